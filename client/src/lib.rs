@@ -1,0 +1,1 @@
+//! Robot SDK over zenoh and HTTP.

@@ -1,0 +1,1 @@
+//! The wire: messages, key expressions and checked conversions.

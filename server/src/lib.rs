@@ -1,0 +1,1 @@
+//! The Waymark server and command line.

@@ -1,0 +1,1 @@
+//! A rendered building with robots and exact truth.

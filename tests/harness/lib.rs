@@ -1,0 +1,1 @@
+//! Servers started and scored for the end-to-end tests.

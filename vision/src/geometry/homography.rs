@@ -1,0 +1,1 @@
+//! Plane homographies (method 4).

@@ -1,0 +1,5 @@
+//! Homographies, lines and polygons in the image plane.
+
+pub mod homography;
+pub mod line;
+pub mod polygon;

@@ -1,0 +1,1 @@
+//! Validation gates (method 9).

@@ -1,0 +1,7 @@
+//! From views of one landmark to its model (method 7 to 9).
+
+pub mod pca;
+pub mod threshold;
+pub mod gates;
+pub mod synthesis;
+pub mod model;

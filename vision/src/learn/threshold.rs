@@ -1,0 +1,1 @@
+//! The threshold tau (method 8).

@@ -1,0 +1,3 @@
+//! Where the camera is, from a recognised landmark of known size (method 13).
+
+pub mod pose;

@@ -1,0 +1,78 @@
+//! Every knob of the pipeline in one place, grouped by stage. The defaults are the method's (section 20).
+
+use crate::{
+    detect::{
+        chains::ChainParams, edges::EdgeParams, quads::QuadParams, relaxation::RelaxationParams,
+        segments::SegmentParams, similarity::SimilarityParams,
+    },
+    icon::IconParams,
+    learn::model::LearnParams,
+    recognise::{correlation::CorrelationParams, descriptor::DescriptorParams, harris::HarrisParams, hausdorff::HausdorffParams, verdict::VerdictParams},
+};
+use serde::{Deserialize, Serialize};
+
+/// Parameters from image to quads.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct DetectParams {
+    /// Canny-Deriche edges.
+    pub edges: EdgeParams,
+    /// Thinning and chaining.
+    pub chains: ChainParams,
+    /// Straight segments.
+    pub segments: SegmentParams,
+    /// Cues and gates of pairs.
+    pub similarity: SimilarityParams,
+    /// Both relaxations.
+    pub relaxation: RelaxationParams,
+    /// Quads and their corners.
+    pub quads: QuadParams,
+}
+
+/// Parameters of points, descriptors, distances and the decision.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RecogniseParams {
+    /// Harris points.
+    pub harris: HarrisParams,
+    /// The 7-component descriptor.
+    pub descriptor: DescriptorParams,
+    /// C^r.
+    pub correlation: CorrelationParams,
+    /// H^r.
+    pub hausdorff: HausdorffParams,
+    /// The decision.
+    pub verdict: VerdictParams,
+}
+
+/// All parameters of the pipeline.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Params {
+    /// Image to quads.
+    pub detect: DetectParams,
+    /// Quad to icon.
+    pub icon: IconParams,
+    /// Icon to verdict.
+    pub recognise: RecogniseParams,
+    /// Views to model.
+    pub learn: LearnParams,
+}
+
+impl Params {
+    /// Names the settings that define both distances (icon, points, descriptor, ranks). A threshold learnt under one
+    /// hash means nothing under another.
+    pub fn distance_hash(&self) -> u64 {
+        let r = &self.recognise;
+        let text = text_of(&(&self.icon, &r.harris, &r.descriptor, &r.correlation, &r.hausdorff));
+        // FNV-1a, 64 bits: stable across builds and machines.
+        text.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
+            (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
+        })
+    }
+}
+
+/// Field names and values as text. Debug output of plain structs of numbers is stable and needs no format crate.
+fn text_of(parts: &impl std::fmt::Debug) -> String {
+    format!("{parts:?}")
+}

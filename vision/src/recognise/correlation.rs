@@ -1,0 +1,6 @@
+//! Bucketed correlation C^r (method 6.1).
+
+/// Parameters of this stage.
+#[derive(Debug, Clone, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct CorrelationParams {}

@@ -1,0 +1,6 @@
+//! Partial Hausdorff distance H^r (method 6.2).
+
+/// Parameters of this stage.
+#[derive(Debug, Clone, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct HausdorffParams {}

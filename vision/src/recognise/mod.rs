@@ -1,0 +1,94 @@
+//! From icon to verdict: points, descriptors, two distances, candidates, confidence (method 5, 6, 10).
+
+pub mod harris;
+pub mod descriptor;
+pub mod correlation;
+pub mod hausdorff;
+pub mod verdict;
+
+use serde::{Deserialize, Serialize};
+
+/// Number that names a landmark inside one map. The server keeps the readable name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct LandmarkId(pub u64);
+
+/// Which distance decides. A setting of a map.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum DistanceKind {
+    /// Partial Hausdorff distance over Harris points, H^r.
+    Hausdorff,
+    /// Bucketed correlation, C^r.
+    Correlation,
+    /// Both must accept; ratios and order are the correlation's.
+    #[default]
+    Both,
+}
+
+/// Why a candidate was refused although it was looked at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Refusal {
+    /// C^r is not below tau.
+    Correlation,
+    /// H^r is not below tau.
+    Hausdorff,
+    /// Accepted by its own thresholds, but another landmark is too close behind.
+    Margin,
+}
+
+/// A landmark compared with one icon.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Candidate {
+    /// The landmark.
+    pub landmark: LandmarkId,
+    /// C^r in [0, 2] (method 6.1).
+    pub correlation: f64,
+    /// H^r in icon pixels times descriptor distance, infinite with too few points (method 6.2).
+    pub hausdorff: f64,
+    /// The deciding distance of the map's [`DistanceKind`].
+    pub distance: f64,
+    /// The deciding threshold.
+    pub tau: f64,
+    /// `distance / tau`; accepted only below 1.
+    pub ratio: f64,
+    /// P(C_l | Q) of method 10.
+    pub probability: f64,
+    /// The gate that refused it, if one did.
+    pub refusal: Option<Refusal>,
+}
+
+/// The paper's three cases. "Unknown" is an answer, not a failure.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Recognition {
+    /// No landmark of the map.
+    Unknown,
+    /// Exactly this landmark: fit for a pose.
+    Unique(LandmarkId),
+    /// Several fit; this one is nearest. Never enough for a pose by itself.
+    Ambiguous(LandmarkId),
+}
+
+/// What recognition says of one icon.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Verdict {
+    /// The answer.
+    pub recognition: Recognition,
+    /// Nearest landmarks by increasing ratio, at most [`MAX_CANDIDATES`]; refused ones included.
+    pub candidates: Vec<Candidate>,
+    /// The paper's m with the printed 1/(N+1), natural logarithm (method 10). Never a gate.
+    pub entropy_m: f64,
+    /// 1 - ln K / ln(N+1), in (0, 1].
+    pub entropy_norm: f64,
+    /// How sure the identity is, 0 to 1; 0 for `Unknown`.
+    pub confidence: f64,
+    /// Which of the four corner rotations matched: corner `rotation` of the quad is the landmark's top-left.
+    pub rotation: usize,
+    /// Which border matched: 0 for the quad's corners, i for alternate i - 1.
+    pub border: usize,
+    /// Landmarks compared (N).
+    pub landmarks: usize,
+}
+
+/// Candidates kept in a verdict.
+pub const MAX_CANDIDATES: usize = 5;

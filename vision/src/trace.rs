@@ -1,0 +1,75 @@
+//! An optional record of every stage, for pictures and timings. The pipeline hands each stage's output to a `Trace`;
+//! with [`NoTrace`] that costs nothing. The clock and all drawing live with whoever implements the trait.
+
+use crate::detect::{chains::EdgeChain, edges::EdgeMap, quads::Quad, segments::EdgeSegment, similarity::SegmentPair};
+
+/// The stages in their order; names appear in timings and picture files.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Stage {
+    /// Canny-Deriche gradient, non-maximum suppression, hysteresis.
+    Edges,
+    /// Thinning and chaining.
+    Chains,
+    /// Recursive segmentation.
+    Segments,
+    /// Similarity and the first relaxation.
+    Pairs,
+    /// Second relaxation, border choice, sub-pixel corners.
+    Quads,
+    /// Rectified icons.
+    Icons,
+    /// Points, descriptors and distances to the models.
+    Recognition,
+    /// Poses from recognised landmarks.
+    Poses,
+}
+
+impl Stage {
+    /// Every stage, in order.
+    pub const ALL: [Stage; 8] = [
+        Stage::Edges,
+        Stage::Chains,
+        Stage::Segments,
+        Stage::Pairs,
+        Stage::Quads,
+        Stage::Icons,
+        Stage::Recognition,
+        Stage::Poses,
+    ];
+
+    /// Lower-case name, as in timings.
+    pub fn name(self) -> &'static str {
+        match self {
+            Stage::Edges => "edges",
+            Stage::Chains => "chains",
+            Stage::Segments => "segments",
+            Stage::Pairs => "pairs",
+            Stage::Quads => "quads",
+            Stage::Icons => "icons",
+            Stage::Recognition => "recognition",
+            Stage::Poses => "poses",
+        }
+    }
+}
+
+/// Told of each stage as it ends. Every method has an empty default.
+pub trait Trace {
+    /// `stage` has just ended.
+    fn finished(&mut self, _stage: Stage) {}
+    /// The edge map.
+    fn edges(&mut self, _edges: &EdgeMap) {}
+    /// The edge chains.
+    fn chains(&mut self, _chains: &[EdgeChain]) {}
+    /// The straight segments.
+    fn segments(&mut self, _segments: &[EdgeSegment]) {}
+    /// The matched pairs of opposite sides.
+    fn pairs(&mut self, _pairs: &[SegmentPair]) {}
+    /// The quads.
+    fn quads(&mut self, _quads: &[Quad]) {}
+}
+
+/// Records nothing.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct NoTrace;
+
+impl Trace for NoTrace {}
