@@ -1,1 +1,9 @@
-//! The Waymark server and command line.
+//! The Waymark server and command line: store, bus, engine and HTTP face around the pure crates `vision` and `map`.
+//!
+//! A frame walks `bus -> engine -> vision -> map -> bus`; a lesson walks `http -> store -> jobs -> store -> engine`.
+//! zenoh appears only in `bus`, sqlx only in `store`, axum only in `http`.
+
+pub mod config;
+pub mod engine;
+pub mod bus;
+pub mod cli;

@@ -1,0 +1,1 @@
+//! The zenoh side: frames, odometry and presence in, answers and events out.

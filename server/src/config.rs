@@ -1,0 +1,381 @@
+//! Settings. In two steps: [`RawConfig`] is what a file, the environment and the command line say; [`Config`] is what
+//! the server runs on, every field checked. Everything has a default: the server starts with no file.
+//!
+//! Precedence, weakest first: defaults, TOML file, `WAYMARK_...` variables (`WAYMARK_LIMITS__FRAME_BYTES=100000`),
+//! command line.
+
+use figment::{
+    Figment,
+    providers::{Env, Format, Serialized, Toml},
+};
+use serde::{Deserialize, Serialize};
+use std::{
+    net::{IpAddr, SocketAddr},
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+use vision::params::Params;
+
+/// Variables that begin with `WAYMARK_` but are read by the command line, not by the settings.
+const NOT_SETTINGS: [&str; 3] = ["config", "server", "log"];
+/// Most vision threads that can be asked for.
+pub const MAX_WORKERS: usize = 256;
+/// Longest name of a map, landmark, robot, camera or fleet.
+pub const MAX_NAME_BYTES: usize = 64;
+
+/// Why the settings cannot be used. The text names the setting.
+#[derive(Debug, thiserror::Error)]
+pub enum ConfigError {
+    /// The file, a variable or their types are wrong.
+    #[error("the settings cannot be read: {0}")]
+    Read(#[source] Box<figment::Error>),
+    /// A setting has a value that cannot be.
+    #[error("setting `{field}`: {reason}")]
+    Invalid {
+        /// Name of the setting.
+        field: &'static str,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// A listener would be reachable from other machines without encryption.
+    #[error(
+        "setting `{field}` = {value} is reachable from other machines in plain text; use a loopback address, or give \
+         --insecure if the network itself is trusted"
+    )]
+    NotLoopback {
+        /// Name of the setting.
+        field: &'static str,
+        /// Its value.
+        value: String,
+    },
+}
+
+/// What file, environment and command line say, unchecked.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RawConfig {
+    /// Directory of the database.
+    pub data: PathBuf,
+    /// Address and port of the HTTP interface; port 0 takes a free one.
+    pub http: String,
+    /// Where the zenoh router listens, as zenoh writes it; port 0 takes a free one.
+    pub zenoh: String,
+    /// Name in every key: `waymark/1/{fleet}/...`.
+    pub fleet: String,
+    /// Vision threads; 0 takes one per core.
+    pub workers: usize,
+    /// Allows plain-text listeners beyond loopback.
+    pub insecure: bool,
+    /// Every bound.
+    pub limits: Limits,
+    /// Parameters of the algorithms. Models learnt under other distance parameters are refused.
+    pub algorithm: Params,
+}
+
+impl Default for RawConfig {
+    fn default() -> Self {
+        Self {
+            data: PathBuf::from("waymark-data"),
+            http: "127.0.0.1:8080".into(),
+            zenoh: "tcp/127.0.0.1:7447".into(),
+            fleet: "default".into(),
+            workers: 0,
+            insecure: false,
+            limits: Limits::default(),
+            algorithm: Params::default(),
+        }
+    }
+}
+
+/// Every bound of the server, each with its unit. A value beyond a bound is refused, never cut.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Limits {
+    /// Largest message from a robot, in bytes. Up to 60 000 bytes fit one zenoh batch and are not fragmented.
+    pub frame_bytes: usize,
+    /// Largest frame, in pixels.
+    pub frame_pixels: usize,
+    /// Largest uploaded image, in bytes.
+    pub upload_bytes: usize,
+    /// Largest uploaded image, in pixels.
+    pub upload_pixels: usize,
+    /// Largest JSON request, in bytes.
+    pub json_bytes: usize,
+    /// Oldest frame that work is still started on, in ms after receipt; a robot may ask for less.
+    pub frame_deadline_ms: u32,
+    /// Maps.
+    pub maps: usize,
+    /// Landmarks in one map.
+    pub landmarks: usize,
+    /// Views of one landmark.
+    pub views: usize,
+    /// Wall segments of one map.
+    pub laser_segments: usize,
+    /// Robots.
+    pub robots: usize,
+    /// Cameras with a slot.
+    pub cameras: usize,
+    /// HTTP connections at a time.
+    pub connections: usize,
+    /// Live event streams (SSE) at a time.
+    pub streams: usize,
+    /// Seconds until the head of a request must be there.
+    pub header_timeout_s: u64,
+    /// Seconds until a request must be answered; event streams are not bound by it.
+    pub request_timeout_s: u64,
+    /// Most items on a page of a list.
+    pub page: usize,
+    /// Commands waiting for the writer.
+    pub write_queue: usize,
+    /// Jobs waiting or running.
+    pub jobs: usize,
+    /// Finished jobs kept.
+    pub jobs_kept: usize,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self {
+            frame_bytes: 4 << 20,
+            frame_pixels: 2_304_000,
+            upload_bytes: 16 << 20,
+            upload_pixels: vision::frame::MAX_AREA_PX,
+            json_bytes: 2 << 20,
+            frame_deadline_ms: 500,
+            maps: 200,
+            landmarks: 2_000,
+            views: 200,
+            laser_segments: 20_000,
+            robots: 1_000,
+            cameras: 2_000,
+            connections: 256,
+            streams: 64,
+            header_timeout_s: 5,
+            request_timeout_s: 30,
+            page: 500,
+            write_queue: 256,
+            jobs: 64,
+            jobs_kept: 1_000,
+        }
+    }
+}
+
+impl Limits {
+    /// Name and value of every bound that must not be 0.
+    fn counts(&self) -> [(&'static str, usize); 18] {
+        [
+            ("limits.frame_bytes", self.frame_bytes),
+            ("limits.frame_pixels", self.frame_pixels),
+            ("limits.upload_bytes", self.upload_bytes),
+            ("limits.upload_pixels", self.upload_pixels),
+            ("limits.json_bytes", self.json_bytes),
+            ("limits.frame_deadline_ms", self.frame_deadline_ms as usize),
+            ("limits.maps", self.maps),
+            ("limits.landmarks", self.landmarks),
+            ("limits.views", self.views),
+            ("limits.laser_segments", self.laser_segments),
+            ("limits.robots", self.robots),
+            ("limits.cameras", self.cameras),
+            ("limits.connections", self.connections),
+            ("limits.header_timeout_s", self.header_timeout_s as usize),
+            ("limits.request_timeout_s", self.request_timeout_s as usize),
+            ("limits.page", self.page),
+            ("limits.write_queue", self.write_queue),
+            ("limits.jobs", self.jobs),
+        ]
+    }
+}
+
+impl RawConfig {
+    /// Defaults, then the file (which must exist if named), then the environment.
+    pub fn read(file: Option<&Path>) -> Result<Self, ConfigError> {
+        let mut figment = Figment::from(Serialized::defaults(Self::default()));
+        if let Some(path) = file {
+            figment = figment.merge(Toml::file_exact(path));
+        }
+        figment
+            .merge(Env::prefixed("WAYMARK_").ignore(&NOT_SETTINGS).split("__"))
+            .extract()
+            .map_err(|e| ConfigError::Read(Box::new(e)))
+    }
+}
+
+/// The settings the server runs on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Config {
+    /// Directory of the database.
+    pub data: PathBuf,
+    /// Where HTTP listens; port 0 takes a free one.
+    pub http_addr: SocketAddr,
+    /// Where the zenoh router listens, `tcp/HOST:PORT`; port 0 takes a free one.
+    pub zenoh_endpoint: String,
+    /// Name in every key.
+    pub fleet: String,
+    /// Vision threads, at least 1.
+    pub workers: usize,
+    /// Every bound.
+    pub limits: Limits,
+    /// Parameters of the algorithms.
+    pub params: Arc<Params>,
+}
+
+impl TryFrom<RawConfig> for Config {
+    type Error = ConfigError;
+
+    fn try_from(raw: RawConfig) -> Result<Self, ConfigError> {
+        let http_addr: SocketAddr = raw
+            .http
+            .parse()
+            .map_err(|e| invalid("http", format!("`{}` is not ADDRESS:PORT ({e})", raw.http)))?;
+        let zenoh_ip = zenoh_address(&raw.zenoh)?.ip();
+        for (field, value, ip) in [("http", &raw.http, http_addr.ip()), ("zenoh", &raw.zenoh, zenoh_ip)] {
+            if !raw.insecure && !is_loopback(ip) {
+                return Err(ConfigError::NotLoopback { field, value: value.clone() });
+            }
+        }
+        if !is_name(&raw.fleet) {
+            return Err(invalid("fleet", format!("`{}` is not of the form [a-z0-9_-]{{1,64}}", raw.fleet)));
+        }
+        if raw.workers > MAX_WORKERS {
+            return Err(invalid("workers", format!("{} is more than {MAX_WORKERS}", raw.workers)));
+        }
+        for (field, value) in raw.limits.counts() {
+            if value == 0 {
+                return Err(invalid(field, "must be at least 1".into()));
+            }
+        }
+        for (field, value) in [
+            ("limits.frame_pixels", raw.limits.frame_pixels),
+            ("limits.upload_pixels", raw.limits.upload_pixels),
+        ] {
+            if value > vision::frame::MAX_AREA_PX {
+                return Err(invalid(
+                    field,
+                    format!("{value} is more than {} px", vision::frame::MAX_AREA_PX),
+                ));
+            }
+        }
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        Ok(Self {
+            data: raw.data,
+            http_addr,
+            zenoh_endpoint: raw.zenoh,
+            fleet: raw.fleet,
+            workers: if raw.workers == 0 { cores } else { raw.workers },
+            limits: raw.limits,
+            params: Arc::new(raw.algorithm),
+        })
+    }
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self::try_from(RawConfig::default()).expect("the defaults are valid")
+    }
+}
+
+fn invalid(field: &'static str, reason: String) -> ConfigError {
+    ConfigError::Invalid { field, reason }
+}
+
+fn is_loopback(ip: IpAddr) -> bool {
+    ip.to_canonical().is_loopback()
+}
+
+/// Only `tcp/IP:PORT`: a host name could resolve to anything, and the other transports are not compiled in.
+fn zenoh_address(endpoint: &str) -> Result<SocketAddr, ConfigError> {
+    endpoint.strip_prefix("tcp/").and_then(|rest| rest.parse().ok()).ok_or_else(|| {
+        invalid("zenoh", format!("`{endpoint}` is not tcp/ADDRESS:PORT with a numeric address"))
+    })
+}
+
+/// Whether `text` may name a map, landmark, robot, camera or fleet: `[a-z0-9_-]{1,64}`. Such names are safe in keys,
+/// paths and file names.
+pub fn is_name(text: &str) -> bool {
+    (1..=MAX_NAME_BYTES).contains(&text.len())
+        && text.bytes().all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'_' || b == b'-')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_example_file_is_the_default() {
+        let text = include_str!("../config.example.toml");
+        let read: RawConfig = Figment::from(Toml::string(text)).extract().unwrap();
+        assert_eq!(read, RawConfig::default());
+        // And it names every setting: without the defaults nothing is missing.
+        let table: toml_keys::Keys = Figment::from(Toml::string(text)).extract().unwrap();
+        assert_eq!(
+            table.limits.len(),
+            serde_json::to_value(Limits::default()).unwrap().as_object().unwrap().len()
+        );
+    }
+
+    mod toml_keys {
+        use std::collections::BTreeMap;
+
+        #[derive(serde::Deserialize)]
+        pub(super) struct Keys {
+            pub(super) limits: BTreeMap<String, u64>,
+        }
+    }
+
+    #[test]
+    fn plain_text_beyond_loopback_is_refused() {
+        for (http, zenoh, ok) in [
+            ("127.0.0.1:0", "tcp/[::1]:7447", true),
+            ("127.9.9.9:80", "tcp/127.0.0.1:0", true),
+            ("0.0.0.0:8080", "tcp/127.0.0.1:7447", false),
+            ("[::]:8080", "tcp/127.0.0.1:7447", false),
+            ("127.0.0.1:8080", "tcp/0.0.0.0:7447", false),
+            ("127.0.0.1:8080", "tcp/192.168.1.4:7447", false),
+        ] {
+            let raw = RawConfig { http: http.into(), zenoh: zenoh.into(), ..RawConfig::default() };
+            assert_eq!(Config::try_from(raw.clone()).is_ok(), ok, "{http} {zenoh}");
+            assert!(Config::try_from(RawConfig { insecure: true, ..raw }).is_ok());
+        }
+    }
+
+    #[test]
+    fn bad_settings_are_named() {
+        let limits = |f: fn(&mut Limits)| {
+            let mut limits = Limits::default();
+            f(&mut limits);
+            RawConfig { limits, ..RawConfig::default() }
+        };
+        for (raw, named) in [
+            (RawConfig { http: "localhost:80".into(), ..RawConfig::default() }, "http"),
+            (RawConfig { zenoh: "tcp/robot-host:7447".into(), ..RawConfig::default() }, "zenoh"),
+            (RawConfig { zenoh: "udp/127.0.0.1:7447".into(), ..RawConfig::default() }, "zenoh"),
+            (RawConfig { fleet: "A/B".into(), ..RawConfig::default() }, "fleet"),
+            (RawConfig { workers: MAX_WORKERS + 1, ..RawConfig::default() }, "workers"),
+            (limits(|l| l.views = 0), "limits.views"),
+            (limits(|l| l.upload_pixels = vision::frame::MAX_AREA_PX + 1), "limits.upload_pixels"),
+        ] {
+            match Config::try_from(raw) {
+                Err(ConfigError::Invalid { field, .. }) => assert_eq!(field, named),
+                other => panic!("{named}: {other:?}"),
+            }
+        }
+        let at_limit = RawConfig { workers: MAX_WORKERS, ..RawConfig::default() };
+        assert_eq!(Config::try_from(at_limit).unwrap().workers, MAX_WORKERS);
+    }
+
+    #[test]
+    fn a_missing_file_and_an_unknown_setting_are_errors() {
+        assert!(RawConfig::read(Some(Path::new("/nonexistent/waymark.toml"))).is_err());
+        let unknown: Result<RawConfig, _> = Figment::from(Toml::string("colour = 3")).extract();
+        assert!(unknown.is_err());
+    }
+
+    #[test]
+    fn names_are_checked_at_the_bound() {
+        assert!(is_name("north-wing_2"));
+        assert!(is_name(&"a".repeat(MAX_NAME_BYTES)));
+        for bad in ["", "A", "a/b", "a*", "a.b", "ä", &"a".repeat(MAX_NAME_BYTES + 1)] {
+            assert!(!is_name(bad), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,3 @@
+//! Frames in, answers out, away from any transport: one slot per camera, workers, and the snapshot they read.
+
+pub mod snapshot;

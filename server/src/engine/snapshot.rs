@@ -1,0 +1,160 @@
+//! What the workers read: one immutable [`MapSnapshot`] per map, swapped whole. Only the store publishes, and only
+//! after its transaction is committed; a reader keeps the `Arc` it took, so an answer rests on one version.
+
+use arc_swap::ArcSwap;
+use std::{collections::BTreeMap, sync::Arc};
+use tokio::sync::broadcast;
+use vision::{
+    localise::pose::LandmarkSize,
+    params::Params,
+    recognise::{DistanceKind, LandmarkId},
+};
+
+/// Changes that a slow listener may lag behind before it loses the oldest.
+const CHANGES_KEPT: usize = 256;
+
+/// One version of one map.
+#[derive(Debug, Clone)]
+pub struct MapSnapshot {
+    /// Name of the map.
+    pub name: String,
+    /// Counts up with every change of the map.
+    pub version: u64,
+    /// Every landmark of the map by number, learnt or not.
+    pub landmarks: BTreeMap<LandmarkId, LandmarkInfo>,
+    /// Which distance decides.
+    pub distance: DistanceKind,
+    /// The parameters the models were learnt under, with the map's own distance.
+    pub params: Arc<Params>,
+}
+
+/// What is known of a landmark besides its appearance.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LandmarkInfo {
+    /// Readable name, unique in the map.
+    pub name: String,
+    /// Width and height, if measured; without it there is no pose.
+    pub size: Option<LandmarkSize>,
+}
+
+/// A map got a new version, or is gone.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct MapChange {
+    /// Name of the map.
+    pub map: String,
+    /// The new version; `None` when the map was deleted.
+    pub version: Option<u64>,
+}
+
+#[derive(Debug, Default, Clone)]
+struct World {
+    maps: BTreeMap<String, Arc<MapSnapshot>>,
+    robots: BTreeMap<String, String>,
+}
+
+/// All maps and the robots' assignments, readable from any thread without waiting.
+#[derive(Debug)]
+pub struct Snapshots {
+    world: ArcSwap<World>,
+    changes: broadcast::Sender<MapChange>,
+}
+
+impl Default for Snapshots {
+    fn default() -> Self {
+        Self { world: ArcSwap::default(), changes: broadcast::channel(CHANGES_KEPT).0 }
+    }
+}
+
+impl Snapshots {
+    /// The current version of `map`.
+    pub fn get(&self, map: &str) -> Option<Arc<MapSnapshot>> {
+        self.world.load().maps.get(map).cloned()
+    }
+
+    /// Name of the robot's map; `None` for a robot that is not registered.
+    pub fn robot_map(&self, robot: &str) -> Option<String> {
+        self.world.load().robots.get(robot).cloned()
+    }
+
+    /// Events of [`Snapshots::publish`] and [`Snapshots::remove_map`] from now on.
+    pub fn changes(&self) -> broadcast::Receiver<MapChange> {
+        self.changes.subscribe()
+    }
+
+    /// Makes `map` the current version of its name. For the store, after the commit.
+    pub fn publish(&self, map: Arc<MapSnapshot>) {
+        let change = MapChange { map: map.name.clone(), version: Some(map.version) };
+        self.world.rcu(|world| {
+            let mut world = World::clone(world);
+            world.maps.insert(map.name.clone(), map.clone());
+            world
+        });
+        self.announce(change);
+    }
+
+    /// Forgets a map. For the store, after the commit.
+    pub fn remove_map(&self, map: &str) {
+        self.world.rcu(|world| {
+            let mut world = World::clone(world);
+            world.maps.remove(map);
+            world
+        });
+        self.announce(MapChange { map: map.to_owned(), version: None });
+    }
+
+    /// Registers a robot on a map, or takes it off with `None`. For the store, after the commit.
+    pub fn set_robot(&self, robot: &str, map: Option<&str>) {
+        self.world.rcu(|world| {
+            let mut world = World::clone(world);
+            match map {
+                Some(map) => world.robots.insert(robot.to_owned(), map.to_owned()),
+                None => world.robots.remove(robot),
+            };
+            world
+        });
+    }
+
+    fn announce(&self, change: MapChange) {
+        // An error only says that nobody listens.
+        drop(self.changes.send(change));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn map(name: &str, version: u64) -> Arc<MapSnapshot> {
+        Arc::new(MapSnapshot {
+            name: name.into(),
+            version,
+            landmarks: BTreeMap::new(),
+            distance: DistanceKind::Both,
+            params: Arc::default(),
+        })
+    }
+
+    #[test]
+    fn a_reader_keeps_its_version() {
+        let snapshots = Snapshots::default();
+        let mut changes = snapshots.changes();
+        snapshots.publish(map("a", 1));
+        let held = snapshots.get("a").unwrap();
+        snapshots.publish(map("a", 2));
+        assert_eq!((held.version, snapshots.get("a").unwrap().version), (1, 2));
+        snapshots.remove_map("a");
+        assert!(snapshots.get("a").is_none());
+        let versions: Vec<_> = std::iter::from_fn(|| changes.try_recv().ok()).map(|c| c.version).collect();
+        assert_eq!(versions, [Some(1), Some(2), None]);
+    }
+
+    #[test]
+    fn robots_come_and_go() {
+        let snapshots = Snapshots::default();
+        assert_eq!(snapshots.robot_map("r1"), None);
+        snapshots.set_robot("r1", Some("a"));
+        assert_eq!(snapshots.robot_map("r1").as_deref(), Some("a"));
+        snapshots.set_robot("r1", None);
+        assert_eq!(snapshots.robot_map("r1"), None);
+    }
+}
