@@ -13,7 +13,9 @@ pub const MAX_AREA_PX: usize = 16 * 1024 * 1024;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FrameError {
     /// Width or height is zero or beyond the limit.
-    #[error("image of {width}x{height} px is outside 1x1 to {MAX_SIDE_PX} px a side and {MAX_AREA_PX} px in all")]
+    #[error(
+        "image of {width}x{height} px is outside 1x1 to {MAX_SIDE_PX} px a side and {MAX_AREA_PX} px in all"
+    )]
     Size {
         /// Claimed width in pixels.
         width: usize,
@@ -50,7 +52,12 @@ pub struct GrayImage {
 impl GrayImage {
     /// Checks size and length. `data` has exactly `width * height` bytes.
     pub fn new(width: usize, height: usize, data: Vec<u8>) -> Result<Self, FrameError> {
-        if width == 0 || height == 0 || width > MAX_SIDE_PX || height > MAX_SIDE_PX || width * height > MAX_AREA_PX {
+        if width == 0
+            || height == 0
+            || width > MAX_SIDE_PX
+            || height > MAX_SIDE_PX
+            || width * height > MAX_AREA_PX
+        {
             return Err(FrameError::Size { width, height });
         }
         if data.len() != width * height {
@@ -127,7 +134,13 @@ pub struct Intrinsics {
 impl Intrinsics {
     /// Checks that every number is finite, focal lengths lie in 10 to 100 000 px, the principal point within
     /// +-20 000 px and distortion coefficients within +-100.
-    pub fn new(fx_px: f64, fy_px: f64, cx_px: f64, cy_px: f64, distortion: Distortion) -> Result<Self, FrameError> {
+    pub fn new(
+        fx_px: f64,
+        fy_px: f64,
+        cx_px: f64,
+        cy_px: f64,
+        distortion: Distortion,
+    ) -> Result<Self, FrameError> {
         let check = |field, value: f64, low: f64, high: f64| {
             if value.is_finite() && (low..=high).contains(&value) {
                 Ok(())
@@ -213,7 +226,13 @@ mod tests {
             Err(FrameError::Intrinsics { field: "fy_px", .. })
         ));
         assert!(matches!(
-            Intrinsics::new(500.0, 500.0, 0.0, 0.0, Distortion::PlumbBob([0.0, f64::INFINITY, 0.0, 0.0, 0.0])),
+            Intrinsics::new(
+                500.0,
+                500.0,
+                0.0,
+                0.0,
+                Distortion::PlumbBob([0.0, f64::INFINITY, 0.0, 0.0, 0.0])
+            ),
             Err(FrameError::Intrinsics { field: "distortion", .. })
         ));
     }
@@ -228,9 +247,14 @@ mod tests {
 
     #[test]
     fn undistort_inverts_project() {
-        let camera =
-            Intrinsics::new(520.0, 518.0, 318.0, 243.0, Distortion::PlumbBob([-0.28, 0.09, 1e-3, -5e-4, -0.01]))
-                .unwrap();
+        let camera = Intrinsics::new(
+            520.0,
+            518.0,
+            318.0,
+            243.0,
+            Distortion::PlumbBob([-0.28, 0.09, 1e-3, -5e-4, -0.01]),
+        )
+        .unwrap();
         let pinhole = Intrinsics { distortion: Distortion::None, ..camera };
         for p in [[0.3, -0.2, 1.0], [-0.5, 0.35, 1.2], [0.0, 0.0, 2.0]] {
             let p = Vector3::from(p);

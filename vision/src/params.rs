@@ -7,7 +7,10 @@ use crate::{
     },
     icon::IconParams,
     learn::model::LearnParams,
-    recognise::{correlation::CorrelationParams, descriptor::DescriptorParams, harris::HarrisParams, hausdorff::HausdorffParams, verdict::VerdictParams},
+    recognise::{
+        correlation::CorrelationParams, descriptor::DescriptorParams, harris::HarrisParams,
+        hausdorff::HausdorffParams, verdict::VerdictParams,
+    },
 };
 use serde::{Deserialize, Serialize};
 

@@ -1,7 +1,9 @@
 //! An optional record of every stage, for pictures and timings. The pipeline hands each stage's output to a `Trace`;
 //! with [`NoTrace`] that costs nothing. The clock and all drawing live with whoever implements the trait.
 
-use crate::detect::{chains::EdgeChain, edges::EdgeMap, quads::Quad, segments::EdgeSegment, similarity::SegmentPair};
+use crate::detect::{
+    chains::EdgeChain, edges::EdgeMap, quads::Quad, segments::EdgeSegment, similarity::SegmentPair,
+};
 
 /// The stages in their order; names appear in timings and picture files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]

@@ -1,5 +1,6 @@
 //! From views of one landmark to its model (method 7 to 9).
 
+pub mod random;
 pub mod pca;
 pub mod threshold;
 pub mod gates;

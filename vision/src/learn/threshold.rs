@@ -1,1 +1,336 @@
-//! The threshold tau (method 8).
+//! The threshold tau of one landmark (method 8).
+//!
+//! In: distances of the landmark's own icons and of everything else. Out: tau with its error rates, where the
+//! weighted cost of false positives and false negatives is least. It knows nothing of icons or of which distance.
+
+use serde::{Deserialize, Serialize};
+
+/// How tau is chosen.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ThresholdParams {
+    /// Cost of a false positive in false negatives (lambda / mu); the paper's 6.
+    pub false_positive_weight: f64,
+    /// tau stays below this share of the smallest distance of anything else while there are no false positives.
+    pub nearest_share: f64,
+}
+
+impl Default for ThresholdParams {
+    fn default() -> Self {
+        Self { false_positive_weight: 6.0, nearest_share: 0.9 }
+    }
+}
+
+/// What held tau where it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LimitedBy {
+    /// The least weighted cost.
+    Cost,
+    /// The share of the nearest other distance.
+    NearestNegative,
+    /// The absolute cap, which holds where there are few negatives.
+    AbsoluteCap,
+}
+
+/// A threshold with its evidence. A distance is accepted only when it is strictly below `tau`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Threshold {
+    /// The threshold; 0 accepts nothing.
+    pub tau: f64,
+    /// Share of other distances below tau.
+    pub false_positive_rate: f64,
+    /// Share of own distances at or above tau.
+    pub false_negative_rate: f64,
+    /// Own distances used (n+).
+    pub positives: usize,
+    /// Other distances used (n-). Below 300 a rate of 1 % is not measurable.
+    pub negatives: usize,
+    /// What held tau.
+    pub limited_by: LimitedBy,
+}
+
+impl Threshold {
+    /// Accepts nothing: what a landmark gets for which there is no threshold.
+    pub const NEVER: Threshold = Threshold {
+        tau: 0.0,
+        false_positive_rate: 0.0,
+        false_negative_rate: 1.0,
+        positives: 0,
+        negatives: 0,
+        limited_by: LimitedBy::Cost,
+    };
+}
+
+/// Why there is no threshold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, thiserror::Error, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ThresholdError {
+    /// No distance of the landmark's own icons.
+    #[error("the landmark has no held-out view to measure its own distances")]
+    NoPositive,
+    /// No distance of anything else.
+    #[error("there is nothing to tell the landmark from")]
+    NoNegative,
+    /// A distance is NaN or negative.
+    #[error("a distance is not a number, or is negative")]
+    NotADistance,
+    /// No own distance is finite.
+    #[error("every own distance is infinite: too few points")]
+    NothingFinite,
+    /// Refusing everything is cheapest.
+    #[error("the landmark cannot be told from others: refusing everything costs least")]
+    Overlap,
+}
+
+/// Weighted empirical cost `S(tau)` with lambda = `weight`, mu = 1. `S` of method 8.
+pub fn cost(tau: f64, positives: &[f64], negatives: &[f64], weight: f64) -> f64 {
+    weight * share(negatives, |d| d < tau) + share(positives, |d| d >= tau)
+}
+
+/// Midpoint of the leftmost interval of least cost (A18). Distances are 0 or more; infinite ones are never accepted.
+pub fn minimise(positives: &[f64], negatives: &[f64], weight: f64) -> Result<f64, ThresholdError> {
+    check(positives)?;
+    if positives.is_empty() {
+        return Err(ThresholdError::NoPositive);
+    }
+    if negatives.is_empty() {
+        return Err(ThresholdError::NoNegative);
+    }
+    check(negatives)?;
+    if positives.iter().all(|d| d.is_infinite()) {
+        return Err(ThresholdError::NothingFinite);
+    }
+    let (n_positive, n_negative) = (positives.len() as f64, negatives.len() as f64);
+    let mut all: Vec<(f64, bool)> = positives.iter().map(|d| (*d, true)).collect();
+    all.extend(negatives.iter().map(|d| (*d, false)));
+    all.retain(|(d, _)| d.is_finite());
+    all.sort_by(|a, b| a.0.total_cmp(&b.0));
+
+    // tau = 0: nothing accepted, every own icon missed. An interval must be strictly cheaper to replace it.
+    let (mut best_tau, mut best_cost) = (0.0, 1.0);
+    let (mut below_positive, mut below_negative) = (0.0, 0.0);
+    for (i, (d, own)) in all.iter().enumerate() {
+        if *own {
+            below_positive += 1.0
+        } else {
+            below_negative += 1.0
+        }
+        let next = all.get(i + 1).map_or(beyond(*d), |n| n.0);
+        if next <= *d {
+            continue;
+        }
+        let cost = weight * below_negative / n_negative + 1.0 - below_positive / n_positive;
+        if cost < best_cost - f64::EPSILON {
+            (best_tau, best_cost) = (f64::midpoint(*d, next), cost);
+        }
+    }
+    if best_tau > 0.0 { Ok(best_tau) } else { Err(ThresholdError::Overlap) }
+}
+
+/// tau for use: [`minimise`], then held below `nearest_share` of the nearest negative where the optimum has no false
+/// positive, and below `cap` always. Without any negative, tau lies just beyond the own distances, below `cap`:
+/// the first landmark of a map has nothing to be told from.
+// Departs from method 8 (n- = 0 gives no threshold): the absolute cap, measured on real strangers, stands in.
+pub fn threshold(
+    positives: &[f64],
+    negatives: &[f64],
+    cap: f64,
+    p: &ThresholdParams,
+) -> Result<Threshold, ThresholdError> {
+    let mut tau = match minimise(positives, negatives, p.false_positive_weight) {
+        Err(ThresholdError::NoNegative) => minimise(positives, &[f64::INFINITY], p.false_positive_weight)?,
+        other => other?,
+    };
+    let mut limited_by = LimitedBy::Cost;
+    let nearest = negatives.iter().copied().fold(f64::INFINITY, f64::min);
+    if nearest > tau && p.nearest_share * nearest < tau {
+        (tau, limited_by) = (p.nearest_share * nearest, LimitedBy::NearestNegative);
+    }
+    if cap < tau {
+        (tau, limited_by) = (cap, LimitedBy::AbsoluteCap);
+    }
+    Ok(Threshold {
+        tau,
+        false_positive_rate: share(negatives, |d| d < tau),
+        false_negative_rate: share(positives, |d| d >= tau),
+        positives: positives.len(),
+        negatives: negatives.len(),
+        limited_by,
+    })
+}
+
+/// Mean and standard deviation of a class of distances, taken for normal.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gaussian {
+    /// Mean.
+    pub mean: f64,
+    /// Standard deviation, positive.
+    pub deviation: f64,
+}
+
+impl Gaussian {
+    /// Fits the finite values; `None` with fewer than two or without spread.
+    pub fn fit(values: &[f64]) -> Option<Self> {
+        let finite: Vec<f64> = values.iter().copied().filter(|d| d.is_finite()).collect();
+        let n = finite.len() as f64;
+        let mean = finite.iter().sum::<f64>() / n;
+        let variance = finite.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0);
+        (finite.len() >= 2 && variance > 0.0).then(|| Self { mean, deviation: variance.sqrt() })
+    }
+}
+
+/// Where the weighted densities cross between the means: for small sets (n+ < 30 or n- < 300). `None` when the own
+/// distances are not the smaller ones or the curves do not cross there.
+pub fn gaussian(own: Gaussian, others: Gaussian, weight: f64) -> Option<f64> {
+    let (m1, s1, m0, s0) = (own.mean, own.deviation, others.mean, others.deviation);
+    if !(m1 < m0) {
+        return None;
+    }
+    let a = 0.5 / (s0 * s0) - 0.5 / (s1 * s1);
+    let b = m1 / (s1 * s1) - m0 / (s0 * s0);
+    let c = 0.5 * (m0 / s0).powi(2) - 0.5 * (m1 / s1).powi(2) - (weight * s1 / s0).ln();
+    let roots = if a.abs() < 1e-12 * (1.0 / (s0 * s0)).max(1.0 / (s1 * s1)) {
+        [-c / b, f64::NAN]
+    } else {
+        let root = (b * b - 4.0 * a * c).sqrt();
+        [(-b - root) / (2.0 * a), (-b + root) / (2.0 * a)]
+    };
+    roots.into_iter().find(|tau| *tau > m1 && *tau < m0)
+}
+
+/// The other end of the interval that begins at the largest distance.
+fn beyond(largest: f64) -> f64 {
+    1.2 * largest + f64::MIN_POSITIVE
+}
+
+fn share(distances: &[f64], is: impl Fn(f64) -> bool) -> f64 {
+    distances.iter().filter(|d| is(**d)).count() as f64 / distances.len().max(1) as f64
+}
+
+fn check(distances: &[f64]) -> Result<(), ThresholdError> {
+    if distances.iter().any(|d| d.is_nan() || *d < 0.0) { Err(ThresholdError::NotADistance) } else { Ok(()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const OWN: [f64; 5] = [1.0, 2.0, 2.5, 4.0, 6.0];
+    const OTHERS: [f64; 6] = [3.0, 5.0, 7.0, 8.0, 9.0, 10.0];
+
+    /// Golden values of method 8.
+    #[test]
+    fn golden_toy() {
+        let tau = minimise(&OWN, &OTHERS, 6.0).unwrap();
+        assert!((tau - 2.75).abs() < 1e-12);
+        assert!((cost(tau, &OWN, &OTHERS, 6.0) - 0.4).abs() < 1e-12);
+        let capped = threshold(&OWN, &OTHERS, 100.0, &ThresholdParams::default()).unwrap();
+        assert!((capped.tau - 2.7).abs() < 1e-12, "0.9 of the nearest negative");
+        assert_eq!(capped.limited_by, LimitedBy::NearestNegative);
+        assert_eq!((capped.positives, capped.negatives), (5, 6));
+        assert!((capped.false_negative_rate - 0.4).abs() < 1e-12 && capped.false_positive_rate < 1e-12);
+    }
+
+    /// Golden value of method 8, and a numerical minimum of the Gaussian cost as oracle.
+    #[test]
+    fn golden_gaussians() {
+        let (own, others) = (Gaussian { mean: 2.0, deviation: 0.7 }, Gaussian { mean: 5.0, deviation: 1.2 });
+        let tau = gaussian(own, others, 6.0).unwrap();
+        assert!((tau - 2.7276).abs() < 5e-5, "{tau}");
+        // d(cost)/d(tau) by a fine sum of the densities: the cost falls before tau and rises after it.
+        let density = |g: Gaussian, x: f64| (-0.5 * ((x - g.mean) / g.deviation).powi(2)).exp() / g.deviation;
+        let slope = |x: f64| 6.0 * density(others, x) - density(own, x);
+        assert!(slope(tau - 1e-4) < 0.0 && slope(tau + 1e-4) > 0.0);
+    }
+
+    #[test]
+    fn equal_deviations_give_the_linear_case() {
+        let own = Gaussian { mean: 1.0, deviation: 0.5 };
+        let others = Gaussian { mean: 4.0, deviation: 0.5 };
+        // (m1 + m0)/2 - s^2 ln(6) / (m0 - m1)
+        let expected = 2.5 - 0.25 * 6.0_f64.ln() / 3.0;
+        assert!((gaussian(own, others, 6.0).unwrap() - expected).abs() < 1e-9);
+        assert!(gaussian(others, own, 6.0).is_none());
+        assert!(gaussian(own, own, 6.0).is_none());
+    }
+
+    #[test]
+    fn gaussian_fit() {
+        let fit = Gaussian::fit(&[1.0, 2.0, 3.0, f64::INFINITY]).unwrap();
+        assert!((fit.mean - 2.0).abs() < 1e-12 && (fit.deviation - 1.0).abs() < 1e-12);
+        assert!(Gaussian::fit(&[1.0, f64::INFINITY]).is_none());
+        assert!(Gaussian::fit(&[1.0, 1.0]).is_none());
+    }
+
+    #[test]
+    fn degenerate_cases_are_typed() {
+        assert_eq!(minimise(&[], &OTHERS, 6.0), Err(ThresholdError::NoPositive));
+        assert_eq!(minimise(&OWN, &[], 6.0), Err(ThresholdError::NoNegative));
+        assert_eq!(minimise(&[f64::NAN], &OTHERS, 6.0), Err(ThresholdError::NotADistance));
+        assert_eq!(minimise(&OWN, &[-1.0], 6.0), Err(ThresholdError::NotADistance));
+        assert_eq!(minimise(&[f64::INFINITY], &OTHERS, 6.0), Err(ThresholdError::NothingFinite));
+        assert_eq!(minimise(&[5.0, 6.0], &[1.0, 2.0], 6.0), Err(ThresholdError::Overlap));
+        assert_eq!(minimise(&[5.0], &[5.0], 6.0), Err(ThresholdError::Overlap));
+        assert_eq!(minimise(&[0.0], &[0.0], 6.0), Err(ThresholdError::Overlap));
+    }
+
+    #[test]
+    fn the_cap_holds_without_negatives() {
+        let p = ThresholdParams::default();
+        let free = threshold(&OWN, &[], 100.0, &p).unwrap();
+        assert!(free.tau > 6.0 && free.tau < 7.0 && free.false_negative_rate < 1e-12);
+        let capped = threshold(&OWN, &[], 3.0, &p).unwrap();
+        assert!((capped.tau - 3.0).abs() < 1e-12 && capped.limited_by == LimitedBy::AbsoluteCap);
+        assert!((capped.false_negative_rate - 0.4).abs() < 1e-12);
+    }
+
+    #[test]
+    fn infinite_distances_are_never_accepted() {
+        let tau = minimise(&[1.0, 2.0, f64::INFINITY], &[f64::INFINITY], 6.0).unwrap();
+        assert!(tau > 2.0 && tau.is_finite());
+        assert!((cost(tau, &[1.0, f64::INFINITY], &[f64::INFINITY], 6.0) - 0.5).abs() < 1e-12);
+    }
+
+    fn distances(max: usize) -> impl Strategy<Value = Vec<f64>> {
+        // A coarse grid, so that ties between and within the classes are common.
+        proptest::collection::vec((0u32..40).prop_map(|d| f64::from(d) * 0.25), 1..max)
+    }
+
+    proptest! {
+        /// Oracle: the cost at every interval, counted anew (O(n^2)).
+        #[test]
+        fn nothing_is_cheaper(own in distances(30), others in distances(30), weight in 0.5f64..8.0) {
+            let mut all: Vec<f64> = own.iter().chain(&others).copied().collect();
+            all.sort_by(f64::total_cmp);
+            all.push(20.0);
+            let candidates: Vec<f64> = all.windows(2).filter(|w| w[1] > w[0]).map(|w| f64::midpoint(w[0], w[1])).collect();
+            let least = candidates.iter().map(|t| cost(*t, &own, &others, weight)).fold(1.0, f64::min);
+            match minimise(&own, &others, weight) {
+                Ok(tau) => {
+                    prop_assert!(cost(tau, &own, &others, weight) <= least + 1e-12);
+                    // Leftmost: everything to the left is dearer.
+                    for t in candidates.iter().filter(|t| **t < tau - 1e-9) {
+                        prop_assert!(cost(*t, &own, &others, weight) > least - 1e-12);
+                    }
+                }
+                Err(error) => {
+                    prop_assert_eq!(error, ThresholdError::Overlap);
+                    prop_assert!(least >= 1.0 - 1e-12);
+                }
+            }
+        }
+
+        #[test]
+        fn more_negatives_never_loosen_a_clean_tau(own in distances(20), extra in 0.0f64..12.0) {
+            let p = ThresholdParams::default();
+            if let (Ok(before), Ok(after)) =
+                (threshold(&own, &[11.0, 12.0], 100.0, &p), threshold(&own, &[11.0, 12.0, extra], 100.0, &p))
+                && after.false_positive_rate < 1e-12 && before.false_positive_rate < 1e-12
+            {
+                prop_assert!(after.tau <= before.tau + 1e-12);
+            }
+        }
+    }
+}
