@@ -1,0 +1,358 @@
+// The live page: the map from above with every robot's tracks, and the last frame of one camera with its quads.
+// Reads the HTTP API once, then follows `maps/{map}/live` (server-sent events). Draws at most once per animation frame.
+
+const API = "/api/v1";
+const TRACK_POINTS = 4000; // per robot and kind: the oldest are forgotten
+const CHI2_2_95 = 5.991; // 95 % of a two-dimensional Gaussian
+
+const byId = (id) => document.getElementById(id);
+const state = {
+  map: null, walls: [], landmarks: [], robots: new Map(), cameras: new Map(), camera: null,
+  view: { x_m: 0, y_m: 0, px_per_m: 40, fitted: false }, recognised: new Map(), dirty: true, source: null,
+};
+
+const getJson = async (path) => {
+  const answer = await fetch(API + path, { headers: { accept: "application/json" } });
+  if (!answer.ok) throw new Error(`${path}: ${answer.status}`);
+  return answer.json();
+};
+
+// ---- what is heard ----
+
+function robotOf(name) {
+  if (!state.robots.has(name)) {
+    state.robots.set(name, { tracks: { truth: [], odometry: [], pose: [] }, covariance: null, frames: 0, recognised: 0, corrections: 0 });
+    byId("robot-hint").textContent = "";
+  }
+  return state.robots.get(name);
+}
+
+function extend(name, kind, pose) {
+  const track = robotOf(name).tracks[kind];
+  const last = track[track.length - 1];
+  if (last && Math.hypot(last.x_m - pose.x_m, last.y_m - pose.y_m) < 0.005 && Math.abs(last.theta_rad - pose.theta_rad) < 0.005) return;
+  track.push(pose);
+  if (track.length > TRACK_POINTS) track.shift();
+}
+
+const heard = {
+  pose(e) {
+    extend(e.robot, "pose", e.pose);
+    const robot = robotOf(e.robot);
+    robot.covariance = e.covariance;
+    robot.corrections = e.corrections;
+  },
+  odometry(e) { extend(e.robot, "odometry", e.pose); },
+  truth(e) { extend(e.robot, "truth", e.pose); },
+  answer(e) {
+    const robot = robotOf(e.robot);
+    robot.frames += 1;
+    for (const quad of e.answer.quads) {
+      if (quad.verdict !== "unique") continue;
+      robot.recognised += 1;
+      state.recognised.set(quad.landmark, performance.now());
+    }
+    const key = `${e.robot}/${e.camera}`;
+    if (!state.cameras.has(key)) {
+      byId("camera-choice").add(new Option(key, key));
+      state.camera ??= key;
+    }
+    state.cameras.set(key, e.answer);
+    if (key === state.camera) showFrame(key, e.answer);
+  },
+  map_changed() { loadMap(state.map); },
+};
+
+function follow(map) {
+  state.source?.close();
+  const source = new EventSource(`${API}/maps/${encodeURIComponent(map)}/live`);
+  state.source = source;
+  const link = byId("link");
+  source.onopen = () => { link.textContent = "live"; link.className = "link-live"; };
+  source.onerror = () => { link.textContent = "connection lost, trying again"; link.className = "link-lost"; };
+  for (const [kind, hear] of Object.entries(heard)) {
+    source.addEventListener(kind, (event) => { hear(JSON.parse(event.data)); state.dirty = true; });
+  }
+}
+
+// ---- the frame ----
+
+let frameBusy = false;
+async function showFrame(key, answer) {
+  if (frameBusy) return; // the next answer brings a newer one
+  frameBusy = true;
+  try {
+    const [robot, camera] = key.split("/");
+    const reply = await fetch(`${API}/robots/${robot}/cameras/${camera}/frame?seq=${answer.seq}`, { cache: "no-store" });
+    if (!reply.ok) return;
+    const picture = await createImageBitmap(await reply.blob());
+    drawFrame(picture, answer);
+    listQuads(answer);
+    const work = (answer.timings ?? []).reduce((sum, t) => sum + t.ms, 0);
+    byId("frame-facts").textContent = `frame ${answer.seq}: ${answer.status}, ${answer.quads.length} quads, ` +
+      `${work.toFixed(1)} ms of work, answered after ${answer.age_ms.toFixed(0)} ms`;
+  } finally { frameBusy = false; }
+}
+
+const COLOURS = { unique: "#4ade80", ambiguous: "#fbbf24", unknown: "#94a3b8" };
+
+function drawFrame(picture, answer) {
+  const canvas = byId("frame");
+  canvas.width = picture.width;
+  canvas.height = picture.height;
+  const c = canvas.getContext("2d");
+  c.drawImage(picture, 0, 0);
+  const unit = Math.max(1, picture.width / 640);
+  c.lineWidth = 2 * unit;
+  c.font = `${14 * unit}px system-ui`;
+  answer.quads.forEach((quad, index) => {
+    c.strokeStyle = COLOURS[quad.verdict] ?? COLOURS.unknown;
+    c.beginPath();
+    quad.corners.forEach((p, i) => (i ? c.lineTo(p.u_px + 0.5, p.v_px + 0.5) : c.moveTo(p.u_px + 0.5, p.v_px + 0.5)));
+    c.closePath();
+    c.stroke();
+    const label = quad.landmark || `${index + 1}`;
+    const { u_px, v_px } = quad.corners[0];
+    const y = Math.max(v_px - 4 * unit, 14 * unit);
+    c.fillStyle = "rgba(0,0,0,.65)";
+    c.fillRect(u_px, y - 14 * unit, c.measureText(label).width + 6 * unit, 17 * unit);
+    c.fillStyle = c.strokeStyle;
+    c.fillText(label, u_px + 3 * unit, y);
+  });
+}
+
+function row(cells) {
+  const tr = document.createElement("tr");
+  for (const cell of cells) tr.insertCell().textContent = cell;
+  return tr;
+}
+
+function listQuads(answer) {
+  byId("quads").replaceChildren(...answer.quads.map((quad, index) => {
+    const [first, second] = quad.candidates ?? [];
+    const name = quad.landmark || (quad.verdict === "ambiguous" && first ? `${first.landmark}?` : quad.verdict || quad.kind);
+    const near = (candidate) => (candidate ? `${candidate.landmark} ${candidate.ratio.toFixed(2)}` : "");
+    return row([index + 1, name, first ? first.ratio.toFixed(2) : "", quad.landmark ? quad.confidence.toFixed(2) : "",
+      near(quad.landmark ? second : first)]);
+  }));
+}
+
+// ---- the map ----
+
+function fit() {
+  const xs = [], ys = [];
+  for (const w of state.walls) for (const [x, y] of [w.a, w.b]) { xs.push(x); ys.push(y); }
+  for (const l of state.landmarks) if (l.place) { xs.push(l.place.x_m); ys.push(l.place.y_m); }
+  if (!xs.length) return;
+  const canvas = byId("map");
+  const [x0, x1, y0, y1] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
+  const scale = Math.min((canvas.clientWidth - 40) / Math.max(x1 - x0, 1), (canvas.clientHeight - 40) / Math.max(y1 - y0, 1));
+  state.view = { x_m: (x0 + x1) / 2, y_m: (y0 + y1) / 2, px_per_m: scale, fitted: true };
+  state.dirty = true;
+}
+
+const layerOn = (name) => document.querySelector(`[data-layer=${name}]`).checked;
+
+function resolveColours() {
+  // light-dark() resolves only on a used property, so ask a probe element.
+  const probe = document.createElement("span");
+  document.body.append(probe);
+  const resolved = {};
+  for (const name of ["wall", "landmark", "truth", "odometry", "pose", "faint", "line", "ink"]) {
+    probe.style.color = `var(--${name})`;
+    resolved[name] = getComputedStyle(probe).color;
+  }
+  probe.remove();
+  return resolved;
+}
+
+function drawMap() {
+  if (!state.dirty) return;
+  state.dirty = false;
+  const canvas = byId("map");
+  const ratio = window.devicePixelRatio || 1;
+  const [w, h] = [canvas.clientWidth, canvas.clientHeight];
+  if (canvas.width !== Math.round(w * ratio) || canvas.height !== Math.round(h * ratio)) {
+    canvas.width = Math.round(w * ratio);
+    canvas.height = Math.round(h * ratio);
+    if (!state.view.fitted) fit();
+  }
+  const c = canvas.getContext("2d");
+  const { x_m, y_m, px_per_m } = state.view;
+  const px = (x, y) => [w / 2 + (x - x_m) * px_per_m, h / 2 - (y - y_m) * px_per_m];
+  c.setTransform(ratio, 0, 0, ratio, 0, 0);
+  c.clearRect(0, 0, w, h);
+  c.lineCap = "round";
+  const ink = resolveColours();
+  drawGrid(c, w, h, ink);
+  if (layerOn("walls")) {
+    stroke(c, ink.wall, 2.5);
+    for (const wall of state.walls) { line(c, px(...wall.a), px(...wall.b)); }
+  }
+  if (layerOn("landmarks")) for (const landmark of state.landmarks) drawLandmark(c, landmark, px, ink);
+  for (const kind of ["odometry", "truth", "pose"]) {
+    if (!layerOn(kind)) continue;
+    for (const [name, robot] of state.robots) drawTrack(c, name, robot, kind, px, ink);
+  }
+}
+
+const stroke = (c, style, width) => { c.strokeStyle = style; c.fillStyle = style; c.lineWidth = width; };
+const line = (c, a, b) => { c.beginPath(); c.moveTo(...a); c.lineTo(...b); c.stroke(); };
+
+function drawGrid(c, w, h, ink) {
+  const { x_m, y_m, px_per_m } = state.view;
+  const step = [0.5, 1, 2, 5, 10, 20, 50, 100].find((s) => s * px_per_m >= 40) ?? 100;
+  stroke(c, ink.line, 1);
+  for (let x = Math.ceil((x_m - w / 2 / px_per_m) / step) * step; x < x_m + w / 2 / px_per_m; x += step) {
+    const u = w / 2 + (x - x_m) * px_per_m;
+    line(c, [u, 0], [u, h]);
+  }
+  for (let y = Math.ceil((y_m - h / 2 / px_per_m) / step) * step; y < y_m + h / 2 / px_per_m; y += step) {
+    const v = h / 2 - (y - y_m) * px_per_m;
+    line(c, [0, v], [w, v]);
+  }
+  stroke(c, ink.faint, 2);
+  line(c, [12, h - 12], [12 + step * px_per_m, h - 12]);
+  c.font = "12px system-ui";
+  c.fillText(`${step} m`, 16, h - 17);
+}
+
+function drawLandmark(c, landmark, px, ink) {
+  const place = landmark.place;
+  if (!place) return;
+  const half = (landmark.size?.width_m ?? 0.5) / 2;
+  const [dx, dy] = [-Math.sin(place.theta_rad) * half, Math.cos(place.theta_rad) * half];
+  const seen = performance.now() - (state.recognised.get(landmark.name) ?? -1e9) < 800;
+  stroke(c, ink.landmark, seen ? 9 : 5);
+  line(c, px(place.x_m - dx, place.y_m - dy), px(place.x_m + dx, place.y_m + dy));
+  const [u, v] = px(place.x_m + 0.35 * Math.cos(place.theta_rad), place.y_m + 0.35 * Math.sin(place.theta_rad));
+  c.font = seen ? "bold 12px system-ui" : "12px system-ui";
+  c.fillText(landmark.name, u - c.measureText(landmark.name).width / 2, v + 4);
+  if (seen) state.dirty = true; // to dim it again in time
+}
+
+function drawTrack(c, name, robot, kind, px, ink) {
+  const track = robot.tracks[kind];
+  if (!track.length) return;
+  stroke(c, ink[kind], 1.6);
+  c.beginPath();
+  track.forEach((p, i) => (i ? c.lineTo(...px(p.x_m, p.y_m)) : c.moveTo(...px(p.x_m, p.y_m))));
+  c.stroke();
+  const last = track[track.length - 1];
+  const [u, v] = px(last.x_m, last.y_m);
+  c.save();
+  c.translate(u, v);
+  c.rotate(-last.theta_rad);
+  c.beginPath();
+  c.moveTo(9, 0); c.lineTo(-6, 5); c.lineTo(-6, -5);
+  c.closePath();
+  c.fill();
+  c.restore();
+  if (kind !== "pose") return;
+  if (robot.covariance) ellipse(c, u, v, robot.covariance);
+  c.font = "12px system-ui";
+  c.fillText(name, u + 10, v - 8);
+}
+
+function ellipse(c, u, v, covariance) {
+  const [a, b, d] = [covariance[0], covariance[1], covariance[4]];
+  const mean = (a + d) / 2, root = Math.hypot((a - d) / 2, b);
+  const axes = [mean + root, Math.max(mean - root, 0)].map((e) => Math.sqrt(e * CHI2_2_95) * state.view.px_per_m);
+  c.beginPath();
+  c.ellipse(u, v, Math.max(axes[0], 1), Math.max(axes[1], 1), -0.5 * Math.atan2(2 * b, a - d), 0, 2 * Math.PI);
+  c.stroke();
+}
+
+// ---- the robots ----
+
+function errorOf(robot, kind) {
+  const truth = robot.tracks.truth.at(-1), other = robot.tracks[kind].at(-1);
+  return truth && other ? `${Math.hypot(truth.x_m - other.x_m, truth.y_m - other.y_m).toFixed(2)} m` : "";
+}
+
+function listRobots() {
+  const rows = [...state.robots].sort(([a], [b]) => a.localeCompare(b)).map(([name, robot]) => {
+    const pose = robot.tracks.pose.at(-1);
+    const sigma = robot.covariance ? `${Math.sqrt(robot.covariance[0] + robot.covariance[4]).toFixed(2)} m` : "";
+    return row([name, pose ? `${pose.x_m.toFixed(2)}, ${pose.y_m.toFixed(2)} m, ${(pose.theta_rad * 180 / Math.PI).toFixed(0)}°` : "not localised yet",
+      sigma, robot.frames, robot.recognised, robot.corrections, errorOf(robot, "pose"), errorOf(robot, "odometry")]);
+  });
+  byId("robots").replaceChildren(...rows);
+}
+
+// ---- start ----
+
+async function loadMap(name) {
+  const [map, laser, landmarks] = await Promise.all([
+    getJson(`/maps/${encodeURIComponent(name)}`), getJson(`/maps/${encodeURIComponent(name)}/laser`),
+    getJson(`/maps/${encodeURIComponent(name)}/landmarks?limit=500`),
+  ]);
+  Object.assign(state, { map: name, walls: laser.segments, landmarks: landmarks.items, dirty: true });
+  const active = state.landmarks.filter((l) => l.status === "active").length;
+  byId("map-facts").textContent = `version ${map.version}, ${active} of ${state.landmarks.length} landmarks active, ${state.walls.length} walls`;
+  byId("map-hint").textContent = state.walls.length || state.landmarks.some((l) => l.place) ? "" : "This map has no walls and no placed landmarks yet.";
+  if (!state.view.fitted) fit();
+}
+
+async function start() {
+  const maps = (await getJson("/maps")).items;
+  const choice = byId("map-choice");
+  choice.replaceChildren(...maps.map((m) => new Option(m.name, m.name)));
+  const asked = new URLSearchParams(location.search).get("map");
+  const name = maps.some((m) => m.name === asked) ? asked : maps[0]?.name;
+  if (!name) {
+    byId("map-hint").textContent = "There is no map yet. Make one with `waymark map create`, or by the API.";
+    setTimeout(start, 2000);
+    return;
+  }
+  choice.value = name;
+  await loadMap(name);
+  follow(name);
+}
+
+function wireUp() {
+  byId("map-choice").addEventListener("change", (e) => { location.search = `?map=${encodeURIComponent(e.target.value)}`; });
+  byId("camera-choice").addEventListener("change", (e) => {
+    state.camera = e.target.value;
+    showFrame(state.camera, state.cameras.get(state.camera));
+  });
+  byId("layers").addEventListener("change", () => { state.dirty = true; });
+  byId("fit").addEventListener("click", fit);
+  window.addEventListener("resize", () => { state.dirty = true; });
+  const canvas = byId("map");
+  const zoom = (factor, u, v) => {
+    const view = state.view;
+    const dx = (u - canvas.clientWidth / 2) / view.px_per_m, dy = -(v - canvas.clientHeight / 2) / view.px_per_m;
+    const next = Math.min(Math.max(view.px_per_m * factor, 2), 2000);
+    view.x_m += dx * (1 - view.px_per_m / next);
+    view.y_m += dy * (1 - view.px_per_m / next);
+    view.px_per_m = next;
+    state.dirty = true;
+  };
+  canvas.addEventListener("wheel", (e) => { e.preventDefault(); zoom(Math.exp(-e.deltaY / 400), e.offsetX, e.offsetY); }, { passive: false });
+  canvas.addEventListener("pointermove", (e) => {
+    if (!(e.buttons & 1)) return;
+    state.view.x_m -= e.movementX / state.view.px_per_m;
+    state.view.y_m += e.movementY / state.view.px_per_m;
+    state.dirty = true;
+  });
+  canvas.addEventListener("keydown", (e) => {
+    const step = 60 / state.view.px_per_m;
+    const act = { "+": () => zoom(1.25, canvas.clientWidth / 2, canvas.clientHeight / 2),
+      "-": () => zoom(0.8, canvas.clientWidth / 2, canvas.clientHeight / 2),
+      ArrowLeft: () => { state.view.x_m -= step; }, ArrowRight: () => { state.view.x_m += step; },
+      ArrowUp: () => { state.view.y_m += step; }, ArrowDown: () => { state.view.y_m -= step; } }[e.key];
+    if (!act) return;
+    e.preventDefault();
+    act();
+    state.dirty = true;
+  });
+}
+
+wireUp();
+start().catch((error) => {
+  byId("map-hint").textContent = `The server does not answer as expected (${error.message}). Reload to try again.`;
+});
+setInterval(listRobots, 500);
+const loop = () => { drawMap(); requestAnimationFrame(loop); };
+loop();
