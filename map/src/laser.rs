@@ -1,0 +1,120 @@
+//! A planar laser scan, checked once: in come bearings and ranges, out come points in the laser frame.
+
+use crate::{
+    check::{self, OutOfRange},
+    pose2::Pose2,
+};
+use nalgebra::Point2;
+use std::f64::consts::TAU;
+
+/// Most beams accepted in a scan.
+pub const MAX_BEAMS: usize = 16_384;
+/// Largest accepted maximum range.
+pub const MAX_RANGE_M: f64 = 1000.0;
+
+/// Why a scan cannot be used.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum ScanError {
+    /// A number is out of range.
+    #[error(transparent)]
+    OutOfRange(#[from] OutOfRange),
+    /// No beam, or more than [`MAX_BEAMS`].
+    #[error("ranges_m has {0} beams, 1 to {MAX_BEAMS} accepted")]
+    Beams(usize),
+}
+
+/// One scan: beam i has bearing `first_bearing_rad + i * bearing_step_rad`, counter-clockwise from the laser's x.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scan {
+    robot_from_laser: Pose2,
+    first_bearing_rad: f64,
+    bearing_step_rad: f64,
+    max_range_m: f64,
+    ranges_m: Vec<f32>,
+}
+
+impl Scan {
+    /// Checks everything but single ranges: those that are NaN, infinite, not positive or at least `max_range_m` are
+    /// beams without a return. `bearing_step_rad` may be negative, not zero; the fan is at most one turn.
+    pub fn new(
+        robot_from_laser: Pose2,
+        first_bearing_rad: f64,
+        bearing_step_rad: f64,
+        max_range_m: f64,
+        ranges_m: Vec<f32>,
+    ) -> Result<Self, ScanError> {
+        if ranges_m.is_empty() || ranges_m.len() > MAX_BEAMS {
+            return Err(ScanError::Beams(ranges_m.len()));
+        }
+        robot_from_laser.check()?;
+        check::within("first_bearing_rad", first_bearing_rad, -TAU, TAU)?;
+        check::within("bearing_step_rad", bearing_step_rad.abs(), 1e-5, TAU)?;
+        let fan_rad = bearing_step_rad.abs() * (ranges_m.len() - 1) as f64;
+        check::within("bearing_step_rad", fan_rad, 0.0, TAU + 1e-6)?;
+        check::within("max_range_m", max_range_m, 0.1, MAX_RANGE_M)?;
+        Ok(Self { robot_from_laser, first_bearing_rad, bearing_step_rad, max_range_m, ranges_m })
+    }
+
+    /// Where the laser sits on the robot.
+    pub fn robot_from_laser(&self) -> &Pose2 {
+        &self.robot_from_laser
+    }
+
+    /// Angle between two beams, signed.
+    pub fn bearing_step_rad(&self) -> f64 {
+        self.bearing_step_rad
+    }
+
+    /// At and beyond it there is no return.
+    pub fn max_range_m(&self) -> f64 {
+        self.max_range_m
+    }
+
+    /// Ranges as given.
+    pub fn ranges_m(&self) -> &[f32] {
+        &self.ranges_m
+    }
+
+    /// Bearing of beam `i`.
+    pub fn bearing_rad(&self, i: usize) -> f64 {
+        self.first_bearing_rad + i as f64 * self.bearing_step_rad
+    }
+
+    /// Range of beam `i`, if it came back.
+    pub fn range_m(&self, i: usize) -> Option<f64> {
+        self.ranges_m.get(i).map(|r| f64::from(*r)).filter(|r| *r > 0.0 && *r < self.max_range_m)
+    }
+
+    /// Point of beam `i` in the laser frame, if it came back.
+    pub fn point(&self, i: usize) -> Option<Point2<f64>> {
+        let (s, c) = self.bearing_rad(i).sin_cos();
+        self.range_m(i).map(|r| Point2::new(r * c, r * s))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::FRAC_PI_2;
+
+    #[test]
+    fn beams_become_points_and_misses_do_not() {
+        let ranges = vec![2.0, f32::NAN, 9.0, 0.0, -1.0];
+        let scan = Scan::new(Pose2::default(), -FRAC_PI_2, FRAC_PI_2, 8.0, ranges).unwrap();
+        assert!((scan.point(0).unwrap() - Point2::new(0.0, -2.0)).norm() < 1e-12);
+        assert!((1..6).all(|i| scan.point(i).is_none()));
+    }
+
+    #[test]
+    fn bounds_are_held() {
+        let scan = |step, max, n| Scan::new(Pose2::default(), 0.0, step, max, vec![1.0; n]);
+        assert!(scan(TAU / MAX_BEAMS as f64, MAX_RANGE_M, MAX_BEAMS).is_ok());
+        assert_eq!(scan(1e-4, 8.0, MAX_BEAMS + 1), Err(ScanError::Beams(MAX_BEAMS + 1)));
+        assert_eq!(scan(1e-3, 8.0, 0), Err(ScanError::Beams(0)));
+        assert!(scan(1e-3, MAX_RANGE_M * 1.01, 10).is_err());
+        assert!(scan(0.0, 8.0, 10).is_err());
+        assert!(scan(0.1, 8.0, 65).is_err(), "more than a turn");
+        assert!(scan(f64::NAN, 8.0, 10).is_err());
+        assert!(Scan::new(Pose2::new(f64::NAN, 0.0, 0.0), 0.0, 0.1, 8.0, vec![1.0]).is_err());
+    }
+}

@@ -1,0 +1,104 @@
+//! From landmarks of known place, seen by a camera of known mounting, to the robot's pose on the floor (method 13.6).
+
+use crate::{place::LandmarkPlace, pose2::Pose2Covariance};
+use nalgebra::{Matrix3, Matrix3x6, Matrix6};
+use vision::{localise::pose::LandmarkPose, recognise::LandmarkId};
+
+/// A recognised landmark and where the map says it hangs.
+#[derive(Debug, Clone, Copy)]
+pub struct Sighting<'a> {
+    /// Which one.
+    pub landmark: LandmarkId,
+    /// How it was seen.
+    pub seen: &'a LandmarkPose,
+    /// Where it hangs.
+    pub place: &'a LandmarkPlace,
+}
+
+/// A source of error that stays the same from fix to fix: fusing fixes as if it did not makes a filter overconfident.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum NuisanceKey {
+    /// The place and size of a landmark: (x, y, theta, z, width, height).
+    Landmark(LandmarkId),
+    /// The mounting of the camera: left perturbation (rotation, translation), robot frame.
+    Mounting,
+}
+
+/// How a lasting error moves a fix: `pose error = jacobian * error`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Nuisance {
+    /// Whose error.
+    pub key: NuisanceKey,
+    /// Derivative of (x, y, theta) by it.
+    pub jacobian: Matrix3x6<f64>,
+    /// Its covariance.
+    pub covariance: Matrix6<f64>,
+}
+
+/// What told the two solutions of the planar ambiguity apart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DecidedBy {
+    /// There was one solution only.
+    Single,
+    /// The corners and the known mounting (camera height, tilt, no roll): the other does not fit them.
+    Image,
+    /// The other lies where it cannot be: behind the wall.
+    Side,
+    /// The prior.
+    Prior,
+}
+
+/// The robot's pose from one frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fix {
+    /// `map_from_robot` with everything that is uncertain: corners, places of landmarks, mounting.
+    pub pose: Pose2Covariance,
+    /// The part of the covariance that is new in every frame (corners).
+    pub noise: Matrix3<f64>,
+    /// The parts that last.
+    pub nuisances: Vec<Nuisance>,
+    /// The landmarks it rests on.
+    pub landmarks: Vec<LandmarkId>,
+    /// How the planar ambiguity was resolved.
+    pub decided_by: DecidedBy,
+    /// Weighted squared residual of the corners.
+    pub chi2: f64,
+    /// Its degrees of freedom: 8 a landmark less 3.
+    pub dof: usize,
+}
+
+/// Why recognised landmarks gave no pose.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum FixRefusal {
+    /// No planar pose explains the corners: camera height, tilt or the landmark's place is wrong.
+    Room {
+        /// Weighted squared residual of the best try.
+        chi2: f64,
+        /// The gate.
+        limit: f64,
+    },
+    /// The prior rules every solution out.
+    Prior {
+        /// Squared Mahalanobis distance of the nearest solution.
+        distance2: f64,
+        /// The gate.
+        limit: f64,
+    },
+    /// The robot would stand behind the wall.
+    Side,
+    /// The landmarks contradict one another.
+    Disagree,
+    /// The corners do not fix the pose.
+    Degenerate,
+}
+
+/// What a frame says of the robot's pose. There is a pose only when exactly one solution is left.
+#[derive(Debug, Clone, PartialEq)]
+pub enum RobotFix {
+    /// The pose.
+    Fixed(Fix),
+    /// Several solutions are left; best first. None of them may be used without more knowledge.
+    Ambiguous(Vec<Fix>),
+    /// No solution is left.
+    Refused(FixRefusal),
+}

@@ -1,0 +1,173 @@
+//! A piece of wall as the laser sees it: the supporting line with its covariance and the two ends.
+//! Made by `lines`, kept by `walls`.
+
+use crate::{
+    check::{self, MAX_COORDINATE_M, OutOfRange},
+    pose2::{Pose2, Pose2Covariance, wrap_rad},
+};
+use nalgebra::{Matrix2, Matrix2x3, Point2, Vector2};
+use std::f64::consts::PI;
+
+/// Shortest length of a segment, metres.
+pub const MIN_SEGMENT_M: f64 = 0.01;
+
+/// A straight piece of wall. `a` to `b` runs so that the free side, from which it was seen, is on the left: the two
+/// faces of a wall are two segments. The ends lie on the line `cos(alpha) x + sin(alpha) y = rho`, rho >= 0.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LaserSegment {
+    /// First end, metres.
+    pub a: Point2<f64>,
+    /// Second end, metres.
+    pub b: Point2<f64>,
+    /// Direction of the line's normal, in (-pi, pi].
+    pub alpha_rad: f64,
+    /// Distance of the line from the origin, not negative.
+    pub rho_m: f64,
+    /// Covariance of (alpha, rho): rad^2, rad m, m^2.
+    pub covariance: Matrix2<f64>,
+    /// How many scans saw it.
+    pub hits: u32,
+}
+
+impl LaserSegment {
+    /// From its ends and the covariance of its line. Ends within [`MAX_COORDINATE_M`], at least [`MIN_SEGMENT_M`]
+    /// apart.
+    pub fn from_ends(a: Point2<f64>, b: Point2<f64>, covariance: Matrix2<f64>) -> Result<Self, OutOfRange> {
+        for (field, value) in [("a.x_m", a.x), ("a.y_m", a.y), ("b.x_m", b.x), ("b.y_m", b.y)] {
+            check::within(field, value, -MAX_COORDINATE_M, MAX_COORDINATE_M)?;
+        }
+        let length = (b - a).norm();
+        check::within("length_m", length, MIN_SEGMENT_M, 4.0 * MAX_COORDINATE_M)?;
+        check::covariance("covariance", &covariance)?;
+        let d = (b - a) / length;
+        let normal = Vector2::new(-d.y, d.x);
+        let rho = normal.dot(&Point2::from((a.coords + b.coords) * 0.5).coords);
+        let (normal, rho_m) = if rho < 0.0 { (-normal, -rho) } else { (normal, rho) };
+        Ok(Self { a, b, alpha_rad: normal.y.atan2(normal.x), rho_m, covariance, hits: 1 })
+    }
+
+    /// From a line and two points that are projected on it, `a` to `b` with the free side on the left.
+    pub(crate) fn on_line(
+        (alpha_rad, rho_m): (f64, f64),
+        (a, b): (Point2<f64>, Point2<f64>),
+        covariance: Matrix2<f64>,
+        hits: u32,
+    ) -> Self {
+        let n = Vector2::new(alpha_rad.cos(), alpha_rad.sin());
+        let foot = |p: Point2<f64>| p - n * (n.dot(&p.coords) - rho_m);
+        // The line's sign is a convention, not a change of side: (alpha, rho) and (alpha + pi, -rho) are one line,
+        // and so are their covariances but for the sign of the off-diagonal term's rho.
+        let (alpha_rad, rho_m, covariance) = if rho_m < 0.0 {
+            let flip = Matrix2::new(1.0, 0.0, 0.0, -1.0);
+            (wrap_rad(alpha_rad + PI), -rho_m, flip * covariance * flip)
+        } else {
+            (wrap_rad(alpha_rad), rho_m, covariance)
+        };
+        Self { a: foot(a), b: foot(b), alpha_rad, rho_m, covariance, hits }
+    }
+
+    /// Length in metres.
+    pub fn length_m(&self) -> f64 {
+        (self.b - self.a).norm()
+    }
+
+    /// Unit vector from `a` to `b`.
+    pub fn direction(&self) -> Vector2<f64> {
+        (self.b - self.a) / self.length_m()
+    }
+
+    /// Unit normal on the free side.
+    pub fn facing(&self) -> Vector2<f64> {
+        let d = self.direction();
+        Vector2::new(-d.y, d.x)
+    }
+
+    /// The segment in the frame a, given `a_from_b` with its covariance and the segment in b (errors independent).
+    #[must_use]
+    pub fn transformed(&self, a_from_b: &Pose2Covariance) -> Self {
+        let Pose2 { x_m, y_m, theta_rad } = a_from_b.pose;
+        let alpha = self.alpha_rad + theta_rad;
+        let (s, c) = alpha.sin_cos();
+        let rho = self.rho_m + x_m * c + y_m * s;
+        // Inverse of method 17.4: d(alpha, rho) by (x, y, theta) and by the line in b.
+        let turn = y_m * c - x_m * s;
+        let by_pose = Matrix2x3::new(0.0, 0.0, 1.0, c, s, turn);
+        let by_line = Matrix2::new(1.0, 0.0, turn, 1.0);
+        let covariance = by_pose * a_from_b.covariance * by_pose.transpose()
+            + by_line * self.covariance * by_line.transpose();
+        let ends = (a_from_b.pose.apply(&self.a), a_from_b.pose.apply(&self.b));
+        Self::on_line((alpha, rho), ends, covariance, self.hits)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Matrix3, Vector3};
+
+    fn wall() -> LaserSegment {
+        let covariance = Matrix2::new(1e-4, 3e-5, 3e-5, 2e-4);
+        LaserSegment::from_ends(Point2::new(3.0, -1.0), Point2::new(3.2, 1.0), covariance).unwrap()
+    }
+
+    #[test]
+    fn the_free_side_is_on_the_left() {
+        let w = wall();
+        assert!(w.facing().dot(&-w.a.coords) > 0.0, "faces the origin");
+        let back = LaserSegment::from_ends(w.b, w.a, w.covariance).unwrap();
+        assert!((back.facing() + w.facing()).norm() < 1e-12);
+        assert!((back.alpha_rad - w.alpha_rad).abs() < 1e-12, "same line");
+        assert!((back.rho_m - w.rho_m).abs() < 1e-12);
+    }
+
+    #[test]
+    fn ends_lie_on_the_line_wherever_it_is_seen_from() {
+        for pose in [Pose2::new(0.3, 0.2, 1.0), Pose2::new(-9.0, 4.0, -2.5), Pose2::new(-2.9, -0.1, 0.0)] {
+            let seen = wall().transformed(&Pose2Covariance { pose, covariance: Matrix3::zeros() });
+            assert!(seen.rho_m >= 0.0);
+            for (p, original) in [(seen.a, wall().a), (seen.b, wall().b)] {
+                let n = Vector2::new(seen.alpha_rad.cos(), seen.alpha_rad.sin());
+                assert!((n.dot(&p.coords) - seen.rho_m).abs() < 1e-12);
+                assert!((p - pose.apply(&original)).norm() < 1e-12);
+            }
+            assert!((seen.length_m() - wall().length_m()).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn covariance_follows_finite_differences() {
+        // Oracle: the transform itself, differenced by (x, y, theta, alpha, rho).
+        for pose in [Pose2::new(0.3, 0.2, 1.0), Pose2::new(-9.0, 4.0, 0.3)] {
+            let line = |d: &[f64; 5]| {
+                let w = wall();
+                let moved =
+                    LaserSegment::on_line((w.alpha_rad + d[3], w.rho_m + d[4]), (w.a, w.b), w.covariance, 1);
+                let p = pose.plus(&Vector3::new(d[0], d[1], d[2]));
+                let s = moved.transformed(&Pose2Covariance { pose: p, covariance: Matrix3::zeros() });
+                Vector2::new(s.alpha_rad, s.rho_m)
+            };
+            let mut expected = Matrix2::zeros();
+            let pose_covariance = Matrix3::from_diagonal(&Vector3::new(1e-4, 2e-4, 3e-5));
+            let mut j = nalgebra::Matrix2x5::zeros();
+            for k in 0..5 {
+                let (mut up, mut down) = ([0.0; 5], [0.0; 5]);
+                (up[k], down[k]) = (1e-6, -1e-6);
+                j.set_column(k, &((line(&up) - line(&down)) / 2e-6));
+            }
+            let (jp, jl) = (j.fixed_columns::<3>(0), j.fixed_columns::<2>(3));
+            expected += jp * pose_covariance * jp.transpose() + jl * wall().covariance * jl.transpose();
+            let got = wall().transformed(&Pose2Covariance { pose, covariance: pose_covariance }).covariance;
+            assert!((got - expected).norm() < 1e-8, "{got} {expected}");
+        }
+    }
+
+    #[test]
+    fn points_and_infinite_lines_are_refused() {
+        let o = Point2::origin();
+        let at = |x| LaserSegment::from_ends(o, Point2::new(x, 0.0), Matrix2::identity());
+        assert!(at(MIN_SEGMENT_M).is_ok());
+        assert_eq!(at(0.009).unwrap_err().field, "length_m");
+        assert_eq!(at(f64::INFINITY).unwrap_err().field, "b.x_m");
+        assert!(LaserSegment::from_ends(o, Point2::new(1.0, 0.0), -Matrix2::identity()).is_err());
+    }
+}
