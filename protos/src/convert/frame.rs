@@ -1,0 +1,217 @@
+//! A camera frame as it enters: everything but the pixels checked.
+
+use super::geometry;
+use crate::{Code, Name, Rejection, v1};
+use nalgebra::{Isometry2, Isometry3, Matrix3};
+use prost::bytes::Bytes;
+use vision::frame::Intrinsics;
+
+/// Largest image of a frame, in encoded bytes: holds raw grey of [`MAX_FRAME_PX`] pixels.
+pub const MAX_FRAME_IMAGE_BYTES: usize = 2_400_000;
+/// What a frame should not exceed: above one transport batch it is fragmented, and easier lost.
+pub const ADVISED_FRAME_BYTES: usize = 60_000;
+/// Largest frame, in pixels (1920 x 1200).
+pub const MAX_FRAME_PX: u32 = 2_304_000;
+/// Longest side of a frame, in pixels.
+pub const MAX_FRAME_SIDE_PX: u32 = 4096;
+/// Longest deadline that a robot may ask for, in milliseconds.
+pub const MAX_DEADLINE_MS: u32 = 600_000;
+
+/// How the image is packed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Encoding {
+    /// JPEG.
+    Jpeg,
+    /// PNG.
+    Png,
+    /// One byte a pixel, row-major.
+    Gray8,
+}
+
+/// A frame whose fields can be relied on. The pixels are still encoded.
+#[derive(Debug, Clone)]
+pub struct CheckedFrame {
+    /// Which start of the robot's software.
+    pub epoch: u64,
+    /// Counts up within the epoch.
+    pub seq: u64,
+    /// Robot's clock at capture, ns since the Unix epoch; echoed only.
+    pub captured_ns: i64,
+    /// How `image` is packed.
+    pub encoding: Encoding,
+    /// Claimed width, checked against the decoded one later.
+    pub width_px: u32,
+    /// Claimed height.
+    pub height_px: u32,
+    /// Encoded image, at most [`MAX_FRAME_IMAGE_BYTES`].
+    pub image: Bytes,
+    /// The camera, where calibrated.
+    pub intrinsics: Option<Intrinsics>,
+    /// Camera on robot.
+    pub robot_from_camera: Option<Isometry3<f64>>,
+    /// Odometry at capture.
+    pub odometry: Option<Isometry2<f64>>,
+    /// The robot's belief, `map_from_robot`, with its covariance.
+    pub prior: Option<(Isometry2<f64>, Matrix3<f64>)>,
+    /// Start of work at the latest so long after receipt; `None` for the server's default.
+    pub deadline_ms: Option<u32>,
+    /// Map asked for; `None` for the robot's.
+    pub map: Option<Name>,
+}
+
+impl TryFrom<v1::Frame> for CheckedFrame {
+    type Error = Rejection;
+
+    fn try_from(frame: v1::Frame) -> Result<Self, Rejection> {
+        let encoding = match frame.encoding() {
+            v1::ImageEncoding::Jpeg => Encoding::Jpeg,
+            v1::ImageEncoding::Png => Encoding::Png,
+            v1::ImageEncoding::Gray8 => Encoding::Gray8,
+            v1::ImageEncoding::Unspecified => {
+                let detail = format!("{} is none of JPEG (1), PNG (2), GRAY8 (3)", frame.encoding);
+                return Err(Rejection::new(Code::OutOfRange, "encoding", detail));
+            }
+        };
+        size(&frame, encoding)?;
+        let map = match frame.map.as_str() {
+            "" => None,
+            name => Some(Name::new(name).map_err(|e| Rejection::new(Code::BadName, "map", e.to_string()))?),
+        };
+        if frame.deadline_ms > MAX_DEADLINE_MS {
+            let detail = format!("{} ms is more than {MAX_DEADLINE_MS}", frame.deadline_ms);
+            return Err(Rejection::new(Code::OutOfRange, "deadline_ms", detail));
+        }
+        let camera = frame.intrinsics.as_ref().map(geometry::intrinsics).transpose();
+        let mounting = frame.robot_from_camera.as_ref().map(geometry::pose3).transpose();
+        let odometry = frame.odometry.as_ref().map(geometry::pose2).transpose();
+        let prior = frame.prior.as_ref().map(geometry::pose2_covariance).transpose();
+        Ok(Self {
+            epoch: frame.epoch,
+            seq: frame.seq,
+            captured_ns: frame.captured_ns,
+            encoding,
+            width_px: frame.width_px,
+            height_px: frame.height_px,
+            intrinsics: camera.map_err(|r| r.inside("intrinsics"))?,
+            robot_from_camera: mounting.map_err(|r| r.inside("robot_from_camera"))?,
+            odometry: odometry.map_err(|r| r.inside("odometry"))?,
+            prior: prior.map_err(|r| r.inside("prior"))?,
+            deadline_ms: (frame.deadline_ms > 0).then_some(frame.deadline_ms),
+            map,
+            image: frame.image,
+        })
+    }
+}
+
+/// Claimed size and bytes, before anything is decoded.
+fn size(frame: &v1::Frame, encoding: Encoding) -> Result<(), Rejection> {
+    for (field, side) in [("width_px", frame.width_px), ("height_px", frame.height_px)] {
+        if side == 0 || side > MAX_FRAME_SIDE_PX {
+            let detail = format!("{side} is outside 1 to {MAX_FRAME_SIDE_PX}");
+            return Err(Rejection::new(Code::OutOfRange, field, detail));
+        }
+    }
+    let area = frame.width_px * frame.height_px;
+    if area > MAX_FRAME_PX {
+        let detail = format!("{area} pixels are more than {MAX_FRAME_PX}");
+        return Err(Rejection::new(Code::OutOfRange, "width_px", detail));
+    }
+    let bytes = frame.image.len();
+    if bytes == 0 {
+        return Err(Rejection::new(Code::Missing, "image", "the image is empty"));
+    }
+    if bytes > MAX_FRAME_IMAGE_BYTES {
+        let detail = format!("{bytes} bytes are more than {MAX_FRAME_IMAGE_BYTES}");
+        return Err(Rejection::new(Code::TooLarge, "image", detail));
+    }
+    if encoding == Encoding::Gray8 && bytes != area as usize {
+        let detail = format!("{bytes} bytes, {area} expected for the claimed size");
+        return Err(Rejection::new(Code::SizeMismatch, "image", detail));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn frame() -> v1::Frame {
+        v1::Frame {
+            epoch: 1,
+            seq: 2,
+            encoding: v1::ImageEncoding::Gray8.into(),
+            width_px: 4,
+            height_px: 3,
+            image: Bytes::from(vec![0; 12]),
+            ..v1::Frame::default()
+        }
+    }
+
+    fn refused(change: impl FnOnce(&mut v1::Frame)) -> (Code, String) {
+        let mut wire = frame();
+        change(&mut wire);
+        let r = CheckedFrame::try_from(wire).unwrap_err();
+        (r.code, r.field)
+    }
+
+    fn raw(width_px: u32, height_px: u32) -> v1::Frame {
+        v1::Frame {
+            width_px,
+            height_px,
+            image: Bytes::from(vec![0; (width_px * height_px) as usize]),
+            ..frame()
+        }
+    }
+
+    #[test]
+    fn a_plain_frame_passes() {
+        let checked = CheckedFrame::try_from(frame()).unwrap();
+        assert_eq!((checked.encoding, checked.map, checked.deadline_ms), (Encoding::Gray8, None, None));
+    }
+
+    #[test]
+    fn each_fault_names_its_field() {
+        assert_eq!(refused(|f| f.encoding = 0), (Code::OutOfRange, "encoding".into()));
+        assert_eq!(refused(|f| f.encoding = 99), (Code::OutOfRange, "encoding".into()));
+        assert_eq!(refused(|f| f.width_px = 0), (Code::OutOfRange, "width_px".into()));
+        assert_eq!(refused(|f| f.height_px = u32::MAX), (Code::OutOfRange, "height_px".into()));
+        assert_eq!(refused(|f| f.width_px = 5), (Code::SizeMismatch, "image".into()));
+        assert_eq!(refused(|f| f.image = Bytes::new()), (Code::Missing, "image".into()));
+        assert_eq!(refused(|f| f.map = "Hall 1".into()), (Code::BadName, "map".into()));
+        assert_eq!(
+            refused(|f| f.deadline_ms = MAX_DEADLINE_MS + 1),
+            (Code::OutOfRange, "deadline_ms".into())
+        );
+        let camera = v1::Intrinsics { fx_px: f64::NAN, ..v1::Intrinsics::default() };
+        assert_eq!(refused(|f| f.intrinsics = Some(camera)), (Code::NotFinite, "intrinsics.fx_px".into()));
+        let mounting = v1::Pose3 { qw: 1.0, z_m: f64::INFINITY, ..v1::Pose3::default() };
+        assert_eq!(
+            refused(|f| f.robot_from_camera = Some(mounting)),
+            (Code::NotFinite, "robot_from_camera.z_m".into())
+        );
+        let odometry = v1::Pose2 { theta_rad: f64::NAN, ..v1::Pose2::default() };
+        assert_eq!(refused(|f| f.odometry = Some(odometry)), (Code::NotFinite, "odometry.theta_rad".into()));
+        let prior = v1::Pose2Covariance::default();
+        assert_eq!(refused(|f| f.prior = Some(prior)), (Code::Missing, "prior.pose".into()));
+    }
+
+    #[test]
+    fn sizes_at_their_bounds() {
+        assert!(CheckedFrame::try_from(raw(1920, 1200)).is_ok());
+        assert_eq!(CheckedFrame::try_from(raw(1921, 1200)).unwrap_err().field, "width_px");
+        assert!(CheckedFrame::try_from(raw(MAX_FRAME_SIDE_PX, 2)).is_ok());
+        assert_eq!(CheckedFrame::try_from(raw(2, MAX_FRAME_SIDE_PX + 1)).unwrap_err().field, "height_px");
+        let packed = |bytes| {
+            let image = Bytes::from(vec![0; bytes]);
+            CheckedFrame::try_from(v1::Frame { encoding: v1::ImageEncoding::Jpeg.into(), image, ..frame() })
+        };
+        assert!(packed(MAX_FRAME_IMAGE_BYTES).is_ok());
+        assert_eq!(packed(MAX_FRAME_IMAGE_BYTES + 1).unwrap_err().code, Code::TooLarge);
+    }
+
+    #[test]
+    fn a_deadline_at_the_bound() {
+        let wire = v1::Frame { deadline_ms: MAX_DEADLINE_MS, ..frame() };
+        assert_eq!(CheckedFrame::try_from(wire).unwrap().deadline_ms, Some(MAX_DEADLINE_MS));
+    }
+}

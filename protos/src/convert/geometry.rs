@@ -1,0 +1,241 @@
+//! Numbers, poses, covariances and cameras, both ways.
+
+use crate::{Code, Rejection, v1};
+use nalgebra::{Isometry2, Isometry3, Matrix3, Quaternion, Translation3, UnitQuaternion, Vector2};
+use vision::frame::{Distortion, FrameError, Intrinsics};
+
+/// Largest accepted coordinate, in metres: a site of 100 km.
+pub const MAX_COORDINATE_M: f64 = 1e5;
+/// Largest accepted angle, in radians: odometry may wind up, but not for ever.
+pub const MAX_ANGLE_RAD: f64 = 1e4;
+/// A quaternion whose length is further from 1 than this is refused, not repaired.
+pub const QUATERNION_TOLERANCE: f64 = 1e-3;
+/// Largest accepted variance (m^2 or rad^2).
+pub const MAX_VARIANCE: f64 = 1e12;
+/// Relative asymmetry and negative eigenvalue that rounding may leave in a covariance.
+pub const COVARIANCE_TOLERANCE: f64 = 1e-6;
+
+/// `value` if finite and within +-`limit`.
+pub fn within(field: &str, value: f64, limit: f64) -> Result<f64, Rejection> {
+    between(field, value, -limit, limit)
+}
+
+/// `value` if finite and within `low..=high`.
+pub fn between(field: &str, value: f64, low: f64, high: f64) -> Result<f64, Rejection> {
+    if !value.is_finite() {
+        return Err(Rejection::new(Code::NotFinite, field, "the number is NaN or infinite"));
+    }
+    if !(low..=high).contains(&value) {
+        return Err(Rejection::new(Code::OutOfRange, field, format!("{value} is outside {low} to {high}")));
+    }
+    Ok(value)
+}
+
+/// A rigid transform. Coordinates within [`MAX_COORDINATE_M`]; the quaternion is normalised when it is within
+/// [`QUATERNION_TOLERANCE`] of unit length.
+pub fn pose3(pose: &v1::Pose3) -> Result<Isometry3<f64>, Rejection> {
+    let x = within("x_m", pose.x_m, MAX_COORDINATE_M)?;
+    let y = within("y_m", pose.y_m, MAX_COORDINATE_M)?;
+    let z = within("z_m", pose.z_m, MAX_COORDINATE_M)?;
+    for (field, value) in [("qx", pose.qx), ("qy", pose.qy), ("qz", pose.qz), ("qw", pose.qw)] {
+        within(field, value, 1.0 + QUATERNION_TOLERANCE)?;
+    }
+    let q = Quaternion::new(pose.qw, pose.qx, pose.qy, pose.qz);
+    if (q.norm() - 1.0).abs() > QUATERNION_TOLERANCE {
+        let detail = format!("the quaternion has length {}, not 1", q.norm());
+        return Err(Rejection::new(Code::OutOfRange, "qw", detail));
+    }
+    Ok(Isometry3::from_parts(Translation3::new(x, y, z), UnitQuaternion::from_quaternion(q)))
+}
+
+/// The wire form, with `qw >= 0`.
+pub fn pose3_wire(pose: &Isometry3<f64>) -> v1::Pose3 {
+    let q = pose.rotation.quaternion();
+    let sign = if q.w < 0.0 { -1.0 } else { 1.0 };
+    let t = pose.translation.vector;
+    v1::Pose3 { qx: sign * q.i, qy: sign * q.j, qz: sign * q.k, qw: sign * q.w, x_m: t.x, y_m: t.y, z_m: t.z }
+}
+
+/// A pose on the floor.
+pub fn pose2(pose: &v1::Pose2) -> Result<Isometry2<f64>, Rejection> {
+    let x = within("x_m", pose.x_m, MAX_COORDINATE_M)?;
+    let y = within("y_m", pose.y_m, MAX_COORDINATE_M)?;
+    let theta = within("theta_rad", pose.theta_rad, MAX_ANGLE_RAD)?;
+    Ok(Isometry2::new(Vector2::new(x, y), theta))
+}
+
+/// The wire form; the heading lies in (-pi, pi].
+pub fn pose2_wire(pose: &Isometry2<f64>) -> v1::Pose2 {
+    let t = pose.translation.vector;
+    v1::Pose2 { x_m: t.x, y_m: t.y, theta_rad: pose.rotation.angle() }
+}
+
+/// A pose on the floor with its covariance over (x, y, theta): 9 finite numbers, symmetric, not negative.
+pub fn pose2_covariance(value: &v1::Pose2Covariance) -> Result<(Isometry2<f64>, Matrix3<f64>), Rejection> {
+    let pose =
+        value.pose.as_ref().ok_or_else(|| Rejection::new(Code::Missing, "pose", "the pose is absent"))?;
+    let pose = pose2(pose).map_err(|r| r.inside("pose"))?;
+    Ok((pose, covariance(&value.covariance)?))
+}
+
+/// The wire form of a pose with covariance.
+pub fn pose2_covariance_wire(pose: &Isometry2<f64>, covariance: &Matrix3<f64>) -> v1::Pose2Covariance {
+    v1::Pose2Covariance {
+        pose: Some(pose2_wire(pose)),
+        // Column-major storage of a symmetric matrix reads row-major too; the transpose says so for any.
+        covariance: covariance.transpose().as_slice().to_vec(),
+    }
+}
+
+fn covariance(numbers: &[f64]) -> Result<Matrix3<f64>, Rejection> {
+    if numbers.len() != 9 {
+        let detail = format!("9 numbers expected, {} given", numbers.len());
+        return Err(Rejection::new(Code::OutOfRange, "covariance", detail));
+    }
+    for (i, &value) in numbers.iter().enumerate() {
+        within(&format!("covariance[{i}]"), value, MAX_VARIANCE)?;
+    }
+    let given = Matrix3::from_row_slice(numbers);
+    let scale = given.diagonal().abs().max().max(f64::MIN_POSITIVE);
+    let crooked = (given - given.transpose()).abs().max() > COVARIANCE_TOLERANCE * scale;
+    let symmetric = (given + given.transpose()) * 0.5;
+    if crooked || symmetric.symmetric_eigenvalues().min() < -COVARIANCE_TOLERANCE * scale {
+        let detail = "not symmetric and positive semidefinite";
+        return Err(Rejection::new(Code::OutOfRange, "covariance", detail));
+    }
+    Ok(symmetric)
+}
+
+/// A calibrated camera. `plumb_bob` is empty or has the five numbers k1, k2, p1, p2, k3.
+pub fn intrinsics(wire: &v1::Intrinsics) -> Result<Intrinsics, Rejection> {
+    let distortion = match wire.plumb_bob.as_slice() {
+        [] => Distortion::None,
+        &[k1, k2, p1, p2, k3] => Distortion::PlumbBob([k1, k2, p1, p2, k3]),
+        other => {
+            let detail = format!("0 or 5 coefficients expected, {} given", other.len());
+            return Err(Rejection::new(Code::OutOfRange, "plumb_bob", detail));
+        }
+    };
+    Intrinsics::new(wire.fx_px, wire.fy_px, wire.cx_px, wire.cy_px, distortion).map_err(
+        |error| match &error {
+            FrameError::Intrinsics { field, value } => {
+                let field = if *field == "distortion" { "plumb_bob" } else { field };
+                let code = if value.is_finite() { Code::OutOfRange } else { Code::NotFinite };
+                Rejection::new(code, field, error.to_string())
+            }
+            FrameError::Size { .. } | FrameError::Length { .. } => {
+                Rejection::new(Code::OutOfRange, "", error.to_string())
+            }
+        },
+    )
+}
+
+/// The wire form of a camera.
+pub fn intrinsics_wire(camera: &Intrinsics) -> v1::Intrinsics {
+    let plumb_bob = match camera.distortion {
+        Distortion::None => Vec::new(),
+        Distortion::PlumbBob(k) => k.to_vec(),
+    };
+    v1::Intrinsics {
+        fx_px: camera.fx_px,
+        fy_px: camera.fy_px,
+        cx_px: camera.cx_px,
+        cy_px: camera.cy_px,
+        plumb_bob,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn camera() -> v1::Intrinsics {
+        v1::Intrinsics { fx_px: 700.0, fy_px: 710.0, cx_px: 320.0, cy_px: 240.0, plumb_bob: vec![] }
+    }
+
+    #[test]
+    fn a_camera_comes_back() {
+        let mut wire = camera();
+        assert_eq!(intrinsics_wire(&intrinsics(&wire).unwrap()), wire);
+        wire.plumb_bob = vec![0.1, -0.2, 0.001, 0.002, 0.03];
+        assert_eq!(intrinsics_wire(&intrinsics(&wire).unwrap()), wire);
+    }
+
+    #[test]
+    fn a_bad_camera_names_its_field() {
+        let refused = |change: fn(&mut v1::Intrinsics)| {
+            let mut wire = camera();
+            change(&mut wire);
+            let r = intrinsics(&wire).unwrap_err();
+            (r.code, r.field)
+        };
+        assert_eq!(refused(|c| c.fx_px = f64::NAN), (Code::NotFinite, "fx_px".into()));
+        assert_eq!(refused(|c| c.fy_px = 0.0), (Code::OutOfRange, "fy_px".into()));
+        assert_eq!(refused(|c| c.cx_px = f64::INFINITY), (Code::NotFinite, "cx_px".into()));
+        assert_eq!(refused(|c| c.cy_px = 1e39), (Code::OutOfRange, "cy_px".into()));
+        assert_eq!(refused(|c| c.plumb_bob = vec![0.0; 4]), (Code::OutOfRange, "plumb_bob".into()));
+        assert_eq!(refused(|c| c.plumb_bob = vec![f64::NAN; 5]), (Code::NotFinite, "plumb_bob".into()));
+    }
+
+    #[test]
+    fn covariances_at_their_bounds() {
+        let field = |numbers: &[f64]| covariance(numbers).map_err(|r| (r.code, r.field));
+        assert!(field(&[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0]).is_ok());
+        assert_eq!(field(&[1.0; 8]), Err((Code::OutOfRange, "covariance".into())));
+        let mut c = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
+        c[4] = f64::NAN;
+        assert_eq!(field(&c), Err((Code::NotFinite, "covariance[4]".into())));
+        c[4] = -1.0;
+        assert_eq!(field(&c), Err((Code::OutOfRange, "covariance".into())));
+        c[4] = 1.0;
+        c[1] = 0.5;
+        assert_eq!(field(&c), Err((Code::OutOfRange, "covariance".into())));
+        c[3] = 0.5;
+        assert!(field(&c).is_ok());
+        c[1] = 1.5;
+        c[3] = 1.5;
+        assert_eq!(field(&c), Err((Code::OutOfRange, "covariance".into())));
+    }
+
+    #[test]
+    fn a_quaternion_off_the_unit_is_refused() {
+        let mut wire = v1::Pose3 { qw: 1.0 + 0.9e-3, ..v1::Pose3::default() };
+        assert!(pose3(&wire).is_ok());
+        wire.qw = 1.0 - 1.1e-3;
+        assert_eq!(pose3(&wire).unwrap_err().field, "qw");
+        wire.qw = 0.0;
+        assert_eq!(pose3(&wire).unwrap_err().code, Code::OutOfRange);
+        wire.qx = f64::NAN;
+        assert_eq!(pose3(&wire).unwrap_err().code, Code::NotFinite);
+    }
+
+    #[test]
+    fn coordinates_at_the_bound() {
+        let at = |x_m| pose2(&v1::Pose2 { x_m, y_m: 0.0, theta_rad: 0.0 }).is_ok();
+        assert!(at(MAX_COORDINATE_M) && at(-MAX_COORDINATE_M));
+        assert!(!at(MAX_COORDINATE_M * 1.000_001) && !at(f64::NAN));
+    }
+
+    proptest! {
+        #[test]
+        fn poses_come_back(x in -1e4..1e4, y in -1e4..1e4, z in -1e4..1e4,
+                           r in -3.0..3.0, p in -1.5..1.5, w in -3.1..3.1) {
+            let pose = Isometry3::from_parts(Translation3::new(x, y, z), UnitQuaternion::from_euler_angles(r, p, w));
+            let back = pose3(&pose3_wire(&pose)).unwrap();
+            prop_assert!((back.to_homogeneous() - pose.to_homogeneous()).abs().max() < 1e-9);
+            prop_assert!(pose3_wire(&pose).qw >= 0.0);
+            let floor = v1::Pose2 { x_m: x, y_m: y, theta_rad: w };
+            let back = pose2_wire(&pose2(&floor).unwrap());
+            prop_assert!((back.theta_rad - w).abs() < 1e-9 && (back.x_m - x).abs() < 1e-9);
+        }
+
+        #[test]
+        fn any_number_passes_or_names_its_field(x in any::<f64>(), y in any::<f64>(), t in any::<f64>()) {
+            match pose2(&v1::Pose2 { x_m: x, y_m: y, theta_rad: t }) {
+                Ok(p) => prop_assert!(p.translation.vector.norm() <= 2.0 * MAX_COORDINATE_M),
+                Err(r) => prop_assert!(["x_m", "y_m", "theta_rad"].contains(&r.field.as_str())),
+            }
+        }
+    }
+}

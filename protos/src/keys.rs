@@ -1,0 +1,283 @@
+//! Key expressions under `waymark/1/{fleet}/`: built from checked names, parsed back into them. A handler of the
+//! transport cannot see who sent a message, so the robot's name is in every key that a robot writes.
+
+use std::fmt;
+
+/// Version of the protocol, second chunk of every key.
+pub const PROTOCOL: &str = "1";
+/// First chunk of every key.
+pub const ROOT: &str = "waymark";
+/// Longest name, in bytes.
+pub const MAX_NAME_BYTES: usize = 64;
+
+/// Why a text is not a name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum NameError {
+    /// Empty, or longer than [`MAX_NAME_BYTES`].
+    #[error("a name has 1 to {MAX_NAME_BYTES} characters, this one has {0}")]
+    Length(usize),
+    /// A character outside the set.
+    #[error("a name has only a-z, 0-9, '_' and '-'; position {0} has another character")]
+    Character(usize),
+}
+
+/// The name of a fleet, robot, camera, map or landmark: `[a-z0-9_-]{1,64}`. Safe in keys, addresses and file names.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct Name(String);
+
+impl Name {
+    /// Checks the text.
+    pub fn new(text: impl Into<String>) -> Result<Self, NameError> {
+        let text = text.into();
+        if text.is_empty() || text.len() > MAX_NAME_BYTES {
+            return Err(NameError::Length(text.len()));
+        }
+        match text.bytes().position(|b| !matches!(b, b'a'..=b'z' | b'0'..=b'9' | b'_' | b'-')) {
+            Some(position) => Err(NameError::Character(position)),
+            None => Ok(Self(text)),
+        }
+    }
+
+    /// The text.
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+}
+
+impl fmt::Display for Name {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl AsRef<str> for Name {
+    fn as_ref(&self) -> &str {
+        &self.0
+    }
+}
+
+impl std::borrow::Borrow<str> for Name {
+    fn borrow(&self) -> &str {
+        &self.0
+    }
+}
+
+impl TryFrom<String> for Name {
+    type Error = NameError;
+    fn try_from(text: String) -> Result<Self, NameError> {
+        Self::new(text)
+    }
+}
+
+impl std::str::FromStr for Name {
+    type Err = NameError;
+    fn from_str(text: &str) -> Result<Self, NameError> {
+        Self::new(text)
+    }
+}
+
+impl From<Name> for String {
+    fn from(name: Name) -> Self {
+        name.0
+    }
+}
+
+/// What a key says, without the fleet.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Key {
+    /// `robot/{robot}/frame/{camera}`: robot to server, `Frame`.
+    Frame(Name, Name),
+    /// `robot/{robot}/answer/{camera}`: server to robot, `Answer`.
+    Answer(Name, Name),
+    /// `robot/{robot}/odometry`: robot to server, `Odometry`.
+    Odometry(Name),
+    /// `robot/{robot}/scan`: robot to server, `Scan`.
+    Scan(Name),
+    /// `robot/{robot}/pose`: server to robot, `RobotPose`.
+    Pose(Name),
+    /// `robot/{robot}/alive`: liveliness token of a robot.
+    Alive(Name),
+    /// `map/{map}/changed`: server to all, `MapChanged`.
+    MapChanged(Name),
+}
+
+/// Why a key is none of ours.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum KeyError {
+    /// Another root, protocol version or fleet.
+    #[error("the key does not begin with {0}")]
+    Prefix(String),
+    /// No key has this shape.
+    #[error("no key of the protocol has this shape")]
+    Shape,
+    /// A chunk is not a name.
+    #[error("{chunk}: {error}")]
+    Name {
+        /// Which chunk: `robot`, `camera` or `map`.
+        chunk: &'static str,
+        /// What is wrong with it.
+        error: NameError,
+    },
+}
+
+/// Builds and parses the keys of one fleet.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Keys {
+    prefix: String,
+}
+
+impl Keys {
+    /// Keys under `waymark/1/{fleet}/`.
+    pub fn new(fleet: &Name) -> Self {
+        Self { prefix: format!("{ROOT}/{PROTOCOL}/{fleet}/") }
+    }
+
+    /// The full key.
+    pub fn build(&self, key: &Key) -> String {
+        let p = &self.prefix;
+        match key {
+            Key::Frame(robot, camera) => format!("{p}robot/{robot}/frame/{camera}"),
+            Key::Answer(robot, camera) => format!("{p}robot/{robot}/answer/{camera}"),
+            Key::Odometry(robot) => format!("{p}robot/{robot}/odometry"),
+            Key::Scan(robot) => format!("{p}robot/{robot}/scan"),
+            Key::Pose(robot) => format!("{p}robot/{robot}/pose"),
+            Key::Alive(robot) => format!("{p}robot/{robot}/alive"),
+            Key::MapChanged(map) => format!("{p}map/{map}/changed"),
+        }
+    }
+
+    /// All frames of all robots.
+    pub fn all_frames(&self) -> String {
+        format!("{}robot/*/frame/*", self.prefix)
+    }
+
+    /// All odometry.
+    pub fn all_odometry(&self) -> String {
+        format!("{}robot/*/odometry", self.prefix)
+    }
+
+    /// All laser scans.
+    pub fn all_scans(&self) -> String {
+        format!("{}robot/*/scan", self.prefix)
+    }
+
+    /// All liveliness tokens.
+    pub fn all_alive(&self) -> String {
+        format!("{}robot/*/alive", self.prefix)
+    }
+
+    /// All answers for one robot.
+    pub fn answers_of(&self, robot: &Name) -> String {
+        format!("{}robot/{robot}/answer/*", self.prefix)
+    }
+
+    /// Parses a full key. Total: any text gives a key or an error.
+    pub fn parse(&self, text: &str) -> Result<Key, KeyError> {
+        let rest = text.strip_prefix(&self.prefix).ok_or_else(|| KeyError::Prefix(self.prefix.clone()))?;
+        let named = |chunk: &'static str, text: &str| {
+            Name::new(text).map_err(|error| KeyError::Name { chunk, error })
+        };
+        let robot = |text| named("robot", text);
+        let mut chunks = rest.split('/');
+        let shape = [chunks.next(), chunks.next(), chunks.next(), chunks.next(), chunks.next()];
+        match shape {
+            [Some("robot"), Some(r), Some("frame"), Some(c), None] => {
+                Ok(Key::Frame(robot(r)?, named("camera", c)?))
+            }
+            [Some("robot"), Some(r), Some("answer"), Some(c), None] => {
+                Ok(Key::Answer(robot(r)?, named("camera", c)?))
+            }
+            [Some("robot"), Some(r), Some("odometry"), None, _] => Ok(Key::Odometry(robot(r)?)),
+            [Some("robot"), Some(r), Some("scan"), None, _] => Ok(Key::Scan(robot(r)?)),
+            [Some("robot"), Some(r), Some("pose"), None, _] => Ok(Key::Pose(robot(r)?)),
+            [Some("robot"), Some(r), Some("alive"), None, _] => Ok(Key::Alive(robot(r)?)),
+            [Some("map"), Some(m), Some("changed"), None, _] => Ok(Key::MapChanged(named("map", m)?)),
+            _ => Err(KeyError::Shape),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn keys() -> Keys {
+        Keys::new(&Name::new("site-1").unwrap())
+    }
+
+    fn names() -> impl Strategy<Value = Name> {
+        "[a-z0-9_-]{1,64}".prop_map(|text| Name::new(text).unwrap())
+    }
+
+    #[test]
+    fn names_at_the_bound() {
+        assert!(Name::new("a".repeat(MAX_NAME_BYTES)).is_ok());
+        assert_eq!(Name::new("a".repeat(MAX_NAME_BYTES + 1)), Err(NameError::Length(MAX_NAME_BYTES + 1)));
+        assert_eq!(Name::new(""), Err(NameError::Length(0)));
+        for (text, position) in
+            [("a/b", 1), ("*", 0), ("ab$", 2), ("A", 0), ("é", 0), ("a b", 1), ("a#", 1), ("@a", 0)]
+        {
+            assert_eq!(Name::new(text), Err(NameError::Character(position)), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_key_reads_as_written_down() {
+        let key = Key::Frame(Name::new("r1").unwrap(), Name::new("front").unwrap());
+        assert_eq!(keys().build(&key), "waymark/1/site-1/robot/r1/frame/front");
+        assert_eq!(keys().all_frames(), "waymark/1/site-1/robot/*/frame/*");
+    }
+
+    #[test]
+    fn foreign_and_crooked_keys_are_refused() {
+        let k = keys();
+        assert!(matches!(k.parse("waymark/2/site-1/robot/r1/scan"), Err(KeyError::Prefix(_))));
+        assert!(matches!(k.parse("waymark/1/other/robot/r1/scan"), Err(KeyError::Prefix(_))));
+        assert_eq!(k.parse("waymark/1/site-1/robot/r1/scan/x"), Err(KeyError::Shape));
+        assert_eq!(k.parse("waymark/1/site-1/robot/r1/frame/a/b"), Err(KeyError::Shape));
+        assert!(matches!(
+            k.parse("waymark/1/site-1/robot/R1/frame/a"),
+            Err(KeyError::Name { chunk: "robot", error: NameError::Character(0) })
+        ));
+        assert!(matches!(
+            k.parse("waymark/1/site-1/robot/r1/frame/"),
+            Err(KeyError::Name { chunk: "camera", .. })
+        ));
+    }
+
+    proptest! {
+        #[test]
+        fn what_is_built_parses_back(a in names(), b in names(), fleet in names()) {
+            let keys = Keys::new(&fleet);
+            for key in [
+                Key::Frame(a.clone(), b.clone()),
+                Key::Answer(a.clone(), b.clone()),
+                Key::Odometry(a.clone()),
+                Key::Scan(a.clone()),
+                Key::Pose(a.clone()),
+                Key::Alive(a.clone()),
+                Key::MapChanged(a.clone()),
+            ] {
+                prop_assert_eq!(keys.parse(&keys.build(&key)), Ok(key));
+            }
+        }
+
+        #[test]
+        fn what_parses_was_built(text in "waymark/1/site-1/(robot|map)/[a-zA-Z*/]{0,20}(/frame/|/scan|/changed|/)[a-z*]{0,3}") {
+            if let Ok(key) = keys().parse(&text) {
+                prop_assert_eq!(keys().build(&key), text);
+            }
+        }
+
+        #[test]
+        fn any_text_parses_or_errs(text in ".{0,200}") {
+            let whole = format!("waymark/1/site-1/{text}");
+            prop_assert!(keys().parse(&text).is_err());
+            if let Ok(key) = keys().parse(&whole) {
+                prop_assert_eq!(keys().build(&key), whole);
+            }
+        }
+    }
+}

@@ -1,0 +1,155 @@
+//! Why a message was refused: a stable code for programs, the field at fault and a sentence for a person.
+//! The codes are part of the wire: never renamed, only added.
+
+use crate::v1;
+
+/// Stable reasons of refusal, the same over zenoh and HTTP.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Code {
+    /// The bytes are not the message that the key promises.
+    BadMessage,
+    /// A name is not `[a-z0-9_-]{1,64}`.
+    BadName,
+    /// A needed field is absent.
+    Missing,
+    /// A number is NaN or infinite.
+    NotFinite,
+    /// A number, a count or an enumeration is outside its range.
+    OutOfRange,
+    /// More bytes or elements than allowed.
+    TooLarge,
+    /// The image is not of the claimed size.
+    SizeMismatch,
+    /// The image is not of the claimed encoding.
+    WrongEncoding,
+    /// The image cannot be decoded.
+    BadImage,
+    /// No such robot.
+    UnknownRobot,
+    /// No such map.
+    UnknownMap,
+    /// Not newer than the last message of this robot and camera.
+    NotNewer,
+    /// The deadline passed before work began.
+    Expired,
+    /// More cameras or robots than the server serves.
+    TooMany,
+    /// The server failed on this input; reported, counted, and the server goes on.
+    Internal,
+}
+
+impl Code {
+    /// Every code.
+    pub const ALL: [Code; 15] = [
+        Code::BadMessage,
+        Code::BadName,
+        Code::Missing,
+        Code::NotFinite,
+        Code::OutOfRange,
+        Code::TooLarge,
+        Code::SizeMismatch,
+        Code::WrongEncoding,
+        Code::BadImage,
+        Code::UnknownRobot,
+        Code::UnknownMap,
+        Code::NotNewer,
+        Code::Expired,
+        Code::TooMany,
+        Code::Internal,
+    ];
+
+    /// The word on the wire.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Code::BadMessage => "bad_message",
+            Code::BadName => "bad_name",
+            Code::Missing => "missing",
+            Code::NotFinite => "not_finite",
+            Code::OutOfRange => "out_of_range",
+            Code::TooLarge => "too_large",
+            Code::SizeMismatch => "size_mismatch",
+            Code::WrongEncoding => "wrong_encoding",
+            Code::BadImage => "bad_image",
+            Code::UnknownRobot => "unknown_robot",
+            Code::UnknownMap => "unknown_map",
+            Code::NotNewer => "not_newer",
+            Code::Expired => "expired",
+            Code::TooMany => "too_many",
+            Code::Internal => "internal",
+        }
+    }
+}
+
+impl std::fmt::Display for Code {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.as_str())
+    }
+}
+
+/// A refusal of one message.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{code}: {field}: {detail}")]
+pub struct Rejection {
+    /// Stable code.
+    pub code: Code,
+    /// The field at fault, with dots and indices (`intrinsics.fx_px`, `prior.covariance[4]`).
+    pub field: String,
+    /// A sentence for a person.
+    pub detail: String,
+}
+
+impl Rejection {
+    /// Longest detail sent, in bytes.
+    pub const MAX_DETAIL_BYTES: usize = 300;
+
+    /// A refusal; a longer detail is cut at [`Self::MAX_DETAIL_BYTES`].
+    pub fn new(code: Code, field: impl Into<String>, detail: impl Into<String>) -> Self {
+        let mut detail = detail.into();
+        detail.truncate(detail.floor_char_boundary(Self::MAX_DETAIL_BYTES));
+        Self { code, field: field.into(), detail }
+    }
+
+    /// The same refusal, its field named from one level further out.
+    #[must_use]
+    pub fn inside(mut self, outer: &str) -> Self {
+        self.field = if self.field.is_empty() { outer.to_owned() } else { format!("{outer}.{}", self.field) };
+        self
+    }
+}
+
+impl From<&Rejection> for v1::Rejection {
+    fn from(r: &Rejection) -> Self {
+        Self { code: r.code.as_str().to_owned(), field: r.field.clone(), detail: r.detail.clone() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn codes_are_distinct_words() {
+        let mut words: Vec<_> = Code::ALL.iter().map(|c| c.as_str()).collect();
+        words.sort_unstable();
+        words.dedup();
+        assert_eq!(words.len(), Code::ALL.len());
+        assert!(words.iter().all(|w| w.bytes().all(|b| b.is_ascii_lowercase() || b == b'_')));
+    }
+
+    #[test]
+    fn a_long_detail_is_cut_between_letters() {
+        let r = Rejection::new(Code::BadName, "map", "é".repeat(Rejection::MAX_DETAIL_BYTES));
+        assert!(
+            r.detail.len() <= Rejection::MAX_DETAIL_BYTES && r.detail.len() + 2 > Rejection::MAX_DETAIL_BYTES
+        );
+        let exact = "x".repeat(Rejection::MAX_DETAIL_BYTES);
+        assert_eq!(Rejection::new(Code::BadName, "map", exact.clone()).detail, exact);
+    }
+
+    #[test]
+    fn fields_nest() {
+        let r = Rejection::new(Code::Missing, "pose", "absent").inside("prior");
+        assert_eq!(r.field, "prior.pose");
+        assert_eq!(v1::Rejection::from(&r).code, "missing");
+    }
+}
