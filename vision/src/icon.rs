@@ -1,7 +1,18 @@
-//! A quad in, its rectified square picture out (method 4).
+//! A quad in, its rectified square picture out (method 4). Grey levels of the source are averaged over each icon
+//! cell. Corner order decides which way is up; nothing here guesses it.
+
+use crate::{detect::quads::Corners, frame::GrayImage, geometry::homography::Homography};
+use nalgebra::Point2;
+use serde::{Deserialize, Serialize};
+
+/// Smallest icon side, in pixels.
+pub const MIN_ICON_SIZE: usize = 20;
+/// Largest icon side, in pixels.
+pub const MAX_ICON_SIZE: usize = 200;
 
 /// A landmark's appearance, rectified to a square of `size` x `size` grey levels, upright as the corners say.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "UncheckedIcon")]
 pub struct Icon {
     /// Side in icon pixels.
     pub size: usize,
@@ -12,6 +23,225 @@ pub struct Icon {
 }
 
 /// Parameters of this stage.
-#[derive(Debug, Clone, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct IconParams {}
+pub struct IconParams {
+    /// Icon side S in pixels, [`MIN_ICON_SIZE`] to [`MAX_ICON_SIZE`].
+    pub size: usize,
+    /// A quad whose shortest side is below this share of S is refused.
+    pub min_side_ratio: f64,
+    /// Largest share of icon cells that may lie outside the image.
+    pub max_outside: f64,
+    /// A cell that holds fewer pixel centres than this is sampled bilinearly instead of averaged.
+    pub min_cell_pixels: u32,
+}
+
+impl Default for IconParams {
+    fn default() -> Self {
+        Self { size: 75, min_side_ratio: 0.5, max_outside: 0.02, min_cell_pixels: 4 }
+    }
+}
+
+/// Why a quad has no icon.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum IconError {
+    /// The setting `size` is out of range.
+    #[error("icon size {size} is outside {MIN_ICON_SIZE} to {MAX_ICON_SIZE} px")]
+    Size {
+        /// The setting.
+        size: usize,
+    },
+    /// A grey level is not in [0, 255], their number is not size x size, or the scale is not positive and finite.
+    #[error("icon field {field} is malformed")]
+    Malformed {
+        /// Name of the field.
+        field: &'static str,
+    },
+    /// Too far away or too oblique to compare.
+    #[error("shortest side is {min_side_px:.1} px, {required_px:.1} px needed")]
+    TooSmall {
+        /// Shortest side of the quad.
+        min_side_px: f64,
+        /// What the parameters ask for.
+        required_px: f64,
+    },
+    /// Too much of the quad lies outside the image.
+    #[error("{share:.3} of the quad lies outside the image")]
+    Outside {
+        /// Share of icon cells outside.
+        share: f64,
+    },
+    /// The corners are too nearly collinear for a homography.
+    #[error("corners are degenerate")]
+    Degenerate,
+}
+
+/// An icon as it arrives, before its fields are checked.
+#[derive(Deserialize)]
+struct UncheckedIcon {
+    size: usize,
+    pixels: Vec<f32>,
+    source_scale: f64,
+}
+
+impl TryFrom<UncheckedIcon> for Icon {
+    type Error = IconError;
+    fn try_from(icon: UncheckedIcon) -> Result<Self, IconError> {
+        Self::new(icon.size, icon.pixels, icon.source_scale)
+    }
+}
+
+impl Icon {
+    /// Checks an icon that comes from outside: `pixels` row-major, `size * size` grey levels in [0, 255].
+    pub fn new(size: usize, pixels: Vec<f32>, source_scale: f64) -> Result<Self, IconError> {
+        if !(MIN_ICON_SIZE..=MAX_ICON_SIZE).contains(&size) {
+            return Err(IconError::Size { size });
+        }
+        if pixels.len() != size * size || pixels.iter().any(|g| !(0.0..=255.0).contains(g)) {
+            return Err(IconError::Malformed { field: "pixels" });
+        }
+        if !(source_scale.is_finite() && source_scale > 0.0) {
+            return Err(IconError::Malformed { field: "source_scale" });
+        }
+        Ok(Self { size, pixels, source_scale })
+    }
+
+    /// The icon that `corners.rotated(shift)` would give: a turn by `shift` quarters, counter-clockwise.
+    #[must_use]
+    pub fn rotated(&self, shift: usize) -> Self {
+        let last = self.size.saturating_sub(1);
+        let mut pixels = Vec::with_capacity(self.pixels.len());
+        for b in 0..self.size {
+            for a in 0..self.size {
+                let (column, row) = match shift % 4 {
+                    0 => (a, b),
+                    1 => (last - b, a),
+                    2 => (last - a, last - b),
+                    _ => (b, last - a),
+                };
+                pixels.push(self.pixels[row * self.size + column]);
+            }
+        }
+        Self { size: self.size, pixels, source_scale: self.source_scale }
+    }
+}
+
+/// Rectifies what `corners_px` enclose.
+pub fn icon(image: &GrayImage, corners_px: &Corners, p: &IconParams) -> Result<Icon, IconError> {
+    if !(MIN_ICON_SIZE..=MAX_ICON_SIZE).contains(&p.size) {
+        return Err(IconError::Size { size: p.size });
+    }
+    let required_px = p.min_side_ratio * p.size as f64;
+    let min_side_px = corners_px.min_side_px();
+    if min_side_px < required_px {
+        return Err(IconError::TooSmall { min_side_px, required_px });
+    }
+    rectify(image, corners_px, p)
+}
+
+/// [`icon`] without the test on the size of the quad.
+pub(crate) fn rectify(image: &GrayImage, corners_px: &Corners, p: &IconParams) -> Result<Icon, IconError> {
+    let image_from_icon =
+        Homography::square_to_quad(p.size, corners_px).map_err(|_degenerate| IconError::Degenerate)?;
+    let outside = outside_cells(image, &image_from_icon, p.size) as f64 / (p.size * p.size) as f64;
+    if outside > p.max_outside {
+        return Err(IconError::Outside { share: outside });
+    }
+    let (mut sums, counts) = cell_sums(image, corners_px, &image_from_icon, p.size)?;
+    for (i, (sum, count)) in sums.iter_mut().zip(&counts).enumerate() {
+        *sum = if *count >= p.min_cell_pixels.max(1) {
+            *sum / *count as f32
+        } else {
+            cell_sample(image, &image_from_icon, i % p.size, i / p.size)
+        };
+    }
+    let source_scale = corners_px.area_px2().sqrt() / p.size as f64;
+    Ok(Icon { size: p.size, pixels: sums, source_scale })
+}
+
+/// Cells whose centre falls outside the image domain.
+fn outside_cells(image: &GrayImage, image_from_icon: &Homography, size: usize) -> usize {
+    let (width, height) = (image.width() as f64, image.height() as f64);
+    let inside = |p: Point2<f64>| p.x >= -0.5 && p.y >= -0.5 && p.x <= width - 0.5 && p.y <= height - 0.5;
+    let corners = [(0, 0), (size - 1, 0), (0, size - 1), (size - 1, size - 1)];
+    // The image is convex, and so is the quad: with all four corner cells inside, so is every cell.
+    if corners.iter().all(|(a, b)| inside(image_from_icon.apply(&Point2::new(*a as f64, *b as f64)))) {
+        return 0;
+    }
+    (0..size * size)
+        .filter(|i| !inside(image_from_icon.apply(&Point2::new((i % size) as f64, (i / size) as f64))))
+        .count()
+}
+
+/// Sum and number of the pixels whose centres lie in each cell. A pixel centre lies in the quadrilateral that a cell
+/// maps to exactly when the inverse map takes it into the cell.
+fn cell_sums(
+    image: &GrayImage,
+    corners_px: &Corners,
+    image_from_icon: &Homography,
+    size: usize,
+) -> Result<(Vec<f32>, Vec<u32>), IconError> {
+    let icon_from_image = image_from_icon.inverse().map_err(|_degenerate| IconError::Degenerate)?;
+    let h = icon_from_image.matrix();
+    let mut sums = vec![0.0_f32; size * size];
+    let mut counts = vec![0_u32; size * size];
+    let points = corners_px.points();
+    let top = points.iter().map(|p| p.y).fold(f64::INFINITY, f64::min).ceil().max(0.0);
+    let bottom = points.iter().map(|p| p.y).fold(f64::NEG_INFINITY, f64::max).floor();
+    let bottom = bottom.min((image.height() - 1) as f64);
+    let mut row = top;
+    while row <= bottom {
+        if let Some((from, to)) = row_span(points, row, image.width()) {
+            let start =
+                [h[(0, 1)] * row + h[(0, 2)], h[(1, 1)] * row + h[(1, 2)], h[(2, 1)] * row + h[(2, 2)]];
+            for u in from..=to {
+                let x = u as f64;
+                let scale = 1.0 / (h[(2, 0)] * x + start[2]);
+                let a = (h[(0, 0)] * x + start[0]) * scale + 0.5;
+                let b = (h[(1, 0)] * x + start[1]) * scale + 0.5;
+                if a >= 0.0 && b >= 0.0 && a < size as f64 && b < size as f64 {
+                    let cell = b as usize * size + a as usize;
+                    sums[cell] += f32::from(image.at(u, row as usize));
+                    counts[cell] += 1;
+                }
+            }
+        }
+        row += 1.0;
+    }
+    Ok((sums, counts))
+}
+
+/// First and last pixel column of the quad on image row `v`, clamped to the image.
+fn row_span(points: &[Point2<f64>; 4], v: f64, width: usize) -> Option<(usize, usize)> {
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    for i in 0..4 {
+        let (p, q) = (points[i], points[(i + 1) % 4]);
+        if (p.y <= v) == (q.y <= v) && (p.y - v).abs() > 0.0 && (q.y - v).abs() > 0.0 {
+            continue;
+        }
+        let t = if (q.y - p.y).abs() > 0.0 { ((v - p.y) / (q.y - p.y)).clamp(0.0, 1.0) } else { 0.0 };
+        let u = p.x + t * (q.x - p.x);
+        low = low.min(u);
+        high = high.max(u);
+    }
+    // One column more on both sides: the inverse map, not this, decides which pixels belong to the quad.
+    let low = (low.floor() - 1.0).max(0.0);
+    let high = (high.ceil() + 1.0).min((width - 1) as f64);
+    (low <= high).then_some((low as usize, high as usize))
+}
+
+/// Mean of 2 x 2 bilinear samples spread over a cell.
+///
+/// Departs from method 4: it takes one sample, and only in cells without any pixel centre. Between one and two source
+/// pixels a cell, averaging the one or two centres that happen to fall in is noisier than sampling.
+fn cell_sample(image: &GrayImage, image_from_icon: &Homography, a: usize, b: usize) -> f32 {
+    let mut sum = 0.0;
+    for (du, dv) in [(-0.25, -0.25), (0.25, -0.25), (-0.25, 0.25), (0.25, 0.25)] {
+        let px = image_from_icon.apply(&Point2::new(a as f64 + du, b as f64 + dv));
+        sum += image.sample(px.x, px.y);
+    }
+    sum * 0.25
+}
+
+#[cfg(test)]
+mod tests;

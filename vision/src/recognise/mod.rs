@@ -6,7 +6,38 @@ pub mod correlation;
 pub mod hausdorff;
 pub mod verdict;
 
+use crate::{icon::Icon, params::RecogniseParams};
+use correlation::Buckets;
+use descriptor::PointSet;
 use serde::{Deserialize, Serialize};
+
+/// An icon with everything that both distances need, worked out once. Depends on icon, points, descriptor and bucket
+/// parameters only; never stored, since it follows from the icon.
+#[derive(Debug, Clone, PartialEq)]
+pub struct IconFeatures {
+    /// The icon.
+    pub icon: Icon,
+    /// Normalised buckets for C^r.
+    pub buckets: Buckets,
+    /// Described points for H^r.
+    pub points: PointSet,
+}
+
+impl IconFeatures {
+    /// The features of `icon.rotated(shift)`.
+    #[must_use]
+    pub fn rotated(&self, shift: usize, p: &RecogniseParams) -> Self {
+        let icon = self.icon.rotated(shift);
+        let buckets = Buckets::new(&icon, &p.correlation);
+        Self { buckets, points: self.points.rotated(shift, icon.size), icon }
+    }
+}
+
+/// Works out buckets, points and descriptors of `icon`.
+pub fn features(icon: Icon, p: &RecogniseParams) -> IconFeatures {
+    let points = descriptor::describe(&icon, &harris::harris(&icon, &p.harris), &p.descriptor);
+    IconFeatures { buckets: Buckets::new(&icon, &p.correlation), points, icon }
+}
 
 /// Number that names a landmark inside one map. The server keeps the readable name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
@@ -52,7 +83,7 @@ pub struct Candidate {
     pub tau: f64,
     /// `distance / tau`; accepted only below 1.
     pub ratio: f64,
-    /// P(C_l | Q) of method 10.
+    /// `P(C_l | Q)` of method 10.
     pub probability: f64,
     /// The gate that refused it, if one did.
     pub refusal: Option<Refusal>,
