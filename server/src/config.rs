@@ -8,6 +8,7 @@ use figment::{
     Figment,
     providers::{Env, Format, Serialized, Toml},
 };
+use protos::Name;
 use serde::{Deserialize, Serialize};
 use std::{
     net::{IpAddr, SocketAddr},
@@ -20,8 +21,6 @@ use vision::params::Params;
 const NOT_SETTINGS: [&str; 3] = ["config", "server", "log"];
 /// Most vision threads that can be asked for.
 pub const MAX_WORKERS: usize = 256;
-/// Longest name of a map, landmark, robot, camera or fleet.
-pub const MAX_NAME_BYTES: usize = 64;
 
 /// Why the settings cannot be used. The text names the setting.
 #[derive(Debug, thiserror::Error)]
@@ -210,7 +209,7 @@ pub struct Config {
     /// Where the zenoh router listens, `tcp/HOST:PORT`; port 0 takes a free one.
     pub zenoh_endpoint: String,
     /// Name in every key.
-    pub fleet: String,
+    pub fleet: Name,
     /// Vision threads, at least 1.
     pub workers: usize,
     /// Every bound.
@@ -233,9 +232,7 @@ impl TryFrom<RawConfig> for Config {
                 return Err(ConfigError::NotLoopback { field, value: value.clone() });
             }
         }
-        if !is_name(&raw.fleet) {
-            return Err(invalid("fleet", format!("`{}` is not of the form [a-z0-9_-]{{1,64}}", raw.fleet)));
-        }
+        let fleet = Name::new(raw.fleet).map_err(|e| invalid("fleet", e.to_string()))?;
         if raw.workers > MAX_WORKERS {
             return Err(invalid("workers", format!("{} is more than {MAX_WORKERS}", raw.workers)));
         }
@@ -260,7 +257,7 @@ impl TryFrom<RawConfig> for Config {
             data: raw.data,
             http_addr,
             zenoh_endpoint: raw.zenoh,
-            fleet: raw.fleet,
+            fleet,
             workers: if raw.workers == 0 { cores } else { raw.workers },
             limits: raw.limits,
             params: Arc::new(raw.algorithm),
@@ -287,13 +284,6 @@ fn zenoh_address(endpoint: &str) -> Result<SocketAddr, ConfigError> {
     endpoint.strip_prefix("tcp/").and_then(|rest| rest.parse().ok()).ok_or_else(|| {
         invalid("zenoh", format!("`{endpoint}` is not tcp/ADDRESS:PORT with a numeric address"))
     })
-}
-
-/// Whether `text` may name a map, landmark, robot, camera or fleet: `[a-z0-9_-]{1,64}`. Such names are safe in keys,
-/// paths and file names.
-pub fn is_name(text: &str) -> bool {
-    (1..=MAX_NAME_BYTES).contains(&text.len())
-        && text.bytes().all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'_' || b == b'-')
 }
 
 #[cfg(test)]
@@ -368,14 +358,5 @@ mod tests {
         assert!(RawConfig::read(Some(Path::new("/nonexistent/waymark.toml"))).is_err());
         let unknown: Result<RawConfig, _> = Figment::from(Toml::string("colour = 3")).extract();
         assert!(unknown.is_err());
-    }
-
-    #[test]
-    fn names_are_checked_at_the_bound() {
-        assert!(is_name("north-wing_2"));
-        assert!(is_name(&"a".repeat(MAX_NAME_BYTES)));
-        for bad in ["", "A", "a/b", "a*", "a.b", "ä", &"a".repeat(MAX_NAME_BYTES + 1)] {
-            assert!(!is_name(bad), "{bad}");
-        }
     }
 }

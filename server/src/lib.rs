@@ -6,4 +6,5 @@
 pub mod config;
 pub mod engine;
 pub mod bus;
+mod store;
 pub mod cli;

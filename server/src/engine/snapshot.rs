@@ -2,6 +2,7 @@
 //! after its transaction is committed; a reader keeps the `Arc` it took, so an answer rests on one version.
 
 use arc_swap::ArcSwap;
+use map::{place::LandmarkPlace, segments::LaserSegment};
 use std::{collections::BTreeMap, sync::Arc};
 use tokio::sync::broadcast;
 use vision::{
@@ -22,6 +23,8 @@ pub struct MapSnapshot {
     pub version: u64,
     /// Every landmark of the map by number, learnt or not.
     pub landmarks: BTreeMap<LandmarkId, LandmarkInfo>,
+    /// The walls.
+    pub walls: Vec<LaserSegment>,
     /// Which distance decides.
     pub distance: DistanceKind,
     /// The parameters the models were learnt under, with the map's own distance.
@@ -35,6 +38,8 @@ pub struct LandmarkInfo {
     pub name: String,
     /// Width and height, if measured; without it there is no pose.
     pub size: Option<LandmarkSize>,
+    /// Where it hangs, if that and its size are known; without it there is no robot pose.
+    pub place: Option<LandmarkPlace>,
 }
 
 /// A map got a new version, or is gone.
@@ -129,6 +134,7 @@ mod tests {
             name: name.into(),
             version,
             landmarks: BTreeMap::new(),
+            walls: Vec::new(),
             distance: DistanceKind::Both,
             params: Arc::default(),
         })

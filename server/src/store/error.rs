@@ -1,0 +1,102 @@
+//! What can go wrong with the store, sorted by what the caller can do about it.
+
+/// Why a read or a write did not happen. Nothing was changed.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum StoreError {
+    /// There is no such thing.
+    #[error("there is no {what} `{name}`")]
+    NotFound {
+        /// Kind of thing.
+        what: &'static str,
+        /// The name asked for.
+        name: String,
+    },
+    /// The name is taken.
+    #[error("{what} `{name}` exists already")]
+    Exists {
+        /// Kind of thing.
+        what: &'static str,
+        /// The name.
+        name: String,
+    },
+    /// A bound is reached.
+    #[error("at most {max} {what}")]
+    Limit {
+        /// What there would be too many of.
+        what: &'static str,
+        /// The bound.
+        max: usize,
+    },
+    /// Something else rests on it.
+    #[error("{0}")]
+    InUse(String),
+    /// The disk is full; reading goes on.
+    #[error("the disk is full")]
+    Full,
+    /// The writer has stopped: after an I/O error nothing may be written any more.
+    #[error("the store does not take writes any more")]
+    Closed,
+    /// A stored row cannot be read as what it should be.
+    #[error("{what} is damaged: {reason}")]
+    Damaged {
+        /// Which row.
+        what: String,
+        /// What is wrong.
+        reason: String,
+    },
+    /// Anything else the database says, with the operation that met it.
+    #[error("{operation} failed")]
+    Database {
+        /// The operation.
+        operation: &'static str,
+        /// What the database says.
+        source: sqlx::Error,
+    },
+}
+
+/// SQLite result codes (primary, the low byte).
+const SQLITE_IOERR: i32 = 10;
+const SQLITE_CORRUPT: i32 = 11;
+const SQLITE_FULL: i32 = 13;
+const SQLITE_NOTADB: i32 = 26;
+
+fn primary_code(error: &sqlx::Error) -> Option<i32> {
+    let code = error.as_database_error()?.code()?.parse::<i32>().ok()?;
+    Some(code & 0xff)
+}
+
+impl StoreError {
+    /// Names the operation. For `map_err`.
+    pub(crate) fn at(operation: &'static str) -> impl FnOnce(sqlx::Error) -> Self {
+        move |source| match primary_code(&source) {
+            Some(SQLITE_FULL) => Self::Full,
+            _ => Self::Database { operation, source },
+        }
+    }
+
+    /// Like [`StoreError::at`], for an insertion whose only unique constraint is the name.
+    pub(crate) fn inserting(
+        operation: &'static str,
+        what: &'static str,
+        name: &str,
+    ) -> impl FnOnce(sqlx::Error) -> Self {
+        move |source| match &source {
+            sqlx::Error::Database(e) if e.is_unique_violation() => {
+                Self::Exists { what, name: name.to_owned() }
+            }
+            _ => Self::at(operation)(source),
+        }
+    }
+
+    /// The state on disk is unknown after this: an fsync that failed cannot be tried again, since the pages are then
+    /// marked clean (reliability 1.12). The only safe way on is to stop and to open again from disk.
+    pub(crate) fn is_fatal(&self) -> bool {
+        match self {
+            Self::Database { source, .. } => {
+                matches!(primary_code(source), Some(SQLITE_IOERR | SQLITE_CORRUPT | SQLITE_NOTADB))
+                    || matches!(source, sqlx::Error::Io(_) | sqlx::Error::WorkerCrashed)
+            }
+            _ => false,
+        }
+    }
+}

@@ -1,0 +1,123 @@
+//! Jobs as rows: what was accepted survives a crash and is run again.
+
+use super::{StoreError, Tx, maps, now_ms, statements::statements, within};
+use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
+
+statements! {
+    COUNT_OPEN = "SELECT count(*) FROM jobs WHERE state IN ('queued', 'running')";
+    INSERT = "INSERT INTO jobs (kind, map, request, state, created_ms) VALUES (?1, ?2, ?3, 'queued', ?4) RETURNING id";
+    GET = "SELECT id, kind, map, request, state, message, result FROM jobs WHERE id = ?1";
+    OPEN = "SELECT id, kind, map, request, state, message, result FROM jobs \
+            WHERE state IN ('queued', 'running') ORDER BY id";
+    SET_RUNNING = "UPDATE jobs SET state = 'running' WHERE id = ?1 AND state = 'queued'";
+    END = "UPDATE jobs SET state = ?2, message = ?3, result = ?4, ended_ms = ?5 \
+           WHERE id = ?1 AND state IN ('queued', 'running')";
+    FORGET = "DELETE FROM jobs WHERE ended_ms IS NOT NULL AND id NOT IN \
+              (SELECT id FROM jobs WHERE ended_ms IS NOT NULL ORDER BY id DESC LIMIT ?1)";
+}
+
+/// A job.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct JobRow {
+    pub(crate) id: i64,
+    pub(crate) kind: String,
+    /// Name of its map.
+    pub(crate) map: String,
+    /// What was asked for, JSON.
+    pub(crate) request: String,
+    /// queued, running, done, failed, cancelled.
+    pub(crate) state: String,
+    pub(crate) message: String,
+    /// JSON, once done.
+    pub(crate) result: Option<String>,
+}
+
+/// How a job ended.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Ended {
+    /// done, failed, cancelled.
+    pub(crate) state: &'static str,
+    pub(crate) message: String,
+    /// JSON.
+    pub(crate) result: Option<String>,
+}
+
+fn job_row(row: &SqliteRow) -> Result<JobRow, sqlx::Error> {
+    Ok(JobRow {
+        id: row.try_get("id")?,
+        kind: row.try_get("kind")?,
+        map: row.try_get("map")?,
+        request: row.try_get("request")?,
+        state: row.try_get("state")?,
+        message: row.try_get("message")?,
+        result: row.try_get("result")?,
+    })
+}
+
+/// Queues a job and forgets the oldest finished ones beyond `kept`.
+pub(crate) async fn create(
+    tx: &mut Tx,
+    kind: &'static str,
+    map: &str,
+    request: &str,
+    (max, kept): (usize, usize),
+) -> Result<JobRow, StoreError> {
+    maps::get(&mut tx.conn, map).await?;
+    let open =
+        sqlx::query_scalar(COUNT_OPEN).fetch_one(&mut tx.conn).await.map_err(StoreError::at("count jobs"))?;
+    within(open, max, "jobs waiting or running")?;
+    sqlx::query(FORGET)
+        .bind(kept as i64)
+        .execute(&mut tx.conn)
+        .await
+        .map_err(StoreError::at("forget jobs"))?;
+    let id = sqlx::query_scalar(INSERT)
+        .bind(kind)
+        .bind(map)
+        .bind(request)
+        .bind(now_ms())
+        .fetch_one(&mut tx.conn)
+        .await;
+    Ok(JobRow {
+        id: id.map_err(StoreError::at("queue job"))?,
+        kind: kind.to_owned(),
+        map: map.to_owned(),
+        request: request.to_owned(),
+        state: "queued".to_owned(),
+        message: String::new(),
+        result: None,
+    })
+}
+
+/// One job.
+pub(crate) async fn get(db: impl SqliteExecutor<'_>, id: i64) -> Result<JobRow, StoreError> {
+    let row = sqlx::query(GET).bind(id).fetch_optional(db).await.map_err(StoreError::at("read job"))?;
+    let row = row.ok_or_else(|| StoreError::NotFound { what: "job", name: id.to_string() })?;
+    job_row(&row).map_err(StoreError::at("read job"))
+}
+
+/// Jobs not ended, oldest first.
+pub(crate) async fn open(db: impl SqliteExecutor<'_>) -> Result<Vec<JobRow>, StoreError> {
+    let rows = sqlx::query(OPEN).fetch_all(db).await.map_err(StoreError::at("list jobs"))?;
+    rows.iter().map(job_row).collect::<Result<_, _>>().map_err(StoreError::at("list jobs"))
+}
+
+/// Marks a queued job as running.
+pub(crate) async fn set_running(tx: &mut Tx, id: i64) -> Result<(), StoreError> {
+    sqlx::query(SET_RUNNING).bind(id).execute(&mut tx.conn).await.map_err(StoreError::at("start job"))?;
+    Ok(())
+}
+
+/// Ends a job. False when it had ended already; then nothing changed.
+pub(crate) async fn end(tx: &mut Tx, id: i64, ended: &Ended) -> Result<bool, StoreError> {
+    let done = sqlx::query(END)
+        .bind(id)
+        .bind(ended.state)
+        .bind(&ended.message)
+        .bind(&ended.result)
+        .bind(now_ms())
+        .execute(&mut tx.conn)
+        .await
+        .map_err(StoreError::at("end job"))?;
+    Ok(done.rows_affected() == 1)
+}

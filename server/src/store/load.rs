@@ -1,0 +1,96 @@
+//! From rows to the immutable snapshot of a map. Models are taken over from the previous version where the digest is
+//! the same; a damaged or outdated model is named and left out, never matched.
+
+use super::{StoreError, landmarks, laser, maps, robots, statements::statements};
+use crate::engine::snapshot::{LandmarkInfo, MapSnapshot, Snapshots};
+use map::{
+    place::{LandmarkPlace, PlaceSigmas},
+    segments::LaserSegment,
+};
+use nalgebra::{Matrix2, Point2, Vector3};
+use sqlx::{Row, SqliteConnection};
+use std::{collections::BTreeMap, sync::Arc};
+use vision::{params::Params, recognise::LandmarkId};
+
+statements! {
+    MAP = "SELECT name, version, distance FROM maps WHERE id = ?1";
+    MAP_IDS = "SELECT id FROM maps ORDER BY id";
+    LANDMARKS = "SELECT id, name, width_m, height_m, x_m, y_m, z_m, theta_rad FROM landmarks WHERE map_id = ?1 ORDER BY id";
+}
+
+/// Standard deviation of a wall given by hand, across it.
+const WALL_SIGMA_M: f64 = 0.01;
+/// Robots read at a time.
+const PAGE: usize = 500;
+
+/// Publishes every map and robot. For the start.
+pub(super) async fn all(
+    conn: &mut SqliteConnection,
+    snapshots: &Snapshots,
+    params: &Arc<Params>,
+) -> Result<(), StoreError> {
+    let ids: Vec<i64> =
+        sqlx::query_scalar(MAP_IDS).fetch_all(&mut *conn).await.map_err(StoreError::at("list maps"))?;
+    for id in ids {
+        if let Some(map) = map(conn, id, snapshots, params).await? {
+            snapshots.publish(map);
+        }
+    }
+    let mut after = String::new();
+    loop {
+        let page = robots::page(&mut *conn, &after, PAGE).await?;
+        let Some(last) = page.last() else { return Ok(()) };
+        after.clone_from(&last.name);
+        for robot in page {
+            snapshots.set_robot(&robot.name, Some(&robot.map));
+        }
+    }
+}
+
+/// The current version of a map as it is in the database; `None` if it is gone.
+pub(super) async fn map(
+    conn: &mut SqliteConnection,
+    id: i64,
+    _snapshots: &Snapshots,
+    params: &Arc<Params>,
+) -> Result<Option<Arc<MapSnapshot>>, StoreError> {
+    let at = || StoreError::at("read map");
+    let Some(row) = sqlx::query(MAP).bind(id).fetch_optional(&mut *conn).await.map_err(at())? else {
+        return Ok(None);
+    };
+    let distance = maps::distance_of(&row.try_get::<String, _>("distance").map_err(at())?);
+    let rows = sqlx::query(LANDMARKS).bind(id).fetch_all(&mut *conn).await.map_err(at())?;
+    let mut infos = BTreeMap::new();
+    for row in &rows {
+        let id: i64 = row.try_get("id").map_err(at())?;
+        let name = row.try_get("name").map_err(at())?;
+        let measures = landmarks::measures(row).map_err(at())?;
+        let info = LandmarkInfo { name, size: measures.size, place: place(&measures) };
+        infos.insert(LandmarkId(id as u64), info);
+    }
+    let walls = laser::all_of(&mut *conn, id).await?.iter().filter_map(wall).collect();
+    Ok(Some(Arc::new(MapSnapshot {
+        name: row.try_get("name").map_err(at())?,
+        version: row.try_get::<i64, _>("version").map_err(at())? as u64,
+        landmarks: infos,
+        walls,
+        distance,
+        params: params.clone(),
+    })))
+}
+
+/// A landmark has a usable place only with a size; out of range (a file from elsewhere) counts as not placed.
+pub(crate) fn place(measures: &landmarks::Measures) -> Option<LandmarkPlace> {
+    let (size, place) = measures.size.zip(measures.place)?;
+    let centre = Vector3::new(place.x_m, place.y_m, place.z_m);
+    LandmarkPlace::by_hand(centre, place.theta_rad, size, PlaceSigmas::default()).ok()
+}
+
+/// A wall from its ends, each known to [`WALL_SIGMA_M`] across the wall.
+pub(crate) fn wall(&[ax, ay, bx, by]: &laser::Ends) -> Option<LaserSegment> {
+    let (a, b) = (Point2::new(ax, ay), Point2::new(bx, by));
+    let length = (b - a).norm().max(map::segments::MIN_SEGMENT_M);
+    let variance = WALL_SIGMA_M * WALL_SIGMA_M;
+    let covariance = Matrix2::new(2.0 * variance / (length * length), 0.0, 0.0, variance);
+    LaserSegment::from_ends(a, b, covariance).ok()
+}

@@ -1,0 +1,118 @@
+//! Maps: named, versioned, with the distance that decides.
+
+use super::{Change, StoreError, Tx, now_ms, statements::statements, within};
+use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
+use vision::recognise::DistanceKind;
+
+statements! {
+    COUNT = "SELECT count(*) FROM maps";
+    INSERT = "INSERT INTO maps (name, distance, created_ms) VALUES (?1, ?2, ?3) RETURNING id";
+    GET = "SELECT id, name, version, distance, (SELECT count(*) FROM landmarks WHERE map_id = maps.id) AS landmarks \
+           FROM maps WHERE name = ?1";
+    PAGE = "SELECT id, name, version, distance, (SELECT count(*) FROM landmarks WHERE map_id = maps.id) AS landmarks \
+            FROM maps WHERE name > ?1 ORDER BY name LIMIT ?2";
+    BUMP = "UPDATE maps SET version = version + 1 WHERE id = ?1";
+    DELETE = "DELETE FROM maps WHERE id = ?1";
+    ROBOT_ON = "SELECT name FROM robots WHERE map_id = ?1 ORDER BY name LIMIT 1";
+}
+
+/// A map without its content.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct MapRow {
+    pub(crate) id: i64,
+    pub(crate) name: String,
+    pub(crate) version: u64,
+    pub(crate) distance: DistanceKind,
+    /// How many landmarks it has.
+    pub(crate) landmarks: u64,
+}
+
+fn map_row(row: &SqliteRow) -> Result<MapRow, sqlx::Error> {
+    let distance: String = row.try_get("distance")?;
+    Ok(MapRow {
+        id: row.try_get("id")?,
+        name: row.try_get("name")?,
+        version: row.try_get::<i64, _>("version")? as u64,
+        distance: distance_of(&distance),
+        landmarks: row.try_get::<i64, _>("landmarks")? as u64,
+    })
+}
+
+/// The word stored for a distance; the schema admits no other.
+pub(super) fn distance_word(distance: DistanceKind) -> &'static str {
+    match distance {
+        DistanceKind::Both => "both",
+        DistanceKind::Correlation => "correlation",
+        DistanceKind::Hausdorff => "hausdorff",
+    }
+}
+
+pub(super) fn distance_of(word: &str) -> DistanceKind {
+    match word {
+        "correlation" => DistanceKind::Correlation,
+        "hausdorff" => DistanceKind::Hausdorff,
+        _ => DistanceKind::Both,
+    }
+}
+
+/// A new, empty map.
+pub(crate) async fn create(
+    tx: &mut Tx,
+    name: &str,
+    distance: DistanceKind,
+    max: usize,
+) -> Result<MapRow, StoreError> {
+    let count =
+        sqlx::query_scalar(COUNT).fetch_one(&mut tx.conn).await.map_err(StoreError::at("count maps"))?;
+    within(count, max, "maps")?;
+    let id = sqlx::query_scalar(INSERT)
+        .bind(name)
+        .bind(distance_word(distance))
+        .bind(now_ms())
+        .fetch_one(&mut tx.conn)
+        .await
+        .map_err(StoreError::inserting("create map", "map", name))?;
+    tx.changed(Change::Map(id));
+    Ok(MapRow { id, name: name.to_owned(), version: 1, distance, landmarks: 0 })
+}
+
+/// One map by name.
+pub(crate) async fn get(db: impl SqliteExecutor<'_>, name: &str) -> Result<MapRow, StoreError> {
+    let row = sqlx::query(GET).bind(name).fetch_optional(db).await.map_err(StoreError::at("read map"))?;
+    let row = row.ok_or_else(|| StoreError::NotFound { what: "map", name: name.to_owned() })?;
+    map_row(&row).map_err(StoreError::at("read map"))
+}
+
+/// Maps with names after `after`, in order.
+pub(crate) async fn page(
+    db: impl SqliteExecutor<'_>,
+    after: &str,
+    limit: usize,
+) -> Result<Vec<MapRow>, StoreError> {
+    let rows = sqlx::query(PAGE).bind(after).bind(limit as i64).fetch_all(db).await;
+    let rows = rows.map_err(StoreError::at("list maps"))?;
+    rows.iter().map(map_row).collect::<Result<_, _>>().map_err(StoreError::at("list maps"))
+}
+
+/// The map's content has changed: a new version, published after the commit.
+pub(super) async fn bump(tx: &mut Tx, id: i64) -> Result<(), StoreError> {
+    sqlx::query(BUMP).bind(id).execute(&mut tx.conn).await.map_err(StoreError::at("count map version"))?;
+    tx.changed(Change::Map(id));
+    Ok(())
+}
+
+/// Deletes a map and all that is in it. Refused while a robot stands on it.
+pub(crate) async fn delete(tx: &mut Tx, name: &str) -> Result<(), StoreError> {
+    let map = get(&mut tx.conn, name).await?;
+    let robot: Option<String> = sqlx::query_scalar(ROBOT_ON)
+        .bind(map.id)
+        .fetch_optional(&mut tx.conn)
+        .await
+        .map_err(StoreError::at("look for robots"))?;
+    if let Some(robot) = robot {
+        return Err(StoreError::InUse(format!("robot `{robot}` stands on map `{name}`")));
+    }
+    sqlx::query(DELETE).bind(map.id).execute(&mut tx.conn).await.map_err(StoreError::at("delete map"))?;
+    tx.changed(Change::MapRemoved(map.name));
+    Ok(())
+}

@@ -1,0 +1,217 @@
+//! Opens the file: one writer connection and a read-only pool, with settings that survive a power cut, each of them
+//! read back. Refuses a SQLite with the write-ahead-log corruption bug, a damaged file and a second server.
+
+use sqlx::{
+    ConnectOptions, Row, SqliteConnection, SqlitePool,
+    sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePoolOptions, SqliteSynchronous},
+};
+use std::{
+    fs::{File, TryLockError},
+    path::{Path, PathBuf},
+    time::Duration,
+};
+
+use super::StoreError;
+
+/// First version without the write-ahead-log corruption of 3.7.0 to 3.51.2 (sqlite.org/wal.html#walresetbug).
+pub(crate) const SQLITE_MIN: (u32, u32, u32) = (3, 51, 3);
+/// Connections that read at a time.
+const READERS: u32 = 4;
+/// Only a foreign program could hold the lock: the writer is alone.
+const BUSY_TIMEOUT: Duration = Duration::from_secs(5);
+/// File name of the database in the data directory.
+pub(crate) const FILE: &str = "waymark.sqlite";
+/// File name of the lock in the data directory.
+const LOCK: &str = "lock";
+
+/// What each connection must say of itself. Name, value.
+const PRAGMAS: [(&str, &str); 7] = [
+    ("journal_mode", "wal"),
+    // 2 = FULL: a commit is on the disk before it is acknowledged.
+    ("synchronous", "2"),
+    ("foreign_keys", "1"),
+    // A read error must come back as an error, not as a signal.
+    ("mmap_size", "0"),
+    ("trusted_schema", "0"),
+    ("cell_size_check", "1"),
+    ("busy_timeout", "5000"),
+];
+
+/// Why the store does not open.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum OpenError {
+    /// The directory or the lock file.
+    #[error("data directory {path}: {source}")]
+    Directory {
+        /// The path.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// Another server holds it.
+    #[error("data directory {0} is in use by another server")]
+    Locked(PathBuf),
+    /// The compiled-in SQLite is too old.
+    #[error("SQLite {0} can corrupt a database; at least {a}.{b}.{c} is needed", a = SQLITE_MIN.0, b = SQLITE_MIN.1, c = SQLITE_MIN.2)]
+    Version(String),
+    /// A setting did not take.
+    #[error("the database says {pragma} = {actual}, {expected} is needed")]
+    Pragma {
+        /// Name of the setting.
+        pragma: &'static str,
+        /// Value needed.
+        expected: &'static str,
+        /// Value read back.
+        actual: String,
+    },
+    /// The file is damaged.
+    #[error("the database is damaged: {0}")]
+    Damaged(String),
+    /// A migration cannot be applied; a newer server may have written the file.
+    #[error("the database cannot be brought to this server's schema")]
+    Migrate(#[source] sqlx::migrate::MigrateError),
+    /// Anything else at opening.
+    #[error("the database does not open")]
+    Open(#[source] sqlx::Error),
+    /// The first reading of the maps.
+    #[error("the maps cannot be read")]
+    Load(#[source] StoreError),
+}
+
+/// An open database.
+pub(super) struct Opened {
+    pub(super) writer: SqliteConnection,
+    pub(super) reads: SqlitePool,
+    pub(super) lock: File,
+}
+
+pub(super) async fn open(data: &Path) -> Result<Opened, OpenError> {
+    let lock = lock(data)?;
+    let options = SqliteConnectOptions::new()
+        .filename(data.join(FILE))
+        .journal_mode(SqliteJournalMode::Wal)
+        .synchronous(SqliteSynchronous::Full)
+        .foreign_keys(true)
+        .busy_timeout(BUSY_TIMEOUT)
+        .pragma("mmap_size", "0")
+        .pragma("trusted_schema", "OFF")
+        .pragma("cell_size_check", "ON")
+        .disable_statement_logging();
+    let mut writer = options.clone().create_if_missing(true).connect().await.map_err(OpenError::Open)?;
+    check_version(&mut writer).await?;
+    check_pragmas(&mut writer).await?;
+    check_integrity(&mut writer).await?;
+    sqlx::migrate!("../migrations").run(&mut writer).await.map_err(OpenError::Migrate)?;
+    let reads = SqlitePoolOptions::new()
+        .max_connections(READERS)
+        .acquire_timeout(BUSY_TIMEOUT)
+        .connect_with(options.read_only(true))
+        .await
+        .map_err(OpenError::Open)?;
+    check_pragmas(&mut *reads.acquire().await.map_err(OpenError::Open)?).await?;
+    Ok(Opened { writer, reads, lock })
+}
+
+fn lock(data: &Path) -> Result<File, OpenError> {
+    let at = |source| OpenError::Directory { path: data.to_owned(), source };
+    std::fs::create_dir_all(data).map_err(at)?;
+    let file = File::options().create(true).truncate(false).write(true).open(data.join(LOCK)).map_err(at)?;
+    match file.try_lock() {
+        Ok(()) => Ok(file),
+        Err(TryLockError::WouldBlock) => Err(OpenError::Locked(data.to_owned())),
+        Err(TryLockError::Error(source)) => Err(at(source)),
+    }
+}
+
+async fn check_version(conn: &mut SqliteConnection) -> Result<(), OpenError> {
+    let text: String =
+        sqlx::query_scalar("SELECT sqlite_version()").fetch_one(conn).await.map_err(OpenError::Open)?;
+    if version(&text).is_some_and(|v| v >= SQLITE_MIN) { Ok(()) } else { Err(OpenError::Version(text)) }
+}
+
+fn version(text: &str) -> Option<(u32, u32, u32)> {
+    let mut parts = text.split('.').map(str::parse);
+    Some((parts.next()?.ok()?, parts.next()?.ok()?, parts.next()?.ok()?))
+}
+
+async fn check_pragmas(conn: &mut SqliteConnection) -> Result<(), OpenError> {
+    for (pragma, expected) in PRAGMAS {
+        let sql = sqlx::AssertSqlSafe(format!("PRAGMA {pragma}"));
+        let row = sqlx::query(sql).fetch_one(&mut *conn).await.map_err(OpenError::Open)?;
+        // Some answer with a number, some with a word; SQLite itself makes either a text.
+        let actual: String = row.try_get_unchecked(0).map_err(OpenError::Open)?;
+        if actual != expected {
+            return Err(OpenError::Pragma { pragma, expected, actual });
+        }
+    }
+    Ok(())
+}
+
+async fn check_integrity(conn: &mut SqliteConnection) -> Result<(), OpenError> {
+    let said: String = sqlx::query_scalar("SELECT quick_check FROM pragma_quick_check")
+        .fetch_one(conn)
+        .await
+        .map_err(OpenError::Open)?;
+    if said == "ok" { Ok(()) } else { Err(OpenError::Damaged(said)) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn versions_compare_as_numbers() {
+        assert!(version("3.51.3").unwrap() >= SQLITE_MIN);
+        assert!(version("3.100.0").unwrap() >= SQLITE_MIN);
+        assert!(version("3.51.2").unwrap() < SQLITE_MIN);
+        assert!(version("3.9.9").unwrap() < SQLITE_MIN);
+        assert_eq!(version("3.51"), None);
+    }
+
+    #[tokio::test]
+    async fn a_second_server_is_refused() {
+        let dir = tempfile::tempdir().unwrap();
+        let first = open(dir.path()).await.unwrap();
+        assert!(matches!(open(dir.path()).await, Err(OpenError::Locked(_))));
+        drop(first);
+        assert!(open(dir.path()).await.is_ok());
+    }
+
+    #[tokio::test]
+    async fn a_setting_that_did_not_take_is_found() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut opened = open(dir.path()).await.unwrap();
+        sqlx::raw_sql("PRAGMA synchronous = NORMAL").execute(&mut opened.writer).await.unwrap();
+        assert!(matches!(
+            check_pragmas(&mut opened.writer).await,
+            Err(OpenError::Pragma { pragma: "synchronous", .. })
+        ));
+    }
+
+    #[tokio::test]
+    async fn a_damaged_file_is_refused() {
+        let dir = tempfile::tempdir().unwrap();
+        let opened = open(dir.path()).await.unwrap();
+        opened.reads.close().await;
+        sqlx::Connection::close(opened.writer).await.unwrap();
+        drop(opened.lock);
+        let path = dir.path().join(FILE);
+        let mut bytes = std::fs::read(&path).unwrap();
+        assert!(bytes.len() > 8192);
+        for byte in &mut bytes[4096..8192] {
+            *byte = 0xa5;
+        }
+        std::fs::write(&path, bytes).unwrap();
+        assert!(open(dir.path()).await.is_err());
+    }
+
+    #[tokio::test]
+    async fn readers_cannot_write() {
+        let dir = tempfile::tempdir().unwrap();
+        let opened = open(dir.path()).await.unwrap();
+        let write = sqlx::query("INSERT INTO maps (name, distance, created_ms) VALUES ('a', 'both', 0)")
+            .execute(&opened.reads)
+            .await;
+        assert!(write.is_err());
+    }
+}

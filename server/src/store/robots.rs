@@ -1,0 +1,63 @@
+//! Robots and the map each stands on.
+
+use super::{Change, StoreError, Tx, maps, now_ms, statements::statements, within};
+use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
+
+statements! {
+    COUNT_OTHERS = "SELECT count(*) FROM robots WHERE name <> ?1";
+    PUT = "INSERT INTO robots (name, map_id, created_ms) VALUES (?1, ?2, ?3) \
+           ON CONFLICT (name) DO UPDATE SET map_id = excluded.map_id";
+    GET = "SELECT r.name, m.name AS map FROM robots r JOIN maps m ON m.id = r.map_id WHERE r.name = ?1";
+    PAGE = "SELECT r.name, m.name AS map FROM robots r JOIN maps m ON m.id = r.map_id \
+            WHERE r.name > ?1 ORDER BY r.name LIMIT ?2";
+    DELETE = "DELETE FROM robots WHERE name = ?1";
+}
+
+/// A robot.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct RobotRow {
+    pub(crate) name: String,
+    /// Name of its map.
+    pub(crate) map: String,
+}
+
+fn robot_row(row: &SqliteRow) -> Result<RobotRow, sqlx::Error> {
+    Ok(RobotRow { name: row.try_get("name")?, map: row.try_get("map")? })
+}
+
+/// Registers a robot, or moves it to another map.
+pub(crate) async fn put(tx: &mut Tx, name: &str, map: &str, max: usize) -> Result<RobotRow, StoreError> {
+    let map = maps::get(&mut tx.conn, map).await?;
+    let others = sqlx::query_scalar(COUNT_OTHERS).bind(name).fetch_one(&mut tx.conn).await;
+    within(others.map_err(StoreError::at("count robots"))?, max, "robots")?;
+    let put = sqlx::query(PUT).bind(name).bind(map.id).bind(now_ms()).execute(&mut tx.conn).await;
+    put.map_err(StoreError::at("register robot"))?;
+    tx.changed(Change::Robot { name: name.to_owned(), map: Some(map.name.clone()) });
+    Ok(RobotRow { name: name.to_owned(), map: map.name })
+}
+
+/// One robot.
+pub(crate) async fn get(db: impl SqliteExecutor<'_>, name: &str) -> Result<RobotRow, StoreError> {
+    let row = sqlx::query(GET).bind(name).fetch_optional(db).await.map_err(StoreError::at("read robot"))?;
+    let row = row.ok_or_else(|| StoreError::NotFound { what: "robot", name: name.to_owned() })?;
+    robot_row(&row).map_err(StoreError::at("read robot"))
+}
+
+/// Robots with names after `after`, in order.
+pub(crate) async fn page(
+    db: impl SqliteExecutor<'_>,
+    after: &str,
+    limit: usize,
+) -> Result<Vec<RobotRow>, StoreError> {
+    let rows = sqlx::query(PAGE).bind(after).bind(limit as i64).fetch_all(db).await;
+    let rows = rows.map_err(StoreError::at("list robots"))?;
+    rows.iter().map(robot_row).collect::<Result<_, _>>().map_err(StoreError::at("list robots"))
+}
+
+/// Forgets a robot.
+pub(crate) async fn delete(tx: &mut Tx, name: &str) -> Result<(), StoreError> {
+    get(&mut tx.conn, name).await?;
+    sqlx::query(DELETE).bind(name).execute(&mut tx.conn).await.map_err(StoreError::at("delete robot"))?;
+    tx.changed(Change::Robot { name: name.to_owned(), map: None });
+    Ok(())
+}

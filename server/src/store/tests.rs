@@ -1,0 +1,109 @@
+//! The store as a whole, on fresh databases.
+
+use super::*;
+use crate::config::RawConfig;
+use sqlx::{Executor, SqlSafeStr};
+use vision::recognise::DistanceKind;
+
+pub(crate) fn config(dir: &std::path::Path) -> Config {
+    Config::try_from(RawConfig { data: dir.to_owned(), ..RawConfig::default() }).unwrap()
+}
+
+#[tokio::test]
+async fn every_statement_prepares_on_the_migrated_schema() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut opened = open::open(dir.path()).await.unwrap();
+    let all = [maps::ALL, landmarks::ALL, laser::ALL, robots::ALL, jobs::ALL, load::ALL];
+    for (name, sql) in all.into_iter().flatten() {
+        if let Err(error) = opened.writer.prepare(sql.into_sql_str()).await {
+            panic!("{name}: {error}");
+        }
+    }
+}
+
+#[tokio::test]
+async fn what_is_acknowledged_is_published_and_survives() {
+    let dir = tempfile::tempdir().unwrap();
+    let config = config(dir.path());
+    let (store, task) = Store::open(&config).await.unwrap();
+    store.write(|tx| Box::pin(maps::create(tx, "a", DistanceKind::Both, 2))).await.unwrap();
+    assert_eq!(store.snapshots().get("a").unwrap().version, 1);
+    let new = landmarks::Measures {
+        size: Some(vision::localise::pose::LandmarkSize { width_m: 0.5, height_m: 0.7 }),
+        place: Some(landmarks::Place { x_m: 1.0, y_m: 2.0, z_m: 1.5, theta_rad: 0.5 }),
+    };
+    let made = store.write(move |tx| Box::pin(landmarks::create(tx, "a", "p1", new, 5))).await.unwrap();
+    store.write(|tx| Box::pin(laser::replace(tx, "a", &[[0.0, 0.0, 4.0, 0.0]]))).await.unwrap();
+    store.write(|tx| Box::pin(robots::put(tx, "r1", "a", 5))).await.unwrap();
+    let snapshot = store.snapshots().get("a").unwrap();
+    assert_eq!((snapshot.version, snapshot.landmarks.len(), snapshot.walls.len()), (3, 1, 1));
+    assert!(snapshot.landmarks[&vision::recognise::LandmarkId(made.id as u64)].place.is_some());
+    drop(store);
+    task.finished().await;
+
+    let (store, _task) = Store::open(&config).await.unwrap();
+    assert_eq!(store.snapshots().get("a").unwrap().version, 3);
+    assert_eq!(store.snapshots().robot_map("r1").as_deref(), Some("a"));
+    assert_eq!(landmarks::get(store.reads(), "a", "p1").await.unwrap().measures, new);
+}
+
+#[tokio::test]
+async fn a_failed_write_changes_nothing() {
+    let dir = tempfile::tempdir().unwrap();
+    let (store, _task) = Store::open(&config(dir.path())).await.unwrap();
+    store.write(|tx| Box::pin(maps::create(tx, "a", DistanceKind::Both, 2))).await.unwrap();
+    let half = store
+        .write(|tx| {
+            Box::pin(async move {
+                landmarks::create(tx, "a", "p1", landmarks::Measures::default(), 5).await?;
+                Err::<(), _>(StoreError::InUse("on purpose".into()))
+            })
+        })
+        .await;
+    assert!(matches!(half, Err(StoreError::InUse(_))));
+    assert_eq!(store.snapshots().get("a").unwrap().version, 1);
+    assert!(matches!(landmarks::get(store.reads(), "a", "p1").await, Err(StoreError::NotFound { .. })));
+}
+
+#[tokio::test]
+async fn names_are_unique_and_bounds_hold() {
+    let dir = tempfile::tempdir().unwrap();
+    let (store, _task) = Store::open(&config(dir.path())).await.unwrap();
+    let create =
+        |name: &'static str| store.write(move |tx| Box::pin(maps::create(tx, name, DistanceKind::Both, 2)));
+    create("a").await.unwrap();
+    assert!(matches!(create("a").await, Err(StoreError::Exists { what: "map", .. })));
+    create("b").await.unwrap();
+    assert!(matches!(create("c").await, Err(StoreError::Limit { max: 2, .. })));
+    store.write(|tx| Box::pin(robots::put(tx, "r1", "b", 1))).await.unwrap();
+    // The same robot again is no new one.
+    store.write(|tx| Box::pin(robots::put(tx, "r1", "a", 1))).await.unwrap();
+    assert!(matches!(
+        store.write(|tx| Box::pin(robots::put(tx, "r2", "a", 1))).await,
+        Err(StoreError::Limit { what: "robots", max: 1 })
+    ));
+    assert!(matches!(store.write(|tx| Box::pin(maps::delete(tx, "a"))).await, Err(StoreError::InUse(_))));
+    store.write(|tx| Box::pin(maps::delete(tx, "b"))).await.unwrap();
+    assert!(store.snapshots().get("b").is_none());
+}
+
+#[tokio::test]
+async fn a_job_ends_once() {
+    let dir = tempfile::tempdir().unwrap();
+    let (store, _task) = Store::open(&config(dir.path())).await.unwrap();
+    store.write(|tx| Box::pin(maps::create(tx, "a", DistanceKind::Both, 2))).await.unwrap();
+    let job = store.write(|tx| Box::pin(jobs::create(tx, "learn", "a", "{}", (1, 9)))).await.unwrap();
+    assert!(matches!(
+        store.write(|tx| Box::pin(jobs::create(tx, "learn", "a", "{}", (1, 9)))).await,
+        Err(StoreError::Limit { .. })
+    ));
+    assert_eq!(jobs::open(store.reads()).await.unwrap().len(), 1);
+    let end = |state: &'static str| {
+        let ended = jobs::Ended { state, message: String::new(), result: None };
+        store.write(move |tx| Box::pin(async move { jobs::end(tx, job.id, &ended).await }))
+    };
+    assert!(end("done").await.unwrap());
+    assert!(!end("failed").await.unwrap());
+    assert_eq!(jobs::get(store.reads(), job.id).await.unwrap().state, "done");
+    assert!(jobs::open(store.reads()).await.unwrap().is_empty());
+}
