@@ -1,1 +1,237 @@
-//! Validation gates (method 9).
+//! Gates at the end of modelling (method 9): is the landmark salient, stable, and seen from far enough apart?
+//!
+//! In: the training icons, their points and the corners they were cut from. Out: numbers with their limits. Whether a
+//! failed gate keeps a landmark back is said in [`super::model::ModelStatus`].
+
+use nalgebra::{Matrix3, Point2, Vector2};
+use serde::{Deserialize, Serialize};
+
+/// Grey-level deviation that every icon is brought to before saliency.
+const NORMAL_DEVIATION: f64 = 50.0;
+/// Value of v_c where the homography's last element all but vanishes, and its upper bound.
+pub const V_C_CAP: f64 = 10.0;
+
+/// Limits of the gates.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct GateParams {
+    /// Fewest views.
+    pub min_views: usize,
+    /// Least saliency F.
+    pub min_saliency_f: f64,
+    /// Fewest stable points.
+    pub min_stable_points: usize,
+    /// Least visibility confidence v_c.
+    pub min_v_c: f64,
+    /// How far a stable point may move, in icon pixels.
+    pub stable_within_px: f64,
+    /// Largest descriptor distance d_nu at which it still is the same point.
+    pub stable_within_nu: f64,
+    /// Share of the training icons in which it must come back.
+    pub stable_share: f64,
+}
+
+impl Default for GateParams {
+    fn default() -> Self {
+        Self {
+            min_views: 20,
+            min_saliency_f: 6.0,
+            min_stable_points: 10,
+            min_v_c: 0.5,
+            stable_within_px: 1.5,
+            stable_within_nu: 3.0,
+            stable_share: 0.6,
+        }
+    }
+}
+
+/// `F = V_s / (V_t + 1)`: spatial variance of the mean icon over the variance of each pixel between icons, every icon
+/// brought to mean 0 and deviation 50 first. Large for a textured plane seen alike, near 0 for a blank or mixed one.
+pub fn saliency_f(icons: &[&[f32]]) -> f64 {
+    let Some(pixels) = icons.first().map(|i| i.len()).filter(|p| *p > 0) else { return 0.0 };
+    let n = icons.len() as f64;
+    let (mut mean, mut square) = (vec![0.0; pixels], vec![0.0; pixels]);
+    for icon in icons {
+        let (centre, scale) = normalisation(icon);
+        for ((m, s), g) in mean.iter_mut().zip(&mut square).zip(*icon) {
+            let g = (f64::from(*g) - centre) * scale;
+            *m += g / n;
+            *s += g * g / n;
+        }
+    }
+    let temporal = mean.iter().zip(&square).map(|(m, s)| (s - m * m).max(0.0)).sum::<f64>() / pixels as f64;
+    let spatial = variance(&mean);
+    spatial / (temporal + 1.0)
+}
+
+/// `sal = min(1, n_stable / 20) F / (F + 6)` in [0, 1): one number for choosing where to look (method 14).
+pub fn saliency(f: f64, stable_points: usize) -> f64 {
+    (stable_points as f64 / 20.0).min(1.0) * f / (f + 6.0)
+}
+
+/// Visibility confidence `v_c`: the largest Frobenius distance from the identity of the homographies between any two
+/// views, in image coordinates centred and divided by half the diagonal, `H(3,3) = 1`. 0 with fewer than two views or
+/// with identical ones, at most [`V_C_CAP`]. `views` are (corners, width and height of the image), all in pixels.
+pub fn v_c(views: &[([Point2<f64>; 4], [f64; 2])]) -> f64 {
+    let planes: Vec<(Matrix3<f64>, Matrix3<f64>)> = views
+        .iter()
+        .filter_map(|(corners, [width, height])| {
+            let centre = Vector2::new(width - 1.0, height - 1.0) * 0.5;
+            let half_diagonal = 0.5 * width.hypot(*height);
+            let view_from_unit =
+                quad_from_unit(&corners.map(|c| Point2::from((c.coords - centre) / half_diagonal)));
+            view_from_unit.try_inverse().map(|inverse| (view_from_unit, inverse))
+        })
+        .collect();
+    let mut largest = 0.0f64;
+    for (i, (_, unit_from_i)) in planes.iter().enumerate() {
+        for (j, (j_from_unit, _)) in planes.iter().enumerate() {
+            if i != j {
+                largest = largest.max(departure(&(j_from_unit * unit_from_i)));
+            }
+        }
+    }
+    largest
+}
+
+/// `||H / H(3,3) - I||`, capped.
+fn departure(h: &Matrix3<f64>) -> f64 {
+    let last = h[(2, 2)];
+    if last.abs() < 0.05 * h.norm() {
+        return V_C_CAP;
+    }
+    let departure = (h / last - Matrix3::identity()).norm();
+    if departure < V_C_CAP { departure } else { V_C_CAP }
+}
+
+/// Homography from the unit square to a convex quad, in closed form.
+fn quad_from_unit(corners: &[Point2<f64>; 4]) -> Matrix3<f64> {
+    let [p0, p1, p2, p3] = corners.map(|c| c.coords);
+    let (d1, d2, sum) = (p1 - p2, p3 - p2, p0 - p1 + p2 - p3);
+    let det = d1.perp(&d2);
+    let (g, h) = (sum.perp(&d2) / det, d1.perp(&sum) / det);
+    let (a, b) = (p1 - p0 + g * p1, p3 - p0 + h * p3);
+    Matrix3::new(a.x, b.x, p0.x, a.y, b.y, p0.y, g, h, 1.0)
+}
+
+/// Mean, and the factor that brings the deviation to [`NORMAL_DEVIATION`] (0 for a constant icon).
+fn normalisation(icon: &[f32]) -> (f64, f64) {
+    let grey: Vec<f64> = icon.iter().map(|g| f64::from(*g)).collect();
+    let deviation = variance(&grey).sqrt();
+    let mean = grey.iter().sum::<f64>() / grey.len() as f64;
+    (mean, if deviation > 1e-6 { NORMAL_DEVIATION / deviation } else { 0.0 })
+}
+
+fn variance(values: &[f64]) -> f64 {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::learn::random::Random;
+    use nalgebra::{Isometry3, Point3, Rotation3, Translation3, Vector3};
+
+    /// Corners of the golden poster (0.60 x 0.84 m) for a level camera (f = 700, 640 x 480) 0.3 m below its centre,
+    /// at `bearing_deg` and `distance_m` in plan view, turned towards it.
+    fn seen_from(bearing_deg: f64, distance_m: f64) -> ([Point2<f64>; 4], [f64; 2]) {
+        let bearing = bearing_deg.to_radians();
+        let centre = Vector3::new(distance_m * bearing.cos(), distance_m * bearing.sin(), -0.3);
+        // Camera z looks back at the poster's axis, y down, x to the right.
+        let z = -Vector3::new(bearing.cos(), bearing.sin(), 0.0);
+        let y = -Vector3::z();
+        let landmark_from_camera = Isometry3::from_parts(
+            Translation3::from(centre),
+            Rotation3::from_basis_unchecked(&[y.cross(&z), y, z]).into(),
+        );
+        let corners = [(-0.3, 0.42), (0.3, 0.42), (0.3, -0.42), (-0.3, -0.42)].map(|(y, z)| {
+            let p = landmark_from_camera.inverse_transform_point(&Point3::new(0.0, y, z));
+            Point2::new(700.0 * p.x / p.z + 319.5, 700.0 * p.y / p.z + 239.5)
+        });
+        (corners, [640.0, 480.0])
+    }
+
+    /// Golden values of method 9.
+    #[test]
+    fn golden_v_c() {
+        let v = |views: &[(f64, f64)]| v_c(&views.iter().map(|(b, d)| seen_from(*b, *d)).collect::<Vec<_>>());
+        assert!(v(&[(0.0, 3.0)]).abs() < 1e-12);
+        assert!(v(&[(20.0, 3.0), (20.0, 3.0)]).abs() < 1e-9);
+        assert!((v(&[(30.0, 3.0), (-30.0, 3.0)]) - 0.66).abs() < 5e-3, "{}", v(&[(30.0, 3.0), (-30.0, 3.0)]));
+        assert!((v(&[(60.0, 3.0), (-60.0, 3.0)]) - 1.98).abs() < 5e-3);
+        assert!((v(&[(0.0, 2.0), (0.0, 6.0)]) - 8.0f64.sqrt()).abs() < 1e-9);
+        // Independent of the order of the views.
+        assert!((v(&[(0.0, 6.0), (0.0, 2.0)]) - 8.0f64.sqrt()).abs() < 1e-9);
+    }
+
+    /// In-plane turn by `a` about the image centre: ||R - I|| = sqrt(8) sin(a / 2).
+    #[test]
+    fn v_c_of_a_turn_in_the_plane() {
+        let (corners, size) = seen_from(0.0, 3.0);
+        let centre = Vector2::new(319.5, 239.5);
+        let turned =
+            corners.map(|c| Point2::from(nalgebra::Rotation2::new(0.4) * (c.coords - centre) + centre));
+        let expected = 8.0f64.sqrt() * 0.2f64.sin();
+        assert!((v_c(&[(corners, size), (turned, size)]) - expected).abs() < 1e-9);
+    }
+
+    #[test]
+    fn v_c_is_capped() {
+        let square =
+            |s: f64| [(0.0, 0.0), (s, 0.0), (s, s), (0.0, s)].map(|(u, v)| Point2::new(300.0 + u, 200.0 + v));
+        let views = [(square(1.0), [640.0, 480.0]), (square(200.0), [640.0, 480.0])];
+        assert!((v_c(&views) - V_C_CAP).abs() < 1e-12);
+    }
+
+    fn textured(noise: f64, seed: u64, n: usize) -> Vec<Vec<f32>> {
+        let mut random = Random::new(seed);
+        let base: Vec<f64> = (0..400).map(|_| 128.0 + 40.0 * random.normal()).collect();
+        (0..n)
+            .map(|_| {
+                let (gain, offset) = (random.range(0.6, 1.4), random.range(-20.0, 20.0));
+                base.iter().map(|b| (gain * (b + noise * random.normal()) + offset) as f32).collect()
+            })
+            .collect()
+    }
+
+    fn f_of(icons: &[Vec<f32>]) -> f64 {
+        saliency_f(&icons.iter().map(Vec::as_slice).collect::<Vec<_>>())
+    }
+
+    /// Oracle: with noise of deviation s on a texture of deviation 40, after normalisation V_s = 2500 w (up to the
+    /// noise left in the mean) and V_t = 2500 (1 - w), w = 40^2 / (40^2 + s^2).
+    #[test]
+    fn saliency_is_signal_over_noise() {
+        for noise in [4.0, 10.0, 20.0] {
+            let w = 1600.0 / (1600.0 + noise * noise);
+            let expected = 2500.0 * w / (2500.0 * (1.0 - w) + 1.0);
+            let found = f_of(&textured(noise, 3, 200));
+            assert!((found / expected - 1.0).abs() < 0.12, "noise {noise}: {found}, expected {expected}");
+        }
+    }
+
+    #[test]
+    fn saliency_ignores_gain_and_offset_and_refuses_noise() {
+        // Without noise only the 1 in the denominator is left: F = 50^2.
+        assert!((f_of(&textured(0.0, 4, 20)) - 2500.0).abs() < 1.0);
+        let blank: Vec<Vec<f32>> = (0..30)
+            .map(|seed| {
+                let mut random = Random::new(seed);
+                (0..400).map(|_| (100.0 + 2.0 * random.normal()) as f32).collect()
+            })
+            .collect();
+        assert!(f_of(&blank) < 0.1);
+        assert!(f_of(&[vec![7.0; 100], vec![9.0; 100]]).abs() < 1e-12);
+        assert!(saliency_f(&[]).abs() < 1e-12);
+    }
+
+    #[test]
+    fn scalar_saliency() {
+        assert!((saliency(6.0, 20) - 0.5).abs() < 1e-12);
+        assert!((saliency(6.0, 10) - 0.25).abs() < 1e-12);
+        assert!((saliency(6.0, 400) - 0.5).abs() < 1e-12);
+        assert!(saliency(0.0, 20).abs() < 1e-12);
+    }
+}
