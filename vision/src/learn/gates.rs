@@ -3,6 +3,7 @@
 //! In: the training icons, their points and the corners they were cut from. Out: numbers with their limits. Whether a
 //! failed gate keeps a landmark back is said in [`super::model::ModelStatus`].
 
+use crate::recognise::descriptor::PointSet;
 use nalgebra::{Matrix3, Point2, Vector2};
 use serde::{Deserialize, Serialize};
 
@@ -69,6 +70,25 @@ pub fn saliency(f: f64, stable_points: usize) -> f64 {
     (stable_points as f64 / 20.0).min(1.0) * f / (f + 6.0)
 }
 
+/// Points of icon `reference` that come back in at least the given share of the icons, itself included: within
+/// `stable_within_px` and with a descriptor distance below `stable_within_nu`.
+pub fn stable_points(reference: usize, icons: &[&PointSet], p: &GateParams) -> usize {
+    let Some(points) = icons.get(reference) else { return 0 };
+    let needed = p.stable_share * icons.len() as f64;
+    let within = |x: &[f32], y: &[f32], limit: f64| {
+        f64::from(x.iter().zip(y).map(|(x, y)| (x - y) * (x - y)).sum::<f32>()).sqrt() < limit
+    };
+    let comes_back = |i: usize, icon: &PointSet| {
+        icon.xy_px().iter().zip(icon.descriptors()).any(|(xy, nu)| {
+            within(xy, &points.xy_px()[i], p.stable_within_px)
+                && within(nu, &points.descriptors()[i], p.stable_within_nu)
+        })
+    };
+    (0..points.len())
+        .filter(|i| icons.iter().filter(|icon| comes_back(*i, icon)).count() as f64 >= needed)
+        .count()
+}
+
 /// Visibility confidence `v_c`: the largest Frobenius distance from the identity of the homographies between any two
 /// views, in image coordinates centred and divided by half the diagonal, `H(3,3) = 1`. 0 with fewer than two views or
 /// with identical ones, at most [`V_C_CAP`]. `views` are (corners, width and height of the image), all in pixels.
@@ -105,7 +125,7 @@ fn departure(h: &Matrix3<f64>) -> f64 {
 }
 
 /// Homography from the unit square to a convex quad, in closed form.
-fn quad_from_unit(corners: &[Point2<f64>; 4]) -> Matrix3<f64> {
+pub(super) fn quad_from_unit(corners: &[Point2<f64>; 4]) -> Matrix3<f64> {
     let [p0, p1, p2, p3] = corners.map(|c| c.coords);
     let (d1, d2, sum) = (p1 - p2, p3 - p2, p0 - p1 + p2 - p3);
     let det = d1.perp(&d2);
@@ -225,6 +245,37 @@ mod tests {
         assert!(f_of(&blank) < 0.1);
         assert!(f_of(&[vec![7.0; 100], vec![9.0; 100]]).abs() < 1e-12);
         assert!(saliency_f(&[]).abs() < 1e-12);
+    }
+
+    fn points(at: &[([f32; 2], f32)]) -> PointSet {
+        let descriptor = |nu: f32| [nu, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+        PointSet::new(
+            at.iter().map(|(xy, _)| *xy).collect(),
+            at.iter().map(|(_, nu)| descriptor(*nu)).collect(),
+            vec![1.0; at.len()],
+        )
+        .unwrap()
+    }
+
+    #[test]
+    fn points_are_stable_where_they_come_back() {
+        // Of five icons: the first point comes back in all, the second in 3 of 5 (the limit), the third in 2, the
+        // fourth at the right place with another texture, the fifth just too far away.
+        let reference = points(&[
+            ([10.0, 10.0], 0.0),
+            ([30.0, 10.0], 0.0),
+            ([50.0, 10.0], 0.0),
+            ([10.0, 40.0], 0.0),
+            ([30.0, 40.0], 0.0),
+        ]);
+        let both =
+            points(&[([11.0, 11.0], 1.0), ([30.0, 10.0], 2.9), ([10.0, 40.0], 3.1), ([31.5, 40.0], 0.0)]);
+        let third = points(&[([10.0, 9.0], 0.0), ([50.0, 10.0], 0.0), ([10.0, 40.0], -3.1)]);
+        let none = points(&[([10.0, 10.0], 0.0)]);
+        let icons = [&both, &reference, &both, &third, &none];
+        assert_eq!(stable_points(1, &icons, &GateParams::default()), 2);
+        assert_eq!(stable_points(9, &icons, &GateParams::default()), 0);
+        assert_eq!(stable_points(0, &[&points(&[])], &GateParams::default()), 0);
     }
 
     #[test]

@@ -1,8 +1,11 @@
 //! From views of one landmark to its model (method 7 to 9).
 
 pub mod random;
+mod texture;
+pub mod synthesis;
 pub mod pca;
 pub mod threshold;
 pub mod gates;
-pub mod synthesis;
 pub mod model;
+mod lesson;
+mod stored;

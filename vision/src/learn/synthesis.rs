@@ -1,1 +1,240 @@
-//! Generated views from one photograph.
+//! Generated views of one landmark from a single photograph.
+//!
+//! In: a photograph, the landmark's corners in it, a seed. Out: views as a real camera would have given them: seen
+//! from other places, at other sizes, in other light, blurred, noisy, cut out along corners as inexact as the
+//! detector's. The same seed gives the same views, bit for bit.
+//!
+//! What they cannot show: whether the thing is flat, reflections, its real surroundings, other states of the light.
+//! Distances measured on them are therefore smaller than real ones, and a model learnt from them says so
+//! ([`super::model::LandmarkModel::generated_views`]).
+
+use super::{gates::quad_from_unit, model::View, random::Random, texture::Texture};
+use crate::{detect::quads::Corners, frame::GrayImage, icon::icon, params::Params};
+use nalgebra::{Matrix3, Point2, Vector3};
+use serde::{Deserialize, Serialize};
+
+/// Image of the generated camera, in pixels.
+const CAMERA_SIZE_PX: [usize; 2] = [640, 480];
+/// Focal length of the generated camera, in pixels.
+const FOCAL_PX: f64 = 600.0;
+/// Draws before a view is given up: some poses are too small to learn from or leave the image.
+const MAX_DRAWS: usize = 30;
+/// Pixels rendered around the landmark.
+const BORDER_PX: f64 = 12.0;
+
+/// Ranges that views are drawn from.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SynthesisParams {
+    /// Largest angle between the landmark's normal and the line of sight, in the horizontal plane.
+    pub max_yaw_rad: f64,
+    /// The same in the vertical plane.
+    pub max_pitch_rad: f64,
+    /// Largest roll of the camera.
+    pub max_roll_rad: f64,
+    /// Apparent size (square root of the frontal area) from, in pixels.
+    pub min_size_px: f64,
+    /// Apparent size to, in pixels.
+    pub max_size_px: f64,
+    /// Standard deviation of the corners per coordinate: the detector's.
+    pub corner_noise_px: f64,
+    /// Contrast factor is drawn from 1 / `max_gain` to `max_gain`.
+    pub max_gain: f64,
+    /// Brightness offset is drawn from minus to plus this, in grey levels.
+    pub max_offset: f64,
+    /// Exponent of the tone curve is drawn from 1 / `max_gamma` to `max_gamma`.
+    pub max_gamma: f64,
+    /// Largest standard deviation of the blur, in pixels.
+    pub max_blur_px: f64,
+    /// Largest standard deviation of the noise, in grey levels.
+    pub max_noise: f64,
+    /// Largest share of the landmark that something stands before; 0 for none.
+    pub max_occluded_share: f64,
+}
+
+impl Default for SynthesisParams {
+    fn default() -> Self {
+        Self {
+            max_yaw_rad: 65f64.to_radians(),
+            max_pitch_rad: 15f64.to_radians(),
+            max_roll_rad: 3f64.to_radians(),
+            min_size_px: 60.0,
+            max_size_px: 240.0,
+            corner_noise_px: 1.0,
+            max_gain: 1.6,
+            max_offset: 30.0,
+            max_gamma: 1.4,
+            max_blur_px: 1.2,
+            max_noise: 5.0,
+            max_occluded_share: 0.0,
+        }
+    }
+}
+
+/// `count` generated views of the landmark at `corners` of `photograph`; fewer where the icon stage refuses what was
+/// drawn, none where the corners cannot be used at all.
+pub fn views(photograph: &GrayImage, corners: &Corners, count: usize, p: &Params, seed: u64) -> Vec<View> {
+    let Some(texture) = Texture::lift(photograph, corners) else { return vec![] };
+    let aspect = aspect(corners);
+    let mut random = Random::new(seed);
+    (0..count.min(super::model::MAX_VIEWS))
+        .filter_map(|_| (0..MAX_DRAWS).find_map(|_| view(&texture, aspect, p, &mut random)))
+        .collect()
+}
+
+fn view(texture: &Texture, aspect: f64, p: &Params, random: &mut Random) -> Option<View> {
+    let s = &p.learn.synthesis;
+    let corners = corners_from(&Pose::draw(s, random), aspect)?;
+    let (image, shift) = photograph(texture, &corners, s, random)?;
+    let noisy = corners.points().map(|c| {
+        let [du, dv] = [random.normal(), random.normal()].map(|n| n * s.corner_noise_px);
+        Point2::new(c.x + du, c.y + dv)
+    });
+    let local = Corners::new(noisy.map(|c| c - shift)).ok()?;
+    let icon = icon(&image, &local, &p.icon).ok()?;
+    Some(View { icon, corners_px: Corners::new(noisy).ok()?, image_size_px: CAMERA_SIZE_PX, generated: true })
+}
+
+/// Where the camera stands: angles of the line of sight to the normal, roll, apparent size, where it aims.
+struct Pose {
+    yaw_rad: f64,
+    pitch_rad: f64,
+    roll_rad: f64,
+    size_px: f64,
+    aim_px: [f64; 2],
+}
+
+impl Pose {
+    fn draw(s: &SynthesisParams, random: &mut Random) -> Self {
+        let mut within = |limit: f64| random.range(-limit, limit);
+        let (yaw_rad, pitch_rad, roll_rad) =
+            (within(s.max_yaw_rad), within(s.max_pitch_rad), within(s.max_roll_rad));
+        let aim_px = [within(0.25 * CAMERA_SIZE_PX[0] as f64), within(0.25 * CAMERA_SIZE_PX[1] as f64)];
+        Self {
+            yaw_rad,
+            pitch_rad,
+            roll_rad,
+            size_px: random.range(s.min_size_px.ln(), s.max_size_px.ln()).exp(),
+            aim_px,
+        }
+    }
+}
+
+/// Corners of a landmark of area 1 and `aspect` = width / height; `None` where they leave the image.
+fn corners_from(pose: &Pose, aspect: f64) -> Option<Corners> {
+    let (half_width, half_height) = (0.5 * aspect.sqrt(), 0.5 / aspect.sqrt());
+    let distance = FOCAL_PX / pose.size_px;
+    let (sin_yaw, cos_yaw) = pose.yaw_rad.sin_cos();
+    let (sin_pitch, cos_pitch) = pose.pitch_rad.sin_cos();
+    let (sin_roll, cos_roll) = pose.roll_rad.sin_cos();
+    let [width, height] = CAMERA_SIZE_PX.map(|s| s as f64);
+    let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(a, b)| {
+        // Camera axes (x right, y down, z forward): turn about y, then about x, then push away, then roll.
+        let (x, y) = (a * half_width, b * half_height);
+        let (x, z) = (x * cos_yaw, x * sin_yaw);
+        let (y, z) = (y * cos_pitch - z * sin_pitch, y * sin_pitch + z * cos_pitch + distance);
+        let (x, y) = (x * cos_roll - y * sin_roll, x * sin_roll + y * cos_roll);
+        Point2::new(
+            FOCAL_PX * x / z + 0.5 * (width - 1.0) + pose.aim_px[0],
+            FOCAL_PX * y / z + 0.5 * (height - 1.0) + pose.aim_px[1],
+        )
+    });
+    let inside = corners.iter().all(|c| c.x > 2.0 && c.y > 2.0 && c.x < width - 3.0 && c.y < height - 3.0);
+    if inside { Corners::new(corners).ok() } else { None }
+}
+
+/// The part of the generated image around the landmark, and the pixel at its top-left.
+fn photograph(
+    texture: &Texture,
+    corners: &Corners,
+    s: &SynthesisParams,
+    random: &mut Random,
+) -> Option<(GrayImage, nalgebra::Vector2<f64>)> {
+    let low = corners
+        .points()
+        .iter()
+        .fold(Vector3::repeat(f64::INFINITY), |m, c| m.inf(&Vector3::new(c.x, c.y, 0.0)));
+    let high = corners
+        .points()
+        .iter()
+        .fold(Vector3::repeat(0.0), |m: Vector3<f64>, c| m.sup(&Vector3::new(c.x, c.y, 0.0)));
+    let shift = nalgebra::Vector2::new((low.x - BORDER_PX).floor(), (low.y - BORDER_PX).floor());
+    let size = [(high.x - shift.x + BORDER_PX) as usize, (high.y - shift.y + BORDER_PX) as usize];
+    let view_from_unit: Matrix3<f64> = quad_from_unit(&corners.points().map(|c| c - shift));
+    let mut picture = texture.seen(&view_from_unit, size, random.range(60.0, 230.0) as f32)?;
+    occlude(&mut picture, size, &view_from_unit, s, random)?;
+    blur(&mut picture, size, random.range(0.0, s.max_blur_px));
+    let gain = random.range(-s.max_gain.ln(), s.max_gain.ln()).exp();
+    let gamma = random.range(-s.max_gamma.ln(), s.max_gamma.ln()).exp();
+    let offset = random.range(-s.max_offset, s.max_offset);
+    let noise = random.range(0.0, s.max_noise);
+    let data = picture
+        .iter()
+        .map(|g| {
+            let curved = 255.0 * (f64::from(*g) / 255.0).clamp(0.0, 1.0).powf(gamma);
+            (128.0 + gain * (curved - 128.0) + offset + noise * random.normal()).round().clamp(0.0, 255.0)
+                as u8
+        })
+        .collect();
+    Some((GrayImage::new(size[0], size[1], data).ok()?, shift))
+}
+
+/// A plain strip from one side, over up to the given share of the landmark.
+fn occlude(
+    picture: &mut [f32],
+    size: [usize; 2],
+    view_from_unit: &Matrix3<f64>,
+    s: &SynthesisParams,
+    random: &mut Random,
+) -> Option<()> {
+    let share = random.range(0.0, s.max_occluded_share);
+    if share <= 0.0 {
+        return Some(());
+    }
+    let (side, grey) = (random.range(0.0, 4.0) as usize, random.range(20.0, 220.0) as f32);
+    let unit_from_view = view_from_unit.try_inverse()?;
+    for (i, g) in picture.iter_mut().enumerate() {
+        let q = unit_from_view * Vector3::new((i % size[0]) as f64, (i / size[0]) as f64, 1.0);
+        let (a, b) = (q.x / q.z, q.y / q.z);
+        if [a, b, 1.0 - a, 1.0 - b][side] < share {
+            *g = grey;
+        }
+    }
+    Some(())
+}
+
+/// Separable Gaussian, ends replicated. Below 0.2 px it changes nothing that counts.
+fn blur(picture: &mut [f32], size: [usize; 2], sigma_px: f64) {
+    if sigma_px < 0.2 {
+        return;
+    }
+    let radius = (3.0 * sigma_px).ceil() as usize;
+    let mut kernel: Vec<f32> = (0..=2 * radius)
+        .map(|i| (-0.5 * ((i as f64 - radius as f64) / sigma_px).powi(2)).exp() as f32)
+        .collect();
+    let sum: f32 = kernel.iter().sum();
+    kernel.iter_mut().for_each(|k| *k /= sum);
+    let [width, height] = size;
+    for v in 0..height {
+        convolve(picture, v * width, 1, width, &kernel);
+    }
+    for u in 0..width {
+        convolve(picture, u, width, height, &kernel);
+    }
+}
+
+fn convolve(picture: &mut [f32], start: usize, step: usize, length: usize, kernel: &[f32]) {
+    let radius = kernel.len() / 2;
+    let line: Vec<f32> = (0..length + 2 * radius)
+        .map(|i| picture[start + step * i.saturating_sub(radius).min(length - 1)])
+        .collect();
+    for i in 0..length {
+        picture[start + step * i] = line[i..].iter().zip(kernel).map(|(g, k)| g * k).sum();
+    }
+}
+
+/// Width over height, from the mean lengths of opposite sides, within 1:5 and 5:1.
+fn aspect(corners: &Corners) -> f64 {
+    let [tl, tr, br, bl] = corners.points();
+    (((tr - tl).norm() + (br - bl).norm()) / ((bl - tl).norm() + (br - tr).norm())).clamp(0.2, 5.0)
+}

@@ -1,0 +1,190 @@
+//! The lesson: views of one landmark in, its model out (method 7 to 9 on one page); and fitting tau anew when the
+//! other landmarks change. Collecting views, storing models and telling look-alikes apart is the caller's.
+
+use super::{
+    gates::{saliency, saliency_f, stable_points, v_c},
+    model::{
+        Evidence, Gate, GateFailure, LandmarkModel, LearnError, MAX_VIEWS, ModelStatus, View, distances,
+    },
+    pca::{exemplars, modes},
+    threshold::{Threshold, ThresholdError, threshold},
+};
+use crate::{
+    icon::Icon,
+    params::{Params, RecogniseParams},
+    recognise::{IconFeatures, LandmarkId, features},
+};
+
+/// Learns a landmark. `negatives` are icons of everything it must be told from: other landmarks, and quads that are
+/// no landmark. Without any, the absolute caps of [`super::model::LearnParams`] stand in for them.
+pub fn learn(
+    id: LandmarkId,
+    views: &[View],
+    negatives: &[IconFeatures],
+    p: &Params,
+) -> Result<LandmarkModel, LearnError> {
+    check(views, p)?;
+    let icons: Vec<IconFeatures> = views.iter().map(|v| features(whole(&v.icon), &p.recognise)).collect();
+    let pixels: Vec<&[f32]> = icons.iter().map(|i| i.icon.pixels.as_slice()).collect();
+    let components = modes(&pixels).ok_or(LearnError::NoComponents)?;
+    let chosen: Vec<usize> = exemplars(&components).iter().map(|e| e.index).collect();
+    let own = own_distances(&icons, &chosen, p).ok_or(LearnError::NoComponents)?;
+
+    let saliency_f = saliency_f(&pixels);
+    let points: Vec<_> = icons.iter().map(|i| &i.points).collect();
+    let stable_points = chosen.first().map_or(0, |mean| stable_points(*mean, &points, &p.learn.gates));
+    let model = LandmarkModel {
+        id,
+        params_hash: p.distance_hash(),
+        views: views.len(),
+        generated_views: views.iter().filter(|v| v.generated).count(),
+        exemplars: chosen.iter().map(|i| icons[*i].clone()).collect(),
+        eigenvalues: components.eigenvalues,
+        total_variance: components.total_variance,
+        correlation: Threshold::NEVER,
+        hausdorff: Threshold::NEVER,
+        correlation_evidence: Evidence { own: rising(own.iter().map(|d| d.0)), ..Evidence::default() },
+        hausdorff_evidence: Evidence { own: rising(own.iter().map(|d| d.1)), ..Evidence::default() },
+        saliency_f,
+        stable_points,
+        saliency: saliency(saliency_f, stable_points),
+        v_c: v_c(&seen_at(views, true)),
+        photographed_v_c: v_c(&seen_at(views, false)),
+        status: ModelStatus::Candidate(vec![]),
+    };
+    Ok(refit_thresholds(&model, negatives, p))
+}
+
+/// The same model with tau fitted to its own distances and to `negatives`, forgetting earlier ones. Cheap: the own
+/// distances are kept in the model.
+#[must_use]
+pub fn refit_thresholds(model: &LandmarkModel, negatives: &[IconFeatures], p: &Params) -> LandmarkModel {
+    let mut model = model.clone();
+    for evidence in [&mut model.correlation_evidence, &mut model.hausdorff_evidence] {
+        (evidence.nearest_others, evidence.others) = (vec![], 0);
+    }
+    add_negatives(&model, negatives, p)
+}
+
+/// The same model with `negatives` added to those it was fitted to: one new landmark costs one comparison with its
+/// icons, not with everybody's.
+#[must_use]
+pub fn add_negatives(model: &LandmarkModel, negatives: &[IconFeatures], p: &Params) -> LandmarkModel {
+    let mut model = model.clone();
+    for negative in negatives {
+        let d = model.distances(negative, &p.recognise);
+        model.correlation_evidence.add(d.correlation);
+        model.hausdorff_evidence.add(d.hausdorff);
+    }
+    let correlation = fitted(&model.correlation_evidence, p.learn.correlation_cap, p);
+    let hausdorff = fitted(&model.hausdorff_evidence, p.learn.hausdorff_cap, p);
+    model.correlation = correlation.unwrap_or(Threshold::NEVER);
+    model.hausdorff = hausdorff.unwrap_or(Threshold::NEVER);
+    model.status = status(&model, correlation.err(), hausdorff.err(), p);
+    model
+}
+
+impl Evidence {
+    /// Counts a distance of something else, and keeps it if it is among the nearest.
+    fn add(&mut self, distance: f64) {
+        self.others += 1;
+        let distance = distance as f32;
+        let at = self.nearest_others.partition_point(|d| *d <= distance);
+        if at < Self::MAX_NEAREST {
+            self.nearest_others.insert(at, distance);
+            self.nearest_others.truncate(Self::MAX_NEAREST);
+        }
+    }
+}
+
+/// tau from the evidence. Distances that were only counted lie beyond the farthest one kept, so tau stays below it.
+fn fitted(evidence: &Evidence, cap: f64, p: &Params) -> Result<Threshold, ThresholdError> {
+    let own: Vec<f64> = evidence.own.iter().map(|d| f64::from(*d)).collect();
+    let mut others: Vec<f64> = evidence.nearest_others.iter().map(|d| f64::from(*d)).collect();
+    let counted_only = evidence.others > others.len();
+    let cap = others.last().filter(|_| counted_only).map_or(cap, |farthest| cap.min(*farthest));
+    others.resize(evidence.others, f64::INFINITY);
+    threshold(&own, &others, cap, &p.learn.threshold)
+}
+
+/// Method 9: what the model fails, if anything.
+fn status(
+    model: &LandmarkModel,
+    no_correlation: Option<ThresholdError>,
+    no_hausdorff: Option<ThresholdError>,
+    p: &Params,
+) -> ModelStatus {
+    let g = &p.learn.gates;
+    let measured = [
+        (Gate::Views, model.views as f64, g.min_views as f64),
+        (Gate::Saliency, model.saliency_f, g.min_saliency_f),
+        (Gate::StablePoints, model.stable_points as f64, g.min_stable_points as f64),
+        (Gate::VisibilityConfidence, model.v_c, g.min_v_c),
+    ];
+    let mut failures: Vec<GateFailure> = measured
+        .into_iter()
+        .filter(|(_, value, limit)| value < limit)
+        .map(|(gate, value, limit)| GateFailure { gate, value, limit })
+        .collect();
+    let missing =
+        [no_correlation.map(Gate::CorrelationThreshold), no_hausdorff.map(Gate::HausdorffThreshold)];
+    failures.extend(missing.into_iter().flatten().map(|gate| GateFailure { gate, value: 0.0, limit: 0.0 }));
+    if failures.is_empty() { ModelStatus::Active } else { ModelStatus::Candidate(failures) }
+}
+
+/// Distances (C^r, H^r) of the landmark's own icons, none to a model that holds the icon itself (A19): by folds with
+/// many views, otherwise of the icons that are no exemplars. `None` if a fold has no components.
+fn own_distances(icons: &[IconFeatures], chosen: &[usize], p: &Params) -> Option<Vec<(f64, f64)>> {
+    let to = |exemplars: &[IconFeatures], icon: &IconFeatures, p: &RecogniseParams| {
+        let d = distances(exemplars, icon, p);
+        (d.correlation, d.hausdorff)
+    };
+    if icons.len() < p.learn.min_views_for_folds.max(2) {
+        let model: Vec<IconFeatures> = chosen.iter().map(|i| icons[*i].clone()).collect();
+        let others = icons.iter().enumerate().filter(|(i, _)| !chosen.contains(i));
+        return Some(others.map(|(_, icon)| to(&model, icon, &p.recognise)).collect());
+    }
+    let folds = p.learn.folds.clamp(2, icons.len());
+    let mut own = Vec::with_capacity(icons.len());
+    for fold in 0..folds {
+        let taught: Vec<&IconFeatures> =
+            icons.iter().enumerate().filter(|(i, _)| i % folds != fold).map(|(_, icon)| icon).collect();
+        let pixels: Vec<&[f32]> = taught.iter().map(|i| i.icon.pixels.as_slice()).collect();
+        let model: Vec<IconFeatures> =
+            exemplars(&modes(&pixels)?).iter().map(|e| taught[e.index].clone()).collect();
+        own.extend(icons.iter().skip(fold).step_by(folds).map(|icon| to(&model, icon, &p.recognise)));
+    }
+    Some(own)
+}
+
+/// The icon in whole grey levels, so that a model in memory and the same model stored agree bit for bit.
+fn whole(icon: &Icon) -> Icon {
+    let pixels = icon.pixels.iter().map(|g| g.round().clamp(0.0, 255.0)).collect();
+    Icon { pixels, ..*icon }
+}
+
+fn rising(distances: impl Iterator<Item = f64>) -> Vec<f32> {
+    let mut rising: Vec<f32> = distances.map(|d| d as f32).collect();
+    rising.sort_by(f32::total_cmp);
+    rising
+}
+
+/// Corners and image sizes of all views, or of the photographed ones.
+fn seen_at(views: &[View], generated: bool) -> Vec<([nalgebra::Point2<f64>; 4], [f64; 2])> {
+    let of_interest = views.iter().filter(|v| generated || !v.generated);
+    of_interest.map(|v| (*v.corners_px.points(), v.image_size_px.map(|s| s as f64))).collect()
+}
+
+fn check(views: &[View], p: &Params) -> Result<(), LearnError> {
+    if views.is_empty() {
+        return Err(LearnError::NoView);
+    }
+    if views.len() > MAX_VIEWS {
+        return Err(LearnError::TooManyViews { found: views.len() });
+    }
+    let expected = p.icon.size;
+    match views.iter().position(|v| v.icon.size != expected || v.icon.pixels.len() != expected * expected) {
+        Some(index) => Err(LearnError::IconSize { index, found: views[index].icon.size, expected }),
+        None => Ok(()),
+    }
+}
