@@ -1,1 +1,18 @@
 //! Robot SDK over zenoh and HTTP.
+//!
+//! [`RobotClient`] is the robot's side: frames, odometry and scans go out, answers and poses come back, over zenoh.
+//! [`MapClient`] is the teacher's side: maps, landmarks, views, lessons and single recognitions, over HTTP.
+//! Neither decides anything: no vision runs here. `examples/` shows both, numbered in reading order.
+
+pub mod capture;
+pub mod error;
+pub mod lessons;
+pub mod map;
+pub mod robot;
+mod transport;
+
+pub use capture::Capture;
+pub use error::ClientError;
+pub use map::MapClient;
+pub use protos::{self, v1};
+pub use robot::{Delivery, RobotClient, RobotOptions};

@@ -1,0 +1,190 @@
+//! One image with what the robot knows about it, before it gets its number and goes out. Reads the size of JPEG and
+//! PNG from their headers; decodes nothing.
+
+use crate::ClientError;
+use nalgebra::{Isometry2, Isometry3, Matrix3};
+use protos::{
+    convert::geometry::{intrinsics_wire, pose2_covariance_wire, pose2_wire, pose3_wire},
+    prost::bytes::Bytes,
+    v1,
+};
+use std::time::{SystemTime, UNIX_EPOCH};
+use vision::frame::{GrayImage, Intrinsics};
+
+/// One image and what is known about it. Built from an image, then filled with `with_...`.
+#[derive(Debug, Clone)]
+pub struct Capture {
+    frame: v1::Frame,
+}
+
+impl Capture {
+    /// An encoded photograph; its size is read from its header. The capture time is now.
+    pub fn encoded(image: impl Into<Bytes>) -> Result<Self, ClientError> {
+        let image = image.into();
+        let (encoding, width_px, height_px) = header(&image)?;
+        Ok(Self::new(encoding, width_px, height_px, image))
+    }
+
+    /// A grey image, sent raw. The capture time is now.
+    pub fn gray(image: &GrayImage) -> Self {
+        let bytes = Bytes::copy_from_slice(image.data());
+        Self::new(v1::ImageEncoding::Gray8, image.width() as u32, image.height() as u32, bytes)
+    }
+
+    fn new(encoding: v1::ImageEncoding, width_px: u32, height_px: u32, image: Bytes) -> Self {
+        let captured_ns = now_ns();
+        let encoding = encoding.into();
+        Self {
+            frame: v1::Frame { encoding, width_px, height_px, image, captured_ns, ..v1::Frame::default() },
+        }
+    }
+
+    /// The calibrated camera: without it there is recognition, but no pose.
+    #[must_use]
+    pub fn with_intrinsics(mut self, camera: &Intrinsics) -> Self {
+        self.frame.intrinsics = Some(intrinsics_wire(camera));
+        self
+    }
+
+    /// Camera on robot at capture: without it there is no robot pose.
+    #[must_use]
+    pub fn with_mounting(mut self, robot_from_camera: &Isometry3<f64>) -> Self {
+        self.frame.robot_from_camera = Some(pose3_wire(robot_from_camera));
+        self
+    }
+
+    /// Odometry at capture.
+    #[must_use]
+    pub fn with_odometry(mut self, odom_from_robot: &Isometry2<f64>) -> Self {
+        self.frame.odometry = Some(pose2_wire(odom_from_robot));
+        self
+    }
+
+    /// What the robot believes, with covariance over (x, y, theta).
+    #[must_use]
+    pub fn with_prior(mut self, map_from_robot: &Isometry2<f64>, covariance: &Matrix3<f64>) -> Self {
+        self.frame.prior = Some(pose2_covariance_wire(map_from_robot, covariance));
+        self
+    }
+
+    /// The robot's clock at capture, ns since the Unix epoch.
+    #[must_use]
+    pub fn captured_at_ns(mut self, captured_ns: i64) -> Self {
+        self.frame.captured_ns = captured_ns;
+        self
+    }
+
+    /// Do not start work later than this after receipt, in milliseconds.
+    #[must_use]
+    pub fn with_deadline_ms(mut self, deadline_ms: u32) -> Self {
+        self.frame.deadline_ms = deadline_ms;
+        self
+    }
+
+    /// Recognise against this map instead of the robot's own.
+    #[must_use]
+    pub fn against_map(mut self, map: impl Into<String>) -> Self {
+        self.frame.map = map.into();
+        self
+    }
+
+    /// Size in pixels, (width, height).
+    pub fn size_px(&self) -> (u32, u32) {
+        (self.frame.width_px, self.frame.height_px)
+    }
+
+    /// The message, numbered.
+    pub(crate) fn numbered(self, epoch: u64, seq: u64) -> v1::Frame {
+        v1::Frame { epoch, seq, ..self.frame }
+    }
+}
+
+/// The robot's clock.
+pub(crate) fn now_ns() -> i64 {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    i64::try_from(since.as_nanos()).unwrap_or(i64::MAX)
+}
+
+/// Encoding, width and height from the first bytes.
+fn header(image: &[u8]) -> Result<(v1::ImageEncoding, u32, u32), ClientError> {
+    if image.starts_with(b"\x89PNG\r\n\x1a\n") {
+        let (width, height) = png_size(image).ok_or_else(|| ClientError::Image("PNG without size".into()))?;
+        Ok((v1::ImageEncoding::Png, width, height))
+    } else if image.starts_with(&[0xFF, 0xD8]) {
+        let (width, height) =
+            jpeg_size(image).ok_or_else(|| ClientError::Image("JPEG without size".into()))?;
+        Ok((v1::ImageEncoding::Jpeg, width, height))
+    } else {
+        let first: Vec<u8> = image.iter().take(8).copied().collect();
+        Err(ClientError::Image(format!("it begins with {first:02x?}")))
+    }
+}
+
+fn png_size(image: &[u8]) -> Option<(u32, u32)> {
+    if image.get(12..16)? != b"IHDR" {
+        return None;
+    }
+    let word = |at: usize| Some(u32::from_be_bytes(image.get(at..at + 4)?.try_into().ok()?));
+    Some((word(16)?, word(20)?))
+}
+
+/// Walks the segments up to the start of frame (SOF0 to SOF15 without DHT, JPG and DAC).
+fn jpeg_size(image: &[u8]) -> Option<(u32, u32)> {
+    let mut at = 2;
+    loop {
+        while *image.get(at)? == 0xFF && *image.get(at + 1)? == 0xFF {
+            at += 1;
+        }
+        if *image.get(at)? != 0xFF {
+            return None;
+        }
+        let marker = *image.get(at + 1)?;
+        let half = |i: usize| Some(u32::from(u16::from_be_bytes([*image.get(i)?, *image.get(i + 1)?])));
+        match marker {
+            0xC0..=0xC3 | 0xC5..=0xC7 | 0xC9..=0xCB | 0xCD..=0xCF => {
+                return Some((half(at + 7)?, half(at + 5)?));
+            }
+            // Markers without a length.
+            0x01 | 0xD0..=0xD8 => at += 2,
+            // End of image or start of scan before any size.
+            0xD9 | 0xDA => return None,
+            _ => at += 2 + half(at + 2)? as usize,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    // The beginning of a real 64x48 JPEG: SOI, APP0 of 16 bytes, SOF0.
+    fn jpeg() -> Vec<u8> {
+        let mut bytes = vec![0xFF, 0xD8, 0xFF, 0xE0, 0, 16];
+        bytes.extend([0; 14]);
+        bytes.extend([0xFF, 0xFF, 0xC0, 0, 17, 8, 0, 48, 0, 64, 3]);
+        bytes
+    }
+
+    #[test]
+    fn sizes_come_from_headers() {
+        let capture = Capture::encoded(jpeg()).unwrap();
+        assert_eq!((capture.size_px(), capture.frame.encoding()), ((64, 48), v1::ImageEncoding::Jpeg));
+        let mut png = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR".to_vec();
+        png.extend([0, 0, 1, 0, 0, 0, 0, 200]);
+        let capture = Capture::encoded(png).unwrap();
+        assert_eq!((capture.size_px(), capture.frame.encoding()), ((256, 200), v1::ImageEncoding::Png));
+    }
+
+    #[test]
+    fn every_cut_of_a_header_is_refused() {
+        let whole = jpeg();
+        for cut in 0..whole.len() - 1 {
+            assert!(Capture::encoded(whole[..cut].to_vec()).is_err(), "{cut}");
+        }
+        assert!(Capture::encoded(b"GIF89a".to_vec()).is_err());
+        // A segment of length 0 cannot hold the walk for ever.
+        let mut stuck = vec![0xFF, 0xD8];
+        stuck.extend([0xFF, 0xE0, 0, 0].repeat(1000));
+        assert!(Capture::encoded(stuck).is_err());
+    }
+}

@@ -1,0 +1,113 @@
+//! What can go wrong on the robot's or the teacher's side. Every message says what to do next.
+
+use std::time::Duration;
+
+/// A failure of the client.
+#[derive(Debug, thiserror::Error)]
+pub enum ClientError {
+    /// A name that is none.
+    #[error("{field} {text:?}: {error}")]
+    Name {
+        /// Which name: `fleet`, `robot`, `camera`.
+        field: &'static str,
+        /// The text given.
+        text: String,
+        /// What is wrong with it.
+        error: protos::NameError,
+    },
+    /// No session with the server's router.
+    #[error(
+        "timeout, or no server reachable at {endpoint}: is `waymark serve` running, is this its zenoh endpoint? ({detail})"
+    )]
+    Unreachable {
+        /// Where we looked.
+        endpoint: String,
+        /// What the transport said.
+        detail: String,
+    },
+    /// The transport refused an action on an open session.
+    #[error("zenoh could not {action}: {detail}")]
+    Transport {
+        /// What was tried.
+        action: &'static str,
+        /// What it said.
+        detail: String,
+    },
+    /// No answer came in time.
+    #[error(
+        "no answer to frame {seq} within {waited:?}: the frame or its answer was dropped, the server is not reachable at {endpoint}, or its work takes longer; send again or wait longer"
+    )]
+    NoAnswer {
+        /// The frame.
+        seq: u64,
+        /// How long we waited.
+        waited: Duration,
+        /// The server.
+        endpoint: String,
+    },
+    /// A newer frame of the same camera took this one's place; its own answer tells more.
+    #[error(
+        "frame {seq} was superseded by a newer one of the same camera: send the next when the last is answered"
+    )]
+    Superseded {
+        /// The frame.
+        seq: u64,
+    },
+    /// Neither JPEG nor PNG.
+    #[error("not a JPEG or PNG image, or its header is damaged: {0}")]
+    Image(String),
+    /// The HTTP server cannot be reached or broke off.
+    #[error("no answer from {url}: is `waymark serve` running there? ({detail})")]
+    Http {
+        /// Address asked.
+        url: String,
+        /// What went wrong.
+        detail: String,
+    },
+    /// The server refused, and said why.
+    #[error("{status} {code}{}{detail}", if field.is_empty() { ": ".to_owned() } else { format!(" in {field}: ") })]
+    Refused {
+        /// HTTP status.
+        status: u16,
+        /// Stable code.
+        code: String,
+        /// Field at fault, or empty.
+        field: String,
+        /// A sentence.
+        detail: String,
+    },
+    /// The answer is not what this version of the client understands.
+    #[error("{url} answered something unexpected ({detail}): are client and server of the same version?")]
+    Unexpected {
+        /// Address asked.
+        url: String,
+        /// What was not understood.
+        detail: String,
+    },
+    /// A job ended without success.
+    #[error("job {id} {state}: {message}")]
+    Job {
+        /// Its number.
+        id: String,
+        /// `failed` or `cancelled`.
+        state: &'static str,
+        /// Why.
+        message: String,
+    },
+    /// A job did not end in time; it goes on at the server.
+    #[error("job {id} is not done after {waited:?}; it goes on, ask again for it")]
+    JobTimeout {
+        /// Its number.
+        id: String,
+        /// How long we waited.
+        waited: Duration,
+    },
+    /// The file could not be read.
+    #[error("{path}: {error}")]
+    File {
+        /// Which.
+        path: String,
+        /// Why.
+        error: std::io::Error,
+    },
+}

@@ -1,0 +1,276 @@
+//! The robot's side. Out: frames, odometry, scans, a liveliness token. In: answers and fused poses. Frames are best
+//! effort and numbered; the server keeps the newest of each camera, so a robot that sends fast never queues.
+
+use crate::{Capture, ClientError, transport};
+use nalgebra::Isometry2;
+use protos::{Key, Keys, Name, convert::geometry::pose2_wire, prost::Message, v1};
+use std::{
+    hash::{BuildHasher, RandomState},
+    sync::atomic::{AtomicU64, Ordering},
+    time::{Duration, Instant},
+};
+use tokio::sync::broadcast;
+use zenoh::{
+    Wait,
+    liveliness::LivelinessToken,
+    pubsub::Subscriber,
+    qos::{CongestionControl, Priority},
+    sample::Sample,
+};
+
+/// Answers and poses kept for a reader that is slow; it then misses the oldest.
+pub const INBOX: usize = 64;
+
+/// What to do when the link is full.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Delivery {
+    /// Drop after 50 ms: right for a robot, whose next frame is worth more.
+    #[default]
+    Latest,
+    /// Wait: right for an evaluation, where every frame counts.
+    Every,
+}
+
+/// How to reach the server, and who we are.
+#[derive(Debug, Clone)]
+pub struct RobotOptions {
+    /// The server's zenoh endpoint, such as `tcp/127.0.0.1:7447`.
+    pub endpoint: String,
+    /// Fleet: part of every key.
+    pub fleet: String,
+    /// The robot's name, as registered at the server.
+    pub robot: String,
+    /// When the link is full.
+    pub delivery: Delivery,
+    /// How long to look for the server.
+    pub timeout: Duration,
+}
+
+impl RobotOptions {
+    /// Options with defaults: latest frame wins, 5 s to find the server.
+    pub fn new(endpoint: impl Into<String>, fleet: impl Into<String>, robot: impl Into<String>) -> Self {
+        Self {
+            endpoint: endpoint.into(),
+            fleet: fleet.into(),
+            robot: robot.into(),
+            delivery: Delivery::Latest,
+            timeout: Duration::from_secs(5),
+        }
+    }
+}
+
+/// An answer and the camera it is for.
+#[derive(Debug, Clone)]
+pub struct CameraAnswer {
+    /// The camera.
+    pub camera: Name,
+    /// What the server said.
+    pub answer: v1::Answer,
+}
+
+/// A robot's connection. Dropping it ends the session and the robot's presence.
+pub struct RobotClient {
+    session: zenoh::Session,
+    keys: Keys,
+    robot: Name,
+    endpoint: String,
+    delivery: Delivery,
+    epoch: u64,
+    next_seq: AtomicU64,
+    answers: broadcast::Sender<CameraAnswer>,
+    poses: broadcast::Sender<v1::RobotPose>,
+    // Declared as long as they live.
+    _subscribers: [Subscriber<()>; 2],
+    _alive: LivelinessToken,
+}
+
+impl RobotClient {
+    /// Connects, subscribes to the robot's answers and poses, and shows it alive.
+    pub async fn connect(options: &RobotOptions) -> Result<Self, ClientError> {
+        let fleet = name("fleet", &options.fleet)?;
+        let robot = name("robot", &options.robot)?;
+        let keys = Keys::new(&fleet);
+        let session = transport::open(&options.endpoint, options.delivery, options.timeout).await?;
+        let (answers, _) = broadcast::channel(INBOX);
+        let (poses, _) = broadcast::channel(INBOX);
+        let to_answers = {
+            let (keys, answers) = (keys.clone(), answers.clone());
+            move |sample: Sample| {
+                let Ok(Key::Answer(_, camera)) = keys.parse(sample.key_expr().as_str()) else { return };
+                let Ok(answer) = v1::Answer::decode(&*sample.payload().to_bytes()) else { return };
+                // Nobody listening is no fault.
+                drop(answers.send(CameraAnswer { camera, answer }));
+            }
+        };
+        let to_poses = {
+            let poses = poses.clone();
+            move |sample: Sample| {
+                if let Ok(pose) = v1::RobotPose::decode(&*sample.payload().to_bytes()) {
+                    drop(poses.send(pose));
+                }
+            }
+        };
+        let subscribe = fault("subscribe");
+        let subscribers = [
+            session
+                .declare_subscriber(keys.answers_of(&robot))
+                .callback(to_answers)
+                .await
+                .map_err(subscribe)?,
+            session
+                .declare_subscriber(keys.build(&Key::Pose(robot.clone())))
+                .callback(to_poses)
+                .await
+                .map_err(subscribe)?,
+        ];
+        let alive = session.liveliness().declare_token(keys.build(&Key::Alive(robot.clone())));
+        let alive = alive.await.map_err(fault("show the robot alive"))?;
+        Ok(Self {
+            session,
+            keys,
+            robot,
+            endpoint: options.endpoint.clone(),
+            delivery: options.delivery,
+            epoch: new_epoch(),
+            next_seq: AtomicU64::new(1),
+            answers,
+            poses,
+            _subscribers: subscribers,
+            _alive: alive,
+        })
+    }
+
+    /// This start of the robot's software, drawn at random at [`Self::connect`].
+    pub fn epoch(&self) -> u64 {
+        self.epoch
+    }
+
+    /// Sends a frame and returns its number, at once.
+    pub async fn publish_frame(&self, camera: &str, capture: Capture) -> Result<u64, ClientError> {
+        let seq = self.next_seq.fetch_add(1, Ordering::Relaxed);
+        let frame = capture.numbered(self.epoch, seq);
+        let key = Key::Frame(self.robot.clone(), name("camera", camera)?);
+        self.put(&key, frame.encode_to_vec(), Priority::DataLow).await?;
+        Ok(seq)
+    }
+
+    /// Sends a frame and waits for its answer. One at a time per camera, or the older is superseded.
+    pub async fn recognise(
+        &self,
+        camera: &str,
+        capture: Capture,
+        wait: Duration,
+    ) -> Result<v1::Answer, ClientError> {
+        let mut answers = self.answers();
+        let started = Instant::now();
+        let seq = self.publish_frame(camera, capture).await?;
+        let none =
+            || ClientError::NoAnswer { seq, waited: started.elapsed(), endpoint: self.endpoint.clone() };
+        let arrived = async {
+            loop {
+                let CameraAnswer { camera: of, answer } = match answers.recv().await {
+                    Ok(answer) => answer,
+                    Err(broadcast::error::RecvError::Lagged(_)) => continue,
+                    Err(broadcast::error::RecvError::Closed) => return Err(none()),
+                };
+                if of.as_str() != camera || answer.epoch != self.epoch {
+                    continue;
+                }
+                match answer.seq.cmp(&seq) {
+                    std::cmp::Ordering::Less => {}
+                    std::cmp::Ordering::Equal => return Ok(answer),
+                    std::cmp::Ordering::Greater => return Err(ClientError::Superseded { seq }),
+                }
+            }
+        };
+        tokio::time::timeout(wait, arrived).await.unwrap_or_else(|_| Err(none()))
+    }
+
+    /// Every answer from now on, of all cameras. A reader more than [`INBOX`] behind misses the oldest.
+    pub fn answers(&self) -> broadcast::Receiver<CameraAnswer> {
+        self.answers.subscribe()
+    }
+
+    /// Every fused pose from now on.
+    pub fn poses(&self) -> broadcast::Receiver<v1::RobotPose> {
+        self.poses.subscribe()
+    }
+
+    /// Sends odometry.
+    pub async fn publish_odometry(&self, odom_from_robot: &Isometry2<f64>) -> Result<u64, ClientError> {
+        let seq = self.next_seq.fetch_add(1, Ordering::Relaxed);
+        let message = v1::Odometry {
+            epoch: self.epoch,
+            seq,
+            captured_ns: crate::capture::now_ns(),
+            odom_from_robot: Some(pose2_wire(odom_from_robot)),
+        };
+        self.put(&Key::Odometry(self.robot.clone()), message.encode_to_vec(), Priority::Data).await?;
+        Ok(seq)
+    }
+
+    /// Sends a laser scan; its epoch and number are set here.
+    pub async fn publish_scan(&self, scan: v1::Scan) -> Result<u64, ClientError> {
+        let seq = self.next_seq.fetch_add(1, Ordering::Relaxed);
+        let message = v1::Scan { epoch: self.epoch, seq, ..scan };
+        self.put(&Key::Scan(self.robot.clone()), message.encode_to_vec(), Priority::Data).await?;
+        Ok(seq)
+    }
+
+    /// Sends any bytes on the frame key of a camera: for tests of the server's refusals only.
+    pub async fn publish_raw_frame(&self, camera: &str, bytes: Vec<u8>) -> Result<(), ClientError> {
+        let key = Key::Frame(self.robot.clone(), name("camera", camera)?);
+        self.put(&key, bytes, Priority::DataLow).await
+    }
+
+    /// Ends the session in order.
+    pub async fn close(self) -> Result<(), ClientError> {
+        self.session.close().await.map_err(fault("close the session"))
+    }
+
+    async fn put(&self, key: &Key, bytes: Vec<u8>, priority: Priority) -> Result<(), ClientError> {
+        let congestion = match self.delivery {
+            Delivery::Latest => CongestionControl::Drop,
+            Delivery::Every => CongestionControl::Block,
+        };
+        let (session, key) = (self.session.clone(), self.keys.build(key));
+        // zenoh waits inside the call when the link is full: not on an async thread.
+        let put = move || session.put(key, bytes).congestion_control(congestion).priority(priority).wait();
+        match tokio::task::spawn_blocking(put).await {
+            Ok(sent) => sent.map_err(fault("send")),
+            Err(gone) => Err(ClientError::Transport { action: "send", detail: gone.to_string() }),
+        }
+    }
+}
+
+fn name(field: &'static str, text: &str) -> Result<Name, ClientError> {
+    Name::new(text).map_err(|error| ClientError::Name { field, text: text.to_owned(), error })
+}
+
+fn fault(action: &'static str) -> impl Fn(zenoh::Error) -> ClientError + Copy {
+    move |error| ClientError::Transport { action, detail: error.to_string() }
+}
+
+/// A random epoch: a fresh hasher of the standard library is keyed by the system's randomness. 53 bits, so that JSON
+/// readers with doubles keep it whole.
+fn new_epoch() -> u64 {
+    (RandomState::new().hash_one(std::process::id()) >> 11).max(1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn epochs_differ() {
+        assert_ne!(new_epoch(), new_epoch());
+        assert!(new_epoch() < 1 << 53);
+    }
+
+    #[tokio::test]
+    async fn bad_names_are_told_before_connecting() {
+        let error =
+            RobotClient::connect(&RobotOptions::new("tcp/127.0.0.1:1", "Site 1", "r1")).await.err().unwrap();
+        assert!(matches!(error, ClientError::Name { field: "fleet", .. }), "{error}");
+    }
+}
