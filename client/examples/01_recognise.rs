@@ -17,7 +17,7 @@ struct Arguments {
     #[arg(long, default_value = "tcp/127.0.0.1:7447")]
     endpoint: String,
     /// Fleet, as the server is set.
-    #[arg(long, default_value = "fleet")]
+    #[arg(long, default_value = "default")]
     fleet: String,
     /// The robot's name; `PUT /api/v1/robots/ROBOT {"map": ...}` makes it known.
     #[arg(long, default_value = "r1")]
