@@ -2,7 +2,8 @@
 //! PNG from their headers; decodes nothing.
 
 use crate::ClientError;
-use nalgebra::{Isometry2, Isometry3, Matrix3};
+use map::pose2::{Pose2, Pose2Covariance};
+use nalgebra::Isometry3;
 use protos::{
     convert::geometry::{intrinsics_wire, pose2_covariance_wire, pose2_wire, pose3_wire},
     prost::bytes::Bytes,
@@ -55,15 +56,15 @@ impl Capture {
 
     /// Odometry at capture.
     #[must_use]
-    pub fn with_odometry(mut self, odom_from_robot: &Isometry2<f64>) -> Self {
+    pub fn with_odometry(mut self, odom_from_robot: &Pose2) -> Self {
         self.frame.odometry = Some(pose2_wire(odom_from_robot));
         self
     }
 
     /// What the robot believes, with covariance over (x, y, theta).
     #[must_use]
-    pub fn with_prior(mut self, map_from_robot: &Isometry2<f64>, covariance: &Matrix3<f64>) -> Self {
-        self.frame.prior = Some(pose2_covariance_wire(map_from_robot, covariance));
+    pub fn with_prior(mut self, map_from_robot: &Pose2Covariance) -> Self {
+        self.frame.prior = Some(pose2_covariance_wire(map_from_robot));
         self
     }
 

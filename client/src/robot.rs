@@ -2,7 +2,7 @@
 //! effort and numbered; the server keeps the newest of each camera, so a robot that sends fast never queues.
 
 use crate::{Capture, ClientError, transport};
-use nalgebra::Isometry2;
+use map::pose2::Pose2;
 use protos::{Key, Keys, Name, convert::geometry::pose2_wire, prost::Message, v1};
 use std::{
     hash::{BuildHasher, RandomState},
@@ -197,7 +197,7 @@ impl RobotClient {
     }
 
     /// Sends odometry.
-    pub async fn publish_odometry(&self, odom_from_robot: &Isometry2<f64>) -> Result<u64, ClientError> {
+    pub async fn publish_odometry(&self, odom_from_robot: &Pose2) -> Result<u64, ClientError> {
         let seq = self.next_seq.fetch_add(1, Ordering::Relaxed);
         let message = v1::Odometry {
             epoch: self.epoch,

@@ -2,7 +2,10 @@
 
 use super::geometry;
 use crate::{Code, Name, Rejection, v1};
-use nalgebra::{Isometry2, Isometry3, Matrix3};
+use map::{
+    mounting::Mounting,
+    pose2::{Pose2, Pose2Covariance},
+};
 use prost::bytes::Bytes;
 use vision::frame::Intrinsics;
 
@@ -48,11 +51,11 @@ pub struct CheckedFrame {
     /// The camera, where calibrated.
     pub intrinsics: Option<Intrinsics>,
     /// Camera on robot.
-    pub robot_from_camera: Option<Isometry3<f64>>,
+    pub mounting: Option<Mounting>,
     /// Odometry at capture.
-    pub odometry: Option<Isometry2<f64>>,
+    pub odometry: Option<Pose2>,
     /// The robot's belief, `map_from_robot`, with its covariance.
-    pub prior: Option<(Isometry2<f64>, Matrix3<f64>)>,
+    pub prior: Option<Pose2Covariance>,
     /// Start of work at the latest so long after receipt; `None` for the server's default.
     pub deadline_ms: Option<u32>,
     /// Map asked for; `None` for the robot's.
@@ -82,7 +85,7 @@ impl TryFrom<v1::Frame> for CheckedFrame {
             return Err(Rejection::new(Code::OutOfRange, "deadline_ms", detail));
         }
         let camera = frame.intrinsics.as_ref().map(geometry::intrinsics).transpose();
-        let mounting = frame.robot_from_camera.as_ref().map(geometry::pose3).transpose();
+        let mounting = frame.robot_from_camera.as_ref().map(geometry::mounting).transpose();
         let odometry = frame.odometry.as_ref().map(geometry::pose2).transpose();
         let prior = frame.prior.as_ref().map(geometry::pose2_covariance).transpose();
         Ok(Self {
@@ -93,7 +96,7 @@ impl TryFrom<v1::Frame> for CheckedFrame {
             width_px: frame.width_px,
             height_px: frame.height_px,
             intrinsics: camera.map_err(|r| r.inside("intrinsics"))?,
-            robot_from_camera: mounting.map_err(|r| r.inside("robot_from_camera"))?,
+            mounting: mounting.map_err(|r| r.inside("robot_from_camera"))?,
             odometry: odometry.map_err(|r| r.inside("odometry"))?,
             prior: prior.map_err(|r| r.inside("prior"))?,
             deadline_ms: (frame.deadline_ms > 0).then_some(frame.deadline_ms),

@@ -1,17 +1,18 @@
 //! Numbers, poses, covariances and cameras, both ways.
 
 use crate::{Code, Rejection, v1};
-use nalgebra::{Isometry2, Isometry3, Matrix3, Quaternion, Translation3, UnitQuaternion, Vector2};
+use map::{
+    check::{MAX_COORDINATE_M, MAX_VARIANCE, OutOfRange},
+    mounting::Mounting,
+    pose2::{Pose2, Pose2Covariance},
+};
+use nalgebra::{Isometry3, Matrix3, Quaternion, Translation3, UnitQuaternion};
 use vision::frame::{Distortion, FrameError, Intrinsics};
 
-/// Largest accepted coordinate, in metres: a site of 100 km.
-pub const MAX_COORDINATE_M: f64 = 1e5;
 /// Largest accepted angle, in radians: odometry may wind up, but not for ever.
 pub const MAX_ANGLE_RAD: f64 = 1e4;
 /// A quaternion whose length is further from 1 than this is refused, not repaired.
 pub const QUATERNION_TOLERANCE: f64 = 1e-3;
-/// Largest accepted variance (m^2 or rad^2).
-pub const MAX_VARIANCE: f64 = 1e12;
 /// Relative asymmetry and negative eigenvalue that rounding may leave in a covariance.
 pub const COVARIANCE_TOLERANCE: f64 = 1e-6;
 
@@ -56,35 +57,49 @@ pub fn pose3_wire(pose: &Isometry3<f64>) -> v1::Pose3 {
     v1::Pose3 { qx: sign * q.i, qy: sign * q.j, qz: sign * q.k, qw: sign * q.w, x_m: t.x, y_m: t.y, z_m: t.z }
 }
 
-/// A pose on the floor.
-pub fn pose2(pose: &v1::Pose2) -> Result<Isometry2<f64>, Rejection> {
-    let x = within("x_m", pose.x_m, MAX_COORDINATE_M)?;
-    let y = within("y_m", pose.y_m, MAX_COORDINATE_M)?;
-    let theta = within("theta_rad", pose.theta_rad, MAX_ANGLE_RAD)?;
-    Ok(Isometry2::new(Vector2::new(x, y), theta))
+/// A pose on the floor; the heading is wrapped into (-pi, pi].
+pub fn pose2(pose: &v1::Pose2) -> Result<Pose2, Rejection> {
+    let x_m = within("x_m", pose.x_m, MAX_COORDINATE_M)?;
+    let y_m = within("y_m", pose.y_m, MAX_COORDINATE_M)?;
+    Ok(Pose2::new(x_m, y_m, within("theta_rad", pose.theta_rad, MAX_ANGLE_RAD)?))
 }
 
-/// The wire form; the heading lies in (-pi, pi].
-pub fn pose2_wire(pose: &Isometry2<f64>) -> v1::Pose2 {
-    let t = pose.translation.vector;
-    v1::Pose2 { x_m: t.x, y_m: t.y, theta_rad: pose.rotation.angle() }
+/// The wire form.
+pub fn pose2_wire(pose: &Pose2) -> v1::Pose2 {
+    v1::Pose2 { x_m: pose.x_m, y_m: pose.y_m, theta_rad: pose.theta_rad }
 }
 
 /// A pose on the floor with its covariance over (x, y, theta): 9 finite numbers, symmetric, not negative.
-pub fn pose2_covariance(value: &v1::Pose2Covariance) -> Result<(Isometry2<f64>, Matrix3<f64>), Rejection> {
+pub fn pose2_covariance(value: &v1::Pose2Covariance) -> Result<Pose2Covariance, Rejection> {
     let pose =
         value.pose.as_ref().ok_or_else(|| Rejection::new(Code::Missing, "pose", "the pose is absent"))?;
     let pose = pose2(pose).map_err(|r| r.inside("pose"))?;
-    Ok((pose, covariance(&value.covariance)?))
+    let made = Pose2Covariance { pose, covariance: covariance(&value.covariance)? };
+    made.check().map_err(|e| refused(&e))?;
+    Ok(made)
 }
 
 /// The wire form of a pose with covariance.
-pub fn pose2_covariance_wire(pose: &Isometry2<f64>, covariance: &Matrix3<f64>) -> v1::Pose2Covariance {
+pub fn pose2_covariance_wire(value: &Pose2Covariance) -> v1::Pose2Covariance {
     v1::Pose2Covariance {
-        pose: Some(pose2_wire(pose)),
-        // Column-major storage of a symmetric matrix reads row-major too; the transpose says so for any.
-        covariance: covariance.transpose().as_slice().to_vec(),
+        pose: Some(pose2_wire(&value.pose)),
+        // Storage is column-major: the transpose reads row-major.
+        covariance: value.covariance.transpose().as_slice().to_vec(),
     }
+}
+
+/// Where a camera sits on its robot, with the default covariance.
+pub fn mounting(pose: &v1::Pose3) -> Result<Mounting, Rejection> {
+    Mounting::new(pose3(pose)?).map_err(|e| {
+        let r = refused(&e);
+        Rejection { field: String::new(), ..r }
+    })
+}
+
+/// A refusal by the map crate in wire words.
+pub(crate) fn refused(error: &OutOfRange) -> Rejection {
+    let code = if error.value.is_finite() { Code::OutOfRange } else { Code::NotFinite };
+    Rejection::new(code, error.field, error.to_string())
 }
 
 fn covariance(numbers: &[f64]) -> Result<Matrix3<f64>, Rejection> {
@@ -199,6 +214,13 @@ mod tests {
     }
 
     #[test]
+    fn a_camera_far_from_its_robot_is_refused() {
+        let at = |x_m| mounting(&v1::Pose3 { qw: 1.0, x_m, ..v1::Pose3::default() });
+        assert!(at(map::mounting::MAX_MOUNTING_M).is_ok());
+        assert_eq!(at(map::mounting::MAX_MOUNTING_M + 0.01).unwrap_err().code, Code::OutOfRange);
+    }
+
+    #[test]
     fn a_quaternion_off_the_unit_is_refused() {
         let mut wire = v1::Pose3 { qw: 1.0 + 0.9e-3, ..v1::Pose3::default() };
         assert!(pose3(&wire).is_ok());
@@ -233,7 +255,7 @@ mod tests {
         #[test]
         fn any_number_passes_or_names_its_field(x in any::<f64>(), y in any::<f64>(), t in any::<f64>()) {
             match pose2(&v1::Pose2 { x_m: x, y_m: y, theta_rad: t }) {
-                Ok(p) => prop_assert!(p.translation.vector.norm() <= 2.0 * MAX_COORDINATE_M),
+                Ok(p) => prop_assert!(p.check().is_ok()),
                 Err(r) => prop_assert!(["x_m", "y_m", "theta_rad"].contains(&r.field.as_str())),
             }
         }

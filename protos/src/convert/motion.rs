@@ -1,13 +1,11 @@
 //! Odometry and laser scans as they enter.
 
-use super::geometry::{self, MAX_COORDINATE_M, between, within};
+use super::geometry;
 use crate::{Code, Rejection, v1};
-use nalgebra::Isometry2;
-
-/// Most beams in one scan.
-pub const MAX_BEAMS: usize = 10_000;
-/// Longest range of a laser, in metres.
-pub const MAX_RANGE_M: f64 = 1000.0;
+use map::{
+    laser::{Scan, ScanError},
+    pose2::Pose2,
+};
 
 /// Odometry that can be relied on.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,7 +17,7 @@ pub struct CheckedOdometry {
     /// Robot's clock.
     pub captured_ns: i64,
     /// The robot in its odometry frame.
-    pub odom_from_robot: Isometry2<f64>,
+    pub odom_from_robot: Pose2,
 }
 
 impl TryFrom<v1::Odometry> for CheckedOdometry {
@@ -45,63 +43,28 @@ pub struct CheckedScan {
     /// Robot's clock.
     pub captured_ns: i64,
     /// The robot in its odometry frame.
-    pub odom_from_robot: Isometry2<f64>,
-    /// Laser on robot.
-    pub robot_from_laser: Isometry2<f64>,
-    /// Bearing of the first beam, laser frame, counter-clockwise from ahead.
-    pub first_bearing_rad: f64,
-    /// Between beams; its sign is the direction of turning.
-    pub bearing_step_rad: f64,
-    /// At or beyond this there was no return.
-    pub max_range_m: f64,
-    /// Ranges, each 0 or more and finite; "no return" is `max_range_m`.
-    pub ranges_m: Vec<f32>,
+    pub odom_from_robot: Pose2,
+    /// Bearings and ranges. A single range that is no number is a beam without return, as drivers send it.
+    pub scan: Scan,
 }
 
 impl TryFrom<v1::Scan> for CheckedScan {
     type Error = Rejection;
 
     fn try_from(s: v1::Scan) -> Result<Self, Rejection> {
-        let turn = std::f64::consts::TAU;
-        if s.ranges_m.is_empty() || s.ranges_m.len() > MAX_BEAMS {
-            let detail = format!("{} beams are outside 1 to {MAX_BEAMS}", s.ranges_m.len());
-            return Err(Rejection::new(Code::OutOfRange, "ranges_m", detail));
-        }
-        let step = within("bearing_step_rad", s.bearing_step_rad, turn)?;
-        if step.abs() * (s.ranges_m.len() - 1) as f64 > turn * 1.001 {
-            return Err(Rejection::new(
-                Code::OutOfRange,
-                "bearing_step_rad",
-                "the scan is more than a full turn",
-            ));
-        }
-        let max_range_m = between("max_range_m", s.max_range_m, 0.1, MAX_RANGE_M)?;
-        let mut ranges_m = s.ranges_m;
-        for (i, range) in ranges_m.iter_mut().enumerate() {
-            // Drivers say "no return" as infinity (REP-117); NaN and negative numbers are faults.
-            if *range == f32::INFINITY {
-                *range = max_range_m as f32;
-            }
-            if !(0.0..=MAX_COORDINATE_M as f32).contains(range) {
-                let code = if range.is_nan() { Code::NotFinite } else { Code::OutOfRange };
-                return Err(Rejection::new(code, format!("ranges_m[{i}]"), format!("{range} is no range")));
-            }
-        }
-        Ok(Self {
-            epoch: s.epoch,
-            seq: s.seq,
-            captured_ns: s.captured_ns,
-            odom_from_robot: needed("odom_from_robot", s.odom_from_robot.as_ref())?,
-            robot_from_laser: needed("robot_from_laser", s.robot_from_laser.as_ref())?,
-            first_bearing_rad: within("first_bearing_rad", s.first_bearing_rad, turn)?,
-            bearing_step_rad: step,
-            max_range_m,
-            ranges_m,
-        })
+        let robot_from_laser = needed("robot_from_laser", s.robot_from_laser.as_ref())?;
+        let odom_from_robot = needed("odom_from_robot", s.odom_from_robot.as_ref())?;
+        let scan =
+            Scan::new(robot_from_laser, s.first_bearing_rad, s.bearing_step_rad, s.max_range_m, s.ranges_m);
+        let scan = scan.map_err(|error| match &error {
+            ScanError::OutOfRange(inner) => geometry::refused(inner),
+            ScanError::Beams(_) => Rejection::new(Code::OutOfRange, "ranges_m", error.to_string()),
+        })?;
+        Ok(Self { epoch: s.epoch, seq: s.seq, captured_ns: s.captured_ns, odom_from_robot, scan })
     }
 }
 
-fn needed(field: &str, pose: Option<&v1::Pose2>) -> Result<Isometry2<f64>, Rejection> {
+fn needed(field: &str, pose: Option<&v1::Pose2>) -> Result<Pose2, Rejection> {
     let pose = pose.ok_or_else(|| Rejection::new(Code::Missing, field, "the pose is absent"))?;
     geometry::pose2(pose).map_err(|r| r.inside(field))
 }
@@ -109,6 +72,7 @@ fn needed(field: &str, pose: Option<&v1::Pose2>) -> Result<Isometry2<f64>, Rejec
 #[cfg(test)]
 mod tests {
     use super::*;
+    use map::laser::{MAX_BEAMS, MAX_RANGE_M};
 
     fn scan(beams: usize) -> v1::Scan {
         v1::Scan {
@@ -138,8 +102,10 @@ mod tests {
 
     #[test]
     fn each_fault_names_its_field() {
-        assert_eq!(refused(|s| s.ranges_m[1] = f32::NAN), (Code::NotFinite, "ranges_m[1]".into()));
-        assert_eq!(refused(|s| s.ranges_m[2] = -0.5), (Code::OutOfRange, "ranges_m[2]".into()));
+        assert_eq!(
+            refused(|s| s.first_bearing_rad = f64::NAN),
+            (Code::NotFinite, "first_bearing_rad".into())
+        );
         assert_eq!(refused(|s| s.bearing_step_rad = 4.0), (Code::OutOfRange, "bearing_step_rad".into()));
         assert_eq!(refused(|s| s.max_range_m = 0.0), (Code::OutOfRange, "max_range_m".into()));
         assert_eq!(refused(|s| s.max_range_m = MAX_RANGE_M + 1.0), (Code::OutOfRange, "max_range_m".into()));
@@ -149,14 +115,6 @@ mod tests {
             refused(|s| s.odom_from_robot = Some(far)),
             (Code::OutOfRange, "odom_from_robot.x_m".into())
         );
-    }
-
-    #[test]
-    fn no_return_becomes_the_range_limit() {
-        let mut wire = scan(2);
-        wire.ranges_m[0] = f32::INFINITY;
-        let ranges = CheckedScan::try_from(wire).unwrap().ranges_m;
-        assert!((ranges[0] - 30.0).abs() < 1e-6 && (ranges[1] - 2.0).abs() < 1e-6);
     }
 
     #[test]
