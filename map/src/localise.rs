@@ -96,7 +96,7 @@ pub enum FixRefusal {
 #[derive(Debug, Clone, PartialEq)]
 pub enum RobotFix {
     /// The pose.
-    Fixed(Fix),
+    Fixed(Box<Fix>),
     /// Several solutions are left; best first. None of them may be used without more knowledge.
     Ambiguous(Vec<Fix>),
     /// No solution is left.

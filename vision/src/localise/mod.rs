@@ -1,3 +1,5 @@
 //! Where the camera is, from a recognised landmark of known size (method 13).
 
+pub mod reproject;
+mod refine;
 pub mod pose;

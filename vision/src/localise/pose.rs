@@ -1,7 +1,15 @@
 //! Pose of a landmark in the camera frame from its four corners (method 13.1 to 13.5).
+//!
+//! In: corners with covariance, the landmark's size, a calibrated camera. Out: the best pose with its covariance, the
+//! other minimum of the reprojection error where there is one, and whether the two can be told apart.
+//! Decides nothing about the robot: that takes the map (`map::localise`).
 
-use crate::{detect::quads::Corners, frame::Intrinsics};
-use nalgebra::{Isometry3, Matrix2, Matrix6};
+use super::refine::Problem;
+use crate::{
+    detect::quads::Corners,
+    frame::{Distortion, FrameError, Intrinsics},
+};
+use nalgebra::{Isometry3, Matrix2, Matrix3, Matrix6, Point2, Rotation3, UnitQuaternion, Vector2};
 
 /// Width and height of a landmark, in metres.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -57,3 +65,205 @@ pub struct LandmarkPose {
     /// The corners behind it: localisation fits the robot's pose directly to them.
     pub measured: Measured,
 }
+
+/// Largest accepted corner coordinate, in pixels: four times the largest image.
+pub const MAX_CORNER_PX: f64 = 32_768.0;
+/// Smallest accepted standard deviation of a corner: finer than any detector.
+pub const MIN_CORNER_SIGMA_PX: f64 = 1e-4;
+/// Largest accepted standard deviation of a corner.
+pub const MAX_CORNER_SIGMA_PX: f64 = 1e4;
+/// Ratio of the reprojection errors below which two solutions are ambiguous (method 13.4).
+pub const AMBIGUOUS_RATIO: f64 = 2.0;
+/// Difference of chi2 below which two solutions are ambiguous.
+///
+/// Departs from method 13.4: the ratio alone lets flips through, since a true pose with an unlucky chi2 of 6 next to
+/// a false one of 1 has ratio 2.4. For two minima whose predictions lie D sigma apart the false one wins by more than
+/// T with probability Q((T + D^2) / 2D) <= Q(sqrt T), at any D: 3e-5 for T = 16.
+pub const AMBIGUOUS_CHI2: f64 = 16.0;
+/// Two minima nearer than this are one.
+const SAME_POSE_RAD: f64 = 1e-4;
+
+/// Why there is no pose.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum PoseError {
+    /// A side of the landmark is not finite or not in [`LandmarkSize::MIN_M`] to [`LandmarkSize::MAX_M`].
+    #[error("{field} = {value} is out of range")]
+    Size {
+        /// `width_m` or `height_m`.
+        field: &'static str,
+        /// What it was.
+        value: f64,
+    },
+    /// The intrinsics are impossible.
+    #[error(transparent)]
+    Camera(#[from] FrameError),
+    /// A corner lies beyond [`MAX_CORNER_PX`].
+    #[error("corner {corner} lies beyond {MAX_CORNER_PX} px")]
+    Corner {
+        /// Its index, TL TR BR BL.
+        corner: usize,
+    },
+    /// A covariance is not symmetric, or a standard deviation is not in [`MIN_CORNER_SIGMA_PX`] to
+    /// [`MAX_CORNER_SIGMA_PX`].
+    #[error("covariance of corner {corner} is impossible")]
+    Covariance {
+        /// Its index, TL TR BR BL.
+        corner: usize,
+    },
+    /// The distortion cannot be undone at a corner, or undoing it folds the quad.
+    #[error("lens distortion cannot be undone at the corners")]
+    Distortion,
+    /// The corners do not determine a pose in front of the camera.
+    #[error("the corners do not determine a pose")]
+    Degenerate,
+}
+
+/// Pose of a landmark of known `size` from its `corners` (pixels, distorted as seen, in the landmark's own order) with
+/// their covariances. Eq. (2), nearest rotation, then least squares from it and from its mirror image.
+pub fn landmark_pose(
+    corners: &Corners,
+    covariance_px2: &[Matrix2<f64>; 4],
+    size: LandmarkSize,
+    camera: &Intrinsics,
+) -> Result<LandmarkPose, PoseError> {
+    let measured = measured(corners, covariance_px2, size, camera)?;
+    let problem = Problem::new(&measured).ok_or(PoseError::Degenerate)?;
+    let start = linear_pose(&measured).ok_or(PoseError::Degenerate)?;
+    let first = problem
+        .descend(start)
+        .filter(faces_camera)
+        .and_then(|pose| problem.solution(pose))
+        .ok_or(PoseError::Degenerate)?;
+    let other = problem
+        .descend(mirrored(&first.camera_from_landmark))
+        .filter(faces_camera)
+        .filter(|pose| pose.rotation.angle_to(&first.camera_from_landmark.rotation) > SAME_POSE_RAD)
+        .and_then(|pose| problem.solution(pose));
+    let (best, second) = match other {
+        Some(other) if other.chi2 < first.chi2 => (other, Some(first)),
+        other => (first, other),
+    };
+    let ambiguous = second.as_ref().is_some_and(|second| {
+        second.chi2 - best.chi2 < AMBIGUOUS_CHI2
+            || second.reprojection_rms_px < AMBIGUOUS_RATIO * best.reprojection_rms_px
+    });
+    Ok(LandmarkPose { best, second, ambiguous, measured })
+}
+
+/// Checks everything and takes the lens distortion out of the corners and of their covariances.
+fn measured(
+    corners: &Corners,
+    covariance_px2: &[Matrix2<f64>; 4],
+    size: LandmarkSize,
+    camera: &Intrinsics,
+) -> Result<Measured, PoseError> {
+    for (field, value) in [("width_m", size.width_m), ("height_m", size.height_m)] {
+        if !(LandmarkSize::MIN_M..=LandmarkSize::MAX_M).contains(&value) {
+            return Err(PoseError::Size { field, value });
+        }
+    }
+    let c = Intrinsics::new(camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px, camera.distortion)?;
+    let (mut straight, mut covariances) = (*corners.points(), *covariance_px2);
+    for (corner, (p, s)) in straight.iter_mut().zip(&mut covariances).enumerate() {
+        if p.x.abs() > MAX_CORNER_PX || p.y.abs() > MAX_CORNER_PX {
+            return Err(PoseError::Corner { corner });
+        }
+        if !is_corner_covariance(s) {
+            return Err(PoseError::Covariance { corner });
+        }
+        if c.distortion != Distortion::None {
+            (*p, *s) = undistorted(&c, p, s).ok_or(PoseError::Distortion)?;
+        }
+    }
+    let corners_px = Corners::new(straight).map_err(|_folded| PoseError::Distortion)?;
+    let camera = Intrinsics { distortion: Distortion::None, ..c };
+    Ok(Measured { corners_px, covariance_px2: covariances, camera, size })
+}
+
+/// Symmetric, with both standard deviations in range.
+fn is_corner_covariance(s: &Matrix2<f64>) -> bool {
+    let symmetric = (s.m12 - s.m21).abs() <= 1e-6 * (s.m11 + s.m22);
+    let (mean, spread) = (0.5 * (s.m11 + s.m22), (0.5 * (s.m11 - s.m22)).hypot(s.m12));
+    // NaN fails every comparison.
+    symmetric && mean - spread >= MIN_CORNER_SIGMA_PX.powi(2) && mean + spread <= MAX_CORNER_SIGMA_PX.powi(2)
+}
+
+/// The undistorted point and its covariance, by central differences over half a pixel.
+fn undistorted(
+    camera: &Intrinsics,
+    p: &Point2<f64>,
+    s: &Matrix2<f64>,
+) -> Option<(Point2<f64>, Matrix2<f64>)> {
+    /// Largest error of the round trip: the fixed point has then converged.
+    const ROUND_TRIP_PX: f64 = 1e-3;
+    let straight = camera.undistort(p);
+    let ray = nalgebra::Vector3::new(
+        (straight.x - camera.cx_px) / camera.fx_px,
+        (straight.y - camera.cy_px) / camera.fy_px,
+        1.0,
+    );
+    let back = camera.project(&ray);
+    let along = |d: Vector2<f64>| camera.undistort(&(p + d)) - camera.undistort(&(p - d));
+    let j = Matrix2::from_columns(&[along(Vector2::new(0.5, 0.0)), along(Vector2::new(0.0, 0.5))]);
+    let covariance = j * s * j.transpose();
+    let good = (back - p).norm() < ROUND_TRIP_PX && is_corner_covariance(&covariance);
+    good.then_some((straight, covariance))
+}
+
+/// Eq. (2): `[r2 r3 T] = lambda K^-1 H`, then the nearest rotation (method 13.1, 13.2).
+fn linear_pose(measured: &Measured) -> Option<Isometry3<f64>> {
+    let c = &measured.camera;
+    let ray = |p: &Point2<f64>| Point2::new((p.x - c.cx_px) / c.fx_px, (p.y - c.cy_px) / c.fy_px);
+    let square = square_to_quad(&measured.corners_px.points().each_ref().map(ray))?;
+    // Landmark (y, z) to the unit square: s = y / w + 1/2 to the right, t = 1/2 - z / h downwards.
+    let (w, h) = (measured.size.width_m, measured.size.height_m);
+    let unit = Matrix3::new(1.0 / w, 0.0, 0.5, 0.0, -1.0 / h, 0.5, 0.0, 0.0, 1.0);
+    let b = square * unit;
+    let (b1, b2, b3) = (b.column(0), b.column(1), b.column(2));
+    let scale = (b1.norm() * b2.norm()).sqrt();
+    let lambda = if b3.z < 0.0 { -1.0 } else { 1.0 } / scale;
+    let (r2, r3, t) = (b1 * lambda, b2 * lambda, b3 * lambda);
+    let raw = Matrix3::from_columns(&[r2.cross(&r3), r2, r3]);
+    if !raw.iter().chain(t.iter()).all(|v| v.is_finite()) {
+        return None;
+    }
+    let rotation = nearest_rotation(&raw)?;
+    Some(Isometry3::from_parts(t.into(), UnitQuaternion::from_rotation_matrix(&rotation)))
+}
+
+/// `U diag(1, 1, det(U V^T)) V^T`: nearest in the Frobenius norm.
+fn nearest_rotation(raw: &Matrix3<f64>) -> Option<Rotation3<f64>> {
+    let svd = raw.try_svd(true, true, f64::EPSILON, 100)?;
+    let (u, v_t) = (svd.u?, svd.v_t?);
+    let mut signs = Matrix3::identity();
+    signs[(2, 2)] = (u * v_t).determinant().signum();
+    Some(Rotation3::from_matrix_unchecked(u * signs * v_t))
+}
+
+/// The viewer is on the front side: `r1 . T < 0`.
+fn faces_camera(pose: &Isometry3<f64>) -> bool {
+    (pose.rotation * nalgebra::Vector3::x()).dot(&pose.translation.vector) < 0.0
+}
+
+/// The pose with its normal mirrored about the line of sight (method 13.4).
+fn mirrored(pose: &Isometry3<f64>) -> Isometry3<f64> {
+    let v = pose.translation.vector.normalize();
+    let mirror = Matrix3::identity() - 2.0 * v * v.transpose();
+    let flip = Matrix3::from_diagonal(&nalgebra::Vector3::new(-1.0, 1.0, 1.0));
+    let rotation =
+        Rotation3::from_matrix_unchecked(mirror * pose.rotation.to_rotation_matrix().matrix() * flip);
+    Isometry3::from_parts(pose.translation, UnitQuaternion::from_rotation_matrix(&rotation))
+}
+
+/// The homography from the unit square (0,0), (1,0), (1,1), (0,1) to four points, in closed form.
+fn square_to_quad([p0, p1, p2, p3]: &[Point2<f64>; 4]) -> Option<Matrix3<f64>> {
+    let (d1, d2, s) = (p1 - p2, p3 - p2, (p0 - p1) + (p2 - p3));
+    let det = d1.perp(&d2);
+    let (g, h) = (s.perp(&d2) / det, d1.perp(&s) / det);
+    let (c0, c1) = (p1 - p0 + p1.coords * g, p3 - p0 + p3.coords * h);
+    let m = Matrix3::new(c0.x, c1.x, p0.x, c0.y, c1.y, p0.y, g, h, 1.0);
+    m.iter().all(|v| v.is_finite()).then_some(m)
+}
+
+#[cfg(test)]
+mod tests;
