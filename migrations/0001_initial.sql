@@ -77,6 +77,8 @@ CREATE TABLE models (
     active          INTEGER NOT NULL CHECK (active IN (0, 1)),
     -- JSON list of what keeps a candidate from being active.
     reasons         TEXT    NOT NULL,
+    -- JSON object for people: thresholds and figures of the learning. Lists are shown without opening any model.
+    facts           TEXT    NOT NULL,
     views           INTEGER NOT NULL,
     generated_views INTEGER NOT NULL,
     learnt_ms       INTEGER NOT NULL

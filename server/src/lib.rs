@@ -7,4 +7,8 @@ pub mod config;
 pub mod engine;
 pub mod bus;
 mod store;
+mod http;
+mod server;
 pub mod cli;
+
+pub use server::{RunningServer, Server, StartError};

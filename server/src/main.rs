@@ -1,2 +1,5 @@
 //! The `waymark` command.
-fn main() {}
+
+fn main() -> std::process::ExitCode {
+    server::cli::main()
+}

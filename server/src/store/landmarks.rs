@@ -10,7 +10,7 @@ macro_rules! select {
         concat!(
             "SELECT l.id, l.name, l.width_m, l.height_m, l.x_m, l.y_m, l.z_m, l.theta_rad, \
              (SELECT count(*) FROM views v WHERE v.landmark_id = l.id) AS views, \
-             m.active, m.reasons, m.views AS model_views, m.generated_views, m.learnt_ms \
+             m.active, m.reasons, m.facts, m.views AS model_views, m.generated_views, m.learnt_ms \
              FROM landmarks l LEFT JOIN models m ON m.landmark_id = l.id ",
             $tail
         )
@@ -51,6 +51,8 @@ pub(crate) struct ModelSummary {
     pub(crate) active: bool,
     /// JSON list of what keeps it from being active.
     pub(crate) reasons: String,
+    /// JSON object: thresholds and figures of the learning.
+    pub(crate) facts: String,
     pub(crate) views: u64,
     pub(crate) generated_views: u64,
     pub(crate) learnt_ms: i64,
@@ -83,6 +85,7 @@ fn landmark_row(row: &SqliteRow) -> Result<LandmarkRow, sqlx::Error> {
         Some(active) => Some(ModelSummary {
             active,
             reasons: row.try_get("reasons")?,
+            facts: row.try_get("facts")?,
             views: row.try_get::<i64, _>("model_views")? as u64,
             generated_views: row.try_get::<i64, _>("generated_views")? as u64,
             learnt_ms: row.try_get("learnt_ms")?,

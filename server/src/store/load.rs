@@ -4,6 +4,7 @@
 use super::{StoreError, landmarks, laser, maps, robots, statements::statements};
 use crate::engine::snapshot::{LandmarkInfo, MapSnapshot, Snapshots};
 use map::{
+    check::OutOfRange,
     place::{LandmarkPlace, PlaceSigmas},
     segments::LaserSegment,
 };
@@ -68,7 +69,7 @@ pub(super) async fn map(
         let info = LandmarkInfo { name, size: measures.size, place: place(&measures) };
         infos.insert(LandmarkId(id as u64), info);
     }
-    let walls = laser::all_of(&mut *conn, id).await?.iter().filter_map(wall).collect();
+    let walls = laser::all_of(&mut *conn, id).await?.iter().filter_map(|ends| wall(ends).ok()).collect();
     Ok(Some(Arc::new(MapSnapshot {
         name: row.try_get("name").map_err(at())?,
         version: row.try_get::<i64, _>("version").map_err(at())? as u64,
@@ -87,10 +88,10 @@ pub(crate) fn place(measures: &landmarks::Measures) -> Option<LandmarkPlace> {
 }
 
 /// A wall from its ends, each known to [`WALL_SIGMA_M`] across the wall.
-pub(crate) fn wall(&[ax, ay, bx, by]: &laser::Ends) -> Option<LaserSegment> {
+pub(crate) fn wall(&[ax, ay, bx, by]: &laser::Ends) -> Result<LaserSegment, OutOfRange> {
     let (a, b) = (Point2::new(ax, ay), Point2::new(bx, by));
     let length = (b - a).norm().max(map::segments::MIN_SEGMENT_M);
     let variance = WALL_SIGMA_M * WALL_SIGMA_M;
     let covariance = Matrix2::new(2.0 * variance / (length * length), 0.0, 0.0, variance);
-    LaserSegment::from_ends(a, b, covariance).ok()
+    LaserSegment::from_ends(a, b, covariance)
 }

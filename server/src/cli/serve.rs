@@ -1,0 +1,115 @@
+//! `waymark serve`: the server, until Ctrl-C or SIGTERM.
+
+use crate::{
+    Server,
+    config::{Config, RawConfig},
+};
+use anyhow::{Context, bail};
+use clap::Args;
+use std::path::PathBuf;
+
+/// Runs the server: zenoh for robots, HTTP for people and programs, one SQLite file for everything that lasts.
+///
+/// Starts with no settings at all; then the page is at http://127.0.0.1:8080/, the API with its interactive
+/// documentation at http://127.0.0.1:8080/api/docs/, and robots connect to tcp/127.0.0.1:7447.
+///
+/// Teach a first landmark from a photograph of a picture on a wall:
+///
+///   curl -X POST localhost:8080/api/v1/maps -H 'content-type: application/json' -d '{"name": "office"}'
+///   curl -X POST localhost:8080/api/v1/maps/office/landmarks -H 'content-type: application/json' \
+///        -d '{"name": "poster", "size": {"width_m": 0.6, "height_m": 0.84}}'
+///   curl -X POST localhost:8080/api/v1/maps/office/landmarks/poster/views -F image=@photo.jpg
+///   curl -X POST localhost:8080/api/v1/maps/office/landmarks/poster/learn
+///   curl -X POST localhost:8080/api/v1/maps/office/recognise -F image=@other-photo.jpg
+///
+/// Settings come from defaults, then the file, then WAYMARK_... variables, then these options;
+/// server/config.example.toml lists all of them.
+#[derive(Debug, Args)]
+#[command(verbatim_doc_comment)]
+pub(super) struct Serve {
+    /// Settings file, TOML.
+    #[arg(long, env = "WAYMARK_CONFIG", value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Directory of the database; made if missing [default: waymark-data].
+    #[arg(long, value_name = "DIR")]
+    data: Option<PathBuf>,
+    /// Where HTTP listens; port 0 takes a free one [default: 127.0.0.1:8080].
+    #[arg(long, value_name = "ADDR")]
+    http: Option<String>,
+    /// Where robots connect; port 0 takes a free one [default: tcp/127.0.0.1:7447].
+    #[arg(long, value_name = "ENDPOINT")]
+    zenoh: Option<String>,
+    /// Name in every key, waymark/1/{fleet}/... [default: default].
+    #[arg(long, value_name = "NAME")]
+    fleet: Option<String>,
+    /// Vision threads [default: one per core].
+    #[arg(long, value_name = "N")]
+    workers: Option<usize>,
+    /// Allows addresses beyond loopback. Nothing is encrypted and nobody is asked who they are: only for a network
+    /// that is trusted as a whole.
+    #[arg(long)]
+    insecure: bool,
+}
+
+impl Serve {
+    /// File and environment, then the options given.
+    fn settings(self) -> anyhow::Result<Config> {
+        let mut raw = RawConfig::read(self.config.as_deref())?;
+        if let Some(data) = self.data {
+            raw.data = data;
+        }
+        if let Some(http) = self.http {
+            raw.http = http;
+        }
+        if let Some(zenoh) = self.zenoh {
+            raw.zenoh = zenoh;
+        }
+        if let Some(fleet) = self.fleet {
+            raw.fleet = fleet;
+        }
+        if let Some(workers) = self.workers {
+            raw.workers = workers;
+        }
+        raw.insecure |= self.insecure;
+        Ok(Config::try_from(raw)?)
+    }
+
+    pub(super) async fn run(self) -> anyhow::Result<()> {
+        let config = self.settings()?;
+        let data = config.data.clone();
+        let server = Server::start(config).await?;
+        ready(&server);
+        tracing::info!(data = %data.display(), http = %server.http_addr, "ready");
+        tokio::select! {
+            stopped = stop_signal() => stopped?,
+            () = server.failed() => {
+                server.stop().await;
+                bail!("the store has failed; start again to read what is on the disk");
+            }
+        }
+        tracing::info!("stopping");
+        server.stop().await;
+        Ok(())
+    }
+}
+
+/// The first lines on stdout, for people and for programs that started this one on port 0.
+#[expect(clippy::print_stdout, reason = "the one result of this command")]
+fn ready(server: &crate::RunningServer) {
+    println!("http://{}/", server.http_addr);
+}
+
+#[cfg(unix)]
+async fn stop_signal() -> anyhow::Result<()> {
+    use tokio::signal::unix::{SignalKind, signal};
+    let mut terminate = signal(SignalKind::terminate()).context("SIGTERM")?;
+    tokio::select! {
+        pressed = tokio::signal::ctrl_c() => pressed.context("Ctrl-C"),
+        _ = terminate.recv() => Ok(()),
+    }
+}
+
+#[cfg(not(unix))]
+async fn stop_signal() -> anyhow::Result<()> {
+    tokio::signal::ctrl_c().await.context("Ctrl-C")
+}

@@ -1,0 +1,140 @@
+//! Errors as `application/problem+json` (RFC 9457): a stable `code`, the `field` at fault, a sentence. What a 5xx was
+//! caused by is logged, never sent.
+
+use crate::store::StoreError;
+use axum::{
+    http::{HeaderValue, StatusCode, header},
+    response::{IntoResponse, Response},
+};
+use serde::Serialize;
+use serde_json::Value;
+use utoipa::ToSchema;
+
+/// The media type of errors.
+pub(crate) const PROBLEM_JSON: &str = "application/problem+json";
+
+/// An error as sent.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub(crate) struct Problem {
+    /// `/problems/{code}`.
+    #[serde(rename = "type")]
+    pub(crate) kind: String,
+    /// The status in words.
+    pub(crate) title: String,
+    /// The HTTP status.
+    pub(crate) status: u16,
+    /// Stable name of the error, for programs.
+    pub(crate) code: &'static str,
+    /// The input at fault: a path into the JSON body, a part of the form, a parameter.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) field: Option<String>,
+    /// A sentence for a person.
+    pub(crate) detail: String,
+    /// More, by code: `quads` with `quad_not_found` and `quad_ambiguous`.
+    #[serde(flatten)]
+    pub(crate) more: serde_json::Map<String, Value>,
+}
+
+/// What a handler returns when it cannot do as asked.
+#[derive(Debug)]
+pub(crate) struct ApiError {
+    pub(crate) status: StatusCode,
+    pub(crate) code: &'static str,
+    field: Option<String>,
+    detail: String,
+    more: serde_json::Map<String, Value>,
+}
+
+impl ApiError {
+    pub(crate) fn new(status: StatusCode, code: &'static str, detail: impl Into<String>) -> Self {
+        Self { status, code, field: None, detail: detail.into(), more: serde_json::Map::new() }
+    }
+
+    /// 422: understood, but a value cannot be.
+    pub(crate) fn invalid(code: &'static str, field: impl Into<String>, detail: impl Into<String>) -> Self {
+        Self::new(StatusCode::UNPROCESSABLE_ENTITY, code, detail).field(field)
+    }
+
+    /// 404.
+    pub(crate) fn unknown(what: &'static str, name: &str) -> Self {
+        StoreError::NotFound { what, name: name.to_owned() }.into()
+    }
+
+    /// Names the input at fault.
+    pub(crate) fn field(mut self, field: impl Into<String>) -> Self {
+        self.field = Some(field.into());
+        self
+    }
+
+    /// Adds a member to the body.
+    pub(crate) fn with(mut self, name: &str, value: Value) -> Self {
+        self.more.insert(name.to_owned(), value);
+        self
+    }
+
+    /// 500, logged here with its cause.
+    pub(crate) fn internal(cause: &(dyn std::error::Error + 'static)) -> Self {
+        tracing::error!(error = cause, "request failed");
+        Self::new(
+            StatusCode::INTERNAL_SERVER_ERROR,
+            "internal",
+            "the server failed on this request; see its log",
+        )
+    }
+
+    fn problem(self) -> Problem {
+        Problem {
+            kind: format!("/problems/{}", self.code),
+            title: self.status.canonical_reason().unwrap_or("Error").to_owned(),
+            status: self.status.as_u16(),
+            code: self.code,
+            field: self.field,
+            detail: self.detail,
+            more: self.more,
+        }
+    }
+}
+
+impl IntoResponse for ApiError {
+    fn into_response(self) -> Response {
+        let status = self.status;
+        let body = serde_json::to_vec(&self.problem()).unwrap_or_default();
+        let mut response = (status, [(header::CONTENT_TYPE, PROBLEM_JSON)], body).into_response();
+        if status == StatusCode::SERVICE_UNAVAILABLE {
+            response.headers_mut().insert(header::RETRY_AFTER, HeaderValue::from_static("2"));
+        }
+        response
+    }
+}
+
+impl From<StoreError> for ApiError {
+    fn from(error: StoreError) -> Self {
+        let detail = error.to_string();
+        match error {
+            StoreError::NotFound { what, .. } => {
+                let (code, field) = match what {
+                    "map" => ("unknown_map", "map"),
+                    "landmark" => ("unknown_landmark", "landmark"),
+                    "view" => ("unknown_view", "view"),
+                    "robot" => ("unknown_robot", "robot"),
+                    "camera" => ("unknown_camera", "camera"),
+                    "job" => ("unknown_job", "job"),
+                    _ => ("not_found", "path"),
+                };
+                Self::new(StatusCode::NOT_FOUND, code, detail).field(field)
+            }
+            StoreError::Exists { .. } => Self::new(StatusCode::CONFLICT, "exists", detail).field("name"),
+            StoreError::Limit { .. } => Self::new(StatusCode::CONFLICT, "too_many", detail),
+            StoreError::InUse(_) => Self::new(StatusCode::CONFLICT, "in_use", detail),
+            StoreError::Full => Self::new(StatusCode::INSUFFICIENT_STORAGE, "storage_full", detail),
+            StoreError::Closed => Self::new(StatusCode::SERVICE_UNAVAILABLE, "storage_failed", detail),
+            StoreError::Damaged { .. } | StoreError::Database { .. } => Self::internal(&error),
+        }
+    }
+}
+
+impl From<protos::Rejection> for ApiError {
+    fn from(rejection: protos::Rejection) -> Self {
+        Self::invalid(rejection.code.as_str(), rejection.field, rejection.detail)
+    }
+}

@@ -1,0 +1,153 @@
+//! From bytes to checked values: JSON bodies within their bound, names in paths, pages in queries. Every failure is a
+//! problem with a code and a field.
+
+use super::{Shared, error::ApiError};
+use axum::{
+    extract::{FromRequest, FromRequestParts, Path, Query, Request},
+    http::{StatusCode, header, request::Parts},
+};
+use protos::Name;
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
+use utoipa::{IntoParams, ToSchema};
+
+/// A JSON body of at most `limits.json_bytes`.
+pub(super) struct Body<T>(pub(super) T);
+
+impl<T: DeserializeOwned> FromRequest<Shared> for Body<T> {
+    type Rejection = ApiError;
+
+    async fn from_request(request: Request, app: &Shared) -> Result<Self, ApiError> {
+        let kind =
+            request.headers().get(header::CONTENT_TYPE).and_then(|v| v.to_str().ok()).unwrap_or_default();
+        if kind.split(';').next().map(str::trim) != Some("application/json") {
+            let detail = "the body must be application/json";
+            return Err(
+                ApiError::new(StatusCode::UNSUPPORTED_MEDIA_TYPE, "not_json", detail).field("content-type")
+            );
+        }
+        let max = app.config.limits.json_bytes;
+        let bytes =
+            axum::body::to_bytes(request.into_body(), max).await.map_err(|_too_long| too_large(max))?;
+        json(&bytes, "").map(Self)
+    }
+}
+
+/// 413.
+pub(super) fn too_large(max: usize) -> ApiError {
+    let detail = format!("the body has more than {max} bytes");
+    ApiError::new(StatusCode::PAYLOAD_TOO_LARGE, "too_large", detail).field("body")
+}
+
+/// Reads JSON; what is wrong is named by its path, inside `outer` if that is not empty.
+pub(super) fn json<T: DeserializeOwned>(bytes: &[u8], outer: &str) -> Result<T, ApiError> {
+    let mut reader = serde_json::Deserializer::from_slice(bytes);
+    let value = serde_path_to_error::deserialize(&mut reader).map_err(|error| {
+        let path = error.path().to_string();
+        let path = if path == "." { String::new() } else { path };
+        let field = match (outer.is_empty(), path.is_empty()) {
+            (true, true) => "body".to_owned(),
+            (false, true) => outer.to_owned(),
+            (true, false) => path,
+            (false, false) => format!("{outer}.{path}"),
+        };
+        let inner = error.inner();
+        if inner.is_data() {
+            ApiError::invalid("bad_value", field, inner.to_string())
+        } else {
+            ApiError::new(StatusCode::BAD_REQUEST, "bad_json", inner.to_string()).field(field)
+        }
+    })?;
+    reader.end().map_err(|e| {
+        let field = if outer.is_empty() { "body" } else { outer };
+        ApiError::new(StatusCode::BAD_REQUEST, "bad_json", e.to_string()).field(field)
+    })?;
+    Ok(value)
+}
+
+/// Checks a name and says which field it is.
+pub(super) fn name(field: &'static str, text: String) -> Result<Name, ApiError> {
+    Name::new(text).map_err(|e| ApiError::invalid("bad_name", field, e.to_string()))
+}
+
+/// Path parameters. A path with wrong percent-encoding or a number that is none is a thing that does not exist.
+pub(super) struct At<T>(pub(super) T);
+
+impl<T: DeserializeOwned + Send> FromRequestParts<Shared> for At<T> {
+    type Rejection = ApiError;
+
+    async fn from_request_parts(parts: &mut Parts, app: &Shared) -> Result<Self, ApiError> {
+        let path = Path::<T>::from_request_parts(parts, app).await;
+        path.map(|Path(value)| Self(value))
+            .map_err(|e| ApiError::new(StatusCode::NOT_FOUND, "not_found", e.body_text()).field("path"))
+    }
+}
+
+/// Query parameters.
+pub(super) struct Params<T>(pub(super) T);
+
+impl<T: DeserializeOwned> FromRequestParts<Shared> for Params<T> {
+    type Rejection = ApiError;
+
+    async fn from_request_parts(parts: &mut Parts, app: &Shared) -> Result<Self, ApiError> {
+        let query = Query::<T>::from_request_parts(parts, app).await;
+        query
+            .map(|Query(value)| Self(value))
+            .map_err(|e| ApiError::new(StatusCode::BAD_REQUEST, "bad_query", e.body_text()).field("query"))
+    }
+}
+
+/// Which page of a list.
+#[derive(Debug, Clone, Default, Deserialize, IntoParams)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub(super) struct PageQuery {
+    /// Most items; 100 by default, bounded by `limits.page`.
+    pub(super) limit: Option<usize>,
+    /// The `next` of the page before; absent for the first page.
+    pub(super) after: Option<String>,
+}
+
+/// Items of a page that does not say how many it wants.
+const PAGE_DEFAULT: usize = 100;
+
+impl PageQuery {
+    /// Checked against the bound.
+    pub(super) fn limit(&self, max: usize) -> Result<usize, ApiError> {
+        match self.limit {
+            None => Ok(PAGE_DEFAULT.min(max)),
+            Some(limit) if (1..=max).contains(&limit) => Ok(limit),
+            Some(limit) => {
+                Err(ApiError::invalid("out_of_range", "limit", format!("{limit} is not in 1 to {max}")))
+            }
+        }
+    }
+
+    /// The cursor; empty comes before every name.
+    pub(super) fn after(&self) -> String {
+        self.after.clone().unwrap_or_default()
+    }
+}
+
+/// A page of a list.
+#[derive(Debug, Clone, Serialize, ToSchema)]
+pub(super) struct Page<T> {
+    /// The items, in order.
+    pub(super) items: Vec<T>,
+    /// Give this as `after` for the next page; null on the last.
+    pub(super) next: Option<String>,
+}
+
+impl<T> Page<T> {
+    /// From one row more than asked for, which only says that there is a next page.
+    pub(super) fn new<R>(
+        mut rows: Vec<R>,
+        limit: usize,
+        key: impl Fn(&R) -> String,
+        item: impl Fn(R) -> T,
+    ) -> Self {
+        let more = rows.len() > limit;
+        rows.truncate(limit);
+        let next = if more { rows.last().map(key) } else { None };
+        Self { items: rows.into_iter().map(item).collect(), next }
+    }
+}

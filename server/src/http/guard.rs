@@ -1,0 +1,138 @@
+//! Around every request: an id, a log line, a deadline, safe headers, and a refusal of what other web pages send.
+//!
+//! The server has no passwords yet and trusts whoever reaches its loopback port. A browser reaches it too, on behalf of
+//! any page it shows; so a request must name this server as its host and, if it changes anything, come from its own
+//! pages or from no page at all.
+
+use super::{Shared, error::ApiError};
+use axum::{
+    extract::{Request, State},
+    http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, header},
+    middleware::Next,
+    response::{IntoResponse, Response},
+};
+use std::{
+    net::IpAddr,
+    sync::atomic::{AtomicU64, Ordering},
+    time::{Duration, Instant},
+};
+
+/// Carries the id of a request, in and out.
+const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
+/// Longest id taken over from a client.
+const REQUEST_ID_MAX: usize = 64;
+/// The pages load only what this server serves; nothing may frame them.
+const CSP: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; \
+                   connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+/// The documentation page sets styles from its script.
+const CSP_DOCS: &str = "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; \
+                        img-src 'self' data:; connect-src 'self'; base-uri 'none'; form-action 'none'; \
+                        frame-ancestors 'none'";
+
+static NEXT_ID: AtomicU64 = AtomicU64::new(1);
+
+/// The middleware.
+pub(super) async fn guard(State(app): State<Shared>, request: Request, next: Next) -> Response {
+    let id = request_id(request.headers());
+    let (method, path) = (request.method().clone(), request.uri().path().to_owned());
+    let started = Instant::now();
+    let deadline = Duration::from_secs(app.config.limits.request_timeout_s);
+    let loopback = app.config.http_addr.ip().to_canonical().is_loopback();
+    let mut response = match check_origin(request.method(), request.headers(), loopback) {
+        Err(error) => error.into_response(),
+        Ok(()) => match tokio::time::timeout(deadline, next.run(request)).await {
+            Ok(response) => response,
+            Err(_elapsed) => {
+                let detail = format!("not done within {} s", deadline.as_secs());
+                ApiError::new(StatusCode::REQUEST_TIMEOUT, "timeout", detail).into_response()
+            }
+        },
+    };
+    let ms = started.elapsed().as_secs_f64() * 1e3;
+    tracing::debug!(id = ?id, %method, path, status = response.status().as_u16(), ms, "request");
+    let docs = path.starts_with("/api/docs");
+    let headers = response.headers_mut();
+    headers.insert(REQUEST_ID, id);
+    headers
+        .insert(header::CONTENT_SECURITY_POLICY, HeaderValue::from_static(if docs { CSP_DOCS } else { CSP }));
+    headers.insert(header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff"));
+    headers.insert(header::REFERRER_POLICY, HeaderValue::from_static("no-referrer"));
+    headers.insert("cross-origin-resource-policy", HeaderValue::from_static("same-origin"));
+    response
+}
+
+fn request_id(headers: &HeaderMap) -> HeaderValue {
+    let given = headers.get(REQUEST_ID).filter(|v| {
+        (1..=REQUEST_ID_MAX).contains(&v.len())
+            && v.as_bytes().iter().all(|b| b.is_ascii_alphanumeric() || *b == b'-')
+    });
+    given.cloned().unwrap_or_else(|| HeaderValue::from(NEXT_ID.fetch_add(1, Ordering::Relaxed)))
+}
+
+fn check_origin(method: &Method, headers: &HeaderMap, loopback: bool) -> Result<(), ApiError> {
+    let text = |name: HeaderName| headers.get(name).and_then(|v| v.to_str().ok());
+    let host = text(header::HOST).unwrap_or_default();
+    // A name that a stranger's DNS points at 127.0.0.1 must not make this server part of the stranger's site.
+    if loopback && !is_loopback_host(host) {
+        let detail = "this server listens on loopback and answers only to a loopback host";
+        return Err(ApiError::new(StatusCode::FORBIDDEN, "foreign_host", detail).field("host"));
+    }
+    if method.is_safe() {
+        return Ok(());
+    }
+    let own = |origin: &str| origin.split_once("://").is_some_and(|(_, rest)| rest == host);
+    if text(header::ORIGIN).is_some_and(|origin| !own(origin)) {
+        let detail = "changes are not accepted from the pages of another site";
+        return Err(ApiError::new(StatusCode::FORBIDDEN, "foreign_origin", detail).field("origin"));
+    }
+    Ok(())
+}
+
+fn is_loopback_host(host: &str) -> bool {
+    let name = match host.strip_prefix('[') {
+        Some(rest) => rest.split_once(']').map_or("", |(address, _)| address),
+        None => host.split(':').next().unwrap_or_default(),
+    };
+    name == "localhost" || name.parse::<IpAddr>().is_ok_and(|ip| ip.to_canonical().is_loopback())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn headers(pairs: &[(&'static str, &'static str)]) -> HeaderMap {
+        pairs.iter().map(|(k, v)| (HeaderName::from_static(k), HeaderValue::from_static(v))).collect()
+    }
+
+    #[test]
+    fn only_loopback_hosts_on_loopback() {
+        for (host, ok) in [
+            ("127.0.0.1:8080", true),
+            ("localhost", true),
+            ("[::1]:8080", true),
+            ("evil.example", false),
+            ("127.0.0.1.evil.example", false),
+            ("", false),
+        ] {
+            assert_eq!(check_origin(&Method::GET, &headers(&[("host", host)]), true).is_ok(), ok, "{host}");
+            assert!(check_origin(&Method::GET, &headers(&[("host", host)]), false).is_ok());
+        }
+    }
+
+    #[test]
+    fn other_sites_cannot_change_anything() {
+        let own = headers(&[("host", "localhost:8080"), ("origin", "http://localhost:8080")]);
+        let foreign = headers(&[("host", "localhost:8080"), ("origin", "https://evil.example")]);
+        assert!(check_origin(&Method::POST, &own, true).is_ok());
+        assert_eq!(check_origin(&Method::POST, &foreign, true).unwrap_err().code, "foreign_origin");
+        assert!(check_origin(&Method::GET, &foreign, true).is_ok());
+        let none = headers(&[("host", "localhost:8080")]);
+        assert!(check_origin(&Method::DELETE, &none, true).is_ok());
+    }
+
+    #[test]
+    fn ids_of_clients_are_taken_over_only_if_harmless() {
+        assert_eq!(request_id(&headers(&[("x-request-id", "abc-1")])), "abc-1");
+        assert_ne!(request_id(&headers(&[("x-request-id", "a b")])), "a b");
+    }
+}

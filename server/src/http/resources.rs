@@ -1,0 +1,215 @@
+//! The shapes of the API's resources, with their checks, and how rows become them.
+
+use super::error::ApiError;
+use crate::store::{
+    landmarks::{self, LandmarkRow, Measures},
+    load,
+    maps::MapRow,
+    robots::RobotRow,
+};
+use map::{
+    check::OutOfRange,
+    place::{LandmarkPlace, PlaceSigmas},
+};
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use utoipa::ToSchema;
+use vision::{localise::pose::LandmarkSize, recognise::DistanceKind};
+
+/// Which distance decides in a map.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum Distance {
+    /// Both must accept.
+    #[default]
+    Both,
+    /// Bucketed correlation.
+    Correlation,
+    /// Partial Hausdorff distance.
+    Hausdorff,
+}
+
+impl From<Distance> for DistanceKind {
+    fn from(distance: Distance) -> Self {
+        match distance {
+            Distance::Both => Self::Both,
+            Distance::Correlation => Self::Correlation,
+            Distance::Hausdorff => Self::Hausdorff,
+        }
+    }
+}
+
+impl From<DistanceKind> for Distance {
+    fn from(kind: DistanceKind) -> Self {
+        match kind {
+            DistanceKind::Both => Self::Both,
+            DistanceKind::Correlation => Self::Correlation,
+            DistanceKind::Hausdorff => Self::Hausdorff,
+        }
+    }
+}
+
+/// A map.
+#[derive(Debug, Clone, Serialize, ToSchema)]
+pub(super) struct Map {
+    /// Its name.
+    name: String,
+    /// Counts up with every change that an answer could depend on.
+    version: u64,
+    /// Landmarks in it, learnt or not.
+    landmarks: u64,
+    /// Which distance decides.
+    distance: Distance,
+}
+
+impl From<MapRow> for Map {
+    fn from(row: MapRow) -> Self {
+        Self { name: row.name, version: row.version, landmarks: row.landmarks, distance: row.distance.into() }
+    }
+}
+
+/// Width and height of a landmark.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Size {
+    /// 0.01 to 100.
+    width_m: f64,
+    /// 0.01 to 100.
+    height_m: f64,
+}
+
+/// Where a landmark hangs, in the map.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Place {
+    /// Centre.
+    x_m: f64,
+    /// Centre.
+    y_m: f64,
+    /// Centre, above the floor.
+    z_m: f64,
+    /// Direction of the outward normal on the floor, counter-clockwise from map x.
+    theta_rad: f64,
+}
+
+/// Size and place, checked. Either may be missing.
+pub(super) fn measures(size: Option<Size>, place: Option<Place>) -> Result<Measures, ApiError> {
+    let size = size.map(|s| LandmarkSize { width_m: s.width_m, height_m: s.height_m });
+    // A place is checked with some size, a size at some place: each has its own ranges.
+    let stand_in = LandmarkSize { width_m: 1.0, height_m: 1.0 };
+    let centre = place.map_or(Vector3::zeros(), |p| Vector3::new(p.x_m, p.y_m, p.z_m));
+    let theta_rad = place.map_or(0.0, |p| p.theta_rad);
+    LandmarkPlace::by_hand(centre, theta_rad, size.unwrap_or(stand_in), PlaceSigmas::default()).map_err(
+        |e| {
+            let outer = if matches!(e.field, "width_m" | "height_m") { "size" } else { "place" };
+            out_of_range(&e, outer)
+        },
+    )?;
+    let place =
+        place.map(|p| landmarks::Place { x_m: p.x_m, y_m: p.y_m, z_m: p.z_m, theta_rad: p.theta_rad });
+    Ok(Measures { size, place })
+}
+
+/// 422 for a number outside its range.
+pub(super) fn out_of_range(error: &OutOfRange, outer: &str) -> ApiError {
+    let code = if error.value.is_finite() { "out_of_range" } else { "not_finite" };
+    ApiError::invalid(code, format!("{outer}.{}", error.field), error.to_string())
+}
+
+/// Checks the ends of a wall.
+pub(super) fn wall(index: usize, a: [f64; 2], b: [f64; 2]) -> Result<[f64; 4], ApiError> {
+    let ends = [a[0], a[1], b[0], b[1]];
+    load::wall(&ends).map(|_| ends).map_err(|e| out_of_range(&e, &format!("segments[{index}]")))
+}
+
+/// How far a landmark has come.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum Status {
+    /// Not learnt yet.
+    Empty,
+    /// A job is learning it.
+    Learning,
+    /// Learnt and matched.
+    Active,
+    /// Learnt, but not matched: see `reasons`.
+    Candidate,
+}
+
+/// What was learnt of a landmark, in brief.
+#[derive(Debug, Clone, Serialize, ToSchema)]
+pub(super) struct Model {
+    /// Real views it rests on.
+    views: u64,
+    /// Views generated from the real ones.
+    generated_views: u64,
+    /// ms since the Unix epoch.
+    learnt_ms: i64,
+    /// Thresholds and figures of the learning.
+    #[serde(flatten)]
+    facts: serde_json::Map<String, Value>,
+}
+
+/// A landmark.
+#[derive(Debug, Clone, Serialize, ToSchema)]
+pub(super) struct Landmark {
+    /// Its name, unique in the map.
+    name: String,
+    /// How far it has come.
+    status: Status,
+    /// Why it is a candidate only.
+    reasons: Vec<Value>,
+    /// Real views stored.
+    views: u64,
+    /// Width and height, if measured.
+    size: Option<Size>,
+    /// Where it hangs, if known.
+    place: Option<Place>,
+    /// What was learnt.
+    model: Option<Model>,
+}
+
+impl Landmark {
+    /// `learning`: whether a job has it in work.
+    pub(super) fn new(row: LandmarkRow, learning: bool) -> Self {
+        let status = match (&row.model, learning) {
+            (_, true) => Status::Learning,
+            (None, _) => Status::Empty,
+            (Some(model), _) if model.active => Status::Active,
+            _ => Status::Candidate,
+        };
+        let reasons = row.model.as_ref().map(|m| serde_json::from_str(&m.reasons).unwrap_or_default());
+        let model = row.model.map(|m| Model {
+            views: m.views,
+            generated_views: m.generated_views,
+            learnt_ms: m.learnt_ms,
+            facts: serde_json::from_str(&m.facts).unwrap_or_default(),
+        });
+        let Measures { size, place } = row.measures;
+        Self {
+            name: row.name,
+            status,
+            reasons: reasons.unwrap_or_default(),
+            views: row.views,
+            size: size.map(|s| Size { width_m: s.width_m, height_m: s.height_m }),
+            place: place.map(|p| Place { x_m: p.x_m, y_m: p.y_m, z_m: p.z_m, theta_rad: p.theta_rad }),
+            model,
+        }
+    }
+}
+
+/// A robot.
+#[derive(Debug, Clone, Serialize, ToSchema)]
+pub(super) struct Robot {
+    /// Its name.
+    pub(super) name: String,
+    /// The map it stands on.
+    pub(super) map: String,
+}
+
+impl From<RobotRow> for Robot {
+    fn from(row: RobotRow) -> Self {
+        Self { name: row.name, map: row.map }
+    }
+}

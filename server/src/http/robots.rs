@@ -1,0 +1,69 @@
+//! `/robots`: which robots there are and on which map each stands.
+
+use super::{
+    Shared,
+    error::{ApiError, Problem},
+    extract::{At, Body, Page, PageQuery, Params, name},
+    resources::Robot,
+};
+use crate::store::robots;
+use axum::{Json, extract::State, http::StatusCode};
+use serde::Deserialize;
+use utoipa::ToSchema;
+use utoipa_axum::{router::OpenApiRouter, routes};
+
+pub(super) fn router() -> OpenApiRouter<Shared> {
+    OpenApiRouter::new().routes(routes!(list)).routes(routes!(put, get, delete))
+}
+
+/// Where a robot stands.
+#[derive(Debug, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+struct Assignment {
+    /// Name of the map.
+    map: String,
+}
+
+/// Registers a robot, or moves it to another map.
+#[utoipa::path(put, path = "/robots/{robot}", tag = "robots", params(("robot" = String, Path)),
+    request_body = Assignment, responses((status = 200, body = Robot),
+    (status = 404, body = Problem, description = "unknown_map"), (status = 409, body = Problem),
+    (status = 422, body = Problem, description = "bad_name")))]
+async fn put(
+    State(app): State<Shared>,
+    At(robot): At<String>,
+    Body(to): Body<Assignment>,
+) -> Result<Json<Robot>, ApiError> {
+    let (robot, max) = (name("robot", robot)?, app.config.limits.robots);
+    let write = app
+        .store
+        .write(move |tx| Box::pin(async move { robots::put(tx, robot.as_str(), &to.map, max).await }));
+    Ok(Json(write.await?.into()))
+}
+
+/// Lists robots by name.
+#[utoipa::path(get, path = "/robots", tag = "robots", params(PageQuery),
+    responses((status = 200, body = Page<Robot>)))]
+async fn list(
+    State(app): State<Shared>,
+    Params(page): Params<PageQuery>,
+) -> Result<Json<Page<Robot>>, ApiError> {
+    let limit = page.limit(app.config.limits.page)?;
+    let rows = robots::page(app.store.reads(), &page.after(), limit + 1).await?;
+    Ok(Json(Page::new(rows, limit, |r| r.name.clone(), Robot::from)))
+}
+
+/// One robot.
+#[utoipa::path(get, path = "/robots/{robot}", tag = "robots", params(("robot" = String, Path)),
+    responses((status = 200, body = Robot), (status = 404, body = Problem)))]
+async fn get(State(app): State<Shared>, At(robot): At<String>) -> Result<Json<Robot>, ApiError> {
+    Ok(Json(robots::get(app.store.reads(), &robot).await?.into()))
+}
+
+/// Forgets a robot; its frames are rejected from now on.
+#[utoipa::path(delete, path = "/robots/{robot}", tag = "robots", params(("robot" = String, Path)),
+    responses((status = 204), (status = 404, body = Problem)))]
+async fn delete(State(app): State<Shared>, At(robot): At<String>) -> Result<StatusCode, ApiError> {
+    app.store.write(move |tx| Box::pin(async move { robots::delete(tx, &robot).await })).await?;
+    Ok(StatusCode::NO_CONTENT)
+}

@@ -1,0 +1,78 @@
+//! Every route, with the layers around them and the OpenAPI document made from them.
+
+use super::{App, Shared, error::ApiError, guard, health, landmarks, laser, maps, pages, robots};
+use axum::{
+    Json, Router,
+    http::StatusCode,
+    middleware::from_fn_with_state,
+    response::{IntoResponse, Response},
+    routing::get,
+};
+use std::{any::Any, sync::Arc};
+use tower_http::catch_panic::CatchPanicLayer;
+use utoipa::{OpenApi, openapi};
+use utoipa_axum::router::OpenApiRouter;
+use utoipa_swagger_ui::SwaggerUi;
+
+/// Where the API lives.
+const API: &str = "/api/v1";
+
+#[derive(OpenApi)]
+#[openapi(info(
+    title = "Waymark",
+    description = "Maps, landmarks, lessons and robots. Errors are application/problem+json with a stable `code` and \
+                   the `field` at fault; lists come in pages."
+))]
+struct Document;
+
+fn api() -> OpenApiRouter<Shared> {
+    OpenApiRouter::new()
+        .merge(maps::router())
+        .merge(laser::router())
+        .merge(landmarks::router())
+        .merge(robots::router())
+        .merge(health::router())
+}
+
+/// Routes and their OpenAPI document.
+fn parts() -> (Router<Shared>, openapi::OpenApi) {
+    OpenApiRouter::with_openapi(Document::openapi()).nest(API, api()).split_for_parts()
+}
+
+/// The whole service.
+pub(crate) fn router(app: App) -> Router {
+    let app = Arc::new(app);
+    let (routes, document) = parts();
+    let (health, _) = health::router().split_for_parts();
+    let config = utoipa_swagger_ui::Config::from(format!("{API}/openapi.json"));
+    let docs: Router<Shared> = SwaggerUi::new("/api/docs").config(config).into();
+    routes
+        .route(&format!("{API}/openapi.json"), get(move || async move { Json(document) }))
+        .merge(health)
+        .merge(pages::router())
+        .merge(docs)
+        .fallback(not_found)
+        .method_not_allowed_fallback(wrong_method)
+        .layer(CatchPanicLayer::custom(panicked))
+        .layer(from_fn_with_state(app.clone(), guard::guard))
+        .with_state(app)
+}
+
+async fn not_found() -> ApiError {
+    ApiError::new(StatusCode::NOT_FOUND, "not_found", "there is nothing at this path").field("path")
+}
+
+async fn wrong_method() -> ApiError {
+    ApiError::new(StatusCode::METHOD_NOT_ALLOWED, "wrong_method", "this path does not take this method")
+        .field("method")
+}
+
+fn panicked(_cause: Box<dyn Any + Send>) -> Response {
+    tracing::error!("a handler panicked");
+    ApiError::new(
+        StatusCode::INTERNAL_SERVER_ERROR,
+        "internal",
+        "the server failed on this request; see its log",
+    )
+    .into_response()
+}

@@ -1,0 +1,92 @@
+//! Starts everything in order and stops it in the opposite order: store, jobs, engine, bus, HTTP.
+
+use crate::{
+    config::Config,
+    engine::snapshot::Snapshots,
+    http::{self, App},
+    store::{OpenError, Store, WriterTask},
+};
+use std::{net::SocketAddr, sync::Arc};
+use tokio::{net::TcpListener, sync::watch, task::JoinHandle};
+
+/// Why the server did not start.
+#[derive(Debug, thiserror::Error)]
+pub enum StartError {
+    /// The database does not open.
+    #[error("{0}")]
+    Store(String),
+    /// The address cannot be listened on.
+    #[error("cannot listen on {addr}: {source}")]
+    Http {
+        /// The address asked for.
+        addr: SocketAddr,
+        /// What the system says.
+        source: std::io::Error,
+    },
+}
+
+impl From<OpenError> for StartError {
+    fn from(error: OpenError) -> Self {
+        let mut text = error.to_string();
+        let mut cause = std::error::Error::source(&error);
+        while let Some(error) = cause {
+            text = format!("{text}: {error}");
+            cause = error.source();
+        }
+        Self::Store(text)
+    }
+}
+
+/// Starts servers.
+#[derive(Debug)]
+pub struct Server;
+
+/// A server at work. Dropping it leaves it running; call [`RunningServer::stop`].
+#[derive(Debug)]
+pub struct RunningServer {
+    /// Where HTTP listens, with the real port.
+    pub http_addr: SocketAddr,
+    /// Maps and robots as the workers see them.
+    pub snapshots: Arc<Snapshots>,
+    stop: watch::Sender<bool>,
+    store_failed: watch::Receiver<bool>,
+    http: JoinHandle<()>,
+    writer: WriterTask,
+}
+
+impl Server {
+    /// Starts a server. When this returns, it answers.
+    pub async fn start(config: Config) -> Result<RunningServer, StartError> {
+        let config = Arc::new(config);
+        let (store, writer) = Store::open(&config).await?;
+        let at = |source| StartError::Http { addr: config.http_addr, source };
+        let listener = TcpListener::bind(config.http_addr).await.map_err(at)?;
+        let http_addr = listener.local_addr().map_err(at)?;
+        let (stop, stopping) = watch::channel(false);
+        let (snapshots, store_failed) = (store.snapshots().clone(), store.failed());
+        let app = App { config: config.clone(), store, stopping: stopping.clone() };
+        let http =
+            tokio::spawn(http::listen::serve(listener, http::router(app), config.limits.clone(), stopping));
+        Ok(RunningServer { http_addr, snapshots, stop, store_failed, http, writer })
+    }
+}
+
+impl RunningServer {
+    /// Returns when the store has failed and nothing can be written any more: stop, and start again from disk.
+    pub async fn failed(&self) {
+        let mut failed = self.store_failed.clone();
+        if failed.wait_for(|failed| *failed).await.is_err() {
+            // The writer is gone without having said that it failed: it is being stopped.
+            std::future::pending::<()>().await;
+        }
+    }
+
+    /// Answers what is in work, then closes everything.
+    pub async fn stop(self) {
+        self.stop.send_replace(true);
+        if let Err(error) = self.http.await {
+            tracing::error!(%error, "the HTTP task panicked");
+        }
+        self.writer.finished().await;
+    }
+}
