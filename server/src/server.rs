@@ -87,6 +87,6 @@ impl RunningServer {
         if let Err(error) = self.http.await {
             tracing::error!(%error, "the HTTP task panicked");
         }
-        self.writer.finished().await;
+        self.writer.close().await;
     }
 }

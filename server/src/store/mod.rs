@@ -23,9 +23,9 @@ use crate::{config::Config, engine::snapshot::Snapshots};
 use futures::future::BoxFuture;
 use sqlx::SqlitePool;
 use std::{sync::Arc, time::SystemTime};
-use tokio::sync::{mpsc, watch};
+use tokio::sync::{mpsc, oneshot, watch};
 
-/// The open store. Cheap to clone; the file closes when the last clone is gone and the writer has finished.
+/// The open store. Cheap to clone.
 #[derive(Debug, Clone)]
 pub(crate) struct Store {
     commands: mpsc::Sender<writer::Command>,
@@ -38,13 +38,19 @@ pub(crate) struct Store {
 #[derive(Debug)]
 pub(crate) struct WriterTask {
     task: tokio::task::JoinHandle<()>,
+    close: oneshot::Sender<()>,
+    reads: SqlitePool,
     /// Held for as long as the writer runs: a second server on the same directory would be a second writer.
     _lock: std::fs::File,
 }
 
 impl WriterTask {
-    /// Waits until everything is written, after every [`Store`] is gone.
-    pub(crate) async fn finished(self) {
+    /// Takes no more writes, finishes those that wait, and leaves one complete file behind.
+    pub(crate) async fn close(self) {
+        // The last connection to close empties the write-ahead log; that must be the one that may write.
+        self.reads.close().await;
+        // It fails if the writer has ended already.
+        drop(self.close.send(()));
         if let Err(error) = self.task.await {
             tracing::error!(%error, "the writer panicked");
         }
@@ -62,7 +68,9 @@ impl Store {
         let (commands, received) = mpsc::channel(config.limits.write_queue);
         let (failed, failure) = watch::channel(false);
         let writer = writer::Writer::new(conn, received, snapshots.clone(), config.params.clone(), failed);
-        let task = WriterTask { task: tokio::spawn(writer.run()), _lock: opened.lock };
+        let (close, closed) = oneshot::channel();
+        let task = tokio::spawn(writer.run(closed));
+        let task = WriterTask { task, close, reads: opened.reads.clone(), _lock: opened.lock };
         Ok((Self { commands, reads: opened.reads, snapshots, failed: failure }, task))
     }
 

@@ -38,8 +38,12 @@ async fn what_is_acknowledged_is_published_and_survives() {
     let snapshot = store.snapshots().get("a").unwrap();
     assert_eq!((snapshot.version, snapshot.landmarks.len(), snapshot.walls.len()), (3, 1, 1));
     assert!(snapshot.landmarks[&vision::recognise::LandmarkId(made.id as u64)].place.is_some());
-    drop(store);
-    task.finished().await;
+    task.close().await;
+    assert!(matches!(
+        store.write(|tx| Box::pin(maps::create(tx, "late", DistanceKind::Both, 2))).await,
+        Err(StoreError::Closed)
+    ));
+    assert!(!dir.path().join("waymark.sqlite-wal").exists());
 
     let (store, _task) = Store::open(&config).await.unwrap();
     assert_eq!(store.snapshots().get("a").unwrap().version, 3);

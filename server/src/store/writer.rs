@@ -96,9 +96,20 @@ impl Writer {
         Self { tx: Tx { conn, changes: Vec::new() }, commands, snapshots, params, failed }
     }
 
-    /// Runs until every sender is gone, or until an error after which nothing may be written.
-    pub(super) async fn run(mut self) {
-        while let Some(command) = self.commands.recv().await {
+    /// Runs until told to close and what is queued is done, or until an error after which nothing may be written.
+    pub(super) async fn run(mut self, mut close: oneshot::Receiver<()>) {
+        let mut open = true;
+        loop {
+            let command = tokio::select! {
+                biased;
+                _ = &mut close, if open => {
+                    open = false;
+                    self.commands.close();
+                    continue;
+                }
+                command = self.commands.recv() => command,
+            };
+            let Some(command) = command else { break };
             if let Err(error) = self.one(command).await {
                 tracing::error!(
                     error = &error as &dyn std::error::Error,
