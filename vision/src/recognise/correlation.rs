@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 /// Most buckets along a side, whatever the parameters say.
 pub const MAX_BUCKETS_PER_SIDE: usize = 10;
 /// Bucket lengths are padded with zeros to a multiple of this, for vector units.
-const LANES: usize = 8;
+const LANES: usize = 16;
 
 /// Parameters of this stage.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -126,6 +126,27 @@ pub(crate) fn ranked(correlations: &mut [f32], rank: usize) -> f64 {
     let index = rank.clamp(1, correlations.len()) - 1;
     let (_, kth, _) = correlations.select_nth_unstable_by(index, |x, y| y.total_cmp(x));
     (1.0 - f64::from(*kth)).clamp(0.0, 2.0)
+}
+
+/// C^r when it is at most `limit`, else `None`; `None` also for icons cut differently. Counts buckets instead of
+/// ranking them, and gives up as soon as the rest cannot reach the rank: unrelated icons cost half the dot products.
+pub(crate) fn correlation_within(a: &Buckets, b: &Buckets, rank: usize, limit: f64) -> Option<f64> {
+    if a.per_side != b.per_side || a.stride != b.stride {
+        return None;
+    }
+    // Rounding of the limit must not lose a distance equal to it.
+    let floor = (1.0 - limit) as f32 - 1e-6;
+    let total = a.per_side * a.per_side;
+    let mut all = [0.0; MAX_BUCKETS_PER_SIDE * MAX_BUCKETS_PER_SIDE];
+    let mut reached = 0;
+    for (i, (x, y)) in a.values.chunks_exact(a.stride).zip(b.values.chunks_exact(b.stride)).enumerate() {
+        all[i] = dot(x, y);
+        reached += usize::from(all[i] >= floor);
+        if reached + total - 1 - i < rank {
+            return None;
+        }
+    }
+    Some(ranked(&mut all[..total], rank)).filter(|d| *d <= limit)
 }
 
 /// C^r of two icons, in [0, 2]: 0 for the same picture under any gain and offset. Icons cut differently are as

@@ -123,6 +123,12 @@ fn sub_pixel(response: &[f32], size: usize, column: usize, row: usize) -> (f32, 
     (dx.clamp(-0.5, 0.5) as f32, dy.clamp(-0.5, 0.5) as f32)
 }
 
+/// A square picture of side `size`, smoothed by a Gaussian, border replicated.
+pub(crate) fn blurred(pixels: &[f32], size: usize, sigma: f64) -> Vec<f32> {
+    let kernel = gaussian(sigma);
+    columns(&rows(pixels, size, &kernel), size, &kernel)
+}
+
 /// Half length of a kernel: four sigma.
 fn radius(sigma: f64) -> usize {
     // A NaN or negative sigma casts to 0: no filtering.

@@ -4,12 +4,18 @@ pub mod harris;
 pub mod descriptor;
 pub mod correlation;
 pub mod hausdorff;
+pub mod models;
+pub mod align;
+pub mod compare;
+pub mod confidence;
 pub mod verdict;
 
 use crate::{icon::Icon, params::RecogniseParams};
 use correlation::Buckets;
 use descriptor::PointSet;
 use serde::{Deserialize, Serialize};
+
+pub use models::{ModelSet, ModelSetError};
 
 /// An icon with everything that both distances need, worked out once. Depends on icon, points, descriptor and bucket
 /// parameters only; never stored, since it follows from the icon.

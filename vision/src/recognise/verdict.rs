@@ -1,6 +1,202 @@
-//! Distances in, verdict out (method 10).
+//! A quad and the landmarks of a map in, the verdict out (method 10). Nearest landmarks first; those within reach are
+//! verified by laying the quad's picture on the learnt icon; then thresholds, margin, probabilities and confidence.
+//! "Unknown" whenever in doubt.
 
-/// Parameters of this stage.
-#[derive(Debug, Clone, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+use super::{
+    Candidate, DistanceKind, IconFeatures, MAX_CANDIDATES, Recognition, Refusal, Verdict,
+    align::{AlignParams, Surroundings},
+    compare::{Near, Sighting, least_hausdorff, nearest, sightings},
+    confidence::{confidence, entropy_m, entropy_norm, probability},
+    correlation::correlation,
+    features,
+    models::ModelSet,
+};
+use crate::{detect::quads::Quad, frame::GrayImage, icon::rectify, params::Params};
+use serde::{Deserialize, Serialize};
+
+/// Parameters of the decision.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct VerdictParams {}
+pub struct VerdictParams {
+    /// The nearest landmark is the answer only while its ratio is below this share of the runner-up's (method 10:
+    /// 0.7).
+    pub margin: f64,
+    /// Candidates below this ratio are verified by alignment; 0 turns verification off.
+    pub verify_reach: f64,
+    /// After alignment a distance is accepted below this share of tau: the corners were moved to please the landmark.
+    pub verified_share: f64,
+    /// Landmarks that are verified at most.
+    pub max_verified: usize,
+    /// How corners are moved.
+    pub align: AlignParams,
+}
+
+impl Default for VerdictParams {
+    fn default() -> Self {
+        Self {
+            margin: 0.7,
+            verify_reach: 1.5,
+            verified_share: 0.8,
+            max_verified: 4,
+            align: AlignParams::default(),
+        }
+    }
+}
+
+/// Recognises what `quad` encloses. Models learnt under other parameters than `p` never match.
+pub fn recognise(
+    image: &GrayImage,
+    quad: &Quad,
+    models: &ModelSet,
+    kind: DistanceKind,
+    p: &Params,
+) -> Verdict {
+    if models.is_empty() || models.params_hash() != p.distance_hash() {
+        return unknown(models.len());
+    }
+    let sightings = sightings(image, quad, p);
+    let mut found: Vec<Judged> = nearest(&sightings, models, kind, MAX_CANDIDATES, p)
+        .into_iter()
+        .map(|near| Judged { near, moved: false })
+        .collect();
+    verify(image, &sightings, &mut found, kind, p);
+    decide(&found, &sightings, kind, models.len(), &p.recognise.verdict)
+}
+
+/// No landmark, no candidate.
+fn unknown(landmarks: usize) -> Verdict {
+    Verdict {
+        recognition: Recognition::Unknown,
+        candidates: Vec::new(),
+        entropy_m: 1.0,
+        entropy_norm: 1.0,
+        confidence: 0.0,
+        rotation: 0,
+        border: 0,
+        landmarks,
+    }
+}
+
+/// A near landmark, with or without alignment.
+struct Judged {
+    near: Near,
+    /// The distances are those after alignment.
+    moved: bool,
+}
+
+impl Judged {
+    /// The first gate that refuses it.
+    fn refusal(&self, kind: DistanceKind, p: &VerdictParams) -> Option<Refusal> {
+        let limit = if self.moved { p.verified_share } else { 1.0 };
+        let correlation = kind != DistanceKind::Hausdorff;
+        let hausdorff = kind != DistanceKind::Correlation;
+        // Written so that a NaN refuses.
+        let below = |ratio: f64| ratio < limit;
+        if correlation && !below(self.near.correlation_ratio()) {
+            Some(Refusal::Correlation)
+        } else if hausdorff && !below(self.near.hausdorff_ratio()) {
+            Some(Refusal::Hausdorff)
+        } else {
+            None
+        }
+    }
+}
+
+/// Lays the quad's picture on each candidate within reach, nearest first, and keeps what the better fit says.
+fn verify(image: &GrayImage, sightings: &[Sighting], found: &mut [Judged], kind: DistanceKind, p: &Params) {
+    let v = &p.recognise.verdict;
+    let mut surroundings: Vec<Option<Option<Surroundings>>> = vec![None; sightings.len()];
+    for judged in found.iter_mut().filter(|j| j.near.ratio(kind) < v.verify_reach).take(v.max_verified) {
+        let i = judged.near.sighting;
+        let around = surroundings[i]
+            .get_or_insert_with(|| Surroundings::new(image, &sightings[i].corners_px, &p.icon, &v.align));
+        let Some(icon) = around.as_ref().and_then(|s| laid_on(image, s, &judged.near, p)) else { continue };
+        let d = |i: usize| correlation(&icon, &judged.near.model.exemplars[i], &p.recognise.correlation);
+        let correlation = (0..judged.near.model.exemplars.len()).map(d).fold(2.0, f64::min);
+        if correlation < judged.near.correlation {
+            judged.near.correlation = correlation;
+            judged.near.hausdorff = least_hausdorff(&icon, &judged.near.model, p).0;
+            judged.moved = true;
+        }
+    }
+    found.sort_by(|a, b| a.near.ratio(kind).total_cmp(&b.near.ratio(kind)));
+}
+
+/// The quad's picture after its corners were moved to fit the nearest exemplar.
+fn laid_on(image: &GrayImage, around: &Surroundings, near: &Near, p: &Params) -> Option<IconFeatures> {
+    let r = &p.recognise;
+    let exemplar = near.model.exemplars.get(near.exemplar)?;
+    let corners = around.align(&exemplar.icon, &r.correlation, &r.verdict.align)?;
+    let icon = rectify(image, &corners, &p.icon).ok()?;
+    Some(features(icon, r))
+}
+
+/// Thresholds, margin, probabilities: the paper's three cases.
+fn decide(
+    found: &[Judged],
+    sightings: &[Sighting],
+    kind: DistanceKind,
+    landmarks: usize,
+    p: &VerdictParams,
+) -> Verdict {
+    let refusals: Vec<Option<Refusal>> = found.iter().map(|j| j.refusal(kind, p)).collect();
+    let accepted = refusals.iter().filter(|r| r.is_none()).count();
+    let mut verdict = unknown(landmarks);
+    verdict.entropy_m = entropy_m(accepted, landmarks);
+    verdict.entropy_norm = entropy_norm(accepted, landmarks);
+    verdict.candidates = found
+        .iter()
+        .zip(&refusals)
+        .take(MAX_CANDIDATES)
+        .map(|(j, refusal)| candidate(&j.near, *refusal, accepted, kind))
+        .collect();
+    let Some(best) = refusals.iter().position(Option::is_none) else { return verdict };
+    let near = &found[best].near;
+    (verdict.rotation, verdict.border) = (sightings[near.sighting].rotation, sightings[near.sighting].border);
+    let margin = margin(found, best, kind);
+    if margin < p.margin {
+        verdict.recognition = Recognition::Unique(near.model.id);
+        verdict.confidence = confidence(near.ratio(kind), margin);
+    } else {
+        verdict.recognition = Recognition::Ambiguous(near.model.id);
+        if let Some(c) = verdict.candidates.get_mut(best) {
+            c.refusal = Some(Refusal::Margin);
+        }
+    }
+    verdict
+}
+
+/// The ratio of `best` over that of the nearest other landmark; with both distances, by the one that separates
+/// better. 0 when there is no other landmark, 1 when the others have no distance to compare with.
+fn margin(found: &[Judged], best: usize, kind: DistanceKind) -> f64 {
+    if found.len() < 2 {
+        return 0.0;
+    }
+    let over = |ratio: &dyn Fn(&Near) -> f64| {
+        let others = found.iter().enumerate().filter(|(i, _)| *i != best);
+        let runner_up = others.map(|(_, j)| ratio(&j.near)).fold(f64::INFINITY, f64::min);
+        if runner_up.is_finite() { ratio(&found[best].near) / runner_up } else { 1.0 }
+    };
+    match kind {
+        DistanceKind::Correlation => over(&Near::correlation_ratio),
+        DistanceKind::Hausdorff => over(&Near::hausdorff_ratio),
+        DistanceKind::Both => over(&Near::correlation_ratio).min(over(&Near::hausdorff_ratio)),
+    }
+}
+
+fn candidate(near: &Near, refusal: Option<Refusal>, accepted: usize, kind: DistanceKind) -> Candidate {
+    let (distance, tau) = match kind {
+        DistanceKind::Hausdorff => (near.hausdorff, near.model.hausdorff.tau),
+        DistanceKind::Correlation | DistanceKind::Both => (near.correlation, near.model.correlation.tau),
+    };
+    Candidate {
+        landmark: near.model.id,
+        correlation: near.correlation,
+        hausdorff: near.hausdorff,
+        distance,
+        tau,
+        ratio: near.ratio(kind),
+        probability: probability(refusal.is_none(), accepted),
+        refusal,
+    }
+}

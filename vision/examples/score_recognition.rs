@@ -1,0 +1,198 @@
+//! Scores recognition on real photographs with the true corners: `score_recognition DIR [ICON_SIZE]`, where DIR holds
+//! a `truth.json` in the evaluation format. Every landmark is taught from its one photograph and views generated from
+//! it. Each quad is looked for among all landmarks; then, as a stranger, among the half that does not hold it.
+#![expect(clippy::print_stdout, reason = "a program that prints a table")]
+
+use nalgebra::{Matrix2, Point2};
+use serde_json::Value;
+use std::{collections::BTreeMap, error::Error, path::Path, sync::Arc};
+use vision::{
+    detect::quads::{Corners, Quad, QuadKind},
+    frame::GrayImage,
+    learn::{
+        model::{LandmarkModel, View, learn, refit_thresholds},
+        synthesis::views,
+    },
+    params::Params,
+    recognise::{
+        DistanceKind, IconFeatures, LandmarkId, ModelSet, Recognition, features, verdict::recognise,
+    },
+};
+
+/// Views generated from each photograph.
+const GENERATED: usize = 40;
+
+/// A labelled quad of one photograph.
+struct Query {
+    file: String,
+    image: Arc<GrayImage>,
+    quad: Quad,
+    landmark: Option<u64>,
+}
+
+struct Taught {
+    model: LandmarkModel,
+    photograph: IconFeatures,
+}
+
+#[derive(Default)]
+struct Score {
+    right: usize,
+    wrong: usize,
+    missed: usize,
+    ambiguous: usize,
+    refused: usize,
+    accepted: usize,
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let arguments: Vec<String> = std::env::args().collect();
+    let root = Path::new(arguments.get(1).ok_or("usage: score_recognition DIR [ICON_SIZE]")?);
+    let mut p = Params::default();
+    if let Some(size) = arguments.get(2) {
+        p.icon.size = size.parse()?;
+    }
+    let verbose = arguments.get(3).is_some();
+    let truth: Value = serde_json::from_str(&std::fs::read_to_string(root.join("truth.json"))?)?;
+    let taught = teach(root, &truth, &p)?;
+    let queries = queries(root, &truth)?;
+    let same = same(&truth);
+    println!("{} landmarks, {} quads, icon size {}", taught.len(), queries.len(), p.icon.size);
+    let everything = model_set(&taught, |_| true, &p)?;
+    let halves = [model_set(&taught, |id| id % 2 == 0, &p)?, model_set(&taught, |id| id % 2 == 1, &p)?];
+    for kind in [DistanceKind::Correlation, DistanceKind::Hausdorff, DistanceKind::Both] {
+        let mut score = Score::default();
+        let start = std::time::Instant::now();
+        for q in &queries {
+            let v = recognise(&q.image, &q.quad, &everything, kind, &p);
+            let is = |id: LandmarkId| q.landmark.is_some_and(|l| same(l) == same(id.0));
+            let word = match (q.landmark, v.recognition) {
+                (Some(_), Recognition::Unique(id)) if is(id) => (&mut score.right, "right"),
+                (Some(_), Recognition::Unique(_)) => (&mut score.wrong, "WRONG"),
+                (Some(_), Recognition::Ambiguous(_)) => (&mut score.ambiguous, "ambiguous"),
+                (Some(_), Recognition::Unknown) => (&mut score.missed, "missed"),
+                (None, Recognition::Unique(_)) => (&mut score.accepted, "ACCEPTED"),
+                (None, _) => (&mut score.refused, "refused"),
+            };
+            *word.0 += 1;
+            if verbose {
+                print!("{kind:?} {} {:?} {} conf {:.2}", q.file, q.landmark, word.1, v.confidence);
+                for c in v.candidates.iter().take(3) {
+                    print!(
+                        " | {} C {:.3} H {:.2} r {:.2} {:?}",
+                        c.landmark.0, c.correlation, c.hausdorff, c.ratio, c.refusal
+                    );
+                }
+                println!();
+            }
+        }
+        let ms = start.elapsed().as_secs_f64() * 1e3 / queries.len() as f64;
+        let (mut strangers, mut strangers_accepted) = (0, 0);
+        for q in &queries {
+            for (parity, half) in halves.iter().enumerate() {
+                if q.landmark.is_some_and(|l| same(l) % 2 == parity as u64) {
+                    continue;
+                }
+                strangers += 1;
+                let v = recognise(&q.image, &q.quad, half, kind, &p);
+                let accepted = matches!(v.recognition, Recognition::Unique(_));
+                strangers_accepted += usize::from(accepted);
+                if verbose && accepted {
+                    println!("HALF {kind:?} {} {:?} accepted {:?}", q.file, q.landmark, v.candidates[0]);
+                }
+            }
+        }
+        println!(
+            "{kind:?}: right {} wrong {} missed {} ambiguous {} | strangers: refused {} accepted {} | of {strangers} \
+             strangers to a half {strangers_accepted} accepted | {ms:.1} ms a quad",
+            score.right, score.wrong, score.missed, score.ambiguous, score.refused, score.accepted
+        );
+    }
+    Ok(())
+}
+
+/// Every `teach` entry: its photograph and generated views; thresholds against all the others' photographs.
+fn teach(root: &Path, truth: &Value, p: &Params) -> Result<Vec<Taught>, Box<dyn Error>> {
+    let mut all = Vec::new();
+    for entry in list(&truth["teach"]) {
+        let id: u64 = entry["landmark"].as_str().ok_or("landmark")?.parse()?;
+        let image = load(&root.join(entry["file"].as_str().ok_or("file")?))?;
+        let corners = whole(&image)?;
+        let mut lesson = vec![View::photographed(&image, &corners, p)?];
+        lesson.extend(views(&image, &corners, GENERATED, p, id));
+        let photograph = features(lesson[0].icon.clone(), &p.recognise);
+        all.push(Taught { model: learn(LandmarkId(id), &lesson, &[], p)?, photograph });
+    }
+    Ok(all)
+}
+
+/// The models of the chosen landmarks, with thresholds fitted against each other only.
+fn model_set(all: &[Taught], chosen: impl Fn(u64) -> bool, p: &Params) -> Result<ModelSet, Box<dyn Error>> {
+    let chosen: Vec<&Taught> = all.iter().filter(|t| chosen(t.model.id.0)).collect();
+    let fit = |t: &&Taught| {
+        let others = chosen.iter().filter(|o| o.model.id != t.model.id);
+        let negatives: Vec<IconFeatures> = others.map(|o| o.photograph.clone()).collect();
+        Arc::new(refit_thresholds(&t.model, &negatives, p))
+    };
+    Ok(ModelSet::new(chosen.iter().map(fit).collect(), p)?)
+}
+
+fn queries(root: &Path, truth: &Value) -> Result<Vec<Query>, Box<dyn Error>> {
+    let mut all = Vec::new();
+    for entry in list(&truth["images"]) {
+        let file = entry["file"].as_str().ok_or("file")?.to_owned();
+        let image = Arc::new(load(&root.join(&file))?);
+        let mut add = |corners: Corners, landmark: &Value| -> Result<(), Box<dyn Error>> {
+            let landmark = landmark.as_str().map(str::parse).transpose()?;
+            all.push(Query { file: file.clone(), image: Arc::clone(&image), quad: quad(corners), landmark });
+            Ok(())
+        };
+        if entry["whole_image"] == Value::Bool(true) {
+            add(whole(&image)?, &entry["landmark"])?;
+        }
+        for q in list(&entry["quads"]) {
+            let corners: [[f64; 2]; 4] = serde_json::from_value(q["corners"].clone())?;
+            add(Corners::from_unordered(corners.map(Point2::from))?, &q["landmark"])?;
+        }
+    }
+    Ok(all)
+}
+
+/// Which corner is top-left is not known: all four rotations are tried.
+fn quad(corners_px: Corners) -> Quad {
+    Quad {
+        corners_px,
+        corner_covariance_px2: [Matrix2::identity(); 4],
+        side_support: [1.0; 4],
+        side_clipped: [false; 4],
+        score: 1.0,
+        kind: QuadKind::Full,
+        upright_ambiguous: true,
+        alternates: Vec::new(),
+    }
+}
+
+/// Landmarks under two names, each to the lower of both.
+fn same(truth: &Value) -> impl Fn(u64) -> u64 + use<> {
+    let number = |v: &Value| v.as_str().and_then(|s| s.parse::<u64>().ok());
+    let pairs: BTreeMap<u64, u64> = list(&truth["same"])
+        .filter_map(|pair| Some((number(&pair[0])?, number(&pair[1])?)))
+        .map(|(a, b)| (a.max(b), a.min(b)))
+        .collect();
+    move |id| pairs.get(&id).copied().unwrap_or(id)
+}
+
+fn list(value: &Value) -> impl Iterator<Item = &Value> {
+    value.as_array().into_iter().flatten()
+}
+
+fn load(path: &Path) -> Result<GrayImage, Box<dyn Error>> {
+    let grey = image::open(path)?.to_luma8();
+    let (width, height) = (grey.width() as usize, grey.height() as usize);
+    Ok(GrayImage::new(width, height, grey.into_raw())?)
+}
+
+fn whole(image: &GrayImage) -> Result<Corners, Box<dyn Error>> {
+    let (right, bottom) = (image.width() as f64 - 0.5, image.height() as f64 - 0.5);
+    Ok(Corners::try_from([[-0.5, -0.5], [right, -0.5], [right, bottom], [-0.5, bottom]])?)
+}

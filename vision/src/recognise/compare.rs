@@ -1,0 +1,185 @@
+//! Sightings of one quad (borders times rotations) and a set of landmarks in, the nearest landmarks out, by the
+//! smallest distance over sightings and exemplars (method 7.5). Deciding is the verdict's work.
+
+use super::{
+    DistanceKind, IconFeatures, correlation::correlation_within, features, hausdorff::hausdorff,
+    models::ModelSet,
+};
+use crate::{
+    detect::quads::{Corners, Quad},
+    frame::GrayImage,
+    icon::icon,
+    learn::model::LandmarkModel,
+    params::Params,
+};
+use std::sync::Arc;
+
+/// Most borders of one quad that are looked at, the outermost first.
+pub const MAX_BORDERS: usize = 6;
+
+/// One way to read a quad: which border, which corner is top-left.
+#[derive(Debug, Clone)]
+pub(crate) struct Sighting {
+    /// 0 for the quad's corners, i for alternate i - 1.
+    pub(crate) border: usize,
+    /// Which corner of the quad is the icon's top-left.
+    pub(crate) rotation: usize,
+    /// The corners in that order.
+    pub(crate) corners_px: Corners,
+    /// What they enclose.
+    pub(crate) features: IconFeatures,
+}
+
+/// Every reading of `quad` whose icon can be cut: all borders, and all four rotations where upright is unsure.
+pub(crate) fn sightings(image: &GrayImage, quad: &Quad, p: &Params) -> Vec<Sighting> {
+    let borders = std::iter::once(&quad.corners_px).chain(&quad.alternates).take(MAX_BORDERS);
+    let rotations = if quad.upright_ambiguous { 4 } else { 1 };
+    let mut all = Vec::new();
+    for (border, corners_px) in borders.enumerate() {
+        let Ok(icon) = icon(image, corners_px, &p.icon) else { continue };
+        let upright = features(icon, &p.recognise);
+        for rotation in 0..rotations {
+            let features = upright.rotated(rotation, &p.recognise);
+            all.push(Sighting { border, rotation, corners_px: corners_px.rotated(rotation), features });
+        }
+    }
+    all
+}
+
+/// A landmark near one sighting.
+#[derive(Debug, Clone)]
+pub(crate) struct Near {
+    pub(crate) model: Arc<LandmarkModel>,
+    /// Index of the sighting.
+    pub(crate) sighting: usize,
+    /// Index of the nearest exemplar.
+    pub(crate) exemplar: usize,
+    pub(crate) correlation: f64,
+    pub(crate) hausdorff: f64,
+}
+
+impl Near {
+    /// C^r over its tau.
+    pub(crate) fn correlation_ratio(&self) -> f64 {
+        ratio(self.correlation, self.model.correlation.tau)
+    }
+
+    /// H^r over its tau.
+    pub(crate) fn hausdorff_ratio(&self) -> f64 {
+        ratio(self.hausdorff, self.model.hausdorff.tau)
+    }
+
+    /// The ratio that orders candidates.
+    pub(crate) fn ratio(&self, kind: DistanceKind) -> f64 {
+        match kind {
+            DistanceKind::Hausdorff => self.hausdorff_ratio(),
+            DistanceKind::Correlation | DistanceKind::Both => self.correlation_ratio(),
+        }
+    }
+}
+
+/// A landmark without a threshold accepts nothing.
+fn ratio(distance: f64, tau: f64) -> f64 {
+    if tau > 0.0 { distance / tau } else { f64::INFINITY }
+}
+
+/// The `count` landmarks of least ratio, and every one with a ratio below 1, rising; of equal ones the lower id.
+pub(crate) fn nearest(
+    sightings: &[Sighting],
+    models: &ModelSet,
+    kind: DistanceKind,
+    count: usize,
+    p: &Params,
+) -> Vec<Near> {
+    let mut found: Vec<Near> = Vec::new();
+    let mut ratios: Vec<f64> = Vec::new();
+    // What is further than the worst of the best `count` so far cannot be among them.
+    let mut reach = f64::INFINITY;
+    for model in models.iter() {
+        let near = match kind {
+            DistanceKind::Hausdorff => nearest_by_points(sightings, model, p),
+            DistanceKind::Correlation | DistanceKind::Both => {
+                nearest_by_correlation(sightings, model, reach, p)
+            }
+        };
+        let Some(near) = near.filter(|n| n.ratio(kind) <= reach) else { continue };
+        ratios.push(near.ratio(kind));
+        found.push(near);
+        if count > 0 && ratios.len() >= count {
+            let (_, worst, _) = ratios.select_nth_unstable_by(count - 1, f64::total_cmp);
+            reach = worst.max(1.0);
+        }
+    }
+    found.sort_by(|a, b| a.ratio(kind).total_cmp(&b.ratio(kind)));
+    let accepted = found.iter().take_while(|n| n.ratio(kind) < 1.0).count();
+    found.truncate(accepted.max(count));
+    for near in &mut found {
+        if kind != DistanceKind::Hausdorff {
+            near.hausdorff = least_hausdorff(&sightings[near.sighting].features, &near.model, p).0;
+        }
+    }
+    found
+}
+
+/// Least C^r over sightings and exemplars, unless its ratio is above `reach`.
+fn nearest_by_correlation(
+    sightings: &[Sighting],
+    model: &Arc<LandmarkModel>,
+    reach: f64,
+    p: &Params,
+) -> Option<Near> {
+    let tau = model.correlation.tau;
+    if tau <= 0.0 {
+        return None;
+    }
+    let rank = p.recognise.correlation.rank();
+    let mut limit = reach * tau;
+    let mut best = None;
+    for (sighting, s) in sightings.iter().enumerate() {
+        for (exemplar, e) in model.exemplars.iter().enumerate() {
+            if let Some(d) = correlation_within(&s.features.buckets, &e.buckets, rank, limit) {
+                limit = d;
+                best = Some((sighting, exemplar, d));
+            }
+        }
+    }
+    best.map(|(sighting, exemplar, correlation)| Near {
+        model: Arc::clone(model),
+        sighting,
+        exemplar,
+        correlation,
+        hausdorff: f64::INFINITY,
+    })
+}
+
+/// Least H^r over sightings and exemplars.
+fn nearest_by_points(sightings: &[Sighting], model: &Arc<LandmarkModel>, p: &Params) -> Option<Near> {
+    let mut best: Option<(usize, usize, f64)> = None;
+    for (sighting, s) in sightings.iter().enumerate() {
+        let (d, exemplar) = least_hausdorff(&s.features, model, p);
+        if d.is_finite() && best.is_none_or(|b| d < b.2) {
+            best = Some((sighting, exemplar, d));
+        }
+    }
+    let (sighting, exemplar, hausdorff) = best.filter(|_| model.hausdorff.tau > 0.0)?;
+    let features = &sightings[sighting].features;
+    let rank = p.recognise.correlation.rank();
+    let correlation = model
+        .exemplars
+        .iter()
+        .filter_map(|e| correlation_within(&features.buckets, &e.buckets, rank, f64::INFINITY))
+        .fold(2.0, f64::min);
+    Some(Near { model: Arc::clone(model), sighting, exemplar, correlation, hausdorff })
+}
+
+/// Least H^r over the exemplars, and which has it.
+pub(crate) fn least_hausdorff(icon: &IconFeatures, model: &LandmarkModel, p: &Params) -> (f64, usize) {
+    let mut best = (f64::INFINITY, 0);
+    for (i, exemplar) in model.exemplars.iter().enumerate() {
+        let d = hausdorff(&icon.points, &exemplar.points, &p.recognise.hausdorff);
+        if d < best.0 {
+            best = (d, i);
+        }
+    }
+    best
+}

@@ -1,0 +1,86 @@
+//! The landmarks that one version of a map recognises: immutable, in the order of their ids, all learnt under the
+//! parameters in use. Whether a model is good enough to be in it is the caller's choice.
+
+use super::LandmarkId;
+use crate::{learn::model::LandmarkModel, params::Params};
+use std::sync::Arc;
+
+/// Most landmarks of one set.
+pub const MAX_LANDMARKS: usize = 100_000;
+
+/// Why models do not make a set.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum ModelSetError {
+    /// Learnt under other parameters: its thresholds mean nothing here.
+    #[error("landmark {} was learnt under parameters {found:016x}, in use are {expected:016x}", id.0)]
+    ForeignParams {
+        /// The landmark.
+        id: LandmarkId,
+        /// Hash of the model.
+        found: u64,
+        /// Hash of the parameters in use.
+        expected: u64,
+    },
+    /// Two models of one landmark.
+    #[error("landmark {} has two models", id.0)]
+    Duplicate {
+        /// The landmark.
+        id: LandmarkId,
+    },
+    /// More than [`MAX_LANDMARKS`].
+    #[error("{count} landmarks, at most {MAX_LANDMARKS} are possible")]
+    TooMany {
+        /// Models given.
+        count: usize,
+    },
+}
+
+/// Models by rising id.
+#[derive(Debug, Clone, Default)]
+pub struct ModelSet {
+    models: Vec<Arc<LandmarkModel>>,
+    params_hash: u64,
+}
+
+impl ModelSet {
+    /// Checks and orders `models`, to be used with the parameters `p`.
+    pub fn new(mut models: Vec<Arc<LandmarkModel>>, p: &Params) -> Result<Self, ModelSetError> {
+        if models.len() > MAX_LANDMARKS {
+            return Err(ModelSetError::TooMany { count: models.len() });
+        }
+        let expected = p.distance_hash();
+        if let Some(m) = models.iter().find(|m| m.params_hash != expected) {
+            return Err(ModelSetError::ForeignParams { id: m.id, found: m.params_hash, expected });
+        }
+        models.sort_by_key(|m| m.id);
+        if let Some(pair) = models.windows(2).find(|pair| pair[0].id == pair[1].id) {
+            return Err(ModelSetError::Duplicate { id: pair[0].id });
+        }
+        Ok(Self { models, params_hash: expected })
+    }
+
+    /// Number of landmarks (N).
+    pub fn len(&self) -> usize {
+        self.models.len()
+    }
+
+    /// No landmark at all.
+    pub fn is_empty(&self) -> bool {
+        self.models.is_empty()
+    }
+
+    /// The model of `id`.
+    pub fn get(&self, id: LandmarkId) -> Option<&Arc<LandmarkModel>> {
+        self.models.binary_search_by_key(&id, |m| m.id).ok().map(|i| &self.models[i])
+    }
+
+    /// Every model, by rising id.
+    pub fn iter(&self) -> impl ExactSizeIterator<Item = &Arc<LandmarkModel>> {
+        self.models.iter()
+    }
+
+    /// [`Params::distance_hash`] of the parameters that the set is for; 0 for a set made by `default()`.
+    pub fn params_hash(&self) -> u64 {
+        self.params_hash
+    }
+}
