@@ -1,3 +1,5 @@
 //! Frames in, answers out, away from any transport: one slot per camera, workers, and the snapshot they read.
 
 pub mod snapshot;
+pub mod decode;
+pub mod slots;

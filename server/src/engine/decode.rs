@@ -1,0 +1,189 @@
+//! Encoded bytes in, checked grey image out, within limits of bytes and pixels. The only way into the decoders: the
+//! size is read from the header and checked before any pixel is unpacked, and no metadata is looked at. JPEG goes
+//! straight to luma; colours of PNG are weighed the way JPEG weighs them, so both give the same grey.
+
+use image::{ColorType, ImageDecoder, Limits, codecs::png::PngDecoder};
+use protos::{CheckedFrame, Code, Rejection, convert::Encoding};
+use std::io::Cursor;
+use vision::frame::{GrayImage, MAX_SIDE_PX};
+use zune_jpeg::{
+    JpegDecoder,
+    zune_core::{bytestream::ZCursor, colorspace::ColorSpace, options::DecoderOptions},
+};
+
+/// Most scans of a progressive JPEG; real ones have about ten.
+pub const MAX_JPEG_SCANS: usize = 64;
+/// Memory that a PNG may take for each pixel: 16-bit RGBA.
+const PNG_BYTES_PER_PX: usize = 8;
+/// Memory for a PNG's rows, palette and metadata besides its pixels.
+const PNG_SPARE_BYTES: usize = 4 << 20;
+
+/// What an image may cost.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ImageLimits {
+    /// Encoded size.
+    pub bytes: usize,
+    /// Width times height.
+    pub pixels: usize,
+}
+
+impl ImageLimits {
+    /// Frames of robots: 1920 x 1200 at most.
+    pub const FRAME: Self = Self {
+        bytes: protos::convert::frame::MAX_FRAME_IMAGE_BYTES,
+        pixels: protos::convert::frame::MAX_FRAME_PX as usize,
+    };
+    /// Photographs that people upload.
+    pub const UPLOAD: Self = Self { bytes: 16 << 20, pixels: vision::frame::MAX_AREA_PX };
+}
+
+/// The grey image of a frame: of the claimed encoding and the claimed size, or refused.
+pub fn decode_frame(frame: &CheckedFrame, limits: ImageLimits) -> Result<GrayImage, Rejection> {
+    let claimed = (frame.width_px as usize, frame.height_px as usize);
+    check_bytes(&frame.image, limits)?;
+    check_size(claimed, limits)?;
+    match frame.encoding {
+        Encoding::Gray8 => gray(claimed, frame.image.to_vec()),
+        Encoding::Jpeg => jpeg(&frame.image, Some(claimed), limits),
+        Encoding::Png => png(&frame.image, Some(claimed), limits),
+    }
+}
+
+/// The grey image of an uploaded JPEG or PNG file, told apart by its first bytes.
+pub fn decode_upload(bytes: &[u8], limits: ImageLimits) -> Result<GrayImage, Rejection> {
+    check_bytes(bytes, limits)?;
+    match sniff(bytes) {
+        Some(Encoding::Jpeg) => jpeg(bytes, None, limits),
+        Some(Encoding::Png) => png(bytes, None, limits),
+        _ => Err(Rejection::new(Code::WrongEncoding, "image", "neither a JPEG nor a PNG image")),
+    }
+}
+
+/// JPEG or PNG by the first bytes.
+pub fn sniff(bytes: &[u8]) -> Option<Encoding> {
+    if bytes.starts_with(&[0xFF, 0xD8, 0xFF]) {
+        Some(Encoding::Jpeg)
+    } else if bytes.starts_with(b"\x89PNG\r\n\x1a\n") {
+        Some(Encoding::Png)
+    } else {
+        None
+    }
+}
+
+fn jpeg(bytes: &[u8], claimed: Option<(usize, usize)>, limits: ImageLimits) -> Result<GrayImage, Rejection> {
+    if sniff(bytes) != Some(Encoding::Jpeg) {
+        return Err(Rejection::new(Code::WrongEncoding, "image", "claimed as JPEG, but it is none"));
+    }
+    // Strict: a truncated file is refused instead of filled with grey. Real cameras' files pass.
+    let options = DecoderOptions::default()
+        .set_strict_mode(true)
+        .set_max_width(MAX_SIDE_PX)
+        .set_max_height(MAX_SIDE_PX)
+        .jpeg_set_max_scans(MAX_JPEG_SCANS)
+        .jpeg_set_out_colorspace(ColorSpace::Luma);
+    let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), options);
+    decoder.decode_headers().map_err(|e| bad("JPEG", &e))?;
+    let size = decoder.dimensions().ok_or_else(|| bad("JPEG", &"no size in its header"))?;
+    check_claim(size, claimed)?;
+    check_size(size, limits)?;
+    if matches!(decoder.input_colorspace(), Some(ColorSpace::YCbCr | ColorSpace::Luma)) {
+        return gray(size, decoder.decode().map_err(|e| bad("JPEG", &e))?);
+    }
+    // Rare colour spaces (RGB, CMYK) by way of RGB.
+    decoder.set_options(options.jpeg_set_out_colorspace(ColorSpace::RGB));
+    let rgb = decoder.decode().map_err(|e| bad("JPEG", &e))?;
+    gray(size, rgb.chunks_exact(3).map(|p| luma(p[0], p[1], p[2])).collect())
+}
+
+fn png(bytes: &[u8], claimed: Option<(usize, usize)>, limits: ImageLimits) -> Result<GrayImage, Rejection> {
+    if sniff(bytes) != Some(Encoding::Png) {
+        return Err(Rejection::new(Code::WrongEncoding, "image", "claimed as PNG, but it is none"));
+    }
+    // Width and height of IHDR, before the decoder reserves anything.
+    let word = |at: usize| bytes.get(at..at + 4).and_then(|w| w.try_into().ok()).map(u32::from_be_bytes);
+    let (Some(width), Some(height)) = (word(16), word(20)) else {
+        return Err(bad("PNG", &"it ends within its header"));
+    };
+    let size = (width as usize, height as usize);
+    check_claim(size, claimed)?;
+    check_size(size, limits)?;
+    let mut bounds = Limits::default();
+    bounds.max_image_width = Some(MAX_SIDE_PX as u32);
+    bounds.max_image_height = Some(MAX_SIDE_PX as u32);
+    bounds.max_alloc = Some((size.0 * size.1 * PNG_BYTES_PER_PX + PNG_SPARE_BYTES) as u64);
+    let decoder = PngDecoder::with_limits(Cursor::new(bytes), bounds).map_err(|e| bad("PNG", &e))?;
+    let (width, height) = decoder.dimensions();
+    check_claim((width as usize, height as usize), Some(size))?;
+    let colours = decoder.color_type();
+    let mut raw = vec![0; size.0 * size.1 * usize::from(colours.bytes_per_pixel())];
+    decoder.read_image(&mut raw).map_err(|e| bad("PNG", &e))?;
+    gray(size, to_gray(&raw, colours)?)
+}
+
+/// Colours to grey; transparency is ignored.
+fn to_gray(raw: &[u8], colours: ColorType) -> Result<Vec<u8>, Rejection> {
+    // 16-bit samples come in native byte order: the high byte is the 8-bit sample.
+    let high = |sample: &[u8]| (u16::from_ne_bytes([sample[0], sample[1]]) >> 8) as u8;
+    Ok(match colours {
+        ColorType::L8 => raw.to_vec(),
+        ColorType::La8 => raw.chunks_exact(2).map(|p| p[0]).collect(),
+        ColorType::Rgb8 => raw.chunks_exact(3).map(|p| luma(p[0], p[1], p[2])).collect(),
+        ColorType::Rgba8 => raw.chunks_exact(4).map(|p| luma(p[0], p[1], p[2])).collect(),
+        ColorType::L16 => raw.chunks_exact(2).map(high).collect(),
+        ColorType::La16 => raw.chunks_exact(4).map(high).collect(),
+        ColorType::Rgb16 => {
+            raw.chunks_exact(6).map(|p| luma(high(p), high(&p[2..]), high(&p[4..]))).collect()
+        }
+        ColorType::Rgba16 => {
+            raw.chunks_exact(8).map(|p| luma(high(p), high(&p[2..]), high(&p[4..]))).collect()
+        }
+        other => return Err(bad("PNG", &format!("colours {other:?} are not supported"))),
+    })
+}
+
+/// ITU-R BT.601 luma, the Y of JPEG, in 16-bit fixed point (the weights add up to 65 536).
+fn luma(r: u8, g: u8, b: u8) -> u8 {
+    ((19_595 * u32::from(r) + 38_470 * u32::from(g) + 7_471 * u32::from(b) + 32_768) >> 16) as u8
+}
+
+fn gray((width, height): (usize, usize), data: Vec<u8>) -> Result<GrayImage, Rejection> {
+    GrayImage::new(width, height, data).map_err(|e| Rejection::new(Code::BadImage, "image", e.to_string()))
+}
+
+fn check_bytes(bytes: &[u8], limits: ImageLimits) -> Result<(), Rejection> {
+    if bytes.len() > limits.bytes {
+        let detail = format!("{} bytes are more than {}", bytes.len(), limits.bytes);
+        return Err(Rejection::new(Code::TooLarge, "image", detail));
+    }
+    Ok(())
+}
+
+fn check_size((width, height): (usize, usize), limits: ImageLimits) -> Result<(), Rejection> {
+    if width == 0 || height == 0 || width > MAX_SIDE_PX || height > MAX_SIDE_PX {
+        let detail = format!("{width}x{height} px: a side is outside 1 to {MAX_SIDE_PX}");
+        return Err(Rejection::new(Code::OutOfRange, "image", detail));
+    }
+    if width * height > limits.pixels {
+        let detail = format!("{width}x{height} px are more than {} in all", limits.pixels);
+        return Err(Rejection::new(Code::TooLarge, "image", detail));
+    }
+    Ok(())
+}
+
+fn check_claim(size: (usize, usize), claimed: Option<(usize, usize)>) -> Result<(), Rejection> {
+    match claimed {
+        Some(claim) if claim != size => {
+            let field = if claim.0 == size.0 { "height_px" } else { "width_px" };
+            let detail = format!("claimed {}x{} px, the image has {}x{}", claim.0, claim.1, size.0, size.1);
+            Err(Rejection::new(Code::SizeMismatch, field, detail))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn bad(kind: &str, error: &dyn std::fmt::Debug) -> Rejection {
+    Rejection::new(Code::BadImage, "image", format!("{kind} cannot be decoded: {error:?}"))
+}
+
+#[cfg(test)]
+mod tests;

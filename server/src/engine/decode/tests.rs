@@ -1,0 +1,154 @@
+use super::*;
+use image::{ExtendedColorType, ImageEncoder, codecs::jpeg::JpegEncoder, codecs::png::PngEncoder};
+use protos::{prost::bytes::Bytes, v1};
+
+/// A smooth picture, so that JPEG keeps it within a few levels.
+fn rgb(width: u32, height: u32) -> Vec<u8> {
+    let pixel = |i: u32| [(i % width * 3) as u8 / 2 + 40, (i / width * 2) as u8 + 30, (i % 7) as u8 + 100];
+    (0..width * height).flat_map(pixel).collect()
+}
+
+fn as_png(raw: &[u8], width: u32, height: u32, colours: ExtendedColorType) -> Vec<u8> {
+    let mut out = Vec::new();
+    PngEncoder::new(&mut out).write_image(raw, width, height, colours).unwrap();
+    out
+}
+
+fn as_jpeg(raw: &[u8], width: u32, height: u32, colours: ExtendedColorType) -> Vec<u8> {
+    let mut out = Vec::new();
+    JpegEncoder::new_with_quality(&mut out, 95).write_image(raw, width, height, colours).unwrap();
+    out
+}
+
+fn frame(encoding: v1::ImageEncoding, width_px: u32, height_px: u32, image: Vec<u8>) -> CheckedFrame {
+    let image = Bytes::from(image);
+    let wire = v1::Frame { encoding: encoding.into(), width_px, height_px, image, ..v1::Frame::default() };
+    CheckedFrame::try_from(wire).unwrap()
+}
+
+fn refused(result: Result<GrayImage, Rejection>) -> (Code, String) {
+    let r = result.unwrap_err();
+    (r.code, r.field)
+}
+
+#[test]
+fn jpeg_and_png_of_one_picture_give_the_same_grey() {
+    let raw = rgb(64, 48);
+    let png = decode_upload(&as_png(&raw, 64, 48, ExtendedColorType::Rgb8), ImageLimits::UPLOAD).unwrap();
+    let jpeg = decode_upload(&as_jpeg(&raw, 64, 48, ExtendedColorType::Rgb8), ImageLimits::UPLOAD).unwrap();
+    assert_eq!((png.width(), png.height()), (64, 48));
+    let worst = png.data().iter().zip(jpeg.data()).map(|(a, b)| a.abs_diff(*b)).max().unwrap();
+    assert!(worst <= 4, "{worst} levels apart");
+    // Against the weights in floating point.
+    for (p, y) in raw.chunks_exact(3).zip(png.data()) {
+        let exact = 0.299 * f64::from(p[0]) + 0.587 * f64::from(p[1]) + 0.114 * f64::from(p[2]);
+        assert!((exact - f64::from(*y)).abs() < 0.51);
+    }
+}
+
+#[test]
+fn every_depth_and_colour_of_png_is_read() {
+    let grey: Vec<u8> = (0..12).map(|i| i * 20).collect();
+    let l8 = as_png(&grey, 4, 3, ExtendedColorType::L8);
+    assert_eq!(decode_upload(&l8, ImageLimits::UPLOAD).unwrap().data(), grey);
+    let la8: Vec<u8> = grey.iter().flat_map(|g| [*g, 9]).collect();
+    let la8 = as_png(&la8, 4, 3, ExtendedColorType::La8);
+    assert_eq!(decode_upload(&la8, ImageLimits::UPLOAD).unwrap().data(), grey);
+    let wide: Vec<u8> = grey.iter().flat_map(|g| u16::from_be_bytes([*g, 77]).to_ne_bytes()).collect();
+    let l16 = as_png(&wide, 4, 3, ExtendedColorType::L16);
+    assert_eq!(decode_upload(&l16, ImageLimits::UPLOAD).unwrap().data(), grey);
+    let rgba: Vec<u8> = grey.iter().flat_map(|g| [*g, *g, *g, 0]).collect();
+    let rgba = as_png(&rgba, 4, 3, ExtendedColorType::Rgba8);
+    assert_eq!(decode_upload(&rgba, ImageLimits::UPLOAD).unwrap().data(), grey);
+    let rgb16: Vec<u8> = wide.chunks_exact(2).flat_map(|s| s.repeat(3)).collect();
+    let rgb16 = as_png(&rgb16, 4, 3, ExtendedColorType::Rgb16);
+    assert_eq!(decode_upload(&rgb16, ImageLimits::UPLOAD).unwrap().data(), grey);
+}
+
+#[test]
+fn frames_must_be_what_they_claim() {
+    let raw = rgb(40, 30);
+    let jpeg = as_jpeg(&raw, 40, 30, ExtendedColorType::Rgb8);
+    let png = as_png(&raw, 40, 30, ExtendedColorType::Rgb8);
+    let decode = |encoding, w, h, image: &[u8]| {
+        decode_frame(&frame(encoding, w, h, image.to_vec()), ImageLimits::FRAME)
+    };
+    assert_eq!(decode(v1::ImageEncoding::Jpeg, 40, 30, &jpeg).unwrap().width(), 40);
+    assert_eq!(decode(v1::ImageEncoding::Png, 40, 30, &png).unwrap().height(), 30);
+    assert_eq!(decode(v1::ImageEncoding::Gray8, 3, 2, &[7; 6]).unwrap().data(), [7; 6]);
+    let wrong = |w, h| refused(decode(v1::ImageEncoding::Jpeg, w, h, &jpeg));
+    assert_eq!(wrong(41, 30), (Code::SizeMismatch, "width_px".into()));
+    assert_eq!(wrong(40, 31), (Code::SizeMismatch, "height_px".into()));
+    assert_eq!(
+        refused(decode(v1::ImageEncoding::Png, 30, 40, &png)),
+        (Code::SizeMismatch, "width_px".into())
+    );
+    assert_eq!(refused(decode(v1::ImageEncoding::Jpeg, 40, 30, &png)), (Code::WrongEncoding, "image".into()));
+    assert_eq!(refused(decode(v1::ImageEncoding::Png, 40, 30, &jpeg)), (Code::WrongEncoding, "image".into()));
+    assert_eq!(
+        refused(decode(v1::ImageEncoding::Jpeg, 40, 30, b"not an image")),
+        (Code::WrongEncoding, "image".into())
+    );
+}
+
+#[test]
+fn sizes_and_bytes_at_their_bounds() {
+    let png = as_png(&[0; 12], 4, 3, ExtendedColorType::L8);
+    let limits = |bytes, pixels| ImageLimits { bytes, pixels };
+    assert!(decode_upload(&png, limits(png.len(), 12)).is_ok());
+    assert_eq!(refused(decode_upload(&png, limits(png.len() - 1, 12))), (Code::TooLarge, "image".into()));
+    assert_eq!(refused(decode_upload(&png, limits(png.len(), 11))), (Code::TooLarge, "image".into()));
+    let jpeg = as_jpeg(&[0; 12], 4, 3, ExtendedColorType::L8);
+    assert!(decode_upload(&jpeg, limits(jpeg.len(), 12)).is_ok());
+    assert_eq!(refused(decode_upload(&jpeg, limits(jpeg.len(), 11))), (Code::TooLarge, "image".into()));
+}
+
+/// Headers that promise more than the limits, on small files: refused before anything is unpacked.
+#[test]
+fn bombs_are_refused_by_their_header() {
+    let mut png = as_png(&[0; 12], 4, 3, ExtendedColorType::L8);
+    png[16..20].copy_from_slice(&60_000_u32.to_be_bytes());
+    assert_eq!(refused(decode_upload(&png, ImageLimits::UPLOAD)), (Code::OutOfRange, "image".into()));
+    png[16..24].copy_from_slice(&[0, 0, 0x1f, 0xff, 0, 0, 0x1f, 0xff]);
+    assert_eq!(refused(decode_upload(&png, ImageLimits::UPLOAD)), (Code::TooLarge, "image".into()));
+    let mut jpeg = as_jpeg(&[0; 12], 4, 3, ExtendedColorType::L8);
+    let sof = jpeg.windows(2).position(|w| w == [0xFF, 0xC0]).unwrap();
+    jpeg[sof + 5..sof + 9].copy_from_slice(&[0x1f, 0xff, 0x1f, 0xff]);
+    assert_eq!(refused(decode_upload(&jpeg, ImageLimits::UPLOAD)), (Code::TooLarge, "image".into()));
+    jpeg[sof + 5..sof + 9].copy_from_slice(&[0xff, 0xff, 0xff, 0xff]);
+    assert!(decode_upload(&jpeg, ImageLimits::UPLOAD).is_err());
+    jpeg[sof + 5..sof + 9].copy_from_slice(&[0, 0, 0, 0]);
+    assert!(decode_upload(&jpeg, ImageLimits::UPLOAD).is_err());
+}
+
+#[test]
+fn every_truncation_is_refused() {
+    let raw = rgb(40, 30);
+    for whole in
+        [as_jpeg(&raw, 40, 30, ExtendedColorType::Rgb8), as_png(&raw, 40, 30, ExtendedColorType::Rgb8)]
+    {
+        // A whole file without its end marker still holds every pixel: cut at least into the data.
+        for cut in (0..whole.len() - 20).step_by(7) {
+            let r = decode_upload(&whole[..cut], ImageLimits::UPLOAD).expect_err("truncated");
+            assert!(matches!(r.code, Code::BadImage | Code::WrongEncoding), "{cut}: {r}");
+        }
+    }
+}
+
+#[test]
+fn damaged_bytes_never_panic() {
+    let raw = rgb(40, 30);
+    for whole in
+        [as_jpeg(&raw, 40, 30, ExtendedColorType::Rgb8), as_png(&raw, 40, 30, ExtendedColorType::Rgb8)]
+    {
+        for at in 0..whole.len() {
+            for value in [0, 0x7f, 0xff, whole[at] ^ 0x10] {
+                let mut damaged = whole.clone();
+                damaged[at] = value;
+                if let Ok(image) = decode_upload(&damaged, ImageLimits::UPLOAD) {
+                    assert_eq!(image.data().len(), image.width() * image.height());
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,294 @@
+//! One slot per robot and camera: one frame in work, one waiting, the newest wins. In: frames in any order and at any
+//! rate. Out: work, round robin over the slots, so that no robot starves another. Every frame ends in exactly one of
+//! processed, superseded, expired, rejected, and the counts say so at every moment. Knows no vision and no transport;
+//! time is passed in.
+
+use protos::{Code, Name, Rejection};
+use std::{
+    collections::{BTreeMap, VecDeque},
+    sync::{Condvar, Mutex, MutexGuard, PoisonError},
+    time::{Duration, Instant},
+};
+
+/// Cameras of one robot.
+pub const MAX_CAMERAS_PER_ROBOT: usize = 8;
+/// A slot that saw no frame for so long gives way to a new camera; its order is forgotten then.
+pub const IDLE_SLOT: Duration = Duration::from_mins(10);
+/// Epochs of one camera that are remembered as over.
+pub const PAST_EPOCHS: usize = 8;
+
+/// Whose frame.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub struct SlotKey {
+    /// The robot.
+    pub robot: Name,
+    /// Its camera.
+    pub camera: Name,
+}
+
+/// How a frame that was taken for work ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outcome {
+    /// Answered.
+    Processed,
+    /// Too old when its turn came.
+    Expired,
+    /// Refused after it was taken, such as an image that cannot be decoded.
+    Rejected(Code),
+}
+
+/// What happened to all frames. `received` is the sum of the others at every moment.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct FrameCounts {
+    /// Every frame that arrived.
+    pub received: u64,
+    /// Answered.
+    pub processed: u64,
+    /// Replaced by a newer one while waiting.
+    pub superseded: u64,
+    /// Too old when their turn came, or still waiting at shutdown.
+    pub expired: u64,
+    /// Refused, by code.
+    pub rejected: BTreeMap<Code, u64>,
+    /// Waiting now.
+    pub waiting: u64,
+    /// In work now.
+    pub in_work: u64,
+}
+
+impl FrameCounts {
+    /// Refused, all codes.
+    pub fn rejected_total(&self) -> u64 {
+        self.rejected.values().sum()
+    }
+
+    /// `received` less everything that is known of: 0, or frames were lost.
+    pub fn missing(&self) -> i128 {
+        let ended = self.processed + self.superseded + self.expired + self.rejected_total();
+        i128::from(self.received) - i128::from(ended + self.waiting + self.in_work)
+    }
+}
+
+/// Place of a frame in its robot's order: an epoch that a later one replaced is over for good.
+#[derive(Debug, Default)]
+pub struct Order {
+    last: Option<(u64, u64)>,
+    past: VecDeque<u64>,
+}
+
+impl Order {
+    /// Takes (epoch, seq) as the newest, or refuses it as not newer.
+    pub fn advance(&mut self, epoch: u64, seq: u64) -> Result<(), Rejection> {
+        let old = |field, detail| Err(Rejection::new(Code::NotNewer, field, detail));
+        if self.past.contains(&epoch) {
+            return old("epoch", format!("epoch {epoch} is over"));
+        }
+        match self.last {
+            Some((current, last)) if current == epoch && seq <= last => {
+                return old("seq", format!("{seq} is not newer than {last}"));
+            }
+            Some((current, _)) if current != epoch => {
+                if self.past.len() == PAST_EPOCHS {
+                    self.past.pop_front();
+                }
+                self.past.push_back(current);
+            }
+            _ => {}
+        }
+        self.last = Some((epoch, seq));
+        Ok(())
+    }
+}
+
+#[derive(Debug)]
+struct Slot<T> {
+    waiting: Option<T>,
+    in_work: bool,
+    queued: bool,
+    order: Order,
+    touched: Instant,
+}
+
+impl<T> Slot<T> {
+    fn new(now: Instant) -> Self {
+        Self { waiting: None, in_work: false, queued: false, order: Order::default(), touched: now }
+    }
+}
+
+#[derive(Debug)]
+struct State<T> {
+    slots: BTreeMap<SlotKey, Slot<T>>,
+    /// Slots with a waiting frame and none in work, in turn.
+    ready: VecDeque<SlotKey>,
+    counts: FrameCounts,
+    closed: bool,
+}
+
+/// The slots of all cameras.
+#[derive(Debug)]
+pub struct Slots<T> {
+    state: Mutex<State<T>>,
+    ready: Condvar,
+    limit: usize,
+}
+
+impl<T> Slots<T> {
+    /// At most `max_slots` cameras over all robots.
+    pub fn new(max_slots: usize) -> Self {
+        let state = State {
+            slots: BTreeMap::new(),
+            ready: VecDeque::new(),
+            counts: FrameCounts::default(),
+            closed: false,
+        };
+        Self { state: Mutex::new(state), ready: Condvar::new(), limit: max_slots }
+    }
+
+    /// Puts a frame in its slot; the one that waited there is superseded. Refuses what is not newer than the last of
+    /// this camera, and cameras beyond the limit. Never waits for work.
+    pub fn offer(&self, key: SlotKey, order: (u64, u64), job: T, now: Instant) -> Result<(), Rejection> {
+        let mut guard = self.lock();
+        let state = &mut *guard;
+        state.counts.received += 1;
+        if state.closed {
+            return state.refuse(Rejection::new(Code::Expired, "", "the server is shutting down"));
+        }
+        if !state.slots.contains_key(&key)
+            && let Err(refusal) = state.make_room(&key, self.limit, now)
+        {
+            return state.refuse(refusal);
+        }
+        let slot = state.slots.entry(key.clone()).or_insert_with(|| Slot::new(now));
+        if let Err(refusal) = slot.order.advance(order.0, order.1) {
+            return state.refuse(refusal);
+        }
+        slot.touched = now;
+        if slot.waiting.replace(job).is_some() {
+            state.counts.superseded += 1;
+        } else {
+            state.counts.waiting += 1;
+        }
+        if !slot.in_work && !slot.queued {
+            slot.queued = true;
+            state.ready.push_back(key);
+            self.ready.notify_one();
+        }
+        Ok(())
+    }
+
+    /// Counts a frame that was refused before it reached a slot.
+    pub fn refuse(&self, code: Code) {
+        let counts = &mut self.lock().counts;
+        counts.received += 1;
+        *counts.rejected.entry(code).or_default() += 1;
+    }
+
+    /// The next frame in turn; waits for one. `None` after [`Slots::close`]. Every frame taken is given back to
+    /// [`Slots::finish`].
+    pub fn take(&self) -> Option<(SlotKey, T)> {
+        let mut state = self.lock();
+        loop {
+            if state.closed {
+                return None;
+            }
+            if let Some(work) = state.next() {
+                return Some(work);
+            }
+            state = self.ready.wait(state).unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+
+    /// The next frame in turn, if there is one now.
+    pub fn try_take(&self) -> Option<(SlotKey, T)> {
+        self.lock().next()
+    }
+
+    /// Ends the work on the frame last taken from this slot; its next one gets in line, behind the others.
+    pub fn finish(&self, key: &SlotKey, outcome: Outcome) {
+        let mut guard = self.lock();
+        let state = &mut *guard;
+        let Some(slot) = state.slots.get_mut(key).filter(|slot| slot.in_work) else { return };
+        slot.in_work = false;
+        state.counts.in_work -= 1;
+        match outcome {
+            Outcome::Processed => state.counts.processed += 1,
+            Outcome::Expired => state.counts.expired += 1,
+            Outcome::Rejected(code) => *state.counts.rejected.entry(code).or_default() += 1,
+        }
+        if slot.waiting.is_some() && !slot.queued {
+            slot.queued = true;
+            state.ready.push_back(key.clone());
+            self.ready.notify_one();
+        }
+    }
+
+    /// What happened so far.
+    pub fn counts(&self) -> FrameCounts {
+        self.lock().counts.clone()
+    }
+
+    /// Ends the wait of every worker; what waits is counted as expired.
+    pub fn close(&self) {
+        let mut guard = self.lock();
+        let state = &mut *guard;
+        state.closed = true;
+        for slot in state.slots.values_mut() {
+            if slot.waiting.take().is_some() {
+                state.counts.waiting -= 1;
+                state.counts.expired += 1;
+            }
+            slot.queued = false;
+        }
+        state.ready.clear();
+        self.ready.notify_all();
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State<T>> {
+        // No code inside can panic halfway through a change.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl<T> State<T> {
+    fn refuse(&mut self, refusal: Rejection) -> Result<(), Rejection> {
+        *self.counts.rejected.entry(refusal.code).or_default() += 1;
+        Err(refusal)
+    }
+
+    fn next(&mut self) -> Option<(SlotKey, T)> {
+        while let Some(key) = self.ready.pop_front() {
+            let Some(slot) = self.slots.get_mut(&key) else { continue };
+            slot.queued = false;
+            if let Some(job) = slot.waiting.take() {
+                slot.in_work = true;
+                self.counts.waiting -= 1;
+                self.counts.in_work += 1;
+                return Some((key, job));
+            }
+        }
+        None
+    }
+
+    /// Room for one more slot, at the cost of slots that have been idle for [`IDLE_SLOT`].
+    fn make_room(&mut self, key: &SlotKey, max_slots: usize, now: Instant) -> Result<(), Rejection> {
+        let of_robot =
+            |slots: &BTreeMap<SlotKey, Slot<T>>| slots.keys().filter(|k| k.robot == key.robot).count();
+        if self.slots.len() >= max_slots || of_robot(&self.slots) >= MAX_CAMERAS_PER_ROBOT {
+            self.slots.retain(|_, s| {
+                s.in_work || s.waiting.is_some() || now.saturating_duration_since(s.touched) < IDLE_SLOT
+            });
+        }
+        if of_robot(&self.slots) >= MAX_CAMERAS_PER_ROBOT {
+            let detail = format!("a robot has at most {MAX_CAMERAS_PER_ROBOT} cameras at a time");
+            return Err(Rejection::new(Code::TooMany, "camera", detail));
+        }
+        if self.slots.len() >= max_slots {
+            let detail = format!("the server has at most {max_slots} cameras at a time");
+            return Err(Rejection::new(Code::TooMany, "camera", detail));
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,171 @@
+use super::*;
+use proptest::prelude::*;
+
+fn key(robot: &str, camera: &str) -> SlotKey {
+    SlotKey { robot: Name::new(robot).unwrap(), camera: Name::new(camera).unwrap() }
+}
+
+fn whole(counts: &FrameCounts) {
+    assert_eq!(counts.missing(), 0, "{counts:?}");
+}
+
+#[test]
+fn one_in_work_one_waiting_newest_wins() {
+    let slots = Slots::new(4);
+    let (k, now) = (key("r1", "front"), Instant::now());
+    slots.offer(k.clone(), (1, 1), 1, now).unwrap();
+    assert_eq!(slots.try_take(), Some((k.clone(), 1)));
+    for seq in 2..=5 {
+        slots.offer(k.clone(), (1, seq), seq, now).unwrap();
+    }
+    assert_eq!(slots.try_take(), None, "its camera is in work");
+    let counts = slots.counts();
+    assert_eq!((counts.waiting, counts.in_work, counts.superseded), (1, 1, 3));
+    slots.finish(&k, Outcome::Processed);
+    assert_eq!(slots.try_take(), Some((k.clone(), 5)));
+    slots.finish(&k, Outcome::Rejected(Code::BadImage));
+    let counts = slots.counts();
+    assert_eq!((counts.received, counts.processed, counts.superseded, counts.rejected_total()), (5, 1, 3, 1));
+    whole(&counts);
+}
+
+#[test]
+fn old_numbers_and_old_epochs_are_refused() {
+    let slots = Slots::new(4);
+    let (k, now) = (key("r1", "front"), Instant::now());
+    let offer = |epoch, seq| slots.offer(k.clone(), (epoch, seq), 0, now).map_err(|r| (r.code, r.field));
+    assert_eq!(offer(7, 10), Ok(()));
+    assert_eq!(offer(7, 10), Err((Code::NotNewer, "seq".into())));
+    assert_eq!(offer(7, 9), Err((Code::NotNewer, "seq".into())));
+    assert_eq!(offer(3, 1), Ok(()), "a restart begins again, whatever its number");
+    assert_eq!(offer(7, 11), Err((Code::NotNewer, "epoch".into())));
+    assert_eq!(offer(3, 2), Ok(()));
+    assert_eq!(slots.counts().rejected, BTreeMap::from([(Code::NotNewer, 3)]));
+    whole(&slots.counts());
+}
+
+#[test]
+fn epochs_are_remembered_up_to_the_bound() {
+    let mut order = Order::default();
+    for epoch in 0..=PAST_EPOCHS as u64 {
+        order.advance(epoch, 1).unwrap();
+    }
+    assert!(order.advance(0, 2).is_err());
+    order.advance(99, 1).unwrap();
+    assert!(order.advance(1, 2).is_err());
+    assert!(order.advance(0, 2).is_ok(), "the oldest of {PAST_EPOCHS} is forgotten");
+}
+
+#[test]
+fn slots_take_turns() {
+    let slots = Slots::new(4);
+    let now = Instant::now();
+    let (fast, slow) = (key("fast", "a"), key("slow", "a"));
+    let mut turns = Vec::new();
+    for seq in 1..=6 {
+        slots.offer(fast.clone(), (1, 10 * seq), 0, now).unwrap();
+        slots.offer(slow.clone(), (1, seq), 0, now).unwrap();
+        let (k, _) = slots.try_take().unwrap();
+        slots.offer(fast.clone(), (1, 10 * seq + 1), 0, now).unwrap();
+        slots.finish(&k, Outcome::Processed);
+        turns.push(k.robot.as_str().to_owned());
+    }
+    assert_eq!(turns, ["fast", "slow", "fast", "slow", "fast", "slow"]);
+    whole(&slots.counts());
+}
+
+#[test]
+fn cameras_at_the_bounds() {
+    let slots = Slots::new(MAX_CAMERAS_PER_ROBOT + 1);
+    let now = Instant::now();
+    for c in 0..MAX_CAMERAS_PER_ROBOT {
+        slots.offer(key("r1", &format!("c{c}")), (1, 1), 0, now).unwrap();
+    }
+    let more = |robot, camera, now| slots.offer(key(robot, camera), (1, 1), 0, now).map_err(|r| r.code);
+    assert_eq!(more("r1", "one-too-many", now), Err(Code::TooMany));
+    assert_eq!(more("r2", "a", now), Ok(()));
+    assert_eq!(more("r3", "a", now), Err(Code::TooMany));
+    // An idle slot gives way, one that holds work does not.
+    let (k, _) = slots.try_take().unwrap();
+    slots.finish(&k, Outcome::Processed);
+    assert_eq!(more("r3", "a", now + IDLE_SLOT / 2), Err(Code::TooMany));
+    assert_eq!(more("r3", "a", now + IDLE_SLOT), Ok(()));
+    assert_eq!(more("r4", "a", now + IDLE_SLOT), Err(Code::TooMany));
+    whole(&slots.counts());
+}
+
+#[test]
+fn closing_wakes_workers_and_counts_what_waited() {
+    let slots = std::sync::Arc::new(Slots::new(2));
+    let waiting = std::thread::spawn({
+        let slots = slots.clone();
+        move || slots.take()
+    });
+    std::thread::sleep(Duration::from_millis(20));
+    slots.close();
+    assert_eq!(waiting.join().unwrap(), None);
+    assert_eq!(slots.offer(key("r1", "a"), (1, 1), 0, Instant::now()).unwrap_err().code, Code::Expired);
+
+    let slots = Slots::new(2);
+    slots.offer(key("r1", "a"), (1, 1), 0, Instant::now()).unwrap();
+    slots.close();
+    assert_eq!((slots.counts().expired, slots.take()), (1, None));
+    whole(&slots.counts());
+}
+
+#[derive(Debug, Clone)]
+enum Step {
+    Offer { camera: u8, epoch: u64, seq: u64 },
+    Refuse,
+    Take,
+    Finish(u8),
+    Close,
+}
+
+fn steps() -> impl Strategy<Value = Vec<Step>> {
+    let step = prop_oneof![
+        8 => (0..4_u8, 0..3_u64, 0..40_u64).prop_map(|(camera, epoch, seq)| Step::Offer { camera, epoch, seq }),
+        1 => Just(Step::Refuse),
+        4 => Just(Step::Take),
+        4 => (0..3_u8).prop_map(Step::Finish),
+        1 => Just(Step::Close),
+    ];
+    prop::collection::vec(step, 0..200)
+}
+
+proptest! {
+    /// Whatever happens in whatever order: nothing is lost, nothing counted twice, never two of one camera in work,
+    /// and what is taken is the newest of its camera.
+    #[test]
+    fn every_frame_ends_exactly_once(steps in steps()) {
+        let slots = Slots::new(3);
+        let now = Instant::now();
+        let mut held: Vec<(SlotKey, Outcome)> = Vec::new();
+        let mut newest: BTreeMap<SlotKey, u64> = BTreeMap::new();
+        for (i, step) in steps.into_iter().enumerate() {
+            match step {
+                Step::Offer { camera, epoch, seq } => {
+                    let k = key("r1", &format!("c{camera}"));
+                    if slots.offer(k.clone(), (epoch, seq), i as u64, now).is_ok() {
+                        newest.insert(k, i as u64);
+                    }
+                }
+                Step::Refuse => slots.refuse(Code::BadMessage),
+                Step::Take => if let Some((k, job)) = slots.try_take() {
+                    prop_assert!(held.iter().all(|(h, _)| *h != k));
+                    prop_assert_eq!(newest[&k], job);
+                    held.push((k, [Outcome::Processed, Outcome::Expired, Outcome::Rejected(Code::BadImage)][i % 3]));
+                },
+                Step::Finish(which) => if !held.is_empty() {
+                    let (k, outcome) = held.remove(usize::from(which) % held.len());
+                    slots.finish(&k, outcome);
+                },
+                Step::Close => slots.close(),
+            }
+            let counts = slots.counts();
+            prop_assert_eq!(counts.missing(), 0);
+            prop_assert_eq!(counts.in_work, held.len() as u64);
+            prop_assert!(counts.waiting <= 3);
+        }
+    }
+}
