@@ -1,6 +1,21 @@
-//! Chains in, straight segments out (method 1.3, 1.4).
+//! Chains in, straight segments out (method 1.3, 1.4): split, fit, join, drop the short ones.
+//!
+//! Each segment knows its bright side, contrast and the variances of its line. Nothing is dropped here for its
+//! direction or surroundings.
 
+use super::{
+    chains::EdgeChain,
+    edges::{BORDER_PX, EdgeMap},
+    joining::{Fragment, join},
+    polyline::{Tolerance, interior, polyline},
+};
+use crate::geometry::line::LineSums;
 use nalgebra::{Point2, Vector2};
+
+/// Most segments of one image; the longest are kept.
+pub const MAX_SEGMENTS: usize = 500;
+/// An end this close to the image border counts as cut off by it.
+pub const CLIP_MARGIN_PX: f64 = BORDER_PX as f64 + 2.0;
 
 /// A straight piece of edge. Coordinates in pixels; pixel centres at integers.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,6 +47,122 @@ pub struct EdgeSegment {
 }
 
 /// Parameters of this stage.
-#[derive(Debug, Clone, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct SegmentParams {}
+pub struct SegmentParams {
+    /// Largest distance of an edge point from its straight piece, px.
+    pub split_px: f64,
+    /// Largest angle between neighbouring pieces of a chain that are merged, degrees.
+    pub merge_angle_deg: f64,
+    /// A piece ends where its chain leaves the fitted line by more than this, px.
+    pub end_px: f64,
+    /// Pieces shorter than this take no part in joining, px.
+    pub min_fragment_px: f64,
+    /// Largest angle between fragments that are joined, degrees.
+    pub join_angle_deg: f64,
+    /// Largest distance across the line between fragments that are joined, px.
+    pub join_lateral_px: f64,
+    /// Largest gap between fragments that are joined, as share of the joint length.
+    pub join_gap_share: f64,
+    /// Shortest segment, as share of the image width.
+    pub min_length_share: f64,
+    /// Lower and upper bound of the shortest segment, px: small images keep what noise cannot make, large ones keep
+    /// the sides of small quads.
+    pub min_length_range_px: [f64; 2],
+    /// Most segments, longest first; at most [`MAX_SEGMENTS`].
+    pub max_segments: usize,
+}
+
+impl Default for SegmentParams {
+    fn default() -> Self {
+        Self {
+            split_px: 1.5,
+            merge_angle_deg: 3.0,
+            end_px: 1.0,
+            min_fragment_px: 8.0,
+            join_angle_deg: 2.0,
+            join_lateral_px: 1.5,
+            join_gap_share: 0.1,
+            min_length_share: 0.04,
+            min_length_range_px: [12.0, 25.0],
+            max_segments: MAX_SEGMENTS,
+        }
+    }
+}
+
+impl SegmentParams {
+    /// Shortest segment that is kept in an image of this width.
+    pub fn min_length_px(&self, width: usize) -> f64 {
+        let [low, high] = self.min_length_range_px;
+        (self.min_length_share * width as f64).min(high).max(low)
+    }
+}
+
+/// Straight segments of all chains, longest first, at most `max_segments`.
+pub fn segments(chains: &[EdgeChain], edges: &EdgeMap, p: &SegmentParams) -> Vec<EdgeSegment> {
+    let mut fragments = Vec::new();
+    for (index, chain) in chains.iter().enumerate() {
+        fragments_of(chain, index, p, &mut fragments);
+    }
+    let min_length_px = p.min_length_px(edges.width());
+    let mut kept = join(fragments, p);
+    kept.retain(|f| f.length_px() >= min_length_px);
+    kept.sort_by(|a, b| b.length_px().total_cmp(&a.length_px()));
+    kept.truncate(p.max_segments.min(MAX_SEGMENTS));
+    kept.iter().map(|f| segment(f, edges)).collect()
+}
+
+fn fragments_of(chain: &EdgeChain, index: usize, p: &SegmentParams, fragments: &mut Vec<Fragment>) {
+    let n = chain.points.len();
+    let positions: Vec<Point2<f64>> = chain.points.iter().map(|e| e.position_px).collect();
+    let tolerance = Tolerance { split_px: p.split_px.max(0.0), merge_rad: p.merge_angle_deg.to_radians() };
+    let polyline = polyline(&positions, chain.closed, tolerance);
+    for piece in &polyline.pieces {
+        let rough: LineSums = polyline.points[interior(piece)].iter().copied().collect();
+        let Some(rough) = rough.fit() else { continue };
+        let piece = polyline.ends_on(piece, &rough.line, p.end_px);
+        let ends = [*polyline.point(piece.start), *polyline.point(piece.end - 1)];
+        if (ends[1] - ends[0]).norm() < p.min_fragment_px {
+            continue;
+        }
+        let inner = interior(&piece);
+        let mut gradient = Vector2::zeros();
+        let mut magnitude = 0.0;
+        for i in inner.clone() {
+            let g: Vector2<f64> = chain.points[(i + polyline.turn) % n].gradient.cast();
+            gradient += g;
+            magnitude += g.norm();
+        }
+        let sums: LineSums = inner.clone().map(|i| *polyline.point(i)).collect();
+        fragments.extend(Fragment::new(sums, gradient, magnitude, inner.len(), &ends, index));
+    }
+}
+
+fn segment(f: &Fragment, edges: &EdgeMap) -> EdgeSegment {
+    let (right, bottom) = (edges.width() as f64 - 1.0, edges.height() as f64 - 1.0);
+    let near_border = |e: &Point2<f64>| e.x.min(e.y).min(right - e.x).min(bottom - e.y) <= CLIP_MARGIN_PX;
+    EdgeSegment {
+        p_px: f.p,
+        q_px: f.q,
+        length_px: f.length_px(),
+        theta_rad: f.fit.line.theta_rad(),
+        normal: f.fit.line.normal,
+        rho_px: f.fit.line.rho_px,
+        contrast: f.magnitude / f.points as f64,
+        support: f.points,
+        chain: f.chain,
+        theta_variance: f.fit.theta_variance(),
+        offset_variance: offset_variance(f),
+        clipped: near_border(&f.p) || near_border(&f.q),
+    }
+}
+
+/// Variance of the offset at the mid point: that at the mean of the points, extrapolated.
+fn offset_variance(f: &Fragment) -> f64 {
+    let away = f.fit.line.direction().dot(&(nalgebra::center(&f.p, &f.q) - f.fit.mean_px));
+    f.fit.offset_variance() + away * away * f.fit.theta_variance()
+}
+
+#[cfg(test)]
+#[path = "segments_tests.rs"]
+mod tests;
