@@ -158,7 +158,7 @@ fn edges_within(image: &GrayImage, p: &EdgeParams, max_points: usize) -> EdgeMap
     keep_strongest(&mut maxima, &map.magnitude, max_points);
     map.mask = hysteresis(&maxima, &map.magnitude, width, p.high);
     maxima.retain(|&at| map.mask[at as usize]);
-    thin(&mut map.mask, width, &mut maxima);
+    thin(&mut map.mask, width, &map.magnitude, &mut maxima);
     map.pixels = maxima;
     map
 }

@@ -57,7 +57,7 @@ fn symmetries_move_the_points_and_nothing_else() {
         let found = points(&edges(image, &p));
         // Thinning may keep another pixel of a staircase.
         let share = shared(expected, &found).min(shared(&found, expected));
-        assert!(share > 0.9, "symmetry {i}: {share:.3}");
+        assert!(share > 0.97, "symmetry {i}: {share:.3}");
     }
 }
 

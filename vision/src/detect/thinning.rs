@@ -69,14 +69,24 @@ pub(crate) fn ring_code(mask: &[bool], width: usize, at: usize) -> usize {
         | usize::from(above[0]) << 7
 }
 
-/// Clears staircase corners, in the order of `pixels` (row-major, none on the border), in `mask` and `pixels` alike.
-pub(crate) fn thin(mask: &mut [bool], width: usize, pixels: &mut Vec<u32>) {
-    pixels.retain(|&at| {
-        let at = at as usize;
-        let keep = !REMOVABLE[ring_code(mask, width, at)];
-        mask[at] = keep;
-        keep
-    });
+/// Clears staircase corners in `mask` and `pixels` (row-major, none on the border) alike. Of two corners that touch,
+/// the weaker goes: which one must not depend on how the image lies.
+pub(crate) fn thin(mask: &mut [bool], width: usize, magnitude: &[f32], pixels: &mut Vec<u32>) {
+    let removable = |mask: &[bool], at: usize| mask[at] && REMOVABLE[ring_code(mask, width, at)];
+    let corners: Vec<usize> =
+        pixels.iter().map(|&at| at as usize).filter(|&at| removable(mask, at)).collect();
+    for weakest in [true, false] {
+        for &at in &corners {
+            let beaten = weakest
+                && [at - width, at - 1, at + 1, at + width]
+                    .into_iter()
+                    .any(|near| magnitude[near] < magnitude[at] && removable(mask, near));
+            if !beaten && removable(mask, at) {
+                mask[at] = false;
+            }
+        }
+    }
+    pixels.retain(|&at| mask[at as usize]);
 }
 
 #[cfg(test)]
@@ -88,7 +98,7 @@ mod tests {
         let width = rows[0].len();
         let mut mask: Vec<bool> = rows.concat().bytes().map(|b| b == b'#').collect();
         let mut pixels: Vec<u32> = (0..mask.len() as u32).filter(|&i| mask[i as usize]).collect();
-        thin(&mut mask, width, &mut pixels);
+        thin(&mut mask, width, &vec![1.0; rows.len() * width], &mut pixels);
         assert_eq!(pixels.len(), mask.iter().filter(|m| **m).count());
         mask.chunks(width)
             .map(|row| row.iter().map(|m| if *m { '#' } else { '.' }).collect::<String>())
