@@ -167,13 +167,21 @@ fn photograph(
     let gain = random.range(-s.max_gain.ln(), s.max_gain.ln()).exp();
     let gamma = random.range(-s.max_gamma.ln(), s.max_gamma.ln()).exp();
     let offset = random.range(-s.max_offset, s.max_offset);
-    let noise = random.range(0.0, s.max_noise);
+    let noise = random.range(0.0, s.max_noise) as f32;
+    // The tone curve is smooth: 256 steps, read linearly, lie within 0.1 grey levels of it.
+    let tone: Vec<f32> = (0..=256)
+        .map(|i| {
+            let curved = 255.0 * (f64::from(i) / 256.0).powf(gamma);
+            (128.0 + gain * (curved - 128.0) + offset) as f32
+        })
+        .collect();
     let data = picture
         .iter()
         .map(|g| {
-            let curved = 255.0 * (f64::from(*g) / 255.0).clamp(0.0, 1.0).powf(gamma);
-            (128.0 + gain * (curved - 128.0) + offset + noise * random.normal()).round().clamp(0.0, 255.0)
-                as u8
+            let at = (g * (256.0 / 255.0)).clamp(0.0, 255.99);
+            let (i, share) = (at as usize, at.fract());
+            let grey = tone[i] * (1.0 - share) + tone[i + 1] * share;
+            (grey + noise * random.quick_normal()).round().clamp(0.0, 255.0) as u8
         })
         .collect();
     Some((GrayImage::new(size[0], size[1], data).ok()?, shift))
@@ -237,4 +245,121 @@ fn convolve(picture: &mut [f32], start: usize, step: usize, length: usize, kerne
 fn aspect(corners: &Corners) -> f64 {
     let [tl, tr, br, bl] = corners.points();
     (((tr - tl).norm() + (br - bl).norm()) / ((bl - tl).norm() + (br - tr).norm())).clamp(0.2, 5.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{learn::model::MAX_VIEWS, recognise::features};
+
+    fn poster(seed: u64) -> GrayImage {
+        let mut random = Random::new(seed);
+        let spots: Vec<[f64; 4]> = (0..25)
+            .map(|_| {
+                [
+                    random.range(0.0, 300.0),
+                    random.range(0.0, 400.0),
+                    random.range(10.0, 45.0),
+                    random.range(20.0, 235.0),
+                ]
+            })
+            .collect();
+        GrayImage::from_fn(300, 400, |u, v| {
+            let (u, v) = (u as f64, v as f64);
+            let top = spots.iter().rev().find(|[x, y, r, _]| (u - x).abs() < *r && (v - y).abs() < *r);
+            top.map_or(120.0, |s| s[3]) as u8
+        })
+    }
+
+    fn whole() -> Corners {
+        Corners::try_from([[-0.5, -0.5], [299.5, -0.5], [299.5, 399.5], [-0.5, 399.5]]).unwrap()
+    }
+
+    #[test]
+    fn the_seed_decides() {
+        let p = Params::default();
+        let poster = poster(1);
+        let first = views(&poster, &whole(), 4, &p, 7);
+        assert_eq!(first, views(&poster, &whole(), 4, &p, 7));
+        assert_ne!(first, views(&poster, &whole(), 4, &p, 8));
+        assert_eq!(first.len(), 4);
+        assert!(first.iter().all(|v| v.generated && v.icon.size == p.icon.size));
+        assert_eq!(views(&poster, &whole(), MAX_VIEWS + 50, &p, 7).len(), MAX_VIEWS);
+    }
+
+    #[test]
+    fn poses_cover_their_ranges() {
+        let p = Params::default();
+        let views = views(&poster(2), &whole(), 100, &p, 3);
+        let sizes: Vec<f64> = views.iter().map(|v| v.corners_px.area_px2().sqrt()).collect();
+        assert!(sizes.iter().any(|s| *s < 80.0) && sizes.iter().any(|s| *s > 180.0));
+        // Width over height against the frontal 0.75: the yaw reaches beyond 55 degrees.
+        let slant = |v: &View| {
+            let [tl, tr, _, bl] = v.corners_px.points();
+            (tr - tl).norm() / (bl - tl).norm() / 0.75
+        };
+        assert!(views.iter().any(|v| slant(v) < 55f64.to_radians().cos()));
+        assert!(views.iter().all(|v| slant(v) > 0.3 && slant(v) < 1.6));
+        for v in &views {
+            assert!(
+                v.corners_px.min_side_px() >= 0.5 * p.icon.size as f64,
+                "smaller ones are refused and drawn anew"
+            );
+        }
+    }
+
+    #[test]
+    fn without_disturbance_the_icon_is_the_photograph() {
+        let mut p = Params::default();
+        p.learn.synthesis = SynthesisParams {
+            max_yaw_rad: 0.0,
+            max_pitch_rad: 0.0,
+            max_roll_rad: 0.0,
+            min_size_px: 240.0,
+            max_size_px: 240.0,
+            corner_noise_px: 0.0,
+            max_gain: 1.0,
+            max_offset: 0.0,
+            max_gamma: 1.0,
+            max_blur_px: 0.0,
+            max_noise: 0.0,
+            max_occluded_share: 0.0,
+        };
+        let poster = poster(3);
+        let direct = features(icon(&poster, &whole(), &p.icon).unwrap(), &p.recognise);
+        let generated = views(&poster, &whole(), 1, &p, 1).remove(0);
+        let difference: f32 =
+            direct.icon.pixels.iter().zip(&generated.icon.pixels).map(|(a, b)| (a - b).abs()).sum::<f32>()
+                / 5625.0;
+        assert!(difference < 3.0, "{difference}");
+    }
+
+    #[test]
+    fn occlusion_and_light_change_the_icon() {
+        let mut p = Params::default();
+        let poster = poster(4);
+        let plain = views(&poster, &whole(), 1, &p, 9).remove(0);
+        p.learn.synthesis.max_occluded_share = 0.9;
+        let covered = views(&poster, &whole(), 1, &p, 9).remove(0);
+        assert_ne!(plain.icon.pixels, covered.icon.pixels);
+    }
+
+    #[test]
+    fn a_useless_quad_gives_no_views() {
+        let sliver = Corners::try_from([[0.0, 0.0], [300.0, 0.0], [300.0, 1e-3], [0.0, 1e-3]]).unwrap();
+        // Stretched to 1:5 at most, it still is a plane of one colour: views exist, but nothing to learn from.
+        for v in views(&poster(5), &sliver, 2, &Params::default(), 1) {
+            assert!(v.icon.pixels.iter().all(|g| (0.0..=255.0).contains(g)));
+        }
+    }
+
+    #[test]
+    fn blur_keeps_the_mean_and_spreads_a_point() {
+        let mut picture = vec![0.0f32; 31 * 31];
+        picture[15 * 31 + 15] = 1000.0;
+        blur(&mut picture, [31, 31], 1.2);
+        assert!((picture.iter().sum::<f32>() - 1000.0).abs() < 0.1);
+        let expected = 1000.0 / (std::f32::consts::TAU * 1.2 * 1.2);
+        assert!((picture[15 * 31 + 15] - expected).abs() < 2.0, "{}", picture[15 * 31 + 15]);
+    }
 }

@@ -16,6 +16,8 @@ const MARGIN: f64 = 0.125;
 const LEVELS: usize = 3;
 /// Most samples along a texel's or a pixel's side.
 const MAX_SAMPLES: usize = 4;
+/// Texels that one bilinear sample may stand for.
+const TEXELS_PER_SAMPLE: f64 = 1.5;
 
 /// Grey levels and coverage of the landmark's plane, over the unit square and its margin.
 #[derive(Debug, Clone)]
@@ -78,20 +80,25 @@ impl Texture {
         };
         let finest = SIDE as f64 / mean(0, 2).max(1.0);
         let finest = finest.max(SIDE as f64 / mean(1, 3).max(1.0));
-        let n = (finest.ceil() as usize).clamp(1, MAX_SAMPLES);
+        let n = ((finest / TEXELS_PER_SAMPLE).ceil() as usize).clamp(1, MAX_SAMPLES);
         let level = &self.levels[((finest / n as f64).log2().round().max(0.0) as usize).min(LEVELS - 1)];
-        let mut picture = Vec::with_capacity(size[0] * size[1]);
-        for v in 0..size[1] {
-            for u in 0..size[0] {
-                let mut sum = 0.0;
-                for (du, dv) in grid(n) {
-                    let p = at(&unit_from_view, u as f64 - 0.5 + du, v as f64 - 0.5 + dv);
-                    let [grey, cover] = level.sample(p.x, p.y);
-                    sum += grey + (1.0 - cover) * wall;
+        let h = unit_from_view;
+        let mut picture = vec![0.0f32; size[0] * size[1]];
+        for (du, dv) in grid(n) {
+            for (v, line) in picture.chunks_exact_mut(size[0]).enumerate() {
+                let (u, v) = (du - 0.5, v as f64 + dv - 0.5);
+                let start = h * Vector3::new(u, v, 1.0);
+                for (i, grey) in line.iter_mut().enumerate() {
+                    let i = i as f64;
+                    let scale = 1.0 / (start.z + i * h[(2, 0)]);
+                    let (a, b) = ((start.x + i * h[(0, 0)]) * scale, (start.y + i * h[(1, 0)]) * scale);
+                    let [lit, cover] = level.sample(a, b);
+                    *grey += lit + (1.0 - cover) * wall;
                 }
-                picture.push(sum / (n * n) as f32);
             }
         }
+        let share = 1.0 / (n * n) as f32;
+        picture.iter_mut().for_each(|grey| *grey *= share);
         Some(picture)
     }
 }
