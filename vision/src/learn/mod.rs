@@ -1,7 +1,7 @@
 //! From views of one landmark to its model (method 7 to 9).
 
 pub mod random;
-mod texture;
+pub(crate) mod texture;
 pub mod synthesis;
 pub mod pca;
 pub mod threshold;

@@ -21,7 +21,7 @@ const TEXELS_PER_SAMPLE: f64 = 1.5;
 
 /// Grey levels and coverage of the landmark's plane, over the unit square and its margin.
 #[derive(Debug, Clone)]
-pub(super) struct Texture {
+pub(crate) struct Texture {
     levels: Vec<Level>,
 }
 
@@ -34,7 +34,7 @@ struct Level {
 
 impl Texture {
     /// Lifts the landmark off `photograph`. `None` if the corners make no invertible homography.
-    pub(super) fn lift(photograph: &GrayImage, corners: &Corners) -> Option<Self> {
+    pub(crate) fn lift(photograph: &GrayImage, corners: &Corners) -> Option<Self> {
         let photograph_from_unit = quad_from_unit(corners.points());
         photograph_from_unit.try_inverse()?;
         let side = SIDE + 2 * (SIDE as f64 * MARGIN) as usize;
@@ -67,7 +67,7 @@ impl Texture {
 
     /// The landmark seen under `view_from_unit` (unit square to pixels of the small picture), before a wall of grey
     /// `wall`. Row-major, `width * height`.
-    pub(super) fn seen(
+    pub(crate) fn seen(
         &self,
         view_from_unit: &Matrix3<f64>,
         size: [usize; 2],
