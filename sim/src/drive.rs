@@ -1,0 +1,405 @@
+//! A robot that drives up and down a corridor, looks at posters on its way, and measures: [`Drive`] gives its motion
+//! step by step, [`Robot`] adds picture and scan. It follows its true path; what it believes is for others to compute.
+
+use std::sync::Arc;
+
+use map::laser::Scan;
+use map::mounting::pan_tilt;
+use map::pose2::{Pose2, wrap_rad};
+use nalgebra::{Isometry3, Point2, Vector2, Vector3};
+use rand::RngExt;
+use serde::{Deserialize, Serialize};
+
+use crate::building::Building;
+use crate::camera::Camera;
+use crate::gaze::{Gaze, GazeParams};
+use crate::laser::{self, LaserParams};
+use crate::odometry::{Odometry, OdometryParams};
+use crate::render::{Rendered, Renderer};
+use crate::seed;
+use crate::sensor::SensorParams;
+
+/// Most steps of a drive.
+pub const MAX_STEPS: u64 = 1_000_000;
+
+/// One robot's drive. Seeds, starts and directions make robots differ.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct DriveParams {
+    /// Seed of weave, odometry and noise.
+    pub seed: u64,
+    /// Where to start, along the path, in metres.
+    pub start_m: f64,
+    /// Start towards the path's beginning.
+    pub reverse: bool,
+    /// How many times to drive to an end; between, the robot turns on the spot.
+    pub legs: u32,
+    /// Driving, 0.01 to 3 m/s.
+    pub speed_mps: f64,
+    /// Turning on the spot, 0.05 to 3 rad/s.
+    pub turn_rate_radps: f64,
+    /// Steps per second, 0.1 to 100.
+    pub rate_hz: f64,
+    /// Largest swerve to either side.
+    pub weave_m: f64,
+    /// Length of one swerve to both sides, 2 m or more.
+    pub weave_length_m: f64,
+    /// How near to the end walls the path goes.
+    pub end_gap_m: f64,
+    /// Odometry's errors.
+    pub odometry: OdometryParams,
+    /// Where the camera looks.
+    pub gaze: GazeParams,
+}
+
+impl Default for DriveParams {
+    fn default() -> Self {
+        Self {
+            seed: 0,
+            start_m: 0.0,
+            reverse: false,
+            legs: 1,
+            speed_mps: 0.5,
+            turn_rate_radps: 0.6,
+            rate_hz: 5.0,
+            weave_m: 0.2,
+            weave_length_m: 9.0,
+            end_gap_m: 1.2,
+            odometry: OdometryParams::default(),
+            gaze: GazeParams::default(),
+        }
+    }
+}
+
+/// The robot at one moment.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Step {
+    /// Counts from 0.
+    pub index: u64,
+    /// Since the start.
+    pub time_s: f64,
+    /// True pose.
+    pub map_from_robot: Pose2,
+    /// What odometry believes; starts at the true pose.
+    pub odom_from_robot: Pose2,
+    /// Pan-tilt unit and mounting.
+    pub robot_from_camera: Isometry3<f64>,
+    /// Camera's pan, left positive.
+    pub pan_rad: f64,
+    /// Camera's tilt, up positive.
+    pub tilt_rad: f64,
+    /// Speed at which the camera's view turns to the left.
+    pub sweep_radps: f64,
+    /// Landmark the camera is told to look at.
+    pub target: Option<String>,
+}
+
+impl Step {
+    /// True pose of the camera.
+    pub fn map_from_camera(&self) -> Isometry3<f64> {
+        self.map_from_robot.to_isometry3() * self.robot_from_camera
+    }
+}
+
+/// Motion of one robot, step by step; ends after its last leg.
+#[derive(Debug, Clone)]
+pub struct Drive {
+    building: Arc<Building>,
+    p: DriveParams,
+    path: [Point2<f64>; 2],
+    along_m: f64,
+    forward: bool,
+    heading_rad: f64,
+    legs_left: u32,
+    weave_phase: f64,
+    gaze: Gaze,
+    odometry: Odometry,
+    index: u64,
+}
+
+impl Drive {
+    /// Along the middle of the building's longer side. Parameters are clamped to their ranges.
+    pub fn new(building: Arc<Building>, params: &DriveParams) -> Self {
+        let p = clamped(params);
+        let path = middle(&building, p.end_gap_m);
+        let weave_phase = seed::stream(p.seed, 60).random_range(0.0..std::f64::consts::TAU);
+        let length = (path[1] - path[0]).norm();
+        let mut drive = Self {
+            building,
+            path,
+            along_m: p.start_m.clamp(0.0, length),
+            forward: !p.reverse,
+            heading_rad: 0.0,
+            legs_left: p.legs,
+            weave_phase,
+            gaze: Gaze::new(p.gaze.clone()),
+            odometry: Odometry::new(p.odometry.clone(), Pose2::default(), p.seed),
+            index: 0,
+            p,
+        };
+        drive.heading_rad = drive.course().theta_rad;
+        drive.odometry = Odometry::new(drive.p.odometry.clone(), drive.pose(), drive.p.seed);
+        drive
+    }
+
+    /// True pose now.
+    pub fn pose(&self) -> Pose2 {
+        Pose2 { theta_rad: self.heading_rad, ..self.course() }
+    }
+
+    /// Where the path is here, and where it leads in the present direction.
+    fn course(&self) -> Pose2 {
+        let d = self.path[1] - self.path[0];
+        let length = d.norm().max(1e-9);
+        let d = d / length;
+        // The swerve fades out towards the ends, so that turning on the spot starts from the middle.
+        let fade = |s: f64| (s / 1.5).clamp(0.0, 1.0).powi(2) * (3.0 - 2.0 * (s / 1.5).clamp(0.0, 1.0));
+        let side = |s: f64| {
+            let wave = (std::f64::consts::TAU * s / self.p.weave_length_m + self.weave_phase).sin();
+            self.p.weave_m * wave * fade(s) * fade(length - s)
+        };
+        let s = self.along_m;
+        let slope = (side(s + 1e-4) - side(s - 1e-4)) / 2e-4;
+        let position = self.path[0] + d * s + Vector2::new(-d.y, d.x) * side(s);
+        let heading = d.y.atan2(d.x) + slope.atan() + if self.forward { 0.0 } else { std::f64::consts::PI };
+        Pose2::new(position.x, position.y, heading)
+    }
+
+    fn advance(&mut self) {
+        let dt = 1.0 / self.p.rate_hz;
+        let length = (self.path[1] - self.path[0]).norm();
+        let wanted = self.course().theta_rad;
+        let error = wrap_rad(wanted - self.heading_rad);
+        let most = self.p.turn_rate_radps * dt;
+        if error.abs() > most.max(0.15) {
+            self.heading_rad = wrap_rad(self.heading_rad + error.clamp(-most, most));
+            return;
+        }
+        let step = self.p.speed_mps * dt;
+        self.along_m = (self.along_m + if self.forward { step } else { -step }).clamp(0.0, length);
+        self.heading_rad = self.course().theta_rad;
+        let end = if self.forward { length } else { 0.0 };
+        if (self.along_m - end).abs() < 1e-9 {
+            self.legs_left = self.legs_left.saturating_sub(1);
+            self.forward = !self.forward;
+        }
+    }
+}
+
+impl Iterator for Drive {
+    type Item = Step;
+
+    fn next(&mut self) -> Option<Step> {
+        if self.legs_left == 0 || self.index >= MAX_STEPS {
+            return None;
+        }
+        let before = self.pose();
+        if self.index > 0 {
+            self.advance();
+        }
+        let map_from_robot = self.pose();
+        let dt = 1.0 / self.p.rate_hz;
+        let motion = before.between(&map_from_robot);
+        let pan_before = self.gaze.pan_rad();
+        let target =
+            self.gaze.follow(&self.building, &map_from_robot, if self.index > 0 { Some(dt) } else { None });
+        let turned = motion.theta_rad + self.gaze.pan_rad() - pan_before;
+        let step = Step {
+            index: self.index,
+            time_s: self.index as f64 * dt,
+            map_from_robot,
+            odom_from_robot: self.odometry.advance(&motion),
+            robot_from_camera: self.gaze.robot_from_camera(),
+            pan_rad: self.gaze.pan_rad(),
+            tilt_rad: self.gaze.tilt_rad(),
+            sweep_radps: if self.index > 0 { turned / dt } else { 0.0 },
+            target,
+        };
+        self.index += 1;
+        Some(step)
+    }
+}
+
+fn clamped(p: &DriveParams) -> DriveParams {
+    let within = |x: f64, low: f64, high: f64| if x.is_finite() { x.clamp(low, high) } else { low };
+    DriveParams {
+        start_m: within(p.start_m, 0.0, 1e6),
+        speed_mps: within(p.speed_mps, 0.01, 3.0),
+        turn_rate_radps: within(p.turn_rate_radps, 0.05, 3.0),
+        rate_hz: within(p.rate_hz, 0.1, 100.0),
+        weave_m: within(p.weave_m, 0.0, 5.0),
+        weave_length_m: within(p.weave_length_m, 2.0, 1e3),
+        end_gap_m: within(p.end_gap_m, 0.3, 100.0),
+        ..p.clone()
+    }
+}
+
+/// The middle line of the walls' bounding box along its longer side, `gap_m` short of both ends.
+fn middle(building: &Building, gap_m: f64) -> [Point2<f64>; 2] {
+    let ends = || building.walls().iter().flat_map(|w| [w.a_m, w.b_m]);
+    let bound =
+        |f: fn(f64, f64) -> f64, of: fn(&Point2<f64>) -> f64| ends().map(|p| of(&p)).reduce(f).unwrap_or(0.0);
+    let low = Point2::new(bound(f64::min, |p| p.x), bound(f64::min, |p| p.y));
+    let high = Point2::new(bound(f64::max, |p| p.x), bound(f64::max, |p| p.y));
+    let centre = nalgebra::center(&low, &high);
+    let half = 0.5 * (high - low);
+    let along = if half.x >= half.y { Vector2::x() } else { Vector2::y() };
+    let reach = (half.x.max(half.y) - gap_m).max(0.01);
+    [centre - along * reach, centre + along * reach]
+}
+
+/// A robot's sensors and drive.
+#[derive(Debug, Clone, Default)]
+pub struct RobotParams {
+    /// How it moves.
+    pub drive: DriveParams,
+    /// Its camera; 640 x 480 without distortion by default.
+    pub camera: Option<Camera>,
+    /// How its camera sees.
+    pub sensor: SensorParams,
+    /// Its laser.
+    pub laser: LaserParams,
+    /// Exposure time: with the speed of turning it makes the motion blur. 0 for none.
+    pub exposure_s: f64,
+}
+
+/// What a robot measures at one moment, with the truth.
+#[derive(Debug, Clone)]
+pub struct Sighting {
+    /// Poses and camera direction.
+    pub step: Step,
+    /// The picture and what it truly shows.
+    pub frame: Rendered,
+    /// The laser's ranges.
+    pub scan: Scan,
+}
+
+/// A robot in a building: an iterator of what it measures along its drive.
+#[derive(Debug, Clone)]
+pub struct Robot {
+    building: Arc<Building>,
+    drive: Drive,
+    renderer: Renderer,
+    sensor: SensorParams,
+    laser: LaserParams,
+    exposure_s: f64,
+    seed: u64,
+}
+
+impl Robot {
+    /// Puts a robot at the start of its drive.
+    pub fn new(building: Arc<Building>, params: &RobotParams) -> Self {
+        Self {
+            drive: Drive::new(building.clone(), &params.drive),
+            renderer: Renderer::new(params.camera.clone().unwrap_or_else(Camera::vga)),
+            sensor: params.sensor.clone(),
+            laser: params.laser.clone(),
+            exposure_s: params.exposure_s,
+            seed: params.drive.seed,
+            building,
+        }
+    }
+
+    /// The camera.
+    pub fn camera(&self) -> &Camera {
+        self.renderer.camera()
+    }
+
+    /// The motion alone, for those who skip pictures: take steps here, then [`Robot::look`] at some of them.
+    pub fn drive_mut(&mut self) -> &mut Drive {
+        &mut self.drive
+    }
+
+    /// Measures at a step, its own or any other. Noise follows from the robot's seed and the step's index.
+    pub fn look(&mut self, step: &Step) -> Sighting {
+        let seed = seed::mix(self.seed ^ seed::mix(step.index));
+        let blur_px = self.exposure_s * step.sweep_radps * self.camera().intrinsics().fx_px;
+        let sensor = SensorParams {
+            motion_px: [self.sensor.motion_px[0] + blur_px, self.sensor.motion_px[1]],
+            ..self.sensor.clone()
+        };
+        let frame = self.renderer.render(&self.building, &step.map_from_camera(), &sensor, seed);
+        let scan = laser::scan(&self.building, &step.map_from_robot, &self.laser, seed);
+        Sighting { step: step.clone(), frame, scan }
+    }
+}
+
+impl Iterator for Robot {
+    type Item = Sighting;
+
+    fn next(&mut self) -> Option<Sighting> {
+        let step = self.drive.next()?;
+        Some(self.look(&step))
+    }
+}
+
+/// Mounting of the camera at a pan and tilt.
+pub(crate) fn mounting(pan_rad: f64, tilt_rad: f64, height_m: f64) -> Isometry3<f64> {
+    pan_tilt(pan_rad, tilt_rad, Vector3::new(0.0, 0.0, height_m))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Point3;
+
+    fn corridor() -> Arc<Building> {
+        Arc::new(Building::corridor(5))
+    }
+
+    #[test]
+    fn drives_the_corridor_and_keeps_clear_of_the_walls() {
+        let building = corridor();
+        let p = DriveParams { legs: 2, ..DriveParams::default() };
+        let steps: Vec<Step> = Drive::new(building.clone(), &p).collect();
+        let furthest = steps.iter().map(|s| s.map_from_robot.x_m).fold(0.0, f64::max);
+        assert!((furthest - 23.8).abs() < 1e-6);
+        let last = steps.last().unwrap().map_from_robot;
+        assert!((last.x_m - 1.2).abs() < 1e-6 && last.y_m.abs() < 1e-6);
+        for pair in steps.windows(2) {
+            let motion = pair[0].map_from_robot.between(&pair[1].map_from_robot);
+            assert!(motion.position().norm() < 0.11 && motion.theta_rad.abs() < 0.2, "{motion:?}");
+            let position = Point2::from(pair[1].map_from_robot.position());
+            assert!(building.clearance_m(&position) > 0.5);
+        }
+    }
+
+    #[test]
+    fn every_poster_is_looked_at() {
+        let building = corridor();
+        let p = DriveParams { legs: 2, ..DriveParams::default() };
+        let steps: Vec<Step> = Drive::new(building.clone(), &p).collect();
+        for poster in building.posters() {
+            let aimed = steps.iter().filter(|s| {
+                let centre = Point3::from(poster.map_from_landmark.translation.vector);
+                let centre = s.map_from_camera().inverse() * centre;
+                s.target.as_deref() == Some(&poster.name)
+                    && (centre.x / centre.z).abs() < 0.15
+                    && centre.z > 0.0
+            });
+            assert!(aimed.count() >= 8, "{}", poster.name);
+        }
+    }
+
+    #[test]
+    fn same_seed_same_bytes_and_others_differ() {
+        let building = corridor();
+        let run = |seed, start_m| {
+            let drive = DriveParams { seed, start_m, ..DriveParams::default() };
+            let mut robot = Robot::new(building.clone(), &RobotParams { drive, ..RobotParams::default() });
+            robot.nth(2).unwrap()
+        };
+        let (a, b, c) = (run(1, 3.0), run(1, 3.0), run(2, 3.0));
+        assert_eq!(a.frame, b.frame);
+        assert_eq!((a.scan, a.step), (b.scan, b.step));
+        assert_ne!(a.frame.image, c.frame.image);
+    }
+
+    #[test]
+    fn a_wild_drive_is_tamed() {
+        let p =
+            DriveParams { rate_hz: f64::NAN, speed_mps: -1.0, weave_length_m: 0.0, ..DriveParams::default() };
+        assert!(Drive::new(corridor(), &p).take(1000).count() > 10);
+        assert_eq!(Drive::new(corridor(), &DriveParams { legs: 0, ..DriveParams::default() }).count(), 0);
+    }
+}

@@ -1,0 +1,133 @@
+//! A planar laser scanner among the building's walls, with noise and a maximum range.
+
+use map::laser::Scan;
+use map::pose2::Pose2;
+use nalgebra::{Point2, Vector2};
+use rand_distr::{Distribution, StandardNormal};
+use serde::{Deserialize, Serialize};
+
+use crate::building::{Building, WallSegment};
+use crate::seed;
+
+/// Most beams of a scan; more are not cast.
+pub const MAX_BEAMS: usize = 4096;
+
+/// A laser scanner. The default sweeps half a turn in half-degree steps.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct LaserParams {
+    /// Where it sits on the robot.
+    pub robot_from_laser: Pose2,
+    /// Beams over the field of view, 2 to [`MAX_BEAMS`].
+    pub beams: usize,
+    /// From the first beam (right) to the last (left), 0.01 to one turn; centred on the laser's x axis.
+    pub field_rad: f64,
+    /// Beyond it there is no return, 0.5 to 200 m.
+    pub max_range_m: f64,
+    /// Standard deviation of a range.
+    pub range_sigma_m: f64,
+}
+
+impl Default for LaserParams {
+    fn default() -> Self {
+        Self {
+            robot_from_laser: Pose2::new(0.2, 0.0, 0.0),
+            beams: 361,
+            field_rad: std::f64::consts::PI,
+            max_range_m: 8.0,
+            range_sigma_m: 0.015,
+        }
+    }
+}
+
+/// A scan from a pose of the robot. A beam without a return reads the maximum range.
+pub fn scan(building: &Building, map_from_robot: &Pose2, params: &LaserParams, seed: u64) -> Scan {
+    let p = params;
+    let within = |x: f64, low: f64, high: f64| if x.is_finite() { x.clamp(low, high) } else { low };
+    let (beams, field) = (p.beams.clamp(2, MAX_BEAMS), within(p.field_rad, 0.01, std::f64::consts::TAU));
+    let max_range_m = within(p.max_range_m, 0.5, 200.0);
+    let map_from_laser = map_from_robot.compose(&p.robot_from_laser);
+    let origin = map_from_laser.apply(&Point2::origin());
+    let step = field / (beams - 1) as f64;
+    let mut rng = seed::stream(seed, 40);
+    let beam = |i: usize| {
+        let bearing = map_from_laser.theta_rad - 0.5 * field + i as f64 * step;
+        let direction = Vector2::new(bearing.cos(), bearing.sin());
+        let noise: f64 = StandardNormal.sample(&mut rng);
+        match range(building.walls(), &origin, &direction, max_range_m) {
+            Some(r) => (r + p.range_sigma_m * noise).clamp(0.001, max_range_m) as f32,
+            None => max_range_m as f32,
+        }
+    };
+    let ranges = (0..beams).map(beam).collect();
+    Scan::new(p.robot_from_laser, -0.5 * field, step, max_range_m, ranges)
+        .expect("parameters are clamped to a scan's ranges")
+}
+
+/// Distance along a unit direction to the nearest wall nearer than `max_m`, either side of it.
+pub(crate) fn range(
+    walls: &[WallSegment],
+    from_m: &Point2<f64>,
+    direction: &Vector2<f64>,
+    max_m: f64,
+) -> Option<f64> {
+    let hit = |w: &WallSegment| {
+        let (along, to_a) = (w.b_m - w.a_m, w.a_m - from_m);
+        let cross = direction.perp(&along);
+        if cross.abs() < 1e-12 {
+            return None;
+        }
+        let (r, k) = (to_a.perp(&along) / cross, to_a.perp(direction) / cross);
+        (r > 1e-9 && r < max_m && (0.0..=1.0).contains(&k)).then_some(r)
+    };
+    walls.iter().filter_map(hit).min_by(f64::total_cmp)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn quiet() -> LaserParams {
+        LaserParams { range_sigma_m: 0.0, robot_from_laser: Pose2::default(), ..LaserParams::default() }
+    }
+
+    #[test]
+    fn beams_end_on_walls() {
+        let building = Building::corridor(2);
+        let robot = Pose2::new(6.0, 0.2, 0.4);
+        let scan = scan(&building, &robot, &quiet(), 0);
+        let mut hits = 0;
+        for i in 0..361 {
+            if let Some(p) = scan.point(i) {
+                assert!(building.clearance_m(&robot.apply(&p)) < 1e-5);
+                hits += 1;
+            }
+        }
+        assert!(hits > 250);
+    }
+
+    #[test]
+    fn distances_by_hand() {
+        let building = Building::corridor(2);
+        let straight = scan(&building, &Pose2::new(6.0, 0.3, 0.0), &quiet(), 0);
+        assert!((straight.range_m(0).unwrap() - 1.6).abs() < 1e-5, "right wall at y = -1.3");
+        assert!((straight.range_m(360).unwrap() - 1.0).abs() < 1e-5, "left wall at y = 1.3");
+        assert!(straight.range_m(180).is_none(), "the end wall is out of range");
+    }
+
+    #[test]
+    fn range_noise_has_its_sigma() {
+        let building = Building::corridor(2);
+        let robot = Pose2::new(6.0, 0.3, 0.0);
+        let noisy = LaserParams { range_sigma_m: 0.02, ..quiet() };
+        let errors: Vec<f64> = (0..4000)
+            .map(|seed| {
+                scan(&building, &robot, &LaserParams { beams: 2, ..noisy.clone() }, seed).range_m(0).unwrap()
+                    - 1.6
+            })
+            .collect();
+        let mean = errors.iter().sum::<f64>() / 4000.0;
+        let sigma = (errors.iter().map(|e| (e - mean).powi(2)).sum::<f64>() / 4000.0).sqrt();
+        assert!(mean.abs() < 0.0015 && (sigma - 0.02).abs() < 0.001, "{mean} {sigma}");
+    }
+}

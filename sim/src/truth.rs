@@ -1,0 +1,118 @@
+//! What is truly in a picture: where each landmark's corners are, how much of it is seen, from which angle.
+//! Corners come from projecting the landmark; the shares come from the depth buffer.
+
+use nalgebra::{Isometry3, Point2, Point3};
+use vision::detect::quads::Corners;
+
+use crate::building::{LandmarkKind, LandmarkTruth};
+use crate::camera::Camera;
+
+/// Nearest depth at which a corner counts as before the camera.
+const NEAR_M: f64 = 0.01;
+/// Hidden share from which a landmark counts as occluded.
+pub const OCCLUDED_SHARE: f64 = 0.02;
+
+/// How much of a landmark a picture holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ViewState {
+    /// All of it.
+    Full,
+    /// The image border cuts it.
+    Truncated,
+    /// It is within the image, but something stands before it.
+    Occluded,
+}
+
+/// One landmark in one picture.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LandmarkView {
+    /// Name of the landmark.
+    pub name: String,
+    /// What it is.
+    pub kind: LandmarkKind,
+    /// Corners in pixels, distortion included. They may lie outside the image.
+    pub corners_px: Corners,
+    /// Full, truncated or occluded.
+    pub state: ViewState,
+    /// Share of what lies within the image that something else hides, 0 to 1.
+    pub occluded_share: f64,
+    /// Area in which it is seen.
+    pub visible_px2: f64,
+    /// Angle between its normal and the direction to the camera, 0 frontal.
+    pub view_angle_rad: f64,
+    /// From the camera to its centre.
+    pub distance_m: f64,
+    /// Lengths of TL-TR, TR-BR, BR-BL, BL-TL.
+    pub sides_px: [f64; 4],
+    /// Maps landmark coordinates to camera coordinates.
+    pub camera_from_landmark: Isometry3<f64>,
+}
+
+impl LandmarkView {
+    /// Length of its shortest side.
+    pub fn min_side_px(&self) -> f64 {
+        self.sides_px.iter().copied().fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// What a picture truly shows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FrameTruth {
+    /// Pose of the camera.
+    pub map_from_camera: Isometry3<f64>,
+    /// Landmarks of which something is seen and whose corners all lie before the camera, in the building's order.
+    pub landmarks: Vec<LandmarkView>,
+}
+
+impl FrameTruth {
+    /// The view of a landmark, if it is seen.
+    pub fn landmark(&self, name: &str) -> Option<&LandmarkView> {
+        self.landmarks.iter().find(|l| l.name == name)
+    }
+}
+
+/// The truth about one landmark; `None` when it is not seen at all or partly behind the camera.
+pub(crate) fn look(
+    landmark: &LandmarkTruth,
+    camera: &Camera,
+    map_from_camera: &Isometry3<f64>,
+    [covered_px2, visible_px2]: [f64; 2],
+) -> Option<LandmarkView> {
+    if visible_px2 <= 0.0 || covered_px2 <= 0.0 {
+        return None;
+    }
+    let camera_from_landmark = map_from_camera.inverse() * landmark.map_from_landmark;
+    let corners =
+        crate::building::rectangle(landmark.width_m, landmark.height_m).map(|p| camera_from_landmark * p);
+    if corners.iter().any(|c| c.z < NEAR_M) {
+        return None;
+    }
+    let corners_px = corners.map(|c| camera.intrinsics().project(&c.coords));
+    let within = |c: &Point2<f64>| {
+        c.x >= -0.5
+            && c.y >= -0.5
+            && c.x <= camera.width_px() as f64 - 0.5
+            && c.y <= camera.height_px() as f64 - 0.5
+    };
+    let occluded_share = (1.0 - visible_px2 / covered_px2).clamp(0.0, 1.0);
+    let state = if !corners_px.iter().all(within) {
+        ViewState::Truncated
+    } else if occluded_share > OCCLUDED_SHARE {
+        ViewState::Occluded
+    } else {
+        ViewState::Full
+    };
+    let to_camera = camera_from_landmark.inverse() * Point3::origin();
+    Some(LandmarkView {
+        name: landmark.name.clone(),
+        kind: landmark.kind,
+        corners_px: Corners::new(corners_px).ok()?,
+        state,
+        occluded_share,
+        visible_px2,
+        view_angle_rad: to_camera.coords.yz().norm().atan2(to_camera.x),
+        distance_m: to_camera.coords.norm(),
+        sides_px: std::array::from_fn(|i| (corners_px[(i + 1) % 4] - corners_px[i]).norm()),
+        camera_from_landmark,
+    })
+}
