@@ -6,7 +6,10 @@
 pub mod check;
 pub mod pose2;
 pub mod mounting;
+pub mod gate;
 pub mod laser;
 pub mod segments;
 pub mod place;
 pub mod localise;
+pub mod lines;
+pub mod walls;

@@ -1,8 +1,52 @@
 //! From landmarks of known place, seen by a camera of known mounting, to the robot's pose on the floor (method 13.6).
+//!
+//! In: sightings, the mounting, perhaps a prior. Out: one pose with its covariance, or that several are left, or why
+//! there is none. The robot stands upright on the floor, so three numbers are fitted to all corners of all landmarks at
+//! once ([M] (b) of the method). It never picks a solution that image, wall and prior leave undecided.
 
-use crate::{place::LandmarkPlace, pose2::Pose2Covariance};
+mod planar;
+mod posterior;
+mod solve;
+
+use crate::{
+    check::{self, OutOfRange},
+    mounting::Mounting,
+    place::LandmarkPlace,
+    pose2::Pose2Covariance,
+};
 use nalgebra::{Matrix3, Matrix3x6, Matrix6};
+use serde::{Deserialize, Serialize};
 use vision::{localise::pose::LandmarkPose, recognise::LandmarkId};
+
+/// Most sightings used in one fix; of more, those with the largest image.
+pub const MAX_SIGHTINGS: usize = 8;
+
+/// Knobs of localisation.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct LocaliseParams {
+    /// Two solutions whose chi2 (image, and prior where there is one) differ by less are ambiguous. 16 leaves a wrong choice 3e-5 at worst (see
+    /// `vision::localise::pose::AMBIGUOUS_CHI2`).
+    pub ambiguous_chi2: f64,
+    /// Gate on chi2 per degree of freedom: no upright robot on the floor sees the corners there. 10 allows corner
+    /// errors three times as large as claimed; the covariance is scaled accordingly.
+    pub max_reduced_chi2: f64,
+    /// Gate on the squared Mahalanobis distance to the prior: 99 % of chi2 with 3 degrees of freedom.
+    pub prior_gate: f64,
+    /// Two minima with a lower barrier between them are one wide one.
+    pub merge_chi2: f64,
+}
+
+impl Default for LocaliseParams {
+    fn default() -> Self {
+        Self {
+            ambiguous_chi2: 16.0,
+            max_reduced_chi2: 10.0,
+            prior_gate: crate::gate::CHI2_3_99,
+            merge_chi2: 4.0,
+        }
+    }
+}
 
 /// A recognised landmark and where the map says it hangs.
 #[derive(Debug, Clone, Copy)]
@@ -24,7 +68,7 @@ pub enum NuisanceKey {
     Mounting,
 }
 
-/// How a lasting error moves a fix: `pose error = jacobian * error`.
+/// How a lasting error moves a fix: `estimated - true pose = jacobian * (true - assumed value)`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Nuisance {
     /// Whose error.
@@ -42,8 +86,6 @@ pub enum DecidedBy {
     Single,
     /// The corners and the known mounting (camera height, tilt, no roll): the other does not fit them.
     Image,
-    /// The other lies where it cannot be: behind the wall.
-    Side,
     /// The prior.
     Prior,
 }
@@ -70,7 +112,9 @@ pub struct Fix {
 /// Why recognised landmarks gave no pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum FixRefusal {
-    /// No planar pose explains the corners: camera height, tilt or the landmark's place is wrong.
+    /// No upright robot on the floor sees the corners there: camera height, tilt or the landmark's place is wrong.
+    // Departs from method 13.6, which gates |z|, |roll| and |pitch| of the pose in space: the same residuals, but weighed
+    // by what the corners know of them, which is little from afar and very much from near.
     Room {
         /// Weighted squared residual of the best try.
         chi2: f64,
@@ -87,7 +131,12 @@ pub enum FixRefusal {
     /// The robot would stand behind the wall.
     Side,
     /// The landmarks contradict one another.
-    Disagree,
+    Disagree {
+        /// Weighted squared residual of the best try.
+        chi2: f64,
+        /// The gate.
+        limit: f64,
+    },
     /// The corners do not fix the pose.
     Degenerate,
 }
@@ -102,3 +151,31 @@ pub enum RobotFix {
     /// No solution is left.
     Refused(FixRefusal),
 }
+
+/// The robot's pose from the landmarks of one frame. Errors name an input that is out of range.
+pub fn robot_pose(
+    sightings: &[Sighting<'_>],
+    mounting: &Mounting,
+    prior: Option<&Pose2Covariance>,
+    p: &LocaliseParams,
+) -> Result<RobotFix, OutOfRange> {
+    check::within("sightings", sightings.len() as f64, 1.0, f64::MAX)?;
+    mounting.check()?;
+    for sighting in sightings {
+        sighting.place.check()?;
+    }
+    if let Some(prior) = prior {
+        prior.check()?;
+    }
+    let mut used = sightings.to_vec();
+    // Largest first; stable, so equal ones stay in order.
+    used.sort_by(|a, b| {
+        let area = |s: &Sighting<'_>| s.seen.measured.corners_px.area_px2();
+        area(b).total_cmp(&area(a))
+    });
+    used.truncate(MAX_SIGHTINGS);
+    Ok(solve::solve(&used, mounting, prior, p))
+}
+
+#[cfg(test)]
+mod tests;

@@ -4,10 +4,11 @@
 //! other minimum of the reprojection error where there is one, and whether the two can be told apart.
 //! Decides nothing about the robot: that takes the map (`map::localise`).
 
-use super::refine::Problem;
+use super::{refine::Problem, reproject::corner_points};
 use crate::{
     detect::quads::Corners,
     frame::{Distortion, FrameError, Intrinsics},
+    geometry::homography::Homography,
 };
 use nalgebra::{Isometry3, Matrix2, Matrix3, Matrix6, Point2, Rotation3, UnitQuaternion, Vector2};
 
@@ -214,11 +215,9 @@ fn undistorted(
 fn linear_pose(measured: &Measured) -> Option<Isometry3<f64>> {
     let c = &measured.camera;
     let ray = |p: &Point2<f64>| Point2::new((p.x - c.cx_px) / c.fx_px, (p.y - c.cy_px) / c.fy_px);
-    let square = square_to_quad(&measured.corners_px.points().each_ref().map(ray))?;
-    // Landmark (y, z) to the unit square: s = y / w + 1/2 to the right, t = 1/2 - z / h downwards.
-    let (w, h) = (measured.size.width_m, measured.size.height_m);
-    let unit = Matrix3::new(1.0 / w, 0.0, 0.5, 0.0, -1.0 / h, 0.5, 0.0, 0.0, 1.0);
-    let b = square * unit;
+    let plane = corner_points(&measured.size).map(|p| Point2::new(p.y, p.z));
+    let rays = measured.corners_px.points().each_ref().map(ray);
+    let b = *Homography::from_points(&plane, &rays).ok()?.matrix();
     let (b1, b2, b3) = (b.column(0), b.column(1), b.column(2));
     let scale = (b1.norm() * b2.norm()).sqrt();
     let lambda = if b3.z < 0.0 { -1.0 } else { 1.0 } / scale;
@@ -253,16 +252,6 @@ fn mirrored(pose: &Isometry3<f64>) -> Isometry3<f64> {
     let rotation =
         Rotation3::from_matrix_unchecked(mirror * pose.rotation.to_rotation_matrix().matrix() * flip);
     Isometry3::from_parts(pose.translation, UnitQuaternion::from_rotation_matrix(&rotation))
-}
-
-/// The homography from the unit square (0,0), (1,0), (1,1), (0,1) to four points, in closed form.
-fn square_to_quad([p0, p1, p2, p3]: &[Point2<f64>; 4]) -> Option<Matrix3<f64>> {
-    let (d1, d2, s) = (p1 - p2, p3 - p2, (p0 - p1) + (p2 - p3));
-    let det = d1.perp(&d2);
-    let (g, h) = (s.perp(&d2) / det, d1.perp(&s) / det);
-    let (c0, c1) = (p1 - p0 + p1.coords * g, p3 - p0 + p3.coords * h);
-    let m = Matrix3::new(c0.x, c1.x, p0.x, c0.y, c1.y, p0.y, g, h, 1.0);
-    m.iter().all(|v| v.is_finite()).then_some(m)
 }
 
 #[cfg(test)]

@@ -1,0 +1,341 @@
+//! Exact poses, derivatives against differences, honest covariance by Monte Carlo, the planar ambiguity, refusals.
+
+use super::{planar::Planar, *};
+use crate::{mounting::pan_tilt, place::PlaceSigmas, pose2::Pose2};
+use nalgebra::{Isometry3, Matrix2, Point2, Vector2, Vector3, Vector6};
+use vision::{
+    detect::quads::Corners,
+    frame::{Distortion, Intrinsics},
+    learn::random::Random,
+    localise::{
+        pose::{LandmarkSize, landmark_pose},
+        reproject::{corner_points, perturbed, pixel},
+    },
+};
+
+const SIZE: LandmarkSize = LandmarkSize { width_m: 0.6, height_m: 0.84 };
+
+fn camera() -> Intrinsics {
+    Intrinsics::new(700.0, 700.0, 320.0, 240.0, Distortion::None).unwrap()
+}
+
+fn mounting() -> Mounting {
+    Mounting::new(pan_tilt(0.0, 0.05, Vector3::new(0.1, 0.02, 1.2))).unwrap()
+}
+
+fn place() -> LandmarkPlace {
+    LandmarkPlace::by_hand(Vector3::new(5.0, 3.0, 1.5), -2.2, SIZE, PlaceSigmas::default()).unwrap()
+}
+
+/// A robot at `d_m` and azimuth `psi_deg` from the landmark's normal, looking at it.
+fn robot(place: &LandmarkPlace, d_m: f64, psi_deg: f64) -> Pose2 {
+    let a = place.theta_rad + psi_deg.to_radians();
+    Pose2::new(place.x_m + d_m * a.cos(), place.y_m + d_m * a.sin(), a + std::f64::consts::PI)
+}
+
+/// What a camera sees of a landmark; `None` when a corner is behind it.
+fn look(
+    robot: &Pose2,
+    place: &LandmarkPlace,
+    robot_from_camera: &Isometry3<f64>,
+    sigma_px: f64,
+    random: &mut Random,
+) -> Option<LandmarkPose> {
+    let camera_from_landmark =
+        robot_from_camera.inverse() * robot.to_isometry3().inverse() * place.map_from_landmark();
+    let mut points = [Point2::origin(); 4];
+    for (px, point) in points.iter_mut().zip(corner_points(&place.size)) {
+        let noise = Vector2::new(random.normal(), random.normal()) * sigma_px;
+        *px = pixel(&camera_from_landmark, &point, &camera())? + noise;
+    }
+    let claimed = [Matrix2::identity() * sigma_px.max(0.01).powi(2); 4];
+    landmark_pose(&Corners::new(points).ok()?, &claimed, SIZE, &camera()).ok()
+}
+
+fn sighting<'a>(id: u64, seen: &'a LandmarkPose, place: &'a LandmarkPlace) -> Sighting<'a> {
+    Sighting { landmark: LandmarkId(id), seen, place }
+}
+
+fn draw(covariance: &Matrix6<f64>, random: &mut Random) -> Vector6<f64> {
+    covariance.cholesky().unwrap().l() * Vector6::from_fn(|_, _| random.normal())
+}
+
+fn moved(place: &LandmarkPlace, e: &Vector6<f64>) -> LandmarkPlace {
+    let size = LandmarkSize { width_m: place.size.width_m + e[4], height_m: place.size.height_m + e[5] };
+    LandmarkPlace {
+        x_m: place.x_m + e[0],
+        y_m: place.y_m + e[1],
+        theta_rad: place.theta_rad + e[2],
+        z_m: place.z_m + e[3],
+        size,
+        ..*place
+    }
+}
+
+fn fixed(answer: RobotFix) -> Fix {
+    match answer {
+        RobotFix::Fixed(fix) => *fix,
+        other => panic!("{other:?}"),
+    }
+}
+
+fn fix_of(seen: &LandmarkPose, place: &LandmarkPlace, prior: Option<&Pose2Covariance>) -> RobotFix {
+    robot_pose(&[sighting(1, seen, place)], &mounting(), prior, &LocaliseParams::default()).unwrap()
+}
+
+fn nees(fix: &Fix, truth: &Pose2) -> f64 {
+    let e = fix.pose.pose.minus(truth);
+    e.dot(&fix.pose.covariance.cholesky().unwrap().solve(&e))
+}
+
+#[test]
+fn exact_corners_give_the_exact_pose() {
+    let mut random = Random::new(1);
+    for (d, psi) in [(1.5, 30.0), (3.0, -50.0), (5.0, 70.0), (2.0, 0.0), (4.0, -20.0)] {
+        let truth = robot(&place(), d, psi);
+        let seen = look(&truth, &place(), &mounting().robot_from_camera, 0.0, &mut random).unwrap();
+        let fix = fixed(fix_of(&seen, &place(), None));
+        // The mean of the posterior differs from its peak by the curvature of the problem.
+        let sigma = fix.pose.covariance.diagonal().map(f64::sqrt);
+        let e = fix.pose.pose.minus(&truth);
+        assert!((0..3).all(|k| e[k].abs() < 0.1 * sigma[k]), "{d} {psi}: {e} {sigma}");
+        assert!(fix.chi2 < 1e-6);
+        assert_eq!((fix.dof, &fix.landmarks), (5, &vec![LandmarkId(1)]));
+    }
+}
+
+#[test]
+fn derivatives_are_the_finite_differences() {
+    let mut random = Random::new(2);
+    let truth = robot(&place(), 3.0, 25.0);
+    let mut tilted = place();
+    tilted.roll_rad = 0.05;
+    let seen = look(&truth, &tilted, &mounting().robot_from_camera, 0.5, &mut random).unwrap();
+    let residual = |pose: &Pose2, place: &LandmarkPlace, mounting: &Mounting| {
+        let sightings = [sighting(1, &seen, place)];
+        Planar::new(&sightings, mounting).linearise(pose).unwrap()
+    };
+    let at = residual(&truth, &tilted, &mounting());
+    let h = 1e-6;
+    for k in 0..3 {
+        let mut d = Vector3::zeros();
+        d[k] = h;
+        let up = residual(&truth.plus(&d), &tilted, &mounting()).residual;
+        let down = residual(&truth.plus(&-d), &tilted, &mounting()).residual;
+        // The residual is seen minus predicted.
+        assert!(((down - up) / (2.0 * h) - at.by_pose.column(k)).norm() < 1e-4, "pose {k}");
+    }
+    for k in 0..6 {
+        let mut d = Vector6::zeros();
+        d[k] = h;
+        let up = residual(&truth, &moved(&tilted, &d), &mounting()).residual;
+        let down = residual(&truth, &moved(&tilted, &-d), &mounting()).residual;
+        assert!(((down - up) / (2.0 * h) - at.by_nuisance.column(k)).norm() < 1e-4, "place {k}");
+        let turned = |d: Vector6<f64>| {
+            let base = mounting();
+            let (turn, shift) = (d.fixed_rows::<3>(0).into(), d.fixed_rows::<3>(3).into());
+            Mounting { robot_from_camera: perturbed(&base.robot_from_camera, &turn, &shift), ..base }
+        };
+        let up = residual(&truth, &tilted, &turned(d)).residual;
+        let down = residual(&truth, &tilted, &turned(-d)).residual;
+        assert!(((down - up) / (2.0 * h) - at.by_nuisance.column(6 + k)).norm() < 1e-4, "mounting {k}");
+    }
+}
+
+#[test]
+fn covariance_is_honest_in_twelve_cells() {
+    // reliability: distance x obliquity x noise. Place, mounting and corners are drawn anew each time.
+    let mut random = Random::new(3);
+    let (mut outside, mut wild, mut all) = (0, 0, 0);
+    for sigma_px in [0.3, 0.8] {
+        for d in [2.0, 4.0, 6.0] {
+            for psi in [10.0, 45.0] {
+                let (mut sum, mut n) = (0.0, 0);
+                for _ in 0..200 {
+                    let truth = robot(&place(), d, psi);
+                    let hung = moved(&place(), &draw(&place().covariance, &mut random));
+                    let m = mounting();
+                    let e = draw(&m.covariance, &mut random);
+                    let (turn, shift) = (e.fixed_rows::<3>(0).into(), e.fixed_rows::<3>(3).into());
+                    let mounted = perturbed(&m.robot_from_camera, &turn, &shift);
+                    let seen = look(&truth, &hung, &mounted, sigma_px, &mut random).unwrap();
+                    if let RobotFix::Fixed(fix) = fix_of(&seen, &place(), None) {
+                        let value = nees(&fix, &truth);
+                        wild += usize::from(value > 30.0);
+                        (sum, n) = (sum + value, n + 1);
+                    }
+                }
+                all += n;
+                let mean = sum / f64::from(n);
+                assert!(n >= 150, "{d} m {psi} deg {sigma_px} px: only {n} fixes");
+                assert!((2.57..3.47).contains(&mean), "{d} m {psi} deg {sigma_px} px: {mean}");
+                outside += usize::from(!(2.67..3.35).contains(&mean));
+            }
+        }
+    }
+    assert!(outside <= 2, "{outside} cells outside the 95 % band");
+    assert!(wild <= 2, "{wild} of {all} fixes far outside their covariance");
+}
+
+#[test]
+fn seen_from_the_front_it_is_careful_rather_than_sure() {
+    let mut random = Random::new(5);
+    let truth = robot(&place(), 6.0, 0.0);
+    let (mut sum, mut n, mut heading) = (0.0, 0.0, 0.0);
+    for _ in 0..200 {
+        let seen = look(&truth, &place(), &mounting().robot_from_camera, 0.5, &mut random).unwrap();
+        if let RobotFix::Fixed(fix) = fix_of(&seen, &place(), None) {
+            (sum, n) = (sum + nees(&fix, &truth), n + 1.0);
+            heading += fix.pose.covariance[(2, 2)].sqrt();
+        }
+    }
+    let (mean, sigma_deg) = (sum / n, f64::to_degrees(heading / n));
+    assert!(n > 150.0 && (1.0..3.5).contains(&mean), "{n} {mean}");
+    assert!((2.0..10.0).contains(&sigma_deg), "{sigma_deg}");
+}
+
+/// From afar and aslant the two solutions fit alike: the case that only a prior decides.
+fn undecided(random: &mut Random) -> (Pose2, LandmarkPose) {
+    let truth = robot(&place(), 6.0, 20.0);
+    loop {
+        let seen = look(&truth, &place(), &mounting().robot_from_camera, 1.5, random).unwrap();
+        if matches!(fix_of(&seen, &place(), None), RobotFix::Ambiguous(_)) {
+            return (truth, seen);
+        }
+    }
+}
+
+#[test]
+fn the_prior_decides_or_nobody_does() {
+    let mut random = Random::new(6);
+    for _ in 0..20 {
+        let (truth, seen) = undecided(&mut random);
+        let around = |pose: Pose2, xy: f64, theta: f64| {
+            let v = Vector3::new(xy * xy, xy * xy, theta * theta);
+            Pose2Covariance::new(pose, Matrix3::from_diagonal(&v)).unwrap()
+        };
+        match fix_of(&seen, &place(), Some(&around(truth, 0.3, 0.05))) {
+            RobotFix::Fixed(fix) => {
+                assert_eq!(fix.decided_by, DecidedBy::Prior);
+                assert!(nees(&fix, &truth) < 25.0);
+            }
+            other => panic!("{other:?}"),
+        }
+        // A prior that knows nothing decides nothing.
+        let vague = fix_of(&seen, &place(), Some(&around(truth, 50.0, 3.0)));
+        assert!(matches!(vague, RobotFix::Ambiguous(_)), "{vague:?}");
+        // A prior elsewhere refuses both.
+        let elsewhere = around(truth.plus(&Vector3::new(30.0, 0.0, 0.0)), 0.3, 0.05);
+        let refused = fix_of(&seen, &place(), Some(&elsewhere));
+        assert!(matches!(refused, RobotFix::Refused(FixRefusal::Prior { .. })), "{refused:?}");
+    }
+}
+
+#[test]
+fn a_second_landmark_sharpens_the_fix_and_ends_the_doubt() {
+    let mut random = Random::new(8);
+    let first = place();
+    let second = LandmarkPlace { x_m: first.x_m + 0.8, y_m: first.y_m - 1.1, z_m: 1.8, ..first };
+    let truth = robot(&first, 6.0, 20.0);
+    let sight = |place: &LandmarkPlace, random: &mut Random| {
+        look(&truth, place, &mounting().robot_from_camera, 1.0, random).unwrap()
+    };
+    let (mut sum, mut sharper) = (0.0, 0);
+    for _ in 0..50 {
+        let (a, b) = (sight(&first, &mut random), sight(&second, &mut random));
+        let both = [sighting(1, &a, &first), sighting(2, &b, &second)];
+        let fix = fixed(robot_pose(&both, &mounting(), None, &LocaliseParams::default()).unwrap());
+        assert_eq!(fix.dof, 13);
+        sum += nees(&fix, &truth);
+        let alone = fix_of(&a, &first, None);
+        let wide = |f: &Fix| f.pose.covariance[(0, 0)] + f.pose.covariance[(1, 1)];
+        sharper += usize::from(match alone {
+            RobotFix::Fixed(one) => wide(&one) > wide(&fix),
+            _ => true,
+        });
+        // Order does not matter.
+        let swapped = [both[1], both[0]];
+        let again = fixed(robot_pose(&swapped, &mounting(), None, &LocaliseParams::default()).unwrap());
+        assert!(again.pose.pose.minus(&fix.pose.pose).norm() < 1e-4);
+    }
+    assert!(sharper >= 45, "{sharper}");
+    assert!(sum / 50.0 < 3.9, "{}", sum / 50.0);
+}
+
+#[test]
+fn what_cannot_be_is_refused() {
+    let mut random = Random::new(9);
+    let truth = robot(&place(), 2.5, 30.0);
+    let seen = look(&truth, &place(), &mounting().robot_from_camera, 0.5, &mut random).unwrap();
+    // The map says half a metre higher: no robot on the floor sees it there.
+    let raised = LandmarkPlace { z_m: 2.0, ..place() };
+    let answer = fix_of(&seen, &raised, None);
+    assert!(matches!(answer, RobotFix::Refused(FixRefusal::Room { .. })), "{answer:?}");
+    // Of two landmarks one was moved by a metre.
+    let other = LandmarkPlace { x_m: place().x_m + 0.9, y_m: place().y_m - 0.6, ..place() };
+    let b = look(&truth, &other, &mounting().robot_from_camera, 0.5, &mut random).unwrap();
+    let claimed = LandmarkPlace { x_m: other.x_m + 0.8, y_m: other.y_m - 0.6, ..other };
+    let home = place();
+    let both = [sighting(1, &seen, &home), sighting(2, &b, &claimed)];
+    let answer = robot_pose(&both, &mounting(), None, &LocaliseParams::default()).unwrap();
+    assert!(matches!(answer, RobotFix::Refused(FixRefusal::Disagree { .. })), "{answer:?}");
+}
+
+#[test]
+fn numbers_that_are_none_are_named() {
+    let mut random = Random::new(10);
+    let truth = robot(&place(), 2.5, 30.0);
+    let seen = look(&truth, &place(), &mounting().robot_from_camera, 0.5, &mut random).unwrap();
+    let p = LocaliseParams::default();
+    assert_eq!(robot_pose(&[], &mounting(), None, &p).unwrap_err().field, "sightings");
+    let home = place();
+    let nowhere = LandmarkPlace { y_m: f64::NAN, ..place() };
+    let with = |place: &LandmarkPlace, mounting: &Mounting, prior: Option<&Pose2Covariance>| {
+        robot_pose(&[sighting(1, &seen, place)], mounting, prior, &p).unwrap_err().field
+    };
+    assert_eq!(with(&nowhere, &mounting(), None), "y_m");
+    let mut loose = mounting();
+    loose.robot_from_camera.translation.vector.x = f64::INFINITY;
+    assert_eq!(with(&home, &loose, None), "robot_from_camera.translation");
+    let prior = Pose2Covariance { pose: truth, covariance: -Matrix3::identity() };
+    assert_eq!(with(&home, &mounting(), Some(&prior)), "covariance");
+    // More sightings than are used.
+    let many = vec![sighting(1, &seen, &home); MAX_SIGHTINGS + 3];
+    match robot_pose(&many, &mounting(), None, &p).unwrap() {
+        RobotFix::Fixed(fix) => assert_eq!(fix.landmarks.len(), MAX_SIGHTINGS),
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn the_map_may_be_turned_and_shifted() {
+    // Symmetry: the same world in another map frame.
+    let mut random = Random::new(11);
+    let truth = robot(&place(), 3.0, 35.0);
+    let seen = look(&truth, &place(), &mounting().robot_from_camera, 0.5, &mut random).unwrap();
+    let fix = fixed(fix_of(&seen, &place(), None));
+    let shift = Pose2::new(-7.0, 11.0, 2.5);
+    let at = shift.compose(&Pose2::new(place().x_m, place().y_m, place().theta_rad));
+    let elsewhere = LandmarkPlace { x_m: at.x_m, y_m: at.y_m, theta_rad: at.theta_rad, ..place() };
+    let other = fixed(fix_of(&seen, &elsewhere, None));
+    assert!(shift.compose(&fix.pose.pose).minus(&other.pose.pose).norm() < 1e-6);
+    assert!((fix.pose.covariance.determinant() / other.pose.covariance.determinant() - 1.0).abs() < 1e-3);
+}
+
+#[test]
+fn parts_of_the_covariance_add_up() {
+    let mut random = Random::new(12);
+    for psi in [0.0, 15.0, 50.0] {
+        let truth = robot(&place(), 4.0, psi);
+        let seen = look(&truth, &place(), &mounting().robot_from_camera, 0.5, &mut random).unwrap();
+        let fix = fixed(fix_of(&seen, &place(), None));
+        let mut sum = fix.noise;
+        for n in &fix.nuisances {
+            sum += n.jacobian * n.covariance * n.jacobian.transpose();
+        }
+        assert!((sum - fix.pose.covariance).norm() < 1e-9 * sum.norm());
+        assert!(fix.noise.symmetric_eigenvalues().min() > 0.0);
+        let keys: Vec<_> = fix.nuisances.iter().map(|n| n.key).collect();
+        assert_eq!(keys, [NuisanceKey::Landmark(LandmarkId(1)), NuisanceKey::Mounting]);
+    }
+}
