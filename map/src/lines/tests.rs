@@ -89,7 +89,7 @@ fn the_fit_is_the_eigenvector() {
         let scatter: Matrix2<f64> =
             points.iter().map(|p| (p.coords - centre) * (p.coords - centre).transpose()).sum();
         let eigen = scatter.symmetric_eigen();
-        let k = if eigen.eigenvalues[0] < eigen.eigenvalues[1] { 0 } else { 1 };
+        let k = usize::from(eigen.eigenvalues[0] >= eigen.eigenvalues[1]);
         let normal = eigen.eigenvectors.column(k);
         assert!((normal.dot(&line.normal()).abs() - 1.0).abs() < 1e-9);
         assert!((normal.dot(&centre).abs() - line.rho_m).abs() < 1e-9 && line.rho_m >= 0.0);
