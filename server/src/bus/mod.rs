@@ -1,1 +1,125 @@
-//! The zenoh side: frames, odometry and presence in, answers and events out.
+//! The zenoh side: frames, odometry, scans and presence in; answers, poses and map changes out. The only place of the
+//! server that knows zenoh. An embedded router on the configured endpoint, so robots need no other daemon; no
+//! discovery, no shared memory, no administration space, bounded messages.
+//!
+//! Callbacks run on zenoh's threads and never wait: they check and hand over. What goes out passes a bounded queue
+//! and its own thread, so a slow link holds up no worker.
+
+mod inbox;
+mod outbox;
+mod router;
+
+pub use outbox::Outbox;
+
+use crate::{
+    config::Config,
+    engine::{intake::Intake, live::LiveHub, motion::Motion},
+};
+use protos::{Key, Keys, v1};
+use std::sync::Arc;
+use tokio::{sync::broadcast::error::RecvError, task::JoinHandle};
+use zenoh::pubsub::Subscriber;
+
+/// Why the bus did not open.
+#[derive(Debug, thiserror::Error)]
+pub enum BusError {
+    /// The endpoint cannot be listened on.
+    #[error("cannot listen for robots on {endpoint}: {detail}")]
+    Listen {
+        /// Endpoint asked for.
+        endpoint: String,
+        /// What was said.
+        detail: String,
+    },
+    /// zenoh refused a declaration on the open session.
+    #[error("zenoh could not {action}: {detail}")]
+    Declare {
+        /// What was tried.
+        action: &'static str,
+        /// What it said.
+        detail: String,
+    },
+}
+
+/// What the bus hands messages to.
+#[derive(Debug, Clone)]
+pub struct Receivers {
+    /// Frames.
+    pub intake: Arc<Intake>,
+    /// Odometry and scans.
+    pub motion: Arc<Motion>,
+    /// Presence, and refusals for pages.
+    pub live: Arc<LiveHub>,
+}
+
+/// The open bus.
+pub struct Bus {
+    endpoint: String,
+    session: zenoh::Session,
+    outbox: Outbox,
+    changes: JoinHandle<()>,
+    subscribers: Vec<Subscriber<()>>,
+}
+
+impl std::fmt::Debug for Bus {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Bus").field("endpoint", &self.endpoint).finish_non_exhaustive()
+    }
+}
+
+impl Bus {
+    /// Opens the router and starts to receive. Needs a multi-threaded runtime.
+    pub async fn open(config: &Config, to: Receivers) -> Result<Self, BusError> {
+        let endpoint = router::endpoint(&config.zenoh_endpoint)?;
+        let session = router::open(&endpoint, config.limits.robots, config.limits.frame_bytes).await?;
+        let keys = Keys::new(&config.fleet);
+        let outbox = Outbox::start(session.clone(), keys.clone());
+        let changes = tokio::spawn(tell_changes(to.clone(), outbox.clone()));
+        let subscribers = inbox::subscribe(&session, &keys, &to, &outbox).await?;
+        tracing::info!(endpoint, fleet = %config.fleet, "robots may connect");
+        Ok(Self { endpoint, session, outbox, changes, subscribers })
+    }
+
+    /// Where robots connect, with the real port.
+    pub fn endpoint(&self) -> &str {
+        &self.endpoint
+    }
+
+    /// Where answers and poses are put.
+    pub fn outbox(&self) -> &Outbox {
+        &self.outbox
+    }
+
+    /// Stops receiving, sends what is queued, closes the router.
+    pub async fn close(self) {
+        self.changes.abort();
+        for subscriber in self.subscribers {
+            if let Err(error) = subscriber.undeclare().await {
+                tracing::warn!(%error, "undeclare");
+            }
+        }
+        self.outbox.drain().await;
+        if let Err(error) = self.session.close().await {
+            tracing::warn!(%error, "closing zenoh");
+        }
+    }
+}
+
+/// Passes map changes on to robots and pages.
+async fn tell_changes(to: Receivers, outbox: Outbox) {
+    let mut changes = to.intake.snapshots.changes();
+    loop {
+        match changes.recv().await {
+            Ok(change) => {
+                if let (Some(version), Ok(map)) = (change.version, protos::Name::new(change.map.as_str())) {
+                    let message = v1::MapChanged { map: change.map.clone(), version };
+                    outbox.send(&Key::MapChanged(map), &message);
+                }
+                to.live.map_changed(change.map, change.version);
+            }
+            // Robots that missed one see the version in their next answer.
+            Err(RecvError::Lagged(_)) => {}
+            Err(RecvError::Closed) => return,
+        }
+    }
+}

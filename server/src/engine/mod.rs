@@ -3,3 +3,6 @@
 pub mod snapshot;
 pub mod decode;
 pub mod slots;
+pub mod intake;
+pub mod live;
+pub mod motion;

@@ -1,0 +1,215 @@
+//! A frame arrives: bytes of a robot on the key of a camera. Out: the frame in its slot, or a refusal as the answer to
+//! publish at once. Checks everything but the pixels, and never waits: it runs on the transport's threads.
+
+use super::slots::{SlotKey, Slots};
+use super::snapshot::Snapshots;
+use protos::{
+    CheckedFrame, Code, Rejection,
+    prost::{Message, bytes::Bytes},
+    v1,
+};
+use std::{
+    sync::Arc,
+    time::{Duration, Instant, SystemTime, UNIX_EPOCH},
+};
+
+/// A capture time further from the server's clock is flagged.
+pub const CLOCK_TOLERANCE: Duration = Duration::from_secs(2);
+
+/// A frame that waits for a worker.
+#[derive(Debug)]
+pub struct FrameJob {
+    /// The frame, checked but for its pixels.
+    pub frame: CheckedFrame,
+    /// The map to recognise against.
+    pub map: String,
+    /// When it came.
+    pub received: Instant,
+    /// Work does not begin later.
+    pub deadline: Instant,
+    /// The robot's clock is off.
+    pub clock_suspect: bool,
+}
+
+/// Takes frames in.
+#[derive(Debug)]
+pub struct Intake {
+    /// Where frames wait.
+    pub slots: Arc<Slots<FrameJob>>,
+    /// Which robots and maps there are.
+    pub snapshots: Arc<Snapshots>,
+    /// Largest message, in bytes.
+    pub frame_bytes: usize,
+    /// Deadline of frames that name none.
+    pub deadline: Duration,
+}
+
+impl Intake {
+    /// Puts the frame in its slot, or counts its refusal and gives the answer that says why.
+    pub fn receive(&self, key: SlotKey, message: Bytes) -> Result<(), Box<v1::Answer>> {
+        let received = Instant::now();
+        let mut echo = v1::Answer { status: v1::Status::Rejected.into(), ..v1::Answer::default() };
+        let job = match self.check(&key, message, received, &mut echo) {
+            Ok(job) => job,
+            Err(refusal) => {
+                self.slots.refuse(refusal.code);
+                return Err(refused(echo, &refusal));
+            }
+        };
+        let order = (job.frame.epoch, job.frame.seq);
+        // The slot counts its own refusals.
+        self.slots.offer(key, order, job, received).map_err(|refusal| refused(echo, &refusal))
+    }
+
+    fn check(
+        &self,
+        key: &SlotKey,
+        message: Bytes,
+        received: Instant,
+        echo: &mut v1::Answer,
+    ) -> Result<FrameJob, Rejection> {
+        let Some(robot_map) = self.snapshots.robot_map(key.robot.as_str()) else {
+            let detail = format!("robot {} is not registered: PUT /api/v1/robots/{}", key.robot, key.robot);
+            return Err(Rejection::new(Code::UnknownRobot, "robot", detail));
+        };
+        if message.len() > self.frame_bytes {
+            let detail = format!("{} bytes are more than {}", message.len(), self.frame_bytes);
+            return Err(Rejection::new(Code::TooLarge, "frame", detail));
+        }
+        let frame = v1::Frame::decode(message)
+            .map_err(|e| Rejection::new(Code::BadMessage, "frame", format!("no Frame message: {e}")))?;
+        (echo.epoch, echo.seq, echo.captured_ns) = (frame.epoch, frame.seq, frame.captured_ns);
+        let frame = CheckedFrame::try_from(frame)?;
+        let map = frame.map.as_ref().map_or(robot_map, ToString::to_string);
+        echo.map.clone_from(&map);
+        if self.snapshots.get(&map).is_none() {
+            return Err(unknown_map(&map));
+        }
+        let wait = frame.deadline_ms.map_or(self.deadline, |ms| Duration::from_millis(u64::from(ms)));
+        let clock_suspect = clock_suspect(frame.captured_ns);
+        Ok(FrameJob { frame, map, received, deadline: received + wait, clock_suspect })
+    }
+}
+
+/// There is no such map (any more).
+pub(crate) fn unknown_map(map: &str) -> Rejection {
+    Rejection::new(Code::UnknownMap, "map", format!("there is no map {map}"))
+}
+
+fn refused(mut echo: v1::Answer, refusal: &Rejection) -> Box<v1::Answer> {
+    echo.rejection = Some(refusal.into());
+    Box::new(echo)
+}
+
+/// Whether a robot's capture time is further than [`CLOCK_TOLERANCE`] from this machine's clock. Only ever reported.
+fn clock_suspect(captured_ns: i64) -> bool {
+    let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    (i128::from(captured_ns) - now.as_nanos() as i128).unsigned_abs() > CLOCK_TOLERANCE.as_nanos()
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use crate::engine::snapshot::MapSnapshot;
+    use protos::Name;
+
+    pub(crate) fn map(name: &str) -> Arc<MapSnapshot> {
+        Arc::new(MapSnapshot {
+            name: name.into(),
+            version: 3,
+            landmarks: std::collections::BTreeMap::new(),
+            walls: Vec::new(),
+            distance: vision::recognise::DistanceKind::Both,
+            params: Arc::default(),
+        })
+    }
+
+    fn intake() -> Intake {
+        let snapshots = Arc::new(Snapshots::default());
+        snapshots.publish(map("hall"));
+        snapshots.set_robot("r1", Some("hall"));
+        snapshots.set_robot("lost", Some("gone"));
+        let slots = Arc::new(Slots::new(4));
+        Intake { slots, snapshots, frame_bytes: 1000, deadline: Duration::from_millis(500) }
+    }
+
+    fn key(robot: &str) -> SlotKey {
+        SlotKey { robot: Name::new(robot).unwrap(), camera: Name::new("front").unwrap() }
+    }
+
+    fn frame(seq: u64) -> v1::Frame {
+        let image = Bytes::from(vec![0; 12]);
+        let encoding = v1::ImageEncoding::Gray8.into();
+        v1::Frame {
+            epoch: 5,
+            seq,
+            captured_ns: 77,
+            encoding,
+            width_px: 4,
+            height_px: 3,
+            image,
+            ..v1::Frame::default()
+        }
+    }
+
+    fn refusal(intake: &Intake, robot: &str, message: Vec<u8>) -> (String, String, u64) {
+        let answer = intake.receive(key(robot), message.into()).unwrap_err();
+        assert_eq!(answer.status(), v1::Status::Rejected);
+        let r = answer.rejection.unwrap();
+        (r.code, r.field, answer.seq)
+    }
+
+    #[test]
+    fn each_fault_is_answered_with_its_code_and_field() {
+        let intake = intake();
+        let good = |seq| frame(seq).encode_to_vec();
+        intake.receive(key("r1"), good(5).into()).unwrap();
+        let is = |code: &str, field: &str, seq: u64| (code.to_owned(), field.to_owned(), seq);
+        assert_eq!(refusal(&intake, "nobody", good(6)), is("unknown_robot", "robot", 0));
+        assert_eq!(refusal(&intake, "r1", b"\xff\xff".to_vec()), is("bad_message", "frame", 0));
+        let camera = v1::Intrinsics { fx_px: f64::NAN, ..v1::Intrinsics::default() };
+        let nan = v1::Frame { intrinsics: Some(camera), ..frame(6) };
+        assert_eq!(refusal(&intake, "r1", nan.encode_to_vec()), is("not_finite", "intrinsics.fx_px", 6));
+        let wrong = v1::Frame { width_px: 5, ..frame(6) };
+        assert_eq!(refusal(&intake, "r1", wrong.encode_to_vec()), is("size_mismatch", "image", 6));
+        let elsewhere = v1::Frame { map: "cellar".into(), ..frame(6) };
+        assert_eq!(refusal(&intake, "r1", elsewhere.encode_to_vec()), is("unknown_map", "map", 6));
+        assert_eq!(refusal(&intake, "lost", good(6)), is("unknown_map", "map", 6));
+        assert_eq!(refusal(&intake, "r1", good(5)), is("not_newer", "seq", 5));
+        let counts = intake.slots.counts();
+        assert_eq!((counts.received, counts.rejected_total(), counts.waiting), (8, 7, 1));
+        assert_eq!(counts.missing(), 0);
+    }
+
+    #[test]
+    fn messages_at_the_bound() {
+        let mut intake = intake();
+        let message = frame(1).encode_to_vec();
+        intake.frame_bytes = message.len() - 1;
+        assert_eq!(refusal(&intake, "r1", message.clone()).0, "too_large");
+        intake.frame_bytes = message.len();
+        assert!(intake.receive(key("r1"), message.into()).is_ok());
+    }
+
+    #[test]
+    fn a_frame_may_ask_for_its_own_deadline() {
+        let intake = intake();
+        intake.receive(key("r1"), frame(1).encode_to_vec().into()).unwrap();
+        let (k, job) = intake.slots.try_take().unwrap();
+        assert_eq!(job.deadline - job.received, Duration::from_millis(500));
+        assert!(job.clock_suspect, "captured in 1970");
+        intake.slots.finish(&k, crate::engine::slots::Outcome::Processed);
+        let hasty = v1::Frame { deadline_ms: 40, ..frame(2) };
+        intake.receive(key("r1"), hasty.encode_to_vec().into()).unwrap();
+        let (_, job) = intake.slots.try_take().unwrap();
+        assert_eq!(job.deadline - job.received, Duration::from_millis(40));
+    }
+
+    #[test]
+    fn clocks_within_two_seconds_are_fine() {
+        let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap().as_nanos() as i64;
+        assert!(!clock_suspect(now) && !clock_suspect(now - 1_900_000_000));
+        assert!(clock_suspect(now - 2_100_000_000) && clock_suspect(now + 2_100_000_000));
+        assert!(clock_suspect(i64::MIN) && clock_suspect(i64::MAX));
+    }
+}

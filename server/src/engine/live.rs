@@ -1,0 +1,406 @@
+//! What pages show: the last frame and answer of each camera, tracks of each robot, and a stream of events. In: what
+//! the bus and the workers saw. Out: copies for readers, who never hold up a worker: a slow reader misses events.
+//! Nothing here is kept on disk, and every collection is bounded.
+
+use map::pose2::{Pose2, Pose2Covariance};
+use protos::{
+    Name,
+    convert::{Encoding, geometry::pose2_wire},
+    prost::bytes::Bytes,
+    v1,
+};
+use serde::Serialize;
+use std::{
+    collections::{BTreeMap, BTreeSet, VecDeque},
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
+};
+use tokio::sync::broadcast;
+
+use super::slots::SlotKey;
+
+/// Cameras whose last frame is kept; the one longest without a frame gives way.
+pub const MAX_CAMERAS: usize = 32;
+/// Robots whose tracks are kept; the one longest without a pose gives way.
+pub const MAX_TRACKS: usize = 256;
+/// Points of one track; the oldest give way.
+pub const MAX_TRACK_POINTS: usize = 2000;
+/// Events that a reader may be behind before it misses the oldest.
+pub const EVENTS_KEPT: usize = 512;
+
+/// The last frame of a camera, as it came.
+#[derive(Debug, Clone)]
+pub struct LiveFrame {
+    /// How it is packed.
+    pub encoding: Encoding,
+    /// Width.
+    pub width_px: u32,
+    /// Height.
+    pub height_px: u32,
+    /// Encoded image.
+    pub image: Bytes,
+    /// What was answered.
+    pub answer: Arc<v1::Answer>,
+}
+
+impl LiveFrame {
+    /// The image in a form that browsers show: its media type and bytes. Raw grey becomes PNG.
+    pub fn for_browsers(&self) -> Result<(&'static str, Bytes), image::ImageError> {
+        match self.encoding {
+            Encoding::Jpeg => Ok(("image/jpeg", self.image.clone())),
+            Encoding::Png => Ok(("image/png", self.image.clone())),
+            Encoding::Gray8 => {
+                let mut out = Vec::new();
+                let encoder = image::codecs::png::PngEncoder::new(&mut out);
+                let (width, height) = (self.width_px, self.height_px);
+                let gray = image::ExtendedColorType::L8;
+                image::ImageEncoder::write_image(encoder, &self.image, width, height, gray)?;
+                Ok(("image/png", out.into()))
+            }
+        }
+    }
+}
+
+/// Where a robot was, by source; oldest first.
+#[derive(Debug, Clone, Default)]
+pub struct Tracks {
+    /// Odometry, laid on the map at the robot's first known pose.
+    pub odometry: VecDeque<Pose2>,
+    /// Fused poses.
+    pub pose: VecDeque<Pose2>,
+    /// The truth, where a simulator tells it.
+    pub truth: VecDeque<Pose2>,
+}
+
+/// Which track a pose belongs to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TrackKind {
+    /// Odometry.
+    Odometry,
+    /// Fused.
+    Pose,
+    /// Simulator's truth.
+    Truth,
+}
+
+/// Something happened. In JSON: the fields of the variant, without its name; [`LiveEvent::kind`] is the event's name.
+#[derive(Debug, Clone, Serialize)]
+#[serde(untagged)]
+pub enum LiveEvent {
+    /// A frame was answered.
+    Answer {
+        /// Robot.
+        robot: Name,
+        /// Its camera.
+        camera: Name,
+        /// What was answered, the map's name included.
+        answer: Arc<v1::Answer>,
+    },
+    /// A fused pose.
+    Pose {
+        /// Robot.
+        robot: Name,
+        /// In this map.
+        map: String,
+        /// Where it is.
+        pose: v1::Pose2,
+        /// Over (x, y, theta), row-major.
+        covariance: Vec<f64>,
+        /// Corrections by landmarks so far.
+        corrections: u64,
+    },
+    /// Odometry, laid on the map.
+    Odometry {
+        /// Robot.
+        robot: Name,
+        /// In this map.
+        map: String,
+        /// Where odometry alone says it is.
+        pose: v1::Pose2,
+    },
+    /// A simulator's truth.
+    Truth {
+        /// Robot.
+        robot: Name,
+        /// In this map.
+        map: String,
+        /// Where it really is.
+        pose: v1::Pose2,
+    },
+    /// A robot came or went.
+    Presence {
+        /// Robot.
+        robot: Name,
+        /// Its map, if it has one.
+        map: String,
+        /// Came, or went.
+        alive: bool,
+    },
+    /// A map has a new version, or is gone.
+    MapChanged {
+        /// Map.
+        map: String,
+        /// New version; absent when deleted.
+        version: Option<u64>,
+    },
+}
+
+impl LiveEvent {
+    /// Name of the event in a stream of events.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::Answer { .. } => "answer",
+            Self::Pose { .. } => "pose",
+            Self::Odometry { .. } => "odometry",
+            Self::Truth { .. } => "truth",
+            Self::Presence { .. } => "presence",
+            Self::MapChanged { .. } => "map_changed",
+        }
+    }
+
+    /// The map it belongs to.
+    pub fn map(&self) -> &str {
+        match self {
+            Self::Answer { answer, .. } => &answer.map,
+            Self::Pose { map, .. }
+            | Self::Odometry { map, .. }
+            | Self::Truth { map, .. }
+            | Self::Presence { map, .. }
+            | Self::MapChanged { map, .. } => map,
+        }
+    }
+}
+
+#[derive(Debug, Default)]
+struct State {
+    /// With the count of frames at its last frame: the smallest is the stalest.
+    frames: BTreeMap<SlotKey, (u64, LiveFrame)>,
+    tracks: BTreeMap<Name, (u64, Tracks)>,
+    alive: BTreeSet<Name>,
+    ticks: u64,
+}
+
+/// The last of everything, and the stream of events.
+#[derive(Debug)]
+pub struct LiveHub {
+    state: Mutex<State>,
+    events: broadcast::Sender<Arc<LiveEvent>>,
+}
+
+impl Default for LiveHub {
+    fn default() -> Self {
+        Self { state: Mutex::default(), events: broadcast::channel(EVENTS_KEPT).0 }
+    }
+}
+
+impl LiveHub {
+    /// Events from now on. A reader more than [`EVENTS_KEPT`] behind is told that it missed some.
+    pub fn events(&self) -> broadcast::Receiver<Arc<LiveEvent>> {
+        self.events.subscribe()
+    }
+
+    /// The last answered frame of a camera.
+    pub fn frame(&self, robot: &Name, camera: &Name) -> Option<LiveFrame> {
+        let key = SlotKey { robot: robot.clone(), camera: camera.clone() };
+        self.lock().frames.get(&key).map(|(_, frame)| frame.clone())
+    }
+
+    /// Cameras that have sent a frame, of one robot.
+    pub fn cameras(&self, robot: &Name) -> Vec<Name> {
+        let state = self.lock();
+        state.frames.keys().filter(|k| k.robot == *robot).map(|k| k.camera.clone()).collect()
+    }
+
+    /// Tracks of a robot so far.
+    pub fn tracks(&self, robot: &Name) -> Option<Tracks> {
+        self.lock().tracks.get(robot).map(|(_, tracks)| tracks.clone())
+    }
+
+    /// Robots that are connected now.
+    pub fn alive(&self) -> Vec<Name> {
+        self.lock().alive.iter().cloned().collect()
+    }
+
+    /// Keeps the frame as its camera's last and tells of its answer.
+    pub fn answered(&self, key: &SlotKey, frame: LiveFrame) {
+        let answer = frame.answer.clone();
+        {
+            let mut guard = self.lock();
+            let state = &mut *guard;
+            state.ticks += 1;
+            state.frames.insert(key.clone(), (state.ticks, frame));
+            if state.frames.len() > MAX_CAMERAS {
+                let stalest = state.frames.iter().min_by_key(|(_, (tick, _))| *tick).map(|(k, _)| k.clone());
+                stalest.map(|k| state.frames.remove(&k));
+            }
+        }
+        self.tell(LiveEvent::Answer { robot: key.robot.clone(), camera: key.camera.clone(), answer });
+    }
+
+    /// Tells of an answer to a frame that cannot be shown.
+    pub fn refused(&self, key: &SlotKey, answer: Arc<v1::Answer>) {
+        self.tell(LiveEvent::Answer { robot: key.robot.clone(), camera: key.camera.clone(), answer });
+    }
+
+    /// A fused pose.
+    pub fn fused(&self, robot: &Name, map: &str, pose: &Pose2Covariance, corrections: u64) {
+        self.extend(robot, TrackKind::Pose, pose.pose);
+        self.tell(LiveEvent::Pose {
+            robot: robot.clone(),
+            map: map.to_owned(),
+            pose: pose2_wire(&pose.pose),
+            covariance: pose.covariance.transpose().as_slice().to_vec(),
+            corrections,
+        });
+    }
+
+    /// Odometry laid on the map.
+    pub fn odometry(&self, robot: &Name, map: &str, map_from_robot: Pose2) {
+        self.extend(robot, TrackKind::Odometry, map_from_robot);
+        let pose = pose2_wire(&map_from_robot);
+        self.tell(LiveEvent::Odometry { robot: robot.clone(), map: map.to_owned(), pose });
+    }
+
+    /// Where a simulated robot really is.
+    pub fn truth(&self, robot: &Name, map: &str, map_from_robot: Pose2) {
+        self.extend(robot, TrackKind::Truth, map_from_robot);
+        let pose = pose2_wire(&map_from_robot);
+        self.tell(LiveEvent::Truth { robot: robot.clone(), map: map.to_owned(), pose });
+    }
+
+    /// A robot came or went.
+    pub fn presence(&self, robot: &Name, map: Option<String>, alive: bool) {
+        {
+            let known = &mut self.lock().alive;
+            if alive {
+                known.insert(robot.clone())
+            } else {
+                known.remove(robot)
+            };
+        }
+        self.tell(LiveEvent::Presence { robot: robot.clone(), map: map.unwrap_or_default(), alive });
+    }
+
+    /// A map changed.
+    pub fn map_changed(&self, map: String, version: Option<u64>) {
+        self.tell(LiveEvent::MapChanged { map, version });
+    }
+
+    fn extend(&self, robot: &Name, kind: TrackKind, pose: Pose2) {
+        let mut guard = self.lock();
+        let state = &mut *guard;
+        state.ticks += 1;
+        let (tick, tracks) = state.tracks.entry(robot.clone()).or_default();
+        *tick = state.ticks;
+        let track = match kind {
+            TrackKind::Odometry => &mut tracks.odometry,
+            TrackKind::Pose => &mut tracks.pose,
+            TrackKind::Truth => &mut tracks.truth,
+        };
+        if track.len() == MAX_TRACK_POINTS {
+            track.pop_front();
+        }
+        track.push_back(pose);
+        if state.tracks.len() > MAX_TRACKS {
+            let stalest = state.tracks.iter().min_by_key(|(_, (tick, _))| *tick).map(|(k, _)| k.clone());
+            stalest.map(|k| state.tracks.remove(&k));
+        }
+    }
+
+    fn tell(&self, event: LiveEvent) {
+        // An error only says that nobody listens.
+        drop(self.events.send(Arc::new(event)));
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn name(text: &str) -> Name {
+        Name::new(text).unwrap()
+    }
+
+    fn key(camera: usize) -> SlotKey {
+        SlotKey { robot: name("r1"), camera: name(&format!("c{camera}")) }
+    }
+
+    fn frame(seq: u64) -> LiveFrame {
+        let answer = Arc::new(v1::Answer { seq, map: "hall".into(), ..v1::Answer::default() });
+        let image = Bytes::from_static(&[0, 50, 100, 150, 200, 250]);
+        LiveFrame { encoding: Encoding::Gray8, width_px: 3, height_px: 2, image, answer }
+    }
+
+    #[test]
+    fn the_stalest_camera_gives_way() {
+        let hub = LiveHub::default();
+        for c in 0..MAX_CAMERAS {
+            hub.answered(&key(c), frame(1));
+        }
+        hub.answered(&key(0), frame(2));
+        assert_eq!(hub.cameras(&name("r1")).len(), MAX_CAMERAS);
+        hub.answered(&key(MAX_CAMERAS), frame(1));
+        assert_eq!(hub.cameras(&name("r1")).len(), MAX_CAMERAS);
+        assert!(hub.frame(&name("r1"), &name("c1")).is_none());
+        assert_eq!(hub.frame(&name("r1"), &name("c0")).unwrap().answer.seq, 2);
+    }
+
+    #[test]
+    fn tracks_are_bounded() {
+        let hub = LiveHub::default();
+        for i in 0..=MAX_TRACK_POINTS {
+            hub.truth(&name("r1"), "hall", Pose2::new(i as f64, 0.0, 0.0));
+        }
+        let truth = hub.tracks(&name("r1")).unwrap().truth;
+        assert_eq!(truth.len(), MAX_TRACK_POINTS);
+        assert!((truth[0].x_m - 1.0).abs() < 1e-12);
+        for r in 0..MAX_TRACKS {
+            hub.odometry(&name(&format!("robot-{r}")), "hall", Pose2::default());
+        }
+        assert!(hub.tracks(&name("r1")).is_none());
+        assert!(hub.tracks(&name("robot-0")).is_some());
+    }
+
+    #[test]
+    fn raw_grey_becomes_png() {
+        let (media, bytes) = frame(1).for_browsers().unwrap();
+        assert_eq!(media, "image/png");
+        let back = crate::engine::decode::decode_upload(&bytes, crate::engine::decode::ImageLimits::UPLOAD);
+        assert_eq!(back.unwrap().data(), [0, 50, 100, 150, 200, 250]);
+    }
+
+    #[test]
+    fn events_read_as_the_page_expects() {
+        let hub = LiveHub::default();
+        let mut events = hub.events();
+        hub.answered(&key(0), frame(7));
+        hub.odometry(&name("r1"), "hall", Pose2::new(1.0, 2.0, 0.5));
+        hub.presence(&name("r1"), Some("hall".into()), true);
+        let event = events.try_recv().unwrap();
+        assert_eq!((event.kind(), event.map()), ("answer", "hall"));
+        let json = serde_json::to_value(&*event).unwrap();
+        assert_eq!(
+            (&json["robot"], &json["camera"], &json["answer"]["seq"]),
+            (&"r1".into(), &"c0".into(), &7.into())
+        );
+        let json = serde_json::to_value(&*events.try_recv().unwrap()).unwrap();
+        assert_eq!(json["pose"]["y_m"], 2.0);
+        assert_eq!(events.try_recv().unwrap().kind(), "presence");
+        assert_eq!(hub.alive(), [name("r1")]);
+        hub.presence(&name("r1"), None, false);
+        assert!(hub.alive().is_empty());
+    }
+
+    #[test]
+    fn a_slow_reader_misses_events_and_is_told() {
+        let hub = LiveHub::default();
+        let mut events = hub.events();
+        for _ in 0..=EVENTS_KEPT {
+            hub.map_changed("hall".into(), Some(1));
+        }
+        assert!(matches!(events.try_recv(), Err(broadcast::error::TryRecvError::Lagged(1))));
+    }
+}
