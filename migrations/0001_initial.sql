@@ -44,9 +44,10 @@ CREATE TABLE views (
     height_px    INTEGER NOT NULL,
     -- Eight little-endian f64 (u, v of TL, TR, BR, BL): exact, unlike decimal text.
     corners_px   BLOB    NOT NULL CHECK (length(corners_px) = 64),
-    -- Side of the icon, then its f32 grey levels, little-endian: learning a whole map again decodes no image.
+    -- Side of the icon and its grey levels, one byte each, as learning rounds them: learning a whole map again
+    -- decodes no image.
     icon_side    INTEGER NOT NULL CHECK (icon_side BETWEEN 1 AND 1024),
-    icon         BLOB    NOT NULL CHECK (length(icon) = 4 * icon_side * icon_side),
+    icon         BLOB    NOT NULL CHECK (length(icon) = icon_side * icon_side),
     icon_scale   REAL    NOT NULL,
     created_ms   INTEGER NOT NULL,
     UNIQUE (landmark_id, image_sha256, corners_px)
@@ -61,7 +62,7 @@ CREATE TABLE strangers (
     image_sha256 BLOB    NOT NULL CHECK (length(image_sha256) = 32),
     corners_px   BLOB    NOT NULL CHECK (length(corners_px) = 64),
     icon_side    INTEGER NOT NULL CHECK (icon_side BETWEEN 1 AND 1024),
-    icon         BLOB    NOT NULL CHECK (length(icon) = 4 * icon_side * icon_side),
+    icon         BLOB    NOT NULL CHECK (length(icon) = icon_side * icon_side),
     icon_scale   REAL    NOT NULL,
     UNIQUE (map_id, image_sha256, corners_px)
 ) STRICT;

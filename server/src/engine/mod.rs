@@ -6,3 +6,4 @@ pub mod slots;
 pub mod intake;
 pub mod live;
 pub mod motion;
+pub mod picture;

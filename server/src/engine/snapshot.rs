@@ -6,6 +6,7 @@ use map::{place::LandmarkPlace, segments::LaserSegment};
 use std::{collections::BTreeMap, sync::Arc};
 use tokio::sync::broadcast;
 use vision::{
+    learn::model::LandmarkModel,
     localise::pose::LandmarkSize,
     params::Params,
     recognise::{DistanceKind, LandmarkId},
@@ -23,6 +24,10 @@ pub struct MapSnapshot {
     pub version: u64,
     /// Every landmark of the map by number, learnt or not.
     pub landmarks: BTreeMap<LandmarkId, LandmarkInfo>,
+    /// Every learnt model that reads and fits the parameters, candidates included.
+    pub learnt: BTreeMap<LandmarkId, Learnt>,
+    /// Models that are stored but must not be used, and why: damaged, or learnt under other parameters.
+    pub quarantined: BTreeMap<LandmarkId, String>,
     /// The walls.
     pub walls: Vec<LaserSegment>,
     /// Which distance decides.
@@ -40,6 +45,15 @@ pub struct LandmarkInfo {
     pub size: Option<LandmarkSize>,
     /// Where it hangs, if that and its size are known; without it there is no robot pose.
     pub place: Option<LandmarkPlace>,
+}
+
+/// A model with the digest of its stored bytes: the same digest is the same model.
+#[derive(Debug, Clone)]
+pub struct Learnt {
+    /// SHA-256 of the bytes.
+    pub digest: [u8; 32],
+    /// The model.
+    pub model: Arc<LandmarkModel>,
 }
 
 /// A map got a new version, or is gone.
@@ -134,6 +148,8 @@ mod tests {
             name: name.into(),
             version,
             landmarks: BTreeMap::new(),
+            learnt: BTreeMap::new(),
+            quarantined: BTreeMap::new(),
             walls: Vec::new(),
             distance: DistanceKind::Both,
             params: Arc::default(),

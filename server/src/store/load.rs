@@ -1,8 +1,13 @@
 //! From rows to the immutable snapshot of a map. Models are taken over from the previous version where the digest is
 //! the same; a damaged or outdated model is named and left out, never matched.
 
-use super::{StoreError, landmarks, laser, maps, robots, statements::statements};
-use crate::engine::snapshot::{LandmarkInfo, MapSnapshot, Snapshots};
+use super::{
+    StoreError, landmarks, laser, maps,
+    models::{self, ModelDigest},
+    robots,
+    statements::statements,
+};
+use crate::engine::snapshot::{LandmarkInfo, Learnt, MapSnapshot, Snapshots};
 use map::{
     check::OutOfRange,
     place::{LandmarkPlace, PlaceSigmas},
@@ -11,7 +16,7 @@ use map::{
 use nalgebra::{Matrix2, Point2, Vector3};
 use sqlx::{Row, SqliteConnection};
 use std::{collections::BTreeMap, sync::Arc};
-use vision::{params::Params, recognise::LandmarkId};
+use vision::{learn::model::LandmarkModel, params::Params, recognise::LandmarkId};
 
 statements! {
     MAP = "SELECT name, version, distance FROM maps WHERE id = ?1";
@@ -52,7 +57,7 @@ pub(super) async fn all(
 pub(super) async fn map(
     conn: &mut SqliteConnection,
     id: i64,
-    _snapshots: &Snapshots,
+    snapshots: &Snapshots,
     params: &Arc<Params>,
 ) -> Result<Option<Arc<MapSnapshot>>, StoreError> {
     let at = || StoreError::at("read map");
@@ -70,14 +75,68 @@ pub(super) async fn map(
         infos.insert(LandmarkId(id as u64), info);
     }
     let walls = laser::all_of(&mut *conn, id).await?.iter().filter_map(|ends| wall(ends).ok()).collect();
+    let name: String = row.try_get("name").map_err(at())?;
+    let (learnt, quarantined) = models(conn, id, snapshots.get(&name).as_deref(), params).await?;
+    for (id, reason) in &quarantined {
+        let landmark = infos.get(id).map_or("", |l: &LandmarkInfo| l.name.as_str());
+        tracing::warn!(map = name, landmark, reason, "model not used");
+    }
     Ok(Some(Arc::new(MapSnapshot {
-        name: row.try_get("name").map_err(at())?,
+        name,
         version: row.try_get::<i64, _>("version").map_err(at())? as u64,
         landmarks: infos,
+        learnt,
+        quarantined,
         walls,
         distance,
         params: params.clone(),
     })))
+}
+
+type Models = (BTreeMap<LandmarkId, Learnt>, BTreeMap<LandmarkId, String>);
+
+/// Models of a map, read only where the digest is not that of the previous snapshot; and those that must not be used.
+async fn models(
+    conn: &mut SqliteConnection,
+    map_id: i64,
+    before: Option<&MapSnapshot>,
+    params: &Params,
+) -> Result<Models, StoreError> {
+    let (mut learnt, mut quarantined) = Models::default();
+    for (id, digest) in models::digests(&mut *conn, map_id).await? {
+        let same = before.and_then(|map| map.learnt.get(&id)).filter(|l| l.digest == digest);
+        if let Some(same) = same {
+            learnt.insert(id, same.clone());
+            continue;
+        }
+        let bytes = models::get(&mut *conn, id).await?;
+        match read_model(&bytes, digest, id, params) {
+            Ok(model) => {
+                learnt.insert(id, Learnt { digest, model: Arc::new(model) });
+            }
+            Err(reason) => {
+                quarantined.insert(id, reason);
+            }
+        }
+    }
+    Ok((learnt, quarantined))
+}
+
+fn read_model(
+    bytes: &[u8],
+    digest: ModelDigest,
+    id: LandmarkId,
+    p: &Params,
+) -> Result<LandmarkModel, String> {
+    if models::digest(bytes) != digest {
+        return Err("the stored model is damaged: its digest does not fit".to_owned());
+    }
+    let model = LandmarkModel::from_bytes(bytes, p).map_err(|e| e.to_string())?;
+    if model.id == id {
+        Ok(model)
+    } else {
+        Err(format!("the stored model is that of landmark {}", model.id.0))
+    }
 }
 
 /// A landmark has a usable place only with a size; out of range (a file from elsewhere) counts as not placed.

@@ -11,6 +11,8 @@ mod statements;
 pub(crate) mod load;
 pub(crate) mod maps;
 pub(crate) mod landmarks;
+pub(crate) mod views;
+pub(crate) mod models;
 pub(crate) mod laser;
 pub(crate) mod robots;
 pub(crate) mod jobs;

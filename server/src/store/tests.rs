@@ -13,7 +13,8 @@ pub(crate) fn config(dir: &std::path::Path) -> Config {
 async fn every_statement_prepares_on_the_migrated_schema() {
     let dir = tempfile::tempdir().unwrap();
     let mut opened = open::open(dir.path()).await.unwrap();
-    let all = [maps::ALL, landmarks::ALL, laser::ALL, robots::ALL, jobs::ALL, load::ALL];
+    let all =
+        [maps::ALL, landmarks::ALL, views::ALL, models::ALL, laser::ALL, robots::ALL, jobs::ALL, load::ALL];
     for (name, sql) in all.into_iter().flatten() {
         if let Err(error) = opened.writer.prepare(sql.into_sql_str()).await {
             panic!("{name}: {error}");

@@ -1,0 +1,79 @@
+//! Learnt models as bytes with their digest. What they mean is not known here.
+
+use super::{StoreError, Tx, landmarks::ModelSummary, statements::statements};
+use sha2::{Digest as _, Sha256};
+use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
+use vision::recognise::LandmarkId;
+
+statements! {
+    PUT = "INSERT INTO models (landmark_id, model, sha256, params_hash, active, reasons, facts, views, generated_views, \
+           learnt_ms) SELECT ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10 \
+           WHERE EXISTS (SELECT 1 FROM landmarks WHERE id = ?1 AND map_id = ?11) \
+           ON CONFLICT (landmark_id) DO UPDATE SET model = excluded.model, sha256 = excluded.sha256, \
+           params_hash = excluded.params_hash, active = excluded.active, reasons = excluded.reasons, \
+           facts = excluded.facts, views = excluded.views, generated_views = excluded.generated_views, \
+           learnt_ms = excluded.learnt_ms";
+    DIGESTS = "SELECT m.landmark_id, m.sha256 FROM models m JOIN landmarks l ON l.id = m.landmark_id \
+               WHERE l.map_id = ?1 ORDER BY m.landmark_id";
+    GET = "SELECT model FROM models WHERE landmark_id = ?1";
+}
+
+/// Digest of a stored model.
+pub(crate) type ModelDigest = [u8; 32];
+
+/// A model to be stored.
+#[derive(Debug, Clone)]
+pub(crate) struct NewModel {
+    pub(crate) landmark: LandmarkId,
+    pub(crate) bytes: Vec<u8>,
+    pub(crate) params_hash: u64,
+    pub(crate) summary: ModelSummary,
+}
+
+/// The digest of a model's bytes.
+pub(crate) fn digest(bytes: &[u8]) -> ModelDigest {
+    Sha256::digest(bytes).into()
+}
+
+/// Stores a model unless its landmark is gone from the map meanwhile; says whether it did.
+pub(crate) async fn put(tx: &mut Tx, map_id: i64, new: &NewModel) -> Result<bool, StoreError> {
+    let done = sqlx::query(PUT)
+        .bind(new.landmark.0 as i64)
+        .bind(&new.bytes)
+        .bind(&digest(&new.bytes)[..])
+        .bind(&new.params_hash.to_le_bytes()[..])
+        .bind(new.summary.active)
+        .bind(&new.summary.reasons)
+        .bind(&new.summary.facts)
+        .bind(new.summary.views as i64)
+        .bind(new.summary.generated_views as i64)
+        .bind(new.summary.learnt_ms)
+        .bind(map_id)
+        .execute(&mut tx.conn)
+        .await
+        .map_err(StoreError::at("store model"))?;
+    Ok(done.rows_affected() == 1)
+}
+
+/// Landmark and digest of every model of a map.
+pub(crate) async fn digests(
+    db: impl SqliteExecutor<'_>,
+    map_id: i64,
+) -> Result<Vec<(LandmarkId, ModelDigest)>, StoreError> {
+    let at = || StoreError::at("list models");
+    let rows = sqlx::query(DIGESTS).bind(map_id).fetch_all(db).await.map_err(at())?;
+    let pair = |row: &SqliteRow| {
+        let id: i64 = row.try_get("landmark_id").map_err(at())?;
+        let bytes: &[u8] = row.try_get("sha256").map_err(at())?;
+        // The schema says 32 bytes; were it otherwise, no model would have this digest.
+        Ok((LandmarkId(id as u64), bytes.try_into().unwrap_or_default()))
+    };
+    rows.iter().map(pair).collect()
+}
+
+/// The bytes of a landmark's model.
+pub(crate) async fn get(db: impl SqliteExecutor<'_>, landmark: LandmarkId) -> Result<Vec<u8>, StoreError> {
+    let bytes = sqlx::query_scalar(GET).bind(landmark.0 as i64).fetch_optional(db).await;
+    let bytes = bytes.map_err(StoreError::at("read model"))?;
+    bytes.ok_or_else(|| StoreError::NotFound { what: "model of landmark", name: landmark.0.to_string() })
+}

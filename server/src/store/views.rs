@@ -1,0 +1,261 @@
+//! Views of landmarks with their pictures, and the strangers seen beside them.
+
+use super::{StoreError, Tx, landmarks, maps, now_ms, statements::statements, within};
+use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
+use vision::{detect::quads::Corners, icon::Icon, recognise::LandmarkId};
+
+statements! {
+    COUNT = "SELECT count(*) FROM views WHERE landmark_id = ?1";
+    SAME = "SELECT id, image_kind, width_px, height_px, corners_px, created_ms FROM views \
+            WHERE landmark_id = ?1 AND image_sha256 = ?2 AND corners_px = ?3";
+    INSERT = "INSERT INTO views (landmark_id, image_sha256, image_kind, image, width_px, height_px, corners_px, \
+              icon_side, icon, icon_scale, created_ms) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11) \
+              RETURNING id";
+    PAGE = "SELECT id, image_kind, width_px, height_px, corners_px, created_ms FROM views \
+            WHERE landmark_id = ?1 AND id > ?2 ORDER BY id LIMIT ?3";
+    ICON = "SELECT v.icon_side, v.icon, v.icon_scale FROM views v JOIN landmarks l ON l.id = v.landmark_id \
+            JOIN maps m ON m.id = l.map_id WHERE m.name = ?1 AND l.name = ?2 AND v.id = ?3";
+    DELETE = "DELETE FROM views WHERE id = ?1 AND landmark_id = ?2";
+    OF_MAP = "SELECT v.id, v.landmark_id, v.image_sha256, v.width_px, v.height_px, v.corners_px, v.icon_side, v.icon, \
+              v.icon_scale FROM views v JOIN landmarks l ON l.id = v.landmark_id WHERE l.map_id = ?1 ORDER BY v.id";
+    IMAGE = "SELECT image FROM views WHERE id = ?1";
+    COUNT_STRANGERS = "SELECT count(*) FROM strangers WHERE map_id = ?1";
+    INSERT_STRANGER = "INSERT INTO strangers (map_id, image_sha256, corners_px, icon_side, icon, icon_scale) \
+                       VALUES (?1, ?2, ?3, ?4, ?5, ?6) ON CONFLICT DO NOTHING";
+    STRANGERS = "SELECT image_sha256, corners_px, icon_side, icon, icon_scale FROM strangers \
+                 WHERE map_id = ?1 ORDER BY id";
+}
+
+/// Strangers kept of one map; later ones are not stored.
+pub(crate) const MAX_STRANGERS: usize = 1_000;
+
+/// Names a picture.
+pub(crate) type Digest = [u8; 32];
+
+/// A quad cut out of a picture.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Cut {
+    pub(crate) corners_px: Corners,
+    pub(crate) icon: Icon,
+}
+
+/// A view to be stored.
+#[derive(Debug, Clone)]
+pub(crate) struct NewView {
+    pub(crate) image: Vec<u8>,
+    pub(crate) image_sha256: Digest,
+    /// png or jpeg.
+    pub(crate) image_kind: &'static str,
+    pub(crate) size_px: [usize; 2],
+    pub(crate) cut: Cut,
+    /// Other quads of the picture.
+    pub(crate) strangers: Vec<Cut>,
+}
+
+/// A stored view without picture and icon.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct ViewRow {
+    pub(crate) id: i64,
+    pub(crate) image_kind: String,
+    pub(crate) size_px: [u32; 2],
+    pub(crate) corners_px: [[f64; 2]; 4],
+    pub(crate) created_ms: i64,
+}
+
+/// A view as learning needs it.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Lesson {
+    pub(crate) view: i64,
+    pub(crate) landmark: LandmarkId,
+    pub(crate) image_sha256: Digest,
+    pub(crate) size_px: [usize; 2],
+    pub(crate) cut: Cut,
+}
+
+fn corners_bytes(corners: &Corners) -> Vec<u8> {
+    corners.points().iter().flat_map(|c| [c.x, c.y]).flat_map(f64::to_le_bytes).collect()
+}
+
+fn corners_of(bytes: &[u8]) -> Option<[[f64; 2]; 4]> {
+    let numbers: Vec<f64> = bytes.as_chunks::<8>().0.iter().map(|b| f64::from_le_bytes(*b)).collect();
+    let [ax, ay, bx, by, cx, cy, dx, dy] = numbers.try_into().ok()?;
+    Some([[ax, ay], [bx, by], [cx, cy], [dx, dy]])
+}
+
+/// Grey levels as learning takes them: whole numbers.
+fn icon_bytes(icon: &Icon) -> Vec<u8> {
+    icon.pixels.iter().map(|g| g.round().clamp(0.0, 255.0) as u8).collect()
+}
+
+fn damaged(what: &str) -> impl Fn(String) -> StoreError {
+    move |reason| StoreError::Damaged { what: what.to_owned(), reason }
+}
+
+fn cut_of(row: &SqliteRow) -> Result<Cut, StoreError> {
+    let bytes: &[u8] = row.try_get("corners_px").map_err(StoreError::at("read corners"))?;
+    let corners = corners_of(bytes).ok_or_else(|| damaged("corners")("not four points".into()))?;
+    let corners_px = Corners::try_from(corners).map_err(|e| damaged("corners")(e.to_string()))?;
+    Ok(Cut { corners_px, icon: icon_of(row)? })
+}
+
+fn icon_of(row: &SqliteRow) -> Result<Icon, StoreError> {
+    let at = || StoreError::at("read icon");
+    let side: i64 = row.try_get("icon_side").map_err(at())?;
+    let bytes: &[u8] = row.try_get("icon").map_err(at())?;
+    let scale = row.try_get("icon_scale").map_err(at())?;
+    let pixels = bytes.iter().map(|g| f32::from(*g)).collect();
+    Icon::new(side as usize, pixels, scale).map_err(|e| damaged("icon")(e.to_string()))
+}
+
+fn digest_of(row: &SqliteRow) -> Result<Digest, StoreError> {
+    let bytes: &[u8] = row.try_get("image_sha256").map_err(StoreError::at("read digest"))?;
+    bytes.try_into().map_err(|_length| damaged("digest")("not 32 bytes".into()))
+}
+
+fn view_row(row: &SqliteRow) -> Result<ViewRow, StoreError> {
+    let at = || StoreError::at("read view");
+    let corners: &[u8] = row.try_get("corners_px").map_err(at())?;
+    Ok(ViewRow {
+        id: row.try_get("id").map_err(at())?,
+        image_kind: row.try_get("image_kind").map_err(at())?,
+        size_px: [row.try_get("width_px").map_err(at())?, row.try_get("height_px").map_err(at())?],
+        corners_px: corners_of(corners).ok_or_else(|| damaged("corners")("not four points".into()))?,
+        created_ms: row.try_get("created_ms").map_err(at())?,
+    })
+}
+
+/// Stores a view. The same quad of the same picture a second time is the view that is there already; the flag says
+/// whether it is new.
+pub(crate) async fn add(
+    tx: &mut Tx,
+    map: &str,
+    landmark: &str,
+    new: &NewView,
+    max: usize,
+) -> Result<(ViewRow, bool), StoreError> {
+    let map = maps::get(&mut tx.conn, map).await?;
+    let landmark = landmarks::get(&mut tx.conn, &map.name, landmark).await?;
+    let corners = corners_bytes(&new.cut.corners_px);
+    let same = sqlx::query(SAME).bind(landmark.id).bind(&new.image_sha256[..]).bind(&corners);
+    if let Some(row) = same.fetch_optional(&mut tx.conn).await.map_err(StoreError::at("look for view"))? {
+        return Ok((view_row(&row)?, false));
+    }
+    let count = sqlx::query_scalar(COUNT).bind(landmark.id).fetch_one(&mut tx.conn).await;
+    within(count.map_err(StoreError::at("count views"))?, max, "views of a landmark")?;
+    let created_ms = now_ms();
+    let id = sqlx::query_scalar(INSERT)
+        .bind(landmark.id)
+        .bind(&new.image_sha256[..])
+        .bind(new.image_kind)
+        .bind(&new.image)
+        .bind(new.size_px[0] as i64)
+        .bind(new.size_px[1] as i64)
+        .bind(&corners)
+        .bind(new.cut.icon.size as i64)
+        .bind(icon_bytes(&new.cut.icon))
+        .bind(new.cut.icon.source_scale)
+        .bind(created_ms)
+        .fetch_one(&mut tx.conn)
+        .await
+        .map_err(StoreError::at("store view"))?;
+    add_strangers(tx, map.id, new).await?;
+    let row = ViewRow {
+        id,
+        image_kind: new.image_kind.to_owned(),
+        size_px: new.size_px.map(|s| s as u32),
+        corners_px: new.cut.corners_px.into(),
+        created_ms,
+    };
+    Ok((row, true))
+}
+
+async fn add_strangers(tx: &mut Tx, map_id: i64, new: &NewView) -> Result<(), StoreError> {
+    let count: i64 = sqlx::query_scalar(COUNT_STRANGERS)
+        .bind(map_id)
+        .fetch_one(&mut tx.conn)
+        .await
+        .map_err(StoreError::at("count strangers"))?;
+    for stranger in new.strangers.iter().take(MAX_STRANGERS.saturating_sub(count as usize)) {
+        sqlx::query(INSERT_STRANGER)
+            .bind(map_id)
+            .bind(&new.image_sha256[..])
+            .bind(corners_bytes(&stranger.corners_px))
+            .bind(stranger.icon.size as i64)
+            .bind(icon_bytes(&stranger.icon))
+            .bind(stranger.icon.source_scale)
+            .execute(&mut tx.conn)
+            .await
+            .map_err(StoreError::at("store stranger"))?;
+    }
+    Ok(())
+}
+
+/// Views of a landmark with numbers above `after`, in order.
+pub(crate) async fn page(
+    db: impl SqliteExecutor<'_>,
+    landmark_id: i64,
+    after: i64,
+    limit: usize,
+) -> Result<Vec<ViewRow>, StoreError> {
+    let rows = sqlx::query(PAGE).bind(landmark_id).bind(after).bind(limit as i64).fetch_all(db).await;
+    rows.map_err(StoreError::at("list views"))?.iter().map(view_row).collect()
+}
+
+/// The icon of a view.
+pub(crate) async fn icon(
+    db: impl SqliteExecutor<'_>,
+    map: &str,
+    landmark: &str,
+    view: i64,
+) -> Result<Icon, StoreError> {
+    let row = sqlx::query(ICON).bind(map).bind(landmark).bind(view).fetch_optional(db).await;
+    let row = row.map_err(StoreError::at("read icon"))?;
+    icon_of(&row.ok_or_else(|| StoreError::NotFound { what: "view", name: view.to_string() })?)
+}
+
+/// Deletes a view. What was learnt from it stays until the landmark is learnt again.
+pub(crate) async fn delete(tx: &mut Tx, map: &str, landmark: &str, view: i64) -> Result<(), StoreError> {
+    let landmark = landmarks::get(&mut tx.conn, map, landmark).await?;
+    let done = sqlx::query(DELETE).bind(view).bind(landmark.id).execute(&mut tx.conn).await;
+    match done.map_err(StoreError::at("delete view"))?.rows_affected() {
+        0 => Err(StoreError::NotFound { what: "view", name: view.to_string() }),
+        _ => Ok(()),
+    }
+}
+
+/// Every view of a map, without pictures.
+pub(crate) async fn of_map(db: impl SqliteExecutor<'_>, map_id: i64) -> Result<Vec<Lesson>, StoreError> {
+    let at = || StoreError::at("read views");
+    let rows = sqlx::query(OF_MAP).bind(map_id).fetch_all(db).await.map_err(at())?;
+    let lesson = |row: &SqliteRow| {
+        let pixels = |column: &str| row.try_get::<i64, _>(column).map(|s| s as usize).map_err(at());
+        Ok(Lesson {
+            view: row.try_get("id").map_err(at())?,
+            landmark: LandmarkId(row.try_get::<i64, _>("landmark_id").map_err(at())? as u64),
+            image_sha256: digest_of(row)?,
+            size_px: [pixels("width_px")?, pixels("height_px")?],
+            cut: cut_of(row)?,
+        })
+    };
+    rows.iter().map(lesson).collect()
+}
+
+/// The picture of a view, as it came.
+pub(crate) async fn image(db: impl SqliteExecutor<'_>, view: i64) -> Result<Vec<u8>, StoreError> {
+    let image = sqlx::query_scalar(IMAGE)
+        .bind(view)
+        .fetch_optional(db)
+        .await
+        .map_err(StoreError::at("read picture"))?;
+    image.ok_or_else(|| StoreError::NotFound { what: "view", name: view.to_string() })
+}
+
+/// The strangers of a map, each with the picture it was seen in.
+pub(crate) async fn strangers(
+    db: impl SqliteExecutor<'_>,
+    map_id: i64,
+) -> Result<Vec<(Digest, Cut)>, StoreError> {
+    let rows =
+        sqlx::query(STRANGERS).bind(map_id).fetch_all(db).await.map_err(StoreError::at("read strangers"))?;
+    rows.iter().map(|row| Ok((digest_of(row)?, cut_of(row)?))).collect()
+}
