@@ -7,6 +7,7 @@ pub mod config;
 pub mod engine;
 pub mod bus;
 mod store;
+mod jobs;
 mod http;
 mod server;
 pub mod cli;

@@ -4,6 +4,7 @@ use crate::{
     config::Config,
     engine::snapshot::Snapshots,
     http::{self, App},
+    jobs::Jobs,
     store::{OpenError, Store, WriterTask},
 };
 use std::{net::SocketAddr, sync::Arc};
@@ -51,6 +52,7 @@ pub struct RunningServer {
     stop: watch::Sender<bool>,
     store_failed: watch::Receiver<bool>,
     http: JoinHandle<()>,
+    jobs: JoinHandle<()>,
     writer: WriterTask,
 }
 
@@ -64,10 +66,13 @@ impl Server {
         let http_addr = listener.local_addr().map_err(at)?;
         let (stop, stopping) = watch::channel(false);
         let (snapshots, store_failed) = (store.snapshots().clone(), store.failed());
-        let app = App { config: config.clone(), store, stopping: stopping.clone() };
+        let (jobs, jobs_task) = Jobs::start(store.clone(), config.clone(), stopping.clone())
+            .await
+            .map_err(|e| StartError::Store(e.to_string()))?;
+        let app = App::new(config.clone(), store, jobs, stopping.clone());
         let http =
             tokio::spawn(http::listen::serve(listener, http::router(app), config.limits.clone(), stopping));
-        Ok(RunningServer { http_addr, snapshots, stop, store_failed, http, writer })
+        Ok(RunningServer { http_addr, snapshots, stop, store_failed, http, jobs: jobs_task, writer })
     }
 }
 
@@ -84,8 +89,10 @@ impl RunningServer {
     /// Answers what is in work, then closes everything.
     pub async fn stop(self) {
         self.stop.send_replace(true);
-        if let Err(error) = self.http.await {
-            tracing::error!(%error, "the HTTP task panicked");
+        for (what, task) in [("HTTP", self.http), ("jobs", self.jobs)] {
+            if let Err(error) = task.await {
+                tracing::error!(%error, what, "a task panicked");
+            }
         }
         self.writer.close().await;
     }

@@ -2,8 +2,11 @@
 //! size and memory are checked from the header, before anything is decoded.
 
 use image::{
-    DynamicImage, ImageDecoder, Limits,
-    codecs::{jpeg::JpegDecoder, png::PngDecoder},
+    DynamicImage, ExtendedColorType, ImageDecoder, ImageEncoder, Limits,
+    codecs::{
+        jpeg::JpegDecoder,
+        png::{PngDecoder, PngEncoder},
+    },
     metadata::Orientation,
 };
 use protos::{Code, Rejection};
@@ -64,6 +67,13 @@ pub fn decode(bytes: &[u8], max_pixels: usize, field: &str) -> Result<(Kind, Gra
     let (width, height) = (gray.width() as usize, gray.height() as usize);
     let gray = GrayImage::new(width, height, gray.into_raw()).map_err(|e| bad(e.to_string()))?;
     Ok((kind, gray))
+}
+
+/// A grey picture as PNG.
+pub fn png(width: usize, height: usize, grey: &[u8]) -> Result<Vec<u8>, image::ImageError> {
+    let mut out = Vec::new();
+    PngEncoder::new(&mut out).write_image(grey, width as u32, height as u32, ExtendedColorType::L8)?;
+    Ok(out)
 }
 
 fn whole(mut decoder: impl ImageDecoder, max_pixels: usize, field: &str) -> Result<DynamicImage, Rejection> {

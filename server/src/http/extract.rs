@@ -3,7 +3,8 @@
 
 use super::{Shared, error::ApiError};
 use axum::{
-    extract::{FromRequest, FromRequestParts, Path, Query, Request},
+    body::HttpBody,
+    extract::{FromRequest, FromRequestParts, OptionalFromRequest, Path, Query, Request},
     http::{StatusCode, header, request::Parts},
 };
 use protos::Name;
@@ -29,6 +30,20 @@ impl<T: DeserializeOwned> FromRequest<Shared> for Body<T> {
         let bytes =
             axum::body::to_bytes(request.into_body(), max).await.map_err(|_too_long| too_large(max))?;
         json(&bytes, "").map(Self)
+    }
+}
+
+/// No body at all is fine where the body is optional.
+impl<T: DeserializeOwned> OptionalFromRequest<Shared> for Body<T> {
+    type Rejection = ApiError;
+
+    async fn from_request(request: Request, app: &Shared) -> Result<Option<Self>, ApiError> {
+        let empty = request.body().size_hint().exact() == Some(0);
+        if empty {
+            Ok(None)
+        } else {
+            <Self as FromRequest<Shared>>::from_request(request, app).await.map(Some)
+        }
     }
 }
 
@@ -104,7 +119,7 @@ pub(super) struct PageQuery {
     /// Most items; 100 by default, bounded by `limits.page`.
     pub(super) limit: Option<usize>,
     /// The `next` of the page before; absent for the first page.
-    pub(super) after: Option<String>,
+    pub(super) cursor: Option<String>,
 }
 
 /// Items of a page that does not say how many it wants.
@@ -124,7 +139,7 @@ impl PageQuery {
 
     /// The cursor; empty comes before every name.
     pub(super) fn after(&self) -> String {
-        self.after.clone().unwrap_or_default()
+        self.cursor.clone().unwrap_or_default()
     }
 }
 
@@ -133,7 +148,7 @@ impl PageQuery {
 pub(super) struct Page<T> {
     /// The items, in order.
     pub(super) items: Vec<T>,
-    /// Give this as `after` for the next page; null on the last.
+    /// Give this as `cursor` for the next page; null on the last.
     pub(super) next: Option<String>,
 }
 

@@ -1,16 +1,20 @@
 //! `/maps/{map}/landmarks`: create, list, read, measure, delete.
 
 use super::{
-    Shared,
+    App, Shared,
     error::{ApiError, Problem},
     extract::{At, Body, Page, PageQuery, Params, name},
     resources::{Landmark, Place, Size, measures},
 };
-use crate::store::{landmarks, maps};
+use crate::store::{
+    landmarks::{self, LandmarkRow},
+    maps,
+};
 use axum::{Json, extract::State, http::StatusCode};
 use serde::{Deserialize, Deserializer};
 use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
+use vision::recognise::LandmarkId;
 
 pub(super) fn router() -> OpenApiRouter<Shared> {
     OpenApiRouter::new().routes(routes!(create, list)).routes(routes!(get, patch, delete))
@@ -47,6 +51,14 @@ fn given<'de, D: Deserializer<'de>, T: Deserialize<'de>>(from: D) -> Result<Opti
     Option::deserialize(from).map(Some)
 }
 
+/// The landmark with what only the running server knows: a model out of use, a job at work.
+fn shown(app: &App, map: &str, row: LandmarkRow) -> Landmark {
+    let snapshot = app.store.snapshots().get(map);
+    let quarantined = snapshot.and_then(|s| s.quarantined.get(&LandmarkId(row.id as u64)).cloned());
+    let learning = app.jobs.is_learning(map, &row.name) && row.views > 0;
+    Landmark::new(row, quarantined, learning)
+}
+
 /// Creates a landmark without views.
 #[utoipa::path(post, path = "/maps/{map}/landmarks", tag = "landmarks", params(("map" = String, Path)),
     request_body = NewLandmark, responses((status = 201, body = Landmark), (status = 404, body = Problem),
@@ -62,7 +74,7 @@ async fn create(
     let write = app.store.write(move |tx| {
         Box::pin(async move { landmarks::create(tx, &map, name.as_str(), measures, max).await })
     });
-    Ok((StatusCode::CREATED, Json(Landmark::new(write.await?, false))))
+    Ok((StatusCode::CREATED, Json(Landmark::new(write.await?, None, false))))
 }
 
 /// Lists the landmarks of a map by name.
@@ -76,7 +88,7 @@ async fn list(
     let limit = page.limit(app.config.limits.page)?;
     let map = maps::get(app.store.reads(), &map).await?;
     let rows = landmarks::page(app.store.reads(), map.id, &page.after(), limit + 1).await?;
-    Ok(Json(Page::new(rows, limit, |r| r.name.clone(), |r| Landmark::new(r, false))))
+    Ok(Json(Page::new(rows, limit, |r| r.name.clone(), |r| shown(&app, &map.name, r))))
 }
 
 /// One landmark.
@@ -89,7 +101,7 @@ async fn get(
 ) -> Result<Json<Landmark>, ApiError> {
     maps::get(app.store.reads(), &map).await?;
     let row = landmarks::get(app.store.reads(), &map, &landmark).await?;
-    Ok(Json(Landmark::new(row, false)))
+    Ok(Json(shown(&app, &map, row)))
 }
 
 /// Sets or forgets size and place.
@@ -104,6 +116,7 @@ async fn patch(
 ) -> Result<Json<Landmark>, ApiError> {
     let checked = measures(changes.size.flatten(), changes.place.flatten())?;
     let (size, place) = (changes.size.is_some(), changes.place.is_some());
+    let map_name = map.clone();
     let write = app.store.write(move |tx| {
         Box::pin(async move {
             landmarks::update(tx, &map, &landmark, |old| landmarks::Measures {
@@ -113,7 +126,7 @@ async fn patch(
             .await
         })
     });
-    Ok(Json(Landmark::new(write.await?, false)))
+    Ok(Json(shown(&app, &map_name, write.await?)))
 }
 
 /// Deletes a landmark with its views and its model.

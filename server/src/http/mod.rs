@@ -9,27 +9,82 @@ mod guard;
 mod health;
 mod laser;
 mod landmarks;
+mod learning;
 mod maps;
 mod pages;
 mod resources;
 mod robots;
 mod router;
+mod upload;
+mod views;
 pub(crate) mod listen;
 
 pub(crate) use router::router;
 
-use crate::{config::Config, store::Store};
+use crate::{config::Config, jobs::Jobs, store::Store};
+use axum::http::StatusCode;
+use error::ApiError;
 use std::sync::Arc;
-use tokio::sync::watch;
+use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
 
 /// What every handler shares.
 #[derive(Debug)]
 pub(crate) struct App {
     pub(crate) config: Arc<Config>,
     pub(crate) store: Store,
+    pub(crate) jobs: Arc<Jobs>,
     /// Becomes true when the server stops; ends event streams.
     pub(crate) stopping: watch::Receiver<bool>,
+    /// Places for vision work asked for over HTTP: as many as there are vision threads.
+    vision: Arc<Semaphore>,
+    /// Places for event streams.
+    streams: Arc<Semaphore>,
 }
 
 /// The state of the router.
 pub(crate) type Shared = Arc<App>;
+
+impl App {
+    pub(crate) fn new(
+        config: Arc<Config>,
+        store: Store,
+        jobs: Arc<Jobs>,
+        stopping: watch::Receiver<bool>,
+    ) -> Self {
+        let vision = Arc::new(Semaphore::new(config.workers));
+        let streams = Arc::new(Semaphore::new(config.limits.streams));
+        Self { config, store, jobs, stopping, vision, streams }
+    }
+
+    /// Runs vision work off the runtime, a bounded number at a time.
+    async fn on_vision_thread<T: Send + 'static>(
+        self: Arc<Self>,
+        work: impl FnOnce(&Self) -> T + Send + 'static,
+    ) -> Result<T, ApiError> {
+        let place = self.vision.clone().acquire_owned().await.map_err(|e| ApiError::internal(&e))?;
+        let done = tokio::task::spawn_blocking(move || {
+            let result = work(&self);
+            // Not before the work is done: a client that hangs up does not make room for another.
+            drop(place);
+            result
+        });
+        done.await.map_err(|e| ApiError::internal(&e))
+    }
+
+    /// A place for an event stream, or 503.
+    fn stream_place(&self) -> Result<OwnedSemaphorePermit, ApiError> {
+        self.streams.clone().try_acquire_owned().map_err(|_full| {
+            let detail = format!("all {} event streams are in use", self.config.limits.streams);
+            ApiError::new(StatusCode::SERVICE_UNAVAILABLE, "too_many_streams", detail)
+        })
+    }
+
+    /// Ends when the server stops.
+    fn stopped(&self) -> impl Future<Output = ()> + Send + use<> {
+        let mut stopping = self.stopping.clone();
+        async move {
+            // An error means that the server is gone altogether.
+            drop(stopping.wait_for(|stop| *stop).await);
+        }
+    }
+}

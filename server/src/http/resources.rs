@@ -13,7 +13,7 @@ use map::{
 };
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
+use serde_json::{Value, json};
 use utoipa::ToSchema;
 use vision::{localise::pose::LandmarkSize, recognise::DistanceKind};
 
@@ -171,8 +171,12 @@ pub(super) struct Landmark {
 }
 
 impl Landmark {
-    /// `learning`: whether a job has it in work.
-    pub(super) fn new(row: LandmarkRow, learning: bool) -> Self {
+    /// `quarantined`: why its stored model is out of use. `learning`: whether a job has it in work.
+    pub(super) fn new(mut row: LandmarkRow, quarantined: Option<String>, learning: bool) -> Self {
+        if let (Some(model), Some(reason)) = (&mut row.model, quarantined) {
+            model.active = false;
+            model.reasons = json!([{ "gate": "stored_model", "detail": reason }]).to_string();
+        }
         let status = match (&row.model, learning) {
             (_, true) => Status::Learning,
             (None, _) => Status::Empty,

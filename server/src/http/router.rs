@@ -1,6 +1,9 @@
 //! Every route, with the layers around them and the OpenAPI document made from them.
 
-use super::{App, Shared, error::ApiError, guard, health, landmarks, laser, maps, pages, robots};
+use super::{
+    App, Shared, error::ApiError, guard, health, landmarks, laser, learning, maps, pages, robots, views,
+};
+use crate::config::Limits;
 use axum::{
     Json, Router,
     http::StatusCode,
@@ -25,24 +28,26 @@ const API: &str = "/api/v1";
 ))]
 struct Document;
 
-fn api() -> OpenApiRouter<Shared> {
+fn api(limits: &Limits) -> OpenApiRouter<Shared> {
     OpenApiRouter::new()
         .merge(maps::router())
         .merge(laser::router())
         .merge(landmarks::router())
+        .merge(views::router(limits.upload_bytes))
+        .merge(learning::router())
         .merge(robots::router())
         .merge(health::router())
 }
 
 /// Routes and their OpenAPI document.
-fn parts() -> (Router<Shared>, openapi::OpenApi) {
-    OpenApiRouter::with_openapi(Document::openapi()).nest(API, api()).split_for_parts()
+fn parts(limits: &Limits) -> (Router<Shared>, openapi::OpenApi) {
+    OpenApiRouter::with_openapi(Document::openapi()).nest(API, api(limits)).split_for_parts()
 }
 
 /// The whole service.
 pub(crate) fn router(app: App) -> Router {
     let app = Arc::new(app);
-    let (routes, document) = parts();
+    let (routes, document) = parts(&app.config.limits);
     let (health, _) = health::router().split_for_parts();
     let config = utoipa_swagger_ui::Config::from(format!("{API}/openapi.json"));
     let docs: Router<Shared> = SwaggerUi::new("/api/docs").config(config).into();

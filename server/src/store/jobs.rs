@@ -9,7 +9,7 @@ statements! {
     GET = "SELECT id, kind, map, request, state, message, result FROM jobs WHERE id = ?1";
     OPEN = "SELECT id, kind, map, request, state, message, result FROM jobs \
             WHERE state IN ('queued', 'running') ORDER BY id";
-    SET_RUNNING = "UPDATE jobs SET state = 'running' WHERE id = ?1 AND state = 'queued'";
+    SET_RUNNING = "UPDATE jobs SET state = 'running' WHERE id = ?1 AND state IN ('queued', 'running')";
     END = "UPDATE jobs SET state = ?2, message = ?3, result = ?4, ended_ms = ?5 \
            WHERE id = ?1 AND state IN ('queued', 'running')";
     FORGET = "DELETE FROM jobs WHERE ended_ms IS NOT NULL AND id NOT IN \
@@ -102,10 +102,11 @@ pub(crate) async fn open(db: impl SqliteExecutor<'_>) -> Result<Vec<JobRow>, Sto
     rows.iter().map(job_row).collect::<Result<_, _>>().map_err(StoreError::at("list jobs"))
 }
 
-/// Marks a queued job as running.
-pub(crate) async fn set_running(tx: &mut Tx, id: i64) -> Result<(), StoreError> {
-    sqlx::query(SET_RUNNING).bind(id).execute(&mut tx.conn).await.map_err(StoreError::at("start job"))?;
-    Ok(())
+/// Marks an open job as running. False when it has ended meanwhile.
+pub(crate) async fn set_running(tx: &mut Tx, id: i64) -> Result<bool, StoreError> {
+    let done =
+        sqlx::query(SET_RUNNING).bind(id).execute(&mut tx.conn).await.map_err(StoreError::at("start job"))?;
+    Ok(done.rows_affected() == 1)
 }
 
 /// Ends a job. False when it had ended already; then nothing changed.

@@ -94,8 +94,14 @@ pub(crate) async fn page(
     rows.iter().map(map_row).collect::<Result<_, _>>().map_err(StoreError::at("list maps"))
 }
 
+/// The same map, if it was not deleted meanwhile, nor replaced by another of the same name.
+pub(crate) async fn still(tx: &mut Tx, map: MapRow) -> Result<MapRow, StoreError> {
+    let now = get(&mut tx.conn, &map.name).await?;
+    if now.id == map.id { Ok(now) } else { Err(StoreError::NotFound { what: "map", name: map.name }) }
+}
+
 /// The map's content has changed: a new version, published after the commit.
-pub(super) async fn bump(tx: &mut Tx, id: i64) -> Result<(), StoreError> {
+pub(crate) async fn bump(tx: &mut Tx, id: i64) -> Result<(), StoreError> {
     sqlx::query(BUMP).bind(id).execute(&mut tx.conn).await.map_err(StoreError::at("count map version"))?;
     tx.changed(Change::Map(id));
     Ok(())

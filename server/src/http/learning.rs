@@ -1,0 +1,234 @@
+//! Lessons and jobs: start, watch, stop.
+
+use super::{
+    Shared,
+    error::{ApiError, Problem},
+    extract::{At, Body},
+};
+use crate::{
+    jobs::{Progress, learn},
+    store::{
+        StoreError,
+        jobs::{self, JobRow},
+        landmarks, maps,
+    },
+};
+use axum::{
+    Json,
+    extract::State,
+    http::StatusCode,
+    response::{
+        Sse,
+        sse::{Event, KeepAlive},
+    },
+};
+use futures::{Stream, StreamExt, stream};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::convert::Infallible;
+use tokio_stream::wrappers::WatchStream;
+use utoipa::ToSchema;
+use utoipa_axum::{router::OpenApiRouter, routes};
+
+pub(super) fn router() -> OpenApiRouter<Shared> {
+    OpenApiRouter::new()
+        .routes(routes!(learn_one))
+        .routes(routes!(learn_map))
+        .routes(routes!(get, cancel))
+        .routes(routes!(events))
+}
+
+/// How to learn one landmark.
+#[derive(Debug, Default, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+struct Lesson {
+    /// Views generated from each photograph, 0 to 100; absent fills up where photographs are few.
+    generated_views: Option<usize>,
+}
+
+/// What to learn of a map, and how.
+#[derive(Debug, Default, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+struct MapLesson {
+    /// Names; absent means every landmark that has views.
+    landmarks: Option<Vec<String>>,
+    /// Views generated from each photograph, 0 to 100; absent fills up where photographs are few.
+    generated_views: Option<usize>,
+}
+
+/// Where a job stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+enum JobState {
+    /// Waits.
+    Queued,
+    /// At work.
+    Running,
+    /// Ended well; `result` is set.
+    Done,
+    /// Ended badly; `message` says why.
+    Failed,
+    /// Stopped on request; nothing was changed.
+    Cancelled,
+}
+
+/// Long work.
+#[derive(Debug, Clone, Serialize, ToSchema)]
+struct Job {
+    /// Its number.
+    id: i64,
+    /// `learn`.
+    kind: String,
+    /// The map it works on.
+    map: String,
+    /// Where it stands.
+    state: JobState,
+    /// 0 to 1.
+    progress: f64,
+    /// What it does, or why it failed.
+    message: String,
+    /// What came of it.
+    result: Option<Value>,
+}
+
+impl Job {
+    fn new(row: JobRow, progress: Option<&Progress>) -> Self {
+        let state = match row.state.as_str() {
+            "done" => JobState::Done,
+            "failed" => JobState::Failed,
+            "cancelled" => JobState::Cancelled,
+            "running" => JobState::Running,
+            _ => JobState::Queued,
+        };
+        let open = matches!(state, JobState::Queued | JobState::Running);
+        let progress = progress.filter(|_| open);
+        Self {
+            id: row.id,
+            kind: row.kind,
+            map: row.map,
+            state: if progress.is_some_and(|p| p.running) { JobState::Running } else { state },
+            progress: progress.map_or(if state == JobState::Done { 1.0 } else { 0.0 }, |p| p.share),
+            message: progress.map_or(row.message, |p| p.message.clone()),
+            result: row.result.and_then(|text| serde_json::from_str(&text).ok()),
+        }
+    }
+}
+
+fn check_generated(generated_views: Option<usize>) -> Result<Option<usize>, ApiError> {
+    match generated_views {
+        Some(n) if n > learn::MAX_GENERATED => {
+            let detail = format!("{n} is more than {}", learn::MAX_GENERATED);
+            Err(ApiError::invalid("out_of_range", "generated_views", detail))
+        }
+        n => Ok(n),
+    }
+}
+
+/// Learns one landmark again from its views.
+#[utoipa::path(post, path = "/maps/{map}/landmarks/{landmark}/learn", tag = "lessons",
+    params(("map" = String, Path), ("landmark" = String, Path)), request_body = Option<Lesson>,
+    responses((status = 202, body = Job), (status = 404, body = Problem),
+    (status = 409, body = Problem, description = "no_views, too_many"), (status = 422, body = Problem)))]
+async fn learn_one(
+    State(app): State<Shared>,
+    At((map, landmark)): At<(String, String)>,
+    lesson: Option<Body<Lesson>>,
+) -> Result<(StatusCode, Json<Job>), ApiError> {
+    let lesson = lesson.map(|Body(l)| l).unwrap_or_default();
+    let request = learn::Request {
+        landmarks: Some(vec![landmark]),
+        generated_views: check_generated(lesson.generated_views)?,
+    };
+    submit(&app, &map, request).await
+}
+
+/// Learns landmarks of a map in one job: what they must be told from is worked out once.
+#[utoipa::path(post, path = "/maps/{map}/learn", tag = "lessons", params(("map" = String, Path)),
+    request_body = Option<MapLesson>, responses((status = 202, body = Job), (status = 404, body = Problem),
+    (status = 409, body = Problem, description = "no_views, too_many"), (status = 422, body = Problem)))]
+async fn learn_map(
+    State(app): State<Shared>,
+    At(map): At<String>,
+    lesson: Option<Body<MapLesson>>,
+) -> Result<(StatusCode, Json<Job>), ApiError> {
+    let lesson = lesson.map(|Body(l)| l).unwrap_or_default();
+    if lesson.landmarks.as_ref().is_some_and(Vec::is_empty) {
+        return Err(ApiError::invalid(
+            "out_of_range",
+            "landmarks",
+            "an empty list; leave it out to mean all",
+        ));
+    }
+    let request = learn::Request {
+        landmarks: lesson.landmarks,
+        generated_views: check_generated(lesson.generated_views)?,
+    };
+    submit(&app, &map, request).await
+}
+
+async fn submit(
+    app: &Shared,
+    map: &str,
+    request: learn::Request,
+) -> Result<(StatusCode, Json<Job>), ApiError> {
+    maps::get(app.store.reads(), map).await?;
+    let max = app.config.limits.landmarks;
+    let names = request.landmarks.as_deref().unwrap_or_default();
+    if names.len() > max {
+        return Err(ApiError::invalid("too_many", "landmarks", format!("more than {max}")));
+    }
+    for name in names {
+        if landmarks::get(app.store.reads(), map, name).await?.views == 0 {
+            let detail = format!("landmark `{name}` has no views");
+            return Err(ApiError::new(StatusCode::CONFLICT, "no_views", detail).field("landmarks"));
+        }
+    }
+    let row = app.jobs.submit(map, &request).await?;
+    Ok((StatusCode::ACCEPTED, Json(Job::new(row, None))))
+}
+
+async fn read(app: &Shared, id: i64) -> Result<Job, StoreError> {
+    // Progress before the row: a job that ends in between is then shown as ended.
+    let progress = app.jobs.watch(id).map(|p| p.borrow().clone());
+    Ok(Job::new(jobs::get(app.store.reads(), id).await?, progress.as_ref()))
+}
+
+/// One job.
+#[utoipa::path(get, path = "/jobs/{job}", tag = "lessons", params(("job" = i64, Path)),
+    responses((status = 200, body = Job), (status = 404, body = Problem)))]
+async fn get(State(app): State<Shared>, At(id): At<i64>) -> Result<Json<Job>, ApiError> {
+    Ok(Json(read(&app, id).await?))
+}
+
+/// Asks a job to stop. One that has ended stays as it is.
+#[utoipa::path(delete, path = "/jobs/{job}", tag = "lessons", params(("job" = i64, Path)),
+    responses((status = 200, body = Job), (status = 404, body = Problem)))]
+async fn cancel(State(app): State<Shared>, At(id): At<i64>) -> Result<Json<Job>, ApiError> {
+    app.jobs.cancel(id).await?;
+    Ok(Json(read(&app, id).await?))
+}
+
+/// Follows a job: an event `job` with each change, the last one with its end.
+#[utoipa::path(get, path = "/jobs/{job}/events", tag = "lessons", params(("job" = i64, Path)),
+    responses((status = 200, content_type = "text/event-stream", body = Job), (status = 404, body = Problem),
+    (status = 503, body = Problem, description = "too_many_streams")))]
+async fn events(
+    State(app): State<Shared>,
+    At(id): At<i64>,
+) -> Result<Sse<impl Stream<Item = Result<Event, Infallible>>>, ApiError> {
+    let place = app.stream_place()?;
+    let progress = app.jobs.watch(id);
+    read(&app, id).await?;
+    let changes = match progress {
+        Some(progress) => WatchStream::new(progress).map(|_| ()).left_stream(),
+        None => stream::iter([()]).right_stream(),
+    };
+    let stopping = app.stopped();
+    // The sender of the changes goes when the job has ended; one more look then shows how.
+    let states = changes.chain(stream::iter([()])).then(move |()| {
+        let (app, _place) = (app.clone(), &place);
+        async move { read(&app, id).await.ok() }
+    });
+    let events = states.filter_map(async |job| Event::default().event("job").json_data(job?).ok().map(Ok));
+    Ok(Sse::new(events.take_until(stopping)).keep_alive(KeepAlive::default()))
+}

@@ -1,0 +1,220 @@
+//! `/maps/{map}/landmarks/{landmark}/views`: photographs to learn from, each with the corners of the landmark.
+
+use super::{
+    App, Shared,
+    error::{ApiError, Problem},
+    extract::{At, Page, PageQuery, Params, json},
+    upload::{FORM_OVERHEAD, Form},
+};
+use crate::{
+    engine::picture,
+    store::{
+        landmarks, maps,
+        views::{self, Cut, NewView, ViewRow},
+    },
+};
+use axum::{
+    Json,
+    body::Bytes,
+    extract::{DefaultBodyLimit, Request, State},
+    http::{StatusCode, header},
+    response::{IntoResponse, Response},
+};
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+use utoipa::ToSchema;
+use utoipa_axum::{router::OpenApiRouter, routes};
+use vision::{detect::quads::Corners, frame::GrayImage, icon::icon, params::Params as Algorithm};
+
+pub(super) fn router(upload_bytes: usize) -> OpenApiRouter<Shared> {
+    OpenApiRouter::new()
+        .routes(routes!(add))
+        .layer(DefaultBodyLimit::max(upload_bytes + FORM_OVERHEAD))
+        .routes(routes!(list))
+        .routes(routes!(delete))
+        .routes(routes!(show_icon))
+}
+
+/// A stored view.
+#[derive(Debug, Clone, Serialize, ToSchema)]
+struct View {
+    /// Its number.
+    id: i64,
+    /// The landmark's corners in the picture: top-left, top-right, bottom-right, bottom-left, in pixels.
+    corners: [[f64; 2]; 4],
+    /// Of the picture, as a viewer shows it.
+    width_px: u32,
+    /// Of the picture.
+    height_px: u32,
+    /// `png` or `jpeg`.
+    image_kind: String,
+    /// ms since the Unix epoch.
+    created_ms: i64,
+}
+
+impl From<ViewRow> for View {
+    fn from(row: ViewRow) -> Self {
+        Self {
+            id: row.id,
+            corners: row.corners_px,
+            width_px: row.size_px[0],
+            height_px: row.size_px[1],
+            image_kind: row.image_kind,
+            created_ms: row.created_ms,
+        }
+    }
+}
+
+/// The form of an upload, for the documentation.
+#[derive(ToSchema)]
+#[expect(dead_code, reason = "read part by part; this only describes it")]
+struct NewViewForm {
+    /// PNG or JPEG.
+    #[schema(value_type = String, format = Binary)]
+    image: Vec<u8>,
+    /// JSON, `[[x,y],[x,y],[x,y],[x,y]]`: top-left, top-right, bottom-right, bottom-left, in pixels.
+    corners: Option<String>,
+    /// `true`: the picture shows the landmark and nothing else.
+    whole_image: Option<String>,
+}
+
+/// What the form says of the landmark's place in the picture.
+enum Extent {
+    Detect,
+    Whole,
+    Corners(Corners),
+}
+
+/// Adds a view. Without corners the server looks for the landmark itself and takes the one dominant quad; if there is
+/// none or more than one, the refusal lists what it saw. The same picture with the same corners a second time is
+/// answered with 200 and the view that is there.
+#[utoipa::path(post, path = "/maps/{map}/landmarks/{landmark}/views", tag = "landmarks",
+    params(("map" = String, Path), ("landmark" = String, Path)),
+    request_body(content = NewViewForm, content_type = "multipart/form-data"),
+    responses((status = 201, body = View), (status = 200, body = View), (status = 404, body = Problem),
+    (status = 409, body = Problem, description = "too_many"), (status = 413, body = Problem),
+    (status = 422, body = Problem, description = "bad_image, too_large, bad_value, too_small, outside, \
+     quad_not_found, quad_ambiguous")))]
+async fn add(
+    State(app): State<Shared>,
+    At((map, landmark)): At<(String, String)>,
+    request: Request,
+) -> Result<(StatusCode, Json<View>), ApiError> {
+    landmarks::get(app.store.reads(), &map, &landmark).await?;
+    let mut form = Form::read(&app, request, &["image", "corners", "whole_image"]).await?;
+    let image = form.needed("image")?;
+    let extent = extent(form.optional("corners"), form.optional("whole_image"))?;
+    let max = app.config.limits.views;
+    let new = app.clone().on_vision_thread(move |app| prepare(app, &image, &extent)).await??;
+    let write =
+        app.store.write(move |tx| Box::pin(async move { views::add(tx, &map, &landmark, &new, max).await }));
+    let (row, created) = write.await?;
+    Ok((if created { StatusCode::CREATED } else { StatusCode::OK }, Json(row.into())))
+}
+
+fn extent(corners: Option<Bytes>, whole_image: Option<Bytes>) -> Result<Extent, ApiError> {
+    let whole = match whole_image.as_deref() {
+        None | Some(b"false") => false,
+        Some(b"true") => true,
+        Some(_) => return Err(ApiError::invalid("bad_value", "whole_image", "neither `true` nor `false`")),
+    };
+    match (corners, whole) {
+        (Some(_), true) => Err(ApiError::invalid("bad_value", "whole_image", "not together with corners")),
+        (Some(corners), false) => Ok(Extent::Corners(json(&corners, "corners")?)),
+        (None, true) => Ok(Extent::Whole),
+        (None, false) => Ok(Extent::Detect),
+    }
+}
+
+fn prepare(app: &App, bytes: &Bytes, extent: &Extent) -> Result<NewView, ApiError> {
+    let (kind, image) = picture::decode(bytes, app.config.limits.upload_pixels, "image")?;
+    let p = &app.config.params;
+    let corners_px = match extent {
+        Extent::Corners(corners) => *corners,
+        Extent::Whole => whole(&image)?,
+        Extent::Detect => {
+            return Err(ApiError::invalid("missing", "corners", "the part `corners` is missing"));
+        }
+    };
+    let icon = cut(&image, &corners_px, p)?;
+    Ok(NewView {
+        image: bytes.to_vec(),
+        image_sha256: Sha256::digest(bytes).into(),
+        image_kind: kind.word(),
+        size_px: [image.width(), image.height()],
+        cut: Cut { corners_px, icon },
+        strangers: Vec::new(),
+    })
+}
+
+/// The outermost pixel centres.
+fn whole(image: &GrayImage) -> Result<Corners, ApiError> {
+    let (right, bottom) = (image.width() as f64 - 1.0, image.height() as f64 - 1.0);
+    Corners::try_from([[0.0, 0.0], [right, 0.0], [right, bottom], [0.0, bottom]])
+        .map_err(|e| ApiError::invalid("too_small", "image", e.to_string()))
+}
+
+fn cut(image: &GrayImage, corners: &Corners, p: &Algorithm) -> Result<vision::icon::Icon, ApiError> {
+    use vision::icon::IconError;
+    icon(image, corners, &p.icon).map_err(|error| {
+        let code = match error {
+            IconError::TooSmall { .. } => "too_small",
+            IconError::Outside { .. } => "outside",
+            _ => "bad_value",
+        };
+        ApiError::invalid(code, "corners", error.to_string())
+    })
+}
+
+/// Lists the views of a landmark by number.
+#[utoipa::path(get, path = "/maps/{map}/landmarks/{landmark}/views", tag = "landmarks",
+    params(("map" = String, Path), ("landmark" = String, Path), PageQuery),
+    responses((status = 200, body = Page<View>), (status = 404, body = Problem)))]
+async fn list(
+    State(app): State<Shared>,
+    At((map, landmark)): At<(String, String)>,
+    Params(page): Params<PageQuery>,
+) -> Result<Json<Page<View>>, ApiError> {
+    let limit = page.limit(app.config.limits.page)?;
+    let after = match page.cursor.as_deref() {
+        None => 0,
+        Some(text) => {
+            text.parse().map_err(|_e| ApiError::invalid("bad_value", "cursor", "not one of this list"))?
+        }
+    };
+    maps::get(app.store.reads(), &map).await?;
+    let landmark = landmarks::get(app.store.reads(), &map, &landmark).await?;
+    let rows = views::page(app.store.reads(), landmark.id, after, limit + 1).await?;
+    Ok(Json(Page::new(rows, limit, |r| r.id.to_string(), View::from)))
+}
+
+/// Deletes a view. The model stays until the landmark is learnt again.
+#[utoipa::path(delete, path = "/maps/{map}/landmarks/{landmark}/views/{view}", tag = "landmarks",
+    params(("map" = String, Path), ("landmark" = String, Path), ("view" = i64, Path)),
+    responses((status = 204), (status = 404, body = Problem)))]
+async fn delete(
+    State(app): State<Shared>,
+    At((map, landmark, view)): At<(String, String, i64)>,
+) -> Result<StatusCode, ApiError> {
+    app.store
+        .write(move |tx| Box::pin(async move { views::delete(tx, &map, &landmark, view).await }))
+        .await?;
+    Ok(StatusCode::NO_CONTENT)
+}
+
+/// The rectified picture that is learnt from, as PNG.
+#[utoipa::path(get, path = "/maps/{map}/landmarks/{landmark}/views/{view}/icon", tag = "landmarks",
+    params(("map" = String, Path), ("landmark" = String, Path), ("view" = i64, Path)),
+    responses((status = 200, content_type = "image/png"), (status = 404, body = Problem)))]
+async fn show_icon(
+    State(app): State<Shared>,
+    At((map, landmark, view)): At<(String, String, i64)>,
+) -> Result<Response, ApiError> {
+    let icon = views::icon(app.store.reads(), &map, &landmark, view).await?;
+    let grey: Vec<u8> = icon.pixels.iter().map(|g| *g as u8).collect();
+    let png = picture::png(icon.size, icon.size, &grey).map_err(|e| ApiError::internal(&e))?;
+    // A view never changes; its number never comes to mean another.
+    let headers =
+        [(header::CONTENT_TYPE, "image/png"), (header::CACHE_CONTROL, "private, max-age=86400, immutable")];
+    Ok((headers, png).into_response())
+}

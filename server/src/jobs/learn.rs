@@ -1,0 +1,383 @@
+//! A lesson: views -> icons -> models, for some landmarks of a map or for all, then one commit with everything, the
+//! new snapshot, and only then "done". The work itself runs on threads of its own, off the runtime.
+//!
+//! Negatives are worked out once for all landmarks. Landmarks that are not in the lesson keep their models and get the
+//! new icons added to what they must be told from.
+
+use super::{
+    JobError, Reporter,
+    negatives::{Negatives, each, real_strangers, spread},
+};
+use crate::{
+    config::Config,
+    engine::{picture, snapshot::MapSnapshot},
+    store::{
+        Store, StoreError,
+        jobs::{self, Ended, JobRow},
+        landmarks::ModelSummary,
+        maps::{self, MapRow},
+        models::{self, NewModel},
+        now_ms,
+        views::{self, Cut, Digest, Lesson},
+    },
+};
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+use std::{
+    collections::BTreeMap,
+    sync::{
+        Arc, Mutex, PoisonError,
+        atomic::{AtomicUsize, Ordering},
+    },
+    time::Instant,
+};
+use vision::{
+    learn::{
+        model::{LandmarkModel, MAX_VIEWS, ModelStatus, View, add_negatives, learn},
+        synthesis,
+    },
+    params::Params,
+    recognise::{IconFeatures, LandmarkId, features},
+};
+
+/// Views a landmark is learnt from at least: what photographs do not give is generated from them.
+const VIEWS_WANTED: usize = 30;
+/// Most generated views that can be asked for, of each photograph.
+pub(crate) const MAX_GENERATED: usize = 100;
+
+/// What to learn.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub(crate) struct Request {
+    /// Names; `None` means every landmark that has views.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) landmarks: Option<Vec<String>>,
+    /// Views generated from each photograph; `None` fills up to [`VIEWS_WANTED`] where photographs are few.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) generated_views: Option<usize>,
+}
+
+impl Request {
+    pub(crate) fn to_json(&self) -> String {
+        serde_json::to_string(self).unwrap_or_default()
+    }
+
+    /// Our own text; an unreadable one (a row from elsewhere) means everything.
+    pub(crate) fn from_json(text: &str) -> Self {
+        serde_json::from_str(text).unwrap_or_default()
+    }
+}
+
+/// Everything a lesson rests on, read at its start.
+struct Material {
+    store: Store,
+    runtime: tokio::runtime::Handle,
+    params: Arc<Params>,
+    workers: usize,
+    upload_pixels: usize,
+    generated_views: Option<usize>,
+    snapshot: Arc<MapSnapshot>,
+    targets: Vec<LandmarkId>,
+    lessons: BTreeMap<LandmarkId, Vec<Lesson>>,
+    strangers: Vec<vision::icon::Icon>,
+}
+
+/// What came of it.
+struct Learnt {
+    models: Vec<LandmarkModel>,
+    refitted: Vec<LandmarkModel>,
+    failed: Vec<(LandmarkId, String)>,
+}
+
+/// Does the job: ends its row in the same transaction as it stores the models.
+pub(super) async fn run(
+    store: &Store,
+    config: &Arc<Config>,
+    row: &JobRow,
+    reporter: &Arc<Reporter>,
+) -> Result<(), JobError> {
+    let started = Instant::now();
+    let map = maps::get(store.reads(), &row.map).await?;
+    let material = gather(store, config, &map, &Request::from_json(&row.request)).await?;
+    let names: BTreeMap<LandmarkId, String> =
+        material.snapshot.landmarks.iter().map(|(id, l)| (*id, l.name.clone())).collect();
+    let work = {
+        let reporter = reporter.clone();
+        move || compute(&material, &reporter)
+    };
+    let learnt = tokio::task::spawn_blocking(work)
+        .await
+        .map_err(|e| JobError::Failed(format!("the lesson broke off: {e}")))??;
+    reporter.report(0.99, "storing");
+    Ok(commit(store, map, row.id, learnt, &names, started).await?)
+}
+
+async fn gather(
+    store: &Store,
+    config: &Arc<Config>,
+    map: &MapRow,
+    request: &Request,
+) -> Result<Material, JobError> {
+    let snapshot = store
+        .snapshots()
+        .get(&map.name)
+        .ok_or_else(|| StoreError::NotFound { what: "map", name: map.name.clone() })?;
+    let all = views::of_map(store.reads(), map.id).await?;
+    let strangers: Vec<(Digest, Cut)> = views::strangers(store.reads(), map.id).await?;
+    let strangers = real_strangers(strangers, &all);
+    let mut lessons: BTreeMap<LandmarkId, Vec<Lesson>> = BTreeMap::new();
+    for lesson in all {
+        lessons.entry(lesson.landmark).or_default().push(lesson);
+    }
+    let targets = targets(&snapshot, &lessons, request)?;
+    Ok(Material {
+        store: store.clone(),
+        runtime: tokio::runtime::Handle::current(),
+        params: config.params.clone(),
+        workers: config.workers,
+        upload_pixels: config.limits.upload_pixels,
+        generated_views: request.generated_views,
+        snapshot,
+        targets,
+        lessons,
+        strangers,
+    })
+}
+
+fn targets(
+    snapshot: &MapSnapshot,
+    lessons: &BTreeMap<LandmarkId, Vec<Lesson>>,
+    request: &Request,
+) -> Result<Vec<LandmarkId>, JobError> {
+    let Some(names) = &request.landmarks else {
+        let all: Vec<_> = lessons.keys().copied().collect();
+        return if all.is_empty() {
+            Err(JobError::Failed("no landmark of this map has views".into()))
+        } else {
+            Ok(all)
+        };
+    };
+    let id_of = |name: &String| {
+        let found = snapshot.landmarks.iter().find(|(_, l)| l.name == *name);
+        let (id, _) =
+            found.ok_or_else(|| JobError::Failed(format!("there is no landmark `{name}` any more")))?;
+        if lessons.contains_key(id) {
+            Ok(*id)
+        } else {
+            Err(JobError::Failed(format!("landmark `{name}` has no views")))
+        }
+    };
+    let mut ids = names.iter().map(id_of).collect::<Result<Vec<_>, _>>()?;
+    ids.sort_unstable();
+    ids.dedup();
+    Ok(ids)
+}
+
+/// Three passes over landmarks, each spread over the threads: views, negatives, models.
+fn compute(m: &Material, reporter: &Reporter) -> Result<Learnt, JobError> {
+    let views = each_of(&m.targets, m.workers, reporter, (0.0, 0.3, "views"), |id| target_views(m, *id))?;
+    let views: BTreeMap<LandmarkId, Vec<View>> = m.targets.iter().copied().zip(views).collect();
+    let negatives = collect_negatives(m, &views, reporter)?;
+    let p = &m.params;
+    let learnt = each_of(&m.targets, m.workers, reporter, (0.4, 0.9, "models"), |id| {
+        let (before, after) = negatives.others(*id);
+        let model = learn(*id, &views[id], before, p).map_err(|e| e.to_string())?;
+        Ok::<_, String>(negatives.with_strangers(&add_negatives(&model, after, p), p))
+    })?;
+    let bystanders: Vec<LandmarkId> =
+        m.snapshot.learnt.keys().filter(|id| !views.contains_key(id)).copied().collect();
+    // A landmark that is learnt again is added a second time. Its older icons stay: a threshold may only get stricter
+    // by this, and learning the whole map starts afresh.
+    let refitted =
+        each_of(&bystanders, m.workers, reporter, (0.9, 0.99, "thresholds of the others"), |id| {
+            m.targets.iter().fold(LandmarkModel::clone(&m.snapshot.learnt[id].model), |model, target| {
+                add_negatives(&model, negatives.of(*target), p)
+            })
+        })?;
+    let mut done = Learnt { models: Vec::new(), refitted, failed: Vec::new() };
+    for (id, result) in m.targets.iter().zip(learnt) {
+        match result {
+            Ok(model) => done.models.push(model),
+            Err(reason) => done.failed.push((*id, reason)),
+        }
+    }
+    Ok(done)
+}
+
+/// The photographs of a landmark and what is generated from them.
+fn target_views(m: &Material, id: LandmarkId) -> Vec<View> {
+    let lessons = m.lessons.get(&id).map_or(&[][..], Vec::as_slice);
+    let mut views: Vec<View> = lessons
+        .iter()
+        .take(MAX_VIEWS)
+        .map(|l| View {
+            icon: l.cut.icon.clone(),
+            corners_px: l.cut.corners_px,
+            image_size_px: l.size_px,
+            generated: false,
+        })
+        .collect();
+    let photographs = views.len();
+    let wanted = match m.generated_views {
+        Some(each) => each * photographs,
+        None => VIEWS_WANTED.saturating_sub(photographs),
+    };
+    let wanted = wanted.min(MAX_VIEWS - photographs);
+    for (index, lesson) in lessons.iter().take(photographs).enumerate() {
+        let count = (wanted + photographs - 1 - index) / photographs;
+        if count > 0 {
+            views.extend(generated(m, lesson, count));
+        }
+    }
+    views
+}
+
+fn generated(m: &Material, lesson: &Lesson, count: usize) -> Vec<View> {
+    let image = m.runtime.block_on(views::image(m.store.reads(), lesson.view));
+    let decoded = image
+        .map_err(|e| e.to_string())
+        .and_then(|bytes| picture::decode(&bytes, m.upload_pixels, "image").map_err(|e| e.to_string()));
+    match decoded {
+        // The number of the view is the seed: the same lesson gives the same model.
+        Ok((_, image)) => {
+            synthesis::views(&image, &lesson.cut.corners_px, count, &m.params, lesson.view as u64)
+        }
+        Err(reason) => {
+            tracing::warn!(view = lesson.view, reason, "no views generated from this picture");
+            Vec::new()
+        }
+    }
+}
+
+fn collect_negatives(
+    m: &Material,
+    views: &BTreeMap<LandmarkId, Vec<View>>,
+    reporter: &Reporter,
+) -> Result<Negatives, JobError> {
+    let all: Vec<LandmarkId> = m.lessons.keys().copied().collect();
+    let count = each(all.len());
+    let icons =
+        each_of(&all, m.workers, reporter, (0.3, 0.4, "icons of the others"), |id| -> Vec<IconFeatures> {
+            let prepare = |icon: &vision::icon::Icon| features(icon.clone(), &m.params.recognise);
+            match views.get(id) {
+                Some(views) => spread(views, count).map(|v| prepare(&v.icon)).collect(),
+                // Not in the lesson: its photographs and, where those are few, what its model remembers.
+                None => {
+                    let photographs = spread(&m.lessons[id], count).map(|l| prepare(&l.cut.icon));
+                    let learnt =
+                        m.snapshot.learnt.get(id).into_iter().flat_map(|l| l.model.exemplars.iter().cloned());
+                    photographs.chain(learnt).take(count.max(3)).collect()
+                }
+            }
+        })?;
+    let mut negatives = Negatives::default();
+    for (id, icons) in all.into_iter().zip(icons) {
+        negatives.add(id, icons);
+    }
+    negatives.set_strangers(m.strangers.iter().map(|s| features(s.clone(), &m.params.recognise)).collect());
+    Ok(negatives)
+}
+
+/// `work` on every item, over `threads` threads, results in the order of the items. Progress goes from and to the
+/// given shares.
+fn each_of<T: Sync, R: Send>(
+    items: &[T],
+    threads: usize,
+    reporter: &Reporter,
+    (from, to, what): (f64, f64, &str),
+    work: impl Fn(&T) -> R + Sync,
+) -> Result<Vec<R>, JobError> {
+    let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
+    let results = Mutex::new(Vec::with_capacity(items.len()));
+    std::thread::scope(|scope| {
+        for _ in 0..threads.min(items.len()) {
+            scope.spawn(|| {
+                while !reporter.unwanted() {
+                    let index = next.fetch_add(1, Ordering::Relaxed);
+                    let Some(item) = items.get(index) else { return };
+                    let result = work(item);
+                    results.lock().unwrap_or_else(PoisonError::into_inner).push((index, result));
+                    let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+                    let share = from + (to - from) * done as f64 / items.len() as f64;
+                    reporter.report(share, format!("{what}: {done} of {}", items.len()));
+                }
+            });
+        }
+    });
+    if reporter.unwanted() {
+        return Err(JobError::Unwanted);
+    }
+    let mut results = results.into_inner().unwrap_or_else(PoisonError::into_inner);
+    results.sort_unstable_by_key(|(index, _)| *index);
+    Ok(results.into_iter().map(|(_, result)| result).collect())
+}
+
+async fn commit(
+    store: &Store,
+    map: MapRow,
+    job: i64,
+    learnt: Learnt,
+    names: &BTreeMap<LandmarkId, String>,
+    started: Instant,
+) -> Result<(), StoreError> {
+    let name = |id: &LandmarkId| names.get(id).cloned().unwrap_or_default();
+    let active = learnt.models.iter().filter(|m| m.is_active()).count();
+    let candidates: Vec<_> = learnt.models.iter().filter(|m| !m.is_active()).map(|m| name(&m.id)).collect();
+    let failed: Vec<_> =
+        learnt.failed.iter().map(|(id, reason)| json!({ "landmark": name(id), "reason": reason })).collect();
+    let result = json!({
+        "learnt": learnt.models.len(),
+        "active": active,
+        "candidates": candidates,
+        "failed": failed,
+        "refitted": learnt.refitted.len(),
+        "generated_views": learnt.models.iter().map(|m| m.generated_views).sum::<usize>(),
+        "seconds": started.elapsed().as_secs_f64(),
+    });
+    let message = format!("{active} of {} landmarks active", learnt.models.len() + learnt.failed.len());
+    let ended = Ended { state: "done", message, result: Some(result.to_string()) };
+    let rows: Vec<NewModel> = learnt.models.iter().chain(&learnt.refitted).map(row).collect();
+    let write = store.write(move |tx| {
+        Box::pin(async move {
+            let map = maps::still(tx, map).await?;
+            for row in &rows {
+                models::put(tx, map.id, row).await?;
+            }
+            maps::bump(tx, map.id).await?;
+            jobs::end(tx, job, &ended).await.map(drop)
+        })
+    });
+    write.await
+}
+
+fn row(model: &LandmarkModel) -> NewModel {
+    let failures = match &model.status {
+        ModelStatus::Active => &[][..],
+        ModelStatus::Candidate(failures) => failures,
+    };
+    let reasons: Vec<Value> = failures
+        .iter()
+        .map(|f| json!({ "gate": f.gate, "value": f.value, "limit": f.limit, "detail": f.to_string() }))
+        .collect();
+    let facts = json!({
+        "correlation": model.correlation,
+        "hausdorff": model.hausdorff,
+        "saliency": model.saliency,
+        "saliency_f": model.saliency_f,
+        "stable_points": model.stable_points,
+        "v_c": model.v_c,
+        "photographed_v_c": model.photographed_v_c,
+    });
+    NewModel {
+        landmark: model.id,
+        bytes: model.to_bytes(),
+        params_hash: model.params_hash,
+        summary: ModelSummary {
+            active: model.is_active(),
+            reasons: Value::from(reasons).to_string(),
+            facts: facts.to_string(),
+            views: (model.views - model.generated_views) as u64,
+            generated_views: model.generated_views as u64,
+            learnt_ms: now_ms(),
+        },
+    }
+}

@@ -1,0 +1,151 @@
+//! What a landmark must be told from: icons of every other landmark, evenly chosen, and strangers seen in the
+//! pictures. Worked out once for a whole lesson; they lie by landmark, so that each landmark's own are one gap.
+
+use crate::store::views::{Cut, Digest, Lesson};
+use std::ops::Range;
+use vision::{
+    detect::quads::Corners,
+    icon::Icon,
+    learn::model::{LandmarkModel, add_negatives},
+    params::Params,
+    recognise::{IconFeatures, LandmarkId},
+};
+
+/// Other landmarks' icons compared with each model, about. 300 are needed to speak of 1 % (method 8).
+const WANTED: usize = 2_000;
+/// Icons of one landmark at least, however many landmarks there are.
+const EACH_MIN: usize = 3;
+/// Icons of one landmark at most, however few landmarks there are.
+const EACH_MAX: usize = 30;
+
+/// How many icons of each landmark stand for it.
+pub(super) fn each(landmarks: usize) -> usize {
+    (WANTED / landmarks.max(1)).clamp(EACH_MIN, EACH_MAX)
+}
+
+/// At most `count` of `items`, evenly spread, the first always among them.
+pub(super) fn spread<T>(items: &[T], count: usize) -> impl Iterator<Item = &T> {
+    let taken = count.min(items.len());
+    (0..taken).map(move |i| &items[i * items.len() / taken])
+}
+
+/// Icons with their features, by landmark.
+#[derive(Debug, Default)]
+pub(super) struct Negatives {
+    icons: Vec<IconFeatures>,
+    owners: Vec<(LandmarkId, Range<usize>)>,
+    strangers: Vec<IconFeatures>,
+}
+
+impl Negatives {
+    /// Adds the icons of one landmark.
+    pub(super) fn add(&mut self, owner: LandmarkId, icons: Vec<IconFeatures>) {
+        let start = self.icons.len();
+        self.icons.extend(icons);
+        self.owners.push((owner, start..self.icons.len()));
+    }
+
+    /// Sets the icons of no landmark.
+    pub(super) fn set_strangers(&mut self, strangers: Vec<IconFeatures>) {
+        self.strangers = strangers;
+    }
+
+    /// The icons of `landmark`.
+    pub(super) fn of(&self, landmark: LandmarkId) -> &[IconFeatures] {
+        self.owners
+            .iter()
+            .find(|(owner, _)| *owner == landmark)
+            .map_or(&[], |(_, range)| &self.icons[range.clone()])
+    }
+
+    /// The icons of all other landmarks, in two parts: before and after its own.
+    pub(super) fn others(&self, landmark: LandmarkId) -> (&[IconFeatures], &[IconFeatures]) {
+        match self.owners.iter().find(|(owner, _)| *owner == landmark) {
+            Some((_, own)) => (&self.icons[..own.start], &self.icons[own.end..]),
+            None => (&self.icons, &[]),
+        }
+    }
+
+    /// `model` with the strangers among what it must be told from, but for those that are as near as its own views
+    /// are to each other: those are the landmark itself, in the background of another landmark's picture.
+    pub(super) fn with_strangers(&self, model: &LandmarkModel, p: &Params) -> LandmarkModel {
+        let own = &model.correlation_evidence.own;
+        let near = own.get(own.len() / 2).map_or(0.0, |d| f64::from(*d));
+        let strangers: Vec<IconFeatures> = self
+            .strangers
+            .iter()
+            .filter(|s| model.distances(s, &p.recognise).correlation > near)
+            .cloned()
+            .collect();
+        add_negatives(model, &strangers, p)
+    }
+}
+
+/// Strangers that no landmark was taught at, in the picture they were seen in.
+pub(super) fn real_strangers(strangers: Vec<(Digest, Cut)>, lessons: &[Lesson]) -> Vec<Icon> {
+    let taught = |digest: &Digest, corners: &Corners| {
+        lessons.iter().any(|l| l.image_sha256 == *digest && overlaps(&l.cut.corners_px, corners))
+    };
+    strangers
+        .into_iter()
+        .filter(|(digest, cut)| !taught(digest, &cut.corners_px))
+        .map(|(_, cut)| cut.icon)
+        .collect()
+}
+
+/// Whether two quads of one picture share more than a border: the centre of one lies in the other.
+pub(crate) fn overlaps(a: &Corners, b: &Corners) -> bool {
+    let inside = |quad: &Corners, other: &Corners| {
+        let centre = other.points().iter().fold(nalgebra::Vector2::zeros(), |sum, c| sum + c.coords * 0.25);
+        let corners = quad.points();
+        (0..4).all(|i| {
+            let (from, to) = (corners[i].coords, corners[(i + 1) % 4].coords);
+            (to - from).perp(&(centre - from)) > 0.0
+        })
+    };
+    inside(a, b) || inside(b, a)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn square(x: f64, y: f64, side: f64) -> Corners {
+        Corners::try_from([[x, y], [x + side, y], [x + side, y + side], [x, y + side]]).unwrap()
+    }
+
+    #[test]
+    fn a_choice_is_even_and_bounded() {
+        let items: Vec<usize> = (0..10).collect();
+        assert_eq!(spread(&items, 5).copied().collect::<Vec<_>>(), [0, 2, 4, 6, 8]);
+        assert_eq!(spread(&items, 20).count(), 10);
+        assert_eq!(spread(&items[..0], 3).count(), 0);
+        assert_eq!((each(0), each(10), each(287), each(10_000)), (30, 30, 6, 3));
+    }
+
+    #[test]
+    fn nested_and_shifted_quads_overlap_and_neighbours_do_not() {
+        let frame = square(0.0, 0.0, 100.0);
+        assert!(overlaps(&frame, &square(30.0, 30.0, 40.0)));
+        assert!(overlaps(&square(30.0, 30.0, 40.0), &frame));
+        assert!(overlaps(&frame, &square(20.0, 0.0, 100.0)));
+        assert!(!overlaps(&frame, &square(101.0, 0.0, 100.0)));
+        assert!(!overlaps(&frame, &square(80.0, 0.0, 100.0)));
+    }
+
+    #[test]
+    fn a_landmark_is_not_its_own_negative() {
+        let icon = |grey: f32| {
+            let icon = Icon::new(75, vec![grey; 75 * 75], 1.0).unwrap();
+            vision::recognise::features(icon, &Params::default().recognise)
+        };
+        let mut negatives = Negatives::default();
+        for (id, count) in [(1, 2), (5, 1), (9, 3)] {
+            negatives.add(LandmarkId(id), vec![icon(id as f32); count]);
+        }
+        let (before, after) = negatives.others(LandmarkId(5));
+        assert_eq!((before.len(), after.len(), negatives.of(LandmarkId(5)).len()), (2, 3, 1));
+        let (before, after) = negatives.others(LandmarkId(7));
+        assert_eq!((before.len(), after.len(), negatives.of(LandmarkId(7)).len()), (6, 0, 0));
+    }
+}
