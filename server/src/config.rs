@@ -4,6 +4,7 @@
 //! Precedence, weakest first: defaults, TOML file, `WAYMARK_...` variables (`WAYMARK_LIMITS__FRAME_BYTES=100000`),
 //! command line.
 
+use crate::engine::decode::ImageLimits;
 use figment::{
     Figment,
     providers::{Env, Format, Serialized, Toml},
@@ -15,7 +16,7 @@ use std::{
     path::{Path, PathBuf},
     sync::Arc,
 };
-use vision::params::Params;
+use vision::{params::Params, recognise::models::MAX_LANDMARKS};
 
 /// Variables that begin with `WAYMARK_` but are read by the command line, not by the settings.
 const NOT_SETTINGS: [&str; 3] = ["config", "server", "log"];
@@ -185,6 +186,13 @@ impl Limits {
     }
 }
 
+impl Limits {
+    /// What an uploaded picture may cost.
+    pub fn upload(&self) -> ImageLimits {
+        ImageLimits { bytes: self.upload_bytes, pixels: self.upload_pixels }
+    }
+}
+
 impl RawConfig {
     /// Defaults, then the file (which must exist if named), then the environment.
     pub fn read(file: Option<&Path>) -> Result<Self, ConfigError> {
@@ -251,6 +259,9 @@ impl TryFrom<RawConfig> for Config {
                     format!("{value} is more than {} px", vision::frame::MAX_AREA_PX),
                 ));
             }
+        }
+        if raw.limits.landmarks > MAX_LANDMARKS {
+            return Err(invalid("limits.landmarks", format!("more than {MAX_LANDMARKS}")));
         }
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         Ok(Self {
@@ -341,6 +352,7 @@ mod tests {
             (RawConfig { zenoh: "udp/127.0.0.1:7447".into(), ..RawConfig::default() }, "zenoh"),
             (RawConfig { fleet: "A/B".into(), ..RawConfig::default() }, "fleet"),
             (RawConfig { workers: MAX_WORKERS + 1, ..RawConfig::default() }, "workers"),
+            (limits(|l| l.landmarks = MAX_LANDMARKS + 1), "limits.landmarks"),
             (limits(|l| l.views = 0), "limits.views"),
             (limits(|l| l.upload_pixels = vision::frame::MAX_AREA_PX + 1), "limits.upload_pixels"),
         ] {

@@ -9,7 +9,7 @@ use vision::{
     learn::model::LandmarkModel,
     localise::pose::LandmarkSize,
     params::Params,
-    recognise::{DistanceKind, LandmarkId},
+    recognise::{DistanceKind, LandmarkId, models::ModelSet},
 };
 
 /// Changes that a slow listener may lag behind before it loses the oldest.
@@ -24,6 +24,8 @@ pub struct MapSnapshot {
     pub version: u64,
     /// Every landmark of the map by number, learnt or not.
     pub landmarks: BTreeMap<LandmarkId, LandmarkInfo>,
+    /// The models that are matched: the active ones of `learnt`.
+    pub models: ModelSet,
     /// Every learnt model that reads and fits the parameters, candidates included.
     pub learnt: BTreeMap<LandmarkId, Learnt>,
     /// Models that are stored but must not be used, and why: damaged, or learnt under other parameters.
@@ -148,6 +150,7 @@ mod tests {
             name: name.into(),
             version,
             landmarks: BTreeMap::new(),
+            models: ModelSet::default(),
             learnt: BTreeMap::new(),
             quarantined: BTreeMap::new(),
             walls: Vec::new(),

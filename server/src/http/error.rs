@@ -55,11 +55,6 @@ impl ApiError {
         Self::new(StatusCode::UNPROCESSABLE_ENTITY, code, detail).field(field)
     }
 
-    /// 404.
-    pub(crate) fn unknown(what: &'static str, name: &str) -> Self {
-        StoreError::NotFound { what, name: name.to_owned() }.into()
-    }
-
     /// Names the input at fault.
     pub(crate) fn field(mut self, field: impl Into<String>) -> Self {
         self.field = Some(field.into());

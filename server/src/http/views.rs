@@ -127,7 +127,7 @@ fn extent(corners: Option<Bytes>, whole_image: Option<Bytes>) -> Result<Extent, 
 }
 
 fn prepare(app: &App, bytes: &Bytes, extent: &Extent) -> Result<NewView, ApiError> {
-    let (kind, image) = picture::decode(bytes, app.config.limits.upload_pixels, "image")?;
+    let image = picture::decode(bytes, app.config.limits.upload())?;
     let p = &app.config.params;
     let corners_px = match extent {
         Extent::Corners(corners) => *corners,
@@ -140,7 +140,7 @@ fn prepare(app: &App, bytes: &Bytes, extent: &Extent) -> Result<NewView, ApiErro
     Ok(NewView {
         image: bytes.to_vec(),
         image_sha256: Sha256::digest(bytes).into(),
-        image_kind: kind.word(),
+        image_kind: picture::kind(bytes).unwrap_or_default(),
         size_px: [image.width(), image.height()],
         cut: Cut { corners_px, icon },
         strangers: Vec::new(),

@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{
     config::Config,
-    engine::{picture, snapshot::MapSnapshot},
+    engine::{decode::ImageLimits, picture, snapshot::MapSnapshot},
     store::{
         Store, StoreError,
         jobs::{self, Ended, JobRow},
@@ -73,7 +73,7 @@ struct Material {
     runtime: tokio::runtime::Handle,
     params: Arc<Params>,
     workers: usize,
-    upload_pixels: usize,
+    upload: ImageLimits,
     generated_views: Option<usize>,
     snapshot: Arc<MapSnapshot>,
     targets: Vec<LandmarkId>,
@@ -134,7 +134,7 @@ async fn gather(
         runtime: tokio::runtime::Handle::current(),
         params: config.params.clone(),
         workers: config.workers,
-        upload_pixels: config.limits.upload_pixels,
+        upload: config.limits.upload(),
         generated_views: request.generated_views,
         snapshot,
         targets,
@@ -235,12 +235,10 @@ fn generated(m: &Material, lesson: &Lesson, count: usize) -> Vec<View> {
     let image = m.runtime.block_on(views::image(m.store.reads(), lesson.view));
     let decoded = image
         .map_err(|e| e.to_string())
-        .and_then(|bytes| picture::decode(&bytes, m.upload_pixels, "image").map_err(|e| e.to_string()));
+        .and_then(|bytes| picture::decode(&bytes, m.upload).map_err(|e| e.to_string()));
     match decoded {
         // The number of the view is the seed: the same lesson gives the same model.
-        Ok((_, image)) => {
-            synthesis::views(&image, &lesson.cut.corners_px, count, &m.params, lesson.view as u64)
-        }
+        Ok(image) => synthesis::views(&image, &lesson.cut.corners_px, count, &m.params, lesson.view as u64),
         Err(reason) => {
             tracing::warn!(view = lesson.view, reason, "no views generated from this picture");
             Vec::new()

@@ -16,7 +16,11 @@ use map::{
 use nalgebra::{Matrix2, Point2, Vector3};
 use sqlx::{Row, SqliteConnection};
 use std::{collections::BTreeMap, sync::Arc};
-use vision::{learn::model::LandmarkModel, params::Params, recognise::LandmarkId};
+use vision::{
+    learn::model::LandmarkModel,
+    params::Params,
+    recognise::{LandmarkId, models::ModelSet},
+};
 
 statements! {
     MAP = "SELECT name, version, distance FROM maps WHERE id = ?1";
@@ -81,8 +85,12 @@ pub(super) async fn map(
         let landmark = infos.get(id).map_or("", |l: &LandmarkInfo| l.name.as_str());
         tracing::warn!(map = name, landmark, reason, "model not used");
     }
+    let active = learnt.values().map(|l| l.model.clone()).filter(|m| m.is_active()).collect();
+    let models = ModelSet::new(active, params)
+        .map_err(|e| StoreError::Damaged { what: format!("map `{name}`"), reason: e.to_string() })?;
     Ok(Some(Arc::new(MapSnapshot {
         name,
+        models,
         version: row.try_get::<i64, _>("version").map_err(at())? as u64,
         landmarks: infos,
         learnt,

@@ -51,8 +51,9 @@ impl WriterTask {
     pub(crate) async fn close(self) {
         // The last connection to close empties the write-ahead log; that must be the one that may write.
         self.reads.close().await;
-        // It fails if the writer has ended already.
-        drop(self.close.send(()));
+        if self.close.send(()).is_err() {
+            tracing::debug!("the writer had ended already");
+        }
         if let Err(error) = self.task.await {
             tracing::error!(%error, "the writer panicked");
         }
