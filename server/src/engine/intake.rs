@@ -114,14 +114,7 @@ pub(crate) mod tests {
     use protos::Name;
 
     pub(crate) fn map(name: &str) -> Arc<MapSnapshot> {
-        Arc::new(MapSnapshot {
-            name: name.into(),
-            version: 3,
-            landmarks: std::collections::BTreeMap::new(),
-            walls: Vec::new(),
-            distance: vision::recognise::DistanceKind::Both,
-            params: Arc::default(),
-        })
+        Arc::new(MapSnapshot::empty(name, 3))
     }
 
     fn intake() -> Intake {

@@ -24,6 +24,8 @@ pub struct MapSnapshot {
     pub version: u64,
     /// Every landmark of the map by number, learnt or not.
     pub landmarks: BTreeMap<LandmarkId, LandmarkInfo>,
+    /// The sizes of those of them that have one.
+    pub sizes: BTreeMap<LandmarkId, LandmarkSize>,
     /// The models that are matched: the active ones of `learnt`.
     pub models: ModelSet,
     /// Every learnt model that reads and fits the parameters, candidates included.
@@ -36,6 +38,24 @@ pub struct MapSnapshot {
     pub distance: DistanceKind,
     /// The parameters the models were learnt under, with the map's own distance.
     pub params: Arc<Params>,
+}
+
+impl MapSnapshot {
+    /// A map without content.
+    pub fn empty(name: impl Into<String>, version: u64) -> Self {
+        Self {
+            name: name.into(),
+            version,
+            landmarks: BTreeMap::new(),
+            sizes: BTreeMap::new(),
+            models: ModelSet::default(),
+            learnt: BTreeMap::new(),
+            quarantined: BTreeMap::new(),
+            walls: Vec::new(),
+            distance: DistanceKind::Both,
+            params: Arc::default(),
+        }
+    }
 }
 
 /// What is known of a landmark besides its appearance.
@@ -146,17 +166,7 @@ mod tests {
     use super::*;
 
     fn map(name: &str, version: u64) -> Arc<MapSnapshot> {
-        Arc::new(MapSnapshot {
-            name: name.into(),
-            version,
-            landmarks: BTreeMap::new(),
-            models: ModelSet::default(),
-            learnt: BTreeMap::new(),
-            quarantined: BTreeMap::new(),
-            walls: Vec::new(),
-            distance: DistanceKind::Both,
-            params: Arc::default(),
-        })
+        Arc::new(MapSnapshot::empty(name, version))
     }
 
     #[test]

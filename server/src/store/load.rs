@@ -92,6 +92,7 @@ pub(super) async fn map(
         name,
         models,
         version: row.try_get::<i64, _>("version").map_err(at())? as u64,
+        sizes: infos.iter().filter_map(|(id, l)| Some((*id, l.size?))).collect(),
         landmarks: infos,
         learnt,
         quarantined,
