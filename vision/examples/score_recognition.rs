@@ -1,5 +1,6 @@
-//! Scores recognition on real photographs with the true corners: `score_recognition DIR [ICON_SIZE]`, where DIR holds
-//! a `truth.json` in the evaluation format. Every landmark is taught from its one photograph and views generated from
+//! Scores recognition on real photographs with the true corners: `score_recognition DIR [PARAMS [KIND]]`, where
+//! DIR holds a `truth.json` in the evaluation format, PARAMS is JSON such as `{"icon":{"size":50}}` and KIND one of
+//! `hausdorff`, `correlation`, `both`; with a KIND every quad is printed. Every landmark is taught from its one photograph and views generated from
 //! it. Each quad is looked for among all landmarks; then, as a stranger, among the half that does not hold it.
 #![expect(clippy::print_stdout, reason = "a program that prints a table")]
 
@@ -47,20 +48,29 @@ struct Score {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().collect();
-    let root = Path::new(arguments.get(1).ok_or("usage: score_recognition DIR [ICON_SIZE]")?);
-    let mut p = Params::default();
-    if let Some(size) = arguments.get(2) {
-        p.icon.size = size.parse()?;
-    }
-    let verbose = arguments.get(3).is_some();
+    let root = Path::new(arguments.get(1).ok_or("usage: score_recognition DIR [PARAMS [KIND]]")?);
+    let p: Params = serde_json::from_str(arguments.get(2).map_or("{}", |json| json))?;
+    let only: Option<DistanceKind> =
+        arguments.get(3).map(|k| serde_json::from_value(k.as_str().into())).transpose()?;
+    let verbose = only.is_some();
+    let start = std::time::Instant::now();
     let truth: Value = serde_json::from_str(&std::fs::read_to_string(root.join("truth.json"))?)?;
     let taught = teach(root, &truth, &p)?;
     let queries = queries(root, &truth)?;
     let same = same(&truth);
-    println!("{} landmarks, {} quads, icon size {}", taught.len(), queries.len(), p.icon.size);
+    println!(
+        "{} landmarks taught in {:.1} s, {} quads, icon size {}",
+        taught.len(),
+        start.elapsed().as_secs_f64(),
+        queries.len(),
+        p.icon.size
+    );
     let everything = model_set(&taught, |_| true, &p)?;
     let halves = [model_set(&taught, |id| id % 2 == 0, &p)?, model_set(&taught, |id| id % 2 == 1, &p)?];
     for kind in [DistanceKind::Correlation, DistanceKind::Hausdorff, DistanceKind::Both] {
+        if only.is_some_and(|o| o != kind) {
+            continue;
+        }
         let mut score = Score::default();
         let start = std::time::Instant::now();
         for q in &queries {

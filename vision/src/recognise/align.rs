@@ -222,3 +222,78 @@ fn bucket_equations(
     }
     (normal, right)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        icon::icon,
+        recognise::fixture::{oblique, photograph, poster},
+    };
+
+    fn setting() -> (IconParams, CorrelationParams, AlignParams) {
+        (IconParams::default(), CorrelationParams::default(), AlignParams::default())
+    }
+
+    #[test]
+    fn displaced_corners_come_back() {
+        let (ip, c, p) = setting();
+        let template = icon(&photograph(&poster(1), &oblique(), 1.0, 0.0), &oblique(), &ip).unwrap();
+        let image = photograph(&poster(1), &oblique(), 0.7, 40.0);
+        // Up to 8 px of 200: 3 icon pixels of 75.
+        for offset in
+            [[6.0, -5.0, 8.0, 4.0, -6.0, 7.0, 3.0, -8.0], [-8.0, -8.0, 8.0, -8.0, 8.0, 8.0, -8.0, 8.0]]
+        {
+            let mut i = 0;
+            let wrong = oblique().points().map(|q| {
+                i += 2;
+                Point2::new(q.x + offset[i - 2], q.y + offset[i - 1])
+            });
+            let around = Surroundings::new(&image, &Corners::new(wrong).unwrap(), &ip, &p).unwrap();
+            let found = around.align(&template, &c, &p).unwrap();
+            for (a, b) in found.points().iter().zip(oblique().points()) {
+                // An icon pixel is 2.7 px here.
+                assert!((a - b).norm() < 1.2, "{offset:?}: {a} for {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_covered_part_has_no_say() {
+        let (ip, c, p) = setting();
+        let template = icon(&photograph(&poster(2), &oblique(), 1.0, 0.0), &oblique(), &ip).unwrap();
+        let image = photograph(&poster(2), &oblique(), 1.0, 0.0);
+        let covered = GrayImage::from_fn(400, 400, |u, v| {
+            if (120..250).contains(&u) && (160..240).contains(&v) {
+                if (u / 7) % 2 == 0 { 255 } else { 0 }
+            } else {
+                image.at(u, v)
+            }
+        });
+        let wrong = Corners::new(oblique().points().map(|q| Point2::new(q.x + 4.0, q.y - 3.0))).unwrap();
+        let found = Surroundings::new(&covered, &wrong, &ip, &p).unwrap().align(&template, &c, &p).unwrap();
+        for (a, b) in found.points().iter().zip(oblique().points()) {
+            assert!((a - b).norm() < 2.5, "{a} for {b}");
+        }
+    }
+
+    #[test]
+    fn corners_never_move_further_than_allowed() {
+        let (ip, c, p) = setting();
+        let image = photograph(&poster(1), &oblique(), 1.0, 0.0);
+        for seed in 2..10 {
+            let template = icon(&photograph(&poster(seed), &oblique(), 1.0, 0.0), &oblique(), &ip).unwrap();
+            let around = Surroundings::new(&image, &oblique(), &ip, &p).unwrap();
+            if let Some(moved) = around.align(&template, &c, &p) {
+                for (a, b) in moved.points().iter().zip(oblique().points()) {
+                    // 12 % of a side of at most 252 px, both coordinates.
+                    assert!((a - b).norm() < 0.12 * 252.0 * 1.42 * 1.2);
+                }
+            }
+        }
+        let flat = GrayImage::from_fn(400, 400, |_, _| 99);
+        let around = Surroundings::new(&flat, &oblique(), &ip, &p).unwrap();
+        let template = icon(&image, &oblique(), &ip).unwrap();
+        assert!(around.align(&template, &c, &p).is_none());
+    }
+}

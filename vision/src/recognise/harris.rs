@@ -7,6 +7,8 @@ use serde::{Deserialize, Serialize};
 pub const MAX_POINTS: usize = 256;
 /// Largest filter radius in icon pixels, whatever the parameters say.
 const MAX_RADIUS: usize = 32;
+/// Parts along each side for [`HarrisParams::max_points_per_part`].
+const PARTS: usize = 5;
 /// A response below this (grey levels to the fourth) is rounding, not texture.
 const MIN_RESPONSE: f32 = 1.0;
 
@@ -26,6 +28,11 @@ pub struct HarrisParams {
     pub margin_px: usize,
     /// The strongest this many are kept, at most [`MAX_POINTS`].
     pub max_points: usize,
+    /// The strongest this many of each of 5 x 5 parts of the icon are kept.
+    ///
+    /// Departs from method 5, which keeps the strongest above 1e-3 of the peak wherever they are: a label, a lamp or a
+    /// passer-by with strong contrast then takes most points and hides the landmark's own.
+    pub max_points_per_part: usize,
 }
 
 impl Default for HarrisParams {
@@ -34,9 +41,10 @@ impl Default for HarrisParams {
             sigma_derivative: 1.0,
             sigma_integration: 1.5,
             k: 0.04,
-            relative_threshold: 1e-3,
+            relative_threshold: 1e-5,
             margin_px: 4,
             max_points: 60,
+            max_points_per_part: 3,
         }
     }
 }
@@ -75,6 +83,13 @@ pub fn harris(icon: &Icon, p: &HarrisParams) -> Vec<HarrisPoint> {
         }
     }
     points.sort_by(|a, b| b.response.total_cmp(&a.response));
+    let mut taken = [0_usize; PARTS * PARTS];
+    points.retain(|q| {
+        let part = q.xy_px.map(|c| (c * PARTS as f32 / size as f32).clamp(0.0, PARTS as f32 - 1.0) as usize);
+        let count = &mut taken[part[1] * PARTS + part[0]];
+        *count += 1;
+        *count <= p.max_points_per_part
+    });
     points.truncate(p.max_points.min(MAX_POINTS));
     points
 }

@@ -9,6 +9,8 @@ pub mod align;
 pub mod compare;
 pub mod confidence;
 pub mod verdict;
+#[cfg(test)]
+mod fixture;
 
 use crate::{icon::Icon, params::RecogniseParams};
 use correlation::Buckets;

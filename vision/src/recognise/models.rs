@@ -84,3 +84,35 @@ impl ModelSet {
         self.params_hash
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recognise::fixture::lessons;
+
+    #[test]
+    fn sets_are_checked_and_ordered() {
+        let p = Params::default();
+        let mut models = lessons(3, &p);
+        let ids = |set: &ModelSet| set.iter().map(|m| m.id.0).collect::<Vec<_>>();
+        models.reverse();
+        let set = ModelSet::new(models.clone(), &p).unwrap();
+        assert_eq!((ids(&set), set.len(), set.params_hash()), (vec![1, 2, 3], 3, p.distance_hash()));
+        assert_eq!(set.get(LandmarkId(2)).unwrap().id, LandmarkId(2));
+        assert!(set.get(LandmarkId(4)).is_none());
+
+        let mut foreign = (*models[0]).clone();
+        foreign.params_hash ^= 1;
+        let mixed = vec![Arc::clone(&models[1]), Arc::new(foreign)];
+        assert!(matches!(
+            ModelSet::new(mixed, &p),
+            Err(ModelSetError::ForeignParams { id: LandmarkId(3), .. })
+        ));
+        let twice = ModelSet::new(vec![Arc::clone(&models[1]); 2], &p);
+        assert_eq!(twice.unwrap_err(), ModelSetError::Duplicate { id: LandmarkId(2) });
+        let at_limit = ModelSet::new(vec![Arc::clone(&models[1]); MAX_LANDMARKS], &p);
+        assert!(matches!(at_limit, Err(ModelSetError::Duplicate { .. })));
+        let beyond = ModelSet::new(vec![Arc::clone(&models[1]); MAX_LANDMARKS + 1], &p);
+        assert_eq!(beyond.unwrap_err(), ModelSetError::TooMany { count: MAX_LANDMARKS + 1 });
+    }
+}

@@ -200,3 +200,6 @@ fn candidate(near: &Near, refusal: Option<Refusal>, accepted: usize, kind: Dista
         refusal,
     }
 }
+
+#[cfg(test)]
+mod tests;
