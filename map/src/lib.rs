@@ -4,12 +4,13 @@
 //! Modules stand in reading order.
 
 pub mod check;
+pub mod gate;
 pub mod pose2;
 pub mod mounting;
-pub mod gate;
 pub mod laser;
 pub mod segments;
-pub mod place;
-pub mod localise;
 pub mod lines;
 pub mod walls;
+pub mod place;
+pub mod localise;
+pub mod fuse;

@@ -208,8 +208,10 @@ fn fix(
     for (k, (key, covariance)) in problem.nuisances().into_iter().enumerate() {
         let j = &gain * at.by_nuisance.columns(6 * k, 6);
         let jacobian = Matrix3x6::from_iterator(j.iter().copied());
-        let covariance = covariance * scale;
-        total += jacobian * covariance * jacobian.transpose();
+        let part = jacobian * covariance * jacobian.transpose();
+        total += part * scale;
+        // What a bad fit adds is not a property of the place.
+        noise += part * (scale - 1.0);
         nuisances.push(Nuisance { key, jacobian, covariance });
     }
     let total = 0.5 * (total + total.transpose());

@@ -1,0 +1,373 @@
+//! One pose from odometry and landmark fixes, in the order of capture, late ones included (method 15).
+//!
+//! In: odometry and fixes with their capture times. Out: the fused pose with covariance, or none before the first fix
+//! and after odometry has jumped. Errors that last (a landmark's place, the mounting) are part of the state: a hundred
+//! fixes on one landmark do not make its place better known than the map says.
+
+mod filter;
+pub use filter::MAX_NUISANCES;
+
+use crate::{
+    check::{self, OutOfRange},
+    gate::CHI2_3_99,
+    localise::Fix,
+    pose2::{Pose2, Pose2Covariance, wrap_rad},
+};
+use filter::Filter;
+use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
+
+/// Most odometry readings and fixes kept for replay, whatever the window.
+pub const MAX_EVENTS: usize = 1024;
+
+/// Odometry this much older than what can be replayed means that the robot's clock was set back.
+const CLOCK_STEP_NS: i64 = 10_000_000_000;
+
+/// Knobs of the fusion.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct FuseParams {
+    /// Odometry: standard deviation along the motion after 1 m (grows with the square root).
+    pub along_m: f64,
+    /// The same across the motion.
+    pub across_m: f64,
+    /// Of the heading after 1 m.
+    pub turn_rad: f64,
+    /// Of the heading after turning 1 rad.
+    pub turn_per_turn_rad: f64,
+    /// Gate on a fix: 99 % of chi2 with 3 degrees of freedom.
+    pub gate_chi2: f64,
+    /// Fixes older than this behind the newest event are refused.
+    pub window_s: f64,
+    /// Contradicting fixes in a row that agree with one another and thereby replace the pose...
+    pub reset_count: u32,
+    /// ...if they rest on this many landmarks: one wrong identity in view can be as steady as the truth.
+    pub reset_landmarks: usize,
+    /// A fix on the same landmarks is new only after this motion: from the same place its errors are the same.
+    pub min_move_m: f64,
+    /// Or after this turn.
+    pub min_turn_rad: f64,
+    /// Faster than this between two readings is a jump of odometry.
+    pub max_speed_mps: f64,
+}
+
+impl Default for FuseParams {
+    fn default() -> Self {
+        Self {
+            along_m: 0.03,
+            across_m: 0.01,
+            turn_rad: 0.01,
+            turn_per_turn_rad: 0.02,
+            gate_chi2: CHI2_3_99,
+            window_s: 2.0,
+            reset_count: 5,
+            reset_landmarks: 2,
+            min_move_m: 0.05,
+            min_turn_rad: 0.02,
+            max_speed_mps: 10.0,
+        }
+    }
+}
+
+impl FuseParams {
+    /// Covariance of a motion, in the frame where it starts. Linear in its length, so that cutting a motion in pieces
+    /// changes nothing.
+    fn motion_noise(&self, motion: &Pose2) -> Matrix3<f64> {
+        let (metres, radians) = (motion.position().norm(), motion.theta_rad.abs());
+        let turn = self.turn_rad.powi(2) * metres + self.turn_per_turn_rad.powi(2) * radians;
+        let (along, across) = (self.along_m.powi(2) * metres, self.across_m.powi(2) * metres);
+        let (s, c) = motion.y_m.atan2(motion.x_m).sin_cos();
+        let mut noise = Matrix3::from_diagonal(&Vector3::new(0.0, 0.0, turn));
+        noise[(0, 0)] = along * c * c + across * s * s;
+        noise[(1, 1)] = along * s * s + across * c * c;
+        noise[(0, 1)] = (along - across) * s * c;
+        noise[(1, 0)] = noise[(0, 1)];
+        noise
+    }
+}
+
+/// The fused pose.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FusedPose {
+    /// Capture time of the last odometry, ns.
+    pub at_ns: i64,
+    /// `map_from_robot`.
+    pub pose: Pose2Covariance,
+    /// Fixes applied since the start.
+    pub corrections: u64,
+    /// Fixes in a row that contradict it: above 0 it deserves doubt.
+    pub contradictions: u32,
+}
+
+/// What became of an odometry reading.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum OdometryOutcome {
+    /// It moved the pose.
+    Moved,
+    /// It was too old, or a second one of the same time: ignored.
+    TooOld,
+    /// The robot cannot have moved so far, or its clock was set back: the odometry frame is another one. The pose is
+    /// unknown until the next fix.
+    Jumped,
+}
+
+/// What became of a fix.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum FixOutcome {
+    /// It gave the first pose.
+    Started,
+    /// It corrected the pose.
+    Applied {
+        /// Squared Mahalanobis distance, 3 degrees of freedom.
+        distance2: f64,
+    },
+    /// It contradicts the pose and was left out.
+    GatedOut {
+        /// Squared Mahalanobis distance.
+        distance2: f64,
+        /// How many in a row.
+        in_a_row: u32,
+    },
+    /// It was the last of a row of contradictions that agree, and replaced the pose.
+    Reset,
+    /// Nothing new: the same landmarks from the same place.
+    Repeated,
+    /// Older than the replay window.
+    TooOld,
+    /// Newer than the last odometry: it will be applied when that arrives.
+    Waiting,
+}
+
+#[derive(Debug, Clone)]
+enum Event {
+    Odometry(Pose2),
+    Fix(Box<Fix>),
+}
+
+/// Fuses odometry and fixes of one robot in one map.
+#[derive(Debug, Clone)]
+pub struct Fuser {
+    params: FuseParams,
+    /// Just before the first kept event.
+    anchor: Filter,
+    /// Time of the last odometry in `anchor`.
+    anchor_ns: Option<i64>,
+    /// By time; odometry before a fix of the same time.
+    events: Vec<(i64, Event)>,
+    /// After the first `applied` events.
+    now: Filter,
+    now_ns: Option<i64>,
+    applied: usize,
+}
+
+impl Fuser {
+    /// Knows nothing yet.
+    pub fn new(params: FuseParams) -> Self {
+        Self {
+            params,
+            anchor: Filter::default(),
+            anchor_ns: None,
+            events: Vec::new(),
+            now: Filter::default(),
+            now_ns: None,
+            applied: 0,
+        }
+    }
+
+    /// Sets the pose of this moment (that of the last odometry), and forgets all before.
+    pub fn start(&mut self, map_from_robot: &Pose2Covariance) -> Result<(), OutOfRange> {
+        map_from_robot.check()?;
+        self.now.start(map_from_robot);
+        self.events.drain(..self.applied);
+        self.applied = 0;
+        (self.anchor, self.anchor_ns) = (self.now.clone(), self.now_ns);
+        Ok(())
+    }
+
+    /// The fused pose at the last odometry.
+    pub fn pose(&self) -> Option<FusedPose> {
+        let (at_ns, pose) = (self.now_ns?, self.now.pose()?);
+        let (corrections, contradictions) = (self.now.corrections, self.now.doubts());
+        Some(FusedPose { at_ns, pose, corrections, contradictions })
+    }
+
+    /// The pose at a time within the window, by what was known before it: the prior for a frame.
+    pub fn pose_at(&self, at_ns: i64) -> Option<Pose2Covariance> {
+        let (mut filter, mut filter_ns) = (self.anchor.clone(), self.anchor_ns);
+        let end = self.events.partition_point(|(t, _)| *t <= at_ns);
+        for i in 0..end {
+            apply(&mut filter, &mut filter_ns, &self.events, i, &self.params);
+        }
+        reach(&mut filter, &mut filter_ns, &self.events[end..], at_ns, &self.params)?;
+        filter.pose()
+    }
+
+    /// Takes an odometry reading.
+    pub fn odometry(&mut self, at_ns: i64, odom_from_robot: Pose2) -> Result<OdometryOutcome, OutOfRange> {
+        odom_from_robot.check()?;
+        let known = |(t, e): &(i64, Event)| *t == at_ns && matches!(e, Event::Odometry(_));
+        if self.anchor_ns.is_some_and(|t| at_ns < t.saturating_sub(CLOCK_STEP_NS)) {
+            self.restart(at_ns, &odom_from_robot);
+            return Ok(OdometryOutcome::Jumped);
+        }
+        if self.is_too_old(at_ns) || self.anchor_ns == Some(at_ns) || self.events.iter().any(known) {
+            return Ok(OdometryOutcome::TooOld);
+        }
+        if self.jumps(at_ns, &odom_from_robot) {
+            self.restart(at_ns, &odom_from_robot);
+            return Ok(OdometryOutcome::Jumped);
+        }
+        self.insert(at_ns, Event::Odometry(odom_from_robot));
+        Ok(OdometryOutcome::Moved)
+    }
+
+    /// Takes a fix of the time when its frame was captured.
+    pub fn fix(&mut self, at_ns: i64, fix: &Fix) -> Result<FixOutcome, OutOfRange> {
+        fix.pose.check()?;
+        check::covariance("noise", &fix.noise)?;
+        for nuisance in &fix.nuisances {
+            check::covariance("nuisance.covariance", &nuisance.covariance)?;
+            if let Some(value) = nuisance.jacobian.iter().find(|v| !v.is_finite()) {
+                return Err(OutOfRange { field: "nuisance.jacobian", value: *value });
+            }
+        }
+        if self.is_too_old(at_ns) {
+            return Ok(FixOutcome::TooOld);
+        }
+        Ok(self.insert(at_ns, Event::Fix(Box::new(fix.clone()))).unwrap_or(FixOutcome::Waiting))
+    }
+
+    /// Forgets all but the count of corrections: where the robot is now is unknown.
+    fn restart(&mut self, at_ns: i64, odom_from_robot: &Pose2) {
+        self.now.lose(odom_from_robot);
+        self.now_ns = Some(at_ns);
+        self.events.clear();
+        self.applied = 0;
+        (self.anchor, self.anchor_ns) = (self.now.clone(), self.now_ns);
+    }
+
+    /// Before everything that can still be replayed.
+    fn is_too_old(&self, at_ns: i64) -> bool {
+        self.anchor_ns.is_some_and(|t| at_ns < t)
+    }
+
+    /// Whether the newest reading cannot follow the one before it.
+    fn jumps(&self, at_ns: i64, odom_from_robot: &Pose2) -> bool {
+        let (Some(t), Some(before)) = (self.now_ns, self.now.odometry()) else { return false };
+        // A little slack for jitter of the clock.
+        let limit = self.params.max_speed_mps * ((at_ns.saturating_sub(t)) as f64 * 1e-9 + 0.1);
+        at_ns > t && before.between(odom_from_robot).position().norm() > limit
+    }
+
+    /// Puts an event in its place and brings `now` up to date. What became of it, if it could be applied.
+    fn insert(&mut self, at_ns: i64, event: Event) -> Option<FixOutcome> {
+        let rank = |t: i64, e: &Event| (t, matches!(e, Event::Fix(_)));
+        let key = rank(at_ns, &event);
+        let place = self.events.partition_point(|(t, e)| rank(*t, e) <= key);
+        self.events.insert(place, (at_ns, event));
+        if place < self.applied {
+            (self.now, self.now_ns, self.applied) = (self.anchor.clone(), self.anchor_ns, 0);
+        }
+        let mut outcome = None;
+        while self.applied < self.events.len() {
+            match apply(&mut self.now, &mut self.now_ns, &self.events, self.applied, &self.params) {
+                Step::Judged(judged) if self.applied == place => outcome = Some(judged),
+                Step::Judged(_) | Step::Moved => {}
+                Step::Waits => break,
+            }
+            self.applied += 1;
+        }
+        self.prune();
+        outcome
+    }
+
+    /// Moves the anchor on, past events out of the window or beyond the bound.
+    fn prune(&mut self) {
+        let newest = self.events.last().map_or(0, |(t, _)| *t);
+        let oldest = newest.saturating_sub((self.params.window_s * 1e9) as i64);
+        let mut gone = 0;
+        // The last odometry stays: later fixes are interpolated from it.
+        while gone + 1 < self.applied
+            && (self.events[gone].0 < oldest || self.events.len() - gone > MAX_EVENTS)
+        {
+            apply(&mut self.anchor, &mut self.anchor_ns, &self.events, gone, &self.params);
+            gone += 1;
+        }
+        self.events.drain(..gone);
+        self.applied -= gone;
+        // Fixes that wait for odometry are bounded too: the oldest are given up.
+        while self.events.len() > MAX_EVENTS {
+            self.events.remove(self.applied);
+        }
+    }
+}
+
+/// What applying an event did.
+enum Step {
+    /// Odometry moved the filter.
+    Moved,
+    /// A fix was judged.
+    Judged(FixOutcome),
+    /// A fix has to wait for odometry.
+    Waits,
+}
+
+/// Applies event `i`.
+fn apply(
+    filter: &mut Filter,
+    filter_ns: &mut Option<i64>,
+    events: &[(i64, Event)],
+    i: usize,
+    p: &FuseParams,
+) -> Step {
+    let (at_ns, event) = &events[i];
+    match event {
+        Event::Odometry(pose) => {
+            filter.predict(pose, p);
+            *filter_ns = Some(*at_ns);
+            Step::Moved
+        }
+        Event::Fix(fix) => {
+            let odometry_follows = events[i..].iter().any(|(_, e)| matches!(e, Event::Odometry(_)));
+            if filter.odometry().is_none() && odometry_follows {
+                // Nothing tells how the robot moved from here to its first reading.
+                return Step::Judged(FixOutcome::TooOld);
+            }
+            match reach(filter, filter_ns, &events[i + 1..], *at_ns, p) {
+                Some(()) => Step::Judged(filter.correct(fix, p)),
+                None => Step::Waits,
+            }
+        }
+    }
+}
+
+/// Moves the filter on to `at_ns`, between its last odometry and the next one among the `later` events.
+fn reach(
+    filter: &mut Filter,
+    filter_ns: &mut Option<i64>,
+    later: &[(i64, Event)],
+    at_ns: i64,
+    p: &FuseParams,
+) -> Option<()> {
+    let (from_ns, from) = ((*filter_ns)?, *filter.odometry()?);
+    if from_ns == at_ns {
+        return Some(());
+    }
+    let next = later.iter().find_map(|(t, e)| match e {
+        Event::Odometry(pose) => Some((*t, pose)),
+        Event::Fix(_) => None,
+    });
+    let (to_ns, to) = next?;
+    if at_ns < from_ns || to_ns <= from_ns {
+        return None;
+    }
+    let share = at_ns.saturating_sub(from_ns) as f64 / to_ns.saturating_sub(from_ns) as f64;
+    let d = to.minus(&from);
+    let turn = wrap_rad(d.z) * share;
+    filter.predict(&from.plus(&Vector3::new(d.x * share, d.y * share, turn)), p);
+    *filter_ns = Some(at_ns);
+    Some(())
+}
+
+#[cfg(test)]
+mod tests;
