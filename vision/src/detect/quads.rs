@@ -1,5 +1,17 @@
 //! The quad: four corners of something flat, seen in perspective (method 3.4 to 3.6).
 
+use super::{
+    border::canonical,
+    corners::refine,
+    evidence::{Gradients, Search},
+    grouping::{QuadSeed, match_quads},
+    hypotheses::{HypothesisParams, hypotheses},
+    segments::EdgeSegment,
+    selection::select,
+    similarity::SegmentPair,
+    three_sided::three_sided,
+};
+use crate::params::DetectParams;
 use nalgebra::{Matrix2, Point2};
 use serde::{Deserialize, Serialize};
 
@@ -127,6 +139,112 @@ pub struct Quad {
     pub alternates: Vec<Corners>,
 }
 
+/// How quads are formed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Grouping {
+    /// The paper's: two relaxations and sets of three sides.
+    Relaxation,
+    /// Corner chains with a searched fourth side, checked against the gradient.
+    #[default]
+    Hypotheses,
+}
+
+/// Parameters of the last stage.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct QuadParams {
+    /// The paper's grouping or the search.
+    pub grouping: Grouping,
+    /// The search.
+    pub hypotheses: HypothesisParams,
+    /// Share of each side that edges must support for the outermost border of a group to be its quad.
+    pub min_side_support: f64,
+    /// Nested quads above this `IoU` are borders of one thing.
+    pub nested_iou: f64,
+    /// How far from a rough side its edge points are looked for.
+    pub refit_reach_px: f64,
+    /// Smallest step height of an edge point, grey levels.
+    pub min_step: f64,
+    /// A nested quad must have this support on every side to unmask the outer one as a shadow or bare wall.
+    pub min_inner_support: f64,
+    /// Sides weaker than this share of the inner ones make an outer quad that shares sides a shadow or bare wall.
+    pub weak_extension: f64,
+    /// Whether to report sets of three sides.
+    pub three_sided: bool,
+    /// Smallest c5 of a set of three sides.
+    pub min_three_sided_closing: f64,
+}
+
+impl Default for QuadParams {
+    fn default() -> Self {
+        Self {
+            grouping: Grouping::default(),
+            hypotheses: HypothesisParams::default(),
+            min_side_support: 0.6,
+            nested_iou: 0.6,
+            refit_reach_px: 2.0,
+            min_step: 6.0,
+            min_inner_support: 0.7,
+            weak_extension: 0.35,
+            three_sided: true,
+            min_three_sided_closing: 0.5,
+        }
+    }
+}
+
+/// Quads from the matched pairs of pass 1: pass 2, three-sided sets, refitted corners, canonical border. Best first.
+pub fn quads(segments: &[EdgeSegment], pairs: &[SegmentPair], g: &Gradients, p: &DetectParams) -> Vec<Quad> {
+    if p.quads.grouping == Grouping::Hypotheses {
+        let seeds = hypotheses(segments, g, &p.quads.hypotheses);
+        let found = select(&seeds, g, &p.quads);
+        return canonical(
+            found,
+            p.quads.nested_iou,
+            p.quads.min_side_support,
+            p.relaxation.pair_tolerance_px,
+        );
+    }
+    let size = (g.width, g.height);
+    let full = match_quads(segments, pairs, size, &p.relaxation);
+    let mut found: Vec<Quad> = full.iter().filter_map(|s| quad(s, QuadKind::Full, g, &p.quads)).collect();
+    if p.quads.three_sided {
+        let mut in_quad = vec![false; segments.len()];
+        full.iter().flat_map(|s| s.sides).flatten().for_each(|i| in_quad[i] = true);
+        let left: Vec<SegmentPair> =
+            pairs.iter().filter(|s| !in_quad[s.k] && !in_quad[s.l]).cloned().collect();
+        for s in pairs {
+            (in_quad[s.k], in_quad[s.l]) = (true, true);
+        }
+        let sets = three_sided(segments, &left, &in_quad, p.quads.min_three_sided_closing, size);
+        found.extend(sets.iter().filter_map(|s| quad(s, QuadKind::ThreeSided, g, &p.quads)));
+    }
+    canonical(found, p.quads.nested_iou, p.quads.min_side_support, p.relaxation.pair_tolerance_px)
+}
+
+/// Refits a seed on the gradient planes. The score is the similarity of its pairs times the support of its worst
+/// side (method 3.6); of three sides, the worst of those that were seen.
+fn quad(seed: &QuadSeed, kind: QuadKind, g: &Gradients, p: &QuadParams) -> Option<Quad> {
+    let refined = refine(g, &seed.corners_px, Search { reach_px: p.refit_reach_px, min_step: p.min_step })?;
+    let mut support = refined.support();
+    let side_support = support;
+    if kind == QuadKind::ThreeSided {
+        support.sort_by(f64::total_cmp);
+        support[0] = 1.0;
+    }
+    let worst = support.into_iter().fold(1.0, f64::min);
+    Some(Quad {
+        corners_px: refined.corners_px,
+        corner_covariance_px2: refined.covariance_px2,
+        side_support,
+        side_clipped: refined.clipped,
+        score: (seed.similarity * worst).clamp(0.0, 1.0),
+        kind,
+        upright_ambiguous: refined.upright_ambiguous,
+        alternates: Vec::new(),
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -168,8 +286,3 @@ mod tests {
         assert!(corners.rotated(2).lean_rad() > 3.0);
     }
 }
-
-/// Parameters of this stage.
-#[derive(Debug, Clone, PartialEq, Default, serde::Serialize, serde::Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct QuadParams {}

@@ -1,0 +1,295 @@
+//! What the gradient planes say about a supposed side: which share of it an edge supports, and where that edge runs
+//! to a fraction of a pixel (method 3.6). Takes two points, gives a line with its variance; forms no hypotheses.
+
+use nalgebra::{Point2, Vector2};
+
+/// Most samples taken along one side.
+const MAX_SAMPLES: usize = 96;
+/// Fewest samples taken along one side.
+const MIN_SAMPLES: usize = 12;
+/// Share of a side left out at both ends: near a corner the other side's gradient mixes in.
+const CORNER_SHARE: f64 = 0.04;
+/// The gradient points along the normal to within about 35 degrees.
+const MIN_COS: f64 = 0.82;
+/// Floor of an edge point's standard deviation across the edge (method 1.3).
+const MIN_SIGMA_PX: f64 = 0.2;
+
+/// The gradient planes of a frame, row-major, in grey levels of step height.
+#[derive(Debug, Clone, Copy)]
+pub struct Gradients<'a> {
+    /// Width in pixels.
+    pub width: usize,
+    /// Height in pixels.
+    pub height: usize,
+    /// Derivative along u.
+    pub gx: &'a [f32],
+    /// Derivative along v.
+    pub gy: &'a [f32],
+}
+
+impl Gradients<'_> {
+    /// Bilinear gradient; none outside the image.
+    fn sample(&self, u: f64, v: f64) -> Option<Vector2<f64>> {
+        let inside = u >= 0.0 && v >= 0.0 && u < (self.width - 1) as f64 && v < (self.height - 1) as f64;
+        if !inside {
+            return None;
+        }
+        let (u0, v0) = (u as usize, v as usize);
+        let (a, b) = ((u - u0 as f64) as f32, (v - v0 as f64) as f32);
+        let i = v0 * self.width + u0;
+        let at = |plane: &[f32]| {
+            let top = plane[i] * (1.0 - a) + plane[i + 1] * a;
+            let bottom = plane[i + self.width] * (1.0 - a) + plane[i + self.width + 1] * a;
+            f64::from(top * (1.0 - b) + bottom * b)
+        };
+        Some(Vector2::new(at(self.gx), at(self.gy)))
+    }
+    /// Whether the gradient at the nearest pixel is a step of at least `min_step` across a line with this normal, to
+    /// within about 35 degrees; none outside the image.
+    fn follows(&self, p: &Point2<f64>, normal: &Vector2<f64>, min_step: f64) -> Option<bool> {
+        let (u, v) = (p.x + 0.5, p.y + 0.5);
+        if !(u >= 0.0 && v >= 0.0 && u < self.width as f64 && v < self.height as f64) {
+            return None;
+        }
+        let i = v as usize * self.width + u as usize;
+        let (gx, gy) = (f64::from(self.gx[i]), f64::from(self.gy[i]));
+        let step = (gx * normal.x + gy * normal.y).abs();
+        Some(step >= min_step && step * step >= MIN_COS * MIN_COS * (gx * gx + gy * gy))
+    }
+}
+
+/// How a side is searched.
+#[derive(Debug, Clone, Copy)]
+pub struct Search {
+    /// How far from the supposed side its edge may lie.
+    pub reach_px: f64,
+    /// Smallest step height of an edge point, in grey levels.
+    pub min_step: f64,
+}
+
+/// An edge point: distance along the side, offset across it, signed step height.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct EdgePoint {
+    along_px: f64,
+    offset_px: f64,
+    step: f64,
+}
+
+/// What was found along a side.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SideEvidence {
+    /// Share of the samples inside the image that have an edge along the side, 0 to 1.
+    pub support: f64,
+    /// Share of the edge points with the more frequent sign, 0.5 to 1; 0 without points.
+    pub agreement: f64,
+    /// Mean step height over all samples, in grey levels, unsupported samples counting 0.
+    pub strength: f64,
+    /// The refitted line, if there were points enough.
+    pub line: Option<FittedLine>,
+}
+
+/// A line `normal . x = rho_px` with the variance of its offset.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FittedLine {
+    /// Unit normal: to the left of the walk from the first to the second point as seen on screen, hence out of a
+    /// polygon that is walked clockwise.
+    pub normal: Vector2<f64>,
+    /// Signed distance from the origin.
+    pub rho_px: f64,
+    /// Point of the line where its offset is known best.
+    centre_px: Point2<f64>,
+    variance_px2: f64,
+    slope_variance: f64,
+}
+
+impl FittedLine {
+    /// Variance of the line's offset at the foot of `p`, extrapolation included, in px^2.
+    pub fn variance_at(&self, p: &Point2<f64>) -> f64 {
+        let direction = Vector2::new(-self.normal.y, self.normal.x);
+        self.variance_px2 + self.slope_variance * direction.dot(&(p - self.centre_px)).powi(2)
+    }
+}
+
+/// Looks for an edge along the way from `from` to `to`.
+pub fn measure(g: &Gradients, from: &Point2<f64>, to: &Point2<f64>, search: Search) -> SideEvidence {
+    let side = to - from;
+    let length = side.norm();
+    let nothing = SideEvidence { support: 0.0, agreement: 0.0, strength: 0.0, line: None };
+    if !length.is_finite() || length < 1.0 || g.width < 2 || g.height < 2 {
+        return nothing;
+    }
+    let direction = side / length;
+    let normal = Vector2::new(direction.y, -direction.x);
+    let count = ((length / 2.0) as usize).clamp(MIN_SAMPLES, MAX_SAMPLES);
+    let mut seen = 0_usize;
+    let mut points = Vec::with_capacity(count);
+    for i in 0..count {
+        let share = CORNER_SHARE + (1.0 - 2.0 * CORNER_SHARE) * (i as f64 + 0.5) / count as f64;
+        let along_px = share * length;
+        let foot = from + direction * along_px;
+        let (inside, found) = edge_across(g, &foot, &normal, search);
+        seen += usize::from(inside);
+        points.extend(found.map(|(offset_px, step)| EdgePoint { along_px, offset_px, step }));
+    }
+    if seen == 0 || points.is_empty() {
+        return nothing;
+    }
+    let positive = points.iter().filter(|p| p.step > 0.0).count();
+    let agreement = positive.max(points.len() - positive) as f64 / points.len() as f64;
+    let strength = points.iter().map(|p| p.step.abs()).sum::<f64>() / seen as f64;
+    let line = fit(&points, length).map(|f| f.line(from, &direction, &normal));
+    SideEvidence { support: points.len() as f64 / seen as f64, agreement, strength, line }
+}
+
+/// A coarse look: share of samples along the side with an edge within about 1.5 px that follows it. Samples outside
+/// the image count as neither.
+pub fn quick_support(g: &Gradients, from: &Point2<f64>, to: &Point2<f64>, min_step: f64) -> f64 {
+    const SAMPLES: usize = 24;
+    let side = to - from;
+    let length = side.norm();
+    if length.is_nan() || length < 1.0 {
+        return 0.0;
+    }
+    let direction = side / length;
+    let normal = Vector2::new(direction.y, -direction.x);
+    let (mut seen, mut supported) = (0_usize, 0_usize);
+    for i in 0..SAMPLES {
+        let share = CORNER_SHARE + (1.0 - 2.0 * CORNER_SHARE) * (i as f64 + 0.5) / SAMPLES as f64;
+        let foot = from + side * share;
+        let Some(here) = g.follows(&foot, &normal, min_step) else { continue };
+        seen += 1;
+        let beside = |offset: f64| g.follows(&(foot + normal * offset), &normal, min_step) == Some(true);
+        supported += usize::from(here || beside(-1.0) || beside(1.0) || beside(-2.0) || beside(2.0));
+    }
+    if seen == 0 { 0.0 } else { supported as f64 / seen as f64 }
+}
+
+/// Where the edge that runs from `from` through `to` ends: the last supported point on the line beyond `to`.
+pub fn run_end(g: &Gradients, from: &Point2<f64>, to: &Point2<f64>, min_step: f64) -> Point2<f64> {
+    /// Steps of 2 px without an edge that end the run.
+    const MAX_MISSES: usize = 4;
+    /// No image is longer.
+    const MAX_STEPS: usize = 8192;
+    let length = (to - from).norm();
+    if length.is_nan() || length < 1.0 {
+        return *to;
+    }
+    let direction = (to - from) / length;
+    let normal = Vector2::new(direction.y, -direction.x);
+    let (mut end, mut misses) = (*to, 0);
+    for i in 1..MAX_STEPS {
+        let foot = to + direction * (2.0 * i as f64);
+        let Some(here) = g.follows(&foot, &normal, min_step) else { break };
+        let beside = |offset: f64| g.follows(&(foot + normal * offset), &normal, min_step) == Some(true);
+        if here || beside(-1.0) || beside(1.0) {
+            (end, misses) = (foot, 0);
+        } else {
+            misses += 1;
+            if misses > MAX_MISSES {
+                break;
+            }
+        }
+    }
+    end
+}
+
+/// Strongest edge across the side at `foot`: whether the foot lies in the image, and the edge's offset and signed
+/// step height. The gradient must point along the normal to within about 35 degrees.
+fn edge_across(
+    g: &Gradients,
+    foot: &Point2<f64>,
+    normal: &Vector2<f64>,
+    search: Search,
+) -> (bool, Option<(f64, f64)>) {
+    let reach = search.reach_px.round().clamp(1.0, 16.0) as i32;
+    let across = |offset: i32| {
+        let p = foot + normal * f64::from(offset);
+        g.sample(p.x, p.y).map(|v| (v.dot(normal), v.norm()))
+    };
+    let mut best: Option<(i32, f64)> = None;
+    let mut inside = false;
+    for offset in -reach..=reach {
+        let Some((step, magnitude)) = across(offset) else { continue };
+        inside |= offset == 0;
+        let strong = step.abs() >= search.min_step && step.abs() >= MIN_COS * magnitude;
+        if strong && best.is_none_or(|b| step.abs() > b.1.abs()) {
+            best = Some((offset, step));
+        }
+    }
+    let found = best.and_then(|(offset, step)| {
+        let beside = |o| across(o).map_or(step.abs(), |s| s.0 * step.signum());
+        let (a, c) = (beside(offset - 1), beside(offset + 1));
+        // At the end of the reach a still rising gradient belongs to another edge.
+        let peak = a <= step.abs() && c <= step.abs();
+        let bend = a - 2.0 * step.abs() + c;
+        let shift = if bend < 0.0 { (0.5 * (a - c) / bend).clamp(-0.5, 0.5) } else { 0.0 };
+        peak.then_some((f64::from(offset) + shift, step))
+    });
+    (inside, found.filter(|_| inside))
+}
+
+/// `offset = offset_at_mean + slope * (along - mean)`.
+struct OffsetFit {
+    mean_along_px: f64,
+    offset_px: f64,
+    slope: f64,
+    variance_px2: f64,
+    slope_variance: f64,
+}
+
+/// Least squares with three rounds of trimming: texture near a side throws points far off its line.
+fn fit(points: &[EdgePoint], length: f64) -> Option<OffsetFit> {
+    const MIN_POINTS: usize = 5;
+    let mut kept: Vec<EdgePoint> = points.to_vec();
+    let mut result = None;
+    for round in 0..4 {
+        if kept.len() < MIN_POINTS {
+            return result;
+        }
+        let n = kept.len() as f64;
+        let mean = kept.iter().map(|p| p.along_px).sum::<f64>() / n;
+        let offset = kept.iter().map(|p| p.offset_px).sum::<f64>() / n;
+        let spread: f64 = kept.iter().map(|p| (p.along_px - mean).powi(2)).sum();
+        // Points in one place cannot give a direction.
+        if spread < n * (0.05 * length).powi(2) {
+            return result;
+        }
+        let slope = kept.iter().map(|p| (p.along_px - mean) * (p.offset_px - offset)).sum::<f64>() / spread;
+        let residual = |p: &EdgePoint| p.offset_px - offset - slope * (p.along_px - mean);
+        let sum: f64 = kept.iter().map(|p| residual(p).powi(2)).sum();
+        let sigma = (sum / (n - 2.0)).sqrt().max(MIN_SIGMA_PX);
+        result = Some(OffsetFit {
+            mean_along_px: mean,
+            offset_px: offset,
+            slope,
+            variance_px2: sigma * sigma / n,
+            slope_variance: sigma * sigma / spread,
+        });
+        let limit = (2.0 * sigma).max(0.5);
+        let before = kept.len();
+        if round == 0 {
+            // The first line may lean on outliers: judge every point by it again.
+            kept = points.iter().filter(|p| residual(p).abs() <= limit).copied().collect();
+        } else {
+            kept.retain(|p| residual(p).abs() <= limit);
+        }
+        if round > 0 && kept.len() == before {
+            break;
+        }
+    }
+    result
+}
+
+impl OffsetFit {
+    fn line(&self, from: &Point2<f64>, direction: &Vector2<f64>, normal: &Vector2<f64>) -> FittedLine {
+        let centre_px = from + direction * self.mean_along_px + normal * self.offset_px;
+        let turned = (normal - direction * self.slope).normalize();
+        FittedLine {
+            normal: turned,
+            rho_px: turned.dot(&centre_px.coords),
+            centre_px,
+            variance_px2: self.variance_px2,
+            slope_variance: self.slope_variance,
+        }
+    }
+}

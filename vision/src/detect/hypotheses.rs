@@ -1,0 +1,251 @@
+//! Quads by search, past the paper's two relaxations: segments that meet in corners are followed round, four in a
+//! circle or three with the fourth side looked for in the gradient planes, and every hypothesis must be supported by
+//! edges along all four sides. Segments in, seeds out; which of them become quads is decided by `selection`.
+//!
+//! Departs from method 3.3, 3.4: there a segment takes part in one pair and a pair in one quad, and a side that the
+//! segments miss loses the quad. What it gains is in docs/METHOD.md.
+
+use super::{
+    evidence::{Gradients, quick_support, run_end},
+    grouping::{QuadSeed, plausible},
+    segments::EdgeSegment,
+    similarity::corner_of,
+};
+use nalgebra::Point2;
+use serde::{Deserialize, Serialize};
+
+/// Most segments that take part, the longest first.
+pub const MAX_SEARCHED_SEGMENTS: usize = 400;
+/// Most corners kept at one end of a segment, the tightest first.
+pub const MAX_CORNERS_PER_END: usize = 8;
+/// Most hypotheses that are checked against the gradient, the tightest first.
+pub const MAX_HYPOTHESES: usize = 6000;
+
+/// How hypotheses are formed and checked.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct HypothesisParams {
+    /// Smallest angle at a corner, degrees.
+    pub min_corner_angle_deg: f64,
+    /// A segment may end this share of its length before the corner.
+    pub max_gap: f64,
+    /// The same in pixels, whichever is more.
+    pub max_gap_px: f64,
+    /// A segment may run past the corner by this share of its length.
+    pub max_overshoot: f64,
+    /// Smallest support of any side in the first, coarse look at the gradient.
+    pub min_support: f64,
+    /// Smallest step height of an edge point, grey levels.
+    pub min_step: f64,
+    /// Whether a fourth side that no segment gives is looked for.
+    pub complete: bool,
+}
+
+impl Default for HypothesisParams {
+    fn default() -> Self {
+        Self {
+            min_corner_angle_deg: 30.0,
+            max_gap: 0.6,
+            max_gap_px: 12.0,
+            max_overshoot: 0.2,
+            min_support: 0.5,
+            min_step: 4.0,
+            complete: true,
+        }
+    }
+}
+
+/// A corner seen from one of its segments.
+#[derive(Debug, Clone, Copy)]
+struct Corner {
+    other: usize,
+    /// End of the other segment at this corner: 0 for p, 1 for q.
+    other_end: usize,
+    at: Point2<f64>,
+    /// Missed length per segment length; small is tight.
+    looseness: f64,
+}
+
+/// Corners at both ends of every segment, tightest first.
+type CornerTable = Vec<[Vec<Corner>; 2]>;
+
+/// Seeds of quads whose sides the gradient supports, best first.
+pub fn hypotheses(segments: &[EdgeSegment], g: &Gradients, p: &HypothesisParams) -> Vec<QuadSeed> {
+    let order = longest(segments);
+    let table = corners(segments, &order, p);
+    let mut found = Vec::new();
+    for &a in &order {
+        for end in [0, 1] {
+            chains_from(&table, a, end, |chain| {
+                closed(&table, chain, &mut found);
+            });
+        }
+    }
+    if p.complete {
+        complete(segments, &table, &order, g, p, &mut found);
+    }
+    found.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.sides.cmp(&y.1.sides)));
+    found.truncate(MAX_HYPOTHESES);
+    let size = (g.width, g.height);
+    found
+        .into_iter()
+        .filter(|(_, seed)| plausible(&seed.corners_px, size))
+        .filter_map(|(_, mut seed)| {
+            seed.fit = supported(&seed, g, p)?;
+            Some(seed)
+        })
+        .collect()
+}
+
+fn longest(segments: &[EdgeSegment]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..segments.len()).collect();
+    order.sort_by(|a, b| segments[*b].length_px.total_cmp(&segments[*a].length_px).then(a.cmp(b)));
+    order.truncate(MAX_SEARCHED_SEGMENTS);
+    order.sort_unstable();
+    order
+}
+
+/// Support of the worst side, if every side has enough.
+fn supported(seed: &QuadSeed, g: &Gradients, p: &HypothesisParams) -> Option<f64> {
+    let mut worst: f64 = 1.0;
+    for i in 0..4 {
+        let support = quick_support(g, &seed.corners_px[i], &seed.corners_px[(i + 1) % 4], p.min_step);
+        if support < p.min_support {
+            return None;
+        }
+        worst = worst.min(support);
+    }
+    Some(worst)
+}
+
+fn corners(segments: &[EdgeSegment], order: &[usize], p: &HypothesisParams) -> CornerTable {
+    let mut table: CornerTable = vec![[Vec::new(), Vec::new()]; segments.len()];
+    let min_sin = p.min_corner_angle_deg.to_radians().sin();
+    for (i, &a) in order.iter().enumerate() {
+        for &b in &order[i + 1..] {
+            if segments[a].normal.perp(&segments[b].normal).abs() < min_sin {
+                continue;
+            }
+            let Some(at) = corner_of(&segments[a], &segments[b]) else { continue };
+            let (Some((end_a, gap_a)), Some((end_b, gap_b))) =
+                (end_at(&segments[a], &at, p), end_at(&segments[b], &at, p))
+            else {
+                continue;
+            };
+            let looseness = (gap_a + gap_b + 3.0) / (segments[a].length_px + segments[b].length_px);
+            table[a][end_a].push(Corner { other: b, other_end: end_b, at, looseness });
+            table[b][end_b].push(Corner { other: a, other_end: end_a, at, looseness });
+        }
+    }
+    for list in table.iter_mut().flatten() {
+        list.sort_by(|x, y| x.looseness.total_cmp(&y.looseness).then(x.other.cmp(&y.other)));
+        list.truncate(MAX_CORNERS_PER_END);
+    }
+    table
+}
+
+/// Which end of the segment the corner belongs to and how far that end misses it; none when too far.
+fn end_at(segment: &EdgeSegment, corner: &Point2<f64>, p: &HypothesisParams) -> Option<(usize, f64)> {
+    let length = segment.length_px;
+    let t = (corner - segment.p_px).dot(&(segment.q_px - segment.p_px)) / length;
+    let (end, beyond) = if t > 0.5 * length { (1, t - length) } else { (0, -t) };
+    let allowed = if beyond > 0.0 {
+        (p.max_gap * length).max(p.max_gap_px)
+    } else {
+        (p.max_overshoot * length).max(p.max_gap_px.min(0.5 * length))
+    };
+    (beyond.abs() <= allowed).then_some((end, beyond.abs()))
+}
+
+/// Three segments in a row: `a` from its start end, then `b`, then `c`.
+struct Chain {
+    /// Segment and the end where the next one is met.
+    a: usize,
+    a_end: usize,
+    ab: Corner,
+    bc: Corner,
+}
+
+fn chains_from(table: &CornerTable, a: usize, a_end: usize, mut found: impl FnMut(&Chain)) {
+    for ab in &table[a][a_end] {
+        for bc in &table[ab.other][1 - ab.other_end] {
+            if bc.other != a {
+                found(&Chain { a, a_end, ab: *ab, bc: *bc });
+            }
+        }
+    }
+}
+
+/// Adds the quads that a fourth segment closes. Each comes once: its smallest index leads, and of both ways round
+/// the one with the smaller second index.
+fn closed(table: &CornerTable, chain: &Chain, found: &mut Vec<(f64, QuadSeed)>) {
+    let (a, b, c) = (chain.a, chain.ab.other, chain.bc.other);
+    for cd in &table[c][1 - chain.bc.other_end] {
+        let d = cd.other;
+        if d == a || d == b || a > b || a > c || a > d || b > d {
+            continue;
+        }
+        let last = table[d][1 - cd.other_end].iter().find(|k| k.other == a && k.other_end == 1 - chain.a_end);
+        let Some(da) = last else { continue };
+        let looseness = chain.ab.looseness + chain.bc.looseness + cd.looseness + da.looseness;
+        found.push((looseness, clockwise([a, b, c, d].map(Some), [da.at, chain.ab.at, chain.bc.at, cd.at])));
+    }
+}
+
+/// Corner i is where side i begins; both are turned clockwise on screen.
+fn clockwise(mut sides: [Option<usize>; 4], mut corners_px: [Point2<f64>; 4]) -> QuadSeed {
+    if crate::geometry::polygon::signed_area(&corners_px) < 0.0 {
+        corners_px.swap(1, 3);
+        sides.reverse();
+    }
+    QuadSeed { sides, corners_px, similarity: 1.0, fit: 0.0 }
+}
+
+/// Adds quads of three segments whose fourth side lies where the edges along the two outer ones end.
+fn complete(
+    segments: &[EdgeSegment],
+    table: &CornerTable,
+    order: &[usize],
+    g: &Gradients,
+    p: &HypothesisParams,
+    found: &mut Vec<(f64, QuadSeed)>,
+) {
+    let ends: Vec<[Point2<f64>; 2]> = segments
+        .iter()
+        .map(|s| [run_end(g, &s.q_px, &s.p_px, p.min_step), run_end(g, &s.p_px, &s.q_px, p.min_step)])
+        .collect();
+    let mut open = Vec::new();
+    for &a in order {
+        for end in [0, 1] {
+            chains_from(table, a, end, |chain| {
+                // Both directions give the same chain.
+                if chain.a > chain.bc.other {
+                    return;
+                }
+                let c = chain.bc.other;
+                let (from, to) = (ends[a][1 - end], ends[c][1 - chain.bc.other_end]);
+                let base = chain.bc.at - chain.ab.at;
+                let looseness = 1.5 * (chain.ab.looseness + chain.bc.looseness) + 0.05;
+                let mut add = |from: Point2<f64>, to: Point2<f64>| {
+                    let seed = clockwise(
+                        [Some(a), Some(chain.ab.other), Some(c), None],
+                        [from, chain.ab.at, chain.bc.at, to],
+                    );
+                    open.push((looseness, seed));
+                };
+                add(from, to);
+                // One of the two may be broken off early or run on: a fourth side parallel to the second instead.
+                let side_a = chain.ab.at - from;
+                let side_c = chain.bc.at - to;
+                if side_a.norm() > 0.0 && side_c.norm() > 0.0 && base.norm() > 0.0 {
+                    let ratio = side_a.norm() / side_c.norm();
+                    if !(0.95..=1.05).contains(&ratio) {
+                        add(from, chain.bc.at - side_c * ratio);
+                        add(chain.ab.at - side_a / ratio, to);
+                    }
+                }
+            });
+        }
+    }
+    found.append(&mut open);
+}
