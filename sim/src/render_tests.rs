@@ -153,7 +153,7 @@ fn an_oblique_texture_is_the_texture_averaged_over_each_pixel() {
     let pose = camera_at(2.5 * angle.cos(), 2.5 * angle.sin(), 1.0, angle + std::f64::consts::PI);
     let frame = renderer.render(&building, &pose, &SensorParams::ideal(), 0);
     let surface = &building.surfaces()[0];
-    let (mut error2, mut spread2, mut count) = (0.0, 0.0, 0.0);
+    let (mut error2, mut spread2, mut count) = (0.0_f64, 0.0_f64, 0.0);
     for (v, u) in (50..150).step_by(3).flat_map(|v| (70..130).step_by(3).map(move |u| (v, u))) {
         let rays = (0..576).map(|i| {
             let (du, dv) = ((f64::from(i % 24) + 0.5) / 24.0 - 0.5, (f64::from(i / 24) + 0.5) / 24.0 - 0.5);
@@ -168,7 +168,7 @@ fn an_oblique_texture_is_the_texture_averaged_over_each_pixel() {
         spread2 += (expected - 128.0).powi(2);
         count += 1.0;
     }
-    let (error, spread) = ((error2 / count as f64).sqrt(), (spread2 / count as f64).sqrt());
+    let (error, spread) = ((error2 / count).sqrt(), (spread2 / count).sqrt());
     assert!(spread > 25.0 && error < 6.0, "root mean square error {error} at contrast {spread}");
 }
 
@@ -232,7 +232,7 @@ fn shares_agree_with_rays_cast_by_brute_force() {
                     hidden += usize::from(share > 0.1);
                 }
                 None => {
-                    assert!(seen[i] < 1.0 || l.corners_map().iter().any(|c| (pose.inverse() * c).z < 0.01))
+                    assert!(seen[i] < 1.0 || l.corners_map().iter().any(|c| (pose.inverse() * c).z < 0.01));
                 }
             }
         }

@@ -80,7 +80,7 @@ pub(crate) fn expose(light: &mut Vec<f32>, width: usize, p: &SensorParams, seed:
 /// Gaussian blur, separable; the border is repeated.
 fn blur(light: &mut [f32], width: usize, sigma_px: f64) {
     let sigma = sigma_px.min(MAX_BLUR_PX);
-    if !(sigma > 0.05) {
+    if sigma.is_nan() || sigma <= 0.05 {
         return;
     }
     let reach = (3.0 * sigma).ceil() as usize;
@@ -106,7 +106,9 @@ fn blur(light: &mut [f32], width: usize, sigma_px: f64) {
     let height = light.len() / width;
     let line = |v: usize| &source[v * width..(v + 1) * width];
     for (v, row) in light.chunks_exact_mut(width).enumerate() {
-        row.iter_mut().for_each(|l| *l *= weights[0]);
+        for l in row.iter_mut() {
+            *l *= weights[0];
+        }
         for (i, w) in weights.iter().enumerate().skip(1) {
             let (above, below) = (line(v.saturating_sub(i)), line((v + i).min(height - 1)));
             for ((out, a), b) in row.iter_mut().zip(above).zip(below) {
@@ -119,7 +121,7 @@ fn blur(light: &mut [f32], width: usize, sigma_px: f64) {
 /// Mean along a straight line of movement, centred; bilinear between pixels.
 fn smear(light: &mut Vec<f32>, width: usize, [du, dv]: [f64; 2]) {
     let length = du.hypot(dv);
-    if !(length > 0.05) {
+    if !length.is_finite() || length <= 0.05 {
         return;
     }
     let scale = length.min(MAX_BLUR_PX) / length;
@@ -143,7 +145,9 @@ fn smear(light: &mut Vec<f32>, width: usize, [du, dv]: [f64; 2]) {
             }
         }
     }
-    sum.iter_mut().for_each(|s| *s /= taps as f32);
+    for s in &mut sum {
+        *s /= taps as f32;
+    }
     *light = sum;
 }
 
