@@ -130,7 +130,7 @@ impl Canvas {
 
     /// Clouds: `octaves` of value noise, `cells` lattice cells per canvas width at the coarsest, blended over what is
     /// there with the given strength. Repeats with the canvas when that is square.
-    pub(crate) fn clouds(&mut self, area: Area, noise: Noise, strength: f32) {
+    pub(crate) fn clouds(&mut self, area: Area, noise: &Noise, strength: f32) {
         self.paint(area, |x, y, under| under + strength * (noise.at(x, y) - 0.5));
     }
 
@@ -151,39 +151,56 @@ impl Canvas {
     }
 }
 
-/// Value noise on a lattice that repeats every `cells` cells at the coarsest octave.
-#[derive(Debug, Clone, Copy)]
+/// Value noise on lattices that repeat: `cells` a canvas width at the coarsest octave, twice as many at each next.
+#[derive(Debug, Clone)]
 pub(crate) struct Noise {
-    pub(crate) seed: u64,
-    pub(crate) cells: u32,
-    pub(crate) octaves: u32,
+    octaves: Vec<Lattice>,
+}
+
+#[derive(Debug, Clone)]
+struct Lattice {
+    cells: usize,
+    values: Vec<f32>,
 }
 
 impl Noise {
+    pub(crate) fn new(seed: u64, cells: usize, octaves: u32) -> Self {
+        let lattice = |octave: u32| {
+            let cells = cells << octave;
+            let key = seed ^ u64::from(octave) << 56;
+            Lattice { cells, values: (0..cells * cells).map(|i| hash(key ^ i as u64)).collect() }
+        };
+        Self { octaves: (0..octaves).map(lattice).collect() }
+    }
+
     /// 0 to 1, mean about one half.
     pub(crate) fn at(&self, x: f32, y: f32) -> f32 {
         let (mut sum, mut weight, mut total) = (0.0, 0.5, 0.0);
-        for octave in 0..self.octaves {
-            let cells = self.cells << octave;
-            sum += weight * self.value(x * cells as f32, y * cells as f32, cells, octave);
+        for lattice in &self.octaves {
+            sum += weight * lattice.at(x, y);
             total += weight;
             weight *= 0.5;
         }
         sum / total
     }
+}
 
-    fn value(&self, x: f32, y: f32, cells: u32, octave: u32) -> f32 {
-        let (fx, fy) = (x - x.floor(), y - y.floor());
-        let (ix, iy) = (x.floor() as i32, y.floor() as i32);
-        let period = cells as i32;
-        let corner = |dx: i32, dy: i32| {
-            let (i, j) = ((ix + dx).rem_euclid(period) as u64, (iy + dy).rem_euclid(period) as u64);
-            hash(self.seed ^ (i << 32 | j << 8 | u64::from(octave)))
-        };
-        let (a, b) = (fx * fx * (3.0 - 2.0 * fx), fy * fy * (3.0 - 2.0 * fy));
-        let upper = corner(0, 0) + a * (corner(1, 0) - corner(0, 0));
-        let lower = corner(0, 1) + a * (corner(1, 1) - corner(0, 1));
+impl Lattice {
+    fn at(&self, x: f32, y: f32) -> f32 {
+        let (i0, i1, a) = self.around(x);
+        let (j0, j1, b) = self.around(y);
+        let at = |i: usize, j: usize| self.values[j * self.cells + i];
+        let upper = at(i0, j0) + a * (at(i1, j0) - at(i0, j0));
+        let lower = at(i0, j1) + a * (at(i1, j1) - at(i0, j1));
         upper + b * (lower - upper)
+    }
+
+    /// The two lattice points around a position that is not negative, and a smooth step from the first to the second.
+    fn around(&self, x: f32) -> (usize, usize, f32) {
+        let x = (x * self.cells as f32).max(0.0);
+        let i = x as usize;
+        let f = x - i as f32;
+        (i % self.cells, (i + 1) % self.cells, f * f * (3.0 - 2.0 * f))
     }
 }
 

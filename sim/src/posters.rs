@@ -57,7 +57,7 @@ fn draw(canvas: &mut Canvas, rng: &mut ChaCha8Rng) {
     letters(canvas, title, grey, rng);
     // Once more, over what reached beyond the area.
     border(canvas, &mut border_rng);
-    canvas.clouds(canvas.area(), Noise { seed: rng.random(), cells: 60, octaves: 2 }, 0.03);
+    canvas.clouds(canvas.area(), &Noise::new(rng.random(), 60, 2), 0.03);
 }
 
 /// Draws the border and gives the area within.
@@ -100,7 +100,7 @@ fn ground(canvas: &mut Canvas, area: Area, rng: &mut ChaCha8Rng) -> bool {
             canvas.paint(area, |x, y, _| blend((x - cx).hypot(y - cy) / 0.9));
         }
         3 => {
-            let noise = Noise { seed: noise_seed, cells: rng.random_range(3..8), octaves: 5 };
+            let noise = Noise::new(noise_seed, rng.random_range(3..8), 5);
             canvas.paint(area, |x, y, _| blend(2.2 * noise.at(x, y) - 0.6));
         }
         4 => {
@@ -111,7 +111,7 @@ fn ground(canvas: &mut Canvas, area: Area, rng: &mut ChaCha8Rng) -> bool {
         }
         _ => {
             let horizon = area.y0 + area.height() * rng.random_range(0.4..0.8);
-            let noise = Noise { seed: noise_seed, cells: rng.random_range(2..6), octaves: 4 };
+            let noise = Noise::new(noise_seed, rng.random_range(2..6), 4);
             canvas.paint(area, |x, y, _| {
                 let ridge = horizon + 0.5 * (noise.at(x, 0.37) - 0.5);
                 if y < ridge { base } else { blend(0.5 + 0.5 * noise.at(x, y)) }
@@ -230,7 +230,7 @@ fn photograph(canvas: &mut Canvas, area: Area, [cx, cy]: [f32; 2], rng: &mut Cha
     let (w, h) = (rng.random_range(0.2..0.42) * area.width(), rng.random_range(0.2..0.42) * area.height());
     let patch =
         Area::new((cx - w).max(area.x0), (cy - h).max(area.y0), (cx + w).min(area.x1), (cy + h).min(area.y1));
-    let noise = Noise { seed: rng.random(), cells: rng.random_range(6..14), octaves: 5 };
+    let noise = Noise::new(rng.random(), rng.random_range(6..14), 5);
     canvas.paint(patch, |x, y, _| (2.6 * (noise.at(x, y) - 0.5) + 0.5).clamp(0.02, 0.98));
     for _ in 0..rng.random_range(2..7) {
         let (x, y) = (rng.random_range(0.15..0.85), rng.random_range(0.15..0.85));

@@ -11,8 +11,8 @@ use crate::texture::{Edge, Texture};
 pub fn plaster(seed: u64) -> Texture {
     let mut rng = seed::stream(seed, 1);
     let mut canvas = Canvas::new(512, 512, rng.random_range(0.68..0.8));
-    canvas.clouds(canvas.area(), Noise { seed: rng.random(), cells: 4, octaves: 3 }, 0.05);
-    canvas.clouds(canvas.area(), Noise { seed: rng.random(), cells: 128, octaves: 1 }, 0.03);
+    canvas.clouds(canvas.area(), &Noise::new(rng.random(), 4, 3), 0.05);
+    canvas.clouds(canvas.area(), &Noise::new(rng.random(), 128, 1), 0.03);
     canvas.into_texture(Edge::Repeat)
 }
 
@@ -26,7 +26,7 @@ pub fn floor_tiles(seed: u64) -> Texture {
         let tile = Area::new(x, y, x + 0.25, y + 0.25).inset(0.003);
         canvas.rect(tile, base + rng.random_range(-0.035..0.035));
     }
-    canvas.clouds(canvas.area(), Noise { seed: rng.random(), cells: 64, octaves: 2 }, 0.08);
+    canvas.clouds(canvas.area(), &Noise::new(rng.random(), 64, 2), 0.08);
     canvas.into_texture(Edge::Repeat)
 }
 
@@ -38,7 +38,7 @@ pub fn ceiling_panels(seed: u64) -> Texture {
         let (x, y) = (column as f32 / 2.0, row as f32 / 2.0);
         canvas.rect(Area::new(x, y, x + 0.5, y + 0.5).inset(0.006), 0.85 + rng.random_range(-0.01..0.01));
     }
-    canvas.clouds(canvas.area(), Noise { seed: rng.random(), cells: 64, octaves: 2 }, 0.05);
+    canvas.clouds(canvas.area(), &Noise::new(rng.random(), 64, 2), 0.05);
     canvas.into_texture(Edge::Repeat)
 }
 
@@ -58,7 +58,7 @@ pub fn door(seed: u64) -> Texture {
     let leaf = Area::new(all.x0 + 0.06, all.y0 + 0.06, all.x1 - 0.06, all.y1);
     let tone: f32 = rng.random_range(0.45..0.62);
     canvas.rect(leaf, tone);
-    canvas.clouds(leaf, Noise { seed: rng.random(), cells: 24, octaves: 2 }, 0.05);
+    canvas.clouds(leaf, &Noise::new(rng.random(), 24, 2), 0.05);
     match rng.random_range(0..3) {
         0 => {
             for (y0, y1) in [(0.06, 0.42), (0.52, 0.94)] {
@@ -86,7 +86,7 @@ pub fn window(seed: u64) -> Texture {
     let mut rng = seed::stream(seed, 6);
     let mut canvas = Canvas::new(320, 320, 0.38);
     let view = canvas.area().inset(0.05);
-    let noise = Noise { seed: rng.random(), cells: rng.random_range(3..6), octaves: 4 };
+    let noise = Noise::new(rng.random(), rng.random_range(3..6), 4);
     let horizon = rng.random_range(0.55..0.75);
     canvas.paint(view, |x, y, _| {
         if y < horizon + 0.2 * (noise.at(x, 0.5) - 0.5) {
@@ -111,6 +111,6 @@ pub fn lamp() -> Texture {
 pub fn concrete(seed: u64) -> Texture {
     let mut rng = seed::stream(seed, 7);
     let mut canvas = Canvas::new(256, 256, rng.random_range(0.48..0.58));
-    canvas.clouds(canvas.area(), Noise { seed: rng.random(), cells: 4, octaves: 5 }, 0.16);
+    canvas.clouds(canvas.area(), &Noise::new(rng.random(), 4, 5), 0.16);
     canvas.into_texture(Edge::Repeat)
 }

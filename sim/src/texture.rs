@@ -13,6 +13,10 @@ pub enum Edge {
 
 /// Most taps along the longer axis of a pixel's footprint.
 const MAX_TAPS: f32 = 16.0;
+/// A footprint less elongated than this counts as round: one tap, and no axis that rounding could turn.
+const ROUND: f32 = 1.15;
+/// From sqrt(2) texels on, the next level is the nearer one.
+const NEXT_LEVEL: f32 = 0.414;
 
 #[derive(Debug, Clone, PartialEq)]
 struct Level {
@@ -74,24 +78,32 @@ impl Texture {
         let (xx, yy) = (a[0] * a[0] + b[0] * b[0], a[1] * a[1] + b[1] * b[1]);
         let xy = a[0] * a[1] + b[0] * b[1];
         let (sum, det) = (xx + yy, (a[0] * b[1] - a[1] * b[0]).abs());
+        if sum <= 1.0 {
+            return self.bilinear(0, s, t);
+        }
         let long2 = 0.5 * (sum + (sum * sum - 4.0 * det * det).max(0.0).sqrt());
         if !(long2 > 1.0 && long2.is_finite()) {
             return self.bilinear(0, s, t);
         }
         let long = long2.sqrt();
         let short = (det / long).max(1.0);
-        let taps = (long / short).ceil().clamp(1.0, MAX_TAPS);
-        let (level, fraction) = lod(short.max(long / taps));
-        if taps < 1.5 {
+        let ratio = long / short;
+        if ratio < ROUND {
+            let (level, fraction) = lod(long);
             return self.trilinear(level, fraction, s, t);
         }
+        let taps = ((ratio - 1e-3).min(MAX_TAPS - 1.0) as usize + 1) as f32;
+        let (level, fraction) = lod(short.max(long / taps));
         let axis = if xx > yy { [long2 - yy, xy] } else { [xy, long2 - xx] };
         let scale = long / (axis[0] * axis[0] + axis[1] * axis[1]).sqrt().max(f32::MIN_POSITIVE);
         let step = [axis[0] * scale / w / taps, axis[1] * scale / h / taps];
+        // The nearest level will do: several taps blend their levels' texels anyway.
+        let level = (level + usize::from(fraction > NEXT_LEVEL)).min(self.levels.len() - 1);
+        let (mut s, mut t) = (s - 0.5 * (taps - 1.0) * step[0], t - 0.5 * (taps - 1.0) * step[1]);
         let mut mean = 0.0;
-        for i in 0..taps as usize {
-            let k = i as f32 + 0.5 - 0.5 * taps;
-            mean += self.trilinear(level, fraction, s + k * step[0], t + k * step[1]);
+        for _ in 0..taps as usize {
+            mean += self.bilinear(level, s, t);
+            (s, t) = (s + step[0], t + step[1]);
         }
         mean / taps
     }
@@ -108,30 +120,47 @@ impl Texture {
         fine + fraction * (self.bilinear(level + 1, s, t) - fine)
     }
 
+    #[inline]
     fn bilinear(&self, level: usize, s: f32, t: f32) -> f32 {
         let l = &self.levels[level];
         let (s, t) = match self.edge {
-            Edge::Clamp => (s.clamp(0.0, 1.0), t.clamp(0.0, 1.0)),
-            Edge::Repeat => (s - s.floor(), t - t.floor()),
+            Edge::Clamp => (s, t),
+            Edge::Repeat => (fraction_of(s), fraction_of(t)),
         };
-        let (u0, u1, a) = neighbours(s * l.width as f32 - 0.5, l.width, self.edge);
-        let (v0, v1, b) = neighbours(t * l.height as f32 - 0.5, l.height, self.edge);
-        let (top, bottom) = (v0 * l.width, v1 * l.width);
-        let at = |i: usize| f32::from(l.data[i]);
-        let upper = at(top + u0) + a * (at(top + u1) - at(top + u0));
-        let lower = at(bottom + u0) + a * (at(bottom + u1) - at(bottom + u0));
-        upper + b * (lower - upper)
+        let (x, y) = (s * l.width as f32 - 0.5, t * l.height as f32 - 0.5);
+        let (u, v) = (x as i32, y as i32);
+        let inside = x >= 0.0 && y >= 0.0 && u + 1 < l.width as i32 && v + 1 < l.height as i32;
+        if !inside {
+            return l.bilinear_at_border(x, y, self.edge);
+        }
+        let (a, b) = (x - u as f32, y - v as f32);
+        let from = v as usize * l.width + u as usize;
+        let (top, bottom) = (&l.data[from..from + 2], &l.data[from + l.width..from + l.width + 2]);
+        mix([top[0], top[1], bottom[0], bottom[1]], a, b)
     }
+}
+
+/// Bilinear mean of top left, top right, bottom left, bottom right.
+#[inline]
+fn mix(texels: [u8; 4], a: f32, b: f32) -> f32 {
+    let [tl, tr, bl, br] = texels.map(f32::from);
+    let (upper, lower) = (tl + a * (tr - tl), bl + a * (br - bl));
+    upper + b * (lower - upper)
+}
+
+/// `x` minus the next lower integer; quicker than `floor` where the processor has no instruction for it.
+fn fraction_of(x: f32) -> f32 {
+    let rest = x - x as i32 as f32;
+    if rest < 0.0 { rest + 1.0 } else { rest }
 }
 
 /// The two texels around `x` and how far towards the second.
 fn neighbours(x: f32, size: usize, edge: Edge) -> (usize, usize, f32) {
-    if x < 0.0 {
-        return match edge {
-            Edge::Clamp => (0, 0, 0.0),
-            Edge::Repeat => (size - 1, 0, x + 1.0),
-        };
-    }
+    let x = match edge {
+        Edge::Clamp => x.clamp(0.0, (size - 1) as f32),
+        Edge::Repeat if x < 0.0 => x + size as f32,
+        Edge::Repeat => x,
+    };
     let first = (x as usize).min(size - 1);
     let second = match edge {
         _ if first + 1 < size => first + 1,
@@ -150,6 +179,14 @@ fn lod(texels: f32) -> (usize, f32) {
 }
 
 impl Level {
+    #[cold]
+    fn bilinear_at_border(&self, x: f32, y: f32, edge: Edge) -> f32 {
+        let (u0, u1, a) = neighbours(x, self.width, edge);
+        let (v0, v1, b) = neighbours(y, self.height, edge);
+        let at = |u: usize, v: usize| self.data[v * self.width + u];
+        mix([at(u0, v0), at(u1, v0), at(u0, v1), at(u1, v1)], a, b)
+    }
+
     /// Half the size by area; an odd side is weighted exactly, so that nothing shifts.
     fn halved(&self) -> Self {
         let (width, height) = ((self.width / 2).max(1), (self.height / 2).max(1));
