@@ -1,13 +1,20 @@
 //! Starts everything in order and stops it in the opposite order: store, jobs, engine, bus, HTTP.
 
 use crate::{
+    bus::{Bus, BusError, Receivers},
     config::Config,
-    engine::snapshot::Snapshots,
+    engine::{
+        intake::{FrameJob, Intake},
+        live::LiveHub,
+        motion::Motion,
+        slots::Slots,
+        snapshot::Snapshots,
+    },
     http::{self, App},
     jobs::Jobs,
     store::{OpenError, Store, WriterTask},
 };
-use std::{net::SocketAddr, sync::Arc};
+use std::{net::SocketAddr, sync::Arc, time::Duration};
 use tokio::{net::TcpListener, sync::watch, task::JoinHandle};
 
 /// Why the server did not start.
@@ -16,6 +23,9 @@ pub enum StartError {
     /// The database does not open.
     #[error("{0}")]
     Store(String),
+    /// Robots cannot connect.
+    #[error(transparent)]
+    Bus(#[from] BusError),
     /// The address cannot be listened on.
     #[error("cannot listen on {addr}: {source}")]
     Http {
@@ -47,10 +57,23 @@ pub struct Server;
 pub struct RunningServer {
     /// Where HTTP listens, with the real port.
     pub http_addr: SocketAddr,
+    /// Where robots connect, with the real port.
+    pub zenoh_endpoint: String,
     /// Maps and robots as the workers see them.
     pub snapshots: Arc<Snapshots>,
+    /// What robots are doing now.
+    pub live: Arc<LiveHub>,
+    /// Frames that wait, and the counters of all frames.
+    pub slots: Arc<Slots<FrameJob>>,
     stop: watch::Sender<bool>,
     store_failed: watch::Receiver<bool>,
+    tasks: Tasks,
+}
+
+/// What must end, in this order.
+#[derive(Debug)]
+struct Tasks {
+    bus: Bus,
     http: JoinHandle<()>,
     jobs: JoinHandle<()>,
     writer: WriterTask,
@@ -69,10 +92,22 @@ impl Server {
         let (jobs, jobs_task) = Jobs::start(store.clone(), config.clone(), stopping.clone())
             .await
             .map_err(|e| StartError::Store(e.to_string()))?;
-        let app = App::new(config.clone(), store, jobs, stopping.clone());
+        let live = Arc::new(LiveHub::default());
+        let motion = Arc::new(Motion::new(snapshots.clone(), live.clone()));
+        let slots = Arc::new(Slots::new(config.limits.cameras));
+        let intake = Arc::new(Intake {
+            slots: slots.clone(),
+            snapshots: snapshots.clone(),
+            frame_bytes: config.limits.frame_bytes,
+            deadline: Duration::from_millis(u64::from(config.limits.frame_deadline_ms)),
+        });
+        let bus = Bus::open(&config, Receivers { intake, motion, live: live.clone() }).await?;
+        let zenoh_endpoint = bus.endpoint().to_owned();
+        let app = App::new(config.clone(), store, jobs, live.clone(), stopping.clone());
         let http =
             tokio::spawn(http::listen::serve(listener, http::router(app), config.limits.clone(), stopping));
-        Ok(RunningServer { http_addr, snapshots, stop, store_failed, http, jobs: jobs_task, writer })
+        let tasks = Tasks { http, jobs: jobs_task, bus, writer };
+        Ok(RunningServer { http_addr, zenoh_endpoint, snapshots, live, slots, stop, store_failed, tasks })
     }
 }
 
@@ -89,11 +124,13 @@ impl RunningServer {
     /// Answers what is in work, then closes everything.
     pub async fn stop(self) {
         self.stop.send_replace(true);
-        for (what, task) in [("HTTP", self.http), ("jobs", self.jobs)] {
+        let Tasks { bus, http, jobs, writer } = self.tasks;
+        bus.close().await;
+        for (what, task) in [("HTTP", http), ("jobs", jobs)] {
             if let Err(error) = task.await {
                 tracing::error!(%error, what, "a task panicked");
             }
         }
-        self.writer.close().await;
+        writer.close().await;
     }
 }

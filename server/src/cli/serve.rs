@@ -79,7 +79,7 @@ impl Serve {
         let data = config.data.clone();
         let server = Server::start(config).await?;
         ready(&server);
-        tracing::info!(data = %data.display(), http = %server.http_addr, "ready");
+        tracing::info!(data = %data.display(), http = %server.http_addr, zenoh = server.zenoh_endpoint, "ready");
         tokio::select! {
             stopped = stop_signal() => stopped?,
             () = server.failed() => {
@@ -96,7 +96,8 @@ impl Serve {
 /// The first lines on stdout, for people and for programs that started this one on port 0.
 #[expect(clippy::print_stdout, reason = "the one result of this command")]
 fn ready(server: &crate::RunningServer) {
-    println!("http://{}/", server.http_addr);
+    println!("pages   http://{}/", server.http_addr);
+    println!("robots  {}", server.zenoh_endpoint);
 }
 
 #[cfg(unix)]

@@ -10,6 +10,7 @@ mod health;
 mod laser;
 mod landmarks;
 mod learning;
+mod live;
 mod maps;
 mod pages;
 mod resources;
@@ -21,7 +22,7 @@ pub(crate) mod listen;
 
 pub(crate) use router::router;
 
-use crate::{config::Config, jobs::Jobs, store::Store};
+use crate::{config::Config, engine::live::LiveHub, jobs::Jobs, store::Store};
 use axum::http::StatusCode;
 use error::ApiError;
 use std::sync::Arc;
@@ -33,6 +34,8 @@ pub(crate) struct App {
     pub(crate) config: Arc<Config>,
     pub(crate) store: Store,
     pub(crate) jobs: Arc<Jobs>,
+    /// What robots are doing now.
+    pub(crate) live: Arc<LiveHub>,
     /// Becomes true when the server stops; ends event streams.
     pub(crate) stopping: watch::Receiver<bool>,
     /// Places for vision work asked for over HTTP: as many as there are vision threads.
@@ -49,11 +52,12 @@ impl App {
         config: Arc<Config>,
         store: Store,
         jobs: Arc<Jobs>,
+        live: Arc<LiveHub>,
         stopping: watch::Receiver<bool>,
     ) -> Self {
         let vision = Arc::new(Semaphore::new(config.workers));
         let streams = Arc::new(Semaphore::new(config.limits.streams));
-        Self { config, store, jobs, stopping, vision, streams }
+        Self { config, store, jobs, live, stopping, vision, streams }
     }
 
     /// Runs vision work off the runtime, a bounded number at a time.

@@ -1,0 +1,92 @@
+//! What is happening: the last frame and answer of a camera, and the events of a map as they come.
+
+use super::{
+    Shared,
+    error::{ApiError, Problem},
+    extract::{At, name},
+};
+use crate::{
+    engine::live::{LiveEvent, LiveFrame},
+    store::{StoreError, maps, robots},
+};
+use axum::{
+    Json,
+    extract::State,
+    http::header,
+    response::{
+        IntoResponse, Response, Sse,
+        sse::{Event, KeepAlive},
+    },
+};
+use futures::{Stream, StreamExt};
+use protos::v1;
+use std::convert::Infallible;
+use tokio_stream::wrappers::BroadcastStream;
+use utoipa_axum::{router::OpenApiRouter, routes};
+
+pub(super) fn router() -> OpenApiRouter<Shared> {
+    OpenApiRouter::new().routes(routes!(frame)).routes(routes!(answer)).routes(routes!(events))
+}
+
+/// The last frame of a camera.
+async fn last(app: &Shared, robot: String, camera: String) -> Result<LiveFrame, ApiError> {
+    robots::get(app.store.reads(), &robot).await?;
+    let (robot, camera) = (name("robot", robot)?, name("camera", camera)?);
+    let frame = app.live.frame(&robot, &camera);
+    Ok(frame.ok_or_else(|| StoreError::NotFound { what: "camera", name: camera.into() })?)
+}
+
+/// The last answered frame of a camera, as a picture.
+#[utoipa::path(get, path = "/robots/{robot}/cameras/{camera}/frame", tag = "robots",
+    params(("robot" = String, Path), ("camera" = String, Path)),
+    responses((status = 200, content_type = "image/jpeg"), (status = 404, body = Problem)))]
+async fn frame(
+    State(app): State<Shared>,
+    At((robot, camera)): At<(String, String)>,
+) -> Result<Response, ApiError> {
+    let frame = last(&app, robot, camera).await?;
+    let seq = frame.answer.seq;
+    let (kind, bytes) = frame.for_browsers().map_err(|e| ApiError::internal(&e))?;
+    let headers = [(header::CONTENT_TYPE, kind.to_owned()), (header::CACHE_CONTROL, "no-store".to_owned())];
+    Ok((headers, [("x-frame-seq", seq.to_string())], bytes).into_response())
+}
+
+/// The answer to that frame.
+#[utoipa::path(get, path = "/robots/{robot}/cameras/{camera}/answer", tag = "robots",
+    params(("robot" = String, Path), ("camera" = String, Path)),
+    responses((status = 200, body = Object, description = "`Answer` of protos/waymark/v1/waymark.proto as JSON"),
+    (status = 404, body = Problem)))]
+async fn answer(
+    State(app): State<Shared>,
+    At((robot, camera)): At<(String, String)>,
+) -> Result<Json<v1::Answer>, ApiError> {
+    Ok(Json(last(&app, robot, camera).await?.answer.as_ref().clone()))
+}
+
+/// Follows a map: events `answer`, `pose`, `odometry`, `truth`, `presence`, `map_changed` as they happen. A reader that
+/// is too slow misses events and gets `missed` with their number.
+#[utoipa::path(get, path = "/maps/{map}/live", tag = "maps", params(("map" = String, Path)),
+    responses((status = 200, content_type = "text/event-stream"), (status = 404, body = Problem),
+    (status = 503, body = Problem, description = "too_many_streams")))]
+async fn events(
+    State(app): State<Shared>,
+    At(map): At<String>,
+) -> Result<Sse<impl Stream<Item = Result<Event, Infallible>>>, ApiError> {
+    let place = app.stream_place()?;
+    let events = BroadcastStream::new(app.live.events());
+    maps::get(app.store.reads(), &map).await?;
+    let events = events.filter_map(move |event| {
+        let _held = &place;
+        let shown = match event {
+            Ok(event) if event.map() == map => shown(&event),
+            Ok(_) => None,
+            Err(missed) => Some(Event::default().event("missed").data(missed.to_string())),
+        };
+        std::future::ready(shown.map(Ok))
+    });
+    Ok(Sse::new(events.take_until(app.stopped())).keep_alive(KeepAlive::default()))
+}
+
+fn shown(event: &LiveEvent) -> Option<Event> {
+    Event::default().event(event.kind()).json_data(event).ok()
+}
