@@ -20,6 +20,10 @@ pub struct GateParams {
     pub min_views: usize,
     /// Least saliency F.
     pub min_saliency_f: f64,
+    /// The same where at most one view was photographed. Generated views are flat and registered by construction, so
+    /// F only has to tell texture from a blank panel (1.1), while their corner noise and light are harsher than a
+    /// robot's own.
+    pub min_saliency_f_generated: f64,
     /// Fewest stable points.
     pub min_stable_points: usize,
     /// Least visibility confidence v_c.
@@ -37,6 +41,7 @@ impl Default for GateParams {
         Self {
             min_views: 20,
             min_saliency_f: 6.0,
+            min_saliency_f_generated: 3.0,
             min_stable_points: 10,
             min_v_c: 0.5,
             stable_within_px: 1.5,

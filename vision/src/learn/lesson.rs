@@ -115,9 +115,11 @@ fn status(
     p: &Params,
 ) -> ModelStatus {
     let g = &p.learn.gates;
+    let observed = model.views - model.generated_views > 1;
+    let min_saliency_f = if observed { g.min_saliency_f } else { g.min_saliency_f_generated };
     let measured = [
         (Gate::Views, model.views as f64, g.min_views as f64),
-        (Gate::Saliency, model.saliency_f, g.min_saliency_f),
+        (Gate::Saliency, model.saliency_f, min_saliency_f),
         (Gate::StablePoints, model.stable_points as f64, g.min_stable_points as f64),
         (Gate::VisibilityConfidence, model.v_c, g.min_v_c),
     ];
