@@ -12,5 +12,6 @@ pub mod segments;
 pub mod lines;
 pub mod walls;
 pub mod place;
+pub mod placing;
 pub mod localise;
 pub mod fuse;

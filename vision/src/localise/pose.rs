@@ -151,7 +151,7 @@ pub fn landmark_pose(
     Ok(LandmarkPose { best, second, ambiguous, measured })
 }
 
-/// Checks everything and takes the lens distortion out of the corners and of their covariances.
+/// Checks everything and takes the lens distortion out.
 fn measured(
     corners: &Corners,
     covariance_px2: &[Matrix2<f64>; 4],
@@ -163,6 +163,17 @@ fn measured(
             return Err(PoseError::Size { field, value });
         }
     }
+    let (corners_px, covariance_px2, camera) = straightened(corners, covariance_px2, camera)?;
+    Ok(Measured { corners_px, covariance_px2, camera, size })
+}
+
+/// Corners and covariances as the pinhole of the same K would have them, and that pinhole. Checks camera, corners and
+/// covariances.
+pub fn straightened(
+    corners: &Corners,
+    covariance_px2: &[Matrix2<f64>; 4],
+    camera: &Intrinsics,
+) -> Result<(Corners, [Matrix2<f64>; 4], Intrinsics), PoseError> {
     let c = Intrinsics::new(camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px, camera.distortion)?;
     let (mut straight, mut covariances) = (*corners.points(), *covariance_px2);
     for (corner, (p, s)) in straight.iter_mut().zip(&mut covariances).enumerate() {
@@ -177,8 +188,7 @@ fn measured(
         }
     }
     let corners_px = Corners::new(straight).map_err(|_folded| PoseError::Distortion)?;
-    let camera = Intrinsics { distortion: Distortion::None, ..c };
-    Ok(Measured { corners_px, covariance_px2: covariances, camera, size })
+    Ok((corners_px, covariances, Intrinsics { distortion: Distortion::None, ..c }))
 }
 
 /// Symmetric, with both standard deviations in range.

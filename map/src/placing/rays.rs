@@ -1,0 +1,75 @@
+//! Where the rays of four corners meet a wall, with the derivatives by all that is uncertain (method 11.3).
+
+use super::WallSighting;
+use crate::segments::LaserSegment;
+use nalgebra::{Matrix3, SMatrix, Vector2, Vector3};
+
+/// Columns of the derivatives: 8 corner coordinates, robot (x, y, theta), mounting (rotation, translation), wall
+/// (facing angle, signed distance from the map's origin along the facing normal).
+pub(super) const CORNERS: usize = 0;
+pub(super) const ROBOT: usize = 8;
+pub(super) const MOUNTING: usize = 11;
+pub(super) const WALL: usize = 17;
+pub(super) const INPUTS: usize = 19;
+
+/// Smallest cosine of the angle between ray and wall normal: 80 degrees of incidence.
+pub const MIN_COS_INCIDENCE: f64 = 0.17;
+
+/// A ray met the wall's plane.
+pub(super) struct Hit {
+    /// Where, map frame.
+    pub point: Vector3<f64>,
+    /// Distance from the camera.
+    pub distance_m: f64,
+    /// By all inputs.
+    pub by: SMatrix<f64, 3, INPUTS>,
+}
+
+/// Facing angle and signed distance of a wall from the map's origin.
+pub(super) fn plane(wall: &LaserSegment) -> (f64, f64) {
+    let f = wall.facing();
+    (f.y.atan2(f.x), f.dot(&wall.a.coords))
+}
+
+/// The hit of corner `i`; `None` when the ray goes away from the wall, grazes it, or comes from behind.
+pub(super) fn hit(view: &WallSighting<'_>, i: usize, (theta, r): (f64, f64)) -> Option<Hit> {
+    let robot = view.map_from_robot.pose.to_isometry3();
+    let robot_turn = robot.rotation.to_rotation_matrix().into_inner();
+    let camera = robot * view.mounting.robot_from_camera;
+    let turn: Matrix3<f64> = camera.rotation.to_rotation_matrix().into_inner();
+    let (c, k) = (camera.translation.vector, &view.camera);
+    let px = view.corners_px.points()[i];
+    let ray = Vector3::new((px.x - k.cx_px) / k.fx_px, (px.y - k.cy_px) / k.fy_px, 1.0);
+    let d = turn * ray;
+    let n = Vector3::new(theta.cos(), theta.sin(), 0.0);
+    let along = n.dot(&d);
+    // The camera stands on the free side: the ray runs against the facing normal.
+    if -along / d.norm() <= MIN_COS_INCIDENCE || n.dot(&c) <= r {
+        return None;
+    }
+    let s = (r - n.dot(&c)) / along;
+    let point = c + d * s;
+    let a = Matrix3::identity() - d * n.transpose() / along;
+    let mut by = SMatrix::<f64, 3, INPUTS>::zeros();
+    by.set_column(CORNERS + 2 * i, &(a * turn.column(0) * (s / k.fx_px)));
+    by.set_column(CORNERS + 2 * i + 1, &(a * turn.column(1) * (s / k.fy_px)));
+    // A left rotation phi of the camera in the map moves the hit by -s A [d]x phi; its centre's shift by A.
+    let by_turn = -(a * d.cross_matrix()) * s;
+    by.set_column(ROBOT, &a.column(0));
+    by.set_column(ROBOT + 1, &a.column(1));
+    let arm = c - robot.translation.vector;
+    by.set_column(ROBOT + 2, &(by_turn * Vector3::z() + a * Vector3::z().cross(&arm)));
+    by.fixed_columns_mut::<3>(MOUNTING).copy_from(&(by_turn * robot_turn));
+    by.fixed_columns_mut::<3>(MOUNTING + 3).copy_from(&(a * robot_turn));
+    let side = Vector3::new(-theta.sin(), theta.cos(), 0.0);
+    by.set_column(WALL, &(-d * (side.dot(&point) / along)));
+    by.set_column(WALL + 1, &(d / along));
+    let finite = point.iter().chain(by.iter()).all(|v| v.is_finite());
+    finite.then(|| Hit { point, distance_m: s * d.norm(), by })
+}
+
+/// Whether a hit lies on the wall's segment, lengthened by `margin_m` at both ends.
+pub(super) fn is_on(wall: &LaserSegment, point: &Vector3<f64>, margin_m: f64) -> bool {
+    let u = wall.direction().dot(&(Vector2::new(point.x, point.y) - wall.a.coords));
+    (-margin_m..=wall.length_m() + margin_m).contains(&u)
+}
