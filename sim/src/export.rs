@@ -170,3 +170,62 @@ pub fn pgm(image: &GrayImage) -> Vec<u8> {
     bytes.extend_from_slice(image.data());
     bytes
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::building::Building;
+    use crate::lesson::{LessonParams, stops};
+    use crate::robot::{Robot, RobotParams};
+    use std::sync::Arc;
+
+    fn entry(min_side_px: f64) -> (ImageEntry, FrameTruth) {
+        let building = Arc::new(Building::corridor(6));
+        let mut robot = Robot::new(building.clone(), &RobotParams::default());
+        let stop = &stops(&building, &LessonParams { views: 1, ..LessonParams::default() })[1];
+        let truth = robot.look(&stop.step).frame.truth;
+        let taught = [stop.landmark.clone()];
+        let labels = Labels { taught: &taught, min_side_px, complete: false };
+        (ImageEntry::new("a.png", Some("plain"), &truth, &labels), truth)
+    }
+
+    #[test]
+    fn the_keys_are_those_of_the_format() {
+        let (image, truth) = entry(20.0);
+        let set = DataSet {
+            name: "corridor".into(),
+            camera: Some(CameraEntry::new(&Camera::vga())),
+            sizes_m: sizes_m(&Building::corridor(6)),
+            teach: vec![TeachEntry { file: "poster-1.png".into(), landmark: "poster-1".into() }],
+            same: vec![],
+            images: vec![image],
+        };
+        let json = serde_json::to_value(&set).unwrap();
+        assert_eq!(json["camera"]["fx"], 512.0);
+        assert_eq!(json["sizes_m"]["poster-1"], serde_json::json!([0.6, 0.84]));
+        assert_eq!(json["images"][0]["quads_complete"], false);
+        let quads = json["images"][0]["quads"].as_array().unwrap();
+        let poster = quads.iter().find(|q| q["landmark"] == "poster-1").unwrap();
+        assert_eq!(poster["state"], "full");
+        let corner = truth.landmark("poster-1").unwrap().corners_px.points()[0];
+        assert_eq!(poster["corners"][0], serde_json::json!([corner.x, corner.y]));
+        assert!(quads.iter().all(|q| q["landmark"] == "poster-1" || q["landmark"].is_null()));
+        assert_eq!(serde_json::from_value::<DataSet>(json).unwrap(), set);
+    }
+
+    #[test]
+    fn small_quads_are_left_out_and_the_pose_is_the_cameras() {
+        let (image, truth) = entry(1e4);
+        assert!(image.quads.is_empty() && !truth.landmarks.is_empty());
+        let position = truth.map_from_camera.translation;
+        for (row, expected) in image.map_from_camera.iter().zip(position.vector.iter()) {
+            assert!((row[3] - expected).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn a_portable_grey_map_is_header_and_pixels() {
+        let image = GrayImage::from_fn(3, 2, |u, v| (10 * v + u) as u8);
+        assert_eq!(pgm(&image), b"P5\n3 2\n255\n\x00\x01\x02\x0a\x0b\x0c");
+    }
+}

@@ -122,7 +122,7 @@ fn stop(l: &LandmarkTruth, place: Point2<f64>, p: &LessonParams, wobble: [f64; 2
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::drive::{Robot, RobotParams};
+    use crate::robot::{Robot, RobotParams};
     use crate::truth::ViewState;
     use std::sync::Arc;
 

@@ -6,7 +6,8 @@
 //! ```
 //! use std::sync::Arc;
 //! use sim::building::Building;
-//! use sim::drive::{DriveParams, Robot, RobotParams};
+//! use sim::drive::DriveParams;
+//! use sim::robot::{Robot, RobotParams};
 //!
 //! let building = Arc::new(Building::corridor(7));
 //! // A lesson: stops before every poster, from several viewpoints.
@@ -46,6 +47,7 @@ pub mod laser;
 pub mod odometry;
 pub mod gaze;
 pub mod drive;
+pub mod robot;
 pub mod lesson;
 pub mod export;
 
