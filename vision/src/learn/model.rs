@@ -33,9 +33,12 @@ pub const MAX_EXEMPLARS: usize = 3;
 pub struct LearnParams {
     /// Choice of tau.
     pub threshold: ThresholdParams,
-    /// tau of C^r is never larger: see docs/EVALUATION.md for the measurement.
+    /// tau of C^r is never larger. Measured with the cap of H^r on 287 paintings, each taught alone from one
+    /// photograph, without negatives, and 2281 quads of other photographs (2102 of them cut at random): of 654 000
+    /// comparisons with the wrong painting both distances accepted 3, all of one look-alike; of 162 taught paintings
+    /// 150 were accepted.
     pub correlation_cap: f64,
-    /// tau of H^r is never larger.
+    /// tau of H^r is never larger. Measured as above.
     pub hausdorff_cap: f64,
     /// From this many views on, own distances are measured by folds; below, by leaving the exemplars out.
     pub min_views_for_folds: usize,

@@ -5,6 +5,9 @@
 
 use serde::{Deserialize, Serialize};
 
+/// With fewer negatives than this the absolute cap counts as one of them.
+pub const FEW_NEGATIVES: usize = 100;
+
 /// How tau is chosen.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -129,21 +132,22 @@ pub fn minimise(positives: &[f64], negatives: &[f64], weight: f64) -> Result<f64
 }
 
 /// tau for use: [`minimise`], then held below `nearest_share` of the nearest negative where the optimum has no false
-/// positive, and below `cap` always. Without any negative, tau lies just beyond the own distances, below `cap`:
-/// the first landmark of a map has nothing to be told from.
-// Departs from method 8 (n- = 0 gives no threshold): the absolute cap, measured on real strangers, stands in.
+/// positive, and below `cap` always. With fewer than [`FEW_NEGATIVES`] the cap counts as one more of them: what the
+/// landmark must be told from has hardly been seen yet, and something as near as the cap may exist.
+// Departs from method 8 twice. There n- = 0 gives no threshold; here the cap, measured on real strangers, stands in.
+// There small sets use the crossing of two normal curves; H^r has infinite values and both classes have long tails
+// towards each other, where the fitted curves promise more than they hold, so [`gaussian`] is only for reports.
 pub fn threshold(
     positives: &[f64],
     negatives: &[f64],
     cap: f64,
     p: &ThresholdParams,
 ) -> Result<Threshold, ThresholdError> {
-    let mut tau = match minimise(positives, negatives, p.false_positive_weight) {
-        Err(ThresholdError::NoNegative) => minimise(positives, &[f64::INFINITY], p.false_positive_weight)?,
-        other => other?,
-    };
+    let stand_in = (negatives.len() < FEW_NEGATIVES).then_some(cap);
+    let against: Vec<f64> = negatives.iter().copied().chain(stand_in).collect();
+    let mut tau = minimise(positives, &against, p.false_positive_weight)?;
     let mut limited_by = LimitedBy::Cost;
-    let nearest = negatives.iter().copied().fold(f64::INFINITY, f64::min);
+    let nearest = against.iter().copied().fold(f64::INFINITY, f64::min);
     if nearest > tau && p.nearest_share * nearest < tau {
         (tau, limited_by) = (p.nearest_share * nearest, LimitedBy::NearestNegative);
     }
@@ -277,13 +281,22 @@ mod tests {
     }
 
     #[test]
-    fn the_cap_holds_without_negatives() {
+    fn the_cap_stands_in_for_missing_negatives() {
         let p = ThresholdParams::default();
-        let free = threshold(&OWN, &[], 100.0, &p).unwrap();
-        assert!(free.tau > 6.0 && free.tau < 7.0 && free.false_negative_rate < 1e-12);
-        let capped = threshold(&OWN, &[], 3.0, &p).unwrap();
-        assert!((capped.tau - 3.0).abs() < 1e-12 && capped.limited_by == LimitedBy::AbsoluteCap);
-        assert!((capped.false_negative_rate - 0.4).abs() < 1e-12);
+        // Half way between the largest own distance and the cap.
+        let alone = threshold(&OWN, &[], 7.0, &p).unwrap();
+        assert!((alone.tau - 6.3).abs() < 1e-12 && alone.limited_by == LimitedBy::NearestNegative);
+        assert!((threshold(&OWN, &[], 10.0, &p).unwrap().tau - 8.0).abs() < 1e-12);
+        assert_eq!(alone.negatives, 0);
+        // Own distances beyond the cap are given up.
+        let short = threshold(&OWN, &[], 3.0, &p).unwrap();
+        assert!((short.tau - 2.7).abs() < 1e-12 && (short.false_negative_rate - 0.4).abs() < 1e-12);
+        assert_eq!(threshold(&[5.0], &[], 3.0, &p), Err(ThresholdError::Overlap));
+        // With enough negatives it is only a bound.
+        let few = threshold(&OWN, &[14.0; FEW_NEGATIVES - 1], 8.0, &p).unwrap();
+        let many = threshold(&OWN, &[14.0; FEW_NEGATIVES], 8.0, &p).unwrap();
+        assert!((few.tau - 7.0).abs() < 1e-12 && (many.tau - 8.0).abs() < 1e-12);
+        assert_eq!(many.limited_by, LimitedBy::AbsoluteCap);
     }
 
     #[test]
