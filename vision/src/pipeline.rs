@@ -3,7 +3,10 @@
 //! No arithmetic here, and no stage steers an earlier one. Where the robot is follows in the map crate.
 
 use crate::{
-    detect::quads::{Corners, Quad, QuadKind},
+    detect::{
+        detect,
+        quads::{Corners, Quad, QuadKind},
+    },
     frame::{GrayImage, Intrinsics},
     localise::pose::{LandmarkPose, LandmarkSize, PoseError, landmark_pose},
     params::Params,
@@ -62,7 +65,19 @@ pub enum NoPose {
     Pose(#[from] PoseError),
 }
 
-/// Image and quads in, facts out: verdicts, poses. The quads may come from elsewhere or be drawn by hand.
+/// Image in, facts out: quads, verdicts, poses.
+pub fn analyse(
+    image: &GrayImage,
+    camera: Option<&Intrinsics>,
+    landmarks: Landmarks<'_>,
+    p: &Params,
+    trace: &mut impl Trace,
+) -> FrameFacts {
+    let quads = detect(image, &p.detect, trace);
+    analyse_quads(image, quads, camera, landmarks, p, trace)
+}
+
+/// The same from given quads, for those found elsewhere or drawn by hand.
 pub fn analyse_quads(
     image: &GrayImage,
     quads: Vec<Quad>,
@@ -218,6 +233,31 @@ mod tests {
         let facts = facts(&image, quad, Some(&camera()));
         assert_eq!(facts.verdict.as_ref().unwrap().recognition, Recognition::Unique(LandmarkId(1)));
         assert_pose(&facts);
+    }
+
+    /// From pixels alone: the poster is found, named and placed to a few centimetres, with every stage told of.
+    #[test]
+    fn the_whole_method() {
+        #[derive(Default)]
+        struct Stages(Vec<Stage>);
+        impl Trace for Stages {
+            fn finished(&mut self, stage: Stage) {
+                self.0.push(stage);
+            }
+        }
+        let (image, _) = scene(1);
+        let (models, sizes) = (models(), BTreeMap::from([(LandmarkId(1), SIZE)]));
+        let landmarks = Landmarks { models: &models, sizes: &sizes, kind: DistanceKind::Both };
+        let mut stages = Stages::default();
+        let facts = analyse(&image, Some(&camera()), landmarks, &Params::default(), &mut stages);
+        let poses: Vec<_> = facts.quads.iter().filter_map(|q| q.pose.as_ref().ok()).collect();
+        assert_eq!(poses.len(), 1, "{:?}", facts.quads);
+        let error = poses[0].best.camera_from_landmark.inverse() * camera_from_landmark();
+        assert!(error.translation.vector.norm() < 0.05 && error.rotation.angle() < 0.05, "{error:?}");
+        for stage in Stage::ALL.into_iter().filter(|s| *s != Stage::Icons) {
+            assert_eq!(stages.0.iter().filter(|s| **s == stage).count(), 1, "{stage:?}");
+        }
+        assert!(stages.0.is_sorted());
     }
 
     #[test]

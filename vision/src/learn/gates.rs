@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 /// Grey-level deviation that every icon is brought to before saliency.
 const NORMAL_DEVIATION: f64 = 50.0;
-/// Value of v_c where the homography's last element all but vanishes, and its upper bound.
+/// Value of `v_c` where the homography's last element all but vanishes, and its upper bound.
 pub const V_C_CAP: f64 = 10.0;
 
 /// Limits of the gates.
@@ -26,11 +26,11 @@ pub struct GateParams {
     pub min_saliency_f_generated: f64,
     /// Fewest stable points.
     pub min_stable_points: usize,
-    /// Least visibility confidence v_c.
+    /// Least visibility confidence `v_c`.
     pub min_v_c: f64,
     /// How far a stable point may move, in icon pixels.
     pub stable_within_px: f64,
-    /// Largest descriptor distance d_nu at which it still is the same point.
+    /// Largest descriptor distance at which it still is the same point.
     pub stable_within_nu: f64,
     /// Share of the training icons in which it must come back.
     pub stable_share: f64,
@@ -225,8 +225,8 @@ mod tests {
         saliency_f(&icons.iter().map(Vec::as_slice).collect::<Vec<_>>())
     }
 
-    /// Oracle: with noise of deviation s on a texture of deviation 40, after normalisation V_s = 2500 w (up to the
-    /// noise left in the mean) and V_t = 2500 (1 - w), w = 40^2 / (40^2 + s^2).
+    /// Oracle: with noise of deviation s on a texture of deviation 40, after normalisation `V_s` = 2500 w (up to the
+    /// noise left in the mean) and `V_t` = 2500 (1 - w), w = 40^2 / (40^2 + s^2).
     #[test]
     fn saliency_is_signal_over_noise() {
         for noise in [4.0, 10.0, 20.0] {

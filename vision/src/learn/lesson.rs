@@ -419,7 +419,9 @@ mod tests {
             static BYTES: OnceLock<Vec<u8>> = OnceLock::new();
             let bytes = BYTES.get_or_init(|| lesson(3, 20, &lesson(4, 4, &[]).exemplars).to_bytes());
             let mut forged = bytes[..bytes.len() - 8 - cut].to_vec();
-            edits.iter().for_each(|(at, value)| forged[*at] = *value);
+            for (at, value) in &edits {
+                forged[*at] = *value;
+            }
             if seal {
                 let sum = crate::learn::stored::digest(&forged);
                 forged.extend(sum.to_le_bytes());

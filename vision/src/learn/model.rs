@@ -119,10 +119,10 @@ pub struct LandmarkModel {
     pub id: LandmarkId,
     /// [`Params::distance_hash`] of the parameters it was learnt under. Its thresholds mean nothing under others.
     pub params_hash: u64,
-    /// Views it was learnt from (N_l).
+    /// Views it was learnt from (`N_l`).
     pub views: usize,
     /// How many of them were generated. Where that is all but one, whether the landmark is flat and how it looks in
-    /// another light was never seen: v_c and saliency then say what the model is prepared for, not what was observed.
+    /// another light was never seen: `v_c` and saliency then say what the model is prepared for, not what was observed.
     pub generated_views: usize,
     /// One to three icons that stand for the mean and the leading modes, grey levels whole numbers.
     pub exemplars: Vec<IconFeatures>,
@@ -198,7 +198,7 @@ pub enum Gate {
     Saliency,
     /// Stable points.
     StablePoints,
-    /// Visibility confidence v_c.
+    /// Visibility confidence `v_c`.
     VisibilityConfidence,
     /// C^r has no threshold.
     CorrelationThreshold(ThresholdError),

@@ -65,12 +65,12 @@ impl LandmarkModel {
             out.extend(number.to_le_bytes());
         }
         out.push(self.eigenvalues.len() as u8);
-        self.eigenvalues.iter().for_each(|value| out.extend(value.to_le_bytes()));
+        out.extend(self.eigenvalues.iter().flat_map(|value| value.to_le_bytes()));
         for evidence in [&self.correlation_evidence, &self.hausdorff_evidence] {
             out.extend((evidence.others as u64).to_le_bytes());
             for distances in [&evidence.own, &evidence.nearest_others] {
                 out.push(distances.len() as u8);
-                distances.iter().for_each(|d| out.extend(d.to_le_bytes()));
+                out.extend(distances.iter().flat_map(|d| d.to_le_bytes()));
             }
         }
         out.push(self.exemplars.len() as u8);

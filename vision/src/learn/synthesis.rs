@@ -221,7 +221,9 @@ fn blur(picture: &mut [f32], size: [usize; 2], sigma_px: f64) {
         .map(|i| (-0.5 * ((i as f64 - radius as f64) / sigma_px).powi(2)).exp() as f32)
         .collect();
     let sum: f32 = kernel.iter().sum();
-    kernel.iter_mut().for_each(|k| *k /= sum);
+    for k in &mut kernel {
+        *k /= sum;
+    }
     let [width, height] = size;
     for v in 0..height {
         convolve(picture, v * width, 1, width, &kernel);

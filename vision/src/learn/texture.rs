@@ -98,7 +98,9 @@ impl Texture {
             }
         }
         let share = 1.0 / (n * n) as f32;
-        picture.iter_mut().for_each(|grey| *grey *= share);
+        for grey in &mut picture {
+            *grey *= share;
+        }
         Some(picture)
     }
 }

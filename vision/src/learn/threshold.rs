@@ -115,9 +115,9 @@ pub fn minimise(positives: &[f64], negatives: &[f64], weight: f64) -> Result<f64
     let (mut below_positive, mut below_negative) = (0.0, 0.0);
     for (i, (d, own)) in all.iter().enumerate() {
         if *own {
-            below_positive += 1.0
+            below_positive += 1.0;
         } else {
-            below_negative += 1.0
+            below_negative += 1.0;
         }
         let next = all.get(i + 1).map_or(beyond(*d), |n| n.0);
         if next <= *d {
@@ -188,9 +188,6 @@ impl Gaussian {
 /// distances are not the smaller ones or the curves do not cross there.
 pub fn gaussian(own: Gaussian, others: Gaussian, weight: f64) -> Option<f64> {
     let (m1, s1, m0, s0) = (own.mean, own.deviation, others.mean, others.deviation);
-    if !(m1 < m0) {
-        return None;
-    }
     let a = 0.5 / (s0 * s0) - 0.5 / (s1 * s1);
     let b = m1 / (s1 * s1) - m0 / (s0 * s0);
     let c = 0.5 * (m0 / s0).powi(2) - 0.5 * (m1 / s1).powi(2) - (weight * s1 / s0).ln();
@@ -200,6 +197,7 @@ pub fn gaussian(own: Gaussian, others: Gaussian, weight: f64) -> Option<f64> {
         let root = (b * b - 4.0 * a * c).sqrt();
         [(-b - root) / (2.0 * a), (-b + root) / (2.0 * a)]
     };
+    // Without m1 < m0 nothing lies between them.
     roots.into_iter().find(|tau| *tau > m1 && *tau < m0)
 }
 
