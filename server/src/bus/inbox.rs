@@ -2,7 +2,7 @@
 //! over. A message that is refused costs its sender an answer and us a counter; nothing here waits or panics.
 
 use super::{BusError, Outbox, Receivers};
-use crate::engine::slots::SlotKey;
+use crate::engine::{slots::SlotKey, workers::Publish};
 use protos::{Key, Keys, prost::bytes::Bytes};
 use zenoh::{
     Session,
@@ -72,7 +72,7 @@ fn frame(keys: &Keys, to: &Receivers, outbox: &Outbox, sample: &Sample) {
     let slot = SlotKey { robot, camera };
     if let Err(answer) = to.intake.receive(slot.clone(), bytes(sample)) {
         tracing::debug!(key, rejection = ?answer.rejection, "frame refused");
-        outbox.answer(&slot.robot, &slot.camera, &answer);
+        outbox.answer(&slot, &answer);
         to.live.refused(&slot, answer.into());
     }
 }

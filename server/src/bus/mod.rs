@@ -8,6 +8,8 @@
 mod inbox;
 mod outbox;
 mod router;
+#[cfg(test)]
+mod tests;
 
 pub use outbox::Outbox;
 

@@ -1,5 +1,6 @@
 //! What goes out: a bounded queue and one thread that puts it on zenoh. A full queue drops and counts; nobody waits.
 
+use crate::engine::{slots::SlotKey, workers::Publish};
 use protos::{Key, Keys, Name, prost::Message, v1};
 use std::{
     sync::{
@@ -52,16 +53,6 @@ impl Outbox {
         }
     }
 
-    /// Sends an answer to the robot's camera.
-    pub fn answer(&self, robot: &Name, camera: &Name, answer: &v1::Answer) {
-        self.send(&Key::Answer(robot.clone(), camera.clone()), answer);
-    }
-
-    /// Sends a fused pose.
-    pub fn pose(&self, robot: &Name, pose: &v1::RobotPose) {
-        self.send(&Key::Pose(robot.clone()), pose);
-    }
-
     /// Messages that were dropped because the queue was full.
     pub fn dropped(&self) -> u64 {
         self.dropped.load(Ordering::Relaxed)
@@ -85,6 +76,16 @@ impl Outbox {
         if !matches!(joined, Ok(None | Some(Ok(())))) {
             tracing::error!("the outbox thread panicked");
         }
+    }
+}
+
+impl Publish for Outbox {
+    fn answer(&self, key: &SlotKey, answer: &v1::Answer) {
+        self.send(&Key::Answer(key.robot.clone(), key.camera.clone()), answer);
+    }
+
+    fn pose(&self, robot: &Name, pose: &v1::RobotPose) {
+        self.send(&Key::Pose(robot.clone()), pose);
     }
 }
 

@@ -68,10 +68,6 @@ impl Intake {
         received: Instant,
         echo: &mut v1::Answer,
     ) -> Result<FrameJob, Rejection> {
-        let Some(robot_map) = self.snapshots.robot_map(key.robot.as_str()) else {
-            let detail = format!("robot {} is not registered: PUT /api/v1/robots/{}", key.robot, key.robot);
-            return Err(Rejection::new(Code::UnknownRobot, "robot", detail));
-        };
         if message.len() > self.frame_bytes {
             let detail = format!("{} bytes are more than {}", message.len(), self.frame_bytes);
             return Err(Rejection::new(Code::TooLarge, "frame", detail));
@@ -79,6 +75,10 @@ impl Intake {
         let frame = v1::Frame::decode(message)
             .map_err(|e| Rejection::new(Code::BadMessage, "frame", format!("no Frame message: {e}")))?;
         (echo.epoch, echo.seq, echo.captured_ns) = (frame.epoch, frame.seq, frame.captured_ns);
+        let Some(robot_map) = self.snapshots.robot_map(key.robot.as_str()) else {
+            let detail = format!("robot {} is not registered: PUT /api/v1/robots/{}", key.robot, key.robot);
+            return Err(Rejection::new(Code::UnknownRobot, "robot", detail));
+        };
         let frame = CheckedFrame::try_from(frame)?;
         let map = frame.map.as_ref().map_or(robot_map, ToString::to_string);
         echo.map.clone_from(&map);
@@ -108,18 +108,13 @@ fn clock_suspect(captured_ns: i64) -> bool {
 }
 
 #[cfg(test)]
-pub(crate) mod tests {
+mod tests {
     use super::*;
-    use crate::engine::snapshot::MapSnapshot;
     use protos::Name;
-
-    pub(crate) fn map(name: &str) -> Arc<MapSnapshot> {
-        Arc::new(MapSnapshot::empty(name, 3))
-    }
 
     fn intake() -> Intake {
         let snapshots = Arc::new(Snapshots::default());
-        snapshots.publish(map("hall"));
+        snapshots.publish(Arc::new(crate::engine::snapshot::MapSnapshot::empty("hall", 3)));
         snapshots.set_robot("r1", Some("hall"));
         snapshots.set_robot("lost", Some("gone"));
         let slots = Arc::new(Slots::new(4));
@@ -158,7 +153,7 @@ pub(crate) mod tests {
         let good = |seq| frame(seq).encode_to_vec();
         intake.receive(key("r1"), good(5).into()).unwrap();
         let is = |code: &str, field: &str, seq: u64| (code.to_owned(), field.to_owned(), seq);
-        assert_eq!(refusal(&intake, "nobody", good(6)), is("unknown_robot", "robot", 0));
+        assert_eq!(refusal(&intake, "nobody", good(6)), is("unknown_robot", "robot", 6));
         assert_eq!(refusal(&intake, "r1", b"\xff\xff".to_vec()), is("bad_message", "frame", 0));
         let camera = v1::Intrinsics { fx_px: f64::NAN, ..v1::Intrinsics::default() };
         let nan = v1::Frame { intrinsics: Some(camera), ..frame(6) };

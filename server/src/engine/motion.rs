@@ -1,8 +1,13 @@
-//! How each robot moves: odometry and scans in, its pose on the map out. Odometry is laid on the map at the robot's
-//! first fix by landmarks. A new epoch of a robot starts afresh.
+//! How each robot moves: odometry, scans and fixes by landmarks in, its fused pose on the map out. For pages, odometry
+//! alone is laid on the map at the robot's first known pose. A new epoch of a robot, or another map, starts afresh.
+//! Capture times order one robot's own readings; they are never compared with this machine's clock.
 
 use super::{live::LiveHub, slots::Order, snapshot::Snapshots};
-use map::{localise::Fix, pose2::Pose2};
+use map::{
+    fuse::{FuseParams, FusedPose, Fuser, OdometryOutcome},
+    localise::Fix,
+    pose2::{Pose2, Pose2Covariance},
+};
 use protos::{
     Code, Name, Rejection,
     convert::{CheckedOdometry, CheckedScan, geometry::pose2_covariance_wire},
@@ -30,13 +35,18 @@ pub struct MessageCounts {
     pub rejected: BTreeMap<Code, u64>,
 }
 
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct Robot {
     odometry: Order,
     scans: Order,
-    map_from_odom: Option<Pose2>,
+    /// What the rest belongs to.
     epoch: u64,
-    corrections: u64,
+    map: String,
+    fuser: Fuser,
+    /// Lays odometry alone on the map, for pages.
+    map_from_odom: Option<Pose2>,
+    /// Any odometry in this epoch.
+    moves: bool,
 }
 
 #[derive(Debug, Default)]
@@ -46,9 +56,9 @@ struct State {
     scans: MessageCounts,
 }
 
-/// A fix of a robot by landmarks in one frame.
+/// Which frame of a robot.
 #[derive(Debug, Clone, Copy)]
-pub struct FrameFix<'a> {
+pub struct Moment<'a> {
     /// The map it is in.
     pub map: &'a str,
     /// Echo of the frame.
@@ -57,8 +67,6 @@ pub struct FrameFix<'a> {
     pub captured_ns: i64,
     /// Odometry at capture, where the frame said.
     pub odometry: Option<Pose2>,
-    /// What the landmarks say.
-    pub fix: &'a Fix,
 }
 
 /// The motion of all robots.
@@ -87,12 +95,16 @@ impl Motion {
             Ok((map, odometry))
         });
         let (map, odometry) = state.odometry.count("odometry", robot, taken)?;
-        let map_from_odom = state.robots.get(robot).and_then(|followed| followed.map_from_odom);
+        let followed = state.robots.get_mut(robot)?;
+        followed.belong(odometry.epoch, &map);
+        followed.moved(odometry.captured_ns, odometry.odom_from_robot);
+        let on_map = followed.on_map(&odometry.odom_from_robot);
+        let fused = followed.fuser.pose();
         drop(state);
-        if let Some(map_from_odom) = map_from_odom {
-            self.live.odometry(robot, &map, map_from_odom.compose(&odometry.odom_from_robot));
+        if let Some(on_map) = on_map {
+            self.live.odometry(robot, &map, on_map);
         }
-        None
+        Some(self.tell(robot, &map, odometry.epoch, &fused?))
     }
 
     /// A laser scan: checked and counted. Walls come from the map; scans do not yet move anything.
@@ -109,30 +121,53 @@ impl Motion {
         state.scans.count("scan", robot, taken);
     }
 
-    /// A robot was seen by landmarks: its pose to publish.
-    pub fn fixed(&self, robot: &Name, seen: FrameFix<'_>) -> Option<v1::RobotPose> {
+    /// What is known of a robot's pose at a frame without the frame itself: for choosing between two solutions.
+    pub fn prior(&self, robot: &Name, at: Moment<'_>) -> Option<Pose2Covariance> {
         let mut state = self.lock();
         let followed = state.robot(robot).ok()?;
-        if followed.epoch != seen.epoch {
-            // The robot's software started anew, and its odometry with it.
-            (followed.epoch, followed.corrections, followed.map_from_odom) = (seen.epoch, 0, None);
+        followed.belong(at.epoch, at.map);
+        if let Some(odometry) = at.odometry {
+            followed.moved(at.captured_ns, odometry);
         }
-        followed.corrections += 1;
-        let pose = &seen.fix.pose;
-        if let (Some(odom_from_robot), None) = (seen.odometry, followed.map_from_odom) {
-            followed.map_from_odom = Some(pose.pose.compose(&odom_from_robot.inverse()));
+        followed.fuser.pose_at(at.captured_ns)
+    }
+
+    /// A robot was fixed by landmarks: its pose to publish. Without any odometry that is the fix itself.
+    pub fn fixed(&self, robot: &Name, at: Moment<'_>, fix: &Fix) -> Option<v1::RobotPose> {
+        let mut state = self.lock();
+        let followed = state.robot(robot).ok()?;
+        followed.belong(at.epoch, at.map);
+        if let Some(odometry) = at.odometry {
+            followed.moved(at.captured_ns, odometry);
         }
-        let corrections = followed.corrections;
+        match followed.fuser.fix(at.captured_ns, fix) {
+            Ok(outcome) => tracing::debug!(%robot, ?outcome, "fix"),
+            Err(error) => tracing::error!(%robot, %error, "a fix of ours is out of range"),
+        }
+        let alone = FusedPose { at_ns: at.captured_ns, pose: fix.pose, corrections: 1, contradictions: 0 };
+        let fused = if followed.moves { followed.fuser.pose()? } else { alone };
+        if let (Some(odometry), None) = (at.odometry, followed.map_from_odom) {
+            followed.map_from_odom = Some(fused.pose.pose.compose(&odometry.inverse()));
+        }
+        let moves = followed.moves;
         drop(state);
-        self.live.fused(robot, seen.map, pose, corrections);
-        Some(v1::RobotPose {
-            epoch: seen.epoch,
-            captured_ns: seen.captured_ns,
-            map: seen.map.to_owned(),
-            map_from_robot: Some(pose2_covariance_wire(pose)),
-            modalities: vec!["landmarks".to_owned()],
-            corrections,
-        })
+        let mut pose = self.tell(robot, at.map, at.epoch, &fused);
+        if !moves {
+            pose.modalities = vec!["landmarks".to_owned()];
+        }
+        Some(pose)
+    }
+
+    fn tell(&self, robot: &Name, map: &str, epoch: u64, fused: &FusedPose) -> v1::RobotPose {
+        self.live.fused(robot, map, &fused.pose, fused.corrections);
+        v1::RobotPose {
+            epoch,
+            captured_ns: fused.at_ns,
+            map: map.to_owned(),
+            map_from_robot: Some(pose2_covariance_wire(&fused.pose)),
+            modalities: vec!["odometry".to_owned(), "landmarks".to_owned()],
+            corrections: fused.corrections,
+        }
     }
 
     /// What came in: odometry and scans.
@@ -157,12 +192,54 @@ impl Motion {
     }
 }
 
+impl Robot {
+    fn new() -> Self {
+        Self {
+            odometry: Order::default(),
+            scans: Order::default(),
+            epoch: 0,
+            map: String::new(),
+            fuser: Fuser::new(FuseParams::default()),
+            map_from_odom: None,
+            moves: false,
+        }
+    }
+
+    /// Starts afresh when the robot's software did, or when it is on another map.
+    fn belong(&mut self, epoch: u64, map: &str) {
+        if self.epoch != epoch || self.map != map {
+            (self.epoch, self.map) = (epoch, map.to_owned());
+            self.fuser = Fuser::new(FuseParams::default());
+            (self.map_from_odom, self.moves) = (None, false);
+        }
+    }
+
+    fn moved(&mut self, captured_ns: i64, odom_from_robot: Pose2) {
+        self.moves = true;
+        match self.fuser.odometry(captured_ns, odom_from_robot) {
+            // Another odometry frame: the old one means nothing on the map any more.
+            Ok(OdometryOutcome::Jumped) => self.map_from_odom = None,
+            Ok(OdometryOutcome::Moved | OdometryOutcome::TooOld) => {}
+            Err(error) => tracing::error!(%error, "checked odometry was refused"),
+        }
+    }
+
+    /// Odometry alone on the map; laid there by the first fused pose.
+    fn on_map(&mut self, odom_from_robot: &Pose2) -> Option<Pose2> {
+        if self.map_from_odom.is_none() {
+            let fused = self.fuser.pose()?;
+            self.map_from_odom = Some(fused.pose.pose.compose(&odom_from_robot.inverse()));
+        }
+        Some(self.map_from_odom?.compose(odom_from_robot))
+    }
+}
+
 impl State {
     fn robot(&mut self, robot: &Name) -> Result<&mut Robot, Rejection> {
         if self.robots.len() >= MAX_ROBOTS && !self.robots.contains_key(robot) {
             return Err(Rejection::new(Code::TooMany, "robot", format!("more than {MAX_ROBOTS} robots")));
         }
-        Ok(self.robots.entry(robot.clone()).or_default())
+        Ok(self.robots.entry(robot.clone()).or_insert_with(Robot::new))
     }
 }
 
@@ -200,7 +277,9 @@ mod tests {
 
     fn odometry(seq: u64, x_m: f64) -> Bytes {
         let odom_from_robot = Some(v1::Pose2 { x_m, ..v1::Pose2::default() });
-        v1::Odometry { epoch: 1, seq, captured_ns: 0, odom_from_robot }.encode_to_vec().into()
+        v1::Odometry { epoch: 1, seq, captured_ns: seq as i64 * 1_000_000_000, odom_from_robot }
+            .encode_to_vec()
+            .into()
     }
 
     fn fix(x_m: f64) -> Fix {
@@ -249,20 +328,50 @@ mod tests {
         assert_eq!((scans.accepted, scans.rejected), (1, BTreeMap::from([(Code::OutOfRange, 1)])));
     }
 
+    fn at(captured_ns: i64, x_m: f64) -> Moment<'static> {
+        Moment { map: "hall", epoch: 1, captured_ns, odometry: Some(Pose2::new(x_m, 0.0, 0.0)) }
+    }
+
     #[test]
-    fn odometry_is_laid_on_the_map_at_the_first_fix() {
+    fn a_fix_puts_odometry_on_the_map() {
         let (motion, r1) = motion();
-        motion.odometry(&r1, odometry(1, 3.0));
+        assert!(motion.odometry(&r1, odometry(1, 3.0)).is_none(), "no pose before the first fix");
         assert!(motion.live.tracks(&r1).is_none());
-        let (first, second) = (fix(10.0), fix(11.5));
-        let at = |odometry, fix| FrameFix { map: "hall", epoch: 1, captured_ns: 0, odometry, fix };
-        motion.fixed(&r1, at(Some(Pose2::new(3.0, 0.0, 0.0)), &first)).unwrap();
-        motion.odometry(&r1, odometry(2, 4.0));
-        // A later fix moves the pose, not the track of odometry alone.
-        let pose = motion.fixed(&r1, at(Some(Pose2::new(4.0, 0.0, 0.0)), &second)).unwrap();
-        motion.odometry(&r1, odometry(3, 5.0));
-        let xs: Vec<_> = motion.live.tracks(&r1).unwrap().odometry.iter().map(|p| p.x_m).collect();
-        assert!((xs[0] - 11.0).abs() < 1e-12 && (xs[1] - 12.0).abs() < 1e-12, "{xs:?}");
-        assert_eq!((pose.corrections, pose.map.as_str()), (2, "hall"));
+        let pose = motion.fixed(&r1, at(1_000_000_000, 3.0), &fix(10.0)).unwrap();
+        assert_eq!((pose.corrections, pose.map.as_str(), pose.epoch), (1, "hall", 1));
+        let pose = motion.odometry(&r1, odometry(2, 4.0)).unwrap().map_from_robot.unwrap();
+        assert!((pose.pose.unwrap().x_m - 11.0).abs() < 1e-9, "{pose:?}");
+        assert!(pose.covariance[0] > 1e-4, "driving makes it less sure");
+        let tracks = motion.live.tracks(&r1).unwrap();
+        assert!((tracks.odometry[0].x_m - 11.0).abs() < 1e-9);
+        assert_eq!((tracks.odometry.len(), tracks.pose.len()), (1, 2));
+    }
+
+    #[test]
+    fn a_prior_follows_from_odometry_alone() {
+        let (motion, r1) = motion();
+        assert!(motion.prior(&r1, at(1_000_000_000, 3.0)).is_none());
+        motion.fixed(&r1, at(1_000_000_000, 3.0), &fix(10.0)).unwrap();
+        let prior = motion.prior(&r1, at(1_500_000_000, 3.5)).unwrap();
+        assert!((prior.pose.x_m - 10.5).abs() < 1e-9);
+        let anew = Moment { epoch: 2, ..at(1_600_000_000, 0.0) };
+        assert!(motion.prior(&r1, anew).is_none(), "a new epoch has its own odometry");
+    }
+
+    #[test]
+    fn another_map_starts_afresh() {
+        let (motion, r1) = motion();
+        motion.fixed(&r1, at(1_000_000_000, 3.0), &fix(10.0)).unwrap();
+        let there = Moment { map: "cellar", ..at(2_000_000_000, 3.0) };
+        assert!(motion.prior(&r1, there).is_none());
+    }
+
+    #[test]
+    fn without_odometry_the_fix_is_the_pose() {
+        let (motion, r1) = motion();
+        let still = Moment { odometry: None, ..at(1_000_000_000, 0.0) };
+        let pose = motion.fixed(&r1, still, &fix(10.0)).unwrap();
+        assert_eq!(pose.modalities, ["landmarks"]);
+        assert!((pose.map_from_robot.unwrap().pose.unwrap().x_m - 10.0).abs() < 1e-12);
     }
 }

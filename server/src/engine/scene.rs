@@ -1,0 +1,100 @@
+//! For tests: a rendered corridor, two of its posters taught, and a robot that looks at them.
+
+use super::{
+    live::LiveHub,
+    motion::Motion,
+    slots::Slots,
+    snapshot::{LandmarkInfo, MapSnapshot, Snapshots},
+    workers::Engine,
+};
+use crate::engine::decode::ImageLimits;
+use map::place::{LandmarkPlace, PlaceSigmas};
+use nalgebra::Vector3;
+use sim::{
+    building::Building,
+    drive::{Robot, RobotParams, Sighting},
+    lesson::{LessonParams, stops},
+};
+use std::{collections::BTreeMap, sync::Arc};
+use vision::{
+    learn::{model::learn, synthesis},
+    localise::pose::LandmarkSize,
+    params::Params,
+    recognise::{LandmarkId, models::ModelSet},
+};
+
+/// Name of the map that is taught.
+pub(crate) const MAP: &str = "corridor";
+
+/// The corridor with a robot that can look.
+pub(crate) struct Scene {
+    building: Arc<Building>,
+    robot: Robot,
+}
+
+impl Scene {
+    pub(crate) fn new() -> Self {
+        let building = Arc::new(Building::corridor(7));
+        let robot = Robot::new(building.clone(), &RobotParams::default());
+        Self { building, robot }
+    }
+
+    /// What the robot sees at stops before the first two posters; another seed gives other stops.
+    pub(crate) fn looks(&mut self, seed: u64, views: usize) -> Vec<(String, Sighting)> {
+        let near = LessonParams {
+            seed,
+            views,
+            distance_m: [1.3, 2.5],
+            max_view_angle_rad: 0.6,
+            ..LessonParams::default()
+        };
+        let names: Vec<_> = self.building.posters().take(2).map(|l| l.name.clone()).collect();
+        let stops = stops(&self.building, &near).into_iter().filter(|s| names.contains(&s.landmark));
+        stops.map(|stop| (stop.landmark, self.robot.look(&stop.step))).collect()
+    }
+
+    pub(crate) fn intrinsics(&self) -> vision::frame::Intrinsics {
+        *self.robot.camera().intrinsics()
+    }
+
+    /// The first two posters, each learnt from warped views of one photograph, at their true places.
+    pub(crate) fn taught(&mut self) -> Arc<MapSnapshot> {
+        let params = Arc::new(Params::default());
+        let mut models = Vec::new();
+        let (mut landmarks, mut sizes) = (BTreeMap::new(), BTreeMap::new());
+        for (name, look) in self.looks(1, 1) {
+            let id = LandmarkId(models.len() as u64 + 1);
+            let seen = look.frame.truth.landmark(&name).unwrap();
+            let views = synthesis::views(&look.frame.image, &seen.corners_px, 24, &params, id.0);
+            models.push(Arc::new(learn(id, &views, &[], &params).unwrap()));
+            let truth = self.building.landmark(&name).unwrap();
+            let size = LandmarkSize { width_m: truth.width_m, height_m: truth.height_m };
+            let (at, normal) =
+                (truth.map_from_landmark.translation.vector, truth.map_from_landmark.rotation * Vector3::x());
+            let sigmas = PlaceSigmas::default();
+            let place = LandmarkPlace::by_hand(at, normal.y.atan2(normal.x), size, sigmas).unwrap();
+            sizes.insert(id, size);
+            landmarks.insert(id, LandmarkInfo { name, size: Some(size), place: Some(place) });
+        }
+        let models = ModelSet::new(models, &params).unwrap();
+        Arc::new(MapSnapshot { landmarks, sizes, models, params, ..MapSnapshot::empty(MAP, 3) })
+    }
+}
+
+/// An engine with these maps; robot `r1` is on the first.
+pub(crate) fn engine(maps: &[Arc<MapSnapshot>]) -> Engine {
+    let snapshots = Arc::new(Snapshots::default());
+    for map in maps {
+        snapshots.publish(map.clone());
+    }
+    snapshots.set_robot("r1", Some(&maps[0].name));
+    let live = Arc::new(LiveHub::default());
+    Engine {
+        slots: Arc::new(Slots::new(8)),
+        motion: Arc::new(Motion::new(snapshots.clone(), live.clone())),
+        snapshots,
+        live,
+        limits: ImageLimits::FRAME,
+        panics: Arc::default(),
+    }
+}

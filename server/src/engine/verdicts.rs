@@ -1,0 +1,191 @@
+//! What was seen in an image, as the answer to send: names instead of numbers, verdicts, poses of landmarks, and the
+//! robot's pose where landmarks of known place allow one. When anything is unsure a field is absent, never zero.
+
+use super::snapshot::MapSnapshot;
+use map::{
+    localise::{Fix, FixRefusal, LocaliseParams, RobotFix, Sighting, robot_pose},
+    mounting::Mounting,
+    pose2::Pose2Covariance,
+};
+use protos::{
+    convert::{
+        geometry::pose2_covariance_wire,
+        result::{corners, fill_pose, fill_verdict, kind},
+    },
+    v1,
+};
+use std::time::Instant;
+use vision::{
+    detect::detect,
+    frame::{GrayImage, Intrinsics},
+    pipeline::{FrameFacts, Landmarks, NoPose, QuadFacts, analyse_quads},
+    recognise::{LandmarkId, Recognition},
+    trace::{Stage, Trace},
+};
+
+/// Why there is no robot pose: several solutions are left.
+pub const AMBIGUOUS: &str = "ambiguous";
+
+/// Times the stages of the pipeline.
+#[derive(Debug)]
+pub struct StageTimes {
+    since: Instant,
+    times: Vec<v1::StageTime>,
+}
+
+impl StageTimes {
+    /// The first stage begins now.
+    pub fn start() -> Self {
+        Self { since: Instant::now(), times: Vec::new() }
+    }
+
+    /// A stage outside the pipeline has just ended.
+    pub fn ended(&mut self, stage: &str) {
+        let now = Instant::now();
+        let ms = (now - self.since).as_secs_f64() * 1e3;
+        self.times.push(v1::StageTime { stage: stage.to_owned(), ms });
+        self.since = now;
+    }
+
+    /// Every stage so far.
+    pub fn finish(self) -> Vec<v1::StageTime> {
+        self.times
+    }
+}
+
+impl Trace for StageTimes {
+    fn finished(&mut self, stage: Stage) {
+        self.ended(stage.name());
+    }
+}
+
+/// Recognises an image against one version of a map: the whole pipeline.
+pub fn look(
+    image: &GrayImage,
+    camera: Option<&Intrinsics>,
+    map: &MapSnapshot,
+    times: &mut StageTimes,
+) -> FrameFacts {
+    let landmarks = Landmarks { models: &map.models, sizes: &map.sizes, kind: map.distance };
+    let quads = detect(image, &map.params.detect, times);
+    analyse_quads(image, quads, camera, landmarks, &map.params, times)
+}
+
+/// The answer to one image without a robot: an uploaded photograph.
+pub fn answer_to_photograph(image: &GrayImage, camera: Option<&Intrinsics>, map: &MapSnapshot) -> v1::Answer {
+    let (started, mut times) = (Instant::now(), StageTimes::start());
+    let facts = look(image, camera, map, &mut times);
+    let mut answer = answer(&facts, map);
+    answer.timings = times.finish();
+    answer.age_ms = started.elapsed().as_secs_f64() * 1e3;
+    answer
+}
+
+/// Facts with names: status and quads, without echo, times and robot pose.
+pub fn answer(facts: &FrameFacts, map: &MapSnapshot) -> v1::Answer {
+    let quads: Vec<_> = facts.quads.iter().map(|q| quad(q, map)).collect();
+    let any = |verdict| quads.iter().any(|q: &v1::QuadAnswer| q.verdict() == verdict);
+    let status = if any(v1::Verdict::Unique) {
+        v1::Status::Matched
+    } else if any(v1::Verdict::Ambiguous) {
+        v1::Status::Ambiguous
+    } else {
+        v1::Status::NoMatch
+    };
+    v1::Answer {
+        map: map.name.clone(),
+        map_version: map.version,
+        status: status.into(),
+        quads,
+        ..v1::Answer::default()
+    }
+}
+
+fn quad(facts: &QuadFacts, map: &MapSnapshot) -> v1::QuadAnswer {
+    let mut quad = v1::QuadAnswer {
+        corners: corners(&facts.quad.corners_px),
+        kind: kind(facts.quad.kind).into(),
+        score: facts.quad.score,
+        verdict: v1::Verdict::Unknown.into(),
+        ..v1::QuadAnswer::default()
+    };
+    if let Some(verdict) = &facts.verdict {
+        fill_verdict(&mut quad, verdict, |id| name(map, id));
+        if quad.verdict() == v1::Verdict::Unique {
+            // The landmark's own top-left first, however the picture hangs.
+            quad.corners = corners(&facts.quad.corners_px.rotated(verdict.rotation));
+        }
+    }
+    match &facts.pose {
+        Ok(pose) => fill_pose(&mut quad, pose),
+        Err(NoPose::NotUnique) => {}
+        Err(NoPose::NoCamera) => "no_intrinsics".clone_into(&mut quad.pose_refusal),
+        Err(NoPose::NoSize(_)) => "no_size".clone_into(&mut quad.pose_refusal),
+        Err(NoPose::Pose(_)) => "degenerate".clone_into(&mut quad.pose_refusal),
+    }
+    quad
+}
+
+fn name(map: &MapSnapshot, id: LandmarkId) -> String {
+    map.landmarks.get(&id).map_or_else(|| format!("#{}", id.0), |info| info.name.clone())
+}
+
+/// The robot's pose by the landmarks seen, or the word that says why not: empty when no landmark was recognised.
+pub fn robot_fix(
+    facts: &FrameFacts,
+    map: &MapSnapshot,
+    mounting: Option<&Mounting>,
+    prior: Option<&Pose2Covariance>,
+) -> Result<Fix, &'static str> {
+    let unique = |q: &QuadFacts| match q.verdict.as_ref()?.recognition {
+        Recognition::Unique(id) => Some(id),
+        Recognition::Unknown | Recognition::Ambiguous(_) => None,
+    };
+    let posed: Vec<_> =
+        facts.quads.iter().filter_map(|q| Some((unique(q)?, q.pose.as_ref().ok()?))).collect();
+    if posed.is_empty() {
+        // The quads say why each has no pose.
+        return Err("");
+    }
+    let Some(mounting) = mounting else { return Err("no_mounting") };
+    let sightings: Vec<Sighting<'_>> = posed
+        .into_iter()
+        .filter_map(|(landmark, seen)| {
+            let place = map.landmarks.get(&landmark)?.place.as_ref()?;
+            Some(Sighting { landmark, seen, place })
+        })
+        .collect();
+    if sightings.is_empty() {
+        return Err("landmark_not_placed");
+    }
+    match robot_pose(&sightings, mounting, prior, &LocaliseParams::default()) {
+        Ok(RobotFix::Fixed(fix)) => Ok(*fix),
+        Ok(RobotFix::Ambiguous(_)) => Err(AMBIGUOUS),
+        Ok(RobotFix::Refused(refusal)) => Err(refusal_word(&refusal)),
+        Err(error) => {
+            tracing::error!(%error, "checked inputs were refused by localisation");
+            Err("degenerate")
+        }
+    }
+}
+
+fn refusal_word(refusal: &FixRefusal) -> &'static str {
+    match refusal {
+        FixRefusal::Room { .. } => "gate_room",
+        FixRefusal::Prior { .. } => "gate_prior",
+        FixRefusal::Side => "gate_side",
+        FixRefusal::Disagree { .. } => "disagree",
+        FixRefusal::Degenerate => "degenerate",
+    }
+}
+
+/// Writes the robot's pose, or why there is none, into the answer.
+pub fn fill_fix(answer: &mut v1::Answer, fix: &Result<Fix, &'static str>, map: &MapSnapshot) {
+    match fix {
+        Ok(fix) => {
+            answer.map_from_robot = Some(pose2_covariance_wire(&fix.pose));
+            answer.pose_landmarks = fix.landmarks.iter().map(|id| name(map, *id)).collect();
+        }
+        Err(word) => (*word).clone_into(&mut answer.pose_refusal),
+    }
+}

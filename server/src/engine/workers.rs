@@ -1,0 +1,292 @@
+//! A fixed pool of threads that turns frames into answers: decode, pipeline, robot pose, publish. Vision runs nowhere
+//! else for robots, and never on the async runtime. A panic is caught at the edge, answered as `internal`, counted,
+//! and the worker goes on.
+
+use super::{
+    decode::{ImageLimits, decode_frame},
+    intake::{FrameJob, unknown_map},
+    live::{LiveFrame, LiveHub},
+    motion::{Moment, Motion},
+    slots::{Outcome, SlotKey, Slots},
+    snapshot::{MapSnapshot, Snapshots},
+    verdicts::{self, StageTimes},
+};
+use map::localise::Fix;
+use protos::{CheckedFrame, Code, Name, Rejection, v1};
+use std::{
+    panic::{AssertUnwindSafe, catch_unwind},
+    sync::{
+        Arc,
+        atomic::{AtomicU64, Ordering},
+    },
+    thread::JoinHandle,
+    time::Instant,
+};
+use vision::pipeline::FrameFacts;
+
+/// Where answers and poses go. Must not wait.
+pub trait Publish: Send + Sync + 'static {
+    /// An answer to a frame.
+    fn answer(&self, key: &SlotKey, answer: &v1::Answer);
+    /// A fused pose.
+    fn pose(&self, robot: &Name, pose: &v1::RobotPose);
+}
+
+/// What workers share.
+#[derive(Debug, Clone)]
+pub struct Engine {
+    /// Where frames wait.
+    pub slots: Arc<Slots<FrameJob>>,
+    /// Maps.
+    pub snapshots: Arc<Snapshots>,
+    /// Robots on the move.
+    pub motion: Arc<Motion>,
+    /// What pages show.
+    pub live: Arc<LiveHub>,
+    /// What a frame may cost.
+    pub limits: ImageLimits,
+    /// Panics caught; must stay 0.
+    pub panics: Arc<AtomicU64>,
+}
+
+/// The threads.
+#[derive(Debug)]
+pub struct Workers {
+    slots: Arc<Slots<FrameJob>>,
+    threads: Vec<JoinHandle<()>>,
+}
+
+impl Workers {
+    /// Starts `count` threads, at least one.
+    pub fn start(engine: &Engine, count: usize, publish: &Arc<impl Publish>) -> std::io::Result<Self> {
+        let mut threads = Vec::with_capacity(count);
+        for i in 0..count.max(1) {
+            let (engine, publish) = (engine.clone(), publish.clone());
+            let named = std::thread::Builder::new().name(format!("vision-{i}"));
+            threads.push(named.spawn(move || {
+                while let Some((key, job)) = engine.slots.take() {
+                    let outcome = engine.work(&key, &job, publish.as_ref());
+                    engine.slots.finish(&key, outcome);
+                }
+            })?);
+        }
+        Ok(Self { slots: engine.slots.clone(), threads })
+    }
+
+    /// Ends when every frame in work is answered. Waits: not for an async thread.
+    pub fn stop(self) {
+        self.slots.close();
+        for thread in self.threads {
+            if thread.join().is_err() {
+                tracing::error!("a worker ended by a panic");
+            }
+        }
+    }
+}
+
+/// What came of a frame.
+struct Done {
+    answer: v1::Answer,
+    fix: Option<(Arc<MapSnapshot>, Fix)>,
+}
+
+impl Engine {
+    /// Answers one frame and publishes the answer; never panics.
+    fn work(&self, key: &SlotKey, job: &FrameJob, publish: &dyn Publish) -> Outcome {
+        let done = if Instant::now() > job.deadline {
+            let detail = format!("waited {} ms", job.received.elapsed().as_millis());
+            Err(Rejection::new(Code::Expired, "deadline_ms", detail))
+        } else {
+            guarded(&self.panics, || self.analyse(key, job)).inspect_err(|refusal| {
+                if refusal.code == Code::Internal {
+                    tracing::error!(robot = %key.robot, camera = %key.camera, seq = job.frame.seq, "a worker panicked");
+                }
+            })
+        };
+        let (mut answer, fix, outcome) = match done {
+            Ok(Done { answer, fix }) => (answer, fix, Outcome::Processed),
+            Err(refusal) => {
+                let (status, outcome) = match refusal.code {
+                    Code::Expired => (v1::Status::Expired, Outcome::Expired),
+                    code => (v1::Status::Rejected, Outcome::Rejected(code)),
+                };
+                let rejection = Some((&refusal).into());
+                let map = job.map.clone();
+                (v1::Answer { status: status.into(), rejection, map, ..v1::Answer::default() }, None, outcome)
+            }
+        };
+        let frame = &job.frame;
+        (answer.epoch, answer.seq, answer.captured_ns) = (frame.epoch, frame.seq, frame.captured_ns);
+        answer.clock_suspect = job.clock_suspect;
+        answer.age_ms = job.received.elapsed().as_secs_f64() * 1e3;
+        publish.answer(key, &answer);
+        self.show(key, job, answer, outcome);
+        if let Some((map, fix)) = fix
+            && let Some(pose) = self.motion.fixed(&key.robot, moment(frame, &map), &fix)
+        {
+            publish.pose(&key.robot, &pose);
+        }
+        outcome
+    }
+
+    /// Decode, pipeline, robot pose: everything that can fail on a frame's content.
+    fn analyse(&self, key: &SlotKey, job: &FrameJob) -> Result<Done, Rejection> {
+        let frame = &job.frame;
+        // One version of the map for the whole answer, whatever is published meanwhile.
+        let map = self.snapshots.get(&job.map).ok_or_else(|| unknown_map(&job.map))?;
+        let mut times = StageTimes::start();
+        let image = decode_frame(frame, self.limits)?;
+        times.ended("decode");
+        let facts = verdicts::look(&image, frame.intrinsics.as_ref(), &map, &mut times);
+        let mut answer = verdicts::answer(&facts, &map);
+        let fix = self.fix(key, frame, &facts, &map);
+        verdicts::fill_fix(&mut answer, &fix, &map);
+        times.ended("localise");
+        answer.timings = times.finish();
+        Ok(Done { answer, fix: fix.ok().map(|fix| (map, fix)) })
+    }
+
+    /// The robot's pose by landmarks. The robot's own prior gates; ours only chooses between two solutions, so that a
+    /// fused pose gone wrong cannot keep out the fixes that would correct it.
+    fn fix(
+        &self,
+        key: &SlotKey,
+        frame: &CheckedFrame,
+        facts: &FrameFacts,
+        map: &MapSnapshot,
+    ) -> Result<Fix, &'static str> {
+        let mounting = frame.mounting.as_ref();
+        let fix = verdicts::robot_fix(facts, map, mounting, frame.prior.as_ref());
+        if fix.as_ref().err() != Some(&verdicts::AMBIGUOUS) || frame.prior.is_some() {
+            return fix;
+        }
+        let prior = self.motion.prior(&key.robot, moment(frame, map));
+        prior.map_or(fix, |prior| verdicts::robot_fix(facts, map, mounting, Some(&prior)))
+    }
+
+    fn show(&self, key: &SlotKey, job: &FrameJob, answer: v1::Answer, outcome: Outcome) {
+        let answer = Arc::new(answer);
+        if outcome == Outcome::Processed {
+            let frame = &job.frame;
+            let (encoding, width_px, height_px) = (frame.encoding, frame.width_px, frame.height_px);
+            self.live.answered(
+                key,
+                LiveFrame { encoding, width_px, height_px, image: frame.image.clone(), answer },
+            );
+        } else {
+            self.live.refused(key, answer);
+        }
+    }
+}
+
+fn moment<'a>(frame: &CheckedFrame, map: &'a MapSnapshot) -> Moment<'a> {
+    let CheckedFrame { epoch, captured_ns, odometry, .. } = *frame;
+    Moment { map: &map.name, epoch, captured_ns, odometry }
+}
+
+/// Runs `work`; a panic becomes a refusal, and is counted.
+fn guarded<T>(panics: &AtomicU64, work: impl FnOnce() -> Result<T, Rejection>) -> Result<T, Rejection> {
+    // Nothing that is shared is left half changed: vision is pure, and the rest locks for single steps.
+    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|_| {
+        panics.fetch_add(1, Ordering::Relaxed);
+        Err(Rejection::new(Code::Internal, "frame", "the server failed on this frame; see its log"))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::engine::{intake::Intake, scene};
+    use protos::prost::Message;
+    use std::{sync::Mutex, time::Duration};
+
+    #[derive(Default)]
+    struct Sent(Mutex<Vec<v1::Answer>>);
+
+    impl Publish for Sent {
+        fn answer(&self, _: &SlotKey, answer: &v1::Answer) {
+            self.0.lock().unwrap().push(answer.clone());
+        }
+
+        fn pose(&self, _: &Name, _: &v1::RobotPose) {}
+    }
+
+    fn intake(engine: &Engine, deadline: Duration) -> Intake {
+        let (slots, snapshots) = (engine.slots.clone(), engine.snapshots.clone());
+        Intake { slots, snapshots, frame_bytes: 100_000, deadline }
+    }
+
+    fn key(camera: usize) -> SlotKey {
+        SlotKey { robot: Name::new("r1").unwrap(), camera: Name::new(format!("c{camera}")).unwrap() }
+    }
+
+    fn message(seq: u64, bytes: usize) -> protos::prost::bytes::Bytes {
+        let encoding = v1::ImageEncoding::Gray8.into();
+        let image = vec![0; bytes].into();
+        let frame =
+            v1::Frame { epoch: 1, seq, encoding, width_px: 32, height_px: 24, image, ..v1::Frame::default() };
+        frame.encode_to_vec().into()
+    }
+
+    fn hall() -> Engine {
+        scene::engine(&[Arc::new(MapSnapshot::empty("hall", 1))])
+    }
+
+    #[test]
+    fn a_panic_is_a_refusal_and_counted() {
+        let panics = AtomicU64::new(0);
+        let result: Result<(), _> = guarded(&panics, || panic!("planted"));
+        assert_eq!((result.unwrap_err().code, panics.load(Ordering::Relaxed)), (Code::Internal, 1));
+        assert_eq!(guarded(&panics, || Ok(3)), Ok(3));
+    }
+
+    #[test]
+    fn late_work_is_not_begun() {
+        let (engine, sent) = (hall(), Sent::default());
+        intake(&engine, Duration::ZERO).receive(key(0), message(1, 768)).unwrap();
+        let (k, job) = engine.slots.try_take().unwrap();
+        std::thread::sleep(Duration::from_millis(2));
+        assert_eq!(engine.work(&k, &job, &sent), Outcome::Expired);
+        let answer = sent.0.lock().unwrap().pop().unwrap();
+        assert_eq!((answer.status(), answer.seq, answer.timings.len()), (v1::Status::Expired, 1, 0));
+    }
+
+    #[test]
+    fn a_map_that_is_gone_is_a_refusal() {
+        let (engine, sent) = (hall(), Sent::default());
+        intake(&engine, Duration::from_secs(9)).receive(key(0), message(1, 768)).unwrap();
+        engine.snapshots.remove_map("hall");
+        let (k, job) = engine.slots.try_take().unwrap();
+        assert_eq!(engine.work(&k, &job, &sent), Outcome::Rejected(Code::UnknownMap));
+    }
+
+    /// Far more frames than the pool can take: each is answered or superseded, none is lost, none answered twice.
+    #[test]
+    fn overload_conserves_frames() {
+        let (engine, sent) = (hall(), Arc::new(Sent::default()));
+        let workers = Workers::start(&engine, 2, &sent).unwrap();
+        let intake = intake(&engine, Duration::from_mins(1));
+        let (cameras, frames) = (4, 200);
+        for seq in 1..=frames {
+            for camera in 0..cameras {
+                intake.receive(key(camera), message(seq, 768)).unwrap();
+            }
+            if seq % 50 == 0 {
+                intake.receive(key(0), message(seq, 768)).unwrap_err();
+            }
+        }
+        while engine.slots.counts().waiting > 0 {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        workers.stop();
+        let counts = engine.slots.counts();
+        assert_eq!((counts.missing(), counts.in_work, counts.waiting), (0, 0, 0));
+        assert_eq!(counts.received, cameras as u64 * frames + 4);
+        assert_eq!(counts.rejected_total(), 4);
+        let answers = sent.0.lock().unwrap();
+        assert_eq!(answers.len() as u64, counts.processed);
+        let last = answers.iter().filter(|a| a.seq == frames).count();
+        assert_eq!(last, cameras, "the newest of each camera is always answered");
+        assert!(counts.superseded > 0);
+    }
+}
