@@ -1,6 +1,7 @@
-//! Scores recognition on real photographs with the true corners: `score_recognition DIR [PARAMS [KIND]]`, where
+//! Scores recognition on real photographs with the true corners: `score_recognition DIR [PARAMS [KIND [STRANGERS...]]]`, where
 //! DIR holds a `truth.json` in the evaluation format, PARAMS is JSON such as `{"icon":{"size":50}}` and KIND one of
-//! `hausdorff`, `correlation`, `both`; with a KIND every quad is printed. Every landmark is taught from its one photograph and views generated from
+//! `hausdorff`, `correlation`, `both`; with a KIND every quad is printed. Further arguments are folders of images that
+//! hold no landmark: quads at random places of them are all strangers. Every landmark is taught from its one photograph and views generated from
 //! it. Each quad is looked for among all landmarks; then, as a stranger, among the half that does not hold it.
 #![expect(clippy::print_stdout, reason = "a program that prints a table")]
 
@@ -22,6 +23,9 @@ use vision::{
 
 /// Views generated from each photograph.
 const GENERATED: usize = 40;
+
+/// Random quads in each image without landmarks.
+const RANDOM_QUADS: usize = 20;
 
 /// A labelled quad of one photograph.
 struct Query {
@@ -48,7 +52,8 @@ struct Score {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().collect();
-    let root = Path::new(arguments.get(1).ok_or("usage: score_recognition DIR [PARAMS [KIND]]")?);
+    let root =
+        Path::new(arguments.get(1).ok_or("usage: score_recognition DIR [PARAMS [KIND [STRANGERS...]]]")?);
     let p: Params = serde_json::from_str(arguments.get(2).map_or("{}", |json| json))?;
     let only: Option<DistanceKind> =
         arguments.get(3).map(|k| serde_json::from_value(k.as_str().into())).transpose()?;
@@ -118,6 +123,48 @@ fn main() -> Result<(), Box<dyn Error>> {
             score.right, score.wrong, score.missed, score.ambiguous, score.refused, score.accepted
         );
     }
+    for folder in arguments.iter().skip(4) {
+        random_strangers(Path::new(folder), &everything, only.unwrap_or_default(), &p)?;
+    }
+    Ok(())
+}
+
+/// Quads at random places of every image in `folder`: how many are taken for a landmark.
+fn random_strangers(
+    folder: &Path,
+    models: &ModelSet,
+    kind: DistanceKind,
+    p: &Params,
+) -> Result<(), Box<dyn Error>> {
+    let mut files: Vec<_> =
+        std::fs::read_dir(folder)?.map(|f| f.map(|f| f.path())).collect::<Result<_, _>>()?;
+    files.sort();
+    let (mut asked, mut accepted) = (0, 0);
+    for file in files {
+        let Ok(image) = load(&file) else { continue };
+        let mut state = 1_u64;
+        let mut roll = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 40) as f64 / f64::from(1 << 24)
+        };
+        for _ in 0..RANDOM_QUADS {
+            let (w, h) = (image.width() as f64 - 1.0, image.height() as f64 - 1.0);
+            let side = (0.1 + 0.5 * roll()) * w.min(h);
+            let (x, y) = (roll() * (w - 1.3 * side), roll() * (h - 1.3 * side));
+            let mut corner = |dx: f64, dy: f64| {
+                Point2::new(x + side * (dx + 0.3 * roll()), y + side * (dy + 0.3 * roll()))
+            };
+            let points = [corner(0.0, 0.0), corner(1.0, 0.0), corner(1.0, 1.0), corner(0.0, 1.0)];
+            let Ok(corners) = Corners::new(points) else { continue };
+            asked += 1;
+            let v = recognise(&image, &quad(corners), models, kind, p);
+            if matches!(v.recognition, Recognition::Unique(_)) {
+                accepted += 1;
+                println!("RANDOM {} {points:?} {:?}", file.display(), v.candidates[0]);
+            }
+        }
+    }
+    println!("{}: {asked} random quads, {accepted} accepted", folder.display());
     Ok(())
 }
 

@@ -111,12 +111,14 @@ fn verify(image: &GrayImage, sightings: &[Sighting], found: &mut [Judged], kind:
         let around = surroundings[i]
             .get_or_insert_with(|| Surroundings::new(image, &sightings[i].corners_px, &p.icon, &v.align));
         let Some(icon) = around.as_ref().and_then(|s| laid_on(image, s, &judged.near, p)) else { continue };
-        let d = |i: usize| correlation(&icon, &judged.near.model.exemplars[i], &p.recognise.correlation);
-        let correlation = (0..judged.near.model.exemplars.len()).map(d).fold(2.0, f64::min);
-        if correlation < judged.near.correlation {
-            judged.near.correlation = correlation;
-            judged.near.hausdorff = least_hausdorff(&icon, &judged.near.model, p).0;
-            judged.moved = true;
+        let model = &judged.near.model;
+        let each = model.exemplars.iter().map(|e| correlation(&icon, e, &p.recognise.correlation));
+        let (correlation, hausdorff) = (each.fold(2.0, f64::min), least_hausdorff(&icon, model, p).0);
+        let moved = Judged { near: Near { correlation, hausdorff, ..judged.near.clone() }, moved: true };
+        // What was accepted where it stood is not lost by a move that fits worse.
+        let lost = judged.refusal(kind, v).is_none() && moved.refusal(kind, v).is_some();
+        if moved.near.ratio(kind) < judged.near.ratio(kind) && !lost {
+            *judged = moved;
         }
     }
     found.sort_by(|a, b| a.near.ratio(kind).total_cmp(&b.near.ratio(kind)));
