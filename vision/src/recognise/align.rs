@@ -32,7 +32,7 @@ pub struct AlignParams {
 
 impl Default for AlignParams {
     fn default() -> Self {
-        Self { max_shift: 0.12, sigmas: [2.5, 1.0], steps: 6 }
+        Self { max_shift: 0.12, sigmas: [2.5, 1.0], steps: 8 }
     }
 }
 
