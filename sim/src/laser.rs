@@ -130,4 +130,18 @@ mod tests {
         let sigma = (errors.iter().map(|e| (e - mean).powi(2)).sum::<f64>() / 4000.0).sqrt();
         assert!(mean.abs() < 0.0015 && (sigma - 0.02).abs() < 0.001, "{mean} {sigma}");
     }
+
+    #[test]
+    fn parameters_are_held_in_their_bounds() {
+        let building = Building::corridor(2);
+        let beams = |beams, field_rad| {
+            let p = LaserParams { beams, field_rad, max_range_m: f64::NAN, ..quiet() };
+            let scan = scan(&building, &Pose2::default(), &p, 0);
+            assert!((scan.max_range_m() - 0.5).abs() < 1e-12);
+            scan.ranges_m().len()
+        };
+        assert_eq!(beams(MAX_BEAMS, 1.0), MAX_BEAMS);
+        assert_eq!(beams(MAX_BEAMS + 1, 100.0), MAX_BEAMS);
+        assert_eq!(beams(0, f64::NAN), 2);
+    }
 }

@@ -150,4 +150,20 @@ mod tests {
         let cramped = LessonParams { clearance_m: 3.0, ..LessonParams::default() };
         assert!(stops(&building, &cramped).is_empty());
     }
+
+    #[test]
+    fn views_are_held_in_their_bound() {
+        let building = Building::corridor(4);
+        let one = |views| {
+            let p = LessonParams {
+                views,
+                max_view_angle_rad: 0.5,
+                distance_m: [1.0, 1.5],
+                ..LessonParams::default()
+            };
+            stops(&building, &p).iter().filter(|s| s.landmark == "poster-0").count()
+        };
+        assert_eq!(one(MAX_VIEWS), MAX_VIEWS);
+        assert_eq!(one(MAX_VIEWS + 1), MAX_VIEWS);
+    }
 }
