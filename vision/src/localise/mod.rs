@@ -2,4 +2,5 @@
 
 pub mod reproject;
 mod refine;
+mod spread;
 pub mod pose;

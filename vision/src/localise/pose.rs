@@ -4,7 +4,11 @@
 //! other minimum of the reprojection error where there is one, and whether the two can be told apart.
 //! Decides nothing about the robot: that takes the map (`map::localise`).
 
-use super::{refine::Problem, reproject::corner_points};
+use super::{
+    refine::{CHI2_2_95, Problem},
+    reproject::corner_points,
+    spread::second_moment,
+};
 use crate::{
     detect::quads::Corners,
     frame::{Distortion, FrameError, Intrinsics},
@@ -140,7 +144,7 @@ pub fn landmark_pose(
         .filter(faces_camera)
         .filter(|pose| pose.rotation.angle_to(&first.camera_from_landmark.rotation) > SAME_POSE_RAD)
         .and_then(|pose| problem.solution(pose));
-    let (best, second) = match other {
+    let (mut best, mut second) = match other {
         Some(other) if other.chi2 < first.chi2 => (other, Some(first)),
         other => (first, other),
     };
@@ -148,6 +152,17 @@ pub fn landmark_pose(
         second.chi2 - best.chi2 < AMBIGUOUS_CHI2
             || second.reprojection_rms_px < AMBIGUOUS_RATIO * best.reprojection_rms_px
     });
+    // Departs from method 13.5: where the plane's direction is poorly known, (J^T S^-1 J)^-1 is not its covariance.
+    let scale = (best.chi2 / CHI2_2_95).max(1.0);
+    let poses = [Some(best.camera_from_landmark), second.as_ref().map(|s| s.camera_from_landmark)];
+    for (i, solution) in [Some(&mut best), second.as_mut()].into_iter().enumerate() {
+        let Some(solution) = solution else { continue };
+        let rival = poses[1 - i].as_ref().filter(|_| ambiguous);
+        let at = solution.camera_from_landmark;
+        if let Some(wide) = second_moment(&problem, &at, &solution.covariance, rival, scale) {
+            solution.covariance = wide;
+        }
+    }
     Ok(LandmarkPose { best, second, ambiguous, measured })
 }
 
