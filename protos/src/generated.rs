@@ -158,6 +158,7 @@ pub struct LandmarkPose {
 #[serde(default)]
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct QuadAnswer {
+    /// As detected; for a unique landmark its own top-left comes first.
     #[prost(message, repeated, tag = "1")]
     pub corners: ::prost::alloc::vec::Vec<Point>,
     #[prost(enumeration = "QuadKind", tag = "2")]
@@ -237,7 +238,9 @@ pub struct Answer {
     /// The capture time is more than 2 s from the server's clock.
     #[prost(bool, tag = "13")]
     pub clock_suspect: bool,
-    /// Why recognised landmarks gave no robot pose: empty, no_mounting, landmark_not_placed, ambiguous, gate_prior, gate_height.
+    /// Why recognised landmarks gave no robot pose: empty, no_mounting, landmark_not_placed, ambiguous, or a gate:
+    /// gate_prior (the robot's prior rules it out), gate_room (no upright robot on the floor sees them so), gate_side (it
+    /// would stand behind the wall), disagree (the landmarks contradict one another), degenerate.
     #[prost(string, tag = "14")]
     pub pose_refusal: ::prost::alloc::string::String,
 }

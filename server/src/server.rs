@@ -4,11 +4,13 @@ use crate::{
     bus::{Bus, BusError, Receivers},
     config::Config,
     engine::{
+        decode::ImageLimits,
         intake::{FrameJob, Intake},
         live::LiveHub,
         motion::Motion,
         slots::Slots,
         snapshot::Snapshots,
+        workers::{Engine, Workers},
     },
     http::{self, App},
     jobs::Jobs,
@@ -23,6 +25,9 @@ pub enum StartError {
     /// The database does not open.
     #[error("{0}")]
     Store(String),
+    /// No threads for vision.
+    #[error("cannot start the vision threads: {0}")]
+    Workers(std::io::Error),
     /// Robots cannot connect.
     #[error(transparent)]
     Bus(#[from] BusError),
@@ -73,6 +78,7 @@ pub struct RunningServer {
 /// What must end, in this order.
 #[derive(Debug)]
 struct Tasks {
+    workers: Workers,
     bus: Bus,
     http: JoinHandle<()>,
     jobs: JoinHandle<()>,
@@ -101,12 +107,23 @@ impl Server {
             frame_bytes: config.limits.frame_bytes,
             deadline: Duration::from_millis(u64::from(config.limits.frame_deadline_ms)),
         });
-        let bus = Bus::open(&config, Receivers { intake, motion, live: live.clone() }).await?;
+        let to = Receivers { intake, motion: motion.clone(), live: live.clone() };
+        let bus = Bus::open(&config, to).await?;
         let zenoh_endpoint = bus.endpoint().to_owned();
+        let engine = Engine {
+            slots: slots.clone(),
+            snapshots: snapshots.clone(),
+            motion,
+            live: live.clone(),
+            limits: ImageLimits { pixels: config.limits.frame_pixels, ..ImageLimits::FRAME },
+            panics: Arc::default(),
+        };
+        let workers = Workers::start(&engine, config.workers, &Arc::new(bus.outbox().clone()))
+            .map_err(StartError::Workers)?;
         let app = App::new(config.clone(), store, jobs, live.clone(), stopping.clone());
         let http =
             tokio::spawn(http::listen::serve(listener, http::router(app), config.limits.clone(), stopping));
-        let tasks = Tasks { http, jobs: jobs_task, bus, writer };
+        let tasks = Tasks { workers, http, jobs: jobs_task, bus, writer };
         Ok(RunningServer { http_addr, zenoh_endpoint, snapshots, live, slots, stop, store_failed, tasks })
     }
 }
@@ -124,7 +141,10 @@ impl RunningServer {
     /// Answers what is in work, then closes everything.
     pub async fn stop(self) {
         self.stop.send_replace(true);
-        let Tasks { bus, http, jobs, writer } = self.tasks;
+        let Tasks { workers, bus, http, jobs, writer } = self.tasks;
+        if let Err(error) = tokio::task::spawn_blocking(move || workers.stop()).await {
+            tracing::error!(%error, "stopping the workers");
+        }
         bus.close().await;
         for (what, task) in [("HTTP", http), ("jobs", jobs)] {
             if let Err(error) = task.await {

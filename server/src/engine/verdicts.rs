@@ -16,9 +16,8 @@ use protos::{
 };
 use std::time::Instant;
 use vision::{
-    detect::detect,
     frame::{GrayImage, Intrinsics},
-    pipeline::{FrameFacts, Landmarks, NoPose, QuadFacts, analyse_quads},
+    pipeline::{FrameFacts, Landmarks, NoPose, QuadFacts, analyse},
     recognise::{LandmarkId, Recognition},
     trace::{Stage, Trace},
 };
@@ -67,8 +66,7 @@ pub fn look(
     times: &mut StageTimes,
 ) -> FrameFacts {
     let landmarks = Landmarks { models: &map.models, sizes: &map.sizes, kind: map.distance };
-    let quads = detect(image, &map.params.detect, times);
-    analyse_quads(image, quads, camera, landmarks, &map.params, times)
+    analyse(image, camera, landmarks, &map.params, times)
 }
 
 /// The answer to one image without a robot: an uploaded photograph.
