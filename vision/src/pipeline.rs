@@ -19,6 +19,12 @@ use std::collections::BTreeMap;
 /// Most quads of one image that are compared with the landmarks, the detector's best first.
 pub const MAX_RECOGNISED_QUADS: usize = 24;
 
+/// Corners that alignment moves by less, in icon pixels, are those of the border that was detected, and better known
+/// from its edges.
+const SAME_BORDER_ICON_PX: f64 = 1.5;
+/// Standard deviation of an aligned corner, in icon pixels: twice what the alignment's own test allows.
+const ALIGNED_SIGMA_ICON_PX: f64 = 0.5;
+
 /// What of a map the pipeline needs. Immutable while an image is worked on.
 #[derive(Debug, Clone, Copy)]
 pub struct Landmarks<'a> {
@@ -98,7 +104,7 @@ pub fn analyse_quads(
         .into_iter()
         .zip(verdicts)
         .map(|(quad, verdict)| {
-            let pose = pose(&quad, verdict.as_ref(), camera, landmarks.sizes);
+            let pose = pose(&quad, verdict.as_ref(), camera, landmarks.sizes, p);
             QuadFacts { quad, verdict, pose }
         })
         .collect();
@@ -112,25 +118,35 @@ fn pose(
     verdict: Option<&Verdict>,
     camera: Option<&Intrinsics>,
     sizes: &BTreeMap<LandmarkId, LandmarkSize>,
+    p: &Params,
 ) -> Result<LandmarkPose, NoPose> {
     let Some(Verdict { recognition: Recognition::Unique(landmark), .. }) = verdict else {
         return Err(NoPose::NotUnique);
     };
-    let (corners_px, covariance_px2) = verdict.and_then(|v| matched(quad, v)).ok_or(NoPose::NotUnique)?;
+    let (corners_px, covariance_px2) = verdict.and_then(|v| matched(quad, v, p)).ok_or(NoPose::NotUnique)?;
     let camera = camera.ok_or(NoPose::NoCamera)?;
     let size = sizes.get(landmark).ok_or(NoPose::NoSize(*landmark))?;
     Ok(landmark_pose(&corners_px, &covariance_px2, *size, camera)?)
 }
 
-/// The corners that the verdict speaks of, the landmark's top-left first, with their covariances. An alternate border
-/// has none of its own: the quad's stand in, both were found by the same edges.
-pub fn matched(quad: &Quad, verdict: &Verdict) -> Option<(Corners, [Matrix2<f64>; 4])> {
-    let corners_px = match verdict.border {
+/// The landmark's corners, its top-left first, with their covariances: as detected, or, where another border of the
+/// same thing was taught than the one detected, as aligned. An alternate border has no covariances of its own: the
+/// quad's stand in, both were found by the same edges.
+pub fn matched(quad: &Quad, verdict: &Verdict, p: &Params) -> Option<(Corners, [Matrix2<f64>; 4])> {
+    let detected_px = match verdict.border {
         0 => &quad.corners_px,
         border => quad.alternates.get(border - 1)?,
     };
+    let detected_px = detected_px.rotated(verdict.rotation);
     let covariance_px2 = std::array::from_fn(|i| quad.corner_covariance_px2[(i + verdict.rotation) % 4]);
-    Some((corners_px.rotated(verdict.rotation), covariance_px2))
+    let Some(aligned_px) = verdict.aligned_px else { return Some((detected_px, covariance_px2)) };
+    let icon_px = detected_px.area_px2().sqrt() / p.icon.size as f64;
+    let moved_px = detected_px.points().iter().zip(aligned_px.points()).map(|(d, a)| (a - d).norm());
+    if moved_px.fold(0.0, f64::max) < SAME_BORDER_ICON_PX * icon_px {
+        return Some((detected_px, covariance_px2));
+    }
+    let sigma_px = ALIGNED_SIGMA_ICON_PX * icon_px;
+    Some((aligned_px, covariance_px2.map(|c| c + Matrix2::identity() * sigma_px * sigma_px)))
 }
 
 #[cfg(test)]
@@ -268,7 +284,7 @@ mod tests {
         quad.upright_ambiguous = true;
         let facts = facts(&image, quad.clone(), Some(&camera()));
         assert_pose(&facts);
-        let (_, covariance) = matched(&quad, facts.verdict.as_ref().unwrap()).unwrap();
+        let (_, covariance) = matched(&quad, facts.verdict.as_ref().unwrap(), &Params::default()).unwrap();
         assert!((covariance[0][(0, 0)] - 0.05).abs() < 1e-12, "covariances turn with their corners");
     }
 
@@ -284,6 +300,24 @@ mod tests {
         let facts = facts(&image, quad, Some(&camera()));
         assert_eq!(facts.verdict.as_ref().unwrap().border, 1);
         assert_pose(&facts);
+    }
+
+    /// A mat inside the frame was detected, the frame was taught: the identity holds, and so must the distance.
+    #[test]
+    fn another_border_than_the_taught_one_gives_the_same_pose() {
+        let (image, mut quad) = scene(1);
+        let centre =
+            quad.corners_px.points().iter().fold(nalgebra::Vector2::zeros(), |m, c| m + c.coords * 0.25);
+        let inner = quad.corners_px.points().map(|c| Point2::from(centre + (c.coords - centre) * 0.95));
+        quad.corners_px = Corners::new(inner).unwrap();
+        let facts = facts(&image, quad, Some(&camera()));
+        assert_eq!(facts.verdict.as_ref().unwrap().recognition, Recognition::Unique(LandmarkId(1)));
+        let pose = facts.pose.unwrap();
+        let error = pose.best.camera_from_landmark.inverse() * camera_from_landmark();
+        // As detected it would stand 5 % farther away: 10 cm.
+        assert!(error.translation.vector.norm() < 0.03, "{error:?}");
+        let sigma_m = pose.best.covariance[(5, 5)].sqrt();
+        assert!(sigma_m > 3e-3, "an aligned corner is not as sure as a detected one: {sigma_m} m");
     }
 
     #[test]

@@ -121,6 +121,7 @@ mod tests {
             confidence: 0.2,
             rotation: 0,
             border: 0,
+            aligned_px: None,
             landmarks: 2,
         };
         let mut quad = v1::QuadAnswer::default();

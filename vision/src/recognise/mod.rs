@@ -12,7 +12,7 @@ pub mod verdict;
 #[cfg(test)]
 mod fixture;
 
-use crate::{icon::Icon, params::RecogniseParams};
+use crate::{detect::quads::Corners, icon::Icon, params::RecogniseParams};
 use correlation::Buckets;
 use descriptor::PointSet;
 use serde::{Deserialize, Serialize};
@@ -125,6 +125,9 @@ pub struct Verdict {
     pub rotation: usize,
     /// Which border matched: 0 for the quad's corners, i for alternate i - 1.
     pub border: usize,
+    /// The landmark's corners after its picture was laid on the learnt one, its top-left first; `None` when it was
+    /// accepted where it stood. They differ from the quad's where another border of the same thing was taught.
+    pub aligned_px: Option<Corners>,
     /// Landmarks compared (N).
     pub landmarks: usize,
 }

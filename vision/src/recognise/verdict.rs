@@ -11,7 +11,12 @@ use super::{
     features,
     models::ModelSet,
 };
-use crate::{detect::quads::Quad, frame::GrayImage, icon::rectify, params::Params};
+use crate::{
+    detect::quads::{Corners, Quad},
+    frame::GrayImage,
+    icon::rectify,
+    params::Params,
+};
 use serde::{Deserialize, Serialize};
 
 /// Parameters of the decision.
@@ -57,7 +62,7 @@ pub fn recognise(
     let sightings = sightings(image, quad, p);
     let mut found: Vec<Judged> = nearest(&sightings, models, kind, MAX_CANDIDATES, p)
         .into_iter()
-        .map(|near| Judged { near, moved: false })
+        .map(|near| Judged { near, moved: None })
         .collect();
     verify(image, &sightings, &mut found, kind, p);
     decide(&found, &sightings, kind, models.len(), &p.recognise.verdict)
@@ -73,6 +78,7 @@ fn unknown(landmarks: usize) -> Verdict {
         confidence: 0.0,
         rotation: 0,
         border: 0,
+        aligned_px: None,
         landmarks,
     }
 }
@@ -80,14 +86,14 @@ fn unknown(landmarks: usize) -> Verdict {
 /// A near landmark, with or without alignment.
 struct Judged {
     near: Near,
-    /// The distances are those after alignment.
-    moved: bool,
+    /// Where alignment moved the corners, if the distances are those after it.
+    moved: Option<Corners>,
 }
 
 impl Judged {
     /// The first gate that refuses it.
     fn refusal(&self, kind: DistanceKind, p: &VerdictParams) -> Option<Refusal> {
-        let limit = if self.moved { p.verified_share } else { 1.0 };
+        let limit = if self.moved.is_some() { p.verified_share } else { 1.0 };
         let correlation = kind != DistanceKind::Hausdorff;
         let hausdorff = kind != DistanceKind::Correlation;
         // Written so that a NaN refuses.
@@ -110,11 +116,15 @@ fn verify(image: &GrayImage, sightings: &[Sighting], found: &mut [Judged], kind:
         let i = judged.near.sighting;
         let around = surroundings[i]
             .get_or_insert_with(|| Surroundings::new(image, &sightings[i].corners_px, &p.icon, &v.align));
-        let Some(icon) = around.as_ref().and_then(|s| laid_on(image, s, &judged.near, p)) else { continue };
+        let Some((icon, corners_px)) = around.as_ref().and_then(|s| laid_on(image, s, &judged.near, p))
+        else {
+            continue;
+        };
         let model = &judged.near.model;
         let each = model.exemplars.iter().map(|e| correlation(&icon, e, &p.recognise.correlation));
         let (correlation, hausdorff) = (each.fold(2.0, f64::min), least_hausdorff(&icon, model, p).0);
-        let moved = Judged { near: Near { correlation, hausdorff, ..judged.near.clone() }, moved: true };
+        let near = Near { correlation, hausdorff, ..judged.near.clone() };
+        let moved = Judged { near, moved: Some(corners_px) };
         // What was accepted where it stood is not lost by a move that fits worse.
         let lost = judged.refusal(kind, v).is_none() && moved.refusal(kind, v).is_some();
         if moved.near.ratio(kind) < judged.near.ratio(kind) && !lost {
@@ -124,13 +134,18 @@ fn verify(image: &GrayImage, sightings: &[Sighting], found: &mut [Judged], kind:
     found.sort_by(|a, b| a.near.ratio(kind).total_cmp(&b.near.ratio(kind)));
 }
 
-/// The quad's picture after its corners were moved to fit the nearest exemplar.
-fn laid_on(image: &GrayImage, around: &Surroundings, near: &Near, p: &Params) -> Option<IconFeatures> {
+/// The quad's picture after its corners were moved to fit the nearest exemplar, and those corners.
+fn laid_on(
+    image: &GrayImage,
+    around: &Surroundings,
+    near: &Near,
+    p: &Params,
+) -> Option<(IconFeatures, Corners)> {
     let r = &p.recognise;
     let exemplar = near.model.exemplars.get(near.exemplar)?;
     let corners = around.align(&exemplar.icon, &r.correlation, &r.verdict.align)?;
     let icon = rectify(image, &corners, &p.icon).ok()?;
-    Some(features(icon, r))
+    Some((features(icon, r), corners))
 }
 
 /// Thresholds, margin, probabilities: the paper's three cases.
@@ -155,6 +170,7 @@ fn decide(
     let Some(best) = refusals.iter().position(Option::is_none) else { return verdict };
     let near = &found[best].near;
     (verdict.rotation, verdict.border) = (sightings[near.sighting].rotation, sightings[near.sighting].border);
+    verdict.aligned_px = found[best].moved;
     let margin = margin(found, best, kind);
     if margin < p.margin {
         verdict.recognition = Recognition::Unique(near.model.id);

@@ -173,9 +173,10 @@ fn nearest_equals_comparing_everything() {
 #[test]
 fn gates_refuse_at_tau() {
     let model = SIX.get(LandmarkId(1)).unwrap();
-    let judged = |correlation: f64, hausdorff: f64, moved| Judged {
+    let anywhere = Corners::try_from([[0.0, 0.0], [90.0, 0.0], [90.0, 90.0], [0.0, 90.0]]).unwrap();
+    let judged = |correlation: f64, hausdorff: f64, moved: bool| Judged {
         near: Near { model: Arc::clone(model), sighting: 0, exemplar: 0, correlation, hausdorff },
-        moved,
+        moved: moved.then_some(anywhere),
     };
     let (c, h, v) = (model.correlation.tau, model.hausdorff.tau, &PARAMS.recognise.verdict);
     let both = |c, h, moved| judged(c, h, moved).refusal(DistanceKind::Both, v);
@@ -201,7 +202,7 @@ fn margin_is_by_the_better_of_both() {
             correlation: c * models[i].correlation.tau,
             hausdorff: h * models[i].hausdorff.tau,
         },
-        moved: false,
+        moved: None,
     };
     let found = [judged(0, 0.4, 0.1), judged(1, 0.5, 1.0)];
     assert!((margin(&found, 0, DistanceKind::Correlation) - 0.8).abs() < 1e-9);
