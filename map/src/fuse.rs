@@ -371,3 +371,5 @@ fn reach(
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod drive;
