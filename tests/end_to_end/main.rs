@@ -1,1 +1,4 @@
-//! End-to-end claims.
+//! End-to-end claims, one file each, against a real server.
+
+mod http_contract;
+mod restart;

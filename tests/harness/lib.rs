@@ -1,1 +1,65 @@
-//! Servers started and scored for the end-to-end tests.
+//! Waymark as a box for the end-to-end tests: the real program as a child process that can be killed, a server inside
+//! the test where that is enough, pictures to send. What is claimed is in `end_to_end/`, one file a claim.
+
+mod child;
+pub mod pictures;
+
+pub use child::Child;
+
+use client::MapClient;
+use server::{
+    RunningServer, Server,
+    config::{Config, Limits, RawConfig},
+};
+use std::time::{Duration, Instant};
+use tempfile::TempDir;
+
+/// Longest wait for something that should happen at once.
+pub const SOON: Duration = Duration::from_secs(20);
+
+/// A server inside the test, on free ports, with its own data directory.
+#[derive(Debug)]
+pub struct Inside {
+    /// The server.
+    pub server: RunningServer,
+    _data: TempDir,
+}
+
+impl Inside {
+    /// Starts one with these limits.
+    pub async fn start(limits: Limits) -> Self {
+        let data = TempDir::new().expect("a temporary directory");
+        let raw = RawConfig {
+            data: data.path().to_owned(),
+            http: "127.0.0.1:0".into(),
+            zenoh: "tcp/127.0.0.1:0".into(),
+            limits,
+            ..RawConfig::default()
+        };
+        let config = Config::try_from(raw).expect("a valid configuration");
+        let server = Server::start(config).await.expect("the server starts");
+        Self { server, _data: data }
+    }
+
+    /// Base of its addresses, without a slash at the end.
+    pub fn url(&self) -> String {
+        format!("http://{}", self.server.http_addr)
+    }
+
+    /// A client of it.
+    pub fn maps(&self) -> MapClient {
+        MapClient::new(&self.url()).expect("a client")
+    }
+}
+
+/// Asks again until `ready` says something, at most [`SOON`].
+pub async fn eventually<T, F: Future<Output = Option<T>>>(what: &str, mut ready: impl FnMut() -> F) -> T {
+    let started = Instant::now();
+    loop {
+        if let Some(value) = ready().await {
+            return value;
+        }
+        assert!(started.elapsed() < SOON, "{what}: not within {SOON:?}");
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    }
+}

@@ -58,11 +58,13 @@ pub(super) fn json<T: DeserializeOwned>(bytes: &[u8], outer: &str) -> Result<T, 
     let mut reader = serde_json::Deserializer::from_slice(bytes);
     let value = serde_path_to_error::deserialize(&mut reader).map_err(|error| {
         let path = error.path().to_string();
-        let path = if path == "." { String::new() } else { path };
+        // "." is the whole, "?" a place that was not reached.
+        let path = if path == "." || path == "?" { String::new() } else { path };
         let field = match (outer.is_empty(), path.is_empty()) {
             (true, true) => "body".to_owned(),
             (false, true) => outer.to_owned(),
             (true, false) => path,
+            (false, false) if path.starts_with('[') => format!("{outer}{path}"),
             (false, false) => format!("{outer}.{path}"),
         };
         let inner = error.inner();

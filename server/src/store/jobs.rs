@@ -63,9 +63,6 @@ pub(crate) async fn create(
     (max, kept): (usize, usize),
 ) -> Result<JobRow, StoreError> {
     maps::get(&mut tx.conn, map).await?;
-    let open =
-        sqlx::query_scalar(COUNT_OPEN).fetch_one(&mut tx.conn).await.map_err(StoreError::at("count jobs"))?;
-    within(open, max, "jobs waiting or running")?;
     sqlx::query(FORGET)
         .bind(kept as i64)
         .execute(&mut tx.conn)
@@ -78,8 +75,12 @@ pub(crate) async fn create(
         .bind(now_ms())
         .fetch_one(&mut tx.conn)
         .await;
+    let id = id.map_err(StoreError::at("queue job"))?;
+    let open =
+        sqlx::query_scalar(COUNT_OPEN).fetch_one(&mut tx.conn).await.map_err(StoreError::at("count jobs"))?;
+    within(open, max, "jobs waiting or running")?;
     Ok(JobRow {
-        id: id.map_err(StoreError::at("queue job"))?,
+        id,
         kind: kind.to_owned(),
         map: map.to_owned(),
         request: request.to_owned(),

@@ -109,12 +109,6 @@ pub(crate) async fn create(
     max: usize,
 ) -> Result<LandmarkRow, StoreError> {
     let map = maps::get(&mut tx.conn, map).await?;
-    let count = sqlx::query_scalar(COUNT)
-        .bind(map.id)
-        .fetch_one(&mut tx.conn)
-        .await
-        .map_err(StoreError::at("count landmarks"))?;
-    within(count, max, "landmarks in a map")?;
     let (size, place) = (measures.size, measures.place);
     let id = sqlx::query_scalar(INSERT)
         .bind(map.id)
@@ -129,6 +123,12 @@ pub(crate) async fn create(
         .fetch_one(&mut tx.conn)
         .await
         .map_err(StoreError::inserting("create landmark", "landmark", name))?;
+    let count = sqlx::query_scalar(COUNT)
+        .bind(map.id)
+        .fetch_one(&mut tx.conn)
+        .await
+        .map_err(StoreError::at("count landmarks"))?;
+    within(count, max, "landmarks in a map")?;
     maps::bump(tx, map.id).await?;
     Ok(LandmarkRow { id, name: name.to_owned(), measures, views: 0, model: None })
 }

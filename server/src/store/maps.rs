@@ -62,9 +62,6 @@ pub(crate) async fn create(
     distance: DistanceKind,
     max: usize,
 ) -> Result<MapRow, StoreError> {
-    let count =
-        sqlx::query_scalar(COUNT).fetch_one(&mut tx.conn).await.map_err(StoreError::at("count maps"))?;
-    within(count, max, "maps")?;
     let id = sqlx::query_scalar(INSERT)
         .bind(name)
         .bind(distance_word(distance))
@@ -72,6 +69,9 @@ pub(crate) async fn create(
         .fetch_one(&mut tx.conn)
         .await
         .map_err(StoreError::inserting("create map", "map", name))?;
+    let count =
+        sqlx::query_scalar(COUNT).fetch_one(&mut tx.conn).await.map_err(StoreError::at("count maps"))?;
+    within(count, max, "maps")?;
     tx.changed(Change::Map(id));
     Ok(MapRow { id, name: name.to_owned(), version: 1, distance, landmarks: 0 })
 }

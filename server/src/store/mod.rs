@@ -109,9 +109,9 @@ pub(crate) fn now_ms() -> i64 {
     SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0, |d| d.as_millis() as i64)
 }
 
-/// Refuses an insertion that would pass a bound.
+/// Refuses an insertion that has passed a bound: the transaction is rolled back.
 fn within(count: i64, max: usize, what: &'static str) -> Result<(), StoreError> {
-    if count as usize >= max { Err(StoreError::Limit { what, max }) } else { Ok(()) }
+    if count as usize > max { Err(StoreError::Limit { what, max }) } else { Ok(()) }
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use super::{Change, StoreError, Tx, maps, now_ms, statements::statements, within
 use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 
 statements! {
-    COUNT_OTHERS = "SELECT count(*) FROM robots WHERE name <> ?1";
+    COUNT = "SELECT count(*) FROM robots";
     PUT = "INSERT INTO robots (name, map_id, created_ms) VALUES (?1, ?2, ?3) \
            ON CONFLICT (name) DO UPDATE SET map_id = excluded.map_id";
     GET = "SELECT r.name, m.name AS map FROM robots r JOIN maps m ON m.id = r.map_id WHERE r.name = ?1";
@@ -28,10 +28,11 @@ fn robot_row(row: &SqliteRow) -> Result<RobotRow, sqlx::Error> {
 /// Registers a robot, or moves it to another map.
 pub(crate) async fn put(tx: &mut Tx, name: &str, map: &str, max: usize) -> Result<RobotRow, StoreError> {
     let map = maps::get(&mut tx.conn, map).await?;
-    let others = sqlx::query_scalar(COUNT_OTHERS).bind(name).fetch_one(&mut tx.conn).await;
-    within(others.map_err(StoreError::at("count robots"))?, max, "robots")?;
     let put = sqlx::query(PUT).bind(name).bind(map.id).bind(now_ms()).execute(&mut tx.conn).await;
     put.map_err(StoreError::at("register robot"))?;
+    let count =
+        sqlx::query_scalar(COUNT).fetch_one(&mut tx.conn).await.map_err(StoreError::at("count robots"))?;
+    within(count, max, "robots")?;
     tx.changed(Change::Robot { name: name.to_owned(), map: Some(map.name.clone()) });
     Ok(RobotRow { name: name.to_owned(), map: map.name })
 }

@@ -140,8 +140,6 @@ pub(crate) async fn add(
     if let Some(row) = same.fetch_optional(&mut tx.conn).await.map_err(StoreError::at("look for view"))? {
         return Ok((view_row(&row)?, false));
     }
-    let count = sqlx::query_scalar(COUNT).bind(landmark.id).fetch_one(&mut tx.conn).await;
-    within(count.map_err(StoreError::at("count views"))?, max, "views of a landmark")?;
     let created_ms = now_ms();
     let id = sqlx::query_scalar(INSERT)
         .bind(landmark.id)
@@ -158,6 +156,8 @@ pub(crate) async fn add(
         .fetch_one(&mut tx.conn)
         .await
         .map_err(StoreError::at("store view"))?;
+    let count = sqlx::query_scalar(COUNT).bind(landmark.id).fetch_one(&mut tx.conn).await;
+    within(count.map_err(StoreError::at("count views"))?, max, "views of a landmark")?;
     add_strangers(tx, map.id, new).await?;
     let row = ViewRow {
         id,

@@ -1,0 +1,79 @@
+//! The real program, `waymark serve`, as a child process: started on free ports, killed at any moment.
+
+use client::MapClient;
+use std::{
+    io::{BufRead, BufReader},
+    path::{Path, PathBuf},
+    process::{Command, Stdio},
+    sync::OnceLock,
+};
+
+/// A running `waymark serve`. Killed when dropped.
+#[derive(Debug)]
+pub struct Child {
+    process: std::process::Child,
+    /// Base of its HTTP addresses, without a slash at the end.
+    pub url: String,
+    /// Where robots connect.
+    pub zenoh: String,
+}
+
+impl Child {
+    /// Starts the program on a data directory and waits until it says that it is ready.
+    pub fn start(data: &Path) -> Self {
+        let mut process = Command::new(program())
+            .args(["serve", "--http", "127.0.0.1:0", "--zenoh", "tcp/127.0.0.1:0", "--log", "warn", "--data"])
+            .arg(data)
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("the program starts");
+        let stdout = process.stdout.take().expect("its output");
+        let mut lines = BufReader::new(stdout).lines().map(|line| line.expect("a line"));
+        let mut after = |label: &str| {
+            let line =
+                lines.next().unwrap_or_else(|| panic!("the server ended before it was ready ({label})"));
+            let rest =
+                line.strip_prefix(label).unwrap_or_else(|| panic!("`{line}` does not begin with `{label}`"));
+            rest.trim().trim_end_matches('/').to_owned()
+        };
+        let (url, zenoh) = (after("pages"), after("robots"));
+        Self { process, url, zenoh }
+    }
+
+    /// A client of it.
+    pub fn maps(&self) -> MapClient {
+        MapClient::new(&self.url).expect("a client")
+    }
+
+    /// SIGKILL: no destructor, no last write.
+    pub fn kill(mut self) {
+        self.process.kill().expect("kill");
+        self.process.wait().expect("wait");
+    }
+}
+
+impl Drop for Child {
+    fn drop(&mut self) {
+        // Fails only when it has ended already.
+        drop(self.process.kill());
+        drop(self.process.wait());
+    }
+}
+
+/// The program, built as the tests are: cargo does not build another package's program for a test by itself.
+pub fn program() -> &'static Path {
+    static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
+    PROGRAM.get_or_init(|| {
+        // target/PROFILE/deps/end_to_end-HASH
+        let exe = std::env::current_exe().expect("own path");
+        let profile = exe.parent().and_then(Path::parent).expect("target directory");
+        let mut cargo = Command::new(env!("CARGO"));
+        cargo.args(["build", "--quiet", "--package", "server", "--bin", "waymark"]);
+        cargo.current_dir(env!("CARGO_MANIFEST_DIR"));
+        if profile.ends_with("release") {
+            cargo.arg("--release");
+        }
+        assert!(cargo.status().expect("cargo").success(), "the program does not build");
+        profile.join(format!("waymark{}", std::env::consts::EXE_SUFFIX))
+    })
+}
