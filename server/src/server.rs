@@ -25,12 +25,12 @@ pub enum StartError {
     /// The database does not open.
     #[error("{0}")]
     Store(String),
-    /// No threads for vision.
-    #[error("cannot start the vision threads: {0}")]
-    Workers(std::io::Error),
     /// Robots cannot connect.
     #[error(transparent)]
     Bus(#[from] BusError),
+    /// The system gives no threads.
+    #[error("no threads for the workers: {0}")]
+    Threads(#[source] std::io::Error),
     /// The address cannot be listened on.
     #[error("cannot listen on {addr}: {source}")]
     Http {
@@ -98,34 +98,41 @@ impl Server {
         let (jobs, jobs_task) = Jobs::start(store.clone(), config.clone(), stopping.clone())
             .await
             .map_err(|e| StartError::Store(e.to_string()))?;
-        let live = Arc::new(LiveHub::default());
-        let motion = Arc::new(Motion::new(snapshots.clone(), live.clone()));
-        let slots = Arc::new(Slots::new(config.limits.cameras));
-        let intake = Arc::new(Intake {
-            slots: slots.clone(),
-            snapshots: snapshots.clone(),
-            frame_bytes: config.limits.frame_bytes,
-            deadline: Duration::from_millis(u64::from(config.limits.frame_deadline_ms)),
-        });
-        let to = Receivers { intake, motion: motion.clone(), live: live.clone() };
-        let bus = Bus::open(&config, to).await?;
-        let zenoh_endpoint = bus.endpoint().to_owned();
-        let engine = Engine {
-            slots: slots.clone(),
-            snapshots: snapshots.clone(),
-            motion,
-            live: live.clone(),
-            limits: ImageLimits { pixels: config.limits.frame_pixels, ..ImageLimits::FRAME },
-            panics: Arc::default(),
-        };
+        let engine = engine(&config, snapshots.clone());
+        let (live, slots) = (engine.live.clone(), engine.slots.clone());
+        let bus = Bus::open(&config, receivers(&config, &engine)).await?;
         let workers = Workers::start(&engine, config.workers, &Arc::new(bus.outbox().clone()))
-            .map_err(StartError::Workers)?;
+            .map_err(StartError::Threads)?;
+        let zenoh_endpoint = bus.endpoint().to_owned();
         let app = App::new(config.clone(), store, jobs, live.clone(), stopping.clone());
         let http =
             tokio::spawn(http::listen::serve(listener, http::router(app), config.limits.clone(), stopping));
-        let tasks = Tasks { workers, http, jobs: jobs_task, bus, writer };
+        let tasks = Tasks { workers, bus, http, jobs: jobs_task, writer };
         Ok(RunningServer { http_addr, zenoh_endpoint, snapshots, live, slots, stop, store_failed, tasks })
     }
+}
+
+/// Everything between frames and answers, for one set of settings.
+fn engine(config: &Config, snapshots: Arc<Snapshots>) -> Engine {
+    let live = Arc::new(LiveHub::default());
+    Engine {
+        slots: Arc::new(Slots::new(config.limits.cameras)),
+        motion: Arc::new(Motion::new(snapshots.clone(), live.clone())),
+        snapshots,
+        live,
+        limits: ImageLimits { bytes: config.limits.frame_bytes, pixels: config.limits.frame_pixels },
+        panics: Arc::default(),
+    }
+}
+
+fn receivers(config: &Config, engine: &Engine) -> Receivers {
+    let intake = Intake {
+        slots: engine.slots.clone(),
+        snapshots: engine.snapshots.clone(),
+        frame_bytes: config.limits.frame_bytes,
+        deadline: Duration::from_millis(u64::from(config.limits.frame_deadline_ms)),
+    };
+    Receivers { intake: Arc::new(intake), motion: engine.motion.clone(), live: engine.live.clone() }
 }
 
 impl RunningServer {
@@ -142,7 +149,9 @@ impl RunningServer {
     pub async fn stop(self) {
         self.stop.send_replace(true);
         let Tasks { workers, bus, http, jobs, writer } = self.tasks;
-        if let Err(error) = tokio::task::spawn_blocking(move || workers.stop()).await {
+        // Workers first: what they have in work is still answered over the open bus.
+        let workers = tokio::task::spawn_blocking(move || workers.stop());
+        if let Err(error) = workers.await {
             tracing::error!(%error, "stopping the workers");
         }
         bus.close().await;

@@ -7,6 +7,7 @@ pub mod intake;
 pub mod live;
 pub mod motion;
 pub mod picture;
+pub mod dominant;
 pub mod verdicts;
 pub mod workers;
 #[cfg(test)]

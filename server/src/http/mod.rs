@@ -13,6 +13,7 @@ mod learning;
 mod live;
 mod maps;
 mod pages;
+mod recognise;
 mod resources;
 mod robots;
 mod router;

@@ -1,7 +1,8 @@
 //! Every route, with the layers around them and the OpenAPI document made from them.
 
 use super::{
-    App, Shared, error::ApiError, guard, health, landmarks, laser, learning, live, maps, pages, robots, views,
+    App, Shared, error::ApiError, guard, health, landmarks, laser, learning, live, maps, pages, recognise,
+    robots, views,
 };
 use crate::config::Limits;
 use axum::{
@@ -35,6 +36,7 @@ fn api(limits: &Limits) -> OpenApiRouter<Shared> {
         .merge(landmarks::router())
         .merge(views::router(limits.upload_bytes))
         .merge(learning::router())
+        .merge(recognise::router(limits.upload_bytes))
         .merge(robots::router())
         .merge(live::router())
         .merge(health::router())

@@ -3,11 +3,14 @@
 use super::{
     App, Shared,
     error::{ApiError, Problem},
-    extract::{At, Page, PageQuery, Params, json},
+    extract::{self, At, Page, PageQuery, Params},
     upload::{FORM_OVERHEAD, Form},
 };
 use crate::{
-    engine::picture,
+    engine::{
+        dominant::{dominant, others, whole_quads},
+        picture,
+    },
     store::{
         landmarks, maps,
         views::{self, Cut, NewView, ViewRow},
@@ -21,10 +24,16 @@ use axum::{
     response::{IntoResponse, Response},
 };
 use serde::Serialize;
+use serde_json::json;
 use sha2::{Digest, Sha256};
 use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
-use vision::{detect::quads::Corners, frame::GrayImage, icon::icon, params::Params as Algorithm};
+use vision::{
+    detect::quads::Corners,
+    frame::GrayImage,
+    icon::{Icon, IconError, icon},
+    params::Params as Algorithm,
+};
 
 pub(super) fn router(upload_bytes: usize) -> OpenApiRouter<Shared> {
     OpenApiRouter::new()
@@ -120,30 +129,47 @@ fn extent(corners: Option<Bytes>, whole_image: Option<Bytes>) -> Result<Extent, 
     };
     match (corners, whole) {
         (Some(_), true) => Err(ApiError::invalid("bad_value", "whole_image", "not together with corners")),
-        (Some(corners), false) => Ok(Extent::Corners(json(&corners, "corners")?)),
+        (Some(corners), false) => Ok(Extent::Corners(extract::json(&corners, "corners")?)),
         (None, true) => Ok(Extent::Whole),
         (None, false) => Ok(Extent::Detect),
     }
 }
 
+/// Other quads of one picture that are kept as strangers.
+const MAX_STRANGERS: usize = 20;
+
 fn prepare(app: &App, bytes: &Bytes, extent: &Extent) -> Result<NewView, ApiError> {
     let image = picture::decode(bytes, app.config.limits.upload())?;
     let p = &app.config.params;
+    let quads = if matches!(extent, Extent::Whole) { Vec::new() } else { whole_quads(&image, p) };
     let corners_px = match extent {
         Extent::Corners(corners) => *corners,
         Extent::Whole => whole(&image)?,
-        Extent::Detect => {
-            return Err(ApiError::invalid("missing", "corners", "the part `corners` is missing"));
-        }
+        Extent::Detect => found(&quads)?,
     };
     let icon = cut(&image, &corners_px, p)?;
+    let stranger =
+        |corners: &Corners| Some(Cut { corners_px: *corners, icon: icon_of(&image, corners, p).ok()? });
     Ok(NewView {
         image: bytes.to_vec(),
         image_sha256: Sha256::digest(bytes).into(),
         image_kind: picture::kind(bytes).unwrap_or_default(),
         size_px: [image.width(), image.height()],
         cut: Cut { corners_px, icon },
-        strangers: Vec::new(),
+        strangers: others(&quads, &corners_px).filter_map(stranger).take(MAX_STRANGERS).collect(),
+    })
+}
+
+/// The quad that is meant, or a refusal that proposes what was seen.
+fn found(quads: &[Corners]) -> Result<Corners, ApiError> {
+    dominant(quads).copied().ok_or_else(|| {
+        let proposed: Vec<[[f64; 2]; 4]> = quads.iter().map(|q| (*q).into()).collect();
+        let (code, detail) = if quads.is_empty() {
+            ("quad_not_found", "no whole quad was found; give the corners")
+        } else {
+            ("quad_ambiguous", "more than one quad could be meant; give the corners, perhaps one of `quads`")
+        };
+        ApiError::invalid(code, "corners", detail).with("quads", json!(proposed))
     })
 }
 
@@ -154,9 +180,12 @@ fn whole(image: &GrayImage) -> Result<Corners, ApiError> {
         .map_err(|e| ApiError::invalid("too_small", "image", e.to_string()))
 }
 
-fn cut(image: &GrayImage, corners: &Corners, p: &Algorithm) -> Result<vision::icon::Icon, ApiError> {
-    use vision::icon::IconError;
-    icon(image, corners, &p.icon).map_err(|error| {
+fn icon_of(image: &GrayImage, corners: &Corners, p: &Algorithm) -> Result<Icon, IconError> {
+    icon(image, corners, &p.icon)
+}
+
+fn cut(image: &GrayImage, corners: &Corners, p: &Algorithm) -> Result<Icon, ApiError> {
+    icon_of(image, corners, p).map_err(|error| {
         let code = match error {
             IconError::TooSmall { .. } => "too_small",
             IconError::Outside { .. } => "outside",

@@ -1,0 +1,64 @@
+//! `/maps/{map}/recognise`: one photograph, the same pipeline that robots' frames go through.
+
+use super::{
+    Shared,
+    error::{ApiError, Problem},
+    extract::{At, json},
+    upload::{FORM_OVERHEAD, Form},
+};
+use crate::{
+    engine::{picture, verdicts::answer_to_photograph},
+    store::StoreError,
+};
+use axum::{
+    Json,
+    extract::{DefaultBodyLimit, Request, State},
+};
+use protos::{convert::geometry, v1};
+use utoipa::ToSchema;
+use utoipa_axum::{router::OpenApiRouter, routes};
+
+pub(super) fn router(upload_bytes: usize) -> OpenApiRouter<Shared> {
+    OpenApiRouter::new().routes(routes!(recognise)).layer(DefaultBodyLimit::max(upload_bytes + FORM_OVERHEAD))
+}
+
+/// The form, for the documentation.
+#[derive(ToSchema)]
+#[expect(dead_code, reason = "read part by part; this only describes it")]
+struct PhotographForm {
+    /// PNG or JPEG.
+    #[schema(value_type = String, format = Binary)]
+    image: Vec<u8>,
+    /// JSON: `fx_px`, `fy_px`, `cx_px`, `cy_px` and optionally `plumb_bob` (k1, k2, p1, p2, k3). Without it there is
+    /// recognition but no pose.
+    intrinsics: Option<String>,
+}
+
+/// Recognises the landmarks of a photograph.
+#[utoipa::path(post, path = "/maps/{map}/recognise", tag = "recognition", params(("map" = String, Path)),
+    request_body(content = PhotographForm, content_type = "multipart/form-data"),
+    responses((status = 200, body = Object, description = "`Answer` of protos/waymark/v1/waymark.proto as JSON"),
+    (status = 404, body = Problem), (status = 413, body = Problem),
+    (status = 422, body = Problem, description = "bad_image, wrong_encoding, too_large, out_of_range, not_finite")))]
+async fn recognise(
+    State(app): State<Shared>,
+    At(map): At<String>,
+    request: Request,
+) -> Result<Json<v1::Answer>, ApiError> {
+    let snapshot = app.store.snapshots().get(&map);
+    let snapshot = snapshot.ok_or_else(|| StoreError::NotFound { what: "map", name: map })?;
+    let mut form = Form::read(&app, request, &["image", "intrinsics"]).await?;
+    let bytes = form.needed("image")?;
+    let camera = match form.optional("intrinsics") {
+        Some(text) => {
+            let wire: v1::Intrinsics = json(&text, "intrinsics")?;
+            Some(geometry::intrinsics(&wire).map_err(|r| r.inside("intrinsics"))?)
+        }
+        None => None,
+    };
+    let answer = app.on_vision_thread(move |app| {
+        let image = picture::decode(&bytes, app.config.limits.upload())?;
+        Ok(answer_to_photograph(&image, camera.as_ref(), &snapshot))
+    });
+    answer.await?.map(Json)
+}
