@@ -81,6 +81,8 @@ pub fn chains(edges: &EdgeMap, p: &ChainParams) -> Vec<EdgeChain> {
 
 struct Tracer<'a> {
     edges: &'a EdgeMap,
+    /// Branches that meet in each edge pixel, 0 elsewhere.
+    branches: Vec<u8>,
     /// Edge pixels not yet in a run. Junctions stay free: several runs may end there.
     free: Vec<bool>,
     pixels: Vec<u32>,
@@ -89,8 +91,12 @@ struct Tracer<'a> {
 
 impl<'a> Tracer<'a> {
     fn new(edges: &'a EdgeMap) -> Self {
+        let mut branches = vec![0; edges.mask().len()];
+        for &at in edges.pixels() {
+            branches[at as usize] = BRANCHES[ring_code(edges.mask(), edges.width(), at as usize)];
+        }
         let pixels = Vec::with_capacity(edges.pixels().len() + 16);
-        Self { edges, free: edges.mask().to_vec(), pixels, runs: Vec::new() }
+        Self { edges, branches, free: edges.mask().to_vec(), pixels, runs: Vec::new() }
     }
 
     /// From ends, from junctions, then what is left: closed loops.
@@ -99,7 +105,7 @@ impl<'a> Tracer<'a> {
         let all = self.edges.pixels();
         for &at in all {
             let at = at as usize;
-            match self.branches(at) {
+            match self.branches[at] {
                 0 | 1 if self.free[at] => self.trace(at),
                 3.. => junctions.push(at),
                 _ => {}
@@ -115,15 +121,11 @@ impl<'a> Tracer<'a> {
             }
         }
         for &at in all {
-            if self.free[at as usize] && self.branches(at as usize) < 3 {
+            if self.free[at as usize] && self.branches[at as usize] < 3 {
                 self.trace(at as usize);
             }
         }
         (self.pixels, self.runs)
-    }
-
-    fn branches(&self, at: usize) -> u8 {
-        BRANCHES[ring_code(self.edges.mask(), self.edges.width(), at)]
     }
 
     /// Follows free pixels from `at` as long as the edge goes on, then, if it did not start at an end, from `at` the
@@ -135,15 +137,15 @@ impl<'a> Tracer<'a> {
         self.follow(at, start, None);
         let last = self.pixels[self.pixels.len() - 1] as usize;
         let long = self.pixels.len() - start > 3;
-        let closed = long && self.branches(at) < 3 && self.touches(last, at) && self.same_side(last, at);
-        if !closed && self.branches(at) < 3 {
+        let closed = long && self.branches[at] < 3 && self.touches(last, at) && self.same_side(last, at);
+        if !closed && self.branches[at] < 3 {
             // Walk the other way from the same pixel: bright side on the other hand.
             let forward = self.pixels.len();
             let sense = (forward - start > 1).then(|| -self.sense(at, self.pixels[start + 1] as usize));
             self.follow(at, start, sense);
             self.pixels[start..forward].reverse();
         }
-        if self.branches(at) >= 3 {
+        if self.branches[at] >= 3 {
             self.free[at] = true;
         }
         let end = self.pixels.len();
@@ -159,7 +161,7 @@ impl<'a> Tracer<'a> {
         while self.pixels.len() - start < MAX_CHAIN_POINTS {
             let Some((next, hand)) = self.next(at, sense) else { return };
             self.pixels.push(next as u32);
-            if self.branches(next) >= 3 {
+            if self.branches[next] >= 3 {
                 return;
             }
             self.free[next] = false;
@@ -172,10 +174,14 @@ impl<'a> Tracer<'a> {
         let mut best = None;
         let mut best_cos = MIN_COS_TURN;
         // Runs between two touching junctions would be found again and again; bridging joins what they separate.
-        let junction = self.branches(at) >= 3;
-        for (i, &(du, dv)) in RING.iter().enumerate() {
+        let junction = self.branches[at] >= 3;
+        let mut ring = ring_code(&self.free, self.edges.width(), at);
+        while ring != 0 {
+            let i = ring.trailing_zeros() as usize;
+            ring &= ring - 1;
+            let (du, dv) = RING[i];
             let near = at.wrapping_add_signed(dv as isize * self.edges.width() as isize + du as isize);
-            if !self.free[near] || !self.same_side(at, near) || (junction && self.branches(near) >= 3) {
+            if !self.same_side(at, near) || (junction && self.branches[near] >= 3) {
                 continue;
             }
             let cos = self.along(at, du as f32, dv as f32)

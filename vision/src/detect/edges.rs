@@ -167,10 +167,11 @@ impl EdgeMap {
     /// Pixels of at least `low` whose magnitude no neighbour along the gradient exceeds; row-major, off the border.
     fn maxima(&self, low: f32) -> Vec<u32> {
         let mut found = Vec::new();
-        let columns = BORDER_PX..self.width.saturating_sub(BORDER_PX);
+        let inner = self.width.saturating_sub(2 * BORDER_PX);
         for v in BORDER_PX..self.height.saturating_sub(BORDER_PX) {
-            for at in v * self.width + columns.start..v * self.width + columns.end.max(columns.start) {
-                if self.magnitude[at] >= low && self.is_maximum(at) {
+            let start = v * self.width + BORDER_PX;
+            for (at, &magnitude) in (start..).zip(&self.magnitude[start..start + inner]) {
+                if magnitude >= low && self.is_maximum(at) {
                     found.push(at as u32);
                 }
             }

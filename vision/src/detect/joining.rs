@@ -20,9 +20,8 @@ pub(crate) struct Fragment {
     pub(crate) fit: LineFit,
     /// Sum of the gradients; tells the bright side.
     pub(crate) gradient: Vector2<f64>,
-    /// Sum of the gradients' magnitudes over `points` points.
+    /// Sum of the gradients' magnitudes over all points.
     pub(crate) magnitude: f64,
-    pub(crate) points: usize,
     /// Ends, on the fitted line; the bright side is on the right from `p` to `q`.
     pub(crate) p: Point2<f64>,
     pub(crate) q: Point2<f64>,
@@ -35,7 +34,6 @@ impl Fragment {
         sums: LineSums,
         gradient: Vector2<f64>,
         magnitude: f64,
-        points: usize,
         ends: &[Point2<f64>],
         chain: usize,
     ) -> Option<Self> {
@@ -48,122 +46,156 @@ impl Fragment {
         let first = ends.iter().min_by(|a, b| along(a).total_cmp(&along(b)))?;
         let last = ends.iter().max_by(|a, b| along(a).total_cmp(&along(b)))?;
         let (p, q) = (fit.line.project(first), fit.line.project(last));
-        Some(Self { sums, fit, gradient, magnitude, points, p, q, chain })
+        Some(Self { sums, fit, gradient, magnitude, p, q, chain })
     }
 
     pub(crate) fn length_px(&self) -> f64 {
         (self.q - self.p).norm()
     }
 
-    /// Both as one, if they follow one line closely enough.
-    fn joined(&self, other: &Self, p: &SegmentParams) -> Option<Self> {
-        let (da, db) = (self.fit.line.direction(), other.fit.line.direction());
-        let max_sin = p.join_angle_deg.to_radians().sin();
-        if da.dot(&db) <= 0.0 || da.perp(&db).abs() > max_sin {
+    /// Both as one, if they follow one line closely enough. `self` is the longer one.
+    fn joined(&self, other: &Self, gates: &Gates) -> Option<Self> {
+        let d = self.fit.line.direction();
+        let (dx, dy) = (other.q - other.p, self.q - self.p);
+        let (own, length) = (d.dot(&dy), dx.norm());
+        // The cheap gates first: most neighbours fail here.
+        if d.dot(&dx) <= 0.0 || d.perp(&dx).abs() > gates.max_sin * length {
             return None;
         }
-        let (long, short) = if self.length_px() >= other.length_px() { (self, other) } else { (other, self) };
+        let lateral = |e: &Point2<f64>| self.fit.line.distance(e).abs();
+        if lateral(&other.p).max(lateral(&other.q)) > gates.lateral_px {
+            return None;
+        }
+        let gap = d.dot(&(other.p - self.q)).max(d.dot(&(self.p - other.q)));
+        if gap > gates.gap_share * (own + length + gap) || gap < -2.0 * gates.lateral_px {
+            return None;
+        }
         let ends = [self.p, self.q, other.p, other.q];
         let joint = Self::new(
             self.sums + other.sums,
             self.gradient + other.gradient,
             self.magnitude + other.magnitude,
-            self.points + other.points,
             &ends,
-            long.chain,
+            self.chain,
         )?;
-        // The short one lies beside neither the long one nor the common line.
-        let lateral = [short.p, short.q].iter().map(|e| long.fit.line.distance(e).abs()).fold(0.0, f64::max);
-        let residual = ends.iter().map(|e| joint.fit.line.distance(e).abs()).fold(0.0, f64::max);
-        let gap = joint.length_px() - self.length_px() - other.length_px();
-        let close = gap <= p.join_gap_share * joint.length_px() && gap > -p.join_lateral_px * 2.0;
-        (close && lateral <= p.join_lateral_px && residual <= p.join_lateral_px).then_some(joint)
+        ends.iter().all(|e| joint.fit.line.distance(e).abs() <= gates.lateral_px).then_some(joint)
     }
+}
+
+struct Gates {
+    max_sin: f64,
+    lateral_px: f64,
+    gap_share: f64,
 }
 
 /// Joins fragments until nothing fits. Deterministic: longest first, then by index.
-pub(crate) fn join(mut fragments: Vec<Fragment>, p: &SegmentParams) -> Vec<Fragment> {
-    sort(&mut fragments);
-    let rest = fragments.split_off(fragments.len().min(MAX_FRAGMENTS));
+pub(crate) fn join(fragments: Vec<Fragment>, p: &SegmentParams) -> Vec<Fragment> {
+    let gates = Gates {
+        max_sin: p.join_angle_deg.to_radians().sin(),
+        lateral_px: p.join_lateral_px,
+        gap_share: p.join_gap_share.clamp(0.0, 0.5),
+    };
+    let mut fragments = fragments;
     for _ in 0..MAX_ROUNDS {
         let before = fragments.len();
-        fragments = join_once(&fragments, p);
+        fragments = join_once(&fragments, &gates);
         if fragments.len() == before {
             break;
         }
-        sort(&mut fragments);
     }
-    fragments.extend(rest);
     fragments
 }
 
-fn sort(fragments: &mut [Fragment]) {
-    // Stable: equal lengths keep the order of their chains.
-    fragments.sort_by(|a, b| b.length_px().total_cmp(&a.length_px()));
-}
-
 /// One round: every fragment takes, at each end, the nearest fitting fragment that is not longer than itself.
-fn join_once(fragments: &[Fragment], p: &SegmentParams) -> Vec<Fragment> {
-    let grid = Grid::new(fragments);
+fn join_once(fragments: &[Fragment], gates: &Gates) -> Vec<Fragment> {
+    let lengths: Vec<f64> = fragments.iter().map(Fragment::length_px).collect();
+    let mut order: Vec<usize> = (0..fragments.len()).collect();
+    // Stable: equal lengths keep the order of their chains.
+    order.sort_by(|a, b| lengths[*b].total_cmp(&lengths[*a]));
+    let rest = order.split_off(order.len().min(MAX_FRAGMENTS));
+    // Bright sides agree, so the end of one meets the start of the other.
+    let starts = Grid::new(order.iter().map(|&i| (fragments[i].p, i)));
+    let ends = Grid::new(order.iter().map(|&i| (fragments[i].q, i)));
     let mut taken = vec![false; fragments.len()];
     let mut joined = Vec::with_capacity(fragments.len());
-    for i in 0..fragments.len() {
+    for &i in &order {
         if std::mem::replace(&mut taken[i], true) {
             continue;
         }
         let mut whole = fragments[i].clone();
         // gap <= share * (long + short + gap) with short <= long.
-        let share = p.join_gap_share.clamp(0.0, 0.5);
-        let reach = 2.0 * share / (1.0 - share) * whole.length_px() + CELL_PX;
+        let reach = 2.0 * gates.gap_share / (1.0 - gates.gap_share) * lengths[i] + CELL_PX;
         let d = whole.fit.line.direction();
-        for (end, outward) in [(whole.p, -d), (whole.q, d)] {
+        for (end, outward, grid) in [(whole.p, -d, &ends), (whole.q, d, &starts)] {
             let mut step = 0.0;
             while step <= reach {
-                let near = grid.near(end + outward * step);
-                let found =
-                    near.filter(|&j| !taken[j]).filter_map(|j| Some((j, whole.joined(&fragments[j], p)?)));
-                let best =
-                    found.max_by(|a, b| b.1.length_px().total_cmp(&a.1.length_px()).then(b.0.cmp(&a.0)));
+                let mut best: Option<(usize, Fragment)> = None;
+                grid.near(end + outward * step, |j| {
+                    if taken[j] || best.as_ref().is_some_and(|b| lengths[b.0] >= lengths[j]) {
+                        return;
+                    }
+                    if let Some(joint) = whole.joined(&fragments[j], gates) {
+                        best = Some((j, joint));
+                    }
+                });
                 if let Some((j, joint)) = best {
                     taken[j] = true;
                     whole = joint;
                     break;
                 }
-                step += CELL_PX;
+                step += 2.0 * CELL_PX;
             }
         }
         joined.push(whole);
     }
+    joined.extend(rest.into_iter().map(|i| fragments[i].clone()));
     joined
 }
 
-/// Ends of fragments by cell, in one sorted list.
+/// Points by cell: `items[first[c]..first[c + 1]]` lie in cell c, row-major.
 struct Grid {
-    ends: Vec<(i64, i64, usize)>,
+    columns: usize,
+    rows: usize,
+    first: Vec<usize>,
+    items: Vec<usize>,
 }
 
 impl Grid {
-    fn new(fragments: &[Fragment]) -> Self {
-        let cell = |e: &Point2<f64>, i| {
-            let (u, v) = Self::cell(e);
-            (v, u, i)
-        };
-        let mut ends: Vec<_> =
-            fragments.iter().enumerate().flat_map(|(i, f)| [cell(&f.p, i), cell(&f.q, i)]).collect();
-        ends.sort_unstable();
-        Self { ends }
+    fn new(points: impl Iterator<Item = (Point2<f64>, usize)> + Clone) -> Self {
+        let cell = |x: f64| (x.max(0.0) / CELL_PX) as usize;
+        let (columns, rows) =
+            points.clone().fold((1, 1), |(c, r), (p, _)| (c.max(cell(p.x) + 1), r.max(cell(p.y) + 1)));
+        let at = |p: &Point2<f64>| cell(p.y) * columns + cell(p.x);
+        let mut first = vec![0; columns * rows + 1];
+        for (p, _) in points.clone() {
+            first[at(&p) + 1] += 1;
+        }
+        for c in 0..columns * rows {
+            first[c + 1] += first[c];
+        }
+        let mut next = first.clone();
+        let mut items = vec![0; first[columns * rows]];
+        for (p, i) in points {
+            let slot = &mut next[at(&p)];
+            items[*slot] = i;
+            *slot += 1;
+        }
+        Self { columns, rows, first, items }
     }
 
-    fn cell(p: &Point2<f64>) -> (i64, i64) {
-        ((p.x / CELL_PX).floor() as i64, (p.y / CELL_PX).floor() as i64)
-    }
-
-    /// Fragments with an end in the cell of `p` or one beside it.
-    fn near(&self, p: Point2<f64>) -> impl Iterator<Item = usize> {
-        let (u, v) = Self::cell(&p);
-        (v - 1..=v + 1).flat_map(move |row| {
-            let from = self.ends.partition_point(|e| (e.0, e.1) < (row, u - 1));
-            self.ends[from..].iter().take_while(move |e| e.0 == row && e.1 <= u + 1).map(|e| e.2)
-        })
+    /// Visits what lies in the cell of `p` or one beside it.
+    fn near(&self, p: Point2<f64>, mut visit: impl FnMut(usize)) {
+        let (u, v) = ((p.x / CELL_PX).floor(), (p.y / CELL_PX).floor());
+        if u < -1.0 || v < -1.0 || u > self.columns as f64 || v > self.rows as f64 {
+            return;
+        }
+        let (from, to) = ((u - 1.0).max(0.0) as usize, ((u + 2.0) as usize).min(self.columns));
+        for row in (v - 1.0).max(0.0) as usize..((v + 2.0) as usize).min(self.rows) {
+            if from < to {
+                self.items[self.first[row * self.columns + from]..self.first[row * self.columns + to]]
+                    .iter()
+                    .for_each(|&i| visit(i));
+            }
+        }
     }
 }

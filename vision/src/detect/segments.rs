@@ -134,7 +134,7 @@ fn fragments_of(chain: &EdgeChain, index: usize, p: &SegmentParams, fragments: &
             magnitude += g.norm();
         }
         let sums: LineSums = inner.clone().map(|i| *polyline.point(i)).collect();
-        fragments.extend(Fragment::new(sums, gradient, magnitude, inner.len(), &ends, index));
+        fragments.extend(Fragment::new(sums, gradient, magnitude, &ends, index));
     }
 }
 
@@ -148,8 +148,8 @@ fn segment(f: &Fragment, edges: &EdgeMap) -> EdgeSegment {
         theta_rad: f.fit.line.theta_rad(),
         normal: f.fit.line.normal,
         rho_px: f.fit.line.rho_px,
-        contrast: f.magnitude / f.points as f64,
-        support: f.points,
+        contrast: f.magnitude / f.sums.count(),
+        support: f.sums.count() as usize,
         chain: f.chain,
         theta_variance: f.fit.theta_variance(),
         offset_variance: offset_variance(f),

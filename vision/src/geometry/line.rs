@@ -119,14 +119,17 @@ impl LineSums {
         let (mx, my) = (self.x / self.n, self.y / self.n);
         let (sxx, sxy, syy) = (self.xx - self.x * mx, self.xy - self.x * my, self.yy - self.y * my);
         let (mean, half) = (f64::midpoint(sxx, syy), 0.5 * (sxx - syy));
-        let radius = half.hypot(sxy);
+        let radius = (half * half + sxy * sxy).sqrt();
         let spread_px2 = mean + radius;
         // Sums of squares cancel: what is left below this is rounding, not spread.
         if !spread_px2.is_finite() || spread_px2 <= 1e-12 * (self.xx + self.yy) + f64::MIN_POSITIVE {
             return None;
         }
-        let theta = 0.5 * sxy.atan2(half);
-        let normal = Vector2::new(-theta.sin(), theta.cos());
+        // Half the angle whose cosine and sine are half / radius and sxy / radius.
+        let (cos2, sin2) = if radius > 0.0 { (half / radius, sxy / radius) } else { (1.0, 0.0) };
+        let direction = if cos2 >= 0.0 { Vector2::new(1.0 + cos2, sin2) } else { Vector2::new(sin2, 1.0 - cos2) };
+        let direction = direction.normalize();
+        let normal = Vector2::new(-direction.y, direction.x);
         Some(LineFit {
             line: Line { normal, rho_px: normal.x * mx + normal.y * my },
             mean_px: Point2::new(mx, my),
