@@ -4,11 +4,7 @@
 
 use std::{error::Error, time::Instant};
 use vision::{
-    detect::{
-        chains::chains,
-        edges::edges,
-        segments::segments,
-    },
+    detect::{chains::chains, edges::edges, segments::segments},
     frame::GrayImage,
     params::DetectParams,
 };

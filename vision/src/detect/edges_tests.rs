@@ -67,14 +67,15 @@ fn contrast_scales_with_the_thresholds() {
     let image = polygon((64, 48), &corners, (70.0, 40.0), 1.0, 8);
     let double = GrayImage::from_fn(64, 48, |u, v| 2 * image.at(u, v) + 5);
     let map = edges(&image, &EdgeParams::default());
-    let doubled = edges(&double, &EdgeParams { low: 12.0, high: 30.0, ..EdgeParams::default() });
+    let p = EdgeParams::default();
+    let doubled = edges(&double, &EdgeParams { low: 2.0 * p.low, high: 2.0 * p.high, ..p });
     assert_eq!(points(&map), points(&doubled));
 }
 
 #[test]
 fn a_fading_edge_is_followed_both_ways() {
     // Step height 40 at one end, 2 at the other: kept down to the low threshold, whichever end is up.
-    let fading = |v: usize| 40.0 - 38.0 * v as f64 / 199.0;
+    let fading = |v: usize| 40.0 - 39.0 * v as f64 / 199.0;
     let image = |up: bool| {
         GrayImage::from_fn(40, 200, |u, v| {
             let step = fading(if up { v } else { 199 - v });
@@ -128,4 +129,21 @@ fn bilinear_gradient_meets_the_pixels() {
     let middle = map.gradient_at(&Point2::new(7.5, 9.0));
     assert!((middle - (map.gradient(7, 9) + map.gradient(8, 9)).cast::<f64>() * 0.5).norm() < 1e-6);
     assert!((map.gradient_at(&Point2::new(-5.0, 99.0)) - map.gradient(0, 23).cast()).norm() < 1e-6);
+}
+
+#[test]
+fn thresholds_rise_with_the_noise() {
+    // Flat apart from noise: its deviation is found, and no edge.
+    for (sigma, seed) in [(2.0, 1), (4.0, 2), (8.0, 3)] {
+        let image =
+            polygon((160, 120), &rectangle((80.0, 60.0), (1.0, 1.0), 0.0), (100.0, 100.0), sigma, seed);
+        let map = edges(&image, &EdgeParams::default());
+        let inner = (0..160 * 120).filter(|i| (8..152).contains(&(i % 160)) && (8..112).contains(&(i / 160)));
+        let squares: Vec<f32> = inner.map(|i| map.gx()[i].powi(2)).collect();
+        let deviation = (squares.iter().sum::<f32>() / squares.len() as f32).sqrt();
+        assert!((map.noise() / deviation - 1.0).abs() < 0.15, "{} {deviation}", map.noise());
+        assert!(map.pixels().len() < 20, "sigma {sigma}: {} edge pixels of noise", map.pixels().len());
+        let bare = edges(&image, &EdgeParams { noise_factors: [0.0; 2], ..EdgeParams::default() });
+        assert!(sigma < 8.0 || bare.pixels().len() > 100);
+    }
 }

@@ -194,7 +194,7 @@ proptest! {
     #[test]
     fn any_parameters_are_survived(alpha: f32, low: f32, high: f32, split_px: f64, share: f64, gap: u32) {
         let image = polygon((64, 48), &rectangle((30.0, 22.0), (30.0, 20.0), 0.4), (200.0, 60.0), 6.0, 1);
-        let edges = edges(&image, &EdgeParams { alpha, low, high });
+        let edges = edges(&image, &EdgeParams { alpha, low, high, noise_factors: [0.0; 2] });
         let chain_params = ChainParams { max_gap_px: gap, min_points: 0, ..ChainParams::default() };
         let p = SegmentParams { split_px, join_gap_share: share, min_fragment_px: 0.0, ..SegmentParams::default() };
         prop_assert!(segments(&chains(&edges, &chain_params), &edges, &p).len() <= MAX_SEGMENTS);

@@ -127,7 +127,8 @@ impl LineSums {
         }
         // Half the angle whose cosine and sine are half / radius and sxy / radius.
         let (cos2, sin2) = if radius > 0.0 { (half / radius, sxy / radius) } else { (1.0, 0.0) };
-        let direction = if cos2 >= 0.0 { Vector2::new(1.0 + cos2, sin2) } else { Vector2::new(sin2, 1.0 - cos2) };
+        let direction =
+            if cos2 >= 0.0 { Vector2::new(1.0 + cos2, sin2) } else { Vector2::new(sin2, 1.0 - cos2) };
         let direction = direction.normalize();
         let normal = Vector2::new(-direction.y, direction.x);
         Some(LineFit {
