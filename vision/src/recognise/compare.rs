@@ -2,17 +2,21 @@
 //! smallest distance over sightings and exemplars (method 7.5). Deciding is the verdict's work.
 
 use super::{
-    DistanceKind, IconFeatures, correlation::correlation_within, features, hausdorff::hausdorff,
+    DistanceKind,
+    correlation::{Buckets, correlation_within},
+    descriptor::{PointSet, describe},
+    harris::harris,
+    hausdorff::hausdorff,
     models::ModelSet,
 };
 use crate::{
     detect::quads::{Corners, Quad},
     frame::GrayImage,
-    icon::icon,
+    icon::{Icon, icon},
     learn::model::LandmarkModel,
     params::Params,
 };
-use std::sync::Arc;
+use std::{cell::OnceCell, sync::Arc};
 
 /// Most borders of one quad that are looked at, the outermost first.
 pub const MAX_BORDERS: usize = 6;
@@ -27,7 +31,23 @@ pub(crate) struct Sighting {
     /// The corners in that order.
     pub(crate) corners_px: Corners,
     /// What they enclose.
-    pub(crate) features: IconFeatures,
+    pub(crate) icon: Icon,
+    /// The icon's buckets.
+    pub(crate) buckets: Buckets,
+    points: OnceCell<PointSet>,
+}
+
+impl Sighting {
+    fn new(border: usize, rotation: usize, corners_px: Corners, icon: Icon, p: &Params) -> Self {
+        let buckets = Buckets::new(&icon, &p.recognise.correlation);
+        Self { border, rotation, corners_px, icon, buckets, points: OnceCell::new() }
+    }
+
+    /// The icon's points. Worked out when first asked for: most quads are out of reach by C^r alone.
+    pub(crate) fn points(&self, p: &Params) -> &PointSet {
+        let r = &p.recognise;
+        self.points.get_or_init(|| describe(&self.icon, &harris(&self.icon, &r.harris), &r.descriptor))
+    }
 }
 
 /// Every reading of `quad` whose icon can be cut: all borders, and all four rotations where upright is unsure.
@@ -36,11 +56,10 @@ pub(crate) fn sightings(image: &GrayImage, quad: &Quad, p: &Params) -> Vec<Sight
     let rotations = if quad.upright_ambiguous { 4 } else { 1 };
     let mut all = Vec::new();
     for (border, corners_px) in borders.enumerate() {
-        let Ok(icon) = icon(image, corners_px, &p.icon) else { continue };
-        let upright = features(icon, &p.recognise);
+        let Ok(upright) = icon(image, corners_px, &p.icon) else { continue };
         for rotation in 0..rotations {
-            let features = upright.rotated(rotation, &p.recognise);
-            all.push(Sighting { border, rotation, corners_px: corners_px.rotated(rotation), features });
+            let corners_px = corners_px.rotated(rotation);
+            all.push(Sighting::new(border, rotation, corners_px, upright.rotated(rotation), p));
         }
     }
     all
@@ -83,7 +102,8 @@ fn ratio(distance: f64, tau: f64) -> f64 {
     if tau > 0.0 { distance / tau } else { f64::INFINITY }
 }
 
-/// The `count` landmarks of least ratio, and every one with a ratio below 1, rising; of equal ones the lower id.
+/// The `count` landmarks of least ratio, and every one with a ratio below 1, rising; of equal ones the lower id. Where
+/// C^r decides or joins in and nothing comes within `verify_reach`, H^r is left infinite.
 pub(crate) fn nearest(
     sightings: &[Sighting],
     models: &ModelSet,
@@ -113,9 +133,10 @@ pub(crate) fn nearest(
     found.sort_by(|a, b| a.ratio(kind).total_cmp(&b.ratio(kind)));
     let accepted = found.iter().take_while(|n| n.ratio(kind) < 1.0).count();
     found.truncate(accepted.max(count));
-    for near in &mut found {
-        if kind != DistanceKind::Hausdorff {
-            near.hausdorff = least_hausdorff(&sightings[near.sighting].features, &near.model, p).0;
+    let reach = p.recognise.verdict.verify_reach.max(1.0);
+    if kind != DistanceKind::Hausdorff && found.first().is_some_and(|n| n.ratio(kind) < reach) {
+        for near in &mut found {
+            near.hausdorff = least_hausdorff(sightings[near.sighting].points(p), &near.model, p).0;
         }
     }
     found
@@ -137,7 +158,7 @@ fn nearest_by_correlation(
     let mut best = None;
     for (sighting, s) in sightings.iter().enumerate() {
         for (exemplar, e) in model.exemplars.iter().enumerate() {
-            if let Some(d) = correlation_within(&s.features.buckets, &e.buckets, rank, limit) {
+            if let Some(d) = correlation_within(&s.buckets, &e.buckets, rank, limit) {
                 limit = d;
                 best = Some((sighting, exemplar, d));
             }
@@ -156,27 +177,27 @@ fn nearest_by_correlation(
 fn nearest_by_points(sightings: &[Sighting], model: &Arc<LandmarkModel>, p: &Params) -> Option<Near> {
     let mut best: Option<(usize, usize, f64)> = None;
     for (sighting, s) in sightings.iter().enumerate() {
-        let (d, exemplar) = least_hausdorff(&s.features, model, p);
+        let (d, exemplar) = least_hausdorff(s.points(p), model, p);
         if d.is_finite() && best.is_none_or(|b| d < b.2) {
             best = Some((sighting, exemplar, d));
         }
     }
     let (sighting, exemplar, hausdorff) = best.filter(|_| model.hausdorff.tau > 0.0)?;
-    let features = &sightings[sighting].features;
+    let buckets = &sightings[sighting].buckets;
     let rank = p.recognise.correlation.rank();
     let correlation = model
         .exemplars
         .iter()
-        .filter_map(|e| correlation_within(&features.buckets, &e.buckets, rank, f64::INFINITY))
+        .filter_map(|e| correlation_within(buckets, &e.buckets, rank, f64::INFINITY))
         .fold(2.0, f64::min);
     Some(Near { model: Arc::clone(model), sighting, exemplar, correlation, hausdorff })
 }
 
 /// Least H^r over the exemplars, and which has it.
-pub(crate) fn least_hausdorff(icon: &IconFeatures, model: &LandmarkModel, p: &Params) -> (f64, usize) {
+pub(crate) fn least_hausdorff(points: &PointSet, model: &LandmarkModel, p: &Params) -> (f64, usize) {
     let mut best = (f64::INFINITY, 0);
     for (i, exemplar) in model.exemplars.iter().enumerate() {
-        let d = hausdorff(&icon.points, &exemplar.points, &p.recognise.hausdorff);
+        let d = hausdorff(points, &exemplar.points, &p.recognise.hausdorff);
         if d < best.0 {
             best = (d, i);
         }

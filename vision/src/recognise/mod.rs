@@ -83,7 +83,8 @@ pub struct Candidate {
     pub landmark: LandmarkId,
     /// C^r in [0, 2] (method 6.1).
     pub correlation: f64,
-    /// H^r in icon pixels times descriptor distance, infinite with too few points (method 6.2).
+    /// H^r in icon pixels times descriptor distance (method 6.2); infinite with too few points, and where C^r alone
+    /// keeps every landmark out of reach.
     pub hausdorff: f64,
     /// The deciding distance of the map's [`DistanceKind`].
     pub distance: f64,

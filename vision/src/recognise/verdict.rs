@@ -42,7 +42,7 @@ impl Default for VerdictParams {
             margin: 0.7,
             verify_reach: 1.5,
             verified_share: 0.8,
-            max_verified: 4,
+            max_verified: 2,
             align: AlignParams::default(),
         }
     }
@@ -122,7 +122,7 @@ fn verify(image: &GrayImage, sightings: &[Sighting], found: &mut [Judged], kind:
         };
         let model = &judged.near.model;
         let each = model.exemplars.iter().map(|e| correlation(&icon, e, &p.recognise.correlation));
-        let (correlation, hausdorff) = (each.fold(2.0, f64::min), least_hausdorff(&icon, model, p).0);
+        let (correlation, hausdorff) = (each.fold(2.0, f64::min), least_hausdorff(&icon.points, model, p).0);
         let near = Near { correlation, hausdorff, ..judged.near.clone() };
         let moved = Judged { near, moved: Some(corners_px) };
         // What was accepted where it stood is not lost by a move that fits worse.

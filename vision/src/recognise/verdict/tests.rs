@@ -142,8 +142,10 @@ fn nearest_equals_comparing_everything() {
         let mut expected: Vec<(f64, LandmarkId)> = SIX
             .iter()
             .map(|m| {
+                let seen: Vec<IconFeatures> =
+                    seen.iter().map(|s| features(s.icon.clone(), &PARAMS.recognise)).collect();
                 let least = |d: &dyn Fn(&IconFeatures, &IconFeatures) -> f64| {
-                    let pairs = seen.iter().flat_map(|s| m.exemplars.iter().map(move |e| (&s.features, e)));
+                    let pairs = seen.iter().flat_map(|s| m.exemplars.iter().map(move |e| (s, e)));
                     pairs.map(|(a, b)| d(a, b)).fold(f64::INFINITY, f64::min)
                 };
                 let r = &PARAMS.recognise;
