@@ -134,7 +134,7 @@ fn bilinear_gradient_meets_the_pixels() {
 #[test]
 fn thresholds_rise_with_the_noise() {
     // Flat apart from noise: its deviation is found, and no edge.
-    let p = EdgeParams { low: 3.0, high: 8.0, ..EdgeParams::default() };
+    let p = EdgeParams { low: 3.0, high: 8.0, noise_factors: [2.5, 6.0], ..EdgeParams::default() };
     for (sigma, seed) in [(2.0, 1), (4.0, 2), (8.0, 3)] {
         let image =
             polygon((160, 120), &rectangle((80.0, 60.0), (1.0, 1.0), 0.0), (100.0, 100.0), sigma, seed);
