@@ -50,9 +50,14 @@ async fn main() -> Result<(), anyhow::Error> {
     let arguments = Arguments::parse();
     let server = MapClient::new(&arguments.server)?;
     let map = arguments.map.as_str();
-    if let Err(error) = server.create_map(map, None).await {
-        // A map of that name may stay; anything else is a fault.
-        anyhow::ensure!(matches!(error, ClientError::Refused { status: 409, .. }), "{error}");
+    match server.create_map(map, None).await {
+        Ok(_) => println!("map {map}: new"),
+        // Somebody's map of that name stays and is added to: say so.
+        Err(ClientError::Refused { status: 409, .. }) => {
+            let there = server.map(map).await?;
+            println!("map {map}: there already with {} landmarks, adding to it", there.landmarks);
+        }
+        Err(error) => return Err(error.into()),
     }
 
     // 1. Landmarks and views.

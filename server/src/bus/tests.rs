@@ -153,3 +153,44 @@ async fn every_bad_frame_is_answered_and_the_server_goes_on() {
     assert_eq!(counts.rejected[&protos::Code::UnknownRobot], 1);
     running.stop().await;
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn presence_odometry_and_map_changes_pass() {
+    let running = running(scene::engine(&[Arc::new(MapSnapshot::empty("hall", 3))]), 1).await;
+    let mut events = running.engine.live.events();
+    let mut next = async |kind: &str| loop {
+        let event = tokio::time::timeout(WAIT, events.recv()).await.unwrap().unwrap();
+        if event.kind() == kind {
+            return event;
+        }
+    };
+    let robot = running.robot("r1").await;
+    next("presence").await;
+    assert_eq!(running.engine.live.alive().len(), 1);
+
+    robot.publish_odometry(&map::pose2::Pose2::new(1.0, 2.0, 0.1)).await.unwrap();
+    let scan = v1::Scan { ranges_m: vec![f32::NAN], max_range_m: f64::NAN, ..v1::Scan::default() };
+    robot.publish_scan(scan).await.unwrap();
+    // Odometry and scans have no answer: wait until both are counted.
+    let counted = async {
+        loop {
+            let (odometry, scans) = running.engine.motion.counts();
+            if (odometry.accepted, scans.rejected.len()) == (1, 1) {
+                return scans;
+            }
+            tokio::time::sleep(Duration::from_millis(5)).await;
+        }
+    };
+    let scans = tokio::time::timeout(WAIT, counted).await.unwrap();
+    assert_eq!(scans.rejected, [(protos::Code::Missing, 1)].into());
+
+    running.engine.snapshots.publish(Arc::new(MapSnapshot::empty("hall", 4)));
+    assert_eq!(next("map_changed").await.map(), "hall");
+    let answer = robot.recognise("front", plain(), WAIT).await.unwrap();
+    assert_eq!(answer.map_version, 4, "the next answer rests on the new version");
+
+    robot.close().await.unwrap();
+    next("presence").await;
+    assert!(running.engine.live.alive().is_empty());
+    running.stop().await;
+}
