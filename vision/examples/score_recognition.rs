@@ -7,10 +7,14 @@
 
 use nalgebra::{Matrix2, Point2};
 use serde_json::Value;
-use std::{collections::BTreeMap, error::Error, path::Path, sync::Arc};
+use std::{collections::BTreeMap, error::Error, path::Path, sync::Arc, time::Instant};
 use vision::{
-    detect::quads::{Corners, Quad, QuadKind},
+    detect::{
+        detect,
+        quads::{Corners, Quad, QuadKind},
+    },
     frame::GrayImage,
+    geometry::polygon::iou,
     learn::{
         model::{LandmarkModel, View, learn, refit_thresholds},
         synthesis::views,
@@ -19,6 +23,7 @@ use vision::{
     recognise::{
         DistanceKind, IconFeatures, LandmarkId, ModelSet, Recognition, features, verdict::recognise,
     },
+    trace::NoTrace,
 };
 
 /// Views generated from each photograph.
@@ -58,7 +63,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let only: Option<DistanceKind> =
         arguments.get(3).map(|k| serde_json::from_value(k.as_str().into())).transpose()?;
     let verbose = only.is_some();
-    let start = std::time::Instant::now();
+    let start = Instant::now();
     let truth: Value = serde_json::from_str(&std::fs::read_to_string(root.join("truth.json"))?)?;
     let taught = teach(root, &truth, &p)?;
     let queries = queries(root, &truth)?;
@@ -76,57 +81,128 @@ fn main() -> Result<(), Box<dyn Error>> {
         if only.is_some_and(|o| o != kind) {
             continue;
         }
-        let mut score = Score::default();
-        let start = std::time::Instant::now();
-        for q in &queries {
-            let v = recognise(&q.image, &q.quad, &everything, kind, &p);
-            let is = |id: LandmarkId| q.landmark.is_some_and(|l| same(l) == same(id.0));
-            let word = match (q.landmark, v.recognition) {
-                (Some(_), Recognition::Unique(id)) if is(id) => (&mut score.right, "right"),
-                (Some(_), Recognition::Unique(_)) => (&mut score.wrong, "WRONG"),
-                (Some(_), Recognition::Ambiguous(_)) => (&mut score.ambiguous, "ambiguous"),
-                (Some(_), Recognition::Unknown) => (&mut score.missed, "missed"),
-                (None, Recognition::Unique(_)) => (&mut score.accepted, "ACCEPTED"),
-                (None, _) => (&mut score.refused, "refused"),
-            };
-            *word.0 += 1;
-            if verbose {
-                print!("{kind:?} {} {:?} {} conf {:.2}", q.file, q.landmark, word.1, v.confidence);
-                for c in v.candidates.iter().take(3) {
-                    print!(
-                        " | {} C {:.3} H {:.2} r {:.2} {:?}",
-                        c.landmark.0, c.correlation, c.hausdorff, c.ratio, c.refusal
-                    );
-                }
-                println!();
-            }
-        }
+        let start = Instant::now();
+        let score = labelled(&queries, &everything, &same, (kind, verbose), &p);
         let ms = start.elapsed().as_secs_f64() * 1e3 / queries.len() as f64;
-        let (mut strangers, mut strangers_accepted) = (0, 0);
-        for q in &queries {
-            for (parity, half) in halves.iter().enumerate() {
-                if q.landmark.is_some_and(|l| same(l) % 2 == parity as u64) {
-                    continue;
-                }
-                strangers += 1;
-                let v = recognise(&q.image, &q.quad, half, kind, &p);
-                let accepted = matches!(v.recognition, Recognition::Unique(_));
-                strangers_accepted += usize::from(accepted);
-                if verbose && accepted {
-                    println!("HALF {kind:?} {} {:?} accepted {:?}", q.file, q.landmark, v.candidates[0]);
-                }
-            }
-        }
+        let (strangers, strangers_accepted) = strangers(&queries, &halves, &same, (kind, verbose), &p);
         println!(
             "{kind:?}: right {} wrong {} missed {} ambiguous {} | strangers: refused {} accepted {} | of {strangers} \
              strangers to a half {strangers_accepted} accepted | {ms:.1} ms a quad",
             score.right, score.wrong, score.missed, score.ambiguous, score.refused, score.accepted
         );
     }
+    let kind = only.unwrap_or_default();
+    detected(&queries, &everything, &same, kind, &p);
     for folder in arguments.iter().skip(4) {
-        random_strangers(Path::new(folder), &everything, only.unwrap_or_default(), &p)?;
+        random_strangers(Path::new(folder), &everything, kind, &p)?;
     }
     Ok(())
+}
+
+/// Every labelled quad with its true corners against all landmarks.
+fn labelled(
+    queries: &[Query],
+    models: &ModelSet,
+    same: &impl Fn(u64) -> u64,
+    (kind, verbose): (DistanceKind, bool),
+    p: &Params,
+) -> Score {
+    let mut score = Score::default();
+    for q in queries {
+        let v = recognise(&q.image, &q.quad, models, kind, p);
+        let is = |id: LandmarkId| q.landmark.is_some_and(|l| same(l) == same(id.0));
+        let word = match (q.landmark, v.recognition) {
+            (Some(_), Recognition::Unique(id)) if is(id) => (&mut score.right, "right"),
+            (Some(_), Recognition::Unique(_)) => (&mut score.wrong, "WRONG"),
+            (Some(_), Recognition::Ambiguous(_)) => (&mut score.ambiguous, "ambiguous"),
+            (Some(_), Recognition::Unknown) => (&mut score.missed, "missed"),
+            (None, Recognition::Unique(_)) => (&mut score.accepted, "ACCEPTED"),
+            (None, _) => (&mut score.refused, "refused"),
+        };
+        *word.0 += 1;
+        if verbose {
+            print!("{kind:?} {} {:?} {} conf {:.2}", q.file, q.landmark, word.1, v.confidence);
+            for c in v.candidates.iter().take(3) {
+                print!(
+                    " | {} C {:.3} H {:.2} r {:.2} {:?}",
+                    c.landmark.0, c.correlation, c.hausdorff, c.ratio, c.refusal
+                );
+            }
+            println!();
+        }
+    }
+    score
+}
+
+/// The same quads as strangers, each against the half of the landmarks that does not hold it: asked and accepted.
+fn strangers(
+    queries: &[Query],
+    halves: &[ModelSet; 2],
+    same: &impl Fn(u64) -> u64,
+    (kind, verbose): (DistanceKind, bool),
+    p: &Params,
+) -> (usize, usize) {
+    let (mut strangers, mut strangers_accepted) = (0, 0);
+    for q in queries {
+        for (parity, half) in halves.iter().enumerate() {
+            if q.landmark.is_some_and(|l| same(l) % 2 == parity as u64) {
+                continue;
+            }
+            strangers += 1;
+            let v = recognise(&q.image, &q.quad, half, kind, p);
+            let accepted = matches!(v.recognition, Recognition::Unique(_));
+            strangers_accepted += usize::from(accepted);
+            if verbose && accepted {
+                println!("HALF {kind:?} {} {:?} accepted {:?}", q.file, q.landmark, v.candidates[0]);
+            }
+        }
+    }
+    (strangers, strangers_accepted)
+}
+
+/// The same photographs with the quads that the detector finds. A detected quad belongs to the labelled one it
+/// overlaps most, if by half; borders within it may share less and are judged by what they say.
+fn detected(
+    queries: &[Query],
+    models: &ModelSet,
+    same: &impl Fn(u64) -> u64,
+    kind: DistanceKind,
+    p: &Params,
+) {
+    let mut images: Vec<Vec<&Query>> = Vec::new();
+    for q in queries {
+        match images.last_mut().filter(|last| last[0].file == q.file) {
+            Some(last) => last.push(q),
+            None => images.push(vec![q]),
+        }
+    }
+    let (mut known, mut found, mut quads, mut wrong) = (0, 0, 0, 0);
+    for labelled in images {
+        let facts = detect(&labelled[0].image, &p.detect, &mut NoTrace);
+        quads += facts.len();
+        let mut named = vec![false; labelled.len()];
+        for quad in &facts {
+            let v = recognise(&labelled[0].image, quad, models, kind, p);
+            let Recognition::Unique(id) = v.recognition else { continue };
+            let overlap = |q: &Query| iou(quad.corners_px.points(), q.quad.corners_px.points());
+            let nearest =
+                (0..labelled.len()).max_by(|a, b| overlap(labelled[*a]).total_cmp(&overlap(labelled[*b])));
+            let hit = nearest.filter(|i| overlap(labelled[*i]) > 0.3);
+            let right = hit.is_some_and(|i| labelled[i].landmark.is_some_and(|l| same(l) == same(id.0)));
+            match hit {
+                Some(i) if right => named[i] = true,
+                _ => {
+                    wrong += 1;
+                    println!("DETECTED WRONG {} {:?}", labelled[0].file, v.candidates[0]);
+                }
+            }
+        }
+        known += labelled.iter().filter(|q| q.landmark.is_some()).count();
+        found += named.iter().filter(|n| **n).count();
+    }
+    println!(
+        "{kind:?}, detected quads: {found} of {known} landmarks found, {wrong} wrong, {quads} quads asked"
+    );
 }
 
 /// Quads at random places of every image in `folder`: how many are taken for a landmark.

@@ -172,6 +172,8 @@ fn decide(
     (verdict.rotation, verdict.border) = (sightings[near.sighting].rotation, sightings[near.sighting].border);
     verdict.aligned_px = found[best].moved;
     let margin = margin(found, best, kind);
+    // Departs from method 10, which asks for a margin only where two or more are accepted: a runner-up just above its
+    // own threshold is as much reason for doubt as one just below.
     if margin < p.margin {
         verdict.recognition = Recognition::Unique(near.model.id);
         verdict.confidence = confidence(near.ratio(kind), margin);
