@@ -8,6 +8,9 @@ use serde::{Deserialize, Serialize};
 /// With fewer negatives than this the absolute cap counts as one of them.
 pub const FEW_NEGATIVES: usize = 100;
 
+/// Costs closer than this are equal: rounding must not move tau to the right.
+const COST_TIE: f64 = 1e-9;
+
 /// How tau is chosen.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -124,7 +127,7 @@ pub fn minimise(positives: &[f64], negatives: &[f64], weight: f64) -> Result<f64
             continue;
         }
         let cost = weight * below_negative / n_negative + 1.0 - below_positive / n_positive;
-        if cost < best_cost - f64::EPSILON {
+        if cost < best_cost - COST_TIE {
             (best_tau, best_cost) = (f64::midpoint(*d, next), cost);
         }
     }
@@ -320,15 +323,15 @@ mod tests {
             let least = candidates.iter().map(|t| cost(*t, &own, &others, weight)).fold(1.0, f64::min);
             match minimise(&own, &others, weight) {
                 Ok(tau) => {
-                    prop_assert!(cost(tau, &own, &others, weight) <= least + 1e-12);
+                    prop_assert!(cost(tau, &own, &others, weight) <= least + 1e-9);
                     // Leftmost: everything to the left is dearer.
                     for t in candidates.iter().filter(|t| **t < tau - 1e-9) {
-                        prop_assert!(cost(*t, &own, &others, weight) > least - 1e-12);
+                        prop_assert!(cost(*t, &own, &others, weight) > least + 1e-10);
                     }
                 }
                 Err(error) => {
                     prop_assert_eq!(error, ThresholdError::Overlap);
-                    prop_assert!(least >= 1.0 - 1e-12);
+                    prop_assert!(least >= 1.0 - 1e-9);
                 }
             }
         }
