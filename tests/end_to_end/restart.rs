@@ -17,7 +17,7 @@ const KILLS: u64 = 20;
 const MAP: &str = "hall";
 
 /// What the server has confirmed.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, Clone)]
 struct Journal {
     /// Landmarks with the numbers of their confirmed views.
     landmarks: BTreeMap<String, Vec<i64>>,
@@ -91,7 +91,8 @@ async fn nothing_acknowledged_is_lost_by_a_kill() {
         if kill == 0 {
             server.maps().create_map(MAP, None).await.expect("map");
         }
-        check(&server, &journal.lock().expect("journal"), next.load(Ordering::Relaxed)).await;
+        let confirmed = journal.lock().expect("journal").clone();
+        check(&server, &confirmed, next.load(Ordering::Relaxed)).await;
         let teachers = [(); 3].map(|()| tokio::spawn(teach(server.maps(), next.clone(), journal.clone())));
         // Spread over everything that teaching does; the number of the kill decides, not a clock's chance.
         tokio::time::sleep(Duration::from_millis(80 + 37 * kill % 300)).await;
@@ -103,7 +104,7 @@ async fn nothing_acknowledged_is_lost_by_a_kill() {
         }
     }
     let server = Child::start(data.path());
-    let journal = journal.lock().expect("journal");
+    let journal = journal.lock().expect("journal").clone();
     check(&server, &journal, next.load(Ordering::Relaxed)).await;
     assert!(
         journal.landmarks.len() as u64 > KILLS && journal.jobs.len() > 3,

@@ -8,24 +8,27 @@ use anyhow::{Context, bail};
 use clap::Args;
 use std::path::PathBuf;
 
-/// Runs the server: zenoh for robots, HTTP for people and programs, one SQLite file for everything that lasts.
-///
-/// Starts with no settings at all; then the page is at http://127.0.0.1:8080/, the API with its interactive
-/// documentation at http://127.0.0.1:8080/api/docs/, and robots connect to tcp/127.0.0.1:7447.
-///
-/// Teach a first landmark from a photograph of a picture on a wall:
-///
-///   curl -X POST localhost:8080/api/v1/maps -H 'content-type: application/json' -d '{"name": "office"}'
-///   curl -X POST localhost:8080/api/v1/maps/office/landmarks -H 'content-type: application/json' \
-///        -d '{"name": "poster", "size": {"width_m": 0.6, "height_m": 0.84}}'
-///   curl -X POST localhost:8080/api/v1/maps/office/landmarks/poster/views -F image=@photo.jpg
-///   curl -X POST localhost:8080/api/v1/maps/office/landmarks/poster/learn
-///   curl -X POST localhost:8080/api/v1/maps/office/recognise -F image=@other-photo.jpg
-///
-/// Settings come from defaults, then the file, then WAYMARK_... variables, then these options;
-/// server/config.example.toml lists all of them.
+/// What `--help` teaches.
+const HELP: &str = r#"Runs the server: zenoh for robots, HTTP for people and programs, one SQLite file for everything that lasts.
+
+Starts with no settings at all; then the page is at http://127.0.0.1:8080/, the API with its interactive
+documentation at http://127.0.0.1:8080/api/docs/, and robots connect to tcp/127.0.0.1:7447.
+
+Teach a first landmark from a photograph of a picture on a wall:
+
+  curl -X POST localhost:8080/api/v1/maps -H 'content-type: application/json' -d '{"name": "office"}'
+  curl -X POST localhost:8080/api/v1/maps/office/landmarks -H 'content-type: application/json' \
+       -d '{"name": "poster", "size": {"width_m": 0.6, "height_m": 0.84}}'
+  curl -X POST localhost:8080/api/v1/maps/office/landmarks/poster/views -F image=@photo.jpg
+  curl -X POST localhost:8080/api/v1/maps/office/landmarks/poster/learn
+  curl -X POST localhost:8080/api/v1/maps/office/recognise -F image=@other-photo.jpg
+
+Settings come from defaults, then the file, then WAYMARK_... variables, then these options;
+server/config.example.toml lists all of them."#;
+
+/// Runs the server until it is told to stop.
 #[derive(Debug, Args)]
-#[command(verbatim_doc_comment)]
+#[command(about = "Runs the server: zenoh for robots, HTTP for people and programs", long_about = HELP)]
 pub(super) struct Serve {
     /// Settings file, TOML.
     #[arg(long, env = "WAYMARK_CONFIG", value_name = "FILE")]

@@ -123,6 +123,7 @@ impl Snapshots {
     }
 
     /// Makes `map` the current version of its name. For the store, after the commit.
+    #[expect(clippy::needless_pass_by_value, reason = "the map is given away: nobody may change it any more")]
     pub fn publish(&self, map: Arc<MapSnapshot>) {
         let change = MapChange { map: map.name.clone(), version: Some(map.version) };
         self.world.rcu(|world| {

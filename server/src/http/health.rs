@@ -22,6 +22,7 @@ struct Health {
 
 /// What runs here.
 #[derive(Debug, Serialize, ToSchema)]
+#[expect(clippy::struct_field_names, reason = "they are the names in the JSON")]
 struct Version {
     /// `waymark`.
     name: &'static str,

@@ -35,6 +35,7 @@ struct NewLandmark {
 /// What changes. A field that is absent stays, one that is null is forgotten.
 #[derive(Debug, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
+#[expect(clippy::option_option, reason = "absent and null differ in a PATCH")]
 struct Changes {
     /// Width and height.
     #[serde(default, deserialize_with = "given")]
@@ -47,6 +48,7 @@ struct Changes {
 }
 
 /// Tells null from absent.
+#[expect(clippy::option_option, reason = "absent and null differ in a PATCH")]
 fn given<'de, D: Deserializer<'de>, T: Deserialize<'de>>(from: D) -> Result<Option<Option<T>>, D::Error> {
     Option::deserialize(from).map(Some)
 }

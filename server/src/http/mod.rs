@@ -1,6 +1,6 @@
 //! The HTTP face: administrators, teachers and pages. axum appears only here.
 //!
-//! `/api/v1`, JSON in snake_case, `application/problem+json` errors with a stable `code` and the `field`, lists in
+//! `/api/v1`, JSON with `snake_case` names, `application/problem+json` errors with a stable `code` and the `field`, lists in
 //! pages. Handlers parse, call the store, the jobs or the engine, and shape the answer; they decide nothing.
 
 mod error;

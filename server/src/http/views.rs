@@ -112,7 +112,7 @@ async fn add(
     landmarks::get(app.store.reads(), &map, &landmark).await?;
     let mut form = Form::read(&app, request, &["image", "corners", "whole_image"]).await?;
     let image = form.needed("image")?;
-    let extent = extent(form.optional("corners"), form.optional("whole_image"))?;
+    let extent = extent(form.optional("corners").as_ref(), form.optional("whole_image").as_ref())?;
     let max = app.config.limits.views;
     let new = app.clone().on_vision_thread(move |app| prepare(app, &image, &extent)).await??;
     let write =
@@ -121,15 +121,15 @@ async fn add(
     Ok((if created { StatusCode::CREATED } else { StatusCode::OK }, Json(row.into())))
 }
 
-fn extent(corners: Option<Bytes>, whole_image: Option<Bytes>) -> Result<Extent, ApiError> {
-    let whole = match whole_image.as_deref() {
+fn extent(corners: Option<&Bytes>, whole_image: Option<&Bytes>) -> Result<Extent, ApiError> {
+    let whole = match whole_image.map(|b| &b[..]) {
         None | Some(b"false") => false,
         Some(b"true") => true,
         Some(_) => return Err(ApiError::invalid("bad_value", "whole_image", "neither `true` nor `false`")),
     };
     match (corners, whole) {
         (Some(_), true) => Err(ApiError::invalid("bad_value", "whole_image", "not together with corners")),
-        (Some(corners), false) => Ok(Extent::Corners(extract::json(&corners, "corners")?)),
+        (Some(corners), false) => Ok(Extent::Corners(extract::json(corners, "corners")?)),
         (None, true) => Ok(Extent::Whole),
         (None, false) => Ok(Extent::Detect),
     }

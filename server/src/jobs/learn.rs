@@ -256,16 +256,14 @@ fn collect_negatives(
     let icons =
         each_of(&all, m.workers, reporter, (0.3, 0.4, "icons of the others"), |id| -> Vec<IconFeatures> {
             let prepare = |icon: &vision::icon::Icon| features(icon.clone(), &m.params.recognise);
-            match views.get(id) {
-                Some(views) => spread(views, count).map(|v| prepare(&v.icon)).collect(),
-                // Not in the lesson: its photographs and, where those are few, what its model remembers.
-                None => {
-                    let photographs = spread(&m.lessons[id], count).map(|l| prepare(&l.cut.icon));
-                    let learnt =
-                        m.snapshot.learnt.get(id).into_iter().flat_map(|l| l.model.exemplars.iter().cloned());
-                    photographs.chain(learnt).take(count.max(3)).collect()
-                }
+            if let Some(views) = views.get(id) {
+                return spread(views, count).map(|v| prepare(&v.icon)).collect();
             }
+            // Not in the lesson: its photographs and, where those are few, what its model remembers.
+            let photographs = spread(&m.lessons[id], count).map(|l| prepare(&l.cut.icon));
+            let learnt =
+                m.snapshot.learnt.get(id).into_iter().flat_map(|l| l.model.exemplars.iter().cloned());
+            photographs.chain(learnt).take(count).collect()
         })?;
     let mut negatives = Negatives::default();
     for (id, icons) in all.into_iter().zip(icons) {
