@@ -87,7 +87,7 @@ fn name_corners(
 }
 
 fn near_border(g: &Gradients, p: &Point2<f64>) -> bool {
-    let (width, height) = (g.width as f64, g.height as f64);
+    let (width, height) = (g.width() as f64, g.height() as f64);
     p.x < CLIP_PX || p.y < CLIP_PX || p.x > width - 1.0 - CLIP_PX || p.y > height - 1.0 - CLIP_PX
 }
 

@@ -1,10 +1,11 @@
 //! What the gradient planes say about a supposed side: which share of it an edge supports, and where that edge runs
 //! to a fraction of a pixel (method 3.6). Takes two points, gives a line with its variance; forms no hypotheses.
 
+use crate::frame::GrayImage;
 use nalgebra::{Point2, Vector2};
 
 /// Most samples taken along one side.
-const MAX_SAMPLES: usize = 96;
+pub const MAX_SAMPLES: usize = 96;
 /// Fewest samples taken along one side.
 const MIN_SAMPLES: usize = 12;
 /// Share of a side left out at both ends: near a corner the other side's gradient mixes in.
@@ -17,10 +18,8 @@ const MIN_SIGMA_PX: f64 = 0.2;
 /// The gradient planes of a frame, row-major, in grey levels of step height.
 #[derive(Debug, Clone, Copy)]
 pub struct Gradients<'a> {
-    /// Width in pixels.
-    pub width: usize,
-    /// Height in pixels.
-    pub height: usize,
+    /// The image they belong to.
+    pub image: &'a GrayImage,
     /// Derivative along u.
     pub gx: &'a [f32],
     /// Derivative along v.
@@ -28,34 +27,107 @@ pub struct Gradients<'a> {
 }
 
 impl Gradients<'_> {
+    /// Width in pixels.
+    pub fn width(&self) -> usize {
+        self.image.width()
+    }
+
+    /// Height in pixels.
+    pub fn height(&self) -> usize {
+        self.image.height()
+    }
+
     /// Bilinear gradient; none outside the image.
     fn sample(&self, u: f64, v: f64) -> Option<Vector2<f64>> {
-        let inside = u >= 0.0 && v >= 0.0 && u < (self.width - 1) as f64 && v < (self.height - 1) as f64;
+        let inside = u >= 0.0 && v >= 0.0 && u < (self.width() - 1) as f64 && v < (self.height() - 1) as f64;
         if !inside {
             return None;
         }
         let (u0, v0) = (u as usize, v as usize);
         let (a, b) = ((u - u0 as f64) as f32, (v - v0 as f64) as f32);
-        let i = v0 * self.width + u0;
+        let i = v0 * self.width() + u0;
         let at = |plane: &[f32]| {
             let top = plane[i] * (1.0 - a) + plane[i + 1] * a;
-            let bottom = plane[i + self.width] * (1.0 - a) + plane[i + self.width + 1] * a;
+            let bottom = plane[i + self.width()] * (1.0 - a) + plane[i + self.width() + 1] * a;
             f64::from(top * (1.0 - b) + bottom * b)
         };
         Some(Vector2::new(at(self.gx), at(self.gy)))
     }
+    /// Gradient at the nearest pixel; none outside the image.
+    fn nearest(&self, p: &Point2<f64>) -> Option<Vector2<f64>> {
+        let (u, v) = (p.x + 0.5, p.y + 0.5);
+        if !(u >= 0.0 && v >= 0.0 && u < self.width() as f64 && v < self.height() as f64) {
+            return None;
+        }
+        let i = v as usize * self.width() + u as usize;
+        Some(Vector2::new(f64::from(self.gx[i]), f64::from(self.gy[i])))
+    }
+
     /// Whether the gradient at the nearest pixel is a step of at least `min_step` across a line with this normal, to
     /// within about 35 degrees; none outside the image.
     fn follows(&self, p: &Point2<f64>, normal: &Vector2<f64>, min_step: f64) -> Option<bool> {
-        let (u, v) = (p.x + 0.5, p.y + 0.5);
-        if !(u >= 0.0 && v >= 0.0 && u < self.width as f64 && v < self.height as f64) {
-            return None;
-        }
-        let i = v as usize * self.width + u as usize;
-        let (gx, gy) = (f64::from(self.gx[i]), f64::from(self.gy[i]));
-        let step = (gx * normal.x + gy * normal.y).abs();
-        Some(step >= min_step && step * step >= MIN_COS * MIN_COS * (gx * gx + gy * gy))
+        let gradient = self.nearest(p)?;
+        let step = gradient.dot(normal).abs();
+        Some(step >= min_step && step * step >= MIN_COS * MIN_COS * gradient.norm_squared())
     }
+}
+
+/// Median grey level on a line beside a side: `offset_px` to its left as seen on screen, hence outside a polygon that
+/// is walked clockwise; negative inside. The ends of the side are left out. None outside the image.
+pub fn level_beside(g: &Gradients, from: &Point2<f64>, to: &Point2<f64>, offset_px: f64) -> Option<f64> {
+    const SAMPLES: usize = 24;
+    let side = to - from;
+    let normal = Vector2::new(side.y, -side.x) / side.norm().max(f64::MIN_POSITIVE);
+    let mut levels = Vec::with_capacity(SAMPLES);
+    for i in 0..SAMPLES {
+        let p = from + side * (0.1 + 0.8 * (i as f64 + 0.5) / SAMPLES as f64) + normal * offset_px;
+        let inside = p.x >= 0.0 && p.y >= 0.0 && p.x < g.width() as f64 && p.y < g.height() as f64;
+        if inside {
+            levels.push(g.image.sample(p.x, p.y));
+        }
+    }
+    levels.sort_by(f32::total_cmp);
+    levels.get(levels.len() / 2).map(|l| f64::from(*l))
+}
+
+/// Share of samples on a line beside a side, as in [`level_beside`], where the image is not plain.
+pub fn roughness(g: &Gradients, from: &Point2<f64>, to: &Point2<f64>, offset_px: f64, min_step: f64) -> f64 {
+    const SAMPLES: usize = 24;
+    let side = to - from;
+    let normal = Vector2::new(side.y, -side.x) / side.norm().max(f64::MIN_POSITIVE);
+    let rough = (0..SAMPLES).filter(|i| {
+        let p = from + side * (0.1 + 0.8 * (*i as f64 + 0.5) / SAMPLES as f64) + normal * offset_px;
+        g.nearest(&p).is_some_and(|v| v.norm_squared() >= min_step * min_step)
+    });
+    rough.count() as f64 / SAMPLES as f64
+}
+
+/// How much edge runs along the side between two distances from it, left as seen on screen for positive ones: the
+/// strongest step per sample that follows the side, as a share of `own`, at most 1, averaged over the samples.
+pub fn edge_between(
+    g: &Gradients,
+    side: (&Point2<f64>, &Point2<f64>),
+    range_px: (i32, i32),
+    own: f64,
+) -> f64 {
+    const SAMPLES: usize = 24;
+    let along = side.1 - side.0;
+    let normal = Vector2::new(along.y, -along.x) / along.norm().max(f64::MIN_POSITIVE);
+    let own = own.max(1.0);
+    let strongest = |i: usize| {
+        let foot = side.0 + along * (0.05 + 0.9 * (i as f64 + 0.5) / SAMPLES as f64);
+        let mut best: f64 = 0.0;
+        for offset in range_px.0..range_px.1 {
+            if let Some(v) = g.nearest(&(foot + normal * f64::from(offset))) {
+                let step = v.dot(&normal).abs();
+                if step > best && step * step >= MIN_COS * MIN_COS * v.norm_squared() {
+                    best = step;
+                }
+            }
+        }
+        (best / own).min(1.0)
+    };
+    (0..SAMPLES).map(strongest).sum::<f64>() / SAMPLES as f64
 }
 
 /// How a side is searched.
@@ -65,6 +137,8 @@ pub struct Search {
     pub reach_px: f64,
     /// Smallest step height of an edge point, in grey levels.
     pub min_step: f64,
+    /// Most samples along a side; [`MAX_SAMPLES`] for the best line.
+    pub samples: usize,
 }
 
 /// An edge point: distance along the side, offset across it, signed step height.
@@ -115,12 +189,12 @@ pub fn measure(g: &Gradients, from: &Point2<f64>, to: &Point2<f64>, search: Sear
     let side = to - from;
     let length = side.norm();
     let nothing = SideEvidence { support: 0.0, agreement: 0.0, strength: 0.0, line: None };
-    if !length.is_finite() || length < 1.0 || g.width < 2 || g.height < 2 {
+    if !length.is_finite() || length < 1.0 || g.width() < 2 || g.height() < 2 {
         return nothing;
     }
     let direction = side / length;
     let normal = Vector2::new(direction.y, -direction.x);
-    let count = ((length / 2.0) as usize).clamp(MIN_SAMPLES, MAX_SAMPLES);
+    let count = ((length / 2.0) as usize).clamp(MIN_SAMPLES, search.samples.clamp(MIN_SAMPLES, MAX_SAMPLES));
     let mut seen = 0_usize;
     let mut points = Vec::with_capacity(count);
     for i in 0..count {
@@ -142,8 +216,8 @@ pub fn measure(g: &Gradients, from: &Point2<f64>, to: &Point2<f64>, search: Sear
 }
 
 /// A coarse look: share of samples along the side with an edge within about 1.5 px that follows it. Samples outside
-/// the image count as neither.
-pub fn quick_support(g: &Gradients, from: &Point2<f64>, to: &Point2<f64>, min_step: f64) -> f64 {
+/// the image count as neither. Gives up with 0 once `enough` is out of reach.
+pub fn quick_support(g: &Gradients, from: &Point2<f64>, to: &Point2<f64>, min_step: f64, enough: f64) -> f64 {
     const SAMPLES: usize = 24;
     let side = to - from;
     let length = side.norm();
@@ -154,12 +228,17 @@ pub fn quick_support(g: &Gradients, from: &Point2<f64>, to: &Point2<f64>, min_st
     let normal = Vector2::new(direction.y, -direction.x);
     let (mut seen, mut supported) = (0_usize, 0_usize);
     for i in 0..SAMPLES {
-        let share = CORNER_SHARE + (1.0 - 2.0 * CORNER_SHARE) * (i as f64 + 0.5) / SAMPLES as f64;
+        // Every seventh in turn: a bad side shows before all samples are taken.
+        let share =
+            CORNER_SHARE + (1.0 - 2.0 * CORNER_SHARE) * ((i * 7 % SAMPLES) as f64 + 0.5) / SAMPLES as f64;
         let foot = from + side * share;
         let Some(here) = g.follows(&foot, &normal, min_step) else { continue };
         seen += 1;
         let beside = |offset: f64| g.follows(&(foot + normal * offset), &normal, min_step) == Some(true);
         supported += usize::from(here || beside(-1.0) || beside(1.0) || beside(-2.0) || beside(2.0));
+        if ((seen - supported) as f64) > (1.0 - enough) * SAMPLES as f64 {
+            return 0.0;
+        }
     }
     if seen == 0 { 0.0 } else { supported as f64 / seen as f64 }
 }

@@ -86,7 +86,7 @@ pub fn hypotheses(segments: &[EdgeSegment], g: &Gradients, p: &HypothesisParams)
     }
     found.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.sides.cmp(&y.1.sides)));
     found.truncate(MAX_HYPOTHESES);
-    let size = (g.width, g.height);
+    let size = (g.width(), g.height());
     found
         .into_iter()
         .filter(|(_, seed)| plausible(&seed.corners_px, size))
@@ -108,8 +108,11 @@ fn longest(segments: &[EdgeSegment]) -> Vec<usize> {
 /// Support of the worst side, if every side has enough.
 fn supported(seed: &QuadSeed, g: &Gradients, p: &HypothesisParams) -> Option<f64> {
     let mut worst: f64 = 1.0;
-    for i in 0..4 {
-        let support = quick_support(g, &seed.corners_px[i], &seed.corners_px[(i + 1) % 4], p.min_step);
+    // The side without a segment is the likeliest to fail.
+    let first = seed.sides.iter().position(Option::is_none).unwrap_or(0);
+    for i in (0..4).map(|i| (i + first) % 4) {
+        let (from, to) = (&seed.corners_px[i], &seed.corners_px[(i + 1) % 4]);
+        let support = quick_support(g, from, to, p.min_step, p.min_support);
         if support < p.min_support {
             return None;
         }

@@ -5,6 +5,10 @@ use crate::{
     params::DetectParams,
     trace::{Stage, Trace},
 };
+use edges::EdgeMap;
+use evidence::Gradients;
+use quads::{Grouping, Quad};
+use segments::EdgeSegment;
 
 mod deriche;
 mod thinning;
@@ -21,10 +25,12 @@ mod profiles;
 pub mod relaxation;
 pub mod grouping;
 pub mod three_sided;
+pub mod pyramid;
 pub mod evidence;
 pub mod corners;
 pub mod hypotheses;
 pub mod selection;
+pub mod border_model;
 pub mod border;
 pub mod quads;
 #[cfg(test)]
@@ -36,7 +42,81 @@ mod scenes;
 pub const MAX_QUADS: usize = 64;
 
 /// Finds the quads of an image, best first; ties by corners. At most [`MAX_QUADS`]. Same image, same quads.
-pub fn detect(image: &GrayImage, p: &DetectParams, trace: &mut impl Trace) -> Vec<quads::Quad> {
+pub fn detect(image: &GrayImage, p: &DetectParams, trace: &mut impl Trace) -> Vec<Quad> {
+    let mut quads = match p.quads.grouping {
+        Grouping::Relaxation => by_relaxation(image, p, trace),
+        Grouping::Hypotheses => by_search(image, p, trace),
+    };
+    quads.truncate(MAX_QUADS);
+    trace.quads(&quads);
+    trace.finished(Stage::Quads);
+    quads
+}
+
+/// The paper's way: pairs by similarity, both relaxations, sets of three sides.
+fn by_relaxation(image: &GrayImage, p: &DetectParams, trace: &mut impl Trace) -> Vec<Quad> {
+    let (edges, segments) = traced_segments(image, p, trace);
+    let candidates = similarity::pairs(&segments, image, &p.similarity);
+    let matched = grouping::match_pairs(&segments, &candidates, p.similarity.min_score, &p.relaxation);
+    let pairs: Vec<_> = matched.iter().map(|i| candidates[*i].clone()).collect();
+    trace.pairs(&pairs);
+    trace.finished(Stage::Pairs);
+    let gradients = Gradients { image, gx: edges.gx(), gy: edges.gy() };
+    quads::quads(&segments, &pairs, &gradients, p)
+}
+
+/// The search, on one scale or several. Coordinates of the trace are those of the working scale.
+fn by_search(image: &GrayImage, p: &DetectParams, trace: &mut impl Trace) -> Vec<Quad> {
+    let factor = pyramid::working_factor(image, p.quads.working_side_px);
+    let reduced = (factor > 1).then(|| pyramid::reduce(image, factor));
+    let work = reduced.as_ref().unwrap_or(image);
+    let (rated, edges) = candidates(work, p, trace);
+    let gradients = Gradients { image: work, gx: edges.gx(), gy: edges.gy() };
+    let found = selection::resolve(rated, &p.quads);
+    let tolerance = p.relaxation.pair_tolerance_px;
+    let quads = border::canonical(found, p.quads.nested_iou, p.quads.min_side_support, tolerance);
+    let sharp = quads.into_iter().map(|q| selection::sharpen(q, &gradients, &p.quads));
+    sharp.filter_map(|q| q.scaled(factor as f64)).collect()
+}
+
+/// Everything the search proposes on the scales of an image, rated, not yet chosen from; and the finest edge map.
+pub fn candidates(
+    work: &GrayImage,
+    p: &DetectParams,
+    trace: &mut impl Trace,
+) -> (Vec<selection::Rated>, EdgeMap) {
+    let (edges, segments) = traced_segments(work, p, trace);
+    let gradients = Gradients { image: work, gx: edges.gx(), gy: edges.gy() };
+    let seeds = hypotheses::hypotheses(&segments, &gradients, &p.quads.hypotheses);
+    trace.finished(Stage::Pairs);
+    let mut rated = selection::rate(&seeds, &gradients, &p.quads);
+    let mut scale = 1;
+    for _ in 1..p.quads.scales.clamp(1, MAX_SCALES) {
+        scale *= 2;
+        if work.width() / scale < MIN_LEVEL_SIDE_PX || work.height() / scale < MIN_LEVEL_SIDE_PX {
+            break;
+        }
+        let level = pyramid::reduce(work, scale);
+        let edges = edges::edges(&level, &p.edges);
+        let segments = segments::segments(&chains::chains(&edges, &p.chains), &edges, &p.segments);
+        let gradients = Gradients { image: &level, gx: edges.gx(), gy: edges.gy() };
+        let seeds = hypotheses::hypotheses(&segments, &gradients, &p.quads.hypotheses);
+        let coarse = selection::rate(&seeds, &gradients, &p.quads);
+        rated.extend(coarse.into_iter().filter_map(|r| r.scaled(scale as f64)));
+    }
+    (rated, edges)
+}
+
+/// Most scales of the search.
+pub const MAX_SCALES: usize = 4;
+/// No scale is smaller than this.
+const MIN_LEVEL_SIDE_PX: usize = 80;
+
+fn traced_segments(
+    image: &GrayImage,
+    p: &DetectParams,
+    trace: &mut impl Trace,
+) -> (EdgeMap, Vec<EdgeSegment>) {
     let edges = edges::edges(image, &p.edges);
     trace.edges(&edges);
     trace.finished(Stage::Edges);
@@ -46,16 +126,5 @@ pub fn detect(image: &GrayImage, p: &DetectParams, trace: &mut impl Trace) -> Ve
     let segments = segments::segments(&chains, &edges, &p.segments);
     trace.segments(&segments);
     trace.finished(Stage::Segments);
-    let candidates = similarity::pairs(&segments, image, &p.similarity);
-    let matched = grouping::match_pairs(&segments, &candidates, p.similarity.min_score, &p.relaxation);
-    let pairs: Vec<_> = matched.iter().map(|i| candidates[*i].clone()).collect();
-    trace.pairs(&pairs);
-    trace.finished(Stage::Pairs);
-    let gradients =
-        evidence::Gradients { width: image.width(), height: image.height(), gx: edges.gx(), gy: edges.gy() };
-    let mut quads = quads::quads(&segments, &pairs, &gradients, p);
-    quads.truncate(MAX_QUADS);
-    trace.quads(&quads);
-    trace.finished(Stage::Quads);
-    quads
+    (edges, segments)
 }

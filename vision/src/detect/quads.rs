@@ -2,12 +2,12 @@
 
 use super::{
     border::canonical,
+    border_model::BorderModel,
     corners::refine,
-    evidence::{Gradients, Search},
+    evidence::{Gradients, MAX_SAMPLES, Search},
     grouping::{QuadSeed, match_quads},
-    hypotheses::{HypothesisParams, hypotheses},
+    hypotheses::HypothesisParams,
     segments::EdgeSegment,
-    selection::select,
     similarity::SegmentPair,
     three_sided::three_sided,
 };
@@ -156,6 +156,10 @@ pub enum Grouping {
 pub struct QuadParams {
     /// The paper's grouping or the search.
     pub grouping: Grouping,
+    /// The search works on an image reduced by a whole factor to about this longer side; 0 for full size.
+    pub working_side_px: usize,
+    /// Scales of the search, each half the one before: a coarse one sees through ragged, ornate borders.
+    pub scales: usize,
     /// The search.
     pub hypotheses: HypothesisParams,
     /// Share of each side that edges must support for the outermost border of a group to be its quad.
@@ -166,10 +170,10 @@ pub struct QuadParams {
     pub refit_reach_px: f64,
     /// Smallest step height of an edge point, grey levels.
     pub min_step: f64,
-    /// A nested quad must have this support on every side to unmask the outer one as a shadow or bare wall.
-    pub min_inner_support: f64,
-    /// Sides weaker than this share of the inner ones make an outer quad that shares sides a shadow or bare wall.
-    pub weak_extension: f64,
+    /// Smallest score of a quad of the search.
+    pub min_score: f64,
+    /// What makes a border, for the search.
+    pub border_model: BorderModel,
     /// Whether to report sets of three sides.
     pub three_sided: bool,
     /// Smallest c5 of a set of three sides.
@@ -180,13 +184,15 @@ impl Default for QuadParams {
     fn default() -> Self {
         Self {
             grouping: Grouping::default(),
+            working_side_px: 640,
+            scales: 2,
             hypotheses: HypothesisParams::default(),
             min_side_support: 0.6,
             nested_iou: 0.6,
             refit_reach_px: 2.0,
             min_step: 6.0,
-            min_inner_support: 0.7,
-            weak_extension: 0.35,
+            min_score: 0.6,
+            border_model: BorderModel::default(),
             three_sided: true,
             min_three_sided_closing: 0.5,
         }
@@ -195,17 +201,7 @@ impl Default for QuadParams {
 
 /// Quads from the matched pairs of pass 1: pass 2, three-sided sets, refitted corners, canonical border. Best first.
 pub fn quads(segments: &[EdgeSegment], pairs: &[SegmentPair], g: &Gradients, p: &DetectParams) -> Vec<Quad> {
-    if p.quads.grouping == Grouping::Hypotheses {
-        let seeds = hypotheses(segments, g, &p.quads.hypotheses);
-        let found = select(&seeds, g, &p.quads);
-        return canonical(
-            found,
-            p.quads.nested_iou,
-            p.quads.min_side_support,
-            p.relaxation.pair_tolerance_px,
-        );
-    }
-    let size = (g.width, g.height);
+    let size = (g.width(), g.height());
     let full = match_quads(segments, pairs, size, &p.relaxation);
     let mut found: Vec<Quad> = full.iter().filter_map(|s| quad(s, QuadKind::Full, g, &p.quads)).collect();
     if p.quads.three_sided {
@@ -225,7 +221,8 @@ pub fn quads(segments: &[EdgeSegment], pairs: &[SegmentPair], g: &Gradients, p: 
 /// Refits a seed on the gradient planes. The score is the similarity of its pairs times the support of its worst
 /// side (method 3.6); of three sides, the worst of those that were seen.
 fn quad(seed: &QuadSeed, kind: QuadKind, g: &Gradients, p: &QuadParams) -> Option<Quad> {
-    let refined = refine(g, &seed.corners_px, Search { reach_px: p.refit_reach_px, min_step: p.min_step })?;
+    let search = Search { reach_px: p.refit_reach_px, min_step: p.min_step, samples: MAX_SAMPLES };
+    let refined = refine(g, &seed.corners_px, search)?;
     let mut support = refined.support();
     let side_support = support;
     if kind == QuadKind::ThreeSided {

@@ -2,8 +2,9 @@
 //! stay together, quads that partly cross may not. The choice of the border within a group is `border`'s.
 
 use super::{
+    border_model::{FEATURES, border_features},
     corners::{RefinedQuad, refine},
-    evidence::{Gradients, Search},
+    evidence::{Gradients, MAX_SAMPLES, Search},
     grouping::QuadSeed,
     quads::{Quad, QuadKind, QuadParams},
 };
@@ -11,21 +12,35 @@ use crate::geometry::polygon::{self, Relation};
 use nalgebra::Point2;
 
 /// Most seeds that are refitted, the best first.
-pub const MAX_REFITTED: usize = 400;
+pub const MAX_REFITTED: usize = 160;
+/// Most rated quads that are compared with each other, those of most weight first.
+pub const MAX_RATED: usize = 160;
+/// Samples along a side while quads are compared; the chosen ones are refitted with more.
+const RATING_SAMPLES: usize = 48;
 /// Corners closer than this make two seeds the same.
-const SAME_CORNER_PX: f64 = 3.0;
+const SAME_CORNER_PX: f64 = 2.0;
 
-/// A refitted quad with its place in the queue.
-struct Rated {
-    quad: Quad,
-    weight: f64,
-    strength: [f64; 4],
+/// A refitted quad with what its score rests on.
+#[derive(Debug, Clone)]
+pub struct Rated {
+    /// Corners, support and score.
+    pub quad: Quad,
+    /// See [`border_features`].
+    pub features: [f64; FEATURES],
+    /// Which of two contradicting quads goes first: the border model's opinion.
+    pub rank: f64,
+}
+
+impl Rated {
+    /// The same in an image larger by `factor`.
+    pub fn scaled(&self, factor: f64) -> Option<Self> {
+        Some(Self { quad: self.quad.scaled(factor)?, ..self.clone() })
+    }
 }
 
 /// How the sides of two quads lie that are named from the corners that fit best: for each side of `a` the side of
 /// `b` that it faces, and whether both lie on one line.
 struct Facing {
-    other: [usize; 4],
     shared: [bool; 4],
 }
 
@@ -33,13 +48,12 @@ impl Facing {
     fn new(a: &[Point2<f64>; 4], b: &[Point2<f64>; 4]) -> Self {
         let gap = |shift: usize| (0..4).map(|i| (a[i] - b[(i + shift) % 4]).norm()).sum::<f64>();
         let shift = (0..4).min_by(|x, y| gap(*x).total_cmp(&gap(*y))).unwrap_or(0);
-        let other = std::array::from_fn(|i| (i + shift) % 4);
         let shared = std::array::from_fn(|i| {
             let (from, side, j) = (a[i], a[(i + 1) % 4] - a[i], (i + shift) % 4);
             let off = |q: &Point2<f64>| side.perp(&(q - from)).abs() / side.norm();
             off(&b[j]) <= SHARED_SIDE_PX && off(&b[(j + 1) % 4]) <= SHARED_SIDE_PX
         });
-        Self { other, shared }
+        Self { shared }
     }
 
     fn count(&self) -> usize {
@@ -47,47 +61,13 @@ impl Facing {
     }
 }
 
-/// Whether `outer` is `inner` plus a shadow or a stretch of bare wall: it contains it, shares sides with it, and
-/// either what it adds to a shared side or all the sides of its own are much weaker than the inner one's.
-fn extends_weakly(outer: &Rated, inner: &Rated, p: &QuadParams) -> bool {
-    let (a, b) = (outer.quad.corners_px.points(), inner.quad.corners_px.points());
-    if outer.quad.corners_px.area_px2() <= inner.quad.corners_px.area_px2()
-        || inner.quad.side_support.iter().any(|s| *s < p.min_inner_support)
-        || polygon::relation(a, b, SHARED_SIDE_PX) != Relation::Contains
-    {
-        return false;
-    }
-    let facing = Facing::new(a, b);
-    if !(1..4).contains(&facing.count()) {
-        return false;
-    }
-    let length = |c: &[Point2<f64>; 4], i: usize| (c[(i + 1) % 4] - c[i]).norm();
-    // A weak frame is weak all round; a shadow or a stray line is weak next to the sides it borrowed.
-    let borrowed = (0..4).filter(|i| facing.shared[*i]).map(|i| inner.strength[facing.other[i]]);
-    let borrowed = borrowed.sum::<f64>() / facing.count() as f64;
-    let mut own_weak = true;
-    for i in 0..4 {
-        let j = facing.other[i];
-        let weak = p.weak_extension * inner.strength[j];
-        if facing.shared[i] {
-            let (long, short) = (length(a, i), length(b, j));
-            let added = long - short;
-            let strength = (outer.strength[i] * long - inner.strength[j] * short) / added.max(1.0);
-            if added > 0.1 * short && strength < weak {
-                return true;
-            }
-        } else {
-            own_weak &= outer.strength[i] < weak.min(p.weak_extension * borrowed);
-        }
-    }
-    own_weak
-}
-
+/// Smallest side of a quad.
+const MIN_SIDE_PX: f64 = 15.0;
 /// Lines closer than this count as the same side.
 const SHARED_SIDE_PX: f64 = 4.0;
 
-/// Refits the seeds, best first, and keeps those that do not cross a better one.
-pub fn select(seeds: &[QuadSeed], g: &Gradients, p: &QuadParams) -> Vec<Quad> {
+/// Refits the seeds, best first, and drops those whose sides the gradient does not support.
+pub fn rate(seeds: &[QuadSeed], g: &Gradients, p: &QuadParams) -> Vec<Rated> {
     let mut order: Vec<&QuadSeed> = seeds.iter().collect();
     order.sort_by(|a, b| (b.fit * size(&b.corners_px)).total_cmp(&(a.fit * size(&a.corners_px))));
     let mut seen: Vec<[Point2<f64>; 4]> = Vec::new();
@@ -100,18 +80,36 @@ pub fn select(seeds: &[QuadSeed], g: &Gradients, p: &QuadParams) -> Vec<Quad> {
             continue;
         }
         seen.push(seed.corners_px);
-        let search = Search { reach_px: p.refit_reach_px + 1.0, min_step: p.min_step };
+        let search =
+            Search { reach_px: p.refit_reach_px + 1.0, min_step: p.min_step, samples: RATING_SAMPLES };
         let Some(rough) = refine(g, &seed.corners_px, search) else { continue };
-        let search = Search { reach_px: p.refit_reach_px, min_step: p.min_step };
+        if rough.min_support() < p.min_side_support {
+            continue;
+        }
+        let search = Search { reach_px: p.refit_reach_px, ..search };
         let Some(refined) = refine(g, rough.corners_px.points(), search) else { continue };
-        rated.extend(rate(&refined, p));
+        if rated.iter().any(|r| same(r.quad.corners_px.points(), refined.corners_px.points())) {
+            continue;
+        }
+        rated.extend(rate_one(&refined, g, p));
     }
-    rated.sort_by(|a, b| b.weight.total_cmp(&a.weight).then(super::border::by_corners(&a.quad, &b.quad)));
-    let keep: Vec<bool> = rated.iter().map(|a| !rated.iter().any(|b| extends_weakly(a, b, p))).collect();
-    let mut keep = keep.into_iter();
-    rated.retain(|_| keep.next().unwrap_or(true));
-    let mut kept: Vec<Quad> = Vec::new();
+    rated
+}
+
+/// Keeps the quads that contradict no better one: that cross none and share an edge with none.
+pub fn resolve(mut rated: Vec<Rated>, p: &QuadParams) -> Vec<Quad> {
+    rated.retain(|r| r.quad.score >= p.min_score);
+    rated.sort_by(|a, b| b.rank.total_cmp(&a.rank).then(super::border::by_corners(&a.quad, &b.quad)));
+    let mut different: Vec<Rated> = Vec::new();
     for r in rated {
+        let corners = r.quad.corners_px.points();
+        if different.len() < MAX_RATED && !different.iter().any(|d| same(d.quad.corners_px.points(), corners))
+        {
+            different.push(r);
+        }
+    }
+    let mut kept: Vec<Quad> = Vec::new();
+    for r in different {
         let corners = r.quad.corners_px.points();
         let free = kept.iter().all(|k| {
             let other = k.corners_px.points();
@@ -138,26 +136,41 @@ fn same(a: &[Point2<f64>; 4], b: &[Point2<f64>; 4]) -> bool {
     (0..4).any(|shift| (0..4).all(|i| near(&a[i], &b[(i + shift) % 4])))
 }
 
-fn rate(refined: &RefinedQuad, p: &QuadParams) -> Option<Rated> {
-    let worst = refined.min_support();
-    if worst < p.min_side_support || refined.corners_px.min_side_px() < 15.0 {
+/// Refits a chosen quad with all samples. One that was seen on a coarser scale only may lose its edges here: then it
+/// stays as it was.
+pub fn sharpen(quad: Quad, g: &Gradients, p: &QuadParams) -> Quad {
+    let search = Search { reach_px: p.refit_reach_px, min_step: p.min_step, samples: MAX_SAMPLES };
+    match refine(g, quad.corners_px.points(), search) {
+        Some(refined) if refined.min_support() >= p.min_side_support => Quad {
+            corners_px: refined.corners_px,
+            corner_covariance_px2: refined.covariance_px2,
+            side_support: refined.support(),
+            side_clipped: refined.clipped,
+            upright_ambiguous: refined.upright_ambiguous,
+            ..quad
+        },
+        _ => quad,
+    }
+}
+
+fn rate_one(refined: &RefinedQuad, g: &Gradients, p: &QuadParams) -> Option<Rated> {
+    if refined.min_support() < p.min_side_support || refined.corners_px.min_side_px() < MIN_SIDE_PX {
         return None;
     }
+    let features = border_features(refined, g);
+    let rank = p.border_model.rank(&features);
     let support = refined.support();
     let agreement: f64 = refined.sides.iter().map(|s| s.agreement).sum::<f64>() / 4.0;
-    let mean = support.iter().sum::<f64>() / 4.0;
-    let score = worst * mean * agreement;
-    let weight = score * size(refined.corners_px.points());
+    let score = refined.min_support() * (support.iter().sum::<f64>() / 4.0) * agreement;
     let quad = Quad {
         corners_px: refined.corners_px,
         corner_covariance_px2: refined.covariance_px2,
-        side_support: support,
+        side_support: refined.support(),
         side_clipped: refined.clipped,
         score,
         kind: QuadKind::Full,
         upright_ambiguous: refined.upright_ambiguous,
         alternates: Vec::new(),
     };
-    let strength = std::array::from_fn(|i| refined.sides[i].strength);
-    Some(Rated { quad, weight, strength })
+    Some(Rated { quad, features, rank })
 }
