@@ -112,3 +112,75 @@ async fn a_job_ends_once() {
     assert_eq!(jobs::get(store.reads(), job.id).await.unwrap().state, "done");
     assert!(jobs::open(store.reads()).await.unwrap().is_empty());
 }
+
+/// A model of one view of random grey levels, stored.
+async fn store_model(store: &Store, landmark: i64, params: &vision::params::Params) {
+    use vision::{detect::quads::Corners, icon::Icon, learn::model, recognise::LandmarkId};
+    let side = params.icon.size;
+    let pixels = (0..side * side).map(|i| ((i * i * 31 + i * 7) % 251) as f32).collect();
+    let view = model::View {
+        icon: Icon::new(side, pixels, 1.0).unwrap(),
+        corners_px: Corners::try_from([[0.0, 0.0], [90.0, 0.0], [90.0, 90.0], [0.0, 90.0]]).unwrap(),
+        image_size_px: [91, 91],
+        generated: false,
+    };
+    let id = LandmarkId(landmark as u64);
+    let model = model::learn(id, &[view.clone(), view], &[], params).unwrap();
+    let new = models::NewModel {
+        landmark: id,
+        bytes: model.to_bytes(),
+        params_hash: model.params_hash,
+        summary: landmarks::ModelSummary {
+            active: false,
+            reasons: "[]".into(),
+            facts: "{}".into(),
+            views: 2,
+            generated_views: 0,
+            learnt_ms: 0,
+        },
+    };
+    let write = store.write(move |tx| {
+        Box::pin(async move {
+            assert!(models::put(tx, 1, &new).await?);
+            maps::bump(tx, 1).await
+        })
+    });
+    write.await.unwrap();
+}
+
+#[tokio::test]
+async fn damaged_and_outdated_models_are_named_and_not_used() {
+    use vision::recognise::LandmarkId;
+    let dir = tempfile::tempdir().unwrap();
+    let config = config(dir.path());
+    let (store, task) = Store::open(&config).await.unwrap();
+    store.write(|tx| Box::pin(maps::create(tx, "a", DistanceKind::Both, 2))).await.unwrap();
+    for name in ["sound", "damaged"] {
+        let none = landmarks::Measures::default();
+        let made = store.write(move |tx| Box::pin(landmarks::create(tx, "a", name, none, 5))).await.unwrap();
+        store_model(&store, made.id, &config.params).await;
+    }
+    assert_eq!(store.snapshots().get("a").unwrap().learnt.len(), 2);
+    // One byte in the middle of the blob, and the digest as it was.
+    let damage = "UPDATE models SET model = CAST(substr(model, 1, 500) || x'00ff' || substr(model, 503) AS BLOB) WHERE landmark_id = 2";
+    let write = store.write(move |tx| {
+        Box::pin(async move {
+            sqlx::query(damage).execute(&mut tx.conn).await.map(drop).map_err(StoreError::at("damage"))
+        })
+    });
+    write.await.unwrap();
+    task.close().await;
+
+    let (store, task) = Store::open(&config).await.unwrap();
+    let map = store.snapshots().get("a").unwrap();
+    assert_eq!(map.learnt.keys().copied().collect::<Vec<_>>(), [LandmarkId(1)]);
+    assert!(map.quarantined[&LandmarkId(2)].contains("damaged"), "{:?}", map.quarantined);
+    task.close().await;
+
+    let mut raw = RawConfig { data: dir.path().to_owned(), ..RawConfig::default() };
+    raw.algorithm.icon.size += 1;
+    let (store, _task) = Store::open(&Config::try_from(raw).unwrap()).await.unwrap();
+    let map = store.snapshots().get("a").unwrap();
+    assert!(map.learnt.is_empty());
+    assert!(map.quarantined[&LandmarkId(1)].contains("parameters"), "{:?}", map.quarantined);
+}
