@@ -1,6 +1,14 @@
 //! The `waymark` command line: one file per command.
 
+mod bench;
+mod demo;
+mod detect;
+pub(crate) mod evaluate;
+pub(crate) mod pictures;
+pub(crate) mod scratch;
+mod screen;
 mod serve;
+mod teach;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -19,20 +27,55 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// A server, a simulated corridor and robots that drive and are localised, all in this program.
+    ///
+    /// A first drive teaches the posters, then robots drive and send frames over zenoh. Watch it at the printed
+    /// address. Ends with a summary; exit status 1 if there was a false match.
+    Demo(demo::Args),
     Serve(serve::Serve),
+    /// The quads of pictures; no server needed.
+    ///
+    /// A picture that cannot be read is one line on standard error and exit status 1; the others are still done.
+    Detect(detect::Args),
+    /// Make and list the maps of a running server.
+    #[command(subcommand)]
+    Map(teach::MapCommand),
+    /// Make robots known to a running server.
+    #[command(subcommand)]
+    Robot(teach::RobotCommand),
+    /// Teach a landmark to a running server from photographs.
+    ///
+    /// The server finds the one dominant quad in each photograph (or takes the whole picture), learns, and says
+    /// whether the landmark is in use or which gate it failed.
+    Learn(teach::LearnArgs),
+    /// Ask a running server what is in photographs.
+    Recognise(teach::RecogniseArgs),
+    /// The paper's experiments on labelled pictures: tables for people, JSON for programs.
+    #[command(subcommand)]
+    Evaluate(evaluate::Command),
+    /// What each stage of the pipeline costs on this machine.
+    Bench(bench::Args),
 }
 
 /// Runs the program.
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
-    start_log(cli.log.as_deref());
-    let done = match cli.command {
-        Command::Serve(serve) => run(serve.run()),
+    start_log(cli.log.as_deref(), &cli.command);
+    let done = match &cli.command {
+        Command::Demo(args) => run(demo::run(args)),
+        Command::Serve(serve) => run(serve.clone().run()).map(|()| ExitCode::SUCCESS),
+        Command::Detect(args) => detect::run(args),
+        Command::Map(command) => run(teach::map(command)).map(|()| ExitCode::SUCCESS),
+        Command::Robot(command) => run(teach::robot(command)).map(|()| ExitCode::SUCCESS),
+        Command::Learn(args) => run(teach::learn(args)),
+        Command::Recognise(args) => run(teach::recognise(args)),
+        Command::Evaluate(command) => evaluate::run(command).map(|()| ExitCode::SUCCESS),
+        Command::Bench(args) => bench::run(args).map(|()| ExitCode::SUCCESS),
     };
     match done {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(code) => code,
         Err(error) => {
-            eprintln!("waymark: {error:#}");
+            screen::complain(&format!("waymark: {error:#}"));
             ExitCode::FAILURE
         }
     }
@@ -43,7 +86,9 @@ fn run<T>(work: impl Future<Output = anyhow::Result<T>>) -> anyhow::Result<T> {
 }
 
 /// Logs go to stderr: stdout belongs to results.
-fn start_log(filter: Option<&str>) {
-    let filter = tracing_subscriber::EnvFilter::builder().parse_lossy(filter.unwrap_or("info,zenoh=warn"));
+fn start_log(filter: Option<&str>, command: &Command) {
+    // A server tells of its life; the other commands have their own words.
+    let usual = if matches!(command, Command::Serve(_)) { "info,zenoh=warn" } else { "warn,zenoh=error" };
+    let filter = tracing_subscriber::EnvFilter::builder().parse_lossy(filter.unwrap_or(usual));
     tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
 }

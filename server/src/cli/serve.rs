@@ -27,7 +27,7 @@ Settings come from defaults, then the file, then WAYMARK_... variables, then the
 server/config.example.toml lists all of them."#;
 
 /// Runs the server until it is told to stop.
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 #[command(about = "Runs the server: zenoh for robots, HTTP for people and programs", long_about = HELP)]
 pub(super) struct Serve {
     /// Settings file, TOML.

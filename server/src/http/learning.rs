@@ -100,6 +100,9 @@ impl Job {
             "running" => JobState::Running,
             _ => JobState::Queued,
         };
+        // The row is committed with the models, before they are published: until then the job is still at work.
+        let published = progress.is_none();
+        let state = if state == JobState::Done && !published { JobState::Running } else { state };
         let open = matches!(state, JobState::Queued | JobState::Running);
         let progress = progress.filter(|_| open);
         Self {

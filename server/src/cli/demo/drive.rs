@@ -1,0 +1,221 @@
+//! The demo's second part: robots drive, send frames and odometry over zenoh, and are told where they are.
+
+use super::{Args, MAP};
+use crate::{
+    RunningServer,
+    cli::{pictures, screen},
+};
+use anyhow::Context as _;
+use client::{
+    Capture, MapClient, RobotClient, RobotOptions,
+    v1::{Answer, Verdict},
+};
+use map::pose2::Pose2;
+use protos::Name;
+use sim::{
+    building::Building,
+    drive::DriveParams,
+    robot::{Robot, RobotParams, Sighting},
+    truth::{FrameTruth, ViewState},
+};
+use std::{sync::Arc, time::Duration};
+use tokio::time::Instant;
+use vision::geometry::polygon;
+
+const CAMERA: &str = "front";
+/// A recognition is true when its quad overlaps the landmark's true outline by this much.
+const IOU_TRUE: f64 = 0.5;
+/// Views smaller than this are not counted as ones that should be recognised.
+const MIN_SIDE_PX: f64 = 30.0;
+/// Longest wait for an answer: then the frame counts as unanswered.
+const ANSWER_TIMEOUT: Duration = Duration::from_secs(3);
+
+/// The pose that a frame led to follows its answer within this time.
+const POSE_WAIT: Duration = Duration::from_millis(20);
+
+/// What all robots lived through.
+#[derive(Debug, Default)]
+pub(super) struct Record {
+    pub(super) robots: usize,
+    pub(super) frames: usize,
+    pub(super) answers: usize,
+    pub(super) landmark_views: usize,
+    pub(super) recognitions: usize,
+    pub(super) false_matches: usize,
+    pub(super) corrections: u64,
+    pub(super) position_errors_m: Vec<f64>,
+    pub(super) odometry_errors_m: Vec<f64>,
+    pub(super) ages_ms: Vec<f64>,
+}
+
+/// Lets every robot drive to its end.
+pub(super) async fn drive(
+    building: &Arc<Building>,
+    server: &RunningServer,
+    args: &Args,
+) -> anyhow::Result<Record> {
+    let maps = MapClient::new(&format!("http://{}", server.http_addr))?;
+    let taught: Vec<String> =
+        maps.landmarks(MAP).await?.into_iter().filter(|l| l.status == "active").map(|l| l.name).collect();
+    let taught = Arc::new(taught);
+    let mut tasks = Vec::new();
+    for number in 0..args.robots {
+        let name = format!("robot-{}", number + 1);
+        maps.put_robot(&name, MAP).await?;
+        let params = RobotParams {
+            drive: DriveParams {
+                seed: args.seed.wrapping_mul(1000) + u64::from(number) + 1,
+                start_m: 3.0 * f64::from(number),
+                reverse: number % 2 == 1,
+                legs: args.legs,
+                rate_hz: args.rate_hz,
+                ..DriveParams::default()
+            },
+            ..RobotParams::default()
+        };
+        let robot = Robot::new(building.clone(), &params);
+        let options = RobotOptions::new(&server.zenoh_endpoint, super::FLEET, &name);
+        let journey = Journey {
+            robot: Name::new(name.as_str())?,
+            name,
+            client: RobotClient::connect(&options).await?,
+            live: server.live.clone(),
+            taught: taught.clone(),
+            period: Duration::from_secs_f64(1.0 / args.rate_hz),
+            record: Record { robots: 1, ..Record::default() },
+            fixed: false,
+        };
+        tasks.push(tokio::spawn(journey.run(robot)));
+    }
+    let mut all = Record::default();
+    for task in tasks {
+        all.add(task.await.context("a robot's task")??);
+    }
+    Ok(all)
+}
+
+struct Journey {
+    robot: Name,
+    name: String,
+    client: RobotClient,
+    live: Arc<crate::engine::live::LiveHub>,
+    taught: Arc<Vec<String>>,
+    period: Duration,
+    record: Record,
+    fixed: bool,
+}
+
+impl Journey {
+    async fn run(mut self, mut robot: Robot) -> anyhow::Result<Record> {
+        let camera = *robot.camera().intrinsics();
+        let mut poses = self.client.poses();
+        let mut next = Instant::now();
+        loop {
+            // Rendering is heavy: off the runtime.
+            let (seen, back) = tokio::task::spawn_blocking(move || {
+                let seen = robot.next();
+                (seen, robot)
+            })
+            .await?;
+            robot = back;
+            let Some(sighting) = seen else { break };
+            tokio::time::sleep_until(next).await;
+            next = Instant::now().max(next) + self.period;
+            let step = &sighting.step;
+            self.live.truth(&self.robot, MAP, step.map_from_robot);
+            self.client.publish_odometry(&step.odom_from_robot).await?;
+            let capture = Capture::encoded(pictures::jpeg(&sighting.frame.image)?)?
+                .with_intrinsics(&camera)
+                .with_mounting(&step.robot_from_camera)
+                .with_odometry(&step.odom_from_robot);
+            self.record.frames += 1;
+            let Ok(answer) = self.client.recognise(CAMERA, capture, ANSWER_TIMEOUT).await else { continue };
+            self.record.answers += 1;
+            self.score(&answer, &sighting);
+            // The odometry brought one pose, a fix may bring a second: the last one counts.
+            tokio::time::sleep(POSE_WAIT).await;
+            let mut last = None;
+            while let Ok(pose) = poses.try_recv() {
+                last = Some(pose);
+            }
+            if let Some(pose) = last {
+                self.compare(&pose, step.map_from_robot, step.odom_from_robot);
+            }
+            self.report();
+        }
+        self.client.close().await?;
+        Ok(self.record)
+    }
+
+    fn score(&mut self, answer: &Answer, sighting: &Sighting) {
+        self.record.ages_ms.push(answer.age_ms);
+        let truth = &sighting.frame.truth;
+        self.record.landmark_views += truth
+            .landmarks
+            .iter()
+            .filter(|l| {
+                l.state == ViewState::Full && l.min_side_px() >= MIN_SIDE_PX && self.taught.contains(&l.name)
+            })
+            .count();
+        for quad in answer.quads.iter().filter(|q| q.verdict() == Verdict::Unique) {
+            if is_true(&quad.landmark, quad, truth) {
+                self.record.recognitions += 1;
+            } else {
+                self.record.false_matches += 1;
+                screen::complain(&format!(
+                    "{}: false match {} in frame {}",
+                    self.name, quad.landmark, answer.seq
+                ));
+            }
+        }
+    }
+
+    fn compare(&mut self, pose: &client::v1::RobotPose, truth: Pose2, odometry: Pose2) {
+        let Some(estimate) = pose.map_from_robot.as_ref().and_then(|p| p.pose.as_ref()) else { return };
+        self.fixed |= pose.corrections > 0;
+        self.record.corrections = self.record.corrections.max(pose.corrections);
+        if self.fixed {
+            let error = |x_m: f64, y_m: f64| (x_m - truth.x_m).hypot(y_m - truth.y_m);
+            self.record.position_errors_m.push(error(estimate.x_m, estimate.y_m));
+            self.record.odometry_errors_m.push(error(odometry.x_m, odometry.y_m));
+        }
+    }
+
+    /// A line every hundred frames: the terminal shows that it lives.
+    fn report(&self) {
+        let r = &self.record;
+        if r.frames.is_multiple_of(50) {
+            let error = r
+                .position_errors_m
+                .last()
+                .map_or("not localised yet".to_owned(), |e| format!("{e:.2} m off"));
+            let odometry =
+                r.odometry_errors_m.last().map_or(String::new(), |e| format!(" (odometry alone {e:.2} m)"));
+            screen::complain(&format!(
+                "{}: {} frames, {} recognitions, {} false, {error}{odometry}",
+                self.name, r.frames, r.recognitions, r.false_matches
+            ));
+        }
+    }
+}
+
+fn is_true(name: &str, quad: &client::v1::QuadAnswer, truth: &FrameTruth) -> bool {
+    let Some(landmark) = truth.landmark(name) else { return false };
+    crate::cli::evaluate::recognition::corners_of(quad)
+        .is_some_and(|c| polygon::iou(c.points(), landmark.corners_px.points()) >= IOU_TRUE)
+}
+
+impl Record {
+    fn add(&mut self, other: Record) {
+        self.robots += other.robots;
+        self.frames += other.frames;
+        self.answers += other.answers;
+        self.landmark_views += other.landmark_views;
+        self.recognitions += other.recognitions;
+        self.false_matches += other.false_matches;
+        self.corrections += other.corrections;
+        self.position_errors_m.extend(other.position_errors_m);
+        self.odometry_errors_m.extend(other.odometry_errors_m);
+        self.ages_ms.extend(other.ages_ms);
+    }
+}

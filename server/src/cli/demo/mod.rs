@@ -1,0 +1,102 @@
+//! `waymark demo`: a server, a simulated corridor, a first drive that teaches, then robots that are localised.
+//! Everything goes the way it goes outside: lessons over HTTP, frames over zenoh. Only the building is simulated.
+
+mod drive;
+mod lesson;
+mod summary;
+
+use super::{scratch, screen};
+use crate::{
+    Server,
+    config::{Config, RawConfig},
+};
+use anyhow::Context as _;
+use sim::building::Building;
+use std::{net::TcpListener, path::PathBuf, process::ExitCode, sync::Arc};
+
+/// Name of the demo's map.
+const MAP: &str = "corridor";
+/// As the settings have it.
+const FLEET: &str = "default";
+/// Where the page is when nobody else listens there.
+const HTTP: &str = "127.0.0.1:8080";
+
+/// `waymark demo`.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
+    /// Robots that drive at the same time.
+    #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=8))]
+    robots: u32,
+    /// Frames a second of each robot.
+    #[arg(long, default_value_t = 4.0, value_parser = rate)]
+    rate_hz: f64,
+    /// Times that each robot drives the length of the corridor.
+    #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=100))]
+    legs: u32,
+    /// The building, its pictures and all noise follow from it.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Where the page listens [default: 127.0.0.1:8080, or a free port if that is taken].
+    #[arg(long)]
+    http: Option<String>,
+    /// Keep the server and its map in this folder afterwards [default: a temporary folder, removed].
+    #[arg(long, value_name = "DIR")]
+    data: Option<PathBuf>,
+    /// Keep serving the page after the summary, until Ctrl-C.
+    #[arg(long)]
+    stay: bool,
+    /// End with the summary as one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+fn rate(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(hz) if (0.2..=30.0).contains(&hz) => Ok(hz),
+        _ => Err("a number from 0.2 to 30".to_owned()),
+    }
+}
+
+/// Runs the demo.
+pub(crate) async fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    let scratch = scratch::Folder::new("demo").context("a temporary folder")?;
+    let data = args.data.clone().unwrap_or_else(|| scratch.path().to_owned());
+    let server = Server::start(settings(args, data)?).await?;
+    let url = format!("http://{}/", server.http_addr);
+    screen::complain(&format!("Waymark demo. Watch it at {url}"));
+
+    let building = Arc::new(Building::corridor(args.seed));
+    let taught = lesson::teach(&building, &server, args.seed).await?;
+    screen::complain(&format!(
+        "First drive: {} walls, {} of {} landmarks in use, learnt from {} views; in {} looks the poster was not found, \
+         {} views did not agree with the others.",
+        taught.walls,
+        taught.active,
+        taught.landmarks,
+        taught.views,
+        taught.views_missed,
+        taught.views_left_out
+    ));
+    let record = drive::drive(&building, &server, args).await?;
+    let summary = summary::summarise(&taught, &record);
+    if args.json {
+        screen::say(&serde_json::to_string(&summary)?);
+    } else {
+        screen::say(&summary.table());
+    }
+    if args.stay {
+        screen::complain(&format!("The page stays at {url} until Ctrl-C."));
+        tokio::signal::ctrl_c().await.context("Ctrl-C")?;
+    }
+    server.stop().await;
+    Ok(if summary.false_matches == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+fn settings(args: &Args, data: PathBuf) -> anyhow::Result<Config> {
+    let http = args.http.clone().unwrap_or_else(|| {
+        // Somebody else may serve there: then any free port will do, it is printed.
+        if TcpListener::bind(HTTP).is_ok() { HTTP.to_owned() } else { "127.0.0.1:0".to_owned() }
+    });
+    let raw = RawConfig { data, http, zenoh: "tcp/127.0.0.1:0".to_owned(), ..RawConfig::default() };
+    Ok(Config::try_from(raw)?)
+}

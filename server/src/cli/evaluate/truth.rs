@@ -1,0 +1,159 @@
+//! The evaluation format: a folder with `truth.json` and pictures (see docs/EVALUATION.md). Read once, checked here.
+
+use serde::Deserialize;
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
+use vision::detect::quads::{Corners, CornersError};
+
+/// Why a data set cannot be scored.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum TruthError {
+    #[error("cannot read {path}")]
+    Read { path: PathBuf, source: std::io::Error },
+    #[error("{path} is not in the evaluation format")]
+    Parse { path: PathBuf, source: serde_json::Error },
+    #[error("{path}: labels of {file}")]
+    Corners { path: PathBuf, file: String, source: CornersError },
+}
+
+/// How much of a labelled quad can be seen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum QuadState {
+    #[default]
+    Full,
+    Truncated,
+    Occluded,
+}
+
+impl QuadState {
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Full => "full",
+            Self::Truncated => "truncated",
+            Self::Occluded => "occluded",
+        }
+    }
+}
+
+/// One labelled quad.
+#[derive(Debug, Clone)]
+pub(crate) struct TruthQuad {
+    /// The start corner may be any where the set's own notes say so.
+    pub(crate) corners: Corners,
+    /// `None`: a stranger, not among those taught.
+    pub(crate) landmark: Option<String>,
+    pub(crate) state: QuadState,
+}
+
+/// One picture with its labels.
+#[derive(Debug, Clone)]
+pub(crate) struct TruthImage {
+    pub(crate) path: PathBuf,
+    pub(crate) file: String,
+    pub(crate) stratum: String,
+    pub(crate) quads: Vec<TruthQuad>,
+    /// No other real quad is in the picture.
+    pub(crate) quads_complete: bool,
+    /// A crop: one landmark fills the whole picture.
+    pub(crate) whole_image: bool,
+}
+
+/// A data set.
+#[derive(Debug, Clone)]
+pub(crate) struct Truth {
+    pub(crate) name: String,
+    pub(crate) images: Vec<TruthImage>,
+    /// Pictures to teach from: file and landmark; the whole picture is the landmark.
+    pub(crate) teach: Vec<(PathBuf, String)>,
+    same: BTreeMap<String, String>,
+}
+
+impl Truth {
+    /// Reads `folder/truth.json`.
+    pub(crate) fn read(folder: &Path) -> Result<Self, TruthError> {
+        let path = folder.join("truth.json");
+        let text = std::fs::read(&path).map_err(|source| TruthError::Read { path: path.clone(), source })?;
+        let raw: RawTruth = serde_json::from_slice(&text)
+            .map_err(|source| TruthError::Parse { path: path.clone(), source })?;
+        let images =
+            raw.images.into_iter().map(|image| image.checked(folder, &path)).collect::<Result<_, _>>()?;
+        // One picture under several names: each name stands for the least of its group.
+        let mut same = BTreeMap::new();
+        for group in raw.same {
+            let Some(least) = group.iter().min().cloned() else { continue };
+            for name in group {
+                same.insert(name, least.clone());
+            }
+        }
+        let teach = raw.teach.into_iter().map(|t| (folder.join(t.file), t.landmark)).collect();
+        Ok(Self { name: raw.name, images, teach, same })
+    }
+
+    /// Whether two names mean the same picture.
+    pub(crate) fn same_landmark(&self, a: &str, b: &str) -> bool {
+        let canonical = |name: &str| self.same.get(name).map_or(name.to_owned(), Clone::clone);
+        canonical(a) == canonical(b)
+    }
+}
+
+#[derive(Deserialize)]
+struct RawTruth {
+    name: String,
+    #[serde(default)]
+    teach: Vec<RawTeach>,
+    #[serde(default)]
+    same: Vec<Vec<String>>,
+    images: Vec<RawImage>,
+}
+
+#[derive(Deserialize)]
+struct RawTeach {
+    file: String,
+    landmark: String,
+}
+
+#[derive(Deserialize)]
+struct RawImage {
+    file: String,
+    #[serde(default)]
+    stratum: String,
+    #[serde(default)]
+    quads: Vec<RawQuad>,
+    #[serde(default)]
+    quads_complete: bool,
+    #[serde(default)]
+    whole_image: bool,
+}
+
+#[derive(Deserialize)]
+struct RawQuad {
+    corners: [[f64; 2]; 4],
+    landmark: Option<String>,
+    #[serde(default)]
+    state: QuadState,
+}
+
+impl RawImage {
+    fn checked(self, folder: &Path, path: &Path) -> Result<TruthImage, TruthError> {
+        let mut quads = Vec::with_capacity(self.quads.len());
+        for quad in self.quads {
+            let corners = Corners::try_from(quad.corners).map_err(|source| TruthError::Corners {
+                path: path.to_owned(),
+                file: self.file.clone(),
+                source,
+            })?;
+            quads.push(TruthQuad { corners, landmark: quad.landmark, state: quad.state });
+        }
+        Ok(TruthImage {
+            path: folder.join(&self.file),
+            file: self.file,
+            stratum: if self.stratum.is_empty() { "all".to_owned() } else { self.stratum },
+            quads,
+            quads_complete: self.quads_complete,
+            whole_image: self.whole_image,
+        })
+    }
+}

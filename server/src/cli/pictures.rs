@@ -1,0 +1,39 @@
+//! Picture files in, grey images out, and the other way round for the demo's robots.
+
+use crate::engine::decode::{ImageLimits, decode_upload};
+use image::ImageEncoder as _;
+use std::{fs::File, io::Read as _, path::Path};
+use vision::frame::GrayImage;
+
+/// Quality of the demo's JPEG frames: a VGA frame stays below one zenoh batch.
+const JPEG_QUALITY: u8 = 85;
+
+/// Why a picture file cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum PictureError {
+    #[error("{0}")]
+    Read(#[from] std::io::Error),
+    #[error("{0}")]
+    Refused(String),
+}
+
+/// Reads and decodes a PNG or JPEG file. No more of it is read than the upload limit allows.
+pub(crate) fn read(path: &Path) -> Result<GrayImage, PictureError> {
+    let limits = ImageLimits::UPLOAD;
+    let mut bytes = Vec::new();
+    // One byte more than allowed is enough for the decoder to refuse it.
+    File::open(path)?.take(limits.bytes as u64 + 1).read_to_end(&mut bytes)?;
+    decode_upload(&bytes, limits).map_err(|refused| PictureError::Refused(refused.detail))
+}
+
+/// A grey image as JPEG.
+pub(crate) fn jpeg(image: &GrayImage) -> Result<Vec<u8>, image::ImageError> {
+    let mut out = Vec::new();
+    image::codecs::jpeg::JpegEncoder::new_with_quality(&mut out, JPEG_QUALITY).write_image(
+        image.data(),
+        image.width() as u32,
+        image.height() as u32,
+        image::ExtendedColorType::L8,
+    )?;
+    Ok(out)
+}

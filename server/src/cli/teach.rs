@@ -1,0 +1,279 @@
+//! Commands against a running server: `map`, `robot`, `learn`, `recognise`.
+
+use super::screen;
+use client::{
+    ClientError, MapClient,
+    lessons::{Job, Size},
+    map::Extent,
+    v1::{Answer, Verdict},
+};
+use std::{path::PathBuf, process::ExitCode, time::Duration};
+use vision::{frame::Intrinsics, recognise::DistanceKind};
+
+/// Longest wait for a lesson.
+const LESSON_TIMEOUT: Duration = Duration::from_hours(2);
+
+/// Which server.
+#[derive(Debug, Clone, clap::Args)]
+pub(crate) struct ServerArgs {
+    /// Address of the server's HTTP interface.
+    #[arg(long, env = "WAYMARK_SERVER", default_value = "http://127.0.0.1:8080")]
+    server: String,
+    /// Print the server's answer as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// `waymark map`.
+#[derive(Debug, clap::Subcommand)]
+pub(crate) enum MapCommand {
+    /// Make a map.
+    Create {
+        /// Lower-case letters, digits, `_` and `-`, up to 64.
+        name: String,
+        /// The distance that decides in this map.
+        #[arg(long, value_parser = distance)]
+        distance: Option<DistanceKind>,
+        #[command(flatten)]
+        server: ServerArgs,
+    },
+    /// List the maps.
+    List {
+        #[command(flatten)]
+        server: ServerArgs,
+    },
+}
+
+/// `waymark robot`.
+#[derive(Debug, clap::Subcommand)]
+pub(crate) enum RobotCommand {
+    /// Make a robot known, or give it another map. Frames of unknown robots are rejected.
+    Add {
+        /// Lower-case letters, digits, `_` and `-`, up to 64.
+        name: String,
+        /// The map it drives in.
+        #[arg(long)]
+        map: String,
+        #[command(flatten)]
+        server: ServerArgs,
+    },
+    /// List the robots.
+    List {
+        #[command(flatten)]
+        server: ServerArgs,
+    },
+}
+
+/// `waymark learn`.
+#[derive(Debug, clap::Args)]
+pub(crate) struct LearnArgs {
+    /// The map.
+    #[arg(long)]
+    map: String,
+    /// The landmark; made if it does not exist.
+    #[arg(long)]
+    landmark: String,
+    /// Its width and height in metres, such as 0.60x0.84; without it there is recognition but no pose.
+    #[arg(long, value_parser = size)]
+    size: Option<Size>,
+    /// The whole picture is the landmark (a scan, a cut-out). Without it the server looks for the one dominant quad.
+    #[arg(long)]
+    whole_image: bool,
+    /// Warped, dimmed and blurred views made of each photograph; left out, the server chooses by the number of
+    /// photographs. A landmark learnt from generated views is recognised less surely than one seen from many sides.
+    #[arg(long)]
+    generated_views: Option<u32>,
+    /// Photographs of the landmark, PNG or JPEG.
+    #[arg(required = true)]
+    images: Vec<PathBuf>,
+    #[command(flatten)]
+    server: ServerArgs,
+}
+
+/// `waymark recognise`.
+#[derive(Debug, clap::Args)]
+pub(crate) struct RecogniseArgs {
+    /// The map.
+    #[arg(long)]
+    map: String,
+    /// Camera for poses: fx,fy,cx,cy in pixels.
+    #[arg(long, value_parser = camera)]
+    camera: Option<Intrinsics>,
+    /// Photographs, PNG or JPEG.
+    #[arg(required = true)]
+    images: Vec<PathBuf>,
+    #[command(flatten)]
+    server: ServerArgs,
+}
+
+pub(crate) fn distance(text: &str) -> Result<DistanceKind, String> {
+    serde_json::from_value(serde_json::Value::from(text))
+        .map_err(|error| format!("{error}; one of: both, correlation, hausdorff"))
+}
+
+fn numbers<const N: usize>(text: &str, separator: char) -> Option<[f64; N]> {
+    let parts: Option<Vec<f64>> =
+        text.split(separator).map(|part| part.trim().parse().ok().filter(|v: &f64| v.is_finite())).collect();
+    parts?.try_into().ok()
+}
+
+fn size(text: &str) -> Result<Size, String> {
+    match numbers(text, 'x') {
+        Some([width_m, height_m]) if width_m > 0.0 && height_m > 0.0 => Ok(Size { width_m, height_m }),
+        _ => Err("width and height in metres, such as 0.60x0.84".to_owned()),
+    }
+}
+
+fn camera(text: &str) -> Result<Intrinsics, String> {
+    let [fx, fy, cx, cy] = numbers(text, ',').ok_or("four numbers: fx,fy,cx,cy in pixels")?;
+    Intrinsics::new(fx, fy, cx, cy, vision::frame::Distortion::None).map_err(|error| error.to_string())
+}
+
+pub(crate) async fn map(command: &MapCommand) -> anyhow::Result<()> {
+    match command {
+        MapCommand::Create { name, distance, server } => {
+            let map = MapClient::new(&server.server)?.create_map(name, *distance).await?;
+            show(server, &map, &format!("map {} created", map.name))
+        }
+        MapCommand::List { server } => {
+            let maps = MapClient::new(&server.server)?.maps().await?;
+            let lines: Vec<String> = maps
+                .iter()
+                .map(|m| format!("{}  version {}, {} landmarks", m.name, m.version, m.landmarks))
+                .collect();
+            show(server, &maps, &lines.join("\n"))
+        }
+    }
+}
+
+pub(crate) async fn robot(command: &RobotCommand) -> anyhow::Result<()> {
+    match command {
+        RobotCommand::Add { name, map, server } => {
+            let robot = MapClient::new(&server.server)?.put_robot(name, map).await?;
+            show(server, &robot, &format!("robot {name} drives in {map}"))
+        }
+        RobotCommand::List { server } => {
+            let robots = MapClient::new(&server.server)?.robots().await?;
+            let lines: Vec<String> = robots
+                .iter()
+                .map(|r| format!("{}  {}", r.name, r.map.as_deref().unwrap_or("no map")))
+                .collect();
+            show(server, &robots, &lines.join("\n"))
+        }
+    }
+}
+
+fn show(server: &ServerArgs, value: &impl serde::Serialize, text: &str) -> anyhow::Result<()> {
+    if server.json {
+        screen::say(&serde_json::to_string(value)?);
+    } else if !text.is_empty() {
+        screen::say(text);
+    }
+    Ok(())
+}
+
+pub(crate) async fn learn(args: &LearnArgs) -> anyhow::Result<ExitCode> {
+    let maps = MapClient::new(&args.server.server)?;
+    let (map, landmark) = (&args.map, &args.landmark);
+    match maps.landmark(map, landmark).await {
+        Ok(_) => {}
+        Err(ClientError::Refused { status: 404, .. }) => {
+            maps.add_landmark(map, landmark, args.size, None).await?;
+        }
+        Err(error) => return Err(error.into()),
+    }
+    let extent = if args.whole_image { Extent::WholeImage } else { Extent::Detect };
+    let mut status = ExitCode::SUCCESS;
+    let progress = screen::progress(args.images.len(), "uploading");
+    for path in &args.images {
+        let name = path.display();
+        let uploaded = match std::fs::read(path) {
+            Ok(image) => {
+                maps.upload_view(map, landmark, image, extent).await.map(drop).map_err(|e| e.to_string())
+            }
+            Err(error) => Err(error.to_string()),
+        };
+        if let Err(error) = uploaded {
+            screen::complain(&format!("waymark: {name}: {error}"));
+            status = ExitCode::FAILURE;
+        }
+        progress.inc(1);
+    }
+    progress.finish_and_clear();
+    let job = maps.learn(map, Some(std::slice::from_ref(landmark)), args.generated_views).await?;
+    let bar = screen::progress(1000, "learning");
+    maps.wait_for_job(job, LESSON_TIMEOUT, |job: &Job| bar.set_position((job.progress * 1000.0) as u64))
+        .await?;
+    bar.finish_and_clear();
+    let learnt = maps.landmark(map, landmark).await?;
+    let lines: Vec<String> =
+        std::iter::once(format!("{landmark}: {} after {} views", learnt.status, learnt.views))
+            .chain(learnt.reasons.iter().map(|r| format!("  {}", reason(r))))
+            .collect();
+    show(&args.server, &learnt, &lines.join("\n"))?;
+    Ok(status)
+}
+
+fn reason(value: &serde_json::Value) -> String {
+    value.as_str().map_or_else(|| value.to_string(), ToOwned::to_owned)
+}
+
+pub(crate) async fn recognise(args: &RecogniseArgs) -> anyhow::Result<ExitCode> {
+    let maps = MapClient::new(&args.server.server)?;
+    let mut status = ExitCode::SUCCESS;
+    for path in &args.images {
+        let name = path.display();
+        let image = match std::fs::read(path) {
+            Ok(image) => image,
+            Err(error) => {
+                screen::complain(&format!("waymark: {name}: {error}"));
+                status = ExitCode::FAILURE;
+                continue;
+            }
+        };
+        match maps.recognise(&args.map, image, args.camera.as_ref()).await {
+            Ok(answer) => show(&args.server, &answer, &sentence(&name.to_string(), &answer))?,
+            Err(error) => {
+                screen::complain(&format!("waymark: {name}: {error}"));
+                status = ExitCode::FAILURE;
+            }
+        }
+    }
+    Ok(status)
+}
+
+fn sentence(name: &str, answer: &Answer) -> String {
+    let mut lines = vec![format!("{name}: {} quads", answer.quads.len())];
+    for quad in &answer.quads {
+        match quad.verdict() {
+            Verdict::Unique => {
+                lines.push(format!("  {} with confidence {:.2}", quad.landmark, quad.confidence));
+            }
+            Verdict::Ambiguous => {
+                let names: Vec<&str> =
+                    quad.candidates.iter().filter(|c| c.ratio < 1.0).map(|c| c.landmark.as_str()).collect();
+                lines.push(format!("  one of {}: not sure which", names.join(", ")));
+            }
+            _ => {}
+        }
+    }
+    if lines.len() == 1 {
+        lines.push("  no landmark recognised".to_owned());
+    }
+    lines.join("\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_and_cameras_are_checked() {
+        assert_eq!(size("0.60x0.84").unwrap(), Size { width_m: 0.6, height_m: 0.84 });
+        assert!(
+            size("0.6").is_err() && size("0x1").is_err() && size("axb").is_err() && size("infx1").is_err()
+        );
+        assert!(camera("500,500,320,240").is_ok());
+        assert!(camera("500,500,320").is_err() && camera("-1,500,320,240").is_err());
+    }
+}
