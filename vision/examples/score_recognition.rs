@@ -161,7 +161,7 @@ fn strangers(
 }
 
 /// The same photographs with the quads that the detector finds. A detected quad belongs to the labelled one it
-/// overlaps most, if by half; borders within it may share less and are judged by what they say.
+/// overlaps most, if by 0.3 at least: borders within it share less than the border itself.
 fn detected(
     queries: &[Query],
     models: &ModelSet,
