@@ -56,3 +56,50 @@ pub(super) fn by_corners(a: &Quad, b: &Quad) -> std::cmp::Ordering {
         .find(|o| o.is_ne())
         .unwrap_or(std::cmp::Ordering::Equal)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{
+        super::quads::{Corners, QuadKind},
+        *,
+    };
+    use nalgebra::Matrix2;
+
+    fn nested(inset: f64, support: f64) -> Quad {
+        let (low, high) = (inset, 200.0 - inset);
+        Quad {
+            corners_px: Corners::try_from([[low, low], [high, low], [high, high], [low, high]]).unwrap(),
+            corner_covariance_px2: [Matrix2::identity(); 4],
+            side_support: [1.0, 1.0, support, 1.0],
+            side_clipped: [false; 4],
+            score: support,
+            kind: QuadKind::Full,
+            upright_ambiguous: false,
+            alternates: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn the_outermost_supported_border_wins() {
+        let quads = canonical(vec![nested(10.0, 0.9), nested(0.0, 0.5), nested(5.0, 0.6)], 0.6, 0.6, 4.0);
+        assert_eq!(quads.len(), 1);
+        assert_eq!(quads[0].corners_px, nested(5.0, 0.6).corners_px);
+        assert_eq!(quads[0].alternates, vec![nested(0.0, 0.5).corners_px, nested(10.0, 0.9).corners_px]);
+        // Without a supported one the best supported.
+        let weak = canonical(vec![nested(10.0, 0.4), nested(0.0, 0.3)], 0.6, 0.6, 4.0);
+        assert_eq!(weak[0].corners_px, nested(10.0, 0.4).corners_px);
+    }
+
+    #[test]
+    fn a_small_quad_inside_is_another_thing() {
+        assert_eq!(canonical(vec![nested(0.0, 0.9), nested(60.0, 0.9)], 0.6, 0.6, 4.0).len(), 2);
+    }
+
+    #[test]
+    fn alternates_are_bounded() {
+        let many = (0..MAX_ALTERNATES + 4).map(|i| nested(i as f64, 0.9)).collect();
+        let quads = canonical(many, 0.6, 0.6, 4.0);
+        assert_eq!(quads.len(), 1);
+        assert_eq!(quads[0].alternates.len(), MAX_ALTERNATES);
+    }
+}

@@ -136,3 +136,49 @@ fn meet(a: &Line, b: &Line) -> Option<(Point2<f64>, Matrix2<f64>)> {
     let variances = Matrix2::from_diagonal(&Vector2::new(a.variance_at(&corner), b.variance_at(&corner)));
     Some((corner, inverse * variances * inverse.transpose()))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn covariance_of_a_corner_agrees_with_counting() {
+        // Two lines at 60 degrees with offsets of known variance: the corner's spread over a grid of disturbances.
+        let (sa, sb) = (0.2_f64, 0.5_f64);
+        let na = Vector2::new(0.0, 1.0);
+        let nb = Vector2::new(60.0_f64.to_radians().sin(), 60.0_f64.to_radians().cos());
+        let inverse = Matrix2::new(na.x, na.y, nb.x, nb.y).try_inverse().unwrap();
+        let wanted = inverse * Matrix2::from_diagonal(&Vector2::new(sa * sa, sb * sb)) * inverse.transpose();
+        let mut spread = Matrix2::zeros();
+        for ea in [-sa, sa] {
+            for eb in [-sb, sb] {
+                // Intersection solved by hand: v = ra, u from the second line.
+                let v = 10.0 + ea;
+                let u = (20.0 + eb - nb.y * v) / nb.x;
+                let off = Vector2::new(u - (20.0 - nb.y * 10.0) / nb.x, v - 10.0);
+                spread += off * off.transpose() * 0.25;
+            }
+        }
+        assert!((spread - wanted).norm() < 1e-12);
+        let given = |normal, rho_px| Line::Given { normal, rho_px };
+        let (corner, covariance) = meet(&given(na, 10.0), &given(nb, 20.0)).unwrap();
+        assert!((corner.y - 10.0).abs() < 1e-12);
+        let unit = inverse * inverse.transpose() * (UNFITTED_SIGMA_PX * UNFITTED_SIGMA_PX);
+        assert!((covariance - unit).norm() < 1e-9);
+        assert!(meet(&given(na, 10.0), &given(na, 20.0)).is_none());
+    }
+
+    #[test]
+    fn upright_is_doubted_near_forty_five_degrees() {
+        let turned = |degrees: f64| {
+            let (s, c) = degrees.to_radians().sin_cos();
+            let points = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]
+                .map(|[x, y]: [f64; 2]| Point2::new(50.0 * (c * x - s * y), 50.0 * (s * x + c * y)));
+            Corners::from_unordered(points).unwrap()
+        };
+        assert!(!upright_ambiguous(&turned(0.0)));
+        assert!(!upright_ambiguous(&turned(35.0)));
+        assert!(upright_ambiguous(&turned(40.0)));
+        assert!(upright_ambiguous(&turned(45.0)));
+    }
+}

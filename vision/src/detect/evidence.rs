@@ -372,3 +372,55 @@ impl OffsetFit {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{
+        super::{
+            edges::{EdgeParams, edges},
+            fixtures::render,
+        },
+        *,
+    };
+
+    const FULL: Search = Search { reach_px: 3.0, min_step: 6.0, samples: MAX_SAMPLES };
+
+    #[test]
+    fn a_side_is_placed_to_a_tenth_of_a_pixel() {
+        let quad = [[30.0, 40.3], [170.0, 52.3], [165.0, 140.0], [35.0, 140.0]];
+        let image = render(200, 180, 200, &[(quad, 60)]);
+        let map = edges(&image, &EdgeParams::default());
+        let g = Gradients { image: &image, gx: map.gx(), gy: map.gy() };
+        let (from, to) = (Point2::from(quad[0]), Point2::from(quad[1]));
+        // The supposed side is a pixel and a half off.
+        let shift = Vector2::new(0.0, 1.5);
+        let found = measure(&g, &(from + shift), &(to + shift), FULL);
+        assert!(found.support > 0.95 && found.agreement > 0.99 && found.strength > 100.0, "{found:?}");
+        let line = found.line.expect("a line");
+        for p in [from, to] {
+            assert!((line.normal.dot(&p.coords) - line.rho_px).abs() < 0.1);
+            assert!(line.variance_at(&p) > 0.0 && line.variance_at(&p) < 0.05);
+        }
+        // Out of a polygon that is walked clockwise: upwards here.
+        assert!(line.normal.y < -0.9);
+        // Beside the quad there is nothing.
+        let away = Vector2::new(0.0, -20.0);
+        assert!(measure(&g, &(from + away), &(to + away), FULL).support < 0.05);
+        assert!(quick_support(&g, &from, &to, 6.0, 0.5) > 0.95);
+        assert!(quick_support(&g, &(from + away), &(to + away), 6.0, 0.5) < 0.05);
+        assert!(level_beside(&g, &from, &to, 6.0).is_some_and(|l| (l - 200.0).abs() < 2.0));
+        assert!(level_beside(&g, &from, &to, -6.0).is_some_and(|l| (l - 60.0).abs() < 2.0));
+        // The run from the middle of the side ends at its corner.
+        let end = run_end(&g, &from, &nalgebra::center(&from, &to), 6.0);
+        assert!((end - to).norm() < 6.0, "{end:?}");
+    }
+
+    #[test]
+    fn half_a_side_is_half_supported() {
+        let image = GrayImage::from_fn(120, 80, |u, v| if v >= 40 && u < 60 { 60 } else { 200 });
+        let map = edges(&image, &EdgeParams::default());
+        let g = Gradients { image: &image, gx: map.gx(), gy: map.gy() };
+        let found = measure(&g, &Point2::new(10.0, 39.5), &Point2::new(110.0, 39.5), FULL);
+        assert!((found.support - 0.5).abs() < 0.06, "{found:?}");
+    }
+}

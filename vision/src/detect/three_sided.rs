@@ -60,3 +60,36 @@ fn seed(
         fit: pair.closing[end].map_or(0.0, |c| c.1),
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{super::fixtures::segment, *};
+
+    fn pair(closing: [Option<(usize, f64)>; 2]) -> SegmentPair {
+        let quad_px = [[20.0, 100.0], [20.0, 20.0], [80.0, 20.0], [80.0, 100.0]].map(Into::into);
+        SegmentPair { k: 0, l: 1, score: 0.9, cues: [1.0; 6], quad_px, closing }
+    }
+
+    #[test]
+    fn a_door_is_closed_by_the_chord_of_its_lower_ends() {
+        let segments = [
+            segment([20.0, 100.0], [20.0, 20.0]),
+            segment([80.0, 100.0], [80.0, 20.0]),
+            segment([22.0, 20.0], [78.0, 20.0]),
+        ];
+        let door = pair([Some((2, 0.95)), None]);
+        let seeds = three_sided(&segments, &[door.clone(), door], &[true, true, false], 0.5, (200, 200));
+        // Each segment is used once, so the twin gives no second set.
+        assert_eq!(seeds.len(), 1);
+        assert_eq!(seeds[0].sides, [Some(0), Some(2), Some(1), None]);
+        for (got, wanted) in
+            seeds[0].corners_px.iter().zip([[20.0, 100.0], [20.0, 20.0], [80.0, 20.0], [80.0, 100.0]])
+        {
+            assert!((got - nalgebra::Point2::from(wanted)).norm() < 1e-9);
+        }
+        let far = pair([Some((2, 0.45)), None]);
+        assert!(three_sided(&segments, &[far], &[true, true, false], 0.5, (200, 200)).is_empty());
+        let taken = pair([Some((2, 0.95)), None]);
+        assert!(three_sided(&segments, &[taken], &[true, true, true], 0.5, (200, 200)).is_empty());
+    }
+}
