@@ -190,7 +190,7 @@ function drawMap() {
     for (const wall of state.walls) { line(c, px(...wall.a), px(...wall.b)); }
   }
   if (layerOn("landmarks")) for (const landmark of state.landmarks) drawLandmark(c, landmark, px, ink);
-  for (const kind of ["odometry", "truth", "pose"]) {
+  for (const kind of ["truth", "odometry", "pose"]) {
     if (!layerOn(kind)) continue;
     for (const [name, robot] of state.robots) drawTrack(c, name, robot, kind, px, ink);
   }
@@ -234,10 +234,14 @@ function drawLandmark(c, landmark, px, ink) {
 function drawTrack(c, name, robot, kind, px, ink) {
   const track = robot.tracks[kind];
   if (!track.length) return;
-  stroke(c, ink[kind], 1.6);
+  // The truth lies wide and pale beneath, so that a corrected track on top of it is still seen.
+  stroke(c, ink[kind], kind === "truth" ? 6 : 1.6);
+  c.globalAlpha = kind === "truth" ? 0.35 : 1;
   c.beginPath();
   track.forEach((p, i) => (i ? c.lineTo(...px(p.x_m, p.y_m)) : c.moveTo(...px(p.x_m, p.y_m))));
   c.stroke();
+  c.globalAlpha = 1;
+  c.lineWidth = 1.6;
   const last = track[track.length - 1];
   const [u, v] = px(last.x_m, last.y_m);
   c.save();
@@ -287,11 +291,21 @@ async function loadMap(name) {
     getJson(`/maps/${encodeURIComponent(name)}`), getJson(`/maps/${encodeURIComponent(name)}/laser`),
     getJson(`/maps/${encodeURIComponent(name)}/landmarks?limit=500`),
   ]);
+  await loadTracks(name);
   Object.assign(state, { map: name, walls: laser.segments, landmarks: landmarks.items, dirty: true });
   const active = state.landmarks.filter((l) => l.status === "active").length;
   byId("map-facts").textContent = `version ${map.version}, ${active} of ${state.landmarks.length} landmarks active, ${state.walls.length} walls`;
   byId("map-hint").textContent = state.walls.length || state.landmarks.some((l) => l.place) ? "" : "This map has no walls and no placed landmarks yet.";
   if (!state.view.fitted) fit();
+}
+
+// Where the map's robots have been before this page was opened.
+async function loadTracks(map) {
+  const robots = (await getJson("/robots?limit=100")).items.filter((robot) => robot.map === map);
+  for (const { name } of robots.filter((robot) => !state.robots.has(robot.name))) {
+    const tracks = await getJson(`/robots/${encodeURIComponent(name)}/tracks`);
+    if (tracks.pose.length || tracks.odometry.length || tracks.truth.length) Object.assign(robotOf(name).tracks, tracks);
+  }
 }
 
 async function start() {

@@ -6,7 +6,6 @@ use serde::Serialize;
 use std::{collections::BTreeMap, path::PathBuf, process::ExitCode, time::Instant};
 use vision::{
     detect::{detect, quads::Quad},
-    params::DetectParams,
     trace::{Stage, Trace},
 };
 
@@ -22,6 +21,9 @@ pub(crate) struct Args {
     /// top-left pixel.
     #[arg(long)]
     json: bool,
+    /// Detection parameters, JSON; only what differs from the defaults, such as {"quads": {"grouping": "relaxation"}}.
+    #[arg(long, value_name = "FILE")]
+    params: Option<PathBuf>,
 }
 
 #[derive(Serialize)]
@@ -70,6 +72,7 @@ impl Trace for Stopwatch {
 
 /// Exit status 1 when any picture could not be read; the others are still done.
 pub(crate) fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    let params = pictures::detect_params(args.params.as_deref())?;
     let mut status = ExitCode::SUCCESS;
     for path in &args.images {
         let name = path.display().to_string();
@@ -82,7 +85,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<ExitCode> {
             }
         };
         let mut stopwatch = Stopwatch::start();
-        let quads = detect(&gray, &DetectParams::default(), &mut stopwatch);
+        let quads = detect(&gray, &params, &mut stopwatch);
         if args.json {
             let line = Line {
                 image: name,

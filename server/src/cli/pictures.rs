@@ -1,9 +1,10 @@
 //! Picture files in, grey images out, and the other way round for the demo's robots.
 
 use crate::engine::decode::{ImageLimits, decode_upload};
+use anyhow::Context as _;
 use image::ImageEncoder as _;
 use std::{fs::File, io::Read as _, path::Path};
-use vision::frame::GrayImage;
+use vision::{frame::GrayImage, params::DetectParams};
 
 /// Quality of the demo's JPEG frames: a VGA frame stays below one zenoh batch.
 const JPEG_QUALITY: u8 = 85;
@@ -24,6 +25,13 @@ pub(crate) fn read(path: &Path) -> Result<GrayImage, PictureError> {
     // One byte more than allowed is enough for the decoder to refuse it.
     File::open(path)?.take(limits.bytes as u64 + 1).read_to_end(&mut bytes)?;
     decode_upload(&bytes, limits).map_err(|refused| PictureError::Refused(refused.detail))
+}
+
+/// Detection parameters from a JSON file that names only what differs from the defaults; no file, the defaults.
+pub(crate) fn detect_params(file: Option<&Path>) -> anyhow::Result<DetectParams> {
+    let Some(path) = file else { return Ok(DetectParams::default()) };
+    let text = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+    serde_json::from_slice(&text).with_context(|| format!("{} holds no detection parameters", path.display()))
 }
 
 /// A grey image as JPEG.

@@ -19,13 +19,19 @@ use axum::{
     },
 };
 use futures::{Stream, StreamExt};
-use protos::v1;
-use std::convert::Infallible;
+use map::pose2::Pose2;
+use protos::{convert::geometry::pose2_wire, v1};
+use serde::Serialize;
+use std::{collections::VecDeque, convert::Infallible};
 use tokio_stream::wrappers::BroadcastStream;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
 pub(super) fn router() -> OpenApiRouter<Shared> {
-    OpenApiRouter::new().routes(routes!(frame)).routes(routes!(answer)).routes(routes!(events))
+    OpenApiRouter::new()
+        .routes(routes!(frame))
+        .routes(routes!(answer))
+        .routes(routes!(tracks))
+        .routes(routes!(events))
 }
 
 /// The last frame of a camera.
@@ -61,6 +67,30 @@ async fn answer(
     At((robot, camera)): At<(String, String)>,
 ) -> Result<Json<v1::Answer>, ApiError> {
     Ok(Json(last(&app, robot, camera).await?.answer.as_ref().clone()))
+}
+
+/// Where a robot was lately, by source: fused poses, odometry alone, and the truth where a simulator tells it. Oldest
+/// first, at most 2000 of each; empty for a robot that has not moved since the server started.
+#[utoipa::path(get, path = "/robots/{robot}/tracks", tag = "robots", params(("robot" = String, Path)),
+    responses((status = 200, body = Object, description = "lists `pose`, `odometry`, `truth` of {x_m, y_m, theta_rad}"),
+    (status = 404, body = Problem)))]
+async fn tracks(State(app): State<Shared>, At(robot): At<String>) -> Result<Json<TracksBody>, ApiError> {
+    robots::get(app.store.reads(), &robot).await?;
+    let tracks = app.live.tracks(&name("robot", robot)?).unwrap_or_default();
+    let wire = |track: VecDeque<Pose2>| track.iter().map(pose2_wire).collect();
+    Ok(Json(TracksBody {
+        pose: wire(tracks.pose),
+        odometry: wire(tracks.odometry),
+        truth: wire(tracks.truth),
+    }))
+}
+
+/// The tracks of one robot.
+#[derive(Debug, Serialize)]
+struct TracksBody {
+    pose: Vec<v1::Pose2>,
+    odometry: Vec<v1::Pose2>,
+    truth: Vec<v1::Pose2>,
 }
 
 /// Follows a map: events `answer`, `pose`, `odometry`, `truth`, `presence`, `map_changed` as they happen. A reader that

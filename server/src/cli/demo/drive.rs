@@ -30,6 +30,8 @@ const MIN_SIDE_PX: f64 = 30.0;
 /// Longest wait for an answer: then the frame counts as unanswered.
 const ANSWER_TIMEOUT: Duration = Duration::from_secs(3);
 
+/// Farther than any corridor: the simulator starts the robot at its end.
+const FAR_END_M: f64 = 1e3;
 /// The pose that a frame led to follows its answer within this time.
 const POSE_WAIT: Duration = Duration::from_millis(20);
 
@@ -65,7 +67,8 @@ pub(super) async fn drive(
         let params = RobotParams {
             drive: DriveParams {
                 seed: args.seed.wrapping_mul(1000) + u64::from(number) + 1,
-                start_m: 3.0 * f64::from(number),
+                // Every other robot comes the other way, from the far end, the others from places of their own.
+                start_m: if number % 2 == 0 { 1.5 * f64::from(number) } else { FAR_END_M },
                 reverse: number % 2 == 1,
                 legs: args.legs,
                 rate_hz: args.rate_hz,

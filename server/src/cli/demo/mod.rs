@@ -34,7 +34,7 @@ pub(crate) struct Args {
     #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=100))]
     legs: u32,
     /// The building, its pictures and all noise follow from it.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 2)]
     seed: u64,
     /// Where the page listens [default: 127.0.0.1:8080, or a free port if that is taken].
     #[arg(long)]

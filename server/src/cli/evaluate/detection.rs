@@ -34,6 +34,9 @@ pub(crate) struct Args {
     /// End with one JSON object per set instead of a table.
     #[arg(long)]
     json: bool,
+    /// Detection parameters, JSON; only what differs from the defaults, such as {"quads": {"grouping": "relaxation"}}.
+    #[arg(long, value_name = "FILE")]
+    params: Option<PathBuf>,
     /// Name every labelled quad that was missed and every false one.
     #[arg(long)]
     misses: bool,
@@ -82,9 +85,10 @@ pub(crate) struct Report {
 }
 
 pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
+    let params = pictures::detect_params(args.params.as_deref())?;
     for folder in &args.sets {
         let truth = Truth::read(folder)?;
-        let report = evaluate(&truth, args);
+        let report = evaluate(&truth, args, &params);
         if args.json {
             screen::say(&serde_json::to_string(&report)?);
         } else {
@@ -94,7 +98,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn evaluate(truth: &Truth, args: &Args) -> Report {
+fn evaluate(truth: &Truth, args: &Args, params: &DetectParams) -> Report {
     let mut report = Report { set: truth.name.clone(), ..Report::default() };
     let mut full = Recall::default();
     let mut corner_errors_px = Vec::new();
@@ -114,7 +118,7 @@ fn evaluate(truth: &Truth, args: &Args) -> Report {
             }
         };
         let start = Instant::now();
-        let found = detect(&gray, &DetectParams::default(), &mut NoTrace);
+        let found = detect(&gray, params, &mut NoTrace);
         work_ms += start.elapsed().as_secs_f64() * 1e3;
         report.images += 1;
         for labelled in &image.quads {
