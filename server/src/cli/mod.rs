@@ -11,7 +11,7 @@ mod serve;
 mod teach;
 
 use clap::{Parser, Subcommand};
-use std::process::ExitCode;
+use std::{io::IsTerminal as _, process::ExitCode};
 
 /// Maps and landmarks for fleets of robots: teach the pictures and doors of a building once, and every robot that
 /// sends camera frames learns where it is.
@@ -90,5 +90,9 @@ fn start_log(filter: Option<&str>, command: &Command) {
     // A server tells of its life; the other commands have their own words.
     let usual = if matches!(command, Command::Serve(_)) { "info,zenoh=warn" } else { "warn,zenoh=error" };
     let filter = tracing_subscriber::EnvFilter::builder().parse_lossy(filter.unwrap_or(usual));
-    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
+    tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(std::io::stderr)
+        .with_ansi(std::io::stderr().is_terminal())
+        .init();
 }

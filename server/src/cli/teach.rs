@@ -139,7 +139,7 @@ pub(crate) async fn map(command: &MapCommand) -> anyhow::Result<()> {
             let maps = MapClient::new(&server.server)?.maps().await?;
             let lines: Vec<String> = maps
                 .iter()
-                .map(|m| format!("{}  version {}, {} landmarks", m.name, m.version, m.landmarks))
+                .map(|m| format!("{}  version {}, {}", m.name, m.version, counted(m.landmarks, "landmark")))
                 .collect();
             show(server, &maps, &lines.join("\n"))
         }
@@ -206,12 +206,19 @@ pub(crate) async fn learn(args: &LearnArgs) -> anyhow::Result<ExitCode> {
         .await?;
     bar.finish_and_clear();
     let learnt = maps.landmark(map, landmark).await?;
-    let lines: Vec<String> =
-        std::iter::once(format!("{landmark}: {} after {} views", learnt.status, learnt.views))
-            .chain(learnt.reasons.iter().map(|r| format!("  {}", reason(r))))
-            .collect();
+    let lines: Vec<String> = std::iter::once(format!(
+        "{landmark}: {}, {} photographed",
+        learnt.status,
+        counted(learnt.views, "view")
+    ))
+    .chain(learnt.reasons.iter().map(|r| format!("  {}", reason(r))))
+    .collect();
     show(&args.server, &learnt, &lines.join("\n"))?;
     Ok(status)
+}
+
+fn counted(count: u64, what: &str) -> String {
+    if count == 1 { format!("1 {what}") } else { format!("{count} {what}s") }
 }
 
 fn reason(value: &serde_json::Value) -> String {
@@ -243,7 +250,7 @@ pub(crate) async fn recognise(args: &RecogniseArgs) -> anyhow::Result<ExitCode> 
 }
 
 fn sentence(name: &str, answer: &Answer) -> String {
-    let mut lines = vec![format!("{name}: {} quads", answer.quads.len())];
+    let mut lines = vec![format!("{name}: {}", counted(answer.quads.len() as u64, "quad"))];
     for quad in &answer.quads {
         match quad.verdict() {
             Verdict::Unique => {
