@@ -1,5 +1,4 @@
 //! Time of each stage from image to segments on a 640x480 scene: framed posters with texture on a shaded wall, noise.
-#![expect(missing_docs, reason = "criterion's macros")]
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use std::hint::black_box;

@@ -52,8 +52,10 @@ fn main() {
     let verbose = args.iter().any(|a| a == "-v");
     let dump = args.iter().position(|a| a == "--dump").and_then(|i| args.get(i + 1));
     let set = Path::new(args.first().expect("a set directory"));
-    let params: DetectParams =
-        args.iter().find(|a| a.ends_with(".json")).map_or_else(DetectParams::default, |path| {
+    let params: DetectParams = args
+        .iter()
+        .find(|a| Path::new(a).extension().is_some_and(|e| e == "json"))
+        .map_or_else(DetectParams::default, |path| {
             serde_json::from_str(&std::fs::read_to_string(path).expect("readable parameters"))
                 .expect("valid parameters")
         });
