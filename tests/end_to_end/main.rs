@@ -1,6 +1,10 @@
 //! End-to-end claims, one file each, against a real server.
 
 mod bad_frames;
+mod command_line;
+mod demo;
+mod evaluate;
 mod http_contract;
+mod real_pictures;
 mod restart;
 mod teach_and_recognise;

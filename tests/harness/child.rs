@@ -61,7 +61,7 @@ impl Drop for Child {
 }
 
 /// The program, built as the tests are: cargo does not build another package's program for a test by itself.
-fn program() -> &'static Path {
+pub(crate) fn program() -> &'static Path {
     static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
     PROGRAM.get_or_init(|| {
         // target/PROFILE/deps/end_to_end-HASH

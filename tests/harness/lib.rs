@@ -2,7 +2,9 @@
 //! the test where that is enough, pictures to send. What is claimed is in `end_to_end/`, one file a claim.
 
 mod child;
+pub mod command;
 pub mod pictures;
+pub mod scenes;
 
 pub use child::Child;
 

@@ -1,0 +1,215 @@
+//! Claim: `waymark detect` prints one JSON line for every picture it can read and one error line for every other; every
+//! command explains its options, and an option that does not exist is refused.
+
+use image::{DynamicImage, ExtendedColorType, ImageFormat, Luma, RgbImage, codecs::jpeg::JpegEncoder};
+use serde_json::Value;
+use sim::{building::Building, lesson::LessonParams, truth::ViewState};
+use std::{
+    collections::BTreeMap,
+    ffi::OsString,
+    fs,
+    path::{Path, PathBuf},
+    sync::Arc,
+    time::Duration,
+};
+use tempfile::TempDir;
+use tests::{
+    command::{Run, waymark},
+    scenes,
+};
+use vision::{detect::quads::Corners, geometry::polygon};
+
+const LONGEST: Duration = Duration::from_mins(2);
+
+/// Options that each command must name in its help.
+const OPTIONS: [(&str, &[&str]); 13] = [
+    ("demo", &["--robots", "--rate-hz", "--legs", "--seed", "--http", "--data", "--stay", "--json"]),
+    ("serve", &["--config", "--data", "--http", "--zenoh", "--fleet", "--workers", "--insecure"]),
+    ("detect", &["--json", "<IMAGES>"]),
+    ("map create", &["--distance", "--server", "--json", "<NAME>"]),
+    ("map list", &["--server", "--json"]),
+    ("robot add", &["--map", "--server", "<NAME>"]),
+    ("robot list", &["--server", "--json"]),
+    ("learn", &["--map", "--landmark", "--size", "--whole-image", "--generated-views", "--server"]),
+    ("recognise", &["--map", "--camera", "--server", "--json", "<IMAGES>"]),
+    ("evaluate detection", &["--min-side-px", "--misses", "--json", "<SETS>"]),
+    ("evaluate recognition", &["--generated-views", "--distance", "--misses", "--json", "<SET>"]),
+    ("bench", &["--frames", "--landmarks", "--rounds", "--seed", "--json"]),
+    ("", &["--log", "--version"]),
+];
+
+fn detect(paths: &[PathBuf]) -> Run {
+    let args = ["detect", "--json"].into_iter().map(OsString::from);
+    waymark(args.chain(paths.iter().map(OsString::from)), LONGEST)
+}
+
+/// A bright rectangle on grey: something to find in every format.
+fn card(width: u32, height: u32) -> RgbImage {
+    RgbImage::from_fn(width, height, |u, v| {
+        let inside = u > width / 4 && u < 3 * width / 4 && v > height / 4 && v < 3 * height / 4;
+        image::Rgb(if inside { [230, 220, 200] } else { [60, 70, 80] })
+    })
+}
+
+/// One readable picture of each kind; width and height by file name.
+fn write_pictures(folder: &Path) -> BTreeMap<PathBuf, (u64, u64)> {
+    let rgb = DynamicImage::from(card(320, 240));
+    let deep = rgb.to_luma16();
+    assert!(deep.pixels().any(|Luma([grey])| *grey > 255));
+    let pictures = [
+        ("grey.png", DynamicImage::from(rgb.to_luma8()), ImageFormat::Png),
+        ("grey.jpg", DynamicImage::from(rgb.to_luma8()), ImageFormat::Jpeg),
+        ("rgb.png", rgb.clone(), ImageFormat::Png),
+        ("rgb.jpeg", rgb.clone(), ImageFormat::Jpeg),
+        ("deep.png", DynamicImage::from(deep), ImageFormat::Png),
+        ("dot.png", DynamicImage::new_luma8(1, 1), ImageFormat::Png),
+        ("dot.jpg", DynamicImage::new_luma8(1, 1), ImageFormat::Jpeg),
+        ("large.png", DynamicImage::new_luma8(4000, 3000), ImageFormat::Png),
+    ];
+    let mut sizes = BTreeMap::new();
+    for (name, picture, format) in pictures {
+        let path = folder.join(name);
+        picture.save_with_format(&path, format).expect("a picture");
+        sizes.insert(path, (u64::from(picture.width()), u64::from(picture.height())));
+    }
+    // Flat, and larger than any frame of a robot.
+    let (path, flat) = (folder.join("large.jpg"), vec![128; 4000 * 3000]);
+    let file = fs::File::create(&path).expect("a file");
+    JpegEncoder::new(file).encode(&flat, 4000, 3000, ExtendedColorType::L8).expect("a picture");
+    sizes.insert(path, (4000, 3000));
+    sizes
+}
+
+fn corners(quad: &Value) -> Corners {
+    serde_json::from_value(quad["corners"].clone()).unwrap_or_else(|e| panic!("{e}: {quad}"))
+}
+
+fn check_line(line: &Value, (width, height): (u64, u64)) {
+    assert_eq!((line["width"].as_u64(), line["height"].as_u64()), (Some(width), Some(height)), "{line}");
+    for quad in line["quads"].as_array().expect("quads") {
+        corners(quad);
+        assert!(matches!(quad["kind"].as_str(), Some("full" | "three_sided")), "{quad}");
+        assert!(quad["score"].as_f64().is_some_and(|s| (0.0..=1.0).contains(&s)), "{quad}");
+    }
+    let timings = line["timings_ms"].as_object().expect("timings_ms");
+    assert!(timings.values().all(|ms| ms.as_f64().is_some_and(|ms| ms >= 0.0)), "{line}");
+    assert!(!timings.is_empty(), "{line}");
+}
+
+#[test]
+fn detect_reads_every_kind_of_picture_and_names_every_other_file() {
+    let folder = TempDir::new().expect("a temporary directory");
+    let sizes = write_pictures(folder.path());
+    let png = fs::read(folder.path().join("rgb.png")).expect("written above");
+    let bad = ["broken.png", "text.txt", "missing.jpg"].map(|name| folder.path().join(name));
+    fs::write(&bad[0], &png[..png.len() / 2]).expect("a file");
+    fs::write(&bad[1], "This is no picture.\nNot in its second line either.\n").expect("a file");
+
+    // Good and bad in turn: a bad one must not stop the next.
+    let mut asked: Vec<PathBuf> = sizes.keys().cloned().collect();
+    for (place, path) in [0, 3, 7].into_iter().zip(&bad) {
+        asked.insert(place, path.clone());
+    }
+    let run = detect(&asked);
+    assert_eq!(run.status, 1, "{run:?}");
+    let complaints: Vec<&str> = run.stderr.lines().collect();
+    assert_eq!(complaints.len(), bad.len(), "{complaints:#?}");
+    for (path, complaint) in bad.iter().zip(&complaints) {
+        assert!(complaint.contains(&path.display().to_string()), "`{complaint}` does not name {path:?}");
+    }
+    let lines = run.json_lines();
+    assert_eq!(lines.len(), sizes.len(), "{run:?}");
+    for (line, (path, size)) in lines.iter().zip(&sizes) {
+        assert_eq!(line["image"].as_str(), path.to_str(), "in the order asked");
+        check_line(line, *size);
+        // The same card in all formats, nothing in the flat ones.
+        let quads = line["quads"].as_array().expect("quads");
+        if size.0 == 320 {
+            let card = [[80.5, 60.5], [239.5, 60.5], [239.5, 179.5], [80.5, 179.5]];
+            let card = Corners::try_from(card).expect("corners");
+            let best = quads.iter().map(|q| polygon::iou(corners(q).points(), card.points()));
+            assert!(best.fold(0.0, f64::max) > 0.95, "{line}");
+        } else {
+            assert!(quads.is_empty(), "{line}");
+        }
+    }
+
+    let fine = detect(&asked[1..3]);
+    assert_eq!((fine.status, fine.stderr.as_str()), (0, ""), "{fine:?}");
+    assert_eq!(fine.json_lines().len(), 2);
+}
+
+#[test]
+fn detect_finds_a_rendered_poster() {
+    let folder = TempDir::new().expect("a temporary directory");
+    let building = Arc::new(Building::corridor(5));
+    let params = LessonParams { views: 1, max_view_angle_rad: 0.6, ..LessonParams::default() };
+    let looks = scenes::looks(&building, &params);
+    let (mut paths, mut truths) = (Vec::new(), Vec::new());
+    for (number, (poster, seen)) in looks.iter().enumerate() {
+        let Some(view) = seen.frame.truth.landmark(poster).filter(|v| v.state == ViewState::Full) else {
+            continue;
+        };
+        paths.push(folder.path().join(format!("{number}.png")));
+        fs::write(&paths[truths.len()], scenes::png(&seen.frame.image)).expect("a picture");
+        truths.push(view.corners_px);
+    }
+    assert!(truths.len() >= 3, "too few whole posters to look at");
+    let run = detect(&paths);
+    assert_eq!(run.status, 0, "{run:?}");
+    for (line, truth) in run.json_lines().iter().zip(&truths) {
+        let quads = line["quads"].as_array().expect("quads");
+        let best = quads.iter().map(|q| polygon::iou(corners(q).points(), truth.points()));
+        let best = best.fold(0.0, f64::max);
+        assert!(best >= 0.85, "IoU {best} at best in {line}");
+    }
+}
+
+/// Commands that the help of `command` lists.
+fn listed(help: &str) -> Vec<String> {
+    let section = help.split("\nCommands:\n").nth(1).unwrap_or("");
+    let lines = section.lines().take_while(|line| !line.is_empty());
+    // A command is indented by two, its explanation by more.
+    lines
+        .filter(|l| l.starts_with("  ") && !l.starts_with("   "))
+        .filter_map(|l| l.split_whitespace().next().map(str::to_owned))
+        .filter(|name| name != "help")
+        .collect()
+}
+
+#[test]
+fn every_command_explains_its_options() {
+    let (mut open, mut helps) = (vec![String::new()], BTreeMap::new());
+    while let Some(command) = open.pop() {
+        let run = waymark(command.split_whitespace().chain(["--help"]), LONGEST);
+        assert_eq!((run.status, run.stderr.as_str()), (0, ""), "{command}: {run:?}");
+        open.extend(listed(&run.stdout).iter().map(|name| format!("{command} {name}").trim().to_owned()));
+        helps.insert(command, run.stdout);
+    }
+    for (command, options) in OPTIONS {
+        let help = helps.get(command).unwrap_or_else(|| panic!("`{command}` is not listed: {helps:#?}"));
+        for option in options {
+            assert!(help.contains(option), "`{command} --help` does not name {option}:\n{help}");
+        }
+    }
+}
+
+#[test]
+fn what_does_not_exist_is_refused() {
+    let wrong = [
+        "detect --jason a.png",
+        "detect",
+        "demo --robots 0",
+        "demo --rate-hz fast",
+        "evaluate",
+        "evaluate recognition --distance near .",
+        "learn --map m --landmark l --size 0x1 a.png",
+        "recognise --map m --camera 1,2,3 a.png",
+        "fly",
+    ];
+    for line in wrong {
+        let run = waymark(line.split(' '), LONGEST);
+        assert_eq!((run.status, run.stdout.as_str()), (2, ""), "`{line}`: {run:?}");
+        assert!(run.stderr.contains("Usage") || run.stderr.contains("--help"), "`{line}`: {run:?}");
+    }
+}
