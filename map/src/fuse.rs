@@ -42,8 +42,13 @@ pub struct FuseParams {
     /// Contradicting fixes in a row that agree with one another and thereby replace the pose...
     pub reset_count: u32,
     /// ...if they rest on this many landmarks: one wrong identity in view can be as steady as the truth.
+    ///
+    /// Departs from method 15, where five fixes gated out mark their source as failed: odometry drifts, landmarks do
+    /// not, so agreeing landmarks win.
     pub reset_landmarks: usize,
     /// A fix on the same landmarks is new only after this motion: from the same place its errors are the same.
+    ///
+    /// Departs from method 15, which applies every fix.
     pub min_move_m: f64,
     /// Or after this turn.
     pub min_turn_rad: f64,

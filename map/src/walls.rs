@@ -146,6 +146,7 @@ fn fused(a: &LaserSegment, b: &LaserSegment) -> LaserSegment {
     let ((la, ca), (lb, cb)) = (local(a, &middle), local(b, &middle));
     let d = Vector2::new(wrap_rad(lb.x - la.x), lb.y - la.y);
     let (Some(ia), Some(ib)) = (ca.try_inverse(), cb.try_inverse()) else { return a.clone() };
+    // Departs from method 17.6, a filter over robot and lines, which knows what they share.
     // Covariance intersection, weighted by hits: sightings share the error of the robot's pose by an unknown amount,
     // so their number must not shrink the covariance (method 11.5 meets the same by inflation).
     let share = f64::from(a.hits) / (f64::from(a.hits) + f64::from(b.hits));

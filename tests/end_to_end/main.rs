@@ -8,3 +8,4 @@ mod http_contract;
 mod real_pictures;
 mod restart;
 mod teach_and_recognise;
+mod tidy;

@@ -2,6 +2,8 @@
 //! go in; their weights were fitted on labelled photographs (`fit_border` example). The paper's assumption is in it:
 //! outside a landmark the background is uniform, and a border is alike on all its sides, which a shadow or the hybrid
 //! of an inner and an outer border is not.
+//!
+//! Departs from method 3.6, whose score (similarity times support) says nothing of what lies beside a border.
 
 use super::{
     corners::RefinedQuad,

@@ -170,6 +170,9 @@ impl<'a> Tracer<'a> {
     }
 
     /// The free neighbour that lies best along the edge's tangent at `at`, and the hand of the bright side.
+    ///
+    /// Departs from method 1.2, which takes the least change of direction: steps between pixels have eight directions
+    /// only, the gradient has them all, and it keeps a chain from changing over to an edge of the other polarity.
     fn next(&self, at: usize, sense: Option<f32>) -> Option<(usize, f32)> {
         let mut best = None;
         let mut best_cos = MIN_COS_TURN;

@@ -1,5 +1,7 @@
 //! Smaller copies of an image, by averaging whole blocks, and quads carried between scales. A large image is searched
 //! at a working scale: sides of quads are long, so nothing is lost but time. Finds nothing itself.
+//!
+//! Departs from method 1, which works at full size: time is bounded, and ornate frames are lines only when seen coarsely.
 
 use super::quads::{Corners, Quad};
 use crate::frame::GrayImage;

@@ -55,6 +55,8 @@ pub struct SegmentParams {
     /// Largest angle between neighbouring pieces of a chain that are merged, degrees.
     pub merge_angle_deg: f64,
     /// A piece ends where its chain leaves the fitted line by more than this, px.
+    ///
+    /// Departs from method 1.3, where a piece ends at its splits: those fall a few points beside a rounded corner.
     pub end_px: f64,
     /// Pieces shorter than this take no part in joining, px.
     pub min_fragment_px: f64,
@@ -68,6 +70,8 @@ pub struct SegmentParams {
     pub min_length_share: f64,
     /// Lower and upper bound of the shortest segment, px: small images keep what noise cannot make, large ones keep
     /// the sides of small quads.
+    ///
+    /// Departs from method 1.4, which has the share of the width alone.
     pub min_length_range_px: [f64; 2],
     /// Most segments, longest first; at most [`MAX_SEGMENTS`].
     pub max_segments: usize,

@@ -97,6 +97,9 @@ pub fn rate(seeds: &[QuadSeed], g: &Gradients, p: &QuadParams) -> Vec<Rated> {
 }
 
 /// Keeps the quads that contradict no better one: that cross none and share an edge with none.
+///
+/// Departs from method 3.4: its table of compatible quads is kept (disjoint and nested may stay, crossing may not), but
+/// quads are taken greedily by rank instead of by relaxation over pairs.
 pub fn resolve(mut rated: Vec<Rated>, p: &QuadParams) -> Vec<Quad> {
     rated.retain(|r| r.quad.score >= p.min_score);
     rated.sort_by(|a, b| b.rank.total_cmp(&a.rank).then(super::border::by_corners(&a.quad, &b.quad)));
