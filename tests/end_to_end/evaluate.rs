@@ -128,13 +128,25 @@ fn detection_figures_are_what_a_recount_gives() {
     let folder = TempDir::new().expect("a temporary directory");
     let building = Arc::new(Building::corridor(6));
     let looks = scenes::looks(&building, &LessonParams { views: 1, ..LessonParams::default() });
-    let set = scenes::write_set(folder.path(), &building, &looks, &[], 20.0);
+    let mut set = scenes::write_set(folder.path(), &building, &looks, &[], 20.0);
+    // Labels beside the truth, so that not everything is found and not everything found is true.
+    for (image, share) in set.images.iter_mut().zip([0.1, 0.4, 0.6]) {
+        for quad in &mut image.quads {
+            let corners: Quad = quad.corners.into();
+            let shift_px = share * (corners[1][0] - corners[0][0]);
+            let moved = corners.map(|[x, y]| [x + shift_px, y]);
+            quad.corners = moved.try_into().expect("still a quad");
+        }
+    }
+    scenes::save(folder.path(), &set);
 
     let run = evaluate("detection", folder.path());
     assert_eq!((run.status, run.stdout.lines().count()), (0, 1), "{run:?}");
     let report = run.last_json();
     let sums = recount(&set, &detected(folder.path(), &set));
-    assert!(sums.quads >= 6 && sums.found[0] >= 4, "too little to count: {sums:?}");
+    let [found_70, found_85] = sums.found;
+    let telling = sums.quads > found_70 && found_70 > found_85 && found_85 > 0 && sums.false_quads > 0;
+    assert!(telling, "some figures are not put to the test: {sums:?}");
     assert_eq!(report["images"].as_u64(), Some(set.images.len() as u64), "{report}");
     assert_eq!(report["quads"].as_u64(), Some(sums.quads as u64), "{report}");
     close(&report, "recall_70", sums.found[0] as f64 / sums.quads as f64);
@@ -214,6 +226,6 @@ fn recognition_names_the_taught_and_no_stranger() {
     );
     assert_eq!(count("right") + count("missed"), known, "{report}");
     assert_eq!(count("strangers_refused"), strangers, "{report}");
-    assert!(2 * count("right") >= known, "{report}");
+    assert!(3 * count("right") >= known, "{report}");
     assert!(report["ms_per_image"].as_f64().is_some_and(|ms| ms > 0.0), "{report}");
 }

@@ -12,8 +12,9 @@ use tempfile::TempDir;
 use tests::command::waymark;
 
 const LONGEST: Duration = Duration::from_mins(4);
-/// Photographs of the smoke.
-const PHOTOGRAPHS: usize = 12;
+/// Photographs with paintings that are taught, and with strangers alone.
+const PHOTOGRAPHS: usize = 10;
+const STRANGERS: usize = 3;
 /// Share of labelled paintings found at IoU 0.7; the whole set measured 0.92.
 const FLOOR_RECALL_70: f64 = 0.75;
 /// Recognised of those taught.
@@ -37,19 +38,19 @@ fn museum() -> Option<PathBuf> {
     there.then_some(folder.canonicalize().ok()?)
 }
 
-/// A folder in the evaluation format with a dozen photographs of walls, and the paintings on them to teach from.
+/// A folder in the evaluation format with some photographs of walls, and the known paintings on them to
+/// teach from.
 fn excerpt(museum: &Path) -> (TempDir, usize) {
     let text = fs::read(museum.join("truth.json")).expect("truth.json");
     let mut truth: Value = serde_json::from_slice(&text).expect("JSON");
-    let images: Vec<Value> = truth["images"]
-        .as_array()
-        .expect("images")
-        .iter()
-        .filter(|i| i["stratum"] == "plain" && i["whole_image"] != true)
-        .take(PHOTOGRAPHS)
-        .cloned()
-        .collect();
-    assert_eq!(images.len(), PHOTOGRAPHS, "the set has become smaller");
+    let all = truth["images"].as_array().expect("images").iter().filter(|i| i["whole_image"] != true);
+    let strange = |image: &&Value| {
+        let quads = image["quads"].as_array().expect("quads");
+        !quads.is_empty() && quads.iter().all(|q| q["landmark"].is_null())
+    };
+    let plain = all.clone().filter(|i| i["stratum"] == "plain").filter(|i| !strange(i)).take(PHOTOGRAPHS);
+    let images: Vec<Value> = plain.chain(all.filter(strange).take(STRANGERS)).cloned().collect();
+    assert_eq!(images.len(), PHOTOGRAPHS + STRANGERS, "the set has become smaller");
     let quads: Vec<&Value> = images.iter().flat_map(|i| i["quads"].as_array().expect("quads")).collect();
     let teach: Vec<Value> = truth["teach"]
         .as_array()
@@ -76,6 +77,7 @@ fn excerpt(museum: &Path) -> (TempDir, usize) {
 fn paintings_on_real_walls_are_found_and_never_mistaken() {
     let Some(museum) = museum() else { return };
     let (folder, quads) = excerpt(&museum);
+    let images = (PHOTOGRAPHS + STRANGERS) as u64;
     let evaluate = |what: &str| {
         let args = ["evaluate".as_ref(), what.as_ref(), folder.path().as_os_str(), "--json".as_ref()];
         let run = waymark(args, LONGEST);
@@ -85,12 +87,12 @@ fn paintings_on_real_walls_are_found_and_never_mistaken() {
     let found = evaluate("detection");
     assert_eq!(
         (found["images"].as_u64(), found["quads"].as_u64()),
-        (Some(12), Some(quads as u64)),
+        (Some(images), Some(quads as u64)),
         "{found}"
     );
     assert!(found["recall_70"].as_f64().expect("a share") >= FLOOR_RECALL_70, "{found}");
     let known = evaluate("recognition");
-    assert_eq!(known["images"].as_u64(), Some(PHOTOGRAPHS as u64), "{known}");
+    assert_eq!(known["images"].as_u64(), Some(images), "{known}");
     assert!(known["right"].as_u64().expect("a count") >= FLOOR_RIGHT, "{known}");
     assert_eq!(
         (known["wrong"].as_u64(), known["strangers_accepted"].as_u64()),

@@ -181,8 +181,10 @@ fn check_claim(size: (usize, usize), claimed: Option<(usize, usize)>) -> Result<
     }
 }
 
-fn bad(kind: &str, error: &dyn std::fmt::Debug) -> Rejection {
-    Rejection::new(Code::BadImage, "image", format!("{kind} cannot be decoded: {error:?}"))
+fn bad(kind: &str, error: &dyn std::fmt::Display) -> Rejection {
+    // Some of the decoders' words end with a line break; a refusal is one line everywhere.
+    let words = error.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
+    Rejection::new(Code::BadImage, "image", format!("{kind} cannot be decoded: {words}"))
 }
 
 #[cfg(test)]

@@ -131,6 +131,7 @@ fn every_truncation_is_refused() {
         for cut in (0..whole.len() - 20).step_by(7) {
             let r = decode_upload(&whole[..cut], ImageLimits::UPLOAD).expect_err("truncated");
             assert!(matches!(r.code, Code::BadImage | Code::WrongEncoding), "{cut}: {r}");
+            assert!(!r.detail.contains('\n'), "{cut}: {r}");
         }
     }
 }
