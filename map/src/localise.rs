@@ -2,7 +2,7 @@
 //!
 //! In: sightings, the mounting, perhaps a prior. Out: one pose with its covariance, or that several are left, or why
 //! there is none. The robot stands upright on the floor, so three numbers are fitted to all corners of all landmarks at
-//! once ([M] (b) of the method). It never picks a solution that image, wall and prior leave undecided.
+//! once (method 13.6, variant b). It never picks a solution that image, wall and prior leave undecided.
 
 mod planar;
 mod posterior;

@@ -1,5 +1,5 @@
 //! A building: flat textured rectangles in the map frame, walls as lines for the laser, lamps for the light, and the
-//! exact truth about its landmarks. Built once with [`Builder`], then read only.
+//! exact truth about its landmarks. Built once with `Builder`, then read only.
 //! Which things hang where is decided elsewhere (`corridor`); how they look to a camera too (`render`).
 
 use std::sync::Arc;

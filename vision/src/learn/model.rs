@@ -1,7 +1,7 @@
 //! What is known of one landmark's appearance (method 7 to 9): the views it is learnt from, the model itself, and
 //! whether the model may be used.
 //!
-//! How a model is made is in [`super::lesson`], how it is stored in [`super::stored`].
+//! How a model is made is in `lesson.rs`, how it is stored in `stored.rs`.
 
 use super::{
     gates::GateParams,
