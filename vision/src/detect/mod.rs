@@ -7,7 +7,7 @@ use crate::{
 };
 use edges::EdgeMap;
 use evidence::Gradients;
-use quads::{Grouping, Quad};
+use quads::{Grouping, Nested, Quad};
 use segments::EdgeSegment;
 
 mod deriche;
@@ -32,6 +32,7 @@ pub mod hypotheses;
 pub mod selection;
 pub mod border_model;
 pub mod border;
+pub mod nested;
 pub mod quads;
 #[cfg(test)]
 mod fixtures;
@@ -75,6 +76,10 @@ fn by_search(image: &GrayImage, p: &DetectParams, trace: &mut impl Trace) -> Vec
     let found = selection::resolve(rated, &p.quads);
     let tolerance = p.relaxation.pair_tolerance_px;
     let quads = border::canonical(found, p.quads.nested_iou, p.quads.min_side_support, tolerance);
+    let quads = match p.quads.nested {
+        Nested::Alternates => nested::absorb(quads, tolerance),
+        Nested::Quads => quads,
+    };
     let sharp = quads.into_iter().map(|q| selection::sharpen(q, &gradients, &p.quads));
     sharp.filter_map(|q| q.scaled(factor as f64)).collect()
 }

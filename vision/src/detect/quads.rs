@@ -135,7 +135,8 @@ pub struct Quad {
     pub kind: QuadKind,
     /// A second way to name the top-left corner is nearly as upright: recognition tries all four rotations.
     pub upright_ambiguous: bool,
-    /// Other borders of the same thing (mat, canvas, inner frame), nested in `corners_px`, outermost first.
+    /// Other borders of the same thing (mat, canvas, inner frame) and what hangs inside (a poster on a door), nested in
+    /// `corners_px`, outermost first.
     pub alternates: Vec<Corners>,
 }
 
@@ -148,6 +149,17 @@ pub enum Grouping {
     /// Corner chains with a searched fourth side, checked against the gradient.
     #[default]
     Hypotheses,
+}
+
+/// What a quad of the search becomes that lies inside another and is no border of the same thing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Nested {
+    /// An alternate of the outer one, unless that is the more doubtful of the two or holds several things.
+    #[default]
+    Alternates,
+    /// A quad of its own.
+    Quads,
 }
 
 /// Parameters of the last stage.
@@ -166,6 +178,8 @@ pub struct QuadParams {
     pub min_side_support: f64,
     /// Nested quads above this `IoU` are borders of one thing.
     pub nested_iou: f64,
+    /// What other nested quads become, for the search.
+    pub nested: Nested,
     /// How far from a rough side its edge points are looked for.
     pub refit_reach_px: f64,
     /// Smallest step height of an edge point, grey levels.
@@ -189,6 +203,7 @@ impl Default for QuadParams {
             hypotheses: HypothesisParams::default(),
             min_side_support: 0.6,
             nested_iou: 0.6,
+            nested: Nested::default(),
             refit_reach_px: 2.0,
             min_step: 6.0,
             min_score: 0.6,

@@ -3,7 +3,7 @@
 use super::{
     MAX_QUADS, detect,
     fixtures::render,
-    quads::{Corners, Grouping, Quad, QuadKind},
+    quads::{Corners, Grouping, Nested, Quad, QuadKind},
 };
 use crate::{frame::GrayImage, geometry::polygon, params::DetectParams, trace::NoTrace};
 use nalgebra::Point2;
@@ -78,6 +78,39 @@ fn the_mat_is_an_alternate_of_its_frame() {
         assert_eq!(quads.len(), 1, "{:?} {quads:#?}", p.quads.grouping);
         assert!(nearest_error(&frame, &quads) < 0.3);
         assert_eq!(quads[0].alternates.len(), 1);
+    }
+}
+
+/// An upright rectangle.
+fn upright([left, top, right, bottom]: [f64; 4]) -> [[f64; 2]; 4] {
+    [[left, top], [right, top], [right, bottom], [left, bottom]]
+}
+
+#[test]
+fn a_poster_on_a_door_and_a_picture_in_a_picture_are_alternates() {
+    let door = upright([150.0, 30.0, 350.0, 400.0]);
+    for inner in [upright([210.0, 100.0, 290.0, 210.0]), upright([190.0, 250.0, 300.0, 330.0])] {
+        let image = render(500, 420, 200, &[(door, 90), (inner, 230)]);
+        let quads = found(&image, &DetectParams::default());
+        assert_eq!(quads.len(), 1, "{quads:#?}");
+        assert!(nearest_error(&door, &quads) < 0.3);
+        assert_eq!(quads[0].alternates.len(), 1);
+        let poster = Quad { corners_px: quads[0].alternates[0], ..quads[0].clone() };
+        assert!(nearest_error(&inner, &[poster]) < 0.5);
+        let mut apart = DetectParams::default();
+        apart.quads.nested = Nested::Quads;
+        assert_eq!(found(&image, &apart).len(), 2);
+    }
+}
+
+#[test]
+fn the_panes_of_a_window_stay_quads() {
+    let frame = upright([100.0, 60.0, 400.0, 360.0]);
+    let panes = [upright([120.0, 80.0, 235.0, 340.0]), upright([265.0, 80.0, 380.0, 340.0])];
+    let image = render(500, 420, 200, &[(frame, 90), (panes[0], 240), (panes[1], 240)]);
+    let quads = found(&image, &DetectParams::default());
+    for quad in [frame, panes[0], panes[1]] {
+        assert!(nearest_error(&quad, &quads) < 0.5, "{quads:#?}");
     }
 }
 
