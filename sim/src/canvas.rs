@@ -5,11 +5,15 @@
 use crate::font;
 use crate::texture::{Edge, Texture};
 
+/// Most rectangles that a drawing remembers.
+const MAX_PARTS: usize = 256;
+
 /// A grey drawing under way.
 pub(crate) struct Canvas {
     width: usize,
     height: usize,
     grey: Vec<f32>,
+    parts: Vec<Area>,
 }
 
 /// A rectangle in canvas units.
@@ -51,7 +55,7 @@ impl Area {
 
 impl Canvas {
     pub(crate) fn new(width: usize, height: usize, grey: f32) -> Self {
-        Self { width, height, grey: vec![grey; width * height] }
+        Self { width, height, grey: vec![grey; width * height], parts: vec![] }
     }
 
     /// The whole canvas.
@@ -61,7 +65,17 @@ impl Canvas {
 
     pub(crate) fn into_texture(self, edge: Edge) -> Texture {
         let data = self.grey.iter().map(|g| (g.clamp(0.0, 1.0) * 255.0 + 0.5) as u8).collect();
-        Texture::new(self.width, self.height, data, edge)
+        let all = self.area();
+        let relative = |a: &Area| [a.x0, a.y0 / all.y1, a.x1, a.y1 / all.y1].map(|x| x.clamp(0.0, 1.0));
+        let parts = self.parts.iter().map(relative).filter(|p| p[2] > p[0] && p[3] > p[1]).collect();
+        Texture::new(self.width, self.height, data, edge).with_parts(parts)
+    }
+
+    /// Notes that the area is a rectangle to be seen, unless enough are known.
+    pub(crate) fn note(&mut self, area: Area) {
+        if self.parts.len() < MAX_PARTS {
+            self.parts.push(area);
+        }
     }
 
     /// Sets every texel with its centre in `area` to `f(x, y, what is there)`.
@@ -86,12 +100,15 @@ impl Canvas {
     }
 
     pub(crate) fn rect(&mut self, area: Area, grey: f32) {
+        self.note(area);
         self.paint(area, |_, _, _| grey);
     }
 
     /// A frame of the given thickness along the inside of `area`.
     pub(crate) fn frame(&mut self, area: Area, thickness: f32, grey: f32) {
         let inner = area.inset(thickness);
+        self.note(area);
+        self.note(inner);
         self.paint(area, |x, y, under| {
             let inside = x > inner.x0 && x < inner.x1 && y > inner.y0 && y < inner.y1;
             if inside { under } else { grey }

@@ -81,6 +81,9 @@ pub struct QuadEntry {
     /// How much of it is there.
     #[serde(default)]
     pub state: QuadState,
+    /// Whether a detector must find it. One that is not counted is neither missed nor false.
+    #[serde(default = "yes", skip_serializing_if = "is_true")]
+    pub counted: bool,
     /// What it is.
     pub kind: LandmarkKind,
     /// Hidden share of what lies within the image.
@@ -101,10 +104,22 @@ pub struct ImageEntry {
     pub stratum: Option<String>,
     /// The quads.
     pub quads: Vec<QuadEntry>,
+    /// Other real four-sided things, which are neither missed nor false: parts of the quads, whole walls.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub others: Vec<Corners>,
     /// Whether no other real quad is there.
     pub quads_complete: bool,
     /// True camera pose: rows of the 3 x 4 matrix `map_from_camera`.
     pub map_from_camera: [[f64; 4]; 3],
+}
+
+fn yes() -> bool {
+    true
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde's signature")]
+fn is_true(value: &bool) -> bool {
+    *value
 }
 
 /// Which quads of a rendered picture are listed, and under which names.
@@ -138,6 +153,7 @@ impl ImageEntry {
                 ViewState::Truncated => QuadState::Truncated,
                 ViewState::Occluded => QuadState::Occluded,
             },
+            counted: true,
             kind: l.kind,
             occluded_share: l.occluded_share,
             view_angle_rad: l.view_angle_rad,
@@ -153,6 +169,7 @@ impl ImageEntry {
                 .filter(|l| l.min_side_px() >= labels.min_side_px)
                 .map(quad)
                 .collect(),
+            others: vec![],
             quads_complete: labels.complete,
             map_from_camera: std::array::from_fn(|row| std::array::from_fn(|column| pose[(row, column)])),
         }

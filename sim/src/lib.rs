@@ -50,6 +50,7 @@ pub mod drive;
 pub mod robot;
 pub mod lesson;
 pub mod export;
+pub mod views;
 
 #[cfg(test)]
 mod render_tests;

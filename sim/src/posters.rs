@@ -231,6 +231,7 @@ fn photograph(canvas: &mut Canvas, area: Area, [cx, cy]: [f32; 2], rng: &mut Cha
     let patch =
         Area::new((cx - w).max(area.x0), (cy - h).max(area.y0), (cx + w).min(area.x1), (cy + h).min(area.y1));
     let noise = Noise::new(rng.random(), rng.random_range(6..14), 5);
+    canvas.note(patch);
     canvas.paint(patch, |x, y, _| (2.6 * (noise.at(x, y) - 0.5) + 0.5).clamp(0.02, 0.98));
     for _ in 0..rng.random_range(2..7) {
         let (x, y) = (rng.random_range(0.15..0.85), rng.random_range(0.15..0.85));

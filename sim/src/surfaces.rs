@@ -88,6 +88,7 @@ pub fn window(seed: u64) -> Texture {
     let view = canvas.area().inset(0.05);
     let noise = Noise::new(rng.random(), rng.random_range(3..6), 4);
     let horizon = rng.random_range(0.55..0.75);
+    canvas.note(view);
     canvas.paint(view, |x, y, _| {
         if y < horizon + 0.2 * (noise.at(x, 0.5) - 0.5) {
             0.98 - 0.15 * y
@@ -97,6 +98,9 @@ pub fn window(seed: u64) -> Texture {
     });
     canvas.rect(view.part(0.47, 0.0, 0.53, 1.0), 0.38);
     canvas.rect(view.part(0.0, 0.47, 1.0, 0.53), 0.38);
+    for (x, y) in [(0.0, 0.0), (0.53, 0.0), (0.0, 0.53), (0.53, 0.53)] {
+        canvas.note(view.part(x, y, x + 0.47, y + 0.47));
+    }
     canvas.into_texture(Edge::Clamp)
 }
 

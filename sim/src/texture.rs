@@ -30,6 +30,7 @@ struct Level {
 pub struct Texture {
     levels: Vec<Level>,
     edge: Edge,
+    parts: Vec<[f32; 4]>,
 }
 
 /// How (s, t) change over one pixel to the right (`du`) and one pixel down (`dv`).
@@ -51,7 +52,19 @@ impl Texture {
         while let Some(last) = levels.last().filter(|l| l.width > 1 || l.height > 1) {
             levels.push(last.halved());
         }
-        Self { levels, edge }
+        Self { levels, edge, parts: Vec::new() }
+    }
+
+    /// The same with the rectangles that are drawn in it: left, top, right, bottom, each 0 to 1.
+    #[must_use]
+    pub(crate) fn with_parts(self, parts: Vec<[f32; 4]>) -> Self {
+        Self { parts, ..self }
+    }
+
+    /// Rectangles drawn in it (frames, panes, panels, patches), left, top, right, bottom from 0 to 1: real four-sided
+    /// things within the picture. Something drawn later may cover one.
+    pub fn parts(&self) -> &[[f32; 4]] {
+        &self.parts
     }
 
     /// Width of the full picture in texels.

@@ -32,7 +32,7 @@ const OPTIONS: [(&str, &[&str]); 13] = [
     ("robot list", &["--server", "--json"]),
     ("learn", &["--map", "--landmark", "--size", "--whole-image", "--generated-views", "--server"]),
     ("recognise", &["--map", "--camera", "--server", "--json", "<IMAGES>"]),
-    ("evaluate detection", &["--min-side-px", "--misses", "--json", "<SETS>"]),
+    ("evaluate detection", &["--min-side-px", "--misses", "--json", "--keep", "--views", "--seed", "<SETS>"]),
     ("evaluate recognition", &["--generated-views", "--distance", "--misses", "--json", "<SET>"]),
     ("bench", &["--frames", "--landmarks", "--rounds", "--seed", "--json"]),
     ("", &["--log", "--version"]),

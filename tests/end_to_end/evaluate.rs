@@ -179,6 +179,25 @@ fn labels_decide_what_is_found_and_what_is_false() {
 }
 
 #[test]
+fn the_rendered_corridor_is_a_set_like_any_other() {
+    let folder = TempDir::new().expect("a temporary directory");
+    let kept = folder.path().join("views");
+    let mut args: Vec<OsString> =
+        ["evaluate", "detection", "corridor", "--views", "4", "--json", "--keep"].map(Into::into).into();
+    args.push(kept.clone().into());
+    let rendered = waymark(args, LONGEST).last_json();
+    let from_folder = evaluate("detection", &kept).last_json();
+    for key in ["set", "images", "quads", "recall_70", "recall_85", "false_per_image", "corner_error_px"] {
+        assert_eq!(rendered[key], from_folder[key], "{key}");
+    }
+    let text = fs::read_to_string(kept.join("truth.json")).expect("truth.json");
+    let set: DataSet = serde_json::from_str(&text).expect("the evaluation format");
+    let counted = set.images.iter().flat_map(|i| &i.quads).filter(|q| q.counted).count();
+    assert_eq!(rendered["quads"].as_u64(), Some(counted as u64), "{rendered}");
+    assert!(counted >= 3 && set.images.iter().any(|i| !i.others.is_empty()));
+}
+
+#[test]
 fn a_folder_that_is_no_data_set_is_refused_by_name() {
     let folder = TempDir::new().expect("a temporary directory");
     let refused = |what: &str| {

@@ -1,9 +1,13 @@
 //! `waymark evaluate detection`: the detector against labelled pictures. Recall at two overlaps, false quads, corner
 //! error, time; per state and stratum. The detector runs on one thread, pictures one after the other.
 
-use super::truth::{QuadState, Truth, TruthImage};
-use crate::cli::{pictures, screen};
+use super::{
+    rendered,
+    truth::{QuadState, Truth, TruthImage},
+};
+use crate::cli::{pictures, scratch, screen};
 use serde::Serialize;
+use sim::views::ViewsParams;
 use std::{collections::BTreeMap, path::PathBuf, time::Instant};
 use vision::{
     detect::{
@@ -25,9 +29,18 @@ const INNER_AREA: f64 = 0.25;
 /// `waymark evaluate detection`.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// Folders in the evaluation format (each with a truth.json).
+    /// Folders in the evaluation format (each with a truth.json), or `corridor` for rendered views with exact truth.
     #[arg(required = true)]
     sets: Vec<PathBuf>,
+    /// Keep the rendered corridor in this folder: a set like any other.
+    #[arg(long, value_name = "DIR")]
+    keep: Option<PathBuf>,
+    /// Rendered views of the corridor.
+    #[arg(long, default_value_t = 300, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    views: u32,
+    /// The rendered views follow from it.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
     /// Leave out labelled quads with a side shorter than this, in pixels.
     #[arg(long, default_value_t = 0.0)]
     min_side_px: f64,
@@ -87,6 +100,13 @@ pub(crate) struct Report {
 pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let params = pictures::detect_params(args.params.as_deref())?;
     for folder in &args.sets {
+        let scratch = scratch::Folder::new("views")?;
+        let rendered = folder.as_os_str() == rendered::CORRIDOR && !folder.is_dir();
+        let folder = if rendered { args.keep.as_deref().unwrap_or(scratch.path()) } else { folder };
+        if rendered {
+            let views = args.views as usize;
+            rendered::write_corridor(folder, &ViewsParams { seed: args.seed, views, ..Default::default() })?;
+        }
         let truth = Truth::read(folder)?;
         let report = evaluate(&truth, args, &params);
         if args.json {
@@ -124,13 +144,16 @@ fn evaluate(truth: &Truth, args: &Args, params: &DetectParams) -> Report {
         found.retain(|quad| quad.kind == QuadKind::Full);
         report.images += 1;
         for labelled in &image.quads {
-            if labelled.corners.min_side_px() < args.min_side_px {
+            if !labelled.counted || labelled.corners.min_side_px() < args.min_side_px {
                 continue;
             }
             let (iou, nearest) = best(&labelled.corners, &found);
             let group =
                 report.by_group.entry(format!("{} / {}", labelled.state.name(), image.stratum)).or_default();
             group.count(iou);
+            if let Some(class) = &labelled.class {
+                report.by_group.entry(format!("{} / {class}", labelled.state.name())).or_default().count(iou);
+            }
             if labelled.state == QuadState::Full {
                 full.count(iou);
                 if let (true, Some(quad)) = (iou >= 0.7, nearest) {
@@ -178,13 +201,15 @@ fn false_quads<'a>(image: &TruthImage, found: &'a [Quad]) -> Vec<&'a Quad> {
     found
         .iter()
         .filter(|quad| {
-            !image.quads.iter().any(|labelled| {
-                let (a, b) = (labelled.corners.points(), quad.corners_px.points());
-                let shared = polygon::intersection_area(a, b);
-                let area = quad.corners_px.area_px2();
-                polygon::iou(a, b) >= IOU_SAME
-                    || (shared >= INNER_SHARE * area && area >= INNER_AREA * labelled.corners.area_px2())
-            })
+            let other = |o: &Corners| polygon::iou(o.points(), quad.corners_px.points()) >= IOU_SAME;
+            !image.others.iter().any(other)
+                && !image.quads.iter().any(|labelled| {
+                    let (a, b) = (labelled.corners.points(), quad.corners_px.points());
+                    let shared = polygon::intersection_area(a, b);
+                    let area = quad.corners_px.area_px2();
+                    polygon::iou(a, b) >= IOU_SAME
+                        || (shared >= INNER_SHARE * area && area >= INNER_AREA * labelled.corners.area_px2())
+                })
         })
         .collect()
 }

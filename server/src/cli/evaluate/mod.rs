@@ -1,5 +1,6 @@
 //! `waymark evaluate`: the paper's experiments on labelled pictures. Tables for people, one JSON object for programs.
 
+mod rendered;
 pub(crate) mod truth;
 pub(crate) mod detection;
 pub(crate) mod recognition;

@@ -46,6 +46,10 @@ pub(crate) struct TruthQuad {
     /// `None`: a stranger, not among those taught.
     pub(crate) landmark: Option<String>,
     pub(crate) state: QuadState,
+    /// What it is, where the set says so.
+    pub(crate) class: Option<String>,
+    /// A detector must find it; else it is neither missed nor false.
+    pub(crate) counted: bool,
 }
 
 /// One picture with its labels.
@@ -55,6 +59,8 @@ pub(crate) struct TruthImage {
     pub(crate) file: String,
     pub(crate) stratum: String,
     pub(crate) quads: Vec<TruthQuad>,
+    /// Other real four-sided things, neither missed nor false.
+    pub(crate) others: Vec<Corners>,
     /// No other real quad is in the picture.
     pub(crate) quads_complete: bool,
     /// A crop: one landmark fills the whole picture.
@@ -123,6 +129,8 @@ struct RawImage {
     #[serde(default)]
     quads: Vec<RawQuad>,
     #[serde(default)]
+    others: Vec<[[f64; 2]; 4]>,
+    #[serde(default)]
     quads_complete: bool,
     #[serde(default)]
     whole_image: bool,
@@ -134,24 +142,37 @@ struct RawQuad {
     landmark: Option<String>,
     #[serde(default)]
     state: QuadState,
+    kind: Option<String>,
+    #[serde(default = "yes")]
+    counted: bool,
+}
+
+fn yes() -> bool {
+    true
 }
 
 impl RawImage {
     fn checked(self, folder: &Path, path: &Path) -> Result<TruthImage, TruthError> {
-        let mut quads = Vec::with_capacity(self.quads.len());
-        for quad in self.quads {
-            let corners = Corners::try_from(quad.corners).map_err(|source| TruthError::Corners {
+        let checked = |corners: [[f64; 2]; 4]| {
+            Corners::try_from(corners).map_err(|source| TruthError::Corners {
                 path: path.to_owned(),
                 file: self.file.clone(),
                 source,
-            })?;
-            quads.push(TruthQuad { corners, landmark: quad.landmark, state: quad.state });
+            })
+        };
+        let mut quads = Vec::with_capacity(self.quads.len());
+        for quad in self.quads {
+            let corners = checked(quad.corners)?;
+            let RawQuad { landmark, state, kind, counted, .. } = quad;
+            quads.push(TruthQuad { corners, landmark, state, class: kind, counted });
         }
+        let others = self.others.into_iter().map(checked).collect::<Result<_, _>>()?;
         Ok(TruthImage {
             path: folder.join(&self.file),
             file: self.file,
             stratum: if self.stratum.is_empty() { "all".to_owned() } else { self.stratum },
             quads,
+            others,
             quads_complete: self.quads_complete,
             whole_image: self.whole_image,
         })
