@@ -3,7 +3,7 @@
 use crate::{
     detect::{
         chains::ChainParams, edges::EdgeParams, quads::QuadParams, relaxation::RelaxationParams,
-        segments::SegmentParams, similarity::SimilarityParams,
+        segments::SegmentParams, similarity::SimilarityParams, tiling::TilingParams,
     },
     icon::IconParams,
     learn::model::LearnParams,
@@ -24,6 +24,8 @@ pub struct DetectParams {
     pub chains: ChainParams,
     /// Straight segments.
     pub segments: SegmentParams,
+    /// Removal of floor tiling.
+    pub tiling: TilingParams,
     /// Cues and gates of pairs.
     pub similarity: SimilarityParams,
     /// Both relaxations.

@@ -62,8 +62,10 @@ pub trait Trace {
     fn edges(&mut self, _edges: &EdgeMap) {}
     /// The edge chains.
     fn chains(&mut self, _chains: &[EdgeChain]) {}
-    /// The straight segments.
+    /// The straight segments that later stages work on.
     fn segments(&mut self, _segments: &[EdgeSegment]) {}
+    /// The segments that were removed as tiling, when there are any.
+    fn tiling(&mut self, _removed: &[EdgeSegment]) {}
     /// The matched pairs of opposite sides.
     fn pairs(&mut self, _pairs: &[SegmentPair]) {}
     /// The quads.

@@ -9,6 +9,7 @@ use edges::EdgeMap;
 use evidence::Gradients;
 use quads::{Grouping, Nested, Quad};
 use segments::EdgeSegment;
+use tiling::Untiled;
 
 mod deriche;
 mod thinning;
@@ -20,6 +21,7 @@ mod rendering;
 pub mod edges;
 pub mod chains;
 pub mod segments;
+pub mod tiling;
 pub mod similarity;
 mod profiles;
 pub mod relaxation;
@@ -104,6 +106,7 @@ pub fn candidates(
         let level = pyramid::reduce(work, scale);
         let edges = edges::edges(&level, &p.edges);
         let segments = segments::segments(&chains::chains(&edges, &p.chains), &edges, &p.segments);
+        let segments = tiling::untile(segments, (level.width(), level.height()), &p.tiling).kept;
         let gradients = Gradients { image: &level, gx: edges.gx(), gy: edges.gy() };
         let seeds = hypotheses::hypotheses(&segments, &gradients, &p.quads.hypotheses);
         let coarse = selection::rate(&seeds, &gradients, &p.quads);
@@ -129,6 +132,11 @@ fn traced_segments(
     trace.chains(&chains);
     trace.finished(Stage::Chains);
     let segments = segments::segments(&chains, &edges, &p.segments);
+    let Untiled { kept: segments, removed } =
+        tiling::untile(segments, (image.width(), image.height()), &p.tiling);
+    if !removed.is_empty() {
+        trace.tiling(&removed);
+    }
     trace.segments(&segments);
     trace.finished(Stage::Segments);
     (edges, segments)
