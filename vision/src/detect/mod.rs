@@ -73,7 +73,7 @@ fn by_search(image: &GrayImage, p: &DetectParams, trace: &mut impl Trace) -> Vec
     let factor = pyramid::working_factor(image, p.quads.working_side_px);
     let reduced = (factor > 1).then(|| pyramid::reduce(image, factor));
     let work = reduced.as_ref().unwrap_or(image);
-    let (rated, edges) = candidates(work, p, trace);
+    let (rated, edges, segments) = searched(work, p, trace);
     let gradients = Gradients { image: work, gx: edges.gx(), gy: edges.gy() };
     let found = selection::resolve(rated, &p.quads);
     let tolerance = p.relaxation.pair_tolerance_px;
@@ -82,8 +82,17 @@ fn by_search(image: &GrayImage, p: &DetectParams, trace: &mut impl Trace) -> Vec
         Nested::Alternates => nested::absorb(quads, tolerance),
         Nested::Quads => quads,
     };
-    let sharp = quads.into_iter().map(|q| selection::sharpen(q, &gradients, &p.quads));
-    sharp.filter_map(|q| q.scaled(factor as f64)).collect()
+    let mut quads: Vec<Quad> =
+        quads.into_iter().map(|q| selection::sharpen(q, &gradients, &p.quads)).collect();
+    if p.quads.three_sided {
+        let open = three_sided::leftover(&segments, &quads, &gradients, p);
+        // They never take the place of a full quad.
+        quads.truncate(MAX_QUADS);
+        let room = MAX_QUADS - quads.len();
+        quads.extend(open.into_iter().take(room));
+        quads.sort_by(|a, b| b.score.total_cmp(&a.score).then(border::by_corners(a, b)));
+    }
+    quads.into_iter().filter_map(|q| q.scaled(factor as f64)).collect()
 }
 
 /// Everything the search proposes on the scales of an image, rated, not yet chosen from; and the finest edge map.
@@ -92,6 +101,16 @@ pub fn candidates(
     p: &DetectParams,
     trace: &mut impl Trace,
 ) -> (Vec<selection::Rated>, EdgeMap) {
+    let (rated, edges, _) = searched(work, p, trace);
+    (rated, edges)
+}
+
+/// The same with the finest segments.
+fn searched(
+    work: &GrayImage,
+    p: &DetectParams,
+    trace: &mut impl Trace,
+) -> (Vec<selection::Rated>, EdgeMap, Vec<EdgeSegment>) {
     let (edges, segments) = traced_segments(work, p, trace);
     let gradients = Gradients { image: work, gx: edges.gx(), gy: edges.gy() };
     let seeds = hypotheses::hypotheses(&segments, &gradients, &p.quads.hypotheses);
@@ -112,7 +131,7 @@ pub fn candidates(
         let coarse = selection::rate(&seeds, &gradients, &p.quads);
         rated.extend(coarse.into_iter().filter_map(|r| r.scaled(scale as f64)));
     }
-    (rated, edges)
+    (rated, edges, segments)
 }
 
 /// Most scales of the search.

@@ -192,6 +192,8 @@ pub struct QuadParams {
     pub three_sided: bool,
     /// Smallest c5 of a set of three sides.
     pub min_three_sided_closing: f64,
+    /// Smallest score of a set of three sides of the search.
+    pub min_three_sided_score: f64,
 }
 
 impl Default for QuadParams {
@@ -210,6 +212,7 @@ impl Default for QuadParams {
             border_model: BorderModel::default(),
             three_sided: true,
             min_three_sided_closing: 0.5,
+            min_three_sided_score: 0.5,
         }
     }
 }

@@ -139,6 +139,18 @@ fn rough_pairs(segments: &[EdgeSegment], p: &SimilarityParams) -> Vec<Rough> {
 
 fn rough_pair(segments: &[EdgeSegment], k: usize, l: usize, p: &SimilarityParams) -> Option<Rough> {
     let (a, b) = (&segments[k], &segments[l]);
+    let (cues, quad_px, distance_px) = shape(a, b, p)?;
+    let bound = weigh(&[cues[0], cues[1], cues[2], cues[3], 1.0, 1.0], a.clipped || b.clipped, p);
+    (bound > p.min_score).then_some(Rough { k, l, quad_px, cues, distance_px, bound })
+}
+
+/// The cues c1 to c4, the 4-gon and the mean distance of two segments; none when distance, overlap or convexity
+/// refuse.
+fn shape(
+    a: &EdgeSegment,
+    b: &EdgeSegment,
+    p: &SimilarityParams,
+) -> Option<([f64; 4], [Point2<f64>; 4], f64)> {
     let distance = |from: &EdgeSegment, to: &EdgeSegment| {
         (to.normal.dot(&nalgebra::center(&from.p_px, &from.q_px).coords) - to.rho_px).abs()
     };
@@ -157,8 +169,7 @@ fn rough_pair(segments: &[EdgeSegment], k: usize, l: usize, p: &SimilarityParams
         inverse_ratio(a.length_px + b.length_px, h),
         overlap,
     ];
-    let bound = weigh(&[cues[0], cues[1], cues[2], cues[3], 1.0, 1.0], a.clipped || b.clipped, p);
-    (bound > p.min_score).then_some(Rough { k, l, quad_px, cues, distance_px: 0.5 * h, bound })
+    Some((cues, quad_px, 0.5 * h))
 }
 
 /// Adds the two dear cues; nothing when no third segment closes the pair or the similarity stays too low.
@@ -186,6 +197,29 @@ fn score(
     let cues = with(profiles.correlation(r.k, r.l, half_width).max(0.0));
     let score = weigh(&cues, clipped, p);
     (score > p.min_score).then_some(SegmentPair { k: r.k, l: r.l, score, cues, quad_px: r.quad_px, closing })
+}
+
+/// Similarity of two segments by shape alone, cues c1 to c4, 0 to 1; none when a cheap gate of method 2 refuses.
+pub(super) fn shape_similarity(a: &EdgeSegment, b: &EdgeSegment, p: &SimilarityParams) -> Option<f64> {
+    if a.normal.dot(&b.normal).abs() < p.max_angle_deg.to_radians().cos() {
+        return None;
+    }
+    let (cues, _, _) = shape(a, b, p)?;
+    let weights = &p.weights[..4];
+    let total: f64 = weights.iter().sum();
+    Some(cues.iter().zip(weights).map(|(c, w)| c * w).sum::<f64>() / total.max(f64::MIN_POSITIVE))
+}
+
+/// c5 of a segment for the chord between two points: how near its ends come to the chord's.
+pub(super) fn closing_cue(
+    from: &Point2<f64>,
+    to: &Point2<f64>,
+    segment: &EdgeSegment,
+    p: &SimilarityParams,
+) -> f64 {
+    let reach = p.closing_gap * (to - from).norm() + p.closing_gap_px;
+    let nearest = |e: &Point2<f64>| (segment.p_px - e).norm().min((segment.q_px - e).norm());
+    (-(0.5 * (nearest(from) + nearest(to)) / reach).powi(2)).exp()
 }
 
 /// Weighted mean of the cues. The length of a clipped segment means little, so its cue has half its weight.
