@@ -1,9 +1,9 @@
-//! Block letters of 5 x 7 dots: A to Z and 0 to 9.
+//! Block letters of 5 x 7 dots: A to Z, 0 to 9 and some signs.
 
 /// Dots across a letter.
-pub(crate) const COLUMNS: usize = 5;
+pub const COLUMNS: usize = 5;
 /// Dots down a letter.
-pub(crate) const ROWS: usize = 7;
+pub const ROWS: usize = 7;
 
 const GLYPHS: [[u8; ROWS]; 36] = [
     [0x0E, 0x11, 0x11, 0x1F, 0x11, 0x11, 0x11], // A
@@ -44,11 +44,26 @@ const GLYPHS: [[u8; ROWS]; 36] = [
     [0x0E, 0x11, 0x11, 0x0F, 0x01, 0x01, 0x0E], // 9
 ];
 
-/// The rows of a letter, top first, most significant of five bits at the left. Blank for what is not A-Z or 0-9.
-pub(crate) fn glyph(letter: char) -> [u8; ROWS] {
+const SIGNS: [(char, [u8; ROWS]); 12] = [
+    ('.', [0, 0, 0, 0, 0, 0x0C, 0x0C]),
+    (',', [0, 0, 0, 0, 0x0C, 0x04, 0x08]),
+    (':', [0, 0x0C, 0x0C, 0, 0x0C, 0x0C, 0]),
+    ('-', [0, 0, 0, 0x1F, 0, 0, 0]),
+    ('_', [0, 0, 0, 0, 0, 0, 0x1F]),
+    ('+', [0, 0x04, 0x04, 0x1F, 0x04, 0x04, 0]),
+    ('=', [0, 0, 0x1F, 0, 0x1F, 0, 0]),
+    ('/', [0x01, 0x01, 0x02, 0x04, 0x08, 0x10, 0x10]),
+    ('%', [0x19, 0x19, 0x02, 0x04, 0x08, 0x13, 0x13]),
+    ('(', [0x02, 0x04, 0x08, 0x08, 0x08, 0x04, 0x02]),
+    (')', [0x08, 0x04, 0x02, 0x02, 0x02, 0x04, 0x08]),
+    ('>', [0x08, 0x04, 0x02, 0x01, 0x02, 0x04, 0x08]),
+];
+
+/// The rows of a letter, top first, most significant of five bits at the left. Blank for what there is no letter of.
+pub fn glyph(letter: char) -> [u8; ROWS] {
     match letter {
         'A'..='Z' => GLYPHS[letter as usize - 'A' as usize],
         '0'..='9' => GLYPHS[26 + letter as usize - '0' as usize],
-        _ => [0; ROWS],
+        _ => SIGNS.iter().find(|(sign, _)| *sign == letter).map_or([0; ROWS], |(_, rows)| *rows),
     }
 }

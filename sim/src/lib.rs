@@ -30,7 +30,7 @@
 //! Modules stand in reading order: what is drawn, where it hangs, how a camera sees it, other sensors, robots.
 
 pub(crate) mod seed;
-pub(crate) mod font;
+pub mod font;
 pub mod texture;
 pub(crate) mod canvas;
 pub mod posters;

@@ -185,7 +185,20 @@ fn the_rendered_corridor_is_a_set_like_any_other() {
     let mut args: Vec<OsString> =
         ["evaluate", "detection", "corridor", "--views", "4", "--json", "--keep"].map(Into::into).into();
     args.push(kept.clone().into());
-    let rendered = waymark(args, LONGEST).last_json();
+    let (plot, worst) = (folder.path().join("plot.svg"), folder.path().join("worst"));
+    args.extend(["--compare", "relaxation", "--worst", "2", "--plot"].map(Into::into));
+    args.extend([plot.clone().into(), "--draw".into(), worst.clone().into()]);
+    let run = waymark(args, LONGEST);
+    let [rendered, paper] = run.json_lines().try_into().expect("a line each");
+    assert_eq!((&rendered["params"], &paper["params"]), (&"default".into(), &"relaxation".into()));
+    assert_eq!(rendered["worst"].as_array().map(Vec::len), Some(2), "{run:?}");
+    assert!(fs::read_to_string(plot).expect("the plot").contains("relaxation"));
+    for name in ["default", "relaxation"] {
+        let pictures = fs::read_dir(worst.join(name)).expect("a folder each");
+        let open =
+            |p: std::io::Result<fs::DirEntry>| image::open(p.expect("an entry").path()).expect("a picture");
+        assert_eq!(pictures.map(open).filter(|p| p.width() >= 640 && p.height() > 480).count(), 2);
+    }
     let from_folder = evaluate("detection", &kept).last_json();
     for key in ["set", "images", "quads", "recall_70", "recall_85", "false_per_image", "corner_error_px"] {
         assert_eq!(rendered[key], from_folder[key], "{key}");

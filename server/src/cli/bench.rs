@@ -105,7 +105,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
             costs.entry(stage).or_default().push(ms);
         }
     }
-    let median = |values: &mut Vec<f64>| super::evaluate::detection::median(values).unwrap_or(0.0);
+    let median = |values: &mut Vec<f64>| super::evaluate::statistics::median(values).unwrap_or(0.0);
     let frame_ms = median(&mut totals);
     let report = Report {
         frames: frames.len(),

@@ -1,8 +1,10 @@
 //! The `waymark` command line: one file per command.
 
 mod bench;
+mod clock;
 mod demo;
 mod detect;
+mod drawing;
 pub(crate) mod evaluate;
 pub(crate) mod pictures;
 pub(crate) mod scratch;

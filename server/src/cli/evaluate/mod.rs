@@ -1,6 +1,8 @@
 //! `waymark evaluate`: the paper's experiments on labelled pictures. Tables for people, one JSON object for programs.
 
 mod rendered;
+mod reviewed;
+pub(crate) mod statistics;
 pub(crate) mod truth;
 pub(crate) mod detection;
 pub(crate) mod recognition;
@@ -10,7 +12,12 @@ pub(crate) mod recognition;
 pub(crate) enum Command {
     /// Quads against labelled corners: recall at IoU 0.7 and 0.85, false quads, corner error, time.
     ///
-    /// The folder is in the evaluation format, described in the folder docs.
+    /// A set is a folder in the evaluation format (docs/EVALUATION.md), or `corridor`: rendered views with exact truth,
+    /// for which no data is needed. Figures come with 95 % confidence intervals, for all quads and by class, stratum,
+    /// size and angle of view.
+    ///
+    /// For example, what the search gains over the paper's grouping, and where it fails:
+    ///   waymark evaluate detection corridor --compare relaxation --plot recall.svg --worst 20 --draw worst
     Detection(detection::Args),
     /// Teach a server from the set's pictures, then have it recognise the others over zenoh.
     ///

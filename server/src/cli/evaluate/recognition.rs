@@ -2,7 +2,7 @@
 //! other pictures sent over zenoh. Right, wrong and missed identities, strangers refused and accepted, time.
 
 use super::{
-    detection::median,
+    statistics::median,
     truth::{Truth, TruthImage},
 };
 use crate::{

@@ -50,6 +50,8 @@ pub(crate) struct TruthQuad {
     pub(crate) class: Option<String>,
     /// A detector must find it; else it is neither missed nor false.
     pub(crate) counted: bool,
+    /// Between its normal and the direction to the camera, where the set says so.
+    pub(crate) view_angle_rad: Option<f64>,
 }
 
 /// One picture with its labels.
@@ -143,6 +145,7 @@ struct RawQuad {
     #[serde(default)]
     state: QuadState,
     kind: Option<String>,
+    view_angle_rad: Option<f64>,
     #[serde(default = "yes")]
     counted: bool,
 }
@@ -163,8 +166,8 @@ impl RawImage {
         let mut quads = Vec::with_capacity(self.quads.len());
         for quad in self.quads {
             let corners = checked(quad.corners)?;
-            let RawQuad { landmark, state, kind, counted, .. } = quad;
-            quads.push(TruthQuad { corners, landmark, state, class: kind, counted });
+            let RawQuad { landmark, state, kind, counted, view_angle_rad, .. } = quad;
+            quads.push(TruthQuad { corners, landmark, state, class: kind, counted, view_angle_rad });
         }
         let others = self.others.into_iter().map(checked).collect::<Result<_, _>>()?;
         Ok(TruthImage {

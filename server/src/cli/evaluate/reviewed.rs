@@ -1,0 +1,86 @@
+//! Reviewed lists: real four-sided things in a set's pictures that the set does not label (signs, switches, windows),
+//! each looked at by a person and written down. Quads on them are counted apart from the other false ones, and nothing
+//! else changes. The lists are in `tests/reviewed`, one file a set, named after it.
+
+use anyhow::Context as _;
+use serde::Deserialize;
+use std::{collections::BTreeMap, path::Path};
+use vision::detect::quads::Corners;
+
+/// Lists that come with the program, by name of the set.
+const BUILT_IN: [(&str, &str); 1] =
+    [("museum-paintings", include_str!("../../../../tests/reviewed/museum-paintings.json"))];
+
+/// A thing that is really there.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Thing {
+    /// Clockwise on screen, pixels of the picture.
+    pub(crate) corners: Corners,
+    /// What it is.
+    pub(crate) what: String,
+}
+
+/// Things by file of the set.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Reviewed(BTreeMap<String, Vec<Thing>>);
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct List {
+    set: String,
+    images: BTreeMap<String, Vec<Thing>>,
+}
+
+impl Reviewed {
+    /// The list in `file`; without one the list that comes with the program, if there is any for the set.
+    pub(crate) fn of(set: &str, file: Option<&Path>) -> anyhow::Result<Self> {
+        if let Some(path) = file {
+            let text =
+                std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+            return Self::parse(set, &text)
+                .with_context(|| format!("{} is no list of {set}", path.display()));
+        }
+        match BUILT_IN.iter().find(|(name, _)| *name == set) {
+            Some((name, text)) => Self::parse(set, text).with_context(|| format!("the list of {name}")),
+            None => Ok(Self::default()),
+        }
+    }
+
+    fn parse(set: &str, text: &str) -> anyhow::Result<Self> {
+        let list: List = serde_json::from_str(text)?;
+        anyhow::ensure!(list.set == set, "it is of {}", list.set);
+        Ok(Self(list.images))
+    }
+
+    /// Things in one picture.
+    pub(crate) fn things(&self, file: &str) -> &[Thing] {
+        self.0.get(file).map_or(&[], Vec::as_slice)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lists_that_come_with_the_program_are_sound() {
+        for (name, _) in BUILT_IN {
+            let list = Reviewed::of(name, None).unwrap();
+            for (file, things) in &list.0 {
+                assert!(!things.is_empty(), "{file}");
+                assert!(things.iter().all(|t| t.what.len() > 3), "{file}: says what each is");
+            }
+        }
+        assert!(Reviewed::of("no-such-set", None).unwrap().things("a.jpg").is_empty());
+    }
+
+    #[test]
+    fn a_list_is_of_one_set() {
+        let text =
+            r#"{"set": "a", "images": {"x.jpg": [{"corners": [[0,0],[9,0],[9,9],[0,9]], "what": "label"}]}}"#;
+        assert_eq!(Reviewed::parse("a", text).unwrap().things("x.jpg").len(), 1);
+        assert!(Reviewed::parse("b", text).is_err());
+        assert!(Reviewed::parse("a", &text.replace("[9,9]", "[-9,-9]")).is_err(), "no quad");
+    }
+}
