@@ -3,7 +3,11 @@
 use criterion::{Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
 use vision::{
-    detect::{chains::chains, edges::edges, segments::segments},
+    detect::{
+        chains::chains,
+        edges::{EdgeMap, edges, edges_into},
+        segments::segments,
+    },
     frame::GrayImage,
     params::DetectParams,
 };
@@ -29,7 +33,9 @@ fn stages(c: &mut Criterion) {
     let (image, p) = (scene(), DetectParams::default());
     let map = edges(&image, &p.edges);
     let chained = chains(&map, &p.chains);
-    c.bench_function("edges", |b| b.iter(|| edges(black_box(&image), &p.edges)));
+    let mut kept = EdgeMap::default();
+    c.bench_function("edges", |b| b.iter(|| edges_into(black_box(&image), &p.edges, &mut kept)));
+    c.bench_function("edges_in_new_memory", |b| b.iter(|| edges(black_box(&image), &p.edges)));
     c.bench_function("chains", |b| b.iter(|| chains(black_box(&map), &p.chains)));
     c.bench_function("segments", |b| b.iter(|| segments(black_box(&chained), &map, &p.segments)));
 }

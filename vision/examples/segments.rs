@@ -4,13 +4,17 @@
 
 use std::{error::Error, time::Instant};
 use vision::{
-    detect::{chains::chains, edges::edges, segments::segments},
+    detect::{
+        chains::chains,
+        edges::{EdgeMap, edges_into},
+        segments::segments,
+    },
     frame::GrayImage,
     params::DetectParams,
 };
 
 /// Runs of which the fastest counts.
-const RUNS: usize = 3;
+const RUNS: usize = 9;
 
 fn main() -> Result<(), Box<dyn Error>> {
     println!("file,pu,pv,qu,qv,contrast,support,chain,clipped");
@@ -24,9 +28,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         let image = GrayImage::new(gray.width() as usize, gray.height() as usize, gray.into_raw())?;
         let mut best_ms = [f64::INFINITY; 3];
         let mut all = Vec::new();
+        let mut map = EdgeMap::default();
         for _ in 0..RUNS {
             let start = Instant::now();
-            let map = edges(&image, &p.edges);
+            edges_into(&image, &p.edges, &mut map);
             let after_edges = Instant::now();
             let chained = chains(&map, &p.chains);
             let after_chains = Instant::now();

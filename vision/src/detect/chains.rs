@@ -5,7 +5,7 @@
 
 use super::{
     bridging::bridged,
-    edges::EdgeMap,
+    edges::{EDGE, EdgeMap},
     thinning::{BRANCHES, RING, ring_code},
 };
 use nalgebra::{Point2, Vector2};
@@ -84,19 +84,19 @@ struct Tracer<'a> {
     /// Branches that meet in each edge pixel, 0 elsewhere.
     branches: Vec<u8>,
     /// Edge pixels not yet in a run. Junctions stay free: several runs may end there.
-    free: Vec<bool>,
+    free: Vec<u8>,
     pixels: Vec<u32>,
     runs: Vec<Run>,
 }
 
 impl<'a> Tracer<'a> {
     fn new(edges: &'a EdgeMap) -> Self {
-        let mut branches = vec![0; edges.mask().len()];
+        let mut branches = vec![0; edges.marks().len()];
         for &at in edges.pixels() {
-            branches[at as usize] = BRANCHES[ring_code(edges.mask(), edges.width(), at as usize)];
+            branches[at as usize] = BRANCHES[ring_code(edges.marks(), edges.width(), at as usize)];
         }
         let pixels = Vec::with_capacity(edges.pixels().len() + 16);
-        Self { edges, branches, free: edges.mask().to_vec(), pixels, runs: Vec::new() }
+        Self { edges, branches, free: edges.marks().to_vec(), pixels, runs: Vec::new() }
     }
 
     /// From ends, from junctions, then what is left: closed loops.
@@ -106,7 +106,7 @@ impl<'a> Tracer<'a> {
         for &at in all {
             let at = at as usize;
             match self.branches[at] {
-                0 | 1 if self.free[at] => self.trace(at),
+                0 | 1 if self.free[at] == EDGE => self.trace(at),
                 3.. => junctions.push(at),
                 _ => {}
             }
@@ -121,7 +121,7 @@ impl<'a> Tracer<'a> {
             }
         }
         for &at in all {
-            if self.free[at as usize] && self.branches[at as usize] < 3 {
+            if self.free[at as usize] == EDGE && self.branches[at as usize] < 3 {
                 self.trace(at as usize);
             }
         }
@@ -133,7 +133,7 @@ impl<'a> Tracer<'a> {
     fn trace(&mut self, at: usize) {
         let start = self.pixels.len();
         self.pixels.push(at as u32);
-        self.free[at] = false;
+        self.free[at] = 0;
         self.follow(at, start, None);
         let last = self.pixels[self.pixels.len() - 1] as usize;
         let long = self.pixels.len() - start > 3;
@@ -146,7 +146,7 @@ impl<'a> Tracer<'a> {
             self.pixels[start..forward].reverse();
         }
         if self.branches[at] >= 3 {
-            self.free[at] = true;
+            self.free[at] = EDGE;
         }
         let end = self.pixels.len();
         if end - start > 1 {
@@ -164,7 +164,7 @@ impl<'a> Tracer<'a> {
             if self.branches[next] >= 3 {
                 return;
             }
-            self.free[next] = false;
+            self.free[next] = 0;
             (at, sense) = (next, Some(hand));
         }
     }
@@ -201,7 +201,7 @@ impl<'a> Tracer<'a> {
     /// Cosine between a step and the tangent that has the bright side on its right, times the step's length.
     fn along(&self, at: usize, du: f32, dv: f32) -> f32 {
         let (gx, gy) = (self.edges.gx()[at], self.edges.gy()[at]);
-        (gy * du - gx * dv) / self.edges.magnitude()[at]
+        (gy * du - gx * dv) / self.edges.magnitude(at)
     }
 
     /// On which hand the bright side lies when walking from `at` to its neighbour `to`.

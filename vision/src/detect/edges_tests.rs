@@ -9,7 +9,7 @@ fn a_step_between_two_pixels_lies_half_way() {
     for &at in map.pixels() {
         let p = map.position_px(at as usize);
         assert!((p.x - 19.5).abs() < 1e-3, "{p}");
-        assert!((map.magnitude()[at as usize] - 100.0).abs() < 0.01);
+        assert!((map.magnitude(at as usize) - 100.0).abs() < 0.01);
     }
 }
 
@@ -95,7 +95,7 @@ fn a_fading_edge_is_followed_both_ways() {
 fn flat_and_tiny_images_have_no_edges() {
     for (width, height) in [(1, 1), (1, 50), (50, 1), (4, 4), (5, 3), (64, 48)] {
         let map = edges(&GrayImage::from_fn(width, height, |_, _| 77), &EdgeParams::default());
-        assert!(map.pixels().is_empty() && map.mask().len() == width * height);
+        assert!(map.pixels().is_empty() && map.marks().len() == width * height);
         let noisy = GrayImage::from_fn(width, height, |u, v| ((u * 97 + v * 57) % 251) as u8);
         for &at in edges(&noisy, &EdgeParams::default()).pixels() {
             let (u, v) = (at as usize % width, at as usize / width);
@@ -106,18 +106,24 @@ fn flat_and_tiny_images_have_no_edges() {
     }
 }
 
+fn within(image: &GrayImage, p: &EdgeParams, max_points: usize) -> EdgeMap {
+    let mut map = EdgeMap::default();
+    map.fill(Level::new(), image, p, max_points);
+    map
+}
+
 #[test]
 fn the_strongest_points_are_kept_up_to_the_bound() {
     // Steps that grow to the right.
     let image = GrayImage::from_fn(80, 40, |u, _| (if u % 10 < 5 { 20 + u } else { 10 }) as u8);
     let p = EdgeParams::default();
-    let all = edges_within(&image, &p, usize::MAX).pixels().len();
-    assert_eq!(edges_within(&image, &p, all).pixels().len(), all);
-    let half = edges_within(&image, &p, all / 2);
+    let all = within(&image, &p, usize::MAX).pixels().len();
+    assert_eq!(within(&image, &p, all).pixels().len(), all);
+    let half = within(&image, &p, all / 2);
     assert!(half.pixels().len() <= all / 2 && half.pixels().len() > all / 3);
-    let weakest = half.pixels().iter().map(|&at| half.magnitude()[at as usize]).fold(f32::INFINITY, f32::min);
+    let weakest = half.pixels().iter().map(|&at| half.magnitude(at as usize)).fold(f32::INFINITY, f32::min);
     assert!(weakest > 40.0);
-    assert!(edges_within(&image, &p, 0).pixels().is_empty());
+    assert!(within(&image, &p, 0).pixels().is_empty());
 }
 
 #[test]

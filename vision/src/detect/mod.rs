@@ -11,7 +11,9 @@ use quads::{Grouping, Nested, Quad};
 use segments::EdgeSegment;
 use tiling::Untiled;
 
+mod tiles;
 mod deriche;
+mod maxima;
 mod thinning;
 mod bridging;
 mod joining;

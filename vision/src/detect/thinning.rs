@@ -3,6 +3,8 @@
 //! Both look only at the ring of eight neighbours, coded as one byte; the answers for all 256 codes are tables made at
 //! compile time.
 
+use super::edges::EDGE;
+
 /// The ring of neighbours (du, dv), clockwise on screen from the one above. Bit i of a ring code is neighbour i.
 pub(crate) const RING: [(i32, i32); 8] =
     [(0, -1), (1, -1), (1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1)];
@@ -55,38 +57,35 @@ const fn branches(code: usize) -> u8 {
     if touches >= set { 1 } else { (set - touches) as u8 }
 }
 
-/// Ring code of pixel `at` of a row-major mask. The pixel must not lie on the image border.
+/// Ring code of pixel `at`: which neighbours are marked as edge in a row-major plane. The pixel must not lie on the image
+/// border.
 #[inline]
-pub(crate) fn ring_code(mask: &[bool], width: usize, at: usize) -> usize {
-    let (above, below) = (&mask[at - width - 1..at - width + 2], &mask[at + width - 1..at + width + 2]);
-    usize::from(above[1])
-        | usize::from(above[2]) << 1
-        | usize::from(mask[at + 1]) << 2
-        | usize::from(below[2]) << 3
-        | usize::from(below[1]) << 4
-        | usize::from(below[0]) << 5
-        | usize::from(mask[at - 1]) << 6
-        | usize::from(above[0]) << 7
+pub(crate) fn ring_code(marks: &[u8], width: usize, at: usize) -> usize {
+    let three = |start: usize| &marks[start..start + 3];
+    let (above, level, below) = (three(at - width - 1), three(at - 1), three(at + width - 1));
+    let bit = |mark: u8, i: usize| usize::from(mark & EDGE) << i;
+    (bit(above[1], 0) | bit(above[2], 1) | bit(level[2], 2) | bit(below[2], 3))
+        | (bit(below[1], 4) | bit(below[0], 5) | bit(level[0], 6) | bit(above[0], 7))
 }
 
-/// Clears staircase corners in `mask` and `pixels` (row-major, none on the border) alike. Of two corners that touch,
+/// Clears staircase corners in `marks` and `pixels` (row-major, none on the border) alike. Of two corners that touch,
 /// the weaker goes: which one must not depend on how the image lies.
-pub(crate) fn thin(mask: &mut [bool], width: usize, magnitude: &[f32], pixels: &mut Vec<u32>) {
-    let removable = |mask: &[bool], at: usize| mask[at] && REMOVABLE[ring_code(mask, width, at)];
+pub(crate) fn thin(marks: &mut [u8], width: usize, magnitude: impl Fn(usize) -> f32, pixels: &mut Vec<u32>) {
+    let removable = |marks: &[u8], at: usize| marks[at] == EDGE && REMOVABLE[ring_code(marks, width, at)];
     let corners: Vec<usize> =
-        pixels.iter().map(|&at| at as usize).filter(|&at| removable(mask, at)).collect();
+        pixels.iter().map(|&at| at as usize).filter(|&at| removable(marks, at)).collect();
     for weakest in [true, false] {
         for &at in &corners {
             let beaten = weakest
                 && [at - width, at - 1, at + 1, at + width]
                     .into_iter()
-                    .any(|near| magnitude[near] < magnitude[at] && removable(mask, near));
-            if !beaten && removable(mask, at) {
-                mask[at] = false;
+                    .any(|near| magnitude(near) < magnitude(at) && removable(marks, near));
+            if !beaten && removable(marks, at) {
+                marks[at] = 0;
             }
         }
     }
-    pixels.retain(|&at| mask[at as usize]);
+    pixels.retain(|&at| marks[at as usize] == EDGE);
 }
 
 #[cfg(test)]
@@ -96,12 +95,13 @@ mod tests {
     fn thinned(picture: &str) -> String {
         let rows: Vec<&str> = picture.split_whitespace().collect();
         let width = rows[0].len();
-        let mut mask: Vec<bool> = rows.concat().bytes().map(|b| b == b'#').collect();
-        let mut pixels: Vec<u32> = (0..mask.len() as u32).filter(|&i| mask[i as usize]).collect();
-        thin(&mut mask, width, &vec![1.0; rows.len() * width], &mut pixels);
-        assert_eq!(pixels.len(), mask.iter().filter(|m| **m).count());
-        mask.chunks(width)
-            .map(|row| row.iter().map(|m| if *m { '#' } else { '.' }).collect::<String>())
+        let mut marks: Vec<u8> = rows.concat().bytes().map(|b| u8::from(b == b'#')).collect();
+        let mut pixels: Vec<u32> = (0..marks.len() as u32).filter(|&i| marks[i as usize] == EDGE).collect();
+        thin(&mut marks, width, |_| 1.0, &mut pixels);
+        assert_eq!(pixels.len(), marks.iter().map(|m| usize::from(*m)).sum::<usize>());
+        marks
+            .chunks(width)
+            .map(|row| row.iter().map(|m| if *m == EDGE { '#' } else { '.' }).collect::<String>())
             .collect::<Vec<_>>()
             .join(" ")
     }
