@@ -25,7 +25,27 @@ const LONGEST: Duration = Duration::from_mins(2);
 const OPTIONS: [(&str, &[&str]); 13] = [
     ("demo", &["--robots", "--rate-hz", "--legs", "--seed", "--http", "--data", "--stay", "--json"]),
     ("serve", &["--config", "--data", "--http", "--zenoh", "--fleet", "--workers", "--insecure"]),
-    ("detect", &["--json", "<IMAGES>"]),
+    (
+        "detect",
+        &[
+            "--json",
+            "--draw",
+            "--show-params",
+            "--params",
+            "--grouping",
+            "--working-side",
+            "--scales",
+            "--min-segment",
+            "--edge-steps",
+            "--min-support",
+            "--min-score",
+            "--nested",
+            "--no-three-sided",
+            "--remove-tiling",
+            "--set",
+            "[IMAGES]",
+        ],
+    ),
     ("map create", &["--distance", "--server", "--json", "<NAME>"]),
     ("map list", &["--server", "--json"]),
     ("robot add", &["--map", "--server", "<NAME>"]),
@@ -115,7 +135,8 @@ fn write_bad(folder: &Path) -> Vec<PathBuf> {
         ("empty.png", &[]),
         ("text.txt", b"This is no picture.\nNot in its second line either.\n"),
     ];
-    let mut bad = vec![folder.join("missing.jpg"), folder.to_owned()];
+    fs::create_dir(folder.join("no-pictures")).expect("a folder");
+    let mut bad = vec![folder.join("missing.jpg"), folder.join("no-pictures")];
     for (name, bytes) in files {
         bad.push(folder.join(name));
         fs::write(folder.join(name), bytes).expect("a file");
@@ -203,6 +224,60 @@ fn detect_finds_a_rendered_poster() {
         let best = quads.iter().map(|q| polygon::iou(corners(q).points(), truth.points()));
         let best = best.fold(0.0, f64::max);
         assert!(best >= 0.85, "IoU {best} at best in {line}");
+    }
+}
+
+#[test]
+fn every_stage_is_drawn_for_every_picture_of_a_folder() {
+    let folder = TempDir::new().expect("a temporary directory");
+    let (pictures, drawings) = (folder.path().join("pictures"), folder.path().join("drawings"));
+    fs::create_dir_all(pictures.join("more")).expect("folders");
+    let card = DynamicImage::from(card(320, 240));
+    card.save(pictures.join("a.png")).expect("a picture");
+    card.save(pictures.join("b.JPG")).expect("a picture");
+    card.save(pictures.join("more/a.png")).expect("a picture");
+    fs::write(pictures.join("notes.txt"), "no picture").expect("a file");
+    let args: [OsString; 5] = [
+        "detect".into(),
+        pictures.clone().into(),
+        pictures.join("more/a.png").into(),
+        "--draw".into(),
+        drawings.clone().into(),
+    ];
+    let run = waymark(args, LONGEST);
+    assert_eq!((run.status, run.stdout.matches("1 quads").count()), (0, 3), "{run:?}");
+    let mut expected = Vec::new();
+    for stem in ["a", "a_2", "b"] {
+        for stage in ["1-edges", "2-chains", "3-segments", "4-pairs", "5-quads", "overview"] {
+            expected.push(format!("{stem}-{stage}.png"));
+        }
+    }
+    let mut written: Vec<String> = fs::read_dir(&drawings)
+        .expect("the folder of drawings")
+        .map(|e| e.expect("an entry").file_name().to_string_lossy().into_owned())
+        .collect();
+    written.sort();
+    expected.sort();
+    assert_eq!(written, expected);
+    // The card's upper side is drawn in colour where the grey picture has none.
+    for stage in &expected[..5] {
+        let picture = image::open(drawings.join(stage)).expect("a picture").into_rgb8();
+        let scale = picture.width() / 320;
+        let near =
+            (-2_i32..=2).map(|d| picture.get_pixel(160 * scale, (61 * scale).saturating_add_signed(d)).0);
+        let spread = near.map(|p| p.iter().max().unwrap_or(&0) - p.iter().min().unwrap_or(&0)).max();
+        assert!(spread > Some(60), "{stage}: {spread:?}");
+    }
+}
+
+#[test]
+fn parameters_are_shown_taken_and_checked() {
+    let shown = waymark(["detect", "--show-params", "--scales", "1", "--set", "edges.high=9"], LONGEST);
+    let all: Value = serde_json::from_str(&shown.stdout).expect("JSON");
+    assert_eq!((&all["quads"]["scales"], &all["edges"]["high"]), (&1.into(), &9.0.into()), "{all}");
+    for (wrong, word) in [("quads.scale=1", "no scale"), ("quads.scales=-1", "quads.scales")] {
+        let run = waymark(["detect", "--show-params", "--set", wrong], LONGEST);
+        assert!(run.status == 1 && run.stderr.contains(word), "{run:?}");
     }
 }
 

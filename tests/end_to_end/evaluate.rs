@@ -74,7 +74,11 @@ fn detected(folder: &Path, set: &DataSet) -> Vec<Vec<Quad>> {
     let run = waymark(["detect", "--json"].into_iter().map(OsString::from).chain(paths), LONGEST);
     let quads = |line: &Value| {
         let quads = line["quads"].as_array().expect("quads").iter();
-        quads.map(|q| serde_json::from_value(q["corners"].clone()).expect("corners")).collect()
+        // Sets of three sides are left out of all figures.
+        quads
+            .filter(|q| q["kind"] == "full")
+            .map(|q| serde_json::from_value(q["corners"].clone()).expect("corners"))
+            .collect()
     };
     run.json_lines().iter().map(quads).collect()
 }

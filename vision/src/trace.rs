@@ -2,7 +2,8 @@
 //! with [`NoTrace`] that costs nothing. The clock and all drawing live with whoever implements the trait.
 
 use crate::detect::{
-    chains::EdgeChain, edges::EdgeMap, quads::Quad, segments::EdgeSegment, similarity::SegmentPair,
+    chains::EdgeChain, edges::EdgeMap, grouping::QuadSeed, quads::Quad, segments::EdgeSegment,
+    similarity::SegmentPair,
 };
 
 /// The stages in their order; names appear in timings and picture files.
@@ -14,12 +15,10 @@ pub enum Stage {
     Chains,
     /// Recursive segmentation.
     Segments,
-    /// Similarity and the first relaxation.
+    /// Similarity and the first relaxation, or the hypotheses of the search.
     Pairs,
     /// Second relaxation, border choice, sub-pixel corners.
     Quads,
-    /// Rectified icons.
-    Icons,
     /// Points, descriptors and distances to the models.
     Recognition,
     /// Poses from recognised landmarks.
@@ -28,13 +27,12 @@ pub enum Stage {
 
 impl Stage {
     /// Every stage, in order.
-    pub const ALL: [Stage; 8] = [
+    pub const ALL: [Stage; 7] = [
         Stage::Edges,
         Stage::Chains,
         Stage::Segments,
         Stage::Pairs,
         Stage::Quads,
-        Stage::Icons,
         Stage::Recognition,
         Stage::Poses,
     ];
@@ -47,7 +45,6 @@ impl Stage {
             Stage::Segments => "segments",
             Stage::Pairs => "pairs",
             Stage::Quads => "quads",
-            Stage::Icons => "icons",
             Stage::Recognition => "recognition",
             Stage::Poses => "poses",
         }
@@ -68,6 +65,8 @@ pub trait Trace {
     fn tiling(&mut self, _removed: &[EdgeSegment]) {}
     /// The matched pairs of opposite sides.
     fn pairs(&mut self, _pairs: &[SegmentPair]) {}
+    /// The search's hypotheses that edges support, on the finest scale, in place of pairs.
+    fn seeds(&mut self, _seeds: &[QuadSeed]) {}
     /// The quads.
     fn quads(&mut self, _quads: &[Quad]) {}
 }

@@ -15,7 +15,13 @@ pub(crate) const RED: Colour = [255, 60, 50];
 pub(crate) const BLUE: Colour = [80, 150, 255];
 pub(crate) const YELLOW: Colour = [255, 215, 0];
 pub(crate) const ORANGE: Colour = [255, 140, 30];
+pub(crate) const CYAN: Colour = [0, 210, 230];
+pub(crate) const MAGENTA: Colour = [240, 90, 230];
 pub(crate) const WHITE: Colour = [255, 255, 255];
+
+/// Many things of a kind, neighbours of different colour.
+pub(crate) const SERIES: [Colour; 10] =
+    [GREEN, ORANGE, BLUE, YELLOW, MAGENTA, CYAN, RED, [170, 255, 160], [190, 160, 255], [255, 190, 170]];
 
 /// Height of the line of words under a picture.
 const LEGEND_PX: usize = 22;
@@ -66,7 +72,8 @@ impl Picture {
     pub(crate) fn line(&mut self, from: [f64; 2], to: [f64; 2], width_px: f64, colour: Colour) {
         let Some((from, to)) = self.cut(from, to, width_px + 1.0) else { return };
         let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
-        let length = dx.hypot(dy).max(1e-9);
+        let length = dx.hypot(dy);
+        let (ex, ey) = if length > 1e-9 { (dx / length, dy / length) } else { (1.0, 0.0) };
         let reach = 0.5 * width_px + 1.0;
         // Along the longer direction, a short stretch across at every step.
         let steep = dy.abs() > dx.abs();
@@ -79,8 +86,7 @@ impl Picture {
             for j in (middle - spread).floor() as i64..=(middle + spread).ceil() as i64 {
                 let (u, v) = if steep { (j, i) } else { (i, j) };
                 let (x, y) = (u as f64 - from[0], v as f64 - from[1]);
-                let along = (x * dx + y * dy) / length;
-                let across = (x * dy - y * dx) / length;
+                let (along, across) = (x * ex + y * ey, x * ey - y * ex);
                 let beyond = (-along).max(along - length).max(0.0);
                 let share = 0.5 * width_px + 0.5 - across.hypot(beyond);
                 if share > 0.0 {
@@ -110,6 +116,11 @@ impl Picture {
         }
         let at = |t: f64| [from[0] + t * (to[0] - from[0]), from[1] + t * (to[1] - from[1])];
         (first <= last).then(|| (at(first), at(last)))
+    }
+
+    /// A filled disc with a smooth edge.
+    pub(crate) fn disc(&mut self, [x, y]: [f64; 2], radius_px: f64, colour: Colour) {
+        self.line([x, y], [x, y], 2.0 * radius_px, colour);
     }
 
     /// The outline of a quad.
@@ -165,6 +176,16 @@ impl Picture {
         out
     }
 
+    /// Copies another picture in with its top left corner at (u, v).
+    pub(crate) fn paste(&mut self, other: &Self, [u, v]: [usize; 2]) {
+        let width = other.width.min(self.width.saturating_sub(u));
+        for row in 0..other.height.min(self.height.saturating_sub(v)) {
+            let to = 3 * ((v + row) * self.width + u);
+            let from = 3 * row * other.width;
+            self.rgb[to..to + 3 * width].copy_from_slice(&other.rgb[from..from + 3 * width]);
+        }
+    }
+
     /// Enlarged by a whole factor, every pixel a block.
     pub(crate) fn enlarged(&self, factor: usize) -> Self {
         let mut out = Self::black(self.width * factor, self.height * factor);
@@ -209,6 +230,13 @@ mod tests {
             // The ends are round: about a disc of the width more.
             assert!((ink(&p) - 2.0 * seen - 3.1).abs() < 4.0, "{to:?}: {}", ink(&p));
         }
+    }
+
+    #[test]
+    fn a_disc_is_round() {
+        let mut p = Picture::black(40, 40);
+        p.disc([20.0, 20.0], 10.0, WHITE);
+        assert!((ink(&p) - std::f64::consts::PI * 100.0).abs() < 3.0, "{}", ink(&p));
     }
 
     #[test]

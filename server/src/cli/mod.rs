@@ -6,6 +6,7 @@ mod demo;
 mod detect;
 mod drawing;
 pub(crate) mod evaluate;
+mod parameters;
 pub(crate) mod pictures;
 pub(crate) mod scratch;
 mod screen;
@@ -37,7 +38,15 @@ enum Command {
     Serve(serve::Serve),
     /// The quads of pictures; no server needed.
     ///
-    /// A picture that cannot be read is one line on standard error and exit status 1; the others are still done.
+    /// Prints the corners of every quad, best first. With --draw, pictures show what each stage made of the image, and
+    /// so where a quad was lost: no edges (lower --edge-steps), edges but no segments (lower --min-segment), segments
+    /// but no hypothesis, or a hypothesis that others outdid (see the scores). A picture that cannot be read is one
+    /// line on standard error and exit status 1; the others are still done.
+    ///
+    /// For example:
+    ///   waymark detect hall.jpg --draw stages
+    ///   waymark detect photographs/ --json --min-score 0.5 > quads.jsonl
+    #[command(verbatim_doc_comment)]
     Detect(detect::Args),
     /// Make and list the maps of a running server.
     #[command(subcommand)]

@@ -116,6 +116,7 @@ fn searched(
     let (edges, segments) = traced_segments(work, p, trace);
     let gradients = Gradients { image: work, gx: edges.gx(), gy: edges.gy() };
     let seeds = hypotheses::hypotheses(&segments, &gradients, &p.quads.hypotheses);
+    trace.seeds(&seeds);
     trace.finished(Stage::Pairs);
     let mut rated = selection::rate(&seeds, &gradients, &p.quads);
     let mut scale = 1;

@@ -18,7 +18,8 @@ pub(crate) enum Command {
     ///
     /// For example, what the search gains over the paper's grouping, and where it fails:
     ///   waymark evaluate detection corridor --compare relaxation --plot recall.svg --worst 20 --draw worst
-    Detection(detection::Args),
+    #[command(verbatim_doc_comment)]
+    Detection(Box<detection::Args>),
     /// Teach a server from the set's pictures, then have it recognise the others over zenoh.
     ///
     /// Starts a server of its own in a temporary folder. A landmark taught from one picture is learnt from views

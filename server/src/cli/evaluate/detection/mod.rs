@@ -9,7 +9,7 @@ mod plot;
 mod pictures;
 
 use super::{rendered, reviewed::Reviewed, truth::Truth};
-use crate::cli::{pictures as files, scratch, screen};
+use crate::cli::{parameters::ParameterArgs, pictures as files, scratch, screen};
 use anyhow::Context as _;
 use report::Report;
 use score::{FOUND, ImageScore};
@@ -32,11 +32,9 @@ pub(crate) struct Args {
     /// Leave out labelled quads with a side shorter than this, in pixels.
     #[arg(long, default_value_t = 0.0)]
     min_side_px: f64,
-    /// Detection parameters, JSON; only what differs from the defaults, such as {"quads": {"grouping": "relaxation"}}.
-    #[arg(long, value_name = "FILE")]
-    params: Option<PathBuf>,
-    /// Evaluate these parameters too: a file as for --params, or `relaxation` for the paper's grouping. May be repeated.
-    #[arg(long, value_name = "FILE|relaxation")]
+    /// Evaluate these parameters too: a file as for --params, `relaxation` for the paper's grouping, or one change as for
+    /// --set. May be repeated.
+    #[arg(long, value_name = "FILE|relaxation|PATH=VALUE")]
     compare: Vec<PathBuf>,
     /// One JSON object per set and parameters instead of tables.
     #[arg(long)]
@@ -66,6 +64,8 @@ pub(crate) struct Args {
     /// The rendered views follow from it.
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    #[command(flatten)]
+    parameters: ParameterArgs,
 }
 
 /// Parameters with the name they go by in the report.
@@ -106,9 +106,13 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
 
 fn parameters(args: &Args) -> anyhow::Result<Vec<Named>> {
     let stem = |path: &Path| path.file_stem().map_or(String::new(), |s| s.to_string_lossy().into_owned());
-    let name = args.params.as_deref().map_or("default".to_owned(), stem);
-    let mut all = vec![Named { name, params: files::detect_params(args.params.as_deref())? }];
+    let mut all = vec![Named { name: args.parameters.name(), params: args.parameters.parameters()? }];
     for other in &args.compare {
+        if let Some(assignment) = other.to_str().filter(|text| text.contains('=')) {
+            let changed = args.parameters.with(assignment);
+            all.push(Named { name: changed.name(), params: changed.parameters()? });
+            continue;
+        }
         let params = if other.as_os_str() == "relaxation" {
             let quads = QuadParams { grouping: Grouping::Relaxation, ..QuadParams::default() };
             DetectParams { quads, ..DetectParams::default() }

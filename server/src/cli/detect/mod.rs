@@ -1,0 +1,190 @@
+//! `waymark detect`: the quads of pictures, no server needed.
+
+mod record;
+mod draw;
+
+use super::{parameters::ParameterArgs, pictures, screen};
+use anyhow::Context as _;
+use record::Record;
+use serde::Serialize;
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+    process::ExitCode,
+    time::Instant,
+};
+use vision::{
+    detect::{detect, quads::Quad},
+    frame::GrayImage,
+    params::DetectParams,
+    trace::{Stage, Trace},
+};
+
+/// Ends of the names of pictures in a folder.
+const PICTURES: [&str; 3] = ["png", "jpg", "jpeg"];
+
+/// `waymark detect`.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
+    /// PNG or JPEG files, or folders of them.
+    #[arg(required_unless_present = "show_params")]
+    images: Vec<PathBuf>,
+    /// One JSON line per picture: `{"image","width","height","quads":[{"corners":[[x,y]*4],"kind","score"}],"timings_ms"}`.
+    ///
+    /// Corners are top-left, top-right, bottom-right, bottom-left in pixels; pixel (0, 0) is the centre of the
+    /// top-left pixel.
+    #[arg(long)]
+    json: bool,
+    /// Write pictures of every stage (edges, chains, segments, pairs or hypotheses, quads) and an overview here.
+    #[arg(long, value_name = "DIR")]
+    draw: Option<PathBuf>,
+    /// Print all parameters as JSON, as a file for --params, and end if there are no images.
+    #[arg(long)]
+    show_params: bool,
+    #[command(flatten)]
+    parameters: ParameterArgs,
+}
+
+#[derive(Serialize)]
+struct Line {
+    image: String,
+    width: usize,
+    height: usize,
+    quads: Vec<QuadLine>,
+    timings_ms: BTreeMap<&'static str, f64>,
+}
+
+#[derive(Serialize)]
+struct QuadLine {
+    corners: [[f64; 2]; 4],
+    kind: vision::detect::quads::QuadKind,
+    score: f64,
+    side_support: [f64; 4],
+    /// Inner borders of the same thing, outermost first.
+    alternates: Vec<[[f64; 2]; 4]>,
+}
+
+/// Times each stage by the clock.
+pub(crate) struct Stopwatch {
+    last: Instant,
+    pub(crate) ms: BTreeMap<&'static str, f64>,
+}
+
+impl Stopwatch {
+    pub(crate) fn start() -> Self {
+        Self { last: Instant::now(), ms: BTreeMap::new() }
+    }
+
+    /// All stages together.
+    pub(crate) fn total_ms(&self) -> f64 {
+        self.ms.values().sum()
+    }
+}
+
+impl Trace for Stopwatch {
+    fn finished(&mut self, stage: Stage) {
+        let now = Instant::now();
+        *self.ms.entry(stage.name()).or_default() += (now - self.last).as_secs_f64() * 1e3;
+        self.last = now;
+    }
+}
+
+/// Exit status 1 when any picture could not be read; the others are still done.
+pub(crate) fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    let params = args.parameters.parameters()?;
+    if args.show_params {
+        screen::say(&serde_json::to_string_pretty(&params)?);
+    }
+    let mut drawings = args.draw.as_deref().map(Drawings::new).transpose()?;
+    let mut status = ExitCode::SUCCESS;
+    let images = files(&args.images)?;
+    // Lines of results on a terminal show how far it is; a bar would only disturb them.
+    for path in &images {
+        let gray = match pictures::read(path) {
+            Ok(gray) => gray,
+            Err(error) => {
+                screen::complain(&format!("waymark: {}: {error}", path.display()));
+                status = ExitCode::FAILURE;
+                continue;
+            }
+        };
+        let mut stopwatch = Stopwatch::start();
+        let quads = detect(&gray, &params, &mut stopwatch);
+        show(path, &gray, &quads, stopwatch, args.json)?;
+        if let Some(drawings) = &mut drawings {
+            drawings.add(path, &gray, &params)?;
+        }
+    }
+    Ok(status)
+}
+
+/// Folders are replaced by the pictures in them, in the order of their names.
+fn files(named: &[PathBuf]) -> anyhow::Result<Vec<PathBuf>> {
+    let mut all = Vec::new();
+    for path in named {
+        if !path.is_dir() {
+            all.push(path.clone());
+            continue;
+        }
+        let entries = std::fs::read_dir(path).with_context(|| format!("cannot read {}", path.display()))?;
+        let mut inside = entries.map(|e| e.map(|e| e.path())).collect::<Result<Vec<_>, _>>()?;
+        inside.retain(|p| {
+            p.extension().is_some_and(|e| PICTURES.iter().any(|known| e.eq_ignore_ascii_case(known)))
+        });
+        inside.sort();
+        // Without pictures it stays: that it is none is said when it is read.
+        if inside.is_empty() {
+            inside.push(path.clone());
+        }
+        all.append(&mut inside);
+    }
+    Ok(all)
+}
+
+fn show(path: &Path, gray: &GrayImage, quads: &[Quad], watch: Stopwatch, json: bool) -> anyhow::Result<()> {
+    let name = path.display().to_string();
+    let (width, height) = (gray.width(), gray.height());
+    if json {
+        let quads = quads.iter().map(quad_line).collect();
+        let line = Line { image: name, width, height, quads, timings_ms: watch.ms };
+        screen::say(&serde_json::to_string(&line)?);
+        return Ok(());
+    }
+    screen::say(&format!("{name}: {width}x{height}, {} quads, {:.1} ms", quads.len(), watch.total_ms()));
+    for quad in quads {
+        let corners = quad.corners_px.points().map(|c| format!("({:.1}, {:.1})", c.x, c.y)).join(" ");
+        screen::say(&format!("  score {:.2}  {corners}  {:?}", quad.score, quad.kind));
+    }
+    Ok(())
+}
+
+/// A folder of drawings, where no two images share names.
+struct Drawings<'a> {
+    folder: &'a Path,
+    stems: BTreeMap<String, usize>,
+}
+
+impl<'a> Drawings<'a> {
+    fn new(folder: &'a Path) -> anyhow::Result<Self> {
+        std::fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
+        Ok(Self { folder, stems: BTreeMap::new() })
+    }
+
+    fn add(&mut self, path: &Path, gray: &GrayImage, params: &DetectParams) -> anyhow::Result<()> {
+        let stem = path.file_stem().map_or("image".into(), |s| s.to_string_lossy().into_owned());
+        let count = self.stems.entry(stem.clone()).or_default();
+        *count += 1;
+        let stem = if *count > 1 { format!("{stem}_{count}") } else { stem };
+        draw::write(self.folder, &stem, &Record::of(gray, params))
+    }
+}
+
+fn quad_line(quad: &Quad) -> QuadLine {
+    QuadLine {
+        corners: quad.corners_px.into(),
+        kind: quad.kind,
+        score: quad.score,
+        side_support: quad.side_support,
+        alternates: quad.alternates.iter().map(|c| (*c).into()).collect(),
+    }
+}

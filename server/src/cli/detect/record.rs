@@ -1,0 +1,80 @@
+//! Everything that the detector reports on its way, kept for drawing.
+
+use vision::{
+    detect::{
+        chains::EdgeChain, detect, edges::EdgeMap, grouping::QuadSeed, pyramid, quads::Quad,
+        segments::EdgeSegment, similarity::SegmentPair,
+    },
+    frame::GrayImage,
+    params::DetectParams,
+    trace::Trace,
+};
+
+/// The stages of one image. All but the quads are in pixels of `work`.
+#[derive(Debug, Clone)]
+pub(crate) struct Record {
+    /// The image that the stages worked on: reduced, where the working scale is.
+    pub(crate) work: GrayImage,
+    /// How many pixels of the image make one of `work`.
+    pub(crate) factor: usize,
+    pub(crate) edges: EdgeMap,
+    pub(crate) chains: Vec<EdgeChain>,
+    pub(crate) segments: Vec<EdgeSegment>,
+    pub(crate) tiling: Vec<EdgeSegment>,
+    pub(crate) pairs: Vec<SegmentPair>,
+    pub(crate) seeds: Vec<QuadSeed>,
+    pub(crate) quads: Vec<Quad>,
+}
+
+impl Record {
+    /// Detects once more and keeps everything.
+    pub(crate) fn of(image: &GrayImage, params: &DetectParams) -> Self {
+        let mut record = Self {
+            work: image.clone(),
+            factor: 1,
+            edges: EdgeMap::default(),
+            chains: vec![],
+            segments: vec![],
+            tiling: vec![],
+            pairs: vec![],
+            seeds: vec![],
+            quads: vec![],
+        };
+        detect(image, params, &mut record);
+        // Both ways of grouping have their own scale; the edges say which it was.
+        let width = record.edges.width().max(1);
+        record.factor = (image.width() / width).max(1);
+        record.work = pyramid::reduce(image, record.factor);
+        record
+    }
+}
+
+impl Trace for Record {
+    fn edges(&mut self, edges: &EdgeMap) {
+        self.edges = edges.clone();
+    }
+
+    fn chains(&mut self, chains: &[EdgeChain]) {
+        self.chains = chains.to_vec();
+    }
+
+    fn segments(&mut self, segments: &[EdgeSegment]) {
+        self.segments = segments.to_vec();
+    }
+
+    fn tiling(&mut self, removed: &[EdgeSegment]) {
+        self.tiling = removed.to_vec();
+    }
+
+    fn pairs(&mut self, pairs: &[SegmentPair]) {
+        self.pairs = pairs.to_vec();
+    }
+
+    fn seeds(&mut self, seeds: &[QuadSeed]) {
+        self.seeds = seeds.to_vec();
+    }
+
+    fn quads(&mut self, quads: &[Quad]) {
+        self.quads = quads.to_vec();
+    }
+}
