@@ -223,3 +223,7 @@ fn boxes_apart(a: &Bounds, b: &Bounds, slack_px: f64) -> bool {
         || a.1.y - slack_px < b.0.y
         || b.1.y - slack_px < a.0.y
 }
+
+#[cfg(test)]
+#[path = "grouping_tests.rs"]
+mod tests;

@@ -42,6 +42,10 @@ pub mod quads;
 mod fixtures;
 #[cfg(test)]
 mod scenes;
+#[cfg(test)]
+mod any_input_tests;
+#[cfg(test)]
+mod symmetry_tests;
 
 /// Most quads of one image, the best first.
 pub const MAX_QUADS: usize = 64;

@@ -121,15 +121,30 @@ fn fragments_of(chain: &EdgeChain, index: usize, p: &SegmentParams, fragments: &
     let positions: Vec<Point2<f64>> = chain.points.iter().map(|e| e.position_px).collect();
     let tolerance = Tolerance { split_px: p.split_px.max(0.0), merge_rad: p.merge_angle_deg.to_radians() };
     let polyline = polyline(&positions, chain.closed, tolerance);
-    for piece in &polyline.pieces {
-        let rough: LineSums = polyline.points[interior(piece)].iter().copied().collect();
-        let Some(rough) = rough.fit() else { continue };
-        let piece = polyline.ends_on(piece, &rough.line, p.end_px);
+    let grown: Vec<_> = polyline
+        .pieces
+        .iter()
+        .map(|piece| {
+            let rough: LineSums = polyline.points[interior(piece)].iter().copied().collect();
+            rough.fit().map(|rough| polyline.ends_on(piece, &rough.line, p.end_px))
+        })
+        .collect();
+    for (i, piece) in grown.iter().enumerate() {
+        let Some(piece) = piece else { continue };
+        // A stub that a neighbour grew over would be a second segment on the same points.
+        let beside = [(i + 1) % grown.len(), (i + grown.len() - 1) % grown.len()];
+        let swallowed = beside.iter().filter(|j| **j != i).filter_map(|j| grown[*j].as_ref()).any(|other| {
+            let common = piece.clone().filter(|k| (k + n - other.start % n) % n < other.len()).count();
+            other.len() > piece.len() && 3 * common > 2 * piece.len()
+        });
+        if swallowed {
+            continue;
+        }
         let ends = [*polyline.point(piece.start), *polyline.point(piece.end - 1)];
         if (ends[1] - ends[0]).norm() < p.min_fragment_px {
             continue;
         }
-        let inner = interior(&piece);
+        let inner = interior(piece);
         let mut gradient = Vector2::zeros();
         let mut magnitude = 0.0;
         for i in inner.clone() {

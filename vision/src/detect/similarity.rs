@@ -8,6 +8,8 @@ use serde::{Deserialize, Serialize};
 
 /// Most segments looked at, the longest first.
 pub const MAX_PAIRED_SEGMENTS: usize = 500;
+/// Most pairs whose third segment is looked for. Photographs stay below; stripes, each as like as the next, do not.
+pub const MAX_ROUGH_PAIRS: usize = 20_000;
 /// Most pairs handed on, the best first.
 pub const MAX_PAIRS: usize = 1200;
 
@@ -91,8 +93,7 @@ struct Rough {
 
 /// Candidate pairs, best first; ties by index. At most [`MAX_PAIRS`], at most `p.max_candidates` a segment.
 pub fn pairs(segments: &[EdgeSegment], image: &GrayImage, p: &SimilarityParams) -> Vec<SegmentPair> {
-    let mut rough = rough_pairs(segments, p);
-    rough.sort_by(|a, b| b.bound.total_cmp(&a.bound).then((a.k, a.l).cmp(&(b.k, b.l))));
+    let rough = shortlist(rough_pairs(segments, p));
     // A segment's hopeless candidates must not cost a profile each: three times what it may keep is looked at.
     let per_segment = p.max_candidates.min(MAX_ROW_CANDIDATES);
     let mut looked = vec![0_usize; segments.len()];
@@ -117,6 +118,13 @@ pub fn pairs(segments: &[EdgeSegment], image: &GrayImage, p: &SimilarityParams) 
     });
     pairs.truncate(MAX_PAIRS);
     pairs
+}
+
+/// The most promising pairs, best first; ties by index. At most [`MAX_ROUGH_PAIRS`].
+fn shortlist(mut rough: Vec<Rough>) -> Vec<Rough> {
+    rough.sort_by(|a, b| b.bound.total_cmp(&a.bound).then((a.k, a.l).cmp(&(b.k, b.l))));
+    rough.truncate(MAX_ROUGH_PAIRS);
+    rough
 }
 
 /// All pairs of the longest segments that pass the cheap gates.

@@ -147,3 +147,16 @@ fn candidates_are_bounded() {
         assert!(found.iter().filter(|s| s.k == i || s.l == i).count() <= p.max_candidates);
     }
 }
+
+#[test]
+fn stripes_are_cut_at_the_shortlist() {
+    let stripes = |n: usize| -> Vec<EdgeSegment> {
+        (0..n).map(|i| segment([i as f64 * 20.0, 0.0], [i as f64 * 20.0, 3000.0])).collect()
+    };
+    let p = SimilarityParams { min_score: 0.0, ..SimilarityParams::default() };
+    // n (n - 1) / 2 pairs.
+    assert_eq!(shortlist(rough_pairs(&stripes(200), &p)).len(), 19_900);
+    let cut = shortlist(rough_pairs(&stripes(201), &p));
+    assert_eq!(cut.len(), MAX_ROUGH_PAIRS);
+    assert!(cut.windows(2).all(|w| w[0].bound >= w[1].bound));
+}
