@@ -71,17 +71,20 @@ fn links(edges: &EdgeMap, p: &ChainParams, pixels: &[u32], runs: &[Run]) -> Vec<
     let reach = p.max_gap_px.min(MAX_GAP_PX) as i32 + 1;
     let min_cos = p.max_bend_deg.to_radians().cos();
     let mut candidates = Vec::new();
+    // Where the neighbours start, for every row of the neighbourhood: the ends are in order, so it only moves on.
+    let mut firsts = [0; MAX_GAP_PX as usize + 2];
     for (i, a) in ends.iter().enumerate() {
-        for dv in 0..=reach {
-            let first = ends.partition_point(|b| (b.v, b.u) < (a.v + dv, a.u - reach));
-            for b in ends[first.max(i + 1)..].iter().take_while(|b| b.v == a.v + dv && b.u <= a.u + reach) {
+        for (dv, first) in (0..=reach).zip(&mut firsts) {
+            *first += ends[*first..].iter().take_while(|b| (b.v, b.u) < (a.v + dv, a.u - reach)).count();
+            let near = &ends[(*first).max(i + 1)..];
+            for b in near.iter().take_while(|b| b.v == a.v + dv && b.u <= a.u + reach) {
                 if let Some(cost) = cost(a, b, min_cos) {
                     candidates.push((cost, a.id.min(b.id), a.id.max(b.id)));
                 }
             }
         }
     }
-    candidates.sort_by(|x, y| x.0.total_cmp(&y.0).then((x.1, x.2).cmp(&(y.1, y.2))));
+    candidates.sort_unstable_by(|x, y| x.0.total_cmp(&y.0).then((x.1, x.2).cmp(&(y.1, y.2))));
     let mut links = vec![None; 2 * runs.len()];
     for (_, a, b) in candidates {
         if links[a].is_none() && links[b].is_none() {
@@ -123,6 +126,6 @@ fn ends(edges: &EdgeMap, pixels: &[u32], runs: &[Run]) -> Vec<End> {
                 .filter(|e| e.outward.x.is_finite()),
         );
     }
-    ends.sort_by_key(|e| (e.v, e.u, e.id));
+    ends.sort_unstable_by_key(|e| (e.v, e.u, e.id));
     ends
 }

@@ -6,7 +6,7 @@
 use super::{
     bridging::bridged,
     edges::{EDGE, EdgeMap},
-    thinning::{BRANCHES, RING, ring_code},
+    thinning::{BRANCHES, RING, changing_ring_code, ring_code},
 };
 use nalgebra::{Point2, Vector2};
 
@@ -178,7 +178,7 @@ impl<'a> Tracer<'a> {
         let mut best_cos = MIN_COS_TURN;
         // Runs between two touching junctions would be found again and again; bridging joins what they separate.
         let junction = self.branches[at] >= 3;
-        let mut ring = ring_code(&self.free, self.edges.width(), at);
+        let mut ring = changing_ring_code(&self.free, self.edges.width(), at);
         while ring != 0 {
             let i = ring.trailing_zeros() as usize;
             ring &= ring - 1;

@@ -7,7 +7,7 @@ pub use super::maxima::BORDER_PX;
 use super::{
     deriche::{FilterMemory, gradients},
     maxima::{Maxima, Maximum},
-    thinning::{ring_code, thin},
+    thinning::{changing_ring_code, keep, thin},
 };
 use crate::frame::GrayImage;
 use fearless_simd::{Level, dispatch};
@@ -201,7 +201,9 @@ impl EdgeMap {
         self.hysteresis(&found, high);
         self.maxima.found = found;
         let (gx, gy) = (&self.gx, &self.gy);
-        thin(&mut self.marks, width, |at| length(gx[at], gy[at]), &mut self.pixels);
+        // Squares: only which is greater matters.
+        let strength = |at: usize| gx[at] * gx[at] + gy[at] * gy[at];
+        thin(&mut self.marks, width, strength, &mut self.pixels, &mut self.stack);
     }
 
     /// Standard deviation of each gradient component in the smoothest parts of the image: the magnitude of noise alone
@@ -221,13 +223,17 @@ impl EdgeMap {
         let width = *width;
         marks.clear();
         marks.resize(self.gx.len(), 0);
+        pixels.clear();
+        stack.clear();
         for m in candidates {
             marks[m.at as usize] = if m.magnitude >= high { EDGE } else { WEAK };
+            pixels.push(m.at);
         }
-        for seed in candidates.iter().map(|m| m.at) {
-            if marks[seed as usize] == WEAK && ring_code(marks, width, seed as usize) != 0 {
-                marks[seed as usize] = EDGE;
-                stack.push(seed);
+        for m in candidates {
+            let seed = m.at as usize;
+            if marks[seed] == WEAK && changing_ring_code(marks, width, seed) != 0 {
+                marks[seed] = EDGE;
+                stack.push(m.at);
             }
             while let Some(at) = stack.pop() {
                 // Candidates keep off the border, so every neighbour exists.
@@ -242,15 +248,10 @@ impl EdgeMap {
                 }
             }
         }
-        pixels.clear();
-        for m in candidates {
-            let mark = &mut marks[m.at as usize];
-            if *mark == EDGE {
-                pixels.push(m.at);
-            } else {
-                *mark = 0;
-            }
-        }
+        keep(pixels, |at| {
+            marks[at] &= EDGE;
+            marks[at] == EDGE
+        });
     }
 }
 

@@ -53,23 +53,25 @@ impl Fragment {
         (self.q - self.p).norm()
     }
 
-    /// Both as one, if they follow one line closely enough. `self` is the longer one.
-    fn joined(&self, other: &Self, gates: &Gates) -> Option<Self> {
+    /// Whether `other` may continue this line; most neighbours fail here. `self` is the longer one.
+    #[inline]
+    fn continues(&self, other: &Place, gates: &Gates) -> bool {
         let d = self.fit.line.direction();
-        let (dx, dy) = (other.q - other.p, self.q - self.p);
-        let (own, length) = (d.dot(&dy), dx.norm());
-        // The cheap gates first: most neighbours fail here.
+        let dx = other.q - other.p;
+        let (own, length) = (d.dot(&(self.q - self.p)), dx.norm());
         if d.dot(&dx) <= 0.0 || d.perp(&dx).abs() > gates.max_sin * length {
-            return None;
+            return false;
         }
         let lateral = |e: &Point2<f64>| self.fit.line.distance(e).abs();
         if lateral(&other.p).max(lateral(&other.q)) > gates.lateral_px {
-            return None;
+            return false;
         }
         let gap = d.dot(&(other.p - self.q)).max(d.dot(&(self.p - other.q)));
-        if gap > gates.gap_share * (own + length + gap) || gap < -2.0 * gates.lateral_px {
-            return None;
-        }
+        gap <= gates.gap_share * (own + length + gap) && gap >= -2.0 * gates.lateral_px
+    }
+
+    /// Both as one, if they follow one line closely enough.
+    fn joined(&self, other: &Self, gates: &Gates) -> Option<Self> {
         let ends = [self.p, self.q, other.p, other.q];
         let joint = Self::new(
             self.sums + other.sums,
@@ -95,107 +97,140 @@ pub(crate) fn join(fragments: Vec<Fragment>, p: &SegmentParams) -> Vec<Fragment>
         lateral_px: p.join_lateral_px,
         gap_share: p.join_gap_share.clamp(0.0, 0.5),
     };
-    let mut fragments = fragments;
+    let mut round = Round { fresh: vec![true; fragments.len()], fragments };
     for _ in 0..MAX_ROUNDS {
-        let before = fragments.len();
-        fragments = join_once(&fragments, &gates);
-        if fragments.len() == before {
+        let before = round.fragments.len();
+        round = round.next(&gates);
+        if round.fragments.len() == before {
             break;
         }
     }
-    fragments
+    round.fragments
 }
 
-/// One round: every fragment takes, at each end, the nearest fitting fragment that is not longer than itself.
-fn join_once(fragments: &[Fragment], gates: &Gates) -> Vec<Fragment> {
-    let lengths: Vec<f64> = fragments.iter().map(Fragment::length_px).collect();
-    let mut order: Vec<usize> = (0..fragments.len()).collect();
-    // Stable: equal lengths keep the order of their chains.
-    order.sort_by(|a, b| lengths[*b].total_cmp(&lengths[*a]));
-    let rest = order.split_off(order.len().min(MAX_FRAGMENTS));
-    // Bright sides agree, so the end of one meets the start of the other.
-    let starts = Grid::new(order.iter().map(|&i| (fragments[i].p, i)));
-    let ends = Grid::new(order.iter().map(|&i| (fragments[i].q, i)));
-    let mut taken = vec![false; fragments.len()];
-    let mut joined = Vec::with_capacity(fragments.len());
-    for &i in &order {
-        if std::mem::replace(&mut taken[i], true) {
-            continue;
-        }
-        let mut whole = fragments[i].clone();
-        // gap <= share * (long + short + gap) with short <= long.
-        let reach = 2.0 * gates.gap_share / (1.0 - gates.gap_share) * lengths[i] + CELL_PX;
-        let d = whole.fit.line.direction();
-        for (end, outward, grid) in [(whole.p, -d, &ends), (whole.q, d, &starts)] {
-            let mut step = 0.0;
-            while step <= reach {
-                let mut best: Option<(usize, Fragment)> = None;
-                grid.near(end + outward * step, |j| {
-                    if taken[j] || best.as_ref().is_some_and(|b| lengths[b.0] >= lengths[j]) {
-                        return;
+/// Fragments between two rounds. `fresh` are those that are new since the last one: two old ones have been tried.
+struct Round {
+    fragments: Vec<Fragment>,
+    fresh: Vec<bool>,
+}
+
+impl Round {
+    /// Every fragment takes, at each end, the nearest fitting fragment that is not longer than itself.
+    fn next(self, gates: &Gates) -> Self {
+        let lengths: Vec<f64> = self.fragments.iter().map(Fragment::length_px).collect();
+        let mut order: Vec<usize> = (0..lengths.len()).collect();
+        // Stable: equal lengths keep the order of their chains.
+        order.sort_by(|a, b| lengths[*b].total_cmp(&lengths[*a]));
+        let rest = order.split_off(order.len().min(MAX_FRAGMENTS));
+        // Bright sides agree, so the end of one meets the start of the other.
+        let place = |i: &usize| Place { p: self.fragments[*i].p, q: self.fragments[*i].q, index: *i };
+        let grids = |kept: &dyn Fn(usize) -> bool| {
+            let places: Vec<Place> = order.iter().filter(|i| kept(**i)).map(place).collect();
+            [Grid::new(&places, |at| at.q), Grid::new(&places, |at| at.p)]
+        };
+        let (all, fresh) = (grids(&|_| true), grids(&|i| self.fresh[i]));
+        let mut next = Self { fragments: Vec::with_capacity(lengths.len()), fresh: vec![] };
+        let mut left: Vec<Option<Fragment>> = self.fragments.into_iter().map(Some).collect();
+        for &i in &order {
+            let Some(mut whole) = left[i].take() else { continue };
+            let mut grew = false;
+            // gap <= share * (long + short + gap) with short <= long.
+            let reach = 2.0 * gates.gap_share / (1.0 - gates.gap_share) * lengths[i] + CELL_PX;
+            let d = whole.fit.line.direction();
+            let grids = if self.fresh[i] { &all } else { &fresh };
+            for ((end, outward), grid) in [(whole.p, -d), (whole.q, d)].into_iter().zip(grids) {
+                let mut step = 0.0;
+                while step <= reach {
+                    if let Some((j, joint)) = grid.best(end + outward * step, &whole, &left, &lengths, gates)
+                    {
+                        left[j] = None;
+                        (whole, grew) = (joint, true);
+                        break;
                     }
-                    if let Some(joint) = whole.joined(&fragments[j], gates) {
-                        best = Some((j, joint));
-                    }
-                });
-                if let Some((j, joint)) = best {
-                    taken[j] = true;
-                    whole = joint;
-                    break;
+                    step += 2.0 * CELL_PX;
                 }
-                step += 2.0 * CELL_PX;
             }
+            next.fragments.push(whole);
+            next.fresh.push(grew);
         }
-        joined.push(whole);
+        for i in rest {
+            next.fragments.extend(left[i].take());
+            next.fresh.push(true);
+        }
+        next
     }
-    joined.extend(rest.into_iter().map(|i| fragments[i].clone()));
-    joined
 }
 
-/// Points by cell: `items[first[c]..first[c + 1]]` lie in cell c, row-major.
+/// Where a fragment lies.
+#[derive(Clone, Copy)]
+struct Place {
+    p: Point2<f64>,
+    q: Point2<f64>,
+    index: usize,
+}
+
+/// Fragments by the cell of one end: `items[first[c]..first[c + 1]]` lie in cell c, row-major.
 struct Grid {
     columns: usize,
     rows: usize,
-    first: Vec<usize>,
-    items: Vec<usize>,
+    first: Vec<u32>,
+    items: Vec<Place>,
 }
 
 impl Grid {
-    fn new(points: impl Iterator<Item = (Point2<f64>, usize)> + Clone) -> Self {
+    fn new(places: &[Place], end: impl Fn(&Place) -> Point2<f64>) -> Self {
         let cell = |x: f64| (x.max(0.0) / CELL_PX) as usize;
         let (columns, rows) =
-            points.clone().fold((1, 1), |(c, r), (p, _)| (c.max(cell(p.x) + 1), r.max(cell(p.y) + 1)));
-        let at = |p: &Point2<f64>| cell(p.y) * columns + cell(p.x);
+            places.iter().map(&end).fold((1, 1), |(c, r), p| (c.max(cell(p.x) + 1), r.max(cell(p.y) + 1)));
+        let at = |place: &Place| {
+            let p = end(place);
+            cell(p.y) * columns + cell(p.x)
+        };
         let mut first = vec![0; columns * rows + 1];
-        for (p, _) in points.clone() {
-            first[at(&p) + 1] += 1;
+        for place in places {
+            first[at(place) + 1] += 1;
         }
         for c in 0..columns * rows {
             first[c + 1] += first[c];
         }
         let mut next = first.clone();
-        let mut items = vec![0; first[columns * rows]];
-        for (p, i) in points {
-            let slot = &mut next[at(&p)];
-            items[*slot] = i;
+        let mut items = vec![Place { p: Point2::origin(), q: Point2::origin(), index: 0 }; places.len()];
+        for place in places {
+            let slot = &mut next[at(place)];
+            items[*slot as usize] = *place;
             *slot += 1;
         }
         Self { columns, rows, first, items }
     }
 
-    /// Visits what lies in the cell of `p` or one beside it.
-    fn near(&self, p: Point2<f64>, mut visit: impl FnMut(usize)) {
-        let (u, v) = ((p.x / CELL_PX).floor(), (p.y / CELL_PX).floor());
+    /// The longest of those `left` in the cell of `near` or one beside it that can be joined to `whole`, and both as
+    /// one; of equals the first.
+    fn best(
+        &self,
+        near: Point2<f64>,
+        whole: &Fragment,
+        left: &[Option<Fragment>],
+        lengths: &[f64],
+        gates: &Gates,
+    ) -> Option<(usize, Fragment)> {
+        let (u, v) = ((near.x / CELL_PX).floor(), (near.y / CELL_PX).floor());
         if u < -1.0 || v < -1.0 || u > self.columns as f64 || v > self.rows as f64 {
-            return;
+            return None;
         }
+        let mut best: Option<(usize, Fragment)> = None;
         let (from, to) = ((u - 1.0).max(0.0) as usize, ((u + 2.0) as usize).min(self.columns));
         for row in (v - 1.0).max(0.0) as usize..((v + 2.0) as usize).min(self.rows) {
-            if from < to {
-                self.items[self.first[row * self.columns + from]..self.first[row * self.columns + to]]
-                    .iter()
-                    .for_each(|&i| visit(i));
+            let first = |column: usize| self.first[row * self.columns + column] as usize;
+            let items = if from < to { &self.items[first(from)..first(to)] } else { &[] };
+            for j in items.iter().filter(|other| whole.continues(other, gates)).map(|other| other.index) {
+                if best.as_ref().is_some_and(|b| lengths[b.0] >= lengths[j]) {
+                    continue;
+                }
+                if let Some(joint) = left[j].as_ref().and_then(|other| whole.joined(other, gates)) {
+                    best = Some((j, joint));
+                }
             }
         }
+        best
     }
 }

@@ -7,9 +7,8 @@ use super::{
     chains::EdgeChain,
     edges::{BORDER_PX, EdgeMap},
     joining::{Fragment, join},
-    polyline::{Tolerance, interior, polyline},
+    polyline::{Polyline, Tolerance, interior},
 };
-use crate::geometry::line::LineSums;
 use nalgebra::{Point2, Vector2};
 
 /// Most segments of one image; the longest are kept.
@@ -105,8 +104,9 @@ impl SegmentParams {
 /// Straight segments of all chains, longest first, at most `max_segments`.
 pub fn segments(chains: &[EdgeChain], edges: &EdgeMap, p: &SegmentParams) -> Vec<EdgeSegment> {
     let mut fragments = Vec::new();
+    let mut line = Polyline::default();
     for (index, chain) in chains.iter().enumerate() {
-        fragments_of(chain, index, p, &mut fragments);
+        fragments_of(chain, index, p, &mut line, &mut fragments);
     }
     let min_length_px = p.min_length_px(edges.width());
     let mut kept = join(fragments, p);
@@ -116,44 +116,34 @@ pub fn segments(chains: &[EdgeChain], edges: &EdgeMap, p: &SegmentParams) -> Vec
     kept.iter().map(|f| segment(f, edges)).collect()
 }
 
-fn fragments_of(chain: &EdgeChain, index: usize, p: &SegmentParams, fragments: &mut Vec<Fragment>) {
+fn fragments_of(
+    chain: &EdgeChain,
+    index: usize,
+    p: &SegmentParams,
+    line: &mut Polyline,
+    fragments: &mut Vec<Fragment>,
+) {
     let n = chain.points.len();
-    let positions: Vec<Point2<f64>> = chain.points.iter().map(|e| e.position_px).collect();
     let tolerance = Tolerance { split_px: p.split_px.max(0.0), merge_rad: p.merge_angle_deg.to_radians() };
-    let polyline = polyline(&positions, chain.closed, tolerance);
-    let grown: Vec<_> = polyline
-        .pieces
-        .iter()
-        .map(|piece| {
-            let rough: LineSums = polyline.points[interior(piece)].iter().copied().collect();
-            rough.fit().map(|rough| polyline.ends_on(piece, &rough.line, p.end_px))
-        })
-        .collect();
-    for (i, piece) in grown.iter().enumerate() {
+    line.cut(chain.points.iter().map(|e| e.position_px), chain.closed, tolerance);
+    line.grow(p.end_px);
+    for (i, piece) in line.grown.iter().enumerate() {
         let Some(piece) = piece else { continue };
-        // A stub that a neighbour grew over would be a second segment on the same points.
-        let beside = [(i + 1) % grown.len(), (i + grown.len() - 1) % grown.len()];
-        let swallowed = beside.iter().filter(|j| **j != i).filter_map(|j| grown[*j].as_ref()).any(|other| {
-            let common = piece.clone().filter(|k| (k + n - other.start % n) % n < other.len()).count();
-            other.len() > piece.len() && 3 * common > 2 * piece.len()
-        });
-        if swallowed {
-            continue;
-        }
-        let ends = [*polyline.point(piece.start), *polyline.point(piece.end - 1)];
-        if (ends[1] - ends[0]).norm() < p.min_fragment_px {
+        let ends = [line.point(piece.start), line.point(piece.end - 1)];
+        if (ends[1] - ends[0]).norm() < p.min_fragment_px || line.swallowed(i, piece) {
             continue;
         }
         let inner = interior(piece);
+        let start = (line.wrapped(inner.start) + line.turn) % n;
+        let (to_end, wrapped) = (inner.len().min(n - start), inner.len().saturating_sub(n - start));
         let mut gradient = Vector2::zeros();
         let mut magnitude = 0.0;
-        for i in inner.clone() {
-            let g: Vector2<f64> = chain.points[(i + polyline.turn) % n].gradient.cast();
+        for e in chain.points[start..start + to_end].iter().chain(&chain.points[..wrapped]) {
+            let g: Vector2<f64> = e.gradient.cast();
             gradient += g;
             magnitude += g.norm();
         }
-        let sums: LineSums = inner.clone().map(|i| *polyline.point(i)).collect();
-        fragments.extend(Fragment::new(sums, gradient, magnitude, &ends, index));
+        fragments.extend(Fragment::new(line.sums(&inner), gradient, magnitude, &ends, index));
     }
 }
 

@@ -155,6 +155,21 @@ impl std::ops::Add for LineSums {
     }
 }
 
+impl std::ops::Sub for LineSums {
+    type Output = Self;
+    /// Takes out a part of the set.
+    fn sub(self, o: Self) -> Self {
+        Self {
+            n: self.n - o.n,
+            x: self.x - o.x,
+            y: self.y - o.y,
+            xx: self.xx - o.xx,
+            xy: self.xy - o.xy,
+            yy: self.yy - o.yy,
+        }
+    }
+}
+
 impl FromIterator<Point2<f64>> for LineSums {
     fn from_iter<I: IntoIterator<Item = Point2<f64>>>(points: I) -> Self {
         points.into_iter().fold(Self::default(), |mut sums, p| {
