@@ -22,7 +22,7 @@ use vision::{detect::quads::Corners, geometry::polygon};
 const LONGEST: Duration = Duration::from_mins(2);
 
 /// Options that each command must name in its help.
-const OPTIONS: [(&str, &[&str]); 13] = [
+const OPTIONS: [(&str, &[&str]); 14] = [
     ("demo", &["--robots", "--rate-hz", "--legs", "--seed", "--http", "--data", "--stay", "--json"]),
     ("serve", &["--config", "--data", "--http", "--zenoh", "--fleet", "--workers", "--insecure"]),
     (
@@ -72,6 +72,10 @@ const OPTIONS: [(&str, &[&str]); 13] = [
     ),
     ("evaluate recognition", &["--generated-views", "--distance", "--misses", "--json", "<SET>"]),
     ("bench", &["--frames", "--landmarks", "--rounds", "--seed", "--json"]),
+    (
+        "bench detect",
+        &["--data", "--count", "--rounds", "--no-peers", "--python", "--seed", "--json", "[IMAGES]"],
+    ),
     ("", &["--log", "--version"]),
 ];
 
@@ -268,6 +272,24 @@ fn every_stage_is_drawn_for_every_picture_of_a_folder() {
         let spread = near.map(|p| p.iter().max().unwrap_or(&0) - p.iter().min().unwrap_or(&0)).max();
         assert!(spread > Some(60), "{stage}: {spread:?}");
     }
+}
+
+#[test]
+fn detection_is_timed_without_data_and_without_python() {
+    let folder = TempDir::new().expect("a temporary directory");
+    let nowhere = folder.path().join("nothing");
+    let mut args: Vec<OsString> =
+        ["bench", "detect", "--count", "1", "--rounds", "1", "--json"].map(Into::into).into();
+    args.extend(["--python".into(), nowhere.clone().into(), "--data".into(), nowhere.into()]);
+    let run = waymark(args, LONGEST);
+    assert!(run.stderr.contains("OpenCV is left out") && run.stderr.contains("pip install"), "{run:?}");
+    let report = run.last_json();
+    assert_eq!((&report["frames"], &report["from"]), (&1.into(), &"rendered corridors".into()), "{report}");
+    let ms =
+        |name: &str| report["ours"][name]["median_ms"].as_f64().unwrap_or_else(|| panic!("{name}: {report}"));
+    assert!(0.0 < ms("edges") && ms("edges") < ms("frame to segments"), "{report}");
+    assert!(report["stages_ms"]["quads"].as_f64().is_some_and(|ms| ms > 0.0), "{report}");
+    assert_eq!(report["ratios"], Value::Array(vec![]), "{report}");
 }
 
 #[test]

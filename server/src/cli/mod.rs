@@ -65,6 +65,9 @@ enum Command {
     #[command(subcommand)]
     Evaluate(evaluate::Command),
     /// What each stage of the pipeline costs on this machine.
+    ///
+    /// Without more words: a whole frame, recognition and poses included, on rendered frames of a corridor.
+    /// `waymark bench detect`: from frame to quads beside OpenCV on the same pictures.
     Bench(bench::Args),
 }
 

@@ -27,6 +27,11 @@ pub(crate) fn read(path: &Path) -> Result<GrayImage, PictureError> {
     decode_upload(&bytes, limits).map_err(|refused| PictureError::Refused(refused.detail))
 }
 
+/// Whether a file's name ends like that of a picture that can be read.
+pub(crate) fn is_picture(path: &Path) -> bool {
+    path.extension().is_some_and(|e| ["png", "jpg", "jpeg"].iter().any(|known| e.eq_ignore_ascii_case(known)))
+}
+
 /// Detection parameters from a JSON file that names only what differs from the defaults; no file, the defaults.
 pub(crate) fn detect_params(file: Option<&Path>) -> anyhow::Result<DetectParams> {
     let Some(path) = file else { return Ok(DetectParams::default()) };

@@ -20,9 +20,6 @@ use vision::{
     trace::{Stage, Trace},
 };
 
-/// Ends of the names of pictures in a folder.
-const PICTURES: [&str; 3] = ["png", "jpg", "jpeg"];
-
 /// `waymark detect`.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
@@ -128,9 +125,7 @@ fn files(named: &[PathBuf]) -> anyhow::Result<Vec<PathBuf>> {
         }
         let entries = std::fs::read_dir(path).with_context(|| format!("cannot read {}", path.display()))?;
         let mut inside = entries.map(|e| e.map(|e| e.path())).collect::<Result<Vec<_>, _>>()?;
-        inside.retain(|p| {
-            p.extension().is_some_and(|e| PICTURES.iter().any(|known| e.eq_ignore_ascii_case(known)))
-        });
+        inside.retain(|p| pictures::is_picture(p));
         inside.sort();
         // Without pictures it stays: that it is none is said when it is read.
         if inside.is_empty() {

@@ -1,7 +1,7 @@
 //! `waymark bench`: what each stage of the pipeline costs on this machine, one core, on rendered frames of the
 //! corridor. Nothing is asserted; the figures are for people and for docs/BENCHMARKS.md.
 
-use super::{detect::Stopwatch, screen};
+use crate::cli::{detect::Stopwatch, evaluate::statistics, screen};
 use serde::Serialize;
 use sim::{
     building::Building,
@@ -27,7 +27,7 @@ const VIEWS: usize = 20;
 
 /// `waymark bench`.
 #[derive(Debug, clap::Args)]
-pub(crate) struct Args {
+pub(super) struct Args {
     /// Frames, 640 x 480, along a drive through the corridor.
     #[arg(long, default_value_t = 60, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     frames: u32,
@@ -58,7 +58,7 @@ struct Report {
     recognised: usize,
 }
 
-pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
+pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let params = Params::default();
     let building = Arc::new(Building::corridor(args.seed));
     let (models, learn_ms) = models(&building, args, &params)?;
@@ -105,7 +105,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
             costs.entry(stage).or_default().push(ms);
         }
     }
-    let median = |values: &mut Vec<f64>| super::evaluate::statistics::median(values).unwrap_or(0.0);
+    let median = |values: &mut Vec<f64>| statistics::median(values).unwrap_or(0.0);
     let frame_ms = median(&mut totals);
     let report = Report {
         frames: frames.len(),

@@ -1,0 +1,34 @@
+//! `waymark bench`: speed on this machine. Nothing is asserted; figures are for people and for docs/BENCHMARKS.md.
+
+mod pipeline;
+mod frames;
+mod peers;
+mod detect;
+
+/// `waymark bench`.
+#[derive(Debug, clap::Args)]
+#[command(args_conflicts_with_subcommands = true)]
+pub(crate) struct Args {
+    #[command(subcommand)]
+    what: Option<What>,
+    #[command(flatten)]
+    pipeline: pipeline::Args,
+}
+
+/// What to time other than the whole pipeline.
+#[derive(Debug, clap::Subcommand)]
+enum What {
+    /// From frame to segments and to quads, one core, 640 x 480, beside OpenCV's segment and marker detectors.
+    ///
+    /// Every picture is done in turn by Waymark and by OpenCV (through python3, one thread), once to warm up and once
+    /// timed, several rounds. Times are of the processor, not of the clock, so other work on the machine matters
+    /// little; ratios are of one run. Without OpenCV our own times are printed.
+    Detect(detect::Args),
+}
+
+pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
+    match &args.what {
+        None => pipeline::run(&args.pipeline),
+        Some(What::Detect(args)) => detect::run(args),
+    }
+}
