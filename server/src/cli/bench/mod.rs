@@ -12,7 +12,7 @@ pub(crate) struct Args {
     #[command(subcommand)]
     what: Option<What>,
     #[command(flatten)]
-    pipeline: pipeline::Args,
+    pipeline: pipeline::PipelineArgs,
 }
 
 /// What to time other than the whole pipeline.

@@ -27,7 +27,7 @@ const VIEWS: usize = 20;
 
 /// `waymark bench`.
 #[derive(Debug, clap::Args)]
-pub(super) struct Args {
+pub(super) struct PipelineArgs {
     /// Frames, 640 x 480, along a drive through the corridor.
     #[arg(long, default_value_t = 60, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     frames: u32,
@@ -58,7 +58,7 @@ struct Report {
     recognised: usize,
 }
 
-pub(super) fn run(args: &Args) -> anyhow::Result<()> {
+pub(super) fn run(args: &PipelineArgs) -> anyhow::Result<()> {
     let params = Params::default();
     let building = Arc::new(Building::corridor(args.seed));
     let (models, learn_ms) = models(&building, args, &params)?;
@@ -122,7 +122,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
 }
 
 /// The corridor's posters and enough others, learnt from generated views; the mean cost of a lesson.
-fn models(building: &Building, args: &Args, params: &Params) -> anyhow::Result<(ModelSet, f64)> {
+fn models(building: &Building, args: &PipelineArgs, params: &Params) -> anyhow::Result<(ModelSet, f64)> {
     let own: Vec<GrayImage> = building
         .posters()
         .filter_map(|l| building.surfaces().iter().find(|s| s.name == l.name))
