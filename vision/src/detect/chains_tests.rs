@@ -2,7 +2,7 @@ use super::*;
 use crate::{
     detect::{
         edges::{EdgeParams, edges},
-        rendering::{polygon, rectangle},
+        rendering::{flipped, polygon, quarter_turned, rectangle},
     },
     frame::GrayImage,
 };
@@ -83,4 +83,83 @@ fn endless_edges_are_cut_at_the_bound() {
     for chain in &all {
         check(chain, &p);
     }
+}
+
+type Map<'a> = &'a dyn Fn(Point2<f64>) -> Point2<f64>;
+
+/// Share of the points of `a`, mapped, that lie within a tenth of a pixel of a point of `b`.
+fn shared(a: &[EdgeChain], b: &[EdgeChain], map: Map) -> f64 {
+    let all = |chains: &[EdgeChain]| -> Vec<_> {
+        chains.iter().flat_map(|c| c.points.iter().map(|e| e.position_px)).collect()
+    };
+    let (a, b) = (all(a), all(b));
+    let near = |p: &&Point2<f64>| b.iter().any(|q| (map(**p) - q).norm() < 0.1);
+    a.iter().filter(near).count() as f64 / a.len() as f64
+}
+
+/// Lengths and kinds of the chains, to a pixel or two: which pixel of a junction or a staircase stays depends on how the
+/// image lies.
+fn same_lengths(a: &[EdgeChain], b: &[EdgeChain]) -> bool {
+    let lengths = |chains: &[EdgeChain]| {
+        let mut all: Vec<_> = chains.iter().map(|c| (c.closed, c.points.len())).collect();
+        all.sort_unstable();
+        all
+    };
+    a.len() == b.len()
+        && lengths(a).iter().zip(lengths(b)).all(|(a, b)| a.0 == b.0 && a.1.abs_diff(b.1) <= 2 + a.1 / 50)
+}
+
+/// A turned rectangle with noise, a disc that closes on itself, and a third that meets the rectangle in junctions.
+fn scene() -> GrayImage {
+    let turned = polygon((90, 70), &rectangle((30.0, 34.0), (33.0, 31.0), 0.4), (170.0, 80.0), 1.5, 8);
+    GrayImage::from_fn(90, 70, |u, v| {
+        let from = |cu: f64, cv: f64| (u as f64 - cu).hypot(v as f64 - cv);
+        let bright =
+            (13.5 - from(68.3, 30.7)).clamp(-0.5, 0.5) + (6.5 - from(27.0, 56.4)).clamp(-0.5, 0.5) + 1.0;
+        turned.at(u, v) + (70.0 * bright) as u8
+    })
+}
+
+#[test]
+fn flips_turns_shifts_and_contrast_change_no_chain() {
+    let image = scene();
+    let p = ChainParams::default();
+    let all = found(&image, &p);
+    assert!(all.len() >= 3 && all.iter().any(|c| c.closed) && all.iter().any(|c| !c.closed), "{}", all.len());
+    let (w, h) = (image.width(), image.height());
+    let cases: [(&str, GrayImage, Map); 6] = [
+        ("flip", flipped(&image), &|p| Point2::new(w as f64 - 1.0 - p.x, p.y)),
+        ("turn", quarter_turned(&image), &|p| Point2::new(h as f64 - 1.0 - p.y, p.x)),
+        (
+            "shift",
+            GrayImage::from_fn(w, h, |u, v| image.at(u.saturating_sub(2), v.saturating_sub(1))),
+            &|p| Point2::new(p.x + 2.0, p.y + 1.0),
+        ),
+        ("brighter", GrayImage::from_fn(w, h, |u, v| image.at(u, v) + 5), &|p| p),
+        ("inverted", GrayImage::from_fn(w, h, |u, v| 255 - image.at(u, v)), &|p| p),
+        ("same", image.clone(), &|p| p),
+    ];
+    for (name, image, map) in &cases {
+        let other = found(image, &p);
+        let share = shared(&all, &other, map);
+        let lengths = |c: &[EdgeChain]| c.iter().map(|c| (c.closed, c.points.len())).collect::<Vec<_>>();
+        println!("{name}: {share:.3} {:?} {:?}", lengths(&all), lengths(&other));
+        assert!(share > 0.96, "{name}: {share:.3} of the points");
+        assert!(same_lengths(&all, &other), "{name}: {:?} became {:?}", lengths(&all), lengths(&other));
+    }
+}
+
+#[test]
+fn a_larger_copy_has_the_same_chains() {
+    let copy = |scale: f64| {
+        let size = ((90.0 * scale) as usize, (70.0 * scale) as usize);
+        let corners = rectangle((40.0 * scale, 34.0 * scale), (40.0 * scale, 31.0 * scale), 0.3);
+        found(&polygon(size, &corners, (170.0, 80.0), 0.0, 8), &ChainParams::default())
+    };
+    let (small, large) = (copy(1.0), copy(3.0));
+    let length = |chains: &[EdgeChain]| chains.iter().map(|c| c.points.len()).sum::<usize>();
+    assert_eq!((small.len(), large.len()), (1, 1));
+    assert!(small[0].closed && large[0].closed);
+    let ratio = length(&large) as f64 / length(&small) as f64;
+    assert!((ratio - 3.0).abs() < 0.1, "{ratio}");
 }

@@ -119,13 +119,19 @@ impl EdgeMap {
     }
 
     /// Sub-pixel position of the edge through edge pixel `at` (row-major index, off the border): the vertex of a
-    /// parabola through the magnitudes along the gradient, at most half a step away.
+    /// parabola along the gradient, at most half a step away.
+    ///
+    /// Departs from method 1.2, where the parabola goes through the magnitudes m: here it goes through `1 / sqrt(m)`. The
+    /// filter answers a step by `(1 + a |x|) exp(-a |x|)`, which is more pointed than a parabola: that pulled positions to
+    /// the middle of the pixel, by up to 0.05 px and along a diagonal side everywhere alike.
     pub fn position_px(&self, at: usize) -> Point2<f64> {
         let (behind, ahead, step) = self.along_gradient(at);
-        let curvature = behind - 2.0 * self.magnitude(at) + ahead;
+        // Roots, and numerator and denominator times all three.
+        let (a, b, c) = (behind.sqrt(), self.magnitude(at).sqrt(), ahead.sqrt());
+        let curvature = b * (a + c) - 2.0 * a * c;
         let centre = Point2::new((at % self.width) as f64, (at / self.width) as f64);
-        if curvature < 0.0 {
-            let shift = (0.5 * (behind - ahead) / curvature).clamp(-0.5, 0.5);
+        if curvature > 0.0 {
+            let shift = (0.5 * b * (c - a) / curvature).clamp(-0.5, 0.5);
             centre + (step * shift).cast::<f64>()
         } else {
             centre
@@ -272,3 +278,7 @@ fn keep_strongest(found: &mut Vec<Maximum>, max: usize) {
 #[cfg(test)]
 #[path = "edges_tests.rs"]
 mod tests;
+
+#[cfg(test)]
+#[path = "edges_accuracy_tests.rs"]
+mod accuracy_tests;
