@@ -22,7 +22,7 @@ use vision::{detect::quads::Corners, geometry::polygon};
 const LONGEST: Duration = Duration::from_mins(2);
 
 /// Options that each command must name in its help.
-const OPTIONS: [(&str, &[&str]); 14] = [
+const OPTIONS: [(&str, &[&str]); 15] = [
     ("demo", &["--robots", "--rate-hz", "--legs", "--seed", "--http", "--data", "--stay", "--json"]),
     ("serve", &["--config", "--data", "--http", "--zenoh", "--fleet", "--workers", "--insecure"]),
     (
@@ -71,6 +71,10 @@ const OPTIONS: [(&str, &[&str]); 14] = [
         ],
     ),
     ("evaluate recognition", &["--generated-views", "--distance", "--misses", "--json", "<SET>"]),
+    (
+        "fit border",
+        &["--folds", "--ridge", "--tie", "--out", "--csv", "--views", "--seed", "--json", "<SETS>"],
+    ),
     ("bench", &["--frames", "--landmarks", "--rounds", "--seed", "--json"]),
     (
         "bench detect",

@@ -1,5 +1,5 @@
 //! How much a quad looks like the border of a thing on a wall, as a rank among rivals. A few measurements along its sides
-//! go in; their weights were fitted on labelled photographs (`fit_border` example). The paper's assumption is in it:
+//! go in; their weights were fitted on labelled photographs (`waymark fit border`, see `fitting`). The paper's assumption is in it:
 //! outside a landmark the background is uniform, and a border is alike on all its sides, which a shadow or the hybrid
 //! of an inner and an outer border is not.
 //!

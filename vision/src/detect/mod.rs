@@ -37,6 +37,7 @@ pub mod selection;
 pub mod border_model;
 pub mod border;
 pub mod nested;
+pub mod fitting;
 pub mod quads;
 #[cfg(test)]
 mod fixtures;

@@ -1,6 +1,6 @@
 //! `waymark evaluate`: the paper's experiments on labelled pictures. Tables for people, one JSON object for programs.
 
-mod rendered;
+pub(crate) mod rendered;
 mod reviewed;
 pub(crate) mod statistics;
 pub(crate) mod truth;

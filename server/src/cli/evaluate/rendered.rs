@@ -1,18 +1,37 @@
 //! The rendered sets: pictures of `sim` with exact truth, written as a folder in the evaluation format, so that they
 //! are evaluated, looked at and kept like any other set.
 
-use crate::cli::screen;
+use crate::cli::{scratch, screen};
 use anyhow::Context as _;
 use image::{ExtendedColorType, ImageEncoder as _, codecs::png};
 use sim::views::{Views, ViewsParams};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use vision::frame::GrayImage;
 
 /// Name by which the rendered corridor is asked for in place of a folder.
-pub(crate) const CORRIDOR: &str = "corridor";
+const CORRIDOR: &str = "corridor";
+
+/// The folder that a set is in. Where `corridor` is asked for in place of one, its views are rendered: into `keep`, or
+/// into a folder that lasts as long as the second value.
+pub(crate) fn folder(
+    set: &Path,
+    keep: Option<&Path>,
+    views: &ViewsParams,
+) -> anyhow::Result<(PathBuf, Option<scratch::Folder>)> {
+    if set.as_os_str() != CORRIDOR || set.is_dir() {
+        return Ok((set.to_owned(), None));
+    }
+    if let Some(keep) = keep {
+        write_corridor(keep, views)?;
+        return Ok((keep.to_owned(), None));
+    }
+    let scratch = scratch::Folder::new("views")?;
+    write_corridor(scratch.path(), views)?;
+    Ok((scratch.path().to_owned(), Some(scratch)))
+}
 
 /// Renders the corridor's views into `folder`, which is made if it is not there.
-pub(crate) fn write_corridor(folder: &Path, params: &ViewsParams) -> anyhow::Result<()> {
+fn write_corridor(folder: &Path, params: &ViewsParams) -> anyhow::Result<()> {
     std::fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
     let views = Views::new(params);
     let progress = screen::progress(views.size_hint().0, "rendering");

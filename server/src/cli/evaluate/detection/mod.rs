@@ -9,7 +9,7 @@ mod plot;
 mod pictures;
 
 use super::{rendered, reviewed::Reviewed, truth::Truth};
-use crate::cli::{parameters::ParameterArgs, pictures as files, scratch, screen};
+use crate::cli::{parameters::ParameterArgs, pictures as files, screen};
 use anyhow::Context as _;
 use report::Report;
 use score::{FOUND, ImageScore};
@@ -78,14 +78,9 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let all = parameters(args)?;
     let mut reports = Vec::new();
     for folder in &args.sets {
-        let scratch = scratch::Folder::new("views")?;
-        let rendered = folder.as_os_str() == rendered::CORRIDOR && !folder.is_dir();
-        let folder = if rendered { args.keep.as_deref().unwrap_or(scratch.path()) } else { folder };
-        if rendered {
-            let views = args.views as usize;
-            rendered::write_corridor(folder, &ViewsParams { seed: args.seed, views, ..Default::default() })?;
-        }
-        let truth = Truth::read(folder)?;
+        let views = ViewsParams { seed: args.seed, views: args.views as usize, ..Default::default() };
+        let (folder, _keep) = rendered::folder(folder, args.keep.as_deref(), &views)?;
+        let truth = Truth::read(&folder)?;
         let reviewed = Reviewed::of(&truth.name, args.reviewed.as_deref())?;
         for named in &all {
             let report = evaluate(&truth, &reviewed, args, named);
