@@ -14,10 +14,11 @@ use protos::{
     },
     v1,
 };
-use std::time::Instant;
+use std::{cell::RefCell, time::Instant};
 use vision::{
+    detect::{Memory, detect_in},
     frame::{GrayImage, Intrinsics},
-    pipeline::{FrameFacts, Landmarks, NoPose, QuadFacts, analyse},
+    pipeline::{FrameFacts, Landmarks, NoPose, QuadFacts, analyse_quads},
     recognise::{LandmarkId, Recognition},
     trace::{Stage, Trace},
 };
@@ -66,7 +67,16 @@ pub fn look(
     times: &mut StageTimes,
 ) -> FrameFacts {
     let landmarks = Landmarks { models: &map.models, sizes: &map.sizes, kind: map.distance };
-    analyse(image, camera, landmarks, &map.params, times)
+    // Taken out while in use: a panic leaves none behind that is half written.
+    let mut memory = MEMORY.take();
+    let quads = detect_in(&mut memory, image, &map.params.detect, times);
+    MEMORY.set(memory);
+    analyse_quads(image, quads, camera, landmarks, &map.params, times)
+}
+
+thread_local! {
+    /// What detection keeps from frame to frame; each worker thread its own.
+    static MEMORY: RefCell<Memory> = RefCell::default();
 }
 
 /// The answer to one image without a robot: an uploaded photograph.

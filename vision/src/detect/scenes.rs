@@ -1,7 +1,7 @@
 //! `detect` from end to end on rendered scenes: truth, symmetry, bounds, determinism.
 
 use super::{
-    MAX_QUADS, detect,
+    MAX_QUADS, MAX_SCALES, Memory, detect, detect_in,
     fixtures::render,
     quads::{Corners, Grouping, Nested, Quad, QuadKind},
 };
@@ -152,6 +152,20 @@ fn the_same_image_gives_the_same_quads_bit_for_bit() {
     for p in [DetectParams::default(), paper()] {
         assert_eq!(detect(&image, &p, &mut NoTrace), detect(&image, &p, &mut NoTrace));
     }
+}
+
+#[test]
+fn memory_of_earlier_images_changes_nothing() {
+    let image = |seed| render(600 - 40 * seed as usize, 420, seed, &scene());
+    let mut memory = Memory::default();
+    for p in [DetectParams::default(), paper()] {
+        for image in [image(1), image(3), image(1), image(2)] {
+            let quads = detect_in(&mut memory, &image, &p, &mut NoTrace);
+            assert!(!quads.is_empty());
+            assert_eq!(quads, detect(&image, &p, &mut NoTrace));
+        }
+    }
+    assert!(memory.maps.len() <= MAX_SCALES);
 }
 
 #[test]

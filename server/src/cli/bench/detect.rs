@@ -8,7 +8,7 @@ use crate::cli::{clock::Clock, evaluate::statistics::median, parameters::Paramet
 use serde::Serialize;
 use std::{collections::BTreeMap, hint::black_box, path::PathBuf};
 use vision::{
-    detect::{chains, detect, edges, quads::Grouping, segments},
+    detect::{Memory, chains, detect_in, edges, quads::Grouping, segments},
     frame::GrayImage,
     params::DetectParams,
     trace::{NoTrace, Stage, Trace},
@@ -210,15 +210,16 @@ fn time_ours(
         let chained = chains::chains(&kept, &params.chains);
         black_box(segments::segments(&chained, &kept, &params.segments));
     });
+    let mut memory = Memory::default();
     let mut found = 0;
-    timed(QUADS, &mut || found = detect(black_box(frame), params, &mut NoTrace).len());
+    timed(QUADS, &mut || found = detect_in(&mut memory, black_box(frame), params, &mut NoTrace).len());
     let mut paper = params.clone();
     paper.quads.grouping = Grouping::Relaxation;
     timed(PAPER, &mut || {
-        black_box(detect(black_box(frame), &paper, &mut NoTrace));
+        black_box(detect_in(&mut memory, black_box(frame), &paper, &mut NoTrace));
     });
     let mut clock = StageClock { last: Clock::start(), ms: BTreeMap::new() };
-    detect(frame, params, &mut clock);
+    detect_in(&mut memory, frame, params, &mut clock);
     for (stage, ms) in clock.ms {
         stages.add(stage, i, ms);
     }

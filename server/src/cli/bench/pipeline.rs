@@ -12,7 +12,7 @@ use sim::{
 };
 use std::{collections::BTreeMap, sync::Arc, time::Instant};
 use vision::{
-    detect::{detect, quads::Corners},
+    detect::{Memory, detect_in, quads::Corners},
     frame::{FrameError, GrayImage},
     learn::{model, synthesis},
     localise::pose::LandmarkSize,
@@ -85,11 +85,12 @@ pub(super) fn run(args: &PipelineArgs) -> anyhow::Result<()> {
     let mut costs: BTreeMap<&'static str, Vec<f64>> = BTreeMap::new();
     let mut totals = Vec::new();
     let (mut quads, mut recognised) = (0, 0);
+    let mut memory = Memory::default();
     for frame in &frames {
         let mut fastest: Option<Stopwatch> = None;
         for round in 0..args.rounds {
             let mut watch = Stopwatch::start();
-            let found = detect(frame, &params.detect, &mut watch);
+            let found = detect_in(&mut memory, frame, &params.detect, &mut watch);
             let facts = analyse_quads(frame, found, Some(&camera), landmarks, &params, &mut watch);
             if fastest.as_ref().is_none_or(|f| watch.total_ms() < f.total_ms()) {
                 fastest = Some(watch);
