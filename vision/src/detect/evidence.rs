@@ -63,6 +63,14 @@ impl Gradients<'_> {
         Some(Vector2::new(f64::from(self.gx[i]), f64::from(self.gy[i])))
     }
 
+    /// The step across a line with this normal at the nearest pixel, 0 where the gradient does not point along the
+    /// normal to within about 35 degrees; none outside the image.
+    pub(super) fn step_following(&self, p: &Point2<f64>, normal: &Vector2<f64>) -> Option<f64> {
+        let gradient = self.nearest(p)?;
+        let step = gradient.dot(normal);
+        Some(if step * step >= MIN_COS * MIN_COS * gradient.norm_squared() { step } else { 0.0 })
+    }
+
     /// Whether the gradient at the nearest pixel is a step of at least `min_step` across a line with this normal, to
     /// within about 35 degrees; none outside the image.
     fn follows(&self, p: &Point2<f64>, normal: &Vector2<f64>, min_step: f64) -> Option<bool> {

@@ -36,6 +36,8 @@ pub mod hypotheses;
 pub mod selection;
 pub mod border_model;
 pub mod border;
+pub mod side_band;
+pub mod side_model;
 pub mod nested;
 pub mod fitting;
 pub mod quads;
@@ -122,7 +124,10 @@ fn by_search(memory: &mut Memory, image: &GrayImage, p: &DetectParams, trace: &m
     let work = reduced.as_ref().unwrap_or(image);
     let (rated, edges, segments) = searched(memory, work, p, trace);
     let gradients = Gradients { image: work, gx: edges.gx(), gy: edges.gy() };
-    let found = selection::resolve(rated, &p.quads);
+    let mut found = selection::resolve(rated, &p.quads);
+    if p.quads.choose_sides {
+        found = selection::settle(found, &gradients, &p.quads);
+    }
     let tolerance = p.relaxation.pair_tolerance_px;
     let quads = border::canonical(found, p.quads.nested_iou, p.quads.min_side_support, tolerance);
     let quads = match p.quads.nested {

@@ -8,6 +8,7 @@ use super::{
     grouping::{QuadSeed, match_quads},
     hypotheses::HypothesisParams,
     segments::EdgeSegment,
+    side_model::SideModel,
     similarity::SegmentPair,
     three_sided::three_sided,
 };
@@ -188,6 +189,10 @@ pub struct QuadParams {
     pub min_score: f64,
     /// What makes a border, for the search.
     pub border_model: BorderModel,
+    /// Whether the search moves each side to the line beside it that looks most like a border.
+    pub choose_sides: bool,
+    /// What makes a side a border.
+    pub side_model: SideModel,
     /// Whether to report sets of three sides.
     pub three_sided: bool,
     /// Smallest c5 of a set of three sides.
@@ -210,6 +215,8 @@ impl Default for QuadParams {
             min_step: 6.0,
             min_score: 0.6,
             border_model: BorderModel::default(),
+            choose_sides: true,
+            side_model: SideModel::default(),
             three_sided: true,
             min_three_sided_closing: 0.5,
             min_three_sided_score: 0.5,

@@ -2,10 +2,11 @@
 //! stay together, quads that partly cross may not. The choice of the border within a group is `border`'s.
 
 use super::{
+    side_model::choose_sides,
     border_model::{FEATURES, border_features},
     corners::{RefinedQuad, refine},
     evidence::{Gradients, MAX_SAMPLES, Search},
-    grouping::QuadSeed,
+    grouping::{QuadSeed, overlap_exceeds},
     quads::{Quad, QuadKind, QuadParams},
 };
 use crate::geometry::polygon::{self, Relation};
@@ -138,6 +139,49 @@ fn same(a: &[Point2<f64>; 4], b: &[Point2<f64>; 4]) -> bool {
     let near = |p: &Point2<f64>, q: &Point2<f64>| (p - q).norm_squared() < SAME_CORNER_PX * SAME_CORNER_PX;
     (0..4).any(|shift| (0..4).all(|i| near(&a[i], &b[(i + shift) % 4])))
 }
+
+/// Moves the sides of the chosen quads, best first, to the lines that look most like borders, and drops what then is a
+/// quad twice. The border that a quad had before stays among its alternates.
+pub fn settle(quads: Vec<Quad>, g: &Gradients, p: &QuadParams) -> Vec<Quad> {
+    let mut kept: Vec<Quad> = Vec::new();
+    let clashes = |kept: &[Quad], q: &Quad| {
+        kept.iter().any(|k| {
+            let (a, b) = (k.corners_px.points(), q.corners_px.points());
+            overlap_exceeds(a, b, SAME_IOU) || polygon::relation(a, b, SHARED_SIDE_PX) == Relation::Crossing
+        })
+    };
+    for quad in quads {
+        let quads = [moved(&quad, g, p), Some(quad)];
+        kept.extend(quads.into_iter().flatten().find(|q| !clashes(&kept, q)));
+    }
+    kept
+}
+
+/// Quads that overlap by more than this are one.
+const SAME_IOU: f64 = 0.8;
+/// A quad whose sides moved is still the same thing if both overlap by this much.
+const MOVED_IOU: f64 = 0.4;
+
+/// The quad with its sides where they look most like a border; none if that is no better supported quad.
+fn moved(quad: &Quad, g: &Gradients, p: &QuadParams) -> Option<Quad> {
+    let before = quad.corners_px.points();
+    let corners = choose_sides(g, before, &p.side_model)?;
+    let search = Search { reach_px: p.refit_reach_px, min_step: p.min_step, samples: RATING_SAMPLES };
+    let refined = refine(g, &corners, search)?;
+    let rated = rate_one(&refined, g, p)?;
+    let after = rated.quad.corners_px.points();
+    if !overlap_exceeds(before, after, MOVED_IOU) {
+        return None;
+    }
+    let mut alternates = quad.alternates.clone();
+    if !overlap_exceeds(before, after, SAME_BORDER_IOU) {
+        alternates.insert(0, quad.corners_px);
+    }
+    Some(Quad { alternates, score: quad.score.max(rated.quad.score), ..rated.quad })
+}
+
+/// Borders that overlap by more are the same border.
+const SAME_BORDER_IOU: f64 = 0.97;
 
 /// Refits a chosen quad with all samples. One that was seen on a coarser scale only may lose its edges here: then it
 /// stays as it was.
