@@ -19,6 +19,7 @@ use vision::{
 fn main() {
     let set = std::env::args().nth(1).expect("a set directory");
     let set = Path::new(&set);
+    let things = std::env::args().nth(2).is_some_and(|a| a == "things");
     let truth: Value =
         serde_json::from_str(&std::fs::read_to_string(set.join("truth.json")).expect("truth.json"))
             .expect("valid JSON");
@@ -36,8 +37,27 @@ fn main() {
         let (rated, edges) = candidates(&work, &params, &mut NoTrace);
         let g = Gradients { image: &work, gx: edges.gx(), gy: edges.gy() };
         let found = selection::resolve(rated, &params.quads);
+        if things {
+            let complete = entry["quads_complete"].as_bool() != Some(false);
+            for s in selection::settle(found, &g, &params.quads) {
+                let quad = s.quad.corners_px.points().map(|p| pyramid::enlarge(&p, factor as f64));
+                let near = quads
+                    .iter()
+                    .map(|t| (polygon::iou(&corners(t), &quad), t["counted"].as_bool() != Some(false)))
+                    .fold((0.0, true), |best, x| if x.0 > best.0 { x } else { best });
+                let inner = quads.iter().any(|t| {
+                    let outer = corners(t);
+                    let share = polygon::area(&quad) / polygon::area(&outer);
+                    polygon::relation(&outer, &quad, 4.0) == polygon::Relation::Contains && share > 0.25
+                });
+                let features: Vec<String> = s.features.iter().map(|f| format!("{f:.5}")).collect();
+                let c = quad.map(|p| format!("{:.1},{:.1}", p.x, p.y)).join(",");
+                println!("{file},{:.4},{},{inner},{complete},{c},{}", near.0, near.1, features.join(","));
+            }
+            continue;
+        }
         for (i, t) in quads.iter().enumerate() {
-            if t["state"].as_str().is_some_and(|s| s != "full") {
+            if t["state"].as_str().is_some_and(|s| s != "full") || t["counted"].as_bool() == Some(false) {
                 continue;
             }
             let label = corners(t).map(|p| pyramid::enlarge(&p, 1.0 / factor as f64));

@@ -37,7 +37,8 @@ fn merge(group: Vec<Quad>, min_support: f64) -> Quad {
         (0..group.len())
             .fold(0, |best, i| if worst_side(&group[i]) > worst_side(&group[best]) { i } else { best })
     });
-    let of_member = |i: usize| group[i].alternates.iter().copied().chain((i != pick).then_some(group[i].corners_px));
+    let of_member =
+        |i: usize| group[i].alternates.iter().copied().chain((i != pick).then_some(group[i].corners_px));
     let mut rest: Vec<_> = (0..group.len()).flat_map(of_member).collect();
     rest.sort_by(|a, b| b.area_px2().total_cmp(&a.area_px2()));
     rest.truncate(MAX_ALTERNATES);

@@ -37,7 +37,10 @@ pub mod selection;
 pub mod border_model;
 pub mod border;
 pub mod side_band;
+pub mod network;
+mod learnt;
 pub mod side_model;
+pub mod thing_model;
 pub mod nested;
 pub mod fitting;
 pub mod quads;
@@ -126,7 +129,9 @@ fn by_search(memory: &mut Memory, image: &GrayImage, p: &DetectParams, trace: &m
     let gradients = Gradients { image: work, gx: edges.gx(), gy: edges.gy() };
     let mut found = selection::resolve(rated, &p.quads);
     if p.quads.choose_sides {
-        found = selection::settle(found, &gradients, &p.quads);
+        let settled = selection::settle(found, &gradients, &p.quads);
+        let things = settled.into_iter().map(|s| s.quad).filter(|q| q.score >= p.quads.min_probability);
+        found = things.collect();
     }
     let tolerance = p.relaxation.pair_tolerance_px;
     let quads = border::canonical(found, p.quads.nested_iou, p.quads.min_side_support, tolerance);

@@ -7,8 +7,8 @@ use super::{
     evidence::{Gradients, MAX_SAMPLES, Search},
     grouping::{QuadSeed, match_quads},
     hypotheses::HypothesisParams,
+    network::Network,
     segments::EdgeSegment,
-    side_model::SideModel,
     similarity::SegmentPair,
     three_sided::three_sided,
 };
@@ -185,14 +185,25 @@ pub struct QuadParams {
     pub refit_reach_px: f64,
     /// Smallest step height of an edge point, grey levels.
     pub min_step: f64,
+    /// Most seeds of a scale that are refitted, at most [`MAX_REFITTED`](super::selection::MAX_REFITTED); half as many
+    /// small ones come on top.
+    pub max_refitted: usize,
+    /// Most borders of one thing that are rated on a scale.
+    pub max_alike: usize,
     /// Smallest score of a quad of the search.
     pub min_score: f64,
     /// What makes a border, for the search.
     pub border_model: BorderModel,
     /// Whether the search moves each side to the line beside it that looks most like a border.
     pub choose_sides: bool,
-    /// What makes a side a border.
-    pub side_model: SideModel,
+    /// What makes a side a border; without one, what was learnt with the program.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub side_model: Option<Network>,
+    /// What makes a quad a thing; without one, what was learnt with the program.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub thing_model: Option<Network>,
+    /// Smallest probability that a quad of the search is a thing.
+    pub min_probability: f64,
     /// Whether to report sets of three sides.
     pub three_sided: bool,
     /// Smallest c5 of a set of three sides.
@@ -208,15 +219,19 @@ impl Default for QuadParams {
             working_side_px: 640,
             scales: 2,
             hypotheses: HypothesisParams::default(),
-            min_side_support: 0.6,
+            min_side_support: 0.5,
             nested_iou: 0.6,
             nested: Nested::default(),
             refit_reach_px: 2.0,
             min_step: 6.0,
-            min_score: 0.6,
+            max_refitted: 60,
+            max_alike: 8,
+            min_score: 0.4,
             border_model: BorderModel::default(),
             choose_sides: true,
-            side_model: SideModel::default(),
+            side_model: None,
+            thing_model: None,
+            min_probability: 0.5,
             three_sided: true,
             min_three_sided_closing: 0.5,
             min_three_sided_score: 0.5,
@@ -246,7 +261,12 @@ pub fn quads(segments: &[EdgeSegment], pairs: &[SegmentPair], g: &Gradients, p: 
 /// Refits a seed on the gradient planes. The score is the similarity of its pairs times the support of its worst
 /// side (method 3.6); of three sides, the worst of those that were seen.
 fn quad(seed: &QuadSeed, kind: QuadKind, g: &Gradients, p: &QuadParams) -> Option<Quad> {
-    let search = Search { reach_px: p.refit_reach_px, min_step: p.min_step, samples: MAX_SAMPLES };
+    let search = Search {
+        reach_px: p.refit_reach_px,
+        min_step: p.min_step,
+        samples: MAX_SAMPLES,
+        between_pixels: true,
+    };
     let refined = refine(g, &seed.corners_px, search)?;
     let mut support = refined.support();
     let side_support = support;

@@ -2,12 +2,14 @@
 //! stay together, quads that partly cross may not. The choice of the border within a group is `border`'s.
 
 use super::{
-    side_model::choose_sides,
     border_model::{FEATURES, border_features},
     corners::{RefinedQuad, refine},
     evidence::{Gradients, MAX_SAMPLES, Search},
     grouping::{QuadSeed, overlap_exceeds},
+    learnt,
     quads::{Quad, QuadKind, QuadParams},
+    side_model::{Chosen, choose_sides},
+    thing_model::{THING_FEATURES, probability, thing_features},
 };
 use crate::geometry::polygon::{self, Relation};
 use nalgebra::Point2;
@@ -67,28 +69,39 @@ const MIN_SIDE_PX: f64 = 15.0;
 /// Lines closer than this count as the same side.
 const SHARED_SIDE_PX: f64 = 4.0;
 
-/// Refits the seeds, best first, and drops those whose sides the gradient does not support.
+/// Refits the seeds, best first, and drops those whose sides the gradient does not support. A share of the places is
+/// kept for small seeds: the large ones of a full wall would take them all.
 pub fn rate(seeds: &[QuadSeed], g: &Gradients, p: &QuadParams) -> Vec<Rated> {
     let mut order: Vec<&QuadSeed> = seeds.iter().collect();
     order.sort_by(|a, b| (b.fit * size(&b.corners_px)).total_cmp(&(a.fit * size(&a.corners_px))));
-    let mut seen: Vec<[Point2<f64>; 4]> = Vec::new();
-    let mut rated: Vec<Rated> = Vec::new();
+    let search = Search {
+        reach_px: p.refit_reach_px + 1.0,
+        min_step: p.min_step,
+        samples: RATING_SAMPLES,
+        between_pixels: false,
+    };
+    let (mut seen, mut rated): (Vec<[Point2<f64>; 4]>, Vec<Rated>) = (Vec::new(), Vec::new());
+    let places = p.max_refitted.min(MAX_REFITTED);
+    let mut left = [places, places / 2];
     for seed in order {
-        if seen.len() >= MAX_REFITTED {
+        let small = size(&seed.corners_px) < SMALL_PERIMETER_PX.sqrt();
+        let class = usize::from(small && left[1] > 0);
+        if left == [0, 0] {
             break;
         }
-        if seen.iter().any(|s| same(s, &seed.corners_px)) {
+        if left[class] == 0 || seen.iter().any(|s| same(s, &seed.corners_px)) {
             continue;
         }
+        let alike = rated
+            .iter()
+            .filter(|r| overlap_exceeds(r.quad.corners_px.points(), &seed.corners_px, ALIKE_IOU))
+            .count();
+        if alike >= p.max_alike {
+            continue;
+        }
+        left[class] -= 1;
         seen.push(seed.corners_px);
-        let search =
-            Search { reach_px: p.refit_reach_px + 1.0, min_step: p.min_step, samples: RATING_SAMPLES };
-        let Some(rough) = refine(g, &seed.corners_px, search) else { continue };
-        if rough.min_support() < p.min_side_support {
-            continue;
-        }
-        let search = Search { reach_px: p.refit_reach_px, ..search };
-        let Some(refined) = refine(g, rough.corners_px.points(), search) else { continue };
+        let Some(refined) = refine(g, &seed.corners_px, search) else { continue };
         if rated.iter().any(|r| same(r.quad.corners_px.points(), refined.corners_px.points())) {
             continue;
         }
@@ -96,6 +109,11 @@ pub fn rate(seeds: &[QuadSeed], g: &Gradients, p: &QuadParams) -> Vec<Rated> {
     }
     rated
 }
+
+/// Seeds with a shorter way round are small.
+const SMALL_PERIMETER_PX: f64 = 240.0;
+/// Rated quads that overlap a seed by more are borders of the same thing.
+const ALIKE_IOU: f64 = 0.6;
 
 /// Keeps the quads that contradict no better one: that cross none and share an edge with none.
 ///
@@ -140,19 +158,36 @@ fn same(a: &[Point2<f64>; 4], b: &[Point2<f64>; 4]) -> bool {
     (0..4).any(|shift| (0..4).all(|i| near(&a[i], &b[(i + shift) % 4])))
 }
 
+/// A quad with its sides where they look most like a border, and what its score rests on.
+#[derive(Debug, Clone)]
+pub struct Settled {
+    /// The quad; its score is the thing model's probability.
+    pub quad: Quad,
+    /// See [`thing_features`].
+    pub features: [f64; THING_FEATURES],
+}
+
 /// Moves the sides of the chosen quads, best first, to the lines that look most like borders, and drops what then is a
 /// quad twice. The border that a quad had before stays among its alternates.
-pub fn settle(quads: Vec<Quad>, g: &Gradients, p: &QuadParams) -> Vec<Quad> {
-    let mut kept: Vec<Quad> = Vec::new();
-    let clashes = |kept: &[Quad], q: &Quad| {
+pub fn settle(quads: Vec<Quad>, g: &Gradients, p: &QuadParams) -> Vec<Settled> {
+    let side_model = p.side_model.as_ref().unwrap_or_else(|| learnt::side_model());
+    let thing_model = p.thing_model.as_ref().unwrap_or_else(|| learnt::thing_model());
+    let mut kept: Vec<Settled> = Vec::new();
+    let clashes = |kept: &[Settled], q: &Quad| {
         kept.iter().any(|k| {
-            let (a, b) = (k.corners_px.points(), q.corners_px.points());
+            let (a, b) = (k.quad.corners_px.points(), q.corners_px.points());
             overlap_exceeds(a, b, SAME_IOU) || polygon::relation(a, b, SHARED_SIDE_PX) == Relation::Crossing
         })
     };
     for quad in quads {
-        let quads = [moved(&quad, g, p), Some(quad)];
-        kept.extend(quads.into_iter().flatten().find(|q| !clashes(&kept, q)));
+        let Some(chosen) = choose_sides(g, quad.corners_px.points(), side_model) else { continue };
+        let options = [moved(&quad, &chosen, g, p), Some(quad)];
+        let Some(quad) = options.into_iter().flatten().find(|q| !clashes(&kept, q)) else { continue };
+        let corners = quad.corners_px.points();
+        let mean_side = (0..4).map(|i| (corners[(i + 1) % 4] - corners[i]).norm()).sum::<f64>() / 4.0;
+        let features = thing_features(&chosen.features, quad.score, mean_side);
+        let score = probability(thing_model, &features);
+        kept.push(Settled { quad: Quad { score, ..quad }, features });
     }
     kept
 }
@@ -162,13 +197,16 @@ const SAME_IOU: f64 = 0.8;
 /// A quad whose sides moved is still the same thing if both overlap by this much.
 const MOVED_IOU: f64 = 0.4;
 
-/// The quad with its sides where they look most like a border; none if that is no better supported quad.
-fn moved(quad: &Quad, g: &Gradients, p: &QuadParams) -> Option<Quad> {
+/// The quad with its sides where they look most like a border; none if that is no well supported quad.
+fn moved(quad: &Quad, chosen: &Chosen, g: &Gradients, p: &QuadParams) -> Option<Quad> {
     let before = quad.corners_px.points();
-    let corners = choose_sides(g, before, &p.side_model)?;
-    let search = Search { reach_px: p.refit_reach_px, min_step: p.min_step, samples: RATING_SAMPLES };
-    let refined = refine(g, &corners, search)?;
-    let rated = rate_one(&refined, g, p)?;
+    let search = Search {
+        reach_px: p.refit_reach_px,
+        min_step: p.min_step,
+        samples: RATING_SAMPLES,
+        between_pixels: false,
+    };
+    let rated = rate_one(&refine(g, &chosen.corners_px, search)?, g, p)?;
     let after = rated.quad.corners_px.points();
     if !overlap_exceeds(before, after, MOVED_IOU) {
         return None;
@@ -186,7 +224,12 @@ const SAME_BORDER_IOU: f64 = 0.97;
 /// Refits a chosen quad with all samples. One that was seen on a coarser scale only may lose its edges here: then it
 /// stays as it was.
 pub fn sharpen(quad: Quad, g: &Gradients, p: &QuadParams) -> Quad {
-    let search = Search { reach_px: p.refit_reach_px, min_step: p.min_step, samples: MAX_SAMPLES };
+    let search = Search {
+        reach_px: p.refit_reach_px,
+        min_step: p.min_step,
+        samples: MAX_SAMPLES,
+        between_pixels: true,
+    };
     match refine(g, quad.corners_px.points(), search) {
         Some(refined) if refined.min_support() >= p.min_side_support => Quad {
             corners_px: refined.corners_px,

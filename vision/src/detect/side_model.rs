@@ -6,10 +6,10 @@
 
 use super::{
     evidence::Gradients,
+    network::Network,
     side_band::{Band, MIN_STEP, SideLine},
 };
 use nalgebra::{Point2, Vector2};
-use serde::{Deserialize, Serialize};
 
 /// Measurements of a line that rest on its band alone.
 const BAND_FEATURES: usize = 20;
@@ -19,53 +19,31 @@ const CORNER_FEATURES: usize = 8;
 pub const SIDE_FEATURES: usize = BAND_FEATURES + CORNER_FEATURES;
 /// How often every side is chosen again with the others as chosen before.
 const ROUNDS: usize = 2;
-/// A side moves only to a line that is better by this much, in nats.
-const MARGIN: f64 = 0.0;
-
-/// A linear model of a line's measurements.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct SideModel {
-    /// Weight of each measurement.
-    pub weights: [f64; SIDE_FEATURES],
-}
 
 /// A line beside a side with its measurements.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rival {
     /// Its ends, beside the ends of the side.
     pub ends_px: [Point2<f64>; 2],
-    /// See [`SideModel`].
+    /// See [`choose_sides`].
     pub features: [f64; SIDE_FEATURES],
 }
 
-/// Fitted on the lines beside the sides of 129 framed paintings on 107 wall photographs: conditional logit of the line
-/// nearest to the label against the others of its side, ridge 3.
-impl Default for SideModel {
-    fn default() -> Self {
-        Self {
-            weights: [6.3695, -0.3618, -0.2679, -0.0192, 0.1621, -0.0762, 0.0956, -0.2755, -0.1020, -0.0344, 0.4620, -0.1857, -0.3108, 0.1197, 2.2344, -2.0454, 1.2228, -0.4023, -2.9774, 3.0704, -0.0898, 2.3016, 0.2165, -1.6511, 0.5523, -0.6819, -0.0056, -0.8801],
-        }
-    }
-}
-
-impl SideModel {
-    fn weigh(&self, features: &[f64]) -> f64 {
-        features.iter().zip(&self.weights).map(|(f, w)| f * w).sum()
-    }
-
-    fn weigh_corners(&self, features: &[f64; CORNER_FEATURES]) -> f64 {
-        features.iter().zip(&self.weights[BAND_FEATURES..]).map(|(f, w)| f * w).sum()
-    }
+/// A quad with its sides on the likeliest lines.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Chosen {
+    /// Corners in the order of the sides.
+    pub corners_px: [Point2<f64>; 4],
+    /// Measurements of each side's line; all 0 for a side without a line.
+    pub features: [[f64; SIDE_FEATURES]; 4],
 }
 
 /// Moves every side of a quad, clockwise on screen, to the line beside it that looks most like the border of a thing.
 /// None if no side has a line, or if what comes out has no corners.
-pub fn choose_sides(g: &Gradients, corners: &[Point2<f64>; 4], model: &SideModel) -> Option<[Point2<f64>; 4]> {
+pub fn choose_sides(g: &Gradients, corners: &[Point2<f64>; 4], model: &Network) -> Option<Chosen> {
     let sides = Sides::new(g, corners);
-    let known: [Vec<f64>; 4] = std::array::from_fn(|i| {
-        (0..sides.lines(i).len()).map(|j| model.weigh(&sides.band_features(i, j))).collect()
-    });
+    let known: [Vec<[f64; BAND_FEATURES]>; 4] =
+        std::array::from_fn(|i| (0..sides.lines(i).len()).map(|j| sides.band_features(i, j)).collect());
     let mut chosen: [Option<usize>; 4] = std::array::from_fn(|i| sides.nearest(i));
     if chosen.iter().all(Option::is_none) {
         return None;
@@ -73,16 +51,23 @@ pub fn choose_sides(g: &Gradients, corners: &[Point2<f64>; 4], model: &SideModel
     for _ in 0..ROUNDS {
         let ends = sides.ends(&chosen);
         chosen = std::array::from_fn(|i| {
-            let weigh = |j: usize| known[i][j] + model.weigh_corners(&sides.corner_features(i, j, &ends));
-            let stay = sides.nearest(i).map_or(f64::NEG_INFINITY, |j| weigh(j) + MARGIN);
-            let (best, _) = (0..known[i].len()).map(|j| (Some(j), weigh(j))).fold(
-                (sides.nearest(i), stay),
-                |best, next| if next.1 > best.1 { next } else { best },
-            );
-            best
+            let weigh = |j: usize| model.output(&joined(&known[i][j], &sides.corner_features(i, j, &ends)));
+            let weights: Vec<f64> = (0..known[i].len()).map(weigh).collect();
+            (0..weights.len()).max_by(|a, b| weights[*a].total_cmp(&weights[*b]).then(b.cmp(a)))
         });
     }
-    meet_all(&sides.ends(&chosen))
+    let ends = sides.ends(&chosen);
+    let features = std::array::from_fn(|i| {
+        chosen[i].map_or([0.0; SIDE_FEATURES], |j| joined(&known[i][j], &sides.corner_features(i, j, &ends)))
+    });
+    Some(Chosen { corners_px: meet_all(&ends)?, features })
+}
+
+fn joined(band: &[f64; BAND_FEATURES], corners: &[f64; CORNER_FEATURES]) -> [f64; SIDE_FEATURES] {
+    let mut features = [0.0; SIDE_FEATURES];
+    features[..BAND_FEATURES].copy_from_slice(band);
+    features[BAND_FEATURES..].copy_from_slice(corners);
+    features
 }
 
 /// The lines beside every side with their measurements, the corners made with the lines nearest to the other sides:
@@ -93,9 +78,7 @@ pub fn rivals(g: &Gradients, corners: &[Point2<f64>; 4]) -> [Vec<Rival>; 4] {
     std::array::from_fn(|i| {
         (0..sides.lines(i).len())
             .map(|j| {
-                let mut features = [0.0; SIDE_FEATURES];
-                features[..BAND_FEATURES].copy_from_slice(&sides.band_features(i, j));
-                features[BAND_FEATURES..].copy_from_slice(&sides.corner_features(i, j, &ends));
+                let features = joined(&sides.band_features(i, j), &sides.corner_features(i, j, &ends));
                 Rival { ends_px: sides.line_ends(i, j), features }
             })
             .collect()
@@ -221,7 +204,8 @@ impl<'a> Sides<'a> {
             let (inner, outer) = (between(1.5, section), between(-1.5, -6.0));
             Some([share(inner.0), inner.1, share(outer.0), outer.1, (inner.0 - usual).abs() / 20.0])
         };
-        let (Some(a), Some(b)) = (look(&ends[(side + 3) % 4], true), look(&ends[(side + 1) % 4], false)) else {
+        let (Some(a), Some(b)) = (look(&ends[(side + 3) % 4], true), look(&ends[(side + 1) % 4], false))
+        else {
             return [0.0; CORNER_FEATURES];
         };
         [
@@ -255,7 +239,17 @@ fn level(band: &Band, line: &SideLine, range_px: (f64, f64)) -> Option<f64> {
         return None;
     }
     let mut left = seen as u32 / 2;
-    counts.iter().position(|n| if *n > left { true } else { left -= n; false }).map(|l| l as f64)
+    counts
+        .iter()
+        .position(|n| {
+            if *n > left {
+                true
+            } else {
+                left -= n;
+                false
+            }
+        })
+        .map(|l| l as f64)
 }
 
 /// Log of the step 2 px beside the line over the step on it: high for a soft edge.

@@ -197,7 +197,12 @@ fn free_end(g: &Gradients, near: &Point2<f64>, far: &Point2<f64>, min_step: f64)
 
 /// Refits the three sides; none unless edges support them. The chord keeps its ends.
 fn three_sided(set: &OpenSet, g: &Gradients, p: &DetectParams) -> Option<Quad> {
-    let search = Search { reach_px: p.quads.refit_reach_px, min_step: p.quads.min_step, samples: SAMPLES };
+    let search = Search {
+        reach_px: p.quads.refit_reach_px,
+        min_step: p.quads.min_step,
+        samples: SAMPLES,
+        between_pixels: true,
+    };
     let c = &set.corners_px;
     let sides: [_; 4] = std::array::from_fn(|i| measure(g, &c[i], &c[(i + 1) % 4], search));
     let worst = sides[..3].iter().fold(1.0_f64, |w, s| w.min(s.support));
