@@ -80,64 +80,6 @@ impl Gradients<'_> {
     }
 }
 
-/// Median grey level on a line beside a side: `offset_px` to its left as seen on screen, hence outside a polygon that
-/// is walked clockwise; negative inside. The ends of the side are left out. None outside the image.
-pub fn level_beside(g: &Gradients, from: &Point2<f64>, to: &Point2<f64>, offset_px: f64) -> Option<f64> {
-    const SAMPLES: usize = 24;
-    let side = to - from;
-    let normal = Vector2::new(side.y, -side.x) / side.norm().max(f64::MIN_POSITIVE);
-    let mut levels = Vec::with_capacity(SAMPLES);
-    for i in 0..SAMPLES {
-        let p = from + side * (0.1 + 0.8 * (i as f64 + 0.5) / SAMPLES as f64) + normal * offset_px;
-        let inside = p.x >= 0.0 && p.y >= 0.0 && p.x < g.width() as f64 && p.y < g.height() as f64;
-        if inside {
-            levels.push(g.image.sample(p.x, p.y));
-        }
-    }
-    levels.sort_by(f32::total_cmp);
-    levels.get(levels.len() / 2).map(|l| f64::from(*l))
-}
-
-/// Share of samples on a line beside a side, as in [`level_beside`], where the image is not plain.
-pub fn roughness(g: &Gradients, from: &Point2<f64>, to: &Point2<f64>, offset_px: f64, min_step: f64) -> f64 {
-    const SAMPLES: usize = 24;
-    let side = to - from;
-    let normal = Vector2::new(side.y, -side.x) / side.norm().max(f64::MIN_POSITIVE);
-    let rough = (0..SAMPLES).filter(|i| {
-        let p = from + side * (0.1 + 0.8 * (*i as f64 + 0.5) / SAMPLES as f64) + normal * offset_px;
-        g.nearest(&p).is_some_and(|v| v.norm_squared() >= min_step * min_step)
-    });
-    rough.count() as f64 / SAMPLES as f64
-}
-
-/// How much edge runs along the side between two distances from it, left as seen on screen for positive ones: the
-/// strongest step per sample that follows the side, as a share of `own`, at most 1, averaged over the samples.
-pub fn edge_between(
-    g: &Gradients,
-    side: (&Point2<f64>, &Point2<f64>),
-    range_px: (i32, i32),
-    own: f64,
-) -> f64 {
-    const SAMPLES: usize = 12;
-    let along = side.1 - side.0;
-    let normal = Vector2::new(along.y, -along.x) / along.norm().max(f64::MIN_POSITIVE);
-    let own = own.max(1.0);
-    let strongest = |i: usize| {
-        let foot = side.0 + along * (0.05 + 0.9 * (i as f64 + 0.5) / SAMPLES as f64);
-        let mut best: f64 = 0.0;
-        for offset in range_px.0..range_px.1 {
-            if let Some(v) = g.nearest(&(foot + normal * f64::from(offset))) {
-                let step = v.dot(&normal).abs();
-                if step > best && step * step >= MIN_COS * MIN_COS * v.norm_squared() {
-                    best = step;
-                }
-            }
-        }
-        (best / own).min(1.0)
-    };
-    (0..SAMPLES).map(strongest).sum::<f64>() / SAMPLES as f64
-}
-
 /// How a side is searched.
 #[derive(Debug, Clone, Copy)]
 pub struct Search {
@@ -282,6 +224,9 @@ pub fn run_end(g: &Gradients, from: &Point2<f64>, to: &Point2<f64>, min_step: f6
     end
 }
 
+/// Most pixels looked at to each side of a foot.
+const MAX_REACH_PX: usize = 16;
+
 /// Strongest edge across the side at `foot`: whether the foot lies in the image, and the edge's offset and signed
 /// step height. The gradient must point along the normal to within about 35 degrees.
 fn edge_across(
@@ -290,32 +235,34 @@ fn edge_across(
     normal: &Vector2<f64>,
     search: Search,
 ) -> (bool, Option<(f64, f64)>) {
-    let reach = search.reach_px.round().clamp(1.0, 16.0) as i32;
-    let across = |offset: i32| {
-        let p = foot + normal * f64::from(offset);
+    let reach = (search.reach_px.round() as usize).clamp(1, MAX_REACH_PX);
+    // One more at both ends, to tell whether the strongest is a peak. Outside the image nothing is known.
+    let mut steps: [Option<f64>; 2 * MAX_REACH_PX + 3] = [None; 2 * MAX_REACH_PX + 3];
+    let mut best: Option<(usize, f64)> = None;
+    for (i, slot) in steps.iter_mut().enumerate().take(2 * reach + 3) {
+        let p = foot + normal * (i as f64 - reach as f64 - 1.0);
         let v = if search.between_pixels { g.sample(p.x, p.y) } else { g.nearest(&p) };
-        v.map(|v| (v.dot(normal), v.norm_squared()))
-    };
-    let mut best: Option<(i32, f64)> = None;
-    let mut inside = false;
-    for offset in -reach..=reach {
-        let Some((step, square)) = across(offset) else { continue };
-        inside |= offset == 0;
-        let strong = step.abs() >= search.min_step && step * step >= MIN_COS * MIN_COS * square;
-        if strong && best.is_none_or(|b| step.abs() > b.1.abs()) {
-            best = Some((offset, step));
+        let Some(v) = v else { continue };
+        let step = v.dot(normal);
+        *slot = Some(step);
+        let follows = step.abs() >= search.min_step && step * step >= MIN_COS * MIN_COS * v.norm_squared();
+        if follows && i != 0 && i != 2 * reach + 2 && best.is_none_or(|b| step.abs() > b.1.abs()) {
+            best = Some((i, step));
         }
     }
-    let found = best.and_then(|(offset, step)| {
-        let beside = |o| across(o).map_or(step.abs(), |s| s.0 * step.signum());
-        let (a, c) = (beside(offset - 1), beside(offset + 1));
+    if steps[reach + 1].is_none() {
+        return (false, None);
+    }
+    let found = best.and_then(|(i, step)| {
+        let beside = |i: usize| steps[i].map_or(step.abs(), |s| s * step.signum());
+        let (a, c) = (beside(i - 1), beside(i + 1));
         // At the end of the reach a still rising gradient belongs to another edge.
         let peak = a <= step.abs() && c <= step.abs();
         let bend = a - 2.0 * step.abs() + c;
         let shift = if bend < 0.0 { (0.5 * (a - c) / bend).clamp(-0.5, 0.5) } else { 0.0 };
-        peak.then_some((f64::from(offset) + shift, step))
+        peak.then_some((i as f64 - reach as f64 - 1.0 + shift, step))
     });
-    (inside, found.filter(|_| inside))
+    (true, found)
 }
 
 /// `offset = offset_at_mean + slope * (along - mean)`.
@@ -419,8 +366,6 @@ mod tests {
         assert!(measure(&g, &(from + away), &(to + away), FULL).support < 0.05);
         assert!(quick_support(&g, &from, &to, 6.0, 0.5) > 0.95);
         assert!(quick_support(&g, &(from + away), &(to + away), 6.0, 0.5) < 0.05);
-        assert!(level_beside(&g, &from, &to, 6.0).is_some_and(|l| (l - 200.0).abs() < 2.0));
-        assert!(level_beside(&g, &from, &to, -6.0).is_some_and(|l| (l - 60.0).abs() < 2.0));
         // The run from the middle of the side ends at its corner.
         let end = run_end(&g, &from, &nalgebra::center(&from, &to), 6.0);
         assert!((end - to).norm() < 6.0, "{end:?}");

@@ -34,7 +34,6 @@ pub mod evidence;
 pub mod corners;
 pub mod hypotheses;
 pub mod selection;
-pub mod border_model;
 pub mod border;
 pub mod side_band;
 pub mod network;

@@ -2,7 +2,6 @@
 
 use super::{
     border::canonical,
-    border_model::BorderModel,
     corners::refine,
     evidence::{Gradients, MAX_SAMPLES, Search},
     grouping::{QuadSeed, match_quads},
@@ -192,8 +191,6 @@ pub struct QuadParams {
     pub max_alike: usize,
     /// Smallest score of a quad of the search.
     pub min_score: f64,
-    /// What makes a border, for the search.
-    pub border_model: BorderModel,
     /// Whether the search moves each side to the line beside it that looks most like a border.
     pub choose_sides: bool,
     /// What makes a side a border; without one, what was learnt with the program.
@@ -227,7 +224,6 @@ impl Default for QuadParams {
             max_refitted: 60,
             max_alike: 8,
             min_score: 0.4,
-            border_model: BorderModel::default(),
             choose_sides: true,
             side_model: None,
             thing_model: None,

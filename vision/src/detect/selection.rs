@@ -2,7 +2,6 @@
 //! stay together, quads that partly cross may not. The choice of the border within a group is `border`'s.
 
 use super::{
-    border_model::{FEATURES, border_features},
     corners::{RefinedQuad, refine},
     evidence::{Gradients, MAX_SAMPLES, Search},
     grouping::{QuadSeed, overlap_exceeds},
@@ -19,7 +18,7 @@ pub const MAX_REFITTED: usize = 160;
 /// Most rated quads that are compared with each other, those of most weight first.
 pub const MAX_RATED: usize = 160;
 /// Samples along a side while quads are compared; the chosen ones are refitted with more.
-const RATING_SAMPLES: usize = 48;
+const RATING_SAMPLES: usize = 32;
 /// Corners closer than this make two seeds the same.
 const SAME_CORNER_PX: f64 = 2.0;
 
@@ -28,9 +27,7 @@ const SAME_CORNER_PX: f64 = 2.0;
 pub struct Rated {
     /// Corners, support and score.
     pub quad: Quad,
-    /// See [`border_features`].
-    pub features: [f64; FEATURES],
-    /// Which of two contradicting quads goes first: the border model's opinion.
+    /// Which of two contradicting quads goes first: its score, and its size.
     pub rank: f64,
 }
 
@@ -247,11 +244,10 @@ fn rate_one(refined: &RefinedQuad, g: &Gradients, p: &QuadParams) -> Option<Rate
     if refined.min_support() < p.min_side_support || refined.corners_px.min_side_px() < MIN_SIDE_PX {
         return None;
     }
-    let features = border_features(refined, g);
-    let rank = p.border_model.rank(&features);
     let support = refined.support();
     let agreement: f64 = refined.sides.iter().map(|s| s.agreement).sum::<f64>() / 4.0;
     let score = refined.min_support() * (support.iter().sum::<f64>() / 4.0) * agreement;
+    let rank = score * size(refined.corners_px.points());
     let quad = Quad {
         corners_px: refined.corners_px,
         corner_covariance_px2: refined.covariance_px2,
@@ -262,5 +258,5 @@ fn rate_one(refined: &RefinedQuad, g: &Gradients, p: &QuadParams) -> Option<Rate
         upright_ambiguous: refined.upright_ambiguous,
         alternates: Vec::new(),
     };
-    Some(Rated { quad, features, rank })
+    Some(Rated { quad, rank })
 }
