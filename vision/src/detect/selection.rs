@@ -102,7 +102,7 @@ pub fn rate(seeds: &[QuadSeed], g: &Gradients, p: &QuadParams) -> Vec<Rated> {
         if rated.iter().any(|r| same(r.quad.corners_px.points(), refined.corners_px.points())) {
             continue;
         }
-        rated.extend(rate_one(&refined, g, p));
+        rated.extend(rate_one(&refined, p));
     }
     rated
 }
@@ -130,20 +130,22 @@ pub fn resolve(mut rated: Vec<Rated>, p: &QuadParams) -> Vec<Quad> {
     let mut kept: Vec<Quad> = Vec::new();
     for r in different {
         let corners = r.quad.corners_px.points();
-        let free = kept.iter().all(|k| {
-            let other = k.corners_px.points();
-            match polygon::relation(other, corners, SHARED_SIDE_PX) {
-                Relation::Disjoint => true,
-                Relation::Crossing => false,
-                // Two borders of one thing differ on all four sides; else one edge would belong to both.
-                Relation::Contains | Relation::Within => Facing::new(other, corners).count() == 0,
-            }
-        });
+        let free = kept.iter().all(|k| !contradict(k.corners_px.points(), corners));
         if free {
             kept.push(r.quad);
         }
     }
     kept
+}
+
+/// Whether two quads cannot both be there: they cross, or one edge would belong to both. Two borders of one thing differ
+/// on all four sides.
+fn contradict(a: &[Point2<f64>; 4], b: &[Point2<f64>; 4]) -> bool {
+    match polygon::relation(a, b, SHARED_SIDE_PX) {
+        Relation::Disjoint => false,
+        Relation::Crossing => true,
+        Relation::Contains | Relation::Within => Facing::new(a, b).count() > 0,
+    }
 }
 
 fn size(corners: &[Point2<f64>; 4]) -> f64 {
@@ -173,16 +175,20 @@ pub fn settle(quads: Vec<Quad>, g: &Gradients, p: &QuadParams) -> Vec<Settled> {
     let clashes = |kept: &[Settled], q: &Quad| {
         kept.iter().any(|k| {
             let (a, b) = (k.quad.corners_px.points(), q.corners_px.points());
-            overlap_exceeds(a, b, SAME_IOU) || polygon::relation(a, b, SHARED_SIDE_PX) == Relation::Crossing
+            overlap_exceeds(a, b, SAME_IOU) || contradict(a, b)
         })
     };
     for quad in quads {
         let Some(chosen) = choose_sides(g, quad.corners_px.points(), side_model) else { continue };
-        let options = [moved(&quad, &chosen, g, p), Some(quad)];
-        let Some(quad) = options.into_iter().flatten().find(|q| !clashes(&kept, q)) else { continue };
+        let options = [
+            moved(&quad, &chosen, g, p).map(|q| (q, &chosen.features)),
+            Some((quad, &chosen.nearest_features)),
+        ];
+        let free = options.into_iter().flatten().find(|(q, _)| !clashes(&kept, q));
+        let Some((quad, sides)) = free else { continue };
         let corners = quad.corners_px.points();
         let mean_side = (0..4).map(|i| (corners[(i + 1) % 4] - corners[i]).norm()).sum::<f64>() / 4.0;
-        let features = thing_features(&chosen.features, quad.score, mean_side);
+        let features = thing_features(sides, quad.score, mean_side);
         let score = probability(thing_model, &features);
         kept.push(Settled { quad: Quad { score, ..quad }, features });
     }
@@ -203,7 +209,7 @@ fn moved(quad: &Quad, chosen: &Chosen, g: &Gradients, p: &QuadParams) -> Option<
         samples: RATING_SAMPLES,
         between_pixels: false,
     };
-    let rated = rate_one(&refine(g, &chosen.corners_px, search)?, g, p)?;
+    let rated = rate_one(&refine(g, &chosen.corners_px, search)?, p)?;
     let after = rated.quad.corners_px.points();
     if !overlap_exceeds(before, after, MOVED_IOU) {
         return None;
@@ -240,7 +246,7 @@ pub fn sharpen(quad: Quad, g: &Gradients, p: &QuadParams) -> Quad {
     }
 }
 
-fn rate_one(refined: &RefinedQuad, g: &Gradients, p: &QuadParams) -> Option<Rated> {
+fn rate_one(refined: &RefinedQuad, p: &QuadParams) -> Option<Rated> {
     if refined.min_support() < p.min_side_support || refined.corners_px.min_side_px() < MIN_SIDE_PX {
         return None;
     }

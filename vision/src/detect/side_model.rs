@@ -36,6 +36,8 @@ pub struct Chosen {
     pub corners_px: [Point2<f64>; 4],
     /// Measurements of each side's line; all 0 for a side without a line.
     pub features: [[f64; SIDE_FEATURES]; 4],
+    /// The same of the lines nearest to the sides as they were.
+    pub nearest_features: [[f64; SIDE_FEATURES]; 4],
 }
 
 /// Moves every side of a quad, clockwise on screen, to the line beside it that looks most like the border of a thing.
@@ -44,7 +46,8 @@ pub fn choose_sides(g: &Gradients, corners: &[Point2<f64>; 4], model: &Network) 
     let sides = Sides::new(g, corners);
     let known: [Vec<[f64; BAND_FEATURES]>; 4] =
         std::array::from_fn(|i| (0..sides.lines(i).len()).map(|j| sides.band_features(i, j)).collect());
-    let mut chosen: [Option<usize>; 4] = std::array::from_fn(|i| sides.nearest(i));
+    let nearest: [Option<usize>; 4] = std::array::from_fn(|i| sides.nearest(i));
+    let mut chosen = nearest;
     if chosen.iter().all(Option::is_none) {
         return None;
     }
@@ -56,11 +59,18 @@ pub fn choose_sides(g: &Gradients, corners: &[Point2<f64>; 4], model: &Network) 
             (0..weights.len()).max_by(|a, b| weights[*a].total_cmp(&weights[*b]).then(b.cmp(a)))
         });
     }
-    let ends = sides.ends(&chosen);
-    let features = std::array::from_fn(|i| {
-        chosen[i].map_or([0.0; SIDE_FEATURES], |j| joined(&known[i][j], &sides.corner_features(i, j, &ends)))
-    });
-    Some(Chosen { corners_px: meet_all(&ends)?, features })
+    let measure = |lines: &[Option<usize>; 4]| {
+        let ends = sides.ends(lines);
+        std::array::from_fn(|i| {
+            let of_line = |j: usize| joined(&known[i][j], &sides.corner_features(i, j, &ends));
+            lines[i].map_or([0.0; SIDE_FEATURES], of_line)
+        })
+    };
+    Some(Chosen {
+        corners_px: meet_all(&sides.ends(&chosen))?,
+        features: measure(&chosen),
+        nearest_features: measure(&nearest),
+    })
 }
 
 fn joined(band: &[f64; BAND_FEATURES], corners: &[f64; CORNER_FEATURES]) -> [f64; SIDE_FEATURES] {
