@@ -71,10 +71,6 @@ const OPTIONS: [(&str, &[&str]); 15] = [
         ],
     ),
     ("evaluate recognition", &["--generated-views", "--distance", "--misses", "--json", "<SET>"]),
-    (
-        "fit border",
-        &["--folds", "--ridge", "--tie", "--out", "--csv", "--views", "--seed", "--json", "<SETS>"],
-    ),
     ("bench", &["--frames", "--landmarks", "--rounds", "--seed", "--json"]),
     (
         "bench detect",
