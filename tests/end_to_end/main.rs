@@ -4,6 +4,7 @@ mod bad_frames;
 mod command_line;
 mod demo;
 mod evaluate;
+mod fit;
 mod http_contract;
 mod real_pictures;
 mod restart;

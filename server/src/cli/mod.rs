@@ -5,6 +5,7 @@ mod clock;
 mod demo;
 mod detect;
 mod drawing;
+mod fit;
 pub(crate) mod evaluate;
 mod parameters;
 pub(crate) mod pictures;
@@ -69,6 +70,9 @@ enum Command {
     /// Without more words: a whole frame, recognition and poses included, on rendered frames of a corridor.
     /// `waymark bench detect`: from frame to quads beside OpenCV on the same pictures.
     Bench(bench::Args),
+    /// Fit parameters of the detector to labelled pictures, with results on pictures held out.
+    #[command(subcommand)]
+    Fit(fit::Command),
 }
 
 /// Runs the program.
@@ -85,6 +89,7 @@ pub fn main() -> ExitCode {
         Command::Recognise(args) => run(teach::recognise(args)),
         Command::Evaluate(command) => evaluate::run(command).map(|()| ExitCode::SUCCESS),
         Command::Bench(args) => bench::run(args).map(|()| ExitCode::SUCCESS),
+        Command::Fit(command) => fit::run(command).map(|()| ExitCode::SUCCESS),
     };
     match done {
         Ok(code) => code,
