@@ -71,6 +71,7 @@ const OPTIONS: [(&str, &[&str]); 15] = [
         ],
     ),
     ("evaluate recognition", &["--generated-views", "--distance", "--misses", "--json", "<SET>"]),
+    ("fit similarity", &["--out", "--json", "--without", "--views", "--seed", "<SETS>"]),
     ("bench", &["--frames", "--landmarks", "--rounds", "--seed", "--json"]),
     (
         "bench detect",

@@ -1,6 +1,8 @@
 //! The weights of the two networks of the search, as fitted on labelled pictures: see docs/METHOD.md. Written by a
 //! program; not for editing.
 
+#![expect(clippy::approx_constant, reason = "fitted weights come as they come")]
+
 use super::network::Network;
 use std::sync::LazyLock;
 
