@@ -340,6 +340,7 @@ mod tests {
     }
 
     #[test]
+    #[expect(clippy::large_stack_arrays, reason = "cases of a test")]
     fn bad_settings_are_named() {
         let limits = |f: fn(&mut Limits)| {
             let mut limits = Limits::default();

@@ -22,7 +22,7 @@ use vision::{detect::quads::Corners, geometry::polygon};
 const LONGEST: Duration = Duration::from_mins(2);
 
 /// Options that each command must name in its help.
-const OPTIONS: [(&str, &[&str]); 15] = [
+const OPTIONS: [(&str, &[&str]); 16] = [
     ("demo", &["--robots", "--rate-hz", "--legs", "--seed", "--http", "--data", "--stay", "--json"]),
     ("serve", &["--config", "--data", "--http", "--zenoh", "--fleet", "--workers", "--insecure"]),
     (
@@ -71,6 +71,10 @@ const OPTIONS: [(&str, &[&str]); 15] = [
         ],
     ),
     ("evaluate recognition", &["--generated-views", "--distance", "--misses", "--json", "<SET>"]),
+    (
+        "fit search",
+        &["--weight", "--folds", "--hidden", "--ridge", "--steps", "--out", "--rust", "--json", "<SETS>"],
+    ),
     ("fit similarity", &["--out", "--json", "--without", "--views", "--seed", "<SETS>"]),
     ("bench", &["--frames", "--landmarks", "--rounds", "--seed", "--json"]),
     (

@@ -215,32 +215,28 @@ fn the_rendered_corridor_is_a_set_like_any_other() {
 }
 
 #[test]
-fn fitted_weights_are_parameters_that_can_be_evaluated() {
+fn fitted_networks_are_parameters_that_can_be_evaluated() {
     let folder = TempDir::new().expect("a temporary directory");
-    let (weights, csv) = (folder.path().join("weights.json"), folder.path().join("rivals.csv"));
-    let mut args: Vec<OsString> =
-        ["fit", "border", "corridor", "--views", "6", "--folds", "3", "--json", "--out"]
-            .map(Into::into)
-            .into();
-    args.extend([weights.clone().into(), "--csv".into(), csv.clone().into()]);
+    let (networks, source) = (folder.path().join("networks.json"), folder.path().join("learnt.rs"));
+    let mut args: Vec<OsString> = [
+        "fit", "search", "corridor", "--views", "12", "--folds", "2", "--steps", "20", "20", "--json",
+        "--out",
+    ]
+    .map(Into::into)
+    .into();
+    args.extend([networks.clone().into(), "--rust".into(), source.clone().into()]);
     let run = waymark(args, LONGEST);
     let report = run.last_json();
-    let candidates = report["candidates"].as_u64().expect("a number");
-    assert_eq!(fs::read_to_string(csv).expect("the rivals").lines().count() as u64, candidates, "{run:?}");
-    let overlap = |chooser: &str| {
-        let mut choices = report["choices"].as_array().expect("choices").iter();
-        let found = choices.find(|c| c["chooser"] == chooser);
-        found.and_then(|c| c["mean_overlap"].as_f64()).expect("a share")
-    };
-    assert!(overlap("fitted, held out") <= overlap("best there is"), "{report}");
-    assert!(overlap("best there is") > 0.5, "{report}");
-    let kept: Value = serde_json::from_slice(&fs::read(&weights).expect("the weights")).expect("JSON");
-    assert_eq!(kept, report["params"]);
+    assert_eq!(report["images"].as_u64(), Some(12), "{report}");
+    assert!(report["sides"].as_u64().is_some_and(|n| n > 12), "{report}");
+    assert!(report["things"].as_u64().is_some_and(|n| n > 4), "{report}");
+    assert_eq!(report["results"].as_array().map(Vec::len), Some(3), "{report}");
+    assert!(fs::read_to_string(source).expect("the source").contains("const THING_MODEL_LINEAR: [f64; "));
     let mut args: Vec<OsString> =
         ["evaluate", "detection", "corridor", "--views=2", "--params"].map(Into::into).into();
-    args.push(weights.into());
+    args.push(networks.into());
     let evaluated = waymark(args, LONGEST);
-    assert!(evaluated.status == 0 && evaluated.stdout.contains("weights parameters"), "{evaluated:?}");
+    assert!(evaluated.status == 0 && evaluated.stdout.contains("networks parameters"), "{evaluated:?}");
 }
 
 #[test]

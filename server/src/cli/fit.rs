@@ -1,7 +1,10 @@
 //! `waymark fit`: parameters of the detector that are learnt from labelled pictures, each with what it is worth on
 //! pictures that were held out. Prints parameters; changes nothing.
 
+mod data;
+mod search;
 mod similarity;
+mod source;
 
 /// What to fit.
 #[derive(Debug, clap::Subcommand)]
@@ -15,11 +18,23 @@ pub(crate) enum Command {
     ///   waymark evaluate detection museum-paintings --params weights.json --grouping relaxation
     #[command(verbatim_doc_comment)]
     Similarity(Box<similarity::SimilarityArgs>),
+    /// The two networks of the search: which line beside a side is its border, and whether a quad is a thing at all.
+    ///
+    /// The first learns to choose, of the lines beside each side of a found quad, the one on the labelled side; the
+    /// second to tell quads on labelled things from false ones. Results are of the networks in use, and of new ones on
+    /// images that they were not trained on. The same sets and options give the same networks.
+    ///
+    /// For example:
+    ///   waymark fit search paintings corridor --weight museum-paintings=3 --out networks.json
+    ///   waymark evaluate detection corridor --seed 2 --compare networks.json
+    #[command(verbatim_doc_comment)]
+    Search(Box<search::SearchArgs>),
 }
 
 /// Runs one fit.
 pub(crate) fn run(command: &Command) -> anyhow::Result<()> {
     match command {
         Command::Similarity(args) => similarity::run(args),
+        Command::Search(args) => search::run(args),
     }
 }

@@ -41,6 +41,7 @@ mod learnt;
 pub mod side_model;
 pub mod thing_model;
 pub mod nested;
+pub mod fitting;
 pub mod quads;
 #[cfg(test)]
 mod fixtures;

@@ -6,6 +6,7 @@ use super::{
     evidence::{Gradients, MAX_SAMPLES, Search},
     grouping::{QuadSeed, match_quads},
     hypotheses::HypothesisParams,
+    learnt,
     network::Network,
     segments::EdgeSegment,
     similarity::SegmentPair,
@@ -232,6 +233,18 @@ impl Default for QuadParams {
             min_three_sided_closing: 0.5,
             min_three_sided_score: 0.5,
         }
+    }
+}
+
+impl QuadParams {
+    /// What makes a side a border.
+    pub fn side_network(&self) -> &Network {
+        self.side_model.as_ref().unwrap_or_else(|| learnt::side_model())
+    }
+
+    /// What makes a quad a thing.
+    pub fn thing_network(&self) -> &Network {
+        self.thing_model.as_ref().unwrap_or_else(|| learnt::thing_model())
     }
 }
 

@@ -5,7 +5,6 @@ use super::{
     corners::{RefinedQuad, refine},
     evidence::{Gradients, MAX_SAMPLES, Search},
     grouping::{QuadSeed, overlap_exceeds},
-    learnt,
     quads::{Quad, QuadKind, QuadParams},
     side_model::{Chosen, choose_sides},
     thing_model::{THING_FEATURES, probability, thing_features},
@@ -169,8 +168,8 @@ pub struct Settled {
 /// Moves the sides of the chosen quads, best first, to the lines that look most like borders, and drops what then is a
 /// quad twice. The border that a quad had before stays among its alternates.
 pub fn settle(quads: Vec<Quad>, g: &Gradients, p: &QuadParams) -> Vec<Settled> {
-    let side_model = p.side_model.as_ref().unwrap_or_else(|| learnt::side_model());
-    let thing_model = p.thing_model.as_ref().unwrap_or_else(|| learnt::thing_model());
+    let side_model = p.side_network();
+    let thing_model = p.thing_network();
     let mut kept: Vec<Settled> = Vec::new();
     let clashes = |kept: &[Settled], q: &Quad| {
         kept.iter().any(|k| {

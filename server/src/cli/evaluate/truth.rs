@@ -54,6 +54,13 @@ pub(crate) struct TruthQuad {
     pub(crate) view_angle_rad: Option<f64>,
 }
 
+impl TruthQuad {
+    /// Whether a detector must find it: it counts and is wholly in view.
+    pub(crate) fn counts(&self) -> bool {
+        self.counted && self.state == QuadState::Full
+    }
+}
+
 /// One picture with its labels.
 #[derive(Debug, Clone)]
 pub(crate) struct TruthImage {
