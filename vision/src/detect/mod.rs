@@ -126,12 +126,12 @@ fn by_search(memory: &mut Memory, image: &GrayImage, p: &DetectParams, trace: &m
     let work = reduced.as_ref().unwrap_or(image);
     let (rated, edges, segments) = searched(memory, work, p, trace);
     let gradients = Gradients { image: work, gx: edges.gx(), gy: edges.gy() };
-    let mut found = selection::resolve(rated, &p.quads);
-    if p.quads.choose_sides {
-        let settled = selection::settle(found, &gradients, &p.quads);
-        let things = settled.into_iter().map(|s| s.quad).filter(|q| q.score >= p.quads.min_probability);
-        found = things.collect();
-    }
+    let found: Vec<Quad> = if p.quads.choose_sides {
+        let settled = selection::settle(rated, &gradients, &p.quads);
+        settled.into_iter().map(|s| s.quad).filter(|q| q.score >= p.quads.min_probability).collect()
+    } else {
+        selection::resolve(rated, &p.quads)
+    };
     let tolerance = p.relaxation.pair_tolerance_px;
     let quads = border::canonical(found, p.quads.nested_iou, p.quads.min_side_support, tolerance);
     let quads = match p.quads.nested {

@@ -115,26 +115,28 @@ const ALIKE_IOU: f64 = 0.6;
 ///
 /// Departs from method 3.4: its table of compatible quads is kept (disjoint and nested may stay, crossing may not), but
 /// quads are taken greedily by rank instead of by relaxation over pairs.
-pub fn resolve(mut rated: Vec<Rated>, p: &QuadParams) -> Vec<Quad> {
-    rated.retain(|r| r.quad.score >= p.min_score);
-    rated.sort_by(|a, b| b.rank.total_cmp(&a.rank).then(super::border::by_corners(&a.quad, &b.quad)));
-    let mut different: Vec<Rated> = Vec::new();
-    for r in rated {
-        let corners = r.quad.corners_px.points();
-        if different.len() < MAX_RATED && !different.iter().any(|d| same(d.quad.corners_px.points(), corners))
-        {
-            different.push(r);
-        }
-    }
+pub fn resolve(rated: Vec<Rated>, p: &QuadParams) -> Vec<Quad> {
     let mut kept: Vec<Quad> = Vec::new();
-    for r in different {
-        let corners = r.quad.corners_px.points();
-        let free = kept.iter().all(|k| !contradict(k.corners_px.points(), corners));
-        if free {
-            kept.push(r.quad);
+    for quad in different(rated, p) {
+        if !kept.iter().any(|k| contradict(k.corners_px.points(), quad.corners_px.points())) {
+            kept.push(quad);
         }
     }
     kept
+}
+
+/// The quads by rank, each once, at most [`MAX_RATED`].
+fn different(mut rated: Vec<Rated>, p: &QuadParams) -> Vec<Quad> {
+    rated.retain(|r| r.quad.score >= p.min_score);
+    rated.sort_by(|a, b| b.rank.total_cmp(&a.rank).then(super::border::by_corners(&a.quad, &b.quad)));
+    let mut different: Vec<Quad> = Vec::new();
+    for r in rated {
+        let corners = r.quad.corners_px.points();
+        if different.len() < MAX_RATED && !different.iter().any(|d| same(d.corners_px.points(), corners)) {
+            different.push(r.quad);
+        }
+    }
+    different
 }
 
 /// Whether two quads cannot both be there: they cross, or one edge would belong to both. Two borders of one thing differ
@@ -165,35 +167,45 @@ pub struct Settled {
     pub features: [f64; THING_FEATURES],
 }
 
-/// Moves the sides of the chosen quads, best first, to the lines that look most like borders, and drops what then is a
-/// quad twice. The border that a quad had before stays among its alternates.
-pub fn settle(quads: Vec<Quad>, g: &Gradients, p: &QuadParams) -> Vec<Settled> {
+/// Moves the sides of the rated quads, by rank, to the lines that look most like borders, and tells which are things:
+/// those whose score reaches `min_probability`. A quad that contradicts one of them is passed over; what is no thing
+/// stands in nobody's way. All that were looked at are returned, at most [`MAX_SETTLED`]. The border that a quad had
+/// before stays among its alternates.
+pub fn settle(rated: Vec<Rated>, g: &Gradients, p: &QuadParams) -> Vec<Settled> {
     let side_model = p.side_network();
     let thing_model = p.thing_network();
-    let mut kept: Vec<Settled> = Vec::new();
-    let clashes = |kept: &[Settled], q: &Quad| {
-        kept.iter().any(|k| {
-            let (a, b) = (k.quad.corners_px.points(), q.corners_px.points());
-            overlap_exceeds(a, b, SAME_IOU) || contradict(a, b)
-        })
-    };
-    for quad in quads {
+    let mut settled: Vec<Settled> = Vec::new();
+    for quad in different(rated, p) {
+        let taken = |q: &Quad| {
+            let things = settled.iter().filter(|s| s.quad.score >= p.min_probability);
+            things.map(|s| s.quad.corners_px.points()).any(|k| {
+                let corners = q.corners_px.points();
+                overlap_exceeds(k, corners, SAME_IOU) || contradict(k, corners)
+            })
+        };
+        if taken(&quad) {
+            continue;
+        }
+        if settled.len() >= MAX_SETTLED {
+            break;
+        }
         let Some(chosen) = choose_sides(g, quad.corners_px.points(), side_model) else { continue };
-        let options = [
-            moved(&quad, &chosen, g, p).map(|q| (q, &chosen.features)),
-            Some((quad, &chosen.nearest_features)),
-        ];
-        let free = options.into_iter().flatten().find(|(q, _)| !clashes(&kept, q));
-        let Some((quad, sides)) = free else { continue };
+        let moved = moved(&quad, &chosen, g, p).filter(|q| !taken(q));
+        let (quad, sides) = match moved {
+            Some(moved) => (moved, &chosen.features),
+            None => (quad, &chosen.nearest_features),
+        };
         let corners = quad.corners_px.points();
         let mean_side = (0..4).map(|i| (corners[(i + 1) % 4] - corners[i]).norm()).sum::<f64>() / 4.0;
         let features = thing_features(sides, quad.score, mean_side);
         let score = probability(thing_model, &features);
-        kept.push(Settled { quad: Quad { score, ..quad }, features });
+        settled.push(Settled { quad: Quad { score, ..quad }, features });
     }
-    kept
+    settled
 }
 
+/// Most quads whose sides are moved.
+pub const MAX_SETTLED: usize = 80;
 /// Quads that overlap by more than this are one.
 const SAME_IOU: f64 = 0.8;
 /// A quad whose sides moved is still the same thing if both overlap by this much.

@@ -67,7 +67,7 @@ impl Data {
             let work = pyramid::reduce(&gray, factor);
             let (rated, edges) = candidates(&work, &params, &mut NoTrace);
             let g = Gradients { image: &work, gx: edges.gx(), gy: edges.gy() };
-            let found = resolve(rated, &params.quads);
+            let found = resolve(rated.clone(), &params.quads);
             // Where pictures are taught, several images show one landmark: it is held out as a whole.
             let by_landmark = !truth.teach.is_empty();
             for quad in image.quads.iter().filter(|q| q.counts()) {
@@ -79,7 +79,7 @@ impl Data {
                 }
             }
             let group = self.group(&format!("{} {}", truth.name, image.file));
-            for settled in settle(found, &g, &params.quads) {
+            for settled in settle(rated, &g, &params.quads) {
                 let Some(corners) = settled.quad.corners_px.scaled(factor as f64) else { continue };
                 let Some(is_one) = is_thing(&corners, image) else { continue };
                 self.things.push(Example { group, weight, features: settled.features.to_vec(), is_one });
