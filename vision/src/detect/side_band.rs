@@ -66,6 +66,8 @@ pub struct Band {
 #[derive(Clone, Copy)]
 struct Peak {
     row: usize,
+    /// Where along the side, -0.5 to 0.5.
+    along: f64,
     offset_px: f64,
     step: f32,
 }
@@ -156,7 +158,7 @@ impl Band {
                 let bend = a - 2.0 * b + c;
                 let shift = if bend < 0.0 { (0.5 * (a - c) / bend).clamp(-0.5, 0.5) } else { 0.0 };
                 let offset_px = f64::from(self.first_px + i as i32 + 1) + f64::from(shift);
-                peaks.push(Peak { row, offset_px, step: w[1] });
+                peaks.push(Peak { row, along: self.along(row) - 0.5, offset_px, step: w[1] });
             }
         }
         peaks
@@ -171,9 +173,10 @@ impl Band {
         for (j, votes) in cells.chunks_exact_mut(bins).enumerate() {
             let slope = (j as f64 - SLOPES as f64) * unit;
             for p in &peaks {
-                let offset = p.offset_px - slope * (self.along(p.row) - 0.5);
-                let bin = (offset + 0.5).floor() - f64::from(self.first_px) + 2.0;
+                let offset = p.offset_px - slope * p.along;
+                let bin = offset + 2.5 - f64::from(self.first_px);
                 if bin >= 1.0 && bin < bins as f64 - 1.0 {
+                    // Above 0, so the cast rounds down.
                     let (bin, bit) = (bin as usize, 1 << p.row);
                     votes[bin - 1] |= bit;
                     votes[bin] |= bit;
@@ -218,14 +221,13 @@ impl Band {
     fn fit(&self, peaks: &[Peak], mut line: (f64, f64)) -> Option<SideLine> {
         const NEAR_PX: [f64; 4] = [1.6, 1.6, 1.3, 1.1];
         const MIN_POINTS: f64 = 8.0;
-        let along = |p: &Peak| self.along(p.row) - 0.5;
         let mut result = None;
         for near in NEAR_PX {
-            let close = peaks.iter().filter(|p| (p.offset_px - line.0 - line.1 * along(p)).abs() < near);
+            let close = peaks.iter().filter(|p| (p.offset_px - line.0 - line.1 * p.along).abs() < near);
             let (mut n, mut t, mut o, mut tt, mut to) = (0.0, 0.0, 0.0, 0.0, 0.0);
             let (mut rows, mut sign, mut step) = (0_u64, 0.0, 0.0);
             for p in close {
-                let (x, y) = (along(p), p.offset_px);
+                let (x, y) = (p.along, p.offset_px);
                 n += 1.0;
                 t += x;
                 o += y;
@@ -261,8 +263,9 @@ impl Band {
         let mut seen = 0;
         for row in 0..self.rows {
             let at = line.offset_px + line.slope_px * (self.along(row) - 0.5) - f64::from(self.first_px);
-            let low = (at + range_px.0).ceil().max(0.0) as usize;
-            let high = ((at + range_px.1).floor() + 1.0).clamp(0.0, self.columns as f64) as usize;
+            let low = first_from(at + range_px.0);
+            let high =
+                if at + range_px.1 < 0.0 { 0 } else { ((at + range_px.1) as usize + 1).min(self.columns) };
             for i in row * self.columns + low..(row * self.columns + high).max(row * self.columns + low) {
                 if self.square[i] >= 0.0 {
                     seen += 1;
@@ -278,12 +281,75 @@ impl Band {
     pub fn edges_outside(&self, line: &SideLine, beyond_px: f64, min_step: f32) -> f64 {
         let with = (0..self.rows).filter(|row| {
             let at = line.offset_px + line.slope_px * (self.along(*row) - 0.5) - f64::from(self.first_px);
-            let low = ((at + beyond_px).ceil().max(0.0) as usize).min(self.columns);
+            let low = first_from(at + beyond_px).min(self.columns);
             (row * self.columns + low..(row + 1) * self.columns).any(|i| {
                 let step = self.step[i].abs();
                 step > min_step && step * step > MIN_COS * MIN_COS * self.square[i]
             })
         });
         with.count() as f64 / self.rows as f64
+    }
+}
+
+/// The first column at or after `x`. Casts round towards 0; `ceil` is a call on the oldest processors.
+fn first_from(x: f64) -> usize {
+    let whole = x.max(0.0) as usize;
+    whole + usize::from((whole as f64) < x)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{
+        super::{
+            edges::{EdgeParams, edges},
+            fixtures::render,
+        },
+        *,
+    };
+    use crate::frame::GrayImage;
+
+    fn band(image: &GrayImage, from: [f64; 2], to: [f64; 2], extent_px: f64) -> Option<Band> {
+        let map = edges(image, &EdgeParams::default());
+        let g = Gradients { image, gx: map.gx(), gy: map.gy() };
+        Band::new(&g, &Point2::from(from), &Point2::from(to), extent_px)
+    }
+
+    #[test]
+    fn lines_beside_a_side_are_found_where_they_are() {
+        // A frame with an inner border 12 px in, and something 20 px above; slightly slanted.
+        let frame = [[50.0, 80.2], [250.0, 84.2], [250.0, 200.0], [50.0, 200.0]];
+        let inner = [[62.0, 92.2], [238.0, 96.2], [238.0, 188.0], [62.0, 188.0]];
+        let above = [[0.0, 10.0], [300.0, 10.0], [300.0, 64.2], [0.0, 58.2]];
+        let image = render(300, 240, 200, &[(above, 120), (frame, 60), (inner, 160)]);
+        let band = band(&image, [50.0, 83.0], [250.0, 83.0], 120.0).unwrap();
+        let offset = |wanted: f64| {
+            let near = |l: &&SideLine| (l.offset_px - wanted).abs() < 0.3;
+            *band.lines.iter().find(near).unwrap_or_else(|| panic!("{wanted}: {:?}", band.lines))
+        };
+        // Out of the quad is up here; the middle of the frame's upper side is at 82.2, of the inner one's at 94.2.
+        let (side, inside, outside) = (offset(0.8), offset(-11.2), offset(21.8));
+        assert!(side.support > 0.95 && side.sign > 0.99 && inside.sign < -0.99 && outside.sign < -0.99);
+        assert!((side.slope_px + 4.0).abs() < 0.3, "{side:?}");
+        let [from, to] = band.ends(&side);
+        assert!((from.y - 80.2).abs() < 0.3 && (to.y - 84.2).abs() < 0.3, "{from} {to}");
+    }
+
+    #[test]
+    fn bands_and_their_lines_are_bounded() {
+        let stripes = GrayImage::from_fn(600, 600, |_, v| if v / 5 % 2 == 0 { 40 } else { 220 });
+        let band_ = band(&stripes, [20.0, 300.0], [580.0, 300.0], 1e6).unwrap();
+        assert_eq!(band_.lines.len(), MAX_LINES);
+        assert!(band_.lines.iter().all(|l| l.offset_px.abs() <= REACH_PX.1 + 1.0));
+        assert!(band(&stripes, [20.0, 300.0], [23.0, 300.0], 100.0).is_none());
+        assert!(band(&stripes, [20.0, 300.0], [f64::NAN, 300.0], 100.0).is_none());
+        // Wholly outside the image there is nothing.
+        assert!(band(&stripes, [-300.0, -300.0], [-200.0, -300.0], 100.0).unwrap().lines.is_empty());
+    }
+
+    #[test]
+    fn columns_start_at_the_next_whole_number() {
+        for (x, column) in [(-3.5, 0), (-0.2, 0), (0.0, 0), (0.1, 1), (1.0, 1), (1.0001, 2)] {
+            assert_eq!(first_from(x), column, "{x}");
+        }
     }
 }

@@ -323,3 +323,42 @@ fn meet_all(ends: &Ends) -> Option<[Point2<f64>; 4]> {
     }
     Some(corners)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{
+        super::{
+            edges::{EdgeParams, edges},
+            fixtures::render,
+            quads::QuadParams,
+        },
+        *,
+    };
+
+    const PICTURE: [[f64; 2]; 4] = [[100.0, 80.0], [300.0, 80.0], [300.0, 240.0], [100.0, 240.0]];
+
+    #[test]
+    fn the_shadow_under_a_picture_is_not_its_side() {
+        // Light from above: the wall under the picture is at six tenths, down to 20 px below it.
+        let shadow = [[102.0, 95.0], [298.0, 95.0], [298.0, 260.0], [102.0, 260.0]];
+        let inner = [[125.0, 105.0], [275.0, 105.0], [275.0, 215.0], [125.0, 215.0]];
+        let image = render(420, 340, 200, &[(shadow, 120), (PICTURE, 50), (inner, 170)]);
+        let map = edges(&image, &EdgeParams::default());
+        let g = Gradients { image: &image, gx: map.gx(), gy: map.gy() };
+        let with_shadow = [[100.0, 80.0], [300.0, 80.0], [300.0, 260.0], [100.0, 260.0]].map(Point2::from);
+        let chosen = choose_sides(&g, &with_shadow, QuadParams::default().side_network()).unwrap();
+        for (found, wanted) in chosen.corners_px.iter().zip(PICTURE.map(Point2::from)) {
+            assert!((found - wanted).norm() < 0.5, "{:?}", chosen.corners_px);
+        }
+    }
+
+    #[test]
+    fn nothing_to_choose_from_is_none() {
+        let image = render(200, 200, 128, &[]);
+        let map = edges(&image, &EdgeParams::default());
+        let g = Gradients { image: &image, gx: map.gx(), gy: map.gy() };
+        let quad = [[50.0, 50.0], [150.0, 50.0], [150.0, 150.0], [50.0, 150.0]].map(Point2::from);
+        assert!(choose_sides(&g, &quad, QuadParams::default().side_network()).is_none());
+        assert!(rivals(&g, &quad).iter().all(Vec::is_empty));
+    }
+}
