@@ -46,7 +46,7 @@ enum Command {
     ///
     /// For example:
     ///   waymark detect hall.jpg --draw stages
-    ///   waymark detect photographs/ --json --min-score 0.5 > quads.jsonl
+    ///   waymark detect photographs/ --json --min-score 0.8 > quads.jsonl
     #[command(verbatim_doc_comment)]
     Detect(detect::Args),
     /// Make and list the maps of a running server.

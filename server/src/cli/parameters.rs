@@ -33,7 +33,7 @@ pub(crate) struct ParameterArgs {
     /// Share of each side that edges must support, 0 to 1: higher for fewer false quads.
     #[arg(long, value_name = "SHARE")]
     min_support: Option<f64>,
-    /// Smallest score of a quad, 0 to 1.
+    /// Smallest score of a quad of the search, the probability that it is a thing, 0 to 1: higher for fewer false quads.
     #[arg(long, value_name = "SCORE")]
     min_score: Option<f64>,
     /// What a quad inside another becomes: one of its `alternates`, or one of the `quads`.
@@ -98,7 +98,7 @@ impl ParameterArgs {
             ("edges.low", self.edge_steps.map(|s| s[0].into())),
             ("edges.high", self.edge_steps.map(|s| s[1].into())),
             ("quads.min_side_support", self.min_support.map(Value::from)),
-            ("quads.min_score", self.min_score.map(Value::from)),
+            ("quads.min_probability", self.min_score.map(Value::from)),
             ("quads.nested", self.nested.clone().map(Value::from)),
             ("quads.three_sided", self.no_three_sided.then_some(Value::from(false))),
             ("tiling.remove", self.remove_tiling.then_some(Value::from(true))),
@@ -160,7 +160,7 @@ mod tests {
             "--scales=1",
             "--min-segment=9",
             "--edge-steps=3,7",
-            "--min-support=0.5",
+            "--min-support=0.7",
             "--min-score=0.4",
             "--nested=quads",
             "--no-three-sided",
@@ -172,7 +172,9 @@ mod tests {
         assert!((p.segments.min_length_px(100) - 9.0).abs() < 1e-12);
         assert!((p.segments.min_length_px(9000) - 9.0).abs() < 1e-12);
         assert!((p.edges.low - 3.0).abs() < 1e-6 && (p.edges.high - 7.0).abs() < 1e-6);
-        assert!((p.quads.min_side_support - 0.5).abs() < 1e-12 && (p.quads.min_score - 0.4).abs() < 1e-12);
+        assert!(
+            (p.quads.min_side_support - 0.7).abs() < 1e-12 && (p.quads.min_probability - 0.4).abs() < 1e-12
+        );
         assert!(!p.quads.three_sided && p.tiling.remove);
     }
 

@@ -9,12 +9,14 @@ use super::{
     learnt,
     network::Network,
     segments::EdgeSegment,
+    side_model::SIDE_FEATURES,
     similarity::SegmentPair,
+    thing_model::THING_FEATURES,
     three_sided::three_sided,
 };
 use crate::params::DetectParams;
 use nalgebra::{Matrix2, Point2};
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize, de::Error as _};
 
 /// Why four points are not the corners of a quad.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -195,10 +197,10 @@ pub struct QuadParams {
     /// Whether the search moves each side to the line beside it that looks most like a border.
     pub choose_sides: bool,
     /// What makes a side a border; without one, what was learnt with the program.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "checked::<SIDE_FEATURES, _>")]
     pub side_model: Option<Network>,
     /// What makes a quad a thing; without one, what was learnt with the program.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "checked::<THING_FEATURES, _>")]
     pub thing_model: Option<Network>,
     /// Smallest probability that a quad of the search is a thing.
     pub min_probability: f64,
@@ -234,6 +236,15 @@ impl Default for QuadParams {
             min_three_sided_score: 0.5,
         }
     }
+}
+
+/// A network for `N` measurements, checked where it comes in.
+fn checked<'de, const N: usize, D: Deserializer<'de>>(from: D) -> Result<Option<Network>, D::Error> {
+    let network = Option::<Network>::deserialize(from)?;
+    if let Some(network) = &network {
+        network.check(N).map_err(D::Error::custom)?;
+    }
+    Ok(network)
 }
 
 impl QuadParams {

@@ -1,5 +1,6 @@
-//! Which hypotheses become quads: seeds in, refitted quads that do not contradict each other out. Nested quads may
-//! stay together, quads that partly cross may not. The choice of the border within a group is `border`'s.
+//! Which hypotheses become quads: seeds in, refitted quads with their sides moved to borders, told from chance, that do
+//! not contradict each other out. Nested quads may stay together, quads that partly cross may not. Which line is a side
+//! is `side_model`'s, what is a thing `thing_model`'s, which of nested borders is canonical `border`'s.
 
 use super::{
     corners::{RefinedQuad, refine},

@@ -32,3 +32,41 @@ pub fn thing_features(
 pub fn probability(model: &Network, features: &[f64; THING_FEATURES]) -> f64 {
     1.0 / (1.0 + (-model.output(features)).exp())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_measurements_are_mean_least_and_most_of_the_sides() {
+        let sides: [[f64; SIDE_FEATURES]; 4] = [1.0, 3.0, -2.0, 6.0].map(|x| [x; SIDE_FEATURES]);
+        let features = thing_features(&sides, 0.7, 100.0);
+        for (from, wanted) in [(0, 2.0), (SIDE_FEATURES, -2.0), (2 * SIDE_FEATURES, 6.0)] {
+            assert!(features[from..from + SIDE_FEATURES].iter().all(|f| (f - wanted).abs() < 1e-12));
+        }
+        assert!((features[THING_FEATURES - 2] - 0.7).abs() < 1e-12);
+        assert!((features[THING_FEATURES - 1] - 100.0_f64.ln()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn odds_of_three_to_one_are_three_quarters() {
+        let model = Network {
+            mean: vec![0.0; THING_FEATURES],
+            deviation: vec![1.0; THING_FEATURES],
+            linear: vec![0.0; THING_FEATURES],
+            hidden_in: Vec::new(),
+            hidden_bias: Vec::new(),
+            hidden_out: Vec::new(),
+            bias: 3.0_f64.ln(),
+        };
+        assert!((probability(&model, &[0.5; THING_FEATURES]) - 0.75).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_network_for_other_measurements_is_refused_by_name() {
+        let wrong = r#"{"thing_model": {"mean": [0], "deviation": [1], "linear": [0], "hidden_in": [],
+            "hidden_bias": [], "hidden_out": [], "bias": 0}}"#;
+        let error = serde_json::from_str::<super::super::quads::QuadParams>(wrong).unwrap_err().to_string();
+        assert!(error.contains("mean has 1 numbers, 86 expected"), "{error}");
+    }
+}

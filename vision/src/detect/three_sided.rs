@@ -1,5 +1,6 @@
 //! Sets of three sides (method 3.5): what pass 2 left over, closed by a segment that pass 1 left over. Doors and
-//! occluded posters. The search's own way is in `leftover`. Whoever confirms the fourth side makes them full quads; here they stay three-sided.
+//! occluded posters. The search's own way is in `leftover`. Whoever confirms the fourth side makes them full quads; here
+//! they stay three-sided.
 
 mod leftover;
 
