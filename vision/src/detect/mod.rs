@@ -41,6 +41,7 @@ mod learnt;
 pub mod side_model;
 pub mod thing_model;
 pub mod nested;
+mod full_size;
 pub mod fitting;
 pub mod quads;
 #[cfg(test)]
@@ -149,7 +150,8 @@ fn by_search(memory: &mut Memory, image: &GrayImage, p: &DetectParams, trace: &m
         quads.sort_by(|a, b| b.score.total_cmp(&a.score).then(border::by_corners(a, b)));
     }
     memory.give_back(edges);
-    quads.into_iter().filter_map(|q| q.scaled(factor as f64)).collect()
+    let quads = quads.into_iter().filter_map(|q| q.scaled(factor as f64)).collect();
+    full_size::at_full_size(quads, image, factor, p, memory)
 }
 
 /// Everything the search proposes on the scales of an image, rated, not yet chosen from; and the finest edge map.
