@@ -2,7 +2,7 @@
 //! clipping out. Also the rule that names the top-left corner. Does not choose between quads.
 
 use super::{
-    evidence::{FittedLine, Gradients, Search, SideEvidence, measure},
+    evidence::{FittedLine, Gradients, Search, SideEvidence, SidePoints},
     quads::Corners,
 };
 use nalgebra::{Matrix2, Point2, Vector2};
@@ -42,10 +42,17 @@ impl RefinedQuad {
 }
 
 /// Refits the four sides on the edge points near them and intersects. `corners_px` is clockwise on screen. None when
-/// what comes out is no convex quad, or a corner left its place by more than `search.reach_px` times four.
+/// what comes out is no convex quad, a corner left its place by more than `search.reach_px` times four, or a side has
+/// less support than `search.least_support`.
 pub fn refine(g: &Gradients, corners_px: &[Point2<f64>; 4], search: Search) -> Option<RefinedQuad> {
-    let sides: [SideEvidence; 4] =
-        std::array::from_fn(|i| measure(g, &corners_px[i], &corners_px[(i + 1) % 4], search));
+    let mut points = [const { None }; 4];
+    for (i, points) in points.iter_mut().enumerate() {
+        *points = SidePoints::new(g, &corners_px[i], &corners_px[(i + 1) % 4], search);
+        if points.is_none() && search.least_support > 0.0 {
+            return None;
+        }
+    }
+    let sides = points.map(|p| p.map_or(SideEvidence::NONE, |p| p.evidence()));
     let lines: [Line; 4] = std::array::from_fn(|i| {
         sides[i].line.map_or_else(|| Line::through(&corners_px[i], &corners_px[(i + 1) % 4]), Line::Fitted)
     });

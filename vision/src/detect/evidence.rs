@@ -1,6 +1,12 @@
 //! What the gradient planes say about a supposed side: which share of it an edge supports, and where that edge runs
 //! to a fraction of a pixel (method 3.6). Takes two points, gives a line with its variance; forms no hypotheses.
 
+pub use super::side_fit::FittedLine;
+
+use super::{
+    fixed::Fixed,
+    side_fit::{EdgePoint, fit},
+};
 use crate::frame::GrayImage;
 use nalgebra::{Point2, Vector2};
 
@@ -11,9 +17,7 @@ const MIN_SAMPLES: usize = 12;
 /// Share of a side left out at both ends: near a corner the other side's gradient mixes in.
 const CORNER_SHARE: f64 = 0.04;
 /// The gradient points along the normal to within about 35 degrees.
-const MIN_COS: f64 = 0.82;
-/// Floor of an edge point's standard deviation across the edge (method 1.3).
-const MIN_SIGMA_PX: f64 = 0.2;
+pub(super) const MIN_COS: f32 = 0.82;
 
 /// The gradient planes of a frame, row-major, in grey levels of step height.
 #[derive(Debug, Clone, Copy)]
@@ -38,7 +42,7 @@ impl Gradients<'_> {
     }
 
     /// Bilinear gradient; none outside the image.
-    fn sample(&self, u: f64, v: f64) -> Option<Vector2<f64>> {
+    fn sample(&self, u: f64, v: f64) -> Option<[f32; 2]> {
         let inside = u >= 0.0 && v >= 0.0 && u < (self.width() - 1) as f64 && v < (self.height() - 1) as f64;
         if !inside {
             return None;
@@ -49,35 +53,39 @@ impl Gradients<'_> {
         let at = |plane: &[f32]| {
             let top = plane[i] * (1.0 - a) + plane[i + 1] * a;
             let bottom = plane[i + self.width()] * (1.0 - a) + plane[i + self.width() + 1] * a;
-            f64::from(top * (1.0 - b) + bottom * b)
+            top * (1.0 - b) + bottom * b
         };
-        Some(Vector2::new(at(self.gx), at(self.gy)))
+        Some([at(self.gx), at(self.gy)])
     }
+
     /// Gradient at the nearest pixel; none outside the image.
-    fn nearest(&self, p: &Point2<f64>) -> Option<Vector2<f64>> {
-        let (u, v) = (p.x + 0.5, p.y + 0.5);
-        if !(u >= 0.0 && v >= 0.0 && u < self.width() as f64 && v < self.height() as f64) {
-            return None;
-        }
-        let i = v as usize * self.width() + u as usize;
-        Some(Vector2::new(f64::from(self.gx[i]), f64::from(self.gy[i])))
+    #[inline]
+    fn nearest(&self, p: Fixed) -> Option<[f32; 2]> {
+        let i = p.pixel(self.width(), self.height())?;
+        Some([*self.gx.get(i)?, *self.gy.get(i)?])
     }
 
     /// The step across a line with this normal at the nearest pixel, 0 where the gradient does not point along the
     /// normal to within about 35 degrees; none outside the image.
-    pub(super) fn step_following(&self, p: &Point2<f64>, normal: &Vector2<f64>) -> Option<f64> {
-        let gradient = self.nearest(p)?;
-        let step = gradient.dot(normal);
-        Some(if step * step >= MIN_COS * MIN_COS * gradient.norm_squared() { step } else { 0.0 })
+    #[inline]
+    pub(super) fn step_following(&self, p: Fixed, normal: [f32; 2]) -> Option<f32> {
+        let (step, square) = across(self.nearest(p)?, normal);
+        Some(if step * step >= MIN_COS * MIN_COS * square { step } else { 0.0 })
     }
 
     /// Whether the gradient at the nearest pixel is a step of at least `min_step` across a line with this normal, to
     /// within about 35 degrees; none outside the image.
-    fn follows(&self, p: &Point2<f64>, normal: &Vector2<f64>, min_step: f64) -> Option<bool> {
-        let gradient = self.nearest(p)?;
-        let step = gradient.dot(normal).abs();
-        Some(step >= min_step && step * step >= MIN_COS * MIN_COS * gradient.norm_squared())
+    #[inline]
+    fn follows(&self, p: Fixed, normal: [f32; 2], min_step: f32) -> Option<bool> {
+        let (step, square) = across(self.nearest(p)?, normal);
+        Some(step.abs() >= min_step && step * step >= MIN_COS * MIN_COS * square)
     }
+}
+
+/// The step across a line with this normal, and the squared gradient.
+#[inline]
+fn across([x, y]: [f32; 2], [nx, ny]: [f32; 2]) -> (f32, f32) {
+    (x * nx + y * ny, x * x + y * y)
 }
 
 /// How a side is searched.
@@ -91,14 +99,8 @@ pub struct Search {
     pub samples: usize,
     /// Read the gradient between pixels, for the best line, or at the nearest, which is quicker.
     pub between_pixels: bool,
-}
-
-/// An edge point: distance along the side, offset across it, signed step height.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct EdgePoint {
-    along_px: f64,
-    offset_px: f64,
-    step: f64,
+    /// Support of a side below which nothing else is asked of it; 0 for all there is to know.
+    pub least_support: f64,
 }
 
 /// What was found along a side.
@@ -114,57 +116,86 @@ pub struct SideEvidence {
     pub line: Option<FittedLine>,
 }
 
-/// A line `normal . x = rho_px` with the variance of its offset.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FittedLine {
-    /// Unit normal: to the left of the walk from the first to the second point as seen on screen, hence out of a
-    /// polygon that is walked clockwise.
-    pub normal: Vector2<f64>,
-    /// Signed distance from the origin.
-    pub rho_px: f64,
-    /// Point of the line where its offset is known best.
-    centre_px: Point2<f64>,
-    variance_px2: f64,
-    slope_variance: f64,
+impl SideEvidence {
+    pub(super) const NONE: Self = Self { support: 0.0, agreement: 0.0, strength: 0.0, line: None };
 }
 
-impl FittedLine {
-    /// Variance of the line's offset at the foot of `p`, extrapolation included, in px^2.
-    pub fn variance_at(&self, p: &Point2<f64>) -> f64 {
-        let direction = Vector2::new(-self.normal.y, self.normal.x);
-        self.variance_px2 + self.slope_variance * direction.dot(&(p - self.centre_px)).powi(2)
-    }
+/// The edge points along the way from one point to another.
+#[derive(Debug, Clone)]
+pub(super) struct SidePoints {
+    from: Point2<f64>,
+    direction: Vector2<f64>,
+    normal: Vector2<f64>,
+    length_px: f64,
+    /// Number of samples inside the image.
+    seen: usize,
+    points: Vec<EdgePoint>,
 }
 
 /// Looks for an edge along the way from `from` to `to`.
 pub fn measure(g: &Gradients, from: &Point2<f64>, to: &Point2<f64>, search: Search) -> SideEvidence {
-    let side = to - from;
-    let length = side.norm();
-    let nothing = SideEvidence { support: 0.0, agreement: 0.0, strength: 0.0, line: None };
-    if !length.is_finite() || length < 1.0 || g.width() < 2 || g.height() < 2 {
-        return nothing;
+    let found = SidePoints::new(g, from, to, Search { least_support: 0.0, ..search });
+    found.map_or(SideEvidence::NONE, |s| s.evidence())
+}
+
+impl SidePoints {
+    /// Looks for edge points along the way from `from` to `to`. None once the support cannot reach what is asked for.
+    pub(super) fn new(g: &Gradients, from: &Point2<f64>, to: &Point2<f64>, search: Search) -> Option<Self> {
+        let side = to - from;
+        let length_px = side.norm();
+        if !length_px.is_finite() || length_px < 1.0 || g.width() < 2 || g.height() < 2 {
+            return None;
+        }
+        let direction = side / length_px;
+        let normal = Vector2::new(direction.y, -direction.x);
+        let count =
+            ((length_px / 2.0) as usize).clamp(MIN_SAMPLES, search.samples.clamp(MIN_SAMPLES, MAX_SAMPLES));
+        let mut looked =
+            Self { from: *from, direction, normal, length_px, seen: 0, points: Vec::with_capacity(count) };
+        let across = Across::new(&normal, search);
+        let most_missed = (1.0 - search.least_support) * count as f64;
+        for i in scattered(count) {
+            let along_px = share_along(i, count) * length_px;
+            let (inside, found) = across.strongest(g, &(from + direction * along_px));
+            looked.seen += usize::from(inside);
+            looked.points.extend(found.map(|(offset_px, step)| EdgePoint { along_px, offset_px, step }));
+            if (looked.seen - looked.points.len()) as f64 > most_missed {
+                return None;
+            }
+        }
+        Some(looked)
     }
-    let direction = side / length;
-    let normal = Vector2::new(direction.y, -direction.x);
-    let count = ((length / 2.0) as usize).clamp(MIN_SAMPLES, search.samples.clamp(MIN_SAMPLES, MAX_SAMPLES));
-    let mut seen = 0_usize;
-    let mut points = Vec::with_capacity(count);
-    for i in 0..count {
-        let share = CORNER_SHARE + (1.0 - 2.0 * CORNER_SHARE) * (i as f64 + 0.5) / count as f64;
-        let along_px = share * length;
-        let foot = from + direction * along_px;
-        let (inside, found) = edge_across(g, &foot, &normal, search);
-        seen += usize::from(inside);
-        points.extend(found.map(|(offset_px, step)| EdgePoint { along_px, offset_px, step }));
+
+    /// What the points say of the side.
+    pub(super) fn evidence(&self) -> SideEvidence {
+        if self.seen == 0 || self.points.is_empty() {
+            return SideEvidence::NONE;
+        }
+        let n = self.points.len();
+        let positive = self.points.iter().filter(|p| p.step > 0.0).count();
+        SideEvidence {
+            support: n as f64 / self.seen as f64,
+            agreement: positive.max(n - positive) as f64 / n as f64,
+            strength: self.points.iter().map(|p| p.step.abs()).sum::<f64>() / self.seen as f64,
+            line: fit(&self.points, self.length_px)
+                .map(|f| f.line(&self.from, &self.direction, &self.normal)),
+        }
     }
-    if seen == 0 || points.is_empty() {
-        return nothing;
-    }
-    let positive = points.iter().filter(|p| p.step > 0.0).count();
-    let agreement = positive.max(points.len() - positive) as f64 / points.len() as f64;
-    let strength = points.iter().map(|p| p.step.abs()).sum::<f64>() / seen as f64;
-    let line = fit(&points, length).map(|f| f.line(from, &direction, &normal));
-    SideEvidence { support: points.len() as f64 / seen as f64, agreement, strength, line }
+}
+
+/// The numbers below `count`, each once, far from one another one after the other: a bad side shows before all of its
+/// samples are taken.
+fn scattered(count: usize) -> impl Iterator<Item = usize> {
+    // Two primes whose product is above every count: one of them is no factor.
+    let stride = if count.is_multiple_of(STRIDES[0]) { STRIDES[1] } else { STRIDES[0] };
+    (0..count).map(move |i| i * stride % count)
+}
+
+const STRIDES: [usize; 2] = [7, 17];
+
+/// Where along a side a sample lies, 0 to 1.
+fn share_along(sample: usize, count: usize) -> f64 {
+    CORNER_SHARE + (1.0 - 2.0 * CORNER_SHARE) * (sample as f64 + 0.5) / count as f64
 }
 
 /// A coarse look: share of samples along the side with an edge within about 1.5 px that follows it. Samples outside
@@ -176,19 +207,17 @@ pub fn quick_support(g: &Gradients, from: &Point2<f64>, to: &Point2<f64>, min_st
     if length.is_nan() || length < 1.0 {
         return 0.0;
     }
-    let direction = side / length;
-    let normal = Vector2::new(direction.y, -direction.x);
+    let (across, min_step) = (Vector2::new(side.y, -side.x) / length, min_step as f32);
+    let (normal, across) = (across.cast().into(), Fixed::step(&across));
+    let most_missed = ((1.0 - enough) * SAMPLES as f64).max(0.0) as usize;
     let (mut seen, mut supported) = (0_usize, 0_usize);
-    for i in 0..SAMPLES {
-        // Every seventh in turn: a bad side shows before all samples are taken.
-        let share =
-            CORNER_SHARE + (1.0 - 2.0 * CORNER_SHARE) * ((i * 7 % SAMPLES) as f64 + 0.5) / SAMPLES as f64;
-        let foot = from + side * share;
-        let Some(here) = g.follows(&foot, &normal, min_step) else { continue };
+    for i in scattered(SAMPLES) {
+        let foot = Fixed::point(&(from + side * share_along(i, SAMPLES)));
+        let Some(here) = g.follows(foot, normal, min_step) else { continue };
         seen += 1;
-        let beside = |offset: f64| g.follows(&(foot + normal * offset), &normal, min_step) == Some(true);
-        supported += usize::from(here || beside(-1.0) || beside(1.0) || beside(-2.0) || beside(2.0));
-        if ((seen - supported) as f64) > (1.0 - enough) * SAMPLES as f64 {
+        let beside = |offset: i64| g.follows(foot.on(across, offset), normal, min_step) == Some(true);
+        supported += usize::from(here || beside(-1) || beside(1) || beside(-2) || beside(2));
+        if seen - supported > most_missed {
             return 0.0;
         }
     }
@@ -200,20 +229,22 @@ pub fn run_end(g: &Gradients, from: &Point2<f64>, to: &Point2<f64>, min_step: f6
     /// Steps of 2 px without an edge that end the run.
     const MAX_MISSES: usize = 4;
     /// No image is longer.
-    const MAX_STEPS: usize = 8192;
+    const MAX_STEPS: i64 = 8192;
     let length = (to - from).norm();
     if length.is_nan() || length < 1.0 {
         return *to;
     }
-    let direction = (to - from) / length;
-    let normal = Vector2::new(direction.y, -direction.x);
-    let (mut end, mut misses) = (*to, 0);
+    let (direction, min_step) = ((to - from) / length, min_step as f32);
+    let across = Vector2::new(direction.y, -direction.x);
+    let normal = across.cast().into();
+    let (start, along, across) = (Fixed::point(to), Fixed::step(&direction), Fixed::step(&across));
+    let (mut end, mut misses) = (0, 0);
     for i in 1..MAX_STEPS {
-        let foot = to + direction * (2.0 * i as f64);
-        let Some(here) = g.follows(&foot, &normal, min_step) else { break };
-        let beside = |offset: f64| g.follows(&(foot + normal * offset), &normal, min_step) == Some(true);
-        if here || beside(-1.0) || beside(1.0) {
-            (end, misses) = (foot, 0);
+        let foot = start.on(along, 2 * i);
+        let Some(here) = g.follows(foot, normal, min_step) else { break };
+        let beside = |offset: i64| g.follows(foot.on(across, offset), normal, min_step) == Some(true);
+        if here || beside(-1) || beside(1) {
+            (end, misses) = (i, 0);
         } else {
             misses += 1;
             if misses > MAX_MISSES {
@@ -221,113 +252,80 @@ pub fn run_end(g: &Gradients, from: &Point2<f64>, to: &Point2<f64>, min_step: f6
             }
         }
     }
-    end
+    to + direction * (2 * end) as f64
 }
 
 /// Most pixels looked at to each side of a foot.
 const MAX_REACH_PX: usize = 16;
+/// Pixels across a side at most: one more at both ends, to tell whether the strongest is a peak.
+const MAX_ACROSS: usize = 2 * MAX_REACH_PX + 3;
 
-/// Strongest edge across the side at `foot`: whether the foot lies in the image, and the edge's offset and signed
-/// step height. The gradient must point along the normal to within about 35 degrees.
-fn edge_across(
-    g: &Gradients,
-    foot: &Point2<f64>,
-    normal: &Vector2<f64>,
-    search: Search,
-) -> (bool, Option<(f64, f64)>) {
-    let reach = (search.reach_px.round() as usize).clamp(1, MAX_REACH_PX);
-    // One more at both ends, to tell whether the strongest is a peak. Outside the image nothing is known.
-    let mut steps: [Option<f64>; 2 * MAX_REACH_PX + 3] = [None; 2 * MAX_REACH_PX + 3];
-    let mut best: Option<(usize, f64)> = None;
-    for (i, slot) in steps.iter_mut().enumerate().take(2 * reach + 3) {
-        let p = foot + normal * (i as f64 - reach as f64 - 1.0);
-        let v = if search.between_pixels { g.sample(p.x, p.y) } else { g.nearest(&p) };
-        let Some(v) = v else { continue };
-        let step = v.dot(normal);
-        *slot = Some(step);
-        let follows = step.abs() >= search.min_step && step * step >= MIN_COS * MIN_COS * v.norm_squared();
-        if follows && i != 0 && i != 2 * reach + 2 && best.is_none_or(|b| step.abs() > b.1.abs()) {
-            best = Some((i, step));
-        }
-    }
-    if steps[reach + 1].is_none() {
-        return (false, None);
-    }
-    let found = best.and_then(|(i, step)| {
-        let beside = |i: usize| steps[i].map_or(step.abs(), |s| s * step.signum());
-        let (a, c) = (beside(i - 1), beside(i + 1));
-        // At the end of the reach a still rising gradient belongs to another edge.
-        let peak = a <= step.abs() && c <= step.abs();
-        let bend = a - 2.0 * step.abs() + c;
-        let shift = if bend < 0.0 { (0.5 * (a - c) / bend).clamp(-0.5, 0.5) } else { 0.0 };
-        peak.then_some((i as f64 - reach as f64 - 1.0 + shift, step))
-    });
-    (true, found)
+/// The look across a side for its edge.
+struct Across {
+    normal: Vector2<f64>,
+    facing: [f32; 2],
+    step: Fixed,
+    reach: usize,
+    min_step: f32,
+    between_pixels: bool,
 }
 
-/// `offset = offset_at_mean + slope * (along - mean)`.
-struct OffsetFit {
-    mean_along_px: f64,
-    offset_px: f64,
-    slope: f64,
-    variance_px2: f64,
-    slope_variance: f64,
-}
+impl Across {
+    fn new(normal: &Vector2<f64>, search: Search) -> Self {
+        Self {
+            normal: *normal,
+            facing: normal.cast().into(),
+            step: Fixed::step(normal),
+            reach: (search.reach_px.round() as usize).clamp(1, MAX_REACH_PX),
+            min_step: search.min_step as f32,
+            between_pixels: search.between_pixels,
+        }
+    }
 
-/// Least squares with three rounds of trimming: texture near a side throws points far off its line.
-fn fit(points: &[EdgePoint], length: f64) -> Option<OffsetFit> {
-    const MIN_POINTS: usize = 5;
-    let mut kept: Vec<EdgePoint> = points.to_vec();
-    let mut result = None;
-    for round in 0..4 {
-        if kept.len() < MIN_POINTS {
-            return result;
-        }
-        let n = kept.len() as f64;
-        let mean = kept.iter().map(|p| p.along_px).sum::<f64>() / n;
-        let offset = kept.iter().map(|p| p.offset_px).sum::<f64>() / n;
-        let spread: f64 = kept.iter().map(|p| (p.along_px - mean).powi(2)).sum();
-        // Points in one place cannot give a direction.
-        if spread < n * (0.05 * length).powi(2) {
-            return result;
-        }
-        let slope = kept.iter().map(|p| (p.along_px - mean) * (p.offset_px - offset)).sum::<f64>() / spread;
-        let residual = |p: &EdgePoint| p.offset_px - offset - slope * (p.along_px - mean);
-        let sum: f64 = kept.iter().map(|p| residual(p).powi(2)).sum();
-        let sigma = (sum / (n - 2.0)).sqrt().max(MIN_SIGMA_PX);
-        result = Some(OffsetFit {
-            mean_along_px: mean,
-            offset_px: offset,
-            slope,
-            variance_px2: sigma * sigma / n,
-            slope_variance: sigma * sigma / spread,
-        });
-        let limit = (2.0 * sigma).max(0.5);
-        let before = kept.len();
-        if round == 0 {
-            // The first line may lean on outliers: judge every point by it again.
-            kept = points.iter().filter(|p| residual(p).abs() <= limit).copied().collect();
+    /// Strongest edge across the side at `foot`: whether the foot lies in the image, and the edge's offset and signed
+    /// step height. The gradient must point along the normal to within about 35 degrees.
+    fn strongest(&self, g: &Gradients, foot: &Point2<f64>) -> (bool, Option<(f64, f64)>) {
+        let from = -(self.reach as i64) - 1;
+        if self.between_pixels {
+            self.among(|i| {
+                let p = foot + self.normal * (i as i64 + from) as f64;
+                g.sample(p.x, p.y)
+            })
         } else {
-            kept.retain(|p| residual(p).abs() <= limit);
-        }
-        if round > 0 && kept.len() == before {
-            break;
+            let start = Fixed::point(foot).on(self.step, from);
+            self.among(|i| g.nearest(start.on(self.step, i as i64)))
         }
     }
-    result
-}
 
-impl OffsetFit {
-    fn line(&self, from: &Point2<f64>, direction: &Vector2<f64>, normal: &Vector2<f64>) -> FittedLine {
-        let centre_px = from + direction * self.mean_along_px + normal * self.offset_px;
-        let turned = (normal - direction * self.slope).normalize();
-        FittedLine {
-            normal: turned,
-            rho_px: turned.dot(&centre_px.coords),
-            centre_px,
-            variance_px2: self.variance_px2,
-            slope_variance: self.slope_variance,
+    /// [`Self::strongest`] among the gradients at steps of a pixel; none outside the image, where nothing is known.
+    #[inline]
+    fn among(&self, gradient: impl Fn(usize) -> Option<[f32; 2]>) -> (bool, Option<(f64, f64)>) {
+        let mut steps = [f32::NAN; MAX_ACROSS];
+        let last = 2 * self.reach + 2;
+        let (mut at, mut best) = (0, 0.0_f32);
+        for (i, slot) in steps.iter_mut().enumerate().take(last + 1) {
+            let Some(v) = gradient(i) else { continue };
+            let (step, square) = across(v, self.facing);
+            *slot = step;
+            let follows = step.abs() >= self.min_step && step * step >= MIN_COS * MIN_COS * square;
+            if follows && i != 0 && i != last && (at == 0 || step.abs() > best.abs()) {
+                (at, best) = (i, step);
+            }
         }
+        if steps[self.reach + 1].is_nan() {
+            return (false, None);
+        }
+        if at == 0 {
+            return (true, None);
+        }
+        let known = |step: f32| if step.is_nan() { best.abs() } else { step * best.signum() };
+        let (a, b, c) = (known(steps[at - 1]), best.abs(), known(steps[at + 1]));
+        // At the end of the reach a still rising gradient belongs to another edge.
+        let peak = a <= b && c <= b;
+        let bend = a - 2.0 * b + c;
+        let shift = if bend < 0.0 { (0.5 * (a - c) / bend).clamp(-0.5, 0.5) } else { 0.0 };
+        let offset_px = at as f64 - self.reach as f64 - 1.0 + f64::from(shift);
+        (true, peak.then_some((offset_px, f64::from(best))))
     }
 }
 
@@ -341,7 +339,22 @@ mod tests {
         *,
     };
 
-    const FULL: Search = Search { reach_px: 3.0, min_step: 6.0, samples: MAX_SAMPLES, between_pixels: true };
+    const FULL: Search = Search {
+        reach_px: 3.0,
+        min_step: 6.0,
+        samples: MAX_SAMPLES,
+        between_pixels: true,
+        least_support: 0.0,
+    };
+
+    #[test]
+    fn every_sample_is_looked_at_once() {
+        for count in MIN_SAMPLES..=MAX_SAMPLES {
+            let mut all: Vec<usize> = scattered(count).collect();
+            all.sort_unstable();
+            assert!(all.into_iter().eq(0..count), "{count}");
+        }
+    }
 
     #[test]
     fn a_side_is_placed_to_a_tenth_of_a_pixel() {
@@ -378,5 +391,10 @@ mod tests {
         let g = Gradients { image: &image, gx: map.gx(), gy: map.gy() };
         let found = measure(&g, &Point2::new(10.0, 39.5), &Point2::new(110.0, 39.5), FULL);
         assert!((found.support - 0.5).abs() < 0.06, "{found:?}");
+        // Whoever asks for more than there is gets nothing, and for less the same.
+        let (from, to) = (Point2::new(10.0, 39.5), Point2::new(110.0, 39.5));
+        let asked = |least_support| SidePoints::new(&g, &from, &to, Search { least_support, ..FULL });
+        assert!(asked(0.6).is_none());
+        assert_eq!(asked(0.4).unwrap().evidence(), found);
     }
 }

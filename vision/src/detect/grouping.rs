@@ -209,10 +209,39 @@ fn quad_weight(a: &[Point2<f64>; 4], b: &[Point2<f64>; 4], p: &RelaxationParams)
     }
 }
 
-/// Whether the `IoU` of two quads exceeds `threshold`. Areas alone often say no.
+/// Whether the `IoU` of two quads exceeds `threshold`.
 pub(super) fn overlap_exceeds(a: &[Point2<f64>; 4], b: &[Point2<f64>; 4], threshold: f64) -> bool {
-    let (area_a, area_b) = (polygon::area(a), polygon::area(b));
-    area_a.min(area_b) > threshold * area_a.max(area_b) && polygon::iou(a, b) > threshold
+    Extent::new(a).overlaps(&Extent::new(b), threshold)
+}
+
+/// A quad with its area and the box around it, which often tell that it hardly overlaps another.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Extent {
+    corners_px: [Point2<f64>; 4],
+    area_px2: f64,
+    bounds: Bounds,
+}
+
+impl Extent {
+    pub(super) fn new(corners_px: &[Point2<f64>; 4]) -> Self {
+        Self {
+            corners_px: *corners_px,
+            area_px2: polygon::area(corners_px),
+            bounds: polygon::bounds(corners_px),
+        }
+    }
+
+    /// Whether the `IoU` exceeds `threshold`.
+    pub(super) fn overlaps(&self, other: &Self, threshold: f64) -> bool {
+        if self.area_px2.min(other.area_px2) <= threshold * self.area_px2.max(other.area_px2) {
+            return false;
+        }
+        let boxes = self.bounds.1.inf(&other.bounds.1) - self.bounds.0.sup(&other.bounds.0);
+        let sum = self.area_px2 + other.area_px2;
+        let exceeds = |common: f64| common > threshold * (sum - common);
+        exceeds(boxes.x.max(0.0) * boxes.y.max(0.0))
+            && exceeds(polygon::intersection_area(&self.corners_px, &other.corners_px))
+    }
 }
 
 type Bounds = (Point2<f64>, Point2<f64>);

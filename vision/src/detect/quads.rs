@@ -286,6 +286,7 @@ fn quad(seed: &QuadSeed, kind: QuadKind, g: &Gradients, p: &QuadParams) -> Optio
         min_step: p.min_step,
         samples: MAX_SAMPLES,
         between_pixels: true,
+        least_support: 0.0,
     };
     let refined = refine(g, &seed.corners_px, search)?;
     let mut support = refined.support();

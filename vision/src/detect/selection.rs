@@ -5,7 +5,7 @@
 use super::{
     corners::{RefinedQuad, refine},
     evidence::{Gradients, MAX_SAMPLES, Search},
-    grouping::{QuadSeed, overlap_exceeds},
+    grouping::{Extent, QuadSeed, overlap_exceeds},
     quads::{Quad, QuadKind, QuadParams},
     side_model::{Chosen, choose_sides},
     thing_model::{THING_FEATURES, probability, thing_features},
@@ -69,18 +69,20 @@ const SHARED_SIDE_PX: f64 = 4.0;
 /// Refits the seeds, best first, and drops those whose sides the gradient does not support. A share of the places is
 /// kept for small seeds: the large ones of a full wall would take them all.
 pub fn rate(seeds: &[QuadSeed], g: &Gradients, p: &QuadParams) -> Vec<Rated> {
-    let mut order: Vec<&QuadSeed> = seeds.iter().collect();
-    order.sort_by(|a, b| (b.fit * size(&b.corners_px)).total_cmp(&(a.fit * size(&a.corners_px))));
+    let mut order: Vec<(f64, &QuadSeed)> = seeds.iter().map(|s| (s.fit * size(&s.corners_px), s)).collect();
+    order.sort_by(|a, b| b.0.total_cmp(&a.0));
     let search = Search {
         reach_px: p.refit_reach_px + 1.0,
         min_step: p.min_step,
         samples: RATING_SAMPLES,
         between_pixels: false,
+        least_support: p.min_side_support,
     };
     let (mut seen, mut rated): (Vec<[Point2<f64>; 4]>, Vec<Rated>) = (Vec::new(), Vec::new());
+    let mut extents = Vec::new();
     let places = p.max_refitted.min(MAX_REFITTED);
     let mut left = [places, places / 2];
-    for seed in order {
+    for (_, seed) in order {
         let small = size(&seed.corners_px) < SMALL_PERIMETER_PX.sqrt();
         let class = usize::from(small && left[1] > 0);
         if left == [0, 0] {
@@ -89,11 +91,9 @@ pub fn rate(seeds: &[QuadSeed], g: &Gradients, p: &QuadParams) -> Vec<Rated> {
         if left[class] == 0 || seen.iter().any(|s| same(s, &seed.corners_px)) {
             continue;
         }
-        let alike = rated
-            .iter()
-            .filter(|r| overlap_exceeds(r.quad.corners_px.points(), &seed.corners_px, ALIKE_IOU))
-            .count();
-        if alike >= p.max_alike {
+        let extent = Extent::new(&seed.corners_px);
+        let alike = extents.iter().filter(|r| extent.overlaps(r, ALIKE_IOU)).take(p.max_alike);
+        if alike.count() >= p.max_alike {
             continue;
         }
         left[class] -= 1;
@@ -102,7 +102,10 @@ pub fn rate(seeds: &[QuadSeed], g: &Gradients, p: &QuadParams) -> Vec<Rated> {
         if rated.iter().any(|r| same(r.quad.corners_px.points(), refined.corners_px.points())) {
             continue;
         }
-        rated.extend(rate_one(&refined, p));
+        if let Some(one) = rate_one(&refined, p) {
+            extents.push(Extent::new(one.quad.corners_px.points()));
+            rated.push(one);
+        }
     }
     rated
 }
@@ -220,6 +223,7 @@ fn moved(quad: &Quad, chosen: &Chosen, g: &Gradients, p: &QuadParams) -> Option<
         min_step: p.min_step,
         samples: RATING_SAMPLES,
         between_pixels: false,
+        least_support: p.min_side_support,
     };
     let rated = rate_one(&refine(g, &chosen.corners_px, search)?, p)?;
     let after = rated.quad.corners_px.points();
@@ -244,6 +248,7 @@ pub fn sharpen(quad: Quad, g: &Gradients, p: &QuadParams) -> Quad {
         min_step: p.min_step,
         samples: MAX_SAMPLES,
         between_pixels: true,
+        least_support: 0.0,
     };
     match refine(g, quad.corners_px.points(), search) {
         Some(refined) if refined.min_support() >= p.min_side_support => Quad {

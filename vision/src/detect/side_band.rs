@@ -1,8 +1,16 @@
-//! What runs beside a supposed side of a quad: the band of image around it, unrolled, and the lines in it that edges
-//! support. Two points in, lines out; which of them is the border is `side_model`'s.
+//! What runs beside a supposed side of a quad: the band of image around it, unrolled, with the lines in it that edges
+//! support. Two points in; what is measured along a line comes out. Finding the lines is `side_lines`', which of them is
+//! the border `side_model`'s.
 
-use super::evidence::Gradients;
+use super::{
+    evidence::{Gradients, MIN_COS},
+    fixed::Fixed,
+    side_lines::{self, Peak},
+};
+use fearless_simd::{Level, dispatch};
 use nalgebra::{Point2, Vector2};
+
+pub use super::side_lines::{MAX_LINES, SideLine};
 
 /// Most samples along a side: a line keeps which of them it has in a 64-bit word.
 pub const MAX_BAND_SAMPLES: usize = 48;
@@ -12,35 +20,15 @@ const MIN_BAND_SAMPLES: usize = 12;
 const REACH_SHARE: f64 = 0.25;
 /// Half the width of a band, smallest and largest.
 const REACH_PX: (f64, f64) = (6.0, 128.0);
-/// Most lines of a band, the best supported first.
-pub const MAX_LINES: usize = 24;
-/// Share of the samples that a line needs.
-const MIN_SUPPORT: f64 = 0.4;
-/// Slopes tried to each side of the supposed direction.
-const SLOPES: usize = 8;
-/// One step of slope as a share of the side, and the least step, in pixels over the whole side.
-const SLOPE_STEP: (f64, f64) = (0.006, 0.5);
 /// Share of the side left out at both ends: near a corner the other side's gradient mixes in.
 const CORNER_SHARE: f64 = 0.06;
 /// Smallest step height of an edge, grey levels.
 pub const MIN_STEP: f32 = 4.0;
-/// The gradient points along the normal to within about 35 degrees.
-const MIN_COS: f32 = 0.82;
+/// Smallest step heights of the edges that [`AlongLine::edges_outside`] counts.
+const STEPS_OUTSIDE: [f32; 2] = [MIN_STEP, 2.0 * MIN_STEP];
 
-/// A line beside a side: its offset from the side, out of the quad for positive ones, at the middle of the side.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SideLine {
-    /// Offset at the middle of the side.
-    pub offset_px: f64,
-    /// How much the offset grows from the first to the second end of the side.
-    pub slope_px: f64,
-    /// Share of the samples with an edge on the line.
-    pub support: f64,
-    /// Mean sign of the steps, -1 to 1; positive where it is brighter outside.
-    pub sign: f64,
-    /// Mean step height in grey levels.
-    pub step: f64,
-}
+/// A number for each row; rows that a band does not have are 0.
+type Rows = [i32; MAX_BAND_SAMPLES];
 
 /// The image around a side, a row for each sample along it, a column for each pixel across, from inside outwards.
 #[derive(Debug, Clone)]
@@ -53,23 +41,17 @@ pub struct Band {
     first_px: i32,
     columns: usize,
     rows: usize,
+    /// The columns of each row that lie in the image: from the first to before the second.
+    inside: [Rows; 2],
     /// Derivative along the normal; 0 outside the image.
     step: Vec<f32>,
-    /// Squared gradient; negative outside the image.
-    square: Vec<f32>,
     level: Vec<u8>,
+    /// How many pixels of the row before a column are not plain; a column more than there are.
+    rough: Vec<u16>,
+    /// Outermost column of each row with an edge along the side of at least each of [`STEPS_OUTSIDE`]; -1 without.
+    outermost: [Rows; 2],
     /// The lines, by descending support when found.
     pub lines: Vec<SideLine>,
-}
-
-/// An edge point of a band.
-#[derive(Clone, Copy)]
-struct Peak {
-    row: usize,
-    /// Where along the side, -0.5 to 0.5.
-    along: f64,
-    offset_px: f64,
-    step: f32,
 }
 
 impl Band {
@@ -90,41 +72,94 @@ impl Band {
             first_px: -reach,
             columns: (2 * reach + 1) as usize,
             rows: ((length_px / 2.0) as usize).clamp(MIN_BAND_SAMPLES, MAX_BAND_SAMPLES),
+            inside: [[0; MAX_BAND_SAMPLES]; 2],
             step: Vec::new(),
-            square: Vec::new(),
             level: Vec::new(),
+            rough: Vec::new(),
+            outermost: [[-1; MAX_BAND_SAMPLES]; 2],
             lines: Vec::new(),
         };
-        band.unroll(g);
-        band.lines = band.find_lines();
+        dispatch!(Level::new(), _s => band.fill(g));
         Some(band)
     }
 
-    fn unroll(&mut self, g: &Gradients) {
+    #[expect(
+        clippy::inline_always,
+        reason = "an instruction set holds only in what is inlined where it was chosen"
+    )]
+    #[inline(always)]
+    fn fill(&mut self, g: &Gradients) {
         let cells = self.rows * self.columns;
-        self.step.reserve_exact(cells);
-        self.square.reserve_exact(cells);
-        self.level.reserve_exact(cells);
-        let (width, height) = (g.width(), g.height());
-        let (nx, ny) = (self.normal.x as f32, self.normal.y as f32);
+        self.step = vec![0.0; cells];
+        self.level = vec![0; cells];
+        self.rough = vec![0; cells + self.rows];
+        let mut square = vec![0.0; self.columns];
+        let mut peaks = Vec::new();
         for row in 0..self.rows {
-            let start = self.at(self.along(row) * self.length_px, f64::from(self.first_px));
-            for column in 0..self.columns {
-                let p = start + self.normal * column as f64 + Vector2::new(0.5, 0.5);
-                // A negative number becomes 0 in the cast: its sign is asked for first.
-                let (u, v) = (p.x as usize, p.y as usize);
-                if p.x < 0.0 || p.y < 0.0 || u >= width || v >= height {
-                    self.step.push(0.0);
-                    self.square.push(-1.0);
-                    self.level.push(0);
-                    continue;
-                }
-                let i = v * width + u;
-                let (x, y) = (g.gx[i], g.gy[i]);
-                self.step.push(x * nx + y * ny);
-                self.square.push(x * x + y * y);
-                self.level.push(g.image.data()[i]);
+            square.fill(0.0);
+            self.unroll(g, row, &mut square);
+            self.look_through(row, &square);
+            self.peaks(row, &square, &mut peaks);
+        }
+        self.lines = side_lines::find(&peaks, self.rows, (self.first_px, self.columns), self.length_px);
+    }
+
+    /// Reads the pixels of a row. What lies outside the image stays 0.
+    #[expect(clippy::inline_always, reason = "as above")]
+    #[inline(always)]
+    fn unroll(&mut self, g: &Gradients, row: usize, square: &mut [f32]) {
+        let (width, height) = (g.width(), g.height());
+        let [nx, ny]: [f32; 2] = self.normal.cast().into();
+        let across = Fixed::step(&self.normal);
+        let start = Fixed::point(&self.at(self.along(row) * self.length_px, f64::from(self.first_px)));
+        let cells = row * self.columns..(row + 1) * self.columns;
+        let (steps, levels) = (&mut self.step[cells.clone()], &mut self.level[cells]);
+        let (mut first, mut end) = (0, 0);
+        for (i, ((step, level), square)) in steps.iter_mut().zip(levels).zip(square).enumerate() {
+            let Some(at) = start.on(across, i as i64).pixel(width, height) else { continue };
+            let (x, y) = (g.gx[at], g.gy[at]);
+            (*step, *square, *level) = (x * nx + y * ny, x * x + y * y, g.image.data()[at]);
+            // A straight line lies in the image from one column to another.
+            (first, end) = (if end == 0 { i } else { first }, i + 1);
+        }
+        (self.inside[0][row], self.inside[1][row]) = (first as i32, end as i32);
+    }
+
+    /// Sums up where a row is rough, and where its last edges are.
+    #[expect(clippy::inline_always, reason = "as above")]
+    #[inline(always)]
+    fn look_through(&mut self, row: usize, square: &[f32]) {
+        let step = &self.step[row * self.columns..(row + 1) * self.columns];
+        let rough = &mut self.rough[row * (self.columns + 1)..(row + 1) * (self.columns + 1)];
+        let mut sum = 0;
+        for (rough, square) in rough[1..].iter_mut().zip(square) {
+            sum += u16::from(*square > MIN_STEP * MIN_STEP);
+            *rough = sum;
+        }
+        for (outermost, least) in self.outermost.iter_mut().zip(STEPS_OUTSIDE) {
+            let is_edge = |i: &usize| step[*i].abs() > least && along_side(step[*i], square[*i]);
+            outermost[row] = (0..self.columns).rev().find(is_edge).map_or(-1, |i| i as i32);
+        }
+    }
+
+    #[expect(clippy::inline_always, reason = "as above")]
+    #[inline(always)]
+    fn peaks(&self, row: usize, square: &[f32], peaks: &mut Vec<Peak>) {
+        let along = (self.along(row) - 0.5) as f32;
+        let step = &self.step[row * self.columns..(row + 1) * self.columns];
+        for (i, (w, square)) in step.windows(3).zip(&square[1..]).enumerate() {
+            let (a, b, c) = (w[0].abs(), w[1].abs(), w[2].abs());
+            if b < MIN_STEP || b < a || b <= c || !along_side(b, *square) {
+                continue;
             }
+            let bend = a - 2.0 * b + c;
+            let shift = if bend < 0.0 { (0.5 * (a - c) / bend).clamp(-0.5, 0.5) } else { 0.0 };
+            peaks.push(Peak {
+                row: row as u32,
+                along,
+                offset_px: (self.first_px + i as i32 + 1) as f32 + shift,
+                step: w[1],
+            });
         }
     }
 
@@ -145,156 +180,88 @@ impl Band {
         ]
     }
 
-    fn peaks(&self) -> Vec<Peak> {
-        let mut peaks = Vec::new();
-        for row in 0..self.rows {
-            let cells = row * self.columns..(row + 1) * self.columns;
-            let (step, square) = (&self.step[cells.clone()], &self.square[cells]);
-            for (i, w) in step.windows(3).enumerate() {
-                let (a, b, c) = (w[0].abs(), w[1].abs(), w[2].abs());
-                if b < MIN_STEP || b < a || b <= c || b * b < MIN_COS * MIN_COS * square[i + 1] {
-                    continue;
-                }
-                let bend = a - 2.0 * b + c;
-                let shift = if bend < 0.0 { (0.5 * (a - c) / bend).clamp(-0.5, 0.5) } else { 0.0 };
-                let offset_px = f64::from(self.first_px + i as i32 + 1) + f64::from(shift);
-                peaks.push(Peak { row, along: self.along(row) - 0.5, offset_px, step: w[1] });
-            }
-        }
-        peaks
-    }
-
-    /// Lines by Hough transform over offset and slope, the best supported first, each refitted.
-    fn find_lines(&self) -> Vec<SideLine> {
-        let peaks = self.peaks();
-        let unit = (SLOPE_STEP.0 * self.length_px).max(SLOPE_STEP.1);
-        let bins = self.columns + 4;
-        let mut cells = vec![0_u64; (2 * SLOPES + 1) * bins];
-        for (j, votes) in cells.chunks_exact_mut(bins).enumerate() {
-            let slope = (j as f64 - SLOPES as f64) * unit;
-            for p in &peaks {
-                let offset = p.offset_px - slope * p.along;
-                let bin = offset + 2.5 - f64::from(self.first_px);
-                if bin >= 1.0 && bin < bins as f64 - 1.0 {
-                    // Above 0, so the cast rounds down.
-                    let (bin, bit) = (bin as usize, 1 << p.row);
-                    votes[bin - 1] |= bit;
-                    votes[bin] |= bit;
-                    votes[bin + 1] |= bit;
-                }
-            }
-        }
-        // Lines of neighbouring slopes are one: the best slope of every offset is enough.
-        let mut best: Vec<(u32, usize)> = (0..bins)
-            .map(|bin| {
-                let count = |j: usize| cells[j * bins + bin].count_ones();
-                let nearest = |j: usize| j.abs_diff(SLOPES);
-                (0..=2 * SLOPES)
-                    .map(|j| (count(j), j))
-                    .max_by(|x, y| x.0.cmp(&y.0).then(nearest(y.1).cmp(&nearest(x.1))).then(y.1.cmp(&x.1)))
-                    .unwrap_or((0, SLOPES))
-            })
-            .collect();
-        let mut lines: Vec<SideLine> = Vec::new();
-        let least = MIN_SUPPORT * self.rows as f64;
-        while lines.len() < MAX_LINES {
-            let top = (0..bins).max_by(|x, y| best[*x].0.cmp(&best[*y].0).then(y.cmp(x))).unwrap_or(0);
-            let (count, j) = best[top];
-            if f64::from(count) < least {
-                break;
-            }
-            best[top.saturating_sub(2)..(top + 3).min(bins)].fill((0, SLOPES));
-            let offset_px = top as f64 - 2.0 + f64::from(self.first_px);
-            let rough = (offset_px, (j as f64 - SLOPES as f64) * unit);
-            let Some(line) = self.fit(&peaks, rough) else { continue };
-            let known = |l: &SideLine| {
-                (l.offset_px - line.offset_px).abs() < 1.5 && (l.slope_px - line.slope_px).abs() < 3.0
-            };
-            if line.support >= MIN_SUPPORT && !lines.iter().any(known) {
-                lines.push(line);
-            }
-        }
-        lines
-    }
-
-    /// Least squares on the edge points near a line (offset, slope), three rounds of closer ones.
-    fn fit(&self, peaks: &[Peak], mut line: (f64, f64)) -> Option<SideLine> {
-        const NEAR_PX: [f64; 4] = [1.6, 1.6, 1.3, 1.1];
-        const MIN_POINTS: f64 = 8.0;
-        let mut result = None;
-        for near in NEAR_PX {
-            let close = peaks.iter().filter(|p| (p.offset_px - line.0 - line.1 * p.along).abs() < near);
-            let (mut n, mut t, mut o, mut tt, mut to) = (0.0, 0.0, 0.0, 0.0, 0.0);
-            let (mut rows, mut sign, mut step) = (0_u64, 0.0, 0.0);
-            for p in close {
-                let (x, y) = (p.along, p.offset_px);
-                n += 1.0;
-                t += x;
-                o += y;
-                tt += x * x;
-                to += x * y;
-                rows |= 1 << p.row;
-                sign += f64::from(p.step.signum());
-                step += f64::from(p.step.abs());
-            }
-            if n < MIN_POINTS {
-                return result;
-            }
-            let spread = tt - t * t / n;
-            if spread <= 1e-9 * n {
-                return result;
-            }
-            let slope = (to - t * o / n) / spread;
-            line = ((o - slope * t) / n, slope);
-            result = Some(SideLine {
-                offset_px: line.0,
-                slope_px: line.1,
-                support: f64::from(rows.count_ones()) / self.rows as f64,
-                sign: sign / n,
-                step: step / n,
-            });
-        }
-        result
-    }
-
-    /// Calls `cell` with the step, the squared gradient and the grey level of every pixel between two offsets from a
-    /// line that lies in the image, and returns how many there were.
-    pub fn strip(&self, line: &SideLine, range_px: (f64, f64), mut cell: impl FnMut(f32, f32, u8)) -> usize {
-        let mut seen = 0;
-        for row in 0..self.rows {
+    /// What is to be measured along one of its lines.
+    pub fn along_line(&self, line: &SideLine) -> AlongLine<'_> {
+        let mut column = [0; MAX_BAND_SAMPLES];
+        for (row, column) in column.iter_mut().enumerate().take(self.rows) {
             let at = line.offset_px + line.slope_px * (self.along(row) - 0.5) - f64::from(self.first_px);
-            let low = first_from(at + range_px.0);
-            let high =
-                if at + range_px.1 < 0.0 { 0 } else { ((at + range_px.1) as usize + 1).min(self.columns) };
-            for i in row * self.columns + low..(row * self.columns + high).max(row * self.columns + low) {
-                if self.square[i] >= 0.0 {
-                    seen += 1;
-                    cell(self.step[i], self.square[i], self.level[i]);
-                }
+            *column = columns(at);
+        }
+        AlongLine { band: self, column }
+    }
+}
+
+/// The gradient points along the normal to within about 35 degrees.
+#[inline]
+fn along_side(step: f32, square: f32) -> bool {
+    step * step >= MIN_COS * MIN_COS * square
+}
+
+/// Bits behind the point of a column.
+const BITS: u32 = 16;
+
+/// A place between columns in fixed point; far outside any band at most.
+#[inline]
+fn columns(x: f64) -> i32 {
+    const FARTHEST: f64 = 8192.0;
+    (x.clamp(-FARTHEST, FARTHEST) * f64::from(1 << BITS)) as i32
+}
+
+/// A line in its band. Strips beside it go from one offset to another, positive ones outwards.
+#[derive(Debug, Clone)]
+pub struct AlongLine<'a> {
+    band: &'a Band,
+    /// Where it crosses each row, by [`columns`].
+    column: Rows,
+}
+
+impl AlongLine<'_> {
+    /// The columns of a strip that lie in the image, row by row.
+    #[inline]
+    fn strip(&self, (from_px, to_px): (f64, f64)) -> impl Iterator<Item = (usize, std::ops::Range<usize>)> {
+        let (from, to) = (columns(from_px) + (1 << BITS) - 1, columns(to_px));
+        let rows = self.column.iter().zip(self.band.inside[0].iter().zip(&self.band.inside[1]));
+        rows.take(self.band.rows).enumerate().map(move |(row, (at, (first, end)))| {
+            let (low, high) = (((at + from) >> BITS).max(*first), (((at + to) >> BITS) + 1).min(*end));
+            (row, low as usize..high.max(low) as usize)
+        })
+    }
+
+    /// Number of pixels of a strip in the image, and how many of them are not plain.
+    pub fn rough(&self, range_px: (f64, f64)) -> (usize, usize) {
+        let stride = self.band.columns + 1;
+        self.strip(range_px).filter(|(_, columns)| !columns.is_empty()).fold(
+            (0, 0),
+            |(seen, rough), (row, columns)| {
+                let sums = &self.band.rough[row * stride..(row + 1) * stride];
+                (seen + columns.len(), rough + usize::from(sums[columns.end] - sums[columns.start]))
+            },
+        )
+    }
+
+    /// Calls `pixel` with the step and the grey level of every pixel of a strip in the image, and gives their number.
+    #[inline]
+    pub fn pixels(&self, range_px: (f64, f64), mut pixel: impl FnMut(f32, u8)) -> usize {
+        let mut seen = 0;
+        for (row, columns) in self.strip(range_px) {
+            seen += columns.len();
+            let start = row * self.band.columns;
+            for i in start + columns.start..start + columns.end {
+                pixel(self.band.step[i], self.band.level[i]);
             }
         }
         seen
     }
 
-    /// Share of the samples with an edge along the side further out than `beyond_px` from a line, of at least
-    /// `min_step`.
-    pub fn edges_outside(&self, line: &SideLine, beyond_px: f64, min_step: f32) -> f64 {
-        let with = (0..self.rows).filter(|row| {
-            let at = line.offset_px + line.slope_px * (self.along(*row) - 0.5) - f64::from(self.first_px);
-            let low = first_from(at + beyond_px).min(self.columns);
-            (row * self.columns + low..(row + 1) * self.columns).any(|i| {
-                let step = self.step[i].abs();
-                step > min_step && step * step > MIN_COS * MIN_COS * self.square[i]
-            })
-        });
-        with.count() as f64 / self.rows as f64
+    /// Share of the samples with an edge along the side further out than `beyond_px`: weak ones, and stronger ones.
+    pub fn edges_outside(&self, beyond_px: f64) -> [f64; 2] {
+        let from = columns(beyond_px) + (1 << BITS) - 1;
+        self.band.outermost.each_ref().map(|outermost| {
+            let rows = outermost.iter().zip(&self.column).take(self.band.rows);
+            let with = rows.filter(|(last, at)| **last >= ((**at + from) >> BITS).max(0)).count();
+            with as f64 / self.band.rows as f64
+        })
     }
-}
-
-/// The first column at or after `x`. Casts round towards 0; `ceil` is a call on the oldest processors.
-fn first_from(x: f64) -> usize {
-    let whole = x.max(0.0) as usize;
-    whole + usize::from((whole as f64) < x)
 }
 
 #[cfg(test)]
@@ -347,9 +314,39 @@ mod tests {
     }
 
     #[test]
-    fn columns_start_at_the_next_whole_number() {
-        for (x, column) in [(-3.5, 0), (-0.2, 0), (0.0, 0), (0.1, 1), (1.0, 1), (1.0001, 2)] {
-            assert_eq!(first_from(x), column, "{x}");
-        }
+    fn strips_are_what_lies_between_two_offsets() {
+        // Grey levels that tell the row of the image; the side runs along row 50, out of the quad is up.
+        let image = GrayImage::from_fn(300, 200, |_, v| v as u8);
+        let band = band(&image, [50.0, 50.0], [250.0, 50.0], 80.0).unwrap();
+        let line = SideLine { offset_px: 0.25, slope_px: 0.0, support: 1.0, sign: 1.0, step: 1.0 };
+        let levels = |range| {
+            let mut all = std::collections::BTreeSet::new();
+            let seen = band.along_line(&line).pixels(range, |_, level| {
+                all.insert(level);
+            });
+            assert_eq!(seen, band.along_line(&line).rough(range).0);
+            (seen / MAX_BAND_SAMPLES, all.into_iter().collect::<Vec<_>>())
+        };
+        // From 1.25 to 4.25 above row 50: rows 48, 47 and 46.
+        assert_eq!(levels((1.0, 4.0)), (3, vec![46, 47, 48]));
+        assert_eq!(levels((-2.25, -0.25)), (3, vec![50, 51, 52]));
+        assert_eq!(levels((4.0, 1.0)), (0, vec![]));
+        // No further than the band is wide: a quarter of 80 px to each side.
+        assert_eq!(levels((18.0, 1e9)), (2, vec![30, 31]));
+    }
+
+    #[test]
+    fn strips_end_at_the_border_of_the_image() {
+        let image = GrayImage::from_fn(300, 200, |u, v| if v < 25 { 0 } else { (u / 2 % 2 * 200) as u8 });
+        let band = band(&image, [50.0, 28.0], [250.0, 28.0], 200.0).unwrap();
+        let line = SideLine { offset_px: 0.0, slope_px: 0.0, support: 1.0, sign: 1.0, step: 1.0 };
+        let along = band.along_line(&line);
+        // Rows 27 to 0 of the image lie further out, however wide the strip.
+        assert_eq!(along.rough((0.5, 40.0)).0, 28 * MAX_BAND_SAMPLES);
+        let (seen, rough) = along.rough((-20.0, -3.0));
+        assert_eq!((seen, rough), (18 * MAX_BAND_SAMPLES, 18 * MAX_BAND_SAMPLES));
+        assert_eq!(along.rough((18.0, 40.0)).1, 0);
+        assert!(along.edges_outside(18.0).iter().all(|share| *share <= 0.0));
+        assert!(along.edges_outside(-18.0).iter().all(|share| *share >= 1.0));
     }
 }

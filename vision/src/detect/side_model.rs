@@ -6,8 +6,9 @@
 
 use super::{
     evidence::Gradients,
+    fixed::Fixed,
     network::Network,
-    side_band::{Band, MIN_STEP, SideLine},
+    side_band::{AlongLine, Band, MIN_STEP, SideLine},
 };
 use nalgebra::{Point2, Vector2};
 
@@ -46,30 +47,32 @@ pub fn choose_sides(g: &Gradients, corners: &[Point2<f64>; 4], model: &Network) 
     let sides = Sides::new(g, corners);
     let known: [Vec<[f64; BAND_FEATURES]>; 4] =
         std::array::from_fn(|i| (0..sides.lines(i).len()).map(|j| sides.band_features(i, j)).collect());
-    let nearest: [Option<usize>; 4] = std::array::from_fn(|i| sides.nearest(i));
-    let mut chosen = nearest;
+    let mut chosen: [Option<usize>; 4] = std::array::from_fn(|i| sides.nearest(i));
     if chosen.iter().all(Option::is_none) {
         return None;
     }
-    for _ in 0..ROUNDS {
-        let ends = sides.ends(&chosen);
-        chosen = std::array::from_fn(|i| {
-            let weigh = |j: usize| model.output(&joined(&known[i][j], &sides.corner_features(i, j, &ends)));
-            let weights: Vec<f64> = (0..known[i].len()).map(weigh).collect();
-            (0..weights.len()).max_by(|a, b| weights[*a].total_cmp(&weights[*b]).then(b.cmp(a)))
-        });
-    }
-    let measure = |lines: &[Option<usize>; 4]| {
-        let ends = sides.ends(lines);
-        std::array::from_fn(|i| {
-            let of_line = |j: usize| joined(&known[i][j], &sides.corner_features(i, j, &ends));
-            lines[i].map_or([0.0; SIDE_FEATURES], of_line)
-        })
+    let mut met = sides.met(&chosen);
+    let measure = |met: &Met, lines: &[Option<usize>; 4]| {
+        let of_line = |i: usize, j: usize| joined(&known[i][j], &sides.corner_features(i, j, &met[i]));
+        std::array::from_fn(|i| lines[i].map_or([0.0; SIDE_FEATURES], |j| of_line(i, j)))
     };
+    let nearest_features = measure(&met, &chosen);
+    for _ in 0..ROUNDS {
+        let before = chosen;
+        for i in 0..4 {
+            let weigh = |j: usize| model.output(&joined(&known[i][j], &sides.corner_features(i, j, &met[i])));
+            let weights: Vec<f64> = (0..known[i].len()).map(weigh).collect();
+            chosen[i] = (0..weights.len()).max_by(|a, b| weights[*a].total_cmp(&weights[*b]).then(b.cmp(a)));
+        }
+        if chosen == before {
+            break;
+        }
+        met = sides.met(&chosen);
+    }
     Some(Chosen {
         corners_px: meet_all(&sides.ends(&chosen))?,
-        features: measure(&chosen),
-        nearest_features: measure(&nearest),
+        features: measure(&met, &chosen),
+        nearest_features,
     })
 }
 
@@ -84,11 +87,11 @@ fn joined(band: &[f64; BAND_FEATURES], corners: &[f64; CORNER_FEATURES]) -> [f64
 /// what a model is fitted on.
 pub fn rivals(g: &Gradients, corners: &[Point2<f64>; 4]) -> [Vec<Rival>; 4] {
     let sides = Sides::new(g, corners);
-    let ends = sides.ends(&std::array::from_fn(|i| sides.nearest(i)));
+    let met = sides.met(&std::array::from_fn(|i| sides.nearest(i)));
     std::array::from_fn(|i| {
         (0..sides.lines(i).len())
             .map(|j| {
-                let features = joined(&sides.band_features(i, j), &sides.corner_features(i, j, &ends));
+                let features = joined(&sides.band_features(i, j), &sides.corner_features(i, j, &met[i]));
                 Rival { ends_px: sides.line_ends(i, j), features }
             })
             .collect()
@@ -97,6 +100,17 @@ pub fn rivals(g: &Gradients, corners: &[Point2<f64>; 4]) -> [Vec<Rival>; 4] {
 
 /// The ends of the line chosen for each side.
 type Ends = [[Point2<f64>; 2]; 4];
+/// The sides that each side meets, with what they usually do: the one before it and the one after it.
+type Met = [[Option<Neighbour>; 2]; 4];
+
+/// A side as seen from one that it meets.
+#[derive(Debug, Clone, Copy)]
+struct Neighbour {
+    ends: [Point2<f64>; 2],
+    along: Vector2<f64>,
+    /// Mean step over most of its length, away from the corner.
+    usual: f64,
+}
 
 /// A quad's sides with the bands around them.
 struct Sides<'a> {
@@ -140,6 +154,19 @@ impl<'a> Sides<'a> {
         })
     }
 
+    /// What each side meets when these lines are chosen.
+    fn met(&self, chosen: &[Option<usize>; 4]) -> Met {
+        let ends = self.ends(chosen);
+        let neighbour = |ends: [Point2<f64>; 2], shares: [f64; 2]| {
+            let along = (ends[1] - ends[0]).try_normalize(1e-9)?;
+            let [p, q] = shares.map(|share| ends[0] + (ends[1] - ends[0]) * share);
+            Some(Neighbour { ends, along, usual: step_along(self.g, &p, &q, 24).0 })
+        };
+        std::array::from_fn(|i| {
+            [neighbour(ends[(i + 3) % 4], [0.2, 0.75]), neighbour(ends[(i + 1) % 4], [0.25, 0.8])]
+        })
+    }
+
     /// 0 support, 1 how alike the signs of its steps are, 2 log of the step; roughness of the strips beside it: 3 just
     /// outside, 4 further outside, 5 and 6 the same inside; log ratio of grey just outside to the wall further out,
     /// 7 signed and 8 absolute, 9 and 10 the same of just inside; 11 log of blur; 12 weight of the heaviest line further
@@ -150,10 +177,11 @@ impl<'a> Sides<'a> {
         let Some(band) = &self.bands[side] else { return [0.0; BAND_FEATURES] };
         let (c, extent) = (band.lines[line], self.extent_px[side]);
         let broad = (0.12 * extent).max(8.0);
-        let rough = |range| roughness(band, &c, range);
-        let inside = level(band, &c, (-5.0, -1.5));
-        let outside = level(band, &c, (1.5, 5.0)).or(inside).unwrap_or(0.0);
-        let wall = level(band, &c, ((0.08 * extent).max(6.0), (0.2 * extent).max(12.0))).unwrap_or(outside);
+        let along = band.along_line(&c);
+        let rough = |range| roughness(&along, range);
+        let inside = level(&along, (-5.0, -1.5));
+        let outside = level(&along, (1.5, 5.0)).or(inside).unwrap_or(0.0);
+        let wall = level(&along, ((0.08 * extent).max(6.0), (0.2 * extent).max(12.0))).unwrap_or(outside);
         let inside = inside.unwrap_or(outside);
         let darker = |grey: f64| ((grey + 8.0) / (wall + 8.0)).ln();
         let (out_ratio, in_ratio) = (darker(outside), darker(inside));
@@ -163,6 +191,7 @@ impl<'a> Sides<'a> {
         let most = |a: f64, b: f64| a.max(b);
         let next_in = inner().max_by(|a, b| a.offset_px.total_cmp(&b.offset_px));
         let next_out = outer().min_by(|a, b| a.offset_px.total_cmp(&b.offset_px));
+        let [weak, stronger] = along.edges_outside(2.5);
         [
             c.support,
             c.sign.abs(),
@@ -175,15 +204,15 @@ impl<'a> Sides<'a> {
             out_ratio.abs(),
             in_ratio,
             in_ratio.abs(),
-            blur(band, &c),
+            blur(&along),
             outer().map(weight).fold(0.0, most),
             inner().map(weight).fold(0.0, most),
             outer().map(|l| l.support).fold(0.0, most),
             outer().count() as f64 / 5.0,
-            band.edges_outside(&c, 2.5, MIN_STEP),
-            band.edges_outside(&c, 2.5, 2.0 * MIN_STEP),
-            next_in.map_or(0.0, |i| shadow(band, &c, i)),
-            next_out.map_or(0.0, |o| shadow(band, o, &c)),
+            weak,
+            stronger,
+            next_in.map_or(0.0, |i| shadow(&along, c.offset_px - i.offset_px)),
+            next_out.map_or(0.0, |o| shadow(&band.along_line(o), o.offset_px - c.offset_px)),
         ]
     }
 
@@ -191,22 +220,22 @@ impl<'a> Sides<'a> {
     /// at the border of a thing they are there just before the corner and gone just after. Of the two: 0 smallest and 1
     /// mean step inwards, 2 smallest support inwards, 3 largest step outwards, 4 largest and 5 mean support outwards, 6
     /// largest difference of the inward step from the side's own, 7 mean step outwards.
-    fn corner_features(&self, side: usize, line: usize, ends: &Ends) -> [f64; CORNER_FEATURES] {
+    fn corner_features(
+        &self,
+        side: usize,
+        line: usize,
+        met: &[Option<Neighbour>; 2],
+    ) -> [f64; CORNER_FEATURES] {
         let own = self.line_ends(side, line);
         let section = (0.07 * self.extent_px[side]).max(6.0);
-        let look = |neighbour: &[Point2<f64>; 2], before: bool| {
-            let corner = meet(&own, neighbour)?;
-            // Along the neighbour away from the corner, into the quad.
-            let along = (neighbour[1] - neighbour[0]).try_normalize(1e-9)?;
-            let inwards = if before { -along } else { along };
+        let look = |neighbour: &Option<Neighbour>, before: bool| {
+            let Neighbour { ends, along, usual } = (*neighbour)?;
+            let corner = meet(&own, &ends)?;
+            // Along the neighbour away from the corner, into the quad; both ways it is walked as its side is.
             let between = |a: f64, b: f64| {
-                let (p, q) = (corner + inwards * a, corner + inwards * b);
-                let (p, q) = if (q - p).dot(&along) < 0.0 { (q, p) } else { (p, q) };
-                step_along(self.g, &p, &q, 10)
+                let (p, q) = if before { (-b, -a) } else { (a, b) };
+                step_along(self.g, &(corner + along * p.min(q)), &(corner + along * p.max(q)), 10)
             };
-            let at = |share: f64| neighbour[0] + (neighbour[1] - neighbour[0]) * share;
-            let (p, q) = if before { (at(0.2), at(0.75)) } else { (at(0.25), at(0.8)) };
-            let usual = step_along(self.g, &p, &q, 24).0;
             let share = |step: f64| {
                 let usual = if usual.abs() > 2.0 { usual } else { 2.0_f64.copysign(usual) };
                 (step / usual).clamp(-1.0, 1.5)
@@ -214,8 +243,7 @@ impl<'a> Sides<'a> {
             let (inner, outer) = (between(1.5, section), between(-1.5, -6.0));
             Some([share(inner.0), inner.1, share(outer.0), outer.1, (inner.0 - usual).abs() / 20.0])
         };
-        let (Some(a), Some(b)) = (look(&ends[(side + 3) % 4], true), look(&ends[(side + 1) % 4], false))
-        else {
+        let [Some(a), Some(b)] = [look(&met[0], true), look(&met[1], false)] else {
             return [0.0; CORNER_FEATURES];
         };
         [
@@ -232,9 +260,8 @@ impl<'a> Sides<'a> {
 }
 
 /// Share of a strip that is not plain.
-fn roughness(band: &Band, line: &SideLine, range_px: (f64, f64)) -> f64 {
-    let mut rough = 0_usize;
-    let seen = band.strip(line, range_px, |_, square, _| rough += usize::from(square > MIN_STEP * MIN_STEP));
+fn roughness(along: &AlongLine, range_px: (f64, f64)) -> f64 {
+    let (seen, rough) = along.rough(range_px);
     if seen > MIN_CELLS { rough as f64 / seen as f64 } else { 0.0 }
 }
 
@@ -242,9 +269,9 @@ fn roughness(band: &Band, line: &SideLine, range_px: (f64, f64)) -> f64 {
 const MIN_CELLS: usize = 20;
 
 /// Median grey level of a strip.
-fn level(band: &Band, line: &SideLine, range_px: (f64, f64)) -> Option<f64> {
+fn level(along: &AlongLine, range_px: (f64, f64)) -> Option<f64> {
     let mut counts = [0_u32; 256];
-    let seen = band.strip(line, range_px, |_, _, level| counts[usize::from(level)] += 1);
+    let seen = along.pixels(range_px, |_, level| counts[usize::from(level)] += 1);
     if seen <= MIN_CELLS {
         return None;
     }
@@ -263,46 +290,50 @@ fn level(band: &Band, line: &SideLine, range_px: (f64, f64)) -> Option<f64> {
 }
 
 /// Log of the step 2 px beside the line over the step on it: high for a soft edge.
-fn blur(band: &Band, line: &SideLine) -> f64 {
+fn blur(along: &AlongLine) -> f64 {
     let mean = |range| {
         let mut sum = 0.0;
-        let seen = band.strip(line, range, |step, _, _| sum += f64::from(step.abs()));
+        let seen = along.pixels(range, |step, _| sum += f64::from(step.abs()));
         if seen > 0 { sum / seen as f64 } else { 0.0 }
     };
     ((mean((1.6, 2.6)) + mean((-2.6, -1.6)) + 1.0) / (mean((-0.6, 0.6)) + 1.0)).ln()
 }
 
-/// How much the strip between two lines looks like a shadow on the wall outside: plain, and darker by about 0.6.
-fn shadow(band: &Band, outer: &SideLine, inner: &SideLine) -> f64 {
-    let width = outer.offset_px - inner.offset_px;
-    if width < 4.0 {
+/// How much the strip of some width inside a line looks like a shadow on the wall outside: plain, and darker by about
+/// 0.6.
+fn shadow(along: &AlongLine, width_px: f64) -> f64 {
+    if width_px < 4.0 {
         return 0.0;
     }
-    let between = (1.5 - width, -1.5);
-    let (Some(within), Some(wall)) = (level(band, outer, between), level(band, outer, (1.5, 8.0))) else {
+    let between = (1.5 - width_px, -1.5);
+    let (Some(within), Some(wall)) = (level(along, between), level(along, (1.5, 8.0))) else {
         return 0.0;
     };
     let ratio = within / (wall + 1.0);
-    (1.0 - roughness(band, outer, between)) * (1.0 - (ratio - 0.6).abs() / 0.35).max(0.0)
+    (1.0 - roughness(along, between)) * (1.0 - (ratio - 0.6).abs() / 0.35).max(0.0)
 }
 
 /// Mean signed step across the way from `p` to `q`, the strongest within a pixel that follows it, and the share of
 /// samples that have one. Samples outside the image count 0.
 fn step_along(g: &Gradients, p: &Point2<f64>, q: &Point2<f64>, samples: usize) -> (f64, f64) {
     let Some(along) = (q - p).try_normalize(1e-6) else { return (0.0, 0.0) };
-    let normal = Vector2::new(along.y, -along.x);
+    let across = Vector2::new(along.y, -along.x);
+    let normal = across.cast().into();
+    let stride = (q - p) / samples as f64;
+    let (start, stride, across) =
+        (Fixed::point(&(p + stride * 0.5)), Fixed::step(&stride), Fixed::step(&across));
     let (mut sum, mut with) = (0.0, 0_usize);
-    for i in 0..samples {
-        let foot = p + (q - p) * ((i as f64 + 0.5) / samples as f64);
-        let mut best = 0.0_f64;
-        for offset in [-1.0, 0.0, 1.0] {
-            let step = g.step_following(&(foot + normal * offset), &normal).unwrap_or(0.0);
+    for i in 0..samples as i64 {
+        let foot = start.on(stride, i);
+        let mut best = 0.0_f32;
+        for offset in [-1, 0, 1] {
+            let step = g.step_following(foot.on(across, offset), normal).unwrap_or(0.0);
             if step.abs() > best.abs() {
                 best = step;
             }
         }
-        sum += best;
-        with += usize::from(best.abs() > f64::from(MIN_STEP));
+        sum += f64::from(best);
+        with += usize::from(best.abs() > MIN_STEP);
     }
     (sum / samples as f64, with as f64 / samples as f64)
 }

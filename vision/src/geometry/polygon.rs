@@ -20,24 +20,56 @@ pub fn intersection_area(a: &[Point2<f64>], b: &[Point2<f64>]) -> f64 {
     if a.len() < 3 || b.len() < 3 || boxes_apart(a, b) {
         return 0.0;
     }
-    let turn = signed_area(b).signum();
-    let mut part = a.to_vec();
-    let mut next = Vec::with_capacity(a.len() + b.len());
-    for (from, to) in edges(b) {
-        let inside = |p: &Point2<f64>| turn * (to - from).perp(&(p - from));
-        next.clear();
-        for (p, q) in edges(&part) {
-            let (dp, dq) = (inside(p), inside(q));
-            if dp >= 0.0 {
-                next.push(*p);
-            }
-            if (dp > 0.0 && dq < 0.0) || (dp < 0.0 && dq > 0.0) {
-                next.push(p + (q - p) * (dp / (dp - dq)));
-            }
+    // Each side of one cuts off corners of the other and adds at most one.
+    if a.len() + b.len() <= SMALL {
+        let (mut part, mut next) = ([Point2::origin(); SMALL], [Point2::origin(); SMALL]);
+        part[..a.len()].copy_from_slice(a);
+        let mut n = a.len();
+        for side in edges(b) {
+            let mut kept = 0;
+            cut(&part[..n], side, signed_area(b).signum(), |p| {
+                // Rounding can bend a polygon inwards; a corner too many is of no size.
+                if let Some(place) = next.get_mut(kept) {
+                    (*place, kept) = (p, kept + 1);
+                }
+            });
+            (part, next, n) = (next, part, kept);
         }
-        std::mem::swap(&mut part, &mut next);
+        return area(&part[..n]);
+    }
+    let mut part = a.to_vec();
+    for side in edges(b) {
+        let mut next = Vec::with_capacity(part.len() + 1);
+        cut(&part, side, signed_area(b).signum(), |p| next.push(p));
+        part = next;
     }
     area(&part)
+}
+
+/// Polygons with so many vertices in all are cut in memory of fixed size.
+const SMALL: usize = 12;
+
+/// Gives the vertices of what of a polygon lies within the line of a side of another that turns this way.
+#[inline]
+fn cut(
+    polygon: &[Point2<f64>],
+    (from, to): (&Point2<f64>, &Point2<f64>),
+    turn: f64,
+    mut keep: impl FnMut(Point2<f64>),
+) {
+    let inside = |p: &Point2<f64>| turn * (to - from).perp(&(p - from));
+    let Some(mut p) = polygon.last() else { return };
+    let mut dp = inside(p);
+    for q in polygon {
+        let dq = inside(q);
+        if (dp > 0.0 && dq < 0.0) || (dp < 0.0 && dq > 0.0) {
+            keep(p + (q - p) * (dp / (dp - dq)));
+        }
+        if dq >= 0.0 {
+            keep(*q);
+        }
+        (p, dp) = (q, dq);
+    }
 }
 
 /// Intersection over union of two convex polygons, 0 to 1; 0 when both are empty.
@@ -170,6 +202,20 @@ mod tests {
         assert!(iou(&a, &rectangle(20.0, 0.0, 5.0, 5.0)) < 1e-12);
         assert!((iou(&a, &a) - 1.0).abs() < 1e-12);
         assert!(iou(&[], &a) < 1e-12);
+    }
+
+    #[test]
+    fn polygons_of_many_sides_are_cut_as_well() {
+        let round = |u: f64, sides: u32| -> Vec<Point2<f64>> {
+            let angles = (0..sides).map(|i| std::f64::consts::TAU * f64::from(i) / f64::from(sides));
+            angles.map(|a| Point2::new(u + 30.0 * a.cos(), 30.0 * a.sin())).collect()
+        };
+        // Either as many vertices as fit in fixed memory, or more.
+        for sides in [SMALL as u32 / 2, 20] {
+            let (a, b) = (round(-10.0, sides), round(10.0, sides));
+            let counted = grid_area(-45.0, 45.0, |p| ray_inside(&a, p) && ray_inside(&b, p));
+            assert!((intersection_area(&a, &b) - counted).abs() < 0.01 * area(&a));
+        }
     }
 
     #[test]

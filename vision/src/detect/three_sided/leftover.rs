@@ -202,6 +202,7 @@ fn three_sided(set: &OpenSet, g: &Gradients, p: &DetectParams) -> Option<Quad> {
         min_step: p.quads.min_step,
         samples: SAMPLES,
         between_pixels: true,
+        least_support: 0.0,
     };
     let c = &set.corners_px;
     let sides: [_; 4] = std::array::from_fn(|i| measure(g, &c[i], &c[(i + 1) % 4], search));
