@@ -10,9 +10,9 @@ use super::{
     hypotheses::{MAX_HYPOTHESES, hypotheses},
     pyramid,
     quads::{Grouping, Quad},
+    rating::MAX_REFITTED,
     rendering::Noise,
     segments::{EdgeSegment, MAX_SEGMENTS},
-    selection::MAX_REFITTED,
     similarity::{MAX_PAIRS, SegmentPair},
 };
 use crate::{
@@ -90,7 +90,7 @@ fn hold(image: &GrayImage) {
     let work = pyramid::reduce(image, pyramid::working_factor(image, p.quads.working_side_px));
     let mut counted = Counted { area: work.width() * work.height(), ..Counted::default() };
     let (rated, edges) = candidates(&work, &p, &mut counted);
-    assert!(rated.len() <= MAX_REFITTED * p.quads.scales);
+    assert!(rated.len() <= (MAX_REFITTED + MAX_REFITTED / 2) * p.quads.scales);
     let g = Gradients { image: &work, gx: edges.gx(), gy: edges.gy() };
     assert!(hypotheses(&counted.segments, &g, &p.quads.hypotheses).len() <= MAX_HYPOTHESES);
 }

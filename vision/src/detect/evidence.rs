@@ -209,10 +209,12 @@ pub fn quick_support(g: &Gradients, from: &Point2<f64>, to: &Point2<f64>, min_st
     }
     let (across, min_step) = (Vector2::new(side.y, -side.x) / length, min_step as f32);
     let (normal, across) = (across.cast().into(), Fixed::step(&across));
+    let stride = side * ((1.0 - 2.0 * CORNER_SHARE) / SAMPLES as f64);
+    let (start, stride) = (Fixed::point(&(from + side * share_along(0, SAMPLES))), Fixed::step(&stride));
     let most_missed = ((1.0 - enough) * SAMPLES as f64).max(0.0) as usize;
     let (mut seen, mut supported) = (0_usize, 0_usize);
     for i in scattered(SAMPLES) {
-        let foot = Fixed::point(&(from + side * share_along(i, SAMPLES)));
+        let foot = start.on(stride, i as i64);
         let Some(here) = g.follows(foot, normal, min_step) else { continue };
         seen += 1;
         let beside = |offset: i64| g.follows(foot.on(across, offset), normal, min_step) == Some(true);

@@ -20,6 +20,8 @@ pub const MAX_SEARCHED_SEGMENTS: usize = 400;
 pub const MAX_CORNERS_PER_END: usize = 8;
 /// Most hypotheses that are checked against the gradient, the tightest first.
 pub const MAX_HYPOTHESES: usize = 6000;
+/// Most hypotheses in memory: whenever there are so many, only the tightest [`MAX_HYPOTHESES`] stay.
+pub const MAX_COLLECTED: usize = 4 * MAX_HYPOTHESES;
 
 /// How hypotheses are formed and checked.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -73,7 +75,7 @@ type CornerTable = Vec<[Vec<Corner>; 2]>;
 pub fn hypotheses(segments: &[EdgeSegment], g: &Gradients, p: &HypothesisParams) -> Vec<QuadSeed> {
     let order = longest(segments);
     let table = corners(segments, &order, p);
-    let mut found = Vec::new();
+    let mut found = Tightest::default();
     for &a in &order {
         for end in [0, 1] {
             chains_from(&table, a, end, |chain| {
@@ -84,17 +86,42 @@ pub fn hypotheses(segments: &[EdgeSegment], g: &Gradients, p: &HypothesisParams)
     if p.complete {
         complete(segments, &table, &order, g, p, &mut found);
     }
-    found.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.sides.cmp(&y.1.sides)));
-    found.truncate(MAX_HYPOTHESES);
     let size = (g.width(), g.height());
     found
-        .into_iter()
-        .filter(|(_, seed)| plausible(&seed.corners_px, size))
-        .filter_map(|(_, mut seed)| {
+        .in_order()
+        .filter(|seed| plausible(&seed.corners_px, size))
+        .filter_map(|mut seed| {
             seed.fit = supported(&seed, g, p)?;
             Some(seed)
         })
         .collect()
+}
+
+/// Hypotheses with their looseness, in bounded memory.
+#[derive(Debug, Default)]
+struct Tightest {
+    found: Vec<(f64, QuadSeed)>,
+}
+
+impl Tightest {
+    fn add(&mut self, looseness: f64, seed: QuadSeed) {
+        self.found.push((looseness, seed));
+        if self.found.len() >= MAX_COLLECTED {
+            self.prune();
+        }
+    }
+
+    /// Of equally tight ones those that came first stay first, so it does not matter when this is done.
+    fn prune(&mut self) {
+        self.found.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.sides.cmp(&y.1.sides)));
+        self.found.truncate(MAX_HYPOTHESES);
+    }
+
+    /// At most [`MAX_HYPOTHESES`], the tightest first.
+    fn in_order(mut self) -> impl Iterator<Item = QuadSeed> {
+        self.prune();
+        self.found.into_iter().map(|(_, seed)| seed)
+    }
 }
 
 fn longest(segments: &[EdgeSegment]) -> Vec<usize> {
@@ -181,7 +208,7 @@ fn chains_from(table: &CornerTable, a: usize, a_end: usize, mut found: impl FnMu
 
 /// Adds the quads that a fourth segment closes. Each comes once: its smallest index leads, and of both ways round
 /// the one with the smaller second index.
-fn closed(table: &CornerTable, chain: &Chain, found: &mut Vec<(f64, QuadSeed)>) {
+fn closed(table: &CornerTable, chain: &Chain, found: &mut Tightest) {
     let (a, b, c) = (chain.a, chain.ab.other, chain.bc.other);
     for cd in &table[c][1 - chain.bc.other_end] {
         let d = cd.other;
@@ -191,7 +218,7 @@ fn closed(table: &CornerTable, chain: &Chain, found: &mut Vec<(f64, QuadSeed)>) 
         let last = table[d][1 - cd.other_end].iter().find(|k| k.other == a && k.other_end == 1 - chain.a_end);
         let Some(da) = last else { continue };
         let looseness = chain.ab.looseness + chain.bc.looseness + cd.looseness + da.looseness;
-        found.push((looseness, clockwise([a, b, c, d].map(Some), [da.at, chain.ab.at, chain.bc.at, cd.at])));
+        found.add(looseness, clockwise([a, b, c, d].map(Some), [da.at, chain.ab.at, chain.bc.at, cd.at]));
     }
 }
 
@@ -211,13 +238,12 @@ fn complete(
     order: &[usize],
     g: &Gradients,
     p: &HypothesisParams,
-    found: &mut Vec<(f64, QuadSeed)>,
+    found: &mut Tightest,
 ) {
     let ends: Vec<[Point2<f64>; 2]> = segments
         .iter()
         .map(|s| [run_end(g, &s.q_px, &s.p_px, p.min_step), run_end(g, &s.p_px, &s.q_px, p.min_step)])
         .collect();
-    let mut open = Vec::new();
     for &a in order {
         for end in [0, 1] {
             chains_from(table, a, end, |chain| {
@@ -234,7 +260,7 @@ fn complete(
                         [Some(a), Some(chain.ab.other), Some(c), None],
                         [from, chain.ab.at, chain.bc.at, to],
                     );
-                    open.push((looseness, seed));
+                    found.add(looseness, seed);
                 };
                 add(from, to);
                 // One of the two may be broken off early or run on: a fourth side parallel to the second instead.
@@ -250,5 +276,32 @@ fn complete(
             });
         }
     }
-    found.append(&mut open);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn collected_hypotheses_are_bounded_and_the_tightest_stay() {
+        let seed = |i: usize| QuadSeed {
+            sides: [Some(i % 3), None, None, None],
+            corners_px: [Point2::new(i as f64, 0.0); 4],
+            similarity: 1.0,
+            fit: 0.0,
+        };
+        // Many equally tight ones, which only their sides and their order tell apart.
+        let looseness = |i: usize| (i * 7919 % 1000) as f64;
+        let count = 3 * MAX_COLLECTED + 5;
+        let (mut kept, mut all) = (Tightest::default(), Vec::new());
+        for i in 0..count {
+            kept.add(looseness(i), seed(i));
+            assert!(kept.found.len() < MAX_COLLECTED);
+            all.push((looseness(i), i % 3, i));
+        }
+        all.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let expected: Vec<usize> = all.iter().take(MAX_HYPOTHESES).map(|x| x.2).collect();
+        let order: Vec<usize> = kept.in_order().map(|s| s.corners_px[0].x as usize).collect();
+        assert_eq!(order, expected);
+    }
 }

@@ -35,6 +35,7 @@ pub mod evidence;
 mod side_fit;
 pub mod corners;
 pub mod hypotheses;
+pub mod rating;
 pub mod selection;
 pub mod border;
 pub mod side_band;
@@ -162,7 +163,7 @@ pub fn candidates(
     work: &GrayImage,
     p: &DetectParams,
     trace: &mut impl Trace,
-) -> (Vec<selection::Rated>, EdgeMap) {
+) -> (Vec<rating::Rated>, EdgeMap) {
     let (rated, edges, _) = searched(&mut Memory::default(), work, p, trace);
     (rated, edges)
 }
@@ -173,13 +174,13 @@ fn searched(
     work: &GrayImage,
     p: &DetectParams,
     trace: &mut impl Trace,
-) -> (Vec<selection::Rated>, EdgeMap, Vec<EdgeSegment>) {
+) -> (Vec<rating::Rated>, EdgeMap, Vec<EdgeSegment>) {
     let (edges, segments) = traced_segments(memory, work, p, trace);
     let gradients = Gradients { image: work, gx: edges.gx(), gy: edges.gy() };
     let seeds = hypotheses::hypotheses(&segments, &gradients, &p.quads.hypotheses);
     trace.seeds(&seeds);
     trace.finished(Stage::Pairs);
-    let mut rated = selection::rate(&seeds, &gradients, &p.quads);
+    let mut rated = rating::rate(&seeds, &gradients, &p.quads);
     let mut scale = 1;
     for _ in 1..p.quads.scales.clamp(1, MAX_SCALES) {
         scale *= 2;
@@ -192,7 +193,7 @@ fn searched(
         let segments = tiling::untile(segments, (level.width(), level.height()), &p.tiling).kept;
         let gradients = Gradients { image: &level, gx: edges.gx(), gy: edges.gy() };
         let seeds = hypotheses::hypotheses(&segments, &gradients, &p.quads.hypotheses);
-        let coarse = selection::rate(&seeds, &gradients, &p.quads);
+        let coarse = rating::rate(&seeds, &gradients, &p.quads);
         rated.extend(coarse.into_iter().filter_map(|r| r.scaled(scale as f64)));
         memory.give_back(edges);
     }

@@ -1,42 +1,21 @@
-//! Which hypotheses become quads: seeds in, refitted quads with their sides moved to borders, told from chance, that do
-//! not contradict each other out. Nested quads may stay together, quads that partly cross may not. Which line is a side
-//! is `side_model`'s, what is a thing `thing_model`'s, which of nested borders is canonical `border`'s.
+//! Which rated quads stay: quads that may contradict each other in, those with their sides moved to borders, told from
+//! chance, that contradict no better one out. Nested quads may stay together, quads that partly cross may not. Which line
+//! is a side is `side_model`'s, what is a thing `thing_model`'s, which of nested borders is canonical `border`'s.
 
 use super::{
-    corners::{RefinedQuad, refine},
+    corners::refine,
     evidence::{Gradients, MAX_SAMPLES, Search},
-    grouping::{Extent, QuadSeed, overlap_exceeds},
-    quads::{Quad, QuadKind, QuadParams},
+    grouping::overlap_exceeds,
+    quads::{Quad, QuadParams},
+    rating::{Rated, rate_one, rating_search, same},
     side_model::{Chosen, choose_sides},
     thing_model::{THING_FEATURES, probability, thing_features},
 };
 use crate::geometry::polygon::{self, Relation};
 use nalgebra::Point2;
 
-/// Most seeds that are refitted, the best first.
-pub const MAX_REFITTED: usize = 160;
 /// Most rated quads that are compared with each other, those of most weight first.
 pub const MAX_RATED: usize = 160;
-/// Samples along a side while quads are compared; the chosen ones are refitted with more.
-const RATING_SAMPLES: usize = 32;
-/// Corners closer than this make two seeds the same.
-const SAME_CORNER_PX: f64 = 2.0;
-
-/// A refitted quad with what its score rests on.
-#[derive(Debug, Clone)]
-pub struct Rated {
-    /// Corners, support and score.
-    pub quad: Quad,
-    /// Which of two contradicting quads goes first: its score, and its size.
-    pub rank: f64,
-}
-
-impl Rated {
-    /// The same in an image larger by `factor`.
-    pub fn scaled(&self, factor: f64) -> Option<Self> {
-        Some(Self { quad: self.quad.scaled(factor)?, ..self.clone() })
-    }
-}
 
 /// How the sides of two quads lie that are named from the corners that fit best: for each side of `a` the side of
 /// `b` that it faces, and whether both lie on one line.
@@ -61,59 +40,8 @@ impl Facing {
     }
 }
 
-/// Smallest side of a quad.
-const MIN_SIDE_PX: f64 = 15.0;
 /// Lines closer than this count as the same side.
 const SHARED_SIDE_PX: f64 = 4.0;
-
-/// Refits the seeds, best first, and drops those whose sides the gradient does not support. A share of the places is
-/// kept for small seeds: the large ones of a full wall would take them all.
-pub fn rate(seeds: &[QuadSeed], g: &Gradients, p: &QuadParams) -> Vec<Rated> {
-    let mut order: Vec<(f64, &QuadSeed)> = seeds.iter().map(|s| (s.fit * size(&s.corners_px), s)).collect();
-    order.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let search = Search {
-        reach_px: p.refit_reach_px + 1.0,
-        min_step: p.min_step,
-        samples: RATING_SAMPLES,
-        between_pixels: false,
-        least_support: p.min_side_support,
-    };
-    let (mut seen, mut rated): (Vec<[Point2<f64>; 4]>, Vec<Rated>) = (Vec::new(), Vec::new());
-    let mut extents = Vec::new();
-    let places = p.max_refitted.min(MAX_REFITTED);
-    let mut left = [places, places / 2];
-    for (_, seed) in order {
-        let small = size(&seed.corners_px) < SMALL_PERIMETER_PX.sqrt();
-        let class = usize::from(small && left[1] > 0);
-        if left == [0, 0] {
-            break;
-        }
-        if left[class] == 0 || seen.iter().any(|s| same(s, &seed.corners_px)) {
-            continue;
-        }
-        let extent = Extent::new(&seed.corners_px);
-        let alike = extents.iter().filter(|r| extent.overlaps(r, ALIKE_IOU)).take(p.max_alike);
-        if alike.count() >= p.max_alike {
-            continue;
-        }
-        left[class] -= 1;
-        seen.push(seed.corners_px);
-        let Some(refined) = refine(g, &seed.corners_px, search) else { continue };
-        if rated.iter().any(|r| same(r.quad.corners_px.points(), refined.corners_px.points())) {
-            continue;
-        }
-        if let Some(one) = rate_one(&refined, p) {
-            extents.push(Extent::new(one.quad.corners_px.points()));
-            rated.push(one);
-        }
-    }
-    rated
-}
-
-/// Seeds with a shorter way round are small.
-const SMALL_PERIMETER_PX: f64 = 240.0;
-/// Rated quads that overlap a seed by more are borders of the same thing.
-const ALIKE_IOU: f64 = 0.6;
 
 /// Keeps the quads that contradict no better one: that cross none and share an edge with none.
 ///
@@ -151,15 +79,6 @@ fn contradict(a: &[Point2<f64>; 4], b: &[Point2<f64>; 4]) -> bool {
         Relation::Crossing => true,
         Relation::Contains | Relation::Within => Facing::new(a, b).count() > 0,
     }
-}
-
-fn size(corners: &[Point2<f64>; 4]) -> f64 {
-    (0..4).map(|i| (corners[(i + 1) % 4] - corners[i]).norm()).sum::<f64>().sqrt()
-}
-
-fn same(a: &[Point2<f64>; 4], b: &[Point2<f64>; 4]) -> bool {
-    let near = |p: &Point2<f64>, q: &Point2<f64>| (p - q).norm_squared() < SAME_CORNER_PX * SAME_CORNER_PX;
-    (0..4).any(|shift| (0..4).all(|i| near(&a[i], &b[(i + shift) % 4])))
 }
 
 /// A quad with its sides where they look most like a border, and what its score rests on.
@@ -218,13 +137,7 @@ const MOVED_IOU: f64 = 0.4;
 /// The quad with its sides where they look most like a border; none if that is no well supported quad.
 fn moved(quad: &Quad, chosen: &Chosen, g: &Gradients, p: &QuadParams) -> Option<Quad> {
     let before = quad.corners_px.points();
-    let search = Search {
-        reach_px: p.refit_reach_px,
-        min_step: p.min_step,
-        samples: RATING_SAMPLES,
-        between_pixels: false,
-        least_support: p.min_side_support,
-    };
+    let search = rating_search(p, p.refit_reach_px);
     let rated = rate_one(&refine(g, &chosen.corners_px, search)?, p)?;
     let after = rated.quad.corners_px.points();
     if !overlap_exceeds(before, after, MOVED_IOU) {
@@ -263,23 +176,24 @@ pub fn sharpen(quad: Quad, g: &Gradients, p: &QuadParams) -> Quad {
     }
 }
 
-fn rate_one(refined: &RefinedQuad, p: &QuadParams) -> Option<Rated> {
-    if refined.min_support() < p.min_side_support || refined.corners_px.min_side_px() < MIN_SIDE_PX {
-        return None;
-    }
-    let support = refined.support();
-    let agreement: f64 = refined.sides.iter().map(|s| s.agreement).sum::<f64>() / 4.0;
-    let score = refined.min_support() * (support.iter().sum::<f64>() / 4.0) * agreement;
-    let rank = score * size(refined.corners_px.points());
-    let quad = Quad {
-        corners_px: refined.corners_px,
-        corner_covariance_px2: refined.covariance_px2,
-        side_support: refined.support(),
-        side_clipped: refined.clipped,
-        score,
-        kind: QuadKind::Full,
-        upright_ambiguous: refined.upright_ambiguous,
-        alternates: Vec::new(),
+#[cfg(test)]
+mod tests {
+    use super::{
+        super::rating::{rate, tests::squares},
+        *,
     };
-    Some(Rated { quad, rank })
+
+    #[test]
+    fn compared_and_settled_quads_are_bounded() {
+        let (image, map, seeds) = squares(14);
+        let g = Gradients { image: &image, gx: map.gx(), gy: map.gy() };
+        // Nothing is a thing, so nothing stands in anybody's way.
+        let p = QuadParams { max_refitted: usize::MAX, min_probability: 2.0, ..QuadParams::default() };
+        let rated = rate(&seeds, &g, &p);
+        assert!(rated.len() > MAX_RATED && MAX_RATED > MAX_SETTLED);
+        assert_eq!(resolve(rated.clone(), &p).len(), MAX_RATED);
+        assert_eq!(settle(rated.clone(), &g, &p).len(), MAX_SETTLED);
+        // Fewer are all settled.
+        assert_eq!(settle(rated[..MAX_SETTLED - 1].to_vec(), &g, &p).len(), MAX_SETTLED - 1);
+    }
 }

@@ -111,12 +111,14 @@ impl Band {
         let (width, height) = (g.width(), g.height());
         let [nx, ny]: [f32; 2] = self.normal.cast().into();
         let across = Fixed::step(&self.normal);
-        let start = Fixed::point(&self.at(self.along(row) * self.length_px, f64::from(self.first_px)));
+        let mut place = Fixed::point(&self.at(self.along(row) * self.length_px, f64::from(self.first_px)));
         let cells = row * self.columns..(row + 1) * self.columns;
         let (steps, levels) = (&mut self.step[cells.clone()], &mut self.level[cells]);
         let (mut first, mut end) = (0, 0);
         for (i, ((step, level), square)) in steps.iter_mut().zip(levels).zip(square).enumerate() {
-            let Some(at) = start.on(across, i as i64).pixel(width, height) else { continue };
+            let pixel = place.pixel(width, height);
+            place = place.on(across, 1);
+            let Some(at) = pixel else { continue };
             let (x, y) = (g.gx[at], g.gy[at]);
             (*step, *square, *level) = (x * nx + y * ny, x * x + y * y, g.image.data()[at]);
             // A straight line lies in the image from one column to another.
