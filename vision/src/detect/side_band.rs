@@ -340,8 +340,11 @@ mod tests {
     #[test]
     fn strips_end_at_the_border_of_the_image() {
         let image = GrayImage::from_fn(300, 200, |u, v| if v < 25 { 0 } else { (u / 2 % 2 * 200) as u8 });
+        // Rows 191 to 199 lie further in, and then nothing.
+        let low = band(&image, [50.0, 190.0], [250.0, 190.0], 200.0).unwrap();
         let band = band(&image, [50.0, 28.0], [250.0, 28.0], 200.0).unwrap();
         let line = SideLine { offset_px: 0.0, slope_px: 0.0, support: 1.0, sign: 1.0, step: 1.0 };
+        assert_eq!(low.along_line(&line).rough((-40.0, -0.5)).0, 9 * MAX_BAND_SAMPLES);
         let along = band.along_line(&line);
         // Rows 27 to 0 of the image lie further out, however wide the strip.
         assert_eq!(along.rough((0.5, 40.0)).0, 28 * MAX_BAND_SAMPLES);
