@@ -27,6 +27,12 @@ pub enum LandmarkKind {
     Window,
     /// A lamp in the ceiling.
     Lamp,
+    /// A picture in a frame or a bare canvas; in scenes only.
+    Picture,
+    /// A sign; in scenes only.
+    Sign,
+    /// A notice board; in scenes only.
+    Board,
 }
 
 /// Where a landmark is, exactly.

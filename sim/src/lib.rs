@@ -51,6 +51,7 @@ pub mod robot;
 pub mod lesson;
 pub mod export;
 pub mod views;
+pub mod scenes;
 
 #[cfg(test)]
 mod render_tests;
