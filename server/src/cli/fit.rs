@@ -2,6 +2,7 @@
 //! pictures that were held out. Prints parameters; changes nothing.
 
 mod data;
+mod held_out;
 mod search;
 mod similarity;
 mod source;
@@ -21,12 +22,14 @@ pub(crate) enum Command {
     /// The two networks of the search: which line beside a side is its border, and whether a quad is a thing at all.
     ///
     /// The first learns to choose, of the lines beside each side of a found quad, the one on the labelled side; the
-    /// second to tell quads on labelled things from false ones. Results are of the networks in use, and of new ones on
-    /// images that they were not trained on. The same sets and options give the same networks.
+    /// second to tell quads on labelled things from false ones, with odds that are right on images held out. They learn
+    /// from rendered scenes and from the given sets. Results are of the networks in use and of new ones; those on
+    /// photographs are of networks that have not seen the half that they are judged by, those on renderings of another
+    /// seed. The same sets and options give the same networks.
     ///
     /// For example:
     ///   waymark fit search paintings corridor --weight museum-paintings=3 --out networks.json
-    ///   waymark evaluate detection corridor --seed 2 --compare networks.json
+    ///   waymark evaluate detection corridor --seed 3 --compare networks.json
     #[command(verbatim_doc_comment)]
     Search(Box<search::SearchArgs>),
 }

@@ -1,5 +1,5 @@
-//! Trains the small networks of the search from labelled pictures: measurements with what is right in, weights out, and
-//! what they are worth on groups that were held out. Reads no images. Same data, same seed: same weights.
+//! Trains the small networks of the search from labelled pictures: measurements with what is right in, weights out.
+//! Reads no images. Same data, same seed: same weights.
 //! What comes out is for `Network`: which measurements go in is the caller's matter.
 //!
 //! Two tasks: of some rivals the right one (the share of its exponential is its chance, as in a conditional logit), and
@@ -7,7 +7,6 @@
 
 use super::network::{MAX_HIDDEN, Network};
 use crate::learn::random::Random;
-use std::collections::BTreeSet;
 
 /// Scaled measurements beyond this many deviations count as this far, as in [`Network::output`].
 const CLIP: f64 = 4.0;
@@ -23,7 +22,7 @@ pub const MAX_STEPS: usize = 100_000;
 /// Candidates of which one or more are right.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rivals {
-    /// Rivals of one group (one image) are never on both sides of a cross-validation.
+    /// Which part of the data they are in: for whoever holds parts out.
     pub group: usize,
     /// How many times these rivals count, above 0.
     pub weight: f64,
@@ -81,14 +80,6 @@ pub enum FitError {
     /// A parameter is out of its range.
     #[error("{0} is out of range")]
     Range(&'static str),
-    /// Fewer than two groups, or folds.
-    #[error("{groups} images in {folds} folds leave nothing to hold out")]
-    Folds {
-        /// Groups there are.
-        groups: usize,
-        /// Folds asked for.
-        folds: usize,
-    },
 }
 
 /// A network that gives the right one of some rivals the greatest output.
@@ -106,29 +97,6 @@ pub fn to_tell(examples: &[Example], p: &TrainParams) -> Result<Network, FitErro
         return Err(FitError::NothingToLearn);
     }
     train(examples.iter().map(Task::telling).collect(), p)
-}
-
-/// For every item the output of a network that was trained without its group: the groups are dealt to `folds` parts in
-/// turn. `train` and `output` say how.
-pub fn held_out<T: Clone, O>(
-    items: &[T],
-    folds: usize,
-    group: impl Fn(&T) -> usize,
-    train: impl Fn(&[T]) -> Result<Network, FitError>,
-    output: impl Fn(&Network, &T) -> O,
-) -> Result<Vec<O>, FitError> {
-    let groups: Vec<usize> = items.iter().map(&group).collect::<BTreeSet<_>>().into_iter().collect();
-    let folds = folds.min(groups.len());
-    if folds < 2 {
-        return Err(FitError::Folds { groups: groups.len(), folds });
-    }
-    let fold = |item: &T| groups.binary_search(&group(item)).unwrap_or(0) % folds;
-    let mut networks = Vec::with_capacity(folds);
-    for part in 0..folds {
-        let others: Vec<T> = items.iter().filter(|item| fold(item) != part).cloned().collect();
-        networks.push(train(&others)?);
-    }
-    Ok(items.iter().map(|item| output(&networks[fold(item)], item)).collect())
 }
 
 /// Measurements with the chance that each should have; one alone has its chance against an output of 0.

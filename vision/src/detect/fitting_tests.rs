@@ -100,19 +100,6 @@ fn odds_are_told_and_repeat() {
 }
 
 #[test]
-fn what_is_held_out_is_judged_by_the_others() {
-    // In every second group all is turned round: of two folds each learns what is wrong for the other.
-    let data = examples(200, 5, |group| group % 2 == 1);
-    let out = |folds| {
-        let train = |e: &[Example]| to_tell(e, &TrainParams { hidden: 0, ..quick() });
-        held_out(&data, folds, |e| e.group, train, |n, e| (n.output(&e.features) > 0.0) == e.is_one)
-    };
-    let right = out(2).unwrap().into_iter().filter(|r| *r).count();
-    assert!(right < 20, "{right}");
-    assert_eq!(out(1), Err(FitError::Folds { groups: 200, folds: 1 }));
-}
-
-#[test]
 fn what_is_further_off_is_wanted_less() {
     let r =
         |off: &[f64]| Rivals { group: 0, weight: 1.0, features: vec![vec![0.0]; off.len()], off: off.into() };

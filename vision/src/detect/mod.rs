@@ -47,6 +47,7 @@ pub mod thing_model;
 pub mod nested;
 mod full_size;
 pub mod fitting;
+pub mod calibration;
 pub mod quads;
 #[cfg(test)]
 mod fixtures;

@@ -1,7 +1,7 @@
 //! `waymark evaluate`: the paper's experiments on labelled pictures. Tables for people, one JSON object for programs.
 
 pub(crate) mod rendered;
-mod reviewed;
+pub(crate) mod reviewed;
 pub(crate) mod statistics;
 pub(crate) mod truth;
 pub(crate) mod detection;
@@ -12,8 +12,8 @@ pub(crate) mod recognition;
 pub(crate) enum Command {
     /// Quads against labelled corners: recall at IoU 0.7 and 0.85, false quads, corner error, time.
     ///
-    /// A set is a folder in the evaluation format (docs/EVALUATION.md), or `corridor`: rendered views with exact truth,
-    /// for which no data is needed. Figures come with 95 % confidence intervals, for all quads and by class, stratum,
+    /// A set is a folder in the evaluation format (docs/EVALUATION.md), or `corridor` or `scenes`: rendered pictures with
+    /// exact truth, for which no data is needed. Figures come with 95 % confidence intervals, for all quads and by class, stratum,
     /// size and angle of view.
     ///
     /// For example, what the search gains over the paper's grouping, and where it fails:

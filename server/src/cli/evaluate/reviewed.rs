@@ -1,6 +1,7 @@
-//! Reviewed lists: real four-sided things in a set's pictures that the set does not label (signs, switches, windows),
-//! each looked at by a person and written down. Quads on them are counted apart from the other false ones, and nothing
-//! else changes. The lists are in `tests/reviewed`, one file a set, named after it.
+//! Reviewed lists: quads in a set's pictures that the set does not label, each looked at and written down: real
+//! four-sided things (signs, switches, windows), and false ones. An evaluation counts quads on real ones apart from the
+//! other false ones; the networks of the search learn from both. The lists are in `tests/reviewed`, one file a set,
+//! named after it.
 
 use anyhow::Context as _;
 use serde::Deserialize;
@@ -8,10 +9,16 @@ use std::{collections::BTreeMap, path::Path};
 use vision::detect::quads::Corners;
 
 /// Lists that come with the program, by name of the set.
-const BUILT_IN: [(&str, &str); 1] =
-    [("museum-paintings", include_str!("../../../../tests/reviewed/museum-paintings.json"))];
+const BUILT_IN: [(&str, &str); 6] = [
+    ("museum-paintings", include_str!("../../../../tests/reviewed/museum-paintings.json")),
+    ("museum-walk-estense", include_str!("../../../../tests/reviewed/museum-walk-estense.json")),
+    ("corridor-loop-rtabmap", include_str!("../../../../tests/reviewed/corridor-loop-rtabmap.json")),
+    ("corridor-multifloor", include_str!("../../../../tests/reviewed/corridor-multifloor.json")),
+    ("doors-bbox", include_str!("../../../../tests/reviewed/doors-bbox.json")),
+    ("signs-misc", include_str!("../../../../tests/reviewed/signs-misc.json")),
+];
 
-/// A thing that is really there.
+/// A quad that was looked at.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Thing {
@@ -19,6 +26,13 @@ pub(crate) struct Thing {
     pub(crate) corners: Corners,
     /// What it is.
     pub(crate) what: String,
+    /// Whether it is a thing, or lines that meet by chance.
+    #[serde(default = "yes")]
+    pub(crate) real: bool,
+}
+
+fn yes() -> bool {
+    true
 }
 
 /// Things by file of the set.
@@ -53,7 +67,12 @@ impl Reviewed {
         Ok(Self(list.images))
     }
 
-    /// Things in one picture.
+    /// Every picture with what was looked at, by name.
+    pub(crate) fn pictures(&self) -> impl Iterator<Item = (&str, &[Thing])> {
+        self.0.iter().map(|(file, things)| (file.as_str(), things.as_slice()))
+    }
+
+    /// Quads that were looked at in one picture.
     pub(crate) fn things(&self, file: &str) -> &[Thing] {
         self.0.get(file).map_or(&[], Vec::as_slice)
     }
@@ -71,7 +90,10 @@ mod tests {
                 assert!(!things.is_empty(), "{file}");
                 assert!(things.iter().all(|t| t.what.len() > 3), "{file}: says what each is");
             }
+            assert!(list.0.values().flatten().any(|t| t.real), "{name}");
         }
+        let walk = Reviewed::of("museum-walk-estense", None).unwrap();
+        assert!(walk.pictures().flat_map(|p| p.1).any(|t| !t.real), "false ones are read as such");
         assert!(Reviewed::of("no-such-set", None).unwrap().things("a.jpg").is_empty());
     }
 

@@ -1,5 +1,6 @@
 //! The evaluation format: a folder with `truth.json` and pictures (see docs/EVALUATION.md). Read once, checked here.
 
+use super::reviewed::{Reviewed, Thing};
 use serde::Deserialize;
 use std::{
     collections::BTreeMap,
@@ -74,6 +75,8 @@ pub(crate) struct TruthImage {
     pub(crate) quads_complete: bool,
     /// A crop: one landmark fills the whole picture.
     pub(crate) whole_image: bool,
+    /// Quads that are known to be false.
+    pub(crate) false_quads: Vec<Corners>,
 }
 
 /// A data set.
@@ -105,6 +108,43 @@ impl Truth {
         }
         let teach = raw.teach.into_iter().map(|t| (folder.join(t.file), t.landmark)).collect();
         Ok(Self { name: raw.name, images, teach, same })
+    }
+
+    /// The same with what a reviewed list knows besides.
+    pub(crate) fn with_things(mut self, list: &Reviewed) -> Self {
+        for image in &mut self.images {
+            for thing in list.things(&image.file) {
+                if thing.real { &mut image.others } else { &mut image.false_quads }.push(thing.corners);
+            }
+        }
+        self
+    }
+
+    /// The pictures of a reviewed list in `folder`, with what was looked at in them and nothing else.
+    pub(crate) fn of_reviewed(name: &str, folder: &Path, list: &Reviewed) -> Self {
+        let image = |(file, things): (&str, &[Thing])| {
+            let of = |real: bool| things.iter().filter(move |t| t.real == real).map(|t| t.corners);
+            let quad = |corners: Corners| TruthQuad {
+                corners,
+                landmark: None,
+                state: QuadState::Full,
+                class: None,
+                counted: false,
+                view_angle_rad: None,
+            };
+            TruthImage {
+                path: folder.join(file),
+                file: file.to_owned(),
+                stratum: "all".to_owned(),
+                quads: of(true).map(quad).collect(),
+                others: vec![],
+                quads_complete: false,
+                whole_image: false,
+                false_quads: of(false).collect(),
+            }
+        };
+        let images = list.pictures().map(image).collect();
+        Self { name: name.to_owned(), images, teach: vec![], same: BTreeMap::new() }
     }
 
     /// Whether two names mean the same picture.
@@ -185,6 +225,7 @@ impl RawImage {
             others,
             quads_complete: self.quads_complete,
             whole_image: self.whole_image,
+            false_quads: vec![],
         })
     }
 }

@@ -7,7 +7,7 @@ use crate::cli::{
 };
 use anyhow::Context as _;
 use nalgebra::Point2;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use vision::{
     detect::{
         candidates,
@@ -34,65 +34,117 @@ const NO_THING: f64 = 0.5;
 /// An inner border covers at least this share of its label: neither the one nor the other.
 const INNER_AREA: f64 = 0.25;
 const INNER_TOLERANCE_PX: f64 = 4.0;
+/// No probability reaches it.
+const ALL: f64 = 0.0;
 
-/// All that is to be learnt from.
+/// A labelled set, and in which part of the data each of its images is.
+#[derive(Debug)]
+pub(super) struct Set {
+    pub(super) truth: Truth,
+    /// How many times its labels count.
+    pub(super) weight: f64,
+    /// Of each image.
+    parts: Vec<usize>,
+}
+
+impl Set {
+    /// Deals the images to so many parts of about the same size. Images that show one landmark stay together, where
+    /// landmarks are taught; elsewhere each image stands for itself.
+    pub(super) fn new(truth: Truth, weight: f64, parts: usize) -> Self {
+        let parts = if truth.teach.is_empty() {
+            (0..truth.images.len()).map(|i| i % parts.max(1)).collect()
+        } else {
+            dealt(&truth.images, parts.max(1))
+        };
+        Self { truth, weight, parts }
+    }
+
+    /// The images to learn from or to be judged by, with their part.
+    pub(super) fn images(&self) -> impl Iterator<Item = (&TruthImage, usize)> {
+        self.truth.images.iter().zip(self.parts.iter().copied()).filter(|(image, _)| !image.whole_image)
+    }
+}
+
+/// Parts of images such that no landmark is in two: the largest groups first, each to the part that has fewest.
+fn dealt(images: &[TruthImage], parts: usize) -> Vec<usize> {
+    let mut group: Vec<usize> = (0..images.len()).collect();
+    let mut first: BTreeMap<&str, usize> = BTreeMap::new();
+    for (i, image) in images.iter().enumerate() {
+        for name in image.quads.iter().filter_map(|q| q.landmark.as_deref()) {
+            let (from, to) = (group[i], group[*first.entry(name).or_insert(i)]);
+            group.iter_mut().filter(|g| **g == from).for_each(|g| *g = to);
+        }
+    }
+    let counts =
+        |g: usize| group.iter().zip(images).filter(|(x, image)| **x == g && !image.whole_image).count();
+    let mut order: Vec<(usize, usize)> =
+        group.iter().copied().collect::<BTreeSet<_>>().into_iter().map(|g| (counts(g), g)).collect();
+    order.sort_by(|a, b| b.0.cmp(&a.0).then(a.1.cmp(&b.1)));
+    let mut sizes = vec![0; parts];
+    let mut part: BTreeMap<usize, usize> = BTreeMap::new();
+    for (count, g) in order {
+        let least = (0..parts).min_by_key(|p| sizes[*p]).unwrap_or(0);
+        sizes[least] += count;
+        part.insert(g, least);
+    }
+    group.iter().map(|g| part.get(g).copied().unwrap_or(0)).collect()
+}
+
+/// All that is to be learnt from. Groups are the parts of the data.
 #[derive(Debug, Default)]
 pub(super) struct Data {
     pub(super) images: usize,
     pub(super) sides: Vec<Rivals>,
     pub(super) things: Vec<Example>,
-    /// Groups by name: images, or landmarks that several images show.
-    groups: BTreeMap<String, usize>,
 }
 
 impl Data {
-    /// Adds a set, whose labels count `weight` times.
-    pub(super) fn add(
+    /// Runs the detector over all sets.
+    pub(super) fn gather(sets: &[Set], params: &DetectParams, min_side_px: f64) -> anyhow::Result<Self> {
+        let mut data = Self::default();
+        let mut params = params.clone();
+        // What is told to be a thing hides what contradicts it; here everything is to be seen.
+        params.quads.min_probability = ALL;
+        for set in sets {
+            let progress = screen::progress(set.images().count(), "searching");
+            for (image, part) in set.images() {
+                progress.inc(1);
+                if !image.quads.is_empty() || !image.false_quads.is_empty() {
+                    data.add(image, [part as f64, set.weight], &params, min_side_px)?;
+                }
+            }
+            progress.finish_and_clear();
+        }
+        Ok(data)
+    }
+
+    fn add(
         &mut self,
-        truth: &Truth,
-        weight: f64,
+        image: &TruthImage,
+        [part, weight]: [f64; 2],
         params: &DetectParams,
         min_side_px: f64,
     ) -> anyhow::Result<()> {
-        let mut params = params.clone();
-        params.quads.min_probability = 0.0;
-        let progress = screen::progress(truth.images.len(), "searching");
-        for image in &truth.images {
-            progress.inc(1);
-            if image.whole_image || image.quads.is_empty() {
-                continue;
+        let group = part as usize;
+        let gray = pictures::read(&image.path).with_context(|| image.path.display().to_string())?;
+        let factor = pyramid::working_factor(&gray, params.quads.working_side_px);
+        let work = pyramid::reduce(&gray, factor);
+        let (rated, edges) = candidates(&work, params, &mut NoTrace);
+        let g = Gradients { image: &work, gx: edges.gx(), gy: edges.gy() };
+        let found = resolve(rated.clone(), &params.quads);
+        for quad in image.quads.iter().filter(|q| q.counts()) {
+            let Some(label) = quad.corners.scaled(1.0 / factor as f64) else { continue };
+            if label.min_side_px() >= min_side_px {
+                self.sides.extend(sides(&g, &found, &label, group, weight));
             }
-            let gray = pictures::read(&image.path).with_context(|| image.path.display().to_string())?;
-            let factor = pyramid::working_factor(&gray, params.quads.working_side_px);
-            let work = pyramid::reduce(&gray, factor);
-            let (rated, edges) = candidates(&work, &params, &mut NoTrace);
-            let g = Gradients { image: &work, gx: edges.gx(), gy: edges.gy() };
-            let found = resolve(rated.clone(), &params.quads);
-            // Where pictures are taught, several images show one landmark: it is held out as a whole.
-            let by_landmark = !truth.teach.is_empty();
-            for quad in image.quads.iter().filter(|q| q.counts()) {
-                let name = quad.landmark.as_deref().filter(|_| by_landmark);
-                let group = self.group(&format!("{} {}", truth.name, name.unwrap_or(&image.file)));
-                let Some(label) = quad.corners.scaled(1.0 / factor as f64) else { continue };
-                if label.min_side_px() >= min_side_px {
-                    self.sides.extend(sides(&g, &found, &label, group, weight));
-                }
-            }
-            let group = self.group(&format!("{} {}", truth.name, image.file));
-            for settled in settle(rated, &g, &params.quads) {
-                let Some(corners) = settled.quad.corners_px.scaled(factor as f64) else { continue };
-                let Some(is_one) = is_thing(&corners, image) else { continue };
-                self.things.push(Example { group, weight, features: settled.features.to_vec(), is_one });
-            }
-            self.images += 1;
         }
-        progress.finish_and_clear();
+        for settled in settle(rated, &g, &params.quads) {
+            let Some(corners) = settled.quad.corners_px.scaled(factor as f64) else { continue };
+            let Some(is_one) = is_thing(&corners, image) else { continue };
+            self.things.push(Example { group, weight, features: settled.features.to_vec(), is_one });
+        }
+        self.images += 1;
         Ok(())
-    }
-
-    fn group(&mut self, name: &str) -> usize {
-        let next = self.groups.len();
-        *self.groups.entry(name.to_owned()).or_insert(next)
     }
 }
 
@@ -127,16 +179,24 @@ fn aligned(label: &Corners, to: &[Point2<f64>; 4]) -> [Point2<f64>; 4] {
     *label.rotated(shift).points()
 }
 
-/// Whether a found quad is a labelled thing; none where the labels do not say.
+/// Whether a found quad is a labelled thing; none where the labels do not say: loosely on a label, off the labels of an
+/// incomplete picture, on another real thing that is no border of a label.
 fn is_thing(found: &Corners, image: &TruthImage) -> Option<bool> {
     let overlap = |o: &Corners| polygon::iou(o.points(), found.points());
-    let labels = image.quads.iter().map(|q| (overlap(&q.corners), q.counted, &q.corners));
-    let others = image.others.iter().map(|o| (overlap(o), false, o));
-    let all: Vec<(f64, bool, &Corners)> = labels.chain(others).collect();
-    let (best, counted) =
-        all.iter().fold((0.0, true), |best, x| if x.0 > best.0 { (x.0, x.1) } else { best });
-    if best >= THING[usize::from(!counted)] {
-        return Some(true);
+    if image.false_quads.iter().any(|q| overlap(q) >= THING[0]) {
+        return Some(false);
+    }
+    let border = |o: &Corners| {
+        let holds =
+            |q: &Corners| polygon::relation(q.points(), o.points(), INNER_TOLERANCE_PX) == Relation::Contains;
+        image.quads.iter().any(|q| holds(&q.corners) && o.area_px2() > INNER_AREA * q.corners.area_px2())
+    };
+    let labels = image.quads.iter().map(|q| (overlap(&q.corners), usize::from(!q.counted), &q.corners));
+    let others = image.others.iter().map(|o| (overlap(o), if border(o) { 1 } else { 2 }, o));
+    let (best, kind) =
+        labels.chain(others).fold((0.0, 0), |best, x| if x.0 > best.0 { (x.0, x.1) } else { best });
+    if best >= THING[kind.min(1)] {
+        return (kind < 2).then_some(true);
     }
     let inner = |o: &Corners| {
         polygon::relation(o.points(), found.points(), INNER_TOLERANCE_PX) == Relation::Contains
@@ -167,6 +227,7 @@ mod tests {
             others: vec![card(300.0, 100.0)],
             quads_complete: complete,
             whole_image: false,
+            false_quads: vec![card(600.0, 100.0)],
         }
     }
 
@@ -176,11 +237,40 @@ mod tests {
         assert_eq!((of(5.0, 100.0), of(200.0, 50.0)), (Some(true), Some(false)));
         // Half on the label, and an inner border.
         assert_eq!((of(29.0, 100.0), of(20.0, 60.0)), (None, None));
-        // A detail is none, a listed other thing is one.
-        assert_eq!((of(20.0, 30.0), of(300.0, 99.0)), (Some(false), Some(true)));
+        // A detail is none; of another thing beside the labels nothing is said.
+        assert_eq!((of(20.0, 30.0), of(300.0, 99.0)), (Some(false), None));
+        // A listed inner border is one, and what is known to be false is not.
+        let mut bordered = image(true, true);
+        bordered
+            .others
+            .push(Corners::try_from([[9.0, 9.0], [91.0, 9.0], [91.0, 91.0], [9.0, 91.0]]).unwrap());
+        let inner = Corners::try_from([[12.0, 12.0], [89.0, 12.0], [89.0, 89.0], [12.0, 89.0]]).unwrap();
+        assert_eq!((is_thing(&inner, &image(true, true)), is_thing(&inner, &bordered)), (None, Some(true)));
+        assert_eq!(is_thing(&card(602.0, 100.0), &image(true, false)), Some(false));
         // Loosely on what does not count: not said. Off an incomplete picture's labels: not said.
         assert_eq!(is_thing(&card(20.0, 100.0), &image(false, true)), None);
         assert_eq!(is_thing(&card(200.0, 50.0), &image(true, false)), None);
+    }
+
+    #[test]
+    fn no_landmark_is_in_two_parts_and_parts_are_alike() {
+        let shows = |names: &[&str]| {
+            let mut shown = image(true, true);
+            let quad = shown.quads[0].clone();
+            shown.quads =
+                names.iter().map(|n| TruthQuad { landmark: Some((*n).to_owned()), ..quad.clone() }).collect();
+            shown
+        };
+        let images = [
+            shows(&["a"]),
+            shows(&["b", "c"]),
+            shows(&["a", "d"]),
+            shows(&["c"]),
+            shows(&["e"]),
+            shows(&["d"]),
+        ];
+        let parts = dealt(&images, 2);
+        assert_eq!(parts, [0, 1, 0, 1, 1, 0]);
     }
 
     #[test]

@@ -1,30 +1,41 @@
 //! `waymark fit search`: the two networks of the search from labelled pictures. Labels in, parameters out; the training
-//! is `vision`'s.
+//! is `vision`'s, what they are worth on pictures held out is `held_out`'s.
 
-use super::{data, source};
-use crate::cli::{evaluate::rendered, evaluate::truth::Truth, parameters::ParameterArgs, screen};
+use super::{
+    data::{Data, Set},
+    held_out::{self, Judged, Line},
+    source,
+};
+use crate::cli::{
+    evaluate::{rendered, reviewed::Reviewed, truth::Truth},
+    parameters::ParameterArgs,
+    scratch, screen,
+};
 use anyhow::Context as _;
 use serde::Serialize;
 use serde_json::json;
-use sim::views::ViewsParams;
+use sim::{scenes::ScenesParams, views::ViewsParams};
 use std::path::{Path, PathBuf};
 use vision::{
     detect::{
-        fitting::{Example, Rivals, TrainParams, held_out, to_choose, to_tell},
+        fitting::{Example, Rivals, TrainParams, to_choose, to_tell},
         network::Network,
     },
     params::DetectParams,
 };
 
-/// A first choice that is off by so much more than the best rival, in pixels of the working image, is right.
-const RIGHT_PX: f64 = 1.5;
-
 /// `waymark fit search`.
 #[derive(Debug, clap::Args)]
 pub(crate) struct SearchArgs {
-    /// Folders in the evaluation format, or `corridor` for rendered views.
-    #[arg(required = true)]
+    /// Folders in the evaluation format, folders with a reviewed list (see docs/EVALUATION.md), or `corridor` for
+    /// rendered views, besides the rendered scenes.
     sets: Vec<PathBuf>,
+    /// Rendered scenes to learn from; 0 for none.
+    #[arg(long, default_value_t = 600, value_parser = clap::value_parser!(u32).range(0..=10_000))]
+    scenes: u32,
+    /// A folder of pictures that hang in the scenes beside generated ones.
+    #[arg(long, value_name = "DIR")]
+    pictures: Option<PathBuf>,
     /// How many times the labels of a set count; 1 where nothing is said. May be repeated.
     #[arg(long, value_name = "SET=TIMES", value_parser = named_weight)]
     weight: Vec<(String, f64)>,
@@ -32,7 +43,7 @@ pub(crate) struct SearchArgs {
     #[arg(long, default_value_t = 18.0)]
     min_side_px: f64,
     /// Parts that the images are dealt to; each is held out once.
-    #[arg(long, default_value_t = 6, value_parser = clap::value_parser!(u32).range(2..=1000))]
+    #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u32).range(2..=1000))]
     folds: u32,
     /// Hidden units of the network of sides, and of the network of things.
     #[arg(long, default_values_t = [16, 8], num_args = 2, value_names = ["SIDES", "THINGS"])]
@@ -49,12 +60,18 @@ pub(crate) struct SearchArgs {
     /// Write the networks as the source file `vision/src/detect/learnt.rs` here; run `cargo fmt` after.
     #[arg(long, value_name = "FILE")]
     rust: Option<PathBuf>,
-    /// Rendered views, where `corridor` is among the sets.
-    #[arg(long, default_value_t = 300, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    /// Rendered views to learn from, where `corridor` is among the sets.
+    #[arg(long, default_value_t = 500, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     views: u32,
-    /// The rendered views and the first weights follow from it.
-    #[arg(long, default_value_t = 1)]
+    /// The rendered pictures and the first weights follow from it.
+    #[arg(long, default_value_t = 2)]
     seed: u64,
+    /// Seed of the rendered pictures that the networks are judged by: another than --seed.
+    #[arg(long, default_value_t = 1)]
+    held_out_seed: u64,
+    /// Rendered pictures of either sort that the networks are judged by; 0 for none.
+    #[arg(long, default_value_t = 300, value_parser = clap::value_parser!(u32).range(0..=10_000))]
+    held_out_views: u32,
     /// One JSON object instead of a table.
     #[arg(long)]
     json: bool,
@@ -68,19 +85,6 @@ fn named_weight(text: &str) -> Result<(String, f64), String> {
     if times > 0.0 && times.is_finite() { Ok((name.to_owned(), times)) } else { Err("not above 0".into()) }
 }
 
-/// How well one network does.
-#[derive(Debug, Serialize)]
-struct Line {
-    network: &'static str,
-    /// Share of the sides whose first choice is as near as the best line, within 1.5 px.
-    sides_right: f64,
-    /// Mean distance of the first choice from the labelled side, px of the working image.
-    side_off_px: f64,
-    /// Share of things that are told to be things, and false ones an image that are.
-    things_kept: f64,
-    false_per_image: f64,
-}
-
 #[derive(Debug, Serialize)]
 struct Report {
     images: usize,
@@ -88,21 +92,22 @@ struct Report {
     lines: usize,
     things: usize,
     no_things: usize,
+    /// What held-out outputs of the network of things were multiplied by.
+    calibration: f64,
     results: Vec<Line>,
+    detection: Vec<Judged>,
 }
+
+/// The name under which rendered pictures are asked for.
+const CORRIDOR: &str = "corridor";
+const SCENES: &str = "scenes";
 
 /// Runs it.
 pub(super) fn run(args: &SearchArgs) -> anyhow::Result<()> {
-    let mut params = args.parameters.parameters()?;
-    let mut sets = Vec::new();
-    for set in &args.sets {
-        let views = ViewsParams { seed: args.seed, views: args.views as usize, ..ViewsParams::default() };
-        let (folder, keep) = rendered::folder(set, None, &views)?;
-        let truth = Truth::read(&folder)?;
-        let weight =
-            args.weight.iter().find(|(name, _)| *name == truth.name).map_or(1.0, |(_, times)| *times);
-        sets.push((truth, weight, keep));
-    }
+    anyhow::ensure!(args.seed != args.held_out_seed, "--held-out-seed: what was trained on judges nothing");
+    let params = args.parameters.parameters()?;
+    let (sets, _keep) = sets(args)?;
+    anyhow::ensure!(!sets.is_empty(), "no sets, and --scenes 0: nothing to learn from");
     let each = |i: usize| TrainParams {
         hidden: args.hidden[i],
         ridge: args.ridge[i],
@@ -110,56 +115,129 @@ pub(super) fn run(args: &SearchArgs) -> anyhow::Result<()> {
         seed: args.seed,
         ..TrainParams::default()
     };
-    let (for_sides, for_things) = (each(0), each(1));
+    let fit = Fit { sets: &sets, params: &params, min_side_px: args.min_side_px, how: [each(0), each(1)] };
     let present = [params.quads.side_network().clone(), params.quads.thing_network().clone()];
-    let gather = |params: &DetectParams| {
-        let mut data = data::Data::default();
-        for (truth, weight, _) in &sets {
-            data.add(truth, *weight, params, args.min_side_px)?;
-        }
-        anyhow::Ok(data)
-    };
-    let data = gather(&params)?;
-    let progress = screen::progress(4, "training");
-    let side_model = to_choose(&data.sides, &for_sides).context("the network of sides")?;
-    progress.inc(1);
-    let train = |r: &[Rivals]| to_choose(r, &for_sides);
-    let sides_out = held_out(&data.sides, args.folds as usize, |r| r.group, train, off)?;
-    progress.inc(1);
-    // Things are told by their sides as the new network places them.
-    params.quads.side_model = Some(side_model.clone());
-    let things = gather(&params)?.things;
-    let thing_model = to_tell(&things, &for_things).context("the network of things")?;
-    progress.inc(1);
-    let tell = |e: &[Example]| to_tell(e, &for_things);
-    let things_out = held_out(&things, args.folds as usize, |e| e.group, tell, |n, e| n.output(&e.features))?;
-    progress.finish_and_clear();
-    let judged = |name, side: Vec<[f64; 2]>, things: &[Example], odds: Vec<f64>| {
-        line(name, &side, things, &odds, params.quads.min_probability, data.images)
-    };
-    let by = |net: &Network, things: &[Example]| things.iter().map(|e| net.output(&e.features)).collect();
-    let sides_by = |net: &Network| data.sides.iter().map(|r| off(net, r)).collect();
+    let data = Data::gather(&sets, &params, args.min_side_px)?;
+    let in_use = held_out::line("in use", &data, &data, &present, &params);
+    // Every part is judged by networks that saw nothing of it.
+    let mut parts = Vec::new();
+    for part in 0..args.folds as usize {
+        parts.push(fit.networks(&data.sides, Some(part))?);
+    }
+    let all = fit.networks(&data.sides, None)?;
+    let calibration = held_out::calibration(&parts)?;
+    let final_networks =
+        [all.networks[0].clone(), calibration.applied(all.networks[1].clone())].map(source::rounded);
     let results = vec![
-        judged("in use", sides_by(&present[0]), &data.things, by(&present[1], &data.things)),
-        judged("new, held out", sides_out, &things, things_out),
-        judged("new, same images", sides_by(&side_model), &things, by(&thing_model, &things)),
+        in_use,
+        held_out::line_of_parts("new, held out", &data, &parts, &calibration, &params),
+        held_out::line("new, same images", &data, &all.data, &final_networks, &params),
     ];
+    let networks: Vec<[Network; 2]> = parts
+        .into_iter()
+        .map(|p| [p.networks[0].clone(), calibration.applied(p.networks[1].clone())])
+        .collect();
+    let mut detection = held_out::photographs(&sets, &networks, &params)?;
+    detection.extend(others(args, &sets, &final_networks, &params)?);
     let report = Report {
         images: data.images,
         sides: data.sides.len(),
         lines: data.sides.iter().map(|r| r.off.len()).sum(),
-        things: things.iter().filter(|e| e.is_one).count(),
-        no_things: things.iter().filter(|e| !e.is_one).count(),
+        things: all.data.things.iter().filter(|e| e.is_one).count(),
+        no_things: all.data.things.iter().filter(|e| !e.is_one).count(),
+        calibration: calibration.factor,
         results,
+        detection,
     };
-    keep(args, [side_model, thing_model])?;
+    keep(args, final_networks)?;
     screen::say(&if args.json { serde_json::to_string(&report)? } else { table(&report, args.folds) });
     Ok(())
 }
 
+/// The sets to learn from, and the folders of those that were rendered.
+fn sets(args: &SearchArgs) -> anyhow::Result<(Vec<Set>, Vec<scratch::Folder>)> {
+    let (mut sets, mut keep) = (Vec::new(), Vec::new());
+    let mut add = |truth: Truth| {
+        let named = args.weight.iter().find(|(name, _)| *name == truth.name);
+        sets.push(Set::new(truth, named.map_or(1.0, |(_, times)| *times), args.folds as usize));
+    };
+    for set in &args.sets {
+        let views = ViewsParams { seed: args.seed, views: args.views as usize, ..ViewsParams::default() };
+        let (folder, rendered) = rendered::folder(set, None, &views)?;
+        keep.extend(rendered);
+        let name = folder.file_name().map_or(String::new(), |n| n.to_string_lossy().into_owned());
+        let list = Reviewed::of(&name, None)?;
+        // A set that says nothing itself is known by what was looked at.
+        let unlabelled = !folder.join("truth.json").exists() && list.pictures().next().is_some();
+        add(if unlabelled {
+            Truth::of_reviewed(&name, &folder, &list)
+        } else {
+            Truth::read(&folder)?.with_things(&list)
+        });
+    }
+    if args.scenes > 0 {
+        let folder = scratch::Folder::new("scenes")?;
+        let params =
+            ScenesParams { seed: args.seed, scenes: args.scenes as usize, ..ScenesParams::default() };
+        let hung = args.pictures.as_deref().map(rendered::hung).transpose()?.unwrap_or_default();
+        rendered::write_scenes(folder.path(), &params, hung)?;
+        add(Truth::read(folder.path())?);
+        keep.push(folder);
+    }
+    Ok((sets, keep))
+}
+
+/// Rendered pictures of another seed, judged by the final networks.
+fn others(
+    args: &SearchArgs,
+    sets: &[Set],
+    networks: &[Network; 2],
+    params: &DetectParams,
+) -> anyhow::Result<Vec<Judged>> {
+    let mut judged = Vec::new();
+    for name in [CORRIDOR, SCENES].into_iter().filter(|name| sets.iter().any(|s| s.truth.name == *name)) {
+        if args.held_out_views == 0 {
+            continue;
+        }
+        let views = ViewsParams {
+            seed: args.held_out_seed,
+            views: args.held_out_views as usize,
+            ..ViewsParams::default()
+        };
+        let (folder, _keep) = rendered::folder(Path::new(name), None, &views)?;
+        let set = Set::new(Truth::read(&folder)?, 1.0, 1);
+        let title = format!("{name}, seed {}", args.held_out_seed);
+        judged.push(held_out::judged(&title, &set, std::slice::from_ref(networks), params)?);
+    }
+    Ok(judged)
+}
+
+/// What networks are fitted with.
+struct Fit<'a> {
+    sets: &'a [Set],
+    params: &'a DetectParams,
+    min_side_px: f64,
+    how: [TrainParams; 2],
+}
+
+impl Fit<'_> {
+    /// Networks of sides and of things from all but one part of the data. Things are told by their sides as the new
+    /// network of sides places them.
+    fn networks(&self, sides: &[Rivals], without: Option<usize>) -> anyhow::Result<held_out::Part> {
+        let learnt: Vec<Rivals> = sides.iter().filter(|r| Some(r.group) != without).cloned().collect();
+        let side = to_choose(&learnt, &self.how[0]).context("the network of sides")?;
+        let mut params = self.params.clone();
+        params.quads.side_model = Some(side.clone());
+        let data = Data::gather(self.sets, &params, self.min_side_px)?;
+        let learnt: Vec<Example> = data.things.iter().filter(|e| Some(e.group) != without).cloned().collect();
+        let thing = to_tell(&learnt, &self.how[1]).context("the network of things")?;
+        Ok(held_out::Part { unseen: without, networks: [side, thing], data })
+    }
+}
+
 /// Writes the networks where they are wanted.
 fn keep(args: &SearchArgs, [side, thing]: [Network; 2]) -> anyhow::Result<()> {
-    let models = [("side_model", source::rounded(side)), ("thing_model", source::rounded(thing))];
+    let models = [("side_model", side), ("thing_model", thing)];
     if let Some(path) = &args.out {
         let [side, thing] = &models;
         write(
@@ -175,37 +253,6 @@ fn keep(args: &SearchArgs, [side, thing]: [Network; 2]) -> anyhow::Result<()> {
 
 fn write(path: &Path, text: &str) -> anyhow::Result<()> {
     std::fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))
-}
-
-/// How far the first choice is off, and the best rival; of equal outputs the earlier.
-fn off(net: &Network, r: &Rivals) -> [f64; 2] {
-    let outputs: Vec<f64> = r.features.iter().map(|f| net.output(f)).collect();
-    let first = (0..outputs.len()).reduce(|a, b| if outputs[b] > outputs[a] { b } else { a });
-    [first.map_or(f64::INFINITY, |i| r.off[i]), r.off.iter().copied().fold(f64::INFINITY, f64::min)]
-}
-
-fn line(
-    network: &'static str,
-    sides: &[[f64; 2]],
-    things: &[Example],
-    odds: &[f64],
-    min_probability: f64,
-    images: usize,
-) -> Line {
-    let n = sides.len().max(1) as f64;
-    let told = |is_one: bool| {
-        let yes =
-            |(e, o): &(&Example, &f64)| e.is_one == is_one && 1.0 / (1.0 + (-**o).exp()) >= min_probability;
-        things.iter().zip(odds).filter(yes).count() as f64
-    };
-    let ones = things.iter().filter(|e| e.is_one).count().max(1) as f64;
-    Line {
-        network,
-        sides_right: sides.iter().filter(|[first, best]| first - best < RIGHT_PX).count() as f64 / n,
-        side_off_px: sides.iter().map(|s| s[0]).sum::<f64>() / n,
-        things_kept: told(true) / ones,
-        false_per_image: told(false) / images.max(1) as f64,
-    }
 }
 
 fn table(r: &Report, folds: u32) -> String {
@@ -225,22 +272,24 @@ fn table(r: &Report, folds: u32) -> String {
             l.network, l.sides_right, l.side_off_px, l.things_kept, l.false_per_image
         )
     }));
+    lines.push(format!("  held-out odds of things were scaled by {:.2}", r.calibration));
+    lines.push(format!(
+        "  {:<34} quads  recall 0.7   0.85  false an image  corner, px",
+        "detection, held out"
+    ));
+    lines.extend(r.detection.iter().map(|d| {
+        let rate = d.false_per_image.map_or_else(|| "not labelled".to_owned(), |f| format!("{f:.3}"));
+        format!(
+            "  {:<34} {:5} {:11.3} {:6.3} {rate:>15} {:11.2}",
+            d.set, d.quads, d.recall_70, d.recall_85, d.corner_px
+        )
+    }));
     lines.join("\n")
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn results_by_hand() {
-        let one = |is_one| Example { group: 0, weight: 1.0, features: vec![], is_one };
-        let things = [one(true), one(true), one(false), one(false)];
-        // Odds of even are a half: kept.
-        let l = line("x", &[[2.0, 1.0], [4.0, 1.0]], &things, &[0.0, -1.0, 3.0, -3.0], 0.5, 4);
-        assert!((l.sides_right - 0.5).abs() < 1e-12 && (l.side_off_px - 3.0).abs() < 1e-12);
-        assert!((l.things_kept - 0.5).abs() < 1e-12 && (l.false_per_image - 0.25).abs() < 1e-12);
-    }
 
     #[test]
     fn weights_are_checked() {

@@ -21,8 +21,15 @@ pub(super) fn rounded(mut net: Network) -> Network {
 /// `vision/src/detect/learnt.rs` with these networks.
 pub(super) fn source(models: &[(&str, Network); 2]) -> String {
     let mut text = String::from(
-        "//! The weights of the two networks of the search, as fitted on labelled pictures: see docs/METHOD.md. Written by\n\
-         //! `waymark fit search --rust`; not for editing.\n\
+        "//! The weights of the two networks of the search, as learnt from rendered scenes and the open sets. Not for editing:\n\
+         //! this command writes the file, byte for byte on one machine, in the folder of the sets (see docs/EVALUATION.md),\n\
+         //! and `cargo fmt` puts it in form:\n\
+         //!\n\
+         //! ```text\n\
+         //! waymark fit search museum-paintings exit-signs corridor museum-walk-estense corridor-loop-rtabmap \\\n\
+         //!   corridor-multifloor doors-bbox signs-misc --pictures poster-textures-estense \\\n\
+         //!   --weight museum-paintings=6 --weight scenes=0.5 --rust vision/src/detect/learnt.rs\n\
+         //! ```\n\
          #![allow(clippy::approx_constant, reason = \"weights that happen to be near one\")]\n\n\
          use super::network::Network;\nuse std::sync::LazyLock;\n",
     );

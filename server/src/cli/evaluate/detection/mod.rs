@@ -2,7 +2,7 @@
 //! error, time; by class, stratum, size and angle, with confidence intervals; as a table, JSON, a plot and pictures of
 //! the worst. The detector runs on one thread, pictures one after the other.
 
-mod score;
+pub(crate) mod score;
 mod report;
 mod table;
 mod plot;
@@ -26,7 +26,8 @@ const DRAWN: usize = 20;
 /// `waymark evaluate detection`.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// Folders in the evaluation format (each with a truth.json), or `corridor` for rendered views with exact truth.
+    /// Folders in the evaluation format (each with a truth.json), or `corridor` or `scenes` for rendered
+    /// pictures with exact truth.
     #[arg(required = true)]
     sets: Vec<PathBuf>,
     /// Leave out labelled quads with a side shorter than this, in pixels.
@@ -55,10 +56,10 @@ pub(crate) struct Args {
     /// this the list that comes with the program, if it knows the set.
     #[arg(long, value_name = "FILE")]
     reviewed: Option<PathBuf>,
-    /// Keep the rendered corridor in this folder: a set like any other.
+    /// Keep the rendered pictures in this folder: a set like any other.
     #[arg(long, value_name = "DIR")]
     keep: Option<PathBuf>,
-    /// Rendered views of the corridor.
+    /// Rendered views of the corridor, or scenes.
     #[arg(long, default_value_t = 300, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     views: u32,
     /// The rendered views follow from it.

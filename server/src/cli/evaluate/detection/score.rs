@@ -159,7 +159,10 @@ fn is_real(found: &Corners, image: &TruthImage) -> bool {
 }
 
 fn named(found: &Corners, reviewed: &[Thing]) -> FalseQuad {
-    let there = reviewed.iter().find(|t| polygon::iou(t.corners.points(), found.points()) >= IOU_SAME);
+    let there = reviewed
+        .iter()
+        .filter(|t| t.real)
+        .find(|t| polygon::iou(t.corners.points(), found.points()) >= IOU_SAME);
     FalseQuad { corners: *found, reviewed: there.map(|t| t.what.clone()) }
 }
 
@@ -195,6 +198,7 @@ pub(super) mod tests {
             others,
             quads_complete: true,
             whole_image: false,
+            false_quads: vec![],
         }
     }
 
@@ -244,10 +248,12 @@ pub(super) mod tests {
 
     #[test]
     fn reviewed_things_are_counted_apart() {
-        let list = [Thing { corners: at(DARK), what: "switch".into() }];
+        let mut list = [Thing { corners: at(DARK), what: "switch".into(), real: true }];
         let s = scored(&image(vec![labelled(at(BRIGHT), true)], vec![]), 0.0, &list);
         assert_eq!((s.false_quads.as_ref().unwrap().len(), s.false_left()), (1, 0));
         assert_eq!(s.false_quads.unwrap()[0].reviewed.as_deref(), Some("switch"));
+        list[0].real = false;
+        assert_eq!(scored(&image(vec![labelled(at(BRIGHT), true)], vec![]), 0.0, &list).false_left(), 1);
     }
 
     #[test]
