@@ -124,7 +124,7 @@ pub struct Point {
 pub struct Candidate {
     #[prost(string, tag = "1")]
     pub landmark: ::prost::alloc::string::String,
-    /// C^r and H^r; H^r is absent when there are too few points.
+    /// C^r and H^r; H^r is absent when there are too few points, and when another gate refused already.
     #[prost(double, tag = "2")]
     pub correlation: f64,
     #[prost(double, optional, tag = "3")]
@@ -138,9 +138,13 @@ pub struct Candidate {
     pub ratio: f64,
     #[prost(double, tag = "7")]
     pub probability: f64,
-    /// Empty, or the gate that refused it: correlation, hausdorff, margin.
+    /// Empty, or the gate that refused it: correlation, hausdorff, likeness, margin.
     #[prost(string, tag = "8")]
     pub refusal: ::prost::alloc::string::String,
+    /// How alike the picture and the learnt icon are, one laid on the other, -1 to 1; absent where the map's distances
+    /// decide alone.
+    #[prost(double, optional, tag = "9")]
+    pub likeness: ::core::option::Option<f64>,
 }
 #[derive(::serde::Serialize, ::serde::Deserialize)]
 #[serde(default)]

@@ -65,11 +65,12 @@ pub struct Params {
 }
 
 impl Params {
-    /// Names the settings that define both distances (icon, points, descriptor, ranks). A threshold learnt under one
+    /// Names the settings that define the distances (icon, points, descriptor, ranks, alignment). A threshold learnt under one
     /// hash means nothing under another.
     pub fn distance_hash(&self) -> u64 {
         let r = &self.recognise;
-        let text = text_of(&(&self.icon, &r.harris, &r.descriptor, &r.correlation, &r.hausdorff));
+        let text =
+            text_of(&(&self.icon, &r.harris, &r.descriptor, &r.correlation, &r.hausdorff, &r.verdict.align));
         // FNV-1a, 64 bits: stable across builds and machines.
         text.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
             (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)

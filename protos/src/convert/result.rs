@@ -42,6 +42,7 @@ pub fn candidate(c: &Candidate, name: impl Fn(LandmarkId) -> String) -> v1::Cand
         ratio: finite(c.ratio),
         probability: c.probability,
         refusal: c.refusal.map_or("", refusal).to_owned(),
+        likeness: c.likeness.filter(|l| l.is_finite()),
     }
 }
 
@@ -50,6 +51,7 @@ pub fn refusal(refusal: Refusal) -> &'static str {
     match refusal {
         Refusal::Correlation => "correlation",
         Refusal::Hausdorff => "hausdorff",
+        Refusal::Likeness => "likeness",
         Refusal::Margin => "margin",
     }
 }
@@ -96,6 +98,7 @@ mod tests {
             landmark: LandmarkId(4),
             correlation: 0.25,
             hausdorff: f64::INFINITY,
+            likeness: Some(0.25),
             distance: f64::INFINITY,
             tau: 0.5,
             ratio: f64::INFINITY,

@@ -357,6 +357,7 @@ fn row(model: &LandmarkModel) -> NewModel {
     let facts = json!({
         "correlation": model.correlation,
         "hausdorff": model.hausdorff,
+        "likeness": model.likeness,
         "saliency": model.saliency,
         "saliency_f": model.saliency_f,
         "stable_points": model.stable_points,

@@ -7,12 +7,12 @@ use super::{
         Evidence, Gate, GateFailure, LandmarkModel, LearnError, MAX_VIEWS, ModelStatus, View, distances,
     },
     pca::{exemplars, modes},
-    threshold::{Threshold, ThresholdError, threshold},
+    threshold::{LimitedBy, Threshold, ThresholdError, threshold},
 };
 use crate::{
     icon::Icon,
     params::{Params, RecogniseParams},
-    recognise::{IconFeatures, LandmarkId, features},
+    recognise::{IconFeatures, LandmarkId, align::Surroundings, features, likeness::likeness, signature},
 };
 
 /// Learns a landmark. `negatives` are icons of everything it must be told from: other landmarks, and quads that are
@@ -45,6 +45,11 @@ pub fn learn(
         hausdorff: Threshold::NEVER,
         correlation_evidence: Evidence { own: rising(own.iter().map(|d| d.0)), ..Evidence::default() },
         hausdorff_evidence: Evidence { own: rising(own.iter().map(|d| d.1)), ..Evidence::default() },
+        likeness: Threshold::NEVER,
+        likeness_evidence: Evidence {
+            own: rising(own_unlikeness(&icons, &chosen, p).into_iter()),
+            ..Evidence::default()
+        },
         saliency_f,
         stable_points,
         saliency: saliency(saliency_f, stable_points),
@@ -60,7 +65,8 @@ pub fn learn(
 #[must_use]
 pub fn refit_thresholds(model: &LandmarkModel, negatives: &[IconFeatures], p: &Params) -> LandmarkModel {
     let mut model = model.clone();
-    for evidence in [&mut model.correlation_evidence, &mut model.hausdorff_evidence] {
+    let LandmarkModel { correlation_evidence, hausdorff_evidence, likeness_evidence, .. } = &mut model;
+    for evidence in [correlation_evidence, hausdorff_evidence, likeness_evidence] {
         (evidence.nearest_others, evidence.others) = (vec![], 0);
     }
     add_negatives(&model, negatives, p)
@@ -75,12 +81,20 @@ pub fn add_negatives(model: &LandmarkModel, negatives: &[IconFeatures], p: &Para
         let d = model.distances(negative, &p.recognise);
         model.correlation_evidence.add(d.correlation);
         model.hausdorff_evidence.add(d.hausdorff);
+        model.likeness_evidence.add(unlikeness(&model.exemplars, negative, MIN_SIGNATURE, p));
     }
     let correlation = fitted(&model.correlation_evidence, p.learn.correlation_cap, p);
     let hausdorff = fitted(&model.hausdorff_evidence, p.learn.hausdorff_cap, p);
+    let likeness = fitted_likeness(&model.likeness_evidence, p);
     model.correlation = correlation.unwrap_or(Threshold::NEVER);
     model.hausdorff = hausdorff.unwrap_or(Threshold::NEVER);
-    model.status = status(&model, correlation.err(), hausdorff.err(), p);
+    model.likeness = likeness.unwrap_or(Threshold::NEVER);
+    let missing = [
+        correlation.err().map(Gate::CorrelationThreshold),
+        hausdorff.err().map(Gate::HausdorffThreshold),
+        likeness.err().map(Gate::LikenessThreshold),
+    ];
+    model.status = status(&model, missing, p);
     model
 }
 
@@ -107,13 +121,64 @@ fn fitted(evidence: &Evidence, cap: f64, p: &Params) -> Result<Threshold, Thresh
     threshold(&own, &others, cap, &p.learn.threshold)
 }
 
+/// Negatives whose signatures are less alike are not laid on the exemplars: they count as infinitely far.
+const MIN_SIGNATURE: f32 = 0.35;
+
+/// The smallest 1 minus likeness of `icon` to the exemplars after alignment, of those whose signatures are alike enough.
+fn unlikeness(exemplars: &[IconFeatures], icon: &IconFeatures, min_signature: f32, p: &Params) -> f64 {
+    let (c, a) = (&p.recognise.correlation, &p.recognise.verdict.align);
+    let alike = |e: &&IconFeatures| {
+        signature::likeness(e.signature.values(), icon.signature.values()) >= min_signature
+    };
+    let mut around = None;
+    let mut least = f64::INFINITY;
+    for exemplar in exemplars.iter().filter(alike) {
+        let around = around.get_or_insert_with(|| Surroundings::of_icon(&icon.icon, a));
+        let laid = around.as_ref().and_then(|s| s.align(&exemplar.icon, c, a));
+        let laid = laid.as_ref().map_or(&icon.icon, |l| &l.icon);
+        least = least.min(1.0 - likeness(laid, &exemplar.icon, c));
+    }
+    least
+}
+
+/// The same of the landmark's own icons that are no exemplars.
+fn own_unlikeness(icons: &[IconFeatures], chosen: &[usize], p: &Params) -> Vec<f64> {
+    let exemplars: Vec<IconFeatures> = chosen.iter().map(|i| icons[*i].clone()).collect();
+    let others = icons.iter().enumerate().filter(|(i, _)| !chosen.contains(i));
+    others.map(|(_, icon)| unlikeness(&exemplars, icon, -1.0, p)).collect()
+}
+
+/// tau of the likeness: the cap, or a share of the nearest of everything else. None where the greater part of the
+/// landmark's own views would be refused.
+// Departs from method 8: own distances have no say in tau but that. Those of generated views, or of one robot's drive,
+// are far smaller than another day's (reflections, dust, another camera); what is safe is said by the others alone.
+fn fitted_likeness(evidence: &Evidence, p: &Params) -> Result<Threshold, ThresholdError> {
+    let mut own: Vec<f64> = evidence.own.iter().map(|d| f64::from(*d)).collect();
+    own.sort_by(f64::total_cmp);
+    let median = own.get(own.len() / 2).copied().ok_or(ThresholdError::NoPositive)?;
+    let nearest = evidence.nearest_others.first().map_or(f64::INFINITY, |d| f64::from(*d));
+    let share = p.learn.threshold.nearest_share * nearest;
+    let (tau, limited_by) = if share < p.learn.likeness_cap {
+        (share, LimitedBy::NearestNegative)
+    } else {
+        (p.learn.likeness_cap, LimitedBy::AbsoluteCap)
+    };
+    if median >= tau {
+        return Err(ThresholdError::Overlap);
+    }
+    let missed = own.iter().filter(|d| **d >= tau).count();
+    Ok(Threshold {
+        tau,
+        false_positive_rate: 0.0,
+        false_negative_rate: missed as f64 / own.len() as f64,
+        positives: own.len(),
+        negatives: evidence.others,
+        limited_by,
+    })
+}
+
 /// Method 9: what the model fails, if anything.
-fn status(
-    model: &LandmarkModel,
-    no_correlation: Option<ThresholdError>,
-    no_hausdorff: Option<ThresholdError>,
-    p: &Params,
-) -> ModelStatus {
+fn status(model: &LandmarkModel, missing: [Option<Gate>; 3], p: &Params) -> ModelStatus {
     let g = &p.learn.gates;
     let observed = model.views - model.generated_views > 1;
     let min_saliency_f = if observed { g.min_saliency_f } else { g.min_saliency_f_generated };
@@ -128,8 +193,6 @@ fn status(
         .filter(|(_, value, limit)| value < limit)
         .map(|(gate, value, limit)| GateFailure { gate, value, limit })
         .collect();
-    let missing =
-        [no_correlation.map(Gate::CorrelationThreshold), no_hausdorff.map(Gate::HausdorffThreshold)];
     failures.extend(missing.into_iter().flatten().map(|gate| GateFailure { gate, value: 0.0, limit: 0.0 }));
     if failures.is_empty() { ModelStatus::Active } else { ModelStatus::Candidate(failures) }
 }
@@ -278,6 +341,30 @@ mod tests {
     }
 
     #[test]
+    fn likeness_is_held_by_the_nearest_of_the_others() {
+        let p = Params::default();
+        let alone = lesson(3, 20, &[]);
+        assert!((alone.likeness.tau - p.learn.likeness_cap).abs() < 1e-12);
+        assert_eq!((alone.likeness.limited_by, alone.likeness.negatives), (LimitedBy::AbsoluteCap, 0));
+        // What is nothing like it changes nothing, a look-alike much: itself under a stain, here.
+        let stranger = lesson(4, 20, &[]).exemplars[0].clone();
+        let far = add_negatives(&alone, &[stranger], &p);
+        assert!((far.likeness.tau - p.learn.likeness_cap).abs() < 1e-12 && far.likeness.negatives == 1);
+        let mut stained = poster(3);
+        stained = GrayImage::from_fn(300, 400, |u, v| {
+            if u > 110 && v > 180 { (60 + (u / 9 + v / 11) % 2 * 90) as u8 } else { stained.at(u, v) }
+        });
+        let view = View::photographed(&stained, &whole(), &p).unwrap();
+        let near = add_negatives(&alone, &[features(view.icon, &p.recognise)], &p);
+        assert_eq!(near.likeness.limited_by, LimitedBy::NearestNegative);
+        assert!(near.likeness.tau < 0.9 * p.learn.likeness_cap, "{:?}", near.likeness);
+        // Itself: nothing can tell them apart, and so it is not used.
+        let twin = add_negatives(&alone, &alone.exemplars.clone(), &p);
+        let ModelStatus::Candidate(failures) = &twin.status else { panic!("told from itself?") };
+        assert!(failures.iter().any(|f| f.gate == Gate::LikenessThreshold(ThresholdError::Overlap)));
+    }
+
+    #[test]
     fn a_model_tells_what_it_was_learnt_from() {
         let p = Params::default();
         let mut views = synthesis::views(&poster(1), &whole(), 24, &p, 1);
@@ -395,7 +482,7 @@ mod tests {
         assert!(matches!(LandmarkModel::from_bytes(&bytes, &other), Err(StoredModelError::Params { .. })));
         let mut later = bytes.clone();
         later[4] += 1;
-        assert_eq!(LandmarkModel::from_bytes(&later, &p), Err(StoredModelError::Version { found: 2 }));
+        assert_eq!(LandmarkModel::from_bytes(&later, &p), Err(StoredModelError::Version { found: 3 }));
         for at in (6..bytes.len()).step_by(97).chain([bytes.len() - 1]) {
             let mut damaged = bytes.clone();
             damaged[at] ^= 0x10;

@@ -16,7 +16,7 @@ use crate::{
 /// Largest stored model, in bytes.
 const MAX_BYTES: usize = 3 * MAX_ICON_SIZE * MAX_ICON_SIZE + 8 * 1024;
 const MAGIC: [u8; 4] = *b"WMLM";
-const VERSION: u16 = 1;
+const VERSION: u16 = 2;
 const DIGEST_BYTES: usize = 8;
 
 /// Why bytes are not a usable model.
@@ -66,7 +66,7 @@ impl LandmarkModel {
         }
         out.push(self.eigenvalues.len() as u8);
         out.extend(self.eigenvalues.iter().flat_map(|value| value.to_le_bytes()));
-        for evidence in [&self.correlation_evidence, &self.hausdorff_evidence] {
+        for evidence in [&self.correlation_evidence, &self.hausdorff_evidence, &self.likeness_evidence] {
             out.extend((evidence.others as u64).to_le_bytes());
             for distances in [&evidence.own, &evidence.nearest_others] {
                 out.push(distances.len() as u8);
@@ -129,6 +129,7 @@ impl Reader<'_> {
             .map(|_| self.number("eigenvalues"))
             .collect::<Result<_, _>>()?;
         let (correlation_evidence, hausdorff_evidence) = (self.evidence()?, self.evidence()?);
+        let likeness_evidence = self.evidence()?;
         let n = self.byte("exemplars", MAX_EXEMPLARS)?;
         let icons = (0..n).map(|_| self.icon(p)).collect::<Result<Vec<_>, _>>()?;
         if icons.is_empty() {
@@ -144,8 +145,10 @@ impl Reader<'_> {
             total_variance,
             correlation: Threshold::NEVER,
             hausdorff: Threshold::NEVER,
+            likeness: Threshold::NEVER,
             correlation_evidence,
             hausdorff_evidence,
+            likeness_evidence,
             saliency_f,
             stable_points,
             saliency,

@@ -7,7 +7,8 @@ use super::{
     descriptor::{PointSet, describe},
     harris::harris,
     hausdorff::hausdorff,
-    models::ModelSet,
+    models::{Listed, ModelSet},
+    signature::Signature,
 };
 use crate::{
     detect::quads::{Corners, Quad},
@@ -34,13 +35,16 @@ pub(crate) struct Sighting {
     pub(crate) icon: Icon,
     /// The icon's buckets.
     pub(crate) buckets: Buckets,
+    /// The icon's signature.
+    pub(crate) signature: Signature,
     points: OnceCell<PointSet>,
 }
 
 impl Sighting {
     fn new(border: usize, rotation: usize, corners_px: Corners, icon: Icon, p: &Params) -> Self {
         let buckets = Buckets::new(&icon, &p.recognise.correlation);
-        Self { border, rotation, corners_px, icon, buckets, points: OnceCell::new() }
+        let signature = Signature::new(&icon);
+        Self { border, rotation, corners_px, icon, buckets, signature, points: OnceCell::new() }
     }
 
     /// The icon's points. Worked out when first asked for: most quads are out of reach by C^r alone.
@@ -75,6 +79,8 @@ pub(crate) struct Near {
     pub(crate) exemplar: usize,
     pub(crate) correlation: f64,
     pub(crate) hausdorff: f64,
+    /// Likeness after alignment, once it was measured.
+    pub(crate) likeness: Option<f64>,
 }
 
 impl Near {
@@ -92,7 +98,10 @@ impl Near {
     pub(crate) fn ratio(&self, kind: DistanceKind) -> f64 {
         match kind {
             DistanceKind::Hausdorff => self.hausdorff_ratio(),
-            DistanceKind::Correlation | DistanceKind::Both => self.correlation_ratio(),
+            DistanceKind::Correlation => self.correlation_ratio(),
+            DistanceKind::Both => {
+                self.likeness.map_or(f64::INFINITY, |l| ratio(1.0 - l, self.model.likeness.tau))
+            }
         }
     }
 }
@@ -102,8 +111,32 @@ fn ratio(distance: f64, tau: f64) -> f64 {
     if tau > 0.0 { distance / tau } else { f64::INFINITY }
 }
 
-/// The `count` landmarks of least ratio, and every one with a ratio below 1, rising; of equal ones the lower id. Where
-/// C^r decides or joins in and nothing comes within `verify_reach`, H^r is left infinite.
+/// The `count` landmarks whose signatures are most like one of the sightings', best first, each with its best sighting;
+/// of equal ones the lower id. H^r is left infinite.
+pub(crate) fn short_list(sightings: &[Sighting], models: &ModelSet, count: usize, p: &Params) -> Vec<Near> {
+    let mut found: Vec<(usize, Listed)> = Vec::new();
+    for (i, sighting) in sightings.iter().enumerate() {
+        found.extend(models.short_list(&sighting.signature, count).into_iter().map(|l| (i, l)));
+    }
+    found.sort_by(|a, b| b.1.likeness.total_cmp(&a.1.likeness).then((a.1.model, a.0).cmp(&(b.1.model, b.0))));
+    let mut near: Vec<Near> = Vec::new();
+    let rank = p.recognise.correlation.rank();
+    for (sighting, listed) in found {
+        let Some(model) = models.at(listed.model) else { continue };
+        if near.len() == count || near.iter().any(|n| n.model.id == model.id) {
+            continue;
+        }
+        let buckets = &sightings[sighting].buckets;
+        let each = model.exemplars.iter().filter_map(|e| correlation_within(buckets, &e.buckets, rank, 2.0));
+        let correlation = each.fold(2.0, f64::min);
+        let (model, exemplar) = (Arc::clone(model), listed.exemplar);
+        near.push(Near { model, sighting, exemplar, correlation, hausdorff: f64::INFINITY, likeness: None });
+    }
+    near
+}
+
+/// The `count` landmarks of least ratio by one of the paper's distances, and every one with a ratio below 1, rising; of
+/// equal ones the lower id. Where C^r decides and nothing comes within `verify_reach`, H^r is left infinite.
 pub(crate) fn nearest(
     sightings: &[Sighting],
     models: &ModelSet,
@@ -170,6 +203,7 @@ fn nearest_by_correlation(
         exemplar,
         correlation,
         hausdorff: f64::INFINITY,
+        likeness: None,
     })
 }
 
@@ -190,7 +224,7 @@ fn nearest_by_points(sightings: &[Sighting], model: &Arc<LandmarkModel>, p: &Par
         .iter()
         .filter_map(|e| correlation_within(buckets, &e.buckets, rank, f64::INFINITY))
         .fold(2.0, f64::min);
-    Some(Near { model: Arc::clone(model), sighting, exemplar, correlation, hausdorff })
+    Some(Near { model: Arc::clone(model), sighting, exemplar, correlation, hausdorff, likeness: None })
 }
 
 /// Least H^r over the exemplars, and which has it.

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 /// Most buckets along a side, whatever the parameters say.
 pub const MAX_BUCKETS_PER_SIDE: usize = 10;
 /// Bucket lengths are padded with zeros to a multiple of this, for vector units.
-const LANES: usize = 16;
+pub(crate) const LANES: usize = 16;
 
 /// Parameters of this stage.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -4,8 +4,10 @@ pub mod harris;
 pub mod descriptor;
 pub mod correlation;
 pub mod hausdorff;
+pub mod signature;
 pub mod models;
 pub mod align;
+pub mod likeness;
 pub mod compare;
 pub mod confidence;
 pub mod verdict;
@@ -16,6 +18,7 @@ use crate::{detect::quads::Corners, icon::Icon, params::RecogniseParams};
 use correlation::Buckets;
 use descriptor::PointSet;
 use serde::{Deserialize, Serialize};
+use signature::Signature;
 
 pub use models::{ModelSet, ModelSetError};
 
@@ -29,6 +32,8 @@ pub struct IconFeatures {
     pub buckets: Buckets,
     /// Described points for H^r.
     pub points: PointSet,
+    /// For the short list.
+    pub signature: Signature,
 }
 
 impl IconFeatures {
@@ -37,14 +42,20 @@ impl IconFeatures {
     pub fn rotated(&self, shift: usize, p: &RecogniseParams) -> Self {
         let icon = self.icon.rotated(shift);
         let buckets = Buckets::new(&icon, &p.correlation);
-        Self { buckets, points: self.points.rotated(shift, icon.size), icon }
+        let signature = Signature::new(&icon);
+        Self { buckets, points: self.points.rotated(shift, icon.size), signature, icon }
     }
 }
 
 /// Works out buckets, points and descriptors of `icon`.
 pub fn features(icon: Icon, p: &RecogniseParams) -> IconFeatures {
     let points = descriptor::describe(&icon, &harris::harris(&icon, &p.harris), &p.descriptor);
-    IconFeatures { buckets: Buckets::new(&icon, &p.correlation), points, icon }
+    IconFeatures {
+        buckets: Buckets::new(&icon, &p.correlation),
+        points,
+        signature: Signature::new(&icon),
+        icon,
+    }
 }
 
 /// Number that names a landmark inside one map. The server keeps the readable name.
@@ -59,7 +70,8 @@ pub enum DistanceKind {
     Hausdorff,
     /// Bucketed correlation, C^r.
     Correlation,
-    /// Both must accept; ratios and order are the correlation's.
+    /// The picture itself: what is near by its signature is laid on the learnt icon; slopes must agree there, and one
+    /// of the two distances must accept. Ratios and order are those of the slopes.
     #[default]
     Both,
 }
@@ -72,6 +84,8 @@ pub enum Refusal {
     Correlation,
     /// H^r is not below tau.
     Hausdorff,
+    /// Laid on the learnt icon, the picture is not like it.
+    Likeness,
     /// Accepted by its own thresholds, but another landmark is too close behind.
     Margin,
 }
@@ -83,9 +97,12 @@ pub struct Candidate {
     pub landmark: LandmarkId,
     /// C^r in [0, 2] (method 6.1).
     pub correlation: f64,
-    /// H^r in icon pixels times descriptor distance (method 6.2); infinite with too few points, and where C^r alone
-    /// keeps every landmark out of reach.
+    /// H^r in icon pixels times descriptor distance (method 6.2); infinite with too few points, and where another gate
+    /// refuses already.
     pub hausdorff: f64,
+    /// How alike the picture and the learnt icon are, one laid on the other, -1 to 1; `None` where the map's distances
+    /// decide alone.
+    pub likeness: Option<f64>,
     /// The deciding distance of the map's [`DistanceKind`].
     pub distance: f64,
     /// The deciding threshold.

@@ -1,7 +1,10 @@
 //! The landmarks that one version of a map recognises: immutable, in the order of their ids, all learnt under the
 //! parameters in use. Whether a model is good enough to be in it is the caller's choice.
 
-use super::LandmarkId;
+use super::{
+    LandmarkId,
+    signature::{SIGNATURE_BYTES, Signature, likeness},
+};
 use crate::{learn::model::LandmarkModel, params::Params};
 use std::sync::Arc;
 
@@ -40,6 +43,21 @@ pub enum ModelSetError {
 pub struct ModelSet {
     models: Vec<Arc<LandmarkModel>>,
     params_hash: u64,
+    /// Signatures of all exemplars, one after the other: looking through them is reading memory once.
+    signatures: Vec<[i8; SIGNATURE_BYTES]>,
+    /// Whose each signature is: index of the model and of its exemplar.
+    owners: Vec<(u32, u8)>,
+}
+
+/// An entry of the short list.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Listed {
+    /// Index of the model in [`ModelSet::iter`].
+    pub model: usize,
+    /// Index of the exemplar that is most alike.
+    pub exemplar: usize,
+    /// How alike the signatures are, -1 to 1.
+    pub likeness: f32,
 }
 
 impl ModelSet {
@@ -56,7 +74,14 @@ impl ModelSet {
         if let Some(pair) = models.windows(2).find(|pair| pair[0].id == pair[1].id) {
             return Err(ModelSetError::Duplicate { id: pair[0].id });
         }
-        Ok(Self { models, params_hash: expected })
+        let exemplars = || {
+            models.iter().enumerate().flat_map(|(m, model)| {
+                model.exemplars.iter().enumerate().map(move |(e, exemplar)| (m, e, exemplar))
+            })
+        };
+        let signatures = exemplars().map(|(_, _, exemplar)| *exemplar.signature.values()).collect();
+        let owners = exemplars().map(|(m, e, _)| (m as u32, e as u8)).collect();
+        Ok(Self { models, params_hash: expected, signatures, owners })
     }
 
     /// Number of landmarks (N).
@@ -79,6 +104,37 @@ impl ModelSet {
         self.models.iter()
     }
 
+    /// The `count` models whose exemplars are most like `signature`, best first; of equal ones the lower id.
+    pub fn short_list(&self, signature: &Signature, count: usize) -> Vec<Listed> {
+        let mut best: Vec<Listed> = Vec::with_capacity(count + 1);
+        let mut enough = f32::NEG_INFINITY;
+        for (values, (model, exemplar)) in self.signatures.iter().zip(&self.owners) {
+            let likeness = likeness(values, signature.values());
+            if likeness <= enough {
+                continue;
+            }
+            let (model, exemplar) = (*model as usize, usize::from(*exemplar));
+            // Exemplars of one model follow each other.
+            if let Some(at) = best.iter().position(|l| l.model == model) {
+                if best[at].likeness >= likeness {
+                    continue;
+                }
+                best.remove(at);
+            }
+            let at = best.partition_point(|l| l.likeness >= likeness);
+            best.insert(at, Listed { model, exemplar, likeness });
+            best.truncate(count);
+            enough =
+                if best.len() == count { best.last().map_or(f32::INFINITY, |l| l.likeness) } else { enough };
+        }
+        best
+    }
+
+    /// The model at `index` of [`ModelSet::iter`].
+    pub fn at(&self, index: usize) -> Option<&Arc<LandmarkModel>> {
+        self.models.get(index)
+    }
+
     /// [`Params::distance_hash`] of the parameters that the set is for; 0 for a set made by `default()`.
     pub fn params_hash(&self) -> u64 {
         self.params_hash
@@ -89,6 +145,36 @@ impl ModelSet {
 mod tests {
     use super::*;
     use crate::recognise::fixture::lessons;
+
+    #[test]
+    fn the_short_list_is_that_of_comparing_everything() {
+        let p = Params::default();
+        let set = ModelSet::new(lessons(6, &p), &p).unwrap();
+        for asked in set.iter().flat_map(|m| m.exemplars.iter()) {
+            // Oracle: every exemplar of every model, sorted.
+            let mut all: Vec<(f32, usize)> = set
+                .iter()
+                .enumerate()
+                .map(|(i, m)| {
+                    let each = m.exemplars.iter();
+                    let each = each.map(|e| likeness(e.signature.values(), asked.signature.values()));
+                    (each.fold(-2.0, f32::max), i)
+                })
+                .collect();
+            all.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+            for count in [0, 1, 3, 6, 9] {
+                let listed = set.short_list(&asked.signature, count);
+                let found: Vec<(f32, usize)> = listed.iter().map(|l| (l.likeness, l.model)).collect();
+                assert_eq!(found, all[..count.min(6)]);
+                for l in listed {
+                    let exemplar = &set.at(l.model).unwrap().exemplars[l.exemplar];
+                    let again = likeness(exemplar.signature.values(), asked.signature.values());
+                    assert!((again - l.likeness).abs() < 1e-9);
+                }
+            }
+        }
+        assert!(ModelSet::default().short_list(&set.at(0).unwrap().exemplars[0].signature, 3).is_empty());
+    }
 
     #[test]
     fn sets_are_checked_and_ordered() {

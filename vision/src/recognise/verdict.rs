@@ -5,10 +5,11 @@
 use super::{
     Candidate, DistanceKind, IconFeatures, MAX_CANDIDATES, Recognition, Refusal, Verdict,
     align::{AlignParams, Surroundings},
-    compare::{Near, Sighting, least_hausdorff, nearest, sightings},
+    compare::{Near, Sighting, least_hausdorff, nearest, short_list, sightings},
     confidence::{confidence, entropy_m, entropy_norm, probability},
     correlation::correlation,
     features,
+    likeness::likeness,
     models::ModelSet,
 };
 use crate::{
@@ -30,6 +31,8 @@ pub struct VerdictParams {
     pub verify_reach: f64,
     /// After alignment a distance is accepted below this share of tau: the corners were moved to please the landmark.
     pub verified_share: f64,
+    /// Landmarks on the short list, of which the picture is laid on each.
+    pub short_list: usize,
     /// Landmarks that are verified at most.
     pub max_verified: usize,
     /// How corners are moved.
@@ -42,6 +45,7 @@ impl Default for VerdictParams {
             margin: 0.7,
             verify_reach: 1.5,
             verified_share: 0.8,
+            short_list: 8,
             max_verified: 2,
             align: AlignParams::default(),
         }
@@ -60,11 +64,17 @@ pub fn recognise(
         return unknown(models.len());
     }
     let sightings = sightings(image, quad, p);
-    let mut found: Vec<Judged> = nearest(&sightings, models, kind, MAX_CANDIDATES, p)
-        .into_iter()
-        .map(|near| Judged { near, moved: None })
-        .collect();
-    verify(image, &sightings, &mut found, kind, p);
+    let near = match kind {
+        DistanceKind::Both => short_list(&sightings, models, p.recognise.verdict.short_list, p),
+        DistanceKind::Correlation | DistanceKind::Hausdorff => {
+            nearest(&sightings, models, kind, MAX_CANDIDATES, p)
+        }
+    };
+    let mut found: Vec<Judged> = near.into_iter().map(|near| Judged { near, moved: None }).collect();
+    match kind {
+        DistanceKind::Both => look(image, &sightings, &mut found, p),
+        DistanceKind::Correlation | DistanceKind::Hausdorff => verify(image, &sightings, &mut found, kind, p),
+    }
     decide(&found, &sightings, kind, models.len(), &p.recognise.verdict)
 }
 
@@ -93,19 +103,46 @@ struct Judged {
 impl Judged {
     /// The first gate that refuses it.
     fn refusal(&self, kind: DistanceKind, p: &VerdictParams) -> Option<Refusal> {
+        // The corners were moved to please the landmark, but for Both, whose tau was learnt after such moves.
         let limit = if self.moved.is_some() { p.verified_share } else { 1.0 };
-        let correlation = kind != DistanceKind::Hausdorff;
-        let hausdorff = kind != DistanceKind::Correlation;
         // Written so that a NaN refuses.
-        let below = |ratio: f64| ratio < limit;
-        if correlation && !below(self.near.correlation_ratio()) {
-            Some(Refusal::Correlation)
-        } else if hausdorff && !below(self.near.hausdorff_ratio()) {
-            Some(Refusal::Hausdorff)
-        } else {
-            None
+        let below = |ratio: f64, limit: f64| ratio < limit;
+        let correlation = below(self.near.correlation_ratio(), limit);
+        let hausdorff = below(self.near.hausdorff_ratio(), limit);
+        match kind {
+            DistanceKind::Correlation => (!correlation).then_some(Refusal::Correlation),
+            DistanceKind::Hausdorff => (!hausdorff).then_some(Refusal::Hausdorff),
+            DistanceKind::Both if !below(self.near.ratio(kind), 1.0) => Some(Refusal::Likeness),
+            DistanceKind::Both => (!correlation && !hausdorff).then_some(Refusal::Correlation),
         }
     }
+}
+
+/// Lays the quad's picture on the exemplar of each landmark of the short list, and compares it there; the distances are
+/// those of the picture where it came to lie.
+fn look(image: &GrayImage, sightings: &[Sighting], found: &mut [Judged], p: &Params) {
+    let (c, v) = (&p.recognise.correlation, &p.recognise.verdict);
+    let mut surroundings: Vec<Option<Option<Surroundings>>> = vec![None; sightings.len()];
+    for Judged { near, moved } in found.iter_mut() {
+        let sighting = &sightings[near.sighting];
+        let Some(exemplar) = near.model.exemplars.get(near.exemplar) else { continue };
+        let around = surroundings[near.sighting]
+            .get_or_insert_with(|| Surroundings::new(image, &sighting.corners_px, &p.icon, &v.align));
+        let laid = around.as_ref().and_then(|s| s.align(&exemplar.icon, c, &v.align));
+        let Some(laid) = laid else {
+            near.likeness = Some(likeness(&sighting.icon, &exemplar.icon, c));
+            continue;
+        };
+        near.likeness = Some(likeness(&laid.icon, &exemplar.icon, c));
+        *moved = Some(laid.corners_px);
+        if near.ratio(DistanceKind::Both) < 1.0 {
+            let icon = features(laid.icon, &p.recognise);
+            let each = near.model.exemplars.iter().map(|e| correlation(&icon, e, c));
+            (near.correlation, near.hausdorff) =
+                (each.fold(2.0, f64::min), least_hausdorff(&icon.points, &near.model, p).0);
+        }
+    }
+    found.sort_by(|a, b| a.near.ratio(DistanceKind::Both).total_cmp(&b.near.ratio(DistanceKind::Both)));
 }
 
 /// Lays the quad's picture on each candidate within reach, nearest first, and keeps what the better fit says.
@@ -143,7 +180,7 @@ fn laid_on(
 ) -> Option<(IconFeatures, Corners)> {
     let r = &p.recognise;
     let exemplar = near.model.exemplars.get(near.exemplar)?;
-    let corners = around.align(&exemplar.icon, &r.correlation, &r.verdict.align)?;
+    let corners = around.align(&exemplar.icon, &r.correlation, &r.verdict.align)?.corners_px;
     let icon = rectify(image, &corners, &p.icon).ok()?;
     Some((features(icon, r), corners))
 }
@@ -186,8 +223,7 @@ fn decide(
     verdict
 }
 
-/// The ratio of `best` over that of the nearest other landmark; with both distances, by the one that separates
-/// better. 0 when there is no other landmark, 1 when the others have no distance to compare with.
+/// The ratio of `best` over that of the nearest other landmark. 0 when there is no other landmark, 1 when the others have no distance to compare with.
 fn margin(found: &[Judged], best: usize, kind: DistanceKind) -> f64 {
     if found.len() < 2 {
         return 0.0;
@@ -200,19 +236,21 @@ fn margin(found: &[Judged], best: usize, kind: DistanceKind) -> f64 {
     match kind {
         DistanceKind::Correlation => over(&Near::correlation_ratio),
         DistanceKind::Hausdorff => over(&Near::hausdorff_ratio),
-        DistanceKind::Both => over(&Near::correlation_ratio).min(over(&Near::hausdorff_ratio)),
+        DistanceKind::Both => over(&|near| near.ratio(kind)),
     }
 }
 
 fn candidate(near: &Near, refusal: Option<Refusal>, accepted: usize, kind: DistanceKind) -> Candidate {
     let (distance, tau) = match kind {
         DistanceKind::Hausdorff => (near.hausdorff, near.model.hausdorff.tau),
-        DistanceKind::Correlation | DistanceKind::Both => (near.correlation, near.model.correlation.tau),
+        DistanceKind::Correlation => (near.correlation, near.model.correlation.tau),
+        DistanceKind::Both => (1.0 - near.likeness.unwrap_or(-1.0), near.model.likeness.tau),
     };
     Candidate {
         landmark: near.model.id,
         correlation: near.correlation,
         hausdorff: near.hausdorff,
+        likeness: near.likeness,
         distance,
         tau,
         ratio: near.ratio(kind),

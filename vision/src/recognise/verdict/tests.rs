@@ -60,7 +60,8 @@ fn any_naming_of_the_corners_is_found_when_upright_is_unsure() {
 #[test]
 fn an_inner_border_is_found() {
     let image = photograph(&poster(2), &oblique(), 1.0, 0.0);
-    let outer = [[40.0, 20.0], [330.0, 60.0], [340.0, 350.0], [45.0, 390.0]];
+    // Too far out for alignment to get from one to the other.
+    let outer = [[4.0, 4.0], [390.0, 10.0], [385.0, 380.0], [8.0, 395.0]];
     let mut q = quad(Corners::try_from(outer).unwrap());
     assert_eq!(recognise(&image, &q, &SIX, DistanceKind::Both, &PARAMS).recognition, Recognition::Unknown);
     q.alternates = vec![oblique()];
@@ -138,7 +139,7 @@ fn nearest_equals_comparing_everything() {
     q.upright_ambiguous = true;
     let seen = sightings(&image, &q, &PARAMS);
     assert_eq!(seen.len(), 4);
-    for kind in KINDS {
+    for kind in [DistanceKind::Hausdorff, DistanceKind::Correlation] {
         let mut expected: Vec<(f64, LandmarkId)> = SIX
             .iter()
             .map(|m| {
@@ -177,42 +178,65 @@ fn gates_refuse_at_tau() {
     let model = SIX.get(LandmarkId(1)).unwrap();
     let anywhere = Corners::try_from([[0.0, 0.0], [90.0, 0.0], [90.0, 90.0], [0.0, 90.0]]).unwrap();
     let judged = |correlation: f64, hausdorff: f64, moved: bool| Judged {
-        near: Near { model: Arc::clone(model), sighting: 0, exemplar: 0, correlation, hausdorff },
+        near: Near {
+            model: Arc::clone(model),
+            sighting: 0,
+            exemplar: 0,
+            correlation,
+            hausdorff,
+            likeness: None,
+        },
         moved: moved.then_some(anywhere),
     };
     let (c, h, v) = (model.correlation.tau, model.hausdorff.tau, &PARAMS.recognise.verdict);
-    let both = |c, h, moved| judged(c, h, moved).refusal(DistanceKind::Both, v);
-    assert_eq!(both(0.99 * c, 0.99 * h, false), None);
-    assert_eq!(both(c, 0.99 * h, false), Some(Refusal::Correlation));
-    assert_eq!(both(0.99 * c, h, false), Some(Refusal::Hausdorff));
-    assert_eq!(both(0.99 * c, f64::NAN, false), Some(Refusal::Hausdorff));
     let tight = v.verified_share;
-    assert_eq!(both(0.99 * tight * c, 0.99 * tight * h, true), None);
-    assert_eq!(both(1.01 * tight * c, 0.99 * tight * h, true), Some(Refusal::Correlation));
-    assert_eq!(judged(c, 0.0, false).refusal(DistanceKind::Hausdorff, v), None);
-    assert_eq!(judged(0.0, h, false).refusal(DistanceKind::Correlation, v), None);
+    let alone = |kind, c, h, moved| judged(c, h, moved).refusal(kind, v);
+    use DistanceKind::{Correlation, Hausdorff};
+    assert_eq!(alone(Correlation, 0.99 * c, f64::NAN, false), None);
+    assert_eq!(alone(Correlation, c, 0.0, false), Some(Refusal::Correlation));
+    assert_eq!(alone(Correlation, 0.99 * tight * c, h, true), None);
+    assert_eq!(alone(Correlation, 1.01 * tight * c, 0.0, true), Some(Refusal::Correlation));
+    assert_eq!(alone(Hausdorff, c, 0.99 * h, false), None);
+    assert_eq!(alone(Hausdorff, 0.0, h, false), Some(Refusal::Hausdorff));
+    assert_eq!(alone(Hausdorff, 0.0, f64::NAN, false), Some(Refusal::Hausdorff));
+    assert_eq!(alone(Hausdorff, 0.0, 1.01 * tight * h, true), Some(Refusal::Hausdorff));
+    // Both: the likeness, and one of the two.
+    let least = 1.0 - model.likeness.tau;
+    let both = |likeness: Option<f64>, c, h| {
+        let mut judged = judged(c, h, true);
+        judged.near.likeness = likeness;
+        judged.refusal(DistanceKind::Both, v)
+    };
+    let alike = Some(least + 1e-6);
+    assert_eq!(both(alike, 0.99 * tight * c, f64::INFINITY), None);
+    assert_eq!(both(alike, c, 0.99 * tight * h), None);
+    assert_eq!(both(alike, 1.01 * tight * c, f64::NAN), Some(Refusal::Correlation));
+    for refused in [Some(least), Some(f64::NAN), None] {
+        assert_eq!(both(refused, 0.0, 0.0), Some(Refusal::Likeness));
+    }
 }
 
 #[test]
-fn margin_is_by_the_better_of_both() {
+fn the_margin_is_over_the_nearest_other() {
     let models = lessons(2, &PARAMS);
-    let judged = |i: usize, c: f64, h: f64| Judged {
+    let judged = |i: usize, c: f64, h: f64, l: f64| Judged {
         near: Near {
             model: Arc::clone(&models[i]),
             sighting: 0,
             exemplar: 0,
             correlation: c * models[i].correlation.tau,
             hausdorff: h * models[i].hausdorff.tau,
+            likeness: Some(1.0 - l * models[i].likeness.tau),
         },
         moved: None,
     };
-    let found = [judged(0, 0.4, 0.1), judged(1, 0.5, 1.0)];
+    let found = [judged(0, 0.4, 0.1, 0.3), judged(1, 0.5, 1.0, 1.5)];
     assert!((margin(&found, 0, DistanceKind::Correlation) - 0.8).abs() < 1e-9);
     assert!((margin(&found, 0, DistanceKind::Hausdorff) - 0.1).abs() < 1e-9);
-    assert!((margin(&found, 0, DistanceKind::Both) - 0.1).abs() < 1e-9);
+    assert!((margin(&found, 0, DistanceKind::Both) - 0.2).abs() < 1e-9);
     assert!(margin(&found[..1], 0, DistanceKind::Both).abs() < 1e-12);
     // A runner-up without points says nothing.
-    let found = [judged(0, 0.4, 0.1), judged(1, 0.5, f64::INFINITY)];
+    let found = [judged(0, 0.4, 0.1, 0.3), judged(1, 0.5, f64::INFINITY, 1.5)];
     assert!((margin(&found, 0, DistanceKind::Hausdorff) - 1.0).abs() < 1e-12);
 }
 

@@ -1,0 +1,132 @@
+//! Two icons of the same thing, one laid on the other, in; how alike their pictures are out. Slopes are compared, bucket
+//! by bucket: unlike grey levels they do not agree by chance where two pictures are dark below and bright above, and a
+//! bucket without any says nothing for either.
+//!
+//! Beyond the method: its distances compare icons where they were found; this one is for icons after alignment
+//! (`align.rs`), where it tells landmarks from look-alikes far better (docs/EVALUATION.md).
+
+use super::correlation::CorrelationParams;
+use crate::icon::Icon;
+
+/// Variance that noise adds to a difference of two grey levels, squared grey levels.
+const NOISE: f32 = 4.0;
+/// Pixels along the icon's border that are not compared: alignment is least sure of them.
+const BORDER_PX: usize = 3;
+
+/// Mean over the buckets of the correlation of their slopes, -1 to 1; 0 where both are flat, or cut differently.
+pub fn likeness(a: &Icon, b: &Icon, p: &CorrelationParams) -> f64 {
+    let (size, per_side) = (a.size, p.per_side());
+    if b.size != size || size <= 2 * BORDER_PX + per_side {
+        return 0.0;
+    }
+    let (a, b) = (smoothed(a), smoothed(b));
+    let edge = |i: usize| i * size / per_side;
+    let within = |i: usize| edge(i).max(BORDER_PX)..edge(i + 1).min(size - BORDER_PX);
+    let mut sum = 0.0;
+    for bucket in 0..per_side * per_side {
+        let (mut ab, mut aa, mut bb) = (0.0_f32, 0.0_f32, 0.0_f32);
+        let columns = within(bucket % per_side);
+        for y in within(bucket / per_side) {
+            let row = |icon: &[f32]| {
+                let at = |x: usize, y: usize| icon[y * size + x];
+                columns
+                    .clone()
+                    .map(|x| [at(x + 1, y) - at(x - 1, y), at(x, y + 1) - at(x, y - 1)])
+                    .collect::<Vec<_>>()
+            };
+            for ([ax, ay], [bx, by]) in row(&a).into_iter().zip(row(&b)) {
+                ab += ax * bx + ay * by;
+                aa += ax * ax + ay * ay + NOISE;
+                bb += bx * bx + by * by + NOISE;
+            }
+        }
+        let correlation = ab / (aa * bb).sqrt();
+        sum += if correlation.is_finite() { f64::from(correlation) } else { 0.0 };
+    }
+    sum / (per_side * per_side) as f64
+}
+
+/// Each pixel with its eight neighbours, weighted 1 2 1 along both axes; border replicated.
+fn smoothed(icon: &Icon) -> Vec<f32> {
+    let size = icon.size;
+    let mut across = Vec::with_capacity(size * size);
+    for row in icon.pixels.chunks_exact(size) {
+        across.extend((0..size).map(|x| {
+            let (left, right) = (row[x.saturating_sub(1)], row[(x + 1).min(size - 1)]);
+            0.25 * (left + 2.0 * row[x] + right)
+        }));
+    }
+    let mut out = Vec::with_capacity(size * size);
+    for y in 0..size {
+        let row = |y: usize| &across[y * size..(y + 1) * size];
+        let (above, here, below) = (row(y.saturating_sub(1)), row(y), row((y + 1).min(size - 1)));
+        out.extend(above.iter().zip(here).zip(below).map(|((a, h), b)| 0.25 * (a + 2.0 * h + b)));
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn made(f: impl Fn(f64, f64) -> f64) -> Icon {
+        let at = |i: usize| (i as f64 + 0.5) / 75.0;
+        let pixels = (0..75 * 75).map(|i| f(at(i % 75), at(i / 75)) as f32).collect();
+        Icon { size: 75, pixels, source_scale: 1.0 }
+    }
+
+    fn waves(x: f64, y: f64) -> f64 {
+        120.0 + 50.0 * (19.0 * x + 9.0 * y * y).sin() + 40.0 * (17.0 * y - 14.0 * x).cos()
+    }
+
+    #[test]
+    fn same_pictures_are_alike_under_any_light() {
+        let p = CorrelationParams::default();
+        let icon = made(waves);
+        assert!(likeness(&icon, &icon, &p) > 0.95);
+        let dimmed = made(|x, y| 0.5 * waves(x, y) + 40.0);
+        assert!(likeness(&icon, &dimmed, &p) > 0.93);
+        // Light from the side.
+        let slanted = made(|x, y| (0.3 + x) * waves(x, y));
+        assert!(likeness(&icon, &slanted, &p) > 0.9);
+        assert!(likeness(&icon, &made(|x, y| 250.0 - waves(x, y)), &p) < -0.9);
+        assert!((likeness(&icon, &dimmed, &p) - likeness(&dimmed, &icon, &p)).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_covered_part_costs_its_share() {
+        let p = CorrelationParams::default();
+        let (icon, whole) = (made(waves), likeness(&made(waves), &made(waves), &p));
+        // A flat label over the two lower rows of buckets.
+        let covered = made(|x, y| if y > 0.6 { 230.0 } else { waves(x, y) });
+        let left = likeness(&icon, &covered, &p);
+        assert!((left - 0.6 * whole).abs() < 0.06, "{left} of {whole}");
+    }
+
+    #[test]
+    fn what_only_shades_alike_is_not_alike() {
+        let p = CorrelationParams::default();
+        let shade = |x: f64, y: f64| 60.0 + 90.0 * y + 20.0 * x;
+        let one = made(|x, y| shade(x, y) + 0.1 * waves(x, y));
+        let two = made(|x, y| shade(x, y) + 0.1 * waves(1.0 - y, x));
+        let by_grey = {
+            let f =
+                |i: &Icon| crate::recognise::features(i.clone(), &crate::params::RecogniseParams::default());
+            crate::recognise::correlation::correlation(&f(&one), &f(&two), &p)
+        };
+        assert!(by_grey < 0.5, "C^r takes them for one: {by_grey}");
+        assert!(likeness(&one, &two, &p) < 0.55, "{}", likeness(&one, &two, &p));
+        assert!(likeness(&one, &one, &p) > 0.7, "{}", likeness(&one, &one, &p));
+    }
+
+    #[test]
+    fn nothing_to_see_is_like_nothing() {
+        let p = CorrelationParams::default();
+        let flat = made(|_, _| 80.0);
+        assert!(likeness(&flat, &made(waves), &p).abs() < 1e-9);
+        assert!(likeness(&made(|_, _| f64::NAN), &made(waves), &p).abs() < 1e-9);
+        let small = Icon { size: 10, pixels: vec![0.0; 100], source_scale: 1.0 };
+        assert!(likeness(&small, &small, &p).abs() < 1e-9);
+        assert!(likeness(&small, &flat, &p).abs() < 1e-9);
+    }
+}
