@@ -230,7 +230,7 @@ impl Default for QuadParams {
             choose_sides: true,
             side_model: None,
             thing_model: None,
-            min_probability: 0.5,
+            min_probability: 0.6,
             three_sided: true,
             min_three_sided_closing: 0.5,
             min_three_sided_score: 0.5,
