@@ -12,7 +12,13 @@ use super::{
 use crate::{
     icon::Icon,
     params::{Params, RecogniseParams},
-    recognise::{IconFeatures, LandmarkId, align::Surroundings, features, likeness::likeness, signature},
+    recognise::{
+        IconFeatures, LandmarkId,
+        align::{Surroundings, Template},
+        features,
+        likeness::likeness,
+        signature,
+    },
 };
 
 /// Learns a landmark. `negatives` are icons of everything it must be told from: other landmarks, and quads that are
@@ -77,11 +83,13 @@ pub fn refit_thresholds(model: &LandmarkModel, negatives: &[IconFeatures], p: &P
 #[must_use]
 pub fn add_negatives(model: &LandmarkModel, negatives: &[IconFeatures], p: &Params) -> LandmarkModel {
     let mut model = model.clone();
+    let exemplars = model.exemplars.clone();
+    let templates = templates(&exemplars, p);
     for negative in negatives {
         let d = model.distances(negative, &p.recognise);
         model.correlation_evidence.add(d.correlation);
         model.hausdorff_evidence.add(d.hausdorff);
-        model.likeness_evidence.add(unlikeness(&model.exemplars, negative, MIN_SIGNATURE, p));
+        model.likeness_evidence.add(unlikeness(&templates, negative, MIN_SIGNATURE, p));
     }
     let correlation = fitted(&model.correlation_evidence, p.learn.correlation_cap, p);
     let hausdorff = fitted(&model.hausdorff_evidence, p.learn.hausdorff_cap, p);
@@ -122,30 +130,44 @@ fn fitted(evidence: &Evidence, cap: f64, p: &Params) -> Result<Threshold, Thresh
 }
 
 /// Negatives whose signatures are less alike are not laid on the exemplars: they count as infinitely far.
-const MIN_SIGNATURE: f32 = 0.35;
+const MIN_SIGNATURE: f32 = 0.45;
+
+fn templates<'a>(exemplars: &'a [IconFeatures], p: &'a Params) -> Vec<(&'a IconFeatures, Template<'a>)> {
+    exemplars.iter().map(|e| (e, Template::new(&e.icon, &p.recognise.correlation))).collect()
+}
 
 /// The smallest 1 minus likeness of `icon` to the exemplars after alignment, of those whose signatures are alike enough.
-fn unlikeness(exemplars: &[IconFeatures], icon: &IconFeatures, min_signature: f32, p: &Params) -> f64 {
+fn unlikeness(
+    templates: &[(&IconFeatures, Template<'_>)],
+    icon: &IconFeatures,
+    min_signature: f32,
+    p: &Params,
+) -> f64 {
     let (c, a) = (&p.recognise.correlation, &p.recognise.verdict.align);
-    let alike = |e: &&IconFeatures| {
-        signature::likeness(e.signature.values(), icon.signature.values()) >= min_signature
-    };
     let mut around = None;
     let mut least = f64::INFINITY;
-    for exemplar in exemplars.iter().filter(alike) {
+    for (exemplar, template) in templates {
+        if signature::likeness(exemplar.signature.values(), icon.signature.values()) < min_signature {
+            continue;
+        }
         let around = around.get_or_insert_with(|| Surroundings::of_icon(&icon.icon, a));
-        let laid = around.as_ref().and_then(|s| s.align(&exemplar.icon, c, a));
+        let laid = around.as_ref().and_then(|s| s.align(template, a));
         let laid = laid.as_ref().map_or(&icon.icon, |l| &l.icon);
         least = least.min(1.0 - likeness(laid, &exemplar.icon, c));
     }
     least
 }
 
+/// Own icons that are laid on the exemplars, evenly chosen: only their median counts.
+const MAX_OWN_LAID: usize = 9;
+
 /// The same of the landmark's own icons that are no exemplars.
 fn own_unlikeness(icons: &[IconFeatures], chosen: &[usize], p: &Params) -> Vec<f64> {
     let exemplars: Vec<IconFeatures> = chosen.iter().map(|i| icons[*i].clone()).collect();
-    let others = icons.iter().enumerate().filter(|(i, _)| !chosen.contains(i));
-    others.map(|(_, icon)| unlikeness(&exemplars, icon, -1.0, p)).collect()
+    let templates = templates(&exemplars, p);
+    let others: Vec<_> = icons.iter().enumerate().filter(|(i, _)| !chosen.contains(i)).collect();
+    let every = others.len().div_ceil(MAX_OWN_LAID).max(1);
+    others.into_iter().step_by(every).map(|(_, icon)| unlikeness(&templates, icon, -1.0, p)).collect()
 }
 
 /// tau of the likeness: the cap, or a share of the nearest of everything else. None where the greater part of the

@@ -14,9 +14,13 @@ use crate::{
 };
 use nalgebra::{Point2, SMatrix, SVector, Vector2};
 use serde::{Deserialize, Serialize};
+use std::cell::OnceCell;
 
 /// Most Gauss-Newton steps at one level, whatever the parameters say.
 pub const MAX_STEPS: usize = 50;
+
+/// Looks at a picture, from coarse to fine.
+const LEVELS: usize = 3;
 
 /// Parameters of this stage.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -26,12 +30,12 @@ pub struct AlignParams {
     pub max_shift: f64,
     /// Both pictures are smoothed by these, one after the other, in icon pixels. At the first only the four sides move,
     /// each along its normal; then all corners.
-    pub sigmas: [f64; 3],
+    pub sigmas: [f64; LEVELS],
     /// Gauss-Newton steps at each smoothing, at most [`MAX_STEPS`].
     pub steps: usize,
     /// Mean squared correlation of the buckets below which a picture is given up after each smoothing: it is of something
     /// else. On real photographs, true ones stay above 0.46, 0.50 and 0.49.
-    pub min_alike: [f64; 3],
+    pub min_alike: [f64; LEVELS],
 }
 
 impl Default for AlignParams {
@@ -66,8 +70,8 @@ pub struct Surroundings {
     margin: usize,
     size: usize,
     pixels: Vec<f32>,
-    /// One picture for each smoothing.
-    levels: Vec<Vec<f32>>,
+    /// The coarse looks' pictures, smoothed when first asked for: most candidates are given up at the first.
+    coarse: [OnceCell<Vec<f32>>; LEVELS],
 }
 
 impl Surroundings {
@@ -83,8 +87,7 @@ impl Surroundings {
         let wide = Corners::new(wide.map(|c| image_from_icon.apply(&c))).ok()?;
         let size = icon.size + 2 * margin;
         let picture = rectify(image, &wide, &IconParams { size, max_outside: 1.0, ..icon.clone() }).ok()?;
-        let levels = levels(&picture.pixels, size, p);
-        Some(Self { image_from_icon, margin, size, pixels: picture.pixels, levels })
+        Some(Self { image_from_icon, margin, size, pixels: picture.pixels, coarse: Default::default() })
     }
 
     /// An icon alone, its border pixels repeated around it: for icons whose image is gone.
@@ -95,22 +98,24 @@ impl Surroundings {
         let row = |y: usize| (0..size).map(move |x| icon.pixels[inside(y) * icon.size + inside(x)]);
         let pixels: Vec<f32> = (0..size).flat_map(row).collect();
         let image_from_icon = Homography::from_matrix(nalgebra::Matrix3::identity())?;
-        let levels = levels(&pixels, size, p);
-        Some(Self { image_from_icon, margin, size, pixels, levels })
+        Some(Self { image_from_icon, margin, size, pixels, coarse: Default::default() })
     }
 
     /// Moves the corners until the picture lies on `template`. `None` when the picture is of something else, or says
     /// nothing about where it lies.
-    pub fn align(&self, template: &Icon, c: &CorrelationParams, p: &AlignParams) -> Option<Laid> {
-        let size = template.size;
-        if size + 2 * self.margin != self.size || self.levels.len() != p.sigmas.len() {
+    pub fn align(&self, template: &Template<'_>, p: &AlignParams) -> Option<Laid> {
+        let size = template.icon.size;
+        if size + 2 * self.margin != self.size {
             return None;
         }
         let mut moved = square(size);
         for (level, sigma) in p.sigmas.into_iter().enumerate() {
-            let goal = Goal::new(template, sigma, c);
+            let goal = template.goal(level, sigma);
             // A fine look smooths after cutting, as the template was: the wall around must not bleed in.
-            let pixels = if goal.fine_sigma.is_some() { &self.pixels } else { &self.levels[level] };
+            let pixels = match goal.fine_sigma {
+                Some(_) => &self.pixels,
+                None => self.coarse[level].get_or_init(|| blurred(&self.pixels, self.size, sigma)),
+            };
             let picture = Picture { pixels, width: self.size, margin: self.margin };
             let (place, alike) = goal.settle(&picture, moved, level == 0, p)?;
             if alike < p.min_alike[level] {
@@ -130,13 +135,28 @@ impl Surroundings {
     }
 }
 
+/// A learnt icon on which pictures are laid; what each look needs is worked out when it is first taken.
+#[derive(Debug)]
+pub struct Template<'a> {
+    icon: &'a Icon,
+    correlation: &'a CorrelationParams,
+    goals: [OnceCell<Goal>; LEVELS],
+}
+
+impl<'a> Template<'a> {
+    /// Takes the icon as it is.
+    pub fn new(icon: &'a Icon, correlation: &'a CorrelationParams) -> Self {
+        Self { icon, correlation, goals: Default::default() }
+    }
+
+    fn goal(&self, level: usize, sigma: f64) -> &Goal {
+        self.goals[level].get_or_init(|| Goal::new(self.icon, sigma, self.correlation))
+    }
+}
+
 /// Pixels around the icon in which corners may move.
 fn margin(size: usize, p: &AlignParams) -> usize {
     (p.max_shift.clamp(0.0, 0.5) * size as f64).ceil() as usize + 1
-}
-
-fn levels(pixels: &[f32], size: usize, p: &AlignParams) -> Vec<Vec<f32>> {
-    p.sigmas.iter().map(|sigma| blurred(pixels, size, *sigma)).collect()
 }
 
 /// Corners of the icon's square.
@@ -146,6 +166,7 @@ fn square(size: usize) -> [Point2<f64>; 4] {
 }
 
 /// What the picture shall look like, bucket by bucket, and how that changes with the corners.
+#[derive(Debug)]
 struct Goal {
     size: usize,
     /// Pictures are smoothed by this after they were cut, if at all: earlier they are smoothed with their surroundings.
@@ -156,6 +177,7 @@ struct Goal {
 }
 
 /// The pixels of one bucket that are compared.
+#[derive(Debug)]
 struct Bucket {
     /// Where they are.
     xy: Vec<[f32; 2]>,
@@ -205,7 +227,7 @@ impl Goal {
         let square = square(self.size);
         let mut damping = LEAST_DAMPING;
         let mut map = Homography::from_points(&square, &start).ok()?;
-        let mut best = (start, self.equations(picture, &map));
+        let mut best = (start, self.equations(picture, &map, -1.0));
         for _ in 0..p.steps.min(MAX_STEPS) {
             let step = best.1.step(damping, sides_only)?;
             // The template was moved in thought: the picture moves by the inverse, before what it moved already.
@@ -215,7 +237,7 @@ impl Goal {
             let next = (shift <= p.max_shift * self.size as f64)
                 .then(|| Homography::from_points(&square, &moved).ok())
                 .flatten()
-                .map(|map| (map, self.equations(picture, &map)));
+                .map(|map| (map, self.equations(picture, &map, best.1.likeness)));
             match next {
                 Some((there, equations)) if equations.likeness > best.1.likeness => {
                     (map, best, damping) = (there, (moved, equations), LEAST_DAMPING.max(damping / 10.0));
@@ -230,17 +252,19 @@ impl Goal {
         Some((best.0, best.1.likeness / self.all_buckets as f64))
     }
 
-    fn equations(&self, picture: &Picture<'_>, map: &Homography) -> Equations {
+    /// How alike the picture is at `map`, and how to move on from there, if it is more alike than `least`.
+    fn equations(&self, picture: &Picture<'_>, map: &Homography, least: f64) -> Equations {
         let mut sum = Equations { normal: Matrix8::zeros(), right: Vector8::zeros(), likeness: 0.0 };
-        let mut seen = Vec::new();
         let cut = self.fine_sigma.map(|sigma| {
-            sample(picture, map, &everywhere(self.size), &mut seen);
-            blurred(&seen, self.size, sigma)
+            let mut all = Vec::new();
+            sample(picture, map, &everywhere(self.size), &mut all);
+            blurred(&all, self.size, sigma)
         });
+        let mut looked = Vec::with_capacity(self.buckets.len());
         for bucket in &self.buckets {
+            let mut seen = Vec::with_capacity(bucket.values.len());
             match &cut {
                 Some(cut) => {
-                    seen.clear();
                     seen.extend(bucket.xy.iter().map(|[x, y]| cut[*y as usize * self.size + *x as usize]));
                 }
                 None => sample(picture, map, &bucket.xy, &mut seen),
@@ -249,9 +273,14 @@ impl Goal {
             seen.resize(bucket.values.len(), 0.0);
             let weight = f64::from(dot(&seen, &bucket.values).max(0.0));
             sum.likeness += weight * weight;
-            if weight < 1e-3 {
-                continue;
+            if weight >= 1e-3 {
+                looked.push((bucket, seen, norm, weight));
             }
+        }
+        if sum.likeness <= least {
+            return sum;
+        }
+        for (bucket, mut seen, norm, weight) in looked {
             // Up close the picture's own slopes: the template's would pull where one of the two is softer.
             let own = cut.as_ref().map(|cut| {
                 let slopes = slopes(cut, self.size, &bucket.xy, &seen, norm);
@@ -338,20 +367,24 @@ impl Bucket {
 /// How the normalised grey levels `values` of the points change with the corners' eight coordinates, each padded with
 /// zeros to the length of `values`.
 fn slopes(smooth: &[f32], size: usize, xy: &[[f32; 2]], values: &[f32], norm: f32) -> [Vec<f32>; 8] {
-    let mut slopes: [Vec<f32>; 8] = std::array::from_fn(|_| Vec::with_capacity(values.len()));
-    for [column, row] in xy.iter().copied() {
-        let (x, y) = (column as usize, row as usize);
-        let (left, right) = (x.saturating_sub(1), (x + 1).min(size - 1));
-        let (up, down) = (y.saturating_sub(1), (y + 1).min(size - 1));
-        let gx = (smooth[y * size + right] - smooth[y * size + left]) / (right - left) as f32;
-        let gy = (smooth[down * size + x] - smooth[up * size + x]) / (down - up) as f32;
-        // A point moves with the corners by its bilinear weights: exact for affine moves, near enough for others.
-        let (s, t) = ((column + 0.5) / size as f32, (row + 0.5) / size as f32);
-        let weights = [(1.0 - s) * (1.0 - t), s * (1.0 - t), s * t, (1.0 - s) * t];
-        for (i, slope) in slopes.iter_mut().enumerate() {
-            slope.push(weights[i / 2] * if i % 2 == 0 { gx } else { gy } / norm);
-        }
-    }
+    let gradients: Vec<[f32; 4]> = xy
+        .iter()
+        .map(|[column, row]| {
+            let (x, y) = (*column as usize, *row as usize);
+            let (left, right) = (x.saturating_sub(1), (x + 1).min(size - 1));
+            let (up, down) = (y.saturating_sub(1), (y + 1).min(size - 1));
+            let gx = (smooth[y * size + right] - smooth[y * size + left]) / (right - left) as f32;
+            let gy = (smooth[down * size + x] - smooth[up * size + x]) / (down - up) as f32;
+            [gx / norm, gy / norm, (column + 0.5) / size as f32, (row + 0.5) / size as f32]
+        })
+        .collect();
+    // A point moves with the corners by its bilinear weights: exact for affine moves, near enough for others.
+    let along = |axis: usize, weight: fn(f32, f32) -> f32| -> Vec<f32> {
+        gradients.iter().map(|g| g[axis] * weight(g[2], g[3])).collect()
+    };
+    let weights: [fn(f32, f32) -> f32; 4] =
+        [|s, t| (1.0 - s) * (1.0 - t), |s, t| s * (1.0 - t), |s, t| s * t, |s, t| (1.0 - s) * t];
+    let mut slopes: [Vec<f32>; 8] = std::array::from_fn(|i| along(i % 2, weights[i / 2]));
     for slope in &mut slopes {
         let mean = slope.iter().sum::<f32>() / xy.len() as f32;
         slope.iter_mut().for_each(|s| *s -= mean);
@@ -449,7 +482,7 @@ mod tests {
                 Point2::new(q.x + offset[i - 2], q.y + offset[i - 1])
             });
             let around = Surroundings::new(&image, &Corners::new(wrong).unwrap(), &ip, &p).unwrap();
-            let found = around.align(&template, &c, &p).unwrap().corners_px;
+            let found = around.align(&Template::new(&template, &c), &p).unwrap().corners_px;
             for (a, b) in found.points().iter().zip(oblique().points()) {
                 // An icon pixel is 2.7 px here.
                 assert!((a - b).norm() < 0.7, "{offset:?}: {a} for {b}");
@@ -465,7 +498,7 @@ mod tests {
         let inset =
             oblique().points().map(|q| Point2::new(0.94 * q.x + 0.06 * 185.0, 0.94 * q.y + 0.06 * 205.0));
         let template = icon(&image, &Corners::new(inset).unwrap(), &ip).unwrap();
-        let laid = Surroundings::of_icon(&all, &p).unwrap().align(&template, &c, &p).unwrap();
+        let laid = Surroundings::of_icon(&all, &p).unwrap().align(&Template::new(&template, &c), &p).unwrap();
         let icon_from_image = Homography::square_to_quad(ip.size, &oblique()).unwrap().inverse().unwrap();
         for (found, wanted) in laid.corners_px.points().iter().zip(inset) {
             let wanted = icon_from_image.apply(&wanted);
@@ -473,7 +506,9 @@ mod tests {
         }
         // Of something else it is given up.
         let other = icon(&photograph(&poster(2), &oblique(), 1.0, 0.0), &oblique(), &ip).unwrap();
-        assert!(Surroundings::of_icon(&other, &p).unwrap().align(&template, &c, &p).is_none());
+        assert!(
+            Surroundings::of_icon(&other, &p).unwrap().align(&Template::new(&template, &c), &p).is_none()
+        );
     }
 
     #[test]
@@ -491,7 +526,7 @@ mod tests {
         let wrong = Corners::new(oblique().points().map(|q| Point2::new(q.x + 4.0, q.y - 3.0))).unwrap();
         let found = Surroundings::new(&covered, &wrong, &ip, &p)
             .unwrap()
-            .align(&template, &c, &p)
+            .align(&Template::new(&template, &c), &p)
             .unwrap()
             .corners_px;
         for (a, b) in found.points().iter().zip(oblique().points()) {
@@ -506,7 +541,7 @@ mod tests {
         for seed in 2..10 {
             let template = icon(&photograph(&poster(seed), &oblique(), 1.0, 0.0), &oblique(), &ip).unwrap();
             let around = Surroundings::new(&image, &oblique(), &ip, &p).unwrap();
-            if let Some(moved) = around.align(&template, &c, &p) {
+            if let Some(moved) = around.align(&Template::new(&template, &c), &p) {
                 for (a, b) in moved.corners_px.points().iter().zip(oblique().points()) {
                     // 20 % of a side of at most 252 px, both coordinates.
                     assert!((a - b).norm() < 0.2 * 252.0 * 1.42 * 1.2);
@@ -516,6 +551,6 @@ mod tests {
         let flat = GrayImage::from_fn(400, 400, |_, _| 99);
         let around = Surroundings::new(&flat, &oblique(), &ip, &p).unwrap();
         let template = icon(&image, &oblique(), &ip).unwrap();
-        assert!(around.align(&template, &c, &p).is_none());
+        assert!(around.align(&Template::new(&template, &c), &p).is_none());
     }
 }

@@ -4,7 +4,7 @@
 
 use super::{
     Candidate, DistanceKind, IconFeatures, MAX_CANDIDATES, Recognition, Refusal, Verdict,
-    align::{AlignParams, Surroundings},
+    align::{AlignParams, Surroundings, Template},
     compare::{Near, Sighting, least_hausdorff, nearest, short_list, sightings},
     confidence::{confidence, entropy_m, entropy_norm, probability},
     correlation::correlation,
@@ -128,7 +128,8 @@ fn look(image: &GrayImage, sightings: &[Sighting], found: &mut [Judged], p: &Par
         let Some(exemplar) = near.model.exemplars.get(near.exemplar) else { continue };
         let around = surroundings[near.sighting]
             .get_or_insert_with(|| Surroundings::new(image, &sighting.corners_px, &p.icon, &v.align));
-        let laid = around.as_ref().and_then(|s| s.align(&exemplar.icon, c, &v.align));
+        let template = Template::new(&exemplar.icon, c);
+        let laid = around.as_ref().and_then(|s| s.align(&template, &v.align));
         let Some(laid) = laid else {
             near.likeness = Some(likeness(&sighting.icon, &exemplar.icon, c));
             continue;
@@ -180,7 +181,7 @@ fn laid_on(
 ) -> Option<(IconFeatures, Corners)> {
     let r = &p.recognise;
     let exemplar = near.model.exemplars.get(near.exemplar)?;
-    let corners = around.align(&exemplar.icon, &r.correlation, &r.verdict.align)?.corners_px;
+    let corners = around.align(&Template::new(&exemplar.icon, &r.correlation), &r.verdict.align)?.corners_px;
     let icon = rectify(image, &corners, &p.icon).ok()?;
     Some((features(icon, r), corners))
 }
