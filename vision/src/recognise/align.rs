@@ -387,7 +387,9 @@ fn slopes(smooth: &[f32], size: usize, xy: &[[f32; 2]], values: &[f32], norm: f3
     let mut slopes: [Vec<f32>; 8] = std::array::from_fn(|i| along(i % 2, weights[i / 2]));
     for slope in &mut slopes {
         let mean = slope.iter().sum::<f32>() / xy.len() as f32;
-        slope.iter_mut().for_each(|s| *s -= mean);
+        for s in slope.iter_mut() {
+            *s -= mean;
+        }
         slope.resize(values.len(), 0.0);
         // What only scales the grey levels is lost when they are normalised.
         let along = dot(slope, values);
@@ -451,7 +453,9 @@ fn normalise(values: &mut [f32], min_deviation: f64) -> Option<f32> {
     let square: f32 = values.iter().map(|v| (v - mean) * (v - mean)).sum();
     let seen = square > 0.0 && square.is_finite() && f64::from(square / n).sqrt() >= min_deviation;
     let scale = if seen { 1.0 / square.sqrt() } else { 0.0 };
-    values.iter_mut().for_each(|v| *v = (*v - mean) * scale);
+    for v in values.iter_mut() {
+        *v = (*v - mean) * scale;
+    }
     seen.then(|| square.sqrt())
 }
 

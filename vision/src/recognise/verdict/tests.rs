@@ -191,15 +191,14 @@ fn gates_refuse_at_tau() {
     let (c, h, v) = (model.correlation.tau, model.hausdorff.tau, &PARAMS.recognise.verdict);
     let tight = v.verified_share;
     let alone = |kind, c, h, moved| judged(c, h, moved).refusal(kind, v);
-    use DistanceKind::{Correlation, Hausdorff};
-    assert_eq!(alone(Correlation, 0.99 * c, f64::NAN, false), None);
-    assert_eq!(alone(Correlation, c, 0.0, false), Some(Refusal::Correlation));
-    assert_eq!(alone(Correlation, 0.99 * tight * c, h, true), None);
-    assert_eq!(alone(Correlation, 1.01 * tight * c, 0.0, true), Some(Refusal::Correlation));
-    assert_eq!(alone(Hausdorff, c, 0.99 * h, false), None);
-    assert_eq!(alone(Hausdorff, 0.0, h, false), Some(Refusal::Hausdorff));
-    assert_eq!(alone(Hausdorff, 0.0, f64::NAN, false), Some(Refusal::Hausdorff));
-    assert_eq!(alone(Hausdorff, 0.0, 1.01 * tight * h, true), Some(Refusal::Hausdorff));
+    assert_eq!(alone(DistanceKind::Correlation, 0.99 * c, f64::NAN, false), None);
+    assert_eq!(alone(DistanceKind::Correlation, c, 0.0, false), Some(Refusal::Correlation));
+    assert_eq!(alone(DistanceKind::Correlation, 0.99 * tight * c, h, true), None);
+    assert_eq!(alone(DistanceKind::Correlation, 1.01 * tight * c, 0.0, true), Some(Refusal::Correlation));
+    assert_eq!(alone(DistanceKind::Hausdorff, c, 0.99 * h, false), None);
+    assert_eq!(alone(DistanceKind::Hausdorff, 0.0, h, false), Some(Refusal::Hausdorff));
+    assert_eq!(alone(DistanceKind::Hausdorff, 0.0, f64::NAN, false), Some(Refusal::Hausdorff));
+    assert_eq!(alone(DistanceKind::Hausdorff, 0.0, 1.01 * tight * h, true), Some(Refusal::Hausdorff));
     // Both: the likeness, and one of the two.
     let least = 1.0 - model.likeness.tau;
     let both = |likeness: Option<f64>, c, h| {
