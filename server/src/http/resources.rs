@@ -21,7 +21,7 @@ use vision::{localise::pose::LandmarkSize, recognise::DistanceKind};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum Distance {
-    /// Both must accept.
+    /// The picture itself, laid on the learnt icon, must be like it, and one of the two distances must accept.
     #[default]
     Both,
     /// Bucketed correlation.

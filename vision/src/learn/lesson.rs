@@ -191,6 +191,7 @@ fn fitted_likeness(evidence: &Evidence, p: &Params) -> Result<Threshold, Thresho
     let missed = own.iter().filter(|d| **d >= tau).count();
     Ok(Threshold {
         tau,
+        // tau is below the nearest of them.
         false_positive_rate: 0.0,
         false_negative_rate: missed as f64 / own.len() as f64,
         positives: own.len(),

@@ -49,6 +49,9 @@ pub struct ModelSet {
     owners: Vec<(u32, u8)>,
 }
 
+/// Longest short list.
+pub const MAX_SHORT_LIST: usize = 64;
+
 /// An entry of the short list.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Listed {
@@ -104,8 +107,10 @@ impl ModelSet {
         self.models.iter()
     }
 
-    /// The `count` models whose exemplars are most like `signature`, best first; of equal ones the lower id.
+    /// The `count` models whose exemplars are most like `signature`, best first; of equal ones the lower id. At most
+    /// [`MAX_SHORT_LIST`].
     pub fn short_list(&self, signature: &Signature, count: usize) -> Vec<Listed> {
+        let count = count.min(MAX_SHORT_LIST);
         let mut best: Vec<Listed> = Vec::with_capacity(count + 1);
         let mut enough = f32::NEG_INFINITY;
         for (values, (model, exemplar)) in self.signatures.iter().zip(&self.owners) {
@@ -174,6 +179,20 @@ mod tests {
             }
         }
         assert!(ModelSet::default().short_list(&set.at(0).unwrap().exemplars[0].signature, 3).is_empty());
+    }
+
+    #[test]
+    fn a_short_list_is_bounded() {
+        let p = Params::default();
+        let one = Arc::clone(&lessons(1, &p)[0]);
+        let many = |count: u64| {
+            let named = |id| Arc::new(LandmarkModel { id: LandmarkId(id), ..(*one).clone() });
+            ModelSet::new((0..count).map(named).collect(), &p).unwrap()
+        };
+        let asked = &one.exemplars[0].signature;
+        for (landmarks, listed) in [(MAX_SHORT_LIST, MAX_SHORT_LIST), (MAX_SHORT_LIST + 1, MAX_SHORT_LIST)] {
+            assert_eq!(many(landmarks as u64).short_list(asked, usize::MAX).len(), listed);
+        }
     }
 
     #[test]
