@@ -58,6 +58,18 @@ impl Canvas {
         Self { width, height, grey: vec![grey; width * height], parts: vec![] }
     }
 
+    /// A drawing that goes on from a picture.
+    pub(crate) fn of(picture: &Texture) -> Self {
+        let grey = picture.data().iter().map(|g| f32::from(*g) / 255.0).collect();
+        Self { width: picture.width(), height: picture.height(), grey, parts: vec![] }
+    }
+
+    /// Grey at a place, 0 to 1 across and down.
+    pub(crate) fn grey_at(&self, s: f32, t: f32) -> f32 {
+        let texel = |x: f32, size: usize| ((x * size as f32).max(0.0) as usize).min(size - 1);
+        self.grey[texel(t, self.height) * self.width + texel(s, self.width)]
+    }
+
     /// The whole canvas.
     pub(crate) fn area(&self) -> Area {
         Area::new(0.0, 0.0, 1.0, self.height as f32 / self.width as f32)

@@ -272,7 +272,7 @@ fn letters(canvas: &mut Canvas, area: Area, grey: f32, rng: &mut ChaCha8Rng) {
     }
 }
 
-fn word(rng: &mut ChaCha8Rng, length: usize) -> String {
+pub(crate) fn word(rng: &mut ChaCha8Rng, length: usize) -> String {
     let vowels = *b"AEIOU";
     let letter = |i: usize| {
         if i % 2 == 1 && rng.random_bool(0.8) {

@@ -52,6 +52,15 @@ pub fn baseboard(seed: u64) -> Texture {
 
 /// A door with its frame, 0.95 m by 2.1 m: leaf, handle, a number plate, perhaps panels or a pane.
 pub fn door(seed: u64) -> Texture {
+    door_with(seed, None)
+}
+
+/// The same door with another number on its plate.
+pub(crate) fn numbered_door(seed: u64, number: u32) -> Texture {
+    door_with(seed, Some(number))
+}
+
+fn door_with(seed: u64, number: Option<u32>) -> Texture {
     let mut rng = seed::stream(seed, 5);
     let mut canvas = Canvas::new(256, 566, rng.random_range(0.25..0.4));
     let all = canvas.area();
@@ -76,7 +85,7 @@ pub fn door(seed: u64) -> Texture {
     canvas.rect(leaf.part(x, 0.49, x + 0.03, 0.57), 0.8);
     let plate = leaf.part(0.4, 0.03, 0.62, 0.06);
     canvas.rect(plate, 0.92);
-    let number = format!("{}", rng.random_range(100..400));
+    let number = number.unwrap_or_else(|| rng.random_range(100..400)).to_string();
     canvas.text([plate.x0 + 0.02, plate.y0 + 0.012], plate.height() - 0.024, &number, 0.1);
     canvas.into_texture(Edge::Clamp)
 }

@@ -6,7 +6,7 @@
 //! painted over each other, so that nothing casts a true shadow: shadows are painted too.
 
 mod clutter;
-mod compression;
+pub(crate) mod compression;
 mod paint;
 mod pictures;
 mod room;

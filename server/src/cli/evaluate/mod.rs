@@ -1,5 +1,7 @@
 //! `waymark evaluate`: the paper's experiments on labelled pictures. Tables for people, one JSON object for programs.
 
+pub(crate) mod chart;
+pub(crate) mod experiment;
 pub(crate) mod rendered;
 pub(crate) mod reviewed;
 pub(crate) mod statistics;
@@ -25,6 +27,30 @@ pub(crate) enum Command {
     /// Starts a server of its own in a temporary folder. A landmark taught from one picture is learnt from views
     /// generated from it (warped, dimmed, blurred).
     Recognition(recognition::Args),
+    /// How obliquely a landmark may be seen: H^r, C^r and likeness over their thresholds, and the decision, by angle.
+    ///
+    /// Landmarks are rendered posters (and photographs, with --photographs), taught as a robot would teach them. Every
+    /// view has its own noise, blur, light and compression; only the angle is set. For example:
+    ///   waymark evaluate viewpoint --plot viewpoint.svg
+    ///   waymark evaluate viewpoint --photographs museum-paintings --taught photograph --detector
+    #[command(verbatim_doc_comment)]
+    Viewpoint(experiment::viewpoint::Args),
+    /// How small a landmark may be seen: the same by apparent size, from 300 px down to 36.
+    Scale(experiment::scale::Args),
+    /// Too dark, too bright, light from the side, a shadow's edge across: the same by each of them.
+    Illumination(experiment::illumination::Args),
+    /// How much of a landmark may be hidden in its middle: the same by share of its area.
+    Occlusion(experiment::occlusion::Args),
+    /// How seldom a stranger is taken for a landmark: per pair by the paper's thresholds, per quad by the decision.
+    ///
+    /// Strangers are posters that are not taught, photographs, doors, windows and tiles, and, as strata of their own,
+    /// look-alikes of landmarks made on purpose. Bounds are exact, by quads and by textures. For example:
+    ///   waymark evaluate discrimination --landmarks 50,300 --views 40 --plot humps.svg
+    #[command(verbatim_doc_comment)]
+    Discrimination(experiment::discrimination::Args),
+    /// Pictures that are nearly the same (another text, one block changed, mirrored, two doors): told apart, refused as
+    /// ambiguous, or confused.
+    Lookalikes(experiment::doubles::Args),
 }
 
 /// Runs one evaluation.
@@ -32,5 +58,11 @@ pub(crate) fn run(command: &Command) -> anyhow::Result<()> {
     match command {
         Command::Detection(args) => detection::run(args),
         Command::Recognition(args) => recognition::run(args),
+        Command::Viewpoint(args) => experiment::viewpoint::run(args),
+        Command::Scale(args) => experiment::scale::run(args),
+        Command::Illumination(args) => experiment::illumination::run(args),
+        Command::Occlusion(args) => experiment::occlusion::run(args),
+        Command::Discrimination(args) => experiment::discrimination::run(args),
+        Command::Lookalikes(args) => experiment::doubles::run(args),
     }
 }

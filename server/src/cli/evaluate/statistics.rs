@@ -6,6 +6,8 @@ use serde::Serialize;
 const Z95: f64 = 1.959_963_984_540_054;
 /// Resamplings of a bootstrap.
 const RESAMPLINGS: usize = 1000;
+/// Halvings of the range in which a bound is looked for.
+const BISECTIONS: usize = 60;
 /// The same report from the same results.
 const SEED: u64 = 0x5eed;
 
@@ -36,6 +38,32 @@ pub(crate) fn wilson(hits: usize, of: usize) -> Interval {
     let centre = (p + 0.5 * z2 / n) / (1.0 + z2 / n);
     let half = Z95 / (1.0 + z2 / n) * (p * (1.0 - p) / n + 0.25 * z2 / (n * n)).sqrt();
     Interval((centre - half).max(0.0), (centre + half).min(1.0))
+}
+
+/// Exact one-sided upper bound at 95 % (Clopper and Pearson) of a share of which `hits` of `of` were seen: the share at
+/// which as few hits would be seen in one case of twenty. 1 where nothing was tried.
+pub(crate) fn upper_bound(hits: usize, of: usize) -> f64 {
+    if hits >= of {
+        return 1.0;
+    }
+    let (mut low, mut high) = (hits as f64 / of as f64, 1.0);
+    for _ in 0..BISECTIONS {
+        let middle = f64::midpoint(low, high);
+        if at_most(hits, of, middle) > 0.05 { low = middle } else { high = middle }
+    }
+    f64::midpoint(low, high)
+}
+
+/// Chance of at most `hits` of `of` where each comes with `share`.
+fn at_most(hits: usize, of: usize, share: f64) -> f64 {
+    let odds = (share / (1.0 - share)).ln();
+    let mut term = of as f64 * (-share).ln_1p();
+    let mut sum = term.exp();
+    for k in 0..hits {
+        term += ((of - k) as f64 / (k + 1) as f64).ln() + odds;
+        sum += term.exp();
+    }
+    sum
 }
 
 /// Interval of a figure of several images by the percentile bootstrap: images are drawn with repetition, 1000 times, a
@@ -96,6 +124,28 @@ mod tests {
             assert!((l - low).abs() < 5e-5 && (h - high).abs() < 5e-5, "{hits}/{of}: {l} {h}");
         }
         assert_eq!(wilson(0, 0), Interval(0.0, 1.0));
+    }
+
+    #[test]
+    fn exact_bounds_as_in_the_tables() {
+        // Trials that show 1e-4, with 0, 1, 2, 3 and 5 hits (chi-squared quantiles over 2e-4), and 1e-3 with none.
+        for (hits, of, bound) in [
+            (0, 29_956, 1e-4),
+            (1, 47_437, 1e-4),
+            (2, 62_956, 1e-4),
+            (3, 77_535, 1e-4),
+            (5, 105_128, 1e-4),
+            (0, 2_995, 1e-3),
+            (0, 10, 0.258_866),
+            (3, 10, 0.606_624),
+        ] {
+            assert!(
+                (upper_bound(hits, of) / bound - 1.0).abs() < 1e-3,
+                "{hits}/{of}: {}",
+                upper_bound(hits, of)
+            );
+        }
+        assert!((upper_bound(0, 0) - 1.0).abs() < 1e-12 && (upper_bound(4, 4) - 1.0).abs() < 1e-12);
     }
 
     #[test]

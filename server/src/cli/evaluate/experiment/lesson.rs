@@ -1,0 +1,149 @@
+//! Teaches a map of pictures as the server does: views of each, negatives from all others, gates. Pictures in, the
+//! models of those that passed out. What is measured with them is the experiments' business.
+
+use super::{mixed, of_each, pictures::Picture};
+use serde::Serialize;
+use sim::{
+    exhibit::{Conditions, Extent, exhibit},
+    surfaces::plaster,
+    texture::Texture,
+};
+use std::sync::Arc;
+use vision::{
+    detect::quads::Corners,
+    learn::{
+        model::{LandmarkModel, View, add_negatives, learn},
+        random::Random,
+        synthesis,
+    },
+    params::Params,
+    recognise::{IconFeatures, LandmarkId, ModelSet, features},
+};
+
+/// Views of each landmark, as the server wants them.
+const VIEWS: usize = 30;
+/// Of all landmarks together as many icons, about, are what each must be told from (`server/src/jobs/negatives.rs`).
+const NEGATIVES: usize = 2000;
+/// Widest angle that views are gathered from.
+const MAX_YAW_RAD: f64 = 60.0 / 360.0 * std::f64::consts::TAU;
+/// Draws for a view before a picture is given up.
+const TRIES: u64 = 20;
+
+/// How landmarks are taught.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub(crate) enum Taught {
+    /// From 30 views, each under its own conditions.
+    Views,
+    /// From one view, and views generated from it.
+    Photograph,
+}
+
+impl Taught {
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Views => "30 views",
+            Self::Photograph => "one photograph",
+        }
+    }
+}
+
+pub(crate) fn taught(text: &str) -> Result<Taught, String> {
+    match text {
+        "views" => Ok(Taught::Views),
+        "photograph" => Ok(Taught::Photograph),
+        _ => Err("one of: views, photograph".to_owned()),
+    }
+}
+
+/// The landmarks of a map and what they were made of.
+pub(crate) struct Class {
+    /// Landmark `LandmarkId(i)` is picture i; those that a gate kept out are not in `models`.
+    pub(crate) landmarks: Vec<Picture>,
+    pub(crate) models: ModelSet,
+    /// Pictures that a gate kept out, or that could not be learnt.
+    pub(crate) candidates: Vec<usize>,
+    pub(crate) wall: Texture,
+}
+
+impl Class {
+    /// Teaches all `pictures` together.
+    pub(crate) fn new(pictures: Vec<Picture>, how: Taught, seed: u64, p: &Params) -> anyhow::Result<Self> {
+        let wall = plaster(seed);
+        let views = of_each(&pictures, "views", |i, picture| {
+            let draw = |n: u64| mixed(&[seed, 1, i as u64, n]);
+            match how {
+                Taught::Views => gathered(picture, &wall, draw, p),
+                Taught::Photograph => from_one(picture, &wall, draw, p),
+            }
+        });
+        let each = (NEGATIVES / pictures.len().max(1)).clamp(3, VIEWS);
+        let icons: Vec<Vec<IconFeatures>> = of_each(&views, "icons", |_, views| {
+            let count = each.min(views.len());
+            let chosen = (0..count).map(|i| &views[i * views.len() / count]);
+            chosen.map(|v| features(v.icon.clone(), &p.recognise)).collect()
+        });
+        let models = of_each(&views, "learning", |i, views| {
+            let alone = learn(LandmarkId(i as u64), views, &[], p).ok()?;
+            let others = icons.iter().enumerate().filter(|(other, _)| *other != i).map(|(_, icons)| icons);
+            let others: Vec<IconFeatures> = others.flatten().cloned().collect();
+            Some(add_negatives(&alone, &others, p))
+        });
+        let candidates = models
+            .iter()
+            .enumerate()
+            .filter(|(_, m)| !m.as_ref().is_some_and(LandmarkModel::is_active))
+            .map(|(i, _)| i)
+            .collect();
+        let active = models.into_iter().flatten().filter(LandmarkModel::is_active).map(Arc::new).collect();
+        Ok(Self { landmarks: pictures, models: ModelSet::new(active, p)?, candidates, wall })
+    }
+
+    /// Pictures that are landmarks in use.
+    pub(crate) fn active(&self) -> impl Iterator<Item = (LandmarkId, &Picture)> {
+        self.models.iter().map(|m| (m.id, &self.landmarks[m.id.0 as usize]))
+    }
+
+    /// Mean size of a model as it is stored; 0 without any.
+    pub(crate) fn bytes_per_model(&self) -> usize {
+        let all: usize = self.models.iter().map(|m| m.to_bytes().len()).sum();
+        all / self.models.len().max(1)
+    }
+}
+
+/// Views as a robot would gather them by driving past.
+fn gathered(picture: &Picture, wall: &Texture, draw: impl Fn(u64) -> u64, p: &Params) -> Vec<View> {
+    let view = |n: u64| {
+        let (noise, mut random) = (draw(2 * n), Random::new(draw(2 * n + 1)));
+        let mut conditions = Conditions::realistic(noise);
+        conditions.yaw_rad = random.range(-MAX_YAW_RAD, MAX_YAW_RAD);
+        let seen = exhibit(&picture.texture, wall, &conditions, Extent::Around, noise)?;
+        View::photographed(&seen.image, &noisy(&seen.corners, 1.0, &mut random)?, p).ok()
+    };
+    (0..TRIES * VIEWS as u64).filter_map(view).take(VIEWS).collect()
+}
+
+/// One view nearly from the front, and what is generated from it.
+fn from_one(picture: &Picture, wall: &Texture, draw: impl Fn(u64) -> u64, p: &Params) -> Vec<View> {
+    let one = |n: u64| {
+        let (noise, mut random) = (draw(2 * n), Random::new(draw(2 * n + 1)));
+        let conditions = Conditions {
+            yaw_rad: random.range(-0.2, 0.2),
+            size_px: random.range(200.0, 280.0),
+            ..Conditions::realistic(noise)
+        };
+        let seen = exhibit(&picture.texture, wall, &conditions, Extent::Around, noise)?;
+        let corners = noisy(&seen.corners, 1.0, &mut random)?;
+        let view = View::photographed(&seen.image, &corners, p).ok()?;
+        let generated = synthesis::views(&seen.image, &corners, VIEWS, p, noise);
+        Some(std::iter::once(view).chain(generated).collect())
+    };
+    (0..TRIES).find_map(one).unwrap_or_default()
+}
+
+/// Corners as a detector would give them, each coordinate off by a normal draw.
+pub(crate) fn noisy(corners: &Corners, sigma_px: f64, random: &mut Random) -> Option<Corners> {
+    let off = corners
+        .points()
+        .map(|c| nalgebra::Point2::new(c.x + sigma_px * random.normal(), c.y + sigma_px * random.normal()));
+    Corners::new(off).ok()
+}

@@ -1,0 +1,193 @@
+//! One view of one picture against the landmarks of a map: the paper's distances over their thresholds, and what the
+//! whole decision says and why.
+
+use super::lesson::Class;
+use nalgebra::Matrix2;
+use serde::Serialize;
+use sim::exhibit::Exhibit;
+use vision::{
+    detect::{
+        detect,
+        quads::{Corners, Quad, QuadKind},
+    },
+    geometry::polygon,
+    icon::icon,
+    params::Params,
+    recognise::{DistanceKind, LandmarkId, Recognition, Refusal, Verdict, features, verdict::recognise},
+    trace::NoTrace,
+};
+
+/// A detected quad is the picture's from this overlap on, or when it lies inside it.
+const IOU_SAME: f64 = 0.5;
+const INNER_SHARE: f64 = 0.9;
+
+/// What became of a view of a taught picture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum Outcome {
+    Right,
+    /// Another landmark was named.
+    Wrong,
+    Ambiguous,
+    /// 1 minus likeness is not below its tau.
+    Likeness,
+    /// Alike, but neither C^r nor H^r is below 0.8 of its tau.
+    Distances,
+    /// Not among the candidates of the verdict.
+    NotListed,
+    /// No icon was cut: too small, or cut off.
+    NoIcon,
+    /// No quad was found there.
+    NotDetected,
+}
+
+impl Outcome {
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Right => "right",
+            Self::Wrong => "wrong",
+            Self::Ambiguous => "ambiguous",
+            Self::Likeness => "likeness",
+            Self::Distances => "distances",
+            Self::NotListed => "not listed",
+            Self::NoIcon => "no icon",
+            Self::NotDetected => "not detected",
+        }
+    }
+}
+
+/// One view, judged.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Look {
+    /// H^r / tau, C^r / tau where the corners were given, and (1 - likeness) / tau after alignment; infinite without.
+    pub(crate) ratios: [f64; 3],
+    pub(crate) outcome: Outcome,
+}
+
+/// A quad of given corners.
+pub(crate) fn quad(corners_px: Corners) -> Quad {
+    Quad {
+        corners_px,
+        corner_covariance_px2: [Matrix2::identity(); 4],
+        side_support: [1.0; 4],
+        side_clipped: [false; 4],
+        score: 1.0,
+        kind: QuadKind::Full,
+        upright_ambiguous: false,
+        alternates: Vec::new(),
+    }
+}
+
+/// The picture's quads among those that the detector finds, the best overlap first.
+pub(crate) fn detected(seen: &Exhibit, p: &Params) -> Vec<Quad> {
+    let truth = seen.corners.points();
+    let mut found: Vec<(f64, Quad)> = detect(&seen.image, &p.detect, &mut NoTrace)
+        .into_iter()
+        .map(|q| (polygon::iou(truth, q.corners_px.points()), q))
+        .filter(|(iou, q)| {
+            let inside = || polygon::intersection_area(truth, q.corners_px.points());
+            *iou >= IOU_SAME || inside() >= INNER_SHARE * q.corners_px.area_px2()
+        })
+        .collect();
+    found.sort_by(|a, b| b.0.total_cmp(&a.0));
+    found.into_iter().map(|(_, q)| q).collect()
+}
+
+/// Judges a view of landmark `id`, whose quad is at `corners`, or wherever the detector finds one.
+pub(crate) fn look(
+    class: &Class,
+    id: LandmarkId,
+    seen: &Exhibit,
+    corners: Option<&Corners>,
+    p: &Params,
+) -> Look {
+    let quads = corners.map_or_else(|| detected(seen, p), |c| vec![quad(*c)]);
+    let verdicts: Vec<Verdict> =
+        quads.iter().map(|q| recognise(&seen.image, q, &class.models, DistanceKind::Both, p)).collect();
+    let mut ratios = [f64::INFINITY; 3];
+    if let Some(at) = quads.first().map(|q| q.corners_px) {
+        ratios = paper_ratios(class, id, seen, &at, p);
+    }
+    let own = |v: &Verdict| v.candidates.iter().find(|c| c.landmark == id).map(|c| c.ratio);
+    ratios[2] = verdicts.iter().filter_map(own).fold(f64::INFINITY, f64::min);
+    let outcome = verdicts.iter().map(|v| outcome(v, id)).min().unwrap_or(Outcome::NotDetected);
+    // A wrong name on any of its quads is wrong, whatever the others say.
+    let wrong = verdicts.iter().any(|v| self::outcome(v, id) == Outcome::Wrong);
+    let too_small = quads.first().is_some_and(|q| icon(&seen.image, &q.corners_px, &p.icon).is_err());
+    let outcome = match outcome {
+        _ if wrong => Outcome::Wrong,
+        Outcome::NotListed if too_small => Outcome::NoIcon,
+        other => other,
+    };
+    Look { ratios, outcome }
+}
+
+/// H^r and C^r of the icon at `corners` to landmark `id`, over tau.
+fn paper_ratios(class: &Class, id: LandmarkId, seen: &Exhibit, corners: &Corners, p: &Params) -> [f64; 3] {
+    let far = [f64::INFINITY; 3];
+    let (Ok(icon), Some(model)) = (icon(&seen.image, corners, &p.icon), class.models.get(id)) else {
+        return far;
+    };
+    let d = model.distances(&features(icon, &p.recognise), &p.recognise);
+    [d.hausdorff / model.hausdorff.tau, d.correlation / model.correlation.tau, f64::INFINITY]
+}
+
+fn outcome(verdict: &Verdict, id: LandmarkId) -> Outcome {
+    match verdict.recognition {
+        Recognition::Unique(named) if named == id => return Outcome::Right,
+        Recognition::Unique(_) => return Outcome::Wrong,
+        Recognition::Ambiguous(_) => return Outcome::Ambiguous,
+        Recognition::Unknown => {}
+    }
+    let Some(own) = verdict.candidates.iter().find(|c| c.landmark == id) else { return Outcome::NotListed };
+    match own.refusal {
+        Some(Refusal::Correlation | Refusal::Hausdorff) => Outcome::Distances,
+        _ => Outcome::Likeness,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use vision::recognise::Candidate;
+
+    fn verdict(recognition: Recognition, refusal: Option<Refusal>) -> Verdict {
+        let candidate = Candidate {
+            landmark: LandmarkId(3),
+            correlation: 0.1,
+            hausdorff: 1.0,
+            likeness: Some(0.5),
+            distance: 0.5,
+            tau: 0.55,
+            ratio: 0.9,
+            probability: 0.0,
+            refusal,
+        };
+        Verdict {
+            recognition,
+            candidates: vec![candidate],
+            entropy_m: 1.0,
+            entropy_norm: 1.0,
+            confidence: 0.0,
+            rotation: 0,
+            border: 0,
+            aligned_px: None,
+            landmarks: 9,
+        }
+    }
+
+    #[test]
+    fn the_outcome_names_the_gate() {
+        let id = LandmarkId(3);
+        for (recognition, refusal, expected) in [
+            (Recognition::Unique(id), None, Outcome::Right),
+            (Recognition::Unique(LandmarkId(4)), None, Outcome::Wrong),
+            (Recognition::Ambiguous(LandmarkId(4)), None, Outcome::Ambiguous),
+            (Recognition::Unknown, Some(Refusal::Likeness), Outcome::Likeness),
+            (Recognition::Unknown, Some(Refusal::Correlation), Outcome::Distances),
+        ] {
+            assert_eq!(outcome(&verdict(recognition, refusal), id), expected);
+        }
+        assert_eq!(outcome(&verdict(Recognition::Unknown, None), LandmarkId(5)), Outcome::NotListed);
+    }
+}
