@@ -14,7 +14,7 @@ use crate::{
     params::{Params, RecogniseParams},
     recognise::{
         IconFeatures, LandmarkId,
-        align::{Surroundings, Template},
+        align::{Aligner, Surroundings, Template},
         features,
         likeness::likeness,
         signature,
@@ -84,7 +84,7 @@ pub fn refit_thresholds(model: &LandmarkModel, negatives: &[IconFeatures], p: &P
 pub fn add_negatives(model: &LandmarkModel, negatives: &[IconFeatures], p: &Params) -> LandmarkModel {
     let mut model = model.clone();
     let exemplars = model.exemplars.clone();
-    let templates = templates(&exemplars, p);
+    let templates = templates(&exemplars);
     for negative in negatives {
         let d = model.distances(negative, &p.recognise);
         model.correlation_evidence.add(d.correlation);
@@ -132,8 +132,8 @@ fn fitted(evidence: &Evidence, cap: f64, p: &Params) -> Result<Threshold, Thresh
 /// Negatives whose signatures are less alike are not laid on the exemplars: they count as infinitely far.
 const MIN_SIGNATURE: f32 = 0.45;
 
-fn templates<'a>(exemplars: &'a [IconFeatures], p: &'a Params) -> Vec<(&'a IconFeatures, Template<'a>)> {
-    exemplars.iter().map(|e| (e, Template::new(&e.icon, &p.recognise.correlation))).collect()
+fn templates(exemplars: &[IconFeatures]) -> Vec<(&IconFeatures, Template<'_>)> {
+    exemplars.iter().map(|e| (e, Template::new(&e.icon, &e.coarse))).collect()
 }
 
 /// The smallest 1 minus likeness of `icon` to the exemplars after alignment, of those whose signatures are alike enough.
@@ -144,6 +144,7 @@ fn unlikeness(
     p: &Params,
 ) -> f64 {
     let (c, a) = (&p.recognise.correlation, &p.recognise.verdict.align);
+    let aligner = Aligner::new(p.icon.size, c, a);
     let mut around = None;
     let mut least = f64::INFINITY;
     for (exemplar, template) in templates {
@@ -151,7 +152,7 @@ fn unlikeness(
             continue;
         }
         let around = around.get_or_insert_with(|| Surroundings::of_icon(&icon.icon, a));
-        let laid = around.as_ref().and_then(|s| s.align(template, a));
+        let laid = around.as_ref().and_then(|s| aligner.align(s, template));
         let laid = laid.as_ref().map_or(&icon.icon, |l| &l.icon);
         least = least.min(1.0 - likeness(laid, &exemplar.icon, c));
     }
@@ -164,7 +165,7 @@ const MAX_OWN_LAID: usize = 9;
 /// The same of the landmark's own icons that are no exemplars.
 fn own_unlikeness(icons: &[IconFeatures], chosen: &[usize], p: &Params) -> Vec<f64> {
     let exemplars: Vec<IconFeatures> = chosen.iter().map(|i| icons[*i].clone()).collect();
-    let templates = templates(&exemplars, p);
+    let templates = templates(&exemplars);
     let others: Vec<_> = icons.iter().enumerate().filter(|(i, _)| !chosen.contains(i)).collect();
     let every = others.len().div_ceil(MAX_OWN_LAID).max(1);
     others.into_iter().step_by(every).map(|(_, icon)| unlikeness(&templates, icon, -1.0, p)).collect()

@@ -172,6 +172,14 @@ impl LandmarkModel {
         self.generated_views > 0
     }
 
+    /// Memory that it takes, in bytes.
+    pub fn memory_bytes(&self) -> usize {
+        let evidence = [&self.correlation_evidence, &self.hausdorff_evidence, &self.likeness_evidence];
+        let distances: usize = evidence.iter().map(|e| e.own.len() + e.nearest_others.len()).sum();
+        let exemplars: usize = self.exemplars.iter().map(IconFeatures::memory_bytes).sum();
+        size_of::<Self>() + size_of::<f32>() * distances + exemplars
+    }
+
     /// Passed every gate.
     pub fn is_active(&self) -> bool {
         self.status == ModelStatus::Active

@@ -1,6 +1,7 @@
 //! Icon in, sub-pixel Harris points out (method 5). Describing them is the next file's work.
 
 use crate::icon::Icon;
+use fearless_simd::{Level, dispatch};
 use serde::{Deserialize, Serialize};
 
 /// Most points that one icon may have, whatever the parameters say.
@@ -98,12 +99,13 @@ pub fn harris(icon: &Icon, p: &HarrisParams) -> Vec<HarrisPoint> {
 fn response(icon: &Icon, p: &HarrisParams) -> Vec<f32> {
     let size = icon.size;
     let (smooth, slope) = (gaussian(p.sigma_derivative), derivative(p.sigma_derivative));
-    let gx = columns(&rows(&icon.pixels, size, &slope), size, &smooth);
-    let gy = columns(&rows(&icon.pixels, size, &smooth), size, &slope);
+    let both = |pixels: &[f32], across: &[f32], down: &[f32]| dispatch!(Level::new(), _s => columns(&rows(pixels, size, across), size, down));
+    let gx = both(&icon.pixels, &slope, &smooth);
+    let gy = both(&icon.pixels, &smooth, &slope);
     let window = gaussian(p.sigma_integration);
     let integrate = |f: &dyn Fn(f32, f32) -> f32| {
         let product: Vec<f32> = gx.iter().zip(&gy).map(|(x, y)| f(*x, *y)).collect();
-        columns(&rows(&product, size, &window), size, &window)
+        both(&product, &window, &window)
     };
     let (xx, xy, yy) = (integrate(&|x, _| x * x), integrate(&|x, y| x * y), integrate(&|_, y| y * y));
     let k = p.k as f32;
@@ -141,7 +143,7 @@ fn sub_pixel(response: &[f32], size: usize, column: usize, row: usize) -> (f32, 
 /// A square picture of side `size`, smoothed by a Gaussian, border replicated.
 pub(crate) fn blurred(pixels: &[f32], size: usize, sigma: f64) -> Vec<f32> {
     let kernel = gaussian(sigma);
-    columns(&rows(pixels, size, &kernel), size, &kernel)
+    dispatch!(Level::new(), _s => columns(&rows(pixels, size, &kernel), size, &kernel))
 }
 
 /// Half length of a kernel: four sigma.
@@ -173,22 +175,31 @@ fn bell(x: f64, sigma: f64) -> f64 {
 }
 
 /// Correlates every row with `kernel`, border replicated.
+#[expect(
+    clippy::inline_always,
+    reason = "an instruction set holds only in what is inlined where it was chosen"
+)]
+#[inline(always)]
 fn rows(image: &[f32], size: usize, kernel: &[f32]) -> Vec<f32> {
     let r = kernel.len() / 2;
-    let mut out = Vec::with_capacity(image.len());
+    let mut out = vec![0.0; image.len()];
     let mut padded = vec![0.0; size + 2 * r];
-    for row in image.chunks_exact(size) {
+    for (row, line) in image.chunks_exact(size).zip(out.chunks_exact_mut(size)) {
         padded[..r].fill(row[0]);
         padded[r..r + size].copy_from_slice(row);
         padded[r + size..].fill(row[size - 1]);
-        for column in 0..size {
-            out.push(kernel.iter().zip(&padded[column..]).map(|(w, g)| w * g).sum());
+        for (i, w) in kernel.iter().enumerate() {
+            for (o, g) in line.iter_mut().zip(&padded[i..i + size]) {
+                *o += w * g;
+            }
         }
     }
     out
 }
 
 /// Correlates every column with `kernel`, border replicated.
+#[expect(clippy::inline_always, reason = "as above")]
+#[inline(always)]
 fn columns(image: &[f32], size: usize, kernel: &[f32]) -> Vec<f32> {
     let r = kernel.len() / 2;
     let mut out = vec![0.0; image.len()];

@@ -8,7 +8,9 @@ pub mod signature;
 pub mod models;
 pub mod align;
 pub mod likeness;
+pub mod watch;
 pub mod compare;
+mod look;
 pub mod confidence;
 pub mod verdict;
 #[cfg(test)]
@@ -34,16 +36,26 @@ pub struct IconFeatures {
     pub points: PointSet,
     /// For the short list.
     pub signature: Signature,
+    /// For the coarse look of alignment.
+    pub coarse: Vec<f32>,
 }
 
 impl IconFeatures {
+    /// Memory that they take, in bytes.
+    pub fn memory_bytes(&self) -> usize {
+        let numbers = self.icon.pixels.len() + self.buckets.values().len() + self.coarse.len();
+        let point = size_of::<[f32; 2]>() + size_of::<descriptor::Descriptor>() + size_of::<f32>();
+        size_of::<Self>() + size_of::<f32>() * numbers + self.points.len() * point
+    }
+
     /// The features of `icon.rotated(shift)`.
     #[must_use]
     pub fn rotated(&self, shift: usize, p: &RecogniseParams) -> Self {
         let icon = self.icon.rotated(shift);
         let buckets = Buckets::new(&icon, &p.correlation);
         let signature = Signature::new(&icon);
-        Self { buckets, points: self.points.rotated(shift, icon.size), signature, icon }
+        let coarse = align::coarse(&icon, &p.verdict.align);
+        Self { buckets, points: self.points.rotated(shift, icon.size), signature, coarse, icon }
     }
 }
 
@@ -54,6 +66,7 @@ pub fn features(icon: Icon, p: &RecogniseParams) -> IconFeatures {
         buckets: Buckets::new(&icon, &p.correlation),
         points,
         signature: Signature::new(&icon),
+        coarse: align::coarse(&icon, &p.verdict.align),
         icon,
     }
 }

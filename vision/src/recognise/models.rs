@@ -140,6 +140,12 @@ impl ModelSet {
         self.models.get(index)
     }
 
+    /// Memory that the set and its models take, in bytes.
+    pub fn memory_bytes(&self) -> usize {
+        let own = self.signatures.len() * SIGNATURE_BYTES + self.owners.len() * size_of::<(u32, u8)>();
+        own + self.models.iter().map(|m| size_of::<Arc<LandmarkModel>>() + m.memory_bytes()).sum::<usize>()
+    }
+
     /// [`Params::distance_hash`] of the parameters that the set is for; 0 for a set made by `default()`.
     pub fn params_hash(&self) -> u64 {
         self.params_hash

@@ -3,21 +3,15 @@
 //! "Unknown" whenever in doubt.
 
 use super::{
-    Candidate, DistanceKind, IconFeatures, MAX_CANDIDATES, Recognition, Refusal, Verdict,
-    align::{AlignParams, Surroundings, Template},
-    compare::{Near, Sighting, least_hausdorff, nearest, short_list, sightings},
+    Candidate, DistanceKind, MAX_CANDIDATES, Recognition, Refusal, Verdict,
+    align::AlignParams,
+    compare::{Near, Sighting, nearest, short_list, sightings},
     confidence::{confidence, entropy_m, entropy_norm, probability},
-    correlation::correlation,
-    features,
-    likeness::likeness,
+    look::{Judged, look, verify},
     models::ModelSet,
+    watch::{NoWatch, Step, Watch},
 };
-use crate::{
-    detect::quads::{Corners, Quad},
-    frame::GrayImage,
-    icon::rectify,
-    params::Params,
-};
+use crate::{detect::quads::Quad, frame::GrayImage, params::Params};
 use serde::{Deserialize, Serialize};
 
 /// Parameters of the decision.
@@ -60,22 +54,41 @@ pub fn recognise(
     kind: DistanceKind,
     p: &Params,
 ) -> Verdict {
+    recognise_watched(image, quad, models, kind, p, &mut NoWatch)
+}
+
+/// The same, and `watch` is told of every step.
+pub fn recognise_watched(
+    image: &GrayImage,
+    quad: &Quad,
+    models: &ModelSet,
+    kind: DistanceKind,
+    p: &Params,
+    watch: &mut impl Watch,
+) -> Verdict {
     if models.is_empty() || models.params_hash() != p.distance_hash() {
         return unknown(models.len());
     }
     let sightings = sightings(image, quad, p);
+    watch.finished(Step::Icons);
     let near = match kind {
         DistanceKind::Both => short_list(&sightings, models, p.recognise.verdict.short_list, p),
         DistanceKind::Correlation | DistanceKind::Hausdorff => {
             nearest(&sightings, models, kind, MAX_CANDIDATES, p)
         }
     };
+    watch.finished(Step::ShortList);
     let mut found: Vec<Judged> = near.into_iter().map(|near| Judged { near, moved: None }).collect();
     match kind {
-        DistanceKind::Both => look(image, &sightings, &mut found, p),
-        DistanceKind::Correlation | DistanceKind::Hausdorff => verify(image, &sightings, &mut found, kind, p),
+        DistanceKind::Both => look(image, &sightings, &mut found, p, watch),
+        DistanceKind::Correlation | DistanceKind::Hausdorff => {
+            verify(image, &sightings, &mut found, kind, p);
+            watch.finished(Step::Alignment);
+        }
     }
-    decide(&found, &sightings, kind, models.len(), &p.recognise.verdict)
+    let verdict = decide(&found, &sightings, kind, models.len(), &p.recognise.verdict);
+    watch.finished(Step::Decision);
+    verdict
 }
 
 /// No landmark, no candidate.
@@ -91,99 +104,6 @@ fn unknown(landmarks: usize) -> Verdict {
         aligned_px: None,
         landmarks,
     }
-}
-
-/// A near landmark, with or without alignment.
-struct Judged {
-    near: Near,
-    /// Where alignment moved the corners, if the distances are those after it.
-    moved: Option<Corners>,
-}
-
-impl Judged {
-    /// The first gate that refuses it.
-    fn refusal(&self, kind: DistanceKind, p: &VerdictParams) -> Option<Refusal> {
-        // The corners were moved to please the landmark, but for Both, whose tau was learnt after such moves.
-        let limit = if self.moved.is_some() { p.verified_share } else { 1.0 };
-        // Written so that a NaN refuses.
-        let below = |ratio: f64, limit: f64| ratio < limit;
-        let correlation = below(self.near.correlation_ratio(), limit);
-        let hausdorff = below(self.near.hausdorff_ratio(), limit);
-        match kind {
-            DistanceKind::Correlation => (!correlation).then_some(Refusal::Correlation),
-            DistanceKind::Hausdorff => (!hausdorff).then_some(Refusal::Hausdorff),
-            DistanceKind::Both if !below(self.near.ratio(kind), 1.0) => Some(Refusal::Likeness),
-            DistanceKind::Both => (!correlation && !hausdorff).then_some(Refusal::Correlation),
-        }
-    }
-}
-
-/// Lays the quad's picture on the exemplar of each landmark of the short list, and compares it there; the distances are
-/// those of the picture where it came to lie.
-fn look(image: &GrayImage, sightings: &[Sighting], found: &mut [Judged], p: &Params) {
-    let (c, v) = (&p.recognise.correlation, &p.recognise.verdict);
-    let mut surroundings: Vec<Option<Option<Surroundings>>> = vec![None; sightings.len()];
-    for Judged { near, moved } in found.iter_mut() {
-        let sighting = &sightings[near.sighting];
-        let Some(exemplar) = near.model.exemplars.get(near.exemplar) else { continue };
-        let around = surroundings[near.sighting]
-            .get_or_insert_with(|| Surroundings::new(image, &sighting.corners_px, &p.icon, &v.align));
-        let template = Template::new(&exemplar.icon, c);
-        let laid = around.as_ref().and_then(|s| s.align(&template, &v.align));
-        let Some(laid) = laid else {
-            near.likeness = Some(likeness(&sighting.icon, &exemplar.icon, c));
-            continue;
-        };
-        near.likeness = Some(likeness(&laid.icon, &exemplar.icon, c));
-        *moved = Some(laid.corners_px);
-        if near.ratio(DistanceKind::Both) < 1.0 {
-            let icon = features(laid.icon, &p.recognise);
-            let each = near.model.exemplars.iter().map(|e| correlation(&icon, e, c));
-            (near.correlation, near.hausdorff) =
-                (each.fold(2.0, f64::min), least_hausdorff(&icon.points, &near.model, p).0);
-        }
-    }
-    found.sort_by(|a, b| a.near.ratio(DistanceKind::Both).total_cmp(&b.near.ratio(DistanceKind::Both)));
-}
-
-/// Lays the quad's picture on each candidate within reach, nearest first, and keeps what the better fit says.
-fn verify(image: &GrayImage, sightings: &[Sighting], found: &mut [Judged], kind: DistanceKind, p: &Params) {
-    let v = &p.recognise.verdict;
-    let mut surroundings: Vec<Option<Option<Surroundings>>> = vec![None; sightings.len()];
-    for judged in found.iter_mut().filter(|j| j.near.ratio(kind) < v.verify_reach).take(v.max_verified) {
-        let i = judged.near.sighting;
-        let around = surroundings[i]
-            .get_or_insert_with(|| Surroundings::new(image, &sightings[i].corners_px, &p.icon, &v.align));
-        let Some((icon, corners_px)) = around.as_ref().and_then(|s| laid_on(image, s, &judged.near, p))
-        else {
-            continue;
-        };
-        let model = &judged.near.model;
-        let each = model.exemplars.iter().map(|e| correlation(&icon, e, &p.recognise.correlation));
-        let (correlation, hausdorff) = (each.fold(2.0, f64::min), least_hausdorff(&icon.points, model, p).0);
-        let near = Near { correlation, hausdorff, ..judged.near.clone() };
-        let moved = Judged { near, moved: Some(corners_px) };
-        // What was accepted where it stood is not lost by a move that fits worse.
-        let lost = judged.refusal(kind, v).is_none() && moved.refusal(kind, v).is_some();
-        if moved.near.ratio(kind) < judged.near.ratio(kind) && !lost {
-            *judged = moved;
-        }
-    }
-    found.sort_by(|a, b| a.near.ratio(kind).total_cmp(&b.near.ratio(kind)));
-}
-
-/// The quad's picture after its corners were moved to fit the nearest exemplar, and those corners.
-fn laid_on(
-    image: &GrayImage,
-    around: &Surroundings,
-    near: &Near,
-    p: &Params,
-) -> Option<(IconFeatures, Corners)> {
-    let r = &p.recognise;
-    let exemplar = near.model.exemplars.get(near.exemplar)?;
-    let corners = around.align(&Template::new(&exemplar.icon, &r.correlation), &r.verdict.align)?.corners_px;
-    let icon = rectify(image, &corners, &p.icon).ok()?;
-    Some((features(icon, r), corners))
 }
 
 /// Thresholds, margin, probabilities: the paper's three cases.

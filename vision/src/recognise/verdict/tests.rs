@@ -4,7 +4,9 @@ use super::*;
 use crate::{
     detect::quads::Corners,
     recognise::{
-        LandmarkId, compare,
+        IconFeatures, LandmarkId, compare,
+        correlation::correlation,
+        features,
         fixture::{Dice, lesson, lessons, model_set, oblique, photograph, poster, quad},
     },
 };
