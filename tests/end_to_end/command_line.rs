@@ -94,6 +94,22 @@ const OPTIONS: [(&str, &[&str]); 16] = [
         "bench detect",
         &["--data", "--count", "--rounds", "--no-peers", "--python", "--seed", "--json", "[IMAGES]"],
     ),
+    (
+        "bench recognise",
+        &[
+            "--landmarks",
+            "--taught",
+            "--quads",
+            "--recall-quads",
+            "--frames",
+            "--rounds",
+            "--views",
+            "--no-peers",
+            "--python",
+            "--seed",
+            "--json",
+        ],
+    ),
     ("", &["--log", "--version"]),
 ];
 

@@ -4,6 +4,7 @@ mod pipeline;
 mod frames;
 mod peers;
 mod detect;
+mod recognise;
 
 /// `waymark bench`.
 #[derive(Debug, clap::Args)]
@@ -24,11 +25,19 @@ enum What {
     /// timed, several rounds. Times are of the processor, not of the clock, so other work on the machine matters
     /// little; ratios are of one run. Without OpenCV our own times are printed.
     Detect(detect::Args),
+    /// From icon to verdict among many landmarks, whole frames beside OpenCV's SIFT, the short list, and a lesson.
+    ///
+    /// Posters are drawn by the simulator. Some are taught as a server would, from generated views; the rest of a map
+    /// get three icons each and thresholds of those. Frames are rendered in a corridor whose posters are among the
+    /// landmarks, and SIFT (through python3, one thread, one index over all landmarks, votes, a homography by RANSAC)
+    /// is given the same pictures. Times are of the processor.
+    Recognise(recognise::Args),
 }
 
 pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     match &args.what {
         None => pipeline::run(&args.pipeline),
         Some(What::Detect(args)) => detect::run(args),
+        Some(What::Recognise(args)) => recognise::run(args),
     }
 }

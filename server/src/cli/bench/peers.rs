@@ -1,7 +1,8 @@
-//! OpenCV beside us: a Python program that is told which picture is next and answers with the times of its detectors.
-//! Whatever is wrong with it (no Python, no OpenCV, no answer) is a reason to do without, never a failure.
+//! OpenCV beside us: a Python program that is told which picture is next and answers with a line of JSON, the times of
+//! its detectors for one. Whatever is wrong with it (no Python, no OpenCV, no answer) is a reason to do without, never a
+//! failure.
 
-use serde::Deserialize;
+use serde::{Deserialize, de::DeserializeOwned};
 use std::{
     collections::BTreeMap,
     io::{BufRead as _, BufReader, Write as _},
@@ -16,39 +17,38 @@ use vision::frame::GrayImage;
 const PROGRAM: &str = include_str!("peers.py");
 /// How to get what it needs.
 pub(super) const HINT: &str = "python3 -m pip install opencv-contrib-python-headless";
-/// Longest wait for a line, of the imports too.
-const ANSWER: Duration = Duration::from_mins(2);
+/// Longest wait for a line, of the imports and of preparing the pictures too.
+const ANSWER: Duration = Duration::from_mins(10);
 
-/// The first line.
+/// The first line, and what it says where something is missing.
 #[derive(Deserialize)]
-#[serde(untagged)]
-enum Greeting {
-    Ready { version: String, names: Vec<String> },
-    Missing { missing: String },
+struct Greeting {
+    version: String,
 }
 
-/// A running Python with all pictures loaded. It ends with this value.
+#[derive(Deserialize)]
+struct Missing {
+    missing: String,
+}
+
+/// A running Python program that answers line by line. It ends with this value.
 #[derive(Debug)]
-pub(super) struct Peers {
+pub(super) struct Python {
     child: Child,
     stdin: ChildStdin,
     lines: mpsc::Receiver<String>,
-    pub(super) version: String,
-    pub(super) names: Vec<String>,
 }
 
-impl Peers {
-    /// Starts `python` with the frames, which are written to `folder` for it. The error says why there is none.
-    pub(super) fn start(python: &Path, frames: &[GrayImage], folder: &Path) -> Result<Self, String> {
-        let mut files: Vec<PathBuf> = Vec::new();
-        for (i, frame) in frames.iter().enumerate() {
-            let path = folder.join(format!("{i}.pgm"));
-            std::fs::write(&path, sim::export::pgm(frame)).map_err(|e| format!("{}: {e}", path.display()))?;
-            files.push(path);
-        }
+impl Python {
+    /// Starts `program` with arguments; also its first line. The error says why there is none.
+    pub(super) fn start<T: DeserializeOwned>(
+        python: &Path,
+        program: &str,
+        args: &[PathBuf],
+    ) -> Result<(Self, T), String> {
         let mut child = Command::new(python)
-            .args(["-u", "-c", PROGRAM])
-            .args(&files)
+            .args(["-u", "-c", program])
+            .args(args)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
@@ -65,21 +65,18 @@ impl Peers {
                 }
             }
         });
-        let mut peers = Self { child, stdin, lines, version: String::new(), names: vec![] };
-        let greeting = peers.line()?;
-        match serde_json::from_str(&greeting) {
-            Ok(Greeting::Ready { version, names }) => {
-                (peers.version, peers.names) = (version, names);
-                Ok(peers)
-            }
-            Ok(Greeting::Missing { missing }) => Err(missing),
-            Err(error) => Err(format!("{greeting}: {error}")),
+        let running = Self { child, stdin, lines };
+        let greeting = running.line()?;
+        if let Ok(Missing { missing }) = serde_json::from_str(&greeting) {
+            return Err(missing);
         }
+        let greeting = serde_json::from_str(&greeting).map_err(|error| format!("{greeting}: {error}"))?;
+        Ok((running, greeting))
     }
 
-    /// Milliseconds of every detector on a picture.
-    pub(super) fn time(&mut self, frame: usize) -> Result<BTreeMap<String, f64>, String> {
-        writeln!(self.stdin, "{frame}").map_err(|error| error.to_string())?;
+    /// Says a line and waits for the answer.
+    pub(super) fn ask<T: DeserializeOwned>(&mut self, question: &str) -> Result<T, String> {
+        writeln!(self.stdin, "{question}").map_err(|error| error.to_string())?;
         let line = self.line()?;
         serde_json::from_str(&line).map_err(|error| format!("{line}: {error}"))
     }
@@ -89,7 +86,42 @@ impl Peers {
     }
 }
 
-impl Drop for Peers {
+/// Writes pictures to `folder`, by name and number.
+pub(super) fn written<'a>(
+    images: impl IntoIterator<Item = &'a GrayImage>,
+    folder: &Path,
+    name: &str,
+) -> Result<Vec<PathBuf>, String> {
+    let write = |(i, image): (usize, &GrayImage)| {
+        let path = folder.join(format!("{name}-{i}.pgm"));
+        std::fs::write(&path, sim::export::pgm(image)).map_err(|e| format!("{}: {e}", path.display()))?;
+        Ok(path)
+    };
+    images.into_iter().enumerate().map(write).collect()
+}
+
+/// A running Python with all pictures loaded, that times OpenCV's detectors.
+#[derive(Debug)]
+pub(super) struct Peers {
+    python: Python,
+    pub(super) version: String,
+}
+
+impl Peers {
+    /// Starts `python` with the frames, which are written to `folder` for it. The error says why there is none.
+    pub(super) fn start(python: &Path, frames: &[GrayImage], folder: &Path) -> Result<Self, String> {
+        let files = written(frames, folder, "frame")?;
+        let (python, Greeting { version }) = Python::start(python, PROGRAM, &files)?;
+        Ok(Self { python, version })
+    }
+
+    /// Milliseconds of every detector on a picture.
+    pub(super) fn time(&mut self, frame: usize) -> Result<BTreeMap<String, f64>, String> {
+        self.python.ask(&frame.to_string())
+    }
+}
+
+impl Drop for Python {
     fn drop(&mut self) {
         // It may have ended by itself; then there is nothing to end.
         self.child.kill().ok();

@@ -1,0 +1,39 @@
+//! A lesson: one landmark from many views, to be told from all others of a map.
+
+use super::{Args, fastest, landmarks::views};
+use serde::Serialize;
+use vision::{
+    learn::model::learn,
+    params::Params,
+    recognise::{IconFeatures, LandmarkId, ModelSet},
+};
+
+/// The poster that is learnt: no landmark of the maps.
+const POSTER: usize = 2_000_000;
+
+/// What it took.
+#[derive(Debug, Serialize)]
+pub(super) struct Report {
+    pub(super) views: usize,
+    pub(super) others: usize,
+    /// Icons of the others, three each as in the server.
+    pub(super) negatives: usize,
+    /// Views are cut and negatives are at hand.
+    pub(super) ms: f64,
+    pub(super) active: bool,
+}
+
+pub(super) fn run(args: &Args, first: u64, map: &ModelSet, p: &Params) -> anyhow::Result<Report> {
+    let views = views(first, POSTER, args.views as usize - 1, p)?;
+    let negatives: Vec<IconFeatures> = map.iter().flat_map(|m| m.exemplars.iter().cloned()).collect();
+    let (ms, model) =
+        fastest(args.rounds as usize, || learn(LandmarkId(POSTER as u64), &views, &negatives, p));
+    let model = model?;
+    Ok(Report {
+        views: views.len(),
+        others: map.len(),
+        negatives: negatives.len(),
+        ms,
+        active: model.is_active(),
+    })
+}
