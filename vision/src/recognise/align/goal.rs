@@ -179,19 +179,19 @@ mod tests {
     use super::super::lattice::{Pattern, Picture, SquareMap, sample, square};
     use super::*;
 
-    fn waves(x: f64, y: f64) -> f32 {
+    fn waves(x: i32, y: i32) -> f32 {
+        let (x, y) = (f64::from(x), f64::from(y));
         (120.0 + 50.0 * (0.25 * x + 0.08 * y).sin() + 40.0 * (0.2 * y - 0.15 * x).cos()) as f32
     }
 
     #[test]
     fn slopes_are_the_finite_differences() {
         let lattice = Lattice::new(75, 5, 4, Pattern::Fourth);
-        let pixels: Vec<f32> = (0..75 * 75).map(|i| waves((i % 75) as f64, (i / 75) as f64)).collect();
+        let pixels: Vec<f32> = (0..75 * 75).map(|i| waves(i % 75, i / 75)).collect();
         let goal = Goal::<8>::new(&lattice, &pixels, 1.0);
         assert_eq!(goal.buckets.len(), 25);
         // The picture with 10 px around, and one corner moved there and back.
-        let wide: Vec<f32> =
-            (0..95 * 95).map(|i| waves((i % 95) as f64 - 10.0, (i / 95) as f64 - 10.0)).collect();
+        let wide: Vec<f32> = (0..95 * 95).map(|i| waves((i % 95) - 10, (i / 95) - 10)).collect();
         let picture = Picture { pixels: &wide, width: 95, margin: 10 };
         for way in 0..8 {
             let seen = |by: f64| {
@@ -217,8 +217,7 @@ mod tests {
     #[test]
     fn sides_are_sums_of_corners() {
         let lattice = Lattice::new(25, 5, 1, Pattern::All);
-        let pixels: Vec<f32> =
-            (0..625).map(|i| waves(3.0 * (i % 25) as f64, 3.0 * (i / 25) as f64)).collect();
+        let pixels: Vec<f32> = (0..625).map(|i| waves(3 * (i % 25), 3 * (i / 25))).collect();
         let (sides, corners) =
             (Goal::<4>::new(&lattice, &pixels, 1.0), Goal::<8>::new(&lattice, &pixels, 1.0));
         for (side, [a, b]) in [[0, 6], [2, 4], [1, 3], [5, 7]].into_iter().enumerate() {
@@ -232,11 +231,10 @@ mod tests {
     #[test]
     fn flat_buckets_say_nothing() {
         let lattice = Lattice::new(75, 5, 0, Pattern::All);
-        let pixels: Vec<f32> = (0..75 * 75)
-            .map(|i| if i % 75 < 15 { waves((i % 75) as f64, (i / 75) as f64) } else { 80.0 })
-            .collect();
+        let pixels: Vec<f32> =
+            (0..75 * 75).map(|i| if i % 75 < 15 { waves(i % 75, i / 75) } else { 80.0 }).collect();
         let goal = Goal::<4>::new(&lattice, &pixels, 1.0);
         assert_eq!(goal.buckets.len(), 5);
-        assert!(Goal::<4>::new(&lattice, &[f32::NAN; 5625], 1.0).buckets.is_empty());
+        assert!(Goal::<4>::new(&lattice, &vec![f32::NAN; 5625], 1.0).buckets.is_empty());
     }
 }
