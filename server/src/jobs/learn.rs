@@ -6,6 +6,7 @@
 
 use super::{
     JobError, Reporter,
+    look_alikes::{LookAlike, look_alikes},
     negatives::{Negatives, each, real_strangers, spread},
 };
 use crate::{
@@ -86,6 +87,7 @@ struct Learnt {
     models: Vec<LandmarkModel>,
     refitted: Vec<LandmarkModel>,
     failed: Vec<(LandmarkId, String)>,
+    look_alikes: BTreeMap<LandmarkId, Vec<LookAlike>>,
 }
 
 /// Does the job: ends its row in the same transaction as it stores the models.
@@ -193,7 +195,12 @@ fn compute(m: &Material, reporter: &Reporter) -> Result<Learnt, JobError> {
                 add_negatives(&model, negatives.of(*target), p)
             })
         })?;
-    let mut done = Learnt { models: Vec::new(), refitted, failed: Vec::new() };
+    let models: Vec<&LandmarkModel> = learnt.iter().flatten().chain(&refitted).collect();
+    let found = each_of(&models, m.workers, reporter, (0.99, 0.99, "look-alikes"), |model| {
+        look_alikes(model, &negatives, p)
+    })?;
+    let look_alikes = models.iter().map(|m| m.id).zip(found).filter(|(_, found)| !found.is_empty()).collect();
+    let mut done = Learnt { models: Vec::new(), refitted, failed: Vec::new(), look_alikes };
     for (id, result) in m.targets.iter().zip(learnt) {
         match result {
             Ok(model) => done.models.push(model),
@@ -320,7 +327,14 @@ async fn commit(
     let candidates: Vec<_> = learnt.models.iter().filter(|m| !m.is_active()).map(|m| name(&m.id)).collect();
     let failed: Vec<_> =
         learnt.failed.iter().map(|(id, reason)| json!({ "landmark": name(id), "reason": reason })).collect();
+    let look_alikes: Vec<_> = learnt
+        .look_alikes
+        .iter()
+        .flat_map(|(id, found)| found.iter().map(move |l| (id, l)))
+        .map(|(id, l)| json!({ "landmark": name(id), "other": name(&l.other), "likeness": l.likeness }))
+        .collect();
     let result = json!({
+        "look_alikes": look_alikes,
         "learnt": learnt.models.len(),
         "active": active,
         "candidates": candidates,
@@ -331,7 +345,12 @@ async fn commit(
     });
     let message = format!("{active} of {} landmarks active", learnt.models.len() + learnt.failed.len());
     let ended = Ended { state: "done", message, result: Some(result.to_string()) };
-    let rows: Vec<NewModel> = learnt.models.iter().chain(&learnt.refitted).map(row).collect();
+    let of = |model: &LandmarkModel| -> Vec<Value> {
+        let found = learnt.look_alikes.get(&model.id).map_or(&[][..], Vec::as_slice);
+        found.iter().map(|l| json!({ "landmark": name(&l.other), "likeness": l.likeness })).collect()
+    };
+    let models = learnt.models.iter().chain(&learnt.refitted);
+    let rows: Vec<NewModel> = models.map(|model| row(model, &of(model))).collect();
     let write = store.write(move |tx| {
         Box::pin(async move {
             let map = maps::still(tx, map).await?;
@@ -345,7 +364,7 @@ async fn commit(
     write.await
 }
 
-fn row(model: &LandmarkModel) -> NewModel {
+fn row(model: &LandmarkModel, look_alikes: &[Value]) -> NewModel {
     let failures = match &model.status {
         ModelStatus::Active => &[][..],
         ModelStatus::Candidate(failures) => failures,
@@ -358,6 +377,7 @@ fn row(model: &LandmarkModel) -> NewModel {
         "correlation": model.correlation,
         "hausdorff": model.hausdorff,
         "likeness": model.likeness,
+        "look_alikes": look_alikes,
         "saliency": model.saliency,
         "saliency_f": model.saliency_f,
         "stable_points": model.stable_points,

@@ -3,6 +3,7 @@
 
 pub(crate) mod learn;
 mod negatives;
+mod look_alikes;
 
 use crate::{
     config::Config,

@@ -62,6 +62,11 @@ impl Negatives {
             .map_or(&[], |(_, range)| &self.icons[range.clone()])
     }
 
+    /// Every landmark with its icons.
+    pub(super) fn by_owner(&self) -> impl Iterator<Item = (LandmarkId, &[IconFeatures])> {
+        self.owners.iter().map(|(owner, range)| (*owner, &self.icons[range.clone()]))
+    }
+
     /// The icons of all other landmarks, in two parts: before and after its own.
     pub(super) fn others(&self, landmark: LandmarkId) -> (&[IconFeatures], &[IconFeatures]) {
         match self.owners.iter().find(|(owner, _)| *owner == landmark) {

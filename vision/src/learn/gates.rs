@@ -24,7 +24,7 @@ pub struct GateParams {
     /// F only has to tell texture from a blank panel (1.1), while their corner noise and light are harsher than a
     /// robot's own.
     pub min_saliency_f_generated: f64,
-    /// Fewest stable points.
+    /// Fewest stable points, where one of the paper's distances decides alone.
     pub min_stable_points: usize,
     /// Least visibility confidence `v_c`.
     pub min_v_c: f64,

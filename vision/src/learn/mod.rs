@@ -7,5 +7,6 @@ pub mod pca;
 pub mod threshold;
 pub mod gates;
 pub mod model;
+mod fitting;
 mod lesson;
 mod stored;

@@ -18,7 +18,8 @@ use crate::{
 use serde::{Deserialize, Serialize};
 
 pub use super::{
-    lesson::{add_negatives, learn, refit_thresholds},
+    fitting::{add_negatives, refit_thresholds, unlikeness_of},
+    lesson::learn,
     stored::StoredModelError,
 };
 
@@ -213,7 +214,7 @@ pub enum Gate {
     Views,
     /// Saliency F.
     Saliency,
-    /// Stable points.
+    /// Stable points: where neither of the paper's distances has a threshold.
     StablePoints,
     /// Visibility confidence `v_c`.
     VisibilityConfidence,

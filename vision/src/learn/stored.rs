@@ -3,7 +3,7 @@
 //! follow from the icons.
 
 use super::{
-    lesson::add_negatives,
+    fitting::add_negatives,
     model::{Evidence, LandmarkModel, MAX_EXEMPLARS, MAX_VIEWS, ModelStatus},
     threshold::Threshold,
 };

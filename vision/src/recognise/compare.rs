@@ -33,18 +33,22 @@ pub(crate) struct Sighting {
     pub(crate) corners_px: Corners,
     /// What they enclose.
     pub(crate) icon: Icon,
-    /// The icon's buckets.
-    pub(crate) buckets: Buckets,
     /// The icon's signature.
     pub(crate) signature: Signature,
+    buckets: OnceCell<Buckets>,
     points: OnceCell<PointSet>,
 }
 
 impl Sighting {
-    fn new(border: usize, rotation: usize, corners_px: Corners, icon: Icon, p: &Params) -> Self {
-        let buckets = Buckets::new(&icon, &p.recognise.correlation);
+    fn new(border: usize, rotation: usize, corners_px: Corners, icon: Icon) -> Self {
         let signature = Signature::new(&icon);
-        Self { border, rotation, corners_px, icon, buckets, signature, points: OnceCell::new() }
+        let (buckets, points) = (OnceCell::new(), OnceCell::new());
+        Self { border, rotation, corners_px, icon, signature, buckets, points }
+    }
+
+    /// The icon's buckets. Worked out when first asked for.
+    pub(crate) fn buckets(&self, p: &Params) -> &Buckets {
+        self.buckets.get_or_init(|| Buckets::new(&self.icon, &p.recognise.correlation))
     }
 
     /// The icon's points. Worked out when first asked for: most quads are out of reach by C^r alone.
@@ -63,7 +67,7 @@ pub(crate) fn sightings(image: &GrayImage, quad: &Quad, p: &Params) -> Vec<Sight
         let Ok(upright) = icon(image, corners_px, &p.icon) else { continue };
         for rotation in 0..rotations {
             let corners_px = corners_px.rotated(rotation);
-            all.push(Sighting::new(border, rotation, corners_px, upright.rotated(rotation), p));
+            all.push(Sighting::new(border, rotation, corners_px, upright.rotated(rotation)));
         }
     }
     all
@@ -81,6 +85,8 @@ pub(crate) struct Near {
     pub(crate) hausdorff: f64,
     /// Likeness after alignment, once it was measured.
     pub(crate) likeness: Option<f64>,
+    /// How alike the signatures are; 0 where they were not compared.
+    pub(crate) signature: f32,
 }
 
 impl Near {
@@ -112,27 +118,45 @@ fn ratio(distance: f64, tau: f64) -> f64 {
 }
 
 /// The `count` landmarks whose signatures are most like one of the sightings', best first, each with its best sighting;
-/// of equal ones the lower id. H^r is left infinite.
-pub(crate) fn short_list(sightings: &[Sighting], models: &ModelSet, count: usize, p: &Params) -> Vec<Near> {
+/// of equal ones the lower id. Distances are left at their worst.
+pub(crate) fn short_list(sightings: &[Sighting], models: &ModelSet, count: usize) -> Vec<Near> {
     let mut found: Vec<(usize, Listed)> = Vec::new();
     for (i, sighting) in sightings.iter().enumerate() {
         found.extend(models.short_list(&sighting.signature, count).into_iter().map(|l| (i, l)));
     }
     found.sort_by(|a, b| b.1.likeness.total_cmp(&a.1.likeness).then((a.1.model, a.0).cmp(&(b.1.model, b.0))));
     let mut near: Vec<Near> = Vec::new();
-    let rank = p.recognise.correlation.rank();
     for (sighting, listed) in found {
         let Some(model) = models.at(listed.model) else { continue };
         if near.len() == count || near.iter().any(|n| n.model.id == model.id) {
             continue;
         }
-        let buckets = &sightings[sighting].buckets;
-        let each = model.exemplars.iter().filter_map(|e| correlation_within(buckets, &e.buckets, rank, 2.0));
-        let correlation = each.fold(2.0, f64::min);
-        let (model, exemplar) = (Arc::clone(model), listed.exemplar);
-        near.push(Near { model, sighting, exemplar, correlation, hausdorff: f64::INFINITY, likeness: None });
+        near.push(Near {
+            model: Arc::clone(model),
+            sighting,
+            exemplar: listed.exemplar,
+            correlation: WORST_CORRELATION,
+            hausdorff: f64::INFINITY,
+            likeness: None,
+            signature: listed.likeness,
+        });
     }
     near
+}
+
+/// C^r of icons that have nothing in common.
+const WORST_CORRELATION: f64 = 2.0;
+
+/// C^r where the quad was found, to the exemplar that is nearest by its signature.
+pub(crate) fn correlation_as_found(near: &Near, sightings: &[Sighting], p: &Params) -> f64 {
+    let (Some(sighting), Some(exemplar)) =
+        (sightings.get(near.sighting), near.model.exemplars.get(near.exemplar))
+    else {
+        return WORST_CORRELATION;
+    };
+    let rank = p.recognise.correlation.rank();
+    correlation_within(sighting.buckets(p), &exemplar.buckets, rank, WORST_CORRELATION)
+        .unwrap_or(WORST_CORRELATION)
 }
 
 /// The `count` landmarks of least ratio by one of the paper's distances, and every one with a ratio below 1, rising; of
@@ -148,7 +172,9 @@ pub(crate) fn nearest(
     let mut ratios: Vec<f64> = Vec::new();
     // What is further than the worst of the best `count` so far cannot be among them.
     let mut reach = f64::INFINITY;
-    for model in models.iter() {
+    // The paper's gate of its own distances: points that come back.
+    let stable = p.learn.gates.min_stable_points;
+    for model in models.iter().filter(|m| m.stable_points >= stable) {
         let near = match kind {
             DistanceKind::Hausdorff => nearest_by_points(sightings, model, p),
             DistanceKind::Correlation | DistanceKind::Both => {
@@ -191,7 +217,7 @@ fn nearest_by_correlation(
     let mut best = None;
     for (sighting, s) in sightings.iter().enumerate() {
         for (exemplar, e) in model.exemplars.iter().enumerate() {
-            if let Some(d) = correlation_within(&s.buckets, &e.buckets, rank, limit) {
+            if let Some(d) = correlation_within(s.buckets(p), &e.buckets, rank, limit) {
                 limit = d;
                 best = Some((sighting, exemplar, d));
             }
@@ -204,6 +230,7 @@ fn nearest_by_correlation(
         correlation,
         hausdorff: f64::INFINITY,
         likeness: None,
+        signature: 0.0,
     })
 }
 
@@ -217,14 +244,22 @@ fn nearest_by_points(sightings: &[Sighting], model: &Arc<LandmarkModel>, p: &Par
         }
     }
     let (sighting, exemplar, hausdorff) = best.filter(|_| model.hausdorff.tau > 0.0)?;
-    let buckets = &sightings[sighting].buckets;
+    let buckets = sightings[sighting].buckets(p);
     let rank = p.recognise.correlation.rank();
     let correlation = model
         .exemplars
         .iter()
         .filter_map(|e| correlation_within(buckets, &e.buckets, rank, f64::INFINITY))
         .fold(2.0, f64::min);
-    Some(Near { model: Arc::clone(model), sighting, exemplar, correlation, hausdorff, likeness: None })
+    Some(Near {
+        model: Arc::clone(model),
+        sighting,
+        exemplar,
+        correlation,
+        hausdorff,
+        likeness: None,
+        signature: 0.0,
+    })
 }
 
 /// Least H^r over the exemplars, and which has it.

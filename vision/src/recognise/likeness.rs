@@ -5,41 +5,67 @@
 //! Beyond the method: its distances compare icons where they were found; this one is for icons after alignment
 //! (`align.rs`), where it tells landmarks from look-alikes far better (docs/EVALUATION.md).
 
-use super::correlation::CorrelationParams;
+use super::correlation::{CorrelationParams, LANES};
 use crate::icon::Icon;
+use fearless_simd::{Level, dispatch};
 
 /// Variance that noise adds to a difference of two grey levels, squared grey levels.
 const NOISE: f32 = 4.0;
 /// Pixels along the icon's border that are not compared: alignment is least sure of them.
 const BORDER_PX: usize = 3;
 
+/// An icon ready to be compared: smoothed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Smoothed {
+    size: usize,
+    pixels: Vec<f32>,
+}
+
+impl Smoothed {
+    /// Smooths `icon`.
+    pub fn new(icon: &Icon) -> Self {
+        Self { size: icon.size, pixels: dispatch!(Level::new(), _s => smoothed(icon)) }
+    }
+}
+
 /// Mean over the buckets of the correlation of their slopes, -1 to 1; 0 where both are flat, or cut differently.
 pub fn likeness(a: &Icon, b: &Icon, p: &CorrelationParams) -> f64 {
+    between(&Smoothed::new(a), &Smoothed::new(b), p)
+}
+
+/// The same of smoothed icons.
+pub fn between(a: &Smoothed, b: &Smoothed, p: &CorrelationParams) -> f64 {
     let (size, per_side) = (a.size, p.per_side());
     if b.size != size || size <= 2 * BORDER_PX + per_side {
         return 0.0;
     }
-    let (a, b) = (smoothed(a), smoothed(b));
+    dispatch!(Level::new(), _s => mean_correlation(&a.pixels, &b.pixels, size, per_side))
+}
+
+#[expect(
+    clippy::inline_always,
+    reason = "an instruction set holds only in what is inlined where it was chosen"
+)]
+#[inline(always)]
+fn mean_correlation(a: &[f32], b: &[f32], size: usize, per_side: usize) -> f64 {
     let edge = |i: usize| i * size / per_side;
     let within = |i: usize| edge(i).max(BORDER_PX)..edge(i + 1).min(size - BORDER_PX);
     let mut sum = 0.0;
     for bucket in 0..per_side * per_side {
-        let (mut ab, mut aa, mut bb) = (0.0_f32, 0.0_f32, 0.0_f32);
         let columns = within(bucket % per_side);
+        let mut sums = [[0.0_f32; LANES]; 3];
         for y in within(bucket / per_side) {
-            let row = |icon: &[f32]| {
-                let at = |x: usize, y: usize| icon[y * size + x];
-                columns
-                    .clone()
-                    .map(|x| [at(x + 1, y) - at(x - 1, y), at(x, y + 1) - at(x, y - 1)])
-                    .collect::<Vec<_>>()
-            };
-            for ([ax, ay], [bx, by]) in row(&a).into_iter().zip(row(&b)) {
-                ab += ax * bx + ay * by;
-                aa += ax * ax + ay * ay + NOISE;
-                bb += bx * bx + by * by + NOISE;
+            for x in columns.clone() {
+                let at = y * size + x;
+                let slope = |icon: &[f32]| [icon[at + 1] - icon[at - 1], icon[at + size] - icon[at - size]];
+                let ([ax, ay], [bx, by]) = (slope(a), slope(b));
+                let lane = (x - columns.start) % LANES;
+                sums[0][lane] += ax * bx + ay * by;
+                sums[1][lane] += ax * ax + ay * ay + NOISE;
+                sums[2][lane] += bx * bx + by * by + NOISE;
             }
         }
+        let [ab, aa, bb] = sums.map(|lanes| lanes.iter().sum::<f32>());
         let correlation = ab / (aa * bb).sqrt();
         sum += if correlation.is_finite() { f64::from(correlation) } else { 0.0 };
     }
@@ -47,6 +73,11 @@ pub fn likeness(a: &Icon, b: &Icon, p: &CorrelationParams) -> f64 {
 }
 
 /// Each pixel with its eight neighbours, weighted 1 2 1 along both axes; border replicated.
+#[expect(
+    clippy::inline_always,
+    reason = "an instruction set holds only in what is inlined where it was chosen"
+)]
+#[inline(always)]
 fn smoothed(icon: &Icon) -> Vec<f32> {
     let size = icon.size;
     let mut across = Vec::with_capacity(size * size);

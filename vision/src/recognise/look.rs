@@ -2,12 +2,12 @@
 //! distance where the quad was found. Thresholds are only read; deciding is the verdict's work.
 
 use super::{
-    DistanceKind, IconFeatures, Refusal,
+    DistanceKind, IconFeatures, MAX_CANDIDATES, Refusal,
     align::{Aligner, Surroundings, Template},
-    compare::{Near, Sighting, least_hausdorff},
-    correlation::correlation,
+    compare::{Near, Sighting, correlation_as_found, least_hausdorff},
+    correlation::{CorrelationParams, correlation},
     features,
-    likeness::likeness,
+    likeness::{Smoothed, between, likeness},
     verdict::VerdictParams,
     watch::{Step, Watch},
 };
@@ -22,7 +22,8 @@ pub(crate) struct Judged {
 
 impl Judged {
     /// The first gate that refuses it.
-    pub(crate) fn refusal(&self, kind: DistanceKind, p: &VerdictParams) -> Option<Refusal> {
+    /// `share` of the likeness's tau is what a map of this size leaves.
+    pub(crate) fn refusal(&self, kind: DistanceKind, share: f64, p: &VerdictParams) -> Option<Refusal> {
         // The corners were moved to please the landmark, but for Both, whose tau was learnt after such moves.
         let limit = if self.moved.is_some() { p.verified_share } else { 1.0 };
         // Written so that a NaN refuses.
@@ -32,14 +33,14 @@ impl Judged {
         match kind {
             DistanceKind::Correlation => (!correlation).then_some(Refusal::Correlation),
             DistanceKind::Hausdorff => (!hausdorff).then_some(Refusal::Hausdorff),
-            DistanceKind::Both if !below(self.near.ratio(kind), 1.0) => Some(Refusal::Likeness),
+            DistanceKind::Both if !below(self.near.ratio(kind), share) => Some(Refusal::Likeness),
             DistanceKind::Both => (!correlation && !hausdorff).then_some(Refusal::Correlation),
         }
     }
 }
 
 /// Lays the quad's picture on the exemplar of each landmark of the short list, and compares it there; the distances are
-/// those of the picture where it came to lie.
+/// those of the picture where it came to lie. What a glance tells to be something else gets no further look.
 pub(crate) fn look(
     image: &GrayImage,
     sightings: &[Sighting],
@@ -50,17 +51,18 @@ pub(crate) fn look(
     let (c, v) = (&p.recognise.correlation, &p.recognise.verdict);
     let aligner = Aligner::new(p.icon.size, c, &v.align);
     let mut surroundings: Vec<Option<Option<Surroundings<'_>>>> = sightings.iter().map(|_| None).collect();
+    let least = found.first().map_or(0.0, |f| f.near.signature - v.signature_gap).max(v.min_signature);
     for Judged { near, moved } in found.iter_mut() {
+        near.likeness = Some(0.0);
         let sighting = &sightings[near.sighting];
-        let Some(exemplar) = near.model.exemplars.get(near.exemplar) else { continue };
+        let Some(exemplar) = near.model.exemplars.get(near.exemplar).filter(|_| near.signature >= least)
+        else {
+            continue;
+        };
         let around = surroundings[near.sighting]
             .get_or_insert_with(|| Surroundings::new(image, &sighting.corners_px, &sighting.icon, &v.align));
         let template = Template::new(&exemplar.icon, &exemplar.coarse);
-        let laid = around.as_ref().and_then(|s| aligner.align(s, &template));
-        let Some(laid) = laid else {
-            near.likeness = Some(likeness(&sighting.icon, &exemplar.icon, c));
-            continue;
-        };
+        let Some(laid) = around.as_ref().and_then(|s| aligner.align(s, &template)) else { continue };
         near.likeness = Some(likeness(&laid.icon, &exemplar.icon, c));
         *moved = Some(laid.corners_px);
         if near.ratio(DistanceKind::Both) < 1.0 {
@@ -72,8 +74,27 @@ pub(crate) fn look(
             watch.finished(Step::Distances);
         }
     }
-    watch.finished(Step::Alignment);
+    if found.iter().any(|j| j.near.ratio(DistanceKind::Both) < 1.0) {
+        compare_as_found(sightings, found, c);
+    }
     found.sort_by(|a, b| a.near.ratio(DistanceKind::Both).total_cmp(&b.near.ratio(DistanceKind::Both)));
+    watch.finished(Step::Alignment);
+    for judged in found.iter_mut().take(MAX_CANDIDATES).filter(|j| j.near.ratio(DistanceKind::Both) >= 1.0) {
+        judged.near.correlation = correlation_as_found(&judged.near, sightings, p);
+    }
+    watch.finished(Step::Distances);
+}
+
+/// Gives those that were not laid on anything the likeness of the picture where it was found: an accepted landmark's
+/// margin is over them, too.
+fn compare_as_found(sightings: &[Sighting], found: &mut [Judged], c: &CorrelationParams) {
+    let mut smoothed: Vec<Option<Smoothed>> = vec![None; sightings.len()];
+    for Judged { near, .. } in found.iter_mut().filter(|j| j.moved.is_none()) {
+        let Some(exemplar) = near.model.exemplars.get(near.exemplar) else { continue };
+        let own =
+            smoothed[near.sighting].get_or_insert_with(|| Smoothed::new(&sightings[near.sighting].icon));
+        near.likeness = Some(between(own, &Smoothed::new(&exemplar.icon), c));
+    }
 }
 
 /// Lays the quad's picture on each candidate within reach, nearest first, and keeps what the better fit says.
@@ -95,7 +116,7 @@ pub(crate) fn verify(
         let near = Near { correlation, hausdorff, ..judged.near.clone() };
         let moved = Judged { near, moved: Some(corners_px) };
         // What was accepted where it stood is not lost by a move that fits worse.
-        let lost = judged.refusal(kind, v).is_none() && moved.refusal(kind, v).is_some();
+        let lost = judged.refusal(kind, 1.0, v).is_none() && moved.refusal(kind, 1.0, v).is_some();
         if moved.near.ratio(kind) < judged.near.ratio(kind) && !lost {
             *judged = moved;
         }

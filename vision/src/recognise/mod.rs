@@ -108,13 +108,14 @@ pub enum Refusal {
 pub struct Candidate {
     /// The landmark.
     pub landmark: LandmarkId,
-    /// C^r in [0, 2] (method 6.1).
+    /// C^r in [0, 2] (method 6.1): to the nearest exemplar, or, where the likeness refuses already, where the quad was
+    /// found, to the exemplar nearest by its signature.
     pub correlation: f64,
     /// H^r in icon pixels times descriptor distance (method 6.2); infinite with too few points, and where another gate
     /// refuses already.
     pub hausdorff: f64,
-    /// How alike the picture and the learnt icon are, one laid on the other, -1 to 1; `None` where the map's distances
-    /// decide alone.
+    /// How alike the picture and the learnt icon are, one laid on the other, -1 to 1; 0 where a glance told them to be
+    /// different things and nothing was accepted; `None` where the map's distances decide alone.
     pub likeness: Option<f64>,
     /// The deciding distance of the map's [`DistanceKind`].
     pub distance: f64,

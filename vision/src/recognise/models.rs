@@ -6,6 +6,7 @@ use super::{
     signature::{SIGNATURE_BYTES, Signature, likeness},
 };
 use crate::{learn::model::LandmarkModel, params::Params};
+use fearless_simd::{Level, dispatch};
 use std::sync::Arc;
 
 /// Most landmarks of one set.
@@ -110,6 +111,15 @@ impl ModelSet {
     /// The `count` models whose exemplars are most like `signature`, best first; of equal ones the lower id. At most
     /// [`MAX_SHORT_LIST`].
     pub fn short_list(&self, signature: &Signature, count: usize) -> Vec<Listed> {
+        dispatch!(Level::new(), _s => self.scan(signature, count))
+    }
+
+    #[expect(
+        clippy::inline_always,
+        reason = "an instruction set holds only in what is inlined where it was chosen"
+    )]
+    #[inline(always)]
+    fn scan(&self, signature: &Signature, count: usize) -> Vec<Listed> {
         let count = count.min(MAX_SHORT_LIST);
         let mut best: Vec<Listed> = Vec::with_capacity(count + 1);
         let mut enough = f32::NEG_INFINITY;

@@ -47,6 +47,11 @@ impl Signature {
 }
 
 /// How alike two signatures are: the cosine between them, -1 to 1 but for rounding; 0 with a flat icon.
+#[expect(
+    clippy::inline_always,
+    reason = "an instruction set holds only in what is inlined where it was chosen"
+)]
+#[inline(always)]
 pub fn likeness(a: &[i8; SIGNATURE_BYTES], b: &[i8; SIGNATURE_BYTES]) -> f32 {
     let dot: i32 = a.iter().zip(b).map(|(x, y)| i32::from(*x) * i32::from(*y)).sum();
     dot as f32 / (LENGTH * LENGTH)

@@ -27,6 +27,16 @@ pub struct VerdictParams {
     pub verified_share: f64,
     /// Landmarks on the short list, of which the picture is laid on each.
     pub short_list: usize,
+    /// Landmarks of the short list whose signature is less alike are not looked at, -1 to 1.
+    pub min_signature: f32,
+    /// Nor those that are further behind the first one.
+    pub signature_gap: f32,
+    /// Landmarks up to which tau of the likeness holds as it is.
+    pub crowd: usize,
+    /// From there on tau shrinks by this share with every factor of e: the more landmarks, the nearer the nearest of them
+    /// is to any stranger. On 732 quads of other buildings among 267 landmarks, strangers within a ratio grow by e with
+    /// 0.08 of ratio.
+    pub crowd_share: f64,
     /// Landmarks that are verified at most.
     pub max_verified: usize,
     /// How corners are moved.
@@ -40,9 +50,25 @@ impl Default for VerdictParams {
             verify_reach: 1.5,
             verified_share: 0.8,
             short_list: 8,
+            min_signature: 0.3,
+            signature_gap: 0.35,
+            crowd: 300,
+            crowd_share: 0.08,
             max_verified: 2,
             align: AlignParams::default(),
         }
+    }
+}
+
+/// What is left of tau in the largest map.
+const LEAST_TAU_SHARE: f64 = 0.5;
+
+impl VerdictParams {
+    /// The share of tau of the likeness that holds among `landmarks`: as many strangers are accepted by a large map as by
+    /// one of `crowd` landmarks.
+    pub fn tau_share(&self, landmarks: usize) -> f64 {
+        let crowds = landmarks.max(1) as f64 / self.crowd.max(1) as f64;
+        (1.0 - self.crowd_share * crowds.ln().max(0.0)).clamp(LEAST_TAU_SHARE, 1.0)
     }
 }
 
@@ -72,7 +98,7 @@ pub fn recognise_watched(
     let sightings = sightings(image, quad, p);
     watch.finished(Step::Icons);
     let near = match kind {
-        DistanceKind::Both => short_list(&sightings, models, p.recognise.verdict.short_list, p),
+        DistanceKind::Both => short_list(&sightings, models, p.recognise.verdict.short_list),
         DistanceKind::Correlation | DistanceKind::Hausdorff => {
             nearest(&sightings, models, kind, MAX_CANDIDATES, p)
         }
@@ -114,7 +140,8 @@ fn decide(
     landmarks: usize,
     p: &VerdictParams,
 ) -> Verdict {
-    let refusals: Vec<Option<Refusal>> = found.iter().map(|j| j.refusal(kind, p)).collect();
+    let share = if kind == DistanceKind::Both { p.tau_share(landmarks) } else { 1.0 };
+    let refusals: Vec<Option<Refusal>> = found.iter().map(|j| j.refusal(kind, share, p)).collect();
     let accepted = refusals.iter().filter(|r| r.is_none()).count();
     let mut verdict = unknown(landmarks);
     verdict.entropy_m = entropy_m(accepted, landmarks);
@@ -123,7 +150,7 @@ fn decide(
         .iter()
         .zip(&refusals)
         .take(MAX_CANDIDATES)
-        .map(|(j, refusal)| candidate(&j.near, *refusal, accepted, kind))
+        .map(|(j, refusal)| candidate(&j.near, *refusal, accepted, (kind, share)))
         .collect();
     let Some(best) = refusals.iter().position(Option::is_none) else { return verdict };
     let near = &found[best].near;
@@ -134,7 +161,7 @@ fn decide(
     // own threshold is as much reason for doubt as one just below.
     if margin < p.margin {
         verdict.recognition = Recognition::Unique(near.model.id);
-        verdict.confidence = confidence(near.ratio(kind), margin);
+        verdict.confidence = confidence(near.ratio(kind) / share, margin);
     } else {
         verdict.recognition = Recognition::Ambiguous(near.model.id);
         if let Some(c) = verdict.candidates.get_mut(best) {
@@ -161,7 +188,12 @@ fn margin(found: &[Judged], best: usize, kind: DistanceKind) -> f64 {
     }
 }
 
-fn candidate(near: &Near, refusal: Option<Refusal>, accepted: usize, kind: DistanceKind) -> Candidate {
+fn candidate(
+    near: &Near,
+    refusal: Option<Refusal>,
+    accepted: usize,
+    (kind, share): (DistanceKind, f64),
+) -> Candidate {
     let (distance, tau) = match kind {
         DistanceKind::Hausdorff => (near.hausdorff, near.model.hausdorff.tau),
         DistanceKind::Correlation => (near.correlation, near.model.correlation.tau),
@@ -173,8 +205,8 @@ fn candidate(near: &Near, refusal: Option<Refusal>, accepted: usize, kind: Dista
         hausdorff: near.hausdorff,
         likeness: near.likeness,
         distance,
-        tau,
-        ratio: near.ratio(kind),
+        tau: share * tau,
+        ratio: near.ratio(kind) / share,
         probability: probability(refusal.is_none(), accepted),
         refusal,
     }

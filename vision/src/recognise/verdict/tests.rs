@@ -187,12 +187,13 @@ fn gates_refuse_at_tau() {
             correlation,
             hausdorff,
             likeness: None,
+            signature: 1.0,
         },
         moved: moved.then_some(anywhere),
     };
     let (c, h, v) = (model.correlation.tau, model.hausdorff.tau, &PARAMS.recognise.verdict);
     let tight = v.verified_share;
-    let alone = |kind, c, h, moved| judged(c, h, moved).refusal(kind, v);
+    let alone = |kind, c, h, moved| judged(c, h, moved).refusal(kind, 1.0, v);
     assert_eq!(alone(DistanceKind::Correlation, 0.99 * c, f64::NAN, false), None);
     assert_eq!(alone(DistanceKind::Correlation, c, 0.0, false), Some(Refusal::Correlation));
     assert_eq!(alone(DistanceKind::Correlation, 0.99 * tight * c, h, true), None);
@@ -206,7 +207,7 @@ fn gates_refuse_at_tau() {
     let both = |likeness: Option<f64>, c, h| {
         let mut judged = judged(c, h, true);
         judged.near.likeness = likeness;
-        judged.refusal(DistanceKind::Both, v)
+        judged.refusal(DistanceKind::Both, 1.0, v)
     };
     let alike = Some(least + 1e-6);
     assert_eq!(both(alike, 0.99 * tight * c, f64::INFINITY), None);
@@ -228,6 +229,7 @@ fn the_margin_is_over_the_nearest_other() {
             correlation: c * models[i].correlation.tau,
             hausdorff: h * models[i].hausdorff.tau,
             likeness: Some(1.0 - l * models[i].likeness.tau),
+            signature: 1.0,
         },
         moved: None,
     };
@@ -239,6 +241,61 @@ fn the_margin_is_over_the_nearest_other() {
     // A runner-up without points says nothing.
     let found = [judged(0, 0.4, 0.1, 0.3), judged(1, 0.5, f64::INFINITY, 1.5)];
     assert!((margin(&found, 0, DistanceKind::Hausdorff) - 1.0).abs() < 1e-12);
+}
+
+#[test]
+fn a_large_map_asks_for_more() {
+    let v = &PARAMS.recognise.verdict;
+    let exact = |n: usize, share: f64| assert!((v.tau_share(n) - share).abs() < 1e-12, "{n}");
+    exact(0, 1.0);
+    exact(v.crowd, 1.0);
+    exact(10 * v.crowd, 1.0 - 0.08 * 10.0_f64.ln());
+    exact(usize::MAX, LEAST_TAU_SHARE);
+    assert!(v.tau_share(v.crowd + 1) < 1.0);
+
+    let image = photograph(&poster(2), &oblique(), 1.0, 0.0);
+    let seen = sightings(&image, &quad(oblique()), &PARAMS);
+    let model = SIX.get(LandmarkId(2)).unwrap();
+    let near = Near {
+        model: Arc::clone(model),
+        sighting: 0,
+        exemplar: 0,
+        correlation: 0.0,
+        hausdorff: 0.0,
+        likeness: Some(1.0 - 0.9 * model.likeness.tau),
+        signature: 1.0,
+    };
+    let found = [Judged { near, moved: Some(oblique()) }];
+    let among = |n: usize| decide(&found, &seen, DistanceKind::Both, n, v);
+    assert_eq!(among(v.crowd).recognition, Recognition::Unique(LandmarkId(2)));
+    let large = among(10 * v.crowd);
+    assert_eq!(
+        (large.recognition, large.candidates[0].refusal),
+        (Recognition::Unknown, Some(Refusal::Likeness))
+    );
+    // What is told is what decided.
+    let told = &large.candidates[0];
+    assert!(told.ratio > 1.0 && (told.distance / told.tau - told.ratio).abs() < 1e-9);
+}
+
+#[test]
+fn few_points_keep_a_landmark_from_the_papers_distances_only() {
+    let image = photograph(&poster(1), &oblique(), 1.0, 0.0);
+    let mut few = (**SIX.get(LandmarkId(1)).unwrap()).clone();
+    few.stable_points = PARAMS.learn.gates.min_stable_points - 1;
+    for (stable_points, known) in [(few.stable_points, false), (few.stable_points + 1, true)] {
+        let model = Arc::new(crate::learn::model::LandmarkModel { stable_points, ..few.clone() });
+        let set = ModelSet::new(vec![model], &PARAMS).unwrap();
+        for kind in KINDS {
+            let v = recognise(&image, &quad(oblique()), &set, kind, &PARAMS);
+            let expected = known || kind == DistanceKind::Both;
+            assert_eq!(
+                v.recognition == Recognition::Unique(LandmarkId(1)),
+                expected,
+                "{kind:?} {stable_points}"
+            );
+        }
+    }
 }
 
 proptest! {

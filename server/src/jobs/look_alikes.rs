@@ -1,0 +1,88 @@
+//! Landmarks that may be taken for one another: found before they go live, each pair by name. Telling them apart is
+//! what thresholds are for; this says where those had to be drawn tight, so that a person can look.
+
+use super::negatives::Negatives;
+use vision::{
+    learn::model::{LandmarkModel, unlikeness_of},
+    params::Params,
+    recognise::LandmarkId,
+};
+
+/// Look-alikes of one landmark that are named, most alike first.
+const MAX_LOOK_ALIKES: usize = 5;
+
+/// Another landmark that is like one of the map: nearer than what is accepted where nothing is like it.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct LookAlike {
+    pub(super) other: LandmarkId,
+    pub(super) likeness: f64,
+}
+
+/// The landmarks that `model` may be taken for, most alike first. Only where something held its threshold down is there
+/// anything to look for.
+pub(super) fn look_alikes(model: &LandmarkModel, negatives: &Negatives, p: &Params) -> Vec<LookAlike> {
+    let nearest = model.likeness_evidence.nearest_others.first().map_or(f64::INFINITY, |d| f64::from(*d));
+    let reach = p.learn.likeness_cap / p.learn.threshold.nearest_share;
+    if nearest >= reach {
+        return vec![];
+    }
+    let mut found: Vec<LookAlike> = negatives
+        .by_owner()
+        .filter(|(other, _)| *other != model.id)
+        .map(|(other, icons)| LookAlike { other, likeness: 1.0 - unlikeness_of(model, icons, p) })
+        .filter(|l| 1.0 - l.likeness < reach)
+        .collect();
+    found.sort_by(|a, b| b.likeness.total_cmp(&a.likeness).then(a.other.cmp(&b.other)));
+    found.truncate(MAX_LOOK_ALIKES);
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use vision::{
+        detect::quads::Corners,
+        frame::GrayImage,
+        learn::{
+            model::{View, learn, refit_thresholds},
+            synthesis,
+        },
+    };
+
+    /// Blocks of grey; another number, other blocks; `stain` paints a corner over.
+    fn picture(number: usize, stain: bool) -> GrayImage {
+        GrayImage::from_fn(240, 240, |u, v| {
+            if stain && u > 200 && v > 200 {
+                return 128;
+            }
+            let block = |size: usize| (u / size * 31 + v / size * 57 + size + number * 7919) as u64;
+            let hash = |x: u64| (x.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 48) % 128;
+            (hash(block(24)) + hash(block(60))) as u8
+        })
+    }
+
+    #[test]
+    fn pairs_are_named_and_others_are_not() {
+        let p = Params::default();
+        let whole = Corners::try_from([[-0.5, -0.5], [239.5, -0.5], [239.5, 239.5], [-0.5, 239.5]]).unwrap();
+        let lesson = |id: u64, image: &GrayImage| {
+            let mut views = vec![View::photographed(image, &whole, &p).unwrap()];
+            views.extend(synthesis::views(image, &whole, 20, &p, id));
+            learn(LandmarkId(id), &views, &[], &p).unwrap()
+        };
+        let models =
+            [lesson(1, &picture(1, false)), lesson(2, &picture(1, true)), lesson(3, &picture(5, false))];
+        let mut negatives = Negatives::default();
+        for model in &models {
+            negatives.add(model.id, model.exemplars.clone());
+        }
+        for (i, expected) in [Some(2), Some(1), None].into_iter().enumerate() {
+            let (before, after) = negatives.others(models[i].id);
+            let others = [before, after].concat();
+            let found = look_alikes(&refit_thresholds(&models[i], &others, &p), &negatives, &p);
+            let named: Vec<LandmarkId> = found.iter().map(|l| l.other).collect();
+            assert_eq!(named, expected.map(LandmarkId).into_iter().collect::<Vec<_>>(), "{found:?}");
+            assert!(found.iter().all(|l| l.likeness > 0.5 && l.likeness < 1.0));
+        }
+    }
+}

@@ -1,0 +1,304 @@
+//! Lessons on drawn posters, thresholds against others, gates, and models stored and read back.
+
+use super::*;
+use crate::{
+    detect::quads::Corners,
+    frame::GrayImage,
+    learn::{
+        fitting::{add_negatives, fitted, unlikeness_of},
+        model::Gate,
+        threshold::ThresholdError,
+    },
+    learn::{
+        model::{MAX_EXEMPLARS, StoredModelError},
+        random::Random,
+        synthesis,
+        threshold::LimitedBy,
+    },
+};
+use proptest::prelude::*;
+
+/// A procedural poster: rectangles of random grey on a random ground.
+fn poster(seed: u64) -> GrayImage {
+    let mut random = Random::new(seed ^ 0x5eed);
+    let ground = random.range(60.0, 200.0);
+    let patches: Vec<[f64; 5]> = (0..40)
+        .map(|_| {
+            let (w, h) = (random.range(8.0, 60.0), random.range(8.0, 60.0));
+            [random.range(0.0, 300.0), random.range(0.0, 400.0), w, h, random.range(10.0, 245.0)]
+        })
+        .collect();
+    GrayImage::from_fn(300, 400, |u, v| {
+        let (u, v) = (u as f64, v as f64);
+        let top = patches.iter().rev().find(|[x, y, w, h, _]| (u - x).abs() < *w && (v - y).abs() < *h);
+        top.map_or(ground, |p| p[4]) as u8
+    })
+}
+
+fn whole() -> Corners {
+    Corners::try_from([[-0.5, -0.5], [299.5, -0.5], [299.5, 399.5], [-0.5, 399.5]]).unwrap()
+}
+
+fn lesson(seed: u64, count: usize, negatives: &[IconFeatures]) -> LandmarkModel {
+    let p = Params::default();
+    let views = synthesis::views(&poster(seed), &whole(), count, &p, seed);
+    learn(LandmarkId(seed), &views, negatives, &p).unwrap()
+}
+
+/// End to end at N = 50: every landmark is taught from one picture, then fresh views are compared with all.
+#[test]
+fn fifty_landmarks_know_themselves_and_refuse_the_others() {
+    let p = Params::default();
+    let alone: Vec<LandmarkModel> = (0..50).map(|seed| lesson(seed, 20, &[])).collect();
+    let models: Vec<LandmarkModel> = (0..50)
+        .map(|i| {
+            let others: Vec<IconFeatures> = alone
+                .iter()
+                .enumerate()
+                .filter(|(j, _)| *j != i)
+                .flat_map(|(_, m)| m.exemplars.clone())
+                .collect();
+            refit_thresholds(&alone[i], &others, &p)
+        })
+        .collect();
+    assert!(
+        models.iter().filter(|m| m.is_active()).count() >= 40,
+        "{:?}",
+        models.iter().map(|m| &m.status).collect::<Vec<_>>()
+    );
+    let accepts = |m: &LandmarkModel, icon: &IconFeatures| {
+        let d = m.distances(icon, &p.recognise);
+        d.correlation < m.correlation.tau && d.hausdorff < m.hausdorff.tau
+    };
+    let (mut own, mut wrong) = (0, 0);
+    for i in 0..50u64 {
+        for view in synthesis::views(&poster(i), &whole(), 4, &p, 1000 + i) {
+            let icon = features(view.icon, &p.recognise);
+            own += usize::from(accepts(&models[i as usize], &icon));
+            wrong += models.iter().filter(|m| m.id.0 != i && accepts(m, &icon)).count();
+        }
+    }
+    assert!(own >= 170, "{own} of 200 fresh views accepted");
+    assert_eq!(wrong, 0, "of 9800 comparisons with other landmarks");
+    // Strangers: posters that nobody taught.
+    for seed in 500..560 {
+        for view in synthesis::views(&poster(seed), &whole(), 1, &p, seed) {
+            let icon = features(view.icon, &p.recognise);
+            assert!(models.iter().all(|m| !accepts(m, &icon)), "stranger {seed}");
+        }
+    }
+}
+
+#[test]
+fn likeness_is_held_by_the_nearest_of_the_others() {
+    let p = Params::default();
+    let alone = lesson(3, 20, &[]);
+    assert!((alone.likeness.tau - p.learn.likeness_cap).abs() < 1e-12);
+    assert_eq!((alone.likeness.limited_by, alone.likeness.negatives), (LimitedBy::AbsoluteCap, 0));
+    // What is nothing like it changes nothing, a look-alike much: itself under a stain, here.
+    let stranger = lesson(4, 20, &[]).exemplars[0].clone();
+    let far = add_negatives(&alone, &[stranger], &p);
+    assert!((far.likeness.tau - p.learn.likeness_cap).abs() < 1e-12 && far.likeness.negatives == 1);
+    let mut stained = poster(3);
+    stained = GrayImage::from_fn(300, 400, |u, v| {
+        if u > 110 && v > 180 { (60 + (u / 9 + v / 11) % 2 * 90) as u8 } else { stained.at(u, v) }
+    });
+    let view = View::photographed(&stained, &whole(), &p).unwrap();
+    let near = add_negatives(&alone, &[features(view.icon, &p.recognise)], &p);
+    assert_eq!(near.likeness.limited_by, LimitedBy::NearestNegative);
+    assert!(near.likeness.tau < 0.9 * p.learn.likeness_cap, "{:?}", near.likeness);
+    // Itself: nothing can tell them apart, and so it is not used.
+    let twin = add_negatives(&alone, &alone.exemplars.clone(), &p);
+    let ModelStatus::Candidate(failures) = &twin.status else { panic!("told from itself?") };
+    assert!(failures.iter().any(|f| f.gate == Gate::LikenessThreshold(ThresholdError::Overlap)));
+}
+
+#[test]
+fn a_model_tells_what_it_was_learnt_from() {
+    let p = Params::default();
+    let mut views = synthesis::views(&poster(1), &whole(), 24, &p, 1);
+    views.push(View::photographed(&poster(1), &whole(), &p).unwrap());
+    let model = learn(LandmarkId(7), &views, &[], &p).unwrap();
+    assert_eq!((model.id, model.views, model.generated_views), (LandmarkId(7), 25, 24));
+    assert!(model.views_generated() && model.v_c > 0.5 && model.photographed_v_c.abs() < 1e-12);
+    assert!((1..=MAX_EXEMPLARS).contains(&model.exemplars.len()));
+    assert_eq!(model.correlation.positives, 25 - model.exemplars.len());
+    assert_eq!(model.params_hash, p.distance_hash());
+    assert!(model.correlation.tau <= p.learn.correlation_cap && model.hausdorff.tau <= p.learn.hausdorff_cap);
+}
+
+#[test]
+fn one_of_the_papers_distances_is_enough() {
+    let p = Params::default();
+    let model = lesson(3, 20, &[]);
+    assert!(model.is_active(), "{:?}", model.status);
+    // Without points H^r knows nothing, C^r still does.
+    let mut pointless = model.clone();
+    (pointless.stable_points, pointless.hausdorff_evidence.own) = (0, vec![f32::INFINITY; 5]);
+    let pointless = refit_thresholds(&pointless, &[], &p);
+    assert!(pointless.is_active() && pointless.hausdorff.tau.abs() < 1e-12, "{:?}", pointless.status);
+    // Without either it is not used, and all of it is told.
+    let mut neither = pointless;
+    neither.correlation_evidence.own = vec![1.9; 5];
+    let ModelStatus::Candidate(failures) = refit_thresholds(&neither, &[], &p).status else {
+        panic!("active")
+    };
+    let gates: Vec<Gate> = failures.iter().map(|f| f.gate).collect();
+    assert!(gates.contains(&Gate::StablePoints), "{gates:?}");
+    assert!(gates.contains(&Gate::HausdorffThreshold(ThresholdError::NothingFinite)), "{gates:?}");
+    assert!(gates.contains(&Gate::CorrelationThreshold(ThresholdError::Overlap)), "{gates:?}");
+}
+
+#[test]
+fn look_alikes_are_near_and_strangers_infinitely_far() {
+    let p = Params::default();
+    let model = lesson(3, 20, &[]);
+    let twin = lesson(3, 6, &[]).exemplars;
+    let stranger = lesson(4, 6, &[]).exemplars;
+    assert!(unlikeness_of(&model, &twin, &p) < 0.3);
+    assert!(unlikeness_of(&model, &stranger, &p) > p.learn.likeness_cap);
+    assert!(unlikeness_of(&model, &[], &p).is_infinite());
+}
+
+#[test]
+fn folds_measure_every_view() {
+    let model = lesson(2, 40, &[]);
+    assert_eq!(model.correlation.positives, 40);
+    assert!(model.correlation_evidence.own[0] > 0.0, "no view is compared with itself");
+}
+
+#[test]
+fn what_fails_a_gate_stays_a_candidate_with_its_number() {
+    let p = Params::default();
+    let blank = GrayImage::from_fn(300, 400, |u, _| 120 + (u / 60) as u8);
+    let views = synthesis::views(&blank, &whole(), 20, &p, 1);
+    let model = learn(LandmarkId(1), &views, &[], &p).unwrap();
+    let ModelStatus::Candidate(failures) = &model.status else { panic!("a blank panel is no landmark") };
+    let gates: Vec<Gate> = failures.iter().map(|f| f.gate).collect();
+    assert!(gates.contains(&Gate::Saliency) && gates.contains(&Gate::StablePoints), "{gates:?}");
+    assert!(gates.contains(&Gate::HausdorffThreshold(ThresholdError::NothingFinite)), "{gates:?}");
+    assert!(model.hausdorff.tau.abs() < 1e-12, "accepts nothing");
+
+    let one = View::photographed(&poster(1), &whole(), &p).unwrap();
+    let model = learn(LandmarkId(1), &[one.clone(), one], &[], &p).unwrap();
+    let ModelStatus::Candidate(failures) = &model.status else { panic!("two equal views are not enough") };
+    let views = failures.iter().find(|f| f.gate == Gate::Views).unwrap();
+    assert_eq!(views.to_string(), "2 views, at least 20 needed");
+    assert!(failures.iter().any(|f| f.gate == Gate::VisibilityConfidence && f.value.abs() < 1e-9));
+}
+
+#[test]
+fn impossible_lessons_are_refused() {
+    let p = Params::default();
+    assert_eq!(learn(LandmarkId(1), &[], &[], &p), Err(LearnError::NoView));
+    let view = View::photographed(&poster(1), &whole(), &p).unwrap();
+    let many = vec![view.clone(); MAX_VIEWS + 1];
+    assert_eq!(learn(LandmarkId(1), &many, &[], &p), Err(LearnError::TooManyViews { found: MAX_VIEWS + 1 }));
+    assert!(learn(LandmarkId(1), &many[1..], &[], &p).is_ok());
+    let mut other = p.clone();
+    other.icon.size = 50;
+    let expected = LearnError::IconSize { index: 0, found: 75, expected: 50 };
+    assert_eq!(learn(LandmarkId(1), std::slice::from_ref(&view), &[], &other), Err(expected));
+    let mut broken = view;
+    broken.icon.pixels[3] = f32::NAN;
+    assert_eq!(learn(LandmarkId(1), &[broken], &[], &p), Err(LearnError::NoComponents));
+}
+
+/// Oracle: all negatives at once.
+#[test]
+fn negatives_may_come_one_after_the_other() {
+    let p = Params::default();
+    let others: Vec<IconFeatures> = (10..22).flat_map(|seed| lesson(seed, 6, &[]).exemplars).collect();
+    let model = lesson(3, 20, &others);
+    let step = add_negatives(&add_negatives(&lesson(3, 20, &[]), &others[..9], &p), &others[9..], &p);
+    assert_eq!(model, step);
+    assert_eq!(model.correlation.negatives, others.len());
+    assert_eq!(refit_thresholds(&model, &[], &p), lesson(3, 20, &[]));
+    // A copy of the landmark among the negatives makes tau no looser.
+    let twin = add_negatives(&model, &lesson(3, 6, &[]).exemplars, &p);
+    assert!(twin.correlation.tau <= model.correlation.tau);
+}
+
+#[test]
+fn counted_negatives_hold_tau_below_those_kept() {
+    let mut evidence = Evidence { own: vec![0.1, 0.2, 0.9], ..Evidence::default() };
+    for i in 0..200 {
+        evidence.add(0.3 + f64::from(i % 100) * 1e-3);
+    }
+    assert_eq!((evidence.others, evidence.nearest_others.len()), (200, Evidence::MAX_NEAREST));
+    assert!(evidence.nearest_others.is_sorted() && evidence.nearest_others[63] < 0.3325);
+    let cheap = Params {
+        learn: crate::learn::model::LearnParams {
+            threshold: crate::learn::threshold::ThresholdParams {
+                false_positive_weight: 0.1,
+                nearest_share: 0.9,
+            },
+            ..Default::default()
+        },
+        ..Params::default()
+    };
+    // With false positives all but free, tau would go to 0.5; what was only counted keeps it below.
+    let held = fitted(&evidence, 0.5, &cheap).unwrap();
+    assert!(held.tau <= f64::from(evidence.nearest_others[63]), "{}", held.tau);
+    assert_eq!(held.limited_by, LimitedBy::AbsoluteCap);
+}
+
+#[test]
+fn a_stored_model_is_the_same_bit_for_bit() {
+    let p = Params::default();
+    let others: Vec<IconFeatures> = (10..40).flat_map(|seed| lesson(seed, 4, &[]).exemplars).collect();
+    let model = lesson(3, 20, &others);
+    let bytes = model.to_bytes();
+    assert!(bytes.len() < 64 * 1024, "{}", bytes.len());
+    assert_eq!(LandmarkModel::from_bytes(&bytes, &p).unwrap(), model);
+
+    let mut other = p.clone();
+    other.recognise.correlation.rank += 1;
+    assert!(matches!(LandmarkModel::from_bytes(&bytes, &other), Err(StoredModelError::Params { .. })));
+    let mut later = bytes.clone();
+    later[4] += 1;
+    assert_eq!(LandmarkModel::from_bytes(&later, &p), Err(StoredModelError::Version { found: 3 }));
+    for at in (6..bytes.len()).step_by(97).chain([bytes.len() - 1]) {
+        let mut damaged = bytes.clone();
+        damaged[at] ^= 0x10;
+        assert_eq!(LandmarkModel::from_bytes(&damaged, &p), Err(StoredModelError::Damaged), "byte {at}");
+        assert!(LandmarkModel::from_bytes(&bytes[..at], &p).is_err());
+    }
+    assert_eq!(LandmarkModel::from_bytes(b"", &p), Err(StoredModelError::NotAModel));
+    assert_eq!(LandmarkModel::from_bytes(&[0; 100], &p), Err(StoredModelError::NotAModel));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(400))]
+    /// Bytes that pass the digest and still are nonsense: typed error or a model, never a panic.
+    #[test]
+    fn forged_bytes_never_panic(
+        edits in proptest::collection::vec((6usize..400, any::<u8>()), 1..6),
+        cut in 0usize..300,
+        seal in any::<bool>(),
+    ) {
+        use std::sync::OnceLock;
+        static BYTES: OnceLock<Vec<u8>> = OnceLock::new();
+        let bytes = BYTES.get_or_init(|| lesson(3, 20, &lesson(4, 4, &[]).exemplars).to_bytes());
+        let mut forged = bytes[..bytes.len() - 8 - cut].to_vec();
+        for (at, value) in &edits {
+            forged[*at] = *value;
+        }
+        if seal {
+            let sum = crate::learn::stored::digest(&forged);
+            forged.extend(sum.to_le_bytes());
+        }
+        if let Ok(model) = LandmarkModel::from_bytes(&forged, &Params::default()) {
+            prop_assert!(model.correlation.tau.is_finite() && model.hausdorff.tau.is_finite());
+            prop_assert!(!model.exemplars.is_empty());
+        }
+    }
+
+    #[test]
+    fn any_bytes_never_panic(mut bytes in proptest::collection::vec(any::<u8>(), 0..300), magic in any::<bool>()) {
+        if magic && bytes.len() >= 6 {
+            bytes[..6].copy_from_slice(b"WMLM\x01\x00");
+        }
+        prop_assert!(LandmarkModel::from_bytes(&bytes, &Params::default()).is_err());
+    }
+}
