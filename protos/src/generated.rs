@@ -183,6 +183,7 @@ pub struct QuadAnswer {
     pub entropy_m: f64,
     #[prost(double, tag = "8")]
     pub entropy_norm: f64,
+    /// Chance that the named landmark is right, 0 to 1, learnt from data; 0 unless UNIQUE.
     #[prost(double, tag = "9")]
     pub confidence: f64,
     #[prost(message, optional, tag = "10")]

@@ -1,6 +1,7 @@
-//! `waymark fit`: parameters of the detector that are learnt from labelled pictures, each with what it is worth on
+//! `waymark fit`: parameters that are learnt from labelled pictures or rendered ones, each with what it is worth on
 //! pictures that were held out. Prints parameters; changes nothing.
 
+mod confidence;
 mod data;
 mod held_out;
 mod search;
@@ -32,6 +33,14 @@ pub(crate) enum Command {
     ///   waymark evaluate detection corridor --seed 3 --compare networks.json
     #[command(verbatim_doc_comment)]
     Search(Box<search::SearchArgs>),
+    /// The weights of the confidence: the chance that an identity is right, from answers whose truth is known.
+    ///
+    /// Maps are taught and quads looked at as in `waymark evaluate calibration`, which says how well the confidence keeps
+    /// its word; fit on the set `calibrate`, judge on `test`. The same options give the same weights. For example:
+    ///   waymark fit confidence --set calibrate --rust weights.txt
+    ///   waymark evaluate calibration --set test --plot reliability.svg
+    #[command(verbatim_doc_comment)]
+    Confidence(Box<confidence::ConfidenceArgs>),
 }
 
 /// Runs one fit.
@@ -39,5 +48,6 @@ pub(crate) fn run(command: &Command) -> anyhow::Result<()> {
     match command {
         Command::Similarity(args) => similarity::run(args),
         Command::Search(args) => search::run(args),
+        Command::Confidence(args) => confidence::run(args),
     }
 }

@@ -70,7 +70,7 @@ enum Command {
     /// Without more words: a whole frame, recognition and poses included, on rendered frames of a corridor.
     /// `waymark bench detect`: from frame to quads beside OpenCV on the same pictures.
     Bench(bench::Args),
-    /// Fit parameters of the detector to labelled pictures, with results on pictures held out.
+    /// Fit parameters of detector and confidence to pictures whose truth is known.
     #[command(subcommand)]
     Fit(fit::Command),
 }

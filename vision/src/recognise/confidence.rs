@@ -1,5 +1,7 @@
-//! Accepted landmarks in, the paper's probabilities and entropies out (method 10), and a confidence of ours. Which
-//! landmarks are accepted is the verdict's business.
+//! Accepted landmarks in, the paper's probabilities and entropies out (method 10), and the chance that an identity is
+//! right, learnt from data. Which landmarks are accepted is the verdict's business.
+
+use super::{Candidate, DistanceKind, confidence_learnt};
 
 /// The paper's m with the printed 1/(N+1), natural logarithm: `1 - ln K / (N+1)` for K of N accepted.
 pub fn entropy_m(accepted: usize, landmarks: usize) -> f64 {
@@ -16,16 +18,58 @@ pub fn probability(is_accepted: bool, accepted: usize) -> f64 {
     if is_accepted { 1.0 / accepted.max(1) as f64 } else { 0.0 }
 }
 
-/// How sure an accepted identity is, 0 to 1: 1 minus the greater of `ratio` (distance / tau) and `margin` (ratio over
-/// the runner-up's). It rises with the evidence but is *not calibrated*: 0.8 does not mean right in 80 of 100 cases.
-pub fn confidence(ratio: f64, margin: f64) -> f64 {
-    let weakest = ratio.max(margin);
-    if weakest.is_finite() { (1.0 - weakest).clamp(0.0, 1.0) } else { 0.0 }
+/// Numbers that a confidence rests on.
+pub const MEASURES: usize = 7;
+/// Distances are measured up to here, as no distance is as bad as a large one.
+const FAR: f64 = 2.0;
+/// H^r is counted in units of this.
+const HAUSDORFF_UNIT: f64 = 10.0;
+
+/// What a verdict knows for and against its candidate `best`, each the worse the larger, all within 0 to [`FAR`]: D/tau and its
+/// square, the share of it in the next best's and its square, C^r, H^r, and how many landmarks there were to err with.
+/// `None` if there is no such candidate.
+pub fn measures(candidates: &[Candidate], best: usize, landmarks: usize) -> Option<[f64; MEASURES]> {
+    let answer = candidates.get(best)?;
+    let others = candidates.iter().enumerate().filter(|(i, _)| *i != best);
+    let next = others.map(|(_, c)| c.ratio).fold(f64::INFINITY, f64::min);
+    let alone = candidates.len() < 2;
+    let margin = if alone { 0.0 } else { answer.ratio / next };
+    let within = |x: f64| if x.is_finite() { x.clamp(0.0, FAR) } else { FAR };
+    // A next best that is infinitely far is no reason for doubt, unless so is the answer.
+    let margin = if next.is_finite() || alone { margin } else { 0.0 };
+    let (ratio, margin) = (within(answer.ratio), within(margin));
+    Some([
+        ratio,
+        0.5 * ratio * ratio,
+        margin,
+        0.5 * margin * margin,
+        within(answer.correlation),
+        within(answer.hausdorff / HAUSDORFF_UNIT),
+        within(0.1 * (1.0 + landmarks as f64).ln()),
+    ])
+}
+
+/// Chance that the identity of candidate `best` is right: a logistic curve over [`measures`], fitted to answers whose truth
+/// is known (`waymark fit confidence`), by the distance that decides. It never rises with any measure. How well it keeps
+/// its word is in docs/EVALUATION.md. 0 without such a candidate.
+pub fn confidence(candidates: &[Candidate], best: usize, landmarks: usize, kind: DistanceKind) -> f64 {
+    let weights = match kind {
+        DistanceKind::Both => &confidence_learnt::BOTH,
+        DistanceKind::Correlation => &confidence_learnt::CORRELATION,
+        DistanceKind::Hausdorff => &confidence_learnt::HAUSDORFF,
+    };
+    measures(candidates, best, landmarks).map_or(0.0, |m| chance(weights, &m))
+}
+
+/// The logistic curve: the last weight is that of no measure.
+pub(super) fn chance(weights: &[f64; MEASURES + 1], measures: &[f64; MEASURES]) -> f64 {
+    let odds = weights[MEASURES] + weights.iter().zip(measures).map(|(w, m)| w * m).sum::<f64>();
+    1.0 / (1.0 + (-odds).exp())
 }
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{super::LandmarkId, *};
 
     #[test]
     fn golden_table() {
@@ -57,13 +101,53 @@ mod tests {
         }
     }
 
+    fn candidate(ratio: f64, correlation: f64, hausdorff: f64) -> Candidate {
+        Candidate {
+            landmark: LandmarkId(1),
+            correlation,
+            hausdorff,
+            likeness: None,
+            distance: ratio,
+            tau: 1.0,
+            ratio,
+            probability: 1.0,
+            refusal: None,
+        }
+    }
+
     #[test]
-    fn confidence_follows_the_weaker_evidence() {
-        assert!((confidence(0.2, 0.3) - 0.7).abs() < 1e-12);
-        assert!(confidence(0.9, 0.1) < confidence(0.8, 0.1));
-        assert!(confidence(0.1, 0.9) < confidence(0.1, 0.8));
-        for (ratio, margin) in [(1.5, 0.1), (f64::INFINITY, 0.0), (f64::NAN, f64::NAN)] {
-            assert!(confidence(ratio, margin).abs() < 1e-12);
+    fn measures_by_hand_and_within_bounds() {
+        let two = [candidate(0.4, 0.2, 3.0), candidate(0.8, 0.9, f64::INFINITY)];
+        let found = measures(&two, 0, 9).unwrap();
+        let expected = [0.4, 0.08, 0.5, 0.125, 0.2, 0.3, 0.1 * 10f64.ln()];
+        assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{found:?}");
+        assert!(measures(&two, 2, 9).is_none() && confidence(&two, 2, 9, DistanceKind::Both).abs() < 1e-12);
+        let bad = f64::NAN;
+        for ratio in [0.0, 1e300, f64::INFINITY, bad] {
+            let found =
+                measures(&[candidate(ratio, bad, bad), candidate(0.0, 0.0, 0.0)], 0, usize::MAX).unwrap();
+            assert!(found.iter().all(|m| (0.0..=FAR).contains(m)), "{found:?}");
+        }
+    }
+
+    #[test]
+    fn confidence_never_rises_with_what_speaks_against() {
+        for kind in [DistanceKind::Both, DistanceKind::Correlation, DistanceKind::Hausdorff] {
+            let of = |ratio: f64, next: f64, c: f64, h: f64, n: usize| {
+                confidence(&[candidate(ratio, c, h), candidate(next, 1.0, 30.0)], 0, n, kind)
+            };
+            let best = of(0.1, 2.0, 0.1, 1.0, 10);
+            assert!(best <= 1.0 && best > 0.9, "{kind:?}: {best}");
+            for worse in [
+                of(0.6, 2.0, 0.1, 1.0, 10),
+                of(0.1, 0.15, 0.1, 1.0, 10),
+                of(0.1, 2.0, 0.6, 1.0, 10),
+                of(0.1, 2.0, 0.1, 9.0, 10),
+                of(0.1, 2.0, 0.1, 1.0, 10_000),
+            ] {
+                assert!(worse <= best && worse >= 0.0, "{kind:?}: {worse} {best}");
+            }
+            assert!(of(0.95, 1.0, 0.9, f64::INFINITY, 300) < 0.9 * best, "{kind:?}");
         }
     }
 }

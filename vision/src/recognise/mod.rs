@@ -12,6 +12,8 @@ pub mod watch;
 pub mod compare;
 mod look;
 pub mod confidence;
+pub mod confidence_fit;
+mod confidence_learnt;
 pub mod verdict;
 #[cfg(test)]
 mod fixture;
@@ -151,7 +153,7 @@ pub struct Verdict {
     pub entropy_m: f64,
     /// 1 - ln K / ln(N+1), in (0, 1].
     pub entropy_norm: f64,
-    /// How sure the identity is, 0 to 1; 0 for `Unknown`.
+    /// Chance that the identity is right, 0 to 1, learnt from data (`confidence.rs`); 0 unless `Unique`.
     pub confidence: f64,
     /// Which of the four corner rotations matched: corner `rotation` of the quad is the landmark's top-left.
     pub rotation: usize,

@@ -161,7 +161,7 @@ fn decide(
     // own threshold is as much reason for doubt as one just below.
     if margin < p.margin {
         verdict.recognition = Recognition::Unique(near.model.id);
-        verdict.confidence = confidence(near.ratio(kind) / share, margin);
+        verdict.confidence = confidence(&verdict.candidates, best, landmarks, kind);
     } else {
         verdict.recognition = Recognition::Ambiguous(near.model.id);
         if let Some(c) = verdict.candidates.get_mut(best) {

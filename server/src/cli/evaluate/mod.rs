@@ -51,6 +51,8 @@ pub(crate) enum Command {
     /// Pictures that are nearly the same (another text, one block changed, mirrored, two doors): told apart, refused as
     /// ambiguous, or confused.
     Lookalikes(experiment::doubles::Args),
+    /// Whether confidences keep their word: reliability diagram and expected calibration error.
+    Calibration(experiment::calibration::Args),
 }
 
 /// Runs one evaluation.
@@ -64,5 +66,6 @@ pub(crate) fn run(command: &Command) -> anyhow::Result<()> {
         Command::Occlusion(args) => experiment::occlusion::run(args),
         Command::Discrimination(args) => experiment::discrimination::run(args),
         Command::Lookalikes(args) => experiment::doubles::run(args),
+        Command::Calibration(args) => experiment::calibration::run(args),
     }
 }

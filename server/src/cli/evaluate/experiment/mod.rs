@@ -14,6 +14,8 @@ pub(crate) mod strangers;
 pub(crate) mod humps;
 pub(crate) mod discrimination;
 pub(crate) mod doubles;
+pub(crate) mod answers;
+pub(crate) mod calibration;
 
 use crate::cli::screen;
 use lesson::Taught;
@@ -33,7 +35,7 @@ use vision::params::Params;
 pub(crate) struct Common {
     /// The textures: tune, calibrate or test, three disjoint sets. Look at test for a report only.
     #[arg(long = "set", default_value = "test", value_parser = pictures::part)]
-    part: Part,
+    pub(crate) part: Part,
     /// A folder of pictures to use beside generated posters, or one with a truth.json of which the taught pictures are
     /// used. May be repeated.
     #[arg(long, value_name = "DIR")]
@@ -50,13 +52,13 @@ pub(crate) struct Common {
     corner_noise_px: f64,
     /// Let the detector find the quad in the whole image, instead of giving the true corners.
     #[arg(long)]
-    detector: bool,
+    pub(crate) detector: bool,
     /// One JSON object instead of a table.
     #[arg(long)]
-    json: bool,
+    pub(crate) json: bool,
     /// Write the curves or histograms as an SVG picture.
     #[arg(long, value_name = "FILE")]
-    plot: Option<PathBuf>,
+    pub(crate) plot: Option<PathBuf>,
 }
 
 /// Largest corner noise.

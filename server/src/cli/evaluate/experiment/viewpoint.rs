@@ -52,3 +52,42 @@ pub(crate) fn class(common: &Common, landmarks: u32, p: &Params) -> anyhow::Resu
     anyhow::ensure!(!class.models.is_empty(), "no landmark passed its gates");
     Ok(class)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+
+    #[derive(Parser)]
+    struct Line {
+        #[command(flatten)]
+        args: Args,
+    }
+
+    #[test]
+    fn a_small_run_repeats_and_knows_the_front_from_the_edge() {
+        let args = Line::parse_from(["x", "--set=tune", "--landmarks=4", "--views=2"]).args;
+        let p = Params::default();
+        let run = |seed: u64| {
+            let common = Common { seed, ..args.common.clone() };
+            let class = class(&common, args.landmarks, &p).unwrap();
+            let angle = Axis {
+                name: "angle",
+                values: vec![0.0, 87.0],
+                set: |c, degrees, _| c.yaw_rad = degrees.to_radians(),
+            };
+            let base = Conditions { size_px: 200.0, ..Conditions::default() };
+            sweep(&class, &angle, &base, args.views, &common, &p)
+        };
+        let text = |seed| serde_json::to_string(&run(seed)).unwrap();
+        assert_eq!(text(3), text(3));
+        assert_ne!(text(3), text(4));
+        let curve = run(3);
+        assert!(curve.points[0].views >= 4 && curve.points[0].right > 0.7, "{:?}", curve.points[0]);
+        assert!(curve.points[1].right < 0.3 && curve.half.at < 87.0, "{:?}", curve.points[1]);
+        assert!(
+            Line::try_parse_from(["x", "--views=0"]).is_err()
+                && Line::try_parse_from(["x", "--corner-noise-px=-1"]).is_err()
+        );
+    }
+}
