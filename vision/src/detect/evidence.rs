@@ -15,7 +15,7 @@ pub const MAX_SAMPLES: usize = 96;
 /// Fewest samples taken along one side.
 const MIN_SAMPLES: usize = 12;
 /// Share of a side left out at both ends: near a corner the other side's gradient mixes in.
-const CORNER_SHARE: f64 = 0.04;
+pub(super) const CORNER_SHARE: f64 = 0.04;
 /// The gradient points along the normal to within about 35 degrees.
 pub(super) const MIN_COS: f32 = 0.82;
 
@@ -185,7 +185,7 @@ impl SidePoints {
 
 /// The numbers below `count`, each once, far from one another one after the other: a bad side shows before all of its
 /// samples are taken.
-fn scattered(count: usize) -> impl Iterator<Item = usize> {
+pub(super) fn scattered(count: usize) -> impl Iterator<Item = usize> {
     // Two primes whose product is above every count: one of them is no factor.
     let stride = if count.is_multiple_of(STRIDES[0]) { STRIDES[1] } else { STRIDES[0] };
     (0..count).map(move |i| i * stride % count)
@@ -194,36 +194,8 @@ fn scattered(count: usize) -> impl Iterator<Item = usize> {
 const STRIDES: [usize; 2] = [7, 17];
 
 /// Where along a side a sample lies, 0 to 1.
-fn share_along(sample: usize, count: usize) -> f64 {
+pub(super) fn share_along(sample: usize, count: usize) -> f64 {
     CORNER_SHARE + (1.0 - 2.0 * CORNER_SHARE) * (sample as f64 + 0.5) / count as f64
-}
-
-/// A coarse look: share of samples along the side with an edge within about 1.5 px that follows it. Samples outside
-/// the image count as neither. Gives up with 0 once `enough` is out of reach.
-pub fn quick_support(g: &Gradients, from: &Point2<f64>, to: &Point2<f64>, min_step: f64, enough: f64) -> f64 {
-    const SAMPLES: usize = 24;
-    let side = to - from;
-    let length = side.norm();
-    if length.is_nan() || length < 1.0 {
-        return 0.0;
-    }
-    let (across, min_step) = (Vector2::new(side.y, -side.x) / length, min_step as f32);
-    let (normal, across) = (across.cast().into(), Fixed::step(&across));
-    let stride = side * ((1.0 - 2.0 * CORNER_SHARE) / SAMPLES as f64);
-    let (start, stride) = (Fixed::point(&(from + side * share_along(0, SAMPLES))), Fixed::step(&stride));
-    let most_missed = ((1.0 - enough) * SAMPLES as f64).max(0.0) as usize;
-    let (mut seen, mut supported) = (0_usize, 0_usize);
-    for i in scattered(SAMPLES) {
-        let foot = start.on(stride, i as i64);
-        let Some(here) = g.follows(foot, normal, min_step) else { continue };
-        seen += 1;
-        let beside = |offset: i64| g.follows(foot.on(across, offset), normal, min_step) == Some(true);
-        supported += usize::from(here || beside(-1) || beside(1) || beside(-2) || beside(2));
-        if seen - supported > most_missed {
-            return 0.0;
-        }
-    }
-    if seen == 0 { 0.0 } else { supported as f64 / seen as f64 }
 }
 
 /// Where the edge that runs from `from` through `to` ends: the last supported point on the line beyond `to`.
@@ -379,8 +351,6 @@ mod tests {
         // Beside the quad there is nothing.
         let away = Vector2::new(0.0, -20.0);
         assert!(measure(&g, &(from + away), &(to + away), FULL).support < 0.05);
-        assert!(quick_support(&g, &from, &to, 6.0, 0.5) > 0.95);
-        assert!(quick_support(&g, &(from + away), &(to + away), 6.0, 0.5) < 0.05);
         // The run from the middle of the side ends at its corner.
         let end = run_end(&g, &from, &nalgebra::center(&from, &to), 6.0);
         assert!((end - to).norm() < 6.0, "{end:?}");

@@ -1,13 +1,15 @@
 //! Quads by search, past the paper's two relaxations: segments that meet in corners are followed round, four in a
-//! circle or three with the fourth side looked for in the gradient planes, and every hypothesis must be supported by
-//! edges along all four sides. Segments in, seeds out; which of them become quads is decided by `selection`.
+//! circle or three with the fourth side looked for in the gradient planes, or two that face each other are taken for
+//! opposite sides, and every hypothesis must be supported by edges along all four sides. Segments in, seeds out; which of them become quads is decided by `selection`.
 //!
 //! Departs from method 3.3, 3.4: there a segment takes part in one pair and a pair in one quad, and a side that the
 //! segments miss loses the quad. What it gains is in docs/METHOD.md.
 
 use super::{
-    evidence::{Gradients, quick_support, run_end},
+    evidence::{Gradients, run_end},
+    facing::partners,
     grouping::{QuadSeed, plausible},
+    seed_look::fit_of,
     segments::EdgeSegment,
     similarity::corner_of,
 };
@@ -41,6 +43,8 @@ pub struct HypothesisParams {
     pub min_step: f64,
     /// Whether a fourth side that no segment gives is looked for.
     pub complete: bool,
+    /// Whether two segments that face each other make a quad, their ends its corners.
+    pub facing: bool,
 }
 
 impl Default for HypothesisParams {
@@ -53,6 +57,7 @@ impl Default for HypothesisParams {
             min_support: 0.5,
             min_step: 4.0,
             complete: true,
+            facing: true,
         }
     }
 }
@@ -86,12 +91,17 @@ pub fn hypotheses(segments: &[EdgeSegment], g: &Gradients, p: &HypothesisParams)
     if p.complete {
         complete(segments, &table, &order, g, p, &mut found);
     }
+    if p.facing {
+        paired(segments, &order, &mut found);
+    }
     let size = (g.width(), g.height());
     found
         .in_order()
         .filter(|seed| plausible(&seed.corners_px, size))
         .filter_map(|mut seed| {
-            seed.fit = supported(&seed, g, p)?;
+            // The side without a segment is the likeliest to fail.
+            let first = seed.sides.iter().position(Option::is_none).unwrap_or(0);
+            seed.fit = fit_of(g, &seed.corners_px, first, p.min_step, p.min_support)?;
             Some(seed)
         })
         .collect()
@@ -130,22 +140,6 @@ fn longest(segments: &[EdgeSegment]) -> Vec<usize> {
     order.truncate(MAX_SEARCHED_SEGMENTS);
     order.sort_unstable();
     order
-}
-
-/// Support of the worst side, if every side has enough.
-fn supported(seed: &QuadSeed, g: &Gradients, p: &HypothesisParams) -> Option<f64> {
-    let mut worst: f64 = 1.0;
-    // The side without a segment is the likeliest to fail.
-    let first = seed.sides.iter().position(Option::is_none).unwrap_or(0);
-    for i in (0..4).map(|i| (i + first) % 4) {
-        let (from, to) = (&seed.corners_px[i], &seed.corners_px[(i + 1) % 4]);
-        let support = quick_support(g, from, to, p.min_step, p.min_support);
-        if support < p.min_support {
-            return None;
-        }
-        worst = worst.min(support);
-    }
-    Some(worst)
 }
 
 fn corners(segments: &[EdgeSegment], order: &[usize], p: &HypothesisParams) -> CornerTable {
@@ -278,9 +272,31 @@ fn complete(
     }
 }
 
+/// Adds quads of two segments that face each other.
+fn paired(segments: &[EdgeSegment], order: &[usize], found: &mut Tightest) {
+    for (i, &a) in order.iter().enumerate() {
+        for p in partners(segments, a, &order[i + 1..]) {
+            let seed = clockwise([Some(a), None, Some(p.other), None], p.corners_px);
+            found.add(FACING_LOOSENESS + p.slack, seed);
+        }
+    }
+}
+
+/// Looseness of two segments that face each other exactly: two corners that no segment closes.
+const FACING_LOOSENESS: f64 = 0.1;
+
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{
+        super::{
+            chains::{ChainParams, chains},
+            edges::{EdgeParams, edges},
+            fixtures::render,
+            segments::{SegmentParams, segments},
+        },
+        *,
+    };
+    use crate::geometry::polygon;
 
     #[test]
     fn collected_hypotheses_are_bounded_and_the_tightest_stay() {
@@ -303,5 +319,19 @@ mod tests {
         let expected: Vec<usize> = all.iter().take(MAX_HYPOTHESES).map(|x| x.2).collect();
         let order: Vec<usize> = kept.in_order().map(|s| s.corners_px[0].x as usize).collect();
         assert_eq!(order, expected);
+    }
+
+    #[test]
+    fn a_sign_with_two_sides_too_short_for_segments_is_a_seed() {
+        let sign = [[300.0, 200.0], [360.0, 206.0], [358.0, 228.0], [298.0, 222.0]];
+        let image = render(640, 480, 90, &[(sign, 180)]);
+        let map = edges(&image, &EdgeParams::default());
+        let g = Gradients { image: &image, gx: map.gx(), gy: map.gy() };
+        let found = segments(&chains(&map, &ChainParams::default()), &map, &SegmentParams::default());
+        assert_eq!(found.len(), 2, "{found:?}");
+        let seeds = |facing| hypotheses(&found, &g, &HypothesisParams { facing, ..Default::default() });
+        let overlap = polygon::iou(&sign.map(Point2::from), &seeds(true)[0].corners_px);
+        assert!(overlap > 0.8, "{overlap}");
+        assert!(seeds(false).is_empty());
     }
 }

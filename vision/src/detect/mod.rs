@@ -34,6 +34,8 @@ pub mod pyramid;
 pub mod evidence;
 mod side_fit;
 pub mod corners;
+pub mod facing;
+pub mod seed_look;
 pub mod hypotheses;
 pub mod rating;
 pub mod selection;
@@ -133,8 +135,7 @@ fn by_search(memory: &mut Memory, image: &GrayImage, p: &DetectParams, trace: &m
     let (rated, edges, segments) = searched(memory, work, p, trace);
     let gradients = Gradients { image: work, gx: edges.gx(), gy: edges.gy() };
     let found: Vec<Quad> = if p.quads.choose_sides {
-        let settled = selection::settle(rated, &gradients, &p.quads);
-        settled.into_iter().map(|s| s.quad).filter(|q| q.score >= p.quads.min_probability).collect()
+        selection::things(selection::settle(rated, &gradients, &p.quads), p.quads.min_probability)
     } else {
         selection::resolve(rated, &p.quads)
     };

@@ -223,7 +223,7 @@ impl Default for QuadParams {
             nested_iou: 0.6,
             nested: Nested::default(),
             refit_reach_px: 2.0,
-            min_step: 6.0,
+            min_step: 4.0,
             max_refitted: 60,
             max_alike: 8,
             min_score: 0.4,

@@ -99,12 +99,11 @@ pub fn settle(rated: Vec<Rated>, g: &Gradients, p: &QuadParams) -> Vec<Settled> 
     let thing_model = p.thing_network();
     let mut settled: Vec<Settled> = Vec::new();
     for quad in different(rated, p) {
+        // What is much larger than a thing that it holds may yet take its place.
         let taken = |q: &Quad| {
+            let corners = q.corners_px.points();
             let things = settled.iter().filter(|s| s.quad.score >= p.min_probability);
-            things.map(|s| s.quad.corners_px.points()).any(|k| {
-                let corners = q.corners_px.points();
-                overlap_exceeds(k, corners, SAME_IOU) || contradict(k, corners)
-            })
+            things.map(|s| s.quad.corners_px.points()).any(|k| against(k, corners) && !is_part(k, corners))
         };
         if taken(&quad) {
             continue;
@@ -126,6 +125,48 @@ pub fn settle(rated: Vec<Rated>, g: &Gradients, p: &QuadParams) -> Vec<Settled> 
     }
     settled
 }
+
+/// The things among settled quads, of those that contradict each other the first; but a quad of which all that it
+/// contradicts are parts, no likelier and no better supported, takes their place: a pane looks like a thing too and comes
+/// before its window when that is seen a little worse.
+pub fn things(settled: Vec<Settled>, min_probability: f64) -> Vec<Quad> {
+    let mut kept: Vec<Quad> = Vec::new();
+    for quad in settled.into_iter().map(|s| s.quad).filter(|q| q.score >= min_probability) {
+        let corners = quad.corners_px.points();
+        let rivals = |k: &Quad| against(k.corners_px.points(), corners);
+        let worst = |q: &Quad| q.side_support.iter().copied().fold(1.0, f64::min);
+        let gives_way = |k: &Quad| {
+            k.score <= quad.score + PART_SLACK
+                && worst(k) <= worst(&quad) + SUPPORT_SLACK
+                && is_part(k.corners_px.points(), corners)
+        };
+        if kept.iter().filter(|k| rivals(k)).all(gives_way) {
+            kept.retain(|k| !rivals(k));
+            kept.push(quad);
+        }
+    }
+    kept
+}
+
+/// Whether two quads are one, or cannot both be there.
+fn against(a: &[Point2<f64>; 4], b: &[Point2<f64>; 4]) -> bool {
+    overlap_exceeds(a, b, SAME_IOU) || contradict(a, b)
+}
+
+/// Whether `part` is cut from `whole` by a line across, as a pane from its window: three sides are the same, and the
+/// whole is much larger.
+fn is_part(part: &[Point2<f64>; 4], whole: &[Point2<f64>; 4]) -> bool {
+    polygon::area(part) < MAX_PART * polygon::area(whole)
+        && polygon::relation(whole, part, SHARED_SIDE_PX) == Relation::Contains
+        && Facing::new(whole, part).count() == 3
+}
+
+/// A part may be this much likelier than its whole: probabilities near 1 differ by chance.
+const PART_SLACK: f64 = 0.02;
+/// Its worst side may have this much more support: one that runs over a gap between two panes is no side.
+const SUPPORT_SLACK: f64 = 0.06;
+/// Largest share of a whole that a part is; more is the same thing.
+const MAX_PART: f64 = 0.6;
 
 /// Most quads whose sides are moved.
 pub const MAX_SETTLED: usize = 80;
@@ -179,9 +220,13 @@ pub fn sharpen(quad: Quad, g: &Gradients, p: &QuadParams) -> Quad {
 #[cfg(test)]
 mod tests {
     use super::{
-        super::rating::{rate, tests::squares},
+        super::{
+            quads::{Corners, QuadKind},
+            rating::{rate, tests::squares},
+        },
         *,
     };
+    use nalgebra::Matrix2;
 
     #[test]
     fn compared_and_settled_quads_are_bounded() {
@@ -195,5 +240,48 @@ mod tests {
         assert_eq!(settle(rated.clone(), &g, &p).len(), MAX_SETTLED);
         // Fewer are all settled.
         assert_eq!(settle(rated[..MAX_SETTLED - 1].to_vec(), &g, &p).len(), MAX_SETTLED - 1);
+    }
+
+    fn thing([left, top, right, bottom]: [f64; 4], score: f64, support: f64) -> Settled {
+        let corners = [[left, top], [right, top], [right, bottom], [left, bottom]];
+        let quad = Quad {
+            corners_px: Corners::try_from(corners).unwrap(),
+            corner_covariance_px2: [Matrix2::identity(); 4],
+            side_support: [1.0, support, 1.0, 1.0],
+            side_clipped: [false; 4],
+            score,
+            kind: QuadKind::Full,
+            upright_ambiguous: false,
+            alternates: Vec::new(),
+        };
+        Settled { quad, features: [0.0; THING_FEATURES] }
+    }
+
+    const WINDOW: [f64; 4] = [20.0, 20.0, 120.0, 160.0];
+
+    #[test]
+    fn a_window_takes_the_place_of_its_panes() {
+        let panes =
+            || vec![thing([20.0, 20.0, 120.0, 90.0], 0.99, 1.0), thing([20.0, 90.0, 120.0, 160.0], 0.9, 1.0)];
+        let kept = |whole: Settled| {
+            let mut all = panes();
+            all.push(whole);
+            things(all, 0.5)
+        };
+        let found = kept(thing(WINDOW, 0.98, 0.95));
+        assert_eq!(found.len(), 1);
+        assert!(found[0].corners_px.area_px2() > 13_900.0, "{found:?}");
+        // Not when it is less likely, when a side runs over a gap, or when it reaches further than the panes.
+        for whole in [
+            thing(WINDOW, 0.9, 1.0),
+            thing(WINDOW, 0.98, 0.85),
+            thing([0.0, 20.0, 120.0, 180.0], 0.98, 1.0),
+            thing(WINDOW, 0.4, 1.0),
+        ] {
+            assert_eq!(kept(whole).len(), 2);
+        }
+        // What is hardly larger than what is there is the same thing seen differently.
+        let same = vec![thing(WINDOW, 0.9, 1.0), thing([20.0, 20.0, 120.0, 210.0], 0.99, 1.0)];
+        assert!(things(same, 0.5)[0].corners_px.area_px2() < 14_100.0);
     }
 }
