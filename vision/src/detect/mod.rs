@@ -135,7 +135,7 @@ fn by_search(memory: &mut Memory, image: &GrayImage, p: &DetectParams, trace: &m
     let (rated, edges, segments) = searched(memory, work, p, trace);
     let gradients = Gradients { image: work, gx: edges.gx(), gy: edges.gy() };
     let found: Vec<Quad> = if p.quads.choose_sides {
-        selection::things(selection::settle(rated, &gradients, &p.quads), p.quads.min_probability)
+        selection::things(selection::settle(rated, &gradients, &p.quads), &p.quads)
     } else {
         selection::resolve(rated, &p.quads)
     };

@@ -204,6 +204,8 @@ pub struct QuadParams {
     pub thing_model: Option<Network>,
     /// Smallest probability that a quad of the search is a thing.
     pub min_probability: f64,
+    /// A quad that is a thing with at least this probability keeps what contradicts it from being looked at.
+    pub sure_probability: f64,
     /// Whether to report sets of three sides.
     pub three_sided: bool,
     /// Smallest c5 of a set of three sides.
@@ -230,7 +232,8 @@ impl Default for QuadParams {
             choose_sides: true,
             side_model: None,
             thing_model: None,
-            min_probability: 0.6,
+            min_probability: 0.65,
+            sure_probability: 0.98,
             three_sided: true,
             min_three_sided_closing: 0.5,
             min_three_sided_score: 0.5,

@@ -90,9 +90,8 @@ pub struct Settled {
     pub features: [f64; THING_FEATURES],
 }
 
-/// Moves the sides of the rated quads, by rank, to the lines that look most like borders, and tells which are things:
-/// those whose score reaches `min_probability`. A quad that contradicts one of them is passed over; what is no thing
-/// stands in nobody's way. All that were looked at are returned, at most [`MAX_SETTLED`]. The border that a quad had
+/// Moves the sides of the rated quads, by rank, to the lines that look most like borders, and tells how likely they are
+/// things. A quad that contradicts one of at least `sure_probability` is passed over; nothing else stands in its way. All that were looked at are returned, at most [`MAX_SETTLED`]. The border that a quad had
 /// before stays among its alternates.
 pub fn settle(rated: Vec<Rated>, g: &Gradients, p: &QuadParams) -> Vec<Settled> {
     let side_model = p.side_network();
@@ -102,7 +101,7 @@ pub fn settle(rated: Vec<Rated>, g: &Gradients, p: &QuadParams) -> Vec<Settled> 
         // What is much larger than a thing that it holds may yet take its place.
         let taken = |q: &Quad| {
             let corners = q.corners_px.points();
-            let things = settled.iter().filter(|s| s.quad.score >= p.min_probability);
+            let things = settled.iter().filter(|s| s.quad.score >= p.sure_probability);
             things.map(|s| s.quad.corners_px.points()).any(|k| against(k, corners) && !is_part(k, corners))
         };
         if taken(&quad) {
@@ -114,24 +113,25 @@ pub fn settle(rated: Vec<Rated>, g: &Gradients, p: &QuadParams) -> Vec<Settled> 
         let Some(chosen) = choose_sides(g, quad.corners_px.points(), side_model) else { continue };
         let moved = moved(&quad, &chosen, g, p).filter(|q| !taken(q));
         let (quad, sides) = match moved {
-            Some(moved) => (moved, &chosen.features),
-            None => (quad, &chosen.nearest_features),
+            Some(moved) => (moved, &chosen.sides),
+            None => (quad, &chosen.nearest),
         };
-        let corners = quad.corners_px.points();
-        let mean_side = (0..4).map(|i| (corners[(i + 1) % 4] - corners[i]).norm()).sum::<f64>() / 4.0;
-        let features = thing_features(sides, quad.score, mean_side);
+        let features = thing_features(sides, quad.corners_px.points(), quad.score, (g.width(), g.height()));
         let score = probability(thing_model, &features);
         settled.push(Settled { quad: Quad { score, ..quad }, features });
     }
     settled
 }
 
-/// The things among settled quads, of those that contradict each other the first; but a quad of which all that it
-/// contradicts are parts, no likelier and no better supported, takes their place: a pane looks like a thing too and comes
-/// before its window when that is seen a little worse.
-pub fn things(settled: Vec<Settled>, min_probability: f64) -> Vec<Quad> {
+/// The things among settled quads. Of those that contradict each other the likeliest, of those that are sure the first;
+/// but a quad of which all that it contradicts are parts, no likelier and no better supported, takes their place: a pane
+/// looks like a thing too and comes before its window when that is seen a little worse.
+pub fn things(mut settled: Vec<Settled>, p: &QuadParams) -> Vec<Quad> {
     let mut kept: Vec<Quad> = Vec::new();
-    for quad in settled.into_iter().map(|s| s.quad).filter(|q| q.score >= min_probability) {
+    let likely = |s: &Settled| s.quad.score.min(p.sure_probability);
+    settled.retain(|s| s.quad.score >= p.min_probability);
+    settled.sort_by(|a, b| likely(b).total_cmp(&likely(a)));
+    for quad in settled.into_iter().map(|s| s.quad) {
         let corners = quad.corners_px.points();
         let rivals = |k: &Quad| against(k.corners_px.points(), corners);
         let worst = |q: &Quad| q.side_support.iter().copied().fold(1.0, f64::min);
@@ -233,7 +233,7 @@ mod tests {
         let (image, map, seeds) = squares(14);
         let g = Gradients { image: &image, gx: map.gx(), gy: map.gy() };
         // Nothing is a thing, so nothing stands in anybody's way.
-        let p = QuadParams { max_refitted: usize::MAX, min_probability: 2.0, ..QuadParams::default() };
+        let p = QuadParams { max_refitted: usize::MAX, sure_probability: 2.0, ..QuadParams::default() };
         let rated = rate(&seeds, &g, &p);
         assert!(rated.len() > MAX_RATED && MAX_RATED > MAX_SETTLED);
         assert_eq!(resolve(rated.clone(), &p).len(), MAX_RATED);
@@ -257,6 +257,10 @@ mod tests {
         Settled { quad, features: [0.0; THING_FEATURES] }
     }
 
+    fn params() -> QuadParams {
+        QuadParams { min_probability: 0.5, sure_probability: 0.98, ..QuadParams::default() }
+    }
+
     const WINDOW: [f64; 4] = [20.0, 20.0, 120.0, 160.0];
 
     #[test]
@@ -266,7 +270,7 @@ mod tests {
         let kept = |whole: Settled| {
             let mut all = panes();
             all.push(whole);
-            things(all, 0.5)
+            things(all, &params())
         };
         let found = kept(thing(WINDOW, 0.98, 0.95));
         assert_eq!(found.len(), 1);
@@ -281,7 +285,21 @@ mod tests {
             assert_eq!(kept(whole).len(), 2);
         }
         // What is hardly larger than what is there is the same thing seen differently.
-        let same = vec![thing(WINDOW, 0.9, 1.0), thing([20.0, 20.0, 120.0, 210.0], 0.99, 1.0)];
-        assert!(things(same, 0.5)[0].corners_px.area_px2() < 14_100.0);
+        let same = vec![thing(WINDOW, 0.985, 1.0), thing([20.0, 20.0, 120.0, 210.0], 0.99, 1.0)];
+        assert!(things(same, &params())[0].corners_px.area_px2() < 14_100.0);
+    }
+
+    #[test]
+    fn of_what_contradicts_the_likeliest_stays() {
+        let beside = [60.0, 0.0, 160.0, 140.0];
+        let left = |first: f64, second: f64| {
+            let found = things(vec![thing(WINDOW, first, 1.0), thing(beside, second, 1.0)], &params());
+            found.iter().map(|q| q.corners_px.points()[0].x).collect::<Vec<_>>()
+        };
+        assert_eq!(left(0.9, 0.95), [60.0]);
+        assert_eq!(left(0.95, 0.9), [20.0]);
+        // Of two that are sure the one that is seen better, which comes first.
+        assert_eq!(left(0.985, 0.99), [20.0]);
+        assert!(left(0.4, 0.45).is_empty());
     }
 }

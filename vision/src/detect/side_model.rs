@@ -35,17 +35,40 @@ pub struct Rival {
 pub struct Chosen {
     /// Corners in the order of the sides.
     pub corners_px: [Point2<f64>; 4],
-    /// Measurements of each side's line; all 0 for a side without a line.
-    pub features: [[f64; SIDE_FEATURES]; 4],
+    /// What was measured of each side's line; all 0 for a side without a line.
+    pub sides: [Measured; 4],
     /// The same of the lines nearest to the sides as they were.
-    pub nearest_features: [[f64; SIDE_FEATURES]; 4],
+    pub nearest: [Measured; 4],
+}
+
+/// What was measured of the line of a side.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Measured {
+    /// See [`choose_sides`].
+    pub features: [f64; SIDE_FEATURES],
+    /// What can be compared between sides only.
+    pub tones: Tones,
+}
+
+/// Tones beside a line: logs of grey levels, 8 added.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Tones {
+    /// Some way outside, where the wall is.
+    pub wall: f64,
+    /// Just outside.
+    pub outside: f64,
+    /// Just inside.
+    pub inside: f64,
+    /// Log of the step in grey levels, 2 added, positive where it is brighter on the one side; times how alike its signs
+    /// are.
+    pub step: f64,
 }
 
 /// Moves every side of a quad, clockwise on screen, to the line beside it that looks most like the border of a thing.
 /// None if no side has a line, or if what comes out has no corners.
 pub fn choose_sides(g: &Gradients, corners: &[Point2<f64>; 4], model: &Network) -> Option<Chosen> {
     let sides = Sides::new(g, corners);
-    let known: [Vec<[f64; BAND_FEATURES]>; 4] =
+    let known: [Vec<([f64; BAND_FEATURES], Tones)>; 4] =
         std::array::from_fn(|i| (0..sides.lines(i).len()).map(|j| sides.band_features(i, j)).collect());
     let mut chosen: [Option<usize>; 4] = std::array::from_fn(|i| sides.nearest(i));
     if chosen.iter().all(Option::is_none) {
@@ -53,14 +76,18 @@ pub fn choose_sides(g: &Gradients, corners: &[Point2<f64>; 4], model: &Network) 
     }
     let mut met = sides.met(&chosen);
     let measure = |met: &Met, lines: &[Option<usize>; 4]| {
-        let of_line = |i: usize, j: usize| joined(&known[i][j], &sides.corner_features(i, j, &met[i]));
-        std::array::from_fn(|i| lines[i].map_or([0.0; SIDE_FEATURES], |j| of_line(i, j)))
+        let of_line = |i: usize, j: usize| Measured {
+            features: joined(&known[i][j].0, &sides.corner_features(i, j, &met[i])),
+            tones: known[i][j].1,
+        };
+        std::array::from_fn(|i| lines[i].map_or_else(Measured::default, |j| of_line(i, j)))
     };
-    let nearest_features = measure(&met, &chosen);
+    let nearest = measure(&met, &chosen);
     for _ in 0..ROUNDS {
         let before = chosen;
         for i in 0..4 {
-            let weigh = |j: usize| model.output(&joined(&known[i][j], &sides.corner_features(i, j, &met[i])));
+            let weigh =
+                |j: usize| model.output(&joined(&known[i][j].0, &sides.corner_features(i, j, &met[i])));
             let weights: Vec<f64> = (0..known[i].len()).map(weigh).collect();
             chosen[i] = (0..weights.len()).max_by(|a, b| weights[*a].total_cmp(&weights[*b]).then(b.cmp(a)));
         }
@@ -69,11 +96,7 @@ pub fn choose_sides(g: &Gradients, corners: &[Point2<f64>; 4], model: &Network) 
         }
         met = sides.met(&chosen);
     }
-    Some(Chosen {
-        corners_px: meet_all(&sides.ends(&chosen))?,
-        features: measure(&met, &chosen),
-        nearest_features,
-    })
+    Some(Chosen { corners_px: meet_all(&sides.ends(&chosen))?, sides: measure(&met, &chosen), nearest })
 }
 
 fn joined(band: &[f64; BAND_FEATURES], corners: &[f64; CORNER_FEATURES]) -> [f64; SIDE_FEATURES] {
@@ -91,7 +114,7 @@ pub fn rivals(g: &Gradients, corners: &[Point2<f64>; 4]) -> [Vec<Rival>; 4] {
     std::array::from_fn(|i| {
         (0..sides.lines(i).len())
             .map(|j| {
-                let features = joined(&sides.band_features(i, j), &sides.corner_features(i, j, &met[i]));
+                let features = joined(&sides.band_features(i, j).0, &sides.corner_features(i, j, &met[i]));
                 Rival { ends_px: sides.line_ends(i, j), features }
             })
             .collect()
@@ -173,8 +196,8 @@ impl<'a> Sides<'a> {
     /// out and 13 further in, 14 largest support further out, 15 number of lines further out; share of samples with
     /// an edge further out, 16 weak and 17 stronger; 18 how much the strip to the next line inside looks like a shadow on
     /// the wall, 19 the strip from the next line outside.
-    fn band_features(&self, side: usize, line: usize) -> [f64; BAND_FEATURES] {
-        let Some(band) = &self.bands[side] else { return [0.0; BAND_FEATURES] };
+    fn band_features(&self, side: usize, line: usize) -> ([f64; BAND_FEATURES], Tones) {
+        let Some(band) = &self.bands[side] else { return ([0.0; BAND_FEATURES], Tones::default()) };
         let (c, extent) = (band.lines[line], self.extent_px[side]);
         let broad = (0.12 * extent).max(8.0);
         let along = band.along_line(&c);
@@ -192,7 +215,14 @@ impl<'a> Sides<'a> {
         let next_in = inner().max_by(|a, b| a.offset_px.total_cmp(&b.offset_px));
         let next_out = outer().min_by(|a, b| a.offset_px.total_cmp(&b.offset_px));
         let [weak, stronger] = along.edges_outside(2.5);
-        [
+        let log = |grey: f64| (grey + 8.0).ln();
+        let tones = Tones {
+            wall: log(wall),
+            outside: log(outside),
+            inside: log(inside),
+            step: c.sign * (c.step + 2.0).ln(),
+        };
+        let features = [
             c.support,
             c.sign.abs(),
             (c.step + 2.0).ln(),
@@ -213,7 +243,8 @@ impl<'a> Sides<'a> {
             stronger,
             next_in.map_or(0.0, |i| shadow(&along, c.offset_px - i.offset_px)),
             next_out.map_or(0.0, |o| shadow(&band.along_line(o), o.offset_px - c.offset_px)),
-        ]
+        ];
+        (features, tones)
     }
 
     /// What the two neighbouring sides do at the corners with a line, as a share of what they do along their own length:

@@ -34,8 +34,8 @@ const NO_THING: f64 = 0.5;
 /// An inner border covers at least this share of its label: neither the one nor the other.
 const INNER_AREA: f64 = 0.25;
 const INNER_TOLERANCE_PX: f64 = 4.0;
-/// No probability reaches it.
-const ALL: f64 = 0.0;
+/// Every quad that is told is at least so likely a thing.
+const SURE: f64 = 0.0;
 
 /// A labelled set, and in which part of the data each of its images is.
 #[derive(Debug)]
@@ -103,8 +103,8 @@ impl Data {
     pub(super) fn gather(sets: &[Set], params: &DetectParams, min_side_px: f64) -> anyhow::Result<Self> {
         let mut data = Self::default();
         let mut params = params.clone();
-        // What is told to be a thing hides what contradicts it; here everything is to be seen.
-        params.quads.min_probability = ALL;
+        // The first by rank hides what contradicts it, thing or not: what is told apart later has little in common.
+        params.quads.sure_probability = SURE;
         for set in sets {
             let progress = screen::progress(set.images().count(), "searching");
             for (image, part) in set.images() {
