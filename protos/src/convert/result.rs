@@ -52,6 +52,7 @@ pub fn refusal(refusal: Refusal) -> &'static str {
         Refusal::Correlation => "correlation",
         Refusal::Hausdorff => "hausdorff",
         Refusal::Likeness => "likeness",
+        Refusal::Contradiction => "contradiction",
         Refusal::Margin => "margin",
     }
 }

@@ -28,33 +28,64 @@ impl Smoothed {
     }
 }
 
-/// Mean over the buckets of the correlation of their slopes, -1 to 1; 0 where both are flat, or cut differently.
-pub fn likeness(a: &Icon, b: &Icon, p: &CorrelationParams) -> f64 {
+/// How two icons compare.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Alike {
+    /// Mean over the buckets of the correlation of their slopes, -1 to 1; 0 where both are flat, or cut differently.
+    pub likeness: f64,
+    /// Share of the buckets in which both show something, and not the same, 0 to 1. What stands plain before a picture
+    /// shows nothing; another picture in its place does.
+    pub contradicting: f64,
+}
+
+/// A bucket contradicts when its correlation is below this...
+const CONTRADICTS: f32 = 0.3;
+/// ... and both have slopes of at least this share of their icon's mean, and this much, in squared grey levels.
+const SHOWS_SHARE: f32 = 0.1;
+const SHOWS_LEAST: f32 = 10.0;
+
+/// Compares two icons of the same thing.
+pub fn alike(a: &Icon, b: &Icon, p: &CorrelationParams) -> Alike {
     between(&Smoothed::new(a), &Smoothed::new(b), p)
 }
 
-/// The same of smoothed icons.
-pub fn between(a: &Smoothed, b: &Smoothed, p: &CorrelationParams) -> f64 {
-    let (size, per_side) = (a.size, p.per_side());
-    if b.size != size || size <= 2 * BORDER_PX + per_side {
-        return 0.0;
-    }
-    dispatch!(Level::new(), _s => mean_correlation(&a.pixels, &b.pixels, size, per_side))
+/// How alike two icons are, see [`Alike::likeness`].
+pub fn likeness(a: &Icon, b: &Icon, p: &CorrelationParams) -> f64 {
+    alike(a, b, p).likeness
 }
 
+/// The same as [`alike`] of smoothed icons.
+pub fn between(a: &Smoothed, b: &Smoothed, p: &CorrelationParams) -> Alike {
+    let (size, per_side) = (a.size, p.per_side());
+    if b.size != size || size <= 2 * BORDER_PX + per_side {
+        return Alike { likeness: 0.0, contradicting: 0.0 };
+    }
+    let buckets = dispatch!(Level::new(), _s => buckets(&a.pixels, &b.pixels, size, per_side));
+    let count = buckets.len() as f64;
+    let means = [1, 2].map(|i| buckets.iter().map(|b| b[i]).sum::<f32>() / count as f32);
+    let shows = |power: f32, mean: f32| power > (SHOWS_SHARE * mean).max(SHOWS_LEAST);
+    let contradicts = |b: &&[f32; 3]| b[0] < CONTRADICTS && shows(b[1], means[0]) && shows(b[2], means[1]);
+    Alike {
+        likeness: buckets.iter().map(|b| f64::from(b[0])).sum::<f64>() / count,
+        contradicting: buckets.iter().filter(contradicts).count() as f64 / count,
+    }
+}
+
+/// Of each bucket the correlation of its slopes, and the mean square of the slopes of either icon.
 #[expect(
     clippy::inline_always,
     reason = "an instruction set holds only in what is inlined where it was chosen"
 )]
 #[inline(always)]
-fn mean_correlation(a: &[f32], b: &[f32], size: usize, per_side: usize) -> f64 {
+fn buckets(a: &[f32], b: &[f32], size: usize, per_side: usize) -> Vec<[f32; 3]> {
     let edge = |i: usize| i * size / per_side;
     let within = |i: usize| edge(i).max(BORDER_PX)..edge(i + 1).min(size - BORDER_PX);
-    let mut sum = 0.0;
+    let mut found = Vec::with_capacity(per_side * per_side);
     for bucket in 0..per_side * per_side {
-        let columns = within(bucket % per_side);
+        let (columns, rows) = (within(bucket % per_side), within(bucket / per_side));
+        let cells = (columns.len() * rows.len()).max(1) as f32;
         let mut sums = [[0.0_f32; LANES]; 3];
-        for y in within(bucket / per_side) {
+        for y in rows {
             for x in columns.clone() {
                 let at = y * size + x;
                 let slope = |icon: &[f32]| [icon[at + 1] - icon[at - 1], icon[at + size] - icon[at - size]];
@@ -67,9 +98,10 @@ fn mean_correlation(a: &[f32], b: &[f32], size: usize, per_side: usize) -> f64 {
         }
         let [ab, aa, bb] = sums.map(|lanes| lanes.iter().sum::<f32>());
         let correlation = ab / (aa * bb).sqrt();
-        sum += if correlation.is_finite() { f64::from(correlation) } else { 0.0 };
+        let correlation = if correlation.is_finite() { correlation } else { 0.0 };
+        found.push([correlation, aa / cells - NOISE, bb / cells - NOISE]);
     }
-    sum / (per_side * per_side) as f64
+    found
 }
 
 /// Each pixel with its eight neighbours, weighted 1 2 1 along both axes; border replicated.
@@ -132,6 +164,28 @@ mod tests {
         let covered = made(|x, y| if y > 0.6 { 230.0 } else { waves(x, y) });
         let left = likeness(&icon, &covered, &p);
         assert!((left - 0.6 * whole).abs() < 0.06, "{left} of {whole}");
+    }
+
+    #[test]
+    fn another_picture_contradicts_and_a_plain_cover_does_not() {
+        let p = CorrelationParams::default();
+        let icon = made(waves);
+        let with = |lower: fn(f64, f64) -> f64| {
+            let other = made(|x, y| if y > 0.6 { lower(x, y) } else { waves(x, y) });
+            let seen = alike(&icon, &other, &p);
+            assert!(alike(&other, &icon, &p) == seen, "{seen:?}");
+            seen.contradicting
+        };
+        assert!(with(waves) < 1e-9);
+        // But for its edge.
+        let plain = with(|_, _| 230.0);
+        assert!(plain <= 0.2, "{plain}");
+        // Ten of 25 buckets show something else.
+        let replaced = with(|x, y| waves(y - 0.4, x + 3.0));
+        assert!((0.24..=0.4).contains(&replaced), "{replaced}");
+        // In half the light, too.
+        let dimmed = with(|x, y| 0.5 * waves(y - 0.4, x + 3.0));
+        assert!((dimmed - replaced).abs() < 0.05, "{dimmed} {replaced}");
     }
 
     #[test]

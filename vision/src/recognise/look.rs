@@ -7,7 +7,7 @@ use super::{
     compare::{Near, Sighting, correlation_as_found, least_hausdorff},
     correlation::{CorrelationParams, correlation},
     features,
-    likeness::{Smoothed, between, likeness},
+    likeness::{Smoothed, alike, between},
     verdict::VerdictParams,
     watch::{Step, Watch},
 };
@@ -18,6 +18,8 @@ pub(crate) struct Judged {
     pub(crate) near: Near,
     /// Where alignment moved the corners, if the distances are those after it.
     pub(crate) moved: Option<Corners>,
+    /// Share of the buckets that contradict after alignment, 0 to 1.
+    pub(crate) contradicting: f64,
 }
 
 impl Judged {
@@ -30,10 +32,13 @@ impl Judged {
         let below = |ratio: f64, limit: f64| ratio < limit;
         let correlation = below(self.near.correlation_ratio(), limit);
         let hausdorff = below(self.near.hausdorff_ratio(), limit);
+        let doubtful = !below(self.near.ratio(kind), share * p.doubtful_share);
+        let contradicted = !(self.contradicting <= p.max_contradicting);
         match kind {
             DistanceKind::Correlation => (!correlation).then_some(Refusal::Correlation),
             DistanceKind::Hausdorff => (!hausdorff).then_some(Refusal::Hausdorff),
             DistanceKind::Both if !below(self.near.ratio(kind), share) => Some(Refusal::Likeness),
+            DistanceKind::Both if doubtful && contradicted => Some(Refusal::Contradiction),
             DistanceKind::Both => (!correlation && !hausdorff).then_some(Refusal::Correlation),
         }
     }
@@ -52,7 +57,7 @@ pub(crate) fn look(
     let aligner = Aligner::new(p.icon.size, c, &v.align);
     let mut surroundings: Vec<Option<Option<Surroundings<'_>>>> = sightings.iter().map(|_| None).collect();
     let least = found.first().map_or(0.0, |f| f.near.signature - v.signature_gap).max(v.min_signature);
-    for Judged { near, moved } in found.iter_mut() {
+    for Judged { near, moved, contradicting } in found.iter_mut() {
         near.likeness = Some(0.0);
         let sighting = &sightings[near.sighting];
         let Some(exemplar) = near.model.exemplars.get(near.exemplar).filter(|_| near.signature >= least)
@@ -63,7 +68,8 @@ pub(crate) fn look(
             .get_or_insert_with(|| Surroundings::new(image, &sighting.corners_px, &sighting.icon, &v.align));
         let template = Template::new(&exemplar.icon, &exemplar.coarse);
         let Some(laid) = around.as_ref().and_then(|s| aligner.align(s, &template)) else { continue };
-        near.likeness = Some(likeness(&laid.icon, &exemplar.icon, c));
+        let alike = alike(&laid.icon, &exemplar.icon, c);
+        (near.likeness, *contradicting) = (Some(alike.likeness), alike.contradicting);
         *moved = Some(laid.corners_px);
         if near.ratio(DistanceKind::Both) < 1.0 {
             watch.finished(Step::Alignment);
@@ -93,7 +99,7 @@ fn compare_as_found(sightings: &[Sighting], found: &mut [Judged], c: &Correlatio
         let Some(exemplar) = near.model.exemplars.get(near.exemplar) else { continue };
         let own =
             smoothed[near.sighting].get_or_insert_with(|| Smoothed::new(&sightings[near.sighting].icon));
-        near.likeness = Some(between(own, &Smoothed::new(&exemplar.icon), c));
+        near.likeness = Some(between(own, &Smoothed::new(&exemplar.icon), c).likeness);
     }
 }
 
@@ -114,7 +120,7 @@ pub(crate) fn verify(
         let each = model.exemplars.iter().map(|e| correlation(&icon, e, &p.recognise.correlation));
         let (correlation, hausdorff) = (each.fold(2.0, f64::min), least_hausdorff(&icon.points, model, p).0);
         let near = Near { correlation, hausdorff, ..judged.near.clone() };
-        let moved = Judged { near, moved: Some(corners_px) };
+        let moved = Judged { near, moved: Some(corners_px), contradicting: 0.0 };
         // What was accepted where it stood is not lost by a move that fits worse.
         let lost = judged.refusal(kind, 1.0, v).is_none() && moved.refusal(kind, 1.0, v).is_some();
         if moved.near.ratio(kind) < judged.near.ratio(kind) && !lost {

@@ -101,6 +101,8 @@ pub enum Refusal {
     Hausdorff,
     /// Laid on the learnt icon, the picture is not like it.
     Likeness,
+    /// It is like it, but too much of it shows something else.
+    Contradiction,
     /// Accepted by its own thresholds, but another landmark is too close behind.
     Margin,
 }

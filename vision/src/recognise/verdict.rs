@@ -37,6 +37,10 @@ pub struct VerdictParams {
     /// is to any stranger. On 732 quads of other buildings among 267 landmarks, strangers within a ratio grow by e with
     /// 0.08 of ratio.
     pub crowd_share: f64,
+    /// A landmark whose likeness uses more than this share of its tau...
+    pub doubtful_share: f64,
+    /// ... is refused where more than this share of the picture shows something else, 0 to 1.
+    pub max_contradicting: f64,
     /// Landmarks that are verified at most.
     pub max_verified: usize,
     /// How corners are moved.
@@ -54,6 +58,8 @@ impl Default for VerdictParams {
             signature_gap: 0.35,
             crowd: 300,
             crowd_share: 0.08,
+            doubtful_share: 0.85,
+            max_contradicting: 0.12,
             max_verified: 2,
             align: AlignParams::default(),
         }
@@ -104,7 +110,8 @@ pub fn recognise_watched(
         }
     };
     watch.finished(Step::ShortList);
-    let mut found: Vec<Judged> = near.into_iter().map(|near| Judged { near, moved: None }).collect();
+    let mut found: Vec<Judged> =
+        near.into_iter().map(|near| Judged { near, moved: None, contradicting: 0.0 }).collect();
     match kind {
         DistanceKind::Both => look(image, &sightings, &mut found, p, watch),
         DistanceKind::Correlation | DistanceKind::Hausdorff => {

@@ -190,6 +190,7 @@ fn gates_refuse_at_tau() {
             signature: 1.0,
         },
         moved: moved.then_some(anywhere),
+        contradicting: 0.0,
     };
     let (c, h, v) = (model.correlation.tau, model.hausdorff.tau, &PARAMS.recognise.verdict);
     let tight = v.verified_share;
@@ -216,6 +217,18 @@ fn gates_refuse_at_tau() {
     for refused in [Some(least), Some(f64::NAN), None] {
         assert_eq!(both(refused, 0.0, 0.0), Some(Refusal::Likeness));
     }
+    // In doubt, what contradicts decides.
+    let contradicted = |ratio: f64, share: f64| {
+        let mut judged = judged(0.0, 0.0, true);
+        judged.near.likeness = Some(1.0 - ratio * model.likeness.tau);
+        judged.contradicting = share;
+        judged.refusal(DistanceKind::Both, 1.0, v)
+    };
+    assert_eq!(contradicted(0.99, v.max_contradicting), None);
+    assert_eq!(contradicted(0.99, v.max_contradicting + 1e-9), Some(Refusal::Contradiction));
+    assert_eq!(contradicted(0.99, f64::NAN), Some(Refusal::Contradiction));
+    assert_eq!(contradicted(v.doubtful_share - 1e-6, 1.0), None);
+    assert_eq!(contradicted(v.doubtful_share + 1e-6, 1.0), Some(Refusal::Contradiction));
 }
 
 #[test]
@@ -232,6 +245,7 @@ fn the_margin_is_over_the_nearest_other() {
             signature: 1.0,
         },
         moved: None,
+        contradicting: 0.0,
     };
     let found = [judged(0, 0.4, 0.1, 0.3), judged(1, 0.5, 1.0, 1.5)];
     assert!((margin(&found, 0, DistanceKind::Correlation) - 0.8).abs() < 1e-9);
@@ -265,7 +279,7 @@ fn a_large_map_asks_for_more() {
         likeness: Some(1.0 - 0.9 * model.likeness.tau),
         signature: 1.0,
     };
-    let found = [Judged { near, moved: Some(oblique()) }];
+    let found = [Judged { near, moved: Some(oblique()), contradicting: 0.0 }];
     let among = |n: usize| decide(&found, &seen, DistanceKind::Both, n, v);
     assert_eq!(among(v.crowd).recognition, Recognition::Unique(LandmarkId(2)));
     let large = among(10 * v.crowd);

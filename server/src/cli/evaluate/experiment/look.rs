@@ -31,6 +31,8 @@ pub(crate) enum Outcome {
     Ambiguous,
     /// 1 minus likeness is not below its tau.
     Likeness,
+    /// Alike, but too much of it shows something else.
+    Contradiction,
     /// Alike, but neither C^r nor H^r is below 0.8 of its tau.
     Distances,
     /// Not among the candidates of the verdict.
@@ -48,6 +50,7 @@ impl Outcome {
             Self::Wrong => "wrong",
             Self::Ambiguous => "ambiguous",
             Self::Likeness => "likeness",
+            Self::Contradiction => "contradiction",
             Self::Distances => "distances",
             Self::NotListed => "not listed",
             Self::NoIcon => "no icon",
@@ -141,6 +144,7 @@ fn outcome(verdict: &Verdict, id: LandmarkId) -> Outcome {
     }
     let Some(own) = verdict.candidates.iter().find(|c| c.landmark == id) else { return Outcome::NotListed };
     match own.refusal {
+        Some(Refusal::Contradiction) => Outcome::Contradiction,
         Some(Refusal::Correlation | Refusal::Hausdorff) => Outcome::Distances,
         _ => Outcome::Likeness,
     }
@@ -184,6 +188,7 @@ mod tests {
             (Recognition::Unique(LandmarkId(4)), None, Outcome::Wrong),
             (Recognition::Ambiguous(LandmarkId(4)), None, Outcome::Ambiguous),
             (Recognition::Unknown, Some(Refusal::Likeness), Outcome::Likeness),
+            (Recognition::Unknown, Some(Refusal::Contradiction), Outcome::Contradiction),
             (Recognition::Unknown, Some(Refusal::Correlation), Outcome::Distances),
         ] {
             assert_eq!(outcome(&verdict(recognition, refusal), id), expected);
