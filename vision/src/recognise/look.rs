@@ -33,7 +33,7 @@ impl Judged {
         let correlation = below(self.near.correlation_ratio(), limit);
         let hausdorff = below(self.near.hausdorff_ratio(), limit);
         let doubtful = !below(self.near.ratio(kind), share * p.doubtful_share);
-        let contradicted = !(self.contradicting <= p.max_contradicting);
+        let contradicted = !below(self.contradicting, p.max_contradicting.next_up());
         match kind {
             DistanceKind::Correlation => (!correlation).then_some(Refusal::Correlation),
             DistanceKind::Hausdorff => (!hausdorff).then_some(Refusal::Hausdorff),
