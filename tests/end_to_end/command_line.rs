@@ -22,7 +22,7 @@ use vision::{detect::quads::Corners, geometry::polygon};
 const LONGEST: Duration = Duration::from_mins(2);
 
 /// Options that each command must name in its help.
-const OPTIONS: [(&str, &[&str]); 17] = [
+const OPTIONS: [(&str, &[&str]); 25] = [
     ("demo", &["--robots", "--rate-hz", "--legs", "--seed", "--http", "--data", "--stay", "--json"]),
     ("serve", &["--config", "--data", "--http", "--zenoh", "--fleet", "--workers", "--insecure"]),
     (
