@@ -9,10 +9,10 @@
 use super::confidence::MEASURES;
 
 /// Where slopes decide.
-pub(super) const BOTH: [f64; MEASURES + 1] = [0.0, -5.7954, -0.0104, -1.8392, 0.0, -1.2431, 0.0, 5.5076];
+pub(super) const BOTH: [f64; MEASURES + 1] = [-1.6149, -2.3303, 0.0, -0.5381, 0.0, -2.1789, 0.0, 5.8694];
 
 /// Where C^r decides.
-pub(super) const CORRELATION: [f64; MEASURES + 1] = [0.0, 0.0, -2.949, -0.6926, 0.0, -1.9547, 0.0, 5.3093];
+pub(super) const CORRELATION: [f64; MEASURES + 1] = [0.0, 0.0, -4.0645, 0.0, 0.0, -1.6928, 0.0, 5.281];
 
 /// Where H^r decides.
-pub(super) const HAUSDORFF: [f64; MEASURES + 1] = [0.0, 0.0, -3.4255, -4.651, -2.6218, 0.0, 0.0, 4.9197];
+pub(super) const HAUSDORFF: [f64; MEASURES + 1] = [0.0, 0.0, -4.8006, -3.1945, -2.1351, 0.0, 0.0, 4.877];
