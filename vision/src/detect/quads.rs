@@ -233,7 +233,7 @@ impl Default for QuadParams {
             side_model: None,
             thing_model: None,
             min_probability: 0.65,
-            sure_probability: 0.98,
+            sure_probability: 0.95,
             three_sided: true,
             min_three_sided_closing: 0.5,
             min_three_sided_score: 0.5,
