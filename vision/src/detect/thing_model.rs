@@ -10,7 +10,7 @@ use super::{
 };
 use nalgebra::Point2;
 
-/// Number of measurements: mean, smallest and largest of each measurement of a side, and [`WHOLE_FEATURES`].
+/// Number of measurements: mean, smallest and largest of each measurement of a side, and ten of the whole.
 pub const THING_FEATURES: usize = 3 * SIDE_FEATURES + WHOLE_FEATURES;
 /// Measurements of the quad as a whole.
 const WHOLE_FEATURES: usize = 10;

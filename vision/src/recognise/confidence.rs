@@ -25,7 +25,7 @@ const FAR: f64 = 2.0;
 /// H^r is counted in units of this.
 const HAUSDORFF_UNIT: f64 = 10.0;
 
-/// What a verdict knows for and against its candidate `best`, each the worse the larger, all within 0 to [`FAR`]: D/tau and its
+/// What a verdict knows for and against its candidate `best`, each the worse the larger, all within 0 to 2: D/tau and its
 /// square, the share of it in the next best's and its square, C^r, H^r, and how many landmarks there were to err with.
 /// `None` if there is no such candidate.
 pub fn measures(candidates: &[Candidate], best: usize, landmarks: usize) -> Option<[f64; MEASURES]> {
