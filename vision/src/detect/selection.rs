@@ -91,8 +91,8 @@ pub struct Settled {
 }
 
 /// Moves the sides of the rated quads, by rank, to the lines that look most like borders, and tells how likely they are
-/// things. A quad that contradicts one of at least `sure_probability` is passed over; nothing else stands in its way. All that were looked at are returned, at most [`MAX_SETTLED`]. The border that a quad had
-/// before stays among its alternates.
+/// things. A quad that contradicts one of at least `sure_probability` is passed over; nothing else stands in its way. All
+/// that were looked at are returned, at most [`MAX_SETTLED`]. The border that a quad had before stays among its alternates.
 pub fn settle(rated: Vec<Rated>, g: &Gradients, p: &QuadParams) -> Vec<Settled> {
     let side_model = p.side_network();
     let thing_model = p.thing_network();
