@@ -13,5 +13,6 @@ pub mod lines;
 pub mod walls;
 pub mod place;
 pub mod placing;
+pub mod visibility;
 pub mod localise;
 pub mod fuse;

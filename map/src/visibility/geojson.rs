@@ -1,0 +1,69 @@
+//! A visibility map as a GeoJSON feature (RFC 7946), in map metres instead of degrees.
+
+use super::VisibilityMap;
+use serde::Serialize;
+
+/// Coordinates are written to a tenth of a millimetre.
+const STEPS_PER_M: f64 = 1e4;
+
+/// A GeoJSON feature with a multipolygon.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Feature {
+    /// `Feature`.
+    #[serde(rename = "type")]
+    pub kind: &'static str,
+    /// The area.
+    pub geometry: Geometry,
+    /// What is known of it.
+    pub properties: Properties,
+}
+
+/// A multipolygon: polygons of rings of points; outer rings only, counter-clockwise, the first point repeated.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Geometry {
+    /// `MultiPolygon`.
+    #[serde(rename = "type")]
+    pub kind: &'static str,
+    /// Metres in the map frame, not degrees.
+    pub coordinates: Vec<Vec<Vec<[f64; 2]>>>,
+}
+
+/// The properties of the feature.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Properties {
+    /// Name of the landmark.
+    pub landmark: String,
+    /// Square metres.
+    pub area_m2: f64,
+    /// Centre of gravity, where there is an area.
+    pub centroid_m: Option<[f64; 2]>,
+    /// Furthest possible distance from the landmark.
+    pub reach_m: f64,
+}
+
+fn rounded(value: f64) -> f64 {
+    (value * STEPS_PER_M).round() / STEPS_PER_M
+}
+
+impl VisibilityMap {
+    /// As a GeoJSON feature of the landmark of this name.
+    pub fn feature(&self, landmark: &str) -> Feature {
+        let point = |p: &nalgebra::Point2<f64>| [rounded(p.x), rounded(p.y)];
+        let ring = |corners: &[nalgebra::Point2<f64>]| {
+            corners.iter().chain(corners.first()).map(point).collect::<Vec<_>>()
+        };
+        Feature {
+            kind: "Feature",
+            geometry: Geometry {
+                kind: "MultiPolygon",
+                coordinates: self.polygons().iter().map(|p| vec![ring(&p.corners)]).collect(),
+            },
+            properties: Properties {
+                landmark: landmark.to_owned(),
+                area_m2: rounded(self.area_m2()),
+                centroid_m: self.centroid().map(|c| point(&c)),
+                reach_m: rounded(self.reach_m()),
+            },
+        }
+    }
+}
