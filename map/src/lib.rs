@@ -16,3 +16,4 @@ pub mod placing;
 pub mod visibility;
 pub mod localise;
 pub mod fuse;
+pub mod gaze;

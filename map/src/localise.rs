@@ -6,6 +6,7 @@
 
 mod planar;
 mod posterior;
+pub(crate) mod predict;
 mod solve;
 
 use crate::{

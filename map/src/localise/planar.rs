@@ -194,13 +194,13 @@ impl<'a> Planar<'a> {
 }
 
 /// Camera coordinates of a map point by (x, y, theta) of the robot; `from_robot` = point - robot, map axes.
-fn point_by_pose(camera_from_map: &Matrix3<f64>, from_robot: &Vector3<f64>) -> Matrix3<f64> {
+pub(super) fn point_by_pose(camera_from_map: &Matrix3<f64>, from_robot: &Vector3<f64>) -> Matrix3<f64> {
     let turn = Vector3::z().cross(from_robot);
     -camera_from_map * Matrix3::from_columns(&[Vector3::x(), Vector3::y(), turn])
 }
 
 /// Map coordinates of a landmark's corner by (x, y, theta, z, width, height).
-fn point_by_place(
+pub(super) fn point_by_place(
     arm: &Vector3<f64>,
     map_from_landmark: &Matrix3<f64>,
     point: &Vector3<f64>,
@@ -214,7 +214,10 @@ fn point_by_place(
 
 /// Camera coordinates of a robot point by the mounting's (rotation, translation); `from_camera` = point - camera,
 /// robot axes.
-fn point_by_mounting(camera_from_robot: &Matrix3<f64>, from_camera: &Vector3<f64>) -> SMatrix<f64, 3, 6> {
+pub(super) fn point_by_mounting(
+    camera_from_robot: &Matrix3<f64>,
+    from_camera: &Vector3<f64>,
+) -> SMatrix<f64, 3, 6> {
     let mut j = SMatrix::<f64, 3, 6>::zeros();
     j.fixed_columns_mut::<3>(0).copy_from(&(camera_from_robot * from_camera.cross_matrix()));
     j.fixed_columns_mut::<3>(3).copy_from(&-camera_from_robot);

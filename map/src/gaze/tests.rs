@@ -1,0 +1,267 @@
+use super::*;
+use crate::{
+    localise::{LocaliseParams, RobotFix, Sighting, robot_pose},
+    mounting::pan_tilt,
+    place::PlaceSigmas,
+    pose2::Pose2,
+    visibility::{VisibilityParams, visibility},
+};
+use nalgebra::{Matrix2, Matrix3, Point3};
+use std::f64::consts::{FRAC_PI_2, PI};
+use vision::{
+    detect::quads::Corners,
+    frame::{Distortion, Intrinsics},
+    localise::{
+        pose::{LandmarkSize, landmark_pose},
+        reproject::{corner_points, pixel},
+    },
+};
+
+const SIZE: LandmarkSize = LandmarkSize { width_m: 0.6, height_m: 0.84 };
+
+/// On the wall y = 0, facing +y.
+fn poster(x: f64) -> LandmarkPlace {
+    LandmarkPlace::by_hand(Vector3::new(x, 0.0, 1.5), FRAC_PI_2, SIZE, PlaceSigmas::default()).unwrap()
+}
+
+fn viewer() -> Viewer {
+    Viewer { pan_rad: [-PI, PI], ..Viewer::default() }
+}
+
+fn seen(place: &LandmarkPlace) -> VisibilityMap {
+    visibility(place, &[], &viewer(), &VisibilityParams::default()).unwrap()
+}
+
+fn at(x: f64, y: f64, theta: f64, sigmas: [f64; 3]) -> Pose2Covariance {
+    let covariance = Matrix3::from_diagonal(&Vector3::from(sigmas.map(|s| s * s)));
+    Pose2Covariance { pose: Pose2::new(x, y, theta), covariance }
+}
+
+const SURE: [f64; 3] = [0.01, 0.01, 0.005];
+
+fn ranked(
+    pose: &Pose2Covariance,
+    things: &[(LandmarkPlace, VisibilityMap, f64, f64)],
+    p: &GazeParams,
+) -> Vec<Choice> {
+    let targets: Vec<_> = things
+        .iter()
+        .enumerate()
+        .map(|(i, (place, visible, saliency, v_c))| Target {
+            landmark: LandmarkId(i as u64),
+            place,
+            visible,
+            saliency: *saliency,
+            v_c: *v_c,
+        })
+        .collect();
+    rank(pose, &targets, &viewer(), &Head::default(), p).unwrap()
+}
+
+fn two(saliency: [f64; 2]) -> Vec<(LandmarkPlace, VisibilityMap, f64, f64)> {
+    [0.0, 3.0].iter().zip(saliency).map(|(x, s)| (poster(*x), seen(&poster(*x)), s, 1.0)).collect()
+}
+
+#[test]
+fn the_choice_flips_where_the_product_says() {
+    // By hand: on y = 3.2 the nearest boundary is the far disc, tangent to the wall: of diameter D, centre (x, D/2). With
+    // saliencies 1 and 0.8 the choice flips where (R - |q - c0|) = 0.8 (R - |q - c1|).
+    let p = GazeParams { full_margin_m: 10.0, ..GazeParams::default() };
+    let things = two([1.0, 0.8]);
+    let r = 0.5 * 512.0 * 0.6 / 75.0;
+    let worth = |x: f64, centre: f64| r - (x - centre).hypot(3.2 - r);
+    let (mut low, mut high) = (1.0, 3.0);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if worth(middle, 0.0) > 0.8 * worth(middle, 3.0) { low = middle } else { high = middle }
+    }
+    assert!(worth(low, 0.0) > 0.1, "both are seen there");
+    for (x, expected) in [(low - 0.02, 0), (low + 0.02, 1)] {
+        let ranked = ranked(&at(x, 3.2, 0.0, [1e-4, 1e-4, 1e-3]), &things, &p);
+        assert_eq!(ranked.len(), 2);
+        assert_eq!(ranked[0].landmark, LandmarkId(expected), "{x} of {low}");
+    }
+}
+
+#[test]
+fn each_factor_counts() {
+    let p = GazeParams::default();
+    let things = two([1.0, 1.0]);
+    let middle = at(1.5, 2.0, 0.0, SURE);
+    let equal = ranked(&middle, &things, &p);
+    assert_eq!(equal[0].landmark, LandmarkId(0), "equal ones by number");
+    assert!((equal[0].utility - equal[1].utility).abs() < 1e-9);
+    let expected = equal[0].probability * equal[0].margin_m.min(1.0) * 0.5;
+    assert!((equal[0].utility - expected).abs() < 1e-12);
+    let mut wider = things.clone();
+    wider[1].3 = 2.0;
+    assert_eq!(ranked(&middle, &wider, &p)[0].landmark, LandmarkId(1), "seen from further apart");
+    let half_lost = ranked(&at(1.5, 2.0, 0.0, [2.0, 2.0, 0.1]), &things, &p);
+    assert!(half_lost.iter().all(|c| c.probability < 0.9));
+}
+
+#[test]
+fn the_landmark_comes_to_the_axis() {
+    let p = GazeParams::default();
+    let head = Head { camera_m: [0.2, -0.1, 1.1], ..Head::default() };
+    for (x, y, theta) in [(0.5, 2.5, 0.3), (-1.0, 1.8, -2.0), (0.0, 3.0, 3.0)] {
+        let pose = at(x, y, theta, SURE);
+        let place = poster(0.0);
+        let map = seen(&place);
+        let target =
+            Target { landmark: LandmarkId(1), place: &place, visible: &map, saliency: 1.0, v_c: 1.0 };
+        let found = rank(&pose, &[target], &viewer(), &head, &p).unwrap()[0];
+        let camera = pose.pose.to_isometry3() * pan_tilt(found.pan_rad, found.tilt_rad, head.camera_m.into());
+        let centre = camera.inverse() * Point3::new(place.x_m, place.y_m, place.z_m);
+        let off = centre.x.hypot(centre.y).atan2(centre.z);
+        assert!(off < 0.5_f64.to_radians(), "{off}");
+        assert!((found.range_m - found.tilt_rad.cos() * centre.z).abs() < 0.01);
+    }
+}
+
+#[test]
+fn what_the_unit_cannot_reach_is_not_offered() {
+    let place = poster(0.0);
+    let map = seen(&place);
+    let target = Target { landmark: LandmarkId(1), place: &place, visible: &map, saliency: 1.0, v_c: 1.0 };
+    let ask = |viewer: &Viewer| {
+        rank(&at(0.0, 2.5, -FRAC_PI_2, SURE), &[target], viewer, &Head::default(), &GazeParams::default())
+            .unwrap()
+    };
+    assert_eq!(ask(&viewer()).len(), 1);
+    assert!(ask(&Viewer { pan_rad: [0.5, 1.0], ..viewer() }).is_empty());
+    assert!(ask(&Viewer { tilt_rad: [-0.3, 0.05], ..viewer() }).is_empty());
+}
+
+#[test]
+fn the_gain_is_that_of_a_real_fix() {
+    // Oracle: the covariance of the fix from the same corners, added to the prior as information.
+    let place = poster(0.0);
+    let camera = Intrinsics::new(512.0, 512.0, 319.5, 239.5, Distortion::None).unwrap();
+    for psi in [0.6_f64, 0.9, -0.7] {
+        let robot = Pose2::new(2.5 * psi.sin(), 2.5 * psi.cos(), 0.4);
+        let pose = Pose2Covariance {
+            pose: robot,
+            covariance: Matrix3::new(0.04, 0.01, 0.0, 0.01, 0.09, 0.002, 0.0, 0.002, 0.01),
+        };
+        let head = Head::default();
+        let things = [(place, seen(&place), 1.0, 1.0)];
+        let found = ranked(&pose, &things, &GazeParams::default())[0];
+        let mounting =
+            Mounting::new(pan_tilt(found.pan_rad, found.tilt_rad, Vector3::from(head.camera_m))).unwrap();
+        let camera_from_landmark =
+            mounting.robot_from_camera.inverse() * robot.to_isometry3().inverse() * place.map_from_landmark();
+        let corners = corner_points(&SIZE).map(|c| pixel(&camera_from_landmark, &c, &camera).unwrap());
+        let claimed = [Matrix2::identity() * 0.25; 4];
+        let seen = landmark_pose(&Corners::new(corners).unwrap(), &claimed, SIZE, &camera).unwrap();
+        let sighting = Sighting { landmark: LandmarkId(1), seen: &seen, place: &place };
+        let fix = robot_pose(&[sighting], &mounting, Some(&pose), &LocaliseParams::default()).unwrap();
+        let RobotFix::Fixed(fix) = fix else { panic!("{fix:?}") };
+        let after = pose.covariance.try_inverse().unwrap() + fix.pose.covariance.try_inverse().unwrap();
+        let expected = 0.5 * (pose.covariance.determinant() * after.determinant()).ln();
+        assert!((found.gain_nats - expected).abs() < 0.05, "{psi}: {} for {expected}", found.gain_nats);
+    }
+}
+
+#[test]
+fn information_prefers_the_oblique_view() {
+    // At the same distance, one straight ahead of its wall and one at 45 degrees, with the same turn of the camera.
+    let p = GazeParams { criterion: Criterion::Information, ..GazeParams::default() };
+    let straight =
+        LandmarkPlace::by_hand(Vector3::new(2.4, 0.0, 1.5), PI, SIZE, PlaceSigmas::default()).unwrap();
+    let turned = LandmarkPlace { theta_rad: PI - 0.8, ..straight };
+    let things = [(straight, seen(&straight), 1.0, 1.0), (turned, seen(&turned), 1.0, 1.0)];
+    let found = ranked(&at(0.0, 0.0, 0.0, [0.1, 0.1, 0.1]), &things, &p);
+    assert_eq!(found[0].landmark, LandmarkId(1), "{found:?}");
+    assert!(found[0].gain_nats > found[1].gain_nats + 0.3);
+    // By the product they are equal but for the margin.
+    let product = ranked(&at(0.0, 0.0, 0.0, SURE), &things, &GazeParams::default());
+    assert_eq!(product[0].landmark, LandmarkId(0));
+}
+
+#[test]
+fn looking_far_aside_costs() {
+    let p = GazeParams { criterion: Criterion::Information, ..GazeParams::default() };
+    let (left, right) = (poster(-1.2), poster(1.2));
+    let targets = [
+        Target { landmark: LandmarkId(0), place: &left, visible: &seen(&left), saliency: 1.0, v_c: 1.0 },
+        Target { landmark: LandmarkId(1), place: &right, visible: &seen(&right), saliency: 1.0, v_c: 1.0 },
+    ];
+    let pose = at(0.0, 2.4, -FRAC_PI_2, SURE);
+    for (pan_rad, expected) in [(0.4, 1), (-0.4, 0)] {
+        let head = Head { pan_rad, ..Head::default() };
+        let found = rank(&pose, &targets, &viewer(), &head, &p).unwrap();
+        assert_eq!(found[0].landmark, LandmarkId(expected), "the one it already looks at");
+    }
+}
+
+#[test]
+fn it_stays_until_another_is_clearly_better() {
+    let p = GazeParams { full_margin_m: 10.0, ..GazeParams::default() };
+    let things = two([1.0, 1.0]);
+    let mut gaze = Gaze::default();
+    let mut look = |x: f64| {
+        let pose = at(x, 3.2, 0.0, SURE);
+        match gaze.choose(0, &ranked(&pose, &things, &p), &pose, &p) {
+            Look::Landmark(choice) => (choice.landmark.0, choice.utility),
+            other => panic!("{other:?}"),
+        }
+    };
+    assert_eq!(look(1.0).0, 0);
+    assert_eq!(look(1.51).0, 0, "the other is better, but not clearly");
+    assert_eq!(look(2.0).0, 1);
+    assert_eq!(look(1.49).0, 1, "and back");
+}
+
+#[test]
+fn failures_make_it_look_elsewhere_for_a_while() {
+    let p = GazeParams::default();
+    let things = two([1.0, 0.7]);
+    let pose = at(1.5, 2.0, 0.0, SURE);
+    let ranked = ranked(&pose, &things, &p);
+    let mut gaze = Gaze::default();
+    let chosen = |look: Look| match look {
+        Look::Landmark(choice) => choice.landmark.0,
+        other => panic!("{other:?}"),
+    };
+    assert_eq!(chosen(gaze.choose(0, &ranked, &pose, &p)), 0);
+    for _ in 0..2 {
+        gaze.looked(0, LandmarkId(0), false, &p);
+    }
+    gaze.looked(0, LandmarkId(0), true, &p);
+    gaze.looked(0, LandmarkId(0), false, &p);
+    assert_eq!(chosen(gaze.choose(1, &ranked, &pose, &p)), 0, "a success starts the count afresh");
+    for _ in 0..2 {
+        gaze.looked(1, LandmarkId(0), false, &p);
+    }
+    assert_eq!(chosen(gaze.choose(2, &ranked, &pose, &p)), 1);
+    let after = 1 + 10_000_000_001;
+    gaze.looked(after, LandmarkId(1), true, &p);
+    assert_eq!(chosen(gaze.choose(after, &ranked, &pose, &p)), 0, "1 against 0.7 is more than 1.2 times");
+}
+
+#[test]
+fn with_nothing_in_sight_it_looks_ahead_or_about() {
+    let p = GazeParams::default();
+    let mut gaze = Gaze::default();
+    assert_eq!(gaze.choose(0, &[], &at(0.0, 0.0, 0.0, SURE), &p), Look::Ahead);
+    assert_eq!(gaze.choose(0, &[], &at(0.0, 0.0, 0.0, [0.9, 0.9, 0.1]), &p), Look::Sweep);
+}
+
+#[test]
+fn bounds_are_held_and_named() {
+    let ask = |head: Head| rank(&at(0.0, 0.0, 0.0, SURE), &[], &viewer(), &head, &GazeParams::default());
+    assert_eq!(ask(Head { rate_radps: 0.0, ..Head::default() }).unwrap_err().field, "head.rate_radps");
+    assert_eq!(
+        ask(Head { camera_m: [0.0, f64::NAN, 1.0], ..Head::default() }).unwrap_err().field,
+        "head.camera_m"
+    );
+    assert_eq!(ask(Head { tilt_rad: 2.0, ..Head::default() }).unwrap_err().field, "head.tilt_rad");
+    let mut gaze = Gaze::default();
+    let p = GazeParams { failures: 1, ..GazeParams::default() };
+    for id in 0..=MAX_DAMPED as u64 {
+        gaze.current = Some(LandmarkId(id));
+        gaze.looked(0, LandmarkId(id), false, &p);
+    }
+    assert_eq!(gaze.damped.len(), MAX_DAMPED);
+}
