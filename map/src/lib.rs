@@ -17,3 +17,5 @@ pub mod visibility;
 pub mod localise;
 pub mod fuse;
 pub mod gaze;
+pub mod slam;
+pub mod laser_fix;

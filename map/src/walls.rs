@@ -120,7 +120,7 @@ fn difference(a: &LaserSegment, b: &LaserSegment) -> (Vector2<f64>, Matrix2<f64>
 }
 
 /// The line as (direction of its facing normal, signed distance from `origin` along it), with covariance.
-fn local(s: &LaserSegment, origin: &Point2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
+pub(crate) fn local(s: &LaserSegment, origin: &Point2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
     let n = s.facing();
     let angle = n.y.atan2(n.x);
     let offset = n.dot(&(s.a - origin));

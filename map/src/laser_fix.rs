@@ -1,0 +1,409 @@
+//! Where a robot is in a finished map of walls, by one scan (method 17.4, 17.5, the map frozen). In: walls, a scan, a
+//! prior. Out: the pose with its covariance, wide where the walls say nothing, as along a bare corridor; or why there is
+//! none. The prior only says where to look and what to refuse: it is not part of the answer, so fusing both is right.
+
+use crate::{
+    check::{self, MAX_VARIANCE, OutOfRange},
+    laser::Scan,
+    pose2::{Pose2, Pose2Covariance},
+    segments::LaserSegment,
+    slam::{
+        align::with_floor,
+        cloud::{Cloud, CloudParams, cloud},
+    },
+    walls::local,
+};
+use nalgebra::{Matrix2, Matrix3, Matrix3x2, Point2, SymmetricEigen, Vector2, Vector3};
+use serde::{Deserialize, Serialize};
+
+/// Most walls of a map that is localised in; later ones are left out.
+pub const MAX_WALLS: usize = 1 << 17;
+/// Most buckets of the index.
+const MAX_BUCKETS: usize = 1 << 20;
+/// Most entries of the index, a wall counted once in every bucket it passes.
+const MAX_ENTRIES: usize = 1 << 23;
+/// Most points of a scan that are used; evenly thinned beyond.
+const MAX_POINTS: usize = 360;
+/// Variance that stands for "the walls do not tell": (100 m)^2, and (pi)^2 for the heading.
+const UNKNOWN: [f64; 3] = [1e4, 1e4, 10.0];
+
+/// Knobs of localisation in walls.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct LaserFixParams {
+    /// Points of the scan.
+    pub cloud: CloudParams,
+    /// How far from a point its wall is looked for at first...
+    pub start_radius_m: f64,
+    /// ...and at last.
+    pub end_radius_m: f64,
+    /// Surface and wall turn less than this against each other.
+    pub max_turn_rad: f64,
+    /// Most iterations from one start.
+    pub iterations: usize,
+    /// Smallest standard deviation of a point across its wall.
+    pub sigma_m: f64,
+    /// Beyond it a point's weight falls off.
+    pub outlier_m: f64,
+    /// Points that err together: their number is divided by this.
+    pub correlated: f64,
+    /// Standard deviation that no number of points removes: position, metres, and heading, radians.
+    pub floor: [f64; 2],
+    /// Fewest points with a wall.
+    pub min_points: usize,
+    /// Least share of the points that have a wall.
+    pub min_matched: f64,
+    /// Gate on the squared Mahalanobis distance to the prior: 99.9 % of chi2 with 3 degrees of freedom.
+    pub prior_gate: f64,
+    /// Priors wider than this are tried from several starts...
+    pub wide_m: f64,
+    /// ...or wider in the heading.
+    pub wide_rad: f64,
+    /// Another solution that matches so nearly as many points makes it ambiguous.
+    pub rival_share: f64,
+    /// Two results are two solutions if they differ by more than this chi2.
+    pub apart_chi2: f64,
+}
+
+impl Default for LaserFixParams {
+    fn default() -> Self {
+        Self {
+            cloud: CloudParams::default(),
+            start_radius_m: 0.6,
+            end_radius_m: 0.15,
+            max_turn_rad: 0.5,
+            iterations: 16,
+            sigma_m: 0.02,
+            outlier_m: 0.06,
+            correlated: 3.0,
+            floor: [0.003, 0.001],
+            min_points: 20,
+            min_matched: 0.5,
+            prior_gate: 16.27,
+            wide_m: 0.2,
+            wide_rad: 0.06,
+            rival_share: 0.9,
+            apart_chi2: 25.0,
+        }
+    }
+}
+
+/// The robot's pose by one scan.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LaserFix {
+    /// `map_from_robot`, without the prior: along what the walls do not tell its variance is some 100 m.
+    pub pose: Pose2Covariance,
+    /// Share of the scan's flat points on a wall.
+    pub matched: f64,
+    /// How many points that are.
+    pub points: usize,
+    /// Root mean square of their distances across the walls.
+    pub rms_m: f64,
+}
+
+/// Why a scan gave no pose.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum LaserRefusal {
+    /// Too few returns from flat surfaces near walls.
+    FewPoints {
+        /// How many there were.
+        points: usize,
+    },
+    /// The scan shows something else than the map.
+    Unlike {
+        /// Share of the points that have a wall.
+        matched: f64,
+    },
+    /// The pose contradicts the prior.
+    Prior {
+        /// Squared Mahalanobis distance.
+        distance2: f64,
+    },
+    /// Several poses fit.
+    Ambiguous,
+}
+
+/// A map's walls, made ready for localisation.
+#[derive(Debug, Clone)]
+pub struct WallIndex {
+    walls: Vec<Ready>,
+    low: Point2<f64>,
+    bucket_m: f64,
+    width: usize,
+    height: usize,
+    starts: Vec<u32>,
+    entries: Vec<u32>,
+}
+
+/// A wall with what every point asks of it.
+#[derive(Debug, Clone)]
+struct Ready {
+    a: Point2<f64>,
+    along: Vector2<f64>,
+    normal: Vector2<f64>,
+    length_m: f64,
+    /// Information of (direction, offset) about the middle.
+    information: Matrix2<f64>,
+}
+
+impl WallIndex {
+    /// Of the walls of a map.
+    pub fn new<'a>(walls: impl IntoIterator<Item = &'a LaserSegment>) -> Self {
+        let ready = |s: &LaserSegment| {
+            let middle = nalgebra::center(&s.a, &s.b);
+            let (_, covariance) = local(s, &middle);
+            let floor = Matrix2::new(1e-8, 0.0, 0.0, 1e-8);
+            let information = (covariance + floor).try_inverse().unwrap_or_else(Matrix2::zeros);
+            Ready { a: s.a, along: s.direction(), normal: s.facing(), length_m: s.length_m(), information }
+        };
+        let walls: Vec<Ready> = walls.into_iter().take(MAX_WALLS).map(ready).collect();
+        let (mut low, mut high) = (Point2::new(f64::MAX, f64::MAX), Point2::new(f64::MIN, f64::MIN));
+        for p in walls.iter().flat_map(|w| [w.a, w.a + w.along * w.length_m]) {
+            low = Point2::new(low.x.min(p.x), low.y.min(p.y));
+            high = Point2::new(high.x.max(p.x), high.y.max(p.y));
+        }
+        if walls.is_empty() {
+            (low, high) = (Point2::origin(), Point2::origin());
+        }
+        let length: f64 = walls.iter().map(|w| w.length_m).sum();
+        let mut bucket_m = 1.0;
+        let cells = |b: f64| (((high.x - low.x) / b) as usize + 1, ((high.y - low.y) / b) as usize + 1);
+        while cells(bucket_m).0.saturating_mul(cells(bucket_m).1) > MAX_BUCKETS
+            || 8.0 * length / bucket_m > MAX_ENTRIES as f64
+        {
+            bucket_m *= 2.0;
+        }
+        let (width, height) = cells(bucket_m);
+        let mut index = Self {
+            walls,
+            low,
+            bucket_m,
+            width,
+            height,
+            starts: vec![0; width * height + 1],
+            entries: Vec::new(),
+        };
+        index.fill();
+        index
+    }
+
+    /// Lists the walls that pass within a bucket of each bucket.
+    fn fill(&mut self) {
+        let mut pairs: Vec<(u32, u32)> = Vec::new();
+        for (i, wall) in self.walls.iter().enumerate() {
+            // Points half a bucket apart, each with its neighbours: nothing nearer than a bucket is missed.
+            let steps = (2.0 * wall.length_m / self.bucket_m).ceil() as usize + 1;
+            for k in 0..=steps {
+                let p = wall.a + wall.along * (wall.length_m * k as f64 / steps as f64);
+                let (x, y) = self.bucket(&p);
+                for (x, y) in (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| (x + dx, y + dy))) {
+                    if x >= 0 && y >= 0 && x < self.width as i64 && y < self.height as i64 {
+                        pairs.push(((y * self.width as i64 + x) as u32, i as u32));
+                    }
+                }
+            }
+        }
+        pairs.sort_unstable();
+        pairs.dedup();
+        for (bucket, _) in &pairs {
+            self.starts[*bucket as usize + 1] += 1;
+        }
+        for i in 1..self.starts.len() {
+            self.starts[i] += self.starts[i - 1];
+        }
+        self.entries = pairs.into_iter().map(|(_, wall)| wall).collect();
+    }
+
+    fn bucket(&self, p: &Point2<f64>) -> (i64, i64) {
+        let f = |v: f64| (v / self.bucket_m).floor() as i64;
+        (f(p.x - self.low.x), f(p.y - self.low.y))
+    }
+
+    /// Whether there is any wall.
+    pub fn is_empty(&self) -> bool {
+        self.walls.is_empty()
+    }
+
+    /// The wall nearest to a point within the radius whose line is turned less than `cos_turn` says from the surface.
+    fn nearest(&self, p: &Point2<f64>, normal: &Vector2<f64>, radius_m: f64, cos_turn: f64) -> Option<usize> {
+        // A point just outside of the walls' box belongs to its border.
+        let (x, y) = self.bucket(p);
+        let (w, h) = (self.width as i64, self.height as i64);
+        if x < -1 || y < -1 || x > w || y > h {
+            return None;
+        }
+        let bucket = (y.clamp(0, h - 1) * w + x.clamp(0, w - 1)) as usize;
+        let (mut best, mut best2) = (None, radius_m * radius_m);
+        for &i in &self.entries[self.starts[bucket] as usize..self.starts[bucket + 1] as usize] {
+            let wall = &self.walls[i as usize];
+            if wall.normal.dot(normal).abs() < cos_turn {
+                continue;
+            }
+            let d = p - wall.a;
+            let (along, across) = (wall.along.dot(&d), wall.normal.dot(&d));
+            let beyond = (-along).max(along - wall.length_m).max(0.0);
+            let d2 = across * across + beyond * beyond;
+            if d2 < best2 {
+                (best, best2) = (Some(i as usize), d2);
+            }
+        }
+        best
+    }
+}
+
+/// The pose of the robot when it took `scan`, near `prior`. Errors name an input that is out of range.
+pub fn laser_fix(
+    walls: &WallIndex,
+    scan: &Scan,
+    prior: &Pose2Covariance,
+    p: &LaserFixParams,
+) -> Result<Result<LaserFix, LaserRefusal>, OutOfRange> {
+    prior.check()?;
+    check::within("params.end_radius_m", p.end_radius_m, 1e-3, 1.0)?;
+    check::within("params.start_radius_m", p.start_radius_m, p.end_radius_m, 1.0)?;
+    let mut seen = cloud(scan, &p.cloud);
+    seen.points.retain(|q| q.normal.is_some());
+    let stride = seen.points.len().div_ceil(MAX_POINTS).max(1);
+    seen.points = seen.points.into_iter().step_by(stride).collect();
+    if seen.points.len() < p.min_points || walls.is_empty() {
+        return Ok(Err(LaserRefusal::FewPoints { points: seen.points.len() }));
+    }
+    let mut found: Vec<LaserFix> =
+        starts(prior, p).iter().filter_map(|start| descend(walls, &seen, start, p)).collect();
+    // Most points first, then the smallest residual; stable, so the prior's own start wins ties.
+    found.sort_by(|a, b| b.points.cmp(&a.points).then(a.rms_m.total_cmp(&b.rms_m)));
+    let Some(best) = found.first() else {
+        return Ok(Err(LaserRefusal::FewPoints { points: 0 }));
+    };
+    if best.points < p.min_points {
+        return Ok(Err(LaserRefusal::FewPoints { points: best.points }));
+    }
+    if best.matched < p.min_matched {
+        return Ok(Err(LaserRefusal::Unlike { matched: best.matched }));
+    }
+    let distance2 = best.pose.distance2(prior).unwrap_or(f64::INFINITY);
+    if distance2 > p.prior_gate {
+        return Ok(Err(LaserRefusal::Prior { distance2 }));
+    }
+    let rival = found.iter().skip(1).any(|other| {
+        other.points as f64 >= p.rival_share * best.points as f64
+            && other.pose.distance2(&best.pose).is_some_and(|d2| d2 > p.apart_chi2)
+            && other.pose.distance2(prior).is_some_and(|d2| d2 <= p.prior_gate)
+    });
+    Ok(if rival { Err(LaserRefusal::Ambiguous) } else { Ok(best.clone()) })
+}
+
+/// The prior's mean, and where it is wide, points along its axes.
+fn starts(prior: &Pose2Covariance, p: &LaserFixParams) -> Vec<Pose2> {
+    let mut starts = vec![prior.pose];
+    let c = &prior.covariance;
+    if c[(0, 0)].max(c[(1, 1)]).sqrt() <= p.wide_m && c[(2, 2)].sqrt() <= p.wide_rad {
+        return starts;
+    }
+    let eigen = SymmetricEigen::new(*c);
+    for k in 0..3 {
+        let axis: Vector3<f64> = eigen.eigenvectors.column(k) * (1.5 * eigen.eigenvalues[k].max(0.0).sqrt());
+        if axis.xy().norm() > 0.5 * p.wide_m || axis.z.abs() > 0.5 * p.wide_rad {
+            starts.extend([prior.pose.plus(&axis), prior.pose.plus(&-axis)]);
+        }
+    }
+    starts
+}
+
+/// Points that found their wall: the wall, the derivative of the distance, where along the wall, weight, distance.
+struct Matched {
+    wall: usize,
+    j: Vector3<f64>,
+    along_m: f64,
+    weight: f64,
+    residual: f64,
+}
+
+fn matched(walls: &WallIndex, seen: &Cloud, pose: &Pose2, radius_m: f64, p: &LaserFixParams) -> Vec<Matched> {
+    let (s, c) = pose.theta_rad.sin_cos();
+    let cos_turn = p.max_turn_rad.cos();
+    let outlier2 = (p.outlier_m * radius_m / p.end_radius_m).powi(2);
+    let one = |point: &crate::slam::cloud::SurfacePoint| {
+        let n = point.normal?;
+        let normal = Vector2::new(c * n.x - s * n.y, s * n.x + c * n.y);
+        let turned = Vector2::new(c * point.at.x - s * point.at.y, s * point.at.x + c * point.at.y);
+        let at = Point2::from(turned + pose.position());
+        let i = walls.nearest(&at, &normal, radius_m, cos_turn)?;
+        let wall = &walls.walls[i];
+        let residual = wall.normal.dot(&(at - wall.a));
+        let j =
+            Vector3::new(wall.normal.x, wall.normal.y, wall.normal.dot(&Vector2::new(-turned.y, turned.x)));
+        let weight = 1.0 / (1.0 + residual * residual / outlier2).powi(2);
+        let along_m = wall.along.dot(&(at - wall.a)) - 0.5 * wall.length_m;
+        Some(Matched { wall: i, j, along_m, weight, residual })
+    };
+    seen.points.iter().filter_map(one).collect()
+}
+
+/// Gauss-Newton from one start.
+fn descend(walls: &WallIndex, seen: &Cloud, start: &Pose2, p: &LaserFixParams) -> Option<LaserFix> {
+    let (mut pose, mut radius_m) = (*start, p.start_radius_m);
+    for step in 0..p.iterations.max(1) {
+        let (mut h, mut g) = (Matrix3::from_diagonal_element(1e-6), Vector3::zeros());
+        let points = matched(walls, seen, &pose, radius_m, p);
+        for m in &points {
+            h += m.j * m.j.transpose() * m.weight;
+            g += m.j * (m.weight * m.residual);
+        }
+        let d = h.cholesky()?.solve(&-g);
+        pose = pose.plus(&d);
+        let at_rest = d.xy().norm() < 2e-4 && d.z.abs() < 5e-5;
+        if at_rest && radius_m <= p.end_radius_m {
+            break;
+        }
+        if at_rest || step % 2 == 1 {
+            radius_m = (0.6 * radius_m).max(p.end_radius_m);
+        }
+    }
+    pose.check().ok()?;
+    let points = matched(walls, seen, &pose, p.end_radius_m, p);
+    let weights: f64 = points.iter().map(|m| m.weight).sum();
+    let squares: f64 = points.iter().map(|m| m.weight * m.residual * m.residual).sum();
+    let variance = (squares / weights.max(1e-9)).max(p.sigma_m * p.sigma_m);
+    let information = information(walls, &points, 1.0 / (p.correlated.max(1.0) * variance));
+    let covariance = spread(&with_floor(&information, p.floor))?;
+    let (count, flat) = (points.len(), seen.points.len());
+    let pose = Pose2Covariance { pose, covariance };
+    pose.check().ok()?;
+    let matched = count as f64 / flat.max(1) as f64;
+    Some(LaserFix { pose, matched, points: count, rms_m: variance.sqrt() })
+}
+
+/// What the points say of the pose, each wall's own error integrated out: a hundred points on one wall do not make its
+/// place better known than the map says.
+fn information(walls: &WallIndex, points: &[Matched], scale: f64) -> Matrix3<f64> {
+    let mut order: Vec<usize> = (0..points.len()).collect();
+    order.sort_by_key(|&i| points[i].wall);
+    let mut all = Matrix3::zeros();
+    for group in order.chunk_by(|&a, &b| points[a].wall == points[b].wall) {
+        let Some(&first) = group.first() else { continue };
+        let (mut h, mut c) = (Matrix3::zeros(), Matrix3x2::zeros());
+        let mut own = walls.walls[points[first].wall].information;
+        for &i in group {
+            let m = &points[i];
+            // Both move the wall towards its free side: a turn by the lever, an offset everywhere the same.
+            let by_wall = Vector2::new(m.along_m, 1.0);
+            h += m.j * m.j.transpose() * (scale * m.weight);
+            c += m.j * by_wall.transpose() * (scale * m.weight);
+            own += by_wall * by_wall.transpose() * (scale * m.weight);
+        }
+        all += own.try_inverse().map_or(h, |inverse| h - c * inverse * c.transpose());
+    }
+    0.5 * (all + all.transpose())
+}
+
+/// Covariance of an information that may be singular: what is unknown has the variance [`UNKNOWN`].
+fn spread(information: &Matrix3<f64>) -> Option<Matrix3<f64>> {
+    let floor = Matrix3::from_diagonal(&Vector3::from(UNKNOWN).map(|v| 1.0 / v));
+    let made = (information + floor).cholesky()?.inverse();
+    let made = 0.5 * (made + made.transpose());
+    made.iter().all(|v| v.is_finite() && v.abs() <= MAX_VARIANCE).then_some(made)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,138 @@
+use super::*;
+use crate::slam::world::{Walls, rectangle, ring, scan, segments};
+use vision::learn::random::Random;
+
+fn prior(at: &Pose2, sigma_m: f64, sigma_rad: f64, random: &mut Random) -> Pose2Covariance {
+    let e = Vector3::new(sigma_m * random.normal(), sigma_m * random.normal(), sigma_rad * random.normal());
+    let v = Vector3::new(sigma_m * sigma_m, sigma_m * sigma_m, sigma_rad * sigma_rad);
+    Pose2Covariance { pose: at.plus(&e), covariance: Matrix3::from_diagonal(&v) }
+}
+
+fn fix(
+    walls: &Walls,
+    at: &Pose2,
+    prior: &Pose2Covariance,
+    random: &mut Random,
+) -> Result<LaserFix, LaserRefusal> {
+    let index = WallIndex::new(&segments(walls, 0.005, 0.002));
+    let scan = scan(walls, at, 0.01, 12.0, random);
+    laser_fix(&index, &scan, prior, &LaserFixParams::default()).unwrap()
+}
+
+#[test]
+fn the_pose_is_found_within_what_it_claims() {
+    let (mut worst, mut sum, mut n) = (0.0_f64, 0.0, 0);
+    for seed in 0..200 {
+        let mut random = Random::new(seed);
+        let at = Pose2::new(random.range(0.7, 1.4), random.range(3.0, 13.0), random.range(-3.0, 3.0));
+        // Each draw has another map, wrong by what it says.
+        let off = |w: &[f64; 4], random: &mut Random| {
+            let d = Vector2::new(w[2] - w[0], w[3] - w[1]).normalize();
+            let e = 0.005 * random.normal();
+            [w[0] - d.y * e, w[1] + d.x * e, w[2] - d.y * e, w[3] + d.x * e]
+        };
+        let map: Walls = ring().iter().map(|w| off(w, &mut random)).collect();
+        let index = WallIndex::new(&segments(&map, 0.005, 1e-4));
+        let prior = prior(&at, 0.1, 0.03, &mut random);
+        let scan = scan(&ring(), &at, 0.01, 12.0, &mut random);
+        let Ok(found) = laser_fix(&index, &scan, &prior, &LaserFixParams::default()).unwrap() else {
+            continue;
+        };
+        let e = found.pose.pose.minus(&at);
+        sum += e.dot(&found.pose.covariance.cholesky().unwrap().solve(&e));
+        // Across the corridor and in the heading it is sure.
+        worst = worst.max(e.x.abs()).max(e.z.abs());
+        n += 1;
+    }
+    assert!(n > 190, "{n}");
+    assert!(worst < 0.05, "{worst}");
+    let mean = sum / f64::from(n);
+    assert!((0.5..3.3).contains(&mean), "mean NEES {mean}, 3 expected");
+}
+
+#[test]
+fn along_a_bare_corridor_nothing_is_claimed() {
+    let walls = vec![[-60.0, -1.0, 60.0, -1.0], [-60.0, 1.0, 60.0, 1.0]];
+    let mut random = Random::new(1);
+    let at = Pose2::new(3.0, 0.2, 0.1);
+    let believed = prior(&at, 0.1, 0.02, &mut random);
+    let found = fix(&walls, &at, &believed, &mut random).unwrap();
+    let c = found.pose.covariance;
+    assert!(c[(0, 0)].sqrt() > 50.0, "{c}");
+    assert!(c[(1, 1)].sqrt() < 0.02 && c[(2, 2)].sqrt() < 0.01, "{c}");
+    // Where nothing is known the prior's value stays: fusing it changes nothing.
+    assert!((found.pose.pose.x_m - believed.pose.x_m).abs() < 0.05);
+    assert!((found.pose.pose.y_m - 0.2).abs() < 0.02);
+}
+
+#[test]
+fn what_is_not_the_map_is_refused() {
+    let mut random = Random::new(2);
+    let at = Pose2::new(3.0, 2.0, 0.3);
+    let room = rectangle([0.0, 0.0, 6.0, 4.0]);
+    let index = WallIndex::new(&segments(&rectangle([0.0, 0.0, 9.0, 7.0]), 0.005, 0.002));
+    let near = prior(&at, 0.05, 0.02, &mut random);
+    let p = LaserFixParams::default();
+    let other = laser_fix(&index, &scan(&room, &at, 0.01, 12.0, &mut random), &near, &p).unwrap();
+    assert!(
+        matches!(
+            other,
+            Err(LaserRefusal::Unlike { .. } | LaserRefusal::FewPoints { .. } | LaserRefusal::Prior { .. })
+        ),
+        "{other:?}"
+    );
+    // No walls, no returns.
+    let empty = WallIndex::new(&[]);
+    let seen = scan(&room, &at, 0.01, 12.0, &mut random);
+    assert!(matches!(laser_fix(&empty, &seen, &near, &p).unwrap(), Err(LaserRefusal::FewPoints { .. })));
+    let blind = Scan::new(Pose2::default(), 0.0, 0.01, 10.0, vec![f32::NAN; 300]).unwrap();
+    assert_eq!(laser_fix(&index, &blind, &near, &p).unwrap(), Err(LaserRefusal::FewPoints { points: 0 }));
+    let nan = Pose2Covariance { covariance: Matrix3::repeat(f64::NAN), ..near };
+    assert_eq!(laser_fix(&index, &seen, &nan, &p).unwrap_err().field, "covariance");
+}
+
+#[test]
+fn a_prior_that_is_sure_and_wrong_is_contradicted() {
+    let mut random = Random::new(4);
+    let room = rectangle([0.0, 0.0, 6.0, 4.0]);
+    let at = Pose2::new(3.0, 2.0, 0.3);
+    // Off by 0.3 m, said to be within 2 cm.
+    let wrong = prior(&at.plus(&Vector3::new(0.3, 0.0, 0.0)), 0.02, 0.01, &mut random);
+    let found = fix(&room, &at, &wrong, &mut random);
+    assert!(matches!(found, Err(LaserRefusal::Prior { .. })), "{found:?}");
+}
+
+#[test]
+fn two_places_that_fit_are_none() {
+    // Niches every 1.2 m, all the same; the prior covers two of them.
+    let mut walls = vec![[-20.0, -1.0, 20.0, -1.0]];
+    for i in -16..16 {
+        let x = 1.2 * f64::from(i);
+        walls.extend([[x, 1.0, x + 0.6, 1.0], [x + 0.6, 1.0, x + 0.6, 1.4]]);
+        walls.extend([[x + 0.6, 1.4, x + 1.2, 1.4], [x + 1.2, 1.4, x + 1.2, 1.0]]);
+    }
+    let mut random = Random::new(5);
+    let at = Pose2::new(0.3, 0.0, 1.2);
+    let v = Vector3::new(0.7 * 0.7, 0.01, 0.001);
+    let wide = Pose2Covariance {
+        pose: at.plus(&Vector3::new(0.6, 0.0, 0.0)),
+        covariance: Matrix3::from_diagonal(&v),
+    };
+    let found = fix(&walls, &at, &wide, &mut random);
+    assert_eq!(found, Err(LaserRefusal::Ambiguous));
+    // A narrow prior settles it.
+    let sure = prior(&at, 0.05, 0.01, &mut random);
+    let found = fix(&walls, &at, &sure, &mut random).unwrap();
+    assert!((found.pose.pose.x_m - 0.3).abs() < 0.03, "{found:?}");
+}
+
+#[test]
+fn the_index_is_bounded() {
+    let far = [[-9e4, -9e4, 9e4, 9e4], [9e4, -9e4, -9e4, 9e4]];
+    let walls: Walls = far.into_iter().cycle().take(1000).collect();
+    let index = WallIndex::new(&segments(&walls, 0.01, 0.01));
+    assert!(index.width * index.height <= MAX_BUCKETS && index.entries.len() <= 2 * MAX_ENTRIES);
+    let p = Point2::new(10.0, 10.1);
+    let n = Vector2::new(-1.0, 1.0).normalize();
+    assert!(index.nearest(&p, &n, 0.5, 0.8).is_some());
+}

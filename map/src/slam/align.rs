@@ -1,0 +1,185 @@
+//! From a good guess to the pose itself: points of a scan onto the surfaces of others, distances measured across the
+//! surface only, so that what the walls do not tell stays untold (method 17.4 in the form of points). In: a guess,
+//! perhaps a prior. Out: the pose and what the walls alone say of it, as information: 0 along a bare corridor.
+
+use super::{cloud::Cloud, reference::Reference};
+use crate::pose2::Pose2;
+use nalgebra::{Matrix3, Vector2, Vector3};
+use serde::{Deserialize, Serialize};
+
+/// Knobs of the alignment.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct AlignParams {
+    /// How far a point's surface is looked for at first...
+    pub start_radius_m: f64,
+    /// ...and at last.
+    pub end_radius_m: f64,
+    /// Surfaces that turn more than this against each other are not one.
+    pub max_turn_rad: f64,
+    /// Most iterations.
+    pub iterations: usize,
+    /// Smallest standard deviation of a point across its surface.
+    pub sigma_m: f64,
+    /// Beyond it a point's weight falls off.
+    pub outlier_m: f64,
+    /// Points that err together: their number is divided by this.
+    pub correlated: f64,
+    /// Standard deviation that no number of points removes: position.
+    pub floor_m: f64,
+    /// The same for the heading.
+    pub floor_rad: f64,
+}
+
+impl Default for AlignParams {
+    fn default() -> Self {
+        Self {
+            start_radius_m: 0.5,
+            end_radius_m: 0.15,
+            max_turn_rad: 0.6,
+            iterations: 20,
+            sigma_m: 0.02,
+            outlier_m: 0.06,
+            correlated: 4.0,
+            floor_m: 0.005,
+            floor_rad: 0.001,
+        }
+    }
+}
+
+/// A prior of the pose: its mean and information.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Prior {
+    pub pose: Pose2,
+    pub information: Matrix3<f64>,
+}
+
+/// How a scan lies on its reference.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Aligned {
+    /// `reference_from_robot`.
+    pub pose: Pose2,
+    /// Of (x, y, theta), by the points alone, without the prior; singular where they say nothing.
+    pub information: Matrix3<f64>,
+    /// Share of the scan's flat points that have a surface.
+    pub matched: f64,
+    /// Root mean square distance of those from it.
+    pub rms_m: f64,
+}
+
+/// Fits `scan` to `reference` from `guess` on. `None` if fewer than three points have a surface.
+pub(crate) fn align(
+    reference: &Reference,
+    scan: &Cloud,
+    guess: &Pose2,
+    prior: Option<&Prior>,
+    p: &AlignParams,
+) -> Option<Aligned> {
+    let mut pose = *guess;
+    let mut radius_m = p.start_radius_m;
+    let mut done = None;
+    for step in 0..p.iterations.max(1) {
+        let sums = sums(reference, scan, &pose, radius_m, p)?;
+        let scale = 1.0 / (p.correlated.max(1.0) * sums.variance(p));
+        let (mut h, mut g) = (sums.h * scale, sums.g * scale);
+        done = Some((sums.clone(), scale));
+        if let Some(prior) = prior {
+            // What the walls only feign to tell would hold the pose at the guess against the prior.
+            h = sums.told() * scale + prior.information;
+            g += prior.information * pose.minus(&prior.pose);
+        }
+        // A little damping: where nothing is known the pose stays.
+        let damped = h + Matrix3::from_diagonal(&Vector3::new(1e-3, 1e-3, 1e-3));
+        let d = damped.cholesky()?.solve(&-g);
+        pose = pose.plus(&d);
+        let at_rest = d.xy().norm() < 2e-4 && d.z.abs() < 2e-5;
+        if at_rest && radius_m <= p.end_radius_m {
+            break;
+        }
+        if at_rest || step % 2 == 1 {
+            radius_m = (radius_m * 0.6).max(p.end_radius_m);
+        }
+    }
+    let (sums, scale) = done?;
+    let flat = scan.points.iter().filter(|q| q.normal.is_some()).count();
+    let information = with_floor(&(sums.told() * scale), [p.floor_m, p.floor_rad]);
+    let finite = pose.check().is_ok() && information.iter().all(|v| v.is_finite());
+    finite.then(|| Aligned {
+        pose,
+        information,
+        matched: sums.points as f64 / flat.max(1) as f64,
+        rms_m: sums.variance(p).sqrt(),
+    })
+}
+
+/// Sums over the matched points: normal equations with unit variance, and the residuals.
+#[derive(Debug, Clone)]
+struct Sums {
+    h: Matrix3<f64>,
+    g: Vector3<f64>,
+    /// What the noise of the normals adds to `h`.
+    by_noise: Matrix3<f64>,
+    squares: f64,
+    weights: f64,
+    points: usize,
+}
+
+impl Sums {
+    /// The information without what only the noise of the normals feigns: walls of a bare corridor seem to look a little
+    /// along it, now here, now there.
+    fn told(&self) -> Matrix3<f64> {
+        // Metres and radians weigh alike at the mean distance of the points.
+        let arm = (self.h[(2, 2)] / (self.h[(0, 0)] + self.h[(1, 1)]).max(1e-12)).sqrt().clamp(0.1, 100.0);
+        let unit = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, 1.0 / arm));
+        let back = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, arm));
+        let mut eigen = (unit * (self.h - self.by_noise) * unit).symmetric_eigen();
+        eigen.eigenvalues.apply(|v| *v = v.max(0.0));
+        back * eigen.recompose() * back
+    }
+
+    fn variance(&self, p: &AlignParams) -> f64 {
+        (self.squares / self.weights.max(1e-9)).max(p.sigma_m * p.sigma_m)
+    }
+}
+
+fn sums(reference: &Reference, scan: &Cloud, pose: &Pose2, radius_m: f64, p: &AlignParams) -> Option<Sums> {
+    let (s, c) = pose.theta_rad.sin_cos();
+    let cos_turn = p.max_turn_rad.cos();
+    let (mut h, mut g) = (Matrix3::zeros(), Vector3::zeros());
+    let mut by_noise = Matrix3::zeros();
+    let (mut squares, mut weights, mut points) = (0.0, 0.0, 0);
+    // While the radius is wide, so is the kernel: the first steps have far to go.
+    let outlier2 = (p.outlier_m * (radius_m / p.end_radius_m)).powi(2);
+    for point in &scan.points {
+        let Some(n) = point.normal else { continue };
+        let normal = Vector2::new(c * n.x - s * n.y, s * n.x + c * n.y);
+        let turned = Vector2::new(c * point.at.x - s * point.at.y, s * point.at.x + c * point.at.y);
+        let at = nalgebra::Point2::from(turned + pose.position());
+        let Some(surface) = reference.nearest(&at, &normal, radius_m, cos_turn) else { continue };
+        let residual = surface.normal.dot(&(at - surface.at));
+        let arm = Vector2::new(-turned.y, turned.x);
+        let j = Vector3::new(surface.normal.x, surface.normal.y, surface.normal.dot(&arm));
+        let w = 1.0 / (1.0 + residual * residual / outlier2).powi(2);
+        h += j * j.transpose() * w;
+        g += j * (w * residual);
+        let t = Vector2::new(-surface.normal.y, surface.normal.x);
+        let turned = Vector3::new(t.x, t.y, t.dot(&arm));
+        by_noise += turned * turned.transpose() * (w * surface.turn_variance);
+        squares += w * residual * residual;
+        weights += w;
+        points += 1;
+    }
+    (points >= 3).then_some(Sums { h, g, by_noise, squares, weights, points })
+}
+
+/// The information that is left when the floor is added to the covariance; works for singular information.
+pub(crate) fn with_floor(information: &Matrix3<f64>, [metres, radians]: [f64; 2]) -> Matrix3<f64> {
+    let floor = Vector3::new(metres.powi(2), metres.powi(2), radians.powi(2));
+    let inverse = Matrix3::from_diagonal(&floor.map(|v| 1.0 / v.max(1e-12)));
+    let Some(c) = (information + inverse).cholesky() else { return Matrix3::zeros() };
+    let made = information - information * c.inverse() * information;
+    0.5 * (made + made.transpose())
+}
+
+#[cfg(test)]
+mod tests;

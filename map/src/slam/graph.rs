@@ -1,0 +1,238 @@
+//! The graph of key poses: relative poses with information between them, and the poses that fit them all best (sparse
+//! nonlinear least squares). In: poses and edges. Out: poses, the misfit of every edge, covariances. Which edges there
+//! are is decided elsewhere.
+
+use crate::pose2::{Pose2, wrap_rad};
+use faer::{
+    MatMut, Side,
+    prelude::Solve as _,
+    sparse::{
+        SparseColMat, Triplet,
+        linalg::solvers::{Llt, SymbolicLlt},
+    },
+};
+use nalgebra::{Matrix3, Vector3};
+
+/// Most poses in a graph.
+pub const MAX_POSES: usize = 50_000;
+/// Most edges in a graph.
+pub const MAX_EDGES: usize = 1_000_000;
+/// Most iterations of an optimisation.
+const MAX_ITERATIONS: usize = 50;
+
+/// One relation between two poses.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Edge {
+    /// Index of the pose whose frame it is in.
+    pub from: usize,
+    /// Index of the other pose.
+    pub to: usize,
+    /// The measured `from_from_to`.
+    pub measured: Pose2,
+    /// Inverse covariance of (x, y, theta) in the frame `from`; may be singular.
+    pub information: Matrix3<f64>,
+    /// If given, the edge may be wrong: beyond this chi2 its weight falls off (dynamic covariance scaling,
+    /// Agarwal et al. 2013).
+    pub doubt_chi2: Option<f64>,
+}
+
+/// Why a graph cannot be optimised.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum GraphError {
+    /// Too large.
+    #[error("{0} poses and {1} edges: at most {MAX_POSES} and {MAX_EDGES}")]
+    TooLarge(usize, usize),
+    /// An edge names a pose that is not there, or a number is not finite.
+    #[error("edge {0} is not usable")]
+    Edge(usize),
+    /// The edges do not hold every pose.
+    #[error("the edges do not determine every pose")]
+    Loose,
+}
+
+/// Error of an edge (x, y, theta), and its derivatives by both poses.
+fn error(edge: &Edge, from: &Pose2, to: &Pose2) -> Vector3<f64> {
+    let h = from.between(to);
+    Vector3::new(
+        h.x_m - edge.measured.x_m,
+        h.y_m - edge.measured.y_m,
+        wrap_rad(h.theta_rad - edge.measured.theta_rad),
+    )
+}
+
+fn jacobians(from: &Pose2, to: &Pose2) -> (Matrix3<f64>, Matrix3<f64>) {
+    let (s, c) = from.theta_rad.sin_cos();
+    let d = to.position() - from.position();
+    let by_from = Matrix3::new(-c, -s, -s * d.x + c * d.y, s, -c, -c * d.x - s * d.y, 0.0, 0.0, -1.0);
+    let by_to = Matrix3::new(c, s, 0.0, -s, c, 0.0, 0.0, 0.0, 1.0);
+    (by_from, by_to)
+}
+
+/// chi2 of an edge at these poses, without scaling.
+pub fn chi2(edge: &Edge, poses: &[Pose2]) -> f64 {
+    let e = error(edge, &poses[edge.from], &poses[edge.to]);
+    e.dot(&(edge.information * e))
+}
+
+/// Weight of an edge with this chi2: 1, or less if it may be wrong.
+pub fn weight(edge: &Edge, chi2: f64) -> f64 {
+    edge.doubt_chi2.map_or(1.0, |phi| (2.0 * phi / (phi + chi2)).min(1.0).powi(2))
+}
+
+/// What the robust edges cost: chi2 where they are believed, bounded where they are not.
+fn cost(edges: &[Edge], poses: &[Pose2]) -> f64 {
+    let one = |e: &Edge| {
+        let c = chi2(e, poses);
+        match e.doubt_chi2 {
+            // Integral of the weight over chi2.
+            Some(phi) if c > phi => phi + 4.0 * phi * phi * (1.0 / (2.0 * phi) - 1.0 / (phi + c)),
+            _ => c,
+        }
+    };
+    edges.iter().map(one).sum()
+}
+
+fn check(poses: &[Pose2], edges: &[Edge]) -> Result<(), GraphError> {
+    if poses.len() > MAX_POSES || edges.len() > MAX_EDGES {
+        return Err(GraphError::TooLarge(poses.len(), edges.len()));
+    }
+    let good = |e: &Edge| {
+        e.from < poses.len()
+            && e.to < poses.len()
+            && e.from != e.to
+            && e.measured.check().is_ok()
+            && e.information.iter().all(|v| v.is_finite())
+    };
+    edges.iter().position(|e| !good(e)).map_or(Ok(()), |i| Err(GraphError::Edge(i)))
+}
+
+/// The factorised normal equations; the first pose is held.
+struct Normal {
+    lower: SparseColMat<usize, f64>,
+    gradient: Vec<f64>,
+}
+
+fn normal(poses: &[Pose2], edges: &[Edge], damping: f64) -> Result<Normal, GraphError> {
+    let n = 3 * (poses.len() - 1);
+    let mut gradient = vec![0.0; n];
+    let mut triplets = Vec::with_capacity(24 * edges.len() + n);
+    let mut diagonal = vec![0.0; n];
+    for edge in edges {
+        let (a, b) = (&poses[edge.from], &poses[edge.to]);
+        let e = error(edge, a, b);
+        let information = edge.information * weight(edge, e.dot(&(edge.information * e)));
+        let (ja, jb) = jacobians(a, b);
+        for (p, jp) in [(edge.from, &ja), (edge.to, &jb)] {
+            let Some(row) = p.checked_sub(1) else { continue };
+            let g = jp.transpose() * information * e;
+            for r in 0..3 {
+                gradient[3 * row + r] += g[r];
+            }
+            for (q, jq) in [(edge.from, &ja), (edge.to, &jb)] {
+                // The lower triangle, by columns.
+                let Some(column) = q.checked_sub(1) else { continue };
+                if column > row {
+                    continue;
+                }
+                let block = jp.transpose() * information * jq;
+                for r in 0..3 {
+                    for c in 0..3 {
+                        let (r_at, c_at) = (3 * row + r, 3 * column + c);
+                        if r_at == c_at {
+                            diagonal[r_at] += block[(r, c)];
+                        } else if r_at > c_at {
+                            triplets.push(Triplet { row: r_at, col: c_at, val: block[(r, c)] });
+                        }
+                    }
+                }
+            }
+        }
+    }
+    for (i, d) in diagonal.iter().enumerate() {
+        triplets.push(Triplet { row: i, col: i, val: d * (1.0 + damping) + 1e-12 });
+    }
+    // What is no matrix cannot be factorised either.
+    let lower = SparseColMat::try_new_from_triplets(n, n, &triplets).or(Err(GraphError::Loose))?;
+    Ok(Normal { lower, gradient })
+}
+
+fn factor(normal: &Normal, symbolic: &SymbolicLlt<usize>) -> Result<Llt<usize, f64>, GraphError> {
+    Llt::try_new_with_symbolic(symbolic.clone(), normal.lower.as_ref(), Side::Lower)
+        .or(Err(GraphError::Loose))
+}
+
+/// Moves all poses but the first to where the edges want them (Levenberg-Marquardt). Gives the final cost.
+pub fn optimise(poses: &mut [Pose2], edges: &[Edge]) -> Result<f64, GraphError> {
+    check(poses, edges)?;
+    if poses.len() < 2 {
+        return Ok(0.0);
+    }
+    let mut now = cost(edges, poses);
+    let mut damping = 1e-6;
+    let mut symbolic = None;
+    for _ in 0..MAX_ITERATIONS {
+        let equations = normal(poses, edges, damping)?;
+        if symbolic.is_none() {
+            let made = SymbolicLlt::try_new(equations.lower.symbolic(), Side::Lower);
+            symbolic = Some(made.or(Err(GraphError::Loose))?);
+        }
+        let Some(symbolic) = &symbolic else { break };
+        let mut step: Vec<f64> = equations.gradient.iter().map(|g| -g).collect();
+        let rows = step.len();
+        factor(&equations, symbolic)?.solve_in_place(MatMut::from_column_major_slice_mut(&mut step, rows, 1));
+        if step.iter().any(|v| !v.is_finite()) {
+            return Err(GraphError::Loose);
+        }
+        let moved: Vec<Pose2> = poses
+            .iter()
+            .enumerate()
+            .map(|(i, p)| match i.checked_sub(1) {
+                Some(k) => p.plus(&Vector3::new(step[3 * k], step[3 * k + 1], step[3 * k + 2])),
+                None => *p,
+            })
+            .collect();
+        let then = cost(edges, &moved);
+        if then > now {
+            damping = (damping * 10.0).max(1e-6);
+            if damping > 1e3 {
+                break;
+            }
+            continue;
+        }
+        let gain = now - then;
+        poses.copy_from_slice(&moved);
+        now = then;
+        damping *= 0.1;
+        if gain <= 1e-6 * (1.0 + now) {
+            break;
+        }
+    }
+    Ok(now)
+}
+
+/// Covariance of (x, y, theta) of the poses `at`, in the map frame, the first pose held.
+pub fn covariances(poses: &[Pose2], edges: &[Edge], at: &[usize]) -> Result<Vec<Matrix3<f64>>, GraphError> {
+    check(poses, edges)?;
+    if poses.len() < 2 {
+        return Ok(vec![Matrix3::zeros(); at.len()]);
+    }
+    let equations = normal(poses, edges, 0.0)?;
+    let symbolic =
+        SymbolicLlt::try_new(equations.lower.symbolic(), Side::Lower).or(Err(GraphError::Loose))?;
+    let factor = factor(&equations, &symbolic)?;
+    let n = equations.gradient.len();
+    let one = |&i: &usize| {
+        let Some(k) = i.checked_sub(1).filter(|k| 3 * k < n) else { return Matrix3::zeros() };
+        let mut columns = vec![0.0; 3 * n];
+        for c in 0..3 {
+            columns[c * n + 3 * k + c] = 1.0;
+        }
+        factor.solve_in_place(MatMut::from_column_major_slice_mut(&mut columns, n, 3));
+        let made = Matrix3::from_fn(|r, c| columns[c * n + 3 * k + r]);
+        0.5 * (made + made.transpose())
+    };
+    Ok(at.iter().map(one).collect())
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,113 @@
+//! Follows the robot from scan to scan: odometry predicts, the recent key scans correct. In: a scan. Out: where it lies
+//! relative to the last key pose, and whether it should become one itself.
+
+use super::{
+    Key, SlamParams,
+    align::{Prior, align},
+    cloud::Cloud,
+    field::{Field, Window},
+    inverse,
+    reference::Reference,
+};
+use crate::pose2::{Pose2, Pose2Covariance};
+use nalgebra::{Matrix3, Point2};
+
+/// Largest distance of the robot from where odometry says that is still looked at.
+const MAX_REACH_M: f64 = 1.2;
+/// The same for the heading.
+const MAX_REACH_RAD: f64 = 0.7;
+
+/// Where a scan lies.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Seen {
+    /// With covariance in the key's frame.
+    pub key_from_robot: Pose2Covariance,
+    /// It should become a key scan.
+    pub is_new: bool,
+}
+
+/// The recent map, in the frame of the last key pose.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Tracker {
+    recent: Option<(Reference, Field)>,
+    /// The last scan in the key's frame.
+    last: Pose2,
+    /// Covariance of the last scan's pose.
+    spread: Matrix3<f64>,
+    /// What odometry alone says since the key.
+    by_odometry: Matrix3<f64>,
+    odom: Pose2,
+}
+
+impl Tracker {
+    /// A new key pose: the recent map is laid anew around it.
+    pub(super) fn start(&mut self, keys: &[Key], p: &SlamParams) {
+        let Some(key) = keys.last() else { return };
+        self.relaid(keys, p);
+        self.last = Pose2::default();
+        (self.spread, self.by_odometry) = (Matrix3::zeros(), Matrix3::zeros());
+        self.odom = key.odom;
+    }
+
+    /// The key poses have moved.
+    pub(super) fn relaid(&mut self, keys: &[Key], p: &SlamParams) {
+        let Some(key) = keys.last() else { return };
+        let first = keys.len().saturating_sub(p.recent_keys.max(1));
+        let near = || {
+            let recent = keys[first..].iter().filter(|k| key.path_m - k.path_m <= p.recent_m);
+            recent.map(|k| (key.pose.between(&k.pose), &k.cloud))
+        };
+        let reference = Reference::new(near(), p.align.start_radius_m);
+        let field = Field::new(near(), &Point2::origin(), p.cloud.max_range_m, MAX_REACH_M, &p.search);
+        self.recent = Some((reference, field));
+    }
+
+    /// Finds the scan near the place that odometry says.
+    pub(super) fn track(&mut self, keys: &[Key], odom: &Pose2, cloud: &Cloud, p: &SlamParams) -> Seen {
+        let (Some(key), Some((reference, field))) = (keys.last(), &self.recent) else {
+            let key_from_robot = Pose2Covariance { pose: Pose2::default(), covariance: Matrix3::zeros() };
+            return Seen { key_from_robot, is_new: true };
+        };
+        let motion = p.motion(&self.odom.between(odom));
+        let predicted = Pose2Covariance { pose: self.last, covariance: self.spread }.compose(&motion);
+        let since = p.motion(&key.odom.between(odom));
+        let alone = Pose2Covariance { pose: self.last, covariance: self.by_odometry }.compose(&motion);
+        self.by_odometry = alone.covariance;
+        let by_odometry = if since.covariance.trace() > alone.covariance.trace() { since } else { alone };
+        let guess = guess(field, cloud, &predicted, p);
+        let prior = Prior { pose: predicted.pose, information: inverse(&predicted.covariance) };
+        let aligned = align(reference, cloud, &guess, Some(&prior), &p.align)
+            .filter(|a| a.matched >= p.min_matched && fits(&a.pose, &predicted));
+        let (pose, information, matched) = match &aligned {
+            Some(a) => (a.pose, a.information, a.matched),
+            None => (predicted.pose, Matrix3::zeros(), 0.0),
+        };
+        let covariance = inverse(&(information + inverse(&by_odometry.covariance)));
+        self.spread = inverse(&(information + prior.information));
+        (self.last, self.odom) = (pose, *odom);
+        let is_new = pose.position().norm() > p.key_m
+            || pose.theta_rad.abs() > p.key_rad
+            || (matched < p.key_matched && pose.position().norm() > 0.25 * p.key_m);
+        Seen { key_from_robot: Pose2Covariance { pose, covariance }, is_new }
+    }
+}
+
+/// The best pose around the predicted one on the grid; the predicted one if none is good.
+fn guess(field: &Field, cloud: &Cloud, predicted: &Pose2Covariance, p: &SlamParams) -> Pose2 {
+    let c = &predicted.covariance;
+    let sigma_m = c[(0, 0)].max(c[(1, 1)]).max(0.0).sqrt();
+    let window = Window {
+        middle: predicted.pose,
+        reach_m: (3.0 * sigma_m + 0.05).min(MAX_REACH_M),
+        reach_rad: (3.0 * c[(2, 2)].max(0.0).sqrt() + 0.02).min(MAX_REACH_RAD),
+        pull: 0.05,
+    };
+    let points: Vec<Point2<f64>> = cloud.points.iter().map(|q| q.at).collect();
+    field.search(&points, &window, 0.3, None, &p.search).map_or(predicted.pose, |f| f.pose)
+}
+
+/// Not farther from the prediction than odometry can err.
+fn fits(pose: &Pose2, predicted: &Pose2Covariance) -> bool {
+    let d = pose.minus(&predicted.pose);
+    d.dot(&(inverse(&predicted.covariance) * d)) < 50.0
+}
