@@ -92,7 +92,7 @@ const OPTIONS: [(&str, &[&str]); 25] = [
     ("evaluate occlusion", &["--landmarks", "--views", "--detector", "--plot"]),
     ("evaluate discrimination", &["--landmarks", "--strangers", "--views", "--own-views", "--plot"]),
     ("evaluate lookalikes", &["--pairs", "--views", "--photographs"]),
-    ("evaluate calibration", &["--quads", "--set", "--plot", "--json"]),
+    ("evaluate confidence", &["--quads", "--set", "--plot", "--json"]),
     ("fit confidence", &["--quads", "--set", "--photographs", "--rust"]),
     (
         "fit search",

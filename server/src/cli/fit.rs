@@ -35,10 +35,10 @@ pub(crate) enum Command {
     Search(Box<search::SearchArgs>),
     /// The weights of the confidence: the chance that an identity is right, from answers whose truth is known.
     ///
-    /// Maps are taught and quads looked at as in `waymark evaluate calibration`, which says how well the confidence keeps
+    /// Maps are taught and quads looked at as in `waymark evaluate confidence`, which says how well the confidence keeps
     /// its word; fit on the set `calibrate`, judge on `test`. The same options give the same weights. For example:
     ///   waymark fit confidence --set calibrate --rust weights.txt
-    ///   waymark evaluate calibration --set test --plot reliability.svg
+    ///   waymark evaluate confidence --set test --plot reliability.svg
     #[command(verbatim_doc_comment)]
     Confidence(Box<confidence::ConfidenceArgs>),
 }

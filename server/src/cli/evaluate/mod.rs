@@ -52,7 +52,7 @@ pub(crate) enum Command {
     /// ambiguous, or confused.
     Lookalikes(experiment::doubles::Args),
     /// Whether confidences keep their word: reliability diagram and expected calibration error.
-    Calibration(experiment::calibration::Args),
+    Confidence(experiment::confidence::Args),
 }
 
 /// Runs one evaluation.
@@ -66,6 +66,6 @@ pub(crate) fn run(command: &Command) -> anyhow::Result<()> {
         Command::Occlusion(args) => experiment::occlusion::run(args),
         Command::Discrimination(args) => experiment::discrimination::run(args),
         Command::Lookalikes(args) => experiment::doubles::run(args),
-        Command::Calibration(args) => experiment::calibration::run(args),
+        Command::Confidence(args) => experiment::confidence::run(args),
     }
 }

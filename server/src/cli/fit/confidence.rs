@@ -1,11 +1,11 @@
 //! `waymark fit confidence`: the weights of the confidence from answers whose truth is known. Answers in, a source file
-//! out; the regression is `vision`'s, the answers are those of `waymark evaluate calibration`, of another set.
+//! out; the regression is `vision`'s, the answers are those of `waymark evaluate confidence`, of another set.
 
 use crate::cli::{
     evaluate::experiment::{
         Common,
         answers::{Answers, KINDS, answers},
-        calibration::{line, reliabilities},
+        confidence::{line, reliabilities},
     },
     screen,
 };

@@ -15,7 +15,7 @@ pub(crate) mod humps;
 pub(crate) mod discrimination;
 pub(crate) mod doubles;
 pub(crate) mod answers;
-pub(crate) mod calibration;
+pub(crate) mod confidence;
 
 use crate::cli::screen;
 use lesson::Taught;

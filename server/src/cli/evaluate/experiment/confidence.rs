@@ -1,4 +1,4 @@
-//! `waymark evaluate calibration`: does a confidence keep its word? Of answers with 0.9, nine in ten should be right.
+//! `waymark evaluate confidence`: does a confidence keep its word? Of answers with 0.9, nine in ten should be right.
 
 use super::{
     Common,
@@ -17,7 +17,7 @@ const BINS: usize = 15;
 /// Answers from here on are sure.
 const SURE: f64 = 0.99;
 
-/// `waymark evaluate calibration`.
+/// `waymark evaluate confidence`.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// Quads, of which about four in ten are named.
@@ -149,7 +149,7 @@ pub(crate) fn line(r: &Reliability) -> String {
 
 fn table(report: &Report) -> Vec<String> {
     let mut lines = vec![format!(
-        "calibration: set {}, seed {}, {} quads ({:.0} % landmarks, {:.0} % look-alikes, the rest strangers)",
+        "confidence: set {}, seed {}, {} quads ({:.0} % landmarks, {:.0} % look-alikes, the rest strangers)",
         report.set,
         report.seed,
         report.quads,
