@@ -53,9 +53,16 @@ pub struct Intrinsics {
     pub cx_px: f64,
     #[prost(double, tag = "4")]
     pub cy_px: f64,
-    /// Empty for a rectified image; k1, k2, p1, p2, k3 for plumb_bob.
+    /// The lens: none for a rectified image, else one of these three, in the order of ROS and OpenCV.
+    /// k1, k2, p1, p2, k3.
     #[prost(double, repeated, tag = "5")]
     pub plumb_bob: ::prost::alloc::vec::Vec<f64>,
+    /// k1, k2, p1, p2, k3, k4, k5, k6; k4 to k6 are of the denominator.
+    #[prost(double, repeated, tag = "6")]
+    pub rational_polynomial: ::prost::alloc::vec::Vec<f64>,
+    /// OpenCV's fisheye: k1, k2, k3, k4 of the angle from the axis.
+    #[prost(double, repeated, tag = "7")]
+    pub equidistant: ::prost::alloc::vec::Vec<f64>,
 }
 /// robot/{robot}/frame/{camera}
 #[derive(Clone, PartialEq, ::prost::Message)]

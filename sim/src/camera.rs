@@ -33,10 +33,11 @@ impl Camera {
         let (width_px, height_px) = (width_px.clamp(16, MAX_SIDE_PX), height_px.clamp(16, MAX_SIDE_PX));
         let table = match intrinsics.distortion {
             Distortion::None => vec![],
-            Distortion::PlumbBob(_) => (0..width_px * height_px)
+            _ => (0..width_px * height_px)
                 .map(|i| {
                     let px = Point2::new((i % width_px) as f64, (i / width_px) as f64);
-                    let straight = intrinsics.undistort(&px);
+                    // Where no pinhole sees what the lens shows, the edge of a fisheye, the ray of the pixel itself.
+                    let straight = intrinsics.undistort(&px).unwrap_or(px);
                     [straight.x as f32, straight.y as f32]
                 })
                 .collect(),

@@ -28,7 +28,7 @@ fn good(seq: u64) -> v1::Frame {
 }
 
 fn camera() -> v1::Intrinsics {
-    v1::Intrinsics { fx_px: 150.0, fy_px: 150.0, cx_px: 80.0, cy_px: 60.0, plumb_bob: vec![] }
+    v1::Intrinsics { fx_px: 150.0, fy_px: 150.0, cx_px: 80.0, cy_px: 60.0, ..v1::Intrinsics::default() }
 }
 
 type Spoil = fn(&mut v1::Frame);

@@ -1,7 +1,10 @@
 //! What enters the pipeline: a grey image and, when known, the camera's intrinsics. Both are checked here, once;
 //! every later stage may rely on it.
 
-use nalgebra::{Matrix3, Point2, Vector3};
+mod lens;
+pub use lens::{Bent, Distortion, MAX_RAY_RAD};
+
+use nalgebra::{Matrix2, Matrix2x3, Matrix3, Point2, Vector3};
 use serde::{Deserialize, Serialize};
 
 /// Largest accepted image side, in pixels.
@@ -104,17 +107,6 @@ impl GrayImage {
     }
 }
 
-/// Lens distortion, in OpenCV's and ROS's coefficient order. Applied to normalised coordinates.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-#[serde(tag = "model", content = "coefficients", rename_all = "snake_case")]
-pub enum Distortion {
-    /// A rectified image or a perfect pinhole.
-    #[default]
-    None,
-    /// `plumb_bob`: k1, k2, p1, p2, k3.
-    PlumbBob([f64; 5]),
-}
-
 /// A calibrated camera: zero skew, pixel (0, 0) at the centre of the top-left pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Intrinsics {
@@ -152,10 +144,8 @@ impl Intrinsics {
         check("fy_px", fy_px, 10.0, 1e5)?;
         check("cx_px", cx_px, -2e4, 2e4)?;
         check("cy_px", cy_px, -2e4, 2e4)?;
-        if let Distortion::PlumbBob(k) = distortion {
-            for value in k {
-                check("distortion", value, -100.0, 100.0)?;
-            }
+        for value in distortion.coefficients() {
+            check("distortion", *value, -100.0, 100.0)?;
         }
         Ok(Self { fx_px, fy_px, cx_px, cy_px, distortion })
     }
@@ -167,36 +157,47 @@ impl Intrinsics {
 
     /// Pixel of a point in camera coordinates (z > 0), distortion included.
     pub fn project(&self, p_camera: &Vector3<f64>) -> Point2<f64> {
-        let (x, y) = self.distort(p_camera.x / p_camera.z, p_camera.y / p_camera.z);
-        Point2::new(self.fx_px * x + self.cx_px, self.fy_px * y + self.cy_px)
+        let straight = Point2::new(p_camera.x / p_camera.z, p_camera.y / p_camera.z);
+        self.pixel(&self.distortion.bend(&straight).point)
     }
 
-    /// The pixel where an undistorted pinhole with the same K would see what this camera sees at `px`.
-    pub fn undistort(&self, px: &Point2<f64>) -> Point2<f64> {
-        let (xd, yd) = ((px.x - self.cx_px) / self.fx_px, (px.y - self.cy_px) / self.fy_px);
-        let (mut x, mut y) = (xd, yd);
-        if self.distortion != Distortion::None {
-            // Fixed point of x = x_d - (distort(x) - x): contracts for the distortion of real lenses.
-            for _ in 0..20 {
-                let (dx, dy) = self.distort(x, y);
-                (x, y) = (xd - (dx - x), yd - (dy - y));
-            }
-        }
-        Point2::new(self.fx_px * x + self.cx_px, self.fy_px * y + self.cy_px)
+    /// As [`Intrinsics::project`], with the derivative by the point.
+    pub fn project_with(&self, p_camera: &Vector3<f64>) -> (Point2<f64>, Matrix2x3<f64>) {
+        let inverse = 1.0 / p_camera.z;
+        let straight = Point2::new(p_camera.x * inverse, p_camera.y * inverse);
+        let bent = self.distortion.bend(&straight);
+        let perspective = Matrix2x3::new(1.0, 0.0, -straight.x, 0.0, 1.0, -straight.y) * inverse;
+        let focal = Matrix2::new(self.fx_px, 0.0, 0.0, self.fy_px);
+        (self.pixel(&bent.point), focal * bent.by_straight * perspective)
     }
 
-    fn distort(&self, x: f64, y: f64) -> (f64, f64) {
-        match self.distortion {
-            Distortion::None => (x, y),
-            Distortion::PlumbBob([k1, k2, p1, p2, k3]) => {
-                let r2 = x * x + y * y;
-                let radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
-                (
-                    x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
-                    y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y,
-                )
-            }
+    /// The pixel where an undistorted pinhole with the same K would see what this camera sees at `px`. `None` where the
+    /// lens cannot be undone: see [`Distortion::straighten`].
+    pub fn undistort(&self, px: &Point2<f64>) -> Option<Point2<f64>> {
+        if self.distortion == Distortion::None {
+            return Some(*px);
         }
+        Some(self.pixel(&self.distortion.straighten(&self.normalised(px))?))
+    }
+
+    /// As [`Intrinsics::undistort`], with the derivative by `px`: what turns the covariance of a corner.
+    pub fn undistort_with(&self, px: &Point2<f64>) -> Option<(Point2<f64>, Matrix2<f64>)> {
+        if self.distortion == Distortion::None {
+            return Some((*px, Matrix2::identity()));
+        }
+        let straight = self.distortion.straighten(&self.normalised(px))?;
+        let back = self.distortion.bend(&straight).by_straight.try_inverse()?;
+        let focal = Matrix2::new(self.fx_px, 0.0, 0.0, self.fy_px);
+        let inverse = Matrix2::new(1.0 / self.fx_px, 0.0, 0.0, 1.0 / self.fy_px);
+        Some((self.pixel(&straight), focal * back * inverse))
+    }
+
+    fn pixel(&self, normalised: &Point2<f64>) -> Point2<f64> {
+        Point2::new(self.fx_px * normalised.x + self.cx_px, self.fy_px * normalised.y + self.cy_px)
+    }
+
+    fn normalised(&self, px: &Point2<f64>) -> Point2<f64> {
+        Point2::new((px.x - self.cx_px) / self.fx_px, (px.y - self.cy_px) / self.fy_px)
     }
 }
 
@@ -245,21 +246,48 @@ mod tests {
         assert!((image.sample(-3.0, 9.0) - 200.0).abs() < 1e-4);
     }
 
+    fn lenses() -> [Intrinsics; 4] {
+        [
+            Distortion::None,
+            Distortion::PlumbBob([-0.28, 0.09, 1e-3, -5e-4, -0.01]),
+            Distortion::RationalPolynomial([0.9, 0.3, 2e-4, -3e-4, 0.02, 1.2, 0.5, 0.06]),
+            Distortion::Equidistant([-0.02, 0.006, -0.004, 0.001]),
+        ]
+        .map(|lens| Intrinsics::new(520.0, 518.0, 318.0, 243.0, lens).unwrap())
+    }
+
     #[test]
     fn undistort_inverts_project() {
-        let camera = Intrinsics::new(
-            520.0,
-            518.0,
-            318.0,
-            243.0,
-            Distortion::PlumbBob([-0.28, 0.09, 1e-3, -5e-4, -0.01]),
-        )
-        .unwrap();
-        let pinhole = Intrinsics { distortion: Distortion::None, ..camera };
-        for p in [[0.3, -0.2, 1.0], [-0.5, 0.35, 1.2], [0.0, 0.0, 2.0]] {
-            let p = Vector3::from(p);
-            let straight = pinhole.project(&p);
-            assert!((camera.undistort(&camera.project(&p)) - straight).norm() < 1e-6);
+        for camera in lenses() {
+            let pinhole = Intrinsics { distortion: Distortion::None, ..camera };
+            for p in [[0.3, -0.2, 1.0], [-0.5, 0.35, 1.2], [0.0, 0.0, 2.0]] {
+                let p = Vector3::from(p);
+                let back = camera.undistort(&camera.project(&p)).unwrap();
+                assert!((back - pinhole.project(&p)).norm() < 1e-6);
+            }
+        }
+    }
+
+    #[test]
+    fn derivatives_are_the_finite_differences() {
+        for camera in lenses() {
+            let p = Vector3::new(-0.5, 0.35, 1.2);
+            let (px, by_point) = camera.project_with(&p);
+            assert!((px - camera.project(&p)).norm() < 1e-12);
+            for k in 0..3 {
+                let mut d = Vector3::zeros();
+                d[k] = 1e-6;
+                let numeric = (camera.project(&(p + d)) - camera.project(&(p - d))) / 2e-6;
+                assert!((numeric - by_point.column(k)).norm() < 1e-5, "{camera:?} {k}");
+            }
+            let (straight, by_px) = camera.undistort_with(&px).unwrap();
+            assert!((straight - camera.undistort(&px).unwrap()).norm() < 1e-12);
+            for k in 0..2 {
+                let mut d = nalgebra::Vector2::zeros();
+                d[k] = 1e-3;
+                let at = |d| camera.undistort(&(px + d)).unwrap();
+                assert!(((at(d) - at(-d)) / 2e-3 - by_px.column(k)).norm() < 1e-6, "{camera:?} {k}");
+            }
         }
     }
 }

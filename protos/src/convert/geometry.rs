@@ -121,20 +121,13 @@ fn covariance(numbers: &[f64]) -> Result<Matrix3<f64>, Rejection> {
     Ok(symmetric)
 }
 
-/// A calibrated camera. `plumb_bob` is empty or has the five numbers k1, k2, p1, p2, k3.
+/// A calibrated camera: no lens, or one of `plumb_bob` (5 numbers), `rational_polynomial` (8), `equidistant` (4).
 pub fn intrinsics(wire: &v1::Intrinsics) -> Result<Intrinsics, Rejection> {
-    let distortion = match wire.plumb_bob.as_slice() {
-        [] => Distortion::None,
-        &[k1, k2, p1, p2, k3] => Distortion::PlumbBob([k1, k2, p1, p2, k3]),
-        other => {
-            let detail = format!("0 or 5 coefficients expected, {} given", other.len());
-            return Err(Rejection::new(Code::OutOfRange, "plumb_bob", detail));
-        }
-    };
+    let (distortion, lens) = lens(wire)?;
     Intrinsics::new(wire.fx_px, wire.fy_px, wire.cx_px, wire.cy_px, distortion).map_err(
         |error| match &error {
             FrameError::Intrinsics { field, value } => {
-                let field = if *field == "distortion" { "plumb_bob" } else { field };
+                let field = if *field == "distortion" { lens } else { field };
                 let code = if value.is_finite() { Code::OutOfRange } else { Code::NotFinite };
                 Rejection::new(code, field, error.to_string())
             }
@@ -145,19 +138,55 @@ pub fn intrinsics(wire: &v1::Intrinsics) -> Result<Intrinsics, Rejection> {
     )
 }
 
+/// The lens of a camera and the field that gives it. At most one may be given.
+fn lens(wire: &v1::Intrinsics) -> Result<(Distortion, &'static str), Rejection> {
+    let counted = |field: &str, wanted: usize, given: usize| {
+        let detail = format!("0 or {wanted} coefficients expected, {given} given");
+        Rejection::new(Code::OutOfRange, field, detail)
+    };
+    let mut made = (Distortion::None, "plumb_bob");
+    if !wire.plumb_bob.is_empty() {
+        let k = wire.plumb_bob.as_slice().try_into();
+        made.0 = Distortion::PlumbBob(k.map_err(|_size| counted(made.1, 5, wire.plumb_bob.len()))?);
+    }
+    for (field, given) in
+        [("rational_polynomial", &wire.rational_polynomial), ("equidistant", &wire.equidistant)]
+    {
+        if given.is_empty() {
+            continue;
+        }
+        if made.0 != Distortion::None {
+            let detail = format!("{} is given as well; a camera has one lens model", made.1);
+            return Err(Rejection::new(Code::OutOfRange, field, detail));
+        }
+        let k = given.as_slice();
+        let distortion = if field == "equidistant" {
+            k.try_into().map(Distortion::Equidistant).map_err(|_size| counted(field, 4, k.len()))?
+        } else {
+            k.try_into().map(Distortion::RationalPolynomial).map_err(|_size| counted(field, 8, k.len()))?
+        };
+        made = (distortion, field);
+    }
+    Ok(made)
+}
+
 /// The wire form of a camera.
 pub fn intrinsics_wire(camera: &Intrinsics) -> v1::Intrinsics {
-    let plumb_bob = match camera.distortion {
-        Distortion::None => Vec::new(),
-        Distortion::PlumbBob(k) => k.to_vec(),
-    };
-    v1::Intrinsics {
+    let mut made = v1::Intrinsics {
         fx_px: camera.fx_px,
         fy_px: camera.fy_px,
         cx_px: camera.cx_px,
         cy_px: camera.cy_px,
-        plumb_bob,
+        ..v1::Intrinsics::default()
+    };
+    let k = camera.distortion.coefficients().to_vec();
+    match camera.distortion {
+        Distortion::None => {}
+        Distortion::PlumbBob(_) => made.plumb_bob = k,
+        Distortion::RationalPolynomial(_) => made.rational_polynomial = k,
+        Distortion::Equidistant(_) => made.equidistant = k,
     }
+    made
 }
 
 #[cfg(test)]
@@ -166,7 +195,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn camera() -> v1::Intrinsics {
-        v1::Intrinsics { fx_px: 700.0, fy_px: 710.0, cx_px: 320.0, cy_px: 240.0, plumb_bob: vec![] }
+        v1::Intrinsics { fx_px: 700.0, fy_px: 710.0, cx_px: 320.0, cy_px: 240.0, ..v1::Intrinsics::default() }
     }
 
     #[test]
@@ -174,6 +203,12 @@ mod tests {
         let mut wire = camera();
         assert_eq!(intrinsics_wire(&intrinsics(&wire).unwrap()), wire);
         wire.plumb_bob = vec![0.1, -0.2, 0.001, 0.002, 0.03];
+        assert_eq!(intrinsics_wire(&intrinsics(&wire).unwrap()), wire);
+        wire = v1::Intrinsics { rational_polynomial: vec![0.1; 8], ..camera() };
+        assert_eq!(intrinsics(&wire).unwrap().distortion, Distortion::RationalPolynomial([0.1; 8]));
+        assert_eq!(intrinsics_wire(&intrinsics(&wire).unwrap()), wire);
+        wire = v1::Intrinsics { equidistant: vec![0.1; 4], ..camera() };
+        assert_eq!(intrinsics(&wire).unwrap().distortion, Distortion::Equidistant([0.1; 4]));
         assert_eq!(intrinsics_wire(&intrinsics(&wire).unwrap()), wire);
     }
 
@@ -191,6 +226,12 @@ mod tests {
         assert_eq!(refused(|c| c.cy_px = 1e39), (Code::OutOfRange, "cy_px".into()));
         assert_eq!(refused(|c| c.plumb_bob = vec![0.0; 4]), (Code::OutOfRange, "plumb_bob".into()));
         assert_eq!(refused(|c| c.plumb_bob = vec![f64::NAN; 5]), (Code::NotFinite, "plumb_bob".into()));
+        let (rational, equidistant) = ("rational_polynomial".to_owned(), "equidistant".to_owned());
+        assert_eq!(refused(|c| c.rational_polynomial = vec![0.0; 5]), (Code::OutOfRange, rational.clone()));
+        assert_eq!(refused(|c| c.rational_polynomial = vec![101.0; 8]), (Code::OutOfRange, rational));
+        assert_eq!(refused(|c| c.equidistant = vec![0.0; 5]), (Code::OutOfRange, equidistant.clone()));
+        let two = |c: &mut v1::Intrinsics| (c.plumb_bob, c.equidistant) = (vec![0.0; 5], vec![0.1; 4]);
+        assert_eq!(refused(two), (Code::OutOfRange, equidistant));
     }
 
     #[test]

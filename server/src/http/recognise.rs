@@ -29,7 +29,7 @@ struct PhotographForm {
     /// PNG or JPEG.
     #[schema(value_type = String, format = Binary)]
     image: Vec<u8>,
-    /// JSON: `fx_px`, `fy_px`, `cx_px`, `cy_px` and optionally `plumb_bob` (k1, k2, p1, p2, k3). Without it there is
+    /// JSON: `fx_px`, `fy_px`, `cx_px`, `cy_px` and optionally a lens: `plumb_bob` (5 numbers), `rational_polynomial` (8) or `equidistant` (4). Without it there is
     /// recognition but no pose.
     intrinsics: Option<String>,
 }

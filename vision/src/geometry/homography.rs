@@ -38,14 +38,10 @@ impl Homography {
         let mut a = SMatrix::<f64, 8, 8>::zeros();
         let mut b = SVector::<f64, 8>::zeros();
         for i in 0..4 {
-            let (x, y) = (from_points[i].x, from_points[i].y);
-            let (u, v) = (to_points[i].x, to_points[i].y);
-            let rows =
-                [[x, y, 1.0, 0.0, 0.0, 0.0, -u * x, -u * y], [0.0, 0.0, 0.0, x, y, 1.0, -v * x, -v * y]];
-            for (j, row) in rows.iter().enumerate() {
-                a.row_mut(2 * i + j).copy_from_slice(row);
+            for (j, row) in rows(&from_points[i], &to_points[i]).iter().enumerate() {
+                a.set_row(2 * i + j, &row.transpose());
             }
-            (b[2 * i], b[2 * i + 1]) = (u, v);
+            (b[2 * i], b[2 * i + 1]) = (to_points[i].x, to_points[i].y);
         }
         let h = a.full_piv_lu().solve(&b).ok_or(HomographyError::Degenerate)?;
         let normal = Matrix3::new(h[0], h[1], h[2], h[3], h[4], h[5], h[6], h[7], 1.0);
@@ -57,6 +53,36 @@ impl Homography {
             0 if from.iter().all(|p| map.denominator(p) < 0.0) => Ok(Self(-map.0)),
             _ => Err(HomographyError::Horizon),
         }
+    }
+
+    /// The map that takes `from[i]` nearly to `to[i]` for four points or more: least squares of the algebraic error on
+    /// normalised points. A start for something better; four points it meets exactly.
+    pub fn fit(from: &[Point2<f64>], to: &[Point2<f64>]) -> Result<Self, HomographyError> {
+        if let (&[a, b, c, d], &[p, q, r, s]) = (from, to) {
+            return Self::from_points(&[a, b, c, d], &[p, q, r, s]);
+        }
+        if from.len() < 4 || from.len() != to.len() {
+            return Err(HomographyError::Degenerate);
+        }
+        let (from_normal, from_points) = normalise_all(from).ok_or(HomographyError::Degenerate)?;
+        let (to_normal, to_points) = normalise_all(to).ok_or(HomographyError::Degenerate)?;
+        let mut a = SMatrix::<f64, 8, 8>::zeros();
+        let mut b = SVector::<f64, 8>::zeros();
+        for (p, q) in from_points.iter().zip(&to_points) {
+            for (row, w) in rows(p, q).iter().zip([q.x, q.y]) {
+                a += row * row.transpose();
+                b += row * w;
+            }
+        }
+        let h = a.cholesky().ok_or(HomographyError::Degenerate)?.solve(&b);
+        let normal = Matrix3::new(h[0], h[1], h[2], h[3], h[4], h[5], h[6], h[7], 1.0);
+        let back = to_normal.try_inverse().ok_or(HomographyError::Degenerate)?;
+        let map = Self::from_matrix(back * normal * from_normal).ok_or(HomographyError::Degenerate)?;
+        if from.iter().all(|p| map.denominator(p) > 0.0) {
+            return Ok(map);
+        }
+        let behind = from.iter().all(|p| map.denominator(p) < 0.0);
+        if behind { Ok(Self(-map.0)) } else { Err(HomographyError::Horizon) }
     }
 
     /// `image_from_icon` for an icon of `size` x `size` pixels: icon corners (-1/2, -1/2), (size - 1/2, -1/2) ... go
@@ -96,16 +122,31 @@ impl Homography {
     }
 }
 
+/// The two equations of a point pair, for a last entry of 1.
+fn rows(p: &Point2<f64>, q: &Point2<f64>) -> [SVector<f64, 8>; 2] {
+    let (x, y, u, v) = (p.x, p.y, q.x, q.y);
+    [
+        SVector::from([x, y, 1.0, 0.0, 0.0, 0.0, -u * x, -u * y]),
+        SVector::from([0.0, 0.0, 0.0, x, y, 1.0, -v * x, -v * y]),
+    ]
+}
+
 /// Hartley's normalisation: centroid to 0, mean distance to sqrt 2.
 fn normalise(points: &[Point2<f64>; 4]) -> Option<(Matrix3<f64>, [Point2<f64>; 4])> {
-    let centre = points.iter().fold(Point2::origin(), |m: Point2<f64>, p| m + p.coords * 0.25);
-    let mean = points.iter().map(|p| (p - centre).norm()).sum::<f64>() / 4.0;
+    let (matrix, scaled) = normalise_all(points)?;
+    Some((matrix, scaled.try_into().ok()?))
+}
+
+fn normalise_all(points: &[Point2<f64>]) -> Option<(Matrix3<f64>, Vec<Point2<f64>>)> {
+    let share = 1.0 / points.len() as f64;
+    let centre = points.iter().fold(Point2::origin(), |m: Point2<f64>, p| m + p.coords * share);
+    let mean = points.iter().map(|p| (p - centre).norm()).sum::<f64>() * share;
     if !(mean.is_finite() && mean > 0.0) {
         return None;
     }
     let s = std::f64::consts::SQRT_2 / mean;
     let matrix = Matrix3::new(s, 0.0, -s * centre.x, 0.0, s, -s * centre.y, 0.0, 0.0, 1.0);
-    Some((matrix, points.map(|p| Point2::from((p - centre) * s))))
+    Some((matrix, points.iter().map(|p| Point2::from((p - centre) * s)).collect()))
 }
 
 #[cfg(test)]
@@ -135,6 +176,21 @@ mod tests {
         let oracle = unit_square_to_quad(&quad);
         assert!((h.matrix() - oracle / oracle.norm()).norm() < 1e-12);
         assert!((h.matrix().norm() - 1.0).abs() < 1e-14);
+    }
+
+    #[test]
+    fn many_points_of_one_plane_give_its_map() {
+        let truth =
+            Homography::from_matrix(Matrix3::new(0.9, 0.1, 30.0, -0.2, 1.1, 12.0, 3e-4, -2e-4, 1.0)).unwrap();
+        let grid: Vec<_> =
+            (0..30).map(|i| Point2::new(f64::from(i % 6) * 40.0, f64::from(i / 6) * 30.0)).collect();
+        let seen: Vec<_> = grid.iter().map(|p| truth.apply(p)).collect();
+        let fitted = Homography::fit(&grid, &seen).unwrap();
+        assert!((fitted.matrix() - truth.matrix()).norm() < 1e-9);
+        // Four points: the exact map; fewer or unequal lists: none.
+        assert_eq!(Homography::fit(&grid[..3], &seen[..3]), Err(HomographyError::Degenerate));
+        assert_eq!(Homography::fit(&grid[..5], &seen[..6]), Err(HomographyError::Degenerate));
+        assert_eq!(Homography::fit(&grid[..6], &seen[..6]), Err(HomographyError::Degenerate), "one row");
     }
 
     #[test]

@@ -14,7 +14,7 @@ use crate::{
     frame::{Distortion, FrameError, Intrinsics},
     geometry::homography::Homography,
 };
-use nalgebra::{Isometry3, Matrix2, Matrix3, Matrix6, Point2, Rotation3, UnitQuaternion, Vector2};
+use nalgebra::{Isometry3, Matrix2, Matrix3, Matrix6, Point2, Rotation3, UnitQuaternion};
 
 /// Width and height of a landmark, in metres.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -207,33 +207,22 @@ pub fn straightened(
 }
 
 /// Symmetric, with both standard deviations in range.
-fn is_corner_covariance(s: &Matrix2<f64>) -> bool {
+pub(super) fn is_corner_covariance(s: &Matrix2<f64>) -> bool {
     let symmetric = (s.m12 - s.m21).abs() <= 1e-6 * (s.m11 + s.m22);
     let (mean, spread) = (0.5 * (s.m11 + s.m22), (0.5 * (s.m11 - s.m22)).hypot(s.m12));
     // NaN fails every comparison.
     symmetric && mean - spread >= MIN_CORNER_SIGMA_PX.powi(2) && mean + spread <= MAX_CORNER_SIGMA_PX.powi(2)
 }
 
-/// The undistorted point and its covariance, by central differences over half a pixel.
+/// The undistorted point and its covariance.
 fn undistorted(
     camera: &Intrinsics,
     p: &Point2<f64>,
     s: &Matrix2<f64>,
 ) -> Option<(Point2<f64>, Matrix2<f64>)> {
-    /// Largest error of the round trip: the fixed point has then converged.
-    const ROUND_TRIP_PX: f64 = 1e-3;
-    let straight = camera.undistort(p);
-    let ray = nalgebra::Vector3::new(
-        (straight.x - camera.cx_px) / camera.fx_px,
-        (straight.y - camera.cy_px) / camera.fy_px,
-        1.0,
-    );
-    let back = camera.project(&ray);
-    let along = |d: Vector2<f64>| camera.undistort(&(p + d)) - camera.undistort(&(p - d));
-    let j = Matrix2::from_columns(&[along(Vector2::new(0.5, 0.0)), along(Vector2::new(0.0, 0.5))]);
+    let (straight, j) = camera.undistort_with(p)?;
     let covariance = j * s * j.transpose();
-    let good = (back - p).norm() < ROUND_TRIP_PX && is_corner_covariance(&covariance);
-    good.then_some((straight, covariance))
+    is_corner_covariance(&covariance).then_some((straight, covariance))
 }
 
 /// Eq. (2): `[r2 r3 T] = lambda K^-1 H`, then the nearest rotation (method 13.1, 13.2).
@@ -242,7 +231,11 @@ fn linear_pose(measured: &Measured) -> Option<Isometry3<f64>> {
     let ray = |p: &Point2<f64>| Point2::new((p.x - c.cx_px) / c.fx_px, (p.y - c.cy_px) / c.fy_px);
     let plane = corner_points(&measured.size).map(|p| Point2::new(p.y, p.z));
     let rays = measured.corners_px.points().each_ref().map(ray);
-    let b = *Homography::from_points(&plane, &rays).ok()?.matrix();
+    pose_of_columns(Homography::from_points(&plane, &rays).ok()?.matrix())
+}
+
+/// The pose behind `B = K^-1 H`, H from the plane's (y, z, 1), positive over its points.
+pub(super) fn pose_of_columns(b: &Matrix3<f64>) -> Option<Isometry3<f64>> {
     let (b1, b2, b3) = (b.column(0), b.column(1), b.column(2));
     let scale = (b1.norm() * b2.norm()).sqrt();
     let lambda = if b3.z < 0.0 { -1.0 } else { 1.0 } / scale;
@@ -265,12 +258,12 @@ fn nearest_rotation(raw: &Matrix3<f64>) -> Option<Rotation3<f64>> {
 }
 
 /// The viewer is on the front side: `r1 . T < 0`.
-fn faces_camera(pose: &Isometry3<f64>) -> bool {
+pub(super) fn faces_camera(pose: &Isometry3<f64>) -> bool {
     (pose.rotation * nalgebra::Vector3::x()).dot(&pose.translation.vector) < 0.0
 }
 
 /// The pose with its normal mirrored about the line of sight (method 13.4).
-fn mirrored(pose: &Isometry3<f64>) -> Isometry3<f64> {
+pub(super) fn mirrored(pose: &Isometry3<f64>) -> Isometry3<f64> {
     let v = pose.translation.vector.normalize();
     let mirror = Matrix3::identity() - 2.0 * v * v.transpose();
     let flip = Matrix3::from_diagonal(&nalgebra::Vector3::new(-1.0, 1.0, 1.0));

@@ -104,7 +104,7 @@ impl Floor {
 
     /// The segment on the floor, if it may lie there.
     pub(super) fn line(&self, index: usize, segment: &EdgeSegment, p: &TilingParams) -> Option<FloorLine> {
-        let ends = [segment.p_px, segment.q_px].map(|e| self.camera.undistort(&e));
+        let ends = [self.camera.undistort(&segment.p_px)?, self.camera.undistort(&segment.q_px)?];
         let middle_px = nalgebra::center(&ends[0], &ends[1]);
         let (image_direction, gravity) = (ends[1] - ends[0], self.gravity_at(&middle_px));
         let cos = image_direction.dot(&gravity).abs() / (image_direction.norm() * gravity.norm());

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::{learn::random::Random, localise::reproject::corner_points};
-use nalgebra::{Vector3, Vector6};
+use nalgebra::{Vector2, Vector3, Vector6};
 
 const SIZE: LandmarkSize = LandmarkSize { width_m: 0.6, height_m: 0.84 };
 
@@ -69,11 +69,16 @@ fn golden_frontal_camera() {
 
 #[test]
 fn exact_corners_give_exact_poses() {
-    let bent = Distortion::PlumbBob([-0.25, 0.08, 8e-4, -6e-4, -0.01]);
+    let lenses = [
+        Distortion::None,
+        Distortion::PlumbBob([-0.25, 0.08, 8e-4, -6e-4, -0.01]),
+        Distortion::RationalPolynomial([0.9, 0.3, 2e-4, -3e-4, 0.02, 1.2, 0.5, 0.06]),
+        Distortion::Equidistant([-0.02, 0.006, -0.004, 0.001]),
+    ];
     let mut random = Random::new(7);
     let mut tried = 0;
     while tried < 500 {
-        let distortion = if tried % 2 == 0 { Distortion::None } else { bent };
+        let distortion = lenses[tried % 4];
         let camera = Intrinsics::new(700.0, 690.0, 320.0, 240.0, distortion).unwrap();
         let (d, psi) = (random.range(1.0, 8.0), random.range(-75.0, 75.0));
         let turn = Vector3::new(random.range(-0.2, 0.2), random.range(-0.2, 0.2), random.range(-0.3, 0.3));
@@ -216,7 +221,7 @@ fn unusable_input_is_refused_by_name() {
     assert!(pose(isotropic(f64::NAN), SIZE, &camera()).is_err());
     let blind = Intrinsics { fx_px: f64::NAN, ..camera() };
     assert!(matches!(pose(isotropic(0.5), SIZE, &blind), Err(PoseError::Camera(_))));
-    let folded = Intrinsics { distortion: Distortion::PlumbBob([50.0, 0.0, 0.0, 0.0, 0.0]), ..camera() };
+    let folded = Intrinsics { distortion: Distortion::PlumbBob([-50.0, 0.0, 0.0, 0.0, 0.0]), ..camera() };
     assert_eq!(pose(isotropic(0.5), SIZE, &folded), Err(PoseError::Distortion));
     let far = |x| Corners::try_from([[0.0, 0.0], [x, 0.0], [x, 9.0], [0.0, 9.0]]).unwrap();
     let result = landmark_pose(&far(MAX_CORNER_PX * 1.01), &isotropic(0.5), SIZE, &camera());
