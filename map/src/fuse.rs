@@ -77,7 +77,7 @@ impl Default for FuseParams {
 impl FuseParams {
     /// Covariance of a motion, in the frame where it starts. Linear in its length, so that cutting a motion in pieces
     /// changes nothing.
-    fn motion_noise(&self, motion: &Pose2) -> Matrix3<f64> {
+    pub fn motion_noise(&self, motion: &Pose2) -> Matrix3<f64> {
         let (metres, radians) = (motion.position().norm(), motion.theta_rad.abs());
         let turn = self.turn_rad.powi(2) * metres + self.turn_per_turn_rad.powi(2) * radians;
         let (along, across) = (self.along_m.powi(2) * metres, self.across_m.powi(2) * metres);

@@ -8,6 +8,7 @@ mod planar;
 mod posterior;
 pub(crate) mod predict;
 mod solve;
+pub mod watch;
 
 use crate::{
     check::{self, OutOfRange},

@@ -1,8 +1,8 @@
-//! Where a landmark hangs: an upright rectangle on a wall, with the covariance of its place and size (method 11).
+//! Where a landmark hangs: a rectangle on a wall or under a ceiling, with the covariance of its place and size (method 11).
 
 use crate::check::{self, MAX_COORDINATE_M, OutOfRange};
 use nalgebra::{Isometry3, Matrix6, Translation3, UnitQuaternion, Vector3, Vector6};
-use std::f64::consts::TAU;
+use std::f64::consts::{FRAC_PI_2, TAU};
 use vision::localise::pose::LandmarkSize;
 
 /// Largest height of a landmark's centre above or below the floor.
@@ -19,10 +19,12 @@ pub struct LandmarkPlace {
     pub y_m: f64,
     /// Centre above the floor.
     pub z_m: f64,
-    /// Direction of the outward normal on the floor.
+    /// Direction of the outward normal on the floor; under a ceiling, where the top of the landmark points.
     pub theta_rad: f64,
     /// Turn about the outward normal; 0 when its sides are vertical.
     pub roll_rad: f64,
+    /// Turn of the outward normal from level downwards: 0 on a wall, pi/2 under a ceiling.
+    pub tilt_rad: f64,
     /// Width and height.
     pub size: LandmarkSize,
     /// Over (x, y, theta, z, width, height), in this order.
@@ -61,7 +63,7 @@ impl LandmarkPlace {
         let (p, t, s) = (sigmas.position_m.powi(2), sigmas.theta_rad.powi(2), sigmas.size_m.powi(2));
         let covariance = Matrix6::from_diagonal(&Vector6::new(p, p, t, p, s, s));
         let (x_m, y_m, z_m) = (centre_m.x, centre_m.y, centre_m.z);
-        let made = Self { x_m, y_m, z_m, theta_rad, roll_rad: 0.0, size, covariance };
+        let made = Self { x_m, y_m, z_m, theta_rad, roll_rad: 0.0, tilt_rad: 0.0, size, covariance };
         made.check()?;
         Ok(made)
     }
@@ -73,6 +75,7 @@ impl LandmarkPlace {
         check::within("z_m", self.z_m, -MAX_HEIGHT_M, MAX_HEIGHT_M)?;
         check::within("theta_rad", self.theta_rad, -TAU, TAU)?;
         check::within("roll_rad", self.roll_rad, -MAX_ROLL_RAD, MAX_ROLL_RAD)?;
+        check::within("tilt_rad", self.tilt_rad, -FRAC_PI_2, FRAC_PI_2)?;
         let (low, high) = (LandmarkSize::MIN_M, LandmarkSize::MAX_M);
         check::within("width_m", self.size.width_m, low, high)?;
         check::within("height_m", self.size.height_m, low, high)?;
@@ -82,8 +85,9 @@ impl LandmarkPlace {
     /// Landmark coordinates (x outward normal, y the viewer's right, z up) to map coordinates.
     pub fn map_from_landmark(&self) -> Isometry3<f64> {
         let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), self.theta_rad);
+        let tilt = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), self.tilt_rad);
         let roll = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), self.roll_rad);
-        Isometry3::from_parts(Translation3::new(self.x_m, self.y_m, self.z_m), turn * roll)
+        Isometry3::from_parts(Translation3::new(self.x_m, self.y_m, self.z_m), turn * tilt * roll)
     }
 }
 
@@ -114,6 +118,23 @@ mod tests {
         assert!((normal - Vector3::new(0.4_f64.cos(), 0.4_f64.sin(), 0.0)).norm() < 1e-12);
         let up = place.map_from_landmark() * Vector3::z();
         assert!((up.z - 0.1_f64.cos()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_viewer_below_sees_a_ceiling_right() {
+        // The top points north; a viewer below who looks up with the feet to the south has east on the left.
+        let mut place =
+            LandmarkPlace::by_hand(Vector3::new(0.0, 0.0, 2.5), FRAC_PI_2, SIZE, PlaceSigmas::default())
+                .unwrap();
+        place.tilt_rad = FRAC_PI_2;
+        place.check().unwrap();
+        let at = |y, z| place.map_from_landmark() * Point3::new(0.0, y, z);
+        assert!((at(0.0, 1.0) - Point3::new(0.0, 1.0, 2.5)).norm() < 1e-12);
+        assert!((at(1.0, 0.0) - Point3::new(-1.0, 0.0, 2.5)).norm() < 1e-12);
+        let normal = place.map_from_landmark() * Vector3::x();
+        assert!((normal + Vector3::z()).norm() < 1e-12);
+        place.tilt_rad = 1.6;
+        assert_eq!(place.check().unwrap_err().field, "tilt_rad");
     }
 
     #[test]

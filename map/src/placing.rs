@@ -4,7 +4,9 @@
 //! covariance, or why the thing does not hang on a wall. Recognition is not its business: all views must be of one
 //! thing.
 
+mod ceiling;
 mod rays;
+pub use ceiling::{Ceiling, ViewOnCeiling, ceiling_placement, view_on_ceiling};
 pub use rays::MIN_COS_INCIDENCE;
 
 use crate::{
@@ -69,13 +71,19 @@ pub enum PlacingError {
     /// A nearer wall is met by some rays only.
     #[error("the quad reaches over the end of a wall")]
     Straddles,
-    /// The hits are not an upright rectangle of possible size.
-    #[error("not an upright rectangle on the wall: rms {rms_m} m, roll {roll_rad} rad")]
+    /// The hits are not an upright rectangle of possible size: an open door, a board on an easel, another wall.
+    #[error("not on this wall: no upright rectangle (rms {rms_m:.3} m, roll {roll_rad:.3} rad)")]
     NotOnWall {
         /// Distance of the hits from the rectangle.
         rms_m: f64,
         /// Its roll.
         roll_rad: f64,
+    },
+    /// The hits are no rectangle of possible size under this ceiling.
+    #[error("not under this ceiling: no rectangle (rms {rms_m:.3} m)")]
+    NotOnCeiling {
+        /// Distance of the hits from the rectangle.
+        rms_m: f64,
     },
     /// No view given, or they lie on different walls.
     #[error("the views do not share a wall")]
@@ -143,13 +151,17 @@ pub fn view_on_wall(
     walls: &[LaserSegment],
     p: &PlacingParams,
 ) -> Result<ViewOnWall, PlacingError> {
+    let sighting = checked(view)?;
+    let (wall, hits) = nearest(&sighting, walls, p)?;
+    fit(&sighting, wall, rays::plane(&walls[wall]).0, &hits, p)
+}
+
+fn checked<'a>(view: &PlacingView<'a>) -> Result<WallSighting<'a>, PlacingError> {
     view.map_from_robot.check()?;
     view.mounting.check()?;
     let (corners_px, covariance_px2, camera) = straightened(view.corners, view.covariance_px2, view.camera)?;
     let (map_from_robot, mounting) = (view.map_from_robot, view.mounting);
-    let sighting = WallSighting { corners_px, covariance_px2, camera, map_from_robot, mounting };
-    let (wall, hits) = nearest(&sighting, walls, p)?;
-    fit(&sighting, wall, rays::plane(&walls[wall]).0, &hits, p)
+    Ok(WallSighting { corners_px, covariance_px2, camera, map_from_robot, mounting })
 }
 
 /// The nearest wall that all four rays meet. Refused when the quad reaches over the end of a wall to one behind it: a
@@ -373,6 +385,7 @@ fn fused(views: &[&ViewOnWall], wall: &LaserSegment, p: &PlacingParams) -> Optio
         z_m: rectangle[1],
         theta_rad: theta,
         roll_rad,
+        tilt_rad: 0.0,
         size: LandmarkSize { width_m: rectangle[2], height_m: rectangle[3] },
         covariance: 0.5 * (covariance + covariance.transpose()),
     })

@@ -8,6 +8,7 @@ pub mod engine;
 pub mod bus;
 mod store;
 mod jobs;
+mod calibrating;
 mod http;
 mod server;
 pub mod cli;

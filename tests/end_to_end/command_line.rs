@@ -22,7 +22,7 @@ use vision::{detect::quads::Corners, geometry::polygon};
 const LONGEST: Duration = Duration::from_mins(2);
 
 /// Options that each command must name in its help.
-const OPTIONS: [(&str, &[&str]); 25] = [
+const OPTIONS: [(&str, &[&str]); 29] = [
     ("demo", &["--robots", "--rate-hz", "--legs", "--seed", "--http", "--data", "--stay", "--json"]),
     ("serve", &["--config", "--data", "--http", "--zenoh", "--fleet", "--workers", "--insecure"]),
     (
@@ -92,7 +92,26 @@ const OPTIONS: [(&str, &[&str]); 25] = [
     ("evaluate occlusion", &["--landmarks", "--views", "--detector", "--plot"]),
     ("evaluate discrimination", &["--landmarks", "--strangers", "--views", "--own-views", "--plot"]),
     ("evaluate lookalikes", &["--pairs", "--views", "--photographs"]),
+    (
+        "calibrate",
+        &[
+            "--size",
+            "--corners",
+            "--radial",
+            "--level",
+            "--height-m",
+            "--unknown-aspect",
+            "--json",
+            "[IMAGES]...",
+        ],
+    ),
     ("evaluate confidence", &["--quads", "--set", "--plot", "--json"]),
+    (
+        "evaluate calibration",
+        &["--views", "--trials", "--corner-noise-px", "--seed", "--python", "--json", "--plot", "[SETS]..."],
+    ),
+    ("evaluate placement", &["--rooms", "--views", "--corridors", "--seed", "--json"]),
+    ("evaluate pose", &["--draws", "--drives", "--seed", "--no-peers", "--python", "--json"]),
     ("fit confidence", &["--quads", "--set", "--photographs", "--rust"]),
     (
         "fit search",

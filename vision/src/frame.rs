@@ -269,6 +269,22 @@ mod tests {
     }
 
     #[test]
+    fn a_short_side_is_hardly_bent() {
+        // What the search for quads must bear: how far a vertical side at the right edge of the image leaves its chord.
+        let lens = Distortion::PlumbBob([-0.28, 0.09, 0.0, 0.0, 0.0]);
+        let camera = Intrinsics::new(520.0, 520.0, 319.5, 239.5, lens).unwrap();
+        let middle = camera.undistort(&Point2::new(619.5, 239.5)).unwrap();
+        for (length, arrow) in [(100.0, 0.8), (200.0, 3.1)] {
+            let end = camera.undistort(&Point2::new(619.5, 239.5 + 0.5 * length)).unwrap();
+            // The straight side through the middle, as far up as the end.
+            let x = (middle.x - 319.5) / 520.0;
+            let y = (end.y - 239.5) / 520.0;
+            let bent = 619.5 - camera.project(&Vector3::new(x, y, 1.0)).x;
+            assert!((bent - arrow).abs() < 0.1, "{length}: {bent}");
+        }
+    }
+
+    #[test]
     fn derivatives_are_the_finite_differences() {
         for camera in lenses() {
             let p = Vector3::new(-0.5, 0.35, 1.2);

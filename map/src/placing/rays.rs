@@ -1,4 +1,4 @@
-//! Where the rays of four corners meet a wall, with the derivatives by all that is uncertain (method 11.3).
+//! Where the rays of four corners meet a wall or a ceiling, with the derivatives by all that is uncertain (method 11.3).
 
 use super::WallSighting;
 use crate::segments::LaserSegment;
@@ -31,8 +31,33 @@ pub(super) fn plane(wall: &LaserSegment) -> (f64, f64) {
     (f.y.atan2(f.x), f.dot(&wall.a.coords))
 }
 
-/// The hit of corner `i`; `None` when the ray goes away from the wall, grazes it, or comes from behind.
+/// A hit with the ray that made it.
+struct Cast {
+    hit: Hit,
+    ray: Vector3<f64>,
+    /// Normal times ray.
+    along: f64,
+}
+
+/// The hit of corner `i` on a wall; `None` when the ray goes away from the wall, grazes it, or comes from behind.
 pub(super) fn hit(view: &WallSighting<'_>, i: usize, (theta, r): (f64, f64)) -> Option<Hit> {
+    let Cast { mut hit, ray, along } = cast(view, i, &Vector3::new(theta.cos(), theta.sin(), 0.0), r)?;
+    let side = Vector3::new(-theta.sin(), theta.cos(), 0.0);
+    hit.by.set_column(WALL, &(-ray * (side.dot(&hit.point) / along)));
+    hit.by.set_column(WALL + 1, &(ray / along));
+    hit.by.iter().all(|v| v.is_finite()).then_some(hit)
+}
+
+/// The hit of corner `i` on the ceiling `height_m` high, its derivative by that height in column [`WALL`].
+pub(super) fn ceiling_hit(view: &WallSighting<'_>, i: usize, height_m: f64) -> Option<Hit> {
+    let Cast { mut hit, ray, along } = cast(view, i, &-Vector3::z(), -height_m)?;
+    hit.by.set_column(WALL, &(-ray / along));
+    hit.by.iter().all(|v| v.is_finite()).then_some(hit)
+}
+
+/// Where the ray of corner `i` meets the plane of facing normal `n` and offset `r`, with the derivatives by all but the
+/// plane.
+fn cast(view: &WallSighting<'_>, i: usize, n: &Vector3<f64>, r: f64) -> Option<Cast> {
     let robot = view.map_from_robot.pose.to_isometry3();
     let robot_turn = robot.rotation.to_rotation_matrix().into_inner();
     let camera = robot * view.mounting.robot_from_camera;
@@ -41,7 +66,6 @@ pub(super) fn hit(view: &WallSighting<'_>, i: usize, (theta, r): (f64, f64)) -> 
     let px = view.corners_px.points()[i];
     let ray = Vector3::new((px.x - k.cx_px) / k.fx_px, (px.y - k.cy_px) / k.fy_px, 1.0);
     let d = turn * ray;
-    let n = Vector3::new(theta.cos(), theta.sin(), 0.0);
     let along = n.dot(&d);
     // The camera stands on the free side: the ray runs against the facing normal.
     if -along / d.norm() <= MIN_COS_INCIDENCE || n.dot(&c) <= r {
@@ -61,11 +85,8 @@ pub(super) fn hit(view: &WallSighting<'_>, i: usize, (theta, r): (f64, f64)) -> 
     by.set_column(ROBOT + 2, &(by_turn * Vector3::z() + a * Vector3::z().cross(&arm)));
     by.fixed_columns_mut::<3>(MOUNTING).copy_from(&(by_turn * robot_turn));
     by.fixed_columns_mut::<3>(MOUNTING + 3).copy_from(&(a * robot_turn));
-    let side = Vector3::new(-theta.sin(), theta.cos(), 0.0);
-    by.set_column(WALL, &(-d * (side.dot(&point) / along)));
-    by.set_column(WALL + 1, &(d / along));
     let finite = point.iter().chain(by.iter()).all(|v| v.is_finite());
-    finite.then(|| Hit { point, distance_m: s * d.norm(), by })
+    finite.then(|| Cast { hit: Hit { point, distance_m: s * d.norm(), by }, ray: d, along })
 }
 
 /// Whether a hit lies on the wall's segment, lengthened by `margin_m` at both ends.

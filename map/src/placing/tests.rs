@@ -35,6 +35,7 @@ fn hung(wall: &LaserSegment, along_m: f64) -> LandmarkPlace {
         z_m: 1.5,
         theta_rad: f.y.atan2(f.x),
         roll_rad: 0.0,
+        tilt_rad: 0.0,
         size: SIZE,
         covariance: Matrix6::zeros(),
     }

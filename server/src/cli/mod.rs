@@ -1,6 +1,7 @@
 //! The `waymark` command line: one file per command.
 
 mod bench;
+mod calibrate;
 mod clock;
 mod demo;
 mod detect;
@@ -49,6 +50,15 @@ enum Command {
     ///   waymark detect photographs/ --json --min-score 0.8 > quads.jsonl
     #[command(verbatim_doc_comment)]
     Detect(detect::Args),
+    /// A camera's focal length, principal point and distortion from pictures of one flat thing; no server needed.
+    ///
+    /// Five to ten pictures of one poster or board from different sides, each of which shows it as its largest quad; at
+    /// least three of the sides must differ by more than 15 degrees. Pictures that do not fit the others are left out
+    /// and named. For example:
+    ///   waymark calibrate pictures/ --size 0.60x0.84
+    ///   waymark calibrate --corners corners.json --size 1x1 --radial 0 --json
+    #[command(verbatim_doc_comment)]
+    Calibrate(calibrate::Args),
     /// Make and list the maps of a running server.
     #[command(subcommand)]
     Map(teach::MapCommand),
@@ -83,6 +93,7 @@ pub fn main() -> ExitCode {
         Command::Demo(args) => run(demo::run(args)),
         Command::Serve(serve) => run(serve.clone().run()).map(|()| ExitCode::SUCCESS),
         Command::Detect(args) => detect::run(args),
+        Command::Calibrate(args) => calibrate::run(args).map(|()| ExitCode::SUCCESS),
         Command::Map(command) => run(teach::map(command)).map(|()| ExitCode::SUCCESS),
         Command::Robot(command) => run(teach::robot(command)).map(|()| ExitCode::SUCCESS),
         Command::Learn(args) => run(teach::learn(args)),

@@ -16,7 +16,7 @@ use std::{
 };
 use tokio::sync::broadcast;
 
-use super::slots::SlotKey;
+use super::{cameras::Cameras, slots::SlotKey};
 
 /// Cameras whose last frame is kept; the one longest without a frame gives way.
 pub const MAX_CAMERAS: usize = 32;
@@ -184,15 +184,25 @@ struct State {
 pub struct LiveHub {
     state: Mutex<State>,
     events: broadcast::Sender<Arc<LiveEvent>>,
+    watched: Cameras,
 }
 
 impl Default for LiveHub {
     fn default() -> Self {
-        Self { state: Mutex::default(), events: broadcast::channel(EVENTS_KEPT).0 }
+        Self {
+            state: Mutex::default(),
+            events: broadcast::channel(EVENTS_KEPT).0,
+            watched: Cameras::default(),
+        }
     }
 }
 
 impl LiveHub {
+    /// What frames say of the cameras they come from.
+    pub fn watched(&self) -> &Cameras {
+        &self.watched
+    }
+
     /// Events from now on. A reader more than [`EVENTS_KEPT`] behind is told that it missed some.
     pub fn events(&self) -> broadcast::Receiver<Arc<LiveEvent>> {
         self.events.subscribe()

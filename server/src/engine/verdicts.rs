@@ -18,6 +18,7 @@ use std::{cell::RefCell, time::Instant};
 use vision::{
     detect::{Memory, detect_in},
     frame::{GrayImage, Intrinsics},
+    localise::pose::LandmarkPose,
     pipeline::{FrameFacts, Landmarks, NoPose, QuadFacts, analyse_quads},
     recognise::{LandmarkId, Recognition},
     trace::{Stage, Trace},
@@ -138,6 +139,15 @@ fn name(map: &MapSnapshot, id: LandmarkId) -> String {
     map.landmarks.get(&id).map_or_else(|| format!("#{}", id.0), |info| info.name.clone())
 }
 
+/// The landmarks that were recognised without doubt, with their poses.
+pub fn recognised(facts: &FrameFacts) -> Vec<(LandmarkId, &LandmarkPose)> {
+    let unique = |q: &QuadFacts| match q.verdict.as_ref()?.recognition {
+        Recognition::Unique(id) => Some(id),
+        Recognition::Unknown | Recognition::Ambiguous(_) => None,
+    };
+    facts.quads.iter().filter_map(|q| Some((unique(q)?, q.pose.as_ref().ok()?))).collect()
+}
+
 /// The robot's pose by the landmarks seen, or the word that says why not: empty when no landmark was recognised.
 pub fn robot_fix(
     facts: &FrameFacts,
@@ -145,12 +155,7 @@ pub fn robot_fix(
     mounting: Option<&Mounting>,
     prior: Option<&Pose2Covariance>,
 ) -> Result<Fix, &'static str> {
-    let unique = |q: &QuadFacts| match q.verdict.as_ref()?.recognition {
-        Recognition::Unique(id) => Some(id),
-        Recognition::Unknown | Recognition::Ambiguous(_) => None,
-    };
-    let posed: Vec<_> =
-        facts.quads.iter().filter_map(|q| Some((unique(q)?, q.pose.as_ref().ok()?))).collect();
+    let posed = recognised(facts);
     if posed.is_empty() {
         // The quads say why each has no pose.
         return Err("");

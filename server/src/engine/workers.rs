@@ -3,6 +3,7 @@
 //! and the worker goes on.
 
 use super::{
+    cameras::Look,
     decode::{ImageLimits, decode_frame},
     intake::{FrameJob, unknown_map},
     live::{LiveFrame, LiveHub},
@@ -141,6 +142,14 @@ impl Engine {
         let mut answer = verdicts::answer(&facts, &map);
         let fix = self.fix(key, frame, &facts, &map);
         verdicts::fill_fix(&mut answer, &fix, &map);
+        if let Some(intrinsics) = &frame.intrinsics {
+            let (seen, mounting) = (verdicts::recognised(&facts), frame.mounting.as_ref());
+            let image_px = [image.width() as u32, image.height() as u32];
+            let fix = fix.as_ref().map_err(|word| *word);
+            self.live
+                .watched()
+                .looked(key, &Look { intrinsics, image_px, seen: &seen, map: &map, mounting, fix });
+        }
         times.ended("localise");
         answer.timings = times.finish();
         Ok(Done { answer, fix: fix.ok().map(|fix| (map, fix)) })

@@ -18,6 +18,7 @@ mod resources;
 mod robots;
 mod router;
 mod upload;
+mod cameras;
 mod views;
 pub(crate) mod listen;
 

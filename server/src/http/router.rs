@@ -1,8 +1,8 @@
 //! Every route, with the layers around them and the OpenAPI document made from them.
 
 use super::{
-    App, Shared, error::ApiError, guard, health, landmarks, laser, learning, live, maps, pages, recognise,
-    robots, views,
+    App, Shared, cameras, error::ApiError, guard, health, landmarks, laser, learning, live, maps, pages,
+    recognise, robots, views,
 };
 use crate::config::Limits;
 use axum::{
@@ -38,6 +38,7 @@ fn api(limits: &Limits) -> OpenApiRouter<Shared> {
         .merge(learning::router())
         .merge(recognise::router(limits.upload_bytes))
         .merge(robots::router())
+        .merge(cameras::router())
         .merge(live::router())
         .merge(health::router())
 }

@@ -4,8 +4,10 @@
 //! Out: focal length, principal point, perhaps radial distortion, with covariance, and how well each view fits; or why
 //! the views do not determine them. The quads are found and named elsewhere.
 
+mod choose;
 mod linear;
 mod refine;
+pub use choose::{Chosen, LENS_GAIN, OUTLIER_PX, OUTLIER_SHARE, calibrate_choosing};
 
 use super::{
     pose::{LandmarkSize, MAX_CORNER_PX, is_corner_covariance},
@@ -254,14 +256,21 @@ pub fn calibrate(
         let seen: Vec<_> = v.seen_px.iter().map(|q| Point2::new(q.x, q.y / p.pixel_aspect)).collect();
         let h = Homography::fit(&v.plane_m, &seen);
         let h = h.map_err(|_horizon| CalibrateError::View { view, reason: "its points are degenerate" })?;
+        // z up becomes v down: from the front the orientation changes.
+        if h.matrix().determinant() >= 0.0 {
+            return Err(CalibrateError::View {
+                view,
+                reason: "it is seen from behind: its points run the other way round",
+            });
+        }
         homographies.push(*h.matrix());
     }
     let square = [size[0], size[1] / p.pixel_aspect];
     let (linear, sigmas) = start(&homographies, square, p);
     let guess = |f: f64| LinearCamera {
-        alpha_px: f * square[0],
-        u0_px: 0.5 * (square[0] - 1.0),
-        v0_px: 0.5 * (square[1] - 1.0),
+        alpha: f * square[0],
+        u0: 0.5 * (square[0] - 1.0),
+        v0: 0.5 * (square[1] - 1.0),
     };
     let [sigma_ratio, sigma_share] = sigmas;
     let starts: Vec<LinearCamera> = match linear {
@@ -288,7 +297,7 @@ pub fn calibrate(
     let undetermined = CalibrateError::Undetermined { sigma_ratio, sigma_share };
     let state = best.ok_or(undetermined.clone())?;
     let made = problem.summary(&state, p.refine).ok_or(undetermined)?;
-    finished(&state, made, linear.map(|l| l.alpha_px), (orientations, sigma_ratio), p)
+    finished(&state, made, linear.map(|l| l.alpha), (orientations, sigma_ratio), p)
 }
 
 /// The linear solution; an unknown constant height is searched.
@@ -322,8 +331,8 @@ fn settled(
 ) -> Option<State> {
     let poses = poses(homographies, camera)?;
     let mut numbers = [0.0; CAMERA];
-    (numbers[ALPHA], numbers[PIXEL_ASPECT]) = (camera.alpha_px, p.pixel_aspect);
-    (numbers[U0], numbers[V0]) = (camera.u0_px, camera.v0_px * p.pixel_aspect);
+    (numbers[ALPHA], numbers[PIXEL_ASPECT]) = (camera.alpha, p.pixel_aspect);
+    (numbers[U0], numbers[V0]) = (camera.u0, camera.v0 * p.pixel_aspect);
     let mut state = State { camera: numbers, poses };
     problem.fit_poster(&mut state, homographies);
     state = problem.posed(state)?;
@@ -333,8 +342,7 @@ fn settled(
 
 /// Eq. (2) for every view; homographies and camera have square pixels.
 fn poses(homographies: &[Matrix3<f64>], camera: &LinearCamera) -> Option<Vec<Isometry3<f64>>> {
-    let k =
-        Matrix3::new(camera.alpha_px, 0.0, camera.u0_px, 0.0, camera.alpha_px, camera.v0_px, 0.0, 0.0, 1.0);
+    let k = Matrix3::new(camera.alpha, 0.0, camera.u0, 0.0, camera.alpha, camera.v0, 0.0, 0.0, 1.0);
     let inverse = k.try_inverse()?;
     homographies.iter().map(|h| super::pose::pose_of_columns(&(inverse * h))).collect()
 }

@@ -3,6 +3,7 @@
 mod pipeline;
 mod frames;
 mod peers;
+pub(crate) use peers::Python;
 mod detect;
 mod recognise;
 

@@ -33,7 +33,7 @@ struct Missing {
 
 /// A running Python program that answers line by line. It ends with this value.
 #[derive(Debug)]
-pub(super) struct Python {
+pub(crate) struct Python {
     child: Child,
     stdin: ChildStdin,
     lines: mpsc::Receiver<String>,
@@ -41,7 +41,7 @@ pub(super) struct Python {
 
 impl Python {
     /// Starts `program` with arguments; also its first line. The error says why there is none.
-    pub(super) fn start<T: DeserializeOwned>(
+    pub(crate) fn start<T: DeserializeOwned>(
         python: &Path,
         program: &str,
         args: &[PathBuf],
@@ -75,7 +75,7 @@ impl Python {
     }
 
     /// Says a line and waits for the answer.
-    pub(super) fn ask<T: DeserializeOwned>(&mut self, question: &str) -> Result<T, String> {
+    pub(crate) fn ask<T: DeserializeOwned>(&mut self, question: &str) -> Result<T, String> {
         writeln!(self.stdin, "{question}").map_err(|error| error.to_string())?;
         let line = self.line()?;
         serde_json::from_str(&line).map_err(|error| format!("{line}: {error}"))

@@ -116,7 +116,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<ExitCode> {
 }
 
 /// Folders are replaced by the pictures in them, in the order of their names.
-fn files(named: &[PathBuf]) -> anyhow::Result<Vec<PathBuf>> {
+pub(crate) fn files(named: &[PathBuf]) -> anyhow::Result<Vec<PathBuf>> {
     let mut all = Vec::new();
     for path in named {
         if !path.is_dir() {

@@ -6,7 +6,10 @@ pub(crate) mod rendered;
 pub(crate) mod reviewed;
 pub(crate) mod statistics;
 pub(crate) mod truth;
+pub(crate) mod calibration;
 pub(crate) mod detection;
+pub(crate) mod placement;
+pub(crate) mod pose;
 pub(crate) mod recognition;
 
 /// What to evaluate.
@@ -53,6 +56,23 @@ pub(crate) enum Command {
     Lookalikes(experiment::doubles::Args),
     /// Whether confidences keep their word: reliability diagram and expected calibration error.
     Confidence(experiment::confidence::Args),
+    /// Auto-calibration of a camera from views of one quad: error of the focal length by the number of views (Fig. 17).
+    ///
+    /// Synthetic views with the constraints C1, C1+C2, C1+C3 and all, linear and refined; and real boards, their
+    /// outermost quad against all their points and against what the set states. For example:
+    ///   waymark evaluate calibration calib-zhang calib-opencv-chessboard --plot calibration.svg
+    #[command(verbatim_doc_comment)]
+    Calibration(calibration::Args),
+    /// How good poses of landmarks and robots are, and whether their covariances keep their word.
+    ///
+    /// The table of method 13.3, NEES over twelve cells of distance, angle and noise, flips of the planar ambiguity, OpenCV
+    /// on the same corners, several landmarks in one frame, simulated drives, cost.
+    Pose(pose::Args),
+    /// Landmarks placed on walls and ceilings from known robot poses, against the truth.
+    ///
+    /// Generated rooms with everything uncertain drawn anew, rendered corridors with the detector's corners, and things
+    /// that hang on no wall.
+    Placement(placement::Args),
 }
 
 /// Runs one evaluation.
@@ -67,5 +87,8 @@ pub(crate) fn run(command: &Command) -> anyhow::Result<()> {
         Command::Discrimination(args) => experiment::discrimination::run(args),
         Command::Lookalikes(args) => experiment::doubles::run(args),
         Command::Confidence(args) => experiment::confidence::run(args),
+        Command::Calibration(args) => calibration::run(args),
+        Command::Pose(args) => pose::run(args),
+        Command::Placement(args) => placement::run(args),
     }
 }

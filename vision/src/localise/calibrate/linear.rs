@@ -19,12 +19,12 @@ pub(super) struct Constraints {
     pub height_m: Option<f64>,
 }
 
-/// A conic's camera: focal length and principal point.
+/// A conic's camera: focal length and principal point, pixels.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct LinearCamera {
-    pub alpha_px: f64,
-    pub u0_px: f64,
-    pub v0_px: f64,
+    pub alpha: f64,
+    pub u0: f64,
+    pub v0: f64,
 }
 
 /// `rho(a, b) . Omega = a^T omega b` (method 16.1).
@@ -83,12 +83,12 @@ pub(super) fn solve(
     // nalgebra sorts them in descending order.
     let sigmas = [s[2] / s[3].max(f64::MIN_POSITIVE), s[2] / s[0].max(f64::MIN_POSITIVE)];
     let o = v_t.row(3);
-    let (u0, v0) = (-o[1] / o[0], -o[2] / o[0]);
-    let alpha2 = o[3] / o[0] - u0 * u0 - v0 * v0;
+    let (u, v) = (-o[1] / o[0], -o[2] / o[0]);
+    let alpha2 = o[3] / o[0] - u * u - v * v;
     let made = (alpha2 > 0.0 && alpha2.is_finite() && sigmas[1] > MIN_SIGMA_SHARE).then(|| LinearCamera {
-        alpha_px: alpha2.sqrt() * half,
-        u0_px: u0 * half + centre[0],
-        v0_px: v0 * half + centre[1],
+        alpha: alpha2.sqrt() * half,
+        u0: u * half + centre[0],
+        v0: v * half + centre[1],
     });
     (made, sigmas)
 }

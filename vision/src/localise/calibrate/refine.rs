@@ -123,22 +123,13 @@ impl Problem {
     pub(super) fn chi2(&self, state: &State) -> f64 {
         let mut sum = self.prior_chi2(state);
         for (view, pose) in self.views.iter().zip(&state.poses) {
-            sum += self.view_chi2(view, pose, state) + self.known_chi2(pose, state);
+            sum += view_chi2(view, pose, state) + self.known_chi2(pose, state);
         }
         if sum.is_nan() { f64::INFINITY } else { sum }
     }
 
     fn prior_chi2(&self, state: &State) -> f64 {
         (0..CAMERA).map(|k| self.prior[k] * (state.camera[k] - self.at[k]).powi(2)).sum()
-    }
-
-    fn view_chi2(&self, view: &[Point], pose: &Isometry3<f64>, state: &State) -> f64 {
-        let mut sum = 0.0;
-        for point in view {
-            let Some(px) = pixel(point, pose, &state.camera) else { return f64::INFINITY };
-            sum += (point.weight * (point.seen - px)).norm_squared();
-        }
-        if sum.is_nan() { f64::INFINITY } else { sum }
     }
 
     /// Of the roll and the height of one view.
@@ -198,7 +189,7 @@ impl Problem {
 
     /// One pose, the camera held.
     fn descend_view(&self, i: usize, start: Isometry3<f64>, state: &State) -> Option<(Isometry3<f64>, f64)> {
-        let cost_of = |pose: &Isometry3<f64>| self.view_chi2(&self.views[i], pose, state);
+        let cost_of = |pose: &Isometry3<f64>| view_chi2(&self.views[i], pose, state);
         let (mut pose, mut damping) = (start, 1e-4);
         let mut cost = cost_of(&pose);
         if !cost.is_finite() {
@@ -235,9 +226,8 @@ impl Problem {
     pub(super) fn descend(&self, state: State) -> Option<State> {
         let mut state = self.descend_all(state)?;
         for _ in 0..FLIPS {
-            let before: Vec<f64> = (0..state.poses.len())
-                .map(|i| self.view_chi2(&self.views[i], &state.poses[i], &state))
-                .collect();
+            let before: Vec<f64> =
+                (0..state.poses.len()).map(|i| view_chi2(&self.views[i], &state.poses[i], &state)).collect();
             let mut tried = state.clone();
             let mut better = false;
             for (i, before) in before.iter().enumerate() {
@@ -271,7 +261,7 @@ impl Problem {
         }
         for _ in 0..MAX_STEPS {
             let normal = self.normal(&state)?;
-            let Some((step, steps)) = normal.step(&self.free, damping) else {
+            let Some((step, steps)) = normal.step(self.free, damping) else {
                 damping *= 8.0;
                 if damping > 1e12 {
                     break;
@@ -360,7 +350,7 @@ impl Problem {
                 sum += (point.seen - pixel(point, pose, &state.camera)?).norm_squared();
             }
             let n = 2 * view.len();
-            let chi2 = self.view_chi2(view, pose, state);
+            let chi2 = view_chi2(view, pose, state);
             views.push(ViewFit { camera_from_plane: *pose, chi2, rms_px: (sum / n as f64).sqrt() });
             (squares, count) = (squares + sum, count + n);
         }
@@ -372,7 +362,7 @@ impl Problem {
         let mut covariance = None;
         if refined {
             let scale = if dof > 0 { (chi2 / dof as f64).max(1.0) } else { 1.0 };
-            let all = self.normal(state)?.covariance(&self.free)? * scale;
+            let all = self.normal(state)?.covariance(self.free)? * scale;
             let order = [ALPHA, U0, V0, K1, K2, PIXEL_ASPECT];
             covariance = Some(Matrix6::from_fn(|i, j| all[(order[i], order[j])]));
         }
@@ -384,7 +374,7 @@ impl Problem {
 
 impl Normal {
     /// The shared block with the poses eliminated, and its gradient; numbers that are not free held.
-    fn reduced(&self, free: &[bool; CAMERA], damping: f64) -> Option<(Shared, SharedVector)> {
+    fn reduced(&self, free: [bool; CAMERA], damping: f64) -> Option<(Shared, SharedVector)> {
         let (mut a, mut g) = (self.shared, self.shared_g);
         for k in 0..CAMERA {
             a[(k, k)] *= 1.0 + damping;
@@ -402,7 +392,7 @@ impl Normal {
         Some((a, g))
     }
 
-    fn step(&self, free: &[bool; CAMERA], damping: f64) -> Option<(SharedVector, Vec<Vector6<f64>>)> {
+    fn step(&self, free: [bool; CAMERA], damping: f64) -> Option<(SharedVector, Vec<Vector6<f64>>)> {
         let (a, g) = self.reduced(free, damping)?;
         // The numbers differ by many orders of magnitude: solved on a unit diagonal.
         let scale = a.diagonal().map(|v| 1.0 / v.max(f64::MIN_POSITIVE).sqrt());
@@ -417,7 +407,7 @@ impl Normal {
     }
 
     /// Of the free numbers; zero elsewhere.
-    fn covariance(&self, free: &[bool; CAMERA]) -> Option<Shared> {
+    fn covariance(&self, free: [bool; CAMERA]) -> Option<Shared> {
         let (a, _) = self.reduced(free, 0.0)?;
         let scale = a.diagonal().map(|v| 1.0 / v.max(f64::MIN_POSITIVE).sqrt());
         let inverse = Shared::from_fn(|i, j| a[(i, j)] * scale[i] * scale[j]).cholesky()?.inverse();
@@ -439,6 +429,15 @@ fn damped(own: &Matrix6<f64>, damping: f64) -> Matrix6<f64> {
 
 fn moved(pose: &Isometry3<f64>, step: &Vector6<f64>) -> Isometry3<f64> {
     perturbed(pose, &step.fixed_rows::<3>(0).into(), &step.fixed_rows::<3>(3).into())
+}
+
+fn view_chi2(view: &[Point], pose: &Isometry3<f64>, state: &State) -> f64 {
+    let mut sum = 0.0;
+    for point in view {
+        let Some(px) = pixel(point, pose, &state.camera) else { return f64::INFINITY };
+        sum += (point.weight * (point.seen - px)).norm_squared();
+    }
+    if sum.is_nan() { f64::INFINITY } else { sum }
 }
 
 /// A plane's point in the camera frame, and the arm by which a turn moves it.

@@ -239,6 +239,29 @@ fn a_view_of_something_else_is_named() {
 }
 
 #[test]
+fn strangers_are_left_out_and_lenses_found_where_there_are_some() {
+    let mut random = Random::new(8);
+    let p = CalibrateParams { radial: 2, ..CalibrateParams::default() };
+    let mut views = views_of(&camera(), 12, 0.3, &mut random);
+    let found = calibrate_choosing(&views, IMAGE, &p).unwrap();
+    assert_eq!((found.used.len(), found.calibration.camera.distortion), (12, Distortion::None));
+    // Two quads of other shapes among them.
+    for (i, stretch) in [(3, 1.6), (9, 0.5)] {
+        let middle = views[i].seen_px.iter().fold(Vector2::zeros(), |m, q| m + q.coords * 0.25);
+        for q in &mut views[i].seen_px {
+            q.x = middle.x + stretch * (q.x - middle.x);
+        }
+    }
+    let found = calibrate_choosing(&views, IMAGE, &p).unwrap();
+    assert_eq!(found.used, [0, 1, 2, 4, 5, 6, 7, 8, 10, 11]);
+    assert!(worst(&found.calibration.camera, &camera()) < 0.01, "{:?}", found.calibration.camera);
+    let bent = Intrinsics { distortion: Distortion::PlumbBob([-0.2, 0.0, 0.0, 0.0, 0.0]), ..camera() };
+    let found = calibrate_choosing(&views_of(&bent, 12, 0.3, &mut random), IMAGE, &p).unwrap();
+    let k1 = found.calibration.camera.distortion.coefficients()[0];
+    assert!((k1 + 0.2).abs() < 0.05 && worst(&found.calibration.camera, &bent) < 0.015, "{found:?}");
+}
+
+#[test]
 fn bad_input_is_refused_by_name() {
     let views = views_of(&camera(), 4, 0.2, &mut Random::new(6));
     let p = CalibrateParams::default();
@@ -254,6 +277,7 @@ fn bad_input_is_refused_by_name() {
         with(&|v| v.covariance_px2[3] = -Matrix2::identity()),
         with(&|v| v.seen_px.truncate(3)),
         with(&|v| v.plane_m = vec![Point2::origin(); 4]),
+        with(&|v| v.seen_px.reverse()),
     ] {
         assert!(matches!(result, Err(CalibrateError::View { view: 2, .. })), "{result:?}");
     }
@@ -301,4 +325,19 @@ proptest::proptest! {
             proptest::prop_assert!(found.rms_px.is_finite() && found.camera.fx_px >= 10.0);
         }
     }
+}
+
+#[test]
+fn agrees_with_opencv() {
+    // cv2.calibrateCamera of OpenCV 5.0.0 on these corners (as f32), aspect ratio 1 and distortion held at 0, 500
+    // iterations: fx 892.09989, cx 655.31211, cy 472.91977, rms 0.18386 per coordinate.
+    let (views, _) = scene(10, 21, 0.5);
+    let found = calibrate(&views, IMAGE, &CalibrateParams::default()).unwrap();
+    let c = found.camera;
+    for (got, want) in
+        [(c.fx_px, 892.099_89), (c.fy_px, 892.099_89), (c.cx_px, 655.312_11), (c.cy_px, 472.919_77)]
+    {
+        assert!((got - want).abs() < 2e-3, "{got} for {want}");
+    }
+    assert!((found.rms_px - 0.183_859).abs() < 1e-5, "{}", found.rms_px);
 }

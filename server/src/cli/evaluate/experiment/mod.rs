@@ -133,13 +133,17 @@ impl Setting {
 }
 
 /// Says the report: a table, or JSON.
-fn say(json: bool, report: &impl Serialize, table: impl FnOnce() -> Vec<String>) -> anyhow::Result<()> {
+pub(crate) fn say(
+    json: bool,
+    report: &impl Serialize,
+    table: impl FnOnce() -> Vec<String>,
+) -> anyhow::Result<()> {
     screen::say(&if json { serde_json::to_string(report)? } else { table().join("\n") });
     Ok(())
 }
 
 /// Writes the plot, if one is asked for.
-fn write_plot(path: Option<&Path>, svg: impl FnOnce() -> String) -> anyhow::Result<()> {
+pub(crate) fn write_plot(path: Option<&Path>, svg: impl FnOnce() -> String) -> anyhow::Result<()> {
     use anyhow::Context as _;
     let Some(path) = path else { return Ok(()) };
     std::fs::write(path, svg()).with_context(|| format!("cannot write {}", path.display()))

@@ -1,0 +1,124 @@
+//! A camera from views of one landmark, for the command line and over HTTP: corners in, a report out. The computation
+//! is `vision::localise::calibrate`.
+
+use protos::{convert::geometry::intrinsics_wire, v1};
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+use vision::localise::calibrate::{
+    CalibrateError, CalibrateParams, Chosen, Height, PlanarView, calibrate_choosing,
+};
+
+/// Standard deviation of a corner per coordinate, where nobody says.
+pub(crate) const CORNER_SIGMA_PX: f64 = 0.5;
+/// What is known of any camera's principal point: standard deviation from the image's centre, as a share of its width.
+const CENTRE_SIGMA: f64 = 0.1;
+/// How well a level camera is level, radians.
+const LEVEL_SIGMA_RAD: f64 = 0.0175;
+/// How well a given height is known, metres.
+const HEIGHT_SIGMA_M: f64 = 0.02;
+
+/// What may be said beside the views.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema, clap::Args)]
+#[serde(default, deny_unknown_fields)]
+pub(crate) struct Knowledge {
+    /// Radial coefficients (k1, k2) that may be fitted, 0 to 2; only those are that the views ask for.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u8).range(0..=2))]
+    pub(crate) radial: u8,
+    /// The camera does not roll (C2).
+    #[arg(long)]
+    pub(crate) level: bool,
+    /// The camera is this high over the landmark's centre in all views, metres; negative below (C3).
+    #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
+    pub(crate) height_m: Option<f64>,
+    /// The ratio of the landmark's sides is not what its size says, and is found with the camera.
+    #[arg(long)]
+    pub(crate) unknown_aspect: bool,
+}
+
+impl Default for Knowledge {
+    fn default() -> Self {
+        Self { radial: 1, level: false, height_m: None, unknown_aspect: false }
+    }
+}
+
+impl Knowledge {
+    fn params(&self) -> CalibrateParams {
+        CalibrateParams {
+            radial: usize::from(self.radial),
+            roll_sigma_rad: if self.level { LEVEL_SIGMA_RAD } else { 0.0 },
+            height: self
+                .height_m
+                .map_or(Height::Free, |height_m| Height::Known { height_m, sigma_m: HEIGHT_SIGMA_M }),
+            known_aspect: !self.unknown_aspect,
+            centre_sigma: CENTRE_SIGMA,
+            ..CalibrateParams::default()
+        }
+    }
+}
+
+/// One view of the report.
+#[derive(Debug, Clone, Serialize, ToSchema)]
+pub(crate) struct ViewReport {
+    /// Whether the camera rests on it; a view that does not fit is left out.
+    pub(crate) used: bool,
+    /// Root mean square residual per coordinate.
+    pub(crate) rms_px: Option<f64>,
+    /// Distance of the camera from the landmark's centre, metres.
+    pub(crate) distance_m: Option<f64>,
+}
+
+/// A calibrated camera.
+#[derive(Debug, Clone, Serialize, ToSchema)]
+pub(crate) struct Report {
+    /// As frames carry it.
+    #[schema(value_type = Object)]
+    pub(crate) intrinsics: v1::Intrinsics,
+    /// Standard deviations.
+    pub(crate) fx_sigma_px: f64,
+    /// Of the principal point.
+    pub(crate) cx_sigma_px: f64,
+    /// Of the principal point.
+    pub(crate) cy_sigma_px: f64,
+    /// Focal length of the linear solution, where there was one.
+    pub(crate) linear_fx_px: Option<f64>,
+    /// Root mean square residual per coordinate.
+    pub(crate) rms_px: f64,
+    /// Weighted squared residual over its degrees of freedom: about 1 where corners are as good as claimed.
+    pub(crate) reduced_chi2: f64,
+    /// Orientations of the landmark that differ by more than 15 degrees.
+    pub(crate) orientations: usize,
+    /// Height over width of the landmark over what its size says.
+    pub(crate) aspect_ratio: f64,
+    /// Each view, in the order given.
+    pub(crate) views: Vec<ViewReport>,
+}
+
+/// Calibrates. Not quick for hundreds of views: not for an async thread.
+pub(crate) fn calibrated(
+    views: &[PlanarView],
+    image_px: [usize; 2],
+    known: &Knowledge,
+) -> Result<Report, CalibrateError> {
+    let Chosen { calibration: c, used } = calibrate_choosing(views, image_px, &known.params())?;
+    let sigma = |i: usize| c.covariance.map_or(f64::INFINITY, |m| m[(i, i)].sqrt());
+    let view = |i: usize| {
+        let fit = used.iter().position(|u| *u == i).and_then(|k| c.views.get(k));
+        ViewReport {
+            used: fit.is_some(),
+            rms_px: fit.map(|f| f.rms_px),
+            distance_m: fit.map(|f| f.camera_from_plane.translation.vector.norm()),
+        }
+    };
+    Ok(Report {
+        intrinsics: intrinsics_wire(&c.camera),
+        fx_sigma_px: sigma(0),
+        cx_sigma_px: sigma(1),
+        cy_sigma_px: sigma(2),
+        linear_fx_px: c.linear_fx_px,
+        rms_px: c.rms_px,
+        reduced_chi2: c.chi2 / c.dof.max(1) as f64,
+        orientations: c.orientations,
+        aspect_ratio: c.aspect_ratio,
+        views: (0..views.len()).map(view).collect(),
+    })
+}

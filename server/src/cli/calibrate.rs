@@ -1,0 +1,140 @@
+//! `waymark calibrate`: a camera's intrinsics from pictures of one flat thing of known shape, no server needed.
+
+use super::{detect, pictures, screen};
+use crate::{
+    calibrating::{CORNER_SIGMA_PX, Knowledge, Report, calibrated},
+    engine::dominant::dominant,
+};
+use anyhow::Context as _;
+use serde::Deserialize;
+use std::path::{Path, PathBuf};
+use vision::{
+    detect::{
+        detect,
+        quads::{Corners, Quad, QuadKind},
+    },
+    localise::{calibrate::PlanarView, pose::LandmarkSize},
+    params::DetectParams,
+    trace::NoTrace,
+};
+
+/// `waymark calibrate`.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
+    /// Pictures by one camera (PNG, JPEG, or folders of them), each of which shows the thing as its largest quad.
+    #[arg(required_unless_present = "corners")]
+    images: Vec<PathBuf>,
+    /// Width and height of the thing in metres, such as 0.60x0.84; only their ratio matters for the camera.
+    #[arg(long, value_parser = size)]
+    size: LandmarkSize,
+    /// Corners instead of pictures: JSON `{"width": px, "height": px, "views": [[[x,y],[x,y],[x,y],[x,y]], ...]}`, each
+    /// view top-left, top-right, bottom-right, bottom-left.
+    #[arg(long, value_name = "FILE", conflicts_with = "images")]
+    corners: Option<PathBuf>,
+    #[command(flatten)]
+    known: Knowledge,
+    /// The report as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Given {
+    width: usize,
+    height: usize,
+    views: Vec<[[f64; 2]; 4]>,
+}
+
+fn size(text: &str) -> Result<LandmarkSize, String> {
+    let part =
+        |t: &str| t.trim().parse().ok().filter(|v| (LandmarkSize::MIN_M..=LandmarkSize::MAX_M).contains(v));
+    text.split_once('x')
+        .and_then(|(w, h)| Some(LandmarkSize { width_m: part(w)?, height_m: part(h)? }))
+        .ok_or_else(|| "width and height in metres, such as 0.60x0.84".to_owned())
+}
+
+pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
+    let (names, views, image_px) = match &args.corners {
+        Some(file) => given(file, args.size)?,
+        None => found(&args.images, args.size)?,
+    };
+    let report = calibrated(&views, image_px, &args.known)?;
+    screen::say(&if args.json { serde_json::to_string(&report)? } else { table(&report, &names) });
+    Ok(())
+}
+
+type Views = (Vec<String>, Vec<PlanarView>, [usize; 2]);
+
+fn given(file: &Path, size: LandmarkSize) -> anyhow::Result<Views> {
+    let text = std::fs::read(file).with_context(|| format!("cannot read {}", file.display()))?;
+    let given: Given =
+        serde_json::from_slice(&text).with_context(|| format!("{} holds no corners", file.display()))?;
+    let covariance = [nalgebra::Matrix2::identity() * CORNER_SIGMA_PX.powi(2); 4];
+    let mut views = vec![];
+    for (i, corners) in given.views.iter().enumerate() {
+        let corners = Corners::try_from(*corners).with_context(|| format!("view {i}"))?;
+        views.push(PlanarView::of_quad(&corners, &covariance, size));
+    }
+    Ok(((0..views.len()).map(|i| format!("view {i}")).collect(), views, [given.width, given.height]))
+}
+
+/// The largest quad of every picture.
+fn found(images: &[PathBuf], size: LandmarkSize) -> anyhow::Result<Views> {
+    let (mut names, mut views) = (vec![], vec![]);
+    let mut image_px = None;
+    for path in detect::files(images)? {
+        let name = path.display().to_string();
+        let image = pictures::read(&path).with_context(|| name.clone())?;
+        let here = [image.width(), image.height()];
+        anyhow::ensure!(*image_px.get_or_insert(here) == here, "{name}: not as large as the first picture");
+        match largest(&detect(&image, &DetectParams::default(), &mut NoTrace)) {
+            Some(quad) => {
+                views.push(PlanarView::of_quad(&quad.corners_px, &quad.corner_covariance_px2, size));
+                names.push(name);
+            }
+            None => screen::complain(&format!("waymark: {name}: no quad stands out")),
+        }
+    }
+    Ok((names, views, image_px.context("no pictures")?))
+}
+
+/// The one quad that is meant: whole, and far larger than any other; else the largest.
+fn largest(quads: &[Quad]) -> Option<&Quad> {
+    let mut whole: Vec<&Quad> =
+        quads.iter().filter(|q| q.kind == QuadKind::Full && !q.side_clipped.contains(&true)).collect();
+    whole.sort_by(|a, b| b.corners_px.area_px2().total_cmp(&a.corners_px.area_px2()));
+    let corners: Vec<Corners> = whole.iter().map(|q| q.corners_px).collect();
+    let meant = dominant(&corners).and_then(|c| whole.iter().find(|q| q.corners_px == *c));
+    meant.or(whole.first()).copied()
+}
+
+fn table(r: &Report, names: &[String]) -> String {
+    let k = &r.intrinsics;
+    let mut lines = vec![
+        format!(
+            "fx {:.2} +- {:.2} px, fy {:.2}, centre ({:.1} +- {:.1}, {:.1} +- {:.1})",
+            k.fx_px, r.fx_sigma_px, k.fy_px, k.cx_px, r.cx_sigma_px, k.cy_px, r.cy_sigma_px
+        ),
+        match k.plumb_bob.as_slice() {
+            [] => "no lens distortion that the views show".to_owned(),
+            lens => format!("plumb_bob {lens:?}"),
+        },
+        format!(
+            "{} of {} views, {} orientations, rms {:.2} px, chi2 {:.2} a degree of freedom",
+            r.views.iter().filter(|v| v.used).count(),
+            r.views.len(),
+            r.orientations,
+            r.rms_px,
+            r.reduced_chi2
+        ),
+    ];
+    lines.extend(r.linear_fx_px.map(|fx| format!("linear solution: fx {fx:.2}")));
+    for (view, name) in r.views.iter().zip(names) {
+        lines.push(match (view.rms_px, view.distance_m) {
+            (Some(rms), Some(distance)) => format!("  {name}: rms {rms:.2} px, {distance:.2} m"),
+            _ => format!("  {name}: left out, it does not fit the others"),
+        });
+    }
+    lines.join("\n")
+}
