@@ -124,6 +124,7 @@ async fn patch(
             landmarks::update(tx, &map, &landmark, |old| landmarks::Measures {
                 size: if size { checked.size } else { old.size },
                 place: if place { checked.place } else { old.place },
+                size_from_views: old.size_from_views && !size,
             })
             .await
         })

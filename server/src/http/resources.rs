@@ -89,8 +89,36 @@ pub(super) struct Place {
     y_m: f64,
     /// Centre, above the floor.
     z_m: f64,
-    /// Direction of the outward normal on the floor, counter-clockwise from map x.
+    /// Direction of the outward normal on the floor, counter-clockwise from map x; under a ceiling, where the top points.
     theta_rad: f64,
+    /// Turn about the outward normal, within 0.5; 0 when the sides are vertical.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    roll_rad: f64,
+    /// Turn of the outward normal from level downwards: 0 on a wall, pi/2 under a ceiling.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    tilt_rad: f64,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
+fn is_zero(value: &f64) -> bool {
+    value.abs() <= 0.0
+}
+
+/// Standard deviations of a place that the server found from views.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+pub(super) struct PlaceSigma {
+    /// Of the centre.
+    x_m: f64,
+    /// Of the centre.
+    y_m: f64,
+    /// Of the centre.
+    z_m: f64,
+    /// Of the direction.
+    theta_rad: f64,
+    /// Of the size.
+    width_m: f64,
+    /// Of the size.
+    height_m: f64,
 }
 
 /// Size and place, checked. Either may be missing.
@@ -100,15 +128,22 @@ pub(super) fn measures(size: Option<Size>, place: Option<Place>) -> Result<Measu
     let stand_in = LandmarkSize { width_m: 1.0, height_m: 1.0 };
     let centre = place.map_or(Vector3::zeros(), |p| Vector3::new(p.x_m, p.y_m, p.z_m));
     let theta_rad = place.map_or(0.0, |p| p.theta_rad);
-    LandmarkPlace::by_hand(centre, theta_rad, size.unwrap_or(stand_in), PlaceSigmas::default()).map_err(
-        |e| {
-            let outer = if matches!(e.field, "width_m" | "height_m") { "size" } else { "place" };
-            out_of_range(&e, outer)
-        },
-    )?;
-    let place =
-        place.map(|p| landmarks::Place { x_m: p.x_m, y_m: p.y_m, z_m: p.z_m, theta_rad: p.theta_rad });
-    Ok(Measures { size, place })
+    let (roll_rad, tilt_rad) = place.map_or((0.0, 0.0), |p| (p.roll_rad, p.tilt_rad));
+    let made = LandmarkPlace::by_hand(centre, theta_rad, size.unwrap_or(stand_in), PlaceSigmas::default());
+    made.and_then(|made| LandmarkPlace { roll_rad, tilt_rad, ..made }.check()).map_err(|e| {
+        let outer = if matches!(e.field, "width_m" | "height_m") { "size" } else { "place" };
+        out_of_range(&e, outer)
+    })?;
+    let place = place.map(|p| landmarks::Place {
+        x_m: p.x_m,
+        y_m: p.y_m,
+        z_m: p.z_m,
+        theta_rad: p.theta_rad,
+        roll_rad: p.roll_rad,
+        tilt_rad: p.tilt_rad,
+        covariance: None,
+    });
+    Ok(Measures { size, place, size_from_views: false })
 }
 
 /// 422 for a number outside its range.
@@ -166,6 +201,9 @@ pub(super) struct Landmark {
     size: Option<Size>,
     /// Where it hangs, if known.
     place: Option<Place>,
+    /// How surely, where the server found the place from views; absent for a place by hand.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    place_sigma: Option<PlaceSigma>,
     /// What was learnt.
     model: Option<Model>,
 }
@@ -190,14 +228,30 @@ impl Landmark {
             learnt_ms: m.learnt_ms,
             facts: serde_json::from_str(&m.facts).unwrap_or_default(),
         });
-        let Measures { size, place } = row.measures;
+        let Measures { size, place, .. } = row.measures;
+        let sigma = place.and_then(|p| p.covariance).map(|c| c.diagonal().map(f64::sqrt));
         Self {
             name: row.name,
             status,
             reasons: reasons.unwrap_or_default(),
             views: row.views,
             size: size.map(|s| Size { width_m: s.width_m, height_m: s.height_m }),
-            place: place.map(|p| Place { x_m: p.x_m, y_m: p.y_m, z_m: p.z_m, theta_rad: p.theta_rad }),
+            place: place.map(|p| Place {
+                x_m: p.x_m,
+                y_m: p.y_m,
+                z_m: p.z_m,
+                theta_rad: p.theta_rad,
+                roll_rad: p.roll_rad,
+                tilt_rad: p.tilt_rad,
+            }),
+            place_sigma: sigma.map(|s| PlaceSigma {
+                x_m: s[0],
+                y_m: s[1],
+                z_m: s[3],
+                theta_rad: s[2],
+                width_m: s[4],
+                height_m: s[5],
+            }),
             model,
         }
     }

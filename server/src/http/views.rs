@@ -13,6 +13,7 @@ use crate::{
     },
     store::{
         landmarks, maps,
+        placing::{self, Placing},
         views::{self, Cut, NewView, ViewRow},
     },
 };
@@ -59,6 +60,9 @@ struct View {
     image_kind: String,
     /// ms since the Unix epoch.
     created_ms: i64,
+    /// In the answer to an upload with `capture`: whether the landmark has a place by its views now, or why not.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    placing: Option<Placing>,
 }
 
 impl From<ViewRow> for View {
@@ -70,6 +74,7 @@ impl From<ViewRow> for View {
             height_px: row.size_px[1],
             image_kind: row.image_kind,
             created_ms: row.created_ms,
+            placing: None,
         }
     }
 }
@@ -85,6 +90,10 @@ struct NewViewForm {
     corners: Option<String>,
     /// `true`: the picture shows the landmark and nothing else.
     whole_image: Option<String>,
+    /// JSON, how it was taken: `intrinsics`, `map_from_robot` (pose with covariance), `robot_from_camera`, and
+    /// `ceiling_height_m` for a landmark under a ceiling. With it the server places the landmark on the map's walls
+    /// itself, unless it was placed by hand.
+    capture: Option<String>,
 }
 
 /// What the form says of the landmark's place in the picture.
@@ -110,15 +119,34 @@ async fn add(
     request: Request,
 ) -> Result<(StatusCode, Json<View>), ApiError> {
     landmarks::get(app.store.reads(), &map, &landmark).await?;
-    let mut form = Form::read(&app, request, &["image", "corners", "whole_image"]).await?;
+    let mut form = Form::read(&app, request, &["image", "corners", "whole_image", "capture"]).await?;
     let image = form.needed("image")?;
     let extent = extent(form.optional("corners").as_ref(), form.optional("whole_image").as_ref())?;
+    let capture = capture(form.optional("capture").as_ref())?;
     let max = app.config.limits.views;
     let new = app.clone().on_vision_thread(move |app| prepare(app, &image, &extent)).await??;
-    let write =
-        app.store.write(move |tx| Box::pin(async move { views::add(tx, &map, &landmark, &new, max).await }));
-    let (row, created) = write.await?;
-    Ok((if created { StatusCode::CREATED } else { StatusCode::OK }, Json(row.into())))
+    let new = NewView { capture, ..new };
+    let write = app.store.write(move |tx| {
+        Box::pin(async move {
+            let (row, created) = views::add(tx, &map, &landmark, &new, max).await?;
+            let placing = match (created, &new.capture) {
+                (true, Some(_)) => Some(placing::by_views(tx, &map, &landmark).await?),
+                _ => None,
+            };
+            Ok((row, created, placing))
+        })
+    });
+    let (row, created, placing) = write.await?;
+    let view = View { placing, ..View::from(row) };
+    Ok((if created { StatusCode::CREATED } else { StatusCode::OK }, Json(view)))
+}
+
+/// How the picture was taken, checked, as it is stored.
+fn capture(bytes: Option<&Bytes>) -> Result<Option<String>, ApiError> {
+    let Some(bytes) = bytes else { return Ok(None) };
+    let capture: placing::Capture = extract::json(bytes, "capture")?;
+    capture.check().map_err(|r| r.inside("capture"))?;
+    serde_json::to_string(&capture).map(Some).map_err(|e| ApiError::internal(&e))
 }
 
 fn extent(corners: Option<&Bytes>, whole_image: Option<&Bytes>) -> Result<Extent, ApiError> {
@@ -157,6 +185,7 @@ fn prepare(app: &App, bytes: &Bytes, extent: &Extent) -> Result<NewView, ApiErro
         size_px: [image.width(), image.height()],
         cut: Cut { corners_px, icon },
         strangers: others(&quads, &corners_px).filter_map(stranger).take(MAX_STRANGERS).collect(),
+        capture: None,
     })
 }
 

@@ -1,6 +1,7 @@
 //! Landmarks of a map: name, size, place, and a summary of what was learnt.
 
 use super::{StoreError, Tx, maps, now_ms, statements::statements, within};
+use nalgebra::Matrix6;
 use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 use vision::localise::pose::LandmarkSize;
 
@@ -9,6 +10,7 @@ macro_rules! select {
     ($tail:literal) => {
         concat!(
             "SELECT l.id, l.name, l.width_m, l.height_m, l.x_m, l.y_m, l.z_m, l.theta_rad, \
+             l.roll_rad, l.tilt_rad, l.place_covariance, l.size_from_views, \
              (SELECT count(*) FROM views v WHERE v.landmark_id = l.id) AS views, \
              m.active, m.reasons, m.facts, m.views AS model_views, m.generated_views, m.learnt_ms \
              FROM landmarks l LEFT JOIN models m ON m.landmark_id = l.id ",
@@ -19,12 +21,11 @@ macro_rules! select {
 
 statements! {
     COUNT = "SELECT count(*) FROM landmarks WHERE map_id = ?1";
-    INSERT = "INSERT INTO landmarks (map_id, name, width_m, height_m, x_m, y_m, z_m, theta_rad, created_ms) \
-              VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9) RETURNING id";
+    INSERT = "INSERT INTO landmarks (map_id, name, created_ms) VALUES (?1, ?2, ?3) RETURNING id";
     GET = select!("JOIN maps ON maps.id = l.map_id WHERE maps.name = ?1 AND l.name = ?2");
     PAGE = select!("WHERE l.map_id = ?1 AND l.name > ?2 ORDER BY l.name LIMIT ?3");
-    UPDATE = "UPDATE landmarks SET width_m = ?2, height_m = ?3, x_m = ?4, y_m = ?5, z_m = ?6, theta_rad = ?7 \
-              WHERE id = ?1";
+    UPDATE = "UPDATE landmarks SET width_m = ?2, height_m = ?3, x_m = ?4, y_m = ?5, z_m = ?6, theta_rad = ?7, \
+              roll_rad = ?8, tilt_rad = ?9, place_covariance = ?10, size_from_views = ?11 WHERE id = ?1";
     DELETE = "DELETE FROM landmarks WHERE id = ?1";
 }
 
@@ -35,13 +36,21 @@ pub(crate) struct Place {
     pub(crate) y_m: f64,
     pub(crate) z_m: f64,
     pub(crate) theta_rad: f64,
+    /// Turn about the normal.
+    pub(crate) roll_rad: f64,
+    /// Turn of the normal downwards.
+    pub(crate) tilt_rad: f64,
+    /// Over (x, y, theta, z, width, height); `None` for a place by hand.
+    pub(crate) covariance: Option<Matrix6<f64>>,
 }
 
-/// What of a landmark can be set by hand.
+/// What of a landmark can be set by hand, or is found from its views.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Measures {
     pub(crate) size: Option<LandmarkSize>,
     pub(crate) place: Option<Place>,
+    /// The size was found with the place.
+    pub(crate) size_from_views: bool,
 }
 
 /// What was learnt, in brief.
@@ -72,10 +81,52 @@ pub(super) fn measures(row: &SqliteRow) -> Result<Measures, sqlx::Error> {
     let real = |column: &str| row.try_get::<Option<f64>, _>(column);
     let size = real("width_m")?.zip(real("height_m")?);
     let (xy, zt) = (real("x_m")?.zip(real("y_m")?), real("z_m")?.zip(real("theta_rad")?));
+    let (roll_rad, tilt_rad) = (real("roll_rad")?.unwrap_or(0.0), real("tilt_rad")?.unwrap_or(0.0));
+    let covariance: Option<Vec<u8>> = row.try_get("place_covariance")?;
+    let covariance = covariance.as_deref().and_then(covariance_of);
     Ok(Measures {
         size: size.map(|(width_m, height_m)| LandmarkSize { width_m, height_m }),
-        place: xy.zip(zt).map(|((x_m, y_m), (z_m, theta_rad))| Place { x_m, y_m, z_m, theta_rad }),
+        place: xy.zip(zt).map(|((x_m, y_m), (z_m, theta_rad))| Place {
+            x_m,
+            y_m,
+            z_m,
+            theta_rad,
+            roll_rad,
+            tilt_rad,
+            covariance,
+        }),
+        size_from_views: row.try_get::<Option<bool>, _>("size_from_views")?.unwrap_or(false),
     })
+}
+
+/// 36 numbers, row by row; a matrix of places is symmetric, so the order within is no matter.
+fn covariance_of(bytes: &[u8]) -> Option<Matrix6<f64>> {
+    let numbers: Vec<f64> = bytes.as_chunks::<8>().0.iter().map(|b| f64::from_le_bytes(*b)).collect();
+    (numbers.len() == 36).then(|| Matrix6::from_row_slice(&numbers))
+}
+
+fn covariance_bytes(covariance: &Matrix6<f64>) -> Vec<u8> {
+    covariance.transpose().iter().flat_map(|v| v.to_le_bytes()).collect()
+}
+
+async fn set(tx: &mut Tx, id: i64, measures: &Measures) -> Result<(), StoreError> {
+    let (size, place) = (measures.size, measures.place);
+    sqlx::query(UPDATE)
+        .bind(id)
+        .bind(size.map(|s| s.width_m))
+        .bind(size.map(|s| s.height_m))
+        .bind(place.map(|p| p.x_m))
+        .bind(place.map(|p| p.y_m))
+        .bind(place.map(|p| p.z_m))
+        .bind(place.map(|p| p.theta_rad))
+        .bind(place.map(|p| p.roll_rad))
+        .bind(place.map(|p| p.tilt_rad))
+        .bind(place.and_then(|p| p.covariance).map(|c| covariance_bytes(&c)))
+        .bind(size.map(|_| measures.size_from_views))
+        .execute(&mut tx.conn)
+        .await
+        .map_err(StoreError::at("measure landmark"))?;
+    Ok(())
 }
 
 fn landmark_row(row: &SqliteRow) -> Result<LandmarkRow, sqlx::Error> {
@@ -101,6 +152,7 @@ fn landmark_row(row: &SqliteRow) -> Result<LandmarkRow, sqlx::Error> {
 }
 
 /// A new landmark without views.
+#[expect(clippy::large_types_passed_by_value, reason = "moved into a write, once")]
 pub(crate) async fn create(
     tx: &mut Tx,
     map: &str,
@@ -109,16 +161,9 @@ pub(crate) async fn create(
     max: usize,
 ) -> Result<LandmarkRow, StoreError> {
     let map = maps::get(&mut tx.conn, map).await?;
-    let (size, place) = (measures.size, measures.place);
     let id = sqlx::query_scalar(INSERT)
         .bind(map.id)
         .bind(name)
-        .bind(size.map(|s| s.width_m))
-        .bind(size.map(|s| s.height_m))
-        .bind(place.map(|p| p.x_m))
-        .bind(place.map(|p| p.y_m))
-        .bind(place.map(|p| p.z_m))
-        .bind(place.map(|p| p.theta_rad))
         .bind(now_ms())
         .fetch_one(&mut tx.conn)
         .await
@@ -129,6 +174,7 @@ pub(crate) async fn create(
         .await
         .map_err(StoreError::at("count landmarks"))?;
     within(count, max, "landmarks in a map")?;
+    set(tx, id, &measures).await?;
     maps::bump(tx, map.id).await?;
     Ok(LandmarkRow { id, name: name.to_owned(), measures, views: 0, model: None })
 }
@@ -171,18 +217,7 @@ pub(crate) async fn update(
     let map = maps::get(&mut tx.conn, map).await?;
     let mut landmark = get(&mut tx.conn, &map.name, name).await?;
     landmark.measures = change(landmark.measures);
-    let (size, place) = (landmark.measures.size, landmark.measures.place);
-    sqlx::query(UPDATE)
-        .bind(landmark.id)
-        .bind(size.map(|s| s.width_m))
-        .bind(size.map(|s| s.height_m))
-        .bind(place.map(|p| p.x_m))
-        .bind(place.map(|p| p.y_m))
-        .bind(place.map(|p| p.z_m))
-        .bind(place.map(|p| p.theta_rad))
-        .execute(&mut tx.conn)
-        .await
-        .map_err(StoreError::at("update landmark"))?;
+    set(tx, landmark.id, &landmark.measures).await?;
     maps::bump(tx, map.id).await?;
     Ok(landmark)
 }

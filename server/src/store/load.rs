@@ -25,7 +25,8 @@ use vision::{
 statements! {
     MAP = "SELECT name, version, distance FROM maps WHERE id = ?1";
     MAP_IDS = "SELECT id FROM maps ORDER BY id";
-    LANDMARKS = "SELECT id, name, width_m, height_m, x_m, y_m, z_m, theta_rad FROM landmarks WHERE map_id = ?1 ORDER BY id";
+    LANDMARKS = "SELECT id, name, width_m, height_m, x_m, y_m, z_m, theta_rad, roll_rad, tilt_rad, place_covariance, \
+                 size_from_views FROM landmarks WHERE map_id = ?1 ORDER BY id";
 }
 
 /// Standard deviation of a wall given by hand, across it.
@@ -152,7 +153,11 @@ fn read_model(
 pub(crate) fn place(measures: &landmarks::Measures) -> Option<LandmarkPlace> {
     let (size, place) = measures.size.zip(measures.place)?;
     let centre = Vector3::new(place.x_m, place.y_m, place.z_m);
-    LandmarkPlace::by_hand(centre, place.theta_rad, size, PlaceSigmas::default()).ok()
+    let by_hand = LandmarkPlace::by_hand(centre, place.theta_rad, size, PlaceSigmas::default()).ok()?;
+    let (roll_rad, tilt_rad) = (place.roll_rad, place.tilt_rad);
+    let covariance = place.covariance.unwrap_or(by_hand.covariance);
+    let made = LandmarkPlace { roll_rad, tilt_rad, covariance, ..by_hand };
+    made.check().is_ok().then_some(made)
 }
 
 /// A wall from its ends, each known to [`WALL_SIGMA_M`] across the wall.

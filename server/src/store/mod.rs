@@ -14,6 +14,7 @@ pub(crate) mod landmarks;
 pub(crate) mod views;
 pub(crate) mod models;
 pub(crate) mod laser;
+pub(crate) mod placing;
 pub(crate) mod robots;
 pub(crate) mod jobs;
 

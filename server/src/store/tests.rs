@@ -13,8 +13,17 @@ pub(crate) fn config(dir: &std::path::Path) -> Config {
 async fn every_statement_prepares_on_the_migrated_schema() {
     let dir = tempfile::tempdir().unwrap();
     let mut opened = open::open(dir.path()).await.unwrap();
-    let all =
-        [maps::ALL, landmarks::ALL, views::ALL, models::ALL, laser::ALL, robots::ALL, jobs::ALL, load::ALL];
+    let all = [
+        maps::ALL,
+        landmarks::ALL,
+        views::ALL,
+        models::ALL,
+        laser::ALL,
+        placing::ALL,
+        robots::ALL,
+        jobs::ALL,
+        load::ALL,
+    ];
     for (name, sql) in all.into_iter().flatten() {
         if let Err(error) = opened.writer.prepare(sql.into_sql_str()).await {
             panic!("{name}: {error}");
@@ -31,7 +40,16 @@ async fn what_is_acknowledged_is_published_and_survives() {
     assert_eq!(store.snapshots().get("a").unwrap().version, 1);
     let new = landmarks::Measures {
         size: Some(vision::localise::pose::LandmarkSize { width_m: 0.5, height_m: 0.7 }),
-        place: Some(landmarks::Place { x_m: 1.0, y_m: 2.0, z_m: 1.5, theta_rad: 0.5 }),
+        place: Some(landmarks::Place {
+            x_m: 1.0,
+            y_m: 2.0,
+            z_m: 1.5,
+            theta_rad: 0.5,
+            roll_rad: 0.0,
+            tilt_rad: 0.0,
+            covariance: None,
+        }),
+        size_from_views: false,
     };
     let made = store.write(move |tx| Box::pin(landmarks::create(tx, "a", "p1", new, 5))).await.unwrap();
     store.write(|tx| Box::pin(laser::replace(tx, "a", &[[0.0, 0.0, 4.0, 0.0]]))).await.unwrap();

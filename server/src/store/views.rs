@@ -9,7 +9,8 @@ statements! {
     SAME = "SELECT id, image_kind, width_px, height_px, corners_px, created_ms FROM views \
             WHERE landmark_id = ?1 AND image_sha256 = ?2 AND corners_px = ?3";
     INSERT = "INSERT INTO views (landmark_id, image_sha256, image_kind, image, width_px, height_px, corners_px, \
-              icon_side, icon, icon_scale, created_ms) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11) \
+              icon_side, icon, icon_scale, created_ms, capture) \
+              VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12) \
               RETURNING id";
     PAGE = "SELECT id, image_kind, width_px, height_px, corners_px, created_ms FROM views \
             WHERE landmark_id = ?1 AND id > ?2 ORDER BY id LIMIT ?3";
@@ -50,6 +51,8 @@ pub(crate) struct NewView {
     pub(crate) cut: Cut,
     /// Other quads of the picture.
     pub(crate) strangers: Vec<Cut>,
+    /// How it was taken: JSON of a checked `placing::Capture`.
+    pub(crate) capture: Option<String>,
 }
 
 /// A stored view without picture and icon.
@@ -91,11 +94,15 @@ fn damaged(what: &str) -> impl Fn(String) -> StoreError {
     move |reason| StoreError::Damaged { what: what.to_owned(), reason }
 }
 
-fn cut_of(row: &SqliteRow) -> Result<Cut, StoreError> {
+/// The corners of a view.
+pub(super) fn corners_in(row: &SqliteRow) -> Result<Corners, StoreError> {
     let bytes: &[u8] = row.try_get("corners_px").map_err(StoreError::at("read corners"))?;
     let corners = corners_of(bytes).ok_or_else(|| damaged("corners")("not four points".into()))?;
-    let corners_px = Corners::try_from(corners).map_err(|e| damaged("corners")(e.to_string()))?;
-    Ok(Cut { corners_px, icon: icon_of(row)? })
+    Corners::try_from(corners).map_err(|e| damaged("corners")(e.to_string()))
+}
+
+fn cut_of(row: &SqliteRow) -> Result<Cut, StoreError> {
+    Ok(Cut { corners_px: corners_in(row)?, icon: icon_of(row)? })
 }
 
 fn icon_of(row: &SqliteRow) -> Result<Icon, StoreError> {
@@ -153,6 +160,7 @@ pub(crate) async fn add(
         .bind(icon_bytes(&new.cut.icon))
         .bind(new.cut.icon.source_scale)
         .bind(created_ms)
+        .bind(&new.capture)
         .fetch_one(&mut tx.conn)
         .await
         .map_err(StoreError::at("store view"))?;

@@ -1,0 +1,307 @@
+//! Places of landmarks from their views: those that say where the robot stood, on the walls of the map or under a ceiling
+//! of given height (method 11). A place by hand is never replaced.
+
+use super::{
+    StoreError, Tx,
+    landmarks::{self, Measures, Place},
+    laser, load, maps,
+    statements::statements,
+    views,
+};
+use map::{
+    mounting::Mounting,
+    place::{LandmarkPlace, PlaceSigmas},
+    placing::{
+        Ceiling, Placement, PlacingError, PlacingParams, PlacingView, ceiling_placement, placement,
+        view_on_ceiling, view_on_wall,
+    },
+    pose2::Pose2Covariance,
+    segments::LaserSegment,
+};
+use nalgebra::Matrix2;
+use protos::{Rejection, convert::geometry, v1};
+use serde::{Deserialize, Serialize};
+use sqlx::Row;
+use utoipa::ToSchema;
+use vision::{detect::quads::Corners, frame::Intrinsics, localise::pose::LandmarkSize};
+
+statements! {
+    CAPTURES = "SELECT corners_px, capture FROM views WHERE landmark_id = ?1 AND capture IS NOT NULL \
+                ORDER BY id DESC LIMIT 256";
+}
+
+/// Standard deviation of a taught corner, per coordinate.
+const CORNER_SIGMA_PX: f64 = 1.0;
+/// Of a ceiling's height as it is given.
+const CEILING_SIGMA_M: f64 = 0.02;
+
+/// How a picture was taken.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Capture {
+    intrinsics: v1::Intrinsics,
+    map_from_robot: v1::Pose2Covariance,
+    robot_from_camera: v1::Pose3,
+    /// The landmark is under a ceiling so high, not on a wall.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    ceiling_height_m: Option<f64>,
+}
+
+/// The same, checked.
+struct Taken {
+    camera: Intrinsics,
+    map_from_robot: Pose2Covariance,
+    mounting: Mounting,
+    ceiling: Option<Ceiling>,
+}
+
+impl Capture {
+    /// What is wrong with it, by field.
+    pub(crate) fn check(&self) -> Result<(), Rejection> {
+        self.taken().map(|_| ())
+    }
+
+    fn taken(&self) -> Result<Taken, Rejection> {
+        let ceiling = self.ceiling_height_m.map(|height_m| Ceiling { height_m, sigma_m: CEILING_SIGMA_M });
+        if let Some(Err(e)) = ceiling.map(|c| c.check()) {
+            return Err(Rejection::new(protos::Code::OutOfRange, "ceiling_height_m", e.to_string()));
+        }
+        Ok(Taken {
+            camera: geometry::intrinsics(&self.intrinsics).map_err(|r| r.inside("intrinsics"))?,
+            map_from_robot: geometry::pose2_covariance(&self.map_from_robot)
+                .map_err(|r| r.inside("map_from_robot"))?,
+            mounting: geometry::mounting(&self.robot_from_camera)
+                .map_err(|r| r.inside("robot_from_camera"))?,
+            ceiling,
+        })
+    }
+}
+
+/// What came of placing.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub(crate) struct Placing {
+    /// The landmark has a place by its views now.
+    pub(crate) placed: bool,
+    /// Views with a robot pose that the place rests on.
+    pub(crate) views_used: usize,
+    /// Why not: `by_hand` (a place by hand stays), or what is wrong with the views, with the residual.
+    pub(crate) reason: Option<String>,
+}
+
+/// Places a landmark from all its views that say where the robot stood.
+pub(crate) async fn by_views(tx: &mut Tx, map: &str, landmark: &str) -> Result<Placing, StoreError> {
+    let not = |reason: String| Placing { placed: false, views_used: 0, reason: Some(reason) };
+    let row = landmarks::get(&mut tx.conn, map, landmark).await?;
+    if row.measures.place.is_some_and(|place| place.covariance.is_none()) {
+        return Ok(not("by_hand".to_owned()));
+    }
+    let rows = sqlx::query(CAPTURES).bind(row.id).fetch_all(&mut tx.conn).await;
+    let rows = rows.map_err(StoreError::at("read captures"))?;
+    let mut looks = vec![];
+    for row in &rows {
+        let at = || StoreError::at("read captures");
+        let corners = views::corners_in(row)?;
+        let capture: String = row.try_get("capture").map_err(at())?;
+        // What an older or newer program stored and this one does not understand is left out.
+        let taken = serde_json::from_str::<Capture>(&capture).ok().and_then(|c| c.taken().ok());
+        looks.extend(taken.map(|taken| (corners, taken)));
+    }
+    let map_row = maps::get(&mut tx.conn, map).await?;
+    let walls: Vec<LaserSegment> = laser::all_of(&mut tx.conn, map_row.id)
+        .await?
+        .iter()
+        .filter_map(|ends| load::wall(ends).ok())
+        .collect();
+    let made = match placed(&looks, &walls) {
+        Ok(made) => made,
+        Err(error) => return Ok(not(error.to_string())),
+    };
+    let by_hand = row.measures.size.filter(|_| !row.measures.size_from_views);
+    let measures = measures(&made.place, by_hand);
+    landmarks::update(tx, map, landmark, |_| measures).await?;
+    Ok(Placing { placed: true, views_used: made.used.len(), reason: None })
+}
+
+fn view<'a>((corners, taken): &'a (Corners, Taken), covariance: &'a [Matrix2<f64>; 4]) -> PlacingView<'a> {
+    PlacingView {
+        corners,
+        covariance_px2: covariance,
+        camera: &taken.camera,
+        map_from_robot: &taken.map_from_robot,
+        mounting: &taken.mounting,
+    }
+}
+
+fn placed(looks: &[(Corners, Taken)], walls: &[LaserSegment]) -> Result<Placement, PlacingError> {
+    let covariance = [Matrix2::identity() * CORNER_SIGMA_PX * CORNER_SIGMA_PX; 4];
+    let p = PlacingParams::default();
+    // The last view says what it hangs on.
+    let ceiling = looks.first().and_then(|(_, taken)| taken.ceiling);
+    let mut why = PlacingError::NoView;
+    if let Some(ceiling) = ceiling {
+        let mut seen = vec![];
+        for look in looks {
+            match view_on_ceiling(&view(look, &covariance), &ceiling, &p) {
+                Ok(view) => seen.push(view),
+                Err(error) => why = error,
+            }
+        }
+        return if seen.is_empty() { Err(why) } else { ceiling_placement(&seen, &ceiling, &p) };
+    }
+    let mut seen = vec![];
+    for look in looks {
+        match view_on_wall(&view(look, &covariance), walls, &p) {
+            Ok(view) => seen.push(view),
+            Err(error) => why = error,
+        }
+    }
+    if seen.is_empty() { Err(why) } else { placement(&seen, walls, &p) }
+}
+
+/// A size by hand stays, and is as sure as a tape.
+fn measures(place: &LandmarkPlace, by_hand: Option<LandmarkSize>) -> Measures {
+    let mut covariance = place.covariance;
+    if by_hand.is_some() {
+        let variance = PlaceSigmas::default().size_m.powi(2);
+        for k in [4, 5] {
+            covariance.fill_row(k, 0.0);
+            covariance.fill_column(k, 0.0);
+            covariance[(k, k)] = variance;
+        }
+    }
+    Measures {
+        size: Some(by_hand.unwrap_or(place.size)),
+        place: Some(Place {
+            x_m: place.x_m,
+            y_m: place.y_m,
+            z_m: place.z_m,
+            theta_rad: place.theta_rad,
+            roll_rad: place.roll_rad,
+            tilt_rad: place.tilt_rad,
+            covariance: Some(covariance),
+        }),
+        size_from_views: by_hand.is_none(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::store::{Store, views::NewView};
+    use map::{mounting::pan_tilt, pose2::Pose2};
+    use nalgebra::{Matrix3, Matrix6, Vector3};
+    use vision::{
+        icon::Icon,
+        localise::reproject::{corner_points, pixel},
+        recognise::{DistanceKind, LandmarkId},
+    };
+
+    const SIZE: LandmarkSize = LandmarkSize { width_m: 0.6, height_m: 0.84 };
+
+    /// On the wall y = 0 of a room above it, 2 m from the origin.
+    fn truth() -> LandmarkPlace {
+        LandmarkPlace {
+            x_m: 2.0,
+            y_m: 0.0,
+            z_m: 1.5,
+            theta_rad: std::f64::consts::FRAC_PI_2,
+            roll_rad: 0.0,
+            tilt_rad: 0.0,
+            size: SIZE,
+            covariance: Matrix6::zeros(),
+        }
+    }
+
+    fn seen_from(x: f64, number: u8, shift_px: f64) -> NewView {
+        let camera = Intrinsics::new(500.0, 500.0, 320.0, 240.0, vision::frame::Distortion::None).unwrap();
+        let heading = (-2.0_f64).atan2(2.0 - x);
+        let robot = Pose2::new(x, 2.0, heading);
+        let mounting = pan_tilt(0.0, 0.1, Vector3::new(0.1, 0.0, 1.2));
+        let seen = mounting.inverse() * robot.to_isometry3().inverse() * truth().map_from_landmark();
+        let mut px = corner_points(&SIZE).map(|p| pixel(&seen, &p, &camera).unwrap());
+        px[1].y += shift_px;
+        let spread = Matrix3::from_diagonal(&Vector3::new(1e-4, 1e-4, 1e-5));
+        let capture = Capture {
+            intrinsics: geometry::intrinsics_wire(&camera),
+            map_from_robot: geometry::pose2_covariance_wire(&Pose2Covariance {
+                pose: robot,
+                covariance: spread,
+            }),
+            robot_from_camera: geometry::pose3_wire(&mounting),
+            ceiling_height_m: None,
+        };
+        capture.check().unwrap();
+        NewView {
+            image: vec![number],
+            image_sha256: [number; 32],
+            image_kind: "png",
+            size_px: [640, 480],
+            cut: views::Cut {
+                corners_px: Corners::new(px).unwrap(),
+                icon: Icon::new(20, vec![7.0; 400], 1.0).unwrap(),
+            },
+            strangers: vec![],
+            capture: Some(serde_json::to_string(&capture).unwrap()),
+        }
+    }
+
+    async fn taught(store: &Store, new: NewView) -> Placing {
+        let write = store.write(move |tx| {
+            Box::pin(async move {
+                views::add(tx, "a", "p1", &new, 100).await?;
+                by_views(tx, "a", "p1").await
+            })
+        });
+        write.await.unwrap()
+    }
+
+    #[tokio::test]
+    async fn a_taught_landmark_is_placed_on_its_wall_and_a_place_by_hand_stays() {
+        let dir = tempfile::tempdir().unwrap();
+        let config = crate::store::tests::config(dir.path());
+        let (store, _task) = Store::open(&config).await.unwrap();
+        store.write(|tx| Box::pin(maps::create(tx, "a", DistanceKind::Both, 2))).await.unwrap();
+        let made = store
+            .write(|tx| Box::pin(landmarks::create(tx, "a", "p1", Measures::default(), 5)))
+            .await
+            .unwrap();
+        let none = taught(&store, seen_from(1.0, 1, 0.0)).await;
+        assert!(!none.placed && none.reason.as_ref().is_some_and(|r| r.contains("no wall")), "{none:?}");
+        store.write(|tx| Box::pin(laser::replace(tx, "a", &[[0.0, 0.0, 6.0, 0.0]]))).await.unwrap();
+        let placed = taught(&store, seen_from(3.2, 2, 0.0)).await;
+        assert_eq!(placed, Placing { placed: true, views_used: 2, reason: None });
+        let of =
+            |store: &Store| store.snapshots().get("a").unwrap().landmarks[&LandmarkId(made.id as u64)].place;
+        let place = of(&store).unwrap();
+        assert!((place.x_m - 2.0).abs() < 1e-6 && place.y_m.abs() < 1e-6 && (place.z_m - 1.5).abs() < 1e-6);
+        assert!((place.size.width_m - 0.6).abs() < 1e-6);
+        // Its covariance, not a tape's: one look at 1 px is worth less across the wall than the wall itself.
+        let hand = PlaceSigmas::default();
+        let row = landmarks::get(store.reads(), "a", "p1").await.unwrap().measures;
+        assert!(row.size_from_views && row.place.unwrap().covariance.is_some());
+        assert!((place.covariance[(0, 0)].sqrt() - hand.position_m).abs() > 1e-6);
+        // A view that is no rectangle on that wall is said to be so when there is no other.
+        let by_hand = store.write(|tx| {
+            Box::pin(landmarks::update(tx, "a", "p1", |old| Measures {
+                place: old.place.map(|p| Place { x_m: 2.5, covariance: None, ..p }),
+                ..old
+            }))
+        });
+        by_hand.await.unwrap();
+        let kept = taught(&store, seen_from(2.5, 3, 0.0)).await;
+        assert_eq!(kept.reason.as_deref(), Some("by_hand"));
+        assert!((of(&store).unwrap().x_m - 2.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_is_not_on_the_wall_is_refused_with_the_residual() {
+        let wall = load::wall(&[0.0, 0.0, 6.0, 0.0]).unwrap();
+        let new = seen_from(1.0, 1, 60.0);
+        let capture: Capture = serde_json::from_str(new.capture.as_deref().unwrap()).unwrap();
+        let refused = placed(&[(new.cut.corners_px, capture.taken().unwrap())], &[wall]).unwrap_err();
+        assert!(matches!(refused, PlacingError::NotOnWall { rms_m, .. } if rms_m > 0.05), "{refused:?}");
+        assert!(refused.to_string().contains("not on this wall"));
+        let high = Capture { ceiling_height_m: Some(101.0), ..capture };
+        assert_eq!(high.check().unwrap_err().field, "ceiling_height_m");
+    }
+}
