@@ -5,13 +5,19 @@ use protos::{convert::geometry::intrinsics_wire, v1};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 use vision::localise::calibrate::{
-    CalibrateError, CalibrateParams, Chosen, Height, PlanarView, calibrate_choosing,
+    CalibrateError, CalibrateParams, Calibration, Chosen, Height, PlanarView, calibrate_choosing,
 };
 
 /// Standard deviation of a corner per coordinate, where nobody says.
 pub(crate) const CORNER_SIGMA_PX: f64 = 0.5;
 /// What is known of any camera's principal point: standard deviation from the image's centre, as a share of its width.
 const CENTRE_SIGMA: f64 = 0.1;
+/// What borders found in pictures are off by beside their noise, per coordinate: the edge of a frame, a shadow.
+const SYSTEMATIC_PX: f64 = 0.3;
+/// A camera is doubtful from so much chi2 a degree of freedom,
+const DOUBTFUL_CHI2: f64 = 10.0;
+/// and with its principal point so far from the image's centre, as a share of the width.
+const DOUBTFUL_CENTRE: f64 = 0.15;
 /// How well a level camera is level, radians.
 const LEVEL_SIGMA_RAD: f64 = 0.0175;
 /// How well a given height is known, metres.
@@ -89,8 +95,28 @@ pub(crate) struct Report {
     pub(crate) orientations: usize,
     /// Height over width of the landmark over what its size says.
     pub(crate) aspect_ratio: f64,
+    /// Why it should not be believed without a look: empty where nothing speaks against it.
+    pub(crate) doubts: Vec<String>,
     /// Each view, in the order given.
     pub(crate) views: Vec<ViewReport>,
+}
+
+/// What speaks against a camera that came out.
+fn doubts(c: &Calibration, image_px: [usize; 2]) -> Vec<String> {
+    let mut all = vec![];
+    let chi2 = c.chi2 / c.dof.max(1) as f64;
+    if chi2 > DOUBTFUL_CHI2 {
+        all.push(format!("corners fit {:.1} times worse than they claim", chi2.sqrt()));
+    }
+    let off = [c.camera.cx_px, c.camera.cy_px]
+        .iter()
+        .zip(image_px)
+        .map(|(p, side)| (p - 0.5 * (side as f64 - 1.0)).abs())
+        .fold(0.0, f64::max);
+    if off > DOUBTFUL_CENTRE * image_px[0] as f64 {
+        all.push(format!("the principal point is {off:.0} px from the image's centre"));
+    }
+    all
 }
 
 /// Calibrates. Not quick for hundreds of views: not for an async thread.
@@ -99,7 +125,11 @@ pub(crate) fn calibrated(
     image_px: [usize; 2],
     known: &Knowledge,
 ) -> Result<Report, CalibrateError> {
-    let Chosen { calibration: c, used } = calibrate_choosing(views, image_px, &known.params())?;
+    let mut views = views.to_vec();
+    for covariance in views.iter_mut().flat_map(|v| &mut v.covariance_px2) {
+        *covariance += nalgebra::Matrix2::identity() * SYSTEMATIC_PX.powi(2);
+    }
+    let Chosen { calibration: c, used } = calibrate_choosing(&views, image_px, &known.params())?;
     let sigma = |i: usize| c.covariance.map_or(f64::INFINITY, |m| m[(i, i)].sqrt());
     let view = |i: usize| {
         let fit = used.iter().position(|u| *u == i).and_then(|k| c.views.get(k));
@@ -119,6 +149,50 @@ pub(crate) fn calibrated(
         reduced_chi2: c.chi2 / c.dof.max(1) as f64,
         orientations: c.orientations,
         aspect_ratio: c.aspect_ratio,
+        doubts: doubts(&c, image_px),
         views: (0..views.len()).map(view).collect(),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Isometry3, Matrix2, Matrix3, Rotation3, UnitQuaternion, Vector3};
+    use vision::{
+        detect::quads::Corners,
+        frame::{Distortion, Intrinsics},
+        localise::{pose::LandmarkSize, reproject::corner_points},
+    };
+
+    /// Nine views of a poster by a camera whose principal point is `cy`.
+    fn views(cy: f64) -> Vec<PlanarView> {
+        let camera = Intrinsics::new(600.0, 600.0, 319.5, cy, Distortion::None).unwrap();
+        let size = LandmarkSize { width_m: 0.6, height_m: 0.84 };
+        let front = Matrix3::new(0.0, 1.0, 0.0, 0.0, 0.0, -1.0, -1.0, 0.0, 0.0);
+        let front = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(front));
+        let of = |i: i32| {
+            let (turn, tilt) = (f64::from(i % 3 - 1) * 0.6, f64::from(i / 3 - 1) * 0.4 + 0.05);
+            let rotation = UnitQuaternion::from_euler_angles(tilt, turn, 0.0) * front;
+            let pose = Isometry3::from_parts(Vector3::new(0.05, 0.0, 2.0).into(), rotation);
+            let px =
+                corner_points(&size).map(|p| camera.project(&(pose.rotation * p + pose.translation.vector)));
+            PlanarView::of_quad(&Corners::new(px).unwrap(), &[Matrix2::identity() * 0.01; 4], size)
+        };
+        (0..9).map(of).collect()
+    }
+
+    #[test]
+    fn a_camera_that_cannot_quite_be_is_doubted() {
+        let known = Knowledge::default();
+        let good = calibrated(&views(239.5), [640, 480], &known).unwrap();
+        assert!(good.doubts.is_empty() && (good.intrinsics.fx_px - 600.0).abs() < 1.0, "{good:?}");
+        let off = calibrated(&views(420.0), [640, 480], &known).unwrap();
+        assert!(off.doubts.iter().any(|d| d.contains("principal point")), "{off:?}");
+        let mut bad = views(239.5);
+        for (i, p) in bad.iter_mut().flat_map(|v| &mut v.seen_px).enumerate() {
+            p.x += [4.0, -4.0, 3.0, -2.0, 1.0, 5.0, -3.0][i % 7];
+        }
+        let bad = calibrated(&bad, [640, 480], &known);
+        assert!(bad.as_ref().is_err() || bad.as_ref().is_ok_and(|b| !b.doubts.is_empty()), "{bad:?}");
+    }
 }
