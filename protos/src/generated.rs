@@ -145,7 +145,8 @@ pub struct Candidate {
     pub ratio: f64,
     #[prost(double, tag = "7")]
     pub probability: f64,
-    /// Empty, or the gate that refused it: correlation, hausdorff, likeness, contradiction, margin.
+    /// Empty, or the gate that refused it: correlation, hausdorff, likeness, contradiction, content,
+    /// margin.
     #[prost(string, tag = "8")]
     pub refusal: ::prost::alloc::string::String,
     /// How alike the picture and the learnt icon are, one laid on the other, -1 to 1; absent where the map's distances

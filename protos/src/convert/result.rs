@@ -53,6 +53,7 @@ pub fn refusal(refusal: Refusal) -> &'static str {
         Refusal::Hausdorff => "hausdorff",
         Refusal::Likeness => "likeness",
         Refusal::Contradiction => "contradiction",
+        Refusal::Content => "content",
         Refusal::Margin => "margin",
     }
 }

@@ -10,7 +10,8 @@ use crate::{
     recognise::{
         IconFeatures,
         align::{Aligner, Surroundings, Template},
-        likeness::likeness,
+        content::shown,
+        likeness::{Smoothed, likeness},
         signature,
     },
 };
@@ -147,15 +148,18 @@ fn fitted_likeness(evidence: &Evidence, p: &Params) -> Result<Threshold, Thresho
 
 /// Method 9: what the model fails, if anything.
 // Departs from method 9: stable points, and a threshold for each of the paper's distances, are asked only where neither
-// distance has one. The likeness decides, and one of the two must agree; a picture of few points is told well enough by
+// distance has one; what it shows beyond its frame is asked besides. The likeness decides, and one of the two must agree; a picture of few points is told well enough by
 // the other. Where a map's kind is one of the paper's, too few stable points keep a landmark out (recognise/compare.rs).
 fn status(model: &LandmarkModel, missing: [Option<Gate>; 3], p: &Params) -> ModelStatus {
     let g = &p.learn.gates;
     let observed = model.views - model.generated_views > 1;
     let min_saliency_f = if observed { g.min_saliency_f } else { g.min_saliency_f_generated };
+    let shown = |e: &IconFeatures| shown(&Smoothed::new(&e.icon), &p.recognise.correlation);
+    let content = model.exemplars.iter().map(shown).fold(0.0, f64::max);
     let mut measured = vec![
         (Gate::Views, model.views as f64, g.min_views as f64),
         (Gate::Saliency, model.saliency_f, min_saliency_f),
+        (Gate::Content, content, p.recognise.verdict.min_content),
         (Gate::VisibilityConfidence, model.v_c, g.min_v_c),
     ];
     let [correlation, hausdorff, likeness] = missing;

@@ -216,6 +216,8 @@ pub enum Gate {
     Saliency,
     /// Stable points: where neither of the paper's distances has a threshold.
     StablePoints,
+    /// What it shows beyond its frame.
+    Content,
     /// Visibility confidence `v_c`.
     VisibilityConfidence,
     /// C^r has no threshold.
@@ -244,6 +246,10 @@ impl std::fmt::Display for GateFailure {
             Gate::Views => write!(f, "{value:.0} views, at least {limit:.0} needed"),
             Gate::Saliency => write!(f, "saliency F {value:.2}, at least {limit} needed"),
             Gate::StablePoints => write!(f, "{value:.0} stable points, at least {limit:.0} needed"),
+            Gate::Content => write!(
+                f,
+                "beyond its frame it shows {value:.1} of 21 parts, at least {limit} needed: any blank board looks like it"
+            ),
             Gate::VisibilityConfidence => {
                 write!(f, "visibility confidence {value:.3}, at least {limit} needed: views from elsewhere")
             }

@@ -26,6 +26,22 @@ impl Smoothed {
     pub fn new(icon: &Icon) -> Self {
         Self { size: icon.size, pixels: dispatch!(Level::new(), _s => smoothed(icon)) }
     }
+
+    /// Of pixels that are smooth already, `size` by `size` of them.
+    pub(super) fn of(size: usize, pixels: Vec<f32>) -> Self {
+        debug_assert_eq!(pixels.len(), size * size);
+        Self { size, pixels }
+    }
+
+    /// Its side, in pixels.
+    pub(super) fn size(&self) -> usize {
+        self.size
+    }
+
+    /// Row by row.
+    pub(super) fn pixels(&self) -> &[f32] {
+        &self.pixels
+    }
 }
 
 /// How two icons compare.
@@ -56,28 +72,42 @@ pub fn likeness(a: &Icon, b: &Icon, p: &CorrelationParams) -> f64 {
 
 /// The same as [`alike`] of smoothed icons.
 pub fn between(a: &Smoothed, b: &Smoothed, p: &CorrelationParams) -> Alike {
-    let (size, per_side) = (a.size, p.per_side());
-    if b.size != size || size <= 2 * BORDER_PX + per_side {
-        return Alike { likeness: 0.0, contradicting: 0.0 };
-    }
-    let buckets = dispatch!(Level::new(), _s => buckets(&a.pixels, &b.pixels, size, per_side));
+    let Some(buckets) = compare(a, b, p) else { return Alike { likeness: 0.0, contradicting: 0.0 } };
     let count = buckets.len() as f64;
-    let means = [1, 2].map(|i| buckets.iter().map(|b| b[i]).sum::<f32>() / count as f32);
+    let mean = |power: fn(&Bucket) -> f32| buckets.iter().map(power).sum::<f32>() / count as f32;
+    let (mean, other_mean) = (mean(|b| b.power), mean(|b| b.other_power));
     let shows = |power: f32, mean: f32| power > (SHOWS_SHARE * mean).max(SHOWS_LEAST);
-    let contradicts = |b: &&[f32; 3]| b[0] < CONTRADICTS && shows(b[1], means[0]) && shows(b[2], means[1]);
+    let contradicts =
+        |b: &&Bucket| b.correlation < CONTRADICTS && shows(b.power, mean) && shows(b.other_power, other_mean);
     Alike {
-        likeness: buckets.iter().map(|b| f64::from(b[0])).sum::<f64>() / count,
+        likeness: buckets.iter().map(|b| f64::from(b.correlation)).sum::<f64>() / count,
         contradicting: buckets.iter().filter(contradicts).count() as f64 / count,
     }
 }
 
-/// Of each bucket the correlation of its slopes, and the mean square of the slopes of either icon.
+/// One bucket of two icons.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Bucket {
+    /// Correlation of the slopes, -1 to 1.
+    pub(super) correlation: f32,
+    /// Mean square of the slopes of the one and of the other, in squared grey levels, less what noise adds.
+    pub(super) power: f32,
+    pub(super) other_power: f32,
+}
+
+/// Bucket by bucket, row by row. None where the icons are cut differently, or too small.
+pub(super) fn compare(a: &Smoothed, b: &Smoothed, p: &CorrelationParams) -> Option<Vec<Bucket>> {
+    let (size, per_side) = (a.size, p.per_side());
+    let fit = b.size == size && size > 2 * BORDER_PX + per_side;
+    fit.then(|| dispatch!(Level::new(), _s => buckets(&a.pixels, &b.pixels, size, per_side)))
+}
+
 #[expect(
     clippy::inline_always,
     reason = "an instruction set holds only in what is inlined where it was chosen"
 )]
 #[inline(always)]
-fn buckets(a: &[f32], b: &[f32], size: usize, per_side: usize) -> Vec<[f32; 3]> {
+fn buckets(a: &[f32], b: &[f32], size: usize, per_side: usize) -> Vec<Bucket> {
     let edge = |i: usize| i * size / per_side;
     let within = |i: usize| edge(i).max(BORDER_PX)..edge(i + 1).min(size - BORDER_PX);
     let mut found = Vec::with_capacity(per_side * per_side);
@@ -99,7 +129,7 @@ fn buckets(a: &[f32], b: &[f32], size: usize, per_side: usize) -> Vec<[f32; 3]> 
         let [ab, aa, bb] = sums.map(|lanes| lanes.iter().sum::<f32>());
         let correlation = ab / (aa * bb).sqrt();
         let correlation = if correlation.is_finite() { correlation } else { 0.0 };
-        found.push([correlation, aa / cells - NOISE, bb / cells - NOISE]);
+        found.push(Bucket { correlation, power: aa / cells - NOISE, other_power: bb / cells - NOISE });
     }
     found
 }

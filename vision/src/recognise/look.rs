@@ -5,9 +5,10 @@ use super::{
     DistanceKind, IconFeatures, MAX_CANDIDATES, Refusal,
     align::{Aligner, Surroundings, Template},
     compare::{Near, Sighting, correlation_as_found, least_hausdorff},
+    content::{Content, content},
     correlation::{CorrelationParams, correlation},
     features,
-    likeness::{Smoothed, alike, between},
+    likeness::{Smoothed, between},
     verdict::VerdictParams,
     watch::{Step, Watch},
 };
@@ -20,6 +21,8 @@ pub(crate) struct Judged {
     pub(crate) moved: Option<Corners>,
     /// Share of the buckets that contradict after alignment, 0 to 1.
     pub(crate) contradicting: f64,
+    /// How well they agree beyond their frames; nothing unless the likeness is within reach.
+    pub(crate) content: Content,
 }
 
 impl Judged {
@@ -34,12 +37,16 @@ impl Judged {
         let hausdorff = below(self.near.hausdorff_ratio(), limit);
         let doubtful = !below(self.near.ratio(kind), share * p.doubtful_share);
         let contradicted = !below(self.contradicting, p.max_contradicting.next_up());
+        let agrees =
+            |likeness: f64, shown: f64| self.content.likeness >= likeness && self.content.shown >= shown;
+        let sure = agrees(p.sure_content_likeness, p.sure_content);
         match kind {
             DistanceKind::Correlation => (!correlation).then_some(Refusal::Correlation),
             DistanceKind::Hausdorff => (!hausdorff).then_some(Refusal::Hausdorff),
             DistanceKind::Both if !below(self.near.ratio(kind), share) => Some(Refusal::Likeness),
             DistanceKind::Both if doubtful && contradicted => Some(Refusal::Contradiction),
-            DistanceKind::Both => (!correlation && !hausdorff).then_some(Refusal::Correlation),
+            DistanceKind::Both if !agrees(p.min_content_likeness, p.min_content) => Some(Refusal::Content),
+            DistanceKind::Both => (!correlation && !hausdorff && !sure).then_some(Refusal::Correlation),
         }
     }
 }
@@ -57,7 +64,7 @@ pub(crate) fn look(
     let aligner = Aligner::new(p.icon.size, c, &v.align);
     let mut surroundings: Vec<Option<Option<Surroundings<'_>>>> = sightings.iter().map(|_| None).collect();
     let least = found.first().map_or(0.0, |f| f.near.signature - v.signature_gap).max(v.min_signature);
-    for Judged { near, moved, contradicting } in found.iter_mut() {
+    for Judged { near, moved, contradicting, content: beyond } in found.iter_mut() {
         near.likeness = Some(0.0);
         let sighting = &sightings[near.sighting];
         let Some(exemplar) = near.model.exemplars.get(near.exemplar).filter(|_| near.signature >= least)
@@ -68,10 +75,12 @@ pub(crate) fn look(
             .get_or_insert_with(|| Surroundings::new(image, &sighting.corners_px, &sighting.icon, &v.align));
         let template = Template::new(&exemplar.icon, &exemplar.coarse);
         let Some(laid) = around.as_ref().and_then(|s| aligner.align(s, &template)) else { continue };
-        let alike = alike(&laid.icon, &exemplar.icon, c);
+        let (seen, learnt) = (Smoothed::new(&laid.icon), Smoothed::new(&exemplar.icon));
+        let alike = between(&seen, &learnt, c);
         (near.likeness, *contradicting) = (Some(alike.likeness), alike.contradicting);
         *moved = Some(laid.corners_px);
         if near.ratio(DistanceKind::Both) < 1.0 {
+            *beyond = content(&seen, &learnt, c);
             watch.finished(Step::Alignment);
             let icon = features(laid.icon, &p.recognise);
             let each = near.model.exemplars.iter().map(|e| correlation(&icon, e, c));
@@ -120,7 +129,7 @@ pub(crate) fn verify(
         let each = model.exemplars.iter().map(|e| correlation(&icon, e, &p.recognise.correlation));
         let (correlation, hausdorff) = (each.fold(2.0, f64::min), least_hausdorff(&icon.points, model, p).0);
         let near = Near { correlation, hausdorff, ..judged.near.clone() };
-        let moved = Judged { near, moved: Some(corners_px), contradicting: 0.0 };
+        let moved = Judged { near, moved: Some(corners_px), contradicting: 0.0, content: Content::NONE };
         // What was accepted where it stood is not lost by a move that fits worse.
         let lost = judged.refusal(kind, 1.0, v).is_none() && moved.refusal(kind, 1.0, v).is_some();
         if moved.near.ratio(kind) < judged.near.ratio(kind) && !lost {

@@ -8,6 +8,7 @@ pub mod signature;
 pub mod models;
 pub mod align;
 pub mod likeness;
+pub mod content;
 pub mod watch;
 pub mod compare;
 mod look;
@@ -85,8 +86,8 @@ pub enum DistanceKind {
     Hausdorff,
     /// Bucketed correlation, C^r.
     Correlation,
-    /// The picture itself: what is near by its signature is laid on the learnt icon; slopes must agree there, and one
-    /// of the two distances must accept. Ratios and order are those of the slopes.
+    /// The picture itself: what is near by its signature is laid on the learnt icon; slopes must agree there, beyond the
+    /// frame, too, and one of the two distances must accept unless they agree very well. Ratios and order are those of the slopes.
     #[default]
     Both,
 }
@@ -103,6 +104,8 @@ pub enum Refusal {
     Likeness,
     /// It is like it, but too much of it shows something else.
     Contradiction,
+    /// It is like it, but hardly by more than the frame.
+    Content,
     /// Accepted by its own thresholds, but another landmark is too close behind.
     Margin,
 }

@@ -7,6 +7,7 @@ use super::{
     align::AlignParams,
     compare::{Near, Sighting, nearest, short_list, sightings},
     confidence::{confidence, entropy_m, entropy_norm, probability},
+    content::Content,
     look::{Judged, look, verify},
     models::ModelSet,
     watch::{NoWatch, Step, Watch},
@@ -41,6 +42,14 @@ pub struct VerdictParams {
     pub doubtful_share: f64,
     /// ... is refused where more than this share of the picture shows something else, 0 to 1.
     pub max_contradicting: f64,
+    /// Beyond the frame the picture must be at least this much like the learnt one, -1 to 1...
+    pub min_content_likeness: f64,
+    /// ... in what amounts to at least so many buckets. A landmark that shows less is not used.
+    pub min_content: f64,
+    /// From this likeness beyond the frame on...
+    pub sure_content_likeness: f64,
+    /// ... in so many buckets, none of the paper's distances need agree: saturation moves them far.
+    pub sure_content: f64,
     /// Landmarks that are verified at most.
     pub max_verified: usize,
     /// How corners are moved.
@@ -60,6 +69,10 @@ impl Default for VerdictParams {
             crowd_share: 0.08,
             doubtful_share: 0.85,
             max_contradicting: 0.12,
+            min_content_likeness: 0.45,
+            min_content: 1.5,
+            sure_content_likeness: 0.6,
+            sure_content: 4.0,
             max_verified: 2,
             align: AlignParams::default(),
         }
@@ -110,8 +123,10 @@ pub fn recognise_watched(
         }
     };
     watch.finished(Step::ShortList);
-    let mut found: Vec<Judged> =
-        near.into_iter().map(|near| Judged { near, moved: None, contradicting: 0.0 }).collect();
+    let mut found: Vec<Judged> = near
+        .into_iter()
+        .map(|near| Judged { near, moved: None, contradicting: 0.0, content: Content::NONE })
+        .collect();
     match kind {
         DistanceKind::Both => look(image, &sightings, &mut found, p, watch),
         DistanceKind::Correlation | DistanceKind::Hausdorff => {

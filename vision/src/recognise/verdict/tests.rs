@@ -3,11 +3,15 @@
 use super::*;
 use crate::{
     detect::quads::Corners,
+    learn::{
+        model::{Gate, ModelStatus, View, learn},
+        synthesis::views,
+    },
     recognise::{
         IconFeatures, LandmarkId, compare,
         correlation::correlation,
         features,
-        fixture::{Dice, lesson, lessons, model_set, oblique, photograph, poster, quad},
+        fixture::{Dice, lesson, lessons, model_set, oblique, photograph, poster, quad, whole},
     },
 };
 use nalgebra::Point2;
@@ -191,6 +195,7 @@ fn gates_refuse_at_tau() {
         },
         moved: moved.then_some(anywhere),
         contradicting: 0.0,
+        content: JUST_ENOUGH,
     };
     let (c, h, v) = (model.correlation.tau, model.hausdorff.tau, &PARAMS.recognise.verdict);
     let tight = v.verified_share;
@@ -229,6 +234,63 @@ fn gates_refuse_at_tau() {
     assert_eq!(contradicted(0.99, f64::NAN), Some(Refusal::Contradiction));
     assert_eq!(contradicted(v.doubtful_share - 1e-6, 1.0), None);
     assert_eq!(contradicted(v.doubtful_share + 1e-6, 1.0), Some(Refusal::Contradiction));
+    // Beyond the frame it must agree; where it does so very well, neither distance is asked.
+    let beyond = |likeness: f64, shown: f64, c: f64| {
+        let mut judged = judged(c, f64::INFINITY, true);
+        judged.near.likeness = alike;
+        judged.content = Content { likeness, shown };
+        judged.refusal(DistanceKind::Both, 1.0, v)
+    };
+    let (least, enough) = (v.min_content_likeness, v.min_content);
+    assert_eq!(beyond(least, enough, 0.0), None);
+    assert_eq!(beyond(least - 1e-9, 20.0, 0.0), Some(Refusal::Content));
+    assert_eq!(beyond(1.0, enough - 1e-9, 0.0), Some(Refusal::Content));
+    assert_eq!(beyond(f64::NAN, 20.0, 0.0), Some(Refusal::Content));
+    let (sure, well) = (v.sure_content_likeness, v.sure_content);
+    assert_eq!(beyond(sure, well, 2.0 * c), None);
+    assert_eq!(beyond(sure - 1e-9, well, 2.0 * c), Some(Refusal::Correlation));
+    assert_eq!(beyond(sure, well - 1e-9, 2.0 * c), Some(Refusal::Correlation));
+}
+
+/// What the gate on content lets through by a hair.
+const JUST_ENOUGH: Content = Content { likeness: 0.45, shown: 1.5 };
+
+/// A dark frame, a mat, and something within: nothing, or a poster.
+fn framed(inside: Option<u64>) -> GrayImage {
+    let picture = inside.map(poster);
+    GrayImage::from_fn(240, 240, |u, v| match u.min(239 - u).min(v).min(239 - v) {
+        depth if depth < 20 => 30,
+        depth if depth < 70 => 215,
+        _ => picture.as_ref().map_or(170, |p| p.at(u, v)),
+    })
+}
+
+#[test]
+fn a_frame_alone_is_no_landmark() {
+    let lesson = |image: &GrayImage| {
+        let mut all = vec![View::photographed(image, &whole(), &PARAMS).unwrap()];
+        all.extend(views(image, &whole(), 20, &PARAMS, 5));
+        learn(LandmarkId(9), &all, &[], &PARAMS).unwrap()
+    };
+    // A blank panel is not learnt, whatever its frame.
+    let blank = lesson(&framed(None));
+    let ModelStatus::Candidate(failures) = &blank.status else { panic!("{:?}", blank.status) };
+    assert!(failures.iter().any(|f| f.gate == Gate::Content), "{failures:?}");
+    // A picture in that frame is, and is told from the empty frame and from another picture in it.
+    let taught = lesson(&framed(Some(3)));
+    assert!(taught.is_active(), "{:?}", taught.status);
+    let set = ModelSet::new(vec![Arc::new(taught)], &PARAMS).unwrap();
+    let asked = |inside: Option<u64>| {
+        let image = photograph(&framed(inside), &oblique(), 0.9, 10.0);
+        recognise(&image, &quad(oblique()), &set, DistanceKind::Both, &PARAMS)
+    };
+    assert_eq!(asked(Some(3)).recognition, Recognition::Unique(LandmarkId(9)));
+    for (inside, refusal) in [(None, Refusal::Content), (Some(4), Refusal::Content)] {
+        let v = asked(inside);
+        assert_eq!(v.recognition, Recognition::Unknown, "{inside:?}");
+        let told = v.candidates[0].refusal;
+        assert!(told == Some(refusal) || told == Some(Refusal::Likeness), "{inside:?} {told:?}");
+    }
 }
 
 #[test]
@@ -246,6 +308,7 @@ fn the_margin_is_over_the_nearest_other() {
         },
         moved: None,
         contradicting: 0.0,
+        content: JUST_ENOUGH,
     };
     let found = [judged(0, 0.4, 0.1, 0.3), judged(1, 0.5, 1.0, 1.5)];
     assert!((margin(&found, 0, DistanceKind::Correlation) - 0.8).abs() < 1e-9);
@@ -279,7 +342,7 @@ fn a_large_map_asks_for_more() {
         likeness: Some(1.0 - 0.9 * model.likeness.tau),
         signature: 1.0,
     };
-    let found = [Judged { near, moved: Some(oblique()), contradicting: 0.0 }];
+    let found = [Judged { near, moved: Some(oblique()), contradicting: 0.0, content: JUST_ENOUGH }];
     let among = |n: usize| decide(&found, &seen, DistanceKind::Both, n, v);
     assert_eq!(among(v.crowd).recognition, Recognition::Unique(LandmarkId(2)));
     let large = among(10 * v.crowd);

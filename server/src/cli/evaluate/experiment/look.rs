@@ -33,6 +33,8 @@ pub(crate) enum Outcome {
     Likeness,
     /// Alike, but too much of it shows something else.
     Contradiction,
+    /// Alike, but hardly by more than the frame.
+    Content,
     /// Alike, but neither C^r nor H^r is below 0.8 of its tau.
     Distances,
     /// Not among the candidates of the verdict.
@@ -51,6 +53,7 @@ impl Outcome {
             Self::Ambiguous => "ambiguous",
             Self::Likeness => "likeness",
             Self::Contradiction => "contradiction",
+            Self::Content => "content",
             Self::Distances => "distances",
             Self::NotListed => "not listed",
             Self::NoIcon => "no icon",
@@ -145,6 +148,7 @@ fn outcome(verdict: &Verdict, id: LandmarkId) -> Outcome {
     let Some(own) = verdict.candidates.iter().find(|c| c.landmark == id) else { return Outcome::NotListed };
     match own.refusal {
         Some(Refusal::Contradiction) => Outcome::Contradiction,
+        Some(Refusal::Content) => Outcome::Content,
         Some(Refusal::Correlation | Refusal::Hausdorff) => Outcome::Distances,
         _ => Outcome::Likeness,
     }
@@ -189,6 +193,7 @@ mod tests {
             (Recognition::Ambiguous(LandmarkId(4)), None, Outcome::Ambiguous),
             (Recognition::Unknown, Some(Refusal::Likeness), Outcome::Likeness),
             (Recognition::Unknown, Some(Refusal::Contradiction), Outcome::Contradiction),
+            (Recognition::Unknown, Some(Refusal::Content), Outcome::Content),
             (Recognition::Unknown, Some(Refusal::Correlation), Outcome::Distances),
         ] {
             assert_eq!(outcome(&verdict(recognition, refusal), id), expected);
