@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::localise::{DecidedBy, Nuisance, NuisanceKey};
-use nalgebra::{DMatrix, DVector, Matrix3x6, Matrix6, Vector6};
+use nalgebra::{DMatrix, DVector, Matrix2, Matrix3x2, Matrix3x6, Matrix6, Vector2, Vector6};
 use vision::{learn::random::Random, recognise::LandmarkId};
 
 const SECOND: i64 = 1_000_000_000;
@@ -61,16 +61,17 @@ fn there_is_no_pose_before_the_first_fix_or_a_given_start() {
 
 #[test]
 fn equals_batch_least_squares() {
-    // Oracle: all poses and both places in one weighted least-squares problem. Errors are a millionth of their sigma,
+    // Oracle: all poses, both places and odometry's errors in one weighted least-squares problem. Errors are a millionth of their sigma,
     // so that every derivative is taken at the same point and the two must agree to rounding.
     let mut random = Random::new(1);
-    let p = eager();
+    let p = FuseParams { scale_drift: 0.0, turn_bias_drift_rad_per_m: 0.0, ..eager() };
     let steps = 6;
     let motion = Pose2::new(0.5, 0.0, 0.3);
     let mut truth = Pose2::new(1.0, 2.0, 0.4);
     let mut odom = Pose2::default();
     let mut fuser = Fuser::new(p.clone());
-    let unknowns = 3 * (steps + 1) + 12;
+    let unknowns = 3 * (steps + 1) + 12 + 2;
+    let lasting = unknowns - 2;
     let (mut h, mut g) = (DMatrix::zeros(unknowns, unknowns), DVector::zeros(unknowns));
     let mut add = |j: DMatrix<f64>, r: DVector<f64>, w: DMatrix<f64>| {
         h += j.transpose() * &w * &j;
@@ -83,6 +84,11 @@ fn equals_batch_least_squares() {
         let w = fix(1, truth, 0.05, 0.03).nuisances[0].covariance.try_inverse().unwrap();
         add(j, DVector::zeros(6), DMatrix::from_iterator(6, 6, w.iter().copied()));
     }
+    for (k, sigma) in [p.scale_sigma, p.turn_bias_sigma_rad_per_m].into_iter().enumerate() {
+        let mut j = DMatrix::zeros(1, unknowns);
+        j[(0, lasting + k)] = 1.0;
+        add(j, DVector::zeros(1), DMatrix::from_element(1, 1, sigma.powi(-2)));
+    }
     for i in 0..=steps {
         if i > 0 {
             let noise = p.motion_noise(&motion);
@@ -91,6 +97,9 @@ fn equals_batch_least_squares() {
             let mut j = DMatrix::zeros(3, unknowns);
             j.view_mut((0, 3 * i), (3, 3)).fill_with_identity();
             j.view_mut((0, 3 * (i - 1)), (3, 3)).copy_from(&-by_pose);
+            let length_m = motion.position().norm();
+            let by_errors = by_motion * Matrix3x2::new(motion.x_m, 0.0, motion.y_m, 0.0, 0.0, length_m);
+            j.view_mut((0, lasting), (3, 2)).copy_from(&-by_errors);
             add(j, DVector::zeros(3), dynamic(&w));
             (truth, odom) = (truth.compose(&motion), odom.compose(&motion));
         }
@@ -115,6 +124,67 @@ fn equals_batch_least_squares() {
             assert!((got - want).abs() < 1e-6 * covariance[(at, at)], "{k} {l}: {got} {want}");
         }
     }
+}
+
+#[test]
+fn odometry_learns_its_own_errors() {
+    // 24 drives past a landmark every 6 m, by a robot whose odometry is off by a scale and a turn of its own.
+    let p = FuseParams::default();
+    let mut random = Random::new(5);
+    let (mut before, mut after, mut nees, drives) = (0.0, 0.0, 0.0, 24);
+    for _ in 0..drives {
+        let true_errors =
+            Vector2::new(p.scale_sigma * random.normal(), p.turn_bias_sigma_rad_per_m * random.normal());
+        let mut fuser = Fuser::new(p.clone());
+        let (mut truth, mut odom) = (Pose2::default(), Pose2::default());
+        let mut missed_m = Vec::new();
+        for i in 0..=240_i64 {
+            fuser.odometry(i * SECOND / 10, odom).unwrap();
+            if i % 60 == 0 {
+                if let Some(fused) = fuser.pose() {
+                    missed_m.push(fused.pose.pose.minus(&truth).fixed_rows::<2>(0).norm());
+                }
+                let off =
+                    Vector3::new(0.01 * random.normal(), 0.01 * random.normal(), 0.002 * random.normal());
+                let seen = fix(i as u64, truth.plus(&off), 0.01, 1e-4);
+                fuser.fix(i * SECOND / 10, &seen).unwrap();
+            }
+            let measured = Pose2::new(0.1, 0.0, 0.0);
+            let turn_rad = 0.1 * true_errors.y;
+            odom = odom.compose(&measured);
+            truth = truth.compose(&Pose2::new(0.1 * (1.0 + true_errors.x), 0.0, turn_rad));
+        }
+        (before, after) = (before + missed_m[0], after + missed_m[3]);
+        let known = fuser.odometry_errors().unwrap();
+        let off = known.errors - true_errors;
+        nees += off.dot(&(known.covariance.try_inverse().unwrap() * off));
+        assert!(known.covariance[(0, 0)] < 0.15 * p.scale_sigma.powi(2), "{}", known.covariance);
+    }
+    assert!(after < 0.35 * before, "{after} m before the fourth landmark, {before} m before the second");
+    // The drives have none of the noise that the filter allows for: surer than it claims, but no less.
+    assert!(nees / f64::from(drives) < 2.6, "{nees}");
+}
+
+#[test]
+fn what_odometry_learnt_outlives_a_jump() {
+    let mut fuser = Fuser::new(FuseParams::default());
+    assert_eq!(fuser.odometry_errors(), None);
+    drive(&mut fuser, 1.0);
+    let start = Pose2Covariance::new(Pose2::default(), Matrix3::identity() * 1e-4).unwrap();
+    fuser.start(&start).unwrap();
+    for i in 11..=100 {
+        fuser.odometry(i * SECOND / 10, Pose2::new(i as f64 * 0.1, 0.0, 0.0)).unwrap();
+    }
+    // 9 m by odometry were 9.09 m.
+    fuser.fix(10 * SECOND, &fix(1, Pose2::new(9.09, 0.0, 0.0), 0.01, 1e-4)).unwrap();
+    let learnt = fuser.odometry_errors().unwrap();
+    assert!((0.007..0.01).contains(&learnt.errors.x), "{}", learnt.errors);
+    let before: Matrix2<f64> = learnt.covariance;
+    assert_eq!(fuser.odometry(11 * SECOND, Pose2::new(900.0, 0.0, 0.0)).unwrap(), OdometryOutcome::Jumped);
+    assert_eq!(fuser.pose(), None);
+    assert_eq!(fuser.odometry_errors(), Some(learnt));
+    fuser.fix(11 * SECOND, &fix(1, Pose2::new(3.0, 0.0, 0.0), 0.01, 1e-4)).unwrap();
+    assert_eq!(fuser.odometry_errors().unwrap().covariance, before);
 }
 
 #[test]
