@@ -152,8 +152,10 @@ fn fitted_likeness(evidence: &Evidence, p: &Params) -> Result<Threshold, Thresho
 // the other. Where a map's kind is one of the paper's, too few stable points keep a landmark out (recognise/compare.rs).
 fn status(model: &LandmarkModel, missing: [Option<Gate>; 3], p: &Params) -> ModelStatus {
     let g = &p.learn.gates;
-    let observed = model.views - model.generated_views > 1;
-    let min_saliency_f = if observed { g.min_saliency_f } else { g.min_saliency_f_generated };
+    let photographed = model.views - model.generated_views;
+    let observed = if photographed > 1 { photographed as f64 / model.views as f64 } else { 0.0 };
+    let generated_f = g.min_saliency_f_generated;
+    let min_saliency_f = generated_f + observed * (g.min_saliency_f - generated_f);
     let shown = |e: &IconFeatures| shown(&Smoothed::new(&e.icon), &p.recognise.correlation);
     let content = model.exemplars.iter().map(shown).fold(0.0, f64::max);
     let mut measured = vec![

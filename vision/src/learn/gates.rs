@@ -20,7 +20,7 @@ pub struct GateParams {
     pub min_views: usize,
     /// Least saliency F.
     pub min_saliency_f: f64,
-    /// The same where at most one view was photographed. Generated views are flat and registered by construction, so
+    /// The same where at most one view was photographed; else the limit lies between, by the share of photographed ones. Generated views are flat and registered by construction, so
     /// F only has to tell texture from a blank panel (1.1), while their corner noise and light are harsher than a
     /// robot's own.
     pub min_saliency_f_generated: f64,
