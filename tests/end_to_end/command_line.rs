@@ -22,7 +22,7 @@ use vision::{detect::quads::Corners, geometry::polygon};
 const LONGEST: Duration = Duration::from_mins(2);
 
 /// Options that each command must name in its help.
-const OPTIONS: [(&str, &[&str]); 29] = [
+const OPTIONS: [(&str, &[&str]); 30] = [
     ("demo", &["--robots", "--rate-hz", "--legs", "--seed", "--http", "--data", "--stay", "--json"]),
     ("serve", &["--config", "--data", "--http", "--zenoh", "--fleet", "--workers", "--insecure"]),
     (
@@ -52,6 +52,10 @@ const OPTIONS: [(&str, &[&str]); 29] = [
     ("robot list", &["--server", "--json"]),
     ("learn", &["--map", "--landmark", "--size", "--whole-image", "--generated-views", "--server"]),
     ("recognise", &["--map", "--camera", "--server", "--json", "<IMAGES>"]),
+    (
+        "evaluate navigation",
+        &["--drives", "--posters", "--length-m", "--rate-hz", "--seed", "--json", "--plot"],
+    ),
     (
         "evaluate detection",
         &[

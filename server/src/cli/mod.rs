@@ -13,6 +13,7 @@ pub(crate) mod pictures;
 pub(crate) mod scratch;
 mod screen;
 mod serve;
+mod survey;
 mod teach;
 
 use clap::{Parser, Subcommand};

@@ -2,6 +2,7 @@
 
 pub(crate) mod chart;
 pub(crate) mod experiment;
+pub(crate) mod navigation;
 pub(crate) mod rendered;
 pub(crate) mod reviewed;
 pub(crate) mod statistics;
@@ -73,6 +74,13 @@ pub(crate) enum Command {
     /// Generated rooms with everything uncertain drawn anew, rendered corridors with the detector's corners, and things
     /// that hang on no wall.
     Placement(placement::Args),
+    /// Robots drive through the paper's corridor: how far off they are along it, with odometry alone beside it.
+    ///
+    /// 25 m, four posters taught by a first drive, a start that nobody tells. Everything is rendered, nothing is needed.
+    /// For example:
+    ///   waymark evaluate navigation --plot corridor.svg
+    #[command(verbatim_doc_comment)]
+    Navigation(navigation::Args),
 }
 
 /// Runs one evaluation.
@@ -90,5 +98,6 @@ pub(crate) fn run(command: &Command) -> anyhow::Result<()> {
         Command::Calibration(args) => calibration::run(args),
         Command::Pose(args) => pose::run(args),
         Command::Placement(args) => placement::run(args),
+        Command::Navigation(args) => navigation::run(args),
     }
 }

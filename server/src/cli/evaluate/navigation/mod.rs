@@ -1,0 +1,67 @@
+//! `waymark evaluate navigation` (method 18, E10 and E12): the paper's corridor, 25 m long with four posters. A first drive
+//! teaches, then robots drive through it, each from a start that nobody tells, and are localised by landmarks and
+//! odometry. It runs in this program, with the code that the server runs, without a server, from a seed.
+
+mod journey;
+mod plot;
+mod report;
+mod world;
+
+use super::experiment::{mixed, of_each, say, write_plot};
+use journey::{Journey, drive};
+use report::Report;
+use std::path::PathBuf;
+use world::World;
+
+/// `waymark evaluate navigation`.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
+    /// Drives, one length of the corridor each, from both ends in turn.
+    #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    drives: u32,
+    /// Posters in the corridor: alternately left and right, the last two at its ends.
+    #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=64))]
+    posters: u32,
+    /// Length of the corridor.
+    #[arg(long, value_name = "M", default_value_t = 25.0, value_parser = length)]
+    length_m: f64,
+    /// Frames a second.
+    #[arg(long, default_value_t = 5.0, value_parser = rate)]
+    rate_hz: f64,
+    /// Building, lesson, drives and all noise follow from it.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// One JSON object instead of a table.
+    #[arg(long)]
+    json: bool,
+    /// Draw the first drive from above (true track, odometry, corrected), and its error over time with the band of three
+    /// standard deviations, as an SVG picture.
+    #[arg(long, value_name = "FILE")]
+    plot: Option<PathBuf>,
+}
+
+fn within(text: &str, [low, high]: [f64; 2]) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(x) if (low..=high).contains(&x) => Ok(x),
+        _ => Err(format!("a number from {low} to {high}")),
+    }
+}
+
+fn length(text: &str) -> Result<f64, String> {
+    within(text, [6.0, 200.0])
+}
+
+fn rate(text: &str) -> Result<f64, String> {
+    within(text, [0.2, 30.0])
+}
+
+/// Teaches, drives, reports.
+pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
+    let world = World::taught(args.length_m, args.posters as usize, args.seed)?;
+    let seeds: Vec<u64> = (0..args.drives).map(|n| mixed(&[args.seed, 10, u64::from(n)])).collect();
+    let journeys: Vec<Journey> =
+        of_each(&seeds, "drives", |n, seed| drive(&world, *seed, n % 2 == 1, args.rate_hz));
+    let report = Report::new(&world, &journeys, args.seed);
+    say(args.json, &report, || report.lines())?;
+    write_plot(args.plot.as_deref(), || plot::svg(&world, &journeys[0]))
+}

@@ -1,0 +1,167 @@
+//! All drives as figures: errors along and across the corridor, how honest the covariance is, what was seen.
+
+use super::{
+    journey::{Journey, Moment},
+    world::World,
+};
+use crate::cli::evaluate::statistics::quantile;
+use map::pose2::{Pose2Covariance, wrap_rad};
+use serde::Serialize;
+
+/// 95 % of chi2 with 3 degrees of freedom.
+const CHI2_3_95: f64 = 7.815;
+
+/// Median, 95 % quantile and largest of absolute errors.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub(super) struct Errors {
+    median: f64,
+    p95: f64,
+    worst: f64,
+}
+
+impl Errors {
+    fn of(errors: impl Iterator<Item = f64>) -> Option<Self> {
+        let mut all: Vec<f64> = errors.map(f64::abs).collect();
+        let worst = all.iter().copied().fold(0.0, f64::max);
+        Some(Self { median: quantile(&mut all, 0.5)?, p95: quantile(&mut all, 0.95)?, worst })
+    }
+
+    fn in_words(this: Option<&Self>) -> String {
+        this.map_or("-".to_owned(), |e| format!("{:.3}  {:.3}  {:.3}", e.median, e.p95, e.worst))
+    }
+}
+
+/// What is said of all drives. Along is the map's x axis.
+#[derive(Debug, Serialize)]
+pub(super) struct Report {
+    experiment: &'static str,
+    seed: u64,
+    length_m: f64,
+    posters: usize,
+    landmarks: usize,
+    /// Of the landmarks' places against the truth.
+    place_error_m: Option<Errors>,
+    drives: usize,
+    frames: usize,
+    shown: usize,
+    recognised: usize,
+    false_matches: usize,
+    corrections: usize,
+    gated: usize,
+    /// Drives that never were fixed.
+    never_fixed: usize,
+    /// Frames that showed a landmark up to the first fix, in the worst drive.
+    frames_to_fix_worst: Option<usize>,
+    /// From the first fix on.
+    along_m: Option<Errors>,
+    across_m: Option<Errors>,
+    heading_rad: Option<Errors>,
+    /// Odometry alone, which was told the true start; all frames.
+    odometry_along_m: Option<Errors>,
+    odometry_across_m: Option<Errors>,
+    /// Mean normalised squared error of the fused pose, 3 expected, and the share of frames within its 95 %.
+    nees: f64,
+    nees_within_95: f64,
+}
+
+impl Report {
+    pub(super) fn new(world: &World, journeys: &[Journey], seed: u64) -> Self {
+        let moments = || journeys.iter().flat_map(|j| &j.moments);
+        let fused = || moments().filter_map(|m| Some((m, m.fused.as_ref()?)));
+        let errors = |of: fn(&Moment, &Pose2Covariance) -> f64| Errors::of(fused().map(|(m, f)| of(m, f)));
+        let squares: Vec<f64> = fused().filter_map(|(m, f)| nees(m, f)).collect();
+        let count = squares.len().max(1) as f64;
+        let of_each = |count: fn(&Journey) -> usize| journeys.iter().map(count).sum();
+        Self {
+            experiment: "navigation",
+            seed,
+            length_m: world.length_m,
+            posters: world.posters,
+            landmarks: world.map.models.len(),
+            place_error_m: Errors::of(world.place_errors_m.iter().copied()),
+            drives: journeys.len(),
+            frames: moments().count(),
+            shown: of_each(|j| j.shown),
+            recognised: of_each(|j| j.recognised),
+            false_matches: of_each(|j| j.false_matches),
+            corrections: moments().filter(|m| m.corrected).count(),
+            gated: of_each(|j| j.gated),
+            never_fixed: journeys.iter().filter(|j| j.frames_to_fix.is_none()).count(),
+            frames_to_fix_worst: journeys.iter().filter_map(|j| j.frames_to_fix).max(),
+            along_m: errors(|m, f| f.pose.x_m - m.truth.x_m),
+            across_m: errors(|m, f| f.pose.y_m - m.truth.y_m),
+            heading_rad: errors(|m, f| wrap_rad(f.pose.theta_rad - m.truth.theta_rad)),
+            odometry_along_m: Errors::of(moments().map(|m| m.odometry.x_m - m.truth.x_m)),
+            odometry_across_m: Errors::of(moments().map(|m| m.odometry.y_m - m.truth.y_m)),
+            nees: squares.iter().sum::<f64>() / count,
+            nees_within_95: squares.iter().filter(|s| **s < CHI2_3_95).count() as f64 / count,
+        }
+    }
+
+    /// For people.
+    pub(super) fn lines(&self) -> Vec<String> {
+        let words = |e: &Option<Errors>| Errors::in_words(e.as_ref());
+        vec![
+            format!(
+                "navigation: corridor of {} m, {} of {} posters in use, {} drives, seed {}",
+                self.length_m, self.landmarks, self.posters, self.drives, self.seed
+            ),
+            format!("  frames          {}", self.frames),
+            format!("  recognitions    {} of {} full views of landmarks in use", self.recognised, self.shown),
+            format!("  false matches   {}", self.false_matches),
+            format!("  corrections     {}, {} more not believed by the filter", self.corrections, self.gated),
+            format!(
+                "  first fix       after {} frames that show a landmark at worst; {} drives had none",
+                self.frames_to_fix_worst.map_or("-".to_owned(), |n| n.to_string()),
+                self.never_fixed
+            ),
+            "  errors                        median  95 %   worst".to_owned(),
+            format!("  places of landmarks, m        {}", words(&self.place_error_m)),
+            format!("  along the corridor, m         {}", words(&self.along_m)),
+            format!("  across it, m                  {}", words(&self.across_m)),
+            format!("  heading, rad                  {}", words(&self.heading_rad)),
+            format!("  odometry alone, along, m      {}", words(&self.odometry_along_m)),
+            format!("  odometry alone, across, m     {}", words(&self.odometry_across_m)),
+            format!(
+                "  covariance: mean NEES {:.2} (3 expected), {:.1} % of poses within its 95 %",
+                self.nees,
+                100.0 * self.nees_within_95
+            ),
+            "  Errors from the first fix on; odometry alone was told the true start.".to_owned(),
+        ]
+    }
+}
+
+/// Squared error by the covariance that was claimed.
+fn nees(moment: &Moment, fused: &Pose2Covariance) -> Option<f64> {
+    let error = fused.pose.minus(&moment.truth);
+    Some(error.dot(&(fused.covariance.try_inverse()? * error)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use map::pose2::Pose2;
+    use nalgebra::Matrix3;
+
+    #[test]
+    fn errors_by_hand() {
+        let e = Errors::of([0.1, -0.3, 0.2].into_iter()).unwrap();
+        assert!((e.median - 0.2).abs() < 1e-12 && (e.worst - 0.3).abs() < 1e-12 && e.p95 <= 0.3);
+        assert!(Errors::of(std::iter::empty()).is_none());
+    }
+
+    #[test]
+    fn a_normalised_error_by_hand() {
+        let fused = Pose2Covariance {
+            pose: Pose2::new(1.0, 2.0, 0.0),
+            covariance: Matrix3::from_diagonal(&nalgebra::Vector3::new(0.01, 0.04, 0.01)),
+        };
+        let truth = Pose2::new(1.2, 2.0, 0.1);
+        let moment = Moment { time_s: 0.0, truth, odometry: truth, fused: Some(fused), corrected: false };
+        // Two sigma along, one in heading.
+        assert!((nees(&moment, &fused).unwrap() - 5.0).abs() < 1e-9);
+        let sure = Pose2Covariance { covariance: Matrix3::zeros(), ..fused };
+        assert!(nees(&moment, &sure).is_none());
+    }
+}

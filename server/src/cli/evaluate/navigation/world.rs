@@ -1,0 +1,151 @@
+//! The corridor and what a first drive taught of it: walls, places and models, as a server would hold them, here in
+//! memory.
+
+use crate::{
+    cli::{
+        evaluate::experiment::{mixed, of_each},
+        screen,
+        survey::{View as Look, hang, survey},
+    },
+    engine::snapshot::{LandmarkInfo, MapSnapshot},
+};
+use anyhow::Context as _;
+use map::place::LandmarkPlace;
+use sim::{
+    building::Building,
+    corridor::CorridorParams,
+    lesson::{LessonParams, stops},
+    robot::{Robot, RobotParams},
+};
+use std::{collections::BTreeMap, sync::Arc};
+use vision::{
+    learn::{
+        model::{LandmarkModel, ModelStatus, View, add_negatives, learn},
+        synthesis,
+    },
+    localise::pose::LandmarkSize,
+    params::Params,
+    recognise::{IconFeatures, LandmarkId, ModelSet, features},
+};
+
+/// Views each landmark is learnt from: what the first drive did not photograph is generated.
+const VIEWS: usize = 30;
+/// Icons of each landmark that the others must be told from.
+const NEGATIVES: usize = 10;
+
+/// The corridor and its map.
+pub(super) struct World {
+    pub(super) building: Arc<Building>,
+    pub(super) map: MapSnapshot,
+    pub(super) length_m: f64,
+    /// Posters that hang there.
+    pub(super) posters: usize,
+    /// Distance of each placed landmark from its true place.
+    pub(super) place_errors_m: Vec<f64>,
+}
+
+/// One poster after the first drive.
+struct Lesson {
+    name: String,
+    place: LandmarkPlace,
+    views: Vec<View>,
+    icons: Vec<IconFeatures>,
+}
+
+impl World {
+    /// Builds the corridor, surveys it and learns its posters.
+    pub(super) fn taught(length_m: f64, posters: usize, seed: u64) -> anyhow::Result<Self> {
+        let p = Params::default();
+        let corridor = CorridorParams {
+            length_m,
+            posters,
+            first_poster: mixed(&[seed, 11]),
+            ..CorridorParams::default()
+        };
+        let building = Arc::new(Building::corridor_with(&corridor, seed));
+        let robot = Robot::new(building.clone(), &RobotParams::default());
+        let camera = *robot.camera().intrinsics();
+        let survey = survey(robot, &stops(&building, &LessonParams { seed, ..LessonParams::default() }))?;
+        let found: Vec<(&String, &Vec<Look>)> = survey.views.iter().collect();
+        let lessons: Vec<Lesson> = of_each(&found, "views", |i, (name, looks)| {
+            let (place, agreed) = hang(looks, &survey.walls, &camera)?;
+            let looks: Vec<&Look> = agreed.iter().map(|&i| &looks[i]).collect();
+            let views = views(&looks, mixed(&[seed, 12, i as u64]), &p);
+            let each = views.iter().step_by(views.len().div_ceil(NEGATIVES).max(1));
+            let icons = each.map(|v| features(v.icon.clone(), &p.recognise)).collect();
+            Some(Lesson { name: (*name).clone(), place, views, icons })
+        })
+        .into_iter()
+        .flatten()
+        .collect();
+        let models = of_each(&lessons, "learning", |i, lesson| {
+            let alone = learn(LandmarkId(i as u64), &lesson.views, &[], &p).ok()?;
+            let others = lessons.iter().enumerate().filter(|(other, _)| *other != i);
+            let others: Vec<IconFeatures> = others.flat_map(|(_, l)| l.icons.iter().cloned()).collect();
+            Some(add_negatives(&alone, &others, &p))
+        });
+        let models = in_use(&lessons, models);
+        let map = snapshot(&lessons, models, p)?;
+        anyhow::ensure!(!map.models.is_empty(), "no poster passed the gates of learning; try another --seed");
+        let place_errors_m = lessons.iter().map(|l| place_error_m(&building, l)).collect::<Result<_, _>>()?;
+        Ok(Self { building, map, length_m, posters, place_errors_m })
+    }
+
+    /// The landmark's name.
+    pub(super) fn name(&self, id: LandmarkId) -> &str {
+        self.map.landmarks.get(&id).map_or("", |info| &info.name)
+    }
+}
+
+fn views(looks: &[&Look], seed: u64, p: &Params) -> Vec<View> {
+    let image = |look: &Look| look.sighting.frame.image.clone();
+    let photographed = looks.iter().filter_map(|l| View::photographed(&image(l), &l.quad.corners_px, p).ok());
+    let mut views: Vec<View> = photographed.collect();
+    let wanted = VIEWS.saturating_sub(views.len());
+    for (i, look) in looks.iter().enumerate() {
+        let count = (wanted + looks.len() - 1 - i) / looks.len();
+        let seed = mixed(&[seed, i as u64]);
+        views.extend(synthesis::views(&image(look), &look.quad.corners_px, count, p, seed));
+    }
+    views
+}
+
+/// Those that passed the gates; of the others it is said why not.
+fn in_use(lessons: &[Lesson], models: Vec<Option<LandmarkModel>>) -> Vec<Arc<LandmarkModel>> {
+    let mut active = Vec::new();
+    for (lesson, model) in lessons.iter().zip(models) {
+        match model.as_ref().map(|m| &m.status) {
+            Some(ModelStatus::Active) => active.extend(model.map(Arc::new)),
+            Some(ModelStatus::Candidate(failures)) => {
+                let reasons: Vec<String> = failures.iter().map(ToString::to_string).collect();
+                screen::complain(&format!("{} is not in use: {}", lesson.name, reasons.join("; ")));
+            }
+            None => screen::complain(&format!("{} could not be learnt", lesson.name)),
+        }
+    }
+    active
+}
+
+fn snapshot(
+    lessons: &[Lesson],
+    models: Vec<Arc<LandmarkModel>>,
+    params: Params,
+) -> anyhow::Result<MapSnapshot> {
+    let models = ModelSet::new(models, &params)?;
+    let numbered = || lessons.iter().enumerate().map(|(i, l)| (LandmarkId(i as u64), l));
+    let sizes: BTreeMap<LandmarkId, LandmarkSize> = numbered().map(|(id, l)| (id, l.place.size)).collect();
+    let landmarks: BTreeMap<LandmarkId, LandmarkInfo> = numbered()
+        .map(|(id, l)| {
+            (id, LandmarkInfo { name: l.name.clone(), size: Some(l.place.size), place: Some(l.place) })
+        })
+        .collect();
+    let params = Arc::new(params);
+    Ok(MapSnapshot { landmarks, sizes, models, params, ..MapSnapshot::empty("corridor", 1) })
+}
+
+fn place_error_m(building: &Building, lesson: &Lesson) -> anyhow::Result<f64> {
+    let truth = building.landmark(&lesson.name).context("a taught poster that the building lacks")?;
+    let at = truth.map_from_landmark.translation.vector;
+    let place = &lesson.place;
+    Ok((at - nalgebra::Vector3::new(place.x_m, place.y_m, place.z_m)).norm())
+}

@@ -1,0 +1,111 @@
+//! A first drive: a robot that knows its pose maps the walls by laser, looks at every poster from several sides, and
+//! what the detector finds there is hung on the walls. The demo teaches it to a server, an evaluation to itself.
+//!
+//! What a person adds in the field is the name of the poster and a click on the right quad; here the simulator's truth
+//! stands in for the click. Corners, places and sizes are measured, not taken from the truth.
+
+use super::screen;
+use map::{
+    lines::{self, LineParams},
+    mounting::Mounting,
+    place::LandmarkPlace,
+    placing::{PlacingParams, PlacingView, ViewOnWall, placement, view_on_wall},
+    pose2::Pose2Covariance,
+    segments::LaserSegment,
+    walls::{WallParams, Walls},
+};
+use nalgebra::{Matrix3, Vector3};
+use sim::{
+    lesson::Stop,
+    robot::{Robot, Sighting},
+};
+use std::collections::BTreeMap;
+use vision::{
+    detect::{
+        detect,
+        quads::{Quad, QuadKind},
+    },
+    frame::Intrinsics,
+    geometry::polygon,
+    params::DetectParams,
+    trace::NoTrace,
+};
+
+/// How well the surveying robot knows its pose: standard deviations of x, y (metres) and heading (radians).
+const SURVEY_SIGMA: [f64; 3] = [0.01, 0.01, 0.002];
+/// The person clicks on the quad that is the poster.
+const IOU_CLICKED: f64 = 0.7;
+
+/// One look at a poster in which it was found.
+pub(crate) struct View {
+    pub(crate) quad: Quad,
+    pub(crate) sighting: Sighting,
+}
+
+/// What the surveying robot brought home.
+pub(crate) struct Survey {
+    pub(crate) walls: Vec<LaserSegment>,
+    /// By poster.
+    pub(crate) views: BTreeMap<String, Vec<View>>,
+    /// Looks at a poster in which the detector did not find it.
+    pub(crate) missed: usize,
+}
+
+/// Drives to all stops.
+pub(crate) fn survey(mut robot: Robot, stops: &[Stop]) -> anyhow::Result<Survey> {
+    let progress = screen::progress(stops.len(), "first drive");
+    let mut walls = Walls::new(WallParams::default());
+    let (mut views, mut missed) = (BTreeMap::<String, Vec<View>>::new(), 0);
+    for stop in stops {
+        let sighting = robot.look(&stop.step);
+        walls.add(&surveyed(&sighting)?, &lines::segments(&sighting.scan, &LineParams::default()))?;
+        match clicked(&sighting, &stop.landmark) {
+            Some(quad) => views.entry(stop.landmark.clone()).or_default().push(View { quad, sighting }),
+            None => missed += 1,
+        }
+        progress.inc(1);
+    }
+    progress.finish_and_clear();
+    Ok(Survey { walls: walls.segments().cloned().collect(), views, missed })
+}
+
+fn surveyed(sighting: &Sighting) -> Result<Pose2Covariance, map::check::OutOfRange> {
+    let variances = Vector3::from(SURVEY_SIGMA.map(|sigma| sigma * sigma));
+    Pose2Covariance::new(sighting.step.map_from_robot, Matrix3::from_diagonal(&variances))
+}
+
+/// The detected quad that a person would click on.
+fn clicked(sighting: &Sighting, name: &str) -> Option<Quad> {
+    let truth = sighting.frame.truth.landmark(name)?;
+    detect(&sighting.frame.image, &DetectParams::default(), &mut NoTrace)
+        .into_iter()
+        .filter(|quad| quad.kind == QuadKind::Full)
+        .find(|quad| polygon::iou(quad.corners_px.points(), truth.corners_px.points()) >= IOU_CLICKED)
+}
+
+/// Where the views say that it hangs, and which of them agree on that. The others saw another border of the same thing,
+/// or something else: their icons would not fit the model (method 7, rectangle consistency).
+pub(crate) fn hang(
+    views: &[View],
+    walls: &[LaserSegment],
+    camera: &Intrinsics,
+) -> Option<(LandmarkPlace, Vec<usize>)> {
+    let p = PlacingParams::default();
+    let on_walls: Vec<(usize, ViewOnWall)> = views
+        .iter()
+        .enumerate()
+        .filter_map(|(i, view)| {
+            let look = PlacingView {
+                corners: &view.quad.corners_px,
+                covariance_px2: &view.quad.corner_covariance_px2,
+                camera,
+                map_from_robot: &surveyed(&view.sighting).ok()?,
+                mounting: &Mounting::new(view.sighting.step.robot_from_camera).ok()?,
+            };
+            Some((i, view_on_wall(&look, walls, &p).ok()?))
+        })
+        .collect();
+    let rectangles: Vec<ViewOnWall> = on_walls.iter().map(|(_, rectangle)| rectangle.clone()).collect();
+    let placement = placement(&rectangles, walls, &p).ok()?;
+    Some((placement.place, placement.used.iter().map(|&i| on_walls[i].0).collect()))
+}
