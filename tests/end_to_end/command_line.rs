@@ -22,7 +22,7 @@ use vision::{detect::quads::Corners, geometry::polygon};
 const LONGEST: Duration = Duration::from_mins(2);
 
 /// Options that each command must name in its help.
-const OPTIONS: [(&str, &[&str]); 30] = [
+const OPTIONS: [(&str, &[&str]); 34] = [
     ("demo", &["--robots", "--rate-hz", "--legs", "--seed", "--http", "--data", "--stay", "--json"]),
     ("serve", &["--config", "--data", "--http", "--zenoh", "--fleet", "--workers", "--insecure"]),
     (
@@ -48,6 +48,22 @@ const OPTIONS: [(&str, &[&str]); 30] = [
     ),
     ("map create", &["--distance", "--server", "--json", "<NAME>"]),
     ("map list", &["--server", "--json"]),
+    (
+        "map build",
+        &[
+            "--max-range-m",
+            "--field-deg",
+            "--out",
+            "--draw",
+            "--params",
+            "--json",
+            "--server",
+            "--map",
+            "<LOG>",
+        ],
+    ),
+    ("map import", &["--min-length-m", "--out", "--draw", "--json", "--server", "--map", "<FILE>"]),
+    ("map export", &["--out", "--resolution-m", "--server", "--map", "[FILE]"]),
     ("robot add", &["--map", "--server", "<NAME>"]),
     ("robot list", &["--server", "--json"]),
     ("learn", &["--map", "--landmark", "--size", "--whole-image", "--generated-views", "--server"]),
@@ -116,6 +132,10 @@ const OPTIONS: [(&str, &[&str]); 30] = [
     ),
     ("evaluate placement", &["--rooms", "--views", "--corridors", "--seed", "--json"]),
     ("evaluate pose", &["--draws", "--drives", "--seed", "--no-peers", "--python", "--json"]),
+    (
+        "evaluate mapping",
+        &["--odometry-noise", "--seed", "--duration-s", "--params", "--draw", "--plot", "--json", "[LOGS]"],
+    ),
     ("fit confidence", &["--quads", "--set", "--photographs", "--rust"]),
     (
         "fit search",

@@ -8,6 +8,7 @@ mod detect;
 mod drawing;
 mod fit;
 pub(crate) mod evaluate;
+pub(crate) mod mapping;
 mod parameters;
 pub(crate) mod pictures;
 pub(crate) mod scratch;
@@ -60,7 +61,7 @@ enum Command {
     ///   waymark calibrate --corners corners.json --size 1x1 --radial 0 --json
     #[command(verbatim_doc_comment)]
     Calibrate(calibrate::Args),
-    /// Make and list the maps of a running server.
+    /// Maps: of a running server, and of walls built from laser recordings or other programs' files.
     #[command(subcommand)]
     Map(teach::MapCommand),
     /// Make robots known to a running server.

@@ -1,6 +1,6 @@
 //! Commands against a running server: `map`, `robot`, `learn`, `recognise`.
 
-use super::screen;
+use super::{mapping, screen};
 use client::{
     ClientError, MapClient,
     lessons::{Job, Size},
@@ -42,6 +42,30 @@ pub(crate) enum MapCommand {
         #[command(flatten)]
         server: ServerArgs,
     },
+    /// Build a map of walls from a laser recording: scans are matched, loops closed, walls drawn. No server needed.
+    ///
+    /// The first pose is the origin of the map. Standard output says how many loops were closed and refused: a picture
+    /// (--draw) shows where. Poses in a CARMEN log are taken for odometry; in a corrected log they are nearly right
+    /// already.
+    ///
+    /// For example:
+    ///   waymark map build hall.log.gz --out hall.json --draw hall.svg
+    ///   waymark map build hall.jsonl --server $SERVER --map hall
+    ///
+    /// A Waymark recording is JSON lines: a head, then one scan a line (`null`: no return; `t_s` and `truth` if known).
+    ///   `{"waymark_recording":1,"robot_from_laser":[0.2,0,0],"first_bearing_rad":-1.57,"bearing_step_rad":0.0087,"max_range_m":30}`
+    ///   `{"t_s":12.5,"odom":[1.0,0.2,0.05],"ranges_m":[1.93,null,2.01]}`
+    #[command(verbatim_doc_comment)]
+    Build(mapping::build::Args),
+    /// Walls from a ROS occupancy grid, a vector map or a map file, to a file or to a running server.
+    ///
+    /// The border between free and occupied cells becomes straight segments, the free side on their left. For example:
+    ///   waymark map import floor.yaml --out floor.json --draw floor.svg
+    ///   waymark map import floor.vectormap.txt --server $SERVER --map floor
+    #[command(verbatim_doc_comment)]
+    Import(mapping::import::ImportArgs),
+    /// Walls as a ROS occupancy grid, a vector map or a map file.
+    Export(mapping::import::ExportArgs),
 }
 
 /// `waymark robot`.
@@ -143,6 +167,9 @@ pub(crate) async fn map(command: &MapCommand) -> anyhow::Result<()> {
                 .collect();
             show(server, &maps, &lines.join("\n"))
         }
+        MapCommand::Build(args) => mapping::build::run(args).await,
+        MapCommand::Import(args) => mapping::import::import(args).await,
+        MapCommand::Export(args) => mapping::import::export(args).await,
     }
 }
 

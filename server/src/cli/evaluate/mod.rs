@@ -11,6 +11,7 @@ pub(crate) mod calibration;
 pub(crate) mod detection;
 pub(crate) mod placement;
 pub(crate) mod pose;
+pub(crate) mod mapping;
 pub(crate) mod recognition;
 
 /// What to evaluate.
@@ -55,6 +56,12 @@ pub(crate) enum Command {
     /// Pictures that are nearly the same (another text, one block changed, mirrored, two doors): told apart, refused as
     /// ambiguous, or confused.
     Lookalikes(experiment::doubles::Args),
+    /// Laser maps from recordings: error of relative poses, odometry alone and published figures beside it, walls, time.
+    ///
+    /// For example:
+    ///   waymark evaluate mapping laser-carmen-corrected laser-intel-raw-odometry --draw maps --plot mapping.svg
+    #[command(verbatim_doc_comment)]
+    Mapping(mapping::Args),
     /// Whether confidences keep their word: reliability diagram and expected calibration error.
     Confidence(experiment::confidence::Args),
     /// Auto-calibration of a camera from views of one quad: error of the focal length by the number of views (Fig. 17).
@@ -99,5 +106,6 @@ pub(crate) fn run(command: &Command) -> anyhow::Result<()> {
         Command::Pose(args) => pose::run(args),
         Command::Placement(args) => placement::run(args),
         Command::Navigation(args) => navigation::run(args),
+        Command::Mapping(args) => mapping::run(args),
     }
 }

@@ -1,0 +1,126 @@
+//! `waymark map build`: from a recording to a map.
+
+use super::{LaserArgs, draw, file::MapFile, open};
+use crate::cli::{clock::Clock, screen};
+use anyhow::Context as _;
+use client::MapClient;
+use map::slam::{Slam, SlamMap, SlamParams};
+use serde_json::json;
+use std::path::PathBuf;
+
+/// Where walls go on a server.
+#[derive(Debug, Clone, clap::Args)]
+pub(crate) struct Upload {
+    /// Replace the walls of --map on the server at this address.
+    #[arg(long, value_name = "URL", requires = "map")]
+    pub(crate) server: Option<String>,
+    /// The map on the server; made with `waymark map create`.
+    #[arg(long, value_name = "NAME")]
+    pub(crate) map: Option<String>,
+}
+
+impl Upload {
+    /// Sends the walls, if a server is named.
+    pub(crate) async fn send(&self, map: &MapFile) -> anyhow::Result<()> {
+        let (Some(server), Some(name)) = (&self.server, &self.map) else { return Ok(()) };
+        let ends: Vec<[[f64; 2]; 2]> = map.segments.iter().map(|s| [s.a, s.b]).collect();
+        MapClient::new(server)?.set_laser(name, &ends).await.context("upload")?;
+        screen::complain(&format!("{} segments are the walls of {name} now", ends.len()));
+        Ok(())
+    }
+}
+
+/// `waymark map build`.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
+    /// The recording: a CARMEN log (FLASER or ROBOTLASER1 lines), numbered scans (`i dx dy dtheta r0 r1 ..`), or a
+    /// Waymark recording; `.gz` is unpacked.
+    log: PathBuf,
+    #[command(flatten)]
+    laser: LaserArgs,
+    /// Write the map (walls with covariance, path, loops) as JSON.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Draw the map as SVG.
+    #[arg(long, value_name = "FILE")]
+    draw: Option<PathBuf>,
+    /// Parameters as a JSON file; what it does not name keeps its default.
+    #[arg(long, value_name = "FILE")]
+    params: Option<PathBuf>,
+    /// Print the summary as JSON.
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    upload: Upload,
+}
+
+/// A map and what it took.
+pub(crate) struct Built {
+    pub(crate) map: SlamMap,
+    /// Processor time of the mapping alone.
+    pub(crate) seconds: f64,
+}
+
+/// Maps records with `odometry` for theirs.
+pub(crate) fn build(
+    records: &[super::Record],
+    odometry: impl Fn(usize) -> map::pose2::Pose2,
+    params: SlamParams,
+) -> anyhow::Result<Built> {
+    let bar = screen::progress(records.len(), "mapping");
+    let clock = Clock::start();
+    let mut slam = Slam::new(params);
+    for (i, record) in records.iter().enumerate() {
+        slam.add(&odometry(i), &record.scan).with_context(|| format!("scan {i}"))?;
+        bar.inc(1);
+    }
+    bar.set_message("fitting");
+    let map = slam.finish()?;
+    bar.finish_and_clear();
+    Ok(Built { map, seconds: clock.ms() * 1e-3 })
+}
+
+/// The parameters of a file, or the defaults.
+pub(crate) fn params(path: Option<&PathBuf>) -> anyhow::Result<SlamParams> {
+    let Some(path) = path else { return Ok(SlamParams::default()) };
+    let name = || path.display().to_string();
+    let text = std::fs::read_to_string(path).with_context(name)?;
+    let mut json = serde_json::Deserializer::from_str(&text);
+    serde_path_to_error::deserialize(&mut json).with_context(name)
+}
+
+/// Runs the command.
+pub(crate) async fn run(args: &Args) -> anyhow::Result<()> {
+    let recording = open(&args.log, &args.laser)?;
+    let Built { map, seconds } =
+        build(&recording.records, |i| recording.records[i].odom, params(args.params.as_ref())?)?;
+    let file = MapFile::of(&map);
+    if let Some(out) = &args.out {
+        file.write(out)?;
+    }
+    if let Some(picture) = &args.draw {
+        std::fs::write(picture, draw::svg(&file, &recording.records))
+            .with_context(|| picture.display().to_string())?;
+    }
+    let way_m: f64 = map.path.windows(2).map(|p| p[0].between(&p[1]).position().norm()).sum();
+    let faster = recording.duration_s().map(|d| d / seconds.max(1e-9));
+    if args.json {
+        let summary = json!({
+            "scans": map.path.len(), "key_poses": map.keys.len(), "way_m": way_m, "segments": map.walls.len(),
+            "loops": map.loops.len(), "loops_refused": map.refused, "seconds": seconds,
+            "times_faster_than_recorded": faster,
+        });
+        screen::say(&summary.to_string());
+    } else {
+        screen::say(&format!(
+            "{} scans over {way_m:.0} m: {} key poses, {} loops closed, {} refused, {} wall segments; {seconds:.1} s{}",
+            map.path.len(),
+            map.keys.len(),
+            map.loops.len(),
+            map.refused,
+            map.walls.len(),
+            faster.map_or_else(String::new, |f| format!(", {f:.0} times faster than recorded")),
+        ));
+    }
+    args.upload.send(&file).await
+}
