@@ -55,8 +55,8 @@ impl Border {
         let mut chain = vec![point(at)];
         let width = self.width as i64;
         loop {
-            // Straight on, else to the right around the same cell, else to the left.
-            let next = [0, 3, 1, 2]
+            // To the left first: cells that touch at a corner are one wall, and the border stays on its side.
+            let next = [1, 0, 3, 2]
                 .map(|turn| (heading + turn) % 4)
                 .into_iter()
                 .find(|d| self.leaving[at] & (1 << d) != 0);

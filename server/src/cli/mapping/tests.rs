@@ -54,7 +54,7 @@ fn errors_name_line_and_field() {
     assert_eq!(bad("FLASER x"), (1, "number of readings".into()));
     assert_eq!(bad("FLASER 99999 1"), (1, "number of readings".into()));
     assert_eq!(bad("FLASER 1 nan 0 0 0 0 0 0 1 h 1"), (1, "range 0".into()));
-    assert_eq!(bad("FLASER 1 1 0 0 9e9 0 0 0 1 h 1\n"), (1, "laser pose".into()));
+    assert_eq!(bad("FLASER 1 1 9e9 0 0 0 0 0 1 h 1\n"), (1, "laser pose".into()));
     assert_eq!(bad("FLASER 0 0 0 0 0 0 0 1 h 1"), (1, "scan".into()));
     assert_eq!(bad("0 0 0 0 1 1 1\n2 0 0 0 1 1 1"), (2, "scan number".into()));
     assert_eq!(bad("0 0 0 0"), (1, "ranges".into()));
@@ -115,7 +115,7 @@ fn a_slanted_wall_of_a_grid_is_one_wall() {
     let walls = grid.walls(1.0);
     let along = |w: &&Wall| {
         let d = [w.b[0] - w.a[0], w.b[1] - w.a[1]];
-        (d[1] / d[0] - 1.0 / 3.0).abs() < 0.02 && d[0] > 0.0
+        (d[1] / d[0] - 1.0 / 3.0).abs() < 0.05 && d[0] > 0.0
     };
     let upper: f64 = walls.iter().filter(along).map(|w| w.b[0] - w.a[0]).sum();
     assert!(upper > 5.5, "{walls:?}");
