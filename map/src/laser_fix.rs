@@ -5,6 +5,7 @@
 use crate::{
     check::{self, MAX_VARIANCE, OutOfRange},
     laser::Scan,
+    localise::{DecidedBy, Fix},
     pose2::{Pose2, Pose2Covariance},
     segments::LaserSegment,
     slam::{
@@ -99,6 +100,21 @@ pub struct LaserFix {
     pub points: usize,
     /// Root mean square of their distances across the walls.
     pub rms_m: f64,
+}
+
+impl LaserFix {
+    /// For [`crate::fuse::Fuser::fix`]: rests on no landmark, and cannot start or replace a pose by itself.
+    pub fn fix(&self) -> Fix {
+        Fix {
+            pose: self.pose,
+            noise: self.pose.covariance,
+            nuisances: Vec::new(),
+            landmarks: Vec::new(),
+            decided_by: DecidedBy::Prior,
+            chi2: 0.0,
+            dof: self.points.saturating_sub(3),
+        }
+    }
 }
 
 /// Why a scan gave no pose.

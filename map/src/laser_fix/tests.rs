@@ -136,3 +136,23 @@ fn the_index_is_bounded() {
     let n = Vector2::new(-1.0, 1.0).normalize();
     assert!(index.nearest(&p, &n, 0.5, 0.8).is_some());
 }
+
+#[test]
+fn fused_along_a_corridor_the_doubt_stays_and_across_it_goes() {
+    use crate::fuse::{FixOutcome, FuseParams, Fuser};
+    let walls = vec![[-60.0, -1.0, 60.0, -1.0], [-60.0, 1.0, 60.0, 1.0]];
+    let mut random = Random::new(6);
+    let at = Pose2::new(3.0, 0.2, 0.1);
+    let v = Vector3::new(0.3, 0.1, 0.03).map(|s: f64| s * s);
+    let believed =
+        Pose2Covariance { pose: Pose2::new(2.6, 0.1, 0.12), covariance: Matrix3::from_diagonal(&v) };
+    let mut fuser = Fuser::new(FuseParams::default());
+    fuser.odometry(0, Pose2::default()).unwrap();
+    fuser.start(&believed).unwrap();
+    let found = fix(&walls, &at, &believed, &mut random).unwrap();
+    assert!(matches!(fuser.fix(0, &found.fix()).unwrap(), FixOutcome::Applied { .. }));
+    let fused = fuser.pose().unwrap().pose;
+    assert!((fused.pose.y_m - 0.2).abs() < 0.02 && (fused.pose.theta_rad - 0.1).abs() < 0.01, "{fused:?}");
+    assert!((fused.pose.x_m - 2.6).abs() < 0.02, "{fused:?}");
+    assert!((fused.covariance[(0, 0)].sqrt() - 0.3).abs() < 0.01 && fused.covariance[(1, 1)].sqrt() < 0.02);
+}
