@@ -7,7 +7,7 @@ const CHI2_2_95 = 5.991; // 95 % of a two-dimensional Gaussian
 
 const byId = (id) => document.getElementById(id);
 const state = {
-  map: null, walls: [], landmarks: [], robots: new Map(), cameras: new Map(), camera: null,
+  map: null, walls: [], landmarks: [], chosen: null, area: null, robots: new Map(), cameras: new Map(), camera: null,
   view: { x_m: 0, y_m: 0, px_per_m: 40, fitted: false }, recognised: new Map(), dirty: true, source: null,
 };
 
@@ -185,6 +185,7 @@ function drawMap() {
   c.lineCap = "round";
   const ink = resolveColours();
   drawGrid(c, w, h, ink);
+  drawArea(c, px, ink);
   if (layerOn("walls")) {
     stroke(c, ink.wall, 2.5);
     for (const wall of state.walls) { line(c, px(...wall.a), px(...wall.b)); }
@@ -217,6 +218,53 @@ function drawGrid(c, w, h, ink) {
   c.fillText(`${step} m`, 16, h - 17);
 }
 
+// From where the chosen landmark is seen.
+function drawArea(c, px, ink) {
+  if (!state.area) return;
+  c.fillStyle = ink.landmark;
+  c.globalAlpha = 0.18;
+  for (const [ring] of state.area.geometry.coordinates) {
+    c.beginPath();
+    for (const [x, y] of ring) c.lineTo(...px(x, y));
+    c.closePath();
+    c.fill();
+  }
+  c.globalAlpha = 1;
+}
+
+async function choose(landmark) {
+  state.chosen = landmark?.name ?? null;
+  state.area = null;
+  state.dirty = true;
+  byId("chosen").textContent = landmark ? factsOf(landmark) : "";
+  if (!landmark?.place || !landmark.size) return;
+  const path = `/maps/${encodeURIComponent(state.map)}/landmarks/${encodeURIComponent(landmark.name)}/visibility`;
+  const area = await getJson(path).catch(() => null);
+  if (!area || state.chosen !== landmark.name) return;
+  state.area = area;
+  state.dirty = true;
+  byId("chosen").textContent = `${factsOf(landmark)}, seen from ${area.properties.area_m2.toFixed(1)} m²`;
+}
+
+function factsOf(landmark) {
+  const finding = landmark.finding;
+  if (landmark.standing === "sound" || !finding) return `${landmark.name}: ${landmark.standing === "sound" ? landmark.status : landmark.standing}`;
+  const why = finding.kind === "moved" ? `appears ${finding.by_m.toFixed(2)} m from its place, ${finding.sightings} times` : `not seen where it should be, ${finding.looks} times`;
+  return `${landmark.name}: ${landmark.standing}, ${why}`;
+}
+
+// The landmark under the pointer, within 14 pixels of its middle.
+function landmarkAt(event) {
+  const canvas = byId("map");
+  const box = canvas.getBoundingClientRect();
+  const { x_m, y_m, px_per_m } = state.view;
+  const x = x_m + (event.clientX - box.left - canvas.clientWidth / 2) / px_per_m;
+  const y = y_m - (event.clientY - box.top - canvas.clientHeight / 2) / px_per_m;
+  const near = state.landmarks.filter((l) => l.place).map((l) => [Math.hypot(l.place.x_m - x, l.place.y_m - y), l]);
+  near.sort((a, b) => a[0] - b[0]);
+  return near.length && near[0][0] * px_per_m < 14 ? near[0][1] : null;
+}
+
 function drawLandmark(c, landmark, px, ink) {
   const place = landmark.place;
   if (!place) return;
@@ -226,8 +274,9 @@ function drawLandmark(c, landmark, px, ink) {
   stroke(c, ink.landmark, seen ? 9 : 5);
   line(c, px(place.x_m - dx, place.y_m - dy), px(place.x_m + dx, place.y_m + dy));
   const [u, v] = px(place.x_m + 0.35 * Math.cos(place.theta_rad), place.y_m + 0.35 * Math.sin(place.theta_rad));
-  c.font = seen ? "bold 12px system-ui" : "12px system-ui";
-  c.fillText(landmark.name, u - c.measureText(landmark.name).width / 2, v + 4);
+  c.font = seen || state.chosen === landmark.name ? "bold 12px system-ui" : "12px system-ui";
+  const label = landmark.standing === "sound" ? landmark.name : `${landmark.name} (${landmark.standing})`;
+  c.fillText(label, u - c.measureText(label).width / 2, v + 4);
   if (seen) state.dirty = true; // to dim it again in time
 }
 
@@ -293,6 +342,7 @@ async function loadMap(name) {
   ]);
   await loadTracks(name);
   Object.assign(state, { map: name, walls: laser.segments, landmarks: landmarks.items, dirty: true });
+  if (state.chosen) choose(state.landmarks.find((l) => l.name === state.chosen));
   const active = state.landmarks.filter((l) => l.status === "active").length;
   byId("map-facts").textContent = `version ${map.version}, ${active} of ${state.landmarks.length} landmarks active, ${state.walls.length} walls`;
   byId("map-hint").textContent = state.walls.length || state.landmarks.some((l) => l.place) ? "" : "This map has no walls and no placed landmarks yet.";
@@ -343,6 +393,12 @@ function wireUp() {
     view.px_per_m = next;
     state.dirty = true;
   };
+  let pressed = [0, 0];
+  canvas.addEventListener("pointerdown", (e) => { pressed = [e.clientX, e.clientY]; });
+  canvas.addEventListener("click", (e) => {
+    // The end of a drag chooses nothing.
+    if (Math.hypot(e.clientX - pressed[0], e.clientY - pressed[1]) < 4) choose(landmarkAt(e));
+  });
   canvas.addEventListener("wheel", (e) => { e.preventDefault(); zoom(Math.exp(-e.deltaY / 400), e.offsetX, e.offsetY); }, { passive: false });
   canvas.addEventListener("pointermove", (e) => {
     if (!(e.buttons & 1)) return;

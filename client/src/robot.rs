@@ -223,6 +223,23 @@ impl RobotClient {
         self.put(&key, bytes, Priority::DataLow).await
     }
 
+    /// Asks where to look, and waits for the advice.
+    pub async fn gaze(
+        &self,
+        request: &v1::GazeRequest,
+        wait: Duration,
+    ) -> Result<v1::GazeAdvice, ClientError> {
+        let key = self.keys.build(&Key::Gaze(self.robot.clone()));
+        let asked = self.session.get(key).payload(request.encode_to_vec()).timeout(wait);
+        let replies = asked.await.map_err(fault("ask where to look"))?;
+        let reply = replies.recv_async().await.map_err(|e| fault("hear where to look")(e))?;
+        let sample = reply
+            .result()
+            .map_err(|e| ClientError::Transport { action: "hear where to look", detail: e.to_string() })?;
+        v1::GazeAdvice::decode(&*sample.payload().to_bytes())
+            .map_err(|e| ClientError::Transport { action: "read where to look", detail: e.to_string() })
+    }
+
     /// Ends the session in order.
     pub async fn close(self) -> Result<(), ClientError> {
         self.session.close().await.map_err(fault("close the session"))

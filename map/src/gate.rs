@@ -2,6 +2,8 @@
 
 /// 99 % quantile with 3 degrees of freedom: the gate of a planar pose (method 13.6, 15).
 pub const CHI2_3_99: f64 = 11.345;
+/// 99.9 % quantile with 3 degrees of freedom: beyond it a landmark is seen elsewhere.
+pub const CHI2_3_999: f64 = 16.266;
 /// Standard normal quantile, 95 %.
 pub(crate) const Z_95: f64 = 1.644_854;
 /// Standard normal quantile, 99 %.

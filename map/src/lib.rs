@@ -19,3 +19,5 @@ pub mod fuse;
 pub mod gaze;
 pub mod slam;
 pub mod laser_fix;
+pub mod changes;
+pub mod hypotheses;

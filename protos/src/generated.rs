@@ -251,7 +251,9 @@ pub struct Answer {
     /// The capture time is more than 2 s from the server's clock.
     #[prost(bool, tag = "13")]
     pub clock_suspect: bool,
-    /// Why recognised landmarks gave no robot pose: empty, no_mounting, landmark_not_placed, ambiguous, or a gate:
+    /// Why recognised landmarks gave no robot pose: empty, no_mounting, landmark_not_placed, landmark_quarantined (found
+    /// moved or missing; see its standing), unsure (seen too poorly to tell whether it was moved, by a robot whose pose is
+    /// known well enough without), ambiguous, or a gate:
     /// gate_prior (the robot's prior rules it out), gate_room (no upright robot on the floor sees them so), gate_side (it
     /// would stand behind the wall), disagree (the landmarks contradict one another), degenerate.
     #[prost(string, tag = "14")]
@@ -325,6 +327,74 @@ pub struct MapChanged {
     pub map: ::prost::alloc::string::String,
     #[prost(uint64, tag = "2")]
     pub version: u64,
+}
+/// robot/{robot}/rpc/gaze, a query: where to look
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct GazeRequest {
+    /// Absent: the last fused pose.
+    #[prost(message, optional, tag = "1")]
+    pub map_from_robot: ::core::option::Option<Pose2Covariance>,
+    /// The camera in the robot frame; a height of 0 stands for 1.2 m.
+    #[prost(double, tag = "2")]
+    pub camera_x_m: f64,
+    #[prost(double, tag = "3")]
+    pub camera_y_m: f64,
+    #[prost(double, tag = "4")]
+    pub camera_z_m: f64,
+    /// Where it looks now.
+    #[prost(double, tag = "5")]
+    pub pan_rad: f64,
+    #[prost(double, tag = "6")]
+    pub tilt_rad: f64,
+    /// How fast it turns; 0 stands for 1 rad/s.
+    #[prost(double, tag = "7")]
+    pub rate_radps: f64,
+    /// Lowest and highest; empty stands for +-1.7 and +-0.35.
+    #[prost(double, repeated, tag = "8")]
+    pub pan_range_rad: ::prost::alloc::vec::Vec<f64>,
+    #[prost(double, repeated, tag = "9")]
+    pub tilt_range_rad: ::prost::alloc::vec::Vec<f64>,
+    #[prost(enumeration = "GazeCriterion", tag = "10")]
+    pub criterion: i32,
+    /// The robot's clock.
+    #[prost(int64, tag = "11")]
+    pub at_ns: i64,
+    /// The landmark it looked at last, if any, and whether that was recognised: after three failures another is advised.
+    #[prost(string, tag = "12")]
+    pub looked_at: ::prost::alloc::string::String,
+    #[prost(bool, tag = "13")]
+    pub recognised: bool,
+}
+/// The reply.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct GazeAdvice {
+    #[prost(string, tag = "1")]
+    pub map: ::prost::alloc::string::String,
+    #[prost(uint64, tag = "2")]
+    pub map_version: u64,
+    #[prost(message, optional, tag = "3")]
+    pub rejection: ::core::option::Option<Rejection>,
+    #[prost(enumeration = "GazeLook", tag = "4")]
+    pub look: i32,
+    /// What follows is set for LANDMARK only.
+    #[prost(string, tag = "5")]
+    pub landmark: ::prost::alloc::string::String,
+    #[prost(double, tag = "6")]
+    pub pan_rad: f64,
+    #[prost(double, tag = "7")]
+    pub tilt_rad: f64,
+    #[prost(double, tag = "8")]
+    pub utility: f64,
+    #[prost(double, tag = "9")]
+    pub probability: f64,
+    #[prost(double, tag = "10")]
+    pub margin_m: f64,
+    #[prost(double, tag = "11")]
+    pub gain_nats: f64,
+    #[prost(double, tag = "12")]
+    pub range_m: f64,
+    #[prost(double, tag = "13")]
+    pub incidence_rad: f64,
 }
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]
 #[repr(i32)]
@@ -460,6 +530,71 @@ impl Verdict {
             "VERDICT_UNKNOWN" => Some(Self::Unknown),
             "VERDICT_UNIQUE" => Some(Self::Unique),
             "VERDICT_AMBIGUOUS" => Some(Self::Ambiguous),
+            _ => None,
+        }
+    }
+}
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]
+#[repr(i32)]
+pub enum GazeCriterion {
+    Unspecified = 0,
+    /// The paper's: probability, saliency, margin, visibility confidence.
+    Product = 1,
+    /// Expected gain of information, by the time it takes to look.
+    Information = 2,
+}
+impl GazeCriterion {
+    /// String value of the enum field names used in the ProtoBuf definition.
+    ///
+    /// The values are not transformed in any way and thus are considered stable
+    /// (if the ProtoBuf definition does not change) and safe for programmatic use.
+    pub fn as_str_name(&self) -> &'static str {
+        match self {
+            Self::Unspecified => "GAZE_CRITERION_UNSPECIFIED",
+            Self::Product => "GAZE_CRITERION_PRODUCT",
+            Self::Information => "GAZE_CRITERION_INFORMATION",
+        }
+    }
+    /// Creates an enum from field names used in the ProtoBuf definition.
+    pub fn from_str_name(value: &str) -> ::core::option::Option<Self> {
+        match value {
+            "GAZE_CRITERION_UNSPECIFIED" => Some(Self::Unspecified),
+            "GAZE_CRITERION_PRODUCT" => Some(Self::Product),
+            "GAZE_CRITERION_INFORMATION" => Some(Self::Information),
+            _ => None,
+        }
+    }
+}
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]
+#[repr(i32)]
+pub enum GazeLook {
+    Unspecified = 0,
+    Landmark = 1,
+    /// None is in sight: look along the path.
+    Ahead = 2,
+    /// None is in sight, and the pose is very uncertain: look about.
+    Sweep = 3,
+}
+impl GazeLook {
+    /// String value of the enum field names used in the ProtoBuf definition.
+    ///
+    /// The values are not transformed in any way and thus are considered stable
+    /// (if the ProtoBuf definition does not change) and safe for programmatic use.
+    pub fn as_str_name(&self) -> &'static str {
+        match self {
+            Self::Unspecified => "GAZE_LOOK_UNSPECIFIED",
+            Self::Landmark => "GAZE_LOOK_LANDMARK",
+            Self::Ahead => "GAZE_LOOK_AHEAD",
+            Self::Sweep => "GAZE_LOOK_SWEEP",
+        }
+    }
+    /// Creates an enum from field names used in the ProtoBuf definition.
+    pub fn from_str_name(value: &str) -> ::core::option::Option<Self> {
+        match value {
+            "GAZE_LOOK_UNSPECIFIED" => Some(Self::Unspecified),
+            "GAZE_LOOK_LANDMARK" => Some(Self::Landmark),
+            "GAZE_LOOK_AHEAD" => Some(Self::Ahead),
+            "GAZE_LOOK_SWEEP" => Some(Self::Sweep),
             _ => None,
         }
     }

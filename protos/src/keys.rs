@@ -98,6 +98,8 @@ pub enum Key {
     Pose(Name),
     /// `robot/{robot}/alive`: liveliness token of a robot.
     Alive(Name),
+    /// `robot/{robot}/rpc/gaze`: a query of the robot, `GazeRequest` in, `GazeAdvice` out.
+    Gaze(Name),
     /// `map/{map}/changed`: server to all, `MapChanged`.
     MapChanged(Name),
 }
@@ -143,6 +145,7 @@ impl Keys {
             Key::Scan(robot) => format!("{p}robot/{robot}/scan"),
             Key::Pose(robot) => format!("{p}robot/{robot}/pose"),
             Key::Alive(robot) => format!("{p}robot/{robot}/alive"),
+            Key::Gaze(robot) => format!("{p}robot/{robot}/rpc/gaze"),
             Key::MapChanged(map) => format!("{p}map/{map}/changed"),
         }
     }
@@ -160,6 +163,11 @@ impl Keys {
     /// All laser scans.
     pub fn all_scans(&self) -> String {
         format!("{}robot/*/scan", self.prefix)
+    }
+
+    /// All questions where to look.
+    pub fn all_gaze(&self) -> String {
+        format!("{}robot/*/rpc/gaze", self.prefix)
     }
 
     /// All liveliness tokens.
@@ -188,6 +196,7 @@ impl Keys {
             [Some("robot"), Some(r), Some("answer"), Some(c), None] => {
                 Ok(Key::Answer(robot(r)?, named("camera", c)?))
             }
+            [Some("robot"), Some(r), Some("rpc"), Some("gaze"), None] => Ok(Key::Gaze(robot(r)?)),
             [Some("robot"), Some(r), Some("odometry"), None, _] => Ok(Key::Odometry(robot(r)?)),
             [Some("robot"), Some(r), Some("scan"), None, _] => Ok(Key::Scan(robot(r)?)),
             [Some("robot"), Some(r), Some("pose"), None, _] => Ok(Key::Pose(robot(r)?)),
@@ -259,6 +268,7 @@ mod tests {
                 Key::Pose(a.clone()),
                 Key::Alive(a.clone()),
                 Key::MapChanged(a.clone()),
+                Key::Gaze(a.clone()),
             ] {
                 prop_assert_eq!(keys.parse(&keys.build(&key)), Ok(key));
             }

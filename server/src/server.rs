@@ -10,14 +10,19 @@ use crate::{
         motion::Motion,
         slots::Slots,
         snapshot::Snapshots,
+        standing::{Findings, Found, findings},
         workers::{Engine, Workers},
     },
     http::{self, App},
     jobs::Jobs,
-    store::{OpenError, Store, WriterTask},
+    store::{OpenError, Store, WriterTask, landmarks},
 };
 use std::{net::SocketAddr, sync::Arc, time::Duration};
-use tokio::{net::TcpListener, sync::watch, task::JoinHandle};
+use tokio::{
+    net::TcpListener,
+    sync::{mpsc::Receiver, watch},
+    task::JoinHandle,
+};
 
 /// Why the server did not start.
 #[derive(Debug, thiserror::Error)]
@@ -82,6 +87,7 @@ struct Tasks {
     bus: Bus,
     http: JoinHandle<()>,
     jobs: JoinHandle<()>,
+    findings: JoinHandle<()>,
     writer: WriterTask,
 }
 
@@ -98,7 +104,9 @@ impl Server {
         let (jobs, jobs_task) = Jobs::start(store.clone(), config.clone(), stopping.clone())
             .await
             .map_err(|e| StartError::Store(e.to_string()))?;
-        let engine = engine(&config, snapshots.clone());
+        let (findings, found) = findings();
+        let engine = engine(&config, snapshots.clone(), findings);
+        let findings = tokio::spawn(keep_findings(store.clone(), found));
         let (live, slots) = (engine.live.clone(), engine.slots.clone());
         let bus = Bus::open(&config, receivers(&config, &engine)).await?;
         let workers = Workers::start(&engine, config.workers, &Arc::new(bus.outbox().clone()))
@@ -107,13 +115,13 @@ impl Server {
         let app = App::new(config.clone(), store, jobs, live.clone(), stopping.clone());
         let http =
             tokio::spawn(http::listen::serve(listener, http::router(app), config.limits.clone(), stopping));
-        let tasks = Tasks { workers, bus, http, jobs: jobs_task, writer };
+        let tasks = Tasks { workers, bus, http, jobs: jobs_task, findings, writer };
         Ok(RunningServer { http_addr, zenoh_endpoint, snapshots, live, slots, stop, store_failed, tasks })
     }
 }
 
 /// Everything between frames and answers, for one set of settings.
-fn engine(config: &Config, snapshots: Arc<Snapshots>) -> Engine {
+fn engine(config: &Config, snapshots: Arc<Snapshots>, findings: Findings) -> Engine {
     let live = Arc::new(LiveHub::default());
     Engine {
         slots: Arc::new(Slots::new(config.limits.cameras)),
@@ -122,6 +130,21 @@ fn engine(config: &Config, snapshots: Arc<Snapshots>) -> Engine {
         live,
         limits: ImageLimits { bytes: config.limits.frame_bytes, pixels: config.limits.frame_pixels },
         panics: Arc::default(),
+        findings,
+    }
+}
+
+/// Writes down what robots find out about landmarks, until no worker is left to find anything.
+async fn keep_findings(store: Store, mut found: Receiver<Found>) {
+    while let Some(Found { map, name, standing, finding, .. }) = found.recv().await {
+        let kept = store.write(move |tx| {
+            Box::pin(async move {
+                landmarks::set_standing(tx, &map, &name, standing, finding.as_deref()).await.map(drop)
+            })
+        });
+        if let Err(error) = kept.await {
+            tracing::error!(%error, "a finding about a landmark was not kept");
+        }
     }
 }
 
@@ -132,7 +155,12 @@ fn receivers(config: &Config, engine: &Engine) -> Receivers {
         frame_bytes: config.limits.frame_bytes,
         deadline: Duration::from_millis(u64::from(config.limits.frame_deadline_ms)),
     };
-    Receivers { intake: Arc::new(intake), motion: engine.motion.clone(), live: engine.live.clone() }
+    Receivers {
+        intake: Arc::new(intake),
+        motion: engine.motion.clone(),
+        live: engine.live.clone(),
+        gazes: Arc::default(),
+    }
 }
 
 impl RunningServer {
@@ -148,14 +176,14 @@ impl RunningServer {
     /// Answers what is in work, then closes everything.
     pub async fn stop(self) {
         self.stop.send_replace(true);
-        let Tasks { workers, bus, http, jobs, writer } = self.tasks;
+        let Tasks { workers, bus, http, jobs, findings, writer } = self.tasks;
         // Workers first: what they have in work is still answered over the open bus.
         let workers = tokio::task::spawn_blocking(move || workers.stop());
         if let Err(error) = workers.await {
             tracing::error!(%error, "stopping the workers");
         }
         bus.close().await;
-        for (what, task) in [("HTTP", http), ("jobs", jobs)] {
+        for (what, task) in [("HTTP", http), ("jobs", jobs), ("findings", findings)] {
             if let Err(error) = task.await {
                 tracing::error!(%error, what, "a task panicked");
             }

@@ -22,7 +22,7 @@ use vision::{detect::quads::Corners, geometry::polygon};
 const LONGEST: Duration = Duration::from_mins(2);
 
 /// Options that each command must name in its help.
-const OPTIONS: [(&str, &[&str]); 34] = [
+const OPTIONS: [(&str, &[&str]); 35] = [
     ("demo", &["--robots", "--rate-hz", "--legs", "--seed", "--http", "--data", "--stay", "--json"]),
     ("serve", &["--config", "--data", "--http", "--zenoh", "--fleet", "--workers", "--insecure"]),
     (
@@ -136,6 +136,7 @@ const OPTIONS: [(&str, &[&str]); 34] = [
         "evaluate mapping",
         &["--odometry-noise", "--seed", "--duration-s", "--params", "--draw", "--plot", "--json", "[LOGS]"],
     ),
+    ("evaluate visibility", &["--maps", "--points", "--seed", "--plot", "--json"]),
     ("fit confidence", &["--quads", "--set", "--photographs", "--rust"]),
     (
         "fit search",

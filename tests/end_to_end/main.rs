@@ -6,6 +6,7 @@ mod demo;
 mod evaluate;
 mod fit;
 mod http_contract;
+mod moved_landmark;
 mod real_pictures;
 mod restart;
 mod teach_and_recognise;

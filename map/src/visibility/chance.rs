@@ -12,8 +12,8 @@ pub const DRAWS: usize = 64;
 /// Draws of an uncertain pose, to be asked of many landmarks.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PoseDraws {
-    /// Camera position and robot heading of each.
-    draws: Vec<(Point2<f64>, f64)>,
+    /// Camera position and robot pose of each.
+    draws: Vec<(Point2<f64>, Pose2)>,
     mean: Point2<f64>,
     /// All draws are within this of `mean`.
     spread_m: f64,
@@ -59,7 +59,7 @@ impl PoseDraws {
             .flat_map(|e| [e, -e])
             .map(|e| {
                 let at = pose.pose.plus(&e);
-                (camera(&at), at.theta_rad)
+                (camera(&at), at)
             })
             .collect();
         let mean = camera(&pose.pose);
@@ -71,6 +71,11 @@ impl PoseDraws {
     pub fn mean(&self) -> Point2<f64> {
         self.mean
     }
+
+    /// The drawn robot poses.
+    pub fn poses(&self) -> impl Iterator<Item = Pose2> {
+        self.draws.iter().map(|(_, pose)| *pose)
+    }
 }
 
 impl VisibilityMap {
@@ -79,7 +84,8 @@ impl VisibilityMap {
         if (pose.mean - self.frame.origin).norm() > self.reach_m + pose.spread_m {
             return 0.0;
         }
-        let inside = pose.draws.iter().filter(|(at, heading)| self.contains(at) && self.pans(at, *heading));
+        let inside =
+            pose.draws.iter().filter(|(at, pose)| self.contains(at) && self.pans(at, pose.theta_rad));
         inside.count() as f64 / DRAWS as f64
     }
 
@@ -101,8 +107,7 @@ mod tests {
         let covariance = root * root.transpose();
         let pose = Pose2Covariance { pose: Pose2::new(2.0, -1.0, 1.0), covariance };
         let made = PoseDraws::new(&pose, Vector2::zeros());
-        let errors: Vec<Vector3<f64>> =
-            made.draws.iter().map(|(at, h)| pose.pose.minus(&Pose2::new(at.x, at.y, *h))).collect();
+        let errors: Vec<Vector3<f64>> = made.poses().map(|at| pose.pose.minus(&at)).collect();
         let n = DRAWS as f64;
         let mean = errors.iter().sum::<Vector3<f64>>() / n;
         assert!(mean.norm() < 1e-12, "{mean}");

@@ -97,7 +97,7 @@ pub fn mounting(pose: &v1::Pose3) -> Result<Mounting, Rejection> {
 }
 
 /// A refusal by the map crate in wire words.
-pub(crate) fn refused(error: &OutOfRange) -> Rejection {
+pub fn refused(error: &OutOfRange) -> Rejection {
     let code = if error.value.is_finite() { Code::OutOfRange } else { Code::NotFinite };
     Rejection::new(code, error.field, error.to_string())
 }

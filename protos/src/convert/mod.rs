@@ -4,9 +4,11 @@
 //! the server's part.
 
 pub mod frame;
+pub mod gaze;
 pub mod geometry;
 pub mod motion;
 pub mod result;
 
 pub use frame::{CheckedFrame, Encoding};
+pub use gaze::CheckedGaze;
 pub use motion::{CheckedOdometry, CheckedScan};

@@ -5,6 +5,7 @@
 //! Callbacks run on zenoh's threads and never wait: they check and hand over. What goes out passes a bounded queue
 //! and its own thread, so a slow link holds up no worker.
 
+mod gaze;
 mod inbox;
 mod outbox;
 mod router;
@@ -15,12 +16,12 @@ pub use outbox::Outbox;
 
 use crate::{
     config::Config,
-    engine::{intake::Intake, live::LiveHub, motion::Motion},
+    engine::{gaze::Gazes, intake::Intake, live::LiveHub, motion::Motion},
 };
 use protos::{Key, Keys, v1};
 use std::sync::Arc;
 use tokio::{sync::broadcast::error::RecvError, task::JoinHandle};
-use zenoh::pubsub::Subscriber;
+use zenoh::{pubsub::Subscriber, query::Queryable};
 
 /// Why the bus did not open.
 #[derive(Debug, thiserror::Error)]
@@ -52,6 +53,8 @@ pub struct Receivers {
     pub motion: Arc<Motion>,
     /// Presence, and refusals for pages.
     pub live: Arc<LiveHub>,
+    /// Which landmark each robot was told to look at.
+    pub gazes: Arc<Gazes>,
 }
 
 /// The open bus.
@@ -61,6 +64,7 @@ pub struct Bus {
     outbox: Outbox,
     changes: JoinHandle<()>,
     subscribers: Vec<Subscriber<()>>,
+    gaze: Queryable<()>,
 }
 
 impl std::fmt::Debug for Bus {
@@ -78,8 +82,9 @@ impl Bus {
         let outbox = Outbox::start(session.clone(), keys.clone());
         let changes = tokio::spawn(tell_changes(to.clone(), outbox.clone()));
         let subscribers = inbox::subscribe(&session, &keys, &to, &outbox).await?;
+        let gaze = gaze::answer_gaze(&session, &keys, &to).await?;
         tracing::info!(endpoint, fleet = %config.fleet, "robots may connect");
-        Ok(Self { endpoint, session, outbox, changes, subscribers })
+        Ok(Self { endpoint, session, outbox, changes, subscribers, gaze })
     }
 
     /// Where robots connect, with the real port.
@@ -99,6 +104,9 @@ impl Bus {
             if let Err(error) = subscriber.undeclare().await {
                 tracing::warn!(%error, "undeclare");
             }
+        }
+        if let Err(error) = self.gaze.undeclare().await {
+            tracing::warn!(%error, "undeclare");
         }
         self.outbox.drain().await;
         if let Err(error) = self.session.close().await {

@@ -32,7 +32,8 @@ async fn running(engine: Engine, workers: usize) -> Running {
         frame_bytes: config.limits.frame_bytes,
         deadline: Duration::from_secs(30),
     });
-    let to = Receivers { intake, motion: engine.motion.clone(), live: engine.live.clone() };
+    let to =
+        Receivers { intake, motion: engine.motion.clone(), live: engine.live.clone(), gazes: Arc::default() };
     let bus = Bus::open(&config, to).await.unwrap();
     let workers = Workers::start(&engine, workers, &Arc::new(bus.outbox().clone())).unwrap();
     Running { bus, engine, workers }

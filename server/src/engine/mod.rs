@@ -9,6 +9,8 @@ pub mod motion;
 pub mod cameras;
 pub mod picture;
 pub mod dominant;
+pub mod gaze;
+pub mod standing;
 pub mod verdicts;
 pub mod workers;
 #[cfg(test)]

@@ -4,7 +4,8 @@
 
 use super::{live::LiveHub, slots::Order, snapshot::Snapshots};
 use map::{
-    fuse::{FuseParams, FusedPose, Fuser, OdometryOutcome},
+    changes::{Change, ChangeParams, Judged, Standing, Watch},
+    fuse::{FixOutcome, FuseParams, FusedPose, Fuser, OdometryOutcome},
     localise::Fix,
     pose2::{Pose2, Pose2Covariance},
 };
@@ -18,11 +19,14 @@ use std::{
     collections::BTreeMap,
     sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
+use vision::recognise::LandmarkId;
 
 /// Largest odometry message, in bytes: it has nine numbers.
 pub const MAX_ODOMETRY_BYTES: usize = 1024;
 /// Largest scan, in bytes: [`map::laser::MAX_BEAMS`] ranges and their head.
 pub const MAX_SCAN_BYTES: usize = map::laser::MAX_BEAMS * 5 + 1024;
+/// Landmarks that a pose is said to rest on: the latest.
+pub const MAX_SUPPORTERS: usize = 16;
 /// Robots whose motion is followed; the number of registered robots bounds it first.
 pub const MAX_ROBOTS: usize = 10_000;
 
@@ -47,6 +51,12 @@ struct Robot {
     map_from_odom: Option<Pose2>,
     /// Any odometry in this epoch.
     moves: bool,
+    /// The landmarks that the pose rests on.
+    supporters: Vec<LandmarkId>,
+    /// What it has found out about landmarks...
+    watch: Watch,
+    /// ...and what of that was not passed on yet.
+    found: Vec<Change>,
 }
 
 #[derive(Debug, Default)]
@@ -67,6 +77,15 @@ pub struct Moment<'a> {
     pub captured_ns: i64,
     /// Odometry at capture, where the frame said.
     pub odometry: Option<Pose2>,
+}
+
+/// What is known of a robot's pose without its frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Grounds {
+    /// `map_from_robot`.
+    pub pose: Pose2Covariance,
+    /// The landmarks that it rests on.
+    pub supporters: Vec<LandmarkId>,
 }
 
 /// The motion of all robots.
@@ -121,15 +140,47 @@ impl Motion {
         state.scans.count("scan", robot, taken);
     }
 
-    /// What is known of a robot's pose at a frame without the frame itself: for choosing between two solutions.
-    pub fn prior(&self, robot: &Name, at: Moment<'_>) -> Option<Pose2Covariance> {
+    /// What is known of a robot's pose at a frame without the frame itself: for choosing between two solutions, and for
+    /// judging landmarks.
+    pub fn grounds(&self, robot: &Name, at: Moment<'_>) -> Option<Grounds> {
         let mut state = self.lock();
         let followed = state.robot(robot).ok()?;
         followed.belong(at.epoch, at.map);
         if let Some(odometry) = at.odometry {
             followed.moved(at.captured_ns, odometry);
         }
-        followed.fuser.pose_at(at.captured_ns)
+        let pose = followed.fuser.pose_at(at.captured_ns)?;
+        Some(Grounds { pose, supporters: followed.supporters.clone() })
+    }
+
+    /// The last fused pose of a robot on a map.
+    pub fn pose(&self, robot: &Name, map: &str) -> Option<Pose2Covariance> {
+        let state = self.lock();
+        let followed = state.robots.get(robot).filter(|r| r.map == map)?;
+        followed.fuser.pose().map(|fused| fused.pose)
+    }
+
+    /// A frame's landmarks were judged by these grounds: what should change in the map by that.
+    pub fn judged(
+        &self,
+        robot: &Name,
+        at: Moment<'_>,
+        grounds: &Grounds,
+        judged: &[Judged],
+        missed: &[LandmarkId],
+    ) -> Vec<Change> {
+        let map = self.snapshots.get(at.map);
+        let standing = |id| map.as_ref().and_then(|m| Some(m.landmarks.get(&id)?.standing));
+        let mut state = self.lock();
+        let Ok(followed) = state.robot(robot) else { return Vec::new() };
+        followed.belong(at.epoch, at.map);
+        let mut changes = std::mem::take(&mut followed.found);
+        if changes.is_empty() {
+            let from = grounds.pose.pose.position().into();
+            let now = |id| standing(id).unwrap_or(Standing::Sound);
+            changes = followed.watch.frame(from, judged, missed, now);
+        }
+        changes
     }
 
     /// A robot was fixed by landmarks: its pose to publish. Without any odometry that is the fix itself.
@@ -141,7 +192,10 @@ impl Motion {
             followed.moved(at.captured_ns, odometry);
         }
         match followed.fuser.fix(at.captured_ns, fix) {
-            Ok(outcome) => tracing::debug!(%robot, ?outcome, "fix"),
+            Ok(outcome) => {
+                tracing::debug!(%robot, ?outcome, "fix");
+                followed.rests_on(&outcome, &fix.landmarks);
+            }
             Err(error) => tracing::error!(%robot, %error, "a fix of ours is out of range"),
         }
         let alone = FusedPose { at_ns: at.captured_ns, pose: fix.pose, corrections: 1, contradictions: 0 };
@@ -202,6 +256,9 @@ impl Robot {
             fuser: Fuser::new(FuseParams::default()),
             map_from_odom: None,
             moves: false,
+            supporters: Vec::new(),
+            watch: Watch::new(ChangeParams::default()),
+            found: Vec::new(),
         }
     }
 
@@ -211,14 +268,39 @@ impl Robot {
             (self.epoch, self.map) = (epoch, map.to_owned());
             self.fuser = Fuser::new(FuseParams::default());
             (self.map_from_odom, self.moves) = (None, false);
+            self.lost();
+            self.found.clear();
         }
+    }
+
+    /// The pose has proved wrong, or is unknown: nothing rests on it any more.
+    fn lost(&mut self) {
+        self.supporters.clear();
+        let cleared = self.watch.clear();
+        self.found.extend(cleared);
+    }
+
+    /// Keeps the landmarks that the pose rests on, the latest first to stay.
+    fn rests_on(&mut self, outcome: &FixOutcome, landmarks: &[LandmarkId]) {
+        match outcome {
+            FixOutcome::Started | FixOutcome::Reset => self.lost(),
+            FixOutcome::Applied { .. } => {}
+            _ => return,
+        }
+        self.supporters.retain(|id| !landmarks.contains(id));
+        self.supporters.extend(landmarks);
+        let gone = self.supporters.len().saturating_sub(MAX_SUPPORTERS);
+        self.supporters.drain(..gone);
     }
 
     fn moved(&mut self, captured_ns: i64, odom_from_robot: Pose2) {
         self.moves = true;
         match self.fuser.odometry(captured_ns, odom_from_robot) {
             // Another odometry frame: the old one means nothing on the map any more.
-            Ok(OdometryOutcome::Jumped) => self.map_from_odom = None,
+            Ok(OdometryOutcome::Jumped) => {
+                self.map_from_odom = None;
+                self.lost();
+            }
             Ok(OdometryOutcome::Moved | OdometryOutcome::TooOld) => {}
             Err(error) => tracing::error!(%error, "checked odometry was refused"),
         }
@@ -350,12 +432,12 @@ mod tests {
     #[test]
     fn a_prior_follows_from_odometry_alone() {
         let (motion, r1) = motion();
-        assert!(motion.prior(&r1, at(1_000_000_000, 3.0)).is_none());
+        assert!(motion.grounds(&r1, at(1_000_000_000, 3.0)).is_none());
         motion.fixed(&r1, at(1_000_000_000, 3.0), &fix(10.0)).unwrap();
-        let prior = motion.prior(&r1, at(1_500_000_000, 3.5)).unwrap();
+        let prior = motion.grounds(&r1, at(1_500_000_000, 3.5)).unwrap().pose;
         assert!((prior.pose.x_m - 10.5).abs() < 1e-9);
         let anew = Moment { epoch: 2, ..at(1_600_000_000, 0.0) };
-        assert!(motion.prior(&r1, anew).is_none(), "a new epoch has its own odometry");
+        assert!(motion.grounds(&r1, anew).is_none(), "a new epoch has its own odometry");
     }
 
     #[test]
@@ -363,7 +445,7 @@ mod tests {
         let (motion, r1) = motion();
         motion.fixed(&r1, at(1_000_000_000, 3.0), &fix(10.0)).unwrap();
         let there = Moment { map: "cellar", ..at(2_000_000_000, 3.0) };
-        assert!(motion.prior(&r1, there).is_none());
+        assert!(motion.grounds(&r1, there).is_none());
     }
 
     #[test]

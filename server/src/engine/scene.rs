@@ -5,6 +5,7 @@ use super::{
     motion::Motion,
     slots::Slots,
     snapshot::{LandmarkInfo, MapSnapshot, Snapshots},
+    standing::findings,
     workers::Engine,
 };
 use crate::engine::decode::ImageLimits;
@@ -74,7 +75,10 @@ impl Scene {
             let sigmas = PlaceSigmas::default();
             let place = LandmarkPlace::by_hand(at, normal.y.atan2(normal.x), size, sigmas).unwrap();
             sizes.insert(id, size);
-            landmarks.insert(id, LandmarkInfo { name, size: Some(size), place: Some(place) });
+            landmarks.insert(
+                id,
+                LandmarkInfo { name, size: Some(size), place: Some(place), ..LandmarkInfo::default() },
+            );
         }
         let models = ModelSet::new(models, &params).unwrap();
         Arc::new(MapSnapshot { landmarks, sizes, models, params, ..MapSnapshot::empty(MAP, 3) })
@@ -96,5 +100,6 @@ pub(crate) fn engine(maps: &[Arc<MapSnapshot>]) -> Engine {
         live,
         limits: ImageLimits::FRAME,
         panics: Arc::default(),
+        findings: findings().0,
     }
 }

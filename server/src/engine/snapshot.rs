@@ -2,7 +2,7 @@
 //! after its transaction is committed; a reader keeps the `Arc` it took, so an answer rests on one version.
 
 use arc_swap::ArcSwap;
-use map::{place::LandmarkPlace, segments::LaserSegment};
+use map::{changes::Standing, place::LandmarkPlace, segments::LaserSegment, visibility::VisibilityMap};
 use std::{collections::BTreeMap, sync::Arc};
 use tokio::sync::broadcast;
 use vision::{
@@ -34,6 +34,8 @@ pub struct MapSnapshot {
     pub quarantined: BTreeMap<LandmarkId, String>,
     /// The walls.
     pub walls: Vec<LaserSegment>,
+    /// From where each placed landmark is seen.
+    pub visibility: BTreeMap<LandmarkId, Arc<VisibilityMap>>,
     /// Which distance decides.
     pub distance: DistanceKind,
     /// The parameters the models were learnt under, with the map's own distance.
@@ -52,6 +54,7 @@ impl MapSnapshot {
             learnt: BTreeMap::new(),
             quarantined: BTreeMap::new(),
             walls: Vec::new(),
+            visibility: BTreeMap::new(),
             distance: DistanceKind::Both,
             params: Arc::default(),
         }
@@ -59,7 +62,7 @@ impl MapSnapshot {
 }
 
 /// What is known of a landmark besides its appearance.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct LandmarkInfo {
     /// Readable name, unique in the map.
     pub name: String,
@@ -67,6 +70,15 @@ pub struct LandmarkInfo {
     pub size: Option<LandmarkSize>,
     /// Where it hangs, if that and its size are known; without it there is no robot pose.
     pub place: Option<LandmarkPlace>,
+    /// How far it is trusted: what is quarantined corrects no pose.
+    pub standing: Standing,
+}
+
+impl LandmarkInfo {
+    /// Whether it may correct poses.
+    pub fn is_trusted(&self) -> bool {
+        self.standing != Standing::Quarantined
+    }
 }
 
 /// A model with the digest of its stored bytes: the same digest is the same model.

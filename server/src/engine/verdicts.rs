@@ -148,30 +148,37 @@ pub fn recognised(facts: &FrameFacts) -> Vec<(LandmarkId, &LandmarkPose)> {
     facts.quads.iter().filter_map(|q| Some((unique(q)?, q.pose.as_ref().ok()?))).collect()
 }
 
-/// The robot's pose by the landmarks seen, or the word that says why not: empty when no landmark was recognised.
-pub fn robot_fix(
-    facts: &FrameFacts,
-    map: &MapSnapshot,
-    mounting: Option<&Mounting>,
-    prior: Option<&Pose2Covariance>,
-) -> Result<Fix, &'static str> {
+/// Landmarks that were recognised, posed, and have a place that is trusted; or the word that says why there are none:
+/// empty when no landmark was recognised.
+pub fn sightings<'a>(facts: &'a FrameFacts, map: &'a MapSnapshot) -> Result<Vec<Sighting<'a>>, &'static str> {
     let posed = recognised(facts);
     if posed.is_empty() {
         // The quads say why each has no pose.
         return Err("");
     }
-    let Some(mounting) = mounting else { return Err("no_mounting") };
-    let sightings: Vec<Sighting<'_>> = posed
-        .into_iter()
-        .filter_map(|(landmark, seen)| {
-            let place = map.landmarks.get(&landmark)?.place.as_ref()?;
-            Some(Sighting { landmark, seen, place })
-        })
-        .collect();
-    if sightings.is_empty() {
+    let placed = |(landmark, seen)| {
+        let info = map.landmarks.get(&landmark)?;
+        Some((info, Sighting { landmark, seen, place: info.place.as_ref()? }))
+    };
+    let placed: Vec<_> = posed.into_iter().filter_map(placed).collect();
+    if placed.is_empty() {
         return Err("landmark_not_placed");
     }
-    match robot_pose(&sightings, mounting, prior, &LocaliseParams::default()) {
+    let trusted: Vec<_> = placed.into_iter().filter(|(info, _)| info.is_trusted()).map(|(_, s)| s).collect();
+    if trusted.is_empty() { Err("landmark_quarantined") } else { Ok(trusted) }
+}
+
+/// The robot's pose by sightings, or the word that says why not.
+pub fn robot_fix(
+    sightings: &[Sighting<'_>],
+    mounting: Option<&Mounting>,
+    prior: Option<&Pose2Covariance>,
+) -> Result<Fix, &'static str> {
+    let Some(mounting) = mounting else { return Err("no_mounting") };
+    if sightings.is_empty() {
+        return Err("unsure");
+    }
+    match robot_pose(sightings, mounting, prior, &LocaliseParams::default()) {
         Ok(RobotFix::Fixed(fix)) => Ok(*fix),
         Ok(RobotFix::Ambiguous(_)) => Err(AMBIGUOUS),
         Ok(RobotFix::Refused(refusal)) => Err(refusal_word(&refusal)),

@@ -7,12 +7,17 @@ use super::{
     decode::{ImageLimits, decode_frame},
     intake::{FrameJob, unknown_map},
     live::{LiveFrame, LiveHub},
-    motion::{Moment, Motion},
+    motion::{Grounds, Moment, Motion},
     slots::{Outcome, SlotKey, Slots},
     snapshot::{MapSnapshot, Snapshots},
+    standing::{Findings, Found},
     verdicts::{self, StageTimes},
 };
-use map::localise::Fix;
+use map::{
+    changes::{ChangeParams, Expectation, Eye, Judged, expected, judge, sift},
+    localise::{Fix, Sighting},
+    pose2::Pose2Covariance,
+};
 use protos::{CheckedFrame, Code, Name, Rejection, v1};
 use std::{
     panic::{AssertUnwindSafe, catch_unwind},
@@ -23,7 +28,10 @@ use std::{
     thread::JoinHandle,
     time::Instant,
 };
-use vision::pipeline::FrameFacts;
+use vision::{
+    pipeline::FrameFacts,
+    recognise::{LandmarkId, Recognition, Verdict},
+};
 
 /// Where answers and poses go. Must not wait.
 pub trait Publish: Send + Sync + 'static {
@@ -48,6 +56,8 @@ pub struct Engine {
     pub limits: ImageLimits,
     /// Panics caught; must stay 0.
     pub panics: Arc<AtomicU64>,
+    /// Where findings about landmarks go.
+    pub findings: Findings,
 }
 
 /// The threads.
@@ -88,7 +98,16 @@ impl Workers {
 /// What came of a frame.
 struct Done {
     answer: v1::Answer,
-    fix: Option<(Arc<MapSnapshot>, Fix)>,
+    map: Option<Arc<MapSnapshot>>,
+    fix: Option<Fix>,
+    seen: Option<Seen>,
+}
+
+/// What a frame says about the landmarks themselves, by the pose without it.
+struct Seen {
+    grounds: Grounds,
+    judged: Vec<Judged>,
+    missed: Vec<LandmarkId>,
 }
 
 impl Engine {
@@ -104,8 +123,8 @@ impl Engine {
                 }
             })
         };
-        let (mut answer, fix, outcome) = match done {
-            Ok(Done { answer, fix }) => (answer, fix, Outcome::Processed),
+        let (Done { mut answer, map, fix, seen }, outcome) = match done {
+            Ok(done) => (done, Outcome::Processed),
             Err(refusal) => {
                 let (status, outcome) = match refusal.code {
                     Code::Expired => (v1::Status::Expired, Outcome::Expired),
@@ -113,7 +132,8 @@ impl Engine {
                 };
                 let rejection = Some((&refusal).into());
                 let map = job.map.clone();
-                (v1::Answer { status: status.into(), rejection, map, ..v1::Answer::default() }, None, outcome)
+                let answer = v1::Answer { status: status.into(), rejection, map, ..v1::Answer::default() };
+                (Done { answer, map: None, fix: None, seen: None }, outcome)
             }
         };
         let frame = &job.frame;
@@ -122,10 +142,18 @@ impl Engine {
         answer.age_ms = job.received.elapsed().as_secs_f64() * 1e3;
         publish.answer(key, &answer);
         self.show(key, job, answer, outcome);
-        if let Some((map, fix)) = fix
+        let Some(map) = map else { return outcome };
+        if let Some(fix) = fix
             && let Some(pose) = self.motion.fixed(&key.robot, moment(frame, &map), &fix)
         {
             publish.pose(&key.robot, &pose);
+        }
+        if let Some(Seen { grounds, judged, missed }) = seen {
+            let changes = self.motion.judged(&key.robot, moment(frame, &map), &grounds, &judged, &missed);
+            for change in changes {
+                let name = map.landmarks.get(&change.landmark).map_or("", |l| l.name.as_str());
+                self.findings.tell(Found::new(&map.name, name, &change));
+            }
         }
         outcome
     }
@@ -140,7 +168,14 @@ impl Engine {
         times.ended("decode");
         let facts = verdicts::look(&image, frame.intrinsics.as_ref(), &map, &mut times);
         let mut answer = verdicts::answer(&facts, &map);
-        let fix = self.fix(key, frame, &facts, &map);
+        let grounds = self.motion.grounds(&key.robot, moment(frame, &map));
+        let sightings = verdicts::sightings(&facts, &map);
+        let seen = grounds.and_then(|grounds| seen(frame, &facts, &map, sightings.as_deref().ok(), grounds));
+        let judged = seen.as_ref().map_or(&[][..], |s| &s.judged);
+        let fix = sightings.and_then(|all| {
+            let prior = seen.as_ref().map(|s| &s.grounds.pose);
+            fix(frame, &sift(&all, judged), prior)
+        });
         verdicts::fill_fix(&mut answer, &fix, &map);
         if let Some(intrinsics) = &frame.intrinsics {
             let (seen, mounting) = (verdicts::recognised(&facts), frame.mounting.as_ref());
@@ -152,25 +187,7 @@ impl Engine {
         }
         times.ended("localise");
         answer.timings = times.finish();
-        Ok(Done { answer, fix: fix.ok().map(|fix| (map, fix)) })
-    }
-
-    /// The robot's pose by landmarks. The robot's own prior gates; ours only chooses between two solutions, so that a
-    /// fused pose gone wrong cannot keep out the fixes that would correct it.
-    fn fix(
-        &self,
-        key: &SlotKey,
-        frame: &CheckedFrame,
-        facts: &FrameFacts,
-        map: &MapSnapshot,
-    ) -> Result<Fix, &'static str> {
-        let mounting = frame.mounting.as_ref();
-        let fix = verdicts::robot_fix(facts, map, mounting, frame.prior.as_ref());
-        if fix.as_ref().err() != Some(&verdicts::AMBIGUOUS) || frame.prior.is_some() {
-            return fix;
-        }
-        let prior = self.motion.prior(&key.robot, moment(frame, map));
-        prior.map_or(fix, |prior| verdicts::robot_fix(facts, map, mounting, Some(&prior)))
+        Ok(Done { answer, map: Some(map.clone()), fix: fix.ok(), seen })
     }
 
     fn show(&self, key: &SlotKey, job: &FrameJob, answer: v1::Answer, outcome: Outcome) {
@@ -186,6 +203,61 @@ impl Engine {
             self.live.refused(key, answer);
         }
     }
+}
+
+/// The robot's pose by landmarks. The robot's own prior gates; ours only chooses between two solutions, so that a fused
+/// pose gone wrong cannot keep out the fixes that would correct it.
+fn fix(
+    frame: &CheckedFrame,
+    sightings: &[Sighting<'_>],
+    prior: Option<&Pose2Covariance>,
+) -> Result<Fix, &'static str> {
+    let mounting = frame.mounting.as_ref();
+    let fix = verdicts::robot_fix(sightings, mounting, frame.prior.as_ref());
+    if fix.as_ref().err() != Some(&verdicts::AMBIGUOUS) || frame.prior.is_some() || prior.is_none() {
+        return fix;
+    }
+    verdicts::robot_fix(sightings, mounting, prior)
+}
+
+/// A candidate whose distance is below this many times its threshold may well be there, though nobody would swear to it.
+const NEARLY: f64 = 1.5;
+
+/// Whether a quad shows a landmark, or something that is taken for it, or nearly.
+fn may_be(verdict: &Verdict, id: LandmarkId) -> bool {
+    let (Recognition::Unique(seen) | Recognition::Ambiguous(seen)) = verdict.recognition else {
+        return verdict.candidates.first().is_some_and(|c| c.landmark == id && c.ratio < NEARLY);
+    };
+    seen == id
+}
+
+/// What a frame says about the landmarks: which hang where they should, and which should be in it and are not.
+fn seen(
+    frame: &CheckedFrame,
+    facts: &FrameFacts,
+    map: &MapSnapshot,
+    sightings: Option<&[Sighting<'_>]>,
+    grounds: Grounds,
+) -> Option<Seen> {
+    let (mounting, camera) = (frame.mounting.as_ref()?, frame.intrinsics.as_ref()?);
+    let p = ChangeParams::default();
+    let judge = |s: &Sighting<'_>| judge(s, mounting, &grounds.pose, &grounds.supporters, &p).ok();
+    let judged = sightings.unwrap_or_default().iter().filter_map(judge).collect();
+    let there = |id: LandmarkId| facts.quads.iter().filter_map(|q| q.verdict.as_ref()).any(|v| may_be(v, id));
+    let learnt = map.models.iter().filter_map(|model| {
+        let (info, visible) = (map.landmarks.get(&model.id)?, map.visibility.get(&model.id)?);
+        let place = info.place.as_ref().filter(|_| info.is_trusted() && !there(model.id))?;
+        Some(Expectation { landmark: model.id, place, visible })
+    });
+    let image_px = [f64::from(frame.width_px), f64::from(frame.height_px)];
+    let eye = Eye { mounting, camera, image_px };
+    // Missing is told only by a pose that others hold up.
+    let missed = if grounds.supporters.len() >= p.supporters {
+        expected(&grounds.pose, &eye, &learnt.collect::<Vec<_>>(), &p)
+    } else {
+        Vec::new()
+    };
+    Some(Seen { grounds, judged, missed })
 }
 
 fn moment<'a>(frame: &CheckedFrame, map: &'a MapSnapshot) -> Moment<'a> {

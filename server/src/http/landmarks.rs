@@ -4,13 +4,14 @@ use super::{
     App, Shared,
     error::{ApiError, Problem},
     extract::{At, Body, Page, PageQuery, Params, name},
-    resources::{Landmark, Place, Size, measures},
+    resources::{Landmark, Place, Size, Trust, measures},
 };
 use crate::store::{
     landmarks::{self, LandmarkRow},
     maps,
 };
 use axum::{Json, extract::State, http::StatusCode};
+use map::changes::Standing;
 use serde::{Deserialize, Deserializer};
 use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
@@ -45,6 +46,8 @@ struct Changes {
     #[serde(default, deserialize_with = "given")]
     #[schema(value_type = Option<Place>)]
     place: Option<Option<Place>>,
+    /// A person's decision; a new size or place is sound by itself.
+    standing: Option<Trust>,
 }
 
 /// Tells null from absent.
@@ -106,7 +109,7 @@ async fn get(
     Ok(Json(shown(&app, &map, row)))
 }
 
-/// Sets or forgets size and place.
+/// Sets or forgets size and place; sets how far it is trusted.
 #[utoipa::path(patch, path = "/maps/{map}/landmarks/{landmark}", tag = "landmarks",
     params(("map" = String, Path), ("landmark" = String, Path)), request_body = Changes,
     responses((status = 200, body = Landmark), (status = 404, body = Problem),
@@ -118,15 +121,19 @@ async fn patch(
 ) -> Result<Json<Landmark>, ApiError> {
     let checked = measures(changes.size.flatten(), changes.place.flatten())?;
     let (size, place) = (changes.size.is_some(), changes.place.is_some());
-    let map_name = map.clone();
+    let (map_name, standing) = (map.clone(), changes.standing.map(Standing::from));
     let write = app.store.write(move |tx| {
         Box::pin(async move {
-            landmarks::update(tx, &map, &landmark, |old| landmarks::Measures {
+            let changed = landmarks::update(tx, &map, &landmark, |old| landmarks::Measures {
                 size: if size { checked.size } else { old.size },
                 place: if place { checked.place } else { old.place },
                 size_from_views: old.size_from_views && !size,
             })
-            .await
+            .await?;
+            match standing {
+                Some(standing) => landmarks::set_standing(tx, &map, &landmark, standing, None).await,
+                None => Ok(changed),
+            }
         })
     });
     Ok(Json(shown(&app, &map_name, write.await?)))

@@ -20,6 +20,7 @@ mod router;
 mod upload;
 mod cameras;
 mod views;
+mod visibility;
 pub(crate) mod listen;
 
 pub(crate) use router::router;

@@ -8,6 +8,7 @@ use crate::store::{
     robots::RobotRow,
 };
 use map::{
+    changes::Standing,
     check::OutOfRange,
     place::{LandmarkPlace, PlaceSigmas},
 };
@@ -186,6 +187,38 @@ pub(super) struct Model {
     facts: serde_json::Map<String, Value>,
 }
 
+/// How far a landmark is trusted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum Trust {
+    /// Nothing speaks against it.
+    Sound,
+    /// Robots find it elsewhere or not at all: see `finding`. It is still used.
+    Flagged,
+    /// So often that it corrects no pose until somebody sets its place or its standing.
+    Quarantined,
+}
+
+impl From<Standing> for Trust {
+    fn from(standing: Standing) -> Self {
+        match standing {
+            Standing::Sound => Self::Sound,
+            Standing::Flagged => Self::Flagged,
+            Standing::Quarantined => Self::Quarantined,
+        }
+    }
+}
+
+impl From<Trust> for Standing {
+    fn from(trust: Trust) -> Self {
+        match trust {
+            Trust::Sound => Self::Sound,
+            Trust::Flagged => Self::Flagged,
+            Trust::Quarantined => Self::Quarantined,
+        }
+    }
+}
+
 /// A landmark.
 #[derive(Debug, Clone, Serialize, ToSchema)]
 pub(super) struct Landmark {
@@ -206,6 +239,10 @@ pub(super) struct Landmark {
     place_sigma: Option<PlaceSigma>,
     /// What was learnt.
     model: Option<Model>,
+    /// How far robots' sightings let it be trusted.
+    standing: Trust,
+    /// What speaks against it: `kind` `moved` with where it appears, or `missing`.
+    finding: Option<Value>,
 }
 
 impl Landmark {
@@ -231,6 +268,8 @@ impl Landmark {
         let Measures { size, place, .. } = row.measures;
         let sigma = place.and_then(|p| p.covariance).map(|c| c.diagonal().map(f64::sqrt));
         Self {
+            standing: row.standing.into(),
+            finding: row.finding.and_then(|f| serde_json::from_str(&f).ok()),
             name: row.name,
             status,
             reasons: reasons.unwrap_or_default(),

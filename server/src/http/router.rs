@@ -2,7 +2,7 @@
 
 use super::{
     App, Shared, cameras, error::ApiError, guard, health, landmarks, laser, learning, live, maps, pages,
-    recognise, robots, views,
+    recognise, robots, views, visibility,
 };
 use crate::config::Limits;
 use axum::{
@@ -36,6 +36,7 @@ fn api(limits: &Limits) -> OpenApiRouter<Shared> {
         .merge(landmarks::router())
         .merge(views::router(limits.upload_bytes))
         .merge(learning::router())
+        .merge(visibility::router())
         .merge(recognise::router(limits.upload_bytes))
         .merge(robots::router())
         .merge(cameras::router())

@@ -1,6 +1,7 @@
 //! Landmarks of a map: name, size, place, and a summary of what was learnt.
 
 use super::{StoreError, Tx, maps, now_ms, statements::statements, within};
+use map::changes::Standing;
 use nalgebra::Matrix6;
 use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 use vision::localise::pose::LandmarkSize;
@@ -10,7 +11,7 @@ macro_rules! select {
     ($tail:literal) => {
         concat!(
             "SELECT l.id, l.name, l.width_m, l.height_m, l.x_m, l.y_m, l.z_m, l.theta_rad, \
-             l.roll_rad, l.tilt_rad, l.place_covariance, l.size_from_views, \
+             l.roll_rad, l.tilt_rad, l.place_covariance, l.size_from_views, l.standing, l.finding, \
              (SELECT count(*) FROM views v WHERE v.landmark_id = l.id) AS views, \
              m.active, m.reasons, m.facts, m.views AS model_views, m.generated_views, m.learnt_ms \
              FROM landmarks l LEFT JOIN models m ON m.landmark_id = l.id ",
@@ -24,6 +25,7 @@ statements! {
     INSERT = "INSERT INTO landmarks (map_id, name, created_ms) VALUES (?1, ?2, ?3) RETURNING id";
     GET = select!("JOIN maps ON maps.id = l.map_id WHERE maps.name = ?1 AND l.name = ?2");
     PAGE = select!("WHERE l.map_id = ?1 AND l.name > ?2 ORDER BY l.name LIMIT ?3");
+    STANDING = "UPDATE landmarks SET standing = ?2, finding = ?3 WHERE id = ?1";
     UPDATE = "UPDATE landmarks SET width_m = ?2, height_m = ?3, x_m = ?4, y_m = ?5, z_m = ?6, theta_rad = ?7, \
               roll_rad = ?8, tilt_rad = ?9, place_covariance = ?10, size_from_views = ?11 WHERE id = ?1";
     DELETE = "DELETE FROM landmarks WHERE id = ?1";
@@ -75,6 +77,27 @@ pub(crate) struct LandmarkRow {
     pub(crate) measures: Measures,
     pub(crate) views: u64,
     pub(crate) model: Option<ModelSummary>,
+    pub(crate) standing: Standing,
+    /// JSON: what speaks against it.
+    pub(crate) finding: Option<String>,
+}
+
+/// The word for a standing in the database.
+fn word(standing: Standing) -> &'static str {
+    match standing {
+        Standing::Sound => "sound",
+        Standing::Flagged => "flagged",
+        Standing::Quarantined => "quarantined",
+    }
+}
+
+/// The standing behind a word; an unknown one (a file from elsewhere) is the most careful.
+pub(super) fn standing_of(word: &str) -> Standing {
+    match word {
+        "sound" => Standing::Sound,
+        "flagged" => Standing::Flagged,
+        _ => Standing::Quarantined,
+    }
 }
 
 pub(super) fn measures(row: &SqliteRow) -> Result<Measures, sqlx::Error> {
@@ -148,6 +171,8 @@ fn landmark_row(row: &SqliteRow) -> Result<LandmarkRow, sqlx::Error> {
         measures: measures(row)?,
         views: row.try_get::<i64, _>("views")? as u64,
         model,
+        standing: standing_of(&row.try_get::<String, _>("standing")?),
+        finding: row.try_get("finding")?,
     })
 }
 
@@ -176,7 +201,15 @@ pub(crate) async fn create(
     within(count, max, "landmarks in a map")?;
     set(tx, id, &measures).await?;
     maps::bump(tx, map.id).await?;
-    Ok(LandmarkRow { id, name: name.to_owned(), measures, views: 0, model: None })
+    Ok(LandmarkRow {
+        id,
+        name: name.to_owned(),
+        measures,
+        views: 0,
+        model: None,
+        standing: Standing::Sound,
+        finding: None,
+    })
 }
 
 /// One landmark by the names of its map and itself. A missing map is not told from a missing landmark.
@@ -207,6 +240,29 @@ pub(crate) async fn page(
     rows.iter().map(landmark_row).collect::<Result<_, _>>().map_err(StoreError::at("list landmarks"))
 }
 
+/// Sets how far a landmark is trusted, and why; by a person, or by what robots found. A place or size that is set anew
+/// is trusted again by [`update`].
+pub(crate) async fn set_standing(
+    tx: &mut Tx,
+    map: &str,
+    name: &str,
+    standing: Standing,
+    finding: Option<&str>,
+) -> Result<LandmarkRow, StoreError> {
+    let map = maps::get(&mut tx.conn, map).await?;
+    let mut landmark = get(&mut tx.conn, &map.name, name).await?;
+    (landmark.standing, landmark.finding) = (standing, finding.map(str::to_owned));
+    sqlx::query(STANDING)
+        .bind(landmark.id)
+        .bind(word(standing))
+        .bind(finding)
+        .execute(&mut tx.conn)
+        .await
+        .map_err(StoreError::at("set standing"))?;
+    maps::bump(tx, map.id).await?;
+    Ok(landmark)
+}
+
 /// Sets size and place. `change` gets the present values and returns the new ones or why not.
 pub(crate) async fn update(
     tx: &mut Tx,
@@ -216,7 +272,15 @@ pub(crate) async fn update(
 ) -> Result<LandmarkRow, StoreError> {
     let map = maps::get(&mut tx.conn, map).await?;
     let mut landmark = get(&mut tx.conn, &map.name, name).await?;
-    landmark.measures = change(landmark.measures);
+    let old = landmark.measures;
+    landmark.measures = change(old);
+    if landmark.measures != old && landmark.standing != Standing::Sound {
+        // What was found out was about another place.
+        landmark = LandmarkRow {
+            measures: landmark.measures,
+            ..set_standing(tx, &map.name, name, Standing::Sound, None).await?
+        };
+    }
     set(tx, landmark.id, &landmark.measures).await?;
     maps::bump(tx, map.id).await?;
     Ok(landmark)

@@ -4,7 +4,7 @@
 use super::{
     StoreError, landmarks, laser, maps,
     models::{self, ModelDigest},
-    robots,
+    robots, seen,
     statements::statements,
 };
 use crate::engine::snapshot::{LandmarkInfo, Learnt, MapSnapshot, Snapshots};
@@ -26,7 +26,7 @@ statements! {
     MAP = "SELECT name, version, distance FROM maps WHERE id = ?1";
     MAP_IDS = "SELECT id FROM maps ORDER BY id";
     LANDMARKS = "SELECT id, name, width_m, height_m, x_m, y_m, z_m, theta_rad, roll_rad, tilt_rad, place_covariance, \
-                 size_from_views FROM landmarks WHERE map_id = ?1 ORDER BY id";
+                 size_from_views, standing FROM landmarks WHERE map_id = ?1 ORDER BY id";
 }
 
 /// Standard deviation of a wall given by hand, across it.
@@ -76,12 +76,16 @@ pub(super) async fn map(
         let id: i64 = row.try_get("id").map_err(at())?;
         let name = row.try_get("name").map_err(at())?;
         let measures = landmarks::measures(row).map_err(at())?;
-        let info = LandmarkInfo { name, size: measures.size, place: place(&measures) };
+        let standing = landmarks::standing_of(&row.try_get::<String, _>("standing").map_err(at())?);
+        let info = LandmarkInfo { name, size: measures.size, place: place(&measures), standing };
         infos.insert(LandmarkId(id as u64), info);
     }
-    let walls = laser::all_of(&mut *conn, id).await?.iter().filter_map(|ends| wall(ends).ok()).collect();
+    let walls: Vec<_> =
+        laser::all_of(&mut *conn, id).await?.iter().filter_map(|ends| wall(ends).ok()).collect();
     let name: String = row.try_get("name").map_err(at())?;
-    let (learnt, quarantined) = models(conn, id, snapshots.get(&name).as_deref(), params).await?;
+    let before = snapshots.get(&name);
+    let visibility = seen::areas(&infos, &walls, before.clone()).await;
+    let (learnt, quarantined) = models(conn, id, before.as_deref(), params).await?;
     for (id, reason) in &quarantined {
         let landmark = infos.get(id).map_or("", |l: &LandmarkInfo| l.name.as_str());
         tracing::warn!(map = name, landmark, reason, "model not used");
@@ -98,6 +102,7 @@ pub(super) async fn map(
         learnt,
         quarantined,
         walls,
+        visibility,
         distance,
         params: params.clone(),
     })))

@@ -15,6 +15,7 @@ pub(crate) mod views;
 pub(crate) mod models;
 pub(crate) mod laser;
 pub(crate) mod placing;
+mod seen;
 pub(crate) mod robots;
 pub(crate) mod jobs;
 

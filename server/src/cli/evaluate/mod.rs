@@ -13,6 +13,7 @@ pub(crate) mod placement;
 pub(crate) mod pose;
 pub(crate) mod mapping;
 pub(crate) mod recognition;
+pub(crate) mod visibility;
 
 /// What to evaluate.
 #[derive(Debug, clap::Subcommand)]
@@ -88,6 +89,9 @@ pub(crate) enum Command {
     ///   waymark evaluate navigation --plot corridor.svg
     #[command(verbatim_doc_comment)]
     Navigation(navigation::Args),
+    /// From where landmarks are seen: closed-form areas against brute force on random maps, their sizes against counting,
+    /// and what they and the choice where to look cost.
+    Visibility(visibility::Args),
 }
 
 /// Runs one evaluation.
@@ -107,5 +111,6 @@ pub(crate) fn run(command: &Command) -> anyhow::Result<()> {
         Command::Placement(args) => placement::run(args),
         Command::Navigation(args) => navigation::run(args),
         Command::Mapping(args) => mapping::run(args),
+        Command::Visibility(args) => visibility::run(args),
     }
 }

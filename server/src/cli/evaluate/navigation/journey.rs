@@ -96,9 +96,10 @@ fn fix(
     mounting: Option<&Mounting>,
     prior: Option<&Pose2Covariance>,
 ) -> Option<Fix> {
-    let alone = verdicts::robot_fix(facts, &world.map, mounting, None);
+    let sightings = verdicts::sightings(facts, &world.map).ok()?;
+    let alone = verdicts::robot_fix(&sightings, mounting, None);
     if alone.as_ref().err() == Some(&AMBIGUOUS) && prior.is_some() {
-        return verdicts::robot_fix(facts, &world.map, mounting, prior).ok();
+        return verdicts::robot_fix(&sightings, mounting, prior).ok();
     }
     alone.ok()
 }

@@ -136,7 +136,8 @@ fn snapshot(
     let sizes: BTreeMap<LandmarkId, LandmarkSize> = numbered().map(|(id, l)| (id, l.place.size)).collect();
     let landmarks: BTreeMap<LandmarkId, LandmarkInfo> = numbered()
         .map(|(id, l)| {
-            (id, LandmarkInfo { name: l.name.clone(), size: Some(l.place.size), place: Some(l.place) })
+            let (size, place) = (Some(l.place.size), Some(l.place));
+            (id, LandmarkInfo { name: l.name.clone(), size, place, ..LandmarkInfo::default() })
         })
         .collect();
     let params = Arc::new(params);

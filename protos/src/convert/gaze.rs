@@ -1,0 +1,108 @@
+//! A question where to look, as it enters, and the advice as it leaves.
+
+use super::geometry;
+use crate::{Code, Rejection, v1};
+use map::{
+    gaze::{Choice, Criterion, Head, Look},
+    pose2::Pose2Covariance,
+    visibility::Viewer,
+};
+
+/// A question that can be relied on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CheckedGaze {
+    /// Where the robot is, if it says so.
+    pub pose: Option<Pose2Covariance>,
+    /// Where its camera is and looks.
+    pub head: Head,
+    /// What its unit reaches.
+    pub viewer: Viewer,
+    /// By what to choose.
+    pub criterion: Criterion,
+    /// Robot's clock.
+    pub at_ns: i64,
+    /// The landmark that it looked at last, and whether that was recognised.
+    pub looked: Option<(String, bool)>,
+}
+
+impl TryFrom<v1::GazeRequest> for CheckedGaze {
+    type Error = Rejection;
+
+    fn try_from(g: v1::GazeRequest) -> Result<Self, Rejection> {
+        let pose = g.map_from_robot.as_ref().map(geometry::pose2_covariance).transpose();
+        let usual = Head::default();
+        let or = |value: f64, usual: f64| if value == 0.0 { usual } else { value };
+        let head = Head {
+            camera_m: [g.camera_x_m, g.camera_y_m, or(g.camera_z_m, usual.camera_m[2])],
+            pan_rad: g.pan_rad,
+            tilt_rad: g.tilt_rad,
+            rate_radps: or(g.rate_radps, usual.rate_radps),
+        };
+        let usual = Viewer::default();
+        let viewer = Viewer {
+            pan_rad: range("pan_range_rad", &g.pan_range_rad, usual.pan_rad)?,
+            tilt_rad: range("tilt_range_rad", &g.tilt_range_rad, usual.tilt_rad)?,
+            ..usual
+        };
+        head.check().and_then(|()| viewer.check()).map_err(|e| geometry::refused(&e))?;
+        let criterion = match g.criterion() {
+            v1::GazeCriterion::Unspecified | v1::GazeCriterion::Product => Criterion::Product,
+            v1::GazeCriterion::Information => Criterion::Information,
+        };
+        Ok(Self {
+            pose: pose.map_err(|r| r.inside("map_from_robot"))?,
+            head,
+            viewer,
+            criterion,
+            at_ns: g.at_ns,
+            looked: (!g.looked_at.is_empty()).then_some((g.looked_at, g.recognised)),
+        })
+    }
+}
+
+fn range(field: &str, given: &[f64], usual: [f64; 2]) -> Result<[f64; 2], Rejection> {
+    match given {
+        [] => Ok(usual),
+        [low, high] => Ok([*low, *high]),
+        _ => {
+            let detail = format!("2 numbers expected, {} given", given.len());
+            Err(Rejection::new(Code::OutOfRange, field, detail))
+        }
+    }
+}
+
+/// The advice; `name` gives the name of a landmark.
+pub fn advice(look: &Look, name: impl Fn(&Choice) -> String) -> v1::GazeAdvice {
+    let (kind, choice) = match look {
+        Look::Landmark(choice) => (v1::GazeLook::Landmark, Some(choice)),
+        Look::Ahead => (v1::GazeLook::Ahead, None),
+        Look::Sweep => (v1::GazeLook::Sweep, None),
+    };
+    let mut advice = v1::GazeAdvice { look: kind.into(), ..v1::GazeAdvice::default() };
+    if let Some(c) = choice {
+        advice.landmark = name(c);
+        (advice.pan_rad, advice.tilt_rad) = (c.pan_rad, c.tilt_rad);
+        (advice.utility, advice.probability) = (c.utility, c.probability);
+        (advice.margin_m, advice.gain_nats) = (c.margin_m, c.gain_nats);
+        (advice.range_m, advice.incidence_rad) = (c.range_m, c.incidence_rad);
+    }
+    advice
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn absent_numbers_are_the_usual_ones_and_wrong_ones_are_named() {
+        let empty = CheckedGaze::try_from(v1::GazeRequest::default()).unwrap();
+        assert_eq!((empty.head, empty.viewer, empty.pose), (Head::default(), Viewer::default(), None));
+        let refused = |g: v1::GazeRequest| CheckedGaze::try_from(g).unwrap_err().field;
+        let g = v1::GazeRequest::default;
+        assert_eq!(refused(v1::GazeRequest { pan_range_rad: vec![1.0], ..g() }), "pan_range_rad");
+        assert_eq!(refused(v1::GazeRequest { pan_range_rad: vec![1.0, 0.5], ..g() }), "pan_rad[1]");
+        assert_eq!(refused(v1::GazeRequest { rate_radps: f64::NAN, ..g() }), "head.rate_radps");
+        let pose = v1::Pose2Covariance { pose: None, covariance: vec![] };
+        assert_eq!(refused(v1::GazeRequest { map_from_robot: Some(pose), ..g() }), "map_from_robot.pose");
+    }
+}

@@ -1,0 +1,68 @@
+//! `robot/{robot}/rpc/gaze`: a robot asks where to look and is answered on the spot, on zenoh's thread: it takes less
+//! than a millisecond.
+
+use super::{BusError, Receivers};
+use crate::engine::gaze::Ask;
+use map::gaze::GazeParams;
+use protos::{
+    Code, Key, Keys, Name, Rejection,
+    convert::{CheckedGaze, gaze::advice, geometry::refused},
+    prost::Message,
+    v1,
+};
+use zenoh::{
+    Session, Wait,
+    query::{Query, Queryable},
+};
+
+/// Largest question, in bytes: it has some thirty numbers and a name.
+const MAX_BYTES: usize = 1024;
+
+pub(super) async fn answer_gaze(
+    session: &Session,
+    keys: &Keys,
+    to: &Receivers,
+) -> Result<Queryable<()>, BusError> {
+    let asked = {
+        let (keys, to) = (keys.clone(), to.clone());
+        move |query: Query| {
+            let Ok(Key::Gaze(robot)) = keys.parse(query.key_expr().as_str()) else { return };
+            let advice = asked(&to, &robot, &query).unwrap_or_else(|rejection| v1::GazeAdvice {
+                rejection: Some((&rejection).into()),
+                ..v1::GazeAdvice::default()
+            });
+            if let Err(error) = query.reply(query.key_expr().clone(), advice.encode_to_vec()).wait() {
+                tracing::debug!(%robot, %error, "no advice sent");
+            }
+        }
+    };
+    let declared = session.declare_queryable(keys.all_gaze()).callback(asked).await;
+    declared
+        .map_err(|e| BusError::Declare { action: "answer questions where to look", detail: e.to_string() })
+}
+
+fn asked(to: &Receivers, robot: &Name, query: &Query) -> Result<v1::GazeAdvice, Rejection> {
+    let name = to.intake.snapshots.robot_map(robot.as_str());
+    let name = name.ok_or_else(|| Rejection::new(Code::UnknownRobot, "robot", "not registered"))?;
+    let map = to.intake.snapshots.get(&name);
+    let map = map.ok_or_else(|| Rejection::new(Code::UnknownMap, "map", "not loaded"))?;
+    let bytes = query.payload().map(|p| p.to_bytes().into_owned()).unwrap_or_default();
+    if bytes.len() > MAX_BYTES {
+        return Err(Rejection::new(Code::TooLarge, "message", format!("more than {MAX_BYTES} bytes")));
+    }
+    let wire = v1::GazeRequest::decode(&*bytes);
+    let wire = wire.map_err(|e| Rejection::new(Code::BadMessage, "message", e.to_string()))?;
+    let question = CheckedGaze::try_from(wire)?;
+    let pose = question.pose.or_else(|| to.motion.pose(robot, &name)).ok_or_else(|| {
+        Rejection::new(Code::Missing, "map_from_robot", "the robot's pose is not known here either")
+    })?;
+    let number = |text: &str| map.landmarks.iter().find(|(_, l)| l.name == text).map(|(id, _)| *id);
+    let looked = question.looked.and_then(|(text, recognised)| Some((number(&text)?, recognised)));
+    let params = GazeParams { criterion: question.criterion, ..GazeParams::default() };
+    let ask = Ask { pose, viewer: question.viewer, head: question.head, params };
+    let look = to.gazes.choose(robot, question.at_ns, looked, &map, &ask).map_err(|e| refused(&e))?;
+    let name_of =
+        |c: &map::gaze::Choice| map.landmarks.get(&c.landmark).map(|l| l.name.clone()).unwrap_or_default();
+    let advice = advice(&look, name_of);
+    Ok(v1::GazeAdvice { map: map.name.clone(), map_version: map.version, ..advice })
+}

@@ -1,0 +1,77 @@
+//! Where a robot should look, over one version of its map: `map::gaze` with the landmarks that are learnt, placed and
+//! trusted. Robots that ask keep to one landmark until another is clearly better; pages that ask get the ranking only.
+
+use super::snapshot::MapSnapshot;
+use map::{
+    check::OutOfRange,
+    gaze::{Choice, Gaze, GazeParams, Head, Look, Target, rank},
+    pose2::Pose2Covariance,
+    visibility::Viewer,
+};
+use protos::Name;
+use std::{
+    collections::BTreeMap,
+    sync::{Mutex, PoisonError},
+};
+use vision::recognise::LandmarkId;
+
+/// Robots whose gaze is remembered; the one longest silent gives way.
+pub const MAX_ROBOTS: usize = 10_000;
+
+/// What is asked.
+#[derive(Debug, Clone)]
+pub struct Ask {
+    /// Where the robot is.
+    pub pose: Pose2Covariance,
+    /// Ranges of its pan-tilt unit, and its focal length.
+    pub viewer: Viewer,
+    /// Where its camera is and looks.
+    pub head: Head,
+    /// How to choose.
+    pub params: GazeParams,
+}
+
+/// Every landmark worth looking at, best first.
+pub fn ranked(map: &MapSnapshot, ask: &Ask) -> Result<Vec<Choice>, OutOfRange> {
+    let targets: Vec<Target<'_>> = map
+        .models
+        .iter()
+        .filter_map(|model| {
+            let (info, visible) = (map.landmarks.get(&model.id)?, map.visibility.get(&model.id)?);
+            let place = info.place.as_ref().filter(|_| info.is_trusted())?;
+            let (saliency, v_c) = (model.saliency, model.v_c);
+            Some(Target { landmark: model.id, place, visible, saliency, v_c })
+        })
+        .collect();
+    rank(&ask.pose, &targets, &ask.viewer, &ask.head, &ask.params)
+}
+
+/// Which landmark each robot was told to look at.
+#[derive(Debug, Default)]
+pub struct Gazes(Mutex<BTreeMap<Name, (u64, Gaze)>>);
+
+impl Gazes {
+    /// Where a robot should look at its own time `at_ns`; `looked` is what came of the last look.
+    pub fn choose(
+        &self,
+        robot: &Name,
+        at_ns: i64,
+        looked: Option<(LandmarkId, bool)>,
+        map: &MapSnapshot,
+        ask: &Ask,
+    ) -> Result<Look, OutOfRange> {
+        let ranked = ranked(map, ask)?;
+        let mut gazes = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let tick = gazes.values().map(|(tick, _)| *tick).max().unwrap_or(0) + 1;
+        if gazes.len() >= MAX_ROBOTS && !gazes.contains_key(robot) {
+            let stalest = gazes.iter().min_by_key(|(_, (tick, _))| *tick).map(|(name, _)| name.clone());
+            stalest.and_then(|name| gazes.remove(&name));
+        }
+        let (ticked, gaze) = gazes.entry(robot.clone()).or_default();
+        *ticked = tick;
+        if let Some((landmark, recognised)) = looked {
+            gaze.looked(at_ns, landmark, recognised, &ask.params);
+        }
+        Ok(gaze.choose(at_ns, &ranked, &ask.pose, &ask.params))
+    }
+}

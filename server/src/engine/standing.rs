@@ -1,0 +1,65 @@
+//! What robots find out about landmarks, on its way to whoever keeps the map: moved, missing, in place again. The store
+//! commits it, then the new version of the map is what every frame sees.
+
+use map::changes::{Change, Finding, Standing};
+use serde_json::json;
+use tokio::sync::mpsc::{Receiver, Sender, channel, error::TrySendError};
+use vision::recognise::LandmarkId;
+
+/// Findings that wait for the store; beyond that they are dropped, and found again.
+const QUEUE: usize = 256;
+
+/// A finding about a landmark of a map.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Found {
+    /// Name of the map.
+    pub map: String,
+    /// Number of the landmark.
+    pub landmark: LandmarkId,
+    /// Its name.
+    pub name: String,
+    /// How far to trust it from now on.
+    pub standing: Standing,
+    /// JSON: why; none for a sound one.
+    pub finding: Option<String>,
+}
+
+impl Found {
+    /// Of what a robot's watch says.
+    pub fn new(map: &str, name: &str, change: &Change) -> Self {
+        let finding = change.finding.map(|finding| match finding {
+            Finding::Moved { apparent, by_m, sightings } => json!({
+                "kind": "moved", "by_m": by_m, "sightings": sightings,
+                "apparent": { "x_m": apparent.x_m, "y_m": apparent.y_m, "theta_rad": apparent.theta_rad },
+            }),
+            Finding::Missing { looks } => json!({ "kind": "missing", "looks": looks }),
+        });
+        Self {
+            map: map.to_owned(),
+            landmark: change.landmark,
+            name: name.to_owned(),
+            standing: change.standing,
+            finding: finding.map(|f| f.to_string()),
+        }
+    }
+}
+
+/// Takes findings from workers, who never wait.
+#[derive(Debug, Clone)]
+pub struct Findings(Sender<Found>);
+
+/// Both ends.
+pub fn findings() -> (Findings, Receiver<Found>) {
+    let (sender, receiver) = channel(QUEUE);
+    (Findings(sender), receiver)
+}
+
+impl Findings {
+    /// Passes one on.
+    pub fn tell(&self, found: Found) {
+        tracing::warn!(map = found.map, landmark = found.name, standing = ?found.standing, finding = found.finding, "landmark");
+        if let Err(TrySendError::Full(found)) = self.0.try_send(found) {
+            tracing::warn!(landmark = found.name, "too many findings at once: this one is dropped");
+        }
+    }
+}

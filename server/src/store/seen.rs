@@ -1,0 +1,91 @@
+//! Visibility areas of a map's landmarks, off the runtime; taken over from the snapshot before where neither the
+//! landmark's place nor an obstacle within its reach has changed.
+
+use crate::engine::snapshot::{LandmarkInfo, MapSnapshot};
+use map::{
+    place::LandmarkPlace,
+    segments::LaserSegment,
+    visibility::{Obstacle, Viewer, VisibilityMap, VisibilityParams, visibility, within_reach},
+};
+use std::{collections::BTreeMap, sync::Arc};
+use vision::recognise::LandmarkId;
+
+/// What is tilted more hangs on no wall: seen in plan view its area would be wrong.
+const MAX_TILT_RAD: f64 = 0.2;
+
+type Areas = BTreeMap<LandmarkId, Arc<VisibilityMap>>;
+
+/// The areas of all placed landmarks. Without them a map is served all the same.
+pub(super) async fn areas(
+    landmarks: &BTreeMap<LandmarkId, LandmarkInfo>,
+    walls: &[LaserSegment],
+    before: Option<Arc<MapSnapshot>>,
+) -> Areas {
+    let on_walls = |place: &LandmarkPlace| place.tilt_rad.abs() <= MAX_TILT_RAD;
+    let places: Vec<_> =
+        landmarks.iter().filter_map(|(id, l)| Some((*id, l.place.filter(on_walls)?))).collect();
+    let obstacles: Vec<Obstacle> = walls.iter().map(Obstacle::from).collect();
+    let made = tokio::task::spawn_blocking(move || all(&places, &obstacles, before.as_deref()));
+    made.await.unwrap_or_else(|error| {
+        tracing::error!(%error, "visibility areas");
+        Areas::new()
+    })
+}
+
+fn all(
+    places: &[(LandmarkId, LandmarkPlace)],
+    obstacles: &[Obstacle],
+    before: Option<&MapSnapshot>,
+) -> Areas {
+    let (viewer, p) = (Viewer::default(), VisibilityParams::default());
+    let kept = |id: &LandmarkId, place: &LandmarkPlace| {
+        let before = before?;
+        let area = before.visibility.get(id)?;
+        let same = before.landmarks.get(id)?.place.as_ref() == Some(place)
+            && within_reach(place, obstacles, &viewer, &p) == area.obstacles();
+        same.then(|| area.clone())
+    };
+    let one = |(id, place): &(LandmarkId, LandmarkPlace)| {
+        let made = || visibility(place, obstacles, &viewer, &p).map(Arc::new);
+        let area = kept(id, place).map_or_else(made, Ok);
+        let area = area.inspect_err(|error| tracing::error!(%error, landmark = id.0, "no visibility area"));
+        Some((*id, area.ok()?))
+    };
+    places.iter().filter_map(one).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use map::place::PlaceSigmas;
+    use nalgebra::{Point2, Vector3};
+    use vision::localise::pose::LandmarkSize;
+
+    #[test]
+    fn only_what_changed_is_made_anew() {
+        let size = LandmarkSize { width_m: 0.6, height_m: 0.8 };
+        let place =
+            |x| LandmarkPlace::by_hand(Vector3::new(x, 0.0, 1.5), 0.0, size, PlaceSigmas::default()).unwrap();
+        let places = [(LandmarkId(1), place(0.0)), (LandmarkId(2), place(50.0))];
+        let wall = |x: f64| Obstacle { a: Point2::new(x, -1.0), b: Point2::new(x, 1.0), height_m: None };
+        let first = all(&places, &[wall(2.0), wall(53.0)], None);
+        let info = |place| LandmarkInfo {
+            name: String::new(),
+            size: Some(size),
+            place: Some(place),
+            ..LandmarkInfo::default()
+        };
+        let snapshot = MapSnapshot {
+            landmarks: places.iter().map(|(id, place)| (*id, info(*place))).collect(),
+            visibility: first.clone(),
+            ..MapSnapshot::empty("hall", 1)
+        };
+        let again = all(&places, &[wall(2.0), wall(52.5)], Some(&snapshot));
+        assert!(Arc::ptr_eq(&first[&LandmarkId(1)], &again[&LandmarkId(1)]), "nothing near it changed");
+        assert!(again[&LandmarkId(2)].area_m2() < first[&LandmarkId(2)].area_m2());
+        let moved = [(LandmarkId(1), place(0.1)), places[1]];
+        let again = all(&moved, &[wall(2.0), wall(53.0)], Some(&snapshot));
+        assert!(!Arc::ptr_eq(&first[&LandmarkId(1)], &again[&LandmarkId(1)]));
+        assert!(Arc::ptr_eq(&first[&LandmarkId(2)], &again[&LandmarkId(2)]));
+    }
+}
