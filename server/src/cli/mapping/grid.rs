@@ -11,6 +11,8 @@ pub(crate) const MAX_CELLS: usize = 1 << 26;
 const MAX_YAML_BYTES: usize = 1 << 16;
 /// Border around the walls of an exported grid.
 const BORDER_M: f64 = 1.0;
+/// Width of the band that smoothing leaves.
+const SOFT_CELLS: usize = 2;
 /// Grey levels that `map_server` writes.
 const OCCUPIED: u8 = 0;
 const FREE: u8 = 254;
@@ -81,7 +83,24 @@ impl Grid {
 
     /// The walls between free and occupied cells, the free side on the left.
     pub(crate) fn walls(&self, min_length_m: f64) -> Vec<Wall> {
-        outline::walls(self, min_length_m)
+        outline::walls(&self.hardened(), min_length_m)
+    }
+
+    /// Pictures that were smoothed have a band of unknown cells between free and occupied ones: free cells grow into it.
+    fn hardened(&self) -> Self {
+        let mut grid = self.clone();
+        for _ in 0..SOFT_CELLS {
+            let before = grid.clone();
+            for y in 0..self.height as i64 {
+                for x in 0..self.width as i64 {
+                    let beside = [(1, 0), (-1, 0), (0, 1), (0, -1)].map(|(dx, dy)| before.at(x + dx, y + dy));
+                    if before.at(x, y) == Cell::Unknown && beside.contains(&Cell::Free) {
+                        grid.set(x, y, Cell::Free);
+                    }
+                }
+            }
+        }
+        grid
     }
 
     /// Draws walls: occupied along them, free where the free sides reach without crossing one, unknown elsewhere.

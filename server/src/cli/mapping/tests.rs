@@ -109,6 +109,17 @@ fn a_grid_becomes_its_walls_and_back() {
 }
 
 #[test]
+fn a_smoothed_grid_has_its_walls_too() {
+    // Free, a cell in between, a wall two cells thick, unknown behind.
+    let row = [Cell::Free, Cell::Free, Cell::Unknown, Cell::Occupied, Cell::Occupied, Cell::Unknown];
+    let cells: Vec<Cell> = (0..40).flat_map(|_| row).collect();
+    let grid = Grid { width: 6, height: 40, resolution_m: 0.05, origin: Pose2::default(), cells };
+    let walls = grid.walls(0.3);
+    assert_eq!(walls.len(), 1, "{walls:?}");
+    assert!([walls[0].a, walls[0].b].iter().all(|p| (p[0] - 0.15).abs() < 1e-9), "{walls:?}");
+}
+
+#[test]
 fn a_slanted_wall_of_a_grid_is_one_wall() {
     let slanted = [Wall::between([0.0, 0.0], [6.0, 2.0]), Wall::between([6.0, 4.0], [0.0, 4.0])];
     let grid = Grid::of_walls(&slanted, 0.05).unwrap();
