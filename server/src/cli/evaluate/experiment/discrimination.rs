@@ -14,11 +14,12 @@ use super::{
 use crate::cli::evaluate::statistics::{Interval, upper_bound, wilson};
 use serde::Serialize;
 use sim::exhibit::{Conditions, Exhibit, Extent, exhibit};
+use std::collections::BTreeMap;
 use vision::{
     detect::quads::Corners,
     learn::random::Random,
     params::Params,
-    recognise::{DistanceKind, Recognition, verdict::recognise},
+    recognise::{DistanceKind, LandmarkId, Recognition, verdict::recognise},
 };
 
 /// `waymark evaluate discrimination`.
@@ -67,6 +68,18 @@ struct Mated {
     ambiguous: usize,
 }
 
+/// A stranger that is no look-alike on purpose and was taken for a landmark.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+struct Taken {
+    /// Which stratum, and the how manieth of all strangers.
+    stratum: &'static str,
+    number: usize,
+    /// For which landmark, in how many of its views.
+    landmark: String,
+    views: usize,
+    of: usize,
+}
+
 #[derive(Debug, Serialize)]
 struct Report {
     #[serde(flatten)]
@@ -74,6 +87,7 @@ struct Report {
     mated: Mated,
     /// All that is no look-alike on purpose, then all, then each.
     unknown: Vec<Stratum>,
+    taken: Vec<Taken>,
     /// By the paper's distances alone: H^r, C^r.
     pairs: [Pairs; 2],
     humps: [Humps; 2],
@@ -144,6 +158,7 @@ fn measure(class: &Class, unknown: &[pictures::Picture], args: &Args, p: &Params
         setting: Setting::new("discrimination", &args.common, class, p),
         mated,
         unknown: strata(&strangers, &seen),
+        taken: taken(&strangers, &seen, |id| class.landmarks[id.0 as usize].name.clone()),
         pairs,
         humps,
     }
@@ -275,6 +290,29 @@ fn strata(strangers: &[Stranger], seen: &[Vec<Sight>]) -> Vec<Stratum> {
     all
 }
 
+/// Strangers that were taken for a landmark though nobody made them like it, by what they were taken for.
+fn taken(strangers: &[Stranger], seen: &[Vec<Sight>], name: impl Fn(LandmarkId) -> String) -> Vec<Taken> {
+    let mut all = Vec::new();
+    for (number, (stranger, sights)) in strangers.iter().zip(seen).enumerate().filter(|(_, (s, _))| !s.hard) {
+        let mut views = BTreeMap::new();
+        for sight in sights {
+            if let Recognition::Unique(id) = sight.recognition {
+                *views.entry(id).or_insert(0) += 1;
+            }
+        }
+        let of = sights.len();
+        let stratum = stranger.stratum;
+        all.extend(views.into_iter().map(|(id, views)| Taken {
+            stratum,
+            number,
+            landmark: name(id),
+            views,
+            of,
+        }));
+    }
+    all
+}
+
 fn table(r: &Report) -> Vec<String> {
     let mut lines = r.setting.lines();
     let m = &r.mated;
@@ -300,6 +338,12 @@ fn table(r: &Report) -> Vec<String> {
             s.textures, s.quads, s.accepted, s.bound, s.ambiguous, s.accepted_textures, s.texture_bound
         ));
     }
+    for t in &r.taken {
+        lines.push(format!(
+            "  stranger {} ({}) was taken for {} in {} of {} views",
+            t.number, t.stratum, t.landmark, t.views, t.of
+        ));
+    }
     for (name, pairs) in ["H^r", "C^r"].iter().zip(&r.pairs) {
         lines.push(format!("  {name} alone, {}", pairs.line()));
     }
@@ -315,7 +359,6 @@ fn table(r: &Report) -> Vec<String> {
 mod tests {
     use super::*;
     use std::sync::Arc;
-    use vision::recognise::LandmarkId;
 
     #[test]
     fn strata_count_quads_and_textures() {
@@ -338,6 +381,10 @@ mod tests {
             (posters.quads, posters.accepted, posters.accepted_textures, posters.ambiguous),
             (6, 2, 1, 1)
         );
+        let taken = taken(&strangers, &seen, |id| format!("landmark {}", id.0));
+        let expected =
+            Taken { stratum: "posters", number: 0, landmark: "landmark 1".into(), views: 2, of: 3 };
+        assert_eq!(taken, [expected]);
         assert!((posters.bound - upper_bound(2, 6)).abs() < 1e-12 && (all[3].bound - 0.95).abs() < 1e-9);
     }
 }
