@@ -226,7 +226,6 @@ fn drive(seed: u64, length_m: f64, moved: usize, hidden: bool) -> Run {
 }
 
 #[test]
-#[ignore = "a minute: run by name for the figures of docs/EVALUATION.md"]
 fn a_moved_poster_is_found_out_and_does_no_harm() {
     for seed in 0..6 {
         for moved in [1, 2] {
@@ -243,7 +242,6 @@ fn a_moved_poster_is_found_out_and_does_no_harm() {
 }
 
 #[test]
-#[ignore = "a minute: run by name for the figures of docs/EVALUATION.md"]
 fn it_costs_no_more_than_a_poster_that_is_not_there() {
     // Over 25 m with four posters the next one is so far that odometry drifts, moved poster or none.
     for seed in 0..4 {
@@ -255,7 +253,6 @@ fn it_costs_no_more_than_a_poster_that_is_not_there() {
 }
 
 #[test]
-#[ignore = "a minute: run by name for the figures of docs/EVALUATION.md"]
 fn where_nothing_moved_nobody_is_blamed() {
     for seed in 0..4 {
         let run = drive(seed, 25.0, usize::MAX, false);
