@@ -305,3 +305,36 @@ fn recognition_names_the_taught_and_no_stranger() {
     assert!(3 * count("right") >= known, "{report}");
     assert!(report["ms_per_image"].as_f64().is_some_and(|ms| ms > 0.0), "{report}");
 }
+
+#[test]
+fn robots_find_their_way_from_a_start_that_nobody_tells() {
+    let folder = TempDir::new().expect("a temporary directory");
+    let plot = folder.path().join("drive.svg");
+    let mut args: Vec<OsString> = [
+        "evaluate",
+        "navigation",
+        "--drives=2",
+        "--length-m=10",
+        "--posters=3",
+        "--rate-hz=2",
+        "--json",
+        "--plot",
+    ]
+    .map(Into::into)
+    .into();
+    args.push(plot.clone().into());
+    let run = waymark(args, LONGEST);
+    assert_eq!((run.status, run.stdout.lines().count()), (0, 1), "{run:?}");
+    let report = run.last_json();
+    let number = |path: &str| {
+        report.pointer(path).and_then(Value::as_f64).unwrap_or_else(|| panic!("{path} of {report}"))
+    };
+    let whole = ["/drives", "/never_fixed", "/false_matches"].map(number);
+    assert_eq!(whole.map(|x| x as i64), [2, 0, 0], "{report}");
+    assert!(number("/corrections") >= 6.0 && number("/recognised") >= 6.0, "{report}");
+    // Odometry alone drifts; the corrected pose does not.
+    assert!(number("/along_m/p95") < 0.15, "{report}");
+    assert!(number("/along_m/median") < 0.5 * number("/odometry_along_m/median"), "{report}");
+    let svg = fs::read_to_string(plot).expect("the plot");
+    assert_eq!(svg.matches("<polyline").count(), 4, "three tracks and an error");
+}
