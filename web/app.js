@@ -347,6 +347,7 @@ async function loadMap(name) {
   byId("map-facts").textContent = `version ${map.version}, ${active} of ${state.landmarks.length} landmarks active, ${state.walls.length} walls`;
   byId("map-hint").textContent = state.walls.length || state.landmarks.some((l) => l.place) ? "" : "This map has no walls and no placed landmarks yet.";
   if (!state.view.fitted) fit();
+  window.dispatchEvent(new CustomEvent("map-loaded", { detail: { map: name, landmarks: state.landmarks } }));
 }
 
 // Where the map's robots have been before this page was opened.

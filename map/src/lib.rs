@@ -20,4 +20,5 @@ pub mod gaze;
 pub mod slam;
 pub mod laser_fix;
 pub mod changes;
+pub mod gather;
 pub mod hypotheses;

@@ -8,6 +8,7 @@ pub mod engine;
 pub mod bus;
 mod store;
 mod jobs;
+pub mod gather;
 mod calibrating;
 mod http;
 mod server;

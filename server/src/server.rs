@@ -13,7 +13,8 @@ use crate::{
         standing::{Findings, Found, findings},
         workers::{Engine, Workers},
     },
-    http::{self, App},
+    gather::{self, Gatherer, Hook},
+    http::{self, App, Workshop},
     jobs::Jobs,
     store::{OpenError, Store, WriterTask, landmarks},
 };
@@ -88,6 +89,7 @@ struct Tasks {
     http: JoinHandle<()>,
     jobs: JoinHandle<()>,
     findings: JoinHandle<()>,
+    gather: JoinHandle<()>,
     writer: WriterTask,
 }
 
@@ -105,23 +107,28 @@ impl Server {
             .await
             .map_err(|e| StartError::Store(e.to_string()))?;
         let (findings, found) = findings();
-        let engine = engine(&config, snapshots.clone(), findings);
+        let (hook, offers) = gather::hook();
+        let (gatherer, gather) = Gatherer::start(store.clone(), &config, &hook, offers)
+            .await
+            .map_err(|e| StartError::Store(e.to_string()))?;
+        let engine = engine(&config, snapshots.clone(), findings, hook);
         let findings = tokio::spawn(keep_findings(store.clone(), found));
         let (live, slots) = (engine.live.clone(), engine.slots.clone());
         let bus = Bus::open(&config, receivers(&config, &engine)).await?;
         let workers = Workers::start(&engine, config.workers, &Arc::new(bus.outbox().clone()))
             .map_err(StartError::Threads)?;
         let zenoh_endpoint = bus.endpoint().to_owned();
-        let app = App::new(config.clone(), store, jobs, live.clone(), stopping.clone());
+        let workshop = Workshop { jobs, gatherer };
+        let app = App::new(config.clone(), store, workshop, live.clone(), stopping.clone());
         let http =
             tokio::spawn(http::listen::serve(listener, http::router(app), config.limits.clone(), stopping));
-        let tasks = Tasks { workers, bus, http, jobs: jobs_task, findings, writer };
+        let tasks = Tasks { workers, bus, http, jobs: jobs_task, findings, gather, writer };
         Ok(RunningServer { http_addr, zenoh_endpoint, snapshots, live, slots, stop, store_failed, tasks })
     }
 }
 
 /// Everything between frames and answers, for one set of settings.
-fn engine(config: &Config, snapshots: Arc<Snapshots>, findings: Findings) -> Engine {
+fn engine(config: &Config, snapshots: Arc<Snapshots>, findings: Findings, gather: Hook) -> Engine {
     let live = Arc::new(LiveHub::default());
     Engine {
         slots: Arc::new(Slots::new(config.limits.cameras)),
@@ -131,6 +138,7 @@ fn engine(config: &Config, snapshots: Arc<Snapshots>, findings: Findings) -> Eng
         limits: ImageLimits { bytes: config.limits.frame_bytes, pixels: config.limits.frame_pixels },
         panics: Arc::default(),
         findings,
+        gather,
     }
 }
 
@@ -176,14 +184,14 @@ impl RunningServer {
     /// Answers what is in work, then closes everything.
     pub async fn stop(self) {
         self.stop.send_replace(true);
-        let Tasks { workers, bus, http, jobs, findings, writer } = self.tasks;
+        let Tasks { workers, bus, http, jobs, findings, gather, writer } = self.tasks;
         // Workers first: what they have in work is still answered over the open bus.
         let workers = tokio::task::spawn_blocking(move || workers.stop());
         if let Err(error) = workers.await {
             tracing::error!(%error, "stopping the workers");
         }
         bus.close().await;
-        for (what, task) in [("HTTP", http), ("jobs", jobs), ("findings", findings)] {
+        for (what, task) in [("HTTP", http), ("jobs", jobs), ("findings", findings), ("gathering", gather)] {
             if let Err(error) = task.await {
                 tracing::error!(%error, what, "a task panicked");
             }

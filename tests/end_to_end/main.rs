@@ -5,6 +5,7 @@ mod command_line;
 mod demo;
 mod evaluate;
 mod fit;
+mod gathered_drive;
 mod http_contract;
 mod moved_landmark;
 mod real_pictures;

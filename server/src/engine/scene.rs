@@ -101,5 +101,6 @@ pub(crate) fn engine(maps: &[Arc<MapSnapshot>]) -> Engine {
         limits: ImageLimits::FRAME,
         panics: Arc::default(),
         findings: findings().0,
+        gather: crate::gather::hook().0,
     }
 }

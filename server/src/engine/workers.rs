@@ -13,6 +13,7 @@ use super::{
     standing::{Findings, Found},
     verdicts::{self, StageTimes},
 };
+use crate::gather::{Hook, Looked};
 use map::{
     changes::{ChangeParams, Expectation, Eye, Judged, expected, judge, sift},
     localise::{Fix, Sighting},
@@ -58,6 +59,8 @@ pub struct Engine {
     pub panics: Arc<AtomicU64>,
     /// Where findings about landmarks go.
     pub findings: Findings,
+    /// Where frames of robots that gather views go.
+    pub gather: Hook,
 }
 
 /// The threads.
@@ -187,6 +190,10 @@ impl Engine {
         }
         times.ended("localise");
         answer.timings = times.finish();
+        self.gather.offer(key, frame, || {
+            let believed = frame.prior.or_else(|| seen.as_ref().map(|s| s.grounds.pose));
+            Looked { image, quads: facts.quads, map: map.clone(), believed }
+        });
         Ok(Done { answer, map: Some(map.clone()), fix: fix.ok(), seen })
     }
 

@@ -114,6 +114,8 @@ impl From<StoreError> for ApiError {
                     "robot" => ("unknown_robot", "robot"),
                     "camera" => ("unknown_camera", "camera"),
                     "job" => ("unknown_job", "job"),
+                    "gathering" => ("unknown_gathering", "gathering"),
+                    "candidate" => ("unknown_candidate", "candidate"),
                     _ => ("not_found", "path"),
                 };
                 Self::new(StatusCode::NOT_FOUND, code, detail).field(field)

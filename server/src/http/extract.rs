@@ -139,6 +139,12 @@ impl PageQuery {
         }
     }
 
+    /// The cursor of a list by number; 0 comes before every number.
+    pub(super) fn after_number(&self) -> Result<i64, ApiError> {
+        let bad = |_e| ApiError::invalid("bad_value", "cursor", "not one of this list");
+        self.cursor.as_deref().map_or(Ok(0), |text| text.parse().map_err(bad))
+    }
+
     /// The cursor; empty comes before every name.
     pub(super) fn after(&self) -> String {
         self.cursor.clone().unwrap_or_default()

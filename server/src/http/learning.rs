@@ -74,7 +74,7 @@ enum JobState {
 
 /// Long work.
 #[derive(Debug, Clone, Serialize, ToSchema)]
-struct Job {
+pub(super) struct Job {
     /// Its number.
     id: i64,
     /// `learn`.
@@ -92,7 +92,7 @@ struct Job {
 }
 
 impl Job {
-    fn new(row: JobRow, progress: Option<&Progress>) -> Self {
+    pub(super) fn new(row: JobRow, progress: Option<&Progress>) -> Self {
         let state = match row.state.as_str() {
             "done" => JobState::Done,
             "failed" => JobState::Failed,

@@ -5,6 +5,7 @@
 
 mod error;
 mod extract;
+mod gathering;
 mod guard;
 mod health;
 mod laser;
@@ -25,7 +26,7 @@ pub(crate) mod listen;
 
 pub(crate) use router::router;
 
-use crate::{config::Config, engine::live::LiveHub, jobs::Jobs, store::Store};
+use crate::{config::Config, engine::live::LiveHub, gather::Gatherer, jobs::Jobs, store::Store};
 use axum::http::StatusCode;
 use error::ApiError;
 use std::sync::Arc;
@@ -37,6 +38,8 @@ pub(crate) struct App {
     pub(crate) config: Arc<Config>,
     pub(crate) store: Store,
     pub(crate) jobs: Arc<Jobs>,
+    /// Robots that gather views.
+    pub(crate) gatherer: Arc<Gatherer>,
     /// What robots are doing now.
     pub(crate) live: Arc<LiveHub>,
     /// Becomes true when the server stops; ends event streams.
@@ -47,6 +50,13 @@ pub(crate) struct App {
     streams: Arc<Semaphore>,
 }
 
+/// Who works on what is asked for.
+#[derive(Debug)]
+pub(crate) struct Workshop {
+    pub(crate) jobs: Arc<Jobs>,
+    pub(crate) gatherer: Arc<Gatherer>,
+}
+
 /// The state of the router.
 pub(crate) type Shared = Arc<App>;
 
@@ -54,13 +64,13 @@ impl App {
     pub(crate) fn new(
         config: Arc<Config>,
         store: Store,
-        jobs: Arc<Jobs>,
+        Workshop { jobs, gatherer }: Workshop,
         live: Arc<LiveHub>,
         stopping: watch::Receiver<bool>,
     ) -> Self {
         let vision = Arc::new(Semaphore::new(config.workers));
         let streams = Arc::new(Semaphore::new(config.limits.streams));
-        Self { config, store, jobs, live, stopping, vision, streams }
+        Self { config, store, jobs, gatherer, live, stopping, vision, streams }
     }
 
     /// Runs vision work off the runtime, a bounded number at a time.

@@ -4,9 +4,10 @@ use super::Shared;
 use axum::{Router, http::header, response::IntoResponse, routing::get};
 
 /// Path, media type, content.
-const FILES: [(&str, &str, &str); 3] = [
+const FILES: [(&str, &str, &str); 4] = [
     ("/", "text/html; charset=utf-8", include_str!("../../../web/index.html")),
     ("/app.js", "text/javascript; charset=utf-8", include_str!("../../../web/app.js")),
+    ("/gather.js", "text/javascript; charset=utf-8", include_str!("../../../web/gather.js")),
     ("/style.css", "text/css; charset=utf-8", include_str!("../../../web/style.css")),
 ];
 

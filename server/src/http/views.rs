@@ -234,12 +234,7 @@ async fn list(
     Params(page): Params<PageQuery>,
 ) -> Result<Json<Page<View>>, ApiError> {
     let limit = page.limit(app.config.limits.page)?;
-    let after = match page.cursor.as_deref() {
-        None => 0,
-        Some(text) => {
-            text.parse().map_err(|_e| ApiError::invalid("bad_value", "cursor", "not one of this list"))?
-        }
-    };
+    let after = page.after_number()?;
     maps::get(app.store.reads(), &map).await?;
     let landmark = landmarks::get(app.store.reads(), &map, &landmark).await?;
     let rows = views::page(app.store.reads(), landmark.id, after, limit + 1).await?;

@@ -58,6 +58,11 @@ pub(crate) struct Request {
 }
 
 impl Request {
+    /// A lesson of these landmarks, as it is stored.
+    pub(crate) fn of(landmarks: &[String]) -> String {
+        Self { landmarks: Some(landmarks.to_vec()), generated_views: None }.to_json()
+    }
+
     pub(crate) fn to_json(&self) -> String {
         serde_json::to_string(self).unwrap_or_default()
     }

@@ -109,9 +109,14 @@ impl Jobs {
             .store
             .write(move |tx| Box::pin(async move { jobs::create(tx, "learn", &map, &text, limits).await }));
         let row = row.await?;
-        self.enter(&row);
-        self.wake.notify_one();
+        self.take_up(&row);
         Ok(row)
+    }
+
+    /// Begins with a job that was queued together with something else.
+    pub(crate) fn take_up(&self, row: &JobRow) {
+        self.enter(row);
+        self.wake.notify_one();
     }
 
     /// Progress of an open job; `None` once it has ended.

@@ -15,6 +15,8 @@ pub(crate) mod views;
 pub(crate) mod models;
 pub(crate) mod laser;
 pub(crate) mod placing;
+pub(crate) mod gatherings;
+pub(crate) mod accepting;
 mod seen;
 pub(crate) mod robots;
 pub(crate) mod jobs;

@@ -18,7 +18,7 @@ use map::{
     pose2::Pose2Covariance,
     segments::LaserSegment,
 };
-use nalgebra::Matrix2;
+use nalgebra::{Isometry3, Matrix2, Vector3};
 use protos::{Rejection, convert::geometry, v1};
 use serde::{Deserialize, Serialize};
 use sqlx::Row;
@@ -56,6 +56,20 @@ struct Taken {
 }
 
 impl Capture {
+    /// Of a robot's own frame: everything is checked already.
+    pub(crate) fn of_robot(
+        camera: &Intrinsics,
+        map_from_robot: &Pose2Covariance,
+        robot_from_camera: &Isometry3<f64>,
+    ) -> Self {
+        Self {
+            intrinsics: geometry::intrinsics_wire(camera),
+            map_from_robot: geometry::pose2_covariance_wire(map_from_robot),
+            robot_from_camera: geometry::pose3_wire(robot_from_camera),
+            ceiling_height_m: None,
+        }
+    }
+
     /// What is wrong with it, by field.
     pub(crate) fn check(&self) -> Result<(), Rejection> {
         self.taken().map(|_| ())
@@ -122,6 +136,41 @@ pub(crate) async fn by_views(tx: &mut Tx, map: &str, landmark: &str) -> Result<P
     Ok(Placing { placed: true, views_used: made.used.len(), reason: None })
 }
 
+/// Where a thing hangs by its views, without storing anything.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Preview {
+    pub(crate) place: LandmarkPlace,
+    /// Which of the views given do not agree with it: they saw another border of the same thing, or something else.
+    pub(crate) apart: Vec<usize>,
+    /// How far off the normal the camera looked in the others, radians.
+    pub(crate) angles_rad: Vec<f64>,
+}
+
+/// Places a thing by views: corners and the JSON of the capture. A view without a capture agrees with everything.
+pub(crate) fn preview<'a>(
+    views: impl Iterator<Item = (&'a Corners, Option<&'a str>)>,
+    walls: &[LaserSegment],
+) -> Result<Preview, String> {
+    let taken = |text: &str| serde_json::from_str::<Capture>(text).ok()?.taken().ok();
+    let (numbers, looks): (Vec<usize>, Vec<(Corners, Taken)>) = views
+        .enumerate()
+        .filter_map(|(i, (corners, capture))| Some((i, (*corners, taken(capture?)?))))
+        .unzip();
+    let made = placed(&looks, walls).map_err(|error| error.to_string())?;
+    let pose = made.place.map_from_landmark();
+    let (normal, centre) = (pose.rotation * Vector3::x(), pose.translation.vector);
+    let angle = |i: &usize| {
+        let (_, taken) = &looks[*i];
+        let camera = taken.map_from_robot.pose.to_isometry3() * taken.mounting.robot_from_camera;
+        normal.angle(&(camera.translation.vector - centre))
+    };
+    Ok(Preview {
+        place: made.place,
+        apart: (0..looks.len()).filter(|i| !made.used.contains(i)).map(|i| numbers[i]).collect(),
+        angles_rad: made.used.iter().map(angle).collect(),
+    })
+}
+
 fn view<'a>((corners, taken): &'a (Corners, Taken), covariance: &'a [Matrix2<f64>; 4]) -> PlacingView<'a> {
     PlacingView {
         corners,
@@ -132,6 +181,7 @@ fn view<'a>((corners, taken): &'a (Corners, Taken), covariance: &'a [Matrix2<f64
     }
 }
 
+/// `used` are indices of `looks`.
 fn placed(looks: &[(Corners, Taken)], walls: &[LaserSegment]) -> Result<Placement, PlacingError> {
     let covariance = [Matrix2::identity() * CORNER_SIGMA_PX * CORNER_SIGMA_PX; 4];
     let p = PlacingParams::default();
@@ -139,23 +189,38 @@ fn placed(looks: &[(Corners, Taken)], walls: &[LaserSegment]) -> Result<Placemen
     let ceiling = looks.first().and_then(|(_, taken)| taken.ceiling);
     let mut why = PlacingError::NoView;
     if let Some(ceiling) = ceiling {
-        let mut seen = vec![];
-        for look in looks {
+        let (mut seen, mut from) = (vec![], vec![]);
+        for (i, look) in looks.iter().enumerate() {
             match view_on_ceiling(&view(look, &covariance), &ceiling, &p) {
-                Ok(view) => seen.push(view),
+                Ok(view) => {
+                    seen.push(view);
+                    from.push(i);
+                }
                 Err(error) => why = error,
             }
         }
-        return if seen.is_empty() { Err(why) } else { ceiling_placement(&seen, &ceiling, &p) };
+        return if seen.is_empty() {
+            Err(why)
+        } else {
+            Ok(named(&ceiling_placement(&seen, &ceiling, &p)?, &from))
+        };
     }
-    let mut seen = vec![];
-    for look in looks {
+    let (mut seen, mut from) = (vec![], vec![]);
+    for (i, look) in looks.iter().enumerate() {
         match view_on_wall(&view(look, &covariance), walls, &p) {
-            Ok(view) => seen.push(view),
+            Ok(view) => {
+                seen.push(view);
+                from.push(i);
+            }
             Err(error) => why = error,
         }
     }
-    if seen.is_empty() { Err(why) } else { placement(&seen, walls, &p) }
+    if seen.is_empty() { Err(why) } else { Ok(named(&placement(&seen, walls, &p)?, &from)) }
+}
+
+/// `used` by the numbers that views had before the unfit ones were left out.
+fn named(made: &Placement, from: &[usize]) -> Placement {
+    Placement { used: made.used.iter().filter_map(|i| from.get(*i).copied()).collect(), place: made.place }
 }
 
 /// A size by hand stays, and is as sure as a tape.
@@ -189,7 +254,7 @@ mod tests {
     use super::*;
     use crate::store::{Store, views::NewView};
     use map::{mounting::pan_tilt, pose2::Pose2};
-    use nalgebra::{Matrix3, Matrix6, Vector3};
+    use nalgebra::{Matrix3, Matrix6};
     use vision::{
         icon::Icon,
         localise::reproject::{corner_points, pixel},

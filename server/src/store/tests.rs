@@ -20,6 +20,8 @@ async fn every_statement_prepares_on_the_migrated_schema() {
         models::ALL,
         laser::ALL,
         placing::ALL,
+        gatherings::ALL,
+        accepting::ALL,
         robots::ALL,
         jobs::ALL,
         load::ALL,

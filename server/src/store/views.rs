@@ -75,7 +75,7 @@ pub(crate) struct Lesson {
     pub(crate) cut: Cut,
 }
 
-fn corners_bytes(corners: &Corners) -> Vec<u8> {
+pub(super) fn corners_bytes(corners: &Corners) -> Vec<u8> {
     corners.points().iter().flat_map(|c| [c.x, c.y]).flat_map(f64::to_le_bytes).collect()
 }
 
@@ -86,7 +86,7 @@ fn corners_of(bytes: &[u8]) -> Option<[[f64; 2]; 4]> {
 }
 
 /// Grey levels as learning takes them: whole numbers.
-fn icon_bytes(icon: &Icon) -> Vec<u8> {
+pub(super) fn icon_bytes(icon: &Icon) -> Vec<u8> {
     icon.pixels.iter().map(|g| g.round().clamp(0.0, 255.0) as u8).collect()
 }
 
@@ -101,7 +101,7 @@ pub(super) fn corners_in(row: &SqliteRow) -> Result<Corners, StoreError> {
     Corners::try_from(corners).map_err(|e| damaged("corners")(e.to_string()))
 }
 
-fn cut_of(row: &SqliteRow) -> Result<Cut, StoreError> {
+pub(super) fn cut_of(row: &SqliteRow) -> Result<Cut, StoreError> {
     Ok(Cut { corners_px: corners_in(row)?, icon: icon_of(row)? })
 }
 

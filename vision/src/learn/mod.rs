@@ -6,6 +6,7 @@ pub mod synthesis;
 pub mod pca;
 pub mod threshold;
 pub mod gates;
+pub mod thinning;
 pub mod model;
 mod fitting;
 mod lesson;

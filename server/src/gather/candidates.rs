@@ -1,0 +1,198 @@
+//! What a person needs to decide on a track: how many views, from how far apart, where it hangs, which gates of learning
+//! its views would pass or fail, and with which other candidates it may be one thing.
+
+use crate::store::{
+    gatherings::{TrackRow, TrackView},
+    placing,
+};
+use map::segments::LaserSegment;
+use serde::Serialize;
+use serde_json::{Value, json};
+use utoipa::ToSchema;
+use vision::{
+    learn::{
+        gates::v_c,
+        model::{Gate, LandmarkModel, ModelStatus, View, learn, unlikeness_of},
+    },
+    params::Params,
+    recognise::LandmarkId,
+};
+
+/// Where a candidate seems to hang.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub(crate) struct Hangs {
+    x_m: f64,
+    y_m: f64,
+    z_m: f64,
+    theta_rad: f64,
+    width_m: f64,
+    height_m: f64,
+    /// Views that agree on it.
+    views: usize,
+    /// How far off the normal the camera looked: least and most.
+    angle_rad: [f64; 2],
+}
+
+/// A thing that a robot drove past, for a person to decide on.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub(crate) struct Candidate {
+    /// Its number in the gathering.
+    number: u32,
+    /// The landmark whose views these are; null for a thing that is none yet.
+    landmark: Option<String>,
+    /// Frames in which it was followed.
+    sightings: u32,
+    /// Of these, such in which it was taken for a landmark of the map, or nearly.
+    known: u32,
+    /// Numbers of its views; `views/{number}/icon` is the picture.
+    views: Vec<i64>,
+    /// Views beside these that do not agree on its place: another border of it was found, or something else. They are left
+    /// out.
+    apart: usize,
+    /// The view that stands best for all.
+    best: Option<i64>,
+    /// Smallest and largest side of the quad in the picture.
+    side_px: [f64; 2],
+    /// How far apart the views are (the gate `visibility_confidence`).
+    v_c: f64,
+    /// Where it hangs by its views.
+    hangs: Option<Hangs>,
+    /// Why that is not known.
+    not_placed: Option<String>,
+    /// Whether a lesson of these views would pass every gate, look-alikes apart, and nothing else speaks against it.
+    passes: bool,
+    /// What does not pass: `gate`, `value`, `limit`, `detail`.
+    #[schema(value_type = Vec<Object>)]
+    reasons: Vec<Value>,
+    /// Other candidates that look or hang alike: perhaps the same thing twice, or two of one kind.
+    rivals: Vec<u32>,
+}
+
+/// The candidates with all that can be said of them. Works on every picture: not for an async thread.
+pub(crate) fn candidates(
+    tracks: &[(TrackRow, Vec<TrackView>)],
+    walls: &[LaserSegment],
+    params: &Params,
+) -> Vec<Candidate> {
+    let mut made: Vec<(Candidate, Option<LandmarkModel>)> =
+        tracks.iter().map(|(track, views)| one(track, views, walls, params)).collect();
+    let rivals: Vec<Vec<u32>> = made
+        .iter()
+        .map(|(a, own)| {
+            let others = made.iter().filter(|(b, _)| b.number != a.number);
+            let rival = |(b, other): &&(Candidate, Option<LandmarkModel>)| {
+                // As near as is accepted where nothing else is like it.
+                let near = |x: &LandmarkModel, y: &LandmarkModel| {
+                    unlikeness_of(x, &y.exemplars, params) < params.learn.likeness_cap
+                };
+                let alike = own.as_ref().zip(other.as_ref()).is_some_and(|(x, y)| near(x, y) || near(y, x));
+                alike || overlap(a, b)
+            };
+            others.filter(rival).map(|(b, _)| b.number).collect()
+        })
+        .collect();
+    for ((candidate, _), rivals) in made.iter_mut().zip(rivals) {
+        if !rivals.is_empty() {
+            let detail = "other candidates look or hang like it: the same thing twice, or two of one kind";
+            candidate
+                .reasons
+                .push(json!({ "gate": "rivals", "value": rivals.len(), "limit": 0, "detail": detail }));
+            (candidate.passes, candidate.rivals) = (false, rivals);
+        }
+    }
+    made.into_iter().map(|(candidate, _)| candidate).collect()
+}
+
+fn overlap(a: &Candidate, b: &Candidate) -> bool {
+    let Some((a, b)) = a.hangs.as_ref().zip(b.hangs.as_ref()) else { return false };
+    let reach = |h: &Hangs| 0.5 * h.width_m.max(h.height_m);
+    (a.x_m - b.x_m).hypot(a.y_m - b.y_m).hypot(a.z_m - b.z_m) < reach(a).max(reach(b))
+}
+
+fn one(
+    track: &TrackRow,
+    all: &[TrackView],
+    walls: &[LaserSegment],
+    params: &Params,
+) -> (Candidate, Option<LandmarkModel>) {
+    let preview = placing::preview(all.iter().map(|v| (&v.cut.corners_px, v.capture.as_deref())), walls);
+    let apart = preview.as_ref().map_or(&[][..], |p| &p.apart);
+    let views: Vec<&TrackView> =
+        all.iter().enumerate().filter(|(i, _)| !apart.contains(i)).map(|(_, v)| v).collect();
+    let taught: Vec<View> = views
+        .iter()
+        .map(|v| View {
+            icon: v.cut.icon.clone(),
+            corners_px: v.cut.corners_px,
+            image_size_px: v.size_px,
+            generated: false,
+        })
+        .collect();
+    let model = learn(LandmarkId(0), &taught, &[], params).ok();
+    let mut reasons = reasons(model.as_ref());
+    if track.landmark.is_none() && track.known > 0 {
+        let detail =
+            format!("in {} sightings it was taken for a landmark of the map, or nearly", track.known);
+        reasons.push(json!({ "gate": "known", "value": track.known, "limit": 0, "detail": detail }));
+    }
+    let sides = views.iter().map(|v| v.cut.corners_px.area_px2().sqrt());
+    let (hangs, not_placed) = match &preview {
+        Ok(preview) => (Some(hangs(preview)), None),
+        Err(reason) => (None, Some(reason.clone())),
+    };
+    let exemplar = model.as_ref().and_then(|m| m.exemplars.first());
+    let best = exemplar.and_then(|e| views.iter().find(|v| v.cut.icon.pixels == e.icon.pixels));
+    let seen: Vec<_> =
+        views.iter().map(|v| (*v.cut.corners_px.points(), v.size_px.map(|side| side as f64))).collect();
+    let candidate = Candidate {
+        number: track.number,
+        landmark: track.landmark.clone(),
+        sightings: track.sightings,
+        known: track.known,
+        views: views.iter().map(|v| v.id).collect(),
+        apart: apart.len(),
+        best: best.or(views.first()).map(|v| v.id),
+        side_px: range(sides),
+        v_c: v_c(&seen),
+        hangs,
+        not_placed,
+        passes: reasons.is_empty(),
+        reasons,
+        rivals: vec![],
+    };
+    (candidate, model)
+}
+
+/// Gates as the lesson will see them. Where views are few, the lesson generates more: their number is no reason.
+fn reasons(model: Option<&LandmarkModel>) -> Vec<Value> {
+    let Some(model) = model else {
+        return vec![json!({ "gate": "views", "value": 0, "limit": 1, "detail": "no views" })];
+    };
+    let ModelStatus::Candidate(failures) = &model.status else { return vec![] };
+    failures
+        .iter()
+        .filter(|f| f.gate != Gate::Views)
+        .map(|f| json!({ "gate": f.gate, "value": f.value, "limit": f.limit, "detail": f.to_string() }))
+        .collect()
+}
+
+fn hangs(preview: &placing::Preview) -> Hangs {
+    let place = &preview.place;
+    Hangs {
+        x_m: place.x_m,
+        y_m: place.y_m,
+        z_m: place.z_m,
+        theta_rad: place.theta_rad,
+        width_m: place.size.width_m,
+        height_m: place.size.height_m,
+        views: preview.angles_rad.len(),
+        angle_rad: range(preview.angles_rad.iter().copied()),
+    }
+}
+
+/// Least and most; zeros of nothing.
+fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    values
+        .fold(None, |r: Option<[f64; 2]>, v| Some(r.map_or([v, v], |[a, b]| [a.min(v), b.max(v)])))
+        .unwrap_or_default()
+}

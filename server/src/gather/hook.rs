@@ -1,0 +1,164 @@
+//! The frame path's end of gathering: what a worker offers, to whom, and what is counted on the way. Never waits.
+
+use crate::{
+    engine::{slots::SlotKey, snapshot::MapSnapshot},
+    store::gatherings::GatheringRow,
+};
+use arc_swap::ArcSwap;
+use map::{
+    gather::{Outcome, Tracker},
+    pose2::Pose2Covariance,
+};
+use protos::CheckedFrame;
+use serde::{Deserialize, Serialize};
+use std::{
+    collections::BTreeMap,
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
+};
+use tokio::sync::mpsc::{Receiver, Sender, channel, error::TrySendError};
+use utoipa::ToSchema;
+use vision::{frame::GrayImage, pipeline::QuadFacts, recognise::LandmarkId};
+
+/// Frames that wait to be followed; beyond that they are dropped.
+pub(crate) const QUEUE: usize = 8;
+
+/// What became of frames and quads.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
+#[serde(default)]
+pub(crate) struct Counts {
+    /// Frames offered.
+    pub(crate) frames: u64,
+    /// Of these, dropped because others were still being followed.
+    pub(crate) dropped: u64,
+    /// Frames on another map.
+    pub(crate) elsewhere: u64,
+    /// Quads that were too small, cut off or blurred to have an icon.
+    pub(crate) unusable: u64,
+    /// Quads that are not flat on a wall of the map.
+    pub(crate) not_on_wall: u64,
+    /// Views kept.
+    pub(crate) kept: u64,
+    /// Quads of which there is a view like it.
+    pub(crate) alike: u64,
+    /// Quads not yet seen often enough.
+    pub(crate) too_new: u64,
+    /// Quads of candidates that have all the views they may have.
+    pub(crate) full: u64,
+    /// Quads of candidates that were decided on.
+    pub(crate) decided: u64,
+    /// Quads that show a landmark, or may.
+    pub(crate) known: u64,
+    /// Quads that are no landmark, where only landmarks are wanted.
+    pub(crate) unwanted: u64,
+    /// Quads that lie where a candidate lies and look different.
+    pub(crate) unlike: u64,
+    /// Quads beyond the number of things that are followed.
+    pub(crate) too_many: u64,
+    /// Views that were not kept because a bound was reached or the disk is full.
+    pub(crate) refused: u64,
+}
+
+impl Counts {
+    pub(super) fn add(&mut self, outcome: Outcome) {
+        let count = match outcome {
+            // Counted when it is committed.
+            Outcome::Keep(_) => return,
+            Outcome::Alike => &mut self.alike,
+            Outcome::TooNew => &mut self.too_new,
+            Outcome::Full => &mut self.full,
+            Outcome::Decided => &mut self.decided,
+            Outcome::Known => &mut self.known,
+            Outcome::Unwanted => &mut self.unwanted,
+            Outcome::Unlike => &mut self.unlike,
+            Outcome::TooMany => &mut self.too_many,
+        };
+        *count += 1;
+    }
+}
+
+/// A robot that gathers.
+#[derive(Debug)]
+pub struct Session {
+    pub(super) id: i64,
+    map: String,
+    pub(super) landmark: Option<LandmarkId>,
+    pub(super) known: bool,
+    /// Short holds only: workers count here.
+    pub(super) counts: Mutex<Counts>,
+    pub(super) tracker: Mutex<Tracker>,
+}
+
+pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    // What is inside is whole after every step of ours.
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Session {
+    pub(super) fn new(row: &GatheringRow, tracker: Tracker) -> Self {
+        Self {
+            id: row.id,
+            map: row.map.clone(),
+            landmark: row.landmark_id.map(|id| LandmarkId(id as u64)),
+            known: row.known,
+            counts: Mutex::default(),
+            tracker: Mutex::new(tracker),
+        }
+    }
+}
+
+/// By robot.
+pub(super) type Sessions = ArcSwap<BTreeMap<String, Arc<Session>>>;
+
+/// What a worker has seen in a frame.
+#[derive(Debug)]
+pub struct Looked {
+    /// The decoded picture.
+    pub image: GrayImage,
+    /// Its quads with verdicts.
+    pub quads: Vec<QuadFacts>,
+    /// The version of the map they were recognised against.
+    pub map: Arc<MapSnapshot>,
+    /// Where the robot is believed to have been: its own word, or the fused pose without this frame.
+    pub believed: Option<Pose2Covariance>,
+}
+
+/// A frame to follow things in.
+#[derive(Debug)]
+pub struct Offer {
+    pub(super) session: Arc<Session>,
+    pub(super) camera: String,
+    pub(super) frame: CheckedFrame,
+    pub(super) looked: Looked,
+}
+
+/// The end that workers hold.
+#[derive(Debug, Clone)]
+pub struct Hook {
+    pub(super) sessions: Arc<Sessions>,
+    offers: Sender<Offer>,
+}
+
+/// Both ends, nobody gathering yet.
+pub fn hook() -> (Hook, Receiver<Offer>) {
+    let (offers, received) = channel(QUEUE);
+    (Hook { sessions: Arc::default(), offers }, received)
+}
+
+impl Hook {
+    /// Passes a frame on if its robot gathers. Never waits.
+    pub fn offer(&self, key: &SlotKey, frame: &CheckedFrame, looked: impl FnOnce() -> Looked) {
+        let sessions = self.sessions.load();
+        let Some(session) = sessions.get(key.robot.as_str()) else { return };
+        lock(&session.counts).frames += 1;
+        let looked = looked();
+        if looked.map.name != session.map {
+            lock(&session.counts).elsewhere += 1;
+            return;
+        }
+        let camera = key.camera.to_string();
+        let offer = Offer { session: session.clone(), camera, frame: frame.clone(), looked };
+        if let Err(TrySendError::Full(offer)) = self.offers.try_send(offer) {
+            lock(&offer.session.counts).dropped += 1;
+        }
+    }
+}

@@ -1,0 +1,120 @@
+use super::{hook::QUEUE, *};
+use crate::{
+    engine::{
+        scene::{MAP, Scene},
+        slots::SlotKey,
+        snapshot::MapSnapshot,
+    },
+    store::{maps, robots, tests::config},
+};
+use map::pose2::{Pose2, Pose2Covariance};
+use nalgebra::Matrix3;
+use protos::{CheckedFrame, Name, prost::bytes::Bytes};
+use vision::{pipeline, recognise::DistanceKind, trace::NoTrace};
+
+async fn store(dir: &std::path::Path) -> (Store, crate::store::WriterTask) {
+    let (store, task) = Store::open(&config(dir)).await.unwrap();
+    store.write(|tx| Box::pin(maps::create(tx, MAP, DistanceKind::Both, 2))).await.unwrap();
+    store.write(|tx| Box::pin(robots::put(tx, "r1", MAP, 5))).await.unwrap();
+    (store, task)
+}
+
+fn new() -> NewGathering {
+    NewGathering { robot: "r1".into(), landmark: None, known: false }
+}
+
+fn key(robot: &str) -> SlotKey {
+    SlotKey { robot: Name::new(robot).unwrap(), camera: Name::new("front").unwrap() }
+}
+
+/// Frames of a robot that stands before a poster and looks again and again, raw grey.
+fn frames(count: u64) -> Vec<(CheckedFrame, Looked)> {
+    let mut scene = Scene::new();
+    let (_, seen) = scene.looks(1, 1).remove(0);
+    let image = &seen.frame.image;
+    let params = Params::default();
+    let map = Arc::new(MapSnapshot::empty(MAP, 1));
+    let landmarks = pipeline::Landmarks { models: &map.models, sizes: &map.sizes, kind: map.distance };
+    let facts = pipeline::analyse(image, None, landmarks, &params, &mut NoTrace);
+    let believed = Pose2Covariance { pose: Pose2::new(1.0, 0.0, 0.0), covariance: Matrix3::zeros() };
+    (1..=count)
+        .map(|seq| {
+            let frame = CheckedFrame {
+                epoch: 1,
+                seq,
+                captured_ns: seq as i64 * 200_000_000,
+                encoding: Encoding::Gray8,
+                width_px: 640,
+                height_px: 480,
+                image: Bytes::from(image.data().to_vec()),
+                intrinsics: Some(scene.intrinsics()),
+                mounting: None,
+                odometry: None,
+                prior: None,
+                deadline_ms: None,
+                map: None,
+            };
+            let (quads, map) = (facts.quads.clone(), map.clone());
+            (frame, Looked { image: image.clone(), quads, map, believed: Some(believed) })
+        })
+        .collect()
+}
+
+#[tokio::test]
+async fn a_full_queue_drops_and_counts_and_nobody_waits() {
+    let dir = tempfile::tempdir().unwrap();
+    let (store, _writer) = store(dir.path()).await;
+    let (hook, offers) = hook();
+    let gatherer = Gatherer { store, params: Arc::default(), sessions: hook.sessions.clone() };
+    let id = gatherer.begin(MAP, new()).await.unwrap().id;
+    for (frame, looked) in frames(QUEUE as u64 + 3) {
+        hook.offer(&key("r1"), &frame, || looked);
+    }
+    let (frame, looked) = frames(1).remove(0);
+    let other = Looked { map: Arc::new(MapSnapshot::empty("cellar", 1)), ..looked };
+    hook.offer(&key("r1"), &frame, || other);
+    hook.offer(&key("r2"), &frame, || unreachable!("it does not gather"));
+    let counts = gatherer.counts(id).unwrap();
+    assert_eq!((counts.frames, counts.dropped, counts.elsewhere), (QUEUE as u64 + 4, 3, 1));
+    // What waits is followed; the same picture again and again is one view.
+    drop(hook);
+    let gatherer = Arc::new(gatherer);
+    gatherer.clone().run(offers).await;
+    let counts = gatherer.counts(id).unwrap();
+    assert!(
+        counts.kept >= 1 && counts.alike >= 5 * counts.kept && counts.too_new >= 2 * counts.kept,
+        "{counts:?}"
+    );
+    let tracks = gatherings::tracks(gatherer.store.reads(), id).await.unwrap();
+    assert_eq!(tracks.iter().map(|t| t.views).sum::<u64>(), counts.kept);
+    let ended = gatherer.end(MAP, id).await.unwrap();
+    assert_eq!(serde_json::from_str::<Counts>(&ended.counts).unwrap(), counts);
+    assert_eq!(gatherer.counts(id), None);
+}
+
+#[tokio::test]
+async fn a_restart_goes_on_where_it_stopped() {
+    let dir = tempfile::tempdir().unwrap();
+    let (first, writer) = store(dir.path()).await;
+    let (hook_, offers) = hook();
+    let (gatherer, task) = Gatherer::start(first, &config(dir.path()), &hook_, offers).await.unwrap();
+    let id = gatherer.begin(MAP, new()).await.unwrap().id;
+    for (frame, looked) in frames(QUEUE as u64) {
+        hook_.offer(&key("r1"), &frame, || looked);
+    }
+    drop(hook_);
+    task.await.unwrap();
+    let kept = gatherer.counts(id).unwrap().kept;
+    drop(gatherer);
+    writer.close().await;
+
+    let (store, _writer) = Store::open(&config(dir.path())).await.unwrap();
+    let (hook, offers) = hook();
+    let (gatherer, _task) = Gatherer::start(store, &config(dir.path()), &hook, offers).await.unwrap();
+    let session = gatherer.session(id).unwrap();
+    let views = lock(&session.tracker).tracks().iter().map(|t| t.views() as u64).sum::<u64>();
+    assert!(kept >= 1 && views == kept);
+    gatherer.decided(id, [1]);
+    gatherer.delete(MAP, id).await.unwrap();
+    assert!(gatherer.session(id).is_none());
+}

@@ -1,0 +1,317 @@
+//! `/maps/{map}/gatherings`: views gathered by a robot that drives past, and a person's decision on them.
+
+use super::{
+    Shared,
+    error::{ApiError, Problem},
+    extract::{At, Body, Page, PageQuery, Params, name},
+    learning::Job,
+};
+use crate::{
+    engine::picture,
+    gather::{
+        Counts,
+        candidates::{Candidate, candidates},
+    },
+    store::{
+        accepting::{self, Pick},
+        gatherings::{self, GatheringRow, NewGathering},
+        landmarks, maps,
+        placing::Placing,
+    },
+};
+use axum::{
+    Json,
+    extract::State,
+    http::{StatusCode, header},
+    response::{IntoResponse, Response},
+};
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+use utoipa_axum::{router::OpenApiRouter, routes};
+use vision::recognise::LandmarkId;
+
+pub(super) fn router() -> OpenApiRouter<Shared> {
+    OpenApiRouter::new()
+        .routes(routes!(begin, list))
+        .routes(routes!(get, delete))
+        .routes(routes!(stop))
+        .routes(routes!(list_candidates))
+        .routes(routes!(discard))
+        .routes(routes!(show_icon))
+        .routes(routes!(accept))
+}
+
+/// Who gathers what.
+#[derive(Debug, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+struct NewGatheringBody {
+    /// A robot that stands on this map.
+    robot: String,
+    /// Only views of this landmark, which must be learnt already; absent: of whatever flat four-sided thing is none yet.
+    landmark: Option<String>,
+    /// Views of every landmark that is recognised beyond doubt, too.
+    #[serde(default)]
+    known: bool,
+}
+
+/// Views being gathered, or gathered.
+#[derive(Debug, Serialize, ToSchema)]
+struct Gathering {
+    /// Its number.
+    id: i64,
+    /// The map.
+    map: String,
+    /// Who gathers.
+    robot: String,
+    /// The only landmark whose views are wanted.
+    landmark: Option<String>,
+    /// Whether views of recognised landmarks are wanted.
+    known: bool,
+    /// It goes on.
+    open: bool,
+    /// What became of the frames. Of a gathering that was interrupted by a restart: since then.
+    counts: Counts,
+    /// ms since the Unix epoch.
+    created_ms: i64,
+    /// ms since the Unix epoch.
+    ended_ms: Option<i64>,
+}
+
+impl Gathering {
+    fn new(app: &Shared, row: GatheringRow) -> Self {
+        let kept = || serde_json::from_str(&row.counts).unwrap_or_default();
+        Self {
+            counts: app.gatherer.counts(row.id).unwrap_or_else(kept),
+            id: row.id,
+            map: row.map,
+            robot: row.robot,
+            landmark: row.landmark,
+            known: row.known,
+            open: row.open,
+            created_ms: row.created_ms,
+            ended_ms: row.ended_ms,
+        }
+    }
+}
+
+/// Begins to gather views with a robot: while it drives, flat four-sided things are followed from frame to frame, and of
+/// each the views that say something new are kept, until it is stopped. Nothing becomes a landmark by itself.
+#[utoipa::path(post, path = "/maps/{map}/gatherings", tag = "gathering", params(("map" = String, Path)),
+    request_body = NewGatheringBody, responses((status = 201, body = Gathering),
+    (status = 404, body = Problem, description = "unknown_map, unknown_robot, unknown_landmark"),
+    (status = 409, body = Problem, description = "in_use: it gathers already or stands on another map; not_learnt; too_many"),
+    (status = 422, body = Problem)))]
+async fn begin(
+    State(app): State<Shared>,
+    At(map): At<String>,
+    Body(new): Body<NewGatheringBody>,
+) -> Result<(StatusCode, Json<Gathering>), ApiError> {
+    if let Some(landmark) = &new.landmark {
+        maps::get(app.store.reads(), &map).await?;
+        let row = landmarks::get(app.store.reads(), &map, landmark).await?;
+        let learnt = app
+            .store
+            .snapshots()
+            .get(&map)
+            .is_some_and(|m| m.models.get(LandmarkId(row.id as u64)).is_some());
+        if !learnt {
+            let detail = format!(
+                "landmark `{landmark}` cannot be recognised yet: gather without naming it, and accept what is it under its name"
+            );
+            return Err(ApiError::new(StatusCode::CONFLICT, "not_learnt", detail).field("landmark"));
+        }
+    }
+    let new = NewGathering { robot: new.robot, landmark: new.landmark, known: new.known };
+    let row = app.gatherer.begin(&map, new).await?;
+    Ok((StatusCode::CREATED, Json(Gathering::new(&app, row))))
+}
+
+/// Lists gatherings by number, ended ones included.
+#[utoipa::path(get, path = "/maps/{map}/gatherings", tag = "gathering", params(("map" = String, Path), PageQuery),
+    responses((status = 200, body = Page<Gathering>), (status = 404, body = Problem)))]
+async fn list(
+    State(app): State<Shared>,
+    At(map): At<String>,
+    Params(page): Params<PageQuery>,
+) -> Result<Json<Page<Gathering>>, ApiError> {
+    let (limit, after) = (page.limit(app.config.limits.page)?, page.after_number()?);
+    let map = maps::get(app.store.reads(), &map).await?;
+    let rows = gatherings::page(app.store.reads(), map.id, after, limit + 1).await?;
+    Ok(Json(Page::new(rows, limit, |r| r.id.to_string(), |r| Gathering::new(&app, r))))
+}
+
+/// One gathering.
+#[utoipa::path(get, path = "/maps/{map}/gatherings/{gathering}", tag = "gathering",
+    params(("map" = String, Path), ("gathering" = i64, Path)),
+    responses((status = 200, body = Gathering), (status = 404, body = Problem)))]
+async fn get(
+    State(app): State<Shared>,
+    At((map, id)): At<(String, i64)>,
+) -> Result<Json<Gathering>, ApiError> {
+    let row = gatherings::get(app.store.reads(), &map, id).await?;
+    Ok(Json(Gathering::new(&app, row)))
+}
+
+/// Stops; what was gathered waits for a decision. One that has ended stays as it is.
+#[utoipa::path(post, path = "/maps/{map}/gatherings/{gathering}/stop", tag = "gathering",
+    params(("map" = String, Path), ("gathering" = i64, Path)),
+    responses((status = 200, body = Gathering), (status = 404, body = Problem)))]
+async fn stop(
+    State(app): State<Shared>,
+    At((map, id)): At<(String, i64)>,
+) -> Result<Json<Gathering>, ApiError> {
+    let row = app.gatherer.end(&map, id).await?;
+    Ok(Json(Gathering::new(&app, row)))
+}
+
+/// Stops, and throws away all that nobody has accepted.
+#[utoipa::path(delete, path = "/maps/{map}/gatherings/{gathering}", tag = "gathering",
+    params(("map" = String, Path), ("gathering" = i64, Path)),
+    responses((status = 204), (status = 404, body = Problem)))]
+async fn delete(State(app): State<Shared>, At((map, id)): At<(String, i64)>) -> Result<StatusCode, ApiError> {
+    app.gatherer.delete(&map, id).await?;
+    Ok(StatusCode::NO_CONTENT)
+}
+
+/// All candidates of a gathering.
+#[derive(Debug, Serialize, ToSchema)]
+struct Candidates {
+    /// By number; those that somebody has decided on are not among them.
+    candidates: Vec<Candidate>,
+}
+
+/// What waits for a decision, with all that helps to decide. Also while the robot still drives.
+#[utoipa::path(get, path = "/maps/{map}/gatherings/{gathering}/candidates", tag = "gathering",
+    params(("map" = String, Path), ("gathering" = i64, Path)),
+    responses((status = 200, body = Candidates), (status = 404, body = Problem)))]
+async fn list_candidates(
+    State(app): State<Shared>,
+    At((map, id)): At<(String, i64)>,
+) -> Result<Json<Candidates>, ApiError> {
+    gatherings::get(app.store.reads(), &map, id).await?;
+    let mut tracks = vec![];
+    for track in gatherings::tracks(app.store.reads(), id).await?.into_iter().filter(|t| t.state == "open") {
+        let views = gatherings::track_views(app.store.reads(), id, track.number).await?;
+        tracks.push((track, views));
+    }
+    let walls = app.store.snapshots().get(&map).map(|map| map.walls.clone()).unwrap_or_default();
+    let work = move |app: &super::App| candidates(&tracks, &walls, &app.config.params);
+    Ok(Json(Candidates { candidates: app.on_vision_thread(work).await? }))
+}
+
+/// Throws a candidate away. While the gathering goes on, no more views of that thing are kept.
+#[utoipa::path(delete, path = "/maps/{map}/gatherings/{gathering}/candidates/{candidate}", tag = "gathering",
+    params(("map" = String, Path), ("gathering" = i64, Path), ("candidate" = u32, Path)),
+    responses((status = 204), (status = 404, body = Problem)))]
+async fn discard(
+    State(app): State<Shared>,
+    At((map, id, number)): At<(String, i64, u32)>,
+) -> Result<StatusCode, ApiError> {
+    app.gatherer.discard(&map, id, number).await?;
+    Ok(StatusCode::NO_CONTENT)
+}
+
+/// The rectified picture of a view of a candidate, as PNG.
+#[utoipa::path(get, path = "/maps/{map}/gatherings/{gathering}/candidates/{candidate}/views/{view}/icon",
+    tag = "gathering", params(("map" = String, Path), ("gathering" = i64, Path), ("candidate" = u32, Path),
+    ("view" = i64, Path)), responses((status = 200, content_type = "image/png"), (status = 404, body = Problem)))]
+async fn show_icon(
+    State(app): State<Shared>,
+    At((map, id, number, view)): At<(String, i64, u32, i64)>,
+) -> Result<Response, ApiError> {
+    gatherings::get(app.store.reads(), &map, id).await?;
+    let views = gatherings::track_views(app.store.reads(), id, number).await?;
+    let unknown = || {
+        ApiError::new(StatusCode::NOT_FOUND, "unknown_view", format!("there is no view `{view}`"))
+            .field("view")
+    };
+    let icon = views.into_iter().find(|v| v.id == view).ok_or_else(unknown)?.cut.icon;
+    let grey: Vec<u8> = icon.pixels.iter().map(|g| *g as u8).collect();
+    let png = picture::png(icon.size, icon.size, &grey).map_err(|e| ApiError::internal(&e))?;
+    let headers =
+        [(header::CONTENT_TYPE, "image/png"), (header::CACHE_CONTROL, "private, max-age=86400, immutable")];
+    Ok((headers, png).into_response())
+}
+
+/// One acceptance.
+#[derive(Debug, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+struct PickBody {
+    /// Number of the candidate.
+    candidate: u32,
+    /// Name of the landmark it becomes: a new one, or one without views. Several candidates of one thing may be given one
+    /// name. Not needed for views of a landmark that is known.
+    name: Option<String>,
+}
+
+/// What is accepted.
+#[derive(Debug, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+struct Decision {
+    /// At least one.
+    candidates: Vec<PickBody>,
+    /// Learn these landmarks at once.
+    #[serde(default = "yes")]
+    learn: bool,
+}
+
+fn yes() -> bool {
+    true
+}
+
+/// A landmark that got views.
+#[derive(Debug, Serialize, ToSchema)]
+struct Grown {
+    name: String,
+    /// How many it got.
+    views: u64,
+    /// Whether they place it.
+    placing: Placing,
+}
+
+/// What an acceptance came to.
+#[derive(Debug, Serialize, ToSchema)]
+struct Accepted {
+    landmarks: Vec<Grown>,
+    /// The lesson, if one was wanted.
+    job: Option<Job>,
+}
+
+/// Most candidates of one decision.
+const MAX_PICKS: usize = 64;
+
+/// Makes landmarks of candidates, or adds views to the landmarks they show; places them; and learns them. All or nothing.
+#[utoipa::path(post, path = "/maps/{map}/gatherings/{gathering}/accept", tag = "gathering",
+    params(("map" = String, Path), ("gathering" = i64, Path)), request_body = Decision,
+    responses((status = 202, body = Accepted), (status = 200, body = Accepted, description = "without a lesson"),
+    (status = 404, body = Problem, description = "unknown_gathering, unknown_candidate"),
+    (status = 409, body = Problem, description = "exists: the landmark has views of its own; in_use; too_many"),
+    (status = 422, body = Problem, description = "bad_name, bad_value, out_of_range")))]
+async fn accept(
+    State(app): State<Shared>,
+    At((map, id)): At<(String, i64)>,
+    Body(decision): Body<Decision>,
+) -> Result<(StatusCode, Json<Accepted>), ApiError> {
+    if !(1..=MAX_PICKS).contains(&decision.candidates.len()) {
+        let detail = format!("1 to {MAX_PICKS} candidates at a time");
+        return Err(ApiError::invalid("out_of_range", "candidates", detail));
+    }
+    let pick = |(i, pick): (usize, PickBody)| {
+        let name = pick.name.map(|text| name("name", text)).transpose();
+        let name = name.map_err(|e| e.field(format!("candidates[{i}].name")))?;
+        Ok(Pick { number: pick.candidate, name: name.map(|n| n.to_string()) })
+    };
+    let picks =
+        decision.candidates.into_iter().enumerate().map(pick).collect::<Result<Vec<_>, ApiError>>()?;
+    let limits = &app.config.limits;
+    let bounds = accepting::Bounds {
+        landmarks: limits.landmarks,
+        views: limits.views,
+        jobs: (limits.jobs, limits.jobs_kept),
+    };
+    let done = app.gatherer.accept(&app.jobs, (&map, id), picks, decision.learn, bounds).await?;
+    let landmarks =
+        done.landmarks.into_iter().map(|(name, (views, placing))| Grown { name, views, placing }).collect();
+    let status = if done.job.is_some() { StatusCode::ACCEPTED } else { StatusCode::OK };
+    Ok((status, Json(Accepted { landmarks, job: done.job.map(|row| Job::new(row, None)) })))
+}

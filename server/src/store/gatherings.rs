@@ -1,0 +1,337 @@
+//! What robots gather while they drive: who gathers for what, the tracks they brought home, and the views of each, until
+//! somebody decides on them (`accepting.rs`).
+
+use super::{
+    StoreError, Tx, landmarks, maps, now_ms, robots,
+    statements::statements,
+    views::{self, Cut, NewView},
+    within,
+};
+use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
+
+/// Columns of [`GatheringRow`].
+macro_rules! select {
+    ($tail:literal) => {
+        concat!(
+            "SELECT g.id, m.name AS map, g.robot, l.name AS landmark, g.landmark_id, g.known, g.open, g.counts, \
+             g.created_ms, g.ended_ms FROM gatherings g JOIN maps m ON m.id = g.map_id \
+             LEFT JOIN landmarks l ON l.id = g.landmark_id ",
+            $tail
+        )
+    };
+}
+
+statements! {
+    COUNT = "SELECT count(*) FROM gatherings WHERE map_id = ?1";
+    COUNT_OPEN = "SELECT count(*) FROM gatherings WHERE open = 1";
+    INSERT = "INSERT INTO gatherings (map_id, robot, landmark_id, known, open, created_ms) \
+              VALUES (?1, ?2, ?3, ?4, 1, ?5) RETURNING id";
+    GET = select!("WHERE m.name = ?1 AND g.id = ?2");
+    PAGE = select!("WHERE g.map_id = ?1 AND g.id > ?2 ORDER BY g.id LIMIT ?3");
+    OPEN = select!("WHERE g.open = 1 ORDER BY g.id");
+    IS_OPEN = "SELECT open FROM gatherings WHERE id = ?1";
+    END = "UPDATE gatherings SET open = 0, counts = ?2, ended_ms = ?3 WHERE id = ?1";
+    DELETE = "DELETE FROM gatherings WHERE id = ?1";
+    PUT_TRACK = "INSERT INTO tracks (gathering_id, number, landmark_id, sightings, known) VALUES (?1, ?2, ?3, ?4, ?5) \
+                 ON CONFLICT (gathering_id, number) DO UPDATE SET sightings = excluded.sightings, known = excluded.known \
+                 RETURNING state";
+    COUNT_TRACKS = "SELECT count(*) FROM tracks WHERE gathering_id = ?1 AND state = 'open'";
+    TRACKS = "SELECT t.number, t.landmark_id, l.name AS landmark, t.state, t.sightings, t.known, \
+              (SELECT count(*) FROM track_views v WHERE v.gathering_id = t.gathering_id AND v.track = t.number) AS views \
+              FROM tracks t LEFT JOIN landmarks l ON l.id = t.landmark_id WHERE t.gathering_id = ?1 ORDER BY t.number";
+    INSERT_VIEW = "INSERT INTO track_views (gathering_id, track, image_sha256, image_kind, image, width_px, height_px, \
+                   corners_px, icon_side, icon, icon_scale, created_ms, capture) \
+                   VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13) ON CONFLICT DO NOTHING";
+    COUNT_VIEWS = "SELECT count(*) FROM track_views WHERE gathering_id = ?1 AND track = ?2";
+    BYTES = "SELECT coalesce(sum(length(image)), 0) FROM track_views WHERE gathering_id = ?1";
+    VIEWS = "SELECT id, width_px, height_px, corners_px, icon_side, icon, icon_scale, capture FROM track_views \
+             WHERE gathering_id = ?1 AND track = ?2 ORDER BY id";
+    DISCARD = "UPDATE tracks SET state = 'discarded' WHERE gathering_id = ?1 AND number = ?2 AND state = 'open'";
+    DROP_VIEWS = "DELETE FROM track_views WHERE gathering_id = ?1 AND track = ?2";
+}
+
+/// How much may be gathered.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Bounds {
+    /// Robots that gather at a time.
+    pub(crate) open: usize,
+    /// Gatherings of one map, ended ones included.
+    pub(crate) of_map: usize,
+    /// Tracks of one gathering that nobody has decided on.
+    pub(crate) tracks: usize,
+    /// Views of one track.
+    pub(crate) views: usize,
+    /// Pictures of one gathering, bytes.
+    pub(crate) bytes: usize,
+}
+
+impl Bounds {
+    /// Those of the server.
+    pub(crate) const SERVER: Self =
+        Self { open: 32, of_map: 100, tracks: 64, views: map::gather::MAX_TRACK_VIEWS, bytes: 256 << 20 };
+}
+
+/// What to gather.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct NewGathering {
+    pub(crate) robot: String,
+    /// Name of the only landmark whose views are wanted.
+    pub(crate) landmark: Option<String>,
+    /// Views of recognised landmarks, too.
+    pub(crate) known: bool,
+}
+
+/// A gathering without its tracks.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct GatheringRow {
+    pub(crate) id: i64,
+    pub(crate) map: String,
+    pub(crate) robot: String,
+    pub(crate) landmark: Option<String>,
+    pub(crate) landmark_id: Option<i64>,
+    pub(crate) known: bool,
+    pub(crate) open: bool,
+    /// JSON object.
+    pub(crate) counts: String,
+    pub(crate) created_ms: i64,
+    pub(crate) ended_ms: Option<i64>,
+}
+
+fn gathering_row(row: &SqliteRow) -> Result<GatheringRow, sqlx::Error> {
+    Ok(GatheringRow {
+        id: row.try_get("id")?,
+        map: row.try_get("map")?,
+        robot: row.try_get("robot")?,
+        landmark: row.try_get("landmark")?,
+        landmark_id: row.try_get("landmark_id")?,
+        known: row.try_get("known")?,
+        open: row.try_get("open")?,
+        counts: row.try_get("counts")?,
+        created_ms: row.try_get("created_ms")?,
+        ended_ms: row.try_get("ended_ms")?,
+    })
+}
+
+/// One thing that was followed.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct TrackRow {
+    pub(crate) number: u32,
+    pub(crate) landmark_id: Option<i64>,
+    /// Name of the landmark whose views these are.
+    pub(crate) landmark: Option<String>,
+    /// open, accepted, discarded.
+    pub(crate) state: String,
+    pub(crate) sightings: u32,
+    pub(crate) known: u32,
+    pub(crate) views: u64,
+}
+
+/// A view of a track, without its picture.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct TrackView {
+    pub(crate) id: i64,
+    pub(crate) size_px: [usize; 2],
+    pub(crate) cut: Cut,
+    /// JSON of a `placing::Capture`.
+    pub(crate) capture: Option<String>,
+}
+
+fn unknown(what: &'static str, number: i64) -> StoreError {
+    StoreError::NotFound { what, name: number.to_string() }
+}
+
+/// Begins to gather with a robot that stands on the map.
+pub(crate) async fn create(
+    tx: &mut Tx,
+    map: &str,
+    new: &NewGathering,
+    bounds: Bounds,
+) -> Result<GatheringRow, StoreError> {
+    let map = maps::get(&mut tx.conn, map).await?;
+    let robot = robots::get(&mut tx.conn, &new.robot).await?;
+    if robot.map != map.name {
+        return Err(StoreError::InUse(format!("robot `{}` stands on map `{}`", robot.name, robot.map)));
+    }
+    let landmark_id = match &new.landmark {
+        Some(name) => Some(landmarks::get(&mut tx.conn, &map.name, name).await?.id),
+        None => None,
+    };
+    let id = sqlx::query_scalar(INSERT)
+        .bind(map.id)
+        .bind(&robot.name)
+        .bind(landmark_id)
+        .bind(new.known)
+        .bind(now_ms())
+        .fetch_one(&mut tx.conn)
+        .await
+        .map_err(StoreError::inserting("begin gathering", "gathering", &robot.name))
+        .map_err(|error| match error {
+            StoreError::Exists { name, .. } => StoreError::InUse(format!("robot `{name}` gathers already")),
+            other => other,
+        })?;
+    let count = |sql| sqlx::query_scalar(sql);
+    let open = count(COUNT_OPEN).fetch_one(&mut tx.conn).await.map_err(StoreError::at("count gatherings"))?;
+    within(open, bounds.open, "robots that gather at a time")?;
+    let of_map = count(COUNT).bind(map.id).fetch_one(&mut tx.conn).await;
+    within(of_map.map_err(StoreError::at("count gatherings"))?, bounds.of_map, "gatherings of a map")?;
+    get(&mut tx.conn, &map.name, id).await
+}
+
+/// One gathering of a map.
+pub(crate) async fn get(db: impl SqliteExecutor<'_>, map: &str, id: i64) -> Result<GatheringRow, StoreError> {
+    let at = || StoreError::at("read gathering");
+    let row = sqlx::query(GET).bind(map).bind(id).fetch_optional(db).await.map_err(at())?;
+    gathering_row(&row.ok_or_else(|| unknown("gathering", id))?).map_err(at())
+}
+
+/// Gatherings of a map with numbers above `after`, in order.
+pub(crate) async fn page(
+    db: impl SqliteExecutor<'_>,
+    map_id: i64,
+    after: i64,
+    limit: usize,
+) -> Result<Vec<GatheringRow>, StoreError> {
+    let at = || StoreError::at("list gatherings");
+    let rows = sqlx::query(PAGE).bind(map_id).bind(after).bind(limit as i64).fetch_all(db).await;
+    rows.map_err(at())?.iter().map(gathering_row).collect::<Result<_, _>>().map_err(at())
+}
+
+/// Those that go on, for the start of the server.
+pub(crate) async fn open(db: impl SqliteExecutor<'_>) -> Result<Vec<GatheringRow>, StoreError> {
+    let at = || StoreError::at("list gatherings");
+    let rows = sqlx::query(OPEN).fetch_all(db).await.map_err(at())?;
+    rows.iter().map(gathering_row).collect::<Result<_, _>>().map_err(at())
+}
+
+/// Ends a gathering; its tracks wait for a decision. What is offered later is refused. One that has ended stays as it is.
+pub(crate) async fn end(tx: &mut Tx, map: &str, id: i64, counts: &str) -> Result<GatheringRow, StoreError> {
+    let row = get(&mut tx.conn, map, id).await?;
+    if !row.open {
+        return Ok(row);
+    }
+    sqlx::query(END)
+        .bind(id)
+        .bind(counts)
+        .bind(now_ms())
+        .execute(&mut tx.conn)
+        .await
+        .map_err(StoreError::at("end gathering"))?;
+    get(&mut tx.conn, map, id).await
+}
+
+/// Throws a gathering away with all that nobody has accepted.
+pub(crate) async fn delete(tx: &mut Tx, map: &str, id: i64) -> Result<(), StoreError> {
+    get(&mut tx.conn, map, id).await?;
+    sqlx::query(DELETE).bind(id).execute(&mut tx.conn).await.map_err(StoreError::at("delete gathering"))?;
+    Ok(())
+}
+
+/// Keeps a view. `InUse` when the gathering has ended.
+pub(crate) async fn add_view(
+    tx: &mut Tx,
+    id: i64,
+    track: &map::gather::Kept,
+    new: &NewView,
+    bounds: Bounds,
+) -> Result<(), StoreError> {
+    let at = || StoreError::at("keep view");
+    let open: Option<bool> =
+        sqlx::query_scalar(IS_OPEN).bind(id).fetch_optional(&mut tx.conn).await.map_err(at())?;
+    if !open.ok_or_else(|| unknown("gathering", id))? {
+        return Err(StoreError::InUse(format!("gathering {id} has ended")));
+    }
+    let state: String = sqlx::query_scalar(PUT_TRACK)
+        .bind(id)
+        .bind(track.number)
+        .bind(track.landmark.map(|l| l.0 as i64))
+        .bind(track.sightings)
+        .bind(track.known)
+        .fetch_one(&mut tx.conn)
+        .await
+        .map_err(at())?;
+    if state != "open" {
+        return Err(StoreError::InUse(format!("candidate {} is {state}", track.number)));
+    }
+    let tracks = sqlx::query_scalar(COUNT_TRACKS).bind(id).fetch_one(&mut tx.conn).await.map_err(at())?;
+    within(tracks, bounds.tracks, "candidates of a gathering")?;
+    sqlx::query(INSERT_VIEW)
+        .bind(id)
+        .bind(track.number)
+        .bind(&new.image_sha256[..])
+        .bind(new.image_kind)
+        .bind(&new.image)
+        .bind(new.size_px[0] as i64)
+        .bind(new.size_px[1] as i64)
+        .bind(views::corners_bytes(&new.cut.corners_px))
+        .bind(new.cut.icon.size as i64)
+        .bind(views::icon_bytes(&new.cut.icon))
+        .bind(new.cut.icon.source_scale)
+        .bind(now_ms())
+        .bind(&new.capture)
+        .execute(&mut tx.conn)
+        .await
+        .map_err(at())?;
+    let count = sqlx::query_scalar(COUNT_VIEWS).bind(id).bind(track.number).fetch_one(&mut tx.conn).await;
+    within(count.map_err(at())?, bounds.views, "views of a candidate")?;
+    let bytes = sqlx::query_scalar(BYTES).bind(id).fetch_one(&mut tx.conn).await.map_err(at())?;
+    within(bytes, bounds.bytes, "bytes of a gathering")
+}
+
+/// The tracks of a gathering by number, decided ones included.
+pub(crate) async fn tracks(db: impl SqliteExecutor<'_>, id: i64) -> Result<Vec<TrackRow>, StoreError> {
+    let at = || StoreError::at("list tracks");
+    let rows = sqlx::query(TRACKS).bind(id).fetch_all(db).await.map_err(at())?;
+    let track = |row: &SqliteRow| {
+        Ok(TrackRow {
+            number: row.try_get("number")?,
+            landmark_id: row.try_get("landmark_id")?,
+            landmark: row.try_get("landmark")?,
+            state: row.try_get("state")?,
+            sightings: row.try_get("sightings")?,
+            known: row.try_get("known")?,
+            views: row.try_get::<i64, _>("views")? as u64,
+        })
+    };
+    rows.iter().map(track).collect::<Result<_, sqlx::Error>>().map_err(at())
+}
+
+/// One track that nobody has decided on.
+pub(crate) async fn track(db: impl SqliteExecutor<'_>, id: i64, number: u32) -> Result<TrackRow, StoreError> {
+    let mut all = tracks(db, id).await?.into_iter();
+    let found = all.find(|t| t.number == number && t.state == "open");
+    found.ok_or_else(|| unknown("candidate", i64::from(number)))
+}
+
+/// The views of a track in the order they were kept.
+pub(crate) async fn track_views(
+    db: impl SqliteExecutor<'_>,
+    id: i64,
+    number: u32,
+) -> Result<Vec<TrackView>, StoreError> {
+    let at = || StoreError::at("read views of a track");
+    let rows = sqlx::query(VIEWS).bind(id).bind(number).fetch_all(db).await.map_err(at())?;
+    let view = |row: &SqliteRow| {
+        let pixels = |column: &str| row.try_get::<i64, _>(column).map(|s| s as usize).map_err(at());
+        Ok(TrackView {
+            id: row.try_get("id").map_err(at())?,
+            size_px: [pixels("width_px")?, pixels("height_px")?],
+            cut: views::cut_of(row)?,
+            capture: row.try_get("capture").map_err(at())?,
+        })
+    };
+    rows.iter().map(view).collect()
+}
+
+/// Throws a track away.
+pub(crate) async fn discard(tx: &mut Tx, map: &str, id: i64, number: u32) -> Result<(), StoreError> {
+    get(&mut tx.conn, map, id).await?;
+    let done = sqlx::query(DISCARD).bind(id).bind(number).execute(&mut tx.conn).await;
+    if done.map_err(StoreError::at("discard track"))?.rows_affected() == 0 {
+        return Err(unknown("candidate", i64::from(number)));
+    }
+    let dropped = sqlx::query(DROP_VIEWS).bind(id).bind(number).execute(&mut tx.conn).await;
+    dropped.map_err(StoreError::at("discard track")).map(drop)
+}
+
+#[cfg(test)]
+mod tests;

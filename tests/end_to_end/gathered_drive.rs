@@ -1,0 +1,379 @@
+//! Claim: a robot that drives past posters nobody taught brings their views home; a person accepts them over HTTP, and
+//! from then on they are recognised and placed, never one for another, at least as often as when each was taught by a
+//! photograph. Views of a landmark that is known are added only where it was recognised, and only when asked for.
+
+use client::{
+    Capture, Delivery, RobotClient, RobotOptions,
+    map::Extent,
+    v1::{self, Verdict},
+};
+use image::{ExtendedColorType, codecs::jpeg::JpegEncoder};
+use map::pose2::{Pose2, Pose2Covariance};
+use nalgebra::{Matrix3, Point2, Vector3};
+use reqwest::{Client, Method, StatusCode};
+use serde_json::{Value, json};
+use server::config::Limits;
+use sim::{
+    building::Building,
+    drive::DriveParams,
+    lesson::{LessonParams, stops},
+    robot::{Robot, RobotParams, Sighting},
+    truth::{LandmarkView, ViewState},
+};
+use std::{collections::BTreeMap, sync::Arc};
+use tests::{Inside, SOON, eventually};
+use vision::{frame::GrayImage, geometry::polygon::iou};
+
+const MAP: &str = "corridor";
+/// Posters with a shorter side in the picture are counted by themselves...
+const LARGE_PX: f64 = 60.0;
+/// ... and below this not at all: they have no icon.
+const MIN_SIDE_PX: f64 = 38.0;
+
+fn jpeg(image: &GrayImage) -> Vec<u8> {
+    let mut out = Vec::new();
+    let (width, height) = (image.width() as u32, image.height() as u32);
+    JpegEncoder::new_with_quality(&mut out, 90)
+        .encode(image.data(), width, height, ExtendedColorType::L8)
+        .expect("in memory");
+    out
+}
+
+async fn call(inside: &Inside, method: Method, path: &str, body: Option<Value>) -> (StatusCode, Value) {
+    let request = Client::new().request(method, format!("{}/api/v1{path}", inside.url()));
+    let request = match body {
+        Some(body) => request.json(&body),
+        None => request,
+    };
+    let answer = request.send().await.expect("an answer");
+    (answer.status(), answer.json().await.unwrap_or_default())
+}
+
+/// A map with walls and a robot on it, nothing taught.
+async fn walls(inside: &Inside, building: &Building) -> RobotClient {
+    inside.maps().create_map(MAP, None).await.expect("map");
+    let walls: Vec<_> = building
+        .walls()
+        .iter()
+        .map(|w| json!({ "a": [w.a_m.x, w.a_m.y], "b": [w.b_m.x, w.b_m.y] }))
+        .collect();
+    let path = format!("/maps/{MAP}/laser");
+    assert_eq!(call(inside, Method::PUT, &path, Some(json!({ "segments": walls }))).await.0, 200);
+    inside.maps().put_robot("r1", MAP).await.expect("robot");
+    let options = RobotOptions {
+        delivery: Delivery::Every,
+        ..RobotOptions::new(&inside.server.zenoh_endpoint, "default", "r1")
+    };
+    RobotClient::connect(&options).await.expect("connected")
+}
+
+fn robot(building: &Arc<Building>, seed: u64, legs: u32, reverse: bool) -> Robot {
+    let drive = DriveParams {
+        seed,
+        reverse,
+        legs,
+        start_m: if reverse { 22.0 } else { 0.0 },
+        ..DriveParams::default()
+    };
+    Robot::new(building.clone(), &RobotParams { drive, ..RobotParams::default() })
+}
+
+/// What the laser says of the pose: 1 cm and 2 mrad off, other at every step.
+fn believed(seen: &Sighting) -> Pose2Covariance {
+    let phase = seen.step.index as f64;
+    let off = Vector3::new(0.014 * phase.sin(), 0.014 * (2.3 * phase).sin(), 0.0028 * (3.7 * phase).sin());
+    let covariance = Matrix3::from_diagonal(&Vector3::new(1e-4, 1e-4, 4e-6));
+    let t = seen.step.map_from_robot;
+    let pose = Pose2::new(t.x_m + off.x, t.y_m + off.y, t.theta_rad + off.z);
+    Pose2Covariance::new(pose, covariance).expect("in range")
+}
+
+/// Every other picture of a drive, answered.
+async fn drive(client: &RobotClient, mut robot: Robot, localised: bool) -> Vec<(Sighting, v1::Answer)> {
+    let steps: Vec<_> = robot.drive_mut().collect();
+    let mut answered = Vec::new();
+    for step in steps.iter().step_by(2) {
+        let seen = robot.look(step);
+        let mut capture = Capture::encoded(jpeg(&seen.frame.image))
+            .expect("a picture")
+            .with_intrinsics(sim::camera::Camera::vga().intrinsics())
+            .with_mounting(&seen.step.robot_from_camera)
+            .with_odometry(&seen.step.odom_from_robot)
+            .captured_at_ns((seen.step.time_s * 1e9) as i64 + 1_000_000_000)
+            .with_deadline_ms(60_000);
+        if localised {
+            capture = capture.with_prior(&believed(&seen));
+        }
+        let answer = client.recognise("front", capture, SOON).await.expect("an answer");
+        answered.push((seen, answer));
+    }
+    answered
+}
+
+/// What a drive gave.
+#[derive(Debug, Default)]
+struct Figures {
+    /// Posters wholly in a picture, large and small, and those of them that were recognised.
+    shown: [usize; 2],
+    right: [usize; 2],
+    wrong: usize,
+    poses: usize,
+    worst_m: f64,
+}
+
+fn figures(drive: &[(Sighting, v1::Answer)]) -> Figures {
+    let mut f = Figures::default();
+    for (seen, answer) in drive {
+        let truth = &seen.frame.truth;
+        let whole = |l: &&LandmarkView| l.name.starts_with("poster") && l.state == ViewState::Full;
+        let size = |l: &LandmarkView| usize::from(l.min_side_px() < LARGE_PX);
+        let shown = truth.landmarks.iter().filter(whole).filter(|l| l.min_side_px() >= MIN_SIDE_PX);
+        for poster in shown.clone() {
+            f.shown[size(poster)] += 1;
+        }
+        for quad in answer.quads.iter().filter(|q| q.verdict() == Verdict::Unique) {
+            let corners: Vec<_> = quad.corners.iter().map(|c| Point2::new(c.u_px, c.v_px)).collect();
+            let there = truth.landmarks.iter().find(|l| iou(&corners, l.corners_px.points()) > 0.5);
+            f.wrong += usize::from(there.is_none_or(|l| l.name != quad.landmark));
+            if let Some(poster) = there.filter(|t| t.name == quad.landmark)
+                && shown.clone().any(|l| l.name == poster.name)
+            {
+                f.right[size(poster)] += 1;
+            }
+        }
+        if let Some(pose) = answer.map_from_robot.as_ref().and_then(|p| p.pose.as_ref()) {
+            let t = seen.step.map_from_robot;
+            f.poses += 1;
+            f.worst_m = f.worst_m.max((pose.x_m - t.x_m).hypot(pose.y_m - t.y_m));
+        }
+    }
+    f
+}
+
+fn list<'a>(value: &'a Value, name: &str) -> &'a [Value] {
+    value[name].as_array().map_or(&[], Vec::as_slice)
+}
+
+/// The poster that hangs where a candidate does: what a person sees in the picture.
+fn poster_of(building: &Building, candidate: &Value) -> Option<String> {
+    let at = |field: &str| candidate["hangs"][field].as_f64();
+    let (x, y, width) = (at("x_m")?, at("y_m")?, at("width_m")?);
+    let near = building.posters().find(|p| {
+        let c = p.map_from_landmark.translation.vector;
+        (c.x - x).hypot(c.y - y) < 0.15 && (width - p.width_m).abs() < 0.1
+    });
+    near.map(|p| p.name.clone())
+}
+
+async fn lesson(inside: &Inside, job: &Value) -> Value {
+    let path = format!("/jobs/{}", job["id"]);
+    eventually("the lesson", || async {
+        let (_, job) = call(inside, Method::GET, &path, None).await;
+        assert!(job["state"] != "failed", "{job}");
+        (job["state"] == "done").then_some(job["result"].clone())
+    })
+    .await
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn posters_that_nobody_taught_are_gathered_accepted_and_recognised() {
+    let building = Arc::new(Building::corridor(11));
+    let (gathered, inside, client) = {
+        let inside = Inside::start(Limits::default()).await;
+        let client = walls(&inside, &building).await;
+        gather_all(&inside, &client, &building).await;
+        let second = drive(&client, robot(&building, 5, 1, true), false).await;
+        (figures(&second), inside, client)
+    };
+    let photographed = photographed(&building).await;
+    eprintln!("gathered {gathered:?}\nby photograph {photographed:?}");
+    assert!(gathered.shown[0] >= 50, "{gathered:?}");
+    assert_eq!((gathered.wrong, photographed.wrong), (0, 0), "{gathered:?} {photographed:?}");
+    assert!(20 * gathered.right[0] >= 19 * gathered.shown[0], "{gathered:?}");
+    assert!(20 * gathered.right[0] >= 19 * photographed.right[0], "{gathered:?} {photographed:?}");
+    assert!(gathered.poses > 0 && gathered.worst_m < 0.5, "{gathered:?}");
+    more_of_one(&inside, &client, &building).await;
+    client.close().await.expect("closed");
+    inside.server.stop().await;
+}
+
+/// The first drive, the decision, the lesson.
+async fn gather_all(inside: &Inside, client: &RobotClient, building: &Arc<Building>) {
+    let path = format!("/maps/{MAP}/gatherings");
+    let (status, gathering) = call(inside, Method::POST, &path, Some(json!({ "robot": "r1" }))).await;
+    assert_eq!(status, StatusCode::CREATED, "{gathering}");
+    let path = format!("{path}/{}", gathering["id"]);
+    drive(client, robot(building, 3, 2, false), true).await;
+    let (status, stopped) = call(inside, Method::POST, &format!("{path}/stop"), None).await;
+    assert_eq!((status, &stopped["open"]), (StatusCode::OK, &json!(false)), "{stopped}");
+    eprintln!("counts {}", stopped["counts"]);
+    let (_, waiting) = call(inside, Method::GET, &format!("{path}/candidates"), None).await;
+    let mut picks = Vec::new();
+    let mut taken = BTreeMap::new();
+    for candidate in list(&waiting, "candidates") {
+        let poster = poster_of(building, candidate);
+        eprintln!(
+            "{:?} {}: {} views, {} apart, of {}, angles {}, sides {}, v_c {}, passes {} {}",
+            poster,
+            candidate["number"],
+            list(candidate, "views").len(),
+            candidate["apart"],
+            candidate["sightings"],
+            candidate["hangs"]["angle_rad"],
+            candidate["side_px"],
+            candidate["v_c"],
+            candidate["passes"],
+            candidate["reasons"]
+        );
+        let Some(name) = poster else { continue };
+        taken.insert(name.clone(), candidate.clone());
+        picks.push(json!({ "candidate": candidate["number"], "name": name }));
+    }
+    assert!(taken.len() == 6, "{} of 6 posters were gathered", taken.len());
+    // A picture of each can be seen.
+    let first = &list(&waiting, "candidates")[0];
+    let icon =
+        format!("{}/api/v1{path}/candidates/{}/views/{}/icon", inside.url(), first["number"], first["best"]);
+    let picture = Client::new().get(icon).send().await.expect("an answer");
+    assert_eq!(picture.headers()["content-type"], "image/png");
+    // Nothing is taken if one of the decisions cannot be.
+    let mut bad = picks.clone();
+    bad.push(json!({ "candidate": 9999, "name": "nothing" }));
+    let (status, problem) =
+        call(inside, Method::POST, &format!("{path}/accept"), Some(json!({ "candidates": bad }))).await;
+    assert_eq!((status, &problem["code"]), (StatusCode::NOT_FOUND, &json!("unknown_candidate")));
+    assert!(inside.maps().landmarks(MAP).await.expect("landmarks").is_empty());
+    let (status, accepted) =
+        call(inside, Method::POST, &format!("{path}/accept"), Some(json!({ "candidates": picks }))).await;
+    assert_eq!(status, StatusCode::ACCEPTED, "{accepted}");
+    assert!(list(&accepted, "landmarks").iter().all(|l| l["placing"]["placed"] == true), "{accepted}");
+    let result = lesson(inside, &accepted["job"]).await;
+    assert_eq!(result["active"].as_u64(), Some(taken.len() as u64), "{result}");
+    for landmark in inside.maps().landmarks(MAP).await.expect("landmarks") {
+        let truth = building.landmark(&landmark.name).expect("a poster").map_from_landmark.translation.vector;
+        let place = landmark.place.expect("placed");
+        assert!((place.x_m - truth.x).hypot(place.y_m - truth.y) < 0.05, "{landmark:?}");
+    }
+    // Accepted ones do not wait any more, nor can they be accepted twice.
+    let again = json!({ "candidates": [picks[0]] });
+    assert_eq!(call(inside, Method::POST, &format!("{path}/accept"), Some(again)).await.0, 404);
+}
+
+/// What one photograph of each poster, seen straight on, teaches: the same second drive.
+async fn photographed(building: &Arc<Building>) -> Figures {
+    let inside = Inside::start(Limits::default()).await;
+    let client = walls(&inside, building).await;
+    let frontal = LessonParams {
+        seed: 1,
+        views: 1,
+        max_view_angle_rad: 0.35,
+        distance_m: [1.3, 2.0],
+        ..LessonParams::default()
+    };
+    let mut teacher = Robot::new(building.clone(), &RobotParams::default());
+    for stop in stops(building, &frontal) {
+        let seen = teacher.look(&stop.step);
+        let corners = seen.frame.truth.landmark(&stop.landmark).expect("aimed at").corners_px;
+        let maps = inside.maps();
+        maps.add_landmark(MAP, &stop.landmark, None, None).await.expect("landmark");
+        let extent = Extent::Corners(corners.into());
+        maps.upload_view(MAP, &stop.landmark, jpeg(&seen.frame.image), extent).await.expect("view");
+    }
+    let job = inside.maps().learn(MAP, None, None).await.expect("job");
+    inside.maps().wait_for_job(job, 3 * SOON, |_| {}).await.expect("the lesson ends");
+    let second = drive(&client, robot(building, 5, 1, true), false).await;
+    client.close().await.expect("closed");
+    inside.server.stop().await;
+    figures(&second)
+}
+
+/// Views of one landmark alone, then a lesson of it alone.
+async fn more_of_one(inside: &Inside, client: &RobotClient, building: &Arc<Building>) {
+    let path = format!("/maps/{MAP}/gatherings");
+    let before = inside.maps().landmark(MAP, "poster-0").await.expect("a landmark").views;
+    let only = json!({ "robot": "r1", "landmark": "poster-0" });
+    let (status, gathering) = call(inside, Method::POST, &path, Some(only)).await;
+    assert_eq!(status, StatusCode::CREATED, "{gathering}");
+    let path = format!("{path}/{}", gathering["id"]);
+    let near: Vec<_> = stops(building, &LessonParams { seed: 9, views: 10, ..LessonParams::default() })
+        .into_iter()
+        .filter(|s| s.landmark == "poster-0" || s.landmark == "poster-1")
+        .collect();
+    let mut looking = Robot::new(building.clone(), &RobotParams::default());
+    for (i, stop) in near.iter().enumerate() {
+        let seen = looking.look(&stop.step);
+        let capture = Capture::encoded(jpeg(&seen.frame.image))
+            .expect("a picture")
+            .with_intrinsics(sim::camera::Camera::vga().intrinsics())
+            .with_mounting(&seen.step.robot_from_camera)
+            .with_prior(&believed(&seen))
+            .captured_at_ns(9_000_000_000_000 + i as i64)
+            .with_deadline_ms(60_000);
+        client.recognise("front", capture, SOON).await.expect("an answer");
+    }
+    let (_, stopped) = call(inside, Method::POST, &format!("{path}/stop"), None).await;
+    let (_, waiting) = call(inside, Method::GET, &format!("{path}/candidates"), None).await;
+    let [one] = list(&waiting, "candidates") else { panic!("{waiting} {stopped}") };
+    assert_eq!(one["landmark"], "poster-0");
+    let kept = list(one, "views").len() as u64;
+    assert!((4..=10).contains(&kept), "{stopped}");
+    let other = json!({ "candidates": [{ "candidate": one["number"], "name": "poster-1" }] });
+    let (status, problem) = call(inside, Method::POST, &format!("{path}/accept"), Some(other)).await;
+    assert_eq!((status, &problem["code"]), (StatusCode::CONFLICT, &json!("in_use")), "{problem}");
+    let its_own = json!({ "candidates": [{ "candidate": one["number"] }] });
+    let (_, accepted) = call(inside, Method::POST, &format!("{path}/accept"), Some(its_own)).await;
+    let result = lesson(inside, &accepted["job"]).await;
+    let others = inside.maps().landmarks(MAP).await.expect("landmarks").len() - 1;
+    assert_eq!((&result["learnt"], &result["refitted"]), (&json!(1), &json!(others)), "{result}");
+    assert_eq!(inside.maps().landmark(MAP, "poster-0").await.expect("a landmark").views, before + kept);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn bad_wishes_are_refused_with_a_reason_and_ends_are_final() {
+    let inside = Inside::start(Limits::default()).await;
+    let building = Building::corridor(11);
+    let client = walls(&inside, &building).await;
+    inside.maps().create_map("cellar", None).await.expect("map");
+    inside.maps().add_landmark(MAP, "blank", None, None).await.expect("landmark");
+    let all = format!("/maps/{MAP}/gatherings");
+    for (path, body, status, code) in [
+        (all.as_str(), json!({ "robot": "nobody" }), 404, "unknown_robot"),
+        (&all, json!({ "robot": "r1", "landmark": "none" }), 404, "unknown_landmark"),
+        (&all, json!({ "robot": "r1", "landmark": "blank" }), 409, "not_learnt"),
+        (&all, json!({ "robot": "r1", "auto_accept": true }), 422, "bad_value"),
+        ("/maps/cellar/gatherings", json!({ "robot": "r1" }), 409, "in_use"),
+        ("/maps/nowhere/gatherings", json!({ "robot": "r1" }), 404, "unknown_map"),
+    ] {
+        let (got, problem) = call(&inside, Method::POST, path, Some(body)).await;
+        assert_eq!((got.as_u16(), problem["code"].as_str()), (status, Some(code)), "{problem}");
+    }
+    let (_, one) = call(&inside, Method::POST, &all, Some(json!({ "robot": "r1", "known": true }))).await;
+    let path = format!("{all}/{}", one["id"]);
+    let (status, problem) = call(&inside, Method::POST, &all, Some(json!({ "robot": "r1" }))).await;
+    assert_eq!((status.as_u16(), problem["code"].as_str()), (409, Some("in_use")), "{problem}");
+    for (body, status, code) in [
+        (json!({ "candidates": [] }), 422, "out_of_range"),
+        (json!({ "candidates": [{ "candidate": 1, "name": "A/B" }] }), 422, "bad_name"),
+        (json!({ "candidates": [{ "candidate": 1, "name": "a" }] }), 404, "unknown_candidate"),
+        (json!({ "candidates": [{ "candidate": -1 }] }), 422, "bad_value"),
+    ] {
+        let (got, problem) = call(&inside, Method::POST, &format!("{path}/accept"), Some(body)).await;
+        assert_eq!((got.as_u16(), problem["code"].as_str()), (status, Some(code)), "{problem}");
+    }
+    assert_eq!(call(&inside, Method::DELETE, &format!("{path}/candidates/1"), None).await.0, 404);
+    let (_, stopped) = call(&inside, Method::POST, &format!("{path}/stop"), None).await;
+    let (_, again) = call(&inside, Method::POST, &format!("{path}/stop"), None).await;
+    assert_eq!((&stopped, stopped["open"].as_bool()), (&again, Some(false)));
+    // It may gather again now; a list shows both; what is deleted is gone.
+    let (status, two) = call(&inside, Method::POST, &all, Some(json!({ "robot": "r1" }))).await;
+    assert_eq!(status, StatusCode::CREATED);
+    let (_, page) = call(&inside, Method::GET, &all, None).await;
+    assert_eq!(list(&page, "items").len(), 2);
+    let path = format!("{all}/{}", two["id"]);
+    assert_eq!(call(&inside, Method::DELETE, &path, None).await.0, 204);
+    let (status, problem) = call(&inside, Method::GET, &path, None).await;
+    assert_eq!((status.as_u16(), problem["code"].as_str()), (404, Some("unknown_gathering")));
+    assert_eq!(call(&inside, Method::POST, &all, Some(json!({ "robot": "r1" }))).await.0, 201);
+    client.close().await.expect("closed");
+    inside.server.stop().await;
+}

@@ -1,0 +1,159 @@
+// The panel for views gathered while a robot drives: turn it on, watch the counts, look at the candidates, accept or throw
+// away. Hears from app.js which map is shown; talks to `maps/{map}/gatherings`.
+
+const API = "/api/v1";
+const POLL_MS = 2000;
+
+const byId = (id) => document.getElementById(id);
+const state = { map: null, gathering: null, candidates: [], busy: false };
+
+async function ask(method, path, body) {
+  const init = { method, headers: { accept: "application/json" } };
+  if (body !== undefined) {
+    init.headers["content-type"] = "application/json";
+    init.body = JSON.stringify(body);
+  }
+  const answer = await fetch(API + path, init);
+  const value = answer.status === 204 ? null : await answer.json();
+  if (!answer.ok) throw new Error(value?.detail ?? `${path}: ${answer.status}`);
+  return value;
+}
+
+const home = () => `/maps/${encodeURIComponent(state.map)}/gatherings`;
+const here = () => `${home()}/${state.gathering.id}`;
+
+// Runs what a button asks for, one at a time, and shows what went wrong.
+async function act(work) {
+  if (state.busy) return;
+  state.busy = true;
+  byId("gather-hint").textContent = "";
+  try { await work(); } catch (error) { byId("gather-hint").textContent = error.message; } finally { state.busy = false; }
+}
+
+function options(select, values, first) {
+  const chosen = select.value;
+  select.replaceChildren(...(first === undefined ? [] : [new Option(first, "")]), ...values.map((v) => new Option(v, v)));
+  if ([...select.options].some((o) => o.value === chosen)) select.value = chosen;
+}
+
+async function open(map, landmarks) {
+  if (state.map !== map) {
+    Object.assign(state, { map, gathering: null, candidates: [] });
+    list();
+  }
+  options(byId("gather-landmark"), landmarks.filter((l) => l.status === "active").map((l) => l.name), "whatever is new");
+  const robots = (await ask("GET", "/robots?limit=100")).items.filter((r) => r.map === map).map((r) => r.name);
+  options(byId("gather-robot"), robots);
+  const all = (await ask("GET", `${home()}?limit=100`)).items;
+  const shown = state.gathering && all.find((g) => g.id === state.gathering.id);
+  state.gathering = shown ?? all.find((g) => g.open) ?? all.at(-1) ?? null;
+  if (state.gathering && !state.candidates.length) await look();
+  show();
+}
+
+async function look() {
+  state.candidates = (await ask("GET", `${here()}/candidates`)).candidates;
+  list();
+  show();
+}
+
+async function refresh() {
+  if (!state.gathering?.open || document.hidden) return;
+  state.gathering = await ask("GET", here());
+  show();
+}
+
+const degrees = (rad) => `${Math.round((rad * 180) / Math.PI)}°`;
+
+function show() {
+  const g = state.gathering;
+  byId("gather-start").disabled = !byId("gather-robot").value;
+  for (const id of ["gather-stop", "gather-look", "gather-accept", "gather-drop"]) byId(id).disabled = !g;
+  byId("gather-stop").disabled = !g?.open;
+  byId("gather-accept").disabled = !state.candidates.length;
+  if (!g) {
+    byId("gather-facts").textContent = "Nothing has been gathered on this map.";
+  } else {
+    const c = g.counts;
+    byId("gather-facts").textContent = `${g.open ? "gathering" : "ended"}: ${g.robot}, ${g.landmark ?? "whatever is new"}; ` +
+      `${c.frames} frames (${c.dropped} dropped), ${c.kept} views kept, ${c.alike} like one that is kept, ${c.known} known or nearly`;
+  }
+}
+
+// Only when they were asked for anew: names that are being typed stay.
+function list() {
+  byId("gather-table").hidden = !state.candidates.length;
+  byId("candidates").replaceChildren(...state.candidates.map(rowOf));
+}
+
+function rowOf(candidate) {
+  const tr = document.createElement("tr");
+  const cell = (content) => tr.insertCell().append(content);
+  const picture = new Image(75, 75);
+  picture.alt = `candidate ${candidate.number}`;
+  if (candidate.best !== null) picture.src = `${API}${here()}/candidates/${candidate.number}/views/${candidate.best}/icon`;
+  cell(picture);
+  cell(`${candidate.views.length} of ${candidate.sightings}${candidate.apart ? `, ${candidate.apart} left out` : ""}`);
+  const hangs = candidate.hangs;
+  cell(hangs ? `${degrees(hangs.angle_rad[0])} to ${degrees(hangs.angle_rad[1])}` : "unknown");
+  cell(candidate.side_px.map((s) => s.toFixed(0)).join(" to ") + " px");
+  cell(hangs ? `${hangs.x_m.toFixed(2)}, ${hangs.y_m.toFixed(2)} m; ${hangs.width_m.toFixed(2)} x ${hangs.height_m.toFixed(2)} m` : candidate.not_placed);
+  const verdict = document.createElement("span");
+  verdict.textContent = candidate.passes ? "passes" : candidate.reasons.map((r) => r.detail).join("; ");
+  verdict.className = "reasons";
+  cell(verdict);
+  const name = document.createElement("input");
+  name.size = 14;
+  name.maxLength = 64;
+  name.placeholder = "name";
+  name.dataset.candidate = candidate.number;
+  name.setAttribute("aria-label", `name of candidate ${candidate.number}`);
+  if (candidate.landmark) Object.assign(name, { value: candidate.landmark, readOnly: true });
+  cell(name);
+  const drop = document.createElement("button");
+  drop.type = "button";
+  drop.textContent = "Throw away";
+  drop.addEventListener("click", () => act(async () => {
+    await ask("DELETE", `${here()}/candidates/${candidate.number}`);
+    await look();
+  }));
+  cell(drop);
+  return tr;
+}
+
+async function accept() {
+  const named = [...byId("candidates").querySelectorAll("input")].filter((i) => i.value.trim());
+  if (!named.length) throw new Error("Name at least one candidate.");
+  const picks = named.map((i) => (i.readOnly ? { candidate: Number(i.dataset.candidate) } : { candidate: Number(i.dataset.candidate), name: i.value.trim() }));
+  const accepted = await ask("POST", `${here()}/accept`, { candidates: picks });
+  await look();
+  let job = accepted.job;
+  while (job && (job.state === "queued" || job.state === "running")) {
+    byId("gather-hint").textContent = `learning: ${Math.round(100 * job.progress)} %, ${job.message}`;
+    await new Promise((done) => setTimeout(done, 300));
+    job = await ask("GET", `/jobs/${job.id}`);
+  }
+  byId("gather-hint").textContent = job ? `${job.state}: ${job.message}` : "";
+}
+
+window.addEventListener("map-loaded", (e) => act(() => open(e.detail.map, e.detail.landmarks)));
+byId("gather-start").addEventListener("click", () => act(async () => {
+  const landmark = byId("gather-landmark").value || null;
+  state.gathering = await ask("POST", home(), { robot: byId("gather-robot").value, landmark, known: byId("gather-known").checked });
+  state.candidates = [];
+  list();
+  show();
+}));
+byId("gather-stop").addEventListener("click", () => act(async () => {
+  state.gathering = await ask("POST", `${here()}/stop`);
+  await look();
+}));
+byId("gather-look").addEventListener("click", () => act(look));
+byId("gather-accept").addEventListener("click", () => act(accept));
+byId("gather-drop").addEventListener("click", () => act(async () => {
+  await ask("DELETE", here());
+  Object.assign(state, { gathering: null, candidates: [] });
+  list();
+  show();
+}));
+setInterval(() => { refresh().catch(() => {}); }, POLL_MS);
