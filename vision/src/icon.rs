@@ -1,7 +1,11 @@
 //! A quad in, its rectified square picture out (method 4). Grey levels of the source are averaged over each icon
 //! cell. Corner order decides which way is up; nothing here guesses it.
 
-use crate::{detect::quads::Corners, frame::GrayImage, geometry::homography::Homography};
+use crate::{
+    detect::quads::Corners,
+    frame::GrayImage,
+    geometry::{homography::Homography, interpolate::cell},
+};
 use nalgebra::Point2;
 use serde::{Deserialize, Serialize};
 
@@ -238,11 +242,13 @@ fn row_span(points: &[Point2<f64>; 4], v: f64, width: usize) -> Option<(usize, u
 /// Departs from method 4: it takes one sample, and only in cells without any pixel centre. Between one and two source
 /// pixels a cell, averaging the one or two centres that happen to fall in is noisier than sampling.
 const SAMPLES: usize = 2;
+/// What a bilinear sample stands for, in pixels: it weighs what lies within one pixel to either side.
+const SAMPLE_PX: f64 = 1.5;
 /// Most samples along each axis of a cell.
 const MAX_SAMPLES: usize = 4;
 
-/// Grey levels of cells `first`, `first + 1`, ... of `row`, by samples spread over each: two along each axis, or more, up
-/// to four, where a cell is more than two of the image's pixels wide. For the surroundings of an icon.
+/// Grey levels of cells `first`, `first + 1`, ... of `row`, by samples spread over each: as many along each axis as leave
+/// one for every [`SAMPLE_PX`] of the image's pixels, up to four. For the surroundings of an icon.
 pub(crate) fn sample_cells(
     image: &GrayImage,
     image_from_cell: &Homography,
@@ -251,7 +257,7 @@ pub(crate) fn sample_cells(
     pixels_per_cell: f64,
     cells: &mut [f32],
 ) {
-    let samples = (pixels_per_cell.ceil() as usize).clamp(SAMPLES, MAX_SAMPLES);
+    let samples = ((pixels_per_cell / SAMPLE_PX).ceil() as usize).clamp(1, MAX_SAMPLES);
     sample_row(image, image_from_cell, first, row, samples, cells);
 }
 
@@ -289,21 +295,21 @@ fn sampled(image: &GrayImage, map: &Homography, [first, row]: [i32; 2], samples:
             let y = f64::from(row) + spread(i / samples);
             let x = f64::from(first + start) + spread(i % samples);
             let line = [0, 1, 2].map(|r| m[(r, 0)] * x + m[(r, 1)] * y + m[(r, 2)]);
-            let (mut at, mut right, mut down) = ([0; ABREAST], [0; ABREAST], [0; ABREAST]);
+            let (mut at, mut right, mut down) = ([0_u32; ABREAST], [0_u32; ABREAST], [0_u32; ABREAST]);
             let (mut du, mut dv) = ([0.0_f32; ABREAST], [0.0_f32; ABREAST]);
             for k in 0..ABREAST {
                 let step = k as f64;
                 let scale = 1.0 / (line[2] + step * m[(2, 0)]);
                 let u = (((line[0] + step * m[(0, 0)]) * scale) as f32).clamp(0.0, last[0] as f32);
                 let v = (((line[1] + step * m[(1, 0)]) * scale) as f32).clamp(0.0, last[1] as f32);
-                let (column, row) = (u as usize, v as usize);
-                at[k] = row * width + column;
-                right[k] = usize::from(column < last[0]);
-                down[k] = if row < last[1] { width } else { 0 };
-                (du[k], dv[k]) = (u - column as f32, v - row as f32);
+                let ((column, left), (row, above)) = (cell(u), cell(v));
+                at[k] = row * width as u32 + column;
+                right[k] = u32::from(column < last[0] as u32);
+                down[k] = if row < last[1] as u32 { width as u32 } else { 0 };
+                (du[k], dv[k]) = (u - left, v - above);
             }
             for k in 0..ABREAST {
-                let grey = |at: usize| f32::from(data[at]);
+                let grey = |at: u32| f32::from(data[at as usize]);
                 let (above, below) = (at[k], at[k] + down[k]);
                 let top = grey(above) + du[k] * (grey(above + right[k]) - grey(above));
                 let bottom = grey(below) + du[k] * (grey(below + right[k]) - grey(below));

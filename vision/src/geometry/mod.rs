@@ -3,3 +3,4 @@
 pub mod homography;
 pub mod line;
 pub mod polygon;
+pub(crate) mod interpolate;

@@ -9,7 +9,7 @@ use crate::{
     params::Params,
     recognise::{
         IconFeatures,
-        align::{Aligner, Surroundings, Template},
+        align::{Aligner, Lattices, Surroundings, Template},
         content::shown,
         likeness::{Smoothed, likeness},
         signature,
@@ -34,12 +34,12 @@ pub fn refit_thresholds(model: &LandmarkModel, negatives: &[IconFeatures], p: &P
 pub fn add_negatives(model: &LandmarkModel, negatives: &[IconFeatures], p: &Params) -> LandmarkModel {
     let mut model = model.clone();
     let exemplars = model.exemplars.clone();
-    let templates = templates(&exemplars);
+    let templates = Templates::new(&exemplars, p);
     for negative in negatives {
         let d = model.distances(negative, &p.recognise);
         model.correlation_evidence.add(d.correlation);
         model.hausdorff_evidence.add(d.hausdorff);
-        model.likeness_evidence.add(unlikeness(&templates, negative, MIN_SIGNATURE, p));
+        model.likeness_evidence.add(templates.unlikeness(negative, MIN_SIGNATURE));
     }
     let correlation = fitted(&model.correlation_evidence, p.learn.correlation_cap, p);
     let hausdorff = fitted(&model.hausdorff_evidence, p.learn.hausdorff_cap, p);
@@ -82,38 +82,44 @@ pub(super) fn fitted(evidence: &Evidence, cap: f64, p: &Params) -> Result<Thresh
 /// The smallest 1 minus likeness of `icons` to the model's exemplars, one laid on the other: what tau of the likeness is
 /// held by. Infinite where nothing is like it. For naming look-alikes.
 pub fn unlikeness_of(model: &LandmarkModel, icons: &[IconFeatures], p: &Params) -> f64 {
-    let templates = templates(&model.exemplars);
-    icons.iter().map(|icon| unlikeness(&templates, icon, MIN_SIGNATURE, p)).fold(f64::INFINITY, f64::min)
+    let templates = Templates::new(&model.exemplars, p);
+    icons.iter().map(|icon| templates.unlikeness(icon, MIN_SIGNATURE)).fold(f64::INFINITY, f64::min)
 }
 
 /// Negatives whose signatures are less alike are not laid on the exemplars: they count as infinitely far.
 const MIN_SIGNATURE: f32 = 0.45;
 
-pub(super) fn templates(exemplars: &[IconFeatures]) -> Vec<(&IconFeatures, Template<'_>)> {
-    exemplars.iter().map(|e| (e, Template::new(&e.icon, &e.coarse))).collect()
+/// Exemplars on which icons are laid.
+pub(super) struct Templates<'a> {
+    each: Vec<(&'a IconFeatures, Template<'a>)>,
+    lattices: Lattices,
+    p: &'a Params,
 }
 
-/// The smallest 1 minus likeness of `icon` to the exemplars after alignment, of those whose signatures are alike enough.
-pub(super) fn unlikeness(
-    templates: &[(&IconFeatures, Template<'_>)],
-    icon: &IconFeatures,
-    min_signature: f32,
-    p: &Params,
-) -> f64 {
-    let (c, a) = (&p.recognise.correlation, &p.recognise.verdict.align);
-    let aligner = Aligner::new(p.icon.size, c, a);
-    let mut around = None;
-    let mut least = f64::INFINITY;
-    for (exemplar, template) in templates {
-        if signature::likeness(exemplar.signature.values(), icon.signature.values()) < min_signature {
-            continue;
-        }
-        let around = around.get_or_insert_with(|| Surroundings::of_icon(&icon.icon, a));
-        let laid = around.as_ref().and_then(|s| aligner.align(s, template));
-        let laid = laid.as_ref().map_or(&icon.icon, |l| &l.icon);
-        least = least.min(1.0 - likeness(laid, &exemplar.icon, c));
+impl<'a> Templates<'a> {
+    pub(super) fn new(exemplars: &'a [IconFeatures], p: &'a Params) -> Self {
+        let each = exemplars.iter().map(|e| (e, Template::new(&e.icon, &e.coarse))).collect();
+        Self { each, lattices: Lattices::new(p.icon.size, &p.recognise.correlation), p }
     }
-    least
+
+    /// The smallest 1 minus likeness of `icon` to the exemplars after alignment, of those whose signatures are alike
+    /// enough.
+    pub(super) fn unlikeness(&self, icon: &IconFeatures, min_signature: f32) -> f64 {
+        let (c, a) = (&self.p.recognise.correlation, &self.p.recognise.verdict.align);
+        let aligner = Aligner::new(&self.lattices, a);
+        let mut around = None;
+        let mut least = f64::INFINITY;
+        for (exemplar, template) in &self.each {
+            if signature::likeness(exemplar.signature.values(), icon.signature.values()) < min_signature {
+                continue;
+            }
+            let around = around.get_or_insert_with(|| Surroundings::of_icon(&icon.icon, a));
+            let laid = around.as_ref().and_then(|s| aligner.align(s, template));
+            let laid = laid.as_ref().map_or(&icon.icon, |l| &l.icon);
+            least = least.min(1.0 - likeness(laid, &exemplar.icon, c));
+        }
+        least
+    }
 }
 
 /// tau of the likeness: the cap, or a share of the nearest of everything else. None where the greater part of the

@@ -2,7 +2,7 @@
 //! Collecting views, storing models and telling look-alikes apart is the caller's.
 
 use super::{
-    fitting::{refit_thresholds, templates, unlikeness},
+    fitting::{Templates, refit_thresholds},
     gates::{saliency, saliency_f, stable_points, v_c},
     model::{Evidence, LandmarkModel, LearnError, MAX_VIEWS, ModelStatus, View, distances},
     pca::{exemplars, modes},
@@ -65,10 +65,10 @@ const MAX_OWN_LAID: usize = 9;
 /// 1 minus the likeness of the landmark's own icons that are no exemplars, laid on those.
 fn own_unlikeness(icons: &[IconFeatures], chosen: &[usize], p: &Params) -> Vec<f64> {
     let exemplars: Vec<IconFeatures> = chosen.iter().map(|i| icons[*i].clone()).collect();
-    let templates = templates(&exemplars);
+    let templates = Templates::new(&exemplars, p);
     let others: Vec<_> = icons.iter().enumerate().filter(|(i, _)| !chosen.contains(i)).collect();
     let every = others.len().div_ceil(MAX_OWN_LAID).max(1);
-    others.into_iter().step_by(every).map(|(_, icon)| unlikeness(&templates, icon, -1.0, p)).collect()
+    others.into_iter().step_by(every).map(|(_, icon)| templates.unlikeness(icon, -1.0)).collect()
 }
 
 /// Distances (C^r, H^r) of the landmark's own icons, none to a model that holds the icon itself (A19): by folds with

@@ -13,7 +13,7 @@ mod surroundings;
 use super::{correlation::CorrelationParams, harris::blurred};
 use crate::{detect::quads::Corners, icon::Icon};
 use fearless_simd::{Level, dispatch};
-use goal::Goal;
+use goal::{Goal, Levels};
 use lattice::{Lattice, Pattern, SquareMap, sample, square};
 use nalgebra::Point2;
 use serde::{Deserialize, Serialize};
@@ -33,6 +33,10 @@ const LEVELS: usize = 3;
 const SECOND_BORDER_PX: usize = 2;
 /// The same of the coarse look, in its pixels.
 const COARSE_BORDER_PX: usize = 1;
+
+/// A step of less than this is the last of its look, in pixels of that look: the next one goes on from there, the last one
+/// gives the corners.
+const SETTLED_PX: [f64; LEVELS] = [0.08, 0.08, 0.02];
 
 /// Parameters of this stage.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -70,13 +74,14 @@ pub struct Laid {
 pub struct Template<'a> {
     icon: &'a Icon,
     coarse: &'a [f32],
-    goals: [OnceCell<Goal<8>>; 2],
+    second: OnceCell<Goal<8>>,
+    last: OnceCell<Levels>,
 }
 
 impl<'a> Template<'a> {
     /// Takes the icon as it is, and what [`coarse()`] makes of it.
     pub fn new(icon: &'a Icon, coarse: &'a [f32]) -> Self {
-        Self { icon, coarse, goals: Default::default() }
+        Self { icon, coarse, second: OnceCell::new(), last: OnceCell::new() }
     }
 }
 
@@ -88,29 +93,41 @@ pub struct Glance {
     pub alike: f64,
 }
 
-/// How icons of one size are laid on each other.
-#[derive(Debug)]
-pub struct Aligner<'a> {
+/// Where icons of one size are compared at each look. Worked out once, for any number of pictures.
+#[derive(Debug, Clone, Default)]
+pub struct Lattices {
     size: usize,
     min_deviation: f32,
-    per_side: usize,
-    p: &'a AlignParams,
     coarse: Lattice,
-    fine: [OnceCell<Lattice>; 2],
+    second: Lattice,
+    last: Lattice,
 }
 
-impl<'a> Aligner<'a> {
+impl Lattices {
     /// For icons of `size`, cut into buckets as `c` says.
-    pub fn new(size: usize, c: &CorrelationParams, p: &'a AlignParams) -> Self {
-        let per_side = c.per_side();
+    pub fn new(size: usize, c: &CorrelationParams) -> Self {
+        let lattice = |size, border, pattern| Lattice::new(size, c.per_side(), border, pattern);
         Self {
             size,
             min_deviation: c.min_deviation as f32,
-            per_side,
-            p,
-            coarse: Lattice::new(coarse_size(size), per_side, COARSE_BORDER_PX, Pattern::All),
-            fine: Default::default(),
+            coarse: lattice(coarse_size(size), COARSE_BORDER_PX, Pattern::All),
+            second: lattice(size, SECOND_BORDER_PX, Pattern::Fourth),
+            last: lattice(size, 0, Pattern::Half),
         }
+    }
+}
+
+/// How icons are laid on each other.
+#[derive(Debug, Clone, Copy)]
+pub struct Aligner<'a> {
+    on: &'a Lattices,
+    p: &'a AlignParams,
+}
+
+impl<'a> Aligner<'a> {
+    /// Compares on `on`.
+    pub fn new(on: &'a Lattices, p: &'a AlignParams) -> Self {
+        Self { on, p }
     }
 
     /// Lays the picture on `template`. `None` when it is of something else, or says nothing about where it lies.
@@ -120,21 +137,21 @@ impl<'a> Aligner<'a> {
 
     /// The coarse look. `None` when the picture is of something else.
     pub fn glance(&self, around: &Surroundings<'_>, template: &Template<'_>) -> Option<Glance> {
-        let size = coarse_size(self.size);
-        if around.icon.size != self.size
-            || template.icon.size != self.size
+        let size = coarse_size(self.on.size);
+        if around.icon.size != self.on.size
+            || template.icon.size != self.on.size
             || template.coarse.len() != size * size
         {
             return None;
         }
         let picture = around.coarse(self.p);
-        let (lattice, start, limits) = (&self.coarse, square(size), self.limits(size));
+        let (lattice, start, limits) = (&self.on.coarse, square(size), self.limits(0, size));
         let settled: Option<Settled> = dispatch!(Level::new(), _s => {
             let see = |map: &SquareMap, seen: &mut [f32]| sample(picture, map, &lattice.x, &lattice.y, seen);
-            settle(&Goal::<4>::new(lattice, template.coarse, self.min_deviation), lattice, see, start, limits)
+            settle(&Goal::<4>::new(lattice, template.coarse, self.on.min_deviation), lattice, see, start, limits)
         });
         let settled = settled.filter(|s| s.alike >= self.p.min_alike[0])?;
-        let scale = self.size as f64 / size as f64;
+        let scale = self.on.size as f64 / size as f64;
         let corners =
             settled.corners.map(|c| Point2::new((c.x + 0.5) * scale - 0.5, (c.y + 0.5) * scale - 0.5));
         Some(Glance { corners, alike: settled.alike })
@@ -151,9 +168,10 @@ impl<'a> Aligner<'a> {
             return None;
         }
         let corners_px = Corners::new(corners.map(|m| map.apply(&m))).ok()?;
-        let cut = SquareMap::new(self.size, &corners)?;
-        let pixels = dispatch!(Level::new(), _s => whole(&cut, self.size, around.full()));
-        Some(Laid { corners_px, icon: Icon { size: self.size, pixels, source_scale: 1.0 } })
+        let size = self.on.size;
+        let cut = SquareMap::new(size, &corners)?;
+        let pixels = dispatch!(Level::new(), _s => whole(&cut, size, around.full()));
+        Some(Laid { corners_px, icon: Icon { size, pixels, source_scale: 1.0 } })
     }
 
     /// The second look, at surroundings that were smoothed whole.
@@ -163,12 +181,11 @@ impl<'a> Aligner<'a> {
         template: &Template<'_>,
         start: [Point2<f64>; 4],
     ) -> Option<Settled> {
-        let sigma = self.p.sigmas[1];
-        let lattice = self.fine[0]
-            .get_or_init(|| Lattice::new(self.size, self.per_side, SECOND_BORDER_PX, Pattern::Fourth));
-        let (picture, limits) = (around.smooth(sigma), self.limits(self.size));
+        let (sigma, lattice, size) = (self.p.sigmas[1], &self.on.second, self.on.size);
+        let (picture, limits) = (around.smooth(sigma), self.limits(1, size));
         dispatch!(Level::new(), _s => {
-            let goal = template.goals[0].get_or_init(|| self.goal(lattice, template, sigma));
+            let smooth = || blurred(&template.icon.pixels, size, sigma);
+            let goal = template.second.get_or_init(|| Goal::new(lattice, &smooth(), self.on.min_deviation));
             let see = |map: &SquareMap, seen: &mut [f32]| sample(picture, map, &lattice.x, &lattice.y, seen);
             settle(goal, lattice, see, start, limits)
         })
@@ -182,34 +199,31 @@ impl<'a> Aligner<'a> {
         template: &Template<'_>,
         start: [Point2<f64>; 4],
     ) -> Option<Settled> {
-        let sigma = self.p.sigmas[2];
-        let lattice = self.fine[1].get_or_init(|| Lattice::new(self.size, self.per_side, 0, Pattern::Half));
-        let (picture, limits) = (around.full(), self.limits(self.size));
+        let (sigma, lattice, size) = (self.p.sigmas[2], &self.on.last, self.on.size);
+        let (picture, limits) = (around.full(), self.limits(2, size));
         dispatch!(Level::new(), _s => {
-            let goal = template.goals[1].get_or_init(|| self.goal(lattice, template, sigma));
-            let cut = |map: &SquareMap| blurred(&whole(map, self.size, picture), self.size, sigma);
+            let smooth = || blurred(&template.icon.pixels, size, sigma);
+            let levels =
+                template.last.get_or_init(|| Levels::new(lattice, &smooth(), self.on.min_deviation));
+            let cut = |map: &SquareMap| blurred(&whole(map, size, picture), size, sigma);
+            let first = cut(&SquareMap::new(size, &start)?);
+            let own = Goal::<8>::with_slopes_of(lattice, levels, &first);
+            let mut first = Some(first);
             let see = |map: &SquareMap, seen: &mut [f32]| {
-                let cut = cut(map);
+                // Settling begins where the slopes were taken.
+                let cut = first.take().unwrap_or_else(|| cut(map));
                 for (seen, at) in seen.iter_mut().zip(&lattice.at) {
                     *seen = cut[*at as usize];
                 }
             };
-            let own = goal.with_slopes_of(lattice, &cut(&SquareMap::new(self.size, &start)?));
             settle(&own, lattice, see, start, limits)
         })
     }
 
-    #[expect(
-        clippy::inline_always,
-        reason = "an instruction set holds only in what is inlined where it was chosen"
-    )]
-    #[inline(always)]
-    fn goal(&self, lattice: &Lattice, template: &Template<'_>, sigma: f64) -> Goal<8> {
-        Goal::new(lattice, &blurred(&template.icon.pixels, self.size, sigma), self.min_deviation)
-    }
-
-    fn limits(&self, size: usize) -> Limits {
-        Limits { shift_px: self.p.max_shift * size as f64, steps: self.p.steps.min(MAX_STEPS) }
+    /// At an icon of `size`.
+    fn limits(&self, level: usize, size: usize) -> Limits {
+        let (shift_px, steps) = (self.p.max_shift * size as f64, self.p.steps.min(MAX_STEPS));
+        Limits { shift_px, steps, settled_px: SETTLED_PX[level] }
     }
 }
 
@@ -248,8 +262,8 @@ mod tests {
 
     /// Lays what `around` shows on `template`.
     fn aligned(around: &Surroundings<'_>, template: &Icon) -> Option<Laid> {
-        let (c, p) = (CorrelationParams::default(), AlignParams::default());
-        Aligner::new(75, &c, &p).align(around, &Template::new(template, &coarse(template, &p)))
+        let (on, p) = (Lattices::new(75, &CorrelationParams::default()), AlignParams::default());
+        Aligner::new(&on, &p).align(around, &Template::new(template, &coarse(template, &p)))
     }
 
     fn laid(image: &GrayImage, corners: &Corners, template: &Icon) -> Option<Laid> {

@@ -1,7 +1,7 @@
 //! Icon in, sub-pixel Harris points out (method 5). Describing them is the next file's work.
 
+use super::separable::filtered;
 use crate::icon::Icon;
-use fearless_simd::{Level, dispatch};
 use serde::{Deserialize, Serialize};
 
 /// Most points that one icon may have, whatever the parameters say.
@@ -99,7 +99,7 @@ pub fn harris(icon: &Icon, p: &HarrisParams) -> Vec<HarrisPoint> {
 fn response(icon: &Icon, p: &HarrisParams) -> Vec<f32> {
     let size = icon.size;
     let (smooth, slope) = (gaussian(p.sigma_derivative), derivative(p.sigma_derivative));
-    let both = |pixels: &[f32], across: &[f32], down: &[f32]| dispatch!(Level::new(), _s => columns(&rows(pixels, size, across), size, down));
+    let both = |pixels: &[f32], across: &[f32], down: &[f32]| filtered(pixels, size, across, down);
     let gx = both(&icon.pixels, &slope, &smooth);
     let gy = both(&icon.pixels, &smooth, &slope);
     let window = gaussian(p.sigma_integration);
@@ -143,7 +143,7 @@ fn sub_pixel(response: &[f32], size: usize, column: usize, row: usize) -> (f32, 
 /// A square picture of side `size`, smoothed by a Gaussian, border replicated.
 pub(crate) fn blurred(pixels: &[f32], size: usize, sigma: f64) -> Vec<f32> {
     let kernel = gaussian(sigma);
-    dispatch!(Level::new(), _s => columns(&rows(pixels, size, &kernel), size, &kernel))
+    filtered(pixels, size, &kernel, &kernel)
 }
 
 /// Half length of a kernel: four sigma.
@@ -172,46 +172,6 @@ fn bell(x: f64, sigma: f64) -> f64 {
     let s = if sigma > 1e-3 { sigma } else { 1e-3 };
     // Never quite 0, so that a derivative kernel always has a slope.
     (-0.5 * (x / s).powi(2)).exp().max(1e-30)
-}
-
-/// Correlates every row with `kernel`, border replicated.
-#[expect(
-    clippy::inline_always,
-    reason = "an instruction set holds only in what is inlined where it was chosen"
-)]
-#[inline(always)]
-fn rows(image: &[f32], size: usize, kernel: &[f32]) -> Vec<f32> {
-    let r = kernel.len() / 2;
-    let mut out = vec![0.0; image.len()];
-    let mut padded = vec![0.0; size + 2 * r];
-    for (row, line) in image.chunks_exact(size).zip(out.chunks_exact_mut(size)) {
-        padded[..r].fill(row[0]);
-        padded[r..r + size].copy_from_slice(row);
-        padded[r + size..].fill(row[size - 1]);
-        for (i, w) in kernel.iter().enumerate() {
-            for (o, g) in line.iter_mut().zip(&padded[i..i + size]) {
-                *o += w * g;
-            }
-        }
-    }
-    out
-}
-
-/// Correlates every column with `kernel`, border replicated.
-#[expect(clippy::inline_always, reason = "as above")]
-#[inline(always)]
-fn columns(image: &[f32], size: usize, kernel: &[f32]) -> Vec<f32> {
-    let r = kernel.len() / 2;
-    let mut out = vec![0.0; image.len()];
-    for (row, line) in out.chunks_exact_mut(size).enumerate() {
-        for (i, w) in kernel.iter().enumerate() {
-            let source = (row + i).saturating_sub(r).min(size - 1) * size;
-            for (o, g) in line.iter_mut().zip(&image[source..source + size]) {
-                *o += w * g;
-            }
-        }
-    }
-    out
 }
 
 #[cfg(test)]

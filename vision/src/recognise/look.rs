@@ -3,7 +3,7 @@
 
 use super::{
     DistanceKind, IconFeatures, MAX_CANDIDATES, Refusal,
-    align::{Aligner, Surroundings, Template},
+    align::{Aligner, Lattices, Surroundings, Template},
     compare::{Near, Sighting, correlation_as_found, least_hausdorff},
     content::{Content, content},
     correlation::{CorrelationParams, correlation},
@@ -57,11 +57,12 @@ pub(crate) fn look(
     image: &GrayImage,
     sightings: &[Sighting],
     found: &mut [Judged],
+    on: &Lattices,
     p: &Params,
     watch: &mut impl Watch,
 ) {
     let (c, v) = (&p.recognise.correlation, &p.recognise.verdict);
-    let aligner = Aligner::new(p.icon.size, c, &v.align);
+    let aligner = Aligner::new(on, &v.align);
     let mut surroundings: Vec<Option<Option<Surroundings<'_>>>> = sightings.iter().map(|_| None).collect();
     let least = found.first().map_or(0.0, |f| f.near.signature - v.signature_gap).max(v.min_signature);
     for Judged { near, moved, contradicting, content: beyond } in found.iter_mut() {
@@ -118,10 +119,11 @@ pub(crate) fn verify(
     sightings: &[Sighting],
     found: &mut [Judged],
     kind: DistanceKind,
+    on: &Lattices,
     p: &Params,
 ) {
     let v = &p.recognise.verdict;
-    let aligner = Aligner::new(p.icon.size, &p.recognise.correlation, &v.align);
+    let aligner = Aligner::new(on, &v.align);
     for judged in found.iter_mut().filter(|j| j.near.ratio(kind) < v.verify_reach).take(v.max_verified) {
         let sighting = &sightings[judged.near.sighting];
         let Some((icon, corners_px)) = laid_on(image, sighting, &judged.near, &aligner, p) else { continue };

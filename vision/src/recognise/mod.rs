@@ -1,5 +1,6 @@
 //! From icon to verdict: points, descriptors, two distances, candidates, confidence (method 5, 6, 10).
 
+mod separable;
 pub mod harris;
 pub mod descriptor;
 pub mod correlation;

@@ -3,6 +3,7 @@
 
 use super::{
     LandmarkId,
+    align::Lattices,
     signature::{SIGNATURE_BYTES, Signature, likeness},
 };
 use crate::{learn::model::LandmarkModel, params::Params};
@@ -48,6 +49,8 @@ pub struct ModelSet {
     signatures: Vec<[i8; SIGNATURE_BYTES]>,
     /// Whose each signature is: index of the model and of its exemplar.
     owners: Vec<(u32, u8)>,
+    /// Where pictures are compared with the exemplars that they are laid on.
+    lattices: Arc<Lattices>,
 }
 
 /// Longest short list.
@@ -85,7 +88,8 @@ impl ModelSet {
         };
         let signatures = exemplars().map(|(_, _, exemplar)| *exemplar.signature.values()).collect();
         let owners = exemplars().map(|(m, e, _)| (m as u32, e as u8)).collect();
-        Ok(Self { models, params_hash: expected, signatures, owners })
+        let lattices = Arc::new(Lattices::new(p.icon.size, &p.recognise.correlation));
+        Ok(Self { models, params_hash: expected, signatures, owners, lattices })
     }
 
     /// Number of landmarks (N).
@@ -148,6 +152,11 @@ impl ModelSet {
     /// The model at `index` of [`ModelSet::iter`].
     pub fn at(&self, index: usize) -> Option<&Arc<LandmarkModel>> {
         self.models.get(index)
+    }
+
+    /// For laying pictures on exemplars.
+    pub(crate) fn lattices(&self) -> &Lattices {
+        &self.lattices
     }
 
     /// Memory that the set and its models take, in bytes.

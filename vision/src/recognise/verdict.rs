@@ -128,9 +128,9 @@ pub fn recognise_watched(
         .map(|near| Judged { near, moved: None, contradicting: 0.0, content: Content::NONE })
         .collect();
     match kind {
-        DistanceKind::Both => look(image, &sightings, &mut found, p, watch),
+        DistanceKind::Both => look(image, &sightings, &mut found, models.lattices(), p, watch),
         DistanceKind::Correlation | DistanceKind::Hausdorff => {
-            verify(image, &sightings, &mut found, kind, p);
+            verify(image, &sightings, &mut found, kind, models.lattices(), p);
             watch.finished(Step::Alignment);
         }
     }

@@ -32,111 +32,138 @@ pub(super) struct Bucket<const D: usize> {
     pub(super) level: SVector<f64, D>,
 }
 
-/// How a point moves along x and y with each way to move, left, right, top, bottom side or x and y of TL, TR, BR, BL: the
-/// derivative of the homography, exact at the square itself. Moving one corner alone also bends lines, so it moves
-/// points along the other axis, too.
+/// A picture's grey levels on a lattice, of mean 0 and norm 1 in every bucket.
+#[derive(Debug, Clone)]
+pub(super) struct Levels {
+    /// Zeros for padding and for buckets with nothing to see.
+    values: Vec<f32>,
+    /// Buckets in which there is something to see, and what their grey levels were divided by.
+    buckets: Vec<(Cells, f32)>,
+}
+
+impl Levels {
+    /// Of the smoothed icon `smooth`. A bucket whose grey levels deviate by less than `min_deviation` says nothing.
+    #[inline(always)]
+    pub(super) fn new(lattice: &Lattice, smooth: &[f32], min_deviation: f32) -> Self {
+        let mut values: Vec<f32> = lattice.at.iter().map(|at| smooth[*at as usize]).collect();
+        let mut buckets = Vec::with_capacity(lattice.buckets.len());
+        for cells in &lattice.buckets {
+            let own = &mut values[cells.start..cells.end];
+            let real = &lattice.real[cells.start..cells.end];
+            buckets.extend(normalise(own, real, cells.count, min_deviation).map(|norm| (*cells, norm)));
+        }
+        Self { values, buckets }
+    }
+}
+
+/// How points move with the corners: left, right, top, bottom side along their normals, or x and y of TL, TR, BR, BL.
+/// The derivative of the homography, exact at the square itself. In: slopes along x and along y of [`LANES`] pixels at
+/// `s` and `t` of the way across and down. Out: their change with each way to move.
 #[inline(always)]
-fn moves<const D: usize>(s: f32, t: f32) -> [[f32; 2]; D] {
-    let mut all = [[0.0; 2]; D];
-    if D == 4 {
-        all.copy_from_slice(&[[1.0 - s, 0.0], [s, 0.0], [0.0, 1.0 - t], [0.0, t]]);
-        return all;
+fn moved<const D: usize>([gx, gy]: [[f32; LANES]; 2], s: [f32; LANES], t: [f32; LANES]) -> [[f32; LANES]; D] {
+    let mut ways = [[0.0; LANES]; D];
+    for i in 0..LANES {
+        let (s, t, gx, gy) = (s[i], t[i], gx[i], gy[i]);
+        if D == 4 {
+            let [left, right, top, bottom] = [(1.0 - s) * gx, s * gx, (1.0 - t) * gy, t * gy];
+            (ways[0][i], ways[1][i], ways[2][i], ways[3][i]) = (left, right, top, bottom);
+            continue;
+        }
+        let corners = [(1.0 - s) * (1.0 - t), s * (1.0 - t), s * t, (1.0 - s) * t];
+        // Moving one corner alone also bends lines, so it moves points along the other axis, too.
+        let (bend_x, bend_y) = (s * (1.0 - s) * gx, t * (1.0 - t) * gy);
+        for (k, along) in corners.into_iter().enumerate() {
+            let sign = if k % 2 == 0 { -1.0 } else { 1.0 };
+            ways[2 * k][i] = along * gx + sign * bend_y;
+            ways[2 * k + 1][i] = along * gy + sign * bend_x;
+        }
     }
-    let corners = [(1.0 - s) * (1.0 - t), s * (1.0 - t), s * t, (1.0 - s) * t];
-    let bend = [s * (1.0 - s), t * (1.0 - t)];
-    for (i, way) in all.iter_mut().enumerate() {
-        let sign = if (i / 2) % 2 == 0 { -1.0 } else { 1.0 };
-        let (along, across) = (corners[(i / 2) % 4], sign * bend[1 - i % 2]);
-        *way = if i % 2 == 0 { [along, across] } else { [across, along] };
-    }
-    all
+    ways
 }
 
 impl<const D: usize> Goal<D> {
     /// Of the smoothed icon `smooth`. A bucket whose grey levels deviate by less than `min_deviation` says nothing.
     #[inline(always)]
     pub(super) fn new(lattice: &Lattice, smooth: &[f32], min_deviation: f32) -> Self {
-        let mut values = vec![0.0; lattice.len()];
-        let mut goal = Self {
-            values: vec![],
-            buckets: vec![],
-            slopes: std::array::from_fn(|_| vec![0.0; lattice.len()]),
-        };
-        for cells in &lattice.buckets {
-            let at = &lattice.at[cells.start..cells.end];
-            let own = &mut values[cells.start..cells.end];
-            for (value, at) in own.iter_mut().zip(at) {
-                *value = smooth[*at as usize];
-            }
-            let Some(norm) =
-                normalise(own, &lattice.real[cells.start..cells.end], cells.count, min_deviation)
-            else {
-                continue;
-            };
-            goal.add_slopes(lattice, smooth, *cells, &values, norm);
-            goal.buckets.push(Bucket { cells: *cells, normal: SMatrix::zeros(), level: SVector::zeros() });
-        }
-        goal.values = values;
-        goal.multiply();
-        goal
+        let levels = Levels::new(lattice, smooth, min_deviation);
+        Self::with_slopes(lattice, &levels, &levels, smooth)
     }
 
-    /// The same goal with the slopes of `smooth`, the picture itself as it lies now, instead of the template's: those
-    /// would pull where one of the two is softer.
+    /// `levels` with the slopes of `smooth`, the picture itself as it lies now, instead of the template's: those would
+    /// pull where one of the two is softer.
     #[inline(always)]
-    pub(super) fn with_slopes_of(&self, lattice: &Lattice, smooth: &[f32]) -> Self {
-        let theirs = Self::new(lattice, smooth, 0.0);
-        let mut goal =
-            Self { values: self.values.clone(), buckets: self.buckets.clone(), slopes: theirs.slopes };
-        goal.multiply();
-        goal
+    pub(super) fn with_slopes_of(lattice: &Lattice, levels: &Levels, smooth: &[f32]) -> Self {
+        Self::with_slopes(lattice, levels, &Levels::new(lattice, smooth, 0.0), smooth)
     }
 
-    /// Slopes of one bucket, whose normalised grey levels and norm are known.
+    /// Slopes of `smooth`, whose grey levels are `own`.
     #[inline(always)]
-    fn add_slopes(&mut self, lattice: &Lattice, smooth: &[f32], cells: Cells, values: &[f32], norm: f32) {
-        let size = lattice.size;
-        let (scale, part) = (1.0 / size as f32, cells.start..cells.end);
-        for i in part.clone() {
-            let at = lattice.at[i] as usize;
-            let (x, y) = (at % size, at / size);
-            let (left, right) = (usize::from(x > 0), usize::from(x + 1 < size));
-            let (up, down) = (usize::from(y > 0), usize::from(y + 1 < size));
-            let real = lattice.real[i] / norm;
-            let gx = real * (smooth[at + right] - smooth[at - left]) / (left + right) as f32;
-            let gy = real * (smooth[at + down * size] - smooth[at - up * size]) / (up + down) as f32;
-            let ways = moves::<D>((x as f32 + 0.5) * scale, (y as f32 + 0.5) * scale);
-            for (slope, [dx, dy]) in self.slopes.iter_mut().zip(ways) {
-                slope[i] = dx * gx + dy * gy;
-            }
+    fn with_slopes(lattice: &Lattice, levels: &Levels, own: &Levels, smooth: &[f32]) -> Self {
+        let mut slopes = std::array::from_fn(|_| vec![0.0; lattice.len()]);
+        for (cells, norm) in &own.buckets {
+            add_slopes(&mut slopes, lattice, smooth, *cells, &own.values, *norm);
         }
-        let (values, real) = (&values[part.clone()], &lattice.real[part.clone()]);
-        for slope in &mut self.slopes {
-            let slope = &mut slope[part.clone()];
-            let mean = dot(slope, real) / cells.count as f32;
-            // What only scales the grey levels is lost when they are normalised.
-            let along = dot(slope, values);
-            for ((s, v), r) in slope.iter_mut().zip(values).zip(real) {
-                *s -= mean * r + along * v;
-            }
+        let of = |(cells, _): &(Cells, f32)| Bucket::new(*cells, &levels.values, &slopes);
+        let buckets = levels.buckets.iter().map(of).collect();
+        Self { values: levels.values.clone(), buckets, slopes }
+    }
+}
+
+/// Slopes of one bucket, whose normalised grey levels and norm are known.
+#[inline(always)]
+fn add_slopes<const D: usize>(
+    slopes: &mut [Vec<f32>; D],
+    lattice: &Lattice,
+    smooth: &[f32],
+    cells: Cells,
+    values: &[f32],
+    norm: f32,
+) {
+    let scale = 1.0 / lattice.size as f32;
+    for start in (cells.start..cells.end).step_by(LANES) {
+        let (mut g, mut s, mut t) = ([[0.0; LANES]; 2], [0.0; LANES], [0.0; LANES]);
+        for i in 0..LANES {
+            let of = |list: &[u32]| smooth[list[start + i] as usize];
+            let [left, right, above, below] = &lattice.beside;
+            let real = lattice.real[start + i] / norm;
+            g[0][i] = real * (of(right) - of(left)) * lattice.per_px[0][start + i];
+            g[1][i] = real * (of(below) - of(above)) * lattice.per_px[1][start + i];
+            s[i] = (lattice.x[start + i] + 0.5) * scale;
+            t[i] = (lattice.y[start + i] + 0.5) * scale;
+        }
+        for (slope, way) in slopes.iter_mut().zip(moved::<D>(g, s, t)) {
+            slope[start..start + LANES].copy_from_slice(&way);
         }
     }
+    let part = cells.start..cells.end;
+    let (values, real) = (&values[part.clone()], &lattice.real[part.clone()]);
+    for slope in slopes {
+        let slope = &mut slope[part.clone()];
+        let mean = dot(slope, real) / cells.count as f32;
+        // What only scales the grey levels is lost when they are normalised.
+        let along = dot(slope, values);
+        for ((s, v), r) in slope.iter_mut().zip(values).zip(real) {
+            *s -= mean * r + along * v;
+        }
+    }
+}
 
+impl<const D: usize> Bucket<D> {
     /// Works out the products.
     #[inline(always)]
-    fn multiply(&mut self) {
-        for bucket in &mut self.buckets {
-            let part = bucket.cells.start..bucket.cells.end;
-            for i in 0..D {
-                let slope = &self.slopes[i][part.clone()];
-                bucket.level[i] = f64::from(dot(slope, &self.values[part.clone()]));
-                for j in 0..=i {
-                    let product = f64::from(dot(slope, &self.slopes[j][part.clone()]));
-                    bucket.normal[(i, j)] = product;
-                    bucket.normal[(j, i)] = product;
-                }
+    fn new(cells: Cells, values: &[f32], slopes: &[Vec<f32>; D]) -> Self {
+        let part = cells.start..cells.end;
+        let mut bucket = Self { cells, normal: SMatrix::zeros(), level: SVector::zeros() };
+        for i in 0..D {
+            let slope = &slopes[i][part.clone()];
+            bucket.level[i] = f64::from(dot(slope, &values[part.clone()]));
+            for (j, other) in slopes.iter().enumerate().take(i + 1) {
+                let product = f64::from(dot(slope, &other[part.clone()]));
+                bucket.normal[(i, j)] = product;
+                bucket.normal[(j, i)] = product;
             }
         }
+        bucket
     }
 }
 
@@ -167,11 +194,14 @@ pub(super) fn dot(a: &[f32], b: &[f32]) -> f32 {
             sums[i] += x[i] * y[i];
         }
     }
-    let mut half = [0.0_f32; LANES / 2];
-    for i in 0..LANES / 2 {
-        half[i] = sums[i] + sums[i + LANES / 2];
+    let mut width = LANES / 2;
+    while width > 0 {
+        for i in 0..width {
+            sums[i] += sums[i + width];
+        }
+        width /= 2;
     }
-    half.iter().sum()
+    sums[0]
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@
 )]
 
 use super::super::correlation::LANES;
+use crate::geometry::interpolate::cell;
 use nalgebra::Point2;
 
 /// Fewest points of a bucket that says anything.
@@ -26,7 +27,7 @@ pub(super) enum Pattern {
 }
 
 /// The pixels of all buckets, one bucket after the other, each padded to a multiple of [`LANES`] with its last pixel.
-#[derive(Debug)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Lattice {
     /// Side of the icon.
     pub(super) size: usize,
@@ -38,6 +39,10 @@ pub(super) struct Lattice {
     pub(super) y: Vec<f32>,
     /// Index into the icon.
     pub(super) at: Vec<u32>,
+    /// The same of the pixels to the left, right, above and below, on the border the pixel itself...
+    pub(super) beside: [Vec<u32>; 4],
+    /// ... and what their difference along x and along y is multiplied by to be a slope.
+    pub(super) per_px: [Vec<f32>; 2],
     /// 1 for pixels, 0 for padding.
     pub(super) real: Vec<f32>,
 }
@@ -66,6 +71,8 @@ impl Lattice {
             x: vec![],
             y: vec![],
             at: vec![],
+            beside: Default::default(),
+            per_px: Default::default(),
             real: vec![],
         };
         for i in 0..per_side * per_side {
@@ -87,6 +94,17 @@ impl Lattice {
             self.x.push(*x as f32);
             self.y.push(*y as f32);
             self.at.push((y * self.size + x) as u32);
+            let last = self.size - 1;
+            let (left, right) = (x.saturating_sub(1), (x + 1).min(last));
+            let (above, below) = (y.saturating_sub(1), (y + 1).min(last));
+            for (list, (x, y)) in
+                self.beside.iter_mut().zip([(left, *y), (right, *y), (*x, above), (*x, below)])
+            {
+                list.push((y * self.size + x) as u32);
+            }
+            for (list, px) in self.per_px.iter_mut().zip([right - left, below - above]) {
+                list.push(1.0 / px.max(1) as f32);
+            }
         }
         self.real.extend(std::iter::repeat_n(1.0, count).chain(std::iter::repeat_n(0.0, padding)));
         self.buckets.push(Cells { start, end: self.x.len(), count });
@@ -151,19 +169,19 @@ pub(super) fn sample(picture: Picture<'_>, map: &SquareMap, x: &[f32], y: &[f32]
     let (offset, last) = (margin as f32, (width - 1) as f32 - 1e-3);
     let (xs, ys) = (x.as_chunks::<LANES>().0, y.as_chunks::<LANES>().0);
     for ((x, y), seen) in xs.iter().zip(ys).zip(seen.as_chunks_mut::<LANES>().0) {
-        let (mut at, mut dx, mut dy) = ([0_i32; LANES], [0.0_f32; LANES], [0.0_f32; LANES]);
+        let (mut at, mut dx, mut dy) = ([0_u32; LANES], [0.0_f32; LANES], [0.0_f32; LANES]);
         for i in 0..LANES {
             let scale = 1.0 / (m[6] * x[i] + m[7] * y[i] + m[8]);
             // A NaN is no place: it ends as pixel 0, and its grey level as NaN.
             let u = ((m[0] * x[i] + m[1] * y[i] + m[2]) * scale + offset).clamp(0.0, last);
             let v = ((m[3] * x[i] + m[4] * y[i] + m[5]) * scale + offset).clamp(0.0, last);
-            let (column, row) = (u as i32, v as i32);
-            (at[i], dx[i], dy[i]) = (row * width as i32 + column, u - column as f32, v - row as f32);
+            let ((column, left), (row, above)) = (cell(u), cell(v));
+            (at[i], dx[i], dy[i]) = (row * width as u32 + column, u - left, v - above);
         }
         for i in 0..LANES {
-            let above = at[i] as usize;
-            let (a, b) = (&pixels[above..above + 2], &pixels[above + width..above + width + 2]);
-            let (top, bottom) = (a[0] + dx[i] * (a[1] - a[0]), b[0] + dx[i] * (b[1] - b[0]));
+            let four = &pixels[at[i] as usize..][..width + 2];
+            let [a, b, c, d] = [four[0], four[1], four[width], four[width + 1]];
+            let (top, bottom) = (a + dx[i] * (b - a), c + dx[i] * (d - c));
             seen[i] = top + dy[i] * (bottom - top);
         }
     }

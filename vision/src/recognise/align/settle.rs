@@ -12,8 +12,8 @@ use super::{
 };
 use nalgebra::{Const, DimMin, Point2, SMatrix, SVector, Vector2};
 
-/// A step of less than this, in pixels of the icon, is the last of its level.
-const LAST_STEP_PX: f64 = 0.02;
+/// A step that brings nothing is not tried again, shorter, if it was less than so many times [`Limits::settled_px`].
+const HARDLY_WRONG: f64 = 5.0;
 /// Share of the mean diagonal element that is added to each.
 const LEAST_DAMPING: f64 = 1e-3;
 /// A step that brings nothing although it is held back by more is given up.
@@ -33,6 +33,8 @@ pub(super) struct Limits {
     /// From their own corner of the square, in pixels of the icon, along either axis.
     pub(super) shift_px: f64,
     pub(super) steps: usize,
+    /// A step of less than this, in pixels of the icon, is the last.
+    pub(super) settled_px: f64,
 }
 
 /// Moves the corners of the icon from `start` on; `see` reads the picture at the lattice's points under a map. `None` when nothing says where.
@@ -61,16 +63,17 @@ where
         let moved: [Point2<f64>; 4] = std::array::from_fn(|i| map.apply(&(square[i] + step[i])));
         let shift = moved.iter().zip(&square).map(|(m, s)| (m - s).amax()).fold(0.0, f64::max);
         let next = (shift <= limits.shift_px).then(|| SquareMap::new(lattice.size, &moved)).flatten();
+        let length_px = step.iter().map(Vector2::amax).fold(0.0, f64::max);
         let next = next.map(|m| (m, Equations::new(goal, lattice, &mut see, &m, here.likeness, &mut seen)));
         match next {
             Some((there, equations)) if equations.likeness > here.likeness => {
                 (map, corners, here) = (there, moved, equations);
                 damping = LEAST_DAMPING.max(damping / 10.0);
-                if step.iter().all(|s| s.amax() < LAST_STEP_PX) {
+                if length_px < limits.settled_px {
                     break;
                 }
             }
-            _ if damping > MOST_DAMPING => break,
+            _ if damping > MOST_DAMPING || length_px < HARDLY_WRONG * limits.settled_px => break,
             _ => damping *= 10.0,
         }
     }
