@@ -1,12 +1,13 @@
-//! One pose from odometry and landmark fixes, in the order of capture, late ones included (method 15).
+//! One pose from odometry and fixes by landmarks and scans, in the order of capture, late ones included (method 15).
 //!
 //! In: odometry and fixes with their capture times. Out: the fused pose with covariance, or none before the first fix
-//! and after odometry has jumped. Errors that last (a landmark's place, the mounting) are part of the state: a hundred
-//! fixes on one landmark do not make its place better known than the map says. So are a wrong scale of odometry and a
+//! and after odometry has jumped. Scans only correct; a pose begins with landmarks. Errors that last (a landmark's place,
+//! the mounting, the walls) are part of the state: a hundred fixes on one landmark do not make its place better known
+//! than the map says. So are a wrong scale of odometry and a
 //! steady turn: the robot learns its own between landmarks.
 
 mod filter;
-pub use filter::{MAX_NUISANCES, OdometryErrors};
+pub use filter::{MAX_NUISANCES, MAX_SOURCES, OdometryErrors};
 
 use crate::{
     check::{self, OutOfRange},
@@ -58,7 +59,8 @@ pub struct FuseParams {
     /// Departs from method 15, where five fixes gated out mark their source as failed: odometry drifts, landmarks do
     /// not, so agreeing landmarks win.
     pub reset_landmarks: usize,
-    /// A fix on the same landmarks is new only after this motion: from the same place its errors are the same.
+    /// A fix on the same landmarks, or another scan, is new only after this motion: from the same place its errors are
+    /// the same.
     ///
     /// Departs from method 15, which applies every fix.
     pub min_move_m: f64,
@@ -114,8 +116,10 @@ pub struct FusedPose {
     pub at_ns: i64,
     /// `map_from_robot`.
     pub pose: Pose2Covariance,
-    /// Fixes applied since the start.
+    /// Fixes by landmarks applied since the start.
     pub corrections: u64,
+    /// Scans applied since the start.
+    pub laser_corrections: u64,
     /// Fixes in a row that contradict it: above 0 it deserves doubt.
     pub contradictions: u32,
 }
@@ -151,8 +155,10 @@ pub enum FixOutcome {
     },
     /// It was the last of a row of contradictions that agree, and replaced the pose.
     Reset,
-    /// Nothing new: the same landmarks from the same place.
+    /// Nothing new: the same landmarks, or the laser, from the same place.
     Repeated,
+    /// A scan while there was no pose to correct.
+    NoPose,
     /// Older than the replay window.
     TooOld,
     /// Newer than the last odometry: it will be applied when that arrives.
@@ -209,7 +215,8 @@ impl Fuser {
     pub fn pose(&self) -> Option<FusedPose> {
         let (at_ns, pose) = (self.now_ns?, self.now.pose()?);
         let (corrections, contradictions) = (self.now.corrections, self.now.doubts());
-        Some(FusedPose { at_ns, pose, corrections, contradictions })
+        let laser_corrections = self.now.laser_corrections;
+        Some(FusedPose { at_ns, pose, corrections, laser_corrections, contradictions })
     }
 
     /// What is known of the odometry's lasting errors; none before the first pose.
@@ -219,6 +226,9 @@ impl Fuser {
 
     /// The pose at a time within the window, by what was known before it: the prior for a frame.
     pub fn pose_at(&self, at_ns: i64) -> Option<Pose2Covariance> {
+        if self.now_ns == Some(at_ns) && self.events.last().is_none_or(|(t, _)| *t <= at_ns) {
+            return self.now.pose();
+        }
         let (mut filter, mut filter_ns) = (self.anchor.clone(), self.anchor_ns);
         let end = self.events.partition_point(|(t, _)| *t <= at_ns);
         for i in 0..end {
@@ -399,3 +409,5 @@ fn reach(
 mod tests;
 #[cfg(test)]
 mod drive;
+#[cfg(test)]
+mod laser_drive;

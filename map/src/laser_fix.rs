@@ -5,16 +5,13 @@
 use crate::{
     check::{self, MAX_VARIANCE, OutOfRange},
     laser::Scan,
-    localise::{DecidedBy, Fix},
+    localise::{DecidedBy, Fix, Modality, Nuisance, NuisanceKey},
     pose2::{Pose2, Pose2Covariance},
     segments::LaserSegment,
-    slam::{
-        align::with_floor,
-        cloud::{Cloud, CloudParams, cloud},
-    },
+    slam::cloud::{Cloud, CloudParams, cloud},
     walls::local,
 };
-use nalgebra::{Matrix2, Matrix3, Matrix3x2, Point2, SymmetricEigen, Vector2, Vector3};
+use nalgebra::{Matrix2, Matrix3, Matrix3x2, Matrix3x6, Matrix6, Point2, SymmetricEigen, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
 /// Most walls of a map that is localised in; later ones are left out.
@@ -27,6 +24,15 @@ const MAX_ENTRIES: usize = 1 << 23;
 const MAX_POINTS: usize = 360;
 /// Variance that stands for "the walls do not tell": (100 m)^2, and (pi)^2 for the heading.
 const UNKNOWN: [f64; 3] = [1e4, 1e4, 10.0];
+/// A pose known less well than this along some direction is not known there: what walls wrong by a centimetre say of a
+/// direction that they hardly show is mostly their own error.
+const LEAST_M: f64 = 1.0;
+/// How many metres a radian weighs as much as.
+const LEVER_M: f64 = 3.0;
+/// Walls whose own errors a fix names one by one: those that move it most.
+const NAMED_WALLS: usize = 6;
+/// Side of the squares of floor in which all other walls err alike.
+const AREA_M: f64 = 10.0;
 
 /// Knobs of localisation in walls.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -94,6 +100,10 @@ impl Default for LaserFixParams {
 pub struct LaserFix {
     /// `map_from_robot`, without the prior: along what the walls do not tell its variance is some 100 m.
     pub pose: Pose2Covariance,
+    /// The part of its covariance that is new in every scan; the rest is the walls' own and lasts.
+    pub noise: Matrix3<f64>,
+    /// The walls that move it most.
+    pub walls: Vec<WallPart>,
     /// Share of the scan's flat points on a wall.
     pub matched: f64,
     /// How many points that are.
@@ -103,17 +113,60 @@ pub struct LaserFix {
 }
 
 impl LaserFix {
-    /// For [`crate::fuse::Fuser::fix`]: rests on no landmark, and cannot start or replace a pose by itself.
+    /// For [`crate::fuse::Fuser::fix`]: rests on no landmark, and cannot start or replace a pose by itself. What walls
+    /// are wrong by lasts: each of the most important is named, the others count as one about a place.
     pub fn fix(&self) -> Fix {
+        let named = self.walls.iter().map(|part| {
+            let mut jacobian = Matrix3x6::zeros();
+            jacobian.fixed_columns_mut::<2>(0).copy_from(&part.by_wall);
+            let mut covariance = Matrix6::zeros();
+            covariance.fixed_view_mut::<2, 2>(0, 0).copy_from(&part.covariance);
+            Nuisance { key: NuisanceKey::Wall(part.wall), jacobian, covariance }
+        });
+        let mut jacobian = Matrix3x6::zeros();
+        jacobian.fixed_columns_mut::<3>(0).copy_from(&self.by_others());
+        let mut covariance = Matrix6::zeros();
+        covariance.fixed_view_mut::<3, 3>(0, 0).fill_with_identity();
+        let square = |v: f64| (v / AREA_M).floor() as i32;
+        let key = NuisanceKey::Walls(square(self.pose.pose.x_m), square(self.pose.pose.y_m));
+        let others = Nuisance { key, jacobian, covariance };
         Fix {
+            modality: Modality::Laser,
             pose: self.pose,
-            noise: self.pose.covariance,
-            nuisances: Vec::new(),
+            noise: self.noise,
+            nuisances: named.chain([others]).collect(),
             landmarks: Vec::new(),
             decided_by: DecidedBy::Prior,
             chi2: 0.0,
             dof: self.points.saturating_sub(3),
         }
+    }
+
+    /// The root of what lasts of the covariance and is not of the named walls.
+    fn by_others(&self) -> Matrix3<f64> {
+        let named: Matrix3<f64> = self.walls.iter().map(WallPart::spread).sum();
+        let eigen = SymmetricEigen::new(self.pose.covariance - self.noise - named);
+        let root = eigen.eigenvalues.map(|v| v.max(0.0).sqrt());
+        eigen.eigenvectors * Matrix3::from_diagonal(&root) * eigen.eigenvectors.transpose()
+    }
+}
+
+/// What the error of one wall does to a fix.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WallPart {
+    /// Names the wall by its place: the same in every scan and in every version of a map that keeps it.
+    pub wall: u64,
+    /// Derivative of (x, y, theta) by the wall's (direction, offset) about its middle.
+    pub by_wall: Matrix3x2<f64>,
+    /// Covariance of those.
+    pub covariance: Matrix2<f64>,
+}
+
+impl WallPart {
+    /// Its part of the fix's covariance.
+    fn spread(&self) -> Matrix3<f64> {
+        let all = self.by_wall * self.covariance * self.by_wall.transpose();
+        0.5 * (all + all.transpose())
     }
 }
 
@@ -158,8 +211,9 @@ struct Ready {
     along: Vector2<f64>,
     normal: Vector2<f64>,
     length_m: f64,
-    /// Information of (direction, offset) about the middle.
-    information: Matrix2<f64>,
+    /// Covariance of (direction, offset) about the middle.
+    covariance: Matrix2<f64>,
+    name: u64,
 }
 
 impl WallIndex {
@@ -168,9 +222,8 @@ impl WallIndex {
         let ready = |s: &LaserSegment| {
             let middle = nalgebra::center(&s.a, &s.b);
             let (_, covariance) = local(s, &middle);
-            let floor = Matrix2::new(1e-8, 0.0, 0.0, 1e-8);
-            let information = (covariance + floor).try_inverse().unwrap_or_else(Matrix2::zeros);
-            Ready { a: s.a, along: s.direction(), normal: s.facing(), length_m: s.length_m(), information }
+            let (a, along, normal, length_m) = (s.a, s.direction(), s.facing(), s.length_m());
+            Ready { a, along, normal, length_m, covariance, name: name(s) }
         };
         let walls: Vec<Ready> = walls.into_iter().take(MAX_WALLS).map(ready).collect();
         let (mut low, mut high) = (Point2::new(f64::MAX, f64::MAX), Point2::new(f64::MIN, f64::MIN));
@@ -381,36 +434,69 @@ fn descend(walls: &WallIndex, seen: &Cloud, start: &Pose2, p: &LaserFixParams) -
     let weights: f64 = points.iter().map(|m| m.weight).sum();
     let squares: f64 = points.iter().map(|m| m.weight * m.residual * m.residual).sum();
     let variance = (squares / weights.max(1e-9)).max(p.sigma_m * p.sigma_m);
-    let information = information(walls, &points, 1.0 / (p.correlated.max(1.0) * variance));
-    let covariance = spread(&with_floor(&information, p.floor))?;
+    let scale = 1.0 / (p.correlated.max(1.0) * variance);
+    let told = points.iter().fold(Matrix3::zeros(), |h, m| h + m.j * m.j.transpose() * (scale * m.weight));
+    let spread = spread(&told)?;
+    let [floor_m, floor_rad] = p.floor.map(|sigma| sigma * sigma);
+    let floor = Matrix3::from_diagonal(&Vector3::new(floor_m, floor_m, floor_rad));
+    let mut parts = by_walls(walls, &points, &(spread * scale));
+    let all = |parts: &[WallPart]| parts.iter().map(WallPart::spread).sum::<Matrix3<f64>>();
+    let (known, unknown) = known(&(spread + all(&parts) + floor));
+    let noise = known * spread * known.transpose() + unknown;
+    for part in &mut parts {
+        part.by_wall = known * part.by_wall;
+    }
+    let covariance = noise + floor + all(&parts);
+    parts.truncate(NAMED_WALLS);
     let (count, flat) = (points.len(), seen.points.len());
     let pose = Pose2Covariance { pose, covariance };
     pose.check().ok()?;
     let matched = count as f64 / flat.max(1) as f64;
-    Some(LaserFix { pose, matched, points: count, rms_m: variance.sqrt() })
+    Some(LaserFix { pose, noise, walls: parts, matched, points: count, rms_m: variance.sqrt() })
 }
 
-/// What the points say of the pose, each wall's own error integrated out: a hundred points on one wall do not make its
-/// place better known than the map says.
-fn information(walls: &WallIndex, points: &[Matched], scale: f64) -> Matrix3<f64> {
+/// What the walls' own errors do to the pose that the points gave, each carried through the fit; the greatest first. A
+/// hundred points on one wall do not make its place better known than the map says.
+fn by_walls(walls: &WallIndex, points: &[Matched], gain: &Matrix3<f64>) -> Vec<WallPart> {
     let mut order: Vec<usize> = (0..points.len()).collect();
     order.sort_by_key(|&i| points[i].wall);
-    let mut all = Matrix3::zeros();
+    let mut parts = Vec::new();
     for group in order.chunk_by(|&a, &b| points[a].wall == points[b].wall) {
         let Some(&first) = group.first() else { continue };
-        let (mut h, mut c) = (Matrix3::zeros(), Matrix3x2::zeros());
-        let mut own = walls.walls[points[first].wall].information;
+        let mut pull = Matrix3x2::zeros();
         for &i in group {
             let m = &points[i];
             // Both move the wall towards its free side: a turn by the lever, an offset everywhere the same.
-            let by_wall = Vector2::new(m.along_m, 1.0);
-            h += m.j * m.j.transpose() * (scale * m.weight);
-            c += m.j * by_wall.transpose() * (scale * m.weight);
-            own += by_wall * by_wall.transpose() * (scale * m.weight);
+            pull += m.j * Vector2::new(m.along_m, 1.0).transpose() * m.weight;
         }
-        all += own.try_inverse().map_or(h, |inverse| h - c * inverse * c.transpose());
+        let wall = &walls.walls[points[first].wall];
+        parts.push(WallPart { wall: wall.name, by_wall: -gain * pull, covariance: wall.covariance });
     }
-    0.5 * (all + all.transpose())
+    let weight = |part: &WallPart| part.spread().diagonal().dot(&Vector3::new(1.0, 1.0, LEVER_M * LEVER_M));
+    parts.sort_by(|a, b| weight(b).total_cmp(&weight(a)).then(a.wall.cmp(&b.wall)));
+    parts
+}
+
+/// Which part of a covariance is knowledge, as a projection, and the covariance of the rest: where the walls tell less
+/// than [`LEAST_M`], they tell nothing.
+fn known(covariance: &Matrix3<f64>) -> (Matrix3<f64>, Matrix3<f64>) {
+    let lever = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, LEVER_M));
+    let back = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, 1.0 / LEVER_M));
+    let eigen = SymmetricEigen::new(lever * covariance * lever);
+    let (mut known, mut unknown) = (Matrix3::identity(), Matrix3::zeros());
+    for k in (0..3).filter(|&k| eigen.eigenvalues[k] > LEAST_M * LEAST_M) {
+        let axis = eigen.eigenvectors.column(k);
+        known -= axis * axis.transpose();
+        unknown += axis * axis.transpose() * UNKNOWN[0];
+    }
+    (back * known * lever, back * unknown * back)
+}
+
+/// A number for a place of a wall (FNV-1a of its ends).
+fn name(wall: &LaserSegment) -> u64 {
+    let ends = [wall.a.x, wall.a.y, wall.b.x, wall.b.y];
+    let bytes = ends.into_iter().flat_map(|v| v.to_bits().to_le_bytes());
+    bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
 }
 
 /// Covariance of an information that may be singular: what is unknown has the variance [`UNKNOWN`].

@@ -68,6 +68,11 @@ pub enum NuisanceKey {
     Landmark(LandmarkId),
     /// The mounting of the camera: left perturbation (rotation, translation), robot frame.
     Mounting,
+    /// A wall, by a number of its own: the first two of six are the errors of its direction and offset.
+    Wall(u64),
+    /// All other walls about a place, by its square of the floor: the first three of six are unit errors of (x, y,
+    /// theta).
+    Walls(i32, i32),
 }
 
 /// How a lasting error moves a fix: `estimated - true pose = jacobian * (true - assumed value)`.
@@ -92,9 +97,20 @@ pub enum DecidedBy {
     Prior,
 }
 
-/// The robot's pose from one frame.
+/// What a fix was made from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Modality {
+    /// Recognised landmarks.
+    Landmarks,
+    /// A scan, laid on the map's walls near a pose that was known before: it corrects, and can never start one.
+    Laser,
+}
+
+/// The robot's pose from one frame, or one scan.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fix {
+    /// What it was made from.
+    pub modality: Modality,
     /// `map_from_robot` with everything that is uncertain: corners, places of landmarks, mounting.
     pub pose: Pose2Covariance,
     /// The part of the covariance that is new in every frame (corners).

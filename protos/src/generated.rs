@@ -311,12 +311,16 @@ pub struct RobotPose {
     pub map: ::prost::alloc::string::String,
     #[prost(message, optional, tag = "4")]
     pub map_from_robot: ::core::option::Option<Pose2Covariance>,
-    /// odometry, landmarks, laser
+    /// What the pose rests on now: odometry, if it carries the pose; landmarks and laser, if fixes of that kind agreed with it
+    /// within the last 10 m. `odometry` alone: it is 10 m since anything else was said.
     #[prost(string, repeated, tag = "5")]
     pub modalities: ::prost::alloc::vec::Vec<::prost::alloc::string::String>,
-    /// Landmark corrections applied since the start.
+    /// Corrections by landmarks applied since the start.
     #[prost(uint64, tag = "6")]
     pub corrections: u64,
+    /// Corrections by laser scans applied since the start.
+    #[prost(uint64, tag = "7")]
+    pub laser_corrections: u64,
 }
 /// map/{map}/changed
 #[derive(::serde::Serialize, ::serde::Deserialize)]

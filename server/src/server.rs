@@ -119,7 +119,7 @@ impl Server {
             .map_err(StartError::Threads)?;
         let zenoh_endpoint = bus.endpoint().to_owned();
         let workshop = Workshop { jobs, gatherer };
-        let app = App::new(config.clone(), store, workshop, live.clone(), stopping.clone());
+        let app = App::new(config.clone(), store, workshop, &engine, stopping.clone());
         let http =
             tokio::spawn(http::listen::serve(listener, http::router(app), config.limits.clone(), stopping));
         let tasks = Tasks { workers, bus, http, jobs: jobs_task, findings, gather, writer };

@@ -7,6 +7,7 @@ mod evaluate;
 mod fit;
 mod gathered_drive;
 mod http_contract;
+mod laser;
 mod moved_landmark;
 mod real_pictures;
 mod restart;

@@ -4,6 +4,7 @@
 mod child;
 pub mod command;
 pub mod pictures;
+pub mod robots;
 pub mod scenes;
 
 pub use child::Child;

@@ -2,14 +2,17 @@
 
 use super::{FixOutcome, FuseParams};
 use crate::{
-    localise::{Fix, Nuisance, NuisanceKey},
+    localise::{Fix, Modality, Nuisance, NuisanceKey},
     pose2::{Pose2, Pose2Covariance},
 };
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, Matrix3x2, Vector2, Vector3};
 use vision::recognise::LandmarkId;
 
-/// Most lasting errors (landmarks, mounting) carried along; the one unused for longest goes first.
+/// Most lasting errors carried along of landmarks and mounting, and as many of walls; the one unused for longest goes
+/// first.
 pub const MAX_NUISANCES: usize = 12;
+/// Most sources of fixes (landmarks, the laser) whose last use is remembered; the one unused for longest goes first.
+pub const MAX_SOURCES: usize = 32;
 /// Size of the pose's block.
 const POSE: usize = 3;
 /// Size of the robot's block: its pose, then its odometry's errors (scale, turn per metre).
@@ -32,6 +35,20 @@ struct Doubt {
     pose: Pose2Covariance,
     count: u32,
     landmarks: Vec<LandmarkId>,
+}
+
+/// Where the errors of a fix come from, besides what lasts: the corners of a landmark, or a scan.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Source {
+    Landmark(LandmarkId),
+    Laser,
+}
+
+fn sources(fix: &Fix) -> Vec<Source> {
+    match fix.modality {
+        Modality::Landmarks => fix.landmarks.iter().copied().map(Source::Landmark).collect(),
+        Modality::Laser => vec![Source::Laser],
+    }
 }
 
 /// What lasts of odometry's errors: of one metre measured, `1 + scale` metres are driven and `turn_rad_per_m` more is
@@ -70,9 +87,15 @@ pub(super) struct Filter {
     odometry: Option<Pose2>,
     /// Of odometry's errors, what was learnt before the present belief.
     learnt: Option<OdometryErrors>,
-    /// Odometry and landmarks at the last applied fix.
-    last: Option<(Pose2, Vec<LandmarkId>)>,
+    /// Each source with the odometry of its last applied fix, the latest last. One list for all would let scans between
+    /// two looks at a landmark make the second look new.
+    used: Vec<(Source, Pose2)>,
+    /// Fixes by landmarks that were applied.
     pub corrections: u64,
+    /// Scans that were applied.
+    pub laser_corrections: u64,
+    /// Scans in a row that contradict the belief.
+    laser_doubts: u32,
     fixes: u64,
 }
 
@@ -94,13 +117,20 @@ impl Filter {
 
     /// Contradicting fixes in a row.
     pub(super) fn doubts(&self) -> u32 {
-        self.doubt.as_ref().map_or(0, |d| d.count)
+        self.doubt.as_ref().map_or(0, |d| d.count).max(self.laser_doubts)
     }
 
     /// Starts, or starts again, from a pose that is given.
     pub(super) fn start(&mut self, at: &Pose2Covariance, p: &FuseParams) {
         let belief = Belief::new(at, &self.so_far(p), 0);
-        (self.belief, self.doubt, self.last) = (Some(belief), None, None);
+        self.belief = Some(belief);
+        self.afresh();
+    }
+
+    /// Nothing speaks for or against the belief yet.
+    fn afresh(&mut self) {
+        (self.doubt, self.laser_doubts) = (None, 0);
+        self.used.clear();
     }
 
     /// Of odometry's errors, what is known so far.
@@ -127,13 +157,18 @@ impl Filter {
     pub(super) fn lose(&mut self, odom_from_robot: &Pose2) {
         // It is still the same robot.
         self.learnt = self.odometry_errors();
-        (self.belief, self.doubt, self.last) = (None, None, None);
+        self.belief = None;
+        self.afresh();
         self.odometry = Some(*odom_from_robot);
     }
 
     /// Takes a fix at the time of the last odometry.
     pub(super) fn correct(&mut self, fix: &Fix, p: &FuseParams) -> FixOutcome {
-        if self.is_repeated(fix, p) {
+        if self.belief.is_none() && fix.modality == Modality::Laser {
+            return FixOutcome::NoPose;
+        }
+        let sources = sources(fix);
+        if self.is_repeated(&sources, p) {
             return FixOutcome::Repeated;
         }
         self.fixes += 1;
@@ -155,23 +190,45 @@ impl Filter {
             }
         };
         if !matches!(outcome, FixOutcome::GatedOut { .. }) {
-            self.doubt = None;
-            self.corrections += 1;
-            self.last = self.odometry.map(|o| (o, fix.landmarks.clone()));
+            match fix.modality {
+                // A scan is laid where the belief says: that it fits there is no word against landmarks that do not.
+                Modality::Laser => {
+                    self.laser_corrections += 1;
+                    self.laser_doubts = 0;
+                }
+                Modality::Landmarks => (self.corrections, self.doubt) = (self.corrections + 1, None),
+            }
+            self.use_up(sources);
         }
         outcome
     }
 
-    /// The same landmarks from the same place: its corner errors are largely those of the last time.
-    fn is_repeated(&self, fix: &Fix, p: &FuseParams) -> bool {
-        let (Some((before, landmarks)), Some(now)) = (&self.last, &self.odometry) else { return false };
-        let motion = before.between(now);
-        let still = motion.position().norm() < p.min_move_m && motion.theta_rad.abs() < p.min_turn_rad;
-        still && *landmarks == fix.landmarks
+    /// Remembers where sources were used.
+    fn use_up(&mut self, sources: Vec<Source>) {
+        let Some(now) = self.odometry else { return };
+        self.used.retain(|(source, _)| !sources.contains(source));
+        self.used.extend(sources.into_iter().map(|source| (source, now)));
+        let gone = self.used.len().saturating_sub(MAX_SOURCES);
+        self.used.drain(..gone);
     }
 
-    /// Counts contradictions; enough of them that agree replace the belief.
+    /// Nothing but what was used from the same place: the errors of corners and ranges are largely those of that time.
+    fn is_repeated(&self, sources: &[Source], p: &FuseParams) -> bool {
+        let Some(now) = &self.odometry else { return false };
+        let still = |before: &Pose2| {
+            let motion = before.between(now);
+            motion.position().norm() < p.min_move_m && motion.theta_rad.abs() < p.min_turn_rad
+        };
+        let used = |source| self.used.iter().any(|(other, before)| other == source && still(before));
+        !sources.is_empty() && sources.iter().all(used)
+    }
+
+    /// Counts contradictions; enough of them that agree, and rest on landmarks, replace the belief.
     fn contradict(&mut self, fix: &Fix, distance2: f64, p: &FuseParams) -> FixOutcome {
+        if fix.modality == Modality::Laser {
+            self.laser_doubts = self.laser_doubts.saturating_add(1);
+            return FixOutcome::GatedOut { distance2, in_a_row: self.laser_doubts };
+        }
         let agrees = |d: &Doubt| d.pose.distance2(&fix.pose).is_some_and(|d2| d2 <= p.gate_chi2);
         let mut doubt = match self.doubt.take() {
             Some(doubt) if agrees(&doubt) => doubt,
@@ -186,6 +243,7 @@ impl Filter {
         }
         if doubt.count >= p.reset_count && doubt.landmarks.len() >= p.reset_landmarks {
             self.belief = Some(Belief::from_fix(fix, &self.so_far(p), self.fixes));
+            self.afresh();
             return FixOutcome::Reset;
         }
         let in_a_row = doubt.count;
@@ -269,15 +327,17 @@ impl Belief {
         let s = &h * &cross;
         let s = Matrix3::from_iterator(s.iter().copied()) + fix.noise;
         let inverse = s.cholesky()?.inverse();
-        let gain = cross * DMatrix::from_iterator(3, 3, inverse.iter().copied());
+        let gain = &cross * DMatrix::from_iterator(3, 3, inverse.iter().copied());
         let step = &gain * DVector::from_iterator(3, innovation.iter().copied());
         self.pose = self.pose.plus(&Vector3::new(step[0], step[1], step[2]));
         self.odometry += Vector2::new(step[3], step[4]);
         self.errors += step.rows(ROBOT, n - ROBOT);
-        // Joseph's form: stays symmetric and positive.
-        let keep = DMatrix::identity(n, n) - &gain * h;
-        let noise = DMatrix::from_iterator(3, 3, fix.noise.iter().copied());
-        self.covariance = &keep * &self.covariance * keep.transpose() + &gain * noise * gain.transpose();
+        // Joseph's form, multiplied out: stays positive whatever the gain, and costs n^2 instead of n^3.
+        let s = DMatrix::from_iterator(3, 3, s.iter().copied());
+        let taken = &gain * cross.transpose();
+        self.covariance -= &taken + taken.transpose() - &gain * s * gain.transpose();
+        // Rounding leaves a little asymmetry that this form, unlike Joseph's, does not shrink with the rest.
+        self.covariance = 0.5 * (&self.covariance + self.covariance.transpose());
         self.forget();
         Some(innovation.dot(&(inverse * innovation)))
     }
@@ -294,16 +354,26 @@ impl Belief {
         self.carried.len() - 1
     }
 
-    /// Keeps at most [`MAX_NUISANCES`]. To leave one out of a Gaussian is to marginalise it.
+    /// Keeps at most [`MAX_NUISANCES`] of each kind. To leave one out of a Gaussian is to marginalise it.
     fn forget(&mut self) {
-        while self.carried.len() > MAX_NUISANCES {
-            let Some(k) = (0..self.carried.len()).min_by_key(|&k| self.carried[k].used) else { return };
-            let at = ROBOT + BLOCK * k;
-            let old = std::mem::replace(&mut self.covariance, DMatrix::zeros(0, 0));
-            self.covariance = old.remove_rows(at, BLOCK).remove_columns(at, BLOCK);
-            let errors = std::mem::replace(&mut self.errors, DVector::zeros(0));
-            self.errors = errors.remove_rows(at - ROBOT, BLOCK);
-            self.carried.remove(k);
+        let is_wall = |c: &Carried| matches!(c.key, NuisanceKey::Wall(_) | NuisanceKey::Walls(..));
+        for walls in [false, true] {
+            let all = |carried: &[Carried]| carried.iter().filter(|c| is_wall(c) == walls).count();
+            while all(&self.carried) > MAX_NUISANCES {
+                let of_kind = (0..self.carried.len()).filter(|&k| is_wall(&self.carried[k]) == walls);
+                let Some(k) = of_kind.min_by_key(|&k| self.carried[k].used) else { return };
+                self.leave_out(k);
+            }
         }
+    }
+
+    /// Leaves one lasting error out.
+    fn leave_out(&mut self, k: usize) {
+        let at = ROBOT + BLOCK * k;
+        let old = std::mem::replace(&mut self.covariance, DMatrix::zeros(0, 0));
+        self.covariance = old.remove_rows(at, BLOCK).remove_columns(at, BLOCK);
+        let errors = std::mem::replace(&mut self.errors, DVector::zeros(0));
+        self.errors = errors.remove_rows(at - ROBOT, BLOCK);
+        self.carried.remove(k);
     }
 }

@@ -1,14 +1,14 @@
 //! Batch least squares, simulated drives with drawn places and mounting, late arrivals, contradictions, bounds.
 
 use super::*;
-use crate::localise::{DecidedBy, Nuisance, NuisanceKey};
+use crate::localise::{DecidedBy, Modality, Nuisance, NuisanceKey};
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix3x2, Matrix3x6, Matrix6, Vector2, Vector6};
 use vision::{learn::random::Random, recognise::LandmarkId};
 
 const SECOND: i64 = 1_000_000_000;
 
 /// A fix as `localise` gives it: `noise_m` new in every frame, and the landmark's place within `place_m`.
-fn fix(landmark: u64, pose: Pose2, noise_m: f64, place_m: f64) -> Fix {
+pub(super) fn fix(landmark: u64, pose: Pose2, noise_m: f64, place_m: f64) -> Fix {
     let noise = Matrix3::from_diagonal(&Vector3::new(noise_m, noise_m, 0.2 * noise_m).map(|v| v * v));
     let p = place_m * place_m;
     let covariance = Matrix6::from_diagonal(&Vector6::new(p, p, 1e-4 * p, p, 1e-6, 1e-6));
@@ -20,6 +20,7 @@ fn fix(landmark: u64, pose: Pose2, noise_m: f64, place_m: f64) -> Fix {
     let jacobian = -jacobian;
     let total = noise + jacobian * covariance * jacobian.transpose();
     Fix {
+        modality: Modality::Landmarks,
         pose: Pose2Covariance::new(pose, total).unwrap(),
         noise,
         nuisances: vec![Nuisance { key: NuisanceKey::Landmark(LandmarkId(landmark)), jacobian, covariance }],

@@ -1,7 +1,7 @@
 //! All solutions of one frame, and which of them is left (method 13.4, 13.6).
 
 use super::{
-    DecidedBy, Fix, FixRefusal, LocaliseParams, Nuisance, RobotFix, Sighting,
+    DecidedBy, Fix, FixRefusal, LocaliseParams, Modality, Nuisance, RobotFix, Sighting,
     planar::{MAX_STEPS, Planar},
     posterior::{Moments, moments, turned},
 };
@@ -217,7 +217,16 @@ fn fix(
     let total = 0.5 * (total + total.transpose());
     let pose = Pose2Covariance::new(mean, total).ok()?;
     let landmarks = sightings.iter().map(|s| s.landmark).collect();
-    Some(Fix { pose, noise, nuisances, landmarks, decided_by, chi2: minimum.chi2, dof: problem.dof() })
+    Some(Fix {
+        modality: Modality::Landmarks,
+        pose,
+        noise,
+        nuisances,
+        landmarks,
+        decided_by,
+        chi2: minimum.chi2,
+        dof: problem.dof(),
+    })
 }
 
 /// `(J^T W J)^-1` over (x, y, theta).

@@ -2,7 +2,10 @@
 //! after its transaction is committed; a reader keeps the `Arc` it took, so an answer rests on one version.
 
 use arc_swap::ArcSwap;
-use map::{changes::Standing, place::LandmarkPlace, segments::LaserSegment, visibility::VisibilityMap};
+use map::{
+    changes::Standing, laser_fix::WallIndex, place::LandmarkPlace, segments::LaserSegment,
+    visibility::VisibilityMap,
+};
 use std::{collections::BTreeMap, sync::Arc};
 use tokio::sync::broadcast;
 use vision::{
@@ -34,6 +37,8 @@ pub struct MapSnapshot {
     pub quarantined: BTreeMap<LandmarkId, String>,
     /// The walls.
     pub walls: Vec<LaserSegment>,
+    /// The same, made ready for localisation by scans; kept from version to version while the walls are the same.
+    pub wall_index: Arc<WallIndex>,
     /// From where each placed landmark is seen.
     pub visibility: BTreeMap<LandmarkId, Arc<VisibilityMap>>,
     /// Which distance decides.
@@ -54,6 +59,7 @@ impl MapSnapshot {
             learnt: BTreeMap::new(),
             quarantined: BTreeMap::new(),
             walls: Vec::new(),
+            wall_index: Arc::new(WallIndex::new([])),
             visibility: BTreeMap::new(),
             distance: DistanceKind::Both,
             params: Arc::default(),

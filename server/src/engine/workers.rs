@@ -67,13 +67,14 @@ pub struct Engine {
 #[derive(Debug)]
 pub struct Workers {
     slots: Arc<Slots<FrameJob>>,
+    motion: Arc<Motion>,
     threads: Vec<JoinHandle<()>>,
 }
 
 impl Workers {
-    /// Starts `count` threads, at least one.
+    /// Starts `count` threads for frames, at least one, and one for laser scans.
     pub fn start(engine: &Engine, count: usize, publish: &Arc<impl Publish>) -> std::io::Result<Self> {
-        let mut threads = Vec::with_capacity(count);
+        let mut threads = Vec::with_capacity(count + 1);
         for i in 0..count.max(1) {
             let (engine, publish) = (engine.clone(), publish.clone());
             let named = std::thread::Builder::new().name(format!("vision-{i}"));
@@ -84,12 +85,23 @@ impl Workers {
                 }
             })?);
         }
-        Ok(Self { slots: engine.slots.clone(), threads })
+        let (lasers, publish) = (engine.clone(), publish.clone());
+        let named = std::thread::Builder::new().name("laser".to_owned());
+        threads.push(named.spawn(move || {
+            while let Some((robot, job)) = lasers.motion.scans().take() {
+                let laid = guarded(&lasers.panics, || Ok(lasers.motion.laser(&robot, &job)));
+                if let Ok(Some(pose)) = laid {
+                    publish.pose(&robot, &pose);
+                }
+            }
+        })?);
+        Ok(Self { slots: engine.slots.clone(), motion: engine.motion.clone(), threads })
     }
 
     /// Ends when every frame in work is answered. Waits: not for an async thread.
     pub fn stop(self) {
         self.slots.close();
+        self.motion.scans().close();
         for thread in self.threads {
             if thread.join().is_err() {
                 tracing::error!("a worker ended by a panic");

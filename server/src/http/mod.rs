@@ -26,7 +26,13 @@ pub(crate) mod listen;
 
 pub(crate) use router::router;
 
-use crate::{config::Config, engine::live::LiveHub, gather::Gatherer, jobs::Jobs, store::Store};
+use crate::{
+    config::Config,
+    engine::{live::LiveHub, motion::Motion, workers::Engine},
+    gather::Gatherer,
+    jobs::Jobs,
+    store::Store,
+};
 use axum::http::StatusCode;
 use error::ApiError;
 use std::sync::Arc;
@@ -42,6 +48,8 @@ pub(crate) struct App {
     pub(crate) gatherer: Arc<Gatherer>,
     /// What robots are doing now.
     pub(crate) live: Arc<LiveHub>,
+    /// Where they are.
+    pub(crate) motion: Arc<Motion>,
     /// Becomes true when the server stops; ends event streams.
     pub(crate) stopping: watch::Receiver<bool>,
     /// Places for vision work asked for over HTTP: as many as there are vision threads.
@@ -65,12 +73,13 @@ impl App {
         config: Arc<Config>,
         store: Store,
         Workshop { jobs, gatherer }: Workshop,
-        live: Arc<LiveHub>,
+        engine: &Engine,
         stopping: watch::Receiver<bool>,
     ) -> Self {
         let vision = Arc::new(Semaphore::new(config.workers));
         let streams = Arc::new(Semaphore::new(config.limits.streams));
-        Self { config, store, jobs, gatherer, live, stopping, vision, streams }
+        let (live, motion) = (engine.live.clone(), engine.motion.clone());
+        Self { config, store, jobs, gatherer, live, motion, stopping, vision, streams }
     }
 
     /// Runs vision work off the runtime, a bounded number at a time.

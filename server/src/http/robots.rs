@@ -6,14 +6,14 @@ use super::{
     extract::{At, Body, Page, PageQuery, Params, name},
     resources::Robot,
 };
-use crate::store::robots;
+use crate::{engine::motion::Corrections, store::robots};
 use axum::{Json, extract::State, http::StatusCode};
 use serde::Deserialize;
 use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
 pub(super) fn router() -> OpenApiRouter<Shared> {
-    OpenApiRouter::new().routes(routes!(list)).routes(routes!(put, get, delete))
+    OpenApiRouter::new().routes(routes!(list)).routes(routes!(put, get, delete)).routes(routes!(corrections))
 }
 
 /// Where a robot stands.
@@ -66,4 +66,16 @@ async fn get(State(app): State<Shared>, At(robot): At<String>) -> Result<Json<Ro
 async fn delete(State(app): State<Shared>, At(robot): At<String>) -> Result<StatusCode, ApiError> {
     app.store.write(move |tx| Box::pin(async move { robots::delete(tx, &robot).await })).await?;
     Ok(StatusCode::NO_CONTENT)
+}
+
+/// What the robot's pose rests on, and what became of its fixes: by landmarks, and by laser scans laid on the map's walls.
+/// Since the server started; the latest 200 of each modality.
+#[utoipa::path(get, path = "/robots/{robot}/corrections", tag = "robots", params(("robot" = String, Path)),
+    responses((status = 200, body = Corrections), (status = 404, body = Problem)))]
+async fn corrections(
+    State(app): State<Shared>,
+    At(robot): At<String>,
+) -> Result<Json<Corrections>, ApiError> {
+    robots::get(app.store.reads(), &robot).await?;
+    Ok(Json(app.motion.corrections(&name("robot", robot)?)))
 }

@@ -10,6 +10,7 @@ use super::{
 use crate::engine::snapshot::{LandmarkInfo, Learnt, MapSnapshot, Snapshots};
 use map::{
     check::OutOfRange,
+    laser_fix::WallIndex,
     place::{LandmarkPlace, PlaceSigmas},
     segments::LaserSegment,
 };
@@ -84,6 +85,7 @@ pub(super) async fn map(
         laser::all_of(&mut *conn, id).await?.iter().filter_map(|ends| wall(ends).ok()).collect();
     let name: String = row.try_get("name").map_err(at())?;
     let before = snapshots.get(&name);
+    let wall_index = wall_index(&walls, before.as_deref()).await;
     let visibility = seen::areas(&infos, &walls, before.clone()).await;
     let (learnt, quarantined) = models(conn, id, before.as_deref(), params).await?;
     for (id, reason) in &quarantined {
@@ -102,10 +104,24 @@ pub(super) async fn map(
         learnt,
         quarantined,
         walls,
+        wall_index,
         visibility,
         distance,
         params: params.clone(),
     })))
+}
+
+/// The walls made ready for scans, off the runtime; taken over from the version before where they are the same.
+async fn wall_index(walls: &[LaserSegment], before: Option<&MapSnapshot>) -> Arc<WallIndex> {
+    if let Some(before) = before.filter(|before| before.walls == walls) {
+        return before.wall_index.clone();
+    }
+    let walls = walls.to_vec();
+    let made = tokio::task::spawn_blocking(move || WallIndex::new(&walls)).await;
+    Arc::new(made.unwrap_or_else(|error| {
+        tracing::error!(%error, "walls for scans");
+        WallIndex::new([])
+    }))
 }
 
 type Models = (BTreeMap<LandmarkId, Learnt>, BTreeMap<LandmarkId, String>);

@@ -1,0 +1,155 @@
+//! What became of every fix of a robot: the latest in a bounded log, all of them in counters. In memory only.
+
+use map::{fuse::FixOutcome, laser_fix::LaserRefusal, localise::Modality, pose2::Pose2};
+use serde::Serialize;
+use std::collections::{BTreeMap, VecDeque};
+use utoipa::ToSchema;
+
+/// Corrections kept for each robot and modality; the oldest give way.
+pub const MAX_CORRECTIONS: usize = 200;
+
+/// A fix, what became of it, and by how much it moved the pose.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct Correction {
+    /// Echo of the frame or scan.
+    pub epoch: u64,
+    /// Echo of the frame or scan, robot's clock.
+    pub captured_ns: i64,
+    /// The map it is a pose in.
+    pub map: String,
+    /// `landmarks`, `laser` or `hypotheses`.
+    pub modality: &'static str,
+    /// The landmarks it rests on, by name; empty for the laser.
+    pub landmarks: Vec<String>,
+    /// `started` (it gave the first pose), `applied`, `gated_out` (it contradicts the pose and was left out), `reset` (the
+    /// last of several that contradict the pose and agree with one another: it replaced the pose), `too_old`, `waiting`
+    /// (newer than the last odometry).
+    pub outcome: &'static str,
+    /// Squared Mahalanobis distance of the fix from the pose before it, 3 degrees of freedom; for `applied` and
+    /// `gated_out`.
+    pub chi2: Option<f64>,
+    /// By how much it moved the pose, in the robot's frame before it: forwards, metres.
+    pub along_m: Option<f64>,
+    /// To the left.
+    pub across_m: Option<f64>,
+    /// Turned to the left.
+    pub turn_rad: Option<f64>,
+}
+
+/// The log of one robot.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Log {
+    latest: BTreeMap<&'static str, VecDeque<(u64, Correction)>>,
+    totals: BTreeMap<&'static str, BTreeMap<&'static str, u64>>,
+    taken: u64,
+}
+
+/// What the log says, for readers.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, ToSchema)]
+pub struct Corrections {
+    /// What the pose rests on now: `odometry`, `landmarks`, `laser`, `hypotheses`; empty without a pose.
+    pub modalities: Vec<String>,
+    /// For each modality how many fixes came to which end. For the laser also why scans gave no fix: `no_pose` (there is
+    /// none to correct), `no_walls` (the map has none), `few_points`, `unlike` (it shows something else than the map),
+    /// `prior` (it contradicts the pose), `ambiguous` (several poses fit), `superseded` (a newer one came first).
+    #[schema(value_type = Object)]
+    pub totals: BTreeMap<&'static str, BTreeMap<&'static str, u64>>,
+    /// The latest 200 of each modality, oldest first; without `repeated` ones, which tell nothing new.
+    pub corrections: Vec<Correction>,
+}
+
+impl Log {
+    /// Counts an end.
+    pub(super) fn count(&mut self, modality: &'static str, outcome: &'static str) {
+        *self.totals.entry(modality).or_default().entry(outcome).or_default() += 1;
+    }
+
+    /// Counts and keeps a correction.
+    pub(super) fn keep(&mut self, correction: Correction) {
+        self.count(correction.modality, correction.outcome);
+        let latest = self.latest.entry(correction.modality).or_default();
+        if latest.len() == MAX_CORRECTIONS {
+            latest.pop_front();
+        }
+        self.taken += 1;
+        latest.push_back((self.taken, correction));
+    }
+
+    /// Everything, in the order of arrival.
+    pub(super) fn read(&self, modalities: Vec<String>) -> Corrections {
+        let mut all: Vec<&(u64, Correction)> = self.latest.values().flatten().collect();
+        all.sort_by_key(|(number, _)| *number);
+        let corrections = all.into_iter().map(|(_, correction)| correction.clone()).collect();
+        Corrections { modalities, totals: self.totals.clone(), corrections }
+    }
+}
+
+/// Along, across and turn of a change of pose.
+pub(super) fn moved(before: Option<&Pose2>, after: Option<&Pose2>) -> Option<Pose2> {
+    Some(before?.between(after?))
+}
+
+/// The word of a modality.
+pub(super) fn modality(modality: Modality) -> &'static str {
+    match modality {
+        Modality::Landmarks => "landmarks",
+        Modality::Laser => "laser",
+    }
+}
+
+/// The word of an outcome, and its chi2.
+pub(super) fn outcome(outcome: FixOutcome) -> (&'static str, Option<f64>) {
+    // JSON has no infinity.
+    let finite = |d: f64| d.is_finite().then_some(d);
+    match outcome {
+        FixOutcome::Started => ("started", None),
+        FixOutcome::Applied { distance2 } => ("applied", finite(distance2)),
+        FixOutcome::GatedOut { distance2, .. } => ("gated_out", finite(distance2)),
+        FixOutcome::Reset => ("reset", None),
+        FixOutcome::Repeated => ("repeated", None),
+        FixOutcome::NoPose => ("no_pose", None),
+        FixOutcome::TooOld => ("too_old", None),
+        FixOutcome::Waiting => ("waiting", None),
+    }
+}
+
+/// The word of a scan's refusal.
+pub(super) fn refusal(refusal: LaserRefusal) -> &'static str {
+    match refusal {
+        LaserRefusal::FewPoints { .. } => "few_points",
+        LaserRefusal::Unlike { .. } => "unlike",
+        LaserRefusal::Prior { .. } => "prior",
+        LaserRefusal::Ambiguous => "ambiguous",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_log_is_bounded_and_scans_do_not_push_out_landmarks() {
+        let mut log = Log::default();
+        let made = |modality, captured_ns| Correction {
+            epoch: 1,
+            captured_ns,
+            map: "hall".into(),
+            modality,
+            landmarks: Vec::new(),
+            outcome: "applied",
+            chi2: Some(1.0),
+            along_m: None,
+            across_m: None,
+            turn_rad: None,
+        };
+        log.keep(made("landmarks", 0));
+        for i in 1..=MAX_CORRECTIONS as i64 + 1 {
+            log.keep(made("laser", i));
+        }
+        log.count("laser", "unlike");
+        let read = log.read(vec!["odometry".into()]);
+        assert_eq!(read.corrections.len(), MAX_CORRECTIONS + 1);
+        assert_eq!((read.corrections[0].modality, read.corrections[1].captured_ns), ("landmarks", 2));
+        assert_eq!(read.totals["laser"], [("applied", MAX_CORRECTIONS as u64 + 1), ("unlike", 1)].into());
+    }
+}

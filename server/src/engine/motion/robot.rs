@@ -1,0 +1,219 @@
+//! One robot on the move: its fused pose, what that rests on, what it has found out about landmarks. A new epoch or
+//! another map starts afresh; an epoch that is over says nothing more.
+
+use super::corrections::{Correction, Log, modality, moved, outcome};
+use crate::engine::slots::{Order, PAST_EPOCHS};
+use map::{
+    changes::{Change, ChangeParams, Watch},
+    fuse::{FixOutcome, FuseParams, FusedPose, Fuser, OdometryOutcome},
+    localise::{Fix, Modality},
+    pose2::Pose2,
+};
+use std::collections::VecDeque;
+use vision::recognise::LandmarkId;
+
+/// Landmarks that a pose is said to rest on: the latest.
+pub const MAX_SUPPORTERS: usize = 16;
+/// After so many metres without a fix of a modality the pose no longer rests on it, but on odometry.
+pub const RESTS_ON_M: f64 = 10.0;
+/// Readings that are older than the newest by no more than this come late; beyond it the clock may have been set back.
+const CLOCK_JITTER_NS: i64 = 2_000_000_000;
+
+#[derive(Debug)]
+pub(super) struct Robot {
+    pub(super) odometry: Order,
+    pub(super) scans: Order,
+    /// What the rest belongs to.
+    epoch: u64,
+    pub(super) map: String,
+    past: VecDeque<u64>,
+    pub(super) fuser: Fuser,
+    /// Lays odometry alone on the map, for pages.
+    map_from_odom: Option<Pose2>,
+    /// The newest odometry of this epoch, and its time.
+    pub(super) newest: Option<(i64, Pose2)>,
+    /// Way driven by odometry in this epoch.
+    way_m: f64,
+    /// Where on it landmarks and the laser last agreed with the pose.
+    by_landmarks_m: Option<f64>,
+    by_laser_m: Option<f64>,
+    /// The landmarks that the pose rests on.
+    pub(super) supporters: Vec<LandmarkId>,
+    /// What it has found out about landmarks...
+    pub(super) watch: Watch,
+    /// ...and what of that was not passed on yet.
+    pub(super) found: Vec<Change>,
+    pub(super) log: Log,
+}
+
+impl Default for Robot {
+    fn default() -> Self {
+        Self {
+            odometry: Order::default(),
+            scans: Order::default(),
+            epoch: 0,
+            map: String::new(),
+            past: VecDeque::new(),
+            fuser: Fuser::new(FuseParams::default()),
+            map_from_odom: None,
+            newest: None,
+            way_m: 0.0,
+            by_landmarks_m: None,
+            by_laser_m: None,
+            supporters: Vec::new(),
+            watch: Watch::new(ChangeParams::default()),
+            found: Vec::new(),
+            log: Log::default(),
+        }
+    }
+}
+
+impl Robot {
+    /// Starts afresh when the robot's software did, or when it is on another map. False for an epoch that is over: what
+    /// was still in work when a new one began.
+    pub(super) fn belong(&mut self, epoch: u64, map: &str) -> bool {
+        if self.epoch == epoch && self.map == map {
+            return true;
+        }
+        if self.past.contains(&epoch) {
+            return false;
+        }
+        if self.epoch != epoch && !self.map.is_empty() {
+            if self.past.len() == PAST_EPOCHS {
+                self.past.pop_front();
+            }
+            self.past.push_back(self.epoch);
+        }
+        (self.epoch, self.map) = (epoch, map.to_owned());
+        self.fuser = Fuser::new(FuseParams::default());
+        (self.map_from_odom, self.newest, self.way_m) = (None, None, 0.0);
+        self.lost();
+        self.found.clear();
+        true
+    }
+
+    /// The pose has proved wrong, or is unknown: nothing rests on it any more.
+    fn lost(&mut self) {
+        (self.by_landmarks_m, self.by_laser_m) = (None, None);
+        self.supporters.clear();
+        let cleared = self.watch.clear();
+        self.found.extend(cleared);
+    }
+
+    /// Takes an odometry reading.
+    pub(super) fn moved(&mut self, captured_ns: i64, odom_from_robot: Pose2) {
+        match self.fuser.odometry(captured_ns, odom_from_robot) {
+            // Another odometry frame: the old one means nothing on the map any more.
+            Ok(OdometryOutcome::Jumped) => {
+                self.map_from_odom = None;
+                self.newest = Some((captured_ns, odom_from_robot));
+                self.lost();
+            }
+            Ok(OdometryOutcome::Moved | OdometryOutcome::TooOld) => {
+                let newest = self.newest.filter(|(at_ns, _)| *at_ns >= captured_ns);
+                if newest.is_none() {
+                    let before = self.newest.replace((captured_ns, odom_from_robot));
+                    let step_m = before.map_or(0.0, |(_, o)| o.between(&odom_from_robot).position().norm());
+                    self.way_m += step_m;
+                }
+            }
+            Err(error) => tracing::error!(%error, "checked odometry was refused"),
+        }
+    }
+
+    /// Takes the odometry of a scan or frame, unless newer odometry tells as much.
+    pub(super) fn moved_to(&mut self, captured_ns: i64, odom_from_robot: Pose2) {
+        // Much older than the newest: perhaps the robot's clock was set back, which odometry tells.
+        let behind_ns = self.newest.map_or(-1, |(at_ns, _)| at_ns.saturating_sub(captured_ns));
+        if !(0..=CLOCK_JITTER_NS).contains(&behind_ns) {
+            self.moved(captured_ns, odom_from_robot);
+        }
+    }
+
+    /// Takes a fix, logs it, and gives the pose after it: without any odometry that is the fix itself.
+    pub(super) fn fix(
+        &mut self,
+        captured_ns: i64,
+        fix: &Fix,
+        landmarks: Vec<String>,
+    ) -> Option<(FixOutcome, FusedPose)> {
+        let before = self.fuser.pose().map(|fused| fused.pose.pose);
+        let judged = match self.fuser.fix(captured_ns, fix) {
+            Ok(judged) => judged,
+            Err(error) => {
+                tracing::error!(%error, "a fix of ours is out of range");
+                return None;
+            }
+        };
+        self.rests_on(judged, fix);
+        let after = self.fuser.pose();
+        let (kind, (outcome, chi2)) = (modality(fix.modality), outcome(judged));
+        if matches!(judged, FixOutcome::Repeated | FixOutcome::NoPose) {
+            self.log.count(kind, outcome);
+        } else {
+            let step = moved(before.as_ref(), after.as_ref().map(|fused| &fused.pose.pose));
+            self.log.keep(Correction {
+                epoch: self.epoch,
+                captured_ns,
+                map: self.map.clone(),
+                modality: kind,
+                landmarks,
+                outcome,
+                chi2,
+                along_m: step.map(|s| s.x_m),
+                across_m: step.map(|s| s.y_m),
+                turn_rad: step.map(|s| s.theta_rad),
+            });
+        }
+        let alone = FusedPose {
+            at_ns: captured_ns,
+            pose: fix.pose,
+            corrections: 1,
+            laser_corrections: 0,
+            contradictions: 0,
+        };
+        let fused = if self.newest.is_some() { after? } else { alone };
+        Some((judged, fused))
+    }
+
+    /// Keeps what the pose rests on; of landmarks the latest.
+    fn rests_on(&mut self, outcome: FixOutcome, fix: &Fix) {
+        match outcome {
+            FixOutcome::Started | FixOutcome::Reset => self.lost(),
+            FixOutcome::Applied { .. } | FixOutcome::Repeated => {}
+            _ => return,
+        }
+        match fix.modality {
+            Modality::Laser => self.by_laser_m = Some(self.way_m),
+            Modality::Landmarks => {
+                self.by_landmarks_m = Some(self.way_m);
+                self.supporters.retain(|id| !fix.landmarks.contains(id));
+                self.supporters.extend(&fix.landmarks);
+                let gone = self.supporters.len().saturating_sub(MAX_SUPPORTERS);
+                self.supporters.drain(..gone);
+            }
+        }
+    }
+
+    /// What the pose rests on now; nothing without a pose.
+    pub(super) fn modalities(&self) -> Vec<String> {
+        let near = |at_m: Option<f64>| at_m.is_some_and(|at_m| self.way_m - at_m <= RESTS_ON_M);
+        let moves = self.newest.is_some();
+        let posed = self.fuser.pose().is_some();
+        let all = [
+            ("odometry", moves && posed),
+            ("landmarks", near(self.by_landmarks_m)),
+            ("laser", near(self.by_laser_m)),
+        ];
+        all.into_iter().filter(|(_, rests)| *rests).map(|(word, _)| word.to_owned()).collect()
+    }
+
+    /// Odometry alone on the map; laid there by the first fused pose.
+    pub(super) fn on_map(&mut self, odom_from_robot: &Pose2) -> Option<Pose2> {
+        if self.map_from_odom.is_none() {
+            let fused = self.fuser.pose()?;
+            self.map_from_odom = Some(fused.pose.pose.compose(&odom_from_robot.inverse()));
+        }
+        Some(self.map_from_odom?.compose(odom_from_robot))
+    }
+}

@@ -1,0 +1,111 @@
+//! Laser scans that wait to be laid on the walls: one of each robot, the newest wins, robots in turn. In: checked scans
+//! from the transport's threads, which never wait. Out: work for the laser's own thread.
+
+use map::{laser::Scan, pose2::Pose2};
+use protos::Name;
+use std::{
+    collections::{BTreeMap, VecDeque},
+    sync::{Condvar, Mutex, MutexGuard, PoisonError},
+};
+
+/// A checked scan.
+#[derive(Debug, Clone)]
+pub struct ScanJob {
+    /// The robot's map.
+    pub map: String,
+    /// Echo of the scan.
+    pub epoch: u64,
+    /// Robot's clock.
+    pub captured_ns: i64,
+    /// Odometry of its moment.
+    pub odom_from_robot: Pose2,
+    /// Bearings and ranges.
+    pub scan: Scan,
+}
+
+#[derive(Debug, Default)]
+struct State {
+    waiting: BTreeMap<Name, ScanJob>,
+    /// Robots with a waiting scan, in turn.
+    turn: VecDeque<Name>,
+    closed: bool,
+}
+
+/// The waiting scans of all robots. Bounded by the number of robots.
+#[derive(Debug, Default)]
+pub struct Scans {
+    state: Mutex<State>,
+    ready: Condvar,
+}
+
+impl Scans {
+    /// Puts a scan in its robot's place; true if another waited there and is superseded.
+    pub fn offer(&self, robot: &Name, job: ScanJob) -> bool {
+        let mut state = self.lock();
+        if state.closed {
+            return false;
+        }
+        let superseded = state.waiting.insert(robot.clone(), job).is_some();
+        if !superseded {
+            state.turn.push_back(robot.clone());
+            self.ready.notify_one();
+        }
+        superseded
+    }
+
+    /// The next scan in turn; waits for one. `None` after [`Scans::close`].
+    pub fn take(&self) -> Option<(Name, ScanJob)> {
+        let mut state = self.lock();
+        loop {
+            if state.closed {
+                return None;
+            }
+            if let Some(robot) = state.turn.pop_front()
+                && let Some(job) = state.waiting.remove(&robot)
+            {
+                return Some((robot, job));
+            }
+            state = self.ready.wait(state).unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+
+    /// Ends the wait; what waits is forgotten.
+    pub fn close(&self) {
+        let mut state = self.lock();
+        (state.closed, state.waiting, state.turn) = (true, BTreeMap::new(), VecDeque::new());
+        self.ready.notify_all();
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State> {
+        // No code inside can panic halfway through a change.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_newest_wins_and_robots_take_turns() {
+        let scans = Scans::default();
+        let name = |text: &str| Name::new(text).unwrap();
+        let job = |captured_ns| ScanJob {
+            map: "hall".into(),
+            epoch: 1,
+            captured_ns,
+            odom_from_robot: Pose2::default(),
+            scan: Scan::new(Pose2::default(), 0.0, 0.1, 9.0, vec![1.0; 3]).unwrap(),
+        };
+        assert!(!scans.offer(&name("a"), job(1)));
+        assert!(scans.offer(&name("a"), job(2)));
+        assert!(!scans.offer(&name("b"), job(3)));
+        let taken = |scans: &Scans| scans.take().map(|(robot, job)| (robot.to_string(), job.captured_ns));
+        assert_eq!(taken(&scans), Some(("a".into(), 2)));
+        assert!(!scans.offer(&name("a"), job(4)));
+        assert_eq!(taken(&scans), Some(("b".into(), 3)));
+        assert_eq!(taken(&scans), Some(("a".into(), 4)));
+        scans.close();
+        assert_eq!((scans.offer(&name("a"), job(5)), scans.take().is_none()), (false, true));
+    }
+}

@@ -1,0 +1,227 @@
+//! Odometry, scans and fixes of one robot, without any transport.
+
+use super::*;
+use crate::engine::snapshot::MapSnapshot;
+use map::{
+    laser_fix::WallIndex,
+    localise::{DecidedBy, Modality},
+    pose2::Pose2Covariance,
+};
+use nalgebra::Matrix3;
+use protos::prost::Message;
+use sim::{
+    building::{Building, WallSegment},
+    laser::LaserParams,
+};
+
+fn motion() -> (Motion, Name) {
+    let snapshots = Arc::new(Snapshots::default());
+    snapshots.set_robot("r1", Some("hall"));
+    (Motion::new(snapshots, Arc::default()), Name::new("r1").unwrap())
+}
+
+fn odometry(seq: u64, x_m: f64) -> Bytes {
+    let odom_from_robot = Some(v1::Pose2 { x_m, ..v1::Pose2::default() });
+    v1::Odometry { epoch: 1, seq, captured_ns: seq as i64 * 1_000_000_000, odom_from_robot }
+        .encode_to_vec()
+        .into()
+}
+
+fn fix(x_m: f64) -> Fix {
+    Fix {
+        modality: Modality::Landmarks,
+        pose: Pose2Covariance { pose: Pose2::new(x_m, 1.0, 0.0), covariance: Matrix3::identity() * 1e-4 },
+        noise: Matrix3::identity() * 1e-4,
+        nuisances: Vec::new(),
+        landmarks: Vec::new(),
+        decided_by: DecidedBy::Single,
+        chi2: 1.0,
+        dof: 5,
+    }
+}
+
+#[test]
+fn odometry_is_checked_and_counted() {
+    let (motion, r1) = motion();
+    motion.odometry(&r1, odometry(1, 0.0));
+    motion.odometry(&r1, odometry(1, 0.0));
+    motion.odometry(&r1, odometry(2, f64::NAN));
+    motion.odometry(&r1, Bytes::from_static(b"\xff"));
+    motion.odometry(&r1, vec![0; MAX_ODOMETRY_BYTES + 1].into());
+    motion.odometry(&Name::new("nobody").unwrap(), odometry(1, 0.0));
+    let (odometry, scans) = motion.counts();
+    let each = [Code::BadMessage, Code::NotFinite, Code::TooLarge, Code::UnknownRobot, Code::NotNewer];
+    assert_eq!((odometry.accepted, scans.accepted), (1, 0));
+    assert_eq!(odometry.rejected, BTreeMap::from(each.map(|code| (code, 1))));
+}
+
+#[test]
+fn scans_are_checked_and_counted() {
+    let (motion, r1) = motion();
+    let scan = v1::Scan {
+        epoch: 1,
+        seq: 1,
+        odom_from_robot: Some(v1::Pose2::default()),
+        robot_from_laser: Some(v1::Pose2::default()),
+        bearing_step_rad: 1e-4,
+        max_range_m: 30.0,
+        ranges_m: vec![1.0; map::laser::MAX_BEAMS],
+        ..v1::Scan::default()
+    };
+    motion.scan(&r1, scan.encode_to_vec().into());
+    motion.scan(&r1, v1::Scan { max_range_m: -1.0, ..scan }.encode_to_vec().into());
+    let (_, scans) = motion.counts();
+    assert_eq!((scans.accepted, scans.rejected), (1, BTreeMap::from([(Code::OutOfRange, 1)])));
+}
+
+fn at(captured_ns: i64, x_m: f64) -> Moment<'static> {
+    Moment { map: "hall", epoch: 1, captured_ns, odometry: Some(Pose2::new(x_m, 0.0, 0.0)) }
+}
+
+#[test]
+fn a_fix_puts_odometry_on_the_map() {
+    let (motion, r1) = motion();
+    assert!(motion.odometry(&r1, odometry(1, 3.0)).is_none(), "no pose before the first fix");
+    assert!(motion.live.tracks(&r1).is_none());
+    let pose = motion.fixed(&r1, at(1_000_000_000, 3.0), &fix(10.0)).unwrap();
+    assert_eq!((pose.corrections, pose.map.as_str(), pose.epoch), (1, "hall", 1));
+    let pose = motion.odometry(&r1, odometry(2, 4.0)).unwrap().map_from_robot.unwrap();
+    assert!((pose.pose.unwrap().x_m - 11.0).abs() < 1e-9, "{pose:?}");
+    assert!(pose.covariance[0] > 1e-4, "driving makes it less sure");
+    let tracks = motion.live.tracks(&r1).unwrap();
+    assert!((tracks.odometry[0].x_m - 11.0).abs() < 1e-9);
+    assert_eq!((tracks.odometry.len(), tracks.pose.len()), (1, 2));
+}
+
+#[test]
+fn a_prior_follows_from_odometry_alone() {
+    let (motion, r1) = motion();
+    assert!(motion.grounds(&r1, at(1_000_000_000, 3.0)).is_none());
+    motion.fixed(&r1, at(1_000_000_000, 3.0), &fix(10.0)).unwrap();
+    let prior = motion.grounds(&r1, at(1_500_000_000, 3.5)).unwrap().pose;
+    assert!((prior.pose.x_m - 10.5).abs() < 1e-9);
+    let anew = Moment { epoch: 2, ..at(1_600_000_000, 0.0) };
+    assert!(motion.grounds(&r1, anew).is_none(), "a new epoch has its own odometry");
+}
+
+#[test]
+fn another_map_starts_afresh() {
+    let (motion, r1) = motion();
+    motion.fixed(&r1, at(1_000_000_000, 3.0), &fix(10.0)).unwrap();
+    let there = Moment { map: "cellar", ..at(2_000_000_000, 3.0) };
+    assert!(motion.grounds(&r1, there).is_none());
+}
+
+#[test]
+fn without_odometry_the_fix_is_the_pose() {
+    let (motion, r1) = motion();
+    let still = Moment { odometry: None, ..at(1_000_000_000, 0.0) };
+    let pose = motion.fixed(&r1, still, &fix(10.0)).unwrap();
+    assert_eq!(pose.modalities, ["landmarks"]);
+    assert!((pose.map_from_robot.unwrap().pose.unwrap().x_m - 10.0).abs() < 1e-12);
+}
+
+/// The rendered corridor with its walls as the map `hall`, without any landmark.
+fn walled() -> (Motion, Name, Building) {
+    let building = Building::corridor(7);
+    let wall = |w: &WallSegment| crate::store::load::wall(&[w.a_m.x, w.a_m.y, w.b_m.x, w.b_m.y]).unwrap();
+    let walls: Vec<_> = building.walls().iter().map(wall).collect();
+    let wall_index = Arc::new(WallIndex::new(&walls));
+    let (motion, r1) = motion();
+    motion.snapshots.publish(Arc::new(MapSnapshot { walls, wall_index, ..MapSnapshot::empty("hall", 1) }));
+    (motion, r1, building)
+}
+
+/// What a robot at a pose measures; odometry is 5 m behind.
+fn scan_at(building: &Building, seq: u64, at: &Pose2) -> Bytes {
+    let scan = sim::laser::scan(building, at, &LaserParams::default(), seq);
+    let mount = scan.robot_from_laser();
+    v1::Scan {
+        epoch: 1,
+        seq,
+        captured_ns: seq as i64 * 1_000_000_000,
+        odom_from_robot: Some(v1::Pose2 { x_m: at.x_m - 5.0, y_m: at.y_m, theta_rad: at.theta_rad }),
+        robot_from_laser: Some(v1::Pose2 { x_m: mount.x_m, y_m: mount.y_m, theta_rad: mount.theta_rad }),
+        first_bearing_rad: scan.bearing_rad(0),
+        bearing_step_rad: scan.bearing_step_rad(),
+        max_range_m: scan.max_range_m(),
+        ranges_m: scan.ranges_m().to_vec(),
+    }
+    .encode_to_vec()
+    .into()
+}
+
+fn laid(motion: &Motion) -> Option<v1::RobotPose> {
+    let (robot, job) = motion.scans().take().unwrap();
+    motion.laser(&robot, &job)
+}
+
+#[test]
+fn scans_correct_a_pose_and_never_start_one() {
+    let (motion, r1, building) = walled();
+    motion.scan(&r1, scan_at(&building, 1, &Pose2::new(12.0, 0.1, 0.0)));
+    assert!(laid(&motion).is_none());
+    assert_eq!(motion.corrections(&r1).totals["laser"], [("no_pose", 1)].into());
+    assert!(motion.corrections(&r1).modalities.is_empty());
+    // Landmarks say 8 cm too far to the left, and how little they know.
+    let pose = Pose2Covariance { pose: Pose2::new(12.0, 0.18, 0.0), covariance: Matrix3::identity() * 0.01 };
+    let unsure = Fix { pose, noise: pose.covariance, ..fix(0.0) };
+    let first = Moment { captured_ns: 1_000_000_000, odometry: None, ..at(0, 0.0) };
+    let started = motion.fixed(&r1, first, &unsure).unwrap();
+    assert_eq!(started.modalities, ["odometry", "landmarks"]);
+    motion.scan(&r1, scan_at(&building, 2, &Pose2::new(12.1, 0.1, 0.0)));
+    motion.scan(&r1, scan_at(&building, 3, &Pose2::new(12.2, 0.1, 0.0)));
+    let pose = laid(&motion).unwrap();
+    assert_eq!((pose.laser_corrections, pose.corrections), (1, 1));
+    assert_eq!(pose.modalities, ["odometry", "landmarks", "laser"]);
+    let at = pose.map_from_robot.unwrap();
+    let y_m = at.pose.unwrap().y_m;
+    assert!((y_m - 0.1).abs() < 0.03 && at.covariance[4].sqrt() < 0.03, "{at:?}");
+    // Standing there another scan tells nothing new.
+    motion.scan(&r1, scan_at(&building, 4, &Pose2::new(12.2, 0.1, 0.0)));
+    assert!(laid(&motion).is_none());
+    let log = motion.corrections(&r1);
+    let ends = [("applied", 1), ("no_pose", 1), ("repeated", 1), ("superseded", 1)];
+    assert_eq!(log.totals["laser"], ends.into());
+    let words: Vec<_> = log.corrections.iter().map(|c| (c.modality, c.outcome)).collect();
+    assert_eq!(words, [("landmarks", "started"), ("laser", "applied")]);
+    let across_m = log.corrections[1].across_m.unwrap();
+    assert!((across_m + 0.08).abs() < 0.03 && log.corrections[1].chi2.is_some(), "{log:?}");
+}
+
+#[test]
+fn after_ten_metres_a_pose_rests_on_odometry_alone() {
+    let (motion, r1, _) = walled();
+    motion.odometry(&r1, odometry(1, 0.0));
+    motion.fixed(&r1, Moment { odometry: None, ..at(1_000_000_000, 0.0) }, &fix(3.0)).unwrap();
+    let after = |seq, x_m| motion.odometry(&r1, odometry(seq, x_m)).unwrap().modalities;
+    assert_eq!(after(2, 5.0), ["odometry", "landmarks"]);
+    assert_eq!(after(3, RESTS_ON_M), ["odometry", "landmarks"]);
+    assert_eq!(after(4, RESTS_ON_M + 0.01), ["odometry"]);
+}
+
+#[test]
+fn scans_that_tell_nothing_are_counted_with_the_reason() {
+    let (motion, r1, building) = walled();
+    motion.fixed(&r1, at(1_000_000_000, 7.0), &fix(12.0)).unwrap();
+    let counted = || motion.corrections(&r1).totals["laser"].clone();
+    // Where the robot is not.
+    motion.scan(&r1, scan_at(&building, 2, &Pose2::new(1.0, 1.0, 2.0)));
+    assert!(laid(&motion).is_none());
+    assert_eq!(counted().values().sum::<u64>(), 1, "{:?}", counted());
+    assert!(!counted().contains_key("applied"));
+    motion.snapshots.publish(Arc::new(MapSnapshot::empty("hall", 2)));
+    motion.scan(&r1, scan_at(&building, 3, &Pose2::new(12.0, 1.0, 0.0)));
+    assert!(laid(&motion).is_none());
+    assert_eq!(counted()["no_walls"], 1);
+}
+
+#[test]
+fn an_epoch_that_is_over_says_nothing_more() {
+    let (motion, r1) = motion();
+    motion.fixed(&r1, at(1_000_000_000, 3.0), &fix(10.0)).unwrap();
+    let anew = Moment { epoch: 2, ..at(2_000_000_000, 0.0) };
+    motion.fixed(&r1, anew, &fix(20.0)).unwrap();
+    assert!(motion.fixed(&r1, at(3_000_000_000, 4.0), &fix(11.0)).is_none());
+    assert!((motion.pose(&r1, "hall").unwrap().pose.x_m - 20.0).abs() < 1e-9);
+}

@@ -1,0 +1,190 @@
+//! Claim: a robot that sees a single landmark and has odometry and a laser is localised on a map with walls: across a
+//! corridor by centimetres however far it drives, in a room in all directions. A scan alone starts nothing, the first
+//! frames that show a unique landmark do, and every correction can be read.
+
+use client::{Capture, Delivery, RobotClient, RobotOptions, v1};
+use map::pose2::Pose2;
+use reqwest::StatusCode;
+use serde_json::Value;
+use server::config::Limits;
+use sim::{
+    building::Building,
+    corridor::CorridorParams,
+    drive::{DriveParams, Step},
+    robot::{Robot, RobotParams, Sighting},
+};
+use std::{
+    sync::Arc,
+    time::{SystemTime, UNIX_EPOCH},
+};
+use tests::{
+    Inside, SOON, eventually,
+    robots::{MAP, call, jpeg, put_walls, scan_message, teach},
+};
+
+/// Frames that show the landmark until there is a pose.
+const FIRST_FIX_FRAMES: usize = 3;
+
+struct Run {
+    inside: Inside,
+    building: Arc<Building>,
+    client: RobotClient,
+    robot: Robot,
+    poses: tokio::sync::broadcast::Receiver<v1::RobotPose>,
+    scans: u64,
+    last: Option<v1::RobotPose>,
+}
+
+impl Run {
+    /// A building with one landmark taught, and a robot at the start of its drive.
+    async fn start(params: &CorridorParams, drive: DriveParams) -> Self {
+        let inside = Inside::start(Limits::default()).await;
+        let building = Arc::new(Building::corridor_with(params, 3));
+        inside.maps().create_map(MAP, None).await.expect("map");
+        put_walls(&inside, &building).await;
+        teach(&inside, &building, &["poster-0"], 6).await;
+        inside.maps().put_robot("r1", MAP).await.expect("robot");
+        let options = RobotOptions {
+            delivery: Delivery::Every,
+            ..RobotOptions::new(&inside.server.zenoh_endpoint, "default", "r1")
+        };
+        let client = RobotClient::connect(&options).await.expect("connected");
+        let robot = Robot::new(building.clone(), &RobotParams { drive, ..RobotParams::default() });
+        let poses = client.poses();
+        Self { inside, building, client, robot, poses, scans: 0, last: None }
+    }
+
+    async fn corrections(&self) -> Value {
+        let (status, log) = call(&self.inside, "GET", "/robots/r1/corrections", None).await;
+        assert_eq!(status, StatusCode::OK, "{log}");
+        log
+    }
+
+    /// Sends a scan and waits until the server has done with it.
+    async fn scan(&mut self, seen: &Sighting) {
+        self.client.publish_scan(scan_message(seen, now_ns())).await.expect("sent");
+        self.scans += 1;
+        eventually("the scan is dealt with", || async {
+            let log = self.corrections().await;
+            let ends = log["totals"]["laser"].as_object()?;
+            (ends.values().filter_map(Value::as_u64).sum::<u64>() == self.scans).then_some(())
+        })
+        .await;
+    }
+
+    /// Sends a frame; whether the landmark was named in it.
+    async fn frame(&mut self, seen: &Sighting) -> bool {
+        let capture = Capture::encoded(jpeg(&seen.frame.image))
+            .expect("a picture")
+            .with_intrinsics(sim::camera::Camera::vga().intrinsics())
+            .with_mounting(&seen.step.robot_from_camera)
+            .with_odometry(&seen.step.odom_from_robot)
+            .with_deadline_ms(60_000);
+        let answer = self.client.recognise("front", capture, SOON).await.expect("an answer");
+        answer.quads.iter().any(|q| q.landmark == "poster-0")
+    }
+
+    /// The pose after an odometry message, of this moment.
+    async fn pose(&mut self, step: &Step) -> Option<v1::RobotPose> {
+        let before = now_ns();
+        self.client.publish_odometry(&step.odom_from_robot).await.expect("sent");
+        self.last.as_ref()?;
+        let newest = async {
+            loop {
+                let pose = self.poses.recv().await.expect("poses");
+                if pose.captured_ns >= before {
+                    return pose;
+                }
+            }
+        };
+        Some(tokio::time::timeout(SOON, newest).await.expect("a pose"))
+    }
+}
+
+fn now_ns() -> i64 {
+    SystemTime::now().duration_since(UNIX_EPOCH).expect("after 1970").as_nanos() as i64
+}
+
+/// Of a pose on the wire: error along x, y and in the heading, each in metres or radians.
+fn errors(pose: &v1::RobotPose, truth: &Pose2) -> [f64; 3] {
+    let at = pose.map_from_robot.as_ref().and_then(|p| p.pose).expect("a pose");
+    let e = Pose2::new(at.x_m, at.y_m, at.theta_rad).minus(truth);
+    [e.x, e.y, e.z]
+}
+
+/// Drives; at each step a scan, and a frame where the camera looks at the landmark. Errors after the first fix.
+async fn drive(run: &mut Run, every: usize) -> Vec<[f64; 3]> {
+    let mut steps = Vec::new();
+    while let Some(step) = run.robot.drive_mut().next() {
+        steps.push(step);
+    }
+    let (mut shown, mut errors_after) = (0, Vec::new());
+    for step in steps.iter().step_by(every) {
+        let seen = run.robot.look(step);
+        run.scan(&seen).await;
+        let looks = step.target.as_deref() == Some("poster-0");
+        if run.last.is_none() {
+            let log = run.corrections().await;
+            assert_eq!(log["totals"]["laser"]["applied"], Value::Null, "a scan started something: {log}");
+        }
+        if looks && run.frame(&seen).await {
+            shown += 1;
+            if run.last.is_none() {
+                let fixed = run.corrections().await["totals"]["landmarks"]["started"] == 1;
+                assert!(
+                    fixed || shown < FIRST_FIX_FRAMES,
+                    "no pose after {shown} frames that show the landmark"
+                );
+                run.last = fixed.then(v1::RobotPose::default);
+            }
+        }
+        if let Some(pose) = run.pose(step).await {
+            errors_after.push(errors(&pose, &step.map_from_robot));
+            run.last = Some(pose);
+        }
+    }
+    errors_after
+}
+
+fn rms(errors: &[[f64; 3]], of: usize) -> f64 {
+    (errors.iter().map(|e| e[of] * e[of]).sum::<f64>() / errors.len() as f64).sqrt()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn in_a_corridor_the_laser_keeps_a_robot_off_the_walls() {
+    let params = CorridorParams { posters: 1, column: false, ..CorridorParams::default() };
+    let drive_params = DriveParams { start_m: 9.0, ..DriveParams::default() };
+    let mut run = Run::start(&params, drive_params).await;
+    let errors = drive(&mut run, 2).await;
+    assert!(errors.len() > 40, "{}", errors.len());
+    let (across, heading) = (rms(&errors, 1), rms(&errors, 2));
+    assert!(across < 0.03 && heading < 0.01, "{across} m across, {heading} rad");
+    let log = run.corrections().await;
+    let ends = &log["totals"]["laser"];
+    assert!(ends["applied"].as_u64() > Some(40), "{ends}");
+    let modalities: Vec<_> = log["modalities"].as_array().expect("as promised").iter().collect();
+    assert!(modalities.contains(&&Value::from("laser")), "{log}");
+    let each = log["corrections"].as_array().expect("as promised");
+    let first = each.iter().find(|c| c["outcome"] == "started").expect("a first fix");
+    assert_eq!((&first["modality"], &first["landmarks"][0]), (&"landmarks".into(), &"poster-0".into()));
+    assert!(
+        each.iter().any(|c| c["modality"] == "laser" && c["chi2"].is_number() && c["across_m"].is_number())
+    );
+    let (status, _) = call(&run.inside, "GET", "/robots/nobody/corrections", None).await;
+    assert_eq!(status, StatusCode::NOT_FOUND);
+    run.client.close().await.expect("closed");
+    run.inside.server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn in_a_room_the_laser_tells_everything_once_a_landmark_told_where() {
+    let params = CorridorParams { posters: 1, length_m: 9.0, width_m: 5.0, ..CorridorParams::default() };
+    let mut run = Run::start(&params, DriveParams { legs: 2, ..DriveParams::default() }).await;
+    let errors = drive(&mut run, 2).await;
+    assert!(errors.len() > 40, "{}", errors.len());
+    let [x, y, heading] = [0, 1, 2].map(|k| rms(&errors, k));
+    assert!(x < 0.03 && y < 0.03 && heading < 0.01, "{x} m, {y} m, {heading} rad");
+    assert_eq!(run.building.posters().count(), 1);
+    run.client.close().await.expect("closed");
+    run.inside.server.stop().await;
+}

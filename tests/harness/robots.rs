@@ -1,0 +1,100 @@
+//! A simulated robot against a server: its building as a map, its landmarks taught, what it measures as messages.
+
+use crate::{Inside, SOON};
+use client::{
+    lessons::{Place, Size},
+    map::Extent,
+    v1,
+};
+use image::{ExtendedColorType, codecs::jpeg::JpegEncoder};
+use reqwest::{Client, Method, StatusCode};
+use serde_json::{Value, json};
+use sim::{
+    building::Building,
+    lesson::{LessonParams, stops},
+    robot::{Robot, RobotParams, Sighting},
+    truth::ViewState,
+};
+use std::sync::Arc;
+use vision::frame::GrayImage;
+
+/// The map of the building.
+pub const MAP: &str = "building";
+
+/// A grey image as a JPEG file.
+pub fn jpeg(image: &GrayImage) -> Vec<u8> {
+    let mut out = Vec::new();
+    let (width, height) = (image.width() as u32, image.height() as u32);
+    JpegEncoder::new_with_quality(&mut out, 90)
+        .encode(image.data(), width, height, ExtendedColorType::L8)
+        .expect("in memory");
+    out
+}
+
+/// A request to the server's interface: status and JSON.
+pub async fn call(inside: &Inside, method: &str, path: &str, body: Option<Value>) -> (StatusCode, Value) {
+    let method: Method = method.parse().expect("a method");
+    let request = Client::new().request(method, format!("{}/api/v1{path}", inside.url()));
+    let request = match body {
+        Some(body) => request.json(&body),
+        None => request,
+    };
+    let answer = request.send().await.expect("an answer");
+    (answer.status(), answer.json().await.unwrap_or_default())
+}
+
+/// The building's walls as those of the map.
+pub async fn put_walls(inside: &Inside, building: &Building) {
+    let walls: Vec<_> = building
+        .walls()
+        .iter()
+        .map(|w| json!({ "a": [w.a_m.x, w.a_m.y], "b": [w.b_m.x, w.b_m.y] }))
+        .collect();
+    let path = format!("/maps/{MAP}/laser");
+    assert_eq!(call(inside, "PUT", &path, Some(json!({ "segments": walls }))).await.0, StatusCode::OK);
+}
+
+/// Teaches landmarks of the building, each from `views` photographs, at their true places.
+pub async fn teach(inside: &Inside, building: &Arc<Building>, names: &[&str], views: usize) {
+    let maps = inside.maps();
+    for name in names {
+        let truth = building.landmark(name).expect("a landmark of the building");
+        let centre = truth.map_from_landmark.translation.vector;
+        let outward = truth.map_from_landmark.rotation * nalgebra::Vector3::x();
+        let place =
+            Place { x_m: centre.x, y_m: centre.y, z_m: centre.z, theta_rad: outward.y.atan2(outward.x) };
+        let size = Size { width_m: truth.width_m, height_m: truth.height_m };
+        maps.add_landmark(MAP, name, Some(size), Some(place)).await.expect("landmark");
+    }
+    let mut robot = Robot::new(building.clone(), &RobotParams::default());
+    for stop in stops(building, &LessonParams { seed: 1, views, ..LessonParams::default() }) {
+        if !names.contains(&stop.landmark.as_str()) {
+            continue;
+        }
+        let seen = robot.look(&stop.step);
+        let view = seen.frame.truth.landmark(&stop.landmark).filter(|v| v.state == ViewState::Full);
+        if let Some(view) = view {
+            let corners = Extent::Corners(view.corners_px.into());
+            let view = maps.upload_view(MAP, &stop.landmark, jpeg(&seen.frame.image), corners).await;
+            view.expect("view");
+        }
+    }
+    let job = maps.learn(MAP, None, None).await.expect("job");
+    maps.wait_for_job(job, 3 * SOON, |_| {}).await.expect("the lesson ends");
+}
+
+/// What the laser measured, as a message.
+pub fn scan_message(seen: &Sighting, captured_ns: i64) -> v1::Scan {
+    let pose = |p: &map::pose2::Pose2| v1::Pose2 { x_m: p.x_m, y_m: p.y_m, theta_rad: p.theta_rad };
+    let scan = &seen.scan;
+    v1::Scan {
+        captured_ns,
+        odom_from_robot: Some(pose(&seen.step.odom_from_robot)),
+        robot_from_laser: Some(pose(scan.robot_from_laser())),
+        first_bearing_rad: scan.bearing_rad(0),
+        bearing_step_rad: scan.bearing_step_rad(),
+        max_range_m: scan.max_range_m(),
+        ranges_m: scan.ranges_m().to_vec(),
+        ..v1::Scan::default()
+    }
+}
