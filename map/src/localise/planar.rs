@@ -1,7 +1,7 @@
 //! The corners of all sightings as a function of the robot's pose on the floor, and the descent to the nearest minimum
 //! (method 13.6 [M] (b)). Lasting errors (places, mounting) enter the weights, so nothing is trusted beyond its word.
 
-use super::{NuisanceKey, Sighting};
+use super::{NuisanceKey, Sighting, predict::corners};
 use crate::{mounting::Mounting, pose2::Pose2};
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Matrix3x6, Matrix6, Point2, SMatrix, Vector3};
 use vision::localise::{
@@ -14,7 +14,30 @@ pub(super) const MAX_STEPS: usize = 40;
 /// A step below this (metres and radians) ends it.
 const STEP_TOLERANCE: f64 = 1e-10;
 
-/// Residuals and derivatives at one pose; two rows a corner, eight a sighting.
+/// Residuals and their change with the pose; two rows a corner, eight a sighting.
+pub(super) struct Look {
+    /// Seen minus predicted, pixels.
+    pub residual: DVector<f64>,
+    /// By (x, y, theta).
+    pub by_pose: DMatrix<f64>,
+}
+
+impl Look {
+    /// Weighted squared residual.
+    pub(super) fn chi2(&self, weight: &DMatrix<f64>) -> f64 {
+        self.residual.dot(&(weight * &self.residual))
+    }
+}
+
+/// Where a descent ended.
+pub(super) struct Descended {
+    pub pose: Pose2,
+    /// There.
+    pub look: Look,
+    pub chi2: f64,
+}
+
+/// Residuals and all derivatives at one pose.
 pub(super) struct Linear {
     /// Seen minus predicted, pixels.
     pub residual: DVector<f64>,
@@ -29,11 +52,20 @@ pub(super) struct Planar<'a> {
     sightings: &'a [Sighting<'a>],
     mounting: &'a Mounting,
     camera_from_robot: Isometry3<f64>,
+    /// Corners of each landmark, map frame.
+    corners_m: Vec<[Vector3<f64>; 4]>,
 }
 
 impl<'a> Planar<'a> {
     pub(super) fn new(sightings: &'a [Sighting<'a>], mounting: &'a Mounting) -> Self {
-        Self { sightings, mounting, camera_from_robot: mounting.robot_from_camera.inverse() }
+        let corners = |s: &Sighting<'_>| {
+            let map_from_landmark = s.place.map_from_landmark();
+            let in_map =
+                |p: Vector3<f64>| map_from_landmark.rotation * p + map_from_landmark.translation.vector;
+            corner_points(&s.place.size).map(in_map)
+        };
+        let camera_from_robot = mounting.robot_from_camera.inverse();
+        Self { sightings, mounting, camera_from_robot, corners_m: sightings.iter().map(corners).collect() }
     }
 
     /// Degrees of freedom of the residual.
@@ -81,43 +113,38 @@ impl<'a> Planar<'a> {
         (Pose2::new(t.x, t.y, r[(1, 0)].atan2(r[(0, 0)])), map_from_robot)
     }
 
-    /// Residuals and derivatives; `None` when a corner is behind the camera.
-    pub(super) fn linearise(&self, pose: &Pose2) -> Option<Linear> {
-        let n = self.sightings.len();
-        let mut made = Linear {
-            residual: DVector::zeros(8 * n),
-            by_pose: DMatrix::zeros(8 * n, 3),
-            by_nuisance: DMatrix::zeros(8 * n, 6 * (n + 1)),
-        };
+    /// Residuals and their change with the pose; `None` when a corner is behind the camera.
+    pub(super) fn look(&self, pose: &Pose2) -> Option<Look> {
+        let rows = 8 * self.sightings.len();
+        let mut made = Look { residual: DVector::zeros(rows), by_pose: DMatrix::zeros(rows, 3) };
         let map_from_robot = pose.to_isometry3();
         let camera_from_map = self.camera_from_robot * map_from_robot.inverse();
         let turn = camera_from_map.rotation.to_rotation_matrix().into_inner();
-        let robot_turn = self.camera_from_robot.rotation.to_rotation_matrix().into_inner();
-        for (i, sighting) in self.sightings.iter().enumerate() {
-            let map_from_landmark = sighting.place.map_from_landmark();
-            let camera_from_landmark = camera_from_map * map_from_landmark;
+        for (i, (sighting, corners)) in self.sightings.iter().zip(&self.corners_m).enumerate() {
             let measured = &sighting.seen.measured;
-            for (c, point) in corner_points(&sighting.place.size).iter().enumerate() {
-                let seen = project(&camera_from_landmark, point, &measured.camera)?;
+            for (c, (point, px)) in corners.iter().zip(measured.corners_px.points()).enumerate() {
                 let row = 8 * i + 2 * c;
-                let error = measured.corners_px.points()[c] - seen.px;
-                made.residual.fixed_rows_mut::<2>(row).copy_from(&error);
-                let arm = map_from_landmark.rotation * point;
-                let in_map = arm + map_from_landmark.translation.vector;
-                let from_robot = in_map - map_from_robot.translation.vector;
+                let seen = project(&camera_from_map, point, &measured.camera)?;
+                made.residual.fixed_rows_mut::<2>(row).copy_from(&(px - seen.px));
+                let from_robot = point - map_from_robot.translation.vector;
                 let by_pose = seen.by_point * point_by_pose(&turn, &from_robot);
                 made.by_pose.view_mut((row, 0), (2, 3)).copy_from(&by_pose);
-                let sides = map_from_landmark.rotation.to_rotation_matrix().into_inner();
-                let by_place =
-                    seen.by_point * turn * point_by_place(&arm, &sides, point, &sighting.place.size);
-                made.by_nuisance.view_mut((row, 6 * i), (2, 6)).copy_from(&by_place);
-                let from_camera = map_from_robot.inverse_transform_vector(&from_robot)
-                    - self.mounting.robot_from_camera.translation.vector;
-                let by_mounting = seen.by_point * point_by_mounting(&robot_turn, &from_camera);
-                made.by_nuisance.view_mut((row, 6 * n), (2, 6)).copy_from(&by_mounting);
             }
         }
         Some(made)
+    }
+
+    /// Residuals and all derivatives; `None` when a corner is behind the camera.
+    pub(super) fn linearise(&self, pose: &Pose2) -> Option<Linear> {
+        let n = self.sightings.len();
+        let Look { residual, by_pose } = self.look(pose)?;
+        let mut by_nuisance = DMatrix::zeros(8 * n, 6 * (n + 1));
+        for (i, sighting) in self.sightings.iter().enumerate() {
+            let seen = corners(pose, sighting.place, self.mounting, &sighting.seen.measured.camera)?;
+            by_nuisance.view_mut((8 * i, 6 * i), (8, 6)).copy_from(&seen.place);
+            by_nuisance.view_mut((8 * i, 6 * n), (8, 6)).copy_from(&seen.mounting);
+        }
+        Some(Linear { residual, by_pose, by_nuisance })
     }
 
     /// Inverse covariance of the residual: corners plus lasting errors.
@@ -144,13 +171,6 @@ impl<'a> Planar<'a> {
         s
     }
 
-    /// Weighted squared residual; infinite where a corner is not in front of the camera.
-    pub(super) fn chi2(&self, pose: &Pose2, weight: &DMatrix<f64>) -> f64 {
-        let Some(at) = self.linearise(pose) else { return f64::INFINITY };
-        let chi2 = at.residual.dot(&(weight * &at.residual));
-        if chi2.is_nan() { f64::INFINITY } else { chi2 }
-    }
-
     /// Levenberg-Marquardt over (x, y, theta), or over (x, y) alone.
     pub(super) fn descend(
         &self,
@@ -158,16 +178,16 @@ impl<'a> Planar<'a> {
         weight: &DMatrix<f64>,
         turn: bool,
         steps: usize,
-    ) -> Option<Pose2> {
-        let (mut pose, mut damping) = (start, 1e-6);
-        let mut cost = self.chi2(&pose, weight);
-        if !cost.is_finite() {
-            return None;
-        }
+    ) -> Option<Descended> {
+        let at = |pose: Pose2| {
+            let look = self.look(&pose)?;
+            let chi2 = look.chi2(weight);
+            chi2.is_finite().then_some(Descended { pose, look, chi2 })
+        };
+        let (mut here, mut damping) = (at(start)?, 1e-6);
         for _ in 0..steps {
-            let at = self.linearise(&pose)?;
-            let jw = at.by_pose.transpose() * weight;
-            let (h, g) = (&jw * &at.by_pose, &jw * &at.residual);
+            let jw = here.look.by_pose.transpose() * weight;
+            let (h, g) = (&jw * &here.look.by_pose, &jw * &here.look.residual);
             let mut h = Matrix3::from_iterator(h.iter().copied());
             let mut g = Vector3::from_iterator(g.iter().copied());
             if !turn {
@@ -178,18 +198,15 @@ impl<'a> Planar<'a> {
                 h[(k, k)] *= 1.0 + damping;
             }
             let step = h.cholesky()?.solve(&g);
-            let next = pose.plus(&step);
-            let next_cost = self.chi2(&next, weight);
-            if next_cost <= cost {
-                (pose, cost, damping) = (next, next_cost, (damping * 0.1).max(1e-12));
-            } else {
-                damping *= 10.0;
+            match at(here.pose.plus(&step)).filter(|next| next.chi2 <= here.chi2) {
+                Some(next) => (here, damping) = (next, (damping * 0.1).max(1e-12)),
+                None => damping *= 10.0,
             }
             if step.norm() < STEP_TOLERANCE || damping > 1e9 {
                 break;
             }
         }
-        Some(pose)
+        Some(here)
     }
 }
 

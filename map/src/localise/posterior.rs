@@ -6,7 +6,7 @@
 //!
 //! Departs from method 13.6, which takes the covariance to first order.
 
-use super::planar::Planar;
+use super::planar::{Descended, Planar};
 use crate::pose2::Pose2;
 use nalgebra::{DMatrix, Matrix2, Matrix3, Point2, Vector2, Vector3};
 
@@ -48,7 +48,8 @@ pub(super) fn moments(
 ) -> Option<Moments> {
     let pivot = problem.pivot();
     let step = (REACH_SIGMA * sigma_rad / HALF_POINTS as f64).clamp(1e-9, MAX_TURN_RAD / HALF_POINTS as f64);
-    let centre = sample(problem, weight, *at)?;
+    // No step: a look where it is.
+    let centre = sample(problem.descend(*at, weight, false, 0)?, weight)?;
     let lowest = centre.chi2;
     let mut samples = vec![centre];
     for direction in [-1.0, 1.0] {
@@ -61,8 +62,8 @@ pub(super) fn moments(
                 break;
             }
             let start = turned(&pose, &pivot, direction * step);
-            let Some(refitted) = problem.descend(start, weight, false, REFIT_STEPS) else { break };
-            let Some(made) = sample(problem, weight, refitted) else { break };
+            let refitted = problem.descend(start, weight, false, REFIT_STEPS);
+            let Some(made) = refitted.and_then(|r| sample(r, weight)) else { break };
             pose = made.pose;
             let far = made.chi2 - lowest > RISE_CHI2;
             samples.push(made);
@@ -81,13 +82,11 @@ pub(super) fn turned(pose: &Pose2, pivot: &Point2<f64>, by_rad: f64) -> Pose2 {
     Pose2::new(pivot.x + c * d.x - s * d.y, pivot.y + s * d.x + c * d.y, pose.theta_rad + by_rad)
 }
 
-fn sample(problem: &Planar<'_>, weight: &DMatrix<f64>, pose: Pose2) -> Option<Sample> {
-    let at = problem.linearise(&pose)?;
-    let chi2 = at.residual.dot(&(weight * &at.residual));
-    let j = at.by_pose.columns(0, 2);
+fn sample(Descended { pose, look, chi2 }: Descended, weight: &DMatrix<f64>) -> Option<Sample> {
+    let j = look.by_pose.columns(0, 2);
     let h = j.transpose() * weight * j;
     let position = Matrix2::new(h[(0, 0)], h[(0, 1)], h[(1, 0)], h[(1, 1)]).cholesky()?.inverse();
-    chi2.is_finite().then_some(Sample { pose, chi2, position })
+    Some(Sample { pose, chi2, position })
 }
 
 fn integrate(samples: &[Sample], at: &Pose2, lowest: f64) -> Option<Moments> {

@@ -12,8 +12,8 @@ use crate::{
 };
 use nalgebra::{DMatrix, Isometry3, Matrix3, Matrix3x6, Rotation3, UnitQuaternion, Vector3};
 
-/// Two minima nearer than this (metres and radians) are one.
-const SAME_POSE: f64 = 1e-4;
+/// Two minima nearer than this (metres and radians) are one, and a descent that comes so near one ends in it.
+const SAME_POSE: f64 = 1e-3;
 /// Points on the way from one minimum to another.
 const PATH_POINTS: usize = 24;
 
@@ -84,17 +84,21 @@ fn minima(problem: &Planar<'_>, sightings: &[Sighting<'_>]) -> Vec<Minimum> {
 }
 
 fn add(problem: &Planar<'_>, found: &mut Vec<Minimum>, start: Pose2) {
+    let weight_at = |pose: &Pose2| problem.linearise(pose).and_then(|at| problem.weight(&at));
     let mut pose = start;
     // The weight depends a little on the pose: refresh it once.
     for _ in 0..2 {
-        let Some(weight) = problem.linearise(&pose).and_then(|at| problem.weight(&at)) else { return };
+        let Some(weight) = weight_at(&pose) else { return };
         let Some(next) = problem.descend(pose, &weight, true, MAX_STEPS) else { return };
-        pose = next;
+        pose = next.pose;
+        if found.iter().any(|m| m.pose.minus(&pose).norm() < SAME_POSE) {
+            return;
+        }
     }
-    let Some(weight) = problem.linearise(&pose).and_then(|at| problem.weight(&at)) else { return };
-    let chi2 = problem.chi2(&pose, &weight);
-    let new = found.iter().all(|m| m.pose.minus(&pose).norm() > SAME_POSE);
-    if chi2.is_finite() && new && problem.sees_fronts(&pose) {
+    let Some(weight) = weight_at(&pose) else { return };
+    let Some(look) = problem.look(&pose) else { return };
+    let chi2 = look.chi2(&weight);
+    if chi2.is_finite() && problem.sees_fronts(&pose) {
         found.push(Minimum { pose, weight, chi2, limit_rad: (f64::NEG_INFINITY, f64::INFINITY) });
     }
 }
@@ -150,11 +154,11 @@ fn pass(problem: &Planar<'_>, from: &Minimum, to: &Minimum) -> (f64, f64) {
         let Some(next) = problem.descend(start, &from.weight, false, 3) else {
             return (step * i as f64, f64::INFINITY);
         };
-        let rise = problem.chi2(&next, &from.weight) - to.chi2;
+        let rise = next.chi2 - to.chi2;
         if rise > top.1 {
             top = (step * i as f64, rise);
         }
-        pose = next;
+        pose = next.pose;
     }
     top
 }
@@ -231,7 +235,7 @@ fn fix(
 
 /// `(J^T W J)^-1` over (x, y, theta).
 fn local_covariance(problem: &Planar<'_>, pose: &Pose2, weight: &DMatrix<f64>) -> Option<Matrix3<f64>> {
-    let at = problem.linearise(pose)?;
+    let at = problem.look(pose)?;
     let h = at.by_pose.transpose() * weight * &at.by_pose;
     Some(Matrix3::from_iterator(h.iter().copied()).cholesky()?.inverse())
 }
