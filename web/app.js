@@ -344,7 +344,9 @@ async function loadMap(name) {
   Object.assign(state, { map: name, walls: laser.segments, landmarks: landmarks.items, dirty: true });
   if (state.chosen) choose(state.landmarks.find((l) => l.name === state.chosen));
   const active = state.landmarks.filter((l) => l.status === "active").length;
-  byId("map-facts").textContent = `version ${map.version}, ${active} of ${state.landmarks.length} landmarks active, ${state.walls.length} walls`;
+  const where = [map.site, map.building, map.floor].filter(Boolean).join(" / ");
+  const lies = map.parent ? `, in ${map.parent.map} at ${map.parent.x_m.toFixed(1)}, ${map.parent.y_m.toFixed(1)} m` : "";
+  byId("map-facts").textContent = `${where}${where ? ", " : ""}version ${map.version}, ${active} of ${state.landmarks.length} landmarks active, ${state.walls.length} walls${lies}`;
   byId("map-hint").textContent = state.walls.length || state.landmarks.some((l) => l.place) ? "" : "This map has no walls and no placed landmarks yet.";
   if (!state.view.fitted) fit();
   window.dispatchEvent(new CustomEvent("map-loaded", { detail: { map: name, landmarks: state.landmarks } }));
@@ -359,10 +361,29 @@ async function loadTracks(map) {
   }
 }
 
+// Maps under the site and building they belong to, floors from below; those that say nothing come first.
+function grouped(maps) {
+  const groups = new Map();
+  for (const map of maps) {
+    const key = [map.site, map.building].filter(Boolean).join(" / ");
+    groups.set(key, [...(groups.get(key) ?? []), map]);
+  }
+  const level = (map) => map.parent?.level_m ?? 0;
+  const order = (a, b) => level(a) - level(b) || (a.floor ?? "").localeCompare(b.floor ?? "") || a.name.localeCompare(b.name);
+  return [...groups].sort(([a], [b]) => a.localeCompare(b)).flatMap(([key, members]) => {
+    const options = members.sort(order).map((m) => new Option(m.floor ? `${m.floor}: ${m.name}` : m.name, m.name));
+    if (!key) return options;
+    const group = document.createElement("optgroup");
+    group.label = key;
+    group.append(...options);
+    return [group];
+  });
+}
+
 async function start() {
-  const maps = (await getJson("/maps")).items;
+  const maps = (await getJson("/maps?limit=500")).items;
   const choice = byId("map-choice");
-  choice.replaceChildren(...maps.map((m) => new Option(m.name, m.name)));
+  choice.replaceChildren(...grouped(maps));
   const asked = new URLSearchParams(location.search).get("map");
   const name = maps.some((m) => m.name === asked) ? asked : maps[0]?.name;
   if (!name) {

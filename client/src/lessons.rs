@@ -15,6 +15,51 @@ pub struct Map {
     pub landmarks: u64,
     /// Which distance decides.
     pub distance: DistanceKind,
+    /// Where it belongs.
+    #[serde(default)]
+    pub site: Option<String>,
+    /// Where it belongs.
+    #[serde(default)]
+    pub building: Option<String>,
+    /// Where it belongs.
+    #[serde(default)]
+    pub floor: Option<String>,
+    /// Where it lies in another map.
+    #[serde(default)]
+    pub parent: Option<Parent>,
+}
+
+impl Map {
+    /// Where it is, for people; empty where nobody has said it.
+    pub fn whereabouts(&self) -> String {
+        let words: Vec<&str> =
+            [&self.site, &self.building, &self.floor].into_iter().flatten().map(String::as_str).collect();
+        let lies = self.parent.as_ref().map(|p| format!("in {} at {:.2}, {:.2} m", p.map, p.x_m, p.y_m));
+        [Some(words.join(" / ")).filter(|w| !w.is_empty()), lies]
+            .into_iter()
+            .flatten()
+            .collect::<Vec<_>>()
+            .join(", ")
+    }
+}
+
+/// Where a map lies in another.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Parent {
+    /// The other map.
+    pub map: String,
+    /// Its origin there.
+    pub x_m: f64,
+    /// Its origin there.
+    pub y_m: f64,
+    /// Its x axis there.
+    pub theta_rad: f64,
+    /// Its floor above that one's.
+    #[serde(default)]
+    pub level_m: f64,
+    /// Over (x, y, theta), row-major.
+    #[serde(default)]
+    pub covariance: Option<[f64; 9]>,
 }
 
 /// One page of a list.
@@ -80,6 +125,100 @@ pub struct View {
     pub id: serde_json::Value,
     /// Corners, TL, TR, BR, BL, in pixels.
     pub corners: [[f64; 2]; 4],
+    /// In the answer to an upload: `new`, `same` (it was there), or `alike` (a near-duplicate of this one, not stored).
+    #[serde(default)]
+    pub outcome: Option<String>,
+}
+
+/// Views gathered by a robot.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Gathering {
+    /// Its number.
+    pub id: i64,
+    /// Who gathers.
+    pub robot: String,
+    /// The only landmark whose views are wanted.
+    #[serde(default)]
+    pub landmark: Option<String>,
+    /// It goes on.
+    pub open: bool,
+    /// What became of frames and quads, by name.
+    #[serde(default)]
+    pub counts: std::collections::BTreeMap<String, u64>,
+}
+
+impl Gathering {
+    /// Views kept.
+    pub fn kept(&self) -> u64 {
+        self.counts.get("kept").copied().unwrap_or_default()
+    }
+}
+
+/// A thing that a robot drove past.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Candidate {
+    /// Its number in the gathering.
+    pub number: u32,
+    /// The landmark whose views these are.
+    #[serde(default)]
+    pub landmark: Option<String>,
+    /// Numbers of its views.
+    pub views: Vec<i64>,
+    /// The view that stands best for all.
+    #[serde(default)]
+    pub best: Option<i64>,
+    /// Nothing speaks against it.
+    pub passes: bool,
+    /// What does.
+    #[serde(default)]
+    pub reasons: Vec<serde_json::Value>,
+    /// Where it hangs, if known.
+    #[serde(default)]
+    pub hangs: Option<serde_json::Value>,
+}
+
+impl Candidate {
+    /// What speaks against it, in words.
+    pub fn details(&self) -> Vec<String> {
+        self.reasons.iter().map(|r| r["detail"].as_str().unwrap_or_default().to_owned()).collect()
+    }
+
+    /// Where it hangs, in words.
+    pub fn place_text(&self) -> String {
+        let Some(hangs) = &self.hangs else { return "not placed".to_owned() };
+        let number = |field: &str| hangs[field].as_f64().unwrap_or_default();
+        let [x, y, w, h] = ["x_m", "y_m", "width_m", "height_m"].map(number);
+        format!("{w:.2} x {h:.2} m at {x:.2}, {y:.2}")
+    }
+}
+
+/// A decision on a candidate.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Pick {
+    /// Its number.
+    pub candidate: u32,
+    /// The landmark it becomes; `None` for views of one that is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+}
+
+/// A landmark that got views by a decision.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Grown {
+    /// Its name.
+    pub name: String,
+    /// How many.
+    pub views: u64,
+}
+
+/// What a decision came to.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Accepted {
+    /// The landmarks.
+    pub landmarks: Vec<Grown>,
+    /// Their lesson.
+    #[serde(default)]
+    pub job: Option<Job>,
 }
 
 /// State of a job.

@@ -2,7 +2,10 @@
 
 use crate::{
     ClientError,
-    lessons::{Job, JobState, Landmark, Map, Page, Place, Problem, Robot, Size, View},
+    lessons::{
+        Accepted, Candidate, Gathering, Job, JobState, Landmark, Map, Page, Pick, Place, Problem, Robot,
+        Size, View,
+    },
 };
 use reqwest::{
     Method, RequestBuilder, Response,
@@ -52,6 +55,31 @@ impl MapClient {
             body["distance"] = json!(distance);
         }
         self.send(self.request(Method::POST, "/maps").json(&body)).await
+    }
+
+    /// Creates a map and says where it is: `site`, `building`, `floor`, `parent`, as the server's documentation has them.
+    pub async fn create_map_at(
+        &self,
+        name: &str,
+        distance: Option<DistanceKind>,
+        whereabouts: &Value,
+    ) -> Result<Map, ClientError> {
+        let mut body = whereabouts.clone();
+        body["name"] = json!(name);
+        if let Some(distance) = distance {
+            body["distance"] = json!(distance);
+        }
+        self.send(self.request(Method::POST, "/maps").json(&body)).await
+    }
+
+    /// Says where a map is; what is not named stays, null forgets.
+    pub async fn place_map(&self, name: &str, whereabouts: &Value) -> Result<Map, ClientError> {
+        self.send(self.request(Method::PATCH, &format!("/maps/{name}")).json(whereabouts)).await
+    }
+
+    /// How a map lies in another, as the server's documentation has it.
+    pub async fn transform(&self, from: &str, to: &str) -> Result<Value, ClientError> {
+        self.send(self.request(Method::GET, &format!("/maps/{from}/transform?to={to}"))).await
     }
 
     /// One map.
@@ -143,6 +171,72 @@ impl MapClient {
             body["generated_views"] = json!(views);
         }
         self.send(self.request(Method::POST, &format!("/maps/{map}/learn")).json(&body)).await
+    }
+
+    /// Begins to gather views with a robot: of one landmark, or of whatever is new (and of known landmarks, too).
+    pub async fn gather(
+        &self,
+        map: &str,
+        robot: &str,
+        landmark: Option<&str>,
+        known: bool,
+    ) -> Result<Gathering, ClientError> {
+        let body = json!({ "robot": robot, "landmark": landmark, "known": known });
+        self.send(self.request(Method::POST, &format!("/maps/{map}/gatherings")).json(&body)).await
+    }
+
+    /// Ends a gathering; what was gathered waits for a decision.
+    pub async fn stop_gathering(&self, map: &str, gathering: i64) -> Result<Gathering, ClientError> {
+        self.send(self.request(Method::POST, &format!("/maps/{map}/gatherings/{gathering}/stop"))).await
+    }
+
+    /// All gatherings of a map.
+    pub async fn gatherings(&self, map: &str) -> Result<Vec<Gathering>, ClientError> {
+        self.all(&format!("/maps/{map}/gatherings")).await
+    }
+
+    /// What waits for a decision.
+    pub async fn candidates(&self, map: &str, gathering: i64) -> Result<Vec<Candidate>, ClientError> {
+        let path = format!("/maps/{map}/gatherings/{gathering}/candidates");
+        let found: Candidates = self.send(self.request(Method::GET, &path)).await?;
+        Ok(found.candidates)
+    }
+
+    /// The rectified picture of a view of a candidate, PNG.
+    pub async fn candidate_picture(
+        &self,
+        map: &str,
+        gathering: i64,
+        candidate: u32,
+        view: i64,
+    ) -> Result<Vec<u8>, ClientError> {
+        let path = format!("/maps/{map}/gatherings/{gathering}/candidates/{candidate}/views/{view}/icon");
+        let response = self.checked(self.request(Method::GET, &path)).await?;
+        let url = response.url().to_string();
+        let bytes = response.bytes().await.map_err(|e| ClientError::Http { url, detail: reason(&e) })?;
+        Ok(bytes.to_vec())
+    }
+
+    /// Makes landmarks of candidates and begins to learn them. All or nothing.
+    pub async fn accept_candidates(
+        &self,
+        map: &str,
+        gathering: i64,
+        picks: &[Pick],
+    ) -> Result<Accepted, ClientError> {
+        let path = format!("/maps/{map}/gatherings/{gathering}/accept");
+        self.send(self.request(Method::POST, &path).json(&json!({ "candidates": picks }))).await
+    }
+
+    /// Throws a candidate away.
+    pub async fn discard_candidate(
+        &self,
+        map: &str,
+        gathering: i64,
+        candidate: u32,
+    ) -> Result<(), ClientError> {
+        let path = format!("/maps/{map}/gatherings/{gathering}/candidates/{candidate}");
+        self.checked(self.request(Method::DELETE, &path)).await.map(drop)
     }
 
     /// A job as it stands.
@@ -255,6 +349,11 @@ impl MapClient {
             detail: problem.detail.unwrap_or(problem.title),
         })
     }
+}
+
+#[derive(serde::Deserialize)]
+struct Candidates {
+    candidates: Vec<Candidate>,
 }
 
 fn image_part(image: Vec<u8>) -> Part {

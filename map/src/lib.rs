@@ -6,6 +6,7 @@
 pub mod check;
 pub mod gate;
 pub mod pose2;
+pub mod frames;
 pub mod mounting;
 pub mod laser;
 pub mod segments;

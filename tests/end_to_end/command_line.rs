@@ -22,7 +22,7 @@ use vision::{detect::quads::Corners, geometry::polygon};
 const LONGEST: Duration = Duration::from_mins(2);
 
 /// Options that each command must name in its help.
-const OPTIONS: [(&str, &[&str]); 35] = [
+const OPTIONS: [(&str, &[&str]); 42] = [
     ("demo", &["--robots", "--rate-hz", "--legs", "--seed", "--http", "--data", "--stay", "--json"]),
     ("serve", &["--config", "--data", "--http", "--zenoh", "--fleet", "--workers", "--insecure"]),
     (
@@ -46,7 +46,14 @@ const OPTIONS: [(&str, &[&str]); 35] = [
             "[IMAGES]",
         ],
     ),
-    ("map create", &["--distance", "--server", "--json", "<NAME>"]),
+    ("map create", &["--distance", "--site", "--building", "--floor", "--server", "--json", "<NAME>"]),
+    ("map place", &["--site", "--building", "--floor", "--in", "--at", "--level-m", "--server", "<NAME>"]),
+    ("gather start", &["--robot", "--landmark", "--known", "--map", "--server", "--json"]),
+    ("gather stop", &["--map", "--server", "<GATHERING>"]),
+    ("gather list", &["--map", "--server", "--json"]),
+    ("gather show", &["--pictures", "--map", "--server", "<GATHERING>"]),
+    ("gather accept", &["--map", "--server", "<GATHERING>", "<PICKS>"]),
+    ("gather discard", &["--map", "--server", "<GATHERING>", "<CANDIDATES>"]),
     ("map list", &["--server", "--json"]),
     (
         "map build",

@@ -21,7 +21,7 @@ use sim::{
     truth::{LandmarkView, ViewState},
 };
 use std::{collections::BTreeMap, sync::Arc};
-use tests::{Inside, SOON, eventually};
+use tests::{Inside, SOON, command::waymark, eventually};
 use vision::{frame::GrayImage, geometry::polygon::iou};
 
 const MAP: &str = "corridor";
@@ -230,6 +230,18 @@ async fn gather_all(inside: &Inside, client: &RobotClient, building: &Arc<Buildi
         picks.push(json!({ "candidate": candidate["number"], "name": name }));
     }
     assert!(taken.len() == 6, "{} of 6 posters were gathered", taken.len());
+    // The same at the command line, with a picture of each.
+    let folder = tempfile::tempdir().expect("a directory");
+    let pictures = folder.path().to_str().expect("text");
+    let number = gathering["id"].to_string();
+    let url = inside.url();
+    let show = ["gather", "show", &number, "--map", MAP, "--server", &url, "--pictures", pictures];
+    let shown = waymark(show, SOON);
+    let count = list(&waiting, "candidates").len();
+    assert_eq!((shown.status, shown.stdout.lines().count()), (0, count), "{shown:?}");
+    assert_eq!(std::fs::read_dir(folder.path()).expect("pictures").count(), count);
+    let listed = waymark(["gather", "list", "--map", MAP, "--server", &url], SOON);
+    assert!(listed.stdout.contains("ended with r1, of whatever is new"), "{listed:?}");
     // A picture of each can be seen.
     let first = &list(&waiting, "candidates")[0];
     let icon =

@@ -11,5 +11,6 @@ mod laser;
 mod moved_landmark;
 mod real_pictures;
 mod restart;
+mod several_maps;
 mod teach_and_recognise;
 mod tidy;

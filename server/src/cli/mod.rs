@@ -7,6 +7,7 @@ mod demo;
 mod detect;
 mod drawing;
 mod fit;
+mod gather;
 pub(crate) mod evaluate;
 pub(crate) mod mapping;
 mod parameters;
@@ -72,6 +73,15 @@ enum Command {
     /// The server finds the one dominant quad in each photograph (or takes the whole picture), learns, and says
     /// whether the landmark is in use or which gate it failed.
     Learn(teach::LearnArgs),
+    /// Let a robot gather views while it drives past, and decide on what it brought home.
+    ///
+    /// For example:
+    ///   waymark gather start --map office --robot r1
+    ///   waymark gather stop --map office 1
+    ///   waymark gather show --map office 1 --pictures candidates
+    ///   waymark gather accept --map office 1 3=poster 5=fire-plan
+    #[command(subcommand, verbatim_doc_comment)]
+    Gather(gather::Command),
     /// Ask a running server what is in photographs.
     Recognise(teach::RecogniseArgs),
     /// The paper's experiments on labelled pictures: tables for people, JSON for programs.
@@ -99,6 +109,7 @@ pub fn main() -> ExitCode {
         Command::Map(command) => run(teach::map(command)).map(|()| ExitCode::SUCCESS),
         Command::Robot(command) => run(teach::robot(command)).map(|()| ExitCode::SUCCESS),
         Command::Learn(args) => run(teach::learn(args)),
+        Command::Gather(command) => run(gather::run(command)).map(|()| ExitCode::SUCCESS),
         Command::Recognise(args) => run(teach::recognise(args)),
         Command::Evaluate(command) => evaluate::run(command).map(|()| ExitCode::SUCCESS),
         Command::Bench(args) => bench::run(args).map(|()| ExitCode::SUCCESS),

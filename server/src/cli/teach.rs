@@ -11,7 +11,7 @@ use std::{path::PathBuf, process::ExitCode, time::Duration};
 use vision::{frame::Intrinsics, recognise::DistanceKind};
 
 /// Longest wait for a lesson.
-const LESSON_TIMEOUT: Duration = Duration::from_hours(2);
+pub(super) const LESSON_TIMEOUT: Duration = Duration::from_hours(2);
 
 /// Which server.
 #[derive(Debug, Clone, clap::Args)]
@@ -24,6 +24,13 @@ pub(crate) struct ServerArgs {
     json: bool,
 }
 
+impl ServerArgs {
+    /// Its address.
+    pub(super) fn address(&self) -> &str {
+        &self.server
+    }
+}
+
 /// `waymark map`.
 #[derive(Debug, clap::Subcommand)]
 pub(crate) enum MapCommand {
@@ -34,6 +41,21 @@ pub(crate) enum MapCommand {
         /// The distance that decides in this map.
         #[arg(long, value_parser = distance)]
         distance: Option<DistanceKind>,
+        #[command(flatten)]
+        found: WhereArgs,
+        #[command(flatten)]
+        server: ServerArgs,
+    },
+    /// Say where a map belongs, and where it lies in another.
+    ///
+    /// For example, the first floor of a house whose plan is the map `house`, 3.4 m up, turned by 90 degrees:
+    ///   waymark map place floor1 --building house --floor 1st --in house --at 12.5,-3,90 --level-m 3.4
+    #[command(verbatim_doc_comment)]
+    Place {
+        /// The map.
+        name: String,
+        #[command(flatten)]
+        found: WhereArgs,
         #[command(flatten)]
         server: ServerArgs,
     },
@@ -62,10 +84,54 @@ pub(crate) enum MapCommand {
     /// The border between free and occupied cells becomes straight segments, the free side on their left. For example:
     ///   waymark map import floor.yaml --out floor.json --draw floor.svg
     ///   waymark map import floor.vectormap.txt --server $SERVER --map floor
+    ///   waymark map import plan.geojson --server $SERVER --map floor
     #[command(verbatim_doc_comment)]
     Import(mapping::import::ImportArgs),
     /// Walls as a ROS occupancy grid, a vector map or a map file.
     Export(mapping::import::ExportArgs),
+}
+
+/// Where a map is.
+#[derive(Debug, Clone, clap::Args)]
+pub(crate) struct WhereArgs {
+    /// The site it belongs to.
+    #[arg(long)]
+    site: Option<String>,
+    /// The building.
+    #[arg(long)]
+    building: Option<String>,
+    /// The floor.
+    #[arg(long)]
+    floor: Option<String>,
+    /// The map in whose frame it lies.
+    #[arg(long = "in", value_name = "MAP", requires = "at")]
+    parent: Option<String>,
+    /// Its origin and x axis there: x,y in metres, direction in degrees.
+    #[arg(long, value_name = "X,Y,DEG", value_parser = origin, requires = "parent", allow_hyphen_values = true)]
+    at: Option<[f64; 3]>,
+    /// Its floor above that one's, metres.
+    #[arg(long, default_value_t = 0.0, allow_hyphen_values = true)]
+    level_m: f64,
+}
+
+impl WhereArgs {
+    /// What is given, as the server takes it.
+    fn changes(&self) -> serde_json::Value {
+        let mut changes = serde_json::Map::new();
+        for (field, word) in [("site", &self.site), ("building", &self.building), ("floor", &self.floor)] {
+            changes.extend(word.as_ref().map(|word| (field.to_owned(), word.as_str().into())));
+        }
+        if let Some((map, [x_m, y_m, degrees])) = self.parent.as_ref().zip(self.at) {
+            let parent = serde_json::json!({ "map": map, "x_m": x_m, "y_m": y_m, "theta_rad": degrees.to_radians(),
+                "level_m": self.level_m });
+            changes.insert("parent".to_owned(), parent);
+        }
+        changes.into()
+    }
+}
+
+fn origin(text: &str) -> Result<[f64; 3], String> {
+    numbers(text, ',').ok_or_else(|| "three numbers: x,y in metres, direction in degrees".to_owned())
 }
 
 /// `waymark robot`.
@@ -155,15 +221,25 @@ fn camera(text: &str) -> Result<Intrinsics, String> {
 
 pub(crate) async fn map(command: &MapCommand) -> anyhow::Result<()> {
     match command {
-        MapCommand::Create { name, distance, server } => {
-            let map = MapClient::new(&server.server)?.create_map(name, *distance).await?;
+        MapCommand::Create { name, distance, found, server } => {
+            let maps = MapClient::new(&server.server)?;
+            let map = maps.create_map_at(name, *distance, &found.changes()).await?;
             show(server, &map, &format!("map {} created", map.name))
+        }
+        MapCommand::Place { name, found, server } => {
+            let map = MapClient::new(&server.server)?.place_map(name, &found.changes()).await?;
+            show(server, &map, &format!("{}  {}", map.name, map.whereabouts()))
         }
         MapCommand::List { server } => {
             let maps = MapClient::new(&server.server)?.maps().await?;
             let lines: Vec<String> = maps
                 .iter()
-                .map(|m| format!("{}  version {}, {}", m.name, m.version, counted(m.landmarks, "landmark")))
+                .map(|m| {
+                    let found = m.whereabouts();
+                    let gap = if found.is_empty() { "" } else { ", " };
+                    let landmarks = counted(m.landmarks, "landmark");
+                    format!("{}  version {}, {landmarks}{gap}{found}", m.name, m.version)
+                })
                 .collect();
             show(server, &maps, &lines.join("\n"))
         }
@@ -190,7 +266,11 @@ pub(crate) async fn robot(command: &RobotCommand) -> anyhow::Result<()> {
     }
 }
 
-fn show(server: &ServerArgs, value: &impl serde::Serialize, text: &str) -> anyhow::Result<()> {
+pub(super) fn show(
+    server: &ServerArgs,
+    value: &(impl serde::Serialize + ?Sized),
+    text: &str,
+) -> anyhow::Result<()> {
     if server.json {
         screen::say(&serde_json::to_string(value)?);
     } else if !text.is_empty() {
@@ -215,9 +295,19 @@ pub(crate) async fn learn(args: &LearnArgs) -> anyhow::Result<ExitCode> {
     for path in &args.images {
         let name = path.display();
         let uploaded = match std::fs::read(path) {
-            Ok(image) => {
-                maps.upload_view(map, landmark, image, extent).await.map(drop).map_err(|e| e.to_string())
-            }
+            Ok(image) => match maps.upload_view(map, landmark, image, extent).await {
+                Ok(view) => {
+                    if view.outcome.as_deref() == Some("alike") {
+                        let like = format!(
+                            "waymark: {name}: not kept, it shows nothing that view {} does not",
+                            view.id
+                        );
+                        screen::complain(&like);
+                    }
+                    Ok(())
+                }
+                Err(error) => Err(error.to_string()),
+            },
             Err(error) => Err(error.to_string()),
         };
         if let Err(error) = uploaded {
@@ -244,7 +334,7 @@ pub(crate) async fn learn(args: &LearnArgs) -> anyhow::Result<ExitCode> {
     Ok(status)
 }
 
-fn counted(count: u64, what: &str) -> String {
+pub(super) fn counted(count: u64, what: &str) -> String {
     if count == 1 { format!("1 {what}") } else { format!("{count} {what}s") }
 }
 

@@ -2,6 +2,7 @@
 //! caused by is logged, never sent.
 
 use crate::store::StoreError;
+use ::map::frames::FrameError;
 use axum::{
     http::{HeaderValue, StatusCode, header},
     response::{IntoResponse, Response},
@@ -123,6 +124,14 @@ impl From<StoreError> for ApiError {
             StoreError::Exists { .. } => Self::new(StatusCode::CONFLICT, "exists", detail).field("name"),
             StoreError::Limit { .. } => Self::new(StatusCode::CONFLICT, "too_many", detail),
             StoreError::InUse(_) => Self::new(StatusCode::CONFLICT, "in_use", detail),
+            StoreError::Frames(error) => {
+                let code = match error {
+                    FrameError::Cycle => "cycle",
+                    FrameError::TooDeep => "too_deep",
+                    FrameError::NotRelated => "not_related",
+                };
+                Self::new(StatusCode::CONFLICT, code, detail).field("parent.map")
+            }
             StoreError::Full => Self::new(StatusCode::INSUFFICIENT_STORAGE, "storage_full", detail),
             StoreError::Closed => Self::new(StatusCode::SERVICE_UNAVAILABLE, "storage_failed", detail),
             StoreError::Damaged { .. } | StoreError::Database { .. } => Self::internal(&error),

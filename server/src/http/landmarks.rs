@@ -52,7 +52,9 @@ struct Changes {
 
 /// Tells null from absent.
 #[expect(clippy::option_option, reason = "absent and null differ in a PATCH")]
-fn given<'de, D: Deserializer<'de>, T: Deserialize<'de>>(from: D) -> Result<Option<Option<T>>, D::Error> {
+pub(super) fn given<'de, D: Deserializer<'de>, T: Deserialize<'de>>(
+    from: D,
+) -> Result<Option<Option<T>>, D::Error> {
     Option::deserialize(from).map(Some)
 }
 

@@ -6,13 +6,16 @@ use crate::store::{
     load,
     maps::MapRow,
     robots::RobotRow,
+    sites::Whereabouts,
 };
 use map::{
     changes::Standing,
     check::OutOfRange,
+    frames::Link,
     place::{LandmarkPlace, PlaceSigmas},
+    pose2::{Pose2, Pose2Covariance},
 };
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use utoipa::ToSchema;
@@ -62,11 +65,83 @@ pub(super) struct Map {
     landmarks: u64,
     /// Which distance decides.
     distance: Distance,
+    /// Where it belongs.
+    site: Option<String>,
+    /// Where it belongs.
+    building: Option<String>,
+    /// Where it belongs.
+    floor: Option<String>,
+    /// Where it lies in another map.
+    parent: Option<Parent>,
 }
 
-impl From<MapRow> for Map {
-    fn from(row: MapRow) -> Self {
-        Self { name: row.name, version: row.version, landmarks: row.landmarks, distance: row.distance.into() }
+/// Where a map lies in another.
+#[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Parent {
+    /// The map in whose frame it lies.
+    pub(super) map: String,
+    /// Its origin there.
+    x_m: f64,
+    /// Its origin there.
+    y_m: f64,
+    /// Its x axis there.
+    theta_rad: f64,
+    /// Its floor above that one's, within 1000 m.
+    #[serde(default)]
+    level_m: f64,
+    /// Over (x, y, theta), row-major; absent for 5 cm and half a degree.
+    covariance: Option<[f64; 9]>,
+}
+
+/// Standard deviations of a link that says nothing of its own.
+const LINK_SIGMA: [f64; 3] = [0.05, 0.05, 0.0087];
+
+impl Parent {
+    /// Checked.
+    pub(super) fn link(self) -> Result<Link<String>, ApiError> {
+        let usual = || Matrix3::from_diagonal(&Vector3::from(LINK_SIGMA.map(|sigma| sigma * sigma)));
+        let covariance = self.covariance.map_or_else(usual, |c| Matrix3::from_row_slice(&c));
+        let pose = Pose2::new(self.x_m, self.y_m, self.theta_rad);
+        let parent_from_map = Pose2Covariance { pose, covariance };
+        let link = Link { parent: self.map, parent_from_map, level_m: self.level_m };
+        link.check().map_err(|e| out_of_range(&e, "parent"))?;
+        Ok(link)
+    }
+}
+
+impl From<&Link<String>> for Parent {
+    fn from(link: &Link<String>) -> Self {
+        let Pose2Covariance { pose, covariance } = &link.parent_from_map;
+        Self {
+            map: link.parent.clone(),
+            x_m: pose.x_m,
+            y_m: pose.y_m,
+            theta_rad: pose.theta_rad,
+            level_m: link.level_m,
+            covariance: Some(row_major(covariance)),
+        }
+    }
+}
+
+/// Nine numbers, row by row.
+pub(super) fn row_major(matrix: &Matrix3<f64>) -> [f64; 9] {
+    std::array::from_fn(|i| matrix[(i / 3, i % 3)])
+}
+
+impl Map {
+    /// A map and where it is.
+    pub(super) fn new(row: MapRow, found: Whereabouts) -> Self {
+        Self {
+            name: row.name,
+            version: row.version,
+            landmarks: row.landmarks,
+            distance: row.distance.into(),
+            parent: found.link.as_ref().map(Parent::from),
+            site: found.site,
+            building: found.building,
+            floor: found.floor,
+        }
     }
 }
 

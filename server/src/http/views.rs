@@ -14,7 +14,7 @@ use crate::{
     store::{
         landmarks, maps,
         placing::{self, Placing},
-        views::{self, Cut, NewView, ViewRow},
+        views::{self, Cut, NewView, Outcome, ViewRow},
     },
 };
 use axum::{
@@ -33,6 +33,7 @@ use vision::{
     detect::quads::Corners,
     frame::GrayImage,
     icon::{Icon, IconError, icon},
+    learn::thinning::ThinningParams,
     params::Params as Algorithm,
 };
 
@@ -60,6 +61,9 @@ struct View {
     image_kind: String,
     /// ms since the Unix epoch.
     created_ms: i64,
+    /// In the answer to an upload: what became of it. With `same` and `alike` the view given is the one that is there.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    outcome: Option<Outcome>,
     /// In the answer to an upload with `capture`: whether the landmark has a place by its views now, or why not.
     #[serde(skip_serializing_if = "Option::is_none")]
     placing: Option<Placing>,
@@ -74,6 +78,7 @@ impl From<ViewRow> for View {
             height_px: row.size_px[1],
             image_kind: row.image_kind,
             created_ms: row.created_ms,
+            outcome: None,
             placing: None,
         }
     }
@@ -94,6 +99,8 @@ struct NewViewForm {
     /// `ceiling_height_m` for a landmark under a ceiling. With it the server places the landmark on the map's walls
     /// itself, unless it was placed by hand.
     capture: Option<String>,
+    /// `true`: stored even if a stored view shows it from the same side, as large and in the same light.
+    keep_alike: Option<String>,
 }
 
 /// What the form says of the landmark's place in the picture.
@@ -105,7 +112,8 @@ enum Extent {
 
 /// Adds a view. Without corners the server looks for the landmark itself and takes the one dominant quad; if there is
 /// none or more than one, the refusal lists what it saw. The same picture with the same corners a second time is
-/// answered with 200 and the view that is there.
+/// answered with 200 and the view that is there; so is a near-duplicate of a view, which is not stored, as it would teach
+/// nothing (`outcome` says which).
 #[utoipa::path(post, path = "/maps/{map}/landmarks/{landmark}/views", tag = "landmarks",
     params(("map" = String, Path), ("landmark" = String, Path)),
     request_body(content = NewViewForm, content_type = "multipart/form-data"),
@@ -119,26 +127,29 @@ async fn add(
     request: Request,
 ) -> Result<(StatusCode, Json<View>), ApiError> {
     landmarks::get(app.store.reads(), &map, &landmark).await?;
-    let mut form = Form::read(&app, request, &["image", "corners", "whole_image", "capture"]).await?;
+    let mut form =
+        Form::read(&app, request, &["image", "corners", "whole_image", "capture", "keep_alike"]).await?;
     let image = form.needed("image")?;
     let extent = extent(form.optional("corners").as_ref(), form.optional("whole_image").as_ref())?;
     let capture = capture(form.optional("capture").as_ref())?;
+    let thinning = (!flag("keep_alike", form.optional("keep_alike").as_ref())?).then(ThinningParams::default);
     let max = app.config.limits.views;
     let new = app.clone().on_vision_thread(move |app| prepare(app, &image, &extent)).await??;
     let new = NewView { capture, ..new };
     let write = app.store.write(move |tx| {
         Box::pin(async move {
-            let (row, created) = views::add(tx, &map, &landmark, &new, max).await?;
-            let placing = match (created, &new.capture) {
-                (true, Some(_)) => Some(placing::by_views(tx, &map, &landmark).await?),
+            let (row, outcome) = views::add(tx, &map, &landmark, &new, max, thinning.as_ref()).await?;
+            let placing = match (outcome, &new.capture) {
+                (Outcome::New, Some(_)) => Some(placing::by_views(tx, &map, &landmark).await?),
                 _ => None,
             };
-            Ok((row, created, placing))
+            Ok((row, outcome, placing))
         })
     });
-    let (row, created, placing) = write.await?;
-    let view = View { placing, ..View::from(row) };
-    Ok((if created { StatusCode::CREATED } else { StatusCode::OK }, Json(view)))
+    let (row, outcome, placing) = write.await?;
+    let view = View { placing, outcome: Some(outcome), ..View::from(row) };
+    let status = if outcome == Outcome::New { StatusCode::CREATED } else { StatusCode::OK };
+    Ok((status, Json(view)))
 }
 
 /// How the picture was taken, checked, as it is stored.
@@ -149,12 +160,17 @@ fn capture(bytes: Option<&Bytes>) -> Result<Option<String>, ApiError> {
     serde_json::to_string(&capture).map(Some).map_err(|e| ApiError::internal(&e))
 }
 
+/// A part that is `true`, `false` or absent.
+fn flag(name: &'static str, part: Option<&Bytes>) -> Result<bool, ApiError> {
+    match part.map(|b| &b[..]) {
+        None | Some(b"false") => Ok(false),
+        Some(b"true") => Ok(true),
+        Some(_) => Err(ApiError::invalid("bad_value", name, "neither `true` nor `false`")),
+    }
+}
+
 fn extent(corners: Option<&Bytes>, whole_image: Option<&Bytes>) -> Result<Extent, ApiError> {
-    let whole = match whole_image.map(|b| &b[..]) {
-        None | Some(b"false") => false,
-        Some(b"true") => true,
-        Some(_) => return Err(ApiError::invalid("bad_value", "whole_image", "neither `true` nor `false`")),
-    };
+    let whole = flag("whole_image", whole_image)?;
     match (corners, whole) {
         (Some(_), true) => Err(ApiError::invalid("bad_value", "whole_image", "not together with corners")),
         (Some(corners), false) => Ok(Extent::Corners(extract::json(corners, "corners")?)),

@@ -30,6 +30,9 @@ pub(crate) enum StoreError {
     /// Something else rests on it.
     #[error("{0}")]
     InUse(String),
+    /// Maps cannot lie like that.
+    #[error(transparent)]
+    Frames(#[from] map::frames::FrameError),
     /// The disk is full; reading goes on.
     #[error("the disk is full")]
     Full,

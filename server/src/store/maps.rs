@@ -13,6 +13,7 @@ statements! {
             FROM maps WHERE name > ?1 ORDER BY name LIMIT ?2";
     BUMP = "UPDATE maps SET version = version + 1 WHERE id = ?1";
     DELETE = "DELETE FROM maps WHERE id = ?1";
+    LIES_IN = "SELECT name FROM maps WHERE parent_id = ?1 ORDER BY name LIMIT 1";
     ROBOT_ON = "SELECT name FROM robots WHERE map_id = ?1 ORDER BY name LIMIT 1";
 }
 
@@ -83,6 +84,11 @@ pub(crate) async fn get(db: impl SqliteExecutor<'_>, name: &str) -> Result<MapRo
     map_row(&row).map_err(StoreError::at("read map"))
 }
 
+/// The same inside a write.
+pub(crate) async fn of(tx: &mut Tx, name: &str) -> Result<MapRow, StoreError> {
+    get(&mut tx.conn, name).await
+}
+
 /// Maps with names after `after`, in order.
 pub(crate) async fn page(
     db: impl SqliteExecutor<'_>,
@@ -107,7 +113,7 @@ pub(crate) async fn bump(tx: &mut Tx, id: i64) -> Result<(), StoreError> {
     Ok(())
 }
 
-/// Deletes a map and all that is in it. Refused while a robot stands on it.
+/// Deletes a map and all that is in it. Refused while a robot stands on it, or another map lies in it.
 pub(crate) async fn delete(tx: &mut Tx, name: &str) -> Result<(), StoreError> {
     let map = get(&mut tx.conn, name).await?;
     let robot: Option<String> = sqlx::query_scalar(ROBOT_ON)
@@ -117,6 +123,14 @@ pub(crate) async fn delete(tx: &mut Tx, name: &str) -> Result<(), StoreError> {
         .map_err(StoreError::at("look for robots"))?;
     if let Some(robot) = robot {
         return Err(StoreError::InUse(format!("robot `{robot}` stands on map `{name}`")));
+    }
+    let inner: Option<String> = sqlx::query_scalar(LIES_IN)
+        .bind(map.id)
+        .fetch_optional(&mut tx.conn)
+        .await
+        .map_err(StoreError::at("look for maps in it"))?;
+    if let Some(inner) = inner {
+        return Err(StoreError::InUse(format!("map `{inner}` lies in map `{name}`")));
     }
     sqlx::query(DELETE).bind(map.id).execute(&mut tx.conn).await.map_err(StoreError::at("delete map"))?;
     tx.changed(Change::MapRemoved(map.name));

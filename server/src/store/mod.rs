@@ -10,6 +10,7 @@ mod writer;
 mod statements;
 pub(crate) mod load;
 pub(crate) mod maps;
+pub(crate) mod sites;
 pub(crate) mod landmarks;
 pub(crate) mod views;
 pub(crate) mod models;

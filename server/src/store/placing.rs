@@ -313,7 +313,7 @@ mod tests {
     async fn taught(store: &Store, new: NewView) -> Placing {
         let write = store.write(move |tx| {
             Box::pin(async move {
-                views::add(tx, "a", "p1", &new, 100).await?;
+                views::add(tx, "a", "p1", &new, 100, None).await?;
                 by_views(tx, "a", "p1").await
             })
         });

@@ -15,6 +15,7 @@ async fn every_statement_prepares_on_the_migrated_schema() {
     let mut opened = open::open(dir.path()).await.unwrap();
     let all = [
         maps::ALL,
+        sites::ALL,
         landmarks::ALL,
         views::ALL,
         models::ALL,

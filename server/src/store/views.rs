@@ -1,8 +1,15 @@
 //! Views of landmarks with their pictures, and the strangers seen beside them.
 
 use super::{StoreError, Tx, landmarks, maps, now_ms, statements::statements, within};
+use serde::Serialize;
 use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
-use vision::{detect::quads::Corners, icon::Icon, recognise::LandmarkId};
+use utoipa::ToSchema;
+use vision::{
+    detect::quads::Corners,
+    icon::Icon,
+    learn::thinning::{ThinningParams, ViewDigest, most_alike},
+    recognise::LandmarkId,
+};
 
 statements! {
     COUNT = "SELECT count(*) FROM views WHERE landmark_id = ?1";
@@ -17,6 +24,8 @@ statements! {
     ICON = "SELECT v.icon_side, v.icon, v.icon_scale FROM views v JOIN landmarks l ON l.id = v.landmark_id \
             JOIN maps m ON m.id = l.map_id WHERE m.name = ?1 AND l.name = ?2 AND v.id = ?3";
     DELETE = "DELETE FROM views WHERE id = ?1 AND landmark_id = ?2";
+    OF_LANDMARK = "SELECT id, image_kind, width_px, height_px, corners_px, created_ms, icon_side, icon, icon_scale \
+                   FROM views WHERE landmark_id = ?1 ORDER BY id";
     OF_MAP = "SELECT v.id, v.landmark_id, v.image_sha256, v.width_px, v.height_px, v.corners_px, v.icon_side, v.icon, \
               v.icon_scale FROM views v JOIN landmarks l ON l.id = v.landmark_id WHERE l.map_id = ?1 ORDER BY v.id";
     IMAGE = "SELECT image FROM views WHERE id = ?1";
@@ -131,21 +140,55 @@ fn view_row(row: &SqliteRow) -> Result<ViewRow, StoreError> {
     })
 }
 
-/// Stores a view. The same quad of the same picture a second time is the view that is there already; the flag says
-/// whether it is new.
+/// What became of an upload.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum Outcome {
+    /// Stored.
+    New,
+    /// The same quad of the same picture is there already.
+    Same,
+    /// Not stored: the view shows nothing that this one does not. A lesson would gain nothing by it.
+    Alike,
+}
+
+/// The stored view that is so much like a new one that both would teach the same.
+async fn alike(
+    tx: &mut Tx,
+    landmark: i64,
+    new: &NewView,
+    p: &ThinningParams,
+) -> Result<Option<ViewRow>, StoreError> {
+    let rows = sqlx::query(OF_LANDMARK).bind(landmark).fetch_all(&mut tx.conn).await;
+    let rows = rows.map_err(StoreError::at("read views"))?;
+    let digest = |cut: &Cut| ViewDigest::new(&cut.corners_px, &cut.icon);
+    let kept = rows.iter().map(|row| Ok(digest(&cut_of(row)?))).collect::<Result<Vec<_>, StoreError>>()?;
+    match most_alike(&digest(&new.cut), &kept, p) {
+        Some((index, novelty)) if novelty < 1.0 => view_row(&rows[index]).map(Some),
+        _ => Ok(None),
+    }
+}
+
+/// Stores a view, unless it is there already or, with `thinning`, is a near-duplicate of one; then gives that one.
 pub(crate) async fn add(
     tx: &mut Tx,
     map: &str,
     landmark: &str,
     new: &NewView,
     max: usize,
-) -> Result<(ViewRow, bool), StoreError> {
+    thinning: Option<&ThinningParams>,
+) -> Result<(ViewRow, Outcome), StoreError> {
     let map = maps::get(&mut tx.conn, map).await?;
     let landmark = landmarks::get(&mut tx.conn, &map.name, landmark).await?;
     let corners = corners_bytes(&new.cut.corners_px);
     let same = sqlx::query(SAME).bind(landmark.id).bind(&new.image_sha256[..]).bind(&corners);
     if let Some(row) = same.fetch_optional(&mut tx.conn).await.map_err(StoreError::at("look for view"))? {
-        return Ok((view_row(&row)?, false));
+        return Ok((view_row(&row)?, Outcome::Same));
+    }
+    if let Some(p) = thinning
+        && let Some(row) = alike(tx, landmark.id, new, p).await?
+    {
+        return Ok((row, Outcome::Alike));
     }
     let created_ms = now_ms();
     let id = sqlx::query_scalar(INSERT)
@@ -174,7 +217,7 @@ pub(crate) async fn add(
         corners_px: new.cut.corners_px.into(),
         created_ms,
     };
-    Ok((row, true))
+    Ok((row, Outcome::New))
 }
 
 async fn add_strangers(tx: &mut Tx, map_id: i64, new: &NewView) -> Result<(), StoreError> {

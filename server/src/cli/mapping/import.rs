@@ -5,6 +5,7 @@ use super::{
     build::Upload,
     draw,
     file::{MapFile, Wall},
+    geojson,
     grid::Grid,
     lines,
 };
@@ -23,8 +24,9 @@ pub(crate) const MAX_WALLS: usize = 1 << 20;
 /// `waymark map import`.
 #[derive(Debug, clap::Args)]
 pub(crate) struct ImportArgs {
-    /// A `map_server` YAML file (its PGM or PNG beside it), a vector map (`x1, y1, x2, y2` in metres, one segment a line),
-    /// or a map of `waymark map build`.
+    /// A `map_server` YAML file (its PGM or PNG beside it), a vector map (`x1, y1, x2, y2` in metres, one segment a line;
+    /// or `.geojson` in map metres: lines are walls with the free side on their left, polygons are rooms with columns for
+    /// holes), or a map of `waymark map build`.
     file: PathBuf,
     /// Leave out pieces of a grid's walls shorter than this, metres.
     #[arg(long, default_value_t = 0.3)]
@@ -71,6 +73,17 @@ fn read(path: &Path, min_length_m: f64) -> anyhow::Result<MapFile> {
             MapFile { segments, ..MapFile::default() }
         }
         "json" => MapFile::read(path)?,
+        "geojson" => {
+            let bytes = std::fs::metadata(path).with_context(name)?.len();
+            anyhow::ensure!(
+                bytes <= geojson::MAX_BYTES,
+                "{}: more than {} bytes",
+                name(),
+                geojson::MAX_BYTES
+            );
+            let text = std::fs::read_to_string(path).with_context(name)?;
+            MapFile { segments: geojson::walls(&text).with_context(name)?, ..MapFile::default() }
+        }
         _ => MapFile { segments: vectors(path).with_context(name)?, ..MapFile::default() },
     };
     anyhow::ensure!(map.segments.len() <= MAX_WALLS, "{}: more than {MAX_WALLS} segments", name());

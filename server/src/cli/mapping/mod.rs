@@ -6,6 +6,7 @@ mod numbered;
 mod own;
 pub(crate) mod build;
 pub(crate) mod draw;
+mod geojson;
 pub(crate) mod grid;
 mod pgm;
 mod outline;
