@@ -182,7 +182,9 @@ async fn posters_that_nobody_taught_are_gathered_accepted_and_recognised() {
         let inside = Inside::start(Limits::default()).await;
         let client = walls(&inside, &building).await;
         gather_all(&inside, &client, &building).await;
+        let gathering = begun(&inside, json!({ "robot": "r1", "known": true })).await;
         let second = drive(&client, robot(&building, 5, 1, true), false).await;
+        known_ones_are_themselves(&inside, &building, &gathering).await;
         (figures(&second), inside, client)
     };
     let photographed = photographed(&building).await;
@@ -299,14 +301,40 @@ async fn photographed(building: &Arc<Building>) -> Figures {
     figures(&second)
 }
 
+async fn begun(inside: &Inside, body: Value) -> String {
+    let path = format!("/maps/{MAP}/gatherings");
+    let (status, gathering) = call(inside, Method::POST, &path, Some(body)).await;
+    assert_eq!(status, StatusCode::CREATED, "{gathering}");
+    format!("{path}/{}", gathering["id"])
+}
+
+/// What was gathered while every landmark was known: views of each in its own track, none of them as something new.
+async fn known_ones_are_themselves(inside: &Inside, building: &Building, path: &str) {
+    let (_, stopped) = call(inside, Method::POST, &format!("{path}/stop"), None).await;
+    let (_, waiting) = call(inside, Method::GET, &format!("{path}/candidates"), None).await;
+    let all = list(&waiting, "candidates");
+    let (of_landmarks, new): (Vec<_>, Vec<_>) = all.iter().partition(|c| c["landmark"].is_string());
+    eprintln!(
+        "known: {} tracks of landmarks, {} others, {}",
+        of_landmarks.len(),
+        new.len(),
+        stopped["counts"]
+    );
+    assert!(of_landmarks.len() >= 4, "{stopped}");
+    for candidate in of_landmarks {
+        let there = poster_of(building, candidate);
+        assert!(there.is_none() || candidate["landmark"] == json!(there), "{candidate}");
+    }
+    for candidate in new {
+        assert_eq!(poster_of(building, candidate), None, "{candidate}");
+    }
+    assert_eq!(call(inside, Method::DELETE, path, None).await.0, 204);
+}
+
 /// Views of one landmark alone, then a lesson of it alone.
 async fn more_of_one(inside: &Inside, client: &RobotClient, building: &Arc<Building>) {
-    let path = format!("/maps/{MAP}/gatherings");
     let before = inside.maps().landmark(MAP, "poster-0").await.expect("a landmark").views;
-    let only = json!({ "robot": "r1", "landmark": "poster-0" });
-    let (status, gathering) = call(inside, Method::POST, &path, Some(only)).await;
-    assert_eq!(status, StatusCode::CREATED, "{gathering}");
-    let path = format!("{path}/{}", gathering["id"]);
+    let path = begun(inside, json!({ "robot": "r1", "landmark": "poster-0" })).await;
     let near: Vec<_> = stops(building, &LessonParams { seed: 9, views: 10, ..LessonParams::default() })
         .into_iter()
         .filter(|s| s.landmark == "poster-0" || s.landmark == "poster-1")
