@@ -5,7 +5,7 @@
 //! see [`super::synthesis`].
 
 use super::gates::quad_from_unit;
-use crate::{detect::quads::Corners, frame::GrayImage};
+use crate::{detect::quads::Corners, frame::GrayImage, geometry::interpolate::cell};
 use nalgebra::{Matrix3, Point2, Vector3};
 
 /// Texels along the landmark's side at the finest level: more than the largest generated view shows.
@@ -18,6 +18,10 @@ const LEVELS: usize = 3;
 const MAX_SAMPLES: usize = 4;
 /// Texels that one bilinear sample may stand for.
 const TEXELS_PER_SAMPLE: f64 = 1.5;
+/// Pixels worked out abreast.
+const ABREAST: usize = 16;
+/// How far before the last texel samples end, in texels.
+const LAST: f32 = 1e-3;
 
 /// Grey levels and coverage of the landmark's plane, over the unit square and its margin.
 #[derive(Debug, Clone)]
@@ -82,19 +86,14 @@ impl Texture {
         let finest = finest.max(SIDE as f64 / mean(1, 3).max(1.0));
         let n = ((finest / TEXELS_PER_SAMPLE).ceil() as usize).clamp(1, MAX_SAMPLES);
         let level = &self.levels[((finest / n as f64).log2().round().max(0.0) as usize).min(LEVELS - 1)];
-        let h = unit_from_view;
+        let texel_from_view = level.texel_from_unit() * unit_from_view;
         let mut picture = vec![0.0f32; size[0] * size[1]];
         for (du, dv) in grid(n) {
             for (v, line) in picture.chunks_exact_mut(size[0]).enumerate() {
-                let (u, v) = (du - 0.5, v as f64 + dv - 0.5);
-                let start = h * Vector3::new(u, v, 1.0);
-                for (i, grey) in line.iter_mut().enumerate() {
-                    let i = i as f64;
-                    let scale = 1.0 / (start.z + i * h[(2, 0)]);
-                    let (a, b) = ((start.x + i * h[(0, 0)]) * scale, (start.y + i * h[(1, 0)]) * scale);
-                    let [lit, cover] = level.sample(a, b);
-                    *grey += lit + (1.0 - cover) * wall;
-                }
+                let start = Vector3::new(du - 0.5, v as f64 + dv - 0.5, 1.0);
+                fearless_simd::dispatch!(fearless_simd::Level::new(), _s => {
+                    level.add_row(&texel_from_view, &start, wall, line);
+                });
             }
         }
         let share = 1.0 / (n * n) as f32;
@@ -119,20 +118,46 @@ impl Level {
         Self { side, texels }
     }
 
-    /// Bilinear [grey, coverage] at landmark coordinates; nothing beyond the margin.
-    fn sample(&self, a: f64, b: f64) -> [f32; 2] {
-        let extent = 1.0 + 2.0 * MARGIN;
-        let column = (a + MARGIN) / extent * self.side as f64 - 0.5;
-        let row = (b + MARGIN) / extent * self.side as f64 - 0.5;
-        let last = (self.side - 1) as f64;
-        if !(column >= 0.0 && column <= last && row >= 0.0 && row <= last) {
-            return [0.0, 0.0];
+    /// Texel coordinates of a point of the unit square.
+    fn texel_from_unit(&self) -> Matrix3<f64> {
+        let scale = self.side as f64 / (1.0 + 2.0 * MARGIN);
+        let shift = MARGIN * scale - 0.5;
+        Matrix3::new(scale, 0.0, shift, 0.0, scale, shift, 0.0, 0.0, 1.0)
+    }
+
+    /// Adds what a row of pixels shows from `start` on, one to the right each: grey levels bilinearly, and the wall where
+    /// nothing covers it; only wall beyond the margin.
+    #[expect(
+        clippy::inline_always,
+        reason = "an instruction set holds only in what is inlined where it was chosen"
+    )]
+    #[inline(always)]
+    fn add_row(&self, texel_from_view: &Matrix3<f64>, start: &Vector3<f64>, wall: f32, line: &mut [f32]) {
+        let (from, step) = (texel_from_view * start, texel_from_view.column(0));
+        let last = (self.side - 1) as f32;
+        for (first, line) in (0..).step_by(ABREAST).zip(line.chunks_mut(ABREAST)) {
+            let (mut at, mut inside) = ([0_u32; ABREAST], [0.0_f32; ABREAST]);
+            let (mut x, mut y) = ([0.0_f32; ABREAST], [0.0_f32; ABREAST]);
+            for k in 0..ABREAST {
+                let i = f64::from(first) + k as f64;
+                let scale = 1.0 / (from.z + i * step.z);
+                let (u, v) = (((from.x + i * step.x) * scale) as f32, ((from.y + i * step.y) * scale) as f32);
+                inside[k] = if u >= 0.0 && u <= last && v >= 0.0 && v <= last { 1.0 } else { 0.0 };
+                // The last texel is the second of its cell.
+                let (u, v) = (u.max(0.0).min(last - LAST), v.max(0.0).min(last - LAST));
+                let ((column, left), (row, above)) = (cell(u), cell(v));
+                (at[k], x[k], y[k]) = (row * self.side as u32 + column, u - left, v - above);
+            }
+            for (k, grey) in line.iter_mut().enumerate() {
+                let four = &self.texels[at[k] as usize..][..self.side + 2];
+                let [p, q, r, s] = [four[0], four[1], four[self.side], four[self.side + 1]];
+                let [lit, cover] = [0, 1].map(|c| {
+                    let (top, bottom) = (p[c] + (q[c] - p[c]) * x[k], r[c] + (s[c] - r[c]) * x[k]);
+                    inside[k] * (top + (bottom - top) * y[k])
+                });
+                *grey += lit + (1.0 - cover) * wall;
+            }
         }
-        let (u, v) = ((column as usize).min(self.side - 2), (row as usize).min(self.side - 2));
-        let (x, y) = ((column - u as f64) as f32, (row - v as f64) as f32);
-        let i = v * self.side + u;
-        let [p, q, r, s] = [i, i + 1, i + self.side, i + self.side + 1].map(|i| self.texels[i]);
-        [0, 1].map(|k| (p[k] * (1.0 - x) + q[k] * x) * (1.0 - y) + (r[k] * (1.0 - x) + s[k] * x) * y)
     }
 }
 
