@@ -8,6 +8,7 @@ mod fit;
 mod gathered_drive;
 mod http_contract;
 mod laser;
+mod live_mapping;
 mod moved_landmark;
 mod real_pictures;
 mod restart;

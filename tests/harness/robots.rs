@@ -7,6 +7,7 @@ use client::{
     v1,
 };
 use image::{ExtendedColorType, codecs::jpeg::JpegEncoder};
+use map::{laser::Scan, pose2::Pose2};
 use reqwest::{Client, Method, StatusCode};
 use serde_json::{Value, json};
 use sim::{
@@ -85,11 +86,15 @@ pub async fn teach(inside: &Inside, building: &Arc<Building>, names: &[&str], vi
 
 /// What the laser measured, as a message.
 pub fn scan_message(seen: &Sighting, captured_ns: i64) -> v1::Scan {
-    let pose = |p: &map::pose2::Pose2| v1::Pose2 { x_m: p.x_m, y_m: p.y_m, theta_rad: p.theta_rad };
-    let scan = &seen.scan;
+    scan_of(&seen.scan, &seen.step.odom_from_robot, captured_ns)
+}
+
+/// A scan with the odometry of its moment, as a message.
+pub fn scan_of(scan: &Scan, odom_from_robot: &Pose2, captured_ns: i64) -> v1::Scan {
+    let pose = |p: &Pose2| v1::Pose2 { x_m: p.x_m, y_m: p.y_m, theta_rad: p.theta_rad };
     v1::Scan {
         captured_ns,
-        odom_from_robot: Some(pose(&seen.step.odom_from_robot)),
+        odom_from_robot: Some(pose(odom_from_robot)),
         robot_from_laser: Some(pose(scan.robot_from_laser())),
         first_bearing_rad: scan.bearing_rad(0),
         bearing_step_rad: scan.bearing_step_rad(),

@@ -6,6 +6,7 @@ pub mod slots;
 pub mod intake;
 pub mod live;
 pub mod motion;
+pub mod mapping;
 pub mod cameras;
 pub mod picture;
 pub mod dominant;

@@ -12,7 +12,7 @@ pub use messages::{MAX_ODOMETRY_BYTES, MAX_SCAN_BYTES, MessageCounts};
 pub use robot::{MAX_SUPPORTERS, RESTS_ON_M};
 pub use scans::{ScanJob, Scans};
 
-use super::{live::LiveHub, snapshot::Snapshots};
+use super::{live::LiveHub, mapping::Mappings, snapshot::Snapshots};
 use map::{
     changes::{Change, Judged, Standing},
     fuse::{FixOutcome, FusedPose},
@@ -70,12 +70,19 @@ pub struct Motion {
     live: Arc<LiveHub>,
     state: Mutex<State>,
     scans: Scans,
+    mappings: Mappings,
 }
 
 impl Motion {
     /// Nothing known of any robot yet.
     pub fn new(snapshots: Arc<Snapshots>, live: Arc<LiveHub>) -> Self {
-        Self { snapshots, live, state: Mutex::default(), scans: Scans::default() }
+        Self {
+            snapshots,
+            live,
+            state: Mutex::default(),
+            scans: Scans::default(),
+            mappings: Mappings::default(),
+        }
     }
 
     /// Odometry of a robot; gives its new pose once it has been on the map. A refusal is counted.
@@ -103,7 +110,8 @@ impl Motion {
         Some(self.tell(robot, &map, odometry.epoch, &fused?, modalities))
     }
 
-    /// A laser scan: checked, counted, and put where [`Motion::laser`] takes it from.
+    /// A laser scan: checked, counted, and put where [`Motion::laser`] takes it from; that of a robot that makes a map, where
+    /// it is mapped.
     pub fn scan(&self, robot: &Name, message: Bytes) {
         let checked = messages::scan(&self.snapshots, robot, message);
         let mut state = self.lock();
@@ -117,6 +125,7 @@ impl Motion {
         let (epoch, captured_ns) = (checked.epoch, checked.captured_ns);
         let job =
             ScanJob { map, epoch, captured_ns, odom_from_robot: checked.odom_from_robot, scan: checked.scan };
+        let Some(job) = self.mappings.offer(robot, job) else { return };
         if self.scans.offer(robot, job) {
             own(&followed).log.count(LASER, "superseded");
         }
@@ -125,6 +134,11 @@ impl Motion {
     /// The scans that wait for the laser's thread.
     pub fn scans(&self) -> &Scans {
         &self.scans
+    }
+
+    /// Maps that are being made.
+    pub fn mappings(&self) -> &Mappings {
+        &self.mappings
     }
 
     /// Lays a scan on the walls of its map, near the pose that is known without it, and corrects that pose by it; gives the

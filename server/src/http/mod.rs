@@ -13,6 +13,7 @@ mod landmarks;
 mod learning;
 mod live;
 mod maps;
+mod mapping;
 mod pages;
 mod recognise;
 mod resources;

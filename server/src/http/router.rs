@@ -1,8 +1,8 @@
 //! Every route, with the layers around them and the OpenAPI document made from them.
 
 use super::{
-    App, Shared, cameras, error::ApiError, gathering, guard, health, landmarks, laser, learning, live, maps,
-    pages, recognise, robots, views, visibility,
+    App, Shared, cameras, error::ApiError, gathering, guard, health, landmarks, laser, learning, live,
+    mapping, maps, pages, recognise, robots, views, visibility,
 };
 use crate::config::Limits;
 use axum::{
@@ -33,6 +33,7 @@ fn api(limits: &Limits) -> OpenApiRouter<Shared> {
     OpenApiRouter::new()
         .merge(maps::router())
         .merge(laser::router())
+        .merge(mapping::router())
         .merge(landmarks::router())
         .merge(views::router(limits.upload_bytes))
         .merge(learning::router())

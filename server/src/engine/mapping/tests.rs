@@ -1,0 +1,110 @@
+//! Mappings without any transport.
+
+use super::*;
+use map::{
+    laser::Scan,
+    slam::{Slam, SlamParams},
+};
+use sim::{building::Building, drive::DriveParams, laser::LaserParams, odometry::OdometryParams};
+use std::time::{Duration, Instant};
+
+fn name(text: &str) -> Name {
+    Name::new(text).unwrap()
+}
+
+fn scan(building: &Building, at: &Pose2, seed: u64) -> Scan {
+    sim::laser::scan(building, at, &LaserParams::default(), seed)
+}
+
+fn job(map: &str, epoch: u64, odom_from_robot: Pose2, scan: Scan) -> ScanJob {
+    ScanJob { map: map.into(), epoch, captured_ns: 0, odom_from_robot, scan }
+}
+
+fn wait(mut ready: impl FnMut() -> bool) {
+    let started = Instant::now();
+    while !ready() {
+        assert!(started.elapsed() < Duration::from_secs(20));
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+#[tokio::test]
+async fn scans_become_the_walls_that_mapping_them_gives() {
+    let building = Arc::new(Building::corridor(7));
+    let drive = DriveParams { odometry: OdometryParams::default(), ..DriveParams::default() };
+    let steps: Vec<_> = sim::drive::Drive::new(building.clone(), &drive).step_by(3).take(60).collect();
+    let (mappings, mut slam) = (Mappings::default(), Slam::new(SlamParams::default()));
+    let origin = Pose2::new(3.0, 1.0, 0.5);
+    mappings.begin("hall", &name("r1"), origin).unwrap();
+    for (i, step) in steps.iter().enumerate() {
+        let seen = scan(&building, &step.map_from_robot, i as u64);
+        slam.add(&step.odom_from_robot, &seen).unwrap();
+        assert!(mappings.offer(&name("r1"), job("hall", 1, step.odom_from_robot, seen)).is_none());
+        wait(|| mappings.progress("hall").unwrap().scans == i as u64 + 1);
+    }
+    let other = scan(&building, &Pose2::new(3.0, 0.0, 0.0), 1);
+    assert!(mappings.offer(&name("r2"), job("hall", 1, Pose2::default(), other.clone())).is_some());
+    assert!(mappings.offer(&name("r1"), job("hall", 2, Pose2::default(), other)).is_none());
+    let so_far = mappings.progress("hall").unwrap();
+    assert_eq!((so_far.stage, so_far.scans, so_far.dropped), (Stage::Mapping, 60, 1));
+    assert!(so_far.way_m > 10.0 && so_far.pose.is_some());
+    let (finishing, walls) = mappings.finish("hall").unwrap();
+    assert_eq!(finishing.stage, Stage::Finishing);
+    let walls = walls.await.unwrap().unwrap();
+    let expected: Vec<_> = slam.finish().unwrap().walls;
+    assert_eq!(walls.len(), expected.len());
+    for (got, wall) in walls.iter().zip(&expected) {
+        let (a, b) = (origin.apply(&wall.a), origin.apply(&wall.b));
+        let off = [got[0] - a.x, got[1] - a.y, got[2] - b.x, got[3] - b.y];
+        assert!(off.iter().all(|d| d.abs() < 1e-12), "{off:?}");
+    }
+    mappings.stored("hall", Ok(walls.len()));
+    assert_eq!(mappings.progress("hall").unwrap().stage, Stage::Done);
+    assert_eq!(mappings.finish("hall").unwrap_err(), MappingError::None);
+    mappings.begin("hall", &name("r1"), origin).unwrap();
+}
+
+#[test]
+fn mappings_are_bounded_and_one_robot_makes_one_map() {
+    let mappings = Mappings::default();
+    let begin = |map: usize, robot: &str| {
+        mappings.begin(&format!("m{map}"), &name(robot), Pose2::default()).map(|p| p.stage)
+    };
+    for i in 0..MAX_MAPPINGS {
+        assert_eq!(begin(i, &format!("r{i}")), Ok(Stage::Mapping));
+    }
+    assert_eq!(begin(0, "other"), Err(MappingError::Going));
+    assert_eq!(begin(9, "r0"), Err(MappingError::Busy));
+    assert_eq!(begin(9, "other"), Err(MappingError::TooMany));
+    assert!(mappings.cancel("m0") && !mappings.cancel("m0"));
+    assert_eq!((begin(9, "r0"), mappings.progress("m0")), (Ok(Stage::Mapping), None));
+}
+
+#[test]
+fn old_mappings_are_forgotten_at_the_bound() {
+    let mappings = Mappings::default();
+    for i in 0..=MAX_REMEMBERED {
+        let map = format!("m{i:03}");
+        mappings.begin(&map, &name("r1"), Pose2::default()).unwrap();
+        mappings.stored(&map, Err("planted".into()));
+    }
+    assert_eq!(mappings.progress("m000"), None);
+    let kept = mappings.progress("m001").unwrap();
+    assert_eq!((kept.stage, kept.reason.as_deref()), (Stage::Failed, Some("planted")));
+}
+
+#[test]
+fn what_the_queue_does_not_hold_is_dropped_and_counted() {
+    let mappings = Mappings::default();
+    let building = Building::corridor(7);
+    mappings.begin("hall", &name("r1"), Pose2::default()).unwrap();
+    let sent = 4 * QUEUE as u64;
+    for i in 0..sent {
+        let at = Pose2::new(2.0 + 0.02 * i as f64, 0.0, 0.0);
+        mappings.offer(&name("r1"), job("hall", 1, at, scan(&building, &at, 1)));
+    }
+    wait(|| {
+        let p = mappings.progress("hall").unwrap();
+        p.scans + p.dropped == sent
+    });
+}

@@ -1,0 +1,128 @@
+//! `/maps/{map}/mapping`: the walls of a map made by a robot that drives.
+
+use super::{
+    App, Shared,
+    error::{ApiError, Problem},
+    extract::{At, Body, name},
+};
+use crate::{
+    engine::mapping::{MappingError, Progress, Walls},
+    store::{laser, load, maps, robots},
+};
+use axum::{Json, extract::State, http::StatusCode};
+use map::pose2::Pose2;
+use serde::Deserialize;
+use tokio::sync::oneshot;
+use utoipa::ToSchema;
+use utoipa_axum::{router::OpenApiRouter, routes};
+
+pub(super) fn router() -> OpenApiRouter<Shared> {
+    OpenApiRouter::new().routes(routes!(begin, get, cancel)).routes(routes!(finish))
+}
+
+/// Who makes the map.
+#[derive(Debug, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+struct NewMapping {
+    /// A robot that stands on this map; its scans must come with odometry.
+    robot: String,
+    /// Where on the map its first pose is: x, y in metres, heading in radians. The origin, if absent.
+    #[serde(default)]
+    origin: [f64; 3],
+}
+
+fn refused(error: MappingError) -> ApiError {
+    let (status, code) = match error {
+        MappingError::Going | MappingError::Busy => (StatusCode::CONFLICT, "in_use"),
+        MappingError::TooMany => (StatusCode::CONFLICT, "too_many"),
+        MappingError::None => (StatusCode::NOT_FOUND, "not_mapping"),
+        MappingError::Thread => (StatusCode::SERVICE_UNAVAILABLE, "no_thread"),
+    };
+    ApiError::new(status, code, error.to_string()).field("map")
+}
+
+/// Begins to make the walls of a map from the scans of a robot. While it lasts, they are mapped and localise nothing. The map
+/// stays as it is until the mapping is finished; a restart of the server forgets it.
+#[utoipa::path(post, path = "/maps/{map}/mapping", tag = "maps", params(("map" = String, Path)),
+    request_body = NewMapping, responses((status = 201, body = Progress),
+    (status = 404, body = Problem, description = "unknown_map, unknown_robot"),
+    (status = 409, body = Problem, description = "in_use: it is being made already, or the robot makes or stands on another; too_many"),
+    (status = 422, body = Problem, description = "out_of_range")))]
+async fn begin(
+    State(app): State<Shared>,
+    At(map): At<String>,
+    Body(new): Body<NewMapping>,
+) -> Result<(StatusCode, Json<Progress>), ApiError> {
+    maps::get(app.store.reads(), &map).await?;
+    let row = robots::get(app.store.reads(), &new.robot).await?;
+    if row.map != map {
+        let detail = format!("robot {} stands on map {}", row.name, row.map);
+        return Err(ApiError::new(StatusCode::CONFLICT, "in_use", detail).field("robot"));
+    }
+    let [x_m, y_m, theta_rad] = new.origin;
+    let origin = Pose2::new(x_m, y_m, theta_rad);
+    origin.check().map_err(|e| ApiError::invalid("out_of_range", "origin", e.to_string()))?;
+    let begun = app.motion.mappings().begin(&map, &name("robot", new.robot)?, origin);
+    Ok((StatusCode::CREATED, Json(begun.map_err(refused)?)))
+}
+
+/// How far it has come: the mapping that goes on, or the last since the server started.
+#[utoipa::path(get, path = "/maps/{map}/mapping", tag = "maps", params(("map" = String, Path)),
+    responses((status = 200, body = Progress), (status = 404, body = Problem, description = "unknown_map, not_mapping")))]
+async fn get(State(app): State<Shared>, At(map): At<String>) -> Result<Json<Progress>, ApiError> {
+    maps::get(app.store.reads(), &map).await?;
+    app.motion.mappings().progress(&map).map(Json).ok_or_else(|| refused(MappingError::None))
+}
+
+/// Gives it up: the map stays as it is.
+#[utoipa::path(delete, path = "/maps/{map}/mapping", tag = "maps", params(("map" = String, Path)),
+    responses((status = 204), (status = 404, body = Problem, description = "unknown_map, not_mapping")))]
+async fn cancel(State(app): State<Shared>, At(map): At<String>) -> Result<StatusCode, ApiError> {
+    maps::get(app.store.reads(), &map).await?;
+    let open = app.motion.mappings().cancel(&map);
+    if open { Ok(StatusCode::NO_CONTENT) } else { Err(refused(MappingError::None)) }
+}
+
+/// Ends the drive: everything is fitted once more, and the walls replace those of the map in one transaction. Answers at once;
+/// `stage` says when they are stored.
+#[utoipa::path(post, path = "/maps/{map}/mapping/finish", tag = "maps", params(("map" = String, Path)),
+    responses((status = 202, body = Progress), (status = 404, body = Problem, description = "unknown_map, not_mapping")))]
+async fn finish(
+    State(app): State<Shared>,
+    At(map): At<String>,
+) -> Result<(StatusCode, Json<Progress>), ApiError> {
+    maps::get(app.store.reads(), &map).await?;
+    let (progress, walls) = app.motion.mappings().finish(&map).map_err(refused)?;
+    // Whoever asked may go away: it is stored all the same.
+    tokio::spawn(async move {
+        let stored = store(&app, &map, walls).await;
+        if let Err(reason) = &stored {
+            tracing::warn!(map, reason, "a map that was made is not stored");
+        }
+        app.motion.mappings().stored(&map, stored);
+    });
+    Ok((StatusCode::ACCEPTED, Json(progress)))
+}
+
+/// Stores the walls when they come; how many.
+async fn store(
+    app: &App,
+    map: &str,
+    walls: oneshot::Receiver<Result<Walls, String>>,
+) -> Result<usize, String> {
+    let walls = walls.await.map_err(|_gone| "the mapping was given up".to_owned())??;
+    let (count, max) = (walls.len(), app.config.limits.laser_segments);
+    if count == 0 {
+        return Err("the scans show no wall".to_owned());
+    }
+    if count > max {
+        return Err(format!("{count} walls are more than {max}"));
+    }
+    if let Some(error) = walls.iter().find_map(|ends| load::wall(ends).err()) {
+        return Err(error.to_string());
+    }
+    let map = map.to_owned();
+    let write = app.store.write(move |tx| Box::pin(async move { laser::replace(tx, &map, &walls).await }));
+    write.await.map_err(|error| error.to_string())?;
+    Ok(count)
+}

@@ -1,0 +1,142 @@
+//! Claim: a robot that drives and sends scans over zenoh makes the walls of a map, the same that `waymark map build` makes of
+//! a recording of them; they are stored when it is finished, and not before.
+
+use client::{Delivery, RobotClient, RobotOptions};
+use reqwest::StatusCode;
+use serde_json::{Value, json};
+use server::config::Limits;
+use sim::{
+    building::Building,
+    corridor::CorridorParams,
+    drive::{Drive, DriveParams, Step},
+    laser::{LaserParams, scan},
+};
+use std::{fmt::Write as _, sync::Arc, time::Duration};
+use tests::{
+    Inside, SOON,
+    command::waymark,
+    eventually,
+    robots::{MAP, call, scan_of},
+};
+
+/// Scans that are on their way at a time: fewer than the server's queue holds.
+const AHEAD: u64 = 20;
+
+fn drive(building: &Arc<Building>) -> Vec<Step> {
+    let params = DriveParams { legs: 2, ..DriveParams::default() };
+    Drive::new(building.clone(), &params).step_by(2).collect()
+}
+
+/// The same scans as a file, through the command.
+fn walls_of_file(building: &Building, steps: &[Step]) -> Vec<[f64; 4]> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (log, out) = (folder.path().join("drive.jsonl"), folder.path().join("map.json"));
+    let mut text = String::new();
+    for (i, step) in steps.iter().enumerate() {
+        let seen = scan(building, &step.map_from_robot, &LaserParams::default(), i as u64);
+        if i == 0 {
+            let mount = seen.robot_from_laser();
+            let head = json!({
+                "waymark_recording": 1, "robot_from_laser": [mount.x_m, mount.y_m, mount.theta_rad],
+                "first_bearing_rad": seen.bearing_rad(0), "bearing_step_rad": seen.bearing_step_rad(),
+                "max_range_m": seen.max_range_m(),
+            });
+            writeln!(text, "{head}").expect("in memory");
+        }
+        let odom = &step.odom_from_robot;
+        let odom = [odom.x_m, odom.y_m, odom.theta_rad];
+        let line = json!({ "t_s": step.time_s, "odom": odom, "ranges_m": seen.ranges_m() });
+        writeln!(text, "{line}").expect("in memory");
+    }
+    std::fs::write(&log, text).expect("a recording");
+    let (log, out_text) = (log.display().to_string(), out.display().to_string());
+    let run = waymark(["map", "build", &log, "--out", &out_text], 6 * SOON);
+    assert_eq!(run.status, 0, "{run:?}");
+    let map: Value = serde_json::from_slice(&std::fs::read(&out).expect("a map")).expect("JSON");
+    ends(&map)
+}
+
+fn ends(map: &Value) -> Vec<[f64; 4]> {
+    let of = |s: &Value, end: &str, k: usize| s[end][k].as_f64().expect("a number");
+    let segments = map["segments"].as_array().expect("segments").iter();
+    segments.map(|s| [of(s, "a", 0), of(s, "a", 1), of(s, "b", 0), of(s, "b", 1)]).collect()
+}
+
+async fn mapping(inside: &Inside) -> Value {
+    let (status, progress) = call(inside, "GET", &format!("/maps/{MAP}/mapping"), None).await;
+    assert_eq!(status, StatusCode::OK, "{progress}");
+    progress
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_drive_over_zenoh_gives_the_walls_that_its_recording_gives() {
+    let inside = Inside::start(Limits::default()).await;
+    let params = CorridorParams { length_m: 12.0, posters: 0, ..CorridorParams::default() };
+    let building = Arc::new(Building::corridor_with(&params, 4));
+    inside.maps().create_map(MAP, None).await.expect("map");
+    inside.maps().put_robot("r1", MAP).await.expect("robot");
+    let path = format!("/maps/{MAP}/mapping");
+    refusals(&inside, &path).await;
+    let body = json!({ "robot": "r1" });
+    let (status, begun) = call(&inside, "POST", &path, Some(body.clone())).await;
+    assert_eq!((status, &begun["stage"]), (StatusCode::CREATED, &json!("mapping")));
+    assert_eq!(call(&inside, "POST", &path, Some(body)).await.1["code"], "in_use");
+    let options = RobotOptions {
+        delivery: Delivery::Every,
+        ..RobotOptions::new(&inside.server.zenoh_endpoint, "default", "r1")
+    };
+    let client = RobotClient::connect(&options).await.expect("connected");
+    let steps = drive(&building);
+    for (i, step) in steps.iter().enumerate() {
+        let seen = scan(&building, &step.map_from_robot, &LaserParams::default(), i as u64);
+        client.publish_scan(scan_of(&seen, &step.odom_from_robot, i as i64)).await.expect("sent");
+        let due = (i as u64 + 1).saturating_sub(AHEAD);
+        eventually("mapped", || async {
+            (mapping(&inside).await["scans"].as_u64() >= Some(due)).then_some(())
+        })
+        .await;
+    }
+    let sent = steps.len() as u64;
+    let all = || async { (mapping(&inside).await["scans"] == sent).then_some(()) };
+    eventually("all mapped", all).await;
+    assert_eq!(mapping(&inside).await["dropped"], 0);
+    let (_, before) = call(&inside, "GET", &format!("/maps/{MAP}/laser"), None).await;
+    assert_eq!(before["segments"], json!([]), "nothing is stored before it is finished");
+    let (status, _) = call(&inside, "POST", &format!("{path}/finish"), None).await;
+    assert_eq!(status, StatusCode::ACCEPTED);
+    let done = || async { Some(mapping(&inside).await).filter(|p| p["stage"] != "finishing") };
+    let progress = eventually("stored", done).await;
+    assert_eq!(progress["stage"], "done", "{progress}");
+    let (_, stored) = call(&inside, "GET", &format!("/maps/{MAP}/laser"), None).await;
+    let (live, file) = (ends(&stored), walls_of_file(&building, &steps));
+    assert_eq!((live.len(), progress["segments"].as_u64()), (file.len(), Some(file.len() as u64)));
+    assert!(live.len() >= 4, "{live:?}");
+    let off = live.iter().zip(&file).flat_map(|(a, b)| a.iter().zip(b).map(|(a, b)| (a - b).abs()));
+    let off = off.fold(0.0, f64::max);
+    assert!(off < 1e-6, "{off} m");
+    client.close().await.expect("closed");
+    inside.server.stop().await;
+}
+
+/// What cannot be begun or ended, and giving up.
+async fn refusals(inside: &Inside, path: &str) {
+    for (method, path, body, status, code) in [
+        ("GET", path.to_owned(), None, 404, "not_mapping"),
+        ("POST", format!("{path}/finish"), None, 404, "not_mapping"),
+        ("POST", path.to_owned(), Some(json!({ "robot": "nobody" })), 404, "unknown_robot"),
+        ("POST", "/maps/none/mapping".to_owned(), Some(json!({ "robot": "r1" })), 404, "unknown_map"),
+        ("POST", path.to_owned(), Some(json!({ "robot": "r1", "origin": [1e9, 0, 0] })), 422, "out_of_range"),
+    ] {
+        let (got, problem) = call(inside, method, &path, body).await;
+        assert_eq!((got.as_u16(), &problem["code"]), (status, &json!(code)), "{problem}");
+    }
+    // Given up, or without any wall seen: the map stays as it is.
+    call(inside, "POST", path, Some(json!({ "robot": "r1" }))).await;
+    assert_eq!(call(inside, "DELETE", path, None).await.0, StatusCode::NO_CONTENT);
+    call(inside, "POST", path, Some(json!({ "robot": "r1" }))).await;
+    call(inside, "POST", &format!("{path}/finish"), None).await;
+    let failed = || async { Some(mapping(inside).await).filter(|p| p["stage"] == "failed") };
+    let progress = tokio::time::timeout(Duration::from_secs(20), eventually("failed", failed)).await;
+    let progress = progress.expect("at once");
+    assert!(progress["reason"].as_str().is_some_and(|r| r.contains("no wall")), "{progress}");
+}
