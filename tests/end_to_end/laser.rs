@@ -72,8 +72,8 @@ impl Run {
         .await;
     }
 
-    /// Sends a frame; whether the landmark was named in it.
-    async fn frame(&mut self, seen: &Sighting) -> bool {
+    /// Sends a frame; whether the landmark was named in it, and whether it gave a pose.
+    async fn frame(&mut self, seen: &Sighting) -> [bool; 2] {
         let capture = Capture::encoded(jpeg(&seen.frame.image))
             .expect("a picture")
             .with_intrinsics(sim::camera::Camera::vga().intrinsics())
@@ -81,7 +81,7 @@ impl Run {
             .with_odometry(&seen.step.odom_from_robot)
             .with_deadline_ms(60_000);
         let answer = self.client.recognise("front", capture, SOON).await.expect("an answer");
-        answer.quads.iter().any(|q| q.landmark == "poster-0")
+        [answer.quads.iter().any(|q| q.landmark == "poster-0"), answer.map_from_robot.is_some()]
     }
 
     /// The pose after an odometry message, of this moment.
@@ -127,16 +127,19 @@ async fn drive(run: &mut Run, every: usize) -> Vec<[f64; 3]> {
             let log = run.corrections().await;
             assert_eq!(log["totals"]["laser"]["applied"], Value::Null, "a scan started something: {log}");
         }
-        if looks && run.frame(&seen).await {
-            shown += 1;
-            if run.last.is_none() {
-                let fixed = run.corrections().await["totals"]["landmarks"]["started"] == 1;
-                assert!(
-                    fixed || shown < FIRST_FIX_FRAMES,
-                    "no pose after {shown} frames that show the landmark"
-                );
-                run.last = fixed.then(v1::RobotPose::default);
+        if looks {
+            let [named, posed] = run.frame(&seen).await;
+            shown += usize::from(named);
+            if posed && run.last.is_none() {
+                // The answer goes out before the pose is taken.
+                let started = || async {
+                    (run.corrections().await["totals"]["landmarks"]["started"] == 1).then_some(())
+                };
+                eventually("started", started).await;
+                run.last = Some(v1::RobotPose::default());
             }
+            let known = run.last.is_some();
+            assert!(known || shown < FIRST_FIX_FRAMES, "no pose after {shown} frames that show the landmark");
         }
         if let Some(pose) = run.pose(step).await {
             errors_after.push(errors(&pose, &step.map_from_robot));

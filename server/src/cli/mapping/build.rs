@@ -35,7 +35,8 @@ impl Upload {
 pub(crate) struct Args {
     /// The recording: a CARMEN log (FLASER or ROBOTLASER1 lines), numbered scans (`i dx dy dtheta r0 r1 ..`), or a
     /// Waymark recording; `.gz` is unpacked.
-    log: PathBuf,
+    #[arg(value_name = "LOG")]
+    recording: PathBuf,
     #[command(flatten)]
     laser: LaserArgs,
     /// Write the map (walls with covariance, path, loops) as JSON.
@@ -91,7 +92,7 @@ pub(crate) fn params(path: Option<&PathBuf>) -> anyhow::Result<SlamParams> {
 
 /// Runs the command.
 pub(crate) async fn run(args: &Args) -> anyhow::Result<()> {
-    let recording = open(&args.log, &args.laser)?;
+    let recording = open(&args.recording, &args.laser)?;
     let Built { map, seconds } =
         build(&recording.records, |i| recording.records[i].odom, params(args.params.as_ref())?)?;
     let file = MapFile::of(&map);
