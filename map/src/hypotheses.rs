@@ -115,6 +115,15 @@ pub struct Glimpse {
     pub covariance: Matrix3<f64>,
 }
 
+/// A landmark that something may be, and how it was seen if it is.
+#[derive(Debug, Clone, Copy)]
+pub struct Reading<'a> {
+    /// Seen so.
+    pub glimpse: Glimpse,
+    /// What it would be.
+    pub member: Member<'a>,
+}
+
 /// A place where the robot may be.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mode {
@@ -159,47 +168,57 @@ impl Hypotheses {
 
     /// The robot saw something that may be any of `members`, or nothing of the map.
     pub fn saw(&mut self, glimpse: &Glimpse, members: &[Member<'_>]) -> Result<(), OutOfRange> {
-        glimpse.robot_from_landmark.check()?;
-        check::covariance("covariance", &glimpse.covariance)?;
-        check::within("members", members.len() as f64, 0.0, MAX_MEMBERS as f64)?;
-        for member in members {
+        let readings: Vec<Reading<'_>> =
+            members.iter().map(|member| Reading { glimpse: *glimpse, member: *member }).collect();
+        self.saw_any(&readings)
+    }
+
+    /// The same where how it was seen depends on what it is: of another size or height it is elsewhere.
+    pub fn saw_any(&mut self, readings: &[Reading<'_>]) -> Result<(), OutOfRange> {
+        check::within("members", readings.len() as f64, 0.0, MAX_MEMBERS as f64)?;
+        let reach_m = self.p.clutter_reach_m;
+        let evenly = self.p.clutter / (PI * reach_m * reach_m * TAU);
+        let mut likelihood = self.grid.like(evenly);
+        for Reading { glimpse, member } in readings {
+            glimpse.robot_from_landmark.check()?;
+            check::covariance("covariance", &glimpse.covariance)?;
             member.place.check()?;
             check::within("probability", member.probability, 0.0, 1.0)?;
+            self.read(glimpse, member, &mut likelihood);
         }
+        self.grid.weigh(|i, _| likelihood[i]);
+        Ok(())
+    }
+
+    /// Adds the likelihood that a glimpse is of a member.
+    fn read(&self, glimpse: &Glimpse, member: &Member<'_>, likelihood: &mut [f64]) {
         // Poses stand for their cells: what is seen from a cell is uncertain by its size.
         let (cell, bin) = (self.p.cell_m, TAU / self.p.headings as f64);
         let within_cell = Vector3::new(cell * cell, cell * cell, bin * bin) / 12.0;
         let covariance = glimpse.covariance + Matrix3::from_diagonal(&within_cell);
-        let Some(inverse) = covariance.try_inverse() else { return Ok(()) };
+        let Some(inverse) = covariance.try_inverse() else { return };
         let scale = 1.0 / (TAU.powi(3) * covariance.determinant()).sqrt();
-        let reach_m = self.p.clutter_reach_m;
-        let evenly = self.p.clutter / (PI * reach_m * reach_m * TAU);
-        let mut likelihood = self.grid.like(evenly);
         let z = glimpse.robot_from_landmark;
         let reach = REACH_SIGMAS * (covariance[(0, 0)] + covariance[(1, 1)]).sqrt();
-        for member in members {
-            let at = Pose2::new(member.place.x_m, member.place.y_m, member.place.theta_rad);
-            self.grid.each_heading(
-                |heading| {
-                    let off = wrap_rad(at.theta_rad - heading - z.theta_rad);
-                    if off * off > REACH_SIGMAS.powi(2) * covariance[(2, 2)] {
-                        return None;
-                    }
-                    // Where a robot of this heading stands to see it so.
-                    let from = Pose2::new(0.0, 0.0, heading).compose(&z);
-                    Some((Point2::new(at.x_m - from.x_m, at.y_m - from.y_m), reach))
-                },
-                |i, pose| {
-                    if member.visible.is_some_and(|v| !v.contains(&Point2::from(pose.position()))) {
-                        return;
-                    }
-                    let e = z.minus(&pose.between(&at));
-                    likelihood[i] += member.probability * scale * (-0.5 * e.dot(&(inverse * e))).exp();
-                },
-            );
-        }
-        self.grid.weigh(|i, _| likelihood[i]);
-        Ok(())
+        let at = Pose2::new(member.place.x_m, member.place.y_m, member.place.theta_rad);
+        self.grid.each_heading(
+            |heading| {
+                let off = wrap_rad(at.theta_rad - heading - z.theta_rad);
+                if off * off > REACH_SIGMAS.powi(2) * covariance[(2, 2)] {
+                    return None;
+                }
+                // Where a robot of this heading stands to see it so.
+                let from = Pose2::new(0.0, 0.0, heading).compose(&z);
+                Some((Point2::new(at.x_m - from.x_m, at.y_m - from.y_m), reach))
+            },
+            |i, pose| {
+                if member.visible.is_some_and(|v| !v.contains(&Point2::from(pose.position()))) {
+                    return;
+                }
+                let e = z.minus(&pose.between(&at));
+                likelihood[i] += member.probability * scale * (-0.5 * e.dot(&(inverse * e))).exp();
+            },
+        );
     }
 
     /// A landmark was not seen, though the camera looked at all bearings between two (left positive).

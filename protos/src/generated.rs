@@ -215,6 +215,17 @@ pub struct StageTime {
     #[prost(double, tag = "2")]
     pub ms: f64,
 }
+/// A place where the robot may be.
+#[derive(::serde::Serialize, ::serde::Deserialize)]
+#[serde(default)]
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct Hypothesis {
+    /// Its share of the belief, 0 to 1.
+    #[prost(double, tag = "1")]
+    pub mass: f64,
+    #[prost(message, optional, tag = "2")]
+    pub map_from_robot: ::core::option::Option<Pose2Covariance>,
+}
 /// robot/{robot}/answer/{camera}
 #[derive(::serde::Serialize, ::serde::Deserialize)]
 #[serde(default)]
@@ -258,6 +269,10 @@ pub struct Answer {
     /// would stand behind the wall), disagree (the landmarks contradict one another), degenerate.
     #[prost(string, tag = "14")]
     pub pose_refusal: ::prost::alloc::string::String,
+    /// Where the robot may be while it does not know its pose and sees only landmarks that each may be several, most probable
+    /// first; it needs odometry for that. None of them is a pose: that comes on the key `pose` when one is left.
+    #[prost(message, repeated, tag = "15")]
+    pub hypotheses: ::prost::alloc::vec::Vec<Hypothesis>,
 }
 /// robot/{robot}/odometry : odom_from_robot
 #[derive(::serde::Serialize, ::serde::Deserialize)]
@@ -312,7 +327,8 @@ pub struct RobotPose {
     #[prost(message, optional, tag = "4")]
     pub map_from_robot: ::core::option::Option<Pose2Covariance>,
     /// What the pose rests on now: odometry, if it carries the pose; landmarks and laser, if fixes of that kind agreed with it
-    /// within the last 10 m. `odometry` alone: it is 10 m since anything else was said.
+    /// within the last 10 m; hypotheses, if it began with the last of several that were left and no landmark has confirmed it
+    /// yet. `odometry` alone: it is 10 m since anything else was said.
     #[prost(string, repeated, tag = "5")]
     pub modalities: ::prost::alloc::vec::Vec<::prost::alloc::string::String>,
     /// Corrections by landmarks applied since the start.

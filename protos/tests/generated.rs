@@ -4,7 +4,8 @@
 use std::{fs, path::Path};
 
 /// Messages that also travel as JSON over HTTP.
-const JSON: [&str; 15] = [
+const JSON: [&str; 16] = [
+    "Hypothesis",
     "Pose3",
     "Pose2",
     "Pose2Covariance",

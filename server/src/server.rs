@@ -138,6 +138,7 @@ fn engine(config: &Config, snapshots: Arc<Snapshots>, findings: Findings, gather
         limits: ImageLimits { bytes: config.limits.frame_bytes, pixels: config.limits.frame_pixels },
         panics: Arc::default(),
         findings,
+        searches: Arc::default(),
         gather,
     }
 }

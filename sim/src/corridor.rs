@@ -35,6 +35,8 @@ pub struct CorridorParams {
     pub poster_size_m: [f64; 2],
     /// First poster's picture; landmark `poster-i` shows poster `first_poster + i`.
     pub first_poster: u64,
+    /// How many different pictures there are: poster `i` looks like poster `i - pictures`; 0: all differ.
+    pub pictures: usize,
     /// Whether a column stands at the right wall.
     pub column: bool,
 }
@@ -49,6 +51,7 @@ impl Default for CorridorParams {
             poster_centre_z_m: 1.5,
             poster_size_m: [0.6, 0.84],
             first_poster: 0,
+            pictures: 0,
             column: true,
         }
     }
@@ -163,7 +166,8 @@ impl<'a> Site<'a> {
         let on_sides = self.p.posters - at_ends;
         let usable = self.p.length_m - 6.0;
         for i in 0..self.p.posters {
-            let texture = Arc::new(poster(self.p.first_poster.wrapping_add(i as u64)));
+            let number = if self.p.pictures > 0 { i % self.p.pictures } else { i };
+            let texture = Arc::new(poster(self.p.first_poster.wrapping_add(number as u64)));
             let thing = Thing {
                 name: format!("poster-{i}"),
                 kind: Some(LandmarkKind::Poster),

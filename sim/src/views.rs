@@ -140,6 +140,7 @@ fn building(seed: u64, number: usize) -> Building {
         poster_centre_z_m: rng.random_range(1.3..1.6),
         poster_size_m: [width_m, width_m * rng.random_range(0.75..1.5)],
         first_poster: rng.random(),
+        pictures: 0,
         column: rng.random_bool(0.5),
     };
     Building::corridor_with(&params, rng.random())

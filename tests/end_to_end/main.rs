@@ -9,6 +9,7 @@ mod gathered_drive;
 mod http_contract;
 mod laser;
 mod live_mapping;
+mod look_alikes;
 mod moved_landmark;
 mod real_pictures;
 mod restart;

@@ -6,6 +6,8 @@ pub mod slots;
 pub mod intake;
 pub mod live;
 pub mod motion;
+pub mod doubles;
+pub mod search;
 pub mod mapping;
 pub mod cameras;
 pub mod picture;

@@ -261,6 +261,30 @@ impl Motion {
         Some(self.tell(robot, at.map, at.epoch, &fused, modalities))
     }
 
+    /// A robot that searched was found, by landmarks that each may be several: its pose to publish. None if its pose is known
+    /// by now.
+    pub fn found(
+        &self,
+        robot: &Name,
+        at: Moment<'_>,
+        pose: &Pose2Covariance,
+        landmarks: &[LandmarkId],
+    ) -> Option<v1::RobotPose> {
+        let odometry = at.odometry?;
+        let map = self.snapshots.get(at.map);
+        let name = |id: &LandmarkId| map.as_ref().and_then(|m| Some(m.landmarks.get(id)?.name.clone()));
+        let landmarks = landmarks.iter().filter_map(name).collect();
+        let followed = self.lock().robot(robot).ok()?;
+        let mut followed = own(&followed);
+        if !followed.belong(at.epoch, at.map) {
+            return None;
+        }
+        let fused = followed.found(at.captured_ns, &odometry, pose, landmarks)?;
+        let modalities = followed.modalities();
+        drop(followed);
+        Some(self.tell(robot, at.map, at.epoch, &fused, modalities))
+    }
+
     fn tell(
         &self,
         robot: &Name,

@@ -101,6 +101,7 @@ pub(crate) fn engine(maps: &[Arc<MapSnapshot>]) -> Engine {
         limits: ImageLimits::FRAME,
         panics: Arc::default(),
         findings: findings().0,
+        searches: Arc::default(),
         gather: crate::gather::hook().0,
     }
 }

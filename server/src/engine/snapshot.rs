@@ -31,6 +31,8 @@ pub struct MapSnapshot {
     pub sizes: BTreeMap<LandmarkId, LandmarkSize>,
     /// The models that are matched: the active ones of `learnt`.
     pub models: ModelSet,
+    /// The landmarks that have look-alikes, with thresholds as if they had none: for robots that search.
+    pub doubles: Arc<ModelSet>,
     /// Every learnt model that reads and fits the parameters, candidates included.
     pub learnt: BTreeMap<LandmarkId, Learnt>,
     /// Models that are stored but must not be used, and why: damaged, or learnt under other parameters.
@@ -56,6 +58,7 @@ impl MapSnapshot {
             landmarks: BTreeMap::new(),
             sizes: BTreeMap::new(),
             models: ModelSet::default(),
+            doubles: Arc::default(),
             learnt: BTreeMap::new(),
             quarantined: BTreeMap::new(),
             walls: Vec::new(),

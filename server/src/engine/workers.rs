@@ -5,9 +5,11 @@
 use super::{
     cameras::Look,
     decode::{ImageLimits, decode_frame},
+    doubles::sighted,
     intake::{FrameJob, unknown_map},
     live::{LiveFrame, LiveHub},
     motion::{Grounds, Moment, Motion},
+    search::{Glance, Left, Searches},
     slots::{Outcome, SlotKey, Slots},
     snapshot::{MapSnapshot, Snapshots},
     standing::{Findings, Found},
@@ -16,10 +18,11 @@ use super::{
 use crate::gather::{Hook, Looked};
 use map::{
     changes::{ChangeParams, Expectation, Eye, Judged, expected, judge, sift},
+    hypotheses::Mode,
     localise::{Fix, Sighting},
     pose2::Pose2Covariance,
 };
-use protos::{CheckedFrame, Code, Name, Rejection, v1};
+use protos::{CheckedFrame, Code, Name, Rejection, convert::geometry::pose2_covariance_wire, v1};
 use std::{
     panic::{AssertUnwindSafe, catch_unwind},
     sync::{
@@ -30,6 +33,7 @@ use std::{
     time::Instant,
 };
 use vision::{
+    frame::GrayImage,
     pipeline::FrameFacts,
     recognise::{LandmarkId, Recognition, Verdict},
 };
@@ -59,6 +63,8 @@ pub struct Engine {
     pub panics: Arc<AtomicU64>,
     /// Where findings about landmarks go.
     pub findings: Findings,
+    /// Robots that do not know where they are.
+    pub searches: Arc<Searches>,
     /// Where frames of robots that gather views go.
     pub gather: Hook,
 }
@@ -116,6 +122,8 @@ struct Done {
     map: Option<Arc<MapSnapshot>>,
     fix: Option<Fix>,
     seen: Option<Seen>,
+    /// Where a robot that searched is found, and the landmarks that say so.
+    found: Option<(Pose2Covariance, Vec<LandmarkId>)>,
 }
 
 /// What a frame says about the landmarks themselves, by the pose without it.
@@ -138,7 +146,7 @@ impl Engine {
                 }
             })
         };
-        let (Done { mut answer, map, fix, seen }, outcome) = match done {
+        let (Done { mut answer, map, fix, seen, found }, outcome) = match done {
             Ok(done) => (done, Outcome::Processed),
             Err(refusal) => {
                 let (status, outcome) = match refusal.code {
@@ -148,7 +156,7 @@ impl Engine {
                 let rejection = Some((&refusal).into());
                 let map = job.map.clone();
                 let answer = v1::Answer { status: status.into(), rejection, map, ..v1::Answer::default() };
-                (Done { answer, map: None, fix: None, seen: None }, outcome)
+                (Done { answer, map: None, fix: None, seen: None, found: None }, outcome)
             }
         };
         let frame = &job.frame;
@@ -161,6 +169,12 @@ impl Engine {
         if let Some(fix) = fix
             && let Some(pose) = self.motion.fixed(&key.robot, moment(frame, &map), &fix)
         {
+            publish.pose(&key.robot, &pose);
+        }
+        if let Some((pose, landmarks)) = found
+            && let Some(pose) = self.motion.found(&key.robot, moment(frame, &map), &pose, &landmarks)
+        {
+            self.searches.end(&key.robot);
             publish.pose(&key.robot, &pose);
         }
         if let Some(Seen { grounds, judged, missed }) = seen {
@@ -200,13 +214,38 @@ impl Engine {
                 .watched()
                 .looked(key, &Look { intrinsics, image_px, seen: &seen, map: &map, mounting, fix });
         }
+        let searched = self.search(key, frame, (&image, &facts), &map, seen.is_some() || fix.is_ok());
+        let found = searched.and_then(|left| {
+            answer.hypotheses = left.modes.iter().map(hypothesis).collect();
+            left.decided
+        });
         times.ended("localise");
         answer.timings = times.finish();
         self.gather.offer(key, frame, || {
             let believed = frame.prior.or_else(|| seen.as_ref().map(|s| s.grounds.pose));
             Looked { image, quads: facts.quads, map: map.clone(), believed }
         });
-        Ok(Done { answer, map: Some(map.clone()), fix: fix.ok(), seen })
+        Ok(Done { answer, map: Some(map.clone()), fix: fix.ok(), seen, found })
+    }
+
+    /// Goes on with the search of a robot that does not know where it is.
+    fn search(
+        &self,
+        key: &SlotKey,
+        frame: &CheckedFrame,
+        (image, facts): (&GrayImage, &FrameFacts),
+        map: &MapSnapshot,
+        is_known: bool,
+    ) -> Option<Left> {
+        let (mounting, camera) = (frame.mounting.as_ref()?, frame.intrinsics.as_ref()?);
+        let odometry = frame.odometry?;
+        if is_known {
+            self.searches.end(&key.robot);
+            return None;
+        }
+        let sighted = sighted(image, facts, map, mounting, camera);
+        let glance = Glance { epoch: frame.epoch, map, odometry, sighted: &sighted };
+        self.searches.glance(&key.robot, &glance)
     }
 
     fn show(&self, key: &SlotKey, job: &FrameJob, answer: v1::Answer, outcome: Outcome) {
@@ -277,6 +316,10 @@ fn seen(
         Vec::new()
     };
     Some(Seen { grounds, judged, missed })
+}
+
+fn hypothesis(mode: &Mode) -> v1::Hypothesis {
+    v1::Hypothesis { mass: mode.mass, map_from_robot: Some(pose2_covariance_wire(&mode.pose)) }
 }
 
 fn moment<'a>(frame: &CheckedFrame, map: &'a MapSnapshot) -> Moment<'a> {

@@ -7,6 +7,7 @@ use super::{
     robots, seen,
     statements::statements,
 };
+use crate::engine::doubles;
 use crate::engine::snapshot::{LandmarkInfo, Learnt, MapSnapshot, Snapshots};
 use map::{
     check::OutOfRange,
@@ -20,7 +21,7 @@ use std::{collections::BTreeMap, sync::Arc};
 use vision::{
     learn::model::LandmarkModel,
     params::Params,
-    recognise::{LandmarkId, models::ModelSet},
+    recognise::{DistanceKind, LandmarkId, models::ModelSet},
 };
 
 statements! {
@@ -95,9 +96,11 @@ pub(super) async fn map(
     let active = learnt.values().map(|l| l.model.clone()).filter(|m| m.is_active()).collect();
     let models = ModelSet::new(active, params)
         .map_err(|e| StoreError::Damaged { what: format!("map `{name}`"), reason: e.to_string() })?;
+    let doubles = doubles(&learnt, before.as_deref(), (distance, params)).await;
     Ok(Some(Arc::new(MapSnapshot {
         name,
         models,
+        doubles,
         version: row.try_get::<i64, _>("version").map_err(at())? as u64,
         sizes: infos.iter().filter_map(|(id, l)| Some((*id, l.size?))).collect(),
         landmarks: infos,
@@ -121,6 +124,25 @@ async fn wall_index(walls: &[LaserSegment], before: Option<&MapSnapshot>) -> Arc
     Arc::new(made.unwrap_or_else(|error| {
         tracing::error!(%error, "walls for scans");
         WallIndex::new([])
+    }))
+}
+
+/// Landmarks that have look-alikes, off the runtime; taken over from the version before where no model is another.
+async fn doubles(
+    learnt: &BTreeMap<LandmarkId, Learnt>,
+    before: Option<&MapSnapshot>,
+    (kind, params): (DistanceKind, &Arc<Params>),
+) -> Arc<ModelSet> {
+    let digests =
+        |of: &BTreeMap<LandmarkId, Learnt>| of.iter().map(|(id, l)| (*id, l.digest)).collect::<Vec<_>>();
+    if let Some(before) = before.filter(|b| b.distance == kind && digests(&b.learnt) == digests(learnt)) {
+        return before.doubles.clone();
+    }
+    let (learnt, params) = (learnt.clone(), params.clone());
+    let made = tokio::task::spawn_blocking(move || doubles::doubles(&learnt, kind, &params)).await;
+    Arc::new(made.unwrap_or_else(|error| {
+        tracing::error!(%error, "look-alikes for searches");
+        ModelSet::default()
     }))
 }
 

@@ -7,7 +7,7 @@ use map::{
     changes::{Change, ChangeParams, Watch},
     fuse::{FixOutcome, FuseParams, FusedPose, Fuser, OdometryOutcome},
     localise::{Fix, Modality},
-    pose2::Pose2,
+    pose2::{Pose2, Pose2Covariance},
 };
 use std::collections::VecDeque;
 use vision::recognise::LandmarkId;
@@ -37,6 +37,8 @@ pub(super) struct Robot {
     /// Where on it landmarks and the laser last agreed with the pose.
     by_landmarks_m: Option<f64>,
     by_laser_m: Option<f64>,
+    /// It began with the last hypothesis that was left, and no landmark has confirmed it yet.
+    by_hypotheses: bool,
     /// The landmarks that the pose rests on.
     pub(super) supporters: Vec<LandmarkId>,
     /// What it has found out about landmarks...
@@ -60,6 +62,7 @@ impl Default for Robot {
             way_m: 0.0,
             by_landmarks_m: None,
             by_laser_m: None,
+            by_hypotheses: false,
             supporters: Vec::new(),
             watch: Watch::new(ChangeParams::default()),
             found: Vec::new(),
@@ -94,7 +97,7 @@ impl Robot {
 
     /// The pose has proved wrong, or is unknown: nothing rests on it any more.
     fn lost(&mut self) {
-        (self.by_landmarks_m, self.by_laser_m) = (None, None);
+        (self.by_landmarks_m, self.by_laser_m, self.by_hypotheses) = (None, None, false);
         self.supporters.clear();
         let cleared = self.watch.clear();
         self.found.extend(cleared);
@@ -176,6 +179,44 @@ impl Robot {
         Some((judged, fused))
     }
 
+    /// Starts from a pose at a frame, if there is none.
+    pub(super) fn found(
+        &mut self,
+        captured_ns: i64,
+        odometry: &Pose2,
+        pose: &Pose2Covariance,
+        landmarks: Vec<String>,
+    ) -> Option<FusedPose> {
+        if self.fuser.pose().is_some() {
+            return None;
+        }
+        self.moved(captured_ns, *odometry);
+        // The fuser starts at the newest odometry, the frame is some way behind it.
+        let motion = odometry.between(&self.newest?.1);
+        let covariance = FuseParams::default().motion_noise(&motion);
+        let now = pose.compose(&Pose2Covariance { pose: motion, covariance });
+        if let Err(error) = self.fuser.start(&now) {
+            tracing::error!(%error, "a pose that was found is out of range");
+            return None;
+        }
+        self.lost();
+        self.by_hypotheses = true;
+        let (epoch, map) = (self.epoch, self.map.clone());
+        self.log.keep(Correction {
+            epoch,
+            captured_ns,
+            map,
+            modality: "hypotheses",
+            landmarks,
+            outcome: "started",
+            chi2: None,
+            along_m: None,
+            across_m: None,
+            turn_rad: None,
+        });
+        self.fuser.pose()
+    }
+
     /// Keeps what the pose rests on; of landmarks the latest.
     fn rests_on(&mut self, outcome: FixOutcome, fix: &Fix) {
         match outcome {
@@ -187,6 +228,7 @@ impl Robot {
             Modality::Laser => self.by_laser_m = Some(self.way_m),
             Modality::Landmarks => {
                 self.by_landmarks_m = Some(self.way_m);
+                self.by_hypotheses = false;
                 self.supporters.retain(|id| !fix.landmarks.contains(id));
                 self.supporters.extend(&fix.landmarks);
                 let gone = self.supporters.len().saturating_sub(MAX_SUPPORTERS);
@@ -204,6 +246,7 @@ impl Robot {
             ("odometry", moves && posed),
             ("landmarks", near(self.by_landmarks_m)),
             ("laser", near(self.by_laser_m)),
+            ("hypotheses", self.by_hypotheses),
         ];
         all.into_iter().filter(|(_, rests)| *rests).map(|(word, _)| word.to_owned()).collect()
     }

@@ -1,0 +1,117 @@
+//! Searches without pictures: three doors that look alike along a corridor, as in `sim`'s look-alikes.
+
+use super::*;
+use crate::engine::snapshot::LandmarkInfo;
+use map::{
+    hypotheses::Glimpse,
+    place::{LandmarkPlace, PlaceSigmas},
+};
+use std::f64::consts::FRAC_PI_2;
+use vision::localise::pose::LandmarkSize;
+
+/// Along the corridor, all on its left side when looking east.
+const DOORS: [f64; 3] = [6.0, 11.0, 18.0];
+
+fn name(text: &str) -> Name {
+    Name::new(text).unwrap()
+}
+
+fn place(x: f64) -> LandmarkPlace {
+    let size = LandmarkSize { width_m: 0.9, height_m: 2.0 };
+    LandmarkPlace::by_hand(Vector3::new(x, 1.2, 1.0), -FRAC_PI_2, size, PlaceSigmas::default()).unwrap()
+}
+
+fn map() -> MapSnapshot {
+    let landmarks = DOORS.iter().enumerate().map(|(i, x)| {
+        let info =
+            LandmarkInfo { name: format!("door-{i}"), place: Some(place(*x)), ..LandmarkInfo::default() };
+        (LandmarkId(i as u64), info)
+    });
+    let wall = |ends| crate::store::load::wall(&ends).unwrap();
+    let walls = vec![wall([0.0, -1.2, 25.0, -1.2]), wall([25.0, 1.2, 0.0, 1.2])];
+    MapSnapshot { landmarks: landmarks.collect(), walls, ..MapSnapshot::empty("hall", 1) }
+}
+
+/// A door at `x` seen from a pose: it may be any of them.
+fn seen(x: f64, from: &Pose2) -> Vec<Sighted> {
+    let covariance = Matrix3::from_diagonal(&Vector3::new(0.01, 0.01, 0.005));
+    let glimpse = Glimpse { robot_from_landmark: from.between(&on_floor(&place(x))), covariance };
+    vec![(0..DOORS.len() as u64).map(|i| (LandmarkId(i), glimpse)).collect()]
+}
+
+/// Drives east from x = 4, looking at the things at `things` when 1 to 2 m before them. What is left in the end, and the
+/// most hypotheses at a time.
+fn drive(things: &[f64]) -> (Option<Pose2>, usize) {
+    let (map, searches) = (map(), Searches::default());
+    let (mut most, mut x) = (0, 4.0);
+    while x < 20.0 {
+        let truth = Pose2::new(x, 0.0, 0.0);
+        // Odometry began elsewhere.
+        let odometry = Pose2::new(100.0, 50.0, 1.0).compose(&Pose2::new(x, 0.0, 0.0));
+        let ahead = things.iter().find(|at| (1.0..2.0).contains(&(*at - x)));
+        let sighted = ahead.map_or_else(Vec::new, |at| seen(*at, &truth));
+        let glance = Glance { epoch: 1, map: &map, odometry, sighted: &sighted };
+        if let Some(left) = searches.glance(&name("r1"), &glance) {
+            most = most.max(left.modes.iter().filter(|m| m.mass > 0.1).count());
+            if let Some((pose, landmarks)) = left.decided {
+                assert!(landmarks.len() >= LEAST_LANDMARKS);
+                assert!(pose.pose.minus(&truth).xy().norm() < 0.3, "{pose:?} for {truth:?}");
+                return (Some(pose.pose), most);
+            }
+        }
+        x += 0.35;
+    }
+    (None, most)
+}
+
+#[test]
+fn one_place_is_left_when_the_distances_between_doors_say_so() {
+    let (found, most) = drive(&DOORS);
+    let at = found.expect("found");
+    // The second door settles it: 5 m apart are only the first two.
+    assert!((9.0..10.1).contains(&at.x_m) && most == 3, "{at:?} {most}");
+}
+
+#[test]
+fn one_door_alone_never_settles_it() {
+    // Nor something that is on no map, however often it is seen.
+    assert_eq!(drive(&[6.0]), (None, 3));
+    assert_eq!(drive(&[8.3]).0, None);
+}
+
+#[test]
+fn standing_before_a_door_tells_nothing_new() {
+    let (map, searches) = (map(), Searches::default());
+    let at = Pose2::new(4.5, 0.0, 0.0);
+    let sighted = seen(6.0, &at);
+    let glance = Glance { epoch: 1, map: &map, odometry: at, sighted: &sighted };
+    let first = searches.glance(&name("r1"), &glance).unwrap().modes;
+    for _ in 0..50 {
+        let again = searches.glance(&name("r1"), &glance).unwrap();
+        assert!(again.decided.is_none() && again.modes == first);
+    }
+    // Another start of its software is another odometry.
+    let anew = Glance { epoch: 2, sighted: &[], ..glance };
+    assert!(searches.glance(&name("r1"), &anew).is_none());
+}
+
+#[test]
+fn searches_are_bounded_and_end() {
+    let (map, searches) = (map(), Searches::default());
+    let at = Pose2::new(4.5, 0.0, 0.0);
+    let sighted = seen(6.0, &at);
+    let glance = Glance { epoch: 1, map: &map, odometry: at, sighted: &sighted };
+    let unseen = Glance { sighted: &[], ..glance };
+    assert!(searches.glance(&name("r0"), &unseen).is_none(), "nothing begins without a sighting");
+    for r in 0..=MAX_SEARCHES {
+        assert!(searches.glance(&name(&format!("r{r}")), &glance).is_some());
+    }
+    assert!(searches.glance(&name("r0"), &unseen).is_none(), "the stalest has given way");
+    searches.end(&name("r1"));
+    assert!(searches.glance(&name("r1"), &unseen).is_none());
+    let far = MapSnapshot {
+        walls: vec![crate::store::load::wall(&[0.0, 0.0, 9000.0, 9000.0]).unwrap()],
+        ..map.clone()
+    };
+    assert!(searches.glance(&name("r9"), &Glance { map: &far, ..glance }).is_none(), "too large a map");
+}

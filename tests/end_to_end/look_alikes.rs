@@ -1,0 +1,93 @@
+//! Claim: a robot that starts nobody knows where and sees only things that all look the same is told where it may be, never
+//! that it is at one of them, until one place is left; then it is there.
+
+use client::{Capture, Delivery, RobotClient, RobotOptions, v1};
+use map::pose2::{Pose2, wrap_rad};
+use server::config::Limits;
+use sim::{
+    building::Building,
+    corridor::CorridorParams,
+    drive::DriveParams,
+    robot::{Robot, RobotParams, Sighting},
+};
+use std::sync::Arc;
+use tests::{
+    Inside, SOON, eventually,
+    robots::{MAP, call, jpeg, put_walls, teach},
+};
+
+/// Three posters with the same picture, left, right and left.
+const ALIKE: [&str; 3] = ["poster-0", "poster-1", "poster-2"];
+
+async fn ask(client: &RobotClient, seen: &Sighting) -> v1::Answer {
+    let capture = Capture::encoded(jpeg(&seen.frame.image))
+        .expect("a picture")
+        .with_intrinsics(sim::camera::Camera::vga().intrinsics())
+        .with_mounting(&seen.step.robot_from_camera)
+        .with_odometry(&seen.step.odom_from_robot)
+        .with_deadline_ms(60_000);
+    client.recognise("front", capture, SOON).await.expect("an answer")
+}
+
+/// Distance and turn between a pose on the wire and the truth.
+fn off(pose: &v1::Pose2Covariance, truth: &Pose2) -> (f64, f64) {
+    let at = pose.pose.expect("a pose");
+    ((at.x_m - truth.x_m).hypot(at.y_m - truth.y_m), wrap_rad(at.theta_rad - truth.theta_rad).abs())
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn among_look_alikes_there_are_hypotheses_and_no_pose_until_one_is_left() {
+    let params = CorridorParams { posters: 3, pictures: 1, column: false, ..CorridorParams::default() };
+    let building = Arc::new(Building::corridor_with(&params, 3));
+    let inside = Inside::start(Limits::default()).await;
+    inside.maps().create_map(MAP, None).await.expect("map");
+    put_walls(&inside, &building).await;
+    teach(&inside, &building, &ALIKE, 6).await;
+    inside.maps().put_robot("r1", MAP).await.expect("robot");
+    let options = RobotOptions {
+        delivery: Delivery::Every,
+        ..RobotOptions::new(&inside.server.zenoh_endpoint, "default", "r1")
+    };
+    let client = RobotClient::connect(&options).await.expect("connected");
+    let drive = DriveParams { start_m: 2.0, ..DriveParams::default() };
+    let mut robot = Robot::new(building.clone(), &RobotParams { drive, ..RobotParams::default() });
+    let mut steps = Vec::new();
+    while let Some(step) = robot.drive_mut().next() {
+        steps.push(step);
+    }
+    let mut poses = client.poses();
+    let (mut several, mut left) = (0, None);
+    for step in steps.iter().step_by(2) {
+        let answer = ask(&client, &robot.look(step)).await;
+        assert!(answer.map_from_robot.is_none(), "nothing here is unique");
+        let true_one = |h: &v1::Hypothesis| {
+            let (m, rad) = off(h.map_from_robot.as_ref().expect("a pose"), &step.map_from_robot);
+            m < 0.8 && rad < 0.5
+        };
+        several += usize::from(answer.hypotheses.len() >= 2 && answer.hypotheses.iter().any(true_one));
+        if answer.hypotheses.first().is_some_and(|h| h.mass > 0.95) {
+            // Sure enough, but of a pose only where two different ones say so.
+            if let Ok(Ok(pose)) =
+                tokio::time::timeout(std::time::Duration::from_millis(300), poses.recv()).await
+            {
+                left = Some((step.clone(), pose));
+                break;
+            }
+        }
+        assert!(poses.try_recv().is_err(), "a pose while several places are left");
+    }
+    assert!(several >= 2, "{several} frames with several hypotheses, the true one among them");
+    let (step, pose) = left.expect("one is left in the end");
+    let (m, rad) = off(pose.map_from_robot.as_ref().expect("a pose"), &step.map_from_robot);
+    assert!(m < 0.5 && rad < 0.25, "{m} m, {rad} rad off");
+    assert_eq!(pose.modalities, ["odometry", "hypotheses"]);
+    let logged = || async {
+        let (_, log) = call(&inside, "GET", "/robots/r1/corrections", None).await;
+        (log["totals"]["hypotheses"]["started"] == 1).then_some(log)
+    };
+    let log = eventually("logged", logged).await;
+    let names = log["corrections"][0]["landmarks"].as_array().map_or(0, Vec::len);
+    assert!(names >= 2 && log["corrections"][0]["modality"] == "hypotheses", "{log}");
+    client.close().await.expect("closed");
+    inside.server.stop().await;
+}
