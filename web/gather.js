@@ -75,7 +75,7 @@ function show() {
     byId("gather-facts").textContent = "Nothing has been gathered on this map.";
   } else {
     const c = g.counts;
-    byId("gather-facts").textContent = `${g.open ? "gathering" : "ended"}: ${g.robot}, ${g.landmark ?? "whatever is new"}; ` +
+    byId("gather-facts").textContent = `${g.open ? "gathering" : "ended"}: ${g.robot}, ${g.landmark ?? (g.known ? "whatever is new and what it recognises" : "whatever is new")}; ` +
       `${c.frames} frames (${c.dropped} dropped), ${c.kept} views kept, ${c.alike} like one that is kept, ${c.known} known or nearly`;
   }
 }
