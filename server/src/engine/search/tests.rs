@@ -80,6 +80,24 @@ fn one_door_alone_never_settles_it() {
 }
 
 #[test]
+fn a_thing_that_could_only_be_one_door_settles_nothing_alone() {
+    // Seen from so far that for the other door the robot would stand outside of the map; but it may be on no map.
+    let mut map = map();
+    map.landmarks.remove(&LandmarkId(2));
+    let searches = Searches::default();
+    let mut sure = 0;
+    for k in 0..4 {
+        let at = Pose2::new(10.4 + 0.35 * f64::from(k), 0.0, 0.0);
+        let sighted = seen(19.0, &at);
+        let glance = Glance { epoch: 1, map: &map, odometry: at, sighted: &sighted };
+        let left = searches.glance(&name("r1"), &glance).unwrap();
+        sure += usize::from(left.modes[0].mass > 0.95);
+        assert!(left.decided.is_none(), "{left:?}");
+    }
+    assert!(sure > 0, "it would be sure of the wrong place");
+}
+
+#[test]
 fn standing_before_a_door_tells_nothing_new() {
     let (map, searches) = (map(), Searches::default());
     let at = Pose2::new(4.5, 0.0, 0.0);
