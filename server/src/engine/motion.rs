@@ -1,5 +1,6 @@
 //! How each robot moves: odometry, scans and fixes by landmarks in, its fused pose on the map out. For pages, odometry
-//! alone is laid on the map at the robot's first known pose. A new epoch of a robot, or another map, starts afresh.
+//! alone is laid on the map at the robot's first known pose. A new epoch of a robot starts afresh; so does another map, unless it is
+//! known how the two lie to each other.
 //! Capture times order one robot's own readings; they are never compared with this machine's clock.
 
 mod corrections;
@@ -97,7 +98,7 @@ impl Motion {
         let (map, odometry, followed) = state.odometry.count("odometry", robot, taken)?;
         drop(state);
         let mut followed = own(&followed);
-        if !followed.belong(odometry.epoch, &map) {
+        if !followed.belong(odometry.epoch, &map, &self.snapshots) {
             return None;
         }
         followed.moved(odometry.captured_ns, odometry.odom_from_robot);
@@ -148,7 +149,7 @@ impl Motion {
         let followed = self.lock().robot(robot).ok()?;
         let prior = {
             let mut followed = own(&followed);
-            if !followed.belong(job.epoch, &job.map) {
+            if !followed.belong(job.epoch, &job.map, &self.snapshots) {
                 return None;
             }
             followed.moved_to(job.captured_ns, job.odom_from_robot);
@@ -164,7 +165,7 @@ impl Motion {
         };
         let found = laser_fix(&map.wall_index, &job.scan, &prior, &LaserFixParams::default());
         let mut followed = own(&followed);
-        if !followed.belong(job.epoch, &job.map) {
+        if !followed.belong(job.epoch, &job.map, &self.snapshots) {
             return None;
         }
         let found =
@@ -188,7 +189,7 @@ impl Motion {
     pub fn grounds(&self, robot: &Name, at: Moment<'_>) -> Option<Grounds> {
         let followed = self.lock().robot(robot).ok()?;
         let mut followed = own(&followed);
-        if !followed.belong(at.epoch, at.map) {
+        if !followed.belong(at.epoch, at.map, &self.snapshots) {
             return None;
         }
         if let Some(odometry) = at.odometry {
@@ -225,7 +226,7 @@ impl Motion {
         let standing = |id| map.as_ref().and_then(|m| Some(m.landmarks.get(&id)?.standing));
         let Ok(followed) = self.lock().robot(robot) else { return Vec::new() };
         let mut followed = own(&followed);
-        if !followed.belong(at.epoch, at.map) {
+        if !followed.belong(at.epoch, at.map, &self.snapshots) {
             return Vec::new();
         }
         let mut changes = std::mem::take(&mut followed.found);
@@ -244,7 +245,7 @@ impl Motion {
         let landmarks = fix.landmarks.iter().filter_map(name).collect();
         let followed = self.lock().robot(robot).ok()?;
         let mut followed = own(&followed);
-        if !followed.belong(at.epoch, at.map) {
+        if !followed.belong(at.epoch, at.map, &self.snapshots) {
             return None;
         }
         if let Some(odometry) = at.odometry {
@@ -276,7 +277,7 @@ impl Motion {
         let landmarks = landmarks.iter().filter_map(name).collect();
         let followed = self.lock().robot(robot).ok()?;
         let mut followed = own(&followed);
-        if !followed.belong(at.epoch, at.map) {
+        if !followed.belong(at.epoch, at.map, &self.snapshots) {
             return None;
         }
         let fused = followed.found(at.captured_ns, &odometry, pose, landmarks)?;

@@ -3,7 +3,12 @@
 
 use arc_swap::ArcSwap;
 use map::{
-    changes::Standing, laser_fix::WallIndex, place::LandmarkPlace, segments::LaserSegment,
+    changes::Standing,
+    frames::{Links, relation},
+    laser_fix::WallIndex,
+    place::LandmarkPlace,
+    pose2::Pose2Covariance,
+    segments::LaserSegment,
     visibility::VisibilityMap,
 };
 use std::{collections::BTreeMap, sync::Arc};
@@ -112,6 +117,7 @@ pub struct MapChange {
 struct World {
     maps: BTreeMap<String, Arc<MapSnapshot>>,
     robots: BTreeMap<String, String>,
+    links: Arc<Links<String>>,
 }
 
 /// All maps and the robots' assignments, readable from any thread without waiting.
@@ -175,6 +181,18 @@ impl Snapshots {
             };
             world
         });
+    }
+
+    /// How maps lie to each other from now on. For the store, after the commit.
+    pub fn set_links(&self, links: Links<String>) {
+        let links = Arc::new(links);
+        self.world.rcu(|world| World { links: links.clone(), ..World::clone(world) });
+    }
+
+    /// `to_from_map` of two maps that hang on the same one; nothing for others.
+    pub fn relation(&self, from: &str, to: &str) -> Option<Pose2Covariance> {
+        let links = self.world.load().links.clone();
+        Some(relation(&links, &from.to_owned(), &to.to_owned()).ok()?.to_from_map)
     }
 
     fn announce(&self, change: MapChange) {

@@ -4,7 +4,7 @@
 use super::{
     StoreError, landmarks, laser, maps,
     models::{self, ModelDigest},
-    robots, seen,
+    robots, seen, sites,
     statements::statements,
 };
 use crate::engine::doubles;
@@ -49,6 +49,7 @@ pub(super) async fn all(
             snapshots.publish(map);
         }
     }
+    snapshots.set_links(sites::links(&sites::all(&mut *conn).await?));
     let mut after = String::new();
     loop {
         let page = robots::page(&mut *conn, &after, PAGE).await?;

@@ -134,5 +134,6 @@ pub(crate) async fn delete(tx: &mut Tx, name: &str) -> Result<(), StoreError> {
     }
     sqlx::query(DELETE).bind(map.id).execute(&mut tx.conn).await.map_err(StoreError::at("delete map"))?;
     tx.changed(Change::MapRemoved(map.name));
+    tx.changed(Change::Links);
     Ok(())
 }

@@ -1,6 +1,6 @@
 //! Where maps belong (site, building, floor: words for people) and how they lie to each other (for poses).
 
-use super::{StoreError, Tx, maps, statements::statements};
+use super::{Change, StoreError, Tx, maps, statements::statements};
 use map::{
     frames::{self, Link, Links},
     pose2::{Pose2, Pose2Covariance},
@@ -89,6 +89,7 @@ pub(crate) async fn set(
         .execute(&mut tx.conn)
         .await
         .map_err(StoreError::at("place map"))?;
+    tx.changed(Change::Links);
     Ok(found)
 }
 
@@ -122,6 +123,7 @@ mod tests {
         }
         put(&store, "b", lies_in("a")).await.unwrap();
         put(&store, "c", lies_in("b")).await.unwrap();
+        assert!(store.snapshots().relation("c", "a").is_some(), "published with the commit");
         assert!(matches!(
             put(&store, "a", lies_in("c")).await,
             Err(StoreError::Frames(frames::FrameError::Cycle))
@@ -137,11 +139,16 @@ mod tests {
         );
         task.close().await;
         let (store, _task) = Store::open(&config).await.unwrap();
+        assert!(store.snapshots().relation("c", "a").is_some(), "and at the start");
         let known = all(store.reads()).await.unwrap();
         assert_eq!(known["b"], lies_in("a"));
         assert_eq!(known["a"], Whereabouts::default());
         put(&store, "c", Whereabouts::default()).await.unwrap();
+        assert!(
+            store.snapshots().relation("c", "a").is_none() && store.snapshots().relation("b", "a").is_some()
+        );
         store.write(|tx| Box::pin(maps::delete(tx, "b"))).await.unwrap();
         assert_eq!(all(store.reads()).await.unwrap().len(), 2);
+        assert!(store.snapshots().relation("b", "a").is_none());
     }
 }

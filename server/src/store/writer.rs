@@ -3,7 +3,7 @@
 //!
 //! A caller that goes away cannot cancel a write: it runs here, not in the caller's task.
 
-use super::{StoreError, load};
+use super::{StoreError, load, sites};
 use crate::engine::snapshot::Snapshots;
 use futures::future::BoxFuture;
 use sqlx::SqliteConnection;
@@ -18,6 +18,8 @@ pub(crate) enum Change {
     Map(i64),
     /// The map is gone.
     MapRemoved(String),
+    /// How maps lie to each other.
+    Links,
     /// The robot stands on this map, or is gone.
     Robot {
         /// Its name.
@@ -170,6 +172,10 @@ impl Writer {
                     }
                 }
                 Change::MapRemoved(name) => self.snapshots.remove_map(&name),
+                Change::Links => {
+                    let all = sites::all(&mut self.tx.conn).await?;
+                    self.snapshots.set_links(sites::links(&all));
+                }
                 Change::Robot { name, map } => self.snapshots.set_robot(&name, map.as_deref()),
             }
         }

@@ -17,13 +17,13 @@ pub struct Correction {
     pub captured_ns: i64,
     /// The map it is a pose in.
     pub map: String,
-    /// `landmarks`, `laser` or `hypotheses`.
+    /// `landmarks`, `laser` or `hypotheses`; `map` when the robot came from another map.
     pub modality: &'static str,
     /// The landmarks it rests on, by name; empty for the laser.
     pub landmarks: Vec<String>,
     /// `started` (it gave the first pose), `applied`, `gated_out` (it contradicts the pose and was left out), `reset` (the
     /// last of several that contradict the pose and agree with one another: it replaced the pose), `too_old`, `waiting`
-    /// (newer than the last odometry).
+    /// (newer than the last odometry), `carried_over` (the pose on another map, in the frame of this one).
     pub outcome: &'static str,
     /// Squared Mahalanobis distance of the fix from the pose before it, 3 degrees of freedom; for `applied` and
     /// `gated_out`.

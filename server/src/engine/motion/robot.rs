@@ -1,8 +1,11 @@
-//! One robot on the move: its fused pose, what that rests on, what it has found out about landmarks. A new epoch or
-//! another map starts afresh; an epoch that is over says nothing more.
+//! One robot on the move: its fused pose, what that rests on, what it has found out about landmarks. A new epoch
+//! starts afresh; an epoch that is over says nothing more.
 
 use super::corrections::{Correction, Log, modality, moved, outcome};
-use crate::engine::slots::{Order, PAST_EPOCHS};
+use crate::engine::{
+    slots::{Order, PAST_EPOCHS},
+    snapshot::Snapshots,
+};
 use map::{
     changes::{Change, ChangeParams, Watch},
     fuse::{FixOutcome, FuseParams, FusedPose, Fuser, OdometryOutcome},
@@ -72,9 +75,9 @@ impl Default for Robot {
 }
 
 impl Robot {
-    /// Starts afresh when the robot's software did, or when it is on another map. False for an epoch that is over: what
-    /// was still in work when a new one began.
-    pub(super) fn belong(&mut self, epoch: u64, map: &str) -> bool {
+    /// Starts afresh when the robot's software did, or when it is on another map; its pose goes with it where it is known
+    /// how the two maps lie to each other. False for an epoch that is over: what was still in work when a new one began.
+    pub(super) fn belong(&mut self, epoch: u64, map: &str, maps: &Snapshots) -> bool {
         if self.epoch == epoch && self.map == map {
             return true;
         }
@@ -87,11 +90,51 @@ impl Robot {
             }
             self.past.push_back(self.epoch);
         }
+        let there = if self.epoch == epoch { self.pose_on(map, maps) } else { None };
+        let newest = self.newest;
         (self.epoch, self.map) = (epoch, map.to_owned());
         self.fuser = Fuser::new(FuseParams::default());
         (self.map_from_odom, self.newest, self.way_m) = (None, None, 0.0);
         self.lost();
         self.found.clear();
+        if let (Some(pose), Some((at_ns, odometry))) = (there, newest) {
+            self.moved(at_ns, odometry);
+            self.begin(at_ns, &pose, ("map", "carried_over"), Vec::new());
+        }
+        true
+    }
+
+    /// The pose of this moment in the frame of another map.
+    fn pose_on(&self, map: &str, maps: &Snapshots) -> Option<Pose2Covariance> {
+        let here = self.fuser.pose()?.pose;
+        Some(maps.relation(&self.map, map)?.compose(&here))
+    }
+
+    /// Starts the filter from a pose of this moment, and logs it; false if it is out of range.
+    fn begin(
+        &mut self,
+        captured_ns: i64,
+        pose: &Pose2Covariance,
+        (modality, outcome): (&'static str, &'static str),
+        landmarks: Vec<String>,
+    ) -> bool {
+        if let Err(error) = self.fuser.start(pose) {
+            tracing::error!(%error, modality, "a pose to start from is out of range");
+            return false;
+        }
+        let (epoch, map) = (self.epoch, self.map.clone());
+        self.log.keep(Correction {
+            epoch,
+            captured_ns,
+            map,
+            modality,
+            landmarks,
+            outcome,
+            chi2: None,
+            along_m: None,
+            across_m: None,
+            turn_rad: None,
+        });
         true
     }
 
@@ -195,25 +238,11 @@ impl Robot {
         let motion = odometry.between(&self.newest?.1);
         let covariance = FuseParams::default().motion_noise(&motion);
         let now = pose.compose(&Pose2Covariance { pose: motion, covariance });
-        if let Err(error) = self.fuser.start(&now) {
-            tracing::error!(%error, "a pose that was found is out of range");
+        self.lost();
+        if !self.begin(captured_ns, &now, ("hypotheses", "started"), landmarks) {
             return None;
         }
-        self.lost();
         self.by_hypotheses = true;
-        let (epoch, map) = (self.epoch, self.map.clone());
-        self.log.keep(Correction {
-            epoch,
-            captured_ns,
-            map,
-            modality: "hypotheses",
-            landmarks,
-            outcome: "started",
-            chi2: None,
-            along_m: None,
-            across_m: None,
-            turn_rad: None,
-        });
         self.fuser.pose()
     }
 

@@ -3,6 +3,7 @@
 use super::*;
 use crate::engine::snapshot::MapSnapshot;
 use map::{
+    frames::Link,
     laser_fix::WallIndex,
     localise::{DecidedBy, Modality},
     pose2::Pose2Covariance,
@@ -110,6 +111,32 @@ fn another_map_starts_afresh() {
     motion.fixed(&r1, at(1_000_000_000, 3.0), &fix(10.0)).unwrap();
     let there = Moment { map: "cellar", ..at(2_000_000_000, 3.0) };
     assert!(motion.grounds(&r1, there).is_none());
+}
+
+#[test]
+fn a_pose_goes_along_to_a_map_that_lies_known() {
+    let (motion, r1) = motion();
+    // The floor above: its origin at (4, 3) of the hall, turned by a quarter.
+    let hall_from_floor = Pose2Covariance {
+        pose: Pose2::new(4.0, 3.0, std::f64::consts::FRAC_PI_2),
+        covariance: Matrix3::identity() * 1e-2,
+    };
+    let link = Link { parent: "hall".to_owned(), parent_from_map: hall_from_floor, level_m: 3.5 };
+    motion.snapshots.set_links([("floor".to_owned(), link)].into());
+    let on = |map: &'static str| motion.grounds(&r1, Moment { map, ..at(2_000_000_000, 5.0) });
+    motion.fixed(&r1, at(1_000_000_000, 3.0), &fix(10.0)).unwrap();
+    motion.odometry(&r1, odometry(2, 5.0));
+    // (12, 1) in the hall, looking along x.
+    let there = on("floor").unwrap().pose;
+    assert!((there.pose.x_m + 2.0).abs() < 1e-9 && (there.pose.y_m + 8.0).abs() < 1e-9, "{there:?}");
+    assert!((there.pose.theta_rad + std::f64::consts::FRAC_PI_2).abs() < 1e-9);
+    // As unsure as the link lets it be: 10 cm, and 0.1 rad at 8 m.
+    assert!(there.covariance[(0, 0)] > 0.5 && there.covariance[(0, 0)] < 1.0, "{}", there.covariance);
+    let said = motion.corrections(&r1);
+    assert_eq!(said.modalities, ["odometry"]);
+    assert_eq!(said.corrections.last().map(|c| (c.modality, c.outcome)), Some(("map", "carried_over")));
+    assert!(on("attic").is_none(), "nothing is known of how it lies");
+    assert!(on("hall").is_none(), "and what was known is gone with it");
 }
 
 #[test]
