@@ -7,7 +7,6 @@ use client::{
     map::Extent,
     v1::{self, Verdict},
 };
-use image::{ExtendedColorType, codecs::jpeg::JpegEncoder};
 use map::pose2::{Pose2, Pose2Covariance};
 use nalgebra::{Matrix3, Point2, Vector3};
 use reqwest::{Client, Method, StatusCode};
@@ -21,33 +20,19 @@ use sim::{
     truth::{LandmarkView, ViewState},
 };
 use std::{collections::BTreeMap, sync::Arc};
-use tests::{Inside, SOON, command::waymark, eventually};
-use vision::{frame::GrayImage, geometry::polygon::iou};
+use tests::{
+    Inside, SOON,
+    command::waymark,
+    eventually,
+    robots::{call, jpeg},
+};
+use vision::geometry::polygon::iou;
 
 const MAP: &str = "corridor";
 /// Posters with a shorter side in the picture are counted by themselves...
 const LARGE_PX: f64 = 60.0;
 /// ... and below this not at all: they have no icon.
 const MIN_SIDE_PX: f64 = 38.0;
-
-fn jpeg(image: &GrayImage) -> Vec<u8> {
-    let mut out = Vec::new();
-    let (width, height) = (image.width() as u32, image.height() as u32);
-    JpegEncoder::new_with_quality(&mut out, 90)
-        .encode(image.data(), width, height, ExtendedColorType::L8)
-        .expect("in memory");
-    out
-}
-
-async fn call(inside: &Inside, method: Method, path: &str, body: Option<Value>) -> (StatusCode, Value) {
-    let request = Client::new().request(method, format!("{}/api/v1{path}", inside.url()));
-    let request = match body {
-        Some(body) => request.json(&body),
-        None => request,
-    };
-    let answer = request.send().await.expect("an answer");
-    (answer.status(), answer.json().await.unwrap_or_default())
-}
 
 /// A map with walls and a robot on it, nothing taught.
 async fn walls(inside: &Inside, building: &Building) -> RobotClient {

@@ -4,7 +4,7 @@
 
 use client::{Capture, Delivery, RobotClient, RobotOptions, v1};
 use map::pose2::Pose2;
-use reqwest::StatusCode;
+use reqwest::{Method, StatusCode};
 use serde_json::Value;
 use server::config::Limits;
 use sim::{
@@ -55,7 +55,7 @@ impl Run {
     }
 
     async fn corrections(&self) -> Value {
-        let (status, log) = call(&self.inside, "GET", "/robots/r1/corrections", None).await;
+        let (status, log) = call(&self.inside, Method::GET, "/robots/r1/corrections", None).await;
         assert_eq!(status, StatusCode::OK, "{log}");
         log
     }
@@ -173,7 +173,7 @@ async fn in_a_corridor_the_laser_keeps_a_robot_off_the_walls() {
     assert!(
         each.iter().any(|c| c["modality"] == "laser" && c["chi2"].is_number() && c["across_m"].is_number())
     );
-    let (status, _) = call(&run.inside, "GET", "/robots/nobody/corrections", None).await;
+    let (status, _) = call(&run.inside, Method::GET, "/robots/nobody/corrections", None).await;
     assert_eq!(status, StatusCode::NOT_FOUND);
     run.client.close().await.expect("closed");
     run.inside.server.stop().await;

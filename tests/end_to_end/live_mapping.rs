@@ -2,7 +2,7 @@
 //! a recording of them; they are stored when it is finished, and not before.
 
 use client::{Delivery, RobotClient, RobotOptions};
-use reqwest::StatusCode;
+use reqwest::{Method, StatusCode};
 use serde_json::{Value, json};
 use server::config::Limits;
 use sim::{
@@ -63,7 +63,7 @@ fn ends(map: &Value) -> Vec<[f64; 4]> {
 }
 
 async fn mapping(inside: &Inside) -> Value {
-    let (status, progress) = call(inside, "GET", &format!("/maps/{MAP}/mapping"), None).await;
+    let (status, progress) = call(inside, Method::GET, &format!("/maps/{MAP}/mapping"), None).await;
     assert_eq!(status, StatusCode::OK, "{progress}");
     progress
 }
@@ -78,9 +78,9 @@ async fn a_drive_over_zenoh_gives_the_walls_that_its_recording_gives() {
     let path = format!("/maps/{MAP}/mapping");
     refusals(&inside, &path).await;
     let body = json!({ "robot": "r1" });
-    let (status, begun) = call(&inside, "POST", &path, Some(body.clone())).await;
+    let (status, begun) = call(&inside, Method::POST, &path, Some(body.clone())).await;
     assert_eq!((status, &begun["stage"]), (StatusCode::CREATED, &json!("mapping")));
-    assert_eq!(call(&inside, "POST", &path, Some(body)).await.1["code"], "in_use");
+    assert_eq!(call(&inside, Method::POST, &path, Some(body)).await.1["code"], "in_use");
     let options = RobotOptions {
         delivery: Delivery::Every,
         ..RobotOptions::new(&inside.server.zenoh_endpoint, "default", "r1")
@@ -100,14 +100,14 @@ async fn a_drive_over_zenoh_gives_the_walls_that_its_recording_gives() {
     let all = || async { (mapping(&inside).await["scans"] == sent).then_some(()) };
     eventually("all mapped", all).await;
     assert_eq!(mapping(&inside).await["dropped"], 0);
-    let (_, before) = call(&inside, "GET", &format!("/maps/{MAP}/laser"), None).await;
+    let (_, before) = call(&inside, Method::GET, &format!("/maps/{MAP}/laser"), None).await;
     assert_eq!(before["segments"], json!([]), "nothing is stored before it is finished");
-    let (status, _) = call(&inside, "POST", &format!("{path}/finish"), None).await;
+    let (status, _) = call(&inside, Method::POST, &format!("{path}/finish"), None).await;
     assert_eq!(status, StatusCode::ACCEPTED);
     let done = || async { Some(mapping(&inside).await).filter(|p| p["stage"] != "finishing") };
     let progress = eventually("stored", done).await;
     assert_eq!(progress["stage"], "done", "{progress}");
-    let (_, stored) = call(&inside, "GET", &format!("/maps/{MAP}/laser"), None).await;
+    let (_, stored) = call(&inside, Method::GET, &format!("/maps/{MAP}/laser"), None).await;
     let (live, file) = (ends(&stored), walls_of_file(&building, &steps));
     assert_eq!((live.len(), progress["segments"].as_u64()), (file.len(), Some(file.len() as u64)));
     assert!(live.len() >= 4, "{live:?}");
@@ -121,20 +121,26 @@ async fn a_drive_over_zenoh_gives_the_walls_that_its_recording_gives() {
 /// What cannot be begun or ended, and giving up.
 async fn refusals(inside: &Inside, path: &str) {
     for (method, path, body, status, code) in [
-        ("GET", path.to_owned(), None, 404, "not_mapping"),
-        ("POST", format!("{path}/finish"), None, 404, "not_mapping"),
-        ("POST", path.to_owned(), Some(json!({ "robot": "nobody" })), 404, "unknown_robot"),
-        ("POST", "/maps/none/mapping".to_owned(), Some(json!({ "robot": "r1" })), 404, "unknown_map"),
-        ("POST", path.to_owned(), Some(json!({ "robot": "r1", "origin": [1e9, 0, 0] })), 422, "out_of_range"),
+        (Method::GET, path.to_owned(), None, 404, "not_mapping"),
+        (Method::POST, format!("{path}/finish"), None, 404, "not_mapping"),
+        (Method::POST, path.to_owned(), Some(json!({ "robot": "nobody" })), 404, "unknown_robot"),
+        (Method::POST, "/maps/none/mapping".to_owned(), Some(json!({ "robot": "r1" })), 404, "unknown_map"),
+        (
+            Method::POST,
+            path.to_owned(),
+            Some(json!({ "robot": "r1", "origin": [1e9, 0, 0] })),
+            422,
+            "out_of_range",
+        ),
     ] {
         let (got, problem) = call(inside, method, &path, body).await;
         assert_eq!((got.as_u16(), &problem["code"]), (status, &json!(code)), "{problem}");
     }
     // Given up, or without any wall seen: the map stays as it is.
-    call(inside, "POST", path, Some(json!({ "robot": "r1" }))).await;
-    assert_eq!(call(inside, "DELETE", path, None).await.0, StatusCode::NO_CONTENT);
-    call(inside, "POST", path, Some(json!({ "robot": "r1" }))).await;
-    call(inside, "POST", &format!("{path}/finish"), None).await;
+    call(inside, Method::POST, path, Some(json!({ "robot": "r1" }))).await;
+    assert_eq!(call(inside, Method::DELETE, path, None).await.0, StatusCode::NO_CONTENT);
+    call(inside, Method::POST, path, Some(json!({ "robot": "r1" }))).await;
+    call(inside, Method::POST, &format!("{path}/finish"), None).await;
     let failed = || async { Some(mapping(inside).await).filter(|p| p["stage"] == "failed") };
     let progress = tokio::time::timeout(Duration::from_secs(20), eventually("failed", failed)).await;
     let progress = progress.expect("at once");

@@ -3,6 +3,7 @@
 
 use client::{Capture, Delivery, RobotClient, RobotOptions, v1};
 use map::pose2::{Pose2, wrap_rad};
+use reqwest::Method;
 use server::config::Limits;
 use sim::{
     building::Building,
@@ -82,7 +83,7 @@ async fn among_look_alikes_there_are_hypotheses_and_no_pose_until_one_is_left() 
     assert!(m < 0.5 && rad < 0.25, "{m} m, {rad} rad off");
     assert_eq!(pose.modalities, ["odometry", "hypotheses"]);
     let logged = || async {
-        let (_, log) = call(&inside, "GET", "/robots/r1/corrections", None).await;
+        let (_, log) = call(&inside, Method::GET, "/robots/r1/corrections", None).await;
         (log["totals"]["hypotheses"]["started"] == 1).then_some(log)
     };
     let log = eventually("logged", logged).await;

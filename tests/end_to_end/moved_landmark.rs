@@ -8,8 +8,7 @@ use client::{
     map::Extent,
     v1::{self, GazeLook, Verdict},
 };
-use image::{ExtendedColorType, codecs::jpeg::JpegEncoder};
-use reqwest::{Client, Method, StatusCode};
+use reqwest::{Method, StatusCode};
 use serde_json::{Value, json};
 use server::config::Limits;
 use sim::{
@@ -19,31 +18,14 @@ use sim::{
     truth::ViewState,
 };
 use std::sync::Arc;
-use tests::{Inside, SOON, eventually};
-use vision::frame::GrayImage;
+use tests::{
+    Inside, SOON, eventually,
+    robots::{call, jpeg},
+};
 
 const MAP: &str = "corridor";
 /// On a side wall; others are passed before it.
 const MOVED: &str = "poster-3";
-
-fn jpeg(image: &GrayImage) -> Vec<u8> {
-    let mut out = Vec::new();
-    let (width, height) = (image.width() as u32, image.height() as u32);
-    JpegEncoder::new_with_quality(&mut out, 90)
-        .encode(image.data(), width, height, ExtendedColorType::L8)
-        .expect("in memory");
-    out
-}
-
-async fn call(inside: &Inside, method: Method, path: &str, body: Option<Value>) -> (StatusCode, Value) {
-    let request = Client::new().request(method, format!("{}/api/v1{path}", inside.url()));
-    let request = match body {
-        Some(body) => request.json(&body),
-        None => request,
-    };
-    let answer = request.send().await.expect("an answer");
-    (answer.status(), answer.json().await.unwrap_or_default())
-}
 
 async fn teach(inside: &Inside, building: &Arc<Building>) {
     let maps = inside.maps();

@@ -7,7 +7,6 @@ use client::{
     map::Extent,
     v1::{self, Verdict},
 };
-use image::{ExtendedColorType, codecs::jpeg::JpegEncoder};
 use server::config::Limits;
 use sim::{
     building::Building,
@@ -16,19 +15,10 @@ use sim::{
     truth::ViewState,
 };
 use std::{sync::Arc, time::Duration};
-use tests::{Inside, SOON};
-use vision::{frame::GrayImage, geometry::polygon::iou};
+use tests::{Inside, SOON, robots::jpeg};
+use vision::geometry::polygon::iou;
 
 const MAP: &str = "corridor";
-
-fn jpeg(image: &GrayImage) -> Vec<u8> {
-    let mut out = Vec::new();
-    let (width, height) = (image.width() as u32, image.height() as u32);
-    JpegEncoder::new_with_quality(&mut out, 90)
-        .encode(image.data(), width, height, ExtendedColorType::L8)
-        .expect("in memory");
-    out
-}
 
 /// Pictures of every poster, from places that `seed` chooses.
 fn round(building: &Arc<Building>, seed: u64, views: usize) -> Vec<(Stop, Sighting)> {

@@ -33,8 +33,7 @@ pub fn jpeg(image: &GrayImage) -> Vec<u8> {
 }
 
 /// A request to the server's interface: status and JSON.
-pub async fn call(inside: &Inside, method: &str, path: &str, body: Option<Value>) -> (StatusCode, Value) {
-    let method: Method = method.parse().expect("a method");
+pub async fn call(inside: &Inside, method: Method, path: &str, body: Option<Value>) -> (StatusCode, Value) {
     let request = Client::new().request(method, format!("{}/api/v1{path}", inside.url()));
     let request = match body {
         Some(body) => request.json(&body),
@@ -52,7 +51,7 @@ pub async fn put_walls(inside: &Inside, building: &Building) {
         .map(|w| json!({ "a": [w.a_m.x, w.a_m.y], "b": [w.b_m.x, w.b_m.y] }))
         .collect();
     let path = format!("/maps/{MAP}/laser");
-    assert_eq!(call(inside, "PUT", &path, Some(json!({ "segments": walls }))).await.0, StatusCode::OK);
+    assert_eq!(call(inside, Method::PUT, &path, Some(json!({ "segments": walls }))).await.0, StatusCode::OK);
 }
 
 /// Teaches landmarks of the building, each from `views` photographs, at their true places.
