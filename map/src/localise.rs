@@ -68,6 +68,9 @@ pub enum NuisanceKey {
     Landmark(LandmarkId),
     /// The mounting of the camera: left perturbation (rotation, translation), robot frame.
     Mounting,
+    /// The camera's intrinsics: the first three of six are the errors of its focal length (as a share) and of its
+    /// principal point (px).
+    Camera,
     /// A wall, by a number of its own: the first two of six are the errors of its direction and offset.
     Wall(u64),
     /// All other walls about a place, by its square of the floor: the first three of six are unit errors of (x, y,
@@ -111,7 +114,7 @@ pub enum Modality {
 pub struct Fix {
     /// What it was made from.
     pub modality: Modality,
-    /// `map_from_robot` with everything that is uncertain: corners, places of landmarks, mounting.
+    /// `map_from_robot` with everything that is uncertain: corners, places of landmarks, mounting, intrinsics.
     pub pose: Pose2Covariance,
     /// The part of the covariance that is new in every frame (corners).
     pub noise: Matrix3<f64>,

@@ -13,13 +13,16 @@ use crate::{
     check::OutOfRange, mounting::Mounting, place::LandmarkPlace, pose2::Pose2Covariance,
     segments::LaserSegment,
 };
-use nalgebra::{DMatrix, Matrix2, Matrix4, Matrix4x2, Matrix6, SMatrix, SVector, Vector2, Vector4};
+use nalgebra::{
+    DMatrix, Matrix2, Matrix2x3, Matrix3, Matrix4, Matrix4x2, Matrix4x3, Matrix6, SMatrix, SVector, Vector2,
+    Vector4,
+};
 use rays::{CORNERS, Hit, INPUTS, MOUNTING, ROBOT, WALL};
 use serde::{Deserialize, Serialize};
 use vision::{
     detect::quads::Corners,
     frame::Intrinsics,
-    localise::pose::{LandmarkSize, PoseError, straightened},
+    localise::pose::{LandmarkSize, PoseError, Straightened, straightened},
 };
 
 /// Most views fused into one place; later ones are ignored.
@@ -110,6 +113,7 @@ struct WallSighting<'a> {
     corners_px: Corners,
     covariance_px2: [Matrix2<f64>; 4],
     camera: Intrinsics,
+    by_camera: [Matrix2x3<f64>; 4],
     map_from_robot: &'a Pose2Covariance,
     mounting: &'a Mounting,
 }
@@ -128,6 +132,8 @@ pub struct ViewOnWall {
     pub by_mounting: SMatrix<f64, 4, 6>,
     /// Covariance of the mounting.
     pub mounting_covariance: Matrix6<f64>,
+    /// By the camera's (focal length, principal point), each in its standard deviations.
+    pub by_camera: Matrix4x3<f64>,
     /// By the wall's facing angle and signed distance.
     pub by_wall: Matrix4x2<f64>,
     /// Roll.
@@ -159,9 +165,10 @@ pub fn view_on_wall(
 fn checked<'a>(view: &PlacingView<'a>) -> Result<WallSighting<'a>, PlacingError> {
     view.map_from_robot.check()?;
     view.mounting.check()?;
-    let (corners_px, covariance_px2, camera) = straightened(view.corners, view.covariance_px2, view.camera)?;
+    let Straightened { corners_px, covariance_px2, camera, by_camera } =
+        straightened(view.corners, view.covariance_px2, view.camera)?;
     let (map_from_robot, mounting) = (view.map_from_robot, view.mounting);
-    Ok(WallSighting { corners_px, covariance_px2, camera, map_from_robot, mounting })
+    Ok(WallSighting { corners_px, covariance_px2, camera, by_camera, map_from_robot, mounting })
 }
 
 /// The nearest wall that all four rays meet. Refused when the quad reaches over the end of a wall to one behind it: a
@@ -245,6 +252,7 @@ fn fit(
         covariance: gain * independent * gain.transpose(),
         by_mounting: gain * m,
         mounting_covariance: view.mounting.covariance,
+        by_camera: gain * by_camera(view, &by),
         by_wall: gain * by.fixed_columns::<2>(WALL),
         roll_rad: q[4],
         rms_m,
@@ -260,6 +268,16 @@ fn new_in_each_view(view: &WallSighting<'_>, by: &SMatrix<f64, 8, INPUTS>) -> SM
     }
     let j = by.fixed_columns::<3>(ROBOT);
     sum + j * view.map_from_robot.covariance * j.transpose()
+}
+
+/// How the hits move with the camera's errors, each of one standard deviation. It has no part in the weights: one view's
+/// departure from a rectangle is no ground to correct the camera, and is what tells that a thing is not on the wall.
+fn by_camera(view: &WallSighting<'_>, by: &SMatrix<f64, 8, INPUTS>) -> SMatrix<f64, 8, 3> {
+    let corners = view.by_camera.iter().enumerate();
+    // What the camera has wrong is wrong with the ray through the corner where it was seen.
+    let moved: SMatrix<f64, 8, 3> =
+        corners.map(|(i, by_camera)| by.fixed_columns::<2>(CORNERS + 2 * i) * by_camera).sum();
+    moved * Matrix3::from_diagonal(&view.camera.error_sigmas())
 }
 
 /// Corners TL, TR, BR, BL (along, up) of a rectangle (centre along, centre height, width, height, roll).
@@ -337,10 +355,11 @@ pub fn placement(
 
 /// Covariance of a view with the wall fixed.
 fn total(v: &ViewOnWall) -> Matrix4<f64> {
-    v.covariance + v.by_mounting * v.mounting_covariance * v.by_mounting.transpose()
+    let mounting = v.by_mounting * v.mounting_covariance * v.by_mounting.transpose();
+    v.covariance + mounting + v.by_camera * v.by_camera.transpose()
 }
 
-/// Information form with the wall fixed; mounting and wall move all views alike and are added once, at the end.
+/// Information form with the wall fixed; mounting, camera and wall move all views alike and are added once, at the end.
 fn fused(views: &[&ViewOnWall], wall: &LaserSegment, p: &PlacingParams) -> Option<LandmarkPlace> {
     let mut information = Matrix4::zeros();
     for v in views {
@@ -349,16 +368,18 @@ fn fused(views: &[&ViewOnWall], wall: &LaserSegment, p: &PlacingParams) -> Optio
     let mean = information.cholesky()?.inverse();
     let (mut rectangle, mut by_mounting, mut by_wall) =
         (Vector4::zeros(), SMatrix::<f64, 4, 6>::zeros(), Matrix4x2::zeros());
-    let (mut roll_rad, n) = (0.0, views.len() as f64);
+    let (mut by_camera, mut roll_rad, n) = (Matrix4x3::zeros(), 0.0, views.len() as f64);
     for v in views {
         let share = mean * v.covariance.try_inverse()?;
         rectangle += share * v.rectangle;
         by_mounting += share * v.by_mounting;
+        by_camera += share * v.by_camera;
         by_wall += share * v.by_wall;
         roll_rad += v.roll_rad / n;
     }
     let inflation = if views.len() > 1 { p.inflation } else { 1.0 };
-    let mounting = by_mounting * views[0].mounting_covariance * by_mounting.transpose();
+    let shared = by_mounting * views[0].mounting_covariance * by_mounting.transpose()
+        + by_camera * by_camera.transpose();
     let (theta, r) = rays::plane(wall);
     let (facing, side) = (Vector2::new(theta.cos(), theta.sin()), Vector2::new(-theta.sin(), theta.cos()));
     // (x, y) = r facing + along side, by (rectangle, wall).
@@ -374,7 +395,7 @@ fn fused(views: &[&ViewOnWall], wall: &LaserSegment, p: &PlacingParams) -> Optio
     let mut wall_part = j.columns_mut(4, 2);
     wall_part += moved;
     let mut s = DMatrix::zeros(6, 6);
-    s.view_mut((0, 0), (4, 4)).copy_from(&(mean * inflation + mounting));
+    s.view_mut((0, 0), (4, 4)).copy_from(&(mean * inflation + shared));
     s.view_mut((4, 4), (2, 2)).copy_from(&facing_covariance(wall));
     let covariance = &j * s * j.transpose();
     let covariance = Matrix6::from_iterator(covariance.iter().copied());

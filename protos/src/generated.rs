@@ -63,6 +63,13 @@ pub struct Intrinsics {
     /// OpenCV's fisheye: k1, k2, k3, k4 of the angle from the axis.
     #[prost(double, repeated, tag = "7")]
     pub equidistant: ::prost::alloc::vec::Vec<f64>,
+    /// How surely the camera is known: standard deviations in pixels, 0 to a quarter of fx_px, such as a calibration gives.
+    /// What the camera has wrong is in every pose's covariance, and never averages out. Absent: 0.005 of fx_px.
+    #[prost(double, optional, tag = "8")]
+    pub focal_sigma_px: ::core::option::Option<f64>,
+    /// Of each coordinate of the principal point. Absent: 0.003 of fx_px.
+    #[prost(double, optional, tag = "9")]
+    pub center_sigma_px: ::core::option::Option<f64>,
 }
 /// robot/{robot}/frame/{camera}
 #[derive(Clone, PartialEq, ::prost::Message)]

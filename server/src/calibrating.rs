@@ -4,8 +4,11 @@
 use protos::{convert::geometry::intrinsics_wire, v1};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
-use vision::localise::calibrate::{
-    CalibrateError, CalibrateParams, Calibration, Chosen, Height, PlanarView, calibrate_choosing,
+use vision::{
+    frame::{Intrinsics, IntrinsicsSigmas},
+    localise::calibrate::{
+        CalibrateError, CalibrateParams, Calibration, Chosen, Height, PlanarView, calibrate_choosing,
+    },
 };
 
 /// Standard deviation of a corner per coordinate, where nobody says.
@@ -76,7 +79,7 @@ pub(crate) struct ViewReport {
 /// A calibrated camera.
 #[derive(Debug, Clone, Serialize, ToSchema)]
 pub(crate) struct Report {
-    /// As frames carry it.
+    /// As frames carry it, with the standard deviations below: what is not known of the camera is then in the poses.
     #[schema(value_type = Object)]
     pub(crate) intrinsics: v1::Intrinsics,
     /// Standard deviations.
@@ -140,7 +143,7 @@ pub(crate) fn calibrated(
         }
     };
     Ok(Report {
-        intrinsics: intrinsics_wire(&c.camera),
+        intrinsics: intrinsics_wire(&stated(&c.camera, [sigma(0), sigma(1), sigma(2)])),
         fx_sigma_px: sigma(0),
         cx_sigma_px: sigma(1),
         cy_sigma_px: sigma(2),
@@ -154,13 +157,22 @@ pub(crate) fn calibrated(
     })
 }
 
+/// The camera with its standard deviations, the larger of the centre's; none where nothing is known of them. At most
+/// what frames may carry.
+fn stated(camera: &Intrinsics, [fx, cx, cy]: [f64; 3]) -> Intrinsics {
+    let most = IntrinsicsSigmas::MAX_SHARE * camera.fx_px;
+    let sigmas = IntrinsicsSigmas { focal_px: fx.min(most), center_px: cx.max(cy).min(most) };
+    let known = fx.is_finite() && cx.is_finite() && cy.is_finite();
+    Some(sigmas).filter(|_| known).and_then(|s| camera.with_sigmas(s).ok()).unwrap_or(*camera)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use nalgebra::{Isometry3, Matrix2, Matrix3, Rotation3, UnitQuaternion, Vector3};
     use vision::{
         detect::quads::Corners,
-        frame::{Distortion, Intrinsics},
+        frame::Distortion,
         localise::{pose::LandmarkSize, reproject::corner_points},
     };
 
@@ -186,6 +198,13 @@ mod tests {
         let known = Knowledge::default();
         let good = calibrated(&views(239.5), [640, 480], &known).unwrap();
         assert!(good.doubts.is_empty() && (good.intrinsics.fx_px - 600.0).abs() < 1.0, "{good:?}");
+        // What it is known to goes along with it.
+        assert_eq!(good.intrinsics.focal_sigma_px, Some(good.fx_sigma_px));
+        assert_eq!(good.intrinsics.center_sigma_px, Some(good.cx_sigma_px.max(good.cy_sigma_px)));
+        let camera = Intrinsics::new(600.0, 600.0, 320.0, 240.0, Distortion::None).unwrap();
+        let most = Some(IntrinsicsSigmas { focal_px: 150.0, center_px: 150.0 });
+        assert_eq!(stated(&camera, [151.0, 1.0, 1e9]).sigmas, most);
+        assert_eq!(stated(&camera, [f64::INFINITY, 1.0, 1.0]).sigmas, None);
         let off = calibrated(&views(420.0), [640, 480], &known).unwrap();
         assert!(off.doubts.iter().any(|d| d.contains("principal point")), "{off:?}");
         let mut bad = views(239.5);

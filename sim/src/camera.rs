@@ -56,6 +56,7 @@ impl Camera {
             cx_px: 319.5,
             cy_px: 239.5,
             distortion: Distortion::None,
+            sigmas: None,
         };
         Self::new(intrinsics, 640, 480)
     }

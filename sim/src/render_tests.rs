@@ -22,8 +22,14 @@ fn camera_at(x: f64, y: f64, z: f64, heading_rad: f64) -> Isometry3<f64> {
 }
 
 fn golden_camera() -> Camera {
-    let k =
-        Intrinsics { fx_px: 700.0, fy_px: 700.0, cx_px: 320.0, cy_px: 240.0, distortion: Distortion::None };
+    let k = Intrinsics {
+        fx_px: 700.0,
+        fy_px: 700.0,
+        cx_px: 320.0,
+        cy_px: 240.0,
+        distortion: Distortion::None,
+        sigmas: None,
+    };
     Camera::new(k, 640, 480)
 }
 
@@ -80,7 +86,14 @@ fn edges_lie_within_a_tenth_of_a_pixel_of_the_truth() {
     let cameras =
         [Distortion::None, Distortion::PlumbBob([-0.25, 0.08, 1e-3, -5e-4, 0.0])].map(|distortion| {
             Camera::new(
-                Intrinsics { fx_px: 520.0, fy_px: 515.0, cx_px: 317.3, cy_px: 242.1, distortion },
+                Intrinsics {
+                    fx_px: 520.0,
+                    fy_px: 515.0,
+                    cx_px: 317.3,
+                    cy_px: 242.1,
+                    distortion,
+                    sigmas: None,
+                },
                 640,
                 480,
             )
@@ -122,8 +135,14 @@ fn a_frontal_texture_is_the_texture_averaged() {
     // 480 x 672 texels over 120 x 168 px: every pixel is the mean of 4 x 4 texels.
     let texture = poster_of_size(11, 480, 1.4);
     let building = one_rectangle(0.6, 0.84, texture.clone());
-    let k =
-        Intrinsics { fx_px: 400.0, fy_px: 400.0, cx_px: 99.5, cy_px: 119.5, distortion: Distortion::None };
+    let k = Intrinsics {
+        fx_px: 400.0,
+        fy_px: 400.0,
+        cx_px: 99.5,
+        cy_px: 119.5,
+        distortion: Distortion::None,
+        sigmas: None,
+    };
     let mut renderer = Renderer::new(Camera::new(k, 200, 240));
     let frame = renderer.render(
         &building,
@@ -147,7 +166,14 @@ fn an_oblique_texture_is_the_texture_averaged_over_each_pixel() {
     // At 60 degrees, against 24 x 24 rays per pixel.
     let texture = poster_of_size(3, 480, 1.4);
     let building = one_rectangle(0.6, 0.84, texture.clone());
-    let k = Intrinsics { fx_px: 400.0, fy_px: 400.0, cx_px: 99.5, cy_px: 99.5, distortion: Distortion::None };
+    let k = Intrinsics {
+        fx_px: 400.0,
+        fy_px: 400.0,
+        cx_px: 99.5,
+        cy_px: 99.5,
+        distortion: Distortion::None,
+        sigmas: None,
+    };
     let mut renderer = Renderer::new(Camera::new(k, 200, 200));
     let angle = 60.0_f64.to_radians();
     let pose = camera_at(2.5 * angle.cos(), 2.5 * angle.sin(), 1.0, angle + std::f64::consts::PI);
@@ -186,8 +212,14 @@ fn hit(surface: &Surface, map_from_camera: &Isometry3<f64>, d: &Vector3<f64>) ->
 #[test]
 fn shares_agree_with_rays_cast_by_brute_force() {
     let building = Building::corridor(1);
-    let k =
-        Intrinsics { fx_px: 256.0, fy_px: 256.0, cx_px: 159.5, cy_px: 119.5, distortion: Distortion::None };
+    let k = Intrinsics {
+        fx_px: 256.0,
+        fy_px: 256.0,
+        cx_px: 159.5,
+        cy_px: 119.5,
+        distortion: Distortion::None,
+        sigmas: None,
+    };
     let mut renderer = Renderer::new(Camera::new(k, 320, 240));
     // Towards the column and what it hides.
     let mut hidden = 0;
@@ -258,7 +290,14 @@ fn a_mirrored_world_gives_a_mirrored_picture() {
         let at = |i: usize| if flip { 15 - i % 16 } else { i % 16 };
         Texture::new(16, 16, (0..256).map(|i| (at(i) * 9 + i / 16 * 5) as u8).collect(), Edge::Clamp)
     };
-    let k = Intrinsics { fx_px: 300.0, fy_px: 300.0, cx_px: 79.5, cy_px: 59.5, distortion: Distortion::None };
+    let k = Intrinsics {
+        fx_px: 300.0,
+        fy_px: 300.0,
+        cx_px: 79.5,
+        cy_px: 59.5,
+        distortion: Distortion::None,
+        sigmas: None,
+    };
     let mut renderer = Renderer::new(Camera::new(k, 160, 120));
     let left = renderer.render(
         &one_rectangle(0.5, 0.4, texture(false)),

@@ -2,7 +2,9 @@
 //! every later stage may rely on it.
 
 mod lens;
+mod sigmas;
 pub use lens::{Bent, Distortion, MAX_RAY_RAD};
+pub use sigmas::IntrinsicsSigmas;
 
 use nalgebra::{Matrix2, Matrix2x3, Matrix3, Point2, Vector3};
 use serde::{Deserialize, Serialize};
@@ -121,6 +123,9 @@ pub struct Intrinsics {
     /// Lens distortion.
     #[serde(default)]
     pub distortion: Distortion,
+    /// How surely the rest is known; none: not stated, and taken as exact.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sigmas: Option<IntrinsicsSigmas>,
 }
 
 impl Intrinsics {
@@ -147,7 +152,7 @@ impl Intrinsics {
         for value in distortion.coefficients() {
             check("distortion", *value, -100.0, 100.0)?;
         }
-        Ok(Self { fx_px, fy_px, cx_px, cy_px, distortion })
+        Ok(Self { fx_px, fy_px, cx_px, cy_px, distortion, sigmas: None })
     }
 
     /// The 3x3 matrix K.

@@ -19,8 +19,14 @@ pub(super) fn gain_nats(
     corner_sigma_px: f64,
 ) -> Option<f64> {
     // Where the image's middle is does not matter to an ideal camera.
-    let camera =
-        Intrinsics { fx_px: focal_px, fy_px: focal_px, cx_px: 0.0, cy_px: 0.0, distortion: Distortion::None };
+    let camera = Intrinsics {
+        fx_px: focal_px,
+        fy_px: focal_px,
+        cx_px: 0.0,
+        cy_px: 0.0,
+        distortion: Distortion::None,
+        sigmas: None,
+    };
     let Predicted { pose: by_pose, place: by_place, mounting: by_mounting } =
         predict::corners(&pose.pose, place, mounting, &camera)?;
     let noise = SMatrix::<f64, 8, 8>::identity() * corner_sigma_px.max(1e-3).powi(2);

@@ -1,12 +1,16 @@
 //! The corners of all sightings as a function of the robot's pose on the floor, and the descent to the nearest minimum
-//! (method 13.6 [M] (b)). Lasting errors (places, mounting) enter the weights, so nothing is trusted beyond its word.
+//! (method 13.6 [M] (b)). Lasting errors (places, mounting, intrinsics) enter the weights, so nothing is trusted beyond its
+//! word.
 
 use super::{NuisanceKey, Sighting, predict::corners};
 use crate::{mounting::Mounting, pose2::Pose2};
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Matrix3x6, Matrix6, Point2, SMatrix, Vector3};
-use vision::localise::{
-    pose::LandmarkSize,
-    reproject::{corner_points, project},
+use vision::{
+    frame::Intrinsics,
+    localise::{
+        pose::LandmarkSize,
+        reproject::{corner_points, project},
+    },
 };
 
 /// Most steps of one descent.
@@ -52,6 +56,8 @@ pub(super) struct Planar<'a> {
     sightings: &'a [Sighting<'a>],
     mounting: &'a Mounting,
     camera_from_robot: Isometry3<f64>,
+    /// Standard deviations of the camera's errors, where they are stated: all sightings are by one camera.
+    camera: Option<Vector3<f64>>,
     /// Corners of each landmark, map frame.
     corners_m: Vec<[Vector3<f64>; 4]>,
 }
@@ -65,7 +71,15 @@ impl<'a> Planar<'a> {
             corner_points(&s.place.size).map(in_map)
         };
         let camera_from_robot = mounting.robot_from_camera.inverse();
-        Self { sightings, mounting, camera_from_robot, corners_m: sightings.iter().map(corners).collect() }
+        let stated = sightings.first().map(|s| &s.seen.measured.camera).filter(|c| c.sigmas.is_some());
+        let camera = stated.map(Intrinsics::error_sigmas);
+        let corners_m = sightings.iter().map(corners).collect();
+        Self { sightings, mounting, camera_from_robot, camera, corners_m }
+    }
+
+    /// The same with a camera that is taken as exact.
+    pub(super) fn exact_camera(self) -> Self {
+        Self { camera: None, ..self }
     }
 
     /// Degrees of freedom of the residual.
@@ -88,10 +102,15 @@ impl<'a> Planar<'a> {
         super::posterior::centre(self.sightings.iter().map(|s| s.place))
     }
 
-    /// Keys and covariances of the lasting errors: each landmark, then the mounting.
+    /// Keys and covariances of the lasting errors: each landmark, the mounting, then the camera where it is not exact.
     pub(super) fn nuisances(&self) -> Vec<(NuisanceKey, Matrix6<f64>)> {
         let places = self.sightings.iter().map(|s| (NuisanceKey::Landmark(s.landmark), s.place.covariance));
-        places.chain([(NuisanceKey::Mounting, self.mounting.covariance)]).collect()
+        let camera = self.camera.map(|sigmas| {
+            let mut covariance = Matrix6::zeros();
+            covariance.fixed_view_mut::<3, 3>(0, 0).set_diagonal(&sigmas.component_mul(&sigmas));
+            (NuisanceKey::Camera, covariance)
+        });
+        places.chain([(NuisanceKey::Mounting, self.mounting.covariance)]).chain(camera).collect()
     }
 
     /// `camera_from_landmark` of sighting `i` for a robot pose.
@@ -138,11 +157,18 @@ impl<'a> Planar<'a> {
     pub(super) fn linearise(&self, pose: &Pose2) -> Option<Linear> {
         let n = self.sightings.len();
         let Look { residual, by_pose } = self.look(pose)?;
-        let mut by_nuisance = DMatrix::zeros(8 * n, 6 * (n + 1));
+        let blocks = n + 1 + usize::from(self.camera.is_some());
+        let mut by_nuisance = DMatrix::zeros(8 * n, 6 * blocks);
         for (i, sighting) in self.sightings.iter().enumerate() {
             let seen = corners(pose, sighting.place, self.mounting, &sighting.seen.measured.camera)?;
             by_nuisance.view_mut((8 * i, 6 * i), (8, 6)).copy_from(&seen.place);
             by_nuisance.view_mut((8 * i, 6 * n), (8, 6)).copy_from(&seen.mounting);
+            if self.camera.is_some() {
+                for (c, by_camera) in sighting.seen.measured.by_camera.iter().enumerate() {
+                    // The residual is seen minus predicted: what moves the seen corner moves the predicted the other way.
+                    by_nuisance.view_mut((8 * i + 2 * c, 6 * (n + 1)), (2, 3)).copy_from(&-by_camera);
+                }
+            }
         }
         Some(Linear { residual, by_pose, by_nuisance })
     }

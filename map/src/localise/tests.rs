@@ -5,7 +5,7 @@ use crate::{mounting::pan_tilt, place::PlaceSigmas, pose2::Pose2};
 use nalgebra::{Isometry3, Matrix2, Point2, Vector2, Vector3, Vector6};
 use vision::{
     detect::quads::Corners,
-    frame::{Distortion, Intrinsics},
+    frame::{Distortion, Intrinsics, IntrinsicsSigmas},
     learn::random::Random,
     localise::{
         pose::{LandmarkSize, landmark_pose},
@@ -43,13 +43,37 @@ fn look(
 ) -> Option<LandmarkPose> {
     let camera_from_landmark =
         robot_from_camera.inverse() * robot.to_isometry3().inverse() * place.map_from_landmark();
+    seen_by(&camera(), &camera(), &camera_from_landmark, place.size, sigma_px, random)
+}
+
+/// What the `real` camera sees, taken for one that is as `stated`.
+fn seen_by(
+    real: &Intrinsics,
+    stated: &Intrinsics,
+    camera_from_landmark: &Isometry3<f64>,
+    size: LandmarkSize,
+    sigma_px: f64,
+    random: &mut Random,
+) -> Option<LandmarkPose> {
     let mut points = [Point2::origin(); 4];
-    for (px, point) in points.iter_mut().zip(corner_points(&place.size)) {
+    for (px, point) in points.iter_mut().zip(corner_points(&size)) {
         let noise = Vector2::new(random.normal(), random.normal()) * sigma_px;
-        *px = pixel(&camera_from_landmark, &point, &camera())? + noise;
+        *px = pixel(camera_from_landmark, &point, real)? + noise;
     }
     let claimed = [Matrix2::identity() * sigma_px.max(0.01).powi(2); 4];
-    landmark_pose(&Corners::new(points).ok()?, &claimed, SIZE, &camera()).ok()
+    landmark_pose(&Corners::new(points).ok()?, &claimed, SIZE, stated).ok()
+}
+
+/// 1 % and 4 px.
+fn stated() -> Intrinsics {
+    camera().with_sigmas(IntrinsicsSigmas { focal_px: 7.0, center_px: 4.0 }).unwrap()
+}
+
+/// The camera off by (share of the focal length, cx, cy).
+fn off(e: &Vector3<f64>) -> Intrinsics {
+    let (k, share) = (camera(), 1.0 + e.x);
+    let (fx_px, fy_px) = (k.fx_px * share, k.fy_px * share);
+    Intrinsics { fx_px, fy_px, cx_px: k.cx_px + e.y, cy_px: k.cy_px + e.z, ..k }
 }
 
 fn sighting<'a>(id: u64, seen: &'a LandmarkPose, place: &'a LandmarkPlace) -> Sighting<'a> {
@@ -175,6 +199,65 @@ fn covariance_is_honest_in_twelve_cells() {
     }
     assert!(outside <= 2, "{outside} cells outside the 95 % band");
     assert!(wild <= 2, "{wild} of {all} fixes far outside their covariance");
+}
+
+#[test]
+fn derivatives_by_the_camera_are_the_finite_differences() {
+    let mut random = Random::new(2);
+    let truth = robot(&place(), 3.0, 25.0);
+    let view =
+        mounting().robot_from_camera.inverse() * truth.to_isometry3().inverse() * place().map_from_landmark();
+    let seen = seen_by(&camera(), &stated(), &view, SIZE, 0.0, &mut random).unwrap();
+    let (home, mounting) = (place(), mounting());
+    let sightings = [sighting(1, &seen, &home)];
+    let at = Planar::new(&sightings, &mounting).linearise(&truth).unwrap();
+    for (k, h) in [1e-6, 1e-3, 1e-3].into_iter().enumerate() {
+        let mut d = Vector3::zeros();
+        d[k] = h;
+        // What is predicted, by another camera: the corners that it sees.
+        let predicted = |d: Vector3<f64>| corner_points(&SIZE).map(|p| pixel(&view, &p, &off(&d)).unwrap());
+        for (c, (up, down)) in predicted(d).iter().zip(predicted(-d)).enumerate() {
+            let numeric = (up - down) / (2.0 * h);
+            let made = at.by_nuisance.fixed_view::<2, 1>(2 * c, 12 + k);
+            assert!((numeric - made).norm() < 1e-4 * numeric.norm().max(1.0), "camera {k}, corner {c}");
+        }
+    }
+}
+
+#[test]
+fn what_the_camera_has_wrong_is_in_the_covariance_and_lasts() {
+    // Oracle: a camera drawn anew each time, with places, mounting and corners.
+    let mut random = Random::new(13);
+    for (d, psi) in [(2.0, 45.0), (4.0, 30.0), (3.0, 10.0)] {
+        let (mut sum, mut as_exact, mut n) = (0.0, 0.0, 0.0);
+        for _ in 0..250 {
+            let mut truth = robot(&place(), d, psi);
+            truth.theta_rad += 0.2;
+            let hung = moved(&place(), &draw(&place().covariance, &mut random));
+            let m = mounting();
+            let e = draw(&m.covariance, &mut random);
+            let (turn, shift) = (e.fixed_rows::<3>(0).into(), e.fixed_rows::<3>(3).into());
+            let mounted = perturbed(&m.robot_from_camera, &turn, &shift);
+            let view = mounted.inverse() * truth.to_isometry3().inverse() * hung.map_from_landmark();
+            let real = off(&stated().error_sigmas().map(|s| s * random.normal()));
+            let seed = random.clone();
+            let seen = seen_by(&real, &stated(), &view, hung.size, 0.4, &mut random).unwrap();
+            let bare = seen_by(&real, &camera(), &view, hung.size, 0.4, &mut seed.clone()).unwrap();
+            let (RobotFix::Fixed(fix), RobotFix::Fixed(exact)) =
+                (fix_of(&seen, &place(), None), fix_of(&bare, &place(), None))
+            else {
+                continue;
+            };
+            (sum, as_exact, n) = (sum + nees(&fix, &truth), as_exact + nees(&exact, &truth), n + 1.0);
+            assert_eq!(fix.nuisances.last().unwrap().key, NuisanceKey::Camera);
+            let parts: Matrix3<f64> =
+                fix.nuisances.iter().map(|n| n.jacobian * n.covariance * n.jacobian.transpose()).sum();
+            let gap = (fix.noise + parts - fix.pose.covariance).norm();
+            assert!(gap < 1e-9 * fix.pose.covariance.norm(), "{gap}");
+        }
+        assert!(n > 200.0 && (2.5..3.5).contains(&(sum / n)), "{d} m {psi} deg: {n} {}", sum / n);
+        assert!(as_exact / n > 5.0, "{d} m {psi} deg: {}", as_exact / n);
+    }
 }
 
 #[test]

@@ -72,7 +72,8 @@ pub fn focal_evidence(
     mounting: &Mounting,
     pose: &Pose2,
 ) -> Option<FocalEvidence> {
-    let problem = Planar::new(sightings, mounting);
+    // What is looked for must not be explained away by what is said to be uncertain.
+    let problem = Planar::new(sightings, mounting).exact_camera();
     let at = problem.linearise(pose)?;
     let weight = problem.weight(&at)?;
     // A longer focal length moves a corner away from the principal point.

@@ -3,7 +3,7 @@
 //! In: views as for walls, the ceiling. Out: place and size with covariance, or why the thing is not up there.
 
 use super::{
-    MAX_VIEWS, PlacingError, PlacingParams, PlacingView, WallSighting, checked, new_in_each_view,
+    MAX_VIEWS, PlacingError, PlacingParams, PlacingView, WallSighting, by_camera, checked, new_in_each_view,
     rays::{self, Hit, MOUNTING, WALL},
 };
 use crate::{
@@ -49,6 +49,8 @@ pub struct ViewOnCeiling {
     pub by_mounting: SMatrix<f64, 5, 6>,
     /// Covariance of the mounting.
     pub mounting_covariance: Matrix6<f64>,
+    /// By the camera's (focal length, principal point), each in its standard deviations.
+    pub by_camera: SMatrix<f64, 5, 3>,
     /// By the ceiling's height.
     pub by_height: SVector<f64, 5>,
     /// Distance of the hits from the rectangle.
@@ -92,6 +94,7 @@ fn fit(view: &WallSighting<'_>, hits: &[Hit; 4], p: &PlacingParams) -> Result<Vi
         covariance: gain * independent * gain.transpose(),
         by_mounting: gain * m,
         mounting_covariance: view.mounting.covariance,
+        by_camera: gain * by_camera(view, &by),
         by_height: gain * by.column(WALL),
         rms_m,
     })
@@ -150,8 +153,10 @@ pub fn ceiling_placement(
     const CHI2_5_99: f64 = 15.086;
     ceiling.check()?;
     let views = &views[..views.len().min(MAX_VIEWS)];
-    let total =
-        |v: &ViewOnCeiling| v.covariance + v.by_mounting * v.mounting_covariance * v.by_mounting.transpose();
+    let total = |v: &ViewOnCeiling| {
+        let mounting = v.by_mounting * v.mounting_covariance * v.by_mounting.transpose();
+        v.covariance + mounting + v.by_camera * v.by_camera.transpose()
+    };
     let agree = |a: &ViewOnCeiling, b: &ViewOnCeiling| {
         let d = apart(&a.rectangle, &b.rectangle);
         (total(a) + total(b)).cholesky().is_some_and(|s| d.dot(&s.solve(&d)) <= CHI2_5_99)
@@ -174,7 +179,7 @@ fn apart(a: &Vector5, b: &Vector5) -> Vector5 {
     d
 }
 
-/// Information form; mounting and ceiling move all views alike and are added once, at the end.
+/// Information form; mounting, camera and ceiling move all views alike and are added once, at the end.
 fn fused(
     origin: &Vector5,
     views: &[&ViewOnCeiling],
@@ -188,15 +193,19 @@ fn fused(
     let mean = information.cholesky()?.inverse();
     let (mut d, mut by_mounting, mut by_height) =
         (Vector5::zeros(), SMatrix::<f64, 5, 6>::zeros(), Vector5::zeros());
+    let mut by_camera = SMatrix::<f64, 5, 3>::zeros();
     for v in views {
         let share = mean * v.covariance.try_inverse()?;
         d += share * apart(&v.rectangle, origin);
         by_mounting += share * v.by_mounting;
+        by_camera += share * v.by_camera;
         by_height += share * v.by_height;
     }
     let q = origin + d;
     let inflation = if views.len() > 1 { p.inflation } else { 1.0 };
-    let own = mean * inflation + by_mounting * views[0].mounting_covariance * by_mounting.transpose();
+    let own = mean * inflation
+        + by_mounting * views[0].mounting_covariance * by_mounting.transpose()
+        + by_camera * by_camera.transpose();
     // (x, y, theta, z, w, h) by (rectangle, height of the ceiling).
     let mut j = DMatrix::zeros(6, 6);
     for (row, k) in [(0, 0), (1, 1), (2, 2), (4, 3), (5, 4)] {
@@ -244,7 +253,7 @@ mod tests {
     use nalgebra::{Matrix2, Matrix3, Point2, Vector3};
     use vision::{
         detect::quads::Corners,
-        frame::{Distortion, Intrinsics},
+        frame::{Distortion, Intrinsics, IntrinsicsSigmas},
         learn::random::Random,
         localise::reproject::{corner_points, perturbed, pixel},
     };
@@ -280,16 +289,30 @@ mod tests {
     }
 
     fn project(place: &LandmarkPlace, robot: &Pose2, mounting: &Mounting) -> [Point2<f64>; 4] {
+        projected(&camera(), place, robot, mounting)
+    }
+
+    fn projected(
+        camera: &Intrinsics,
+        place: &LandmarkPlace,
+        robot: &Pose2,
+        mounting: &Mounting,
+    ) -> [Point2<f64>; 4] {
         let camera_from_landmark =
             mounting.robot_from_camera.inverse() * robot.to_isometry3().inverse() * place.map_from_landmark();
-        corner_points(&place.size).map(|p| pixel(&camera_from_landmark, &p, &camera()).unwrap())
+        corner_points(&place.size).map(|p| pixel(&camera_from_landmark, &p, camera).unwrap())
+    }
+
+    /// As it is said to be: focal length to 0.8 %, principal point to 3 px.
+    fn stated() -> Intrinsics {
+        camera().with_sigmas(IntrinsicsSigmas { focal_px: 4.0, center_px: 3.0 }).unwrap()
     }
 
     fn look(points: [Point2<f64>; 4], robot: &Pose2Covariance) -> Result<ViewOnCeiling, PlacingError> {
         let view = PlacingView {
             corners: &Corners::new(points).unwrap(),
             covariance_px2: &[Matrix2::identity() * 0.25; 4],
-            camera: &camera(),
+            camera: &stated(),
             map_from_robot: robot,
             mounting: &mounting(),
         };
@@ -312,7 +335,7 @@ mod tests {
 
     #[test]
     fn the_covariance_is_honest() {
-        // Oracle: Monte Carlo with corners, robot, mounting and ceiling drawn anew.
+        // Oracle: Monte Carlo with corners, robot, mounting, camera and ceiling drawn anew.
         let mut random = Random::new(7);
         for directions in [vec![0.4], vec![0.4, 2.0, -1.5]] {
             let (mut sum, mut n, mut beyond) = (0.0, 0.0, 0);
@@ -323,6 +346,11 @@ mod tests {
                 let (turn, shift) = (e.fixed_rows::<3>(0).into(), e.fixed_rows::<3>(3).into());
                 let real =
                     Mounting { robot_from_camera: perturbed(&m.robot_from_camera, &turn, &shift), ..m };
+                let k = camera();
+                let share = 1.0 + 0.008 * random.normal();
+                let (cx_px, cy_px) = (k.cx_px + 3.0 * random.normal(), k.cy_px + 3.0 * random.normal());
+                let taken_by =
+                    Intrinsics { fx_px: k.fx_px * share, fy_px: k.fy_px * share, cx_px, cy_px, ..k };
                 let views: Vec<_> = directions
                     .iter()
                     .map(|direction| {
@@ -331,7 +359,8 @@ mod tests {
                         let stood = believed.pose.plus(&e);
                         let noise =
                             |p: Point2<f64>, r: &mut Random| p + Vector2::new(r.normal(), r.normal()) * 0.5;
-                        let points = project(&hung, &stood, &real).map(|p| noise(p, &mut random));
+                        let points =
+                            projected(&taken_by, &hung, &stood, &real).map(|p| noise(p, &mut random));
                         look(points, &believed).unwrap()
                     })
                     .collect();

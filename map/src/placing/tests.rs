@@ -4,7 +4,7 @@ use super::*;
 use crate::{mounting::pan_tilt, pose2::Pose2};
 use nalgebra::{Matrix3, Point2, Vector3, Vector6};
 use vision::{
-    frame::Distortion,
+    frame::{Distortion, IntrinsicsSigmas},
     learn::random::Random,
     localise::reproject::{corner_points, perturbed, pixel},
 };
@@ -50,9 +50,18 @@ fn robot(place: &LandmarkPlace, d_m: f64, psi_deg: f64) -> Pose2Covariance {
 }
 
 fn project(place: &LandmarkPlace, robot: &Pose2, mounting: &Mounting) -> [Point2<f64>; 4] {
+    projected(&camera(), place, robot, mounting)
+}
+
+fn projected(
+    camera: &Intrinsics,
+    place: &LandmarkPlace,
+    robot: &Pose2,
+    mounting: &Mounting,
+) -> [Point2<f64>; 4] {
     let camera_from_landmark =
         mounting.robot_from_camera.inverse() * robot.to_isometry3().inverse() * place.map_from_landmark();
-    corner_points(&place.size).map(|p| pixel(&camera_from_landmark, &p, &camera()).unwrap())
+    corner_points(&place.size).map(|p| pixel(&camera_from_landmark, &p, camera).unwrap())
 }
 
 const SIGMA_PX: f64 = 0.5;
@@ -66,10 +75,19 @@ fn look(
     robot: &Pose2Covariance,
     walls: &[LaserSegment],
 ) -> Result<ViewOnWall, PlacingError> {
+    look_with(&camera(), points, robot, walls)
+}
+
+fn look_with(
+    camera: &Intrinsics,
+    points: [Point2<f64>; 4],
+    robot: &Pose2Covariance,
+    walls: &[LaserSegment],
+) -> Result<ViewOnWall, PlacingError> {
     let view = PlacingView {
         corners: &Corners::new(points).unwrap(),
         covariance_px2: &covariances(),
-        camera: &camera(),
+        camera,
         map_from_robot: robot,
         mounting: &mounting(),
     };
@@ -118,6 +136,7 @@ fn derivatives_are_the_finite_differences() {
             corners_px: Corners::new(px).unwrap(),
             covariance_px2: covariances(),
             camera: camera(),
+            by_camera: [Matrix2x3::zeros(); 4],
             map_from_robot: &robot,
             mounting: &mounting,
         };
@@ -136,6 +155,18 @@ fn derivatives_are_the_finite_differences() {
 
 /// The place from one or several views with everything drawn: errors of (x, y, theta, z, w, h) and the claim.
 fn draw(views: &[(f64, f64)], random: &mut Random) -> (Vector6<f64>, LandmarkPlace) {
+    draw_with(&camera(), views, random)
+}
+
+/// The same with a camera that is wrong by what it says of itself.
+fn draw_with(
+    stated: &Intrinsics,
+    views: &[(f64, f64)],
+    random: &mut Random,
+) -> (Vector6<f64>, LandmarkPlace) {
+    let e = stated.error_sigmas().map(|s| if s > 0.0 { s * random.normal() } else { 0.0 });
+    let (fx_px, fy_px) = (stated.fx_px * (1.0 + e.x), stated.fy_px * (1.0 + e.x));
+    let real = Intrinsics { fx_px, fy_px, cx_px: stated.cx_px + e.y, cy_px: stated.cy_px + e.z, ..*stated };
     let w = wall();
     let l = w.covariance.cholesky().unwrap().l() * Vector2::new(random.normal(), random.normal());
     let truth_wall = LaserSegment::on_line((w.alpha_rad + l.x, w.rho_m + l.y), (w.a, w.b), w.covariance, 1);
@@ -146,15 +177,19 @@ fn draw(views: &[(f64, f64)], random: &mut Random) -> (Vector6<f64>, LandmarkPla
     let mounted = Mounting { robot_from_camera: perturbed(&m.robot_from_camera, &turn, &shift), ..m.clone() };
     let seen: Vec<_> = views
         .iter()
-        .map(|(d, psi)| {
+        .filter_map(|(d, psi)| {
             let believed = robot(&truth, *d, *psi);
             let e = believed.covariance.map_diagonal(f64::sqrt).map(|s| s * random.normal());
-            let points = project(&truth, &believed.pose.plus(&e), &mounted)
+            let points = projected(&real, &truth, &believed.pose.plus(&e), &mounted)
                 .map(|p| p + Vector2::new(random.normal(), random.normal()) * SIGMA_PX);
-            look(points, &believed, &[wall()]).unwrap()
+            // A camera that is far off makes no rectangles.
+            let made = look_with(stated, points, &believed, &[wall()]);
+            made.inspect_err(|_| assert!(stated.sigmas.is_some())).ok()
         })
         .collect();
-    let place = placement(&seen, &[wall()], &PlacingParams::default()).unwrap().place;
+    let Ok(Placement { place, .. }) = placement(&seen, &[wall()], &PlacingParams::default()) else {
+        return draw_with(stated, views, random);
+    };
     let error = Vector6::new(
         place.x_m - truth.x_m,
         place.y_m - truth.y_m,
@@ -196,6 +231,31 @@ fn several_views_are_sharper_and_not_overconfident() {
     }
     // Inflated by 2 where views are independent: below 6, but not useless.
     assert!((3.0..6.3).contains(&(sum / n)), "{}", sum / n);
+}
+
+#[test]
+fn what_the_camera_has_wrong_is_wrong_in_all_views() {
+    // Oracle: a camera drawn anew in each draw and the same in all its views. 1 % and 3 px.
+    let stated = camera().with_sigmas(IntrinsicsSigmas { focal_px: 7.0, center_px: 3.0 }).unwrap();
+    let views = [(2.5, 35.0), (2.0, -30.0), (3.0, 10.0), (2.2, 50.0)];
+    for (views, band) in [(&views[..1], 5.4..6.6), (&views[..], 4.0..6.5)] {
+        let mut random = Random::new(3);
+        let (mut sum, mut by_none, n) = (0.0, 0.0, 400);
+        for _ in 0..n {
+            let (e, place) = draw_with(&stated, views, &mut random);
+            sum += e.dot(&place.covariance.cholesky().unwrap().solve(&e));
+            // As if it were exact.
+            let bare = draw(views, &mut Random::new(4)).1.covariance;
+            by_none += e.dot(&bare.cholesky().unwrap().solve(&e));
+        }
+        let (mean, by_none) = (sum / f64::from(n), by_none / f64::from(n));
+        assert!(band.contains(&mean) && by_none > 1.5 * band.end, "{mean} {by_none}");
+    }
+    // However many views, its share of the size stays: 1 % of 0.6 m.
+    let mut random = Random::new(5);
+    let many: Vec<(f64, f64)> = (0..60).map(|i| (2.5, f64::from(i) - 30.0)).collect();
+    let (_, place) = draw_with(&stated, &many, &mut random);
+    assert!(place.covariance[(4, 4)].sqrt() > 0.005, "{}", place.covariance[(4, 4)].sqrt());
 }
 
 #[test]

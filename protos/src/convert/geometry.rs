@@ -7,7 +7,7 @@ use map::{
     pose2::{Pose2, Pose2Covariance},
 };
 use nalgebra::{Isometry3, Matrix3, Quaternion, Translation3, UnitQuaternion};
-use vision::frame::{Distortion, FrameError, Intrinsics};
+use vision::frame::{Distortion, FrameError, Intrinsics, IntrinsicsSigmas};
 
 /// Largest accepted angle, in radians: odometry may wind up, but not for ever.
 pub const MAX_ANGLE_RAD: f64 = 1e4;
@@ -121,21 +121,30 @@ fn covariance(numbers: &[f64]) -> Result<Matrix3<f64>, Rejection> {
     Ok(symmetric)
 }
 
-/// A calibrated camera: no lens, or one of `plumb_bob` (5 numbers), `rational_polynomial` (8), `equidistant` (4).
+/// A calibrated camera: no lens, or one of `plumb_bob` (5 numbers), `rational_polynomial` (8), `equidistant` (4). Where
+/// it is not said how surely it is known, [`IntrinsicsSigmas::usual`].
 pub fn intrinsics(wire: &v1::Intrinsics) -> Result<Intrinsics, Rejection> {
     let (distortion, lens) = lens(wire)?;
-    Intrinsics::new(wire.fx_px, wire.fy_px, wire.cx_px, wire.cy_px, distortion).map_err(
-        |error| match &error {
-            FrameError::Intrinsics { field, value } => {
-                let field = if *field == "distortion" { lens } else { field };
-                let code = if value.is_finite() { Code::OutOfRange } else { Code::NotFinite };
-                Rejection::new(code, field, error.to_string())
-            }
-            FrameError::Size { .. } | FrameError::Length { .. } => {
-                Rejection::new(Code::OutOfRange, "", error.to_string())
-            }
-        },
-    )
+    let made = Intrinsics::new(wire.fx_px, wire.fy_px, wire.cx_px, wire.cy_px, distortion);
+    made.and_then(|camera| {
+        // Nobody's camera is exact: where nothing is said it is a usual one.
+        let usual = IntrinsicsSigmas::usual(camera.fx_px);
+        let focal_px = wire.focal_sigma_px.unwrap_or(usual.focal_px);
+        camera.with_sigmas(IntrinsicsSigmas {
+            focal_px,
+            center_px: wire.center_sigma_px.unwrap_or(usual.center_px),
+        })
+    })
+    .map_err(|error| match &error {
+        FrameError::Intrinsics { field, value } => {
+            let field = if *field == "distortion" { lens } else { field };
+            let code = if value.is_finite() { Code::OutOfRange } else { Code::NotFinite };
+            Rejection::new(code, field, error.to_string())
+        }
+        FrameError::Size { .. } | FrameError::Length { .. } => {
+            Rejection::new(Code::OutOfRange, "", error.to_string())
+        }
+    })
 }
 
 /// The lens of a camera and the field that gives it. At most one may be given.
@@ -177,6 +186,8 @@ pub fn intrinsics_wire(camera: &Intrinsics) -> v1::Intrinsics {
         fy_px: camera.fy_px,
         cx_px: camera.cx_px,
         cy_px: camera.cy_px,
+        focal_sigma_px: camera.sigmas.map(|s| s.focal_px),
+        center_sigma_px: camera.sigmas.map(|s| s.center_px),
         ..v1::Intrinsics::default()
     };
     let k = camera.distortion.coefficients().to_vec();
@@ -195,7 +206,15 @@ mod tests {
     use proptest::prelude::*;
 
     fn camera() -> v1::Intrinsics {
-        v1::Intrinsics { fx_px: 700.0, fy_px: 710.0, cx_px: 320.0, cy_px: 240.0, ..v1::Intrinsics::default() }
+        v1::Intrinsics {
+            fx_px: 700.0,
+            fy_px: 710.0,
+            cx_px: 320.0,
+            cy_px: 240.0,
+            focal_sigma_px: Some(1.5),
+            center_sigma_px: Some(0.0),
+            ..v1::Intrinsics::default()
+        }
     }
 
     #[test]
@@ -210,6 +229,19 @@ mod tests {
         wire = v1::Intrinsics { equidistant: vec![0.1; 4], ..camera() };
         assert_eq!(intrinsics(&wire).unwrap().distortion, Distortion::Equidistant([0.1; 4]));
         assert_eq!(intrinsics_wire(&intrinsics(&wire).unwrap()), wire);
+    }
+
+    #[test]
+    fn a_camera_of_which_nothing_is_said_is_a_usual_one() {
+        let silent = v1::Intrinsics { focal_sigma_px: None, center_sigma_px: None, ..camera() };
+        let read = intrinsics(&silent).unwrap();
+        assert_eq!(read.sigmas, Some(IntrinsicsSigmas { focal_px: 3.5, center_px: 2.1 }));
+        // What is stated for one of them stays.
+        let half = intrinsics(&v1::Intrinsics { focal_sigma_px: None, ..camera() }).unwrap();
+        assert_eq!(half.sigmas, Some(IntrinsicsSigmas { focal_px: 3.5, center_px: 0.0 }));
+        // A camera that is built by hand says nothing, and so does its message.
+        let bare = Intrinsics { sigmas: None, ..read };
+        assert_eq!(intrinsics_wire(&bare), silent);
     }
 
     #[test]
@@ -230,6 +262,12 @@ mod tests {
         assert_eq!(refused(|c| c.rational_polynomial = vec![0.0; 5]), (Code::OutOfRange, rational.clone()));
         assert_eq!(refused(|c| c.rational_polynomial = vec![101.0; 8]), (Code::OutOfRange, rational));
         assert_eq!(refused(|c| c.equidistant = vec![0.0; 5]), (Code::OutOfRange, equidistant.clone()));
+        assert_eq!(refused(|c| c.focal_sigma_px = Some(175.1)), (Code::OutOfRange, "focal_sigma_px".into()));
+        assert_eq!(
+            refused(|c| c.focal_sigma_px = Some(f64::NAN)),
+            (Code::NotFinite, "focal_sigma_px".into())
+        );
+        assert_eq!(refused(|c| c.center_sigma_px = Some(-0.1)), (Code::OutOfRange, "center_sigma_px".into()));
         let two = |c: &mut v1::Intrinsics| (c.plumb_bob, c.equidistant) = (vec![0.0; 5], vec![0.1; 4]);
         assert_eq!(refused(two), (Code::OutOfRange, equidistant));
     }

@@ -8,6 +8,7 @@ mod detect;
 mod drawing;
 mod fit;
 mod gather;
+mod given;
 pub(crate) mod evaluate;
 pub(crate) mod mapping;
 mod parameters;

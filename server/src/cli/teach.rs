@@ -1,6 +1,9 @@
 //! Commands against a running server: `map`, `robot`, `learn`, `recognise`.
 
-use super::{mapping, screen};
+use super::{
+    given::{camera, numbers, size},
+    mapping, screen,
+};
 use client::{
     ClientError, MapClient,
     lessons::{Job, Size},
@@ -186,7 +189,8 @@ pub(crate) struct RecogniseArgs {
     /// The map.
     #[arg(long)]
     map: String,
-    /// Camera for poses: fx,fy,cx,cy in pixels.
+    /// Camera for poses: fx,fy,cx,cy in pixels; and its standard deviations, where known: of the focal length, of the
+    /// principal point.
     #[arg(long, value_parser = camera)]
     camera: Option<Intrinsics>,
     /// Photographs, PNG or JPEG.
@@ -199,24 +203,6 @@ pub(crate) struct RecogniseArgs {
 pub(crate) fn distance(text: &str) -> Result<DistanceKind, String> {
     serde_json::from_value(serde_json::Value::from(text))
         .map_err(|error| format!("{error}; one of: both, correlation, hausdorff"))
-}
-
-fn numbers<const N: usize>(text: &str, separator: char) -> Option<[f64; N]> {
-    let parts: Option<Vec<f64>> =
-        text.split(separator).map(|part| part.trim().parse().ok().filter(|v: &f64| v.is_finite())).collect();
-    parts?.try_into().ok()
-}
-
-fn size(text: &str) -> Result<Size, String> {
-    match numbers(text, 'x') {
-        Some([width_m, height_m]) if width_m > 0.0 && height_m > 0.0 => Ok(Size { width_m, height_m }),
-        _ => Err("width and height in metres, such as 0.60x0.84".to_owned()),
-    }
-}
-
-fn camera(text: &str) -> Result<Intrinsics, String> {
-    let [fx, fy, cx, cy] = numbers(text, ',').ok_or("four numbers: fx,fy,cx,cy in pixels")?;
-    Intrinsics::new(fx, fy, cx, cy, vision::frame::Distortion::None).map_err(|error| error.to_string())
 }
 
 pub(crate) async fn map(command: &MapCommand) -> anyhow::Result<()> {
@@ -385,19 +371,4 @@ fn sentence(name: &str, answer: &Answer) -> String {
         lines.push("  no landmark recognised".to_owned());
     }
     lines.join("\n")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn sizes_and_cameras_are_checked() {
-        assert_eq!(size("0.60x0.84").unwrap(), Size { width_m: 0.6, height_m: 0.84 });
-        assert!(
-            size("0.6").is_err() && size("0x1").is_err() && size("axb").is_err() && size("infx1").is_err()
-        );
-        assert!(camera("500,500,320,240").is_ok());
-        assert!(camera("500,500,320").is_err() && camera("-1,500,320,240").is_err());
-    }
 }

@@ -14,7 +14,7 @@ use crate::{
     frame::{Distortion, FrameError, Intrinsics},
     geometry::homography::Homography,
 };
-use nalgebra::{Isometry3, Matrix2, Matrix3, Matrix6, Point2, Rotation3, UnitQuaternion};
+use nalgebra::{Isometry3, Matrix2, Matrix2x3, Matrix3, Matrix6, Point2, Rotation3, UnitQuaternion};
 
 /// Width and height of a landmark, in metres.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -41,6 +41,8 @@ pub struct Measured {
     pub covariance_px2: [Matrix2<f64>; 4],
     /// The pinhole.
     pub camera: Intrinsics,
+    /// How each corner would move if the camera's (share of the focal length, cx, cy) were more.
+    pub by_camera: [Matrix2x3<f64>; 4],
     /// The size that was assumed.
     pub size: LandmarkSize,
 }
@@ -50,7 +52,8 @@ pub struct Measured {
 pub struct PoseSolution {
     /// Maps landmark coordinates to camera coordinates.
     pub camera_from_landmark: Isometry3<f64>,
-    /// Covariance of the left perturbation (rotation vector rad, translation m), in that order, camera frame.
+    /// Covariance of the left perturbation (rotation vector rad, translation m), in that order, camera frame: corners,
+    /// and the camera's own errors where they are stated.
     pub covariance: Matrix6<f64>,
     /// Root mean square reprojection error per coordinate, in pixels.
     pub reprojection_rms_px: f64,
@@ -162,6 +165,9 @@ pub fn landmark_pose(
         if let Some(wide) = second_moment(&problem, &at, &solution.covariance, rival, scale) {
             solution.covariance = wide;
         }
+        if let Some(spread) = problem.spread_by_camera(&at) {
+            solution.covariance += spread;
+        }
     }
     Ok(LandmarkPose { best, second, ambiguous, measured })
 }
@@ -178,8 +184,22 @@ fn measured(
             return Err(PoseError::Size { field, value });
         }
     }
-    let (corners_px, covariance_px2, camera) = straightened(corners, covariance_px2, camera)?;
-    Ok(Measured { corners_px, covariance_px2, camera, size })
+    let Straightened { corners_px, covariance_px2, camera, by_camera } =
+        straightened(corners, covariance_px2, camera)?;
+    Ok(Measured { corners_px, covariance_px2, camera, by_camera, size })
+}
+
+/// Corners free of lens distortion.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Straightened {
+    /// As a pinhole with the same K would see them.
+    pub corners_px: Corners,
+    /// Covariance of each of them.
+    pub covariance_px2: [Matrix2<f64>; 4],
+    /// The pinhole.
+    pub camera: Intrinsics,
+    /// See [`Intrinsics::straight_by_errors`].
+    pub by_camera: [Matrix2x3<f64>; 4],
 }
 
 /// Corners and covariances as the pinhole of the same K would have them, and that pinhole. Checks camera, corners and
@@ -188,8 +208,10 @@ pub fn straightened(
     corners: &Corners,
     covariance_px2: &[Matrix2<f64>; 4],
     camera: &Intrinsics,
-) -> Result<(Corners, [Matrix2<f64>; 4], Intrinsics), PoseError> {
+) -> Result<Straightened, PoseError> {
     let c = Intrinsics::new(camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px, camera.distortion)?;
+    let c = camera.sigmas.map_or(Ok(c), |sigmas| c.with_sigmas(sigmas))?;
+    let mut by_camera = [Matrix2x3::zeros(); 4];
     let (mut straight, mut covariances) = (*corners.points(), *covariance_px2);
     for (corner, (p, s)) in straight.iter_mut().zip(&mut covariances).enumerate() {
         if p.x.abs() > MAX_CORNER_PX || p.y.abs() > MAX_CORNER_PX {
@@ -201,9 +223,11 @@ pub fn straightened(
         if c.distortion != Distortion::None {
             (*p, *s) = undistorted(&c, p, s).ok_or(PoseError::Distortion)?;
         }
+        by_camera[corner] = c.straight_by_errors(p).ok_or(PoseError::Distortion)?;
     }
     let corners_px = Corners::new(straight).map_err(|_folded| PoseError::Distortion)?;
-    Ok((corners_px, covariances, Intrinsics { distortion: Distortion::None, ..c }))
+    let camera = Intrinsics { distortion: Distortion::None, ..c };
+    Ok(Straightened { corners_px, covariance_px2: covariances, camera, by_camera })
 }
 
 /// Symmetric, with both standard deviations in range.

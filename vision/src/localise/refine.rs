@@ -2,7 +2,7 @@
 
 use super::pose::{Measured, PoseSolution};
 use super::reproject::{corner_points, perturbed, pixel, project};
-use nalgebra::{Isometry3, Matrix2, Matrix6, Vector2, Vector6};
+use nalgebra::{Isometry3, Matrix2, Matrix3, Matrix6, SMatrix, Vector2, Vector6};
 
 /// Most steps of one descent, accepted or not.
 pub(super) const MAX_STEPS: usize = 60;
@@ -49,6 +49,21 @@ impl<'a> Problem<'a> {
             g += j.transpose() * r;
         }
         Some((h, g))
+    }
+
+    /// What the camera's own errors add to the covariance of a minimum, to first order. `None` where none are stated.
+    pub(super) fn spread_by_camera(&self, pose: &Isometry3<f64>) -> Option<Matrix6<f64>> {
+        self.measured.camera.sigmas?;
+        let (h, _) = self.normal_equations(pose)?;
+        let mut pull = SMatrix::<f64, 6, 3>::zeros();
+        for (i, point) in corner_points(&self.measured.size).iter().enumerate() {
+            let j = self.weights[i] * project(pose, point, &self.measured.camera)?.by_pose;
+            pull += j.transpose() * self.weights[i] * self.measured.by_camera[i];
+        }
+        let by_camera = h.cholesky()?.solve(&pull);
+        let sigmas = Matrix3::from_diagonal(&self.measured.camera.error_sigmas());
+        let by_sigmas = by_camera * sigmas;
+        Some(by_sigmas * by_sigmas.transpose())
     }
 
     /// Levenberg-Marquardt from `start` to the nearest minimum.

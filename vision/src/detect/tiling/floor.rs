@@ -91,6 +91,7 @@ impl Floor {
                 cx_px: 0.5 * (width - 1.0),
                 cy_px: horizon_px,
                 distortion: Distortion::None,
+                sigmas: None,
             };
             Self { camera, height: 1.0, tilt_rad: 0.0, square: false }
         };
@@ -157,6 +158,7 @@ fn scaled(camera: &Intrinsics, scale: f64) -> Intrinsics {
         cx_px: centre(camera.cx_px),
         cy_px: centre(camera.cy_px),
         distortion: camera.distortion,
+        sigmas: None,
     }
 }
 

@@ -179,6 +179,7 @@ mod tests {
             cx_px: 630.0,
             cy_px: 470.0,
             distortion: vision::frame::Distortion::None,
+            sigmas: None,
         };
         let views: Vec<_> =
             (0..12).map(|_| super::super::synthetic::view(&camera, 0.0, &mut random)).collect();

@@ -109,8 +109,14 @@ fn trial_errors(n: usize, noise_px: f64, seed: u64) -> Vec<Option<f64>> {
     let (mut u0, mut v0) = (0.5 * (IMAGE_PX[0] as f64 - 1.0), 0.5 * (IMAGE_PX[1] as f64 - 1.0));
     u0 += CENTRE_SIGMA_PX * random.normal();
     v0 += CENTRE_SIGMA_PX * random.normal();
-    let truth =
-        Intrinsics { fx_px: ALPHA_PX, fy_px: ALPHA_PX, cx_px: u0, cy_px: v0, distortion: Distortion::None };
+    let truth = Intrinsics {
+        fx_px: ALPHA_PX,
+        fy_px: ALPHA_PX,
+        cx_px: u0,
+        cy_px: v0,
+        distortion: Distortion::None,
+        sigmas: None,
+    };
     let solve = |views: &[PlanarView], (roll, height): (bool, bool), refine| {
         let found = calibrate(views, IMAGE_PX, &params(roll, height, refine)).ok()?;
         Some((found.camera.fx_px / ALPHA_PX - 1.0).abs())

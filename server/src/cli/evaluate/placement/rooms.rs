@@ -25,8 +25,14 @@ use vision::{
     },
 };
 
-const CAMERA: Intrinsics =
-    Intrinsics { fx_px: 520.0, fy_px: 520.0, cx_px: 319.5, cy_px: 239.5, distortion: Distortion::None };
+const CAMERA: Intrinsics = Intrinsics {
+    fx_px: 520.0,
+    fy_px: 520.0,
+    cx_px: 319.5,
+    cy_px: 239.5,
+    distortion: Distortion::None,
+    sigmas: None,
+};
 /// Standard deviation of a corner.
 const SIGMA_PX: f64 = 0.5;
 /// Of the robot's pose: metres and radians.

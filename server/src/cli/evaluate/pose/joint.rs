@@ -1,7 +1,7 @@
 //! The robot's pose on the floor from one, two or three landmarks at once, and fused over drives (method 13.6, 15).
 
 use super::{
-    scene::isotropic,
+    eye::{Cameras, Eye},
     single::{Cost, cost_of},
 };
 use map::{
@@ -11,28 +11,34 @@ use map::{
     place::{LandmarkPlace, PlaceSigmas},
     pose2::Pose2,
 };
-use nalgebra::{Matrix6, Point2, Vector2, Vector3, Vector6};
+use nalgebra::{Matrix6, Vector3, Vector6};
 use serde::Serialize;
 use std::{f64::consts::FRAC_PI_2, time::Instant};
 use vision::{
-    detect::quads::Corners,
     frame::{Distortion, Intrinsics},
     learn::random::Random,
     localise::{
-        pose::{LandmarkPose, LandmarkSize, landmark_pose},
-        reproject::{corner_points, perturbed, pixel},
+        pose::{LandmarkPose, LandmarkSize},
+        reproject::perturbed,
     },
     recognise::LandmarkId,
 };
 
 const SIZE: LandmarkSize = LandmarkSize { width_m: 0.6, height_m: 0.84 };
-const CAMERA: Intrinsics =
-    Intrinsics { fx_px: 500.0, fy_px: 500.0, cx_px: 320.0, cy_px: 240.0, distortion: Distortion::None };
+const CAMERA: Intrinsics = Intrinsics {
+    fx_px: 500.0,
+    fy_px: 500.0,
+    cx_px: 320.0,
+    cy_px: 240.0,
+    distortion: Distortion::None,
+    sigmas: None,
+};
 const SIGMA_PX: f64 = 0.5;
 
 /// Fixes from `landmarks` posters in one frame.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct Joint {
+    pub(super) cameras: Cameras,
     pub(super) landmarks: usize,
     pub(super) frames: usize,
     /// Frames that gave one pose; the others were ambiguous and say so.
@@ -67,15 +73,14 @@ fn mounting_error(covariance: &Matrix6<f64>, random: &mut Random) -> Vector6<f64
     covariance.map_diagonal(f64::sqrt).map(|s| s * random.normal())
 }
 
-fn look(robot: &Pose2, hung: &LandmarkPlace, real: &Mounting, random: &mut Random) -> Option<LandmarkPose> {
+fn look(
+    robot: &Pose2,
+    hung: &LandmarkPlace,
+    (real, eye): (&Mounting, &Eye),
+    random: &mut Random,
+) -> Option<LandmarkPose> {
     let view = real.robot_from_camera.inverse() * robot.to_isometry3().inverse() * hung.map_from_landmark();
-    let mut points = [Point2::origin(); 4];
-    for (px, p) in points.iter_mut().zip(corner_points(&hung.size)) {
-        *px = pixel(&view, &p, &CAMERA)? + Vector2::new(random.normal(), random.normal()) * SIGMA_PX;
-    }
-    let inside = |p: &Point2<f64>| (0.0..640.0).contains(&p.x) && (0.0..480.0).contains(&p.y);
-    let corners = Corners::new(points).ok().filter(|_| points.iter().all(inside))?;
-    landmark_pose(&corners, &isotropic(SIGMA_PX), SIZE, &CAMERA).ok()
+    eye.look(&view, (hung.size, SIZE), SIGMA_PX, random)
 }
 
 fn mean_nees(fix: &map::pose2::Pose2Covariance, truth: &Pose2) -> f64 {
@@ -84,7 +89,7 @@ fn mean_nees(fix: &map::pose2::Pose2Covariance, truth: &Pose2) -> f64 {
 }
 
 /// Posters beside one another on a wall, seen from 3 to 5 m.
-pub(super) fn joint(landmarks: usize, frames: usize, seed: u64) -> Joint {
+pub(super) fn joint(landmarks: usize, frames: usize, cameras: Cameras, seed: u64) -> Joint {
     let mut random = Random::new(seed);
     let places: Vec<LandmarkPlace> = (0..landmarks)
         .filter_map(|i| {
@@ -100,8 +105,9 @@ pub(super) fn joint(landmarks: usize, frames: usize, seed: u64) -> Joint {
         let Ok(believed) = Mounting::new(pan_tilt(0.0, 0.0, Vector3::new(0.1, 0.0, 1.3))) else { break };
         let real = moved(&believed, &mounting_error(&believed.covariance, &mut random));
         let hung: Vec<LandmarkPlace> = places.iter().map(|p| drawn(p, &mut random)).collect();
+        let eye = Eye::drawn(&CAMERA, cameras, &mut random);
         let seen: Option<Vec<LandmarkPose>> =
-            hung.iter().map(|h| look(&truth, h, &real, &mut random)).collect();
+            hung.iter().map(|h| look(&truth, h, (&real, &eye), &mut random)).collect();
         let Some(seen) = seen else { continue };
         tried += 1;
         let sightings: Vec<Sighting<'_>> = seen
@@ -123,6 +129,7 @@ pub(super) fn joint(landmarks: usize, frames: usize, seed: u64) -> Joint {
     }
     let n = fixed.max(1) as f64;
     Joint {
+        cameras,
         landmarks,
         frames: tried,
         fixed,
@@ -137,6 +144,7 @@ pub(super) fn joint(landmarks: usize, frames: usize, seed: u64) -> Joint {
 /// Drives through a corridor with everything uncertain drawn anew.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct Drives {
+    pub(super) cameras: Cameras,
     pub(super) count: usize,
     /// Of the pose at the end of each drive, 3 degrees of freedom.
     pub(super) nees: f64,
@@ -147,11 +155,11 @@ pub(super) struct Drives {
     pub(super) corrections: u64,
 }
 
-pub(super) fn drives(count: usize, seed: u64) -> Drives {
+pub(super) fn drives(count: usize, cameras: Cameras, seed: u64) -> Drives {
     let mut random = Random::new(seed);
     let (mut nees, mut squares, mut n, mut corrections) = (0.0, 0.0, 0.0, 0);
     for _ in 0..count {
-        let drive = drive(&mut random);
+        let drive = drive(cameras, &mut random);
         nees += drive.nees;
         squares += drive.squares;
         n += drive.steps;
@@ -161,6 +169,7 @@ pub(super) fn drives(count: usize, seed: u64) -> Drives {
     // Variance of chi2 with 3 degrees of freedom is 6.
     let inside = |z: f64| (mean - 3.0).abs() <= z * (6.0 / count.max(1) as f64).sqrt();
     Drives {
+        cameras,
         count,
         nees: mean,
         inside_95: inside(1.960),
@@ -178,7 +187,7 @@ struct Drive {
 }
 
 /// 25 m; four posters, alternately left and right, seen from 1 to 4 m ahead.
-fn drive(random: &mut Random) -> Drive {
+fn drive(cameras: Cameras, random: &mut Random) -> Drive {
     let mut made = Drive { nees: f64::INFINITY, squares: 0.0, steps: 0.0, corrections: 0 };
     let places: Vec<LandmarkPlace> = (0..4)
         .filter_map(|i| {
@@ -191,6 +200,7 @@ fn drive(random: &mut Random) -> Drive {
     let mounted = |pan| Mounting::new(pan_tilt(pan, 0.0, Vector3::new(0.1, 0.0, 1.3)));
     let Ok(base) = mounted(0.0) else { return made };
     let error = mounting_error(&base.covariance, random);
+    let eye = Eye::drawn(&CAMERA, cameras, random);
     let params = FuseParams::default();
     let mut fuser = Fuser::new(params.clone());
     let (mut truth, mut odom) = (Pose2::new(1.0, 0.1, 0.0), Pose2::default());
@@ -210,7 +220,7 @@ fn drive(random: &mut Random) -> Drive {
         if let Some(l) = ahead.filter(|_| i % 3 == 0) {
             let Ok(believed) = mounted(if places[l].y_m > 0.0 { 0.6 } else { -0.6 }) else { return made };
             let real = moved(&believed, &error);
-            if let Some(seen) = look(&truth, &hung[l], &real, random) {
+            if let Some(seen) = look(&truth, &hung[l], (&real, &eye), random) {
                 let sighting = Sighting { landmark: LandmarkId(l as u64), seen: &seen, place: &places[l] };
                 let prior = fuser.pose_at(at);
                 let answer = robot_pose(&[sighting], &believed, prior.as_ref(), &LocaliseParams::default());
@@ -240,10 +250,17 @@ mod tests {
 
     #[test]
     fn more_landmarks_and_drives_are_honest() {
-        let [one, three] = [1, 3].map(|n| joint(n, 120, 5));
+        let [one, three] = [1, 3].map(|n| joint(n, 120, Cameras::Exact, 5));
         assert!(three.rms_m < one.rms_m && three.fixed > 100, "{one:?} {three:?}");
         assert!((1.5..4.2).contains(&three.nees), "{three:?}");
-        let drives = drives(20, 2);
-        assert!((1.4..4.6).contains(&drives.nees) && drives.rms_along_m < 0.2, "{drives:?}");
+        let driven = drives(20, Cameras::Exact, 2);
+        assert!((1.4..4.6).contains(&driven.nees) && driven.rms_along_m < 0.2, "{driven:?}");
+    }
+
+    #[test]
+    fn a_camera_that_says_how_wrong_it_may_be_is_honest_and_one_that_does_not_is_not() {
+        let of = |cameras| joint(3, 150, cameras, 6).nees;
+        let (told, untold) = (of(Cameras::WrongTold), of(Cameras::WrongUntold));
+        assert!((2.2..3.9).contains(&told) && untold > 1.3 * told, "{told} {untold}");
     }
 }

@@ -1,12 +1,14 @@
 //! `waymark evaluate pose`: how good poses are and whether their covariances tell the truth (method 13.3 to 13.6): the
 //! table of 13.3, NEES, flips of the planar ambiguity, OpenCV on the same corners, several landmarks, drives, cost.
 
+mod eye;
 mod joint;
 mod peers;
 mod scene;
 mod single;
 
 use super::experiment::say;
+use eye::Cameras;
 use joint::{Drives, Joint};
 use peers::{Beside, Errors};
 use serde::Serialize;
@@ -48,9 +50,14 @@ struct Report {
     opencv: Result<Beside, String>,
     joint: Vec<Joint>,
     fused: Drives,
+    /// The same with cameras that are wrong by as much as a usual calibration is.
+    camera: Vec<Joint>,
+    camera_fused: Vec<Drives>,
     /// Microseconds.
     cost: Cost,
 }
+
+const WRONG: [Cameras; 2] = [Cameras::WrongUntold, Cameras::WrongTold];
 
 pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let draws = args.draws as usize;
@@ -69,8 +76,13 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         unflagged_flips: cells.iter().map(|c| c.flips).sum(),
         cells,
         opencv,
-        joint: [1, 2, 3].map(|n| joint::joint(n, draws, args.seed)).to_vec(),
-        fused: joint::drives(args.drives as usize, args.seed),
+        joint: [1, 2, 3].map(|n| joint::joint(n, draws, Cameras::Exact, args.seed)).to_vec(),
+        fused: joint::drives(args.drives as usize, Cameras::Exact, args.seed),
+        camera: WRONG
+            .into_iter()
+            .flat_map(|cameras| [1, 2, 3].map(|n| joint::joint(n, draws, cameras, args.seed)))
+            .collect(),
+        camera_fused: WRONG.map(|cameras| joint::drives(args.drives as usize, cameras, args.seed)).to_vec(),
         cost: single::cost(args.seed),
     };
     say(args.json, &report, || table(&report))
@@ -128,17 +140,39 @@ fn table(r: &Report) -> Vec<String> {
 
 /// Poses of robots, and what a pose costs.
 fn robots(r: &Report) -> Vec<String> {
-    let mut lines = vec![];
-    for j in &r.joint {
-        lines.push(format!(
-            "  robot on the floor by {} landmarks: {} of {} frames fixed, rms {:.3} m {:.2} deg, NEES {:.2} of 3{}, median {:.0} us",
-            j.landmarks, j.fixed, j.frames, j.rms_m, j.rms_deg, j.nees,
-            if j.inside_99 { " (in the 99 % band)" } else { " (outside the 99 % band)" },
-            j.cost.median
-        ));
+    let mut lines: Vec<String> = r.joint.iter().map(joint_line).collect();
+    lines.push(drives_line(&r.fused));
+    for (cameras, words) in WRONG.into_iter().zip([
+        "and it is not said (focal length 0.5 %, principal point 0.3 % of it)",
+        "and it is said, as the server does of each camera that says nothing else",
+    ]) {
+        lines.push(format!("  cameras are wrong by a usual calibration's errors, {words}"));
+        lines.extend(r.camera.iter().filter(|j| j.cameras == cameras).map(joint_line));
+        lines.extend(r.camera_fused.iter().filter(|f| f.cameras == cameras).map(drives_line));
     }
-    let f = &r.fused;
     lines.push(format!(
+        "  a pose with covariance and second solution: median {:.1} us, least {:.1}, 95 % {:.1}",
+        r.cost.median, r.cost.least, r.cost.p95
+    ));
+    lines
+}
+
+fn joint_line(j: &Joint) -> String {
+    format!(
+        "  robot on the floor by {} landmarks: {} of {} frames fixed, rms {:.3} m {:.2} deg, NEES {:.2} of 3{}, median {:.0} us",
+        j.landmarks,
+        j.fixed,
+        j.frames,
+        j.rms_m,
+        j.rms_deg,
+        j.nees,
+        if j.inside_99 { " (in the 99 % band)" } else { " (outside the 99 % band)" },
+        j.cost.median
+    )
+}
+
+fn drives_line(f: &Drives) -> String {
+    format!(
         "  fused over {} drives: NEES {:.2} of 3 ({}), rms along the corridor {:.3} m, {} corrections",
         f.count,
         f.nees,
@@ -151,12 +185,7 @@ fn robots(r: &Report) -> Vec<String> {
         },
         f.rms_along_m,
         f.corrections
-    ));
-    lines.push(format!(
-        "  a pose with covariance and second solution: median {:.1} us, least {:.1}, 95 % {:.1}",
-        r.cost.median, r.cost.least, r.cost.p95
-    ));
-    lines
+    )
 }
 
 fn opencv(beside: &Result<Beside, String>) -> Vec<String> {

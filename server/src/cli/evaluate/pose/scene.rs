@@ -9,8 +9,14 @@ use vision::{
 };
 
 pub(super) const SIZE: LandmarkSize = LandmarkSize { width_m: 0.6, height_m: 0.84 };
-pub(super) const CAMERA: Intrinsics =
-    Intrinsics { fx_px: 700.0, fy_px: 700.0, cx_px: 320.0, cy_px: 240.0, distortion: Distortion::None };
+pub(super) const CAMERA: Intrinsics = Intrinsics {
+    fx_px: 700.0,
+    fy_px: 700.0,
+    cx_px: 320.0,
+    cy_px: 240.0,
+    distortion: Distortion::None,
+    sigmas: None,
+};
 
 /// `camera_from_landmark` of a level camera `d_m` from the poster's centre in plan, at azimuth `psi_deg`.
 pub(super) fn view(d_m: f64, psi_deg: f64) -> Isometry3<f64> {
