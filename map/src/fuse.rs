@@ -7,9 +7,11 @@
 //! steady turn: the robot learns its own between landmarks.
 
 mod filter;
+mod trust;
 pub use filter::{MAX_NUISANCES, MAX_SOURCES, OdometryErrors};
 
 use crate::{
+    areas::Areas,
     check::{self, OutOfRange},
     gate::CHI2_3_99,
     localise::Fix,
@@ -18,6 +20,7 @@ use crate::{
 use filter::Filter;
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 /// Most odometry readings and fixes kept for replay, whatever the window.
 pub const MAX_EVENTS: usize = 1024;
@@ -107,6 +110,15 @@ impl FuseParams {
         noise[(1, 0)] = noise[(0, 1)];
         noise
     }
+
+    /// Variances (along, across, heading) of a metre straight on by odometry of which nothing is known yet: noise, and what
+    /// it always gets wrong.
+    pub(crate) fn metre_variances(&self) -> Vector3<f64> {
+        let turn = self.turn_rad.powi(2) + self.turn_bias_sigma_rad_per_m.powi(2);
+        // A heading that wanders on the way moves the end aside by a third of its square.
+        let across = self.across_m.powi(2) + turn / 3.0;
+        Vector3::new(self.along_m.powi(2) + self.scale_sigma.powi(2), across, turn)
+    }
 }
 
 /// The fused pose.
@@ -146,6 +158,11 @@ pub enum FixOutcome {
         /// Squared Mahalanobis distance, 3 degrees of freedom.
         distance2: f64,
     },
+    /// It agrees with the pose, but its modality is not used where the robot is (see [`crate::areas`]).
+    NotUsed {
+        /// Squared Mahalanobis distance.
+        distance2: f64,
+    },
     /// It contradicts the pose and was left out.
     GatedOut {
         /// Squared Mahalanobis distance.
@@ -171,10 +188,17 @@ enum Event {
     Fix(Box<Fix>),
 }
 
+/// How to fuse, and where to trust what.
+#[derive(Debug, Clone)]
+struct Rules {
+    params: FuseParams,
+    areas: Arc<Areas>,
+}
+
 /// Fuses odometry and fixes of one robot in one map.
 #[derive(Debug, Clone)]
 pub struct Fuser {
-    params: FuseParams,
+    rules: Rules,
     /// Just before the first kept event.
     anchor: Filter,
     /// Time of the last odometry in `anchor`.
@@ -191,7 +215,7 @@ impl Fuser {
     /// Knows nothing yet.
     pub fn new(params: FuseParams) -> Self {
         Self {
-            params,
+            rules: Rules { params, areas: Arc::default() },
             anchor: Filter::default(),
             anchor_ns: None,
             events: Vec::new(),
@@ -201,10 +225,15 @@ impl Fuser {
         }
     }
 
+    /// From now on modalities are trusted as runs have shown; what is replayed goes by it, too.
+    pub fn set_areas(&mut self, areas: Arc<Areas>) {
+        self.rules.areas = areas;
+    }
+
     /// Sets the pose of this moment (that of the last odometry), and forgets all before.
     pub fn start(&mut self, map_from_robot: &Pose2Covariance) -> Result<(), OutOfRange> {
         map_from_robot.check()?;
-        self.now.start(map_from_robot, &self.params);
+        self.now.start(map_from_robot, &self.rules.params);
         self.events.drain(..self.applied);
         self.applied = 0;
         (self.anchor, self.anchor_ns) = (self.now.clone(), self.now_ns);
@@ -232,9 +261,9 @@ impl Fuser {
         let (mut filter, mut filter_ns) = (self.anchor.clone(), self.anchor_ns);
         let end = self.events.partition_point(|(t, _)| *t <= at_ns);
         for i in 0..end {
-            apply(&mut filter, &mut filter_ns, &self.events, i, &self.params);
+            apply(&mut filter, &mut filter_ns, &self.events, i, &self.rules);
         }
-        reach(&mut filter, &mut filter_ns, &self.events[end..], at_ns, &self.params)?;
+        reach(&mut filter, &mut filter_ns, &self.events[end..], at_ns, &self.rules)?;
         filter.pose()
     }
 
@@ -291,7 +320,7 @@ impl Fuser {
     fn jumps(&self, at_ns: i64, odom_from_robot: &Pose2) -> bool {
         let (Some(t), Some(before)) = (self.now_ns, self.now.odometry()) else { return false };
         // A little slack for jitter of the clock.
-        let limit = self.params.max_speed_mps * ((at_ns.saturating_sub(t)) as f64 * 1e-9 + 0.1);
+        let limit = self.rules.params.max_speed_mps * ((at_ns.saturating_sub(t)) as f64 * 1e-9 + 0.1);
         at_ns > t && before.between(odom_from_robot).position().norm() > limit
     }
 
@@ -306,7 +335,7 @@ impl Fuser {
         }
         let mut outcome = None;
         while self.applied < self.events.len() {
-            match apply(&mut self.now, &mut self.now_ns, &self.events, self.applied, &self.params) {
+            match apply(&mut self.now, &mut self.now_ns, &self.events, self.applied, &self.rules) {
                 Step::Judged(judged) if self.applied == place => outcome = Some(judged),
                 Step::Judged(_) | Step::Moved => {}
                 Step::Waits => break,
@@ -320,13 +349,13 @@ impl Fuser {
     /// Moves the anchor on, past events out of the window or beyond the bound.
     fn prune(&mut self) {
         let newest = self.events.last().map_or(0, |(t, _)| *t);
-        let oldest = newest.saturating_sub((self.params.window_s * 1e9) as i64);
+        let oldest = newest.saturating_sub((self.rules.params.window_s * 1e9) as i64);
         let mut gone = 0;
         // The last odometry stays: later fixes are interpolated from it.
         while gone + 1 < self.applied
             && (self.events[gone].0 < oldest || self.events.len() - gone > MAX_EVENTS)
         {
-            apply(&mut self.anchor, &mut self.anchor_ns, &self.events, gone, &self.params);
+            apply(&mut self.anchor, &mut self.anchor_ns, &self.events, gone, &self.rules);
             gone += 1;
         }
         self.events.drain(..gone);
@@ -354,12 +383,12 @@ fn apply(
     filter_ns: &mut Option<i64>,
     events: &[(i64, Event)],
     i: usize,
-    p: &FuseParams,
+    rules: &Rules,
 ) -> Step {
     let (at_ns, event) = &events[i];
     match event {
         Event::Odometry(pose) => {
-            filter.predict(pose, p);
+            filter.predict(pose, rules);
             *filter_ns = Some(*at_ns);
             Step::Moved
         }
@@ -369,8 +398,8 @@ fn apply(
                 // Nothing tells how the robot moved from here to its first reading.
                 return Step::Judged(FixOutcome::TooOld);
             }
-            match reach(filter, filter_ns, &events[i + 1..], *at_ns, p) {
-                Some(()) => Step::Judged(filter.correct(fix, p)),
+            match reach(filter, filter_ns, &events[i + 1..], *at_ns, rules) {
+                Some(()) => Step::Judged(filter.correct(fix, rules)),
                 None => Step::Waits,
             }
         }
@@ -383,7 +412,7 @@ fn reach(
     filter_ns: &mut Option<i64>,
     later: &[(i64, Event)],
     at_ns: i64,
-    p: &FuseParams,
+    rules: &Rules,
 ) -> Option<()> {
     let (from_ns, from) = ((*filter_ns)?, *filter.odometry()?);
     if from_ns == at_ns {
@@ -400,7 +429,7 @@ fn reach(
     let share = at_ns.saturating_sub(from_ns) as f64 / to_ns.saturating_sub(from_ns) as f64;
     let d = to.minus(&from);
     let turn = wrap_rad(d.z) * share;
-    filter.predict(&from.plus(&Vector3::new(d.x * share, d.y * share, turn)), p);
+    filter.predict(&from.plus(&Vector3::new(d.x * share, d.y * share, turn)), rules);
     *filter_ns = Some(at_ns);
     Some(())
 }

@@ -16,6 +16,7 @@ pub mod place;
 pub mod placing;
 pub mod visibility;
 pub mod localise;
+pub mod areas;
 pub mod fuse;
 pub mod gaze;
 pub mod slam;

@@ -11,6 +11,7 @@ mod solve;
 pub mod watch;
 
 use crate::{
+    areas::Cell,
     check::{self, OutOfRange},
     mounting::Mounting,
     place::LandmarkPlace,
@@ -76,6 +77,9 @@ pub enum NuisanceKey {
     /// All other walls about a place, by its square of the floor: the first three of six are unit errors of (x, y,
     /// theta).
     Walls(i32, i32),
+    /// What a modality gets wrong in a place beyond what it says, as runs have shown: the first three of six are unit errors
+    /// along, across and of the heading, robot-aligned.
+    Area(Modality, Cell),
 }
 
 /// How a lasting error moves a fix: `estimated - true pose = jacobian * (true - assumed value)`.

@@ -1,6 +1,6 @@
 //! The filter itself: robot pose and lasting errors in one Gaussian; predict, correct, start, give up.
 
-use super::{FixOutcome, FuseParams};
+use super::{FixOutcome, FuseParams, Rules, trust};
 use crate::{
     localise::{Fix, Modality, Nuisance, NuisanceKey},
     pose2::{Pose2, Pose2Covariance},
@@ -139,11 +139,13 @@ impl Filter {
     }
 
     /// Moves on to another odometry pose.
-    pub(super) fn predict(&mut self, odom_from_robot: &Pose2, p: &FuseParams) {
+    pub(super) fn predict(&mut self, odom_from_robot: &Pose2, rules: &Rules) {
         if let Some(before) = self.odometry {
+            let p = &rules.params;
             let motion = before.between(odom_from_robot);
             let noise = p.motion_noise(&motion);
             if let Some(belief) = &mut self.belief {
+                let (motion, noise) = trust::motion(&motion, &noise, &rules.areas.advice(&belief.pose), p);
                 belief.predict(&motion, &noise, p);
             }
             if let Some(doubt) = &mut self.doubt {
@@ -163,7 +165,8 @@ impl Filter {
     }
 
     /// Takes a fix at the time of the last odometry.
-    pub(super) fn correct(&mut self, fix: &Fix, p: &FuseParams) -> FixOutcome {
+    pub(super) fn correct(&mut self, fix: &Fix, rules: &Rules) -> FixOutcome {
+        let p = &rules.params;
         if self.belief.is_none() && fix.modality == Modality::Laser {
             return FixOutcome::NoPose;
         }
@@ -173,6 +176,9 @@ impl Filter {
         }
         self.fixes += 1;
         let so_far = self.so_far(p);
+        let at = self.belief.as_ref().map_or(fix.pose.pose, |belief| belief.pose);
+        let advice = rules.areas.advice(&at);
+        let fix = &*trust::fix(fix, &at, &advice);
         let outcome = match &mut self.belief {
             None => {
                 self.belief = Some(Belief::from_fix(fix, &so_far, self.fixes));
@@ -182,14 +188,23 @@ impl Filter {
                 let mut next = belief.clone();
                 match next.correct(fix, self.fixes) {
                     Some(distance2) if distance2 <= p.gate_chi2 => {
-                        *belief = next;
-                        FixOutcome::Applied { distance2 }
+                        if advice.uses(fix.modality) {
+                            *belief = next;
+                            FixOutcome::Applied { distance2 }
+                        } else {
+                            FixOutcome::NotUsed { distance2 }
+                        }
                     }
                     distance2 => self.contradict(fix, distance2.unwrap_or(f64::INFINITY), p),
                 }
             }
         };
-        if !matches!(outcome, FixOutcome::GatedOut { .. }) {
+        if let FixOutcome::NotUsed { .. } = outcome {
+            match fix.modality {
+                Modality::Laser => self.laser_doubts = 0,
+                Modality::Landmarks => self.doubt = None,
+            }
+        } else if !matches!(outcome, FixOutcome::GatedOut { .. }) {
             match fix.modality {
                 // A scan is laid where the belief says: that it fits there is no word against landmarks that do not.
                 Modality::Laser => {
@@ -356,7 +371,10 @@ impl Belief {
 
     /// Keeps at most [`MAX_NUISANCES`] of each kind. To leave one out of a Gaussian is to marginalise it.
     fn forget(&mut self) {
-        let is_wall = |c: &Carried| matches!(c.key, NuisanceKey::Wall(_) | NuisanceKey::Walls(..));
+        let is_wall = |c: &Carried| {
+            let of_area = matches!(c.key, NuisanceKey::Area(Modality::Laser, _));
+            of_area || matches!(c.key, NuisanceKey::Wall(_) | NuisanceKey::Walls(..))
+        };
         for walls in [false, true] {
             let all = |carried: &[Carried]| carried.iter().filter(|c| is_wall(c) == walls).count();
             while all(&self.carried) > MAX_NUISANCES {

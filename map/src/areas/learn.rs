@@ -1,0 +1,226 @@
+//! From a run whose path is known to evidence: how far every module's own position was off, and how far single
+//! measurements were off compared with what they claimed, each where the robot was.
+//!
+//! In: the odometry and the fixes of a robot, the reference. Out: evidence by cell. Each module goes the whole way by
+//! itself ("loose coupling", method 15), started where the reference starts: what a corridor does to the laser shows only
+//! when nobody else tells it where it is.
+
+use super::{Cell, MAX_CELLS, Module, Modules, Reference, map_from_aligned};
+use crate::{
+    fuse::{FuseParams, Fuser},
+    localise::{Fix, Modality},
+    pose2::{Pose2, Pose2Covariance, wrap_rad},
+};
+use nalgebra::{Matrix3, Vector3};
+use std::collections::BTreeMap;
+
+/// Steps of the reference at which positions are compared: after this way...
+const STEP_M: f64 = 0.05;
+/// ...or this turn.
+const STEP_RAD: f64 = 0.05;
+/// A module is available until this far from its last fix.
+const NEWS_M: f64 = 0.5;
+/// Length of the stretches on which odometry is measured.
+const STRETCH_M: f64 = 1.0;
+/// Stretches that turn by more are left out: along and across would not mean one thing.
+const STRETCH_RAD: f64 = 0.5;
+/// Standard deviations less than this are not believed: metres and radians. Keeps weights finite.
+const LEAST: [f64; 2] = [1e-3, 1e-4];
+
+/// A robot's run.
+#[derive(Debug, Clone, Copy)]
+pub struct Run<'a> {
+    /// `odom_from_robot` by time, in order, ns of the robot's clock.
+    pub odometry: &'a [(i64, Pose2)],
+    /// Its fixes by time of capture, in order; those that say nothing new left out.
+    pub fixes: &'a [(i64, Fix)],
+    /// Where it really was, by the same clock.
+    pub reference: &'a Reference,
+}
+
+/// What a run taught.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Learnt {
+    /// By cell.
+    pub cells: BTreeMap<Cell, Modules>,
+    /// Way of which the path is known, metres.
+    pub way_m: f64,
+    /// Fixes that the reference says nothing of.
+    pub unknown_fixes: u64,
+    /// Steps in cells beyond [`MAX_CELLS`], left out.
+    pub beyond: u64,
+}
+
+impl Learnt {
+    fn cell(&mut self, pose: &Pose2) -> Option<&mut Modules> {
+        let cell = Cell::of(pose);
+        if self.cells.len() >= MAX_CELLS && !self.cells.contains_key(&cell) {
+            self.beyond += 1;
+            return None;
+        }
+        Some(self.cells.entry(cell).or_default())
+    }
+}
+
+/// One step along the reference.
+struct Step {
+    /// Counts pieces of the reference that hang together.
+    piece: u32,
+    way_m: f64,
+    truth: Pose2,
+    odometry: Pose2,
+}
+
+/// Compares a run with its reference. Nothing is learnt where they have no time in common.
+pub fn learn(run: &Run<'_>, p: &FuseParams) -> Learnt {
+    let mut learnt = Learnt::default();
+    let steps = positions(run, p, &mut learnt);
+    measured_fixes(run, &mut learnt);
+    measured_odometry(&steps, run.reference, p, &mut learnt);
+    learnt
+}
+
+/// A module that goes by itself.
+struct Walker {
+    modality: Modality,
+    fuser: Fuser,
+    /// The reference's way at its last fix.
+    news_m: Option<f64>,
+}
+
+impl Walker {
+    fn new(modality: Modality, p: &FuseParams) -> Self {
+        Self { modality, fuser: Fuser::new(p.clone()), news_m: None }
+    }
+
+    /// Its position, if something told it lately.
+    fn position(&self, way_m: f64) -> Option<Pose2> {
+        self.news_m.filter(|at_m| way_m - at_m <= NEWS_M)?;
+        Some(self.fuser.pose()?.pose.pose)
+    }
+}
+
+/// Lets every module go the way by itself and notes how far it is off, step by step.
+fn positions(run: &Run<'_>, p: &FuseParams, learnt: &mut Learnt) -> Vec<Step> {
+    let mut walkers = [Modality::Laser, Modality::Landmarks].map(|modality| Walker::new(modality, p));
+    let mut map_from_odom: Option<Pose2> = None;
+    let (mut steps, mut piece, mut way_m): (Vec<Step>, u32, f64) = (Vec::new(), 0, 0.0);
+    let (mut before, mut since_ns): (Option<Pose2>, i64) = (None, 0);
+    let mut fixes = run.fixes.iter().peekable();
+    for (at_ns, odometry) in run.odometry {
+        let mut told = |walkers: &mut [Walker; 2], until_ns: i64, way_m: f64| {
+            while let Some((t, fix)) = fixes.next_if(|(t, _)| *t < until_ns) {
+                for walker in walkers.iter_mut().filter(|w| w.modality == fix.modality) {
+                    // What is out of range was refused when it was made; a refusal here only leaves it out.
+                    if walker.fuser.pose().is_some() && walker.fuser.fix(*t, fix).is_ok() {
+                        walker.news_m = Some(way_m);
+                    }
+                }
+            }
+        };
+        told(&mut walkers, *at_ns, way_m);
+        for walker in &mut walkers {
+            walker.fuser.odometry(*at_ns, *odometry).ok();
+        }
+        let Some(truth) = run.reference.at(*at_ns) else {
+            (piece, before) = (piece + u32::from(before.is_some()), None);
+            continue;
+        };
+        if map_from_odom.is_none() {
+            map_from_odom = Some(truth.compose(&odometry.inverse()));
+            let variances = Vector3::new(run.reference.sigma_m, run.reference.sigma_m, run.reference.sigma_rad);
+            let covariance = Matrix3::from_diagonal(&variances.map(|s| s * s));
+            for walker in &mut walkers {
+                walker.fuser.start(&Pose2Covariance { pose: truth, covariance }).ok();
+            }
+        }
+        let motion = before.map_or_else(Pose2::default, |before| before.between(&truth));
+        let moved_m = motion.position().norm();
+        if before.is_some() && moved_m < 0.999 * STEP_M && motion.theta_rad.abs() < STEP_RAD {
+            continue;
+        }
+        let seconds = before.map_or(0.0, |_| at_ns.saturating_sub(since_ns) as f64 * 1e-9);
+        (way_m, before, since_ns) = (way_m + moved_m, Some(truth), *at_ns);
+        steps.push(Step { piece, way_m, truth, odometry: *odometry });
+        let odometry = map_from_odom.map(|m| m.compose(odometry));
+        let [laser, landmarks] = &walkers;
+        let found = [odometry, laser.position(way_m), landmarks.position(way_m)];
+        let Some(cell) = learnt.cell(&truth) else { continue };
+        for (evidence, pose) in cell.iter_mut().zip(found) {
+            evidence.step(seconds, pose.map(|pose| aligned(&pose, &truth)).as_ref());
+        }
+    }
+    learnt.way_m = way_m;
+    steps
+}
+
+/// Error of a pose, robot-aligned.
+fn aligned(pose: &Pose2, truth: &Pose2) -> Vector3<f64> {
+    map_from_aligned(truth.theta_rad).transpose() * pose.minus(truth)
+}
+
+/// Every fix against the reference; passages end where another cell begins.
+fn measured_fixes(run: &Run<'_>, learnt: &mut Learnt) {
+    let r = run.reference;
+    for module in [Module::Laser, Module::Landmarks] {
+        let of_module = run.fixes.iter().filter(|(_, fix)| Module::from(fix.modality) == module);
+        let mut found: Vec<(Pose2, Vector3<f64>, Vector3<f64>)> = Vec::new();
+        for (at_ns, fix) in of_module {
+            let Some(truth) = r.at(*at_ns) else {
+                learnt.unknown_fixes += 1;
+                continue;
+            };
+            let turn = map_from_aligned(truth.theta_rad);
+            let claimed = (turn.transpose() * fix.pose.covariance * turn).diagonal();
+            let variances = Vector3::new(
+                claimed.x + r.sigma_m * r.sigma_m + LEAST[0] * LEAST[0],
+                claimed.y + r.sigma_m * r.sigma_m + LEAST[0] * LEAST[0],
+                claimed.z + r.sigma_rad * r.sigma_rad + LEAST[1] * LEAST[1],
+            );
+            found.push((truth, aligned(&fix.pose.pose, &truth), variances));
+        }
+        visits(module, &found, learnt);
+    }
+}
+
+/// Odometry against the reference, metre by metre.
+fn measured_odometry(steps: &[Step], r: &Reference, p: &FuseParams, learnt: &mut Learnt) {
+    let mut found = Vec::new();
+    let mut from = 0;
+    for to in steps {
+        while from < steps.len() && (steps[from].piece < to.piece || to.way_m - steps[from].way_m > STRETCH_M + STEP_M)
+        {
+            from += 1;
+        }
+        let start = &steps[from];
+        let length_m = to.way_m - start.way_m;
+        let (truly, measured) = (start.truth.between(&to.truth), start.odometry.between(&to.odometry));
+        // Backwards a fault of the floor has the other sign: only drives forwards are learnt from.
+        if length_m < 0.999 * STRETCH_M || truly.theta_rad.abs() > STRETCH_RAD || measured.x_m <= 0.0 {
+            continue;
+        }
+        let d = measured.minus(&truly);
+        let error = Vector3::new(d.x, d.y, wrap_rad(d.z)) / length_m;
+        // Both ends of the stretch are known as well as the reference knows them, and its beginning turns it.
+        let (place, heading) = (2.0 * r.sigma_m.powi(2), r.sigma_rad.powi(2));
+        let turned = p.turn_per_turn_rad.powi(2) * measured.theta_rad.abs();
+        let variances = p.metre_variances() + Vector3::new(place, place + heading, 2.0 * heading + turned);
+        let middle = steps[from..].iter().find(|s| s.way_m >= 0.5 * (start.way_m + to.way_m)).unwrap_or(to);
+        found.push((middle.truth, error, variances));
+    }
+    visits(Module::Odometry, &found, learnt);
+}
+
+/// Adds measurements up, passage by passage.
+fn visits(module: Module, found: &[(Pose2, Vector3<f64>, Vector3<f64>)], learnt: &mut Learnt) {
+    for visit in found.chunk_by(|a, b| Cell::of(&a.0) == Cell::of(&b.0)) {
+        let mut evidence = super::Evidence::default();
+        for (_, error, variances) in visit {
+            evidence.measure(error, variances);
+        }
+        evidence.end_visit();
+        if let Some(cell) = learnt.cell(&visit[0].0) {
+            cell[module.index()].add(&evidence);
+        }
+    }
+}

@@ -1,0 +1,47 @@
+//! What runs have shown of a place, laid on a motion and on a fix there: a bias is taken away, and what a modality errs by
+//! more than it says is added (method 15: "reported covariance inflated to the learnt one").
+
+use super::FuseParams;
+use crate::{
+    areas::{Advice, Cell, Module, map_from_aligned},
+    localise::{Fix, Nuisance, NuisanceKey},
+    pose2::Pose2,
+};
+use nalgebra::{Matrix3, Matrix3x6, Matrix6, Vector3};
+use std::borrow::Cow;
+
+/// A measured motion and its noise, in the frame where it starts, as odometry is there.
+pub(super) fn motion(
+    measured: &Pose2,
+    noise: &Matrix3<f64>,
+    advice: &Advice,
+    p: &FuseParams,
+) -> (Pose2, Matrix3<f64>) {
+    let (fault, length_m) = (advice.fault(Module::Odometry), measured.position().norm());
+    let more = fault.excess.component_mul(&p.metre_variances()) * length_m;
+    // Learnt of robots that drive forwards.
+    let bias = if measured.x_m > 0.0 { fault.bias * length_m } else { Vector3::zeros() };
+    (measured.plus(&-bias), noise + Matrix3::from_diagonal(&more))
+}
+
+/// A fix as its modality is where the robot is.
+pub(super) fn fix<'a>(fix: &'a Fix, at: &Pose2, advice: &Advice) -> Cow<'a, Fix> {
+    let fault = advice.fault(Module::from(fix.modality));
+    if fault.bias == Vector3::zeros() && fault.excess == Vector3::zeros() {
+        return Cow::Borrowed(fix);
+    }
+    let turn = map_from_aligned(at.theta_rad);
+    let claimed = (turn.transpose() * fix.pose.covariance * turn).diagonal();
+    let more = fault.excess.component_mul(&claimed);
+    let mut trusted = fix.clone();
+    trusted.pose.pose = fix.pose.pose.plus(&-(turn * fault.bias));
+    trusted.pose.covariance += turn * Matrix3::from_diagonal(&more) * turn.transpose();
+    // Not part of the noise: what is wrong in a place is wrong every time, by so many standard deviations of the fix.
+    let mut jacobian = Matrix3x6::zeros();
+    jacobian.fixed_columns_mut::<3>(0).copy_from(&(turn * Matrix3::from_diagonal(&more.map(f64::sqrt))));
+    let mut covariance = Matrix6::zeros();
+    covariance.fixed_view_mut::<3, 3>(0, 0).fill_with_identity();
+    let key = NuisanceKey::Area(fix.modality, Cell::of(at));
+    trusted.nuisances.push(Nuisance { key, jacobian, covariance });
+    Cow::Owned(trusted)
+}
