@@ -1,6 +1,8 @@
 // The live page: the map from above with every robot's tracks, and the last frame of one camera with its quads.
 // Reads the HTTP API once, then follows `maps/{map}/live` (server-sent events). Draws at most once per animation frame.
 
+import { drawModalities, loadModalities } from "/modalities.js";
+
 const API = "/api/v1";
 const TRACK_POINTS = 4000; // per robot and kind: the oldest are forgotten
 const CHI2_2_95 = 5.991; // 95 % of a two-dimensional Gaussian
@@ -158,7 +160,7 @@ function resolveColours() {
   const probe = document.createElement("span");
   document.body.append(probe);
   const resolved = {};
-  for (const name of ["wall", "landmark", "truth", "odometry", "pose", "faint", "line", "ink"]) {
+  for (const name of ["wall", "landmark", "truth", "odometry", "pose", "laser", "faint", "line", "ink"]) {
     probe.style.color = `var(--${name})`;
     resolved[name] = getComputedStyle(probe).color;
   }
@@ -185,6 +187,7 @@ function drawMap() {
   c.lineCap = "round";
   const ink = resolveColours();
   drawGrid(c, w, h, ink);
+  drawModalities(c, px, ink);
   drawArea(c, px, ink);
   if (layerOn("walls")) {
     stroke(c, ink.wall, 2.5);
@@ -349,6 +352,7 @@ async function loadMap(name) {
   byId("map-facts").textContent = `${where}${where ? ", " : ""}version ${map.version}, ${active} of ${state.landmarks.length} landmarks active, ${state.walls.length} walls${lies}`;
   byId("map-hint").textContent = state.walls.length || state.landmarks.some((l) => l.place) ? "" : "This map has no walls and no placed landmarks yet.";
   if (!state.view.fitted) fit();
+  loadModalities(name, () => { state.dirty = true; });
   window.dispatchEvent(new CustomEvent("map-loaded", { detail: { map: name, landmarks: state.landmarks } }));
 }
 

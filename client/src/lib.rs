@@ -9,6 +9,7 @@ pub mod error;
 pub mod lessons;
 pub mod map;
 pub mod robot;
+pub mod runs;
 mod transport;
 
 pub use capture::Capture;

@@ -302,7 +302,7 @@ impl MapClient {
         self.all("/robots").await
     }
 
-    fn request(&self, method: Method, path: &str) -> RequestBuilder {
+    pub(crate) fn request(&self, method: Method, path: &str) -> RequestBuilder {
         self.http.request(method, format!("{}/api/v1{path}", self.base))
     }
 
@@ -322,7 +322,7 @@ impl MapClient {
         }
     }
 
-    async fn send<T: DeserializeOwned>(&self, request: RequestBuilder) -> Result<T, ClientError> {
+    pub(crate) async fn send<T: DeserializeOwned>(&self, request: RequestBuilder) -> Result<T, ClientError> {
         let response = self.checked(request).await?;
         let url = response.url().to_string();
         let bytes =
@@ -331,7 +331,7 @@ impl MapClient {
     }
 
     /// Sends, and turns refusals into errors.
-    async fn checked(&self, request: RequestBuilder) -> Result<Response, ClientError> {
+    pub(crate) async fn checked(&self, request: RequestBuilder) -> Result<Response, ClientError> {
         let response = request.send().await.map_err(|e| {
             let url = e.url().map_or_else(|| self.base.clone(), ToString::to_string);
             ClientError::Http { url, detail: reason(&e) }

@@ -249,7 +249,8 @@ impl Areas {
         }
         let mut made = Self { mode, named, map, ..Self::default() };
         made.elsewhere = made.judge(&[(Level::Map, &map)]);
-        made.cells = cells.into_iter().map(|(cell, found)| (cell, (found, made.judged(&cell, &found)))).collect();
+        made.cells =
+            cells.into_iter().map(|(cell, found)| (cell, (found, made.judged(&cell, &found)))).collect();
         made
     }
 
@@ -279,7 +280,8 @@ impl Areas {
     /// Every named area with what was found in it, by heading, and what follows where its cells say nothing themselves.
     pub fn named(&self) -> impl Iterator<Item = (&NamedArea, [(Modules, Advice); 4])> {
         self.named.iter().map(|(area, by_heading)| {
-            let told = |found: &Modules| (*found, self.judge(&[(Level::Area, found), (Level::Map, &self.map)]));
+            let told =
+                |found: &Modules| (*found, self.judge(&[(Level::Area, found), (Level::Map, &self.map)]));
             (area, std::array::from_fn(|k| told(&by_heading[k])))
         })
     }
@@ -293,8 +295,10 @@ impl Areas {
     fn judged(&self, cell: &Cell, found: &Modules) -> Advice {
         let around = self.named.iter().find(|(area, _)| area.contains(cell.middle_m()));
         let around = around.map(|(_, by_heading)| (Level::Area, &by_heading[usize::from(cell.heading)]));
-        let levels: Vec<_> =
-            [Some((Level::Cell, found)), around, Some((Level::Map, &self.map))].into_iter().flatten().collect();
+        let levels: Vec<_> = [Some((Level::Cell, found)), around, Some((Level::Map, &self.map))]
+            .into_iter()
+            .flatten()
+            .collect();
         self.judge(&levels)
     }
 

@@ -22,7 +22,7 @@ use vision::{detect::quads::Corners, geometry::polygon};
 const LONGEST: Duration = Duration::from_mins(2);
 
 /// Options that each command must name in its help.
-const OPTIONS: [(&str, &[&str]); 42] = [
+const OPTIONS: [(&str, &[&str]); 49] = [
     ("demo", &["--robots", "--rate-hz", "--legs", "--seed", "--http", "--data", "--stay", "--json"]),
     ("serve", &["--config", "--data", "--http", "--zenoh", "--fleet", "--workers", "--insecure"]),
     (
@@ -54,6 +54,13 @@ const OPTIONS: [(&str, &[&str]); 42] = [
     ("gather show", &["--pictures", "--map", "--server", "<GATHERING>"]),
     ("gather accept", &["--map", "--server", "<GATHERING>", "<PICKS>"]),
     ("gather discard", &["--map", "--server", "<GATHERING>", "<CANDIDATES>"]),
+    ("run start", &["--server", "--json", "<ROBOT>"]),
+    ("run status", &["--server", "--json", "<ROBOT>"]),
+    ("run cancel", &["--server", "<ROBOT>"]),
+    ("run learn", &["--path", "--sigma-m", "--sigma-rad", "--server", "<ROBOT>"]),
+    ("run list", &["--map", "--server", "--json"]),
+    ("run forget", &["--map", "--server", "<RUN>"]),
+    ("run mode", &["--map", "--server", "--json", "[MODE]"]),
     ("map list", &["--server", "--json"]),
     (
         "map build",

@@ -337,6 +337,7 @@ async fn the_document_names_every_path_and_the_page_is_served() {
         ("/", "text/html"),
         ("/app.js", "text/javascript"),
         ("/gather.js", "text/javascript"),
+        ("/modalities.js", "text/javascript"),
         ("/style.css", "text/css"),
         ("/api/docs/", "text/html"),
         ("/healthz", "application/json"),

@@ -1,11 +1,12 @@
 //! Claim: a robot that sees a single landmark and has odometry and a laser is localised on a map with walls: across a
 //! corridor by centimetres however far it drives, in a room in all directions. A scan alone starts nothing, the first
-//! frames that show a unique landmark do, and every correction can be read.
+//! frames that show a unique landmark do, and every correction can be read. From a run whose path is told the server learns
+//! what to trust where.
 
 use client::{Capture, Delivery, RobotClient, RobotOptions, v1};
 use map::pose2::Pose2;
 use reqwest::{Method, StatusCode};
-use serde_json::Value;
+use serde_json::{Value, json};
 use server::config::Limits;
 use sim::{
     building::Building,
@@ -33,6 +34,8 @@ struct Run {
     poses: tokio::sync::broadcast::Receiver<v1::RobotPose>,
     scans: u64,
     last: Option<v1::RobotPose>,
+    /// Where the robot really was at every scan, by its clock.
+    path: Vec<(i64, Pose2)>,
 }
 
 impl Run {
@@ -51,7 +54,7 @@ impl Run {
         let client = RobotClient::connect(&options).await.expect("connected");
         let robot = Robot::new(building.clone(), &RobotParams { drive, ..RobotParams::default() });
         let poses = client.poses();
-        Self { inside, building, client, robot, poses, scans: 0, last: None }
+        Self { inside, building, client, robot, poses, scans: 0, last: None, path: Vec::new() }
     }
 
     async fn corrections(&self) -> Value {
@@ -62,7 +65,9 @@ impl Run {
 
     /// Sends a scan and waits until the server has done with it.
     async fn scan(&mut self, seen: &Sighting) {
-        self.client.publish_scan(scan_message(seen, now_ns())).await.expect("sent");
+        let captured_ns = now_ns();
+        self.path.push((captured_ns, seen.step.map_from_robot));
+        self.client.publish_scan(scan_message(seen, captured_ns)).await.expect("sent");
         self.scans += 1;
         eventually("the scan is dealt with", || async {
             let log = self.corrections().await;
@@ -158,6 +163,8 @@ async fn in_a_corridor_the_laser_keeps_a_robot_off_the_walls() {
     let params = CorridorParams { posters: 1, column: false, ..CorridorParams::default() };
     let drive_params = DriveParams { start_m: 9.0, ..DriveParams::default() };
     let mut run = Run::start(&params, drive_params).await;
+    let begun = call(&run.inside, Method::POST, "/robots/r1/run", None).await;
+    assert_eq!((begun.0, &begun.1["going"]), (StatusCode::CREATED, &Value::from(true)), "{begun:?}");
     let errors = drive(&mut run, 2).await;
     assert!(errors.len() > 40, "{}", errors.len());
     let (across, heading) = (rms(&errors, 1), rms(&errors, 2));
@@ -175,8 +182,60 @@ async fn in_a_corridor_the_laser_keeps_a_robot_off_the_walls() {
     );
     let (status, _) = call(&run.inside, Method::GET, "/robots/nobody/corrections", None).await;
     assert_eq!(status, StatusCode::NOT_FOUND);
+    learnt_from(&run).await;
     run.client.close().await.expect("closed");
     run.inside.server.stop().await;
+}
+
+/// The run was recorded; told where the robot really was, the server knows which modality is best where.
+async fn learnt_from(run: &Run) {
+    let ask = async |method, path: &str, body| call(&run.inside, method, path, body).await;
+    let (status, problem) = ask(Method::POST, "/robots/r1/run", None).await;
+    assert_eq!((status, &problem["code"]), (StatusCode::CONFLICT, &"in_use".into()));
+    let (_, recorded) = ask(Method::GET, "/robots/r1/run", None).await;
+    assert!(recorded["laser"].as_u64() > Some(40) && recorded["landmarks"].as_u64() > Some(0), "{recorded}");
+    let told = "/robots/r1/run/reference";
+    let poses = |shift_ns: i64| {
+        let pose = |(t, p): &(i64, Pose2)| json!([t + shift_ns, p.x_m, p.y_m, p.theta_rad]);
+        json!({ "poses": run.path.iter().map(pose).collect::<Vec<_>>() })
+    };
+    let refusals = [
+        (json!({ "poses": [[2, 0.0, 0.0, 0.0], [1, 0.0, 0.0, 0.0]] }), "not_in_order", "poses[1]"),
+        (json!({ "poses": [[1, 0.0, 1e9, 0.0], [2, 0.0, 0.0, 0.0]] }), "out_of_range", "poses[0].y_m"),
+        (poses(1 << 50), "no_overlap", "poses"),
+    ];
+    for (body, code, field) in refusals {
+        let (status, problem) = ask(Method::POST, told, Some(body)).await;
+        assert_eq!(status, StatusCode::UNPROCESSABLE_ENTITY, "{problem}");
+        assert_eq!((&problem["code"], &problem["field"]), (&code.into(), &field.into()));
+    }
+    let (status, learnt) = ask(Method::POST, told, Some(poses(0))).await;
+    assert_eq!(status, StatusCode::CREATED, "{learnt}");
+    assert!(learnt["way_m"].as_f64() > Some(5.0) && learnt["cells"].as_u64() > Some(5), "{learnt}");
+    let laser = &learnt["modules"][1];
+    let availability = laser["availability"].as_f64();
+    assert!(laser["module"] == "laser" && availability > Some(0.5), "{learnt}");
+    assert!(laser["sigma"][1].as_f64() < Some(0.03), "{learnt}");
+    let areas = format!("/maps/{MAP}/areas");
+    let corridor =
+        json!([{ "name": "corridor", "corners_m": [[-1.0, -3.0], [40.0, -3.0], [40.0, 3.0], [-1.0, 3.0]] }]);
+    let (status, known) = ask(Method::PUT, &areas, Some(json!({ "mode": "fuse", "areas": corridor }))).await;
+    assert_eq!((status, &known["mode"]), (StatusCode::OK, &"fuse".into()), "{known}");
+    assert_eq!(known["cells"].as_array().map(Vec::len), learnt["cells"].as_u64().map(|n| n as usize));
+    let at = &run.path[run.path.len() / 2].1;
+    let at = format!("{areas}/at?x_m={}&y_m={}&theta_rad={}", at.x_m, at.y_m, at.theta_rad);
+    let (_, here) = ask(Method::GET, &at, None).await;
+    assert_eq!(here["told"]["level"], "area", "{here}");
+    assert!(here["told"]["best"].is_string() && here["modules"][0]["steps"].as_u64() > Some(0), "{here}");
+    let twice = json!({ "areas": [corridor[0], corridor[0]] });
+    let (status, problem) = ask(Method::PUT, &areas, Some(twice)).await;
+    assert_eq!((status, &problem["field"]), (StatusCode::UNPROCESSABLE_ENTITY, &"areas[1].name".into()));
+    let one = format!("/maps/{MAP}/runs/{}", learnt["id"]);
+    assert_eq!(ask(Method::DELETE, &one, None).await.0, StatusCode::NO_CONTENT);
+    assert_eq!(ask(Method::DELETE, &one, None).await.1["code"], "unknown_run");
+    let (_, known) = ask(Method::GET, &areas, None).await;
+    assert_eq!(known["cells"], json!([]));
+    assert_eq!(ask(Method::GET, "/robots/r1/run", None).await.1["code"], "not_recording");
 }
 
 #[tokio::test(flavor = "multi_thread")]

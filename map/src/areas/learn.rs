@@ -128,7 +128,8 @@ fn positions(run: &Run<'_>, p: &FuseParams, learnt: &mut Learnt) -> Vec<Step> {
         };
         if map_from_odom.is_none() {
             map_from_odom = Some(truth.compose(&odometry.inverse()));
-            let variances = Vector3::new(run.reference.sigma_m, run.reference.sigma_m, run.reference.sigma_rad);
+            let variances =
+                Vector3::new(run.reference.sigma_m, run.reference.sigma_m, run.reference.sigma_rad);
             let covariance = Matrix3::from_diagonal(&variances.map(|s| s * s));
             for walker in &mut walkers {
                 walker.fuser.start(&Pose2Covariance { pose: truth, covariance }).ok();
@@ -188,7 +189,8 @@ fn measured_odometry(steps: &[Step], r: &Reference, p: &FuseParams, learnt: &mut
     let mut found = Vec::new();
     let mut from = 0;
     for to in steps {
-        while from < steps.len() && (steps[from].piece < to.piece || to.way_m - steps[from].way_m > STRETCH_M + STEP_M)
+        while from < steps.len()
+            && (steps[from].piece < to.piece || to.way_m - steps[from].way_m > STRETCH_M + STEP_M)
         {
             from += 1;
         }

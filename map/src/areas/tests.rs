@@ -100,7 +100,8 @@ fn areas_hold_their_points_and_are_checked() {
     let corners_m = vec![[0.0, 0.0], [4.0, 0.0], [4.0, 1.0], [1.0, 1.0], [1.0, 3.0], [0.0, 3.0]];
     let area = NamedArea { name: "hall".into(), corners_m };
     area.check().unwrap();
-    for (point, inside) in [([0.5, 2.5], true), ([3.5, 0.5], true), ([2.0, 2.0], false), ([-0.1, 0.5], false)] {
+    for (point, inside) in [([0.5, 2.5], true), ([3.5, 0.5], true), ([2.0, 2.0], false), ([-0.1, 0.5], false)]
+    {
         assert_eq!(area.contains(point), inside, "{point:?}");
     }
     let bad = |name: &str, corners_m: Vec<[f64; 2]>| {
@@ -219,7 +220,8 @@ fn a_named_area_speaks_for_cells_that_were_hardly_driven_through() {
     runs.push(once);
     let at = Pose2::new(2.5, 2.5, 0.0);
     assert_eq!(Areas::new(Mode::Fuse, Vec::new(), &runs).advice(&at).best, None);
-    let west = NamedArea { name: "west".into(), corners_m: vec![[0.0, 0.0], [4.0, 0.0], [4.0, 5.0], [0.0, 5.0]] };
+    let west =
+        NamedArea { name: "west".into(), corners_m: vec![[0.0, 0.0], [4.0, 0.0], [4.0, 5.0], [0.0, 5.0]] };
     let areas = Areas::new(Mode::Fuse, vec![west], &runs);
     let advice = areas.advice(&at);
     assert_eq!((advice.best, advice.level), (Some(Module::Landmarks), Level::Area));
@@ -278,7 +280,8 @@ fn a_reference_is_checked_and_has_gaps() {
 fn cells_of_a_run_are_bounded_and_strange_runs_teach_nothing() {
     // A diagonal through more cells than a run may tell of.
     let n = MAX_CELLS as i64 + 10;
-    let at = |i: i64| (i * SECOND / 10, Pose2::new(i as f64 + 0.5, i as f64 + 0.5, std::f64::consts::FRAC_PI_4));
+    let at =
+        |i: i64| (i * SECOND / 10, Pose2::new(i as f64 + 0.5, i as f64 + 0.5, std::f64::consts::FRAC_PI_4));
     let path: Vec<_> = (0..n).map(at).collect();
     let reference = Reference::new(path.clone(), 0.0, 0.0).unwrap();
     let learnt = learn(&Run { odometry: &path, fixes: &[], reference: &reference }, &FuseParams::default());
@@ -287,7 +290,8 @@ fn cells_of_a_run_are_bounded_and_strange_runs_teach_nothing() {
     // Another time: nothing in common.
     let later: Vec<_> = path.iter().map(|(t, pose)| (t + 10_000 * SECOND, *pose)).collect();
     let seen = [(later[3].0, fix(Modality::Landmarks, later[3].1, [0.1; 3]))];
-    let learnt = learn(&Run { odometry: &later, fixes: &seen, reference: &reference }, &FuseParams::default());
+    let learnt =
+        learn(&Run { odometry: &later, fixes: &seen, reference: &reference }, &FuseParams::default());
     assert_eq!((learnt.cells.len(), learnt.unknown_fixes), (0, 1));
     let none = learn(&Run { odometry: &[], fixes: &[], reference: &reference }, &FuseParams::default());
     assert_eq!(none, Learnt::default());

@@ -13,6 +13,7 @@ pub(crate) mod evaluate;
 pub(crate) mod mapping;
 mod parameters;
 pub(crate) mod pictures;
+mod run;
 pub(crate) mod scratch;
 mod screen;
 mod serve;
@@ -83,6 +84,14 @@ enum Command {
     ///   waymark gather accept --map office 1 3=poster 5=fire-plan
     #[command(subcommand, verbatim_doc_comment)]
     Gather(gather::Command),
+    /// Record a robot's run and tell where it really was, so that the map learns which modality to trust where.
+    ///
+    /// For example:
+    ///   waymark run start r1
+    ///   waymark run learn r1 --path survey.tum
+    ///   waymark run mode --map office fuse
+    #[command(subcommand, verbatim_doc_comment)]
+    Run(run::Command),
     /// Ask a running server what is in photographs.
     Recognise(teach::RecogniseArgs),
     /// The paper's experiments on labelled pictures: tables for people, JSON for programs.
@@ -111,6 +120,7 @@ pub fn main() -> ExitCode {
         Command::Robot(command) => run(teach::robot(command)).map(|()| ExitCode::SUCCESS),
         Command::Learn(args) => run(teach::learn(args)),
         Command::Gather(command) => run(gather::run(command)).map(|()| ExitCode::SUCCESS),
+        Command::Run(command) => run(run::run(command)).map(|()| ExitCode::SUCCESS),
         Command::Recognise(args) => run(teach::recognise(args)),
         Command::Evaluate(command) => evaluate::run(command).map(|()| ExitCode::SUCCESS),
         Command::Bench(args) => bench::run(args).map(|()| ExitCode::SUCCESS),

@@ -6,11 +6,14 @@
 mod corrections;
 mod messages;
 mod robot;
+mod run;
 mod scans;
 
 pub use corrections::{Correction, Corrections, MAX_CORRECTIONS};
 pub use messages::{MAX_ODOMETRY_BYTES, MAX_SCAN_BYTES, MessageCounts};
 pub use robot::{MAX_SUPPORTERS, RESTS_ON_M};
+pub(crate) use run::Recording;
+pub use run::{MAX_RECORDINGS, MAX_RUN_FIXES, MAX_RUN_ODOMETRY, Recorded, RunError};
 pub use scans::{ScanJob, Scans};
 
 use super::{live::LiveHub, mapping::Mappings, snapshot::Snapshots};
@@ -24,7 +27,7 @@ use map::{
 use protos::{Code, Name, Rejection, convert::geometry::pose2_covariance_wire, prost::bytes::Bytes, v1};
 use robot::Robot;
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
 use vision::recognise::LandmarkId;
@@ -72,6 +75,8 @@ pub struct Motion {
     state: Mutex<State>,
     scans: Scans,
     mappings: Mappings,
+    /// Robots whose run is recorded; taken before their own locks.
+    recorded: Mutex<BTreeSet<Name>>,
 }
 
 impl Motion {
@@ -83,6 +88,7 @@ impl Motion {
             state: Mutex::default(),
             scans: Scans::default(),
             mappings: Mappings::default(),
+            recorded: Mutex::default(),
         }
     }
 
@@ -211,6 +217,49 @@ impl Motion {
         let Some(followed) = self.lock().robots.get(robot).cloned() else { return Corrections::default() };
         let followed = own(&followed);
         followed.log.read(followed.modalities())
+    }
+
+    /// Begins to record a run of a robot on a map.
+    pub fn record(&self, robot: &Name, map: &str) -> Result<Recorded, RunError> {
+        let mut recorded = self.recorded.lock().unwrap_or_else(PoisonError::into_inner);
+        if recorded.contains(robot) {
+            return Err(RunError::Going);
+        }
+        if recorded.len() >= MAX_RECORDINGS {
+            return Err(RunError::TooMany);
+        }
+        let followed = self.lock().robot(robot).map_err(|_full| RunError::TooMany)?;
+        let mut followed = own(&followed);
+        let run = followed.run.insert(Box::new(Recording::new(map)));
+        let told = run.told(robot.as_str());
+        recorded.insert(robot.clone());
+        Ok(told)
+    }
+
+    /// The run of a robot as it is recorded.
+    pub fn recorded(&self, robot: &Name) -> Option<Recorded> {
+        let followed = self.lock().robots.get(robot)?.clone();
+        let followed = own(&followed);
+        Some(followed.run.as_ref()?.told(robot.as_str()))
+    }
+
+    /// Ends the recording and gives it.
+    pub(crate) fn take_recording(&self, robot: &Name) -> Option<Box<Recording>> {
+        let mut recorded = self.recorded.lock().unwrap_or_else(PoisonError::into_inner);
+        recorded.remove(robot);
+        let followed = self.lock().robots.get(robot)?.clone();
+        own(&followed).run.take()
+    }
+
+    /// Takes a recording back that could not be learnt from after all, unless another has begun.
+    pub(crate) fn keep_recording(&self, robot: &Name, recording: Box<Recording>) {
+        let mut recorded = self.recorded.lock().unwrap_or_else(PoisonError::into_inner);
+        if recorded.len() >= MAX_RECORDINGS || !recorded.insert(robot.clone()) {
+            return;
+        }
+        if let Ok(followed) = self.lock().robot(robot) {
+            own(&followed).run = Some(recording);
+        }
     }
 
     /// A frame's landmarks were judged by these grounds: what should change in the map by that.

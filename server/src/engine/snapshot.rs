@@ -1,6 +1,7 @@
 //! What the workers read: one immutable [`MapSnapshot`] per map, swapped whole. Only the store publishes, and only
 //! after its transaction is committed; a reader keeps the `Arc` it took, so an answer rests on one version.
 
+use crate::store::areas::Kept;
 use arc_swap::ArcSwap;
 use map::{
     changes::Standing,
@@ -46,6 +47,8 @@ pub struct MapSnapshot {
     pub walls: Vec<LaserSegment>,
     /// The same, made ready for localisation by scans; kept from version to version while the walls are the same.
     pub wall_index: Arc<WallIndex>,
+    /// What runs have shown of modalities; kept from version to version while it is the same.
+    pub(crate) areas: Kept,
     /// From where each placed landmark is seen.
     pub visibility: BTreeMap<LandmarkId, Arc<VisibilityMap>>,
     /// Which distance decides.
@@ -68,6 +71,7 @@ impl MapSnapshot {
             quarantined: BTreeMap::new(),
             walls: Vec::new(),
             wall_index: Arc::new(WallIndex::new([])),
+            areas: Kept::default(),
             visibility: BTreeMap::new(),
             distance: DistanceKind::Both,
             params: Arc::default(),

@@ -3,6 +3,7 @@
 //! `/api/v1`, JSON with `snake_case` names, `application/problem+json` errors with a stable `code` and the `field`, lists in
 //! pages. Handlers parse, call the store, the jobs or the engine, and shape the answer; they decide nothing.
 
+mod areas;
 mod error;
 mod extract;
 mod gathering;
@@ -18,6 +19,7 @@ mod pages;
 mod recognise;
 mod resources;
 mod robots;
+mod runs;
 mod router;
 mod upload;
 mod cameras;

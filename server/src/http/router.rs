@@ -1,8 +1,8 @@
 //! Every route, with the layers around them and the OpenAPI document made from them.
 
 use super::{
-    App, Shared, cameras, error::ApiError, gathering, guard, health, landmarks, laser, learning, live,
-    mapping, maps, pages, recognise, robots, views, visibility,
+    App, Shared, areas, cameras, error::ApiError, gathering, guard, health, landmarks, laser, learning, live,
+    mapping, maps, pages, recognise, robots, runs, views, visibility,
 };
 use crate::config::Limits;
 use axum::{
@@ -39,6 +39,8 @@ fn api(limits: &Limits) -> OpenApiRouter<Shared> {
         .merge(learning::router())
         .merge(gathering::router())
         .merge(visibility::router())
+        .merge(areas::router())
+        .merge(runs::router(limits.upload_bytes))
         .merge(recognise::router(limits.upload_bytes))
         .merge(robots::router())
         .merge(cameras::router())

@@ -2,7 +2,7 @@
 //! the same; a damaged or outdated model is named and left out, never matched.
 
 use super::{
-    StoreError, landmarks, laser, maps,
+    StoreError, areas, landmarks, laser, maps,
     models::{self, ModelDigest},
     robots, seen, sites,
     statements::statements,
@@ -88,6 +88,7 @@ pub(super) async fn map(
     let name: String = row.try_get("name").map_err(at())?;
     let before = snapshots.get(&name);
     let wall_index = wall_index(&walls, before.as_deref()).await;
+    let areas = areas::all(&mut *conn, id, before.as_deref().map(|map| &map.areas)).await?;
     let visibility = seen::areas(&infos, &walls, before.clone()).await;
     let (learnt, quarantined) = models(conn, id, before.as_deref(), params).await?;
     for (id, reason) in &quarantined {
@@ -109,6 +110,7 @@ pub(super) async fn map(
         quarantined,
         walls,
         wall_index,
+        areas,
         visibility,
         distance,
         params: params.clone(),

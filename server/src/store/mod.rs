@@ -18,6 +18,7 @@ pub(crate) mod laser;
 pub(crate) mod placing;
 pub(crate) mod gatherings;
 pub(crate) mod accepting;
+pub(crate) mod areas;
 mod seen;
 pub(crate) mod robots;
 pub(crate) mod jobs;

@@ -23,6 +23,7 @@ async fn every_statement_prepares_on_the_migrated_schema() {
         placing::ALL,
         gatherings::ALL,
         accepting::ALL,
+        areas::ALL,
         robots::ALL,
         jobs::ALL,
         load::ALL,

@@ -22,11 +22,12 @@ pub struct Correction {
     /// The landmarks it rests on, by name; empty for the laser.
     pub landmarks: Vec<String>,
     /// `started` (it gave the first pose), `applied`, `gated_out` (it contradicts the pose and was left out), `reset` (the
-    /// last of several that contradict the pose and agree with one another: it replaced the pose), `too_old`, `waiting`
+    /// last of several that contradict the pose and agree with one another: it replaced the pose), `not_used` (it agrees, but
+    /// runs have shown another modality to be better here, and the map's mode leaves this one out), `too_old`, `waiting`
     /// (newer than the last odometry), `carried_over` (the pose on another map, in the frame of this one).
     pub outcome: &'static str,
-    /// Squared Mahalanobis distance of the fix from the pose before it, 3 degrees of freedom; for `applied` and
-    /// `gated_out`.
+    /// Squared Mahalanobis distance of the fix from the pose before it, 3 degrees of freedom; for `applied`, `not_used`
+    /// and `gated_out`.
     pub chi2: Option<f64>,
     /// By how much it moved the pose, in the robot's frame before it: forwards, metres.
     pub along_m: Option<f64>,
@@ -104,6 +105,7 @@ pub(super) fn outcome(outcome: FixOutcome) -> (&'static str, Option<f64>) {
     match outcome {
         FixOutcome::Started => ("started", None),
         FixOutcome::Applied { distance2 } => ("applied", finite(distance2)),
+        FixOutcome::NotUsed { distance2 } => ("not_used", finite(distance2)),
         FixOutcome::GatedOut { distance2, .. } => ("gated_out", finite(distance2)),
         FixOutcome::Reset => ("reset", None),
         FixOutcome::Repeated => ("repeated", None),

@@ -1,18 +1,22 @@
 //! One robot on the move: its fused pose, what that rests on, what it has found out about landmarks. A new epoch
 //! starts afresh; an epoch that is over says nothing more.
 
-use super::corrections::{Correction, Log, modality, moved, outcome};
+use super::{
+    corrections::{Correction, Log, modality, moved, outcome},
+    run::Recording,
+};
 use crate::engine::{
     slots::{Order, PAST_EPOCHS},
     snapshot::Snapshots,
 };
 use map::{
+    areas::Areas,
     changes::{Change, ChangeParams, Watch},
     fuse::{FixOutcome, FuseParams, FusedPose, Fuser, OdometryOutcome},
     localise::{Fix, Modality},
     pose2::{Pose2, Pose2Covariance},
 };
-use std::collections::VecDeque;
+use std::{collections::VecDeque, sync::Arc};
 use vision::recognise::LandmarkId;
 
 /// Landmarks that a pose is said to rest on: the latest.
@@ -49,6 +53,10 @@ pub(super) struct Robot {
     /// ...and what of that was not passed on yet.
     pub(super) found: Vec<Change>,
     pub(super) log: Log,
+    /// The run that is being recorded.
+    pub(super) run: Option<Box<Recording>>,
+    /// What its fusion goes by.
+    areas: Arc<Areas>,
 }
 
 impl Default for Robot {
@@ -70,6 +78,8 @@ impl Default for Robot {
             watch: Watch::new(ChangeParams::default()),
             found: Vec::new(),
             log: Log::default(),
+            run: None,
+            areas: Arc::default(),
         }
     }
 }
@@ -79,6 +89,7 @@ impl Robot {
     /// how the two maps lie to each other. False for an epoch that is over: what was still in work when a new one began.
     pub(super) fn belong(&mut self, epoch: u64, map: &str, maps: &Snapshots) -> bool {
         if self.epoch == epoch && self.map == map {
+            self.trust(maps);
             return true;
         }
         if self.past.contains(&epoch) {
@@ -90,10 +101,19 @@ impl Robot {
             }
             self.past.push_back(self.epoch);
         }
+        if let Some(run) = &mut self.run {
+            if run.map != map {
+                run.end("the robot went to another map");
+            } else if self.epoch != epoch && !run.odometry.is_empty() {
+                run.end("the robot's software was started again");
+            }
+        }
         let there = if self.epoch == epoch { self.pose_on(map, maps) } else { None };
         let newest = self.newest;
         (self.epoch, self.map) = (epoch, map.to_owned());
         self.fuser = Fuser::new(FuseParams::default());
+        self.areas = Arc::default();
+        self.trust(maps);
         (self.map_from_odom, self.newest, self.way_m) = (None, None, 0.0);
         self.lost();
         self.found.clear();
@@ -102,6 +122,15 @@ impl Robot {
             self.begin(at_ns, &pose, ("map", "carried_over"), Vec::new());
         }
         true
+    }
+
+    /// Goes by what runs have shown of its map by now.
+    fn trust(&mut self, maps: &Snapshots) {
+        let Some(map) = maps.get(&self.map) else { return };
+        if !Arc::ptr_eq(&map.areas.areas, &self.areas) {
+            self.areas = map.areas.areas.clone();
+            self.fuser.set_areas(self.areas.clone());
+        }
     }
 
     /// The pose of this moment in the frame of another map.
@@ -154,8 +183,14 @@ impl Robot {
                 self.map_from_odom = None;
                 self.newest = Some((captured_ns, odom_from_robot));
                 self.lost();
+                if let Some(run) = &mut self.run {
+                    run.end("odometry jumped");
+                }
             }
             Ok(OdometryOutcome::Moved | OdometryOutcome::TooOld) => {
+                if let Some(run) = &mut self.run {
+                    run.moved(captured_ns, odom_from_robot);
+                }
                 let newest = self.newest.filter(|(at_ns, _)| *at_ns >= captured_ns);
                 if newest.is_none() {
                     let before = self.newest.replace((captured_ns, odom_from_robot));
@@ -197,6 +232,9 @@ impl Robot {
         if matches!(judged, FixOutcome::Repeated | FixOutcome::NoPose) {
             self.log.count(kind, outcome);
         } else {
+            if let Some(run) = &mut self.run {
+                run.fix(captured_ns, fix);
+            }
             let step = moved(before.as_ref(), after.as_ref().map(|fused| &fused.pose.pose));
             self.log.keep(Correction {
                 epoch: self.epoch,
@@ -250,7 +288,7 @@ impl Robot {
     fn rests_on(&mut self, outcome: FixOutcome, fix: &Fix) {
         match outcome {
             FixOutcome::Started | FixOutcome::Reset => self.lost(),
-            FixOutcome::Applied { .. } | FixOutcome::Repeated => {}
+            FixOutcome::Applied { .. } | FixOutcome::NotUsed { .. } | FixOutcome::Repeated => {}
             _ => return,
         }
         match fix.modality {

@@ -1,0 +1,194 @@
+//! A run that is recorded to learn from: the odometry and the fixes of one robot, in memory, until somebody says where it
+//! really was, gives it up, or the server stops. In: what the robot's fusion gets. Out: the same, in order of capture.
+
+use map::{
+    areas::{Reference, Run},
+    localise::{Fix, Modality},
+    pose2::Pose2,
+};
+use serde::Serialize;
+use utoipa::ToSchema;
+
+/// Runs recorded at a time.
+pub const MAX_RECORDINGS: usize = 8;
+/// Fixes of one run; each takes about 3 kB.
+pub const MAX_RUN_FIXES: usize = 20_000;
+/// Readings of odometry of one run.
+pub const MAX_RUN_ODOMETRY: usize = 200_000;
+/// A reading is kept after this motion...
+const STEP_M: f64 = 0.01;
+/// ...or this turn.
+const STEP_RAD: f64 = 0.01;
+
+/// A run as it is recorded.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct Recorded {
+    /// The map.
+    pub map: String,
+    /// Whose run.
+    pub robot: String,
+    /// False once it is full, or the robot's software was started again, or it went to another map, or its odometry
+    /// jumped: what was recorded until then can be learnt from.
+    pub going: bool,
+    /// Why it goes on no longer.
+    pub reason: Option<String>,
+    /// Way driven by odometry, metres.
+    pub way_m: f64,
+    /// Time of the first and the last reading of odometry, ns of the robot's clock; absent before the first.
+    pub span_ns: Option<[i64; 2]>,
+    /// Readings of odometry that were kept.
+    pub odometry: usize,
+    /// Fixes by landmarks.
+    pub landmarks: usize,
+    /// Fixes by the laser.
+    pub laser: usize,
+}
+
+/// Why a run cannot be recorded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum RunError {
+    /// One is being recorded.
+    #[error("a run of this robot is being recorded already")]
+    Going,
+    /// Too many at a time.
+    #[error("{MAX_RECORDINGS} runs are being recorded already")]
+    TooMany,
+    /// There is none.
+    #[error("no run of this robot is being recorded")]
+    None,
+}
+
+/// What is kept of a run.
+#[derive(Debug, Clone)]
+pub(crate) struct Recording {
+    pub(crate) map: String,
+    /// Times rise.
+    pub(super) odometry: Vec<(i64, Pose2)>,
+    fixes: Vec<(i64, Fix)>,
+    ended: Option<&'static str>,
+    way_m: f64,
+}
+
+impl Recording {
+    pub(super) fn new(map: &str) -> Self {
+        Self { map: map.to_owned(), odometry: Vec::new(), fixes: Vec::new(), ended: None, way_m: 0.0 }
+    }
+
+    /// Goes on no longer; the first reason stays.
+    pub(super) fn end(&mut self, reason: &'static str) {
+        self.ended.get_or_insert(reason);
+    }
+
+    /// A reading of odometry, if it is newer and tells of a motion.
+    pub(super) fn moved(&mut self, at_ns: i64, odom_from_robot: Pose2) {
+        let Some((last_ns, last)) = self.odometry.last() else {
+            if self.ended.is_none() {
+                self.odometry.push((at_ns, odom_from_robot));
+            }
+            return;
+        };
+        let motion = last.between(&odom_from_robot);
+        let still = motion.position().norm() < STEP_M && motion.theta_rad.abs() < STEP_RAD;
+        if self.ended.is_some() || at_ns <= *last_ns || still {
+            return;
+        }
+        if self.odometry.len() == MAX_RUN_ODOMETRY {
+            self.end("full");
+            return;
+        }
+        self.way_m += motion.position().norm();
+        self.odometry.push((at_ns, odom_from_robot));
+    }
+
+    /// A fix that said something new, whatever became of it.
+    pub(super) fn fix(&mut self, at_ns: i64, fix: &Fix) {
+        if self.ended.is_some() {
+            return;
+        }
+        if self.fixes.len() == MAX_RUN_FIXES {
+            self.end("full");
+            return;
+        }
+        self.fixes.push((at_ns, fix.clone()));
+    }
+
+    /// Its odometry and its fixes, each in order of capture, beside where the robot really was.
+    pub(crate) fn against<'a>(&'a mut self, reference: &'a Reference) -> Run<'a> {
+        self.fixes.sort_by_key(|(at_ns, _)| *at_ns);
+        Run { odometry: &self.odometry, fixes: &self.fixes, reference }
+    }
+
+    pub(super) fn told(&self, robot: &str) -> Recorded {
+        let of = |modality| self.fixes.iter().filter(|(_, fix)| fix.modality == modality).count();
+        let span_ns = self.odometry.first().zip(self.odometry.last()).map(|(a, b)| [a.0, b.0]);
+        Recorded {
+            map: self.map.clone(),
+            robot: robot.to_owned(),
+            going: self.ended.is_none(),
+            reason: self.ended.map(str::to_owned),
+            way_m: self.way_m,
+            span_ns,
+            odometry: self.odometry.len(),
+            landmarks: of(Modality::Landmarks),
+            laser: of(Modality::Laser),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use map::{localise::DecidedBy, pose2::Pose2Covariance};
+    use nalgebra::Matrix3;
+
+    fn fix(modality: Modality) -> Fix {
+        let covariance = Matrix3::identity() * 1e-4;
+        Fix {
+            modality,
+            pose: Pose2Covariance { pose: Pose2::default(), covariance },
+            noise: covariance,
+            nuisances: Vec::new(),
+            landmarks: Vec::new(),
+            decided_by: DecidedBy::Single,
+            chi2: 1.0,
+            dof: 5,
+        }
+    }
+
+    #[test]
+    fn what_tells_nothing_new_is_not_kept_and_the_order_is_that_of_capture() {
+        let mut run = Recording::new("hall");
+        for (at_ns, x_m) in [(10, 0.0), (20, 0.005), (30, 0.02), (25, 0.5), (40, 0.04)] {
+            run.moved(at_ns, Pose2::new(x_m, 0.0, 0.0));
+        }
+        assert_eq!(run.odometry.iter().map(|(t, _)| *t).collect::<Vec<_>>(), [10, 30, 40]);
+        run.fix(35, &fix(Modality::Laser));
+        run.fix(12, &fix(Modality::Landmarks));
+        let path = Reference::new(vec![(0, Pose2::default()), (1, Pose2::default())], 0.0, 0.0).unwrap();
+        assert_eq!(run.against(&path).fixes.iter().map(|(t, _)| *t).collect::<Vec<_>>(), [12, 35]);
+        let told = run.told("r1");
+        assert!((told.way_m - 0.04).abs() < 1e-12);
+        assert_eq!((told.span_ns, told.odometry, told.landmarks, told.laser), (Some([10, 40]), 3, 1, 1));
+        run.end("odometry jumped");
+        run.end("full");
+        run.moved(50, Pose2::new(9.0, 0.0, 0.0));
+        run.fix(50, &fix(Modality::Laser));
+        let after = run.told("r1");
+        assert_eq!((after.going, after.reason.as_deref()), (false, Some("odometry jumped")));
+        assert_eq!((after.odometry, after.laser), (3, 1));
+    }
+
+    #[test]
+    fn a_recording_is_bounded() {
+        let mut run = Recording::new("hall");
+        for i in 0..=MAX_RUN_FIXES as i64 {
+            run.fix(i, &fix(Modality::Laser));
+        }
+        assert_eq!((run.fixes.len(), run.ended), (MAX_RUN_FIXES, Some("full")));
+        let mut run = Recording::new("hall");
+        for i in 0..=MAX_RUN_ODOMETRY as i64 {
+            run.moved(i, Pose2::new(0.02 * i as f64, 0.0, 0.0));
+        }
+        assert_eq!((run.odometry.len(), run.ended), (MAX_RUN_ODOMETRY, Some("full")));
+    }
+}

@@ -1,0 +1,245 @@
+//! What runs have shown of a map's modalities, the areas that somebody named, and what is fused.
+
+use super::{StoreError, Tx, maps, now_ms, statements::statements, within};
+use map::areas::{Areas, Cell, MAX_AREAS, Mode, Modules, NamedArea};
+use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
+use std::{collections::BTreeMap, sync::Arc};
+
+/// Most runs kept of a map.
+pub(crate) const MAX_RUNS: usize = 200;
+
+statements! {
+    SETTINGS = "SELECT fusion, areas FROM maps WHERE id = ?1";
+    SET = "UPDATE maps SET fusion = ?2, areas = ?3 WHERE id = ?1";
+    RUNS = "SELECT id, robot, created_ms, way_m, cells FROM runs WHERE map_id = ?1 ORDER BY id";
+    COUNT = "SELECT count(*) FROM runs WHERE map_id = ?1";
+    LATEST = "SELECT coalesce(max(id), 0) FROM runs WHERE map_id = ?1";
+    INSERT = "INSERT INTO runs (map_id, robot, created_ms, way_m, cells) VALUES (?1, ?2, ?3, ?4, ?5) RETURNING id";
+    DELETE = "DELETE FROM runs WHERE map_id = ?1 AND id = ?2";
+}
+
+/// A run and what it showed.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct RunRow {
+    pub(crate) id: i64,
+    pub(crate) robot: String,
+    pub(crate) created_ms: i64,
+    pub(crate) way_m: f64,
+    pub(crate) cells: BTreeMap<Cell, Modules>,
+}
+
+/// What administrators set.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct Settings {
+    pub(crate) mode: Mode,
+    pub(crate) named: Vec<NamedArea>,
+}
+
+fn mode_word(mode: Mode) -> &'static str {
+    match mode {
+        Mode::All => "all",
+        Mode::Fuse => "fuse",
+        Mode::Single => "single",
+    }
+}
+
+fn mode_of(word: &str) -> Mode {
+    match word {
+        "fuse" => Mode::Fuse,
+        "single" => Mode::Single,
+        _ => Mode::All,
+    }
+}
+
+fn json<T: serde::Serialize>(what: &'static str, value: &T) -> Result<String, StoreError> {
+    let damaged = |e: serde_json::Error| StoreError::Damaged { what: what.to_owned(), reason: e.to_string() };
+    serde_json::to_string(value).map_err(damaged)
+}
+
+/// Cells of a run; those that cannot be (a file from elsewhere) are left out.
+fn cells_of(text: &str) -> BTreeMap<Cell, Modules> {
+    let read: Vec<(Cell, Modules)> = serde_json::from_str(text).unwrap_or_else(|error| {
+        tracing::warn!(%error, "what a run showed cannot be read and is not used");
+        Vec::new()
+    });
+    read.into_iter().filter(|(_, found)| found.iter().all(|evidence| evidence.check().is_ok())).collect()
+}
+
+fn run_row(row: &SqliteRow) -> Result<RunRow, sqlx::Error> {
+    Ok(RunRow {
+        id: row.try_get("id")?,
+        robot: row.try_get("robot")?,
+        created_ms: row.try_get("created_ms")?,
+        way_m: row.try_get("way_m")?,
+        cells: cells_of(&row.try_get::<String, _>("cells")?),
+    })
+}
+
+/// What is set for a map.
+pub(crate) async fn settings(db: impl SqliteExecutor<'_>, map_id: i64) -> Result<Settings, StoreError> {
+    let at = || StoreError::at("read areas");
+    let row = sqlx::query(SETTINGS).bind(map_id).fetch_one(db).await.map_err(at())?;
+    let mode = mode_of(&row.try_get::<String, _>("fusion").map_err(at())?);
+    let named: String = row.try_get("areas").map_err(at())?;
+    let named: Vec<NamedArea> = serde_json::from_str(&named).unwrap_or_default();
+    Ok(Settings { mode, named: named.into_iter().filter(|area| area.check().is_ok()).collect() })
+}
+
+/// Sets it; `change` gets what is set.
+pub(crate) async fn set(
+    tx: &mut Tx,
+    map: &str,
+    change: impl FnOnce(Settings) -> Settings + Send,
+) -> Result<(), StoreError> {
+    let map = maps::get(&mut tx.conn, map).await?;
+    let new = change(settings(&mut tx.conn, map.id).await?);
+    within(new.named.len() as i64, MAX_AREAS, "areas")?;
+    sqlx::query(SET)
+        .bind(map.id)
+        .bind(mode_word(new.mode))
+        .bind(json("areas", &new.named)?)
+        .execute(&mut tx.conn)
+        .await
+        .map_err(StoreError::at("store areas"))?;
+    maps::bump(tx, map.id).await
+}
+
+/// The runs of a map, oldest first.
+pub(crate) async fn runs(db: impl SqliteExecutor<'_>, map_id: i64) -> Result<Vec<RunRow>, StoreError> {
+    let rows = sqlx::query(RUNS).bind(map_id).fetch_all(db).await.map_err(StoreError::at("read runs"))?;
+    rows.iter().map(run_row).collect::<Result<_, _>>().map_err(StoreError::at("read runs"))
+}
+
+/// Keeps a run; its number.
+pub(crate) async fn add(
+    tx: &mut Tx,
+    map: &str,
+    robot: &str,
+    way_m: f64,
+    cells: &BTreeMap<Cell, Modules>,
+) -> Result<i64, StoreError> {
+    let map = maps::get(&mut tx.conn, map).await?;
+    let cells = json("a run", &cells.iter().collect::<Vec<_>>())?;
+    let id = sqlx::query_scalar(INSERT)
+        .bind(map.id)
+        .bind(robot)
+        .bind(now_ms())
+        .bind(way_m)
+        .bind(cells)
+        .fetch_one(&mut tx.conn)
+        .await
+        .map_err(StoreError::at("store run"))?;
+    let count = sqlx::query_scalar(COUNT).bind(map.id).fetch_one(&mut tx.conn).await;
+    within(count.map_err(StoreError::at("count runs"))?, MAX_RUNS, "runs")?;
+    maps::bump(tx, map.id).await?;
+    Ok(id)
+}
+
+/// Forgets a run and what it showed.
+pub(crate) async fn forget(tx: &mut Tx, map: &str, id: i64) -> Result<(), StoreError> {
+    let map = maps::get(&mut tx.conn, map).await?;
+    let gone = sqlx::query(DELETE).bind(map.id).bind(id).execute(&mut tx.conn).await;
+    if gone.map_err(StoreError::at("forget run"))?.rows_affected() == 0 {
+        return Err(StoreError::NotFound { what: "run", name: id.to_string() });
+    }
+    maps::bump(tx, map.id).await
+}
+
+/// All of it, added up, and what it was made from: the same is not added up again.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Kept {
+    settings: Settings,
+    /// How many, and the latest: numbers are never used twice.
+    runs: (i64, i64),
+    pub(crate) areas: Arc<Areas>,
+}
+
+/// What is known now; taken over from before where nothing has changed.
+pub(super) async fn all(
+    conn: &mut sqlx::SqliteConnection,
+    map_id: i64,
+    before: Option<&Kept>,
+) -> Result<Kept, StoreError> {
+    let at = || StoreError::at("count runs");
+    let settings = settings(&mut *conn, map_id).await?;
+    let count: i64 = sqlx::query_scalar(COUNT).bind(map_id).fetch_one(&mut *conn).await.map_err(at())?;
+    let latest: i64 = sqlx::query_scalar(LATEST).bind(map_id).fetch_one(&mut *conn).await.map_err(at())?;
+    let same = before.filter(|kept| kept.settings == settings && kept.runs == (count, latest));
+    if let Some(same) = same {
+        return Ok(same.clone());
+    }
+    let found = runs(&mut *conn, map_id).await?;
+    let areas = Areas::new(settings.mode, settings.named.clone(), found.iter().map(|run| &run.cells));
+    Ok(Kept { settings, runs: (count, latest), areas: Arc::new(areas) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::store::{Store, tests::config};
+    use vision::recognise::DistanceKind;
+
+    fn shown(x: i32) -> BTreeMap<Cell, Modules> {
+        [(Cell { x, y: -2, heading: 3 }, Modules::default())].into()
+    }
+
+    async fn put(store: &Store, x: i32) -> Result<i64, StoreError> {
+        store.write(move |tx| Box::pin(async move { add(tx, "a", "r1", 12.5, &shown(x)).await })).await
+    }
+
+    fn known(store: &Store) -> (u64, Arc<Areas>) {
+        let map = store.snapshots().get("a").unwrap();
+        (map.version, map.areas.areas.clone())
+    }
+
+    #[tokio::test]
+    async fn runs_and_areas_survive_and_are_published() {
+        let dir = tempfile::tempdir().unwrap();
+        let config = config(dir.path());
+        let (store, task) = Store::open(&config).await.unwrap();
+        store.write(|tx| Box::pin(maps::create(tx, "a", DistanceKind::Both, 3))).await.unwrap();
+        let first = put(&store, 1).await.unwrap();
+        let second = put(&store, 2).await.unwrap();
+        assert_eq!(known(&store).1.cells().count(), 2);
+        let hall = NamedArea { name: "hall".into(), corners_m: vec![[0.0, 0.0], [4.0, 0.0], [4.0, 3.0]] };
+        let named = vec![hall.clone()];
+        let settings = Settings { mode: Mode::Single, named };
+        store.write(|tx| Box::pin(async move { set(tx, "a", |_| settings).await })).await.unwrap();
+        let (version, areas) = known(&store);
+        assert_eq!((areas.mode(), areas.named().count(), areas.cells().count()), (Mode::Single, 1, 2));
+        // What has nothing to do with it makes a new version and leaves it as it is.
+        store
+            .write(|tx| {
+                Box::pin(async { crate::store::laser::replace(tx, "a", &[[0.0, 0.0, 1.0, 0.0]]).await })
+            })
+            .await
+            .unwrap();
+        let after = known(&store);
+        assert!(after.0 > version && Arc::ptr_eq(&after.1, &areas));
+        store.write(move |tx| Box::pin(async move { forget(tx, "a", first).await })).await.unwrap();
+        assert_eq!(known(&store).1.cells().map(|(cell, ..)| cell.x).collect::<Vec<_>>(), [2]);
+        let again = store.write(move |tx| Box::pin(async move { forget(tx, "a", first).await })).await;
+        assert!(matches!(again, Err(StoreError::NotFound { what: "run", .. })));
+        task.close().await;
+        let (store, task) = Store::open(&config).await.unwrap();
+        let areas = known(&store).1;
+        assert_eq!((areas.mode(), areas.named().next().unwrap().0), (Mode::Single, &hall));
+        let id = maps::get(store.reads(), "a").await.unwrap().id;
+        let kept = runs(store.reads(), id).await.unwrap();
+        assert_eq!((kept.len(), kept[0].id, kept[0].way_m, &kept[0].cells), (1, second, 12.5, &shown(2)));
+        task.close().await;
+    }
+
+    #[tokio::test]
+    async fn runs_are_bounded() {
+        let dir = tempfile::tempdir().unwrap();
+        let (store, task) = Store::open(&config(dir.path())).await.unwrap();
+        store.write(|tx| Box::pin(maps::create(tx, "a", DistanceKind::Both, 3))).await.unwrap();
+        for x in 0..MAX_RUNS {
+            put(&store, x as i32).await.unwrap();
+        }
+        assert!(matches!(put(&store, 0).await, Err(StoreError::Limit { what: "runs", max: MAX_RUNS })));
+        assert_eq!(known(&store).1.cells().count(), MAX_RUNS);
+        task.close().await;
+    }
+}

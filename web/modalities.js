@@ -1,0 +1,79 @@
+// Which modality is best where, as runs have shown: a layer of the map, and the choice of what is fused.
+// A square metre has four triangles, one for each heading in which it was driven through.
+
+const API = "/api/v1";
+const byId = (id) => document.getElementById(id);
+const known = { map: null, areas: null, changed: () => {} };
+
+const shown = () => document.querySelector("[data-layer=modalities]").checked;
+
+async function asked(path, options) {
+  const answer = await fetch(API + path, { headers: { "content-type": "application/json" }, ...options });
+  const body = await answer.json();
+  if (!answer.ok) throw new Error(body.detail ?? body.title);
+  return body;
+}
+
+function tell() {
+  const { areas } = known;
+  byId("modality-bar").hidden = !shown();
+  if (!areas) return;
+  byId("fusion").value = areas.mode;
+  const judged = areas.cells.filter((cell) => cell.best).length;
+  byId("modality-hint").textContent = areas.cells.length
+    ? `${areas.cells.length} squares and headings driven through, ${judged} often enough to be judged.`
+    : "No run has been learnt from. Record one with `waymark run start ROBOT`, then tell its path with `waymark run learn`.";
+}
+
+// Reads what is known of a map, if the layer is shown.
+export async function loadModalities(map, changed) {
+  Object.assign(known, { map, changed });
+  known.areas = shown() ? await asked(`/maps/${encodeURIComponent(map)}/areas`).catch(() => null) : null;
+  tell();
+  changed();
+}
+
+export function drawModalities(c, px, ink) {
+  if (!known.areas || !shown()) return;
+  const side = known.areas.cell_m;
+  const colours = { odometry: ink.odometry, laser: ink.laser, landmarks: ink.landmark };
+  for (const cell of known.areas.cells) {
+    const [x, y] = [cell.x_m + side / 2, cell.y_m + side / 2];
+    const [dx, dy] = [Math.cos(cell.heading_rad) * side / 2, Math.sin(cell.heading_rad) * side / 2];
+    c.fillStyle = colours[cell.best] ?? ink.faint;
+    c.globalAlpha = cell.best ? 0.55 : 0.15;
+    c.beginPath();
+    // The side that the robot drives towards, seen from the middle.
+    for (const [u, v] of [[x, y], [x + dx - dy, y + dy + dx], [x + dx + dy, y + dy - dx]]) c.lineTo(...px(u, v));
+    c.closePath();
+    c.fill();
+  }
+  c.globalAlpha = 1;
+  c.strokeStyle = ink.faint;
+  c.lineWidth = 1.5;
+  c.font = "12px system-ui";
+  for (const area of known.areas.areas) {
+    c.beginPath();
+    for (const [x, y] of area.corners_m) c.lineTo(...px(x, y));
+    c.closePath();
+    c.stroke();
+    const [x, y] = area.corners_m[0];
+    const [u, v] = px(x, y);
+    c.fillStyle = ink.faint;
+    c.fillText(area.name, u + 4, v - 4);
+  }
+}
+
+byId("fusion").addEventListener("change", async (event) => {
+  const body = JSON.stringify({ mode: event.target.value });
+  try {
+    known.areas = await asked(`/maps/${encodeURIComponent(known.map)}/areas`, { method: "PUT", body });
+    tell();
+  } catch (error) {
+    byId("modality-hint").textContent = `Not changed: ${error.message}.`;
+  }
+  known.changed();
+});
+byId("layers").addEventListener("change", (event) => {
+  if (event.target.dataset.layer === "modalities" && known.map) loadModalities(known.map, known.changed);
+});
