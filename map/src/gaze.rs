@@ -13,7 +13,7 @@ use crate::{
     pose2::{Pose2Covariance, wrap_rad},
     visibility::{PoseDraws, Viewer, VisibilityMap},
 };
-use nalgebra::{Point2, Vector3};
+use nalgebra::{Point2, Point3, Vector3};
 use serde::{Deserialize, Serialize};
 use vision::recognise::LandmarkId;
 
@@ -192,8 +192,7 @@ fn choice(
     if !reachable(pan_rad, viewer.pan_rad) || !reachable(tilt_rad, viewer.tilt_rad) {
         return None;
     }
-    let to_camera = camera - Point2::new(target.place.x_m, target.place.y_m);
-    let incidence_rad = wrap_rad(to_camera.y.atan2(to_camera.x) - target.place.theta_rad).abs();
+    let incidence_rad = target.place.incidence_rad(&Point3::new(camera.x, camera.y, head.camera_m[2]));
     let margin_m = target.visible.margin_m(&camera).max(0.0);
     let mounting = Mounting::new(crate::mounting::pan_tilt(pan_rad, tilt_rad, head.camera_m.into())).ok()?;
     let gain_nats =

@@ -1,7 +1,7 @@
 //! Where a landmark hangs: a rectangle on a wall or under a ceiling, with the covariance of its place and size (method 11).
 
 use crate::check::{self, MAX_COORDINATE_M, OutOfRange};
-use nalgebra::{Isometry3, Matrix6, Translation3, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3, Vector6};
 use std::f64::consts::{FRAC_PI_2, TAU};
 use vision::localise::pose::LandmarkSize;
 
@@ -82,6 +82,12 @@ impl LandmarkPlace {
         check::covariance("covariance", &self.covariance)
     }
 
+    /// Angle between the outward normal and the way from the landmark's middle to a camera in the map.
+    pub fn incidence_rad(&self, camera_m: &Point3<f64>) -> f64 {
+        let from_landmark = self.map_from_landmark().inverse() * camera_m;
+        from_landmark.coords.yz().norm().atan2(from_landmark.x)
+    }
+
     /// Landmark coordinates (x outward normal, y the viewer's right, z up) to map coordinates.
     pub fn map_from_landmark(&self) -> Isometry3<f64> {
         let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), self.theta_rad);
@@ -94,7 +100,6 @@ impl LandmarkPlace {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::Point3;
 
     const SIZE: LandmarkSize = LandmarkSize { width_m: 0.6, height_m: 0.84 };
 
@@ -135,6 +140,18 @@ mod tests {
         assert!((normal + Vector3::z()).norm() < 1e-12);
         place.tilt_rad = 1.6;
         assert_eq!(place.check().unwrap_err().field, "tilt_rad");
+    }
+
+    #[test]
+    fn incidence_is_against_the_normal_in_space() {
+        let mut place =
+            LandmarkPlace::by_hand(Vector3::new(1.0, 1.0, 2.5), 0.3, SIZE, PlaceSigmas::default()).unwrap();
+        let ahead = Point3::new(1.0 + 2.0 * 0.8_f64.cos(), 1.0 + 2.0 * 0.8_f64.sin(), 2.5);
+        assert!((place.incidence_rad(&ahead) - 0.5).abs() < 1e-12);
+        place.tilt_rad = FRAC_PI_2;
+        assert!(place.incidence_rad(&Point3::new(1.0, 1.0, 1.2)).abs() < 1e-7, "right below");
+        assert!((place.incidence_rad(&Point3::new(0.0, 1.0, 1.5)) - FRAC_PI_2 / 2.0).abs() < 1e-12);
+        assert!(place.incidence_rad(&Point3::new(1.0, 1.0, 3.0)) > 3.0, "from above the ceiling");
     }
 
     #[test]

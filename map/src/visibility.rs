@@ -1,11 +1,12 @@
-//! From where a landmark can be seen: the closed-form visibility map of method 12, in plan view.
+//! From where a landmark can be seen: the closed-form visibility map of method 12, for a landmark of any tilt: on a wall,
+//! under a ceiling, on the floor, or leaning.
 //!
 //! In: the landmark's place, the walls and other obstacles, the camera that is to see it. Out: a multipolygon on the floor
 //! with area and centroid, and tests of points and of uncertain poses against it. Says nothing of recognition.
 //!
 //! Seen from the middle of the landmark the area is a range of distances in every direction: whatever is seen from a point
-//! is seen from everywhere between it and the landmark, but for what is too near. So penumbrae, cone and discs become
-//! bounds over direction (`envelope`), and no polygons are cut with each other.
+//! is seen from everywhere between it and the landmark, but for what is too near. So penumbrae and limits become bounds
+//! over direction (`envelope`), a quarter of all directions at a time, and no polygons are cut with each other.
 
 mod chance;
 mod coverage;
@@ -15,6 +16,8 @@ mod limits;
 mod outline;
 mod penumbra;
 pub mod pointwise;
+mod quarters;
+mod rims;
 
 pub use chance::{DRAWS, PoseDraws};
 pub use coverage::{Coverage, Gap, MAX_STEPS, Seen, coverage};
@@ -25,15 +28,18 @@ use crate::{
     check::{self, OutOfRange},
     place::LandmarkPlace,
 };
-use envelope::Envelope;
+use limits::Limits;
 use nalgebra::{Point2, Vector2};
+use penumbra::Footprint;
+use quarters::Quarter;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_PI_2;
+use vision::localise::pose::LandmarkSize;
 
 /// Most obstacles of one landmark's map; of more, the nearest.
 pub const MAX_OBSTACLES: usize = 20_000;
-/// Slope against the landmark's normal beyond which nothing is looked at: 89.5 degrees.
-const MAX_SLOPE: f64 = 114.588_65;
+/// Tilted less, a landmark hangs on a wall: what is behind it hides nothing.
+const UPRIGHT_RAD: f64 = 1e-9;
 
 /// The camera that is to see landmarks.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -133,7 +139,8 @@ impl From<&crate::segments::LaserSegment> for Obstacle {
 impl Obstacle {
     /// Whether it can come between camera and landmark at all: the lines of sight run above the lower of the two.
     fn hides(&self, place: &LandmarkPlace, viewer: &Viewer) -> bool {
-        let lowest = (place.z_m - 0.5 * place.size.height_m).min(viewer.camera_height_m);
+        let half_height = 0.5 * place.size.height_m * place.tilt_rad.cos();
+        let lowest = (place.z_m - half_height).min(viewer.camera_height_m);
         self.height_m.is_none_or(|height| height > lowest)
     }
 }
@@ -146,10 +153,8 @@ pub struct VisibilityMap {
     centre: Point2<f64>,
     /// Pan range of the viewer.
     pan_rad: [f64; 2],
-    /// Nearest bound beyond which nothing is seen, over direction.
-    far: Envelope,
-    /// Bound within which it is too near.
-    near: Envelope,
+    /// Bounds of what is seen, over direction.
+    quarters: [Quarter; 4],
     polygons: Vec<Polygon>,
     area_m2: f64,
     centroid: Option<Point2<f64>>,
@@ -157,17 +162,39 @@ pub struct VisibilityMap {
     obstacles: Vec<Obstacle>,
 }
 
-/// The frame whose origin is the landmark's middle, moved off its wall; x along the normal.
+/// The frame whose origin is the landmark's middle, moved off its wall; x along the normal on the floor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct LocalFrame {
     origin: Point2<f64>,
     normal: Vector2<f64>,
 }
 
+/// A landmark as it is looked at: moved along its normal by the standoff.
+#[derive(Debug, Clone, Copy)]
+struct Moved {
+    /// Of its middle above the floor.
+    height_m: f64,
+    tilt_rad: f64,
+    size: LandmarkSize,
+}
+
+impl Moved {
+    fn new(place: &LandmarkPlace, standoff_m: f64) -> Self {
+        let tilt_rad = if place.tilt_rad.abs() < UPRIGHT_RAD { 0.0 } else { place.tilt_rad };
+        Self { height_m: place.z_m - standoff_m * tilt_rad.sin(), tilt_rad, size: place.size }
+    }
+
+    fn footprint(&self) -> Footprint {
+        let half_depth_m = 0.5 * self.size.height_m * self.tilt_rad.sin().abs();
+        Footprint { half_depth_m, half_width_m: 0.5 * self.size.width_m }
+    }
+}
+
 impl LocalFrame {
     fn new(place: &LandmarkPlace, standoff_m: f64) -> Self {
         let normal = Vector2::new(place.theta_rad.cos(), place.theta_rad.sin());
-        Self { origin: Point2::new(place.x_m, place.y_m) + normal * standoff_m, normal }
+        let off = standoff_m * place.tilt_rad.cos();
+        Self { origin: Point2::new(place.x_m, place.y_m) + normal * off, normal }
     }
 
     fn local(&self, map: &Point2<f64>) -> Point2<f64> {
@@ -184,8 +211,10 @@ impl LocalFrame {
 /// The visibility map of a landmark among `obstacles`: `O(M log M)` in those within reach.
 ///
 /// A landmark that an obstacle cuts is seen from nowhere; neither is one that the camera cannot show large enough, or whole.
+/// Its roll counts for nothing.
 // Departs from method 12: no polygon Booleans, see the head of this file; the area is the same. Free space known
-// otherwise is not asked: what walls enclose they hide.
+// otherwise is not asked: what walls enclose they hide. Every condition is asked of the landmark moved off its wall, not only
+// what hides it: 5 cm of the way.
 pub fn visibility(
     place: &LandmarkPlace,
     obstacles: &[Obstacle],
@@ -196,27 +225,27 @@ pub fn visibility(
     viewer.check()?;
     p.check()?;
     let frame = LocalFrame::new(place, p.standoff_m);
-    let limits = limits::limits(place, viewer, p);
-    let reach_m = limits.as_ref().map_or(0.0, |l| l.reach_m);
+    let moved = Moved::new(place, p.standoff_m);
+    let limits = Limits::new(&moved, viewer, p);
     let mut made = VisibilityMap {
         frame,
         centre: Point2::new(place.x_m, place.y_m),
         pan_rad: viewer.pan_rad,
-        far: Envelope::default(),
-        near: Envelope::default(),
+        quarters: Default::default(),
         polygons: Vec::new(),
         area_m2: 0.0,
         centroid: None,
-        reach_m,
+        reach_m: limits.as_ref().map_or(0.0, Limits::reach_m),
         obstacles: within_reach(place, obstacles, viewer, p),
     };
-    let half_width = 0.5 * place.size.width_m;
     let Some(limits) = limits else { return Ok(made) };
-    let Some(shadows) = penumbra::penumbrae(&frame, half_width, &made.obstacles) else { return Ok(made) };
-    let far = limits.far.into_iter().chain(shadows).collect();
-    made.far = Envelope::upper(far);
-    made.near = limits.near;
-    made.polygons = outline::outline(&frame, &made.far, &made.near);
+    let footprint = moved.footprint();
+    let local: Vec<_> = made.obstacles.iter().map(|o| (frame.local(&o.a), frame.local(&o.b))).collect();
+    if local.iter().any(|(a, b)| footprint.touches(a, b)) {
+        return Ok(made);
+    }
+    made.quarters = quarters::quarters(&limits, &footprint, &local);
+    made.polygons = outline::outline(&frame, &made.quarters);
     (made.area_m2, made.centroid) = outline::measure(&made.polygons);
     Ok(made)
 }
@@ -229,14 +258,16 @@ pub fn within_reach(
     p: &VisibilityParams,
 ) -> Vec<Obstacle> {
     let frame = LocalFrame::new(place, p.standoff_m);
-    let Some(reach_m) = limits::reach_m(place, viewer, p) else { return Vec::new() };
+    let moved = Moved::new(place, p.standoff_m);
+    let Some(reach_m) = Limits::new(&moved, viewer, p).map(|l| l.reach_m()) else { return Vec::new() };
+    let behind = if moved.tilt_rad.abs() > 0.0 { -reach_m } else { 0.0 };
     let mut near: Vec<(f64, &Obstacle)> = obstacles
         .iter()
         .filter(|o| o.hides(place, viewer))
         .filter_map(|o| {
             let (a, b) = (frame.local(&o.a), frame.local(&o.b));
             let distance = outline::distance_to_segment(&Point2::origin(), &a, &b);
-            (a.x.max(b.x) >= 0.0 && distance <= reach_m).then_some((distance, o))
+            (a.x.max(b.x) >= behind && distance <= reach_m).then_some((distance, o))
         })
         .collect();
     if near.len() > MAX_OBSTACLES {
@@ -275,12 +306,7 @@ impl VisibilityMap {
     /// Whether a camera at a point sees the landmark.
     pub fn contains(&self, camera: &Point2<f64>) -> bool {
         let q = self.frame.local(camera);
-        if q.x <= 0.0 || self.polygons.is_empty() || q.coords.norm() > self.reach_m {
-            return false;
-        }
-        let (slope, inverse) = (q.y / q.x, 1.0 / q.x);
-        self.far.at(slope).is_some_and(|far| inverse >= far)
-            && self.near.at(slope).is_none_or(|near| inverse <= near)
+        !self.polygons.is_empty() && q.coords.norm() <= self.reach_m && quarters::contains(&self.quarters, &q)
     }
 
     /// Distance to the boundary of the area, positive inside; minus infinity when there is no area.

@@ -4,10 +4,10 @@ use super::ChangeParams;
 use crate::{
     mounting::Mounting,
     place::LandmarkPlace,
-    pose2::{Pose2Covariance, wrap_rad},
+    pose2::Pose2Covariance,
     visibility::{PoseDraws, VisibilityMap},
 };
-use nalgebra::Point2;
+use nalgebra::{Point2, Point3};
 use vision::{
     frame::Intrinsics,
     localise::reproject::{corner_points, pixel},
@@ -47,15 +47,14 @@ pub fn expected(
     let draws = PoseDraws::new(pose, eye.mounting.robot_from_camera.translation.vector.xy());
     let expected = landmarks.iter().filter(|l| {
         l.visible.probability(&draws) >= p.expected_probability
-            && is_straight(&draws.mean(), l.place, p)
+            && l.place.incidence_rad(&camera_at(&draws.mean(), eye)) <= p.expected_incidence_rad
             && draws.poses().all(|at| is_inside(&at, eye, l.place, p))
     });
     expected.map(|l| l.landmark).collect()
 }
 
-fn is_straight(camera: &Point2<f64>, place: &LandmarkPlace, p: &ChangeParams) -> bool {
-    let to = camera - Point2::new(place.x_m, place.y_m);
-    wrap_rad(to.y.atan2(to.x) - place.theta_rad).abs() <= p.expected_incidence_rad
+fn camera_at(on_floor: &Point2<f64>, eye: &Eye<'_>) -> Point3<f64> {
+    Point3::new(on_floor.x, on_floor.y, eye.mounting.robot_from_camera.translation.z)
 }
 
 fn is_inside(at: &crate::pose2::Pose2, eye: &Eye<'_>, place: &LandmarkPlace, p: &ChangeParams) -> bool {

@@ -120,6 +120,31 @@ fn the_landmark_comes_to_the_axis() {
 }
 
 #[test]
+fn a_sign_under_the_ceiling_is_looked_at_from_where_it_is_seen() {
+    let mut sign = poster(0.0);
+    (sign.z_m, sign.tilt_rad) = (2.5, FRAC_PI_2);
+    let viewer = Viewer { tilt_rad: [-0.3, 1.0], ..viewer() };
+    let visible = visibility(&sign, &[], &viewer, &VisibilityParams::default()).unwrap();
+    let target = Target { landmark: LandmarkId(1), place: &sign, visible: &visible, saliency: 1.0, v_c: 1.0 };
+    let ask = |pose: &Pose2Covariance| {
+        rank(pose, &[target], &viewer, &Head::default(), &GazeParams::default()).unwrap()
+    };
+    // By hand: 1.3 m above the camera, 1.3 m away from every side, it is up and oblique by 45 degrees.
+    for theta in [0.0, 1.0, 2.0, -2.5_f64] {
+        let [choice] = ask(&at(1.3 * theta.cos(), 1.3 * theta.sin(), 0.4, SURE))[..] else {
+            panic!("{theta}")
+        };
+        assert!(
+            (choice.tilt_rad - FRAC_PI_2 / 2.0).abs() < 1e-9
+                && (choice.incidence_rad - FRAC_PI_2 / 2.0).abs() < 1e-9
+        );
+        assert!(wrap_rad(choice.pan_rad - (theta + PI - 0.4)).abs() < 1e-9);
+        assert!(choice.gain_nats > 0.5 && choice.utility > 0.0);
+    }
+    assert!(ask(&at(0.3, 0.0, 0.0, SURE)).is_empty(), "it is too high above");
+}
+
+#[test]
 fn what_the_unit_cannot_reach_is_not_offered() {
     let place = poster(0.0);
     let map = seen(&place);

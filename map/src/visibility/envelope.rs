@@ -1,8 +1,8 @@
 //! Bounds over direction. A point (x, y) before the landmark is (slope, inverse) = (y / x, 1 / x): straight lines stay
 //! straight, and nearer is larger. So the nearest of many bounds is the upper envelope of straight pieces.
 
-use super::MAX_SLOPE;
-
+/// Slopes are looked at from minus this to this.
+pub(super) const MAX_SLOPE: f64 = 1.0;
 /// Pieces narrower than this in slope, relative to it, bound nothing.
 const NARROW: f64 = 1e-12;
 
@@ -68,17 +68,19 @@ impl Envelope {
         level.pop().unwrap_or_default()
     }
 
-    /// The lowest of two bounds that both reach over all slopes.
-    pub(super) fn lower(self, other: Self) -> Self {
-        merged(self.mirrored(), other.mirrored()).mirrored()
-    }
-
-    fn mirrored(mut self) -> Self {
-        for piece in &mut self.0 {
-            piece.anchor.1 = -piece.anchor.1;
-            piece.rise = -piece.rise;
+    /// What of it lies within ranges of slopes, which are in order.
+    pub(super) fn within(&self, open: &[(f64, f64)]) -> Self {
+        let mut made = Self::default();
+        let mut next = 0;
+        for (from, to) in open {
+            while self.0.get(next).is_some_and(|p| p.to <= *from) {
+                next += 1;
+            }
+            // The last of them may reach into the next range.
+            let inside = self.0[next..].iter().take_while(|p| p.from < *to);
+            made.0.extend(inside.map(|p| p.cut(p.from.max(*from), p.to.min(*to))));
         }
-        self
+        made
     }
 
     /// The pieces, by slope.
@@ -157,15 +159,26 @@ mod tests {
     #[test]
     fn what_is_covered_vanishes_and_gaps_stay() {
         let e = Envelope::upper(vec![
-            piece(0.0, 1.0, 1.0, 1.0),
-            piece(0.2, 0.4, 0.5, 0.5),
-            piece(0.6, 0.8, 2.0, 2.0),
-            piece(3.0, 4.0, 1.0, 2.0),
+            piece(0.0, 0.5, 1.0, 1.0),
+            piece(0.1, 0.2, 0.5, 0.5),
+            piece(0.3, 0.4, 2.0, 2.0),
+            piece(0.7, 1.0, 1.0, 2.0),
         ]);
-        let spans: Vec<_> = e.pieces().iter().map(|p| (p.from, p.to)).collect();
-        assert_eq!(spans, [(0.0, 0.6), (0.6, 0.8), (0.8, 1.0), (3.0, 4.0)]);
-        assert_eq!(e.at(2.0), None);
-        assert!((e.at(0.6).unwrap() - 2.0).abs() < 1e-12, "the nearer bound at a step");
+        let spans = |e: &Envelope| e.pieces().iter().map(|p| (p.from, p.to)).collect::<Vec<_>>();
+        assert_eq!(spans(&e), [(0.0, 0.3), (0.3, 0.4), (0.4, 0.5), (0.7, 1.0)]);
+        assert_eq!(e.at(0.6), None);
+        assert!((e.at(0.3).unwrap() - 2.0).abs() < 1e-12, "the nearer bound at a step");
+        let some = e.within(&[(-0.5, 0.1), (0.2, 0.35), (0.38, 0.8)]);
+        let expected = [(0.0, 0.1), (0.2, 0.3), (0.3, 0.35), (0.38, 0.4), (0.4, 0.5), (0.7, 0.8)];
+        assert_eq!(spans(&some), expected);
+        assert!(e.within(&[]).pieces().is_empty());
+    }
+
+    #[test]
+    fn what_is_too_steep_is_cut_off() {
+        let p = piece(-3.0, 0.5, 0.0, 3.5);
+        assert!((p.from + 1.0).abs() < 1e-15 && (p.at(0.0) - 3.0).abs() < 1e-12);
+        assert_eq!(Piece::through((1.0, 1.0), (2.0, 1.0)), None);
     }
 
     #[test]
@@ -178,13 +191,13 @@ mod tests {
         };
         let pieces: Vec<_> = (0..300)
             .filter_map(|_| {
-                let from = 20.0 * next() - 10.0;
-                Piece::through((from, next()), (from + 5.0 * next(), next()))
+                let from = 2.0 * next() - 1.0;
+                Piece::through((from, next()), (from + 0.5 * next(), next()))
             })
             .collect();
         let e = Envelope::upper(pieces.clone());
         for k in 0..4000 {
-            let slope = -11.0 + 22.0 * f64::from(k) / 4000.0;
+            let slope = -1.1 + 2.2 * f64::from(k) / 4000.0;
             let covering = pieces.iter().filter(|p| p.from <= slope && slope <= p.to);
             let expected = covering.map(|p| p.at(slope)).reduce(f64::max);
             match (e.at(slope), expected) {

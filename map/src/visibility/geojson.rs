@@ -1,6 +1,6 @@
 //! A visibility map as a GeoJSON feature (RFC 7946), in map metres instead of degrees.
 
-use super::VisibilityMap;
+use super::{Polygon, VisibilityMap};
 use serde::Serialize;
 
 /// Coordinates are written to a tenth of a millimetre.
@@ -18,7 +18,8 @@ pub struct Feature {
     pub properties: Properties,
 }
 
-/// A multipolygon: polygons of rings of points; outer rings only, counter-clockwise, the first point repeated.
+/// A multipolygon: polygons of rings of points; the outer ring counter-clockwise, that of a hole
+/// clockwise, the first point repeated.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Geometry {
     /// `MultiPolygon`.
@@ -52,11 +53,15 @@ impl VisibilityMap {
         let ring = |corners: &[nalgebra::Point2<f64>]| {
             corners.iter().chain(corners.first()).map(point).collect::<Vec<_>>()
         };
+        let rings = |p: &Polygon| {
+            let hole = (!p.hole.is_empty()).then(|| ring(&p.hole));
+            std::iter::once(ring(&p.corners)).chain(hole).collect()
+        };
         Feature {
             kind: "Feature",
             geometry: Geometry {
                 kind: "MultiPolygon",
-                coordinates: self.polygons().iter().map(|p| vec![ring(&p.corners)]).collect(),
+                coordinates: self.polygons().iter().map(rings).collect(),
             },
             properties: Properties {
                 landmark: landmark.to_owned(),

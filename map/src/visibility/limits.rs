@@ -1,58 +1,37 @@
-//! What the landmark and the camera alone allow, without any wall: incidence, apparent size, fit in the image, tilt
-//! (method 12.1 to 12.3), as bounds over direction. Arcs become chords.
+//! What the landmark and the camera alone allow, without any wall: incidence, apparent size, fit in the image, tilt range
+//! (method 12.1 to 12.3), for a landmark of any tilt. In one direction on the floor what is allowed is one span of
+//! distances; each condition gives its own in closed form, but for the height's, whose ends are roots of a quartic.
 
-use super::{
-    MAX_SLOPE, Viewer, VisibilityParams,
-    envelope::{Envelope, Piece},
-};
-use crate::place::LandmarkPlace;
+use super::{Moved, Viewer, VisibilityParams};
 use std::f64::consts::FRAC_PI_2;
+use vision::localise::pose::LandmarkSize;
 
-/// Largest distance between an arc and its chord, metres.
-const MAX_SAGITTA_M: f64 = 2e-4;
-/// Longest and shortest chord, as the angle seen from the landmark.
-const CHORD_RAD: [f64; 2] = [0.002, 0.05];
+/// A landmark nearer to the camera's height than this counts as this far above it, metres: it has elevations all the same.
+const MIN_RISE_M: f64 = 1e-6;
+/// Halvings of a span in which a bound is sought: to a billionth of a millionth of it.
+const HALVINGS: u32 = 50;
+/// Part of a span that is kept in the search for the distance from which the height looks largest.
+const GOLDEN: f64 = 0.618_033_988_749_895;
 
-/// A circle whose inside is allowed (far) or forbidden (near): centre on the landmark's axis, this far before the origin.
-#[derive(Debug, Clone, Copy)]
-struct Disc {
-    ahead_m: f64,
-    radius_m: f64,
-}
-
-impl Disc {
-    /// Where a ray from the origin leaves it. None when the origin is outside.
-    fn exit_m(&self, direction_rad: f64) -> Option<f64> {
-        if self.ahead_m.abs() >= self.radius_m {
-            return None;
-        }
-        let (s, c) = direction_rad.sin_cos();
-        let across = self.ahead_m * s;
-        Some(self.ahead_m * c + (self.radius_m.powi(2) - across * across).sqrt())
-    }
-
-    /// Its rim before the landmark as chords; empty when the origin is outside.
-    fn rim(&self) -> Vec<Piece> {
-        let edge = MAX_SLOPE.atan();
-        // The origin sees a circle through it under half the angle of its centre: the step serves both.
-        let step = (1.0 - MAX_SAGITTA_M / self.radius_m).max(0.0).acos().clamp(CHORD_RAD[0], CHORD_RAD[1]);
-        let count = (2.0 * edge / step).ceil();
-        let point = |i: usize| {
-            let angle = -edge + 2.0 * edge * (i as f64 / count);
-            self.exit_m(angle).map(|r| (angle.tan(), 1.0 / (r * angle.cos())))
-        };
-        (0..count as usize).filter_map(|i| Piece::through(point(i)?, point(i + 1)?)).collect()
-    }
-}
-
-/// The bounds of one landmark for one camera.
+/// The conditions of one landmark for one camera.
+///
+/// The camera is at (r cos d, r sin d, -rise) from the landmark's middle, direction d from its normal on the floor. The
+/// normal is n = (cos t, 0, -sin t), its height runs along u = (sin t, 0, cos t), its width along (0, 1, 0).
+// Departs from method 12.1 to 12.3: these are its conditions in space. For a landmark at the camera's height, on a wall, they
+// are those of the plan view; high up on a wall the plan view takes the landmark for nearer and less oblique than it is.
+#[derive(Debug, Clone)]
 pub(super) struct Limits {
-    /// Each of them bounds what is far.
-    pub far: Vec<Piece>,
-    /// Nearer than this is too near; empty for no bound.
-    pub near: Envelope,
-    /// Nothing is further.
-    pub reach_m: f64,
+    rise_m: f64,
+    tilt: (f64, f64),
+    size: LandmarkSize,
+    /// Distances at which width and height, unforeshortened, have the least size.
+    wide_m: f64,
+    high_m: f64,
+    /// Width and height of the image that may be filled, at 1 m.
+    room: [f64; 2],
+    min_cosine: f64,
+    /// Distances on the floor to which the unit can tilt.
+    tilt_m: (f64, f64),
 }
 
 /// Nearest and furthest distance on the floor at which the unit can tilt towards the landmark's centre.
@@ -69,44 +48,134 @@ fn tilt_range_m(rise_m: f64, [low, high]: [f64; 2]) -> Option<(f64, f64)> {
     Some((rise / high.min(FRAC_PI_2 - 1e-6).tan(), far))
 }
 
-/// Furthest distance of the area from its origin; None when the landmark can be seen from nowhere.
-pub(super) fn reach_m(place: &LandmarkPlace, viewer: &Viewer, p: &VisibilityParams) -> Option<f64> {
-    let (_, tilt_far) = tilt_range_m(place.z_m - viewer.camera_height_m, viewer.tilt_rad)?;
-    let wide = viewer.focal_px * place.size.width_m / p.min_side_px;
-    let high = viewer.focal_px * place.size.height_m / p.min_side_px;
-    let reach = wide.min(high).min(tilt_far);
-    (reach > p.standoff_m).then_some(reach)
+impl Limits {
+    /// None when the landmark can be seen from nowhere.
+    pub(super) fn new(moved: &Moved, viewer: &Viewer, p: &VisibilityParams) -> Option<Self> {
+        let rise = moved.height_m - viewer.camera_height_m;
+        let tilt_m = tilt_range_m(rise, viewer.tilt_rad)?;
+        let size = moved.size;
+        let room = |side_px: f64| p.max_fill * side_px / viewer.focal_px;
+        let made = Self {
+            rise_m: if rise.abs() < MIN_RISE_M { MIN_RISE_M.copysign(rise) } else { rise },
+            tilt: moved.tilt_rad.sin_cos(),
+            size,
+            wide_m: viewer.focal_px * size.width_m / p.min_side_px,
+            high_m: viewer.focal_px * size.height_m / p.min_side_px,
+            room: [room(viewer.width_px), room(viewer.height_px)],
+            min_cosine: p.max_incidence_rad.cos(),
+            tilt_m,
+        };
+        (made.rise_m.abs() < made.wide_m.min(made.high_m)).then_some(made)
+    }
+
+    /// Nothing is further from the landmark's middle.
+    pub(super) fn reach_m(&self) -> f64 {
+        self.wide_m.min(self.high_m).min(self.tilt_m.1)
+    }
+
+    /// From where to where in a direction a camera sees it.
+    pub(super) fn span_m(&self, direction_rad: f64) -> Option<(f64, f64)> {
+        let (sine, cosine) = direction_rad.sin_cos();
+        let (near, far) = self.upright_m(cosine)?;
+        let near = near.max(self.tilt_m.0).max(self.fits_from_m(sine, cosine));
+        let far = far.min(self.tilt_m.1).min(self.wide_to_m(cosine)?);
+        if near >= far {
+            return None;
+        }
+        self.high_within_m(cosine, (near, far))
+    }
+
+    /// Incidence: in terms of the angle e from the vertical, r = rise tan e, it is a cos e + b sin e >= min_cosine.
+    fn upright_m(&self, cosine: f64) -> Option<(f64, f64)> {
+        let (sin_tilt, cos_tilt) = self.tilt;
+        let (across, down) = (cosine * cos_tilt, sin_tilt.copysign(sin_tilt * self.rise_m));
+        let most = across.hypot(down);
+        if most < self.min_cosine {
+            return None;
+        }
+        let (middle, half) = (across.atan2(down), (self.min_cosine / most).acos());
+        let (low, high) = (middle - half, middle + half);
+        if high <= 0.0 || low >= FRAC_PI_2 {
+            return None;
+        }
+        let rise = self.rise_m.abs();
+        let far = if high < FRAC_PI_2 { rise * high.tan() } else { f64::INFINITY };
+        Some((rise * low.max(0.0).tan(), far))
+    }
+
+    /// It is wide enough up to there: (r^2 + rise^2)^2 = wide^2 (r^2 cos^2 d + rise^2).
+    fn wide_to_m(&self, cosine: f64) -> Option<f64> {
+        let (rise2, wide2) = (self.rise_m.powi(2), self.wide_m.powi(2));
+        let half = rise2 - 0.5 * wide2 * cosine * cosine;
+        let root = (half * half - rise2 * (rise2 - wide2)).max(0.0).sqrt();
+        // Of two numbers whose product is known the larger comes without cancellation.
+        let square = if half > 0.0 { rise2 * (wide2 - rise2) / (half + root) } else { root - half };
+        (square > 0.0).then(|| square.sqrt())
+    }
+
+    /// Nearer it does not fit: the box about it in the image, its height taken as if no elevation foreshortened it.
+    fn fits_from_m(&self, sine: f64, cosine: f64) -> f64 {
+        let (sin_tilt, cos_tilt) = self.tilt;
+        let LandmarkSize { width_m, height_m } = self.size;
+        let by_width = (width_m * cosine.abs() + height_m * (sin_tilt * sine).abs()) / self.room[0];
+        // height / D + width |rise sin d| / D^2 = room.
+        let height = height_m * cos_tilt.hypot(sin_tilt * cosine);
+        let lying = width_m * (self.rise_m * sine).abs();
+        let by_height =
+            (height + (height * height + 4.0 * self.room[1] * lying).sqrt()) / (2.0 * self.room[1]);
+        let distance = by_width.max(by_height);
+        (distance * distance - self.rise_m.powi(2)).max(0.0).sqrt()
+    }
+
+    /// The part of a span in which it is high enough.
+    // Behind and below a landmark tilted by 20 to 40 degrees the height can look less and then again more on the way away
+    // from it, by 12 % at most, where it is seen very obliquely: such a dip is not cut out.
+    fn high_within_m(&self, cosine: f64, (near, far): (f64, f64)) -> Option<(f64, f64)> {
+        let enough = |r: f64| self.high_m * self.height_m2(cosine, r).sqrt() >= r * r + self.rise_m.powi(2);
+        match (enough(near), enough(far)) {
+            (true, true) => Some((near, far)),
+            (true, false) => Some((near, last(near, far, enough))),
+            (false, true) => Some((last(far, near, enough), far)),
+            (false, false) => {
+                let top = self.highest_m(cosine, (near, far));
+                enough(top).then(|| (last(top, near, enough), last(top, far, enough)))
+            }
+        }
+    }
+
+    /// Squared distance of the camera from the line of the landmark's height: what its foreshortening goes by.
+    fn height_m2(&self, cosine: f64, r: f64) -> f64 {
+        let (sin_tilt, cos_tilt) = self.tilt;
+        let along = r * cosine * sin_tilt - self.rise_m * cos_tilt;
+        (r * r + self.rise_m.powi(2) - along * along).max(0.0)
+    }
+
+    /// From where in a span its height looks largest.
+    fn highest_m(&self, cosine: f64, (mut near, mut far): (f64, f64)) -> f64 {
+        let looks = |r: f64| self.height_m2(cosine, r) / (r * r + self.rise_m.powi(2)).powi(2);
+        for _ in 0..HALVINGS {
+            let part = GOLDEN * (far - near);
+            if looks(far - part) >= looks(near + part) {
+                far = near + part;
+            } else {
+                near = far - part;
+            }
+        }
+        0.5 * (near + far)
+    }
 }
 
-/// All bounds; None when nothing is left.
-pub(super) fn limits(place: &LandmarkPlace, viewer: &Viewer, p: &VisibilityParams) -> Option<Limits> {
-    let reach_m = reach_m(place, viewer, p)?;
-    let (width, height) = (place.size.width_m, place.size.height_m);
-    let (tilt_near, tilt_far) = tilt_range_m(place.z_m - viewer.camera_height_m, viewer.tilt_rad)?;
-    // About the landmark's centre, which is behind the origin; and tangent to its wall there.
-    let about = |radius_m: f64| Disc { ahead_m: -p.standoff_m, radius_m };
-    let tangent =
-        |diameter_m: f64| Disc { ahead_m: 0.5 * diameter_m - p.standoff_m, radius_m: 0.5 * diameter_m };
-    let mut far = tangent(viewer.focal_px * width / p.min_side_px).rim();
-    far.extend(about(viewer.focal_px * height / p.min_side_px).rim());
-    if tilt_far.is_finite() {
-        far.extend(about(tilt_far).rim());
+/// The last place from one that is on the way to one that is not.
+fn last(mut good: f64, mut bad: f64, is: impl Fn(f64) -> bool) -> f64 {
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (good + bad);
+        if is(middle) {
+            good = middle;
+        } else {
+            bad = middle;
+        }
     }
-    let steepest = p.max_incidence_rad.tan();
-    for side in [-1.0, 1.0] {
-        // y = steepest (x + standoff) beyond the slope where the ray is parallel to it.
-        let edge = (MAX_SLOPE / steepest - 1.0) / p.standoff_m;
-        far.extend(Piece::through((side * steepest, 0.0), (side * MAX_SLOPE, edge)));
-    }
-    let fill = 2.0 * p.max_fill;
-    let nears = [
-        tangent(width / (fill * 0.5 * viewer.width_px / viewer.focal_px)),
-        about(height / (fill * 0.5 * viewer.height_px / viewer.focal_px)),
-        about(tilt_near),
-    ];
-    let rims = nears.iter().map(|d| Envelope::upper(d.rim())).filter(|e| !e.pieces().is_empty());
-    let near = rims.reduce(Envelope::lower).unwrap_or_default();
-    Some(Limits { far, near, reach_m })
+    good
 }
 
 #[cfg(test)]
@@ -124,15 +193,37 @@ mod tests {
         assert_eq!(tilt_range_m(0.0, [-0.1, 0.2]), Some((0.0, f64::INFINITY)));
     }
 
+    fn limits(tilt_rad: f64, height_m: f64) -> Limits {
+        let size = LandmarkSize { width_m: 0.6, height_m: 0.6 };
+        let viewer = Viewer { tilt_rad: [-1.5, 1.5], ..Viewer::default() };
+        Limits::new(&Moved { height_m, tilt_rad, size }, &viewer, &VisibilityParams::default()).unwrap()
+    }
+
     #[test]
-    fn rays_leave_a_disc_on_its_rim() {
-        let disc = Disc { ahead_m: 1.4, radius_m: 1.5 };
-        for k in -8..=8 {
-            let angle = 0.19 * f64::from(k);
-            let r = disc.exit_m(angle).unwrap();
-            let (x, y) = (r * angle.cos() - 1.4, r * angle.sin());
-            assert!((x.hypot(y) - 1.5).abs() < 1e-12);
+    fn under_a_ceiling_the_floor_circle_is_that_of_the_incidence_or_the_size() {
+        // By hand, 1 m above the camera: straight ahead the width is whole and ends at 512 * 0.6 / 75 m in space, the
+        // height is foreshortened: 512 * 0.6 * 1 / (r^2 + 1) = 75.
+        let limits = limits(FRAC_PI_2, 2.2);
+        let diameter: f64 = 512.0 * 0.6 / 75.0;
+        for direction in [0.0, FRAC_PI_2, 3.0 * FRAC_PI_2, 2.0 * FRAC_PI_2] {
+            let (near, far) = limits.span_m(direction).unwrap();
+            // Straight below it fills 0.6 * 512 px of 480, of which 432 are allowed.
+            assert!((near - 1.0 / 1.5_f64.tan()).abs() < 1e-9, "{near}: the unit cannot tilt up straight");
+            assert!((far - (diameter - 1.0).sqrt()).abs() < 1e-9, "{direction}: {far}");
         }
-        assert_eq!(Disc { ahead_m: -0.05, radius_m: 0.05 }.exit_m(0.0), None);
+    }
+
+    #[test]
+    fn high_on_a_wall_one_must_step_back() {
+        // By hand: 1 m above the camera it is seen by less than 75 degrees from r > 1 / tan 75 on, straight ahead.
+        let limits = limits(0.0, 2.2);
+        let (near, far) = limits.span_m(0.0).unwrap();
+        let fits: f64 = 0.6 / (0.9 * 480.0 / 512.0);
+        assert!(near >= 1.0 / 75.0_f64.to_radians().tan() && near >= (fits * fits - 1.0).max(0.0).sqrt());
+        let diameter: f64 = 512.0 * 0.6 / 75.0;
+        // Its width ends at the sphere about it; its height earlier: r / (r^2 + 1) = 1 / diameter.
+        let expected = 0.5 * (diameter + (diameter * diameter - 4.0).sqrt());
+        assert!((far - expected).abs() < 1e-9, "{far} for {expected}");
+        assert_eq!(limits.span_m(1.4), None, "too oblique");
     }
 }

@@ -2,42 +2,58 @@
 
 use super::{
     LocalFrame,
-    envelope::{Envelope, Piece},
+    envelope::{MAX_SLOPE, Piece},
+    quarters::{Quarter, turned_back},
 };
 use nalgebra::{Point2, Vector2};
 
 /// Corners nearer to each other than this are one, metres.
 const SAME_M: f64 = 1e-9;
+/// Corners nearer than this to the landmark's middle are there, metres.
+const MIDDLE_M: f64 = 1e-5;
 /// Corners nearer than this to the line between their neighbours are none, metres.
 const STRAIGHT_M: f64 = 1e-8;
-/// Pieces of area smaller than this are left out, square metres.
+/// Pieces of area smaller than this are left out, square metres; and so are holes.
 const MIN_AREA_M2: f64 = 1e-6;
 
-/// A polygon without holes, counter-clockwise; the last corner is not the first.
+/// A polygon, counter-clockwise; the last corner is not the first.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Polygon {
     /// Corners, metres.
     pub corners: Vec<Point2<f64>>,
+    /// Corners of the hole in it, clockwise; empty for none. A landmark under a ceiling that is seen from all sides, but not
+    /// from right below, has one.
+    pub hole: Vec<Point2<f64>>,
+}
+
+/// The sides of a ring.
+fn sides(ring: &[Point2<f64>]) -> impl Iterator<Item = (&Point2<f64>, &Point2<f64>)> {
+    ring.iter().zip(ring.iter().cycle().skip(1))
+}
+
+/// Area of a ring, positive counter-clockwise, and its first moment about `o`.
+fn moments(ring: &[Point2<f64>], o: &Point2<f64>) -> (f64, Vector2<f64>) {
+    sides(ring).fold((0.0, Vector2::zeros()), |(area, moment), (a, b)| {
+        let (a, b) = (a - o, b - o);
+        let part = 0.5 * a.perp(&b);
+        (area + part, moment + (a + b) * (part / 3.0))
+    })
 }
 
 impl Polygon {
     fn sides(&self) -> impl Iterator<Item = (&Point2<f64>, &Point2<f64>)> {
-        self.corners.iter().zip(self.corners.iter().cycle().skip(1))
+        sides(&self.corners).chain(sides(&self.hole))
     }
 
-    /// Area, and its first moment about the first corner.
-    fn moments(&self) -> (f64, Vector2<f64>) {
-        let Some(o) = self.corners.first() else { return (0.0, Vector2::zeros()) };
-        self.sides().fold((0.0, Vector2::zeros()), |(area, moment), (a, b)| {
-            let (a, b) = (a - o, b - o);
-            let part = 0.5 * a.perp(&b);
-            (area + part, moment + (a + b) * (part / 3.0))
-        })
+    /// Area, and its first moment about `o`.
+    fn moments(&self, o: &Point2<f64>) -> (f64, Vector2<f64>) {
+        let (outer, hole) = (moments(&self.corners, o), moments(&self.hole, o));
+        (outer.0 + hole.0, outer.1 + hole.1)
     }
 
     /// Area, square metres.
     pub fn area_m2(&self) -> f64 {
-        self.moments().0
+        self.corners.first().map_or(0.0, |o| self.moments(o).0)
     }
 
     /// Distance of a point to the nearest side, from inside or outside.
@@ -64,69 +80,82 @@ pub(super) fn distance_to_segment(q: &Point2<f64>, a: &Point2<f64>, b: &Point2<f
 /// Area and centroid of several polygons.
 pub(super) fn measure(polygons: &[Polygon]) -> (f64, Option<Point2<f64>>) {
     let Some(o) = polygons.first().and_then(|p| p.corners.first()) else { return (0.0, None) };
-    let mut total = (0.0, Vector2::zeros());
-    for polygon in polygons {
-        let (area, moment) = polygon.moments();
-        let first = polygon.corners.first().map_or_else(Vector2::zeros, |c| c - o);
-        total = (total.0 + area, total.1 + moment + first * area);
-    }
+    let total = polygons
+        .iter()
+        .map(|p| p.moments(o))
+        .fold((0.0, Vector2::zeros()), |total, part| (total.0 + part.0, total.1 + part.1));
     (total.0, Some(o + total.1 / total.0))
 }
 
-/// The area between `near` and `far`.
-pub(super) fn outline(frame: &LocalFrame, far: &Envelope, near: &Envelope) -> Vec<Polygon> {
-    let mut made = Vec::new();
-    let mut run = Run::default();
-    let (nears, mut next) = (near.pieces(), 0);
-    for outer in far.pieces() {
-        let mut from = outer.from;
-        while from < outer.to {
-            while nears.get(next).is_some_and(|p| p.to <= from) {
-                next += 1;
+/// The area between the near and the far bounds.
+pub(super) fn outline(frame: &LocalFrame, quarters: &[Quarter; 4]) -> Vec<Polygon> {
+    let mut runs: Vec<Run> = Vec::new();
+    for (quarter, Quarter { far, near }) in quarters.iter().enumerate() {
+        let (nears, mut next) = (near.pieces(), 0);
+        for outer in far.pieces() {
+            let mut from = outer.from;
+            while from < outer.to {
+                while nears.get(next).is_some_and(|p| p.to <= from) {
+                    next += 1;
+                }
+                let ahead = nears.get(next);
+                let change = |p: &Piece| if p.from > from { p.from } else { p.to };
+                let to = ahead.map_or(outer.to, |p| change(p).min(outer.to));
+                let strip = Strip { quarter, outer, inner: ahead.filter(|p| p.from <= from), from, to };
+                strip.join(&mut runs);
+                from = to;
             }
-            let ahead = nears.get(next);
-            let change = |p: &Piece| if p.from > from { p.from } else { p.to };
-            let to = ahead.map_or(outer.to, |p| change(p).min(outer.to));
-            run.take(frame, outer, ahead.filter(|p| p.from <= from), (from, to), &mut made);
-            from = to;
         }
     }
-    made.extend(run.close(frame));
-    made
+    closed(runs).into_iter().filter_map(|(run, round)| run.polygon(frame, round)).collect()
 }
 
-/// Without the corners at which the outline goes straight on.
-fn without_straight(corners: &[Point2<f64>]) -> Vec<Point2<f64>> {
-    let mut made: Vec<Point2<f64>> = Vec::with_capacity(corners.len());
-    for (i, corner) in corners.iter().enumerate() {
-        let next = corners[(i + 1) % corners.len()];
-        let before = made.last().unwrap_or(&corners[corners.len() - 1]);
-        if distance_to_segment(corner, before, &next) > STRAIGHT_M {
-            made.push(*corner);
+/// The last run goes on with the first where both reach the direction at which directions begin; one that meets itself
+/// there goes all round.
+fn closed(mut runs: Vec<Run>) -> Vec<(Run, bool)> {
+    let begins = runs.first().is_some_and(|r| r.from <= -MAX_SLOPE + SAME);
+    let ends = runs.last().is_some_and(|r| r.to >= direction(3, MAX_SLOPE) - SAME);
+    let meets = begins && ends;
+    if meets && runs.len() > 1 {
+        let first = runs.remove(0);
+        if let Some(last) = runs.last_mut() {
+            last.outer.extend(first.outer);
+            last.inner.extend(first.inner);
         }
+        return runs.into_iter().map(|r| (r, false)).collect();
     }
-    made
+    runs.into_iter().map(|r| (r, meets)).collect()
 }
 
-/// Outer and inner corners of one piece of area, by slope.
-#[derive(Default)]
+/// Directions closer than this are one.
+const SAME: f64 = 1e-12;
+
+/// Counts up all round: from -1 over each quarter by 2.
+fn direction(quarter: usize, slope: f64) -> f64 {
+    2.0 * MAX_SLOPE * quarter as f64 + slope
+}
+
+/// What lies between two bounds from one slope to another.
+struct Strip<'a> {
+    quarter: usize,
+    outer: &'a Piece,
+    inner: Option<&'a Piece>,
+    from: f64,
+    to: f64,
+}
+
+/// Outer and inner corners of one piece of area, by direction, about the landmark's middle.
 struct Run {
-    to: Option<f64>,
-    outer: Vec<(f64, f64)>,
-    /// Empty inverse: no bound, the landmark's middle itself.
-    inner: Vec<(f64, Option<f64>)>,
+    from: f64,
+    to: f64,
+    outer: Vec<Point2<f64>>,
+    inner: Vec<Point2<f64>>,
 }
 
-impl Run {
-    /// Adds what lies between the bounds from one slope to another.
-    fn take(
-        &mut self,
-        frame: &LocalFrame,
-        outer: &Piece,
-        inner: Option<&Piece>,
-        (from, to): (f64, f64),
-        made: &mut Vec<Polygon>,
-    ) {
+impl Strip<'_> {
+    /// Adds it to the last run if that ends where this begins.
+    fn join(self, runs: &mut Vec<Run>) {
+        let Self { quarter, outer, inner, from, to } = self;
         // Room is left where the inner bound has the larger inverse.
         let room = |slope: f64| inner.map_or(f64::INFINITY, |i| i.at(slope) - outer.at(slope));
         let (first, last) = (room(from), room(to));
@@ -139,36 +168,60 @@ impl Run {
             (_, true) => (from, meet()),
             _ => (from, to),
         };
-        if self.to.is_none_or(|end| from - end > 1e-12 * (1.0 + from.abs())) {
-            made.extend(self.close(frame));
+        let (begin, end) = (direction(quarter, from), direction(quarter, to));
+        if runs.last().is_none_or(|run| begin - run.to > SAME) {
+            runs.push(Run { from: begin, to: begin, outer: Vec::new(), inner: Vec::new() });
         }
+        let Some(run) = runs.last_mut() else { return };
         for slope in [from, to] {
-            self.outer.push((slope, outer.at(slope)));
-            self.inner.push((slope, inner.map(|i| i.at(slope))));
+            let floor = |inverse: f64| turned_back(&Point2::new(1.0 / inverse, slope / inverse), quarter);
+            run.outer.push(floor(outer.at(slope)));
+            let near = inner.map_or_else(Point2::origin, |i| floor(i.at(slope)));
+            run.inner.push(if near.coords.norm() < MIDDLE_M { Point2::origin() } else { near });
         }
-        self.to = Some(to);
+        run.to = end;
     }
+}
 
-    /// The polygon of what was taken; begins anew.
-    fn close(&mut self, frame: &LocalFrame) -> Option<Polygon> {
-        let run = std::mem::take(self);
-        let floor = |slope: f64, inverse: f64| Point2::new(1.0 / inverse, slope / inverse);
-        let outer = run.outer.iter().map(|(slope, inverse)| floor(*slope, *inverse));
-        let inner =
-            run.inner.iter().rev().map(|(slope, i)| i.map_or_else(Point2::origin, |i| floor(*slope, i)));
-        let mut corners: Vec<Point2<f64>> = Vec::with_capacity(run.outer.len() + run.inner.len());
-        for corner in outer.chain(inner) {
-            if corners.last().is_none_or(|last| (last - corner).norm() > SAME_M) {
-                corners.push(corner);
-            }
+impl Run {
+    /// Its polygon; one that goes all round has its inner corners as a hole.
+    fn polygon(self, frame: &LocalFrame, round: bool) -> Option<Polygon> {
+        let back = self.inner.into_iter().rev();
+        let (outer, hole): (Vec<_>, Vec<_>) = if round {
+            (self.outer, back.collect())
+        } else {
+            (self.outer.into_iter().chain(back).collect(), vec![])
+        };
+        let ring = |corners: Vec<Point2<f64>>| -> Vec<Point2<f64>> {
+            tidied(&corners).iter().map(|c| frame.map(c)).collect()
+        };
+        let (corners, mut hole) = (ring(outer), ring(hole));
+        if hole.first().is_none_or(|o| -moments(&hole, o).0 <= MIN_AREA_M2) {
+            hole.clear();
         }
-        while corners.len() > 1
-            && corners.first().zip(corners.last()).is_some_and(|(a, b)| (a - b).norm() <= SAME_M)
-        {
-            corners.pop();
-        }
-        let corners = without_straight(&corners);
-        let polygon = Polygon { corners: corners.iter().map(|c| frame.map(c)).collect() };
+        let polygon = Polygon { corners, hole };
         (polygon.corners.len() >= 3 && polygon.area_m2() > MIN_AREA_M2).then_some(polygon)
     }
+}
+
+/// Without corners that are the same, or at which the outline goes straight on.
+fn tidied(corners: &[Point2<f64>]) -> Vec<Point2<f64>> {
+    let mut apart: Vec<Point2<f64>> = Vec::with_capacity(corners.len());
+    for corner in corners {
+        if apart.last().is_none_or(|last| (last - corner).norm() > SAME_M) {
+            apart.push(*corner);
+        }
+    }
+    while apart.len() > 1 && apart.first().zip(apart.last()).is_some_and(|(a, b)| (a - b).norm() <= SAME_M) {
+        apart.pop();
+    }
+    let mut made: Vec<Point2<f64>> = Vec::with_capacity(apart.len());
+    for (i, corner) in apart.iter().enumerate() {
+        let next = apart[(i + 1) % apart.len()];
+        let before = made.last().unwrap_or(&apart[apart.len() - 1]);
+        if distance_to_segment(corner, before, &next) > STRAIGHT_M {
+            made.push(*corner);
+        }
+    }
+    made
 }

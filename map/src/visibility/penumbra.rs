@@ -1,61 +1,105 @@
 //! What obstacles hide: of each its full penumbra, from everywhere in which some part of the landmark is not seen
 //! (method 12.4), as bounds over direction. Exact, not sampled.
 
-use super::{LocalFrame, Obstacle, envelope::Piece};
-use nalgebra::Point2;
+use super::{
+    envelope::{MAX_SLOPE, Piece},
+    quarters::turned,
+};
+use nalgebra::{Point2, Vector2};
 
-/// How near to the line through the landmark obstacles are looked at, metres.
+/// How near to the landmark's middle obstacles are looked at, metres.
 const MIN_AHEAD_M: f64 = 1e-6;
 
-/// The near borders of all penumbrae: each obstacle, and the crossing tangents beyond its ends. None when an obstacle
-/// cuts the landmark itself.
-pub(super) fn penumbrae(frame: &LocalFrame, half_width: f64, obstacles: &[Obstacle]) -> Option<Vec<Piece>> {
-    let mut pieces = Vec::with_capacity(3 * obstacles.len());
-    for obstacle in obstacles {
-        let (a, b) = (frame.local(&obstacle.a), frame.local(&obstacle.b));
-        if cuts(&a, &b, half_width) {
+/// What the landmark covers on the floor, about the origin: half its depth along x, half its width along y.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Footprint {
+    pub half_depth_m: f64,
+    pub half_width_m: f64,
+}
+
+impl Footprint {
+    /// Whether a to b touches it.
+    pub(super) fn touches(&self, a: &Point2<f64>, b: &Point2<f64>) -> bool {
+        let (mut from, mut to) = (0.0_f64, 1.0_f64);
+        for (start, end, half) in [(a.x, b.x, self.half_depth_m), (a.y, b.y, self.half_width_m)] {
+            let along = end - start;
+            if along.abs() < MIN_AHEAD_M * MIN_AHEAD_M {
+                if start.abs() > half {
+                    return false;
+                }
+                continue;
+            }
+            let (first, last) = ((-half - start) / along, (half - start) / along);
+            (from, to) = (from.max(first.min(last)), to.min(first.max(last)));
+        }
+        from <= to
+    }
+
+    fn corners(&self) -> [Point2<f64>; 4] {
+        let (x, y) = (self.half_depth_m, self.half_width_m);
+        [Point2::new(x, y), Point2::new(x, -y), Point2::new(-x, y), Point2::new(-x, -y)]
+    }
+}
+
+/// The near borders of one obstacle's penumbra within a quarter.
+///
+/// What it hides of one point of the landmark lies behind it between the lines from that point past its ends. Of all
+/// points the landmark's corners give the borders: every such line lies in the penumbra, and its tangents are among them.
+pub(super) fn penumbra(
+    footprint: &Footprint,
+    a: &Point2<f64>,
+    b: &Point2<f64>,
+    quarter: usize,
+) -> Vec<Piece> {
+    let turn = |v: Vector2<f64>| turned(&Point2::from(v), quarter).coords;
+    let mut pieces: Vec<Piece> = straight(turn(a.coords), turn(b - a), 1.0).into_iter().collect();
+    // A landmark on a wall has no depth: two of its corners are the other two.
+    let corners = footprint.corners();
+    let count = if footprint.half_depth_m > 0.0 { 4 } else { 2 };
+    for end in [a, b] {
+        let beyond = |corner: &Point2<f64>| straight(turn(end.coords), turn(end - corner), f64::INFINITY);
+        pieces.extend(corners[..count].iter().filter_map(beyond));
+    }
+    pieces
+}
+
+/// The part of a straight line, from a point so many times `along`, that lies in the quarter ahead.
+fn straight(from: Vector2<f64>, along: Vector2<f64>, times: f64) -> Option<Piece> {
+    let (mut first, mut last) = (0.0_f64, times);
+    let inside = |v: &Vector2<f64>| [MAX_SLOPE * v.x - v.y, MAX_SLOPE * v.x + v.y, v.x];
+    let least = [0.0, 0.0, MIN_AHEAD_M];
+    for ((start, rise), least) in inside(&from).into_iter().zip(inside(&along)).zip(least) {
+        let crossing = (least - start) / rise;
+        if rise > 0.0 {
+            first = first.max(crossing);
+        } else if rise < 0.0 {
+            last = last.min(crossing);
+        } else if start < least {
             return None;
         }
-        let Some((a, b)) = ahead(a, b) else { continue };
-        let seen = |q: &Point2<f64>| (q.y / q.x, 1.0 / q.x);
-        pieces.extend(Piece::through(seen(&a), seen(&b)));
-        // A viewer to the right sees the last of the landmark's left end, and the other way about: the tangent from
-        // the left end leaves the obstacle's rightmost point, as seen from there, and goes on to its own direction.
-        let from_left = |q: &Point2<f64>| (q.y + half_width) / q.x;
-        let from_right = |q: &Point2<f64>| (q.y - half_width) / q.x;
-        let rightmost = if from_left(&a) >= from_left(&b) { a } else { b };
-        let leftmost = if from_right(&a) <= from_right(&b) { a } else { b };
-        pieces.extend(Piece::through(seen(&rightmost), (from_left(&rightmost), 0.0)));
-        pieces.extend(Piece::through(seen(&leftmost), (from_right(&leftmost), 0.0)));
     }
-    Some(pieces)
-}
-
-/// Whether a to b touches the landmark, which lies on x = 0 within `half_width` of y = 0.
-fn cuts(a: &Point2<f64>, b: &Point2<f64>, half_width: f64) -> bool {
-    if a.x * b.x > 0.0 {
-        return false;
-    }
-    let (low, high) = if a.x.abs() + b.x.abs() < MIN_AHEAD_M {
-        (a.y.min(b.y), a.y.max(b.y))
-    } else {
-        let y = a.y + (b.y - a.y) * (a.x / (a.x - b.x));
-        (y, y)
-    };
-    low <= half_width && high >= -half_width
-}
-
-/// The part of a to b before the landmark.
-fn ahead(a: Point2<f64>, b: Point2<f64>) -> Option<(Point2<f64>, Point2<f64>)> {
-    if a.x.max(b.x) < MIN_AHEAD_M {
+    if first >= last {
         return None;
     }
-    let cut = |inside: &Point2<f64>, outside: Point2<f64>| {
-        if outside.x >= MIN_AHEAD_M {
-            return outside;
-        }
-        let share = (MIN_AHEAD_M - outside.x) / (inside.x - outside.x);
-        Point2::new(MIN_AHEAD_M, outside.y + (inside.y - outside.y) * share)
+    let seen = |t: f64| {
+        let v = from + along * t;
+        if t.is_finite() { (v.y / v.x, 1.0 / v.x) } else { (along.y / along.x, 0.0) }
     };
-    Some((cut(&b, a), cut(&a, b)))
+    Piece::through(seen(first), seen(last))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_touches_the_footprint() {
+        let flat = Footprint { half_depth_m: 0.0, half_width_m: 0.3 };
+        let deep = Footprint { half_depth_m: 0.2, half_width_m: 0.3 };
+        let touch = |f: &Footprint, ax, ay, bx, by| f.touches(&Point2::new(ax, ay), &Point2::new(bx, by));
+        assert!(touch(&flat, -1.0, 0.0, 1.0, 0.1) && touch(&flat, 0.0, -1.0, 0.0, 1.0));
+        assert!(!touch(&flat, 0.1, -1.0, 0.1, 1.0) && !touch(&flat, 0.0, 0.31, 0.0, 1.0));
+        assert!(touch(&deep, 0.1, -1.0, 0.1, 1.0) && touch(&deep, 0.0, 0.0, 0.1, 0.1));
+        assert!(!touch(&deep, 0.21, -1.0, 0.21, 1.0) && !touch(&deep, 0.3, 0.29, 0.1, 0.5));
+    }
 }

@@ -3,7 +3,7 @@
 
 use super::{Obstacle, Viewer, VisibilityParams};
 use crate::place::LandmarkPlace;
-use nalgebra::{Point2, Vector2};
+use nalgebra::{Point2, Point3, Vector3};
 
 /// Whether a camera at `q` sees the whole landmark, near, upright and large enough, with nothing in between.
 pub fn sees(
@@ -13,34 +13,48 @@ pub fn sees(
     p: &VisibilityParams,
     q: &Point2<f64>,
 ) -> bool {
-    let (width, height) = (place.size.width_m, place.size.height_m);
-    let normal = Vector2::new(place.theta_rad.cos(), place.theta_rad.sin());
-    let centre = Point2::new(place.x_m, place.y_m);
-    let to = q - centre;
-    let distance = to.norm();
-    let cosine = normal.dot(&to) / distance;
-    if normal.dot(&to) <= p.standoff_m || cosine < p.max_incidence_rad.cos() {
+    let map_from_landmark = LandmarkPlace { roll_rad: 0.0, ..*place }.map_from_landmark();
+    let face = |y: f64, z: f64| map_from_landmark * Point3::new(p.standoff_m, y, z);
+    let (half_width, half_height) = (0.5 * place.size.width_m, 0.5 * place.size.height_m);
+    let camera = Point3::new(q.x, q.y, viewer.camera_height_m);
+    let centre = face(0.0, 0.0);
+    let (sight, distance) = ((camera - centre).normalize(), (camera - centre).norm());
+    let [normal, wide, high] = [Vector3::x(), Vector3::y(), Vector3::z()].map(|v| map_from_landmark * v);
+    let length_px = |side_m: f64| viewer.focal_px * side_m / distance;
+    // Incidence and size: the sides as they look from there.
+    let width_px = length_px(place.size.width_m * wide.cross(&sight).norm());
+    let height_px = length_px(place.size.height_m * high.cross(&sight).norm());
+    if normal.dot(&sight) < p.max_incidence_rad.cos() || width_px.min(height_px) < p.min_side_px {
         return false;
     }
-    let (wide, high) = (width * cosine / distance, height / distance);
-    let large = viewer.focal_px * wide.min(high) >= p.min_side_px;
-    let half_view = |side_px: f64| 0.5 * side_px / viewer.focal_px;
-    let whole = wide <= 2.0 * p.max_fill * half_view(viewer.width_px)
-        && high <= 2.0 * p.max_fill * half_view(viewer.height_px);
-    let tilt = (place.z_m - viewer.camera_height_m).atan2(distance);
-    if !large || !whole || tilt < viewer.tilt_rad[0] || tilt > viewer.tilt_rad[1] {
+    // The axes of the image of an upright camera that looks at the centre.
+    let right = sight.cross(&Vector3::z()).normalize();
+    let up = right.cross(&-sight).normalize();
+    let across = place.size.width_m * wide.dot(&right).abs() + place.size.height_m * high.dot(&right).abs();
+    let upright = (high - right * high.dot(&right)).norm();
+    let along = place.size.width_m * wide.dot(&up).abs() + place.size.height_m * upright;
+    let whole = length_px(across) <= p.max_fill * viewer.width_px
+        && length_px(along) <= p.max_fill * viewer.height_px;
+    let tilt = (-sight.z).atan2(sight.xy().norm());
+    if !whole || tilt < viewer.tilt_rad[0] || tilt > viewer.tilt_rad[1] {
         return false;
     }
-    let side = Vector2::new(-normal.y, normal.x) * (0.5 * width);
-    let face = centre + normal * p.standoff_m;
-    let sight = [*q, face - side, face + side];
-    let lowest = (place.z_m - 0.5 * height).min(viewer.camera_height_m);
-    !obstacles.iter().any(|o| o.height_m.is_none_or(|h| h > lowest) && meets(&sight, &o.a, &o.b))
+    let corners = [(-1.0, -1.0), (-1.0, 1.0), (1.0, 1.0), (1.0, -1.0)]
+        .map(|(y, z)| Point2::from(face(y * half_width, z * half_height).coords.xy()));
+    // The hull of camera and landmark on the floor is covered by the camera's triangles with all pairs of corners.
+    let hidden =
+        |o: &Obstacle| (0..4).any(|i| (0..i).any(|j| meets(&[*q, corners[i], corners[j]], &o.a, &o.b)));
+    let lowest = (place.z_m - half_height * place.tilt_rad.cos()).min(viewer.camera_height_m);
+    !obstacles.iter().any(|o| o.height_m.is_none_or(|h| h > lowest) && hidden(o))
 }
 
-/// Whether a segment touches a triangle: what three half-planes leave of it.
+/// Whether a segment touches a triangle: what three half-planes leave of it. A triangle without area touches nothing.
 fn meets(triangle: &[Point2<f64>; 3], a: &Point2<f64>, b: &Point2<f64>) -> bool {
-    let turn = (triangle[1] - triangle[0]).perp(&(triangle[2] - triangle[0])).signum();
+    let twice_area = (triangle[1] - triangle[0]).perp(&(triangle[2] - triangle[0]));
+    if twice_area.abs() < 1e-12 {
+        return false;
+    }
+    let turn = twice_area.signum();
     let (mut from, mut to) = (0.0_f64, 1.0_f64);
     for k in 0..3 {
         let (corner, next) = (triangle[k], triangle[(k + 1) % 3]);

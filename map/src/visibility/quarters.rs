@@ -1,0 +1,83 @@
+//! Bounds in all directions about a landmark: four quarters, each with its own axis, so that no slope exceeds one.
+
+use super::{
+    envelope::{Envelope, Piece},
+    limits::Limits,
+    penumbra::{Footprint, penumbra},
+    rims::{MIN_NEAR_M, rims},
+};
+use nalgebra::Point2;
+use std::f64::consts::FRAC_PI_2;
+
+/// A point in the frame of a quarter, whose x is its axis.
+pub(super) fn turned(p: &Point2<f64>, quarter: usize) -> Point2<f64> {
+    match quarter % 4 {
+        0 => *p,
+        1 => Point2::new(p.y, -p.x),
+        2 => Point2::new(-p.x, -p.y),
+        _ => Point2::new(-p.y, p.x),
+    }
+}
+
+/// Back from it.
+pub(super) fn turned_back(p: &Point2<f64>, quarter: usize) -> Point2<f64> {
+    turned(p, 4 - quarter % 4)
+}
+
+/// The bounds of one quarter.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(super) struct Quarter {
+    /// Nearest bound beyond which nothing is seen; nothing is seen where there is none.
+    pub far: Envelope,
+    /// Bound within which it is too near; it reaches over all that `far` does.
+    pub near: Envelope,
+}
+
+/// The bounds of all quarters, the first ahead, the others to the left. `obstacles` in the landmark's frame.
+pub(super) fn quarters(
+    limits: &Limits,
+    footprint: &Footprint,
+    obstacles: &[(Point2<f64>, Point2<f64>)],
+) -> [Quarter; 4] {
+    std::array::from_fn(|quarter| {
+        let rims = rims(limits, quarter as f64 * FRAC_PI_2);
+        if rims.open.is_empty() {
+            return Quarter::default();
+        }
+        let mut far: Vec<Piece> = rims.far;
+        far.extend(obstacles.iter().flat_map(|(a, b)| penumbra(footprint, a, b, quarter)));
+        Quarter { far: Envelope::upper(far).within(&rims.open), near: Envelope::upper(rims.near) }
+    })
+}
+
+/// Whether a point about the origin is within the bounds.
+pub(super) fn contains(quarters: &[Quarter; 4], q: &Point2<f64>) -> bool {
+    let quarter = match (q.x.abs() >= q.y.abs(), q.x >= 0.0, q.y >= 0.0) {
+        (true, true, _) => 0,
+        (false, _, true) => 1,
+        (true, false, _) => 2,
+        (false, _, false) => 3,
+    };
+    let q = turned(q, quarter);
+    // The middle itself is as what is next to it.
+    let ahead = q.x.max(2.0 * MIN_NEAR_M);
+    let (slope, inverse) = (q.y / ahead, 1.0 / ahead);
+    let Quarter { far, near } = &quarters[quarter];
+    far.at(slope).is_some_and(|far| inverse >= far) && near.at(slope).is_none_or(|near| inverse <= near)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_quarter_looks_along_its_axis() {
+        for quarter in 0..4 {
+            let angle = quarter as f64 * FRAC_PI_2 + 0.3;
+            let p = Point2::new(2.0 * angle.cos(), 2.0 * angle.sin());
+            let t = turned(&p, quarter);
+            assert!((t - Point2::new(2.0 * 0.3_f64.cos(), 2.0 * 0.3_f64.sin())).norm() < 1e-12);
+            assert!((turned_back(&t, quarter) - p).norm() < 1e-12);
+        }
+    }
+}

@@ -1,0 +1,151 @@
+//! Where the limits end, as straight pieces over direction, in one quarter of all directions: chords that leave the curves
+//! by at most a fifth of a millimetre where they can be followed.
+
+use super::{
+    envelope::{MAX_SLOPE, Piece},
+    limits::Limits,
+};
+
+/// Largest distance between a curve and its chord, metres.
+const MAX_SAGITTA_M: f64 = 2e-4;
+/// Directions of a quarter that are always looked at.
+const GRID: u32 = 64;
+/// Halvings between two of them: to a hundred millionth of a radian.
+const DEPTH: u32 = 20;
+/// Halvings in search of the direction in which a landmark begins to be seen.
+const EDGE_HALVINGS: u32 = 50;
+/// Nearer than this is at the landmark, metres.
+pub(super) const MIN_NEAR_M: f64 = 1e-6;
+
+/// The rims of one quarter.
+#[derive(Default)]
+pub(super) struct Rims {
+    pub far: Vec<Piece>,
+    pub near: Vec<Piece>,
+    /// The slopes in which anything is seen, in order.
+    pub open: Vec<(f64, f64)>,
+}
+
+/// What is allowed in one direction.
+#[derive(Clone, Copy)]
+struct Look {
+    slope: f64,
+    near_m: f64,
+    far_m: f64,
+}
+
+impl Look {
+    /// A point at this distance, as (slope, inverse).
+    fn point(&self, distance_m: f64) -> (f64, f64) {
+        (self.slope, self.slope.hypot(1.0) / distance_m)
+    }
+}
+
+struct Follower<'a> {
+    limits: &'a Limits,
+    /// Middle of the quarter.
+    ahead_rad: f64,
+    made: Rims,
+}
+
+/// The rims of the quarter about a direction.
+pub(super) fn rims(limits: &Limits, ahead_rad: f64) -> Rims {
+    let mut follower = Follower { limits, ahead_rad, made: Rims::default() };
+    let slope = |i: u32| MAX_SLOPE * (2.0 * f64::from(i) / f64::from(GRID) - 1.0);
+    for i in 0..GRID {
+        follower.between(slope(i), slope(i + 1), DEPTH);
+    }
+    follower.made
+}
+
+impl Follower<'_> {
+    fn look(&self, slope: f64) -> Option<Look> {
+        let (near_m, far_m) = self.limits.span_m(self.ahead_rad + slope.atan())?;
+        let near_m = near_m.max(MIN_NEAR_M);
+        (near_m < far_m).then_some(Look { slope, near_m, far_m })
+    }
+
+    fn between(&mut self, from: f64, to: f64, depth: u32) {
+        match (self.look(from), self.look(to)) {
+            (Some(a), Some(b)) => self.follow(a, b, depth),
+            (Some(a), None) => self.follow(a, self.edge(a, to), depth),
+            (None, Some(b)) => self.follow(self.edge(b, from), b, depth),
+            (None, None) => {}
+        }
+    }
+
+    /// The last direction in which something is seen, on the way to one in which nothing is.
+    fn edge(&self, mut seen: Look, mut unseen: f64) -> Look {
+        for _ in 0..EDGE_HALVINGS {
+            let middle = 0.5 * (seen.slope + unseen);
+            match self.look(middle) {
+                Some(look) => seen = look,
+                None => unseen = middle,
+            }
+        }
+        seen
+    }
+
+    fn follow(&mut self, a: Look, b: Look, depth: u32) {
+        let slope = 0.5 * (a.slope + b.slope);
+        let Some(middle) = self.look(slope) else {
+            if let Some(less) = depth.checked_sub(1) {
+                self.between(a.slope, slope, less);
+                self.between(slope, b.slope, less);
+            }
+            return;
+        };
+        let leaves = |of: fn(&Look) -> f64| {
+            let chord = 0.5 * (a.point(of(&a)).1 + b.point(of(&b)).1);
+            (middle.slope.hypot(1.0) / chord - of(&middle)).abs() > MAX_SAGITTA_M
+        };
+        if depth > 0 && (leaves(|l| l.near_m) || leaves(|l| l.far_m)) {
+            self.follow(a, middle, depth - 1);
+            self.follow(middle, b, depth - 1);
+            return;
+        }
+        self.made.far.extend(Piece::through(a.point(a.far_m), b.point(b.far_m)));
+        self.made.near.extend(Piece::through(a.point(a.near_m), b.point(b.near_m)));
+        #[expect(clippy::float_cmp, reason = "the end of one look is the very beginning of the next")]
+        match self.made.open.last_mut() {
+            Some(last) if last.1 == a.slope => last.1 = b.slope,
+            _ => self.made.open.push((a.slope, b.slope)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::visibility::{Moved, Viewer, VisibilityParams, envelope::Envelope};
+    use std::f64::consts::FRAC_PI_2;
+    use vision::localise::pose::LandmarkSize;
+
+    #[test]
+    fn chords_follow_the_limits() {
+        let size = LandmarkSize { width_m: 0.9, height_m: 0.7 };
+        let viewer = Viewer { tilt_rad: [-1.2, 1.2], ..Viewer::default() };
+        for tilt_rad in [0.0, 0.5, 1.1, FRAC_PI_2, -0.8] {
+            let moved = Moved { height_m: 1.2 + 1.3_f64.copysign(tilt_rad), tilt_rad, size };
+            let limits = Limits::new(&moved, &viewer, &VisibilityParams::default()).unwrap();
+            let mut seen = 0;
+            for quarter in 0..4 {
+                let ahead = f64::from(quarter) * FRAC_PI_2;
+                let rims = rims(&limits, ahead);
+                let (far, near) = (Envelope::upper(rims.far), Envelope::upper(rims.near));
+                for k in 0..997 {
+                    let slope = -1.0 + 2.0 * f64::from(k) / 997.0;
+                    let span = limits.span_m(ahead + slope.atan());
+                    let open = rims.open.iter().any(|(from, to)| (*from..=*to).contains(&slope));
+                    assert_eq!(open, span.is_some(), "{tilt_rad} {quarter} {slope}");
+                    let Some((nearest, furthest)) = span else { continue };
+                    seen += 1;
+                    let distance = |e: &Envelope| slope.hypot(1.0) / e.at(slope).unwrap();
+                    assert!((distance(&far) - furthest).abs() < 2.0 * MAX_SAGITTA_M, "{tilt_rad} {slope}");
+                    assert!((distance(&near) - nearest).abs() < 2.0 * MAX_SAGITTA_M, "{tilt_rad} {slope}");
+                }
+            }
+            assert!(seen > 100, "{tilt_rad}: {seen}");
+        }
+    }
+}
