@@ -226,11 +226,13 @@ function drawArea(c, px, ink) {
   if (!state.area) return;
   c.fillStyle = ink.landmark;
   c.globalAlpha = 0.18;
-  for (const [ring] of state.area.geometry.coordinates) {
+  for (const rings of state.area.geometry.coordinates) {
     c.beginPath();
-    for (const [x, y] of ring) c.lineTo(...px(x, y));
-    c.closePath();
-    c.fill();
+    for (const ring of rings) {
+      ring.forEach(([x, y], i) => (i ? c.lineTo(...px(x, y)) : c.moveTo(...px(x, y))));
+      c.closePath();
+    }
+    c.fill("evenodd"); // a second ring is a hole
   }
   c.globalAlpha = 1;
 }

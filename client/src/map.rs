@@ -77,6 +77,16 @@ impl MapClient {
         self.send(self.request(Method::PATCH, &format!("/maps/{name}")).json(whereabouts)).await
     }
 
+    /// The camera that looks for a map's landmarks, and what counts as seen, as the server's documentation has it.
+    pub async fn sight(&self, map: &str) -> Result<Value, ClientError> {
+        self.send(self.request(Method::GET, &format!("/maps/{map}/sight"))).await
+    }
+
+    /// Sets it; what is not named becomes that of a usual robot.
+    pub async fn set_sight(&self, map: &str, sight: &Value) -> Result<Value, ClientError> {
+        self.send(self.request(Method::PUT, &format!("/maps/{map}/sight")).json(sight)).await
+    }
+
     /// How a map lies in another, as the server's documentation has it.
     pub async fn transform(&self, from: &str, to: &str) -> Result<Value, ClientError> {
         self.send(self.request(Method::GET, &format!("/maps/{from}/transform?to={to}"))).await

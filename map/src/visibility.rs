@@ -119,6 +119,29 @@ impl VisibilityParams {
     }
 }
 
+/// Who looks for landmarks, and what counts as seen.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Sight {
+    /// The camera.
+    pub viewer: Viewer,
+    /// What counts.
+    pub seen: VisibilityParams,
+}
+
+impl Sight {
+    /// Every number finite and in range.
+    pub fn check(&self) -> Result<(), OutOfRange> {
+        self.viewer.check()?;
+        self.seen.check()
+    }
+
+    /// No landmark of this size is seen from further, metres.
+    pub fn reach_m(&self, size: &LandmarkSize) -> f64 {
+        self.viewer.focal_px * size.width_m.min(size.height_m) / self.seen.min_side_px
+    }
+}
+
 /// Something straight that stands on the floor and hides what is behind it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Obstacle {

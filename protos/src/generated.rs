@@ -376,7 +376,7 @@ pub struct GazeRequest {
     /// How fast it turns; 0 stands for 1 rad/s.
     #[prost(double, tag = "7")]
     pub rate_radps: f64,
-    /// Lowest and highest; empty stands for +-1.7 and +-0.35.
+    /// Lowest and highest; empty stands for those of the map's camera: +-1.7 and +-0.35 unless they were set.
     #[prost(double, repeated, tag = "8")]
     pub pan_range_rad: ::prost::alloc::vec::Vec<f64>,
     #[prost(double, repeated, tag = "9")]

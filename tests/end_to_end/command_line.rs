@@ -22,7 +22,7 @@ use vision::{detect::quads::Corners, geometry::polygon};
 const LONGEST: Duration = Duration::from_mins(2);
 
 /// Options that each command must name in its help.
-const OPTIONS: [(&str, &[&str]); 49] = [
+const OPTIONS: [(&str, &[&str]); 50] = [
     ("demo", &["--robots", "--rate-hz", "--legs", "--seed", "--http", "--data", "--stay", "--json"]),
     ("serve", &["--config", "--data", "--http", "--zenoh", "--fleet", "--workers", "--insecure"]),
     (
@@ -48,6 +48,19 @@ const OPTIONS: [(&str, &[&str]); 49] = [
     ),
     ("map create", &["--distance", "--site", "--building", "--floor", "--server", "--json", "<NAME>"]),
     ("map place", &["--site", "--building", "--floor", "--in", "--at", "--level-m", "--server", "<NAME>"]),
+    (
+        "map sight",
+        &[
+            "--image",
+            "--focal-px",
+            "--camera-height-m",
+            "--tilt-deg",
+            "--pan-deg",
+            "--usual",
+            "--server",
+            "<NAME>",
+        ],
+    ),
     ("gather start", &["--robot", "--landmark", "--known", "--map", "--server", "--json"]),
     ("gather stop", &["--map", "--server", "<GATHERING>"]),
     ("gather list", &["--map", "--server", "--json"]),

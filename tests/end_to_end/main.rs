@@ -14,5 +14,6 @@ mod moved_landmark;
 mod real_pictures;
 mod restart;
 mod several_maps;
+mod sight;
 mod teach_and_recognise;
 mod tidy;

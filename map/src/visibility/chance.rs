@@ -72,6 +72,11 @@ impl PoseDraws {
         self.mean
     }
 
+    /// All draws are within this of the mean, metres.
+    pub fn spread_m(&self) -> f64 {
+        self.spread_m
+    }
+
     /// The drawn robot poses.
     pub fn poses(&self) -> impl Iterator<Item = Pose2> {
         self.draws.iter().map(|(_, pose)| *pose)

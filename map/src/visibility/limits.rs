@@ -85,7 +85,7 @@ impl Limits {
         self.high_within_m(cosine, (near, far))
     }
 
-    /// Incidence: in terms of the angle e from the vertical, r = rise tan e, it is a cos e + b sin e >= min_cosine.
+    /// Incidence: in terms of the angle e from the vertical, r = rise tan e, it is a sin e + b cos e, at least `min_cosine`.
     fn upright_m(&self, cosine: f64) -> Option<(f64, f64)> {
         let (sin_tilt, cos_tilt) = self.tilt;
         let (across, down) = (cosine * cos_tilt, sin_tilt.copysign(sin_tilt * self.rise_m));

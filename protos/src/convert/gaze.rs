@@ -15,8 +15,10 @@ pub struct CheckedGaze {
     pub pose: Option<Pose2Covariance>,
     /// Where its camera is and looks.
     pub head: Head,
-    /// What its unit reaches.
-    pub viewer: Viewer,
+    /// Rightmost and leftmost pan of its unit, if it says so.
+    pub pan_range_rad: Option<[f64; 2]>,
+    /// Lowest and highest tilt, if it says so.
+    pub tilt_range_rad: Option<[f64; 2]>,
     /// By what to choose.
     pub criterion: Criterion,
     /// Robot's clock.
@@ -38,32 +40,42 @@ impl TryFrom<v1::GazeRequest> for CheckedGaze {
             tilt_rad: g.tilt_rad,
             rate_radps: or(g.rate_radps, usual.rate_radps),
         };
-        let usual = Viewer::default();
-        let viewer = Viewer {
-            pan_rad: range("pan_range_rad", &g.pan_range_rad, usual.pan_rad)?,
-            tilt_rad: range("tilt_range_rad", &g.tilt_range_rad, usual.tilt_rad)?,
-            ..usual
-        };
-        head.check().and_then(|()| viewer.check()).map_err(|e| geometry::refused(&e))?;
+        let pan_range_rad = range("pan_range_rad", &g.pan_range_rad)?;
+        let tilt_range_rad = range("tilt_range_rad", &g.tilt_range_rad)?;
         let criterion = match g.criterion() {
             v1::GazeCriterion::Unspecified | v1::GazeCriterion::Product => Criterion::Product,
             v1::GazeCriterion::Information => Criterion::Information,
         };
-        Ok(Self {
+        let made = Self {
             pose: pose.map_err(|r| r.inside("map_from_robot"))?,
             head,
-            viewer,
+            pan_range_rad,
+            tilt_range_rad,
             criterion,
             at_ns: g.at_ns,
             looked: (!g.looked_at.is_empty()).then_some((g.looked_at, g.recognised)),
-        })
+        };
+        let viewer = made.viewer(&Viewer::default());
+        made.head.check().and_then(|()| viewer.check()).map_err(|e| geometry::refused(&e))?;
+        Ok(made)
     }
 }
 
-fn range(field: &str, given: &[f64], usual: [f64; 2]) -> Result<[f64; 2], Rejection> {
+impl CheckedGaze {
+    /// The robot's camera: what it does not say is as in `usual`.
+    pub fn viewer(&self, usual: &Viewer) -> Viewer {
+        Viewer {
+            pan_rad: self.pan_range_rad.unwrap_or(usual.pan_rad),
+            tilt_rad: self.tilt_range_rad.unwrap_or(usual.tilt_rad),
+            ..usual.clone()
+        }
+    }
+}
+
+fn range(field: &str, given: &[f64]) -> Result<Option<[f64; 2]>, Rejection> {
     match given {
-        [] => Ok(usual),
-        [low, high] => Ok([*low, *high]),
+        [] => Ok(None),
+        [low, high] => Ok(Some([*low, *high])),
         _ => {
             let detail = format!("2 numbers expected, {} given", given.len());
             Err(Rejection::new(Code::OutOfRange, field, detail))
@@ -96,7 +108,8 @@ mod tests {
     #[test]
     fn absent_numbers_are_the_usual_ones_and_wrong_ones_are_named() {
         let empty = CheckedGaze::try_from(v1::GazeRequest::default()).unwrap();
-        assert_eq!((empty.head, empty.viewer, empty.pose), (Head::default(), Viewer::default(), None));
+        assert_eq!(empty.viewer(&Viewer::default()), Viewer::default());
+        assert_eq!((empty.head, empty.pose), (Head::default(), None));
         let refused = |g: v1::GazeRequest| CheckedGaze::try_from(g).unwrap_err().field;
         let g = v1::GazeRequest::default;
         assert_eq!(refused(v1::GazeRequest { pan_range_rad: vec![1.0], ..g() }), "pan_range_rad");

@@ -56,10 +56,11 @@ fn asked(to: &Receivers, robot: &Name, query: &Query) -> Result<v1::GazeAdvice, 
     let pose = question.pose.or_else(|| to.motion.pose(robot, &name)).ok_or_else(|| {
         Rejection::new(Code::Missing, "map_from_robot", "the robot's pose is not known here either")
     })?;
+    let viewer = question.viewer(&map.sight.viewer);
     let number = |text: &str| map.landmarks.iter().find(|(_, l)| l.name == text).map(|(id, _)| *id);
     let looked = question.looked.and_then(|(text, recognised)| Some((number(&text)?, recognised)));
     let params = GazeParams { criterion: question.criterion, ..GazeParams::default() };
-    let ask = Ask { pose, viewer: question.viewer, head: question.head, params };
+    let ask = Ask { pose, viewer, head: question.head, params };
     let look = to.gazes.choose(robot, question.at_ns, looked, &map, &ask).map_err(|e| refused(&e))?;
     let name_of =
         |c: &map::gaze::Choice| map.landmarks.get(&c.landmark).map(|l| l.name.clone()).unwrap_or_default();

@@ -26,7 +26,9 @@ pub(super) fn camera(text: &str) -> Result<Intrinsics, String> {
             ([fx, fy, cx, cy], Some(IntrinsicsSigmas { focal_px, center_px }))
         }
         _ => {
-            return Err("four numbers: fx,fy,cx,cy in pixels; or six, with two standard deviations".to_owned());
+            return Err(
+                "four numbers: fx,fy,cx,cy in pixels; or six, with two standard deviations".to_owned()
+            );
         }
     };
     let [fx, fy, cx, cy] = pinhole;

@@ -17,6 +17,7 @@ mod run;
 pub(crate) mod scratch;
 mod screen;
 mod serve;
+mod sight;
 mod survey;
 mod teach;
 

@@ -3,6 +3,7 @@
 use super::{
     given::{camera, numbers, size},
     mapping, screen,
+    sight::{self, SightArgs},
 };
 use client::{
     ClientError, MapClient,
@@ -59,6 +60,19 @@ pub(crate) enum MapCommand {
         name: String,
         #[command(flatten)]
         found: WhereArgs,
+        #[command(flatten)]
+        server: ServerArgs,
+    },
+    /// Say which camera looks for a map's landmarks, and what counts as seen by it; without options, show that.
+    ///
+    /// The areas from which landmarks are seen are made for it. For example, a camera 0.8 m up that tilts up to 60 degrees:
+    ///   waymark map sight office --image 1280x720 --focal-px 900 --camera-height-m 0.8 --tilt-deg -10,60
+    #[command(verbatim_doc_comment)]
+    Sight {
+        /// The map.
+        name: String,
+        #[command(flatten)]
+        sight: SightArgs,
         #[command(flatten)]
         server: ServerArgs,
     },
@@ -215,6 +229,10 @@ pub(crate) async fn map(command: &MapCommand) -> anyhow::Result<()> {
         MapCommand::Place { name, found, server } => {
             let map = MapClient::new(&server.server)?.place_map(name, &found.changes()).await?;
             show(server, &map, &format!("{}  {}", map.name, map.whereabouts()))
+        }
+        MapCommand::Sight { name, sight, server } => {
+            let found = sight.set(&MapClient::new(&server.server)?, name).await?;
+            show(server, &found, &sight::sentences(name, &found))
         }
         MapCommand::List { server } => {
             let maps = MapClient::new(&server.server)?.maps().await?;

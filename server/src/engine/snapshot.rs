@@ -10,7 +10,7 @@ use map::{
     place::LandmarkPlace,
     pose2::Pose2Covariance,
     segments::LaserSegment,
-    visibility::VisibilityMap,
+    visibility::{Sight, VisibilityMap},
 };
 use std::{collections::BTreeMap, sync::Arc};
 use tokio::sync::broadcast;
@@ -49,7 +49,9 @@ pub struct MapSnapshot {
     pub wall_index: Arc<WallIndex>,
     /// What runs have shown of modalities; kept from version to version while it is the same.
     pub(crate) areas: Kept,
-    /// From where each placed landmark is seen.
+    /// The camera that looks for its landmarks, and what counts as seen.
+    pub sight: Sight,
+    /// From where each placed landmark is seen by that camera.
     pub visibility: BTreeMap<LandmarkId, Arc<VisibilityMap>>,
     /// Which distance decides.
     pub distance: DistanceKind,
@@ -72,6 +74,7 @@ impl MapSnapshot {
             walls: Vec::new(),
             wall_index: Arc::new(WallIndex::new([])),
             areas: Kept::default(),
+            sight: Sight::default(),
             visibility: BTreeMap::new(),
             distance: DistanceKind::Both,
             params: Arc::default(),

@@ -41,7 +41,7 @@ pub(crate) struct Problem {
 pub(crate) struct ApiError {
     pub(crate) status: StatusCode,
     pub(crate) code: &'static str,
-    field: Option<String>,
+    pub(crate) field: Option<String>,
     detail: String,
     more: serde_json::Map<String, Value>,
 }

@@ -20,6 +20,7 @@ mod recognise;
 mod resources;
 mod robots;
 mod runs;
+mod sight;
 mod router;
 mod upload;
 mod cameras;

@@ -2,7 +2,7 @@
 
 use super::{
     App, Shared, areas, cameras, error::ApiError, gathering, guard, health, landmarks, laser, learning, live,
-    mapping, maps, pages, recognise, robots, runs, views, visibility,
+    mapping, maps, pages, recognise, robots, runs, sight, views, visibility,
 };
 use crate::config::Limits;
 use axum::{
@@ -41,6 +41,7 @@ fn api(limits: &Limits) -> OpenApiRouter<Shared> {
         .merge(visibility::router())
         .merge(areas::router())
         .merge(runs::router(limits.upload_bytes))
+        .merge(sight::router())
         .merge(recognise::router(limits.upload_bytes))
         .merge(robots::router())
         .merge(cameras::router())

@@ -3,8 +3,9 @@
 use super::{
     Shared,
     error::{ApiError, Problem},
-    extract::{At, Body},
+    extract::{At, Body, Params},
     resources::out_of_range,
+    sight::{self, Fields},
 };
 use crate::{
     engine::{
@@ -16,8 +17,9 @@ use crate::{
 use axum::{Json, extract::State, http::StatusCode};
 use map::{
     gaze::{Choice, Criterion, GazeParams, Head},
+    place::LandmarkPlace,
     pose2::{Pose2, Pose2Covariance},
-    visibility::{Feature, PoseDraws, Viewer, coverage},
+    visibility::{Feature, PoseDraws, Sight, Viewer, coverage},
 };
 use nalgebra::{Matrix3, Point2, Vector2};
 use serde::{Deserialize, Serialize};
@@ -25,6 +27,9 @@ use std::sync::Arc;
 use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
 use vision::recognise::LandmarkId;
+
+/// Landmarks are taken to hang so far before their walls at most.
+const STANDOFF_M: f64 = 0.5;
 
 pub(super) fn router() -> OpenApiRouter<Shared> {
     OpenApiRouter::new()
@@ -43,22 +48,28 @@ fn name_of(map: &MapSnapshot, id: LandmarkId) -> String {
     map.landmarks.get(&id).map(|l| l.name.clone()).unwrap_or_default()
 }
 
-/// The area on the floor from which a landmark is seen, as a GeoJSON feature in map metres. The camera is that of a usual
-/// robot (640 x 480, 64 degrees across, 1.2 m high, tilting by 20 degrees); sides of at least 75 px, at most 75 degrees
-/// off the normal.
+/// The area on the floor from which a landmark is seen, as a GeoJSON feature in map metres: by the map's camera
+/// (`/maps/{map}/sight`), or by another for this question.
 #[utoipa::path(get, path = "/maps/{map}/landmarks/{landmark}/visibility", tag = "landmarks",
-    params(("map" = String, Path), ("landmark" = String, Path)), responses(
+    params(("map" = String, Path), ("landmark" = String, Path), Fields), responses(
     (status = 200, body = Object, description = "GeoJSON `Feature` of a `MultiPolygon`; properties landmark, area_m2, centroid_m, reach_m"),
-    (status = 404, body = Problem), (status = 409, body = Problem, description = "not_placed")))]
+    (status = 400, body = Problem, description = "bad_query"), (status = 404, body = Problem),
+    (status = 409, body = Problem, description = "not_placed"),
+    (status = 422, body = Problem, description = "out_of_range")))]
 async fn area(
     State(app): State<Shared>,
     At((map, landmark)): At<(String, String)>,
+    Params(fields): Params<Fields>,
 ) -> Result<Json<Feature>, ApiError> {
     maps::get(app.store.reads(), &map).await?;
     let row = landmarks::get(app.store.reads(), &map, &landmark).await?;
     let map = snapshot(&app, &map)?;
-    let area = map.visibility.get(&LandmarkId(row.id as u64)).ok_or_else(|| {
-        let detail = "without size and a place on a wall it is not known from where it is seen";
+    let (id, other) = (LandmarkId(row.id as u64), fields.other(&map, "query")?);
+    let asked = map.landmarks.get(&id).and_then(|l| l.place);
+    let is_asked = move |place: &LandmarkPlace, _reach| asked.as_ref() == Some(place);
+    let found = app.on_vision_thread(move |_| sight::areas(&map, other.as_ref(), is_asked)).await??;
+    let area = found.get(&id).ok_or_else(|| {
+        let detail = "without size and place it is not known from where it is seen";
         ApiError::new(StatusCode::CONFLICT, "not_placed", detail).field("landmark")
     })?;
     Ok(Json(area.feature(&landmark)))
@@ -94,6 +105,9 @@ impl At2 {
 struct From {
     /// Its pose.
     pose: At2,
+    /// Another camera than the map's.
+    #[serde(default)]
+    sight: Fields,
 }
 
 /// A landmark that may be seen.
@@ -126,20 +140,32 @@ async fn visible(
     Body(from): Body<From>,
 ) -> Result<Json<Visible>, ApiError> {
     let (map, pose) = (snapshot(&app, &map)?, from.pose.checked()?);
-    let draws = PoseDraws::new(&pose, Vector2::zeros());
-    let mut seen: Vec<Seen> = map
-        .visibility
+    let other = from.sight.other(&map, "sight")?;
+    app.on_vision_thread(move |_| visible_from(&map, &pose, other.as_ref())).await?.map(Json)
+}
+
+fn visible_from(
+    map: &MapSnapshot,
+    pose: &Pose2Covariance,
+    other: Option<&Sight>,
+) -> Result<Visible, ApiError> {
+    let draws = PoseDraws::new(pose, Vector2::zeros());
+    let near = |place: &LandmarkPlace, reach: f64| {
+        (draws.mean() - Point2::new(place.x_m, place.y_m)).norm() <= reach + STANDOFF_M + draws.spread_m()
+    };
+    let areas = sight::areas(map, other, near)?;
+    let mut seen: Vec<Seen> = areas
         .iter()
         .map(|(id, area)| (id, area, area.probability(&draws)))
         .filter(|(_, _, probability)| *probability > 0.0)
         .map(|(id, area, probability)| Seen {
-            landmark: name_of(&map, *id),
+            landmark: name_of(map, *id),
             probability,
             margin_m: area.margin_m(&draws.mean()),
         })
         .collect();
     seen.sort_by(|a, b| b.probability.total_cmp(&a.probability).then(a.landmark.cmp(&b.landmark)));
-    Ok(Json(Visible { map_version: map.version, landmarks: seen }))
+    Ok(Visible { map_version: map.version, landmarks: seen })
 }
 
 /// A path to look at.
@@ -151,6 +177,9 @@ struct Along {
     /// How often to look: 0.01 to 10 m.
     #[serde(default = "step_m")]
     step_m: f64,
+    /// Another camera than the map's.
+    #[serde(default)]
+    sight: Fields,
 }
 
 fn step_m() -> f64 {
@@ -199,7 +228,10 @@ async fn along(
 
 fn covered(map: &MapSnapshot, along: &Along) -> Result<Coverage, ApiError> {
     let path: Vec<_> = along.path.iter().map(|p| Point2::new(p[0], p[1])).collect();
-    let areas: Vec<_> = map.visibility.iter().map(|(id, area)| (*id, &**area)).collect();
+    let other = along.sight.other(map, "sight")?;
+    let near = |place: &LandmarkPlace, reach: f64| comes_near(&path, place, reach + STANDOFF_M);
+    let made = sight::areas(map, other.as_ref(), near)?;
+    let areas: Vec<_> = made.iter().map(|(id, area)| (*id, &**area)).collect();
     let found = coverage(&path, along.step_m, &areas).map_err(|e| out_of_range(&e, "path"))?;
     let step = |s: &map::visibility::Seen| Step {
         along_m: s.along_m,
@@ -216,6 +248,14 @@ fn covered(map: &MapSnapshot, along: &Along) -> Result<Coverage, ApiError> {
     })
 }
 
+/// Whether a path's bounding box comes within `reach_m` of a landmark.
+fn comes_near(path: &[Point2<f64>], place: &LandmarkPlace, reach_m: f64) -> bool {
+    let Some(first) = path.first() else { return false };
+    let (low, high) = path.iter().fold((*first, *first), |(low, high), p| (low.inf(p), high.sup(p)));
+    let at = Point2::new(place.x_m, place.y_m);
+    (at - at.sup(&low).inf(&high)).norm() <= reach_m
+}
+
 /// A question where to look.
 #[derive(Debug, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
@@ -226,10 +266,9 @@ struct Question {
     #[serde(default)]
     #[schema(value_type = Object)]
     head: Head,
-    /// `focal_px`, `pan_rad`, `tilt_rad` and the rest of the camera.
-    #[serde(default)]
-    #[schema(value_type = Object)]
-    viewer: Viewer,
+    /// `focal_px`, `pan_rad`, `tilt_rad` and the rest of the camera; absent for the map's (`/maps/{map}/sight`).
+    #[schema(value_type = Option<Object>)]
+    viewer: Option<Viewer>,
     /// `product` (the paper's) or `information`.
     #[serde(default)]
     #[schema(value_type = String)]
@@ -284,7 +323,8 @@ async fn gaze(
 ) -> Result<Json<Advice>, ApiError> {
     let (map, pose) = (snapshot(&app, &map)?, question.pose.checked()?);
     let params = GazeParams { criterion: question.criterion, ..GazeParams::default() };
-    let ask = Ask { pose, viewer: question.viewer, head: question.head, params };
+    let viewer = question.viewer.unwrap_or_else(|| map.sight.viewer.clone());
+    let ask = Ask { pose, viewer, head: question.head, params };
     let found = ranked(&map, &ask).map_err(|e| out_of_range(&e, "question"))?;
     Ok(Json(Advice { map_version: map.version, ranked: found.iter().map(|c| aim(&map, c)).collect() }))
 }

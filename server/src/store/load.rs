@@ -4,7 +4,7 @@
 use super::{
     StoreError, areas, landmarks, laser, maps,
     models::{self, ModelDigest},
-    robots, seen, sites,
+    robots, seen, sights, sites,
     statements::statements,
 };
 use crate::engine::doubles;
@@ -25,7 +25,7 @@ use vision::{
 };
 
 statements! {
-    MAP = "SELECT name, version, distance FROM maps WHERE id = ?1";
+    MAP = "SELECT name, version, distance, sight FROM maps WHERE id = ?1";
     MAP_IDS = "SELECT id FROM maps ORDER BY id";
     LANDMARKS = "SELECT id, name, width_m, height_m, x_m, y_m, z_m, theta_rad, roll_rad, tilt_rad, place_covariance, \
                  size_from_views, standing FROM landmarks WHERE map_id = ?1 ORDER BY id";
@@ -89,7 +89,8 @@ pub(super) async fn map(
     let before = snapshots.get(&name);
     let wall_index = wall_index(&walls, before.as_deref()).await;
     let areas = areas::all(&mut *conn, id, before.as_deref().map(|map| &map.areas)).await?;
-    let visibility = seen::areas(&infos, &walls, before.clone()).await;
+    let sight = sights::read(&name, row.try_get::<Option<&str>, _>("sight").map_err(at())?);
+    let visibility = seen::areas(&infos, &walls, &sight, before.clone()).await;
     let (learnt, quarantined) = models(conn, id, before.as_deref(), params).await?;
     for (id, reason) in &quarantined {
         let landmark = infos.get(id).map_or("", |l: &LandmarkInfo| l.name.as_str());
@@ -111,6 +112,7 @@ pub(super) async fn map(
         walls,
         wall_index,
         areas,
+        sight,
         visibility,
         distance,
         params: params.clone(),

@@ -20,6 +20,7 @@ pub(crate) mod gatherings;
 pub(crate) mod accepting;
 pub(crate) mod areas;
 mod seen;
+pub(crate) mod sights;
 pub(crate) mod robots;
 pub(crate) mod jobs;
 

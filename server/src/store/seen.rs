@@ -1,17 +1,14 @@
-//! Visibility areas of a map's landmarks, off the runtime; taken over from the snapshot before where neither the
-//! landmark's place nor an obstacle within its reach has changed.
+//! Visibility areas of a map's landmarks, off the runtime; taken over from the snapshot before where neither the camera,
+//! the landmark's place nor an obstacle within its reach has changed.
 
 use crate::engine::snapshot::{LandmarkInfo, MapSnapshot};
 use map::{
     place::LandmarkPlace,
     segments::LaserSegment,
-    visibility::{Obstacle, Viewer, VisibilityMap, VisibilityParams, visibility, within_reach},
+    visibility::{Obstacle, Sight, VisibilityMap, visibility, within_reach},
 };
 use std::{collections::BTreeMap, sync::Arc};
 use vision::recognise::LandmarkId;
-
-/// What is tilted more hangs on no wall: seen in plan view its area would be wrong.
-const MAX_TILT_RAD: f64 = 0.2;
 
 type Areas = BTreeMap<LandmarkId, Arc<VisibilityMap>>;
 
@@ -19,13 +16,12 @@ type Areas = BTreeMap<LandmarkId, Arc<VisibilityMap>>;
 pub(super) async fn areas(
     landmarks: &BTreeMap<LandmarkId, LandmarkInfo>,
     walls: &[LaserSegment],
+    sight: &Sight,
     before: Option<Arc<MapSnapshot>>,
 ) -> Areas {
-    let on_walls = |place: &LandmarkPlace| place.tilt_rad.abs() <= MAX_TILT_RAD;
-    let places: Vec<_> =
-        landmarks.iter().filter_map(|(id, l)| Some((*id, l.place.filter(on_walls)?))).collect();
-    let obstacles: Vec<Obstacle> = walls.iter().map(Obstacle::from).collect();
-    let made = tokio::task::spawn_blocking(move || all(&places, &obstacles, before.as_deref()));
+    let places: Vec<_> = landmarks.iter().filter_map(|(id, l)| Some((*id, l.place?))).collect();
+    let (obstacles, sight): (Vec<Obstacle>, _) = (walls.iter().map(Obstacle::from).collect(), sight.clone());
+    let made = tokio::task::spawn_blocking(move || all(&places, &obstacles, &sight, before.as_deref()));
     made.await.unwrap_or_else(|error| {
         tracing::error!(%error, "visibility areas");
         Areas::new()
@@ -35,18 +31,19 @@ pub(super) async fn areas(
 fn all(
     places: &[(LandmarkId, LandmarkPlace)],
     obstacles: &[Obstacle],
+    sight: &Sight,
     before: Option<&MapSnapshot>,
 ) -> Areas {
-    let (viewer, p) = (Viewer::default(), VisibilityParams::default());
+    let before = before.filter(|before| before.sight == *sight);
     let kept = |id: &LandmarkId, place: &LandmarkPlace| {
         let before = before?;
         let area = before.visibility.get(id)?;
         let same = before.landmarks.get(id)?.place.as_ref() == Some(place)
-            && within_reach(place, obstacles, &viewer, &p) == area.obstacles();
+            && within_reach(place, obstacles, &sight.viewer, &sight.seen) == area.obstacles();
         same.then(|| area.clone())
     };
     let one = |(id, place): &(LandmarkId, LandmarkPlace)| {
-        let made = || visibility(place, obstacles, &viewer, &p).map(Arc::new);
+        let made = || visibility(place, obstacles, &sight.viewer, &sight.seen).map(Arc::new);
         let area = kept(id, place).map_or_else(made, Ok);
         let area = area.inspect_err(|error| tracing::error!(%error, landmark = id.0, "no visibility area"));
         Some((*id, area.ok()?))
@@ -68,7 +65,8 @@ mod tests {
             |x| LandmarkPlace::by_hand(Vector3::new(x, 0.0, 1.5), 0.0, size, PlaceSigmas::default()).unwrap();
         let places = [(LandmarkId(1), place(0.0)), (LandmarkId(2), place(50.0))];
         let wall = |x: f64| Obstacle { a: Point2::new(x, -1.0), b: Point2::new(x, 1.0), height_m: None };
-        let first = all(&places, &[wall(2.0), wall(53.0)], None);
+        let usual = Sight::default();
+        let first = all(&places, &[wall(2.0), wall(53.0)], &usual, None);
         let info = |place| LandmarkInfo {
             name: String::new(),
             size: Some(size),
@@ -80,11 +78,15 @@ mod tests {
             visibility: first.clone(),
             ..MapSnapshot::empty("hall", 1)
         };
-        let again = all(&places, &[wall(2.0), wall(52.5)], Some(&snapshot));
+        let again = all(&places, &[wall(2.0), wall(52.5)], &usual, Some(&snapshot));
         assert!(Arc::ptr_eq(&first[&LandmarkId(1)], &again[&LandmarkId(1)]), "nothing near it changed");
         assert!(again[&LandmarkId(2)].area_m2() < first[&LandmarkId(2)].area_m2());
+        let mut other = usual.clone();
+        other.viewer.focal_px *= 2.0;
+        let wide = all(&places, &[wall(2.0), wall(53.0)], &other, Some(&snapshot));
+        assert!(wide[&LandmarkId(1)].reach_m() > 1.9 * first[&LandmarkId(1)].reach_m(), "another camera");
         let moved = [(LandmarkId(1), place(0.1)), places[1]];
-        let again = all(&moved, &[wall(2.0), wall(53.0)], Some(&snapshot));
+        let again = all(&moved, &[wall(2.0), wall(53.0)], &usual, Some(&snapshot));
         assert!(!Arc::ptr_eq(&first[&LandmarkId(1)], &again[&LandmarkId(1)]));
         assert!(Arc::ptr_eq(&first[&LandmarkId(2)], &again[&LandmarkId(2)]));
     }

@@ -16,6 +16,7 @@ async fn every_statement_prepares_on_the_migrated_schema() {
     let all = [
         maps::ALL,
         sites::ALL,
+        sights::ALL,
         landmarks::ALL,
         views::ALL,
         models::ALL,

@@ -1,5 +1,5 @@
 //! `waymark evaluate visibility`: the closed-form areas against brute force, their sizes against counting, and what they
-//! and the choice where to look cost. Needs neither server nor data.
+//! and the choice where to look cost; of landmarks on walls, and of tilted ones. Needs neither server nor data.
 
 use super::super::{clock::Clock, screen};
 use map::{
@@ -9,7 +9,7 @@ use map::{
     visibility::{Obstacle, Viewer, VisibilityMap, VisibilityParams, pointwise, visibility},
 };
 use nalgebra::{Matrix3, Point2, Rotation2, Vector2, Vector3};
-use std::path::PathBuf;
+use std::{f64::consts::FRAC_PI_2, path::PathBuf};
 use vision::{learn::random::Random, localise::pose::LandmarkSize, recognise::LandmarkId};
 
 /// Landmarks of the hall in which the choice where to look is timed.
@@ -18,10 +18,11 @@ const HALL: usize = 1000;
 /// `waymark evaluate visibility`.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// Random maps: a landmark on its wall among a dozen obstacles.
+    /// Random maps: a landmark on its wall among a dozen obstacles; and as many with it under a ceiling, on the floor or
+    /// leaning.
     #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     maps: u32,
-    /// Points compared, over all maps.
+    /// Points compared, over all maps of a kind.
     #[arg(long, default_value_t = 20_000, value_parser = clap::value_parser!(u32).range(100..=10_000_000))]
     points: u32,
     /// Seed of maps and points.
@@ -30,7 +31,7 @@ pub(crate) struct Args {
     /// Prints one JSON object.
     #[arg(long)]
     json: bool,
-    /// Draws the first maps as SVG.
+    /// Draws the first maps of each kind as SVG.
     #[arg(long)]
     plot: Option<PathBuf>,
 }
@@ -41,9 +42,9 @@ struct Plan {
     viewer: Viewer,
 }
 
-/// What was counted.
+/// What was counted over maps of one kind.
 #[derive(Debug, Default, serde::Serialize)]
-struct Figures {
+struct Compared {
     maps: u32,
     /// Of them seen from nowhere: an obstacle cuts the landmark, or it is out of reach.
     empty: u32,
@@ -56,16 +57,43 @@ struct Figures {
     area_error: f64,
     /// Median and worst milliseconds of processor time for one landmark.
     ms_per_landmark: [f64; 2],
-    /// The same for the choice where to look among a thousand landmarks.
+}
+
+#[derive(Debug, serde::Serialize)]
+struct Figures {
+    /// Landmarks on walls.
+    #[serde(flatten)]
+    upright: Compared,
+    /// Under ceilings, on floors, leaning.
+    tilted: Compared,
+    /// Median and worst milliseconds for the choice where to look among a thousand landmarks.
     gaze_ms: [f64; 2],
     gaze_in_sight: usize,
 }
 
 pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
-    let p = VisibilityParams::default();
-    let mut figures = Figures { maps: args.maps, points: args.points, ..Figures::default() };
-    let (mut counted, mut area, mut times) = (0.0, 0.0, Vec::new());
     let mut drawn = String::new();
+    let upright = compared(args, plan, (&mut drawn, 0))?;
+    let tilted = compared(args, tilted_plan, (&mut drawn, DRAWN))?;
+    let (gaze_ms, gaze_in_sight) = gaze_ms(args.seed)?;
+    if let Some(path) = &args.plot {
+        let svg = format!(
+            r#"<svg xmlns="http://www.w3.org/2000/svg" width="960" height="1280" viewBox="0 0 960 1280"><rect width="960" height="1280" fill="white"/>{drawn}</svg>"#
+        );
+        std::fs::write(path, svg)?;
+    }
+    show(&Figures { upright, tilted, gaze_ms, gaze_in_sight }, args.json)
+}
+
+/// Maps of each kind that are drawn.
+const DRAWN: u32 = 6;
+
+type Planner = fn(&mut Random) -> anyhow::Result<Plan>;
+
+fn compared(args: &Args, plan: Planner, (drawn, place): (&mut String, u32)) -> anyhow::Result<Compared> {
+    let p = VisibilityParams::default();
+    let mut figures = Compared { maps: args.maps, points: args.points, ..Compared::default() };
+    let (mut counted, mut area, mut times) = (0.0, 0.0, Vec::new());
     for m in 0..args.maps {
         let mut random = Random::new(args.seed.wrapping_mul(1_000_003) ^ u64::from(m));
         let plan = plan(&mut random)?;
@@ -86,21 +114,14 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         }
         counted += counted_m2(&plan, &p, map.reach_m());
         area += map.area_m2();
-        if m < 6 {
-            draw(&mut drawn, m, &plan, &map);
+        if m < DRAWN {
+            draw(drawn, place + m, &plan, &map);
         }
     }
     figures.agreement = 1.0 - f64::from(figures.differ) / f64::from(args.points);
     figures.area_error = area / counted - 1.0;
     figures.ms_per_landmark = middle_and_worst(times);
-    (figures.gaze_ms, figures.gaze_in_sight) = gaze_ms(args.seed)?;
-    if let Some(path) = &args.plot {
-        let svg = format!(
-            r#"<svg xmlns="http://www.w3.org/2000/svg" width="960" height="640" viewBox="0 0 960 640"><rect width="960" height="640" fill="white"/>{drawn}</svg>"#
-        );
-        std::fs::write(path, svg)?;
-    }
-    show(&figures, args.json)
+    Ok(figures)
 }
 
 fn show(f: &Figures, json: bool) -> anyhow::Result<()> {
@@ -108,16 +129,16 @@ fn show(f: &Figures, json: bool) -> anyhow::Result<()> {
         screen::say(&serde_json::to_string(f)?);
         return Ok(());
     }
-    let ([ms, worst], [gaze, slowest]) = (f.ms_per_landmark, f.gaze_ms);
-    screen::say(&format!("maps                      {} ({} seen from nowhere)", f.maps, f.empty));
-    screen::say(&format!("points                    {} ({} from which it is seen)", f.points, f.seen));
-    screen::say(&format!(
-        "polygons, brute force     {} differ, {:.3} % agree",
-        f.differ,
-        100.0 * f.agreement
-    ));
-    screen::say(&format!("areas against counting    {:+.3} %", 100.0 * f.area_error));
-    screen::say(&format!("one landmark              {ms:.3} ms, at most {worst:.3}"));
+    for (kind, c) in [("on walls", &f.upright), ("tilted", &f.tilted)] {
+        let [ms, worst] = c.ms_per_landmark;
+        screen::say(&format!("maps, {kind:<9}           {} ({} seen from nowhere)", c.maps, c.empty));
+        screen::say(&format!("points                    {} ({} from which it is seen)", c.points, c.seen));
+        let agree = 100.0 * c.agreement;
+        screen::say(&format!("polygons, brute force     {} differ, {agree:.3} % agree", c.differ));
+        screen::say(&format!("areas against counting    {:+.3} %", 100.0 * c.area_error));
+        screen::say(&format!("one landmark              {ms:.3} ms, at most {worst:.3}"));
+    }
+    let [gaze, slowest] = f.gaze_ms;
     screen::say(&format!(
         "where to look, of {HALL}    {gaze:.3} ms, at most {slowest:.3} ({} in sight)",
         f.gaze_in_sight
@@ -156,6 +177,22 @@ fn plan(random: &mut Random) -> anyhow::Result<Plan> {
         ..Viewer::default()
     };
     Ok(Plan { place, obstacles, viewer })
+}
+
+/// The same with the landmark under the ceiling, on the floor or leaning, off its wall, and a camera that looks there.
+fn tilted_plan(random: &mut Random) -> anyhow::Result<Plan> {
+    let mut made = plan(random)?;
+    let tilt_rad = match random.next_u64() % 4 {
+        0 => FRAC_PI_2,
+        1 => -FRAC_PI_2,
+        _ => random.range(-FRAC_PI_2, FRAC_PI_2),
+    };
+    let rise = random.range(-0.3, 2.5);
+    let z_m = made.viewer.camera_height_m + rise * tilt_rad.signum();
+    made.place = LandmarkPlace { tilt_rad, z_m, ..made.place };
+    made.viewer.tilt_rad = [random.range(-1.5, -0.6), random.range(0.6, 1.5)];
+    made.obstacles.remove(0);
+    Ok(made)
 }
 
 /// The area by counting the cells of a grid.
@@ -221,9 +258,13 @@ fn draw(svg: &mut String, index: u32, plan: &Plan, map: &VisibilityMap) {
         (origin[0] + 17.0 * (q.x - plan.place.x_m), origin[1] - 17.0 * (q.y - plan.place.y_m))
     };
     for polygon in map.polygons() {
-        let corners: Vec<String> =
-            polygon.corners.iter().map(at).map(|(u, v)| format!("{u:.1},{v:.1}")).collect();
-        put(svg, &format!(r##"<polygon points="{}" fill="#9ecae1" stroke="#3182bd"/>"##, corners.join(" ")));
+        let ring = |corners: &[Point2<f64>]| {
+            let corners: Vec<String> =
+                corners.iter().map(at).map(|(u, v)| format!("{u:.1} {v:.1}")).collect();
+            if corners.is_empty() { String::new() } else { format!("M{}Z", corners.join("L")) }
+        };
+        let rings = ring(&polygon.corners) + &ring(&polygon.hole);
+        put(svg, &format!(r##"<path d="{rings}" fill="#9ecae1" fill-rule="evenodd" stroke="#3182bd"/>"##));
     }
     let mut line = |a: (f64, f64), b: (f64, f64), colour: &str, width: f64| {
         put(

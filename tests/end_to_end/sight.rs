@@ -1,0 +1,134 @@
+//! Claim: from where landmarks are seen is told for the camera that looks: each map has its own, set over HTTP or by the
+//! command line with errors that name the field, kept over a restart; one question may ask for another. A sign under the
+//! ceiling is seen by a camera that looks up, and by no other.
+
+use reqwest::{Client, Method, StatusCode};
+use serde_json::{Value, json};
+use std::{f64::consts::FRAC_PI_2, time::Duration};
+use tests::{Child, command::waymark};
+
+async fn call(server: &Child, method: Method, path: &str, body: Option<Value>) -> (StatusCode, Value) {
+    let request = Client::new().request(method, format!("{}/api/v1/maps/hall{path}", server.url));
+    let request = match body {
+        Some(body) => request.json(&body),
+        None => request,
+    };
+    let answer = request.send().await.expect("an answer");
+    (answer.status(), answer.json().await.unwrap_or_default())
+}
+
+async fn get(server: &Child, path: &str) -> Value {
+    let (status, found) = call(server, Method::GET, path, None).await;
+    assert_eq!(status, StatusCode::OK, "{path}: {found}");
+    found
+}
+
+/// A hall with a poster on a wall and a sign under the ceiling.
+async fn hall(server: &Child) {
+    server.maps().create_map("hall", None).await.expect("created");
+    server
+        .maps()
+        .set_laser("hall", &[[[0.0, 0.0], [10.0, 0.0]], [[10.0, 8.0], [0.0, 8.0]]])
+        .await
+        .expect("walls");
+    for (name, place) in [
+        ("poster", json!({ "x_m": 5, "y_m": 0, "z_m": 1.5, "theta_rad": FRAC_PI_2 })),
+        ("sign", json!({ "x_m": 5, "y_m": 4, "z_m": 2.5, "theta_rad": 0, "tilt_rad": FRAC_PI_2 })),
+    ] {
+        let body = json!({ "name": name, "size": { "width_m": 0.6, "height_m": 0.6 }, "place": place });
+        let (status, made) = call(server, Method::POST, "/landmarks", Some(body)).await;
+        assert_eq!(status, StatusCode::CREATED, "{made}");
+    }
+}
+
+async fn area(server: &Child, landmark: &str, query: &str) -> f64 {
+    let found = get(server, &format!("/landmarks/{landmark}/visibility{query}")).await;
+    found["properties"]["area_m2"].as_f64().expect("an area")
+}
+
+async fn seen_from(server: &Child, sight: Value) -> Vec<String> {
+    let body = json!({ "pose": { "x_m": 5, "y_m": 3, "theta_rad": 0 }, "sight": sight });
+    let (status, found) = call(server, Method::POST, "/visible", Some(body)).await;
+    assert_eq!(status, StatusCode::OK, "{found}");
+    let mut names: Vec<String> = found["landmarks"]
+        .as_array()
+        .expect("a list")
+        .iter()
+        .filter_map(|l| l["landmark"].as_str().map(str::to_owned))
+        .collect();
+    names.sort();
+    names
+}
+
+async fn refusals(server: &Child) {
+    let version = get(server, "").await["version"].clone();
+    for (body, code, field) in [
+        (json!({ "focal_px": 5 }), "out_of_range", "focal_px"),
+        (json!({ "tilt_low_rad": 0.5, "tilt_high_rad": 0.4 }), "out_of_range", "tilt_high_rad"),
+        (json!({ "tilt_low_rad": -2 }), "out_of_range", "tilt_low_rad"),
+        (json!({ "max_incidence_rad": 1.5 }), "out_of_range", "max_incidence_rad"),
+        (json!({ "camera_height_m": "high" }), "bad_value", "camera_height_m"),
+        (json!({ "focal": 500 }), "bad_value", "focal"),
+    ] {
+        let (status, problem) = call(server, Method::PUT, "/sight", Some(body.clone())).await;
+        assert_eq!(status, StatusCode::UNPROCESSABLE_ENTITY, "{problem}");
+        assert_eq!(
+            (problem["code"].as_str(), problem["field"].as_str()),
+            (Some(code), Some(field)),
+            "{problem}"
+        );
+        if code == "out_of_range" {
+            let body = json!({ "pose": { "x_m": 0, "y_m": 0, "theta_rad": 0 }, "sight": body });
+            let (_, problem) = call(server, Method::POST, "/visible", Some(body)).await;
+            assert_eq!(problem["field"], format!("sight.{field}"), "{problem}");
+        }
+    }
+    assert_eq!(get(server, "").await["version"], version, "nothing was changed");
+    let (status, _) = call(server, Method::GET, "/landmarks/sign/visibility?focal_px=1", None).await;
+    assert_eq!(status, StatusCode::UNPROCESSABLE_ENTITY);
+}
+
+/// Another camera for one question, without a new version.
+async fn one_question(server: &Child) {
+    assert!(area(server, "sign", "").await <= 0.0, "the usual camera does not look up so far");
+    let usual = area(server, "poster", "").await;
+    assert!(area(server, "poster", "?focal_px=900").await > 1.5 * usual);
+    let up = json!({ "tilt_high_rad": 1.2 });
+    assert!(area(server, "sign", "?tilt_high_rad=1.2").await > 5.0);
+    assert_eq!(seen_from(server, json!({})).await, ["poster"]);
+    assert_eq!(seen_from(server, up.clone()).await, ["poster", "sign"]);
+    let path = json!({ "path": [[5, 2.6], [5, 3.2]], "sight": up });
+    let (status, along) = call(server, Method::POST, "/coverage", Some(path)).await;
+    assert_eq!(status, StatusCode::OK, "{along}");
+    assert_eq!(along["steps"][0]["landmarks"], json!(["sign"]), "{along}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn areas_are_those_of_the_camera_that_looks() {
+    let data = tempfile::tempdir().expect("a directory");
+    let server = Child::start(data.path());
+    hall(&server).await;
+    let usual = get(&server, "/sight").await;
+    assert_eq!(usual["focal_px"], 512.0, "{usual}");
+    refusals(&server).await;
+    one_question(&server).await;
+    let version = get(&server, "").await["version"].as_u64().expect("a number");
+    let command = ["map", "sight", "hall", "--tilt-deg", "-10,70", "--server", &server.url];
+    let run = waymark(command, Duration::from_secs(30));
+    assert!(run.status == 0 && run.stdout.contains("tilts -10.0 to 70.0"), "{run:?}");
+    assert_eq!(get(&server, "").await["version"], version + 1);
+    assert_eq!(seen_from(&server, json!({})).await, ["poster", "sign"]);
+    let gaze = json!({ "pose": { "x_m": 5, "y_m": 3, "theta_rad": 0 } });
+    let (status, ranked) = call(&server, Method::POST, "/gaze", Some(gaze)).await;
+    assert_eq!(status, StatusCode::OK, "nothing is learnt, but the question is answered: {ranked}");
+    let set = get(&server, "/sight").await;
+    assert_eq!(set["width_px"], usual["width_px"], "what is not given stays");
+    server.kill();
+    let server = Child::start(data.path());
+    assert_eq!(get(&server, "/sight").await, set);
+    assert!(area(&server, "sign", "").await > 5.0, "and the areas are made for it at the start");
+    let run = waymark(["map", "sight", "hall", "--usual", "--server", &server.url], Duration::from_secs(30));
+    assert_eq!(run.status, 0, "{run:?}");
+    assert_eq!(get(&server, "/sight").await, usual);
+    server.kill();
+}
