@@ -1,6 +1,7 @@
 // The live page: the map from above with every robot's tracks, and the last frame of one camera with its quads.
 // Reads the HTTP API once, then follows `maps/{map}/live` (server-sent events). Draws at most once per animation frame.
 
+import { drawHypotheses, fromAnswer, fromServer, positionText } from "/hypotheses.js";
 import { drawModalities, loadModalities } from "/modalities.js";
 
 const API = "/api/v1";
@@ -23,7 +24,7 @@ const getJson = async (path) => {
 
 function robotOf(name) {
   if (!state.robots.has(name)) {
-    state.robots.set(name, { tracks: { truth: [], odometry: [], pose: [] }, covariance: null, frames: 0, recognised: 0, corrections: 0 });
+    state.robots.set(name, { tracks: { truth: [], odometry: [], pose: [] }, covariance: null, hypotheses: [], needed: [], frames: 0, recognised: 0, corrections: 0 });
     byId("robot-hint").textContent = "";
   }
   return state.robots.get(name);
@@ -43,12 +44,14 @@ const heard = {
     const robot = robotOf(e.robot);
     robot.covariance = e.covariance;
     robot.corrections = e.corrections;
+    robot.hypotheses = [];
   },
   odometry(e) { extend(e.robot, "odometry", e.pose); },
   truth(e) { extend(e.robot, "truth", e.pose); },
   answer(e) {
     const robot = robotOf(e.robot);
     robot.frames += 1;
+    robot.hypotheses = fromAnswer(e.answer.hypotheses);
     for (const quad of e.answer.quads) {
       if (quad.verdict !== "unique") continue;
       robot.recognised += 1;
@@ -160,7 +163,7 @@ function resolveColours() {
   const probe = document.createElement("span");
   document.body.append(probe);
   const resolved = {};
-  for (const name of ["wall", "landmark", "truth", "odometry", "pose", "laser", "faint", "line", "ink"]) {
+  for (const name of ["wall", "landmark", "truth", "odometry", "pose", "hypothesis", "laser", "faint", "line", "ink"]) {
     probe.style.color = `var(--${name})`;
     resolved[name] = getComputedStyle(probe).color;
   }
@@ -198,6 +201,7 @@ function drawMap() {
     if (!layerOn(kind)) continue;
     for (const [name, robot] of state.robots) drawTrack(c, name, robot, kind, px, ink);
   }
+  if (layerOn("hypotheses")) for (const [name, robot] of state.robots) drawHypotheses(c, name, robot, px, px_per_m, ink.hypothesis);
 }
 
 const stroke = (c, style, width) => { c.strokeStyle = style; c.fillStyle = style; c.lineWidth = width; };
@@ -323,6 +327,15 @@ function ellipse(c, u, v, covariance) {
 
 // ---- the robots ----
 
+// What a robot that searches still needs.
+async function askNeeds() {
+  for (const [name, robot] of state.robots) {
+    if (!robot.hypotheses.length) continue;
+    const found = await getJson(`/robots/${encodeURIComponent(name)}/hypotheses`).catch(() => null);
+    robot.needed = found?.needed ?? [];
+  }
+}
+
 function errorOf(robot, kind) {
   const truth = robot.tracks.truth.at(-1), other = robot.tracks[kind].at(-1);
   return truth && other ? `${Math.hypot(truth.x_m - other.x_m, truth.y_m - other.y_m).toFixed(2)} m` : "";
@@ -332,7 +345,7 @@ function listRobots() {
   const rows = [...state.robots].sort(([a], [b]) => a.localeCompare(b)).map(([name, robot]) => {
     const pose = robot.tracks.pose.at(-1);
     const sigma = robot.covariance ? `${Math.sqrt(robot.covariance[0] + robot.covariance[4]).toFixed(2)} m` : "";
-    return row([name, pose ? `${pose.x_m.toFixed(2)}, ${pose.y_m.toFixed(2)} m, ${(pose.theta_rad * 180 / Math.PI).toFixed(0)}°` : "not localised yet",
+    return row([name, pose ? `${pose.x_m.toFixed(2)}, ${pose.y_m.toFixed(2)} m, ${(pose.theta_rad * 180 / Math.PI).toFixed(0)}°` : positionText(robot),
       sigma, robot.frames, robot.recognised, robot.corrections, errorOf(robot, "pose"), errorOf(robot, "odometry")]);
   });
   byId("robots").replaceChildren(...rows);
@@ -364,6 +377,8 @@ async function loadTracks(map) {
   for (const { name } of robots.filter((robot) => !state.robots.has(robot.name))) {
     const tracks = await getJson(`/robots/${encodeURIComponent(name)}/tracks`);
     if (tracks.pose.length || tracks.odometry.length || tracks.truth.length) Object.assign(robotOf(name).tracks, tracks);
+    const found = await getJson(`/robots/${encodeURIComponent(name)}/hypotheses`);
+    if (found.searching && found.map === map) Object.assign(robotOf(name), { hypotheses: fromServer(found), needed: found.needed });
   }
 }
 
@@ -386,6 +401,14 @@ function grouped(maps) {
   });
 }
 
+// The list anew, and where the map of this page lies.
+async function mapsChanged() {
+  const choice = byId("map-choice"), chosen = choice.value;
+  choice.replaceChildren(...grouped((await getJson("/maps?limit=500")).items));
+  choice.value = chosen;
+  await loadMap(chosen);
+}
+
 async function start() {
   const maps = (await getJson("/maps?limit=500")).items;
   const choice = byId("map-choice");
@@ -403,6 +426,7 @@ async function start() {
 }
 
 function wireUp() {
+  window.addEventListener("maps-changed", () => mapsChanged().catch(() => { /* the next change brings it */ }));
   byId("map-choice").addEventListener("change", (e) => { location.search = `?map=${encodeURIComponent(e.target.value)}`; });
   byId("camera-choice").addEventListener("change", (e) => {
     state.camera = e.target.value;
@@ -452,5 +476,6 @@ start().catch((error) => {
   byId("map-hint").textContent = `The server does not answer as expected (${error.message}). Reload to try again.`;
 });
 setInterval(listRobots, 500);
+setInterval(askNeeds, 2000);
 const loop = () => { drawMap(); requestAnimationFrame(loop); };
 loop();

@@ -1,6 +1,7 @@
 //! Landmarks that look alike, for a robot that does not know where it is. Thresholds that tell landmarks from one another
 //! refuse what fits several; here they are lifted to what they would be if nothing looked like them, so that a sighting may
-//! be of any of a few. Out: where the robot would stand for each of them. Never a recognition.
+//! be of any of those that look the same: which these are is known before anything is seen. Out: where the robot would
+//! stand for each of them. Never a recognition.
 
 use super::snapshot::{Learnt, MapSnapshot};
 use map::{
@@ -11,23 +12,37 @@ use map::{
     pose2::Pose2,
 };
 use nalgebra::Matrix6;
-use std::{collections::BTreeMap, sync::Arc};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    sync::Arc,
+};
 use vision::{
     frame::{GrayImage, Intrinsics},
     learn::{
-        model::{Gate, LandmarkModel, ModelStatus, refit_thresholds},
+        model::{Gate, LandmarkModel, ModelStatus, refit_thresholds, unlikeness_of},
         threshold::LimitedBy,
     },
     localise::pose::{LandmarkPose, landmark_pose},
     params::Params,
     pipeline::{FrameFacts, QuadFacts, matched},
-    recognise::{
-        DistanceKind, LandmarkId, MAX_CANDIDATES, Recognition, Refusal, models::ModelSet, verdict::recognise,
-    },
+    recognise::{DistanceKind, LandmarkId, Recognition, Refusal, models::ModelSet, verdict::recognise},
 };
 
 /// Most landmarks with look-alikes that are kept for this.
 pub const MAX_DOUBLES: usize = 512;
+/// Pairs of them that are compared; from then on all count as alike.
+pub const MAX_COMPARED: usize = 20_000;
+/// Most landmarks that look the same: a sighting of more says too little for what it costs.
+pub const MAX_ALIKE: usize = map::hypotheses::MAX_MEMBERS / 2;
+
+/// The landmarks that have look-alikes.
+#[derive(Debug, Default)]
+pub struct Doubles {
+    /// Their models, with lifted thresholds.
+    pub models: ModelSet,
+    /// The landmarks that look like each, itself included.
+    pub alike: BTreeMap<LandmarkId, Arc<Vec<LandmarkId>>>,
+}
 
 /// Whether something looks like it: its threshold was held down by others, or none could be found for that.
 fn has_doubles(model: &LandmarkModel) -> bool {
@@ -47,13 +62,44 @@ fn has_doubles(model: &LandmarkModel) -> bool {
 }
 
 /// The landmarks that have look-alikes, with lifted thresholds; none where a map's distances decide alone.
-pub fn doubles(learnt: &BTreeMap<LandmarkId, Learnt>, kind: DistanceKind, p: &Params) -> ModelSet {
+pub fn doubles(learnt: &BTreeMap<LandmarkId, Learnt>, kind: DistanceKind, p: &Params) -> Doubles {
     if kind != DistanceKind::Both {
-        return ModelSet::default();
+        return Doubles::default();
     }
     let held = learnt.values().map(|l| &l.model).filter(|m| has_doubles(m)).take(MAX_DOUBLES);
-    let lifted = held.map(|model| Arc::new(refit_thresholds(model, &[], p))).filter(|m| m.is_active());
-    ModelSet::new(lifted.collect(), p).unwrap_or_default()
+    let lifted: Vec<_> =
+        held.map(|model| Arc::new(refit_thresholds(model, &[], p))).filter(|m| m.is_active()).collect();
+    let alike = alike(&lifted, p);
+    Doubles { models: ModelSet::new(lifted, p).unwrap_or_default(), alike }
+}
+
+/// Who looks like whom: of two that one takes for the other, and so on from one to the next. What looks like either of two
+/// is never left out, though the ends of a long chain may look nothing like each other.
+fn alike(models: &[Arc<LandmarkModel>], p: &Params) -> BTreeMap<LandmarkId, Arc<Vec<LandmarkId>>> {
+    let accepts = |a: &LandmarkModel, b: &LandmarkModel| unlikeness_of(a, &b.exemplars, p) < a.likeness.tau;
+    let (mut class, mut compared): (Vec<usize>, usize) = ((0..models.len()).collect(), 0);
+    for i in 0..models.len() {
+        for j in 0..i {
+            if class[i] == class[j] {
+                continue;
+            }
+            compared += 1;
+            let (a, b) = (&models[i], &models[j]);
+            if compared > MAX_COMPARED || accepts(a, b) || accepts(b, a) {
+                let (from, to) = (class[i], class[j]);
+                class.iter_mut().filter(|c| **c == from).for_each(|c| *c = to);
+            }
+        }
+    }
+    let mut classes: BTreeMap<usize, Vec<LandmarkId>> = BTreeMap::new();
+    for (model, class) in models.iter().zip(class) {
+        classes.entry(class).or_default().push(model.id);
+    }
+    let mut alike = BTreeMap::new();
+    for all in classes.into_values().map(Arc::new) {
+        alike.extend(all.iter().map(|id| (*id, all.clone())));
+    }
+    alike
 }
 
 /// One thing that was seen: each landmark it may be, and how it was seen if it is that one.
@@ -68,7 +114,7 @@ pub fn sighted(
     mounting: &Mounting,
     camera: &Intrinsics,
 ) -> Vec<Sighted> {
-    if map.doubles.is_empty() {
+    if map.doubles.models.is_empty() {
         return Vec::new();
     }
     let unsure =
@@ -83,15 +129,11 @@ fn one(
     mounting: &Mounting,
     camera: &Intrinsics,
 ) -> Option<Sighted> {
-    let verdict = recognise(image, &facts.quad, &map.doubles, DistanceKind::Both, &map.params);
+    let verdict = recognise(image, &facts.quad, &map.doubles.models, DistanceKind::Both, &map.params);
     let Recognition::Ambiguous(_) = verdict.recognition else { return None };
     let fits = |refusal: Option<Refusal>| matches!(refusal, None | Some(Refusal::Margin));
-    let members: Vec<LandmarkId> =
-        verdict.candidates.iter().filter(|c| fits(c.refusal)).map(|c| c.landmark).collect();
-    // As many as are told: there may be more of them.
-    if members.len() < 2 || members.len() >= MAX_CANDIDATES {
-        return None;
-    }
+    let fitting = verdict.candidates.iter().filter(|c| fits(c.refusal)).map(|c| c.landmark);
+    let members = members(fitting, &map.doubles.alike)?;
     let (corners_px, covariance_px2) = matched(&facts.quad, &verdict, &map.params)?;
     let mut sighted = Vec::new();
     for id in members {
@@ -101,6 +143,17 @@ fn one(
         sighted.extend(glimpses(id, place, &seen, mounting).into_iter().map(|glimpse| (id, glimpse)));
     }
     (!sighted.is_empty()).then_some(sighted)
+}
+
+/// All that a thing may be which several fit: those, and whatever looks like one of them. Of many only some are told.
+fn members(
+    fitting: impl Iterator<Item = LandmarkId>,
+    alike: &BTreeMap<LandmarkId, Arc<Vec<LandmarkId>>>,
+) -> Option<BTreeSet<LandmarkId>> {
+    let fitting: BTreeSet<LandmarkId> = fitting.collect();
+    let like = fitting.iter().filter_map(|id| alike.get(id)).flat_map(|all| all.iter().copied());
+    let all: BTreeSet<LandmarkId> = fitting.iter().copied().chain(like).collect();
+    (fitting.len() >= 2 && all.len() <= MAX_ALIKE).then_some(all)
 }
 
 /// Where the landmark is from the robot: one, or two where its picture allows both.
@@ -139,4 +192,60 @@ pub fn readings<'a>(
 /// A landmark's place as a pose on the floor.
 pub fn on_floor(place: &LandmarkPlace) -> Pose2 {
     Pose2::new(place.x_m, place.y_m, place.theta_rad)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use vision::{
+        detect::quads::Corners,
+        learn::model::{View, learn},
+        learn::synthesis,
+    };
+
+    /// Blocks of grey with a little of its own in a corner; another number, other blocks.
+    fn picture(number: usize, own: usize) -> GrayImage {
+        GrayImage::from_fn(240, 240, |u, v| {
+            if u > 216 && v > 216 {
+                return (40 + 12 * own) as u8;
+            }
+            let block = |size: usize| (u / size * 31 + v / size * 57 + size + number * 7919) as u64;
+            let hash = |x: u64| (x.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 48) % 128;
+            (hash(block(24)) + hash(block(60))) as u8
+        })
+    }
+
+    #[test]
+    fn twelve_like_doors_are_one_class_and_others_are_their_own() {
+        let p = Params::default();
+        let whole = Corners::try_from([[-0.5, -0.5], [239.5, -0.5], [239.5, 239.5], [-0.5, 239.5]]).unwrap();
+        let lesson = |id: u64, image: &GrayImage| {
+            let mut views = vec![View::photographed(image, &whole, &p).unwrap()];
+            views.extend(synthesis::views(image, &whole, 8, &p, id));
+            Arc::new(refit_thresholds(&learn(LandmarkId(id), &views, &[], &p).unwrap(), &[], &p))
+        };
+        let mut models: Vec<_> = (0..12).map(|i| lesson(i, &picture(1, i as usize))).collect();
+        models.extend([lesson(20, &picture(5, 0)), lesson(21, &picture(5, 3))]);
+        let alike = alike(&models, &p);
+        let of = |id: u64| alike[&LandmarkId(id)].iter().map(|l| l.0).collect::<Vec<_>>();
+        assert_eq!(of(0), (0..12).collect::<Vec<_>>());
+        assert!(Arc::ptr_eq(&alike[&LandmarkId(3)], &alike[&LandmarkId(11)]));
+        assert_eq!(of(20), [20, 21]);
+        // Five of the doors are told; it may be any of the twelve. One that fits alone settles nothing.
+        let ids = |ids: &[u64]| ids.iter().map(|id| LandmarkId(*id)).collect::<Vec<_>>();
+        assert_eq!(members(ids(&[0, 2, 4, 6, 8]).into_iter(), &alike).unwrap().len(), 12);
+        assert_eq!(members(ids(&[0, 20]).into_iter(), &alike).unwrap().len(), 14);
+        assert_eq!(members(ids(&[3]).into_iter(), &alike), None);
+    }
+
+    #[test]
+    fn too_many_that_look_the_same_say_nothing() {
+        let all = |count: u64| {
+            let ids: Arc<Vec<LandmarkId>> = Arc::new((0..count).map(LandmarkId).collect());
+            ids.iter().map(|id| (*id, ids.clone())).collect::<BTreeMap<_, _>>()
+        };
+        let some = || [LandmarkId(0), LandmarkId(1)].into_iter();
+        assert_eq!(members(some(), &all(MAX_ALIKE as u64)).unwrap().len(), MAX_ALIKE);
+        assert_eq!(members(some(), &all(MAX_ALIKE as u64 + 1)), None);
+    }
 }

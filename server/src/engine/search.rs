@@ -1,6 +1,7 @@
 //! Where a robot may be while nothing it sees is unique: the belief of `map::hypotheses` over the map, for each robot that
 //! searches. In: frames with odometry that show landmarks that have doubles. Out: the hypotheses that are left, and a pose
-//! once one of them holds 95 % and explains sightings of two different landmarks. On the vision threads only.
+//! once one of them holds 95 %, explains sightings of two different landmarks, and no other place does nearly as well. On
+//! the vision threads only.
 
 use super::{
     doubles::{Sighted, on_floor, readings},
@@ -12,10 +13,12 @@ use map::{
 };
 use nalgebra::{Matrix3, Point2, Vector2, Vector3};
 use protos::Name;
+use serde::Serialize;
 use std::{
     collections::{BTreeMap, BTreeSet, VecDeque},
     sync::{Arc, Mutex, PoisonError},
 };
+use utoipa::ToSchema;
 use vision::recognise::LandmarkId;
 
 /// Robots that search at a time, some 50 MB each at most; the one longest without a sighting gives way.
@@ -56,6 +59,39 @@ pub struct Glance<'a> {
     pub sighted: &'a [Sighted],
 }
 
+/// How far a robot's search has come.
+#[derive(Debug, Clone, Default)]
+pub struct Progress {
+    /// On which map.
+    pub map: String,
+    /// Its version.
+    pub map_version: u64,
+    /// The hypotheses, most probable first.
+    pub modes: Vec<Mode>,
+    /// Of the belief, nats.
+    pub entropy_nats: f64,
+    /// Sightings so far, the latest 32 at most.
+    pub sightings: usize,
+    /// Landmarks by which the first hypothesis explains them.
+    pub landmarks: Vec<LandmarkId>,
+    /// What is missing before the first one is the robot's pose.
+    pub needed: Vec<Need>,
+}
+
+/// Why the first hypothesis is not yet the pose.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Need {
+    /// Other places are too probable still.
+    FewerPlaces,
+    /// All sightings could be of one landmark: another is to be seen.
+    AnotherLandmark,
+    /// It does not explain enough of what was seen.
+    AgreeingSightings,
+    /// The landmarks hang so evenly that another place would explain what was seen nearly as well.
+    NoOtherPlace,
+}
+
 /// What is left after a frame.
 #[derive(Debug, Clone, Default)]
 pub struct Left {
@@ -77,6 +113,9 @@ struct Search {
     looks: VecDeque<(Pose2, f64, Vec<Sighted>)>,
     /// After the last sighting.
     modes: Vec<Mode>,
+    entropy_nats: f64,
+    landmarks: Vec<LandmarkId>,
+    needed: Vec<Need>,
 }
 
 /// All searches.
@@ -96,6 +135,24 @@ impl Searches {
         let search = self.of(robot, glance)?;
         let mut search = search.lock().unwrap_or_else(PoisonError::into_inner);
         search.glance(glance)
+    }
+
+    /// How far a robot's search has come; `None` for one that is not searching.
+    pub fn progress(&self, robot: &Name) -> Option<Progress> {
+        let search = {
+            let open = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+            open.all.get(robot).map(|(_, search)| search.clone())?
+        };
+        let search = search.lock().unwrap_or_else(PoisonError::into_inner);
+        Some(Progress {
+            map: search.map.clone(),
+            map_version: search.version,
+            modes: search.modes.clone(),
+            entropy_nats: search.entropy_nats,
+            sightings: search.looks.iter().map(|(.., sighted)| sighted.len()).sum(),
+            landmarks: search.landmarks.clone(),
+            needed: search.needed.clone(),
+        })
     }
 
     /// The robot knows where it is.
@@ -139,8 +196,20 @@ impl Search {
         let belief = Hypotheses::new(corners, |_| 1.0, &p).ok()?;
         let Glance { epoch, map, odometry, .. } = *glance;
         let (name, version) = (map.name.clone(), map.version);
-        let (way_m, looks, modes) = (0.0, VecDeque::new(), Vec::new());
-        Some(Self { epoch, map: name, version, p, belief, odometry, way_m, looks, modes })
+        Some(Self {
+            epoch,
+            map: name,
+            version,
+            p,
+            entropy_nats: belief.entropy_nats(),
+            belief,
+            odometry,
+            way_m: 0.0,
+            looks: VecDeque::new(),
+            modes: Vec::new(),
+            landmarks: Vec::new(),
+            needed: vec![Need::FewerPlaces, Need::AnotherLandmark],
+        })
     }
 
     fn glance(&mut self, glance: &Glance<'_>) -> Option<Left> {
@@ -169,19 +238,58 @@ impl Search {
         }
         self.looks.push_back((glance.odometry, self.way_m, glance.sighted.to_vec()));
         self.modes = self.belief.modes();
-        let modes = self.modes.clone();
-        let decided = modes.first().filter(|m| m.mass > self.p.decided).and_then(|mode| {
-            let landmarks = self.explained(&mode.pose.pose, glance.map)?;
-            let cell = Vector3::new(self.p.cell_m, self.p.cell_m, 0.1).map(|s| s * s);
-            let covariance = mode.pose.covariance + Matrix3::from_diagonal(&cell);
-            Some((Pose2Covariance { covariance, ..mode.pose }, landmarks))
-        });
-        Some(Left { modes, decided })
+        self.entropy_nats = self.belief.entropy_nats();
+        Some(Left { modes: self.modes.clone(), decided: self.decided(glance.map) })
     }
 
-    /// The landmarks that a pose explains the sightings by; `None` if they are too few.
-    fn explained(&self, now: &Pose2, map: &MapSnapshot) -> Option<Vec<LandmarkId>> {
-        let (mut landmarks, mut explained, mut all) = (BTreeSet::new(), 0.0, 0.0);
+    /// The pose, if nothing is missing any more.
+    fn decided(&mut self, map: &MapSnapshot) -> Option<(Pose2Covariance, Vec<LandmarkId>)> {
+        self.needed = Vec::new();
+        let Some(mode) = self.modes.first().copied().filter(|m| m.mass > self.p.decided) else {
+            self.needed.push(Need::FewerPlaces);
+            self.landmarks =
+                self.modes.first().map_or_else(Vec::new, |m| self.explained(&m.pose.pose, map).0);
+            return None;
+        };
+        let (landmarks, share) = self.explained(&mode.pose.pose, map);
+        if landmarks.len() < LEAST_LANDMARKS {
+            self.needed.push(Need::AnotherLandmark);
+        }
+        if share < LEAST_EXPLAINED {
+            self.needed.push(Need::AgreeingSightings);
+        }
+        if self.needed.is_empty() && self.has_rival(&mode.pose.pose, &landmarks, map) {
+            self.needed.push(Need::NoOtherPlace);
+        }
+        self.landmarks.clone_from(&landmarks);
+        let cell = Vector3::new(self.p.cell_m, self.p.cell_m, 0.1).map(|s| s * s);
+        let covariance = mode.pose.covariance + Matrix3::from_diagonal(&cell);
+        self.needed.is_empty().then_some((Pose2Covariance { covariance, ..mode.pose }, landmarks))
+    }
+
+    /// Whether some other place explains the sightings too, within what odometry and places may be wrong by: the belief
+    /// takes its errors for independent and is too sure where like doors hang nearly evenly. Where the robot would be if the
+    /// landmarks that `now` explains were others that look like them.
+    fn has_rival(&self, now: &Pose2, landmarks: &[LandmarkId], map: &MapSnapshot) -> bool {
+        let place = |id: &LandmarkId| Some(on_floor(map.landmarks.get(id)?.place.as_ref()?));
+        let others: BTreeSet<LandmarkId> =
+            self.looks.iter().flat_map(|(.., looks)| looks.iter().flatten().map(|(id, _)| *id)).collect();
+        let others: Vec<Pose2> = others.iter().filter_map(place).collect();
+        let explained: Vec<Pose2> = landmarks.iter().filter_map(place).collect();
+        let images = explained.iter().flat_map(|here| {
+            let from_here = here.between(now);
+            others.iter().map(move |there| there.compose(&from_here))
+        });
+        let elsewhere = |image: &Pose2| {
+            let e = image.minus(now);
+            e.xy().norm() > self.p.mode_m || wrap_rad(e.z).abs() > self.p.mode_rad
+        };
+        images.filter(elsewhere).any(|image| self.explained(&image, map).1 >= LEAST_EXPLAINED)
+    }
+
+    /// The landmarks that a pose explains the sightings by, and the share of them that it explains.
+    fn explained(&self, now: &Pose2, map: &MapSnapshot) -> (Vec<LandmarkId>, f64) {
+        let (mut landmarks, mut explained, mut all) = (BTreeSet::new(), 0.0, 0.0_f64);
         for (odometry, way_m, looks) in &self.looks {
             let then = now.compose(&self.odometry.between(odometry));
             let drift = DRIFT * (self.way_m - way_m);
@@ -201,8 +309,7 @@ impl Search {
                 }
             }
         }
-        let enough = landmarks.len() >= LEAST_LANDMARKS && explained >= LEAST_EXPLAINED * all;
-        enough.then(|| landmarks.into_iter().collect())
+        (landmarks.into_iter().collect(), explained / all.max(1.0))
     }
 }
 

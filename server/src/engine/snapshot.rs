@@ -1,6 +1,7 @@
 //! What the workers read: one immutable [`MapSnapshot`] per map, swapped whole. Only the store publishes, and only
 //! after its transaction is committed; a reader keeps the `Arc` it took, so an answer rests on one version.
 
+use super::doubles::Doubles;
 use crate::store::areas::Kept;
 use arc_swap::ArcSwap;
 use map::{
@@ -38,7 +39,7 @@ pub struct MapSnapshot {
     /// The models that are matched: the active ones of `learnt`.
     pub models: ModelSet,
     /// The landmarks that have look-alikes, with thresholds as if they had none: for robots that search.
-    pub doubles: Arc<ModelSet>,
+    pub doubles: Arc<Doubles>,
     /// Every learnt model that reads and fits the parameters, candidates included.
     pub learnt: BTreeMap<LandmarkId, Learnt>,
     /// Models that are stored but must not be used, and why: damaged, or learnt under other parameters.

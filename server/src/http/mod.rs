@@ -9,6 +9,7 @@ mod extract;
 mod gathering;
 mod guard;
 mod health;
+mod hypotheses;
 mod laser;
 mod landmarks;
 mod learning;
@@ -32,7 +33,7 @@ pub(crate) use router::router;
 
 use crate::{
     config::Config,
-    engine::{live::LiveHub, motion::Motion, workers::Engine},
+    engine::{live::LiveHub, motion::Motion, search::Searches, workers::Engine},
     gather::Gatherer,
     jobs::Jobs,
     store::Store,
@@ -54,6 +55,8 @@ pub(crate) struct App {
     pub(crate) live: Arc<LiveHub>,
     /// Where they are.
     pub(crate) motion: Arc<Motion>,
+    /// Where those may be that do not know.
+    pub(crate) searches: Arc<Searches>,
     /// Becomes true when the server stops; ends event streams.
     pub(crate) stopping: watch::Receiver<bool>,
     /// Places for vision work asked for over HTTP: as many as there are vision threads.
@@ -83,7 +86,8 @@ impl App {
         let vision = Arc::new(Semaphore::new(config.workers));
         let streams = Arc::new(Semaphore::new(config.limits.streams));
         let (live, motion) = (engine.live.clone(), engine.motion.clone());
-        Self { config, store, jobs, gatherer, live, motion, stopping, vision, streams }
+        let searches = engine.searches.clone();
+        Self { config, store, jobs, gatherer, live, motion, searches, stopping, vision, streams }
     }
 
     /// Runs vision work off the runtime, a bounded number at a time.

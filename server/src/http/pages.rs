@@ -4,11 +4,13 @@ use super::Shared;
 use axum::{Router, http::header, response::IntoResponse, routing::get};
 
 /// Path, media type, content.
-const FILES: [(&str, &str, &str); 5] = [
+const FILES: [(&str, &str, &str); 7] = [
     ("/", "text/html; charset=utf-8", include_str!("../../../web/index.html")),
     ("/app.js", "text/javascript; charset=utf-8", include_str!("../../../web/app.js")),
     ("/gather.js", "text/javascript; charset=utf-8", include_str!("../../../web/gather.js")),
     ("/modalities.js", "text/javascript; charset=utf-8", include_str!("../../../web/modalities.js")),
+    ("/hypotheses.js", "text/javascript; charset=utf-8", include_str!("../../../web/hypotheses.js")),
+    ("/setting.js", "text/javascript; charset=utf-8", include_str!("../../../web/setting.js")),
     ("/style.css", "text/css; charset=utf-8", include_str!("../../../web/style.css")),
 ];
 

@@ -1,8 +1,8 @@
 //! Every route, with the layers around them and the OpenAPI document made from them.
 
 use super::{
-    App, Shared, areas, cameras, error::ApiError, gathering, guard, health, landmarks, laser, learning, live,
-    mapping, maps, pages, recognise, robots, runs, sight, views, visibility,
+    App, Shared, areas, cameras, error::ApiError, gathering, guard, health, hypotheses, landmarks, laser,
+    learning, live, mapping, maps, pages, recognise, robots, runs, sight, views, visibility,
 };
 use crate::config::Limits;
 use axum::{
@@ -44,6 +44,7 @@ fn api(limits: &Limits) -> OpenApiRouter<Shared> {
         .merge(sight::router())
         .merge(recognise::router(limits.upload_bytes))
         .merge(robots::router())
+        .merge(hypotheses::router())
         .merge(cameras::router())
         .merge(live::router())
         .merge(health::router())

@@ -7,7 +7,7 @@ use super::{
     robots, seen, sights, sites,
     statements::statements,
 };
-use crate::engine::doubles;
+use crate::engine::doubles::{self, Doubles};
 use crate::engine::snapshot::{LandmarkInfo, Learnt, MapSnapshot, Snapshots};
 use map::{
     check::OutOfRange,
@@ -137,7 +137,7 @@ async fn doubles(
     learnt: &BTreeMap<LandmarkId, Learnt>,
     before: Option<&MapSnapshot>,
     (kind, params): (DistanceKind, &Arc<Params>),
-) -> Arc<ModelSet> {
+) -> Arc<Doubles> {
     let digests =
         |of: &BTreeMap<LandmarkId, Learnt>| of.iter().map(|(id, l)| (*id, l.digest)).collect::<Vec<_>>();
     if let Some(before) = before.filter(|b| b.distance == kind && digests(&b.learnt) == digests(learnt)) {
@@ -147,7 +147,7 @@ async fn doubles(
     let made = tokio::task::spawn_blocking(move || doubles::doubles(&learnt, kind, &params)).await;
     Arc::new(made.unwrap_or_else(|error| {
         tracing::error!(%error, "look-alikes for searches");
-        ModelSet::default()
+        Doubles::default()
     }))
 }
 

@@ -73,6 +73,46 @@ fn one_place_is_left_when_the_distances_between_doors_say_so() {
 }
 
 #[test]
+fn where_doors_hang_nearly_evenly_no_place_is_taken_for_the_only_one() {
+    // The belief prefers the true place: 5.0 m apart are only the first two. But 5.55 m are within what may be wrong.
+    let place_of = |x: f64| LandmarkInfo { place: Some(place(x)), ..LandmarkInfo::default() };
+    let mut map = map();
+    map.landmarks.insert(LandmarkId(2), place_of(16.55));
+    let searches = Searches::default();
+    let mut needed = Vec::new();
+    for x in [4.2, 4.6, 5.0, 9.2, 9.6, 10.0, 10.4] {
+        let truth = Pose2::new(x, 0.0, 0.0);
+        let sighted = seen(if x < 6.0 { 6.0 } else { 11.0 }, &truth);
+        let glance = Glance { epoch: 1, map: &map, odometry: truth, sighted: &sighted };
+        let left = searches.glance(&name("r1"), &glance).unwrap();
+        assert!(left.decided.is_none(), "{x}: {left:?}");
+        needed = searches.progress(&name("r1")).unwrap().needed;
+    }
+    assert!(matches!(needed[..], [Need::NoOtherPlace]), "{needed:?}");
+}
+
+#[test]
+fn how_far_a_search_has_come_is_told() {
+    let (map, searches) = (map(), Searches::default());
+    assert!(searches.progress(&name("r1")).is_none(), "nothing was seen");
+    let look = |x: f64| {
+        let sighted = seen(if x < 8.0 { 6.0 } else { 11.0 }, &Pose2::new(x, 0.0, 0.0));
+        let odometry = Pose2::new(x, 0.0, 0.0);
+        searches.glance(&name("r1"), &Glance { epoch: 1, map: &map, odometry, sighted: &sighted }).unwrap()
+    };
+    look(4.5);
+    let first = searches.progress(&name("r1")).unwrap();
+    assert_eq!((first.sightings, first.modes.len(), &first.needed[..]), (1, 3, &[Need::FewerPlaces][..]));
+    assert!(first.modes.iter().all(|m| (0.2..0.45).contains(&m.mass)) && first.landmarks.len() == 1);
+    look(9.5);
+    let second = searches.progress(&name("r1")).unwrap();
+    assert_eq!((second.landmarks.len(), &second.needed[..]), (2, &[][..]), "{second:?}");
+    assert!(second.entropy_nats < first.entropy_nats && second.map == "hall");
+    searches.end(&name("r1"));
+    assert!(searches.progress(&name("r1")).is_none());
+}
+
+#[test]
 fn one_door_alone_never_settles_it() {
     // Nor something that is on no map, however often it is seen.
     assert_eq!(drive(&[6.0]), (None, 3));

@@ -1,0 +1,154 @@
+// What an administrator says of a map: where it belongs and lies, and which camera looks for its landmarks. Angles are in
+// degrees here and in radians on the wire; what the server refuses is said at its field.
+
+const API = "/api/v1";
+const byId = (id) => document.getElementById(id);
+const DEG = Math.PI / 180;
+
+// Name on the wire, label, unit, factor from what is shown to the wire.
+const WORDS = [["site", "site"], ["building", "building"], ["floor", "floor"]];
+const LINK = [["x_m", "x of its origin there", "m", 1], ["y_m", "y of its origin there", "m", 1],
+  ["theta_rad", "its x axis there", "°", DEG], ["level_m", "its floor above that one", "m", 1]];
+const SIGHT = [["width_px", "image width", "px", 1], ["height_px", "image height", "px", 1], ["focal_px", "focal length", "px", 1],
+  ["camera_height_m", "camera above the floor", "m", 1], ["tilt_low_rad", "lowest tilt", "°", DEG], ["tilt_high_rad", "highest tilt", "°", DEG],
+  ["pan_low_rad", "rightmost pan", "°", DEG], ["pan_high_rad", "leftmost pan", "°", DEG],
+  ["max_incidence_rad", "most oblique view", "°", DEG], ["min_side_px", "shortest side seen", "px", 1],
+  ["max_fill", "largest share of the image", "%", 0.01], ["standoff_m", "landmark before its wall", "cm", 0.01]];
+let map = null;
+
+async function ask(method, path, body) {
+  const options = { method, headers: { accept: "application/json" } };
+  if (body !== undefined) Object.assign(options, { body: JSON.stringify(body), headers: { ...options.headers, "content-type": "application/json" } });
+  const answer = await fetch(API + path, options);
+  const found = await answer.json().catch(() => ({}));
+  if (!answer.ok) throw Object.assign(new Error(found.detail ?? `${answer.status}`), { field: found.field });
+  return found;
+}
+
+const place = () => `/maps/${encodeURIComponent(map)}`;
+
+// A labelled input with room for what is wrong with it.
+function field(name, label, unit) {
+  const row = document.createElement("label");
+  row.className = "setting";
+  row.append(Object.assign(document.createElement("span"), { textContent: label }));
+  const input = Object.assign(document.createElement("input"), { name, autocomplete: "off" });
+  if (unit) Object.assign(input, { type: "number", step: "any" });
+  const wrong = Object.assign(document.createElement("em"), { className: "wrong", id: `wrong-${name}` });
+  wrong.setAttribute("role", "alert");
+  input.setAttribute("aria-describedby", wrong.id);
+  row.append(input, Object.assign(document.createElement("span"), { className: "facts", textContent: unit ?? "" }), wrong);
+  return row;
+}
+
+function clean(form) {
+  form.querySelectorAll(".wrong").forEach((e) => { e.textContent = ""; });
+  form.querySelectorAll("[aria-invalid]").forEach((e) => e.removeAttribute("aria-invalid"));
+  form.querySelector("[role=status]").textContent = "";
+}
+
+function refuse(form, name, text) {
+  const input = form.elements[name];
+  if (!input) { form.querySelector("[role=status]").textContent = text; return; }
+  input.setAttribute("aria-invalid", "true");
+  byId(`wrong-${name}`).textContent = text;
+  input.focus();
+}
+
+// The server's text speaks of radians where people see degrees: the bound is shown in their unit.
+const inUnit = (text, unit) => (unit === "°" ? text.replace(/(-?\d+(\.\d+)?(e-?\d+)?)(?= is out| $|$)/g, (n) => `${(n / DEG).toFixed(1)}°`).replaceAll("_rad", "") : text);
+
+// Numbers as the wire has them. Of fields left empty: nothing; a wrong one is refused here.
+function numbers(form, fields) {
+  const made = {};
+  for (const [name, label, unit, factor] of fields) {
+    const input = form.elements[name];
+    if (input.validity.badInput) throw Object.assign(new Error(`${label}: a number`), { field: name });
+    if (input.value.trim() !== "") made[name] = Number((Number(input.value) * factor).toPrecision(12));
+  }
+  return made;
+}
+
+function show(form, fields, values) {
+  for (const [name, , , factor] of fields) {
+    const value = values?.[name];
+    form.elements[name].value = value === undefined || value === null ? "" : Number((value / factor).toPrecision(7));
+  }
+}
+
+async function send(form, fields, work) {
+  clean(form);
+  const button = form.querySelector("button");
+  button.disabled = true;
+  try {
+    await work();
+    form.querySelector("[role=status]").textContent = "Saved.";
+    window.dispatchEvent(new CustomEvent("maps-changed"));
+  } catch (error) {
+    const name = (error.field ?? "").replace(/^parent\./, "");
+    const of = fields.find(([n]) => n === name);
+    refuse(form, name === "map" ? "parent" : name, inUnit(error.message, of?.[2]));
+  } finally { button.disabled = false; }
+}
+
+function saveWhere(event) {
+  event.preventDefault();
+  const form = event.target;
+  send(form, LINK, async () => {
+    const changes = Object.fromEntries(WORDS.map(([name]) => [name, form.elements[name].value.trim() || null]));
+    const parent = form.elements.parent.value;
+    const link = numbers(form, LINK);
+    const missing = parent && LINK.slice(0, 3).find(([name]) => link[name] === undefined);
+    if (missing) throw Object.assign(new Error("needed where it lies in another map"), { field: missing[0] });
+    const kept = parent && form.dataset.parent === parent && form.dataset.covariance ? { covariance: JSON.parse(form.dataset.covariance) } : {};
+    changes.parent = parent ? { map: parent, ...link, ...kept } : null;
+    await ask("PATCH", place(), changes);
+  });
+}
+
+function saveSight(event) {
+  event.preventDefault();
+  const form = event.target;
+  send(form, SIGHT, async () => show(form, SIGHT, await ask("PUT", `${place()}/sight`, numbers(form, SIGHT))));
+}
+
+function toggleLink(form) {
+  for (const [name] of LINK) form.elements[name].disabled = !form.elements.parent.value;
+}
+
+async function load(name) {
+  map = name;
+  const [found, sight, maps] = await Promise.all([ask("GET", place()), ask("GET", `${place()}/sight`), ask("GET", "/maps?limit=500")]);
+  if (map !== name) return;
+  const form = byId("where-form");
+  // What somebody is typing stays.
+  if (form.contains(document.activeElement) || byId("sight-form").contains(document.activeElement)) return;
+  for (const [word] of WORDS) form.elements[word].value = found[word] ?? "";
+  const others = maps.items.filter((m) => m.name !== name).map((m) => new Option([m.building, m.floor, m.name].filter(Boolean).join(" / "), m.name));
+  form.elements.parent.replaceChildren(new Option("none: it stands for itself", ""), ...others);
+  form.elements.parent.value = found.parent?.map ?? "";
+  form.dataset.parent = found.parent?.map ?? "";
+  form.dataset.covariance = found.parent?.covariance ? JSON.stringify(found.parent.covariance) : "";
+  show(form, LINK, found.parent);
+  toggleLink(form);
+  show(byId("sight-form"), SIGHT, sight);
+}
+
+function build() {
+  const where = byId("where-form"), sight = byId("sight-form");
+  const parent = field("parent", "lies in the map");
+  const choice = Object.assign(document.createElement("select"), { name: "parent" });
+  choice.setAttribute("aria-describedby", "wrong-parent");
+  parent.querySelector("input").replaceWith(choice);
+  byId("where-fields").append(...WORDS.map(([name, label]) => field(name, label)), parent, ...LINK.map(([name, label, unit]) => field(name, label, unit)));
+  byId("sight-fields").append(...SIGHT.map(([name, label, unit]) => field(name, label, unit)));
+  choice.addEventListener("change", () => toggleLink(where));
+  where.addEventListener("submit", saveWhere);
+  sight.addEventListener("submit", saveSight);
+  byId("sight-usual").addEventListener("click", () => send(sight, SIGHT, async () => show(sight, SIGHT, await ask("PUT", `${place()}/sight`, {}))));
+  window.addEventListener("map-loaded", (event) => load(event.detail.map).catch((error) => {
+    where.querySelector("[role=status]").textContent = `The server does not answer as expected (${error.message}).`;
+  }));
+}
+
+build();
