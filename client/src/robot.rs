@@ -44,6 +44,9 @@ pub struct RobotOptions {
     pub delivery: Delivery,
     /// How long to look for the server.
     pub timeout: Duration,
+    /// The epoch of a session before, for a program that was started again while odometry went on; drawn at random if
+    /// absent. Only for a server that was started again too: to one that went on, numbers that begin anew are stale.
+    pub epoch: Option<u64>,
 }
 
 impl RobotOptions {
@@ -55,6 +58,7 @@ impl RobotOptions {
             robot: robot.into(),
             delivery: Delivery::Latest,
             timeout: Duration::from_secs(5),
+            epoch: None,
         }
     }
 }
@@ -131,7 +135,7 @@ impl RobotClient {
             robot,
             endpoint: options.endpoint.clone(),
             delivery: options.delivery,
-            epoch: new_epoch(),
+            epoch: options.epoch.unwrap_or_else(new_epoch),
             next_seq: AtomicU64::new(1),
             answers,
             poses,
@@ -140,7 +144,7 @@ impl RobotClient {
         })
     }
 
-    /// This start of the robot's software, drawn at random at [`Self::connect`].
+    /// This start of the robot's software, drawn at random at [`Self::connect`] unless the options name it.
     pub fn epoch(&self) -> u64 {
         self.epoch
     }

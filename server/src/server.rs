@@ -112,6 +112,10 @@ impl Server {
             .await
             .map_err(|e| StartError::Store(e.to_string()))?;
         let engine = engine(&config, snapshots.clone(), findings, hook);
+        let stands = |map: &protos::Name, robot: &protos::Name| {
+            snapshots.robot_map(robot.as_str()).is_some_and(|on| on == map.as_str())
+        };
+        engine.motion.mappings().keep_in(config.data.join("mapping"), stands);
         let findings = tokio::spawn(keep_findings(store.clone(), found));
         let (live, slots) = (engine.live.clone(), engine.slots.clone());
         let bus = Bus::open(&config, receivers(&config, &engine)).await?;

@@ -13,7 +13,7 @@ use sim::{
 };
 use std::{fmt::Write as _, sync::Arc, time::Duration};
 use tests::{
-    Inside, SOON,
+    Child, Inside, SOON,
     command::waymark,
     eventually,
     robots::{MAP, call, scan_of},
@@ -145,4 +145,67 @@ async fn refusals(inside: &Inside, path: &str) {
     let progress = tokio::time::timeout(Duration::from_secs(20), eventually("failed", failed)).await;
     let progress = progress.expect("at once");
     assert!(progress["reason"].as_str().is_some_and(|r| r.contains("no wall")), "{progress}");
+}
+
+/// A request about the mapping of a server that can be killed.
+async fn ask(server: &Child, method: Method, path: &str, body: Option<Value>) -> Value {
+    let request = reqwest::Client::new().request(method, format!("{}/api/v1/maps/{MAP}/{path}", server.url));
+    let request = match body {
+        Some(body) => request.json(&body),
+        None => request,
+    };
+    request.send().await.expect("an answer").json().await.unwrap_or_default()
+}
+
+async fn connected(server: &Child, epoch: u64) -> RobotClient {
+    let options = RobotOptions {
+        delivery: Delivery::Every,
+        epoch: Some(epoch),
+        ..RobotOptions::new(&server.zenoh, "default", "r1")
+    };
+    RobotClient::connect(&options).await.expect("connected")
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_server_that_is_killed_in_mid_drive_goes_on_with_the_map() {
+    let data = tempfile::tempdir().expect("a folder");
+    let mut server = Child::start(data.path());
+    let params = CorridorParams { length_m: 12.0, posters: 0, ..CorridorParams::default() };
+    let building = Arc::new(Building::corridor_with(&params, 4));
+    server.maps().create_map(MAP, None).await.expect("map");
+    server.maps().put_robot("r1", MAP).await.expect("robot");
+    let begun = ask(&server, Method::POST, "mapping", Some(json!({ "robot": "r1" }))).await;
+    assert_eq!((&begun["stage"], &begun["not_kept"]), (&json!("mapping"), &Value::Null), "{begun}");
+    let (steps, mut client) = (drive(&building), connected(&server, 77).await);
+    for (i, step) in steps.iter().enumerate() {
+        if i == steps.len() / 3 || i == 2 * steps.len() / 3 {
+            client.close().await.expect("closed");
+            server.kill();
+            server = Child::start(data.path());
+            client = connected(&server, 77).await;
+        }
+        let seen = scan(&building, &step.map_from_robot, &LaserParams::default(), i as u64);
+        client.publish_scan(scan_of(&seen, &step.odom_from_robot, i as i64)).await.expect("sent");
+        let taken = || async {
+            (ask(&server, Method::GET, "mapping", None).await["scans"].as_u64() > Some(i as u64))
+                .then_some(())
+        };
+        eventually("mapped", taken).await;
+    }
+    let progress = ask(&server, Method::GET, "mapping", None).await;
+    assert_eq!((&progress["stage"], &progress["dropped"]), (&json!("mapping"), &json!(0)), "{progress}");
+    ask(&server, Method::POST, "mapping/finish", None).await;
+    let done =
+        || async { Some(ask(&server, Method::GET, "mapping", None).await).filter(|p| p["stage"] == "done") };
+    eventually("stored", done).await;
+    let (live, file) =
+        (ends(&ask(&server, Method::GET, "laser", None).await), walls_of_file(&building, &steps));
+    assert!(live.len() == file.len() && live.len() >= 4, "{live:?}");
+    let off =
+        live.iter().flatten().zip(file.iter().flatten()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    assert!(off < 1e-6, "{off} m");
+    let kept = std::fs::read_dir(data.path().join("mapping")).expect("the folder").count();
+    assert_eq!(kept, 0, "nothing is left of what is stored");
+    client.close().await.expect("closed");
+    server.kill();
 }

@@ -1,19 +1,22 @@
 //! Maps made while a robot drives: the scans of one robot, each with its odometry, go to `map::slam` on a thread of their
-//! own, by a bounded queue. In: scans in order. Out: progress, and the walls when somebody ends it. Nothing of it is on
-//! disk before that: whoever ends it stores the walls.
+//! own, by a bounded queue. In: scans in order. Out: progress, and the walls when somebody ends it: whoever does stores
+//! them. Until then the scans are kept in a journal, from which a restart of the server goes on.
 
+mod journal;
 mod session;
 
 pub use session::{MAX_SCANS, QUEUE};
 
 use super::motion::ScanJob;
+use journal::{Head, Journal, Kept};
 use map::pose2::Pose2;
 use protos::Name;
 use serde::Serialize;
-use session::Session;
+use session::{Session, Start};
 use std::{
     collections::BTreeMap,
-    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    path::{Path, PathBuf},
+    sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError},
 };
 use tokio::sync::oneshot;
 use utoipa::ToSchema;
@@ -30,6 +33,9 @@ pub type Walls = Vec<[f64; 4]>;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Stage {
+    /// The server was started again: the scans that were kept are mapped once more. New ones wait, as many as there is room
+    /// for.
+    Resuming,
     /// Scans are taken.
     Mapping,
     /// Everything is fitted once more; then the walls are stored.
@@ -63,6 +69,8 @@ pub struct Progress {
     pub loops: Option<usize>,
     /// Why it failed.
     pub reason: Option<String>,
+    /// Why further scans are not kept on disk: a restart of the server would lose them. Absent while they are.
+    pub not_kept: Option<String>,
 }
 
 /// Why a mapping cannot begin or end.
@@ -87,13 +95,36 @@ pub enum MappingError {
 
 /// All mappings, by map.
 #[derive(Debug, Default)]
-pub struct Mappings(Mutex<BTreeMap<String, Session>>);
+pub struct Mappings {
+    all: Mutex<BTreeMap<String, Session>>,
+    /// Where their scans are kept.
+    dir: OnceLock<PathBuf>,
+}
 
 impl Mappings {
-    /// Begins to make a map with a robot, whose first pose is `origin` on it.
-    pub fn begin(&self, map: &str, robot: &Name, origin: Pose2) -> Result<Progress, MappingError> {
+    /// Keeps scans in a folder from now on, and goes on with what is there: with those mappings whose robot still stands on
+    /// the map (`stands`); the others are forgotten.
+    pub fn keep_in(&self, dir: PathBuf, stands: impl Fn(&Name, &Name) -> bool) {
+        let dir = self.dir.get_or_init(|| dir);
         let mut all = self.lock();
-        if all.get(map).is_some_and(Session::is_open) {
+        for kept in Kept::all(dir) {
+            let (map, robot) = (kept.head.map.clone(), kept.head.robot.clone());
+            if !stands(&map, &robot) {
+                tracing::warn!(%map, %robot, "a mapping is forgotten: the robot stands elsewhere now");
+                journal::remove(dir, map.as_str());
+            } else if all.len() >= MAX_MAPPINGS {
+                tracing::warn!(%map, "a mapping waits for another start: {MAX_MAPPINGS} go on already");
+            } else if let Some(session) = Session::begin(Start::Again(kept)) {
+                tracing::info!(%map, %robot, "a mapping goes on");
+                all.insert(map.to_string(), session);
+            }
+        }
+    }
+
+    /// Begins to make a map with a robot, whose first pose is `origin` on it.
+    pub fn begin(&self, map: &Name, robot: &Name, origin: Pose2) -> Result<Progress, MappingError> {
+        let mut all = self.lock();
+        if all.get(map.as_str()).is_some_and(Session::is_open) {
             return Err(MappingError::Going);
         }
         let open = || all.values().filter(|s| s.is_open());
@@ -103,12 +134,16 @@ impl Mappings {
         if open().count() >= MAX_MAPPINGS {
             return Err(MappingError::TooMany);
         }
-        let session = Session::begin(map, robot, origin).ok_or(MappingError::Thread)?;
+        let head = Head::new(map, robot, &origin);
+        let journal = self.dir.get().map(|dir| Journal::create(dir, &head));
+        let session = Session::begin(Start::New(head, journal)).ok_or(MappingError::Thread)?;
         let progress = session.progress();
-        all.insert(map.to_owned(), session);
+        all.insert(map.to_string(), session);
         if all.len() > MAX_REMEMBERED {
-            let over =
-                all.iter().find(|(name, s)| !s.is_open() && *name != map).map(|(name, _)| name.clone());
+            let over = all
+                .iter()
+                .find(|(name, s)| !s.is_open() && *name != map.as_str())
+                .map(|(name, _)| name.clone());
             over.map(|name| all.remove(&name));
         }
         Ok(progress)
@@ -140,13 +175,20 @@ impl Mappings {
     /// The walls were stored, so many; or why not.
     pub fn stored(&self, map: &str, stored: Result<usize, String>) {
         if let Some(session) = self.lock().get_mut(map) {
+            // Of what failed the scans stay: the next start goes on with them, unless it is given up.
+            if stored.is_ok() {
+                self.forget(map);
+            }
             session.end(stored);
         }
     }
 
     /// Gives a mapping up: the map stays as it is. False if there is none.
     pub fn cancel(&self, map: &str) -> bool {
-        self.lock().remove(map).is_some_and(|session| session.is_open())
+        let mut all = self.lock();
+        let Some(session) = all.remove(map) else { return false };
+        self.forget(map);
+        session.is_open() || session.has_failed()
     }
 
     /// How far the mapping of a map has come: the one that goes on, or the last.
@@ -154,8 +196,15 @@ impl Mappings {
         self.lock().get(map).map(Session::progress)
     }
 
+    /// What is on disk of a mapping.
+    fn forget(&self, map: &str) {
+        if let Some(dir) = self.dir.get() {
+            journal::remove(Path::new(dir), map);
+        }
+    }
+
     fn lock(&self) -> MutexGuard<'_, BTreeMap<String, Session>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        self.all.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

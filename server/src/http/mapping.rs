@@ -42,7 +42,8 @@ fn refused(error: MappingError) -> ApiError {
 }
 
 /// Begins to make the walls of a map from the scans of a robot. While it lasts, they are mapped and localise nothing. The map
-/// stays as it is until the mapping is finished; a restart of the server forgets it.
+/// stays as it is until the mapping is finished. The scans are kept on disk until then: after a restart of the server the
+/// mapping goes on by itself (`resuming`), with a robot whose software went on; `not_kept` says if they cannot be.
 #[utoipa::path(post, path = "/maps/{map}/mapping", tag = "maps", params(("map" = String, Path)),
     request_body = NewMapping, responses((status = 201, body = Progress),
     (status = 404, body = Problem, description = "unknown_map, unknown_robot"),
@@ -62,7 +63,10 @@ async fn begin(
     let [x_m, y_m, theta_rad] = new.origin;
     let origin = Pose2::new(x_m, y_m, theta_rad);
     origin.check().map_err(|e| ApiError::invalid("out_of_range", "origin", e.to_string()))?;
-    let begun = app.motion.mappings().begin(&map, &name("robot", new.robot)?, origin);
+    let (map, robot) = (name("map", map)?, name("robot", new.robot)?);
+    // It opens a file.
+    let begun = tokio::task::spawn_blocking(move || app.motion.mappings().begin(&map, &robot, origin)).await;
+    let begun = begun.map_err(|e| ApiError::internal(&e))?;
     Ok((StatusCode::CREATED, Json(begun.map_err(refused)?)))
 }
 
@@ -74,7 +78,7 @@ async fn get(State(app): State<Shared>, At(map): At<String>) -> Result<Json<Prog
     app.motion.mappings().progress(&map).map(Json).ok_or_else(|| refused(MappingError::None))
 }
 
-/// Gives it up: the map stays as it is.
+/// Gives it up, or forgets one that failed: the map stays as it is, what was kept of the scans is removed.
 #[utoipa::path(delete, path = "/maps/{map}/mapping", tag = "maps", params(("map" = String, Path)),
     responses((status = 204), (status = 404, body = Problem, description = "unknown_map, not_mapping")))]
 async fn cancel(State(app): State<Shared>, At(map): At<String>) -> Result<StatusCode, ApiError> {

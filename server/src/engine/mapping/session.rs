@@ -1,6 +1,9 @@
 //! One mapping: its queue, its thread, its progress.
 
-use super::{Progress, Shared, Stage, Walls};
+use super::{
+    Progress, Shared, Stage, Walls,
+    journal::{Head, Journal, Kept},
+};
 use crate::engine::motion::ScanJob;
 use map::{
     pose2::Pose2,
@@ -8,6 +11,7 @@ use map::{
 };
 use protos::Name;
 use std::{
+    io,
     panic::{AssertUnwindSafe, catch_unwind},
     sync::{
         Arc, Mutex, MutexGuard, PoisonError,
@@ -21,10 +25,21 @@ pub const QUEUE: usize = 64;
 /// Most scans of one mapping.
 pub const MAX_SCANS: u64 = 100_000;
 
+/// Handles of the progress that the thread itself has: with no more the session is gone.
+const OWN_HANDLES: usize = 2;
+
 /// What the thread is told.
 enum Order {
     Scan(Box<ScanJob>),
     Finish(oneshot::Sender<Result<Walls, String>>),
+}
+
+/// How a mapping begins.
+pub(super) enum Start {
+    /// Anew; with its journal, if scans are kept, or why there is none.
+    New(Head, Option<io::Result<Journal>>),
+    /// With what was kept.
+    Again(Kept),
 }
 
 /// A mapping, from its beginning until it is forgotten. Dropping it gives it up.
@@ -39,11 +54,22 @@ pub(super) struct Session {
 
 impl Session {
     /// Starts its thread.
-    pub(super) fn begin(map: &str, robot: &Name, origin: Pose2) -> Option<Self> {
+    pub(super) fn begin(mut start: Start) -> Option<Self> {
+        let head = match &start {
+            Start::New(head, _) => head.clone(),
+            Start::Again(kept) => kept.head.clone(),
+        };
+        let origin = head.origin()?;
+        let first = match &mut start {
+            Start::New(..) => None,
+            Start::Again(kept) => kept.next(),
+        };
+        let epoch = first.as_ref().map(|job| job.epoch);
+        let stage = if matches!(start, Start::New(..)) { Stage::Mapping } else { Stage::Resuming };
         let progress = Arc::new(Mutex::new(Progress {
-            map: map.to_owned(),
-            robot: robot.to_string(),
-            stage: Stage::Mapping,
+            map: head.map.to_string(),
+            robot: head.robot.to_string(),
+            stage,
             scans: 0,
             dropped: 0,
             way_m: 0.0,
@@ -51,29 +77,35 @@ impl Session {
             segments: None,
             loops: None,
             reason: None,
+            not_kept: None,
         }));
         let (orders, received) = sync_channel(QUEUE);
         let shared = progress.clone();
         let work = move || {
             // Nothing shared is left half changed: the map so far is this thread's own.
-            if catch_unwind(AssertUnwindSafe(|| run(&received, &shared, &origin))).is_err() {
+            let mapper = Mapper::new(shared.clone(), origin);
+            if catch_unwind(AssertUnwindSafe(|| mapper.run(start, first, &received))).is_err() {
                 tracing::error!("making a map panicked");
                 fail(&shared, "the server failed on these scans; see its log");
             }
         };
         let thread = std::thread::Builder::new().name("mapping".into()).spawn(work);
         thread.inspect_err(|error| tracing::error!(%error, "no thread for a mapping")).ok()?;
-        Some(Self { robot: robot.clone(), epoch: None, orders: Some(orders), progress })
+        Some(Self { robot: head.robot, epoch, orders: Some(orders), progress })
     }
 
     /// Whether it goes on, be it only to be stored.
     pub(super) fn is_open(&self) -> bool {
-        matches!(own(&self.progress).stage, Stage::Mapping | Stage::Finishing)
+        matches!(own(&self.progress).stage, Stage::Resuming | Stage::Mapping | Stage::Finishing)
+    }
+
+    pub(super) fn has_failed(&self) -> bool {
+        own(&self.progress).stage == Stage::Failed
     }
 
     /// Whether it takes scans.
     pub(super) fn takes(&self) -> bool {
-        own(&self.progress).stage == Stage::Mapping
+        matches!(own(&self.progress).stage, Stage::Resuming | Stage::Mapping)
     }
 
     pub(super) fn progress(&self) -> Progress {
@@ -109,34 +141,97 @@ impl Session {
     }
 }
 
-/// Maps scans until it is told to finish, or given up.
-fn run(orders: &Receiver<Order>, progress: &Shared, origin: &Pose2) {
-    let mut slam = Slam::new(SlamParams::default());
-    let mut last: Option<Pose2> = None;
-    while let Ok(order) = orders.recv() {
-        match order {
-            Order::Scan(job) => {
-                let at = match slam.add(&job.odom_from_robot, &job.scan) {
-                    Ok(at) => at,
-                    Err(error) => return fail(progress, &error.to_string()),
-                };
-                let on_map = origin.compose(&at);
-                let mut progress = own(progress);
-                progress.scans += 1;
-                let odom = job.odom_from_robot;
-                progress.way_m += last.replace(odom).map_or(0.0, |o| o.between(&odom).position().norm());
-                progress.pose = Some([on_map.x_m, on_map.y_m, on_map.theta_rad]);
+/// What the thread of a mapping works with.
+struct Mapper {
+    slam: Slam,
+    progress: Shared,
+    origin: Pose2,
+    last: Option<Pose2>,
+    journal: Option<Journal>,
+}
+
+impl Mapper {
+    fn new(progress: Shared, origin: Pose2) -> Self {
+        Self { slam: Slam::new(SlamParams::default()), progress, origin, last: None, journal: None }
+    }
+
+    /// Maps what was kept, then scans until it is told to finish, or given up.
+    fn run(mut self, start: Start, first: Option<ScanJob>, orders: &Receiver<Order>) {
+        let ready = match start {
+            Start::New(_, journal) => {
+                self.keep(journal);
+                Ok(())
             }
-            Order::Finish(reply) => {
-                let made = slam.finish().map_err(|error| error.to_string());
-                if let Ok(map) = &made {
-                    own(progress).loops = Some(map.loops.len());
+            Start::Again(kept) => self.again(kept, first),
+        };
+        if let Err(reason) = ready.and_then(|()| self.orders(orders)) {
+            fail(&self.progress, &reason);
+        }
+    }
+
+    /// Maps the scans that were kept, as long as the session is there.
+    fn again(&mut self, mut kept: Kept, first: Option<ScanJob>) -> Result<(), String> {
+        let mut next = first;
+        while let Some(job) = next {
+            if Arc::strong_count(&self.progress) <= OWN_HANDLES {
+                return Ok(());
+            }
+            self.add(&job)?;
+            next = kept.next();
+        }
+        self.keep(Some(kept.reopened()));
+        let mut progress = own(&self.progress);
+        if progress.stage == Stage::Resuming {
+            progress.stage = Stage::Mapping;
+        }
+        Ok(())
+    }
+
+    fn orders(&mut self, orders: &Receiver<Order>) -> Result<(), String> {
+        while let Ok(order) = orders.recv() {
+            match order {
+                Order::Scan(job) => {
+                    let kept = self.journal.as_mut().map(|journal| journal.scan(&job));
+                    if let Some(Err(error)) = kept {
+                        self.keep(Some(Err(error)));
+                    }
+                    self.add(&job)?;
                 }
-                // Nobody waits any more: it was given up.
-                drop(reply.send(made.map(|map| walls(&map, origin))));
-                return;
+                Order::Finish(reply) => {
+                    let slam = std::mem::replace(&mut self.slam, Slam::new(SlamParams::default()));
+                    let made = slam.finish().map_err(|error| error.to_string());
+                    if let Ok(map) = &made {
+                        own(&self.progress).loops = Some(map.loops.len());
+                    }
+                    // Nobody waits any more: it was given up.
+                    drop(reply.send(made.map(|map| walls(&map, &self.origin))));
+                    break;
+                }
             }
         }
+        Ok(())
+    }
+
+    /// From now on scans are kept in this journal, or not at all: the mapping goes on without, and says why.
+    fn keep(&mut self, journal: Option<io::Result<Journal>>) {
+        self.journal = journal.and_then(|opened| {
+            let failed = |error: &io::Error| {
+                tracing::warn!(%error, "the scans of a mapping are not kept");
+                own(&self.progress).not_kept = Some(error.to_string());
+            };
+            opened.inspect_err(failed).ok()
+        });
+    }
+
+    fn add(&mut self, job: &ScanJob) -> Result<(), String> {
+        let at = self.slam.add(&job.odom_from_robot, &job.scan).map_err(|error| error.to_string())?;
+        let on_map = self.origin.compose(&at);
+        let mut progress = own(&self.progress);
+        progress.scans += 1;
+        let odom = job.odom_from_robot;
+        progress.way_m += self.last.replace(odom).map_or(0.0, |o| o.between(&odom).position().norm());
+        progress.pose = Some([on_map.x_m, on_map.y_m, on_map.theta_rad]);
+        Ok(())
     }
 }
 

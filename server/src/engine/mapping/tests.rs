@@ -35,7 +35,7 @@ async fn scans_become_the_walls_that_mapping_them_gives() {
     let steps: Vec<_> = sim::drive::Drive::new(building.clone(), &drive).step_by(3).take(60).collect();
     let (mappings, mut slam) = (Mappings::default(), Slam::new(SlamParams::default()));
     let origin = Pose2::new(3.0, 1.0, 0.5);
-    mappings.begin("hall", &name("r1"), origin).unwrap();
+    mappings.begin(&name("hall"), &name("r1"), origin).unwrap();
     for (i, step) in steps.iter().enumerate() {
         let seen = scan(&building, &step.map_from_robot, i as u64);
         slam.add(&step.odom_from_robot, &seen).unwrap();
@@ -61,14 +61,14 @@ async fn scans_become_the_walls_that_mapping_them_gives() {
     mappings.stored("hall", Ok(walls.len()));
     assert_eq!(mappings.progress("hall").unwrap().stage, Stage::Done);
     assert_eq!(mappings.finish("hall").unwrap_err(), MappingError::None);
-    mappings.begin("hall", &name("r1"), origin).unwrap();
+    mappings.begin(&name("hall"), &name("r1"), origin).unwrap();
 }
 
 #[test]
 fn mappings_are_bounded_and_one_robot_makes_one_map() {
     let mappings = Mappings::default();
     let begin = |map: usize, robot: &str| {
-        mappings.begin(&format!("m{map}"), &name(robot), Pose2::default()).map(|p| p.stage)
+        mappings.begin(&name(&format!("m{map}")), &name(robot), Pose2::default()).map(|p| p.stage)
     };
     for i in 0..MAX_MAPPINGS {
         assert_eq!(begin(i, &format!("r{i}")), Ok(Stage::Mapping));
@@ -85,7 +85,7 @@ fn old_mappings_are_forgotten_at_the_bound() {
     let mappings = Mappings::default();
     for i in 0..=MAX_REMEMBERED {
         let map = format!("m{i:03}");
-        mappings.begin(&map, &name("r1"), Pose2::default()).unwrap();
+        mappings.begin(&name(&map), &name("r1"), Pose2::default()).unwrap();
         mappings.stored(&map, Err("planted".into()));
     }
     assert_eq!(mappings.progress("m000"), None);
@@ -97,7 +97,7 @@ fn old_mappings_are_forgotten_at_the_bound() {
 fn what_the_queue_does_not_hold_is_dropped_and_counted() {
     let mappings = Mappings::default();
     let building = Building::corridor(7);
-    mappings.begin("hall", &name("r1"), Pose2::default()).unwrap();
+    mappings.begin(&name("hall"), &name("r1"), Pose2::default()).unwrap();
     let sent = 4 * QUEUE as u64;
     for i in 0..sent {
         let at = Pose2::new(2.0 + 0.02 * i as f64, 0.0, 0.0);
@@ -107,4 +107,75 @@ fn what_the_queue_does_not_hold_is_dropped_and_counted() {
         let p = mappings.progress("hall").unwrap();
         p.scans + p.dropped == sent
     });
+}
+
+fn steps_of(building: &Arc<Building>) -> Vec<sim::drive::Step> {
+    let drive = DriveParams { odometry: OdometryParams::default(), ..DriveParams::default() };
+    sim::drive::Drive::new(building.clone(), &drive).step_by(3).take(40).collect()
+}
+
+#[tokio::test]
+async fn a_mapping_goes_on_after_a_restart_as_if_there_had_been_none() {
+    let (building, dir) = (Arc::new(Building::corridor(7)), tempfile::tempdir().unwrap());
+    let (mut slam, origin) = (Slam::new(SlamParams::default()), Pose2::new(3.0, 1.0, 0.5));
+    let mut mappings = Mappings::default();
+    mappings.keep_in(dir.path().join("mapping"), |_, _| true);
+    mappings.begin(&name("hall"), &name("r1"), origin).unwrap();
+    for (i, step) in steps_of(&building).iter().enumerate() {
+        if i == 25 {
+            mappings = Mappings::default();
+            mappings.keep_in(dir.path().join("mapping"), |map, robot| {
+                (map.as_str(), robot.as_str()) == ("hall", "r1")
+            });
+        }
+        let seen = scan(&building, &step.map_from_robot, i as u64);
+        slam.add(&step.odom_from_robot, &seen).unwrap();
+        assert!(mappings.offer(&name("r1"), job("hall", 5, step.odom_from_robot, seen)).is_none());
+        wait(|| mappings.progress("hall").unwrap().scans == i as u64 + 1);
+    }
+    let other = scan(&building, &Pose2::new(3.0, 0.0, 0.0), 1);
+    mappings.offer(&name("r1"), job("hall", 6, Pose2::default(), other));
+    let so_far = mappings.progress("hall").unwrap();
+    assert_eq!(
+        (so_far.stage, so_far.dropped, so_far.not_kept),
+        (Stage::Mapping, 1, None),
+        "its epoch is kept"
+    );
+    let walls = mappings.finish("hall").unwrap().1.await.unwrap().unwrap();
+    let expected = slam.finish().unwrap().walls;
+    assert_eq!(walls.len(), expected.len());
+    for (got, wall) in walls.iter().zip(&expected) {
+        let (a, b) = (origin.apply(&wall.a), origin.apply(&wall.b));
+        assert!(
+            (got[0] - a.x).abs() + (got[1] - a.y).abs() + (got[2] - b.x).abs() + (got[3] - b.y).abs() < 1e-9
+        );
+    }
+    mappings.stored("hall", Ok(walls.len()));
+    let again = Mappings::default();
+    again.keep_in(dir.path().join("mapping"), |_, _| true);
+    assert_eq!(again.progress("hall"), None, "what is stored is not gone on with");
+}
+
+#[test]
+fn what_cannot_be_kept_is_said_and_what_is_given_up_is_removed() {
+    let (building, dir) = (Building::corridor(7), tempfile::tempdir().unwrap());
+    let file = dir.path().join("file");
+    std::fs::write(&file, "not a folder").unwrap();
+    let mappings = Mappings::default();
+    mappings.keep_in(file, |_, _| true);
+    mappings.begin(&name("hall"), &name("r1"), Pose2::default()).unwrap();
+    let seen = scan(&building, &Pose2::new(3.0, 0.0, 0.0), 1);
+    mappings.offer(&name("r1"), job("hall", 1, Pose2::default(), seen));
+    wait(|| mappings.progress("hall").unwrap().scans == 1);
+    assert!(mappings.progress("hall").unwrap().not_kept.is_some(), "and it goes on");
+    let folder = dir.path().join("mapping");
+    let mappings = Mappings::default();
+    mappings.keep_in(folder.clone(), |_, _| true);
+    mappings.begin(&name("hall"), &name("r1"), Pose2::default()).unwrap();
+    mappings.begin(&name("house"), &name("r2"), Pose2::default()).unwrap();
+    let files = || std::fs::read_dir(&folder).unwrap().count();
+    assert!(files() == 2 && mappings.cancel("hall") && files() == 1);
+    let again = Mappings::default();
+    again.keep_in(folder.clone(), |_, robot| robot.as_str() != "r2");
+    assert!(again.progress("house").is_none() && files() == 0, "its robot stands elsewhere");
 }

@@ -1,0 +1,302 @@
+//! The scans of a mapping on disk, so that a restart of the server loses no drive: one file for each map, only ever added
+//! to. In: scans as they were mapped. Out: the same scans at the next start, up to the first record that is not whole.
+//!
+//! A record is its length (4 bytes), the first 8 bytes of its SHA-256, and itself: first the head as JSON, then scans as on
+//! the wire, which are checked again when they are read.
+
+use crate::engine::motion::ScanJob;
+use map::pose2::Pose2;
+use protos::{Name, convert::CheckedScan, convert::geometry::pose2_wire, prost::Message, v1};
+use serde::{Deserialize, Serialize};
+use sha2::{Digest as _, Sha256};
+use std::{
+    fs::{File, OpenOptions},
+    io::{self, BufReader, Read, Seek, Write},
+    path::{Path, PathBuf},
+};
+
+/// Largest journal: some hours of a large scanner.
+pub(super) const MAX_BYTES: u64 = 2 << 30;
+/// Largest record: a scan of the most beams that are accepted.
+const MAX_RECORD: u32 = crate::engine::motion::MAX_SCAN_BYTES as u32;
+/// Scans after which the disk is told to keep them, should the power fail.
+const SYNC_EVERY: u32 = 50;
+/// Of the length and the digest.
+const FRAME_BYTES: usize = 12;
+/// How the files end.
+const EXTENSION: &str = "scans";
+
+/// Whose scans these are.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Head {
+    /// The format.
+    waymark_mapping: u32,
+    /// The map.
+    pub map: Name,
+    /// The robot.
+    pub robot: Name,
+    /// Its first pose on the map.
+    pub origin: [f64; 3],
+}
+
+impl Head {
+    pub(super) fn new(map: &Name, robot: &Name, origin: &Pose2) -> Self {
+        let origin = [origin.x_m, origin.y_m, origin.theta_rad];
+        Self { waymark_mapping: 1, map: map.clone(), robot: robot.clone(), origin }
+    }
+
+    /// If it is possible.
+    pub(super) fn origin(&self) -> Option<Pose2> {
+        let [x_m, y_m, theta_rad] = self.origin;
+        let origin = Pose2 { x_m, y_m, theta_rad };
+        origin.check().ok().map(|()| origin)
+    }
+}
+
+/// The journal of a mapping that goes on.
+#[derive(Debug)]
+pub(super) struct Journal {
+    file: File,
+    bytes: u64,
+    unsynced: u32,
+}
+
+fn path(dir: &Path, map: &str) -> PathBuf {
+    dir.join(map).with_extension(EXTENSION)
+}
+
+fn framed(record: &[u8]) -> io::Result<Vec<u8>> {
+    let length = u32::try_from(record.len()).ok().filter(|n| *n <= MAX_RECORD);
+    let length = length.ok_or_else(|| io::Error::other("a record is too long"))?;
+    let digest = Sha256::digest(record);
+    Ok([&length.to_le_bytes()[..], &digest[..8], record].concat())
+}
+
+impl Journal {
+    /// A new one, in place of any other of the map.
+    pub(super) fn create(dir: &Path, head: &Head) -> io::Result<Self> {
+        std::fs::create_dir_all(dir)?;
+        let file = File::create(path(dir, head.map.as_str()))?;
+        let mut made = Self { file, bytes: 0, unsynced: 0 };
+        made.put(&serde_json::to_vec(head)?)?;
+        made.file.sync_all()?;
+        Ok(made)
+    }
+
+    /// Adds a scan.
+    pub(super) fn scan(&mut self, job: &ScanJob) -> io::Result<()> {
+        let scan = &job.scan;
+        let wire = v1::Scan {
+            epoch: job.epoch,
+            seq: 0,
+            captured_ns: job.captured_ns,
+            odom_from_robot: Some(pose2_wire(&job.odom_from_robot)),
+            robot_from_laser: Some(pose2_wire(scan.robot_from_laser())),
+            first_bearing_rad: scan.bearing_rad(0),
+            bearing_step_rad: scan.bearing_step_rad(),
+            max_range_m: scan.max_range_m(),
+            ranges_m: scan.ranges_m().to_vec(),
+        };
+        self.put(&wire.encode_to_vec())?;
+        self.unsynced += 1;
+        if self.unsynced >= SYNC_EVERY {
+            self.unsynced = 0;
+            self.file.sync_data()?;
+        }
+        Ok(())
+    }
+
+    fn put(&mut self, record: &[u8]) -> io::Result<()> {
+        let framed = framed(record)?;
+        let bytes = self.bytes + framed.len() as u64;
+        if bytes > MAX_BYTES {
+            return Err(io::Error::other(format!("more than {MAX_BYTES} bytes of scans")));
+        }
+        self.file.write_all(&framed)?;
+        self.bytes = bytes;
+        Ok(())
+    }
+}
+
+/// Forgets what is kept of a map.
+pub(super) fn remove(dir: &Path, map: &str) {
+    if let Err(error) = std::fs::remove_file(path(dir, map))
+        && error.kind() != io::ErrorKind::NotFound
+    {
+        tracing::warn!(map, %error, "the scans of a mapping that is over stay on disk");
+    }
+}
+
+/// What was kept of a mapping: first read, then gone on with.
+#[derive(Debug)]
+pub(super) struct Kept {
+    pub(super) head: Head,
+    from: BufReader<File>,
+    file: File,
+    /// Up to here every record is whole.
+    whole: u64,
+}
+
+impl Kept {
+    /// All journals of a folder, by map. What is none is left alone and said.
+    pub(super) fn all(dir: &Path) -> Vec<Self> {
+        let entries = std::fs::read_dir(dir).into_iter().flatten().flatten();
+        let mut paths: Vec<PathBuf> = entries.map(|e| e.path()).collect();
+        paths.retain(|p| p.extension().is_some_and(|e| e == EXTENSION));
+        paths.sort();
+        let read = |p: &PathBuf| {
+            Self::open(p).inspect_err(|error| tracing::warn!(path = %p.display(), %error, "no mapping")).ok()
+        };
+        paths.iter().filter_map(read).collect()
+    }
+
+    fn open(path: &Path) -> io::Result<Self> {
+        let file = OpenOptions::new().read(true).write(true).open(path)?;
+        let mut from = BufReader::new(file.try_clone()?);
+        let mut whole = 0;
+        let record = record(&mut from, &mut whole).ok_or_else(|| io::Error::other("it has no head"))?;
+        let head: Head = serde_json::from_slice(&record)?;
+        let named = path.file_stem().is_some_and(|stem| stem == head.map.as_str());
+        if !named || head.waymark_mapping != 1 || head.origin().is_none() {
+            return Err(io::Error::other("its head is not one of this map"));
+        }
+        Ok(Self { head, from, file, whole })
+    }
+
+    /// The next scan; `None` at the end, or before the first that is not whole.
+    pub(super) fn next(&mut self) -> Option<ScanJob> {
+        let before = self.whole;
+        let read = record(&mut self.from, &mut self.whole);
+        let wire = read.and_then(|bytes| v1::Scan::decode(&*bytes).ok());
+        let Some(checked) = wire.and_then(|wire| CheckedScan::try_from(wire).ok()) else {
+            self.whole = before;
+            return None;
+        };
+        let CheckedScan { epoch, captured_ns, odom_from_robot, scan, .. } = checked;
+        Some(ScanJob { map: self.head.map.to_string(), epoch, captured_ns, odom_from_robot, scan })
+    }
+
+    /// To be gone on with, after the last whole record.
+    pub(super) fn reopened(mut self) -> io::Result<Journal> {
+        self.file.set_len(self.whole)?;
+        self.file.seek(io::SeekFrom::Start(self.whole))?;
+        Ok(Journal { file: self.file, bytes: self.whole, unsynced: 0 })
+    }
+}
+
+/// One record, if it is whole; counts its bytes.
+fn record(from: &mut impl Read, whole: &mut u64) -> Option<Vec<u8>> {
+    let mut frame = [0; FRAME_BYTES];
+    from.read_exact(&mut frame).ok()?;
+    let (length, digest) = frame.split_at(4);
+    let length = u32::from_le_bytes(length.try_into().ok()?);
+    if length > MAX_RECORD {
+        return None;
+    }
+    let mut record = vec![0; length as usize];
+    from.read_exact(&mut record).ok()?;
+    if Sha256::digest(&record)[..8] != *digest {
+        return None;
+    }
+    *whole += (FRAME_BYTES + record.len()) as u64;
+    Some(record)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use map::laser::Scan;
+
+    fn name(text: &str) -> Name {
+        Name::new(text).unwrap()
+    }
+
+    fn job(i: i64) -> ScanJob {
+        let scan =
+            Scan::new(Pose2::new(0.2, 0.0, 0.0), -1.0, 0.1, 20.0, vec![3.5, f32::NAN, i as f32]).unwrap();
+        let odom_from_robot = Pose2::new(0.1 * i as f64, 0.2, 0.3);
+        ScanJob { map: "hall".into(), epoch: 7, captured_ns: i, odom_from_robot, scan }
+    }
+
+    fn written(dir: &Path, scans: i64) {
+        let head = Head::new(&name("hall"), &name("r1"), &Pose2::new(1.0, 2.0, 0.5));
+        let mut journal = Journal::create(dir, &head).unwrap();
+        for i in 1..=scans {
+            journal.scan(&job(i)).unwrap();
+        }
+    }
+
+    fn read(dir: &Path) -> (Vec<i64>, Option<Journal>) {
+        let Some(mut kept) = Kept::all(dir).pop() else { return (Vec::new(), None) };
+        let scans = std::iter::from_fn(|| kept.next()).map(|job| job.captured_ns).collect();
+        (scans, kept.reopened().ok())
+    }
+
+    #[test]
+    fn what_was_written_is_read_and_gone_on_with() {
+        let dir = tempfile::tempdir().unwrap();
+        written(dir.path(), 3);
+        let mut kept = Kept::all(dir.path()).pop().unwrap();
+        assert_eq!((kept.head.robot.as_str(), kept.head.origin()), ("r1", Some(Pose2::new(1.0, 2.0, 0.5))));
+        let first = kept.next().unwrap();
+        assert_eq!((first.epoch, first.odom_from_robot), (7, job(1).odom_from_robot));
+        assert!((first.scan.ranges_m()[0] - 3.5).abs() < 1e-9 && first.scan.ranges_m()[1].is_nan());
+        let (scans, journal) = read(dir.path());
+        assert_eq!(scans, [1, 2, 3]);
+        journal.unwrap().scan(&job(4)).unwrap();
+        assert_eq!(read(dir.path()).0, [1, 2, 3, 4]);
+        remove(dir.path(), "hall");
+        remove(dir.path(), "hall");
+        assert!(Kept::all(dir.path()).is_empty());
+    }
+
+    #[test]
+    fn a_torn_tail_is_cut_off_wherever_it_is_torn() {
+        let dir = tempfile::tempdir().unwrap();
+        written(dir.path(), 2);
+        let file = path(dir.path(), "hall");
+        let two = std::fs::read(&file).unwrap();
+        written(dir.path(), 3);
+        let three = std::fs::read(&file).unwrap();
+        assert_eq!(three[..two.len()], two[..]);
+        for end in two.len()..three.len() {
+            std::fs::write(&file, &three[..end]).unwrap();
+            let (scans, journal) = read(dir.path());
+            assert_eq!(scans, [1, 2], "{end}");
+            journal.unwrap().scan(&job(9)).unwrap();
+            assert_eq!(read(dir.path()).0, [1, 2, 9], "{end}");
+        }
+    }
+
+    #[test]
+    fn a_damaged_record_ends_it_and_a_damaged_head_is_no_mapping() {
+        let dir = tempfile::tempdir().unwrap();
+        written(dir.path(), 3);
+        let file = path(dir.path(), "hall");
+        let whole = std::fs::read(&file).unwrap();
+        let flipped = |at: usize| {
+            let mut bytes = whole.clone();
+            bytes[at] ^= 1;
+            std::fs::write(&file, bytes).unwrap();
+        };
+        flipped(whole.len() - 1);
+        assert_eq!(read(dir.path()).0, [1, 2]);
+        flipped(20);
+        assert!(Kept::all(dir.path()).is_empty());
+        std::fs::write(&file, []).unwrap();
+        assert!(Kept::all(dir.path()).is_empty());
+        std::fs::write(&file, &whole).unwrap();
+        std::fs::rename(&file, path(dir.path(), "other")).unwrap();
+        assert!(Kept::all(dir.path()).is_empty(), "under the name of another map");
+    }
+
+    #[test]
+    fn it_is_bounded() {
+        let dir = tempfile::tempdir().unwrap();
+        written(dir.path(), 1);
+        let mut journal = read(dir.path()).1.unwrap();
+        journal.bytes = MAX_BYTES - 60;
+        assert!(journal.scan(&job(2)).unwrap_err().to_string().contains("more than"));
+        assert_eq!(read(dir.path()).0, [1], "nothing of it was written");
+    }
+}
