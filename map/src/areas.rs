@@ -3,7 +3,7 @@
 //!
 //! In: evidence of runs by cell (a square metre and one of four headings), areas that somebody named, the mode. Out: advice
 //! for a pose: the best module, which are used, by how much each is biased and how much less sure it is than it claims.
-//! Where a cell was hardly driven through, the named area it lies in speaks for it, then the whole map.
+//! Where a cell was hardly driven through, those around speak for it, then the named area it lies in, then the whole map.
 
 mod evidence;
 mod learn;
@@ -179,6 +179,8 @@ pub struct Fault {
 pub enum Level {
     /// The cell itself was driven through often enough.
     Cell,
+    /// It and the eight around it.
+    Around,
     /// The named area it lies in.
     Area,
     /// All of the map.
@@ -221,10 +223,27 @@ impl Advice {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Areas {
     mode: Mode,
-    named: Vec<(NamedArea, [Modules; 4])>,
+    named: Vec<(NamedArea, [Pool; 4])>,
     cells: BTreeMap<Cell, (Modules, Advice)>,
-    map: Modules,
+    map: Pool,
     elsewhere: Advice,
+}
+
+/// Cells added up.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+struct Pool {
+    found: Modules,
+    /// How many.
+    cells: u64,
+}
+
+impl Pool {
+    fn add(&mut self, found: &Modules) {
+        for (sum, more) in self.found.iter_mut().zip(found) {
+            sum.add(more);
+        }
+        self.cells += 1;
+    }
 }
 
 impl Areas {
@@ -235,22 +254,25 @@ impl Areas {
         runs: impl IntoIterator<Item = &'a BTreeMap<Cell, Modules>>,
     ) -> Self {
         let mut cells: BTreeMap<Cell, Modules> = BTreeMap::new();
-        let mut map = Modules::default();
         for (cell, found) in runs.into_iter().flatten() {
-            add(cells.entry(*cell).or_default(), found);
-            add(&mut map, found);
-        }
-        let mut named: Vec<_> =
-            named.into_iter().take(MAX_AREAS).map(|area| (area, [Modules::default(); 4])).collect();
-        for (cell, found) in &cells {
-            if let Some((_, sums)) = named.iter_mut().find(|(area, _)| area.contains(cell.middle_m())) {
-                add(&mut sums[usize::from(cell.heading)], found);
+            for (sum, more) in cells.entry(*cell).or_default().iter_mut().zip(found) {
+                sum.add(more);
             }
         }
-        let mut made = Self { mode, named, map, ..Self::default() };
-        made.elsewhere = made.judge(&[(Level::Map, &map)]);
-        made.cells =
-            cells.into_iter().map(|(cell, found)| (cell, (found, made.judged(&cell, &found)))).collect();
+        let mut made = Self { mode, ..Self::default() };
+        made.named = named.into_iter().take(MAX_AREAS).map(|area| (area, [Pool::default(); 4])).collect();
+        for (cell, found) in &cells {
+            made.map.add(found);
+            if let Some((_, pools)) = made.named.iter_mut().find(|(area, _)| area.contains(cell.middle_m())) {
+                pools[usize::from(cell.heading)].add(found);
+            }
+        }
+        made.elsewhere = made.judge(&[(Level::Map, made.map)]);
+        made.cells = cells.iter().map(|(cell, found)| (*cell, (*found, Advice::default()))).collect();
+        let told: Vec<Advice> = cells.keys().map(|cell| made.judged(cell)).collect();
+        for ((_, advice), told) in made.cells.values_mut().zip(told) {
+            *advice = told;
+        }
         made
     }
 
@@ -265,11 +287,7 @@ impl Areas {
             return self.elsewhere;
         }
         let cell = Cell::of(at);
-        match self.cells.get(&cell) {
-            Some((_, advice)) => *advice,
-            None if self.named.is_empty() => self.elsewhere,
-            None => self.judged(&cell, &Modules::default()),
-        }
+        self.cells.get(&cell).map_or_else(|| self.judged(&cell), |(_, advice)| *advice)
     }
 
     /// Every cell that was driven through, with what was found and what follows.
@@ -281,37 +299,44 @@ impl Areas {
     pub fn named(&self) -> impl Iterator<Item = (&NamedArea, [(Modules, Advice); 4])> {
         self.named.iter().map(|(area, by_heading)| {
             let told =
-                |found: &Modules| (*found, self.judge(&[(Level::Area, found), (Level::Map, &self.map)]));
+                |pool: &Pool| (pool.found, self.judge(&[(Level::Area, *pool), (Level::Map, self.map)]));
             (area, std::array::from_fn(|k| told(&by_heading[k])))
         })
     }
 
     /// All of the map together.
     pub fn map(&self) -> (&Modules, &Advice) {
-        (&self.map, &self.elsewhere)
+        (&self.map.found, &self.elsewhere)
     }
 
     /// Advice for a cell.
-    fn judged(&self, cell: &Cell, found: &Modules) -> Advice {
-        let around = self.named.iter().find(|(area, _)| area.contains(cell.middle_m()));
-        let around = around.map(|(_, by_heading)| (Level::Area, &by_heading[usize::from(cell.heading)]));
-        let levels: Vec<_> = [Some((Level::Cell, found)), around, Some((Level::Map, &self.map))]
-            .into_iter()
-            .flatten()
-            .collect();
+    fn judged(&self, cell: &Cell) -> Advice {
+        let (mut alone, mut around) = (Pool::default(), Pool::default());
+        for (dx, dy) in (-1..=1).flat_map(|dx| (-1..=1).map(move |dy| (dx, dy))) {
+            let near = Cell { x: cell.x.saturating_add(dx), y: cell.y.saturating_add(dy), ..*cell };
+            let Some((found, _)) = self.cells.get(&near) else { continue };
+            around.add(found);
+            if near == *cell {
+                alone.add(found);
+            }
+        }
+        let mut levels = vec![(Level::Cell, alone), (Level::Around, around)];
+        let named = self.named.iter().find(|(area, _)| area.contains(cell.middle_m()));
+        levels.extend(named.map(|(_, by_heading)| (Level::Area, by_heading[usize::from(cell.heading)])));
+        levels.push((Level::Map, self.map));
         self.judge(&levels)
     }
 
     /// Advice from the first of the levels that know enough.
-    fn judge(&self, levels: &[(Level, &Modules)]) -> Advice {
+    fn judge(&self, levels: &[(Level, Pool)]) -> Advice {
         let mut advice = Advice::default();
         for module in Module::ALL {
-            let enough = |(_, found): &&(Level, &Modules)| found[module.index()].fixes() >= MIN_MEASUREMENTS;
-            if let Some((level, found)) = levels.iter().find(enough) {
+            let enough = |(_, pool): &&(Level, Pool)| pool.found[module.index()].fixes() >= MIN_MEASUREMENTS;
+            if let Some((level, pool)) = levels.iter().find(enough) {
                 // Robot-aligned biases of different places are different things: over the whole map they only tell how much
                 // less sure a module is than it says.
-                let may_subtract = *level != Level::Map;
-                advice.faults[module.index()] = found[module.index()].fault(may_subtract);
+                let cells = if *level == Level::Map { None } else { Some(pool.cells) };
+                advice.faults[module.index()] = pool.found[module.index()].fault(cells);
             }
         }
         // Nobody is shut out of a place for what happened elsewhere.
@@ -319,9 +344,9 @@ impl Areas {
         let ranked = levels
             .iter()
             .filter(|(level, _)| *level != Level::Map)
-            .find(|(_, found)| found[Module::Odometry.index()].available() >= MIN_MEASUREMENTS);
-        let Some((level, found)) = ranked else { return advice };
-        let scores = found.map(|evidence| evidence.score());
+            .find(|(_, pool)| pool.found[Module::Odometry.index()].available() >= MIN_MEASUREMENTS);
+        let Some((level, pool)) = ranked else { return advice };
+        let scores = pool.found.map(|evidence| evidence.score());
         let best = Module::ALL.into_iter().min_by(|a, b| scores[a.index()].total_cmp(&scores[b.index()]));
         let Some(best) = best else { return advice };
         let lowest = scores[best.index()];
@@ -332,12 +357,6 @@ impl Areas {
         };
         (advice.best, advice.level) = (Some(best), *level);
         advice
-    }
-}
-
-fn add(sums: &mut Modules, found: &Modules) {
-    for (sum, more) in sums.iter_mut().zip(found) {
-        sum.add(more);
     }
 }
 

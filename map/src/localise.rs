@@ -78,7 +78,7 @@ pub enum NuisanceKey {
     /// theta).
     Walls(i32, i32),
     /// What a modality gets wrong in a place beyond what it says, as runs have shown: the first three of six are unit errors
-    /// along, across and of the heading, robot-aligned.
+    /// of (x, y, theta).
     Area(Modality, Cell),
 }
 

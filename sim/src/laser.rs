@@ -42,6 +42,11 @@ impl Default for LaserParams {
 
 /// A scan from a pose of the robot. A beam without a return reads the maximum range.
 pub fn scan(building: &Building, map_from_robot: &Pose2, params: &LaserParams, seed: u64) -> Scan {
+    scan_among(building.walls(), map_from_robot, params, seed)
+}
+
+/// The same among walls that are no building's.
+pub fn scan_among(walls: &[WallSegment], map_from_robot: &Pose2, params: &LaserParams, seed: u64) -> Scan {
     let p = params;
     let within = |x: f64, low: f64, high: f64| if x.is_finite() { x.clamp(low, high) } else { low };
     let (beams, field) = (p.beams.clamp(2, MAX_BEAMS), within(p.field_rad, 0.01, std::f64::consts::TAU));
@@ -54,7 +59,7 @@ pub fn scan(building: &Building, map_from_robot: &Pose2, params: &LaserParams, s
         let bearing = map_from_laser.theta_rad - 0.5 * field + i as f64 * step;
         let direction = Vector2::new(bearing.cos(), bearing.sin());
         let noise: f64 = StandardNormal.sample(&mut rng);
-        match range(building.walls(), &origin, &direction, max_range_m) {
+        match range(walls, &origin, &direction, max_range_m) {
             Some(r) => (r + p.range_sigma_m * noise).clamp(0.001, max_range_m) as f32,
             None => max_range_m as f32,
         }

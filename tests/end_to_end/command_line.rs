@@ -22,7 +22,7 @@ use vision::{detect::quads::Corners, geometry::polygon};
 const LONGEST: Duration = Duration::from_mins(2);
 
 /// Options that each command must name in its help.
-const OPTIONS: [(&str, &[&str]); 50] = [
+const OPTIONS: [(&str, &[&str]); 51] = [
     ("demo", &["--robots", "--rate-hz", "--legs", "--seed", "--http", "--data", "--stay", "--json"]),
     ("serve", &["--config", "--data", "--http", "--zenoh", "--fleet", "--workers", "--insecure"]),
     (
@@ -117,6 +117,7 @@ const OPTIONS: [(&str, &[&str]); 50] = [
             "<SETS>",
         ],
     ),
+    ("evaluate modalities", &["--runs", "--drives", "--seed", "--json", "--plot"]),
     ("evaluate recognition", &["--generated-views", "--distance", "--misses", "--json", "<SET>"]),
     (
         "evaluate viewpoint",

@@ -158,20 +158,24 @@ impl Evidence {
         squares * self.steps as f64 / self.available as f64
     }
 
-    /// How it errs beyond what it claims. A bias is subtracted only where it is one: from enough passages and more than
-    /// twice its own standard deviation (method 15).
-    pub(super) fn fault(&self, may_subtract: bool) -> Fault {
+    /// How it errs beyond what it claims. A bias is subtracted only where it is one: in sums over so many `cells`, from
+    /// enough passages, and more than twice its own standard deviation (method 15); never where `cells` is absent.
+    pub(super) fn fault(&self, cells: Option<u64>) -> Fault {
         let mut fault = Fault::default();
         if self.fixes < MIN_MEASUREMENTS {
             return fault;
         }
         let n = self.fixes as f64;
+        // One passage through several cells errs alike in all of them.
+        let passages = cells.map_or(0.0, |cells| self.visits as f64 / cells.max(1) as f64);
         for k in 0..3 {
-            if may_subtract && self.visits >= MIN_VISITS {
+            if passages >= MIN_VISITS as f64 {
                 let visits = self.visits as f64;
                 let mean = self.means[k] / visits;
-                let scatter = (self.mean_squares[k] / visits - mean * mean).max(0.0) / (visits - 1.0);
-                if mean * mean > BIAS_SIGMAS * BIAS_SIGMAS * scatter {
+                let scatter = (self.mean_squares[k] / visits - mean * mean).max(0.0) / (passages - 1.0);
+                // Few passages know their own scatter badly: about Student's quantile.
+                let sigmas = BIAS_SIGMAS * (1.0 + 2.0 / (passages - 1.0));
+                if mean * mean > sigmas * sigmas * scatter {
                     fault.bias[k] = mean;
                 }
             }

@@ -12,6 +12,7 @@ pub(crate) mod detection;
 pub(crate) mod placement;
 pub(crate) mod pose;
 pub(crate) mod mapping;
+pub(crate) mod modalities;
 pub(crate) mod recognition;
 pub(crate) mod visibility;
 
@@ -89,6 +90,13 @@ pub(crate) enum Command {
     ///   waymark evaluate navigation --plot corridor.svg
     #[command(verbatim_doc_comment)]
     Navigation(navigation::Args),
+    /// Which modality to trust where: learnt from runs whose path is known, then driven with, mode by mode.
+    ///
+    /// A way of 55 m through a corridor (the laser tells nothing along it), a hall (the floor pushes odometry aside, no
+    /// posters) and a workshop (its walls were moved after they were mapped). For example:
+    ///   waymark evaluate modalities --plot modalities.svg
+    #[command(verbatim_doc_comment)]
+    Modalities(modalities::Args),
     /// From where landmarks are seen: closed-form areas against brute force on random maps, their sizes against counting,
     /// and what they and the choice where to look cost.
     Visibility(visibility::Args),
@@ -111,6 +119,7 @@ pub(crate) fn run(command: &Command) -> anyhow::Result<()> {
         Command::Placement(args) => placement::run(args),
         Command::Navigation(args) => navigation::run(args),
         Command::Mapping(args) => mapping::run(args),
+        Command::Modalities(args) => modalities::run(args),
         Command::Visibility(args) => visibility::run(args),
     }
 }
