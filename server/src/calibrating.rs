@@ -5,6 +5,7 @@ use protos::{convert::geometry::intrinsics_wire, v1};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 use vision::{
+    detect::quads::BORDER_SIGMA_PX,
     frame::{Intrinsics, IntrinsicsSigmas},
     localise::calibrate::{
         CalibrateError, CalibrateParams, Calibration, Chosen, Height, PlanarView, calibrate_choosing,
@@ -15,8 +16,6 @@ use vision::{
 pub(crate) const CORNER_SIGMA_PX: f64 = 0.5;
 /// What is known of any camera's principal point: standard deviation from the image's centre, as a share of its width.
 const CENTRE_SIGMA: f64 = 0.1;
-/// What borders found in pictures are off by beside their noise, per coordinate: the edge of a frame, a shadow.
-const SYSTEMATIC_PX: f64 = 0.3;
 /// A camera is doubtful from so much chi2 a degree of freedom,
 const DOUBTFUL_CHI2: f64 = 10.0;
 /// and with its principal point so far from the image's centre, as a share of the width.
@@ -130,7 +129,7 @@ pub(crate) fn calibrated(
 ) -> Result<Report, CalibrateError> {
     let mut views = views.to_vec();
     for covariance in views.iter_mut().flat_map(|v| &mut v.covariance_px2) {
-        *covariance += nalgebra::Matrix2::identity() * SYSTEMATIC_PX.powi(2);
+        *covariance += nalgebra::Matrix2::identity() * BORDER_SIGMA_PX.powi(2);
     }
     let Chosen { calibration: c, used } = calibrate_choosing(&views, image_px, &known.params())?;
     let sigma = |i: usize| c.covariance.map_or(f64::INFINITY, |m| m[(i, i)].sqrt());

@@ -138,7 +138,8 @@ pub fn matched(quad: &Quad, verdict: &Verdict, p: &Params) -> Option<(Corners, [
         border => quad.alternates.get(border - 1)?,
     };
     let detected_px = detected_px.rotated(verdict.rotation);
-    let covariance_px2 = std::array::from_fn(|i| quad.corner_covariance_px2[(i + verdict.rotation) % 4]);
+    let believed_px2 = quad.believed_covariance_px2();
+    let covariance_px2 = std::array::from_fn(|i| believed_px2[(i + verdict.rotation) % 4]);
     let Some(aligned_px) = verdict.aligned_px else { return Some((detected_px, covariance_px2)) };
     let icon_px = detected_px.area_px2().sqrt() / p.icon.size as f64;
     let moved_px = detected_px.points().iter().zip(aligned_px.points()).map(|(d, a)| (a - d).norm());
@@ -153,6 +154,7 @@ pub fn matched(quad: &Quad, verdict: &Verdict, p: &Params) -> Option<(Corners, [
 mod tests {
     use super::*;
     use crate::{
+        detect::quads::BORDER_SIGMA_PX,
         frame::Distortion,
         geometry::homography::Homography,
         learn::{model::learn, random::Random, synthesis, texture::Texture},
@@ -285,7 +287,8 @@ mod tests {
         let facts = facts(&image, quad.clone(), Some(&camera()));
         assert_pose(&facts);
         let (_, covariance) = matched(&quad, facts.verdict.as_ref().unwrap(), &Params::default()).unwrap();
-        assert!((covariance[0][(0, 0)] - 0.05).abs() < 1e-12, "covariances turn with their corners");
+        let border = BORDER_SIGMA_PX.powi(2);
+        assert!((covariance[0][(0, 0)] - 0.05 - border).abs() < 1e-12, "covariances turn with their corners");
     }
 
     #[test]

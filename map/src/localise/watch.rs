@@ -251,7 +251,7 @@ mod tests {
     use nalgebra::{Matrix2, Vector2, Vector3, Vector6};
     use vision::{
         detect::quads::Corners,
-        frame::{Distortion, Intrinsics},
+        frame::{Distortion, Intrinsics, IntrinsicsSigmas},
         learn::random::Random,
         localise::{
             pose::{LandmarkSize, landmark_pose},
@@ -266,6 +266,8 @@ mod tests {
     fn watched(true_px: f64, looks: usize, seed: u64) -> WatchState {
         let mut random = Random::new(seed);
         let said = Intrinsics::new(600.0, 600.0, 320.0, 240.0, Distortion::None).unwrap();
+        // Whoever says that it may be wrong is watched all the same.
+        let said = said.with_sigmas(IntrinsicsSigmas { focal_px: 30.0, center_px: 2.0 }).unwrap();
         let real = Intrinsics { fx_px: true_px, fy_px: true_px, ..said };
         let believed = Mounting::new(pan_tilt(0.0, 0.0, Vector3::new(0.1, 0.0, 1.2))).unwrap();
         let e = believed.covariance.map_diagonal(f64::sqrt).map(|s| s * random.normal());

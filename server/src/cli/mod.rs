@@ -12,6 +12,7 @@ mod given;
 pub(crate) mod evaluate;
 pub(crate) mod mapping;
 mod parameters;
+mod own_errors;
 pub(crate) mod pictures;
 mod run;
 pub(crate) mod scratch;

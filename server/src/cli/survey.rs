@@ -4,7 +4,7 @@
 //! What a person adds in the field is the name of the poster and a click on the right quad; here the simulator's truth
 //! stands in for the click. Corners, places and sizes are measured, not taken from the truth.
 
-use super::screen;
+use super::{own_errors::OwnErrors, screen};
 use map::{
     lines::{self, LineParams},
     mounting::Mounting,
@@ -14,7 +14,6 @@ use map::{
     segments::LaserSegment,
     walls::{WallParams, Walls},
 };
-use nalgebra::{Matrix3, Vector3};
 use sim::{
     lesson::Stop,
     robot::{Robot, Sighting},
@@ -31,8 +30,6 @@ use vision::{
     trace::NoTrace,
 };
 
-/// How well the surveying robot knows its pose: standard deviations of x, y (metres) and heading (radians).
-const SURVEY_SIGMA: [f64; 3] = [0.01, 0.01, 0.002];
 /// The person clicks on the quad that is the poster.
 const IOU_CLICKED: f64 = 0.7;
 
@@ -40,6 +37,9 @@ const IOU_CLICKED: f64 = 0.7;
 pub(crate) struct View {
     pub(crate) quad: Quad,
     pub(crate) sighting: Sighting,
+    /// Where the robot says that it stood, and that its camera sat.
+    map_from_robot: Pose2Covariance,
+    mounting: Mounting,
 }
 
 /// What the surveying robot brought home.
@@ -52,26 +52,28 @@ pub(crate) struct Survey {
 }
 
 /// Drives to all stops.
-pub(crate) fn survey(mut robot: Robot, stops: &[Stop]) -> anyhow::Result<Survey> {
+pub(crate) fn survey(mut robot: Robot, stops: &[Stop], mut wrong: OwnErrors) -> anyhow::Result<Survey> {
     let progress = screen::progress(stops.len(), "first drive");
     let mut walls = Walls::new(WallParams::default());
     let (mut views, mut missed) = (BTreeMap::<String, Vec<View>>::new(), 0);
     for stop in stops {
         let sighting = robot.look(&stop.step);
-        walls.add(&surveyed(&sighting)?, &lines::segments(&sighting.scan, &LineParams::default()))?;
+        let map_from_robot = wrong.surveyed(&sighting.step.map_from_robot)?;
+        let mounting = wrong.mounting(&sighting.step.robot_from_camera)?;
+        walls.add(&map_from_robot, &lines::segments(&sighting.scan, &LineParams::default()))?;
         match clicked(&sighting, &stop.landmark) {
-            Some(quad) => views.entry(stop.landmark.clone()).or_default().push(View { quad, sighting }),
+            Some(quad) => views.entry(stop.landmark.clone()).or_default().push(View {
+                quad,
+                sighting,
+                map_from_robot,
+                mounting,
+            }),
             None => missed += 1,
         }
         progress.inc(1);
     }
     progress.finish_and_clear();
     Ok(Survey { walls: walls.segments().cloned().collect(), views, missed })
-}
-
-fn surveyed(sighting: &Sighting) -> Result<Pose2Covariance, map::check::OutOfRange> {
-    let variances = Vector3::from(SURVEY_SIGMA.map(|sigma| sigma * sigma));
-    Pose2Covariance::new(sighting.step.map_from_robot, Matrix3::from_diagonal(&variances))
 }
 
 /// The detected quad that a person would click on.
@@ -97,10 +99,10 @@ pub(crate) fn hang(
         .filter_map(|(i, view)| {
             let look = PlacingView {
                 corners: &view.quad.corners_px,
-                covariance_px2: &view.quad.corner_covariance_px2,
+                covariance_px2: &view.quad.believed_covariance_px2(),
                 camera,
-                map_from_robot: &surveyed(&view.sighting).ok()?,
-                mounting: &Mounting::new(view.sighting.step.robot_from_camera).ok()?,
+                map_from_robot: &view.map_from_robot,
+                mounting: &view.mounting,
             };
             Some((i, view_on_wall(&look, walls, &p).ok()?))
         })

@@ -4,6 +4,7 @@ pub mod snapshot;
 pub mod decode;
 pub mod slots;
 pub mod intake;
+pub mod judging;
 pub mod live;
 pub mod motion;
 pub mod doubles;

@@ -7,8 +7,9 @@ use super::{
     decode::{ImageLimits, decode_frame},
     doubles::sighted,
     intake::{FrameJob, unknown_map},
+    judging::{Seen, View, judged_fix},
     live::{LiveFrame, LiveHub},
-    motion::{Grounds, Moment, Motion},
+    motion::{Moment, Motion},
     search::{Glance, Left, Searches},
     slots::{Outcome, SlotKey, Slots},
     snapshot::{MapSnapshot, Snapshots},
@@ -16,12 +17,7 @@ use super::{
     verdicts::{self, StageTimes},
 };
 use crate::gather::{Hook, Looked};
-use map::{
-    changes::{ChangeParams, Expectation, Eye, Judged, expected, judge, sift},
-    hypotheses::Mode,
-    localise::{Fix, Sighting},
-    pose2::Pose2Covariance,
-};
+use map::{hypotheses::Mode, localise::Fix, pose2::Pose2Covariance};
 use protos::{CheckedFrame, Code, Name, Rejection, convert::geometry::pose2_covariance_wire, v1};
 use std::{
     panic::{AssertUnwindSafe, catch_unwind},
@@ -32,11 +28,7 @@ use std::{
     thread::JoinHandle,
     time::Instant,
 };
-use vision::{
-    frame::GrayImage,
-    pipeline::FrameFacts,
-    recognise::{LandmarkId, Recognition, Verdict},
-};
+use vision::{frame::GrayImage, pipeline::FrameFacts, recognise::LandmarkId};
 
 /// Where answers and poses go. Must not wait.
 pub trait Publish: Send + Sync + 'static {
@@ -126,13 +118,6 @@ struct Done {
     found: Option<(Pose2Covariance, Vec<LandmarkId>)>,
 }
 
-/// What a frame says about the landmarks themselves, by the pose without it.
-struct Seen {
-    grounds: Grounds,
-    judged: Vec<Judged>,
-    missed: Vec<LandmarkId>,
-}
-
 impl Engine {
     /// Answers one frame and publishes the answer; never panics.
     fn work(&self, key: &SlotKey, job: &FrameJob, publish: &dyn Publish) -> Outcome {
@@ -198,13 +183,15 @@ impl Engine {
         let facts = verdicts::look(&image, frame.intrinsics.as_ref(), &map, &mut times);
         let mut answer = verdicts::answer(&facts, &map);
         let grounds = self.motion.grounds(&key.robot, moment(frame, &map));
-        let sightings = verdicts::sightings(&facts, &map);
-        let seen = grounds.and_then(|grounds| seen(frame, &facts, &map, sightings.as_deref().ok(), grounds));
-        let judged = seen.as_ref().map_or(&[][..], |s| &s.judged);
-        let fix = sightings.and_then(|all| {
-            let prior = seen.as_ref().map(|s| &s.grounds.pose);
-            fix(frame, &sift(&all, judged), prior)
-        });
+        let view = View {
+            facts: &facts,
+            map: &map,
+            mounting: frame.mounting.as_ref(),
+            camera: frame.intrinsics.as_ref(),
+            image_px: [f64::from(frame.width_px), f64::from(frame.height_px)],
+            prior: frame.prior.as_ref(),
+        };
+        let (fix, seen) = judged_fix(&view, grounds);
         verdicts::fill_fix(&mut answer, &fix, &map);
         if let Some(intrinsics) = &frame.intrinsics {
             let (seen, mounting) = (verdicts::recognised(&facts), frame.mounting.as_ref());
@@ -261,61 +248,6 @@ impl Engine {
             self.live.refused(key, answer);
         }
     }
-}
-
-/// The robot's pose by landmarks. The robot's own prior gates; ours only chooses between two solutions, so that a fused
-/// pose gone wrong cannot keep out the fixes that would correct it.
-fn fix(
-    frame: &CheckedFrame,
-    sightings: &[Sighting<'_>],
-    prior: Option<&Pose2Covariance>,
-) -> Result<Fix, &'static str> {
-    let mounting = frame.mounting.as_ref();
-    let fix = verdicts::robot_fix(sightings, mounting, frame.prior.as_ref());
-    if fix.as_ref().err() != Some(&verdicts::AMBIGUOUS) || frame.prior.is_some() || prior.is_none() {
-        return fix;
-    }
-    verdicts::robot_fix(sightings, mounting, prior)
-}
-
-/// A candidate whose distance is below this many times its threshold may well be there, though nobody would swear to it.
-const NEARLY: f64 = 1.5;
-
-/// Whether a quad shows a landmark, or something that is taken for it, or nearly.
-fn may_be(verdict: &Verdict, id: LandmarkId) -> bool {
-    let (Recognition::Unique(seen) | Recognition::Ambiguous(seen)) = verdict.recognition else {
-        return verdict.candidates.first().is_some_and(|c| c.landmark == id && c.ratio < NEARLY);
-    };
-    seen == id
-}
-
-/// What a frame says about the landmarks: which hang where they should, and which should be in it and are not.
-fn seen(
-    frame: &CheckedFrame,
-    facts: &FrameFacts,
-    map: &MapSnapshot,
-    sightings: Option<&[Sighting<'_>]>,
-    grounds: Grounds,
-) -> Option<Seen> {
-    let (mounting, camera) = (frame.mounting.as_ref()?, frame.intrinsics.as_ref()?);
-    let p = ChangeParams::default();
-    let judge = |s: &Sighting<'_>| judge(s, mounting, &grounds.pose, &grounds.supporters, &p).ok();
-    let judged = sightings.unwrap_or_default().iter().filter_map(judge).collect();
-    let there = |id: LandmarkId| facts.quads.iter().filter_map(|q| q.verdict.as_ref()).any(|v| may_be(v, id));
-    let learnt = map.models.iter().filter_map(|model| {
-        let (info, visible) = (map.landmarks.get(&model.id)?, map.visibility.get(&model.id)?);
-        let place = info.place.as_ref().filter(|_| info.is_trusted() && !there(model.id))?;
-        Some(Expectation { landmark: model.id, place, visible })
-    });
-    let image_px = [f64::from(frame.width_px), f64::from(frame.height_px)];
-    let eye = Eye { mounting, camera, image_px };
-    // Missing is told only by a pose that others hold up.
-    let missed = if grounds.supporters.len() >= p.supporters {
-        expected(&grounds.pose, &eye, &learnt.collect::<Vec<_>>(), &p)
-    } else {
-        Vec::new()
-    };
-    Some(Seen { grounds, judged, missed })
 }
 
 fn hypothesis(mode: &Mode) -> v1::Hypothesis {

@@ -121,6 +121,11 @@ pub enum QuadKind {
     ThreeSided,
 }
 
+/// What a border that was found in a picture is off by besides the noise of its edges, per coordinate: another edge of the
+/// frame, a shadow, a side that bends. The covariance of the corners knows nothing of it: where that says 0.04 px, corners
+/// of rendered posters are 0.2 to 0.4 px off, whatever their size (docs/EVALUATION.md, "Navigation").
+pub const BORDER_SIGMA_PX: f64 = 0.3;
+
 /// A detected quad.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Quad {
@@ -141,6 +146,13 @@ pub struct Quad {
     /// Other borders of the same thing (mat, canvas, inner frame) and what hangs inside (a poster on a door), nested in
     /// `corners_px`, outermost first.
     pub alternates: Vec<Corners>,
+}
+
+impl Quad {
+    /// Covariance of each corner as far as it can be believed: of the fitted edges, and [`BORDER_SIGMA_PX`].
+    pub fn believed_covariance_px2(&self) -> [Matrix2<f64>; 4] {
+        self.corner_covariance_px2.map(|c| c + Matrix2::identity() * BORDER_SIGMA_PX.powi(2))
+    }
 }
 
 /// How quads are formed.

@@ -4,6 +4,7 @@ use super::MAP;
 use crate::{
     RunningServer,
     cli::{
+        own_errors::OwnErrors,
         pictures, screen,
         survey::{hang, survey},
     },
@@ -47,7 +48,8 @@ pub(super) async fn teach(
     let robot = Robot::new(building.clone(), &RobotParams::default());
     let camera = *robot.camera().intrinsics();
     let stops = stops(building, &LessonParams { seed, ..LessonParams::default() });
-    let survey = tokio::task::spawn_blocking(move || survey(robot, &stops)).await??;
+    let survey =
+        tokio::task::spawn_blocking(move || survey(robot, &stops, OwnErrors::none(&camera))).await??;
 
     let mut taught = Taught { walls: survey.walls.len(), views_missed: survey.missed, ..Taught::default() };
     let ends: Vec<[[f64; 2]; 2]> = survey.walls.iter().map(|w| [w.a.into(), w.b.into()]).collect();

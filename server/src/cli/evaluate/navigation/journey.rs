@@ -1,19 +1,32 @@
-//! One drive: frames are looked at as a server would (`engine/verdicts.rs`), fixes and odometry fused (`map::fuse`), and
-//! all of it compared with the truth. The robot is told nothing of where it starts.
+//! One drive, with the code of the server's workers: scans and frames through `engine/motion.rs`, landmarks judged by
+//! `engine/judging.rs`, what that finds put into the map. No transport, no threads; the scan of a moment comes before its
+//! frame. All of it is compared with the truth. The robot is told nothing of where it starts.
 
-use super::world::World;
-use crate::engine::verdicts::{self, AMBIGUOUS, StageTimes};
+use super::{
+    super::experiment::mixed,
+    world::{MAP, World},
+};
+use crate::{
+    cli::own_errors::OwnErrors,
+    engine::{
+        judging::{View, judged_fix},
+        live::LiveHub,
+        motion::{Corrections, Moment as At, Motion, ScanJob},
+        snapshot::{MapSnapshot, Snapshots},
+        verdicts::{self, StageTimes},
+    },
+};
 use map::{
-    fuse::{FixOutcome, FuseParams, Fuser},
-    localise::Fix,
-    mounting::Mounting,
+    changes::{Change, Standing},
     pose2::{Pose2, Pose2Covariance},
 };
+use protos::Name;
 use sim::{
     drive::DriveParams,
     robot::{Robot, RobotParams, Sighting},
     truth::{LandmarkView, ViewState},
 };
+use std::sync::Arc;
 use vision::{geometry::polygon, pipeline::FrameFacts, recognise::Recognition};
 
 /// A recognition is true when its quad overlaps the landmark's true outline by this much.
@@ -24,6 +37,8 @@ const MIN_SIDE_PX: f64 = 40.0;
 const MAX_VIEW_ANGLE_RAD: f64 = 1.309;
 /// Farther than any corridor: the simulator starts the robot at its end.
 const FAR_END_M: f64 = 1e3;
+/// One run of the robot's software.
+const EPOCH: u64 = 1;
 
 /// Where a robot was, and where it was thought to be.
 pub(super) struct Moment {
@@ -33,7 +48,7 @@ pub(super) struct Moment {
     pub(super) odometry: Pose2,
     /// None before the first fix.
     pub(super) fused: Option<Pose2Covariance>,
-    /// A fix was taken here.
+    /// A landmark corrected it here.
     pub(super) corrected: bool,
 }
 
@@ -48,60 +63,148 @@ pub(super) struct Journey {
     pub(super) false_matches: usize,
     /// Frames that showed a landmark up to the first fix, itself included; none if there never was one.
     pub(super) frames_to_fix: Option<usize>,
-    /// Fixes that the filter did not believe.
-    pub(super) gated: usize,
+    /// What became of fixes and scans.
+    pub(super) log: Corrections,
+    /// Times that a landmark was said to have moved or to be missing; nothing in the corridor changes.
+    pub(super) flagged: usize,
+    pub(super) quarantined: usize,
 }
 
-/// Drives the length of the corridor once; `back` from its far end.
-pub(super) fn drive(world: &World, seed: u64, back: bool, rate_hz: f64) -> Journey {
-    let start_m = if back { FAR_END_M } else { 0.0 };
-    let drive = DriveParams { seed, start_m, reverse: back, rate_hz, ..DriveParams::default() };
+/// How robots drive.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Way {
+    pub(super) seed: u64,
+    /// From the far end.
+    pub(super) back: bool,
+    pub(super) rate_hz: f64,
+    /// They have a laser.
+    pub(super) laser: bool,
+    /// Their cameras, and where those sit, are exactly what they say.
+    pub(super) exact: bool,
+}
+
+/// The server's side: one robot in one map.
+struct Server {
+    snapshots: Arc<Snapshots>,
+    motion: Motion,
+    robot: Name,
+}
+
+impl Server {
+    fn new(map: &MapSnapshot) -> anyhow::Result<Self> {
+        let robot = Name::new("robot").map_err(|refusal| anyhow::anyhow!("{refusal:?}"))?;
+        let snapshots = Arc::new(Snapshots::default());
+        snapshots.publish(Arc::new(map.clone()));
+        snapshots.set_robot(robot.as_ref(), Some(MAP));
+        let motion = Motion::new(snapshots.clone(), Arc::new(LiveHub::default()));
+        Ok(Self { snapshots, motion, robot })
+    }
+
+    fn map(&self) -> anyhow::Result<Arc<MapSnapshot>> {
+        self.snapshots.get(MAP).ok_or_else(|| anyhow::anyhow!("the map is gone"))
+    }
+
+    fn scan(&self, seen: &Sighting, captured_ns: i64) {
+        let odom_from_robot = seen.step.odom_from_robot;
+        let scan = seen.scan.clone();
+        self.motion.laser(
+            &self.robot,
+            &ScanJob { map: MAP.to_owned(), epoch: EPOCH, captured_ns, odom_from_robot, scan },
+        );
+    }
+
+    /// What a frame does to the robot's pose; what it finds out about landmarks.
+    fn frame(
+        &self,
+        map: &MapSnapshot,
+        facts: &FrameFacts,
+        seen: &Sighting,
+        (wrong, captured_ns): (&OwnErrors, i64),
+    ) -> Vec<Change> {
+        let at = At { map: MAP, epoch: EPOCH, captured_ns, odometry: Some(seen.step.odom_from_robot) };
+        let mounting = wrong.mounting(&seen.step.robot_from_camera).ok();
+        let image = &seen.frame.image;
+        let view = View {
+            facts,
+            map,
+            mounting: mounting.as_ref(),
+            camera: Some(&wrong.camera),
+            image_px: [image.width() as f64, image.height() as f64],
+            prior: None,
+        };
+        let (fix, judged) = judged_fix(&view, self.motion.grounds(&self.robot, at));
+        if let Ok(fix) = fix {
+            self.motion.fixed(&self.robot, at, &fix);
+        }
+        judged
+            .map_or_else(Vec::new, |s| self.motion.judged(&self.robot, at, &s.grounds, &s.judged, &s.missed))
+    }
+
+    /// As the store does.
+    fn change(&self, map: &MapSnapshot, changes: &[Change]) {
+        let mut next = map.clone();
+        next.version += 1;
+        for change in changes {
+            if let Some(info) = next.landmarks.get_mut(&change.landmark) {
+                info.standing = change.standing;
+            }
+        }
+        self.snapshots.publish(Arc::new(next));
+    }
+
+    /// Fixes by landmarks that corrected the pose so far.
+    fn corrections(&self) -> u64 {
+        let log = self.motion.corrections(&self.robot);
+        of(&log, "landmarks", &["started", "applied", "reset"])
+    }
+}
+
+/// How often a modality had one of these outcomes.
+pub(super) fn of(log: &Corrections, modality: &str, outcomes: &[&str]) -> u64 {
+    let counts = log.totals.get(modality);
+    counts.map_or(0, |counts| outcomes.iter().filter_map(|o| counts.get(o)).sum())
+}
+
+/// Drives the length of the corridor once.
+pub(super) fn drive(world: &World, way: Way) -> anyhow::Result<Journey> {
+    let start_m = if way.back { FAR_END_M } else { 0.0 };
+    let (seed, reverse, rate_hz) = (way.seed, way.back, way.rate_hz);
+    let drive = DriveParams { seed, start_m, reverse, rate_hz, ..DriveParams::default() };
     let robot = Robot::new(world.building.clone(), &RobotParams { drive, ..RobotParams::default() });
-    let camera = *robot.camera().intrinsics();
-    let mut fuser = Fuser::new(FuseParams::default());
+    let wrong = OwnErrors::of(robot.camera().intrinsics(), way.exact, mixed(&[way.seed, 14]));
+    let server = Server::new(&world.map)?;
     let mut journey = Journey::default();
     let mut frames_that_show = 0;
     for seen in robot {
-        let step = &seen.step;
-        let at_ns = (step.time_s * 1e9) as i64;
-        // The simulator's odometry is within range: what is refused could only be forgotten.
-        fuser.odometry(at_ns, step.odom_from_robot).ok();
-        let facts = verdicts::look(&seen.frame.image, Some(&camera), &world.map, &mut StageTimes::start());
+        let captured_ns = (seen.step.time_s * 1e9) as i64;
+        let before = server.corrections();
+        if way.laser {
+            server.scan(&seen, captured_ns);
+        }
+        let map = server.map()?;
+        let facts = verdicts::look(&seen.frame.image, Some(&wrong.camera), &map, &mut StageTimes::start());
         frames_that_show += usize::from(journey.score(world, &seen, &facts));
-        let mounting = Mounting::new(step.robot_from_camera).ok();
-        let outcome = fix(world, &facts, mounting.as_ref(), fuser.pose_at(at_ns).as_ref())
-            .and_then(|fix| fuser.fix(at_ns, &fix).ok());
-        let corrected =
-            matches!(outcome, Some(FixOutcome::Started | FixOutcome::Applied { .. } | FixOutcome::Reset));
-        journey.gated += usize::from(matches!(outcome, Some(FixOutcome::GatedOut { .. })));
-        let fused = fuser.pose().map(|f| f.pose);
+        let changes = server.frame(&map, &facts, &seen, (&wrong, captured_ns));
+        if !changes.is_empty() {
+            let of = |standing| changes.iter().filter(|c| c.standing == standing).count();
+            journey.flagged += of(Standing::Flagged);
+            journey.quarantined += of(Standing::Quarantined);
+            server.change(&map, &changes);
+        }
+        let fused = server.motion.pose(&server.robot, MAP);
         if fused.is_some() && journey.frames_to_fix.is_none() {
             journey.frames_to_fix = Some(frames_that_show);
         }
         journey.moments.push(Moment {
-            time_s: step.time_s,
-            truth: step.map_from_robot,
-            odometry: step.odom_from_robot,
+            time_s: seen.step.time_s,
+            truth: seen.step.map_from_robot,
+            odometry: seen.step.odom_from_robot,
             fused,
-            corrected,
+            corrected: server.corrections() > before,
         });
     }
-    journey
-}
-
-/// As the server: our own prior only chooses between two solutions.
-fn fix(
-    world: &World,
-    facts: &FrameFacts,
-    mounting: Option<&Mounting>,
-    prior: Option<&Pose2Covariance>,
-) -> Option<Fix> {
-    let sightings = verdicts::sightings(facts, &world.map).ok()?;
-    let alone = verdicts::robot_fix(&sightings, mounting, None);
-    if alone.as_ref().err() == Some(&AMBIGUOUS) && prior.is_some() {
-        return verdicts::robot_fix(&sightings, mounting, prior).ok();
-    }
-    alone.ok()
+    journey.log = server.motion.corrections(&server.robot);
+    Ok(journey)
 }
 
 impl Journey {

@@ -1,6 +1,7 @@
 //! `waymark evaluate navigation` (method 18, E10 and E12): the paper's corridor, 25 m long with four posters. A first drive
-//! teaches, then robots drive through it, each from a start that nobody tells, and are localised by landmarks and
-//! odometry. It runs in this program, with the code that the server runs, without a server, from a seed.
+//! teaches, then robots drive through it, each from a start that nobody tells, and are localised by landmarks, odometry and
+//! a laser that the corridor tells nothing along it. It runs in this program, with the code that the server runs, without
+//! a server, from a seed.
 
 mod journey;
 mod plot;
@@ -8,7 +9,7 @@ mod report;
 mod world;
 
 use super::experiment::{mixed, of_each, say, write_plot};
-use journey::{Journey, drive};
+use journey::{Journey, Way, drive};
 use report::Report;
 use std::path::PathBuf;
 use world::World;
@@ -31,6 +32,13 @@ pub(crate) struct Args {
     /// Building, lesson, drives and all noise follow from it.
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Robots without a laser.
+    #[arg(long)]
+    no_laser: bool,
+    /// Robots whose cameras and their seats, and a survey whose poses, are wrong by the standard deviations that come with
+    /// them; else they are exactly what they are said to be. Only so can covariances be judged.
+    #[arg(long)]
+    own_errors: bool,
     /// One JSON object instead of a table.
     #[arg(long)]
     json: bool,
@@ -57,11 +65,13 @@ fn rate(text: &str) -> Result<f64, String> {
 
 /// Teaches, drives, reports.
 pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
-    let world = World::taught(args.length_m, args.posters as usize, args.seed)?;
+    let world = World::taught(args.length_m, args.posters as usize, !args.own_errors, args.seed)?;
     let seeds: Vec<u64> = (0..args.drives).map(|n| mixed(&[args.seed, 10, u64::from(n)])).collect();
-    let journeys: Vec<Journey> =
-        of_each(&seeds, "drives", |n, seed| drive(&world, *seed, n % 2 == 1, args.rate_hz));
-    let report = Report::new(&world, &journeys, args.seed);
+    let (rate_hz, laser, exact) = (args.rate_hz, !args.no_laser, !args.own_errors);
+    let way = |n: usize, seed: &u64| Way { seed: *seed, back: n % 2 == 1, rate_hz, laser, exact };
+    let journeys = of_each(&seeds, "drives", |n, seed| drive(&world, way(n, seed)));
+    let journeys = journeys.into_iter().collect::<anyhow::Result<Vec<Journey>>>()?;
+    let report = Report::new(&world, &journeys, (laser, exact), args.seed);
     say(args.json, &report, || report.lines())?;
     write_plot(args.plot.as_deref(), || plot::svg(&world, &journeys[0]))
 }

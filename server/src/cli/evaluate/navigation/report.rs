@@ -1,13 +1,16 @@
 //! All drives as figures: errors along and across the corridor, how honest the covariance is, what was seen.
 
 use super::{
-    journey::{Journey, Moment},
+    journey::{Journey, Moment, of},
     world::World,
 };
 use crate::cli::evaluate::statistics::quantile;
 use map::pose2::{Pose2Covariance, wrap_rad};
 use serde::Serialize;
+use std::collections::BTreeMap;
 
+/// Outcomes that changed the pose.
+const APPLIED: [&str; 3] = ["started", "applied", "reset"];
 /// 95 % of chi2 with 3 degrees of freedom.
 const CHI2_3_95: f64 = 7.815;
 
@@ -46,8 +49,17 @@ pub(super) struct Report {
     shown: usize,
     recognised: usize,
     false_matches: usize,
-    corrections: usize,
-    gated: usize,
+    /// The robots had one.
+    laser: bool,
+    /// By landmarks, and those that the filter did not believe.
+    corrections: u64,
+    gated: u64,
+    /// By scans, and what became of the others.
+    laser_corrections: u64,
+    laser_others: BTreeMap<&'static str, u64>,
+    /// Landmarks wrongly said to have moved or to be missing.
+    flagged: usize,
+    quarantined: usize,
     /// Drives that never were fixed.
     never_fixed: usize,
     /// Frames that showed a landmark up to the first fix, in the worst drive.
@@ -62,16 +74,27 @@ pub(super) struct Report {
     /// Mean normalised squared error of the fused pose, 3 expected, and the share of frames within its 95 %.
     nees: f64,
     nees_within_95: f64,
+    /// Mean squared error over the claimed variance along, across and of the heading: 1 expected of each.
+    nees_each: [f64; 3],
+    /// Poses and the survey are what they are said to be.
+    exact: bool,
 }
 
 impl Report {
-    pub(super) fn new(world: &World, journeys: &[Journey], seed: u64) -> Self {
+    pub(super) fn new(world: &World, journeys: &[Journey], (laser, exact): (bool, bool), seed: u64) -> Self {
         let moments = || journeys.iter().flat_map(|j| &j.moments);
         let fused = || moments().filter_map(|m| Some((m, m.fused.as_ref()?)));
         let errors = |of: fn(&Moment, &Pose2Covariance) -> f64| Errors::of(fused().map(|(m, f)| of(m, f)));
         let squares: Vec<f64> = fused().filter_map(|(m, f)| nees(m, f)).collect();
         let count = squares.len().max(1) as f64;
         let of_each = |count: fn(&Journey) -> usize| journeys.iter().map(count).sum();
+        let logged =
+            |modality, outcomes: &[&str]| journeys.iter().map(|j| of(&j.log, modality, outcomes)).sum();
+        let mut laser_others = BTreeMap::new();
+        let scans = journeys.iter().filter_map(|j| j.log.totals.get("laser")).flatten();
+        for (outcome, count) in scans.filter(|(outcome, _)| !APPLIED.contains(outcome)) {
+            *laser_others.entry(*outcome).or_default() += count;
+        }
         Self {
             experiment: "navigation",
             seed,
@@ -84,8 +107,13 @@ impl Report {
             shown: of_each(|j| j.shown),
             recognised: of_each(|j| j.recognised),
             false_matches: of_each(|j| j.false_matches),
-            corrections: moments().filter(|m| m.corrected).count(),
-            gated: of_each(|j| j.gated),
+            laser,
+            corrections: logged("landmarks", &APPLIED),
+            gated: logged("landmarks", &["gated_out"]),
+            laser_corrections: logged("laser", &APPLIED),
+            laser_others,
+            flagged: of_each(|j| j.flagged),
+            quarantined: of_each(|j| j.quarantined),
             never_fixed: journeys.iter().filter(|j| j.frames_to_fix.is_none()).count(),
             frames_to_fix_worst: journeys.iter().filter_map(|j| j.frames_to_fix).max(),
             along_m: errors(|m, f| f.pose.x_m - m.truth.x_m),
@@ -95,6 +123,11 @@ impl Report {
             odometry_across_m: Errors::of(moments().map(|m| m.odometry.y_m - m.truth.y_m)),
             nees: squares.iter().sum::<f64>() / count,
             nees_within_95: squares.iter().filter(|s| **s < CHI2_3_95).count() as f64 / count,
+            nees_each: std::array::from_fn(|k| {
+                fused().map(|(m, f)| f.pose.minus(&m.truth)[k].powi(2) / f.covariance[(k, k)]).sum::<f64>()
+                    / count
+            }),
+            exact,
         }
     }
 
@@ -109,7 +142,20 @@ impl Report {
             format!("  frames          {}", self.frames),
             format!("  recognitions    {} of {} full views of landmarks in use", self.recognised, self.shown),
             format!("  false matches   {}", self.false_matches),
-            format!("  corrections     {}, {} more not believed by the filter", self.corrections, self.gated),
+            format!(
+                "  by landmarks    {} corrections, {} more not believed by the filter",
+                self.corrections, self.gated
+            ),
+            if self.laser {
+                let others: Vec<String> = self.laser_others.iter().map(|(o, n)| format!("{o} {n}")).collect();
+                format!("  by the laser    {} corrections; {}", self.laser_corrections, others.join(", "))
+            } else {
+                "  by the laser    the robots have none".to_owned()
+            },
+            format!(
+                "  wrongly judged  {} times flagged, {} quarantined; nothing was moved",
+                self.flagged, self.quarantined
+            ),
             format!(
                 "  first fix       after {} frames that show a landmark at worst; {} drives had none",
                 self.frames_to_fix_worst.map_or("-".to_owned(), |n| n.to_string()),
@@ -127,6 +173,17 @@ impl Report {
                 self.nees,
                 100.0 * self.nees_within_95
             ),
+            format!(
+                "  of each number: {:.2} along, {:.2} across, {:.2} heading (1 expected)",
+                self.nees_each[0], self.nees_each[1], self.nees_each[2]
+            ),
+            if self.exact {
+                "  Cameras, their seats and the survey's poses are exact, and claimed with the usual doubt."
+                    .to_owned()
+            } else {
+                "  Cameras, their seats and the survey's poses are wrong by what they are claimed to."
+                    .to_owned()
+            },
             "  Errors from the first fix on; odometry alone was told the true start.".to_owned(),
         ]
     }

@@ -4,13 +4,19 @@
 use crate::{
     cli::{
         evaluate::experiment::{mixed, of_each},
+        own_errors::OwnErrors,
         screen,
         survey::{View as Look, hang, survey},
     },
     engine::snapshot::{LandmarkInfo, MapSnapshot},
 };
 use anyhow::Context as _;
-use map::place::LandmarkPlace;
+use map::{
+    laser_fix::WallIndex,
+    place::LandmarkPlace,
+    segments::LaserSegment,
+    visibility::{Obstacle, Viewer, VisibilityParams, visibility},
+};
 use sim::{
     building::Building,
     corridor::CorridorParams,
@@ -33,6 +39,9 @@ const VIEWS: usize = 30;
 /// Icons of each landmark that the others must be told from.
 const NEGATIVES: usize = 10;
 
+/// Name of its map.
+pub(super) const MAP: &str = "corridor";
+
 /// The corridor and its map.
 pub(super) struct World {
     pub(super) building: Arc<Building>,
@@ -54,7 +63,9 @@ struct Lesson {
 
 impl World {
     /// Builds the corridor, surveys it and learns its posters.
-    pub(super) fn taught(length_m: f64, posters: usize, seed: u64) -> anyhow::Result<Self> {
+    ///
+    /// `exact`: the surveying robot's pose, camera and its seat are exactly what they are said to be.
+    pub(super) fn taught(length_m: f64, posters: usize, exact: bool, seed: u64) -> anyhow::Result<Self> {
         let p = Params::default();
         let corridor = CorridorParams {
             length_m,
@@ -64,8 +75,10 @@ impl World {
         };
         let building = Arc::new(Building::corridor_with(&corridor, seed));
         let robot = Robot::new(building.clone(), &RobotParams::default());
-        let camera = *robot.camera().intrinsics();
-        let survey = survey(robot, &stops(&building, &LessonParams { seed, ..LessonParams::default() }))?;
+        let wrong = OwnErrors::of(robot.camera().intrinsics(), exact, mixed(&[seed, 13]));
+        let camera = wrong.camera;
+        let stops = stops(&building, &LessonParams { seed, ..LessonParams::default() });
+        let survey = survey(robot, &stops, wrong)?;
         let found: Vec<(&String, &Vec<Look>)> = survey.views.iter().collect();
         let lessons: Vec<Lesson> = of_each(&found, "views", |i, (name, looks)| {
             let (place, agreed) = hang(looks, &survey.walls, &camera)?;
@@ -85,7 +98,7 @@ impl World {
             Some(add_negatives(&alone, &others, &p))
         });
         let models = in_use(&lessons, models);
-        let map = snapshot(&lessons, models, p)?;
+        let map = snapshot(&lessons, &survey.walls, models, p)?;
         anyhow::ensure!(!map.models.is_empty(), "no poster passed the gates of learning; try another --seed");
         let place_errors_m = lessons.iter().map(|l| place_error_m(&building, l)).collect::<Result<_, _>>()?;
         Ok(Self { building, map, length_m, posters, place_errors_m })
@@ -128,6 +141,7 @@ fn in_use(lessons: &[Lesson], models: Vec<Option<LandmarkModel>>) -> Vec<Arc<Lan
 
 fn snapshot(
     lessons: &[Lesson],
+    walls: &[LaserSegment],
     models: Vec<Arc<LandmarkModel>>,
     params: Params,
 ) -> anyhow::Result<MapSnapshot> {
@@ -140,8 +154,15 @@ fn snapshot(
             (id, LandmarkInfo { name: l.name.clone(), size, place, ..LandmarkInfo::default() })
         })
         .collect();
-    let params = Arc::new(params);
-    Ok(MapSnapshot { landmarks, sizes, models, params, ..MapSnapshot::empty("corridor", 1) })
+    // Where each should be seen from, so that it can be missed: as the store makes it.
+    let obstacles: Vec<Obstacle> = walls.iter().map(Obstacle::from).collect();
+    let area =
+        |l: &Lesson| visibility(&l.place, &obstacles, &Viewer::default(), &VisibilityParams::default());
+    let visibility = numbered().filter_map(|(id, l)| Some((id, Arc::new(area(l).ok()?)))).collect();
+    let (params, wall_index) = (Arc::new(params), Arc::new(WallIndex::new(walls)));
+    let walls = walls.to_vec();
+    let empty = MapSnapshot::empty(MAP, 1);
+    Ok(MapSnapshot { landmarks, sizes, models, walls, wall_index, visibility, params, ..empty })
 }
 
 fn place_error_m(building: &Building, lesson: &Lesson) -> anyhow::Result<f64> {

@@ -138,7 +138,7 @@ fn look(
         off(a).total_cmp(&off(b))
     })?;
     let corners = quad.corners_px.rotated(turn);
-    let mut covariance = quad.corner_covariance_px2;
+    let mut covariance = quad.believed_covariance_px2();
     covariance.rotate_left(turn);
     let e = Vector3::from(ROBOT_SIGMA).map(|s| s * random.normal());
     let spread = Matrix3::from_diagonal(&Vector3::from(ROBOT_SIGMA.map(|s| s * s)));
