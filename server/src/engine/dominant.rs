@@ -1,6 +1,7 @@
 //! Which quad of a photograph is meant, when nobody says: the only one, or the one that is far larger than any other.
 //! In: the detector's quads. Out: one of them, or those between which a person must choose.
 
+use nalgebra::Matrix2;
 use vision::{
     detect::{
         detect,
@@ -20,8 +21,17 @@ const SEARCH_MAX_PX: usize = 1_920 * 1_200;
 /// Quads that share more of their union than this show the same thing.
 const SAME_IOU: f64 = 0.5;
 
+/// A whole quad of a photograph.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Whole {
+    /// Its corners.
+    pub corners_px: Corners,
+    /// Their covariance by the detector, in the same pixels.
+    pub covariance_px2: [Matrix2<f64>; 4],
+}
+
 /// The quads of a photograph, largest first, in its own pixels: four sides seen, none cut off by the image border.
-pub fn whole_quads(image: &GrayImage, p: &Params) -> Vec<Corners> {
+pub fn whole_quads(image: &GrayImage, p: &Params) -> Vec<Whole> {
     let factor = ((image.width() * image.height()) as f64 / SEARCH_MAX_PX as f64).sqrt().ceil() as usize;
     let quads = if factor > 1 {
         detect(&smaller(image, factor), &p.detect, &mut NoTrace)
@@ -29,10 +39,10 @@ pub fn whole_quads(image: &GrayImage, p: &Params) -> Vec<Corners> {
         detect(image, &p.detect, &mut NoTrace)
     };
     let whole = |q: &&Quad| q.kind == QuadKind::Full && !q.side_clipped.contains(&true);
-    let mut corners: Vec<Corners> =
-        quads.iter().filter(whole).filter_map(|q| enlarged(&q.corners_px, factor.max(1))).collect();
-    corners.sort_by(|a, b| b.area_px2().total_cmp(&a.area_px2()));
-    corners
+    let mut found: Vec<Whole> =
+        quads.iter().filter(whole).filter_map(|q| enlarged(q, factor.max(1))).collect();
+    found.sort_by(|a, b| b.corners_px.area_px2().total_cmp(&a.corners_px.area_px2()));
+    found
 }
 
 /// The one quad that is meant, of quads sorted by falling area.
@@ -65,9 +75,11 @@ fn smaller(image: &GrayImage, factor: usize) -> GrayImage {
 }
 
 /// Pixel centres are at whole numbers: the centre of a block lies between its pixels.
-fn enlarged(corners: &Corners, factor: usize) -> Option<Corners> {
+fn enlarged(quad: &Quad, factor: usize) -> Option<Whole> {
     let scale = factor as f64;
-    Corners::new(corners.points().map(|c| c.map(|x| (x + 0.5) * scale - 0.5))).ok()
+    let corners_px =
+        Corners::new(quad.corners_px.points().map(|c| c.map(|x| (x + 0.5) * scale - 0.5))).ok()?;
+    Some(Whole { corners_px, covariance_px2: quad.corner_covariance_px2.map(|c| c * scale * scale) })
 }
 
 #[cfg(test)]
@@ -100,10 +112,16 @@ mod tests {
             if inside { if check { 60 } else { 90 } } else { 220 }
         });
         let quads = whole_quads(&image, &Params::default());
-        let found = dominant(&quads).unwrap_or_else(|| panic!("{quads:?}"));
+        let corners: Vec<Corners> = quads.iter().map(|q| q.corners_px).collect();
+        let found = dominant(&corners).unwrap_or_else(|| panic!("{quads:?}"));
         let [tl, _, br, _] = found.points();
         for (found, true_px) in [(tl.x, 599.5), (tl.y, 499.5), (br.x, 1_799.5), (br.y, 1_699.5)] {
             assert!((found - true_px).abs() < 2.0, "{found} instead of {true_px}");
         }
+        // So are their covariances: two pixels for each.
+        let halves = detect(&smaller(&image, 2), &Params::default().detect, &mut NoTrace);
+        let half = halves.iter().max_by(|a, b| a.corners_px.area_px2().total_cmp(&b.corners_px.area_px2()));
+        let half = half.unwrap().corner_covariance_px2;
+        assert!((quads[0].covariance_px2[0] - half[0] * 4.0).norm() < 1e-12);
     }
 }

@@ -32,6 +32,8 @@ const NEARLY: f64 = 1.5;
 /// What a frame gives.
 pub(super) struct Found {
     pub(super) glimpses: Vec<Glimpse>,
+    /// Of each, the covariance of its corners by the detector.
+    pub(super) corners_px2: Vec<[Matrix2<f64>; 4]>,
     /// How the picture was taken, if that is known well enough.
     pub(super) capture: Option<Capture>,
     pub(super) unusable: u64,
@@ -61,15 +63,15 @@ pub(super) fn glimpses(offer: &Offer, params: &Params) -> Found {
     let stand = stand(offer);
     let capture =
         stand.as_ref().map(|s| Capture::of_robot(s.camera, s.map_from_robot, &s.mounting.robot_from_camera));
-    let mut found = Found { glimpses: vec![], capture, unusable: 0, not_on_wall: 0 };
+    let mut found = Found { glimpses: vec![], corners_px2: vec![], capture, unusable: 0, not_on_wall: 0 };
     for facts in &offer.looked.quads {
         if facts.quad.kind != QuadKind::Full || facts.quad.side_clipped.contains(&true) {
             found.unusable += 1;
             continue;
         }
         let recognised = recognised(facts, params);
-        let (corners_px, covariance_px2) =
-            recognised.map_or((facts.quad.corners_px, facts.quad.corner_covariance_px2), |(_, seen)| seen);
+        let (corners_px, covariance_px2) = recognised
+            .map_or((facts.quad.corners_px, facts.quad.believed_covariance_px2()), |(_, seen)| seen);
         let Ok(place) = place(&corners_px, &covariance_px2, stand.as_ref(), &offer.looked.map) else {
             found.not_on_wall += 1;
             continue;
@@ -80,6 +82,11 @@ pub(super) fn glimpses(offer: &Offer, params: &Params) -> Found {
         };
         let identity = identity(facts, recognised.map(|(id, _)| id), place.as_ref(), &offer.looked.map);
         let icon = features(icon, &params.recognise);
+        // Of a landmark that is seen the corners are those detected, turned.
+        let turn = facts.verdict.as_ref().filter(|_| recognised.is_some()).map_or(0, |v| v.rotation);
+        let mut covariance = facts.quad.corner_covariance_px2;
+        covariance.rotate_left(turn % 4);
+        found.corners_px2.push(covariance);
         found.glimpses.push(Glimpse { corners_px, icon, place, identity });
     }
     found

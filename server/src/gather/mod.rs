@@ -243,7 +243,7 @@ fn follow(offer: &Offer, params: &Params) -> Vec<(Kept, NewView)> {
     }
     drop(counts);
     let mut views = vec![];
-    for (glimpse, outcome) in found.glimpses.iter().zip(outcomes) {
+    for ((glimpse, corners_px2), outcome) in found.glimpses.iter().zip(&found.corners_px2).zip(outcomes) {
         let Outcome::Keep(number) = outcome else { continue };
         let Some(track) = tracker.tracks().iter().find(|t| t.number == number) else { continue };
         let kept = Kept {
@@ -253,7 +253,11 @@ fn follow(offer: &Offer, params: &Params) -> Vec<(Kept, NewView)> {
             known: track.known,
             place: glimpse.place,
         };
-        views.extend(view(offer, glimpse, found.capture.as_ref()).map(|view| (kept, view)));
+        let mut capture = found.capture.clone();
+        if let Some(capture) = &mut capture {
+            capture.corners_by_detector(corners_px2);
+        }
+        views.extend(view(offer, glimpse, capture.as_ref()).map(|view| (kept, view)));
     }
     views
 }

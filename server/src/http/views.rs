@@ -8,12 +8,12 @@ use super::{
 };
 use crate::{
     engine::{
-        dominant::{dominant, others, whole_quads},
+        dominant::{Whole, dominant, others, whole_quads},
         picture,
     },
     store::{
         landmarks, maps,
-        placing::{self, Placing},
+        placing::{self, Capture, Placing},
         views::{self, Cut, NewView, Outcome, ViewRow},
     },
 };
@@ -96,7 +96,8 @@ struct NewViewForm {
     /// `true`: the picture shows the landmark and nothing else.
     whole_image: Option<String>,
     /// JSON, how it was taken: `intrinsics`, `map_from_robot` (pose with covariance), `robot_from_camera`, and
-    /// `ceiling_height_m` for a landmark under a ceiling. With it the server places the landmark on the map's walls
+    /// `ceiling_height_m` for a landmark under a ceiling; also `corner_covariance_px2`, `[[uu,uv,vv], ...]` of the four
+    /// corners, where their noise is known (else 1 px, or the detector's where the server finds them). With it the server places the landmark on the map's walls
     /// itself, unless it was placed by hand.
     capture: Option<String>,
     /// `true`: stored even if a stored view shows it from the same side, as large and in the same light.
@@ -131,10 +132,15 @@ async fn add(
         Form::read(&app, request, &["image", "corners", "whole_image", "capture", "keep_alike"]).await?;
     let image = form.needed("image")?;
     let extent = extent(form.optional("corners").as_ref(), form.optional("whole_image").as_ref())?;
-    let capture = capture(form.optional("capture").as_ref())?;
+    let mut capture = capture(form.optional("capture").as_ref())?;
     let thinning = (!flag("keep_alike", form.optional("keep_alike").as_ref())?).then(ThinningParams::default);
     let max = app.config.limits.views;
-    let new = app.clone().on_vision_thread(move |app| prepare(app, &image, &extent)).await??;
+    let (new, detected) = app.clone().on_vision_thread(move |app| prepare(app, &image, &extent)).await??;
+    if let (Some(capture), Some(quad)) = (&mut capture, detected) {
+        capture.corners_by_detector(&quad.covariance_px2);
+    }
+    let capture =
+        capture.map(|c| serde_json::to_string(&c)).transpose().map_err(|e| ApiError::internal(&e))?;
     let new = NewView { capture, ..new };
     let write = app.store.write(move |tx| {
         Box::pin(async move {
@@ -152,12 +158,12 @@ async fn add(
     Ok((status, Json(view)))
 }
 
-/// How the picture was taken, checked, as it is stored.
-fn capture(bytes: Option<&Bytes>) -> Result<Option<String>, ApiError> {
+/// How the picture was taken, checked.
+fn capture(bytes: Option<&Bytes>) -> Result<Option<Capture>, ApiError> {
     let Some(bytes) = bytes else { return Ok(None) };
-    let capture: placing::Capture = extract::json(bytes, "capture")?;
+    let capture: Capture = extract::json(bytes, "capture")?;
     capture.check().map_err(|r| r.inside("capture"))?;
-    serde_json::to_string(&capture).map(Some).map_err(|e| ApiError::internal(&e))
+    Ok(Some(capture))
 }
 
 /// A part that is `true`, `false` or absent.
@@ -182,27 +188,32 @@ fn extent(corners: Option<&Bytes>, whole_image: Option<&Bytes>) -> Result<Extent
 /// Other quads of one picture that are kept as strangers.
 const MAX_STRANGERS: usize = 20;
 
-fn prepare(app: &App, bytes: &Bytes, extent: &Extent) -> Result<NewView, ApiError> {
+/// The view, and the quad that was taken for it where nobody said.
+fn prepare(app: &App, bytes: &Bytes, extent: &Extent) -> Result<(NewView, Option<Whole>), ApiError> {
     let image = picture::decode(bytes, app.config.limits.upload())?;
     let p = &app.config.params;
     let quads = if matches!(extent, Extent::Whole) { Vec::new() } else { whole_quads(&image, p) };
+    let corners: Vec<Corners> = quads.iter().map(|q| q.corners_px).collect();
     let corners_px = match extent {
         Extent::Corners(corners) => *corners,
         Extent::Whole => whole(&image)?,
-        Extent::Detect => found(&quads)?,
+        Extent::Detect => found(&corners)?,
     };
+    let meant = |q: &&Whole| matches!(extent, Extent::Detect) && q.corners_px == corners_px;
+    let detected = quads.iter().find(meant).copied();
     let icon = cut(&image, &corners_px, p)?;
     let stranger =
         |corners: &Corners| Some(Cut { corners_px: *corners, icon: icon_of(&image, corners, p).ok()? });
-    Ok(NewView {
+    let view = NewView {
         image: bytes.to_vec(),
         image_sha256: Sha256::digest(bytes).into(),
         image_kind: picture::kind(bytes).unwrap_or_default(),
         size_px: [image.width(), image.height()],
         cut: Cut { corners_px, icon },
-        strangers: others(&quads, &corners_px).filter_map(stranger).take(MAX_STRANGERS).collect(),
+        strangers: others(&corners, &corners_px).filter_map(stranger).take(MAX_STRANGERS).collect(),
         capture: None,
-    })
+    };
+    Ok((view, detected))
 }
 
 /// The quad that is meant, or a refusal that proposes what was seen.

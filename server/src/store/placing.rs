@@ -23,14 +23,18 @@ use protos::{Rejection, convert::geometry, v1};
 use serde::{Deserialize, Serialize};
 use sqlx::Row;
 use utoipa::ToSchema;
-use vision::{detect::quads::Corners, frame::Intrinsics, localise::pose::LandmarkSize};
+use vision::{
+    detect::quads::{BORDER_SIGMA_PX, Corners},
+    frame::Intrinsics,
+    localise::pose::{LandmarkSize, MAX_CORNER_SIGMA_PX},
+};
 
 statements! {
     CAPTURES = "SELECT corners_px, capture FROM views WHERE landmark_id = ?1 AND capture IS NOT NULL \
                 ORDER BY id DESC LIMIT 256";
 }
 
-/// Standard deviation of a taught corner, per coordinate.
+/// Standard deviation of a taught corner, per coordinate, where nothing is known of it.
 const CORNER_SIGMA_PX: f64 = 1.0;
 /// Of a ceiling's height as it is given.
 const CEILING_SIGMA_M: f64 = 0.02;
@@ -45,6 +49,10 @@ pub(crate) struct Capture {
     /// The landmark is under a ceiling so high, not on a wall.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     ceiling_height_m: Option<f64>,
+    /// Covariance of each corner by the noise of its edges: (uu, uv, vv), TL TR BR BL. What borders are off by besides is
+    /// added whenever it is used.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    corner_covariance_px2: Option<[[f64; 3]; 4]>,
 }
 
 /// The same, checked.
@@ -53,6 +61,7 @@ struct Taken {
     map_from_robot: Pose2Covariance,
     mounting: Mounting,
     ceiling: Option<Ceiling>,
+    corners_px2: [Matrix2<f64>; 4],
 }
 
 impl Capture {
@@ -67,7 +76,13 @@ impl Capture {
             map_from_robot: geometry::pose2_covariance_wire(map_from_robot),
             robot_from_camera: geometry::pose3_wire(robot_from_camera),
             ceiling_height_m: None,
+            corner_covariance_px2: None,
         }
+    }
+
+    /// The corners were found by the detector, with these covariances.
+    pub(crate) fn corners_by_detector(&mut self, covariance_px2: &[Matrix2<f64>; 4]) {
+        self.corner_covariance_px2 = Some(covariance_px2.map(|c| [c.m11, c.m12, c.m22]));
     }
 
     /// What is wrong with it, by field.
@@ -87,7 +102,32 @@ impl Capture {
             mounting: geometry::mounting(&self.robot_from_camera)
                 .map_err(|r| r.inside("robot_from_camera"))?,
             ceiling,
+            corners_px2: self.corners_px2()?,
         })
+    }
+}
+
+impl Capture {
+    /// As far as it can be believed.
+    fn corners_px2(&self) -> Result<[Matrix2<f64>; 4], Rejection> {
+        let Some(stated) = &self.corner_covariance_px2 else {
+            return Ok([Matrix2::identity() * CORNER_SIGMA_PX.powi(2); 4]);
+        };
+        let mut made = [Matrix2::zeros(); 4];
+        for (i, (made, [uu, uv, vv])) in made.iter_mut().zip(stated).enumerate() {
+            let noise = Matrix2::new(*uu, *uv, *uv, *vv);
+            let most = MAX_CORNER_SIGMA_PX.powi(2);
+            let possible = noise.iter().all(|v| v.is_finite())
+                && noise.determinant() >= 0.0
+                && [uu, vv].iter().all(|v| (0.0..=most).contains(*v));
+            if !possible {
+                let field = format!("corner_covariance_px2[{i}]");
+                let detail = format!("not a covariance (uu, uv, vv) of at most {MAX_CORNER_SIGMA_PX} px");
+                return Err(Rejection::new(protos::Code::OutOfRange, &field, detail));
+            }
+            *made = noise + Matrix2::identity() * BORDER_SIGMA_PX.powi(2);
+        }
+        Ok(made)
     }
 }
 
@@ -171,10 +211,10 @@ pub(crate) fn preview<'a>(
     })
 }
 
-fn view<'a>((corners, taken): &'a (Corners, Taken), covariance: &'a [Matrix2<f64>; 4]) -> PlacingView<'a> {
+fn view((corners, taken): &(Corners, Taken)) -> PlacingView<'_> {
     PlacingView {
         corners,
-        covariance_px2: covariance,
+        covariance_px2: &taken.corners_px2,
         camera: &taken.camera,
         map_from_robot: &taken.map_from_robot,
         mounting: &taken.mounting,
@@ -183,7 +223,6 @@ fn view<'a>((corners, taken): &'a (Corners, Taken), covariance: &'a [Matrix2<f64
 
 /// `used` are indices of `looks`.
 fn placed(looks: &[(Corners, Taken)], walls: &[LaserSegment]) -> Result<Placement, PlacingError> {
-    let covariance = [Matrix2::identity() * CORNER_SIGMA_PX * CORNER_SIGMA_PX; 4];
     let p = PlacingParams::default();
     // The last view says what it hangs on.
     let ceiling = looks.first().and_then(|(_, taken)| taken.ceiling);
@@ -191,7 +230,7 @@ fn placed(looks: &[(Corners, Taken)], walls: &[LaserSegment]) -> Result<Placemen
     if let Some(ceiling) = ceiling {
         let (mut seen, mut from) = (vec![], vec![]);
         for (i, look) in looks.iter().enumerate() {
-            match view_on_ceiling(&view(look, &covariance), &ceiling, &p) {
+            match view_on_ceiling(&view(look), &ceiling, &p) {
                 Ok(view) => {
                     seen.push(view);
                     from.push(i);
@@ -207,7 +246,7 @@ fn placed(looks: &[(Corners, Taken)], walls: &[LaserSegment]) -> Result<Placemen
     }
     let (mut seen, mut from) = (vec![], vec![]);
     for (i, look) in looks.iter().enumerate() {
-        match view_on_wall(&view(look, &covariance), walls, &p) {
+        match view_on_wall(&view(look), walls, &p) {
             Ok(view) => {
                 seen.push(view);
                 from.push(i);
@@ -294,6 +333,7 @@ mod tests {
             }),
             robot_from_camera: geometry::pose3_wire(&mounting),
             ceiling_height_m: None,
+            corner_covariance_px2: None,
         };
         capture.check().unwrap();
         NewView {
@@ -368,5 +408,41 @@ mod tests {
         assert!(refused.to_string().contains("not on this wall"));
         let high = Capture { ceiling_height_m: Some(101.0), ..capture };
         assert_eq!(high.check().unwrap_err().field, "ceiling_height_m");
+    }
+
+    #[test]
+    fn corners_are_worth_what_is_known_of_them_and_no_more_than_borders_are() {
+        let wall = load::wall(&[0.0, 0.0, 6.0, 0.0]).unwrap();
+        let new = seen_from(1.0, 1, 0.0);
+        let silent: Capture = serde_json::from_str(new.capture.as_deref().unwrap()).unwrap();
+        let with = |corner| Capture { corner_covariance_px2: Some([corner; 4]), ..silent.clone() };
+        let width = |capture: &Capture| {
+            let made = placed(&[(new.cut.corners_px, capture.taken().unwrap())], std::slice::from_ref(&wall));
+            made.unwrap().place.covariance[(4, 4)]
+        };
+        let by_detector = {
+            let mut capture = silent.clone();
+            capture.corners_by_detector(&[Matrix2::identity() * 0.04; 4]);
+            // It comes back from the store as it went in.
+            serde_json::from_str::<Capture>(&serde_json::to_string(&capture).unwrap()).unwrap()
+        };
+        // The width is all corners', so its variance goes with theirs: 1 px; 0.2 px and what borders are off by.
+        let camera = width(&Capture {
+            intrinsics: v1::Intrinsics {
+                focal_sigma_px: Some(0.0),
+                center_sigma_px: Some(0.0),
+                ..silent.intrinsics.clone()
+            },
+            ..silent.clone()
+        });
+        assert!(width(&by_detector) < width(&silent) && camera < width(&silent));
+        assert_eq!(by_detector.taken().unwrap().corners_px2[3], Matrix2::identity() * 0.13);
+        assert_eq!(silent.taken().unwrap().corners_px2[0], Matrix2::identity());
+        // Whoever states nothing but certainty is not believed.
+        assert_eq!(with([0.0; 3]).taken().unwrap().corners_px2[0], Matrix2::identity() * 0.09);
+        assert!(with([1e8, 0.0, 1e8]).check().is_ok());
+        for bad in [[1.1e8, 0.0, 1.0], [1.0, 1.1, 1.0], [-0.1, 0.0, -0.1], [1.0, f64::NAN, 1.0]] {
+            assert_eq!(with(bad).check().unwrap_err().field, "corner_covariance_px2[0]");
+        }
     }
 }
