@@ -28,6 +28,8 @@ pub(crate) const MAX_BYTES: u64 = 2 << 30;
 pub(crate) const MAX_LINE_BYTES: u64 = 1 << 20;
 /// Two records farther apart in time are a pause or a clock set anew: not counted as recorded time.
 const MAX_PAUSE_S: f64 = 60.0;
+/// A robot that was faster on the whole was not: the recording's times are wrong.
+const MAX_SPEED_MPS: f64 = 5.0;
 
 /// What a recording says of its laser where the file itself does not.
 #[derive(Debug, Clone, Copy, clap::Args)]
@@ -57,11 +59,15 @@ pub(crate) struct Recording {
 }
 
 impl Recording {
-    /// Recorded time without pauses, if the recording has times.
+    /// Recorded time without pauses, if the recording has times that can be: some logs have times by which the robot would
+    /// have driven like a car.
     pub(crate) fn duration_s(&self) -> Option<f64> {
         let times: Option<Vec<f64>> = self.records.iter().map(|r| r.time_s).collect();
         let steps = |t: &[f64]| Some((t[1] - t[0]).abs()).filter(|d| *d <= MAX_PAUSE_S);
-        times.map(|t| t.windows(2).filter_map(steps).sum())
+        let duration_s: f64 = times?.windows(2).filter_map(steps).sum();
+        let way = |r: &[Record]| r[0].odom.between(&r[1].odom).position().norm();
+        let way_m: f64 = self.records.windows(2).map(way).sum();
+        Some(duration_s).filter(|d| *d > 0.0 && way_m <= MAX_SPEED_MPS * d)
     }
 }
 

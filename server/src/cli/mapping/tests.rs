@@ -29,6 +29,18 @@ fn bad(text: &str) -> (usize, String) {
 }
 
 #[test]
+fn times_by_which_a_robot_would_have_flown_are_none() {
+    let recording = |way_m: f64, time_s: f64| {
+        let line = |x: f64, t: f64| format!("FLASER 3 1.0 2.0 3.0 {x} 0 0 {x} 0 0 {t} host {t}\n");
+        reading("a.log", &(line(0.0, 10.0) + &line(way_m, 10.0 + time_s))).unwrap()
+    };
+    assert_eq!(recording(4.0, 1.0).duration_s(), Some(1.0));
+    assert_eq!(recording(6.0, 1.0).duration_s(), None);
+    assert_eq!(recording(0.0, 0.0).duration_s(), None);
+    assert_eq!(Recording::default().duration_s(), None);
+}
+
+#[test]
 fn a_carmen_log_is_read_packed_or_not() {
     let text = "# a comment\nPARAM x 1\nODOM 0 0 0 0 0 0 1.0 host 1.0\nFLASER 3 1.0 2.0 81.8 1 2 0.5 1 2 0.5 10.0 host 10.0\nFLASER 2 1 2 1.5 2 0.5 1 2 0.5 12.5 host 12.5\n";
     for name in ["a.log", "a.log.gz"] {
