@@ -281,6 +281,13 @@ mod tests {
         };
         flipped(whole.len() - 1);
         assert_eq!(read(dir.path()).0, [1, 2]);
+        written(dir.path(), 2);
+        let third = whole.len() as u64 - std::fs::metadata(&file).unwrap().len();
+        flipped(whole.len() - third as usize - 1);
+        let (scans, journal) = read(dir.path());
+        assert_eq!(scans, [1]);
+        journal.unwrap().scan(&job(9)).unwrap();
+        assert_eq!(read(dir.path()).0, [1, 9], "what came after the damage does not come back");
         flipped(20);
         assert!(Kept::all(dir.path()).is_empty());
         std::fs::write(&file, []).unwrap();
