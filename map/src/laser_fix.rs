@@ -2,24 +2,19 @@
 //! prior. Out: the pose with its covariance, wide where the walls say nothing, as along a bare corridor; or why there is
 //! none. The prior only says where to look and what to refuse: it is not part of the answer, so fusing both is right.
 
+mod index;
+pub use index::{MAX_WALLS, WallIndex};
+
 use crate::{
     check::{self, MAX_VARIANCE, OutOfRange},
     laser::Scan,
     localise::{DecidedBy, Fix, Modality, Nuisance, NuisanceKey},
     pose2::{Pose2, Pose2Covariance},
-    segments::LaserSegment,
     slam::cloud::{Cloud, CloudParams, cloud},
-    walls::local,
 };
 use nalgebra::{Matrix2, Matrix3, Matrix3x2, Matrix3x6, Matrix6, Point2, SymmetricEigen, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
-/// Most walls of a map that is localised in; later ones are left out.
-pub const MAX_WALLS: usize = 1 << 17;
-/// Most buckets of the index.
-const MAX_BUCKETS: usize = 1 << 20;
-/// Most entries of the index, a wall counted once in every bucket it passes.
-const MAX_ENTRIES: usize = 1 << 23;
 /// Most points of a scan that are used; evenly thinned beyond.
 const MAX_POINTS: usize = 360;
 /// Variance that stands for "the walls do not tell": (100 m)^2, and (pi)^2 for the heading.
@@ -192,134 +187,6 @@ pub enum LaserRefusal {
     Ambiguous,
 }
 
-/// A map's walls, made ready for localisation.
-#[derive(Debug, Clone)]
-pub struct WallIndex {
-    walls: Vec<Ready>,
-    low: Point2<f64>,
-    bucket_m: f64,
-    width: usize,
-    height: usize,
-    starts: Vec<u32>,
-    entries: Vec<u32>,
-}
-
-/// A wall with what every point asks of it.
-#[derive(Debug, Clone)]
-struct Ready {
-    a: Point2<f64>,
-    along: Vector2<f64>,
-    normal: Vector2<f64>,
-    length_m: f64,
-    /// Covariance of (direction, offset) about the middle.
-    covariance: Matrix2<f64>,
-    name: u64,
-}
-
-impl WallIndex {
-    /// Of the walls of a map.
-    pub fn new<'a>(walls: impl IntoIterator<Item = &'a LaserSegment>) -> Self {
-        let ready = |s: &LaserSegment| {
-            let middle = nalgebra::center(&s.a, &s.b);
-            let (_, covariance) = local(s, &middle);
-            let (a, along, normal, length_m) = (s.a, s.direction(), s.facing(), s.length_m());
-            Ready { a, along, normal, length_m, covariance, name: name(s) }
-        };
-        let walls: Vec<Ready> = walls.into_iter().take(MAX_WALLS).map(ready).collect();
-        let (mut low, mut high) = (Point2::new(f64::MAX, f64::MAX), Point2::new(f64::MIN, f64::MIN));
-        for p in walls.iter().flat_map(|w| [w.a, w.a + w.along * w.length_m]) {
-            low = Point2::new(low.x.min(p.x), low.y.min(p.y));
-            high = Point2::new(high.x.max(p.x), high.y.max(p.y));
-        }
-        if walls.is_empty() {
-            (low, high) = (Point2::origin(), Point2::origin());
-        }
-        let length: f64 = walls.iter().map(|w| w.length_m).sum();
-        let mut bucket_m = 1.0;
-        let cells = |b: f64| (((high.x - low.x) / b) as usize + 1, ((high.y - low.y) / b) as usize + 1);
-        while cells(bucket_m).0.saturating_mul(cells(bucket_m).1) > MAX_BUCKETS
-            || 8.0 * length / bucket_m > MAX_ENTRIES as f64
-        {
-            bucket_m *= 2.0;
-        }
-        let (width, height) = cells(bucket_m);
-        let mut index = Self {
-            walls,
-            low,
-            bucket_m,
-            width,
-            height,
-            starts: vec![0; width * height + 1],
-            entries: Vec::new(),
-        };
-        index.fill();
-        index
-    }
-
-    /// Lists the walls that pass within a bucket of each bucket.
-    fn fill(&mut self) {
-        let mut pairs: Vec<(u32, u32)> = Vec::new();
-        for (i, wall) in self.walls.iter().enumerate() {
-            // Points half a bucket apart, each with its neighbours: nothing nearer than a bucket is missed.
-            let steps = (2.0 * wall.length_m / self.bucket_m).ceil() as usize + 1;
-            for k in 0..=steps {
-                let p = wall.a + wall.along * (wall.length_m * k as f64 / steps as f64);
-                let (x, y) = self.bucket(&p);
-                for (x, y) in (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| (x + dx, y + dy))) {
-                    if x >= 0 && y >= 0 && x < self.width as i64 && y < self.height as i64 {
-                        pairs.push(((y * self.width as i64 + x) as u32, i as u32));
-                    }
-                }
-            }
-        }
-        pairs.sort_unstable();
-        pairs.dedup();
-        for (bucket, _) in &pairs {
-            self.starts[*bucket as usize + 1] += 1;
-        }
-        for i in 1..self.starts.len() {
-            self.starts[i] += self.starts[i - 1];
-        }
-        self.entries = pairs.into_iter().map(|(_, wall)| wall).collect();
-    }
-
-    fn bucket(&self, p: &Point2<f64>) -> (i64, i64) {
-        let f = |v: f64| (v / self.bucket_m).floor() as i64;
-        (f(p.x - self.low.x), f(p.y - self.low.y))
-    }
-
-    /// Whether there is any wall.
-    pub fn is_empty(&self) -> bool {
-        self.walls.is_empty()
-    }
-
-    /// The wall nearest to a point within the radius whose line is turned less than `cos_turn` says from the surface.
-    fn nearest(&self, p: &Point2<f64>, normal: &Vector2<f64>, radius_m: f64, cos_turn: f64) -> Option<usize> {
-        // A point just outside of the walls' box belongs to its border.
-        let (x, y) = self.bucket(p);
-        let (w, h) = (self.width as i64, self.height as i64);
-        if x < -1 || y < -1 || x > w || y > h {
-            return None;
-        }
-        let bucket = (y.clamp(0, h - 1) * w + x.clamp(0, w - 1)) as usize;
-        let (mut best, mut best2) = (None, radius_m * radius_m);
-        for &i in &self.entries[self.starts[bucket] as usize..self.starts[bucket + 1] as usize] {
-            let wall = &self.walls[i as usize];
-            if wall.normal.dot(normal).abs() < cos_turn {
-                continue;
-            }
-            let d = p - wall.a;
-            let (along, across) = (wall.along.dot(&d), wall.normal.dot(&d));
-            let beyond = (-along).max(along - wall.length_m).max(0.0);
-            let d2 = across * across + beyond * beyond;
-            if d2 < best2 {
-                (best, best2) = (Some(i as usize), d2);
-            }
-        }
-        best
-    }
-}
-
 /// The pose of the robot when it took `scan`, near `prior`. Errors name an input that is out of range.
 pub fn laser_fix(
     walls: &WallIndex,
@@ -490,13 +357,6 @@ fn known(covariance: &Matrix3<f64>) -> (Matrix3<f64>, Matrix3<f64>) {
         unknown += axis * axis.transpose() * UNKNOWN[0];
     }
     (back * known * lever, back * unknown * back)
-}
-
-/// A number for a place of a wall (FNV-1a of its ends).
-fn name(wall: &LaserSegment) -> u64 {
-    let ends = [wall.a.x, wall.a.y, wall.b.x, wall.b.y];
-    let bytes = ends.into_iter().flat_map(|v| v.to_bits().to_le_bytes());
-    bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
 }
 
 /// Covariance of an information that may be singular: what is unknown has the variance [`UNKNOWN`].

@@ -149,6 +149,7 @@ fn a_bias_wants_several_passages_and_honest_ones_have_none() {
     assert!(once.fault(Some(1)).excess.y > 15.0, "{:?}", once.fault(Some(1)));
     let mut several = Evidence::default();
     for _ in 0..MIN_VISITS {
+        assert_eq!(several.fault(Some(1)).bias, Vector3::zeros());
         several.add(&visit(1.0, 30, &mut random));
     }
     let fault = several.fault(Some(1));
@@ -219,8 +220,9 @@ fn neighbours_speak_for_a_cell_that_was_hardly_driven_through() {
     assert_eq!((here.level, beside.level), (Level::Around, Level::Around));
     // Passages through two or three cells are as many as through one: enough for a bias all the same.
     assert!((here.fault(Module::Laser).bias.y + 0.2).abs() < 0.01, "{here:?}");
-    let once = Areas::new(Mode::All, Vec::new(), &runs[..1]);
-    let advice = once.advice(&Pose2::new(10.5, 2.5, 0.0));
+    let once = learnt(&drive(&mut Random::new(3), false)).cells;
+    let advice = Areas::new(Mode::All, Vec::new(), [&once]).advice(&Pose2::new(9.5, 3.5, 0.0));
+    assert_eq!(advice.level, Level::Around);
     assert_eq!(advice.fault(Module::Laser).bias, Vector3::zeros(), "one passage through three cells");
     assert_eq!(areas.advice(&Pose2::new(10.5, 4.5, 0.0)).level, Level::Map);
 }

@@ -127,17 +127,6 @@ fn two_places_that_fit_are_none() {
 }
 
 #[test]
-fn the_index_is_bounded() {
-    let far = [[-9e4, -9e4, 9e4, 9e4], [9e4, -9e4, -9e4, 9e4]];
-    let walls: Walls = far.into_iter().cycle().take(1000).collect();
-    let index = WallIndex::new(&segments(&walls, 0.01, 0.01));
-    assert!(index.width * index.height <= MAX_BUCKETS && index.entries.len() <= 2 * MAX_ENTRIES);
-    let p = Point2::new(10.0, 10.1);
-    let n = Vector2::new(-1.0, 1.0).normalize();
-    assert!(index.nearest(&p, &n, 0.5, 0.8).is_some());
-}
-
-#[test]
 fn fused_along_a_corridor_the_doubt_stays_and_across_it_goes() {
     use crate::fuse::{FixOutcome, FuseParams, Fuser};
     let walls = vec![[-60.0, -1.0, 60.0, -1.0], [-60.0, 1.0, 60.0, 1.0]];
