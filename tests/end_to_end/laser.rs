@@ -236,6 +236,11 @@ async fn learnt_from(run: &Run) {
     let (_, known) = ask(Method::GET, &areas, None).await;
     assert_eq!(known["cells"], json!([]));
     assert_eq!(ask(Method::GET, "/robots/r1/run", None).await.1["code"], "not_recording");
+    // A robot that is forgotten leaves no recording behind.
+    assert_eq!(ask(Method::POST, "/robots/r1/run", None).await.0, StatusCode::CREATED);
+    assert_eq!(ask(Method::DELETE, "/robots/r1", None).await.0, StatusCode::NO_CONTENT);
+    assert_eq!(ask(Method::PUT, "/robots/r1", Some(json!({ "map": MAP }))).await.0, StatusCode::OK);
+    assert_eq!(ask(Method::POST, "/robots/r1/run", None).await.0, StatusCode::CREATED);
 }
 
 #[tokio::test(flavor = "multi_thread")]

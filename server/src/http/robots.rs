@@ -64,7 +64,10 @@ async fn get(State(app): State<Shared>, At(robot): At<String>) -> Result<Json<Ro
 #[utoipa::path(delete, path = "/robots/{robot}", tag = "robots", params(("robot" = String, Path)),
     responses((status = 204), (status = 404, body = Problem)))]
 async fn delete(State(app): State<Shared>, At(robot): At<String>) -> Result<StatusCode, ApiError> {
-    app.store.write(move |tx| Box::pin(async move { robots::delete(tx, &robot).await })).await?;
+    let gone = robot.clone();
+    app.store.write(move |tx| Box::pin(async move { robots::delete(tx, &gone).await })).await?;
+    // A run of it that is being recorded would keep its place for ever.
+    app.motion.take_recording(&name("robot", robot)?);
     Ok(StatusCode::NO_CONTENT)
 }
 
