@@ -75,9 +75,4 @@ impl Reference {
         let (share, d) = (at_ns.saturating_sub(*from_ns) as f64 / gap_ns as f64, to.minus(from));
         Some(from.plus(&Vector3::new(d.x * share, d.y * share, wrap_rad(d.z) * share)))
     }
-
-    /// First and last time.
-    pub fn span_ns(&self) -> (i64, i64) {
-        (self.poses.first().map_or(0, |p| p.0), self.poses.last().map_or(0, |p| p.0))
-    }
 }
