@@ -1,8 +1,10 @@
-//! Scores recognition on real photographs with the true corners: `score_recognition DIR [PARAMS [KIND [STRANGERS...]]]`, where
-//! DIR holds a `truth.json` in the evaluation format, PARAMS is JSON such as `{"icon":{"size":50}}` and KIND one of
-//! `hausdorff`, `correlation`, `both`; with a KIND every quad is printed. Further arguments are folders of images that
-//! hold no landmark: quads at random places of them are all strangers. Every landmark is taught from its one photograph and views generated from
-//! it. Each quad is looked for among all landmarks; then, as a stranger, among the half that does not hold it.
+//! Scores recognition on real photographs: `score_recognition DIR [PARAMS [KIND [STRANGERS...]]]`, where DIR holds a
+//! `truth.json` in the evaluation format, PARAMS is JSON such as `{"icon":{"size":50}}` and KIND one of `hausdorff`,
+//! `correlation`, `both` (default); with `VERBOSE` set every quad is printed. Further arguments are folders of images that
+//! hold no landmark: what the detector finds there, and quads at random places, are all strangers. Every landmark is taught
+//! from its one photograph and views generated from it. Each quad is looked for among all landmarks; then, as a stranger,
+//! among the half that does not hold it. Odd photographs, by the number in their name, may be tuned on; even ones are for
+//! the report: every figure has both columns.
 #![expect(clippy::print_stdout, reason = "a program that prints a table")]
 
 use nalgebra::{Matrix2, Point2};
@@ -20,8 +22,11 @@ use vision::{
         synthesis::views,
     },
     params::Params,
+    pipeline::{MAX_RECOGNISED_QUADS, matched},
+    points::{search::search, taught::view_points},
     recognise::{
-        DistanceKind, IconFeatures, LandmarkId, ModelSet, Recognition, features, verdict::recognise,
+        DistanceKind, IconFeatures, LandmarkId, ModelSet, Recognition, features, log10_false_alarms,
+        verdict::recognise,
     },
     trace::NoTrace,
 };
@@ -38,7 +43,21 @@ struct Query {
     image: Arc<GrayImage>,
     quad: Quad,
     landmark: Option<u64>,
+    /// 0 for odd photographs, 1 for even ones.
+    half: usize,
+    /// Cropped to the landmark: nothing for the detector.
+    whole_image: bool,
 }
+
+/// 0 for odd numbers in a file's name, 1 for even ones.
+fn half(file: &str) -> usize {
+    let digits: String =
+        file.chars().rev().skip_while(|c| !c.is_ascii_digit()).take_while(char::is_ascii_digit).collect();
+    // Digits are reversed: the first is the last of the number.
+    digits.bytes().next().map_or(1, |d| usize::from((d - b'0').is_multiple_of(2)))
+}
+
+const HALVES: [&str; 2] = ["odd", "even"];
 
 struct Taught {
     model: LandmarkModel,
@@ -62,7 +81,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     let p: Params = serde_json::from_str(arguments.get(2).map_or("{}", |json| json))?;
     let only: Option<DistanceKind> =
         arguments.get(3).map(|k| serde_json::from_value(k.as_str().into())).transpose()?;
-    let verbose = only.is_some();
     let start = Instant::now();
     let truth: Value = serde_json::from_str(&std::fs::read_to_string(root.join("truth.json"))?)?;
     let taught = teach(root, &truth, &p)?;
@@ -77,31 +95,40 @@ fn main() -> Result<(), Box<dyn Error>> {
     );
     let everything = model_set(&taught, |_| true, &p)?;
     let halves = [model_set(&taught, |id| id % 2 == 0, &p)?, model_set(&taught, |id| id % 2 == 1, &p)?];
-    for kind in [DistanceKind::Correlation, DistanceKind::Hausdorff, DistanceKind::Both] {
-        if only.is_some_and(|o| o != kind) {
-            continue;
-        }
+    let kind = only.unwrap_or_default();
+    let verbose = std::env::var_os("VERBOSE").is_some();
+    for (half, name) in HALVES.into_iter().enumerate() {
+        let queries: Vec<&Query> = queries.iter().filter(|q| q.half == half).collect();
         let start = Instant::now();
         let score = labelled(&queries, &everything, &same, (kind, verbose), &p);
         let ms = start.elapsed().as_secs_f64() * 1e3 / queries.len() as f64;
         let (strangers, strangers_accepted) = strangers(&queries, &halves, &same, (kind, verbose), &p);
         println!(
-            "{kind:?}: right {} wrong {} missed {} ambiguous {} | strangers: refused {} accepted {} | of {strangers} \
+            "{kind:?}, {}: right {} wrong {} missed {} ambiguous {} ({:.3}) | strangers: refused {} accepted {} | of {strangers} \
              strangers to a half {strangers_accepted} accepted | {ms:.1} ms a quad",
-            score.right, score.wrong, score.missed, score.ambiguous, score.refused, score.accepted
+            name,
+            score.right,
+            score.wrong,
+            score.missed,
+            score.ambiguous,
+            score.right as f64 / (score.right + score.wrong + score.missed + score.ambiguous) as f64,
+            score.refused,
+            score.accepted
         );
     }
-    let kind = only.unwrap_or_default();
-    detected(&queries, &everything, &same, kind, &p);
+    detected(&queries, &everything, &same, (kind, verbose), &p);
+    let fifty = model_set(&taught, |id| id % 6 == 0, &p)?;
     for folder in arguments.iter().skip(4) {
-        random_strangers(Path::new(folder), &everything, kind, &p)?;
+        for models in [&fifty, &everything] {
+            strangers_in(Path::new(folder), models, kind, &p)?;
+        }
     }
     Ok(())
 }
 
 /// Every labelled quad with its true corners against all landmarks.
 fn labelled(
-    queries: &[Query],
+    queries: &[&Query],
     models: &ModelSet,
     same: &impl Fn(u64) -> u64,
     (kind, verbose): (DistanceKind, bool),
@@ -136,7 +163,7 @@ fn labelled(
 
 /// The same quads as strangers, each against the half of the landmarks that does not hold it: asked and accepted.
 fn strangers(
-    queries: &[Query],
+    queries: &[&Query],
     halves: &[ModelSet; 2],
     same: &impl Fn(u64) -> u64,
     (kind, verbose): (DistanceKind, bool),
@@ -160,53 +187,120 @@ fn strangers(
     (strangers, strangers_accepted)
 }
 
+/// What the detector and recognition make of the photographs of one half.
+#[derive(Default)]
+struct Detected {
+    images: usize,
+    known: usize,
+    found: usize,
+    wrong: usize,
+    quads: usize,
+    detection_s: f64,
+    recognition_s: f64,
+    corner_errors_px: Vec<f64>,
+    confidences: Vec<(f64, bool)>,
+}
+
 /// The same photographs with the quads that the detector finds. A detected quad belongs to the labelled one it
 /// overlaps most, if by 0.3 at least: borders within it share less than the border itself.
 fn detected(
     queries: &[Query],
     models: &ModelSet,
     same: &impl Fn(u64) -> u64,
-    kind: DistanceKind,
+    (kind, verbose): (DistanceKind, bool),
     p: &Params,
 ) {
     let mut images: Vec<Vec<&Query>> = Vec::new();
-    for q in queries {
+    for q in queries.iter().filter(|q| !q.whole_image) {
         match images.last_mut().filter(|last| last[0].file == q.file) {
             Some(last) => last.push(q),
             None => images.push(vec![q]),
         }
     }
-    let (mut known, mut found, mut quads, mut wrong) = (0, 0, 0, 0);
+    let mut scores: [Detected; 2] = Default::default();
     for labelled in images {
+        let score = &mut scores[labelled[0].half];
+        let start = Instant::now();
         let facts = detect(&labelled[0].image, &p.detect, &mut NoTrace);
-        quads += facts.len();
+        score.detection_s += start.elapsed().as_secs_f64();
         let mut named = vec![false; labelled.len()];
-        for quad in &facts {
+        for quad in facts.iter().filter(|q| q.kind == QuadKind::Full).take(MAX_RECOGNISED_QUADS) {
+            score.quads += 1;
+            let start = Instant::now();
             let v = recognise(&labelled[0].image, quad, models, kind, p);
-            let Recognition::Unique(id) = v.recognition else { continue };
+            score.recognition_s += start.elapsed().as_secs_f64();
             let overlap = |q: &Query| iou(quad.corners_px.points(), q.quad.corners_px.points());
             let nearest =
                 (0..labelled.len()).max_by(|a, b| overlap(labelled[*a]).total_cmp(&overlap(labelled[*b])));
             let hit = nearest.filter(|i| overlap(labelled[*i]) > 0.3);
+            let Recognition::Unique(id) = v.recognition else {
+                if verbose && hit.is_some_and(|i| labelled[i].landmark.is_some()) {
+                    println!(
+                        "REFUSED {} {:?} {:?}",
+                        labelled[0].file,
+                        labelled[hit.unwrap_or(0)].landmark,
+                        v.candidates.first()
+                    );
+                }
+                continue;
+            };
             let right = hit.is_some_and(|i| labelled[i].landmark.is_some_and(|l| same(l) == same(id.0)));
+            score.confidences.push((v.confidence, right));
             match hit {
-                Some(i) if right => named[i] = true,
+                Some(i) if right => {
+                    named[i] = true;
+                    if let Some((corners, _)) = matched(quad, &v, p) {
+                        let truth = labelled[i].quad.corners_px;
+                        let turned = (0..4).map(|r| worst_corner(&corners, &truth.rotated(r)));
+                        score.corner_errors_px.push(turned.fold(f64::INFINITY, f64::min));
+                    }
+                }
                 _ => {
-                    wrong += 1;
-                    println!("DETECTED WRONG {} {:?}", labelled[0].file, v.candidates[0]);
+                    score.wrong += 1;
+                    println!("DETECTED WRONG {} {:?} {:?}", labelled[0].file, v.candidates[0], v.points);
                 }
             }
         }
-        known += labelled.iter().filter(|q| q.landmark.is_some()).count();
-        found += named.iter().filter(|n| **n).count();
+        score.images += 1;
+        score.known += labelled.iter().filter(|q| q.landmark.is_some()).count();
+        score.found += named.iter().filter(|n| **n).count();
+        for (q, _) in
+            labelled.iter().zip(&named).filter(|(q, named)| verbose && !**named && q.landmark.is_some())
+        {
+            println!("MISSED {} {:?}", q.file, q.landmark);
+        }
     }
+    for (score, name) in scores.into_iter().zip(HALVES) {
+        print_detected(score, name, kind);
+    }
+}
+
+fn print_detected(mut s: Detected, name: &str, kind: DistanceKind) {
+    s.corner_errors_px.sort_by(f64::total_cmp);
+    let at = |share: f64| s.corner_errors_px.get((share * s.corner_errors_px.len() as f64) as usize).copied();
+    let gap: f64 = s.confidences.iter().map(|(c, right)| c - f64::from(u8::from(*right))).sum::<f64>()
+        / s.confidences.len().max(1) as f64;
     println!(
-        "{kind:?}, detected quads: {found} of {known} landmarks found, {wrong} wrong, {quads} quads asked"
+        "{kind:?}, detected quads, {name}: {} of {} landmarks found ({:.3}), {} wrong, {} quads asked | a photograph: \
+             {:.1} ms detection, {:.1} ms recognition | worst corner median {:.2} px, 90 % {:.2} px | confidence less accuracy {gap:.4}",
+        s.found,
+        s.known,
+        s.found as f64 / s.known as f64,
+        s.wrong,
+        s.quads,
+        s.detection_s * 1e3 / s.images as f64,
+        s.recognition_s * 1e3 / s.images as f64,
+        at(0.5).unwrap_or(f64::NAN),
+        at(0.9).unwrap_or(f64::NAN),
     );
 }
 
-/// Quads at random places of every image in `folder`: how many are taken for a landmark.
-fn random_strangers(
+fn worst_corner(a: &Corners, b: &Corners) -> f64 {
+    a.points().iter().zip(b.points()).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
+}
+
+/// What the detector finds in every image in `folder`, and quads at random places of it: how many are taken for a landmark.
+fn strangers_in(
     folder: &Path,
     models: &ModelSet,
     kind: DistanceKind,
@@ -215,14 +309,18 @@ fn random_strangers(
     let mut files: Vec<_> =
         std::fs::read_dir(folder)?.map(|f| f.map(|f| f.path())).collect::<Result<_, _>>()?;
     files.sort();
-    let (mut asked, mut accepted) = (0, 0);
+    let (mut asked, mut accepted, mut seconds, mut images) = (0, 0, 0.0, 0);
+    let mut nearest: Vec<f64> = Vec::new();
     for file in files {
         let Ok(image) = load(&file) else { continue };
+        images += 1;
         let mut state = 1_u64;
         let mut roll = || {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             (state >> 40) as f64 / f64::from(1 << 24)
         };
+        let mut quads = detect(&image, &p.detect, &mut NoTrace);
+        quads.retain(|q| q.kind == QuadKind::Full);
         for _ in 0..RANDOM_QUADS {
             let (w, h) = (image.width() as f64 - 1.0, image.height() as f64 - 1.0);
             let side = (0.1 + 0.5 * roll()) * w.min(h);
@@ -231,16 +329,31 @@ fn random_strangers(
                 Point2::new(x + side * (dx + 0.3 * roll()), y + side * (dy + 0.3 * roll()))
             };
             let points = [corner(0.0, 0.0), corner(1.0, 0.0), corner(1.0, 1.0), corner(0.0, 1.0)];
-            let Ok(corners) = Corners::new(points) else { continue };
+            quads.extend(Corners::new(points).ok().map(quad));
+        }
+        for quad in quads {
             asked += 1;
-            let v = recognise(&image, &quad(corners), models, kind, p);
+            let start = Instant::now();
+            let v = recognise(&image, &quad, models, kind, p);
+            seconds += start.elapsed().as_secs_f64();
+            let found = search(&image, &quad, models.points(), |i| {
+                models.at(i).map_or(&[][..], |m| m.points.as_slice())
+            });
+            nearest.extend(found.first().map(|f| log10_false_alarms(&f.evidence, models.len())));
             if matches!(v.recognition, Recognition::Unique(_)) {
                 accepted += 1;
-                println!("RANDOM {} {points:?} {:?}", file.display(), v.candidates[0]);
+                println!("STRANGER {} {:?} {:?}", file.display(), v.candidates[0], v.points);
             }
         }
     }
-    println!("{}: {asked} random quads, {accepted} accepted", folder.display());
+    nearest.sort_by(f64::total_cmp);
+    nearest.truncate(3);
+    println!(
+        "{}, N = {}: {asked} quads of {images} images, {accepted} accepted | {:.2} ms a quad | least log10 of false alarms {nearest:.1?}",
+        folder.display(),
+        models.len(),
+        seconds * 1e3 / f64::from(asked.max(1))
+    );
     Ok(())
 }
 
@@ -254,7 +367,8 @@ fn teach(root: &Path, truth: &Value, p: &Params) -> Result<Vec<Taught>, Box<dyn 
         let mut lesson = vec![View::photographed(&image, &corners, p)?];
         lesson.extend(views(&image, &corners, GENERATED, p, id));
         let photograph = features(lesson[0].icon.clone(), &p.recognise);
-        all.push(Taught { model: learn(LandmarkId(id), &lesson, &[], p)?, photograph });
+        let points = [view_points(&image, &corners)];
+        all.push(Taught { model: learn(LandmarkId(id), &lesson, &[], p)?.with_points(&points), photograph });
     }
     Ok(all)
 }
@@ -275,12 +389,14 @@ fn queries(root: &Path, truth: &Value) -> Result<Vec<Query>, Box<dyn Error>> {
     for entry in list(&truth["images"]) {
         let file = entry["file"].as_str().ok_or("file")?.to_owned();
         let image = Arc::new(load(&root.join(&file))?);
+        let whole_image = entry["whole_image"] == Value::Bool(true);
         let mut add = |corners: Corners, landmark: &Value| -> Result<(), Box<dyn Error>> {
             let landmark = landmark.as_str().map(str::parse).transpose()?;
-            all.push(Query { file: file.clone(), image: Arc::clone(&image), quad: quad(corners), landmark });
+            let (image, half) = (Arc::clone(&image), half(&file));
+            all.push(Query { file: file.clone(), image, quad: quad(corners), landmark, half, whole_image });
             Ok(())
         };
-        if entry["whole_image"] == Value::Bool(true) {
+        if whole_image {
             add(whole(&image)?, &entry["landmark"])?;
         }
         for q in list(&entry["quads"]) {

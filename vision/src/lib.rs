@@ -14,6 +14,7 @@ pub mod geometry;
 pub mod detect;
 pub mod icon;
 pub mod recognise;
+pub mod points;
 pub mod learn;
 pub mod localise;
 pub mod pipeline;

@@ -1,5 +1,7 @@
 //! Every knob of the pipeline in one place, grouped by stage. The defaults are the method's (section 20).
 
+mod distance_hash;
+
 use crate::{
     detect::{
         chains::ChainParams, edges::EdgeParams, quads::QuadParams, relaxation::RelaxationParams,
@@ -62,23 +64,4 @@ pub struct Params {
     pub recognise: RecogniseParams,
     /// Views to model.
     pub learn: LearnParams,
-}
-
-impl Params {
-    /// Names the settings that define the distances (icon, points, descriptor, ranks, alignment). A threshold learnt under one
-    /// hash means nothing under another.
-    pub fn distance_hash(&self) -> u64 {
-        let r = &self.recognise;
-        let text =
-            text_of(&(&self.icon, &r.harris, &r.descriptor, &r.correlation, &r.hausdorff, &r.verdict.align));
-        // FNV-1a, 64 bits: stable across builds and machines.
-        text.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
-            (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
-        })
-    }
-}
-
-/// Field names and values as text. Debug output of plain structs of numbers is stable and needs no format crate.
-fn text_of(parts: &impl std::fmt::Debug) -> String {
-    format!("{parts:?}")
 }

@@ -140,6 +140,15 @@ pub fn matched(quad: &Quad, verdict: &Verdict, p: &Params) -> Option<(Corners, [
     let detected_px = detected_px.rotated(verdict.rotation);
     let believed_px2 = quad.believed_covariance_px2();
     let covariance_px2 = std::array::from_fn(|i| believed_px2[(i + verdict.rotation) % 4]);
+    if let Some(evidence) = &verdict.points {
+        let icon_px = evidence.corners_px.area_px2().sqrt() / p.icon.size as f64;
+        let moved_px =
+            detected_px.points().iter().zip(evidence.corners_px.points()).map(|(d, a)| (a - d).norm());
+        if moved_px.fold(0.0, f64::max) < SAME_BORDER_ICON_PX * icon_px {
+            return Some((detected_px, covariance_px2));
+        }
+        return Some((evidence.corners_px, evidence.corner_covariance_px2));
+    }
     let Some(aligned_px) = verdict.aligned_px else { return Some((detected_px, covariance_px2)) };
     let icon_px = detected_px.area_px2().sqrt() / p.icon.size as f64;
     let moved_px = detected_px.points().iter().zip(aligned_px.points()).map(|(d, a)| (a - d).norm());

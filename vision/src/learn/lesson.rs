@@ -55,6 +55,8 @@ pub fn learn(
         v_c: v_c(&seen_at(views, true)),
         photographed_v_c: v_c(&seen_at(views, false)),
         status: ModelStatus::Candidate(vec![]),
+        points: vec![],
+        knows_points: false,
     };
     Ok(refit_thresholds(&model, negatives, p))
 }

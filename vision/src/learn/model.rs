@@ -13,6 +13,7 @@ use crate::{
     frame::GrayImage,
     icon::{Icon, IconError, icon},
     params::{Params, RecogniseParams},
+    points::taught::{TaughtPoint, landmark_points},
     recognise::{IconFeatures, LandmarkId, correlation::correlation, hausdorff::hausdorff},
 };
 use serde::{Deserialize, Serialize};
@@ -160,9 +161,29 @@ pub struct LandmarkModel {
     pub photographed_v_c: f64,
     /// Whether it may be used.
     pub status: ModelStatus,
+    /// Points of up to three photographed views (`points/`). Empty where none were given, and in models that were stored
+    /// before there were any: see [`LandmarkModel::knows_points`].
+    pub points: Vec<TaughtPoint>,
+    /// Points were looked for, even if none were found.
+    pub knows_points: bool,
 }
 
 impl LandmarkModel {
+    /// The same model with the points of its photographed views, each as [`crate::points::taught::view_points`] gives
+    /// them.
+    #[must_use]
+    pub fn with_points(mut self, views: &[Vec<TaughtPoint>]) -> Self {
+        self.points = landmark_points(views);
+        self.knows_points = true;
+        self
+    }
+
+    /// The same model, with points where the settings decide by them; `views` is only called then.
+    #[must_use]
+    pub fn with_points_if_used(self, p: &Params, views: impl FnOnce() -> Vec<Vec<TaughtPoint>>) -> Self {
+        if p.recognise.verdict.points { self.with_points(&views()) } else { self }
+    }
+
     /// `D(Q, C_l)`: the smallest distance to any exemplar (A17), each of the two by itself.
     pub fn distances(&self, icon: &IconFeatures, p: &RecogniseParams) -> Distances {
         distances(&self.exemplars, icon, p)
@@ -178,7 +199,8 @@ impl LandmarkModel {
         let evidence = [&self.correlation_evidence, &self.hausdorff_evidence, &self.likeness_evidence];
         let distances: usize = evidence.iter().map(|e| e.own.len() + e.nearest_others.len()).sum();
         let exemplars: usize = self.exemplars.iter().map(IconFeatures::memory_bytes).sum();
-        size_of::<Self>() + size_of::<f32>() * distances + exemplars
+        let points = self.points.len() * size_of::<TaughtPoint>();
+        size_of::<Self>() + size_of::<f32>() * distances + exemplars + points
     }
 
     /// Passed every gate.

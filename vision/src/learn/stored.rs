@@ -1,6 +1,6 @@
 //! A model as bytes, and back. Little-endian, versioned, with a digest at the end: what was stored under other
-//! parameters, by a later version or damaged on the way is refused by name. Points and buckets are not stored: they
-//! follow from the icons.
+//! parameters, by a later version or damaged on the way is refused by name. What follows from the icons
+//! (Harris points, buckets) is not stored.
 
 use super::{
     fitting::add_negatives,
@@ -10,13 +10,16 @@ use super::{
 use crate::{
     icon::{Icon, MAX_ICON_SIZE},
     params::Params,
+    points::taught::{MAX_LANDMARK_POINTS, POINT_BYTES, TaughtPoint},
     recognise::{LandmarkId, features},
 };
 
 /// Largest stored model, in bytes.
-const MAX_BYTES: usize = 3 * MAX_ICON_SIZE * MAX_ICON_SIZE + 8 * 1024;
+const MAX_BYTES: usize = 3 * MAX_ICON_SIZE * MAX_ICON_SIZE + MAX_LANDMARK_POINTS * POINT_BYTES + 8 * 1024;
 const MAGIC: [u8; 4] = *b"WMLM";
-const VERSION: u16 = 2;
+const VERSION: u16 = 3;
+/// The last version without points.
+const WITHOUT_POINTS: u16 = 2;
 const DIGEST_BYTES: usize = 8;
 
 /// Why bytes are not a usable model.
@@ -79,6 +82,9 @@ impl LandmarkModel {
             out.extend(exemplar.icon.source_scale.to_le_bytes());
             out.extend(exemplar.icon.pixels.iter().map(|g| *g as u8));
         }
+        out.push(u8::from(self.knows_points));
+        out.extend((self.points.len() as u16).to_le_bytes());
+        self.points.iter().for_each(|p| p.write(&mut out));
         out.extend(digest(&out).to_le_bytes());
         out
     }
@@ -92,17 +98,21 @@ impl LandmarkModel {
         let (content, stored_digest) = bytes.split_at(bytes.len() - DIGEST_BYTES);
         let mut reader = Reader { rest: &content[MAGIC.len()..] };
         let found = u16::from_le_bytes(reader.take("version")?);
-        if found != VERSION {
+        if !(WITHOUT_POINTS..=VERSION).contains(&found) {
             return Err(StoredModelError::Version { found });
         }
+        let version = found;
         if stored_digest != digest(content).to_le_bytes() {
             return Err(StoredModelError::Damaged);
         }
         let (found, expected) = (u64::from_le_bytes(reader.take("params_hash")?), p.distance_hash());
-        if found != expected {
+        if !p.has_distance_hash(found) {
             return Err(StoredModelError::Params { found, expected });
         }
-        let model = reader.model(found, p)?;
+        let mut model = reader.model(expected, p)?;
+        if version > WITHOUT_POINTS {
+            (model.knows_points, model.points) = reader.points()?;
+        }
         if !reader.rest.is_empty() {
             return Err(StoredModelError::Malformed { field: "length" });
         }
@@ -155,7 +165,19 @@ impl Reader<'_> {
             v_c,
             photographed_v_c,
             status: ModelStatus::Candidate(vec![]),
+            points: vec![],
+            knows_points: false,
         })
+    }
+
+    fn points(&mut self) -> Result<(bool, Vec<TaughtPoint>), StoredModelError> {
+        let known = self.byte("points", 1)? == 1;
+        let count = usize::from(u16::from_le_bytes(self.take("points")?));
+        if count > MAX_LANDMARK_POINTS || (count > 0 && !known) {
+            return Err(StoredModelError::Malformed { field: "points" });
+        }
+        let points = (0..count).map(|_| self.take("points").map(|b| TaughtPoint::read(&b)));
+        Ok((known, points.collect::<Result<_, _>>()?))
     }
 
     fn evidence(&mut self) -> Result<Evidence, StoredModelError> {

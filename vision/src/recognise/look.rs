@@ -40,7 +40,9 @@ impl Judged {
         let agrees =
             |likeness: f64, shown: f64| self.content.likeness >= likeness && self.content.shown >= shown;
         let sure = agrees(p.sure_content_likeness, p.sure_content);
+        let by_points = p.points && self.near.model.points.len() > p.max_icon_points;
         match kind {
+            DistanceKind::Both if by_points => Some(Refusal::Points),
             DistanceKind::Correlation => (!correlation).then_some(Refusal::Correlation),
             DistanceKind::Hausdorff => (!hausdorff).then_some(Refusal::Hausdorff),
             DistanceKind::Both if !below(self.near.ratio(kind), share) => Some(Refusal::Likeness),

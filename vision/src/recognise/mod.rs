@@ -16,16 +16,18 @@ mod look;
 pub mod confidence;
 pub mod confidence_fit;
 mod confidence_learnt;
+mod by_points;
 pub mod verdict;
 #[cfg(test)]
-mod fixture;
+pub(crate) mod fixture;
 
-use crate::{detect::quads::Corners, icon::Icon, params::RecogniseParams};
+use crate::{detect::quads::Corners, icon::Icon, params::RecogniseParams, points::verify::PointEvidence};
 use correlation::Buckets;
 use descriptor::PointSet;
 use serde::{Deserialize, Serialize};
 use signature::Signature;
 
+pub use by_points::{DOUBTFUL_PARTS, LOG10_EPSILON, log10_false_alarms};
 pub use models::{ModelSet, ModelSetError};
 
 /// An icon with everything that both distances need, worked out once. Depends on icon, points, descriptor and bucket
@@ -109,6 +111,10 @@ pub enum Refusal {
     Content,
     /// Accepted by its own thresholds, but another landmark is too close behind.
     Margin,
+    /// So many points would agree by chance too often.
+    Points,
+    /// Its points are there, but a connected part of it shows something else: perhaps not the landmark that was taught.
+    Disagreement,
 }
 
 /// A landmark compared with one icon.
@@ -170,6 +176,8 @@ pub struct Verdict {
     pub aligned_px: Option<Corners>,
     /// Landmarks compared (N).
     pub landmarks: usize,
+    /// What points say of the first candidate, where they decided.
+    pub points: Option<Box<PointEvidence>>,
 }
 
 /// Candidates kept in a verdict.

@@ -6,7 +6,7 @@ use super::{
     align::Lattices,
     signature::{SIGNATURE_BYTES, Signature, likeness},
 };
-use crate::{learn::model::LandmarkModel, params::Params};
+use crate::{learn::model::LandmarkModel, params::Params, points::index::PointIndex};
 use fearless_simd::{Level, dispatch};
 use std::sync::Arc;
 
@@ -51,6 +51,8 @@ pub struct ModelSet {
     owners: Vec<(u32, u8)>,
     /// Where pictures are compared with the exemplars that they are laid on.
     lattices: Arc<Lattices>,
+    /// The points of all models.
+    points: Arc<PointIndex>,
 }
 
 /// Longest short list.
@@ -89,7 +91,8 @@ impl ModelSet {
         let signatures = exemplars().map(|(_, _, exemplar)| *exemplar.signature.values()).collect();
         let owners = exemplars().map(|(m, e, _)| (m as u32, e as u8)).collect();
         let lattices = Arc::new(Lattices::new(p.icon.size, &p.recognise.correlation));
-        Ok(Self { models, params_hash: expected, signatures, owners, lattices })
+        let points = Arc::new(PointIndex::new(models.iter().map(|m| m.points.as_slice())));
+        Ok(Self { models, params_hash: expected, signatures, owners, lattices, points })
     }
 
     /// Number of landmarks (N).
@@ -154,6 +157,11 @@ impl ModelSet {
         self.models.get(index)
     }
 
+    /// The points of all models, by their index.
+    pub fn points(&self) -> &PointIndex {
+        &self.points
+    }
+
     /// For laying pictures on exemplars.
     pub(crate) fn lattices(&self) -> &Lattices {
         &self.lattices
@@ -162,6 +170,7 @@ impl ModelSet {
     /// Memory that the set and its models take, in bytes.
     pub fn memory_bytes(&self) -> usize {
         let own = self.signatures.len() * SIGNATURE_BYTES + self.owners.len() * size_of::<(u32, u8)>();
+        let own = own + self.points.memory_bytes();
         own + self.models.iter().map(|m| size_of::<Arc<LandmarkModel>>() + m.memory_bytes()).sum::<usize>()
     }
 

@@ -5,6 +5,7 @@
 use super::{
     Candidate, DistanceKind, MAX_CANDIDATES, Recognition, Refusal, Verdict,
     align::AlignParams,
+    by_points::by_points,
     compare::{Near, Sighting, nearest, short_list, sightings},
     confidence::{confidence, entropy_m, entropy_norm, probability},
     content::Content,
@@ -52,6 +53,11 @@ pub struct VerdictParams {
     pub sure_content: f64,
     /// Landmarks that are verified at most.
     pub max_verified: usize,
+    /// Whether points decide where icons would (`both`); what they say nothing of is left to the icons. Off by default:
+    /// measured in `docs/METHOD.md`, "Points".
+    pub points: bool,
+    /// Landmarks with more points than this are never accepted by their icons: their points would have said so.
+    pub max_icon_points: usize,
     /// How corners are moved.
     pub align: AlignParams,
 }
@@ -74,6 +80,8 @@ impl Default for VerdictParams {
             sure_content_likeness: 0.6,
             sure_content: 4.0,
             max_verified: 2,
+            points: false,
+            max_icon_points: 40,
             align: AlignParams::default(),
         }
     }
@@ -114,6 +122,13 @@ pub fn recognise_watched(
     if models.is_empty() || models.params_hash() != p.distance_hash() {
         return unknown(models.len());
     }
+    if kind == DistanceKind::Both && p.recognise.verdict.points {
+        let said = by_points(image, quad, models, p);
+        watch.finished(Step::Points);
+        if let Some(verdict) = said {
+            return verdict;
+        }
+    }
     let sightings = sightings(image, quad, p);
     watch.finished(Step::Icons);
     let near = match kind {
@@ -151,6 +166,7 @@ fn unknown(landmarks: usize) -> Verdict {
         border: 0,
         aligned_px: None,
         landmarks,
+        points: None,
     }
 }
 

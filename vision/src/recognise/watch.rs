@@ -3,6 +3,8 @@
 /// The steps of recognising one quad, in their order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Step {
+    /// Patches, points, votes, homographies, verification.
+    Points,
     /// Icons of every border and rotation, with what the short list needs of them.
     Icons,
     /// The landmarks that it may be: by signatures, or by one of the paper's distances.
@@ -19,6 +21,7 @@ impl Step {
     /// Short name.
     pub fn name(self) -> &'static str {
         match self {
+            Step::Points => "points",
             Step::Icons => "icons",
             Step::ShortList => "short list",
             Step::Alignment => "alignment",

@@ -255,9 +255,23 @@ fn a_stored_model_is_the_same_bit_for_bit() {
     let mut other = p.clone();
     other.recognise.correlation.rank += 1;
     assert!(matches!(LandmarkModel::from_bytes(&bytes, &other), Err(StoredModelError::Params { .. })));
+    // A model of the version before points loads, and says that it knows none.
+    let mut older = bytes[..bytes.len() - 8 - 3].to_vec();
+    older[4] = 2;
+    older.extend(crate::learn::stored::digest(&older).to_le_bytes());
+    let read = LandmarkModel::from_bytes(&older, &p).unwrap();
+    assert!(!read.knows_points && read == model);
+    let points = crate::points::taught::view_points(
+        &crate::recognise::fixture::poster(1),
+        &crate::recognise::fixture::whole(),
+    );
+    let with_points = model.clone().with_points(&[points]);
+    assert!(with_points.knows_points && with_points.points.len() > 50);
+    assert_eq!(LandmarkModel::from_bytes(&with_points.to_bytes(), &p).unwrap(), with_points);
+
     let mut later = bytes.clone();
     later[4] += 1;
-    assert_eq!(LandmarkModel::from_bytes(&later, &p), Err(StoredModelError::Version { found: 3 }));
+    assert_eq!(LandmarkModel::from_bytes(&later, &p), Err(StoredModelError::Version { found: 4 }));
     for at in (6..bytes.len()).step_by(97).chain([bytes.len() - 1]) {
         let mut damaged = bytes.clone();
         damaged[at] ^= 0x10;

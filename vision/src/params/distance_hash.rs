@@ -1,0 +1,160 @@
+//! The identity of the distances: which settings a stored threshold was learnt under. An explicit list of numbers is hashed, so
+//! that renaming a field changes nothing and changing a number does.
+
+use super::Params;
+
+/// Raised when the same numbers give other distances: an algorithm of icon, points, descriptors, ranks or alignment changed.
+const VERSION: u64 = 1;
+
+impl Params {
+    /// Names the settings that define the distances: icon, points, descriptor, ranks, alignment. A threshold learnt under one
+    /// hash means nothing under another. FNV-1a, 64 bits, of a version and of the numbers, each group preceded by its length.
+    pub fn distance_hash(&self) -> u64 {
+        let groups = self.distance_numbers();
+        let words = groups.iter().flat_map(|group| {
+            let length = std::iter::once(group.len() as u64);
+            length.chain(group.iter().map(|number| number.to_bits()))
+        });
+        fnv1a(std::iter::once(VERSION).chain(words).flat_map(u64::to_le_bytes))
+    }
+
+    /// Whether a threshold stored under `hash` holds for these settings: their own hash, or the one that builds before
+    /// 2026-11-23 wrote for the same settings.
+    pub fn has_distance_hash(&self, hash: u64) -> bool {
+        hash == self.distance_hash() || hash == self.distance_hash_of_text()
+    }
+
+    /// Every number that defines the distances, by stage. Only ever appended to; a change of order or meaning raises [`VERSION`].
+    fn distance_numbers(&self) -> [Vec<f64>; 6] {
+        let (icon, r) = (&self.icon, &self.recognise);
+        let (harris, descriptor) = (&r.harris, &r.descriptor);
+        let (correlation, hausdorff, align) = (&r.correlation, &r.hausdorff, &r.verdict.align);
+        let descriptor_head = [descriptor.sigma, descriptor.regularisation, descriptor.clip];
+        let align_numbers = [align.max_shift].into_iter().chain(align.sigmas).chain([align.steps as f64]);
+        [
+            vec![icon.size as f64, icon.min_side_ratio, icon.max_outside, f64::from(icon.min_cell_pixels)],
+            vec![
+                harris.sigma_derivative,
+                harris.sigma_integration,
+                harris.k,
+                harris.relative_threshold,
+                harris.margin_px as f64,
+                harris.max_points as f64,
+                harris.max_points_per_part as f64,
+            ],
+            descriptor_head.into_iter().chain(descriptor.whitening.into_iter().flatten()).collect(),
+            vec![correlation.buckets_per_side as f64, correlation.rank as f64, correlation.min_deviation],
+            vec![hausdorff.inlier_fraction, hausdorff.min_points as f64],
+            align_numbers.chain(align.min_alike).collect(),
+        ]
+    }
+
+    /// The hash that builds before 2026-11-23 stored: of a text with the names that types and fields had then. The text is frozen;
+    /// only databases of those builds need it.
+    fn distance_hash_of_text(&self) -> u64 {
+        let (icon, r) = (&self.icon, &self.recognise);
+        let (h, d, c, f, a) = (&r.harris, &r.descriptor, &r.correlation, &r.hausdorff, &r.verdict.align);
+        let text = format!(
+            "(IconParams {{ size: {:?}, min_side_ratio: {:?}, max_outside: {:?}, min_cell_pixels: {:?} }}, \
+             HarrisParams {{ sigma_derivative: {:?}, sigma_integration: {:?}, k: {:?}, relative_threshold: {:?}, \
+             margin_px: {:?}, max_points: {:?}, max_points_per_part: {:?} }}, \
+             DescriptorParams {{ sigma: {:?}, regularisation: {:?}, clip: {:?}, whitening: {:?} }}, \
+             CorrelationParams {{ buckets_per_side: {:?}, rank: {:?}, min_deviation: {:?} }}, \
+             HausdorffParams {{ inlier_fraction: {:?}, min_points: {:?} }}, \
+             AlignParams {{ max_shift: {:?}, sigmas: {:?}, steps: {:?}, min_alike: {:?} }})",
+            icon.size,
+            icon.min_side_ratio,
+            icon.max_outside,
+            icon.min_cell_pixels,
+            h.sigma_derivative,
+            h.sigma_integration,
+            h.k,
+            h.relative_threshold,
+            h.margin_px,
+            h.max_points,
+            h.max_points_per_part,
+            d.sigma,
+            d.regularisation,
+            d.clip,
+            d.whitening,
+            c.buckets_per_side,
+            c.rank,
+            c.min_deviation,
+            f.inlier_fraction,
+            f.min_points,
+            a.max_shift,
+            a.sigmas,
+            a.steps,
+            a.min_alike,
+        );
+        fnv1a(text.bytes())
+    }
+}
+
+/// FNV-1a, 64 bits: stable across builds and machines.
+fn fnv1a(bytes: impl Iterator<Item = u8>) -> u64 {
+    bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of the default settings. A change here puts every stored model of every installation out of use: it needs a raised
+    /// [`VERSION`] and a migration.
+    const DEFAULT: u64 = 0xc207_d0a0_41ff_bfb9;
+    /// What the builds before 2026-11-23 stored for the default settings.
+    const DEFAULT_OF_TEXT: u64 = 0xe31b_6db6_d7dd_08be;
+
+    #[test]
+    fn hashes_of_the_defaults_are_pinned() {
+        let p = Params::default();
+        assert_eq!((p.distance_hash(), p.distance_hash_of_text()), (DEFAULT, DEFAULT_OF_TEXT));
+        assert!(p.has_distance_hash(DEFAULT) && p.has_distance_hash(DEFAULT_OF_TEXT));
+        assert!(!p.has_distance_hash(0));
+    }
+
+    /// Every number of the six stages changes the hash, and nothing else does.
+    #[test]
+    fn every_number_counts_and_no_other() {
+        let default = Params::default();
+        let json = serde_json::to_value(&default).unwrap();
+        let mut paths = Vec::new();
+        numbers(&json, String::new(), &mut paths);
+        let of_distances = |path: &str| {
+            let stages = ["harris", "descriptor", "correlation", "hausdorff", "verdict/align"];
+            path.starts_with("/icon/") || stages.iter().any(|s| path.starts_with(&format!("/recognise/{s}/")))
+        };
+        let counted: usize = default.distance_numbers().iter().map(Vec::len).sum();
+        assert_eq!(paths.iter().filter(|path| of_distances(path)).count(), counted, "a number is left out");
+        for path in &paths {
+            let mut changed = json.clone();
+            let number = changed.pointer_mut(path).unwrap();
+            *number = match number.as_u64() {
+                Some(whole) => (whole + 1).into(),
+                None => (number.as_f64().unwrap() + 0.125).into(),
+            };
+            let changed: Params = serde_json::from_value(changed).unwrap();
+            assert_eq!(changed.distance_hash() != DEFAULT, of_distances(path), "{path}");
+        }
+    }
+
+    fn numbers(value: &serde_json::Value, path: String, out: &mut Vec<String>) {
+        match value {
+            serde_json::Value::Number(_) => out.push(path),
+            serde_json::Value::Array(items) => {
+                for (i, item) in items.iter().enumerate() {
+                    numbers(item, format!("{path}/{i}"), out);
+                }
+            }
+            serde_json::Value::Object(fields) => {
+                for (name, field) in fields {
+                    numbers(field, format!("{path}/{name}"), out);
+                }
+            }
+            _ => {}
+        }
+    }
+}

@@ -1,0 +1,237 @@
+//! A landmark's points and where they should be seen in; whether the patch looks like each of them there out. No
+//! keypoint need be found in the patch: the descriptor is taken where the homography puts it.
+
+use super::{
+    Point, SeenPatch,
+    descriptor::{Descriptor, Window, describe},
+    keypoints::{BASE_SIGMA, SCALES},
+};
+use crate::geometry::homography::Homography;
+use fearless_simd::{Level, dispatch};
+use nalgebra::Point2;
+use serde::{Deserialize, Serialize};
+
+/// What the patch shows where a landmark's point should be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Check {
+    /// Index of the landmark's point.
+    pub taught: usize,
+    /// Descriptor distance.
+    pub distance: u32,
+    /// Mean gradient of the patch there, in grey levels a pixel of the octave.
+    pub gradient: f32,
+    /// Share of the other places, in the patch and on the landmark, that look as much alike or more, 0 to 1: what
+    /// chance would do at this point of these two pictures.
+    pub by_chance: f32,
+    /// Distance of the landmark's point to the most similar plain structure.
+    pub plain: u32,
+}
+
+/// Largest descriptor distance of an agreeing point...
+const AGREEING: f32 = 90.0;
+/// ... as a share of the point's distance to plain structures, too: a frame must not pass for a picture...
+const AGREEING_PLAIN: f32 = 0.7;
+/// ... and nearer than all but this share of other places.
+pub const AGREEING_BY_CHANCE: f32 = 0.05;
+/// Below this gradient the patch shows nothing that could agree or disagree.
+const SILENT_GRADIENT: f32 = 0.5;
+/// A point disagrees when this share of other places looks as much alike, or more.
+const DISAGREEING_BY_CHANCE: f32 = 0.2;
+
+impl Check {
+    /// The patch looks like the landmark here, as it would hardly do by chance.
+    pub fn agrees(&self) -> bool {
+        let most = AGREEING.min(AGREEING_PLAIN * self.plain as f32);
+        !self.is_silent() && self.distance as f32 <= most && self.by_chance <= AGREEING_BY_CHANCE
+    }
+
+    /// The patch shows nothing here.
+    pub fn is_silent(&self) -> bool {
+        self.gradient < SILENT_GRADIENT
+    }
+
+    /// The patch shows something else here.
+    pub fn disagrees(&self) -> bool {
+        !self.is_silent() && self.by_chance >= DISAGREEING_BY_CHANCE
+    }
+}
+
+/// Cells along a side of the table.
+pub const TABLE: usize = 5;
+
+/// What a part of the landmark says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Part {
+    /// Nothing: no points there, hidden by something plain, or out of the image.
+    #[default]
+    Silent,
+    /// The picture is the taught one.
+    Agrees,
+    /// The picture shows something else.
+    Disagrees,
+}
+
+/// What the parts of a landmark say, rows from the top, in its own upright orientation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Agreement(pub [[Part; TABLE]; TABLE]);
+
+/// Fewest points of a part that disagrees.
+const MIN_DISAGREEING: usize = 2;
+
+impl Agreement {
+    /// Sums up `checks` of `taught`.
+    pub fn new(checks: &[Check], taught: &[Point]) -> Self {
+        let mut counts = [[[0_usize; 2]; TABLE]; TABLE];
+        for check in checks {
+            let [x, y] = taught[check.taught].at.map(|a| ((a * TABLE as f32) as usize).min(TABLE - 1));
+            counts[y][x][0] += usize::from(check.agrees());
+            counts[y][x][1] += usize::from(check.disagrees());
+        }
+        Self(counts.map(|row| {
+            row.map(|[agreeing, disagreeing]| match (agreeing, disagreeing) {
+                (0, d) if d >= MIN_DISAGREEING => Part::Disagrees,
+                (a, d) if a > 0 && d <= 2 * a => Part::Agrees,
+                (_, d) if d >= 2 * MIN_DISAGREEING => Part::Disagrees,
+                _ => Part::Silent,
+            })
+        }))
+    }
+
+    /// Parts that say `part`.
+    pub fn count(&self, part: Part) -> usize {
+        self.0.iter().flatten().filter(|p| **p == part).count()
+    }
+
+    /// Parts of the largest connected region that disagrees; parts are neighbours along rows and columns.
+    pub fn largest_disagreement(&self) -> usize {
+        let mut left = self.0.map(|row| row.map(|p| p == Part::Disagrees));
+        let mut largest = 0;
+        for start in 0..TABLE * TABLE {
+            let mut open = vec![start];
+            let mut size = 0;
+            while let Some(i) = open.pop() {
+                let (x, y) = (i % TABLE, i / TABLE);
+                if !std::mem::take(&mut left[y][x]) {
+                    continue;
+                }
+                size += 1;
+                open.extend((x > 0).then(|| i - 1));
+                open.extend((x + 1 < TABLE).then_some(i + 1));
+                open.extend((y > 0).then(|| i - TABLE));
+                open.extend((y + 1 < TABLE).then_some(i + TABLE));
+            }
+            largest = largest.max(size);
+        }
+        largest
+    }
+}
+
+/// Looks at every point of `taught` that the patch shows at its scale. `turned` quarters were applied to the patch's
+/// points before `seen_from_taught` was found.
+pub fn checks(
+    seen: &SeenPatch,
+    turned: usize,
+    seen_from_taught: &Homography,
+    taught: &[Point],
+    plain: &[u32],
+) -> Vec<Check> {
+    let side = seen.patch.side as f32;
+    let mut found = Vec::with_capacity(taught.len());
+    let mut shown: Vec<Descriptor> = Vec::with_capacity(taught.len());
+    for (index, point) in taught.iter().enumerate() {
+        let at = Point2::new(f64::from(point.at[0]), f64::from(point.at[1]));
+        if seen_from_taught.denominator(&at) <= 0.0 {
+            continue;
+        }
+        let here = seen_from_taught.apply(&at);
+        let scale = local_scale(seen_from_taught, &at);
+        let sigma = point.sigma * scale as f32 * seen.patch.inner as f32;
+        let Some((octave, level)) = level_of(seen, sigma) else { continue };
+        let back = unturned([here.x, here.y], turned);
+        let [x, y] = seen.patch.to_patch(back).map(|v| v as f32);
+        let reach = REACH * sigma;
+        if x < reach
+            || y < reach
+            || x > side - 1.0 - reach
+            || y > side - 1.0 - reach
+            || !seen.patch.is_seen(x, y, reach)
+        {
+            continue;
+        }
+        let (descriptor, gradient) = describe(&seen.space.octaves[octave], &Window { x, y, sigma, level });
+        let descriptor = descriptor.rotated(turned);
+        let distance = descriptor.distance(&point.descriptor);
+        shown.push(descriptor);
+        found.push(Check {
+            taught: index,
+            distance,
+            gradient,
+            by_chance: 1.0,
+            plain: plain.get(index).copied().unwrap_or(0),
+        });
+    }
+    dispatch!(Level::new(), _s => compare_elsewhere(&mut found, &shown, taught));
+    found
+}
+
+/// Compares every point with every other place.
+#[expect(
+    clippy::inline_always,
+    reason = "an instruction set holds only in what is inlined where it was chosen"
+)]
+#[inline(always)]
+fn compare_elsewhere(found: &mut [Check], shown: &[Descriptor], taught: &[Point]) {
+    for i in 0..found.len() {
+        let (own, at) = (taught[found[i].taught], taught[found[i].taught].at);
+        let (mut asked, mut alike) = (0_u32, 0_u32);
+        for (j, descriptor) in shown.iter().enumerate() {
+            let other = &taught[found[j].taught];
+            if (other.at[0] - at[0]).abs() < ELSEWHERE && (other.at[1] - at[1]).abs() < ELSEWHERE {
+                continue;
+            }
+            asked += 2;
+            alike += u32::from(own.descriptor.distance(descriptor) <= found[i].distance);
+            alike += u32::from(other.descriptor.distance(&shown[i]) <= found[i].distance);
+        }
+        if asked > 0 {
+            found[i].by_chance = alike as f32 / asked as f32;
+        }
+    }
+}
+
+/// Places further apart than this along an axis, in landmark units, show different things.
+const ELSEWHERE: f32 = 0.1;
+
+/// How far around a point the patch must reach, in its scales.
+const REACH: f32 = 3.0;
+
+/// Place in the patch's own landmark coordinates of one in those after `turned` quarters.
+pub(super) fn unturned([x, y]: [f64; 2], turned: usize) -> [f64; 2] {
+    match turned % 4 {
+        0 => [x, y],
+        1 => [1.0 - y, x],
+        2 => [1.0 - x, 1.0 - y],
+        _ => [y, 1.0 - x],
+    }
+}
+
+/// Square root of the determinant of the map's derivative.
+fn local_scale(map: &Homography, at: &Point2<f64>) -> f64 {
+    let d = map.denominator(at);
+    (map.matrix().determinant() / (d * d * d)).abs().sqrt()
+}
+
+/// Octave and level whose smoothing is that of a keypoint of `sigma` patch pixels.
+fn level_of(seen: &SeenPatch, sigma: f32) -> Option<(usize, usize)> {
+    let steps = (SCALES as f32 * (sigma / BASE_SIGMA as f32).log2()).round() as i32;
+    // Finer than the patch shows.
+    if steps < 0 {
+        return None;
+    }
+    // Keypoints are found on levels 1 to SCALES of an octave.
+    let steps = steps.max(1) as usize;
+    let octave = (steps - 1) / SCALES;
+    let level = steps - octave * SCALES;
+    (octave < seen.space.octaves.len()).then_some((octave, level))
+}

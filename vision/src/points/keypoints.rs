@@ -1,0 +1,155 @@
+//! A patch in, its keypoints out: extrema of the difference of Gaussians over place and scale (Lowe 2004). No
+//! orientation: the patch is rectified already.
+
+use super::patch::Patch;
+use crate::recognise::harris::blurred;
+
+/// Smoothing of the first level of an octave, in its pixels.
+pub const BASE_SIGMA: f64 = 1.15;
+/// What smoothing a patch is taken to have from its sampling, in pixels.
+const SAMPLING_SIGMA: f64 = 0.5;
+/// Scales of an octave at which extrema are looked for.
+pub const SCALES: usize = 3;
+/// Smoothed levels of an octave.
+const LEVELS: usize = SCALES + 3;
+/// No octave is smaller than this.
+const MIN_OCTAVE_PX: usize = 16;
+/// Most octaves.
+const MAX_OCTAVES: usize = 4;
+/// Smallest response, in grey levels.
+const MIN_RESPONSE: f32 = 0.25;
+/// Largest ratio of the principal curvatures: beyond it the point is an edge.
+const MAX_EDGE_RATIO: f32 = 10.0;
+/// Pixels along the border of an octave where no extremum is looked for.
+const BORDER_PX: usize = 3;
+
+/// A keypoint of a patch.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Keypoint {
+    /// Column and row in patch pixels.
+    pub x: f32,
+    /// See `x`.
+    pub y: f32,
+    /// Scale, in patch pixels.
+    pub sigma: f32,
+    /// Absolute difference of Gaussians, in grey levels.
+    pub response: f32,
+    /// Octave and level of the smoothed picture that the descriptor is taken from.
+    pub octave: usize,
+    /// See `octave`.
+    pub level: usize,
+}
+
+/// The smoothed pictures of a patch.
+#[derive(Debug, Clone)]
+pub struct ScaleSpace {
+    /// Octaves, each half the size of the one before.
+    pub octaves: Vec<Octave>,
+}
+
+/// The smoothed pictures of one size.
+#[derive(Debug, Clone)]
+pub struct Octave {
+    /// Side in pixels.
+    pub side: usize,
+    /// Patch pixels along one of its pixels.
+    pub step: f32,
+    /// Pictures of rising smoothing.
+    pub levels: Vec<Vec<f32>>,
+}
+
+impl ScaleSpace {
+    /// Smooths `patch`.
+    pub fn new(patch: &Patch) -> Self {
+        let mut octaves: Vec<Octave> = Vec::new();
+        let start = (BASE_SIGMA.powi(2) - SAMPLING_SIGMA.powi(2)).sqrt();
+        let mut first = blurred(&patch.pixels, patch.side, start);
+        let (mut side, mut step) = (patch.side, 1.0);
+        while side >= MIN_OCTAVE_PX && octaves.len() < MAX_OCTAVES {
+            let mut levels = vec![first];
+            for i in 1..LEVELS {
+                let sigma = |i: usize| BASE_SIGMA * 2.0_f64.powf(i as f64 / SCALES as f64);
+                let more = (sigma(i).powi(2) - sigma(i - 1).powi(2)).sqrt();
+                levels.push(blurred(&levels[i - 1], side, more));
+            }
+            let half = side / 2;
+            first =
+                (0..half * half).map(|i| levels[SCALES][2 * (i / half) * side + 2 * (i % half)]).collect();
+            octaves.push(Octave { side, step, levels });
+            (side, step) = (half, step * 2.0);
+        }
+        Self { octaves }
+    }
+}
+
+/// The keypoints of `patch` that the image shows, strongest first, at most `most`.
+pub fn keypoints(patch: &Patch, space: &ScaleSpace, most: usize) -> Vec<Keypoint> {
+    let mut found = Vec::new();
+    for (index, octave) in space.octaves.iter().enumerate() {
+        extrema(octave, index, &mut found);
+    }
+    found.retain(|k| patch.is_seen(k.x, k.y, SUPPORT * k.sigma));
+    found.sort_by(|a, b| {
+        b.response.total_cmp(&a.response).then(a.y.total_cmp(&b.y)).then(a.x.total_cmp(&b.x))
+    });
+    found.truncate(most);
+    found
+}
+
+/// How far around a keypoint the image must show the patch, in its scales.
+const SUPPORT: f32 = 1.0;
+
+fn extrema(octave: &Octave, index: usize, found: &mut Vec<Keypoint>) {
+    let n = octave.side;
+    let differences: Vec<Vec<f32>> = octave
+        .levels
+        .windows(2)
+        .map(|pair| pair[1].iter().zip(&pair[0]).map(|(a, b)| a - b).collect())
+        .collect();
+    for level in 1..=SCALES {
+        let [below, own, above] = [&differences[level - 1], &differences[level], &differences[level + 1]];
+        for y in BORDER_PX..n - BORDER_PX {
+            for x in BORDER_PX..n - BORDER_PX {
+                let at = y * n + x;
+                let d = own[at];
+                if d.abs() < MIN_RESPONSE || !is_extremum(d, at, n, [below, own, above]) {
+                    continue;
+                }
+                let (dxx, dyy) = (own[at + 1] + own[at - 1] - 2.0 * d, own[at + n] + own[at - n] - 2.0 * d);
+                let dxy = 0.25 * (own[at + n + 1] + own[at - n - 1] - own[at + n - 1] - own[at - n + 1]);
+                let (trace, det) = (dxx + dyy, dxx * dyy - dxy * dxy);
+                let limit = (MAX_EDGE_RATIO + 1.0).powi(2) / MAX_EDGE_RATIO;
+                if det <= 0.0 || trace * trace >= limit * det {
+                    continue;
+                }
+                // Peak of a parabola along each axis by itself.
+                let peak = |before: f32, after: f32| {
+                    let bend = before + after - 2.0 * d;
+                    if bend.abs() > 1e-6 { (0.5 * (before - after) / bend).clamp(-0.5, 0.5) } else { 0.0 }
+                };
+                let (dx, dy) = (peak(own[at - 1], own[at + 1]), peak(own[at - n], own[at + n]));
+                let ds = peak(below[at], above[at]);
+                let scale = (level as f32 + ds) / SCALES as f32;
+                found.push(Keypoint {
+                    x: (x as f32 + dx) * octave.step,
+                    y: (y as f32 + dy) * octave.step,
+                    sigma: BASE_SIGMA as f32 * scale.exp2() * octave.step,
+                    response: d.abs(),
+                    octave: index,
+                    level,
+                });
+            }
+        }
+    }
+}
+
+fn is_extremum(d: f32, at: usize, n: usize, levels: [&Vec<f32>; 3]) -> bool {
+    let around = [at - n - 1, at - n, at - n + 1, at - 1, at, at + 1, at + n - 1, at + n, at + n + 1];
+    let top = d > 0.0;
+    levels.iter().enumerate().all(|(l, level)| {
+        around.iter().all(|i| {
+            let other = level[*i];
+            (l == 1 && *i == at) || if top { d >= other } else { d <= other }
+        })
+    })
+}

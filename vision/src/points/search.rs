@@ -1,0 +1,96 @@
+//! A quad and the landmarks of a map in, the landmarks that points speak for out: votes by the index, homographies for the
+//! landmarks with most votes, verification of the best of these.
+
+use super::{
+    Point, SeenPatch,
+    index::PointIndex,
+    patch::{Patch, inner_px},
+    taught::TaughtPoint,
+    verify::{Hypothesis, MAX_PATCH_POINTS, PointEvidence, Target, global_hypothesis, verified},
+};
+use crate::{
+    detect::quads::{Corners, Quad},
+    frame::GrayImage,
+    geometry::polygon::iou,
+};
+
+/// Landmarks for which a homography is looked for.
+const MAX_HYPOTHESES: usize = 8;
+/// Homographies that are verified.
+const MAX_VERIFIED: usize = 3;
+/// Least weight of votes of a landmark that is looked at: see [`PointIndex::vote`].
+const MIN_VOTES: u32 = 4;
+/// Borders of a quad that get a patch of their own: those that overlap all earlier ones by less than this.
+const SAME_BORDER_IOU: f64 = 0.6;
+/// Most borders of a quad.
+const MAX_BORDERS: usize = 2;
+
+/// A landmark that points speak for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Found {
+    /// Index of the model.
+    pub model: usize,
+    /// Which border of the quad: 0 for its corners, i for alternate i - 1.
+    pub border: usize,
+    /// What speaks for it.
+    pub evidence: PointEvidence,
+}
+
+/// The landmarks that points speak for in `quad`, the most improbable coincidence first; each once.
+pub fn search<'a>(
+    image: &GrayImage,
+    quad: &Quad,
+    index: &PointIndex,
+    taught: impl Fn(usize) -> &'a [TaughtPoint],
+) -> Vec<Found> {
+    let mut found: Vec<Found> = Vec::new();
+    if index.is_empty() {
+        return found;
+    }
+    for (border, corners) in borders(quad) {
+        let Some(patch) = Patch::new(image, &corners, inner_px(&corners)) else { continue };
+        let seen = SeenPatch::new(patch, MAX_PATCH_POINTS);
+        let mut votes: Vec<(u32, usize, usize)> = Vec::new();
+        let turns = if quad.upright_ambiguous { 4 } else { 1 };
+        let turned: Vec<Vec<Point>> =
+            (0..turns).map(|t| seen.points.iter().map(|p| p.rotated(t)).collect()).collect();
+        for (turn, points) in turned.iter().enumerate() {
+            let voted = index.vote(points, MAX_HYPOTHESES, MIN_VOTES);
+            votes.extend(voted.into_iter().map(|(model, votes)| (votes, model, turn)));
+        }
+        votes.sort_by(|a, b| b.0.cmp(&a.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+        votes.truncate(MAX_HYPOTHESES);
+        let mut hypotheses: Vec<(usize, Target, Hypothesis)> = votes
+            .into_iter()
+            .filter_map(|(_, model, turn)| {
+                let target = Target::new(taught(model));
+                let hypothesis = global_hypothesis(&turned[turn], turn, &target)?;
+                Some((model, target, hypothesis))
+            })
+            .collect();
+        hypotheses.sort_by(|a, b| a.2.log10_matches.total_cmp(&b.2.log10_matches).then(a.0.cmp(&b.0)));
+        for (model, target, hypothesis) in hypotheses.iter().take(MAX_VERIFIED) {
+            let Some(evidence) = verified(&seen, hypothesis, target) else { continue };
+            found.push(Found { model: *model, border, evidence });
+        }
+    }
+    found.sort_by(|a, b| a.evidence.log10_nfa.total_cmp(&b.evidence.log10_nfa).then(a.model.cmp(&b.model)));
+    let mut once: Vec<Found> = Vec::new();
+    for f in found {
+        if once.iter().all(|o| o.model != f.model) {
+            once.push(f);
+        }
+    }
+    once
+}
+
+fn borders(quad: &Quad) -> Vec<(usize, Corners)> {
+    let mut chosen: Vec<(usize, Corners)> = Vec::new();
+    for (border, corners) in std::iter::once(&quad.corners_px).chain(&quad.alternates).enumerate() {
+        let is_new = chosen.iter().all(|(_, c)| iou(c.points(), corners.points()) < SAME_BORDER_IOU);
+        if chosen.len() < MAX_BORDERS && is_new {
+            chosen.push((border, *corners));
+        }
+    }
+    chosen
+}

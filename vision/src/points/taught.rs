@@ -1,0 +1,112 @@
+//! Views of a landmark in, the points that are kept of it out.
+
+use super::{
+    Point, SeenPatch,
+    descriptor::{Descriptor, WORDS},
+    patch::{INNER_PX, Patch, inner_px},
+    plain::distance_to_plain,
+};
+use crate::{detect::quads::Corners, frame::GrayImage};
+
+/// Most points of a landmark.
+pub const MAX_LANDMARK_POINTS: usize = 240;
+/// Most views that points are taken from.
+pub const MAX_POINT_VIEWS: usize = 3;
+/// Points of a view that are looked at.
+const MAX_VIEW_POINTS: usize = 400;
+/// A point that is as near as this to a plain structure is not kept.
+const MIN_PLAIN_DISTANCE: u32 = 46;
+/// Points of one place and scale whose descriptors are nearer than this say the same.
+const SAME_DISTANCE: u32 = 40;
+/// Places nearer than this, in landmark units, are one.
+const SAME_PLACE: f32 = 0.02;
+/// Steps of the stored scale in a factor of 2.
+const SCALE_STEPS: f32 = 24.0;
+/// Bytes of a stored point.
+pub(crate) const POINT_BYTES: usize = 8 * WORDS + 6;
+
+/// A landmark's point as it is kept: quantised, so that memory and store agree bit for bit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TaughtPoint {
+    /// What it looks like.
+    pub descriptor: Descriptor,
+    /// Place in landmark coordinates, in 65535ths.
+    at: [u16; 2],
+    /// Scale: `2^(-sigma / 24)` landmark units.
+    sigma: u8,
+    /// Distance to the most similar plain structure.
+    plain: u8,
+}
+
+impl TaughtPoint {
+    fn new(point: &Point, plain: u32) -> Self {
+        let at = point.at.map(|a| (a.clamp(0.0, 1.0) * f32::from(u16::MAX)).round() as u16);
+        let sigma = (-point.sigma.log2() * SCALE_STEPS).round().clamp(0.0, 255.0) as u8;
+        Self { descriptor: point.descriptor, at, sigma, plain: plain.min(255) as u8 }
+    }
+
+    /// The point.
+    pub fn point(&self) -> Point {
+        let at = self.at.map(|a| f32::from(a) / f32::from(u16::MAX));
+        Point { at, sigma: (-f32::from(self.sigma) / SCALE_STEPS).exp2(), descriptor: self.descriptor }
+    }
+
+    /// Distance to the most similar plain structure.
+    pub fn plain(&self) -> u32 {
+        u32::from(self.plain)
+    }
+
+    /// Appends [`POINT_BYTES`] bytes.
+    pub(crate) fn write(&self, out: &mut Vec<u8>) {
+        out.extend(self.descriptor.0.iter().flat_map(|w| w.to_le_bytes()));
+        out.extend(self.at.iter().flat_map(|a| a.to_le_bytes()));
+        out.extend([self.sigma, self.plain]);
+    }
+
+    /// The reverse.
+    pub(crate) fn read(bytes: &[u8; POINT_BYTES]) -> Self {
+        let mut words = [0; WORDS];
+        for (word, bytes) in words.iter_mut().zip(bytes.as_chunks::<8>().0) {
+            *word = u64::from_le_bytes(*bytes);
+        }
+        let rest = &bytes[8 * WORDS..];
+        let at = [u16::from_le_bytes([rest[0], rest[1]]), u16::from_le_bytes([rest[2], rest[3]])];
+        Self { descriptor: Descriptor(words), at, sigma: rest[4], plain: rest[5] }
+    }
+}
+
+/// The points of one photographed view: those on the landmark that are no plain structures, strongest first. Empty where
+/// the corners are degenerate.
+pub fn view_points(image: &GrayImage, corners_px: &Corners) -> Vec<TaughtPoint> {
+    let Some(patch) = Patch::new(image, corners_px, inner_px(corners_px).min(INNER_PX[0])) else {
+        return Vec::new();
+    };
+    let inside = |p: &Point| p.at.iter().all(|a| (0.0..=1.0).contains(a));
+    let seen = SeenPatch::new(patch, MAX_VIEW_POINTS);
+    let of = |p: &Point| TaughtPoint::new(p, distance_to_plain(&p.descriptor));
+    seen.points.iter().filter(|p| inside(p)).map(of).filter(|p| p.plain() >= MIN_PLAIN_DISTANCE).collect()
+}
+
+/// The points of a landmark from those of its photographed views: of up to [`MAX_POINT_VIEWS`] views, evenly chosen, each
+/// with what the ones before do not show. At most [`MAX_LANDMARK_POINTS`].
+pub fn landmark_points(views: &[Vec<TaughtPoint>]) -> Vec<TaughtPoint> {
+    let chosen = views.len().min(MAX_POINT_VIEWS);
+    let mut kept: Vec<TaughtPoint> = Vec::new();
+    for i in 0..chosen {
+        let view = &views[i * views.len() / chosen];
+        let room = (MAX_LANDMARK_POINTS - kept.len()) / (chosen - i);
+        let known = kept.len();
+        let is_new = |p: &&TaughtPoint| !kept[..known].iter().any(|k| says_the_same(k, p));
+        let new: Vec<TaughtPoint> = view.iter().filter(is_new).take(room).copied().collect();
+        kept.extend(new);
+    }
+    kept
+}
+
+fn says_the_same(a: &TaughtPoint, b: &TaughtPoint) -> bool {
+    let (p, q) = (a.point(), b.point());
+    (p.at[0] - q.at[0]).abs() < SAME_PLACE
+        && (p.at[1] - q.at[1]).abs() < SAME_PLACE
+        && a.sigma.abs_diff(b.sigma) < SCALE_STEPS as u8 / 2
+        && a.descriptor.distance(&b.descriptor) < SAME_DISTANCE
+}

@@ -1,0 +1,128 @@
+//! The decision by points: landmarks that points speak for in, the verdict out, or `None` where points say nothing and the
+//! icons are asked. Corners are those of the homography, sharpened by laying the picture on the learnt icon.
+
+use super::{
+    Candidate, MAX_CANDIDATES, Recognition, Refusal, Verdict,
+    align::{Aligner, Surroundings, Template},
+    confidence::{entropy_m, entropy_norm, probability},
+    likeness::{Smoothed, between},
+    models::ModelSet,
+    signature::{Signature, likeness},
+};
+use crate::{
+    detect::quads::{Corners, Quad},
+    frame::GrayImage,
+    icon::rectify,
+    learn::model::LandmarkModel,
+    params::Params,
+    points::{
+        search::{Found, search},
+        verify::PointEvidence,
+    },
+};
+use nalgebra::Matrix2;
+
+/// log10 of the false alarms that a comparison of a quad with a whole map may have, expected.
+pub const LOG10_EPSILON: f64 = -5.0;
+/// log10 of the comparisons of a quad with one landmark: four turns.
+const LOG10_TURNS: f64 = 0.6;
+/// A landmark with so many connected parts of 25 that show something else is in doubt.
+pub const DOUBTFUL_PARTS: usize = 5;
+/// Dense alignment moves no corner of the homography further than this, in icon pixels.
+const MAX_MOVED_ICON_PX: f64 = 4.0;
+/// Smallest likeness of an alignment that is believed.
+const MIN_LIKENESS: f64 = 0.4;
+/// Standard deviation of a densely aligned corner, in icon pixels.
+const ALIGNED_SIGMA_ICON_PX: f64 = 0.25;
+
+/// log10 of the expected false alarms of `evidence` in a map of `landmarks`.
+pub fn log10_false_alarms(evidence: &PointEvidence, landmarks: usize) -> f64 {
+    evidence.log10_nfa + LOG10_TURNS + (landmarks.max(1) as f64).log10()
+}
+
+/// What points say of `quad`. `None` if they speak for no landmark.
+pub(crate) fn by_points(image: &GrayImage, quad: &Quad, models: &ModelSet, p: &Params) -> Option<Verdict> {
+    let of = |index: usize| models.at(index).map_or(&[][..], |m| m.points.as_slice());
+    let found = search(image, quad, models.points(), of);
+    let n = models.len();
+    let alarms: Vec<f64> = found.iter().map(|f| log10_false_alarms(&f.evidence, n)).collect();
+    let accepted = alarms.iter().filter(|a| **a <= LOG10_EPSILON).count();
+    if accepted == 0 {
+        return None;
+    }
+    let (best, model) = (found.first()?, models.at(found.first()?.model)?);
+    let mut evidence = best.evidence.clone();
+    let doubtful = evidence.agreement.largest_disagreement() >= DOUBTFUL_PARTS;
+    let unique = alarms.get(1).is_none_or(|next| next / alarms[0] < p.recognise.verdict.margin);
+    let likeness = sharpened(image, &mut evidence, model, models, p);
+    let refusal = if doubtful { Some(Refusal::Disagreement) } else { (!unique).then_some(Refusal::Margin) };
+    let of = |(i, f): (usize, &Found)| {
+        let ratio = if alarms[i] < 0.0 { LOG10_EPSILON / alarms[i] } else { f64::INFINITY };
+        let refused = if i == 0 { refusal } else { (alarms[i] > LOG10_EPSILON).then_some(Refusal::Points) };
+        Some(Candidate {
+            landmark: models.at(f.model)?.id,
+            correlation: 2.0,
+            hausdorff: f64::INFINITY,
+            likeness: if i == 0 { likeness } else { None },
+            distance: ratio,
+            tau: 1.0,
+            ratio,
+            probability: probability(alarms[i] <= LOG10_EPSILON, accepted),
+            refusal: refused,
+        })
+    };
+    let sure = refusal.is_none();
+    Some(Verdict {
+        recognition: if sure { Recognition::Unique(model.id) } else { Recognition::Ambiguous(model.id) },
+        candidates: found.iter().enumerate().filter_map(of).take(MAX_CANDIDATES).collect(),
+        entropy_m: entropy_m(accepted, n),
+        entropy_norm: entropy_norm(accepted, n),
+        confidence: if sure { confidence(alarms[0]) } else { 0.0 },
+        rotation: evidence.turned,
+        border: best.border,
+        aligned_px: Some(evidence.corners_px),
+        landmarks: n,
+        points: Some(Box::new(evidence)),
+    })
+}
+
+/// Chance that the identity is right: false alarms are as rare as they are computed to be only if the model of chance
+/// holds, so that the exponent is discounted.
+fn confidence(log10_false_alarms: f64) -> f64 {
+    const DISCOUNT: f64 = 0.35;
+    1.0 - 10.0_f64.powf(DISCOUNT * log10_false_alarms.min(0.0))
+}
+
+/// Lays the picture on the learnt icon from the corners of `evidence`, and takes over the corners if they moved as little
+/// as corners of points are wrong by. The likeness there.
+fn sharpened(
+    image: &GrayImage,
+    evidence: &mut PointEvidence,
+    model: &LandmarkModel,
+    models: &ModelSet,
+    p: &Params,
+) -> Option<f64> {
+    let (c, align) = (&p.recognise.correlation, &p.recognise.verdict.align);
+    let icon = rectify(image, &evidence.corners_px, &p.icon).ok()?;
+    let signature = Signature::new(&icon);
+    let alike = |i: usize| likeness(model.exemplars[i].signature.values(), signature.values());
+    let nearest = (0..model.exemplars.len()).max_by(|a, b| alike(*a).total_cmp(&alike(*b)))?;
+    let exemplar = &model.exemplars[nearest];
+    let around = Surroundings::new(image, &evidence.corners_px, &icon, align)?;
+    let laid = Aligner::new(models.lattices(), align)
+        .align(&around, &Template::new(&exemplar.icon, &exemplar.coarse))?;
+    let alike = between(&Smoothed::new(&laid.icon), &Smoothed::new(&exemplar.icon), c).likeness;
+    let icon_px = evidence.corners_px.area_px2().sqrt() / p.icon.size as f64;
+    if alike >= MIN_LIKENESS
+        && moved_px(&evidence.corners_px, &laid.corners_px) <= MAX_MOVED_ICON_PX * icon_px
+    {
+        evidence.corners_px = laid.corners_px;
+        evidence.corner_covariance_px2 = [Matrix2::identity() * (ALIGNED_SIGMA_ICON_PX * icon_px).powi(2); 4];
+    }
+    Some(alike)
+}
+
+/// How far the corner that moved most has moved.
+fn moved_px(a: &Corners, b: &Corners) -> f64 {
+    a.points().iter().zip(b.points()).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
+}
