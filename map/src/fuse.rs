@@ -25,9 +25,6 @@ use std::sync::Arc;
 /// Most odometry readings and fixes kept for replay, whatever the window.
 pub const MAX_EVENTS: usize = 1024;
 
-/// Odometry this much older than what can be replayed means that the robot's clock was set back.
-const CLOCK_STEP_NS: i64 = 10_000_000_000;
-
 /// The fused pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FusedPose {
@@ -50,9 +47,22 @@ pub enum OdometryOutcome {
     Moved,
     /// It was too old, or a second one of the same time: ignored.
     TooOld,
-    /// The robot cannot have moved so far, or its clock was set back: the odometry frame is another one. The pose is
-    /// unknown until the next fix.
+    /// The robot cannot have moved so far: the odometry frame is another one. The pose is unknown until the next fix.
     Jumped,
+}
+
+/// What a fix may do to the pose, by how its landmarks were recognised.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum FixRole {
+    /// Its landmarks were recognised without the pose: it may start the pose, correct it, contradict it, and with others
+    /// that agree replace it.
+    #[default]
+    Independent,
+    /// Its landmarks were recognised where the pose expects them ([`crate::guided`]): it corrects the pose and does nothing
+    /// else. It neither counts as a contradiction nor ends one: the pose fits what was looked for by it.
+    Guided,
+    /// Whoever gives it has decided that the pose is wrong ([`crate::guided::Schedule`]): it replaces the pose.
+    Replacing,
 }
 
 /// What became of a fix.
@@ -77,11 +87,11 @@ pub enum FixOutcome {
         /// How many in a row.
         in_a_row: u32,
     },
-    /// It was the last of a row of contradictions that agree, and replaced the pose.
+    /// It was the last of a row of contradictions that agree, or [`FixRole::Replacing`], and replaced the pose.
     Reset,
     /// Nothing new: the same landmarks, or the laser, from the same place.
     Repeated,
-    /// A scan while there was no pose to correct.
+    /// A scan or a guided fix while there was no pose to correct.
     NoPose,
     /// Older than the replay window.
     TooOld,
@@ -92,7 +102,7 @@ pub enum FixOutcome {
 #[derive(Debug, Clone)]
 enum Event {
     Odometry(Pose2),
-    Fix(Box<Fix>),
+    Fix(Box<Fix>, FixRole),
 }
 
 /// How to fuse, and where to trust what.
@@ -176,16 +186,23 @@ impl Fuser {
 
     /// Takes an odometry reading.
     pub fn odometry(&mut self, at_ns: i64, odom_from_robot: Pose2) -> Result<OdometryOutcome, OutOfRange> {
+        self.odometry_after(at_ns, odom_from_robot, 0.0)
+    }
+
+    /// Takes an odometry reading that was received `elapsed_s` after the one before it. A stamp that is a little wrong must
+    /// not look like a jump of odometry: the longer of both times counts.
+    pub fn odometry_after(
+        &mut self,
+        at_ns: i64,
+        odom_from_robot: Pose2,
+        elapsed_s: f64,
+    ) -> Result<OdometryOutcome, OutOfRange> {
         odom_from_robot.check()?;
         let known = |(t, e): &(i64, Event)| *t == at_ns && matches!(e, Event::Odometry(_));
-        if self.anchor_ns.is_some_and(|t| at_ns < t.saturating_sub(CLOCK_STEP_NS)) {
-            self.restart(at_ns, &odom_from_robot);
-            return Ok(OdometryOutcome::Jumped);
-        }
         if self.is_too_old(at_ns) || self.anchor_ns == Some(at_ns) || self.events.iter().any(known) {
             return Ok(OdometryOutcome::TooOld);
         }
-        if self.jumps(at_ns, &odom_from_robot) {
+        if self.jumps(at_ns, &odom_from_robot, elapsed_s) {
             self.restart(at_ns, &odom_from_robot);
             return Ok(OdometryOutcome::Jumped);
         }
@@ -193,8 +210,51 @@ impl Fuser {
         Ok(OdometryOutcome::Moved)
     }
 
-    /// Takes a fix of the time when its frame was captured.
+    /// The robot's clock was set: the window starts again at the reading `odom_from_robot`, received `elapsed_s` after the
+    /// last, at the new time `at_ns`. The pose is carried along by odometry, unless the robot cannot have moved so far.
+    /// What could be replayed, and fixes that waited for odometry, are forgotten.
+    pub fn set_clock(
+        &mut self,
+        at_ns: i64,
+        odom_from_robot: Pose2,
+        elapsed_s: f64,
+    ) -> Result<OdometryOutcome, OutOfRange> {
+        odom_from_robot.check()?;
+        if self.is_too_far(&odom_from_robot, elapsed_s) {
+            self.restart(at_ns, &odom_from_robot);
+            return Ok(OdometryOutcome::Jumped);
+        }
+        self.now.predict(&odom_from_robot, &self.rules);
+        self.begin_window(at_ns);
+        Ok(OdometryOutcome::Moved)
+    }
+
+    /// Forgets the odometry reading of this time: its time proved wrong. Odometry is cumulative, so that the reading after
+    /// it says as much. Nothing happens if it cannot be replayed any more.
+    pub fn retract(&mut self, at_ns: i64) {
+        let found = self.events.iter().position(|(t, e)| *t == at_ns && matches!(e, Event::Odometry(_)));
+        let Some(place) = found else { return };
+        self.events.remove(place);
+        if place < self.applied {
+            (self.now, self.now_ns, self.applied) = (self.anchor.clone(), self.anchor_ns, 0);
+            self.advance(usize::MAX);
+        }
+    }
+
+    /// The pose by this odometry reading, which is newer than that of [`Self::pose`] though its time is not.
+    pub fn pose_by(&self, at_ns: i64, odom_from_robot: &Pose2) -> Option<FusedPose> {
+        let mut filter = self.now.clone();
+        filter.predict(odom_from_robot, &self.rules);
+        Some(FusedPose { at_ns, pose: filter.pose()?, ..self.pose()? })
+    }
+
+    /// Takes a fix of the time when its frame was captured, made without the pose.
     pub fn fix(&mut self, at_ns: i64, fix: &Fix) -> Result<FixOutcome, OutOfRange> {
+        self.fix_as(at_ns, fix, FixRole::Independent)
+    }
+
+    /// As [`Fuser::fix`], for a fix that may do more or less.
+    pub fn fix_as(&mut self, at_ns: i64, fix: &Fix, role: FixRole) -> Result<FixOutcome, OutOfRange> {
         fix.pose.check()?;
         check::covariance("noise", &fix.noise)?;
         for nuisance in &fix.nuisances {
@@ -206,12 +266,17 @@ impl Fuser {
         if self.is_too_old(at_ns) {
             return Ok(FixOutcome::TooOld);
         }
-        Ok(self.insert(at_ns, Event::Fix(Box::new(fix.clone()))).unwrap_or(FixOutcome::Waiting))
+        Ok(self.insert(at_ns, Event::Fix(Box::new(fix.clone()), role)).unwrap_or(FixOutcome::Waiting))
     }
 
     /// Forgets all but the count of corrections: where the robot is now is unknown.
     fn restart(&mut self, at_ns: i64, odom_from_robot: &Pose2) {
         self.now.lose(odom_from_robot);
+        self.begin_window(at_ns);
+    }
+
+    /// Nothing before this moment can be replayed any more.
+    fn begin_window(&mut self, at_ns: i64) {
         self.now_ns = Some(at_ns);
         self.events.clear();
         self.applied = 0;
@@ -224,22 +289,36 @@ impl Fuser {
     }
 
     /// Whether the newest reading cannot follow the one before it.
-    fn jumps(&self, at_ns: i64, odom_from_robot: &Pose2) -> bool {
-        let (Some(t), Some(before)) = (self.now_ns, self.now.odometry()) else { return false };
+    fn jumps(&self, at_ns: i64, odom_from_robot: &Pose2, elapsed_s: f64) -> bool {
+        let Some(t) = self.now_ns else { return false };
+        let stamped_s = at_ns.saturating_sub(t) as f64 * 1e-9;
+        at_ns > t && self.is_too_far(odom_from_robot, stamped_s.max(elapsed_s))
+    }
+
+    /// Whether the robot cannot have moved so far since the last reading.
+    fn is_too_far(&self, odom_from_robot: &Pose2, elapsed_s: f64) -> bool {
+        let Some(before) = self.now.odometry() else { return false };
         // A little slack for jitter of the clock.
-        let limit = self.rules.params.max_speed_mps * ((at_ns.saturating_sub(t)) as f64 * 1e-9 + 0.1);
-        at_ns > t && before.between(odom_from_robot).position().norm() > limit
+        let limit = self.rules.params.max_speed_mps * (elapsed_s + 0.1);
+        before.between(odom_from_robot).position().norm() > limit
     }
 
     /// Puts an event in its place and brings `now` up to date. What became of it, if it could be applied.
     fn insert(&mut self, at_ns: i64, event: Event) -> Option<FixOutcome> {
-        let rank = |t: i64, e: &Event| (t, matches!(e, Event::Fix(_)));
+        let rank = |t: i64, e: &Event| (t, matches!(e, Event::Fix(..)));
         let key = rank(at_ns, &event);
         let place = self.events.partition_point(|(t, e)| rank(*t, e) <= key);
         self.events.insert(place, (at_ns, event));
         if place < self.applied {
             (self.now, self.now_ns, self.applied) = (self.anchor.clone(), self.anchor_ns, 0);
         }
+        let outcome = self.advance(place);
+        self.prune();
+        outcome
+    }
+
+    /// Applies what is not applied yet; what became of the event at `place`.
+    fn advance(&mut self, place: usize) -> Option<FixOutcome> {
         let mut outcome = None;
         while self.applied < self.events.len() {
             match apply(&mut self.now, &mut self.now_ns, &self.events, self.applied, &self.rules) {
@@ -249,7 +328,6 @@ impl Fuser {
             }
             self.applied += 1;
         }
-        self.prune();
         outcome
     }
 
@@ -299,14 +377,14 @@ fn apply(
             *filter_ns = Some(*at_ns);
             Step::Moved
         }
-        Event::Fix(fix) => {
+        Event::Fix(fix, role) => {
             let odometry_follows = events[i..].iter().any(|(_, e)| matches!(e, Event::Odometry(_)));
             if filter.odometry().is_none() && odometry_follows {
                 // Nothing tells how the robot moved from here to its first reading.
                 return Step::Judged(FixOutcome::TooOld);
             }
             match reach(filter, filter_ns, &events[i + 1..], *at_ns, rules) {
-                Some(()) => Step::Judged(filter.correct(fix, rules)),
+                Some(()) => Step::Judged(filter.correct(fix, *role, rules)),
                 None => Step::Waits,
             }
         }
@@ -327,7 +405,7 @@ fn reach(
     }
     let next = later.iter().find_map(|(t, e)| match e {
         Event::Odometry(pose) => Some((*t, pose)),
-        Event::Fix(_) => None,
+        Event::Fix(..) => None,
     });
     let (to_ns, to) = next?;
     if at_ns < from_ns || to_ns <= from_ns {

@@ -4,8 +4,12 @@
 pub const CHI2_3_99: f64 = 11.345;
 /// 99.9 % quantile with 3 degrees of freedom: beyond it a landmark is seen elsewhere.
 pub const CHI2_3_999: f64 = 16.266;
+/// 99.9 % quantile with 2 degrees of freedom: the search gate of one corner.
+pub const CHI2_2_999: f64 = 13.816;
 /// Standard normal quantile, 95 %.
 pub(crate) const Z_95: f64 = 1.644_854;
+/// Standard normal quantile, 99.9 %.
+pub(crate) const Z_999: f64 = 3.090_232;
 /// Standard normal quantile, 99 %.
 #[cfg(test)]
 pub(crate) const Z_99: f64 = 2.326_348;

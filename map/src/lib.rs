@@ -24,3 +24,4 @@ pub mod laser_fix;
 pub mod changes;
 pub mod gather;
 pub mod hypotheses;
+pub mod guided;

@@ -1,6 +1,6 @@
 //! The filter itself: robot pose and lasting errors in one Gaussian; predict, correct, start, give up.
 
-use super::{FixOutcome, FuseParams, Rules, trust};
+use super::{FixOutcome, FixRole, FuseParams, Rules, trust};
 use crate::{
     localise::{Fix, Modality, Nuisance, NuisanceKey},
     pose2::{Pose2, Pose2Covariance},
@@ -165,13 +165,14 @@ impl Filter {
     }
 
     /// Takes a fix at the time of the last odometry.
-    pub(super) fn correct(&mut self, fix: &Fix, rules: &Rules) -> FixOutcome {
+    pub(super) fn correct(&mut self, fix: &Fix, role: FixRole, rules: &Rules) -> FixOutcome {
         let p = &rules.params;
-        if self.belief.is_none() && fix.modality == Modality::Laser {
+        let only_corrects = fix.modality == Modality::Laser || role == FixRole::Guided;
+        if self.belief.is_none() && only_corrects {
             return FixOutcome::NoPose;
         }
         let sources = sources(fix);
-        if self.is_repeated(&sources, p) {
+        if role != FixRole::Replacing && self.is_repeated(&sources, p) {
             return FixOutcome::Repeated;
         }
         self.fixes += 1;
@@ -184,6 +185,11 @@ impl Filter {
                 self.belief = Some(Belief::from_fix(fix, &so_far, self.fixes));
                 FixOutcome::Started
             }
+            Some(belief) if role == FixRole::Replacing => {
+                *belief = Belief::from_fix(fix, &so_far, self.fixes);
+                self.afresh();
+                FixOutcome::Reset
+            }
             Some(belief) => {
                 let mut next = belief.clone();
                 match next.correct(fix, self.fixes) {
@@ -195,6 +201,10 @@ impl Filter {
                             FixOutcome::NotUsed { distance2 }
                         }
                     }
+                    distance2 if role == FixRole::Guided => FixOutcome::GatedOut {
+                        distance2: distance2.unwrap_or(f64::INFINITY),
+                        in_a_row: self.doubts(),
+                    },
                     distance2 => self.contradict(fix, distance2.unwrap_or(f64::INFINITY), p),
                 }
             }
@@ -202,6 +212,7 @@ impl Filter {
         if let FixOutcome::NotUsed { .. } = outcome {
             match fix.modality {
                 Modality::Laser => self.laser_doubts = 0,
+                Modality::Landmarks if role == FixRole::Guided => {}
                 Modality::Landmarks => self.doubt = None,
             }
         } else if !matches!(outcome, FixOutcome::GatedOut { .. }) {
@@ -211,6 +222,8 @@ impl Filter {
                     self.laser_corrections += 1;
                     self.laser_doubts = 0;
                 }
+                // Nor is it that a landmark is found where the belief says.
+                Modality::Landmarks if role == FixRole::Guided => self.corrections += 1,
                 Modality::Landmarks => (self.corrections, self.doubt) = (self.corrections + 1, None),
             }
             self.use_up(sources);

@@ -364,7 +364,7 @@ fn a_robot_that_stands_learns_nothing_from_the_same_view() {
 }
 
 #[test]
-fn jumps_of_odometry_and_of_the_clock_lose_the_pose() {
+fn jumps_of_odometry_lose_the_pose_and_steps_of_the_clock_do_not() {
     let mut fuser = Fuser::new(FuseParams::default());
     drive(&mut fuser, 1.0);
     fuser.fix(SECOND, &fix(1, Pose2::default(), 0.05, 0.01)).unwrap();
@@ -378,13 +378,81 @@ fn jumps_of_odometry_and_of_the_clock_lose_the_pose() {
         fuser.fix(11 * SECOND / 10, &fix(1, Pose2::default(), 0.05, 0.01)).unwrap(),
         FixOutcome::Started
     );
-    // A clock that was wrong by an hour does not lock the robot out.
-    let mut ahead = Fuser::new(FuseParams::default());
-    for i in 0..50 {
-        ahead.odometry(3600 * SECOND + i * SECOND / 10, Pose2::default()).unwrap();
+    // A clock that was wrong by an hour is set, back and forth: the pose goes on by odometry.
+    let mut set = Fuser::new(FuseParams::default());
+    drive(&mut set, 1.0);
+    set.fix(SECOND, &fix(1, Pose2::default(), 0.05, 0.01)).unwrap();
+    let started = set.pose().unwrap();
+    for (at_ns, x) in [(3600 * SECOND, 2.0), (2 * SECOND, 3.0)] {
+        assert_eq!(set.set_clock(at_ns, Pose2::new(x, 0.0, 0.0), 1.0).unwrap(), OdometryOutcome::Moved);
+        let pose = set.pose().unwrap();
+        assert_eq!((pose.at_ns, pose.corrections), (at_ns, 1));
+        assert!((pose.pose.pose.x_m - started.pose.pose.x_m - (x - 1.0)).abs() < 1e-9);
+        assert!(pose.pose.covariance[(0, 0)] > started.pose.covariance[(0, 0)]);
     }
-    assert_eq!(ahead.odometry(5 * SECOND, Pose2::default()).unwrap(), OdometryOutcome::Jumped);
-    assert_eq!(ahead.odometry(6 * SECOND, Pose2::default()).unwrap(), OdometryOutcome::Moved);
+    assert_eq!(set.odometry(3 * SECOND, Pose2::new(4.0, 0.0, 0.0)).unwrap(), OdometryOutcome::Moved);
+    // So far a robot cannot have come meanwhile: it is another odometry frame.
+    assert_eq!(set.set_clock(SECOND, Pose2::new(40.0, 0.0, 0.0), 1.0).unwrap(), OdometryOutcome::Jumped);
+    assert_eq!(set.pose(), None);
+}
+
+/// Fault F2: one reading more than 10 s behind used to lose the pose.
+#[test]
+fn one_reading_far_behind_loses_nothing() {
+    let mut fuser = Fuser::new(FuseParams::default());
+    drive(&mut fuser, 5.0);
+    fuser.fix(5 * SECOND, &fix(1, Pose2::default(), 0.05, 0.01)).unwrap();
+    let before = fuser.pose().unwrap();
+    assert_eq!(fuser.odometry(-20 * SECOND, Pose2::new(5.0, 0.0, 0.0)).unwrap(), OdometryOutcome::TooOld);
+    assert_eq!(fuser.pose().unwrap(), before);
+}
+
+#[test]
+fn a_reading_that_is_retracted_was_never_there() {
+    let mut with = Fuser::new(FuseParams::default());
+    drive(&mut with, 1.0);
+    with.fix(SECOND, &fix(1, Pose2::default(), 0.05, 0.01)).unwrap();
+    let mut without = with.clone();
+    with.odometry(13 * SECOND / 10, Pose2::new(1.05, 0.0, 0.0)).unwrap();
+    // It waits for odometry of its time, or is judged by the stray reading.
+    let late = fix(2, Pose2::new(0.2, 0.0, 0.0), 0.05, 0.01);
+    with.fix(12 * SECOND / 10, &late).unwrap();
+    without.fix(12 * SECOND / 10, &late).unwrap();
+    with.retract(13 * SECOND / 10);
+    for fuser in [&mut with, &mut without] {
+        for (tenths, x) in [(11, 1.1), (12, 1.2), (13, 1.3)] {
+            fuser.odometry(tenths * SECOND / 10, Pose2::new(x, 0.0, 0.0)).unwrap();
+        }
+    }
+    assert_eq!(with.pose(), without.pose());
+    assert_eq!(with.pose().unwrap().corrections, 2);
+    with.retract(77);
+    assert_eq!(with.pose(), without.pose());
+}
+
+#[test]
+fn a_slow_stamp_is_no_jump_if_the_reading_came_later() {
+    let mut fuser = Fuser::new(FuseParams::default());
+    drive(&mut fuser, 1.0);
+    fuser.fix(SECOND, &fix(1, Pose2::default(), 0.05, 0.01)).unwrap();
+    // 2 m in a second, stamped 50 ms after the reading before.
+    let at_ns = SECOND + SECOND / 20;
+    let mut by_stamp = fuser.clone();
+    assert_eq!(by_stamp.odometry(at_ns, Pose2::new(3.0, 0.0, 0.0)).unwrap(), OdometryOutcome::Jumped);
+    let outcome = fuser.odometry_after(at_ns, Pose2::new(3.0, 0.0, 0.0), 1.0).unwrap();
+    assert_eq!(outcome, OdometryOutcome::Moved);
+}
+
+#[test]
+fn a_newer_reading_with_an_earlier_time_moves_the_pose() {
+    let mut fuser = Fuser::new(FuseParams::default());
+    drive(&mut fuser, 1.0);
+    fuser.fix(SECOND, &fix(1, Pose2::default(), 0.05, 0.01)).unwrap();
+    let held = fuser.pose().unwrap();
+    let pose = fuser.pose_by(SECOND - 1, &Pose2::new(1.1, 0.0, 0.0)).unwrap();
+    assert_eq!((pose.at_ns, pose.corrections), (SECOND - 1, 1));
+    assert!((pose.pose.pose.x_m - held.pose.pose.x_m - 0.1).abs() < 1e-9);
+    assert_eq!(fuser.pose().unwrap(), held);
 }
 
 #[test]

@@ -1,0 +1,395 @@
+//! When the whole map must be searched although a pose is known, how far that pose is trusted, and when a global
+//! observation replaces it. A state machine over frames: no clock, no images.
+//!
+//! For each frame: [`Schedule::plan`] before recognition, [`GuidedReport::global_reason`] after guided recognition of the
+//! same frame, [`Schedule::finish`] at the end. What `finish` decides says how the frame's global fix goes to the fuser,
+//! [`Schedule::guided_corrects`] whether its guided fix does.
+//!
+//! Only fixes from landmarks that were recognised in the whole map, without the pose, support a pose. Guided observations
+//! support nothing: in a row of identical doors they fit a pose that is wrong by one door as well as the right one. So they
+//! correct only a pose that has had support; otherwise they would make a wrong pose surer.
+//!
+//! A pose with no support yet is replaced after [`ScheduleParams::unsupported_reset_fixes`] contradicting fixes that agree
+//! with one another. A pose that [`ScheduleParams::established_landmarks`] different landmarks support needs
+//! [`ScheduleParams::reset_fixes`] and two witnesses: two contradicting landmarks, or one and an expected landmark that is
+//! missing. One landmark that was moved must not carry robots along.
+
+mod params;
+pub use params::ScheduleParams;
+
+use crate::{
+    fuse::FuseParams,
+    localise::{DecidedBy, Fix, RobotFix},
+    pose2::{Pose2, Pose2Covariance},
+};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use vision::recognise::LandmarkId;
+
+/// Most landmarks remembered as support of a pose, or as contradicting it; the oldest go first.
+pub const MAX_SUPPORT: usize = 16;
+/// Most cameras of a robot whose searches are counted.
+pub const MAX_CAMERAS: usize = 16;
+
+/// How far a pose is trusted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Trust {
+    /// There is no pose.
+    NoPose,
+    /// No global observation has agreed with it.
+    Unsupported,
+    /// Global observations have agreed with it lately.
+    Supported,
+    /// The last global observation that agreed is too long ago.
+    Stale,
+    /// The last global observation contradicts it.
+    Contradicted,
+}
+
+/// Why a frame is searched globally.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum GlobalReason {
+    /// There is no pose to guide.
+    NoPose,
+    /// A global observation contradicts the pose.
+    Contradicted,
+    /// The pose is too uncertain.
+    Uncertain,
+    /// Nothing has supported the pose for too many frames or metres.
+    Stale,
+    /// It is time.
+    Interval,
+    /// A landmark that is surely in view was not found.
+    Missed,
+    /// A guided observation contradicts the pose.
+    GuidedContradiction,
+}
+
+/// What to do with a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FramePlan {
+    /// Whether to look for expected landmarks. Not while the pose is contradicted.
+    pub guided: bool,
+    /// Whether to search the whole map as well, and why.
+    pub global: Option<GlobalReason>,
+}
+
+/// What guided recognition of a frame found.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct GuidedReport {
+    /// Observations that speak against the pose ([`super::Assignment::contradictions`]).
+    pub contradictions: usize,
+    /// Whether a landmark that is surely in view was not found (as in [`FrameReport::missed`]).
+    pub missed: bool,
+}
+
+impl GuidedReport {
+    /// Whether the frame must be searched globally after all, and why.
+    pub fn global_reason(&self) -> Option<GlobalReason> {
+        if self.contradictions > 0 {
+            Some(GlobalReason::GuidedContradiction)
+        } else if self.missed {
+            Some(GlobalReason::Missed)
+        } else {
+            None
+        }
+    }
+}
+
+/// What became of a frame.
+#[derive(Debug, Clone, Copy)]
+pub struct FrameReport<'a> {
+    /// The camera, as in [`Schedule::plan`].
+    pub camera: u32,
+    /// Motion by odometry since the frame before, in the robot frame then; the identity for the first.
+    pub motion: Pose2,
+    /// The pose at the frame's time without the frame, if there is one.
+    pub prior: Option<&'a Pose2Covariance>,
+    /// Whether the whole map was searched.
+    pub searched: bool,
+    /// The pose by the uniquely recognised landmarks of that search alone, made without any prior.
+    pub global: Option<&'a RobotFix>,
+    /// Landmarks surely in view ([`super::Expected::is_sure`]) that neither way found. Only those that are recognised
+    /// reliably when they are there: not members of look-alike classes, not quarantined ones.
+    pub missed: &'a [LandmarkId],
+}
+
+/// How the global fix of a frame goes to the fuser.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Decision {
+    /// Nothing global was seen, or it says nothing of the pose.
+    Keep,
+    /// The global fix agrees with the pose, or starts one: it goes to the fuser as `FixRole::Independent`.
+    Use,
+    /// The global fix contradicts the pose: it goes to the fuser as `FixRole::Independent`, which leaves it out and counts
+    /// it.
+    Doubt {
+        /// How many global fixes in a row contradict the pose and agree with one another.
+        in_a_row: u32,
+    },
+    /// The global fix replaces the pose (`FixRole::Replacing`).
+    Replace(Box<Fix>),
+}
+
+/// Global fixes that contradict the pose and agree with one another.
+#[derive(Debug, Clone)]
+struct Contradiction {
+    /// The latest, carried along by odometry; `None` where it has several solutions.
+    pose: Option<Pose2Covariance>,
+    count: u32,
+    landmarks: Vec<LandmarkId>,
+    missed: Vec<LandmarkId>,
+}
+
+/// One robot's schedule on one map. A new one when the map or the odometry frame changes.
+#[derive(Debug, Clone, Default)]
+pub struct Schedule {
+    params: ScheduleParams,
+    noise: FuseParams,
+    has_pose: bool,
+    /// Some global fix has agreed with this pose.
+    was_supported: bool,
+    /// The last frame replaced the pose.
+    was_replaced: bool,
+    /// Frames of each camera since the last that was searched globally.
+    searches: BTreeMap<u32, u32>,
+    frames_since_support: u32,
+    metres_since_support: f64,
+    /// Landmarks that agreed with the pose, with the metres driven since, the latest last.
+    support: Vec<(LandmarkId, f64)>,
+    contradiction: Option<Contradiction>,
+}
+
+impl Schedule {
+    /// Nothing known yet. `noise` says what odometry errs by between frames.
+    pub fn new(params: ScheduleParams, noise: FuseParams) -> Self {
+        Self { params, noise, ..Self::default() }
+    }
+
+    /// How far the pose is trusted after the last frame.
+    pub fn trust(&self) -> Trust {
+        if !self.has_pose {
+            Trust::NoPose
+        } else if self.contradiction.is_some() {
+            Trust::Contradicted
+        } else if !self.was_supported {
+            Trust::Unsupported
+        } else if self.is_stale() {
+            Trust::Stale
+        } else {
+            Trust::Supported
+        }
+    }
+
+    /// Whether the guided fix of the last frame may go to the fuser (as `FixRole::Guided`): the pose has had support and the
+    /// frame does not contradict it.
+    pub fn guided_corrects(&self) -> bool {
+        self.was_supported && self.contradiction.is_none() && !self.was_replaced
+    }
+
+    /// The pose was found by relocalisation from several observations of these landmarks: that is support.
+    pub fn relocalised(&mut self, landmarks: &[LandmarkId]) {
+        self.forget();
+        self.has_pose = true;
+        self.supported(landmarks);
+    }
+
+    /// What to do with the next frame of a camera, taken near `prior`. Cameras are numbered by the caller; of more than
+    /// [`MAX_CAMERAS`] the others are searched every time.
+    pub fn plan(&self, camera: u32, prior: Option<&Pose2Covariance>) -> FramePlan {
+        let p = &self.params;
+        let Some(prior) = prior else {
+            return FramePlan { guided: false, global: Some(GlobalReason::NoPose) };
+        };
+        if self.contradiction.is_some() {
+            return FramePlan { guided: false, global: Some(GlobalReason::Contradicted) };
+        }
+        let interval =
+            if self.support.is_empty() { p.unsupported_interval_frames } else { p.interval_frames };
+        let global = if is_uncertain(prior, p) {
+            Some(GlobalReason::Uncertain)
+        } else if self.is_stale() {
+            Some(GlobalReason::Stale)
+        } else if self.frames_since_search(camera).saturating_add(1) >= interval {
+            Some(GlobalReason::Interval)
+        } else {
+            None
+        };
+        FramePlan { guided: true, global }
+    }
+
+    /// Takes a frame to its end.
+    pub fn finish(&mut self, frame: &FrameReport<'_>) -> Decision {
+        self.carry(&frame.motion);
+        self.count_search(frame.camera, frame.searched);
+        self.was_replaced = false;
+        let Some(prior) = frame.prior else {
+            return self.without_pose(frame);
+        };
+        self.has_pose = true;
+        let Some(global) = frame.global else { return Decision::Keep };
+        match judge(global, prior, &self.params) {
+            Judged::Agrees(fix) => {
+                self.supported(&fix.landmarks);
+                Decision::Use
+            }
+            Judged::Silent => Decision::Keep,
+            Judged::Contradicts(fixes) => self.contradicted(fixes, frame.missed),
+        }
+    }
+
+    /// How many landmarks are remembered, in all lists.
+    #[cfg(test)]
+    pub(super) fn remembered(&self) -> usize {
+        self.support.len() + self.contradiction.as_ref().map_or(0, |c| c.landmarks.len() + c.missed.len())
+    }
+
+    /// A pose begins with a global fix, or not at all.
+    fn without_pose(&mut self, frame: &FrameReport<'_>) -> Decision {
+        self.forget();
+        self.has_pose = false;
+        match frame.global {
+            Some(RobotFix::Fixed(fix)) => {
+                self.has_pose = true;
+                self.supported(&fix.landmarks);
+                Decision::Use
+            }
+            Some(RobotFix::Ambiguous(_) | RobotFix::Refused(_)) | None => Decision::Keep,
+        }
+    }
+
+    fn frames_since_search(&self, camera: u32) -> u32 {
+        let unknown = if self.searches.len() < MAX_CAMERAS { 0 } else { u32::MAX };
+        self.searches.get(&camera).copied().unwrap_or(unknown)
+    }
+
+    fn count_search(&mut self, camera: u32, searched: bool) {
+        if self.searches.len() >= MAX_CAMERAS && !self.searches.contains_key(&camera) {
+            return;
+        }
+        let since = self.searches.entry(camera).or_insert(0);
+        *since = if searched { 0 } else { since.saturating_add(1) };
+    }
+
+    fn is_stale(&self) -> bool {
+        let p = &self.params;
+        self.frames_since_support >= p.max_guided_frames || self.metres_since_support >= p.max_guided_m
+    }
+
+    fn forget(&mut self) {
+        self.support.clear();
+        (self.contradiction, self.was_supported) = (None, false);
+        (self.frames_since_support, self.metres_since_support) = (0, 0.0);
+    }
+
+    /// Ages everything by a motion.
+    fn carry(&mut self, motion: &Pose2) {
+        let metres = motion.position().norm();
+        self.frames_since_support = self.frames_since_support.saturating_add(1);
+        self.metres_since_support += metres;
+        for (_, since) in &mut self.support {
+            *since += metres;
+        }
+        self.support.retain(|(_, since)| *since <= self.params.support_m);
+        let noise = self.noise.motion_noise(motion);
+        if let Some(pose) = self.contradiction.as_mut().and_then(|c| c.pose.as_mut()) {
+            *pose = pose.compose(&Pose2Covariance { pose: *motion, covariance: noise });
+        }
+    }
+
+    fn supported(&mut self, landmarks: &[LandmarkId]) {
+        (self.contradiction, self.was_supported) = (None, true);
+        (self.frames_since_support, self.metres_since_support) = (0, 0.0);
+        self.support.retain(|(landmark, _)| !landmarks.contains(landmark));
+        self.support.extend(landmarks.iter().map(|landmark| (*landmark, 0.0)));
+        let gone = self.support.len().saturating_sub(MAX_SUPPORT);
+        self.support.drain(..gone);
+    }
+
+    /// Counts contradicting fixes that agree; enough of them replace the pose.
+    fn contradicted(&mut self, fixes: &[Fix], missed: &[LandmarkId]) -> Decision {
+        let single = if let [fix] = fixes { Some(fix) } else { None };
+        let agrees = |c: &Contradiction| {
+            // A fix with several solutions agrees by any of them, but counts for none.
+            c.pose.as_ref().is_none_or(|pose| {
+                fixes.iter().any(|f| pose.distance2(&f.pose).is_some_and(|d| d <= self.params.support_chi2))
+            })
+        };
+        let mut contradiction = self.contradiction.take().filter(agrees).unwrap_or(Contradiction {
+            pose: None,
+            count: 0,
+            landmarks: Vec::new(),
+            missed: Vec::new(),
+        });
+        if let Some(fix) = single {
+            contradiction.pose = Some(fix.pose);
+            contradiction.count = contradiction.count.saturating_add(1);
+            remember(&mut contradiction.landmarks, &fix.landmarks);
+            remember(&mut contradiction.missed, missed);
+        }
+        let Contradiction { count, landmarks, missed, .. } = &contradiction;
+        let p = &self.params;
+        let missing = missed.iter().any(|id| !landmarks.contains(id));
+        let witnesses = landmarks.len() + usize::from(missing);
+        // Support that is stale protects nothing.
+        let support = if self.is_stale() { 0 } else { self.support.len() };
+        let needed = if support >= p.established_landmarks { 2 } else { 1 };
+        let fixes_needed = if support == 0 { p.unsupported_reset_fixes } else { p.reset_fixes };
+        let in_a_row = *count;
+        if let Some(fix) = single
+            && in_a_row >= fixes_needed
+            && witnesses >= needed
+        {
+            self.forget();
+            self.supported(&fix.landmarks);
+            self.was_replaced = true;
+            return Decision::Replace(Box::new(fix.clone()));
+        }
+        self.contradiction = Some(contradiction);
+        Decision::Doubt { in_a_row }
+    }
+}
+
+/// What a global fix says of the pose.
+enum Judged<'a> {
+    Agrees(&'a Fix),
+    /// All of its solutions.
+    Contradicts(&'a [Fix]),
+    Silent,
+}
+
+fn judge<'a>(global: &'a RobotFix, prior: &Pose2Covariance, p: &ScheduleParams) -> Judged<'a> {
+    let distance2 = |fix: &Fix| prior.distance2(&fix.pose).unwrap_or(f64::INFINITY);
+    let fixes = match global {
+        RobotFix::Fixed(fix) => std::slice::from_ref(&**fix),
+        RobotFix::Ambiguous(fixes) => fixes.as_slice(),
+        RobotFix::Refused(_) => &[],
+    };
+    let nearest = fixes.iter().map(distance2).fold(f64::INFINITY, f64::min);
+    match fixes {
+        [] => Judged::Silent,
+        // A fix that a prior decided was drawn to the pose by it.
+        [fix] if nearest <= p.support_chi2 && fix.decided_by != DecidedBy::Prior => Judged::Agrees(fix),
+        _ if nearest > p.contradict_chi2 => Judged::Contradicts(fixes),
+        _ => Judged::Silent,
+    }
+}
+
+fn remember(known: &mut Vec<LandmarkId>, more: &[LandmarkId]) {
+    for id in more {
+        if known.len() < MAX_SUPPORT && !known.contains(id) {
+            known.push(*id);
+        }
+    }
+}
+
+fn is_uncertain(prior: &Pose2Covariance, p: &ScheduleParams) -> bool {
+    let c = &prior.covariance;
+    let (xx, xy, yy, variance_rad2) = (c[(0, 0)], c[(0, 1)], c[(1, 1)], c[(2, 2)]);
+    // Largest eigenvalue of the position's block.
+    let variance_m2 = 0.5 * (xx + yy) + (0.5 * (xx - yy)).hypot(xy);
+    // NaN is uncertain.
+    !(variance_m2 <= p.max_sigma_m.powi(2) && variance_rad2 <= p.max_sigma_rad.powi(2))
+}
