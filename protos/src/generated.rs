@@ -80,7 +80,8 @@ pub struct Frame {
     /// Counts up within an epoch; a frame not newer than the last is rejected.
     #[prost(uint64, tag = "2")]
     pub seq: u64,
-    /// The robot's clock at capture, ns since the Unix epoch; only echoed and compared, never used for order.
+    /// The robot's clock at capture, ns since the Unix epoch; never used for order among frames. It places the frame among the
+    /// robot's odometry; where it cannot be right by the robot's other messages, the frame is answered and not fused.
     #[prost(int64, tag = "3")]
     pub captured_ns: i64,
     #[prost(enumeration = "ImageEncoding", tag = "4")]
@@ -107,7 +108,8 @@ pub struct Frame {
     /// Do not start work later than this after receipt; 0 = the server's default.
     #[prost(uint32, tag = "12")]
     pub deadline_ms: u32,
-    /// The map to recognise against; empty = the robot's map.
+    /// The map to recognise against; empty = the robot's map. On another map the frame is answered, and changes neither the
+    /// robot's fused pose nor anything of that map.
     #[prost(string, tag = "13")]
     pub map: ::prost::alloc::string::String,
 }
@@ -152,14 +154,39 @@ pub struct Candidate {
     pub ratio: f64,
     #[prost(double, tag = "7")]
     pub probability: f64,
-    /// Empty, or the gate that refused it: correlation, hausdorff, likeness, contradiction, content,
-    /// margin.
+    /// Empty, or the gate that refused it: correlation, hausdorff, likeness, contradiction, content, margin,
+    /// points (so many points would agree by chance too often), disagreement (a connected part shows something else).
     #[prost(string, tag = "8")]
     pub refusal: ::prost::alloc::string::String,
     /// How alike the picture and the learnt icon are, one laid on the other, -1 to 1; absent where the map's distances
     /// decide alone.
     #[prost(double, optional, tag = "9")]
     pub likeness: ::core::option::Option<f64>,
+}
+/// What matched points say of the first candidate.
+#[derive(::serde::Serialize, ::serde::Deserialize)]
+#[serde(default)]
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct PointEvidence {
+    /// Tentative matches at different places, and how many of them agree on one homography.
+    #[prost(uint32, tag = "1")]
+    pub matches: u32,
+    #[prost(uint32, tag = "2")]
+    pub inliers: u32,
+    /// Further points of the landmark that the image shows, at different places, and how many of them look as taught.
+    #[prost(uint32, tag = "3")]
+    pub checked: u32,
+    #[prost(uint32, tag = "4")]
+    pub agreeing: u32,
+    /// log10 of the number of such coincidences expected when something else is compared with the whole map. Accepted from
+    /// -5 downwards.
+    #[prost(double, tag = "5")]
+    pub log10_false_alarms: f64,
+    /// 25 values: the landmark divided into 5 by 5 equal parts, as it was taught, upright. Rows from its top, in each row
+    /// from its left: value 5 * row + column.
+    #[prost(enumeration = "PartAgreement", repeated, tag = "6")]
+    #[serde(with = "crate::json::part_agreement")]
+    pub agreement: ::prost::alloc::vec::Vec<i32>,
 }
 #[derive(::serde::Serialize, ::serde::Deserialize)]
 #[serde(default)]
@@ -212,6 +239,13 @@ pub struct QuadAnswer {
     /// Why no pose followed from a unique landmark: empty, no_intrinsics, no_size, degenerate.
     #[prost(string, tag = "13")]
     pub pose_refusal: ::prost::alloc::string::String,
+    /// Present where points decided.
+    #[prost(message, optional, tag = "14")]
+    pub points: ::core::option::Option<PointEvidence>,
+    /// The landmark whose points are there while a connected part of it shows something else: perhaps altered, or another
+    /// thing with the same parts. The verdict is AMBIGUOUS, and no pose follows. Empty unless in doubt for this reason.
+    #[prost(string, tag = "15")]
+    pub doubtful_landmark: ::prost::alloc::string::String,
 }
 #[derive(::serde::Serialize, ::serde::Deserialize)]
 #[serde(default)]
@@ -266,7 +300,8 @@ pub struct Answer {
     pub age_ms: f64,
     #[prost(message, repeated, tag = "12")]
     pub timings: ::prost::alloc::vec::Vec<StageTime>,
-    /// The capture time is more than 2 s from the server's clock.
+    /// The capture time is more than 2 s from the server's clock, or does not fit those of the robot's other messages: then
+    /// the answer holds for the image, and the frame has no influence on the fused pose.
     #[prost(bool, tag = "13")]
     pub clock_suspect: bool,
     /// Why recognised landmarks gave no robot pose: empty, no_mounting, landmark_not_placed, landmark_quarantined (found
@@ -344,6 +379,10 @@ pub struct RobotPose {
     /// Corrections by laser scans applied since the start.
     #[prost(uint64, tag = "7")]
     pub laser_corrections: u64,
+    /// From the capture of the newest odometry or fix that supports the pose to its publication, as far as the server can tell
+    /// from the robot's messages: without the shortest delay among them. Never above 2000: an older pose is not published.
+    #[prost(double, tag = "8")]
+    pub age_ms: f64,
 }
 /// map/{map}/changed
 #[derive(::serde::Serialize, ::serde::Deserialize)]
@@ -557,6 +596,42 @@ impl Verdict {
             "VERDICT_UNKNOWN" => Some(Self::Unknown),
             "VERDICT_UNIQUE" => Some(Self::Unique),
             "VERDICT_AMBIGUOUS" => Some(Self::Ambiguous),
+            _ => None,
+        }
+    }
+}
+/// What a part of a landmark says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]
+#[repr(i32)]
+pub enum PartAgreement {
+    Unspecified = 0,
+    /// Nothing: no points there, hidden by something plain, or outside of the image.
+    Silent = 1,
+    /// The image shows there what was taught.
+    Agrees = 2,
+    /// The image shows something else there.
+    Disagrees = 3,
+}
+impl PartAgreement {
+    /// String value of the enum field names used in the ProtoBuf definition.
+    ///
+    /// The values are not transformed in any way and thus are considered stable
+    /// (if the ProtoBuf definition does not change) and safe for programmatic use.
+    pub fn as_str_name(&self) -> &'static str {
+        match self {
+            Self::Unspecified => "PART_AGREEMENT_UNSPECIFIED",
+            Self::Silent => "PART_AGREEMENT_SILENT",
+            Self::Agrees => "PART_AGREEMENT_AGREES",
+            Self::Disagrees => "PART_AGREEMENT_DISAGREES",
+        }
+    }
+    /// Creates an enum from field names used in the ProtoBuf definition.
+    pub fn from_str_name(value: &str) -> ::core::option::Option<Self> {
+        match value {
+            "PART_AGREEMENT_UNSPECIFIED" => Some(Self::Unspecified),
+            "PART_AGREEMENT_SILENT" => Some(Self::Silent),
+            "PART_AGREEMENT_AGREES" => Some(Self::Agrees),
+            "PART_AGREEMENT_DISAGREES" => Some(Self::Disagrees),
             _ => None,
         }
     }

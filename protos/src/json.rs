@@ -1,7 +1,7 @@
 //! Enumerations of the wire as lower-case words in JSON (`"matched"`, `"three_sided"`), the way HTTP shows them.
 
 use serde::de::Error;
-use serde::{Deserialize, Deserializer, Serializer};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// One module per enumeration, for `#[serde(with = ...)]`; the prefix is what Protocol Buffers puts before a value.
 macro_rules! word {
@@ -36,10 +36,29 @@ macro_rules! word {
 word!(status, crate::v1::Status, "STATUS_", "Words of [`crate::v1::Status`].");
 word!(quad_kind, crate::v1::QuadKind, "QUAD_KIND_", "Words of [`crate::v1::QuadKind`].");
 word!(verdict, crate::v1::Verdict, "VERDICT_", "Words of [`crate::v1::Verdict`].");
+word!(part, crate::v1::PartAgreement, "PART_AGREEMENT_", "Words of [`crate::v1::PartAgreement`].");
+
+/// A list of words of [`crate::v1::PartAgreement`].
+pub mod part_agreement {
+    use super::{Deserialize, Deserializer, Serialize, Serializer, part};
+
+    #[derive(Serialize, Deserialize)]
+    struct Part(#[serde(with = "part")] i32);
+
+    /// Writes the words.
+    pub fn serialize<S: Serializer>(values: &[i32], to: S) -> Result<S::Ok, S::Error> {
+        to.collect_seq(values.iter().map(|value| Part(*value)))
+    }
+
+    /// Reads the words; refuses others.
+    pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<i32>, D::Error> {
+        Ok(Vec::<Part>::deserialize(from)?.into_iter().map(|part| part.0).collect())
+    }
+}
 
 #[cfg(test)]
 mod tests {
-    use crate::v1::{Answer, QuadAnswer, QuadKind, Status, Verdict};
+    use crate::v1::{Answer, PartAgreement, PointEvidence, QuadAnswer, QuadKind, Status, Verdict};
 
     #[test]
     fn an_answer_reads_and_comes_back() {
@@ -55,6 +74,25 @@ mod tests {
         assert!(text.contains(r#""status":"no_match""#), "{text}");
         assert!(text.contains(r#""kind":"three_sided""#), "{text}");
         assert_eq!(serde_json::from_str::<Answer>(&text).unwrap(), answer);
+    }
+
+    #[test]
+    fn parts_are_words() {
+        let agreement =
+            vec![PartAgreement::Silent.into(), PartAgreement::Disagrees.into(), PartAgreement::Agrees.into()];
+        let points = PointEvidence { inliers: 9, agreement, ..PointEvidence::default() };
+        let quad = QuadAnswer { points: Some(points), ..QuadAnswer::default() };
+        let text = serde_json::to_string(&quad).unwrap();
+        assert!(text.contains(r#""agreement":["silent","disagrees","agrees"]"#), "{text}");
+        assert_eq!(serde_json::from_str::<QuadAnswer>(&text).unwrap(), quad);
+        assert!(serde_json::from_str::<PointEvidence>(r#"{"agreement":["perhaps"]}"#).is_err());
+    }
+
+    /// What a server sends that knows nothing of points.
+    #[test]
+    fn a_quad_without_points_reads() {
+        let quad: QuadAnswer = serde_json::from_str(r#"{"verdict":"unique","landmark":"door-3"}"#).unwrap();
+        assert_eq!((quad.points, quad.doubtful_landmark.as_str()), (None, ""));
     }
 
     #[test]

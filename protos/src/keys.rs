@@ -96,12 +96,15 @@ pub enum Key {
     Scan(Name),
     /// `robot/{robot}/pose`: server to robot, `RobotPose`.
     Pose(Name),
-    /// `robot/{robot}/alive`: liveliness token of a robot.
-    Alive(Name),
+    /// `robot/{robot}/alive/{epoch}`: liveliness token of a start of a robot's software; the epoch in decimal digits. The
+    /// older `robot/{robot}/alive` names no epoch.
+    Alive(Name, Option<u64>),
     /// `robot/{robot}/rpc/gaze`: a query of the robot, `GazeRequest` in, `GazeAdvice` out.
     Gaze(Name),
     /// `map/{map}/changed`: server to all, `MapChanged`.
     MapChanged(Name),
+    /// `map/{map}/version`: a query of anyone, `MapChanged` out with the present version.
+    MapVersion(Name),
 }
 
 /// Why a key is none of ours.
@@ -144,9 +147,11 @@ impl Keys {
             Key::Odometry(robot) => format!("{p}robot/{robot}/odometry"),
             Key::Scan(robot) => format!("{p}robot/{robot}/scan"),
             Key::Pose(robot) => format!("{p}robot/{robot}/pose"),
-            Key::Alive(robot) => format!("{p}robot/{robot}/alive"),
+            Key::Alive(robot, None) => format!("{p}robot/{robot}/alive"),
+            Key::Alive(robot, Some(epoch)) => format!("{p}robot/{robot}/alive/{epoch}"),
             Key::Gaze(robot) => format!("{p}robot/{robot}/rpc/gaze"),
             Key::MapChanged(map) => format!("{p}map/{map}/changed"),
+            Key::MapVersion(map) => format!("{p}map/{map}/version"),
         }
     }
 
@@ -170,9 +175,14 @@ impl Keys {
         format!("{}robot/*/rpc/gaze", self.prefix)
     }
 
+    /// The versions of all maps.
+    pub fn all_map_versions(&self) -> String {
+        format!("{}map/*/version", self.prefix)
+    }
+
     /// All liveliness tokens.
     pub fn all_alive(&self) -> String {
-        format!("{}robot/*/alive", self.prefix)
+        format!("{}robot/*/alive/**", self.prefix)
     }
 
     /// All answers for one robot.
@@ -200,11 +210,21 @@ impl Keys {
             [Some("robot"), Some(r), Some("odometry"), None, _] => Ok(Key::Odometry(robot(r)?)),
             [Some("robot"), Some(r), Some("scan"), None, _] => Ok(Key::Scan(robot(r)?)),
             [Some("robot"), Some(r), Some("pose"), None, _] => Ok(Key::Pose(robot(r)?)),
-            [Some("robot"), Some(r), Some("alive"), None, _] => Ok(Key::Alive(robot(r)?)),
+            [Some("robot"), Some(r), Some("alive"), None, _] => Ok(Key::Alive(robot(r)?, None)),
+            [Some("robot"), Some(r), Some("alive"), Some(e), None] => {
+                Ok(Key::Alive(robot(r)?, Some(epoch(e)?)))
+            }
             [Some("map"), Some(m), Some("changed"), None, _] => Ok(Key::MapChanged(named("map", m)?)),
+            [Some("map"), Some(m), Some("version"), None, _] => Ok(Key::MapVersion(named("map", m)?)),
             _ => Err(KeyError::Shape),
         }
     }
+}
+
+/// An epoch as [`Keys::build`] writes it: no sign, no leading zero.
+fn epoch(text: &str) -> Result<u64, KeyError> {
+    let epoch: u64 = text.parse().map_err(|_not_a_number| KeyError::Shape)?;
+    if epoch.to_string() == text { Ok(epoch) } else { Err(KeyError::Shape) }
 }
 
 #[cfg(test)]
@@ -240,6 +260,16 @@ mod tests {
     }
 
     #[test]
+    fn epochs_are_plain_numbers() {
+        let parsed = |epoch: &str| keys().parse(&format!("waymark/1/site-1/robot/r1/alive/{epoch}"));
+        let r1 = Name::new("r1").unwrap();
+        assert_eq!(parsed("18446744073709551615"), Ok(Key::Alive(r1, Some(u64::MAX))));
+        for text in ["", "x", "-1", "+1", "01", "18446744073709551616", "1/2"] {
+            assert_eq!(parsed(text), Err(KeyError::Shape), "{text}");
+        }
+    }
+
+    #[test]
     fn foreign_and_crooked_keys_are_refused() {
         let k = keys();
         assert!(matches!(k.parse("waymark/2/site-1/robot/r1/scan"), Err(KeyError::Prefix(_))));
@@ -258,7 +288,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_is_built_parses_back(a in names(), b in names(), fleet in names()) {
+        fn what_is_built_parses_back(a in names(), b in names(), fleet in names(), epoch: u64) {
             let keys = Keys::new(&fleet);
             for key in [
                 Key::Frame(a.clone(), b.clone()),
@@ -266,8 +296,10 @@ mod tests {
                 Key::Odometry(a.clone()),
                 Key::Scan(a.clone()),
                 Key::Pose(a.clone()),
-                Key::Alive(a.clone()),
+                Key::Alive(a.clone(), None),
+                Key::Alive(a.clone(), Some(epoch)),
                 Key::MapChanged(a.clone()),
+                Key::MapVersion(a.clone()),
                 Key::Gaze(a.clone()),
             ] {
                 prop_assert_eq!(keys.parse(&keys.build(&key)), Ok(key));
@@ -275,7 +307,7 @@ mod tests {
         }
 
         #[test]
-        fn what_parses_was_built(text in "waymark/1/site-1/(robot|map)/[a-zA-Z*/]{0,20}(/frame/|/scan|/changed|/)[a-z*]{0,3}") {
+        fn what_parses_was_built(text in "waymark/1/site-1/(robot|map)/[a-zA-Z*/]{0,20}(/frame/|/scan|/changed|/version|/)[a-z*]{0,3}") {
             if let Ok(key) = keys().parse(&text) {
                 prop_assert_eq!(keys().build(&key), text);
             }

@@ -30,6 +30,12 @@ pub enum Code {
     UnknownMap,
     /// Not newer than the last message of this robot and camera.
     NotNewer,
+    /// Another start of the robot's software (epoch) is live.
+    EpochConflict,
+    /// The capture time runs ahead of the time that has passed since the robot's messages before.
+    ClockAhead,
+    /// The capture time is too far behind the robot's messages before.
+    ClockBehind,
     /// The deadline passed before work began.
     Expired,
     /// More cameras or robots than the server serves.
@@ -40,7 +46,7 @@ pub enum Code {
 
 impl Code {
     /// Every code.
-    pub const ALL: [Code; 15] = [
+    pub const ALL: [Code; 18] = [
         Code::BadMessage,
         Code::BadName,
         Code::Missing,
@@ -53,6 +59,9 @@ impl Code {
         Code::UnknownRobot,
         Code::UnknownMap,
         Code::NotNewer,
+        Code::EpochConflict,
+        Code::ClockAhead,
+        Code::ClockBehind,
         Code::Expired,
         Code::TooMany,
         Code::Internal,
@@ -73,6 +82,9 @@ impl Code {
             Code::UnknownRobot => "unknown_robot",
             Code::UnknownMap => "unknown_map",
             Code::NotNewer => "not_newer",
+            Code::EpochConflict => "epoch_conflict",
+            Code::ClockAhead => "clock_ahead",
+            Code::ClockBehind => "clock_behind",
             Code::Expired => "expired",
             Code::TooMany => "too_many",
             Code::Internal => "internal",

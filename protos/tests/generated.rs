@@ -4,7 +4,7 @@
 use std::{fs, path::Path};
 
 /// Messages that also travel as JSON over HTTP.
-const JSON: [&str; 16] = [
+const JSON: [&str; 17] = [
     "Hypothesis",
     "Pose3",
     "Pose2",
@@ -12,6 +12,7 @@ const JSON: [&str; 16] = [
     "Rejection",
     "Point",
     "Candidate",
+    "PointEvidence",
     "LandmarkPose",
     "QuadAnswer",
     "StageTime",
@@ -35,9 +36,12 @@ fn committed_rust_matches_the_proto() {
         config.type_attribute(&path, "#[derive(::serde::Serialize, ::serde::Deserialize)]");
         config.type_attribute(&path, "#[serde(default)]");
     }
-    for (field, module) in
-        [("Answer.status", "status"), ("QuadAnswer.kind", "quad_kind"), ("QuadAnswer.verdict", "verdict")]
-    {
+    for (field, module) in [
+        ("Answer.status", "status"),
+        ("QuadAnswer.kind", "quad_kind"),
+        ("QuadAnswer.verdict", "verdict"),
+        ("PointEvidence.agreement", "part_agreement"),
+    ] {
         let attribute = format!("#[serde(with = \"crate::json::{module}\")]");
         config.field_attribute(format!(".waymark.v1.{field}"), attribute);
     }

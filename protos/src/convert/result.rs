@@ -5,7 +5,8 @@ use crate::v1;
 use vision::{
     detect::quads::{Corners, QuadKind},
     localise::pose::{LandmarkPose, PoseSolution},
-    recognise::{Candidate, LandmarkId, Recognition, Refusal, Verdict},
+    points::{agreement::Part, verify::PointEvidence},
+    recognise::{Candidate, LandmarkId, Recognition, Refusal, Verdict, log10_false_alarms},
 };
 
 /// Four corners, TL, TR, BR, BL.
@@ -55,6 +56,8 @@ pub fn refusal(refusal: Refusal) -> &'static str {
         Refusal::Contradiction => "contradiction",
         Refusal::Content => "content",
         Refusal::Margin => "margin",
+        Refusal::Points => "points",
+        Refusal::Disagreement => "disagreement",
     }
 }
 
@@ -68,6 +71,33 @@ pub fn fill_verdict(quad: &mut v1::QuadAnswer, v: &Verdict, name: impl Fn(Landma
     quad.entropy_m = v.entropy_m;
     quad.entropy_norm = v.entropy_norm;
     quad.confidence = v.confidence;
+    quad.points = v.points.as_deref().map(|evidence| points(evidence, v.landmarks));
+    quad.doubtful_landmark = doubtful(v).map(name).unwrap_or_default();
+}
+
+/// What points say of the first candidate, among `landmarks`.
+pub fn points(evidence: &PointEvidence, landmarks: usize) -> v1::PointEvidence {
+    let part = |part: &Part| match part {
+        Part::Silent => v1::PartAgreement::Silent,
+        Part::Agrees => v1::PartAgreement::Agrees,
+        Part::Disagrees => v1::PartAgreement::Disagrees,
+    };
+    v1::PointEvidence {
+        matches: evidence.matches as u32,
+        inliers: evidence.inliers as u32,
+        checked: evidence.checked as u32,
+        agreeing: evidence.agreeing as u32,
+        // JSON has no infinity.
+        log10_false_alarms: log10_false_alarms(evidence, landmarks).max(f64::MIN),
+        agreement: evidence.agreement.0.as_flattened().iter().map(|p| part(p).into()).collect(),
+    }
+}
+
+/// The landmark that is in doubt because a part of it shows something else.
+fn doubtful(v: &Verdict) -> Option<LandmarkId> {
+    let best = v.candidates.first()?;
+    let named = v.recognition == Recognition::Ambiguous(best.landmark);
+    (named && best.refusal == Some(Refusal::Disagreement)).then_some(best.landmark)
 }
 
 /// Best and second pose, and whether they can be told apart.
@@ -93,6 +123,8 @@ fn finite(value: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::Matrix2;
+    use vision::points::agreement::Agreement;
 
     #[test]
     fn an_infinite_distance_stays_writable() {
@@ -116,9 +148,8 @@ mod tests {
         assert!(json["distance"].is_number() && json["ratio"].is_number());
     }
 
-    #[test]
-    fn only_a_unique_verdict_names_a_landmark() {
-        let mut v = Verdict {
+    fn ambiguous() -> Verdict {
+        Verdict {
             recognition: Recognition::Ambiguous(LandmarkId(1)),
             candidates: vec![],
             entropy_m: 1.0,
@@ -128,7 +159,83 @@ mod tests {
             border: 0,
             aligned_px: None,
             landmarks: 2,
+            points: None,
+        }
+    }
+
+    fn evidence() -> PointEvidence {
+        let mut agreement = Agreement::default();
+        (agreement.0[0][0], agreement.0[1][0], agreement.0[4][3]) =
+            (Part::Agrees, Part::Disagrees, Part::Agrees);
+        PointEvidence {
+            matches: 30,
+            inliers: 21,
+            checked: 12,
+            agreeing: 9,
+            log10_nfa: -20.0,
+            turned: 0,
+            corners_px: Corners::try_from([[0.0, 0.0], [9.0, 0.0], [9.0, 9.0], [0.0, 9.0]]).unwrap(),
+            corner_covariance_px2: [Matrix2::identity(); 4],
+            agreement,
+        }
+    }
+
+    /// Rows from the top, in each row from the left; false alarms among all landmarks of the map.
+    #[test]
+    fn points_travel_with_their_table() {
+        let wire = points(&evidence(), 100);
+        assert_eq!((wire.matches, wire.inliers, wire.checked, wire.agreeing), (30, 21, 12, 9));
+        // Four turns (0.6) and 100 landmarks (2).
+        assert!((wire.log10_false_alarms + 17.4).abs() < 1e-9, "{}", wire.log10_false_alarms);
+        let said: Vec<_> =
+            wire.agreement().enumerate().filter(|(_, p)| *p != v1::PartAgreement::Silent).collect();
+        assert_eq!(wire.agreement.len(), 25);
+        assert_eq!(
+            said,
+            [
+                (0, v1::PartAgreement::Agrees),
+                (5, v1::PartAgreement::Disagrees),
+                (23, v1::PartAgreement::Agrees)
+            ]
+        );
+        let never = PointEvidence { log10_nfa: f64::NEG_INFINITY, ..evidence() };
+        assert!(serde_json::to_value(points(&never, 1)).unwrap()["log10_false_alarms"].is_number());
+    }
+
+    /// It is named, but not as the landmark that was recognised: who knows nothing of doubt reads "ambiguous".
+    #[test]
+    fn a_doubtful_landmark_is_named_apart() {
+        let refused = |refusal| Candidate {
+            landmark: LandmarkId(1),
+            correlation: 0.2,
+            hausdorff: 1.0,
+            likeness: None,
+            distance: 0.3,
+            tau: 1.0,
+            ratio: 0.3,
+            probability: 1.0,
+            refusal: Some(refusal),
         };
+        let filled = |refusal| {
+            let points = Some(Box::new(evidence()));
+            let v = Verdict { candidates: vec![refused(refusal)], points, ..ambiguous() };
+            let mut quad = v1::QuadAnswer::default();
+            fill_verdict(&mut quad, &v, |_| "door".into());
+            quad
+        };
+        let quad = filled(Refusal::Disagreement);
+        assert_eq!((quad.verdict(), quad.landmark.as_str()), (v1::Verdict::Ambiguous, ""));
+        assert_eq!(
+            (quad.doubtful_landmark.as_str(), quad.candidates[0].refusal.as_str()),
+            ("door", "disagreement")
+        );
+        assert_eq!(quad.points.map(|p| p.inliers), Some(21));
+        assert_eq!(filled(Refusal::Margin).doubtful_landmark, "");
+    }
+
+    #[test]
+    fn only_a_unique_verdict_names_a_landmark() {
+        let mut v = ambiguous();
         let mut quad = v1::QuadAnswer::default();
         fill_verdict(&mut quad, &v, |_| "door".into());
         assert_eq!((quad.verdict(), quad.landmark.as_str()), (v1::Verdict::Ambiguous, ""));
