@@ -6,6 +6,8 @@ import { drawModalities, loadModalities } from "/modalities.js";
 
 const API = "/api/v1";
 const TRACK_POINTS = 4000; // per robot and kind: the oldest are forgotten
+// A fused pose that is older is no pose.
+const MAX_POSE_AGE_S = 2;
 const CHI2_2_95 = 5.991; // 95 % of a two-dimensional Gaussian
 
 const byId = (id) => document.getElementById(id);
@@ -44,6 +46,7 @@ const heard = {
     const robot = robotOf(e.robot);
     robot.covariance = e.covariance;
     robot.corrections = e.corrections;
+    robot.posed = performance.now() - e.age_ms;
     robot.hypotheses = [];
   },
   odometry(e) { extend(e.robot, "odometry", e.pose); },
@@ -99,7 +102,8 @@ async function showFrame(key, answer) {
   } finally { frameBusy = false; }
 }
 
-const COLOURS = { unique: "#4ade80", ambiguous: "#fbbf24", unknown: "#94a3b8" };
+const COLOURS = { unique: "#4ade80", ambiguous: "#fbbf24", doubtful: "#fb923c", unknown: "#94a3b8" };
+const colourOf = (quad) => COLOURS[quad.doubtful_landmark ? "doubtful" : quad.verdict] ?? COLOURS.unknown;
 
 function drawFrame(picture, answer) {
   const canvas = byId("frame");
@@ -111,12 +115,12 @@ function drawFrame(picture, answer) {
   c.lineWidth = 2 * unit;
   c.font = `${14 * unit}px system-ui`;
   answer.quads.forEach((quad, index) => {
-    c.strokeStyle = COLOURS[quad.verdict] ?? COLOURS.unknown;
+    c.strokeStyle = colourOf(quad);
     c.beginPath();
     quad.corners.forEach((p, i) => (i ? c.lineTo(p.u_px + 0.5, p.v_px + 0.5) : c.moveTo(p.u_px + 0.5, p.v_px + 0.5)));
     c.closePath();
     c.stroke();
-    const label = quad.landmark || `${index + 1}`;
+    const label = quad.landmark || (quad.doubtful_landmark ? `${quad.doubtful_landmark}?` : `${index + 1}`);
     const { u_px, v_px } = quad.corners[0];
     const y = Math.max(v_px - 4 * unit, 14 * unit);
     c.fillStyle = "rgba(0,0,0,.65)";
@@ -128,17 +132,42 @@ function drawFrame(picture, answer) {
 
 function row(cells) {
   const tr = document.createElement("tr");
-  for (const cell of cells) tr.insertCell().textContent = cell;
+  for (const cell of cells) tr.insertCell().append(cell ?? "");
   return tr;
+}
+
+const PARTS = { agrees: "agrees", disagrees: "shows something else", silent: "says nothing" };
+
+// What the 25 parts of the landmark say, upright as it was taught, with the words beside.
+function partsOf(points) {
+  if (!points) return "";
+  const count = (word) => points.agreement.filter((part) => part === word).length;
+  const words = `${points.inliers} of ${points.matches} matches agree, 1e${Math.round(points.log10_false_alarms)} false alarms; ` +
+    `parts: ${count("agrees")} agree, ${count("disagrees")} show something else, ${count("silent")} say nothing`;
+  const table = document.createElement("span");
+  table.className = "parts";
+  table.setAttribute("role", "img");
+  table.setAttribute("aria-label", words);
+  points.agreement.forEach((part, i) => {
+    const cell = document.createElement("i");
+    cell.className = part;
+    cell.title = `row ${Math.floor(i / 5) + 1}, column ${(i % 5) + 1}: ${PARTS[part] ?? part}`;
+    table.append(cell);
+  });
+  const both = document.createElement("span");
+  both.className = "points";
+  both.append(table, words);
+  return both;
 }
 
 function listQuads(answer) {
   byId("quads").replaceChildren(...answer.quads.map((quad, index) => {
     const [first, second] = quad.candidates ?? [];
-    const name = quad.landmark || (quad.verdict === "ambiguous" && first ? `${first.landmark}?` : quad.verdict || quad.kind);
+    const doubtful = quad.doubtful_landmark && `${quad.doubtful_landmark}: doubtful, a part of it shows something else`;
+    const name = quad.landmark || doubtful || (quad.verdict === "ambiguous" && first ? `${first.landmark}?` : quad.verdict || quad.kind);
     const near = (candidate) => (candidate ? `${candidate.landmark} ${candidate.ratio.toFixed(2)}` : "");
     return row([index + 1, name, first ? first.ratio.toFixed(2) : "", quad.landmark ? quad.confidence.toFixed(2) : "",
-      near(quad.landmark ? second : first)]);
+      near(quad.landmark ? second : first), partsOf(quad.points)]);
   }));
 }
 
@@ -345,7 +374,10 @@ function listRobots() {
   const rows = [...state.robots].sort(([a], [b]) => a.localeCompare(b)).map(([name, robot]) => {
     const pose = robot.tracks.pose.at(-1);
     const sigma = robot.covariance ? `${Math.sqrt(robot.covariance[0] + robot.covariance[4]).toFixed(2)} m` : "";
-    return row([name, pose ? `${pose.x_m.toFixed(2)}, ${pose.y_m.toFixed(2)} m, ${(pose.theta_rad * 180 / Math.PI).toFixed(0)}°` : positionText(robot),
+    // The server publishes no pose that is older: what is shown then is where the robot was.
+    const age_s = robot.posed === undefined ? Infinity : (performance.now() - robot.posed) / 1000;
+    const old = pose && age_s > MAX_POSE_AGE_S ? (Number.isFinite(age_s) ? `, ${age_s.toFixed(0)} s ago` : ", formerly") : "";
+    return row([name, pose ? `${pose.x_m.toFixed(2)}, ${pose.y_m.toFixed(2)} m, ${(pose.theta_rad * 180 / Math.PI).toFixed(0)}°${old}` : positionText(robot),
       sigma, robot.frames, robot.recognised, robot.corrections, errorOf(robot, "pose"), errorOf(robot, "odometry")]);
   });
   byId("robots").replaceChildren(...rows);

@@ -272,6 +272,46 @@ pub struct Robot {
     pub name: String,
     /// The map it drives in.
     pub map: Option<String>,
+    /// Its software is connected, or sent a message within the last 3 s.
+    #[serde(default)]
+    pub alive: bool,
+    /// The start of its software that speaks for it.
+    #[serde(default)]
+    pub epoch: Option<u64>,
+    /// A second program that uses the robot's name and is refused.
+    #[serde(default)]
+    pub conflict: Option<RobotConflict>,
+    /// Its fused pose, if that is known.
+    #[serde(default)]
+    pub pose: Option<RobotPose>,
+}
+
+/// A second program under the name of a robot.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub struct RobotConflict {
+    /// Its epoch.
+    pub epoch: u64,
+    /// Messages of it that were refused.
+    pub refused: u64,
+    /// Milliseconds since the last of them.
+    pub last_ms: u64,
+}
+
+/// The fused pose of a robot on its map.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub struct RobotPose {
+    /// Metres.
+    pub x_m: f64,
+    /// Metres.
+    pub y_m: f64,
+    /// Heading.
+    pub theta_rad: f64,
+    /// Over (x, y, theta), row-major.
+    pub covariance: [f64; 9],
+    /// Since the capture of what supports it.
+    pub age_ms: f64,
 }
 
 /// An error of the server (RFC 9457).

@@ -307,6 +307,11 @@ impl MapClient {
         self.send(self.request(Method::PUT, &format!("/robots/{robot}")).json(&json!({ "map": map }))).await
     }
 
+    /// One robot: whether it is connected, its pose and how old that is, and whether a second program uses its name.
+    pub async fn robot(&self, name: &str) -> Result<Robot, ClientError> {
+        self.send(self.request(Method::GET, &format!("/robots/{name}"))).await
+    }
+
     /// All robots.
     pub async fn robots(&self) -> Result<Vec<Robot>, ClientError> {
         self.all("/robots").await

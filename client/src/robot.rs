@@ -45,7 +45,8 @@ pub struct RobotOptions {
     /// How long to look for the server.
     pub timeout: Duration,
     /// The epoch of a session before, for a program that was started again while odometry went on; drawn at random if
-    /// absent. Only for a server that was started again too: to one that went on, numbers that begin anew are stale.
+    /// absent. Only for a server that was started again too: to one that went on, numbers that begin anew are stale. Two
+    /// programs must not use one robot's name at a time: the later one is refused with `epoch_conflict`.
     pub epoch: Option<u64>,
 }
 
@@ -106,10 +107,14 @@ impl RobotClient {
                 drop(answers.send(CameraAnswer { camera, answer }));
             }
         };
+        let epoch = options.epoch.unwrap_or_else(new_epoch);
         let to_poses = {
             let poses = poses.clone();
             move |sample: Sample| {
-                if let Ok(pose) = v1::RobotPose::decode(&*sample.payload().to_bytes()) {
+                // The pose of another epoch is that of another program under this robot's name.
+                if let Ok(pose) = v1::RobotPose::decode(&*sample.payload().to_bytes())
+                    && pose.epoch == epoch
+                {
                     drop(poses.send(pose));
                 }
             }
@@ -127,7 +132,7 @@ impl RobotClient {
                 .await
                 .map_err(subscribe)?,
         ];
-        let alive = session.liveliness().declare_token(keys.build(&Key::Alive(robot.clone())));
+        let alive = session.liveliness().declare_token(keys.build(&Key::Alive(robot.clone(), Some(epoch))));
         let alive = alive.await.map_err(fault("show the robot alive"))?;
         Ok(Self {
             session,
@@ -135,7 +140,7 @@ impl RobotClient {
             robot,
             endpoint: options.endpoint.clone(),
             delivery: options.delivery,
-            epoch: options.epoch.unwrap_or_else(new_epoch),
+            epoch,
             next_seq: AtomicU64::new(1),
             answers,
             poses,
@@ -195,18 +200,28 @@ impl RobotClient {
         self.answers.subscribe()
     }
 
-    /// Every fused pose from now on.
+    /// Every fused pose of this epoch from now on; [`v1::RobotPose::age_ms`] says how old it was when it was sent. The server
+    /// sends none that is more than 2 s old, so that silence means that the pose is unknown.
     pub fn poses(&self) -> broadcast::Receiver<v1::RobotPose> {
         self.poses.subscribe()
     }
 
-    /// Sends odometry.
+    /// Sends odometry of this moment.
     pub async fn publish_odometry(&self, odom_from_robot: &Pose2) -> Result<u64, ClientError> {
+        self.publish_odometry_at(crate::capture::now_ns(), odom_from_robot).await
+    }
+
+    /// Sends odometry that was read at `captured_ns` of the robot's clock, ns; the same clock as in frames and scans.
+    pub async fn publish_odometry_at(
+        &self,
+        captured_ns: i64,
+        odom_from_robot: &Pose2,
+    ) -> Result<u64, ClientError> {
         let seq = self.next_seq.fetch_add(1, Ordering::Relaxed);
         let message = v1::Odometry {
             epoch: self.epoch,
             seq,
-            captured_ns: crate::capture::now_ns(),
+            captured_ns,
             odom_from_robot: Some(pose2_wire(odom_from_robot)),
         };
         self.put(&Key::Odometry(self.robot.clone()), message.encode_to_vec(), Priority::Data).await?;
@@ -242,6 +257,20 @@ impl RobotClient {
             .map_err(|e| ClientError::Transport { action: "hear where to look", detail: e.to_string() })?;
         v1::GazeAdvice::decode(&*sample.payload().to_bytes())
             .map_err(|e| ClientError::Transport { action: "read where to look", detail: e.to_string() })
+    }
+
+    /// The present version of a map; `None` if the server has no such map. For a program that keeps something derived from a
+    /// map: `MapChanged` events may be lost on a full link, this cannot.
+    pub async fn map_version(&self, map: &str, wait: Duration) -> Result<Option<u64>, ClientError> {
+        let key = self.keys.build(&Key::MapVersion(name("map", map)?));
+        let replies = self.session.get(key).timeout(wait).await.map_err(fault("ask for a map's version"))?;
+        let Ok(reply) = replies.recv_async().await else { return Ok(None) };
+        let hear = "hear a map's version";
+        let sample =
+            reply.result().map_err(|e| ClientError::Transport { action: hear, detail: e.to_string() })?;
+        v1::MapChanged::decode(&*sample.payload().to_bytes())
+            .map(|message| Some(message.version))
+            .map_err(|e| ClientError::Transport { action: hear, detail: e.to_string() })
     }
 
     /// Ends the session in order.

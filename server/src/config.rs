@@ -123,6 +123,14 @@ pub struct Limits {
     pub header_timeout_s: u64,
     /// Seconds until a request must be answered; event streams are not bound by it.
     pub request_timeout_s: u64,
+    /// Seconds for which a client may leave an answer unread before its connection is closed; event streams that have
+    /// nothing to send are not bound by it.
+    pub write_timeout_s: u64,
+    /// Requests at a time with a body of more than 64 KiB, or of unknown length: what their bodies take in memory is
+    /// bounded by this times the largest body.
+    pub uploads: usize,
+    /// Seconds that such a request waits for its place before it is refused.
+    pub upload_wait_s: u64,
     /// Most items on a page of a list.
     pub page: usize,
     /// Commands waiting for the writer.
@@ -152,6 +160,9 @@ impl Default for Limits {
             streams: 64,
             header_timeout_s: 5,
             request_timeout_s: 30,
+            write_timeout_s: 20,
+            uploads: 16,
+            upload_wait_s: 5,
             page: 500,
             write_queue: 256,
             jobs: 64,
@@ -162,7 +173,7 @@ impl Default for Limits {
 
 impl Limits {
     /// Name and value of every bound that must not be 0.
-    fn counts(&self) -> [(&'static str, usize); 18] {
+    fn counts(&self) -> [(&'static str, usize); 21] {
         [
             ("limits.frame_bytes", self.frame_bytes),
             ("limits.frame_pixels", self.frame_pixels),
@@ -179,6 +190,9 @@ impl Limits {
             ("limits.connections", self.connections),
             ("limits.header_timeout_s", self.header_timeout_s as usize),
             ("limits.request_timeout_s", self.request_timeout_s as usize),
+            ("limits.write_timeout_s", self.write_timeout_s as usize),
+            ("limits.uploads", self.uploads),
+            ("limits.upload_wait_s", self.upload_wait_s as usize),
             ("limits.page", self.page),
             ("limits.write_queue", self.write_queue),
             ("limits.jobs", self.jobs),

@@ -9,6 +9,7 @@ pub mod bus;
 mod store;
 mod jobs;
 pub mod gather;
+pub mod vitals;
 mod calibrating;
 mod http;
 mod server;

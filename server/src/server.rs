@@ -17,6 +17,7 @@ use crate::{
     http::{self, App, Workshop},
     jobs::Jobs,
     store::{OpenError, Store, WriterTask, landmarks},
+    vitals::{Failure, Pulse, Vitals},
 };
 use std::{net::SocketAddr, sync::Arc, time::Duration};
 use tokio::{
@@ -77,7 +78,7 @@ pub struct RunningServer {
     /// Frames that wait, and the counters of all frames.
     pub slots: Arc<Slots<FrameJob>>,
     stop: watch::Sender<bool>,
-    store_failed: watch::Receiver<bool>,
+    vitals: Arc<Vitals>,
     tasks: Tasks,
 }
 
@@ -91,6 +92,7 @@ struct Tasks {
     findings: JoinHandle<()>,
     gather: JoinHandle<()>,
     writer: WriterTask,
+    watch: JoinHandle<()>,
 }
 
 impl Server {
@@ -102,37 +104,54 @@ impl Server {
         let listener = TcpListener::bind(config.http_addr).await.map_err(at)?;
         let http_addr = listener.local_addr().map_err(at)?;
         let (stop, stopping) = watch::channel(false);
-        let (snapshots, store_failed) = (store.snapshots().clone(), store.failed());
+        let (snapshots, vitals) = (store.snapshots().clone(), store.vitals().clone());
         let (jobs, jobs_task) = Jobs::start(store.clone(), config.clone(), stopping.clone())
             .await
             .map_err(|e| StartError::Store(e.to_string()))?;
+        if config.params.recognise.verdict.points {
+            jobs.renew().await.map_err(|e| StartError::Store(e.to_string()))?;
+        }
         let (findings, found) = findings();
         let (hook, offers) = gather::hook();
         let (gatherer, gather) = Gatherer::start(store.clone(), &config, &hook, offers)
             .await
             .map_err(|e| StartError::Store(e.to_string()))?;
-        let engine = engine(&config, snapshots.clone(), findings, hook);
+        let engine = engine(&config, snapshots.clone(), vitals.clone(), (findings, hook));
         let stands = |map: &protos::Name, robot: &protos::Name| {
             snapshots.robot_map(robot.as_str()).is_some_and(|on| on == map.as_str())
         };
+        engine.motion.mappings().count_in(vitals.panics().clone());
         engine.motion.mappings().keep_in(config.data.join("mapping"), stands);
-        let findings = tokio::spawn(keep_findings(store.clone(), found));
+        let pulse = vitals.begin("the task that keeps findings");
+        let findings = tokio::spawn(keep_findings(store.clone(), found, pulse));
         let (live, slots) = (engine.live.clone(), engine.slots.clone());
         let bus = Bus::open(&config, receivers(&config, &engine)).await?;
+        let outbox = bus.outbox().clone();
+        vitals.probe("the outbox", move || outbox.is_running());
         let workers = Workers::start(&engine, config.workers, &Arc::new(bus.outbox().clone()))
             .map_err(StartError::Threads)?;
         let zenoh_endpoint = bus.endpoint().to_owned();
         let workshop = Workshop { jobs, gatherer };
         let app = App::new(config.clone(), store, workshop, &engine, stopping.clone());
-        let http =
-            tokio::spawn(http::listen::serve(listener, http::router(app), config.limits.clone(), stopping));
-        let tasks = Tasks { workers, bus, http, jobs: jobs_task, findings, gather, writer };
-        Ok(RunningServer { http_addr, zenoh_endpoint, snapshots, live, slots, stop, store_failed, tasks })
+        let pulse = vitals.begin("the HTTP listener");
+        let router = http::router(app);
+        let http = tokio::spawn(async move {
+            http::listen::serve(listener, router, config.limits.clone(), stopping).await;
+            drop(pulse);
+        });
+        let watch = tokio::spawn(vitals.clone().watch());
+        let tasks = Tasks { workers, bus, http, jobs: jobs_task, findings, gather, writer, watch };
+        Ok(RunningServer { http_addr, zenoh_endpoint, snapshots, live, slots, stop, vitals, tasks })
     }
 }
 
 /// Everything between frames and answers, for one set of settings.
-fn engine(config: &Config, snapshots: Arc<Snapshots>, findings: Findings, gather: Hook) -> Engine {
+fn engine(
+    config: &Config,
+    snapshots: Arc<Snapshots>,
+    vitals: Arc<Vitals>,
+    (findings, gather): (Findings, Hook),
+) -> Engine {
     let live = Arc::new(LiveHub::default());
     Engine {
         slots: Arc::new(Slots::new(config.limits.cameras)),
@@ -140,7 +159,7 @@ fn engine(config: &Config, snapshots: Arc<Snapshots>, findings: Findings, gather
         snapshots,
         live,
         limits: ImageLimits { bytes: config.limits.frame_bytes, pixels: config.limits.frame_pixels },
-        panics: Arc::default(),
+        vitals,
         findings,
         searches: Arc::default(),
         gather,
@@ -148,7 +167,7 @@ fn engine(config: &Config, snapshots: Arc<Snapshots>, findings: Findings, gather
 }
 
 /// Writes down what robots find out about landmarks, until no worker is left to find anything.
-async fn keep_findings(store: Store, mut found: Receiver<Found>) {
+async fn keep_findings(store: Store, mut found: Receiver<Found>, pulse: Pulse) {
     while let Some(Found { map, name, standing, finding, .. }) = found.recv().await {
         let kept = store.write(move |tx| {
             Box::pin(async move {
@@ -159,12 +178,14 @@ async fn keep_findings(store: Store, mut found: Receiver<Found>) {
             tracing::error!(%error, "a finding about a landmark was not kept");
         }
     }
+    drop(pulse);
 }
 
 fn receivers(config: &Config, engine: &Engine) -> Receivers {
     let intake = Intake {
         slots: engine.slots.clone(),
         snapshots: engine.snapshots.clone(),
+        motion: engine.motion.clone(),
         frame_bytes: config.limits.frame_bytes,
         deadline: Duration::from_millis(u64::from(config.limits.frame_deadline_ms)),
     };
@@ -173,23 +194,27 @@ fn receivers(config: &Config, engine: &Engine) -> Receivers {
         motion: engine.motion.clone(),
         live: engine.live.clone(),
         gazes: Arc::default(),
+        vitals: engine.vitals.clone(),
     }
 }
 
 impl RunningServer {
-    /// Returns when the store has failed and nothing can be written any more: stop, and start again from disk.
-    pub async fn failed(&self) {
-        let mut failed = self.store_failed.clone();
-        if failed.wait_for(|failed| *failed).await.is_err() {
-            // The writer is gone without having said that it failed: it is being stopped.
-            std::future::pending::<()>().await;
-        }
+    /// Which parts run.
+    pub fn vitals(&self) -> &Arc<Vitals> {
+        &self.vitals
+    }
+
+    /// Returns when a part of the server has ended untold, with its name and the reason: stop, and start again from disk.
+    pub async fn failed(&self) -> Failure {
+        self.vitals.failed().await
     }
 
     /// Answers what is in work, then closes everything.
     pub async fn stop(self) {
+        self.vitals.stop();
         self.stop.send_replace(true);
-        let Tasks { workers, bus, http, jobs, findings, gather, writer } = self.tasks;
+        let Tasks { workers, bus, http, jobs, findings, gather, writer, watch } = self.tasks;
+        watch.abort();
         // Workers first: what they have in work is still answered over the open bus.
         let workers = tokio::task::spawn_blocking(move || workers.stop());
         if let Err(error) = workers.await {

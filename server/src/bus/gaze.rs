@@ -1,8 +1,8 @@
 //! `robot/{robot}/rpc/gaze`: a robot asks where to look and is answered on the spot, on zenoh's thread: it takes less
 //! than a millisecond.
 
-use super::{BusError, Receivers};
-use crate::engine::gaze::Ask;
+use super::{BusError, Receivers, caught};
+use crate::engine::{gaze::Ask, panics::Edge};
 use map::gaze::GazeParams;
 use protos::{
     Code, Key, Keys, Name, Rejection,
@@ -10,6 +10,7 @@ use protos::{
     prost::Message,
     v1,
 };
+use std::time::Instant;
 use zenoh::{
     Session, Wait,
     query::{Query, Queryable},
@@ -27,7 +28,14 @@ pub(super) async fn answer_gaze(
         let (keys, to) = (keys.clone(), to.clone());
         move |query: Query| {
             let Ok(Key::Gaze(robot)) = keys.parse(query.key_expr().as_str()) else { return };
-            let advice = asked(&to, &robot, &query).unwrap_or_else(|rejection| v1::GazeAdvice {
+            let panics = to.vitals.panics();
+            let advice =
+                panics.catch(Edge::Message, "a question where to look", "it is refused as internal", || {
+                    asked(&to, &robot, &query)
+                });
+            let failed =
+                || Err(Rejection::new(Code::Internal, "message", "the server failed on it; see its log"));
+            let advice = advice.unwrap_or_else(failed).unwrap_or_else(|rejection| v1::GazeAdvice {
                 rejection: Some((&rejection).into()),
                 ..v1::GazeAdvice::default()
             });
@@ -36,7 +44,10 @@ pub(super) async fn answer_gaze(
             }
         }
     };
-    let declared = session.declare_queryable(keys.all_gaze()).callback(asked).await;
+    let declared = session
+        .declare_queryable(keys.all_gaze())
+        .callback(caught(&to.vitals, "a question where to look", asked))
+        .await;
     declared
         .map_err(|e| BusError::Declare { action: "answer questions where to look", detail: e.to_string() })
 }
@@ -53,7 +64,7 @@ fn asked(to: &Receivers, robot: &Name, query: &Query) -> Result<v1::GazeAdvice, 
     let wire = v1::GazeRequest::decode(&*bytes);
     let wire = wire.map_err(|e| Rejection::new(Code::BadMessage, "message", e.to_string()))?;
     let question = CheckedGaze::try_from(wire)?;
-    let pose = question.pose.or_else(|| to.motion.pose(robot, &name)).ok_or_else(|| {
+    let pose = question.pose.or_else(|| to.motion.pose(robot, &name, Instant::now())).ok_or_else(|| {
         Rejection::new(Code::Missing, "map_from_robot", "the robot's pose is not known here either")
     })?;
     let viewer = question.viewer(&map.sight.viewer);

@@ -1,9 +1,18 @@
 //! What comes in: one subscription per kind of message, each with a callback that parses the key, checks and hands
 //! over. A message that is refused costs its sender an answer and us a counter; nothing here waits or panics.
 
-use super::{BusError, Outbox, Receivers};
-use crate::engine::{slots::SlotKey, workers::Publish};
-use protos::{Key, Keys, prost::bytes::Bytes};
+use super::{BusError, Outbox, Receivers, caught};
+use crate::engine::{
+    panics::Edge,
+    slots::SlotKey,
+    workers::{Publish, failed},
+};
+use protos::{
+    Key, Keys, Name,
+    prost::{Message, bytes::Bytes},
+    v1,
+};
+use std::time::Instant;
 use zenoh::{
     Session,
     pubsub::Subscriber,
@@ -25,7 +34,7 @@ pub(super) async fn subscribe(
         let (keys, to, outbox) = (keys.clone(), to.clone(), outbox.clone());
         move |sample: Sample| {
             if let Ok(Key::Odometry(robot)) = keys.parse(sample.key_expr().as_str())
-                && let Some(pose) = to.motion.odometry(&robot, bytes(&sample))
+                && let Some(pose) = to.motion.odometry(&robot, bytes(&sample), Instant::now())
             {
                 outbox.pose(&robot, &pose);
             }
@@ -35,31 +44,48 @@ pub(super) async fn subscribe(
         let (keys, to) = (keys.clone(), to.clone());
         move |sample: Sample| {
             if let Ok(Key::Scan(robot)) = keys.parse(sample.key_expr().as_str()) {
-                to.motion.scan(&robot, bytes(&sample));
+                to.motion.scan(&robot, bytes(&sample), Instant::now());
             }
         }
     };
     let alive = {
         let (keys, to) = (keys.clone(), to.clone());
         move |sample: Sample| {
-            if let Ok(Key::Alive(robot)) = keys.parse(sample.key_expr().as_str()) {
-                let map = to.intake.snapshots.robot_map(robot.as_str());
-                let alive = sample.kind() == SampleKind::Put;
-                tracing::info!(%robot, alive, "robot");
-                to.live.presence(&robot, map, alive);
+            if let Ok(Key::Alive(robot, epoch)) = keys.parse(sample.key_expr().as_str()) {
+                token(&to, &robot, (epoch, sample.kind() == SampleKind::Put));
             }
         }
     };
-    let frames = session.declare_subscriber(keys.all_frames()).callback(frames);
-    let odometry = session.declare_subscriber(keys.all_odometry()).callback(odometry);
-    let scans = session.declare_subscriber(keys.all_scans()).callback(scans);
-    let alive = session.liveliness().declare_subscriber(keys.all_alive()).history(true).callback(alive);
+    let frames = session.declare_subscriber(keys.all_frames()).callback(caught(&to.vitals, "frame", frames));
+    let odometry =
+        session.declare_subscriber(keys.all_odometry()).callback(caught(&to.vitals, "odometry", odometry));
+    let scans = session.declare_subscriber(keys.all_scans()).callback(caught(&to.vitals, "scan", scans));
+    let alive = session
+        .liveliness()
+        .declare_subscriber(keys.all_alive())
+        .history(true)
+        .callback(caught(&to.vitals, "presence", alive));
     Ok(vec![
         odometry.await.map_err(declared("subscribe to odometry"))?,
         scans.await.map_err(declared("subscribe to scans"))?,
         alive.await.map_err(declared("watch robots"))?,
         frames.await.map_err(declared("subscribe to frames"))?,
     ])
+}
+
+/// A liveliness token appeared or went.
+fn token(to: &Receivers, robot: &Name, token: (Option<u64>, bool)) {
+    let map_of = |robot: &Name| to.intake.snapshots.robot_map(robot.as_str());
+    let is_registered = |robot: &Name| map_of(robot).is_some();
+    let came = to.motion.epochs().token(robot, token, Instant::now(), is_registered);
+    let Some(alive) = came else { return };
+    let map = map_of(robot);
+    if map.is_some() {
+        tracing::info!(%robot, alive, "a robot came or went");
+    } else {
+        tracing::debug!(%robot, alive, "a robot that is not registered came or went");
+    }
+    to.live.presence(robot, map, alive);
 }
 
 fn frame(keys: &Keys, to: &Receivers, outbox: &Outbox, sample: &Sample) {
@@ -70,11 +96,22 @@ fn frame(keys: &Keys, to: &Receivers, outbox: &Outbox, sample: &Sample) {
         return to.intake.slots.refuse(protos::Code::BadName);
     };
     let slot = SlotKey { robot, camera };
-    if let Err(answer) = to.intake.receive(slot.clone(), bytes(sample)) {
+    let panics = to.vitals.panics();
+    let follows = "it is refused as internal";
+    let received =
+        panics.catch(Edge::Message, "frame", follows, || to.intake.receive(slot.clone(), bytes(sample)));
+    if let Err(answer) = received.unwrap_or_else(|| Err(internal(sample))) {
         tracing::debug!(key, rejection = ?answer.rejection, "frame refused");
         outbox.answer(&slot, &answer);
         to.live.refused(&slot, answer.into());
     }
+}
+
+/// The answer to a frame on which the intake panicked.
+fn internal(sample: &Sample) -> Box<v1::Answer> {
+    let v1::Frame { epoch, seq, captured_ns, .. } = v1::Frame::decode(bytes(sample)).unwrap_or_default();
+    let (status, rejection) = (v1::Status::Rejected.into(), Some((&failed()).into()));
+    Box::new(v1::Answer { epoch, seq, captured_ns, status, rejection, ..v1::Answer::default() })
 }
 
 fn bytes(sample: &Sample) -> Bytes {

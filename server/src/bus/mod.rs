@@ -9,6 +9,7 @@ mod gaze;
 mod inbox;
 mod outbox;
 mod router;
+mod versions;
 #[cfg(test)]
 mod tests;
 
@@ -16,7 +17,8 @@ pub use outbox::Outbox;
 
 use crate::{
     config::Config,
-    engine::{gaze::Gazes, intake::Intake, live::LiveHub, motion::Motion},
+    engine::{gaze::Gazes, intake::Intake, live::LiveHub, motion::Motion, panics::Edge},
+    vitals::{Pulse, Vitals},
 };
 use protos::{Key, Keys, v1};
 use std::sync::Arc;
@@ -42,6 +44,14 @@ pub enum BusError {
         /// What it said.
         detail: String,
     },
+    /// The system gives no thread.
+    #[error("no thread `{name}`: {source}")]
+    Thread {
+        /// What the thread is for.
+        name: &'static str,
+        /// What the system says.
+        source: std::io::Error,
+    },
 }
 
 /// What the bus hands messages to.
@@ -55,6 +65,8 @@ pub struct Receivers {
     pub live: Arc<LiveHub>,
     /// Which landmark each robot was told to look at.
     pub gazes: Arc<Gazes>,
+    /// Where tasks say that they run and panics are counted.
+    pub vitals: Arc<Vitals>,
 }
 
 /// The open bus.
@@ -64,7 +76,7 @@ pub struct Bus {
     outbox: Outbox,
     changes: JoinHandle<()>,
     subscribers: Vec<Subscriber<()>>,
-    gaze: Queryable<()>,
+    queryables: [Queryable<()>; 2],
 }
 
 impl std::fmt::Debug for Bus {
@@ -79,12 +91,19 @@ impl Bus {
         let endpoint = router::endpoint(&config.zenoh_endpoint)?;
         let session = router::open(&endpoint, config.limits.robots, config.limits.frame_bytes).await?;
         let keys = Keys::new(&config.fleet);
-        let outbox = Outbox::start(session.clone(), keys.clone());
-        let changes = tokio::spawn(tell_changes(to.clone(), outbox.clone()));
+        let outbox = Outbox::start(session.clone(), keys.clone(), to.vitals.panics().clone())?;
+        let changes = tokio::spawn(tell_changes(
+            to.clone(),
+            outbox.clone(),
+            to.vitals.begin("the task that tells of new maps"),
+        ));
         let subscribers = inbox::subscribe(&session, &keys, &to, &outbox).await?;
-        let gaze = gaze::answer_gaze(&session, &keys, &to).await?;
+        let queryables = [
+            gaze::answer_gaze(&session, &keys, &to).await?,
+            versions::answer_versions(&session, &keys, &to).await?,
+        ];
         tracing::info!(endpoint, fleet = %config.fleet, "robots may connect");
-        Ok(Self { endpoint, session, outbox, changes, subscribers, gaze })
+        Ok(Self { endpoint, session, outbox, changes, subscribers, queryables })
     }
 
     /// Where robots connect, with the real port.
@@ -105,8 +124,10 @@ impl Bus {
                 tracing::warn!(%error, "undeclare");
             }
         }
-        if let Err(error) = self.gaze.undeclare().await {
-            tracing::warn!(%error, "undeclare");
+        for queryable in self.queryables {
+            if let Err(error) = queryable.undeclare().await {
+                tracing::warn!(%error, "undeclare");
+            }
         }
         self.outbox.drain().await;
         if let Err(error) = self.session.close().await {
@@ -115,8 +136,21 @@ impl Bus {
     }
 }
 
+/// A callback of zenoh's that does not let a panic through: it would end the task that receives from a robot. `kind` says
+/// what is received.
+fn caught<T>(
+    vitals: &Arc<Vitals>,
+    kind: &'static str,
+    receive: impl Fn(T) + Send + Sync + 'static,
+) -> impl Fn(T) + Send + Sync + 'static {
+    let vitals = vitals.clone();
+    move |received| {
+        vitals.panics().catch(Edge::Message, kind, "it is dropped", || receive(received));
+    }
+}
+
 /// Passes map changes on to robots and pages.
-async fn tell_changes(to: Receivers, outbox: Outbox) {
+async fn tell_changes(to: Receivers, outbox: Outbox, pulse: Pulse) {
     let mut changes = to.intake.snapshots.changes();
     loop {
         match changes.recv().await {
@@ -127,9 +161,9 @@ async fn tell_changes(to: Receivers, outbox: Outbox) {
                 }
                 to.live.map_changed(change.map, change.version);
             }
-            // Robots that missed one see the version in their next answer.
+            // Robots that missed one see the version in their next answer, or ask for it.
             Err(RecvError::Lagged(_)) => {}
-            Err(RecvError::Closed) => return,
+            Err(RecvError::Closed) => return pulse.end(),
         }
     }
 }

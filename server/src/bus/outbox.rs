@@ -1,6 +1,15 @@
-//! What goes out: a bounded queue and one thread that puts it on zenoh. A full queue drops and counts; nobody waits.
+//! What goes out: a bounded queue and one thread that puts it on zenoh. A full queue drops the message and counts it.
+//!
+//! Every message is sent with `CongestionControl::Drop`: one subscriber that does not read loses its own messages and delays
+//! nobody else's. Nothing here depends on a message arriving: an answer and a pose are replaced by the next one, and the version
+//! of a map can be asked for at `map/{map}/version`.
 
-use crate::engine::{slots::SlotKey, workers::Publish};
+use super::BusError;
+use crate::engine::{
+    panics::{Edge, Panics},
+    slots::SlotKey,
+    workers::Publish,
+};
 use protos::{Key, Keys, Name, prost::Message, v1};
 use std::{
     sync::{
@@ -21,7 +30,7 @@ const QUEUE: usize = 1024;
 struct Letter {
     key: String,
     bytes: Vec<u8>,
-    important: bool,
+    priority: Priority,
 }
 
 /// Puts answers, poses and map changes on zenoh.
@@ -40,17 +49,24 @@ impl std::fmt::Debug for Outbox {
 }
 
 impl Outbox {
-    pub(super) fn start(session: zenoh::Session, keys: Keys) -> Self {
+    pub(super) fn start(session: zenoh::Session, keys: Keys, panics: Arc<Panics>) -> Result<Self, BusError> {
         let (queue, letters) = sync_channel(QUEUE);
-        let thread =
-            std::thread::Builder::new().name("outbox".into()).spawn(move || deliver(&session, &letters));
-        let thread = thread.inspect_err(|error| tracing::error!(%error, "no thread for the outbox")).ok();
-        Self {
+        let thread = std::thread::Builder::new()
+            .name("outbox".into())
+            .spawn(move || deliver(&session, &letters, &panics))
+            .map_err(|source| BusError::Thread { name: "outbox", source })?;
+        Ok(Self {
             keys,
             queue: Arc::new(Mutex::new(Some(queue))),
-            thread: Arc::new(Mutex::new(thread)),
+            thread: Arc::new(Mutex::new(Some(thread))),
             dropped: Arc::default(),
-        }
+        })
+    }
+
+    /// Whether the sending thread runs; false after it ended, whatever the reason.
+    pub fn is_running(&self) -> bool {
+        let thread = self.thread.lock().unwrap_or_else(PoisonError::into_inner);
+        thread.as_ref().is_some_and(|thread| !thread.is_finished())
     }
 
     /// Messages that were dropped because the queue was full.
@@ -59,8 +75,9 @@ impl Outbox {
     }
 
     pub(super) fn send(&self, key: &Key, message: &impl Message) {
-        let important = matches!(key, Key::MapChanged(_));
-        let letter = Letter { key: self.keys.build(key), bytes: message.encode_to_vec(), important };
+        let priority =
+            if matches!(key, Key::MapChanged(_)) { Priority::Data } else { Priority::InteractiveHigh };
+        let letter = Letter { key: self.keys.build(key), bytes: message.encode_to_vec(), priority };
         let queue = self.queue.lock().unwrap_or_else(PoisonError::into_inner);
         let sent = queue.as_ref().is_some_and(|queue| queue.try_send(letter).is_ok());
         if !sent {
@@ -89,15 +106,13 @@ impl Publish for Outbox {
     }
 }
 
-fn deliver(session: &zenoh::Session, letters: &Receiver<Letter>) {
-    for Letter { key, bytes, important } in letters {
-        let put = session.put(key.as_str(), bytes).express(true);
-        let put = if important {
-            put.congestion_control(CongestionControl::Block).priority(Priority::Data)
-        } else {
-            put.congestion_control(CongestionControl::Drop).priority(Priority::InteractiveHigh)
+fn deliver(session: &zenoh::Session, letters: &Receiver<Letter>, panics: &Panics) {
+    for Letter { key, bytes, priority } in letters {
+        let put = || {
+            let put = session.put(key.as_str(), bytes).express(true);
+            put.congestion_control(CongestionControl::Drop).priority(priority).wait()
         };
-        if let Err(error) = put.wait() {
+        if let Some(Err(error)) = panics.catch(Edge::Delivery, &key, "the message is lost", put) {
             tracing::debug!(%error, key, "not sent");
         }
     }

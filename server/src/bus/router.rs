@@ -9,6 +9,11 @@ const SPARE_SESSIONS: usize = 8;
 const MESSAGE_SPARE_BYTES: usize = 64 << 10;
 /// A robot whose link is silent for so long is gone.
 const LEASE_MS: u64 = 2000;
+/// A message for a robot whose queue is full is dropped after this wait. All answers share one sending thread, so this bounds
+/// what one robot that does not read costs the others: a thousandth of a second a message.
+const WAIT_BEFORE_DROP_US: u64 = 1000;
+/// A robot that does not take a reply to its own query for this long is disconnected.
+const WAIT_BEFORE_CLOSE_US: u64 = 1_000_000;
 /// Longest wait for the router to open.
 const OPEN_TIMEOUT: Duration = Duration::from_secs(10);
 
@@ -41,7 +46,6 @@ fn config(endpoint: &str, robots: usize, frame_bytes: usize) -> zenoh::Result<ze
     let sessions = robots + SPARE_SESSIONS;
     let message_bytes = frame_bytes + MESSAGE_SPARE_BYTES;
     // No time stamps: clocks of robots decide nothing here, and a clock far ahead would have its samples refused.
-    // Answers fit one batch; a robot whose queue is full loses one after 50 ms instead of holding up the others.
     zenoh::Config::from_json5(&format!(
         r#"{{
             mode: "router",
@@ -54,7 +58,11 @@ fn config(endpoint: &str, robots: usize, frame_bytes: usize) -> zenoh::Result<ze
                 unicast: {{ max_sessions: {sessions}, max_links: 1 }},
                 link: {{
                     tx: {{ lease: {LEASE_MS}, queue: {{ congestion_control: {{
-                        drop: {{ wait_before_drop: 50000, max_wait_before_drop_fragments: 50000 }},
+                        drop: {{
+                            wait_before_drop: {WAIT_BEFORE_DROP_US},
+                            max_wait_before_drop_fragments: {WAIT_BEFORE_DROP_US},
+                        }},
+                        block: {{ wait_before_close: {WAIT_BEFORE_CLOSE_US} }},
                     }} }} }},
                     rx: {{ max_message_size: {message_bytes} }},
                 }},

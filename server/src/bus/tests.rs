@@ -29,11 +29,17 @@ async fn running(engine: Engine, workers: usize) -> Running {
     let intake = Arc::new(Intake {
         slots: engine.slots.clone(),
         snapshots: engine.snapshots.clone(),
+        motion: engine.motion.clone(),
         frame_bytes: config.limits.frame_bytes,
         deadline: Duration::from_secs(30),
     });
-    let to =
-        Receivers { intake, motion: engine.motion.clone(), live: engine.live.clone(), gazes: Arc::default() };
+    let to = Receivers {
+        intake,
+        motion: engine.motion.clone(),
+        live: engine.live.clone(),
+        gazes: Arc::default(),
+        vitals: engine.vitals.clone(),
+    };
     let bus = Bus::open(&config, to).await.unwrap();
     let workers = Workers::start(&engine, workers, &Arc::new(bus.outbox().clone())).unwrap();
     Running { bus, engine, workers }
@@ -54,7 +60,7 @@ impl Running {
         self.bus.close().await;
         let counts = self.engine.slots.counts();
         assert_eq!((counts.missing(), counts.waiting, counts.in_work), (0, 0, 0), "{counts:?}");
-        assert_eq!(self.engine.panics.load(std::sync::atomic::Ordering::Relaxed), 0);
+        assert_eq!(self.engine.vitals.panics().total(), 0);
     }
 }
 
@@ -167,7 +173,9 @@ async fn presence_odometry_and_map_changes_pass() {
     };
     let robot = running.robot("r1").await;
     next("presence").await;
-    assert_eq!(running.engine.live.alive().len(), 1);
+    let r1 = protos::Name::new("r1").unwrap();
+    let status = || running.engine.motion.epochs().status(&r1, std::time::Instant::now());
+    assert_eq!((status().alive, status().epoch), (true, Some(robot.epoch())));
 
     robot.publish_odometry(&map::pose2::Pose2::new(1.0, 2.0, 0.1)).await.unwrap();
     let scan = v1::Scan { ranges_m: vec![f32::NAN], max_range_m: f64::NAN, ..v1::Scan::default() };
@@ -192,6 +200,113 @@ async fn presence_odometry_and_map_changes_pass() {
 
     robot.close().await.unwrap();
     next("presence").await;
-    assert!(running.engine.live.alive().is_empty());
+    assert_eq!((status().alive, status().epoch), (false, None));
     running.stop().await;
+}
+
+/// A link to the server that can be made to stop reading.
+struct StallingLink {
+    endpoint: String,
+    stalled: tokio::sync::watch::Sender<bool>,
+}
+
+impl StallingLink {
+    /// Passes everything between one client and `server` (`tcp/ADDRESS`) until it is stalled.
+    async fn open(server: &str) -> Self {
+        use tokio::io::{AsyncReadExt, AsyncWriteExt};
+        let address: std::net::SocketAddr = server.strip_prefix("tcp/").unwrap().parse().unwrap();
+        let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
+        let endpoint = format!("tcp/{}", listener.local_addr().unwrap());
+        let (stalled, mut stall) = tokio::sync::watch::channel(false);
+        tokio::spawn(async move {
+            let (near, _) = listener.accept().await.unwrap();
+            let socket = tokio::net::TcpSocket::new_v4().unwrap();
+            // A small window, so that the server's queue is full soon after the stall.
+            socket.set_recv_buffer_size(4096).unwrap();
+            let (mut from_server, mut to_server) = socket.connect(address).await.unwrap().into_split();
+            let (mut from_near, mut to_near) = near.into_split();
+            tokio::spawn(async move { tokio::io::copy(&mut from_near, &mut to_server).await });
+            let mut buffer = vec![0; 4096];
+            loop {
+                if *stall.borrow() {
+                    // The connection stays open; nothing is read from it.
+                    drop(stall.wait_for(|stalled| !stalled).await);
+                }
+                let Ok(n @ 1..) = from_server.read(&mut buffer).await else { return };
+                if to_near.write_all(&buffer[..n]).await.is_err() {
+                    return;
+                }
+            }
+        });
+        Self { endpoint, stalled }
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_subscriber_that_does_not_read_delays_no_answer() {
+    const CHANGES: u64 = 40_000;
+    const AT_ONCE: Duration = Duration::from_secs(2);
+    let running = running(scene::engine(&[Arc::new(MapSnapshot::empty("hall", 3))]), 1).await;
+    let link = StallingLink::open(running.bus.endpoint()).await;
+    let slow = zenoh::open(
+        zenoh::Config::from_json5(&format!(
+            r#"{{ mode: "client", connect: {{ endpoints: ["{}"] }}, scouting: {{ multicast: {{ enabled: false }} }} }}"#,
+            link.endpoint
+        ))
+        .unwrap(),
+    )
+    .await
+    .unwrap();
+    let keys = Keys::new(&protos::Name::new("test").unwrap());
+    let changed = Key::MapChanged(protos::Name::new("m".repeat(64)).unwrap());
+    let subscriber = slow.declare_subscriber(keys.build(&changed)).await.unwrap();
+    let robot = running.robot("r1").await;
+    let tell = |version| {
+        running.bus.outbox().send(&changed, &v1::MapChanged { map: "m".repeat(64), version });
+    };
+    // The subscription is there once a change arrives.
+    let arrived = async {
+        loop {
+            tell(0);
+            let heard = tokio::time::timeout(Duration::from_millis(20), subscriber.recv_async()).await;
+            if let Ok(sample) = heard {
+                return sample.unwrap().congestion_control();
+            }
+        }
+    };
+    let congestion_control = tokio::time::timeout(WAIT, arrived).await.unwrap();
+    assert_eq!(congestion_control, zenoh::qos::CongestionControl::Drop, "the sending thread may not wait");
+
+    link.stalled.send_replace(true);
+    let mut slowest = Duration::ZERO;
+    for version in 1..=CHANGES {
+        tell(version);
+        if version % 500 == 0 {
+            let asked = std::time::Instant::now();
+            robot.recognise("front", plain(), WAIT).await.unwrap();
+            slowest = slowest.max(asked.elapsed());
+        }
+    }
+    assert!(slowest < AT_ONCE, "an answer took {slowest:?} while a subscriber did not read");
+    assert_eq!(robot.map_version("hall", WAIT).await.unwrap(), Some(3), "whoever missed a change asks");
+    assert_eq!(robot.map_version("cellar", WAIT).await.unwrap(), None);
+    robot.close().await.unwrap();
+    drop((subscriber, link));
+    running.stop().await;
+}
+
+/// Through the callback a panic would end zenoh's task that receives from that robot.
+#[test]
+fn a_callback_that_panics_is_counted_and_receives_on() {
+    let (vitals, received) = (Arc::new(Vitals::default()), Arc::new(std::sync::Mutex::new(Vec::new())));
+    let kept = received.clone();
+    let callback = super::caught(&vitals, "frame", move |number: u8| {
+        assert!(number != 2, "planted");
+        kept.lock().unwrap().push(number);
+    });
+    for number in 1..=3 {
+        callback(number);
+    }
+    assert_eq!(*received.lock().unwrap(), [1, 3]);
+    assert_eq!((vitals.panics().at(Edge::Message), vitals.failure()), (1, None));
 }

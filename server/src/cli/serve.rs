@@ -1,12 +1,16 @@
 //! `waymark serve`: the server, until Ctrl-C or SIGTERM.
 
 use crate::{
-    Server,
+    RunningServer, Server,
     config::{Config, RawConfig},
+    vitals::Failure,
 };
-use anyhow::{Context, bail};
+use anyhow::{Context, anyhow};
 use clap::Args;
-use std::path::PathBuf;
+use std::{path::PathBuf, time::Duration};
+
+/// Time that the other parts have to end after one has failed.
+const STOP_AFTER_FAILURE: Duration = Duration::from_secs(20);
 
 /// What `--help` teaches.
 const HELP: &str = r#"Runs the server: zenoh for robots, HTTP for people and programs, one SQLite file for everything that lasts.
@@ -22,6 +26,9 @@ Teach a first landmark from a photograph of a picture on a wall:
   curl -X POST localhost:8080/api/v1/maps/office/landmarks/poster/views -F image=@photo.jpg
   curl -X POST localhost:8080/api/v1/maps/office/landmarks/poster/learn
   curl -X POST localhost:8080/api/v1/maps/office/recognise -F image=@other-photo.jpg
+
+Runs until Ctrl-C or SIGTERM. If a part of it ends by itself, /readyz answers 503 with its name and the program ends with
+an error: start it again, and it goes on from what is on the disk.
 
 Settings come from defaults, then the file, then WAYMARK_... variables, then these options;
 server/config.example.toml lists all of them."#;
@@ -85,10 +92,7 @@ impl Serve {
         tracing::info!(data = %data.display(), http = %server.http_addr, zenoh = server.zenoh_endpoint, "ready");
         tokio::select! {
             stopped = stop_signal() => stopped?,
-            () = server.failed() => {
-                server.stop().await;
-                bail!("the store has failed; start again to read what is on the disk");
-            }
+            failure = server.failed() => return Err(after(&failure, server).await),
         }
         tracing::info!("stopping");
         server.stop().await;
@@ -96,9 +100,18 @@ impl Serve {
     }
 }
 
+/// Stops what is left of a server and says what to do.
+async fn after(failure: &Failure, server: RunningServer) -> anyhow::Error {
+    // What is left of it may not come to an end.
+    if tokio::time::timeout(STOP_AFTER_FAILURE, server.stop()).await.is_err() {
+        tracing::error!("the rest of the server did not stop in time");
+    }
+    anyhow!("{failure}; start the server again: it goes on from what is on the disk")
+}
+
 /// The first lines on stdout, for people and for programs that started this one on port 0.
 #[expect(clippy::print_stdout, reason = "the one result of this command")]
-fn ready(server: &crate::RunningServer) {
+fn ready(server: &RunningServer) {
     println!("pages   http://{}/", server.http_addr);
     println!("robots  {}", server.zenoh_endpoint);
 }
@@ -116,4 +129,30 @@ async fn stop_signal() -> anyhow::Result<()> {
 #[cfg(not(unix))]
 async fn stop_signal() -> anyhow::Result<()> {
     tokio::signal::ctrl_c().await.context("Ctrl-C")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[tokio::test(flavor = "multi_thread")]
+    async fn a_part_that_ends_ends_the_program_with_an_error() {
+        let data = tempfile::tempdir().unwrap();
+        let raw = || RawConfig {
+            data: data.path().to_owned(),
+            http: "127.0.0.1:0".into(),
+            zenoh: "tcp/127.0.0.1:0".into(),
+            ..RawConfig::default()
+        };
+        let server = Server::start(Config::try_from(raw()).unwrap()).await.unwrap();
+        // As a worker thread does that unwinds.
+        drop(server.vitals().begin("the worker thread vision-7"));
+        let failure = tokio::time::timeout(Duration::from_secs(5), server.failed()).await.unwrap();
+        let error = after(&failure, server).await.to_string();
+        assert!(error.contains("vision-7 has ended") && error.contains("start the server again"), "{error}");
+        // Everything else was stopped: its lock is free. And while nothing ends, nothing fails.
+        let again = Server::start(Config::try_from(raw()).unwrap()).await.unwrap();
+        assert_eq!(again.vitals().failure(), None);
+        again.stop().await;
+    }
 }

@@ -9,7 +9,7 @@ use client::{
     ClientError, MapClient,
     lessons::{Job, Size},
     map::Extent,
-    v1::{Answer, Verdict},
+    v1::{Answer, QuadAnswer, Verdict},
 };
 use std::{path::PathBuf, process::ExitCode, time::Duration};
 use vision::{frame::Intrinsics, recognise::DistanceKind};
@@ -370,17 +370,30 @@ pub(crate) async fn recognise(args: &RecogniseArgs) -> anyhow::Result<ExitCode> 
     Ok(status)
 }
 
+/// What points say of the first candidate; empty where they did not decide.
+fn by_points(quad: &QuadAnswer) -> String {
+    quad.points.as_ref().map_or_else(String::new, |points| {
+        let alarms = points.log10_false_alarms.round();
+        format!(", {} of {} matches agree, 1e{alarms} false alarms expected", points.inliers, points.matches)
+    })
+}
+
 fn sentence(name: &str, answer: &Answer) -> String {
     let mut lines = vec![format!("{name}: {}", counted(answer.quads.len() as u64, "quad"))];
     for quad in &answer.quads {
         match quad.verdict() {
             Verdict::Unique => {
-                lines.push(format!("  {} with confidence {:.2}", quad.landmark, quad.confidence));
+                let line = format!("  {} with confidence {:.2}", quad.landmark, quad.confidence);
+                lines.push(line + &by_points(quad));
+            }
+            Verdict::Ambiguous if !quad.doubtful_landmark.is_empty() => {
+                let line = format!("  perhaps {}: a part of it shows something else", quad.doubtful_landmark);
+                lines.push(line + &by_points(quad));
             }
             Verdict::Ambiguous => {
                 let names: Vec<&str> =
                     quad.candidates.iter().filter(|c| c.ratio < 1.0).map(|c| c.landmark.as_str()).collect();
-                lines.push(format!("  one of {}: not sure which", names.join(", ")));
+                lines.push(format!("  one of {}: not sure which", names.join(", ")) + &by_points(quad));
             }
             _ => {}
         }
@@ -389,4 +402,35 @@ fn sentence(name: &str, answer: &Answer) -> String {
         lines.push("  no landmark recognised".to_owned());
     }
     lines.join("\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use client::v1::PointEvidence;
+
+    #[test]
+    fn a_line_says_what_points_say() {
+        let points =
+            PointEvidence { matches: 40, inliers: 34, log10_false_alarms: -21.3, ..PointEvidence::default() };
+        let mut quad = QuadAnswer {
+            verdict: Verdict::Unique.into(),
+            landmark: "door".into(),
+            confidence: 0.98,
+            points: Some(points),
+            ..QuadAnswer::default()
+        };
+        let said =
+            |quad: &QuadAnswer| sentence("a.jpg", &Answer { quads: vec![quad.clone()], ..Answer::default() });
+        let evidence = ", 34 of 40 matches agree, 1e-21 false alarms expected";
+        assert_eq!(said(&quad), format!("a.jpg: 1 quad\n  door with confidence 0.98{evidence}"));
+        quad.set_verdict(Verdict::Ambiguous);
+        (quad.doubtful_landmark, quad.landmark) = ("door".into(), String::new());
+        assert_eq!(
+            said(&quad),
+            format!("a.jpg: 1 quad\n  perhaps door: a part of it shows something else{evidence}")
+        );
+        quad.points = None;
+        assert_eq!(said(&quad), "a.jpg: 1 quad\n  perhaps door: a part of it shows something else");
+    }
 }

@@ -2,7 +2,7 @@
 //! publish at once. Checks everything but the pixels, and never waits: it runs on the transport's threads.
 
 use super::slots::{SlotKey, Slots};
-use super::snapshot::Snapshots;
+use super::{motion::Motion, snapshot::Snapshots};
 use protos::{
     CheckedFrame, Code, Rejection,
     prost::{Message, bytes::Bytes},
@@ -27,8 +27,11 @@ pub struct FrameJob {
     pub received: Instant,
     /// Work does not begin later.
     pub deadline: Instant,
-    /// The robot's clock is off.
+    /// The robot's clock is off, or the capture time does not fit the robot's other messages.
     pub clock_suspect: bool,
+    /// The capture time does not fit the robot's other messages, and is not to be used. Instead: what the robot's clock
+    /// showed at receipt, ns.
+    pub stamp_instead_ns: Option<i64>,
 }
 
 /// Takes frames in.
@@ -38,6 +41,8 @@ pub struct Intake {
     pub slots: Arc<Slots<FrameJob>>,
     /// Which robots and maps there are.
     pub snapshots: Arc<Snapshots>,
+    /// Which epoch of a robot is live, and its clock.
+    pub motion: Arc<Motion>,
     /// Largest message, in bytes.
     pub frame_bytes: usize,
     /// Deadline of frames that name none.
@@ -80,14 +85,17 @@ impl Intake {
             return Err(Rejection::new(Code::UnknownRobot, "robot", detail));
         };
         let frame = CheckedFrame::try_from(frame)?;
+        self.motion.epochs().admit(&key.robot, frame.epoch, received)?;
         let map = frame.map.as_ref().map_or(robot_map, ToString::to_string);
         echo.map.clone_from(&map);
         if self.snapshots.get(&map).is_none() {
             return Err(unknown_map(&map));
         }
         let wait = frame.deadline_ms.map_or(self.deadline, |ms| Duration::from_millis(u64::from(ms)));
-        let clock_suspect = clock_suspect(frame.captured_ns);
-        Ok(FrameJob { frame, map, received, deadline: received + wait, clock_suspect })
+        let stamp = self.motion.frame_stamp((&key.robot, &key.camera), &map, &frame, received);
+        let stamp_instead_ns = stamp.err();
+        let clock_suspect = clock_suspect(frame.captured_ns) || stamp_instead_ns.is_some();
+        Ok(FrameJob { frame, map, received, deadline: received + wait, clock_suspect, stamp_instead_ns })
     }
 }
 
@@ -118,7 +126,8 @@ mod tests {
         snapshots.set_robot("r1", Some("hall"));
         snapshots.set_robot("lost", Some("gone"));
         let slots = Arc::new(Slots::new(4));
-        Intake { slots, snapshots, frame_bytes: 1000, deadline: Duration::from_millis(500) }
+        let motion = Arc::new(Motion::new(snapshots.clone(), Arc::default()));
+        Intake { slots, snapshots, motion, frame_bytes: 1000, deadline: Duration::from_millis(500) }
     }
 
     fn key(robot: &str) -> SlotKey {
@@ -167,6 +176,36 @@ mod tests {
         let counts = intake.slots.counts();
         assert_eq!((counts.received, counts.rejected_total(), counts.waiting), (8, 7, 1));
         assert_eq!(counts.missing(), 0);
+    }
+
+    /// Fault F3: a frame of another epoch used to end the epoch of the robot that drives.
+    #[test]
+    fn a_frame_of_another_epoch_is_refused_while_one_is_live() {
+        let intake = intake();
+        intake.receive(key("r1"), frame(5).encode_to_vec().into()).unwrap();
+        let forged = v1::Frame { epoch: 6, ..frame(1) };
+        let refused = refusal(&intake, "r1", forged.encode_to_vec());
+        assert_eq!(refused, ("epoch_conflict".into(), "epoch".into(), 1));
+        intake.receive(key("r1"), frame(6).encode_to_vec().into()).unwrap();
+    }
+
+    /// Fault F2: the frame is answered, its capture time is not used.
+    #[test]
+    fn a_stray_capture_time_is_marked() {
+        let intake = intake();
+        for (seq, captured_ns, is_stray) in
+            [(1, 77, false), (2, 78, false), (3, 3_600_000_000_000, true), (4, 79, false)]
+        {
+            intake
+                .receive(key("r1"), v1::Frame { captured_ns, ..frame(seq) }.encode_to_vec().into())
+                .unwrap();
+            let (k, job) = intake.slots.try_take().unwrap();
+            assert_eq!(job.stamp_instead_ns.is_some(), is_stray, "{seq}");
+            assert!(job.stamp_instead_ns.is_none_or(|ns| ns < 1_000_000_000));
+            intake.slots.finish(&k, crate::engine::slots::Outcome::Processed);
+        }
+        let counts = intake.motion.frame_stamps();
+        assert_eq!((counts.accepted, counts.rejected), (3, [(protos::Code::ClockAhead, 1)].into()));
     }
 
     #[test]

@@ -11,7 +11,7 @@ use protos::{
 };
 use serde::Serialize;
 use std::{
-    collections::{BTreeMap, BTreeSet, VecDeque},
+    collections::{BTreeMap, VecDeque},
     sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
 use tokio::sync::broadcast;
@@ -107,6 +107,8 @@ pub enum LiveEvent {
         covariance: Vec<f64>,
         /// Corrections by landmarks so far.
         corrections: u64,
+        /// From the capture of what supports it to its publication.
+        age_ms: f64,
     },
     /// Odometry, laid on the map.
     Odometry {
@@ -175,7 +177,6 @@ struct State {
     /// With the count of frames at its last frame: the smallest is the stalest.
     frames: BTreeMap<SlotKey, (u64, LiveFrame)>,
     tracks: BTreeMap<Name, (u64, Tracks)>,
-    alive: BTreeSet<Name>,
     ticks: u64,
 }
 
@@ -225,11 +226,6 @@ impl LiveHub {
         self.lock().tracks.get(robot).map(|(_, tracks)| tracks.clone())
     }
 
-    /// Robots that are connected now.
-    pub fn alive(&self) -> Vec<Name> {
-        self.lock().alive.iter().cloned().collect()
-    }
-
     /// Keeps the frame as its camera's last and tells of its answer.
     pub fn answered(&self, key: &SlotKey, frame: LiveFrame) {
         let answer = frame.answer.clone();
@@ -252,7 +248,7 @@ impl LiveHub {
     }
 
     /// A fused pose.
-    pub fn fused(&self, robot: &Name, map: &str, pose: &Pose2Covariance, corrections: u64) {
+    pub fn fused(&self, robot: &Name, map: &str, pose: &Pose2Covariance, (corrections, age_ms): (u64, f64)) {
         self.extend(robot, TrackKind::Pose, pose.pose);
         self.tell(LiveEvent::Pose {
             robot: robot.clone(),
@@ -260,6 +256,7 @@ impl LiveHub {
             pose: pose2_wire(&pose.pose),
             covariance: pose.covariance.transpose().as_slice().to_vec(),
             corrections,
+            age_ms,
         });
     }
 
@@ -279,14 +276,6 @@ impl LiveHub {
 
     /// A robot came or went.
     pub fn presence(&self, robot: &Name, map: Option<String>, alive: bool) {
-        {
-            let known = &mut self.lock().alive;
-            if alive {
-                known.insert(robot.clone())
-            } else {
-                known.remove(robot)
-            };
-        }
         self.tell(LiveEvent::Presence { robot: robot.clone(), map: map.unwrap_or_default(), alive });
     }
 
@@ -399,9 +388,10 @@ mod tests {
         let json = serde_json::to_value(&*events.try_recv().unwrap()).unwrap();
         assert_eq!(json["pose"]["y_m"], 2.0);
         assert_eq!(events.try_recv().unwrap().kind(), "presence");
-        assert_eq!(hub.alive(), [name("r1")]);
-        hub.presence(&name("r1"), None, false);
-        assert!(hub.alive().is_empty());
+        let pose = Pose2Covariance { pose: Pose2::default(), covariance: nalgebra::Matrix3::identity() };
+        hub.fused(&name("r1"), "hall", &pose, (2, 7.5));
+        let json = serde_json::to_value(&*events.try_recv().unwrap()).unwrap();
+        assert_eq!((&json["corrections"], &json["age_ms"]), (&2.into(), &7.5.into()));
     }
 
     #[test]

@@ -7,7 +7,7 @@ mod session;
 
 pub use session::{MAX_SCANS, QUEUE};
 
-use super::motion::ScanJob;
+use super::{motion::ScanJob, panics::Panics};
 use journal::{Head, Journal, Kept};
 use map::pose2::Pose2;
 use protos::Name;
@@ -99,9 +99,16 @@ pub struct Mappings {
     all: Mutex<BTreeMap<String, Session>>,
     /// Where their scans are kept.
     dir: OnceLock<PathBuf>,
+    /// Where their panics are counted.
+    panics: OnceLock<Arc<Panics>>,
 }
 
 impl Mappings {
+    /// Counts the panics of mappings here from now on.
+    pub fn count_in(&self, panics: Arc<Panics>) {
+        self.panics.get_or_init(|| panics);
+    }
+
     /// Keeps scans in a folder from now on, and goes on with what is there: with those mappings whose robot still stands on
     /// the map (`stands`); the others are forgotten.
     pub fn keep_in(&self, dir: PathBuf, stands: impl Fn(&Name, &Name) -> bool) {
@@ -114,7 +121,7 @@ impl Mappings {
                 journal::remove(dir, map.as_str());
             } else if all.len() >= MAX_MAPPINGS {
                 tracing::warn!(%map, "a mapping waits for another start: {MAX_MAPPINGS} go on already");
-            } else if let Some(session) = Session::begin(Start::Again(kept)) {
+            } else if let Some(session) = Session::begin(Start::Again(kept), self.panics()) {
                 tracing::info!(%map, %robot, "a mapping goes on");
                 all.insert(map.to_string(), session);
             }
@@ -136,7 +143,7 @@ impl Mappings {
         }
         let head = Head::new(map, robot, &origin);
         let journal = self.dir.get().map(|dir| Journal::create(dir, &head));
-        let session = Session::begin(Start::New(head, journal)).ok_or(MappingError::Thread)?;
+        let session = Session::begin(Start::New(head, journal), self.panics()).ok_or(MappingError::Thread)?;
         let progress = session.progress();
         all.insert(map.to_string(), session);
         if all.len() > MAX_REMEMBERED {
@@ -201,6 +208,10 @@ impl Mappings {
         if let Some(dir) = self.dir.get() {
             journal::remove(Path::new(dir), map);
         }
+    }
+
+    fn panics(&self) -> Arc<Panics> {
+        self.panics.get_or_init(Arc::default).clone()
     }
 
     fn lock(&self) -> MutexGuard<'_, BTreeMap<String, Session>> {

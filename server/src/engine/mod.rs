@@ -3,6 +3,7 @@
 pub mod snapshot;
 pub mod decode;
 pub mod slots;
+pub mod panics;
 pub mod intake;
 pub mod judging;
 pub mod live;
@@ -13,6 +14,7 @@ pub mod mapping;
 pub mod cameras;
 pub mod picture;
 pub mod dominant;
+pub mod epochs;
 pub mod gaze;
 pub mod standing;
 pub mod verdicts;

@@ -1,13 +1,16 @@
 //! How each robot moves: odometry, scans and fixes by landmarks in, its fused pose on the map out. For pages, odometry
 //! alone is laid on the map at the robot's first known pose. A new epoch of a robot starts afresh; so does another map, unless it is
 //! known how the two lie to each other.
-//! Capture times order one robot's own readings; they are never compared with this machine's clock.
+//! Capture times order one robot's own readings. They are never compared with this machine's wall clock, only with the time
+//! that passes between messages (`timebase.rs`): a stray stamp is refused, and a pose says how old it is.
 
 mod corrections;
 mod messages;
 mod robot;
+mod lent;
 mod run;
 mod scans;
+mod timebase;
 
 pub use corrections::{Correction, Corrections, MAX_CORRECTIONS};
 pub use messages::{MAX_ODOMETRY_BYTES, MAX_SCAN_BYTES, MessageCounts};
@@ -15,8 +18,12 @@ pub use robot::{MAX_SUPPORTERS, RESTS_ON_M};
 pub(crate) use run::Recording;
 pub use run::{MAX_RECORDINGS, MAX_RUN_FIXES, MAX_RUN_ODOMETRY, Recorded, RunError};
 pub use scans::{ScanJob, Scans};
+pub use timebase::{
+    AHEAD_TOLERANCE, BEHIND_TOLERANCE, CLOCK_SET_AFTER, CLOCK_SET_COUNT, CLOCK_SET_SPREAD, LEADER_SILENT,
+    MAX_LEADS, MAX_STREAMS,
+};
 
-use super::{live::LiveHub, mapping::Mappings, snapshot::Snapshots};
+use super::{epochs::Epochs, live::LiveHub, mapping::Mappings, snapshot::Snapshots};
 use map::{
     changes::{Change, Judged, Standing},
     fuse::{FixOutcome, FusedPose},
@@ -24,16 +31,26 @@ use map::{
     localise::Fix,
     pose2::{Pose2, Pose2Covariance},
 };
-use protos::{Code, Name, Rejection, convert::geometry::pose2_covariance_wire, prost::bytes::Bytes, v1};
+use protos::{
+    CheckedFrame, Code, Name, Rejection,
+    convert::{CheckedOdometry, geometry::pose2_covariance_wire},
+    prost::bytes::Bytes,
+    v1,
+};
 use robot::Robot;
 use std::{
     collections::{BTreeMap, BTreeSet},
     sync::{Arc, Mutex, MutexGuard, PoisonError},
+    time::{Duration, Instant},
 };
+use timebase::Stream;
 use vision::recognise::LandmarkId;
 
 /// Robots whose motion is followed; the number of registered robots bounds it first.
 pub const MAX_ROBOTS: usize = 10_000;
+/// A fused pose is published, and used, only while the odometry or fix that supports it was captured no longer ago.
+/// Robots that send odometry once a second are within it.
+pub const MAX_POSE_AGE: Duration = Duration::from_secs(2);
 /// The laser's word in counters.
 const LASER: &str = "laser";
 
@@ -43,6 +60,8 @@ struct State {
     robots: BTreeMap<Name, Arc<Mutex<Robot>>>,
     odometry: MessageCounts,
     scans: MessageCounts,
+    /// Capture times of frames.
+    stamps: MessageCounts,
 }
 
 /// Which frame of a robot.
@@ -56,6 +75,19 @@ pub struct Moment<'a> {
     pub captured_ns: i64,
     /// Odometry at capture, where the frame said.
     pub odometry: Option<Pose2>,
+    /// When it is looked at, by the server's clock.
+    pub now: Instant,
+}
+
+/// The fused pose of a robot as it is known at some moment.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Known {
+    /// The map it is in.
+    pub map: String,
+    /// The pose.
+    pub fused: FusedPose,
+    /// Since the capture of the newest odometry that supports it; at most [`MAX_POSE_AGE`].
+    pub age: Duration,
 }
 
 /// What is known of a robot's pose without its frame.
@@ -72,6 +104,7 @@ pub struct Grounds {
 pub struct Motion {
     snapshots: Arc<Snapshots>,
     live: Arc<LiveHub>,
+    epochs: Epochs,
     state: Mutex<State>,
     scans: Scans,
     mappings: Mappings,
@@ -85,6 +118,7 @@ impl Motion {
         Self {
             snapshots,
             live,
+            epochs: Epochs::default(),
             state: Mutex::default(),
             scans: Scans::default(),
             mappings: Mappings::default(),
@@ -92,50 +126,99 @@ impl Motion {
         }
     }
 
-    /// Odometry of a robot; gives its new pose once it has been on the map. A refusal is counted.
-    pub fn odometry(&self, robot: &Name, message: Bytes) -> Option<v1::RobotPose> {
-        let checked = messages::odometry(&self.snapshots, robot, message);
-        let mut state = self.lock();
-        let taken = checked.and_then(|(map, odometry)| {
-            let followed = state.robot(robot)?;
-            own(&followed).odometry.advance(odometry.epoch, odometry.seq)?;
-            Ok((map, odometry, followed))
-        });
-        let (map, odometry, followed) = state.odometry.count("odometry", robot, taken)?;
-        drop(state);
+    /// Which start of each robot's software speaks for it.
+    pub fn epochs(&self) -> &Epochs {
+        &self.epochs
+    }
+
+    /// Odometry of a robot, with the time of receipt; gives its new pose once it has been on the map. A refusal is counted.
+    pub fn odometry(&self, robot: &Name, message: Bytes, received: Instant) -> Option<v1::RobotPose> {
+        let taken = self.checked_odometry(robot, message, received);
+        let (map, odometry, followed) = self.lock().odometry.count("odometry", robot, taken)?;
         let mut followed = own(&followed);
-        if !followed.belong(odometry.epoch, &map, &self.snapshots) {
-            return None;
-        }
-        followed.moved(odometry.captured_ns, odometry.odom_from_robot);
+        followed.moved(odometry.captured_ns, odometry.odom_from_robot, received);
         let on_map = followed.on_map(&odometry.odom_from_robot);
-        let (fused, modalities) = (followed.fuser.pose(), followed.modalities());
+        let told = followed.pose().map(|fused| (fused, followed.age(fused.at_ns, received)));
+        let modalities = followed.modalities();
         drop(followed);
         if let Some(on_map) = on_map {
             self.live.odometry(robot, &map, on_map);
         }
-        Some(self.tell(robot, &map, odometry.epoch, &fused?, modalities))
+        self.tell(robot, &map, odometry.epoch, told?, modalities)
     }
 
-    /// A laser scan: checked, counted, and put where [`Motion::laser`] takes it from; that of a robot that makes a map, where
-    /// it is mapped.
-    pub fn scan(&self, robot: &Name, message: Bytes) {
-        let checked = messages::scan(&self.snapshots, robot, message);
-        let mut state = self.lock();
-        let taken = checked.and_then(|(map, scan)| {
-            let followed = state.robot(robot)?;
-            own(&followed).scans.advance(scan.epoch, scan.seq)?;
-            Ok((map, scan, followed))
-        });
-        let Some((map, checked, followed)) = state.scans.count("scan", robot, taken) else { return };
-        drop(state);
+    fn checked_odometry(
+        &self,
+        robot: &Name,
+        message: Bytes,
+        received: Instant,
+    ) -> Result<(String, CheckedOdometry, Arc<Mutex<Robot>>), Rejection> {
+        let (map, odometry) = messages::odometry(&self.snapshots, robot, message)?;
+        self.epochs.admit(robot, odometry.epoch, received)?;
+        let shared = self.lock().robot(robot)?;
+        let mut followed = own(&shared);
+        followed.odometry.advance(odometry.epoch, odometry.seq)?;
+        followed.belong(odometry.epoch, &map, &self.snapshots);
+        let moved = Some(odometry.odom_from_robot);
+        followed.stamp(&Stream::Odometry, odometry.captured_ns, moved, received)?;
+        drop(followed);
+        Ok((map, odometry, shared))
+    }
+
+    /// A laser scan, with the time of receipt: checked, counted, and put where [`Motion::laser`] takes it from; that of a
+    /// robot that makes a map, where it is mapped.
+    pub fn scan(&self, robot: &Name, message: Bytes, received: Instant) {
+        let taken = self.checked_scan(robot, message, received);
+        let Some(Some(job)) = self.lock().scans.count("scan", robot, taken) else { return };
+        if self.scans.offer(robot, job)
+            && let Ok(followed) = self.lock().robot(robot)
+        {
+            own(&followed).log.count(LASER, "superseded");
+        }
+    }
+
+    /// The scan to lay on the walls; none if it is mapped.
+    fn checked_scan(
+        &self,
+        robot: &Name,
+        message: Bytes,
+        received: Instant,
+    ) -> Result<Option<ScanJob>, Rejection> {
+        let (map, checked) = messages::scan(&self.snapshots, robot, message)?;
+        self.epochs.admit(robot, checked.epoch, received)?;
+        let shared = self.lock().robot(robot)?;
+        own(&shared).scans.advance(checked.epoch, checked.seq)?;
         let (epoch, captured_ns) = (checked.epoch, checked.captured_ns);
         let job =
             ScanJob { map, epoch, captured_ns, odom_from_robot: checked.odom_from_robot, scan: checked.scan };
-        let Some(job) = self.mappings.offer(robot, job) else { return };
-        if self.scans.offer(robot, job) {
-            own(&followed).log.count(LASER, "superseded");
-        }
+        // Mapping goes by the order of scans and does not use their times.
+        let Some(job) = self.mappings.offer(robot, job) else { return Ok(None) };
+        let mut followed = own(&shared);
+        followed.belong(epoch, &job.map, &self.snapshots);
+        followed.stamp(&Stream::Scan, captured_ns, Some(job.odom_from_robot), received)?;
+        Ok(Some(job))
+    }
+
+    /// Judges the capture time of a frame on its robot's own map. Where it is refused, the frame may be answered, but says
+    /// nothing about the robot's pose; what the robot's clock showed at receipt is given instead. Counted.
+    pub fn frame_stamp(
+        &self,
+        (robot, camera): (&Name, &Name),
+        map: &str,
+        frame: &CheckedFrame,
+        received: Instant,
+    ) -> Result<(), i64> {
+        let stream = match frame.odometry {
+            Some(_) => Stream::MovingCamera(camera.clone()),
+            None => Stream::Camera(camera.clone()),
+        };
+        let Some(shared) = self.followed(robot, map, frame.epoch) else { return Ok(()) };
+        let mut followed = own(&shared);
+        followed.belong(frame.epoch, map, &self.snapshots);
+        let judged = followed.stamp(&stream, frame.captured_ns, frame.odometry, received);
+        let instead_ns = followed.clock_ns(received).unwrap_or(frame.captured_ns);
+        drop(followed);
+        self.lock().stamps.count("frame", robot, judged).ok_or(instead_ns)
     }
 
     /// The scans that wait for the laser's thread.
@@ -150,15 +233,13 @@ impl Motion {
 
     /// Lays a scan on the walls of its map, near the pose that is known without it, and corrects that pose by it; gives the
     /// new pose if it did. A scan never gives a first pose. Takes about 100 microseconds: for the laser's own thread.
-    pub fn laser(&self, robot: &Name, job: &ScanJob) -> Option<v1::RobotPose> {
+    pub fn laser(&self, robot: &Name, job: &ScanJob, now: Instant) -> Option<v1::RobotPose> {
         let map = self.snapshots.get(&job.map)?;
-        let followed = self.lock().robot(robot).ok()?;
+        let followed = self.followed(robot, &job.map, job.epoch)?;
         let prior = {
             let mut followed = own(&followed);
-            if !followed.belong(job.epoch, &job.map, &self.snapshots) {
-                return None;
-            }
-            followed.moved_to(job.captured_ns, job.odom_from_robot);
+            followed.belong(job.epoch, &job.map, &self.snapshots);
+            followed.moved_to(job.captured_ns, job.odom_from_robot, now);
             if map.wall_index.is_empty() {
                 followed.log.count(LASER, "no_walls");
                 return None;
@@ -170,10 +251,9 @@ impl Motion {
             prior?
         };
         let found = laser_fix(&map.wall_index, &job.scan, &prior, &LaserFixParams::default());
+        let followed = self.followed(robot, &job.map, job.epoch)?;
         let mut followed = own(&followed);
-        if !followed.belong(job.epoch, &job.map, &self.snapshots) {
-            return None;
-        }
+        followed.belong(job.epoch, &job.map, &self.snapshots);
         let found =
             found.inspect_err(|error| tracing::error!(%error, "a prior of ours is out of range")).ok()?;
         let fix = match found {
@@ -184,32 +264,39 @@ impl Motion {
             }
         };
         let (outcome, fused) = followed.fix(job.captured_ns, &fix, Vec::new())?;
-        let modalities = followed.modalities();
+        let (age, modalities) = (followed.age(fused.at_ns, now), followed.modalities());
         drop(followed);
-        let applied = matches!(outcome, FixOutcome::Applied { .. });
-        applied.then(|| self.tell(robot, &job.map, job.epoch, &fused, modalities))
+        if !matches!(outcome, FixOutcome::Applied { .. }) {
+            return None;
+        }
+        self.tell(robot, &job.map, job.epoch, (fused, age), modalities)
     }
 
     /// What is known of a robot's pose at a frame without the frame itself: for choosing between two solutions, and for
     /// judging landmarks.
     pub fn grounds(&self, robot: &Name, at: Moment<'_>) -> Option<Grounds> {
-        let followed = self.lock().robot(robot).ok()?;
+        let followed = self.followed(robot, at.map, at.epoch)?;
         let mut followed = own(&followed);
-        if !followed.belong(at.epoch, at.map, &self.snapshots) {
-            return None;
-        }
+        followed.belong(at.epoch, at.map, &self.snapshots);
         if let Some(odometry) = at.odometry {
-            followed.moved(at.captured_ns, odometry);
+            followed.moved(at.captured_ns, odometry, at.now);
         }
         let pose = followed.fuser.pose_at(at.captured_ns)?;
         Some(Grounds { pose, supporters: followed.supporters.clone() })
     }
 
-    /// The last fused pose of a robot on a map.
-    pub fn pose(&self, robot: &Name, map: &str) -> Option<Pose2Covariance> {
+    /// The fused pose of a robot on a map, unless it is older than [`MAX_POSE_AGE`].
+    pub fn pose(&self, robot: &Name, map: &str, now: Instant) -> Option<Pose2Covariance> {
+        self.known(robot, now).filter(|known| known.map == map).map(|known| known.fused.pose)
+    }
+
+    /// The fused pose of a robot and its age, unless it is older than [`MAX_POSE_AGE`].
+    pub fn known(&self, robot: &Name, now: Instant) -> Option<Known> {
         let followed = self.lock().robots.get(robot)?.clone();
         let followed = own(&followed);
-        followed.fuser.pose().filter(|_| followed.map == map).map(|fused| fused.pose)
+        let fused = followed.pose()?;
+        let age = followed.age(fused.at_ns, now);
+        (age <= MAX_POSE_AGE).then(|| Known { map: followed.map.clone(), fused, age })
     }
 
     /// Every fix of a robot and what became of it; nothing for one that has not been heard of since the start.
@@ -251,17 +338,6 @@ impl Motion {
         own(&followed).run.take()
     }
 
-    /// Takes a recording back that could not be learnt from after all, unless another has begun.
-    pub(crate) fn keep_recording(&self, robot: &Name, recording: Box<Recording>) {
-        let mut recorded = self.recorded.lock().unwrap_or_else(PoisonError::into_inner);
-        if recorded.len() >= MAX_RECORDINGS || !recorded.insert(robot.clone()) {
-            return;
-        }
-        if let Ok(followed) = self.lock().robot(robot) {
-            own(&followed).run = Some(recording);
-        }
-    }
-
     /// A frame's landmarks were judged by these grounds: what should change in the map by that.
     pub fn judged(
         &self,
@@ -273,11 +349,9 @@ impl Motion {
     ) -> Vec<Change> {
         let map = self.snapshots.get(at.map);
         let standing = |id| map.as_ref().and_then(|m| Some(m.landmarks.get(&id)?.standing));
-        let Ok(followed) = self.lock().robot(robot) else { return Vec::new() };
+        let Some(followed) = self.followed(robot, at.map, at.epoch) else { return Vec::new() };
         let mut followed = own(&followed);
-        if !followed.belong(at.epoch, at.map, &self.snapshots) {
-            return Vec::new();
-        }
+        followed.belong(at.epoch, at.map, &self.snapshots);
         let mut changes = std::mem::take(&mut followed.found);
         if changes.is_empty() {
             let from = grounds.pose.pose.position().into();
@@ -292,13 +366,11 @@ impl Motion {
         let map = self.snapshots.get(at.map);
         let name = |id: &LandmarkId| map.as_ref().and_then(|m| Some(m.landmarks.get(id)?.name.clone()));
         let landmarks = fix.landmarks.iter().filter_map(name).collect();
-        let followed = self.lock().robot(robot).ok()?;
+        let followed = self.followed(robot, at.map, at.epoch)?;
         let mut followed = own(&followed);
-        if !followed.belong(at.epoch, at.map, &self.snapshots) {
-            return None;
-        }
+        followed.belong(at.epoch, at.map, &self.snapshots);
         if let Some(odometry) = at.odometry {
-            followed.moved(at.captured_ns, odometry);
+            followed.moved(at.captured_ns, odometry, at.now);
         }
         let (outcome, fused) = followed.fix(at.captured_ns, fix, landmarks)?;
         tracing::debug!(%robot, ?outcome, "fix");
@@ -307,8 +379,9 @@ impl Motion {
         }
         let modalities =
             if followed.newest.is_some() { followed.modalities() } else { vec!["landmarks".to_owned()] };
+        let age = followed.age(fused.at_ns, at.now);
         drop(followed);
-        Some(self.tell(robot, at.map, at.epoch, &fused, modalities))
+        self.tell(robot, at.map, at.epoch, (fused, age), modalities)
     }
 
     /// A robot that searched was found, by landmarks that each may be several: its pose to publish. None if its pose is known
@@ -324,27 +397,42 @@ impl Motion {
         let map = self.snapshots.get(at.map);
         let name = |id: &LandmarkId| map.as_ref().and_then(|m| Some(m.landmarks.get(id)?.name.clone()));
         let landmarks = landmarks.iter().filter_map(name).collect();
-        let followed = self.lock().robot(robot).ok()?;
+        let followed = self.followed(robot, at.map, at.epoch)?;
         let mut followed = own(&followed);
-        if !followed.belong(at.epoch, at.map, &self.snapshots) {
-            return None;
-        }
-        let fused = followed.found(at.captured_ns, &odometry, pose, landmarks)?;
-        let modalities = followed.modalities();
+        followed.belong(at.epoch, at.map, &self.snapshots);
+        let fused = followed.found(at.captured_ns, &odometry, pose, landmarks, at.now)?;
+        let (age, modalities) = (followed.age(fused.at_ns, at.now), followed.modalities());
         drop(followed);
-        Some(self.tell(robot, at.map, at.epoch, &fused, modalities))
+        self.tell(robot, at.map, at.epoch, (fused, age), modalities)
     }
 
+    /// The state of a robot that stands on this map, for its live epoch; `None` for any other. What a frame shows of a map
+    /// that its robot does not stand on says nothing about the robot's pose, and must not restart its fusion; no more must
+    /// what was still in work when another epoch began.
+    fn followed(&self, robot: &Name, map: &str, epoch: u64) -> Option<Arc<Mutex<Robot>>> {
+        let stands_on = self.snapshots.robot_map(robot.as_str())?;
+        if stands_on != map || self.epochs.current(robot).is_some_and(|current| current != epoch) {
+            return None;
+        }
+        self.lock().robot(robot).ok()
+    }
+
+    /// The pose to publish, unless it is too old.
     fn tell(
         &self,
         robot: &Name,
         map: &str,
         epoch: u64,
-        fused: &FusedPose,
+        (fused, age): (FusedPose, Duration),
         modalities: Vec<String>,
-    ) -> v1::RobotPose {
-        self.live.fused(robot, map, &fused.pose, fused.corrections);
-        v1::RobotPose {
+    ) -> Option<v1::RobotPose> {
+        if age > MAX_POSE_AGE {
+            tracing::debug!(%robot, ?age, "a pose is too old to be published");
+            return None;
+        }
+        let age_ms = age.as_secs_f64() * 1e3;
+        self.live.fused(robot, map, &fused.pose, (fused.corrections, age_ms));
+        Some(v1::RobotPose {
             epoch,
             captured_ns: fused.at_ns,
             map: map.to_owned(),
@@ -352,13 +440,19 @@ impl Motion {
             modalities,
             corrections: fused.corrections,
             laser_corrections: fused.laser_corrections,
-        }
+            age_ms,
+        })
     }
 
     /// What came in: odometry and scans.
     pub fn counts(&self) -> (MessageCounts, MessageCounts) {
         let state = self.lock();
         (state.odometry.clone(), state.scans.clone())
+    }
+
+    /// What became of the capture times of frames.
+    pub fn frame_stamps(&self) -> MessageCounts {
+        self.lock().stamps.clone()
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {

@@ -21,6 +21,7 @@ use vision::{
     learn::{model::learn, synthesis},
     localise::pose::LandmarkSize,
     params::Params,
+    points::taught::view_points,
     recognise::{LandmarkId, models::ModelSet},
 };
 
@@ -67,7 +68,9 @@ impl Scene {
             let id = LandmarkId(models.len() as u64 + 1);
             let seen = look.frame.truth.landmark(&name).unwrap();
             let views = synthesis::views(&look.frame.image, &seen.corners_px, 24, &params, id.0);
-            models.push(Arc::new(learn(id, &views, &[], &params).unwrap()));
+            let points = view_points(&look.frame.image, &seen.corners_px);
+            let model = learn(id, &views, &[], &params).unwrap().with_points(&[points]);
+            models.push(Arc::new(model));
             let truth = self.building.landmark(&name).unwrap();
             let size = LandmarkSize { width_m: truth.width_m, height_m: truth.height_m };
             let (at, normal) =
@@ -99,7 +102,7 @@ pub(crate) fn engine(maps: &[Arc<MapSnapshot>]) -> Engine {
         snapshots,
         live,
         limits: ImageLimits::FRAME,
-        panics: Arc::default(),
+        vitals: Arc::default(),
         findings: findings().0,
         searches: Arc::default(),
         gather: crate::gather::hook().0,

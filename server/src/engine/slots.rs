@@ -12,9 +12,11 @@ use std::{
 
 /// Cameras of one robot.
 pub const MAX_CAMERAS_PER_ROBOT: usize = 8;
-/// A slot that saw no frame for so long gives way to a new camera; its order is forgotten then.
+/// A slot that saw no frame for so long gives way to a camera of another robot; its order is forgotten then.
 pub const IDLE_SLOT: Duration = Duration::from_mins(10);
-/// Epochs of one camera that are remembered as over.
+/// Where a robot has all the cameras it may have, the one longest without a frame gives way to a new one after this time.
+pub const IDLE_CAMERA: Duration = Duration::from_secs(5);
+/// Epochs of one camera whose last number is remembered besides the present one's.
 pub const PAST_EPOCHS: usize = 8;
 
 /// Whose frame.
@@ -69,31 +71,31 @@ impl FrameCounts {
     }
 }
 
-/// Place of a frame in its robot's order: an epoch that a later one replaced is over for good.
+/// Place of a message in its stream's order, by epoch. Which epoch is live is decided elsewhere
+/// ([`crate::engine::epochs::Epochs`]); one that comes back goes on after its last number.
 #[derive(Debug, Default)]
 pub struct Order {
     last: Option<(u64, u64)>,
-    past: VecDeque<u64>,
+    past: VecDeque<(u64, u64)>,
 }
 
 impl Order {
-    /// Takes (epoch, seq) as the newest, or refuses it as not newer.
+    /// Takes (epoch, seq) as the newest, or refuses it as not newer than the last of its epoch.
     pub fn advance(&mut self, epoch: u64, seq: u64) -> Result<(), Rejection> {
-        let old = |field, detail| Err(Rejection::new(Code::NotNewer, field, detail));
-        if self.past.contains(&epoch) {
-            return old("epoch", format!("epoch {epoch} is over"));
+        let place = self.past.iter().position(|(past, _)| *past == epoch);
+        let known = match self.last {
+            Some((current, last)) if current == epoch => Some(last),
+            _ => place.map(|i| self.past[i].1),
+        };
+        if let Some(last) = known.filter(|last| seq <= *last) {
+            return Err(Rejection::new(Code::NotNewer, "seq", format!("{seq} is not newer than {last}")));
         }
-        match self.last {
-            Some((current, last)) if current == epoch && seq <= last => {
-                return old("seq", format!("{seq} is not newer than {last}"));
+        if let Some(current) = self.last.filter(|(current, _)| *current != epoch) {
+            place.and_then(|i| self.past.remove(i));
+            if self.past.len() == PAST_EPOCHS {
+                self.past.pop_front();
             }
-            Some((current, _)) if current != epoch => {
-                if self.past.len() == PAST_EPOCHS {
-                    self.past.pop_front();
-                }
-                self.past.push_back(current);
-            }
-            _ => {}
+            self.past.push_back(current);
         }
         self.last = Some((epoch, seq));
         Ok(())
@@ -269,7 +271,8 @@ impl<T> State<T> {
         None
     }
 
-    /// Room for one more slot, at the cost of slots that have been idle for [`IDLE_SLOT`].
+    /// Room for one more slot: at the cost of slots that have been idle for [`IDLE_SLOT`], and of the robot's own camera that
+    /// has been idle longest, [`IDLE_CAMERA`] at least.
     fn make_room(&mut self, key: &SlotKey, max_slots: usize, now: Instant) -> Result<(), Rejection> {
         let of_robot =
             |slots: &BTreeMap<SlotKey, Slot<T>>| slots.keys().filter(|k| k.robot == key.robot).count();
@@ -277,6 +280,15 @@ impl<T> State<T> {
             self.slots.retain(|_, s| {
                 s.in_work || s.waiting.is_some() || now.saturating_duration_since(s.touched) < IDLE_SLOT
             });
+        }
+        if of_robot(&self.slots) >= MAX_CAMERAS_PER_ROBOT {
+            let idle = |s: &Slot<T>| {
+                let free = !s.in_work && s.waiting.is_none();
+                free && now.saturating_duration_since(s.touched) >= IDLE_CAMERA
+            };
+            let own = self.slots.iter().filter(|(k, s)| k.robot == key.robot && idle(s));
+            let stalest = own.min_by_key(|(_, s)| s.touched).map(|(k, _)| k.clone());
+            stalest.map(|k| self.slots.remove(&k));
         }
         if of_robot(&self.slots) >= MAX_CAMERAS_PER_ROBOT {
             let detail = format!("a robot has at most {MAX_CAMERAS_PER_ROBOT} cameras at a time");

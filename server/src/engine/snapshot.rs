@@ -147,6 +147,11 @@ impl Snapshots {
         self.world.load().maps.get(map).cloned()
     }
 
+    /// The current version of every map, by name.
+    pub fn all(&self) -> Vec<Arc<MapSnapshot>> {
+        self.world.load().maps.values().cloned().collect()
+    }
+
     /// Name of the robot's map; `None` for a robot that is not registered.
     pub fn robot_map(&self, robot: &str) -> Option<String> {
         self.world.load().robots.get(robot).cloned()

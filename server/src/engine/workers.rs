@@ -1,6 +1,6 @@
 //! A fixed pool of threads that turns frames into answers: decode, pipeline, robot pose, publish. Vision runs nowhere
-//! else for robots, and never on the async runtime. A panic is caught at the edge, answered as `internal`, counted,
-//! and the worker goes on.
+//! else for robots, and never on the async runtime. A panic anywhere in a frame's work is caught, answered as `internal`
+//! and counted; its slot is free again and the worker goes on. A thread that ends untold makes the server fail.
 
 use super::{
     cameras::Look,
@@ -10,24 +10,20 @@ use super::{
     judging::{Seen, View, judged_fix},
     live::{LiveFrame, LiveHub},
     motion::{Moment, Motion},
+    panics::Edge,
     search::{Glance, Left, Searches},
     slots::{Outcome, SlotKey, Slots},
     snapshot::{MapSnapshot, Snapshots},
     standing::{Findings, Found},
     verdicts::{self, StageTimes},
 };
-use crate::gather::{Hook, Looked};
+use crate::{
+    gather::{Hook, Looked},
+    vitals::Vitals,
+};
 use map::{hypotheses::Mode, localise::Fix, pose2::Pose2Covariance};
 use protos::{CheckedFrame, Code, Name, Rejection, convert::geometry::pose2_covariance_wire, v1};
-use std::{
-    panic::{AssertUnwindSafe, catch_unwind},
-    sync::{
-        Arc,
-        atomic::{AtomicU64, Ordering},
-    },
-    thread::JoinHandle,
-    time::Instant,
-};
+use std::{cell::Cell, sync::Arc, thread::JoinHandle, time::Instant};
 use vision::{frame::GrayImage, pipeline::FrameFacts, recognise::LandmarkId};
 
 /// Where answers and poses go. Must not wait.
@@ -51,8 +47,8 @@ pub struct Engine {
     pub live: Arc<LiveHub>,
     /// What a frame may cost.
     pub limits: ImageLimits,
-    /// Panics caught; must stay 0.
-    pub panics: Arc<AtomicU64>,
+    /// Where threads say that they run and panics are counted.
+    pub vitals: Arc<Vitals>,
     /// Where findings about landmarks go.
     pub findings: Findings,
     /// Robots that do not know where they are.
@@ -75,22 +71,29 @@ impl Workers {
         let mut threads = Vec::with_capacity(count + 1);
         for i in 0..count.max(1) {
             let (engine, publish) = (engine.clone(), publish.clone());
-            let named = std::thread::Builder::new().name(format!("vision-{i}"));
-            threads.push(named.spawn(move || {
+            let name = format!("vision-{i}");
+            let pulse = engine.vitals.begin(format!("the worker thread {name}"));
+            threads.push(std::thread::Builder::new().name(name).spawn(move || {
+                // Ends with the thread, however that ends.
+                let _pulse = pulse;
                 while let Some((key, job)) = engine.slots.take() {
-                    let outcome = engine.work(&key, &job, publish.as_ref());
+                    let outcome = engine.contained(&key, &job, publish.as_ref());
                     engine.slots.finish(&key, outcome);
                 }
             })?);
         }
         let (lasers, publish) = (engine.clone(), publish.clone());
         let named = std::thread::Builder::new().name("laser".to_owned());
+        let pulse = engine.vitals.begin("the laser thread");
         threads.push(named.spawn(move || {
+            let _pulse = pulse;
             while let Some((robot, job)) = lasers.motion.scans().take() {
-                let laid = guarded(&lasers.panics, || Ok(lasers.motion.laser(&robot, &job)));
-                if let Ok(Some(pose)) = laid {
-                    publish.pose(&robot, &pose);
-                }
+                let what = format_args!("a scan of robot {robot}");
+                lasers.vitals.panics().catch(Edge::Scan, what, "it corrects nothing", || {
+                    if let Some(pose) = lasers.motion.laser(&robot, &job, Instant::now()) {
+                        publish.pose(&robot, &pose);
+                    }
+                });
             }
         })?);
         Ok(Self { slots: engine.slots.clone(), motion: engine.motion.clone(), threads })
@@ -111,7 +114,7 @@ impl Workers {
 /// What came of a frame.
 struct Done {
     answer: v1::Answer,
-    map: Option<Arc<MapSnapshot>>,
+    map: Arc<MapSnapshot>,
     fix: Option<Fix>,
     seen: Option<Seen>,
     /// Where a robot that searched is found, and the landmarks that say so.
@@ -119,38 +122,49 @@ struct Done {
 }
 
 impl Engine {
-    /// Answers one frame and publishes the answer; never panics.
-    fn work(&self, key: &SlotKey, job: &FrameJob, publish: &dyn Publish) -> Outcome {
+    /// Answers one frame and publishes the answer; never panics. What a frame has come to once it is answered stands,
+    /// whatever happens to the pose and the findings after it.
+    fn contained(&self, key: &SlotKey, job: &FrameJob, publish: &dyn Publish) -> Outcome {
+        let answered = Cell::new(None);
+        let seq = job.frame.seq;
+        let what = format_args!("frame {seq} of robot {}, camera {}", key.robot, key.camera);
+        let panics = self.vitals.panics();
+        let worked = panics
+            .catch(Edge::Frame, what, "its slot is free again", || self.work(key, job, publish, &answered));
+        if let Some(outcome) = worked.or(answered.get()) {
+            return outcome;
+        }
+        let (answer, outcome) = refused(job, &failed());
+        panics.catch(Edge::Frame, what, "it is not answered", || self.reply(key, job, answer, publish));
+        outcome
+    }
+
+    /// Answers one frame; `answered` says what it has come to as soon as the answer is on its way.
+    fn work(
+        &self,
+        key: &SlotKey,
+        job: &FrameJob,
+        publish: &dyn Publish,
+        answered: &Cell<Option<Outcome>>,
+    ) -> Outcome {
         let done = if Instant::now() > job.deadline {
             let detail = format!("waited {} ms", job.received.elapsed().as_millis());
             Err(Rejection::new(Code::Expired, "deadline_ms", detail))
         } else {
-            guarded(&self.panics, || self.analyse(key, job)).inspect_err(|refusal| {
-                if refusal.code == Code::Internal {
-                    tracing::error!(robot = %key.robot, camera = %key.camera, seq = job.frame.seq, "a worker panicked");
-                }
-            })
+            self.analyse(key, job)
         };
-        let (Done { mut answer, map, fix, seen, found }, outcome) = match done {
-            Ok(done) => (done, Outcome::Processed),
+        let Done { answer, map, fix, seen, found } = match done {
+            Ok(done) => done,
             Err(refusal) => {
-                let (status, outcome) = match refusal.code {
-                    Code::Expired => (v1::Status::Expired, Outcome::Expired),
-                    code => (v1::Status::Rejected, Outcome::Rejected(code)),
-                };
-                let rejection = Some((&refusal).into());
-                let map = job.map.clone();
-                let answer = v1::Answer { status: status.into(), rejection, map, ..v1::Answer::default() };
-                (Done { answer, map: None, fix: None, seen: None, found: None }, outcome)
+                let (answer, outcome) = refused(job, &refusal);
+                answered.set(Some(outcome));
+                self.reply(key, job, answer, publish);
+                return outcome;
             }
         };
-        let frame = &job.frame;
-        (answer.epoch, answer.seq, answer.captured_ns) = (frame.epoch, frame.seq, frame.captured_ns);
-        answer.clock_suspect = job.clock_suspect;
-        answer.age_ms = job.received.elapsed().as_secs_f64() * 1e3;
-        publish.answer(key, &answer);
-        self.show(key, job, answer, outcome);
-        let Some(map) = map else { return outcome };
+        let (frame, outcome) = (&job.frame, Outcome::Processed);
+        answered.set(Some(outcome));
+        self.reply(key, job, answer, publish);
         if let Some(fix) = fix
             && let Some(pose) = self.motion.fixed(&key.robot, moment(frame, &map), &fix)
         {
@@ -175,6 +189,8 @@ impl Engine {
     /// Decode, pipeline, robot pose: everything that can fail on a frame's content.
     fn analyse(&self, key: &SlotKey, job: &FrameJob) -> Result<Done, Rejection> {
         let frame = &job.frame;
+        #[cfg(test)]
+        assert!(key.camera.as_str() != tests::PLANTED, "planted");
         // One version of the map for the whole answer, whatever is published meanwhile.
         let map = self.snapshots.get(&job.map).ok_or_else(|| unknown_map(&job.map))?;
         let mut times = StageTimes::start();
@@ -182,7 +198,11 @@ impl Engine {
         times.ended("decode");
         let facts = verdicts::look(&image, frame.intrinsics.as_ref(), &map, &mut times);
         let mut answer = verdicts::answer(&facts, &map);
-        let grounds = self.motion.grounds(&key.robot, moment(frame, &map));
+        // A frame may be answered on any map; what follows for the robot and for the map, only on its own.
+        let on_own_map = self.snapshots.robot_map(key.robot.as_str()).is_some_and(|own| own == map.name);
+        let is_live = self.motion.epochs().current(&key.robot).is_none_or(|epoch| epoch == frame.epoch);
+        let counts = on_own_map && is_live && job.stamp_instead_ns.is_none();
+        let grounds = counts.then(|| self.motion.grounds(&key.robot, moment(frame, &map))).flatten();
         let view = View {
             facts: &facts,
             map: &map,
@@ -193,6 +213,16 @@ impl Engine {
         };
         let (fix, seen) = judged_fix(&view, grounds);
         verdicts::fill_fix(&mut answer, &fix, &map);
+        if !counts {
+            times.ended("localise");
+            answer.timings = times.finish();
+            if let Some(captured_ns) = job.stamp_instead_ns.filter(|_| on_own_map && is_live) {
+                let frame = CheckedFrame { captured_ns, ..frame.clone() };
+                let (quads, believed) = (facts.quads, frame.prior);
+                self.gather.offer(key, &frame, || Looked { image, quads, map: map.clone(), believed });
+            }
+            return Ok(Done { answer, map, fix: None, seen: None, found: None });
+        }
         if let Some(intrinsics) = &frame.intrinsics {
             let (seen, mounting) = (verdicts::recognised(&facts), frame.mounting.as_ref());
             let image_px = [image.width() as u32, image.height() as u32];
@@ -212,7 +242,7 @@ impl Engine {
             let believed = frame.prior.or_else(|| seen.as_ref().map(|s| s.grounds.pose));
             Looked { image, quads: facts.quads, map: map.clone(), believed }
         });
-        Ok(Done { answer, map: Some(map.clone()), fix: fix.ok(), seen, found })
+        Ok(Done { answer, map, fix: fix.ok(), seen, found })
     }
 
     /// Goes on with the search of a robot that does not know where it is.
@@ -235,10 +265,15 @@ impl Engine {
         self.searches.glance(&key.robot, &glance)
     }
 
-    fn show(&self, key: &SlotKey, job: &FrameJob, answer: v1::Answer, outcome: Outcome) {
+    /// Publishes an answer and shows it on pages.
+    fn reply(&self, key: &SlotKey, job: &FrameJob, mut answer: v1::Answer, publish: &dyn Publish) {
+        let frame = &job.frame;
+        (answer.epoch, answer.seq, answer.captured_ns) = (frame.epoch, frame.seq, frame.captured_ns);
+        answer.clock_suspect = job.clock_suspect;
+        answer.age_ms = job.received.elapsed().as_secs_f64() * 1e3;
+        publish.answer(key, &answer);
         let answer = Arc::new(answer);
-        if outcome == Outcome::Processed {
-            let frame = &job.frame;
+        if answer.rejection.is_none() {
             let (encoding, width_px, height_px) = (frame.encoding, frame.width_px, frame.height_px);
             self.live.answered(
                 key,
@@ -256,16 +291,22 @@ fn hypothesis(mode: &Mode) -> v1::Hypothesis {
 
 fn moment<'a>(frame: &CheckedFrame, map: &'a MapSnapshot) -> Moment<'a> {
     let CheckedFrame { epoch, captured_ns, odometry, .. } = *frame;
-    Moment { map: &map.name, epoch, captured_ns, odometry }
+    Moment { map: &map.name, epoch, captured_ns, odometry, now: Instant::now() }
 }
 
-/// Runs `work`; a panic becomes a refusal, and is counted.
-fn guarded<T>(panics: &AtomicU64, work: impl FnOnce() -> Result<T, Rejection>) -> Result<T, Rejection> {
-    // Nothing that is shared is left half changed: vision is pure, and the rest locks for single steps.
-    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|_| {
-        panics.fetch_add(1, Ordering::Relaxed);
-        Err(Rejection::new(Code::Internal, "frame", "the server failed on this frame; see its log"))
-    })
+/// The answer that says why there is none, and how the frame has ended.
+fn refused(job: &FrameJob, refusal: &Rejection) -> (v1::Answer, Outcome) {
+    let (status, outcome) = match refusal.code {
+        Code::Expired => (v1::Status::Expired, Outcome::Expired),
+        code => (v1::Status::Rejected, Outcome::Rejected(code)),
+    };
+    let (rejection, map) = (Some(refusal.into()), job.map.clone());
+    (v1::Answer { status: status.into(), rejection, map, ..v1::Answer::default() }, outcome)
+}
+
+/// What a panic is answered with.
+pub(crate) fn failed() -> Rejection {
+    Rejection::new(Code::Internal, "frame", "the server failed on this frame; see its log")
 }
 
 #[cfg(test)]
@@ -274,6 +315,9 @@ mod tests {
     use crate::engine::{intake::Intake, scene};
     use protos::prost::Message;
     use std::{sync::Mutex, time::Duration};
+
+    /// The analysis of this camera's frames panics.
+    pub(super) const PLANTED: &str = "panics";
 
     #[derive(Default)]
     struct Sent(Mutex<Vec<v1::Answer>>);
@@ -288,7 +332,7 @@ mod tests {
 
     fn intake(engine: &Engine, deadline: Duration) -> Intake {
         let (slots, snapshots) = (engine.slots.clone(), engine.snapshots.clone());
-        Intake { slots, snapshots, frame_bytes: 100_000, deadline }
+        Intake { slots, snapshots, motion: engine.motion.clone(), frame_bytes: 100_000, deadline }
     }
 
     fn key(camera: usize) -> SlotKey {
@@ -307,12 +351,81 @@ mod tests {
         scene::engine(&[Arc::new(MapSnapshot::empty("hall", 1))])
     }
 
+    /// Panics where it is told to.
+    #[derive(Default)]
+    struct Breaks {
+        answers: bool,
+        sent: Sent,
+    }
+
+    impl Publish for Breaks {
+        fn answer(&self, key: &SlotKey, answer: &v1::Answer) {
+            assert!(!self.answers, "planted");
+            self.sent.answer(key, answer);
+        }
+
+        fn pose(&self, _: &Name, _: &v1::RobotPose) {}
+    }
+
+    fn settled(engine: &Engine) -> crate::engine::slots::FrameCounts {
+        loop {
+            let counts = engine.slots.counts();
+            if counts.waiting == 0 && counts.in_work == 0 {
+                return counts;
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    /// Outside the analysis: where the answer is handed over.
     #[test]
-    fn a_panic_is_a_refusal_and_counted() {
-        let panics = AtomicU64::new(0);
-        let result: Result<(), _> = guarded(&panics, || panic!("planted"));
-        assert_eq!((result.unwrap_err().code, panics.load(Ordering::Relaxed)), (Code::Internal, 1));
-        assert_eq!(guarded(&panics, || Ok(3)), Ok(3));
+    fn a_panic_beside_the_analysis_leaves_the_camera_usable() {
+        let (engine, breaks) = (hall(), Arc::new(Breaks { answers: true, ..Breaks::default() }));
+        let workers = Workers::start(&engine, 1, &breaks).unwrap();
+        let intake = intake(&engine, Duration::from_mins(1));
+        for seq in 1..=2 {
+            intake.receive(key(0), message(seq, 768)).unwrap();
+            let counts = settled(&engine);
+            assert_eq!((counts.processed, counts.missing()), (seq, 0));
+        }
+        assert_eq!(engine.vitals.panics().at(Edge::Frame), 2);
+        assert_eq!(engine.vitals.failure(), None);
+        engine.vitals.stop();
+        workers.stop();
+    }
+
+    /// Inside it: answered, once.
+    #[test]
+    fn a_panic_of_the_analysis_is_answered_and_counted() {
+        let (engine, sent) = (hall(), Sent::default());
+        intake(&engine, Duration::from_mins(1)).receive(key(0), message(1, 768)).unwrap();
+        let (_, job) = engine.slots.try_take().unwrap();
+        let k = SlotKey { robot: key(0).robot, camera: Name::new(PLANTED).unwrap() };
+        let outcome = engine.contained(&k, &job, &sent);
+        let answer = sent.0.lock().unwrap().pop().unwrap();
+        assert!(sent.0.lock().unwrap().is_empty());
+        let code = answer.rejection.map(|r| r.code);
+        assert_eq!((outcome, code.as_deref()), (Outcome::Rejected(Code::Internal), Some("internal")));
+        assert_eq!(engine.vitals.panics().at(Edge::Frame), 1);
+    }
+
+    #[test]
+    fn a_thread_that_ends_untold_is_a_failure() {
+        let engine = hall();
+        let workers = Workers::start(&engine, 1, &Arc::new(Sent::default())).unwrap();
+        assert_eq!(engine.vitals.failure(), None);
+        // No frames any more, and nobody has told the server to stop.
+        engine.slots.close();
+        let started = Instant::now();
+        let failure = loop {
+            if let Some(failure) = engine.vitals.failure() {
+                break failure;
+            }
+            assert!(started.elapsed() < Duration::from_secs(5));
+            std::thread::sleep(Duration::from_millis(1));
+        };
+        assert_eq!(failure.part, "the worker thread vision-0");
+        workers.stop();
     }
 
     #[test]
@@ -321,7 +434,7 @@ mod tests {
         intake(&engine, Duration::ZERO).receive(key(0), message(1, 768)).unwrap();
         let (k, job) = engine.slots.try_take().unwrap();
         std::thread::sleep(Duration::from_millis(2));
-        assert_eq!(engine.work(&k, &job, &sent), Outcome::Expired);
+        assert_eq!(engine.contained(&k, &job, &sent), Outcome::Expired);
         let answer = sent.0.lock().unwrap().pop().unwrap();
         assert_eq!((answer.status(), answer.seq, answer.timings.len()), (v1::Status::Expired, 1, 0));
     }
@@ -332,7 +445,7 @@ mod tests {
         intake(&engine, Duration::from_secs(9)).receive(key(0), message(1, 768)).unwrap();
         engine.snapshots.remove_map("hall");
         let (k, job) = engine.slots.try_take().unwrap();
-        assert_eq!(engine.work(&k, &job, &sent), Outcome::Rejected(Code::UnknownMap));
+        assert_eq!(engine.contained(&k, &job, &sent), Outcome::Rejected(Code::UnknownMap));
     }
 
     /// Far more frames than the pool can take: each is answered or superseded, none is lost, none answered twice.

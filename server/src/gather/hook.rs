@@ -86,6 +86,8 @@ pub struct Session {
     /// Short holds only: workers count here.
     pub(super) counts: Mutex<Counts>,
     pub(super) tracker: Mutex<Tracker>,
+    /// Tracks that somebody has decided on since the last frame. Short holds only: the writer tells of them here.
+    pub(super) decided: Mutex<Vec<u32>>,
 }
 
 pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -102,6 +104,7 @@ impl Session {
             known: row.known,
             counts: Mutex::default(),
             tracker: Mutex::new(tracker),
+            decided: Mutex::default(),
         }
     }
 }

@@ -13,11 +13,11 @@ pub use hook::{Hook, Looked, Offer, Session, hook};
 
 use crate::{
     config::Config,
-    engine::picture,
-    jobs::{Jobs, learn},
+    engine::{panics::Edge, picture},
+    jobs::learn,
     store::{
         Store, StoreError,
-        accepting::{self, Accepted, Pick},
+        accepting::{self, Accepted, Decision, Pick},
         gatherings::{self, Bounds, GatheringRow, NewGathering},
         placing::{self, Capture},
         views::NewView,
@@ -57,7 +57,12 @@ impl Gatherer {
             let tracker = gatherer.resumed(&row).await?;
             gatherer.enter(&row, tracker);
         }
-        let task = tokio::spawn(gatherer.clone().run(offers));
+        let pulse = gatherer.store.vitals().begin("the task that gathers views");
+        let run = gatherer.clone().run(offers);
+        let task = tokio::spawn(async move {
+            run.await;
+            drop(pulse);
+        });
         Ok((gatherer, task))
     }
 
@@ -108,43 +113,52 @@ impl Gatherer {
     }
 
     /// Begins. Durable when this returns.
-    pub(crate) async fn begin(&self, map: &str, new: NewGathering) -> Result<GatheringRow, StoreError> {
-        let map = map.to_owned();
+    pub(crate) async fn begin(
+        self: &Arc<Self>,
+        map: &str,
+        new: NewGathering,
+    ) -> Result<GatheringRow, StoreError> {
+        let (gatherer, map) = (self.clone(), map.to_owned());
         let write = self.store.write(move |tx| {
-            Box::pin(async move { gatherings::create(tx, &map, &new, Bounds::SERVER).await })
+            Box::pin(async move {
+                let row = gatherings::create(tx, &map, &new, Bounds::SERVER).await?;
+                let begun = row.clone();
+                tx.after(move || gatherer.enter(&begun, Tracker::new(GatherParams::default())));
+                Ok(row)
+            })
         });
-        let row = write.await?;
-        self.enter(&row, Tracker::new(GatherParams::default()));
-        Ok(row)
+        write.await
     }
 
     /// Ends. What is still in the queue is not kept.
-    pub(crate) async fn end(&self, map: &str, id: i64) -> Result<GatheringRow, StoreError> {
+    pub(crate) async fn end(self: &Arc<Self>, map: &str, id: i64) -> Result<GatheringRow, StoreError> {
         let counts =
             self.counts(id).and_then(|c| serde_json::to_string(&c).ok()).unwrap_or_else(|| "{}".into());
-        let map = map.to_owned();
-        let row = self
-            .store
-            .write(move |tx| Box::pin(async move { gatherings::end(tx, &map, id, &counts).await }))
-            .await?;
-        self.leave(id);
-        Ok(row)
+        let (gatherer, map) = (self.clone(), map.to_owned());
+        let write = self.store.write(move |tx| {
+            Box::pin(async move {
+                tx.after(move || gatherer.leave(id));
+                gatherings::end(tx, &map, id, &counts).await
+            })
+        });
+        write.await
     }
 
     /// Throws everything away that nobody has accepted.
-    pub(crate) async fn delete(&self, map: &str, id: i64) -> Result<(), StoreError> {
-        let map = map.to_owned();
-        let write =
-            self.store.write(move |tx| Box::pin(async move { gatherings::delete(tx, &map, id).await }));
-        write.await?;
-        self.leave(id);
-        Ok(())
+    pub(crate) async fn delete(self: &Arc<Self>, map: &str, id: i64) -> Result<(), StoreError> {
+        let (gatherer, map) = (self.clone(), map.to_owned());
+        let write = self.store.write(move |tx| {
+            Box::pin(async move {
+                tx.after(move || gatherer.leave(id));
+                gatherings::delete(tx, &map, id).await
+            })
+        });
+        write.await
     }
 
     /// Makes landmarks of tracks, and queues their lesson if it is wanted.
     pub(crate) async fn accept(
-        &self,
-        jobs: &Jobs,
+        self: &Arc<Self>,
         (map, id): (&str, i64),
         picks: Vec<Pick>,
         lesson: bool,
@@ -152,34 +166,28 @@ impl Gatherer {
     ) -> Result<Accepted, StoreError> {
         let (map, numbers) = (map.to_owned(), picks.iter().map(|p| p.number).collect::<Vec<_>>());
         let lesson = lesson.then_some(learn::Request::of as fn(&[String]) -> String);
-        let write = self.store.write(move |tx| {
-            Box::pin(async move { accepting::accept(tx, (&map, id), &picks, lesson, bounds).await })
-        });
-        let accepted = write.await?;
-        self.decided(id, numbers);
-        if let Some(job) = &accepted.job {
-            jobs.take_up(job);
-        }
-        Ok(accepted)
+        let gatherer = self.clone();
+        let after = Arc::new(move || gatherer.decided(id, numbers.iter().copied()));
+        let decision = Decision { map, gathering: id, picks, lesson, bounds, after };
+        accepting::accept(&self.store, decision).await
     }
 
     /// Throws a track away.
-    pub(crate) async fn discard(&self, map: &str, id: i64, number: u32) -> Result<(), StoreError> {
-        let map = map.to_owned();
-        let write = self
-            .store
-            .write(move |tx| Box::pin(async move { gatherings::discard(tx, &map, id, number).await }));
-        write.await?;
-        self.decided(id, [number]);
-        Ok(())
+    pub(crate) async fn discard(self: &Arc<Self>, map: &str, id: i64, number: u32) -> Result<(), StoreError> {
+        let (gatherer, map) = (self.clone(), map.to_owned());
+        let write = self.store.write(move |tx| {
+            Box::pin(async move {
+                tx.after(move || gatherer.decided(id, [number]));
+                gatherings::discard(tx, &map, id, number).await
+            })
+        });
+        write.await
     }
 
     /// Somebody has decided on these tracks.
     fn decided(&self, id: i64, numbers: impl IntoIterator<Item = u32>) {
-        let Some(session) = self.session(id) else { return };
-        let mut tracker = lock(&session.tracker);
-        for number in numbers {
-            tracker.close(number);
+        if let Some(session) = self.session(id) {
+            lock(&session.decided).extend(numbers);
         }
     }
 
@@ -191,12 +199,10 @@ impl Gatherer {
     async fn run(self: Arc<Self>, mut offers: Receiver<Offer>) {
         while let Some(offer) = offers.recv().await {
             let (session, params) = (offer.session.clone(), self.params.clone());
-            let views = match tokio::task::spawn_blocking(move || follow(&offer, &params)).await {
-                Ok(views) => views,
-                Err(error) => {
-                    tracing::error!(%error, "a frame was not followed");
-                    continue;
-                }
+            let views = tokio::task::spawn_blocking(move || follow(&offer, &params)).await;
+            let (panics, what) = (self.store.vitals().panics(), "a frame of a robot that gathers");
+            let Ok(views) = panics.joined(Edge::Gathering, what, "nothing of it is kept", views) else {
+                continue;
             };
             for (kept, view) in views {
                 self.keep(&session, Box::new(kept), view).await;
@@ -232,6 +238,9 @@ fn follow(offer: &Offer, params: &Params) -> Vec<(Kept, NewView)> {
     let found = glimpses::glimpses(offer, params);
     let wanted = |id| session.landmark.map_or(session.known, |only| only == id);
     let mut tracker = lock(&session.tracker);
+    for number in std::mem::take(&mut *lock(&session.decided)) {
+        tracker.close(number);
+    }
     let at = (frame.captured_ns, offer.camera.as_str());
     let recognise: &RecogniseParams = &params.recognise;
     let outcomes = tracker.follow(at, &found.glimpses, wanted, session.landmark.is_none(), recognise);

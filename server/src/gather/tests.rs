@@ -65,7 +65,7 @@ async fn a_full_queue_drops_and_counts_and_nobody_waits() {
     let dir = tempfile::tempdir().unwrap();
     let (store, _writer) = store(dir.path()).await;
     let (hook, offers) = hook();
-    let gatherer = Gatherer { store, params: Arc::default(), sessions: hook.sessions.clone() };
+    let gatherer = Arc::new(Gatherer { store, params: Arc::default(), sessions: hook.sessions.clone() });
     let id = gatherer.begin(MAP, new()).await.unwrap().id;
     for (frame, looked) in frames(QUEUE as u64 + 3) {
         hook.offer(&key("r1"), &frame, || looked);
@@ -78,7 +78,6 @@ async fn a_full_queue_drops_and_counts_and_nobody_waits() {
     assert_eq!((counts.frames, counts.dropped, counts.elsewhere), (QUEUE as u64 + 4, 3, 1));
     // What waits is followed; the same picture again and again is one view.
     drop(hook);
-    let gatherer = Arc::new(gatherer);
     gatherer.clone().run(offers).await;
     let counts = gatherer.counts(id).unwrap();
     assert!(

@@ -31,7 +31,8 @@ pub(crate) struct Problem {
     pub(crate) field: Option<String>,
     /// A sentence for a person.
     pub(crate) detail: String,
-    /// More, by code: `quads` with `quad_not_found` and `quad_ambiguous`.
+    /// More, by code: `quads` with `quad_not_found` and `quad_ambiguous`; `may_be_done` (true) with `timeout` and
+    /// `not_published`, if the change that was asked for may have been made; `part` with `part_ended`.
     #[serde(flatten)]
     pub(crate) more: serde_json::Map<String, Value>,
 }
@@ -135,7 +136,16 @@ impl From<StoreError> for ApiError {
             }
             StoreError::Full => Self::new(StatusCode::INSUFFICIENT_STORAGE, "storage_full", detail),
             StoreError::Closed => Self::new(StatusCode::SERVICE_UNAVAILABLE, "storage_failed", detail),
-            StoreError::Damaged { .. } | StoreError::Database { .. } => Self::internal(&error),
+            StoreError::NotPublished { .. } => {
+                Self::new(StatusCode::INTERNAL_SERVER_ERROR, "not_published", detail)
+                    .with("may_be_done", Value::Bool(true))
+            }
+            StoreError::Changed | StoreError::Busy => {
+                Self::new(StatusCode::SERVICE_UNAVAILABLE, "busy", StoreError::Busy.to_string())
+            }
+            StoreError::Damaged { .. } | StoreError::Database { .. } | StoreError::Panicked => {
+                Self::internal(&error)
+            }
         }
     }
 }

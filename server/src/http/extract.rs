@@ -14,27 +14,46 @@ use utoipa::{IntoParams, ToSchema};
 /// A JSON body of at most `limits.json_bytes`.
 pub(super) struct Body<T>(pub(super) T);
 
-impl<T: DeserializeOwned> FromRequest<Shared> for Body<T> {
+impl<T: DeserializeOwned + Send + 'static> FromRequest<Shared> for Body<T> {
     type Rejection = ApiError;
 
     async fn from_request(request: Request, app: &Shared) -> Result<Self, ApiError> {
-        let kind =
-            request.headers().get(header::CONTENT_TYPE).and_then(|v| v.to_str().ok()).unwrap_or_default();
-        if kind.split(';').next().map(str::trim) != Some("application/json") {
-            let detail = "the body must be application/json";
-            return Err(
-                ApiError::new(StatusCode::UNSUPPORTED_MEDIA_TYPE, "not_json", detail).field("content-type")
-            );
-        }
-        let max = app.config.limits.json_bytes;
-        let bytes =
-            axum::body::to_bytes(request.into_body(), max).await.map_err(|_too_long| too_large(max))?;
-        json(&bytes, "").map(Self)
+        read(request, app.config.limits.json_bytes).await.map(Self)
     }
 }
 
+/// A JSON body of at most so many bytes, for a route that promises to take more than `limits.json_bytes`.
+pub(super) struct BodyUpTo<T, const BYTES: usize>(pub(super) T);
+
+impl<T: DeserializeOwned + Send + 'static, const BYTES: usize> FromRequest<Shared> for BodyUpTo<T, BYTES> {
+    type Rejection = ApiError;
+
+    async fn from_request(request: Request, _: &Shared) -> Result<Self, ApiError> {
+        read(request, BYTES).await.map(Self)
+    }
+}
+
+/// Larger bodies are parsed off the runtime.
+const PARSED_HERE: usize = 256 << 10;
+
+async fn read<T: DeserializeOwned + Send + 'static>(request: Request, max: usize) -> Result<T, ApiError> {
+    let kind = request.headers().get(header::CONTENT_TYPE).and_then(|v| v.to_str().ok()).unwrap_or_default();
+    if kind.split(';').next().map(str::trim) != Some("application/json") {
+        let detail = "the body must be application/json";
+        return Err(
+            ApiError::new(StatusCode::UNSUPPORTED_MEDIA_TYPE, "not_json", detail).field("content-type")
+        );
+    }
+    let bytes = axum::body::to_bytes(request.into_body(), max).await.map_err(|_too_long| too_large(max))?;
+    if bytes.len() <= PARSED_HERE {
+        return json(&bytes, "");
+    }
+    let parsed = tokio::task::spawn_blocking(move || json(&bytes, "")).await;
+    parsed.map_err(|e| ApiError::internal(&e))?
+}
+
 /// No body at all is fine where the body is optional.
-impl<T: DeserializeOwned> OptionalFromRequest<Shared> for Body<T> {
+impl<T: DeserializeOwned + Send + 'static> OptionalFromRequest<Shared> for Body<T> {
     type Rejection = ApiError;
 
     async fn from_request(request: Request, app: &Shared) -> Result<Option<Self>, ApiError> {

@@ -309,7 +309,7 @@ async fn accept(
         views: limits.views,
         jobs: (limits.jobs, limits.jobs_kept),
     };
-    let done = app.gatherer.accept(&app.jobs, (&map, id), picks, decision.learn, bounds).await?;
+    let done = app.gatherer.accept((&map, id), picks, decision.learn, bounds).await?;
     let landmarks =
         done.landmarks.into_iter().map(|(name, (views, placing))| Grown { name, views, placing }).collect();
     let status = if done.job.is_some() { StatusCode::ACCEPTED } else { StatusCode::OK };

@@ -1,4 +1,4 @@
-//! Around every request: an id, a log line, a deadline, safe headers, and a refusal of what other web pages send.
+//! Around every request: an id, a log line, a deadline, a place for a large body, safe headers, and a refusal of what other web pages send.
 //!
 //! The server has no passwords yet and trusts whoever reaches its loopback port. A browser reaches it too, on behalf of
 //! any page it shows; so a request must name this server as its host and, if it changes anything, come from its own
@@ -6,11 +6,13 @@
 
 use super::{Shared, error::ApiError};
 use axum::{
+    body::HttpBody,
     extract::{Request, State},
     http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, header},
     middleware::Next,
     response::{IntoResponse, Response},
 };
+use serde_json::Value;
 use std::{
     net::IpAddr,
     sync::atomic::{AtomicU64, Ordering},
@@ -21,6 +23,8 @@ use std::{
 const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
 /// Longest id taken over from a client.
 const REQUEST_ID_MAX: usize = 64;
+/// Bodies up to this size need no place, bytes.
+const SMALL_BODY: u64 = 64 << 10;
 /// The pages load only what this server serves; nothing may frame them.
 const CSP: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; \
                    connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
@@ -40,12 +44,9 @@ pub(super) async fn guard(State(app): State<Shared>, request: Request, next: Nex
     let loopback = app.config.http_addr.ip().to_canonical().is_loopback();
     let mut response = match check_origin(request.method(), request.headers(), loopback) {
         Err(error) => error.into_response(),
-        Ok(()) => match tokio::time::timeout(deadline, next.run(request)).await {
+        Ok(()) => match tokio::time::timeout(deadline, placed(&app, request, next)).await {
             Ok(response) => response,
-            Err(_elapsed) => {
-                let detail = format!("not done within {} s", deadline.as_secs());
-                ApiError::new(StatusCode::REQUEST_TIMEOUT, "timeout", detail).into_response()
-            }
+            Err(_elapsed) => timed_out(&method, deadline).into_response(),
         },
     };
     let ms = started.elapsed().as_secs_f64() * 1e3;
@@ -59,6 +60,33 @@ pub(super) async fn guard(State(app): State<Shared>, request: Request, next: Nex
     headers.insert(header::REFERRER_POLICY, HeaderValue::from_static("no-referrer"));
     headers.insert("cross-origin-resource-policy", HeaderValue::from_static("same-origin"));
     response
+}
+
+/// Handles a request. One with a large body has a place from before its body is read until it is answered.
+async fn placed(app: &Shared, request: Request, next: Next) -> Response {
+    let small = request.body().size_hint().upper().is_some_and(|bytes| bytes <= SMALL_BODY);
+    let _place = if small {
+        None
+    } else {
+        match app.upload_place().await {
+            Ok(place) => Some(place),
+            Err(error) => return error.into_response(),
+        }
+    };
+    next.run(request).await
+}
+
+/// 408. A change that had not begun is not made any more; one that had is made all the same, and nobody is told.
+fn timed_out(method: &Method, deadline: Duration) -> ApiError {
+    let seconds = deadline.as_secs();
+    if method.is_safe() {
+        let detail = format!("not done within {seconds} s");
+        return ApiError::new(StatusCode::REQUEST_TIMEOUT, "timeout", detail);
+    }
+    let detail = format!(
+        "not done within {seconds} s; the change may have been made: look before it is asked for again"
+    );
+    ApiError::new(StatusCode::REQUEST_TIMEOUT, "timeout", detail).with("may_be_done", Value::Bool(true))
 }
 
 fn request_id(headers: &HeaderMap) -> HeaderValue {

@@ -4,8 +4,11 @@ use super::{
     Shared,
     error::{ApiError, Problem},
 };
+use crate::{engine::panics::Edge, store::WRITER, vitals::Failure};
 use axum::{Json, extract::State, http::StatusCode};
 use serde::Serialize;
+use serde_json::json;
+use std::collections::BTreeMap;
 use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
@@ -16,8 +19,21 @@ pub(super) fn router() -> OpenApiRouter<Shared> {
 /// A word.
 #[derive(Debug, Serialize, ToSchema)]
 struct Health {
-    /// `ok` or `ready`.
+    /// `ok`.
     status: &'static str,
+}
+
+/// How far the server can do its work.
+#[derive(Debug, Serialize, ToSchema)]
+struct Ready {
+    /// `ready`, or `degraded`: everything runs, but maps are named in `maps_not_in_use`.
+    status: &'static str,
+    /// Maps whose stored version cannot be made ready, with the reason: an earlier version is used, or none since the
+    /// server started. A later change of the map tries again.
+    maps_not_in_use: BTreeMap<String, String>,
+    /// Panics caught since the start, by where: what they met was refused or dropped, everything else went on. Each is in
+    /// the log. Anything but 0 is a fault of the program.
+    panics: BTreeMap<&'static str, u64>,
 }
 
 /// What runs here.
@@ -40,19 +56,26 @@ async fn healthz() -> Json<Health> {
     Json(Health { status: "ok" })
 }
 
-/// The database answers and takes writes.
-#[utoipa::path(get, path = "/readyz", tag = "health", responses((status = 200, body = Health),
-    (status = 503, body = Problem)))]
-async fn readyz(State(app): State<Shared>) -> Result<Json<Health>, ApiError> {
-    if *app.store.failed().borrow() {
-        return Err(ApiError::new(
-            StatusCode::SERVICE_UNAVAILABLE,
-            "storage_failed",
-            "the store does not take writes",
-        ));
+/// Every part of the server runs and the database answers. 503 with the `part` that has ended: the process is about to end
+/// with an error, too.
+#[utoipa::path(get, path = "/readyz", tag = "health", responses((status = 200, body = Ready),
+    (status = 503, body = Problem, description = "storage_failed, part_ended")))]
+async fn readyz(State(app): State<Shared>) -> Result<Json<Ready>, ApiError> {
+    let vitals = app.store.vitals();
+    if let Some(failure) = vitals.failure() {
+        return Err(not_ready(&failure));
     }
     crate::store::maps::page(app.store.reads(), "", 1).await?;
-    Ok(Json(Health { status: "ready" }))
+    let maps_not_in_use = vitals.all_unpublished();
+    let status = if maps_not_in_use.is_empty() { "ready" } else { "degraded" };
+    let panics = Edge::ALL.into_iter().map(|edge| (edge.name(), vitals.panics().at(edge))).collect();
+    Ok(Json(Ready { status, maps_not_in_use, panics }))
+}
+
+fn not_ready(failure: &Failure) -> ApiError {
+    let code = if failure.part == WRITER { "storage_failed" } else { "part_ended" };
+    let detail = format!("{failure}; the server must be started again");
+    ApiError::new(StatusCode::SERVICE_UNAVAILABLE, code, detail).with("part", json!(failure.part))
 }
 
 /// What runs here.

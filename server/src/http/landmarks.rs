@@ -6,9 +6,12 @@ use super::{
     extract::{At, Body, Page, PageQuery, Params, name},
     resources::{Landmark, Place, Size, Trust, measures},
 };
-use crate::store::{
-    landmarks::{self, LandmarkRow},
-    maps,
+use crate::{
+    jobs::Learning,
+    store::{
+        landmarks::{self, LandmarkRow},
+        maps,
+    },
 };
 use axum::{Json, extract::State, http::StatusCode};
 use map::changes::Standing;
@@ -59,10 +62,10 @@ pub(super) fn given<'de, D: Deserializer<'de>, T: Deserialize<'de>>(
 }
 
 /// The landmark with what only the running server knows: a model out of use, a job at work.
-fn shown(app: &App, map: &str, row: LandmarkRow) -> Landmark {
+fn shown(app: &App, learning: &Learning, map: &str, row: LandmarkRow) -> Landmark {
     let snapshot = app.store.snapshots().get(map);
     let quarantined = snapshot.and_then(|s| s.quarantined.get(&LandmarkId(row.id as u64)).cloned());
-    let learning = app.jobs.is_learning(map, &row.name) && row.views > 0;
+    let learning = learning.has(&row.name) && row.views > 0;
     Landmark::new(row, quarantined, learning)
 }
 
@@ -95,7 +98,8 @@ async fn list(
     let limit = page.limit(app.config.limits.page)?;
     let map = maps::get(app.store.reads(), &map).await?;
     let rows = landmarks::page(app.store.reads(), map.id, &page.after(), limit + 1).await?;
-    Ok(Json(Page::new(rows, limit, |r| r.name.clone(), |r| shown(&app, &map.name, r))))
+    let learning = app.jobs.learning(&map.name).await?;
+    Ok(Json(Page::new(rows, limit, |r| r.name.clone(), |r| shown(&app, &learning, &map.name, r))))
 }
 
 /// One landmark.
@@ -108,7 +112,7 @@ async fn get(
 ) -> Result<Json<Landmark>, ApiError> {
     maps::get(app.store.reads(), &map).await?;
     let row = landmarks::get(app.store.reads(), &map, &landmark).await?;
-    Ok(Json(shown(&app, &map, row)))
+    Ok(Json(shown(&app, &app.jobs.learning(&map).await?, &map, row)))
 }
 
 /// Sets or forgets size and place; sets how far it is trusted.
@@ -138,7 +142,8 @@ async fn patch(
             }
         })
     });
-    Ok(Json(shown(&app, &map_name, write.await?)))
+    let changed = write.await?;
+    Ok(Json(shown(&app, &app.jobs.learning(&map_name).await?, &map_name, changed)))
 }
 
 /// Deletes a landmark with its views and its model.

@@ -141,6 +141,7 @@ async fn learn_one(
     let request = learn::Request {
         landmarks: Some(vec![landmark]),
         generated_views: check_generated(lesson.generated_views)?,
+        only_points: false,
     };
     submit(&app, &map, request).await
 }
@@ -165,6 +166,7 @@ async fn learn_map(
     let request = learn::Request {
         landmarks: lesson.landmarks,
         generated_views: check_generated(lesson.generated_views)?,
+        only_points: false,
     };
     submit(&app, &map, request).await
 }
@@ -192,7 +194,7 @@ async fn submit(
 
 async fn read(app: &Shared, id: i64) -> Result<Job, StoreError> {
     // Progress before the row: a job that ends in between is then shown as ended.
-    let progress = app.jobs.watch(id).map(|p| p.borrow().clone());
+    let progress = app.jobs.progress(id);
     Ok(Job::new(jobs::get(app.store.reads(), id).await?, progress.as_ref()))
 }
 
@@ -203,7 +205,7 @@ async fn get(State(app): State<Shared>, At(id): At<i64>) -> Result<Json<Job>, Ap
     Ok(Json(read(&app, id).await?))
 }
 
-/// Asks a job to stop. One that has ended stays as it is.
+/// Asks a job to stop: one that waits is cancelled at once. One that has ended stays as it is.
 #[utoipa::path(delete, path = "/jobs/{job}", tag = "lessons", params(("job" = i64, Path)),
     responses((status = 200, body = Job), (status = 404, body = Problem)))]
 async fn cancel(State(app): State<Shared>, At(id): At<i64>) -> Result<Json<Job>, ApiError> {
@@ -220,8 +222,7 @@ async fn events(
     At(id): At<i64>,
 ) -> Result<Sse<impl Stream<Item = Result<Event, Infallible>>>, ApiError> {
     let place = app.stream_place()?;
-    let progress = app.jobs.watch(id);
-    read(&app, id).await?;
+    let progress = app.jobs.watch(id).await?;
     let changes = match progress {
         Some(progress) => WatchStream::new(progress).map(|_| ()).left_stream(),
         None => stream::iter([()]).right_stream(),

@@ -1,5 +1,5 @@
-//! The accept loop: bounded connections, a deadline for the head of a request, a graceful end. axum's own `serve`
-//! installs no timer, so hyper's deadline would not work there.
+//! The accept loop: bounded connections, a deadline for the head of a request and for the reading of an answer, a graceful
+//! end. axum's own `serve` installs no timer, so hyper's deadline would not work there.
 
 use crate::config::Limits;
 use axum::Router;
@@ -14,6 +14,7 @@ use tokio::{
     net::TcpListener,
     sync::{Semaphore, watch},
 };
+use tokio_io_timeout::TimeoutStream;
 
 /// Largest head of a request, in bytes.
 const HEAD_MAX: usize = 32 << 10;
@@ -42,8 +43,11 @@ pub(crate) async fn serve(
             accepted = accept(&listener, &places) => accepted,
         };
         let Some((stream, place)) = accepted else { continue };
-        let connection =
-            builder.serve_connection(TokioIo::new(stream), TowerToHyperService::new(router.clone()));
+        let mut stream = TimeoutStream::new(stream);
+        // Runs only while there is something to write, and starts again with every part that is taken.
+        stream.set_write_timeout(Some(Duration::from_secs(limits.write_timeout_s)));
+        let stream = TokioIo::new(Box::pin(stream));
+        let connection = builder.serve_connection(stream, TowerToHyperService::new(router.clone()));
         let connection = graceful.watch(connection);
         tokio::spawn(async move {
             if let Err(error) = connection.await {
@@ -75,5 +79,85 @@ async fn accept(
             tokio::time::sleep(ACCEPT_PAUSE).await;
             None
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use axum::{
+        body::Bytes,
+        response::{Sse, sse::Event},
+        routing::get,
+    };
+    use futures::{StreamExt, stream};
+    use std::{convert::Infallible, net::SocketAddr};
+    use tokio::{
+        io::{AsyncReadExt, AsyncWriteExt},
+        net::TcpStream,
+        time::timeout,
+    };
+
+    /// Far more than the buffers of a connection take.
+    const LARGE: usize = 64 << 20;
+    const WRITE_TIMEOUT_S: u64 = 1;
+
+    /// Serves one connection at a time.
+    async fn served() -> (SocketAddr, watch::Sender<bool>) {
+        let quiet = || async {
+            let late = stream::once(tokio::time::sleep(Duration::from_secs(3 * WRITE_TIMEOUT_S)));
+            let events =
+                stream::iter([()]).chain(late).map(|()| Ok::<_, Infallible>(Event::default().data("here")));
+            Sse::new(events)
+        };
+        let router = Router::new()
+            .route("/large", get(|| async { Bytes::from(vec![0_u8; LARGE]) }))
+            .route("/small", get(|| async { "small" }))
+            .route("/quiet", get(quiet));
+        let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+        let at = listener.local_addr().unwrap();
+        let (stop, stopping) = watch::channel(false);
+        let limits = Limits { connections: 1, write_timeout_s: WRITE_TIMEOUT_S, ..Limits::default() };
+        tokio::spawn(serve(listener, router, limits, stopping));
+        (at, stop)
+    }
+
+    async fn asked(at: SocketAddr, path: &str) -> TcpStream {
+        let mut stream = TcpStream::connect(at).await.unwrap();
+        let head = format!("GET {path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n");
+        stream.write_all(head.as_bytes()).await.unwrap();
+        stream
+    }
+
+    #[tokio::test]
+    async fn a_client_that_does_not_read_its_answer_is_cut_off() {
+        let (at, _stop) = served().await;
+        let mut unread = asked(at, "/large").await;
+        let mut answer = String::new();
+        let mut next = asked(at, "/small").await;
+        let read = timeout(Duration::from_secs(10), next.read_to_string(&mut answer)).await;
+        assert!(read.is_ok(), "the one connection is still held by a client that does not read");
+        assert!(answer.ends_with("small"), "{answer}");
+        let mut rest = Vec::new();
+        drop(unread.read_to_end(&mut rest).await);
+        assert!(rest.len() < LARGE, "all of it was sent");
+    }
+
+    #[tokio::test]
+    async fn a_client_that_reads_slowly_and_a_quiet_stream_are_not() {
+        let (at, _stop) = served().await;
+        let mut slow = asked(at, "/large").await;
+        let (mut piece, mut got) = (vec![0; LARGE / 16], 0);
+        while let Ok(n @ 1..) = slow.read(&mut piece).await {
+            let pieces = got / piece.len();
+            got += n;
+            if got / piece.len() > pieces {
+                tokio::time::sleep(Duration::from_millis(WRITE_TIMEOUT_S * 1_000 / 4)).await;
+            }
+        }
+        assert!(got > LARGE, "cut off after {got} bytes");
+        let mut events = String::new();
+        asked(at, "/quiet").await.read_to_string(&mut events).await.unwrap();
+        assert_eq!(events.matches("data: here").count(), 2, "{events}");
     }
 }

@@ -6,12 +6,17 @@ use super::{
     extract::{At, Body, name},
 };
 use crate::{
-    engine::mapping::{MappingError, Progress, Walls},
+    engine::{
+        mapping::{MappingError, Progress, Walls},
+        panics::Edge,
+    },
     store::{laser, load, maps, robots},
 };
 use axum::{Json, extract::State, http::StatusCode};
+use futures::FutureExt;
 use map::pose2::Pose2;
 use serde::Deserialize;
+use std::panic::AssertUnwindSafe;
 use tokio::sync::oneshot;
 use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
@@ -99,7 +104,12 @@ async fn finish(
     let (progress, walls) = app.motion.mappings().finish(&map).map_err(refused)?;
     // Whoever asked may go away: it is stored all the same.
     tokio::spawn(async move {
-        let stored = store(&app, &map, walls).await;
+        let storing = AssertUnwindSafe(store(&app, &map, walls)).catch_unwind().await;
+        let stored = storing.unwrap_or_else(|cause| {
+            let panics = app.store.vitals().panics();
+            panics.caught(Edge::Mapping, cause.as_ref(), "a finished mapping", "it has failed");
+            Err("the server failed on it; see its log".to_owned())
+        });
         if let Err(reason) = &stored {
             tracing::warn!(map, reason, "a map that was made is not stored");
         }

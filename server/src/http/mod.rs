@@ -28,20 +28,22 @@ mod cameras;
 mod views;
 mod visibility;
 pub(crate) mod listen;
+#[cfg(test)]
+mod tests;
 
 pub(crate) use router::router;
 
 use crate::{
     config::Config,
-    engine::{live::LiveHub, motion::Motion, search::Searches, workers::Engine},
+    engine::{live::LiveHub, motion::Motion, panics::Edge, search::Searches, workers::Engine},
     gather::Gatherer,
     jobs::Jobs,
     store::Store,
 };
 use axum::http::StatusCode;
 use error::ApiError;
-use std::sync::Arc;
-use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
+use std::{sync::Arc, time::Duration};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore, SemaphorePermit, watch};
 
 /// What every handler shares.
 #[derive(Debug)]
@@ -63,6 +65,8 @@ pub(crate) struct App {
     vision: Arc<Semaphore>,
     /// Places for event streams.
     streams: Arc<Semaphore>,
+    /// Places for requests with large bodies.
+    uploads: Semaphore,
 }
 
 /// Who works on what is asked for.
@@ -85,9 +89,10 @@ impl App {
     ) -> Self {
         let vision = Arc::new(Semaphore::new(config.workers));
         let streams = Arc::new(Semaphore::new(config.limits.streams));
+        let uploads = Semaphore::new(config.limits.uploads);
         let (live, motion) = (engine.live.clone(), engine.motion.clone());
         let searches = engine.searches.clone();
-        Self { config, store, jobs, gatherer, live, motion, searches, stopping, vision, streams }
+        Self { config, store, jobs, gatherer, live, motion, searches, stopping, vision, streams, uploads }
     }
 
     /// Runs vision work off the runtime, a bounded number at a time.
@@ -95,6 +100,7 @@ impl App {
         self: Arc<Self>,
         work: impl FnOnce(&Self) -> T + Send + 'static,
     ) -> Result<T, ApiError> {
+        let vitals = self.store.vitals().clone();
         let place = self.vision.clone().acquire_owned().await.map_err(|e| ApiError::internal(&e))?;
         let done = tokio::task::spawn_blocking(move || {
             let result = work(&self);
@@ -102,7 +108,22 @@ impl App {
             drop(place);
             result
         });
-        done.await.map_err(|e| ApiError::internal(&e))
+        let follows = "the request is refused as internal";
+        let done = vitals.panics().joined(Edge::Request, "vision work of a request", follows, done.await);
+        done.map_err(|e| ApiError::internal(&e))
+    }
+
+    /// A place for a request with a large body, or 503.
+    async fn upload_place(&self) -> Result<SemaphorePermit<'_>, ApiError> {
+        let limits = &self.config.limits;
+        let wait = Duration::from_secs(limits.upload_wait_s);
+        match tokio::time::timeout(wait, self.uploads.acquire()).await {
+            Ok(place) => place.map_err(|closed| ApiError::internal(&closed)),
+            Err(_elapsed) => {
+                let detail = format!("all {} places for large requests are in use", limits.uploads);
+                Err(ApiError::new(StatusCode::SERVICE_UNAVAILABLE, "too_many_uploads", detail))
+            }
+        }
     }
 
     /// A place for an event stream, or 503.

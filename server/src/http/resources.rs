@@ -1,12 +1,18 @@
 //! The shapes of the API's resources, with their checks, and how rows become them.
 
 use super::error::ApiError;
-use crate::store::{
-    landmarks::{self, LandmarkRow, Measures},
-    load,
-    maps::MapRow,
-    robots::RobotRow,
-    sites::Whereabouts,
+use crate::{
+    engine::{
+        epochs::Conflict,
+        motion::{Known, Motion},
+    },
+    store::{
+        landmarks::{self, LandmarkRow, Measures},
+        load,
+        maps::MapRow,
+        robots::RobotRow,
+        sites::Whereabouts,
+    },
 };
 use map::{
     changes::Standing,
@@ -16,8 +22,10 @@ use map::{
     pose2::{Pose2, Pose2Covariance},
 };
 use nalgebra::{Matrix3, Vector3};
+use protos::Name;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
+use std::time::Instant;
 use utoipa::ToSchema;
 use vision::{localise::pose::LandmarkSize, recognise::DistanceKind};
 
@@ -378,10 +386,44 @@ pub(super) struct Robot {
     pub(super) name: String,
     /// The map it stands on.
     pub(super) map: String,
+    /// Its software is connected, or sent a message within the last 3 s.
+    pub(super) alive: bool,
+    /// The start of its software that speaks for it; absent if it is not connected.
+    pub(super) epoch: Option<u64>,
+    /// A second program that uses the robot's name and is refused; shown for 10 s after its last message.
+    pub(super) conflict: Option<Conflict>,
+    /// Its fused pose; absent if it is unknown, or nothing newer than 2 s supports it.
+    pub(super) pose: Option<RobotPose>,
 }
 
-impl From<RobotRow> for Robot {
-    fn from(row: RobotRow) -> Self {
-        Self { name: row.name, map: row.map }
+/// A fused pose on the robot's map.
+#[derive(Debug, Clone, Serialize, ToSchema)]
+pub(super) struct RobotPose {
+    /// Metres.
+    pub(super) x_m: f64,
+    /// Metres.
+    pub(super) y_m: f64,
+    /// Heading.
+    pub(super) theta_rad: f64,
+    /// Over (x, y, theta), row-major.
+    pub(super) covariance: [f64; 9],
+    /// Since the capture of the newest odometry or fix that supports it; at most 2000.
+    pub(super) age_ms: f64,
+}
+
+impl Robot {
+    /// A registered robot with what is known of it now.
+    pub(super) fn new(row: RobotRow, motion: &Motion) -> Self {
+        let now = Instant::now();
+        let robot = Name::new(row.name.as_str()).ok();
+        let status = robot.as_ref().map(|robot| motion.epochs().status(robot, now)).unwrap_or_default();
+        let known = robot.and_then(|robot| motion.known(&robot, now)).filter(|known| known.map == row.map);
+        let pose = known.map(|Known { fused, age, .. }| {
+            let Pose2 { x_m, y_m, theta_rad } = fused.pose.pose;
+            let covariance = row_major(&fused.pose.covariance);
+            RobotPose { x_m, y_m, theta_rad, covariance, age_ms: age.as_secs_f64() * 1e3 }
+        });
+        let (alive, epoch, conflict) = (status.alive, status.epoch, status.conflict);
+        Self { name: row.name, map: row.map, alive, epoch, conflict, pose }
     }
 }

@@ -38,10 +38,11 @@ async fn put(
     let write = app
         .store
         .write(move |tx| Box::pin(async move { robots::put(tx, robot.as_str(), &to.map, max).await }));
-    Ok(Json(write.await?.into()))
+    Ok(Json(Robot::new(write.await?, &app.motion)))
 }
 
-/// Lists robots by name.
+/// Lists robots by name, with what is known of each: whether its software is connected, whether a second program uses its
+/// name, its pose and how old that is.
 #[utoipa::path(get, path = "/robots", tag = "robots", params(PageQuery),
     responses((status = 200, body = Page<Robot>)))]
 async fn list(
@@ -50,24 +51,30 @@ async fn list(
 ) -> Result<Json<Page<Robot>>, ApiError> {
     let limit = page.limit(app.config.limits.page)?;
     let rows = robots::page(app.store.reads(), &page.after(), limit + 1).await?;
-    Ok(Json(Page::new(rows, limit, |r| r.name.clone(), Robot::from)))
+    Ok(Json(Page::new(rows, limit, |r| r.name.clone(), |r| Robot::new(r, &app.motion))))
 }
 
 /// One robot.
 #[utoipa::path(get, path = "/robots/{robot}", tag = "robots", params(("robot" = String, Path)),
     responses((status = 200, body = Robot), (status = 404, body = Problem)))]
 async fn get(State(app): State<Shared>, At(robot): At<String>) -> Result<Json<Robot>, ApiError> {
-    Ok(Json(robots::get(app.store.reads(), &robot).await?.into()))
+    Ok(Json(Robot::new(robots::get(app.store.reads(), &robot).await?, &app.motion)))
 }
 
 /// Forgets a robot; its frames are rejected from now on.
 #[utoipa::path(delete, path = "/robots/{robot}", tag = "robots", params(("robot" = String, Path)),
     responses((status = 204), (status = 404, body = Problem)))]
 async fn delete(State(app): State<Shared>, At(robot): At<String>) -> Result<StatusCode, ApiError> {
-    let gone = robot.clone();
-    app.store.write(move |tx| Box::pin(async move { robots::delete(tx, &gone).await })).await?;
-    // A run of it that is being recorded would keep its place for ever.
-    app.motion.take_recording(&name("robot", robot)?);
+    let (gone, motion) = (name("robot", robot)?, app.motion.clone());
+    let write = app.store.write(move |tx| {
+        Box::pin(async move {
+            robots::delete(tx, gone.as_str()).await?;
+            // A run of it that is being recorded would keep its place for ever.
+            tx.after(move || drop(motion.take_recording(&gone)));
+            Ok(())
+        })
+    });
+    write.await?;
     Ok(StatusCode::NO_CONTENT)
 }
 

@@ -4,7 +4,10 @@ use super::{
     App, Shared, areas, cameras, error::ApiError, gathering, guard, health, hypotheses, landmarks, laser,
     learning, live, mapping, maps, pages, recognise, robots, runs, sight, views, visibility,
 };
-use crate::config::Limits;
+use crate::{
+    config::Limits,
+    engine::panics::{Edge, Panics},
+};
 use axum::{
     Json, Router,
     http::StatusCode,
@@ -40,7 +43,7 @@ fn api(limits: &Limits) -> OpenApiRouter<Shared> {
         .merge(gathering::router())
         .merge(visibility::router())
         .merge(areas::router())
-        .merge(runs::router(limits.upload_bytes))
+        .merge(runs::router())
         .merge(sight::router())
         .merge(recognise::router(limits.upload_bytes))
         .merge(robots::router())
@@ -58,6 +61,7 @@ fn parts(limits: &Limits) -> (Router<Shared>, openapi::OpenApi) {
 /// The whole service.
 pub(crate) fn router(app: App) -> Router {
     let app = Arc::new(app);
+    let panics = app.store.vitals().panics().clone();
     let (routes, document) = parts(&app.config.limits);
     let (health, _) = health::router().split_for_parts();
     let config = utoipa_swagger_ui::Config::from(format!("{API}/openapi.json"));
@@ -69,7 +73,7 @@ pub(crate) fn router(app: App) -> Router {
         .merge(docs)
         .fallback(not_found)
         .method_not_allowed_fallback(wrong_method)
-        .layer(CatchPanicLayer::custom(panicked))
+        .layer(CatchPanicLayer::custom(move |cause: Box<dyn Any + Send>| panicked(&panics, cause.as_ref())))
         .layer(from_fn_with_state(app.clone(), guard::guard))
         .with_state(app)
 }
@@ -83,8 +87,8 @@ async fn wrong_method() -> ApiError {
         .field("method")
 }
 
-fn panicked(_cause: Box<dyn Any + Send>) -> Response {
-    tracing::error!("a handler panicked");
+fn panicked(panics: &Panics, cause: &(dyn Any + Send)) -> Response {
+    panics.caught(Edge::Request, cause, "a request", "it is refused as internal");
     ApiError::new(
         StatusCode::INTERNAL_SERVER_ERROR,
         "internal",

@@ -1,10 +1,10 @@
 //! `/robots/{robot}/run` and `/maps/{map}/runs`: runs whose path is known, to learn which modality to trust where.
 
 use super::{
-    Shared,
+    App, Shared,
     areas::Shown,
     error::{ApiError, Problem},
-    extract::{At, Body, name},
+    extract::{At, BodyUpTo, name},
 };
 use crate::{
     engine::motion::{Recorded, RunError},
@@ -15,11 +15,7 @@ use ::map::{
     fuse::FuseParams,
     pose2::Pose2,
 };
-use axum::{
-    Json,
-    extract::{DefaultBodyLimit, State},
-    http::StatusCode,
-};
+use axum::{Json, extract::State, http::StatusCode};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
@@ -27,18 +23,22 @@ use utoipa_axum::{router::OpenApiRouter, routes};
 /// Usual standard deviations of a reference: metres, radians.
 const USUAL: [f64; 2] = [0.01, 0.005];
 
-pub(super) fn router(body_bytes: usize) -> OpenApiRouter<Shared> {
-    let reference = OpenApiRouter::new().routes(routes!(reference)).layer(DefaultBodyLimit::max(body_bytes));
+/// Most bytes of one pose in JSON: 20 digits of the time, three numbers of up to 25 characters, and what is between them.
+const POSE_BYTES: usize = 112;
+/// Most bytes of a path: that of [`MAX_REFERENCE`] poses, and the rest of the object.
+const PATH_BYTES: usize = MAX_REFERENCE * POSE_BYTES + 1024;
+
+pub(super) fn router() -> OpenApiRouter<Shared> {
     OpenApiRouter::new()
         .routes(routes!(begin, get, cancel))
         .routes(routes!(list))
         .routes(routes!(forget))
-        .merge(reference)
+        .routes(routes!(reference))
 }
 
 fn refused(error: RunError) -> ApiError {
     let (status, code) = match error {
-        RunError::Going => (StatusCode::CONFLICT, "in_use"),
+        RunError::Going | RunError::Lent => (StatusCode::CONFLICT, "in_use"),
         RunError::TooMany => (StatusCode::CONFLICT, "too_many"),
         RunError::None => (StatusCode::NOT_FOUND, "not_recording"),
     };
@@ -82,7 +82,7 @@ async fn cancel(State(app): State<Shared>, At(robot): At<String>) -> Result<Stat
 #[serde(deny_unknown_fields)]
 struct KnownPath {
     /// Time (ns of the robot's clock, as in its messages), x and y in metres on the map, heading in radians; times rise, 2 to
-    /// 200 000. Nothing is learnt between two that are more than a second apart.
+    /// 200 000 (up to 112 bytes each). Nothing is learnt between two that are more than a second apart.
     poses: Vec<(i64, f64, f64, f64)>,
     /// Standard deviation of its positions, metres; 0.01 if absent.
     sigma_m: Option<f64>,
@@ -149,49 +149,46 @@ fn reference_of(path: KnownPath) -> Result<Reference, ApiError> {
     })
 }
 
-/// Ends the recording by telling the path: what each modality was off by, and claimed, is kept by square metre and heading,
+/// Ends the recording by telling the path, once what it shows is stored; until then it stays, whatever becomes of the request.
+/// What each modality was off by, and claimed, is kept by square metre and heading,
 /// and robots on this map are fused by it from now on.
 #[utoipa::path(post, path = "/robots/{robot}/run/reference", tag = "robots", params(("robot" = String, Path)),
     request_body = KnownPath, responses((status = 201, body = LearntRun),
     (status = 404, body = Problem, description = "unknown_robot, not_recording, unknown_map"),
-    (status = 409, body = Problem, description = "too_many"),
+    (status = 409, body = Problem, description = "too_many; in_use: it is being learnt from already"),
     (status = 422, body = Problem, description = "out_of_range, not_in_order, too_many, no_overlap: none of the run's times is within the path's")))]
 async fn reference(
     State(app): State<Shared>,
     At(robot): At<String>,
-    Body(path): Body<KnownPath>,
+    BodyUpTo(path): BodyUpTo<KnownPath, PATH_BYTES>,
 ) -> Result<(StatusCode, Json<LearntRun>), ApiError> {
     robots::get(app.store.reads(), &robot).await?;
     let (robot, known) = (name("robot", robot)?, reference_of(path)?);
-    let recording = app.motion.take_recording(&robot).ok_or_else(|| refused(RunError::None))?;
-    let work = move || {
-        let mut recording = recording;
-        let learnt = learn(&recording.against(&known), &FuseParams::default());
-        (recording, learnt)
+    // Whatever ends this request early, the recording stays until the run is stored.
+    let (motion, whose) = (app.motion.clone(), robot.to_string());
+    let work = move |_: &App| {
+        let mut lent = motion.lend_recording(&robot)?;
+        let learnt = learn(&lent.recording.against(&known), &FuseParams::default());
+        Ok((lent, learnt))
     };
-    let (recording, learnt) = tokio::task::spawn_blocking(work).await.map_err(|e| ApiError::internal(&e))?;
-    let map = recording.map.clone();
+    let (lent, learnt) = app.clone().on_vision_thread(work).await?.map_err(refused)?;
     if learnt.cells.is_empty() {
-        app.motion.keep_recording(&robot, recording);
         return Err(ApiError::invalid(
             "no_overlap",
             "poses",
             "none of the run's times is within those of the path",
         ));
     }
-    let (on, whose) = (map.clone(), robot.to_string());
-    let (way_m, cells) = (learnt.way_m, learnt.cells);
-    let write = app
-        .store
-        .write(move |tx| Box::pin(async move { areas::add(tx, &on, &whose, way_m, &cells).await }))
-        .await;
-    let id = match write {
-        Ok(id) => id,
-        Err(error) => {
-            app.motion.keep_recording(&robot, recording);
-            return Err(error.into());
-        }
-    };
+    let map = lent.recording.map.clone();
+    let (on, way_m, cells) = (map.clone(), learnt.way_m, learnt.cells);
+    let write = app.store.write(move |tx| {
+        Box::pin(async move {
+            let id = areas::add(tx, &on, &whose, way_m, &cells).await?;
+            tx.after(move || lent.learnt());
+            Ok(id)
+        })
+    });
+    let id = write.await?;
     let map = maps::get(app.store.reads(), &map).await?;
     let runs = areas::runs(app.store.reads(), map.id).await?;
     let row = runs.into_iter().find(|run| run.id == id);

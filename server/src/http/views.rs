@@ -13,7 +13,8 @@ use crate::{
     },
     store::{
         landmarks, maps,
-        placing::{self, Capture, Placing},
+        placing::{Capture, Placing},
+        teaching::{self, Teaching},
         views::{self, Cut, NewView, Outcome, ViewRow},
     },
 };
@@ -141,18 +142,8 @@ async fn add(
     }
     let capture =
         capture.map(|c| serde_json::to_string(&c)).transpose().map_err(|e| ApiError::internal(&e))?;
-    let new = NewView { capture, ..new };
-    let write = app.store.write(move |tx| {
-        Box::pin(async move {
-            let (row, outcome) = views::add(tx, &map, &landmark, &new, max, thinning.as_ref()).await?;
-            let placing = match (outcome, &new.capture) {
-                (Outcome::New, Some(_)) => Some(placing::by_views(tx, &map, &landmark).await?),
-                _ => None,
-            };
-            Ok((row, outcome, placing))
-        })
-    });
-    let (row, outcome, placing) = write.await?;
+    let teaching = Teaching { map, landmark, view: NewView { capture, ..new }, max, thinning };
+    let (row, outcome, placing) = teaching::add(&app.store, teaching).await?;
     let view = View { placing, outcome: Some(outcome), ..View::from(row) };
     let status = if outcome == Outcome::New { StatusCode::CREATED } else { StatusCode::OK };
     Ok((status, Json(view)))

@@ -1,5 +1,6 @@
 //! A lesson: views -> icons -> models, for some landmarks of a map or for all, then one commit with everything, the
-//! new snapshot, and only then "done". The work itself runs on threads of its own, off the runtime.
+//! new snapshot, and only then "done". The work itself runs on threads of its own, off the runtime; each decodes one
+//! stored picture at a time.
 //!
 //! Negatives are worked out once for all landmarks. Landmarks that are not in the lesson keep their models and get the
 //! new icons added to what they must be told from.
@@ -8,10 +9,11 @@ use super::{
     JobError, Reporter,
     look_alikes::{LookAlike, look_alikes},
     negatives::{Negatives, each, real_strangers, spread},
+    points,
 };
 use crate::{
     config::Config,
-    engine::{decode::ImageLimits, picture, snapshot::MapSnapshot},
+    engine::{decode::ImageLimits, panics::Edge, picture, snapshot::MapSnapshot},
     store::{
         Store, StoreError,
         jobs::{self, Ended, JobRow},
@@ -33,11 +35,13 @@ use std::{
     time::Instant,
 };
 use vision::{
+    frame::GrayImage,
     learn::{
         model::{LandmarkModel, MAX_VIEWS, ModelStatus, View, add_negatives, learn},
         synthesis,
     },
     params::Params,
+    points::taught::{MAX_POINT_VIEWS, TaughtPoint, view_points},
     recognise::{IconFeatures, LandmarkId, features},
 };
 
@@ -55,12 +59,15 @@ pub(crate) struct Request {
     /// Views generated from each photograph; `None` fills up to [`VIEWS_WANTED`] where photographs are few.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) generated_views: Option<usize>,
+    /// The models stay as they are, and those without points get them: see [`super::points`].
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub(crate) only_points: bool,
 }
 
 impl Request {
     /// A lesson of these landmarks, as it is stored.
     pub(crate) fn of(landmarks: &[String]) -> String {
-        Self { landmarks: Some(landmarks.to_vec()), generated_views: None }.to_json()
+        Self { landmarks: Some(landmarks.to_vec()), ..Self::default() }.to_json()
     }
 
     pub(crate) fn to_json(&self) -> String {
@@ -73,13 +80,38 @@ impl Request {
     }
 }
 
-/// Everything a lesson rests on, read at its start.
-struct Material {
+/// The stored pictures, for threads that are not the runtime's.
+pub(super) struct Pictures {
     store: Store,
     runtime: tokio::runtime::Handle,
+    upload: ImageLimits,
+}
+
+impl Pictures {
+    pub(super) fn new(store: &Store, config: &Config) -> Self {
+        let runtime = tokio::runtime::Handle::current();
+        Self { store: store.clone(), runtime, upload: config.limits.upload() }
+    }
+
+    /// The picture of a view; `None`, with a word in the log, if it cannot be read.
+    fn of(&self, lesson: &Lesson) -> Option<GrayImage> {
+        let image = self.runtime.block_on(views::image(self.store.reads(), lesson.view));
+        let decoded = image
+            .map_err(|e| e.to_string())
+            .and_then(|bytes| picture::decode(&bytes, self.upload).map_err(|e| e.to_string()));
+        let skipped = |reason: &String| {
+            let what = "this picture cannot be read: no views are generated and no points taken from it";
+            tracing::warn!(view = lesson.view, reason, "{what}");
+        };
+        decoded.inspect_err(skipped).ok()
+    }
+}
+
+/// Everything a lesson rests on, read at its start.
+struct Material {
+    pictures: Pictures,
     params: Arc<Params>,
     workers: usize,
-    upload: ImageLimits,
     generated_views: Option<usize>,
     snapshot: Arc<MapSnapshot>,
     targets: Vec<LandmarkId>,
@@ -103,19 +135,28 @@ pub(super) async fn run(
     reporter: &Arc<Reporter>,
 ) -> Result<(), JobError> {
     let started = Instant::now();
+    let request = Request::from_json(&row.request);
+    if request.only_points {
+        return points::run(store, config, row, request.landmarks.unwrap_or_default(), reporter).await;
+    }
     let map = maps::get(store.reads(), &row.map).await?;
-    let material = gather(store, config, &map, &Request::from_json(&row.request)).await?;
+    let material = gather(store, config, &map, &request).await?;
     let names: BTreeMap<LandmarkId, String> =
         material.snapshot.landmarks.iter().map(|(id, l)| (*id, l.name.clone())).collect();
     let work = {
         let reporter = reporter.clone();
         move || compute(&material, &reporter)
     };
-    let learnt = tokio::task::spawn_blocking(work)
-        .await
+    let panics = store.vitals().panics();
+    let learnt = tokio::task::spawn_blocking(work).await;
+    let learnt = panics
+        .joined(Edge::Job, format_args!("job {}", row.id), "it ends as failed", learnt)
         .map_err(|e| JobError::Failed(format!("the lesson broke off: {e}")))??;
     reporter.report(0.99, "storing");
-    Ok(commit(store, map, row.id, learnt, &names, started).await?)
+    match commit(store, map, row.id, learnt, &names, started).await {
+        Err(StoreError::Changed) => Err(JobError::Unwanted),
+        done => Ok(done?),
+    }
 }
 
 async fn gather(
@@ -137,11 +178,9 @@ async fn gather(
     }
     let targets = targets(&snapshot, &lessons, request)?;
     Ok(Material {
-        store: store.clone(),
-        runtime: tokio::runtime::Handle::current(),
+        pictures: Pictures::new(store, config),
         params: config.params.clone(),
         workers: config.workers,
-        upload: config.limits.upload(),
         generated_views: request.generated_views,
         snapshot,
         targets,
@@ -179,15 +218,19 @@ fn targets(
     Ok(ids)
 }
 
-/// Three passes over landmarks, each spread over the threads: views, negatives, models.
+/// Three passes over landmarks, each spread over the threads: views with their points, negatives, models.
 fn compute(m: &Material, reporter: &Reporter) -> Result<Learnt, JobError> {
-    let views = each_of(&m.targets, m.workers, reporter, (0.0, 0.3, "views"), |id| target_views(m, *id))?;
-    let views: BTreeMap<LandmarkId, Vec<View>> = m.targets.iter().copied().zip(views).collect();
+    let sights = each_of(&m.targets, m.workers, reporter, (0.0, 0.3, "views"), |id| sights(m, *id))?;
+    let (views, points): (Vec<_>, Vec<_>) = sights.into_iter().map(|s| (s.views, s.points)).unzip();
+    let of_targets = || m.targets.iter().copied();
+    let views: BTreeMap<LandmarkId, Vec<View>> = of_targets().zip(views).collect();
+    let points: BTreeMap<LandmarkId, Vec<Vec<TaughtPoint>>> = of_targets().zip(points).collect();
     let negatives = collect_negatives(m, &views, reporter)?;
     let p = &m.params;
     let learnt = each_of(&m.targets, m.workers, reporter, (0.4, 0.9, "models"), |id| {
         let (before, after) = negatives.others(*id);
         let model = learn(*id, &views[id], before, p).map_err(|e| e.to_string())?;
+        let model = model.with_points_if_used(p, || points[id].clone());
         Ok::<_, String>(negatives.with_strangers(&add_negatives(&model, after, p), p))
     })?;
     let bystanders: Vec<LandmarkId> =
@@ -215,12 +258,19 @@ fn compute(m: &Material, reporter: &Reporter) -> Result<Learnt, JobError> {
     Ok(done)
 }
 
-/// The photographs of a landmark and what is generated from them.
-fn target_views(m: &Material, id: LandmarkId) -> Vec<View> {
+/// What a landmark is learnt from.
+struct Sights {
+    /// Its photographs and what is generated from them.
+    views: Vec<View>,
+    /// Points of its photographs, of at most [`MAX_POINT_VIEWS`] evenly chosen ones.
+    points: Vec<Vec<TaughtPoint>>,
+}
+
+fn sights(m: &Material, id: LandmarkId) -> Sights {
     let lessons = m.lessons.get(&id).map_or(&[][..], Vec::as_slice);
+    let lessons = &lessons[..lessons.len().min(MAX_VIEWS)];
     let mut views: Vec<View> = lessons
         .iter()
-        .take(MAX_VIEWS)
         .map(|l| View {
             icon: l.cut.icon.clone(),
             corners_px: l.cut.corners_px,
@@ -234,28 +284,35 @@ fn target_views(m: &Material, id: LandmarkId) -> Vec<View> {
         None => VIEWS_WANTED.saturating_sub(photographs),
     };
     let wanted = wanted.min(MAX_VIEWS - photographs);
-    for (index, lesson) in lessons.iter().take(photographs).enumerate() {
+    let uses_points = m.params.recognise.verdict.points;
+    let with_points: Vec<i64> = point_views(lessons).filter(|_| uses_points).map(|l| l.view).collect();
+    let mut points = Vec::with_capacity(with_points.len());
+    for (index, lesson) in lessons.iter().enumerate() {
         let count = (wanted + photographs - 1 - index) / photographs;
-        if count > 0 {
-            views.extend(generated(m, lesson, count));
+        let gives_points = with_points.contains(&lesson.view);
+        if count == 0 && !gives_points {
+            continue;
         }
+        let Some(image) = m.pictures.of(lesson) else { continue };
+        if gives_points {
+            points.push(view_points(&image, &lesson.cut.corners_px));
+        }
+        // The number of the view is the seed: the same lesson gives the same model.
+        let seed = lesson.view as u64;
+        views.extend(synthesis::views(&image, &lesson.cut.corners_px, count, &m.params, seed));
     }
-    views
+    Sights { views, points }
 }
 
-fn generated(m: &Material, lesson: &Lesson, count: usize) -> Vec<View> {
-    let image = m.runtime.block_on(views::image(m.store.reads(), lesson.view));
-    let decoded = image
-        .map_err(|e| e.to_string())
-        .and_then(|bytes| picture::decode(&bytes, m.upload).map_err(|e| e.to_string()));
-    match decoded {
-        // The number of the view is the seed: the same lesson gives the same model.
-        Ok(image) => synthesis::views(&image, &lesson.cut.corners_px, count, &m.params, lesson.view as u64),
-        Err(reason) => {
-            tracing::warn!(view = lesson.view, reason, "no views generated from this picture");
-            Vec::new()
-        }
-    }
+/// The photographs of a landmark that give it points.
+fn point_views(lessons: &[Lesson]) -> impl Iterator<Item = &Lesson> {
+    spread(lessons, MAX_POINT_VIEWS)
+}
+
+/// The points of a landmark's photographs; those that cannot be read are left out.
+pub(super) fn points_of(lessons: &[Lesson], pictures: &Pictures) -> Vec<Vec<TaughtPoint>> {
+    let of = |lesson: &Lesson| Some(view_points(&pictures.of(lesson)?, &lesson.cut.corners_px));
+    point_views(lessons).filter_map(of).collect()
 }
 
 fn collect_negatives(
@@ -287,7 +344,7 @@ fn collect_negatives(
 
 /// `work` on every item, over `threads` threads, results in the order of the items. Progress goes from and to the
 /// given shares.
-fn each_of<T: Sync, R: Send>(
+pub(super) fn each_of<T: Sync, R: Send>(
     items: &[T],
     threads: usize,
     reporter: &Reporter,
@@ -344,6 +401,7 @@ async fn commit(
         "active": active,
         "candidates": candidates,
         "failed": failed,
+        "points": learnt.models.iter().map(|m| m.points.len()).sum::<usize>(),
         "refitted": learnt.refitted.len(),
         "generated_views": learnt.models.iter().map(|m| m.generated_views).sum::<usize>(),
         "seconds": started.elapsed().as_secs_f64(),
@@ -363,7 +421,8 @@ async fn commit(
                 models::put(tx, map.id, row).await?;
             }
             maps::bump(tx, map.id).await?;
-            jobs::end(tx, job, &ended).await.map(drop)
+            // It was cancelled before it began: nothing of it is stored.
+            if jobs::end(tx, job, &ended).await? { Ok(()) } else { Err(StoreError::Changed) }
         })
     });
     write.await
@@ -388,6 +447,7 @@ fn row(model: &LandmarkModel, look_alikes: &[Value]) -> NewModel {
         "stable_points": model.stable_points,
         "v_c": model.v_c,
         "photographed_v_c": model.photographed_v_c,
+        "points": model.points.len(),
     });
     NewModel {
         landmark: model.id,

@@ -1,6 +1,6 @@
 //! What can go wrong with the store, sorted by what the caller can do about it.
 
-/// Why a read or a write did not happen. Nothing was changed.
+/// Why a read or a write did not happen. Nothing was changed, except with [`StoreError::NotPublished`].
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum StoreError {
     /// There is no such thing.
@@ -36,6 +36,21 @@ pub(crate) enum StoreError {
     /// The disk is full; reading goes on.
     #[error("the disk is full")]
     Full,
+    /// The write panicked: it was rolled back.
+    #[error("the server failed on this write; nothing was changed")]
+    Panicked,
+    /// The write is on the disk, but the map cannot be made ready with it: its previous version stays in use.
+    #[error("the change is stored, but map `{map}` cannot be made ready with it; see the server's log")]
+    NotPublished {
+        /// Name of the map.
+        map: String,
+    },
+    /// What a prepared write rested on has changed: prepare it again.
+    #[error("it changed meanwhile")]
+    Changed,
+    /// What a write rests on changed each time that it was prepared.
+    #[error("others change the same things at this moment; try again")]
+    Busy,
     /// The writer has stopped: after an I/O error nothing may be written any more.
     #[error("the store does not take writes any more")]
     Closed,

@@ -44,7 +44,7 @@ statements! {
                    VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13) ON CONFLICT DO NOTHING";
     COUNT_VIEWS = "SELECT count(*) FROM track_views WHERE gathering_id = ?1 AND track = ?2";
     BYTES = "SELECT coalesce(sum(length(image)), 0) FROM track_views WHERE gathering_id = ?1";
-    VIEWS = "SELECT id, width_px, height_px, corners_px, icon_side, icon, icon_scale, capture FROM track_views \
+    VIEWS = "SELECT id, image_sha256, width_px, height_px, corners_px, icon_side, icon, icon_scale, capture FROM track_views \
              WHERE gathering_id = ?1 AND track = ?2 ORDER BY id";
     DISCARD = "UPDATE tracks SET state = 'discarded' WHERE gathering_id = ?1 AND number = ?2 AND state = 'open'";
     DROP_VIEWS = "DELETE FROM track_views WHERE gathering_id = ?1 AND track = ?2";
@@ -130,6 +130,7 @@ pub(crate) struct TrackRow {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct TrackView {
     pub(crate) id: i64,
+    pub(crate) image_sha256: views::Digest,
     pub(crate) size_px: [usize; 2],
     pub(crate) cut: Cut,
     /// JSON of a `placing::Capture`.
@@ -314,6 +315,7 @@ pub(crate) async fn track_views(
         let pixels = |column: &str| row.try_get::<i64, _>(column).map(|s| s as usize).map_err(at());
         Ok(TrackView {
             id: row.try_get("id").map_err(at())?,
+            image_sha256: views::digest_of(row)?,
             size_px: [pixels("width_px")?, pixels("height_px")?],
             cut: views::cut_of(row)?,
             capture: row.try_get("capture").map_err(at())?,

@@ -1,15 +1,17 @@
 //! Jobs as rows: what was accepted survives a crash and is run again.
 
-use super::{StoreError, Tx, maps, now_ms, statements::statements, within};
+use super::{Change, StoreError, Tx, maps, now_ms, statements::statements, within};
 use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 
 statements! {
     COUNT_OPEN = "SELECT count(*) FROM jobs WHERE state IN ('queued', 'running')";
     INSERT = "INSERT INTO jobs (kind, map, request, state, created_ms) VALUES (?1, ?2, ?3, 'queued', ?4) RETURNING id";
-    GET = "SELECT id, kind, map, request, state, message, result FROM jobs WHERE id = ?1";
-    OPEN = "SELECT id, kind, map, request, state, message, result FROM jobs \
+    GET = "SELECT id, kind, map, request, state, message, result, attempts FROM jobs WHERE id = ?1";
+    OPEN = "SELECT id, kind, map, request, state, message, result, attempts FROM jobs \
             WHERE state IN ('queued', 'running') ORDER BY id";
-    SET_RUNNING = "UPDATE jobs SET state = 'running' WHERE id = ?1 AND state IN ('queued', 'running')";
+    BEGIN = "UPDATE jobs SET state = 'running', attempts = attempts + 1 \
+             WHERE id = ?1 AND state IN ('queued', 'running')";
+    PUT_BACK = "UPDATE jobs SET state = 'queued', attempts = attempts - 1 WHERE id = ?1 AND state = 'running'";
     END = "UPDATE jobs SET state = ?2, message = ?3, result = ?4, ended_ms = ?5 \
            WHERE id = ?1 AND state IN ('queued', 'running')";
     FORGET = "DELETE FROM jobs WHERE ended_ms IS NOT NULL AND id NOT IN \
@@ -30,6 +32,8 @@ pub(crate) struct JobRow {
     pub(crate) message: String,
     /// JSON, once done.
     pub(crate) result: Option<String>,
+    /// How often it was begun, less those times that a stop of the server put it back.
+    pub(crate) attempts: u32,
 }
 
 /// How a job ended.
@@ -51,6 +55,7 @@ fn job_row(row: &SqliteRow) -> Result<JobRow, sqlx::Error> {
         state: row.try_get("state")?,
         message: row.try_get("message")?,
         result: row.try_get("result")?,
+        attempts: row.try_get("attempts")?,
     })
 }
 
@@ -79,6 +84,7 @@ pub(crate) async fn create(
     let open =
         sqlx::query_scalar(COUNT_OPEN).fetch_one(&mut tx.conn).await.map_err(StoreError::at("count jobs"))?;
     within(open, max, "jobs waiting or running")?;
+    tx.changed(Change::Jobs);
     Ok(JobRow {
         id,
         kind: kind.to_owned(),
@@ -87,6 +93,7 @@ pub(crate) async fn create(
         state: "queued".to_owned(),
         message: String::new(),
         result: None,
+        attempts: 0,
     })
 }
 
@@ -103,11 +110,16 @@ pub(crate) async fn open(db: impl SqliteExecutor<'_>) -> Result<Vec<JobRow>, Sto
     rows.iter().map(job_row).collect::<Result<_, _>>().map_err(StoreError::at("list jobs"))
 }
 
-/// Marks an open job as running. False when it has ended meanwhile.
-pub(crate) async fn set_running(tx: &mut Tx, id: i64) -> Result<bool, StoreError> {
-    let done =
-        sqlx::query(SET_RUNNING).bind(id).execute(&mut tx.conn).await.map_err(StoreError::at("start job"))?;
-    Ok(done.rows_affected() == 1)
+/// Begins with an open job and counts the attempt. False when it has ended meanwhile.
+pub(crate) async fn begin(tx: &mut Tx, id: i64) -> Result<bool, StoreError> {
+    let done = sqlx::query(BEGIN).bind(id).execute(&mut tx.conn).await;
+    Ok(done.map_err(StoreError::at("begin job"))?.rows_affected() == 1)
+}
+
+/// A job that was begun waits again, as if it had not been: the server stops.
+pub(crate) async fn put_back(tx: &mut Tx, id: i64) -> Result<(), StoreError> {
+    let done = sqlx::query(PUT_BACK).bind(id).execute(&mut tx.conn).await;
+    done.map_err(StoreError::at("put job back")).map(drop)
 }
 
 /// Ends a job. False when it had ended already; then nothing changed.

@@ -6,6 +6,8 @@ use sqlx::{Row, SqliteExecutor};
 statements! {
     CLEAR = "DELETE FROM laser_segments WHERE map_id = ?1";
     INSERT = "INSERT INTO laser_segments (map_id, ordinal, ax_m, ay_m, bx_m, by_m) VALUES (?1, ?2, ?3, ?4, ?5, ?6)";
+    WALLS = "UPDATE maps SET walls_version = walls_version + 1 WHERE id = ?1";
+    VERSION = "SELECT walls_version FROM maps WHERE id = ?1";
     ALL_OF = "SELECT ax_m, ay_m, bx_m, by_m FROM laser_segments WHERE map_id = ?1 ORDER BY ordinal";
 }
 
@@ -28,7 +30,15 @@ pub(crate) async fn replace(tx: &mut Tx, map: &str, segments: &[Ends]) -> Result
             .await
             .map_err(StoreError::at("store wall"))?;
     }
+    sqlx::query(WALLS).bind(map.id).execute(&mut tx.conn).await.map_err(StoreError::at("count walls"))?;
     maps::bump(tx, map.id).await
+}
+
+/// Counts up with every change of a map's walls.
+pub(super) async fn version(db: impl SqliteExecutor<'_>, map_id: i64) -> Result<i64, StoreError> {
+    let version = sqlx::query_scalar(VERSION).bind(map_id).fetch_optional(db).await;
+    let version = version.map_err(StoreError::at("read the version of walls"))?;
+    version.ok_or_else(|| StoreError::NotFound { what: "map", name: map_id.to_string() })
 }
 
 /// The walls of a map, in the order they were given.

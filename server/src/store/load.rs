@@ -1,5 +1,8 @@
 //! From rows to the immutable snapshot of a map. Models are taken over from the previous version where the digest is
 //! the same; a damaged or outdated model is named and left out, never matched.
+//!
+//! A map that cannot be made ready ends nothing: its previous version stays in use, at the start none, the map is named in
+//! the log and at `/readyz`, and the next write to it tries again.
 
 use super::{
     StoreError, areas, landmarks, laser, maps,
@@ -7,8 +10,15 @@ use super::{
     robots, seen, sights, sites,
     statements::statements,
 };
-use crate::engine::doubles::{self, Doubles};
-use crate::engine::snapshot::{LandmarkInfo, Learnt, MapSnapshot, Snapshots};
+use crate::{
+    engine::{
+        doubles::{self, Doubles},
+        panics::{Edge, Panics},
+        snapshot::{LandmarkInfo, Learnt, MapSnapshot, Snapshots},
+    },
+    vitals::Vitals,
+};
+use futures::FutureExt;
 use map::{
     check::OutOfRange,
     laser_fix::WallIndex,
@@ -17,7 +27,7 @@ use map::{
 };
 use nalgebra::{Matrix2, Point2, Vector3};
 use sqlx::{Row, SqliteConnection};
-use std::{collections::BTreeMap, sync::Arc};
+use std::{collections::BTreeMap, panic::AssertUnwindSafe, sync::Arc};
 use vision::{
     learn::model::LandmarkModel,
     params::Params,
@@ -26,6 +36,7 @@ use vision::{
 
 statements! {
     MAP = "SELECT name, version, distance, sight FROM maps WHERE id = ?1";
+    NAME = "SELECT name FROM maps WHERE id = ?1";
     MAP_IDS = "SELECT id FROM maps ORDER BY id";
     LANDMARKS = "SELECT id, name, width_m, height_m, x_m, y_m, z_m, theta_rad, roll_rad, tilt_rad, place_covariance, \
                  size_from_views, standing FROM landmarks WHERE map_id = ?1 ORDER BY id";
@@ -41,12 +52,14 @@ pub(super) async fn all(
     conn: &mut SqliteConnection,
     snapshots: &Snapshots,
     params: &Arc<Params>,
+    vitals: &Vitals,
 ) -> Result<(), StoreError> {
     let ids: Vec<i64> =
         sqlx::query_scalar(MAP_IDS).fetch_all(&mut *conn).await.map_err(StoreError::at("list maps"))?;
     for id in ids {
-        if let Some(map) = map(conn, id, snapshots, params).await? {
-            snapshots.publish(map);
+        match publish(conn, id, snapshots, params, vitals).await {
+            Ok(()) | Err(StoreError::NotPublished { .. }) => {}
+            Err(error) => return Err(error),
         }
     }
     snapshots.set_links(sites::links(&sites::all(&mut *conn).await?));
@@ -61,12 +74,49 @@ pub(super) async fn all(
     }
 }
 
-/// The current version of a map as it is in the database; `None` if it is gone.
-pub(super) async fn map(
+/// Makes the current version of a map the one that is used. `NotPublished` if it cannot be made ready; any other error
+/// means that the database cannot be read.
+pub(super) async fn publish(
     conn: &mut SqliteConnection,
     id: i64,
     snapshots: &Snapshots,
     params: &Arc<Params>,
+    vitals: &Vitals,
+) -> Result<(), StoreError> {
+    // What a panic leaves behind is thrown away: the snapshot is whole or there is none.
+    let made = AssertUnwindSafe(map(&mut *conn, id, snapshots, params, vitals.panics())).catch_unwind().await;
+    let reason = match made {
+        Ok(Ok(None)) => return Ok(()),
+        Ok(Ok(Some(map))) => {
+            vitals.published(&map.name);
+            snapshots.publish(map);
+            return Ok(());
+        }
+        Ok(Err(error)) if error.is_fatal() => return Err(error),
+        Ok(Err(error)) => {
+            tracing::error!(map = id, error = &error as &dyn std::error::Error, "a map cannot be made ready");
+            error.to_string()
+        }
+        Err(cause) => {
+            let (what, follows) = (format!("map number {id}"), "its previous version stays in use");
+            vitals.panics().caught(Edge::Publication, cause.as_ref(), &what, follows);
+            "the server failed on it; see its log".to_owned()
+        }
+    };
+    let name = sqlx::query_scalar(NAME).bind(id).fetch_one(conn).await;
+    let name: String = name.map_err(StoreError::at("read the name of a map"))?;
+    tracing::error!(map = name, reason, "the stored version of this map is not in use");
+    vitals.unpublished(&name, &reason);
+    Err(StoreError::NotPublished { map: name })
+}
+
+/// The current version of a map as it is in the database; `None` if it is gone.
+async fn map(
+    conn: &mut SqliteConnection,
+    id: i64,
+    snapshots: &Snapshots,
+    params: &Arc<Params>,
+    panics: &Panics,
 ) -> Result<Option<Arc<MapSnapshot>>, StoreError> {
     let at = || StoreError::at("read map");
     let Some(row) = sqlx::query(MAP).bind(id).fetch_optional(&mut *conn).await.map_err(at())? else {
@@ -87,11 +137,13 @@ pub(super) async fn map(
         laser::all_of(&mut *conn, id).await?.iter().filter_map(|ends| wall(ends).ok()).collect();
     let name: String = row.try_get("name").map_err(at())?;
     let before = snapshots.get(&name);
-    let wall_index = wall_index(&walls, before.as_deref()).await;
+    let wall_index = wall_index(&walls, before.as_deref(), panics).await;
     let areas = areas::all(&mut *conn, id, before.as_deref().map(|map| &map.areas)).await?;
     let sight = sights::read(&name, row.try_get::<Option<&str>, _>("sight").map_err(at())?);
-    let visibility = seen::areas(&infos, &walls, &sight, before.clone()).await;
-    let (learnt, quarantined) = models(conn, id, before.as_deref(), params).await?;
+    let visibility = seen::areas(&infos, &walls, &sight, before.clone(), panics).await;
+    #[cfg(test)]
+    tests::planted(&name);
+    let (learnt, quarantined) = models(conn, id, before.as_deref(), params, panics).await?;
     for (id, reason) in &quarantined {
         let landmark = infos.get(id).map_or("", |l: &LandmarkInfo| l.name.as_str());
         tracing::warn!(map = name, landmark, reason, "model not used");
@@ -99,7 +151,7 @@ pub(super) async fn map(
     let active = learnt.values().map(|l| l.model.clone()).filter(|m| m.is_active()).collect();
     let models = ModelSet::new(active, params)
         .map_err(|e| StoreError::Damaged { what: format!("map `{name}`"), reason: e.to_string() })?;
-    let doubles = doubles(&learnt, before.as_deref(), (distance, params)).await;
+    let doubles = doubles(&learnt, before.as_deref(), (distance, params), panics).await;
     Ok(Some(Arc::new(MapSnapshot {
         name,
         models,
@@ -120,16 +172,14 @@ pub(super) async fn map(
 }
 
 /// The walls made ready for scans, off the runtime; taken over from the version before where they are the same.
-async fn wall_index(walls: &[LaserSegment], before: Option<&MapSnapshot>) -> Arc<WallIndex> {
+async fn wall_index(walls: &[LaserSegment], before: Option<&MapSnapshot>, panics: &Panics) -> Arc<WallIndex> {
     if let Some(before) = before.filter(|before| before.walls == walls) {
         return before.wall_index.clone();
     }
     let walls = walls.to_vec();
     let made = tokio::task::spawn_blocking(move || WallIndex::new(&walls)).await;
-    Arc::new(made.unwrap_or_else(|error| {
-        tracing::error!(%error, "walls for scans");
-        WallIndex::new([])
-    }))
+    let made = panics.joined(Edge::Publication, "the index of the walls", "scans correct nothing here", made);
+    Arc::new(made.unwrap_or_else(|_ended| WallIndex::new([])))
 }
 
 /// Landmarks that have look-alikes, off the runtime; taken over from the version before where no model is another.
@@ -137,6 +187,7 @@ async fn doubles(
     learnt: &BTreeMap<LandmarkId, Learnt>,
     before: Option<&MapSnapshot>,
     (kind, params): (DistanceKind, &Arc<Params>),
+    panics: &Panics,
 ) -> Arc<Doubles> {
     let digests =
         |of: &BTreeMap<LandmarkId, Learnt>| of.iter().map(|(id, l)| (*id, l.digest)).collect::<Vec<_>>();
@@ -145,10 +196,8 @@ async fn doubles(
     }
     let (learnt, params) = (learnt.clone(), params.clone());
     let made = tokio::task::spawn_blocking(move || doubles::doubles(&learnt, kind, &params)).await;
-    Arc::new(made.unwrap_or_else(|error| {
-        tracing::error!(%error, "look-alikes for searches");
-        Doubles::default()
-    }))
+    let made = panics.joined(Edge::Publication, "look-alikes for searches", "searches do without", made);
+    Arc::new(made.unwrap_or_default())
 }
 
 type Models = (BTreeMap<LandmarkId, Learnt>, BTreeMap<LandmarkId, String>);
@@ -159,6 +208,7 @@ async fn models(
     map_id: i64,
     before: Option<&MapSnapshot>,
     params: &Params,
+    panics: &Panics,
 ) -> Result<Models, StoreError> {
     let (mut learnt, mut quarantined) = Models::default();
     for (id, digest) in models::digests(&mut *conn, map_id).await? {
@@ -168,7 +218,13 @@ async fn models(
             continue;
         }
         let bytes = models::get(&mut *conn, id).await?;
-        match read_model(&bytes, digest, id, params) {
+        let what = format!("the model of landmark number {}", id.0);
+        let read = panics.catch(Edge::Publication, &what, "it is not used", || {
+            #[cfg(test)]
+            tests::planted(&what);
+            read_model(&bytes, digest, id, params)
+        });
+        match read.unwrap_or_else(|| Err("the server failed on the stored model; see its log".to_owned())) {
             Ok(model) => {
                 learnt.insert(id, Learnt { digest, model: Arc::new(model) });
             }
@@ -215,4 +271,24 @@ pub(crate) fn wall(&[ax, ay, bx, by]: &laser::Ends) -> Result<LaserSegment, OutO
     let variance = WALL_SIGMA_M * WALL_SIGMA_M;
     let covariance = Matrix2::new(2.0 * variance / (length * length), 0.0, 0.0, variance);
     LaserSegment::from_ends(a, b, covariance)
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use std::cell::RefCell;
+
+    thread_local! {
+        /// Where the loading of a map panics on this thread: the name of a map, or what is read of it.
+        static PLANTED: RefCell<Option<String>> = const { RefCell::new(None) };
+    }
+
+    /// Plants a panic, or takes it away.
+    pub(in crate::store) fn plant(what: Option<&str>) {
+        PLANTED.set(what.map(str::to_owned));
+    }
+
+    pub(super) fn planted(what: &str) {
+        let hit = PLANTED.with_borrow(|planted| planted.as_deref() == Some(what));
+        assert!(!hit, "planted: {what}");
+    }
 }

@@ -16,6 +16,7 @@ pub(crate) mod views;
 pub(crate) mod models;
 pub(crate) mod laser;
 pub(crate) mod placing;
+pub(crate) mod teaching;
 pub(crate) mod gatherings;
 pub(crate) mod accepting;
 pub(crate) mod areas;
@@ -26,13 +27,13 @@ pub(crate) mod jobs;
 
 pub(crate) use error::StoreError;
 pub(crate) use open::OpenError;
-pub(crate) use writer::{Change, Tx};
+pub(crate) use writer::{Change, PART as WRITER, Tx};
 
-use crate::{config::Config, engine::snapshot::Snapshots};
+use crate::{config::Config, engine::snapshot::Snapshots, vitals::Vitals};
 use futures::future::BoxFuture;
 use sqlx::SqlitePool;
 use std::{sync::Arc, time::SystemTime};
-use tokio::sync::{mpsc, oneshot, watch};
+use tokio::sync::{Mutex, MutexGuard, Notify, mpsc, oneshot};
 
 /// The open store. Cheap to clone.
 #[derive(Debug, Clone)]
@@ -40,7 +41,10 @@ pub(crate) struct Store {
     commands: mpsc::Sender<writer::Command>,
     reads: SqlitePool,
     snapshots: Arc<Snapshots>,
-    failed: watch::Receiver<bool>,
+    vitals: Arc<Vitals>,
+    jobs: Arc<Notify>,
+    /// Held while a write is prepared and made.
+    turn: Arc<Mutex<()>>,
 }
 
 /// What must be awaited for the file to be closed in good order.
@@ -73,26 +77,41 @@ impl Store {
     pub(crate) async fn open(config: &Config) -> Result<(Self, WriterTask), OpenError> {
         let opened = open::open(&config.data).await?;
         let snapshots = Arc::new(Snapshots::default());
+        let (vitals, jobs) = (Arc::new(Vitals::default()), Arc::new(Notify::new()));
         let mut conn = opened.writer;
-        load::all(&mut conn, &snapshots, &config.params).await.map_err(OpenError::Load)?;
+        load::all(&mut conn, &snapshots, &config.params, &vitals).await.map_err(OpenError::Load)?;
         let (commands, received) = mpsc::channel(config.limits.write_queue);
-        let (failed, failure) = watch::channel(false);
-        let writer = writer::Writer::new(conn, received, snapshots.clone(), config.params.clone(), failed);
+        let (all, params) = (snapshots.clone(), config.params.clone());
+        let writer = writer::Writer::new(conn, received, all, params, vitals.clone(), jobs.clone());
         let (close, closed) = oneshot::channel();
-        let task = tokio::spawn(writer.run(closed));
+        let task = tokio::spawn(writer.run(closed, vitals.begin(WRITER)));
         let task = WriterTask { task, close, reads: opened.reads.clone(), _lock: opened.lock };
-        Ok((Self { commands, reads: opened.reads, snapshots, failed: failure }, task))
+        Ok((Self { commands, reads: opened.reads, snapshots, vitals, jobs, turn: Arc::default() }, task))
     }
 
-    /// Runs `write` in its own transaction. When this returns `Ok`, it is committed and visible.
+    /// Runs `write` in its own transaction. When this returns `Ok`, it is committed and visible. A caller that drops this
+    /// future before the transaction begins takes the write back; later it runs to its end.
     pub(crate) async fn write<T, F>(&self, write: F) -> Result<T, StoreError>
     where
         T: Send + 'static,
         F: for<'t> FnOnce(&'t mut Tx) -> BoxFuture<'t, Result<T, StoreError>> + Send + 'static,
     {
-        let (command, answer) = writer::command(write);
+        let caller = Arc::new(());
+        let (command, answer) = writer::command(write, &caller);
         self.commands.send(command).await.map_err(|_gone| StoreError::Closed)?;
-        answer.await.map_err(|_gone| StoreError::Closed)?
+        let answer = answer.await;
+        drop(caller);
+        answer.map_err(|_gone| StoreError::Closed)?
+    }
+
+    /// The turn to prepare a write from what is stored: one at a time, so that they do not undo each other's work.
+    async fn preparing(&self) -> MutexGuard<'_, ()> {
+        self.turn.lock().await
+    }
+
+    /// Returns when a job was queued since the last time. For one who waits.
+    pub(crate) async fn job_queued(&self) {
+        self.jobs.notified().await;
     }
 
     /// The read-only pool.
@@ -105,9 +124,9 @@ impl Store {
         &self.snapshots
     }
 
-    /// Becomes true when the store has failed and the server must stop.
-    pub(crate) fn failed(&self) -> watch::Receiver<bool> {
-        self.failed.clone()
+    /// Which parts of the server run; the writer is one of them.
+    pub(crate) fn vitals(&self) -> &Arc<Vitals> {
+        &self.vitals
     }
 }
 

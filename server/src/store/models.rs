@@ -3,6 +3,7 @@
 use super::{StoreError, Tx, landmarks::ModelSummary, statements::statements};
 use sha2::{Digest as _, Sha256};
 use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
+use std::collections::BTreeSet;
 use vision::recognise::LandmarkId;
 
 statements! {
@@ -15,6 +16,12 @@ statements! {
            learnt_ms = excluded.learnt_ms";
     DIGESTS = "SELECT m.landmark_id, m.sha256 FROM models m JOIN landmarks l ON l.id = m.landmark_id \
                WHERE l.map_id = ?1 ORDER BY m.landmark_id";
+    REPLACE = "UPDATE models SET model = ?3, sha256 = ?4, facts = json_set(facts, '$.points', ?5) \
+               WHERE landmark_id = ?1 AND sha256 = ?2";
+    POINTS_NOT_ASKED = "SELECT m.landmark_id FROM models m JOIN landmarks l ON l.id = m.landmark_id \
+                        WHERE l.map_id = ?1 AND m.points_asked = 0 \
+                        AND EXISTS (SELECT 1 FROM views v WHERE v.landmark_id = m.landmark_id)";
+    ASK_POINTS = "UPDATE models SET points_asked = 1 WHERE landmark_id = ?1";
     GET = "SELECT model FROM models WHERE landmark_id = ?1";
 }
 
@@ -53,6 +60,45 @@ pub(crate) async fn put(tx: &mut Tx, map_id: i64, new: &NewModel) -> Result<bool
         .await
         .map_err(StoreError::at("store model"))?;
     Ok(done.rows_affected() == 1)
+}
+
+/// Puts the bytes of the same model with points in the place of the model with the digest `was`; says whether that one was
+/// still there.
+pub(crate) async fn replace(
+    tx: &mut Tx,
+    landmark: LandmarkId,
+    (was, bytes): (ModelDigest, &[u8]),
+    points: usize,
+) -> Result<bool, StoreError> {
+    let done = sqlx::query(REPLACE)
+        .bind(landmark.0 as i64)
+        .bind(&was[..])
+        .bind(bytes)
+        .bind(&digest(bytes)[..])
+        .bind(points as i64)
+        .execute(&mut tx.conn)
+        .await
+        .map_err(StoreError::at("replace model"))?;
+    Ok(done.rows_affected() == 1)
+}
+
+/// Landmarks of a map that have a model and views, and for whose model points were not asked yet.
+pub(crate) async fn points_not_asked(
+    db: impl SqliteExecutor<'_>,
+    map_id: i64,
+) -> Result<BTreeSet<LandmarkId>, StoreError> {
+    let ids = sqlx::query_scalar::<_, i64>(POINTS_NOT_ASKED).bind(map_id).fetch_all(db).await;
+    let ids = ids.map_err(StoreError::at("list models without points"))?;
+    Ok(ids.into_iter().map(|id| LandmarkId(id as u64)).collect())
+}
+
+/// Notes that points were asked for these models.
+pub(crate) async fn ask_points(tx: &mut Tx, landmarks: &[LandmarkId]) -> Result<(), StoreError> {
+    for landmark in landmarks {
+        let done = sqlx::query(ASK_POINTS).bind(landmark.0 as i64).execute(&mut tx.conn).await;
+        done.map_err(StoreError::at("ask for points"))?;
+    }
+    Ok(())
 }
 
 /// Landmark and digest of every model of a map.

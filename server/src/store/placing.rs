@@ -4,8 +4,8 @@
 use super::{
     StoreError, Tx,
     landmarks::{self, Measures, Place},
-    laser, load, maps,
     statements::statements,
+    teaching::Captured,
     views,
 };
 use map::{
@@ -21,7 +21,7 @@ use map::{
 use nalgebra::{Isometry3, Matrix2, Vector3};
 use protos::{Rejection, convert::geometry, v1};
 use serde::{Deserialize, Serialize};
-use sqlx::Row;
+use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 use utoipa::ToSchema;
 use vision::{
     detect::quads::{BORDER_SIGMA_PX, Corners},
@@ -34,6 +34,8 @@ statements! {
                 ORDER BY id DESC LIMIT 256";
 }
 
+/// Views that a place rests on at most, the newest; the number in `CAPTURES`.
+const MAX_CAPTURES: usize = 256;
 /// Standard deviation of a taught corner, per coordinate, where nothing is known of it.
 const CORNER_SIGMA_PX: f64 = 1.0;
 /// Of a ceiling's height as it is given.
@@ -142,38 +144,60 @@ pub(crate) struct Placing {
     pub(crate) reason: Option<String>,
 }
 
-/// Places a landmark from all its views that say where the robot stood.
-pub(crate) async fn by_views(tx: &mut Tx, map: &str, landmark: &str) -> Result<Placing, StoreError> {
-    let not = |reason: String| Placing { placed: false, views_used: 0, reason: Some(reason) };
-    let row = landmarks::get(&mut tx.conn, map, landmark).await?;
-    if row.measures.place.is_some_and(|place| place.covariance.is_none()) {
-        return Ok(not("by_hand".to_owned()));
-    }
-    let rows = sqlx::query(CAPTURES).bind(row.id).fetch_all(&mut tx.conn).await;
+/// What the views of a landmark say of its place; computed, not stored yet.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Made {
+    /// The place by hand stays.
+    ByHand,
+    /// They do not place it, and why.
+    Not(String),
+    /// Place and size, and how many views they rest on.
+    Placed(Box<Measures>, usize),
+}
+
+/// Views of a landmark that say how they were taken, the newest first: as many as its place may rest on.
+pub(super) async fn captures(
+    db: impl SqliteExecutor<'_>,
+    landmark: i64,
+) -> Result<Vec<Captured>, StoreError> {
+    let rows = sqlx::query(CAPTURES).bind(landmark).fetch_all(db).await;
     let rows = rows.map_err(StoreError::at("read captures"))?;
-    let mut looks = vec![];
-    for row in &rows {
-        let at = || StoreError::at("read captures");
-        let corners = views::corners_in(row)?;
-        let capture: String = row.try_get("capture").map_err(at())?;
-        // What an older or newer program stored and this one does not understand is left out.
-        let taken = serde_json::from_str::<Capture>(&capture).ok().and_then(|c| c.taken().ok());
-        looks.extend(taken.map(|taken| (corners, taken)));
-    }
-    let map_row = maps::get(&mut tx.conn, map).await?;
-    let walls: Vec<LaserSegment> = laser::all_of(&mut tx.conn, map_row.id)
-        .await?
-        .iter()
-        .filter_map(|ends| load::wall(ends).ok())
-        .collect();
-    let made = match placed(&looks, &walls) {
-        Ok(made) => made,
-        Err(error) => return Ok(not(error.to_string())),
+    let captured = |row: &SqliteRow| {
+        Ok((views::corners_in(row)?, row.try_get("capture").map_err(StoreError::at("read captures"))?))
     };
-    let by_hand = row.measures.size.filter(|_| !row.measures.size_from_views);
-    let measures = measures(&made.place, by_hand);
-    landmarks::update(tx, map, landmark, |_| measures).await?;
-    Ok(Placing { placed: true, views_used: made.used.len(), reason: None })
+    rows.iter().map(captured).collect()
+}
+
+/// Places a landmark, that is measured as `now`, by views that say where the robot stood, the newest first.
+pub(super) fn made(captures: &[Captured], walls: &[LaserSegment], now: &Measures) -> Made {
+    if now.place.is_some_and(|place| place.covariance.is_none()) {
+        return Made::ByHand;
+    }
+    // What an older or newer program stored and this one does not understand is left out.
+    let taken = |(corners, capture): &Captured| {
+        Some((*corners, serde_json::from_str::<Capture>(capture).ok()?.taken().ok()?))
+    };
+    let looks: Vec<(Corners, Taken)> = captures.iter().take(MAX_CAPTURES).filter_map(taken).collect();
+    match placed(&looks, walls) {
+        Ok(made) => {
+            let by_hand = now.size.filter(|_| !now.size_from_views);
+            Made::Placed(Box::new(measures(&made.place, by_hand)), made.used.len())
+        }
+        Err(error) => Made::Not(error.to_string()),
+    }
+}
+
+/// Stores a place that was computed.
+pub(super) async fn put(tx: &mut Tx, map: &str, landmark: &str, made: Made) -> Result<Placing, StoreError> {
+    let not = |reason: String| Placing { placed: false, views_used: 0, reason: Some(reason) };
+    Ok(match made {
+        Made::ByHand => not("by_hand".to_owned()),
+        Made::Not(reason) => not(reason),
+        Made::Placed(measures, views_used) => {
+            landmarks::update(tx, map, landmark, move |_| *measures).await?;
+            Placing { placed: true, views_used, reason: None }
+        }
+    })
 }
 
 /// Where a thing hangs by its views, without storing anything.
@@ -289,9 +313,13 @@ fn measures(place: &LandmarkPlace, by_hand: Option<LandmarkSize>) -> Measures {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
-    use crate::store::{Store, views::NewView};
+    use crate::store::{
+        Store, laser, load, maps,
+        teaching::{self, Teaching},
+        views::NewView,
+    };
     use map::{mounting::pan_tilt, pose2::Pose2};
     use nalgebra::{Matrix3, Matrix6};
     use vision::{
@@ -316,7 +344,7 @@ mod tests {
         }
     }
 
-    fn seen_from(x: f64, number: u8, shift_px: f64) -> NewView {
+    pub(in crate::store) fn seen_from(x: f64, number: u8, shift_px: f64) -> NewView {
         let camera = Intrinsics::new(500.0, 500.0, 320.0, 240.0, vision::frame::Distortion::None).unwrap();
         let heading = (-2.0_f64).atan2(2.0 - x);
         let robot = Pose2::new(x, 2.0, heading);
@@ -350,14 +378,10 @@ mod tests {
         }
     }
 
-    async fn taught(store: &Store, new: NewView) -> Placing {
-        let write = store.write(move |tx| {
-            Box::pin(async move {
-                views::add(tx, "a", "p1", &new, 100, None).await?;
-                by_views(tx, "a", "p1").await
-            })
-        });
-        write.await.unwrap()
+    async fn taught(store: &Store, view: NewView) -> Placing {
+        let (map, landmark) = ("a".to_owned(), "p1".to_owned());
+        let teaching = Teaching { map, landmark, view, max: 100, thinning: None };
+        teaching::add(store, teaching).await.unwrap().2.unwrap()
     }
 
     #[tokio::test]

@@ -1,7 +1,10 @@
 //! Visibility areas of a map's landmarks, off the runtime; taken over from the snapshot before where neither the camera,
 //! the landmark's place nor an obstacle within its reach has changed.
 
-use crate::engine::snapshot::{LandmarkInfo, MapSnapshot};
+use crate::engine::{
+    panics::{Edge, Panics},
+    snapshot::{LandmarkInfo, MapSnapshot},
+};
 use map::{
     place::LandmarkPlace,
     segments::LaserSegment,
@@ -18,14 +21,13 @@ pub(super) async fn areas(
     walls: &[LaserSegment],
     sight: &Sight,
     before: Option<Arc<MapSnapshot>>,
+    panics: &Panics,
 ) -> Areas {
     let places: Vec<_> = landmarks.iter().filter_map(|(id, l)| Some((*id, l.place?))).collect();
     let (obstacles, sight): (Vec<Obstacle>, _) = (walls.iter().map(Obstacle::from).collect(), sight.clone());
     let made = tokio::task::spawn_blocking(move || all(&places, &obstacles, &sight, before.as_deref()));
-    made.await.unwrap_or_else(|error| {
-        tracing::error!(%error, "visibility areas");
-        Areas::new()
-    })
+    let made = panics.joined(Edge::Publication, "visibility areas", "there are none", made.await);
+    made.unwrap_or_default()
 }
 
 fn all(

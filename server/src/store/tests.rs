@@ -1,7 +1,7 @@
 //! The store as a whole, on fresh databases.
 
 use super::*;
-use crate::config::RawConfig;
+use crate::{config::RawConfig, engine::panics::Edge};
 use sqlx::{Executor, SqlSafeStr};
 use vision::recognise::DistanceKind;
 
@@ -22,6 +22,7 @@ async fn every_statement_prepares_on_the_migrated_schema() {
         models::ALL,
         laser::ALL,
         placing::ALL,
+        teaching::ALL,
         gatherings::ALL,
         accepting::ALL,
         areas::ALL,
@@ -206,4 +207,162 @@ async fn damaged_and_outdated_models_are_named_and_not_used() {
     let map = store.snapshots().get("a").unwrap();
     assert!(map.learnt.is_empty());
     assert!(map.quarantined[&LandmarkId(1)].contains("parameters"), "{:?}", map.quarantined);
+}
+
+#[tokio::test]
+async fn a_write_that_panics_is_rolled_back_and_the_writer_goes_on() {
+    let dir = tempfile::tempdir().unwrap();
+    let (store, _task) = Store::open(&config(dir.path())).await.unwrap();
+    let panicked = store
+        .write(|tx| {
+            Box::pin(async move {
+                maps::create(tx, "half", DistanceKind::Both, 9).await?;
+                tx.after(|| unreachable!("nothing was committed"));
+                Err::<(), _>(StoreError::InUse(String::from_utf8(vec![0xff]).expect("planted")))
+            })
+        })
+        .await;
+    assert!(matches!(panicked, Err(StoreError::Panicked)), "{panicked:?}");
+    store.write(|tx| Box::pin(maps::create(tx, "a", DistanceKind::Both, 2))).await.unwrap();
+    assert!(matches!(maps::get(store.reads(), "half").await, Err(StoreError::NotFound { .. })));
+    assert_eq!(store.vitals().panics().at(Edge::Write), 1);
+    assert_eq!(store.vitals().failure(), None);
+}
+
+#[tokio::test]
+async fn an_error_after_which_nothing_may_be_written_is_a_failure_of_the_server() {
+    let dir = tempfile::tempdir().unwrap();
+    let (store, _task) = Store::open(&config(dir.path())).await.unwrap();
+    let source = || sqlx::Error::WorkerCrashed;
+    let fatal = store.write(move |_| {
+        Box::pin(async move { Err::<(), _>(StoreError::Database { operation: "planted", source: source() }) })
+    });
+    assert!(fatal.await.is_err());
+    let failed = tokio::time::timeout(std::time::Duration::from_secs(5), store.vitals().failed()).await;
+    assert_eq!(failed.unwrap().part, WRITER);
+    let late = store.write(|tx| Box::pin(maps::create(tx, "late", DistanceKind::Both, 2))).await;
+    assert!(matches!(late, Err(StoreError::Closed)));
+}
+
+/// Whatever ends the writer's task without a word.
+#[tokio::test]
+async fn a_writer_that_is_gone_is_a_failure_of_the_server() {
+    let dir = tempfile::tempdir().unwrap();
+    let (store, task) = Store::open(&config(dir.path())).await.unwrap();
+    task.task.abort();
+    let failed = tokio::time::timeout(std::time::Duration::from_secs(5), store.vitals().failed()).await;
+    assert_eq!(failed.unwrap().part, WRITER);
+}
+
+#[tokio::test]
+async fn a_write_whose_caller_has_gone_before_it_began_is_left_out() {
+    let dir = tempfile::tempdir().unwrap();
+    let (store, _task) = Store::open(&config(dir.path())).await.unwrap();
+    let create =
+        |name: &'static str| store.write(move |tx| Box::pin(maps::create(tx, name, DistanceKind::Both, 9)));
+    {
+        let mut gone = std::pin::pin!(create("gone"));
+        // It is in the queue; the writer has had no turn on this one thread.
+        assert!(futures::poll!(gone.as_mut()).is_pending());
+    }
+    create("next").await.unwrap();
+    assert!(matches!(maps::get(store.reads(), "gone").await, Err(StoreError::NotFound { .. })));
+}
+
+#[tokio::test]
+async fn what_follows_a_commit_does_not_wait_for_its_caller() {
+    let dir = tempfile::tempdir().unwrap();
+    let (store, _task) = Store::open(&config(dir.path())).await.unwrap();
+    let (begun, begins) = oneshot::channel();
+    let (done, followed) = oneshot::channel();
+    let (store_, go) = (store.clone(), Arc::new(tokio::sync::Notify::new()));
+    let wait = go.clone();
+    let caller = tokio::spawn(async move {
+        let write = store_.write(move |tx| {
+            Box::pin(async move {
+                maps::create(tx, "a", DistanceKind::Both, 2).await?;
+                begun.send(()).unwrap();
+                wait.notified().await;
+                tx.after(move || done.send(()).unwrap());
+                Ok(())
+            })
+        });
+        write.await
+    });
+    begins.await.unwrap();
+    caller.abort();
+    assert!(caller.await.unwrap_err().is_cancelled());
+    go.notify_one();
+    followed.await.unwrap();
+    assert!(maps::get(store.reads(), "a").await.is_ok() && store.snapshots().get("a").is_some());
+}
+
+#[tokio::test]
+async fn a_map_that_cannot_be_made_ready_keeps_its_version_and_stops_nothing() {
+    let dir = tempfile::tempdir().unwrap();
+    let config = config(dir.path());
+    let (store, task) = Store::open(&config).await.unwrap();
+    for map in ["a", "b"] {
+        store.write(move |tx| Box::pin(maps::create(tx, map, DistanceKind::Both, 2))).await.unwrap();
+    }
+    let wall =
+        |map: &'static str| store.write(move |tx| Box::pin(laser::replace(tx, map, &[[0.0, 0.0, 4.0, 0.0]])));
+    load::tests::plant(Some("a"));
+    let refused = wall("a").await;
+    assert!(matches!(&refused, Err(StoreError::NotPublished { map }) if map == "a"), "{refused:?}");
+    wall("b").await.unwrap();
+    let versions = || ["a", "b"].map(|map| store.snapshots().get(map).map(|m| m.version));
+    assert_eq!(versions(), [Some(1), Some(2)]);
+    let named: Vec<_> = store.vitals().all_unpublished().into_keys().collect();
+    assert_eq!((named, store.vitals().failure()), (vec!["a".to_owned()], None));
+    assert_eq!(store.vitals().panics().at(Edge::Publication), 1);
+    // The write stands, and the next one makes all of it visible.
+    load::tests::plant(None);
+    wall("a").await.unwrap();
+    assert_eq!(versions(), [Some(3), Some(2)]);
+    assert!(store.vitals().all_unpublished().is_empty());
+    task.close().await;
+
+    // A start with it is a start without that map.
+    load::tests::plant(Some("a"));
+    let (store, task) = Store::open(&config).await.unwrap();
+    assert!(store.snapshots().get("a").is_none() && store.snapshots().get("b").is_some());
+    assert!(store.vitals().all_unpublished().contains_key("a"));
+    store.write(|tx| Box::pin(maps::delete(tx, "a"))).await.unwrap();
+    assert!(store.vitals().all_unpublished().is_empty());
+    load::tests::plant(None);
+    task.close().await;
+}
+
+#[tokio::test]
+async fn a_model_that_cannot_be_read_is_quarantined_and_the_others_are_used() {
+    use vision::recognise::LandmarkId;
+    let dir = tempfile::tempdir().unwrap();
+    let config = config(dir.path());
+    let (store, task) = Store::open(&config).await.unwrap();
+    store.write(|tx| Box::pin(maps::create(tx, "a", DistanceKind::Both, 2))).await.unwrap();
+    for name in ["sound", "bad"] {
+        let none = landmarks::Measures::default();
+        let made = store.write(move |tx| Box::pin(landmarks::create(tx, "a", name, none, 5))).await.unwrap();
+        store_model(&store, made.id, &config.params).await;
+    }
+    task.close().await;
+    load::tests::plant(Some("the model of landmark number 2"));
+    let (store, _task) = Store::open(&config).await.unwrap();
+    load::tests::plant(None);
+    let map = store.snapshots().get("a").unwrap();
+    assert_eq!(map.learnt.keys().copied().collect::<Vec<_>>(), [LandmarkId(1)]);
+    assert!(map.quarantined[&LandmarkId(2)].contains("failed"), "{:?}", map.quarantined);
+    assert_eq!(store.vitals().panics().at(Edge::Publication), 1);
+}
+
+/// From now on no run can be stored.
+pub(crate) async fn refuse_runs(store: &Store) {
+    let trigger = "CREATE TRIGGER refuse BEFORE INSERT ON runs BEGIN SELECT RAISE(ABORT, 'planted'); END";
+    let write = store.write(move |tx| {
+        Box::pin(async move {
+            sqlx::raw_sql(trigger).execute(&mut tx.conn).await.map(drop).map_err(StoreError::at("plant"))
+        })
+    });
+    write.await.unwrap();
 }

@@ -1,15 +1,10 @@
 //! Views of landmarks with their pictures, and the strangers seen beside them.
 
-use super::{StoreError, Tx, landmarks, maps, now_ms, statements::statements, within};
+use super::{StoreError, Tx, landmarks, now_ms, statements::statements, within};
 use serde::Serialize;
 use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 use utoipa::ToSchema;
-use vision::{
-    detect::quads::Corners,
-    icon::Icon,
-    learn::thinning::{ThinningParams, ViewDigest, most_alike},
-    recognise::LandmarkId,
-};
+use vision::{detect::quads::Corners, icon::Icon, recognise::LandmarkId};
 
 statements! {
     COUNT = "SELECT count(*) FROM views WHERE landmark_id = ?1";
@@ -24,8 +19,8 @@ statements! {
     ICON = "SELECT v.icon_side, v.icon, v.icon_scale FROM views v JOIN landmarks l ON l.id = v.landmark_id \
             JOIN maps m ON m.id = l.map_id WHERE m.name = ?1 AND l.name = ?2 AND v.id = ?3";
     DELETE = "DELETE FROM views WHERE id = ?1 AND landmark_id = ?2";
-    OF_LANDMARK = "SELECT id, image_kind, width_px, height_px, corners_px, created_ms, icon_side, icon, icon_scale \
-                   FROM views WHERE landmark_id = ?1 ORDER BY id";
+    GET = "SELECT id, image_kind, width_px, height_px, corners_px, created_ms FROM views WHERE id = ?1";
+    CUTS = "SELECT id, corners_px, icon_side, icon, icon_scale FROM views WHERE landmark_id = ?1 ORDER BY id";
     OF_MAP = "SELECT v.id, v.landmark_id, v.image_sha256, v.width_px, v.height_px, v.corners_px, v.icon_side, v.icon, \
               v.icon_scale FROM views v JOIN landmarks l ON l.id = v.landmark_id WHERE l.map_id = ?1 ORDER BY v.id";
     IMAGE = "SELECT image FROM views WHERE id = ?1";
@@ -123,7 +118,7 @@ fn icon_of(row: &SqliteRow) -> Result<Icon, StoreError> {
     Icon::new(side as usize, pixels, scale).map_err(|e| damaged("icon")(e.to_string()))
 }
 
-fn digest_of(row: &SqliteRow) -> Result<Digest, StoreError> {
+pub(super) fn digest_of(row: &SqliteRow) -> Result<Digest, StoreError> {
     let bytes: &[u8] = row.try_get("image_sha256").map_err(StoreError::at("read digest"))?;
     bytes.try_into().map_err(|_length| damaged("digest")("not 32 bytes".into()))
 }
@@ -152,47 +147,39 @@ pub(crate) enum Outcome {
     Alike,
 }
 
-/// The stored view that is so much like a new one that both would teach the same.
-async fn alike(
-    tx: &mut Tx,
-    landmark: i64,
-    new: &NewView,
-    p: &ThinningParams,
-) -> Result<Option<ViewRow>, StoreError> {
-    let rows = sqlx::query(OF_LANDMARK).bind(landmark).fetch_all(&mut tx.conn).await;
-    let rows = rows.map_err(StoreError::at("read views"))?;
-    let digest = |cut: &Cut| ViewDigest::new(&cut.corners_px, &cut.icon);
-    let kept = rows.iter().map(|row| Ok(digest(&cut_of(row)?))).collect::<Result<Vec<_>, StoreError>>()?;
-    match most_alike(&digest(&new.cut), &kept, p) {
-        Some((index, novelty)) if novelty < 1.0 => view_row(&rows[index]).map(Some),
-        _ => Ok(None),
-    }
+/// The view of a landmark that shows the same quad of the same picture.
+pub(super) async fn same(tx: &mut Tx, landmark: i64, new: &NewView) -> Result<Option<ViewRow>, StoreError> {
+    let corners = corners_bytes(&new.cut.corners_px);
+    let same = sqlx::query(SAME).bind(landmark).bind(&new.image_sha256[..]).bind(&corners);
+    let row = same.fetch_optional(&mut tx.conn).await.map_err(StoreError::at("look for view"))?;
+    row.as_ref().map(view_row).transpose()
 }
 
-/// Stores a view, unless it is there already or, with `thinning`, is a near-duplicate of one; then gives that one.
-pub(crate) async fn add(
+/// One view.
+pub(super) async fn get(db: impl SqliteExecutor<'_>, view: i64) -> Result<ViewRow, StoreError> {
+    let row = sqlx::query(GET).bind(view).fetch_optional(db).await.map_err(StoreError::at("read view"))?;
+    view_row(&row.ok_or_else(|| StoreError::NotFound { what: "view", name: view.to_string() })?)
+}
+
+/// What the views of a landmark show, by number.
+pub(super) async fn cuts(db: impl SqliteExecutor<'_>, landmark: i64) -> Result<Vec<(i64, Cut)>, StoreError> {
+    let rows = sqlx::query(CUTS).bind(landmark).fetch_all(db).await;
+    let rows = rows.map_err(StoreError::at("read views"))?;
+    let cut = |row: &SqliteRow| Ok((row.try_get("id").map_err(StoreError::at("read views"))?, cut_of(row)?));
+    rows.iter().map(cut).collect()
+}
+
+/// Stores a view of a landmark (numbers of map and landmark) that is not there yet, at most `max`.
+pub(super) async fn add(
     tx: &mut Tx,
-    map: &str,
-    landmark: &str,
+    (map, landmark): (i64, i64),
     new: &NewView,
     max: usize,
-    thinning: Option<&ThinningParams>,
-) -> Result<(ViewRow, Outcome), StoreError> {
-    let map = maps::get(&mut tx.conn, map).await?;
-    let landmark = landmarks::get(&mut tx.conn, &map.name, landmark).await?;
+) -> Result<ViewRow, StoreError> {
     let corners = corners_bytes(&new.cut.corners_px);
-    let same = sqlx::query(SAME).bind(landmark.id).bind(&new.image_sha256[..]).bind(&corners);
-    if let Some(row) = same.fetch_optional(&mut tx.conn).await.map_err(StoreError::at("look for view"))? {
-        return Ok((view_row(&row)?, Outcome::Same));
-    }
-    if let Some(p) = thinning
-        && let Some(row) = alike(tx, landmark.id, new, p).await?
-    {
-        return Ok((row, Outcome::Alike));
-    }
     let created_ms = now_ms();
     let id = sqlx::query_scalar(INSERT)
-        .bind(landmark.id)
+        .bind(landmark)
         .bind(&new.image_sha256[..])
         .bind(new.image_kind)
         .bind(&new.image)
@@ -207,17 +194,16 @@ pub(crate) async fn add(
         .fetch_one(&mut tx.conn)
         .await
         .map_err(StoreError::at("store view"))?;
-    let count = sqlx::query_scalar(COUNT).bind(landmark.id).fetch_one(&mut tx.conn).await;
+    let count = sqlx::query_scalar(COUNT).bind(landmark).fetch_one(&mut tx.conn).await;
     within(count.map_err(StoreError::at("count views"))?, max, "views of a landmark")?;
-    add_strangers(tx, map.id, new).await?;
-    let row = ViewRow {
+    add_strangers(tx, map, new).await?;
+    Ok(ViewRow {
         id,
         image_kind: new.image_kind.to_owned(),
         size_px: new.size_px.map(|s| s as u32),
         corners_px: new.cut.corners_px.into(),
         created_ms,
-    };
-    Ok((row, Outcome::New))
+    })
 }
 
 async fn add_strangers(tx: &mut Tx, map_id: i64, new: &NewView) -> Result<(), StoreError> {

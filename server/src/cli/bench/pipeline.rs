@@ -18,6 +18,7 @@ use vision::{
     localise::pose::LandmarkSize,
     params::Params,
     pipeline::{Landmarks, analyse_quads},
+    points::taught::view_points,
     recognise::{DistanceKind, LandmarkId, ModelSet},
     trace::Stage,
 };
@@ -139,7 +140,8 @@ fn models(building: &Building, args: &PipelineArgs, params: &Params) -> anyhow::
         let (w, h) = (picture.width() as f64 - 0.5, picture.height() as f64 - 0.5);
         let whole = Corners::try_from([[-0.5, -0.5], [w, -0.5], [w, h], [-0.5, h]])?;
         let views = synthesis::views(picture, &whole, VIEWS, params, args.seed ^ id);
-        models.push(Arc::new(model::learn(LandmarkId(id), &views, &[], params)?));
+        let model = model::learn(LandmarkId(id), &views, &[], params)?;
+        models.push(Arc::new(model.with_points_if_used(params, || vec![view_points(picture, &whole)])));
         progress.inc(1);
     }
     progress.finish_and_clear();

@@ -4,7 +4,10 @@ use super::{
     Progress, Shared, Stage, Walls,
     journal::{Head, Journal, Kept},
 };
-use crate::engine::motion::ScanJob;
+use crate::engine::{
+    motion::ScanJob,
+    panics::{Edge, Panics},
+};
 use map::{
     pose2::Pose2,
     slam::{Slam, SlamMap, SlamParams},
@@ -12,7 +15,6 @@ use map::{
 use protos::Name;
 use std::{
     io,
-    panic::{AssertUnwindSafe, catch_unwind},
     sync::{
         Arc, Mutex, MutexGuard, PoisonError,
         mpsc::{Receiver, SyncSender, sync_channel},
@@ -54,7 +56,7 @@ pub(super) struct Session {
 
 impl Session {
     /// Starts its thread.
-    pub(super) fn begin(mut start: Start) -> Option<Self> {
+    pub(super) fn begin(mut start: Start, panics: Arc<Panics>) -> Option<Self> {
         let head = match &start {
             Start::New(head, _) => head.clone(),
             Start::Again(kept) => kept.head.clone(),
@@ -84,8 +86,8 @@ impl Session {
         let work = move || {
             // Nothing shared is left half changed: the map so far is this thread's own.
             let mapper = Mapper::new(shared.clone(), origin);
-            if catch_unwind(AssertUnwindSafe(|| mapper.run(start, first, &received))).is_err() {
-                tracing::error!("making a map panicked");
+            let run = || mapper.run(start, first, &received);
+            if panics.catch(Edge::Mapping, "the making of a map", "this mapping has failed", run).is_none() {
                 fail(&shared, "the server failed on these scans; see its log");
             }
         };

@@ -1,14 +1,12 @@
-//! One robot on the move: its fused pose, what that rests on, what it has found out about landmarks. A new epoch
-//! starts afresh; an epoch that is over says nothing more.
+//! One robot on the move: its clock, its fused pose, what that rests on, what it has found out about landmarks. A new epoch
+//! starts afresh; which epoch speaks for the robot is decided in `engine/epochs.rs`.
 
 use super::{
     corrections::{Correction, Log, modality, moved, outcome},
     run::Recording,
+    timebase::{AHEAD_TOLERANCE, Stamp, Stream, TimeBase},
 };
-use crate::engine::{
-    slots::{Order, PAST_EPOCHS},
-    snapshot::Snapshots,
-};
+use crate::engine::{slots::Order, snapshot::Snapshots};
 use map::{
     areas::Areas,
     changes::{Change, ChangeParams, Watch},
@@ -16,15 +14,17 @@ use map::{
     localise::{Fix, Modality},
     pose2::{Pose2, Pose2Covariance},
 };
-use std::{collections::VecDeque, sync::Arc};
+use protos::Rejection;
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
 use vision::recognise::LandmarkId;
 
 /// Landmarks that a pose is said to rest on: the latest.
 pub const MAX_SUPPORTERS: usize = 16;
 /// After so many metres without a fix of a modality the pose no longer rests on it, but on odometry.
 pub const RESTS_ON_M: f64 = 10.0;
-/// Readings that are older than the newest by no more than this come late; beyond it the clock may have been set back.
-const CLOCK_JITTER_NS: i64 = 2_000_000_000;
 
 #[derive(Debug)]
 pub(super) struct Robot {
@@ -33,12 +33,17 @@ pub(super) struct Robot {
     /// What the rest belongs to.
     epoch: u64,
     pub(super) map: String,
-    past: VecDeque<u64>,
+    /// Of this epoch.
+    clock: TimeBase,
     pub(super) fuser: Fuser,
     /// Lays odometry alone on the map, for pages.
     map_from_odom: Option<Pose2>,
     /// The newest odometry of this epoch, and its time.
     pub(super) newest: Option<(i64, Pose2)>,
+    /// The last odometry message: capture time and reading.
+    last_message: Option<(i64, Pose2)>,
+    /// When odometry was taken last, by the server's clock.
+    moved_at: Option<Instant>,
     /// Way driven by odometry in this epoch.
     way_m: f64,
     /// Where on it landmarks and the laser last agreed with the pose.
@@ -66,10 +71,12 @@ impl Default for Robot {
             scans: Order::default(),
             epoch: 0,
             map: String::new(),
-            past: VecDeque::new(),
+            clock: TimeBase::default(),
             fuser: Fuser::new(FuseParams::default()),
             map_from_odom: None,
             newest: None,
+            last_message: None,
+            moved_at: None,
             way_m: 0.0,
             by_landmarks_m: None,
             by_laser_m: None,
@@ -86,20 +93,14 @@ impl Default for Robot {
 
 impl Robot {
     /// Starts afresh when the robot's software did, or when it is on another map; its pose goes with it where it is known
-    /// how the two maps lie to each other. False for an epoch that is over: what was still in work when a new one began.
-    pub(super) fn belong(&mut self, epoch: u64, map: &str, maps: &Snapshots) -> bool {
+    /// how the two maps lie to each other.
+    pub(super) fn belong(&mut self, epoch: u64, map: &str, maps: &Snapshots) {
         if self.epoch == epoch && self.map == map {
             self.trust(maps);
-            return true;
+            return;
         }
-        if self.past.contains(&epoch) {
-            return false;
-        }
-        if self.epoch != epoch && !self.map.is_empty() {
-            if self.past.len() == PAST_EPOCHS {
-                self.past.pop_front();
-            }
-            self.past.push_back(self.epoch);
+        if self.epoch != epoch {
+            self.clock = TimeBase::default();
         }
         if let Some(run) = &mut self.run {
             if run.map != map {
@@ -114,14 +115,88 @@ impl Robot {
         self.fuser = Fuser::new(FuseParams::default());
         self.areas = Arc::default();
         self.trust(maps);
-        (self.map_from_odom, self.newest, self.way_m) = (None, None, 0.0);
+        (self.map_from_odom, self.newest, self.last_message, self.way_m) = (None, None, None, 0.0);
+        let moved_at = self.moved_at.take();
         self.lost();
         self.found.clear();
-        if let (Some(pose), Some((at_ns, odometry))) = (there, newest) {
-            self.moved(at_ns, odometry);
+        if let (Some(pose), Some((at_ns, odometry)), Some(moved_at)) = (there, newest, moved_at) {
+            self.moved(at_ns, odometry, moved_at);
             self.begin(at_ns, &pose, ("map", "carried_over"), Vec::new());
         }
-        true
+    }
+
+    /// Judges the capture time of the next message of a stream, with the odometry in it. Where it shows that the robot's
+    /// clock was set, the fusion goes on at the new time.
+    pub(super) fn stamp(
+        &mut self,
+        stream: &Stream,
+        captured_ns: i64,
+        odometry: Option<Pose2>,
+        received: Instant,
+    ) -> Result<(), Rejection> {
+        match self.clock.judge(stream, captured_ns, received)? {
+            Stamp::Good => {}
+            Stamp::GoodAfterStray(before_ns) => {
+                if *stream == Stream::Odometry {
+                    self.fuser.retract(before_ns);
+                    if let Some((at_ns, _)) = self.newest.as_mut().filter(|(at_ns, _)| *at_ns == before_ns) {
+                        *at_ns = captured_ns.saturating_sub(1);
+                    }
+                }
+            }
+            Stamp::ClockSet => {
+                tracing::info!(epoch = self.epoch, captured_ns, "the robot's clock was set");
+                self.clock_set(captured_ns, odometry, received);
+            }
+        }
+        if let (Stream::Odometry, Some(odometry)) = (stream, odometry) {
+            self.last_message = Some((captured_ns, odometry));
+        }
+        Ok(())
+    }
+
+    fn clock_set(&mut self, captured_ns: i64, odometry: Option<Pose2>, received: Instant) {
+        self.last_message = None;
+        if let Some(run) = &mut self.run {
+            run.end("the robot's clock was set");
+        }
+        let Some(odometry) = odometry else { return };
+        let elapsed_s = self.elapsed_s(received);
+        match self.fuser.set_clock(captured_ns, odometry, elapsed_s) {
+            Ok(OdometryOutcome::Jumped) => self.jumped(captured_ns, odometry),
+            Ok(OdometryOutcome::Moved | OdometryOutcome::TooOld) => self.advanced(captured_ns, odometry),
+            Err(error) => tracing::error!(%error, "checked odometry was refused"),
+        }
+        self.moved_at = Some(received);
+    }
+
+    /// Since odometry was taken last, s.
+    fn elapsed_s(&self, now: Instant) -> f64 {
+        self.moved_at.map_or(0.0, |at| now.saturating_duration_since(at).as_secs_f64())
+    }
+
+    /// How long ago something was captured.
+    pub(super) fn age(&self, captured_ns: i64, now: Instant) -> Duration {
+        // Without any message of which the time of receipt is known there is no clock to compare with.
+        self.clock.age(captured_ns, now).unwrap_or_default()
+    }
+
+    /// What the robot's clock shows.
+    pub(super) fn clock_ns(&self, now: Instant) -> Option<i64> {
+        self.clock.robot_ns(now)
+    }
+
+    /// The fused pose by the newest odometry. That is the last message, even where a scan or frame is stamped a little
+    /// later: its stamp may be wrong by what is tolerated.
+    pub(super) fn pose(&self) -> Option<FusedPose> {
+        let fused = self.fuser.pose()?;
+        if let Some((at_ns, odometry)) = &self.last_message {
+            let later_ns = fused.at_ns.saturating_sub(*at_ns);
+            if later_ns > 0 && later_ns as u128 <= AHEAD_TOLERANCE.as_nanos() {
+                return self.fuser.pose_by(*at_ns, odometry);
+            }
+        }
+        Some(fused)
     }
 
     /// Goes by what runs have shown of its map by now.
@@ -175,39 +250,47 @@ impl Robot {
         self.found.extend(cleared);
     }
 
-    /// Takes an odometry reading.
-    pub(super) fn moved(&mut self, captured_ns: i64, odom_from_robot: Pose2) {
-        match self.fuser.odometry(captured_ns, odom_from_robot) {
-            // Another odometry frame: the old one means nothing on the map any more.
+    /// Takes an odometry reading, at a time of the server's clock.
+    pub(super) fn moved(&mut self, captured_ns: i64, odom_from_robot: Pose2, now: Instant) {
+        let elapsed_s = self.elapsed_s(now);
+        match self.fuser.odometry_after(captured_ns, odom_from_robot, elapsed_s) {
             Ok(OdometryOutcome::Jumped) => {
-                self.map_from_odom = None;
-                self.newest = Some((captured_ns, odom_from_robot));
-                self.lost();
-                if let Some(run) = &mut self.run {
-                    run.end("odometry jumped");
-                }
+                self.jumped(captured_ns, odom_from_robot);
+                self.moved_at = Some(now);
             }
             Ok(OdometryOutcome::Moved | OdometryOutcome::TooOld) => {
                 if let Some(run) = &mut self.run {
                     run.moved(captured_ns, odom_from_robot);
                 }
-                let newest = self.newest.filter(|(at_ns, _)| *at_ns >= captured_ns);
-                if newest.is_none() {
-                    let before = self.newest.replace((captured_ns, odom_from_robot));
-                    let step_m = before.map_or(0.0, |(_, o)| o.between(&odom_from_robot).position().norm());
-                    self.way_m += step_m;
+                if self.newest.is_none_or(|(at_ns, _)| at_ns < captured_ns) {
+                    self.advanced(captured_ns, odom_from_robot);
+                    self.moved_at = Some(now);
                 }
             }
             Err(error) => tracing::error!(%error, "checked odometry was refused"),
         }
     }
 
+    /// Another odometry frame: the old one means nothing on the map any more.
+    fn jumped(&mut self, captured_ns: i64, odom_from_robot: Pose2) {
+        self.map_from_odom = None;
+        self.newest = Some((captured_ns, odom_from_robot));
+        self.lost();
+        if let Some(run) = &mut self.run {
+            run.end("odometry jumped");
+        }
+    }
+
+    /// This odometry is the newest.
+    fn advanced(&mut self, captured_ns: i64, odom_from_robot: Pose2) {
+        let before = self.newest.replace((captured_ns, odom_from_robot));
+        self.way_m += before.map_or(0.0, |(_, o)| o.between(&odom_from_robot).position().norm());
+    }
+
     /// Takes the odometry of a scan or frame, unless newer odometry tells as much.
-    pub(super) fn moved_to(&mut self, captured_ns: i64, odom_from_robot: Pose2) {
-        // Much older than the newest: perhaps the robot's clock was set back, which odometry tells.
-        let behind_ns = self.newest.map_or(-1, |(at_ns, _)| at_ns.saturating_sub(captured_ns));
-        if !(0..=CLOCK_JITTER_NS).contains(&behind_ns) {
-            self.moved(captured_ns, odom_from_robot);
+    pub(super) fn moved_to(&mut self, captured_ns: i64, odom_from_robot: Pose2, now: Instant) {
+        if self.newest.is_none_or(|(at_ns, _)| at_ns < captured_ns) {
+            self.moved(captured_ns, odom_from_robot, now);
         }
     }
 
@@ -267,17 +350,18 @@ impl Robot {
         odometry: &Pose2,
         pose: &Pose2Covariance,
         landmarks: Vec<String>,
+        now: Instant,
     ) -> Option<FusedPose> {
         if self.fuser.pose().is_some() {
             return None;
         }
-        self.moved(captured_ns, *odometry);
+        self.moved(captured_ns, *odometry, now);
         // The fuser starts at the newest odometry, the frame is some way behind it.
         let motion = odometry.between(&self.newest?.1);
         let covariance = FuseParams::default().motion_noise(&motion);
-        let now = pose.compose(&Pose2Covariance { pose: motion, covariance });
+        let there = pose.compose(&Pose2Covariance { pose: motion, covariance });
         self.lost();
-        if !self.begin(captured_ns, &now, ("hypotheses", "started"), landmarks) {
+        if !self.begin(captured_ns, &there, ("hypotheses", "started"), landmarks) {
             return None;
         }
         self.by_hypotheses = true;

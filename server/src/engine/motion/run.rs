@@ -7,6 +7,7 @@ use map::{
     pose2::Pose2,
 };
 use serde::Serialize;
+use std::sync::atomic::{AtomicU64, Ordering};
 use utoipa::ToSchema;
 
 /// Runs recorded at a time.
@@ -19,6 +20,8 @@ pub const MAX_RUN_ODOMETRY: usize = 200_000;
 const STEP_M: f64 = 0.01;
 /// ...or this turn.
 const STEP_RAD: f64 = 0.01;
+
+static NEXT: AtomicU64 = AtomicU64::new(0);
 
 /// A run as it is recorded.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
@@ -53,6 +56,9 @@ pub enum RunError {
     /// Too many at a time.
     #[error("{MAX_RECORDINGS} runs are being recorded already")]
     TooMany,
+    /// It is being learnt from.
+    #[error("the run of this robot is being learnt from already")]
+    Lent,
     /// There is none.
     #[error("no run of this robot is being recorded")]
     None,
@@ -61,6 +67,10 @@ pub enum RunError {
 /// What is kept of a run.
 #[derive(Debug, Clone)]
 pub(crate) struct Recording {
+    /// Tells it from any other since the start.
+    pub(super) number: u64,
+    /// It is being learnt from.
+    pub(super) lent: bool,
     pub(crate) map: String,
     /// Times rise.
     pub(super) odometry: Vec<(i64, Pose2)>,
@@ -71,7 +81,16 @@ pub(crate) struct Recording {
 
 impl Recording {
     pub(super) fn new(map: &str) -> Self {
-        Self { map: map.to_owned(), odometry: Vec::new(), fixes: Vec::new(), ended: None, way_m: 0.0 }
+        let number = NEXT.fetch_add(1, Ordering::Relaxed);
+        Self {
+            number,
+            lent: false,
+            map: map.to_owned(),
+            odometry: Vec::new(),
+            fixes: Vec::new(),
+            ended: None,
+            way_m: 0.0,
+        }
     }
 
     /// Goes on no longer; the first reason stays.

@@ -14,6 +14,29 @@ use sim::{
     building::{Building, WallSegment},
     laser::LaserParams,
 };
+use std::sync::LazyLock;
+
+mod stamps;
+
+/// A moment of the server's clock.
+fn time(seconds: f64) -> Instant {
+    static START: LazyLock<Instant> = LazyLock::new(Instant::now);
+    *START + Duration::from_secs_f64(seconds)
+}
+
+impl Motion {
+    /// Odometry that is received as it is captured: number 1 at 1 s.
+    fn odometry_of(&self, robot: &Name, message: Bytes) -> Option<v1::RobotPose> {
+        let seq = v1::Odometry::decode(message.clone()).map_or(0, |o| o.seq);
+        self.odometry(robot, message, time(seq as f64))
+    }
+
+    /// The same of a scan.
+    fn scan_of(&self, robot: &Name, message: Bytes) {
+        let seq = v1::Scan::decode(message.clone()).map_or(0, |s| s.seq);
+        self.scan(robot, message, time(seq as f64));
+    }
+}
 
 fn motion() -> (Motion, Name) {
     let snapshots = Arc::new(Snapshots::default());
@@ -44,12 +67,12 @@ fn fix(x_m: f64) -> Fix {
 #[test]
 fn odometry_is_checked_and_counted() {
     let (motion, r1) = motion();
-    motion.odometry(&r1, odometry(1, 0.0));
-    motion.odometry(&r1, odometry(1, 0.0));
-    motion.odometry(&r1, odometry(2, f64::NAN));
-    motion.odometry(&r1, Bytes::from_static(b"\xff"));
-    motion.odometry(&r1, vec![0; MAX_ODOMETRY_BYTES + 1].into());
-    motion.odometry(&Name::new("nobody").unwrap(), odometry(1, 0.0));
+    motion.odometry_of(&r1, odometry(1, 0.0));
+    motion.odometry_of(&r1, odometry(1, 0.0));
+    motion.odometry_of(&r1, odometry(2, f64::NAN));
+    motion.odometry_of(&r1, Bytes::from_static(b"\xff"));
+    motion.odometry_of(&r1, vec![0; MAX_ODOMETRY_BYTES + 1].into());
+    motion.odometry_of(&Name::new("nobody").unwrap(), odometry(1, 0.0));
     let (odometry, scans) = motion.counts();
     let each = [Code::BadMessage, Code::NotFinite, Code::TooLarge, Code::UnknownRobot, Code::NotNewer];
     assert_eq!((odometry.accepted, scans.accepted), (1, 0));
@@ -69,24 +92,25 @@ fn scans_are_checked_and_counted() {
         ranges_m: vec![1.0; map::laser::MAX_BEAMS],
         ..v1::Scan::default()
     };
-    motion.scan(&r1, scan.encode_to_vec().into());
-    motion.scan(&r1, v1::Scan { max_range_m: -1.0, ..scan }.encode_to_vec().into());
+    motion.scan_of(&r1, scan.encode_to_vec().into());
+    motion.scan_of(&r1, v1::Scan { max_range_m: -1.0, ..scan }.encode_to_vec().into());
     let (_, scans) = motion.counts();
     assert_eq!((scans.accepted, scans.rejected), (1, BTreeMap::from([(Code::OutOfRange, 1)])));
 }
 
 fn at(captured_ns: i64, x_m: f64) -> Moment<'static> {
-    Moment { map: "hall", epoch: 1, captured_ns, odometry: Some(Pose2::new(x_m, 0.0, 0.0)) }
+    let now = time(captured_ns as f64 * 1e-9);
+    Moment { map: "hall", epoch: 1, captured_ns, odometry: Some(Pose2::new(x_m, 0.0, 0.0)), now }
 }
 
 #[test]
 fn a_fix_puts_odometry_on_the_map() {
     let (motion, r1) = motion();
-    assert!(motion.odometry(&r1, odometry(1, 3.0)).is_none(), "no pose before the first fix");
+    assert!(motion.odometry_of(&r1, odometry(1, 3.0)).is_none(), "no pose before the first fix");
     assert!(motion.live.tracks(&r1).is_none());
     let pose = motion.fixed(&r1, at(1_000_000_000, 3.0), &fix(10.0)).unwrap();
     assert_eq!((pose.corrections, pose.map.as_str(), pose.epoch), (1, "hall", 1));
-    let pose = motion.odometry(&r1, odometry(2, 4.0)).unwrap().map_from_robot.unwrap();
+    let pose = motion.odometry_of(&r1, odometry(2, 4.0)).unwrap().map_from_robot.unwrap();
     assert!((pose.pose.unwrap().x_m - 11.0).abs() < 1e-9, "{pose:?}");
     assert!(pose.covariance[0] > 1e-4, "driving makes it less sure");
     let tracks = motion.live.tracks(&r1).unwrap();
@@ -109,8 +133,27 @@ fn a_prior_follows_from_odometry_alone() {
 fn another_map_starts_afresh() {
     let (motion, r1) = motion();
     motion.fixed(&r1, at(1_000_000_000, 3.0), &fix(10.0)).unwrap();
+    motion.snapshots.set_robot("r1", Some("cellar"));
     let there = Moment { map: "cellar", ..at(2_000_000_000, 3.0) };
     assert!(motion.grounds(&r1, there).is_none());
+    assert!(motion.pose(&r1, "hall", time(2.0)).is_none(), "what was known is gone");
+}
+
+/// Fault F4: this used to restart the fusion on the map that the frame named.
+#[test]
+fn a_frame_against_another_map_leaves_the_fusion_alone() {
+    let (motion, r1) = motion();
+    motion.snapshots.publish(Arc::new(MapSnapshot::empty("cellar", 1)));
+    motion.fixed(&r1, at(1_000_000_000, 3.0), &fix(10.0)).unwrap();
+    let there = Moment { map: "cellar", ..at(1_500_000_000, 3.0) };
+    let grounds = Grounds { pose: fix(0.0).pose, supporters: Vec::new() };
+    assert!(motion.grounds(&r1, there).is_none());
+    assert!(motion.fixed(&r1, there, &fix(0.0)).is_none());
+    assert!(motion.found(&r1, there, &fix(0.0).pose, &[]).is_none());
+    assert!(motion.judged(&r1, there, &grounds, &[], &[]).is_empty());
+    let pose = motion.odometry_of(&r1, odometry(2, 4.0)).unwrap();
+    assert_eq!((pose.map.as_str(), pose.corrections), ("hall", 1));
+    assert!((pose.map_from_robot.unwrap().pose.unwrap().x_m - 11.0).abs() < 1e-9);
 }
 
 #[test]
@@ -123,9 +166,12 @@ fn a_pose_goes_along_to_a_map_that_lies_known() {
     };
     let link = Link { parent: "hall".to_owned(), parent_from_map: hall_from_floor, level_m: 3.5 };
     motion.snapshots.set_links([("floor".to_owned(), link)].into());
-    let on = |map: &'static str| motion.grounds(&r1, Moment { map, ..at(2_000_000_000, 5.0) });
+    let on = |map: &'static str| {
+        motion.snapshots.set_robot("r1", Some(map));
+        motion.grounds(&r1, Moment { map, ..at(2_000_000_000, 5.0) })
+    };
     motion.fixed(&r1, at(1_000_000_000, 3.0), &fix(10.0)).unwrap();
-    motion.odometry(&r1, odometry(2, 5.0));
+    motion.odometry_of(&r1, odometry(2, 5.0));
     // (12, 1) in the hall, looking along x.
     let there = on("floor").unwrap().pose;
     assert!((there.pose.x_m + 2.0).abs() < 1e-9 && (there.pose.y_m + 8.0).abs() < 1e-9, "{there:?}");
@@ -180,13 +226,13 @@ fn scan_at(building: &Building, seq: u64, at: &Pose2) -> Bytes {
 
 fn laid(motion: &Motion) -> Option<v1::RobotPose> {
     let (robot, job) = motion.scans().take().unwrap();
-    motion.laser(&robot, &job)
+    motion.laser(&robot, &job, time(job.captured_ns as f64 * 1e-9))
 }
 
 #[test]
 fn scans_correct_a_pose_and_never_start_one() {
     let (motion, r1, building) = walled();
-    motion.scan(&r1, scan_at(&building, 1, &Pose2::new(12.0, 0.1, 0.0)));
+    motion.scan_of(&r1, scan_at(&building, 1, &Pose2::new(12.0, 0.1, 0.0)));
     assert!(laid(&motion).is_none());
     assert_eq!(motion.corrections(&r1).totals["laser"], [("no_pose", 1)].into());
     assert!(motion.corrections(&r1).modalities.is_empty());
@@ -196,8 +242,8 @@ fn scans_correct_a_pose_and_never_start_one() {
     let first = Moment { captured_ns: 1_000_000_000, odometry: None, ..at(0, 0.0) };
     let started = motion.fixed(&r1, first, &unsure).unwrap();
     assert_eq!(started.modalities, ["odometry", "landmarks"]);
-    motion.scan(&r1, scan_at(&building, 2, &Pose2::new(12.1, 0.1, 0.0)));
-    motion.scan(&r1, scan_at(&building, 3, &Pose2::new(12.2, 0.1, 0.0)));
+    motion.scan_of(&r1, scan_at(&building, 2, &Pose2::new(12.1, 0.1, 0.0)));
+    motion.scan_of(&r1, scan_at(&building, 3, &Pose2::new(12.2, 0.1, 0.0)));
     let pose = laid(&motion).unwrap();
     assert_eq!((pose.laser_corrections, pose.corrections), (1, 1));
     assert_eq!(pose.modalities, ["odometry", "landmarks", "laser"]);
@@ -205,7 +251,7 @@ fn scans_correct_a_pose_and_never_start_one() {
     let y_m = at.pose.unwrap().y_m;
     assert!((y_m - 0.1).abs() < 0.03 && at.covariance[4].sqrt() < 0.03, "{at:?}");
     // Standing there another scan tells nothing new.
-    motion.scan(&r1, scan_at(&building, 4, &Pose2::new(12.2, 0.1, 0.0)));
+    motion.scan_of(&r1, scan_at(&building, 4, &Pose2::new(12.2, 0.1, 0.0)));
     assert!(laid(&motion).is_none());
     let log = motion.corrections(&r1);
     let ends = [("applied", 1), ("no_pose", 1), ("repeated", 1), ("superseded", 1)];
@@ -219,9 +265,9 @@ fn scans_correct_a_pose_and_never_start_one() {
 #[test]
 fn after_ten_metres_a_pose_rests_on_odometry_alone() {
     let (motion, r1, _) = walled();
-    motion.odometry(&r1, odometry(1, 0.0));
+    motion.odometry_of(&r1, odometry(1, 0.0));
     motion.fixed(&r1, Moment { odometry: None, ..at(1_000_000_000, 0.0) }, &fix(3.0)).unwrap();
-    let after = |seq, x_m| motion.odometry(&r1, odometry(seq, x_m)).unwrap().modalities;
+    let after = |seq, x_m| motion.odometry_of(&r1, odometry(seq, x_m)).unwrap().modalities;
     assert_eq!(after(2, 5.0), ["odometry", "landmarks"]);
     assert_eq!(after(3, RESTS_ON_M), ["odometry", "landmarks"]);
     assert_eq!(after(4, RESTS_ON_M + 0.01), ["odometry"]);
@@ -233,12 +279,12 @@ fn scans_that_tell_nothing_are_counted_with_the_reason() {
     motion.fixed(&r1, at(1_000_000_000, 7.0), &fix(12.0)).unwrap();
     let counted = || motion.corrections(&r1).totals["laser"].clone();
     // Where the robot is not.
-    motion.scan(&r1, scan_at(&building, 2, &Pose2::new(1.0, 1.0, 2.0)));
+    motion.scan_of(&r1, scan_at(&building, 2, &Pose2::new(1.0, 1.0, 2.0)));
     assert!(laid(&motion).is_none());
     assert_eq!(counted().values().sum::<u64>(), 1, "{:?}", counted());
     assert!(!counted().contains_key("applied"));
     motion.snapshots.publish(Arc::new(MapSnapshot::empty("hall", 2)));
-    motion.scan(&r1, scan_at(&building, 3, &Pose2::new(12.0, 1.0, 0.0)));
+    motion.scan_of(&r1, scan_at(&building, 3, &Pose2::new(12.0, 1.0, 0.0)));
     assert!(laid(&motion).is_none());
     assert_eq!(counted()["no_walls"], 1);
 }
@@ -246,11 +292,35 @@ fn scans_that_tell_nothing_are_counted_with_the_reason() {
 #[test]
 fn an_epoch_that_is_over_says_nothing_more() {
     let (motion, r1) = motion();
+    motion.epochs().admit(&r1, 1, time(1.0)).unwrap();
     motion.fixed(&r1, at(1_000_000_000, 3.0), &fix(10.0)).unwrap();
+    motion.epochs().token(&r1, (Some(1), true), time(1.1), |_| true);
+    motion.epochs().token(&r1, (Some(1), false), time(1.2), |_| true);
+    motion.epochs().admit(&r1, 2, time(1.3)).unwrap();
     let anew = Moment { epoch: 2, ..at(2_000_000_000, 0.0) };
     motion.fixed(&r1, anew, &fix(20.0)).unwrap();
+    // What was still in work of the first.
     assert!(motion.fixed(&r1, at(3_000_000_000, 4.0), &fix(11.0)).is_none());
-    assert!((motion.pose(&r1, "hall").unwrap().pose.x_m - 20.0).abs() < 1e-9);
+    assert!((motion.pose(&r1, "hall", time(2.0)).unwrap().pose.x_m - 20.0).abs() < 1e-9);
+}
+
+/// Fault F3: one message of another epoch used to reset the fusion, and the robot's own messages were refused from then on.
+#[test]
+fn a_forged_message_leaves_the_robot_alone() {
+    let (motion, r1) = motion();
+    motion.odometry_of(&r1, odometry(1, 3.0));
+    motion.fixed(&r1, at(1_000_000_000, 3.0), &fix(10.0)).unwrap();
+    let forged = v1::Odometry {
+        epoch: 2,
+        seq: 1,
+        captured_ns: 1_500_000_000,
+        odom_from_robot: Some(v1::Pose2::default()),
+    };
+    assert!(motion.odometry(&r1, forged.encode_to_vec().into(), time(1.5)).is_none());
+    let pose = motion.odometry_of(&r1, odometry(2, 4.0)).unwrap();
+    assert!((pose.map_from_robot.unwrap().pose.unwrap().x_m - 11.0).abs() < 1e-9);
+    assert_eq!(motion.counts().0.rejected, [(Code::EpochConflict, 1)].into());
+    assert_eq!(motion.epochs().status(&r1, time(2.0)).conflict.unwrap().epoch, 2);
 }
 
 #[test]
@@ -260,9 +330,9 @@ fn runs_are_recorded_one_by_one_and_bounded() {
     let begun = motion.record(&r1, "hall").unwrap();
     assert!(begun.going && begun.span_ns.is_none());
     assert_eq!(motion.record(&r1, "hall"), Err(RunError::Going));
-    motion.odometry(&r1, odometry(1, 0.0));
+    motion.odometry_of(&r1, odometry(1, 0.0));
     motion.fixed(&r1, at(1_000_000_000, 0.0), &fix(10.0)).unwrap();
-    motion.odometry(&r1, odometry(2, 1.0));
+    motion.odometry_of(&r1, odometry(2, 1.0));
     let told = motion.recorded(&r1).unwrap();
     assert_eq!((told.odometry, told.landmarks, told.laser, told.going), (2, 1, 0, true));
     // Its software is started again: what was recorded stays, nothing is added.
@@ -272,13 +342,24 @@ fn runs_are_recorded_one_by_one_and_bounded() {
         captured_ns: 9_000_000_000,
         odom_from_robot: Some(v1::Pose2::default()),
     };
-    motion.odometry(&r1, again.encode_to_vec().into());
+    motion.odometry(&r1, again.encode_to_vec().into(), time(9.0));
     let told = motion.recorded(&r1).unwrap();
     assert_eq!((told.odometry, told.going), (2, false));
-    let recording = motion.take_recording(&r1).unwrap();
-    assert_eq!(motion.recorded(&r1), None);
-    motion.keep_recording(&r1, recording);
-    assert_eq!(motion.recorded(&r1).unwrap().odometry, 2);
+    // Lent to be learnt from: it stays, and is lent once at a time, until what it taught is stored.
+    let motion = Arc::new(motion);
+    let lent = motion.lend_recording(&r1).unwrap();
+    assert_eq!(motion.lend_recording(&r1).err(), Some(RunError::Lent));
+    assert_eq!((lent.recording.odometry.len(), motion.recorded(&r1).unwrap().odometry), (2, 2));
+    drop(lent);
+    motion.lend_recording(&r1).unwrap().learnt();
+    assert_eq!((motion.recorded(&r1), motion.lend_recording(&r1).err()), (None, Some(RunError::None)));
+    motion.record(&r1, "hall").unwrap();
+    // Given up and begun anew while it is learnt from: the new one stays.
+    let lent = motion.lend_recording(&r1).unwrap();
+    motion.take_recording(&r1).unwrap();
+    motion.record(&r1, "hall").unwrap();
+    lent.learnt();
+    assert!(motion.recorded(&r1).is_some());
     for i in 1..MAX_RECORDINGS {
         motion.record(&Name::new(format!("r{}", i + 1)).unwrap(), "hall").unwrap();
     }
@@ -291,7 +372,7 @@ fn runs_are_recorded_one_by_one_and_bounded() {
 fn a_run_on_another_map_ends_at_once() {
     let (motion, r1) = motion();
     motion.record(&r1, "attic").unwrap();
-    motion.odometry(&r1, odometry(1, 0.0));
+    motion.odometry_of(&r1, odometry(1, 0.0));
     let told = motion.recorded(&r1).unwrap();
     assert_eq!((told.going, told.odometry), (false, 0));
 }
@@ -300,7 +381,7 @@ fn a_run_on_another_map_ends_at_once() {
 fn what_runs_have_shown_is_heeded_from_the_next_message_on() {
     use map::areas::{Areas, Cell, Evidence, Mode, Modules};
     let (motion, r1) = motion();
-    motion.odometry(&r1, odometry(1, 0.0));
+    motion.odometry_of(&r1, odometry(1, 0.0));
     motion.fixed(&r1, at(1_000_000_000, 0.0), &fix(10.0)).unwrap();
     // Where the robot will be odometry was exact and landmarks far off: the best alone means odometry.
     let sums = |error: f64| -> Evidence {
@@ -317,9 +398,9 @@ fn what_runs_have_shown_is_heeded_from_the_next_message_on() {
     let mut map = MapSnapshot::empty("hall", 2);
     map.areas.areas = Arc::new(Areas::new(Mode::Single, Vec::new(), [&cells]));
     motion.snapshots.publish(Arc::new(map));
-    motion.odometry(&r1, odometry(2, 1.0));
+    motion.odometry_of(&r1, odometry(2, 1.0));
     motion.fixed(&r1, at(2_000_000_000, 1.0), &fix(11.0)).unwrap();
     let log = motion.corrections(&r1);
     assert_eq!(log.totals["landmarks"], [("not_used", 1), ("started", 1)].into());
-    assert!((motion.pose(&r1, "hall").unwrap().pose.x_m - 11.0).abs() < 1e-9);
+    assert!((motion.pose(&r1, "hall", time(2.0)).unwrap().pose.x_m - 11.0).abs() < 1e-9);
 }

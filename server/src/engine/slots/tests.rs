@@ -30,7 +30,7 @@ fn one_in_work_one_waiting_newest_wins() {
 }
 
 #[test]
-fn old_numbers_and_old_epochs_are_refused() {
+fn old_numbers_are_refused_in_each_epoch() {
     let slots = Slots::new(4);
     let (k, now) = (key("r1", "front"), Instant::now());
     let offer = |epoch, seq| slots.offer(k.clone(), (epoch, seq), 0, now).map_err(|r| (r.code, r.field));
@@ -38,9 +38,10 @@ fn old_numbers_and_old_epochs_are_refused() {
     assert_eq!(offer(7, 10), Err((Code::NotNewer, "seq".into())));
     assert_eq!(offer(7, 9), Err((Code::NotNewer, "seq".into())));
     assert_eq!(offer(3, 1), Ok(()), "a restart begins again, whatever its number");
-    assert_eq!(offer(7, 11), Err((Code::NotNewer, "epoch".into())));
-    assert_eq!(offer(3, 2), Ok(()));
-    assert_eq!(slots.counts().rejected, BTreeMap::from([(Code::NotNewer, 3)]));
+    assert_eq!(offer(7, 10), Err((Code::NotNewer, "seq".into())), "at most once, also after another epoch");
+    assert_eq!(offer(7, 11), Ok(()), "one that comes back goes on");
+    assert_eq!(offer(3, 1), Err((Code::NotNewer, "seq".into())));
+    assert_eq!(slots.counts().rejected, BTreeMap::from([(Code::NotNewer, 4)]));
     whole(&slots.counts());
 }
 
@@ -48,12 +49,42 @@ fn old_numbers_and_old_epochs_are_refused() {
 fn epochs_are_remembered_up_to_the_bound() {
     let mut order = Order::default();
     for epoch in 0..=PAST_EPOCHS as u64 {
-        order.advance(epoch, 1).unwrap();
+        order.advance(epoch, 5).unwrap();
     }
-    assert!(order.advance(0, 2).is_err());
+    assert!(order.advance(0, 5).is_err());
     order.advance(99, 1).unwrap();
-    assert!(order.advance(1, 2).is_err());
-    assert!(order.advance(0, 2).is_ok(), "the oldest of {PAST_EPOCHS} is forgotten");
+    assert_eq!(order.past.len(), PAST_EPOCHS);
+    assert!(order.advance(1, 5).is_err());
+    assert!(order.advance(0, 5).is_ok(), "the oldest of {PAST_EPOCHS} is forgotten");
+}
+
+/// Fault F3: eight invented cameras kept the robot's own one out for ten minutes.
+#[test]
+fn the_camera_longest_without_a_frame_gives_way() {
+    let slots = Slots::new(100);
+    let start = Instant::now();
+    let offer = |camera: &str, seq, now| slots.offer(key("r1", camera), (1, seq), 0, now).map_err(|r| r.code);
+    for c in 0..MAX_CAMERAS_PER_ROBOT {
+        offer(&format!("invented-{c}"), 1, start + Duration::from_millis(c as u64)).unwrap();
+    }
+    assert_eq!(offer("front", 1, start + IDLE_CAMERA), Err(Code::TooMany), "all have a frame that waits");
+    while let Some((k, _)) = slots.try_take() {
+        slots.finish(&k, Outcome::Processed);
+    }
+    assert_eq!(
+        offer("front", 2, start + IDLE_CAMERA.saturating_sub(Duration::from_millis(1))),
+        Err(Code::TooMany)
+    );
+    assert_eq!(offer("front", 3, start + IDLE_CAMERA), Ok(()));
+    assert_eq!(
+        offer("invented-0", 2, start + IDLE_CAMERA),
+        Err(Code::TooMany),
+        "it gave way; the next is not due"
+    );
+    // Cameras that send go on.
+    assert_eq!(offer("invented-1", 2, start + IDLE_CAMERA), Ok(()));
+    assert_eq!(offer("front", 4, start + 2 * IDLE_CAMERA), Ok(()));
+    whole(&slots.counts());
 }
 
 #[test]

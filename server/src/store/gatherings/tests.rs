@@ -80,10 +80,9 @@ async fn accepted(store: &Store, id: i64, picks: &[(u32, &str)]) -> Result<accep
         .map(|(n, name)| accepting::Pick { number: *n, name: Some((*name).to_owned()) })
         .collect();
     let lesson = Some(crate::jobs::learn::Request::of as fn(&[String]) -> String);
-    let write = store.write(move |tx| {
-        Box::pin(async move { accepting::accept(tx, ("a", id), &picks, lesson, LIMITS).await })
-    });
-    write.await
+    let (map, after) = ("a".to_owned(), std::sync::Arc::new(|| ()));
+    let decision = accepting::Decision { map, gathering: id, picks, lesson, bounds: LIMITS, after };
+    accepting::accept(store, decision).await
 }
 
 #[tokio::test]

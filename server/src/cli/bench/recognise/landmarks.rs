@@ -1,5 +1,5 @@
 //! Landmarks of the benchmark's maps: the first few learnt as a server would, against each other; the rest, of which
-//! there may be thousands, by three icons each and the thresholds of one of the first.
+//! there may be thousands, by three icons and their own points each and the thresholds of one of the first.
 
 use crate::cli::screen;
 use sim::posters;
@@ -13,6 +13,7 @@ use vision::{
         synthesis,
     },
     params::Params,
+    points::taught::view_points,
     recognise::{IconFeatures, LandmarkId, features},
 };
 
@@ -58,7 +59,8 @@ pub(super) fn models(
     let rest = each_of(count.saturating_sub(taught), threads, "drawing", |i| {
         let exemplars = icons(first, taught + i, p)?;
         let id = LandmarkId((taught + i + 1) as u64);
-        Ok(Arc::new(LandmarkModel { id, exemplars, ..LandmarkModel::clone(&fitted[i % taught]) }))
+        let like = LandmarkModel { id, exemplars, ..LandmarkModel::clone(&fitted[i % taught]) };
+        with_points(like, first, taught + i, p).map(Arc::new)
     })?;
     Ok(fitted.into_iter().take(count).chain(rest).collect())
 }
@@ -66,7 +68,15 @@ pub(super) fn models(
 /// The poster and views generated from it, without negatives.
 fn lesson(first: u64, index: usize, p: &Params) -> anyhow::Result<LandmarkModel> {
     let views = views(first, index, VIEWS, p)?;
-    Ok(learn(LandmarkId(index as u64 + 1), &views, &[], p)?)
+    let model = learn(LandmarkId(index as u64 + 1), &views, &[], p)?;
+    with_points(model, first, index, p)
+}
+
+/// The model with the points of its poster, where they are used.
+fn with_points(model: LandmarkModel, first: u64, index: usize, p: &Params) -> anyhow::Result<LandmarkModel> {
+    let image = picture(first, index)?;
+    let corners = whole(&image)?;
+    Ok(model.with_points_if_used(p, || vec![view_points(&image, &corners)]))
 }
 
 /// The poster itself and `count` views generated from it.

@@ -1,10 +1,14 @@
 //! A lesson: one landmark from many views, to be told from all others of a map.
 
-use super::{Args, fastest, landmarks::views};
+use super::{
+    Args, fastest,
+    landmarks::{picture, views, whole},
+};
 use serde::Serialize;
 use vision::{
     learn::model::learn,
     params::Params,
+    points::taught::view_points,
     recognise::{IconFeatures, LandmarkId, ModelSet},
 };
 
@@ -18,7 +22,7 @@ pub(super) struct Report {
     pub(super) others: usize,
     /// Icons of the others, three each as in the server.
     pub(super) negatives: usize,
-    /// Views are cut and negatives are at hand.
+    /// Views are cut and negatives are at hand; the points of one photograph are taken where they are used.
     pub(super) ms: f64,
     pub(super) active: bool,
 }
@@ -26,8 +30,12 @@ pub(super) struct Report {
 pub(super) fn run(args: &Args, first: u64, map: &ModelSet, p: &Params) -> anyhow::Result<Report> {
     let views = views(first, POSTER, args.views as usize - 1, p)?;
     let negatives: Vec<IconFeatures> = map.iter().flat_map(|m| m.exemplars.iter().cloned()).collect();
-    let (ms, model) =
-        fastest(args.rounds as usize, || learn(LandmarkId(POSTER as u64), &views, &negatives, p));
+    let photograph = picture(first, POSTER)?;
+    let corners = whole(&photograph)?;
+    let (ms, model) = fastest(args.rounds as usize, || {
+        learn(LandmarkId(POSTER as u64), &views, &negatives, p)
+            .map(|model| model.with_points_if_used(p, || vec![view_points(&photograph, &corners)]))
+    });
     let model = model?;
     Ok(Report {
         views: views.len(),

@@ -11,12 +11,14 @@ use sim::{
 use std::sync::Arc;
 use vision::{
     detect::quads::Corners,
+    frame::GrayImage,
     learn::{
         model::{LandmarkModel, View, add_negatives, learn},
         random::Random,
         synthesis,
     },
     params::Params,
+    points::taught::{MAX_POINT_VIEWS, TaughtPoint, view_points},
     recognise::{IconFeatures, LandmarkId, ModelSet, features},
 };
 
@@ -55,6 +57,21 @@ pub(crate) fn taught(text: &str) -> Result<Taught, String> {
     }
 }
 
+/// What a landmark is learnt from: views, and the points of its photographs.
+#[derive(Default)]
+struct Sights {
+    views: Vec<View>,
+    points: Vec<Vec<TaughtPoint>>,
+}
+
+/// The points of a landmark's photographs, as a lesson of the server takes them (`server/src/jobs/learn.rs`): of a few,
+/// evenly chosen.
+pub(crate) fn points_of<'a>(photographs: &[(&'a GrayImage, &'a Corners)]) -> Vec<Vec<TaughtPoint>> {
+    let chosen = photographs.len().min(MAX_POINT_VIEWS);
+    let of = |i: usize| photographs[i * photographs.len() / chosen];
+    (0..chosen).map(of).map(|(image, corners)| view_points(image, corners)).collect()
+}
+
 /// The landmarks of a map and what they were made of.
 pub(crate) struct Class {
     /// Landmark `LandmarkId(i)` is picture i; those that a gate kept out are not in `models`.
@@ -69,7 +86,7 @@ impl Class {
     /// Teaches all `pictures` together.
     pub(crate) fn new(pictures: Vec<Picture>, how: Taught, seed: u64, p: &Params) -> anyhow::Result<Self> {
         let wall = plaster(seed);
-        let views = of_each(&pictures, "views", |i, picture| {
+        let sights = of_each(&pictures, "views", |i, picture| {
             let draw = |n: u64| mixed(&[seed, 1, i as u64, n]);
             match how {
                 Taught::Views => gathered(picture, &wall, draw, p),
@@ -77,13 +94,14 @@ impl Class {
             }
         });
         let each = (NEGATIVES / pictures.len().max(1)).clamp(3, VIEWS);
-        let icons: Vec<Vec<IconFeatures>> = of_each(&views, "icons", |_, views| {
+        let icons: Vec<Vec<IconFeatures>> = of_each(&sights, "icons", |_, Sights { views, .. }| {
             let count = each.min(views.len());
             let chosen = (0..count).map(|i| &views[i * views.len() / count]);
             chosen.map(|v| features(v.icon.clone(), &p.recognise)).collect()
         });
-        let models = of_each(&views, "learning", |i, views| {
+        let models = of_each(&sights, "learning", |i, Sights { views, points }| {
             let alone = learn(LandmarkId(i as u64), views, &[], p).ok()?;
+            let alone = alone.with_points_if_used(p, || points.clone());
             let others = icons.iter().enumerate().filter(|(other, _)| *other != i).map(|(_, icons)| icons);
             let others: Vec<IconFeatures> = others.flatten().cloned().collect();
             Some(add_negatives(&alone, &others, p))
@@ -111,19 +129,24 @@ impl Class {
 }
 
 /// Views as a robot would gather them by driving past.
-fn gathered(picture: &Picture, wall: &Texture, draw: impl Fn(u64) -> u64, p: &Params) -> Vec<View> {
+fn gathered(picture: &Picture, wall: &Texture, draw: impl Fn(u64) -> u64, p: &Params) -> Sights {
     let view = |n: u64| {
         let (noise, mut random) = (draw(2 * n), Random::new(draw(2 * n + 1)));
         let mut conditions = Conditions::realistic(noise);
         conditions.yaw_rad = random.range(-MAX_YAW_RAD, MAX_YAW_RAD);
         let seen = exhibit(&picture.texture, wall, &conditions, Extent::Around, noise)?;
-        View::photographed(&seen.image, &noisy(&seen.corners, 1.0, &mut random)?, p).ok()
+        let corners = noisy(&seen.corners, 1.0, &mut random)?;
+        let view = View::photographed(&seen.image, &corners, p).ok()?;
+        Some((view, seen.image, corners))
     };
-    (0..TRIES * VIEWS as u64).filter_map(view).take(VIEWS).collect()
+    let all: Vec<_> = (0..TRIES * VIEWS as u64).filter_map(view).take(VIEWS).collect();
+    let photographs: Vec<_> = all.iter().map(|(_, image, corners)| (image, corners)).collect();
+    let points = points_of(&photographs);
+    Sights { views: all.into_iter().map(|(view, _, _)| view).collect(), points }
 }
 
 /// One view nearly from the front, and what is generated from it.
-fn from_one(picture: &Picture, wall: &Texture, draw: impl Fn(u64) -> u64, p: &Params) -> Vec<View> {
+fn from_one(picture: &Picture, wall: &Texture, draw: impl Fn(u64) -> u64, p: &Params) -> Sights {
     let one = |n: u64| {
         let (noise, mut random) = (draw(2 * n), Random::new(draw(2 * n + 1)));
         let conditions = Conditions {
@@ -135,7 +158,8 @@ fn from_one(picture: &Picture, wall: &Texture, draw: impl Fn(u64) -> u64, p: &Pa
         let corners = noisy(&seen.corners, 1.0, &mut random)?;
         let view = View::photographed(&seen.image, &corners, p).ok()?;
         let generated = synthesis::views(&seen.image, &corners, VIEWS, p, noise);
-        Some(std::iter::once(view).chain(generated).collect())
+        let points = points_of(&[(&seen.image, &corners)]);
+        Some(Sights { views: std::iter::once(view).chain(generated).collect(), points })
     };
     (0..TRIES).find_map(one).unwrap_or_default()
 }

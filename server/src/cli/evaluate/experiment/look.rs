@@ -181,6 +181,7 @@ mod tests {
             border: 0,
             aligned_px: None,
             landmarks: 9,
+            points: None,
         }
     }
 

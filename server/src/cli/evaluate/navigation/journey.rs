@@ -26,7 +26,7 @@ use sim::{
     robot::{Robot, RobotParams, Sighting},
     truth::{LandmarkView, ViewState},
 };
-use std::sync::Arc;
+use std::{sync::Arc, time::Instant};
 use vision::{geometry::polygon, pipeline::FrameFacts, recognise::Recognition};
 
 /// A recognition is true when its quad overlaps the landmark's true outline by this much.
@@ -88,6 +88,8 @@ struct Server {
     snapshots: Arc<Snapshots>,
     motion: Motion,
     robot: Name,
+    /// The drive goes by its own time: here none passes.
+    now: Instant,
 }
 
 impl Server {
@@ -97,7 +99,7 @@ impl Server {
         snapshots.publish(Arc::new(map.clone()));
         snapshots.set_robot(robot.as_ref(), Some(MAP));
         let motion = Motion::new(snapshots.clone(), Arc::new(LiveHub::default()));
-        Ok(Self { snapshots, motion, robot })
+        Ok(Self { snapshots, motion, robot, now: Instant::now() })
     }
 
     fn map(&self) -> anyhow::Result<Arc<MapSnapshot>> {
@@ -110,6 +112,7 @@ impl Server {
         self.motion.laser(
             &self.robot,
             &ScanJob { map: MAP.to_owned(), epoch: EPOCH, captured_ns, odom_from_robot, scan },
+            self.now,
         );
     }
 
@@ -121,7 +124,13 @@ impl Server {
         seen: &Sighting,
         (wrong, captured_ns): (&OwnErrors, i64),
     ) -> Vec<Change> {
-        let at = At { map: MAP, epoch: EPOCH, captured_ns, odometry: Some(seen.step.odom_from_robot) };
+        let at = At {
+            map: MAP,
+            epoch: EPOCH,
+            captured_ns,
+            odometry: Some(seen.step.odom_from_robot),
+            now: self.now,
+        };
         let mounting = wrong.mounting(&seen.step.robot_from_camera).ok();
         let image = &seen.frame.image;
         let view = View {
@@ -191,7 +200,7 @@ pub(super) fn drive(world: &World, way: Way) -> anyhow::Result<Journey> {
             journey.quarantined += of(Standing::Quarantined);
             server.change(&map, &changes);
         }
-        let fused = server.motion.pose(&server.robot, MAP);
+        let fused = server.motion.pose(&server.robot, MAP, server.now);
         if fused.is_some() && journey.frames_to_fix.is_none() {
             journey.frames_to_fix = Some(frames_that_show);
         }

@@ -3,7 +3,7 @@
 
 use crate::{
     cli::{
-        evaluate::experiment::{mixed, of_each},
+        evaluate::experiment::{lesson::points_of, mixed, of_each},
         own_errors::OwnErrors,
         screen,
         survey::{View as Look, hang, survey},
@@ -31,6 +31,7 @@ use vision::{
     },
     localise::pose::LandmarkSize,
     params::Params,
+    points::taught::TaughtPoint,
     recognise::{IconFeatures, LandmarkId, ModelSet, features},
 };
 
@@ -59,6 +60,7 @@ struct Lesson {
     place: LandmarkPlace,
     views: Vec<View>,
     icons: Vec<IconFeatures>,
+    points: Vec<Vec<TaughtPoint>>,
 }
 
 impl World {
@@ -86,13 +88,17 @@ impl World {
             let views = views(&looks, mixed(&[seed, 12, i as u64]), &p);
             let each = views.iter().step_by(views.len().div_ceil(NEGATIVES).max(1));
             let icons = each.map(|v| features(v.icon.clone(), &p.recognise)).collect();
-            Some(Lesson { name: (*name).clone(), place, views, icons })
+            let photographs: Vec<_> =
+                looks.iter().map(|l| (&l.sighting.frame.image, &l.quad.corners_px)).collect();
+            let points = points_of(&photographs);
+            Some(Lesson { name: (*name).clone(), place, views, icons, points })
         })
         .into_iter()
         .flatten()
         .collect();
         let models = of_each(&lessons, "learning", |i, lesson| {
             let alone = learn(LandmarkId(i as u64), &lesson.views, &[], &p).ok()?;
+            let alone = alone.with_points_if_used(&p, || lesson.points.clone());
             let others = lessons.iter().enumerate().filter(|(other, _)| *other != i);
             let others: Vec<IconFeatures> = others.flat_map(|(_, l)| l.icons.iter().cloned()).collect();
             Some(add_negatives(&alone, &others, &p))

@@ -1,0 +1,44 @@
+//! `map/{map}/version`: whoever missed a change of a map asks for its version. Answered on zenoh's thread from the snapshots:
+//! one look-up a map.
+
+use super::{BusError, Receivers, caught};
+use protos::{Key, Keys, Name, prost::Message, v1};
+use zenoh::{
+    Session, Wait,
+    key_expr::KeyExpr,
+    query::{Query, Queryable},
+};
+
+/// Answers `map/{map}/version` with one `MapChanged` for each map that the query's key expression names.
+pub(super) async fn answer_versions(
+    session: &Session,
+    keys: &Keys,
+    to: &Receivers,
+) -> Result<Queryable<()>, BusError> {
+    let answer = {
+        let (keys, to) = (keys.clone(), to.clone());
+        move |query: Query| reply(&keys, &to, &query)
+    };
+    let declared = session
+        .declare_queryable(keys.all_map_versions())
+        .callback(caught(&to.vitals, "a question for versions", answer))
+        .await;
+    declared
+        .map_err(|e| BusError::Declare { action: "answer questions for map versions", detail: e.to_string() })
+}
+
+fn reply(keys: &Keys, to: &Receivers, query: &Query) {
+    for map in to.intake.snapshots.all() {
+        let Ok(name) = Name::new(map.name.as_str()) else { continue };
+        let key = keys.build(&Key::MapVersion(name));
+        let asked = KeyExpr::new(key.as_str()).is_ok_and(|key| query.key_expr().intersects(&key));
+        if !asked {
+            continue;
+        }
+        let message = v1::MapChanged { map: map.name.clone(), version: map.version };
+        if let Err(error) = query.reply(key, message.encode_to_vec()).wait() {
+            tracing::debug!(map = map.name, %error, "no version sent");
+            return;
+        }
+    }
+}

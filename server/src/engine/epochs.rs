@@ -1,0 +1,401 @@
+//! Which start of a robot's software (epoch) speaks for the robot. In: liveliness tokens and the epoch of every message,
+//! with the time of receipt. Out: the message is admitted, or refused because another epoch of the robot is live. Knows
+//! no transport; time is passed in.
+//!
+//! An epoch is live while its liveliness token is there, or for [`MESSAGE_LIVE`] after its last message. While one epoch of
+//! a robot is live, every other one is refused. When its token goes, it is over at once, and the next one is admitted.
+
+use protos::{Code, Name, Rejection};
+use serde::Serialize;
+use std::{
+    collections::{BTreeMap, VecDeque},
+    sync::{Mutex, MutexGuard, PoisonError},
+    time::{Duration, Instant},
+};
+use utoipa::ToSchema;
+
+/// An epoch without a liveliness token is live for so long after its last message: the longest wait of a robot that was
+/// started again. Longer than zenoh's lease (2 s), after which the token of a lost link goes.
+pub const MESSAGE_LIVE: Duration = Duration::from_secs(3);
+/// Liveliness tokens remembered of one robot; more are ignored.
+pub const MAX_TOKENS_PER_ROBOT: usize = 8;
+/// Epochs of one robot whose end is remembered, to tell late messages from a robot that came back.
+pub const MAX_ENDED: usize = 8;
+/// Robots that are followed besides the registered ones; the one longest without a token or message gives way.
+pub const MAX_UNREGISTERED: usize = 1024;
+/// Robots that are followed in all.
+pub const MAX_FOLLOWED: usize = 10_000 + MAX_UNREGISTERED;
+/// A conflict is shown for so long after the last refused message.
+pub const CONFLICT_SHOWN: Duration = Duration::from_secs(10);
+/// A conflict is logged once in so long for each robot.
+pub const CONFLICT_LOGGED: Duration = Duration::from_secs(10);
+
+/// A second epoch speaks under the name of a robot while the first is live.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+pub struct Conflict {
+    /// The epoch that was refused last.
+    pub epoch: u64,
+    /// Messages refused since the conflict began.
+    pub refused: u64,
+    /// Milliseconds since the last of them.
+    pub last_ms: u64,
+}
+
+/// What is known of a robot's software.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Status {
+    /// It has a liveliness token, or sent a message within [`MESSAGE_LIVE`].
+    pub alive: bool,
+    /// The live epoch.
+    pub epoch: Option<u64>,
+    /// Another epoch that was refused within [`CONFLICT_SHOWN`].
+    pub conflict: Option<Conflict>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Refused {
+    epoch: u64,
+    count: u64,
+    last: Instant,
+}
+
+/// One robot.
+#[derive(Debug)]
+struct Owner {
+    /// Tokens that are there; those of older clients name no epoch.
+    tokens: Vec<Option<u64>>,
+    /// The epoch that speaks for the robot, and when it was last heard of.
+    current: Option<(u64, Instant)>,
+    /// Epochs that spoke for it before, and when that ended; the latest last.
+    ended: VecDeque<(u64, Instant)>,
+    refused: Option<Refused>,
+    logged: Option<Instant>,
+    heard: Instant,
+}
+
+impl Owner {
+    fn new(now: Instant) -> Self {
+        Self {
+            tokens: Vec::new(),
+            current: None,
+            ended: VecDeque::new(),
+            refused: None,
+            logged: None,
+            heard: now,
+        }
+    }
+
+    fn has_token(&self, epoch: u64) -> bool {
+        self.tokens.contains(&Some(epoch))
+    }
+
+    /// The epoch that speaks for the robot, if it is live.
+    fn live(&self, now: Instant) -> Option<u64> {
+        let (epoch, last) = self.current?;
+        let recent = now.saturating_duration_since(last) < MESSAGE_LIVE;
+        (recent || self.has_token(epoch)).then_some(epoch)
+    }
+
+    fn end_current(&mut self, now: Instant) {
+        let Some((epoch, _)) = self.current.take() else { return };
+        if self.ended.len() == MAX_ENDED {
+            self.ended.pop_front();
+        }
+        self.ended.push_back((epoch, now));
+    }
+
+    fn begin(&mut self, epoch: u64, now: Instant) {
+        if self.current.is_some_and(|(current, _)| current != epoch) {
+            self.end_current(now);
+        }
+        self.ended.retain(|(ended, _)| *ended != epoch);
+        self.current = Some((epoch, now));
+        if self.refused.is_some_and(|refused| refused.epoch == epoch) {
+            self.refused = None;
+        }
+    }
+
+    /// Whether a message of this epoch may still be on its way from before the epoch ended.
+    fn is_straggler(&self, epoch: u64, now: Instant) -> bool {
+        let late = |(ended, at): &(u64, Instant)| {
+            *ended == epoch && now.saturating_duration_since(*at) < MESSAGE_LIVE
+        };
+        !self.has_token(epoch) && self.ended.iter().any(late)
+    }
+
+    /// Counts a message that another live epoch keeps out; the count so far, if it is to be logged.
+    fn refuse(&mut self, epoch: u64, now: Instant) -> Option<u64> {
+        let shown = |r: &Refused| now.saturating_duration_since(r.last) < CONFLICT_SHOWN;
+        let count = self.refused.filter(shown).map_or(0, |r| r.count) + 1;
+        self.refused = Some(Refused { epoch, count, last: now });
+        if self.logged.is_some_and(|last| now.saturating_duration_since(last) < CONFLICT_LOGGED) {
+            return None;
+        }
+        self.logged = Some(now);
+        Some(count)
+    }
+}
+
+/// The live epochs of all robots.
+#[derive(Debug, Default)]
+pub struct Epochs(Mutex<BTreeMap<Name, Owner>>);
+
+impl Epochs {
+    /// Admits a message of a registered robot, or refuses it with [`Code::EpochConflict`] because another epoch is live, or
+    /// with [`Code::NotNewer`] because its own ended less than [`MESSAGE_LIVE`] ago.
+    pub fn admit(&self, robot: &Name, epoch: u64, now: Instant) -> Result<(), Rejection> {
+        let mut owners = self.lock();
+        if owners.len() >= MAX_FOLLOWED && !owners.contains_key(robot) {
+            // Names that were registered once and are not any more.
+            let oldest = owners.iter().min_by_key(|(_, owner)| owner.heard).map(|(name, _)| name.clone());
+            oldest.map(|name| owners.remove(&name));
+        }
+        let owner = owners.entry(robot.clone()).or_insert_with(|| Owner::new(now));
+        owner.heard = now;
+        if let Some((current, last)) = &mut owner.current
+            && *current == epoch
+        {
+            *last = now;
+            return Ok(());
+        }
+        let live = owner.live(now);
+        if owner.is_straggler(epoch, now) {
+            return Err(Rejection::new(Code::NotNewer, "epoch", format!("epoch {epoch} is over")));
+        }
+        let Some(live) = live else {
+            owner.begin(epoch, now);
+            return Ok(());
+        };
+        if let Some(refused) = owner.refuse(epoch, now) {
+            tracing::warn!(
+                %robot, live_epoch = live, refused_epoch = epoch, refused,
+                "two programs speak under the name of one robot; messages of the later one are refused"
+            );
+        }
+        let detail = format!("epoch {live} of robot {robot} is live; two programs use the robot's name");
+        Err(Rejection::new(Code::EpochConflict, "epoch", detail))
+    }
+
+    /// A liveliness token appeared or went; `epoch` is absent in the tokens of older clients. `is_registered` tells which
+    /// robots are, so that others cannot crowd them out. Whether the robot came (`true`) or went (`false`) by that.
+    pub fn token(
+        &self,
+        robot: &Name,
+        (epoch, appeared): (Option<u64>, bool),
+        now: Instant,
+        is_registered: impl Fn(&Name) -> bool,
+    ) -> Option<bool> {
+        let mut owners = self.lock();
+        if !owners.contains_key(robot) {
+            if !appeared {
+                return None;
+            }
+            if !is_registered(robot) {
+                make_room(&mut owners, is_registered);
+            }
+        }
+        let owner = owners.entry(robot.clone()).or_insert_with(|| Owner::new(now));
+        owner.heard = now;
+        let before = owner.tokens.len();
+        if appeared {
+            if before < MAX_TOKENS_PER_ROBOT && !owner.tokens.contains(&epoch) {
+                owner.tokens.push(epoch);
+            }
+            if let Some(epoch) = epoch.filter(|_| owner.live(now).is_none()) {
+                owner.begin(epoch, now);
+            }
+        } else {
+            owner.tokens.retain(|token| *token != epoch);
+            if owner.current.is_some_and(|(current, _)| Some(current) == epoch) {
+                owner.end_current(now);
+            }
+        }
+        match (before, owner.tokens.len()) {
+            (0, 1..) => Some(true),
+            (1.., 0) => Some(false),
+            _ => None,
+        }
+    }
+
+    /// The epoch that spoke last for a robot and was not ended since.
+    pub fn current(&self, robot: &Name) -> Option<u64> {
+        self.lock().get(robot)?.current.map(|(epoch, _)| epoch)
+    }
+
+    /// What is known of a robot's software now.
+    pub fn status(&self, robot: &Name, now: Instant) -> Status {
+        let owners = self.lock();
+        let Some(owner) = owners.get(robot) else { return Status::default() };
+        let epoch = owner.live(now);
+        let conflict = owner.refused.and_then(|r| {
+            let ago = now.saturating_duration_since(r.last);
+            let last_ms = u64::try_from(ago.as_millis()).unwrap_or(u64::MAX);
+            (ago < CONFLICT_SHOWN).then_some(Conflict { epoch: r.epoch, refused: r.count, last_ms })
+        });
+        Status { alive: epoch.is_some() || !owner.tokens.is_empty(), epoch, conflict }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, BTreeMap<Name, Owner>> {
+        // No code inside can panic halfway through a change.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Room for one more robot that is not registered.
+fn make_room(owners: &mut BTreeMap<Name, Owner>, is_registered: impl Fn(&Name) -> bool) {
+    if owners.len() < MAX_UNREGISTERED {
+        return;
+    }
+    let unknown = || owners.iter().filter(|(name, _)| !is_registered(name));
+    if unknown().count() < MAX_UNREGISTERED {
+        return;
+    }
+    let oldest = unknown().min_by_key(|(_, owner)| owner.heard).map(|(name, _)| name.clone());
+    oldest.map(|name| owners.remove(&name));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn name(text: &str) -> Name {
+        Name::new(text).unwrap()
+    }
+
+    /// One robot, `r1`, and times in milliseconds.
+    struct World {
+        epochs: Epochs,
+        start: Instant,
+    }
+
+    impl World {
+        fn new() -> Self {
+            Self { epochs: Epochs::default(), start: Instant::now() }
+        }
+
+        fn at(&self, ms: u64) -> Instant {
+            self.start + Duration::from_millis(ms)
+        }
+
+        fn message(&self, epoch: u64, ms: u64) -> Result<(), Code> {
+            self.epochs.admit(&name("r1"), epoch, self.at(ms)).map_err(|r| r.code)
+        }
+
+        fn token(&self, epoch: Option<u64>, appeared: bool, ms: u64) -> Option<bool> {
+            self.epochs.token(&name("r1"), (epoch, appeared), self.at(ms), |_| true)
+        }
+
+        fn status(&self, ms: u64) -> Status {
+            self.epochs.status(&name("r1"), self.at(ms))
+        }
+    }
+
+    #[test]
+    fn while_messages_come_another_epoch_is_refused_and_shown() {
+        let world = World::new();
+        assert_eq!(world.message(7, 0), Ok(()));
+        assert_eq!(world.message(8, 100), Err(Code::EpochConflict));
+        assert_eq!(world.message(7, 200), Ok(()), "the first goes on");
+        assert_eq!(world.message(8, 300), Err(Code::EpochConflict));
+        let status = world.status(400);
+        assert_eq!((status.alive, status.epoch), (true, Some(7)));
+        assert_eq!(status.conflict, Some(Conflict { epoch: 8, refused: 2, last_ms: 100 }));
+        assert_eq!(world.status(300 + CONFLICT_SHOWN.as_millis() as u64).conflict, None);
+    }
+
+    #[test]
+    fn without_a_token_the_wait_is_the_named_time() {
+        let world = World::new();
+        let live = MESSAGE_LIVE.as_millis() as u64;
+        world.message(7, 0).unwrap();
+        assert_eq!(world.message(8, live - 1), Err(Code::EpochConflict));
+        assert_eq!(world.message(8, live), Ok(()));
+        assert_eq!(world.status(live).conflict, None, "it is no stranger any more");
+        // The first one's late messages are refused, and are no conflict.
+        assert_eq!(world.message(7, live + 10), Err(Code::NotNewer));
+        assert_eq!(world.status(live + 10).conflict, None);
+        // When the second is silent in its turn, the first may come back.
+        assert_eq!(world.message(7, 2 * live), Ok(()));
+    }
+
+    #[test]
+    fn a_token_keeps_an_epoch_live_and_its_end_is_at_once() {
+        let world = World::new();
+        assert_eq!(world.token(Some(7), true, 0), Some(true));
+        assert_eq!(world.message(8, 100_000), Err(Code::EpochConflict), "silent, but there");
+        assert_eq!(world.token(Some(8), true, 100_000), None, "the robot was there before");
+        assert_eq!(world.message(8, 100_001), Err(Code::EpochConflict));
+        assert_eq!(world.token(Some(7), false, 100_002), None);
+        assert_eq!(world.epochs.current(&name("r1")), None);
+        assert_eq!(world.message(8, 100_003), Ok(()));
+        assert_eq!(world.message(7, 100_004), Err(Code::NotNewer), "a straggler");
+        assert_eq!(world.token(Some(8), false, 100_005), Some(false));
+        assert!(!world.status(100_005).alive);
+    }
+
+    #[test]
+    fn a_straggler_does_not_bring_its_epoch_back() {
+        let world = World::new();
+        world.token(Some(7), true, 0);
+        world.message(7, 10).unwrap();
+        world.token(Some(7), false, 20);
+        assert_eq!(world.message(7, 30), Err(Code::NotNewer));
+        assert_eq!(world.message(8, 40), Ok(()), "at once");
+        world.token(Some(8), false, 50);
+        // A link that was lost comes back: the token says so.
+        world.token(Some(7), true, 60);
+        assert_eq!(world.message(7, 70), Ok(()));
+    }
+
+    #[test]
+    fn tokens_without_an_epoch_are_presence_only() {
+        let world = World::new();
+        assert_eq!(world.token(None, true, 0), Some(true));
+        assert_eq!((world.status(0).alive, world.status(0).epoch), (true, None));
+        assert_eq!(world.message(7, 10), Ok(()));
+        assert_eq!(world.message(8, 10 + MESSAGE_LIVE.as_millis() as u64), Ok(()));
+        assert_eq!(world.token(None, false, 20_000), Some(false));
+    }
+
+    #[test]
+    fn tokens_are_bounded() {
+        let world = World::new();
+        for epoch in 0..=MAX_TOKENS_PER_ROBOT as u64 {
+            world.token(Some(epoch), true, epoch);
+        }
+        assert_eq!(world.epochs.lock()[&name("r1")].tokens.len(), MAX_TOKENS_PER_ROBOT);
+        for epoch in 100..200 {
+            world.message(epoch, epoch * 10_000).ok();
+        }
+        assert!(world.epochs.lock()[&name("r1")].ended.len() <= MAX_ENDED);
+    }
+
+    #[test]
+    fn robots_are_bounded() {
+        let world = World::new();
+        for i in 0..MAX_FOLLOWED as u64 + 5 {
+            world.epochs.admit(&name(&format!("robot-{i}")), 1, world.at(i)).unwrap();
+        }
+        assert_eq!(world.epochs.lock().len(), MAX_FOLLOWED);
+    }
+
+    /// Fault F11: every name was kept for ever. Unregistered names neither grow the list nor crowd out a registered robot.
+    #[test]
+    fn names_that_nobody_registered_are_bounded() {
+        let world = World::new();
+        let registered = |n: &Name| n.as_str() == "r1";
+        let token =
+            |robot: &str, ms| world.epochs.token(&name(robot), (None, true), world.at(ms), registered);
+        token("r1", 0);
+        for i in 0..3 * MAX_UNREGISTERED as u64 {
+            token(&format!("made-up-{i}"), i + 1);
+        }
+        assert_eq!(world.epochs.lock().len(), MAX_UNREGISTERED + 1);
+        assert!(world.status(0).alive, "the registered robot is shown");
+        // A registered robot is let in when the list is full, and one whose token came before its registration is alive.
+        world.epochs.token(&name("r2"), (Some(1), true), world.at(9), |n| n.as_str() == "r2");
+        assert!(world.epochs.status(&name("r2"), world.at(9)).alive);
+        let latest = format!("made-up-{}", 3 * MAX_UNREGISTERED - 1);
+        assert!(world.epochs.status(&name(&latest), world.at(9)).alive);
+    }
+}

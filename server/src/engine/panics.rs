@@ -1,0 +1,151 @@
+//! Panics that were caught, counted by the edge that caught them. An edge is where work of one kind begins: a frame, a
+//! write, a message, a request. What is behind it may be wrong; the process and everybody else's work go on.
+
+use std::{
+    any::Any,
+    fmt::Display,
+    panic::{AssertUnwindSafe, catch_unwind},
+    sync::atomic::{AtomicU64, Ordering},
+};
+use tokio::task::JoinError;
+
+/// Where a panic was caught.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(usize)]
+pub enum Edge {
+    /// A write inside its transaction.
+    Write,
+    /// A snapshot made after a commit or at the start.
+    Publication,
+    /// A frame on a worker thread.
+    Frame,
+    /// A scan on the laser's thread.
+    Scan,
+    /// The making of a map.
+    Mapping,
+    /// A message or a question of a robot, on zenoh's thread.
+    Message,
+    /// A message to a robot, on the thread that sends.
+    Delivery,
+    /// A request over HTTP, or vision work asked for by one.
+    Request,
+    /// A job.
+    Job,
+    /// A frame of a robot that gathers views.
+    Gathering,
+}
+
+impl Edge {
+    /// All of them.
+    pub const ALL: [Self; 10] = [
+        Self::Write,
+        Self::Publication,
+        Self::Frame,
+        Self::Scan,
+        Self::Mapping,
+        Self::Message,
+        Self::Delivery,
+        Self::Request,
+        Self::Job,
+        Self::Gathering,
+    ];
+
+    /// Its name in logs and answers.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Write => "write",
+            Self::Publication => "publication",
+            Self::Frame => "frame",
+            Self::Scan => "scan",
+            Self::Mapping => "mapping",
+            Self::Message => "message",
+            Self::Delivery => "delivery",
+            Self::Request => "request",
+            Self::Job => "job",
+            Self::Gathering => "gathering",
+        }
+    }
+}
+
+/// Counters of all edges; each must stay 0.
+#[derive(Debug, Default)]
+pub struct Panics([AtomicU64; Edge::ALL.len()]);
+
+impl Panics {
+    /// Counts a panic that was caught and logs it: `what` it met, `follows` says what becomes of that.
+    pub fn caught(&self, edge: Edge, cause: &(dyn Any + Send), what: impl Display, follows: &str) {
+        self.0[edge as usize].fetch_add(1, Ordering::Relaxed);
+        tracing::error!(edge = edge.name(), panic = text(cause), %what, follows, "a panic was caught");
+    }
+
+    /// Runs `work`. A panic is counted and logged; `None` then.
+    pub fn catch<T>(
+        &self,
+        edge: Edge,
+        what: impl Display,
+        follows: &str,
+        work: impl FnOnce() -> T,
+    ) -> Option<T> {
+        // What is shared behind an edge is changed in single steps under a lock, or replaced as a whole.
+        catch_unwind(AssertUnwindSafe(work))
+            .inspect_err(|cause| self.caught(edge, cause.as_ref(), what, follows))
+            .ok()
+    }
+
+    /// What a task came to that ran elsewhere. A panic of it is counted and logged; the error says so, too.
+    pub fn joined<T>(
+        &self,
+        edge: Edge,
+        what: impl Display,
+        follows: &str,
+        joined: Result<T, JoinError>,
+    ) -> Result<T, Ended> {
+        joined.map_err(|error| match error.try_into_panic() {
+            Ok(cause) => {
+                self.caught(edge, cause.as_ref(), what, follows);
+                Ended("it panicked; see the server's log")
+            }
+            Err(_cancelled) => Ended("it was given up: the server stops"),
+        })
+    }
+
+    /// Panics caught at one edge.
+    pub fn at(&self, edge: Edge) -> u64 {
+        self.0[edge as usize].load(Ordering::Relaxed)
+    }
+
+    /// Panics caught at all edges.
+    pub fn total(&self) -> u64 {
+        Edge::ALL.into_iter().map(|edge| self.at(edge)).sum()
+    }
+}
+
+/// A task that did not come to its end, and why.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct Ended(&'static str);
+
+/// The message of a panic.
+pub fn text(cause: &(dyn Any + Send)) -> &str {
+    let literal = cause.downcast_ref::<&'static str>().copied();
+    literal.or_else(|| cause.downcast_ref::<String>().map(String::as_str)).unwrap_or("no message")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn panics_are_counted_by_edge() {
+        let panics = Panics::default();
+        let (zero, message) = (0, String::from("planted"));
+        let divided = panics.catch(Edge::Scan, "a scan", "it is dropped", || 7 / std::hint::black_box(zero));
+        assert_eq!(divided, None);
+        assert_eq!(panics.catch(Edge::Write, "a write", "nothing", || panic!("{message}")), None::<()>);
+        assert_eq!(panics.catch(Edge::Write, "a write", "nothing", || 3), Some(3));
+        assert_eq!((panics.at(Edge::Scan), panics.at(Edge::Write), panics.total()), (1, 1, 2));
+        for (index, edge) in Edge::ALL.into_iter().enumerate() {
+            assert_eq!(edge as usize, index, "{}", edge.name());
+        }
+    }
+}

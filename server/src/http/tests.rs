@@ -1,0 +1,260 @@
+//! The routes without a network: requests go straight to the router.
+
+use super::*;
+use crate::{
+    config::{Limits, RawConfig},
+    engine::{panics::Edge, scene, snapshot::MapSnapshot, workers::Engine},
+    store::{StoreError, WriterTask, maps},
+};
+use axum::{
+    Router,
+    body::{Body, to_bytes},
+    http::{Request, Response, header},
+};
+use serde_json::Value;
+use tower::ServiceExt;
+use vision::recognise::DistanceKind;
+
+/// A service on a fresh database with map `hall` and robot `r1` on it.
+struct Service {
+    router: Router,
+    store: Store,
+    engine: Engine,
+    _writer: WriterTask,
+    _stop: watch::Sender<bool>,
+    _data: tempfile::TempDir,
+}
+
+impl Service {
+    async fn start(limits: Limits) -> Self {
+        let data = tempfile::tempdir().unwrap();
+        let raw = RawConfig { limits, data: data.path().to_owned(), ..RawConfig::default() };
+        let config = Arc::new(crate::config::Config::try_from(raw).unwrap());
+        let (store, writer) = Store::open(&config).await.unwrap();
+        store.write(|tx| Box::pin(maps::create(tx, "hall", DistanceKind::Both, 9))).await.unwrap();
+        store.write(|tx| Box::pin(crate::store::robots::put(tx, "r1", "hall", 9))).await.unwrap();
+        let (stop, stopping) = watch::channel(false);
+        let (jobs, _) = Jobs::start(store.clone(), config.clone(), stopping.clone()).await.unwrap();
+        let (hook, offers) = crate::gather::hook();
+        let (gatherer, _) = Gatherer::start(store.clone(), &config, &hook, offers).await.unwrap();
+        let hall = Arc::new(MapSnapshot::empty("hall", 1));
+        let engine = Engine { vitals: store.vitals().clone(), gather: hook, ..scene::engine(&[hall]) };
+        let app = App::new(config, store.clone(), Workshop { jobs, gatherer }, &engine, stopping);
+        Self { router: router(app), store, engine, _writer: writer, _stop: stop, _data: data }
+    }
+
+    fn ask(&self, request: Request<Body>) -> impl Future<Output = Response<Body>> + Send + 'static {
+        let router = self.router.clone();
+        async move { router.oneshot(request).await.unwrap() }
+    }
+
+    async fn get(&self, path: &str) -> (u16, Value) {
+        read(self.ask(request("GET", path, "")).await).await
+    }
+}
+
+fn request(method: &str, path: &str, body: impl Into<Body>) -> Request<Body> {
+    let request = Request::builder().method(method).uri(path).header(header::HOST, "localhost");
+    request.header(header::CONTENT_TYPE, "application/json").body(body.into()).unwrap()
+}
+
+async fn read(response: Response<Body>) -> (u16, Value) {
+    let status = response.status().as_u16();
+    let bytes = to_bytes(response.into_body(), 1 << 20).await.unwrap();
+    (status, serde_json::from_slice(&bytes).unwrap_or_default())
+}
+
+#[tokio::test]
+async fn a_panic_in_a_write_is_answered_and_counted_and_the_server_stays_ready() {
+    let service = Service::start(Limits::default()).await;
+    let planted = service.store.write(|_| {
+        Box::pin(async {
+            assert!(std::hint::black_box(false), "planted");
+            Ok::<(), StoreError>(())
+        })
+    });
+    assert_eq!(ApiError::from(planted.await.unwrap_err()).code, "internal");
+    let (status, ready) = service.get("/readyz").await;
+    assert_eq!((status, &ready["status"], &ready["panics"]["write"]), (200, &"ready".into(), &1.into()));
+    let made = service.ask(request("POST", "/api/v1/maps", r#"{"name": "after"}"#)).await;
+    assert_eq!(made.status(), StatusCode::CREATED);
+    assert_eq!(service.store.vitals().panics().at(Edge::Write), 1);
+}
+
+#[tokio::test]
+async fn a_part_that_has_ended_makes_the_server_not_ready() {
+    let service = Service::start(Limits::default()).await;
+    assert_eq!(service.get("/readyz").await.0, 200);
+    drop(service.store.vitals().begin("the laser thread"));
+    let (status, problem) = service.get("/readyz").await;
+    assert_eq!(
+        (status, &problem["code"], &problem["part"]),
+        (503, &"part_ended".into(), &"the laser thread".into())
+    );
+}
+
+#[tokio::test]
+async fn a_writer_that_has_ended_makes_the_server_not_ready() {
+    let service = Service::start(Limits::default()).await;
+    let fatal = service.store.write(|_| {
+        let source = sqlx::Error::WorkerCrashed;
+        Box::pin(async move { Err::<(), _>(StoreError::Database { operation: "planted", source }) })
+    });
+    assert!(fatal.await.is_err());
+    service.store.vitals().failed().await;
+    let (status, problem) = service.get("/readyz").await;
+    assert_eq!((status, &problem["code"]), (503, &"storage_failed".into()));
+}
+
+/// A recorded drive of `r1` along x, and the body that tells its path.
+fn driven(service: &Service) -> String {
+    use protos::{Name, prost::Message, v1};
+    let r1 = Name::new("r1").unwrap();
+    service.engine.motion.record(&r1, "hall").unwrap();
+    let begun = std::time::Instant::now();
+    for seq in 1..=20_u64 {
+        let captured_ns = seq as i64 * 100_000_000;
+        // As much time passes between messages as their stamps say.
+        let received = begun + Duration::from_nanos(captured_ns as u64);
+        let odom_from_robot = Some(v1::Pose2 { x_m: seq as f64 * 0.1, ..v1::Pose2::default() });
+        let odometry = v1::Odometry { epoch: 1, seq, captured_ns, odom_from_robot };
+        service.engine.motion.odometry(&r1, odometry.encode_to_vec().into(), received);
+    }
+    assert_eq!(service.engine.motion.recorded(&r1).unwrap().odometry, 20);
+    let poses: Vec<_> =
+        (1..=20).map(|i| (i * 100_000_000_i64, f64::from(i as i32) * 0.1, 0.0, 0.0)).collect();
+    serde_json::json!({ "poses": poses }).to_string()
+}
+
+/// Keeps the writer busy from now until the sender is dropped.
+async fn hold_writer(store: &Store) -> tokio::sync::oneshot::Sender<()> {
+    let (release, released) = tokio::sync::oneshot::channel::<()>();
+    let (begin, begun) = tokio::sync::oneshot::channel();
+    let store = store.clone();
+    tokio::spawn(async move {
+        let held = store.write(move |_| {
+            Box::pin(async move {
+                begin.send(()).unwrap();
+                drop(released.await);
+                Ok(())
+            })
+        });
+        held.await.unwrap();
+    });
+    begun.await.unwrap();
+    release
+}
+
+/// The caller hangs up at several points between the reading of the recording and the write. The write never begins
+/// before that, because the writer is held, so the drive must still be there each time.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_recorded_drive_outlives_a_client_that_hangs_up() {
+    let service = Service::start(Limits::default()).await;
+    let body = driven(&service);
+    let r1 = protos::Name::new("r1").unwrap();
+    let motion = &service.engine.motion;
+    let short = || tokio::time::sleep(Duration::from_micros(200));
+    for polls_after_lending in 0..10 {
+        let writer = hold_writer(&service.store).await;
+        let asked = service.ask(request("POST", "/api/v1/robots/r1/run/reference", body.clone()));
+        let mut asked = Box::pin(asked);
+        while !motion.is_lent(&r1) {
+            assert!(futures::poll!(asked.as_mut()).is_pending(), "answered without the recording");
+            short().await;
+        }
+        for _ in 0..polls_after_lending {
+            assert!(futures::poll!(asked.as_mut()).is_pending(), "answered while the writer is held");
+            short().await;
+        }
+        drop((asked, writer));
+        while motion.is_lent(&r1) {
+            short().await;
+        }
+        assert_eq!(motion.recorded(&r1).unwrap().odometry, 20, "after {polls_after_lending} polls");
+        let (_, runs) = service.get("/api/v1/maps/hall/runs").await;
+        assert_eq!(runs["runs"].as_array().unwrap().len(), 0);
+    }
+    let answer = service.ask(request("POST", "/api/v1/robots/r1/run/reference", body)).await;
+    assert_eq!(answer.status(), StatusCode::CREATED);
+    assert!(motion.recorded(&r1).is_none(), "stored once, and over");
+}
+
+#[tokio::test]
+async fn a_drive_whose_run_cannot_be_stored_stays() {
+    let service = Service::start(Limits::default()).await;
+    let body = driven(&service);
+    crate::store::tests::refuse_runs(&service.store).await;
+    let answer = service.ask(request("POST", "/api/v1/robots/r1/run/reference", body)).await;
+    assert_eq!(answer.status(), StatusCode::INTERNAL_SERVER_ERROR);
+    let r1 = protos::Name::new("r1").unwrap();
+    assert_eq!(service.engine.motion.recorded(&r1).unwrap().odometry, 20);
+    assert!(service.engine.motion.lend_recording(&r1).is_ok());
+}
+
+#[tokio::test]
+async fn a_change_that_timed_out_before_it_began_is_not_made() {
+    let service = Service::start(Limits { request_timeout_s: 1, ..Limits::default() }).await;
+    let go = Arc::new(tokio::sync::Notify::new());
+    let wait = go.clone();
+    let store = service.store.clone();
+    let first = tokio::spawn(async move {
+        let write = store.write(move |_| {
+            Box::pin(async move {
+                wait.notified().await;
+                Ok(())
+            })
+        });
+        write.await
+    });
+    tokio::task::yield_now().await;
+    // It waits behind that write for longer than it may.
+    let late = read(service.ask(request("POST", "/api/v1/maps", r#"{"name": "late"}"#)).await).await;
+    assert_eq!((late.0, &late.1["code"], &late.1["may_be_done"]), (408, &"timeout".into(), &true.into()));
+    assert!(late.1["detail"].as_str().unwrap().contains("may have been made"));
+    go.notify_one();
+    first.await.unwrap().unwrap();
+    // The writer has had its turn once this one is made.
+    let made = service.ask(request("POST", "/api/v1/maps", r#"{"name": "next"}"#)).await;
+    assert_eq!(made.status(), StatusCode::CREATED);
+    assert_eq!(service.get("/api/v1/maps/late").await.0, 404);
+}
+
+#[tokio::test]
+async fn large_bodies_take_a_place_before_they_are_read() {
+    let service = Service::start(Limits { uploads: 1, upload_wait_s: 1, ..Limits::default() }).await;
+    let large = |name: &str| {
+        let body = format!("{{\"name\": \"{name}\"{}}}", " ".repeat(65 << 10));
+        request("POST", "/api/v1/maps", body)
+    };
+    // A body that does not come to its end.
+    let endless = futures::stream::pending::<Result<axum::body::Bytes, std::convert::Infallible>>();
+    let mut held = Box::pin(service.ask(request("POST", "/api/v1/maps", Body::from_stream(endless))));
+    assert!(futures::poll!(held.as_mut()).is_pending());
+    let refused = service.ask(large("one")).await;
+    assert!(refused.headers().contains_key(header::RETRY_AFTER));
+    let (status, problem) = read(refused).await;
+    assert_eq!((status, &problem["code"]), (503, &"too_many_uploads".into()));
+    let small = service.ask(request("POST", "/api/v1/maps", r#"{"name": "small"}"#)).await;
+    assert_eq!(small.status(), StatusCode::CREATED);
+    drop(held);
+    assert_eq!(service.ask(large("one")).await.status(), StatusCode::CREATED);
+}
+
+#[tokio::test]
+async fn a_known_path_may_be_as_long_as_it_is_promised() {
+    use ::map::areas::MAX_REFERENCE;
+    let service = Service::start(Limits::default()).await;
+    let path = |poses: usize| {
+        let pose = |i: usize| {
+            let ns = 1_700_000_000_000_000_000_i64 + i as i64;
+            format!("[{ns}, -1234.5678901234567, 0.00012345678901234567, -1.5707963267948966]")
+        };
+        let poses: Vec<String> = (0..poses).map(pose).collect();
+        request("POST", "/api/v1/robots/r1/run/reference", format!("{{\"poses\": [{}]}}", poses.join(", ")))
+    };
+    // Read to its end: only then it matters that there is no recording.
+    let (status, problem) = read(service.ask(path(MAX_REFERENCE)).await).await;
+    assert_eq!((status, &problem["code"]), (404, &"not_recording".into()), "{problem}");
+    let (status, problem) = read(service.ask(path(MAX_REFERENCE + 1)).await).await;
+    assert_eq!((status, &problem["code"]), (422, &"too_many".into()), "{problem}");
+}

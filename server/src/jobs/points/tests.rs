@@ -1,0 +1,223 @@
+use super::*;
+use crate::{
+    config::{Config, RawConfig},
+    engine::picture,
+    store::{
+        WriterTask, landmarks,
+        teaching::{self, Teaching},
+        views::{Cut, NewView},
+    },
+};
+use sha2::{Digest as _, Sha256};
+use std::time::Duration;
+use tokio::sync::watch;
+use vision::{
+    detect::quads::Corners,
+    frame::GrayImage,
+    learn::{
+        model::{View, learn},
+        synthesis,
+    },
+    params::Params,
+    recognise::DistanceKind,
+};
+
+fn config(dir: &std::path::Path) -> Config {
+    let mut raw = RawConfig { data: dir.to_owned(), ..RawConfig::default() };
+    raw.algorithm.recognise.verdict.points = true;
+    Config::try_from(raw).unwrap()
+}
+
+/// A poster, another for another seed.
+fn photograph(seed: u64) -> GrayImage {
+    let texture = sim::posters::poster_of_size(seed, 260, 1.0);
+    GrayImage::new(texture.width(), texture.height(), texture.data().to_vec()).unwrap()
+}
+
+fn corners() -> Corners {
+    Corners::try_from([[20.0, 20.0], [240.0, 24.0], [236.0, 238.0], [24.0, 232.0]]).unwrap()
+}
+
+/// Adds a view whose stored picture is `bytes`.
+async fn teach(store: &Store, landmark: &str, image: &GrayImage, bytes: Vec<u8>) {
+    let photographed = View::photographed(image, &corners(), &Params::default()).unwrap();
+    let cut = Cut { corners_px: corners(), icon: photographed.icon };
+    let view = NewView {
+        image_sha256: Sha256::digest(&bytes).into(),
+        image: bytes,
+        image_kind: "png",
+        size_px: [image.width(), image.height()],
+        cut,
+        strangers: vec![],
+        capture: None,
+    };
+    let (map, landmark) = ("a".to_owned(), landmark.to_owned());
+    teaching::add(store, Teaching { map, landmark, view, max: 9, thinning: None }).await.unwrap();
+}
+
+fn png(image: &GrayImage) -> Vec<u8> {
+    picture::png(image.width(), image.height(), image.data()).unwrap()
+}
+
+/// Map `a` with landmarks `whole` and `damaged`, each with one view and a model as builds before the points stored it.
+/// The picture of `damaged` cannot be decoded.
+async fn earlier(config: &Config) -> (Store, WriterTask) {
+    let (store, task) = Store::open(config).await.unwrap();
+    store.write(|tx| Box::pin(maps::create(tx, "a", DistanceKind::Both, 2))).await.unwrap();
+    for (seed, name) in [(1, "whole"), (2, "damaged")] {
+        let none = landmarks::Measures::default();
+        let made = store.write(move |tx| Box::pin(landmarks::create(tx, "a", name, none, 5))).await.unwrap();
+        let image = photograph(seed);
+        let bytes = if name == "whole" { png(&image) } else { b"no picture".to_vec() };
+        teach(&store, name, &image, bytes).await;
+        let views = synthesis::views(&image, &corners(), 12, &config.params, seed);
+        let id = LandmarkId(made.id as u64);
+        store_model(&store, &learn(id, &views, &[], &config.params).unwrap()).await;
+    }
+    (store, task)
+}
+
+async fn store_model(store: &Store, model: &LandmarkModel) {
+    let new = models::NewModel {
+        landmark: model.id,
+        bytes: model.to_bytes(),
+        params_hash: model.params_hash,
+        summary: landmarks::ModelSummary {
+            active: model.is_active(),
+            reasons: "[]".into(),
+            facts: r#"{"look_alikes":[{"landmark":"twin"}]}"#.into(),
+            views: 1,
+            generated_views: 12,
+            learnt_ms: 7,
+        },
+    };
+    let write = store.write(move |tx| {
+        Box::pin(async move {
+            assert!(models::put(tx, 1, &new).await?);
+            maps::bump(tx, 1).await
+        })
+    });
+    write.await.unwrap();
+}
+
+async fn started(store: &Store, config: &Config) -> (Arc<Jobs>, watch::Sender<bool>) {
+    let (stop, stopping) = watch::channel(false);
+    let (jobs, _) = Jobs::start(store.clone(), Arc::new(config.clone()), stopping).await.unwrap();
+    jobs.renew().await.unwrap();
+    (jobs, stop)
+}
+
+/// The job once it has ended and what it stored is published.
+async fn ended(jobs: &Jobs, job: i64) -> JobRow {
+    let begun = Instant::now();
+    loop {
+        let row = jobs::get(jobs.store.reads(), job).await.unwrap();
+        if !matches!(row.state.as_str(), "queued" | "running") && jobs.progress(job).is_none() {
+            return row;
+        }
+        assert!(begun.elapsed() < Duration::from_mins(1), "{row:?}");
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+}
+
+fn model(store: &Store, id: u64) -> Arc<LandmarkModel> {
+    store.snapshots().get("a").unwrap().learnt[&LandmarkId(id)].model.clone()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn models_of_earlier_builds_get_points_once() {
+    let dir = tempfile::tempdir().unwrap();
+    let config = config(dir.path());
+    let (store, task) = earlier(&config).await;
+    let before = [model(&store, 1), model(&store, 2)];
+    assert!(before.iter().all(|m| !m.knows_points && m.points.is_empty()));
+
+    let (jobs, stop) = started(&store, &config).await;
+    let row = ended(&jobs, 1).await;
+    assert_eq!((row.kind.as_str(), row.map.as_str(), row.state.as_str()), ("learn", "a", "done"), "{row:?}");
+    assert_eq!(row.message, "1 of 2 landmarks have points now");
+    let request = Request::from_json(&row.request);
+    assert_eq!(request.landmarks, Some(vec!["whole".to_owned(), "damaged".to_owned()]));
+    let result: Value = serde_json::from_str(row.result.as_deref().unwrap()).unwrap();
+    assert_eq!((&result["with_points"], &result["failed"][0]["landmark"]), (&json!(1), &json!("damaged")));
+
+    // The same model, with points.
+    let whole = model(&store, 1);
+    assert!(whole.knows_points && whole.points.len() >= 10, "{} points", whole.points.len());
+    let without = LandmarkModel { points: vec![], knows_points: false, ..LandmarkModel::clone(&whole) };
+    assert_eq!(without, *before[0]);
+    assert_eq!(model(&store, 2), before[1]);
+    let kept = landmarks::get(store.reads(), "a", "whole").await.unwrap().model.unwrap();
+    let facts: Value = serde_json::from_str(&kept.facts).unwrap();
+    assert_eq!(facts["points"], json!(whole.points.len()));
+    assert_eq!((&facts["look_alikes"][0]["landmark"], kept.learnt_ms), (&json!("twin"), 7));
+
+    // At later starts there is nothing to do: not for the one that has points, nor for the one that failed.
+    stop.send_replace(true);
+    task.close().await;
+    let (store, _task) = Store::open(&config).await.unwrap();
+    let (_jobs, _stop) = started(&store, &config).await;
+    assert!(jobs::open(store.reads()).await.unwrap().is_empty());
+    assert!(jobs::get(store.reads(), 2).await.is_err(), "a second job");
+    assert_eq!(model(&store, 1), whole);
+}
+
+/// A crash between two starts: the job that waits is the only one.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_job_that_waits_is_not_queued_again() {
+    let dir = tempfile::tempdir().unwrap();
+    let config = config(dir.path());
+    let (store, _task) = earlier(&config).await;
+    let (stop, stopping) = watch::channel(true);
+    let (jobs, _) = Jobs::start(store.clone(), Arc::new(config.clone()), stopping).await.unwrap();
+    for _ in 0..3 {
+        jobs.renew().await.unwrap();
+    }
+    let open = jobs::open(store.reads()).await.unwrap();
+    assert_eq!(open.iter().map(|row| row.id).collect::<Vec<_>>(), [1]);
+    drop(stop);
+}
+
+/// A landmark that has gone, or has points by a lesson meanwhile, is passed over.
+#[tokio::test(flavor = "multi_thread")]
+async fn what_has_changed_since_is_passed_over() {
+    let dir = tempfile::tempdir().unwrap();
+    let config = config(dir.path());
+    let (store, _task) = earlier(&config).await;
+    let (stop, stopping) = watch::channel(true);
+    let (jobs, _) = Jobs::start(store.clone(), Arc::new(config.clone()), stopping).await.unwrap();
+    jobs.renew().await.unwrap();
+    drop((jobs, stop));
+    let learnt = LandmarkModel::clone(&model(&store, 1)).with_points(&[]);
+    store_model(&store, &learnt).await;
+    store.write(|tx| Box::pin(landmarks::delete(tx, "a", "damaged"))).await.unwrap();
+    let (jobs, _stop) = started(&store, &config).await;
+    let row = ended(&jobs, 1).await;
+    assert_eq!((row.state.as_str(), row.message.as_str()), ("done", "0 of 0 landmarks have points now"));
+    assert_eq!(*model(&store, 1), learnt);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_lesson_takes_points_of_the_pictures_that_can_be_read() {
+    let dir = tempfile::tempdir().unwrap();
+    let config = config(dir.path());
+    let (store, _task) = earlier(&config).await;
+    // A second view, whose picture is damaged.
+    teach(&store, "whole", &photograph(1), b"no picture either".to_vec()).await;
+    let bystander = model(&store, 2).points.clone();
+    let (stop, stopping) = watch::channel(false);
+    let (jobs, _) = Jobs::start(store.clone(), Arc::new(config.clone()), stopping).await.unwrap();
+    let request = Request { landmarks: Some(vec!["whole".to_owned()]), ..Request::default() };
+    let job = jobs.submit("a", &request).await.unwrap();
+    let row = ended(&jobs, job.id).await;
+    assert_eq!(row.state, "done", "{row:?}");
+    let learnt = model(&store, 1);
+    let expected = vision::points::taught::view_points(&photograph(1), &corners());
+    let expected = vision::points::taught::landmark_points(&[expected]);
+    assert!(learnt.knows_points && expected.len() >= 10, "{} points", expected.len());
+    assert_eq!(learnt.points, expected);
+    assert_eq!((&model(&store, 2).points, model(&store, 2).knows_points), (&bystander, false));
+    let result: Value = serde_json::from_str(row.result.as_deref().unwrap()).unwrap();
+    assert_eq!(result["points"], json!(expected.len()));
+    drop(stop);
+}

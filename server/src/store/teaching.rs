@@ -1,0 +1,289 @@
+//! Views that are added to landmarks. Whether a view says something new and where it places its landmark is computed
+//! before the write, from what is stored. Inside the transaction only a stamp of all that it rests on is compared; if
+//! that has changed, everything is computed once more. Whoever prepares a write waits for the one before
+//! ([`Store::preparing`]), so that this happens only when something else than teaching changes the map meanwhile.
+
+use super::{
+    Store, StoreError, Tx,
+    landmarks::{self, Measures},
+    laser, load, maps,
+    placing::{self, Made, Placing},
+    statements::statements,
+    views::{self, Cut, NewView, Outcome, ViewRow},
+};
+use crate::engine::panics::Edge;
+use map::segments::LaserSegment;
+use sqlx::{Row, SqliteExecutor};
+use std::sync::Arc;
+use vision::{
+    detect::quads::Corners,
+    learn::thinning::{ThinningParams, ViewDigest, most_alike},
+};
+
+statements! {
+    STAMP = "SELECT m.id AS map, m.walls_version, l.id AS landmark, count(v.id) AS views, \
+             coalesce(max(v.id), 0) AS last_view, l.width_m, l.height_m, l.x_m, l.y_m, l.z_m, l.theta_rad, l.roll_rad, \
+             l.tilt_rad, l.place_covariance, l.size_from_views FROM maps m JOIN landmarks l ON l.map_id = m.id \
+             LEFT JOIN views v ON v.landmark_id = l.id WHERE m.name = ?1 AND l.name = ?2 GROUP BY l.id";
+}
+
+/// How often a write is prepared before its caller is told to try again.
+pub(super) const ATTEMPTS: usize = 5;
+
+/// What a landmark's place and the novelty of its views rest on. Views are never changed and their numbers never used
+/// again, so count and last number tell any set of views of a landmark from all before it.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Stamp {
+    map: i64,
+    walls_version: i64,
+    landmark: i64,
+    views: i64,
+    last_view: i64,
+    pub(super) measures: Measures,
+}
+
+impl Stamp {
+    /// Number of the landmark.
+    pub(super) fn landmark(&self) -> i64 {
+        self.landmark
+    }
+}
+
+/// The stamp of a landmark; `None` if there is none of that name.
+pub(super) async fn stamp(
+    db: impl SqliteExecutor<'_>,
+    map: &str,
+    landmark: &str,
+) -> Result<Option<Stamp>, StoreError> {
+    let at = || StoreError::at("read what a view rests on");
+    let Some(row) = sqlx::query(STAMP).bind(map).bind(landmark).fetch_optional(db).await.map_err(at())?
+    else {
+        return Ok(None);
+    };
+    let number = |column: &str| row.try_get::<i64, _>(column).map_err(at());
+    Ok(Some(Stamp {
+        map: number("map")?,
+        walls_version: number("walls_version")?,
+        landmark: number("landmark")?,
+        views: number("views")?,
+        last_view: number("last_view")?,
+        measures: landmarks::measures(&row).map_err(at())?,
+    }))
+}
+
+/// The walls of a map, as places rest on them.
+pub(super) async fn walls(store: &Store, map: i64) -> Result<Vec<LaserSegment>, StoreError> {
+    Ok(laser::all_of(store.reads(), map).await?.iter().filter_map(|ends| load::wall(ends).ok()).collect())
+}
+
+/// Computes off the runtime. A panic is caught, counted and answered.
+pub(super) async fn computed<T: Send + 'static>(
+    store: &Store,
+    what: &'static str,
+    work: impl FnOnce() -> T + Send + 'static,
+) -> Result<T, StoreError> {
+    let done = tokio::task::spawn_blocking(work).await;
+    let done = store.vitals().panics().joined(Edge::Write, what, "nothing is written", done);
+    done.map_err(|_ended| StoreError::Panicked)
+}
+
+/// A view to be added to a landmark.
+#[derive(Debug)]
+pub(crate) struct Teaching {
+    /// Name of the map.
+    pub(crate) map: String,
+    /// Name of the landmark.
+    pub(crate) landmark: String,
+    /// The view. With a capture it places the landmark.
+    pub(crate) view: NewView,
+    /// Most views of a landmark.
+    pub(crate) max: usize,
+    /// What counts as saying nothing new; without it every view is stored.
+    pub(crate) thinning: Option<ThinningParams>,
+}
+
+/// What was computed for a view, and from what.
+struct Prepared {
+    stamp: Stamp,
+    /// Number of the stored view that is so much like the new one that both would teach the same.
+    alike: Option<i64>,
+    /// The landmark's place with the new view, if that has a capture.
+    made: Option<Made>,
+}
+
+/// Stores a view, unless it is there already or is a near-duplicate of one; then gives that one. A view with a capture
+/// places its landmark in the same transaction.
+pub(crate) async fn add(
+    store: &Store,
+    teaching: Teaching,
+) -> Result<(ViewRow, Outcome, Option<Placing>), StoreError> {
+    let teaching = Arc::new(teaching);
+    let _turn = store.preparing().await;
+    for _ in 0..ATTEMPTS {
+        let (prepared, new) = (prepare(store, &teaching).await?, teaching.clone());
+        let added = store.write(move |tx| Box::pin(async move { write(tx, &new, prepared).await }));
+        match added.await {
+            Err(StoreError::Changed) => {}
+            done => return done,
+        }
+    }
+    Err(StoreError::Busy)
+}
+
+async fn prepare(store: &Store, teaching: &Arc<Teaching>) -> Result<Prepared, StoreError> {
+    let Teaching { map, landmark, view, thinning, .. } = &**teaching;
+    // The stamp first: whatever changes after it is noticed inside the write.
+    let Some(stamp) = stamp(store.reads(), map, landmark).await? else {
+        maps::get(store.reads(), map).await?;
+        return Err(StoreError::NotFound { what: "landmark", name: landmark.clone() });
+    };
+    let stored = match thinning {
+        Some(_) => views::cuts(store.reads(), stamp.landmark).await?,
+        None => Vec::new(),
+    };
+    let (mut captures, mut on) = (Vec::new(), Vec::new());
+    if let Some(capture) = &view.capture {
+        captures = placing::captures(store.reads(), stamp.landmark).await?;
+        captures.insert(0, (view.cut.corners_px, capture.clone()));
+        on = walls(store, stamp.map).await?;
+    }
+    let teaching = teaching.clone();
+    let work = move || Prepared {
+        alike: teaching.thinning.as_ref().and_then(|p| alike(&teaching.view.cut, &stored, p)),
+        made: teaching.view.capture.is_some().then(|| placing::made(&captures, &on, &stamp.measures)),
+        stamp,
+    };
+    computed(store, "a view", work).await
+}
+
+/// The stored view that the new one adds nothing to.
+fn alike(new: &Cut, stored: &[(i64, Cut)], p: &ThinningParams) -> Option<i64> {
+    let digest = |cut: &Cut| ViewDigest::new(&cut.corners_px, &cut.icon);
+    let digests: Vec<ViewDigest> = stored.iter().map(|(_, cut)| digest(cut)).collect();
+    let (index, novelty) = most_alike(&digest(new), &digests, p)?;
+    (novelty < 1.0).then(|| stored[index].0)
+}
+
+async fn write(
+    tx: &mut Tx,
+    new: &Teaching,
+    prepared: Prepared,
+) -> Result<(ViewRow, Outcome, Option<Placing>), StoreError> {
+    let Teaching { map, landmark, view, max, .. } = new;
+    if stamp(&mut tx.conn, map, landmark).await?.as_ref() != Some(&prepared.stamp) {
+        return Err(StoreError::Changed);
+    }
+    let number = prepared.stamp.landmark;
+    if let Some(row) = views::same(tx, number, view).await? {
+        return Ok((row, Outcome::Same, None));
+    }
+    if let Some(id) = prepared.alike {
+        return Ok((views::get(&mut tx.conn, id).await?, Outcome::Alike, None));
+    }
+    let row = views::add(tx, (prepared.stamp.map, number), view, *max).await?;
+    let placing = match prepared.made {
+        Some(made) => Some(placing::put(tx, map, landmark, made).await?),
+        None => None,
+    };
+    Ok((row, Outcome::New, placing))
+}
+
+/// Corners and capture of a view that was taken with a known pose.
+pub(super) type Captured = (Corners, String);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::store::{
+        Store,
+        accepting::tests::{decision, gathered},
+        placing::tests::seen_from,
+        tests::config,
+    };
+    use vision::recognise::DistanceKind;
+
+    async fn store(dir: &std::path::Path) -> (Store, crate::store::WriterTask) {
+        let (store, task) = Store::open(&config(dir)).await.unwrap();
+        store.write(|tx| Box::pin(maps::create(tx, "a", DistanceKind::Both, 2))).await.unwrap();
+        let none = Measures::default();
+        store.write(move |tx| Box::pin(landmarks::create(tx, "a", "p1", none, 5))).await.unwrap();
+        wall(&store).await;
+        (store, task)
+    }
+
+    async fn wall(store: &Store) {
+        store.write(|tx| Box::pin(laser::replace(tx, "a", &[[0.0, 0.0, 6.0, 0.0]]))).await.unwrap();
+    }
+
+    fn teaching(number: u8) -> Teaching {
+        let (map, landmark) = ("a".to_owned(), "p1".to_owned());
+        let view = seen_from(1.0 + f64::from(number) * 0.4, number, 0.0);
+        Teaching { map, landmark, view, max: 9, thinning: None }
+    }
+
+    /// Prepares a view, lets `meanwhile` happen, and writes: was it refused, so that it is prepared again?
+    async fn refused(store: &Store, number: u8, meanwhile: impl AsyncFnOnce()) -> bool {
+        let teaching = Arc::new(teaching(number));
+        let prepared = prepare(store, &teaching).await.unwrap();
+        meanwhile().await;
+        let written = store.write(move |tx| Box::pin(async move { write(tx, &teaching, prepared).await }));
+        match written.await {
+            Ok((_, outcome, placing)) => {
+                assert!(outcome == Outcome::New && placing.unwrap().placed);
+                false
+            }
+            Err(StoreError::Changed) => true,
+            Err(error) => panic!("{error}"),
+        }
+    }
+
+    #[tokio::test]
+    async fn a_view_is_written_only_on_what_it_was_prepared_from() {
+        let dir = tempfile::tempdir().unwrap();
+        let (store, _task) = store(dir.path()).await;
+        assert!(!refused(&store, 1, async || ()).await);
+        assert!(refused(&store, 2, async || wall(&store).await).await, "other walls");
+        let another = async || drop(add(&store, teaching(3)).await.unwrap());
+        assert!(refused(&store, 2, another).await, "another view, and another place");
+        let deleted = async || {
+            let last = stamp(store.reads(), "a", "p1").await.unwrap().unwrap().last_view;
+            store.write(move |tx| Box::pin(views::delete(tx, "a", "p1", last))).await.unwrap();
+        };
+        assert!(refused(&store, 2, deleted).await, "a view less");
+        // Another landmark is no matter.
+        let beside = async || {
+            let none = Measures::default();
+            store.write(move |tx| Box::pin(landmarks::create(tx, "a", "p2", none, 5))).await.unwrap();
+        };
+        assert!(!refused(&store, 2, beside).await);
+    }
+
+    #[tokio::test]
+    async fn an_accepted_track_is_placed_as_its_views_place_it() {
+        let dir = tempfile::tempdir().unwrap();
+        let (store, _task) = store(dir.path()).await;
+        let id = gathered(&store, "a", (1..=3).map(|n| teaching(n).view)).await;
+        // It has one of these views already, and one of its own.
+        for view in [2, 5] {
+            add(&store, teaching(view)).await.unwrap();
+        }
+        let accepted = crate::store::accepting::accept(&store, decision("a", id, "new")).await.unwrap();
+        let placing = &accepted.landmarks["new"].1;
+        assert_eq!((placing.placed, placing.views_used), (true, 3), "{placing:?}");
+        let row = landmarks::get(store.reads(), "a", "new").await.unwrap();
+        let on = walls(&store, 1).await.unwrap();
+        let captures = placing::captures(store.reads(), row.id).await.unwrap();
+        let again = placing::made(&captures, &on, &Measures::default());
+        assert_eq!(again, Made::Placed(Box::new(row.measures), 3));
+    }
+
+    #[tokio::test]
+    async fn a_panic_of_the_computation_ends_nothing() {
+        let dir = tempfile::tempdir().unwrap();
+        let (store, _task) = store(dir.path()).await;
+        let planted = computed(&store, "planted", || -> u8 { panic!("planted") }).await;
+        assert!(matches!(planted, Err(StoreError::Panicked)));
+        assert_eq!(store.vitals().panics().at(Edge::Write), 1);
+        assert!(!refused(&store, 1, async || ()).await);
+    }
+}
