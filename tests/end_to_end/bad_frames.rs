@@ -93,6 +93,7 @@ async fn next(answers: &mut Receiver<CameraAnswer>) -> v1::Answer {
 async fn connect(inside: &Inside, robot: &str) -> RobotClient {
     let options = RobotOptions {
         delivery: Delivery::Every,
+        epoch: Some(9),
         ..RobotOptions::new(&inside.server.zenoh_endpoint, "default", robot)
     };
     RobotClient::connect(&options).await.expect("a connection")
@@ -132,11 +133,11 @@ async fn bad_frames_are_refused_by_name_and_the_server_goes_on() {
     assert_eq!(refusal(&next(&mut answers).await), ("bad_message".into(), "frame".into()));
     send(vec![0; 100_001]).await;
     assert_eq!(refusal(&next(&mut answers).await), ("too_large".into(), "frame".into()));
-    // A new start of the robot is another epoch; after it the old one is over.
+    // A new start of the robot is another epoch: it waits until the live one ends.
     send(v1::Frame { epoch: 10, ..good(1) }.encode_to_vec()).await;
-    assert_eq!(next(&mut answers).await.status(), Status::NoMatch);
+    assert_eq!(refusal(&next(&mut answers).await), ("epoch_conflict".into(), "epoch".into()));
     send(good(1_000).encode_to_vec()).await;
-    assert_eq!(refusal(&next(&mut answers).await), ("not_newer".into(), "epoch".into()));
+    assert_eq!(next(&mut answers).await.status(), Status::NoMatch);
 
     let counts = inside.server.slots.counts();
     assert_eq!(counts.received, 2 * ROWS.len() as u64 + 5, "{counts:?}");

@@ -1,19 +1,24 @@
 //! End-to-end claims, one file each, against a real server.
 
 mod bad_frames;
+mod clocks;
 mod command_line;
 mod demo;
+mod earlier_database;
 mod evaluate;
 mod fit;
 mod gathered_drive;
+mod hang_ups;
 mod http_contract;
 mod laser;
 mod live_mapping;
 mod look_alikes;
 mod moved_landmark;
+mod other_map;
 mod real_pictures;
 mod restart;
 mod several_maps;
 mod sight;
 mod teach_and_recognise;
 mod tidy;
+mod two_programs;

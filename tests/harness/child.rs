@@ -21,7 +21,13 @@ pub struct Child {
 impl Child {
     /// Starts the program on a data directory and waits until it says that it is ready.
     pub fn start(data: &Path) -> Self {
+        Self::start_with(data, &[])
+    }
+
+    /// The same with these settings, as environment variables.
+    pub fn start_with(data: &Path, settings: &[(&str, &str)]) -> Self {
         let mut process = Command::new(program())
+            .envs(settings.iter().copied())
             .args(["serve", "--http", "127.0.0.1:0", "--zenoh", "tcp/127.0.0.1:0", "--log", "warn", "--data"])
             .arg(data)
             .stdout(Stdio::piped())

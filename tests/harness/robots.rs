@@ -1,7 +1,8 @@
 //! A simulated robot against a server: its building as a map, its landmarks taught, what it measures as messages.
 
-use crate::{Inside, SOON};
+use crate::{Inside, SOON, eventually};
 use client::{
+    Capture, Delivery, RobotClient, RobotOptions,
     lessons::{Place, Size},
     map::Extent,
     v1,
@@ -81,6 +82,49 @@ pub async fn teach(inside: &Inside, building: &Arc<Building>, names: &[&str], vi
     }
     let job = maps.learn(MAP, None, None).await.expect("job");
     maps.wait_for_job(job, 3 * SOON, |_| {}).await.expect("the lesson ends");
+}
+
+/// Connects as a robot; what it sends is never dropped on the way.
+pub async fn connect(endpoint: &str, robot: &str) -> RobotClient {
+    let options = RobotOptions { delivery: Delivery::Every, ..RobotOptions::new(endpoint, "default", robot) };
+    RobotClient::connect(&options).await.expect("connected")
+}
+
+/// What was seen, with everything a robot knows.
+pub fn capture(seen: &Sighting) -> Capture {
+    Capture::encoded(jpeg(&seen.frame.image))
+        .expect("a picture")
+        .with_intrinsics(sim::camera::Camera::vga().intrinsics())
+        .with_mounting(&seen.step.robot_from_camera)
+        .with_odometry(&seen.step.odom_from_robot)
+        .with_deadline_ms(60_000)
+}
+
+/// Shows robot `name` views of the landmark `poster-0`, until its pose on [`MAP`] is known; the last view.
+pub async fn find_itself(
+    inside: &Inside,
+    building: &Arc<Building>,
+    client: &RobotClient,
+    name: &str,
+) -> Sighting {
+    let mut robot = Robot::new(building.clone(), &RobotParams::default());
+    let near = LessonParams { seed: 9, views: 12, ..LessonParams::default() };
+    let stops: Vec<_> = stops(building, &near).into_iter().filter(|s| s.landmark == "poster-0").collect();
+    for stop in &stops {
+        let seen = robot.look(&stop.step);
+        let answer = client.recognise("front", capture(&seen), SOON).await.expect("an answer");
+        if answer.map_from_robot.is_some() {
+            let started = || async {
+                let path = format!("/robots/{name}/corrections");
+                let (_, log) = call(inside, Method::GET, &path, None).await;
+                (log["totals"]["landmarks"]["started"] == 1).then_some(())
+            };
+            // The answer goes out before the pose is taken.
+            eventually("started", started).await;
+            return seen;
+        }
+    }
+    panic!("none of {} views gave a pose", stops.len());
 }
 
 /// What the laser measured, as a message.

@@ -1,0 +1,47 @@
+//! Claim: what was accepted is done although its client goes away at once, and what was not does not block anything.
+
+use client::{lessons::JobState, map::Extent};
+use serde_json::Value;
+use server::config::Limits;
+use tests::{Inside, eventually, pictures};
+use tokio::{io::AsyncWriteExt, net::TcpStream};
+
+/// More than may be open at once, so that jobs which nobody runs would stop all learning.
+const REQUESTS: u64 = 20;
+
+#[tokio::test(flavor = "multi_thread")]
+async fn no_job_stays_behind_when_clients_hang_up() {
+    let inside = Inside::start(Limits { jobs: 4, ..Limits::default() }).await;
+    let maps = inside.maps();
+    maps.create_map("hall", None).await.expect("map");
+    maps.add_landmark("hall", "p1", None, None).await.expect("landmark");
+    maps.upload_view("hall", "p1", pictures::picture(1), Extent::WholeImage).await.expect("view");
+    for i in 0..REQUESTS {
+        let mut stream = TcpStream::connect(inside.server.http_addr).await.expect("connection");
+        let path = "/api/v1/maps/hall/landmarks/p1/learn";
+        let head = format!("POST {path} HTTP/1.1\r\nHost: localhost\r\nContent-Length: 0\r\n\r\n");
+        stream.write_all(head.as_bytes()).await.expect("sent");
+        // At once, and ever later: somewhere in between the job is committed and not yet answered.
+        tokio::time::sleep(std::time::Duration::from_micros(250 * i)).await;
+        drop(stream);
+    }
+    let url = inside.url();
+    let state = async |job: u64| {
+        let answer = reqwest::get(format!("{url}/api/v1/jobs/{job}")).await.expect("answer");
+        let job: Value = answer.json().await.expect("JSON");
+        job["state"].as_str().map(str::to_owned)
+    };
+    let last = eventually("there is room for another lesson", || async {
+        maps.learn("hall", None, Some(2)).await.ok()
+    })
+    .await;
+    eventually("the lesson after all of them is done", || async {
+        (maps.job(&last.id_text()).await.expect("job").state == JobState::Done).then_some(())
+    })
+    .await;
+    let number: u64 = last.id_text().parse().expect("a number");
+    for job in 1..number {
+        assert_eq!(state(job).await.as_deref(), Some("done"), "job {job} of {number}");
+    }
+    inside.server.stop().await;
+}
