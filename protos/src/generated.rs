@@ -215,7 +215,7 @@ pub struct QuadAnswer {
     #[prost(enumeration = "Verdict", tag = "4")]
     #[serde(with = "crate::json::verdict")]
     pub verdict: i32,
-    /// Set only for UNIQUE.
+    /// Set only for UNIQUE; what a known pose adds is `guided_landmark`.
     #[prost(string, tag = "5")]
     pub landmark: ::prost::alloc::string::String,
     #[prost(message, repeated, tag = "6")]
@@ -246,6 +246,14 @@ pub struct QuadAnswer {
     /// thing with the same parts. The verdict is AMBIGUOUS, and no pose follows. Empty unless in doubt for this reason.
     #[prost(string, tag = "15")]
     pub doubtful_landmark: ::prost::alloc::string::String,
+    /// How it was named: GLOBAL with `landmark`, GUIDED with `guided_landmark`; unspecified where it was not.
+    #[prost(enumeration = "Sighting", tag = "16")]
+    #[serde(with = "crate::json::sighting")]
+    pub sighting: i32,
+    /// The landmark that the quad is by the pose known before the frame, where the picture alone leaves several. The verdict
+    /// stays what the picture alone says; corners and pose are those of this landmark. Empty unless GUIDED.
+    #[prost(string, tag = "17")]
+    pub guided_landmark: ::prost::alloc::string::String,
 }
 #[derive(::serde::Serialize, ::serde::Deserialize)]
 #[serde(default)]
@@ -315,6 +323,14 @@ pub struct Answer {
     /// first; it needs odometry for that. None of them is a pose: that comes on the key `pose` when one is left.
     #[prost(message, repeated, tag = "15")]
     pub hypotheses: ::prost::alloc::vec::Vec<Hypothesis>,
+    /// From landmarks of known place that were named by the pose known before (the fused one, else `prior`); absent unless
+    /// there are any. It may correct that pose. It says nothing to anybody who does not know where the robot is: use
+    /// `map_from_robot` to start.
+    #[prost(message, optional, tag = "16")]
+    pub guided_map_from_robot: ::core::option::Option<Pose2Covariance>,
+    /// The landmarks it rests on: the guided ones, and those named globally where they alone gave no pose.
+    #[prost(string, repeated, tag = "17")]
+    pub guided_landmarks: ::prost::alloc::vec::Vec<::prost::alloc::string::String>,
 }
 /// robot/{robot}/odometry : odom_from_robot
 #[derive(::serde::Serialize, ::serde::Deserialize)]
@@ -368,12 +384,12 @@ pub struct RobotPose {
     pub map: ::prost::alloc::string::String,
     #[prost(message, optional, tag = "4")]
     pub map_from_robot: ::core::option::Option<Pose2Covariance>,
-    /// What the pose rests on now: odometry, if it carries the pose; landmarks and laser, if fixes of that kind agreed with it
-    /// within the last 10 m; hypotheses, if it began with the last of several that were left and no landmark has confirmed it
+    /// What the pose rests on now: odometry, if it carries the pose; landmarks (named without the pose), guided (landmarks named
+    /// by the pose) and laser, if fixes of that kind agreed with it within the last 10 m; hypotheses, if it began with the last of several that were left and no landmark has confirmed it
     /// yet. `odometry` alone: it is 10 m since anything else was said.
     #[prost(string, repeated, tag = "5")]
     pub modalities: ::prost::alloc::vec::Vec<::prost::alloc::string::String>,
-    /// Corrections by landmarks applied since the start.
+    /// Corrections by landmarks applied since the start, guided ones included.
     #[prost(uint64, tag = "6")]
     pub corrections: u64,
     /// Corrections by laser scans applied since the start.
@@ -383,6 +399,10 @@ pub struct RobotPose {
     /// from the robot's messages: without the shortest delay among them. Never above 2000: an older pose is not published.
     #[prost(double, tag = "8")]
     pub age_ms: f64,
+    /// How far it is trusted.
+    #[prost(enumeration = "PoseTrust", tag = "9")]
+    #[serde(with = "crate::json::pose_trust")]
+    pub trust: i32,
 }
 /// map/{map}/changed
 #[derive(::serde::Serialize, ::serde::Deserialize)]
@@ -632,6 +652,80 @@ impl PartAgreement {
             "PART_AGREEMENT_SILENT" => Some(Self::Silent),
             "PART_AGREEMENT_AGREES" => Some(Self::Agrees),
             "PART_AGREEMENT_DISAGREES" => Some(Self::Disagrees),
+            _ => None,
+        }
+    }
+}
+/// How a landmark was named.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]
+#[repr(i32)]
+pub enum Sighting {
+    Unspecified = 0,
+    /// By the picture alone, among all landmarks of the map. It may start a pose.
+    Global = 1,
+    /// By the picture and the pose that was known before: it is the only one of those that look so which is expected there.
+    /// It corrects a pose and never starts, supports or replaces one.
+    Guided = 2,
+}
+impl Sighting {
+    /// String value of the enum field names used in the ProtoBuf definition.
+    ///
+    /// The values are not transformed in any way and thus are considered stable
+    /// (if the ProtoBuf definition does not change) and safe for programmatic use.
+    pub fn as_str_name(&self) -> &'static str {
+        match self {
+            Self::Unspecified => "SIGHTING_UNSPECIFIED",
+            Self::Global => "SIGHTING_GLOBAL",
+            Self::Guided => "SIGHTING_GUIDED",
+        }
+    }
+    /// Creates an enum from field names used in the ProtoBuf definition.
+    pub fn from_str_name(value: &str) -> ::core::option::Option<Self> {
+        match value {
+            "SIGHTING_UNSPECIFIED" => Some(Self::Unspecified),
+            "SIGHTING_GLOBAL" => Some(Self::Global),
+            "SIGHTING_GUIDED" => Some(Self::Guided),
+            _ => None,
+        }
+    }
+}
+/// How far a fused pose is trusted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]
+#[repr(i32)]
+pub enum PoseTrust {
+    Unspecified = 0,
+    /// No landmark that was named without the pose has agreed with it yet.
+    Unsupported = 1,
+    /// Such landmarks have agreed with it lately.
+    Supported = 2,
+    /// The last that agreed is 30 frames or 10 m back.
+    Stale = 3,
+    /// The last that was named without the pose contradicts it. Nothing guided corrects it meanwhile; when others agree with
+    /// the contradiction, they replace the pose.
+    Contradicted = 4,
+}
+impl PoseTrust {
+    /// String value of the enum field names used in the ProtoBuf definition.
+    ///
+    /// The values are not transformed in any way and thus are considered stable
+    /// (if the ProtoBuf definition does not change) and safe for programmatic use.
+    pub fn as_str_name(&self) -> &'static str {
+        match self {
+            Self::Unspecified => "POSE_TRUST_UNSPECIFIED",
+            Self::Unsupported => "POSE_TRUST_UNSUPPORTED",
+            Self::Supported => "POSE_TRUST_SUPPORTED",
+            Self::Stale => "POSE_TRUST_STALE",
+            Self::Contradicted => "POSE_TRUST_CONTRADICTED",
+        }
+    }
+    /// Creates an enum from field names used in the ProtoBuf definition.
+    pub fn from_str_name(value: &str) -> ::core::option::Option<Self> {
+        match value {
+            "POSE_TRUST_UNSPECIFIED" => Some(Self::Unspecified),
+            "POSE_TRUST_UNSUPPORTED" => Some(Self::Unsupported),
+            "POSE_TRUST_SUPPORTED" => Some(Self::Supported),
+            "POSE_TRUST_STALE" => Some(Self::Stale),
+            "POSE_TRUST_CONTRADICTED" => Some(Self::Contradicted),
             _ => None,
         }
     }

@@ -36,6 +36,8 @@ macro_rules! word {
 word!(status, crate::v1::Status, "STATUS_", "Words of [`crate::v1::Status`].");
 word!(quad_kind, crate::v1::QuadKind, "QUAD_KIND_", "Words of [`crate::v1::QuadKind`].");
 word!(verdict, crate::v1::Verdict, "VERDICT_", "Words of [`crate::v1::Verdict`].");
+word!(sighting, crate::v1::Sighting, "SIGHTING_", "Words of [`crate::v1::Sighting`].");
+word!(pose_trust, crate::v1::PoseTrust, "POSE_TRUST_", "Words of [`crate::v1::PoseTrust`].");
 word!(part, crate::v1::PartAgreement, "PART_AGREEMENT_", "Words of [`crate::v1::PartAgreement`].");
 
 /// A list of words of [`crate::v1::PartAgreement`].
@@ -58,7 +60,10 @@ pub mod part_agreement {
 
 #[cfg(test)]
 mod tests {
-    use crate::v1::{Answer, PartAgreement, PointEvidence, QuadAnswer, QuadKind, Status, Verdict};
+    use crate::v1::{
+        Answer, PartAgreement, PointEvidence, PoseTrust, QuadAnswer, QuadKind, RobotPose, Sighting, Status,
+        Verdict,
+    };
 
     #[test]
     fn an_answer_reads_and_comes_back() {
@@ -93,6 +98,15 @@ mod tests {
     fn a_quad_without_points_reads() {
         let quad: QuadAnswer = serde_json::from_str(r#"{"verdict":"unique","landmark":"door-3"}"#).unwrap();
         assert_eq!((quad.points, quad.doubtful_landmark.as_str()), (None, ""));
+    }
+
+    #[test]
+    /// What a server sends that knows nothing of guided recognition.
+    fn a_quad_without_its_sighting_reads() {
+        let quad: QuadAnswer = serde_json::from_str(r#"{"verdict":"unique","landmark":"door-3"}"#).unwrap();
+        assert_eq!((quad.sighting(), quad.guided_landmark.as_str()), (Sighting::Unspecified, ""));
+        let pose: RobotPose = serde_json::from_str(r#"{"map":"hall","trust":"contradicted"}"#).unwrap();
+        assert_eq!(pose.trust(), PoseTrust::Contradicted);
     }
 
     #[test]

@@ -40,6 +40,8 @@ fn committed_rust_matches_the_proto() {
         ("Answer.status", "status"),
         ("QuadAnswer.kind", "quad_kind"),
         ("QuadAnswer.verdict", "verdict"),
+        ("QuadAnswer.sighting", "sighting"),
+        ("RobotPose.trust", "pose_trust"),
         ("PointEvidence.agreement", "part_agreement"),
     ] {
         let attribute = format!("#[serde(with = \"crate::json::{module}\")]");

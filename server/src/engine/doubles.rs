@@ -11,12 +11,13 @@ use map::{
     place::LandmarkPlace,
     pose2::Pose2,
 };
-use nalgebra::Matrix6;
+use nalgebra::{Matrix2, Matrix6};
 use std::{
     collections::{BTreeMap, BTreeSet},
     sync::Arc,
 };
 use vision::{
+    detect::quads::{Corners, Quad},
     frame::{GrayImage, Intrinsics},
     learn::{
         model::{Gate, LandmarkModel, ModelStatus, refit_thresholds, unlikeness_of},
@@ -129,31 +130,58 @@ fn one(
     mounting: &Mounting,
     camera: &Intrinsics,
 ) -> Option<Sighted> {
-    let verdict = recognise(image, &facts.quad, &map.doubles.models, DistanceKind::Both, &map.params);
-    let Recognition::Ambiguous(_) = verdict.recognition else { return None };
-    let fits = |refusal: Option<Refusal>| matches!(refusal, None | Some(Refusal::Margin));
-    let fitting = verdict.candidates.iter().filter(|c| fits(c.refusal)).map(|c| c.landmark);
-    let members = members(fitting, &map.doubles.alike)?;
-    let (corners_px, covariance_px2) = matched(&facts.quad, &verdict, &map.params)?;
+    let alike = resembling(image, &facts.quad, map).filter(|alike| alike.fitting >= 2)?;
     let mut sighted = Vec::new();
-    for id in members {
-        let info = map.landmarks.get(&id).filter(|info| info.is_trusted())?;
-        let place = info.place.as_ref()?;
-        let seen = landmark_pose(&corners_px, &covariance_px2, place.size, camera).ok()?;
+    for id in alike.members {
+        let place = map.landmarks.get(&id)?.place.as_ref()?;
+        let seen = landmark_pose(&alike.corners_px, &alike.covariance_px2, place.size, camera).ok()?;
         sighted.extend(glimpses(id, place, &seen, mounting).into_iter().map(|glimpse| (id, glimpse)));
     }
     (!sighted.is_empty()).then_some(sighted)
 }
 
-/// All that a thing may be which several fit: those, and whatever looks like one of them. Of many only some are told.
+/// A quad that looks like landmarks which look like one another.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Resembling {
+    /// All that it may be: all of known and trusted place.
+    pub members: BTreeSet<LandmarkId>,
+    /// How many of them it was compared with and fits.
+    pub fitting: usize,
+    /// How well it fits the best: its distance over the threshold, below 1.
+    pub ratio: f64,
+    /// Its corners in the landmark's order.
+    pub corners_px: Corners,
+    /// Their covariances.
+    pub covariance_px2: [Matrix2<f64>; 4],
+}
+
+/// Which landmarks with doubles a quad may be; `None` where it is none of them, or may be one that hangs nobody knows where.
+pub fn resembling(image: &GrayImage, quad: &Quad, map: &MapSnapshot) -> Option<Resembling> {
+    let verdict = recognise(image, quad, &map.doubles.models, DistanceKind::Both, &map.params);
+    let (Recognition::Ambiguous(_) | Recognition::Unique(_)) = verdict.recognition else { return None };
+    let fits = |refusal: Option<Refusal>| matches!(refusal, None | Some(Refusal::Margin));
+    let fitting: BTreeSet<LandmarkId> =
+        verdict.candidates.iter().filter(|c| fits(c.refusal)).map(|c| c.landmark).collect();
+    let members = members(&fitting, &map.doubles.alike)?;
+    let is_known =
+        |id: &LandmarkId| map.landmarks.get(id).is_some_and(|info| info.is_trusted() && info.place.is_some());
+    if !members.iter().all(is_known) {
+        return None;
+    }
+    let (corners_px, covariance_px2) = matched(quad, &verdict, &map.params)?;
+    let ratio = verdict.candidates.first()?.ratio;
+    Some(Resembling { members, fitting: fitting.len(), ratio, corners_px, covariance_px2 })
+}
+
+/// All that a thing may be which these fit: those, and whatever looks like one of them; `None` if that is nothing, or too
+/// many to say anything.
 fn members(
-    fitting: impl Iterator<Item = LandmarkId>,
+    fitting: &BTreeSet<LandmarkId>,
     alike: &BTreeMap<LandmarkId, Arc<Vec<LandmarkId>>>,
 ) -> Option<BTreeSet<LandmarkId>> {
-    let fitting: BTreeSet<LandmarkId> = fitting.collect();
     let like = fitting.iter().filter_map(|id| alike.get(id)).flat_map(|all| all.iter().copied());
     let all: BTreeSet<LandmarkId> = fitting.iter().copied().chain(like).collect();
-    (fitting.len() >= 2 && all.len() <= MAX_ALIKE).then_some(all)
+    (!all.is_empty() && all.len() <= MAX_ALIKE).then_some(all)
 }
 
 /// Where the landmark is from the robot: one, or two where its picture allows both.
@@ -198,7 +226,6 @@ pub fn on_floor(place: &LandmarkPlace) -> Pose2 {
 mod tests {
     use super::*;
     use vision::{
-        detect::quads::Corners,
         learn::model::{View, learn},
         learn::synthesis,
     };
@@ -231,11 +258,12 @@ mod tests {
         assert_eq!(of(0), (0..12).collect::<Vec<_>>());
         assert!(Arc::ptr_eq(&alike[&LandmarkId(3)], &alike[&LandmarkId(11)]));
         assert_eq!(of(20), [20, 21]);
-        // Five of the doors are told; it may be any of the twelve. One that fits alone settles nothing.
-        let ids = |ids: &[u64]| ids.iter().map(|id| LandmarkId(*id)).collect::<Vec<_>>();
-        assert_eq!(members(ids(&[0, 2, 4, 6, 8]).into_iter(), &alike).unwrap().len(), 12);
-        assert_eq!(members(ids(&[0, 20]).into_iter(), &alike).unwrap().len(), 14);
-        assert_eq!(members(ids(&[3]).into_iter(), &alike), None);
+        // Five of the doors are told; it may be any of the twelve. So if only one is.
+        let ids = |ids: &[u64]| ids.iter().map(|id| LandmarkId(*id)).collect::<BTreeSet<_>>();
+        assert_eq!(members(&ids(&[0, 2, 4, 6, 8]), &alike).unwrap().len(), 12);
+        assert_eq!(members(&ids(&[0, 20]), &alike).unwrap().len(), 14);
+        assert_eq!(members(&ids(&[3]), &alike).unwrap().len(), 12);
+        assert_eq!(members(&ids(&[]), &alike), None);
     }
 
     #[test]
@@ -244,8 +272,8 @@ mod tests {
             let ids: Arc<Vec<LandmarkId>> = Arc::new((0..count).map(LandmarkId).collect());
             ids.iter().map(|id| (*id, ids.clone())).collect::<BTreeMap<_, _>>()
         };
-        let some = || [LandmarkId(0), LandmarkId(1)].into_iter();
-        assert_eq!(members(some(), &all(MAX_ALIKE as u64)).unwrap().len(), MAX_ALIKE);
-        assert_eq!(members(some(), &all(MAX_ALIKE as u64 + 1)), None);
+        let some = BTreeSet::from([LandmarkId(0), LandmarkId(1)]);
+        assert_eq!(members(&some, &all(MAX_ALIKE as u64)).unwrap().len(), MAX_ALIKE);
+        assert_eq!(members(&some, &all(MAX_ALIKE as u64 + 1)), None);
     }
 }

@@ -1,11 +1,17 @@
 //! What a frame says of the robot's pose and of the landmarks themselves: landmarks are judged by the pose without the
-//! frame, what hangs elsewhere is left out, and the rest gives the fix. In: the facts of a frame and what is known
-//! without it. Out: the fix or why there is none, and what is to be remembered of the landmarks. Keeps nothing.
+//! frame, what hangs elsewhere is left out, and the rest gives the fixes: one by the landmarks that the picture alone names,
+//! one by those that the pose names. In: the facts of a frame and what is known without it. Out: [`JudgedFrame`]. Keeps
+//! nothing.
 
-use super::{motion::Grounds, snapshot::MapSnapshot, verdicts};
+use super::{
+    guided::Guided,
+    motion::{FrameFixes, Grounds},
+    snapshot::MapSnapshot,
+    verdicts,
+};
 use map::{
-    changes::{ChangeParams, Expectation, Eye, Judged, expected, judge, sift},
-    localise::{Fix, Sighting},
+    changes::{ChangeParams, Expectation, Eye, Judged, Verdict as InPlace, expected, judge, sift},
+    localise::{Fix, RobotFix, Sighting},
     mounting::Mounting,
     pose2::Pose2Covariance,
 };
@@ -43,31 +49,90 @@ pub struct Seen {
     pub missed: Vec<LandmarkId>,
 }
 
-/// The fix by a frame, or the word that says why there is none; and what it says of the landmarks, where the robot's
-/// pose was known without it.
-pub fn judged_fix(view: &View<'_>, grounds: Option<Grounds>) -> (Result<Fix, &'static str>, Option<Seen>) {
-    let sightings = verdicts::sightings(view.facts, view.map);
-    let seen = grounds.and_then(|grounds| seen(view, sightings.as_deref().ok(), grounds));
+/// What a frame says of the robot's pose and of the landmarks.
+#[derive(Debug)]
+pub struct JudgedFrame {
+    /// The robot's pose without the frame.
+    pub prior: Option<Pose2Covariance>,
+    /// The fix by the landmarks that the picture alone names, or the word that says why there is none.
+    pub fix: Result<Fix, &'static str>,
+    /// The same without a pose of ours to choose among several solutions.
+    pub independent: Option<RobotFix>,
+    /// The fix by the landmarks that the pose names, and by the others where they alone gave none.
+    pub guided: Option<Fix>,
+    /// What it says of the landmarks, where the robot's pose was known without it.
+    pub seen: Option<Seen>,
+}
+
+impl JudgedFrame {
+    /// What goes to the robot's fusion.
+    pub fn fixes(&self) -> FrameFixes<'_> {
+        FrameFixes {
+            prior: self.prior.as_ref(),
+            independent: self.independent.as_ref(),
+            chosen: self.fix.as_ref().ok(),
+            guided: self.guided.as_ref(),
+            missed: self.seen.as_ref().map_or(&[], |s| &s.missed),
+        }
+    }
+}
+
+/// Judges a frame by what is known without it, and `guided`, the landmarks that this names.
+pub fn judged_frame(view: &View<'_>, grounds: Option<Grounds>, guided: &Guided) -> JudgedFrame {
+    let global = verdicts::sightings(view.facts, view.map);
+    let known = grounds.as_ref().map(|grounds| grounds.pose);
+    let seen = grounds.and_then(|grounds| seen(view, global.as_deref().ok(), grounds));
     let judged = seen.as_ref().map_or(&[][..], |s| &s.judged);
-    let fix = sightings.and_then(|all| {
-        let prior = seen.as_ref().map(|s| &s.grounds.pose);
-        fix(view, &sift(&all, judged), prior)
-    });
-    (fix, seen)
+    let prior = known.as_ref().or(view.prior);
+    let global = global.map(|all| sift(&all, judged));
+    let (fix, independent) = match &global {
+        Ok(sightings) => fixes(view, sightings, prior),
+        Err(word) => (Err(*word), None),
+    };
+    let with = if fix == Err(verdicts::AMBIGUOUS) { global.as_deref().unwrap_or_default() } else { &[] };
+    let guided = prior.and_then(|prior| guided_fix(view, guided, with, (prior, seen.as_ref())));
+    JudgedFrame { prior: known, fix, independent, guided, seen }
 }
 
 /// The robot's pose by landmarks. The robot's own prior gates; ours only chooses between two solutions, so that a fused
 /// pose gone wrong cannot keep out the fixes that would correct it.
-fn fix(
+fn fixes(
     view: &View<'_>,
     sightings: &[Sighting<'_>],
     prior: Option<&Pose2Covariance>,
-) -> Result<Fix, &'static str> {
-    let fix = verdicts::robot_fix(sightings, view.mounting, view.prior);
-    if fix.as_ref().err() != Some(&verdicts::AMBIGUOUS) || view.prior.is_some() || prior.is_none() {
-        return fix;
-    }
-    verdicts::robot_fix(sightings, view.mounting, prior)
+) -> (Result<Fix, &'static str>, Option<RobotFix>) {
+    let independent = verdicts::robot_fixes(sightings, view.mounting, view.prior);
+    let fix = match &independent {
+        Ok(RobotFix::Ambiguous(_)) if view.prior.is_none() && prior.is_some() => {
+            verdicts::robot_fix(sightings, view.mounting, prior)
+        }
+        Ok(fix) => verdicts::only(fix),
+        Err(word) => Err(*word),
+    };
+    (fix, independent.ok())
+}
+
+/// The robot's pose by landmarks that the pose names, and those given. What may have been moved is left out: by a pose that
+/// is known well, nothing is gained by what hardly tells.
+fn guided_fix(
+    view: &View<'_>,
+    guided: &Guided,
+    with: &[Sighting<'_>],
+    (prior, seen): (&Pose2Covariance, Option<&Seen>),
+) -> Option<Fix> {
+    let named = guided.placed(view.map);
+    let mounting = view.mounting.filter(|_| !named.is_empty())?;
+    let supporters = seen.map_or(&[][..], |s| &s.grounds.supporters);
+    let p = ChangeParams::default();
+    let judged = named.iter().filter_map(|s| judge(s, mounting, prior, supporters, &p).ok());
+    let judged: Vec<_> = judged.collect();
+    let in_place = |s: &&Sighting<'_>| {
+        judged.iter().any(|j| {
+            j.landmark == s.landmark && matches!(j.verdict, InPlace::InPlace { .. } | InPlace::Undecided)
+        })
+    };
+    let all: Vec<Sighting<'_>> = named.iter().filter(in_place).chain(with).copied().collect();
+    verdicts::robot_fix(&all, Some(mounting), Some(prior)).ok()
 }
 
 /// A candidate whose distance is below this many times its threshold may well be there, though nobody would swear to it.

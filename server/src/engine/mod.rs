@@ -5,6 +5,7 @@ pub mod decode;
 pub mod slots;
 pub mod panics;
 pub mod intake;
+pub mod guided;
 pub mod judging;
 pub mod live;
 pub mod motion;

@@ -5,14 +5,16 @@
 //! that passes between messages (`timebase.rs`): a stray stamp is refused, and a pose says how old it is.
 
 mod corrections;
+mod frames;
+mod lent;
 mod messages;
 mod robot;
-mod lent;
 mod run;
 mod scans;
 mod timebase;
 
 pub use corrections::{Correction, Corrections, MAX_CORRECTIONS};
+pub use frames::{FrameFixes, Grounds, Moment};
 pub use messages::{MAX_ODOMETRY_BYTES, MAX_SCAN_BYTES, MessageCounts};
 pub use robot::{MAX_SUPPORTERS, RESTS_ON_M};
 pub(crate) use run::Recording;
@@ -25,26 +27,23 @@ pub use timebase::{
 
 use super::{epochs::Epochs, live::LiveHub, mapping::Mappings, snapshot::Snapshots};
 use map::{
-    changes::{Change, Judged, Standing},
-    fuse::{FixOutcome, FusedPose},
+    fuse::{FixOutcome, FixRole, FusedPose},
     laser_fix::{LaserFixParams, laser_fix},
-    localise::Fix,
-    pose2::{Pose2, Pose2Covariance},
+    pose2::Pose2Covariance,
 };
 use protos::{
-    CheckedFrame, Code, Name, Rejection,
+    Code, Name, Rejection,
     convert::{CheckedOdometry, geometry::pose2_covariance_wire},
     prost::bytes::Bytes,
     v1,
 };
-use robot::Robot;
+use robot::{Robot, Told};
 use std::{
     collections::{BTreeMap, BTreeSet},
     sync::{Arc, Mutex, MutexGuard, PoisonError},
     time::{Duration, Instant},
 };
 use timebase::Stream;
-use vision::recognise::LandmarkId;
 
 /// Robots whose motion is followed; the number of registered robots bounds it first.
 pub const MAX_ROBOTS: usize = 10_000;
@@ -64,21 +63,6 @@ struct State {
     stamps: MessageCounts,
 }
 
-/// Which frame of a robot.
-#[derive(Debug, Clone, Copy)]
-pub struct Moment<'a> {
-    /// The map it is in.
-    pub map: &'a str,
-    /// Echo of the frame.
-    pub epoch: u64,
-    /// Echo of the frame.
-    pub captured_ns: i64,
-    /// Odometry at capture, where the frame said.
-    pub odometry: Option<Pose2>,
-    /// When it is looked at, by the server's clock.
-    pub now: Instant,
-}
-
 /// The fused pose of a robot as it is known at some moment.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Known {
@@ -88,15 +72,6 @@ pub struct Known {
     pub fused: FusedPose,
     /// Since the capture of the newest odometry that supports it; at most [`MAX_POSE_AGE`].
     pub age: Duration,
-}
-
-/// What is known of a robot's pose without its frame.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Grounds {
-    /// `map_from_robot`.
-    pub pose: Pose2Covariance,
-    /// The landmarks that it rests on.
-    pub supporters: Vec<LandmarkId>,
 }
 
 /// The motion of all robots.
@@ -138,13 +113,12 @@ impl Motion {
         let mut followed = own(&followed);
         followed.moved(odometry.captured_ns, odometry.odom_from_robot, received);
         let on_map = followed.on_map(&odometry.odom_from_robot);
-        let told = followed.pose().map(|fused| (fused, followed.age(fused.at_ns, received)));
-        let modalities = followed.modalities();
+        let told = followed.pose().map(|fused| followed.told(fused, received));
         drop(followed);
         if let Some(on_map) = on_map {
             self.live.odometry(robot, &map, on_map);
         }
-        self.tell(robot, &map, odometry.epoch, told?, modalities)
+        self.tell(robot, &map, odometry.epoch, told?)
     }
 
     fn checked_odometry(
@@ -199,28 +173,6 @@ impl Motion {
         Ok(Some(job))
     }
 
-    /// Judges the capture time of a frame on its robot's own map. Where it is refused, the frame may be answered, but says
-    /// nothing about the robot's pose; what the robot's clock showed at receipt is given instead. Counted.
-    pub fn frame_stamp(
-        &self,
-        (robot, camera): (&Name, &Name),
-        map: &str,
-        frame: &CheckedFrame,
-        received: Instant,
-    ) -> Result<(), i64> {
-        let stream = match frame.odometry {
-            Some(_) => Stream::MovingCamera(camera.clone()),
-            None => Stream::Camera(camera.clone()),
-        };
-        let Some(shared) = self.followed(robot, map, frame.epoch) else { return Ok(()) };
-        let mut followed = own(&shared);
-        followed.belong(frame.epoch, map, &self.snapshots);
-        let judged = followed.stamp(&stream, frame.captured_ns, frame.odometry, received);
-        let instead_ns = followed.clock_ns(received).unwrap_or(frame.captured_ns);
-        drop(followed);
-        self.lock().stamps.count("frame", robot, judged).ok_or(instead_ns)
-    }
-
     /// The scans that wait for the laser's thread.
     pub fn scans(&self) -> &Scans {
         &self.scans
@@ -263,26 +215,13 @@ impl Motion {
                 return None;
             }
         };
-        let (outcome, fused) = followed.fix(job.captured_ns, &fix, Vec::new())?;
-        let (age, modalities) = (followed.age(fused.at_ns, now), followed.modalities());
+        let (outcome, fused) = followed.fix(job.captured_ns, (&fix, FixRole::Independent), Vec::new())?;
+        let told = followed.told(fused, now);
         drop(followed);
         if !matches!(outcome, FixOutcome::Applied { .. }) {
             return None;
         }
-        self.tell(robot, &job.map, job.epoch, (fused, age), modalities)
-    }
-
-    /// What is known of a robot's pose at a frame without the frame itself: for choosing between two solutions, and for
-    /// judging landmarks.
-    pub fn grounds(&self, robot: &Name, at: Moment<'_>) -> Option<Grounds> {
-        let followed = self.followed(robot, at.map, at.epoch)?;
-        let mut followed = own(&followed);
-        followed.belong(at.epoch, at.map, &self.snapshots);
-        if let Some(odometry) = at.odometry {
-            followed.moved(at.captured_ns, odometry, at.now);
-        }
-        let pose = followed.fuser.pose_at(at.captured_ns)?;
-        Some(Grounds { pose, supporters: followed.supporters.clone() })
+        self.tell(robot, &job.map, job.epoch, told)
     }
 
     /// The fused pose of a robot on a map, unless it is older than [`MAX_POSE_AGE`].
@@ -338,74 +277,6 @@ impl Motion {
         own(&followed).run.take()
     }
 
-    /// A frame's landmarks were judged by these grounds: what should change in the map by that.
-    pub fn judged(
-        &self,
-        robot: &Name,
-        at: Moment<'_>,
-        grounds: &Grounds,
-        judged: &[Judged],
-        missed: &[LandmarkId],
-    ) -> Vec<Change> {
-        let map = self.snapshots.get(at.map);
-        let standing = |id| map.as_ref().and_then(|m| Some(m.landmarks.get(&id)?.standing));
-        let Some(followed) = self.followed(robot, at.map, at.epoch) else { return Vec::new() };
-        let mut followed = own(&followed);
-        followed.belong(at.epoch, at.map, &self.snapshots);
-        let mut changes = std::mem::take(&mut followed.found);
-        if changes.is_empty() {
-            let from = grounds.pose.pose.position().into();
-            let now = |id| standing(id).unwrap_or(Standing::Sound);
-            changes = followed.watch.frame(from, judged, missed, now);
-        }
-        changes
-    }
-
-    /// A robot was fixed by landmarks: its pose to publish. Without any odometry that is the fix itself.
-    pub fn fixed(&self, robot: &Name, at: Moment<'_>, fix: &Fix) -> Option<v1::RobotPose> {
-        let map = self.snapshots.get(at.map);
-        let name = |id: &LandmarkId| map.as_ref().and_then(|m| Some(m.landmarks.get(id)?.name.clone()));
-        let landmarks = fix.landmarks.iter().filter_map(name).collect();
-        let followed = self.followed(robot, at.map, at.epoch)?;
-        let mut followed = own(&followed);
-        followed.belong(at.epoch, at.map, &self.snapshots);
-        if let Some(odometry) = at.odometry {
-            followed.moved(at.captured_ns, odometry, at.now);
-        }
-        let (outcome, fused) = followed.fix(at.captured_ns, fix, landmarks)?;
-        tracing::debug!(%robot, ?outcome, "fix");
-        if let Some(odometry) = at.odometry {
-            followed.on_map(&odometry);
-        }
-        let modalities =
-            if followed.newest.is_some() { followed.modalities() } else { vec!["landmarks".to_owned()] };
-        let age = followed.age(fused.at_ns, at.now);
-        drop(followed);
-        self.tell(robot, at.map, at.epoch, (fused, age), modalities)
-    }
-
-    /// A robot that searched was found, by landmarks that each may be several: its pose to publish. None if its pose is known
-    /// by now.
-    pub fn found(
-        &self,
-        robot: &Name,
-        at: Moment<'_>,
-        pose: &Pose2Covariance,
-        landmarks: &[LandmarkId],
-    ) -> Option<v1::RobotPose> {
-        let odometry = at.odometry?;
-        let map = self.snapshots.get(at.map);
-        let name = |id: &LandmarkId| map.as_ref().and_then(|m| Some(m.landmarks.get(id)?.name.clone()));
-        let landmarks = landmarks.iter().filter_map(name).collect();
-        let followed = self.followed(robot, at.map, at.epoch)?;
-        let mut followed = own(&followed);
-        followed.belong(at.epoch, at.map, &self.snapshots);
-        let fused = followed.found(at.captured_ns, &odometry, pose, landmarks, at.now)?;
-        let (age, modalities) = (followed.age(fused.at_ns, at.now), followed.modalities());
-        drop(followed);
-        self.tell(robot, at.map, at.epoch, (fused, age), modalities)
-    }
-
     /// The state of a robot that stands on this map, for its live epoch; `None` for any other. What a frame shows of a map
     /// that its robot does not stand on says nothing about the robot's pose, and must not restart its fusion; no more must
     /// what was still in work when another epoch began.
@@ -418,14 +289,8 @@ impl Motion {
     }
 
     /// The pose to publish, unless it is too old.
-    fn tell(
-        &self,
-        robot: &Name,
-        map: &str,
-        epoch: u64,
-        (fused, age): (FusedPose, Duration),
-        modalities: Vec<String>,
-    ) -> Option<v1::RobotPose> {
+    fn tell(&self, robot: &Name, map: &str, epoch: u64, told: Told) -> Option<v1::RobotPose> {
+        let Told { fused, age, modalities, trust } = told;
         if age > MAX_POSE_AGE {
             tracing::debug!(%robot, ?age, "a pose is too old to be published");
             return None;
@@ -441,6 +306,7 @@ impl Motion {
             corrections: fused.corrections,
             laser_corrections: fused.laser_corrections,
             age_ms,
+            trust: trust.into(),
         })
     }
 

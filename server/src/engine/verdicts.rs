@@ -1,7 +1,7 @@
 //! What was seen in an image, as the answer to send: names instead of numbers, verdicts, poses of landmarks, and the
 //! robot's pose where landmarks of known place allow one. When anything is unsure a field is absent, never zero.
 
-use super::snapshot::MapSnapshot;
+use super::{guided::Guided, judging::JudgedFrame, snapshot::MapSnapshot};
 use map::{
     localise::{Fix, FixRefusal, LocaliseParams, RobotFix, Sighting, robot_pose},
     mounting::Mounting,
@@ -121,6 +121,7 @@ fn quad(facts: &QuadFacts, map: &MapSnapshot) -> v1::QuadAnswer {
     if let Some(verdict) = &facts.verdict {
         fill_verdict(&mut quad, verdict, |id| name(map, id));
         if quad.verdict() == v1::Verdict::Unique {
+            quad.set_sighting(v1::Sighting::Global);
             // The landmark's own top-left first, however the picture hangs.
             quad.corners = corners(&facts.quad.corners_px.rotated(verdict.rotation));
         }
@@ -168,25 +169,38 @@ pub fn sightings<'a>(facts: &'a FrameFacts, map: &'a MapSnapshot) -> Result<Vec<
     if trusted.is_empty() { Err("landmark_quarantined") } else { Ok(trusted) }
 }
 
+/// What sightings say of the robot's pose, or the word that says why they say nothing.
+pub fn robot_fixes(
+    sightings: &[Sighting<'_>],
+    mounting: Option<&Mounting>,
+    prior: Option<&Pose2Covariance>,
+) -> Result<RobotFix, &'static str> {
+    let Some(mounting) = mounting else { return Err("no_mounting") };
+    if sightings.is_empty() {
+        return Err("unsure");
+    }
+    robot_pose(sightings, mounting, prior, &LocaliseParams::default()).map_err(|error| {
+        tracing::error!(%error, "checked inputs were refused by localisation");
+        "degenerate"
+    })
+}
+
+/// The one pose that is left, or the word that says why there is none.
+pub fn only(fix: &RobotFix) -> Result<Fix, &'static str> {
+    match fix {
+        RobotFix::Fixed(fix) => Ok((**fix).clone()),
+        RobotFix::Ambiguous(_) => Err(AMBIGUOUS),
+        RobotFix::Refused(refusal) => Err(refusal_word(refusal)),
+    }
+}
+
 /// The robot's pose by sightings, or the word that says why not.
 pub fn robot_fix(
     sightings: &[Sighting<'_>],
     mounting: Option<&Mounting>,
     prior: Option<&Pose2Covariance>,
 ) -> Result<Fix, &'static str> {
-    let Some(mounting) = mounting else { return Err("no_mounting") };
-    if sightings.is_empty() {
-        return Err("unsure");
-    }
-    match robot_pose(sightings, mounting, prior, &LocaliseParams::default()) {
-        Ok(RobotFix::Fixed(fix)) => Ok(*fix),
-        Ok(RobotFix::Ambiguous(_)) => Err(AMBIGUOUS),
-        Ok(RobotFix::Refused(refusal)) => Err(refusal_word(&refusal)),
-        Err(error) => {
-            tracing::error!(%error, "checked inputs were refused by localisation");
-            Err("degenerate")
-        }
-    }
+    only(&robot_fixes(sightings, mounting, prior)?)
 }
 
 fn refusal_word(refusal: &FixRefusal) -> &'static str {
@@ -199,9 +213,20 @@ fn refusal_word(refusal: &FixRefusal) -> &'static str {
     }
 }
 
-/// Writes the robot's pose, or why there is none, into the answer.
-pub fn fill_fix(answer: &mut v1::Answer, fix: &Result<Fix, &'static str>, map: &MapSnapshot) {
-    match fix {
+/// Writes the robot's pose, or why there is none, and what the pose known before adds, into the answer.
+pub fn fill_fixes(answer: &mut v1::Answer, judged: &JudgedFrame, guided: &Guided, map: &MapSnapshot) {
+    for sighting in &guided.sightings {
+        let Some(quad) = answer.quads.get_mut(sighting.quad) else { continue };
+        quad.set_sighting(v1::Sighting::Guided);
+        quad.guided_landmark = name(map, sighting.landmark);
+        quad.corners = corners(&sighting.corners_px);
+        fill_pose(quad, &sighting.seen);
+    }
+    if let Some(fix) = &judged.guided {
+        answer.guided_map_from_robot = Some(pose2_covariance_wire(&fix.pose));
+        answer.guided_landmarks = fix.landmarks.iter().map(|id| name(map, *id)).collect();
+    }
+    match &judged.fix {
         Ok(fix) => {
             answer.map_from_robot = Some(pose2_covariance_wire(&fix.pose));
             answer.pose_landmarks = fix.landmarks.iter().map(|id| name(map, *id)).collect();

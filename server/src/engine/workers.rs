@@ -6,8 +6,9 @@ use super::{
     cameras::Look,
     decode::{ImageLimits, decode_frame},
     doubles::sighted,
+    guided::{Guided, guided},
     intake::{FrameJob, unknown_map},
-    judging::{Seen, View, judged_fix},
+    judging::{JudgedFrame, Seen, View, judged_frame},
     live::{LiveFrame, LiveHub},
     motion::{Moment, Motion},
     panics::Edge,
@@ -21,7 +22,7 @@ use crate::{
     gather::{Hook, Looked},
     vitals::Vitals,
 };
-use map::{hypotheses::Mode, localise::Fix, pose2::Pose2Covariance};
+use map::{hypotheses::Mode, pose2::Pose2Covariance};
 use protos::{CheckedFrame, Code, Name, Rejection, convert::geometry::pose2_covariance_wire, v1};
 use std::{cell::Cell, sync::Arc, thread::JoinHandle, time::Instant};
 use vision::{frame::GrayImage, pipeline::FrameFacts, recognise::LandmarkId};
@@ -115,8 +116,8 @@ impl Workers {
 struct Done {
     answer: v1::Answer,
     map: Arc<MapSnapshot>,
-    fix: Option<Fix>,
-    seen: Option<Seen>,
+    /// What it says of the robot and the landmarks; absent where it must not count.
+    judged: Option<JudgedFrame>,
     /// Where a robot that searched is found, and the landmarks that say so.
     found: Option<(Pose2Covariance, Vec<LandmarkId>)>,
 }
@@ -153,7 +154,7 @@ impl Engine {
         } else {
             self.analyse(key, job)
         };
-        let Done { answer, map, fix, seen, found } = match done {
+        let Done { answer, map, judged, found } = match done {
             Ok(done) => done,
             Err(refusal) => {
                 let (answer, outcome) = refused(job, &refusal);
@@ -165,9 +166,9 @@ impl Engine {
         let (frame, outcome) = (&job.frame, Outcome::Processed);
         answered.set(Some(outcome));
         self.reply(key, job, answer, publish);
-        if let Some(fix) = fix
-            && let Some(pose) = self.motion.fixed(&key.robot, moment(frame, &map), &fix)
-        {
+        let Some(judged) = judged else { return outcome };
+        let at = moment(frame, &map);
+        if let Some(pose) = self.motion.looked(&key.robot, &key.camera, at, &judged.fixes()) {
             publish.pose(&key.robot, &pose);
         }
         if let Some((pose, landmarks)) = found
@@ -176,7 +177,7 @@ impl Engine {
             self.searches.end(&key.robot);
             publish.pose(&key.robot, &pose);
         }
-        if let Some(Seen { grounds, judged, missed }) = seen {
+        if let Some(Seen { grounds, judged, missed }) = judged.seen {
             let changes = self.motion.judged(&key.robot, moment(frame, &map), &grounds, &judged, &missed);
             for change in changes {
                 let name = map.landmarks.get(&change.landmark).map_or("", |l| l.name.as_str());
@@ -202,7 +203,8 @@ impl Engine {
         let on_own_map = self.snapshots.robot_map(key.robot.as_str()).is_some_and(|own| own == map.name);
         let is_live = self.motion.epochs().current(&key.robot).is_none_or(|epoch| epoch == frame.epoch);
         let counts = on_own_map && is_live && job.stamp_instead_ns.is_none();
-        let grounds = counts.then(|| self.motion.grounds(&key.robot, moment(frame, &map))).flatten();
+        let at = moment(frame, &map);
+        let grounds = counts.then(|| self.motion.grounds(&key.robot, &key.camera, at)).flatten();
         let view = View {
             facts: &facts,
             map: &map,
@@ -211,8 +213,14 @@ impl Engine {
             image_px: [f64::from(frame.width_px), f64::from(frame.height_px)],
             prior: frame.prior.as_ref(),
         };
-        let (fix, seen) = judged_fix(&view, grounds);
-        verdicts::fill_fix(&mut answer, &fix, &map);
+        // The fused pose while nothing contradicts it; without one, what the robot itself believes.
+        let guide = match &grounds {
+            Some(grounds) => grounds.plan.guided.then_some(&grounds.pose),
+            None => frame.prior.as_ref().filter(|_| on_own_map),
+        };
+        let guided = guide.map_or_else(Guided::default, |pose| guided(&image, &view, pose));
+        let judged = judged_frame(&view, grounds, &guided);
+        verdicts::fill_fixes(&mut answer, &judged, &guided, &map);
         if !counts {
             times.ended("localise");
             answer.timings = times.finish();
@@ -221,17 +229,18 @@ impl Engine {
                 let (quads, believed) = (facts.quads, frame.prior);
                 self.gather.offer(key, &frame, || Looked { image, quads, map: map.clone(), believed });
             }
-            return Ok(Done { answer, map, fix: None, seen: None, found: None });
+            return Ok(Done { answer, map, judged: None, found: None });
         }
         if let Some(intrinsics) = &frame.intrinsics {
             let (seen, mounting) = (verdicts::recognised(&facts), frame.mounting.as_ref());
             let image_px = [image.width() as u32, image.height() as u32];
-            let fix = fix.as_ref().map_err(|word| *word);
+            let fix = judged.fix.as_ref().map_err(|word| *word);
             self.live
                 .watched()
                 .looked(key, &Look { intrinsics, image_px, seen: &seen, map: &map, mounting, fix });
         }
-        let searched = self.search(key, frame, (&image, &facts), &map, seen.is_some() || fix.is_ok());
+        let searched =
+            self.search(key, frame, (&image, &facts), &map, judged.seen.is_some() || judged.fix.is_ok());
         let found = searched.and_then(|left| {
             answer.hypotheses = left.modes.iter().map(hypothesis).collect();
             left.decided
@@ -239,10 +248,10 @@ impl Engine {
         times.ended("localise");
         answer.timings = times.finish();
         self.gather.offer(key, frame, || {
-            let believed = frame.prior.or_else(|| seen.as_ref().map(|s| s.grounds.pose));
+            let believed = frame.prior.or(judged.prior);
             Looked { image, quads: facts.quads, map: map.clone(), believed }
         });
-        Ok(Done { answer, map, fix: fix.ok(), seen, found })
+        Ok(Done { answer, map, judged: Some(judged), found })
     }
 
     /// Goes on with the search of a robot that does not know where it is.

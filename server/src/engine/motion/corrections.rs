@@ -17,7 +17,8 @@ pub struct Correction {
     pub captured_ns: i64,
     /// The map it is a pose in.
     pub map: String,
-    /// `landmarks`, `laser` or `hypotheses`; `map` when the robot came from another map.
+    /// `landmarks` (named without the pose), `guided` (landmarks named by the pose), `laser` or `hypotheses`; `map` when the
+    /// robot came from another map.
     pub modality: &'static str,
     /// The landmarks it rests on, by name; empty for the laser.
     pub landmarks: Vec<String>,
@@ -48,7 +49,7 @@ pub(super) struct Log {
 /// What the log says, for readers.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, ToSchema)]
 pub struct Corrections {
-    /// What the pose rests on now: `odometry`, `landmarks`, `laser`, `hypotheses`; empty without a pose.
+    /// What the pose rests on now: `odometry`, `landmarks`, `guided`, `laser`, `hypotheses`; empty without a pose.
     pub modalities: Vec<String>,
     /// For each modality how many fixes came to which end. For the laser also why scans gave no fix: `no_pose` (there is
     /// none to correct), `no_walls` (the map has none), `few_points`, `unlike` (it shows something else than the map),

@@ -10,11 +10,12 @@ use crate::engine::{slots::Order, snapshot::Snapshots};
 use map::{
     areas::Areas,
     changes::{Change, ChangeParams, Watch},
-    fuse::{FixOutcome, FuseParams, FusedPose, Fuser, OdometryOutcome},
+    fuse::{FixOutcome, FixRole, FuseParams, FusedPose, Fuser, OdometryOutcome},
+    guided::{FramePlan, MAX_CAMERAS, Schedule, ScheduleParams, Trust},
     localise::{Fix, Modality},
     pose2::{Pose2, Pose2Covariance},
 };
-use protos::Rejection;
+use protos::{Name, Rejection, v1::PoseTrust};
 use std::{
     sync::Arc,
     time::{Duration, Instant},
@@ -23,6 +24,8 @@ use vision::recognise::LandmarkId;
 
 /// Landmarks that a pose is said to rest on: the latest.
 pub const MAX_SUPPORTERS: usize = 16;
+/// The word of landmarks that were named by the pose, in counters and among what a pose rests on.
+const GUIDED: &str = "guided";
 /// After so many metres without a fix of a modality the pose no longer rests on it, but on odometry.
 pub const RESTS_ON_M: f64 = 10.0;
 
@@ -46,8 +49,9 @@ pub(super) struct Robot {
     moved_at: Option<Instant>,
     /// Way driven by odometry in this epoch.
     way_m: f64,
-    /// Where on it landmarks and the laser last agreed with the pose.
+    /// Where on it landmarks, those named by the pose, and the laser last agreed with the pose.
     by_landmarks_m: Option<f64>,
+    by_guided_m: Option<f64>,
     by_laser_m: Option<f64>,
     /// It began with the last hypothesis that was left, and no landmark has confirmed it yet.
     by_hypotheses: bool,
@@ -62,6 +66,23 @@ pub(super) struct Robot {
     pub(super) run: Option<Box<Recording>>,
     /// What its fusion goes by.
     areas: Arc<Areas>,
+    /// When landmarks may be named by the pose, and how far it is trusted.
+    pub(super) schedule: Schedule,
+    /// Its cameras, by their numbers in the schedule.
+    cameras: Vec<Name>,
+    /// Odometry at the last frame.
+    at_last_frame: Option<Pose2>,
+}
+
+/// A pose as it is told.
+#[derive(Debug)]
+pub(super) struct Told {
+    pub(super) fused: FusedPose,
+    /// Since it was captured.
+    pub(super) age: Duration,
+    /// What it rests on.
+    pub(super) modalities: Vec<String>,
+    pub(super) trust: PoseTrust,
 }
 
 impl Default for Robot {
@@ -79,6 +100,7 @@ impl Default for Robot {
             moved_at: None,
             way_m: 0.0,
             by_landmarks_m: None,
+            by_guided_m: None,
             by_laser_m: None,
             by_hypotheses: false,
             supporters: Vec::new(),
@@ -87,8 +109,15 @@ impl Default for Robot {
             log: Log::default(),
             run: None,
             areas: Arc::default(),
+            schedule: schedule(),
+            cameras: Vec::new(),
+            at_last_frame: None,
         }
     }
+}
+
+fn schedule() -> Schedule {
+    Schedule::new(ScheduleParams::default(), FuseParams::default())
 }
 
 impl Robot {
@@ -117,7 +146,7 @@ impl Robot {
         self.trust(maps);
         (self.map_from_odom, self.newest, self.last_message, self.way_m) = (None, None, None, 0.0);
         let moved_at = self.moved_at.take();
-        self.lost();
+        self.unknown();
         self.found.clear();
         if let (Some(pose), Some((at_ns, odometry)), Some(moved_at)) = (there, newest, moved_at) {
             self.moved(at_ns, odometry, moved_at);
@@ -244,10 +273,56 @@ impl Robot {
 
     /// The pose has proved wrong, or is unknown: nothing rests on it any more.
     fn lost(&mut self) {
-        (self.by_landmarks_m, self.by_laser_m, self.by_hypotheses) = (None, None, false);
+        (self.by_landmarks_m, self.by_guided_m, self.by_laser_m) = (None, None, None);
+        self.by_hypotheses = false;
         self.supporters.clear();
         let cleared = self.watch.clear();
         self.found.extend(cleared);
+    }
+
+    /// The same, and odometry so far means nothing any more.
+    fn unknown(&mut self) {
+        self.lost();
+        (self.schedule, self.at_last_frame) = (schedule(), None);
+    }
+
+    /// What to do with a camera's next frame, taken near this pose.
+    pub(super) fn plan(&mut self, camera: &Name, pose: &Pose2Covariance) -> FramePlan {
+        let camera = self.camera_number(camera);
+        self.schedule.plan(camera, Some(pose))
+    }
+
+    /// The camera's number in the schedule; of too many cameras one that it does not count.
+    pub(super) fn camera_number(&mut self, camera: &Name) -> u32 {
+        if let Some(number) = self.cameras.iter().position(|known| known == camera) {
+            return number as u32;
+        }
+        if self.cameras.len() >= MAX_CAMERAS {
+            return u32::MAX;
+        }
+        self.cameras.push(camera.clone());
+        self.cameras.len() as u32 - 1
+    }
+
+    /// Motion by odometry since the frame before, for a frame with this odometry or, without, the newest.
+    pub(super) fn since_last_frame(&mut self, odometry: Option<Pose2>) -> Pose2 {
+        let Some(now) = odometry.or(self.newest.map(|(_, newest)| newest)) else { return Pose2::default() };
+        let before = self.at_last_frame.replace(now).unwrap_or(now);
+        before.between(&now)
+    }
+
+    /// A pose as it is told at this moment.
+    pub(super) fn told(&self, fused: FusedPose, now: Instant) -> Told {
+        let trust = match self.schedule.trust() {
+            Trust::NoPose => PoseTrust::Unspecified,
+            Trust::Unsupported => PoseTrust::Unsupported,
+            Trust::Supported => PoseTrust::Supported,
+            Trust::Stale => PoseTrust::Stale,
+            Trust::Contradicted => PoseTrust::Contradicted,
+        };
+        // Without any odometry the pose is the fix itself.
+        let modalities = if self.newest.is_some() { self.modalities() } else { vec!["landmarks".to_owned()] };
+        Told { fused, age: self.age(fused.at_ns, now), modalities, trust }
     }
 
     /// Takes an odometry reading, at a time of the server's clock.
@@ -275,7 +350,7 @@ impl Robot {
     fn jumped(&mut self, captured_ns: i64, odom_from_robot: Pose2) {
         self.map_from_odom = None;
         self.newest = Some((captured_ns, odom_from_robot));
-        self.lost();
+        self.unknown();
         if let Some(run) = &mut self.run {
             run.end("odometry jumped");
         }
@@ -298,24 +373,26 @@ impl Robot {
     pub(super) fn fix(
         &mut self,
         captured_ns: i64,
-        fix: &Fix,
+        (fix, role): (&Fix, FixRole),
         landmarks: Vec<String>,
     ) -> Option<(FixOutcome, FusedPose)> {
         let before = self.fuser.pose().map(|fused| fused.pose.pose);
-        let judged = match self.fuser.fix(captured_ns, fix) {
+        let judged = match self.fuser.fix_as(captured_ns, fix, role) {
             Ok(judged) => judged,
             Err(error) => {
                 tracing::error!(%error, "a fix of ours is out of range");
                 return None;
             }
         };
-        self.rests_on(judged, fix);
+        self.rests_on(judged, fix, role);
         let after = self.fuser.pose();
-        let (kind, (outcome, chi2)) = (modality(fix.modality), outcome(judged));
+        let kind = if role == FixRole::Guided { GUIDED } else { modality(fix.modality) };
+        let (outcome, chi2) = outcome(judged);
         if matches!(judged, FixOutcome::Repeated | FixOutcome::NoPose) {
             self.log.count(kind, outcome);
         } else {
-            if let Some(run) = &mut self.run {
+            // A fix by the pose shows nothing of how well landmarks do without it.
+            if let Some(run) = self.run.as_mut().filter(|_| role != FixRole::Guided) {
                 run.fix(captured_ns, fix);
             }
             let step = moved(before.as_ref(), after.as_ref().map(|fused| &fused.pose.pose));
@@ -349,7 +426,7 @@ impl Robot {
         captured_ns: i64,
         odometry: &Pose2,
         pose: &Pose2Covariance,
-        landmarks: Vec<String>,
+        (landmarks, names): (&[LandmarkId], Vec<String>),
         now: Instant,
     ) -> Option<FusedPose> {
         if self.fuser.pose().is_some() {
@@ -361,22 +438,29 @@ impl Robot {
         let covariance = FuseParams::default().motion_noise(&motion);
         let there = pose.compose(&Pose2Covariance { pose: motion, covariance });
         self.lost();
-        if !self.begin(captured_ns, &there, ("hypotheses", "started"), landmarks) {
+        if !self.begin(captured_ns, &there, ("hypotheses", "started"), names) {
             return None;
         }
+        self.schedule.relocalised(landmarks);
         self.by_hypotheses = true;
         self.fuser.pose()
     }
 
     /// Keeps what the pose rests on; of landmarks the latest.
-    fn rests_on(&mut self, outcome: FixOutcome, fix: &Fix) {
+    fn rests_on(&mut self, outcome: FixOutcome, fix: &Fix, role: FixRole) {
         match outcome {
-            FixOutcome::Started | FixOutcome::Reset => self.lost(),
+            FixOutcome::Started => self.lost(),
+            FixOutcome::Reset => {
+                self.lost();
+                self.schedule.relocalised(&fix.landmarks);
+            }
             FixOutcome::Applied { .. } | FixOutcome::NotUsed { .. } | FixOutcome::Repeated => {}
             _ => return,
         }
         match fix.modality {
             Modality::Laser => self.by_laser_m = Some(self.way_m),
+            // The pose does not rest on what was named by it, in the sense that it could be judged by it.
+            Modality::Landmarks if role == FixRole::Guided => self.by_guided_m = Some(self.way_m),
             Modality::Landmarks => {
                 self.by_landmarks_m = Some(self.way_m);
                 self.by_hypotheses = false;
@@ -396,6 +480,7 @@ impl Robot {
         let all = [
             ("odometry", moves && posed),
             ("landmarks", near(self.by_landmarks_m)),
+            (GUIDED, near(self.by_guided_m)),
             ("laser", near(self.by_laser_m)),
             ("hypotheses", self.by_hypotheses),
         ];

@@ -4,9 +4,10 @@ use super::*;
 use crate::engine::snapshot::MapSnapshot;
 use map::{
     frames::Link,
+    guided::FramePlan,
     laser_fix::WallIndex,
-    localise::{DecidedBy, Modality},
-    pose2::Pose2Covariance,
+    localise::{DecidedBy, Fix, Modality, RobotFix},
+    pose2::{Pose2, Pose2Covariance},
 };
 use nalgebra::Matrix3;
 use protos::prost::Message;
@@ -98,6 +99,21 @@ fn scans_are_checked_and_counted() {
     assert_eq!((scans.accepted, scans.rejected), (1, BTreeMap::from([(Code::OutOfRange, 1)])));
 }
 
+fn front() -> Name {
+    Name::new("front").unwrap()
+}
+
+impl Motion {
+    /// A frame whose landmarks, named without the pose, give this fix.
+    fn fixed(&self, robot: &Name, at: Moment<'_>, fix: &Fix) -> Option<v1::RobotPose> {
+        let known = self.grounds(robot, &front(), at).map(|grounds| grounds.pose);
+        let independent = RobotFix::Fixed(Box::new(fix.clone()));
+        let (independent, chosen) = (Some(&independent), Some(fix));
+        let says = FrameFixes { prior: known.as_ref(), independent, chosen, ..FrameFixes::default() };
+        self.looked(robot, &front(), at, &says)
+    }
+}
+
 fn at(captured_ns: i64, x_m: f64) -> Moment<'static> {
     let now = time(captured_ns as f64 * 1e-9);
     Moment { map: "hall", epoch: 1, captured_ns, odometry: Some(Pose2::new(x_m, 0.0, 0.0)), now }
@@ -121,12 +137,12 @@ fn a_fix_puts_odometry_on_the_map() {
 #[test]
 fn a_prior_follows_from_odometry_alone() {
     let (motion, r1) = motion();
-    assert!(motion.grounds(&r1, at(1_000_000_000, 3.0)).is_none());
+    assert!(motion.grounds(&r1, &front(), at(1_000_000_000, 3.0)).is_none());
     motion.fixed(&r1, at(1_000_000_000, 3.0), &fix(10.0)).unwrap();
-    let prior = motion.grounds(&r1, at(1_500_000_000, 3.5)).unwrap().pose;
+    let prior = motion.grounds(&r1, &front(), at(1_500_000_000, 3.5)).unwrap().pose;
     assert!((prior.pose.x_m - 10.5).abs() < 1e-9);
     let anew = Moment { epoch: 2, ..at(1_600_000_000, 0.0) };
-    assert!(motion.grounds(&r1, anew).is_none(), "a new epoch has its own odometry");
+    assert!(motion.grounds(&r1, &front(), anew).is_none(), "a new epoch has its own odometry");
 }
 
 #[test]
@@ -135,7 +151,7 @@ fn another_map_starts_afresh() {
     motion.fixed(&r1, at(1_000_000_000, 3.0), &fix(10.0)).unwrap();
     motion.snapshots.set_robot("r1", Some("cellar"));
     let there = Moment { map: "cellar", ..at(2_000_000_000, 3.0) };
-    assert!(motion.grounds(&r1, there).is_none());
+    assert!(motion.grounds(&r1, &front(), there).is_none());
     assert!(motion.pose(&r1, "hall", time(2.0)).is_none(), "what was known is gone");
 }
 
@@ -146,8 +162,9 @@ fn a_frame_against_another_map_leaves_the_fusion_alone() {
     motion.snapshots.publish(Arc::new(MapSnapshot::empty("cellar", 1)));
     motion.fixed(&r1, at(1_000_000_000, 3.0), &fix(10.0)).unwrap();
     let there = Moment { map: "cellar", ..at(1_500_000_000, 3.0) };
-    let grounds = Grounds { pose: fix(0.0).pose, supporters: Vec::new() };
-    assert!(motion.grounds(&r1, there).is_none());
+    let plan = FramePlan { guided: true, global: None };
+    let grounds = Grounds { pose: fix(0.0).pose, supporters: Vec::new(), plan };
+    assert!(motion.grounds(&r1, &front(), there).is_none());
     assert!(motion.fixed(&r1, there, &fix(0.0)).is_none());
     assert!(motion.found(&r1, there, &fix(0.0).pose, &[]).is_none());
     assert!(motion.judged(&r1, there, &grounds, &[], &[]).is_empty());
@@ -168,7 +185,7 @@ fn a_pose_goes_along_to_a_map_that_lies_known() {
     motion.snapshots.set_links([("floor".to_owned(), link)].into());
     let on = |map: &'static str| {
         motion.snapshots.set_robot("r1", Some(map));
-        motion.grounds(&r1, Moment { map, ..at(2_000_000_000, 5.0) })
+        motion.grounds(&r1, &front(), Moment { map, ..at(2_000_000_000, 5.0) })
     };
     motion.fixed(&r1, at(1_000_000_000, 3.0), &fix(10.0)).unwrap();
     motion.odometry_of(&r1, odometry(2, 5.0));

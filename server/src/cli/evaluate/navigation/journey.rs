@@ -9,7 +9,8 @@ use super::{
 use crate::{
     cli::own_errors::OwnErrors,
     engine::{
-        judging::{View, judged_fix},
+        guided::{Guided, guided},
+        judging::{View, judged_frame},
         live::LiveHub,
         motion::{Corrections, Moment as At, Motion, ScanJob},
         snapshot::{MapSnapshot, Snapshots},
@@ -88,18 +89,20 @@ struct Server {
     snapshots: Arc<Snapshots>,
     motion: Motion,
     robot: Name,
+    camera: Name,
     /// The drive goes by its own time: here none passes.
     now: Instant,
 }
 
 impl Server {
     fn new(map: &MapSnapshot) -> anyhow::Result<Self> {
-        let robot = Name::new("robot").map_err(|refusal| anyhow::anyhow!("{refusal:?}"))?;
+        let name = |text| Name::new(text).map_err(|refusal| anyhow::anyhow!("{refusal:?}"));
+        let (robot, camera) = (name("robot")?, name("front")?);
         let snapshots = Arc::new(Snapshots::default());
         snapshots.publish(Arc::new(map.clone()));
         snapshots.set_robot(robot.as_ref(), Some(MAP));
         let motion = Motion::new(snapshots.clone(), Arc::new(LiveHub::default()));
-        Ok(Self { snapshots, motion, robot, now: Instant::now() })
+        Ok(Self { snapshots, motion, robot, camera, now: Instant::now() })
     }
 
     fn map(&self) -> anyhow::Result<Arc<MapSnapshot>> {
@@ -141,11 +144,13 @@ impl Server {
             image_px: [image.width() as f64, image.height() as f64],
             prior: None,
         };
-        let (fix, judged) = judged_fix(&view, self.motion.grounds(&self.robot, at));
-        if let Ok(fix) = fix {
-            self.motion.fixed(&self.robot, at, &fix);
-        }
+        let grounds = self.motion.grounds(&self.robot, &self.camera, at);
+        let guide = grounds.as_ref().filter(|g| g.plan.guided).map(|g| g.pose);
+        let guided = guide.map_or_else(Guided::default, |pose| guided(image, &view, &pose));
+        let judged = judged_frame(&view, grounds, &guided);
+        self.motion.looked(&self.robot, &self.camera, at, &judged.fixes());
         judged
+            .seen
             .map_or_else(Vec::new, |s| self.motion.judged(&self.robot, at, &s.grounds, &s.judged, &s.missed))
     }
 

@@ -2,6 +2,7 @@
 //! 7 m further on than in its odometry.
 
 use super::*;
+use protos::CheckedFrame;
 
 const HOUR: f64 = 3600.0;
 /// Odometry messages a second.
