@@ -565,6 +565,8 @@ pub enum QuadKind {
     Unspecified = 0,
     Full = 1,
     ThreeSided = 2,
+    /// Not detected: a landmark that was found where the pose known before expects it. Corners may lie outside of the image.
+    Expected = 3,
 }
 impl QuadKind {
     /// String value of the enum field names used in the ProtoBuf definition.
@@ -576,6 +578,7 @@ impl QuadKind {
             Self::Unspecified => "QUAD_KIND_UNSPECIFIED",
             Self::Full => "QUAD_KIND_FULL",
             Self::ThreeSided => "QUAD_KIND_THREE_SIDED",
+            Self::Expected => "QUAD_KIND_EXPECTED",
         }
     }
     /// Creates an enum from field names used in the ProtoBuf definition.
@@ -584,6 +587,7 @@ impl QuadKind {
             "QUAD_KIND_UNSPECIFIED" => Some(Self::Unspecified),
             "QUAD_KIND_FULL" => Some(Self::Full),
             "QUAD_KIND_THREE_SIDED" => Some(Self::ThreeSided),
+            "QUAD_KIND_EXPECTED" => Some(Self::Expected),
             _ => None,
         }
     }

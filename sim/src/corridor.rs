@@ -37,6 +37,8 @@ pub struct CorridorParams {
     pub first_poster: u64,
     /// How many different pictures there are: poster `i` looks like poster `i - pictures`; 0: all differ.
     pub pictures: usize,
+    /// The last so many posters show a picture of their own all the same.
+    pub unique_posters: usize,
     /// Whether a column stands at the right wall.
     pub column: bool,
 }
@@ -52,6 +54,7 @@ impl Default for CorridorParams {
             poster_size_m: [0.6, 0.84],
             first_poster: 0,
             pictures: 0,
+            unique_posters: 0,
             column: true,
         }
     }
@@ -166,7 +169,8 @@ impl<'a> Site<'a> {
         let on_sides = self.p.posters - at_ends;
         let usable = self.p.length_m - 6.0;
         for i in 0..self.p.posters {
-            let number = if self.p.pictures > 0 { i % self.p.pictures } else { i };
+            let shares = self.p.pictures > 0 && i + self.p.unique_posters < self.p.posters;
+            let number = if shares { i % self.p.pictures } else { i };
             let texture = Arc::new(poster(self.p.first_poster.wrapping_add(number as u64)));
             let thing = Thing {
                 name: format!("poster-{i}"),

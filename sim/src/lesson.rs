@@ -1,11 +1,12 @@
-//! Where a robot stops to learn: before every poster, from several distances and angles, camera aimed at it.
+//! Where a robot stops to learn: before every poster, and every door and window if so asked, from several distances and
+//! angles, camera aimed at it.
 
 use map::pose2::Pose2;
 use nalgebra::{Point2, Point3};
 use rand::RngExt;
 use serde::{Deserialize, Serialize};
 
-use crate::building::{Building, LandmarkTruth};
+use crate::building::{Building, LandmarkKind, LandmarkTruth};
 use crate::drive::{Step, mounting};
 use crate::gaze::aim;
 use crate::seed;
@@ -15,14 +16,16 @@ pub const MAX_VIEWS: usize = 500;
 /// Tries per stop before it is given up.
 const TRIES: usize = 200;
 
-/// How to look at each poster.
+/// How to look at each landmark.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LessonParams {
     /// Seed of the viewpoints.
     pub seed: u64,
-    /// Stops per poster, at most [`MAX_VIEWS`].
+    /// Stops per landmark, at most [`MAX_VIEWS`].
     pub views: usize,
+    /// Doors and windows are learnt, too.
+    pub fittings: bool,
     /// Nearest and furthest distance from the poster's centre.
     pub distance_m: [f64; 2],
     /// Most oblique view to either side, below 1.5 rad.
@@ -40,6 +43,7 @@ impl Default for LessonParams {
         Self {
             seed: 0,
             views: 12,
+            fittings: false,
             distance_m: [1.3, 4.0],
             max_view_angle_rad: 1.05,
             clearance_m: 0.35,
@@ -58,11 +62,16 @@ pub struct Stop {
     pub step: Step,
 }
 
-/// Stops before all posters, in the building's order; fewer where there is no room. Views go from one side to the
+/// Stops before all posters (and doors and windows), in the building's order; fewer where there is no room. Views go from one side to the
 /// other, one per equal share of the angles.
 pub fn stops(building: &Building, params: &LessonParams) -> Vec<Stop> {
     let mut all = vec![];
-    for (number, landmark) in building.posters().enumerate() {
+    let learnt = building.landmarks().iter().filter(|l| match l.kind {
+        LandmarkKind::Poster => true,
+        LandmarkKind::Door | LandmarkKind::Window => params.fittings,
+        _ => false,
+    });
+    for (number, landmark) in learnt.enumerate() {
         let mut rng = seed::stream(params.seed ^ number as u64, 70);
         let views = params.views.min(MAX_VIEWS);
         for view in 0..views {

@@ -141,6 +141,7 @@ fn building(seed: u64, number: usize) -> Building {
         poster_size_m: [width_m, width_m * rng.random_range(0.75..1.5)],
         first_poster: rng.random(),
         pictures: 0,
+        unique_posters: 0,
         column: rng.random_bool(0.5),
     };
     Building::corridor_with(&params, rng.random())

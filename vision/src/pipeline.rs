@@ -5,7 +5,7 @@
 use crate::{
     detect::{
         detect,
-        quads::{Corners, Quad, QuadKind},
+        quads::{BORDER_SIGMA_PX, Corners, Quad, QuadKind},
     },
     frame::{GrayImage, Intrinsics},
     localise::pose::{LandmarkPose, LandmarkSize, PoseError, landmark_pose},
@@ -159,11 +159,16 @@ pub fn matched(quad: &Quad, verdict: &Verdict, p: &Params) -> Option<(Corners, [
     Some((aligned_px, covariance_px2.map(|c| c + Matrix2::identity() * sigma_px * sigma_px)))
 }
 
+/// Covariances of corners that were laid on the learnt icon without any border having been detected.
+pub(crate) fn aligned_covariance_px2(corners_px: &Corners, p: &Params) -> [Matrix2<f64>; 4] {
+    let sigma_px = ALIGNED_SIGMA_ICON_PX * corners_px.area_px2().sqrt() / p.icon.size as f64;
+    [Matrix2::identity() * (sigma_px.powi(2) + BORDER_SIGMA_PX.powi(2)); 4]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::{
-        detect::quads::BORDER_SIGMA_PX,
         frame::Distortion,
         geometry::homography::Homography,
         learn::{model::learn, random::Random, synthesis, texture::Texture},

@@ -1,7 +1,8 @@
-//! What a known pose adds to a frame: which of the landmarks that look alike a quad is, by where each is expected.
+//! What a known pose adds to a frame: which of the landmarks that look alike a quad is, by where each is expected; and
+//! expected landmarks that were not detected, asked for one by one.
 //!
-//! In: the image, its facts, the map, the pose without the frame. Out: [`Guided`]: quads that are one landmark by picture
-//! and place together, with their poses. A picture that fits no landmark is none wherever it hangs. Keeps nothing.
+//! In: the image, its facts, the map, the pose without the frame. Out: [`Guided`]: what is one landmark by picture and place
+//! together, with its pose. A picture that fits no landmark is none wherever it hangs. Keeps nothing.
 
 use super::{
     doubles::{Resembling, resembling},
@@ -9,40 +10,46 @@ use super::{
 };
 use map::{
     guided::{
-        AssociateParams, CameraView, Candidate, ExpectParams, GuidedReport, KnownLandmark, MAX_OBSERVATIONS,
-        Observation, associate, expect,
+        AssociateParams, CameraView, Candidate, ExpectParams, Expectations, Expected, GuidedReport,
+        KnownLandmark, MAX_OBSERVATIONS, Observation, associate, expect,
     },
     localise::Sighting,
     pose2::Pose2Covariance,
     visibility::Obstacle,
 };
-use std::sync::Arc;
+use std::{collections::BTreeSet, sync::Arc};
 use vision::{
     detect::quads::Corners,
     frame::GrayImage,
     geometry::polygon,
     localise::pose::{LandmarkPose, landmark_pose},
     pipeline::{QuadFacts, matched},
-    recognise::{LandmarkId, Recognition},
+    points::verify::PointEvidence,
+    recognise::{
+        LandmarkId, Recognition,
+        expected::{ACCEPTED_NATS, Found, expected},
+    },
 };
 
-/// Picture evidence of a quad that passes every gate of recognition, nats: of the quads of strangers less than one in a
-/// thousand does (`docs/EVALUATION.md`), of those of a landmark most do.
-const ACCEPTED_NATS: f64 = 6.9;
 /// Two quads that overlap by more than this and may be the same landmark are two borders of one thing.
 const SAME_THING_IOU: f64 = 0.5;
+
+/// Most landmarks that are asked for where they are expected, in one frame: those with the largest part in the image.
+pub const MAX_ASKED: usize = 8;
 
 /// A landmark that was named by the pose.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GuidedSighting {
-    /// Index of its quad in the facts of the frame.
-    pub quad: usize,
+    /// Index of its quad in the facts of the frame; `None` if none was detected.
+    pub quad: Option<usize>,
     /// Which landmark.
     pub landmark: LandmarkId,
-    /// Its corners in the landmark's order.
+    /// Its corners in the landmark's order; outside of the image where its border cuts it.
     pub corners_px: Corners,
     /// Its pose.
     pub seen: LandmarkPose,
+    /// What points say of it, where they decided.
+    pub points: Option<PointEvidence>,
 }
 
 /// What a known pose adds to a frame.
@@ -55,11 +62,6 @@ pub struct Guided {
 }
 
 impl Guided {
-    /// The landmark that a quad is by the pose.
-    pub fn of(&self, quad: usize) -> Option<&GuidedSighting> {
-        self.sightings.iter().find(|s| s.quad == quad)
-    }
-
     /// As sightings of known place.
     pub fn placed<'a>(&'a self, map: &'a super::snapshot::MapSnapshot) -> Vec<Sighting<'a>> {
         let place = |s: &'a GuidedSighting| {
@@ -70,35 +72,36 @@ impl Guided {
     }
 }
 
-/// A quad that may be landmarks.
+/// A part of the image that may be landmarks.
 struct MayBe {
-    quad: usize,
+    /// `None`: nothing was detected, the landmark was asked for.
+    quad: Option<usize>,
     /// The picture alone names it.
     is_unique: bool,
+    picture_nats: f64,
     resembling: Resembling,
+    points: Option<PointEvidence>,
 }
 
-/// Names the quads that look like several landmarks by `prior`, the pose without the frame. Where the camera or its mounting
-/// is not known, or nothing in the frame has look-alikes, nothing is added.
+/// Names what the picture alone leaves open by `prior`, the pose without the frame. Where the camera or its mounting is not
+/// known, nothing is added.
 pub fn guided(image: &GrayImage, view: &View<'_>, prior: &Pose2Covariance) -> Guided {
     let (Some(mounting), Some(intrinsics)) = (view.mounting, view.camera) else { return Guided::default() };
-    let may_be = observed(image, view);
-    if may_be.iter().all(|m| m.is_unique) {
-        return Guided::default();
-    }
     let map = view.map;
     let known = map.landmarks.iter().filter_map(|(id, info)| {
         let place = info.place.as_ref().filter(|_| info.is_trusted())?;
         Some(KnownLandmark { landmark: *id, place, visible: map.visibility.get(id).map(Arc::as_ref) })
     });
+    let known: Vec<_> = known.collect();
     let obstacles: Vec<Obstacle> = map.walls.iter().map(Obstacle::from).collect();
     let camera = CameraView { mounting, intrinsics, image_px: view.image_px };
-    let observations: Vec<Observation> = may_be.iter().map(observation).collect();
-    let known: Vec<_> = known.collect();
-    let assigned = expect(prior, &camera, &known, &obstacles, &ExpectParams::default())
-        .and_then(|expected| associate(&expected, &observations, &AssociateParams::default()));
-    let assigned = match assigned {
-        Ok(assigned) => assigned,
+    let named = expect(prior, &camera, &known, &obstacles, &ExpectParams::default()).and_then(|expected| {
+        let may_be = observed(image, view, &expected);
+        let observations: Vec<Observation> = may_be.iter().map(observation).collect();
+        Ok((associate(&expected, &observations, &AssociateParams::default())?, may_be))
+    });
+    let (assigned, may_be) = match named {
+        Ok(named) => named,
         Err(error) => {
             tracing::error!(%error, "checked inputs were refused by guided recognition");
             return Guided::default();
@@ -110,50 +113,86 @@ pub fn guided(image: &GrayImage, view: &View<'_>, prior: &Pose2Covariance) -> Gu
     Guided { sightings, report }
 }
 
-/// The quads that may be landmarks, each thing once: of several borders the one that fits best.
-fn observed(image: &GrayImage, view: &View<'_>) -> Vec<MayBe> {
+/// What may be landmarks, each thing once: of several borders the one that fits best, of what was detected and what was
+/// asked for the former.
+fn observed(image: &GrayImage, view: &View<'_>, expected: &Expectations) -> Vec<MayBe> {
     let quads = view.facts.quads.iter().enumerate();
     let mut all: Vec<MayBe> = quads.filter_map(|(i, facts)| may_be(image, i, facts, view)).collect();
     all.sort_by(|a, b| {
-        let key = |m: &MayBe| (!m.is_unique, m.resembling.ratio);
-        let ((a_is, a_ratio), (b_is, b_ratio)) = (key(a), key(b));
-        a_is.cmp(&b_is).then(a_ratio.total_cmp(&b_ratio))
+        let by_fit = a.resembling.ratio.total_cmp(&b.resembling.ratio);
+        b.is_unique.cmp(&a.is_unique).then(by_fit)
     });
     let mut kept: Vec<MayBe> = Vec::new();
-    for one in all {
+    let keep = |kept: &mut Vec<MayBe>, one: MayBe| {
         let is_known = kept.iter().any(|k| {
             let (a, b) = (&k.resembling, &one.resembling);
-            !a.members.is_disjoint(&b.members)
-                && polygon::iou(a.corners_px.points(), b.corners_px.points()) > SAME_THING_IOU
+            (k.is_unique || !a.members.is_disjoint(&b.members)) && overlap(&a.corners_px, &b.corners_px)
         });
         if !is_known && kept.len() < MAX_OBSERVATIONS {
             kept.push(one);
         }
+    };
+    for one in all {
+        keep(&mut kept, one);
+    }
+    let mut open: Vec<&Expected> =
+        expected.searchable().filter(|e| kept.iter().all(|k| !is_found(k, e))).collect();
+    open.sort_by(|a, b| b.side_px.total_cmp(&a.side_px).then(a.landmark.cmp(&b.landmark)));
+    for one in open.into_iter().take(MAX_ASKED).filter_map(|e| asked(image, e, view)) {
+        keep(&mut kept, one);
     }
     kept
+}
+
+fn overlap(a: &Corners, b: &Corners) -> bool {
+    polygon::iou(a.points(), b.points()) > SAME_THING_IOU
+}
+
+/// Whether a landmark need not be asked for: it was named, or something that was detected there may be it.
+fn is_found(kept: &MayBe, e: &Expected) -> bool {
+    let Resembling { members, corners_px, .. } = &kept.resembling;
+    let is_there = Corners::new(e.corners_px).is_ok_and(|expected_px| overlap(corners_px, &expected_px));
+    members.contains(&e.landmark) && (kept.is_unique || is_there)
 }
 
 /// The landmarks that one quad may be.
 fn may_be(image: &GrayImage, quad: usize, facts: &QuadFacts, view: &View<'_>) -> Option<MayBe> {
     let verdict = facts.verdict.as_ref()?;
+    let quad = Some(quad);
     if let Recognition::Unique(landmark) = verdict.recognition {
         let (corners_px, covariance_px2) = matched(&facts.quad, verdict, &view.map.params)?;
         let ratio = verdict.candidates.first().map_or(0.0, |c| c.ratio);
         let members = [landmark].into();
         let resembling = Resembling { members, fitting: 1, ratio, corners_px, covariance_px2 };
-        return Some(MayBe { quad, is_unique: true, resembling });
+        let (picture_nats, points) = (ACCEPTED_NATS, None);
+        return Some(MayBe { quad, is_unique: true, picture_nats, resembling, points });
     }
     if view.map.doubles.models.is_empty() {
         return None;
     }
     let resembling = resembling(image, &facts.quad, view.map)?;
-    Some(MayBe { quad, is_unique: false, resembling })
+    Some(MayBe { quad, is_unique: false, picture_nats: ACCEPTED_NATS, resembling, points: None })
+}
+
+/// An expected landmark that was not detected, asked for; it may as well be another that looks the same.
+fn asked(image: &GrayImage, e: &Expected, view: &View<'_>) -> Option<MayBe> {
+    let (map, id) = (view.map, e.landmark);
+    let models = [&map.models, &map.doubles.models].into_iter().find(|models| models.get(id).is_some())?;
+    let found = expected(image, &Corners::new(e.corners_px).ok()?, id, models, &map.params)?;
+    let members: BTreeSet<LandmarkId> =
+        map.doubles.alike.get(&id).map_or_else(|| [id].into(), |alike| alike.iter().copied().collect());
+    if !members.iter().all(|id| map.landmarks.get(id).is_some_and(|info| info.place.is_some())) {
+        return None;
+    }
+    let Found { corners_px, covariance_px2, picture_nats, points } = found;
+    let resembling = Resembling { members, fitting: 1, ratio: 1.0, corners_px, covariance_px2 };
+    Some(MayBe { quad: None, is_unique: false, picture_nats, resembling, points })
 }
 
 fn observation(may_be: &MayBe) -> Observation {
     let Resembling { members, corners_px, covariance_px2, .. } = &may_be.resembling;
     let candidate =
-        |id: &LandmarkId| Candidate { landmark: *id, picture_nats: ACCEPTED_NATS, prior_nats: 0.0 };
+        |id: &LandmarkId| Candidate { landmark: *id, picture_nats: may_be.picture_nats, prior_nats: 0.0 };
     Observation::new(*corners_px, covariance_px2, members.iter().map(candidate).collect())
 }
 
@@ -161,5 +200,6 @@ fn sighting(may_be: &MayBe, landmark: LandmarkId, view: &View<'_>) -> Option<Gui
     let Resembling { corners_px, covariance_px2, .. } = &may_be.resembling;
     let size = view.map.sizes.get(&landmark)?;
     let seen = landmark_pose(corners_px, covariance_px2, *size, view.camera?).ok()?;
-    Some(GuidedSighting { quad: may_be.quad, landmark, corners_px: *corners_px, seen })
+    let (quad, points) = (may_be.quad, may_be.points.clone());
+    Some(GuidedSighting { quad, landmark, corners_px: *corners_px, seen, points })
 }

@@ -1,7 +1,11 @@
 //! What was seen in an image, as the answer to send: names instead of numbers, verdicts, poses of landmarks, and the
 //! robot's pose where landmarks of known place allow one. When anything is unsure a field is absent, never zero.
 
-use super::{guided::Guided, judging::JudgedFrame, snapshot::MapSnapshot};
+use super::{
+    guided::{Guided, GuidedSighting},
+    judging::JudgedFrame,
+    snapshot::MapSnapshot,
+};
 use map::{
     localise::{Fix, FixRefusal, LocaliseParams, RobotFix, Sighting, robot_pose},
     mounting::Mounting,
@@ -10,7 +14,7 @@ use map::{
 use protos::{
     convert::{
         geometry::pose2_covariance_wire,
-        result::{corners, fill_pose, fill_verdict, kind},
+        result::{corners, fill_pose, fill_verdict, kind, points},
     },
     v1,
 };
@@ -213,10 +217,24 @@ fn refusal_word(refusal: &FixRefusal) -> &'static str {
     }
 }
 
+/// The quad of a landmark that was not detected and found all the same.
+fn asked_for(sighting: &GuidedSighting) -> v1::QuadAnswer {
+    v1::QuadAnswer {
+        kind: v1::QuadKind::Expected.into(),
+        verdict: v1::Verdict::Unknown.into(),
+        points: sighting.points.as_ref().map(|evidence| points(evidence, 1)),
+        ..v1::QuadAnswer::default()
+    }
+}
+
 /// Writes the robot's pose, or why there is none, and what the pose known before adds, into the answer.
 pub fn fill_fixes(answer: &mut v1::Answer, judged: &JudgedFrame, guided: &Guided, map: &MapSnapshot) {
     for sighting in &guided.sightings {
-        let Some(quad) = answer.quads.get_mut(sighting.quad) else { continue };
+        let index = sighting.quad.unwrap_or(answer.quads.len());
+        if index == answer.quads.len() {
+            answer.quads.push(asked_for(sighting));
+        }
+        let Some(quad) = answer.quads.get_mut(index) else { continue };
         quad.set_sighting(v1::Sighting::Guided);
         quad.guided_landmark = name(map, sighting.landmark);
         quad.corners = corners(&sighting.corners_px);

@@ -95,7 +95,7 @@ fn confidence(log10_false_alarms: f64) -> f64 {
 
 /// Lays the picture on the learnt icon from the corners of `evidence`, and takes over the corners if they moved as little
 /// as corners of points are wrong by. The likeness there.
-fn sharpened(
+pub(super) fn sharpened(
     image: &GrayImage,
     evidence: &mut PointEvidence,
     model: &LandmarkModel,

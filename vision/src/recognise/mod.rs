@@ -18,6 +18,7 @@ pub mod confidence_fit;
 mod confidence_learnt;
 mod by_points;
 pub mod verdict;
+pub mod expected;
 #[cfg(test)]
 pub(crate) mod fixture;
 

@@ -95,6 +95,23 @@ impl ModelSet {
         Ok(Self { models, params_hash: expected, signatures, owners, lattices, points })
     }
 
+    /// A set with the model of `id` alone.
+    pub fn only(&self, id: LandmarkId) -> Option<Self> {
+        let model = self.get(id)?.clone();
+        let signatures: Vec<_> = model.exemplars.iter().map(|e| *e.signature.values()).collect();
+        let owners = (0..signatures.len()).map(|e| (0, e as u8)).collect();
+        let points = Arc::new(PointIndex::new(std::iter::once(model.points.as_slice())));
+        let lattices = self.lattices.clone();
+        Some(Self {
+            models: vec![model],
+            params_hash: self.params_hash,
+            signatures,
+            owners,
+            lattices,
+            points,
+        })
+    }
+
     /// Number of landmarks (N).
     pub fn len(&self) -> usize {
         self.models.len()

@@ -10,7 +10,7 @@ use crate::{
     cli::own_errors::OwnErrors,
     engine::{
         guided::{Guided, guided},
-        judging::{View, judged_frame},
+        judging::{Seen, View, judged_frame},
         live::LiveHub,
         motion::{Corrections, Moment as At, Motion, ScanJob},
         snapshot::{MapSnapshot, Snapshots},
@@ -23,17 +23,23 @@ use map::{
 };
 use protos::Name;
 use sim::{
+    building::LandmarkKind,
     drive::DriveParams,
     robot::{Robot, RobotParams, Sighting},
     truth::{LandmarkView, ViewState},
 };
-use std::{sync::Arc, time::Instant};
-use vision::{geometry::polygon, pipeline::FrameFacts, recognise::Recognition};
+use std::{collections::BTreeMap, sync::Arc, time::Instant};
+use vision::{
+    detect::quads::Corners,
+    geometry::polygon,
+    pipeline::FrameFacts,
+    recognise::{LandmarkId, Recognition},
+};
 
 /// A recognition is true when its quad overlaps the landmark's true outline by this much.
 const IOU_TRUE: f64 = 0.5;
 /// A frame shows a landmark when all of it is seen, no side shorter than this...
-const MIN_SIDE_PX: f64 = 40.0;
+const MIN_SIDE_PX: f64 = 38.0;
 /// ... and no more obliquely: the paper's limit of recognition.
 const MAX_VIEW_ANGLE_RAD: f64 = 1.309;
 /// Farther than any corridor: the simulator starts the robot at its end.
@@ -62,6 +68,10 @@ pub(super) struct Journey {
     pub(super) recognised: usize,
     /// Names given to something else.
     pub(super) false_matches: usize,
+    /// Names given to something else by the pose.
+    pub(super) guided_false: usize,
+    /// How often what was shown of each kind was rightly named.
+    pub(super) named: BTreeMap<(&'static str, &'static str), Named>,
     /// Frames that showed a landmark up to the first fix, itself included; none if there never was one.
     pub(super) frames_to_fix: Option<usize>,
     /// What became of fixes and scans.
@@ -69,6 +79,18 @@ pub(super) struct Journey {
     /// Times that a landmark was said to have moved or to be missing; nothing in the corridor changes.
     pub(super) flagged: usize,
     pub(super) quarantined: usize,
+}
+
+/// Sightings of taught landmarks of one kind.
+#[derive(Debug, Clone, Copy, Default, serde::Serialize)]
+pub(super) struct Named {
+    pub(super) shown: usize,
+    /// Rightly named by the picture alone.
+    pub(super) global: usize,
+    /// Shown while the robot's pose was known and nothing contradicted it.
+    pub(super) shown_to_pose: usize,
+    /// Of these rightly named by the picture alone or with the pose.
+    pub(super) guided: usize,
 }
 
 /// How robots drive.
@@ -126,7 +148,7 @@ impl Server {
         facts: &FrameFacts,
         seen: &Sighting,
         (wrong, captured_ns): (&OwnErrors, i64),
-    ) -> Vec<Change> {
+    ) -> (Vec<Change>, Option<Guided>) {
         let at = At {
             map: MAP,
             epoch: EPOCH,
@@ -146,12 +168,11 @@ impl Server {
         };
         let grounds = self.motion.grounds(&self.robot, &self.camera, at);
         let guide = grounds.as_ref().filter(|g| g.plan.guided).map(|g| g.pose);
-        let guided = guide.map_or_else(Guided::default, |pose| guided(image, &view, &pose));
-        let judged = judged_frame(&view, grounds, &guided);
+        let guided = guide.map(|pose| guided(image, &view, &pose));
+        let judged = judged_frame(&view, grounds, guided.as_ref().unwrap_or(&Guided::default()));
         self.motion.looked(&self.robot, &self.camera, at, &judged.fixes());
-        judged
-            .seen
-            .map_or_else(Vec::new, |s| self.motion.judged(&self.robot, at, &s.grounds, &s.judged, &s.missed))
+        let found = |s: Seen| self.motion.judged(&self.robot, at, &s.grounds, &s.judged, &s.missed);
+        (judged.seen.map_or_else(Vec::new, found), guided)
     }
 
     /// As the store does.
@@ -197,8 +218,8 @@ pub(super) fn drive(world: &World, way: Way) -> anyhow::Result<Journey> {
         }
         let map = server.map()?;
         let facts = verdicts::look(&seen.frame.image, Some(&wrong.camera), &map, &mut StageTimes::start());
-        frames_that_show += usize::from(journey.score(world, &seen, &facts));
-        let changes = server.frame(&map, &facts, &seen, (&wrong, captured_ns));
+        let (changes, guided) = server.frame(&map, &facts, &seen, (&wrong, captured_ns));
+        frames_that_show += usize::from(journey.score(world, &seen, &facts, guided.as_ref()));
         if !changes.is_empty() {
             let of = |standing| changes.iter().filter(|c| c.standing == standing).count();
             journey.flagged += of(Standing::Flagged);
@@ -222,33 +243,68 @@ pub(super) fn drive(world: &World, way: Way) -> anyhow::Result<Journey> {
 }
 
 impl Journey {
-    /// Counts what the frame shows and what was named in it; whether it shows a landmark at all.
-    fn score(&mut self, world: &World, seen: &Sighting, facts: &FrameFacts) -> bool {
+    /// Counts what the frame shows and what was named in it; whether it shows a landmark in use at all.
+    fn score(&mut self, world: &World, seen: &Sighting, facts: &FrameFacts, guided: Option<&Guided>) -> bool {
         let truth = &seen.frame.truth;
-        let shows = |view: &&LandmarkView| {
-            view.state == ViewState::Full
-                && view.min_side_px() >= MIN_SIDE_PX
-                && view.view_angle_rad <= MAX_VIEW_ANGLE_RAD
-                && world.map.models.iter().any(|m| world.name(m.id) == view.name)
+        let is_there = |id: LandmarkId, found: &Corners| {
+            let view = truth.landmark(world.name(id));
+            view.is_some_and(|v| polygon::iou(found.points(), v.corners_px.points()) >= IOU_TRUE)
         };
-        let mut named = Vec::new();
+        let mut global = Vec::new();
         for quad in &facts.quads {
             let Some(Recognition::Unique(id)) = quad.verdict.as_ref().map(|v| v.recognition) else {
                 continue;
             };
-            let view = truth.landmark(world.name(id));
             // Where the picture was found to lie: the quad itself may be a border around it.
             let found = quad.verdict.as_ref().and_then(|v| v.aligned_px).unwrap_or(quad.quad.corners_px);
-            let overlaps = |v: &LandmarkView| polygon::iou(found.points(), v.corners_px.points()) >= IOU_TRUE;
-            if view.is_some_and(overlaps) {
-                named.push(world.name(id));
+            if is_there(id, &found) {
+                global.push(world.name(id));
             } else {
                 self.false_matches += 1;
             }
         }
-        let shown: Vec<&LandmarkView> = truth.landmarks.iter().filter(shows).collect();
+        let mut with_pose = global.clone();
+        for sighting in guided.iter().flat_map(|guided| &guided.sightings) {
+            if is_there(sighting.landmark, &sighting.corners_px) {
+                with_pose.push(world.name(sighting.landmark));
+            } else {
+                self.guided_false += 1;
+            }
+        }
+        let is_large =
+            |v: &&LandmarkView| v.min_side_px() >= MIN_SIDE_PX && v.view_angle_rad <= MAX_VIEW_ANGLE_RAD;
+        let taught = |v: &&LandmarkView| world.map.landmarks.values().any(|info| info.name == v.name);
+        for view in truth.landmarks.iter().filter(taught).filter(is_large) {
+            let named = self.named.entry((kind(view.kind), state(view.state))).or_default();
+            named.shown += 1;
+            named.global += usize::from(global.contains(&view.name.as_str()));
+            if guided.is_some() {
+                named.shown_to_pose += 1;
+                named.guided += usize::from(with_pose.contains(&view.name.as_str()));
+            }
+        }
+        let in_use = |v: &&LandmarkView| world.map.models.iter().any(|m| world.name(m.id) == v.name);
+        let full = |v: &&LandmarkView| v.state == ViewState::Full;
+        let shown: Vec<_> = truth.landmarks.iter().filter(is_large).filter(full).filter(in_use).collect();
         self.shown += shown.len();
-        self.recognised += shown.iter().filter(|v| named.contains(&v.name.as_str())).count();
+        self.recognised += shown.iter().filter(|v| global.contains(&v.name.as_str())).count();
         !shown.is_empty()
+    }
+}
+
+fn kind(kind: LandmarkKind) -> &'static str {
+    match kind {
+        LandmarkKind::Poster => "posters",
+        LandmarkKind::Door => "doors",
+        LandmarkKind::Window => "windows",
+        _ => "others",
+    }
+}
+
+fn state(state: ViewState) -> &'static str {
+    match state {
+        ViewState::Full => "in full view",
+        ViewState::Truncated => "cut by the image border",
+        ViewState::Occluded => "partly hidden",
     }
 }

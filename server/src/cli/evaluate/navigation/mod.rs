@@ -12,7 +12,7 @@ use super::experiment::{mixed, of_each, say, write_plot};
 use journey::{Journey, Way, drive};
 use report::Report;
 use std::path::PathBuf;
-use world::World;
+use world::{Course, World};
 
 /// `waymark evaluate navigation`.
 #[derive(Debug, clap::Args)]
@@ -23,6 +23,21 @@ pub(crate) struct Args {
     /// Posters in the corridor: alternately left and right, the last two at its ends.
     #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=64))]
     posters: u32,
+    /// How many different pictures the posters show; the others look the same. 0: all differ.
+    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=64))]
+    pictures: u32,
+    /// The last so many posters show a picture of their own all the same.
+    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=64))]
+    unique: u32,
+    /// Landmarks are taught with points, and points decide (`algorithm.recognise.verdict.points`).
+    #[arg(long)]
+    points: bool,
+    /// Teach doors and windows, too.
+    #[arg(long)]
+    fittings: bool,
+    /// Photographs that the first drive takes of each landmark.
+    #[arg(long, default_value_t = 12, value_parser = clap::value_parser!(u32).range(1..=100))]
+    views: u32,
     /// Length of the corridor.
     #[arg(long, value_name = "M", default_value_t = 25.0, value_parser = length)]
     length_m: f64,
@@ -65,7 +80,18 @@ fn rate(text: &str) -> Result<f64, String> {
 
 /// Teaches, drives, reports.
 pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
-    let world = World::taught(args.length_m, args.posters as usize, !args.own_errors, args.seed)?;
+    let course = Course {
+        length_m: args.length_m,
+        posters: args.posters as usize,
+        pictures: args.pictures as usize,
+        unique: args.unique as usize,
+        points: args.points,
+        fittings: args.fittings,
+        views: args.views as usize,
+        exact: !args.own_errors,
+        seed: args.seed,
+    };
+    let world = World::taught(course)?;
     let seeds: Vec<u64> = (0..args.drives).map(|n| mixed(&[args.seed, 10, u64::from(n)])).collect();
     let (rate_hz, laser, exact) = (args.rate_hz, !args.no_laser, !args.own_errors);
     let way = |n: usize, seed: &u64| Way { seed: *seed, back: n % 2 == 1, rate_hz, laser, exact };

@@ -1,7 +1,7 @@
 //! All drives as figures: errors along and across the corridor, how honest the covariance is, what was seen.
 
 use super::{
-    journey::{Journey, Moment, of},
+    journey::{Journey, Moment, Named, of},
     world::World,
 };
 use crate::cli::evaluate::statistics::quantile;
@@ -34,6 +34,37 @@ impl Errors {
     }
 }
 
+/// Sightings of one kind of landmark in one state.
+#[derive(Debug, Serialize)]
+struct Row {
+    kind: &'static str,
+    state: &'static str,
+    #[serde(flatten)]
+    named: Named,
+}
+
+impl Row {
+    fn in_words(&self) -> String {
+        let Named { shown, global, shown_to_pose, guided } = self.named;
+        let share = |count: usize, of: usize| 100.0 * count as f64 / of.max(1) as f64;
+        let what = format!("{} {}", self.kind, self.state);
+        let (alone, with) = (share(global, shown), share(guided, shown_to_pose));
+        format!("  {what:<33} {alone:>5.1} % of {shown:<6} {with:>5.1} % of {shown_to_pose}")
+    }
+}
+
+fn rows(journeys: &[Journey]) -> Vec<Row> {
+    let mut all: BTreeMap<(&'static str, &'static str), Named> = BTreeMap::new();
+    for (key, named) in journeys.iter().flat_map(|j| &j.named) {
+        let sum = all.entry(*key).or_default();
+        sum.shown += named.shown;
+        sum.global += named.global;
+        sum.shown_to_pose += named.shown_to_pose;
+        sum.guided += named.guided;
+    }
+    all.into_iter().map(|((kind, state), named)| Row { kind, state, named }).collect()
+}
+
 /// What is said of all drives. Along is the map's x axis.
 #[derive(Debug, Serialize)]
 pub(super) struct Report {
@@ -41,6 +72,8 @@ pub(super) struct Report {
     seed: u64,
     length_m: f64,
     posters: usize,
+    /// Landmarks that were learnt and placed, and those of them in use.
+    taught: usize,
     landmarks: usize,
     /// Of the landmarks' places against the truth.
     place_error_m: Option<Errors>,
@@ -49,11 +82,17 @@ pub(super) struct Report {
     shown: usize,
     recognised: usize,
     false_matches: usize,
+    /// Names given to something else by the pose.
+    guided_false: usize,
+    /// Of taught landmarks with sides of 38 px and more, in use or not.
+    named: Vec<Row>,
     /// The robots had one.
     laser: bool,
     /// By landmarks, and those that the filter did not believe.
     corrections: u64,
     gated: u64,
+    /// By landmarks that were named by the pose.
+    guided_corrections: u64,
     /// By scans, and what became of the others.
     laser_corrections: u64,
     laser_others: BTreeMap<&'static str, u64>,
@@ -98,8 +137,9 @@ impl Report {
         Self {
             experiment: "navigation",
             seed,
-            length_m: world.length_m,
-            posters: world.posters,
+            length_m: world.course.length_m,
+            posters: world.course.posters,
+            taught: world.map.landmarks.len(),
             landmarks: world.map.models.len(),
             place_error_m: Errors::of(world.place_errors_m.iter().copied()),
             drives: journeys.len(),
@@ -107,9 +147,12 @@ impl Report {
             shown: of_each(|j| j.shown),
             recognised: of_each(|j| j.recognised),
             false_matches: of_each(|j| j.false_matches),
+            guided_false: of_each(|j| j.guided_false),
+            named: rows(journeys),
             laser,
             corrections: logged("landmarks", &APPLIED),
             gated: logged("landmarks", &["gated_out"]),
+            guided_corrections: logged("guided", &APPLIED),
             laser_corrections: logged("laser", &APPLIED),
             laser_others,
             flagged: of_each(|j| j.flagged),
@@ -134,17 +177,17 @@ impl Report {
     /// For people.
     pub(super) fn lines(&self) -> Vec<String> {
         let words = |e: &Option<Errors>| Errors::in_words(e.as_ref());
-        vec![
+        let mut lines = vec![
             format!(
-                "navigation: corridor of {} m, {} of {} posters in use, {} drives, seed {}",
-                self.length_m, self.landmarks, self.posters, self.drives, self.seed
+                "navigation: corridor of {} m, {} posters; {} landmarks taught, {} in use; {} drives, seed {}",
+                self.length_m, self.posters, self.taught, self.landmarks, self.drives, self.seed
             ),
             format!("  frames          {}", self.frames),
             format!("  recognitions    {} of {} full views of landmarks in use", self.recognised, self.shown),
-            format!("  false matches   {}", self.false_matches),
+            format!("  false matches   {}, {} more by the pose", self.false_matches, self.guided_false),
             format!(
-                "  by landmarks    {} corrections, {} more not believed by the filter",
-                self.corrections, self.gated
+                "  by landmarks    {} corrections, {} more not believed by the filter; {} by guided ones",
+                self.corrections, self.gated, self.guided_corrections
             ),
             if self.laser {
                 let others: Vec<String> = self.laser_others.iter().map(|(o, n)| format!("{o} {n}")).collect();
@@ -185,7 +228,10 @@ impl Report {
                     .to_owned()
             },
             "  Errors from the first fix on; odometry alone was told the true start.".to_owned(),
-        ]
+            "  named rightly                      by the picture    with a known pose".to_owned(),
+        ];
+        lines.extend(self.named.iter().map(Row::in_words));
+        lines
     }
 }
 

@@ -8,7 +8,10 @@ use crate::{
         screen,
         survey::{View as Look, hang, survey},
     },
-    engine::snapshot::{LandmarkInfo, MapSnapshot},
+    engine::{
+        doubles::doubles,
+        snapshot::{LandmarkInfo, Learnt, MapSnapshot},
+    },
 };
 use anyhow::Context as _;
 use map::{
@@ -32,7 +35,7 @@ use vision::{
     localise::pose::LandmarkSize,
     params::Params,
     points::taught::TaughtPoint,
-    recognise::{IconFeatures, LandmarkId, ModelSet, features},
+    recognise::{DistanceKind, IconFeatures, LandmarkId, ModelSet, features},
 };
 
 /// Views each landmark is learnt from: what the first drive did not photograph is generated.
@@ -43,18 +46,37 @@ const NEGATIVES: usize = 10;
 /// Name of its map.
 pub(super) const MAP: &str = "corridor";
 
+/// A corridor and how it is taught.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Course {
+    pub(super) length_m: f64,
+    /// Posters that hang there.
+    pub(super) posters: usize,
+    /// How many different pictures they show; 0: all differ.
+    pub(super) pictures: usize,
+    /// The last so many have a picture of their own all the same.
+    pub(super) unique: usize,
+    /// Points decide.
+    pub(super) points: bool,
+    /// Doors and windows are taught, too.
+    pub(super) fittings: bool,
+    /// Photographs of each landmark.
+    pub(super) views: usize,
+    /// The surveying robot's pose, camera and its seat are exactly what they are said to be.
+    pub(super) exact: bool,
+    pub(super) seed: u64,
+}
+
 /// The corridor and its map.
 pub(super) struct World {
     pub(super) building: Arc<Building>,
     pub(super) map: MapSnapshot,
-    pub(super) length_m: f64,
-    /// Posters that hang there.
-    pub(super) posters: usize,
+    pub(super) course: Course,
     /// Distance of each placed landmark from its true place.
     pub(super) place_errors_m: Vec<f64>,
 }
 
-/// One poster after the first drive.
+/// One landmark after the first drive.
 struct Lesson {
     name: String,
     place: LandmarkPlace,
@@ -64,14 +86,17 @@ struct Lesson {
 }
 
 impl World {
-    /// Builds the corridor, surveys it and learns its posters.
-    ///
-    /// `exact`: the surveying robot's pose, camera and its seat are exactly what they are said to be.
-    pub(super) fn taught(length_m: f64, posters: usize, exact: bool, seed: u64) -> anyhow::Result<Self> {
-        let p = Params::default();
+    /// Builds the corridor, surveys it and learns its landmarks.
+    pub(super) fn taught(course: Course) -> anyhow::Result<Self> {
+        let Course { length_m, posters, pictures, unique, points, fittings, views: photographs, exact, seed } =
+            course;
+        let mut p = Params::default();
+        p.recognise.verdict.points = points;
         let corridor = CorridorParams {
             length_m,
             posters,
+            pictures,
+            unique_posters: unique,
             first_poster: mixed(&[seed, 11]),
             ..CorridorParams::default()
         };
@@ -79,7 +104,8 @@ impl World {
         let robot = Robot::new(building.clone(), &RobotParams::default());
         let wrong = OwnErrors::of(robot.camera().intrinsics(), exact, mixed(&[seed, 13]));
         let camera = wrong.camera;
-        let stops = stops(&building, &LessonParams { seed, ..LessonParams::default() });
+        let lesson = LessonParams { seed, views: photographs, fittings, ..LessonParams::default() };
+        let stops = stops(&building, &lesson);
         let survey = survey(robot, &stops, wrong)?;
         let found: Vec<(&String, &Vec<Look>)> = survey.views.iter().collect();
         let lessons: Vec<Lesson> = of_each(&found, "views", |i, (name, looks)| {
@@ -103,11 +129,10 @@ impl World {
             let others: Vec<IconFeatures> = others.flat_map(|(_, l)| l.icons.iter().cloned()).collect();
             Some(add_negatives(&alone, &others, &p))
         });
-        let models = in_use(&lessons, models);
         let map = snapshot(&lessons, &survey.walls, models, p)?;
-        anyhow::ensure!(!map.models.is_empty(), "no poster passed the gates of learning; try another --seed");
+        anyhow::ensure!(!map.models.is_empty(), "nothing passed the gates of learning; try another --seed");
         let place_errors_m = lessons.iter().map(|l| place_error_m(&building, l)).collect::<Result<_, _>>()?;
-        Ok(Self { building, map, length_m, posters, place_errors_m })
+        Ok(Self { building, map, course, place_errors_m })
     }
 
     /// The landmark's name.
@@ -129,12 +154,11 @@ fn views(looks: &[&Look], seed: u64, p: &Params) -> Vec<View> {
     views
 }
 
-/// Those that passed the gates; of the others it is said why not.
-fn in_use(lessons: &[Lesson], models: Vec<Option<LandmarkModel>>) -> Vec<Arc<LandmarkModel>> {
-    let mut active = Vec::new();
+/// Says of those that did not pass the gates why not.
+fn complain(lessons: &[Lesson], models: &[Option<LandmarkModel>]) {
     for (lesson, model) in lessons.iter().zip(models) {
         match model.as_ref().map(|m| &m.status) {
-            Some(ModelStatus::Active) => active.extend(model.map(Arc::new)),
+            Some(ModelStatus::Active) => {}
             Some(ModelStatus::Candidate(failures)) => {
                 let reasons: Vec<String> = failures.iter().map(ToString::to_string).collect();
                 screen::complain(&format!("{} is not in use: {}", lesson.name, reasons.join("; ")));
@@ -142,16 +166,23 @@ fn in_use(lessons: &[Lesson], models: Vec<Option<LandmarkModel>>) -> Vec<Arc<Lan
             None => screen::complain(&format!("{} could not be learnt", lesson.name)),
         }
     }
-    active
 }
 
 fn snapshot(
     lessons: &[Lesson],
     walls: &[LaserSegment],
-    models: Vec<Arc<LandmarkModel>>,
+    models: Vec<Option<LandmarkModel>>,
     params: Params,
 ) -> anyhow::Result<MapSnapshot> {
-    let models = ModelSet::new(models, &params)?;
+    complain(lessons, &models);
+    let learnt: BTreeMap<LandmarkId, Learnt> = models
+        .into_iter()
+        .flatten()
+        .map(|model| (model.id, Learnt { digest: [0; 32], model: Arc::new(model) }))
+        .collect();
+    let active = learnt.values().map(|l| l.model.clone()).filter(|m| m.is_active()).collect();
+    let models = ModelSet::new(active, &params)?;
+    let doubles = Arc::new(doubles(&learnt, DistanceKind::Both, &params));
     let numbered = || lessons.iter().enumerate().map(|(i, l)| (LandmarkId(i as u64), l));
     let sizes: BTreeMap<LandmarkId, LandmarkSize> = numbered().map(|(id, l)| (id, l.place.size)).collect();
     let landmarks: BTreeMap<LandmarkId, LandmarkInfo> = numbered()
@@ -168,7 +199,18 @@ fn snapshot(
     let (params, wall_index) = (Arc::new(params), Arc::new(WallIndex::new(walls)));
     let walls = walls.to_vec();
     let empty = MapSnapshot::empty(MAP, 1);
-    Ok(MapSnapshot { landmarks, sizes, models, walls, wall_index, visibility, params, ..empty })
+    Ok(MapSnapshot {
+        landmarks,
+        sizes,
+        models,
+        doubles,
+        learnt,
+        walls,
+        wall_index,
+        visibility,
+        params,
+        ..empty
+    })
 }
 
 fn place_error_m(building: &Building, lesson: &Lesson) -> anyhow::Result<f64> {
