@@ -25,6 +25,10 @@ pub const LOG10_EPSILON_EXPECTED: f64 = -4.0;
 /// does (`docs/EVALUATION.md`).
 pub const ACCEPTED_NATS: f64 = 6.9;
 
+/// A landmark of which a corner is known worse than this share of its size is not told, standard deviations: what is seen of
+/// it does not say where the rest is.
+const MAX_CORNER_SIGMA_SHARE: f64 = 0.1;
+
 /// A landmark found where it was expected.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Found {
@@ -57,6 +61,9 @@ pub fn expected(
         if is_whole {
             sharpened(image, &mut evidence, model, models, p);
         }
+        if !is_well_known(&evidence.corners_px, &evidence.corner_covariance_px2) {
+            return None;
+        }
         return Some(Found {
             corners_px: evidence.corners_px,
             covariance_px2: evidence.corner_covariance_px2,
@@ -74,6 +81,11 @@ pub fn expected(
     };
     let covariance_px2 = aligned_covariance_px2(&corners_px, p);
     Some(Found { corners_px, covariance_px2, picture_nats: ACCEPTED_NATS, points: None })
+}
+
+fn is_well_known(corners_px: &Corners, covariance_px2: &[Matrix2<f64>; 4]) -> bool {
+    let limit_px2 = MAX_CORNER_SIGMA_SHARE.powi(2) * corners_px.area_px2();
+    covariance_px2.iter().all(|c| c.symmetric_eigenvalues().max() <= limit_px2)
 }
 
 fn is_inside(image: &GrayImage, c: &Point2<f64>) -> bool {

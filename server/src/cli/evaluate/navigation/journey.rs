@@ -42,6 +42,8 @@ const IOU_TRUE: f64 = 0.5;
 const MIN_SIDE_PX: f64 = 38.0;
 /// ... and no more obliquely: the paper's limit of recognition.
 const MAX_VIEW_ANGLE_RAD: f64 = 1.309;
+/// What is cut or hidden counts where at least this share of it is seen.
+const MIN_SHARE: f64 = 0.25;
 /// Farther than any corridor: the simulator starts the robot at its end.
 const FAR_END_M: f64 = 1e3;
 /// One run of the robot's software.
@@ -273,7 +275,10 @@ impl Journey {
         }
         let is_large =
             |v: &&LandmarkView| v.min_side_px() >= MIN_SIDE_PX && v.view_angle_rad <= MAX_VIEW_ANGLE_RAD;
-        let taught = |v: &&LandmarkView| world.map.landmarks.values().any(|info| info.name == v.name);
+        let taught = |v: &&LandmarkView| {
+            v.visible_px2 >= MIN_SHARE * v.corners_px.area_px2()
+                && world.map.landmarks.values().any(|info| info.name == v.name)
+        };
         for view in truth.landmarks.iter().filter(taught).filter(is_large) {
             let named = self.named.entry((kind(view.kind), state(view.state))).or_default();
             named.shown += 1;

@@ -84,7 +84,7 @@ pub(super) struct Report {
     false_matches: usize,
     /// Names given to something else by the pose.
     guided_false: usize,
-    /// Of taught landmarks with sides of 38 px and more, in use or not.
+    /// Of taught landmarks with sides of 38 px and more of which a quarter is seen, in use or not.
     named: Vec<Row>,
     /// The robots had one.
     laser: bool,
