@@ -203,3 +203,6 @@ fn sighting(may_be: &MayBe, landmark: LandmarkId, view: &View<'_>) -> Option<Gui
     let (quad, points) = (may_be.quad, may_be.points.clone());
     Some(GuidedSighting { quad, landmark, corners_px: *corners_px, seen, points })
 }
+
+#[cfg(test)]
+mod tests;

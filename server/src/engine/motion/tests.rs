@@ -16,7 +16,9 @@ use sim::{
     laser::LaserParams,
 };
 use std::sync::LazyLock;
+use vision::recognise::LandmarkId;
 
+mod guided;
 mod stamps;
 
 /// A moment of the server's clock.

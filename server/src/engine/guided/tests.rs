@@ -1,0 +1,160 @@
+//! A robot that looks at a taught poster from a pose that is known.
+
+use super::*;
+use crate::engine::{
+    doubles::Doubles,
+    scene::Scene,
+    snapshot::{LandmarkInfo, MapSnapshot},
+    verdicts::{self, StageTimes},
+};
+use map::{mounting::Mounting, pose2::Pose2};
+use nalgebra::{Matrix3, Vector3};
+use sim::drive::Sighting as Seen;
+use vision::{pipeline::FrameFacts, recognise::models::ModelSet};
+
+const POSTER: LandmarkId = LandmarkId(1);
+const TWIN: LandmarkId = LandmarkId(7);
+
+/// A pose that is known to 3 cm and half a degree.
+fn known(pose: Pose2) -> Pose2Covariance {
+    Pose2Covariance { pose, covariance: Matrix3::from_diagonal(&Vector3::new(9e-4, 9e-4, 8e-5)) }
+}
+
+struct Look {
+    seen: Seen,
+    scene: Scene,
+}
+
+impl Look {
+    /// The first poster, from another place than it was taught from.
+    fn new() -> (Self, Arc<MapSnapshot>) {
+        let mut scene = Scene::new();
+        let map = scene.taught();
+        let name = map.landmarks[&POSTER].name.clone();
+        let seen = scene.looks(5, 1).into_iter().find(|(landmark, _)| *landmark == name).unwrap().1;
+        (Self { seen, scene }, map)
+    }
+
+    fn facts(&self, map: &MapSnapshot) -> FrameFacts {
+        let camera = self.scene.intrinsics();
+        verdicts::look(&self.seen.frame.image, Some(&camera), map, &mut StageTimes::start())
+    }
+
+    /// What a pose adds to these facts.
+    fn guided(&self, image: &GrayImage, facts: &FrameFacts, map: &MapSnapshot, pose: Pose2) -> Guided {
+        let mounting = Mounting::new(self.seen.step.robot_from_camera).unwrap();
+        let image_px = [image.width() as f64, image.height() as f64];
+        let camera = self.scene.intrinsics();
+        let view =
+            View { facts, map, mounting: Some(&mounting), camera: Some(&camera), image_px, prior: None };
+        guided(image, &view, &known(pose))
+    }
+
+    fn truth(&self) -> Pose2 {
+        self.seen.step.map_from_robot
+    }
+}
+
+/// The map with a second landmark that looks like the poster and hangs `along_m` further along its wall: neither is in use
+/// by itself.
+fn with_twin(map: &MapSnapshot, along_m: f64) -> MapSnapshot {
+    let poster = map.models.get(POSTER).unwrap();
+    let twin = Arc::new(vision::learn::model::LandmarkModel { id: TWIN, ..(**poster).clone() });
+    let mut info: LandmarkInfo = map.landmarks[&POSTER].clone();
+    "twin".clone_into(&mut info.name);
+    let place = info.place.as_mut().unwrap();
+    place.x_m -= along_m * place.theta_rad.sin();
+    place.y_m += along_m * place.theta_rad.cos();
+    let mut made = map.clone();
+    made.landmarks.insert(TWIN, info);
+    made.sizes.insert(TWIN, map.sizes[&POSTER]);
+    made.models = ModelSet::default();
+    let both = Arc::new(vec![POSTER, TWIN]);
+    made.doubles = Arc::new(Doubles {
+        models: ModelSet::new(vec![poster.clone(), twin], &map.params).unwrap(),
+        alike: [(POSTER, both.clone()), (TWIN, both)].into(),
+    });
+    made
+}
+
+fn off_px(a: &Corners, b: &Corners) -> f64 {
+    a.points().iter().zip(b.points()).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
+}
+
+#[test]
+fn what_the_picture_alone_names_is_not_guided() {
+    let (look, map) = Look::new();
+    let facts = look.facts(&map);
+    assert!(!verdicts::recognised(&facts).is_empty());
+    let made = look.guided(&look.seen.frame.image, &facts, &map, look.truth());
+    assert!(made.sightings.iter().all(|s| s.landmark != POSTER), "{:?}", made.sightings);
+    assert_eq!(made.report.contradictions, 0);
+}
+
+#[test]
+fn a_landmark_that_was_not_detected_is_found_where_it_is_expected() {
+    let (look, map) = Look::new();
+    let nothing = FrameFacts { quads: Vec::new() };
+    let made = look.guided(&look.seen.frame.image, &nothing, &map, look.truth());
+    let found = made.sightings.iter().find(|s| s.landmark == POSTER).expect("found");
+    let truth = look.seen.frame.truth.landmark(&map.landmarks[&POSTER].name).unwrap();
+    assert!(off_px(&found.corners_px, &truth.corners_px) < 3.0, "{found:?}, truth {truth:?}");
+    assert_eq!(found.quad, None);
+    // From 6 cm further on it is still found where it is, not where it was expected.
+    let beside = look.truth().compose(&Pose2::new(0.06, 0.0, 0.0));
+    let made = look.guided(&look.seen.frame.image, &nothing, &map, beside);
+    let found = made.sightings.iter().find(|s| s.landmark == POSTER).expect("found");
+    assert!(off_px(&found.corners_px, &truth.corners_px) < 3.0, "{found:?}, truth {truth:?}");
+}
+
+#[test]
+fn nothing_is_found_in_another_picture_or_from_a_wrong_pose() {
+    let (look, map) = Look::new();
+    let (image, nothing) = (&look.seen.frame.image, FrameFacts { quads: Vec::new() });
+    let grey = GrayImage::from_fn(image.width(), image.height(), |_, _| 128);
+    assert_eq!(look.guided(&grey, &nothing, &map, look.truth()), Guided::default());
+    let mirrored = GrayImage::from_fn(image.width(), image.height(), |u, v| {
+        image.data()[v * image.width() + image.width() - 1 - u]
+    });
+    assert_eq!(look.guided(&mirrored, &nothing, &map, look.truth()).sightings, []);
+    // Half a metre off, believed to 3 cm.
+    let wrong = look.truth().compose(&Pose2::new(0.5, 0.0, 0.0));
+    let made = look.guided(image, &nothing, &map, wrong);
+    assert!(made.sightings.is_empty(), "{made:?}");
+    let facts = look.facts(&map);
+    let made = look.guided(image, &facts, &map, wrong);
+    assert!(made.report.contradictions > 0, "what the picture alone names speaks against the pose: {made:?}");
+}
+
+#[test]
+fn of_two_that_look_the_same_the_pose_says_which() {
+    let (look, map) = Look::new();
+    // Two metres: far beyond the gates.
+    let map = with_twin(&map, 2.0);
+    let facts = look.facts(&map);
+    assert!(verdicts::recognised(&facts).is_empty(), "neither is in use by itself");
+    let image = &look.seen.frame.image;
+    let made = look.guided(image, &facts, &map, look.truth());
+    let named: Vec<_> = made.sightings.iter().map(|s| (s.landmark, s.quad.is_some())).collect();
+    assert!(named.contains(&(POSTER, true)), "{named:?}");
+    assert!(!named.iter().any(|(id, _)| *id == TWIN), "{named:?}");
+    // Believed two metres further along the wall, the same picture is the twin: what is named by a pose proves nothing of
+    // that pose.
+    let place = map.landmarks[&POSTER].place.unwrap();
+    let along = Pose2::new(-2.0 * place.theta_rad.sin(), 2.0 * place.theta_rad.cos(), 0.0);
+    let there =
+        Pose2::new(look.truth().x_m + along.x_m, look.truth().y_m + along.y_m, look.truth().theta_rad);
+    let made = look.guided(image, &facts, &map, there);
+    let named: Vec<_> = made.sightings.iter().map(|s| s.landmark).collect();
+    assert!(named.contains(&TWIN) && !named.contains(&POSTER), "{named:?}");
+}
+
+#[test]
+fn a_class_of_which_one_hangs_nobody_knows_where_is_not_named() {
+    let (look, map) = Look::new();
+    let mut map = with_twin(&map, 2.0);
+    map.landmarks.get_mut(&TWIN).unwrap().place = None;
+    let facts = look.facts(&map);
+    let made = look.guided(&look.seen.frame.image, &facts, &map, look.truth());
+    assert!(made.sightings.iter().all(|s| s.landmark != POSTER), "{:?}", made.sightings);
+}
