@@ -17,6 +17,7 @@ use map::{
     pose2::Pose2Covariance,
     visibility::Obstacle,
 };
+use nalgebra::Matrix2;
 use std::{collections::BTreeSet, sync::Arc};
 use vision::{
     detect::quads::Corners,
@@ -46,6 +47,8 @@ pub struct GuidedSighting {
     pub landmark: LandmarkId,
     /// Its corners in the landmark's order; outside of the image where its border cuts it.
     pub corners_px: Corners,
+    /// Their covariances, px^2.
+    pub covariance_px2: [Matrix2<f64>; 4],
     /// Its pose.
     pub seen: LandmarkPose,
     /// What points say of it, where they decided.
@@ -201,7 +204,8 @@ fn sighting(may_be: &MayBe, landmark: LandmarkId, view: &View<'_>) -> Option<Gui
     let size = view.map.sizes.get(&landmark)?;
     let seen = landmark_pose(corners_px, covariance_px2, *size, view.camera?).ok()?;
     let (quad, points) = (may_be.quad, may_be.points.clone());
-    Some(GuidedSighting { quad, landmark, corners_px: *corners_px, seen, points })
+    let (corners_px, covariance_px2) = (*corners_px, *covariance_px2);
+    Some(GuidedSighting { quad, landmark, corners_px, covariance_px2, seen, points })
 }
 
 #[cfg(test)]

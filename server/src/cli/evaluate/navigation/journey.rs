@@ -21,6 +21,7 @@ use map::{
     changes::{Change, Standing},
     pose2::{Pose2, Pose2Covariance},
 };
+use nalgebra::Matrix2;
 use protos::Name;
 use sim::{
     building::LandmarkKind,
@@ -32,7 +33,7 @@ use std::{collections::BTreeMap, sync::Arc, time::Instant};
 use vision::{
     detect::quads::Corners,
     geometry::polygon,
-    pipeline::FrameFacts,
+    pipeline::{FrameFacts, matched},
     recognise::{LandmarkId, Recognition},
 };
 
@@ -72,6 +73,8 @@ pub(super) struct Journey {
     pub(super) false_matches: usize,
     /// Names given to something else by the pose.
     pub(super) guided_false: usize,
+    /// Corners of what was rightly named: how far off each is, px, and its squared Mahalanobis distance.
+    pub(super) corners: BTreeMap<&'static str, Vec<(f64, f64)>>,
     /// How often what was shown of each kind was rightly named.
     pub(super) named: BTreeMap<(&'static str, &'static str), Named>,
     /// Frames that showed a landmark up to the first fix, itself included; none if there never was one.
@@ -261,6 +264,10 @@ impl Journey {
             let found = quad.verdict.as_ref().and_then(|v| v.aligned_px).unwrap_or(quad.quad.corners_px);
             if is_there(id, &found) {
                 global.push(world.name(id));
+                let corners = quad.verdict.as_ref().and_then(|v| matched(&quad.quad, v, &world.map.params));
+                if let (Some(corners), Some(view)) = (corners, truth.landmark(world.name(id))) {
+                    self.corners.entry("by the picture").or_default().extend(off(&corners, view));
+                }
             } else {
                 self.false_matches += 1;
             }
@@ -269,6 +276,15 @@ impl Journey {
         for sighting in guided.iter().flat_map(|guided| &guided.sightings) {
             if is_there(sighting.landmark, &sighting.corners_px) {
                 with_pose.push(world.name(sighting.landmark));
+                if let Some(view) = truth.landmark(world.name(sighting.landmark)) {
+                    let group = match (sighting.quad, view.state) {
+                        (Some(_), _) => "detected, named by the pose",
+                        (None, ViewState::Truncated) => "asked for, cut",
+                        (None, _) => "asked for, not cut",
+                    };
+                    let corners = (sighting.corners_px, sighting.covariance_px2);
+                    self.corners.entry(group).or_default().extend(off(&corners, view));
+                }
             } else {
                 self.guided_false += 1;
             }
@@ -295,6 +311,18 @@ impl Journey {
         self.recognised += shown.iter().filter(|v| global.contains(&v.name.as_str())).count();
         !shown.is_empty()
     }
+}
+
+/// For each corner: how far off it is, px, and its squared Mahalanobis distance.
+fn off((corners_px, covariance_px2): &(Corners, [Matrix2<f64>; 4]), truth: &LandmarkView) -> Vec<(f64, f64)> {
+    let pairs = corners_px.points().iter().zip(truth.corners_px.points()).zip(covariance_px2);
+    pairs
+        .map(|((found, there), covariance)| {
+            let d = found - there;
+            let distance2 = covariance.cholesky().map_or(f64::INFINITY, |c| d.dot(&c.solve(&d)));
+            (d.norm(), distance2)
+        })
+        .collect()
 }
 
 fn kind(kind: LandmarkKind) -> &'static str {

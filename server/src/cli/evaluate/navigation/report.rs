@@ -65,6 +65,52 @@ fn rows(journeys: &[Journey]) -> Vec<Row> {
     all.into_iter().map(|((kind, state), named)| Row { kind, state, named }).collect()
 }
 
+/// Corners of rightly named landmarks.
+#[derive(Debug, Serialize)]
+struct CornerErrors {
+    named: &'static str,
+    corners: usize,
+    median_px: f64,
+    p90_px: f64,
+    /// Mean squared Mahalanobis distance of a corner, 2 expected; and the share of corners within 95 %.
+    nees: f64,
+    within_95: f64,
+}
+
+/// 95 % of chi2 with 2 degrees of freedom.
+const CHI2_2_95: f64 = 5.991;
+
+impl CornerErrors {
+    fn of(named: &'static str, all: &[(f64, f64)]) -> Option<Self> {
+        let mut errors: Vec<f64> = all.iter().map(|(px, _)| *px).collect();
+        let count = all.len().max(1) as f64;
+        Some(Self {
+            named,
+            corners: all.len(),
+            median_px: quantile(&mut errors, 0.5)?,
+            p90_px: quantile(&mut errors, 0.9)?,
+            nees: all.iter().map(|(_, d2)| d2).sum::<f64>() / count,
+            within_95: all.iter().filter(|(_, d2)| *d2 < CHI2_2_95).count() as f64 / count,
+        })
+    }
+
+    fn in_words(&self) -> String {
+        let Self { named, corners, median_px, p90_px, nees, within_95 } = self;
+        let within = 100.0 * within_95;
+        format!(
+            "  {named:<33} {corners:>6}   {median_px:>6.2}  {p90_px:>6.2}    {nees:>6.2}   {within:>5.1} %"
+        )
+    }
+}
+
+fn corner_errors(journeys: &[Journey]) -> Vec<CornerErrors> {
+    let mut all: BTreeMap<&'static str, Vec<(f64, f64)>> = BTreeMap::new();
+    for (named, corners) in journeys.iter().flat_map(|j| &j.corners) {
+        all.entry(named).or_default().extend(corners);
+    }
+    all.into_iter().filter_map(|(named, corners)| CornerErrors::of(named, &corners)).collect()
+}
+
 /// What is said of all drives. Along is the map's x axis.
 #[derive(Debug, Serialize)]
 pub(super) struct Report {
@@ -86,6 +132,7 @@ pub(super) struct Report {
     guided_false: usize,
     /// Of taught landmarks with sides of 38 px and more of which a quarter is seen, in use or not.
     named: Vec<Row>,
+    corners: Vec<CornerErrors>,
     /// The robots had one.
     laser: bool,
     /// By landmarks, and those that the filter did not believe.
@@ -149,6 +196,7 @@ impl Report {
             false_matches: of_each(|j| j.false_matches),
             guided_false: of_each(|j| j.guided_false),
             named: rows(journeys),
+            corners: corner_errors(journeys),
             laser,
             corrections: logged("landmarks", &APPLIED),
             gated: logged("landmarks", &["gated_out"]),
@@ -231,6 +279,10 @@ impl Report {
             "  named rightly                      by the picture    with a known pose".to_owned(),
         ];
         lines.extend(self.named.iter().map(Row::in_words));
+        lines.push(
+            "  corners of these                 number   median   90 %  NEES (2)  within 95 %".to_owned(),
+        );
+        lines.extend(self.corners.iter().map(CornerErrors::in_words));
         lines
     }
 }
