@@ -35,6 +35,10 @@ pub(crate) struct Args {
     /// Teach doors and windows, too.
     #[arg(long)]
     fittings: bool,
+    /// Teach by the truth: the corners of every photograph and the places of landmarks are exact. Only so can the corners of
+    /// what is named be judged.
+    #[arg(long)]
+    true_lessons: bool,
     /// Photographs that the first drive takes of each landmark.
     #[arg(long, default_value_t = 12, value_parser = clap::value_parser!(u32).range(1..=100))]
     views: u32,
@@ -87,6 +91,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         unique: args.unique as usize,
         points: args.points,
         fittings: args.fittings,
+        true_lessons: args.true_lessons,
         views: args.views as usize,
         exact: !args.own_errors,
         seed: args.seed,

@@ -16,7 +16,7 @@ use crate::{
 use anyhow::Context as _;
 use map::{
     laser_fix::WallIndex,
-    place::LandmarkPlace,
+    place::{LandmarkPlace, PlaceSigmas},
     segments::LaserSegment,
     visibility::{Obstacle, Viewer, VisibilityParams, visibility},
 };
@@ -60,6 +60,8 @@ pub(super) struct Course {
     pub(super) points: bool,
     /// Doors and windows are taught, too.
     pub(super) fittings: bool,
+    /// Corners of photographs and places of landmarks are exact.
+    pub(super) true_lessons: bool,
     /// Photographs of each landmark.
     pub(super) views: usize,
     /// The surveying robot's pose, camera and its seat are exactly what they are said to be.
@@ -88,8 +90,8 @@ struct Lesson {
 impl World {
     /// Builds the corridor, surveys it and learns its landmarks.
     pub(super) fn taught(course: Course) -> anyhow::Result<Self> {
-        let Course { length_m, posters, pictures, unique, points, fittings, views: photographs, exact, seed } =
-            course;
+        let Course { length_m, posters, pictures, unique, points, fittings, .. } = course;
+        let Course { true_lessons, views: photographs, exact, seed, .. } = course;
         let mut p = Params::default();
         p.recognise.verdict.points = points;
         let corridor = CorridorParams {
@@ -106,10 +108,16 @@ impl World {
         let camera = wrong.camera;
         let lesson = LessonParams { seed, views: photographs, fittings, ..LessonParams::default() };
         let stops = stops(&building, &lesson);
-        let survey = survey(robot, &stops, wrong)?;
+        let mut survey = survey(robot, &stops, wrong)?;
+        if true_lessons {
+            survey.views.iter_mut().for_each(|(name, looks)| take_true_corners(name, looks));
+        }
         let found: Vec<(&String, &Vec<Look>)> = survey.views.iter().collect();
         let lessons: Vec<Lesson> = of_each(&found, "views", |i, (name, looks)| {
-            let (place, agreed) = hang(looks, &survey.walls, &camera)?;
+            let (mut place, agreed) = hang(looks, &survey.walls, &camera)?;
+            if true_lessons {
+                place = true_place(&building, name)?;
+            }
             let looks: Vec<&Look> = agreed.iter().map(|&i| &looks[i]).collect();
             let views = views(&looks, mixed(&[seed, 12, i as u64]), &p);
             let each = views.iter().step_by(views.len().div_ceil(NEGATIVES).max(1));
@@ -211,6 +219,22 @@ fn snapshot(
         params,
         ..empty
     })
+}
+
+fn take_true_corners(name: &str, looks: &mut [Look]) {
+    for look in looks {
+        if let Some(truth) = look.sighting.frame.truth.landmark(name) {
+            look.quad.corners_px = truth.corners_px;
+        }
+    }
+}
+
+fn true_place(building: &Building, name: &str) -> Option<LandmarkPlace> {
+    let truth = building.landmark(name)?;
+    let size = LandmarkSize { width_m: truth.width_m, height_m: truth.height_m };
+    let normal = truth.map_from_landmark.rotation * nalgebra::Vector3::x();
+    let (at, theta_rad) = (truth.map_from_landmark.translation.vector, normal.y.atan2(normal.x));
+    LandmarkPlace::by_hand(at, theta_rad, size, PlaceSigmas::default()).ok()
 }
 
 fn place_error_m(building: &Building, lesson: &Lesson) -> anyhow::Result<f64> {
