@@ -8,6 +8,7 @@ mod earlier_database;
 mod evaluate;
 mod fit;
 mod gathered_drive;
+mod guided;
 mod hang_ups;
 mod http_contract;
 mod laser;
