@@ -1,0 +1,168 @@
+//! Workers without any transport: panics, late work, overload.
+
+use super::*;
+use crate::engine::{intake::Intake, scene};
+use protos::prost::Message;
+use std::{sync::Mutex, time::Duration};
+
+/// The analysis of this camera's frames panics.
+pub(super) const PLANTED: &str = "panics";
+
+#[derive(Default)]
+struct Sent(Mutex<Vec<v1::Answer>>);
+
+impl Publish for Sent {
+    fn answer(&self, _: &SlotKey, answer: &v1::Answer) {
+        self.0.lock().unwrap().push(answer.clone());
+    }
+
+    fn pose(&self, _: &Name, _: &v1::RobotPose) {}
+}
+
+fn intake(engine: &Engine, deadline: Duration) -> Intake {
+    let (slots, snapshots) = (engine.slots.clone(), engine.snapshots.clone());
+    Intake { slots, snapshots, motion: engine.motion.clone(), frame_bytes: 100_000, deadline }
+}
+
+fn key(camera: usize) -> SlotKey {
+    SlotKey { robot: Name::new("r1").unwrap(), camera: Name::new(format!("c{camera}")).unwrap() }
+}
+
+fn message(seq: u64, bytes: usize) -> protos::prost::bytes::Bytes {
+    let encoding = v1::ImageEncoding::Gray8.into();
+    let image = vec![0; bytes].into();
+    let frame =
+        v1::Frame { epoch: 1, seq, encoding, width_px: 32, height_px: 24, image, ..v1::Frame::default() };
+    frame.encode_to_vec().into()
+}
+
+fn hall() -> Engine {
+    scene::engine(&[Arc::new(MapSnapshot::empty("hall", 1))])
+}
+
+/// Panics where it is told to.
+#[derive(Default)]
+struct Breaks {
+    answers: bool,
+    sent: Sent,
+}
+
+impl Publish for Breaks {
+    fn answer(&self, key: &SlotKey, answer: &v1::Answer) {
+        assert!(!self.answers, "planted");
+        self.sent.answer(key, answer);
+    }
+
+    fn pose(&self, _: &Name, _: &v1::RobotPose) {}
+}
+
+fn settled(engine: &Engine) -> crate::engine::slots::FrameCounts {
+    loop {
+        let counts = engine.slots.counts();
+        if counts.waiting == 0 && counts.in_work == 0 {
+            return counts;
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+/// Outside the analysis: where the answer is handed over.
+#[test]
+fn a_panic_beside_the_analysis_leaves_the_camera_usable() {
+    let (engine, breaks) = (hall(), Arc::new(Breaks { answers: true, ..Breaks::default() }));
+    let workers = Workers::start(&engine, 1, &breaks).unwrap();
+    let intake = intake(&engine, Duration::from_mins(1));
+    for seq in 1..=2 {
+        intake.receive(key(0), message(seq, 768)).unwrap();
+        let counts = settled(&engine);
+        assert_eq!((counts.processed, counts.missing()), (seq, 0));
+    }
+    assert_eq!(engine.vitals.panics().at(Edge::Frame), 2);
+    assert_eq!(engine.vitals.failure(), None);
+    engine.vitals.stop();
+    workers.stop();
+}
+
+/// Inside it: answered, once.
+#[test]
+fn a_panic_of_the_analysis_is_answered_and_counted() {
+    let (engine, sent) = (hall(), Sent::default());
+    intake(&engine, Duration::from_mins(1)).receive(key(0), message(1, 768)).unwrap();
+    let (_, job) = engine.slots.try_take().unwrap();
+    let k = SlotKey { robot: key(0).robot, camera: Name::new(PLANTED).unwrap() };
+    let outcome = engine.contained(&k, &job, &sent);
+    let answer = sent.0.lock().unwrap().pop().unwrap();
+    assert!(sent.0.lock().unwrap().is_empty());
+    let code = answer.rejection.map(|r| r.code);
+    assert_eq!((outcome, code.as_deref()), (Outcome::Rejected(Code::Internal), Some("internal")));
+    assert_eq!(engine.vitals.panics().at(Edge::Frame), 1);
+}
+
+#[test]
+fn a_thread_that_ends_untold_is_a_failure() {
+    let engine = hall();
+    let workers = Workers::start(&engine, 1, &Arc::new(Sent::default())).unwrap();
+    assert_eq!(engine.vitals.failure(), None);
+    // No frames any more, and nobody has told the server to stop.
+    engine.slots.close();
+    let started = Instant::now();
+    let failure = loop {
+        if let Some(failure) = engine.vitals.failure() {
+            break failure;
+        }
+        assert!(started.elapsed() < Duration::from_secs(5));
+        std::thread::sleep(Duration::from_millis(1));
+    };
+    assert_eq!(failure.part, "the worker thread vision-0");
+    workers.stop();
+}
+
+#[test]
+fn late_work_is_not_begun() {
+    let (engine, sent) = (hall(), Sent::default());
+    intake(&engine, Duration::ZERO).receive(key(0), message(1, 768)).unwrap();
+    let (k, job) = engine.slots.try_take().unwrap();
+    std::thread::sleep(Duration::from_millis(2));
+    assert_eq!(engine.contained(&k, &job, &sent), Outcome::Expired);
+    let answer = sent.0.lock().unwrap().pop().unwrap();
+    assert_eq!((answer.status(), answer.seq, answer.timings.len()), (v1::Status::Expired, 1, 0));
+}
+
+#[test]
+fn a_map_that_is_gone_is_a_refusal() {
+    let (engine, sent) = (hall(), Sent::default());
+    intake(&engine, Duration::from_secs(9)).receive(key(0), message(1, 768)).unwrap();
+    engine.snapshots.remove_map("hall");
+    let (k, job) = engine.slots.try_take().unwrap();
+    assert_eq!(engine.contained(&k, &job, &sent), Outcome::Rejected(Code::UnknownMap));
+}
+
+/// Far more frames than the pool can take: each is answered or superseded, none is lost, none answered twice.
+#[test]
+fn overload_conserves_frames() {
+    let (engine, sent) = (hall(), Arc::new(Sent::default()));
+    let workers = Workers::start(&engine, 2, &sent).unwrap();
+    let intake = intake(&engine, Duration::from_mins(1));
+    let (cameras, frames) = (4, 200);
+    for seq in 1..=frames {
+        for camera in 0..cameras {
+            intake.receive(key(camera), message(seq, 768)).unwrap();
+        }
+        if seq % 50 == 0 {
+            intake.receive(key(0), message(seq, 768)).unwrap_err();
+        }
+    }
+    while engine.slots.counts().waiting > 0 {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    workers.stop();
+    let counts = engine.slots.counts();
+    assert_eq!((counts.missing(), counts.in_work, counts.waiting), (0, 0, 0));
+    assert_eq!(counts.received, cameras as u64 * frames + 4);
+    assert_eq!(counts.rejected_total(), 4);
+    let answers = sent.0.lock().unwrap();
+    assert_eq!(answers.len() as u64, counts.processed);
+    let last = answers.iter().filter(|a| a.seq == frames).count();
+    assert_eq!(last, cameras, "the newest of each camera is always answered");
+    assert!(counts.superseded > 0);
+}
