@@ -2,7 +2,7 @@
 //!
 //! In: an image, the landmark's model, its expected corners. Out: [`Found`]: its corners with covariance and how much the
 //! picture speaks for it, or nothing. Points find it also where the image border cuts it or something hides a part of it;
-//! a landmark without points is laid on its icon, and must be in view as a whole.
+//! where they say nothing it is laid on its icon, and must be in view as a whole.
 
 use super::{
     DistanceKind, LandmarkId, Recognition,
@@ -42,6 +42,16 @@ pub struct Found {
     pub points: Option<PointEvidence>,
 }
 
+/// What points say of an expected landmark.
+enum Said {
+    /// It is there.
+    Found(Found),
+    /// Its points are there while a part of it shows something else.
+    Doubtful,
+    /// Nothing.
+    Silent,
+}
+
 /// Looks for landmark `id` of `models` at `expected_px`. `None`: the picture does not show it there, or it is in doubt.
 pub fn expected(
     image: &GrayImage,
@@ -50,32 +60,54 @@ pub fn expected(
     models: &ModelSet,
     p: &Params,
 ) -> Option<Found> {
-    let model = models.get(id)?;
     let is_whole = expected_px.points().iter().all(|c| is_inside(image, c));
-    if !model.points.is_empty() {
-        let mut evidence = verify_at(image, &model.points, expected_px)?;
-        let is_doubtful = evidence.agreement.largest_disagreement() >= DOUBTFUL_PARTS;
-        if is_doubtful || evidence.log10_nfa > LOG10_EPSILON_EXPECTED {
-            return None;
-        }
-        if is_whole {
-            sharpened(image, &mut evidence, model, models, p);
-        }
-        if !is_well_known(&evidence.corners_px, &evidence.corner_covariance_px2) {
-            return None;
-        }
-        return Some(Found {
-            corners_px: evidence.corners_px,
-            covariance_px2: evidence.corner_covariance_px2,
-            picture_nats: -evidence.log10_nfa * std::f64::consts::LN_10,
-            points: Some(evidence),
-        });
+    match by_points(image, expected_px, (id, is_whole), models, p) {
+        Said::Found(found) => Some(found),
+        Said::Doubtful => None,
+        Said::Silent => is_whole.then(|| by_icon(image, expected_px, id, models, p)).flatten(),
     }
-    if !is_whole {
-        return None;
+}
+
+fn by_points(
+    image: &GrayImage,
+    expected_px: &Corners,
+    (id, is_whole): (LandmarkId, bool),
+    models: &ModelSet,
+    p: &Params,
+) -> Said {
+    let Some(model) = models.get(id).filter(|model| !model.points.is_empty()) else { return Said::Silent };
+    let Some(mut evidence) = verify_at(image, &model.points, expected_px) else { return Said::Silent };
+    if evidence.agreement.largest_disagreement() >= DOUBTFUL_PARTS {
+        return Said::Doubtful;
     }
-    let quad = as_quad(expected_px);
-    let verdict = recognise(image, &quad, &models.only(id)?, DistanceKind::Both, p);
+    if evidence.log10_nfa > LOG10_EPSILON_EXPECTED {
+        return Said::Silent;
+    }
+    if is_whole {
+        sharpened(image, &mut evidence, model, models, p);
+    }
+    if !is_well_known(&evidence.corners_px, &evidence.corner_covariance_px2) {
+        return Said::Silent;
+    }
+    Said::Found(Found {
+        corners_px: evidence.corners_px,
+        covariance_px2: evidence.corner_covariance_px2,
+        picture_nats: -evidence.log10_nfa * std::f64::consts::LN_10,
+        points: Some(evidence),
+    })
+}
+
+fn by_icon(
+    image: &GrayImage,
+    expected_px: &Corners,
+    id: LandmarkId,
+    models: &ModelSet,
+    p: &Params,
+) -> Option<Found> {
+    // Points had their say.
+    let mut by_icons = p.clone();
+    by_icons.recognise.verdict.points = false;
+    let verdict = recognise(image, &as_quad(expected_px), &models.only(id)?, DistanceKind::Both, &by_icons);
     let (Recognition::Unique(_), Some(corners_px)) = (verdict.recognition, verdict.aligned_px) else {
         return None;
     };
