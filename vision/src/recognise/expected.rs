@@ -45,7 +45,7 @@ pub struct Found {
 /// What points say of an expected landmark.
 enum Said {
     /// It is there.
-    Found(Found),
+    Found(Box<Found>),
     /// Its points are there while a part of it shows something else.
     Doubtful,
     /// Nothing.
@@ -62,7 +62,7 @@ pub fn expected(
 ) -> Option<Found> {
     let is_whole = expected_px.points().iter().all(|c| is_inside(image, c));
     match by_points(image, expected_px, (id, is_whole), models, p) {
-        Said::Found(found) => Some(found),
+        Said::Found(found) => Some(*found),
         Said::Doubtful => None,
         Said::Silent => is_whole.then(|| by_icon(image, expected_px, id, models, p)).flatten(),
     }
@@ -89,12 +89,12 @@ fn by_points(
     if !is_well_known(&evidence.corners_px, &evidence.corner_covariance_px2) {
         return Said::Silent;
     }
-    Said::Found(Found {
+    Said::Found(Box::new(Found {
         corners_px: evidence.corners_px,
         covariance_px2: evidence.corner_covariance_px2,
         picture_nats: -evidence.log10_nfa * std::f64::consts::LN_10,
         points: Some(evidence),
-    })
+    }))
 }
 
 fn by_icon(

@@ -16,6 +16,7 @@ use world::{Course, World};
 
 /// `waymark evaluate navigation`.
 #[derive(Debug, clap::Args)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a switch of the experiment")]
 pub(crate) struct Args {
     /// Drives, one length of the corridor each, from both ends in turn.
     #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=1000))]

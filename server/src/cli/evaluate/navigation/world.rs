@@ -48,6 +48,7 @@ pub(super) const MAP: &str = "corridor";
 
 /// A corridor and how it is taught.
 #[derive(Debug, Clone, Copy)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a switch of the experiment")]
 pub(super) struct Course {
     pub(super) length_m: f64,
     /// Posters that hang there.
