@@ -7,7 +7,7 @@
 #![expect(clippy::print_stdout, reason = "an example shows its results")]
 
 use clap::Parser;
-use client::{Capture, ClientError, Delivery, RobotClient, RobotOptions, v1};
+use client::{Capture, ClientError, Delivery, RobotClient, RobotOptions, named_landmarks, v1};
 use std::{path::PathBuf, time::Duration};
 
 /// Send photographs to a running Waymark server as robot ROBOT and print the answers.
@@ -44,9 +44,15 @@ async fn main() -> Result<(), anyhow::Error> {
         let capture = Capture::encoded(image)?;
         let answer = robot.recognise("camera", capture, Duration::from_secs(30)).await?;
         println!("[{}/{count}] {}: {}", i + 1, path.display(), sentence(&answer));
-        for quad in answer.quads.iter().filter(|q| q.verdict() != v1::Verdict::Unknown) {
-            let at: Vec<_> = quad.corners.iter().map(|c| format!("({:.0}, {:.0})", c.u_px, c.v_px)).collect();
-            println!("    {} with confidence {:.2} at {}", quad.landmark, quad.confidence, at.join(" "));
+        for named in named_landmarks(&answer) {
+            let at = named.quad.corners.iter().map(|c| format!("({:.0}, {:.0})", c.u_px, c.v_px));
+            let at = at.collect::<Vec<_>>().join(" ");
+            // What the pose named starts none: `answer.map_from_robot` rests on the others alone.
+            let how = match named.sighting {
+                v1::Sighting::Guided => ", named by the pose known before,".to_owned(),
+                _ => format!(" with confidence {:.2}", named.quad.confidence),
+            };
+            println!("    {}{how} at {at}", named.name);
         }
     }
     robot.close().await?;

@@ -1,6 +1,7 @@
 //! What travels over HTTP as JSON: maps, landmarks, views, jobs, robots, problems. Shapes only, names with
 //! units; unknown fields are ignored so that a newer server can say more.
 
+use protos::v1::PoseTrust;
 use serde::{Deserialize, Serialize};
 use vision::recognise::DistanceKind;
 
@@ -312,6 +313,24 @@ pub struct RobotPose {
     pub covariance: [f64; 9],
     /// Since the capture of what supports it.
     pub age_ms: f64,
+    /// How far it is trusted; unspecified where the server does not say, or says a word that is not known here.
+    #[serde(with = "trust_word")]
+    pub trust: PoseTrust,
+}
+
+mod trust_word {
+    use protos::v1::PoseTrust;
+    use serde::{Deserialize, Deserializer, Serializer};
+
+    #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
+    pub(super) fn serialize<S: Serializer>(trust: &PoseTrust, to: S) -> Result<S::Ok, S::Error> {
+        protos::json::pose_trust::serialize(&i32::from(*trust), to)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<PoseTrust, D::Error> {
+        let word = String::deserialize(from)?;
+        Ok(PoseTrust::from_str_name(&format!("POSE_TRUST_{}", word.to_uppercase())).unwrap_or_default())
+    }
 }
 
 /// An error of the server (RFC 9457).
@@ -328,4 +347,23 @@ pub struct Problem {
     pub field: Option<String>,
     /// What happened.
     pub detail: Option<String>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_trust_of_a_pose_is_read_and_unknown_words_are_no_fault() {
+        let trust = |fields: &str| {
+            let text = format!(r#"{{"name":"r1","map":"hall","pose":{{"x_m":1.0{fields}}}}}"#);
+            serde_json::from_str::<Robot>(&text).unwrap().pose.unwrap().trust
+        };
+        assert_eq!(trust(r#","trust":"contradicted""#), PoseTrust::Contradicted);
+        // A server from before there was trust, and one from after another word.
+        assert_eq!(trust(""), PoseTrust::Unspecified);
+        assert_eq!(trust(r#","trust":"certified""#), PoseTrust::Unspecified);
+        let pose = RobotPose { trust: PoseTrust::Stale, ..RobotPose::default() };
+        assert_eq!(serde_json::to_value(pose).unwrap()["trust"], "stale");
+    }
 }

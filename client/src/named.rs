@@ -1,0 +1,87 @@
+//! The landmarks that an answer names, and how each was named. In: an answer. Out: one item for each named quad.
+
+use protos::v1::{Answer, QuadAnswer, Sighting, Verdict};
+
+/// A quad that has a landmark's name.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NamedLandmark<'a> {
+    /// The landmark.
+    pub name: &'a str,
+    /// [`Sighting::Global`]: the picture alone names it; it may start a pose. [`Sighting::Guided`]: the pose known before
+    /// names it; it may correct that pose, and says nothing to a program that does not know where the robot is.
+    pub sighting: Sighting,
+    /// Where it is in the image, and its pose.
+    pub quad: &'a QuadAnswer,
+}
+
+impl NamedLandmark<'_> {
+    /// The pose known before names it.
+    pub fn is_guided(&self) -> bool {
+        self.sighting == Sighting::Guided
+    }
+}
+
+/// The landmark that a quad is, and how it was named; none for a quad without a name.
+///
+/// A server from before guided recognition does not say how: what it names is global. A name of a kind that is not known
+/// here is none.
+pub fn named(quad: &QuadAnswer) -> Option<NamedLandmark<'_>> {
+    let sighting = Sighting::try_from(quad.sighting).ok()?;
+    let (name, sighting) = match sighting {
+        Sighting::Guided => (&quad.guided_landmark, Sighting::Guided),
+        Sighting::Global | Sighting::Unspecified => (&quad.landmark, Sighting::Global),
+    };
+    let is_named = !name.is_empty() && (sighting == Sighting::Guided || quad.verdict() == Verdict::Unique);
+    is_named.then_some(NamedLandmark { name, sighting, quad })
+}
+
+/// Every landmark that an answer names, in the order of its quads.
+pub fn named_landmarks(answer: &Answer) -> impl Iterator<Item = NamedLandmark<'_>> {
+    answer.quads.iter().filter_map(named)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use protos::v1::QuadKind;
+
+    fn global(name: &str) -> QuadAnswer {
+        let (verdict, sighting) = (Verdict::Unique.into(), Sighting::Global.into());
+        QuadAnswer { verdict, sighting, landmark: name.into(), ..QuadAnswer::default() }
+    }
+
+    fn guided(name: &str, verdict: Verdict) -> QuadAnswer {
+        let (verdict, sighting) = (verdict.into(), Sighting::Guided.into());
+        QuadAnswer { verdict, sighting, guided_landmark: name.into(), ..QuadAnswer::default() }
+    }
+
+    #[test]
+    fn each_name_comes_with_how_it_was_given() {
+        let expected = QuadAnswer { kind: QuadKind::Expected.into(), ..guided("window", Verdict::Unknown) };
+        let nameless = QuadAnswer { verdict: Verdict::Unknown.into(), ..QuadAnswer::default() };
+        let quads = vec![guided("door-3", Verdict::Ambiguous), nameless, global("poster"), expected];
+        let answer = Answer { quads, ..Answer::default() };
+        let named: Vec<_> = named_landmarks(&answer).map(|n| (n.name, n.sighting, n.is_guided())).collect();
+        assert_eq!(
+            named,
+            [
+                ("door-3", Sighting::Guided, true),
+                ("poster", Sighting::Global, false),
+                ("window", Sighting::Guided, true),
+            ]
+        );
+        assert_eq!(named_landmarks(&answer).nth(2).unwrap().quad.kind(), QuadKind::Expected);
+    }
+
+    #[test]
+    fn what_a_server_names_that_does_not_say_how_is_global() {
+        let old = QuadAnswer { sighting: Sighting::Unspecified.into(), ..global("poster") };
+        assert_eq!(named(&old).map(|n| (n.name, n.sighting)), Some(("poster", Sighting::Global)));
+    }
+
+    #[test]
+    fn a_name_of_an_unknown_kind_is_none() {
+        let new = QuadAnswer { sighting: 7, ..global("poster") };
+        assert_eq!(named(&new), None);
+    }
+}
