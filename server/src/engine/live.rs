@@ -9,14 +9,14 @@ use protos::{
     prost::bytes::Bytes,
     v1,
 };
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 use std::{
     collections::{BTreeMap, VecDeque},
     sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
 use tokio::sync::broadcast;
 
-use super::{cameras::Cameras, slots::SlotKey};
+use super::{cameras::Cameras, motion::MAX_ROBOTS, slots::SlotKey};
 
 /// Cameras whose last frame is kept; the one longest without a frame gives way.
 pub const MAX_CAMERAS: usize = 32;
@@ -109,6 +109,9 @@ pub enum LiveEvent {
         corrections: u64,
         /// From the capture of what supports it to its publication.
         age_ms: f64,
+        /// How far it is trusted.
+        #[serde(serialize_with = "trust_word")]
+        trust: v1::PoseTrust,
     },
     /// Odometry, laid on the map.
     Odometry {
@@ -146,6 +149,11 @@ pub enum LiveEvent {
     },
 }
 
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
+fn trust_word<S: Serializer>(trust: &v1::PoseTrust, to: S) -> Result<S::Ok, S::Error> {
+    protos::json::pose_trust::serialize(&i32::from(*trust), to)
+}
+
 impl LiveEvent {
     /// Name of the event in a stream of events.
     pub fn kind(&self) -> &'static str {
@@ -177,6 +185,8 @@ struct State {
     /// With the count of frames at its last frame: the smallest is the stalest.
     frames: BTreeMap<SlotKey, (u64, LiveFrame)>,
     tracks: BTreeMap<Name, (u64, Tracks)>,
+    /// Of each robot's last published pose: the map it is in, and how far it is trusted.
+    trust: BTreeMap<Name, (String, v1::PoseTrust)>,
     ticks: u64,
 }
 
@@ -226,6 +236,12 @@ impl LiveHub {
         self.lock().tracks.get(robot).map(|(_, tracks)| tracks.clone())
     }
 
+    /// How far a robot's last published pose is trusted, if that is on this map.
+    pub fn trust(&self, robot: &Name, map: &str) -> Option<v1::PoseTrust> {
+        let state = self.lock();
+        state.trust.get(robot).filter(|(on, _)| on == map).map(|(_, trust)| *trust)
+    }
+
     /// Keeps the frame as its camera's last and tells of its answer.
     pub fn answered(&self, key: &SlotKey, frame: LiveFrame) {
         let answer = frame.answer.clone();
@@ -247,9 +263,17 @@ impl LiveHub {
         self.tell(LiveEvent::Answer { robot: key.robot.clone(), camera: key.camera.clone(), answer });
     }
 
-    /// A fused pose.
-    pub fn fused(&self, robot: &Name, map: &str, pose: &Pose2Covariance, (corrections, age_ms): (u64, f64)) {
+    /// A fused pose, with the corrections so far, its age, and how far it is trusted.
+    pub fn fused(
+        &self,
+        robot: &Name,
+        map: &str,
+        pose: &Pose2Covariance,
+        (corrections, age_ms): (u64, f64),
+        trust: v1::PoseTrust,
+    ) {
         self.extend(robot, TrackKind::Pose, pose.pose);
+        self.trusted(robot, map, trust);
         self.tell(LiveEvent::Pose {
             robot: robot.clone(),
             map: map.to_owned(),
@@ -257,6 +281,7 @@ impl LiveHub {
             covariance: pose.covariance.transpose().as_slice().to_vec(),
             corrections,
             age_ms,
+            trust,
         });
     }
 
@@ -282,6 +307,13 @@ impl LiveHub {
     /// A map changed.
     pub fn map_changed(&self, map: String, version: Option<u64>) {
         self.tell(LiveEvent::MapChanged { map, version });
+    }
+
+    fn trusted(&self, robot: &Name, map: &str, trust: v1::PoseTrust) {
+        let mut state = self.lock();
+        if state.trust.len() < MAX_ROBOTS || state.trust.contains_key(robot) {
+            state.trust.insert(robot.clone(), (map.to_owned(), trust));
+        }
     }
 
     fn extend(&self, robot: &Name, kind: TrackKind, pose: Pose2) {
@@ -389,9 +421,29 @@ mod tests {
         assert_eq!(json["pose"]["y_m"], 2.0);
         assert_eq!(events.try_recv().unwrap().kind(), "presence");
         let pose = Pose2Covariance { pose: Pose2::default(), covariance: nalgebra::Matrix3::identity() };
-        hub.fused(&name("r1"), "hall", &pose, (2, 7.5));
+        hub.fused(&name("r1"), "hall", &pose, (2, 7.5), v1::PoseTrust::Contradicted);
         let json = serde_json::to_value(&*events.try_recv().unwrap()).unwrap();
         assert_eq!((&json["corrections"], &json["age_ms"]), (&2.into(), &7.5.into()));
+        assert_eq!(json["trust"], "contradicted");
+    }
+
+    #[test]
+    fn the_trust_is_that_of_the_last_pose_on_its_map() {
+        let (hub, r1) = (LiveHub::default(), name("r1"));
+        let pose = Pose2Covariance { pose: Pose2::default(), covariance: nalgebra::Matrix3::identity() };
+        assert_eq!(hub.trust(&r1, "hall"), None);
+        for trust in [v1::PoseTrust::Supported, v1::PoseTrust::Stale] {
+            hub.fused(&r1, "hall", &pose, (1, 0.0), trust);
+            assert_eq!(hub.trust(&r1, "hall"), Some(trust));
+        }
+        // The robot was given another map, and no pose has been published there yet.
+        assert_eq!(hub.trust(&r1, "yard"), None);
+        for r in 0..MAX_ROBOTS {
+            hub.trusted(&name(&format!("robot-{r}")), "hall", v1::PoseTrust::Supported);
+        }
+        assert_eq!(hub.lock().trust.len(), MAX_ROBOTS);
+        hub.trusted(&r1, "yard", v1::PoseTrust::Unsupported);
+        assert_eq!(hub.trust(&r1, "yard"), Some(v1::PoseTrust::Unsupported));
     }
 
     #[test]

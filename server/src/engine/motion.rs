@@ -296,7 +296,7 @@ impl Motion {
             return None;
         }
         let age_ms = age.as_secs_f64() * 1e3;
-        self.live.fused(robot, map, &fused.pose, (fused.corrections, age_ms));
+        self.live.fused(robot, map, &fused.pose, (fused.corrections, age_ms), trust);
         Some(v1::RobotPose {
             epoch,
             captured_ns: fused.at_ns,

@@ -93,8 +93,10 @@ struct TracksBody {
     truth: Vec<v1::Pose2>,
 }
 
-/// Follows a map: events `answer`, `pose`, `odometry`, `truth`, `presence`, `map_changed` as they happen. A reader that
-/// is too slow misses events and gets `missed` with their number.
+/// Follows a map: events `answer`, `pose`, `odometry`, `truth`, `presence`, `map_changed` as they happen. A `pose` has the
+/// word of its `trust`: `unspecified`, `unsupported`, `supported`, `stale` or `contradicted`, as in the list of robots. In an
+/// `answer`, `sighting` of a quad says whether the picture alone names its landmark (`global`) or the pose known before
+/// (`guided`). A reader that is too slow misses events and gets `missed` with their number.
 #[utoipa::path(get, path = "/maps/{map}/live", tag = "maps", params(("map" = String, Path)),
     responses((status = 200, content_type = "text/event-stream"), (status = 404, body = Problem),
     (status = 503, body = Problem, description = "too_many_streams")))]

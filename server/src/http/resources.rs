@@ -4,6 +4,7 @@ use super::error::ApiError;
 use crate::{
     engine::{
         epochs::Conflict,
+        live::LiveHub,
         motion::{Known, Motion},
     },
     store::{
@@ -22,7 +23,7 @@ use map::{
     pose2::{Pose2, Pose2Covariance},
 };
 use nalgebra::{Matrix3, Vector3};
-use protos::Name;
+use protos::{Name, v1};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use std::time::Instant;
@@ -409,19 +410,51 @@ pub(super) struct RobotPose {
     pub(super) covariance: [f64; 9],
     /// Since the capture of the newest odometry or fix that supports it; at most 2000.
     pub(super) age_ms: f64,
+    /// How far it is trusted, as it was last published.
+    pub(super) trust: PoseTrust,
+}
+
+/// How far a fused pose is trusted, by the landmarks that were named without it (globally). Those that were named by it
+/// (guided) say nothing of it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum PoseTrust {
+    /// No frame was compared with it yet: it comes from another map, or was not published yet.
+    Unspecified,
+    /// None has agreed with it yet.
+    Unsupported,
+    /// They have agreed with it lately.
+    Supported,
+    /// The last that agreed is 30 frames or 10 m back.
+    Stale,
+    /// The last one contradicts it. Nothing guided corrects it meanwhile.
+    Contradicted,
+}
+
+impl From<v1::PoseTrust> for PoseTrust {
+    fn from(trust: v1::PoseTrust) -> Self {
+        match trust {
+            v1::PoseTrust::Unspecified => Self::Unspecified,
+            v1::PoseTrust::Unsupported => Self::Unsupported,
+            v1::PoseTrust::Supported => Self::Supported,
+            v1::PoseTrust::Stale => Self::Stale,
+            v1::PoseTrust::Contradicted => Self::Contradicted,
+        }
+    }
 }
 
 impl Robot {
     /// A registered robot with what is known of it now.
-    pub(super) fn new(row: RobotRow, motion: &Motion) -> Self {
+    pub(super) fn new(row: RobotRow, motion: &Motion, live: &LiveHub) -> Self {
         let now = Instant::now();
         let robot = Name::new(row.name.as_str()).ok();
         let status = robot.as_ref().map(|robot| motion.epochs().status(robot, now)).unwrap_or_default();
-        let known = robot.and_then(|robot| motion.known(&robot, now)).filter(|known| known.map == row.map);
-        let pose = known.map(|Known { fused, age, .. }| {
+        let known = robot.as_ref().and_then(|robot| motion.known(robot, now));
+        let pose = known.filter(|known| known.map == row.map).map(|Known { fused, age, .. }| {
             let Pose2 { x_m, y_m, theta_rad } = fused.pose.pose;
             let covariance = row_major(&fused.pose.covariance);
-            RobotPose { x_m, y_m, theta_rad, covariance, age_ms: age.as_secs_f64() * 1e3 }
+            let trust = robot.and_then(|robot| live.trust(&robot, &row.map)).unwrap_or_default().into();
+            RobotPose { x_m, y_m, theta_rad, covariance, age_ms: age.as_secs_f64() * 1e3, trust }
         });
         let (alive, epoch, conflict) = (status.alive, status.epoch, status.conflict);
         Self { name: row.name, map: row.map, alive, epoch, conflict, pose }

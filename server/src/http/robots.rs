@@ -38,11 +38,11 @@ async fn put(
     let write = app
         .store
         .write(move |tx| Box::pin(async move { robots::put(tx, robot.as_str(), &to.map, max).await }));
-    Ok(Json(Robot::new(write.await?, &app.motion)))
+    Ok(Json(Robot::new(write.await?, &app.motion, &app.live)))
 }
 
 /// Lists robots by name, with what is known of each: whether its software is connected, whether a second program uses its
-/// name, its pose and how old that is.
+/// name, its pose, how old that is and how far it is trusted.
 #[utoipa::path(get, path = "/robots", tag = "robots", params(PageQuery),
     responses((status = 200, body = Page<Robot>)))]
 async fn list(
@@ -51,14 +51,14 @@ async fn list(
 ) -> Result<Json<Page<Robot>>, ApiError> {
     let limit = page.limit(app.config.limits.page)?;
     let rows = robots::page(app.store.reads(), &page.after(), limit + 1).await?;
-    Ok(Json(Page::new(rows, limit, |r| r.name.clone(), |r| Robot::new(r, &app.motion))))
+    Ok(Json(Page::new(rows, limit, |r| r.name.clone(), |r| Robot::new(r, &app.motion, &app.live))))
 }
 
 /// One robot.
 #[utoipa::path(get, path = "/robots/{robot}", tag = "robots", params(("robot" = String, Path)),
     responses((status = 200, body = Robot), (status = 404, body = Problem)))]
 async fn get(State(app): State<Shared>, At(robot): At<String>) -> Result<Json<Robot>, ApiError> {
-    Ok(Json(Robot::new(robots::get(app.store.reads(), &robot).await?, &app.motion)))
+    Ok(Json(Robot::new(robots::get(app.store.reads(), &robot).await?, &app.motion, &app.live)))
 }
 
 /// Forgets a robot; its frames are rejected from now on.
@@ -78,8 +78,10 @@ async fn delete(State(app): State<Shared>, At(robot): At<String>) -> Result<Stat
     Ok(StatusCode::NO_CONTENT)
 }
 
-/// What the robot's pose rests on, and what became of its fixes: by landmarks, and by laser scans laid on the map's walls.
-/// Since the server started; the latest 200 of each modality.
+/// What the robot's pose rests on, and what became of its fixes: by landmarks that were named without the pose
+/// (`landmarks`), by landmarks that were named by the pose (`guided`), and by laser scans laid on the map's walls (`laser`).
+/// A guided fix corrects a pose that the others support; it never starts, supports or replaces one. Since the server
+/// started; the latest 200 of each modality.
 #[utoipa::path(get, path = "/robots/{robot}/corrections", tag = "robots", params(("robot" = String, Path)),
     responses((status = 200, body = Corrections), (status = 404, body = Problem)))]
 async fn corrections(

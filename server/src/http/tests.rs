@@ -12,6 +12,7 @@ use axum::{
     http::{Request, Response, header},
 };
 use serde_json::Value;
+use std::time::Instant;
 use tower::ServiceExt;
 use vision::recognise::DistanceKind;
 
@@ -257,4 +258,64 @@ async fn a_known_path_may_be_as_long_as_it_is_promised() {
     assert_eq!((status, &problem["code"]), (404, &"not_recording".into()), "{problem}");
     let (status, problem) = read(service.ask(path(MAX_REFERENCE + 1)).await).await;
     assert_eq!((status, &problem["code"]), (422, &"too_many".into()), "{problem}");
+}
+
+/// A robot whose odometry says that it is 7 m less far than it is: a frame a second with the landmark of this number, that
+/// puts it there.
+fn framed(service: &Service, seconds: u64, (landmark, x_m): (u64, f64)) {
+    use crate::engine::motion::{FrameFixes, Moment};
+    use ::map::{
+        localise::{DecidedBy, Fix, Modality, RobotFix},
+        pose2::{Pose2, Pose2Covariance},
+    };
+    let (r1, front) = (protos::Name::new("r1").unwrap(), protos::Name::new("front").unwrap());
+    let odometry = Pose2::new(seconds as f64 * 0.1, 0.0, 0.0);
+    let captured_ns = seconds as i64 * 1_000_000_000;
+    let at = Moment { map: "hall", epoch: 1, captured_ns, odometry: Some(odometry), now: Instant::now() };
+    let prior = service.engine.motion.grounds(&r1, &front, at).map(|grounds| grounds.pose);
+    let covariance = nalgebra::Matrix3::identity() * 1e-4;
+    let fix = RobotFix::Fixed(Box::new(Fix {
+        modality: Modality::Landmarks,
+        pose: Pose2Covariance { pose: Pose2::new(x_m, 0.0, 0.0), covariance },
+        noise: covariance,
+        nuisances: Vec::new(),
+        landmarks: vec![vision::recognise::LandmarkId(landmark)],
+        decided_by: DecidedBy::Single,
+        chi2: 1.0,
+        dof: 5,
+    }));
+    let says = FrameFixes { prior: prior.as_ref(), independent: Some(&fix), ..FrameFixes::default() };
+    service.engine.motion.looked(&r1, &front, at, &says);
+}
+
+#[tokio::test]
+async fn a_robot_is_shown_with_how_far_its_pose_is_trusted() {
+    let service = Service::start(Limits::default()).await;
+    assert_eq!(service.get("/api/v1/robots/r1").await.1["pose"], Value::Null);
+    let shown = |path: &'static str, pointer: &'static str| {
+        let asked = service.get(path);
+        async move { asked.await.1.pointer(pointer).cloned().unwrap_or_default() }
+    };
+    framed(&service, 1, (1, 7.1));
+    assert_eq!(shown("/api/v1/robots/r1", "/pose/trust").await, "supported");
+    // Another landmark puts it 3 m further.
+    framed(&service, 2, (2, 10.2));
+    assert_eq!(shown("/api/v1/robots/r1", "/pose/trust").await, "contradicted");
+    assert_eq!(shown("/api/v1/robots", "/items/0/pose/trust").await, "contradicted");
+}
+
+#[tokio::test]
+async fn the_document_names_every_word_of_trust_and_what_guided_fixes_may_do() {
+    let service = Service::start(Limits::default()).await;
+    let (_, document) = service.get("/api/v1/openapi.json").await;
+    let trust = &document["components"]["schemas"]["PoseTrust"];
+    let described = trust["enum"].as_array().or(trust["oneOf"].as_array()).unwrap();
+    let words: Vec<_> =
+        described.iter().map(|w| w.as_str().unwrap_or_else(|| w["enum"][0].as_str().unwrap())).collect();
+    let wire = (0..5).map(protos::json::pose_trust::word);
+    assert_eq!(words, wire.collect::<Vec<_>>());
+    assert_eq!(protos::json::pose_trust::word(5), words[0], "a word of the wire is missing here");
+    let corrections = &document["paths"]["/api/v1/robots/{robot}/corrections"]["get"];
+    let text = format!("{} {}", corrections["summary"], corrections["description"]);
+    assert!(text.contains("`guided`") && text.contains("never starts, supports or replaces"), "{text}");
 }
