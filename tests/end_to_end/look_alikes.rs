@@ -1,8 +1,9 @@
 //! Claim: a robot that starts nobody knows where and sees only things that all look the same is told where it may be, never
-//! that it is at one of them, until one place is left; then it is there.
+//! that it is at one of them, until one place is left; then it is there, and its pose says which of them it sees.
 
-use client::{Capture, Delivery, RobotClient, RobotOptions, v1};
+use client::{Capture, Delivery, RobotClient, RobotOptions, named_landmarks, v1};
 use map::pose2::{Pose2, wrap_rad};
+use nalgebra::Point2;
 use reqwest::Method;
 use server::config::Limits;
 use sim::{
@@ -16,6 +17,7 @@ use tests::{
     Inside, SOON, eventually,
     robots::{MAP, call, jpeg, put_walls, teach},
 };
+use vision::geometry::polygon::iou;
 
 /// Three posters with the same picture, left, right and left.
 const ALIKE: [&str; 3] = ["poster-0", "poster-1", "poster-2"];
@@ -101,6 +103,31 @@ async fn twelve_like_doors_are_twelve_places_and_never_one_too_early() {
     inside.server.stop().await;
 }
 
+/// From there on the pose says which of them each one is; the API says that it was the pose.
+async fn named_by_pose(inside: &Inside, client: &RobotClient, looks: impl Iterator<Item = Sighting>) {
+    let mut poses = client.poses();
+    let (mut right, mut trust) = (0, Vec::new());
+    for seen in looks {
+        let answer = ask(client, &seen).await;
+        for named in named_landmarks(&answer) {
+            assert!(named.is_guided(), "nothing here is unique: {named:?}");
+            let truth = seen.frame.truth.landmark(named.name).expect("a landmark in view");
+            let corners: Vec<_> = named.quad.corners.iter().map(|c| Point2::new(c.u_px, c.v_px)).collect();
+            assert!(iou(&corners, truth.corners_px.points()) > 0.5, "{named:?} is not there");
+            right += 1;
+        }
+        trust.extend(std::iter::from_fn(|| poses.try_recv().ok()).map(|pose| pose.trust()));
+    }
+    assert!(right >= 3, "{right} named by pose");
+    assert!(trust.iter().all(|t| [v1::PoseTrust::Supported, v1::PoseTrust::Stale].contains(t)), "{trust:?}");
+    let logged = || async {
+        let (_, log) = call(inside, Method::GET, "/robots/r1/corrections", None).await;
+        log["totals"]["guided"]["applied"].as_u64().is_some_and(|n| n > 0).then_some(log)
+    };
+    let log = eventually("logged as guided", logged).await;
+    assert_eq!(log["totals"]["landmarks"], serde_json::Value::Null, "none of them was named alone: {log}");
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn among_look_alikes_there_are_hypotheses_and_no_pose_until_one_is_left() {
     let params = CorridorParams { posters: 3, pictures: 1, column: false, ..CorridorParams::default() };
@@ -123,7 +150,8 @@ async fn among_look_alikes_there_are_hypotheses_and_no_pose_until_one_is_left() 
     }
     let mut poses = client.poses();
     let (mut several, mut told, mut left) = (0, false, None);
-    for step in steps.iter().step_by(2) {
+    let mut ahead = steps.iter().step_by(2);
+    for step in ahead.by_ref() {
         let answer = ask(&client, &robot.look(step)).await;
         assert!(answer.map_from_robot.is_none(), "nothing here is unique");
         let true_one = |h: &v1::Hypothesis| {
@@ -158,6 +186,7 @@ async fn among_look_alikes_there_are_hypotheses_and_no_pose_until_one_is_left() 
     let log = eventually("logged", logged).await;
     let names = log["corrections"][0]["landmarks"].as_array().map_or(0, Vec::len);
     assert!(names >= 2 && log["corrections"][0]["modality"] == "hypotheses", "{log}");
+    named_by_pose(&inside, &client, ahead.take(20).map(|step| robot.look(step))).await;
     client.close().await.expect("closed");
     inside.server.stop().await;
 }

@@ -1,5 +1,6 @@
 //! The `waymark` command line: one file per command.
 
+mod answers;
 mod bench;
 mod calibrate;
 mod clock;

@@ -1,6 +1,7 @@
 //! Commands against a running server: `map`, `robot`, `learn`, `recognise`.
 
 use super::{
+    answers::{robot_line, sentence},
     given::{camera, numbers, size},
     mapping, screen,
     sight::{self, SightArgs},
@@ -9,7 +10,6 @@ use client::{
     ClientError, MapClient,
     lessons::{Job, Size},
     map::Extent,
-    v1::{Answer, QuadAnswer, Verdict},
 };
 use std::{path::PathBuf, process::ExitCode, time::Duration};
 use vision::{frame::Intrinsics, recognise::DistanceKind};
@@ -164,7 +164,7 @@ pub(crate) enum RobotCommand {
         #[command(flatten)]
         server: ServerArgs,
     },
-    /// List the robots.
+    /// List the robots: the map of each, and, where its pose is known, where it is and how far that is trusted.
     List {
         #[command(flatten)]
         server: ServerArgs,
@@ -261,10 +261,7 @@ pub(crate) async fn robot(command: &RobotCommand) -> anyhow::Result<()> {
         }
         RobotCommand::List { server } => {
             let robots = MapClient::new(&server.server)?.robots().await?;
-            let lines: Vec<String> = robots
-                .iter()
-                .map(|r| format!("{}  {}", r.name, r.map.as_deref().unwrap_or("no map")))
-                .collect();
+            let lines: Vec<String> = robots.iter().map(robot_line).collect();
             show(server, &robots, &lines.join("\n"))
         }
     }
@@ -368,69 +365,4 @@ pub(crate) async fn recognise(args: &RecogniseArgs) -> anyhow::Result<ExitCode> 
         }
     }
     Ok(status)
-}
-
-/// What points say of the first candidate; empty where they did not decide.
-fn by_points(quad: &QuadAnswer) -> String {
-    quad.points.as_ref().map_or_else(String::new, |points| {
-        let alarms = points.log10_false_alarms.round();
-        format!(", {} of {} matches agree, 1e{alarms} false alarms expected", points.inliers, points.matches)
-    })
-}
-
-fn sentence(name: &str, answer: &Answer) -> String {
-    let mut lines = vec![format!("{name}: {}", counted(answer.quads.len() as u64, "quad"))];
-    for quad in &answer.quads {
-        match quad.verdict() {
-            Verdict::Unique => {
-                let line = format!("  {} with confidence {:.2}", quad.landmark, quad.confidence);
-                lines.push(line + &by_points(quad));
-            }
-            Verdict::Ambiguous if !quad.doubtful_landmark.is_empty() => {
-                let line = format!("  perhaps {}: a part of it shows something else", quad.doubtful_landmark);
-                lines.push(line + &by_points(quad));
-            }
-            Verdict::Ambiguous => {
-                let names: Vec<&str> =
-                    quad.candidates.iter().filter(|c| c.ratio < 1.0).map(|c| c.landmark.as_str()).collect();
-                lines.push(format!("  one of {}: not sure which", names.join(", ")) + &by_points(quad));
-            }
-            _ => {}
-        }
-    }
-    if lines.len() == 1 {
-        lines.push("  no landmark recognised".to_owned());
-    }
-    lines.join("\n")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use client::v1::PointEvidence;
-
-    #[test]
-    fn a_line_says_what_points_say() {
-        let points =
-            PointEvidence { matches: 40, inliers: 34, log10_false_alarms: -21.3, ..PointEvidence::default() };
-        let mut quad = QuadAnswer {
-            verdict: Verdict::Unique.into(),
-            landmark: "door".into(),
-            confidence: 0.98,
-            points: Some(points),
-            ..QuadAnswer::default()
-        };
-        let said =
-            |quad: &QuadAnswer| sentence("a.jpg", &Answer { quads: vec![quad.clone()], ..Answer::default() });
-        let evidence = ", 34 of 40 matches agree, 1e-21 false alarms expected";
-        assert_eq!(said(&quad), format!("a.jpg: 1 quad\n  door with confidence 0.98{evidence}"));
-        quad.set_verdict(Verdict::Ambiguous);
-        (quad.doubtful_landmark, quad.landmark) = ("door".into(), String::new());
-        assert_eq!(
-            said(&quad),
-            format!("a.jpg: 1 quad\n  perhaps door: a part of it shows something else{evidence}")
-        );
-        quad.points = None;
-        assert_eq!(said(&quad), "a.jpg: 1 quad\n  perhaps door: a part of it shows something else");
-    }
 }

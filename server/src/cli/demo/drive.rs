@@ -6,10 +6,7 @@ use crate::{
     cli::{pictures, screen},
 };
 use anyhow::Context as _;
-use client::{
-    Capture, MapClient, RobotClient, RobotOptions,
-    v1::{Answer, Verdict},
-};
+use client::{Capture, MapClient, RobotClient, RobotOptions, named_landmarks, v1::Answer};
 use map::pose2::Pose2;
 use protos::Name;
 use sim::{
@@ -44,6 +41,9 @@ pub(super) struct Record {
     pub(super) landmark_views: usize,
     pub(super) recognitions: usize,
     pub(super) false_matches: usize,
+    /// Quads that were named by the pose, and those of them that are not that landmark.
+    pub(super) guided: usize,
+    pub(super) false_guided: usize,
     pub(super) corrections: u64,
     pub(super) position_errors_m: Vec<f64>,
     pub(super) odometry_errors_m: Vec<f64>,
@@ -160,14 +160,14 @@ impl Journey {
                 l.state == ViewState::Full && l.min_side_px() >= MIN_SIDE_PX && self.taught.contains(&l.name)
             })
             .count();
-        for quad in answer.quads.iter().filter(|q| q.verdict() == Verdict::Unique) {
-            if is_true(&quad.landmark, quad, truth) {
-                self.record.recognitions += 1;
-            } else {
-                self.record.false_matches += 1;
+        for named in named_landmarks(answer) {
+            let is_true = is_true(named.name, named.quad, truth);
+            self.record.count(named.is_guided(), is_true);
+            if !is_true {
+                let by_pose = if named.is_guided() { " by pose" } else { "" };
                 screen::complain(&format!(
-                    "{}: false match {} in frame {}",
-                    self.name, quad.landmark, answer.seq
+                    "{}: false match {}{by_pose} in frame {}",
+                    self.name, named.name, answer.seq
                 ));
             }
         }
@@ -195,8 +195,8 @@ impl Journey {
             let odometry =
                 r.odometry_errors_m.last().map_or(String::new(), |e| format!(" (odometry alone {e:.2} m)"));
             screen::complain(&format!(
-                "{}: {} frames, {} recognitions, {} false, {error}{odometry}",
-                self.name, r.frames, r.recognitions, r.false_matches
+                "{}: {} frames, {} recognitions, {} false, {} by pose, {} false, {error}{odometry}",
+                self.name, r.frames, r.recognitions, r.false_matches, r.guided, r.false_guided
             ));
         }
     }
@@ -209,6 +209,18 @@ fn is_true(name: &str, quad: &client::v1::QuadAnswer, truth: &FrameTruth) -> boo
 }
 
 impl Record {
+    /// Counts a landmark that was named. One that the pose named is no recognition, whether right or wrong.
+    pub(super) fn count(&mut self, is_guided: bool, is_true: bool) {
+        match (is_guided, is_true) {
+            (false, true) => self.recognitions += 1,
+            (false, false) => self.false_matches += 1,
+            (true, _) => {
+                self.guided += 1;
+                self.false_guided += usize::from(!is_true);
+            }
+        }
+    }
+
     fn add(&mut self, other: Record) {
         self.robots += other.robots;
         self.frames += other.frames;
@@ -216,6 +228,8 @@ impl Record {
         self.landmark_views += other.landmark_views;
         self.recognitions += other.recognitions;
         self.false_matches += other.false_matches;
+        self.guided += other.guided;
+        self.false_guided += other.false_guided;
         self.corrections += other.corrections;
         self.position_errors_m.extend(other.position_errors_m);
         self.odometry_errors_m.extend(other.odometry_errors_m);

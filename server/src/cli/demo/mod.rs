@@ -89,7 +89,7 @@ pub(crate) async fn run(args: &Args) -> anyhow::Result<ExitCode> {
         tokio::signal::ctrl_c().await.context("Ctrl-C")?;
     }
     server.stop().await;
-    Ok(if summary.false_matches == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    Ok(if summary.false_matches + summary.false_guided == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
 fn settings(args: &Args, data: PathBuf) -> anyhow::Result<Config> {

@@ -16,6 +16,9 @@ pub(super) struct Summary {
     landmark_views: usize,
     recognitions: usize,
     pub(super) false_matches: usize,
+    /// Quads that the pose named where the picture alone did not, and those of them that are not that landmark.
+    guided: usize,
+    pub(super) false_guided: usize,
     corrections: u64,
     /// Distance from the true position after each robot's first fix.
     position_error_m: Option<Spread>,
@@ -55,6 +58,8 @@ pub(super) fn summarise(taught: &Taught, record: &Record) -> Summary {
         landmark_views: record.landmark_views,
         recognitions: record.recognitions,
         false_matches: record.false_matches,
+        guided: record.guided,
+        false_guided: record.false_guided,
         corrections: record.corrections,
         position_error_m: Spread::of(&record.position_errors_m),
         odometry_error_m: Spread::of(&record.odometry_errors_m),
@@ -80,6 +85,7 @@ impl Summary {
                 self.recognitions, self.landmark_views
             ),
             format!("false matches     {}", self.false_matches),
+            format!("named by pose     {}, {} of them falsely", self.guided, self.false_guided),
             format!("corrections       {}", self.corrections),
             format!("position error    {}", spread(self.position_error_m, "m", 3)),
             format!("odometry alone    {}", spread(self.odometry_error_m, "m", 3)),
@@ -92,6 +98,24 @@ impl Summary {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_the_pose_named_is_told_apart_from_recognitions() {
+        let mut record = Record::default();
+        for (is_guided, is_true) in [(false, true), (false, true), (true, true), (true, true), (true, false)]
+        {
+            record.count(is_guided, is_true);
+        }
+        let summary = summarise(&Taught::default(), &record);
+        let table = summary.table();
+        assert!(
+            table.contains("recognitions      2 of") && table.contains("false matches     0\n"),
+            "{table}"
+        );
+        assert!(table.contains("named by pose     3, 1 of them falsely\n"), "{table}");
+        let json = serde_json::to_value(&summary).unwrap();
+        assert_eq!((&json["guided"], &json["false_guided"]), (&3.into(), &1.into()));
+    }
 
     #[test]
     fn spread_of_a_hundred_numbers() {
