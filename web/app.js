@@ -1,8 +1,10 @@
 // The live page: the map from above with every robot's tracks, and the last frame of one camera with its quads.
 // Reads the HTTP API once, then follows `maps/{map}/live` (server-sent events). Draws at most once per animation frame.
 
+import { drawFrame, quadCells } from "/frame.js";
 import { drawHypotheses, fromAnswer, fromServer, positionText } from "/hypotheses.js";
 import { drawModalities, loadModalities } from "/modalities.js";
+import { named, trustText } from "/naming.js";
 
 const API = "/api/v1";
 const TRACK_POINTS = 4000; // per robot and kind: the oldest are forgotten
@@ -26,7 +28,7 @@ const getJson = async (path) => {
 
 function robotOf(name) {
   if (!state.robots.has(name)) {
-    state.robots.set(name, { tracks: { truth: [], odometry: [], pose: [] }, covariance: null, hypotheses: [], needed: [], frames: 0, recognised: 0, corrections: 0 });
+    state.robots.set(name, { tracks: { truth: [], odometry: [], pose: [] }, covariance: null, hypotheses: [], needed: [], frames: 0, recognised: 0, byPose: 0, corrections: 0, trust: null });
     byId("robot-hint").textContent = "";
   }
   return state.robots.get(name);
@@ -46,6 +48,7 @@ const heard = {
     const robot = robotOf(e.robot);
     robot.covariance = e.covariance;
     robot.corrections = e.corrections;
+    robot.trust = e.trust;
     robot.posed = performance.now() - e.age_ms;
     robot.hypotheses = [];
   },
@@ -56,9 +59,10 @@ const heard = {
     robot.frames += 1;
     robot.hypotheses = fromAnswer(e.answer.hypotheses);
     for (const quad of e.answer.quads) {
-      if (quad.verdict !== "unique") continue;
-      robot.recognised += 1;
-      state.recognised.set(quad.landmark, performance.now());
+      const name = named(quad);
+      if (!name) continue;
+      robot[name.byPose ? "byPose" : "recognised"] += 1;
+      state.recognised.set(name.landmark, performance.now());
     }
     const key = `${e.robot}/${e.camera}`;
     if (!state.cameras.has(key)) {
@@ -94,81 +98,18 @@ async function showFrame(key, answer) {
     const reply = await fetch(`${API}/robots/${robot}/cameras/${camera}/frame?seq=${answer.seq}`, { cache: "no-store" });
     if (!reply.ok) return;
     const picture = await createImageBitmap(await reply.blob());
-    drawFrame(picture, answer);
-    listQuads(answer);
+    drawFrame(byId("frame"), picture, answer);
+    byId("quads").replaceChildren(...quadCells(answer).map(row));
     const work = (answer.timings ?? []).reduce((sum, t) => sum + t.ms, 0);
     byId("frame-facts").textContent = `frame ${answer.seq}: ${answer.status}, ${answer.quads.length} quads, ` +
       `${work.toFixed(1)} ms of work, answered after ${answer.age_ms.toFixed(0)} ms`;
   } finally { frameBusy = false; }
 }
 
-const COLOURS = { unique: "#4ade80", ambiguous: "#fbbf24", doubtful: "#fb923c", unknown: "#94a3b8" };
-const colourOf = (quad) => COLOURS[quad.doubtful_landmark ? "doubtful" : quad.verdict] ?? COLOURS.unknown;
-
-function drawFrame(picture, answer) {
-  const canvas = byId("frame");
-  canvas.width = picture.width;
-  canvas.height = picture.height;
-  const c = canvas.getContext("2d");
-  c.drawImage(picture, 0, 0);
-  const unit = Math.max(1, picture.width / 640);
-  c.lineWidth = 2 * unit;
-  c.font = `${14 * unit}px system-ui`;
-  answer.quads.forEach((quad, index) => {
-    c.strokeStyle = colourOf(quad);
-    c.beginPath();
-    quad.corners.forEach((p, i) => (i ? c.lineTo(p.u_px + 0.5, p.v_px + 0.5) : c.moveTo(p.u_px + 0.5, p.v_px + 0.5)));
-    c.closePath();
-    c.stroke();
-    const label = quad.landmark || (quad.doubtful_landmark ? `${quad.doubtful_landmark}?` : `${index + 1}`);
-    const { u_px, v_px } = quad.corners[0];
-    const y = Math.max(v_px - 4 * unit, 14 * unit);
-    c.fillStyle = "rgba(0,0,0,.65)";
-    c.fillRect(u_px, y - 14 * unit, c.measureText(label).width + 6 * unit, 17 * unit);
-    c.fillStyle = c.strokeStyle;
-    c.fillText(label, u_px + 3 * unit, y);
-  });
-}
-
 function row(cells) {
   const tr = document.createElement("tr");
   for (const cell of cells) tr.insertCell().append(cell ?? "");
   return tr;
-}
-
-const PARTS = { agrees: "agrees", disagrees: "shows something else", silent: "says nothing" };
-
-// What the 25 parts of the landmark say, upright as it was taught, with the words beside.
-function partsOf(points) {
-  if (!points) return "";
-  const count = (word) => points.agreement.filter((part) => part === word).length;
-  const words = `${points.inliers} of ${points.matches} matches agree, 1e${Math.round(points.log10_false_alarms)} false alarms; ` +
-    `parts: ${count("agrees")} agree, ${count("disagrees")} show something else, ${count("silent")} say nothing`;
-  const table = document.createElement("span");
-  table.className = "parts";
-  table.setAttribute("role", "img");
-  table.setAttribute("aria-label", words);
-  points.agreement.forEach((part, i) => {
-    const cell = document.createElement("i");
-    cell.className = part;
-    cell.title = `row ${Math.floor(i / 5) + 1}, column ${(i % 5) + 1}: ${PARTS[part] ?? part}`;
-    table.append(cell);
-  });
-  const both = document.createElement("span");
-  both.className = "points";
-  both.append(table, words);
-  return both;
-}
-
-function listQuads(answer) {
-  byId("quads").replaceChildren(...answer.quads.map((quad, index) => {
-    const [first, second] = quad.candidates ?? [];
-    const doubtful = quad.doubtful_landmark && `${quad.doubtful_landmark}: doubtful, a part of it shows something else`;
-    const name = quad.landmark || doubtful || (quad.verdict === "ambiguous" && first ? `${first.landmark}?` : quad.verdict || quad.kind);
-    const near = (candidate) => (candidate ? `${candidate.landmark} ${candidate.ratio.toFixed(2)}` : "");
-    return row([index + 1, name, first ? first.ratio.toFixed(2) : "", quad.landmark ? quad.confidence.toFixed(2) : "",
-      near(quad.landmark ? second : first), partsOf(quad.points)]);
-  }));
 }
 
 // ---- the map ----
@@ -378,7 +319,7 @@ function listRobots() {
     const age_s = robot.posed === undefined ? Infinity : (performance.now() - robot.posed) / 1000;
     const old = pose && age_s > MAX_POSE_AGE_S ? (Number.isFinite(age_s) ? `, ${age_s.toFixed(0)} s ago` : ", formerly") : "";
     return row([name, pose ? `${pose.x_m.toFixed(2)}, ${pose.y_m.toFixed(2)} m, ${(pose.theta_rad * 180 / Math.PI).toFixed(0)}°${old}` : positionText(robot),
-      sigma, robot.frames, robot.recognised, robot.corrections, errorOf(robot, "pose"), errorOf(robot, "odometry")]);
+      sigma, pose && !old ? trustText(robot.trust) : "", robot.frames, robot.recognised, robot.byPose, robot.corrections, errorOf(robot, "pose"), errorOf(robot, "odometry")]);
   });
   byId("robots").replaceChildren(...rows);
 }
@@ -406,9 +347,10 @@ async function loadMap(name) {
 // Where the map's robots have been before this page was opened.
 async function loadTracks(map) {
   const robots = (await getJson("/robots?limit=100")).items.filter((robot) => robot.map === map);
-  for (const { name } of robots.filter((robot) => !state.robots.has(robot.name))) {
+  for (const { name, pose } of robots.filter((robot) => !state.robots.has(robot.name))) {
     const tracks = await getJson(`/robots/${encodeURIComponent(name)}/tracks`);
     if (tracks.pose.length || tracks.odometry.length || tracks.truth.length) Object.assign(robotOf(name).tracks, tracks);
+    if (pose) Object.assign(robotOf(name), { covariance: pose.covariance, trust: pose.trust, posed: performance.now() - pose.age_ms });
     const found = await getJson(`/robots/${encodeURIComponent(name)}/hypotheses`);
     if (found.searching && found.map === map) Object.assign(robotOf(name), { hypotheses: fromServer(found), needed: found.needed });
   }
