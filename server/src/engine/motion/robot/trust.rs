@@ -65,7 +65,8 @@ impl Robot {
     /// A pose as it is told at this moment.
     pub(in crate::engine::motion) fn told(&self, fused: FusedPose, now: Instant) -> Told {
         let trust = match self.schedule.trust() {
-            Trust::NoPose => PoseTrust::Unspecified,
+            // A pose that came along from another map, which no frame has been compared with yet.
+            Trust::NoPose => PoseTrust::Unsupported,
             Trust::Unsupported => PoseTrust::Unsupported,
             Trust::Supported => PoseTrust::Supported,
             Trust::Stale => PoseTrust::Stale,
