@@ -257,12 +257,17 @@ pub(crate) fn sample_cells(
     pixels_per_cell: f64,
     cells: &mut [f32],
 ) {
-    let samples = ((pixels_per_cell / SAMPLE_PX).ceil() as usize).clamp(1, MAX_SAMPLES);
-    sample_row(image, image_from_cell, first, row, samples, cells);
+    sample_row(image, image_from_cell, first, row, samples_for(pixels_per_cell, SAMPLE_PX), cells);
+}
+
+/// Samples along each axis of a cell of so many of the image's pixels, one for every `sample_px`, at most
+/// [`MAX_SAMPLES`].
+pub(crate) fn samples_for(pixels_per_cell: f64, sample_px: f64) -> usize {
+    ((pixels_per_cell / sample_px).ceil() as usize).clamp(1, MAX_SAMPLES)
 }
 
 /// The same with `samples` along each axis.
-fn sample_row(
+pub(crate) fn sample_row(
     image: &GrayImage,
     image_from_cell: &Homography,
     first: i32,

@@ -3,6 +3,7 @@
 
 use super::patch::Patch;
 use crate::recognise::harris::blurred;
+use fearless_simd::{Level, dispatch};
 
 /// Smoothing of the first level of an octave, in its pixels.
 pub const BASE_SIGMA: f64 = 1.15;
@@ -106,13 +107,15 @@ fn extrema(octave: &Octave, index: usize, found: &mut Vec<Keypoint>) {
         .windows(2)
         .map(|pair| pair[1].iter().zip(&pair[0]).map(|(a, b)| a - b).collect())
         .collect();
+    let mut peaks = vec![0_u8; n];
     for level in 1..=SCALES {
         let [below, own, above] = [&differences[level - 1], &differences[level], &differences[level + 1]];
         for y in BORDER_PX..n - BORDER_PX {
-            for x in BORDER_PX..n - BORDER_PX {
+            dispatch!(Level::new(), _s => row_peaks([below.as_slice(), own, above], y * n, &mut peaks));
+            for x in (BORDER_PX..n - BORDER_PX).filter(|x| peaks[*x] != 0) {
                 let at = y * n + x;
                 let d = own[at];
-                if d.abs() < MIN_RESPONSE || !is_extremum(d, at, n, [below, own, above]) {
+                if !is_extremum(d, at, n, [below, own, above]) {
                     continue;
                 }
                 let (dxx, dyy) = (own[at + 1] + own[at - 1] - 2.0 * d, own[at + n] + own[at - n] - 2.0 * d);
@@ -140,6 +143,26 @@ fn extrema(octave: &Octave, index: usize, found: &mut Vec<Keypoint>) {
                 });
             }
         }
+    }
+}
+
+/// Marks what may be an extremum in a row that begins at `start`: strong enough, and beyond its neighbours to the left, the
+/// right, and at the two next scales.
+#[expect(
+    clippy::inline_always,
+    reason = "an instruction set holds only in what is inlined where it was chosen"
+)]
+#[inline(always)]
+fn row_peaks([below, own, above]: [&[f32]; 3], start: usize, peaks: &mut [u8]) {
+    let n = peaks.len();
+    let (d, left, right) = (&own[start..][..n], &own[start - 1..][..n], &own[start + 1..][..n]);
+    let (below, above) = (&below[start..][..n], &above[start..][..n]);
+    for x in 0..n {
+        let high = left[x].max(right[x]).max(below[x]).max(above[x]);
+        let low = left[x].min(right[x]).min(below[x]).min(above[x]);
+        let top = u8::from(d[x] >= MIN_RESPONSE) & u8::from(d[x] >= high);
+        let bottom = u8::from(d[x] <= -MIN_RESPONSE) & u8::from(d[x] <= low);
+        peaks[x] = top | bottom;
     }
 }
 

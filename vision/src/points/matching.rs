@@ -44,20 +44,21 @@ pub fn matches(seen: &[Point], taught: &[Point], gate: &MatchGate) -> Vec<Match>
 )]
 #[inline(always)]
 fn search(seen: &[Point], taught: &[Point], gate: &MatchGate) -> Vec<Match> {
-    let near = |a: &Point, b: &Point| {
-        (a.at[0] - b.at[0]).abs() <= gate.place
-            && (a.at[1] - b.at[1]).abs() <= gate.place
-            && a.sigma <= b.sigma * gate.scale
-            && b.sigma <= a.sigma * gate.scale
-    };
+    let column = |of: fn(&Point) -> f32| -> Vec<f32> { taught.iter().map(of).collect() };
+    let (x, y, sigma) = (column(|p| p.at[0]), column(|p| p.at[1]), column(|p| p.sigma));
+    let mut near = vec![0_u8; taught.len()];
     let mut best_of_taught: Vec<(u32, usize)> = vec![(u32::MAX, 0); taught.len()];
     let mut found = Vec::new();
     for (s, point) in seen.iter().enumerate() {
         let (mut best, mut next): ((u32, usize), u32) = ((u32::MAX, 0), u32::MAX);
-        for (t, other) in taught.iter().enumerate() {
-            if !near(point, other) {
-                continue;
-            }
+        for (near, ((x, y), sigma)) in near.iter_mut().zip(x.iter().zip(&y).zip(&sigma)) {
+            *near = u8::from((x - point.at[0]).abs() <= gate.place)
+                & u8::from((y - point.at[1]).abs() <= gate.place)
+                & u8::from(point.sigma <= sigma * gate.scale)
+                & u8::from(*sigma <= point.sigma * gate.scale);
+        }
+        for (t, _) in near.iter().enumerate().filter(|(_, near)| **near != 0) {
+            let other = &taught[t];
             let d = point.descriptor.distance(&other.descriptor);
             if d < best_of_taught[t].0 {
                 best_of_taught[t] = (d, s);

@@ -2,15 +2,23 @@
 //!
 //! Landmark coordinates: the quad's corners TL, TR, BR, BL are (0, 0), (1, 0), (1, 1), (0, 1).
 
-use crate::{detect::quads::Corners, frame::GrayImage, geometry::homography::Homography, icon::sample_cells};
+use crate::{
+    detect::quads::Corners,
+    frame::GrayImage,
+    geometry::homography::Homography,
+    icon::{sample_row, samples_for},
+};
 use nalgebra::{Matrix3, Point2};
 
 /// Sides of the quad inside its patch, in patch pixels, falling. With the margin patches have 198, 120 and 72 px.
-pub const INNER_PX: [usize; 3] = [160, 96, 56];
+pub const INNER_PX: [usize; 3] = [128, 84, 56];
 /// Margin on every side, as a share of the quad's side.
 pub const MARGIN: f64 = 0.25;
 /// A quad is magnified by at most this factor before the next smaller patch is taken.
 const MAX_MAGNIFICATION: f64 = 1.25;
+
+/// What a bilinear sample stands for, in the image's pixels: it weighs what lies within one pixel to either side.
+const SAMPLE_PX: f64 = 2.0;
 
 /// A rectified patch.
 #[derive(Debug, Clone)]
@@ -48,9 +56,10 @@ impl Patch {
             return None;
         }
         let pixels_per_cell = corners_px.area_px2().sqrt() / inner as f64;
+        let samples = samples_for(pixels_per_cell, SAMPLE_PX);
         let mut pixels = vec![0.0; side * side];
         for (row, line) in (0..).zip(pixels.chunks_exact_mut(side)) {
-            sample_cells(image, &image_from_patch, 0, row, pixels_per_cell, line);
+            sample_row(image, &image_from_patch, 0, row, samples, line);
         }
         let image_size_px = [image.width() as f64, image.height() as f64];
         Some(Self { side, inner, pixels, to_image: image_from_patch, image_size_px })

@@ -20,6 +20,14 @@ const MAX_HYPOTHESES: usize = 8;
 const MAX_VERIFIED: usize = 3;
 /// Least weight of votes of a landmark that is looked at: see [`PointIndex::vote`].
 const MIN_VOTES: u32 = 4;
+/// Landmarks with less than this share of the most votes are left out: what looks like the landmark that is there gets
+/// about as many.
+const MIN_VOTES_SHARE: f64 = 0.2;
+/// Once a landmark is beyond doubt, others are verified if at least this share of their matches agrees on the homography:
+/// a look-alike agrees with most, an accident with a few.
+const MIN_RIVAL_SHARE: f64 = 0.25;
+/// log10 of the false alarms in one comparison from which on a landmark is beyond doubt.
+const LOG10_SURE: f64 = -12.0;
 /// Borders of a quad that get a patch of their own: those that overlap all earlier ones by less than this.
 const SAME_BORDER_IOU: f64 = 0.6;
 /// Most borders of a quad.
@@ -60,6 +68,8 @@ pub fn search<'a>(
         }
         votes.sort_by(|a, b| b.0.cmp(&a.0).then((a.1, a.2).cmp(&(b.1, b.2))));
         votes.truncate(MAX_HYPOTHESES);
+        let least = votes.first().map_or(0.0, |first| MIN_VOTES_SHARE * f64::from(first.0));
+        votes.retain(|(votes, ..)| f64::from(*votes) >= least);
         let mut hypotheses: Vec<(usize, Target, Hypothesis)> = votes
             .into_iter()
             .filter_map(|(_, model, turn)| {
@@ -69,8 +79,14 @@ pub fn search<'a>(
             })
             .collect();
         hypotheses.sort_by(|a, b| a.2.log10_matches.total_cmp(&b.2.log10_matches).then(a.0.cmp(&b.0)));
+        let mut sure = false;
         for (model, target, hypothesis) in hypotheses.iter().take(MAX_VERIFIED) {
+            let agreeing = hypothesis.consensus.distinct as f64 / hypothesis.distinct.max(1) as f64;
+            if sure && agreeing < MIN_RIVAL_SHARE {
+                continue;
+            }
             let Some(evidence) = verified(&seen, hypothesis, target) else { continue };
+            sure |= evidence.log10_nfa <= LOG10_SURE;
             found.push(Found { model: *model, border, evidence });
         }
     }

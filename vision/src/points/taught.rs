@@ -7,6 +7,7 @@ use super::{
     plain::distance_to_plain,
 };
 use crate::{detect::quads::Corners, frame::GrayImage};
+use std::sync::LazyLock;
 
 /// Most points of a landmark.
 pub const MAX_LANDMARK_POINTS: usize = 240;
@@ -22,6 +23,9 @@ const SAME_DISTANCE: u32 = 40;
 const SAME_PLACE: f32 = 0.02;
 /// Steps of the stored scale in a factor of 2.
 const SCALE_STEPS: f32 = 24.0;
+/// What each stored scale stands for, in landmark units.
+static SCALES: LazyLock<[f32; 256]> =
+    LazyLock::new(|| std::array::from_fn(|step| (-(step as f32) / SCALE_STEPS).exp2()));
 /// Bytes of a stored point.
 pub(crate) const POINT_BYTES: usize = 8 * WORDS + 6;
 
@@ -48,7 +52,7 @@ impl TaughtPoint {
     /// The point.
     pub fn point(&self) -> Point {
         let at = self.at.map(|a| f32::from(a) / f32::from(u16::MAX));
-        Point { at, sigma: (-f32::from(self.sigma) / SCALE_STEPS).exp2(), descriptor: self.descriptor }
+        Point { at, sigma: SCALES[usize::from(self.sigma)], descriptor: self.descriptor }
     }
 
     /// Distance to the most similar plain structure.
