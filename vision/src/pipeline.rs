@@ -10,7 +10,9 @@ use crate::{
     frame::{GrayImage, Intrinsics},
     localise::pose::{LandmarkPose, LandmarkSize, PoseError, landmark_pose},
     params::Params,
-    recognise::{DistanceKind, LandmarkId, ModelSet, Recognition, Verdict, verdict::recognise},
+    recognise::{
+        DistanceKind, LandmarkId, ModelSet, Recognition, Verdict, is_same_border, verdict::recognise,
+    },
     trace::{Stage, Trace},
 };
 use nalgebra::Matrix2;
@@ -19,9 +21,6 @@ use std::collections::BTreeMap;
 /// Most quads of one image that are compared with the landmarks, the detector's best first.
 pub const MAX_RECOGNISED_QUADS: usize = 24;
 
-/// Corners that alignment moves by less, in icon pixels, are those of the border that was detected, and better known
-/// from its edges.
-const SAME_BORDER_ICON_PX: f64 = 1.5;
 /// Standard deviation of an aligned corner, in icon pixels: twice what the alignment's own test allows.
 const ALIGNED_SIGMA_ICON_PX: f64 = 0.5;
 
@@ -103,13 +102,28 @@ pub fn analyse_quads(
     let quads = quads
         .into_iter()
         .zip(verdicts)
-        .map(|(quad, verdict)| {
+        .map(|(mut quad, mut verdict)| {
+            if let Some(verdict) = &mut verdict {
+                turn_to_recognised(&mut quad, verdict);
+            }
             let pose = pose(&quad, verdict.as_ref(), camera, landmarks.sizes, p);
             QuadFacts { quad, verdict, pose }
         })
         .collect();
     trace.finished(Stage::Poses);
     FrameFacts { quads }
+}
+
+/// Where another border of `quad` than its corners was recognised, that one becomes its corners: whoever reads what was
+/// recognised must not take the wall round a poster for it.
+fn turn_to_recognised(quad: &mut Quad, verdict: &mut Verdict) {
+    if verdict.recognition == Recognition::Unknown || verdict.border == 0 {
+        return;
+    }
+    if let Some(recognised) = quad.alternates.get_mut(verdict.border - 1) {
+        std::mem::swap(recognised, &mut quad.corners_px);
+        verdict.border = 0;
+    }
 }
 
 /// Only a unique recognition of a landmark of known size, seen by a known camera, has a pose.
@@ -140,21 +154,20 @@ pub fn matched(quad: &Quad, verdict: &Verdict, p: &Params) -> Option<(Corners, [
     let detected_px = detected_px.rotated(verdict.rotation);
     let believed_px2 = quad.believed_covariance_px2();
     let covariance_px2 = std::array::from_fn(|i| believed_px2[(i + verdict.rotation) % 4]);
-    if let Some(evidence) = &verdict.points {
-        let icon_px = evidence.corners_px.area_px2().sqrt() / p.icon.size as f64;
-        let moved_px =
-            detected_px.points().iter().zip(evidence.corners_px.points()).map(|(d, a)| (a - d).norm());
-        if moved_px.fold(0.0, f64::max) < SAME_BORDER_ICON_PX * icon_px {
-            return Some((detected_px, covariance_px2));
-        }
-        return Some((evidence.corners_px, evidence.corner_covariance_px2));
-    }
-    let Some(aligned_px) = verdict.aligned_px else { return Some((detected_px, covariance_px2)) };
-    let icon_px = detected_px.area_px2().sqrt() / p.icon.size as f64;
-    let moved_px = detected_px.points().iter().zip(aligned_px.points()).map(|(d, a)| (a - d).norm());
-    if moved_px.fold(0.0, f64::max) < SAME_BORDER_ICON_PX * icon_px {
+    let aligned_px = match &verdict.points {
+        Some(evidence) => evidence.corners_px,
+        None => match verdict.aligned_px {
+            Some(aligned_px) => aligned_px,
+            None => return Some((detected_px, covariance_px2)),
+        },
+    };
+    if is_same_border(&detected_px, &aligned_px, p) {
         return Some((detected_px, covariance_px2));
     }
+    if let Some(evidence) = &verdict.points {
+        return Some((evidence.corners_px, evidence.corner_covariance_px2));
+    }
+    let icon_px = detected_px.area_px2().sqrt() / p.icon.size as f64;
     let sigma_px = ALIGNED_SIGMA_ICON_PX * icon_px;
     Some((aligned_px, covariance_px2.map(|c| c + Matrix2::identity() * sigma_px * sigma_px)))
 }
@@ -312,10 +325,11 @@ mod tests {
             .corners_px
             .points()
             .map(|c| Point2::from(c.coords * 1.35 - nalgebra::Vector2::new(319.5, 239.5) * 0.35));
-        quad.alternates = vec![quad.corners_px];
-        quad.corners_px = Corners::new(outer).unwrap();
+        let (inner, outer) = (quad.corners_px, Corners::new(outer).unwrap());
+        (quad.corners_px, quad.alternates) = (outer, vec![inner]);
         let facts = facts(&image, quad, Some(&camera()));
-        assert_eq!(facts.verdict.as_ref().unwrap().border, 1);
+        assert_eq!((facts.quad.corners_px, &facts.quad.alternates[..]), (inner, &[outer][..]));
+        assert_eq!(facts.verdict.as_ref().unwrap().border, 0);
         assert_pose(&facts);
     }
 

@@ -92,6 +92,11 @@ impl Corners {
         0.5 * (c - a).perp(&(d - b))
     }
 
+    /// Distance to `other`'s of the corner that is furthest from it.
+    pub fn furthest_px(&self, other: &Self) -> f64 {
+        self.0.iter().zip(&other.0).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
+    }
+
     /// Length of the shortest side.
     pub fn min_side_px(&self) -> f64 {
         (0..4).map(|i| (self.0[(i + 1) % 4] - self.0[i]).norm()).fold(f64::INFINITY, f64::min)

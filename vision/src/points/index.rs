@@ -84,7 +84,8 @@ impl PointIndex {
 
     /// The `count` models with most votes of `points`, most first, of equal ones the lower index; those with less than
     /// `least` are left out. Each with its votes: a point votes for the landmarks of its nearest neighbours, by how much
-    /// nearer they are than the next landmark's, so that what many landmarks show counts for little.
+    /// nearer they are than the next landmark's, so that what many landmarks show counts for little, but never for nothing:
+    /// more landmarks than that may have the same picture.
     pub fn vote(&self, points: &[Point], count: usize, least: u32) -> Vec<(usize, u32)> {
         if self.is_empty() {
             return Vec::new();
@@ -128,7 +129,7 @@ impl PointIndex {
             }
             let common = nearest[NEIGHBOURS].0;
             for (d, model) in nearest.into_iter().take(NEIGHBOURS).filter(|(_, model)| *model != u32::MAX) {
-                votes[model as usize] += common - d;
+                votes[model as usize] += (common - d).max(1);
             }
         }
         votes

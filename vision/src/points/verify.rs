@@ -11,7 +11,11 @@ use super::{
     patch::{Patch, inner_px},
     taught::TaughtPoint,
 };
-use crate::{detect::quads::Corners, frame::GrayImage, geometry::homography::Homography};
+use crate::{
+    detect::quads::{BORDER_SIGMA_PX, Corners},
+    frame::GrayImage,
+    geometry::homography::Homography,
+};
 use nalgebra::{Matrix2, Point2, SMatrix};
 
 /// Most points of a patch.
@@ -152,7 +156,8 @@ fn held_out(checks: &[Check], target: &Target, used: &[[f32; 2]]) -> (usize, usi
     (places.len(), agreeing, f64::from(points) / places.len().max(1) as f64)
 }
 
-/// Corners of the taught border in the image, with covariances that follow from the residuals of the inliers.
+/// Corners of the taught border in the image, with covariances that follow from the residuals of the inliers, and from
+/// what the taught border itself is off by.
 fn corners(
     seen: &SeenPatch,
     turned: usize,
@@ -200,7 +205,8 @@ fn corners(
     // A weak prior keeps directions that no inlier fixes finite.
     let prior = 1.0 / corners.area_px2();
     let covariance = (normal / variance + SMatrix::<f64, 8, 8>::identity() * prior).try_inverse()?;
-    let of = |i: usize| covariance.fixed_view::<2, 2>(2 * i, 2 * i).into_owned();
+    let border = Matrix2::identity() * BORDER_SIGMA_PX.powi(2);
+    let of = |i: usize| covariance.fixed_view::<2, 2>(2 * i, 2 * i).into_owned() + border;
     Some((corners, std::array::from_fn(of)))
 }
 

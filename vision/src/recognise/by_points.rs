@@ -1,16 +1,21 @@
 //! The decision by points: landmarks that points speak for in, the verdict out, or `None` where points say nothing and the
 //! icons are asked. Corners are those of the homography, sharpened by laying the picture on the learnt icon.
+//!
+//! False alarms are counted against things that have nothing in common with the landmark. Against its look-alikes two
+//! more conditions stand: no other landmark whose points are there may go uncontradicted, and where something of the map
+//! is so like the landmark that its icon would be taken for it, the likeness must be within the threshold that this left.
 
 use super::{
     Candidate, MAX_CANDIDATES, Recognition, Refusal, Verdict,
     align::{Aligner, Surroundings, Template},
     confidence::{entropy_m, entropy_norm, probability},
+    is_same_border,
     likeness::{Smoothed, between},
     models::ModelSet,
     signature::{Signature, likeness},
 };
 use crate::{
-    detect::quads::{Corners, Quad},
+    detect::quads::{BORDER_SIGMA_PX, Corners, Quad},
     frame::GrayImage,
     icon::rectify,
     learn::model::LandmarkModel,
@@ -32,7 +37,7 @@ pub const DOUBTFUL_PARTS: usize = 5;
 const MAX_MOVED_ICON_PX: f64 = 4.0;
 /// Smallest likeness of an alignment that is believed.
 const MIN_LIKENESS: f64 = 0.4;
-/// Standard deviation of a densely aligned corner, in icon pixels.
+/// Standard deviation of a densely aligned corner, in icon pixels, besides [`BORDER_SIGMA_PX`].
 const ALIGNED_SIGMA_ICON_PX: f64 = 0.25;
 
 /// log10 of the expected false alarms of `evidence` in a map of `landmarks`.
@@ -52,10 +57,15 @@ pub(crate) fn by_points(image: &GrayImage, quad: &Quad, models: &ModelSet, p: &P
     }
     let (best, model) = (found.first()?, models.at(found.first()?.model)?);
     let mut evidence = best.evidence.clone();
-    let doubtful = evidence.agreement.largest_disagreement() >= DOUBTFUL_PARTS;
-    let unique = alarms.get(1).is_none_or(|next| next / alarms[0] < p.recognise.verdict.margin);
-    let likeness = sharpened(image, &mut evidence, model, models, p);
-    let refusal = if doubtful { Some(Refusal::Disagreement) } else { (!unique).then_some(Refusal::Margin) };
+    let (border, corners_px) = nearest_border(quad, &evidence);
+    // Corners that were detected are the best there are: alignment is for others, and for telling a double.
+    let is_detected = is_same_border(&corners_px, &evidence.corners_px, p);
+    let likeness = if is_detected && !has_double(model, p) {
+        None
+    } else {
+        sharpened(image, &mut evidence, model, models, p)
+    };
+    let refusal = refusal(&found, &alarms, (model, likeness), p);
     let of = |(i, f): (usize, &Found)| {
         let ratio = if alarms[i] < 0.0 { LOG10_EPSILON / alarms[i] } else { f64::INFINITY };
         let refused = if i == 0 { refusal } else { (alarms[i] > LOG10_EPSILON).then_some(Refusal::Points) };
@@ -79,11 +89,56 @@ pub(crate) fn by_points(image: &GrayImage, quad: &Quad, models: &ModelSet, p: &P
         entropy_norm: entropy_norm(accepted, n),
         confidence: if sure { confidence(alarms[0]) } else { 0.0 },
         rotation: evidence.turned,
-        border: best.border,
+        border,
         aligned_px: Some(evidence.corners_px),
         landmarks: n,
         points: Some(Box::new(evidence)),
     })
+}
+
+/// Why the first of `found`, which is `model` and has the `likeness`, is not named although its points are there.
+fn refusal(
+    found: &[Found],
+    log10_alarms: &[f64],
+    (model, likeness): (&LandmarkModel, Option<f64>),
+    p: &Params,
+) -> Option<Refusal> {
+    if is_contradicted(found.first()?) {
+        return Some(Refusal::Disagreement);
+    }
+    // Its share of the best one's exponent says how much was taught of a rival, not whether it hangs there: a look-alike
+    // that was taught with fewer points agrees wherever it has any.
+    let rivals = |(f, alarms): (&Found, &f64)| {
+        let accepted = *alarms <= LOG10_EPSILON;
+        alarms / log10_alarms[0] >= p.recognise.verdict.margin || (accepted && !is_contradicted(f))
+    };
+    if found.iter().zip(log10_alarms).skip(1).any(rivals) {
+        return Some(Refusal::Margin);
+    }
+    // Where the image does not show all of it there is no likeness.
+    let is_like = likeness.is_none_or(|l| 1.0 - l < model.likeness.tau);
+    (has_double(model, p) && !is_like).then_some(Refusal::Likeness)
+}
+
+/// Something of the map is nearer to it than what is accepted where nothing is like it: to be told from that by points
+/// alone is not certain.
+fn has_double(model: &LandmarkModel, p: &Params) -> bool {
+    model.likeness.tau < p.learn.threshold.nearest_share * p.learn.likeness_cap
+}
+
+/// A connected part of it shows something else.
+fn is_contradicted(found: &Found) -> bool {
+    found.evidence.agreement.largest_disagreement() >= DOUBTFUL_PARTS
+}
+
+/// Which border of `quad` lies nearest to where the landmark's is: 0 for its corners, i for alternate i - 1; and its
+/// corners, the landmark's top-left first.
+fn nearest_border(quad: &Quad, evidence: &PointEvidence) -> (usize, Corners) {
+    let turned =
+        std::iter::once(&quad.corners_px).chain(&quad.alternates).map(|c| c.rotated(evidence.turned));
+    let off_px = |c: &Corners| c.furthest_px(&evidence.corners_px);
+    let nearest = turned.enumerate().min_by(|a, b| off_px(&a.1).total_cmp(&off_px(&b.1)));
+    nearest.unwrap_or((0, quad.corners_px.rotated(evidence.turned)))
 }
 
 /// Chance that the identity is right: false alarms are as rare as they are computed to be only if the model of chance
@@ -114,15 +169,14 @@ pub(super) fn sharpened(
     let alike = between(&Smoothed::new(&laid.icon), &Smoothed::new(&exemplar.icon), c).likeness;
     let icon_px = evidence.corners_px.area_px2().sqrt() / p.icon.size as f64;
     if alike >= MIN_LIKENESS
-        && moved_px(&evidence.corners_px, &laid.corners_px) <= MAX_MOVED_ICON_PX * icon_px
+        && evidence.corners_px.furthest_px(&laid.corners_px) <= MAX_MOVED_ICON_PX * icon_px
     {
         evidence.corners_px = laid.corners_px;
-        evidence.corner_covariance_px2 = [Matrix2::identity() * (ALIGNED_SIGMA_ICON_PX * icon_px).powi(2); 4];
+        let variance_px2 = (ALIGNED_SIGMA_ICON_PX * icon_px).powi(2) + BORDER_SIGMA_PX.powi(2);
+        evidence.corner_covariance_px2 = [Matrix2::identity() * variance_px2; 4];
     }
     Some(alike)
 }
 
-/// How far the corner that moved most has moved.
-fn moved_px(a: &Corners, b: &Corners) -> f64 {
-    a.points().iter().zip(b.points()).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
-}
+#[cfg(test)]
+mod tests;

@@ -22,7 +22,12 @@ pub mod expected;
 #[cfg(test)]
 pub(crate) mod fixture;
 
-use crate::{detect::quads::Corners, icon::Icon, params::RecogniseParams, points::verify::PointEvidence};
+use crate::{
+    detect::quads::Corners,
+    icon::Icon,
+    params::{Params, RecogniseParams},
+    points::verify::PointEvidence,
+};
 use correlation::Buckets;
 use descriptor::PointSet;
 use serde::{Deserialize, Serialize};
@@ -130,7 +135,8 @@ pub struct Candidate {
     /// refuses already.
     pub hausdorff: f64,
     /// How alike the picture and the learnt icon are, one laid on the other, -1 to 1; 0 where a glance told them to be
-    /// different things and nothing was accepted; `None` where the map's distances decide alone.
+    /// different things and nothing was accepted; `None` where the map's distances decide alone, and where points name a
+    /// landmark at the border that was detected.
     pub likeness: Option<f64>,
     /// The deciding distance of the map's [`DistanceKind`].
     pub distance: f64,
@@ -179,6 +185,15 @@ pub struct Verdict {
     pub landmarks: usize,
     /// What points say of the first candidate, where they decided.
     pub points: Option<Box<PointEvidence>>,
+}
+
+/// Corners that differ by less, in icon pixels, are those of one border.
+const SAME_BORDER_ICON_PX: f64 = 1.5;
+
+/// Whether aligned corners are those of the border that was detected, which are better known from its edges.
+pub(crate) fn is_same_border(detected_px: &Corners, aligned_px: &Corners, p: &Params) -> bool {
+    let icon_px = detected_px.area_px2().sqrt() / p.icon.size as f64;
+    detected_px.furthest_px(aligned_px) < SAME_BORDER_ICON_PX * icon_px
 }
 
 /// Candidates kept in a verdict.
