@@ -1,7 +1,8 @@
 //! Landmarks that look alike, for a robot that does not know where it is. Thresholds that tell landmarks from one another
 //! refuse what fits several; here they are lifted to what they would be if nothing looked like them, so that a sighting may
 //! be of any of those that look the same: which these are is known before anything is seen. Out: where the robot would
-//! stand for each of them. Never a recognition.
+//! stand for each of them. Never a recognition. Points have no thresholds to lift; where they say nothing, icons are asked
+//! of all, also of those that are named by their points only.
 
 use super::snapshot::{Learnt, MapSnapshot};
 use map::{
@@ -43,6 +44,8 @@ pub struct Doubles {
     pub models: ModelSet,
     /// The landmarks that look like each, itself included.
     pub alike: BTreeMap<LandmarkId, Arc<Vec<LandmarkId>>>,
+    /// The parameters without points: icons are asked where points say nothing.
+    by_icons: Params,
 }
 
 /// Whether something looks like it: its threshold was held down by others, or none could be found for that.
@@ -71,7 +74,9 @@ pub fn doubles(learnt: &BTreeMap<LandmarkId, Learnt>, kind: DistanceKind, p: &Pa
     let lifted: Vec<_> =
         held.map(|model| Arc::new(refit_thresholds(model, &[], p))).filter(|m| m.is_active()).collect();
     let alike = alike(&lifted, p);
-    Doubles { models: ModelSet::new(lifted, p).unwrap_or_default(), alike }
+    let mut by_icons = p.clone();
+    by_icons.recognise.verdict.points = false;
+    Doubles { models: ModelSet::new(lifted, p).unwrap_or_default(), alike, by_icons }
 }
 
 /// Who looks like whom: of two that one takes for the other, and so on from one to the next. What looks like either of two
@@ -157,7 +162,11 @@ pub struct Resembling {
 
 /// Which landmarks with doubles a quad may be; `None` where it is none of them, or may be one that hangs nobody knows where.
 pub fn resembling(image: &GrayImage, quad: &Quad, map: &MapSnapshot) -> Option<Resembling> {
-    let verdict = recognise(image, quad, &map.doubles.models, DistanceKind::Both, &map.params);
+    let asked = |p: &Params| recognise(image, quad, &map.doubles.models, DistanceKind::Both, p);
+    let mut verdict = asked(&map.params);
+    if map.params.recognise.verdict.points && verdict.recognition == Recognition::Unknown {
+        verdict = asked(&map.doubles.by_icons);
+    }
     let (Recognition::Ambiguous(_) | Recognition::Unique(_)) = verdict.recognition else { return None };
     let fits = |refusal: Option<Refusal>| matches!(refusal, None | Some(Refusal::Margin));
     let fitting: BTreeSet<LandmarkId> =
