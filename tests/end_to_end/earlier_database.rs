@@ -14,8 +14,8 @@ fn fixture(name: &str) -> Vec<u8> {
     fs::read(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-/// Points decide, and models that have none get them.
-const BY_POINTS: [(&str, &str); 1] = [("WAYMARK_ALGORITHM__RECOGNISE__VERDICT__POINTS", "true")];
+/// Icons decide alone: no model needs points.
+const BY_ICONS: [(&str, &str); 1] = [("WAYMARK_ALGORITHM__RECOGNISE__VERDICT__POINTS", "false")];
 
 /// A data directory with the database of the build.
 fn earlier() -> TempDir {
@@ -29,7 +29,7 @@ fn earlier() -> TempDir {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_database_of_2026_11_22_recognises_what_it_was_taught() {
     let data = earlier();
-    let server = Child::start(data.path());
+    let server = Child::start_with(data.path(), &BY_ICONS);
     let maps = server.maps();
     let all = maps.maps().await.expect("maps");
     assert_eq!(all.len(), 1, "{all:?}");
@@ -45,7 +45,7 @@ async fn a_database_of_2026_11_22_recognises_what_it_was_taught() {
 #[tokio::test(flavor = "multi_thread")]
 async fn models_of_2026_11_22_get_points_once_where_points_decide() {
     let data = earlier();
-    let server = Child::start_with(data.path(), &BY_POINTS);
+    let server = Child::start(data.path());
     let maps = server.maps();
     let all = maps.maps().await.expect("maps");
     let map = all[0].name.as_str();
@@ -74,7 +74,7 @@ async fn models_of_2026_11_22_get_points_once_where_points_decide() {
 
     // At the next start there is nothing left to do.
     server.kill();
-    let server = Child::start_with(data.path(), &BY_POINTS);
+    let server = Child::start(data.path());
     let maps = server.maps();
     assert!(maps.job("3").await.is_err(), "points are taken a second time");
     assert!(recognise(&maps, map).await.quads.iter().any(|q| q.points.is_some()));

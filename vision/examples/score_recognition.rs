@@ -26,7 +26,8 @@ use vision::{
     points::{search::search, taught::view_points},
     recognise::{
         DistanceKind, IconFeatures, LandmarkId, ModelSet, Recognition, features, log10_false_alarms,
-        verdict::recognise,
+        verdict::{recognise, recognise_watched},
+        watch::{Step, Watch},
     },
     trace::NoTrace,
 };
@@ -151,8 +152,8 @@ fn labelled(
             print!("{kind:?} {} {:?} {} conf {:.2}", q.file, q.landmark, word.1, v.confidence);
             for c in v.candidates.iter().take(3) {
                 print!(
-                    " | {} C {:.3} H {:.2} r {:.2} {:?}",
-                    c.landmark.0, c.correlation, c.hausdorff, c.ratio, c.refusal
+                    " | {} C {:.3} H {:.2} L {:.2?} r {:.2} {:?}",
+                    c.landmark.0, c.correlation, c.hausdorff, c.likeness, c.ratio, c.refusal
                 );
             }
             println!();
@@ -187,6 +188,21 @@ fn strangers(
     (strangers, strangers_accepted)
 }
 
+/// Time of each step of recognition.
+#[derive(Default)]
+struct Steps {
+    last: Option<Instant>,
+    ms: BTreeMap<Step, f64>,
+}
+
+impl Watch for Steps {
+    fn finished(&mut self, step: Step) {
+        let now = Instant::now();
+        let last = self.last.replace(now).unwrap_or(now);
+        *self.ms.entry(step).or_default() += (now - last).as_secs_f64() * 1e3;
+    }
+}
+
 /// What the detector and recognition make of the photographs of one half.
 #[derive(Default)]
 struct Detected {
@@ -197,7 +213,10 @@ struct Detected {
     quads: usize,
     detection_s: f64,
     recognition_s: f64,
+    steps: Steps,
     corner_errors_px: Vec<f64>,
+    /// Of each quad with the right name: see [`normalised_square`].
+    squares: Vec<f64>,
     confidences: Vec<(f64, bool)>,
 }
 
@@ -227,7 +246,8 @@ fn detected(
         for quad in facts.iter().filter(|q| q.kind == QuadKind::Full).take(MAX_RECOGNISED_QUADS) {
             score.quads += 1;
             let start = Instant::now();
-            let v = recognise(&labelled[0].image, quad, models, kind, p);
+            score.steps.last = Some(start);
+            let v = recognise_watched(&labelled[0].image, quad, models, kind, p, &mut score.steps);
             score.recognition_s += start.elapsed().as_secs_f64();
             let overlap = |q: &Query| iou(quad.corners_px.points(), q.quad.corners_px.points());
             let nearest =
@@ -249,10 +269,13 @@ fn detected(
             match hit {
                 Some(i) if right => {
                     named[i] = true;
-                    if let Some((corners, _)) = matched(quad, &v, p) {
-                        let truth = labelled[i].quad.corners_px;
-                        let turned = (0..4).map(|r| worst_corner(&corners, &truth.rotated(r)));
-                        score.corner_errors_px.push(turned.fold(f64::INFINITY, f64::min));
+                    if let Some((corners, covariance)) = matched(quad, &v, p) {
+                        let truth = (0..4).map(|r| labelled[i].quad.corners_px.rotated(r));
+                        let nearest = truth
+                            .min_by(|a, b| corners.furthest_px(a).total_cmp(&corners.furthest_px(b)))
+                            .unwrap_or(corners);
+                        score.corner_errors_px.push(corners.furthest_px(&nearest));
+                        score.squares.push(normalised_square(&corners, &nearest, &covariance));
                     }
                 }
                 _ => {
@@ -293,10 +316,27 @@ fn print_detected(mut s: Detected, name: &str, kind: DistanceKind) {
         at(0.5).unwrap_or(f64::NAN),
         at(0.9).unwrap_or(f64::NAN),
     );
+    s.squares.sort_by(f64::total_cmp);
+    let square =
+        |share: f64| s.squares.get((share * s.squares.len() as f64) as usize).copied().unwrap_or(f64::NAN);
+    println!(
+        "    normalised square of corner errors: 25 % {:.1}, median {:.1}, 75 % {:.1}",
+        square(0.25),
+        square(0.5),
+        square(0.75)
+    );
+    for (step, ms) in &s.steps.ms {
+        println!("    {}: {:.1} ms a photograph", step.name(), ms / s.images as f64);
+    }
 }
 
-fn worst_corner(a: &Corners, b: &Corners) -> f64 {
-    a.points().iter().zip(b.points()).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
+/// Mean square of the coordinates' errors over their variances: 1 where the covariances are right.
+fn normalised_square(found: &Corners, truth: &Corners, covariance: &[Matrix2<f64>; 4]) -> f64 {
+    let each = found.points().iter().zip(truth.points()).zip(covariance).map(|((f, t), c)| {
+        let off = f - t;
+        c.try_inverse().map_or(f64::INFINITY, |inverse| off.dot(&(inverse * off)))
+    });
+    each.sum::<f64>() / 8.0
 }
 
 /// What the detector finds in every image in `folder`, and quads at random places of it: how many are taken for a landmark.

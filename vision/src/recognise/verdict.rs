@@ -53,8 +53,8 @@ pub struct VerdictParams {
     pub sure_content: f64,
     /// Landmarks that are verified at most.
     pub max_verified: usize,
-    /// Whether points decide where icons would (`both`); what they say nothing of is left to the icons. Off by default:
-    /// measured in `docs/METHOD.md`, "Points".
+    /// Whether points decide where icons would (`both`); what they say nothing of is left to the icons. Measured in
+    /// `docs/METHOD.md`, "Points".
     pub points: bool,
     /// Landmarks with more points than this are never accepted by their icons: their points would have said so.
     pub max_icon_points: usize,
@@ -80,7 +80,7 @@ impl Default for VerdictParams {
             sure_content_likeness: 0.6,
             sure_content: 4.0,
             max_verified: 2,
-            points: false,
+            points: true,
             max_icon_points: 40,
             align: AlignParams::default(),
         }
