@@ -45,7 +45,7 @@ pub struct Doubles {
     /// The landmarks that look like each, itself included.
     pub alike: BTreeMap<LandmarkId, Arc<Vec<LandmarkId>>>,
     /// The parameters without points: icons are asked where points say nothing.
-    by_icons: Params,
+    pub by_icons: Params,
 }
 
 /// Whether something looks like it: its threshold was held down by others, or none could be found for that.

@@ -73,6 +73,7 @@ fn with_twin(map: &MapSnapshot, along_m: f64) -> MapSnapshot {
     made.doubles = Arc::new(Doubles {
         models: ModelSet::new(vec![poster.clone(), twin], &map.params).unwrap(),
         alike: [(POSTER, both.clone()), (TWIN, both)].into(),
+        ..Doubles::default()
     });
     made
 }

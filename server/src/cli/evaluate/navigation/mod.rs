@@ -30,9 +30,9 @@ pub(crate) struct Args {
     /// The last so many posters show a picture of their own all the same.
     #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=64))]
     unique: u32,
-    /// Landmarks are taught with points, and points decide (`algorithm.recognise.verdict.points`).
+    /// Icons decide, not points (`algorithm.recognise.verdict.points = false`).
     #[arg(long)]
-    points: bool,
+    icons: bool,
     /// Teach doors and windows, too.
     #[arg(long)]
     fittings: bool,
@@ -90,7 +90,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         posters: args.posters as usize,
         pictures: args.pictures as usize,
         unique: args.unique as usize,
-        points: args.points,
+        points: !args.icons,
         fittings: args.fittings,
         true_lessons: args.true_lessons,
         views: args.views as usize,
