@@ -66,8 +66,7 @@ impl Robot {
     pub(in crate::engine::motion) fn told(&self, fused: FusedPose, now: Instant) -> Told {
         let trust = match self.schedule.trust() {
             // A pose that came along from another map, which no frame has been compared with yet.
-            Trust::NoPose => PoseTrust::Unsupported,
-            Trust::Unsupported => PoseTrust::Unsupported,
+            Trust::NoPose | Trust::Unsupported => PoseTrust::Unsupported,
             Trust::Supported => PoseTrust::Supported,
             Trust::Stale => PoseTrust::Stale,
             Trust::Contradicted => PoseTrust::Contradicted,
