@@ -1,4 +1,5 @@
-//! Landmarks that look alike, for a robot that does not know where it is. Thresholds that tell landmarks from one another
+//! Landmarks that look alike: for a robot that does not know where it is, and for naming them by a pose that is known
+//! (`guided.rs`). Thresholds that tell landmarks from one another
 //! refuse what fits several; here they are lifted to what they would be if nothing looked like them, so that a sighting may
 //! be of any of those that look the same: which these are is known before anything is seen. Out: where the robot would
 //! stand for each of them. Never a recognition. Points have no thresholds to lift; where they say nothing, icons are asked
@@ -160,6 +161,12 @@ pub struct Resembling {
     pub covariance_px2: [Matrix2<f64>; 4],
 }
 
+/// Whether all of these have a place that is trusted.
+pub fn hang_where_known(landmarks: &BTreeSet<LandmarkId>, map: &MapSnapshot) -> bool {
+    let is_known = |id| map.landmarks.get(id).is_some_and(|info| info.is_trusted() && info.place.is_some());
+    landmarks.iter().all(is_known)
+}
+
 /// Which landmarks with doubles a quad may be; `None` where it is none of them, or may be one that hangs nobody knows where.
 pub fn resembling(image: &GrayImage, quad: &Quad, map: &MapSnapshot) -> Option<Resembling> {
     let asked = |p: &Params| recognise(image, quad, &map.doubles.models, DistanceKind::Both, p);
@@ -172,9 +179,7 @@ pub fn resembling(image: &GrayImage, quad: &Quad, map: &MapSnapshot) -> Option<R
     let fitting: BTreeSet<LandmarkId> =
         verdict.candidates.iter().filter(|c| fits(c.refusal)).map(|c| c.landmark).collect();
     let members = members(&fitting, &map.doubles.alike)?;
-    let is_known =
-        |id: &LandmarkId| map.landmarks.get(id).is_some_and(|info| info.is_trusted() && info.place.is_some());
-    if !members.iter().all(is_known) {
+    if !hang_where_known(&members, map) {
         return None;
     }
     let (corners_px, covariance_px2) = matched(quad, &verdict, &map.params)?;

@@ -5,7 +5,7 @@
 //! together, with its pose. A picture that fits no landmark is none wherever it hangs. Keeps nothing.
 
 use super::{
-    doubles::{Resembling, resembling},
+    doubles::{Resembling, hang_where_known, resembling},
     judging::View,
 };
 use map::{
@@ -35,7 +35,7 @@ use vision::{
 /// Two quads that overlap by more than this and may be the same landmark are two borders of one thing.
 const SAME_THING_IOU: f64 = 0.5;
 
-/// Most landmarks that are asked for where they are expected, in one frame: those with the largest part in the image.
+/// Most landmarks that are asked for where they are expected, in one frame: those whose shortest side is the longest.
 pub const MAX_ASKED: usize = 8;
 
 /// A landmark that was named by the pose.
@@ -184,7 +184,7 @@ fn asked(image: &GrayImage, e: &Expected, view: &View<'_>) -> Option<MayBe> {
     let found = expected(image, &Corners::new(e.corners_px).ok()?, id, models, &map.params)?;
     let members: BTreeSet<LandmarkId> =
         map.doubles.alike.get(&id).map_or_else(|| [id].into(), |alike| alike.iter().copied().collect());
-    if !members.iter().all(|id| map.landmarks.get(id).is_some_and(|info| info.place.is_some())) {
+    if !hang_where_known(&members, map) {
         return None;
     }
     let Found { corners_px, covariance_px2, picture_nats, points } = found;

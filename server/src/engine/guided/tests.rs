@@ -153,9 +153,14 @@ fn of_two_that_look_the_same_the_pose_says_which() {
 #[test]
 fn a_class_of_which_one_hangs_nobody_knows_where_is_not_named() {
     let (look, map) = Look::new();
-    let mut map = with_twin(&map, 2.0);
-    map.landmarks.get_mut(&TWIN).unwrap().place = None;
-    let facts = look.facts(&map);
-    let made = look.guided(&look.seen.frame.image, &facts, &map, look.truth());
-    assert!(made.sightings.iter().all(|s| s.landmark != POSTER), "{:?}", made.sightings);
+    let placed = with_twin(&map, 2.0);
+    let (mut unplaced, mut quarantined) = (placed.clone(), placed);
+    unplaced.landmarks.get_mut(&TWIN).unwrap().place = None;
+    quarantined.landmarks.get_mut(&TWIN).unwrap().standing = map::changes::Standing::Quarantined;
+    for map in [unplaced, quarantined] {
+        for facts in [look.facts(&map), FrameFacts { quads: Vec::new() }] {
+            let made = look.guided(&look.seen.frame.image, &facts, &map, look.truth());
+            assert!(made.sightings.iter().all(|s| s.landmark != POSTER), "{:?}", made.sightings);
+        }
+    }
 }
