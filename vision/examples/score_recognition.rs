@@ -29,6 +29,7 @@ use vision::{
         verdict::{recognise, recognise_watched},
         watch::{Step, Watch},
     },
+    seen_border::SeenBorder,
     trace::NoTrace,
 };
 
@@ -269,7 +270,9 @@ fn detected(
             match hit {
                 Some(i) if right => {
                     named[i] = true;
-                    if let Some((corners, covariance)) = matched(quad, &v, p) {
+                    if let Some(SeenBorder { corners_px: corners, covariance_px2: covariance, .. }) =
+                        matched(quad, &v, p)
+                    {
                         let truth = (0..4).map(|r| labelled[i].quad.corners_px.rotated(r));
                         let nearest = truth
                             .min_by(|a, b| corners.furthest_px(a).total_cmp(&corners.furthest_px(b)))

@@ -13,6 +13,7 @@ pub mod trace;
 pub mod geometry;
 pub mod detect;
 pub mod icon;
+pub mod seen_border;
 pub mod recognise;
 pub mod points;
 pub mod learn;

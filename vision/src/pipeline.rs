@@ -5,7 +5,7 @@
 use crate::{
     detect::{
         detect,
-        quads::{BORDER_SIGMA_PX, Corners, Quad, QuadKind},
+        quads::{Quad, QuadKind},
     },
     frame::{GrayImage, Intrinsics},
     localise::pose::{LandmarkPose, LandmarkSize, PoseError, landmark_pose},
@@ -13,6 +13,7 @@ use crate::{
     recognise::{
         DistanceKind, LandmarkId, ModelSet, Recognition, Verdict, is_same_border, verdict::recognise,
     },
+    seen_border::{ALIGNED_SIGMA_ICON_PX, FoundBy, SeenBorder},
     trace::{Stage, Trace},
 };
 use nalgebra::Matrix2;
@@ -20,9 +21,6 @@ use std::collections::BTreeMap;
 
 /// Most quads of one image that are compared with the landmarks, the detector's best first.
 pub const MAX_RECOGNISED_QUADS: usize = 24;
-
-/// Standard deviation of an aligned corner, in icon pixels: twice what the alignment's own test allows.
-const ALIGNED_SIGMA_ICON_PX: f64 = 0.5;
 
 /// What of a map the pipeline needs. Immutable while an image is worked on.
 #[derive(Debug, Clone, Copy)]
@@ -137,16 +135,15 @@ fn pose(
     let Some(Verdict { recognition: Recognition::Unique(landmark), .. }) = verdict else {
         return Err(NoPose::NotUnique);
     };
-    let (corners_px, covariance_px2) = verdict.and_then(|v| matched(quad, v, p)).ok_or(NoPose::NotUnique)?;
+    let seen = verdict.and_then(|v| matched(quad, v, p)).ok_or(NoPose::NotUnique)?;
     let camera = camera.ok_or(NoPose::NoCamera)?;
     let size = sizes.get(landmark).ok_or(NoPose::NoSize(*landmark))?;
-    Ok(landmark_pose(&corners_px, &covariance_px2, *size, camera)?)
+    Ok(landmark_pose(&seen.corners_px, &seen.covariance_px2, *size, camera)?)
 }
 
-/// The landmark's corners, its top-left first, with their covariances: as detected, or, where another border of the
-/// same thing was taught than the one detected, as aligned. An alternate border has no covariances of its own: the
-/// quad's stand in, both were found by the same edges.
-pub fn matched(quad: &Quad, verdict: &Verdict, p: &Params) -> Option<(Corners, [Matrix2<f64>; 4])> {
+/// The landmark's border: as detected, or, where another border of the same thing was taught than the one detected, as
+/// aligned. An alternate border has no covariances of its own: the quad's stand in, both were found by the same edges.
+pub fn matched(quad: &Quad, verdict: &Verdict, p: &Params) -> Option<SeenBorder> {
     let detected_px = match verdict.border {
         0 => &quad.corners_px,
         border => quad.alternates.get(border - 1)?,
@@ -154,37 +151,35 @@ pub fn matched(quad: &Quad, verdict: &Verdict, p: &Params) -> Option<(Corners, [
     let detected_px = detected_px.rotated(verdict.rotation);
     let believed_px2 = quad.believed_covariance_px2();
     let covariance_px2 = std::array::from_fn(|i| believed_px2[(i + verdict.rotation) % 4]);
+    let detected = SeenBorder { corners_px: detected_px, covariance_px2, found_by: FoundBy::Edges };
     let aligned_px = match &verdict.points {
         Some(evidence) => evidence.corners_px,
         None => match verdict.aligned_px {
             Some(aligned_px) => aligned_px,
-            None => return Some((detected_px, covariance_px2)),
+            None => return Some(detected),
         },
     };
     if is_same_border(&detected_px, &aligned_px, p) {
-        return Some((detected_px, covariance_px2));
+        return Some(detected);
     }
     if let Some(evidence) = &verdict.points {
-        return Some((evidence.corners_px, evidence.corner_covariance_px2));
+        return Some(evidence.border());
     }
     let icon_px = detected_px.area_px2().sqrt() / p.icon.size as f64;
     let sigma_px = ALIGNED_SIGMA_ICON_PX * icon_px;
-    Some((aligned_px, covariance_px2.map(|c| c + Matrix2::identity() * sigma_px * sigma_px)))
-}
-
-/// Covariances of corners that were laid on the learnt icon without any border having been detected.
-pub(crate) fn aligned_covariance_px2(corners_px: &Corners, p: &Params) -> [Matrix2<f64>; 4] {
-    let sigma_px = ALIGNED_SIGMA_ICON_PX * corners_px.area_px2().sqrt() / p.icon.size as f64;
-    [Matrix2::identity() * (sigma_px.powi(2) + BORDER_SIGMA_PX.powi(2)); 4]
+    let covariance_px2 = covariance_px2.map(|c| c + Matrix2::identity() * sigma_px * sigma_px);
+    Some(SeenBorder { corners_px: aligned_px, covariance_px2, found_by: FoundBy::Alignment })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::{
+        detect::quads::{BORDER_SIGMA_PX, Corners},
         frame::Distortion,
         geometry::homography::Homography,
         learn::{model::learn, random::Random, synthesis, texture::Texture},
+        points::taught::view_points,
         trace::NoTrace,
     };
     use nalgebra::{Isometry3, Point2, Point3, Rotation3, Translation3, Vector3};
@@ -219,7 +214,8 @@ mod tests {
         let p = Params::default();
         let lesson = |seed| {
             let views = synthesis::views(&poster(seed), &whole(), 20, &p, seed);
-            Arc::new(learn(LandmarkId(seed), &views, &[], &p).unwrap())
+            let points = view_points(&poster(seed), &whole());
+            Arc::new(learn(LandmarkId(seed), &views, &[], &p).unwrap().with_points(&[points]))
         };
         ModelSet::new(vec![lesson(1), lesson(2)], &p).unwrap()
     }
@@ -313,9 +309,12 @@ mod tests {
         quad.upright_ambiguous = true;
         let facts = facts(&image, quad.clone(), Some(&camera()));
         assert_pose(&facts);
-        let (_, covariance) = matched(&quad, facts.verdict.as_ref().unwrap(), &Params::default()).unwrap();
+        let seen = matched(&quad, facts.verdict.as_ref().unwrap(), &Params::default()).unwrap();
         let border = BORDER_SIGMA_PX.powi(2);
-        assert!((covariance[0][(0, 0)] - 0.05 - border).abs() < 1e-12, "covariances turn with their corners");
+        assert!(
+            (seen.covariance_px2[0][(0, 0)] - 0.05 - border).abs() < 1e-12,
+            "covariances turn with their corners"
+        );
     }
 
     #[test]

@@ -58,6 +58,8 @@ pub fn refusal(refusal: Refusal) -> &'static str {
         Refusal::Margin => "margin",
         Refusal::Points => "points",
         Refusal::Disagreement => "disagreement",
+        Refusal::Corners => "corners",
+        Refusal::Plain => "plain",
     }
 }
 

@@ -29,6 +29,7 @@ use vision::{
     params::Params,
     pipeline::{FrameFacts, QuadFacts, matched},
     recognise::{DistanceKind, LandmarkId, Recognition, Refusal, models::ModelSet, verdict::recognise},
+    seen_border::SeenBorder,
 };
 
 /// Most landmarks with look-alikes that are kept for this.
@@ -182,7 +183,7 @@ pub fn resembling(image: &GrayImage, quad: &Quad, map: &MapSnapshot) -> Option<R
     if !hang_where_known(&members, map) {
         return None;
     }
-    let (corners_px, covariance_px2) = matched(quad, &verdict, &map.params)?;
+    let SeenBorder { corners_px, covariance_px2, .. } = matched(quad, &verdict, &map.params)?;
     let ratio = verdict.candidates.first()?.ratio;
     Some(Resembling { members, fitting: fitting.len(), ratio, corners_px, covariance_px2 })
 }

@@ -27,9 +27,10 @@ use vision::{
     pipeline::{QuadFacts, matched},
     points::verify::PointEvidence,
     recognise::{
-        LandmarkId, Recognition,
+        LandmarkId, Recognition, Refusal,
         expected::{ACCEPTED_NATS, Found, expected},
     },
+    seen_border::SeenBorder,
 };
 
 /// Two quads that overlap by more than this and may be the same landmark are two borders of one thing.
@@ -163,18 +164,33 @@ fn may_be(image: &GrayImage, quad: usize, facts: &QuadFacts, view: &View<'_>) ->
     let verdict = facts.verdict.as_ref()?;
     let quad = Some(quad);
     if let Recognition::Unique(landmark) = verdict.recognition {
-        let (corners_px, covariance_px2) = matched(&facts.quad, verdict, &view.map.params)?;
+        let SeenBorder { corners_px, covariance_px2, .. } = matched(&facts.quad, verdict, &view.map.params)?;
         let ratio = verdict.candidates.first().map_or(0.0, |c| c.ratio);
         let members = [landmark].into();
         let resembling = Resembling { members, fitting: 1, ratio, corners_px, covariance_px2 };
         let (picture_nats, points) = (ACCEPTED_NATS, None);
         return Some(MayBe { quad, is_unique: true, picture_nats, resembling, points });
     }
-    if view.map.doubles.models.is_empty() {
+    let resembling = match plain(facts, view) {
+        Some(plain) => plain,
+        None if view.map.doubles.models.is_empty() => return None,
+        None => resembling(image, &facts.quad, view.map)?,
+    };
+    Some(MayBe { quad, is_unique: false, picture_nats: ACCEPTED_NATS, resembling, points: None })
+}
+
+/// A quad that the icon of one landmark alone speaks for, and nothing of the map looks like that landmark.
+fn plain(facts: &QuadFacts, view: &View<'_>) -> Option<Resembling> {
+    let verdict = facts.verdict.as_ref()?;
+    let Recognition::Ambiguous(landmark) = verdict.recognition else { return None };
+    let first = verdict.candidates.iter().find(|c| c.landmark == landmark)?;
+    let members = [landmark].into();
+    let is_alone = !view.map.doubles.alike.contains_key(&landmark) && hang_where_known(&members, view.map);
+    if first.refusal != Some(Refusal::Plain) || !is_alone {
         return None;
     }
-    let resembling = resembling(image, &facts.quad, view.map)?;
-    Some(MayBe { quad, is_unique: false, picture_nats: ACCEPTED_NATS, resembling, points: None })
+    let SeenBorder { corners_px, covariance_px2, .. } = matched(&facts.quad, verdict, &view.map.params)?;
+    Some(Resembling { members, fitting: 1, ratio: first.ratio, corners_px, covariance_px2 })
 }
 
 /// An expected landmark that was not detected, asked for; it may as well be another that looks the same.

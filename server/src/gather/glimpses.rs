@@ -17,7 +17,8 @@ use vision::{
     icon::icon,
     params::Params,
     pipeline::{QuadFacts, matched},
-    recognise::{LandmarkId, Recognition, features},
+    recognise::{LandmarkId, Recognition, Refusal, features},
+    seen_border::{FoundBy, SeenBorder},
 };
 
 /// A robot that knows its place less surely than this does not place what it sees: standard deviation on the floor...
@@ -71,7 +72,9 @@ pub(super) fn glimpses(offer: &Offer, params: &Params) -> Found {
         }
         let recognised = recognised(facts, params);
         let (corners_px, covariance_px2) = recognised
-            .map_or((facts.quad.corners_px, facts.quad.believed_covariance_px2()), |(_, seen)| seen);
+            .map_or((facts.quad.corners_px, facts.quad.believed_covariance_px2()), |(_, s)| {
+                (s.corners_px, s.covariance_px2)
+            });
         let Ok(place) = place(&corners_px, &covariance_px2, stand.as_ref(), &offer.looked.map) else {
             found.not_on_wall += 1;
             continue;
@@ -92,18 +95,15 @@ pub(super) fn glimpses(offer: &Offer, params: &Params) -> Found {
     found
 }
 
-type Seen = (Corners, [Matrix2<f64>; 4]);
-
 /// The landmark that is seen beyond doubt, with its corners. Where its border was found only by laying the learnt picture
 /// on it, the corners are not good enough to learn from.
-fn recognised(facts: &QuadFacts, params: &Params) -> Option<(LandmarkId, Seen)> {
+fn recognised(facts: &QuadFacts, params: &Params) -> Option<(LandmarkId, SeenBorder)> {
     let verdict = facts.verdict.as_ref()?;
     let Recognition::Unique(id) = verdict.recognition else { return None };
     if verdict.confidence < MIN_CONFIDENCE || verdict.border != 0 {
         return None;
     }
-    let detected = facts.quad.corners_px.rotated(verdict.rotation);
-    matched(&facts.quad, verdict, params).filter(|(corners, _)| *corners == detected).map(|seen| (id, seen))
+    matched(&facts.quad, verdict, params).filter(|s| s.found_by == FoundBy::Edges).map(|seen| (id, seen))
 }
 
 /// Where it hangs; `None` where that cannot be known, an error where it is known not to hang flat on a wall.
@@ -146,8 +146,12 @@ fn identity(
         };
     }
     let Some(verdict) = &facts.verdict else { return Identity::Doubtful };
-    if verdict.recognition != Recognition::Unknown {
-        return Identity::Doubtful;
+    if let Recognition::Ambiguous(id) = verdict.recognition {
+        // What its icon alone speaks for is the landmark where that hangs.
+        let is_plain =
+            verdict.candidates.iter().any(|c| c.landmark == id && c.refusal == Some(Refusal::Plain));
+        let is_it = is_plain && there(&id) == Some(true);
+        return if is_it { Identity::Landmark(id) } else { Identity::Doubtful };
     }
     let near = verdict.candidates.iter().any(|c| c.ratio < NEARLY && there(&c.landmark) != Some(false));
     let on_one = map.landmarks.keys().any(|id| there(id) == Some(true));

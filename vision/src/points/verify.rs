@@ -15,6 +15,7 @@ use crate::{
     detect::quads::{BORDER_SIGMA_PX, Corners},
     frame::GrayImage,
     geometry::homography::Homography,
+    seen_border::{FoundBy, SeenBorder},
 };
 use nalgebra::{Matrix2, Point2, SMatrix};
 
@@ -72,8 +73,18 @@ pub struct PointEvidence {
     pub corners_px: Corners,
     /// Their covariances, px^2.
     pub corner_covariance_px2: [Matrix2<f64>; 4],
+    /// Whether the corners are those of the homography, or were aligned from there with the learnt icon.
+    pub found_by: FoundBy,
     /// Which parts of the landmark agree.
     pub agreement: Agreement,
+}
+
+impl PointEvidence {
+    /// The landmark's border, wherever the detector found one.
+    pub fn border(&self) -> SeenBorder {
+        let (corners_px, covariance_px2) = (self.corners_px, self.corner_covariance_px2);
+        SeenBorder { corners_px, covariance_px2, found_by: self.found_by }
+    }
 }
 
 /// A homography that has yet to be verified.
@@ -131,6 +142,7 @@ pub(crate) fn verified(seen: &SeenPatch, hypothesis: &Hypothesis, target: &Targe
         turned: *turned,
         corners_px,
         corner_covariance_px2,
+        found_by: FoundBy::Points,
         agreement: Agreement::new(&checks, &target.points),
     })
 }

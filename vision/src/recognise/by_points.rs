@@ -24,6 +24,7 @@ use crate::{
         search::{Found, search},
         verify::PointEvidence,
     },
+    seen_border::FoundBy,
 };
 use nalgebra::Matrix2;
 
@@ -65,7 +66,10 @@ pub(crate) fn by_points(image: &GrayImage, quad: &Quad, models: &ModelSet, p: &P
     } else {
         sharpened(image, &mut evidence, model, models, p)
     };
-    let refusal = refusal(&found, &alarms, (model, likeness), p);
+    // The homography's corners stand unless the detector found the same.
+    let is_located = is_detected || is_well_known(&evidence);
+    let refusal =
+        refusal(&found, &alarms, (model, likeness), p).or((!is_located).then_some(Refusal::Corners));
     let of = |(i, f): (usize, &Found)| {
         let ratio = if alarms[i] < 0.0 { LOG10_EPSILON / alarms[i] } else { f64::INFINITY };
         let refused = if i == 0 { refusal } else { (alarms[i] > LOG10_EPSILON).then_some(Refusal::Points) };
@@ -94,6 +98,16 @@ pub(crate) fn by_points(image: &GrayImage, quad: &Quad, models: &ModelSet, p: &P
         landmarks: n,
         points: Some(Box::new(evidence)),
     })
+}
+
+/// A landmark of which a corner is known worse than this share of its size is not told, standard deviations: what is seen of
+/// it does not say where the rest is.
+const MAX_CORNER_SIGMA_SHARE: f64 = 0.1;
+
+/// Whether the points tell where the landmark's corners are.
+pub(super) fn is_well_known(evidence: &PointEvidence) -> bool {
+    let limit_px2 = MAX_CORNER_SIGMA_SHARE.powi(2) * evidence.corners_px.area_px2();
+    evidence.corner_covariance_px2.iter().all(|c| c.symmetric_eigenvalues().max() <= limit_px2)
 }
 
 /// Why the first of `found`, which is `model` and has the `likeness`, is not named although its points are there.
@@ -172,6 +186,7 @@ pub(super) fn sharpened(
         && evidence.corners_px.furthest_px(&laid.corners_px) <= MAX_MOVED_ICON_PX * icon_px
     {
         evidence.corners_px = laid.corners_px;
+        evidence.found_by = FoundBy::Alignment;
         let variance_px2 = (ALIGNED_SIGMA_ICON_PX * icon_px).powi(2) + BORDER_SIGMA_PX.powi(2);
         evidence.corner_covariance_px2 = [Matrix2::identity() * variance_px2; 4];
     }

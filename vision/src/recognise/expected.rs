@@ -6,7 +6,7 @@
 
 use super::{
     DistanceKind, LandmarkId, Recognition,
-    by_points::{DOUBTFUL_PARTS, sharpened},
+    by_points::{DOUBTFUL_PARTS, is_well_known, sharpened},
     models::ModelSet,
     verdict::recognise,
 };
@@ -14,8 +14,8 @@ use crate::{
     detect::quads::{Corners, Quad, QuadKind},
     frame::GrayImage,
     params::Params,
-    pipeline::aligned_covariance_px2,
     points::verify::{PointEvidence, verify_at},
+    seen_border::aligned_covariance_px2,
 };
 use nalgebra::{Matrix2, Point2};
 
@@ -24,10 +24,6 @@ pub const LOG10_EPSILON_EXPECTED: f64 = -4.0;
 /// Evidence of a landmark that passes every gate of its icon, nats: of the quads of strangers less than one in a thousand
 /// does (`docs/EVALUATION.md`).
 pub const ACCEPTED_NATS: f64 = 6.9;
-
-/// A landmark of which a corner is known worse than this share of its size is not told, standard deviations: what is seen of
-/// it does not say where the rest is.
-const MAX_CORNER_SIGMA_SHARE: f64 = 0.1;
 
 /// A landmark found where it was expected.
 #[derive(Debug, Clone, PartialEq)]
@@ -86,7 +82,7 @@ fn by_points(
     if is_whole {
         sharpened(image, &mut evidence, model, models, p);
     }
-    if !is_well_known(&evidence.corners_px, &evidence.corner_covariance_px2) {
+    if !is_well_known(&evidence) {
         return Said::Silent;
     }
     Said::Found(Box::new(Found {
@@ -111,13 +107,8 @@ fn by_icon(
     let (Recognition::Unique(_), Some(corners_px)) = (verdict.recognition, verdict.aligned_px) else {
         return None;
     };
-    let covariance_px2 = aligned_covariance_px2(&corners_px, p);
+    let covariance_px2 = aligned_covariance_px2(&corners_px, p.icon.size);
     Some(Found { corners_px, covariance_px2, picture_nats: ACCEPTED_NATS, points: None })
-}
-
-fn is_well_known(corners_px: &Corners, covariance_px2: &[Matrix2<f64>; 4]) -> bool {
-    let limit_px2 = MAX_CORNER_SIGMA_SHARE.powi(2) * corners_px.area_px2();
-    covariance_px2.iter().all(|c| c.symmetric_eigenvalues().max() <= limit_px2)
 }
 
 fn is_inside(image: &GrayImage, c: &Point2<f64>) -> bool {

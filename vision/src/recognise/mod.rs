@@ -121,6 +121,10 @@ pub enum Refusal {
     Points,
     /// Its points are there, but a connected part of it shows something else: perhaps not the landmark that was taught.
     Disagreement,
+    /// Its points agree, but do not tell where its corners are.
+    Corners,
+    /// Its icon alone speaks for it, where points decide: too little to name it without the robot's pose.
+    Plain,
 }
 
 /// A landmark compared with one icon.

@@ -56,7 +56,8 @@ pub struct VerdictParams {
     /// Whether points decide where icons would (`both`); what they say nothing of is left to the icons. Measured in
     /// `docs/METHOD.md`, "Points".
     pub points: bool,
-    /// Landmarks with more points than this are never accepted by their icons: their points would have said so.
+    /// Landmarks with more points than this are never accepted by their icons: their points would have said so. One with
+    /// fewer that its icon speaks for is ambiguous, with [`Refusal::Plain`]: the robot's pose may name it.
     pub max_icon_points: usize,
     /// How corners are moved.
     pub align: AlignParams,
@@ -197,14 +198,19 @@ fn decide(
     let margin = margin(found, best, kind);
     // Departs from method 10, which asks for a margin only where two or more are accepted: a runner-up just above its
     // own threshold is as much reason for doubt as one just below.
-    if margin < p.margin {
+    let refusal = if margin >= p.margin {
+        Some(Refusal::Margin)
+    } else {
+        (kind == DistanceKind::Both && p.points).then_some(Refusal::Plain)
+    };
+    if refusal.is_none() {
         verdict.recognition = Recognition::Unique(near.model.id);
         verdict.confidence = confidence(&verdict.candidates, best, landmarks, kind);
-    } else {
-        verdict.recognition = Recognition::Ambiguous(near.model.id);
-        if let Some(c) = verdict.candidates.get_mut(best) {
-            c.refusal = Some(Refusal::Margin);
-        }
+        return verdict;
+    }
+    verdict.recognition = Recognition::Ambiguous(near.model.id);
+    if let Some(c) = verdict.candidates.get_mut(best) {
+        c.refusal = refusal;
     }
     verdict
 }

@@ -93,6 +93,31 @@ fn the_border_of_the_landmark_is_told_from_the_wall_round_it() {
     assert_eq!(by_points(&image, &nested, &six(&p), &p).unwrap().border, 1);
 }
 
+/// Only the upper left of the landmark has points, the rest is hidden, and another border was detected: who it is is clear,
+/// where its lower right corner is is not.
+#[test]
+fn a_landmark_whose_corners_are_not_told_is_not_named() {
+    let p = Params::default();
+    let asked = |share: f32| {
+        let points: Vec<_> =
+            taught(1).into_iter().filter(|t| t.point().at.iter().all(|x| *x < share)).collect();
+        let set = models(&[(1, points), (2, taught(2)), (3, taught(3))], &p);
+        let (first, other) = (poster(1), poster(5));
+        let edge = 240.0 * share;
+        let half = GrayImage::from_fn(240, 240, |u, v| {
+            if (u as f32) < edge && (v as f32) < edge { first.at(u, v) } else { other.at(u, v) }
+        });
+        let image = photograph(&half, &oblique(), 0.9, 10.0);
+        let border =
+            Corners::try_from([[90.0, 80.0], [262.0, 107.0], [266.0, 280.0], [94.0, 306.0]]).unwrap();
+        let verdict = by_points(&image, &quad(border), &set, &p)?;
+        Some((verdict.recognition, verdict.candidates[0].refusal))
+    };
+    let first = LandmarkId(1);
+    assert_eq!(asked(1.0), Some((Recognition::Unique(first), None)));
+    assert_eq!(asked(0.5), Some((Recognition::Ambiguous(first), Some(Refusal::Corners))));
+}
+
 /// Corners of small and large posters that were found by another border than the taught one, in blurred and noisy images:
 /// squared errors are what their covariances say.
 #[test]

@@ -20,7 +20,12 @@ use std::sync::{Arc, LazyLock};
 
 const KINDS: [DistanceKind; 3] = [DistanceKind::Hausdorff, DistanceKind::Correlation, DistanceKind::Both];
 
-static PARAMS: LazyLock<Params> = LazyLock::new(Params::default);
+/// The icons decide.
+static PARAMS: LazyLock<Params> = LazyLock::new(|| {
+    let mut p = Params::default();
+    p.recognise.verdict.points = false;
+    p
+});
 static SIX: LazyLock<ModelSet> = LazyLock::new(|| model_set(6, &PARAMS));
 
 #[test]
@@ -353,6 +358,17 @@ fn a_large_map_asks_for_more() {
     // What is told is what decided.
     let told = &large.candidates[0];
     assert!(told.ratio > 1.0 && (told.distance / told.tau - told.ratio).abs() < 1e-9);
+}
+
+/// The same picture that names a landmark where icons decide leaves it open where points do and say nothing.
+#[test]
+fn where_points_decide_an_icon_alone_names_nothing() {
+    let image = photograph(&poster(1), &oblique(), 0.8, 20.0);
+    let v = recognise(&image, &quad(oblique()), &SIX, DistanceKind::Both, &Params::default());
+    assert_eq!(v.recognition, Recognition::Ambiguous(LandmarkId(1)));
+    assert_eq!((v.candidates[0].refusal, v.confidence), (Some(Refusal::Plain), 0.0));
+    let by_icon = recognise(&image, &quad(oblique()), &SIX, DistanceKind::Both, &PARAMS);
+    assert_eq!(by_icon.recognition, Recognition::Unique(LandmarkId(1)));
 }
 
 #[test]

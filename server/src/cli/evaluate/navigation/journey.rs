@@ -35,6 +35,7 @@ use vision::{
     geometry::polygon,
     pipeline::{FrameFacts, matched},
     recognise::{LandmarkId, Recognition},
+    seen_border::FoundBy,
 };
 
 /// A recognition is true when its quad overlaps the landmark's true outline by this much.
@@ -266,9 +267,16 @@ impl Journey {
                 global.push(world.name(id));
                 let corners = quad.verdict.as_ref().and_then(|v| matched(&quad.quad, v, &world.map.params));
                 if let (Some(corners), Some(view)) = (corners, truth.landmark(world.name(id))) {
-                    self.corners.entry("by the picture").or_default().extend(off(&corners, view));
+                    let how = match corners.found_by {
+                        FoundBy::Edges => "by the picture, detected",
+                        FoundBy::Alignment => "by the picture, aligned",
+                        FoundBy::Points => "by the picture, by points",
+                    };
+                    let corners = (corners.corners_px, corners.covariance_px2);
+                    self.corners.entry(how).or_default().extend(off(&corners, view));
                 }
             } else {
+                tracing::info!(landmark = world.name(id), ?found, verdict = ?quad.verdict, "a wrong name");
                 self.false_matches += 1;
             }
         }
