@@ -8,14 +8,20 @@
 mod lattice;
 mod goal;
 mod settle;
+mod certainty;
 mod surroundings;
 
 use super::{correlation::CorrelationParams, harris::blurred};
-use crate::{detect::quads::Corners, icon::Icon};
+use crate::{
+    detect::quads::{BORDER_SIGMA_PX, Corners},
+    geometry::homography::Homography,
+    icon::Icon,
+    seen_border::aligned_covariance_px2,
+};
 use fearless_simd::{Level, dispatch};
 use goal::{Goal, Levels};
 use lattice::{Lattice, Pattern, SquareMap, sample, square};
-use nalgebra::Point2;
+use nalgebra::{Matrix2, Point2, Vector2};
 use serde::{Deserialize, Serialize};
 use settle::{Limits, Settled, settle};
 use std::cell::OnceCell;
@@ -33,6 +39,9 @@ const LEVELS: usize = 3;
 const SECOND_BORDER_PX: usize = 2;
 /// The same of the coarse look, in its pixels.
 const COARSE_BORDER_PX: usize = 1;
+
+/// Least standard deviation of an aligned corner, in icon pixels.
+const LEAST_SIGMA_ICON_PX: f64 = 0.1;
 
 /// A step of less than this is the last of its look, in pixels of that look: the next one goes on from there, the last one
 /// gives the corners.
@@ -65,6 +74,8 @@ impl Default for AlignParams {
 pub struct Laid {
     /// Where the template's corners are in the image.
     pub corners_px: Corners,
+    /// Their covariances, px^2, as far as the two pictures tell.
+    pub covariance_px2: [Matrix2<f64>; 4],
     /// What they enclose, cut from the rectified surroundings.
     pub icon: Icon,
 }
@@ -171,7 +182,8 @@ impl<'a> Aligner<'a> {
         let size = self.on.size;
         let cut = SquareMap::new(size, &corners)?;
         let pixels = dispatch!(Level::new(), _s => whole(&cut, size, around.full()));
-        Some(Laid { corners_px, icon: Icon { size, pixels, source_scale: 1.0 } })
+        let covariance_px2 = in_image(&corners_px, size, last.covariances);
+        Some(Laid { corners_px, covariance_px2, icon: Icon { size, pixels, source_scale: 1.0 } })
     }
 
     /// The second look, at surroundings that were smoothed whole.
@@ -225,6 +237,22 @@ impl<'a> Aligner<'a> {
         let (shift_px, steps) = (self.p.max_shift * size as f64, self.p.steps.min(MAX_STEPS));
         Limits { shift_px, steps, settled_px: SETTLED_PX[level] }
     }
+}
+
+/// Covariances of corners in the image, from those in squared pixels of an icon of `size`.
+fn in_image(corners_px: &Corners, size: usize, covariances: Option<[Matrix2<f64>; 4]>) -> [Matrix2<f64>; 4] {
+    let unknown = || aligned_covariance_px2(corners_px, size);
+    let (Some(own), Ok(map)) = (covariances, Homography::square_to_quad(size, corners_px)) else {
+        return unknown();
+    };
+    let floor = Matrix2::identity() * LEAST_SIGMA_ICON_PX.powi(2);
+    std::array::from_fn(|i| {
+        let at = square(size)[i];
+        let along = |d: Vector2<f64>| map.apply(&(at + 0.5 * d)) - map.apply(&(at - 0.5 * d));
+        let slope = Matrix2::from_columns(&[along(Vector2::x()), along(Vector2::y())]);
+        let sum = slope * (own[i] + floor) * slope.transpose();
+        0.5 * (sum + sum.transpose()) + Matrix2::identity() * BORDER_SIGMA_PX.powi(2)
+    })
 }
 
 /// Every pixel of an icon whose corners lie where `map` says.

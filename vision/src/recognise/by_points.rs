@@ -7,7 +7,7 @@
 
 use super::{
     Candidate, MAX_CANDIDATES, Recognition, Refusal, Verdict,
-    align::{Aligner, Surroundings, Template},
+    align::{Aligner, Laid, Surroundings, Template},
     confidence::{entropy_m, entropy_norm, probability},
     is_same_border,
     likeness::{Smoothed, between},
@@ -15,7 +15,7 @@ use super::{
     signature::{Signature, likeness},
 };
 use crate::{
-    detect::quads::{BORDER_SIGMA_PX, Corners, Quad},
+    detect::quads::{Corners, Quad},
     frame::GrayImage,
     icon::rectify,
     learn::model::LandmarkModel,
@@ -26,7 +26,6 @@ use crate::{
     },
     seen_border::FoundBy,
 };
-use nalgebra::Matrix2;
 
 /// log10 of the false alarms that a comparison of a quad with a whole map may have, expected.
 pub const LOG10_EPSILON: f64 = -5.0;
@@ -34,12 +33,12 @@ pub const LOG10_EPSILON: f64 = -5.0;
 const LOG10_TURNS: f64 = 0.6;
 /// A landmark with so many connected parts of 25 that show something else is in doubt.
 pub const DOUBTFUL_PARTS: usize = 5;
-/// Dense alignment moves no corner of the homography further than this, in icon pixels.
+/// Dense alignment moves no corner of the homography further than this, in icon pixels...
 const MAX_MOVED_ICON_PX: f64 = 4.0;
 /// Smallest likeness of an alignment that is believed.
 const MIN_LIKENESS: f64 = 0.4;
-/// Standard deviation of a densely aligned corner, in icon pixels, besides [`BORDER_SIGMA_PX`].
-const ALIGNED_SIGMA_ICON_PX: f64 = 0.25;
+/// Nor further than so many squared standard deviations: 99.99 % of a corner in the plane.
+const MAX_SQUARE: f64 = 18.4;
 
 /// log10 of the expected false alarms of `evidence` in a map of `landmarks`.
 pub fn log10_false_alarms(evidence: &PointEvidence, landmarks: usize) -> f64 {
@@ -64,7 +63,8 @@ pub(crate) fn by_points(image: &GrayImage, quad: &Quad, models: &ModelSet, p: &P
     let likeness = if is_detected && !has_double(model, p) {
         None
     } else {
-        sharpened(image, &mut evidence, model, models, p)
+        let detected_px = (!is_detected).then_some(&corners_px);
+        sharpened(image, &mut evidence, detected_px, (model, models), p)
     };
     // The homography's corners stand unless the detector found the same.
     let is_located = is_detected || is_well_known(&evidence);
@@ -162,35 +162,58 @@ fn confidence(log10_false_alarms: f64) -> f64 {
     1.0 - 10.0_f64.powf(DISCOUNT * log10_false_alarms.min(0.0))
 }
 
-/// Lays the picture on the learnt icon from the corners of `evidence`, and takes over the corners if they moved as little
-/// as corners of points are wrong by. The likeness there.
+/// Lays the picture on the learnt icon, from the corners of `evidence` and, if that leads nowhere, from `detected_px`; takes
+/// over the corners if they are where the points can have put them. The likeness there.
 pub(super) fn sharpened(
     image: &GrayImage,
     evidence: &mut PointEvidence,
-    model: &LandmarkModel,
-    models: &ModelSet,
+    detected_px: Option<&Corners>,
+    (model, models): (&LandmarkModel, &ModelSet),
     p: &Params,
 ) -> Option<f64> {
+    let mut first = None;
+    for start_px in std::iter::once(&evidence.corners_px.clone()).chain(detected_px) {
+        let Some((laid, alike)) = laid(image, start_px, (model, models), p) else { continue };
+        first = first.or(Some(alike));
+        if alike >= MIN_LIKENESS && may_be_at(evidence, &laid.corners_px, p) {
+            evidence.corners_px = laid.corners_px;
+            evidence.corner_covariance_px2 = laid.covariance_px2;
+            evidence.found_by = FoundBy::Alignment;
+            return Some(alike);
+        }
+    }
+    first
+}
+
+/// Whether the points leave it open that the landmark's corners are `corners_px`.
+fn may_be_at(evidence: &PointEvidence, corners_px: &Corners, p: &Params) -> bool {
+    let icon_px = evidence.corners_px.area_px2().sqrt() / p.icon.size as f64;
+    let pairs = evidence.corners_px.points().iter().zip(corners_px.points());
+    pairs.zip(&evidence.corner_covariance_px2).all(|((a, b), covariance)| {
+        let off = a - b;
+        off.norm() <= MAX_MOVED_ICON_PX * icon_px
+            || covariance.cholesky().is_some_and(|c| off.dot(&c.solve(&off)) <= MAX_SQUARE)
+    })
+}
+
+/// The picture laid on the nearest of the learnt icons from `start_px`, and how like it is there.
+fn laid(
+    image: &GrayImage,
+    start_px: &Corners,
+    (model, models): (&LandmarkModel, &ModelSet),
+    p: &Params,
+) -> Option<(Laid, f64)> {
     let (c, align) = (&p.recognise.correlation, &p.recognise.verdict.align);
-    let icon = rectify(image, &evidence.corners_px, &p.icon).ok()?;
+    let icon = rectify(image, start_px, &p.icon).ok()?;
     let signature = Signature::new(&icon);
     let alike = |i: usize| likeness(model.exemplars[i].signature.values(), signature.values());
     let nearest = (0..model.exemplars.len()).max_by(|a, b| alike(*a).total_cmp(&alike(*b)))?;
     let exemplar = &model.exemplars[nearest];
-    let around = Surroundings::new(image, &evidence.corners_px, &icon, align)?;
+    let around = Surroundings::new(image, start_px, &icon, align)?;
     let laid = Aligner::new(models.lattices(), align)
         .align(&around, &Template::new(&exemplar.icon, &exemplar.coarse))?;
     let alike = between(&Smoothed::new(&laid.icon), &Smoothed::new(&exemplar.icon), c).likeness;
-    let icon_px = evidence.corners_px.area_px2().sqrt() / p.icon.size as f64;
-    if alike >= MIN_LIKENESS
-        && evidence.corners_px.furthest_px(&laid.corners_px) <= MAX_MOVED_ICON_PX * icon_px
-    {
-        evidence.corners_px = laid.corners_px;
-        evidence.found_by = FoundBy::Alignment;
-        let variance_px2 = (ALIGNED_SIGMA_ICON_PX * icon_px).powi(2) + BORDER_SIGMA_PX.powi(2);
-        evidence.corner_covariance_px2 = [Matrix2::identity() * variance_px2; 4];
-    }
-    Some(alike)
+    Some((laid, alike))
 }
 
 #[cfg(test)]

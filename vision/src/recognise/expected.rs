@@ -80,7 +80,7 @@ fn by_points(
         return Said::Silent;
     }
     if is_whole {
-        sharpened(image, &mut evidence, model, models, p);
+        sharpened(image, &mut evidence, None, (model, models), p);
     }
     if !is_well_known(&evidence) {
         return Said::Silent;

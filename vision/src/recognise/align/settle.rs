@@ -7,10 +7,11 @@
 )]
 
 use super::{
+    certainty::corner_covariances,
     goal::{Goal, dot},
     lattice::{Lattice, SquareMap, square},
 };
-use nalgebra::{Const, DimMin, Point2, SMatrix, SVector, Vector2};
+use nalgebra::{Const, DimMin, Matrix2, Point2, SMatrix, SVector, Vector2};
 
 /// A step that brings nothing is not tried again, shorter, if it was less than so many times [`Limits::settled_px`].
 const HARDLY_WRONG: f64 = 5.0;
@@ -25,6 +26,8 @@ pub(super) struct Settled {
     pub(super) corners: [Point2<f64>; 4],
     /// Mean squared correlation of the buckets.
     pub(super) alike: f64,
+    /// How surely the corners are known, in squared pixels of the icon, where all eight coordinates moved.
+    pub(super) covariances: Option<[Matrix2<f64>; 4]>,
 }
 
 /// How far and how often corners may move.
@@ -77,7 +80,10 @@ where
             _ => damping *= 10.0,
         }
     }
-    Some(Settled { corners, alike: here.alike / lattice.all_buckets as f64 })
+    let said: Vec<_> =
+        here.said.iter().map(|s| (goal.buckets[s.bucket].normal * s.weight, s.gradient)).collect();
+    let covariances = corner_covariances(&said);
+    Some(Settled { corners, alike: here.alike / lattice.all_buckets as f64, covariances })
 }
 
 /// Moves of TL, TR, BR, BL: from those of the left, right, top and bottom sides, or as they are.
@@ -90,10 +96,21 @@ fn corner_moves<const D: usize>(step: &SVector<f64, D>) -> [Vector2<f64>; 4] {
     }
 }
 
+/// What one bucket adds to the equations.
+struct Said<const D: usize> {
+    /// Its index.
+    bucket: usize,
+    weight: f64,
+    /// What it adds to the right side.
+    gradient: SVector<f64, D>,
+}
+
 /// Normal equations of the moves, and how alike picture and template are.
 struct Equations<const D: usize> {
     normal: SMatrix<f64, D, D>,
     right: SVector<f64, D>,
+    /// What each bucket says.
+    said: Vec<Said<D>>,
     /// What the moves make greater: a bucket that is covered in part has far less say than one that is not.
     likeness: f64,
     /// Squared correlations of the buckets, added up.
@@ -114,7 +131,13 @@ where
         least: f64,
         seen: &mut [f32],
     ) -> Self {
-        let mut sum = Self { normal: SMatrix::zeros(), right: SVector::zeros(), likeness: 0.0, alike: 0.0 };
+        let mut sum = Self {
+            normal: SMatrix::zeros(),
+            right: SVector::zeros(),
+            said: vec![],
+            likeness: 0.0,
+            alike: 0.0,
+        };
         see(map, seen);
         let mut looked = Vec::with_capacity(goal.buckets.len());
         for (i, bucket) in goal.buckets.iter().enumerate() {
@@ -141,11 +164,14 @@ where
             let bucket = &goal.buckets[i];
             let part = bucket.cells.start..bucket.cells.end;
             sum.normal += bucket.normal * weight;
+            let mut gradient = SVector::zeros();
             for d in 0..D {
                 // Slopes have mean 0: what is subtracted from the grey levels does not matter.
                 let level = f64::from(dot(&goal.slopes[d][part.clone()], &seen[part.clone()]) / norm);
-                sum.right[d] += weight * (bucket.level[d] - level);
+                gradient[d] = weight * (bucket.level[d] - level);
             }
+            sum.right += gradient;
+            sum.said.push(Said { bucket: i, weight, gradient });
         }
         sum
     }

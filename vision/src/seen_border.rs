@@ -1,0 +1,35 @@
+//! The taught border of a landmark as an image shows it: corners, covariances, and how they were found.
+
+use crate::detect::quads::{BORDER_SIGMA_PX, Corners};
+use nalgebra::Matrix2;
+
+/// Standard deviation of an aligned corner, in icon pixels: twice what the alignment's own test allows.
+pub(crate) const ALIGNED_SIGMA_ICON_PX: f64 = 0.5;
+
+/// The taught border of a landmark in an image.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SeenBorder {
+    /// Its corners, the landmark's top-left first.
+    pub corners_px: Corners,
+    /// Their covariances, px^2.
+    pub covariance_px2: [Matrix2<f64>; 4],
+    /// How the corners were found.
+    pub found_by: FoundBy,
+}
+
+/// How the corners of a landmark were found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FoundBy {
+    /// They are those of a detected border.
+    Edges,
+    /// The picture was laid on the learnt icon.
+    Alignment,
+    /// By the homography of matched points.
+    Points,
+}
+
+/// Covariances of corners that were laid on the learnt icon without any border having been detected.
+pub(crate) fn aligned_covariance_px2(corners_px: &Corners, icon_size: usize) -> [Matrix2<f64>; 4] {
+    let sigma_px = ALIGNED_SIGMA_ICON_PX * corners_px.area_px2().sqrt() / icon_size as f64;
+    [Matrix2::identity() * (sigma_px.powi(2) + BORDER_SIGMA_PX.powi(2)); 4]
+}
