@@ -125,6 +125,7 @@ fn one(
             icon: v.cut.icon.clone(),
             corners_px: v.cut.corners_px,
             image_size_px: v.size_px,
+            exact: None,
             generated: false,
         })
         .collect();

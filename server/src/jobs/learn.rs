@@ -275,6 +275,7 @@ fn sights(m: &Material, id: LandmarkId) -> Sights {
             icon: l.cut.icon.clone(),
             corners_px: l.cut.corners_px,
             image_size_px: l.size_px,
+            exact: None,
             generated: false,
         })
         .collect();

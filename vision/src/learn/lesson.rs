@@ -27,7 +27,12 @@ pub fn learn(
     let pixels: Vec<&[f32]> = icons.iter().map(|i| i.icon.pixels.as_slice()).collect();
     let components = modes(&pixels).ok_or(LearnError::NoComponents)?;
     let chosen: Vec<usize> = exemplars(&components).iter().map(|e| e.index).collect();
-    let own = own_distances(&icons, &chosen, p).ok_or(LearnError::NoComponents)?;
+    // An exemplar's own corners would be wrong by as much as a detector's: what is laid on it would be as well.
+    let exemplar = |i: usize| {
+        views[i].exact.as_ref().map_or_else(|| icons[i].clone(), |e| features(whole(e), &p.recognise))
+    };
+    let kept: Vec<IconFeatures> = chosen.iter().map(|i| exemplar(*i)).collect();
+    let own = own_distances(&icons, (&chosen, &kept), exemplar, p).ok_or(LearnError::NoComponents)?;
 
     let saliency_f = saliency_f(&pixels);
     let points: Vec<_> = icons.iter().map(|i| &i.points).collect();
@@ -37,7 +42,6 @@ pub fn learn(
         params_hash: p.distance_hash(),
         views: views.len(),
         generated_views: views.iter().filter(|v| v.generated).count(),
-        exemplars: chosen.iter().map(|i| icons[*i].clone()).collect(),
         eigenvalues: components.eigenvalues,
         total_variance: components.total_variance,
         correlation: Threshold::NEVER,
@@ -46,7 +50,7 @@ pub fn learn(
         hausdorff_evidence: Evidence { own: rising(own.iter().map(|d| d.1)), ..Evidence::default() },
         likeness: Threshold::NEVER,
         likeness_evidence: Evidence {
-            own: rising(own_unlikeness(&icons, &chosen, p).into_iter()),
+            own: rising(own_unlikeness(&icons, (&chosen, &kept), p).into_iter()),
             ..Evidence::default()
         },
         saliency_f,
@@ -57,6 +61,7 @@ pub fn learn(
         status: ModelStatus::Candidate(vec![]),
         points: vec![],
         knows_points: false,
+        exemplars: kept,
     };
     Ok(refit_thresholds(&model, negatives, p))
 }
@@ -65,9 +70,12 @@ pub fn learn(
 const MAX_OWN_LAID: usize = 9;
 
 /// 1 minus the likeness of the landmark's own icons that are no exemplars, laid on those.
-fn own_unlikeness(icons: &[IconFeatures], chosen: &[usize], p: &Params) -> Vec<f64> {
-    let exemplars: Vec<IconFeatures> = chosen.iter().map(|i| icons[*i].clone()).collect();
-    let templates = Templates::new(&exemplars, p);
+fn own_unlikeness(
+    icons: &[IconFeatures],
+    (chosen, exemplars): (&[usize], &[IconFeatures]),
+    p: &Params,
+) -> Vec<f64> {
+    let templates = Templates::new(exemplars, p);
     let others: Vec<_> = icons.iter().enumerate().filter(|(i, _)| !chosen.contains(i)).collect();
     let every = others.len().div_ceil(MAX_OWN_LAID).max(1);
     others.into_iter().step_by(every).map(|(_, icon)| templates.unlikeness(icon, -1.0)).collect()
@@ -75,24 +83,27 @@ fn own_unlikeness(icons: &[IconFeatures], chosen: &[usize], p: &Params) -> Vec<f
 
 /// Distances (C^r, H^r) of the landmark's own icons, none to a model that holds the icon itself (A19): by folds with
 /// many views, otherwise of the icons that are no exemplars. `None` if a fold has no components.
-fn own_distances(icons: &[IconFeatures], chosen: &[usize], p: &Params) -> Option<Vec<(f64, f64)>> {
+fn own_distances(
+    icons: &[IconFeatures],
+    (chosen, kept): (&[usize], &[IconFeatures]),
+    exemplar: impl Fn(usize) -> IconFeatures,
+    p: &Params,
+) -> Option<Vec<(f64, f64)>> {
     let to = |exemplars: &[IconFeatures], icon: &IconFeatures, p: &RecogniseParams| {
         let d = distances(exemplars, icon, p);
         (d.correlation, d.hausdorff)
     };
     if icons.len() < p.learn.min_views_for_folds.max(2) {
-        let model: Vec<IconFeatures> = chosen.iter().map(|i| icons[*i].clone()).collect();
         let others = icons.iter().enumerate().filter(|(i, _)| !chosen.contains(i));
-        return Some(others.map(|(_, icon)| to(&model, icon, &p.recognise)).collect());
+        return Some(others.map(|(_, icon)| to(kept, icon, &p.recognise)).collect());
     }
     let folds = p.learn.folds.clamp(2, icons.len());
     let mut own = Vec::with_capacity(icons.len());
     for fold in 0..folds {
-        let taught: Vec<&IconFeatures> =
-            icons.iter().enumerate().filter(|(i, _)| i % folds != fold).map(|(_, icon)| icon).collect();
-        let pixels: Vec<&[f32]> = taught.iter().map(|i| i.icon.pixels.as_slice()).collect();
+        let taught: Vec<usize> = (0..icons.len()).filter(|i| i % folds != fold).collect();
+        let pixels: Vec<&[f32]> = taught.iter().map(|i| icons[*i].icon.pixels.as_slice()).collect();
         let model: Vec<IconFeatures> =
-            exemplars(&modes(&pixels)?).iter().map(|e| taught[e.index].clone()).collect();
+            exemplars(&modes(&pixels)?).iter().map(|e| exemplar(taught[e.index])).collect();
         own.extend(icons.iter().skip(fold).step_by(folds).map(|icon| to(&model, icon, &p.recognise)));
     }
     Some(own)

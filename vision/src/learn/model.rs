@@ -74,8 +74,10 @@ impl Default for LearnParams {
 /// One sighting of a landmark, to learn from.
 #[derive(Debug, Clone, PartialEq)]
 pub struct View {
-    /// The rectified picture.
+    /// The rectified picture, cut out along corners as inexact as the detector's.
     pub icon: Icon,
+    /// The same along its true corners, where those are known: of a generated view. What is laid on it is as exact as they.
+    pub exact: Option<Icon>,
     /// Where it was in the image.
     pub corners_px: Corners,
     /// Width and height of that image.
@@ -89,7 +91,7 @@ impl View {
     pub fn photographed(image: &GrayImage, corners_px: &Corners, p: &Params) -> Result<Self, IconError> {
         let icon = icon(image, corners_px, &p.icon)?;
         let image_size_px = [image.width(), image.height()];
-        Ok(Self { icon, corners_px: *corners_px, image_size_px, generated: false })
+        Ok(Self { icon, exact: None, corners_px: *corners_px, image_size_px, generated: false })
     }
 }
 

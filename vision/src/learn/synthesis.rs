@@ -91,8 +91,14 @@ fn view(texture: &Texture, aspect: f64, p: &Params, random: &mut Random) -> Opti
         Point2::new(c.x + du, c.y + dv)
     });
     let local = Corners::new(noisy.map(|c| c - shift)).ok()?;
-    let icon = icon(&image, &local, &p.icon).ok()?;
-    Some(View { icon, corners_px: Corners::new(noisy).ok()?, image_size_px: CAMERA_SIZE_PX, generated: true })
+    let exact = Corners::new(corners.points().map(|c| c - shift)).ok()?;
+    Some(View {
+        exact: Some(icon(&image, &exact, &p.icon).ok()?),
+        icon: icon(&image, &local, &p.icon).ok()?,
+        corners_px: Corners::new(noisy).ok()?,
+        image_size_px: CAMERA_SIZE_PX,
+        generated: true,
+    })
 }
 
 /// Where the camera stands: angles of the line of sight to the normal, roll, apparent size, where it aims.
