@@ -152,18 +152,16 @@ pub fn matched(quad: &Quad, verdict: &Verdict, p: &Params) -> Option<SeenBorder>
     let believed_px2 = quad.believed_covariance_px2();
     let covariance_px2 = std::array::from_fn(|i| believed_px2[(i + verdict.rotation) % 4]);
     let detected = SeenBorder { corners_px: detected_px, covariance_px2, found_by: FoundBy::Edges };
-    let aligned_px = match &verdict.points {
-        Some(evidence) => evidence.corners_px,
-        None => match verdict.aligned_px {
-            Some(aligned_px) => aligned_px,
-            None => return Some(detected),
-        },
-    };
+    if let Some(own) = verdict.points.as_ref().map(|evidence| evidence.border()) {
+        let is_same = match own.found_by {
+            FoundBy::Alignment => detected.agrees_with(&own),
+            FoundBy::Points | FoundBy::Edges => is_same_border(&detected_px, &own.corners_px, p),
+        };
+        return Some(if is_same { detected } else { own });
+    }
+    let Some(aligned_px) = verdict.aligned_px else { return Some(detected) };
     if is_same_border(&detected_px, &aligned_px, p) {
         return Some(detected);
-    }
-    if let Some(evidence) = &verdict.points {
-        return Some(evidence.border());
     }
     let icon_px = detected_px.area_px2().sqrt() / p.icon.size as f64;
     let sigma_px = ALIGNED_SIGMA_ICON_PX * icon_px;

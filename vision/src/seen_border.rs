@@ -17,6 +17,21 @@ pub struct SeenBorder {
     pub found_by: FoundBy,
 }
 
+/// 99 % of chi2 with 2 degrees of freedom.
+const CHI2_2_99: f64 = 9.21;
+
+impl SeenBorder {
+    /// Whether both can be the same border by their covariances.
+    pub fn agrees_with(&self, other: &Self) -> bool {
+        let corners = self.corners_px.points().iter().zip(other.corners_px.points());
+        let covariances = self.covariance_px2.iter().zip(&other.covariance_px2);
+        corners.zip(covariances).all(|((a, b), (c, d))| {
+            let off = a - b;
+            (c + d).cholesky().is_some_and(|sum| off.dot(&sum.solve(&off)) <= CHI2_2_99)
+        })
+    }
+}
+
 /// How the corners of a landmark were found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FoundBy {

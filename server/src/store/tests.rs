@@ -146,6 +146,7 @@ async fn store_model(store: &Store, landmark: i64, params: &vision::params::Para
         icon: Icon::new(side, pixels, 1.0).unwrap(),
         corners_px: Corners::try_from([[0.0, 0.0], [90.0, 0.0], [90.0, 90.0], [0.0, 90.0]]).unwrap(),
         image_size_px: [91, 91],
+        exact: None,
         generated: false,
     };
     let id = LandmarkId(landmark as u64);

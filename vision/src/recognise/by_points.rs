@@ -58,14 +58,8 @@ pub(crate) fn by_points(image: &GrayImage, quad: &Quad, models: &ModelSet, p: &P
     let (best, model) = (found.first()?, models.at(found.first()?.model)?);
     let mut evidence = best.evidence.clone();
     let (border, corners_px) = nearest_border(quad, &evidence);
-    // Corners that were detected are the best there are: alignment is for others, and for telling a double.
     let is_detected = is_same_border(&corners_px, &evidence.corners_px, p);
-    let likeness = if is_detected && !has_double(model, p) {
-        None
-    } else {
-        let detected_px = (!is_detected).then_some(&corners_px);
-        sharpened(image, &mut evidence, detected_px, (model, models), p)
-    };
+    let likeness = sharpened(image, &mut evidence, Some(&corners_px), (model, models), p);
     // The homography's corners stand unless the detector found the same.
     let is_located = is_detected || is_well_known(&evidence);
     let refusal =

@@ -175,8 +175,7 @@ fn what_fails_a_gate_stays_a_candidate_with_its_number() {
     let model = learn(LandmarkId(1), &views, &[], &p).unwrap();
     let ModelStatus::Candidate(failures) = &model.status else { panic!("a blank panel is no landmark") };
     let gates: Vec<Gate> = failures.iter().map(|f| f.gate).collect();
-    assert!(gates.contains(&Gate::Saliency) && gates.contains(&Gate::StablePoints), "{gates:?}");
-    assert!(gates.contains(&Gate::HausdorffThreshold(ThresholdError::NothingFinite)), "{gates:?}");
+    assert!(gates.contains(&Gate::Saliency) && gates.contains(&Gate::Content), "{gates:?}");
     assert!(model.hausdorff.tau.abs() < 1e-12, "accepts nothing");
 
     let one = View::photographed(&poster(1), &whole(), &p).unwrap();

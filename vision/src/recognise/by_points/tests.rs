@@ -119,7 +119,7 @@ fn a_landmark_whose_corners_are_not_told_is_not_named() {
 }
 
 /// Corners of small and large posters that were found by another border than the taught one, in blurred and noisy images:
-/// squared errors are what their covariances say.
+/// squared errors are at most what their covariances say. Those count 0.3 px for the taught border, which is exact here.
 #[test]
 fn corners_are_as_good_as_their_covariance_says() {
     let p = Params::default();
@@ -142,7 +142,7 @@ fn corners_are_as_good_as_their_covariance_says() {
             }
         }
         assert!(count > 150.0, "{side_px} px: {count} coordinates");
-        assert!((0.2..2.0).contains(&(sum / count)), "{side_px} px: normalised square {}", sum / count);
+        assert!((0.1..2.0).contains(&(sum / count)), "{side_px} px: normalised square {}", sum / count);
     }
 }
 
