@@ -155,7 +155,8 @@ pub struct Candidate {
     #[prost(double, tag = "7")]
     pub probability: f64,
     /// Empty, or the gate that refused it: correlation, hausdorff, likeness, contradiction, content, margin,
-    /// points (so many points would agree by chance too often), disagreement (a connected part shows something else).
+    /// points (so many points would agree by chance too often), disagreement (a connected part shows something else),
+    /// corners (points agree, but do not tell where its corners are), plain (its icon alone speaks for it).
     #[prost(string, tag = "8")]
     pub refusal: ::prost::alloc::string::String,
     /// How alike the picture and the learnt icon are, one laid on the other, -1 to 1; absent where the map's distances
