@@ -42,7 +42,7 @@ pub(crate) enum Command {
     ///   waymark evaluate viewpoint --photographs museum-paintings --taught photograph --detector
     #[command(verbatim_doc_comment)]
     Viewpoint(experiment::viewpoint::Args),
-    /// How small a landmark may be seen: the same by apparent size, from 300 px down to 36.
+    /// How small a landmark may be seen: the same by apparent size, from 300 px down to 28.
     Scale(experiment::scale::Args),
     /// Too dark, too bright, light from the side, a shadow's edge across: the same by each of them.
     Illumination(experiment::illumination::Args),

@@ -254,7 +254,10 @@ fn mated(class: &Class, args: &Args, p: &Params) -> (Mated, [usize; 2]) {
         right_interval: wilson(right, looks.len()),
         wrong,
         wrong_bound: upper_bound(wrong, looks.len()),
-        ambiguous: count(Outcome::Ambiguous),
+        ambiguous: [Outcome::Doubtful, Outcome::Corners, Outcome::Plain, Outcome::Ambiguous]
+            .map(count)
+            .iter()
+            .sum(),
     };
     (mated, missed)
 }

@@ -28,6 +28,13 @@ pub(crate) enum Outcome {
     Right,
     /// Another landmark was named.
     Wrong,
+    /// Its points are there, but a connected part of it shows something else: its name, with a doubt.
+    Doubtful,
+    /// Its points agree, but do not tell where its corners are.
+    Corners,
+    /// Its icon alone speaks for it: the robot's pose may name it.
+    Plain,
+    /// Perhaps another landmark.
     Ambiguous,
     /// 1 minus likeness is not below its tau.
     Likeness,
@@ -50,6 +57,9 @@ impl Outcome {
         match self {
             Self::Right => "right",
             Self::Wrong => "wrong",
+            Self::Doubtful => "doubtful",
+            Self::Corners => "corners",
+            Self::Plain => "plain",
             Self::Ambiguous => "ambiguous",
             Self::Likeness => "likeness",
             Self::Contradiction => "contradiction",
@@ -142,7 +152,15 @@ fn outcome(verdict: &Verdict, id: LandmarkId) -> Outcome {
     match verdict.recognition {
         Recognition::Unique(named) if named == id => return Outcome::Right,
         Recognition::Unique(_) => return Outcome::Wrong,
-        Recognition::Ambiguous(_) => return Outcome::Ambiguous,
+        Recognition::Ambiguous(named) => {
+            let own = verdict.candidates.iter().find(|c| c.landmark == id && named == id);
+            return match own.and_then(|c| c.refusal) {
+                Some(Refusal::Disagreement) => Outcome::Doubtful,
+                Some(Refusal::Corners) => Outcome::Corners,
+                Some(Refusal::Plain) => Outcome::Plain,
+                _ => Outcome::Ambiguous,
+            };
+        }
         Recognition::Unknown => {}
     }
     let Some(own) = verdict.candidates.iter().find(|c| c.landmark == id) else { return Outcome::NotListed };
@@ -192,6 +210,11 @@ mod tests {
             (Recognition::Unique(id), None, Outcome::Right),
             (Recognition::Unique(LandmarkId(4)), None, Outcome::Wrong),
             (Recognition::Ambiguous(LandmarkId(4)), None, Outcome::Ambiguous),
+            (Recognition::Ambiguous(id), Some(Refusal::Disagreement), Outcome::Doubtful),
+            (Recognition::Ambiguous(id), Some(Refusal::Corners), Outcome::Corners),
+            (Recognition::Ambiguous(id), Some(Refusal::Plain), Outcome::Plain),
+            (Recognition::Ambiguous(id), Some(Refusal::Margin), Outcome::Ambiguous),
+            (Recognition::Ambiguous(LandmarkId(4)), Some(Refusal::Plain), Outcome::Ambiguous),
             (Recognition::Unknown, Some(Refusal::Likeness), Outcome::Likeness),
             (Recognition::Unknown, Some(Refusal::Contradiction), Outcome::Contradiction),
             (Recognition::Unknown, Some(Refusal::Content), Outcome::Content),

@@ -9,9 +9,9 @@ use sim::exhibit::Conditions;
 use vision::params::Params;
 
 /// Apparent sizes from four times the icon's 75 px down to less than half of it.
-const SIZES_PX: [f64; 19] = [
+const SIZES_PX: [f64; 21] = [
     300.0, 240.0, 200.0, 160.0, 130.0, 110.0, 95.0, 85.0, 75.0, 68.0, 62.0, 57.0, 53.0, 50.0, 48.0, 45.0,
-    42.0, 39.0, 36.0,
+    42.0, 39.0, 36.0, 32.0, 28.0,
 ];
 
 /// `waymark evaluate scale`.
