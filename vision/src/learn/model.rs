@@ -196,13 +196,17 @@ impl LandmarkModel {
         self.generated_views > 0
     }
 
-    /// Memory that it takes, in bytes.
-    pub fn memory_bytes(&self) -> usize {
+    /// Memory that it takes, in bytes, by what it is for.
+    pub fn memory_parts(&self) -> Vec<(&'static str, usize)> {
         let evidence = [&self.correlation_evidence, &self.hausdorff_evidence, &self.likeness_evidence];
         let distances: usize = evidence.iter().map(|e| e.own.len() + e.nearest_others.len()).sum();
-        let exemplars: usize = self.exemplars.iter().map(IconFeatures::memory_bytes).sum();
-        let points = self.points.len() * size_of::<TaughtPoint>();
-        size_of::<Self>() + size_of::<f32>() * distances + exemplars + points
+        let mut parts = vec![
+            ("points", self.points.len() * size_of::<TaughtPoint>()),
+            ("evidence", size_of::<f32>() * distances),
+            ("other", size_of::<Self>() + size_of::<f64>() * self.eigenvalues.len()),
+        ];
+        parts.extend(self.exemplars.iter().flat_map(IconFeatures::memory_parts));
+        parts
     }
 
     /// Passed every gate.

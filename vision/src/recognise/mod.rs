@@ -53,11 +53,16 @@ pub struct IconFeatures {
 }
 
 impl IconFeatures {
-    /// Memory that they take, in bytes.
-    pub fn memory_bytes(&self) -> usize {
-        let numbers = self.icon.pixels.len() + self.buckets.values().len() + self.coarse.len();
+    /// Memory that they take, in bytes, by what it is for.
+    pub fn memory_parts(&self) -> [(&'static str, usize); 5] {
         let point = size_of::<[f32; 2]>() + size_of::<descriptor::Descriptor>() + size_of::<f32>();
-        size_of::<Self>() + size_of::<f32>() * numbers + self.points.len() * point
+        [
+            ("icons", size_of::<f32>() * self.icon.pixels.len()),
+            ("buckets", size_of::<f32>() * self.buckets.values().len()),
+            ("icons, coarse", size_of::<f32>() * self.coarse.len()),
+            ("corner points", self.points.len() * point),
+            ("other", size_of::<Self>()),
+        ]
     }
 
     /// The features of `icon.rotated(shift)`.

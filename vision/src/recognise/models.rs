@@ -8,7 +8,7 @@ use super::{
 };
 use crate::{learn::model::LandmarkModel, params::Params, points::index::PointIndex};
 use fearless_simd::{Level, dispatch};
-use std::sync::Arc;
+use std::{collections::BTreeMap, sync::Arc};
 
 /// Most landmarks of one set.
 pub const MAX_LANDMARKS: usize = 100_000;
@@ -186,9 +186,26 @@ impl ModelSet {
 
     /// Memory that the set and its models take, in bytes.
     pub fn memory_bytes(&self) -> usize {
-        let own = self.signatures.len() * SIGNATURE_BYTES + self.owners.len() * size_of::<(u32, u8)>();
-        let own = own + self.points.memory_bytes();
-        own + self.models.iter().map(|m| size_of::<Arc<LandmarkModel>>() + m.memory_bytes()).sum::<usize>()
+        self.memory_parts().values().sum()
+    }
+
+    /// The same by what it is for.
+    pub fn memory_parts(&self) -> BTreeMap<&'static str, usize> {
+        let mut parts: BTreeMap<&'static str, usize> = BTreeMap::new();
+        for model in &self.models {
+            for (part, bytes) in model.memory_parts() {
+                *parts.entry(part).or_default() += bytes;
+            }
+        }
+        let signatures = self.signatures.len() * SIGNATURE_BYTES;
+        let other =
+            self.owners.len() * size_of::<(u32, u8)>() + self.models.len() * size_of::<Arc<LandmarkModel>>();
+        for (part, bytes) in
+            [("signatures", signatures), ("point index", self.points.memory_bytes()), ("other", other)]
+        {
+            *parts.entry(part).or_default() += bytes;
+        }
+        parts
     }
 
     /// [`Params::distance_hash`] of the parameters that the set is for; 0 for a set made by `default()`.

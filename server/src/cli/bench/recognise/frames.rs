@@ -1,9 +1,10 @@
-//! Whole frames of a corridor whose posters are among the landmarks: who is named, and how long that takes, by us and
-//! by SIFT with one index over all landmarks.
+//! Whole frames of a corridor whose posters are among the landmarks: who is named, and how long that takes, in maps of
+//! several sizes, without and with a known pose, and by SIFT with one index over all landmarks of one of these maps.
 
 use super::{
     super::peers::{HINT, Python, written},
-    Args,
+    Args, MAP,
+    guided::Guide,
     landmarks::{each_of, picture},
     threads,
 };
@@ -12,6 +13,7 @@ use serde::{Deserialize, Serialize};
 use sim::{
     building::{Building, LandmarkKind},
     corridor::CorridorParams,
+    drive::Step,
     lesson::{LessonParams, stops},
     robot::{Robot, RobotParams},
     truth::{LandmarkView, ViewState},
@@ -22,7 +24,7 @@ use vision::{
     frame::{GrayImage, Intrinsics},
     params::Params,
     pipeline::{Landmarks, analyse_quads},
-    recognise::{DistanceKind, ModelSet, Recognition},
+    recognise::{DistanceKind, LandmarkId, ModelSet, Recognition},
     trace::{NoTrace, Stage, Trace},
 };
 
@@ -37,7 +39,10 @@ const MAX_ANGLE_RAD: f64 = 1.22;
 /// Frames with the numbers of the landmarks in them, from 0.
 pub(super) struct Scenes {
     frames: Vec<GrayImage>,
-    camera: Intrinsics,
+    /// Where the robot stood.
+    pub(super) steps: Vec<Step>,
+    pub(super) building: Arc<Building>,
+    pub(super) camera: Intrinsics,
     /// Wholly visible and large enough to be asked for.
     wanted: Vec<Vec<usize>>,
     /// In view at all: naming one is no error.
@@ -56,20 +61,32 @@ pub(super) struct Named {
     pub(super) frame_ms: f64,
 }
 
+/// Frames in one map.
+#[derive(Debug, Serialize)]
+pub(super) struct InMap {
+    pub(super) landmarks: usize,
+    /// The whole map is searched.
+    pub(super) global: Named,
+    /// The two parts of that, medians.
+    pub(super) detection_ms: f64,
+    pub(super) recognition_ms: f64,
+    /// Only landmarks that a known pose expects are looked for, where they are expected.
+    pub(super) guided: Named,
+}
+
 /// Frames by both.
 #[derive(Debug, Serialize)]
 pub(super) struct Report {
     pub(super) frames: usize,
-    pub(super) landmarks: usize,
     pub(super) visible: usize,
     pub(super) quads_per_frame: f64,
-    pub(super) waymark: Named,
-    /// The part of the frame's time that recognition takes.
-    pub(super) recognition_ms: f64,
+    pub(super) maps: Vec<InMap>,
+    /// Among [`MAP`] landmarks.
     pub(super) sift: Option<Named>,
     pub(super) opencv: Option<String>,
-    /// Our time over SIFT's.
-    pub(super) ratio: Option<f64>,
+    /// Our times in the map of as many landmarks over SIFT's.
+    pub(super) global_ratio: Option<f64>,
+    pub(super) guided_ratio: Option<f64>,
 }
 
 impl Scenes {
@@ -85,12 +102,15 @@ impl Scenes {
         let mut robot = Robot::new(building.clone(), &RobotParams::default());
         let lesson = LessonParams { seed, views: count.div_ceil(POSTERS), ..LessonParams::default() };
         let camera = *robot.camera().intrinsics();
-        let mut scenes = Self { frames: vec![], camera, wanted: vec![], present: vec![] };
+        let (frames, steps) = (vec![], vec![]);
+        let (wanted, present) = (vec![], vec![]);
+        let mut scenes = Self { frames, steps, building: building.clone(), camera, wanted, present };
         let all = stops(&building, &lesson);
         let progress = screen::progress(count, "rendering");
         // Evenly over the posters.
         for i in 0..count.min(all.len()) {
-            let shot = robot.look(&all[i * all.len() / count].step).frame;
+            let step = all[i * all.len() / count].step.clone();
+            let shot = robot.look(&step).frame;
             let numbers = |keep: &dyn Fn(&LandmarkView) -> bool| {
                 let posters = shot.truth.landmarks.iter().filter(|l| l.kind == LandmarkKind::Poster);
                 posters.filter(|l| keep(l)).filter_map(|l| number(&l.name)).collect::<Vec<usize>>()
@@ -102,6 +122,7 @@ impl Scenes {
             }));
             scenes.present.push(numbers(&|_| true));
             scenes.frames.push(shot.image);
+            scenes.steps.push(step);
             progress.inc(1);
         }
         progress.finish_and_clear();
@@ -122,7 +143,7 @@ impl Scenes {
 }
 
 /// `poster-3` is landmark 3.
-fn number(name: &str) -> Option<usize> {
+pub(super) fn number(name: &str) -> Option<usize> {
     name.strip_prefix("poster-")?.parse().ok()
 }
 
@@ -140,38 +161,96 @@ impl Trace for Split {
     }
 }
 
-/// Both on the same frames, in turn.
+/// What became of each frame, and its least times.
+struct Tally {
+    accepted: Vec<Vec<usize>>,
+    ms: Vec<f64>,
+    recognition_ms: Vec<f64>,
+}
+
+impl Tally {
+    fn new(frames: usize) -> Self {
+        let never = vec![f64::INFINITY; frames];
+        Self { accepted: vec![vec![]; frames], ms: never.clone(), recognition_ms: never }
+    }
+
+    fn put(&mut self, frame: usize, accepted: Vec<usize>, ms: f64) {
+        (self.accepted[frame], self.ms[frame]) = (accepted, self.ms[frame].min(ms));
+    }
+}
+
+/// One map with what it has come to.
+struct Timed<'a> {
+    models: &'a ModelSet,
+    guide: Guide,
+    global: Tally,
+    guided: Tally,
+}
+
+impl Timed<'_> {
+    /// Does one frame both ways; the quads that were detected.
+    fn frame(&mut self, i: usize, scenes: &Scenes, memory: &mut Memory, p: &Params) -> usize {
+        let frame = &scenes.frames[i];
+        let sizes = BTreeMap::new();
+        let landmarks = Landmarks { models: self.models, sizes: &sizes, kind: DistanceKind::default() };
+        let clock = Clock::start();
+        let found = detect_in(memory, frame, &p.detect, &mut NoTrace);
+        let mut split = Split { clock: Clock::start(), recognition_ms: 0.0 };
+        let facts = analyse_quads(frame, found, Some(&scenes.camera), landmarks, p, &mut split);
+        let ms = clock.ms();
+        let least = &mut self.global.recognition_ms[i];
+        *least = least.min(split.recognition_ms);
+        let named = facts.quads.iter().filter_map(|q| q.verdict.as_ref()).filter_map(unique).collect();
+        self.global.put(i, named, ms);
+        let clock = Clock::start();
+        let guided = self.guide.look(i, frame, &scenes.camera);
+        let ms = clock.ms();
+        self.guided.put(i, guided.sightings.iter().filter_map(|s| index(s.landmark)).collect(), ms);
+        facts.quads.len()
+    }
+
+    fn report(mut self, scenes: &Scenes) -> InMap {
+        let mut detection: Vec<f64> =
+            self.global.ms.iter().zip(&self.global.recognition_ms).map(|(all, part)| all - part).collect();
+        InMap {
+            landmarks: self.models.len(),
+            global: scenes.named(&self.global.accepted, &self.global.ms),
+            detection_ms: median(&mut detection).unwrap_or(0.0),
+            recognition_ms: median(&mut self.global.recognition_ms).unwrap_or(0.0),
+            guided: scenes.named(&self.guided.accepted, &self.guided.ms),
+        }
+    }
+}
+
+/// All on the same frames, in turn.
 pub(super) fn run(
     args: &Args,
     first: u64,
     scenes: &Scenes,
-    models: &ModelSet,
+    maps: &[ModelSet],
     p: &Params,
 ) -> anyhow::Result<Report> {
     let folder = scratch::Folder::new("bench")?;
-    let mut sift = if args.no_peers { None } else { start(args, first, scenes, models.len(), folder.path()) };
+    let mut sift = if args.no_peers { None } else { start(args, first, scenes, MAP, folder.path()) };
     let opencv = sift.as_ref().map(|(_, version)| version.clone());
     let n = scenes.frames.len();
-    let sizes = BTreeMap::new();
-    let landmarks = Landmarks { models, sizes: &sizes, kind: DistanceKind::default() };
-    let (mut ours, mut theirs) = (vec![f64::INFINITY; n], vec![f64::INFINITY; n]);
-    let mut recognition = vec![f64::INFINITY; n];
-    let (mut by_us, mut by_sift) = (vec![vec![]; n], vec![vec![]; n]);
+    let timed = |models| {
+        let guide = Guide::new(scenes, models, args.seed)?;
+        Ok(Timed { models, guide, global: Tally::new(n), guided: Tally::new(n) })
+    };
+    let mut maps: Vec<Timed<'_>> = maps.iter().map(timed).collect::<anyhow::Result<_>>()?;
+    let mut by_sift = Tally::new(n);
     let (mut memory, mut quads) = (Memory::default(), 0);
     let progress = screen::progress(args.rounds as usize * n, "frames");
     for round in 0..args.rounds {
-        for (i, frame) in scenes.frames.iter().enumerate() {
-            let clock = Clock::start();
-            let found = detect_in(&mut memory, frame, &p.detect, &mut NoTrace);
-            let mut split = Split { clock: Clock::start(), recognition_ms: 0.0 };
-            let facts = analyse_quads(frame, found, Some(&scenes.camera), landmarks, p, &mut split);
-            ours[i] = ours[i].min(clock.ms());
-            recognition[i] = recognition[i].min(split.recognition_ms);
-            quads += if round == 0 { facts.quads.len() } else { 0 };
-            by_us[i] = facts.quads.iter().filter_map(|q| q.verdict.as_ref()).filter_map(unique).collect();
+        for i in 0..n {
+            for (number, map) in maps.iter_mut().enumerate() {
+                let found = map.frame(i, scenes, &mut memory, p);
+                quads += if (round, number) == (0, 0) { found } else { 0 };
+            }
             if let Some((running, _)) = &mut sift {
                 match running.ask::<Answer>(&i.to_string()) {
-                    Ok(answer) => (theirs[i], by_sift[i]) = (theirs[i].min(answer.ms), answer.accepted),
+                    Ok(answer) => by_sift.put(i, answer.accepted, answer.ms),
                     Err(why) => {
                         screen::complain(&format!("OpenCV is left out from here on: {why}"));
                         sift = None;
@@ -182,16 +261,17 @@ pub(super) fn run(
         }
     }
     progress.finish_and_clear();
-    let waymark = scenes.named(&by_us, &ours);
-    let sift = sift.map(|_| scenes.named(&by_sift, &theirs));
+    let maps: Vec<InMap> = maps.into_iter().map(|map| map.report(scenes)).collect();
+    let sift = sift.map(|_| scenes.named(&by_sift.accepted, &by_sift.ms));
+    let like = maps.iter().find(|m| m.landmarks == MAP);
+    let ratio = |of: fn(&InMap) -> &Named| Some(of(like?).frame_ms / sift.as_ref()?.frame_ms);
     Ok(Report {
         frames: n,
-        landmarks: models.len(),
         visible: scenes.wanted.iter().map(Vec::len).sum(),
         quads_per_frame: quads as f64 / n as f64,
-        ratio: sift.as_ref().map(|s| waymark.frame_ms / s.frame_ms),
-        waymark,
-        recognition_ms: median(&mut recognition).unwrap_or(0.0),
+        global_ratio: ratio(|m| &m.global),
+        guided_ratio: ratio(|m| &m.guided),
+        maps,
         sift,
         opencv,
     })
@@ -199,9 +279,14 @@ pub(super) fn run(
 
 fn unique(verdict: &vision::recognise::Verdict) -> Option<usize> {
     match verdict.recognition {
-        Recognition::Unique(id) => usize::try_from(id.0).ok()?.checked_sub(1),
+        Recognition::Unique(id) => index(id),
         Recognition::Unknown | Recognition::Ambiguous(_) => None,
     }
+}
+
+/// Ids count from 1.
+fn index(id: LandmarkId) -> Option<usize> {
+    usize::try_from(id.0).ok()?.checked_sub(1)
 }
 
 #[derive(Deserialize)]
@@ -248,6 +333,8 @@ mod tests {
     fn names_are_counted() {
         let scenes = Scenes {
             frames: vec![],
+            steps: vec![],
+            building: Arc::new(Building::corridor(1)),
             camera: *sim::camera::Camera::vga().intrinsics(),
             wanted: vec![vec![1, 2], vec![], vec![3]],
             present: vec![vec![1, 2, 5], vec![], vec![3]],

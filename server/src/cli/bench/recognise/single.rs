@@ -36,8 +36,6 @@ pub(super) struct Report {
     pub(super) strangers_accepted: usize,
     /// Means over all quads, by step.
     pub(super) steps_ms: BTreeMap<&'static str, f64>,
-    /// Memory of a landmark's model and its part of the set.
-    pub(super) landmark_kb: f64,
 }
 
 /// What the short list loses.
@@ -94,7 +92,6 @@ impl Asked {
             wrong: own.iter().filter(|(id, (_, r))| unique(r).is_some_and(|u| u != *id)).count(),
             strangers_accepted: strangers.iter().filter(|(_, r)| unique(r).is_some()).count(),
             steps_ms: steps.ms.into_iter().map(|(step, ms)| (step, ms / asked as f64)).collect(),
-            landmark_kb: models.memory_bytes() as f64 / models.len() as f64 / 1e3,
         }
     }
 }
