@@ -5,7 +5,7 @@
 //! distance of two descriptors is the L1 distance of their values on three levels.
 
 use super::keypoints::Octave;
-use fearless_simd::{Level, dispatch};
+use fearless_simd::{Level, Simd, dispatch, f32x8, prelude::*};
 use std::sync::LazyLock;
 
 /// Cells along a side.
@@ -22,8 +22,11 @@ const HALF_WORDS: usize = WORDS / 2;
 pub const MAX_DISTANCE: u32 = 2 * VALUES as u32;
 /// Side of a cell, in scales of the keypoint.
 const CELL_SIGMAS: f32 = 3.0;
-/// Samples along a side of the window of `CELLS + 1` cells.
-const SAMPLES: usize = 20;
+/// Samples along a cell, and along a side of the window of `CELLS + 1` cells.
+const PER_CELL: usize = 4;
+const SAMPLES: usize = PER_CELL * (CELLS + 1);
+/// The same, for whole vectors: what is beyond weighs nothing.
+const PADDED: usize = 32;
 /// Values of a unit histogram above which its bits are set.
 const THRESHOLDS: [f32; 2] = [0.055, 0.12];
 /// A value of the histogram before square roots is at most this share of its norm.
@@ -38,6 +41,12 @@ impl Descriptor {
     #[inline]
     pub fn distance(&self, other: &Self) -> u32 {
         self.0.iter().zip(&other.0).map(|(a, b)| (a ^ b).count_ones()).sum()
+    }
+
+    /// The first bits of all values: each is at least the lower threshold.
+    #[inline]
+    pub fn half(&self) -> [u64; HALF_WORDS] {
+        [self.0[0], self.0[1]]
     }
 
     /// The descriptor after the patch was turned counter-clockwise by `shift` quarters: what
@@ -87,35 +96,33 @@ pub struct Window {
 /// The descriptor of `window` on its octave, and the mean gradient there, in grey levels a pixel of the octave.
 pub fn describe(octave: &Octave, window: &Window) -> (Descriptor, f32) {
     let line = &*LINE;
-    dispatch!(Level::new(), _s => {
-        let (values, gradient) = histogram(octave, window, line);
+    dispatch!(Level::new(), s => {
+        let (values, gradient) = histogram(s, octave, window, line);
         (quantised(&values), gradient)
     })
 }
 
-/// One row of cells, with a cell of padding at both ends.
-type Row = [[f32; DIRECTIONS]; CELLS + 2];
-
-/// A line of samples, the same for rows and columns and for every window: where each lies from the centre, in cells; the
-/// cell, padding included, that it lies in or behind; its share of the next cell; its weight.
+/// A line of samples, the same for rows and columns and for every window: where each lies from the centre, in cells, and
+/// its weight. Samples lie between the centres of one cell and the next, padding included, [`PER_CELL`] in a row.
 struct Line {
-    from_centre: [f32; SAMPLES],
-    cell: [usize; SAMPLES],
-    next: [f32; SAMPLES],
-    weight: [f32; SAMPLES],
+    from_centre: [f32; PADDED],
+    weight: [f32; PADDED],
+    /// Sum of the weights of a window.
+    weights: f32,
 }
+
+/// Shares of the next cell.
+const NEXT: [f32; PER_CELL] = [0.125, 0.375, 0.625, 0.875];
 
 static LINE: LazyLock<Line> = LazyLock::new(|| {
     let half = CELLS as f32 * 0.5;
     // Place in cells, -0.5 to CELLS + 0.5; cell centres at halves.
     let place = |i: usize| (i as f32 + 0.5) / SAMPLES as f32 * (CELLS + 1) as f32 - 0.5;
-    let from_centre: [f32; SAMPLES] = std::array::from_fn(|i| place(i) - half);
-    Line {
-        from_centre,
-        cell: std::array::from_fn(|i| (place(i) + 0.5) as usize),
-        next: std::array::from_fn(|i| (place(i) + 0.5).fract()),
-        weight: from_centre.map(|s| (-s * s / (2.0 * half * half)).exp()),
-    }
+    let from_centre: [f32; PADDED] = std::array::from_fn(|i| place(i.min(SAMPLES - 1)) - half);
+    let bell =
+        |i: usize| if i < SAMPLES { (-from_centre[i].powi(2) / (2.0 * half * half)).exp() } else { 0.0 };
+    let weight: [f32; PADDED] = std::array::from_fn(bell);
+    Line { from_centre, weight, weights: weight.iter().sum::<f32>().powi(2) }
 });
 
 /// The unit histogram of a window, after square roots, and the mean gradient.
@@ -124,80 +131,111 @@ static LINE: LazyLock<Line> = LazyLock::new(|| {
     reason = "an instruction set holds only in what is inlined where it was chosen"
 )]
 #[inline(always)]
-fn histogram(octave: &Octave, window: &Window, line: &Line) -> ([f32; VALUES], f32) {
+fn histogram<S: Simd>(s: S, octave: &Octave, window: &Window, line: &Line) -> ([f32; VALUES], f32) {
     let picture = &octave.levels[window.level];
     let n = octave.side;
     let (x, y, sigma) = (window.x / octave.step, window.y / octave.step, window.sigma / octave.step);
     // Pixels of the samples and their neighbours, repeated beyond the border of the picture.
-    let pixel = |centre: f32, i: usize, beside: i32| {
-        let at = (centre + line.from_centre[i] * CELL_SIGMAS * sigma).round() as i32 + beside;
-        at.clamp(0, n as i32 - 1) as usize
-    };
-    let columns = [-1, 0, 1].map(|b| std::array::from_fn::<usize, SAMPLES, _>(|i| pixel(x, i, b)));
-    let mut cells: [Row; CELLS + 2] = Default::default();
-    let (mut sum, mut weights) = (0.0, 0.0);
+    let nearest = |centre: f32, i: usize| centre + line.from_centre[i] * CELL_SIGMAS * sigma + 0.5;
+    let pixel = |nearest: f32, beside: f32| (nearest.floor() + beside).clamp(0.0, (n - 1) as f32) as u32;
+    let (mut left, mut middle, mut right) = ([0; PADDED], [0; PADDED], [0; PADDED]);
+    for i in 0..PADDED {
+        let at = nearest(x, i);
+        (left[i], middle[i], right[i]) = (pixel(at, -1.0), pixel(at, 0.0), pixel(at, 1.0));
+    }
+    let mut cells = [[f32x8::splat(s, 0.0); CELLS + 2]; CELLS + 2];
+    let mut lengths = [0.0; PADDED];
     for j in 0..SAMPLES {
-        let [above, own, below] = [-1, 0, 1].map(|b| &picture[pixel(y, j, b) * n..][..n]);
-        let mut row: Row = Default::default();
+        let at = nearest(y, j);
+        let [above, own, below] = [-1.0, 0.0, 1.0].map(|b| &picture[pixel(at, b) as usize * n..][..n]);
+        let [mut gx, mut gy, mut length] = [[0.0; PADDED]; 3];
         for i in 0..SAMPLES {
-            let weight = line.weight[i] * line.weight[j];
-            let gx = weight * (own[columns[2][i]] - own[columns[0][i]]);
-            let gy = weight * (below[columns[1][i]] - above[columns[1][i]]);
-            let length = (gx * gx + gy * gy).sqrt();
-            sum += length;
-            weights += weight;
-            let votes = votes(gx, gy, length);
-            let (cell, next) = (line.cell[i], line.next[i]);
-            for k in 0..DIRECTIONS {
-                row[cell][k] += (1.0 - next) * votes[k];
-                row[cell + 1][k] += next * votes[k];
-            }
+            gx[i] = own[right[i] as usize] - own[left[i] as usize];
+            gy[i] = below[middle[i] as usize] - above[middle[i] as usize];
         }
-        let (cell, next) = (line.cell[j], line.next[j]);
-        for (column, votes) in row.iter().enumerate() {
-            for k in 0..DIRECTIONS {
-                cells[cell][column][k] += (1.0 - next) * votes[k];
-                cells[cell + 1][column][k] += next * votes[k];
+        for i in 0..PADDED {
+            let weight = line.weight[i] * line.weight[j];
+            (gx[i], gy[i]) = (weight * gx[i], weight * gy[i]);
+            length[i] = (gx[i] * gx[i] + gy[i] * gy[i]).sqrt();
+            lengths[i] += length[i];
+        }
+        let mut row = [f32x8::splat(s, 0.0); CELLS + 2];
+        for cell in 0..=CELLS {
+            let mut next = f32x8::splat(s, 0.0);
+            for (i, share) in (cell * PER_CELL..).zip(NEXT) {
+                let votes = votes(s, gx[i], gy[i], length[i]);
+                row[cell] += votes * (1.0 - share);
+                next += votes * share;
             }
+            row[cell + 1] = next;
+        }
+        let (cell, next) = (j / PER_CELL, NEXT[j % PER_CELL]);
+        for column in 0..CELLS + 2 {
+            cells[cell][column] += row[column] * (1.0 - next);
+            cells[cell + 1][column] += row[column] * next;
         }
     }
     let mut values = [0.0; VALUES];
     for (i, values) in values.as_chunks_mut::<DIRECTIONS>().0.iter_mut().enumerate() {
-        *values = cells[i / CELLS + 1][i % CELLS + 1];
+        cells[i / CELLS + 1][i % CELLS + 1].store_slice(values);
     }
-    (normalised(values), 0.5 * sum / weights)
+    (normalised(&values), 0.5 * lengths.iter().sum::<f32>() / line.weights)
 }
 
 /// A share of each direction in a gradient of `length`: a lobe of 45 degrees to either side.
+#[expect(clippy::inline_always, reason = "as above")]
 #[inline(always)]
-fn votes(gx: f32, gy: f32, length: f32) -> [f32; DIRECTIONS] {
+fn votes<S: Simd>(s: S, gx: f32, gy: f32, length: f32) -> f32x8<S> {
     const HALF: f32 = std::f32::consts::FRAC_1_SQRT_2;
     const COS: [f32; DIRECTIONS] = [1.0, HALF, 0.0, -HALF, -1.0, -HALF, 0.0, HALF];
     const SIN: [f32; DIRECTIONS] = [0.0, HALF, 1.0, HALF, 0.0, -HALF, -1.0, -HALF];
-    std::array::from_fn(|k| (gx * COS[k] + gy * SIN[k] - HALF * length).max(0.0))
+    let (cos, sin) = (f32x8::from_slice(s, &COS), f32x8::from_slice(s, &SIN));
+    (cos * gx + sin * gy - f32x8::splat(s, HALF * length)).max(0.0)
+}
+
+/// Sum over all values, by as many partial sums as there are in two vectors.
+#[expect(clippy::inline_always, reason = "as above")]
+#[inline(always)]
+fn sum(values: &[f32; VALUES], of: impl Fn(f32) -> f32) -> f32 {
+    let mut sums = [0.0; 2 * DIRECTIONS];
+    for part in values.as_chunks::<{ 2 * DIRECTIONS }>().0 {
+        for (sum, v) in sums.iter_mut().zip(part) {
+            *sum += of(*v);
+        }
+    }
+    sums.iter().sum()
 }
 
 /// To norm 1, clipped, then square roots of shares: norm 1 again.
-fn normalised(mut values: [f32; VALUES]) -> [f32; VALUES] {
-    let norm = values.iter().map(|v| v * v).sum::<f32>().sqrt();
-    let most = CLIP * norm;
-    let mut sum = 0.0;
-    for v in &mut values {
-        *v = v.min(most);
-        sum += *v;
+#[expect(clippy::inline_always, reason = "as above")]
+#[inline(always)]
+fn normalised(values: &[f32; VALUES]) -> [f32; VALUES] {
+    let most = CLIP * sum(values, |v| v * v).sqrt();
+    let clipped = values.map(|v| v.min(most));
+    let sum = sum(&clipped, |v| v);
+    let scale = if sum > 0.0 { 1.0 / sum } else { 0.0 };
+    let mut out = [0.0; VALUES];
+    for (out, v) in out.iter_mut().zip(&clipped) {
+        *out = (v * scale).sqrt();
     }
-    for v in &mut values {
-        *v = if sum > 0.0 { (*v / sum).sqrt() } else { 0.0 };
-    }
-    values
+    out
 }
 
+#[expect(clippy::inline_always, reason = "as above")]
+#[inline(always)]
 fn quantised(values: &[f32; VALUES]) -> Descriptor {
     let mut words = [0; WORDS];
-    for (half, threshold) in THRESHOLDS.iter().enumerate() {
-        for (i, v) in values.iter().enumerate() {
-            let bit = half * VALUES + i;
-            words[bit / 64] |= u64::from(v > threshold) << (bit % 64);
+    for (half, threshold) in words.chunks_exact_mut(HALF_WORDS).zip(THRESHOLDS) {
+        let mut above = [0_u8; VALUES];
+        for (above, v) in above.iter_mut().zip(values) {
+            *above = u8::from(*v > threshold);
+        }
+        for (word, bytes) in half.iter_mut().zip(above.chunks_exact(64)) {
+            // The lowest bits of eight bytes become one byte.
+            let eight =
+                |bytes: &[u8; 8]| u64::from_le_bytes(*bytes).wrapping_mul(0x0102_0408_1020_4080) >> 56;
+            let bytes = bytes.as_chunks::<8>().0.iter().enumerate();
+            *word = bytes.fold(0, |word, (i, bytes)| word | eight(bytes) << (8 * i));
         }
     }
     Descriptor(words)

@@ -1,22 +1,23 @@
-//! The points of all landmarks of a map, by word and place: a patch's points vote for landmarks without being compared with
-//! every one of theirs.
+//! The points of all landmarks of a map, by word: a patch's points vote for landmarks without being compared with every one
+//! of theirs. Half of each descriptor is kept here, enough for votes; matches are made with the landmarks' own points.
 
 use super::{
     Point,
-    taught::TaughtPoint,
+    taught::{TaughtPoint, scale_step},
     vocabulary::{VOCABULARY, words},
 };
 use fearless_simd::{Level, dispatch};
 
-/// Cells along a side of the landmark.
-const CELLS: usize = 8;
-const PROBES: usize = 3;
+/// Words that are looked at for a point.
+const PROBES: usize = 6;
+/// Steps of a place in a landmark unit.
+const PLACES: f32 = 255.0;
 /// Largest difference of place along an axis that votes, in landmark units.
 const REACH: f32 = 0.22;
-/// Largest ratio of scales that votes.
-const MAX_SCALE: f32 = 1.7;
-/// Largest descriptor distance that votes.
-const MAX_DISTANCE: u32 = 75;
+/// Largest difference of scale that votes, in steps of the stored one: a ratio of 1.7.
+const MAX_SCALE_STEPS: u8 = 18;
+/// Largest distance of half descriptors that votes.
+const MAX_DISTANCE: u32 = 37;
 /// Points of a patch that vote, the strongest first.
 pub const MAX_VOTERS: usize = 100;
 
@@ -26,47 +27,45 @@ const NEIGHBOURS: usize = 8;
 /// One landmark's point in the index.
 #[derive(Debug, Clone, Copy)]
 struct Entry {
-    point: Point,
+    half: [u64; 2],
     model: u32,
+    at: [u8; 2],
+    sigma: u8,
 }
 
-/// Points by word and cell.
+/// Points by word, in each by their place from the top.
 #[derive(Debug, Clone, Default)]
 pub struct PointIndex {
     entries: Vec<Entry>,
-    /// Where each bin begins; one more than there are bins.
+    /// Where each word begins; one more than there are words.
     starts: Vec<u32>,
     models: usize,
 }
 
-/// The bin of a word and a cell.
-fn bin(word: u8, column: usize, row: usize) -> usize {
-    (usize::from(word) * CELLS + row) * CELLS + column
-}
-
-fn cell(at: f32) -> usize {
-    ((at * CELLS as f32).max(0.0) as usize).min(CELLS - 1)
+fn steps(at: f32) -> u8 {
+    (at.clamp(0.0, 1.0) * PLACES).round() as u8
 }
 
 impl PointIndex {
     /// Indexes the points of models, in their order.
     pub fn new<'a>(models: impl ExactSizeIterator<Item = &'a [TaughtPoint]>) -> Self {
         let count = models.len();
-        let mut all: Vec<(usize, Entry)> = Vec::new();
+        let mut all: Vec<(u16, Entry)> = Vec::new();
         for (model, points) in (0_u32..).zip(models) {
-            for taught in points {
-                let point = taught.point();
-                let [word] = words::<1>(&point.descriptor);
-                all.push((bin(word, cell(point.at[0]), cell(point.at[1])), Entry { point, model }));
-            }
+            all.extend(points.iter().map(|p| {
+                let at = p.point().at.map(steps);
+                (p.word(), Entry { half: p.descriptor.half(), model, at, sigma: p.scale_step() })
+            }));
         }
-        all.sort_by_key(|(bin, entry)| (*bin, entry.model));
-        let bins = VOCABULARY * CELLS * CELLS;
-        let mut starts = vec![0_u32; bins + 1];
-        for (bin, _) in &all {
-            starts[bin + 1] += 1;
+        if all.is_empty() {
+            return Self { models: count, ..Self::default() };
         }
-        for i in 0..bins {
+        all.sort_unstable_by_key(|(word, e)| (*word, e.at[1], e.model, e.at[0], e.sigma, e.half));
+        let mut starts = vec![0_u32; VOCABULARY + 1];
+        for (word, _) in &all {
+            starts[usize::from(*word) + 1] += 1;
+        }
+        for i in 0..VOCABULARY {
             starts[i + 1] += starts[i];
         }
         Self { entries: all.into_iter().map(|(_, e)| e).collect(), starts, models: count }
@@ -106,24 +105,26 @@ impl PointIndex {
     fn votes(&self, points: &[Point]) -> Vec<u32> {
         let mut votes = vec![0_u32; self.models];
         for point in points.iter().take(MAX_VOTERS) {
-            let mut nearest = [(MAX_DISTANCE, u32::MAX); NEIGHBOURS + 1];
-            let [low, high] = [-REACH, REACH].map(|r| point.at.map(|a| cell(a + r)));
+            let mut nearest = [(2 * MAX_DISTANCE + 1, u32::MAX); NEIGHBOURS + 1];
+            let half = point.descriptor.half();
+            let [left, top] = point.at.map(|a| steps(a - REACH));
+            let [right, bottom] = point.at.map(|a| steps(a + REACH));
+            let sigma = scale_step(point.sigma);
+            let scales = sigma.saturating_sub(MAX_SCALE_STEPS)..=sigma.saturating_add(MAX_SCALE_STEPS);
             for word in words::<PROBES>(&point.descriptor) {
-                for row in low[1]..=high[1] {
-                    let from = self.starts[bin(word, low[0], row)] as usize;
-                    let to = self.starts[bin(word, high[0], row) + 1] as usize;
-                    for entry in &self.entries[from..to] {
-                        let other = &entry.point;
-                        let near = (other.at[0] - point.at[0]).abs() < REACH
-                            && (other.at[1] - point.at[1]).abs() < REACH
-                            && other.sigma < MAX_SCALE * point.sigma
-                            && point.sigma < MAX_SCALE * other.sigma;
-                        if near {
-                            let d = other.descriptor.distance(&point.descriptor);
-                            if d < nearest[NEIGHBOURS].0 {
-                                insert(&mut nearest, d, entry.model);
-                            }
-                        }
+                let word = usize::from(word);
+                let all = &self.entries[self.starts[word] as usize..self.starts[word + 1] as usize];
+                let all = &all[all.partition_point(|e| e.at[1] < top)..];
+                for entry in all.iter().take_while(|e| e.at[1] <= bottom) {
+                    let near = u8::from(entry.at[0] >= left)
+                        & u8::from(entry.at[0] <= right)
+                        & u8::from(scales.contains(&entry.sigma));
+                    if near == 0 {
+                        continue;
+                    }
+                    let d = 2 * half.iter().zip(&entry.half).map(|(a, b)| (a ^ b).count_ones()).sum::<u32>();
+                    if d < nearest[NEIGHBOURS].0 {
+                        insert(&mut nearest, d, entry.model);
                     }
                 }
             }

@@ -100,26 +100,27 @@ pub fn keypoints(patch: &Patch, space: &ScaleSpace, most: usize) -> Vec<Keypoint
 /// How far around a keypoint the image must show the patch, in its scales.
 const SUPPORT: f32 = 1.0;
 
+/// Pictures whose differences are the responses at one scale and at the two next to it, from the finest on.
+type Levels<'a> = [&'a [f32]; 4];
+
 fn extrema(octave: &Octave, index: usize, found: &mut Vec<Keypoint>) {
     let n = octave.side;
-    let differences: Vec<Vec<f32>> = octave
-        .levels
-        .windows(2)
-        .map(|pair| pair[1].iter().zip(&pair[0]).map(|(a, b)| a - b).collect())
-        .collect();
     let mut peaks = vec![0_u8; n];
     for level in 1..=SCALES {
-        let [below, own, above] = [&differences[level - 1], &differences[level], &differences[level + 1]];
+        let levels: Levels<'_> = std::array::from_fn(|i| octave.levels[level - 1 + i].as_slice());
+        let [below, own, above] =
+            [0, 1, 2].map(|scale| move |at: usize| levels[scale + 1][at] - levels[scale][at]);
         for y in BORDER_PX..n - BORDER_PX {
-            dispatch!(Level::new(), _s => row_peaks([below.as_slice(), own, above], y * n, &mut peaks));
-            for x in (BORDER_PX..n - BORDER_PX).filter(|x| peaks[*x] != 0) {
+            dispatch!(Level::new(), _s => row_peaks(levels, y * n, &mut peaks));
+            for x in marked(&peaks).filter(|x| (BORDER_PX..n - BORDER_PX).contains(x)) {
                 let at = y * n + x;
-                let d = own[at];
-                if !is_extremum(d, at, n, [below, own, above]) {
+                let d = own(at);
+                if !is_extremum(d, at, n, &levels) {
                     continue;
                 }
-                let (dxx, dyy) = (own[at + 1] + own[at - 1] - 2.0 * d, own[at + n] + own[at - n] - 2.0 * d);
-                let dxy = 0.25 * (own[at + n + 1] + own[at - n - 1] - own[at + n - 1] - own[at - n + 1]);
+                let (left, right, up, down) = (own(at - 1), own(at + 1), own(at - n), own(at + n));
+                let (dxx, dyy) = (right + left - 2.0 * d, down + up - 2.0 * d);
+                let dxy = 0.25 * (own(at + n + 1) + own(at - n - 1) - own(at + n - 1) - own(at - n + 1));
                 let (trace, det) = (dxx + dyy, dxx * dyy - dxy * dxy);
                 let limit = (MAX_EDGE_RATIO + 1.0).powi(2) / MAX_EDGE_RATIO;
                 if det <= 0.0 || trace * trace >= limit * det {
@@ -130,8 +131,8 @@ fn extrema(octave: &Octave, index: usize, found: &mut Vec<Keypoint>) {
                     let bend = before + after - 2.0 * d;
                     if bend.abs() > 1e-6 { (0.5 * (before - after) / bend).clamp(-0.5, 0.5) } else { 0.0 }
                 };
-                let (dx, dy) = (peak(own[at - 1], own[at + 1]), peak(own[at - n], own[at + n]));
-                let ds = peak(below[at], above[at]);
+                let (dx, dy) = (peak(left, right), peak(up, down));
+                let ds = peak(below(at), above(at));
                 let scale = (level as f32 + ds) / SCALES as f32;
                 found.push(Keypoint {
                     x: (x as f32 + dx) * octave.step,
@@ -146,6 +147,13 @@ fn extrema(octave: &Octave, index: usize, found: &mut Vec<Keypoint>) {
     }
 }
 
+/// Where `peaks` are marked; most are not, sixteen at a time.
+fn marked(peaks: &[u8]) -> impl Iterator<Item = usize> {
+    let any = |part: &&[u8]| part.first_chunk::<16>().is_none_or(|p| u128::from_ne_bytes(*p) != 0);
+    let parts = (0..).step_by(16).zip(peaks.chunks(16)).filter(move |(_, part)| any(part));
+    parts.flat_map(|(start, part)| (start..).zip(part).filter(|(_, mark)| **mark != 0).map(|(x, _)| x))
+}
+
 /// Marks what may be an extremum in a row that begins at `start`: strong enough, and beyond its neighbours to the left, the
 /// right, and at the two next scales.
 #[expect(
@@ -153,26 +161,30 @@ fn extrema(octave: &Octave, index: usize, found: &mut Vec<Keypoint>) {
     reason = "an instruction set holds only in what is inlined where it was chosen"
 )]
 #[inline(always)]
-fn row_peaks([below, own, above]: [&[f32]; 3], start: usize, peaks: &mut [u8]) {
+fn row_peaks(levels: Levels<'_>, start: usize, peaks: &mut [u8]) {
     let n = peaks.len();
-    let (d, left, right) = (&own[start..][..n], &own[start - 1..][..n], &own[start + 1..][..n]);
-    let (below, above) = (&below[start..][..n], &above[start..][..n]);
+    let [first, second, third, fourth] = levels.map(|level| &level[start..][..n]);
+    let beside = |by: usize| [1, 2].map(|level| &levels[level][start + by - 1..][..n]);
+    let ([left2, left3], [right2, right3]) = (beside(0), beside(2));
     for x in 0..n {
-        let high = left[x].max(right[x]).max(below[x]).max(above[x]);
-        let low = left[x].min(right[x]).min(below[x]).min(above[x]);
-        let top = u8::from(d[x] >= MIN_RESPONSE) & u8::from(d[x] >= high);
-        let bottom = u8::from(d[x] <= -MIN_RESPONSE) & u8::from(d[x] <= low);
+        let d = third[x] - second[x];
+        let (below, above) = (second[x] - first[x], fourth[x] - third[x]);
+        let (left, right) = (left3[x] - left2[x], right3[x] - right2[x]);
+        let high = left.max(right).max(below).max(above);
+        let low = left.min(right).min(below).min(above);
+        let top = u8::from(d >= MIN_RESPONSE) & u8::from(d >= high);
+        let bottom = u8::from(d <= -MIN_RESPONSE) & u8::from(d <= low);
         peaks[x] = top | bottom;
     }
 }
 
-fn is_extremum(d: f32, at: usize, n: usize, levels: [&Vec<f32>; 3]) -> bool {
+fn is_extremum(d: f32, at: usize, n: usize, levels: &Levels<'_>) -> bool {
     let around = [at - n - 1, at - n, at - n + 1, at - 1, at, at + 1, at + n - 1, at + n, at + n + 1];
     let top = d > 0.0;
-    levels.iter().enumerate().all(|(l, level)| {
+    (0..3).all(|scale| {
         around.iter().all(|i| {
-            let other = level[*i];
-            (l == 1 && *i == at) || if top { d >= other } else { d <= other }
+            let other = levels[scale + 1][*i] - levels[scale][*i];
+            (scale == 1 && *i == at) || if top { d >= other } else { d <= other }
         })
     })
 }

@@ -5,6 +5,7 @@ use super::{
     descriptor::{Descriptor, WORDS},
     patch::{INNER_PX, Patch, inner_px},
     plain::distance_to_plain,
+    vocabulary::word,
 };
 use crate::{detect::quads::Corners, frame::GrayImage};
 use std::sync::LazyLock;
@@ -40,13 +41,20 @@ pub struct TaughtPoint {
     sigma: u8,
     /// Distance to the most similar plain structure.
     plain: u8,
+    /// Word of the descriptor; not stored, it follows from that.
+    word: u16,
+}
+
+/// The stored step of a scale in landmark units.
+pub(super) fn scale_step(sigma: f32) -> u8 {
+    (-sigma.log2() * SCALE_STEPS).round().clamp(0.0, 255.0) as u8
 }
 
 impl TaughtPoint {
     fn new(point: &Point, plain: u32) -> Self {
         let at = point.at.map(|a| (a.clamp(0.0, 1.0) * f32::from(u16::MAX)).round() as u16);
-        let sigma = (-point.sigma.log2() * SCALE_STEPS).round().clamp(0.0, 255.0) as u8;
-        Self { descriptor: point.descriptor, at, sigma, plain: plain.min(255) as u8 }
+        let (descriptor, sigma) = (point.descriptor, scale_step(point.sigma));
+        Self { descriptor, at, sigma, plain: plain.min(255) as u8, word: word(&descriptor) }
     }
 
     /// The point.
@@ -58,6 +66,16 @@ impl TaughtPoint {
     /// Distance to the most similar plain structure.
     pub fn plain(&self) -> u32 {
         u32::from(self.plain)
+    }
+
+    /// Word of its descriptor.
+    pub(super) fn word(&self) -> u16 {
+        self.word
+    }
+
+    /// Its scale as it is kept.
+    pub(super) fn scale_step(&self) -> u8 {
+        self.sigma
     }
 
     /// Appends [`POINT_BYTES`] bytes.
@@ -75,7 +93,8 @@ impl TaughtPoint {
         }
         let rest = &bytes[8 * WORDS..];
         let at = [u16::from_le_bytes([rest[0], rest[1]]), u16::from_le_bytes([rest[2], rest[3]])];
-        Self { descriptor: Descriptor(words), at, sigma: rest[4], plain: rest[5] }
+        let descriptor = Descriptor(words);
+        Self { descriptor, at, sigma: rest[4], plain: rest[5], word: word(&descriptor) }
     }
 }
 

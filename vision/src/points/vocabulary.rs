@@ -1,5 +1,5 @@
-//! A coarse division of all descriptors into words, so that a point is compared with a few of a map's points only. It is
-//! the same for every map: its medoids are descriptors of generated textures.
+//! A division of all descriptors into words, so that a point is compared with a few of a map's points only. It is the same
+//! for every map: its medoids are descriptors of generated textures, in two levels.
 
 use super::{
     SeenPatch,
@@ -7,26 +7,72 @@ use super::{
     patch::{INNER_PX, Patch},
 };
 use crate::{detect::quads::Corners, frame::GrayImage, learn::random::Random};
+use fearless_simd::{Level, dispatch};
 use std::sync::LazyLock;
 
+/// Medoids of the first level, and of the second below each of them.
+const ROOTS: usize = 64;
+const LEAVES: usize = 32;
 /// Number of words.
-pub const VOCABULARY: usize = 64;
+pub const VOCABULARY: usize = ROOTS * LEAVES;
+/// Roots below which words are looked for.
+const BRANCHES: usize = 3;
 /// Side of a generated texture, and how many there are.
 const SIDE: usize = 240;
-const TEXTURES: u64 = 4;
+const TEXTURES: u64 = 48;
 /// Blobs and rectangles of a texture.
 const SHAPES: usize = 160;
 /// Rounds of choosing medoids.
 const ROUNDS: usize = 4;
 
-static MEDOIDS: LazyLock<Vec<Descriptor>> = LazyLock::new(medoids);
+/// The medoids, those of the second level below each root in a row.
+struct Tree {
+    roots: Vec<Descriptor>,
+    leaves: Vec<Descriptor>,
+}
 
-/// The `N` nearest words, nearest first; of equal ones the lower.
+static TREE: LazyLock<Tree> = LazyLock::new(|| dispatch!(Level::new(), _s => tree()));
+
+/// The word of a descriptor.
+pub fn word(descriptor: &Descriptor) -> u16 {
+    let tree = &*TREE;
+    dispatch!(Level::new(), _s => {
+        let [root] = nearest::<1>(descriptor, tree.roots.iter().enumerate());
+        let [leaf] = nearest::<1>(descriptor, below(tree, root));
+        leaf
+    })
+}
+
+/// The `N` nearest words below the nearest roots, nearest first; of equal ones the lower.
 #[inline]
-pub fn words<const N: usize>(descriptor: &Descriptor) -> [u8; N] {
-    let mut best = [(u32::MAX, 0_u8); N];
-    for (word, medoid) in MEDOIDS.iter().enumerate() {
-        let mut entry = (descriptor.distance(medoid), word as u8);
+pub fn words<const N: usize>(descriptor: &Descriptor) -> [u16; N] {
+    let tree = &*TREE;
+    let roots = nearest::<BRANCHES>(descriptor, tree.roots.iter().enumerate());
+    nearest::<N>(descriptor, roots.into_iter().flat_map(|root| below(tree, root)))
+}
+
+/// The words below a root.
+#[inline]
+fn below(tree: &Tree, root: u16) -> impl Iterator<Item = (usize, &Descriptor)> {
+    let first = usize::from(root) * LEAVES;
+    (first..).zip(&tree.leaves[first..first + LEAVES])
+}
+
+#[expect(
+    clippy::inline_always,
+    reason = "an instruction set holds only in what is inlined where it was chosen"
+)]
+#[inline(always)]
+fn nearest<'a, const N: usize>(
+    descriptor: &Descriptor,
+    medoids: impl Iterator<Item = (usize, &'a Descriptor)>,
+) -> [u16; N] {
+    let mut best = [(u32::MAX, 0_u16); N];
+    for (number, medoid) in medoids {
+        let mut entry = (descriptor.distance(medoid), number as u16);
+        if entry.0 >= best[N - 1].0 {
+            continue;
+        }
         for slot in &mut best {
             if entry.0 < slot.0 {
                 std::mem::swap(slot, &mut entry);
@@ -36,18 +82,37 @@ pub fn words<const N: usize>(descriptor: &Descriptor) -> [u8; N] {
     best.map(|b| b.1)
 }
 
-/// Medoids by a few rounds of assignment; in each the new medoid is the bitwise majority of those assigned.
-fn medoids() -> Vec<Descriptor> {
+#[expect(clippy::inline_always, reason = "as above")]
+#[inline(always)]
+fn tree() -> Tree {
     let all: Vec<Descriptor> = (0..TEXTURES).flat_map(descriptors).collect();
-    if all.is_empty() {
-        return Vec::new();
+    let roots = medoids(&all, ROOTS);
+    let mut parts: Vec<Vec<Descriptor>> = vec![Vec::new(); ROOTS];
+    for d in &all {
+        let [root] = nearest::<1>(d, roots.iter().enumerate());
+        parts[usize::from(root)].push(*d);
     }
-    let mut medoids: Vec<Descriptor> = (0..VOCABULARY).map(|i| all[i * all.len() / VOCABULARY]).collect();
+    let leaves = parts.iter().zip(&roots).flat_map(|(part, root)| {
+        let mut leaves = medoids(part, LEAVES);
+        leaves.resize(LEAVES, *root);
+        leaves
+    });
+    let leaves = leaves.collect();
+    Tree { roots, leaves }
+}
+
+/// `count` medoids, fewer of fewer descriptors, by a few rounds of assignment; in each the new medoid is the bitwise majority
+/// of those assigned.
+#[expect(clippy::inline_always, reason = "as above")]
+#[inline(always)]
+fn medoids(all: &[Descriptor], count: usize) -> Vec<Descriptor> {
+    let count = count.min(all.len());
+    let mut medoids: Vec<Descriptor> = (0..count).map(|i| all[i * all.len() / count]).collect();
     for _ in 0..ROUNDS {
-        let mut counts = vec![([0_u32; 256], 0_u32); VOCABULARY];
-        for d in &all {
-            let nearest = (0..VOCABULARY).min_by_key(|m| medoids[*m].distance(d)).unwrap_or(0);
-            let (bits, count) = &mut counts[nearest];
+        let mut counts = vec![([0_u32; 256], 0_u32); count];
+        for d in all {
+            let [near] = nearest::<1>(d, medoids.iter().enumerate());
+            let (bits, count) = &mut counts[usize::from(near)];
             *count += 1;
             for (i, bit) in bits.iter_mut().enumerate() {
                 *bit += ((d.0[i / 64] >> (i % 64)) & 1) as u32;

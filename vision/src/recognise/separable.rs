@@ -47,9 +47,9 @@ fn rows(image: &[f32], size: usize, kernel: &[f32]) -> Vec<f32> {
 #[inline(always)]
 fn columns(image: &[f32], size: usize, kernel: &[f32]) -> Vec<f32> {
     let (r, stride) = (kernel.len() / 2, stride(size));
-    let mut out = Vec::with_capacity(size * stride);
-    for row in 0..size {
-        for start in (0..stride).step_by(LANES) {
+    let mut out = vec![0.0; size * size];
+    for (row, line) in out.chunks_exact_mut(size.max(1)).enumerate() {
+        for (start, out) in (0..).step_by(LANES).zip(line.chunks_mut(LANES)) {
             let mut sum = [0.0; LANES];
             for (i, w) in kernel.iter().enumerate() {
                 let source = (row + i).saturating_sub(r).min(size - 1) * stride + start;
@@ -58,7 +58,10 @@ fn columns(image: &[f32], size: usize, kernel: &[f32]) -> Vec<f32> {
                     sum[k] += w * greys[k];
                 }
             }
-            out.extend_from_slice(&sum[..LANES.min(size - start)]);
+            match out.first_chunk_mut::<LANES>() {
+                Some(whole) => *whole = sum,
+                None => out.copy_from_slice(&sum[..out.len()]),
+            }
         }
     }
     out
