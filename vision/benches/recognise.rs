@@ -8,6 +8,7 @@ use vision::{
     frame::GrayImage,
     icon::icon,
     learn::{
+        exemplar::Exemplar,
         model::{LandmarkModel, View, learn},
         synthesis::views,
     },
@@ -37,9 +38,7 @@ fn landmarks(p: &Params) -> ModelSet {
     let model = learn(LandmarkId(0), &lesson, &[], p).expect("textured");
     let all = (0..LANDMARKS).map(|id| {
         let exemplars = (0..3)
-            .map(|i| {
-                features(icon(&picture(1 + 3 * id + i), &corners(), &p.icon).expect("large"), &p.recognise)
-            })
+            .map(|i| Exemplar::new(&icon(&picture(1 + 3 * id + i), &corners(), &p.icon).expect("large")))
             .collect();
         Arc::new(LandmarkModel { id: LandmarkId(id), exemplars, ..model.clone() })
     });

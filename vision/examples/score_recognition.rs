@@ -411,7 +411,10 @@ fn teach(root: &Path, truth: &Value, p: &Params) -> Result<Vec<Taught>, Box<dyn 
         lesson.extend(views(&image, &corners, GENERATED, p, id));
         let photograph = features(lesson[0].icon.clone(), &p.recognise);
         let points = [view_points(&image, &corners)];
-        all.push(Taught { model: learn(LandmarkId(id), &lesson, &[], p)?.with_points(&points), photograph });
+        all.push(Taught {
+            model: learn(LandmarkId(id), &lesson, &[], p)?.with_points(&points).lean(p),
+            photograph,
+        });
     }
     Ok(all)
 }

@@ -28,7 +28,9 @@ use vision::{
     localise::pose::{LandmarkPose, landmark_pose},
     params::Params,
     pipeline::{FrameFacts, QuadFacts, matched},
-    recognise::{DistanceKind, LandmarkId, Recognition, Refusal, models::ModelSet, verdict::recognise},
+    recognise::{
+        DistanceKind, IconFeatures, LandmarkId, Recognition, Refusal, models::ModelSet, verdict::recognise,
+    },
     seen_border::SeenBorder,
 };
 
@@ -84,7 +86,8 @@ pub fn doubles(learnt: &BTreeMap<LandmarkId, Learnt>, kind: DistanceKind, p: &Pa
 /// Who looks like whom: of two that one takes for the other, and so on from one to the next. What looks like either of two
 /// is never left out, though the ends of a long chain may look nothing like each other.
 fn alike(models: &[Arc<LandmarkModel>], p: &Params) -> BTreeMap<LandmarkId, Arc<Vec<LandmarkId>>> {
-    let accepts = |a: &LandmarkModel, b: &LandmarkModel| unlikeness_of(a, &b.exemplars, p) < a.likeness.tau;
+    let icons: Vec<Vec<IconFeatures>> = models.iter().map(|m| m.features(&p.recognise)).collect();
+    let accepts = |a: usize, b: usize| unlikeness_of(&models[a], &icons[b], p) < models[a].likeness.tau;
     let (mut class, mut compared): (Vec<usize>, usize) = ((0..models.len()).collect(), 0);
     for i in 0..models.len() {
         for j in 0..i {
@@ -92,8 +95,7 @@ fn alike(models: &[Arc<LandmarkModel>], p: &Params) -> BTreeMap<LandmarkId, Arc<
                 continue;
             }
             compared += 1;
-            let (a, b) = (&models[i], &models[j]);
-            if compared > MAX_COMPARED || accepts(a, b) || accepts(b, a) {
+            if compared > MAX_COMPARED || accepts(i, j) || accepts(j, i) {
                 let (from, to) = (class[i], class[j]);
                 class.iter_mut().filter(|c| **c == from).for_each(|c| *c = to);
             }

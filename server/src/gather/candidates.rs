@@ -83,7 +83,7 @@ pub(crate) fn candidates(
             let rival = |(b, other): &&(Candidate, Option<LandmarkModel>)| {
                 // As near as is accepted where nothing else is like it.
                 let near = |x: &LandmarkModel, y: &LandmarkModel| {
-                    unlikeness_of(x, &y.exemplars, params) < params.learn.likeness_cap
+                    unlikeness_of(x, &y.features(&params.recognise), params) < params.learn.likeness_cap
                 };
                 let alike = own.as_ref().zip(other.as_ref()).is_some_and(|(x, y)| near(x, y) || near(y, x));
                 alike || overlap(a, b)
@@ -142,7 +142,7 @@ fn one(
         Err(reason) => (None, Some(reason.clone())),
     };
     let exemplar = model.as_ref().and_then(|m| m.exemplars.first());
-    let best = exemplar.and_then(|e| views.iter().find(|v| v.cut.icon.pixels == e.icon.pixels));
+    let best = exemplar.and_then(|e| views.iter().find(|v| v.cut.icon.pixels == e.icon().pixels));
     let seen: Vec<_> =
         views.iter().map(|v| (*v.cut.corners_px.points(), v.size_px.map(|side| side as f64))).collect();
     let candidate = Candidate {

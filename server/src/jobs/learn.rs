@@ -42,7 +42,7 @@ use vision::{
     },
     params::Params,
     points::taught::{MAX_POINT_VIEWS, TaughtPoint, view_points},
-    recognise::{IconFeatures, LandmarkId, features},
+    recognise::{DistanceKind, IconFeatures, LandmarkId, features},
 };
 
 /// Views a landmark is learnt from at least: what photographs do not give is generated from them.
@@ -230,7 +230,11 @@ fn compute(m: &Material, reporter: &Reporter) -> Result<Learnt, JobError> {
     let learnt = each_of(&m.targets, m.workers, reporter, (0.4, 0.9, "models"), |id| {
         let (before, after) = negatives.others(*id);
         let model = learn(*id, &views[id], before, p).map_err(|e| e.to_string())?;
-        let model = model.with_points_if_used(p, || points[id].clone());
+        // The paper's own distances ask for no points, and for every icon.
+        let model = match m.snapshot.distance {
+            DistanceKind::Both => model.with_points_if_used(p, || points[id].clone()),
+            DistanceKind::Correlation | DistanceKind::Hausdorff => model,
+        };
         Ok::<_, String>(negatives.with_strangers(&add_negatives(&model, after, p), p))
     })?;
     let bystanders: Vec<LandmarkId> =
@@ -332,7 +336,7 @@ fn collect_negatives(
             // Not in the lesson: its photographs and, where those are few, what its model remembers.
             let photographs = spread(&m.lessons[id], count).map(|l| prepare(&l.cut.icon));
             let learnt =
-                m.snapshot.learnt.get(id).into_iter().flat_map(|l| l.model.exemplars.iter().cloned());
+                m.snapshot.learnt.get(id).into_iter().flat_map(|l| l.model.features(&m.params.recognise));
             photographs.chain(learnt).take(count).collect()
         })?;
     let mut negatives = Negatives::default();

@@ -74,7 +74,7 @@ mod tests {
             [lesson(1, &picture(1, false)), lesson(2, &picture(1, true)), lesson(3, &picture(5, false))];
         let mut negatives = Negatives::default();
         for model in &models {
-            negatives.add(model.id, model.exemplars.clone());
+            negatives.add(model.id, model.features(&p.recognise));
         }
         for (i, expected) in [Some(2), Some(1), None].into_iter().enumerate() {
             let (before, after) = negatives.others(models[i].id);

@@ -2,17 +2,19 @@
 //! model comes to be is in `lesson.rs`.
 
 use super::{
-    model::{Evidence, Gate, GateFailure, LandmarkModel, ModelStatus},
+    exemplar::Exemplar,
+    model::{Evidence, Gate, GateFailure, LandmarkModel, ModelStatus, distances},
     threshold::{LimitedBy, Threshold, ThresholdError, threshold},
 };
 use crate::{
+    icon::Icon,
     params::Params,
     recognise::{
         IconFeatures,
         align::{Aligner, Lattices, Surroundings, Template},
         content::shown,
         likeness::{Smoothed, likeness},
-        signature,
+        signature::{self, Signature},
     },
 };
 
@@ -33,10 +35,11 @@ pub fn refit_thresholds(model: &LandmarkModel, negatives: &[IconFeatures], p: &P
 #[must_use]
 pub fn add_negatives(model: &LandmarkModel, negatives: &[IconFeatures], p: &Params) -> LandmarkModel {
     let mut model = model.clone();
-    let exemplars = model.exemplars.clone();
-    let templates = Templates::new(&exemplars, p);
+    let ready = ready(&model.exemplars, p);
+    let templates = Templates::new(&ready, p);
+    let exemplars = if negatives.is_empty() { Vec::new() } else { model.features(&p.recognise) };
     for negative in negatives {
-        let d = model.distances(negative, &p.recognise);
+        let d = distances(&exemplars, negative, &p.recognise);
         model.correlation_evidence.add(d.correlation);
         model.hausdorff_evidence.add(d.hausdorff);
         model.likeness_evidence.add(templates.unlikeness(negative, MIN_SIGNATURE));
@@ -82,22 +85,39 @@ pub(super) fn fitted(evidence: &Evidence, cap: f64, p: &Params) -> Result<Thresh
 /// The smallest 1 minus likeness of `icons` to the model's exemplars, one laid on the other: what tau of the likeness is
 /// held by. Infinite where nothing is like it. For naming look-alikes.
 pub fn unlikeness_of(model: &LandmarkModel, icons: &[IconFeatures], p: &Params) -> f64 {
-    let templates = Templates::new(&model.exemplars, p);
+    let ready = ready(&model.exemplars, p);
+    let templates = Templates::new(&ready, p);
     icons.iter().map(|icon| templates.unlikeness(icon, MIN_SIGNATURE)).fold(f64::INFINITY, f64::min)
 }
 
 /// Negatives whose signatures are less alike are not laid on the exemplars: they count as infinitely far.
 const MIN_SIGNATURE: f32 = 0.45;
 
+/// An exemplar on which icons can be laid.
+pub(super) struct Ready<'a> {
+    signature: &'a Signature,
+    icon: Icon,
+    coarse: Vec<f32>,
+}
+
+/// Makes exemplars ready.
+pub(super) fn ready<'a>(exemplars: &'a [Exemplar], p: &Params) -> Vec<Ready<'a>> {
+    let of = |e: &'a Exemplar| {
+        let (icon, coarse) = e.template(&p.recognise.verdict.align);
+        Ready { signature: &e.signature, icon, coarse }
+    };
+    exemplars.iter().map(of).collect()
+}
+
 /// Exemplars on which icons are laid.
 pub(super) struct Templates<'a> {
-    each: Vec<(&'a IconFeatures, Template<'a>)>,
+    each: Vec<(&'a Ready<'a>, Template<'a>)>,
     lattices: Lattices,
     p: &'a Params,
 }
 
 impl<'a> Templates<'a> {
-    pub(super) fn new(exemplars: &'a [IconFeatures], p: &'a Params) -> Self {
+    pub(super) fn new(exemplars: &'a [Ready<'a>], p: &'a Params) -> Self {
         let each = exemplars.iter().map(|e| (e, Template::new(&e.icon, &e.coarse))).collect();
         Self { each, lattices: Lattices::new(p.icon.size, &p.recognise.correlation), p }
     }
@@ -162,7 +182,7 @@ fn status(model: &LandmarkModel, missing: [Option<Gate>; 3], p: &Params) -> Mode
     let observed = if photographed > 1 { photographed as f64 / model.views as f64 } else { 0.0 };
     let generated_f = g.min_saliency_f_generated;
     let min_saliency_f = generated_f + observed * (g.min_saliency_f - generated_f);
-    let shown = |e: &IconFeatures| shown(&Smoothed::new(&e.icon), &p.recognise.correlation);
+    let shown = |e: &Exemplar| shown(&Smoothed::new(&e.icon()), &p.recognise.correlation);
     let content = model.exemplars.iter().map(shown).fold(0.0, f64::max);
     let mut measured = vec![
         (Gate::Views, model.views as f64, g.min_views as f64),

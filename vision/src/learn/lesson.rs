@@ -2,7 +2,8 @@
 //! Collecting views, storing models and telling look-alikes apart is the caller's.
 
 use super::{
-    fitting::{Templates, refit_thresholds},
+    exemplar::Exemplar,
+    fitting::{Templates, ready, refit_thresholds},
     gates::{saliency, saliency_f, stable_points, v_c},
     model::{Evidence, LandmarkModel, LearnError, MAX_VIEWS, ModelStatus, View, distances},
     pca::{exemplars, modes},
@@ -33,6 +34,7 @@ pub fn learn(
     };
     let kept: Vec<IconFeatures> = chosen.iter().map(|i| exemplar(*i)).collect();
     let own = own_distances(&icons, (&chosen, &kept), exemplar, p).ok_or(LearnError::NoComponents)?;
+    let kept: Vec<Exemplar> = kept.iter().map(|k| Exemplar::new(&k.icon)).collect();
 
     let saliency_f = saliency_f(&pixels);
     let points: Vec<_> = icons.iter().map(|i| &i.points).collect();
@@ -72,10 +74,11 @@ const MAX_OWN_LAID: usize = 9;
 /// 1 minus the likeness of the landmark's own icons that are no exemplars, laid on those.
 fn own_unlikeness(
     icons: &[IconFeatures],
-    (chosen, exemplars): (&[usize], &[IconFeatures]),
+    (chosen, exemplars): (&[usize], &[Exemplar]),
     p: &Params,
 ) -> Vec<f64> {
-    let templates = Templates::new(exemplars, p);
+    let ready = ready(exemplars, p);
+    let templates = Templates::new(&ready, p);
     let others: Vec<_> = icons.iter().enumerate().filter(|(i, _)| !chosen.contains(i)).collect();
     let every = others.len().div_ceil(MAX_OWN_LAID).max(1);
     others.into_iter().step_by(every).map(|(_, icon)| templates.unlikeness(icon, -1.0)).collect()

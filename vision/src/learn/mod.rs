@@ -7,6 +7,7 @@ pub mod pca;
 pub mod threshold;
 pub mod gates;
 pub mod thinning;
+pub mod exemplar;
 pub mod model;
 mod fitting;
 mod lesson;

@@ -4,6 +4,7 @@
 //! How a model is made is in `lesson.rs`, how it is stored in `stored.rs`.
 
 use super::{
+    exemplar::Exemplar,
     gates::GateParams,
     synthesis::SynthesisParams,
     threshold::{Threshold, ThresholdError, ThresholdParams},
@@ -134,7 +135,7 @@ pub struct LandmarkModel {
     /// another light was never seen: `v_c` and saliency then say what the model is prepared for, not what was observed.
     pub generated_views: usize,
     /// One to three icons that stand for the mean and the leading modes, grey levels whole numbers.
-    pub exemplars: Vec<IconFeatures>,
+    pub exemplars: Vec<Exemplar>,
     /// Variance along the leading modes, falling; squared grey levels summed over the icon.
     pub eigenvalues: Vec<f64>,
     /// Sum of all eigenvalues.
@@ -183,12 +184,32 @@ impl LandmarkModel {
     /// The same model, with points where the settings decide by them; `views` is only called then.
     #[must_use]
     pub fn with_points_if_used(self, p: &Params, views: impl FnOnce() -> Vec<Vec<TaughtPoint>>) -> Self {
-        if p.recognise.verdict.points { self.with_points(&views()) } else { self }
+        if p.recognise.verdict.points { self.with_points(&views()).lean(p) } else { self }
+    }
+
+    /// The same model without what is not used where points decide: of a landmark that is named by them alone the icon that
+    /// stands for the mean remains, on which pictures are laid.
+    #[must_use]
+    pub fn lean(mut self, p: &Params) -> Self {
+        if self.is_named_by_points(p) {
+            self.exemplars.truncate(1);
+        }
+        self
+    }
+
+    /// Whether it has so many points that its icons never name it.
+    pub fn is_named_by_points(&self, p: &Params) -> bool {
+        p.recognise.verdict.points && self.points.len() > p.recognise.verdict.max_icon_points
     }
 
     /// `D(Q, C_l)`: the smallest distance to any exemplar (A17), each of the two by itself.
     pub fn distances(&self, icon: &IconFeatures, p: &RecogniseParams) -> Distances {
-        distances(&self.exemplars, icon, p)
+        distances(&self.features(p), icon, p)
+    }
+
+    /// The exemplars with all that is asked of them.
+    pub fn features(&self, p: &RecogniseParams) -> Vec<IconFeatures> {
+        self.exemplars.iter().map(|e| e.features(p)).collect()
     }
 
     /// Learnt from generated views, at least in part.
@@ -205,7 +226,7 @@ impl LandmarkModel {
             ("evidence", size_of::<f32>() * distances),
             ("other", size_of::<Self>() + size_of::<f64>() * self.eigenvalues.len()),
         ];
-        parts.extend(self.exemplars.iter().flat_map(IconFeatures::memory_parts));
+        parts.extend(self.exemplars.iter().flat_map(Exemplar::memory_parts));
         parts
     }
 

@@ -3,6 +3,7 @@
 //! (Harris points, buckets) is not stored.
 
 use super::{
+    exemplar::Exemplar,
     fitting::add_negatives,
     model::{Evidence, LandmarkModel, MAX_EXEMPLARS, MAX_VIEWS, ModelStatus},
     threshold::Threshold,
@@ -11,7 +12,7 @@ use crate::{
     icon::{Icon, MAX_ICON_SIZE},
     params::Params,
     points::taught::{MAX_LANDMARK_POINTS, POINT_BYTES, TaughtPoint},
-    recognise::{LandmarkId, features},
+    recognise::LandmarkId,
 };
 
 /// Largest stored model, in bytes.
@@ -78,9 +79,9 @@ impl LandmarkModel {
         }
         out.push(self.exemplars.len() as u8);
         for exemplar in &self.exemplars {
-            out.extend((exemplar.icon.size as u16).to_le_bytes());
-            out.extend(exemplar.icon.source_scale.to_le_bytes());
-            out.extend(exemplar.icon.pixels.iter().map(|g| *g as u8));
+            out.extend((exemplar.size() as u16).to_le_bytes());
+            out.extend(exemplar.source_scale().to_le_bytes());
+            out.extend(exemplar.pixels());
         }
         out.push(u8::from(self.knows_points));
         out.extend((self.points.len() as u16).to_le_bytes());
@@ -150,7 +151,7 @@ impl Reader<'_> {
             params_hash,
             views,
             generated_views,
-            exemplars: icons.into_iter().map(|icon| features(icon, &p.recognise)).collect(),
+            exemplars: icons.iter().map(Exemplar::new).collect(),
             eigenvalues,
             total_variance,
             correlation: Threshold::NEVER,

@@ -202,11 +202,10 @@ fn laid(
     let signature = Signature::new(&icon);
     let alike = |i: usize| likeness(model.exemplars[i].signature.values(), signature.values());
     let nearest = (0..model.exemplars.len()).max_by(|a, b| alike(*a).total_cmp(&alike(*b)))?;
-    let exemplar = &model.exemplars[nearest];
+    let (learnt, coarse) = model.exemplars[nearest].template(align);
     let around = Surroundings::new(image, start_px, &icon, align)?;
-    let laid = Aligner::new(models.lattices(), align)
-        .align(&around, &Template::new(&exemplar.icon, &exemplar.coarse))?;
-    let alike = between(&Smoothed::new(&laid.icon), &Smoothed::new(&exemplar.icon), c).likeness;
+    let laid = Aligner::new(models.lattices(), align).align(&around, &Template::new(&learnt, &coarse))?;
+    let alike = between(&Smoothed::new(&laid.icon), &Smoothed::new(&learnt), c).likeness;
     Some((laid, alike))
 }
 

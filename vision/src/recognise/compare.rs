@@ -155,8 +155,8 @@ pub(crate) fn correlation_as_found(near: &Near, sightings: &[Sighting], p: &Para
         return WORST_CORRELATION;
     };
     let rank = p.recognise.correlation.rank();
-    correlation_within(sighting.buckets(p), &exemplar.buckets, rank, WORST_CORRELATION)
-        .unwrap_or(WORST_CORRELATION)
+    let buckets = Buckets::new(&exemplar.icon(), &p.recognise.correlation);
+    correlation_within(sighting.buckets(p), &buckets, rank, WORST_CORRELATION).unwrap_or(WORST_CORRELATION)
 }
 
 /// The `count` landmarks of least ratio by one of the paper's distances, and every one with a ratio below 1, rising; of
@@ -217,7 +217,7 @@ fn nearest_by_correlation(
     let mut best = None;
     for (sighting, s) in sightings.iter().enumerate() {
         for (exemplar, e) in model.exemplars.iter().enumerate() {
-            if let Some(d) = correlation_within(s.buckets(p), &e.buckets, rank, limit) {
+            if let Some(d) = correlation_within(s.buckets(p), e.buckets(&p.recognise), rank, limit) {
                 limit = d;
                 best = Some((sighting, exemplar, d));
             }
@@ -249,7 +249,7 @@ fn nearest_by_points(sightings: &[Sighting], model: &Arc<LandmarkModel>, p: &Par
     let correlation = model
         .exemplars
         .iter()
-        .filter_map(|e| correlation_within(buckets, &e.buckets, rank, f64::INFINITY))
+        .filter_map(|e| correlation_within(buckets, e.buckets(&p.recognise), rank, f64::INFINITY))
         .fold(2.0, f64::min);
     Some(Near {
         model: Arc::clone(model),
@@ -266,7 +266,7 @@ fn nearest_by_points(sightings: &[Sighting], model: &Arc<LandmarkModel>, p: &Par
 pub(crate) fn least_hausdorff(points: &PointSet, model: &LandmarkModel, p: &Params) -> (f64, usize) {
     let mut best = (f64::INFINITY, 0);
     for (i, exemplar) in model.exemplars.iter().enumerate() {
-        let d = hausdorff(points, &exemplar.points, &p.recognise.hausdorff);
+        let d = hausdorff(points, exemplar.points(&p.recognise), &p.recognise.hausdorff);
         if d < best.0 {
             best = (d, i);
         }

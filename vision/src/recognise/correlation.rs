@@ -152,7 +152,12 @@ pub(crate) fn correlation_within(a: &Buckets, b: &Buckets, rank: usize, limit: f
 /// C^r of two icons, in [0, 2]: 0 for the same picture under any gain and offset. Icons cut differently are as
 /// different as can be: 2.
 pub fn correlation(a: &IconFeatures, b: &IconFeatures, p: &CorrelationParams) -> f64 {
-    bucket_correlations(&a.buckets, &b.buckets).map_or(2.0, |mut all| ranked(&mut all, p.rank()))
+    correlation_of(&a.buckets, &b.buckets, p)
+}
+
+/// The same of their buckets.
+pub(crate) fn correlation_of(a: &Buckets, b: &Buckets, p: &CorrelationParams) -> f64 {
+    bucket_correlations(a, b).map_or(2.0, |mut all| ranked(&mut all, p.rank()))
 }
 
 #[cfg(test)]

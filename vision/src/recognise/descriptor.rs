@@ -113,6 +113,11 @@ impl PointSet {
         self.xy_px.len()
     }
 
+    /// Memory that they take, in bytes.
+    pub(crate) fn memory_bytes(&self) -> usize {
+        size_of_val(&*self.xy_px) + size_of_val(&*self.descriptors) + size_of_val(&*self.responses)
+    }
+
     /// No point at all.
     pub fn is_empty(&self) -> bool {
         self.xy_px.is_empty()

@@ -109,8 +109,7 @@ pub(crate) fn lessons(count: u64, p: &Params) -> Vec<Arc<LandmarkModel>> {
         .iter()
         .map(|m| {
             let others = models.iter().filter(|o| o.id != m.id);
-            let negatives: Vec<_> =
-                others.map(|o| features(o.exemplars[0].icon.clone(), &p.recognise)).collect();
+            let negatives: Vec<_> = others.map(|o| o.exemplars[0].features(&p.recognise)).collect();
             Arc::new(refit_thresholds(m, &negatives, p))
         })
         .collect()

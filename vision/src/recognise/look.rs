@@ -2,17 +2,24 @@
 //! distance where the quad was found. Thresholds are only read; deciding is the verdict's work.
 
 use super::{
-    DistanceKind, IconFeatures, MAX_CANDIDATES, Refusal,
+    DistanceKind, MAX_CANDIDATES, Refusal,
     align::{Aligner, Lattices, Surroundings, Template},
     compare::{Near, Sighting, correlation_as_found, least_hausdorff},
     content::{Content, content},
-    correlation::{CorrelationParams, correlation},
-    features,
+    correlation::{Buckets, CorrelationParams, correlation_of},
+    descriptor::describe,
+    harris::harris,
     likeness::{Smoothed, between},
     verdict::VerdictParams,
     watch::{Step, Watch},
 };
-use crate::{detect::quads::Corners, frame::GrayImage, icon::rectify, params::Params};
+use crate::{
+    detect::quads::Corners,
+    frame::GrayImage,
+    icon::{Icon, rectify},
+    learn::model::LandmarkModel,
+    params::Params,
+};
 
 /// A near landmark, with or without alignment.
 pub(crate) struct Judged {
@@ -76,19 +83,17 @@ pub(crate) fn look(
         };
         let around = surroundings[near.sighting]
             .get_or_insert_with(|| Surroundings::new(image, &sighting.corners_px, &sighting.icon, &v.align));
-        let template = Template::new(&exemplar.icon, &exemplar.coarse);
+        let (learnt, coarse) = exemplar.template(&v.align);
+        let template = Template::new(&learnt, &coarse);
         let Some(laid) = around.as_ref().and_then(|s| aligner.align(s, &template)) else { continue };
-        let (seen, learnt) = (Smoothed::new(&laid.icon), Smoothed::new(&exemplar.icon));
+        let (seen, learnt) = (Smoothed::new(&laid.icon), Smoothed::new(&learnt));
         let alike = between(&seen, &learnt, c);
         (near.likeness, *contradicting) = (Some(alike.likeness), alike.contradicting);
         *moved = Some(laid.corners_px);
         if near.ratio(DistanceKind::Both) < 1.0 {
             *beyond = content(&seen, &learnt, c);
             watch.finished(Step::Alignment);
-            let icon = features(laid.icon, &p.recognise);
-            let each = near.model.exemplars.iter().map(|e| correlation(&icon, e, c));
-            (near.correlation, near.hausdorff) =
-                (each.fold(2.0, f64::min), least_hausdorff(&icon.points, &near.model, p).0);
+            (near.correlation, near.hausdorff) = distances(laid.icon, &near.model, p);
             watch.finished(Step::Distances);
         }
     }
@@ -111,7 +116,7 @@ fn compare_as_found(sightings: &[Sighting], found: &mut [Judged], c: &Correlatio
         let Some(exemplar) = near.model.exemplars.get(near.exemplar) else { continue };
         let own =
             smoothed[near.sighting].get_or_insert_with(|| Smoothed::new(&sightings[near.sighting].icon));
-        near.likeness = Some(between(own, &Smoothed::new(&exemplar.icon), c).likeness);
+        near.likeness = Some(between(own, &Smoothed::new(&exemplar.icon()), c).likeness);
     }
 }
 
@@ -129,9 +134,7 @@ pub(crate) fn verify(
     for judged in found.iter_mut().filter(|j| j.near.ratio(kind) < v.verify_reach).take(v.max_verified) {
         let sighting = &sightings[judged.near.sighting];
         let Some((icon, corners_px)) = laid_on(image, sighting, &judged.near, &aligner, p) else { continue };
-        let model = &judged.near.model;
-        let each = model.exemplars.iter().map(|e| correlation(&icon, e, &p.recognise.correlation));
-        let (correlation, hausdorff) = (each.fold(2.0, f64::min), least_hausdorff(&icon.points, model, p).0);
+        let (correlation, hausdorff) = distances(icon, &judged.near.model, p);
         let near = Near { correlation, hausdorff, ..judged.near.clone() };
         let moved = Judged { near, moved: Some(corners_px), contradicting: 0.0, content: Content::NONE };
         // What was accepted where it stood is not lost by a move that fits worse.
@@ -143,6 +146,20 @@ pub(crate) fn verify(
     found.sort_by(|a, b| a.near.ratio(kind).total_cmp(&b.near.ratio(kind)));
 }
 
+/// C^r and H^r of an icon to the nearest of a model's exemplars. Of a landmark that is named by points alone they would say
+/// nothing: H^r is left infinite.
+fn distances(icon: Icon, model: &LandmarkModel, p: &Params) -> (f64, f64) {
+    let c = &p.recognise.correlation;
+    let own = Buckets::new(&icon, c);
+    let each = model.exemplars.iter().map(|e| correlation_of(&own, &Buckets::new(&e.icon(), c), c));
+    let correlation = each.fold(2.0, f64::min);
+    if model.is_named_by_points(p) {
+        return (correlation, f64::INFINITY);
+    }
+    let points = describe(&icon, &harris(&icon, &p.recognise.harris), &p.recognise.descriptor);
+    (correlation, least_hausdorff(&points, model, p).0)
+}
+
 /// The quad's picture after its corners were moved to fit the nearest exemplar, and those corners.
 fn laid_on(
     image: &GrayImage,
@@ -150,11 +167,11 @@ fn laid_on(
     near: &Near,
     aligner: &Aligner<'_>,
     p: &Params,
-) -> Option<(IconFeatures, Corners)> {
+) -> Option<(Icon, Corners)> {
     let r = &p.recognise;
     let exemplar = near.model.exemplars.get(near.exemplar)?;
     let around = Surroundings::new(image, &sighting.corners_px, &sighting.icon, &r.verdict.align)?;
-    let corners = aligner.align(&around, &Template::new(&exemplar.icon, &exemplar.coarse))?.corners_px;
-    let icon = rectify(image, &corners, &p.icon).ok()?;
-    Some((features(icon, r), corners))
+    let (learnt, coarse) = exemplar.template(&r.verdict.align);
+    let corners = aligner.align(&around, &Template::new(&learnt, &coarse))?.corners_px;
+    Some((rectify(image, &corners, &p.icon).ok()?, corners))
 }

@@ -53,18 +53,6 @@ pub struct IconFeatures {
 }
 
 impl IconFeatures {
-    /// Memory that they take, in bytes, by what it is for.
-    pub fn memory_parts(&self) -> [(&'static str, usize); 5] {
-        let point = size_of::<[f32; 2]>() + size_of::<descriptor::Descriptor>() + size_of::<f32>();
-        [
-            ("icons", size_of::<f32>() * self.icon.pixels.len()),
-            ("buckets", size_of::<f32>() * self.buckets.values().len()),
-            ("icons, coarse", size_of::<f32>() * self.coarse.len()),
-            ("corner points", self.points.len() * point),
-            ("other", size_of::<Self>()),
-        ]
-    }
-
     /// The features of `icon.rotated(shift)`.
     #[must_use]
     pub fn rotated(&self, shift: usize, p: &RecogniseParams) -> Self {

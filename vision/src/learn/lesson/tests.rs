@@ -45,6 +45,11 @@ fn lesson(seed: u64, count: usize, negatives: &[IconFeatures]) -> LandmarkModel 
     learn(LandmarkId(seed), &views, negatives, &p).unwrap()
 }
 
+/// The exemplars as negatives of others.
+fn icons(model: &LandmarkModel) -> Vec<IconFeatures> {
+    model.features(&Params::default().recognise)
+}
+
 /// End to end at N = 50: every landmark is taught from one picture, then fresh views are compared with all.
 #[test]
 fn fifty_landmarks_know_themselves_and_refuse_the_others() {
@@ -52,12 +57,8 @@ fn fifty_landmarks_know_themselves_and_refuse_the_others() {
     let alone: Vec<LandmarkModel> = (0..50).map(|seed| lesson(seed, 20, &[])).collect();
     let models: Vec<LandmarkModel> = (0..50)
         .map(|i| {
-            let others: Vec<IconFeatures> = alone
-                .iter()
-                .enumerate()
-                .filter(|(j, _)| *j != i)
-                .flat_map(|(_, m)| m.exemplars.clone())
-                .collect();
+            let others: Vec<IconFeatures> =
+                alone.iter().enumerate().filter(|(j, _)| *j != i).flat_map(|(_, m)| icons(m)).collect();
             refit_thresholds(&alone[i], &others, &p)
         })
         .collect();
@@ -96,7 +97,7 @@ fn likeness_is_held_by_the_nearest_of_the_others() {
     assert!((alone.likeness.tau - p.learn.likeness_cap).abs() < 1e-12);
     assert_eq!((alone.likeness.limited_by, alone.likeness.negatives), (LimitedBy::AbsoluteCap, 0));
     // What is nothing like it changes nothing, a look-alike much: itself under a stain, here.
-    let stranger = lesson(4, 20, &[]).exemplars[0].clone();
+    let stranger = icons(&lesson(4, 20, &[])).remove(0);
     let far = add_negatives(&alone, &[stranger], &p);
     assert!((far.likeness.tau - p.learn.likeness_cap).abs() < 1e-12 && far.likeness.negatives == 1);
     let mut stained = poster(3);
@@ -108,7 +109,7 @@ fn likeness_is_held_by_the_nearest_of_the_others() {
     assert_eq!(near.likeness.limited_by, LimitedBy::NearestNegative);
     assert!(near.likeness.tau < 0.9 * p.learn.likeness_cap, "{:?}", near.likeness);
     // Itself: nothing can tell them apart, and so it is not used.
-    let twin = add_negatives(&alone, &alone.exemplars.clone(), &p);
+    let twin = add_negatives(&alone, &icons(&alone), &p);
     let ModelStatus::Candidate(failures) = &twin.status else { panic!("told from itself?") };
     assert!(failures.iter().any(|f| f.gate == Gate::LikenessThreshold(ThresholdError::Overlap)));
 }
@@ -153,8 +154,8 @@ fn one_of_the_papers_distances_is_enough() {
 fn look_alikes_are_near_and_strangers_infinitely_far() {
     let p = Params::default();
     let model = lesson(3, 20, &[]);
-    let twin = lesson(3, 6, &[]).exemplars;
-    let stranger = lesson(4, 6, &[]).exemplars;
+    let twin = icons(&lesson(3, 6, &[]));
+    let stranger = icons(&lesson(4, 6, &[]));
     assert!(unlikeness_of(&model, &twin, &p) < 0.3);
     assert!(unlikeness_of(&model, &stranger, &p) > p.learn.likeness_cap);
     assert!(unlikeness_of(&model, &[], &p).is_infinite());
@@ -207,14 +208,14 @@ fn impossible_lessons_are_refused() {
 #[test]
 fn negatives_may_come_one_after_the_other() {
     let p = Params::default();
-    let others: Vec<IconFeatures> = (10..22).flat_map(|seed| lesson(seed, 6, &[]).exemplars).collect();
+    let others: Vec<IconFeatures> = (10..22).flat_map(|seed| icons(&lesson(seed, 6, &[]))).collect();
     let model = lesson(3, 20, &others);
     let step = add_negatives(&add_negatives(&lesson(3, 20, &[]), &others[..9], &p), &others[9..], &p);
     assert_eq!(model, step);
     assert_eq!(model.correlation.negatives, others.len());
     assert_eq!(refit_thresholds(&model, &[], &p), lesson(3, 20, &[]));
     // A copy of the landmark among the negatives makes tau no looser.
-    let twin = add_negatives(&model, &lesson(3, 6, &[]).exemplars, &p);
+    let twin = add_negatives(&model, &icons(&lesson(3, 6, &[])), &p);
     assert!(twin.correlation.tau <= model.correlation.tau);
 }
 
@@ -245,7 +246,7 @@ fn counted_negatives_hold_tau_below_those_kept() {
 #[test]
 fn a_stored_model_is_the_same_bit_for_bit() {
     let p = Params::default();
-    let others: Vec<IconFeatures> = (10..40).flat_map(|seed| lesson(seed, 4, &[]).exemplars).collect();
+    let others: Vec<IconFeatures> = (10..40).flat_map(|seed| icons(&lesson(seed, 4, &[]))).collect();
     let model = lesson(3, 20, &others);
     let bytes = model.to_bytes();
     assert!(bytes.len() < 64 * 1024, "{}", bytes.len());
@@ -292,7 +293,7 @@ proptest! {
     ) {
         use std::sync::OnceLock;
         static BYTES: OnceLock<Vec<u8>> = OnceLock::new();
-        let bytes = BYTES.get_or_init(|| lesson(3, 20, &lesson(4, 4, &[]).exemplars).to_bytes());
+        let bytes = BYTES.get_or_init(|| lesson(3, 20, &icons(&lesson(4, 4, &[]))).to_bytes());
         let mut forged = bytes[..bytes.len() - 8 - cut].to_vec();
         for (at, value) in &edits {
             forged[*at] = *value;

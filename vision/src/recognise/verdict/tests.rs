@@ -156,8 +156,9 @@ fn nearest_equals_comparing_everything() {
             .map(|m| {
                 let seen: Vec<IconFeatures> =
                     seen.iter().map(|s| features(s.icon.clone(), &PARAMS.recognise)).collect();
+                let learnt = m.features(&PARAMS.recognise);
                 let least = |d: &dyn Fn(&IconFeatures, &IconFeatures) -> f64| {
-                    let pairs = seen.iter().flat_map(|s| m.exemplars.iter().map(move |e| (s, e)));
+                    let pairs = seen.iter().flat_map(|s| learnt.iter().map(move |e| (s, e)));
                     pairs.map(|(a, b)| d(a, b)).fold(f64::INFINITY, f64::min)
                 };
                 let r = &PARAMS.recognise;

@@ -9,12 +9,13 @@ use vision::{
     frame::{FrameError, GrayImage},
     icon::icon,
     learn::{
+        exemplar::Exemplar,
         model::{LandmarkModel, View, learn, refit_thresholds},
         synthesis,
     },
     params::Params,
     points::taught::view_points,
-    recognise::{IconFeatures, LandmarkId, features},
+    recognise::{IconFeatures, LandmarkId},
 };
 
 /// Width of the posters' pictures, in pixels; also what SIFT learns from.
@@ -53,7 +54,7 @@ pub(super) fn models(
     let alone = each_of(taught, threads, "learning", |i| lesson(first, i, p))?;
     let fitted = each_of(taught, threads, "thresholds", |i| {
         let others: Vec<IconFeatures> =
-            alone.iter().filter(|m| m.id != alone[i].id).flat_map(|m| m.exemplars.clone()).collect();
+            alone.iter().filter(|m| m.id != alone[i].id).flat_map(|m| m.features(&p.recognise)).collect();
         Ok(Arc::new(refit_thresholds(&alone[i], &others, p)))
     })?;
     let rest = each_of(count.saturating_sub(taught), threads, "drawing", |i| {
@@ -89,7 +90,7 @@ pub(super) fn views(first: u64, index: usize, count: usize, p: &Params) -> anyho
 }
 
 /// Three icons of the poster: as it is, and cut a little beside.
-fn icons(first: u64, index: usize, p: &Params) -> anyhow::Result<Vec<IconFeatures>> {
+fn icons(first: u64, index: usize, p: &Params) -> anyhow::Result<Vec<Exemplar>> {
     let image = picture(first, index)?;
     let corners = whole(&image)?;
     let beside = BESIDE * image.width() as f64;
@@ -104,7 +105,7 @@ fn icons(first: u64, index: usize, p: &Params) -> anyhow::Result<Vec<IconFeature
         let mut icon = icon(&image, &Corners::new(inset)?, &p.icon)?;
         // As a lesson keeps them.
         icon.pixels.iter_mut().for_each(|g| *g = g.round());
-        all.push(features(icon, &p.recognise));
+        all.push(Exemplar::new(&icon));
     }
     Ok(all)
 }

@@ -29,7 +29,7 @@ pub(super) struct Report {
 
 pub(super) fn run(args: &Args, first: u64, map: &ModelSet, p: &Params) -> anyhow::Result<Report> {
     let views = views(first, POSTER, args.views as usize - 1, p)?;
-    let negatives: Vec<IconFeatures> = map.iter().flat_map(|m| m.exemplars.iter().cloned()).collect();
+    let negatives: Vec<IconFeatures> = map.iter().flat_map(|m| m.features(&p.recognise)).collect();
     let photograph = picture(first, POSTER)?;
     let corners = whole(&photograph)?;
     let (ms, model) = fastest(args.rounds as usize, || {
