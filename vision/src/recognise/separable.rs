@@ -14,6 +14,9 @@ fn stride(size: usize) -> usize {
     size.next_multiple_of(LANES)
 }
 
+/// Vectors that are summed abreast: sums of one wait for each other.
+const ABREAST: usize = 4;
+
 /// Correlates every row with `kernel`; rows of [`stride`].
 #[expect(
     clippy::inline_always,
@@ -24,20 +27,12 @@ fn rows(image: &[f32], size: usize, kernel: &[f32]) -> Vec<f32> {
     let (r, stride) = (kernel.len() / 2, stride(size));
     let mut out = vec![0.0; stride * size];
     let mut padded = vec![0.0; stride + 2 * r];
+    let offsets: Vec<usize> = (0..kernel.len()).collect();
     for (row, line) in image.chunks_exact(size.max(1)).zip(out.chunks_exact_mut(stride.max(1))) {
         padded[..r].fill(row[0]);
         padded[r..r + size].copy_from_slice(row);
         padded[r + size..size + 2 * r].fill(row[size - 1]);
-        for (start, out) in (0..).step_by(LANES).zip(line.as_chunks_mut::<LANES>().0) {
-            let mut sum = [0.0; LANES];
-            for (i, w) in (start..).zip(kernel) {
-                let Some(greys) = padded.get(i..).and_then(<[f32]>::first_chunk::<LANES>) else { break };
-                for k in 0..LANES {
-                    sum[k] += w * greys[k];
-                }
-            }
-            *out = sum;
-        }
+        weighted(&padded, &offsets, kernel, line);
     }
     out
 }
@@ -48,23 +43,43 @@ fn rows(image: &[f32], size: usize, kernel: &[f32]) -> Vec<f32> {
 fn columns(image: &[f32], size: usize, kernel: &[f32]) -> Vec<f32> {
     let (r, stride) = (kernel.len() / 2, stride(size));
     let mut out = vec![0.0; size * size];
-    for (row, line) in out.chunks_exact_mut(size.max(1)).enumerate() {
-        for (start, out) in (0..).step_by(LANES).zip(line.chunks_mut(LANES)) {
-            let mut sum = [0.0; LANES];
-            for (i, w) in kernel.iter().enumerate() {
-                let source = (row + i).saturating_sub(r).min(size - 1) * stride + start;
-                let Some(greys) = image.get(source..).and_then(<[f32]>::first_chunk::<LANES>) else { break };
-                for k in 0..LANES {
-                    sum[k] += w * greys[k];
-                }
-            }
-            match out.first_chunk_mut::<LANES>() {
-                Some(whole) => *whole = sum,
-                None => out.copy_from_slice(&sum[..out.len()]),
-            }
+    let mut line = vec![0.0; stride];
+    let mut offsets = vec![0; kernel.len()];
+    for (row, out) in out.chunks_exact_mut(size.max(1)).enumerate() {
+        for (i, offset) in offsets.iter_mut().enumerate() {
+            *offset = (row + i).saturating_sub(r).min(size - 1) * stride;
         }
+        weighted(image, &offsets, kernel, &mut line);
+        out.copy_from_slice(&line[..size]);
     }
     out
+}
+
+/// Fills a line of whole vectors with the sums of the parts of `source` that begin at `offsets`, each times its weight.
+#[expect(clippy::inline_always, reason = "as above")]
+#[inline(always)]
+fn weighted(source: &[f32], offsets: &[usize], weights: &[f32], line: &mut [f32]) {
+    let (many, rest) = line.as_chunks_mut::<{ ABREAST * LANES }>();
+    let done = many.len() * ABREAST * LANES;
+    for (i, out) in many.iter_mut().enumerate() {
+        sum(source, offsets, weights, i * ABREAST * LANES, out);
+    }
+    for (i, out) in rest.as_chunks_mut::<LANES>().0.iter_mut().enumerate() {
+        sum(source, offsets, weights, done + i * LANES, out);
+    }
+}
+
+#[expect(clippy::inline_always, reason = "as above")]
+#[inline(always)]
+fn sum<const N: usize>(source: &[f32], offsets: &[usize], weights: &[f32], start: usize, out: &mut [f32; N]) {
+    let mut sum = [0.0; N];
+    for (offset, w) in offsets.iter().zip(weights) {
+        let Some(greys) = source.get(offset + start..).and_then(<[f32]>::first_chunk::<N>) else { break };
+        for k in 0..N {
+            sum[k] += w * greys[k];
+        }
+    }
+    *out = sum;
 }
 
 #[cfg(test)]
