@@ -332,6 +332,10 @@ pub struct Answer {
     /// The landmarks it rests on: the guided ones, and those named globally where they alone gave no pose.
     #[prost(string, repeated, tag = "17")]
     pub guided_landmarks: ::prost::alloc::vec::Vec<::prost::alloc::string::String>,
+    /// Landmarks were looked for only where the robot's pose expects them: nothing was detected, and nothing named by the
+    /// picture alone. Never set unless the server is told to spare searches (its setting `search_every_frame`).
+    #[prost(bool, tag = "18")]
+    pub only_expected: bool,
 }
 /// robot/{robot}/odometry : odom_from_robot
 #[derive(::serde::Serialize, ::serde::Deserialize)]

@@ -64,6 +64,10 @@ pub struct RawConfig {
     pub fleet: String,
     /// Vision threads; 0 takes one per core.
     pub workers: usize,
+    /// Searches every frame for all landmarks of its map. Otherwise, while a robot's pose is supported and the landmarks that
+    /// it expects are found, every third frame of a camera; the others are answered by the expected landmarks alone and say
+    /// so (`Answer.only_expected`).
+    pub search_every_frame: bool,
     /// Allows plain-text listeners beyond loopback.
     pub insecure: bool,
     /// Every bound.
@@ -80,6 +84,7 @@ impl Default for RawConfig {
             zenoh: "tcp/127.0.0.1:7447".into(),
             fleet: "default".into(),
             workers: 0,
+            search_every_frame: true,
             insecure: false,
             limits: Limits::default(),
             algorithm: Params::default(),
@@ -234,6 +239,8 @@ pub struct Config {
     pub fleet: Name,
     /// Vision threads, at least 1.
     pub workers: usize,
+    /// Whether every frame is searched for all landmarks of its map.
+    pub search_every_frame: bool,
     /// Every bound.
     pub limits: Limits,
     /// Parameters of the algorithms.
@@ -284,6 +291,7 @@ impl TryFrom<RawConfig> for Config {
             zenoh_endpoint: raw.zenoh,
             fleet,
             workers: if raw.workers == 0 { cores } else { raw.workers },
+            search_every_frame: raw.search_every_frame,
             limits: raw.limits,
             params: Arc::new(raw.algorithm),
         })

@@ -163,6 +163,7 @@ fn engine(
         findings,
         searches: Arc::default(),
         gather,
+        search_every_frame: config.search_every_frame,
     }
 }
 

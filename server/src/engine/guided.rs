@@ -7,6 +7,7 @@
 use super::{
     doubles::{Resembling, hang_where_known, resembling},
     judging::View,
+    snapshot::MapSnapshot,
 };
 use map::{
     guided::{
@@ -39,6 +40,9 @@ const SAME_THING_IOU: f64 = 0.5;
 /// Most landmarks that are asked for where they are expected, in one frame: those whose shortest side is the longest.
 pub const MAX_ASKED: usize = 8;
 
+/// A landmark that is surely in view, with sides of at least this, is found if it is there.
+const SURELY_FOUND_PX: f64 = 48.0;
+
 /// A landmark that was named by the pose.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GuidedSighting {
@@ -67,7 +71,7 @@ pub struct Guided {
 
 impl Guided {
     /// As sightings of known place.
-    pub fn placed<'a>(&'a self, map: &'a super::snapshot::MapSnapshot) -> Vec<Sighting<'a>> {
+    pub fn placed<'a>(&'a self, map: &'a MapSnapshot) -> Vec<Sighting<'a>> {
         let place = |s: &'a GuidedSighting| {
             let place = map.landmarks.get(&s.landmark)?.place.as_ref()?;
             Some(Sighting { landmark: s.landmark, seen: &s.seen, place })
@@ -102,19 +106,29 @@ pub fn guided(image: &GrayImage, view: &View<'_>, prior: &Pose2Covariance) -> Gu
     let named = expect(prior, &camera, &known, &obstacles, &ExpectParams::default()).and_then(|expected| {
         let may_be = observed(image, view, &expected);
         let observations: Vec<Observation> = may_be.iter().map(observation).collect();
-        Ok((associate(&expected, &observations, &AssociateParams::default())?, may_be))
+        Ok((associate(&expected, &observations, &AssociateParams::default())?, may_be, expected))
     });
-    let (assigned, may_be) = match named {
+    let (assigned, may_be, expected) = match named {
         Ok(named) => named,
         Err(error) => {
             tracing::error!(%error, "checked inputs were refused by guided recognition");
             return Guided::default();
         }
     };
-    let report = GuidedReport { contradictions: assigned.contradictions(), missed: false };
+    let is_missed = |e: &Expected| {
+        let is_seen = assigned.unique().any(|(_, id)| id == e.landmark);
+        e.is_sure && e.side_px >= SURELY_FOUND_PX && is_told_apart(map, e.landmark) && !is_seen
+    };
+    let missed = expected.searchable().any(is_missed);
+    let report = GuidedReport { contradictions: assigned.contradictions(), missed };
     let named = assigned.unique().filter(|(i, _)| !may_be[*i].is_unique);
     let sightings = named.filter_map(|(i, landmark)| sighting(&may_be[i], landmark, view)).collect();
     Guided { sightings, report }
+}
+
+/// Whether a landmark is in use by itself, and nothing looks like it.
+fn is_told_apart(map: &MapSnapshot, id: LandmarkId) -> bool {
+    map.models.get(id).is_some() && !map.doubles.alike.contains_key(&id)
 }
 
 /// What may be landmarks, each thing once: of several borders the one that fits best, of what was detected and what was

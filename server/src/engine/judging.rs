@@ -62,6 +62,8 @@ pub struct JudgedFrame {
     pub guided: Option<Fix>,
     /// What it says of the landmarks, where the robot's pose was known without it.
     pub seen: Option<Seen>,
+    /// The frame was not searched for all landmarks of the map.
+    pub only_expected: bool,
 }
 
 impl JudgedFrame {
@@ -73,6 +75,7 @@ impl JudgedFrame {
             chosen: self.fix.as_ref().ok(),
             guided: self.guided.as_ref(),
             missed: self.seen.as_ref().map_or(&[], |s| &s.missed),
+            only_expected: self.only_expected,
         }
     }
 }
@@ -91,7 +94,17 @@ pub fn judged_frame(view: &View<'_>, grounds: Option<Grounds>, guided: &Guided) 
     };
     let with = if fix == Err(verdicts::AMBIGUOUS) { global.as_deref().unwrap_or_default() } else { &[] };
     let guided = prior.and_then(|prior| guided_fix(view, guided, with, (prior, seen.as_ref())));
-    JudgedFrame { prior: known, fix, independent, guided, seen }
+    JudgedFrame { prior: known, fix, independent, guided, seen, only_expected: false }
+}
+
+/// Judges a frame of which only the landmarks were looked for that the pose without it expects: they may correct that pose.
+/// What hangs elsewhere, or not at all, is said by frames that are searched.
+pub fn judged_expected(view: &View<'_>, grounds: Grounds, guided: &Guided) -> JudgedFrame {
+    let prior = grounds.pose;
+    let seen = Seen { grounds, judged: Vec::new(), missed: Vec::new() };
+    let guided = guided_fix(view, guided, &[], (&prior, Some(&seen)));
+    let (prior, seen) = (Some(prior), Some(seen));
+    JudgedFrame { prior, fix: Err(""), independent: None, guided, seen, only_expected: true }
 }
 
 /// The robot's pose by landmarks. The robot's own prior gates; ours only chooses between two solutions, so that a fused

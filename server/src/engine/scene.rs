@@ -106,5 +106,6 @@ pub(crate) fn engine(maps: &[Arc<MapSnapshot>]) -> Engine {
         findings: findings().0,
         searches: Arc::default(),
         gather: crate::gather::hook().0,
+        search_every_frame: true,
     }
 }

@@ -53,8 +53,8 @@ impl StageTimes {
     }
 
     /// Every stage so far.
-    pub fn finish(self) -> Vec<v1::StageTime> {
-        self.times
+    pub fn finish(&mut self) -> Vec<v1::StageTime> {
+        std::mem::take(&mut self.times)
     }
 }
 

@@ -8,9 +8,9 @@ use super::{
     doubles::sighted,
     guided::{Guided, guided},
     intake::{FrameJob, unknown_map},
-    judging::{JudgedFrame, Seen, View, judged_frame},
+    judging::{JudgedFrame, Seen, View, judged_expected, judged_frame},
     live::{LiveFrame, LiveHub},
-    motion::{Moment, Motion},
+    motion::{Grounds, Moment, Motion},
     panics::Edge,
     search::{Glance, Left, Searches},
     slots::{Outcome, SlotKey, Slots},
@@ -56,6 +56,8 @@ pub struct Engine {
     pub searches: Arc<Searches>,
     /// Where frames of robots that gather views go.
     pub gather: Hook,
+    /// Whether every frame is searched for all landmarks of its map.
+    pub search_every_frame: bool,
 }
 
 /// The threads.
@@ -197,22 +199,20 @@ impl Engine {
         let mut times = StageTimes::start();
         let image = decode_frame(frame, self.limits)?;
         times.ended("decode");
-        let facts = verdicts::look(&image, frame.intrinsics.as_ref(), &map, &mut times);
-        let mut answer = verdicts::answer(&facts, &map);
         // A frame may be answered on any map; what follows for the robot and for the map, only on its own.
         let on_own_map = self.snapshots.robot_map(key.robot.as_str()).is_some_and(|own| own == map.name);
         let is_live = self.motion.epochs().current(&key.robot).is_none_or(|epoch| epoch == frame.epoch);
         let counts = on_own_map && is_live && job.stamp_instead_ns.is_none();
         let at = moment(frame, &map);
         let grounds = counts.then(|| self.motion.grounds(&key.robot, &key.camera, at)).flatten();
-        let view = View {
-            facts: &facts,
-            map: &map,
-            mounting: frame.mounting.as_ref(),
-            camera: frame.intrinsics.as_ref(),
-            image_px: [f64::from(frame.width_px), f64::from(frame.height_px)],
-            prior: frame.prior.as_ref(),
-        };
+        if let Some((answer, judged)) =
+            self.expected_only(key, frame, (&image, &map), grounds.as_ref(), &mut times)
+        {
+            return Ok(Done { answer, map, judged: Some(judged), found: None });
+        }
+        let facts = verdicts::look(&image, frame.intrinsics.as_ref(), &map, &mut times);
+        let mut answer = verdicts::answer(&facts, &map);
+        let view = view(frame, &facts, &map);
         // The fused pose while nothing contradicts it; without one, what the robot itself believes.
         let guide = match &grounds {
             Some(grounds) => grounds.plan.guided.then_some(&grounds.pose),
@@ -254,6 +254,38 @@ impl Engine {
         Ok(Done { answer, map, judged: Some(judged), found })
     }
 
+    /// Answers a frame by the landmarks alone that the robot's pose expects, where the schedule asks for no search. `None`
+    /// where it asks for one, or what is found calls for one: nothing, a contradiction, a landmark that is surely in view
+    /// and was not found. Robots that gather are searched for: they want what is on no map.
+    fn expected_only(
+        &self,
+        key: &SlotKey,
+        frame: &CheckedFrame,
+        (image, map): (&GrayImage, &MapSnapshot),
+        grounds: Option<&Grounds>,
+        times: &mut StageTimes,
+    ) -> Option<(v1::Answer, JudgedFrame)> {
+        let is_spared = |g: &&Grounds| g.plan.guided && g.plan.global.is_none();
+        let grounds = grounds.filter(is_spared).filter(|_| !self.search_every_frame)?;
+        if self.gather.is_wanted(key) {
+            return None;
+        }
+        let nothing = FrameFacts { quads: Vec::new() };
+        let view = view(frame, &nothing, map);
+        let guided = guided(image, &view, &grounds.pose);
+        let judged = judged_expected(&view, grounds.clone(), &guided);
+        times.ended("expected");
+        if guided.report.global_reason().is_some() || judged.guided.is_none() {
+            return None;
+        }
+        let mut answer = verdicts::answer(&nothing, map);
+        answer.only_expected = true;
+        verdicts::fill_fixes(&mut answer, &judged, &guided, map);
+        times.ended("localise");
+        answer.timings = times.finish();
+        Some((answer, judged))
+    }
+
     /// Goes on with the search of a robot that does not know where it is.
     fn search(
         &self,
@@ -291,6 +323,17 @@ impl Engine {
         } else {
             self.live.refused(key, answer);
         }
+    }
+}
+
+fn view<'a>(frame: &'a CheckedFrame, facts: &'a FrameFacts, map: &'a MapSnapshot) -> View<'a> {
+    View {
+        facts,
+        map,
+        mounting: frame.mounting.as_ref(),
+        camera: frame.intrinsics.as_ref(),
+        image_px: [f64::from(frame.width_px), f64::from(frame.height_px)],
+        prior: frame.prior.as_ref(),
     }
 }
 

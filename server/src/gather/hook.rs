@@ -148,6 +148,11 @@ pub fn hook() -> (Hook, Receiver<Offer>) {
 }
 
 impl Hook {
+    /// Whether this robot gathers.
+    pub fn is_wanted(&self, key: &SlotKey) -> bool {
+        self.sessions.load().contains_key(key.robot.as_str())
+    }
+
     /// Passes a frame on if its robot gathers. Never waits.
     pub fn offer(&self, key: &SlotKey, frame: &CheckedFrame, looked: impl FnOnce() -> Looked) {
         let sessions = self.sessions.load();

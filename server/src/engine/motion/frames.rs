@@ -55,6 +55,8 @@ pub struct FrameFixes<'a> {
     pub guided: Option<&'a Fix>,
     /// Landmarks that should be in the frame and are not.
     pub missed: &'a [LandmarkId],
+    /// The frame was not searched for all landmarks of the map.
+    pub only_expected: bool,
 }
 
 impl<'a> FrameFixes<'a> {
@@ -127,7 +129,7 @@ impl Motion {
             camera,
             motion,
             prior: says.prior,
-            searched: true,
+            searched: !says.only_expected,
             global: says.independent,
             missed: says.missed,
         });

@@ -166,3 +166,95 @@ fn overload_conserves_frames() {
     assert_eq!(last, cameras, "the newest of each camera is always answered");
     assert!(counts.superseded > 0);
 }
+
+/// The scene's robot before the first poster, at the pose that odometry gives, again and again.
+struct Standing {
+    engine: Engine,
+    looks: Vec<(Arc<MapSnapshot>, sim::robot::Sighting)>,
+    intrinsics: vision::frame::Intrinsics,
+    seq: u64,
+}
+
+impl Standing {
+    fn new(search_every_frame: bool) -> Self {
+        let mut scene = scene::Scene::new();
+        let map = scene.taught();
+        let engine = Engine { search_every_frame, ..scene::engine(&[map.clone()]) };
+        let looks = scene.looks(5, 1).into_iter().map(|(_, seen)| (map.clone(), seen)).collect();
+        Self { engine, looks, intrinsics: scene.intrinsics(), seq: 0 }
+    }
+
+    /// The next frame shows what is seen before poster `poster`; odometry says that the robot stands where it did.
+    fn frame(&mut self, poster: usize) -> v1::Answer {
+        self.seq += 1;
+        let (_, seen) = &self.looks[poster];
+        let odometry = self.looks[0].1.step.odom_from_robot;
+        let frame = CheckedFrame {
+            epoch: 1,
+            seq: self.seq,
+            captured_ns: self.seq as i64 * 200_000_000,
+            encoding: protos::convert::Encoding::Gray8,
+            width_px: 640,
+            height_px: 480,
+            image: seen.frame.image.data().to_vec().into(),
+            intrinsics: Some(self.intrinsics),
+            mounting: Some(map::mounting::Mounting::new(seen.step.robot_from_camera).unwrap()),
+            odometry: Some(odometry),
+            prior: None,
+            deadline_ms: None,
+            map: None,
+        };
+        let now = Instant::now();
+        let job = FrameJob {
+            frame,
+            map: scene::MAP.to_owned(),
+            received: now,
+            deadline: now + Duration::from_mins(10),
+            clock_suspect: false,
+            stamp_instead_ns: None,
+        };
+        let sent = Sent::default();
+        assert_eq!(self.engine.contained(&key(0), &job, &sent), Outcome::Processed);
+        let answer = sent.0.lock().unwrap().pop().unwrap();
+        answer
+    }
+
+    /// Distance of the fused pose from where the frames of a poster were taken, metres.
+    fn off_m(&self, poster: usize) -> f64 {
+        let known = self.engine.motion.pose(&key(0).robot, scene::MAP, Instant::now()).unwrap();
+        let truth = self.looks[poster].1.step.map_from_robot;
+        (known.pose.x_m - truth.x_m).hypot(known.pose.y_m - truth.y_m)
+    }
+}
+
+#[test]
+fn two_frames_of_three_are_answered_by_expected_landmarks_where_searches_are_spared() {
+    let mut standing = Standing::new(false);
+    let answers: Vec<_> = (0..7).map(|_| standing.frame(0)).collect();
+    let spared: Vec<bool> = answers.iter().map(|a| a.only_expected).collect();
+    assert_eq!(spared, [false, true, true, false, true, true, false]);
+    for answer in &answers {
+        let (global, guided) = (answer.map_from_robot.is_some(), answer.guided_map_from_robot.is_some());
+        assert_eq!((global, guided), (!answer.only_expected, answer.only_expected), "{answer:?}");
+        let named = answer.quads.iter().any(|q| !q.landmark.is_empty() || !q.guided_landmark.is_empty());
+        assert!(named, "{answer:?}");
+    }
+    assert!(standing.off_m(0) < 0.1, "{}", standing.off_m(0));
+    let mut every = Standing::new(true);
+    assert!((0..4).all(|_| !every.frame(0).only_expected));
+}
+
+/// Nothing that the pose expects is found: the frame is searched at once, and the third that contradicts replaces the pose.
+#[test]
+fn a_robot_that_was_carried_away_is_found_out_although_searches_are_spared() {
+    let mut standing = Standing::new(false);
+    for _ in 0..3 {
+        standing.frame(0);
+    }
+    assert!(standing.off_m(1) > 1.0, "the posters hang apart");
+    for _ in 0..3 {
+        let answer = standing.frame(1);
+        assert!(!answer.only_expected && answer.map_from_robot.is_some(), "{answer:?}");
+    }
+    assert!(standing.off_m(1) < 0.2, "{}", standing.off_m(1));
+}

@@ -39,6 +39,7 @@ impl Robot {
             chosen: independent,
             guided,
             missed: &[],
+            only_expected: false,
         };
         self.motion.looked(&self.r1, &front(), at, &says)
     }
