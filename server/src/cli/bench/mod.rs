@@ -26,12 +26,13 @@ enum What {
     /// timed, several rounds. Times are of the processor, not of the clock, so other work on the machine matters
     /// little; ratios are of one run. Without OpenCV our own times are printed.
     Detect(detect::Args),
-    /// From icon to verdict among many landmarks, whole frames beside OpenCV's SIFT, the short list, and a lesson.
+    /// From quad to verdict among many landmarks, whole frames beside OpenCV's SIFT, memory, the short list, and a lesson.
     ///
     /// Posters are drawn by the simulator. Some are taught as a server would, from generated views; the rest of a map
-    /// get three icons each and thresholds of those. Frames are rendered in a corridor whose posters are among the
-    /// landmarks, and SIFT (through python3, one thread, one index over all landmarks, votes, a homography by RANSAC)
-    /// is given the same pictures. Times are of the processor.
+    /// get icons and points of their own and thresholds of those. Frames are rendered in a corridor whose posters are among
+    /// the landmarks; each is searched as a whole, and by a known pose for the landmarks that this expects. SIFT (through
+    /// python3, one thread, one index over 1000 landmarks, votes, a homography by RANSAC) is given the same pictures. Times
+    /// are of the processor.
     Recognise(recognise::Args),
 }
 

@@ -23,7 +23,7 @@ pub(crate) struct Args {
     /// Sizes of the maps.
     #[arg(long, value_delimiter = ',', default_values_t = [100, 1000, 10_000], value_parser = clap::value_parser!(u32).range(1..=100_000))]
     landmarks: Vec<u32>,
-    /// Landmarks that are taught as a server would; the others of a map only get three icons each.
+    /// Landmarks that are taught as a server would; the others of a map get icons and points, and thresholds of these.
     #[arg(long, default_value_t = 60, value_parser = clap::value_parser!(u32).range(24..=1000))]
     taught: u32,
     /// Quads of landmarks, and as many of none, that are timed.
