@@ -170,6 +170,7 @@ mod tests {
         (agreement.0[0][0], agreement.0[1][0], agreement.0[4][3]) =
             (Part::Agrees, Part::Disagrees, Part::Agrees);
         PointEvidence {
+            found_by: vision::seen_border::FoundBy::Points,
             matches: 30,
             inliers: 21,
             checked: 12,

@@ -183,7 +183,6 @@ fn histogram<S: Simd>(s: S, octave: &Octave, window: &Window, line: &Line) -> ([
 }
 
 /// A share of each direction in a gradient of `length`: a lobe of 45 degrees to either side.
-#[expect(clippy::inline_always, reason = "as above")]
 #[inline(always)]
 fn votes<S: Simd>(s: S, gx: f32, gy: f32, length: f32) -> f32x8<S> {
     const HALF: f32 = std::f32::consts::FRAC_1_SQRT_2;

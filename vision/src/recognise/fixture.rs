@@ -7,7 +7,7 @@ use crate::{
     learn::model::{LandmarkModel, View, learn, refit_thresholds},
     learn::synthesis::views,
     params::Params,
-    recognise::{LandmarkId, ModelSet, features},
+    recognise::{LandmarkId, ModelSet},
 };
 use nalgebra::{Matrix2, Point2};
 use std::sync::Arc;

@@ -93,7 +93,7 @@ pub(crate) fn look(
         if near.ratio(DistanceKind::Both) < 1.0 {
             *beyond = content(&seen, &learnt, c);
             watch.finished(Step::Alignment);
-            (near.correlation, near.hausdorff) = distances(laid.icon, &near.model, p);
+            (near.correlation, near.hausdorff) = distances(&laid.icon, &near.model, p);
             watch.finished(Step::Distances);
         }
     }
@@ -134,7 +134,7 @@ pub(crate) fn verify(
     for judged in found.iter_mut().filter(|j| j.near.ratio(kind) < v.verify_reach).take(v.max_verified) {
         let sighting = &sightings[judged.near.sighting];
         let Some((icon, corners_px)) = laid_on(image, sighting, &judged.near, &aligner, p) else { continue };
-        let (correlation, hausdorff) = distances(icon, &judged.near.model, p);
+        let (correlation, hausdorff) = distances(&icon, &judged.near.model, p);
         let near = Near { correlation, hausdorff, ..judged.near.clone() };
         let moved = Judged { near, moved: Some(corners_px), contradicting: 0.0, content: Content::NONE };
         // What was accepted where it stood is not lost by a move that fits worse.
@@ -148,15 +148,15 @@ pub(crate) fn verify(
 
 /// C^r and H^r of an icon to the nearest of a model's exemplars. Of a landmark that is named by points alone they would say
 /// nothing: H^r is left infinite.
-fn distances(icon: Icon, model: &LandmarkModel, p: &Params) -> (f64, f64) {
+fn distances(icon: &Icon, model: &LandmarkModel, p: &Params) -> (f64, f64) {
     let c = &p.recognise.correlation;
-    let own = Buckets::new(&icon, c);
+    let own = Buckets::new(icon, c);
     let each = model.exemplars.iter().map(|e| correlation_of(&own, &Buckets::new(&e.icon(), c), c));
     let correlation = each.fold(2.0, f64::min);
     if model.is_named_by_points(p) {
         return (correlation, f64::INFINITY);
     }
-    let points = describe(&icon, &harris(&icon, &p.recognise.harris), &p.recognise.descriptor);
+    let points = describe(icon, &harris(icon, &p.recognise.harris), &p.recognise.descriptor);
     (correlation, least_hausdorff(&points, model, p).0)
 }
 

@@ -179,7 +179,7 @@ impl Standing {
     fn new(search_every_frame: bool) -> Self {
         let mut scene = scene::Scene::new();
         let map = scene.taught();
-        let engine = Engine { search_every_frame, ..scene::engine(&[map.clone()]) };
+        let engine = Engine { search_every_frame, ..scene::engine(std::slice::from_ref(&map)) };
         let looks = scene.looks(5, 1).into_iter().map(|(_, seen)| (map.clone(), seen)).collect();
         Self { engine, looks, intrinsics: scene.intrinsics(), seq: 0 }
     }
@@ -215,8 +215,7 @@ impl Standing {
         };
         let sent = Sent::default();
         assert_eq!(self.engine.contained(&key(0), &job, &sent), Outcome::Processed);
-        let answer = sent.0.lock().unwrap().pop().unwrap();
-        answer
+        sent.0.lock().unwrap().pop().unwrap()
     }
 
     /// Distance of the fused pose from where the frames of a poster were taken, metres.

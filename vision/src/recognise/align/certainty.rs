@@ -63,7 +63,9 @@ mod tests {
             let total: SVector<f64, 8> = own.iter().sum();
             let error = normal.try_inverse().unwrap() * total;
             // Where the corners settle the gradients add up to nothing.
-            own.iter_mut().for_each(|g| *g -= each * error);
+            for g in &mut own {
+                *g -= each * error;
+            }
             let said: Vec<_> = own.iter().map(|g| (each, *g)).collect();
             let covariances = corner_covariances(&said).unwrap();
             for (i, c) in covariances.iter().enumerate() {

@@ -67,13 +67,12 @@ impl Guide {
             posters.insert(LandmarkId(index as u64 + 1), place);
         }
         for model in models.iter() {
-            let place = match posters.get(&model.id) {
-                Some(place) => *place,
-                None => {
-                    let (part, along) = (model.id.0 / PER_PART + 1, model.id.0 % PER_PART);
-                    let at = Vector3::new(along as f64, ELSEWHERE_M * part as f64, 1.5);
-                    LandmarkPlace::by_hand(at, std::f64::consts::FRAC_PI_2, size, sigmas)?
-                }
+            let place = if let Some(place) = posters.get(&model.id) {
+                *place
+            } else {
+                let (part, along) = (model.id.0 / PER_PART + 1, model.id.0 % PER_PART);
+                let at = Vector3::new(along as f64, ELSEWHERE_M * part as f64, 1.5);
+                LandmarkPlace::by_hand(at, std::f64::consts::FRAC_PI_2, size, sigmas)?
             };
             hang(model.id, place);
         }
