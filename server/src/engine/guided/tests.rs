@@ -92,6 +92,28 @@ fn what_the_picture_alone_names_is_not_guided() {
     assert_eq!(made.report.contradictions, 0);
 }
 
+/// Without points the poster's icon alone speaks for it: the picture leaves it open, the pose names it where it hangs and
+/// not from half a metre beside.
+#[test]
+fn what_an_icon_alone_speaks_for_is_named_by_the_pose() {
+    let (look, map) = Look::new();
+    let poster = map.models.get(POSTER).unwrap();
+    let plain = Arc::new(vision::learn::model::LandmarkModel { points: vec![], ..(**poster).clone() });
+    let mut map = (*map).clone();
+    map.models = ModelSet::new(vec![plain], &map.params).unwrap();
+    let facts = look.facts(&map);
+    assert_eq!(verdicts::recognised(&facts), []);
+    let image = &look.seen.frame.image;
+    let made = look.guided(image, &facts, &map, look.truth());
+    let found = made.sightings.iter().find(|s| s.landmark == POSTER).expect("named");
+    assert!(found.quad.is_some(), "by what was detected: {found:?}");
+    let wrong = look.truth().compose(&Pose2::new(0.5, 0.0, 0.0));
+    assert_eq!(look.guided(image, &facts, &map, wrong).sightings, []);
+    // One that hangs nobody knows where is never named.
+    map.landmarks.get_mut(&POSTER).unwrap().place = None;
+    assert_eq!(look.guided(image, &facts, &map, look.truth()).sightings, []);
+}
+
 #[test]
 fn a_landmark_that_was_not_detected_is_found_where_it_is_expected() {
     let (look, map) = Look::new();
