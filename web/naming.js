@@ -17,6 +17,11 @@ export function labelOf(quad, index) {
   return quad.doubtful_landmark ? `${quad.doubtful_landmark}?` : `${index + 1}`;
 }
 
+// Why the picture alone leaves one landmark open.
+const REFUSALS = {
+  plain: "too plain to be named without the robot's pose", corners: "where its corners are is not clear",
+};
+
 // In the table of quads.
 export function answerOf(quad) {
   const name = named(quad);
@@ -24,6 +29,7 @@ export function answerOf(quad) {
   if (name) return name.landmark;
   if (quad.doubtful_landmark) return `${quad.doubtful_landmark}: doubtful, a part of it shows something else`;
   const [first] = quad.candidates ?? [];
+  if (quad.verdict === "ambiguous" && REFUSALS[first?.refusal]) return `${first.landmark}? ${REFUSALS[first.refusal]}`;
   return quad.verdict === "ambiguous" && first ? `${first.landmark}?` : quad.verdict || quad.kind;
 }
 

@@ -24,6 +24,9 @@ test("what the picture alone says is as before", () => {
   assert.deepEqual([labelOf(global, 0), answerOf(global), isByPose(global)], ["poster", "poster", false]);
   assert.equal(named(ambiguous), null);
   assert.deepEqual([labelOf(ambiguous, 4), answerOf(ambiguous), isByPose(ambiguous)], ["5", "door-2?", false]);
+  const refused = (refusal) => answerOf({ ...ambiguous, candidates: [{ ...candidates[0], refusal }] });
+  assert.equal(refused("plain"), "door-2? too plain to be named without the robot's pose");
+  assert.equal(refused("corners"), "door-2? where its corners are is not clear");
   const doubtful = { ...ambiguous, doubtful_landmark: "door-9" };
   assert.equal(labelOf(doubtful, 0), "door-9?");
   assert.match(answerOf(doubtful), /^door-9: doubtful/);

@@ -25,10 +25,20 @@ fn said(quad: &QuadAnswer) -> Option<String> {
         (None, Verdict::Ambiguous) if !quad.doubtful_landmark.is_empty() => {
             format!("perhaps {}: a part of it shows something else", quad.doubtful_landmark)
         }
-        (None, Verdict::Ambiguous) => format!("one of {}: not sure which", fitting(quad).join(", ")),
+        (None, Verdict::Ambiguous) => ambiguous_line(quad),
         _ => return None,
     };
     Some(line + &by_points(quad))
+}
+
+/// One landmark that the picture leaves open for a reason of its own, or several that it fits.
+fn ambiguous_line(quad: &QuadAnswer) -> String {
+    let refused = |why: &str| quad.candidates.iter().find(|c| c.refusal == why).map(|c| c.landmark.as_str());
+    match (refused("plain"), refused("corners")) {
+        (Some(name), _) => format!("perhaps {name}: too plain to be named without the robot's pose"),
+        (None, Some(name)) => format!("perhaps {name}: where its corners are is not clear"),
+        (None, None) => format!("one of {}: not sure which", fitting(quad).join(", ")),
+    }
 }
 
 fn named_line(named: &NamedLandmark<'_>) -> String {
@@ -124,6 +134,15 @@ mod tests {
             ..QuadAnswer::default()
         };
         assert_eq!(of(&quad), "a.jpg: 1 quad\n  one of door-2, door-3: not sure which");
+        for (refusal, why) in [
+            ("plain", "too plain to be named without the robot's pose"),
+            ("corners", "where its corners are is not clear"),
+        ] {
+            let mut refused = quad.clone();
+            refused.candidates.truncate(1);
+            refused.candidates[0].refusal = refusal.into();
+            assert_eq!(of(&refused), format!("a.jpg: 1 quad\n  perhaps door-2: {why}"));
+        }
         quad.set_sighting(Sighting::Guided);
         quad.guided_landmark = "door-3".into();
         assert_eq!(of(&quad), "a.jpg: 1 quad\n  door-3 by pose; the picture alone says door-2 or door-3");
