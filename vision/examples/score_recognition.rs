@@ -411,10 +411,7 @@ fn teach(root: &Path, truth: &Value, p: &Params) -> Result<Vec<Taught>, Box<dyn 
         lesson.extend(views(&image, &corners, GENERATED, p, id));
         let photograph = features(lesson[0].icon.clone(), &p.recognise);
         let points = [view_points(&image, &corners)];
-        all.push(Taught {
-            model: learn(LandmarkId(id), &lesson, &[], p)?.with_points(&points).lean(p),
-            photograph,
-        });
+        all.push(Taught { model: learn(LandmarkId(id), &lesson, &[], p)?.with_points(&points), photograph });
     }
     Ok(all)
 }

@@ -42,7 +42,7 @@ use vision::{
     },
     params::Params,
     points::taught::{MAX_POINT_VIEWS, TaughtPoint, view_points},
-    recognise::{DistanceKind, IconFeatures, LandmarkId, features},
+    recognise::{IconFeatures, LandmarkId, features},
 };
 
 /// Views a landmark is learnt from at least: what photographs do not give is generated from them.
@@ -230,11 +230,7 @@ fn compute(m: &Material, reporter: &Reporter) -> Result<Learnt, JobError> {
     let learnt = each_of(&m.targets, m.workers, reporter, (0.4, 0.9, "models"), |id| {
         let (before, after) = negatives.others(*id);
         let model = learn(*id, &views[id], before, p).map_err(|e| e.to_string())?;
-        // The paper's own distances ask for no points, and for every icon.
-        let model = match m.snapshot.distance {
-            DistanceKind::Both => model.with_points_if_used(p, || points[id].clone()),
-            DistanceKind::Correlation | DistanceKind::Hausdorff => model,
-        };
+        let model = model.with_points_if_used(p, || points[id].clone());
         Ok::<_, String>(negatives.with_strangers(&add_negatives(&model, after, p), p))
     })?;
     let bystanders: Vec<LandmarkId> =

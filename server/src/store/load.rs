@@ -143,7 +143,7 @@ async fn map(
     let visibility = seen::areas(&infos, &walls, &sight, before.clone(), panics).await;
     #[cfg(test)]
     tests::planted(&name);
-    let (learnt, quarantined) = models(conn, id, before.as_deref(), (distance, params), panics).await?;
+    let (learnt, quarantined) = models(conn, id, before.as_deref(), params, panics).await?;
     for (id, reason) in &quarantined {
         let landmark = infos.get(id).map_or("", |l: &LandmarkInfo| l.name.as_str());
         tracing::warn!(map = name, landmark, reason, "model not used");
@@ -207,7 +207,7 @@ async fn models(
     conn: &mut SqliteConnection,
     map_id: i64,
     before: Option<&MapSnapshot>,
-    (kind, params): (DistanceKind, &Params),
+    params: &Params,
     panics: &Panics,
 ) -> Result<Models, StoreError> {
     let (mut learnt, mut quarantined) = Models::default();
@@ -226,7 +226,6 @@ async fn models(
         });
         match read.unwrap_or_else(|| Err("the server failed on the stored model; see its log".to_owned())) {
             Ok(model) => {
-                let model = if kind == DistanceKind::Both { model.lean(params) } else { model };
                 learnt.insert(id, Learnt { digest, model: Arc::new(model) });
             }
             Err(reason) => {

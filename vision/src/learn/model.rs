@@ -184,17 +184,7 @@ impl LandmarkModel {
     /// The same model, with points where the settings decide by them; `views` is only called then.
     #[must_use]
     pub fn with_points_if_used(self, p: &Params, views: impl FnOnce() -> Vec<Vec<TaughtPoint>>) -> Self {
-        if p.recognise.verdict.points { self.with_points(&views()).lean(p) } else { self }
-    }
-
-    /// The same model without what is not used where points decide: of a landmark that is named by them alone the icon that
-    /// stands for the mean remains, on which pictures are laid.
-    #[must_use]
-    pub fn lean(mut self, p: &Params) -> Self {
-        if self.is_named_by_points(p) {
-            self.exemplars.truncate(1);
-        }
-        self
+        if p.recognise.verdict.points { self.with_points(&views()) } else { self }
     }
 
     /// Whether it has so many points that its icons never name it.

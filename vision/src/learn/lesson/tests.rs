@@ -15,6 +15,7 @@ use crate::{
         synthesis,
         threshold::LimitedBy,
     },
+    points::taught::view_points,
 };
 use proptest::prelude::*;
 
@@ -159,6 +160,20 @@ fn look_alikes_are_near_and_strangers_infinitely_far() {
     assert!(unlikeness_of(&model, &twin, &p) < 0.3);
     assert!(unlikeness_of(&model, &stranger, &p) > p.learn.likeness_cap);
     assert!(unlikeness_of(&model, &[], &p).is_infinite());
+}
+
+/// What looks like a landmark is told by its icons, all of them, however many points it has.
+#[test]
+fn points_take_nothing_from_the_icons() {
+    let p = Params::default();
+    let model = lesson(3, 20, &[]);
+    let points = view_points(&poster(3), &whole());
+    assert!(points.len() > p.recognise.verdict.max_icon_points, "{} points", points.len());
+    let with_points = model.clone().with_points_if_used(&p, || vec![points]);
+    assert!(model.exemplars.len() > 1 && with_points.exemplars == model.exemplars);
+    let twin = icons(&lesson(3, 6, &[]));
+    let [held, expected] = [&with_points, &model].map(|m| add_negatives(m, &twin, &p));
+    assert_eq!((held.status, held.likeness), (expected.status, expected.likeness));
 }
 
 #[test]
