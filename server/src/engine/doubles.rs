@@ -22,7 +22,7 @@ use vision::{
     detect::quads::{Corners, Quad},
     frame::{GrayImage, Intrinsics},
     learn::{
-        model::{Gate, LandmarkModel, ModelStatus, refit_thresholds, unlikeness_of},
+        model::{LandmarkModel, refit_thresholds, unlikeness_of},
         threshold::LimitedBy,
     },
     localise::pose::{LandmarkPose, landmark_pose},
@@ -54,19 +54,8 @@ pub struct Doubles {
 
 /// Whether something looks like it: its threshold was held down by others, or none could be found for that.
 fn has_doubles(model: &LandmarkModel) -> bool {
-    let overlaps = |failures: &[vision::learn::model::GateFailure]| {
-        let threshold = |gate: &Gate| {
-            matches!(
-                gate,
-                Gate::LikenessThreshold(_) | Gate::CorrelationThreshold(_) | Gate::HausdorffThreshold(_)
-            )
-        };
-        !failures.is_empty() && failures.iter().all(|f| threshold(&f.gate))
-    };
-    match &model.status {
-        ModelStatus::Active => model.likeness.limited_by == LimitedBy::NearestNegative,
-        ModelStatus::Candidate(failures) => overlaps(failures),
-    }
+    let is_held_down = model.is_active() && model.likeness.limited_by == LimitedBy::NearestNegative;
+    is_held_down || model.is_kept_out_by_look_alikes()
 }
 
 /// The landmarks that have look-alikes, with lifted thresholds; none where a map's distances decide alone.

@@ -148,8 +148,7 @@ async fn map(
         let landmark = infos.get(id).map_or("", |l: &LandmarkInfo| l.name.as_str());
         tracing::warn!(map = name, landmark, reason, "model not used");
     }
-    let active = learnt.values().map(|l| l.model.clone()).filter(|m| m.is_active()).collect();
-    let models = ModelSet::new(active, params)
+    let models = ModelSet::in_use(learnt.values().map(|l| l.model.clone()), params)
         .map_err(|e| StoreError::Damaged { what: format!("map `{name}`"), reason: e.to_string() })?;
     let doubles = doubles(&learnt, before.as_deref(), (distance, params), panics).await;
     Ok(Some(Arc::new(MapSnapshot {

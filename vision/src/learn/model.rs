@@ -224,6 +224,18 @@ impl LandmarkModel {
     pub fn is_active(&self) -> bool {
         self.status == ModelStatus::Active
     }
+
+    /// Not in use for no other reason than that other landmarks look like it.
+    pub fn is_kept_out_by_look_alikes(&self) -> bool {
+        let ModelStatus::Candidate(failures) = &self.status else { return false };
+        let is_threshold = |gate: Gate| {
+            matches!(
+                gate,
+                Gate::LikenessThreshold(_) | Gate::CorrelationThreshold(_) | Gate::HausdorffThreshold(_)
+            )
+        };
+        !failures.is_empty() && failures.iter().all(|f| is_threshold(f.gate))
+    }
 }
 
 /// The smallest of each distance of `icon` to the exemplars.

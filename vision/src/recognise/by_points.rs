@@ -7,24 +7,20 @@
 
 use super::{
     Candidate, MAX_CANDIDATES, Recognition, Refusal, Verdict,
-    align::{Aligner, Laid, Surroundings, Template},
     confidence::{entropy_m, entropy_norm, probability},
     is_same_border,
-    likeness::{Smoothed, between},
+    laying::{Laying, sharpened},
     models::ModelSet,
-    signature::{Signature, likeness},
 };
 use crate::{
     detect::quads::{Corners, Quad},
     frame::GrayImage,
-    icon::rectify,
     learn::model::LandmarkModel,
     params::Params,
     points::{
         search::{Found, search},
         verify::PointEvidence,
     },
-    seen_border::FoundBy,
 };
 
 /// log10 of the false alarms that a comparison of a quad with a whole map may have, expected.
@@ -33,12 +29,6 @@ pub const LOG10_EPSILON: f64 = -5.0;
 const LOG10_TURNS: f64 = 0.6;
 /// A landmark with so many connected parts of 25 that show something else is in doubt.
 pub const DOUBTFUL_PARTS: usize = 5;
-/// Dense alignment moves no corner of the homography further than this, in icon pixels...
-const MAX_MOVED_ICON_PX: f64 = 4.0;
-/// Smallest likeness of an alignment that is believed.
-const MIN_LIKENESS: f64 = 0.4;
-/// Nor further than so many squared standard deviations: 99.99 % of a corner in the plane.
-const MAX_SQUARE: f64 = 18.4;
 
 /// log10 of the expected false alarms of `evidence` in a map of `landmarks`.
 pub fn log10_false_alarms(evidence: &PointEvidence, landmarks: usize) -> f64 {
@@ -47,9 +37,10 @@ pub fn log10_false_alarms(evidence: &PointEvidence, landmarks: usize) -> f64 {
 
 /// What points say of `quad`. `None` if they speak for no landmark.
 pub(crate) fn by_points(image: &GrayImage, quad: &Quad, models: &ModelSet, p: &Params) -> Option<Verdict> {
-    let of = |index: usize| models.at(index).map_or(&[][..], |m| m.points.as_slice());
-    let found = search(image, quad, models.points(), of);
+    let of = |index: usize| models.at_point_index(index).map_or(&[][..], |m| m.points.as_slice());
     let n = models.len();
+    let (found, rivals): (Vec<Found>, Vec<Found>) =
+        search(image, quad, models.points(), of).into_iter().partition(|f| f.model < n);
     let alarms: Vec<f64> = found.iter().map(|f| log10_false_alarms(&f.evidence, n)).collect();
     let accepted = alarms.iter().filter(|a| **a <= LOG10_EPSILON).count();
     if accepted == 0 {
@@ -59,11 +50,11 @@ pub(crate) fn by_points(image: &GrayImage, quad: &Quad, models: &ModelSet, p: &P
     let mut evidence = best.evidence.clone();
     let (border, corners_px) = nearest_border(quad, &evidence);
     let is_detected = is_same_border(&corners_px, &evidence.corners_px, p);
-    let likeness = sharpened(image, &mut evidence, Some(&corners_px), (model, models), p);
+    let laying = sharpened(image, &mut evidence, Some(&corners_px), (model, models), p);
     // The homography's corners stand unless the detector found the same.
     let is_located = is_detected || is_well_known(&evidence);
-    let refusal =
-        refusal(&found, &alarms, (model, likeness), p).or((!is_located).then_some(Refusal::Corners));
+    let others = found.iter().skip(1).chain(&rivals);
+    let refusal = refusal(best, others, (model, &laying), n, p).or((!is_located).then_some(Refusal::Corners));
     let of = |(i, f): (usize, &Found)| {
         let ratio = if alarms[i] < 0.0 { LOG10_EPSILON / alarms[i] } else { f64::INFINITY };
         let refused = if i == 0 { refusal } else { (alarms[i] > LOG10_EPSILON).then_some(Refusal::Points) };
@@ -71,7 +62,7 @@ pub(crate) fn by_points(image: &GrayImage, quad: &Quad, models: &ModelSet, p: &P
             landmark: models.at(f.model)?.id,
             correlation: 2.0,
             hausdorff: f64::INFINITY,
-            likeness: if i == 0 { likeness } else { None },
+            likeness: if i == 0 { laying.likeness } else { None },
             distance: ratio,
             tau: 1.0,
             ratio,
@@ -104,27 +95,30 @@ pub(super) fn is_well_known(evidence: &PointEvidence) -> bool {
     evidence.corner_covariance_px2.iter().all(|c| c.symmetric_eigenvalues().max() <= limit_px2)
 }
 
-/// Why the first of `found`, which is `model` and has the `likeness`, is not named although its points are there.
-fn refusal(
-    found: &[Found],
-    log10_alarms: &[f64],
-    (model, likeness): (&LandmarkModel, Option<f64>),
+/// Why `best`, which is `model` and was laid on its icon, is not named among `landmarks` although its points are there, while
+/// points speak for `others`, too.
+fn refusal<'a>(
+    best: &Found,
+    mut others: impl Iterator<Item = &'a Found>,
+    (model, laying): (&LandmarkModel, &Laying),
+    landmarks: usize,
     p: &Params,
 ) -> Option<Refusal> {
-    if is_contradicted(found.first()?) {
+    if is_in_doubt(&best.evidence, laying) {
         return Some(Refusal::Disagreement);
     }
     // Its share of the best one's exponent says how much was taught of a rival, not whether it hangs there: a look-alike
     // that was taught with fewer points agrees wherever it has any.
-    let rivals = |(f, alarms): (&Found, &f64)| {
-        let accepted = *alarms <= LOG10_EPSILON;
-        alarms / log10_alarms[0] >= p.recognise.verdict.margin || (accepted && !is_contradicted(f))
+    let alarms = |f: &Found| log10_false_alarms(&f.evidence, landmarks);
+    let is_rival = |f: &Found| {
+        let accepted = alarms(f) <= LOG10_EPSILON;
+        alarms(f) / alarms(best) >= p.recognise.verdict.margin || (accepted && !is_contradicted(f))
     };
-    if found.iter().zip(log10_alarms).skip(1).any(rivals) {
+    if others.any(is_rival) {
         return Some(Refusal::Margin);
     }
     // Where the image does not show all of it there is no likeness.
-    let is_like = likeness.is_none_or(|l| 1.0 - l < model.likeness.tau);
+    let is_like = laying.likeness.is_none_or(|l| 1.0 - l < model.likeness.tau);
     (has_double(model, p) && !is_like).then_some(Refusal::Likeness)
 }
 
@@ -134,9 +128,15 @@ fn has_double(model: &LandmarkModel, p: &Params) -> bool {
     model.likeness.tau < p.learn.threshold.nearest_share * p.learn.likeness_cap
 }
 
-/// A connected part of it shows something else.
+/// Whether a connected part of the landmark shows something else: by its icon where it was laid on that, which sees every
+/// part of it, else by its points.
+pub(super) fn is_in_doubt(evidence: &PointEvidence, laying: &Laying) -> bool {
+    laying.differs.unwrap_or_else(|| evidence.agreement.largest_disagreement() >= DOUBTFUL_PARTS)
+}
+
+/// A connected part of it shows something else by its points.
 fn is_contradicted(found: &Found) -> bool {
-    found.evidence.agreement.largest_disagreement() >= DOUBTFUL_PARTS
+    is_in_doubt(&found.evidence, &Laying::NONE)
 }
 
 /// Which border of `quad` lies nearest to where the landmark's is: 0 for its corners, i for alternate i - 1; and its
@@ -154,59 +154,6 @@ fn nearest_border(quad: &Quad, evidence: &PointEvidence) -> (usize, Corners) {
 fn confidence(log10_false_alarms: f64) -> f64 {
     const DISCOUNT: f64 = 0.35;
     1.0 - 10.0_f64.powf(DISCOUNT * log10_false_alarms.min(0.0))
-}
-
-/// Lays the picture on the learnt icon, from the corners of `evidence` and, if that leads nowhere, from `detected_px`; takes
-/// over the corners if they are where the points can have put them. The likeness there.
-pub(super) fn sharpened(
-    image: &GrayImage,
-    evidence: &mut PointEvidence,
-    detected_px: Option<&Corners>,
-    (model, models): (&LandmarkModel, &ModelSet),
-    p: &Params,
-) -> Option<f64> {
-    let mut first = None;
-    for start_px in std::iter::once(&evidence.corners_px.clone()).chain(detected_px) {
-        let Some((laid, alike)) = laid(image, start_px, (model, models), p) else { continue };
-        first = first.or(Some(alike));
-        if alike >= MIN_LIKENESS && may_be_at(evidence, &laid.corners_px, p) {
-            evidence.corners_px = laid.corners_px;
-            evidence.corner_covariance_px2 = laid.covariance_px2;
-            evidence.found_by = FoundBy::Alignment;
-            return Some(alike);
-        }
-    }
-    first
-}
-
-/// Whether the points leave it open that the landmark's corners are `corners_px`.
-fn may_be_at(evidence: &PointEvidence, corners_px: &Corners, p: &Params) -> bool {
-    let icon_px = evidence.corners_px.area_px2().sqrt() / p.icon.size as f64;
-    let pairs = evidence.corners_px.points().iter().zip(corners_px.points());
-    pairs.zip(&evidence.corner_covariance_px2).all(|((a, b), covariance)| {
-        let off = a - b;
-        off.norm() <= MAX_MOVED_ICON_PX * icon_px
-            || covariance.cholesky().is_some_and(|c| off.dot(&c.solve(&off)) <= MAX_SQUARE)
-    })
-}
-
-/// The picture laid on the nearest of the learnt icons from `start_px`, and how like it is there.
-fn laid(
-    image: &GrayImage,
-    start_px: &Corners,
-    (model, models): (&LandmarkModel, &ModelSet),
-    p: &Params,
-) -> Option<(Laid, f64)> {
-    let (c, align) = (&p.recognise.correlation, &p.recognise.verdict.align);
-    let icon = rectify(image, start_px, &p.icon).ok()?;
-    let signature = Signature::new(&icon);
-    let alike = |i: usize| likeness(model.exemplars[i].signature.values(), signature.values());
-    let nearest = (0..model.exemplars.len()).max_by(|a, b| alike(*a).total_cmp(&alike(*b)))?;
-    let (learnt, coarse) = model.exemplars[nearest].template(align);
-    let around = Surroundings::new(image, start_px, &icon, align)?;
-    let laid = Aligner::new(models.lattices(), align).align(&around, &Template::new(&learnt, &coarse))?;
-    let alike = between(&Smoothed::new(&laid.icon), &Smoothed::new(&learnt), c).likeness;
-    Some((laid, alike))
 }
 
 #[cfg(test)]

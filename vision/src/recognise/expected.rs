@@ -6,7 +6,8 @@
 
 use super::{
     DistanceKind, LandmarkId, Recognition,
-    by_points::{DOUBTFUL_PARTS, is_well_known, sharpened},
+    by_points::{is_in_doubt, is_well_known},
+    laying::{Laying, sharpened},
     models::ModelSet,
     verdict::recognise,
 };
@@ -73,14 +74,17 @@ fn by_points(
 ) -> Said {
     let Some(model) = models.get(id).filter(|model| !model.points.is_empty()) else { return Said::Silent };
     let Some(mut evidence) = verify_at(image, &model.points, expected_px) else { return Said::Silent };
-    if evidence.agreement.largest_disagreement() >= DOUBTFUL_PARTS {
+    let are_there = evidence.log10_nfa <= LOG10_EPSILON_EXPECTED;
+    let laying = if is_whole && are_there {
+        sharpened(image, &mut evidence, None, (model, models), p)
+    } else {
+        Laying::NONE
+    };
+    if is_in_doubt(&evidence, &laying) {
         return Said::Doubtful;
     }
-    if evidence.log10_nfa > LOG10_EPSILON_EXPECTED {
+    if !are_there {
         return Said::Silent;
-    }
-    if is_whole {
-        sharpened(image, &mut evidence, None, (model, models), p);
     }
     if !is_well_known(&evidence) {
         return Said::Silent;

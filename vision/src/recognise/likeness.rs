@@ -55,7 +55,7 @@ pub struct Alike {
 }
 
 /// A bucket contradicts when its correlation is below this...
-const CONTRADICTS: f32 = 0.3;
+pub(super) const CONTRADICTS: f32 = 0.3;
 /// ... and both have slopes of at least this share of their icon's mean, and this much, in squared grey levels.
 const SHOWS_SHARE: f32 = 0.1;
 const SHOWS_LEAST: f32 = 10.0;
@@ -76,13 +76,17 @@ pub fn between(a: &Smoothed, b: &Smoothed, p: &CorrelationParams) -> Alike {
     let count = buckets.len() as f64;
     let mean = |power: fn(&Bucket) -> f32| buckets.iter().map(power).sum::<f32>() / count as f32;
     let (mean, other_mean) = (mean(|b| b.power), mean(|b| b.other_power));
-    let shows = |power: f32, mean: f32| power > (SHOWS_SHARE * mean).max(SHOWS_LEAST);
     let contradicts =
         |b: &&Bucket| b.correlation < CONTRADICTS && shows(b.power, mean) && shows(b.other_power, other_mean);
     Alike {
         likeness: buckets.iter().map(|b| f64::from(b.correlation)).sum::<f64>() / count,
         contradicting: buckets.iter().filter(contradicts).count() as f64 / count,
     }
+}
+
+/// Whether slopes of the mean square `power` show something, in an icon where it is `mean`.
+pub(super) fn shows(power: f32, mean: f32) -> bool {
+    power > (SHOWS_SHARE * mean).max(SHOWS_LEAST)
 }
 
 /// One bucket of two icons.
@@ -97,9 +101,46 @@ pub(super) struct Bucket {
 
 /// Bucket by bucket, row by row. None where the icons are cut differently, or too small.
 pub(super) fn compare(a: &Smoothed, b: &Smoothed, p: &CorrelationParams) -> Option<Vec<Bucket>> {
-    let (size, per_side) = (a.size, p.per_side());
+    Some(cells(a, b, p.per_side())?.iter().map(Cell::bucket).collect())
+}
+
+/// What a cell of two icons adds up to: products of slopes, squares of the one's and the other's with what noise adds, and
+/// pixels.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Cell {
+    products: f32,
+    squares: f32,
+    other_squares: f32,
+    pixels: f32,
+}
+
+impl std::ops::Add for Cell {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self {
+            products: self.products + other.products,
+            squares: self.squares + other.squares,
+            other_squares: self.other_squares + other.other_squares,
+            pixels: self.pixels + other.pixels,
+        }
+    }
+}
+
+impl Cell {
+    pub(super) fn bucket(&self) -> Bucket {
+        let correlation = self.products / (self.squares * self.other_squares).sqrt();
+        let correlation = if correlation.is_finite() { correlation } else { 0.0 };
+        let power = |squares: f32| squares / self.pixels.max(1.0) - NOISE;
+        Bucket { correlation, power: power(self.squares), other_power: power(self.other_squares) }
+    }
+}
+
+/// `per_side` by `per_side` cells of two icons, row by row. None where the icons are cut differently, or too small.
+pub(super) fn cells(a: &Smoothed, b: &Smoothed, per_side: usize) -> Option<Vec<Cell>> {
+    let size = a.size;
     let fit = b.size == size && size > 2 * BORDER_PX + per_side;
-    fit.then(|| dispatch!(Level::new(), _s => buckets(&a.pixels, &b.pixels, size, per_side)))
+    fit.then(|| dispatch!(Level::new(), _s => summed(&a.pixels, &b.pixels, size, per_side)))
 }
 
 #[expect(
@@ -107,13 +148,13 @@ pub(super) fn compare(a: &Smoothed, b: &Smoothed, p: &CorrelationParams) -> Opti
     reason = "an instruction set holds only in what is inlined where it was chosen"
 )]
 #[inline(always)]
-fn buckets(a: &[f32], b: &[f32], size: usize, per_side: usize) -> Vec<Bucket> {
+fn summed(a: &[f32], b: &[f32], size: usize, per_side: usize) -> Vec<Cell> {
     let edge = |i: usize| i * size / per_side;
     let within = |i: usize| edge(i).max(BORDER_PX)..edge(i + 1).min(size - BORDER_PX);
     let mut found = Vec::with_capacity(per_side * per_side);
     for bucket in 0..per_side * per_side {
         let (columns, rows) = (within(bucket % per_side), within(bucket / per_side));
-        let cells = (columns.len() * rows.len()).max(1) as f32;
+        let pixels = (columns.len() * rows.len()) as f32;
         let mut sums = [[0.0_f32; LANES]; 3];
         for y in rows {
             for x in columns.clone() {
@@ -126,10 +167,8 @@ fn buckets(a: &[f32], b: &[f32], size: usize, per_side: usize) -> Vec<Bucket> {
                 sums[2][lane] += bx * bx + by * by + NOISE;
             }
         }
-        let [ab, aa, bb] = sums.map(|lanes| lanes.iter().sum::<f32>());
-        let correlation = ab / (aa * bb).sqrt();
-        let correlation = if correlation.is_finite() { correlation } else { 0.0 };
-        found.push(Bucket { correlation, power: aa / cells - NOISE, other_power: bb / cells - NOISE });
+        let [products, squares, other_squares] = sums.map(|lanes| lanes.iter().sum::<f32>());
+        found.push(Cell { products, squares, other_squares, pixels });
     }
     found
 }

@@ -16,6 +16,8 @@ mod look;
 pub mod confidence;
 pub mod confidence_fit;
 mod confidence_learnt;
+mod differing;
+mod laying;
 mod by_points;
 pub mod verdict;
 pub mod expected;

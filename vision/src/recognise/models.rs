@@ -6,7 +6,11 @@ use super::{
     align::Lattices,
     signature::{SIGNATURE_BYTES, Signature, likeness},
 };
-use crate::{learn::model::LandmarkModel, params::Params, points::index::PointIndex};
+use crate::{
+    learn::model::LandmarkModel,
+    params::Params,
+    points::{index::PointIndex, taught::TaughtPoint},
+};
 use fearless_simd::{Level, dispatch};
 use std::{collections::BTreeMap, sync::Arc};
 
@@ -44,6 +48,8 @@ pub enum ModelSetError {
 #[derive(Debug, Clone, Default)]
 pub struct ModelSet {
     models: Vec<Arc<LandmarkModel>>,
+    /// Not recognised; see [`ModelSet::with_rivals`].
+    rivals: Vec<Arc<LandmarkModel>>,
     params_hash: u64,
     /// Signatures of all exemplars, one after the other: looking through them is reading memory once.
     signatures: Vec<[i8; SIGNATURE_BYTES]>,
@@ -51,7 +57,7 @@ pub struct ModelSet {
     owners: Vec<(u32, u8)>,
     /// Where pictures are compared with the exemplars that they are laid on.
     lattices: Arc<Lattices>,
-    /// The points of all models.
+    /// The points of all models, then of all rivals.
     points: Arc<PointIndex>,
 }
 
@@ -71,17 +77,38 @@ pub struct Listed {
 
 impl ModelSet {
     /// Checks and orders `models`, to be used with the parameters `p`.
-    pub fn new(mut models: Vec<Arc<LandmarkModel>>, p: &Params) -> Result<Self, ModelSetError> {
-        if models.len() > MAX_LANDMARKS {
-            return Err(ModelSetError::TooMany { count: models.len() });
+    pub fn new(models: Vec<Arc<LandmarkModel>>, p: &Params) -> Result<Self, ModelSetError> {
+        Self::with_rivals(models, Vec::new(), p)
+    }
+
+    /// The landmarks in use of `all` that were learnt, with those as rivals that look-alikes keep out of use.
+    pub fn in_use(all: impl Iterator<Item = Arc<LandmarkModel>>, p: &Params) -> Result<Self, ModelSetError> {
+        let (active, others): (Vec<_>, Vec<_>) = all.partition(|m| m.is_active());
+        let rivals = others.into_iter().filter(|m| m.is_kept_out_by_look_alikes()).collect();
+        Self::with_rivals(active, rivals, p)
+    }
+
+    /// `models` beside `rivals`: landmarks of the map that are not recognised, because others look like them, but that may be
+    /// what is seen. Where the points of a rival are there, too, no landmark is named.
+    pub fn with_rivals(
+        mut models: Vec<Arc<LandmarkModel>>,
+        mut rivals: Vec<Arc<LandmarkModel>>,
+        p: &Params,
+    ) -> Result<Self, ModelSetError> {
+        let count = models.len() + rivals.len();
+        if count > MAX_LANDMARKS {
+            return Err(ModelSetError::TooMany { count });
         }
         let expected = p.distance_hash();
-        if let Some(m) = models.iter().find(|m| m.params_hash != expected) {
+        if let Some(m) = models.iter().chain(&rivals).find(|m| m.params_hash != expected) {
             return Err(ModelSetError::ForeignParams { id: m.id, found: m.params_hash, expected });
         }
         models.sort_by_key(|m| m.id);
-        if let Some(pair) = models.windows(2).find(|pair| pair[0].id == pair[1].id) {
-            return Err(ModelSetError::Duplicate { id: pair[0].id });
+        rivals.sort_by_key(|m| m.id);
+        let mut ids: Vec<LandmarkId> = models.iter().chain(&rivals).map(|m| m.id).collect();
+        ids.sort_unstable();
+        if let Some(pair) = ids.windows(2).find(|pair| pair[0] == pair[1]) {
+            return Err(ModelSetError::Duplicate { id: pair[0] });
         }
         let exemplars = || {
             models.iter().enumerate().flat_map(|(m, model)| {
@@ -91,8 +118,9 @@ impl ModelSet {
         let signatures = exemplars().map(|(_, _, exemplar)| *exemplar.signature.values()).collect();
         let owners = exemplars().map(|(m, e, _)| (m as u32, e as u8)).collect();
         let lattices = Arc::new(Lattices::new(p.icon.size, &p.recognise.correlation));
-        let points = Arc::new(PointIndex::new(models.iter().map(|m| m.points.as_slice())));
-        Ok(Self { models, params_hash: expected, signatures, owners, lattices, points })
+        let all: Vec<&[TaughtPoint]> = models.iter().chain(&rivals).map(|m| m.points.as_slice()).collect();
+        let points = Arc::new(PointIndex::new(all.into_iter()));
+        Ok(Self { models, rivals, params_hash: expected, signatures, owners, lattices, points })
     }
 
     /// A set with the model of `id` alone.
@@ -104,6 +132,7 @@ impl ModelSet {
         let lattices = self.lattices.clone();
         Some(Self {
             models: vec![model],
+            rivals: Vec::new(),
             params_hash: self.params_hash,
             signatures,
             owners,
@@ -174,7 +203,12 @@ impl ModelSet {
         self.models.get(index)
     }
 
-    /// The points of all models, by their index.
+    /// The landmark at `index` of [`Self::points`]: a model, or from [`Self::len`] on a rival.
+    pub(crate) fn at_point_index(&self, index: usize) -> Option<&Arc<LandmarkModel>> {
+        self.models.get(index).or_else(|| self.rivals.get(index - self.models.len()))
+    }
+
+    /// The points of all models, by their index, then of all rivals.
     pub fn points(&self) -> &PointIndex {
         &self.points
     }
@@ -192,7 +226,7 @@ impl ModelSet {
     /// The same by what it is for.
     pub fn memory_parts(&self) -> BTreeMap<&'static str, usize> {
         let mut parts: BTreeMap<&'static str, usize> = BTreeMap::new();
-        for model in &self.models {
+        for model in self.models.iter().chain(&self.rivals) {
             for (part, bytes) in model.memory_parts() {
                 *parts.entry(part).or_default() += bytes;
             }
@@ -283,6 +317,11 @@ mod tests {
         ));
         let twice = ModelSet::new(vec![Arc::clone(&models[1]); 2], &p);
         assert_eq!(twice.unwrap_err(), ModelSetError::Duplicate { id: LandmarkId(2) });
+        let [a, b, c] = [0, 1, 2].map(|i| Arc::clone(&models[i]));
+        let with_rival = ModelSet::with_rivals(vec![a], vec![b.clone()], &p).unwrap();
+        assert_eq!((ids(&with_rival), with_rival.len()), (vec![3], 1), "a rival is not in use");
+        let both = ModelSet::with_rivals(vec![b.clone(), c], vec![b], &p);
+        assert_eq!(both.unwrap_err(), ModelSetError::Duplicate { id: LandmarkId(2) });
         let at_limit = ModelSet::new(vec![Arc::clone(&models[1]); MAX_LANDMARKS], &p);
         assert!(matches!(at_limit, Err(ModelSetError::Duplicate { .. })));
         let beyond = ModelSet::new(vec![Arc::clone(&models[1]); MAX_LANDMARKS + 1], &p);

@@ -1,7 +1,10 @@
 use super::*;
 use crate::{
     detect::quads::BORDER_SIGMA_PX,
-    points::taught::{TaughtPoint, view_points},
+    points::{
+        agreement::Part,
+        taught::{TaughtPoint, view_points},
+    },
     recognise::{
         LandmarkId,
         fixture::{Dice, lesson, oblique, photograph, poster, quad, whole},
@@ -53,6 +56,51 @@ fn twelve_of_one_picture_are_ambiguous() {
     let verdict = by_points(&image, &quad(oblique()), &set, &p).unwrap();
     assert!(matches!(verdict.recognition, Recognition::Ambiguous(_)), "{verdict:?}");
     assert!(verdict.candidates.iter().filter(|c| c.ratio < 1.0).count() >= 2, "{verdict:?}");
+}
+
+/// Of two of one picture the one in use is not named for both.
+#[test]
+fn what_look_alikes_keep_out_of_use_is_a_rival() {
+    let p = Params::default();
+    let image = photograph(&poster(1), &oblique(), 0.8, 20.0);
+    let model = |id: u64, seed: u64| Arc::new(lesson(id, seed, &p).with_points(&[taught(seed)]));
+    let decided = |rival: u64| {
+        let set = ModelSet::with_rivals(vec![model(1, 1), model(2, 2)], vec![model(3, rival)], &p).unwrap();
+        by_points(&image, &quad(oblique()), &set, &p).unwrap()
+    };
+    let verdict = decided(1);
+    assert_eq!(verdict.recognition, Recognition::Ambiguous(LandmarkId(1)));
+    assert_eq!((verdict.candidates[0].refusal, verdict.landmarks), (Some(Refusal::Margin), 2));
+    assert_eq!(decided(3).recognition, Recognition::Unique(LandmarkId(1)));
+    // What is not in use is never named, though it alone is there.
+    let set = ModelSet::with_rivals(vec![model(2, 2)], vec![model(3, 1)], &p).unwrap();
+    assert_eq!(by_points(&image, &quad(oblique()), &set, &p), None);
+}
+
+#[test]
+fn a_landmark_of_which_a_quarter_is_another_picture_is_doubtful() {
+    let p = Params::default();
+    let (first, other) = (poster(1), poster(5));
+    let decided = |left: usize, top: usize| {
+        let is_in = |x: usize, from: usize| (from..from + 120).contains(&x);
+        let replaced = GrayImage::from_fn(240, 240, |u, v| {
+            if is_in(u, left) && is_in(v, top) { other.at(u, v) } else { first.at(u, v) }
+        });
+        let image = photograph(&replaced, &oblique(), 0.9, 10.0);
+        let verdict = by_points(&image, &quad(oblique()), &six(&p), &p).unwrap();
+        (verdict.recognition, verdict.candidates[0].refusal, verdict.points.unwrap().agreement)
+    };
+    for (left, top) in [(0, 0), (120, 0), (0, 120), (120, 120)] {
+        let (recognition, refusal, table) = decided(left, top);
+        let place = format!("{left} {top}: {table:?}");
+        assert_eq!(recognition, Recognition::Ambiguous(LandmarkId(1)), "{place}");
+        assert_eq!(refusal, Some(Refusal::Disagreement), "{place}");
+        // The parts that lie in it as a whole.
+        let [x, y] = [left, top].map(|from| if from == 0 { 0..2 } else { 3..5 });
+        let named = table.0[y].iter().flat_map(|row| &row[x.clone()]).filter(|p| **p == Part::Disagrees);
+        assert!(named.count() >= 2, "{place}");
+    }
+    assert_eq!(decided(240, 240).0, Recognition::Unique(LandmarkId(1)));
 }
 
 #[test]

@@ -112,8 +112,8 @@ impl Class {
             .filter(|(_, m)| !m.as_ref().is_some_and(LandmarkModel::is_active))
             .map(|(i, _)| i)
             .collect();
-        let active = models.into_iter().flatten().filter(LandmarkModel::is_active).map(Arc::new).collect();
-        Ok(Self { landmarks: pictures, models: ModelSet::new(active, p)?, candidates, wall })
+        let models = ModelSet::in_use(models.into_iter().flatten().map(Arc::new), p)?;
+        Ok(Self { landmarks: pictures, models, candidates, wall })
     }
 
     /// Pictures that are landmarks in use.

@@ -189,8 +189,7 @@ fn snapshot(
         .flatten()
         .map(|model| (model.id, Learnt { digest: [0; 32], model: Arc::new(model) }))
         .collect();
-    let active = learnt.values().map(|l| l.model.clone()).filter(|m| m.is_active()).collect();
-    let models = ModelSet::new(active, &params)?;
+    let models = ModelSet::in_use(learnt.values().map(|l| l.model.clone()), &params)?;
     let doubles = Arc::new(doubles(&learnt, DistanceKind::Both, &params));
     let numbered = || lessons.iter().enumerate().map(|(i, l)| (LandmarkId(i as u64), l));
     let sizes: BTreeMap<LandmarkId, LandmarkSize> = numbered().map(|(id, l)| (id, l.place.size)).collect();
