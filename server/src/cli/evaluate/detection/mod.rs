@@ -3,6 +3,7 @@
 //! the worst. The detector runs on one thread, pictures one after the other.
 
 pub(crate) mod score;
+mod easy;
 mod report;
 mod table;
 mod plot;
@@ -150,10 +151,11 @@ fn evaluate(truth: &Truth, reviewed: &Reviewed, args: &Args, named: &Named) -> R
 fn name_misses(score: &ImageScore) {
     for label in score.labels.iter().filter(|l| l.iou < FOUND) {
         screen::complain(&format!(
-            "missed {} {} best IoU {:.2}",
+            "missed {} {} best IoU {:.2}{}",
             score.file,
             words(&label.corners),
-            label.iou
+            label.iou,
+            if label.is_easy { ", easy" } else { "" }
         ));
     }
     for quad in score.false_quads.iter().flatten() {

@@ -64,6 +64,8 @@ pub(crate) struct Report {
     pub(crate) all: Group,
     #[serde(flatten)]
     pub(crate) images: Seen,
+    /// Those that are easy to see; `null` where there is none.
+    pub(crate) easy: Option<Group>,
     pub(crate) by_state: BTreeMap<String, Group>,
     pub(crate) by_class: BTreeMap<String, Group>,
     pub(crate) by_stratum: BTreeMap<String, Group>,
@@ -122,6 +124,7 @@ impl Report {
             unreadable,
             all: Group::of(&scores, full).unwrap_or_else(Group::empty),
             images: Seen::of(&scores.iter().collect::<Vec<_>>()),
+            easy: Group::of(&scores, |l| l.is_easy),
             by_state,
             by_class: by(|l| l.class.clone()),
             by_stratum: by(|l| l.stratum.clone()),
@@ -268,6 +271,7 @@ pub(super) mod tests {
             iou,
             corner_error_px: (iou >= FOUND).then_some(error),
             is_alternate: false,
+            is_easy: side > 60.0,
         }
     }
 

@@ -1,5 +1,6 @@
 //! One picture: what the detector found against what is labelled. No sums over pictures here.
 
+use super::easy::is_easy;
 use crate::cli::{
     clock::Clock,
     evaluate::{
@@ -45,6 +46,8 @@ pub(crate) struct LabelScore {
     pub(crate) corner_error_px: Option<f64>,
     /// Not found, but an alternate of some detected quad would be it.
     pub(crate) is_alternate: bool,
+    /// See [`is_easy`].
+    pub(crate) is_easy: bool,
 }
 
 /// A detected quad where nothing is labelled.
@@ -111,14 +114,15 @@ pub(crate) fn score(
     ImageScore {
         file: image.file.clone(),
         stratum: image.stratum.clone(),
-        labels: image.quads.iter().filter(counts).map(|l| label(l, image, &found)).collect(),
+        labels: image.quads.iter().filter(counts).map(|l| label(l, (image, gray), &found)).collect(),
         found: found.iter().map(|q| q.corners_px).collect(),
         false_quads,
         ms,
     }
 }
 
-fn label(labelled: &TruthQuad, image: &TruthImage, found: &[Quad]) -> LabelScore {
+fn label(labelled: &TruthQuad, (image, gray): (&TruthImage, &GrayImage), found: &[Quad]) -> LabelScore {
+    let is_it = |border: &Corners| polygon::iou(labelled.corners.points(), border.points()) >= FOUND;
     let (iou, nearest) = best(&labelled.corners, found);
     let error = nearest.map(|quad| corner_error_px(&labelled.corners, &quad.corners_px));
     let by_name = if labelled.landmark.is_some() { "landmark" } else { "stranger" };
@@ -131,11 +135,8 @@ fn label(labelled: &TruthQuad, image: &TruthImage, found: &[Quad]) -> LabelScore
         view_angle_rad: labelled.view_angle_rad,
         iou,
         corner_error_px: error.filter(|_| iou >= FOUND),
-        is_alternate: iou < FOUND
-            && found
-                .iter()
-                .flat_map(|q| &q.alternates)
-                .any(|a| polygon::iou(labelled.corners.points(), a.points()) >= FOUND),
+        is_alternate: iou < FOUND && found.iter().flat_map(|q| &q.alternates).any(is_it),
+        is_easy: is_easy(gray, labelled),
     }
 }
 

@@ -4,7 +4,10 @@ use super::report::{Group, Report, Seen};
 use crate::cli::evaluate::statistics::Interval;
 
 /// Width of the column of names.
-const NAMES: usize = 36;
+const NAMES: usize = 38;
+
+/// The row of what is easy to see; its limits are `easy.rs`'s.
+const EASY: &str = "easy: sides 60 px, contrast 20 on each";
 
 /// Several lines, no line feed at the end.
 pub(crate) fn table(r: &Report) -> String {
@@ -19,6 +22,7 @@ pub(crate) fn table(r: &Report) -> String {
         ),
         row("all", &r.all),
     ];
+    lines.extend(r.easy.iter().map(|easy| row(EASY, easy)));
     let mut add = |title: &str, groups: &mut dyn Iterator<Item = (&String, &Group)>| {
         let groups: Vec<(&String, &Group)> = groups.collect();
         // One group says no more than all do.
@@ -33,7 +37,9 @@ pub(crate) fn table(r: &Report) -> String {
     add("by angle of view", &mut r.by_view_angle.iter().map(|(n, g)| (n, g)));
     add("by what can be seen", &mut r.by_state.iter());
     if r.all.missed_but_alternate > 0 {
-        lines.push(format!("  missed, but among the alternates of a quad: {}", r.all.missed_but_alternate));
+        let easy = r.easy.as_ref().map_or(0, |easy| easy.missed_but_alternate);
+        let all = r.all.missed_but_alternate;
+        lines.push(format!("  missed, but among the alternates of a quad: {all}, of the easy ones {easy}"));
     }
     lines.extend(images(&r.images));
     if r.images_by_stratum.len() > 1 && r.images.false_quads > r.images.reviewed_quads {

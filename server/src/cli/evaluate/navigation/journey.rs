@@ -4,6 +4,7 @@
 
 use super::{
     super::experiment::mixed,
+    carried::{Carried, Carrier},
     world::{MAP, World},
 };
 use crate::{
@@ -85,6 +86,8 @@ pub(super) struct Journey {
     /// Times that a landmark was said to have moved or to be missing; nothing in the corridor changes.
     pub(super) flagged: usize,
     pub(super) quarantined: usize,
+    /// What became of a robot that was carried along.
+    pub(super) carried: Option<Carried>,
 }
 
 /// Sightings of taught landmarks of one kind.
@@ -110,6 +113,8 @@ pub(super) struct Way {
     pub(super) laser: bool,
     /// Their cameras, and where those sit, are exactly what they say.
     pub(super) exact: bool,
+    /// Once they know where they are, they are carried forwards by this.
+    pub(super) carried_m: f64,
 }
 
 /// The server's side: one robot in one map.
@@ -137,8 +142,7 @@ impl Server {
         self.snapshots.get(MAP).ok_or_else(|| anyhow::anyhow!("the map is gone"))
     }
 
-    fn scan(&self, seen: &Sighting, captured_ns: i64) {
-        let odom_from_robot = seen.step.odom_from_robot;
+    fn scan(&self, seen: &Sighting, odom_from_robot: Pose2, captured_ns: i64) {
         let scan = seen.scan.clone();
         self.motion.laser(
             &self.robot,
@@ -152,16 +156,10 @@ impl Server {
         &self,
         map: &MapSnapshot,
         facts: &FrameFacts,
-        seen: &Sighting,
+        (seen, odom_from_robot): (&Sighting, Pose2),
         (wrong, captured_ns): (&OwnErrors, i64),
     ) -> (Vec<Change>, Option<Guided>) {
-        let at = At {
-            map: MAP,
-            epoch: EPOCH,
-            captured_ns,
-            odometry: Some(seen.step.odom_from_robot),
-            now: self.now,
-        };
+        let at = At { map: MAP, epoch: EPOCH, captured_ns, odometry: Some(odom_from_robot), now: self.now };
         let mounting = wrong.mounting(&seen.step.robot_from_camera).ok();
         let image = &seen.frame.image;
         let view = View {
@@ -215,17 +213,21 @@ pub(super) fn drive(world: &World, way: Way) -> anyhow::Result<Journey> {
     let wrong = OwnErrors::of(robot.camera().intrinsics(), way.exact, mixed(&[way.seed, 14]));
     let server = Server::new(&world.map)?;
     let mut journey = Journey::default();
+    let mut carrier = Carrier::new(way.carried_m);
     let mut frames_that_show = 0;
     for seen in robot {
         let captured_ns = (seen.step.time_s * 1e9) as i64;
         let before = server.corrections();
+        let odom_from_robot = carrier.odometry(seen.step.time_s, seen.step.odom_from_robot);
         if way.laser {
-            server.scan(&seen, captured_ns);
+            server.scan(&seen, odom_from_robot, captured_ns);
         }
         let map = server.map()?;
         let facts = verdicts::look(&seen.frame.image, Some(&wrong.camera), &map, &mut StageTimes::start());
-        let (changes, guided) = server.frame(&map, &facts, &seen, (&wrong, captured_ns));
-        frames_that_show += usize::from(journey.score(world, &seen, &facts, guided.as_ref()));
+        let (changes, guided) = server.frame(&map, &facts, (&seen, odom_from_robot), (&wrong, captured_ns));
+        let misled = journey.guided_false;
+        let shows = journey.score(world, &seen, &facts, guided.as_ref());
+        frames_that_show += usize::from(shows);
         if !changes.is_empty() {
             let of = |standing| changes.iter().filter(|c| c.standing == standing).count();
             journey.flagged += of(Standing::Flagged);
@@ -236,14 +238,17 @@ pub(super) fn drive(world: &World, way: Way) -> anyhow::Result<Journey> {
         if fused.is_some() && journey.frames_to_fix.is_none() {
             journey.frames_to_fix = Some(frames_that_show);
         }
+        let misled = journey.guided_false - misled;
+        carrier.looked(seen.step.time_s, (shows, misled), (fused.as_ref(), &seen.step.map_from_robot));
         journey.moments.push(Moment {
             time_s: seen.step.time_s,
             truth: seen.step.map_from_robot,
-            odometry: seen.step.odom_from_robot,
+            odometry: odom_from_robot,
             fused,
             corrected: server.corrections() > before,
         });
     }
+    journey.carried = carrier.carried;
     journey.log = server.motion.corrections(&server.robot);
     Ok(journey)
 }

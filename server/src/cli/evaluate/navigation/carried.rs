@@ -1,0 +1,103 @@
+//! A robot that is carried along while its wheels stand still: from then on its pose is wrong by that much, and it does not
+//! know. Odometry in, odometry that misses it out; counts until the pose is right again or given up.
+
+use map::pose2::{Pose2, Pose2Covariance};
+use serde::Serialize;
+
+/// Robots are carried once they have had a pose for so long.
+const AFTER_S: f64 = 8.0;
+/// The pose is right again from this error on.
+const RIGHT_M: f64 = 0.3;
+
+/// What became of it.
+#[derive(Debug, Clone, Default, Serialize)]
+pub(super) struct Carried {
+    /// Frames since that showed a landmark in use in full view, the one that found it out included.
+    pub(super) frames: usize,
+    /// The pose was given up, or is right.
+    pub(super) is_found_out: bool,
+    /// Names that the wrong pose gave to something else.
+    pub(super) misled: usize,
+}
+
+/// Carries a robot once.
+#[derive(Debug)]
+pub(super) struct Carrier {
+    by_m: f64,
+    first_fix_s: Option<f64>,
+    /// What odometry missed: where it says the robot is, from where it would say so.
+    missed: Option<Pose2>,
+    pub(super) carried: Option<Carried>,
+}
+
+impl Carrier {
+    /// Carries by `by_m` forwards; by 0 never.
+    pub(super) fn new(by_m: f64) -> Self {
+        Self { by_m, first_fix_s: None, missed: None, carried: None }
+    }
+
+    /// What odometry says at `time_s` where it would say `odom_from_robot`.
+    pub(super) fn odometry(&mut self, time_s: f64, odom_from_robot: Pose2) -> Pose2 {
+        let is_due = self.first_fix_s.is_some_and(|first| time_s >= first + AFTER_S);
+        if self.by_m != 0.0 && self.missed.is_none() && is_due {
+            let back = Pose2::new(-self.by_m, 0.0, 0.0);
+            self.missed = Some(odom_from_robot.compose(&back).compose(&odom_from_robot.inverse()));
+            self.carried = Some(Carried::default());
+        }
+        self.missed.map_or(odom_from_robot, |missed| missed.compose(&odom_from_robot))
+    }
+
+    /// Counts a frame at `time_s`: whether it `shows` a landmark in use, the names by the pose that were wrong, the pose
+    /// after it.
+    pub(super) fn looked(
+        &mut self,
+        time_s: f64,
+        (shows, misled): (bool, usize),
+        (fused, truth): (Option<&Pose2Covariance>, &Pose2),
+    ) {
+        self.first_fix_s = self.first_fix_s.or(fused.map(|_| time_s));
+        let Some(carried) = self.carried.as_mut().filter(|c| !c.is_found_out) else { return };
+        carried.frames += usize::from(shows);
+        carried.misled += misled;
+        let off_m = |f: &Pose2Covariance| (f.pose.position() - truth.position()).norm();
+        carried.is_found_out = fused.is_none_or(|f| off_m(f) < RIGHT_M);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Matrix3;
+
+    fn at(x_m: f64) -> Pose2Covariance {
+        Pose2Covariance { pose: Pose2::new(x_m, 0.0, 0.0), covariance: Matrix3::identity() }
+    }
+
+    #[test]
+    fn odometry_misses_what_was_carried_and_frames_count_until_the_pose_is_right() {
+        let mut carrier = Carrier::new(2.0);
+        let heading = std::f64::consts::FRAC_PI_2;
+        assert_eq!(carrier.odometry(0.0, Pose2::new(1.0, 1.0, heading)).y_m, 1.0);
+        carrier.looked(0.0, (true, 0), (Some(&at(0.0)), &Pose2::new(0.0, 0.0, 0.0)));
+        assert!(carrier.carried.is_none());
+        let moved = carrier.odometry(9.0, Pose2::new(1.0, 5.0, heading));
+        assert!((moved.x_m - 1.0).abs() < 1e-12 && (moved.y_m - 3.0).abs() < 1e-12, "{moved:?}");
+        let truth = Pose2::new(2.0, 0.0, 0.0);
+        carrier.looked(9.0, (false, 0), (Some(&at(0.0)), &truth));
+        carrier.looked(9.5, (true, 1), (Some(&at(0.0)), &truth));
+        carrier.looked(10.0, (true, 0), (Some(&at(1.9)), &truth));
+        carrier.looked(10.5, (true, 1), (Some(&at(0.0)), &truth));
+        let carried = carrier.carried.as_ref().unwrap();
+        assert_eq!((carried.frames, carried.misled, carried.is_found_out), (2, 1, true));
+        let later = carrier.odometry(11.0, Pose2::new(1.0, 6.0, heading));
+        assert!((later.y_m - 4.0).abs() < 1e-12, "{later:?}");
+    }
+
+    #[test]
+    fn a_robot_that_is_not_carried_keeps_its_odometry() {
+        let mut carrier = Carrier::new(0.0);
+        carrier.looked(0.0, (true, 0), (Some(&at(0.0)), &Pose2::new(0.0, 0.0, 0.0)));
+        assert_eq!(carrier.odometry(99.0, Pose2::new(3.0, 0.0, 0.0)), Pose2::new(3.0, 0.0, 0.0));
+        assert!(carrier.carried.is_none());
+    }
+}
