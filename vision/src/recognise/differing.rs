@@ -17,6 +17,9 @@ const MIN_DIFFERING: usize = 9;
 /// that differs.
 const MAX_HIDDEN: usize = 4;
 
+/// Where the icon shows nothing, the picture shows something else with slopes of more than this share of its mean.
+const APPEARS_SHARE: f32 = 0.5;
+
 /// Which windows of a picture show something else than the learnt icon, and which cells nothing.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Differing {
@@ -36,7 +39,10 @@ impl Differing {
         let mean = |power: fn(&Bucket) -> f32| windows.iter().map(power).sum::<f32>() / windows.len() as f32;
         let (power, other_power) = (mean(|w| w.power), mean(|w| w.other_power));
         let differs = |w: &Bucket| {
-            w.correlation < CONTRADICTS && shows(w.power, power) && shows(w.other_power, other_power)
+            let appears = w.power > APPEARS_SHARE * power;
+            w.correlation < CONTRADICTS
+                && shows(w.power, power)
+                && (appears || shows(w.other_power, other_power))
         };
         let is_hidden = |c: &Bucket| !shows(c.power, power) && shows(c.other_power, other_power);
         let row = |y: usize| std::array::from_fn(|x| differs(&windows[y * WINDOWS + x]));
@@ -114,6 +120,18 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// Half of the icon is a plain margin.
+    #[test]
+    fn what_appears_where_the_icon_shows_nothing_is_something_else() {
+        let half = |x: f64, y: f64| if x < 0.5 { taught(x, y) } else { 120.0 };
+        let differs =
+            |seen: &dyn Fn(f64, f64) -> f64| Differing::new(&made(seen), &made(half)).unwrap().has_part();
+        assert!(differs(&|x, y| if x > 0.5 && y > 0.5 { other(x, y) } else { half(x, y) }));
+        assert!(!differs(&half));
+        // A shadow's edge across it.
+        assert!(!differs(&|x, y| if x + 0.3 * y > 0.8 { 0.6 * half(x, y) } else { half(x, y) }));
     }
 
     #[test]

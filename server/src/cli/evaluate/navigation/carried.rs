@@ -77,7 +77,7 @@ mod tests {
     fn odometry_misses_what_was_carried_and_frames_count_until_the_pose_is_right() {
         let mut carrier = Carrier::new(2.0);
         let heading = std::f64::consts::FRAC_PI_2;
-        assert_eq!(carrier.odometry(0.0, Pose2::new(1.0, 1.0, heading)).y_m, 1.0);
+        assert_eq!(carrier.odometry(0.0, Pose2::new(1.0, 1.0, heading)), Pose2::new(1.0, 1.0, heading));
         carrier.looked(0.0, (true, 0), (Some(&at(0.0)), &Pose2::new(0.0, 0.0, 0.0)));
         assert!(carrier.carried.is_none());
         let moved = carrier.odometry(9.0, Pose2::new(1.0, 5.0, heading));
