@@ -225,16 +225,25 @@ impl LandmarkModel {
         self.status == ModelStatus::Active
     }
 
+    /// Not in use, and other landmarks look like it, whatever else it fails.
+    pub fn has_look_alikes_in_its_way(&self) -> bool {
+        let ModelStatus::Candidate(failures) = &self.status else { return false };
+        let is_overlap = |gate: Gate| {
+            let overlap = ThresholdError::Overlap;
+            [
+                Gate::LikenessThreshold(overlap),
+                Gate::CorrelationThreshold(overlap),
+                Gate::HausdorffThreshold(overlap),
+            ]
+            .contains(&gate)
+        };
+        failures.iter().any(|f| is_overlap(f.gate))
+    }
+
     /// Not in use for no other reason than that other landmarks look like it.
     pub fn is_kept_out_by_look_alikes(&self) -> bool {
         let ModelStatus::Candidate(failures) = &self.status else { return false };
-        let is_threshold = |gate: Gate| {
-            matches!(
-                gate,
-                Gate::LikenessThreshold(_) | Gate::CorrelationThreshold(_) | Gate::HausdorffThreshold(_)
-            )
-        };
-        !failures.is_empty() && failures.iter().all(|f| is_threshold(f.gate))
+        !failures.is_empty() && failures.iter().all(|f| f.gate.is_threshold())
     }
 }
 
@@ -277,6 +286,16 @@ pub enum Gate {
     HausdorffThreshold(ThresholdError),
     /// The likeness has no threshold.
     LikenessThreshold(ThresholdError),
+}
+
+impl Gate {
+    /// A distance has no threshold that tells the landmark from others.
+    fn is_threshold(self) -> bool {
+        matches!(
+            self,
+            Self::LikenessThreshold(_) | Self::CorrelationThreshold(_) | Self::HausdorffThreshold(_)
+        )
+    }
 }
 
 /// A failed gate, with its number and its limit. For a missing threshold both are 0.

@@ -81,10 +81,10 @@ impl ModelSet {
         Self::with_rivals(models, Vec::new(), p)
     }
 
-    /// The landmarks in use of `all` that were learnt, with those as rivals that look-alikes keep out of use.
+    /// The landmarks in use of `all` that were learnt, with those as rivals that are not and have look-alikes.
     pub fn in_use(all: impl Iterator<Item = Arc<LandmarkModel>>, p: &Params) -> Result<Self, ModelSetError> {
         let (active, others): (Vec<_>, Vec<_>) = all.partition(|m| m.is_active());
-        let rivals = others.into_iter().filter(|m| m.is_kept_out_by_look_alikes()).collect();
+        let rivals = others.into_iter().filter(|m| m.has_look_alikes_in_its_way()).collect();
         Self::with_rivals(active, rivals, p)
     }
 
@@ -251,7 +251,13 @@ impl ModelSet {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::recognise::fixture::lessons;
+    use crate::{
+        learn::{
+            model::{Gate, GateFailure, ModelStatus},
+            threshold::ThresholdError,
+        },
+        recognise::fixture::lessons,
+    };
 
     #[test]
     fn the_short_list_is_that_of_comparing_everything() {
@@ -318,6 +324,17 @@ mod tests {
         let twice = ModelSet::new(vec![Arc::clone(&models[1]); 2], &p);
         assert_eq!(twice.unwrap_err(), ModelSetError::Duplicate { id: LandmarkId(2) });
         let [a, b, c] = [0, 1, 2].map(|i| Arc::clone(&models[i]));
+        let mut kept_out = (*b).clone();
+        let fails = |gate| GateFailure { gate, value: 0.0, limit: 0.0 };
+        let rivals = |kept_out: &LandmarkModel| {
+            let all = [a.clone(), Arc::new(kept_out.clone())];
+            ModelSet::in_use(all.into_iter(), &p).unwrap().rivals.len()
+        };
+        kept_out.status = ModelStatus::Candidate(vec![fails(Gate::Saliency)]);
+        assert_eq!(rivals(&kept_out), 0, "nothing looks like it");
+        let overlap = fails(Gate::LikenessThreshold(ThresholdError::Overlap));
+        kept_out.status = ModelStatus::Candidate(vec![fails(Gate::Saliency), overlap]);
+        assert_eq!(rivals(&kept_out), 1);
         let with_rival = ModelSet::with_rivals(vec![a], vec![b.clone()], &p).unwrap();
         assert_eq!((ids(&with_rival), with_rival.len()), (vec![3], 1), "a rival is not in use");
         let both = ModelSet::with_rivals(vec![b.clone(), c], vec![b], &p);
