@@ -225,25 +225,17 @@ impl LandmarkModel {
         self.status == ModelStatus::Active
     }
 
-    /// Not in use, and other landmarks look like it, whatever else it fails.
-    pub fn has_look_alikes_in_its_way(&self) -> bool {
+    /// Not in use, as a distance does not tell it from others, whatever other gates it fails.
+    pub fn overlaps_others(&self) -> bool {
         let ModelStatus::Candidate(failures) = &self.status else { return false };
-        let is_overlap = |gate: Gate| {
-            let overlap = ThresholdError::Overlap;
-            [
-                Gate::LikenessThreshold(overlap),
-                Gate::CorrelationThreshold(overlap),
-                Gate::HausdorffThreshold(overlap),
-            ]
-            .contains(&gate)
-        };
-        failures.iter().any(|f| is_overlap(f.gate))
+        let overlap = ThresholdError::Overlap;
+        failures.iter().any(|f| f.gate.threshold_error() == Some(overlap))
     }
 
     /// Not in use for no other reason than that other landmarks look like it.
     pub fn is_kept_out_by_look_alikes(&self) -> bool {
         let ModelStatus::Candidate(failures) = &self.status else { return false };
-        !failures.is_empty() && failures.iter().all(|f| f.gate.is_threshold())
+        !failures.is_empty() && failures.iter().all(|f| f.gate.threshold_error().is_some())
     }
 }
 
@@ -289,12 +281,18 @@ pub enum Gate {
 }
 
 impl Gate {
-    /// A distance has no threshold that tells the landmark from others.
-    fn is_threshold(self) -> bool {
-        matches!(
-            self,
-            Self::LikenessThreshold(_) | Self::CorrelationThreshold(_) | Self::HausdorffThreshold(_)
-        )
+    /// Why a distance has no threshold, if that is what failed.
+    fn threshold_error(self) -> Option<ThresholdError> {
+        match self {
+            Self::LikenessThreshold(error)
+            | Self::CorrelationThreshold(error)
+            | Self::HausdorffThreshold(error) => Some(error),
+            Self::Views
+            | Self::Saliency
+            | Self::StablePoints
+            | Self::Content
+            | Self::VisibilityConfidence => None,
+        }
     }
 }
 

@@ -1,5 +1,5 @@
 //! The decision by points: landmarks that points speak for in, the verdict out, or `None` where points say nothing and the
-//! icons are asked. Corners are those of the homography, sharpened by laying the picture on the learnt icon.
+//! icons are asked. Corners are those of the homography, sharpened by alignment the picture on the learnt icon.
 //!
 //! False alarms are counted against things that have nothing in common with the landmark. Against its look-alikes two
 //! more conditions stand: no other landmark whose points are there may go uncontradicted, and where something of the map
@@ -8,8 +8,8 @@
 use super::{
     Candidate, MAX_CANDIDATES, Recognition, Refusal, Verdict,
     confidence::{entropy_m, entropy_norm, probability},
+    icon_alignment::{IconAlignment, align_to_icon},
     is_same_border,
-    laying::{Laying, sharpened},
     models::ModelSet,
 };
 use crate::{
@@ -50,11 +50,12 @@ pub(crate) fn by_points(image: &GrayImage, quad: &Quad, models: &ModelSet, p: &P
     let mut evidence = best.evidence.clone();
     let (border, corners_px) = nearest_border(quad, &evidence);
     let is_detected = is_same_border(&corners_px, &evidence.corners_px, p);
-    let laying = sharpened(image, &mut evidence, Some(&corners_px), (model, models), p);
+    let alignment = align_to_icon(image, &mut evidence, Some(&corners_px), (model, models), p);
     // The homography's corners stand unless the detector found the same.
     let is_located = is_detected || is_well_known(&evidence);
     let others = found.iter().skip(1).chain(&rivals);
-    let refusal = refusal(best, others, (model, &laying), n, p).or((!is_located).then_some(Refusal::Corners));
+    let refusal =
+        refusal(best, others, (model, &alignment), n, p).or((!is_located).then_some(Refusal::Corners));
     let of = |(i, f): (usize, &Found)| {
         let ratio = if alarms[i] < 0.0 { LOG10_EPSILON / alarms[i] } else { f64::INFINITY };
         let refused = if i == 0 { refusal } else { (alarms[i] > LOG10_EPSILON).then_some(Refusal::Points) };
@@ -62,7 +63,7 @@ pub(crate) fn by_points(image: &GrayImage, quad: &Quad, models: &ModelSet, p: &P
             landmark: models.at(f.model)?.id,
             correlation: 2.0,
             hausdorff: f64::INFINITY,
-            likeness: if i == 0 { laying.likeness } else { None },
+            likeness: if i == 0 { alignment.likeness } else { None },
             distance: ratio,
             tau: 1.0,
             ratio,
@@ -95,16 +96,16 @@ pub(super) fn is_well_known(evidence: &PointEvidence) -> bool {
     evidence.corner_covariance_px2.iter().all(|c| c.symmetric_eigenvalues().max() <= limit_px2)
 }
 
-/// Why `best`, which is `model` and was laid on its icon, is not named among `landmarks` although its points are there, while
+/// Why `best`, which is `model` and was aligned with its icon, is not named among `landmarks` although its points are there, while
 /// points speak for `others`, too.
 fn refusal<'a>(
     best: &Found,
     mut others: impl Iterator<Item = &'a Found>,
-    (model, laying): (&LandmarkModel, &Laying),
+    (model, alignment): (&LandmarkModel, &IconAlignment),
     landmarks: usize,
     p: &Params,
 ) -> Option<Refusal> {
-    if is_in_doubt(&best.evidence, laying) {
+    if is_doubtful(&best.evidence, alignment) {
         return Some(Refusal::Disagreement);
     }
     // Its share of the best one's exponent says how much was taught of a rival, not whether it hangs there: a look-alike
@@ -118,7 +119,7 @@ fn refusal<'a>(
         return Some(Refusal::Margin);
     }
     // Where the image does not show all of it there is no likeness.
-    let is_like = laying.likeness.is_none_or(|l| 1.0 - l < model.likeness.tau);
+    let is_like = alignment.likeness.is_none_or(|l| 1.0 - l < model.likeness.tau);
     (has_double(model, p) && !is_like).then_some(Refusal::Likeness)
 }
 
@@ -128,15 +129,15 @@ fn has_double(model: &LandmarkModel, p: &Params) -> bool {
     model.likeness.tau < p.learn.threshold.nearest_share * p.learn.likeness_cap
 }
 
-/// Whether a connected part of the landmark shows something else: by its icon where it was laid on that, which sees every
-/// part of it, else by its points.
-pub(super) fn is_in_doubt(evidence: &PointEvidence, laying: &Laying) -> bool {
-    laying.differs.unwrap_or_else(|| evidence.agreement.largest_disagreement() >= DOUBTFUL_PARTS)
+/// Whether a connected part of the landmark shows something else: by its icon where it was aligned with that, as the icon covers
+/// every part; else by its points.
+pub(super) fn is_doubtful(evidence: &PointEvidence, alignment: &IconAlignment) -> bool {
+    alignment.has_mismatch.unwrap_or_else(|| evidence.agreement.largest_disagreement() >= DOUBTFUL_PARTS)
 }
 
 /// A connected part of it shows something else by its points.
 fn is_contradicted(found: &Found) -> bool {
-    is_in_doubt(&found.evidence, &Laying::NONE)
+    is_doubtful(&found.evidence, &IconAlignment::NONE)
 }
 
 /// Which border of `quad` lies nearest to where the landmark's is: 0 for its corners, i for alternate i - 1; and its

@@ -109,18 +109,10 @@ fn nearest_side(i: usize, size: usize) -> (usize, usize) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::icon::Icon;
-
-    const SIZE: usize = 75;
+    use crate::recognise::fixture::{drawn_icon, waves};
 
     fn made(f: impl Fn(f64, f64) -> f64) -> Smoothed {
-        let at = |i: usize| (i as f64 + 0.5) / SIZE as f64;
-        let pixels = (0..SIZE * SIZE).map(|i| f(at(i % SIZE), at(i / SIZE)) as f32).collect();
-        Smoothed::new(&Icon { size: SIZE, pixels, source_scale: 1.0 })
-    }
-
-    fn waves(x: f64, y: f64) -> f64 {
-        120.0 + 50.0 * (19.0 * x + 9.0 * y * y).sin() + 40.0 * (17.0 * y - 14.0 * x).cos()
+        Smoothed::new(&drawn_icon(f))
     }
 
     /// A dark frame a tenth wide, a mat to three tenths, and `inside` within.

@@ -6,8 +6,8 @@
 
 use super::{
     DistanceKind, LandmarkId, Recognition,
-    by_points::{is_in_doubt, is_well_known},
-    laying::{Laying, sharpened},
+    by_points::{is_doubtful, is_well_known},
+    icon_alignment::{IconAlignment, align_to_icon},
     models::ModelSet,
     verdict::recognise,
 };
@@ -75,12 +75,12 @@ fn by_points(
     let Some(model) = models.get(id).filter(|model| !model.points.is_empty()) else { return Said::Silent };
     let Some(mut evidence) = verify_at(image, &model.points, expected_px) else { return Said::Silent };
     let are_there = evidence.log10_nfa <= LOG10_EPSILON_EXPECTED;
-    let laying = if is_whole && are_there {
-        sharpened(image, &mut evidence, None, (model, models), p)
+    let alignment = if is_whole && are_there {
+        align_to_icon(image, &mut evidence, None, (model, models), p)
     } else {
-        Laying::NONE
+        IconAlignment::NONE
     };
-    if is_in_doubt(&evidence, &laying) {
+    if is_doubtful(&evidence, &alignment) {
         return Said::Doubtful;
     }
     if !are_there {

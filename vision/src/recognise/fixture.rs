@@ -4,6 +4,7 @@ use crate::{
     detect::quads::{Corners, Quad, QuadKind},
     frame::GrayImage,
     geometry::homography::Homography,
+    icon::Icon,
     learn::model::{LandmarkModel, View, learn, refit_thresholds},
     learn::synthesis::views,
     params::Params,
@@ -28,6 +29,19 @@ impl Dice {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 40) as f64 / f64::from(1 << 24)
     }
+}
+
+/// An icon of 75 x 75 px with the grey levels of `grey`, of places from 0 to 1, right and down.
+pub(crate) fn drawn_icon(grey: impl Fn(f64, f64) -> f64) -> Icon {
+    const SIZE: usize = 75;
+    let at = |i: usize| (i as f64 + 0.5) / SIZE as f64;
+    let pixels = (0..SIZE * SIZE).map(|i| grey(at(i % SIZE), at(i / SIZE)) as f32).collect();
+    Icon { size: SIZE, pixels, source_scale: 1.0 }
+}
+
+/// Texture everywhere, grey levels 30 to 210.
+pub(crate) fn waves(x: f64, y: f64) -> f64 {
+    120.0 + 50.0 * (19.0 * x + 9.0 * y * y).sin() + 40.0 * (17.0 * y - 14.0 * x).cos()
 }
 
 /// Ellipses and boxes of all sizes on a shaded ground; another seed, another poster.

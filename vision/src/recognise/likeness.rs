@@ -200,16 +200,7 @@ fn smoothed(icon: &Icon) -> Vec<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn made(f: impl Fn(f64, f64) -> f64) -> Icon {
-        let at = |i: usize| (i as f64 + 0.5) / 75.0;
-        let pixels = (0..75 * 75).map(|i| f(at(i % 75), at(i / 75)) as f32).collect();
-        Icon { size: 75, pixels, source_scale: 1.0 }
-    }
-
-    fn waves(x: f64, y: f64) -> f64 {
-        120.0 + 50.0 * (19.0 * x + 9.0 * y * y).sin() + 40.0 * (17.0 * y - 14.0 * x).cos()
-    }
+    use crate::recognise::fixture::{drawn_icon as made, waves};
 
     #[test]
     fn same_pictures_are_alike_under_any_light() {

@@ -81,10 +81,10 @@ impl ModelSet {
         Self::with_rivals(models, Vec::new(), p)
     }
 
-    /// The landmarks in use of `all` that were learnt, with those as rivals that are not and have look-alikes.
+    /// Of `all` landmarks those in use; as rivals those that are not, because a distance does not tell them from others.
     pub fn in_use(all: impl Iterator<Item = Arc<LandmarkModel>>, p: &Params) -> Result<Self, ModelSetError> {
         let (active, others): (Vec<_>, Vec<_>) = all.partition(|m| m.is_active());
-        let rivals = others.into_iter().filter(|m| m.has_look_alikes_in_its_way()).collect();
+        let rivals = others.into_iter().filter(|m| m.overlaps_others()).collect();
         Self::with_rivals(active, rivals, p)
     }
 

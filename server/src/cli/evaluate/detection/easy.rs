@@ -5,9 +5,9 @@ use nalgebra::Point2;
 use vision::{detect::quads::Corners, frame::GrayImage};
 
 /// The shortest side of an easy quad is longer than this, in pixels.
-pub(crate) const MIN_SIDE_PX: f64 = 60.0;
+pub(super) const MIN_SIDE_PX: f64 = 60.0;
 /// Along each side of an easy quad, inside and outside differ by more than this, in grey levels.
-pub(crate) const MIN_CONTRAST: f64 = 20.0;
+pub(super) const MIN_CONTRAST: f64 = 20.0;
 
 /// Samples along a side.
 const SAMPLES: usize = 64;
@@ -16,7 +16,7 @@ const CORNER_SHARE: f64 = 0.1;
 /// Distances from a side at which grey levels are read, in pixels: past the blur of the edge itself.
 const BESIDE_PX: [f64; 3] = [2.0, 3.0, 4.0];
 
-/// Whether a detector must find it, and it is large and told from what is around it along all four sides.
+/// Whether a detector must find it, and it is large and differs from what is around it along all four sides.
 pub(super) fn is_easy(image: &GrayImage, quad: &TruthQuad) -> bool {
     quad.counts() && quad.corners.min_side_px() > MIN_SIDE_PX && contrast(image, &quad.corners) > MIN_CONTRAST
 }

@@ -271,7 +271,7 @@ pub(super) mod tests {
             iou,
             corner_error_px: (iou >= FOUND).then_some(error),
             is_alternate: false,
-            is_easy: side > 60.0,
+            is_easy: side > super::super::easy::MIN_SIDE_PX,
         }
     }
 
@@ -308,6 +308,7 @@ pub(super) mod tests {
         assert_eq!(sides, [("20 to 30 px", 1), ("30 to 50 px", 2), ("from 200 px", 1)]);
         assert_eq!(r.by_view_angle.len(), 1);
         assert_eq!(r.by_class["poster"].quads, 4);
+        assert_eq!(r.easy.as_ref().map(|easy| easy.quads), Some(1));
         // One missed is worse than one loose and one false less a reviewed one.
         assert_eq!(r.worst.len(), 1);
         assert_eq!((r.worst[0].file.as_str(), r.worst[0].false_quads, r.worst[0].loose), ("a", 1, 1));

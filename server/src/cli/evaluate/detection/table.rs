@@ -1,13 +1,13 @@
 //! The report as text for people.
 
-use super::report::{Group, Report, Seen};
+use super::{
+    easy::{MIN_CONTRAST, MIN_SIDE_PX},
+    report::{Group, Report, Seen},
+};
 use crate::cli::evaluate::statistics::Interval;
 
 /// Width of the column of names.
 const NAMES: usize = 38;
-
-/// The row of what is easy to see; its limits are `easy.rs`'s.
-const EASY: &str = "easy: sides 60 px, contrast 20 on each";
 
 /// Several lines, no line feed at the end.
 pub(crate) fn table(r: &Report) -> String {
@@ -22,7 +22,8 @@ pub(crate) fn table(r: &Report) -> String {
         ),
         row("all", &r.all),
     ];
-    lines.extend(r.easy.iter().map(|easy| row(EASY, easy)));
+    let easy = format!("easy: sides {MIN_SIDE_PX} px, contrast {MIN_CONTRAST} on each");
+    lines.extend(r.easy.iter().map(|group| row(&easy, group)));
     let mut add = |title: &str, groups: &mut dyn Iterator<Item = (&String, &Group)>| {
         let groups: Vec<(&String, &Group)> = groups.collect();
         // One group says no more than all do.

@@ -4,7 +4,7 @@
 
 use super::{
     super::experiment::mixed,
-    carried::{Carried, Carrier},
+    kidnap::{Kidnap, KidnapOutcome},
     world::{MAP, World},
 };
 use crate::{
@@ -86,8 +86,8 @@ pub(super) struct Journey {
     /// Times that a landmark was said to have moved or to be missing; nothing in the corridor changes.
     pub(super) flagged: usize,
     pub(super) quarantined: usize,
-    /// What became of a robot that was carried along.
-    pub(super) carried: Option<Carried>,
+    /// What became of it after it was kidnapped.
+    pub(super) kidnapped: Option<KidnapOutcome>,
 }
 
 /// Sightings of taught landmarks of one kind.
@@ -113,8 +113,8 @@ pub(super) struct Way {
     pub(super) laser: bool,
     /// Their cameras, and where those sit, are exactly what they say.
     pub(super) exact: bool,
-    /// Once they know where they are, they are carried forwards by this.
-    pub(super) carried_m: f64,
+    /// How far they are kidnapped forwards; 0: not at all.
+    pub(super) kidnap_m: f64,
 }
 
 /// The server's side: one robot in one map.
@@ -213,12 +213,12 @@ pub(super) fn drive(world: &World, way: Way) -> anyhow::Result<Journey> {
     let wrong = OwnErrors::of(robot.camera().intrinsics(), way.exact, mixed(&[way.seed, 14]));
     let server = Server::new(&world.map)?;
     let mut journey = Journey::default();
-    let mut carrier = Carrier::new(way.carried_m);
+    let mut kidnap = Kidnap::new(way.kidnap_m);
     let mut frames_that_show = 0;
     for seen in robot {
         let captured_ns = (seen.step.time_s * 1e9) as i64;
         let before = server.corrections();
-        let odom_from_robot = carrier.odometry(seen.step.time_s, seen.step.odom_from_robot);
+        let odom_from_robot = kidnap.odometry(seen.step.time_s, seen.step.odom_from_robot);
         if way.laser {
             server.scan(&seen, odom_from_robot, captured_ns);
         }
@@ -239,7 +239,7 @@ pub(super) fn drive(world: &World, way: Way) -> anyhow::Result<Journey> {
             journey.frames_to_fix = Some(frames_that_show);
         }
         let misled = journey.guided_false - misled;
-        carrier.looked(seen.step.time_s, (shows, misled), (fused.as_ref(), &seen.step.map_from_robot));
+        kidnap.looked(seen.step.time_s, (shows, misled), (fused.as_ref(), &seen.step.map_from_robot));
         journey.moments.push(Moment {
             time_s: seen.step.time_s,
             truth: seen.step.map_from_robot,
@@ -248,7 +248,7 @@ pub(super) fn drive(world: &World, way: Way) -> anyhow::Result<Journey> {
             corrected: server.corrections() > before,
         });
     }
-    journey.carried = carrier.carried;
+    journey.kidnapped = kidnap.outcome;
     journey.log = server.motion.corrections(&server.robot);
     Ok(journey)
 }

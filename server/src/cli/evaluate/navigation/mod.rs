@@ -3,8 +3,8 @@
 //! a laser that the corridor tells nothing along it. It runs in this program, with the code that the server runs, without
 //! a server, from a seed.
 
-mod carried;
 mod journey;
+mod kidnap;
 mod plot;
 mod report;
 mod world;
@@ -60,10 +60,10 @@ pub(crate) struct Args {
     /// them; else they are exactly what they are said to be. Only so can covariances be judged.
     #[arg(long)]
     own_errors: bool,
-    /// Carry every robot so far forwards once it has had a pose for 8 s, while its odometry stands still: how soon is the wrong
-    /// pose found out?
-    #[arg(long, value_name = "M", default_value_t = 0.0, value_parser = carried, allow_negative_numbers = true)]
-    carried_m: f64,
+    /// Kidnap every robot: carry it so far forwards, while its odometry stands still, once it has had a pose for 8 s. The report
+    /// says how soon the wrong pose is found out.
+    #[arg(long, value_name = "M", default_value_t = 0.0, value_parser = kidnap, allow_negative_numbers = true)]
+    kidnap_m: f64,
     /// One JSON object instead of a table.
     #[arg(long)]
     json: bool,
@@ -88,7 +88,7 @@ fn rate(text: &str) -> Result<f64, String> {
     within(text, [0.2, 30.0])
 }
 
-fn carried(text: &str) -> Result<f64, String> {
+fn kidnap(text: &str) -> Result<f64, String> {
     within(text, [-10.0, 10.0])
 }
 
@@ -109,8 +109,8 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let world = World::taught(course)?;
     let seeds: Vec<u64> = (0..args.drives).map(|n| mixed(&[args.seed, 10, u64::from(n)])).collect();
     let (rate_hz, laser, exact) = (args.rate_hz, !args.no_laser, !args.own_errors);
-    let carried_m = args.carried_m;
-    let way = |n: usize, seed: &u64| Way { seed: *seed, back: n % 2 == 1, rate_hz, laser, exact, carried_m };
+    let kidnap_m = args.kidnap_m;
+    let way = |n: usize, seed: &u64| Way { seed: *seed, back: n % 2 == 1, rate_hz, laser, exact, kidnap_m };
     let journeys = of_each(&seeds, "drives", |n, seed| drive(&world, way(n, seed)));
     let journeys = journeys.into_iter().collect::<anyhow::Result<Vec<Journey>>>()?;
     let report = Report::new(&world, &journeys, (laser, exact), args.seed);

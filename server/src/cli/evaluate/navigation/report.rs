@@ -1,8 +1,8 @@
 //! All drives as figures: errors along and across the corridor, how honest the covariance is, what was seen.
 
 use super::{
-    carried::Carried,
     journey::{Journey, Moment, Named, of},
+    kidnap::KidnapOutcome,
     world::World,
 };
 use crate::cli::evaluate::statistics::quantile;
@@ -168,9 +168,9 @@ pub(super) struct Report {
     nees_each: [f64; 3],
     /// Poses and the survey are what they are said to be.
     exact: bool,
-    /// What became of each robot that was carried along.
+    /// What became of each robot that was kidnapped.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    carried: Vec<Carried>,
+    kidnapped: Vec<KidnapOutcome>,
 }
 
 impl Report {
@@ -226,7 +226,7 @@ impl Report {
                     / count
             }),
             exact,
-            carried: journeys.iter().filter_map(|j| j.carried.clone()).collect(),
+            kidnapped: journeys.iter().filter_map(|j| j.kidnapped.clone()).collect(),
         }
     }
 
@@ -287,7 +287,7 @@ impl Report {
             "  named rightly                      by the picture    with a known pose".to_owned(),
         ];
         lines.extend(self.named.iter().map(Row::in_words));
-        lines.extend(self.carried_in_words());
+        lines.extend(self.kidnapped_in_words());
         lines.push(
             "  corners of these                 number   median   90 %  NEES (2)  median (1.39)  within 95 %"
                 .to_owned(),
@@ -298,15 +298,16 @@ impl Report {
 }
 
 impl Report {
-    fn carried_in_words(&self) -> Option<String> {
-        if self.carried.is_empty() {
+    fn kidnapped_in_words(&self) -> Option<String> {
+        if self.kidnapped.is_empty() {
             return None;
         }
-        let (found, left): (Vec<&Carried>, Vec<&Carried>) = self.carried.iter().partition(|c| c.is_found_out);
+        let (found, left): (Vec<&KidnapOutcome>, Vec<&KidnapOutcome>) =
+            self.kidnapped.iter().partition(|c| c.is_found_out);
         let frames: Vec<String> = found.iter().map(|c| c.frames.to_string()).collect();
-        let misled: usize = self.carried.iter().map(|c| c.misled).sum();
+        let misled: usize = self.kidnapped.iter().map(|c| c.misled).sum();
         Some(format!(
-            "  carried along   found out after {} frames that show a landmark in use, {} never; {misled} wrong names by the pose until then",
+            "  kidnapped       found out after {} frames that show a landmark in use, {} never; {misled} wrong names by the pose until then",
             frames.join(", "),
             left.len()
         ))

@@ -1,11 +1,10 @@
-//! A landmark that points speak for is laid on its learnt icon. In: the image, the evidence with the corners of the
-//! homography, the landmark. Out: sharper corners in the evidence, how like the picture is there, and whether a part of it
-//! shows something else.
+//! Template alignment of a landmark that points speak for. In: the image, the evidence with the corners of the homography,
+//! the landmark. Out: the aligned corners in the evidence, the likeness there, and whether a part shows something else.
 
 use super::{
     align::{Aligner, Laid, Surroundings, Template},
-    differing::Differing,
     likeness::{Smoothed, between},
+    mismatch::MismatchMap,
     models::ModelSet,
     signature::{Signature, likeness},
 };
@@ -20,35 +19,36 @@ const MIN_LIKENESS: f64 = 0.4;
 const MAX_MOVED_ICON_PX: f64 = 4.0;
 /// ... so many squared standard deviations: 99.99 % of a corner in the plane.
 const MAX_SQUARE: f64 = 18.4;
-/// From this likeness on the picture itself says that it lies there, however sure the points are of another place.
+/// From this likeness on alignment is believed wherever it moved the corners: the covariance of points that lie at one end of a
+/// landmark is too small at its other end.
 const SURE_LIKENESS: f64 = 0.65;
 
-/// What came of laying a picture on a learnt icon.
+/// How the picture in the image, aligned with a learnt icon, compares with it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Laying {
-    /// How like the icon the picture is there, -1 to 1. `None` where the image does not show all of it.
+pub(super) struct IconAlignment {
+    /// Likeness after alignment, -1 to 1. `None` where the image does not show all of the landmark.
     pub(super) likeness: Option<f64>,
     /// Whether a connected part shows something else. `None` unless the alignment is believed.
-    pub(super) differs: Option<bool>,
+    pub(super) has_mismatch: Option<bool>,
 }
 
-impl Laying {
-    /// Not laid on anything.
-    pub(super) const NONE: Self = Self { likeness: None, differs: None };
+impl IconAlignment {
+    /// No alignment was tried.
+    pub(super) const NONE: Self = Self { likeness: None, has_mismatch: None };
 }
 
-/// Lays the picture on the learnt icon, from the corners of `evidence` and, if that leads nowhere, from `detected_px`; takes
-/// over the corners if they are where the points can have put them, or the picture leaves no doubt.
-pub(super) fn sharpened(
+/// Aligns the picture with the learnt icon, starting at the corners of `evidence` and, if that fails, at `detected_px`. The
+/// aligned corners replace those of `evidence` if its covariance allows them, or from [`SURE_LIKENESS`] on.
+pub(super) fn align_to_icon(
     image: &GrayImage,
     evidence: &mut PointEvidence,
     detected_px: Option<&Corners>,
     (model, models): (&LandmarkModel, &ModelSet),
     p: &Params,
-) -> Laying {
+) -> IconAlignment {
     let mut first = None;
     for start_px in std::iter::once(&evidence.corners_px.clone()).chain(detected_px) {
-        let Some((laid, learnt)) = laid(image, start_px, (model, models), p) else { continue };
+        let Some((laid, learnt)) = aligned(image, start_px, (model, models), p) else { continue };
         let seen = Smoothed::new(&laid.icon);
         let alike = between(&seen, &learnt, &p.recognise.correlation).likeness;
         first = first.or(Some(alike));
@@ -59,13 +59,14 @@ pub(super) fn sharpened(
         evidence.corners_px = laid.corners_px;
         evidence.corner_covariance_px2 = laid.covariance_px2;
         evidence.found_by = FoundBy::Alignment;
-        let differing = Differing::new(&seen, &learnt);
-        if let Some(differing) = differing.as_ref().filter(|d| d.has_part()) {
-            evidence.agreement = differing.marked(evidence.agreement);
+        let mismatches = MismatchMap::new(&seen, &learnt);
+        let has_mismatch = mismatches.as_ref().map(MismatchMap::has_mismatched_part);
+        if let Some(mismatches) = mismatches.filter(|_| has_mismatch == Some(true)) {
+            evidence.agreement = mismatches.marked(evidence.agreement);
         }
-        return Laying { likeness: Some(alike), differs: differing.map(|d| d.has_part()) };
+        return IconAlignment { likeness: Some(alike), has_mismatch };
     }
-    Laying { likeness: first, differs: None }
+    IconAlignment { likeness: first, has_mismatch: None }
 }
 
 /// Whether the points leave it open that the landmark's corners are `corners_px`.
@@ -79,8 +80,8 @@ fn may_be_at(evidence: &PointEvidence, corners_px: &Corners, p: &Params) -> bool
     })
 }
 
-/// The picture laid on the nearest of the learnt icons from `start_px`, and that icon.
-fn laid(
+/// The picture aligned with the most similar of the learnt icons, starting at `start_px`, and that icon.
+fn aligned(
     image: &GrayImage,
     start_px: &Corners,
     (model, models): (&LandmarkModel, &ModelSet),

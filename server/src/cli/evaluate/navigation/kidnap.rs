@@ -1,17 +1,17 @@
-//! A robot that is carried along while its wheels stand still: from then on its pose is wrong by that much, and it does not
-//! know. Odometry in, odometry that misses it out; counts until the pose is right again or given up.
+//! A kidnapped robot: it is carried forwards while its odometry stands still, so that its pose is wrong and believed. In: the
+//! true odometry. Out: odometry that misses the way; counts until the pose is right again or given up.
 
 use map::pose2::{Pose2, Pose2Covariance};
 use serde::Serialize;
 
-/// Robots are carried once they have had a pose for so long.
+/// Robots are kidnapped once they have had a pose for so long.
 const AFTER_S: f64 = 8.0;
 /// The pose is right again from this error on.
 const RIGHT_M: f64 = 0.3;
 
-/// What became of it.
+/// What became of a kidnapped robot.
 #[derive(Debug, Clone, Default, Serialize)]
-pub(super) struct Carried {
+pub(super) struct KidnapOutcome {
     /// Frames since that showed a landmark in use in full view, the one that found it out included.
     pub(super) frames: usize,
     /// The pose was given up, or is right.
@@ -20,20 +20,20 @@ pub(super) struct Carried {
     pub(super) misled: usize,
 }
 
-/// Carries a robot once.
+/// Kidnaps a robot once.
 #[derive(Debug)]
-pub(super) struct Carrier {
+pub(super) struct Kidnap {
     by_m: f64,
     first_fix_s: Option<f64>,
     /// What odometry missed: where it says the robot is, from where it would say so.
     missed: Option<Pose2>,
-    pub(super) carried: Option<Carried>,
+    pub(super) outcome: Option<KidnapOutcome>,
 }
 
-impl Carrier {
-    /// Carries by `by_m` forwards; by 0 never.
+impl Kidnap {
+    /// By `by_m` forwards; by 0 never.
     pub(super) fn new(by_m: f64) -> Self {
-        Self { by_m, first_fix_s: None, missed: None, carried: None }
+        Self { by_m, first_fix_s: None, missed: None, outcome: None }
     }
 
     /// What odometry says at `time_s` where it would say `odom_from_robot`.
@@ -42,7 +42,7 @@ impl Carrier {
         if self.by_m != 0.0 && self.missed.is_none() && is_due {
             let back = Pose2::new(-self.by_m, 0.0, 0.0);
             self.missed = Some(odom_from_robot.compose(&back).compose(&odom_from_robot.inverse()));
-            self.carried = Some(Carried::default());
+            self.outcome = Some(KidnapOutcome::default());
         }
         self.missed.map_or(odom_from_robot, |missed| missed.compose(&odom_from_robot))
     }
@@ -56,11 +56,11 @@ impl Carrier {
         (fused, truth): (Option<&Pose2Covariance>, &Pose2),
     ) {
         self.first_fix_s = self.first_fix_s.or(fused.map(|_| time_s));
-        let Some(carried) = self.carried.as_mut().filter(|c| !c.is_found_out) else { return };
-        carried.frames += usize::from(shows);
-        carried.misled += misled;
+        let Some(outcome) = self.outcome.as_mut().filter(|c| !c.is_found_out) else { return };
+        outcome.frames += usize::from(shows);
+        outcome.misled += misled;
         let off_m = |f: &Pose2Covariance| (f.pose.position() - truth.position()).norm();
-        carried.is_found_out = fused.is_none_or(|f| off_m(f) < RIGHT_M);
+        outcome.is_found_out = fused.is_none_or(|f| off_m(f) < RIGHT_M);
     }
 }
 
@@ -74,30 +74,30 @@ mod tests {
     }
 
     #[test]
-    fn odometry_misses_what_was_carried_and_frames_count_until_the_pose_is_right() {
-        let mut carrier = Carrier::new(2.0);
+    fn odometry_misses_the_way_and_frames_count_until_the_pose_is_right() {
+        let mut kidnap = Kidnap::new(2.0);
         let heading = std::f64::consts::FRAC_PI_2;
-        assert_eq!(carrier.odometry(0.0, Pose2::new(1.0, 1.0, heading)), Pose2::new(1.0, 1.0, heading));
-        carrier.looked(0.0, (true, 0), (Some(&at(0.0)), &Pose2::new(0.0, 0.0, 0.0)));
-        assert!(carrier.carried.is_none());
-        let moved = carrier.odometry(9.0, Pose2::new(1.0, 5.0, heading));
+        assert_eq!(kidnap.odometry(0.0, Pose2::new(1.0, 1.0, heading)), Pose2::new(1.0, 1.0, heading));
+        kidnap.looked(0.0, (true, 0), (Some(&at(0.0)), &Pose2::new(0.0, 0.0, 0.0)));
+        assert!(kidnap.outcome.is_none());
+        let moved = kidnap.odometry(9.0, Pose2::new(1.0, 5.0, heading));
         assert!((moved.x_m - 1.0).abs() < 1e-12 && (moved.y_m - 3.0).abs() < 1e-12, "{moved:?}");
         let truth = Pose2::new(2.0, 0.0, 0.0);
-        carrier.looked(9.0, (false, 0), (Some(&at(0.0)), &truth));
-        carrier.looked(9.5, (true, 1), (Some(&at(0.0)), &truth));
-        carrier.looked(10.0, (true, 0), (Some(&at(1.9)), &truth));
-        carrier.looked(10.5, (true, 1), (Some(&at(0.0)), &truth));
-        let carried = carrier.carried.as_ref().unwrap();
-        assert_eq!((carried.frames, carried.misled, carried.is_found_out), (2, 1, true));
-        let later = carrier.odometry(11.0, Pose2::new(1.0, 6.0, heading));
+        kidnap.looked(9.0, (false, 0), (Some(&at(0.0)), &truth));
+        kidnap.looked(9.5, (true, 1), (Some(&at(0.0)), &truth));
+        kidnap.looked(10.0, (true, 0), (Some(&at(1.9)), &truth));
+        kidnap.looked(10.5, (true, 1), (Some(&at(0.0)), &truth));
+        let outcome = kidnap.outcome.as_ref().unwrap();
+        assert_eq!((outcome.frames, outcome.misled, outcome.is_found_out), (2, 1, true));
+        let later = kidnap.odometry(11.0, Pose2::new(1.0, 6.0, heading));
         assert!((later.y_m - 4.0).abs() < 1e-12, "{later:?}");
     }
 
     #[test]
-    fn a_robot_that_is_not_carried_keeps_its_odometry() {
-        let mut carrier = Carrier::new(0.0);
-        carrier.looked(0.0, (true, 0), (Some(&at(0.0)), &Pose2::new(0.0, 0.0, 0.0)));
-        assert_eq!(carrier.odometry(99.0, Pose2::new(3.0, 0.0, 0.0)), Pose2::new(3.0, 0.0, 0.0));
-        assert!(carrier.carried.is_none());
+    fn a_robot_that_is_not_kidnapped_keeps_its_odometry() {
+        let mut kidnap = Kidnap::new(0.0);
+        kidnap.looked(0.0, (true, 0), (Some(&at(0.0)), &Pose2::new(0.0, 0.0, 0.0)));
+        assert_eq!(kidnap.odometry(99.0, Pose2::new(3.0, 0.0, 0.0)), Pose2::new(3.0, 0.0, 0.0));
+        assert!(kidnap.outcome.is_none());
     }
 }
