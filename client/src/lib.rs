@@ -17,6 +17,6 @@ mod transport;
 pub use capture::Capture;
 pub use error::ClientError;
 pub use map::MapClient;
-pub use named::{NamedLandmark, named, named_landmarks};
+pub use named::{NamedLandmark, named, named_landmarks, quad_corners};
 pub use protos::{self, v1};
 pub use robot::{Delivery, RobotClient, RobotOptions};

@@ -1,6 +1,7 @@
 //! The landmarks that an answer names, and how each was named. In: an answer. Out: one item for each named quad.
 
 use protos::v1::{Answer, QuadAnswer, Sighting, Verdict};
+use vision::detect::quads::Corners;
 
 /// A quad that has a landmark's name.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,6 +39,13 @@ pub fn named(quad: &QuadAnswer) -> Option<NamedLandmark<'_>> {
 /// Every landmark that an answer names, in the order of its quads.
 pub fn named_landmarks(answer: &Answer) -> impl Iterator<Item = NamedLandmark<'_>> {
     answer.quads.iter().filter_map(named)
+}
+
+/// Corners of a quad of an answer (pixels of the frame sent, clockwise from top left); `None` where they are not those of
+/// a convex quad.
+pub fn quad_corners(quad: &QuadAnswer) -> Option<Corners> {
+    let points: Vec<[f64; 2]> = quad.corners.iter().map(|p| [p.u_px, p.v_px]).collect();
+    Corners::try_from(<[[f64; 2]; 4]>::try_from(points).ok()?).ok()
 }
 
 #[cfg(test)]

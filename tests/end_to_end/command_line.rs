@@ -14,7 +14,7 @@ use std::{
 };
 use tempfile::TempDir;
 use tests::{
-    command::{Run, waymark},
+    command::{Run, check_help, check_refused, program, waymark},
     scenes,
 };
 use vision::{detect::quads::Corners, geometry::polygon};
@@ -22,7 +22,7 @@ use vision::{detect::quads::Corners, geometry::polygon};
 const LONGEST: Duration = Duration::from_mins(2);
 
 /// Options that each command must name in its help.
-const OPTIONS: [(&str, &[&str]); 51] = [
+const OPTIONS: [(&str, &[&str]); 29] = [
     ("demo", &["--robots", "--rate-hz", "--legs", "--seed", "--http", "--data", "--stay", "--json"]),
     ("serve", &["--config", "--data", "--http", "--zenoh", "--fleet", "--workers", "--insecure"]),
     (
@@ -96,51 +96,6 @@ const OPTIONS: [(&str, &[&str]); 51] = [
     ("learn", &["--map", "--landmark", "--size", "--whole-image", "--generated-views", "--server"]),
     ("recognise", &["--map", "--camera", "--server", "--json", "<IMAGES>"]),
     (
-        "evaluate navigation",
-        &["--drives", "--posters", "--length-m", "--rate-hz", "--seed", "--json", "--plot"],
-    ),
-    (
-        "evaluate detection",
-        &[
-            "--min-side-px",
-            "--params",
-            "--compare",
-            "--plot",
-            "--worst",
-            "--draw",
-            "--misses",
-            "--reviewed",
-            "--json",
-            "--keep",
-            "--views",
-            "--seed",
-            "<SETS>",
-        ],
-    ),
-    ("evaluate modalities", &["--runs", "--drives", "--seed", "--json", "--plot"]),
-    ("evaluate recognition", &["--generated-views", "--distance", "--misses", "--json", "<SET>"]),
-    (
-        "evaluate viewpoint",
-        &[
-            "--set",
-            "--photographs",
-            "--taught",
-            "--landmarks",
-            "--views",
-            "--size-px",
-            "--corner-noise-px",
-            "--detector",
-            "--seed",
-            "--plot",
-            "--json",
-        ],
-    ),
-    ("evaluate scale", &["--landmarks", "--views", "--detector", "--plot"]),
-    ("evaluate illumination", &["--landmarks", "--views", "--detector", "--plot"]),
-    ("evaluate occlusion", &["--landmarks", "--views", "--detector", "--plot"]),
-    ("evaluate discrimination", &["--landmarks", "--strangers", "--views", "--own-views", "--plot"]),
-    ("evaluate lookalikes", &["--pairs", "--views", "--photographs"]),
-    (
         "calibrate",
         &[
             "--size",
@@ -151,58 +106,6 @@ const OPTIONS: [(&str, &[&str]); 51] = [
             "--unknown-aspect",
             "--json",
             "[IMAGES]...",
-        ],
-    ),
-    ("evaluate confidence", &["--quads", "--set", "--plot", "--json"]),
-    (
-        "evaluate calibration",
-        &["--views", "--trials", "--corner-noise-px", "--seed", "--python", "--json", "--plot", "[SETS]..."],
-    ),
-    ("evaluate placement", &["--rooms", "--views", "--corridors", "--seed", "--json"]),
-    ("evaluate pose", &["--draws", "--drives", "--seed", "--no-peers", "--python", "--json"]),
-    (
-        "evaluate mapping",
-        &["--odometry-noise", "--seed", "--duration-s", "--params", "--draw", "--plot", "--json", "[LOGS]"],
-    ),
-    ("evaluate visibility", &["--maps", "--points", "--seed", "--plot", "--json"]),
-    ("fit confidence", &["--quads", "--set", "--photographs", "--rust"]),
-    (
-        "fit search",
-        &[
-            "--scenes",
-            "--pictures",
-            "--weight",
-            "--folds",
-            "--held-out-seed",
-            "--hidden",
-            "--ridge",
-            "--steps",
-            "--out",
-            "--rust",
-            "--json",
-            "[SETS]...",
-        ],
-    ),
-    ("fit similarity", &["--out", "--json", "--without", "--views", "--seed", "<SETS>"]),
-    ("bench", &["--frames", "--landmarks", "--rounds", "--seed", "--json"]),
-    (
-        "bench detect",
-        &["--data", "--count", "--rounds", "--no-peers", "--python", "--seed", "--json", "[IMAGES]"],
-    ),
-    (
-        "bench recognise",
-        &[
-            "--landmarks",
-            "--taught",
-            "--quads",
-            "--recall-quads",
-            "--frames",
-            "--rounds",
-            "--views",
-            "--no-peers",
-            "--python",
-            "--seed",
-            "--json",
         ],
     ),
     ("", &["--log", "--version"]),
@@ -404,24 +307,6 @@ fn every_stage_is_drawn_for_every_picture_of_a_folder() {
 }
 
 #[test]
-fn detection_is_timed_without_data_and_without_python() {
-    let folder = TempDir::new().expect("a temporary directory");
-    let nowhere = folder.path().join("nothing");
-    let mut args: Vec<OsString> =
-        ["bench", "detect", "--count", "1", "--rounds", "1", "--json"].map(Into::into).into();
-    args.extend(["--python".into(), nowhere.clone().into(), "--data".into(), nowhere.into()]);
-    let run = waymark(args, LONGEST);
-    assert!(run.stderr.contains("OpenCV is left out") && run.stderr.contains("pip install"), "{run:?}");
-    let report = run.last_json();
-    assert_eq!((&report["frames"], &report["from"]), (&1.into(), &"rendered corridors".into()), "{report}");
-    let ms =
-        |name: &str| report["ours"][name]["median_ms"].as_f64().unwrap_or_else(|| panic!("{name}: {report}"));
-    assert!(0.0 < ms("edges") && ms("edges") < ms("frame to segments"), "{report}");
-    assert!(report["stages_ms"]["quads"].as_f64().is_some_and(|ms| ms > 0.0), "{report}");
-    assert_eq!(report["ratios"], Value::Array(vec![]), "{report}");
-}
-
-#[test]
 fn parameters_are_shown_taken_and_checked() {
     let shown = waymark(["detect", "--show-params", "--scales", "1", "--set", "edges.high=9"], LONGEST);
     let all: Value = serde_json::from_str(&shown.stdout).expect("JSON");
@@ -432,33 +317,9 @@ fn parameters_are_shown_taken_and_checked() {
     }
 }
 
-/// Commands that the help of `command` lists.
-fn listed(help: &str) -> Vec<String> {
-    let section = help.split("\nCommands:\n").nth(1).unwrap_or("");
-    let lines = section.lines().take_while(|line| !line.is_empty());
-    // A command is indented by two, its explanation by more.
-    lines
-        .filter(|l| l.starts_with("  ") && !l.starts_with("   "))
-        .filter_map(|l| l.split_whitespace().next().map(str::to_owned))
-        .filter(|name| name != "help")
-        .collect()
-}
-
 #[test]
 fn every_command_explains_its_options() {
-    let (mut open, mut helps) = (vec![String::new()], BTreeMap::new());
-    while let Some(command) = open.pop() {
-        let run = waymark(command.split_whitespace().chain(["--help"]), LONGEST);
-        assert_eq!((run.status, run.stderr.as_str()), (0, ""), "{command}: {run:?}");
-        open.extend(listed(&run.stdout).iter().map(|name| format!("{command} {name}").trim().to_owned()));
-        helps.insert(command, run.stdout);
-    }
-    for (command, options) in OPTIONS {
-        let help = helps.get(command).unwrap_or_else(|| panic!("`{command}` is not listed: {helps:#?}"));
-        for option in options {
-            assert!(help.contains(option), "`{command} --help` does not name {option}:\n{help}");
-        }
-    }
+    check_help(program(), &OPTIONS, LONGEST);
 }
 
 #[test]
@@ -469,14 +330,11 @@ fn what_does_not_exist_is_refused() {
         "demo --robots 0",
         "demo --rate-hz fast",
         "evaluate",
-        "evaluate recognition --distance near .",
         "learn --map m --landmark l --size 0x1 a.png",
         "recognise --map m --camera 1,2,3 a.png",
         "fly",
     ];
     for line in wrong {
-        let run = waymark(line.split(' '), LONGEST);
-        assert_eq!((run.status, run.stdout.as_str()), (2, ""), "`{line}`: {run:?}");
-        assert!(run.stderr.contains("Usage") || run.stderr.contains("--help"), "`{line}`: {run:?}");
+        check_refused(program(), line, LONGEST);
     }
 }

@@ -59,7 +59,7 @@ fn documents_name_only_files_that_exist() {
 fn sources() -> String {
     let mut text = String::new();
     let mut folders: Vec<PathBuf> =
-        ["vision/src", "map/src", "protos", "sim/src", "sim/tests", "client/src", "server/src", "tests"]
+        ["vision", "map", "formats", "protos", "sim", "client", "server", "lab", "tests"]
             .map(|f| root().join(f))
             .into();
     while let Some(folder) = folders.pop() {

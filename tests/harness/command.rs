@@ -1,10 +1,11 @@
 //! One run of the real program: arguments in, status and what it printed out. A run that does not end is killed.
 
-use crate::child::program;
 use serde_json::Value;
 use std::{
+    collections::BTreeMap,
     ffi::OsStr,
     io::Read,
+    path::Path,
     process::{Command, Stdio},
     thread,
     time::{Duration, Instant},
@@ -39,7 +40,54 @@ impl Run {
 
 /// Runs `waymark` with these arguments, for `longest` at most.
 pub fn waymark<A: AsRef<OsStr>>(args: impl IntoIterator<Item = A>, longest: Duration) -> Run {
-    let mut command = Command::new(program());
+    run(program(), args, longest)
+}
+
+/// Checks that the help of every command (`COMMAND` or `COMMAND SUBCOMMAND`, with the options it must name) exists, and that
+/// `--help` of every command works.
+pub fn check_help(program: &Path, options: &[(&str, &[&str])], longest: Duration) {
+    let (mut open, mut helps) = (vec![String::new()], BTreeMap::new());
+    while let Some(command) = open.pop() {
+        let run = run(program, command.split_whitespace().chain(["--help"]), longest);
+        assert_eq!((run.status, run.stderr.as_str()), (0, ""), "{command}: {run:?}");
+        open.extend(listed(&run.stdout).iter().map(|name| format!("{command} {name}").trim().to_owned()));
+        helps.insert(command, run.stdout);
+    }
+    for (command, options) in options {
+        let help = helps.get(*command).unwrap_or_else(|| panic!("`{command}` is not listed: {helps:#?}"));
+        for option in *options {
+            assert!(help.contains(option), "`{command} --help` does not name {option}:\n{help}");
+        }
+    }
+}
+
+/// Commands that the help of a command lists.
+fn listed(help: &str) -> Vec<String> {
+    let section = help.split("\nCommands:\n").nth(1).unwrap_or("");
+    let lines = section.lines().take_while(|line| !line.is_empty());
+    // A command is indented by two, its explanation by more.
+    lines
+        .filter(|l| l.starts_with("  ") && !l.starts_with("   "))
+        .filter_map(|l| l.split_whitespace().next().map(str::to_owned))
+        .filter(|name| name != "help")
+        .collect()
+}
+
+/// Checks that a command line is refused as a wrong use, with nothing on standard output.
+pub fn check_refused(program: &Path, line: &str, longest: Duration) {
+    let run = run(program, line.split(' '), longest);
+    assert_eq!((run.status, run.stdout.as_str()), (2, ""), "`{line}`: {run:?}");
+    assert!(run.stderr.contains("Usage") || run.stderr.contains("--help"), "`{line}`: {run:?}");
+}
+
+/// The `waymark` program of this build.
+pub fn program() -> &'static Path {
+    crate::child::program()
+}
+
+/// Runs `program` with these arguments, for `longest` at most.
+pub fn run<A: AsRef<OsStr>>(program: &Path, args: impl IntoIterator<Item = A>, longest: Duration) -> Run {
+    let mut command = Command::new(program);
     command.args(args).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
     // Only the program's own settings: what the tests' caller has set must not change a claim.
     for name in ["WAYMARK_LOG", "WAYMARK_SERVER", "WAYMARK_CONFIG", "WAYMARK_DATA"] {

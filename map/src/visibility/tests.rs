@@ -118,7 +118,7 @@ fn compared_with_brute_force(scene: Scene, seeds: u64) -> (u32, u32, u32) {
 
 #[test]
 fn polygons_agree_with_brute_force() {
-    // Oracle: every condition at every point by itself. The whole comparison is `waymark evaluate visibility`.
+    // Oracle: every condition at every point by itself. The whole comparison is `waymark-lab evaluate visibility`.
     let (looked, differ, seen) = compared_with_brute_force(random_map, 40);
     assert!(seen > 500, "{seen} of {looked}");
     assert!(differ <= 1, "{differ} of {looked}");

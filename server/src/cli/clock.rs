@@ -3,16 +3,16 @@
 
 /// Seconds from one moment to a later one on the same thread.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Clock(f64);
+pub struct Clock(f64);
 
 impl Clock {
     /// Starts now.
-    pub(crate) fn start() -> Self {
+    pub fn start() -> Self {
         Self(now_s())
     }
 
     /// Milliseconds of work since the start.
-    pub(crate) fn ms(self) -> f64 {
+    pub fn ms(self) -> f64 {
         (now_s() - self.0) * 1e3
     }
 }

@@ -7,20 +7,28 @@ use std::path::Path;
 use vision::{detect::quads::Corners, frame::GrayImage, geometry::polygon};
 
 /// Red, green, blue.
-pub(crate) type Colour = [u8; 3];
+pub type Colour = [u8; 3];
 
-/// Colours that are told apart on grey, by colour-blind eyes too.
-pub(crate) const GREEN: Colour = [60, 220, 90];
-pub(crate) const RED: Colour = [255, 60, 50];
-pub(crate) const BLUE: Colour = [80, 150, 255];
-pub(crate) const YELLOW: Colour = [255, 215, 0];
-pub(crate) const ORANGE: Colour = [255, 140, 30];
-pub(crate) const CYAN: Colour = [0, 210, 230];
-pub(crate) const MAGENTA: Colour = [240, 90, 230];
-pub(crate) const WHITE: Colour = [255, 255, 255];
+// Colours that are told apart on grey, by colour-blind eyes too.
+/// Green.
+pub const GREEN: Colour = [60, 220, 90];
+/// Red.
+pub const RED: Colour = [255, 60, 50];
+/// Blue.
+pub const BLUE: Colour = [80, 150, 255];
+/// Yellow.
+pub const YELLOW: Colour = [255, 215, 0];
+/// Orange.
+pub const ORANGE: Colour = [255, 140, 30];
+/// Cyan.
+pub const CYAN: Colour = [0, 210, 230];
+/// Magenta.
+pub const MAGENTA: Colour = [240, 90, 230];
+/// White.
+pub const WHITE: Colour = [255, 255, 255];
 
 /// Many things of a kind, neighbours of different colour.
-pub(crate) const SERIES: [Colour; 10] =
+pub const SERIES: [Colour; 10] =
     [GREEN, ORANGE, BLUE, YELLOW, MAGENTA, CYAN, RED, [170, 255, 160], [190, 160, 255], [255, 190, 170]];
 
 /// Height of the line of words under a picture.
@@ -30,7 +38,7 @@ const DOT_PX: usize = 2;
 
 /// A colour picture.
 #[derive(Debug, Clone)]
-pub(crate) struct Picture {
+pub struct Picture {
     width: usize,
     height: usize,
     rgb: Vec<u8>,
@@ -38,26 +46,28 @@ pub(crate) struct Picture {
 
 impl Picture {
     /// A black one.
-    pub(crate) fn black(width: usize, height: usize) -> Self {
+    pub fn black(width: usize, height: usize) -> Self {
         Self { width, height, rgb: vec![0; 3 * width * height] }
     }
 
     /// A grey image, its contrast times `brightness`.
-    pub(crate) fn of(image: &GrayImage, brightness: f32) -> Self {
+    pub fn of(image: &GrayImage, brightness: f32) -> Self {
         let rgb = image.data().iter().flat_map(|g| [(f32::from(*g) * brightness) as u8; 3]).collect();
         Self { width: image.width(), height: image.height(), rgb }
     }
 
-    pub(crate) fn width(&self) -> usize {
+    /// Pixels in a row.
+    pub fn width(&self) -> usize {
         self.width
     }
 
-    pub(crate) fn height(&self) -> usize {
+    /// Rows.
+    pub fn height(&self) -> usize {
         self.height
     }
 
     /// Lays `colour` over a pixel, 0 not at all, 1 completely.
-    pub(crate) fn blend(&mut self, u: i64, v: i64, colour: Colour, share: f64) {
+    pub fn blend(&mut self, u: i64, v: i64, colour: Colour, share: f64) {
         if u < 0 || v < 0 || u >= self.width as i64 || v >= self.height as i64 {
             return;
         }
@@ -69,7 +79,7 @@ impl Picture {
     }
 
     /// A straight line with smooth edges.
-    pub(crate) fn line(&mut self, from: [f64; 2], to: [f64; 2], width_px: f64, colour: Colour) {
+    pub fn line(&mut self, from: [f64; 2], to: [f64; 2], width_px: f64, colour: Colour) {
         let Some((from, to)) = self.cut(from, to, width_px + 1.0) else { return };
         let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
         let length = dx.hypot(dy);
@@ -119,12 +129,12 @@ impl Picture {
     }
 
     /// A filled disc with a smooth edge.
-    pub(crate) fn disc(&mut self, [x, y]: [f64; 2], radius_px: f64, colour: Colour) {
+    pub fn disc(&mut self, [x, y]: [f64; 2], radius_px: f64, colour: Colour) {
         self.line([x, y], [x, y], 2.0 * radius_px, colour);
     }
 
     /// The outline of a quad.
-    pub(crate) fn quad(&mut self, corners: &Corners, width_px: f64, colour: Colour) {
+    pub fn quad(&mut self, corners: &Corners, width_px: f64, colour: Colour) {
         for (i, from) in corners.points().iter().enumerate() {
             let to = corners.points()[(i + 1) % 4];
             self.line([from.x, from.y], [to.x, to.y], width_px, colour);
@@ -132,7 +142,7 @@ impl Picture {
     }
 
     /// The inside of a quad, tinted.
-    pub(crate) fn tint(&mut self, corners: &Corners, colour: Colour, share: f64) {
+    pub fn tint(&mut self, corners: &Corners, colour: Colour, share: f64) {
         let (low, high) = polygon::bounds(corners.points());
         let range = |low: f64, high: f64, size: usize| {
             (low.max(0.0) as usize).min(size)..(high.max(-1.0) + 1.0).min(size as f64) as usize
@@ -148,7 +158,7 @@ impl Picture {
     }
 
     /// Block capitals, `dot` pixels a dot, top left corner given. Gives the width.
-    pub(crate) fn text(&mut self, [x, y]: [usize; 2], dot: usize, words: &str, colour: Colour) -> usize {
+    pub fn text(&mut self, [x, y]: [usize; 2], dot: usize, words: &str, colour: Colour) -> usize {
         let advance = (font::COLUMNS + 1) * dot;
         for (i, letter) in words.chars().enumerate() {
             for (row, bits) in font::glyph(letter.to_ascii_uppercase()).iter().enumerate() {
@@ -164,7 +174,8 @@ impl Picture {
     }
 
     /// The same with a line of words below, each in its colour.
-    pub(crate) fn with_legend(self, words: &[(&str, Colour)]) -> Self {
+    #[must_use]
+    pub fn with_legend(self, words: &[(&str, Colour)]) -> Self {
         let needed: usize = words.iter().map(|(w, _)| (w.chars().count() + 2) * (font::COLUMNS + 1)).sum();
         let dot = if needed * DOT_PX <= self.width { DOT_PX } else { 1 };
         let mut out = Self::black(self.width, self.height + LEGEND_PX);
@@ -177,7 +188,7 @@ impl Picture {
     }
 
     /// Copies another picture in with its top left corner at (u, v).
-    pub(crate) fn paste(&mut self, other: &Self, [u, v]: [usize; 2]) {
+    pub fn paste(&mut self, other: &Self, [u, v]: [usize; 2]) {
         let width = other.width.min(self.width.saturating_sub(u));
         for row in 0..other.height.min(self.height.saturating_sub(v)) {
             let to = 3 * ((v + row) * self.width + u);
@@ -187,7 +198,8 @@ impl Picture {
     }
 
     /// Enlarged by a whole factor, every pixel a block.
-    pub(crate) fn enlarged(&self, factor: usize) -> Self {
+    #[must_use]
+    pub fn enlarged(&self, factor: usize) -> Self {
         let mut out = Self::black(self.width * factor, self.height * factor);
         for v in 0..out.height {
             for u in 0..out.width {
@@ -200,7 +212,7 @@ impl Picture {
     }
 
     /// Writes it as a PNG file.
-    pub(crate) fn save(&self, path: &Path) -> anyhow::Result<()> {
+    pub fn save(&self, path: &Path) -> anyhow::Result<()> {
         let mut out = Vec::new();
         png::PngEncoder::new_with_quality(&mut out, png::CompressionType::Fast, png::FilterType::Sub)
             .write_image(&self.rgb, self.width as u32, self.height as u32, ExtendedColorType::Rgb8)?;

@@ -1,26 +1,24 @@
 //! The `waymark` command line: one file per command.
 
 mod answers;
-mod bench;
+pub mod arg_parsers;
 mod calibrate;
-mod clock;
+pub mod clock;
 mod demo;
 mod detect;
-mod drawing;
-mod fit;
+pub mod drawing;
 mod gather;
-mod given;
-pub(crate) mod evaluate;
-pub(crate) mod mapping;
-mod parameters;
-mod own_errors;
-pub(crate) mod pictures;
+pub mod mapping;
+pub mod parameters;
+pub mod simulated_errors;
+pub mod pictures;
 mod run;
-pub(crate) mod scratch;
-mod screen;
+pub mod scratch;
+pub mod screen;
 mod serve;
+pub mod stopwatch;
 mod sight;
-mod survey;
+pub mod survey;
 mod teach;
 
 use clap::{Parser, Subcommand};
@@ -97,23 +95,15 @@ enum Command {
     Run(run::Command),
     /// Ask a running server what is in photographs.
     Recognise(teach::RecogniseArgs),
-    /// The paper's experiments on labelled pictures: tables for people, JSON for programs.
-    #[command(subcommand)]
-    Evaluate(evaluate::Command),
-    /// What each stage of the pipeline costs on this machine.
-    ///
-    /// Without more words: a whole frame, recognition and poses included, on rendered frames of a corridor.
-    /// `waymark bench detect`: from frame to quads beside OpenCV on the same pictures.
-    Bench(bench::Args),
-    /// Fit parameters of detector and confidence to pictures whose truth is known.
-    #[command(subcommand)]
-    Fit(fit::Command),
 }
 
 /// Runs the program.
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
-    start_log(cli.log.as_deref(), &cli.command);
+    // A running server logs what it does; the other commands print results.
+    let default =
+        if matches!(cli.command, Command::Serve(_)) { "info,zenoh=warn" } else { "warn,zenoh=error" };
+    start_log(cli.log.as_deref(), default);
     let done = match &cli.command {
         Command::Demo(args) => run(demo::run(args)),
         Command::Serve(serve) => run(serve.clone().run()).map(|()| ExitCode::SUCCESS),
@@ -125,9 +115,6 @@ pub fn main() -> ExitCode {
         Command::Gather(command) => run(gather::run(command)).map(|()| ExitCode::SUCCESS),
         Command::Run(command) => run(run::run(command)).map(|()| ExitCode::SUCCESS),
         Command::Recognise(args) => run(teach::recognise(args)),
-        Command::Evaluate(command) => evaluate::run(command).map(|()| ExitCode::SUCCESS),
-        Command::Bench(args) => bench::run(args).map(|()| ExitCode::SUCCESS),
-        Command::Fit(command) => fit::run(command).map(|()| ExitCode::SUCCESS),
     };
     match done {
         Ok(code) => code,
@@ -142,11 +129,9 @@ fn run<T>(work: impl Future<Output = anyhow::Result<T>>) -> anyhow::Result<T> {
     tokio::runtime::Builder::new_multi_thread().enable_all().build()?.block_on(work)
 }
 
-/// Logs go to stderr: stdout belongs to results.
-fn start_log(filter: Option<&str>, command: &Command) {
-    // A server tells of its life; the other commands have their own words.
-    let usual = if matches!(command, Command::Serve(_)) { "info,zenoh=warn" } else { "warn,zenoh=error" };
-    let filter = tracing_subscriber::EnvFilter::builder().parse_lossy(filter.unwrap_or(usual));
+/// Starts the log on standard error (standard output belongs to results), with `filter` or else with `default`.
+pub fn start_log(filter: Option<&str>, default: &str) {
+    let filter = tracing_subscriber::EnvFilter::builder().parse_lossy(filter.unwrap_or(default));
     tracing_subscriber::fmt()
         .with_env_filter(filter)
         .with_writer(std::io::stderr)

@@ -10,7 +10,7 @@ use vision::params::DetectParams;
 /// How quads are looked for.
 #[derive(Debug, Clone, Default, clap::Args)]
 #[command(next_help_heading = "Detection parameters")]
-pub(crate) struct ParameterArgs {
+pub struct ParameterArgs {
     /// Parameters as JSON, only what differs from the defaults, such as {"quads": {"grouping": "relaxation"}}.
     #[arg(long, value_name = "FILE")]
     params: Option<PathBuf>,
@@ -53,7 +53,7 @@ pub(crate) struct ParameterArgs {
 
 impl ParameterArgs {
     /// The parameters asked for; those not mentioned have their defaults.
-    pub(crate) fn parameters(&self) -> anyhow::Result<DetectParams> {
+    pub fn parameters(&self) -> anyhow::Result<DetectParams> {
         let mut all = serde_json::to_value(pictures::detect_params(self.params.as_deref())?)?;
         for (path, value) in self.flags() {
             put(&mut all, path, value)?;
@@ -70,7 +70,7 @@ impl ParameterArgs {
     }
 
     /// What to call them in a report.
-    pub(crate) fn name(&self) -> String {
+    pub fn name(&self) -> String {
         let file = self.params.as_deref().and_then(std::path::Path::file_stem);
         let file = file.map(|stem| stem.to_string_lossy().into_owned());
         let flag = |(path, value): (&str, Value)| {
@@ -84,7 +84,8 @@ impl ParameterArgs {
     }
 
     /// The same with one more change by its path.
-    pub(crate) fn with(&self, assignment: &str) -> Self {
+    #[must_use]
+    pub fn with(&self, assignment: &str) -> Self {
         let set = self.set.iter().cloned().chain([assignment.to_owned()]).collect();
         Self { set, ..self.clone() }
     }

@@ -11,15 +11,17 @@ const JPEG_QUALITY: u8 = 85;
 
 /// Why a picture file cannot be used.
 #[derive(Debug, thiserror::Error)]
-pub(crate) enum PictureError {
+pub enum PictureError {
+    /// The file cannot be opened or read.
     #[error("{0}")]
     Read(#[from] std::io::Error),
+    /// The decoder refuses it: the reason.
     #[error("{0}")]
     Refused(String),
 }
 
 /// Reads and decodes a PNG or JPEG file. No more of it is read than the upload limit allows.
-pub(crate) fn read(path: &Path) -> Result<GrayImage, PictureError> {
+pub fn read(path: &Path) -> Result<GrayImage, PictureError> {
     let limits = ImageLimits::UPLOAD;
     let mut bytes = Vec::new();
     // One byte more than allowed is enough for the decoder to refuse it.
@@ -28,19 +30,19 @@ pub(crate) fn read(path: &Path) -> Result<GrayImage, PictureError> {
 }
 
 /// Whether a file's name ends like that of a picture that can be read.
-pub(crate) fn is_picture(path: &Path) -> bool {
+pub fn is_picture(path: &Path) -> bool {
     path.extension().is_some_and(|e| ["png", "jpg", "jpeg"].iter().any(|known| e.eq_ignore_ascii_case(known)))
 }
 
 /// Detection parameters from a JSON file that names only what differs from the defaults; no file, the defaults.
-pub(crate) fn detect_params(file: Option<&Path>) -> anyhow::Result<DetectParams> {
+pub fn detect_params(file: Option<&Path>) -> anyhow::Result<DetectParams> {
     let Some(path) = file else { return Ok(DetectParams::default()) };
     let text = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
     serde_json::from_slice(&text).with_context(|| format!("{} holds no detection parameters", path.display()))
 }
 
 /// A grey image as JPEG.
-pub(crate) fn jpeg(image: &GrayImage) -> Result<Vec<u8>, image::ImageError> {
+pub fn jpeg(image: &GrayImage) -> Result<Vec<u8>, image::ImageError> {
     let mut out = Vec::new();
     image::codecs::jpeg::JpegEncoder::new_with_quality(&mut out, JPEG_QUALITY).write_image(
         image.data(),

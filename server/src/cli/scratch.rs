@@ -4,7 +4,7 @@ use crate::config::{Config, ConfigError, RawConfig};
 use std::path::{Path, PathBuf};
 
 /// Settings of a server that only this program knows of: free ports, and frames as large as the wire allows.
-pub(crate) fn private_server(data: &Path) -> Result<Config, ConfigError> {
+pub fn private_server(data: &Path) -> Result<Config, ConfigError> {
     let mut raw = RawConfig {
         data: data.to_owned(),
         http: "127.0.0.1:0".to_owned(),
@@ -17,11 +17,11 @@ pub(crate) fn private_server(data: &Path) -> Result<Config, ConfigError> {
 
 /// Exists as long as the value does.
 #[derive(Debug)]
-pub(crate) struct Folder(PathBuf);
+pub struct Folder(PathBuf);
 
 impl Folder {
     /// Makes a new folder under the system's temporary folder; the name says what for.
-    pub(crate) fn new(what: &str) -> std::io::Result<Self> {
+    pub fn new(what: &str) -> std::io::Result<Self> {
         let base = std::env::temp_dir();
         let mut number = std::process::id();
         loop {
@@ -37,7 +37,7 @@ impl Folder {
     }
 
     /// Where it is.
-    pub(crate) fn path(&self) -> &Path {
+    pub fn path(&self) -> &Path {
         &self.0
     }
 }

@@ -4,20 +4,20 @@ use indicatif::{ProgressBar, ProgressStyle};
 use std::io::{IsTerminal, Write as _};
 
 /// One result line on standard output. A closed pipe (`| head`) ends the program quietly.
-pub(crate) fn say(line: &str) {
+pub fn say(line: &str) {
     if writeln!(std::io::stdout(), "{line}").is_err() {
         std::process::exit(0);
     }
 }
 
 /// One line on standard error.
-pub(crate) fn complain(line: &str) {
+pub fn complain(line: &str) {
     // With standard error gone there is nobody left to tell.
     writeln!(std::io::stderr(), "{line}").ok();
 }
 
 /// A progress bar of `steps`, on a terminal only.
-pub(crate) fn progress(steps: usize, what: &'static str) -> ProgressBar {
+pub fn progress(steps: usize, what: &'static str) -> ProgressBar {
     if !std::io::stderr().is_terminal() {
         return ProgressBar::hidden();
     }

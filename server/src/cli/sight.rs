@@ -1,6 +1,6 @@
 //! `waymark map sight`: the camera that looks for a map's landmarks, with angles in degrees, as people have them.
 
-use super::given::numbers;
+use super::arg_parsers::numbers;
 use client::MapClient;
 use serde_json::{Map, Value};
 

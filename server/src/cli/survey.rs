@@ -4,7 +4,7 @@
 //! What a person adds in the field is the name of the poster and a click on the right quad; here the simulator's truth
 //! stands in for the click. Corners, places and sizes are measured, not taken from the truth.
 
-use super::{own_errors::OwnErrors, screen};
+use super::{screen, simulated_errors::SimulatedRobotErrors};
 use map::{
     lines::{self, LineParams},
     mounting::Mounting,
@@ -33,36 +33,41 @@ use vision::{
 /// The person clicks on the quad that is the poster.
 const IOU_CLICKED: f64 = 0.7;
 
-/// One look at a poster in which it was found.
-pub(crate) struct View {
-    pub(crate) quad: Quad,
-    pub(crate) sighting: Sighting,
-    /// Where the robot says that it stood, and that its camera sat.
+/// A frame in which a poster was found.
+#[derive(Debug)]
+pub struct SurveyView {
+    /// The poster's quad.
+    pub quad: Quad,
+    /// The frame, and the truth about it.
+    pub sighting: Sighting,
+    // Pose and extrinsics as the robot states them.
     map_from_robot: Pose2Covariance,
     mounting: Mounting,
 }
 
-/// What the surveying robot brought home.
-pub(crate) struct Survey {
-    pub(crate) walls: Vec<LaserSegment>,
-    /// By poster.
-    pub(crate) views: BTreeMap<String, Vec<View>>,
-    /// Looks at a poster in which the detector did not find it.
-    pub(crate) missed: usize,
+/// What a surveying robot gathered.
+#[derive(Debug)]
+pub struct Survey {
+    /// Walls from its laser.
+    pub walls: Vec<LaserSegment>,
+    /// Views by name of the poster.
+    pub views: BTreeMap<String, Vec<SurveyView>>,
+    /// Frames of a poster in which the detector did not find it.
+    pub missed: usize,
 }
 
 /// Drives to all stops.
-pub(crate) fn survey(mut robot: Robot, stops: &[Stop], mut wrong: OwnErrors) -> anyhow::Result<Survey> {
+pub fn survey(mut robot: Robot, stops: &[Stop], mut wrong: SimulatedRobotErrors) -> anyhow::Result<Survey> {
     let progress = screen::progress(stops.len(), "first drive");
     let mut walls = Walls::new(WallParams::default());
-    let (mut views, mut missed) = (BTreeMap::<String, Vec<View>>::new(), 0);
+    let (mut views, mut missed) = (BTreeMap::<String, Vec<SurveyView>>::new(), 0);
     for stop in stops {
         let sighting = robot.look(&stop.step);
         let map_from_robot = wrong.surveyed(&sighting.step.map_from_robot)?;
         let mounting = wrong.mounting(&sighting.step.robot_from_camera)?;
         walls.add(&map_from_robot, &lines::segments(&sighting.scan, &LineParams::default()))?;
         match clicked(&sighting, &stop.landmark) {
-            Some(quad) => views.entry(stop.landmark.clone()).or_default().push(View {
+            Some(quad) => views.entry(stop.landmark.clone()).or_default().push(SurveyView {
                 quad,
                 sighting,
                 map_from_robot,
@@ -87,8 +92,8 @@ fn clicked(sighting: &Sighting, name: &str) -> Option<Quad> {
 
 /// Where the views say that it hangs, and which of them agree on that. The others saw another border of the same thing,
 /// or something else: their icons would not fit the model (method 7, rectangle consistency).
-pub(crate) fn hang(
-    views: &[View],
+pub fn hang(
+    views: &[SurveyView],
     walls: &[LaserSegment],
     camera: &Intrinsics,
 ) -> Option<(LandmarkPlace, Vec<usize>)> {

@@ -2,7 +2,7 @@
 
 use super::{
     answers::{robot_line, sentence},
-    given::{camera, numbers, size},
+    arg_parsers::{camera, distance, numbers, size},
     mapping, screen,
     sight::{self, SightArgs},
 };
@@ -212,11 +212,6 @@ pub(crate) struct RecogniseArgs {
     images: Vec<PathBuf>,
     #[command(flatten)]
     server: ServerArgs,
-}
-
-pub(crate) fn distance(text: &str) -> Result<DistanceKind, String> {
-    serde_json::from_value(serde_json::Value::from(text))
-        .map_err(|error| format!("{error}; one of: both, correlation, hausdorff"))
 }
 
 pub(crate) async fn map(command: &MapCommand) -> anyhow::Result<()> {

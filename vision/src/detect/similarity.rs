@@ -46,7 +46,7 @@ pub struct SimilarityParams {
     pub max_candidates: usize,
 }
 
-/// Weights by `waymark fit similarity` on photographs of paintings and rendered corridors.
+/// Weights by `waymark-lab train similarity` on photographs of paintings and rendered corridors.
 ///
 /// Departs from method 2, which asks for this fit: opposite sides of a quad are told by their lengths and a third side,
 /// hardly by the profiles across them. What it gained is in docs/METHOD.md.

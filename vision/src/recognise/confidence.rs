@@ -50,7 +50,7 @@ pub fn measures(candidates: &[Candidate], best: usize, landmarks: usize) -> Opti
 }
 
 /// Chance that the identity of candidate `best` is right: a logistic curve over [`measures`], fitted to answers whose truth
-/// is known (`waymark fit confidence`), by the distance that decides. It never rises with any measure. How well it keeps
+/// is known (`waymark-lab train confidence`), by the distance that decides. It never rises with any measure. How well it keeps
 /// its word is in docs/EVALUATION.md. 0 without such a candidate.
 pub fn confidence(candidates: &[Candidate], best: usize, landmarks: usize, kind: DistanceKind) -> f64 {
     let weights = match kind {

@@ -2,7 +2,7 @@
 //! for byte, with the open sets as pictures (see docs/EVALUATION.md).
 //!
 //! ```text
-//! waymark fit confidence --set calibrate --photographs museum-paintings --photographs poster-textures-estense \
+//! waymark-lab train confidence --set calibrate --photographs museum-paintings --photographs poster-textures-estense \
 //!   --rust vision/src/recognise/confidence_learnt.rs
 //! ```
 

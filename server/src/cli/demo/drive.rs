@@ -6,7 +6,7 @@ use crate::{
     cli::{pictures, screen},
 };
 use anyhow::Context as _;
-use client::{Capture, MapClient, RobotClient, RobotOptions, named_landmarks, v1::Answer};
+use client::{Capture, MapClient, RobotClient, RobotOptions, named_landmarks, quad_corners, v1::Answer};
 use map::pose2::Pose2;
 use protos::Name;
 use sim::{
@@ -204,8 +204,7 @@ impl Journey {
 
 fn is_true(name: &str, quad: &client::v1::QuadAnswer, truth: &FrameTruth) -> bool {
     let Some(landmark) = truth.landmark(name) else { return false };
-    crate::cli::evaluate::recognition::corners_of(quad)
-        .is_some_and(|c| polygon::iou(c.points(), landmark.corners_px.points()) >= IOU_TRUE)
+    quad_corners(quad).is_some_and(|c| polygon::iou(c.points(), landmark.corners_px.points()) >= IOU_TRUE)
 }
 
 impl Record {

@@ -4,8 +4,8 @@ use super::MAP;
 use crate::{
     RunningServer,
     cli::{
-        own_errors::OwnErrors,
         pictures, screen,
+        simulated_errors::SimulatedRobotErrors,
         survey::{hang, survey},
     },
 };
@@ -49,7 +49,8 @@ pub(super) async fn teach(
     let camera = *robot.camera().intrinsics();
     let stops = stops(building, &LessonParams { seed, ..LessonParams::default() });
     let survey =
-        tokio::task::spawn_blocking(move || survey(robot, &stops, OwnErrors::none(&camera))).await??;
+        tokio::task::spawn_blocking(move || survey(robot, &stops, SimulatedRobotErrors::none(&camera)))
+            .await??;
 
     let mut taught = Taught { walls: survey.walls.len(), views_missed: survey.missed, ..Taught::default() };
     let ends: Vec<[[f64; 2]; 2]> = survey.walls.iter().map(|w| [w.a.into(), w.b.into()]).collect();

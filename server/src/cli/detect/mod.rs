@@ -3,7 +3,7 @@
 mod record;
 mod draw;
 
-use super::{parameters::ParameterArgs, pictures, screen};
+use super::{parameters::ParameterArgs, pictures, screen, stopwatch::Stopwatch};
 use anyhow::Context as _;
 use record::Record;
 use serde::Serialize;
@@ -11,13 +11,11 @@ use std::{
     collections::BTreeMap,
     path::{Path, PathBuf},
     process::ExitCode,
-    time::Instant,
 };
 use vision::{
     detect::{detect, quads::Quad},
     frame::GrayImage,
     params::DetectParams,
-    trace::{Stage, Trace},
 };
 
 /// `waymark detect`.
@@ -59,31 +57,6 @@ struct QuadLine {
     side_support: [f64; 4],
     /// Inner borders of the same thing, outermost first.
     alternates: Vec<[[f64; 2]; 4]>,
-}
-
-/// Times each stage by the clock.
-pub(crate) struct Stopwatch {
-    last: Instant,
-    pub(crate) ms: BTreeMap<&'static str, f64>,
-}
-
-impl Stopwatch {
-    pub(crate) fn start() -> Self {
-        Self { last: Instant::now(), ms: BTreeMap::new() }
-    }
-
-    /// All stages together.
-    pub(crate) fn total_ms(&self) -> f64 {
-        self.ms.values().sum()
-    }
-}
-
-impl Trace for Stopwatch {
-    fn finished(&mut self, stage: Stage) {
-        let now = Instant::now();
-        *self.ms.entry(stage.name()).or_default() += (now - self.last).as_secs_f64() * 1e3;
-        self.last = now;
-    }
 }
 
 /// Exit status 1 when any picture could not be read; the others are still done.

@@ -1,9 +1,14 @@
 //! `waymark map build`: from a recording to a map.
 
-use super::{LaserArgs, draw, file::MapFile, open};
+use super::LaserArgs;
 use crate::cli::{clock::Clock, screen};
 use anyhow::Context as _;
 use client::MapClient;
+use formats::{
+    map_svg,
+    scan_log::{self, LogEntry},
+    walls::MapFile,
+};
 use map::slam::{Slam, SlamMap, SlamParams};
 use serde_json::json;
 use std::path::PathBuf;
@@ -55,16 +60,18 @@ pub(crate) struct Args {
     upload: Upload,
 }
 
-/// A map and what it took.
-pub(crate) struct Built {
-    pub(crate) map: SlamMap,
-    /// Processor time of the mapping alone.
-    pub(crate) seconds: f64,
+/// A map and what it cost.
+#[derive(Debug)]
+pub struct Built {
+    /// The map.
+    pub map: SlamMap,
+    /// Processor time of the mapping alone, seconds.
+    pub seconds: f64,
 }
 
-/// Maps records with `odometry` for theirs.
-pub(crate) fn build(
-    records: &[super::Record],
+/// Maps a log, with `odometry(i)` (`odom_from_robot`) in place of that of entry `i`.
+pub fn build(
+    records: &[LogEntry],
     odometry: impl Fn(usize) -> map::pose2::Pose2,
     params: SlamParams,
 ) -> anyhow::Result<Built> {
@@ -82,7 +89,7 @@ pub(crate) fn build(
 }
 
 /// The parameters of a file, or the defaults.
-pub(crate) fn params(path: Option<&PathBuf>) -> anyhow::Result<SlamParams> {
+pub fn params(path: Option<&PathBuf>) -> anyhow::Result<SlamParams> {
     let Some(path) = path else { return Ok(SlamParams::default()) };
     let name = || path.display().to_string();
     let text = std::fs::read_to_string(path).with_context(name)?;
@@ -92,15 +99,16 @@ pub(crate) fn params(path: Option<&PathBuf>) -> anyhow::Result<SlamParams> {
 
 /// Runs the command.
 pub(crate) async fn run(args: &Args) -> anyhow::Result<()> {
-    let recording = open(&args.recording, &args.laser)?;
+    let recording = scan_log::read(&args.recording, &args.laser.defaults())
+        .with_context(|| args.recording.display().to_string())?;
     let Built { map, seconds } =
         build(&recording.records, |i| recording.records[i].odom, params(args.params.as_ref())?)?;
     let file = MapFile::of(&map);
     if let Some(out) = &args.out {
-        file.write(out)?;
+        file.write(out).with_context(|| out.display().to_string())?;
     }
     if let Some(picture) = &args.draw {
-        std::fs::write(picture, draw::svg(&file, &recording.records))
+        std::fs::write(picture, map_svg::draw(&file, &recording.records))
             .with_context(|| picture.display().to_string())?;
     }
     let way_m: f64 = map.path.windows(2).map(|p| p[0].between(&p[1]).position().norm()).sum();

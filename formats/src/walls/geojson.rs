@@ -1,0 +1,213 @@
+//! Walls from a GeoJSON file in map metres: lines are walls as drawn, polygons are rooms, whose walls face inwards, and
+//! their holes (columns, blocks), whose walls face outwards. Points, and properties of any kind, are passed over.
+
+use super::map_file::{MAX_WALLS, Wall};
+use serde::Deserialize;
+
+/// Largest file.
+pub(super) const MAX_BYTES: u64 = 64 << 20;
+
+type Position = Vec<f64>;
+
+/// What of GeoJSON (RFC 7946) can hold walls. Members that are not named are ignored, as the format asks for.
+#[derive(Debug, Deserialize)]
+#[serde(tag = "type")]
+enum Object {
+    FeatureCollection {
+        features: Vec<Feature>,
+    },
+    Feature {
+        geometry: Option<Geometry>,
+    },
+    #[serde(untagged)]
+    Geometry(Geometry),
+}
+
+#[derive(Debug, Deserialize)]
+struct Feature {
+    geometry: Option<Geometry>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(tag = "type")]
+enum Geometry {
+    Point {},
+    MultiPoint {},
+    LineString { coordinates: Vec<Position> },
+    MultiLineString { coordinates: Vec<Vec<Position>> },
+    Polygon { coordinates: Vec<Vec<Position>> },
+    MultiPolygon { coordinates: Vec<Vec<Vec<Position>>> },
+}
+
+/// Why a file has no walls.
+#[derive(Debug, thiserror::Error, PartialEq)]
+pub enum GeoJsonError {
+    /// Not JSON, or not GeoJSON.
+    #[error("not GeoJSON: {0}")]
+    Format(String),
+    /// A coordinate.
+    #[error("line {line}, position {position}: not two finite numbers")]
+    Position {
+        /// Which line or ring, from 0.
+        line: usize,
+        /// Which of its points, from 0.
+        position: usize,
+    },
+    /// A ring that does not end where it begins, or has no area.
+    #[error("line {line}: a ring must end where it begins and enclose something")]
+    Ring {
+        /// Which, from 0.
+        line: usize,
+    },
+    /// Longitudes and latitudes are no metres.
+    #[error("a coordinate reference system other than map metres (`crs`) is not understood")]
+    Crs,
+    /// Too many.
+    #[error("more than {MAX_WALLS} segments")]
+    TooMany,
+}
+
+/// One line and what it bounds.
+struct Line {
+    points: Vec<Position>,
+    /// Ring: with the free side inside, or outside.
+    free_inside: Option<bool>,
+}
+
+/// The walls of a file's text.
+pub(super) fn walls(text: &str) -> Result<Vec<Wall>, GeoJsonError> {
+    let value: serde_json::Value =
+        serde_json::from_str(text).map_err(|e| GeoJsonError::Format(e.to_string()))?;
+    if value.get("crs").is_some_and(|crs| !crs.is_null()) {
+        return Err(GeoJsonError::Crs);
+    }
+    let object: Object = serde_json::from_value(value).map_err(|e| GeoJsonError::Format(e.to_string()))?;
+    let geometries = match object {
+        Object::FeatureCollection { features } => features.into_iter().filter_map(|f| f.geometry).collect(),
+        Object::Feature { geometry } => geometry.into_iter().collect(),
+        Object::Geometry(geometry) => vec![geometry],
+    };
+    let mut walls = vec![];
+    for (number, line) in geometries.into_iter().flat_map(lines).enumerate() {
+        add(&mut walls, number, &line)?;
+    }
+    Ok(walls)
+}
+
+fn lines(geometry: Geometry) -> Vec<Line> {
+    let open = |points| Line { points, free_inside: None };
+    let room = |rings: Vec<Vec<Position>>| {
+        rings.into_iter().enumerate().map(|(i, points)| Line { points, free_inside: Some(i == 0) })
+    };
+    match geometry {
+        Geometry::Point {} | Geometry::MultiPoint {} => vec![],
+        Geometry::LineString { coordinates } => vec![open(coordinates)],
+        Geometry::MultiLineString { coordinates } => coordinates.into_iter().map(open).collect(),
+        Geometry::Polygon { coordinates } => room(coordinates).collect(),
+        Geometry::MultiPolygon { coordinates } => coordinates.into_iter().flat_map(room).collect(),
+    }
+}
+
+fn add(walls: &mut Vec<Wall>, number: usize, line: &Line) -> Result<(), GeoJsonError> {
+    let point = |(position, p): (usize, &Position)| match p[..] {
+        // A height may follow.
+        [x, y, ..] if x.is_finite() && y.is_finite() => Ok([x, y]),
+        _ => Err(GeoJsonError::Position { line: number, position }),
+    };
+    let mut points = line.points.iter().enumerate().map(point).collect::<Result<Vec<[f64; 2]>, _>>()?;
+    if let Some(free_inside) = line.free_inside {
+        let area: f64 = points.windows(2).map(|p| p[0][0] * p[1][1] - p[1][0] * p[0][1]).sum();
+        let (first, last) = (points.first(), points.last());
+        if points.len() < 4 || first != last || !(area.abs() > 0.0 && area.is_finite()) {
+            return Err(GeoJsonError::Ring { line: number });
+        }
+        // The free side is left of a to b, whichever way round the file has the ring.
+        if (area > 0.0) != free_inside {
+            points.reverse();
+        }
+    }
+    for pair in points.windows(2) {
+        let (a, b) = (pair[0], pair[1]);
+        if (b[0] - a[0]).hypot(b[1] - a[1]) < map::segments::MIN_SEGMENT_M {
+            continue;
+        }
+        if walls.len() >= MAX_WALLS {
+            return Err(GeoJsonError::TooMany);
+        }
+        walls.push(Wall::between(a, b));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ends(text: &str) -> Vec<[[f64; 2]; 2]> {
+        walls(text).unwrap().iter().map(|w| [w.a, w.b]).collect()
+    }
+
+    #[test]
+    fn rooms_face_inwards_and_columns_outwards_whichever_way_round() {
+        let room = "[[0,0],[4,0],[4,3],[0,3],[0,0]]";
+        let turned = "[[0,0],[0,3],[4,3],[4,0],[0,0]]";
+        let column = "[[1,1],[2,1],[2,2],[1,1]]";
+        let free_side = |text: &str, inside: [f64; 2], free: bool| {
+            for [a, b] in ends(text) {
+                let left = (b[0] - a[0]) * (inside[1] - a[1]) - (b[1] - a[1]) * (inside[0] - a[0]);
+                assert_eq!(left > 0.0, free, "{a:?} {b:?}");
+            }
+        };
+        for ring in [room, turned] {
+            let text = format!(r#"{{"type":"Polygon","coordinates":[{ring}]}}"#);
+            assert_eq!(ends(&text).len(), 4);
+            free_side(&text, [2.0, 1.5], true);
+            let holed = format!(r#"{{"type":"Polygon","coordinates":[{ring},{column}]}}"#);
+            let alone = ends(&holed).split_off(4);
+            for [a, b] in alone {
+                let left = (b[0] - a[0]) * (1.25 - a[1]) - (b[1] - a[1]) * (1.75 - a[0]);
+                assert!(left < 0.0, "the column's inside is not free");
+            }
+        }
+    }
+
+    #[test]
+    fn lines_and_collections_are_read_and_the_rest_passed_over() {
+        let text = r#"{"type":"FeatureCollection","name":"plan","features":[
+            {"type":"Feature","properties":{"kind":"wall"},"geometry":{"type":"LineString","coordinates":[[0,0],[5,0,2.5],[5,1]]}},
+            {"type":"Feature","properties":null,"geometry":null},
+            {"type":"Feature","geometry":{"type":"Point","coordinates":[1,1]}},
+            {"type":"Feature","geometry":{"type":"MultiLineString","coordinates":[[[0,2],[1,2]],[[3,3],[3,3]]]}}]}"#;
+        assert_eq!(
+            ends(text),
+            [[[0.0, 0.0], [5.0, 0.0]], [[5.0, 0.0], [5.0, 1.0]], [[0.0, 2.0], [1.0, 2.0]]]
+        );
+        let feature = r#"{"type":"Feature","geometry":{"type":"LineString","coordinates":[[0,0],[1,0]]}}"#;
+        assert_eq!(ends(feature).len(), 1);
+    }
+
+    #[test]
+    fn what_is_wrong_is_named() {
+        let bad = |text: &str| walls(text).unwrap_err();
+        assert!(matches!(bad("{"), GeoJsonError::Format(_)));
+        assert!(matches!(bad(r#"{"type":"Walls"}"#), GeoJsonError::Format(_)));
+        assert!(matches!(bad("[]"), GeoJsonError::Format(_)));
+        assert_eq!(
+            bad(r#"{"type":"LineString","coordinates":[[0,0],[1]]}"#),
+            GeoJsonError::Position { line: 0, position: 1 }
+        );
+        for ring in ["[[0,0],[1,0],[1,1]]", "[[0,0],[1,0],[1,1],[0,1]]", "[[0,0],[1,0],[2,0],[0,0]]"] {
+            assert_eq!(
+                bad(&format!(r#"{{"type":"Polygon","coordinates":[{ring}]}}"#)),
+                GeoJsonError::Ring { line: 0 }
+            );
+        }
+        assert_eq!(bad(r#"{"type":"Point","coordinates":[0,0],"crs":{"type":"name"}}"#), GeoJsonError::Crs);
+        let long = |n: usize| {
+            let points: Vec<[usize; 2]> = (0..n).map(|i| [i, 0]).collect();
+            serde_json::json!({ "type": "LineString", "coordinates": points }).to_string()
+        };
+        assert_eq!(walls(&long(MAX_WALLS + 1)).unwrap().len(), MAX_WALLS);
+        assert_eq!(bad(&long(MAX_WALLS + 2)), GeoJsonError::TooMany);
+    }
+}

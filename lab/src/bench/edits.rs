@@ -1,0 +1,215 @@
+//! What one change of a large map costs: a landmark moved, a landmark quarantined, and a lesson, over HTTP, until the server has
+//! acknowledged it. What the server still computes after that is waited for and reported apart.
+
+use crate::evaluate::statistics::quantile;
+use anyhow::Context as _;
+use client::{
+    MapClient,
+    lessons::{Place, Size},
+    map::Extent,
+};
+use serde::Serialize;
+use serde_json::{Value, json};
+use server::{
+    Server,
+    cli::{pictures, scratch, screen},
+    config::{Config, RawConfig},
+};
+use sim::posters::poster_of_size;
+use std::time::{Duration, Instant};
+use vision::frame::GrayImage;
+
+const MAP: &str = "large";
+/// Widest poster that is taught, in pixels: what is measured does not depend on it.
+const POSTER_PX: usize = 240;
+/// Posters of these numbers are taught twice, so that the map has look-alikes: one in twenty.
+const LOOK_ALIKE_EVERY: usize = 20;
+/// Distance of landmarks along their wall, and of one wall from the next, metres.
+const SPACING_M: f64 = 2.0;
+const ROW_M: f64 = 4.0;
+const ROW_LANDMARKS: usize = 50;
+/// Longest wait for a lesson.
+const LESSON_TIMEOUT: Duration = Duration::from_hours(1);
+
+/// `waymark-lab bench edits`.
+#[derive(Debug, clap::Args)]
+pub(super) struct Args {
+    /// Landmarks of the map, all learnt and placed.
+    #[arg(long, default_value_t = 2000, value_parser = clap::value_parser!(u32).range(10..=20_000))]
+    landmarks: u32,
+    /// Wall segments of the map.
+    #[arg(long, default_value_t = 20_000, value_parser = clap::value_parser!(u32).range(0..=100_000))]
+    walls: u32,
+    /// Changes of each kind.
+    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(3..=1000))]
+    changes: u32,
+    /// One JSON object instead of the table.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Milliseconds of several changes of one kind.
+#[derive(Debug, Serialize)]
+struct Cost {
+    median_ms: f64,
+    p90_ms: f64,
+    worst_ms: f64,
+}
+
+impl Cost {
+    fn of(ms: &mut [f64]) -> Self {
+        let worst_ms = ms.iter().copied().fold(0.0, f64::max);
+        let [median_ms, p90_ms] = [0.5, 0.9].map(|share| quantile(ms, share).unwrap_or(worst_ms));
+        Self { median_ms, p90_ms, worst_ms }
+    }
+}
+
+/// A server with a large map.
+struct Large {
+    maps: MapClient,
+    base: String,
+    http: reqwest::Client,
+}
+
+/// Runs the benchmark.
+pub(super) fn run(args: &Args) -> anyhow::Result<()> {
+    tokio::runtime::Builder::new_multi_thread().enable_all().build()?.block_on(measured(args))
+}
+
+async fn measured(args: &Args) -> anyhow::Result<()> {
+    let folder = scratch::Folder::new("edits")?;
+    let server = Server::start(settings(folder.path(), args)?).await?;
+    let base = format!("http://{}", server.http_addr);
+    let large = Large { maps: MapClient::new(&base)?, base, http: reqwest::Client::new() };
+    let taught_s = large.fill(args).await?;
+    let (mut moved, mut settled, mut trusted, mut lessons) = (vec![], vec![], vec![], vec![]);
+    let bar = screen::progress(args.changes as usize, "changing");
+    for i in 0..args.changes as usize {
+        let name = format!("l{}", i * 7 % args.landmarks as usize);
+        let started = Instant::now();
+        let place = json!(place(i * 7 % args.landmarks as usize, 0.3));
+        large.change(&name, &json!({ "place": place })).await?;
+        moved.push(ms(started));
+        large.visible(&name).await?;
+        settled.push(ms(started));
+        let started = Instant::now();
+        large.change(&name, &json!({ "standing": if i % 2 == 0 { "quarantined" } else { "sound" } })).await?;
+        trusted.push(ms(started));
+        bar.inc(1);
+    }
+    for i in 0..(args.changes as usize).div_ceil(4) {
+        let name = format!("l{}", i * 11 % args.landmarks as usize);
+        let image = picture(1_000_000 + i);
+        large.maps.upload_view(MAP, &name, pictures::jpeg(&image)?, Extent::WholeImage).await?;
+        let started = Instant::now();
+        let job = large.maps.learn(MAP, Some(&[name]), Some(4)).await?;
+        large.maps.wait_for_job(job, LESSON_TIMEOUT, |_| ()).await?;
+        lessons.push(ms(started));
+    }
+    bar.finish_and_clear();
+    server.stop().await;
+    let rows = [
+        ("landmark moved", Cost::of(&mut moved)),
+        ("moved, and its visibility area known", Cost::of(&mut settled)),
+        ("landmark quarantined", Cost::of(&mut trusted)),
+        ("lesson of one landmark", Cost::of(&mut lessons)),
+    ];
+    if args.json {
+        let costs: Value = rows.iter().map(|(name, cost)| ((*name).to_owned(), json!(cost))).collect();
+        let head =
+            json!({ "landmarks": args.landmarks, "walls": args.walls, "taught_s": taught_s, "costs": costs });
+        screen::say(&head.to_string());
+        return Ok(());
+    }
+    screen::say(&format!(
+        "{} landmarks, {} wall segments (taught in {taught_s:.0} s); milliseconds until acknowledged",
+        args.landmarks, args.walls
+    ));
+    screen::say("| change | median | 90 % | worst |\n|---|---|---|---|");
+    for (name, cost) in rows {
+        let Cost { median_ms, p90_ms, worst_ms } = cost;
+        screen::say(&format!("| {name} | {median_ms:.1} | {p90_ms:.1} | {worst_ms:.1} |"));
+    }
+    Ok(())
+}
+
+fn ms(started: Instant) -> f64 {
+    started.elapsed().as_secs_f64() * 1e3
+}
+
+/// Settings of a server that takes maps of this size.
+fn settings(data: &std::path::Path, args: &Args) -> anyhow::Result<Config> {
+    let mut raw = RawConfig {
+        data: data.to_owned(),
+        http: "127.0.0.1:0".to_owned(),
+        zenoh: "tcp/127.0.0.1:0".to_owned(),
+        ..RawConfig::default()
+    };
+    raw.limits.landmarks = raw.limits.landmarks.max(args.landmarks as usize + 1);
+    raw.limits.laser_segments = raw.limits.laser_segments.max(args.walls as usize);
+    Ok(Config::try_from(raw)?)
+}
+
+fn picture(number: usize) -> GrayImage {
+    let texture = poster_of_size(number as u64, POSTER_PX, 1.4);
+    GrayImage::from_fn(texture.width(), texture.height(), |u, v| texture.data()[v * texture.width() + u])
+}
+
+/// Where landmark `i` hangs: rows of walls along x, all facing y.
+fn place(i: usize, shift_m: f64) -> Place {
+    let (row, column) = (i / ROW_LANDMARKS, i % ROW_LANDMARKS);
+    let (x_m, y_m) = (SPACING_M * column as f64 + shift_m, ROW_M * row as f64);
+    Place { x_m, y_m, z_m: 1.5, theta_rad: std::f64::consts::FRAC_PI_2 }
+}
+
+impl Large {
+    /// Teaches and places all landmarks, then sets the walls; seconds.
+    async fn fill(&self, args: &Args) -> anyhow::Result<f64> {
+        let started = Instant::now();
+        self.maps.create_map(MAP, None).await?;
+        let bar = screen::progress(args.landmarks as usize, "landmarks");
+        for i in 0..args.landmarks as usize {
+            let number = if i % LOOK_ALIKE_EVERY == 1 { i - 1 } else { i };
+            let name = format!("l{i}");
+            let size = Size { width_m: 0.6, height_m: 0.84 };
+            self.maps.add_landmark(MAP, &name, Some(size), Some(place(i, 0.0))).await?;
+            let jpeg = pictures::jpeg(&picture(number))?;
+            self.maps.upload_view(MAP, &name, jpeg, Extent::WholeImage).await?;
+            bar.inc(1);
+        }
+        let job = self.maps.learn(MAP, None, Some(4)).await?;
+        bar.set_message("learning");
+        self.maps.wait_for_job(job, LESSON_TIMEOUT, |_| ()).await?;
+        bar.finish_and_clear();
+        self.maps.set_laser(MAP, &walls(args)).await?;
+        Ok(started.elapsed().as_secs_f64())
+    }
+
+    async fn change(&self, landmark: &str, changes: &Value) -> anyhow::Result<()> {
+        let url = format!("{}/api/v1/maps/{MAP}/landmarks/{landmark}", self.base);
+        let answer = self.http.patch(&url).json(changes).send().await?;
+        anyhow::ensure!(answer.status().is_success(), "{url}: {}", answer.text().await?);
+        Ok(())
+    }
+
+    /// Waits until the server tells from where the landmark is seen.
+    async fn visible(&self, landmark: &str) -> anyhow::Result<()> {
+        let url = format!("{}/api/v1/maps/{MAP}/landmarks/{landmark}/visibility", self.base);
+        let answer = self.http.get(&url).send().await?;
+        anyhow::ensure!(answer.status().is_success(), "{url}: {}", answer.text().await.context("an answer")?);
+        Ok(())
+    }
+}
+
+/// Walls behind the landmarks, cut into as many segments.
+fn walls(args: &Args) -> Vec<[[f64; 2]; 2]> {
+    let rows = (args.landmarks as usize).div_ceil(ROW_LANDMARKS);
+    let pieces = (args.walls as usize).div_ceil(rows);
+    let piece_m = SPACING_M * ROW_LANDMARKS as f64 / pieces as f64;
+    let wall = |i: usize| {
+        let (row, x) = (i / pieces, piece_m * (i % pieces) as f64 - 1.0);
+        let y = ROW_M * row as f64 - 0.02;
+        [[x, y], [x + 0.98 * piece_m, y]]
+    };
+    (0..args.walls as usize).map(wall).collect()
+}

@@ -1,0 +1,52 @@
+//! `waymark-lab bench`: speed on this machine. Nothing is asserted; figures are for people and for docs/BENCHMARKS.md.
+
+mod pipeline;
+mod frames;
+mod peers;
+pub(crate) use peers::Python;
+mod detect;
+mod edits;
+mod recognise;
+
+/// `waymark-lab bench`.
+#[derive(Debug, clap::Args)]
+#[command(args_conflicts_with_subcommands = true)]
+pub(crate) struct Args {
+    #[command(subcommand)]
+    what: Option<What>,
+    #[command(flatten)]
+    pipeline: pipeline::PipelineArgs,
+}
+
+/// What to time other than the whole pipeline.
+#[derive(Debug, clap::Subcommand)]
+enum What {
+    /// From frame to segments and to quads, one core, 640 x 480, beside OpenCV's segment and marker detectors.
+    ///
+    /// Every picture is done in turn by Waymark and by OpenCV (through python3, one thread), once to warm up and once
+    /// timed, several rounds. Times are of the processor, not of the clock, so other work on the machine matters
+    /// little; ratios are of one run. Without OpenCV our own times are printed.
+    Detect(detect::Args),
+    /// From quad to verdict among many landmarks, whole frames beside OpenCV's SIFT, memory, the short list, and a lesson.
+    ///
+    /// Posters are drawn by the simulator. Some are taught as a server would, from generated views; the rest of a map
+    /// get icons and points of their own and thresholds of those. Frames are rendered in a corridor whose posters are among
+    /// the landmarks; each is searched as a whole, and by a known pose for the landmarks that this expects. SIFT (through
+    /// python3, one thread, one index over 1000 landmarks, votes, a homography by RANSAC) is given the same pictures. Times
+    /// are of the processor.
+    Recognise(recognise::Args),
+    /// One change of a large map over HTTP: a landmark moved or quarantined, a lesson.
+    ///
+    /// A server in this program is taught a map of posters (one in twenty of them twice) with many wall segments; then
+    /// single landmarks are changed and taught again. Times are of the clock, until the server has acknowledged the change.
+    Edits(edits::Args),
+}
+
+pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
+    match &args.what {
+        None => pipeline::run(&args.pipeline),
+        Some(What::Detect(args)) => detect::run(args),
+        Some(What::Recognise(args)) => recognise::run(args),
+        Some(What::Edits(args)) => edits::run(args),
+    }
+}

@@ -1,0 +1,125 @@
+//! `waymark-lab evaluate`: the paper's experiments on labelled pictures. Tables for people, one JSON object for programs.
+
+pub(crate) mod chart;
+pub(crate) mod experiment;
+pub(crate) mod navigation;
+pub(crate) mod rendered;
+pub(crate) mod reviewed;
+pub(crate) mod statistics;
+pub(crate) mod truth;
+pub(crate) mod calibration;
+pub(crate) mod detection;
+pub(crate) mod placement;
+pub(crate) mod pose;
+pub(crate) mod mapping;
+pub(crate) mod modalities;
+pub(crate) mod recognition;
+pub(crate) mod visibility;
+
+/// What to evaluate.
+#[derive(Debug, clap::Subcommand)]
+pub(crate) enum Command {
+    /// Quads against labelled corners: recall at IoU 0.7 and 0.85, false quads, corner error, time.
+    ///
+    /// A set is a folder in the evaluation format (docs/EVALUATION.md), or `corridor` or `scenes`: rendered pictures with
+    /// exact truth, for which no data is needed. Figures come with 95 % confidence intervals, for all quads and by class, stratum,
+    /// size and angle of view.
+    ///
+    /// For example, what the search gains over the paper's grouping, and where it fails:
+    ///   waymark-lab evaluate detection corridor --compare relaxation --plot recall.svg --worst 20 --draw worst
+    #[command(verbatim_doc_comment)]
+    Detection(Box<detection::Args>),
+    /// Teach a server from the set's pictures, then have it recognise the others over zenoh.
+    ///
+    /// Starts a server of its own in a temporary folder. A landmark taught from one picture is learnt from views
+    /// generated from it (warped, dimmed, blurred).
+    Recognition(recognition::Args),
+    /// How obliquely a landmark may be seen: H^r, C^r and likeness over their thresholds, and the decision, by angle.
+    ///
+    /// Landmarks are rendered posters (and photographs, with --photographs), taught as a robot would teach them. Every
+    /// view has its own noise, blur, light and compression; only the angle is set. For example:
+    ///   waymark-lab evaluate viewpoint --plot viewpoint.svg
+    ///   waymark-lab evaluate viewpoint --photographs museum-paintings --taught photograph --detector
+    #[command(verbatim_doc_comment)]
+    Viewpoint(experiment::viewpoint::Args),
+    /// How small a landmark may be seen: the same by apparent size, from 300 px down to 28.
+    Scale(experiment::scale::Args),
+    /// Too dark, too bright, light from the side, a shadow's edge across: the same by each of them.
+    Illumination(experiment::illumination::Args),
+    /// How much of a landmark may be hidden in its middle: the same by share of its area.
+    Occlusion(experiment::occlusion::Args),
+    /// How seldom a stranger is taken for a landmark: per pair by the paper's thresholds, per quad by the decision.
+    ///
+    /// Strangers are posters that are not taught, photographs, doors, windows and tiles, and, as strata of their own,
+    /// look-alikes of landmarks made on purpose. Bounds are exact, by quads and by textures. For example:
+    ///   waymark-lab evaluate discrimination --landmarks 50,300 --views 40 --plot humps.svg
+    #[command(verbatim_doc_comment)]
+    Discrimination(experiment::discrimination::Args),
+    /// Pictures that are nearly the same (another text, one block changed, mirrored, two doors): told apart, refused as
+    /// ambiguous, or confused.
+    Lookalikes(experiment::doubles::Args),
+    /// Laser maps from recordings: error of relative poses, odometry alone and published figures beside it, walls, time.
+    ///
+    /// For example:
+    ///   waymark-lab evaluate mapping laser-carmen-corrected laser-intel-raw-odometry --draw maps --plot mapping.svg
+    #[command(verbatim_doc_comment)]
+    Mapping(mapping::Args),
+    /// Whether confidences keep their word: reliability diagram and expected calibration error.
+    Confidence(experiment::confidence::Args),
+    /// Auto-calibration of a camera from views of one quad: error of the focal length by the number of views (Fig. 17).
+    ///
+    /// Synthetic views with the constraints C1, C1+C2, C1+C3 and all, linear and refined; and real boards, their
+    /// outermost quad against all their points and against what the set states. For example:
+    ///   waymark-lab evaluate calibration calib-zhang calib-opencv-chessboard --plot calibration.svg
+    #[command(verbatim_doc_comment)]
+    Calibration(calibration::Args),
+    /// How good poses of landmarks and robots are, and whether their covariances keep their word.
+    ///
+    /// The table of method 13.3, NEES over twelve cells of distance, angle and noise, flips of the planar ambiguity, OpenCV
+    /// on the same corners, several landmarks in one frame, simulated drives, cost.
+    Pose(pose::Args),
+    /// Landmarks placed on walls and ceilings from known robot poses, against the truth.
+    ///
+    /// Generated rooms with everything uncertain drawn anew, rendered corridors with the detector's corners, and things
+    /// that hang on no wall.
+    Placement(placement::Args),
+    /// Robots drive through the paper's corridor: how far off they are along it, with odometry alone beside it.
+    ///
+    /// 25 m, four posters taught by a first drive, a start that nobody tells. Everything is rendered, nothing is needed.
+    /// For example:
+    ///   waymark-lab evaluate navigation --plot corridor.svg
+    #[command(verbatim_doc_comment)]
+    Navigation(navigation::Args),
+    /// Which modality to trust where: learnt from runs whose path is known, then driven with, mode by mode.
+    ///
+    /// A way of 55 m through a corridor (the laser tells nothing along it), a hall (the floor pushes odometry aside, no
+    /// posters) and a workshop (its walls were moved after they were mapped). For example:
+    ///   waymark-lab evaluate modalities --plot modalities.svg
+    #[command(verbatim_doc_comment)]
+    Modalities(modalities::Args),
+    /// From where landmarks are seen: closed-form areas against brute force on random maps, their sizes against counting,
+    /// and what they and the choice where to look cost.
+    Visibility(visibility::Args),
+}
+
+/// Runs one evaluation.
+pub(crate) fn run(command: &Command) -> anyhow::Result<()> {
+    match command {
+        Command::Detection(args) => detection::run(args),
+        Command::Recognition(args) => recognition::run(args),
+        Command::Viewpoint(args) => experiment::viewpoint::run(args),
+        Command::Scale(args) => experiment::scale::run(args),
+        Command::Illumination(args) => experiment::illumination::run(args),
+        Command::Occlusion(args) => experiment::occlusion::run(args),
+        Command::Discrimination(args) => experiment::discrimination::run(args),
+        Command::Lookalikes(args) => experiment::doubles::run(args),
+        Command::Confidence(args) => experiment::confidence::run(args),
+        Command::Calibration(args) => calibration::run(args),
+        Command::Pose(args) => pose::run(args),
+        Command::Placement(args) => placement::run(args),
+        Command::Navigation(args) => navigation::run(args),
+        Command::Mapping(args) => mapping::run(args),
+        Command::Modalities(args) => modalities::run(args),
+        Command::Visibility(args) => visibility::run(args),
+    }
+}

@@ -1,0 +1,356 @@
+//! One drive, with the code of the server's workers: scans and frames through `engine/motion.rs`, landmarks judged by
+//! `engine/judging.rs`, what that finds put into the map. No transport, no threads; the scan of a moment comes before its
+//! frame. All of it is compared with the truth. The robot is told nothing of where it starts.
+
+use super::{
+    super::experiment::mixed,
+    kidnap::{Kidnap, KidnapOutcome},
+    world::{MAP, World},
+};
+use map::{
+    changes::{Change, Standing},
+    pose2::{Pose2, Pose2Covariance},
+};
+use nalgebra::Matrix2;
+use protos::Name;
+use server::{
+    cli::simulated_errors::SimulatedRobotErrors,
+    engine::{
+        guided::{Guided, guided},
+        judging::{Seen, View, judged_frame},
+        live::LiveHub,
+        motion::{Corrections, Moment as At, Motion, ScanJob},
+        snapshot::{MapSnapshot, Snapshots},
+        verdicts::{self, StageTimes},
+    },
+};
+use sim::{
+    building::LandmarkKind,
+    drive::DriveParams,
+    robot::{Robot, RobotParams, Sighting},
+    truth::{LandmarkView, ViewState},
+};
+use std::{collections::BTreeMap, sync::Arc, time::Instant};
+use vision::{
+    detect::quads::Corners,
+    geometry::polygon,
+    pipeline::{FrameFacts, matched},
+    recognise::{LandmarkId, Recognition},
+    seen_border::FoundBy,
+};
+
+/// A recognition is true when its quad overlaps the landmark's true outline by this much.
+const IOU_TRUE: f64 = 0.5;
+/// A frame shows a landmark when all of it is seen, no side shorter than this...
+const MIN_SIDE_PX: f64 = 38.0;
+/// ... and no more obliquely: the paper's limit of recognition.
+const MAX_VIEW_ANGLE_RAD: f64 = 1.309;
+/// What is cut or hidden counts where at least this share of it is seen.
+const MIN_SHARE: f64 = 0.25;
+/// Farther than any corridor: the simulator starts the robot at its end.
+const FAR_END_M: f64 = 1e3;
+/// One run of the robot's software.
+const EPOCH: u64 = 1;
+
+/// Where a robot was, and where it was thought to be.
+pub(super) struct Moment {
+    pub(super) time_s: f64,
+    pub(super) truth: Pose2,
+    /// Odometry alone, told the true start.
+    pub(super) odometry: Pose2,
+    /// None before the first fix.
+    pub(super) fused: Option<Pose2Covariance>,
+    /// A landmark corrected it here.
+    pub(super) corrected: bool,
+}
+
+/// A drive.
+#[derive(Default)]
+pub(super) struct Journey {
+    pub(super) moments: Vec<Moment>,
+    /// Times that a taught landmark was shown, and how often it was rightly named.
+    pub(super) shown: usize,
+    pub(super) recognised: usize,
+    /// Names given to something else.
+    pub(super) false_matches: usize,
+    /// Names given to something else by the pose.
+    pub(super) guided_false: usize,
+    /// Corners of what was rightly named: how far off each is, px, and its squared Mahalanobis distance.
+    pub(super) corners: BTreeMap<&'static str, Vec<(f64, f64)>>,
+    /// How often what was shown of each kind was rightly named.
+    pub(super) named: BTreeMap<(&'static str, &'static str), Named>,
+    /// Frames that showed a landmark up to the first fix, itself included; none if there never was one.
+    pub(super) frames_to_fix: Option<usize>,
+    /// What became of fixes and scans.
+    pub(super) log: Corrections,
+    /// Times that a landmark was said to have moved or to be missing; nothing in the corridor changes.
+    pub(super) flagged: usize,
+    pub(super) quarantined: usize,
+    /// What became of it after it was kidnapped.
+    pub(super) kidnapped: Option<KidnapOutcome>,
+}
+
+/// Sightings of taught landmarks of one kind.
+#[derive(Debug, Clone, Copy, Default, serde::Serialize)]
+pub(super) struct Named {
+    pub(super) shown: usize,
+    /// Rightly named by the picture alone.
+    pub(super) global: usize,
+    /// Shown while the robot's pose was known and nothing contradicted it.
+    pub(super) shown_to_pose: usize,
+    /// Of these rightly named by the picture alone or with the pose.
+    pub(super) guided: usize,
+}
+
+/// How robots drive.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Way {
+    pub(super) seed: u64,
+    /// From the far end.
+    pub(super) back: bool,
+    pub(super) rate_hz: f64,
+    /// They have a laser.
+    pub(super) laser: bool,
+    /// Their cameras, and where those sit, are exactly what they say.
+    pub(super) exact: bool,
+    /// How far they are kidnapped forwards; 0: not at all.
+    pub(super) kidnap_m: f64,
+}
+
+/// The server's side: one robot in one map.
+struct Server {
+    snapshots: Arc<Snapshots>,
+    motion: Motion,
+    robot: Name,
+    camera: Name,
+    /// The drive goes by its own time: here none passes.
+    now: Instant,
+}
+
+impl Server {
+    fn new(map: &MapSnapshot) -> anyhow::Result<Self> {
+        let name = |text| Name::new(text).map_err(|refusal| anyhow::anyhow!("{refusal:?}"));
+        let (robot, camera) = (name("robot")?, name("front")?);
+        let snapshots = Arc::new(Snapshots::default());
+        snapshots.publish(Arc::new(map.clone()));
+        snapshots.set_robot(robot.as_ref(), Some(MAP));
+        let motion = Motion::new(snapshots.clone(), Arc::new(LiveHub::default()));
+        Ok(Self { snapshots, motion, robot, camera, now: Instant::now() })
+    }
+
+    fn map(&self) -> anyhow::Result<Arc<MapSnapshot>> {
+        self.snapshots.get(MAP).ok_or_else(|| anyhow::anyhow!("the map is gone"))
+    }
+
+    fn scan(&self, seen: &Sighting, odom_from_robot: Pose2, captured_ns: i64) {
+        let scan = seen.scan.clone();
+        self.motion.laser(
+            &self.robot,
+            &ScanJob { map: MAP.to_owned(), epoch: EPOCH, captured_ns, odom_from_robot, scan },
+            self.now,
+        );
+    }
+
+    /// What a frame does to the robot's pose; what it finds out about landmarks.
+    fn frame(
+        &self,
+        map: &MapSnapshot,
+        facts: &FrameFacts,
+        (seen, odom_from_robot): (&Sighting, Pose2),
+        (wrong, captured_ns): (&SimulatedRobotErrors, i64),
+    ) -> (Vec<Change>, Option<Guided>) {
+        let at = At { map: MAP, epoch: EPOCH, captured_ns, odometry: Some(odom_from_robot), now: self.now };
+        let mounting = wrong.mounting(&seen.step.robot_from_camera).ok();
+        let image = &seen.frame.image;
+        let view = View {
+            facts,
+            map,
+            mounting: mounting.as_ref(),
+            camera: Some(&wrong.camera),
+            image_px: [image.width() as f64, image.height() as f64],
+            prior: None,
+        };
+        let grounds = self.motion.grounds(&self.robot, &self.camera, at);
+        let guide = grounds.as_ref().filter(|g| g.plan.guided).map(|g| g.pose);
+        let guided = guide.map(|pose| guided(image, &view, &pose));
+        let judged = judged_frame(&view, grounds, guided.as_ref().unwrap_or(&Guided::default()));
+        self.motion.looked(&self.robot, &self.camera, at, &judged.fixes());
+        let found = |s: Seen| self.motion.judged(&self.robot, at, &s.grounds, &s.judged, &s.missed);
+        (judged.seen.map_or_else(Vec::new, found), guided)
+    }
+
+    /// As the store does.
+    fn change(&self, map: &MapSnapshot, changes: &[Change]) {
+        let mut next = map.clone();
+        next.version += 1;
+        for change in changes {
+            if let Some(info) = next.landmarks.get_mut(&change.landmark) {
+                info.standing = change.standing;
+            }
+        }
+        self.snapshots.publish(Arc::new(next));
+    }
+
+    /// Fixes by landmarks that corrected the pose so far.
+    fn corrections(&self) -> u64 {
+        let log = self.motion.corrections(&self.robot);
+        of(&log, "landmarks", &["started", "applied", "reset"])
+    }
+}
+
+/// How often a modality had one of these outcomes.
+pub(super) fn of(log: &Corrections, modality: &str, outcomes: &[&str]) -> u64 {
+    let counts = log.totals.get(modality);
+    counts.map_or(0, |counts| outcomes.iter().filter_map(|o| counts.get(o)).sum())
+}
+
+/// Drives the length of the corridor once.
+pub(super) fn drive(world: &World, way: Way) -> anyhow::Result<Journey> {
+    let start_m = if way.back { FAR_END_M } else { 0.0 };
+    let (seed, reverse, rate_hz) = (way.seed, way.back, way.rate_hz);
+    let drive = DriveParams { seed, start_m, reverse, rate_hz, ..DriveParams::default() };
+    let robot = Robot::new(world.building.clone(), &RobotParams { drive, ..RobotParams::default() });
+    let wrong = SimulatedRobotErrors::of(robot.camera().intrinsics(), way.exact, mixed(&[way.seed, 14]));
+    let server = Server::new(&world.map)?;
+    let mut journey = Journey::default();
+    let mut kidnap = Kidnap::new(way.kidnap_m);
+    let mut frames_that_show = 0;
+    for seen in robot {
+        let captured_ns = (seen.step.time_s * 1e9) as i64;
+        let before = server.corrections();
+        let odom_from_robot = kidnap.odometry(seen.step.time_s, seen.step.odom_from_robot);
+        if way.laser {
+            server.scan(&seen, odom_from_robot, captured_ns);
+        }
+        let map = server.map()?;
+        let facts = verdicts::look(&seen.frame.image, Some(&wrong.camera), &map, &mut StageTimes::start());
+        let (changes, guided) = server.frame(&map, &facts, (&seen, odom_from_robot), (&wrong, captured_ns));
+        let misled = journey.guided_false;
+        let shows = journey.score(world, &seen, &facts, guided.as_ref());
+        frames_that_show += usize::from(shows);
+        if !changes.is_empty() {
+            let of = |standing| changes.iter().filter(|c| c.standing == standing).count();
+            journey.flagged += of(Standing::Flagged);
+            journey.quarantined += of(Standing::Quarantined);
+            server.change(&map, &changes);
+        }
+        let fused = server.motion.pose(&server.robot, MAP, server.now);
+        if fused.is_some() && journey.frames_to_fix.is_none() {
+            journey.frames_to_fix = Some(frames_that_show);
+        }
+        let misled = journey.guided_false - misled;
+        kidnap.looked(seen.step.time_s, (shows, misled), (fused.as_ref(), &seen.step.map_from_robot));
+        journey.moments.push(Moment {
+            time_s: seen.step.time_s,
+            truth: seen.step.map_from_robot,
+            odometry: odom_from_robot,
+            fused,
+            corrected: server.corrections() > before,
+        });
+    }
+    journey.kidnapped = kidnap.outcome;
+    journey.log = server.motion.corrections(&server.robot);
+    Ok(journey)
+}
+
+impl Journey {
+    /// Counts what the frame shows and what was named in it; whether it shows a landmark in use at all.
+    fn score(&mut self, world: &World, seen: &Sighting, facts: &FrameFacts, guided: Option<&Guided>) -> bool {
+        let truth = &seen.frame.truth;
+        let is_there = |id: LandmarkId, found: &Corners| {
+            let view = truth.landmark(world.name(id));
+            view.is_some_and(|v| polygon::iou(found.points(), v.corners_px.points()) >= IOU_TRUE)
+        };
+        let mut global = Vec::new();
+        for quad in &facts.quads {
+            let Some(Recognition::Unique(id)) = quad.verdict.as_ref().map(|v| v.recognition) else {
+                continue;
+            };
+            // Where the picture was found to lie: the quad itself may be a border around it.
+            let found = quad.verdict.as_ref().and_then(|v| v.aligned_px).unwrap_or(quad.quad.corners_px);
+            if is_there(id, &found) {
+                global.push(world.name(id));
+                let corners = quad.verdict.as_ref().and_then(|v| matched(&quad.quad, v, &world.map.params));
+                if let (Some(corners), Some(view)) = (corners, truth.landmark(world.name(id))) {
+                    let how = match corners.found_by {
+                        FoundBy::Edges => "by the picture, detected",
+                        FoundBy::Alignment => "by the picture, aligned",
+                        FoundBy::Points => "by the picture, by points",
+                    };
+                    let corners = (corners.corners_px, corners.covariance_px2);
+                    self.corners.entry(how).or_default().extend(off(&corners, view));
+                }
+            } else {
+                tracing::info!(landmark = world.name(id), ?found, verdict = ?quad.verdict, "a wrong name");
+                self.false_matches += 1;
+            }
+        }
+        let mut with_pose = global.clone();
+        for sighting in guided.iter().flat_map(|guided| &guided.sightings) {
+            if is_there(sighting.landmark, &sighting.corners_px) {
+                with_pose.push(world.name(sighting.landmark));
+                if let Some(view) = truth.landmark(world.name(sighting.landmark)) {
+                    let group = match (sighting.quad, view.state) {
+                        (Some(_), _) => "detected, named by the pose",
+                        (None, ViewState::Truncated) => "asked for, cut",
+                        (None, _) => "asked for, not cut",
+                    };
+                    let corners = (sighting.corners_px, sighting.covariance_px2);
+                    self.corners.entry(group).or_default().extend(off(&corners, view));
+                }
+            } else {
+                self.guided_false += 1;
+            }
+        }
+        let is_large =
+            |v: &&LandmarkView| v.min_side_px() >= MIN_SIDE_PX && v.view_angle_rad <= MAX_VIEW_ANGLE_RAD;
+        let taught = |v: &&LandmarkView| {
+            v.visible_px2 >= MIN_SHARE * v.corners_px.area_px2()
+                && world.map.landmarks.values().any(|info| info.name == v.name)
+        };
+        for view in truth.landmarks.iter().filter(taught).filter(is_large) {
+            let named = self.named.entry((kind(view.kind), state(view.state))).or_default();
+            named.shown += 1;
+            named.global += usize::from(global.contains(&view.name.as_str()));
+            if guided.is_some() {
+                named.shown_to_pose += 1;
+                named.guided += usize::from(with_pose.contains(&view.name.as_str()));
+            }
+        }
+        let in_use = |v: &&LandmarkView| world.map.models.iter().any(|m| world.name(m.id) == v.name);
+        let full = |v: &&LandmarkView| v.state == ViewState::Full;
+        let shown: Vec<_> = truth.landmarks.iter().filter(is_large).filter(full).filter(in_use).collect();
+        self.shown += shown.len();
+        self.recognised += shown.iter().filter(|v| global.contains(&v.name.as_str())).count();
+        !shown.is_empty()
+    }
+}
+
+/// For each corner: how far off it is, px, and its squared Mahalanobis distance.
+fn off((corners_px, covariance_px2): &(Corners, [Matrix2<f64>; 4]), truth: &LandmarkView) -> Vec<(f64, f64)> {
+    let pairs = corners_px.points().iter().zip(truth.corners_px.points()).zip(covariance_px2);
+    pairs
+        .map(|((found, there), covariance)| {
+            let d = found - there;
+            let distance2 = covariance.cholesky().map_or(f64::INFINITY, |c| d.dot(&c.solve(&d)));
+            (d.norm(), distance2)
+        })
+        .collect()
+}
+
+fn kind(kind: LandmarkKind) -> &'static str {
+    match kind {
+        LandmarkKind::Poster => "posters",
+        LandmarkKind::Door => "doors",
+        LandmarkKind::Window => "windows",
+        _ => "others",
+    }
+}
+
+fn state(state: ViewState) -> &'static str {
+    match state {
+        ViewState::Full => "in full view",
+        ViewState::Truncated => "cut by the image border",
+        ViewState::Occluded => "partly hidden",
+    }
+}

@@ -1,0 +1,237 @@
+//! The corridor and what a first drive taught of it: walls, places and models, as a server would hold them, here in
+//! memory.
+
+use crate::evaluate::experiment::{lesson::points_of, mixed, of_each};
+use anyhow::Context as _;
+use map::{
+    laser_fix::WallIndex,
+    place::{LandmarkPlace, PlaceSigmas},
+    segments::LaserSegment,
+    visibility::{Obstacle, Viewer, VisibilityParams, visibility},
+};
+use server::{
+    cli::{
+        screen,
+        simulated_errors::SimulatedRobotErrors,
+        survey::{SurveyView as Look, hang, survey},
+    },
+    engine::{
+        doubles::doubles,
+        snapshot::{LandmarkInfo, Learnt, MapSnapshot},
+    },
+};
+use sim::{
+    building::Building,
+    corridor::CorridorParams,
+    lesson::{LessonParams, stops},
+    robot::{Robot, RobotParams},
+};
+use std::{collections::BTreeMap, sync::Arc};
+use vision::{
+    learn::{
+        model::{LandmarkModel, ModelStatus, View, add_negatives, learn},
+        synthesis,
+    },
+    localise::pose::LandmarkSize,
+    params::Params,
+    points::taught::TaughtPoint,
+    recognise::{DistanceKind, IconFeatures, LandmarkId, ModelSet, features},
+};
+
+/// Views each landmark is learnt from: what the first drive did not photograph is generated.
+const VIEWS: usize = 30;
+/// Icons of each landmark that the others must be told from.
+const NEGATIVES: usize = 10;
+
+/// Name of its map.
+pub(super) const MAP: &str = "corridor";
+
+/// A corridor and how it is taught.
+#[derive(Debug, Clone, Copy)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a switch of the experiment")]
+pub(super) struct Course {
+    pub(super) length_m: f64,
+    /// Posters that hang there.
+    pub(super) posters: usize,
+    /// How many different pictures they show; 0: all differ.
+    pub(super) pictures: usize,
+    /// The last so many have a picture of their own all the same.
+    pub(super) unique: usize,
+    /// Points decide.
+    pub(super) points: bool,
+    /// Doors and windows are taught, too.
+    pub(super) fittings: bool,
+    /// Corners of photographs and places of landmarks are exact.
+    pub(super) true_lessons: bool,
+    /// Photographs of each landmark.
+    pub(super) views: usize,
+    /// The surveying robot's pose, camera and its seat are exactly what they are said to be.
+    pub(super) exact: bool,
+    pub(super) seed: u64,
+}
+
+/// The corridor and its map.
+pub(super) struct World {
+    pub(super) building: Arc<Building>,
+    pub(super) map: MapSnapshot,
+    pub(super) course: Course,
+    /// Distance of each placed landmark from its true place.
+    pub(super) place_errors_m: Vec<f64>,
+}
+
+/// One landmark after the first drive.
+struct Lesson {
+    name: String,
+    place: LandmarkPlace,
+    views: Vec<View>,
+    icons: Vec<IconFeatures>,
+    points: Vec<Vec<TaughtPoint>>,
+}
+
+impl World {
+    /// Builds the corridor, surveys it and learns its landmarks.
+    pub(super) fn taught(course: Course) -> anyhow::Result<Self> {
+        let Course { length_m, posters, pictures, unique, points, fittings, .. } = course;
+        let Course { true_lessons, views: photographs, exact, seed, .. } = course;
+        let mut p = Params::default();
+        p.recognise.verdict.points = points;
+        let corridor = CorridorParams {
+            length_m,
+            posters,
+            pictures,
+            unique_posters: unique,
+            first_poster: mixed(&[seed, 11]),
+            ..CorridorParams::default()
+        };
+        let building = Arc::new(Building::corridor_with(&corridor, seed));
+        let robot = Robot::new(building.clone(), &RobotParams::default());
+        let wrong = SimulatedRobotErrors::of(robot.camera().intrinsics(), exact, mixed(&[seed, 13]));
+        let camera = wrong.camera;
+        let lesson = LessonParams { seed, views: photographs, fittings, ..LessonParams::default() };
+        let stops = stops(&building, &lesson);
+        let mut survey = survey(robot, &stops, wrong)?;
+        if true_lessons {
+            survey.views.iter_mut().for_each(|(name, looks)| take_true_corners(name, looks));
+        }
+        let found: Vec<(&String, &Vec<Look>)> = survey.views.iter().collect();
+        let lessons: Vec<Lesson> = of_each(&found, "views", |i, (name, looks)| {
+            let (mut place, agreed) = hang(looks, &survey.walls, &camera)?;
+            if true_lessons {
+                place = true_place(&building, name)?;
+            }
+            let looks: Vec<&Look> = agreed.iter().map(|&i| &looks[i]).collect();
+            let views = views(&looks, mixed(&[seed, 12, i as u64]), &p);
+            let each = views.iter().step_by(views.len().div_ceil(NEGATIVES).max(1));
+            let icons = each.map(|v| features(v.icon.clone(), &p.recognise)).collect();
+            let photographs: Vec<_> =
+                looks.iter().map(|l| (&l.sighting.frame.image, &l.quad.corners_px)).collect();
+            let points = points_of(&photographs);
+            Some(Lesson { name: (*name).clone(), place, views, icons, points })
+        })
+        .into_iter()
+        .flatten()
+        .collect();
+        let models = of_each(&lessons, "learning", |i, lesson| {
+            let alone = learn(LandmarkId(i as u64), &lesson.views, &[], &p).ok()?;
+            let alone = alone.with_points_if_used(&p, || lesson.points.clone());
+            let others = lessons.iter().enumerate().filter(|(other, _)| *other != i);
+            let others: Vec<IconFeatures> = others.flat_map(|(_, l)| l.icons.iter().cloned()).collect();
+            Some(add_negatives(&alone, &others, &p))
+        });
+        let map = snapshot(&lessons, &survey.walls, models, p)?;
+        anyhow::ensure!(!map.models.is_empty(), "nothing passed the gates of learning; try another --seed");
+        let place_errors_m = lessons.iter().map(|l| place_error_m(&building, l)).collect::<Result<_, _>>()?;
+        Ok(Self { building, map, course, place_errors_m })
+    }
+
+    /// The landmark's name.
+    pub(super) fn name(&self, id: LandmarkId) -> &str {
+        self.map.landmarks.get(&id).map_or("", |info| &info.name)
+    }
+}
+
+fn views(looks: &[&Look], seed: u64, p: &Params) -> Vec<View> {
+    let image = |look: &Look| look.sighting.frame.image.clone();
+    let photographed = looks.iter().filter_map(|l| View::photographed(&image(l), &l.quad.corners_px, p).ok());
+    let mut views: Vec<View> = photographed.collect();
+    let wanted = VIEWS.saturating_sub(views.len());
+    for (i, look) in looks.iter().enumerate() {
+        let count = (wanted + looks.len() - 1 - i) / looks.len();
+        let seed = mixed(&[seed, i as u64]);
+        views.extend(synthesis::views(&image(look), &look.quad.corners_px, count, p, seed));
+    }
+    views
+}
+
+/// Says of those that did not pass the gates why not.
+fn complain(lessons: &[Lesson], models: &[Option<LandmarkModel>]) {
+    for (lesson, model) in lessons.iter().zip(models) {
+        match model.as_ref().map(|m| &m.status) {
+            Some(ModelStatus::Active) => {}
+            Some(ModelStatus::Candidate(failures)) => {
+                let reasons: Vec<String> = failures.iter().map(ToString::to_string).collect();
+                screen::complain(&format!("{} is not in use: {}", lesson.name, reasons.join("; ")));
+            }
+            None => screen::complain(&format!("{} could not be learnt", lesson.name)),
+        }
+    }
+}
+
+fn snapshot(
+    lessons: &[Lesson],
+    walls: &[LaserSegment],
+    models: Vec<Option<LandmarkModel>>,
+    params: Params,
+) -> anyhow::Result<MapSnapshot> {
+    complain(lessons, &models);
+    let learnt: BTreeMap<LandmarkId, Learnt> = models
+        .into_iter()
+        .flatten()
+        .map(|model| (model.id, Learnt { digest: [0; 32], model: Arc::new(model) }))
+        .collect();
+    let models = ModelSet::in_use(learnt.values().map(|l| l.model.clone()), &params)?;
+    let doubles = Arc::new(doubles(&learnt, DistanceKind::Both, &params));
+    let numbered = || lessons.iter().enumerate().map(|(i, l)| (LandmarkId(i as u64), l));
+    let sizes: BTreeMap<LandmarkId, LandmarkSize> = numbered().map(|(id, l)| (id, l.place.size)).collect();
+    let landmarks: BTreeMap<LandmarkId, LandmarkInfo> = numbered()
+        .map(|(id, l)| {
+            let (size, place) = (Some(l.place.size), Some(l.place));
+            (id, LandmarkInfo { name: l.name.clone(), size, place, ..LandmarkInfo::default() })
+        })
+        .collect();
+    // Where each should be seen from, so that it can be missed: as the store makes it.
+    let obstacles: Vec<Obstacle> = walls.iter().map(Obstacle::from).collect();
+    let area =
+        |l: &Lesson| visibility(&l.place, &obstacles, &Viewer::default(), &VisibilityParams::default());
+    let visibility = numbered().filter_map(|(id, l)| Some((id, Arc::new(area(l).ok()?)))).collect();
+    let (params, wall_index) = (Arc::new(params), Arc::new(WallIndex::new(walls)));
+    let walls = walls.to_vec();
+    let mut map = MapSnapshot::empty(MAP, 1);
+    (map.landmarks, map.sizes, map.models, map.learnt) = (landmarks, sizes, models, learnt);
+    (map.doubles, map.visibility, map.params) = (doubles, visibility, params);
+    (map.walls, map.wall_index) = (walls, wall_index);
+    Ok(map)
+}
+
+fn take_true_corners(name: &str, looks: &mut [Look]) {
+    for look in looks {
+        if let Some(truth) = look.sighting.frame.truth.landmark(name) {
+            look.quad.corners_px = truth.corners_px;
+        }
+    }
+}
+
+fn true_place(building: &Building, name: &str) -> Option<LandmarkPlace> {
+    let truth = building.landmark(name)?;
+    let size = LandmarkSize { width_m: truth.width_m, height_m: truth.height_m };
+    let normal = truth.map_from_landmark.rotation * nalgebra::Vector3::x();
+    let (at, theta_rad) = (truth.map_from_landmark.translation.vector, normal.y.atan2(normal.x));
+    LandmarkPlace::by_hand(at, theta_rad, size, PlaceSigmas::default()).ok()
+}
+
+fn place_error_m(building: &Building, lesson: &Lesson) -> anyhow::Result<f64> {
+    let truth = building.landmark(&lesson.name).context("a taught poster that the building lacks")?;
+    let at = truth.map_from_landmark.translation.vector;
+    let place = &lesson.place;
+    Ok((at - nalgebra::Vector3::new(place.x_m, place.y_m, place.z_m)).norm())
+}

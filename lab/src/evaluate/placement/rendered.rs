@@ -1,0 +1,176 @@
+//! The simulator's corridor, rendered: posters on walls and lamps under the ceiling, with the corners and covariances
+//! that the detector gives, from robot poses of known uncertainty.
+
+use super::{Outcome, Summary};
+use crate::evaluate::experiment::{mixed, of_each};
+use map::{
+    mounting::{Mounting, pan_tilt},
+    place::LandmarkPlace,
+    placing::{Ceiling, PlacingParams, PlacingView, ViewOnCeiling, ViewOnWall, ceiling_placement, placement},
+    pose2::{Pose2, Pose2Covariance},
+    segments::LaserSegment,
+};
+use nalgebra::{Matrix2, Matrix3, Matrix6, Point2, Vector3};
+use sim::{
+    building::{Building, LandmarkKind, LandmarkTruth},
+    camera::Camera,
+    render::Renderer,
+    sensor::SensorParams,
+};
+use std::f64::consts::{FRAC_PI_2, PI};
+use vision::{
+    detect::{detect, quads::Quad},
+    geometry::polygon::iou,
+    learn::random::Random,
+    localise::pose::LandmarkSize,
+    params::DetectParams,
+    trace::NoTrace,
+};
+
+/// Height of the corridor's ceiling, as somebody measured it.
+const CEILING: Ceiling = Ceiling { height_m: 2.7, sigma_m: 0.01 };
+/// Standard deviation of the robot's pose: metres and radians.
+const ROBOT_SIGMA: [f64; 3] = [0.02, 0.02, 0.005];
+/// A found quad is the landmark when it overlaps it by this.
+const SAME_IOU: f64 = 0.8;
+/// Looks that are tried for each view wanted.
+const TRIES: usize = 4;
+/// Smallest side of a landmark that counts as seen.
+const MIN_SIDE_PX: f64 = 30.0;
+
+enum Seen {
+    Wall(ViewOnWall),
+    Ceiling(ViewOnCeiling),
+}
+
+pub(super) fn judged(corridors: usize, views: usize, seed: u64) -> Vec<Summary> {
+    let mut tasks: Vec<(u64, LandmarkTruth)> = vec![];
+    for corridor in 0..corridors as u64 {
+        let building = Building::corridor(mixed(&[seed, corridor]));
+        let wanted = |l: &&LandmarkTruth| matches!(l.kind, LandmarkKind::Poster | LandmarkKind::Lamp);
+        tasks.extend(building.landmarks().iter().filter(wanted).map(|l| (corridor, l.clone())));
+    }
+    let placed = of_each(&tasks, "placements", |i, (corridor, thing)| {
+        let building = Building::corridor(mixed(&[seed, *corridor]));
+        place(&building, thing, views, mixed(&[seed, *corridor, i as u64]))
+    });
+    [
+        ("rendered corridor, posters, detector", LandmarkKind::Poster),
+        ("rendered corridor, lamps, detector", LandmarkKind::Lamp),
+    ]
+    .iter()
+    .map(|(what, kind)| {
+        let of: Vec<&Option<Outcome>> =
+            tasks.iter().zip(&placed).filter(|((_, l), _)| l.kind == *kind).map(|(_, o)| o).collect();
+        let outcomes: Vec<Outcome> = of.iter().filter_map(|o| (*o).clone()).collect();
+        Summary::of(*what, &outcomes, of.len() - outcomes.len())
+    })
+    .collect()
+}
+
+fn place(building: &Building, thing: &LandmarkTruth, views: usize, seed: u64) -> Option<Outcome> {
+    let p = PlacingParams::default();
+    let walls: Vec<LaserSegment> = building
+        .walls()
+        .iter()
+        .filter_map(|w| LaserSegment::from_ends(w.a_m, w.b_m, Matrix2::new(4e-6, 0.0, 0.0, 1e-4)).ok())
+        .collect();
+    let mut renderer = Renderer::new(Camera::vga());
+    let mut random = Random::new(seed);
+    let (mut on_walls, mut on_ceiling) = (vec![], vec![]);
+    for _ in 0..views * TRIES {
+        match look(building, &mut renderer, thing, &walls, &mut random) {
+            Some(Seen::Wall(view)) => on_walls.push(view),
+            Some(Seen::Ceiling(view)) => on_ceiling.push(view),
+            None => {}
+        }
+        if on_walls.len().max(on_ceiling.len()) == views {
+            break;
+        }
+    }
+    let made = if thing.kind == LandmarkKind::Lamp {
+        ceiling_placement(&on_ceiling, &CEILING, &p)
+    } else {
+        placement(&on_walls, &walls, &p)
+    };
+    made.ok().map(|made| Outcome::of(&made.place, &truth(thing)))
+}
+
+/// One rendered frame with the detector's quad of the thing.
+fn look(
+    building: &Building,
+    renderer: &mut Renderer,
+    thing: &LandmarkTruth,
+    walls: &[LaserSegment],
+    random: &mut Random,
+) -> Option<Seen> {
+    let at = thing.map_from_landmark.translation.vector;
+    let normal = thing.map_from_landmark.rotation * Vector3::x();
+    let is_up = thing.kind == LandmarkKind::Lamp;
+    let (d, psi) = (random.range(1.2, 3.0), random.range(-0.9, 0.9));
+    let a = if is_up { random.range(-PI, PI) } else { normal.y.atan2(normal.x) + psi };
+    let (x, y) = (at.x + d * a.cos(), at.y + d * a.sin());
+    if building.clearance_m(&Point2::new(x, y)) < 0.25
+        || !building
+            .in_sight(&Point2::new(x, y), &Point2::new(at.x + 0.05 * normal.x, at.y + 0.05 * normal.y))
+    {
+        return None;
+    }
+    let tilt = (at.z - 1.2).atan2(d);
+    let mounting = Mounting::new(pan_tilt(0.0, tilt, Vector3::new(0.1, 0.0, 1.2))).ok()?;
+    let stood = Pose2::new(x, y, a + PI + random.range(-0.1, 0.1));
+    let rendered = renderer.render(
+        building,
+        &(stood.to_isometry3() * mounting.robot_from_camera),
+        &SensorParams::default(),
+        random.next_u64(),
+    );
+    let seen = rendered.truth.landmark(&thing.name).filter(|l| l.min_side_px() > MIN_SIDE_PX)?;
+    let quads = detect(&rendered.image, &DetectParams::default(), &mut NoTrace);
+    let quad: &Quad =
+        quads.iter().find(|q| iou(q.corners_px.points(), seen.corners_px.points()) > SAME_IOU)?;
+    // As recognition would: the landmark's own top-left first.
+    let turn = (0..4).min_by(|&a, &b| {
+        let off = |k: usize| {
+            let p = quad.corners_px.rotated(k);
+            p.points().iter().zip(seen.corners_px.points()).map(|(p, q)| (p - q).norm()).sum::<f64>()
+        };
+        off(a).total_cmp(&off(b))
+    })?;
+    let corners = quad.corners_px.rotated(turn);
+    let mut covariance = quad.believed_covariance_px2();
+    covariance.rotate_left(turn);
+    let e = Vector3::from(ROBOT_SIGMA).map(|s| s * random.normal());
+    let spread = Matrix3::from_diagonal(&Vector3::from(ROBOT_SIGMA.map(|s| s * s)));
+    let robot = Pose2Covariance { pose: stood.plus(&e), covariance: spread };
+    let view = PlacingView {
+        corners: &corners,
+        covariance_px2: &covariance,
+        camera: renderer.camera().intrinsics(),
+        map_from_robot: &robot,
+        mounting: &mounting,
+    };
+    let p = PlacingParams::default();
+    if is_up {
+        map::placing::view_on_ceiling(&view, &CEILING, &p).ok().map(Seen::Ceiling)
+    } else {
+        map::placing::view_on_wall(&view, walls, &p).ok().map(Seen::Wall)
+    }
+}
+
+fn truth(thing: &LandmarkTruth) -> LandmarkPlace {
+    let (at, turn) = (thing.map_from_landmark.translation.vector, thing.map_from_landmark.rotation);
+    let normal = turn * Vector3::x();
+    let up = turn * Vector3::z();
+    let is_up = thing.kind == LandmarkKind::Lamp;
+    LandmarkPlace {
+        x_m: at.x,
+        y_m: at.y,
+        z_m: at.z,
+        theta_rad: if is_up { up.y.atan2(up.x) } else { normal.y.atan2(normal.x) },
+        roll_rad: 0.0,
+        tilt_rad: if is_up { FRAC_PI_2 } else { 0.0 },
+        size: LandmarkSize { width_m: thing.width_m, height_m: thing.height_m },
+        covariance: Matrix6::zeros(),
+    }
+}

@@ -1,0 +1,54 @@
+//! The `waymark-lab` command line: what is known of Waymark's quality and speed, and how its weights were trained.
+//!
+//! Not part of the product: `server` does not depend on this crate.
+
+mod bench;
+mod evaluate;
+mod train;
+
+use clap::{Parser, Subcommand};
+use server::cli::screen;
+use std::process::ExitCode;
+
+/// Experiments on labelled pictures and simulated buildings, benchmarks beside peers, and training.
+#[derive(Debug, Parser)]
+#[command(name = "waymark-lab", version, propagate_version = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+    /// What to log, as in `info,server=debug`; default `warn`.
+    #[arg(long, global = true, env = "WAYMARK_LOG", value_name = "FILTER")]
+    log: Option<String>,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// The paper's experiments on labelled pictures: tables for people, JSON for programs.
+    #[command(subcommand)]
+    Evaluate(evaluate::Command),
+    /// What each stage of the pipeline costs on this machine.
+    ///
+    /// Without more words: a whole frame, recognition and poses included, on rendered frames of a corridor.
+    /// `waymark-lab bench detect`: from frame to quads beside OpenCV on the same pictures.
+    Bench(bench::Args),
+    /// Fit parameters of detector and confidence to pictures whose truth is known.
+    #[command(subcommand)]
+    Train(train::Command),
+}
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    server::cli::start_log(cli.log.as_deref(), "warn,zenoh=error");
+    let done = match &cli.command {
+        Command::Evaluate(command) => evaluate::run(command),
+        Command::Bench(args) => bench::run(args),
+        Command::Train(command) => train::run(command),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            screen::complain(&format!("waymark-lab: {error:#}"));
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -1,0 +1,298 @@
+//! `waymark-lab train search`: the two networks of the search from labelled pictures. Labels in, parameters out; the training
+//! is `vision`'s, what they are worth on pictures held out is `held_out`'s.
+
+use super::{
+    data::{Data, Set},
+    held_out::{self, Judged, Line},
+    source,
+};
+use crate::evaluate::{rendered, reviewed::Reviewed, truth::Truth};
+use anyhow::Context as _;
+use serde::Serialize;
+use serde_json::json;
+use server::cli::{parameters::ParameterArgs, scratch, screen};
+use sim::{scenes::ScenesParams, views::ViewsParams};
+use std::path::{Path, PathBuf};
+use vision::{
+    detect::{
+        fitting::{Example, Rivals, TrainParams, to_choose, to_tell},
+        network::Network,
+    },
+    params::DetectParams,
+};
+
+/// `waymark-lab train search`.
+#[derive(Debug, clap::Args)]
+pub(crate) struct SearchArgs {
+    /// Folders in the evaluation format, folders with a reviewed list (see docs/EVALUATION.md), or `corridor` for
+    /// rendered views, besides the rendered scenes.
+    sets: Vec<PathBuf>,
+    /// Rendered scenes to learn from; 0 for none.
+    #[arg(long, default_value_t = 600, value_parser = clap::value_parser!(u32).range(0..=10_000))]
+    scenes: u32,
+    /// A folder of pictures that hang in the scenes beside generated ones.
+    #[arg(long, value_name = "DIR")]
+    pictures: Option<PathBuf>,
+    /// How many times the labels of a set count; 1 where nothing is said. May be repeated.
+    #[arg(long, value_name = "SET=TIMES", value_parser = named_weight)]
+    weight: Vec<(String, f64)>,
+    /// Sides of labelled quads with a shorter side than this, in pixels of the working image, are not learnt from.
+    #[arg(long, default_value_t = 18.0)]
+    min_side_px: f64,
+    /// Parts that the images are dealt to; each is held out once.
+    #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u32).range(2..=1000))]
+    folds: u32,
+    /// Hidden units of the network of sides, and of the network of things.
+    #[arg(long, default_values_t = [16, 8], num_args = 2, value_names = ["SIDES", "THINGS"])]
+    hidden: Vec<usize>,
+    /// How much their weights are kept small.
+    #[arg(long, default_values_t = [5.0, 10.0], num_args = 2, value_names = ["SIDES", "THINGS"])]
+    ridge: Vec<f64>,
+    /// Steps of their training.
+    #[arg(long, default_values_t = [500, 400], num_args = 2, value_names = ["SIDES", "THINGS"])]
+    steps: Vec<usize>,
+    /// Write the networks as parameters here, for --params.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Write the networks as the source file `vision/src/detect/learnt.rs` here; run `cargo fmt` after.
+    #[arg(long, value_name = "FILE")]
+    rust: Option<PathBuf>,
+    /// Rendered views to learn from, where `corridor` is among the sets.
+    #[arg(long, default_value_t = 500, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    views: u32,
+    /// The rendered pictures and the first weights follow from it.
+    #[arg(long, default_value_t = 2)]
+    seed: u64,
+    /// Seed of the rendered pictures that the networks are judged by: another than --seed.
+    #[arg(long, default_value_t = 1)]
+    held_out_seed: u64,
+    /// Rendered pictures of either sort that the networks are judged by; 0 for none.
+    #[arg(long, default_value_t = 300, value_parser = clap::value_parser!(u32).range(0..=10_000))]
+    held_out_views: u32,
+    /// One JSON object instead of a table.
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    parameters: ParameterArgs,
+}
+
+fn named_weight(text: &str) -> Result<(String, f64), String> {
+    let (name, times) = text.split_once('=').ok_or("not SET=TIMES")?;
+    let times: f64 = times.parse().map_err(|error| format!("{times}: {error}"))?;
+    if times > 0.0 && times.is_finite() { Ok((name.to_owned(), times)) } else { Err("not above 0".into()) }
+}
+
+#[derive(Debug, Serialize)]
+struct Report {
+    images: usize,
+    sides: usize,
+    lines: usize,
+    things: usize,
+    no_things: usize,
+    /// What held-out outputs of the network of things were multiplied by.
+    calibration: f64,
+    results: Vec<Line>,
+    detection: Vec<Judged>,
+}
+
+/// The name under which rendered pictures are asked for.
+const CORRIDOR: &str = "corridor";
+const SCENES: &str = "scenes";
+
+/// Runs it.
+pub(super) fn run(args: &SearchArgs) -> anyhow::Result<()> {
+    anyhow::ensure!(args.seed != args.held_out_seed, "--held-out-seed: what was trained on judges nothing");
+    let params = args.parameters.parameters()?;
+    let (sets, _keep) = sets(args)?;
+    anyhow::ensure!(!sets.is_empty(), "no sets, and --scenes 0: nothing to learn from");
+    let each = |i: usize| TrainParams {
+        hidden: args.hidden[i],
+        ridge: args.ridge[i],
+        steps: args.steps[i],
+        seed: args.seed,
+        ..TrainParams::default()
+    };
+    let fit = Fit { sets: &sets, params: &params, min_side_px: args.min_side_px, how: [each(0), each(1)] };
+    let present = [params.quads.side_network().clone(), params.quads.thing_network().clone()];
+    let data = Data::gather(&sets, &params, args.min_side_px)?;
+    let in_use = held_out::line("in use", &data, &data, &present, &params);
+    // Every part is judged by networks that saw nothing of it.
+    let mut parts = Vec::new();
+    for part in 0..args.folds as usize {
+        parts.push(fit.networks(&data.sides, Some(part))?);
+    }
+    let all = fit.networks(&data.sides, None)?;
+    let calibration = held_out::calibration(&parts)?;
+    let final_networks =
+        [all.networks[0].clone(), calibration.applied(all.networks[1].clone())].map(source::rounded);
+    let results = vec![
+        in_use,
+        held_out::line_of_parts("new, held out", &data, &parts, &calibration, &params),
+        held_out::line("new, same images", &data, &all.data, &final_networks, &params),
+    ];
+    let networks: Vec<[Network; 2]> = parts
+        .into_iter()
+        .map(|p| [p.networks[0].clone(), calibration.applied(p.networks[1].clone())])
+        .collect();
+    let mut detection = held_out::photographs(&sets, &networks, &params)?;
+    detection.extend(others(args, &sets, &final_networks, &params)?);
+    let report = Report {
+        images: data.images,
+        sides: data.sides.len(),
+        lines: data.sides.iter().map(|r| r.off.len()).sum(),
+        things: all.data.things.iter().filter(|e| e.is_one).count(),
+        no_things: all.data.things.iter().filter(|e| !e.is_one).count(),
+        calibration: calibration.factor,
+        results,
+        detection,
+    };
+    keep(args, final_networks)?;
+    screen::say(&if args.json { serde_json::to_string(&report)? } else { table(&report, args.folds) });
+    Ok(())
+}
+
+/// The sets to learn from, and the folders of those that were rendered.
+fn sets(args: &SearchArgs) -> anyhow::Result<(Vec<Set>, Vec<scratch::Folder>)> {
+    let (mut sets, mut keep) = (Vec::new(), Vec::new());
+    let mut add = |truth: Truth| {
+        let named = args.weight.iter().find(|(name, _)| *name == truth.name);
+        sets.push(Set::new(truth, named.map_or(1.0, |(_, times)| *times), args.folds as usize));
+    };
+    for set in &args.sets {
+        let views = ViewsParams { seed: args.seed, views: args.views as usize, ..ViewsParams::default() };
+        let (folder, rendered) = rendered::folder(set, None, &views)?;
+        keep.extend(rendered);
+        let name = folder.file_name().map_or(String::new(), |n| n.to_string_lossy().into_owned());
+        let list = Reviewed::of(&name, None)?;
+        // A set that says nothing itself is known by what was looked at.
+        let unlabelled = !folder.join("truth.json").exists() && list.pictures().next().is_some();
+        add(if unlabelled {
+            Truth::of_reviewed(&name, &folder, &list)
+        } else {
+            Truth::read(&folder)?.with_things(&list)
+        });
+    }
+    if args.scenes > 0 {
+        let folder = scratch::Folder::new("scenes")?;
+        let params =
+            ScenesParams { seed: args.seed, scenes: args.scenes as usize, ..ScenesParams::default() };
+        let hung = args.pictures.as_deref().map(rendered::hung).transpose()?.unwrap_or_default();
+        rendered::write_scenes(folder.path(), &params, hung)?;
+        add(Truth::read(folder.path())?);
+        keep.push(folder);
+    }
+    Ok((sets, keep))
+}
+
+/// Rendered pictures of another seed, judged by the final networks.
+fn others(
+    args: &SearchArgs,
+    sets: &[Set],
+    networks: &[Network; 2],
+    params: &DetectParams,
+) -> anyhow::Result<Vec<Judged>> {
+    let mut judged = Vec::new();
+    for name in [CORRIDOR, SCENES].into_iter().filter(|name| sets.iter().any(|s| s.truth.name == *name)) {
+        if args.held_out_views == 0 {
+            continue;
+        }
+        let views = ViewsParams {
+            seed: args.held_out_seed,
+            views: args.held_out_views as usize,
+            ..ViewsParams::default()
+        };
+        let (folder, _keep) = rendered::folder(Path::new(name), None, &views)?;
+        let set = Set::new(Truth::read(&folder)?, 1.0, 1);
+        let title = format!("{name}, seed {}", args.held_out_seed);
+        judged.push(held_out::judged(&title, &set, std::slice::from_ref(networks), params)?);
+    }
+    Ok(judged)
+}
+
+/// What networks are fitted with.
+struct Fit<'a> {
+    sets: &'a [Set],
+    params: &'a DetectParams,
+    min_side_px: f64,
+    how: [TrainParams; 2],
+}
+
+impl Fit<'_> {
+    /// Networks of sides and of things from all but one part of the data. Things are told by their sides as the new
+    /// network of sides places them.
+    fn networks(&self, sides: &[Rivals], without: Option<usize>) -> anyhow::Result<held_out::Part> {
+        let learnt: Vec<Rivals> = sides.iter().filter(|r| Some(r.group) != without).cloned().collect();
+        let side = to_choose(&learnt, &self.how[0]).context("the network of sides")?;
+        let mut params = self.params.clone();
+        params.quads.side_model = Some(side.clone());
+        let data = Data::gather(self.sets, &params, self.min_side_px)?;
+        let learnt: Vec<Example> = data.things.iter().filter(|e| Some(e.group) != without).cloned().collect();
+        let thing = to_tell(&learnt, &self.how[1]).context("the network of things")?;
+        Ok(held_out::Part { unseen: without, networks: [side, thing], data })
+    }
+}
+
+/// Writes the networks where they are wanted.
+fn keep(args: &SearchArgs, [side, thing]: [Network; 2]) -> anyhow::Result<()> {
+    let models = [("side_model", side), ("thing_model", thing)];
+    if let Some(path) = &args.out {
+        let [side, thing] = &models;
+        write(
+            path,
+            &serde_json::to_string(&json!({"quads": {"side_model": side.1, "thing_model": thing.1}}))?,
+        )?;
+    }
+    if let Some(path) = &args.rust {
+        write(path, &source::source(&models))?;
+    }
+    Ok(())
+}
+
+fn write(path: &Path, text: &str) -> anyhow::Result<()> {
+    std::fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))
+}
+
+fn table(r: &Report, folds: u32) -> String {
+    let mut lines = vec![
+        format!(
+            "{} images: {} sides with {} lines beside them; {} quads that are things, {} that are not",
+            r.images, r.sides, r.lines, r.things, r.no_things
+        ),
+        format!(
+            "  {:<18} sides right    off, px   things kept   false an image   ({folds} folds)",
+            "networks"
+        ),
+    ];
+    lines.extend(r.results.iter().map(|l| {
+        format!(
+            "  {:<18} {:11.3} {:10.2} {:13.3} {:16.3}",
+            l.network, l.sides_right, l.side_off_px, l.things_kept, l.false_per_image
+        )
+    }));
+    lines.push(format!("  held-out odds of things were scaled by {:.2}", r.calibration));
+    lines.push(format!(
+        "  {:<34} quads  recall 0.7   0.85  false an image  corner, px",
+        "detection, held out"
+    ));
+    lines.extend(r.detection.iter().map(|d| {
+        let rate = d.false_per_image.map_or_else(|| "not labelled".to_owned(), |f| format!("{f:.3}"));
+        format!(
+            "  {:<34} {:5} {:11.3} {:6.3} {rate:>15} {:11.2}",
+            d.set, d.quads, d.recall_70, d.recall_85, d.corner_px
+        )
+    }));
+    lines.join("\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn weights_are_checked() {
+        assert_eq!(named_weight("museum=3"), Ok(("museum".into(), 3.0)));
+        for wrong in ["museum", "museum=", "museum=0", "museum=inf"] {
+            assert!(named_weight(wrong).is_err(), "{wrong}");
+        }
+    }
+}

@@ -1,0 +1,111 @@
+//! Networks as the source file that the detector is built with.
+
+use std::fmt::Write as _;
+use vision::detect::network::Network;
+
+/// Longest line.
+const WIDTH: usize = 108;
+
+/// Weights with four digits after the point: what is written is what is used.
+pub(super) fn rounded(mut net: Network) -> Network {
+    let round = |x: &mut f64| *x = (*x * 1e4).round() / 1e4 + 0.0;
+    let lists =
+        [&mut net.mean, &mut net.linear, &mut net.hidden_in, &mut net.hidden_bias, &mut net.hidden_out];
+    lists.into_iter().flatten().for_each(round);
+    // A deviation must stay above 0.
+    net.deviation.iter_mut().for_each(|d| *d = (*d * 1e4).ceil() / 1e4);
+    round(&mut net.bias);
+    net
+}
+
+/// `vision/src/detect/learnt.rs` with these networks.
+pub(super) fn source(models: &[(&str, Network); 2]) -> String {
+    let mut text = String::from(
+        "//! The weights of the two networks of the search, as learnt from rendered scenes and the open sets. Not for editing:\n\
+         //! this command writes the file, byte for byte on one machine, in the folder of the sets (see docs/EVALUATION.md),\n\
+         //! and `cargo fmt` puts it in form:\n\
+         //!\n\
+         //! ```text\n\
+         //! waymark-lab train search museum-paintings exit-signs corridor museum-walk-estense corridor-loop-rtabmap \\\n\
+         //!   corridor-multifloor doors-bbox signs-misc --pictures poster-textures-estense \\\n\
+         //!   --weight museum-paintings=6 --weight scenes=0.5 --rust vision/src/detect/learnt.rs\n\
+         //! ```\n\
+         #![allow(clippy::approx_constant, reason = \"weights that happen to be near one\")]\n\n\
+         use super::network::Network;\nuse std::sync::LazyLock;\n",
+    );
+    for (name, net) in models {
+        let lists = lists(net);
+        let upper = name.to_uppercase();
+        // Writing to a String cannot fail.
+        write!(
+            text,
+            "\n/// Weighs the measurements of `{name}`.\npub(super) fn {name}() -> &'static Network {{\n"
+        )
+        .ok();
+        text.push_str("    static MODEL: LazyLock<Network> = LazyLock::new(|| Network {\n");
+        for (list, _) in lists {
+            writeln!(text, "        {list}: {upper}_{}.to_vec(),", list.to_uppercase()).ok();
+        }
+        write!(text, "        bias: {:?},\n    }});\n    &MODEL\n}}\n", net.bias).ok();
+    }
+    for (name, net) in models {
+        for (list, values) in lists(net) {
+            let name = format!("{}_{}", name.to_uppercase(), list.to_uppercase());
+            write!(text, "\nconst {name}: [f64; {}] = [\n   ", values.len()).ok();
+            let mut used = 3;
+            for value in values {
+                let word = format!(" {value:?},");
+                if used + word.len() > WIDTH {
+                    text.push_str("\n   ");
+                    used = 3;
+                }
+                used += word.len();
+                text.push_str(&word);
+            }
+            text.push_str("\n];\n");
+        }
+    }
+    text
+}
+
+/// Names and values in the order of the fields.
+fn lists(net: &Network) -> [(&'static str, &[f64]); 6] {
+    [
+        ("mean", &net.mean),
+        ("deviation", &net.deviation),
+        ("linear", &net.linear),
+        ("hidden_in", &net.hidden_in),
+        ("hidden_bias", &net.hidden_bias),
+        ("hidden_out", &net.hidden_out),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_weight_is_written_as_it_is_used() {
+        let net = rounded(Network {
+            mean: vec![0.123_449, -0.000_01],
+            deviation: vec![1e-9, 2.0],
+            linear: vec![3.5; 2],
+            hidden_in: vec![-1.0; 60],
+            hidden_bias: vec![0.0; 30],
+            hidden_out: vec![7.0; 30],
+            bias: 0.518_46,
+        });
+        assert_eq!(net.check(2), Ok(()));
+        let text = source(&[("side_model", net.clone()), ("thing_model", net)]);
+        for part in [
+            "const SIDE_MODEL_MEAN: [f64; 2] = [\n    0.1234, 0.0,\n];",
+            "const THING_MODEL_DEVIATION: [f64; 2] = [\n    0.0001, 2.0,\n];",
+            "bias: 0.5185,",
+            "pub(super) fn thing_model() -> &'static Network {",
+        ] {
+            assert!(text.contains(part), "{part} not in\n{text}");
+        }
+        assert!(text.lines().all(|l| l.len() <= 120));
+        assert_eq!(text.matches("-1.0,").count(), 120);
+    }
+}

@@ -1,0 +1,97 @@
+//! What a simulated robot has wrong of itself: its camera, where that sits, and on a survey where it stands. A covariance
+//! can only be judged where the errors that it states are made.
+
+use map::{
+    check::OutOfRange,
+    mounting::Mounting,
+    pose2::{Pose2, Pose2Covariance},
+};
+use nalgebra::{Isometry3, Matrix3, Vector3, Vector6};
+use vision::{
+    frame::{Intrinsics, IntrinsicsSigmas},
+    learn::random::Random,
+    localise::reproject::perturbed,
+};
+
+/// How well a surveying robot knows its pose: standard deviations of x, y (metres) and heading (radians).
+const SURVEY_SIGMA: [f64; 3] = [0.01, 0.01, 0.002];
+
+/// Of one robot: its camera and the camera's seat are wrong by the same in every picture, its pose by something else each
+/// time.
+#[derive(Debug, Clone)]
+pub struct SimulatedRobotErrors {
+    /// What it says of its camera.
+    pub camera: Intrinsics,
+    /// None: it has nothing wrong.
+    random: Option<Random>,
+    /// Of the seat: left perturbation (rotation, translation), robot frame.
+    seat: Vector6<f64>,
+}
+
+impl SimulatedRobotErrors {
+    /// A robot with nothing wrong, which knows that of its camera and claims for the rest what others do.
+    pub fn none(camera: &Intrinsics) -> Self {
+        Self { camera: *camera, random: None, seat: Vector6::zeros() }
+    }
+
+    /// A robot that is wrong by what it says it may be: a usual calibration's errors, the mounting's default, a survey's.
+    pub fn drawn(camera: &Intrinsics, seed: u64) -> Self {
+        let mut random = Random::new(seed);
+        let sigmas = IntrinsicsSigmas::usual(camera.fx_px);
+        let usual = camera.with_sigmas(sigmas).unwrap_or(*camera);
+        let e = usual.error_sigmas().map(|s| s * random.normal());
+        let (fx_px, fy_px) = (camera.fx_px * (1.0 + e.x), camera.fy_px * (1.0 + e.x));
+        let said = Intrinsics { fx_px, fy_px, cx_px: camera.cx_px + e.y, cy_px: camera.cy_px + e.z, ..usual };
+        let (a, t) = (Mounting::DEFAULT_ANGLE_SIGMA_RAD, Mounting::DEFAULT_POSITION_SIGMA_M);
+        let seat = Vector6::new(a, a, a, t, t, t).map(|s| s * random.normal());
+        Self { camera: said, random: Some(random), seat }
+    }
+
+    /// One or the other.
+    pub fn of(camera: &Intrinsics, exact: bool, seed: u64) -> Self {
+        if exact { Self::none(camera) } else { Self::drawn(camera, seed) }
+    }
+
+    /// Where it says that its camera sits.
+    pub fn mounting(&self, robot_from_camera: &Isometry3<f64>) -> Result<Mounting, OutOfRange> {
+        let (turn, shift) = (self.seat.fixed_rows::<3>(0).into(), self.seat.fixed_rows::<3>(3).into());
+        Mounting::new(perturbed(robot_from_camera, &turn, &shift))
+    }
+
+    /// Where it says that it stands, on a survey.
+    pub fn surveyed(&mut self, map_from_robot: &Pose2) -> Result<Pose2Covariance, OutOfRange> {
+        let sigmas = Vector3::from(SURVEY_SIGMA);
+        let error = self.random.as_mut().map_or_else(Vector3::zeros, |r| sigmas.map(|s| s * r.normal()));
+        let covariance = Matrix3::from_diagonal(&sigmas.component_mul(&sigmas));
+        Pose2Covariance::new(map_from_robot.plus(&error), covariance)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use vision::frame::Distortion;
+
+    #[test]
+    fn errors_are_as_large_as_they_are_said_to_be() {
+        let camera = Intrinsics::new(500.0, 500.0, 320.0, 240.0, Distortion::None).unwrap();
+        let (at, seat) = (Pose2::new(3.0, 1.0, 0.5), Isometry3::translation(0.1, 0.0, 1.2));
+        let n = 500_u32;
+        let (mut focal, mut turn, mut nees) = (0.0, 0.0, 0.0);
+        for seed in 0..n {
+            let mut robot = SimulatedRobotErrors::drawn(&camera, u64::from(seed));
+            focal += ((robot.camera.fx_px / 500.0 - 1.0) / IntrinsicsSigmas::USUAL_FOCAL_SHARE).powi(2);
+            let angle = robot.mounting(&seat).unwrap().robot_from_camera.rotation.angle();
+            turn += (angle / Mounting::DEFAULT_ANGLE_SIGMA_RAD).powi(2);
+            let said = robot.surveyed(&at).unwrap();
+            let e = said.pose.minus(&at);
+            nees += e.dot(&said.covariance.cholesky().unwrap().solve(&e));
+            assert!(robot.camera.sigmas.is_some());
+        }
+        let of = |sum: f64| sum / f64::from(n);
+        assert!((0.8..1.2).contains(&of(focal)) && (2.6..3.4).contains(&of(turn)), "{focal} {turn}");
+        assert!((2.6..3.4).contains(&of(nees)), "{nees}");
+        let mut exact = SimulatedRobotErrors::none(&camera);
+        assert_eq!((exact.surveyed(&at).unwrap().pose, exact.camera), (at, camera));
+    }
+}
