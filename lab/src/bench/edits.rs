@@ -1,13 +1,10 @@
 //! What one change of a large map costs: a landmark moved, a landmark quarantined, and a lesson, over HTTP, until the server has
 //! acknowledged it. What the server still computes after that is waited for and reported apart.
 
+use super::recognise::landmarks::models;
 use crate::evaluate::statistics::quantile;
 use anyhow::Context as _;
-use client::{
-    MapClient,
-    lessons::{Place, Size},
-    map::Extent,
-};
+use client::{MapClient, lessons::Place, map::Extent};
 use serde::Serialize;
 use serde_json::{Value, json};
 use server::{
@@ -15,15 +12,30 @@ use server::{
     cli::{pictures, scratch, screen},
     config::{Config, RawConfig},
 };
+use sha2::{Digest as _, Sha256};
 use sim::posters::poster_of_size;
-use std::time::{Duration, Instant};
-use vision::frame::GrayImage;
+use sqlx::{Connection as _, SqliteConnection, sqlite::SqliteConnectOptions};
+use std::{
+    path::Path,
+    time::{Duration, Instant},
+};
+use vision::{frame::GrayImage, learn::model::LandmarkModel, params::Params};
 
 const MAP: &str = "large";
 /// Widest poster that is taught, in pixels: what is measured does not depend on it.
 const POSTER_PX: usize = 240;
-/// Posters of these numbers are taught twice, so that the map has look-alikes: one in twenty.
+/// One poster in so many is on the map twice, so that the map has look-alikes.
 const LOOK_ALIKE_EVERY: usize = 20;
+/// Posters that are learnt as a server would; the others share their thresholds.
+const TAUGHT: usize = 20;
+/// Number of the first poster.
+const FIRST_POSTER: u64 = 40_000;
+/// The server's database in its data directory.
+const DATABASE: &str = "waymark.sqlite";
+const LANDMARK: &str = "INSERT INTO landmarks (id, map_id, name, width_m, height_m, x_m, y_m, z_m, theta_rad, created_ms) \
+                        SELECT ?1, id, ?3, 0.6, 0.84, ?4, ?5, ?6, ?7, 0 FROM maps WHERE name = ?2";
+const MODEL: &str = "INSERT INTO models (landmark_id, sha256, params_hash, model, active, reasons, facts, views, \
+                     generated_views, learnt_ms) VALUES (?1, ?2, ?3, ?4, 1, '[]', '{}', 3, 0, 0)";
 /// Distance of landmarks along their wall, and of one wall from the next, metres.
 const SPACING_M: f64 = 2.0;
 const ROW_M: f64 = 4.0;
@@ -78,10 +90,14 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
 
 async fn measured(args: &Args) -> anyhow::Result<()> {
     let folder = scratch::Folder::new("edits")?;
+    let started = Instant::now();
+    fill(folder.path(), args).await?;
+    let filled_s = started.elapsed().as_secs_f64();
+    let started = Instant::now();
     let server = Server::start(settings(folder.path(), args)?).await?;
+    let start_ms = ms(started);
     let base = format!("http://{}", server.http_addr);
     let large = Large { maps: MapClient::new(&base)?, base, http: reqwest::Client::new() };
-    let taught_s = large.fill(args).await?;
     let (mut moved, mut settled, mut trusted, mut lessons) = (vec![], vec![], vec![], vec![]);
     let bar = screen::progress(args.changes as usize, "changing");
     for i in 0..args.changes as usize {
@@ -116,13 +132,12 @@ async fn measured(args: &Args) -> anyhow::Result<()> {
     ];
     if args.json {
         let costs: Value = rows.iter().map(|(name, cost)| ((*name).to_owned(), json!(cost))).collect();
-        let head =
-            json!({ "landmarks": args.landmarks, "walls": args.walls, "taught_s": taught_s, "costs": costs });
+        let head = json!({ "landmarks": args.landmarks, "walls": args.walls, "filled_s": filled_s, "start_ms": start_ms, "costs": costs });
         screen::say(&head.to_string());
         return Ok(());
     }
     screen::say(&format!(
-        "{} landmarks, {} wall segments (taught in {taught_s:.0} s); milliseconds until acknowledged",
+        "{} landmarks, {} wall segments (made in {filled_s:.0} s, server ready after {start_ms:.0} ms)",
         args.landmarks, args.walls
     ));
     screen::say("| change | median | 90 % | worst |\n|---|---|---|---|");
@@ -138,7 +153,7 @@ fn ms(started: Instant) -> f64 {
 }
 
 /// Settings of a server that takes maps of this size.
-fn settings(data: &std::path::Path, args: &Args) -> anyhow::Result<Config> {
+fn settings(data: &Path, args: &Args) -> anyhow::Result<Config> {
     let mut raw = RawConfig {
         data: data.to_owned(),
         http: "127.0.0.1:0".to_owned(),
@@ -150,6 +165,47 @@ fn settings(data: &std::path::Path, args: &Args) -> anyhow::Result<Config> {
     Ok(Config::try_from(raw)?)
 }
 
+/// Makes the map: through the server what is small, the models and places straight into its database.
+async fn fill(data: &Path, args: &Args) -> anyhow::Result<()> {
+    let server = Server::start(settings(data, args)?).await?;
+    let maps = MapClient::new(&format!("http://{}", server.http_addr))?;
+    maps.create_map(MAP, None).await?;
+    maps.set_laser(MAP, &walls(args)).await?;
+    server.stop().await;
+    let (count, threads) = (args.landmarks as usize, std::thread::available_parallelism()?.get());
+    let params = Params::default();
+    let models = models(FIRST_POSTER, count, TAUGHT.min(count), threads, &params)?;
+    let options = SqliteConnectOptions::new().filename(data.join(DATABASE)).foreign_keys(true);
+    let mut db = SqliteConnection::connect_with(&options).await?;
+    let mut tx = db.begin().await?;
+    for (i, model) in models.iter().enumerate() {
+        // Of the posters taught twice, the second has the model of the first.
+        let original = if i % LOOK_ALIKE_EVERY == 1 { &models[i - 1] } else { model };
+        let bytes = LandmarkModel { id: model.id, ..LandmarkModel::clone(original) }.to_bytes();
+        let place = place(i, 0.0);
+        sqlx::query(LANDMARK)
+            .bind(model.id.0 as i64)
+            .bind(MAP)
+            .bind(format!("l{i}"))
+            .bind(place.x_m)
+            .bind(place.y_m)
+            .bind(place.z_m)
+            .bind(place.theta_rad)
+            .execute(&mut *tx)
+            .await?;
+        sqlx::query(MODEL)
+            .bind(model.id.0 as i64)
+            .bind(&Sha256::digest(&bytes)[..])
+            .bind(&params.distance_hash().to_le_bytes()[..])
+            .bind(bytes)
+            .execute(&mut *tx)
+            .await?;
+    }
+    tx.commit().await?;
+    Ok(db.close().await?)
+}
+
+/// A poster that the map does not have yet.
 fn picture(number: usize) -> GrayImage {
     let texture = poster_of_size(number as u64, POSTER_PX, 1.4);
     GrayImage::from_fn(texture.width(), texture.height(), |u, v| texture.data()[v * texture.width() + u])
@@ -163,28 +219,6 @@ fn place(i: usize, shift_m: f64) -> Place {
 }
 
 impl Large {
-    /// Teaches and places all landmarks, then sets the walls; seconds.
-    async fn fill(&self, args: &Args) -> anyhow::Result<f64> {
-        let started = Instant::now();
-        self.maps.create_map(MAP, None).await?;
-        let bar = screen::progress(args.landmarks as usize, "landmarks");
-        for i in 0..args.landmarks as usize {
-            let number = if i % LOOK_ALIKE_EVERY == 1 { i - 1 } else { i };
-            let name = format!("l{i}");
-            let size = Size { width_m: 0.6, height_m: 0.84 };
-            self.maps.add_landmark(MAP, &name, Some(size), Some(place(i, 0.0))).await?;
-            let jpeg = pictures::jpeg(&picture(number))?;
-            self.maps.upload_view(MAP, &name, jpeg, Extent::WholeImage).await?;
-            bar.inc(1);
-        }
-        let job = self.maps.learn(MAP, None, Some(4)).await?;
-        bar.set_message("learning");
-        self.maps.wait_for_job(job, LESSON_TIMEOUT, |_| ()).await?;
-        bar.finish_and_clear();
-        self.maps.set_laser(MAP, &walls(args)).await?;
-        Ok(started.elapsed().as_secs_f64())
-    }
-
     async fn change(&self, landmark: &str, changes: &Value) -> anyhow::Result<()> {
         let url = format!("{}/api/v1/maps/{MAP}/landmarks/{landmark}", self.base);
         let answer = self.http.patch(&url).json(changes).send().await?;

@@ -1,7 +1,7 @@
 //! `waymark-lab bench recognise`: from quad to verdict among few and many landmarks; whole frames, searched globally and by a
 //! known pose, beside OpenCV's SIFT; what a landmark takes; what the short list of icons loses; a lesson.
 
-mod landmarks;
+pub(super) mod landmarks;
 mod queries;
 mod frames;
 mod guided;

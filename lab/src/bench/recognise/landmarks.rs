@@ -43,7 +43,7 @@ pub(super) fn whole(image: &GrayImage) -> anyhow::Result<Corners> {
 }
 
 /// `count` models with the ids 1 to `count`, of which `taught` are learnt; `threads` work.
-pub(super) fn models(
+pub(in crate::bench) fn models(
     first: u64,
     count: usize,
     taught: usize,
