@@ -10,6 +10,8 @@ use std::f64::consts::PI;
 
 /// Shortest length of a segment, metres.
 pub const MIN_SEGMENT_M: f64 = 0.01;
+/// Standard deviation of a wall given by hand, across it, metres.
+const BY_HAND_SIGMA_M: f64 = 0.01;
 
 /// A straight piece of wall. `a` to `b` runs so that the free side, from which it was seen, is on the left: the two
 /// faces of a wall are two segments. The ends lie on the line `cos(alpha) x + sin(alpha) y = rho`, rho >= 0.
@@ -44,6 +46,15 @@ impl LaserSegment {
         let rho = normal.dot(&Point2::from((a.coords + b.coords) * 0.5).coords);
         let (normal, rho_m) = if rho < 0.0 { (-normal, -rho) } else { (normal, rho) };
         Ok(Self { a, b, alpha_rad: normal.y.atan2(normal.x), rho_m, covariance, hits: 1 })
+    }
+
+    /// From ends `[ax, ay, bx, by]` (metres) measured by hand, each known to 1 cm across the wall.
+    pub fn by_hand(&[ax, ay, bx, by]: &[f64; 4]) -> Result<Self, OutOfRange> {
+        let (a, b) = (Point2::new(ax, ay), Point2::new(bx, by));
+        let length = (b - a).norm().max(MIN_SEGMENT_M);
+        let variance = BY_HAND_SIGMA_M * BY_HAND_SIGMA_M;
+        let covariance = Matrix2::new(2.0 * variance / (length * length), 0.0, 0.0, variance);
+        Self::from_ends(a, b, covariance)
     }
 
     /// From a line and two points that are projected on it, `a` to `b` with the free side on the left.

@@ -7,6 +7,7 @@ pub mod config;
 pub mod engine;
 pub mod bus;
 mod store;
+mod publication;
 mod jobs;
 pub mod gather;
 pub mod vitals;

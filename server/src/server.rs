@@ -16,7 +16,8 @@ use crate::{
     gather::{self, Gatherer, Hook},
     http::{self, App, Workshop},
     jobs::Jobs,
-    store::{OpenError, Store, WriterTask, landmarks},
+    publication::{Catalogue, CatalogueTasks},
+    store::{OpenError, landmarks},
     vitals::{Failure, Pulse, Vitals},
 };
 use std::{net::SocketAddr, sync::Arc, time::Duration};
@@ -91,7 +92,7 @@ struct Tasks {
     jobs: JoinHandle<()>,
     findings: JoinHandle<()>,
     gather: JoinHandle<()>,
-    writer: WriterTask,
+    writer: CatalogueTasks,
     watch: JoinHandle<()>,
 }
 
@@ -99,7 +100,7 @@ impl Server {
     /// Starts a server. When this returns, it answers.
     pub async fn start(config: Config) -> Result<RunningServer, StartError> {
         let config = Arc::new(config);
-        let (store, writer) = Store::open(&config).await?;
+        let (store, writer) = Catalogue::open(&config).await?;
         let at = |source| StartError::Http { addr: config.http_addr, source };
         let listener = TcpListener::bind(config.http_addr).await.map_err(at)?;
         let http_addr = listener.local_addr().map_err(at)?;
@@ -168,7 +169,7 @@ fn engine(
 }
 
 /// Writes down what robots find out about landmarks, until no worker is left to find anything.
-async fn keep_findings(store: Store, mut found: Receiver<Found>, pulse: Pulse) {
+async fn keep_findings(store: Catalogue, mut found: Receiver<Found>, pulse: Pulse) {
     while let Some(Found { map, name, standing, finding, .. }) = found.recv().await {
         let kept = store.write(move |tx| {
             Box::pin(async move {

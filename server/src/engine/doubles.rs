@@ -5,7 +5,7 @@
 //! stand for each of them. Never a recognition. Points have no thresholds to lift; where they say nothing, icons are asked
 //! of all, also of those that are named by their points only.
 
-use super::snapshot::{Learnt, MapSnapshot};
+use super::snapshot::map_snapshot::MapSnapshot;
 use map::{
     hypotheses::{Glimpse, Member, Reading},
     localise::{LocaliseParams, RobotFix, Sighting, robot_pose},
@@ -21,85 +21,15 @@ use std::{
 use vision::{
     detect::quads::{Corners, Quad},
     frame::{GrayImage, Intrinsics},
-    learn::{
-        model::{LandmarkModel, refit_thresholds, unlikeness_of},
-        threshold::LimitedBy,
-    },
     localise::pose::{LandmarkPose, landmark_pose},
     params::Params,
     pipeline::{FrameFacts, QuadFacts, matched},
-    recognise::{
-        DistanceKind, IconFeatures, LandmarkId, Recognition, Refusal, models::ModelSet, verdict::recognise,
-    },
+    recognise::{DistanceKind, LandmarkId, Recognition, Refusal, verdict::recognise},
     seen_border::SeenBorder,
 };
 
-/// Most landmarks with look-alikes that are kept for this.
-pub const MAX_DOUBLES: usize = 512;
-/// Pairs of them that are compared; from then on all count as alike.
-pub const MAX_COMPARED: usize = 20_000;
 /// Most landmarks that look the same: a sighting of more says too little for what it costs.
 pub const MAX_ALIKE: usize = map::hypotheses::MAX_MEMBERS / 2;
-
-/// The landmarks that have look-alikes.
-#[derive(Debug, Default)]
-pub struct Doubles {
-    /// Their models, with lifted thresholds.
-    pub models: ModelSet,
-    /// The landmarks that look like each, itself included.
-    pub alike: BTreeMap<LandmarkId, Arc<Vec<LandmarkId>>>,
-    /// The parameters without points: icons are asked where points say nothing.
-    pub by_icons: Params,
-}
-
-/// Whether something looks like it: its threshold was held down by others, or none could be found for that.
-fn has_doubles(model: &LandmarkModel) -> bool {
-    let is_held_down = model.is_active() && model.likeness.limited_by == LimitedBy::NearestNegative;
-    is_held_down || model.is_kept_out_by_look_alikes()
-}
-
-/// The landmarks that have look-alikes, with lifted thresholds; none where a map's distances decide alone.
-pub fn doubles(learnt: &BTreeMap<LandmarkId, Learnt>, kind: DistanceKind, p: &Params) -> Doubles {
-    if kind != DistanceKind::Both {
-        return Doubles::default();
-    }
-    let held = learnt.values().map(|l| &l.model).filter(|m| has_doubles(m)).take(MAX_DOUBLES);
-    let lifted: Vec<_> =
-        held.map(|model| Arc::new(refit_thresholds(model, &[], p))).filter(|m| m.is_active()).collect();
-    let alike = alike(&lifted, p);
-    let mut by_icons = p.clone();
-    by_icons.recognise.verdict.points = false;
-    Doubles { models: ModelSet::new(lifted, p).unwrap_or_default(), alike, by_icons }
-}
-
-/// Who looks like whom: of two that one takes for the other, and so on from one to the next. What looks like either of two
-/// is never left out, though the ends of a long chain may look nothing like each other.
-fn alike(models: &[Arc<LandmarkModel>], p: &Params) -> BTreeMap<LandmarkId, Arc<Vec<LandmarkId>>> {
-    let icons: Vec<Vec<IconFeatures>> = models.iter().map(|m| m.features(&p.recognise)).collect();
-    let accepts = |a: usize, b: usize| unlikeness_of(&models[a], &icons[b], p) < models[a].likeness.tau;
-    let (mut class, mut compared): (Vec<usize>, usize) = ((0..models.len()).collect(), 0);
-    for i in 0..models.len() {
-        for j in 0..i {
-            if class[i] == class[j] {
-                continue;
-            }
-            compared += 1;
-            if compared > MAX_COMPARED || accepts(i, j) || accepts(j, i) {
-                let (from, to) = (class[i], class[j]);
-                class.iter_mut().filter(|c| **c == from).for_each(|c| *c = to);
-            }
-        }
-    }
-    let mut classes: BTreeMap<usize, Vec<LandmarkId>> = BTreeMap::new();
-    for (model, class) in models.iter().zip(class) {
-        classes.entry(class).or_default().push(model.id);
-    }
-    let mut alike = BTreeMap::new();
-    for all in classes.into_values().map(Arc::new) {
-        alike.extend(all.iter().map(|id| (*id, all.clone())));
-    }
-    alike
-}
 
 /// One thing that was seen: each landmark it may be, and how it was seen if it is that one.
 pub type Sighted = Vec<(LandmarkId, Glimpse)>;
@@ -113,7 +43,7 @@ pub fn sighted(
     mounting: &Mounting,
     camera: &Intrinsics,
 ) -> Vec<Sighted> {
-    if map.doubles.models.is_empty() {
+    if map.look_alikes.models.is_empty() {
         return Vec::new();
     }
     let unsure =
@@ -161,16 +91,16 @@ pub fn hang_where_known(landmarks: &BTreeSet<LandmarkId>, map: &MapSnapshot) -> 
 
 /// Which landmarks with doubles a quad may be; `None` where it is none of them, or may be one that hangs nobody knows where.
 pub fn resembling(image: &GrayImage, quad: &Quad, map: &MapSnapshot) -> Option<Resembling> {
-    let asked = |p: &Params| recognise(image, quad, &map.doubles.models, DistanceKind::Both, p);
+    let asked = |p: &Params| recognise(image, quad, &map.look_alikes.models, DistanceKind::Both, p);
     let mut verdict = asked(&map.params);
     if map.params.recognise.verdict.points && verdict.recognition == Recognition::Unknown {
-        verdict = asked(&map.doubles.by_icons);
+        verdict = asked(&map.look_alikes.by_icons);
     }
     let (Recognition::Ambiguous(_) | Recognition::Unique(_)) = verdict.recognition else { return None };
     let fits = |refusal: Option<Refusal>| matches!(refusal, None | Some(Refusal::Margin));
     let fitting: BTreeSet<LandmarkId> =
         verdict.candidates.iter().filter(|c| fits(c.refusal)).map(|c| c.landmark).collect();
-    let members = members(&fitting, &map.doubles.alike)?;
+    let members = members(&fitting, &map.look_alikes.alike)?;
     if !hang_where_known(&members, map) {
         return None;
     }
@@ -231,41 +161,16 @@ pub fn on_floor(place: &LandmarkPlace) -> Pose2 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use vision::{
-        learn::model::{View, learn},
-        learn::synthesis,
-    };
 
-    /// Blocks of grey with a little of its own in a corner; another number, other blocks.
-    fn picture(number: usize, own: usize) -> GrayImage {
-        GrayImage::from_fn(240, 240, |u, v| {
-            if u > 216 && v > 216 {
-                return (40 + 12 * own) as u8;
-            }
-            let block = |size: usize| (u / size * 31 + v / size * 57 + size + number * 7919) as u64;
-            let hash = |x: u64| (x.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 48) % 128;
-            (hash(block(24)) + hash(block(60))) as u8
-        })
+    fn ids(ids: &[u64]) -> BTreeSet<LandmarkId> {
+        ids.iter().map(|id| LandmarkId(*id)).collect()
     }
 
     #[test]
-    fn twelve_like_doors_are_one_class_and_others_are_their_own() {
-        let p = Params::default();
-        let whole = Corners::try_from([[-0.5, -0.5], [239.5, -0.5], [239.5, 239.5], [-0.5, 239.5]]).unwrap();
-        let lesson = |id: u64, image: &GrayImage| {
-            let mut views = vec![View::photographed(image, &whole, &p).unwrap()];
-            views.extend(synthesis::views(image, &whole, 8, &p, id));
-            Arc::new(refit_thresholds(&learn(LandmarkId(id), &views, &[], &p).unwrap(), &[], &p))
-        };
-        let mut models: Vec<_> = (0..12).map(|i| lesson(i, &picture(1, i as usize))).collect();
-        models.extend([lesson(20, &picture(5, 0)), lesson(21, &picture(5, 3))]);
-        let alike = alike(&models, &p);
-        let of = |id: u64| alike[&LandmarkId(id)].iter().map(|l| l.0).collect::<Vec<_>>();
-        assert_eq!(of(0), (0..12).collect::<Vec<_>>());
-        assert!(Arc::ptr_eq(&alike[&LandmarkId(3)], &alike[&LandmarkId(11)]));
-        assert_eq!(of(20), [20, 21]);
-        // Five of the doors are told; it may be any of the twelve. So if only one is.
-        let ids = |ids: &[u64]| ids.iter().map(|id| LandmarkId(*id)).collect::<BTreeSet<_>>();
+    fn what_fits_some_of_a_class_may_be_any_of_it() {
+        let class = |ids: std::ops::Range<u64>| Arc::new(ids.map(LandmarkId).collect::<Vec<_>>());
+        let classes = [class(0..12), class(20..22)];
+        let alike = classes.iter().flat_map(|c| c.iter().map(|id| (*id, c.clone()))).collect();
         assert_eq!(members(&ids(&[0, 2, 4, 6, 8]), &alike).unwrap().len(), 12);
         assert_eq!(members(&ids(&[0, 20]), &alike).unwrap().len(), 14);
         assert_eq!(members(&ids(&[3]), &alike).unwrap().len(), 12);

@@ -96,6 +96,10 @@ struct MayBe {
 pub fn guided(image: &GrayImage, view: &View<'_>, prior: &Pose2Covariance) -> Guided {
     let (Some(mounting), Some(intrinsics)) = (view.mounting, view.camera) else { return Guided::default() };
     let map = view.map;
+    // Until it is known what looks alike, a pose may not choose between landmarks.
+    if map.pending.look_alikes {
+        return Guided::default();
+    }
     let known = map.landmarks.iter().filter_map(|(id, info)| {
         let place = info.place.as_ref().filter(|_| info.is_trusted())?;
         Some(KnownLandmark { landmark: *id, place, visible: map.visibility.get(id).map(Arc::as_ref) })
@@ -128,7 +132,7 @@ pub fn guided(image: &GrayImage, view: &View<'_>, prior: &Pose2Covariance) -> Gu
 
 /// Whether a landmark is in use by itself, and nothing looks like it.
 fn is_told_apart(map: &MapSnapshot, id: LandmarkId) -> bool {
-    map.models.get(id).is_some() && !map.doubles.alike.contains_key(&id)
+    map.models.get(id).is_some() && !map.look_alikes.alike.contains_key(&id)
 }
 
 /// What may be landmarks, each thing once: of several borders the one that fits best, of what was detected and what was
@@ -187,7 +191,7 @@ fn may_be(image: &GrayImage, quad: usize, facts: &QuadFacts, view: &View<'_>) ->
     }
     let resembling = match plain(facts, view) {
         Some(plain) => plain,
-        None if view.map.doubles.models.is_empty() => return None,
+        None if view.map.look_alikes.models.is_empty() => return None,
         None => resembling(image, &facts.quad, view.map)?,
     };
     Some(MayBe { quad, is_unique: false, picture_nats: ACCEPTED_NATS, resembling, points: None })
@@ -199,7 +203,8 @@ fn plain(facts: &QuadFacts, view: &View<'_>) -> Option<Resembling> {
     let Recognition::Ambiguous(landmark) = verdict.recognition else { return None };
     let first = verdict.candidates.iter().find(|c| c.landmark == landmark)?;
     let members = [landmark].into();
-    let is_alone = !view.map.doubles.alike.contains_key(&landmark) && hang_where_known(&members, view.map);
+    let is_alone =
+        !view.map.look_alikes.alike.contains_key(&landmark) && hang_where_known(&members, view.map);
     if first.refusal != Some(Refusal::Plain) || !is_alone {
         return None;
     }
@@ -210,10 +215,11 @@ fn plain(facts: &QuadFacts, view: &View<'_>) -> Option<Resembling> {
 /// An expected landmark that was not detected, asked for; it may as well be another that looks the same.
 fn asked(image: &GrayImage, e: &Expected, view: &View<'_>) -> Option<MayBe> {
     let (map, id) = (view.map, e.landmark);
-    let models = [&map.models, &map.doubles.models].into_iter().find(|models| models.get(id).is_some())?;
+    let models =
+        [&map.models, &map.look_alikes.models].into_iter().find(|models| models.get(id).is_some())?;
     let found = expected(image, &Corners::new(e.corners_px).ok()?, id, models, &map.params)?;
     let members: BTreeSet<LandmarkId> =
-        map.doubles.alike.get(&id).map_or_else(|| [id].into(), |alike| alike.iter().copied().collect());
+        map.look_alikes.alike.get(&id).map_or_else(|| [id].into(), |alike| alike.iter().copied().collect());
     if !hang_where_known(&members, map) {
         return None;
     }

@@ -15,8 +15,9 @@ use crate::{
     config::Config,
     engine::{panics::Edge, picture},
     jobs::learn,
+    publication::Catalogue,
     store::{
-        Store, StoreError,
+        StoreError,
         accepting::{self, Accepted, Decision, Pick},
         gatherings::{self, Bounds, GatheringRow, NewGathering},
         placing::{self, Capture},
@@ -37,7 +38,7 @@ use vision::{
 /// Who gathers, and what is kept.
 #[derive(Debug)]
 pub(crate) struct Gatherer {
-    store: Store,
+    store: Catalogue,
     params: Arc<Params>,
     sessions: Arc<Sessions>,
 }
@@ -45,7 +46,7 @@ pub(crate) struct Gatherer {
 impl Gatherer {
     /// Takes up what a stop or a crash interrupted, and follows what is offered until no worker is left.
     pub(crate) async fn start(
-        store: Store,
+        store: Catalogue,
         config: &Config,
         hook: &Hook,
         offers: Receiver<Offer>,

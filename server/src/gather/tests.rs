@@ -5,15 +5,16 @@ use crate::{
         slots::SlotKey,
         snapshot::MapSnapshot,
     },
-    store::{maps, robots, tests::config},
+    publication::tests::config,
+    store::{maps, robots},
 };
 use map::pose2::{Pose2, Pose2Covariance};
 use nalgebra::Matrix3;
 use protos::{CheckedFrame, Name, prost::bytes::Bytes};
 use vision::{pipeline, recognise::DistanceKind, trace::NoTrace};
 
-async fn store(dir: &std::path::Path) -> (Store, crate::store::WriterTask) {
-    let (store, task) = Store::open(&config(dir)).await.unwrap();
+async fn store(dir: &std::path::Path) -> (Catalogue, crate::publication::CatalogueTasks) {
+    let (store, task) = Catalogue::open(&config(dir)).await.unwrap();
     store.write(|tx| Box::pin(maps::create(tx, MAP, DistanceKind::Both, 2))).await.unwrap();
     store.write(|tx| Box::pin(robots::put(tx, "r1", MAP, 5))).await.unwrap();
     (store, task)
@@ -107,7 +108,7 @@ async fn a_restart_goes_on_where_it_stopped() {
     drop(gatherer);
     writer.close().await;
 
-    let (store, _writer) = Store::open(&config(dir.path())).await.unwrap();
+    let (store, _writer) = Catalogue::open(&config(dir.path())).await.unwrap();
     let (hook, offers) = hook();
     let (gatherer, _task) = Gatherer::start(store, &config(dir.path()), &hook, offers).await.unwrap();
     let session = gatherer.session(id).unwrap();

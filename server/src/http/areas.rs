@@ -267,7 +267,7 @@ fn known(app: &Shared, map: &str) -> Result<Arc<Areas>, ApiError> {
     let found = app.store.snapshots().get(map);
     let found =
         found.ok_or_else(|| crate::store::StoreError::NotFound { what: "map", name: map.to_owned() })?;
-    Ok(found.areas.areas.clone())
+    Ok(found.modalities.clone())
 }
 
 /// Which modality is best where, as runs have shown, and what is fused.

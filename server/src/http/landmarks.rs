@@ -64,7 +64,7 @@ pub(super) fn given<'de, D: Deserializer<'de>, T: Deserialize<'de>>(
 /// The landmark with what only the running server knows: a model out of use, a job at work.
 fn shown(app: &App, learning: &Learning, map: &str, row: LandmarkRow) -> Landmark {
     let snapshot = app.store.snapshots().get(map);
-    let quarantined = snapshot.and_then(|s| s.quarantined.get(&LandmarkId(row.id as u64)).cloned());
+    let quarantined = snapshot.and_then(|s| s.unusable_models.get(&LandmarkId(row.id as u64)).cloned());
     let learning = learning.has(&row.name) && row.views > 0;
     Landmark::new(row, quarantined, learning)
 }

@@ -10,11 +10,11 @@ use crate::{
         mapping::{MappingError, Progress, Walls},
         panics::Edge,
     },
-    store::{laser, load, maps, robots},
+    store::{laser, maps, robots},
 };
 use axum::{Json, extract::State, http::StatusCode};
 use futures::FutureExt;
-use map::pose2::Pose2;
+use map::{pose2::Pose2, segments::LaserSegment};
 use serde::Deserialize;
 use std::panic::AssertUnwindSafe;
 use tokio::sync::oneshot;
@@ -132,7 +132,7 @@ async fn store(
     if count > max {
         return Err(format!("{count} walls are more than {max}"));
     }
-    if let Some(error) = walls.iter().find_map(|ends| load::wall(ends).err()) {
+    if let Some(error) = walls.iter().find_map(|ends| LaserSegment::by_hand(ends).err()) {
         return Err(error.to_string());
     }
     let map = map.to_owned();

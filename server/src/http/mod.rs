@@ -38,7 +38,7 @@ use crate::{
     engine::{live::LiveHub, motion::Motion, panics::Edge, search::Searches, workers::Engine},
     gather::Gatherer,
     jobs::Jobs,
-    store::Store,
+    publication::Catalogue,
 };
 use axum::http::StatusCode;
 use error::ApiError;
@@ -49,7 +49,7 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore, SemaphorePermit, watch};
 #[derive(Debug)]
 pub(crate) struct App {
     pub(crate) config: Arc<Config>,
-    pub(crate) store: Store,
+    pub(crate) store: Catalogue,
     pub(crate) jobs: Arc<Jobs>,
     /// Robots that gather views.
     pub(crate) gatherer: Arc<Gatherer>,
@@ -82,7 +82,7 @@ pub(crate) type Shared = Arc<App>;
 impl App {
     pub(crate) fn new(
         config: Arc<Config>,
-        store: Store,
+        store: Catalogue,
         Workshop { jobs, gatherer }: Workshop,
         engine: &Engine,
         stopping: watch::Receiver<bool>,

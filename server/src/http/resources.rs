@@ -9,7 +9,6 @@ use crate::{
     },
     store::{
         landmarks::{self, LandmarkRow, Measures},
-        load,
         maps::MapRow,
         robots::RobotRow,
         sites::Whereabouts,
@@ -21,6 +20,7 @@ use map::{
     frames::Link,
     place::{LandmarkPlace, PlaceSigmas},
     pose2::{Pose2, Pose2Covariance},
+    segments::LaserSegment,
 };
 use nalgebra::{Matrix3, Vector3};
 use protos::{Name, v1};
@@ -240,7 +240,7 @@ pub(super) fn out_of_range(error: &OutOfRange, outer: &str) -> ApiError {
 /// Checks the ends of a wall.
 pub(super) fn wall(index: usize, a: [f64; 2], b: [f64; 2]) -> Result<[f64; 4], ApiError> {
     let ends = [a[0], a[1], b[0], b[1]];
-    load::wall(&ends).map(|_| ends).map_err(|e| out_of_range(&e, &format!("segments[{index}]")))
+    LaserSegment::by_hand(&ends).map(|_| ends).map_err(|e| out_of_range(&e, &format!("segments[{index}]")))
 }
 
 /// How far a landmark has come.

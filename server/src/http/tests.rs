@@ -4,7 +4,8 @@ use super::*;
 use crate::{
     config::{Limits, RawConfig},
     engine::{panics::Edge, scene, snapshot::MapSnapshot, workers::Engine},
-    store::{StoreError, WriterTask, maps},
+    publication::CatalogueTasks,
+    store::{StoreError, maps},
 };
 use axum::{
     Router,
@@ -19,9 +20,9 @@ use vision::recognise::DistanceKind;
 /// A service on a fresh database with map `hall` and robot `r1` on it.
 struct Service {
     router: Router,
-    store: Store,
+    store: Catalogue,
     engine: Engine,
-    _writer: WriterTask,
+    _writer: CatalogueTasks,
     _stop: watch::Sender<bool>,
     _data: tempfile::TempDir,
 }
@@ -31,7 +32,7 @@ impl Service {
         let data = tempfile::tempdir().unwrap();
         let raw = RawConfig { limits, data: data.path().to_owned(), ..RawConfig::default() };
         let config = Arc::new(crate::config::Config::try_from(raw).unwrap());
-        let (store, writer) = Store::open(&config).await.unwrap();
+        let (store, writer) = Catalogue::open(&config).await.unwrap();
         store.write(|tx| Box::pin(maps::create(tx, "hall", DistanceKind::Both, 9))).await.unwrap();
         store.write(|tx| Box::pin(crate::store::robots::put(tx, "r1", "hall", 9))).await.unwrap();
         let (stop, stopping) = watch::channel(false);
@@ -128,7 +129,7 @@ fn driven(service: &Service) -> String {
 }
 
 /// Keeps the writer busy from now until the sender is dropped.
-async fn hold_writer(store: &Store) -> tokio::sync::oneshot::Sender<()> {
+async fn hold_writer(store: &Catalogue) -> tokio::sync::oneshot::Sender<()> {
     let (release, released) = tokio::sync::oneshot::channel::<()>();
     let (begin, begun) = tokio::sync::oneshot::channel();
     let store = store.clone();
@@ -184,7 +185,7 @@ async fn a_recorded_drive_outlives_a_client_that_hangs_up() {
 async fn a_drive_whose_run_cannot_be_stored_stays() {
     let service = Service::start(Limits::default()).await;
     let body = driven(&service);
-    crate::store::tests::refuse_runs(&service.store).await;
+    crate::publication::tests::refuse_runs(&service.store).await;
     let answer = service.ask(request("POST", "/api/v1/robots/r1/run/reference", body)).await;
     assert_eq!(answer.status(), StatusCode::INTERNAL_SERVER_ERROR);
     let r1 = protos::Name::new("r1").unwrap();

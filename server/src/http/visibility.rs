@@ -39,9 +39,10 @@ pub(super) fn router() -> OpenApiRouter<Shared> {
         .routes(routes!(gaze))
 }
 
-fn snapshot(app: &Shared, map: &str) -> Result<Arc<MapSnapshot>, ApiError> {
+/// The current version of a map with its visibility areas.
+async fn snapshot(app: &Shared, map: &str) -> Result<Arc<MapSnapshot>, ApiError> {
     let gone = || ApiError::new(StatusCode::NOT_FOUND, "unknown_map", "no such map").field("map");
-    app.store.snapshots().get(map).ok_or_else(gone)
+    app.store.snapshots().with_visibility(map).await.ok_or_else(gone)
 }
 
 fn name_of(map: &MapSnapshot, id: LandmarkId) -> String {
@@ -63,7 +64,7 @@ async fn area(
 ) -> Result<Json<Feature>, ApiError> {
     maps::get(app.store.reads(), &map).await?;
     let row = landmarks::get(app.store.reads(), &map, &landmark).await?;
-    let map = snapshot(&app, &map)?;
+    let map = snapshot(&app, &map).await?;
     let (id, other) = (LandmarkId(row.id as u64), fields.other(&map, "query")?);
     let asked = map.landmarks.get(&id).and_then(|l| l.place);
     let is_asked = move |place: &LandmarkPlace, _reach| asked.as_ref() == Some(place);
@@ -139,7 +140,7 @@ async fn visible(
     At(map): At<String>,
     Body(from): Body<From>,
 ) -> Result<Json<Visible>, ApiError> {
-    let (map, pose) = (snapshot(&app, &map)?, from.pose.checked()?);
+    let (map, pose) = (snapshot(&app, &map).await?, from.pose.checked()?);
     let other = from.sight.other(&map, "sight")?;
     app.on_vision_thread(move |_| visible_from(&map, &pose, other.as_ref())).await?.map(Json)
 }
@@ -222,7 +223,7 @@ async fn along(
     At(map): At<String>,
     Body(along): Body<Along>,
 ) -> Result<Json<Coverage>, ApiError> {
-    let map = snapshot(&app, &map)?;
+    let map = snapshot(&app, &map).await?;
     app.on_vision_thread(move |_| covered(&map, &along)).await?.map(Json)
 }
 
@@ -321,7 +322,7 @@ async fn gaze(
     At(map): At<String>,
     Body(question): Body<Question>,
 ) -> Result<Json<Advice>, ApiError> {
-    let (map, pose) = (snapshot(&app, &map)?, question.pose.checked()?);
+    let (map, pose) = (snapshot(&app, &map).await?, question.pose.checked()?);
     let params = GazeParams { criterion: question.criterion, ..GazeParams::default() };
     let viewer = question.viewer.unwrap_or_else(|| map.sight.viewer.clone());
     let ask = Ask { pose, viewer, head: question.head, params };

@@ -14,8 +14,9 @@ use super::{
 use crate::{
     config::Config,
     engine::{decode::ImageLimits, panics::Edge, picture, snapshot::MapSnapshot},
+    publication::Catalogue,
     store::{
-        Store, StoreError,
+        StoreError,
         jobs::{self, Ended, JobRow},
         landmarks::ModelSummary,
         maps::{self, MapRow},
@@ -82,13 +83,13 @@ impl Request {
 
 /// The stored pictures, for threads that are not the runtime's.
 pub(super) struct Pictures {
-    store: Store,
+    store: Catalogue,
     runtime: tokio::runtime::Handle,
     upload: ImageLimits,
 }
 
 impl Pictures {
-    pub(super) fn new(store: &Store, config: &Config) -> Self {
+    pub(super) fn new(store: &Catalogue, config: &Config) -> Self {
         let runtime = tokio::runtime::Handle::current();
         Self { store: store.clone(), runtime, upload: config.limits.upload() }
     }
@@ -129,7 +130,7 @@ struct Learnt {
 
 /// Does the job: ends its row in the same transaction as it stores the models.
 pub(super) async fn run(
-    store: &Store,
+    store: &Catalogue,
     config: &Arc<Config>,
     row: &JobRow,
     reporter: &Arc<Reporter>,
@@ -160,7 +161,7 @@ pub(super) async fn run(
 }
 
 async fn gather(
-    store: &Store,
+    store: &Catalogue,
     config: &Arc<Config>,
     map: &MapRow,
     request: &Request,
@@ -378,7 +379,7 @@ pub(super) fn each_of<T: Sync, R: Send>(
 }
 
 async fn commit(
-    store: &Store,
+    store: &Catalogue,
     map: MapRow,
     job: i64,
     learnt: Learnt,

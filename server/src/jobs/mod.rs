@@ -11,8 +11,9 @@ mod points;
 
 use crate::{
     config::Config,
+    publication::Catalogue,
     store::{
-        Store, StoreError,
+        StoreError,
         jobs::{self, Ended, JobRow},
     },
 };
@@ -90,7 +91,7 @@ struct Reporters {
 /// The jobs that wait or run. Which those are is known from the table alone.
 #[derive(Debug)]
 pub(crate) struct Jobs {
-    store: Store,
+    store: Catalogue,
     config: Arc<Config>,
     reporters: Mutex<Reporters>,
     started: Instant,
@@ -121,7 +122,7 @@ enum Next {
 impl Jobs {
     /// Takes up what a stop or a crash interrupted, then what is queued.
     pub(crate) async fn start(
-        store: Store,
+        store: Catalogue,
         config: Arc<Config>,
         stopping: watch::Receiver<bool>,
     ) -> Result<(Arc<Self>, tokio::task::JoinHandle<()>), StoreError> {

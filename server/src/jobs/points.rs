@@ -12,8 +12,9 @@ use super::{
 use crate::{
     config::Config,
     engine::{panics::Edge, snapshot::MapSnapshot},
+    publication::Catalogue,
     store::{
-        Store, StoreError,
+        StoreError,
         jobs::{self, Ended, JobRow},
         maps,
         models::{self, ModelDigest},
@@ -105,7 +106,7 @@ fn lacking(map: &MapSnapshot, ids: BTreeSet<LandmarkId>) -> BTreeMap<LandmarkId,
 
 /// Does the job: ends its row in the same transaction as it stores the models.
 pub(super) async fn run(
-    store: &Store,
+    store: &Catalogue,
     config: &Arc<Config>,
     row: &JobRow,
     names: Vec<String>,

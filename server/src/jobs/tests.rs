@@ -1,28 +1,31 @@
 use super::*;
-use crate::store::{WriterTask, maps, tests::config};
+use crate::{
+    publication::{CatalogueTasks, tests::config},
+    store::maps,
+};
 use vision::recognise::DistanceKind;
 
 /// A store with map `a`, whose landmarks have no views: every lesson of it fails at once.
-async fn store(dir: &std::path::Path) -> (Store, WriterTask) {
-    let (store, task) = Store::open(&config(dir)).await.unwrap();
+async fn store(dir: &std::path::Path) -> (Catalogue, CatalogueTasks) {
+    let (store, task) = Catalogue::open(&config(dir)).await.unwrap();
     store.write(|tx| Box::pin(maps::create(tx, "a", DistanceKind::Both, 2))).await.unwrap();
     (store, task)
 }
 
-async fn started(store: &Store, dir: &std::path::Path) -> (Arc<Jobs>, watch::Sender<bool>) {
+async fn started(store: &Catalogue, dir: &std::path::Path) -> (Arc<Jobs>, watch::Sender<bool>) {
     let (stop, stopping) = watch::channel(false);
     let (jobs, _) = Jobs::start(store.clone(), Arc::new(config(dir)), stopping).await.unwrap();
     (jobs, stop)
 }
 
 /// A row as its caller leaves it who goes away right after the commit.
-async fn queued(store: &Store) -> i64 {
+async fn queued(store: &Catalogue) -> i64 {
     let write = store.write(|tx| Box::pin(jobs::create(tx, "learn", "a", "{}", (64, 9))));
     write.await.unwrap().id
 }
 
 /// It was begun so often, and the process ended each time.
-async fn interrupted(store: &Store, times: u32) -> i64 {
+async fn interrupted(store: &Catalogue, times: u32) -> i64 {
     let id = queued(store).await;
     for _ in 0..times {
         assert!(store.write(move |tx| Box::pin(jobs::begin(tx, id))).await.unwrap());
@@ -30,7 +33,7 @@ async fn interrupted(store: &Store, times: u32) -> i64 {
     id
 }
 
-async fn ended(store: &Store, id: i64) -> JobRow {
+async fn ended(store: &Catalogue, id: i64) -> JobRow {
     let begun = Instant::now();
     loop {
         let row = jobs::get(store.reads(), id).await.unwrap();

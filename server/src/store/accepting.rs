@@ -292,11 +292,12 @@ async fn landmark_of(
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
+    use crate::publication::Catalogue;
     use crate::store::{gatherings::NewGathering, robots, views::NewView};
 
     /// A gathering with one track of these views.
     pub(in crate::store) async fn gathered(
-        store: &Store,
+        store: &Catalogue,
         map: &'static str,
         views: impl Iterator<Item = NewView>,
     ) -> i64 {
@@ -313,7 +314,7 @@ pub(super) mod tests {
         id
     }
 
-    async fn keep(store: &Store, id: i64, view: NewView) {
+    async fn keep(store: &Catalogue, id: i64, view: NewView) {
         let kept = map::gather::Kept { number: 1, landmark: None, sightings: 3, known: 0, place: None };
         let bounds = gatherings::Bounds::SERVER;
         let write = store.write(move |tx| {
@@ -338,7 +339,7 @@ pub(super) mod tests {
     async fn a_decision_is_written_only_on_what_it_was_prepared_from() {
         use crate::store::placing::tests::seen_from;
         let dir = tempfile::tempdir().unwrap();
-        let (store, _task) = Store::open(&crate::store::tests::config(dir.path())).await.unwrap();
+        let (store, _task) = Catalogue::open(&crate::publication::tests::config(dir.path())).await.unwrap();
         let both = vision::recognise::DistanceKind::Both;
         store.write(move |tx| Box::pin(maps::create(tx, "a", both, 2))).await.unwrap();
         let id = gathered(&store, "a", std::iter::once(seen_from(1.0, 1, 0.0))).await;

@@ -1,9 +1,9 @@
 //! What runs have shown of a map's modalities, the areas that somebody named, and what is fused.
 
 use super::{StoreError, Tx, maps, now_ms, statements::statements, within};
-use map::areas::{Areas, Cell, MAX_AREAS, Mode, Modules, NamedArea};
+use map::areas::{Cell, MAX_AREAS, Mode, Modules, NamedArea};
 use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
-use std::{collections::BTreeMap, sync::Arc};
+use std::collections::BTreeMap;
 
 /// Most runs kept of a map.
 pub(crate) const MAX_RUNS: usize = 200;
@@ -145,58 +145,43 @@ pub(crate) async fn forget(tx: &mut Tx, map: &str, id: i64) -> Result<(), StoreE
     maps::bump(tx, map.id).await
 }
 
-/// All of it, added up, and what it was made from: the same is not added up again.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Kept {
-    settings: Settings,
-    /// How many, and the latest: numbers are never used twice.
-    runs: (i64, i64),
-    pub(crate) areas: Arc<Areas>,
-}
-
-/// What is known now; taken over from before where nothing has changed.
-pub(super) async fn all(
+/// Number of the runs of a map, and the latest: numbers are never used twice.
+pub(crate) async fn run_numbers(
     conn: &mut sqlx::SqliteConnection,
     map_id: i64,
-    before: Option<&Kept>,
-) -> Result<Kept, StoreError> {
+) -> Result<(i64, i64), StoreError> {
     let at = || StoreError::at("count runs");
-    let settings = settings(&mut *conn, map_id).await?;
     let count: i64 = sqlx::query_scalar(COUNT).bind(map_id).fetch_one(&mut *conn).await.map_err(at())?;
     let latest: i64 = sqlx::query_scalar(LATEST).bind(map_id).fetch_one(&mut *conn).await.map_err(at())?;
-    let same = before.filter(|kept| kept.settings == settings && kept.runs == (count, latest));
-    if let Some(same) = same {
-        return Ok(same.clone());
-    }
-    let found = runs(&mut *conn, map_id).await?;
-    let areas = Areas::new(settings.mode, settings.named.clone(), found.iter().map(|run| &run.cells));
-    Ok(Kept { settings, runs: (count, latest), areas: Arc::new(areas) })
+    Ok((count, latest))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::store::{Store, tests::config};
+    use crate::publication::{Catalogue, tests::config};
+    use map::areas::Areas;
+    use std::sync::Arc;
     use vision::recognise::DistanceKind;
 
     fn shown(x: i32) -> BTreeMap<Cell, Modules> {
         [(Cell { x, y: -2, heading: 3 }, Modules::default())].into()
     }
 
-    async fn put(store: &Store, x: i32) -> Result<i64, StoreError> {
+    async fn put(store: &Catalogue, x: i32) -> Result<i64, StoreError> {
         store.write(move |tx| Box::pin(async move { add(tx, "a", "r1", 12.5, &shown(x)).await })).await
     }
 
-    fn known(store: &Store) -> (u64, Arc<Areas>) {
+    fn known(store: &Catalogue) -> (u64, Arc<Areas>) {
         let map = store.snapshots().get("a").unwrap();
-        (map.version, map.areas.areas.clone())
+        (map.version, map.modalities.clone())
     }
 
     #[tokio::test]
     async fn runs_and_areas_survive_and_are_published() {
         let dir = tempfile::tempdir().unwrap();
         let config = config(dir.path());
-        let (store, task) = Store::open(&config).await.unwrap();
+        let (store, task) = Catalogue::open(&config).await.unwrap();
         store.write(|tx| Box::pin(maps::create(tx, "a", DistanceKind::Both, 3))).await.unwrap();
         let first = put(&store, 1).await.unwrap();
         let second = put(&store, 2).await.unwrap();
@@ -221,7 +206,7 @@ mod tests {
         let again = store.write(move |tx| Box::pin(async move { forget(tx, "a", first).await })).await;
         assert!(matches!(again, Err(StoreError::NotFound { what: "run", .. })));
         task.close().await;
-        let (store, task) = Store::open(&config).await.unwrap();
+        let (store, task) = Catalogue::open(&config).await.unwrap();
         let areas = known(&store).1;
         assert_eq!((areas.mode(), areas.named().next().unwrap().0), (Mode::Single, &hall));
         let id = maps::get(store.reads(), "a").await.unwrap().id;
@@ -233,7 +218,7 @@ mod tests {
     #[tokio::test]
     async fn runs_are_bounded() {
         let dir = tempfile::tempdir().unwrap();
-        let (store, task) = Store::open(&config(dir.path())).await.unwrap();
+        let (store, task) = Catalogue::open(&config(dir.path())).await.unwrap();
         store.write(|tx| Box::pin(maps::create(tx, "a", DistanceKind::Both, 3))).await.unwrap();
         for x in 0..MAX_RUNS {
             put(&store, x as i32).await.unwrap();

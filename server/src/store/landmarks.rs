@@ -1,8 +1,11 @@
 //! Landmarks of a map: name, size, place, and a summary of what was learnt.
 
 use super::{StoreError, Tx, maps, now_ms, statements::statements, within};
-use map::changes::Standing;
-use nalgebra::Matrix6;
+use map::{
+    changes::Standing,
+    place::{LandmarkPlace, PlaceSigmas},
+};
+use nalgebra::{Matrix6, Vector3};
 use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 use vision::localise::pose::LandmarkSize;
 
@@ -53,6 +56,19 @@ pub(crate) struct Measures {
     pub(crate) place: Option<Place>,
     /// The size was found with the place.
     pub(crate) size_from_views: bool,
+}
+
+impl Measures {
+    /// The place with its covariance. `None` without a size, or where numbers of a file from elsewhere are out of range.
+    pub(crate) fn landmark_place(&self) -> Option<LandmarkPlace> {
+        let (size, place) = self.size.zip(self.place)?;
+        let centre = Vector3::new(place.x_m, place.y_m, place.z_m);
+        let by_hand = LandmarkPlace::by_hand(centre, place.theta_rad, size, PlaceSigmas::default()).ok()?;
+        let (roll_rad, tilt_rad) = (place.roll_rad, place.tilt_rad);
+        let covariance = place.covariance.unwrap_or(by_hand.covariance);
+        let made = LandmarkPlace { roll_rad, tilt_rad, covariance, ..by_hand };
+        made.check().is_ok().then_some(made)
+    }
 }
 
 /// What was learnt, in brief.

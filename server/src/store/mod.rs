@@ -1,14 +1,15 @@
 //! Everything durable, in one SQLite file: maps, landmarks, views, models, walls, robots, jobs.
 //!
 //! One task owns the only connection that writes ([`writer`]); reads take a separate, read-only pool. Every SQL text
-//! is a constant of its file and is prepared by a test against the migrated schema. Does not know vision beyond bytes,
-//! except [`load`], which makes snapshots.
+//! is a constant of its file and is prepared by a test against the migrated schema. What a commit makes visible is told to
+//! one listener ([`on_commit`]), which the store knows by its trait alone.
 
 mod error;
 mod open;
 mod writer;
 mod statements;
-pub(crate) mod load;
+pub(crate) mod map_rows;
+pub(crate) mod on_commit;
 pub(crate) mod maps;
 pub(crate) mod sites;
 pub(crate) mod landmarks;
@@ -20,16 +21,16 @@ pub(crate) mod teaching;
 pub(crate) mod gatherings;
 pub(crate) mod accepting;
 pub(crate) mod areas;
-mod seen;
 pub(crate) mod sights;
 pub(crate) mod robots;
 pub(crate) mod jobs;
 
 pub(crate) use error::StoreError;
+pub(crate) use on_commit::{Change, OnCommit};
 pub(crate) use open::OpenError;
-pub(crate) use writer::{Change, PART as WRITER, Tx};
+pub(crate) use writer::{PART as WRITER, Tx};
 
-use crate::{config::Config, engine::snapshot::Snapshots, vitals::Vitals};
+use crate::{config::Config, vitals::Vitals};
 use futures::future::BoxFuture;
 use sqlx::SqlitePool;
 use std::{sync::Arc, time::SystemTime};
@@ -40,7 +41,6 @@ use tokio::sync::{Mutex, MutexGuard, Notify, mpsc, oneshot};
 pub(crate) struct Store {
     commands: mpsc::Sender<writer::Command>,
     reads: SqlitePool,
-    snapshots: Arc<Snapshots>,
     vitals: Arc<Vitals>,
     jobs: Arc<Notify>,
     /// Held while a write is prepared and made.
@@ -58,6 +58,12 @@ pub(crate) struct WriterTask {
 }
 
 impl WriterTask {
+    /// Ends the writer as a fault would.
+    #[cfg(test)]
+    pub(crate) fn abort(&self) {
+        self.task.abort();
+    }
+
     /// Takes no more writes, finishes those that wait, and leaves one complete file behind.
     pub(crate) async fn close(self) {
         // The last connection to close empties the write-ahead log; that must be the one that may write.
@@ -72,21 +78,23 @@ impl WriterTask {
 }
 
 impl Store {
-    /// Opens or creates the database under `config.data`, migrates it, checks its settings and its integrity, and
-    /// publishes every map.
-    pub(crate) async fn open(config: &Config) -> Result<(Self, WriterTask), OpenError> {
+    /// Opens or creates the database under `config.data`, migrates it, checks its settings and its integrity, and tells
+    /// `on_commit` of everything in it.
+    pub(crate) async fn open(
+        config: &Config,
+        on_commit: Arc<dyn OnCommit>,
+        vitals: Arc<Vitals>,
+    ) -> Result<(Self, WriterTask), OpenError> {
         let opened = open::open(&config.data).await?;
-        let snapshots = Arc::new(Snapshots::default());
-        let (vitals, jobs) = (Arc::new(Vitals::default()), Arc::new(Notify::new()));
+        let jobs = Arc::new(Notify::new());
         let mut conn = opened.writer;
-        load::all(&mut conn, &snapshots, &config.params, &vitals).await.map_err(OpenError::Load)?;
+        on_commit.opened(&mut conn).await.map_err(OpenError::Load)?;
         let (commands, received) = mpsc::channel(config.limits.write_queue);
-        let (all, params) = (snapshots.clone(), config.params.clone());
-        let writer = writer::Writer::new(conn, received, all, params, vitals.clone(), jobs.clone());
+        let writer = writer::Writer::new(conn, received, on_commit, vitals.clone(), jobs.clone());
         let (close, closed) = oneshot::channel();
         let task = tokio::spawn(writer.run(closed, vitals.begin(WRITER)));
         let task = WriterTask { task, close, reads: opened.reads.clone(), _lock: opened.lock };
-        Ok((Self { commands, reads: opened.reads, snapshots, vitals, jobs, turn: Arc::default() }, task))
+        Ok((Self { commands, reads: opened.reads, vitals, jobs, turn: Arc::default() }, task))
     }
 
     /// Runs `write` in its own transaction. When this returns `Ok`, it is committed and visible. A caller that drops this
@@ -119,11 +127,6 @@ impl Store {
         &self.reads
     }
 
-    /// What the workers read.
-    pub(crate) fn snapshots(&self) -> &Arc<Snapshots> {
-        &self.snapshots
-    }
-
     /// Which parts of the server run; the writer is one of them.
     pub(crate) fn vitals(&self) -> &Arc<Vitals> {
         &self.vitals
@@ -141,4 +144,4 @@ fn within(count: i64, max: usize, what: &'static str) -> Result<(), StoreError> 
 }
 
 #[cfg(test)]
-pub(crate) mod tests;
+mod tests;

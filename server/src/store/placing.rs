@@ -315,10 +315,13 @@ fn measures(place: &LandmarkPlace, by_hand: Option<LandmarkSize>) -> Measures {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::store::{
-        Store, laser, load, maps,
-        teaching::{self, Teaching},
-        views::NewView,
+    use crate::{
+        publication::Catalogue,
+        store::{
+            laser, maps,
+            teaching::{self, Teaching},
+            views::NewView,
+        },
     };
     use map::{mounting::pan_tilt, pose2::Pose2};
     use nalgebra::{Matrix3, Matrix6};
@@ -378,7 +381,7 @@ pub(super) mod tests {
         }
     }
 
-    async fn taught(store: &Store, view: NewView) -> Placing {
+    async fn taught(store: &Catalogue, view: NewView) -> Placing {
         let (map, landmark) = ("a".to_owned(), "p1".to_owned());
         let teaching = Teaching { map, landmark, view, max: 100, thinning: None };
         teaching::add(store, teaching).await.unwrap().2.unwrap()
@@ -387,8 +390,8 @@ pub(super) mod tests {
     #[tokio::test]
     async fn a_taught_landmark_is_placed_on_its_wall_and_a_place_by_hand_stays() {
         let dir = tempfile::tempdir().unwrap();
-        let config = crate::store::tests::config(dir.path());
-        let (store, _task) = Store::open(&config).await.unwrap();
+        let config = crate::publication::tests::config(dir.path());
+        let (store, _task) = Catalogue::open(&config).await.unwrap();
         store.write(|tx| Box::pin(maps::create(tx, "a", DistanceKind::Both, 2))).await.unwrap();
         let made = store
             .write(|tx| Box::pin(landmarks::create(tx, "a", "p1", Measures::default(), 5)))
@@ -399,8 +402,9 @@ pub(super) mod tests {
         store.write(|tx| Box::pin(laser::replace(tx, "a", &[[0.0, 0.0, 6.0, 0.0]]))).await.unwrap();
         let placed = taught(&store, seen_from(3.2, 2, 0.0)).await;
         assert_eq!(placed, Placing { placed: true, views_used: 2, reason: None });
-        let of =
-            |store: &Store| store.snapshots().get("a").unwrap().landmarks[&LandmarkId(made.id as u64)].place;
+        let of = |store: &Catalogue| {
+            store.snapshots().get("a").unwrap().landmarks[&LandmarkId(made.id as u64)].place
+        };
         let place = of(&store).unwrap();
         assert!((place.x_m - 2.0).abs() < 1e-6 && place.y_m.abs() < 1e-6 && (place.z_m - 1.5).abs() < 1e-6);
         assert!((place.size.width_m - 0.6).abs() < 1e-6);
@@ -424,7 +428,7 @@ pub(super) mod tests {
 
     #[test]
     fn what_is_not_on_the_wall_is_refused_with_the_residual() {
-        let wall = load::wall(&[0.0, 0.0, 6.0, 0.0]).unwrap();
+        let wall = LaserSegment::by_hand(&[0.0, 0.0, 6.0, 0.0]).unwrap();
         let new = seen_from(1.0, 1, 60.0);
         let capture: Capture = serde_json::from_str(new.capture.as_deref().unwrap()).unwrap();
         let refused = placed(&[(new.cut.corners_px, capture.taken().unwrap())], &[wall]).unwrap_err();
@@ -436,7 +440,7 @@ pub(super) mod tests {
 
     #[test]
     fn corners_are_worth_what_is_known_of_them_and_no_more_than_borders_are() {
-        let wall = load::wall(&[0.0, 0.0, 6.0, 0.0]).unwrap();
+        let wall = LaserSegment::by_hand(&[0.0, 0.0, 6.0, 0.0]).unwrap();
         let new = seen_from(1.0, 1, 0.0);
         let silent: Capture = serde_json::from_str(new.capture.as_deref().unwrap()).unwrap();
         let with = |corner| Capture { corner_covariance_px2: Some([corner; 4]), ..silent.clone() };

@@ -96,7 +96,7 @@ pub(crate) async fn set(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::store::Store;
+    use crate::publication::Catalogue;
     use nalgebra::Vector3;
     use vision::recognise::DistanceKind;
 
@@ -109,15 +109,19 @@ mod tests {
         Whereabouts { site: word("Works"), building: word("B 2"), floor: word("1st"), link: Some(link) }
     }
 
-    async fn put(store: &Store, map: &'static str, found: Whereabouts) -> Result<Whereabouts, StoreError> {
+    async fn put(
+        store: &Catalogue,
+        map: &'static str,
+        found: Whereabouts,
+    ) -> Result<Whereabouts, StoreError> {
         store.write(move |tx| Box::pin(async move { set(tx, map, |_| found).await })).await
     }
 
     #[tokio::test]
     async fn whereabouts_survive_and_no_map_lies_in_itself() {
         let dir = tempfile::tempdir().unwrap();
-        let config = crate::store::tests::config(dir.path());
-        let (store, task) = Store::open(&config).await.unwrap();
+        let config = crate::publication::tests::config(dir.path());
+        let (store, task) = Catalogue::open(&config).await.unwrap();
         for map in ["a", "b", "c"] {
             store.write(move |tx| Box::pin(maps::create(tx, map, DistanceKind::Both, 3))).await.unwrap();
         }
@@ -138,7 +142,7 @@ mod tests {
             "it has another in it"
         );
         task.close().await;
-        let (store, _task) = Store::open(&config).await.unwrap();
+        let (store, _task) = Catalogue::open(&config).await.unwrap();
         assert!(store.snapshots().relation("c", "a").is_some(), "and at the start");
         let known = all(store.reads()).await.unwrap();
         assert_eq!(known["b"], lies_in("a"));

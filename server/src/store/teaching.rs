@@ -6,7 +6,7 @@
 use super::{
     Store, StoreError, Tx,
     landmarks::{self, Measures},
-    laser, load, maps,
+    laser, maps,
     placing::{self, Made, Placing},
     statements::statements,
     views::{self, Cut, NewView, Outcome, ViewRow},
@@ -73,7 +73,11 @@ pub(super) async fn stamp(
 
 /// The walls of a map, as places rest on them.
 pub(super) async fn walls(store: &Store, map: i64) -> Result<Vec<LaserSegment>, StoreError> {
-    Ok(laser::all_of(store.reads(), map).await?.iter().filter_map(|ends| load::wall(ends).ok()).collect())
+    Ok(laser::all_of(store.reads(), map)
+        .await?
+        .iter()
+        .filter_map(|ends| LaserSegment::by_hand(ends).ok())
+        .collect())
 }
 
 /// Computes off the runtime. A panic is caught, counted and answered.
@@ -194,16 +198,17 @@ pub(super) type Captured = (Corners, String);
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::store::{
-        Store,
-        accepting::tests::{decision, gathered},
-        placing::tests::seen_from,
-        tests::config,
+    use crate::{
+        publication::{Catalogue, tests::config},
+        store::{
+            accepting::tests::{decision, gathered},
+            placing::tests::seen_from,
+        },
     };
     use vision::recognise::DistanceKind;
 
-    async fn store(dir: &std::path::Path) -> (Store, crate::store::WriterTask) {
-        let (store, task) = Store::open(&config(dir)).await.unwrap();
+    async fn store(dir: &std::path::Path) -> (Catalogue, crate::publication::CatalogueTasks) {
+        let (store, task) = Catalogue::open(&config(dir)).await.unwrap();
         store.write(|tx| Box::pin(maps::create(tx, "a", DistanceKind::Both, 2))).await.unwrap();
         let none = Measures::default();
         store.write(move |tx| Box::pin(landmarks::create(tx, "a", "p1", none, 5))).await.unwrap();
@@ -211,7 +216,7 @@ mod tests {
         (store, task)
     }
 
-    async fn wall(store: &Store) {
+    async fn wall(store: &Catalogue) {
         store.write(|tx| Box::pin(laser::replace(tx, "a", &[[0.0, 0.0, 6.0, 0.0]]))).await.unwrap();
     }
 
@@ -222,7 +227,7 @@ mod tests {
     }
 
     /// Prepares a view, lets `meanwhile` happen, and writes: was it refused, so that it is prepared again?
-    async fn refused(store: &Store, number: u8, meanwhile: impl AsyncFnOnce()) -> bool {
+    async fn refused(store: &Catalogue, number: u8, meanwhile: impl AsyncFnOnce()) -> bool {
         let teaching = Arc::new(teaching(number));
         let prepared = prepare(store, &teaching).await.unwrap();
         meanwhile().await;

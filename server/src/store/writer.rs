@@ -7,9 +7,12 @@
 //! A panic inside a write is caught and rolled back. A panic while a map is made ready after the commit leaves the map's
 //! previous version in use; the next write to that map tries again.
 
-use super::{StoreError, load, sites};
+use super::{
+    error::StoreError,
+    on_commit::{Change, OnCommit},
+};
 use crate::{
-    engine::{panics::Edge, snapshot::Snapshots},
+    engine::panics::Edge,
     vitals::{Pulse, Vitals},
 };
 use futures::{FutureExt, future::BoxFuture};
@@ -20,27 +23,6 @@ use std::{
     sync::{Arc, Weak},
 };
 use tokio::sync::{Notify, mpsc, oneshot};
-use vision::params::Params;
-
-/// What a committed write makes visible.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum Change {
-    /// The map with this number has a new version.
-    Map(i64),
-    /// The map is gone.
-    MapRemoved(String),
-    /// How maps lie to each other.
-    Links,
-    /// A job is queued.
-    Jobs,
-    /// The robot stands on this map, or is gone.
-    Robot {
-        /// Its name.
-        name: String,
-        /// The map's name.
-        map: Option<String>,
-    },
-}
 
 /// Runs once the transaction is committed and visible. Short: the writer waits for it.
 type After = Box<dyn FnOnce() + Send>;
@@ -60,6 +42,12 @@ impl std::fmt::Debug for Tx {
 }
 
 impl Tx {
+    /// The connection, for tests that damage what is stored.
+    #[cfg(test)]
+    pub(crate) fn conn(&mut self) -> &mut SqliteConnection {
+        &mut self.conn
+    }
+
     /// To be published after the commit.
     pub(super) fn changed(&mut self, change: Change) {
         if !self.changes.contains(&change) {
@@ -122,8 +110,7 @@ where
 pub(super) struct Writer {
     tx: Tx,
     commands: mpsc::Receiver<Command>,
-    snapshots: Arc<Snapshots>,
-    params: Arc<Params>,
+    on_commit: Arc<dyn OnCommit>,
     vitals: Arc<Vitals>,
     /// Told of every job that is queued.
     jobs: Arc<Notify>,
@@ -136,13 +123,12 @@ impl Writer {
     pub(super) fn new(
         conn: SqliteConnection,
         commands: mpsc::Receiver<Command>,
-        snapshots: Arc<Snapshots>,
-        params: Arc<Params>,
+        on_commit: Arc<dyn OnCommit>,
         vitals: Arc<Vitals>,
         jobs: Arc<Notify>,
     ) -> Self {
         let tx = Tx { conn, changes: Vec::new(), after: Vec::new() };
-        Self { tx, commands, snapshots, params, vitals, jobs }
+        Self { tx, commands, on_commit, vitals, jobs }
     }
 
     /// Runs until told to close and what is queued is done, or until an error after which nothing may be written.
@@ -235,25 +221,13 @@ impl Writer {
     async fn publish(&mut self) -> Result<(), StoreError> {
         let mut done = Ok(());
         for change in std::mem::take(&mut self.tx.changes) {
-            match change {
-                Change::Map(id) => {
-                    let made =
-                        load::publish(&mut self.tx.conn, id, &self.snapshots, &self.params, &self.vitals);
-                    match made.await {
-                        Err(error @ StoreError::NotPublished { .. }) => done = Err(error),
-                        other => other?,
-                    }
-                }
-                Change::MapRemoved(name) => {
-                    self.snapshots.remove_map(&name);
-                    self.vitals.published(&name);
-                }
-                Change::Links => {
-                    let all = sites::all(&mut self.tx.conn).await?;
-                    self.snapshots.set_links(sites::links(&all));
-                }
-                Change::Jobs => self.jobs.notify_one(),
-                Change::Robot { name, map } => self.snapshots.set_robot(&name, map.as_deref()),
+            if change == Change::Jobs {
+                self.jobs.notify_one();
+                continue;
+            }
+            match self.on_commit.committed(&mut self.tx.conn, change).await {
+                Err(error @ StoreError::NotPublished { .. }) => done = Err(error),
+                other => other?,
             }
         }
         done

@@ -48,7 +48,7 @@ impl Guide {
             .collect::<Result<_, _>>()?;
         let obstacles: Vec<Obstacle> = walls.iter().map(Obstacle::from).collect();
         let mut map = MapSnapshot::empty("bench", 1);
-        (map.walls, map.models) = (walls, models.clone());
+        (map.walls, map.models) = (std::sync::Arc::new(walls), models.clone());
         let sigmas = PlaceSigmas::default();
         let mut hang = |id: LandmarkId, place: LandmarkPlace| {
             let (size, name) = (Some(place.size), id.0.to_string());

@@ -15,10 +15,7 @@ use server::{
         simulated_errors::SimulatedRobotErrors,
         survey::{SurveyView as Look, hang, survey},
     },
-    engine::{
-        doubles::doubles,
-        snapshot::{LandmarkInfo, Learnt, MapSnapshot},
-    },
+    engine::snapshot::{LandmarkInfo, MapSnapshot, StoredModel, look_alike_classes},
 };
 use sim::{
     building::Building,
@@ -184,13 +181,13 @@ fn snapshot(
     params: Params,
 ) -> anyhow::Result<MapSnapshot> {
     complain(lessons, &models);
-    let learnt: BTreeMap<LandmarkId, Learnt> = models
+    let learnt: BTreeMap<LandmarkId, StoredModel> = models
         .into_iter()
         .flatten()
-        .map(|model| (model.id, Learnt { digest: [0; 32], model: Arc::new(model) }))
+        .map(|model| (model.id, StoredModel { digest: [0; 32], model: Arc::new(model) }))
         .collect();
     let models = ModelSet::in_use(learnt.values().map(|l| l.model.clone()), &params)?;
-    let doubles = Arc::new(doubles(&learnt, DistanceKind::Both, &params));
+    let doubles = Arc::new(look_alike_classes(&learnt, DistanceKind::Both, &params));
     let numbered = || lessons.iter().enumerate().map(|(i, l)| (LandmarkId(i as u64), l));
     let sizes: BTreeMap<LandmarkId, LandmarkSize> = numbered().map(|(id, l)| (id, l.place.size)).collect();
     let landmarks: BTreeMap<LandmarkId, LandmarkInfo> = numbered()
@@ -208,8 +205,8 @@ fn snapshot(
     let walls = walls.to_vec();
     let mut map = MapSnapshot::empty(MAP, 1);
     (map.landmarks, map.sizes, map.models, map.learnt) = (landmarks, sizes, models, learnt);
-    (map.doubles, map.visibility, map.params) = (doubles, visibility, params);
-    (map.walls, map.wall_index) = (walls, wall_index);
+    (map.look_alikes, map.visibility, map.params) = (doubles, visibility, params);
+    (map.walls, map.wall_index) = (Arc::new(walls), wall_index);
     Ok(map)
 }
 

@@ -223,8 +223,8 @@ impl Robot {
     /// Goes by what runs have shown of its map by now.
     fn trust(&mut self, maps: &Snapshots) {
         let Some(map) = maps.get(&self.map) else { return };
-        if !Arc::ptr_eq(&map.areas.areas, &self.areas) {
-            self.areas = map.areas.areas.clone();
+        if !Arc::ptr_eq(&map.modalities, &self.areas) {
+            self.areas = map.modalities.clone();
             self.fuser.set_areas(self.areas.clone());
         }
     }

@@ -218,11 +218,17 @@ fn without_odometry_the_fix_is_the_pose() {
 /// The rendered corridor with its walls as the map `hall`, without any landmark.
 fn walled() -> (Motion, Name, Building) {
     let building = Building::corridor(7);
-    let wall = |w: &WallSegment| crate::store::load::wall(&[w.a_m.x, w.a_m.y, w.b_m.x, w.b_m.y]).unwrap();
+    let wall = |w: &WallSegment| {
+        map::segments::LaserSegment::by_hand(&[w.a_m.x, w.a_m.y, w.b_m.x, w.b_m.y]).unwrap()
+    };
     let walls: Vec<_> = building.walls().iter().map(wall).collect();
     let wall_index = Arc::new(WallIndex::new(&walls));
     let (motion, r1) = motion();
-    motion.snapshots.publish(Arc::new(MapSnapshot { walls, wall_index, ..MapSnapshot::empty("hall", 1) }));
+    motion.snapshots.publish(Arc::new(MapSnapshot {
+        walls: Arc::new(walls),
+        wall_index,
+        ..MapSnapshot::empty("hall", 1)
+    }));
     (motion, r1, building)
 }
 
@@ -417,7 +423,7 @@ fn what_runs_have_shown_is_heeded_from_the_next_message_on() {
     let found: Modules = [sums(0.0), sums(100.0), sums(100.0)];
     let cells = (10..14).map(|x| (Cell { x, y: 1, heading: 0 }, found)).collect::<BTreeMap<_, _>>();
     let mut map = MapSnapshot::empty("hall", 2);
-    map.areas.areas = Arc::new(Areas::new(Mode::Single, Vec::new(), [&cells]));
+    map.modalities = Arc::new(Areas::new(Mode::Single, Vec::new(), [&cells]));
     motion.snapshots.publish(Arc::new(map));
     motion.odometry_of(&r1, odometry(2, 1.0));
     motion.fixed(&r1, at(2_000_000_000, 1.0), &fix(11.0)).unwrap();

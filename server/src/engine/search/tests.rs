@@ -27,9 +27,9 @@ fn map() -> MapSnapshot {
             LandmarkInfo { name: format!("door-{i}"), place: Some(place(*x)), ..LandmarkInfo::default() };
         (LandmarkId(i as u64), info)
     });
-    let wall = |ends| crate::store::load::wall(&ends).unwrap();
+    let wall = |ends| map::segments::LaserSegment::by_hand(&ends).unwrap();
     let walls = vec![wall([0.0, -1.2, 25.0, -1.2]), wall([25.0, 1.2, 0.0, 1.2])];
-    MapSnapshot { landmarks: landmarks.collect(), walls, ..MapSnapshot::empty("hall", 1) }
+    MapSnapshot { landmarks: landmarks.collect(), walls: Arc::new(walls), ..MapSnapshot::empty("hall", 1) }
 }
 
 /// A door at `x` seen from a pose: it may be any of them.
@@ -168,7 +168,7 @@ fn searches_are_bounded_and_end() {
     searches.end(&name("r1"));
     assert!(searches.glance(&name("r1"), &unseen).is_none());
     let far = MapSnapshot {
-        walls: vec![crate::store::load::wall(&[0.0, 0.0, 9000.0, 9000.0]).unwrap()],
+        walls: Arc::new(vec![map::segments::LaserSegment::by_hand(&[0.0, 0.0, 9000.0, 9000.0]).unwrap()]),
         ..map.clone()
     };
     assert!(searches.glance(&name("r9"), &Glance { map: &far, ..glance }).is_none(), "too large a map");

@@ -2,8 +2,9 @@ use super::*;
 use crate::{
     config::{Config, RawConfig},
     engine::picture,
+    publication::CatalogueTasks,
     store::{
-        WriterTask, landmarks,
+        landmarks,
         teaching::{self, Teaching},
         views::{Cut, NewView},
     },
@@ -39,7 +40,7 @@ fn corners() -> Corners {
 }
 
 /// Adds a view whose stored picture is `bytes`.
-async fn teach(store: &Store, landmark: &str, image: &GrayImage, bytes: Vec<u8>) {
+async fn teach(store: &Catalogue, landmark: &str, image: &GrayImage, bytes: Vec<u8>) {
     let photographed = View::photographed(image, &corners(), &Params::default()).unwrap();
     let cut = Cut { corners_px: corners(), icon: photographed.icon };
     let view = NewView {
@@ -61,8 +62,8 @@ fn png(image: &GrayImage) -> Vec<u8> {
 
 /// Map `a` with landmarks `whole` and `damaged`, each with one view and a model as builds before the points stored it.
 /// The picture of `damaged` cannot be decoded.
-async fn earlier(config: &Config) -> (Store, WriterTask) {
-    let (store, task) = Store::open(config).await.unwrap();
+async fn earlier(config: &Config) -> (Catalogue, CatalogueTasks) {
+    let (store, task) = Catalogue::open(config).await.unwrap();
     store.write(|tx| Box::pin(maps::create(tx, "a", DistanceKind::Both, 2))).await.unwrap();
     for (seed, name) in [(1, "whole"), (2, "damaged")] {
         let none = landmarks::Measures::default();
@@ -77,7 +78,7 @@ async fn earlier(config: &Config) -> (Store, WriterTask) {
     (store, task)
 }
 
-async fn store_model(store: &Store, model: &LandmarkModel) {
+async fn store_model(store: &Catalogue, model: &LandmarkModel) {
     let new = models::NewModel {
         landmark: model.id,
         bytes: model.to_bytes(),
@@ -100,7 +101,7 @@ async fn store_model(store: &Store, model: &LandmarkModel) {
     write.await.unwrap();
 }
 
-async fn started(store: &Store, config: &Config) -> (Arc<Jobs>, watch::Sender<bool>) {
+async fn started(store: &Catalogue, config: &Config) -> (Arc<Jobs>, watch::Sender<bool>) {
     let (stop, stopping) = watch::channel(false);
     let (jobs, _) = Jobs::start(store.clone(), Arc::new(config.clone()), stopping).await.unwrap();
     jobs.renew().await.unwrap();
@@ -120,7 +121,7 @@ async fn ended(jobs: &Jobs, job: i64) -> JobRow {
     }
 }
 
-fn model(store: &Store, id: u64) -> Arc<LandmarkModel> {
+fn model(store: &Catalogue, id: u64) -> Arc<LandmarkModel> {
     store.snapshots().get("a").unwrap().learnt[&LandmarkId(id)].model.clone()
 }
 
@@ -155,7 +156,7 @@ async fn models_of_earlier_builds_get_points_once() {
     // At later starts there is nothing to do: not for the one that has points, nor for the one that failed.
     stop.send_replace(true);
     task.close().await;
-    let (store, _task) = Store::open(&config).await.unwrap();
+    let (store, _task) = Catalogue::open(&config).await.unwrap();
     let (_jobs, _stop) = started(&store, &config).await;
     assert!(jobs::open(store.reads()).await.unwrap().is_empty());
     assert!(jobs::get(store.reads(), 2).await.is_err(), "a second job");

@@ -1,13 +1,16 @@
 use super::*;
-use crate::store::{Store, WriterTask, accepting, landmarks::Measures, maps, tests::config};
+use crate::{
+    publication::{Catalogue, CatalogueTasks, tests::config},
+    store::{accepting, landmarks::Measures, maps},
+};
 use map::gather::Kept;
 use vision::{detect::quads::Corners, icon::Icon, recognise::DistanceKind};
 
 const BOUNDS: Bounds = Bounds { open: 2, of_map: 3, tracks: 2, views: 2, bytes: 40 };
 const LIMITS: accepting::Bounds = accepting::Bounds { landmarks: 2, views: 3, jobs: (1, 5) };
 
-async fn store(dir: &std::path::Path) -> (Store, WriterTask) {
-    let (store, task) = Store::open(&config(dir)).await.unwrap();
+async fn store(dir: &std::path::Path) -> (Catalogue, CatalogueTasks) {
+    let (store, task) = Catalogue::open(&config(dir)).await.unwrap();
     store.write(|tx| Box::pin(maps::create(tx, "a", DistanceKind::Both, 2))).await.unwrap();
     for robot in ["r1", "r2", "r3"] {
         store.write(move |tx| Box::pin(robots::put(tx, robot, "a", 5))).await.unwrap();
@@ -15,12 +18,12 @@ async fn store(dir: &std::path::Path) -> (Store, WriterTask) {
     (store, task)
 }
 
-async fn begun(store: &Store, robot: &str) -> Result<GatheringRow, StoreError> {
+async fn begun(store: &Catalogue, robot: &str) -> Result<GatheringRow, StoreError> {
     let new = NewGathering { robot: robot.to_owned(), landmark: None, known: false };
     store.write(move |tx| Box::pin(async move { create(tx, "a", &new, BOUNDS).await })).await
 }
 
-async fn kept(store: &Store, id: i64, number: u32, picture: u8, bytes: usize) -> Result<(), StoreError> {
+async fn kept(store: &Catalogue, id: i64, number: u32, picture: u8, bytes: usize) -> Result<(), StoreError> {
     let track = Kept { number, landmark: None, sightings: u32::from(picture), known: 0, place: None };
     let corners = Corners::try_from([[1.0, 1.0], [90.0, 1.0], [90.0, 99.0], [1.0, 99.0]]).unwrap();
     let new = NewView {
@@ -74,7 +77,11 @@ async fn every_bound_holds_and_a_refusal_changes_nothing() {
     assert!(track_views(store.reads(), id, 3).await.unwrap().is_empty(), "gone with its gathering");
 }
 
-async fn accepted(store: &Store, id: i64, picks: &[(u32, &str)]) -> Result<accepting::Accepted, StoreError> {
+async fn accepted(
+    store: &Catalogue,
+    id: i64,
+    picks: &[(u32, &str)],
+) -> Result<accepting::Accepted, StoreError> {
     let picks: Vec<_> = picks
         .iter()
         .map(|(n, name)| accepting::Pick { number: *n, name: Some((*name).to_owned()) })

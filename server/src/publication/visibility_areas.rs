@@ -1,13 +1,9 @@
-//! Visibility areas of a map's landmarks, off the runtime; taken over from the snapshot before where neither the camera,
-//! the landmark's place nor an obstacle within its reach has changed.
+//! Visibility areas of a map's landmarks; taken over from a snapshot before where neither the camera, the landmark's place nor
+//! an obstacle within its reach has changed.
 
-use crate::engine::{
-    panics::{Edge, Panics},
-    snapshot::{LandmarkInfo, MapSnapshot},
-};
+use crate::engine::snapshot::MapSnapshot;
 use map::{
     place::LandmarkPlace,
-    segments::LaserSegment,
     visibility::{Obstacle, Sight, VisibilityMap, visibility, within_reach},
 };
 use std::{collections::BTreeMap, sync::Arc};
@@ -15,19 +11,19 @@ use vision::recognise::LandmarkId;
 
 type Areas = BTreeMap<LandmarkId, Arc<VisibilityMap>>;
 
-/// The areas of all placed landmarks. Without them a map is served all the same.
-pub(super) async fn areas(
-    landmarks: &BTreeMap<LandmarkId, LandmarkInfo>,
-    walls: &[LaserSegment],
-    sight: &Sight,
-    before: Option<Arc<MapSnapshot>>,
-    panics: &Panics,
-) -> Areas {
-    let places: Vec<_> = landmarks.iter().filter_map(|(id, l)| Some((*id, l.place?))).collect();
-    let (obstacles, sight): (Vec<Obstacle>, _) = (walls.iter().map(Obstacle::from).collect(), sight.clone());
-    let made = tokio::task::spawn_blocking(move || all(&places, &obstacles, &sight, before.as_deref()));
-    let made = panics.joined(Edge::Publication, "visibility areas", "there are none", made.await);
-    made.unwrap_or_default()
+/// The areas of all placed landmarks of `map`: those that it has, and those that it lacks.
+pub(super) fn areas(map: &MapSnapshot, before: Option<&MapSnapshot>) -> Areas {
+    let is_missing = |id: &LandmarkId| !map.visibility.contains_key(id);
+    let places: Vec<_> = map
+        .landmarks
+        .iter()
+        .filter(|(id, _)| is_missing(id))
+        .filter_map(|(id, l)| Some((*id, l.place?)))
+        .collect();
+    let obstacles: Vec<Obstacle> = map.walls.iter().map(Obstacle::from).collect();
+    let mut areas = map.visibility.clone();
+    areas.extend(all(&places, &obstacles, &map.sight, before));
+    areas
 }
 
 fn all(
@@ -56,6 +52,7 @@ fn all(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::engine::snapshot::LandmarkInfo;
     use map::place::PlaceSigmas;
     use nalgebra::{Point2, Vector3};
     use vision::localise::pose::LandmarkSize;

@@ -1,116 +1,17 @@
-//! What the workers read: one immutable [`MapSnapshot`] per map, swapped whole. Only the store publishes, and only
-//! after its transaction is committed; a reader keeps the `Arc` it took, so an answer rests on one version.
+//! The current version of every map, swapped whole. Only the publication publishes, and only after a transaction is
+//! committed; a reader keeps the `Arc` it took, so an answer rests on one version.
 
-use super::doubles::Doubles;
-use crate::store::areas::Kept;
+use super::map_snapshot::MapSnapshot;
 use arc_swap::ArcSwap;
 use map::{
-    changes::Standing,
     frames::{Links, relation},
-    laser_fix::WallIndex,
-    place::LandmarkPlace,
     pose2::Pose2Covariance,
-    segments::LaserSegment,
-    visibility::{Sight, VisibilityMap},
 };
 use std::{collections::BTreeMap, sync::Arc};
-use tokio::sync::broadcast;
-use vision::{
-    learn::model::LandmarkModel,
-    localise::pose::LandmarkSize,
-    params::Params,
-    recognise::{DistanceKind, LandmarkId, models::ModelSet},
-};
+use tokio::sync::{broadcast, watch};
 
 /// Changes that a slow listener may lag behind before it loses the oldest.
 const CHANGES_KEPT: usize = 256;
-
-/// One version of one map.
-#[derive(Debug, Clone)]
-pub struct MapSnapshot {
-    /// Name of the map.
-    pub name: String,
-    /// Counts up with every change of the map.
-    pub version: u64,
-    /// Every landmark of the map by number, learnt or not.
-    pub landmarks: BTreeMap<LandmarkId, LandmarkInfo>,
-    /// The sizes of those of them that have one.
-    pub sizes: BTreeMap<LandmarkId, LandmarkSize>,
-    /// The models that are matched: the active ones of `learnt`.
-    pub models: ModelSet,
-    /// The landmarks that have look-alikes, with thresholds as if they had none: for robots that search.
-    pub doubles: Arc<Doubles>,
-    /// Every learnt model that reads and fits the parameters, candidates included.
-    pub learnt: BTreeMap<LandmarkId, Learnt>,
-    /// Models that are stored but must not be used, and why: damaged, or learnt under other parameters.
-    pub quarantined: BTreeMap<LandmarkId, String>,
-    /// The walls.
-    pub walls: Vec<LaserSegment>,
-    /// The same, made ready for localisation by scans; kept from version to version while the walls are the same.
-    pub wall_index: Arc<WallIndex>,
-    /// What runs have shown of modalities; kept from version to version while it is the same.
-    pub(crate) areas: Kept,
-    /// The camera that looks for its landmarks, and what counts as seen.
-    pub sight: Sight,
-    /// From where each placed landmark is seen by that camera.
-    pub visibility: BTreeMap<LandmarkId, Arc<VisibilityMap>>,
-    /// Which distance decides.
-    pub distance: DistanceKind,
-    /// The parameters the models were learnt under, with the map's own distance.
-    pub params: Arc<Params>,
-}
-
-impl MapSnapshot {
-    /// A map without content.
-    pub fn empty(name: impl Into<String>, version: u64) -> Self {
-        Self {
-            name: name.into(),
-            version,
-            landmarks: BTreeMap::new(),
-            sizes: BTreeMap::new(),
-            models: ModelSet::default(),
-            doubles: Arc::default(),
-            learnt: BTreeMap::new(),
-            quarantined: BTreeMap::new(),
-            walls: Vec::new(),
-            wall_index: Arc::new(WallIndex::new([])),
-            areas: Kept::default(),
-            sight: Sight::default(),
-            visibility: BTreeMap::new(),
-            distance: DistanceKind::Both,
-            params: Arc::default(),
-        }
-    }
-}
-
-/// What is known of a landmark besides its appearance.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct LandmarkInfo {
-    /// Readable name, unique in the map.
-    pub name: String,
-    /// Width and height, if measured; without it there is no pose.
-    pub size: Option<LandmarkSize>,
-    /// Where it hangs, if that and its size are known; without it there is no robot pose.
-    pub place: Option<LandmarkPlace>,
-    /// How far it is trusted: what is quarantined corrects no pose.
-    pub standing: Standing,
-}
-
-impl LandmarkInfo {
-    /// Whether it may correct poses.
-    pub fn is_trusted(&self) -> bool {
-        self.standing != Standing::Quarantined
-    }
-}
-
-/// A model with the digest of its stored bytes: the same digest is the same model.
-#[derive(Debug, Clone)]
-pub struct Learnt {
-    /// SHA-256 of the bytes.
-    pub digest: [u8; 32],
-    /// The model.
-    pub model: Arc<LandmarkModel>,
-}
 
 /// A map got a new version, or is gone.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -133,11 +34,17 @@ struct World {
 pub struct Snapshots {
     world: ArcSwap<World>,
     changes: broadcast::Sender<MapChange>,
+    /// Counts the publications, of derived data too.
+    published: watch::Sender<u64>,
 }
 
 impl Default for Snapshots {
     fn default() -> Self {
-        Self { world: ArcSwap::default(), changes: broadcast::channel(CHANGES_KEPT).0 }
+        Self {
+            world: ArcSwap::default(),
+            changes: broadcast::channel(CHANGES_KEPT).0,
+            published: watch::Sender::default(),
+        }
     }
 }
 
@@ -162,7 +69,7 @@ impl Snapshots {
         self.changes.subscribe()
     }
 
-    /// Makes `map` the current version of its name. For the store, after the commit.
+    /// Makes `map` the current version of its name. For the publication, after the commit.
     #[expect(clippy::needless_pass_by_value, reason = "the map is given away: nobody may change it any more")]
     pub fn publish(&self, map: Arc<MapSnapshot>) {
         let change = MapChange { map: map.name.clone(), version: Some(map.version) };
@@ -174,7 +81,21 @@ impl Snapshots {
         self.announce(change);
     }
 
-    /// Forgets a map. For the store, after the commit.
+    /// Replaces a map by the same version with more derived data; nothing if another version is current by now.
+    pub fn publish_derived(&self, map: &Arc<MapSnapshot>) {
+        self.world.rcu(|world| {
+            let mut world = World::clone(world);
+            if let Some(current) = world.maps.get_mut(&map.name)
+                && current.version == map.version
+            {
+                *current = map.clone();
+            }
+            world
+        });
+        self.published.send_modify(|count| *count += 1);
+    }
+
+    /// Forgets a map. For the publication, after the commit.
     pub fn remove_map(&self, map: &str) {
         self.world.rcu(|world| {
             let mut world = World::clone(world);
@@ -184,7 +105,7 @@ impl Snapshots {
         self.announce(MapChange { map: map.to_owned(), version: None });
     }
 
-    /// Registers a robot on a map, or takes it off with `None`. For the store, after the commit.
+    /// Registers a robot on a map, or takes it off with `None`. For the publication, after the commit.
     pub fn set_robot(&self, robot: &str, map: Option<&str>) {
         self.world.rcu(|world| {
             let mut world = World::clone(world);
@@ -196,7 +117,7 @@ impl Snapshots {
         });
     }
 
-    /// How maps lie to each other from now on. For the store, after the commit.
+    /// How maps lie to each other from now on. For the publication, after the commit.
     pub fn set_links(&self, links: Links<String>) {
         let links = Arc::new(links);
         self.world.rcu(|world| World { links: links.clone(), ..World::clone(world) });
@@ -208,7 +129,22 @@ impl Snapshots {
         Some(relation(&links, &from.to_owned(), &to.to_owned()).ok()?.to_from_map)
     }
 
+    /// The current version of `map` once the visibility areas of all its landmarks are known. For one who can wait.
+    pub async fn with_visibility(&self, map: &str) -> Option<Arc<MapSnapshot>> {
+        let mut published = self.published.subscribe();
+        loop {
+            published.mark_unchanged();
+            match self.get(map) {
+                Some(current) if current.pending.visibility => {}
+                known => return known,
+            }
+            // An error says that this is gone, and nobody can hold a reference to it then.
+            published.changed().await.ok()?;
+        }
+    }
+
     fn announce(&self, change: MapChange) {
+        self.published.send_modify(|count| *count += 1);
         // An error only says that nobody listens.
         drop(self.changes.send(change));
     }

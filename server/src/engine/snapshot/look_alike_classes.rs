@@ -1,0 +1,126 @@
+//! Classes of landmarks that look alike. Thresholds that tell landmarks from one another refuse what fits several; here
+//! they are fitted again without negatives, so that a quad may match every landmark of its class. In: all learnt models.
+//! Out: models with lifted thresholds and the class of each. For relocalisation and for guided recognition; matching by
+//! these models is never a recognition.
+
+use super::stored_model::StoredModel;
+use std::{collections::BTreeMap, sync::Arc};
+use vision::{
+    learn::{
+        model::{LandmarkModel, refit_thresholds, unlikeness_of},
+        threshold::LimitedBy,
+    },
+    params::Params,
+    recognise::{DistanceKind, IconFeatures, LandmarkId, models::ModelSet},
+};
+
+/// Most landmarks with look-alikes; what is beyond is left out.
+pub const MAX_LOOK_ALIKES: usize = 512;
+/// Pairs of them that are compared; from then on all count as look-alikes.
+pub const MAX_COMPARED: usize = 20_000;
+/// The landmarks that have look-alikes.
+#[derive(Debug, Default)]
+pub struct LookAlikeClasses {
+    /// Their models, with lifted thresholds.
+    pub models: ModelSet,
+    /// The landmarks that look like each, itself included.
+    pub alike: BTreeMap<LandmarkId, Arc<Vec<LandmarkId>>>,
+    /// The parameters without points: icons are asked where points say nothing.
+    pub by_icons: Params,
+}
+
+/// Whether a landmark has look-alikes: negatives limit its threshold, or leave none.
+fn has_look_alikes(model: &LandmarkModel) -> bool {
+    let is_held_down = model.is_active() && model.likeness.limited_by == LimitedBy::NearestNegative;
+    is_held_down || model.is_kept_out_by_look_alikes()
+}
+
+/// The look-alike classes of a map: empty where one distance alone decides.
+pub fn look_alike_classes(
+    learnt: &BTreeMap<LandmarkId, StoredModel>,
+    kind: DistanceKind,
+    p: &Params,
+) -> LookAlikeClasses {
+    if kind != DistanceKind::Both {
+        return LookAlikeClasses::default();
+    }
+    let held = learnt.values().map(|l| &l.model).filter(|m| has_look_alikes(m)).take(MAX_LOOK_ALIKES);
+    let lifted: Vec<_> =
+        held.map(|model| Arc::new(refit_thresholds(model, &[], p))).filter(|m| m.is_active()).collect();
+    let alike = alike(&lifted, p);
+    let mut by_icons = p.clone();
+    by_icons.recognise.verdict.points = false;
+    LookAlikeClasses { models: ModelSet::new(lifted, p).unwrap_or_default(), alike, by_icons }
+}
+
+/// The connected components of "one accepts the other": nothing that looks like a member is left out, though the ends of a
+/// long chain may differ.
+fn alike(models: &[Arc<LandmarkModel>], p: &Params) -> BTreeMap<LandmarkId, Arc<Vec<LandmarkId>>> {
+    let icons: Vec<Vec<IconFeatures>> = models.iter().map(|m| m.features(&p.recognise)).collect();
+    let accepts = |a: usize, b: usize| unlikeness_of(&models[a], &icons[b], p) < models[a].likeness.tau;
+    let (mut class, mut compared): (Vec<usize>, usize) = ((0..models.len()).collect(), 0);
+    for i in 0..models.len() {
+        for j in 0..i {
+            if class[i] == class[j] {
+                continue;
+            }
+            compared += 1;
+            if compared > MAX_COMPARED || accepts(i, j) || accepts(j, i) {
+                let (from, to) = (class[i], class[j]);
+                class.iter_mut().filter(|c| **c == from).for_each(|c| *c = to);
+            }
+        }
+    }
+    let mut classes: BTreeMap<usize, Vec<LandmarkId>> = BTreeMap::new();
+    for (model, class) in models.iter().zip(class) {
+        classes.entry(class).or_default().push(model.id);
+    }
+    let mut alike = BTreeMap::new();
+    for all in classes.into_values().map(Arc::new) {
+        alike.extend(all.iter().map(|id| (*id, all.clone())));
+    }
+    alike
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use vision::{
+        detect::quads::Corners,
+        frame::GrayImage,
+        learn::{
+            model::{View, learn},
+            synthesis,
+        },
+    };
+
+    /// Blocks of grey with a little of its own in a corner; another number, other blocks.
+    fn picture(number: usize, own: usize) -> GrayImage {
+        GrayImage::from_fn(240, 240, |u, v| {
+            if u > 216 && v > 216 {
+                return (40 + 12 * own) as u8;
+            }
+            let block = |size: usize| (u / size * 31 + v / size * 57 + size + number * 7919) as u64;
+            let hash = |x: u64| (x.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 48) % 128;
+            (hash(block(24)) + hash(block(60))) as u8
+        })
+    }
+
+    #[test]
+    fn twelve_like_doors_are_one_class_and_others_are_their_own() {
+        let p = Params::default();
+        let whole = Corners::try_from([[-0.5, -0.5], [239.5, -0.5], [239.5, 239.5], [-0.5, 239.5]]).unwrap();
+        let lesson = |id: u64, image: &GrayImage| {
+            let mut views = vec![View::photographed(image, &whole, &p).unwrap()];
+            views.extend(synthesis::views(image, &whole, 8, &p, id));
+            Arc::new(refit_thresholds(&learn(LandmarkId(id), &views, &[], &p).unwrap(), &[], &p))
+        };
+        let mut models: Vec<_> = (0..12).map(|i| lesson(i, &picture(1, i as usize))).collect();
+        models.extend([lesson(20, &picture(5, 0)), lesson(21, &picture(5, 3))]);
+        let alike = alike(&models, &p);
+        let of = |id: u64| alike[&LandmarkId(id)].iter().map(|l| l.0).collect::<Vec<_>>();
+        assert_eq!(of(0), (0..12).collect::<Vec<_>>());
+        assert!(Arc::ptr_eq(&alike[&LandmarkId(3)], &alike[&LandmarkId(11)]));
+        assert_eq!(of(20), [20, 21]);
+    }
+}

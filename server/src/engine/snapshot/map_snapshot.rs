@@ -1,0 +1,120 @@
+//! What the workers read: one immutable version of one map.
+
+use super::{look_alike_classes::LookAlikeClasses, stored_model::StoredModel};
+use map::{
+    areas::Areas,
+    changes::Standing,
+    laser_fix::WallIndex,
+    place::LandmarkPlace,
+    segments::LaserSegment,
+    visibility::{Sight, VisibilityMap},
+};
+use std::{collections::BTreeMap, sync::Arc};
+use vision::{
+    localise::pose::LandmarkSize,
+    params::Params,
+    recognise::{DistanceKind, LandmarkId, models::ModelSet},
+};
+
+/// One version of one map.
+#[derive(Debug, Clone)]
+pub struct MapSnapshot {
+    /// Name of the map.
+    pub name: String,
+    /// Counts up with every change of the map.
+    pub version: u64,
+    /// Every landmark of the map by number, learnt or not.
+    pub landmarks: BTreeMap<LandmarkId, LandmarkInfo>,
+    /// The sizes of those of them that have one.
+    pub sizes: BTreeMap<LandmarkId, LandmarkSize>,
+    /// The models that are matched: the active ones of `learnt`.
+    pub models: ModelSet,
+    /// The landmarks that have look-alikes, with thresholds as if they had none.
+    pub look_alikes: Arc<LookAlikeClasses>,
+    /// Every learnt model that reads and fits the parameters, candidates included.
+    pub learnt: BTreeMap<LandmarkId, StoredModel>,
+    /// Models that are stored but must not be used, and why: damaged, or learnt under other parameters.
+    pub unusable_models: BTreeMap<LandmarkId, String>,
+    /// The walls, with the free side on the left.
+    pub walls: Arc<Vec<LaserSegment>>,
+    /// Counts up whenever the walls are replaced.
+    pub walls_version: i64,
+    /// The walls, made ready for localisation by scans; kept from version to version while the walls are the same.
+    pub wall_index: Arc<WallIndex>,
+    /// What reference runs have shown of the modalities, by pose cell.
+    pub modalities: Arc<Areas>,
+    /// Number of reference runs that `modalities` rests on, and the latest.
+    pub runs: (i64, i64),
+    /// The camera that looks for its landmarks, and what counts as seen.
+    pub sight: Sight,
+    /// From where each placed landmark is seen by that camera. Without those that are still computed.
+    pub visibility: BTreeMap<LandmarkId, Arc<VisibilityMap>>,
+    /// What is still computed of this version: until then it is absent, never out of date.
+    pub pending: Pending,
+    /// Which distance decides.
+    pub distance: DistanceKind,
+    /// The parameters the models were learnt under, with the map's own distance.
+    pub params: Arc<Params>,
+}
+
+impl MapSnapshot {
+    /// A map without content.
+    pub fn empty(name: impl Into<String>, version: u64) -> Self {
+        Self {
+            name: name.into(),
+            version,
+            landmarks: BTreeMap::new(),
+            sizes: BTreeMap::new(),
+            models: ModelSet::default(),
+            look_alikes: Arc::default(),
+            learnt: BTreeMap::new(),
+            unusable_models: BTreeMap::new(),
+            walls: Arc::default(),
+            walls_version: 0,
+            wall_index: Arc::new(WallIndex::new([])),
+            modalities: Arc::default(),
+            runs: (0, 0),
+            sight: Sight::default(),
+            visibility: BTreeMap::new(),
+            pending: Pending::default(),
+            distance: DistanceKind::Both,
+            params: Arc::default(),
+        }
+    }
+}
+
+/// Data derived from a version that is computed after the version is published.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Pending {
+    /// Visibility areas of some landmarks.
+    pub visibility: bool,
+    /// The look-alike classes.
+    pub look_alikes: bool,
+}
+
+impl Pending {
+    /// Whether anything is still computed.
+    pub fn any(self) -> bool {
+        self.visibility || self.look_alikes
+    }
+}
+
+/// What is known of a landmark besides its appearance.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct LandmarkInfo {
+    /// Readable name, unique in the map.
+    pub name: String,
+    /// Width and height, if measured; without it there is no pose.
+    pub size: Option<LandmarkSize>,
+    /// Where it hangs, if that and its size are known; without it there is no robot pose.
+    pub place: Option<LandmarkPlace>,
+    /// How far it is trusted: what is quarantined corrects no pose.
+    pub standing: Standing,
+}
+
+impl LandmarkInfo {
+    /// Whether it may correct poses.
+    pub fn is_trusted(&self) -> bool {
+        self.standing != Standing::Quarantined
+    }
+}

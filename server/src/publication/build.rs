@@ -1,0 +1,238 @@
+//! From rows to the next version of a map. What has not changed is taken over from the version before: walls by their version
+//! number, models by their digests, visibility areas by place, walls and camera. A damaged or outdated model is named and left
+//! out, never matched.
+
+use crate::{
+    engine::{
+        panics::{Edge, Panics},
+        snapshot::{LandmarkInfo, LookAlikeClasses, MapSnapshot, Pending, Snapshots, StoredModel},
+    },
+    store::{
+        StoreError, areas, laser, map_rows,
+        map_rows::MapHead,
+        models::{self, ModelDigest},
+    },
+};
+use map::{areas::Areas, laser_fix::WallIndex, segments::LaserSegment, visibility::VisibilityMap};
+use sqlx::SqliteConnection;
+use std::{collections::BTreeMap, sync::Arc};
+use vision::{
+    learn::model::LandmarkModel,
+    params::Params,
+    recognise::{DistanceKind, LandmarkId, models::ModelSet},
+};
+
+/// The current version of a map as it is in the database, without what is derived from it; `None` if the map is gone.
+pub(super) async fn snapshot(
+    conn: &mut SqliteConnection,
+    id: i64,
+    snapshots: &Snapshots,
+    params: &Arc<Params>,
+    panics: &Panics,
+) -> Result<Option<MapSnapshot>, StoreError> {
+    let Some(head) = map_rows::head(&mut *conn, id).await? else { return Ok(None) };
+    let before = snapshots.get(&head.name);
+    let before = before.as_deref();
+    let info = |l: map_rows::LandmarkHead| {
+        let (size, place) = (l.measures.size, l.measures.landmark_place());
+        (l.id, LandmarkInfo { name: l.name, size, place, standing: l.standing })
+    };
+    let landmarks: BTreeMap<_, _> =
+        map_rows::landmarks(&mut *conn, id).await?.into_iter().map(info).collect();
+    let (walls, wall_index) = walls(&mut *conn, id, &head, before, panics).await?;
+    let (modalities, runs) = modalities(&mut *conn, id, before).await?;
+    #[cfg(test)]
+    tests::planted(&head.name);
+    let (learnt, unusable_models) = models(conn, id, before, params, panics).await?;
+    for (id, reason) in &unusable_models {
+        let landmark = landmarks.get(id).map_or("", |l: &LandmarkInfo| l.name.as_str());
+        tracing::warn!(map = head.name, landmark, reason, "model not used");
+    }
+    let same_models = before.filter(|before| digests(&before.learnt).eq(digests(&learnt)));
+    let models = match same_models {
+        Some(before) => before.models.clone(),
+        None => ModelSet::in_use(learnt.values().map(|l| l.model.clone()), params).map_err(|e| {
+            StoreError::Damaged { what: format!("map `{}`", head.name), reason: e.to_string() }
+        })?,
+    };
+    let (look_alikes, look_alikes_pending) = look_alikes(head.distance, same_models);
+    let (visibility, visibility_pending) = visibility(&landmarks, &head, before);
+    Ok(Some(MapSnapshot {
+        sizes: landmarks.iter().filter_map(|(id, l)| Some((*id, l.size?))).collect(),
+        name: head.name,
+        version: head.version,
+        landmarks,
+        models,
+        look_alikes,
+        learnt,
+        unusable_models,
+        walls,
+        walls_version: head.walls_version,
+        wall_index,
+        modalities,
+        runs,
+        sight: head.sight,
+        visibility,
+        pending: Pending { visibility: visibility_pending, look_alikes: look_alikes_pending },
+        distance: head.distance,
+        params: params.clone(),
+    }))
+}
+
+type Walls = (Arc<Vec<LaserSegment>>, Arc<WallIndex>);
+
+/// The walls and their index, which is made off the runtime.
+async fn walls(
+    conn: &mut SqliteConnection,
+    id: i64,
+    head: &MapHead,
+    before: Option<&MapSnapshot>,
+    panics: &Panics,
+) -> Result<Walls, StoreError> {
+    if let Some(before) = before.filter(|before| before.walls_version == head.walls_version) {
+        return Ok((before.walls.clone(), before.wall_index.clone()));
+    }
+    let ends = laser::all_of(conn, id).await?;
+    let walls: Arc<Vec<_>> = Arc::new(ends.iter().filter_map(|e| LaserSegment::by_hand(e).ok()).collect());
+    let indexed = walls.clone();
+    let made = tokio::task::spawn_blocking(move || WallIndex::new(indexed.iter())).await;
+    let made = panics.joined(Edge::Publication, "the index of the walls", "scans correct nothing here", made);
+    Ok((walls, Arc::new(made.unwrap_or_else(|_ended| WallIndex::new([])))))
+}
+
+/// What reference runs have shown of the modalities, and the runs that this rests on.
+async fn modalities(
+    conn: &mut SqliteConnection,
+    id: i64,
+    before: Option<&MapSnapshot>,
+) -> Result<(Arc<Areas>, (i64, i64)), StoreError> {
+    let settings = areas::settings(&mut *conn, id).await?;
+    let numbers = areas::run_numbers(&mut *conn, id).await?;
+    let is_same = |before: &&MapSnapshot| {
+        let known = &before.modalities;
+        before.runs == numbers
+            && known.mode() == settings.mode
+            && known.named().map(|(a, ..)| a).eq(&settings.named)
+    };
+    if let Some(before) = before.filter(is_same) {
+        return Ok((before.modalities.clone(), numbers));
+    }
+    let runs = areas::runs(conn, id).await?;
+    let areas = Areas::new(settings.mode, settings.named, runs.iter().map(|run| &run.cells));
+    Ok((Arc::new(areas), numbers))
+}
+
+/// Digest of every learnt model.
+pub(super) fn digests(
+    learnt: &BTreeMap<LandmarkId, StoredModel>,
+) -> impl Iterator<Item = (LandmarkId, ModelDigest)> + '_ {
+    learnt.iter().map(|(id, model)| (*id, model.digest))
+}
+
+/// The look-alike classes if they are known, and whether they are to be computed.
+fn look_alikes(kind: DistanceKind, same_models: Option<&MapSnapshot>) -> (Arc<LookAlikeClasses>, bool) {
+    if kind != DistanceKind::Both {
+        return (Arc::default(), false);
+    }
+    match same_models.filter(|before| before.distance == kind) {
+        Some(before) => (before.look_alikes.clone(), before.pending.look_alikes),
+        None => (Arc::default(), true),
+    }
+}
+
+type Visibility = BTreeMap<LandmarkId, Arc<VisibilityMap>>;
+
+/// The visibility areas that are still those of their landmarks, and whether others are to be computed.
+fn visibility(
+    landmarks: &BTreeMap<LandmarkId, LandmarkInfo>,
+    head: &MapHead,
+    before: Option<&MapSnapshot>,
+) -> (Visibility, bool) {
+    let before = before.filter(|b| b.walls_version == head.walls_version && b.sight == head.sight);
+    let (mut known, mut is_pending) = (Visibility::new(), false);
+    for (id, info) in landmarks.iter().filter(|(_, info)| info.place.is_some()) {
+        let same = before.filter(|b| b.landmarks.get(id).is_some_and(|was| was.place == info.place));
+        match same.map(|b| (b.visibility.get(id), b.pending.visibility)) {
+            Some((Some(area), _)) => {
+                known.insert(*id, area.clone());
+            }
+            // It has none: it could not be computed.
+            Some((None, false)) => {}
+            Some((None, true)) | None => is_pending = true,
+        }
+    }
+    (known, is_pending)
+}
+
+type Models = (BTreeMap<LandmarkId, StoredModel>, BTreeMap<LandmarkId, String>);
+
+/// Models of a map, read only where the digest is not that of the previous snapshot; and those that must not be used.
+async fn models(
+    conn: &mut SqliteConnection,
+    map_id: i64,
+    before: Option<&MapSnapshot>,
+    params: &Params,
+    panics: &Panics,
+) -> Result<Models, StoreError> {
+    let (mut learnt, mut unusable) = Models::default();
+    for (id, digest) in models::digests(&mut *conn, map_id).await? {
+        let same = before.and_then(|map| map.learnt.get(&id)).filter(|l| l.digest == digest);
+        if let Some(same) = same {
+            learnt.insert(id, same.clone());
+            continue;
+        }
+        let bytes = models::get(&mut *conn, id).await?;
+        let what = format!("the model of landmark number {}", id.0);
+        let read = panics.catch(Edge::Publication, &what, "it is not used", || {
+            #[cfg(test)]
+            tests::planted(&what);
+            read_model(&bytes, digest, id, params)
+        });
+        match read.unwrap_or_else(|| Err("the server failed on the stored model; see its log".to_owned())) {
+            Ok(model) => {
+                learnt.insert(id, StoredModel { digest, model: Arc::new(model) });
+            }
+            Err(reason) => {
+                unusable.insert(id, reason);
+            }
+        }
+    }
+    Ok((learnt, unusable))
+}
+
+fn read_model(
+    bytes: &[u8],
+    digest: ModelDigest,
+    id: LandmarkId,
+    p: &Params,
+) -> Result<LandmarkModel, String> {
+    if models::digest(bytes) != digest {
+        return Err("the stored model is damaged: its digest does not fit".to_owned());
+    }
+    let model = LandmarkModel::from_bytes(bytes, p).map_err(|e| e.to_string())?;
+    if model.id == id {
+        Ok(model)
+    } else {
+        Err(format!("the stored model is that of landmark {}", model.id.0))
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use std::cell::RefCell;
+
+    thread_local! {
+        /// Where the loading of a map panics on this thread: the name of a map, or what is read of it.
+        static PLANTED: RefCell<Option<String>> = const { RefCell::new(None) };
+    }
+
+    /// Plants a panic, or takes it away.
+    pub(in crate::publication) fn plant(what: Option<&str>) {
+        PLANTED.set(what.map(str::to_owned));
+    }
+
+    pub(super) fn planted(what: &str) {
+        let hit = PLANTED.with_borrow(|planted| planted.as_deref() == Some(what));
+        assert!(!hit, "planted: {what}");
+    }
+}

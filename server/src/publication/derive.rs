@@ -1,0 +1,78 @@
+//! Data derived from a version of a map, computed off the runtime and outside the writer: visibility areas, then look-alike
+//! classes. Each is published as soon as it is known, as the same version of the map with more in it. A version that is replaced
+//! meanwhile takes over what still holds.
+
+use super::{build::digests, visibility_areas};
+use crate::{
+    engine::{
+        panics::Edge,
+        snapshot::{LookAlikeClasses, MapSnapshot, Snapshots, look_alike_classes},
+    },
+    vitals::Vitals,
+};
+use std::{collections::BTreeMap, sync::Arc};
+use tokio::sync::{Notify, watch};
+
+/// Name of the task among the parts of the server.
+const PART: &str = "the task that derives data of maps";
+
+/// What was computed last, by map: most of it holds for the next version.
+type Last = BTreeMap<String, Arc<MapSnapshot>>;
+
+/// Derives whenever it is woken, until told to stop.
+pub(super) async fn run(
+    snapshots: Arc<Snapshots>,
+    vitals: Arc<Vitals>,
+    wake: Arc<Notify>,
+    mut stopping: watch::Receiver<bool>,
+) {
+    let pulse = vitals.begin(PART);
+    let mut last = Last::new();
+    loop {
+        tokio::select! {
+            _ = stopping.wait_for(|stop| *stop) => break,
+            () = wake.notified() => {}
+        }
+        while let Some(map) = snapshots.all().into_iter().find(|map| map.pending.any()) {
+            if *stopping.borrow() {
+                break;
+            }
+            let before = last.remove(&map.name);
+            let done = Arc::new(derived(map, before, &vitals).await);
+            snapshots.publish_derived(&done);
+            last.insert(done.name.clone(), done);
+        }
+        last.retain(|name, _| snapshots.get(name).is_some());
+    }
+    pulse.end();
+}
+
+/// `map` with one more kind of derived data. What fails is left out, and the map is served without.
+async fn derived(map: Arc<MapSnapshot>, before: Option<Arc<MapSnapshot>>, vitals: &Vitals) -> MapSnapshot {
+    let mut next = MapSnapshot::clone(&map);
+    let panics = vitals.panics();
+    if map.pending.visibility {
+        let made =
+            tokio::task::spawn_blocking(move || visibility_areas::areas(&map, before.as_deref())).await;
+        let made = panics.joined(Edge::Publication, "visibility areas", "there are none", made);
+        next.visibility = made.unwrap_or_default();
+        next.pending.visibility = false;
+        return next;
+    }
+    let made = tokio::task::spawn_blocking(move || look_alikes(&map, before.as_deref())).await;
+    let follows = "lost robots are found by unique landmarks only";
+    let made = panics.joined(Edge::Publication, "look-alike classes", follows, made);
+    next.look_alikes = made.unwrap_or_default();
+    next.pending.look_alikes = false;
+    next
+}
+
+fn look_alikes(map: &MapSnapshot, before: Option<&MapSnapshot>) -> Arc<LookAlikeClasses> {
+    let is_same = |b: &&MapSnapshot| {
+        !b.pending.look_alikes && b.distance == map.distance && digests(&b.learnt).eq(digests(&map.learnt))
+    };
+    match before.filter(is_same) {
+        Some(before) => before.look_alikes.clone(),
+        None => Arc::new(look_alike_classes(&map.learnt, map.distance, &map.params)),
+    }
+}

@@ -1,0 +1,82 @@
+//! From committed rows to what the workers read. In: changes from the store's writer. Out: the next version of a map in
+//! [`Snapshots`], and after it what is derived from that version.
+//!
+//! The order is commit -> [`build`] -> publish -> acknowledge; only what has changed is read again. Visibility areas and
+//! look-alike classes take longer: [`derive`] computes them outside the writer and publishes the same version once more. Until
+//! then they are absent ([`MapSnapshot::pending`]), never out of date.
+
+mod build;
+mod derive;
+mod publisher;
+mod visibility_areas;
+
+use crate::{
+    config::Config,
+    engine::snapshot::Snapshots,
+    store::{OpenError, Store, WriterTask},
+    vitals::Vitals,
+};
+use publisher::Publisher;
+use std::{ops::Deref, sync::Arc};
+use tokio::{sync::watch, task::JoinHandle};
+
+/// The open store and what is published of it. Cheap to clone.
+#[derive(Debug, Clone)]
+pub(crate) struct Catalogue {
+    store: Store,
+    snapshots: Arc<Snapshots>,
+}
+
+impl Deref for Catalogue {
+    type Target = Store;
+
+    fn deref(&self) -> &Store {
+        &self.store
+    }
+}
+
+/// What must be awaited for the store to be closed in good order.
+#[derive(Debug)]
+pub(crate) struct CatalogueTasks {
+    writer: WriterTask,
+    deriver: JoinHandle<()>,
+    stop: watch::Sender<bool>,
+}
+
+impl CatalogueTasks {
+    /// Ends the writer as a fault would.
+    #[cfg(test)]
+    fn abort_writer(&self) {
+        self.writer.abort();
+    }
+
+    /// Finishes the writes that wait, and closes the store.
+    pub(crate) async fn close(self) {
+        self.writer.close().await;
+        self.stop.send_replace(true);
+        if let Err(error) = self.deriver.await {
+            tracing::error!(%error, "the task that derives data of maps panicked");
+        }
+    }
+}
+
+impl Catalogue {
+    /// Opens the store and publishes every map.
+    pub(crate) async fn open(config: &Config) -> Result<(Self, CatalogueTasks), OpenError> {
+        let (snapshots, vitals) = (Arc::new(Snapshots::default()), Arc::new(Vitals::default()));
+        let publisher = Publisher::new(snapshots.clone(), config.params.clone(), vitals.clone());
+        let wake = publisher.derive.clone();
+        let (store, writer) = Store::open(config, Arc::new(publisher), vitals.clone()).await?;
+        let (stop, stopping) = watch::channel(false);
+        let deriver = tokio::spawn(derive::run(snapshots.clone(), vitals, wake, stopping));
+        Ok((Self { store, snapshots }, CatalogueTasks { writer, deriver, stop }))
+    }
+
+    /// What the workers read.
+    pub(crate) fn snapshots(&self) -> &Arc<Snapshots> {
+        &self.snapshots
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests;

@@ -1,0 +1,415 @@
+//! The store and its publication as a whole, on fresh databases.
+
+use super::{build::tests as planting, *};
+use crate::{
+    config::RawConfig,
+    engine::panics::Edge,
+    store::{StoreError, WRITER, jobs, landmarks, laser, maps, models, robots},
+};
+use tokio::sync::oneshot;
+use vision::recognise::DistanceKind;
+
+pub(crate) fn config(dir: &std::path::Path) -> Config {
+    Config::try_from(RawConfig { data: dir.to_owned(), ..RawConfig::default() }).unwrap()
+}
+
+#[tokio::test]
+async fn what_is_acknowledged_is_published_and_survives() {
+    let dir = tempfile::tempdir().unwrap();
+    let config = config(dir.path());
+    let (store, task) = Catalogue::open(&config).await.unwrap();
+    store.write(|tx| Box::pin(maps::create(tx, "a", DistanceKind::Both, 2))).await.unwrap();
+    assert_eq!(store.snapshots().get("a").unwrap().version, 1);
+    let new = landmarks::Measures {
+        size: Some(vision::localise::pose::LandmarkSize { width_m: 0.5, height_m: 0.7 }),
+        place: Some(landmarks::Place {
+            x_m: 1.0,
+            y_m: 2.0,
+            z_m: 1.5,
+            theta_rad: 0.5,
+            roll_rad: 0.0,
+            tilt_rad: 0.0,
+            covariance: None,
+        }),
+        size_from_views: false,
+    };
+    let made = store.write(move |tx| Box::pin(landmarks::create(tx, "a", "p1", new, 5))).await.unwrap();
+    store.write(|tx| Box::pin(laser::replace(tx, "a", &[[0.0, 0.0, 4.0, 0.0]]))).await.unwrap();
+    store.write(|tx| Box::pin(robots::put(tx, "r1", "a", 5))).await.unwrap();
+    let snapshot = store.snapshots().get("a").unwrap();
+    assert_eq!((snapshot.version, snapshot.landmarks.len(), snapshot.walls.len()), (3, 1, 1));
+    assert!(snapshot.landmarks[&vision::recognise::LandmarkId(made.id as u64)].place.is_some());
+    task.close().await;
+    assert!(matches!(
+        store.write(|tx| Box::pin(maps::create(tx, "late", DistanceKind::Both, 2))).await,
+        Err(StoreError::Closed)
+    ));
+    assert!(!dir.path().join("waymark.sqlite-wal").exists());
+
+    let (store, _task) = Catalogue::open(&config).await.unwrap();
+    assert_eq!(store.snapshots().get("a").unwrap().version, 3);
+    assert_eq!(store.snapshots().robot_map("r1").as_deref(), Some("a"));
+    assert_eq!(landmarks::get(store.reads(), "a", "p1").await.unwrap().measures, new);
+}
+
+#[tokio::test]
+async fn a_failed_write_changes_nothing() {
+    let dir = tempfile::tempdir().unwrap();
+    let (store, _task) = Catalogue::open(&config(dir.path())).await.unwrap();
+    store.write(|tx| Box::pin(maps::create(tx, "a", DistanceKind::Both, 2))).await.unwrap();
+    let half = store
+        .write(|tx| {
+            Box::pin(async move {
+                landmarks::create(tx, "a", "p1", landmarks::Measures::default(), 5).await?;
+                Err::<(), _>(StoreError::InUse("on purpose".into()))
+            })
+        })
+        .await;
+    assert!(matches!(half, Err(StoreError::InUse(_))));
+    assert_eq!(store.snapshots().get("a").unwrap().version, 1);
+    assert!(matches!(landmarks::get(store.reads(), "a", "p1").await, Err(StoreError::NotFound { .. })));
+}
+
+#[tokio::test]
+async fn names_are_unique_and_bounds_hold() {
+    let dir = tempfile::tempdir().unwrap();
+    let (store, _task) = Catalogue::open(&config(dir.path())).await.unwrap();
+    let create =
+        |name: &'static str| store.write(move |tx| Box::pin(maps::create(tx, name, DistanceKind::Both, 2)));
+    create("a").await.unwrap();
+    assert!(matches!(create("a").await, Err(StoreError::Exists { what: "map", .. })));
+    create("b").await.unwrap();
+    assert!(matches!(create("c").await, Err(StoreError::Limit { max: 2, .. })));
+    store.write(|tx| Box::pin(robots::put(tx, "r1", "b", 1))).await.unwrap();
+    // The same robot again is no new one.
+    store.write(|tx| Box::pin(robots::put(tx, "r1", "a", 1))).await.unwrap();
+    assert!(matches!(
+        store.write(|tx| Box::pin(robots::put(tx, "r2", "a", 1))).await,
+        Err(StoreError::Limit { what: "robots", max: 1 })
+    ));
+    assert!(matches!(store.write(|tx| Box::pin(maps::delete(tx, "a"))).await, Err(StoreError::InUse(_))));
+    store.write(|tx| Box::pin(maps::delete(tx, "b"))).await.unwrap();
+    assert!(store.snapshots().get("b").is_none());
+}
+
+#[tokio::test]
+async fn a_job_ends_once() {
+    let dir = tempfile::tempdir().unwrap();
+    let (store, _task) = Catalogue::open(&config(dir.path())).await.unwrap();
+    store.write(|tx| Box::pin(maps::create(tx, "a", DistanceKind::Both, 2))).await.unwrap();
+    let job = store.write(|tx| Box::pin(jobs::create(tx, "learn", "a", "{}", (1, 9)))).await.unwrap();
+    assert!(matches!(
+        store.write(|tx| Box::pin(jobs::create(tx, "learn", "a", "{}", (1, 9)))).await,
+        Err(StoreError::Limit { .. })
+    ));
+    assert_eq!(jobs::open(store.reads()).await.unwrap().len(), 1);
+    let end = |state: &'static str| {
+        let ended = jobs::Ended { state, message: String::new(), result: None };
+        store.write(move |tx| Box::pin(async move { jobs::end(tx, job.id, &ended).await }))
+    };
+    assert!(end("done").await.unwrap());
+    assert!(!end("failed").await.unwrap());
+    assert_eq!(jobs::get(store.reads(), job.id).await.unwrap().state, "done");
+    assert!(jobs::open(store.reads()).await.unwrap().is_empty());
+}
+
+/// A model of one view of random grey levels, stored.
+async fn store_model(store: &Catalogue, landmark: i64, params: &vision::params::Params) {
+    use vision::{detect::quads::Corners, icon::Icon, learn::model, recognise::LandmarkId};
+    let side = params.icon.size;
+    let pixels = (0..side * side).map(|i| ((i * i * 31 + i * 7) % 251) as f32).collect();
+    let view = model::View {
+        icon: Icon::new(side, pixels, 1.0).unwrap(),
+        corners_px: Corners::try_from([[0.0, 0.0], [90.0, 0.0], [90.0, 90.0], [0.0, 90.0]]).unwrap(),
+        image_size_px: [91, 91],
+        exact: None,
+        generated: false,
+    };
+    let id = LandmarkId(landmark as u64);
+    let model = model::learn(id, &[view.clone(), view], &[], params).unwrap();
+    let new = models::NewModel {
+        landmark: id,
+        bytes: model.to_bytes(),
+        params_hash: model.params_hash,
+        summary: landmarks::ModelSummary {
+            active: false,
+            reasons: "[]".into(),
+            facts: "{}".into(),
+            views: 2,
+            generated_views: 0,
+            learnt_ms: 0,
+        },
+    };
+    let write = store.write(move |tx| {
+        Box::pin(async move {
+            assert!(models::put(tx, 1, &new).await?);
+            maps::bump(tx, 1).await
+        })
+    });
+    write.await.unwrap();
+}
+
+#[tokio::test]
+async fn damaged_and_outdated_models_are_named_and_not_used() {
+    use vision::recognise::LandmarkId;
+    let dir = tempfile::tempdir().unwrap();
+    let config = config(dir.path());
+    let (store, task) = Catalogue::open(&config).await.unwrap();
+    store.write(|tx| Box::pin(maps::create(tx, "a", DistanceKind::Both, 2))).await.unwrap();
+    for name in ["sound", "damaged"] {
+        let none = landmarks::Measures::default();
+        let made = store.write(move |tx| Box::pin(landmarks::create(tx, "a", name, none, 5))).await.unwrap();
+        store_model(&store, made.id, &config.params).await;
+    }
+    assert_eq!(store.snapshots().get("a").unwrap().learnt.len(), 2);
+    // One byte in the middle of the blob, and the digest as it was.
+    let damage = "UPDATE models SET model = CAST(substr(model, 1, 500) || x'00ff' || substr(model, 503) AS BLOB) WHERE landmark_id = 2";
+    let write = store.write(move |tx| {
+        Box::pin(async move {
+            sqlx::query(damage).execute(tx.conn()).await.map(drop).map_err(StoreError::at("damage"))
+        })
+    });
+    write.await.unwrap();
+    task.close().await;
+
+    let (store, task) = Catalogue::open(&config).await.unwrap();
+    let map = store.snapshots().get("a").unwrap();
+    assert_eq!(map.learnt.keys().copied().collect::<Vec<_>>(), [LandmarkId(1)]);
+    assert!(map.unusable_models[&LandmarkId(2)].contains("damaged"), "{:?}", map.unusable_models);
+    task.close().await;
+
+    let mut raw = RawConfig { data: dir.path().to_owned(), ..RawConfig::default() };
+    raw.algorithm.icon.size += 1;
+    let (store, _task) = Catalogue::open(&Config::try_from(raw).unwrap()).await.unwrap();
+    let map = store.snapshots().get("a").unwrap();
+    assert!(map.learnt.is_empty());
+    assert!(map.unusable_models[&LandmarkId(1)].contains("parameters"), "{:?}", map.unusable_models);
+}
+
+#[tokio::test]
+async fn a_write_that_panics_is_rolled_back_and_the_writer_goes_on() {
+    let dir = tempfile::tempdir().unwrap();
+    let (store, _task) = Catalogue::open(&config(dir.path())).await.unwrap();
+    let panicked = store
+        .write(|tx| {
+            Box::pin(async move {
+                maps::create(tx, "half", DistanceKind::Both, 9).await?;
+                tx.after(|| unreachable!("nothing was committed"));
+                Err::<(), _>(StoreError::InUse(String::from_utf8(vec![0xff]).expect("planted")))
+            })
+        })
+        .await;
+    assert!(matches!(panicked, Err(StoreError::Panicked)), "{panicked:?}");
+    store.write(|tx| Box::pin(maps::create(tx, "a", DistanceKind::Both, 2))).await.unwrap();
+    assert!(matches!(maps::get(store.reads(), "half").await, Err(StoreError::NotFound { .. })));
+    assert_eq!(store.vitals().panics().at(Edge::Write), 1);
+    assert_eq!(store.vitals().failure(), None);
+}
+
+#[tokio::test]
+async fn an_error_after_which_nothing_may_be_written_is_a_failure_of_the_server() {
+    let dir = tempfile::tempdir().unwrap();
+    let (store, _task) = Catalogue::open(&config(dir.path())).await.unwrap();
+    let source = || sqlx::Error::WorkerCrashed;
+    let fatal = store.write(move |_| {
+        Box::pin(async move { Err::<(), _>(StoreError::Database { operation: "planted", source: source() }) })
+    });
+    assert!(fatal.await.is_err());
+    let failed = tokio::time::timeout(std::time::Duration::from_secs(5), store.vitals().failed()).await;
+    assert_eq!(failed.unwrap().part, WRITER);
+    let late = store.write(|tx| Box::pin(maps::create(tx, "late", DistanceKind::Both, 2))).await;
+    assert!(matches!(late, Err(StoreError::Closed)));
+}
+
+/// Whatever ends the writer's task without a word.
+#[tokio::test]
+async fn a_writer_that_is_gone_is_a_failure_of_the_server() {
+    let dir = tempfile::tempdir().unwrap();
+    let (store, task) = Catalogue::open(&config(dir.path())).await.unwrap();
+    task.abort_writer();
+    let failed = tokio::time::timeout(std::time::Duration::from_secs(5), store.vitals().failed()).await;
+    assert_eq!(failed.unwrap().part, WRITER);
+}
+
+#[tokio::test]
+async fn a_write_whose_caller_has_gone_before_it_began_is_left_out() {
+    let dir = tempfile::tempdir().unwrap();
+    let (store, _task) = Catalogue::open(&config(dir.path())).await.unwrap();
+    let create =
+        |name: &'static str| store.write(move |tx| Box::pin(maps::create(tx, name, DistanceKind::Both, 9)));
+    {
+        let mut gone = std::pin::pin!(create("gone"));
+        // It is in the queue; the writer has had no turn on this one thread.
+        assert!(futures::poll!(gone.as_mut()).is_pending());
+    }
+    create("next").await.unwrap();
+    assert!(matches!(maps::get(store.reads(), "gone").await, Err(StoreError::NotFound { .. })));
+}
+
+#[tokio::test]
+async fn what_follows_a_commit_does_not_wait_for_its_caller() {
+    let dir = tempfile::tempdir().unwrap();
+    let (store, _task) = Catalogue::open(&config(dir.path())).await.unwrap();
+    let (begun, begins) = oneshot::channel();
+    let (done, followed) = oneshot::channel();
+    let (store_, go) = (store.clone(), Arc::new(tokio::sync::Notify::new()));
+    let wait = go.clone();
+    let caller = tokio::spawn(async move {
+        let write = store_.write(move |tx| {
+            Box::pin(async move {
+                maps::create(tx, "a", DistanceKind::Both, 2).await?;
+                begun.send(()).unwrap();
+                wait.notified().await;
+                tx.after(move || done.send(()).unwrap());
+                Ok(())
+            })
+        });
+        write.await
+    });
+    begins.await.unwrap();
+    caller.abort();
+    assert!(caller.await.unwrap_err().is_cancelled());
+    go.notify_one();
+    followed.await.unwrap();
+    assert!(maps::get(store.reads(), "a").await.is_ok() && store.snapshots().get("a").is_some());
+}
+
+#[tokio::test]
+async fn a_map_that_cannot_be_made_ready_keeps_its_version_and_stops_nothing() {
+    let dir = tempfile::tempdir().unwrap();
+    let config = config(dir.path());
+    let (store, task) = Catalogue::open(&config).await.unwrap();
+    for map in ["a", "b"] {
+        store.write(move |tx| Box::pin(maps::create(tx, map, DistanceKind::Both, 2))).await.unwrap();
+    }
+    let wall =
+        |map: &'static str| store.write(move |tx| Box::pin(laser::replace(tx, map, &[[0.0, 0.0, 4.0, 0.0]])));
+    planting::plant(Some("a"));
+    let refused = wall("a").await;
+    assert!(matches!(&refused, Err(StoreError::NotPublished { map }) if map == "a"), "{refused:?}");
+    wall("b").await.unwrap();
+    let versions = || ["a", "b"].map(|map| store.snapshots().get(map).map(|m| m.version));
+    assert_eq!(versions(), [Some(1), Some(2)]);
+    let named: Vec<_> = store.vitals().all_unpublished().into_keys().collect();
+    assert_eq!((named, store.vitals().failure()), (vec!["a".to_owned()], None));
+    assert_eq!(store.vitals().panics().at(Edge::Publication), 1);
+    // The write stands, and the next one makes all of it visible.
+    planting::plant(None);
+    wall("a").await.unwrap();
+    assert_eq!(versions(), [Some(3), Some(2)]);
+    assert!(store.vitals().all_unpublished().is_empty());
+    task.close().await;
+
+    // A start with it is a start without that map.
+    planting::plant(Some("a"));
+    let (store, task) = Catalogue::open(&config).await.unwrap();
+    assert!(store.snapshots().get("a").is_none() && store.snapshots().get("b").is_some());
+    assert!(store.vitals().all_unpublished().contains_key("a"));
+    store.write(|tx| Box::pin(maps::delete(tx, "a"))).await.unwrap();
+    assert!(store.vitals().all_unpublished().is_empty());
+    planting::plant(None);
+    task.close().await;
+}
+
+#[tokio::test]
+async fn a_model_that_cannot_be_read_is_quarantined_and_the_others_are_used() {
+    use vision::recognise::LandmarkId;
+    let dir = tempfile::tempdir().unwrap();
+    let config = config(dir.path());
+    let (store, task) = Catalogue::open(&config).await.unwrap();
+    store.write(|tx| Box::pin(maps::create(tx, "a", DistanceKind::Both, 2))).await.unwrap();
+    for name in ["sound", "bad"] {
+        let none = landmarks::Measures::default();
+        let made = store.write(move |tx| Box::pin(landmarks::create(tx, "a", name, none, 5))).await.unwrap();
+        store_model(&store, made.id, &config.params).await;
+    }
+    task.close().await;
+    planting::plant(Some("the model of landmark number 2"));
+    let (store, _task) = Catalogue::open(&config).await.unwrap();
+    planting::plant(None);
+    let map = store.snapshots().get("a").unwrap();
+    assert_eq!(map.learnt.keys().copied().collect::<Vec<_>>(), [LandmarkId(1)]);
+    assert!(map.unusable_models[&LandmarkId(2)].contains("failed"), "{:?}", map.unusable_models);
+    assert_eq!(store.vitals().panics().at(Edge::Publication), 1);
+}
+
+/// From now on no run can be stored.
+pub(crate) async fn refuse_runs(store: &Catalogue) {
+    let trigger = "CREATE TRIGGER refuse BEFORE INSERT ON runs BEGIN SELECT RAISE(ABORT, 'planted'); END";
+    let write = store.write(move |tx| {
+        Box::pin(async move {
+            sqlx::raw_sql(trigger).execute(tx.conn()).await.map(drop).map_err(StoreError::at("plant"))
+        })
+    });
+    write.await.unwrap();
+}
+
+/// A map with a wall and two landmarks 40 m apart, so that neither's area reaches the other.
+async fn two_placed(store: &Store) -> [vision::recognise::LandmarkId; 2] {
+    store.write(|tx| Box::pin(maps::create(tx, "a", DistanceKind::Both, 2))).await.unwrap();
+    store
+        .write(|tx| Box::pin(async { laser::replace(tx, "a", &[[0.0, -0.1, 60.0, -0.1]]).await }))
+        .await
+        .unwrap();
+    let mut ids = [vision::recognise::LandmarkId(0); 2];
+    for (id, (name, x_m)) in ids.iter_mut().zip([("p1", 5.0), ("p2", 45.0)]) {
+        let new = placed_at(x_m);
+        let row = store.write(move |tx| Box::pin(landmarks::create(tx, "a", name, new, 5))).await.unwrap();
+        id.0 = row.id as u64;
+    }
+    ids
+}
+
+fn placed_at(x_m: f64) -> landmarks::Measures {
+    let (z_m, theta_rad) = (1.5, std::f64::consts::FRAC_PI_2);
+    landmarks::Measures {
+        size: Some(vision::localise::pose::LandmarkSize { width_m: 0.5, height_m: 0.7 }),
+        place: Some(landmarks::Place {
+            x_m,
+            y_m: 0.0,
+            z_m,
+            theta_rad,
+            roll_rad: 0.0,
+            tilt_rad: 0.0,
+            covariance: None,
+        }),
+        size_from_views: false,
+    }
+}
+
+#[tokio::test]
+async fn an_edit_computes_only_what_it_changed_and_not_in_the_writer() {
+    let dir = tempfile::tempdir().unwrap();
+    let config = config(dir.path());
+    let (snapshots, vitals) = (Arc::new(Snapshots::default()), Arc::new(Vitals::default()));
+    let publisher = Publisher::new(snapshots.clone(), config.params.clone(), vitals.clone());
+    let wake = publisher.derive.clone();
+    // Nothing derives yet: what the writer publishes is all there is.
+    let (store, _task) = Store::open(&config, Arc::new(publisher), vitals.clone()).await.unwrap();
+    let [p1, p2] = two_placed(&store).await;
+    let map = snapshots.get("a").unwrap();
+    assert!(map.pending.visibility && map.visibility.is_empty());
+
+    let (stop, stopping) = watch::channel(false);
+    let deriver = tokio::spawn(derive::run(snapshots.clone(), vitals.clone(), wake.clone(), stopping));
+    let before = snapshots.with_visibility("a").await.unwrap();
+    assert_eq!((before.version, before.visibility.len()), (map.version, 2));
+    stop.send_replace(true);
+    deriver.await.unwrap();
+
+    let (moved, walls) = (placed_at(6.0), before.walls.clone());
+    store
+        .write(move |tx| Box::pin(async move { landmarks::update(tx, "a", "p1", |_| moved).await }))
+        .await
+        .unwrap();
+    let after = snapshots.get("a").unwrap();
+    assert!(after.version > before.version && Arc::ptr_eq(&after.walls, &walls));
+    assert!(after.pending.visibility && !after.visibility.contains_key(&p1), "never one of another place");
+    assert!(Arc::ptr_eq(&after.visibility[&p2], &before.visibility[&p2]), "its inputs are the same");
+
+    let (_stop, stopping) = watch::channel(false);
+    tokio::spawn(derive::run(snapshots.clone(), vitals, wake, stopping));
+    let derived = snapshots.with_visibility("a").await.unwrap();
+    assert!(derived.version == after.version && derived.visibility.contains_key(&p1));
+    assert!(Arc::ptr_eq(&derived.visibility[&p2], &before.visibility[&p2]));
+}
