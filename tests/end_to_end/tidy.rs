@@ -211,7 +211,7 @@ fn citations(text: &str) -> Vec<(usize, &str)> {
         if is_label(word) || (word.starts_with("docs/") && word.ends_with(DOCUMENT) && !word.contains('*')) {
             found.push((line, word));
         }
-        if !word.eq_ignore_ascii_case("method") && !word.eq_ignore_ascii_case("section") {
+        if !["method", "section", "sections"].iter().any(|mark| word.eq_ignore_ascii_case(mark)) {
             continue;
         }
         // A list goes on after a comma and after "to" and "and".
@@ -242,7 +242,7 @@ fn citations_are_told_from_other_words() {
     assert_eq!(citations(&text), expected);
     let none = "fn method() { 3.6 }\n// a method of 1.5 px\n#[doc = \"method 9.9\"]\n// A300 and E";
     assert_eq!(citations(none), []);
-    assert_eq!(citations("-- docs/method/README.md, section 8."), [(1, "docs/method/README.md"), (1, "8")]);
+    assert_eq!(citations("-- docs/method/README.md, Sections 8."), [(1, "docs/method/README.md"), (1, "8")]);
 }
 
 #[test]
