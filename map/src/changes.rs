@@ -1,4 +1,4 @@
-//! Moved, changed, gone: what the map says should be seen, against what is seen (issue of landmarks that do not stay).
+//! Moved, changed, gone: what the map says should be seen, against what is seen (docs/method/27-landmark-health.md).
 //!
 //! In: sightings with the pose that the robot has without them, and what should have been in the picture. Out: which
 //! landmarks to flag, to quarantine and to trust again. A landmark is only judged by a pose that rests on others, and only

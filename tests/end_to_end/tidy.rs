@@ -1,4 +1,4 @@
-//! What the documents name is there: every path in backticks that ends like a file of this repository exists.
+//! What the documents name is there: files, tests, types and constants. What comments cite of the method is there, too.
 
 use std::{
     collections::BTreeSet,
@@ -8,28 +8,91 @@ use std::{
 
 /// Ends of the paths that are looked at.
 const ENDINGS: [&str; 4] = [".rs", ".md", ".sql", ".proto"];
+/// End of the path of a document.
+const DOCUMENT: &str = ".md";
+/// Folders with code and text of this project; those that are not there are passed over.
+const FOLDERS: [&str; 11] = [
+    "client",
+    "formats",
+    "lab",
+    "map",
+    "migrations",
+    "protos",
+    "server",
+    "sim",
+    "tests",
+    "vision",
+    "fuzz/fuzz_targets",
+];
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }
 
-/// README.md and docs/*.md.
-fn documents() -> Vec<PathBuf> {
-    let mut found = vec![root().join("README.md")];
-    let entries = fs::read_dir(root().join("docs")).expect("the docs folder");
-    found.extend(entries.map(|e| e.expect("an entry of the docs folder").path()));
+/// The Markdown files of a folder, by name.
+fn markdown(folder: &str) -> Vec<PathBuf> {
+    let entries = fs::read_dir(root().join(folder)).expect("a folder of documents");
+    let mut found: Vec<PathBuf> = entries.map(|e| e.expect("an entry of a folder").path()).collect();
     found.retain(|path| path.extension().is_some_and(|e| e == "md"));
     found.sort();
     found
 }
 
+/// README.md, docs/*.md and docs/method/*.md.
+fn documents() -> Vec<PathBuf> {
+    let mut found = vec![root().join("README.md")];
+    found.extend(markdown("docs"));
+    found.extend(markdown("docs/method"));
+    found
+}
+
+/// The pages of the method in one text.
+fn method() -> String {
+    markdown("docs/method").iter().map(|page| fs::read_to_string(page).expect("a page in UTF-8")).collect()
+}
+
+/// Every file of the project that ends with `.` and one of `endings`, with its text.
+fn files(endings: &[&str]) -> Vec<(PathBuf, String)> {
+    let mut found = Vec::new();
+    let mut folders: Vec<PathBuf> = FOLDERS.map(|f| root().join(f)).into();
+    folders.retain(|f| f.is_dir());
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder).expect("a folder of sources") {
+            let path = entry.expect("an entry of a folder of sources").path();
+            if path.is_dir() {
+                folders.extend((!path.ends_with("target")).then_some(path));
+            } else if path.extension().and_then(|e| e.to_str()).is_some_and(|e| endings.contains(&e)) {
+                let text = fs::read_to_string(&path).expect("a source in UTF-8");
+                found.push((path, text));
+            }
+        }
+    }
+    found.sort();
+    found
+}
+
+/// The sources of every crate in one text.
+fn sources() -> String {
+    files(&["rs"]).into_iter().map(|(_, text)| text).collect()
+}
+
+/// The names that `keyword` declares.
+fn declared<'a>(sources: &'a str, keyword: &str) -> BTreeSet<&'a str> {
+    let name = |rest: &'a str| rest.split(|c: char| !c.is_alphanumeric() && c != '_').next();
+    sources.split(keyword).skip(1).filter_map(name).collect()
+}
+
+/// What stands between single backticks, by line.
+fn quoted(text: &str) -> impl Iterator<Item = &str> {
+    text.lines().filter(|line| !line.starts_with("```")).flat_map(|line| line.split('`').skip(1).step_by(2))
+}
+
 /// Paths with a folder between single backticks; one name alone may stand for many files, `*` does.
 fn paths(text: &str) -> BTreeSet<&str> {
-    let quoted = text.lines().flat_map(|line| line.split('`').skip(1).step_by(2));
     let is_path = |word: &&str| {
         word.contains('/') && !word.contains([' ', '*']) && ENDINGS.iter().any(|end| word.ends_with(end))
     };
-    quoted.filter(is_path).collect()
+    quoted(text).filter(is_path).collect()
 }
 
 #[test]
@@ -52,37 +115,151 @@ fn documents_name_only_files_that_exist() {
         }
     }
     assert!(missing.is_empty(), "{missing:#?}");
-    assert!(named > 20, "only {named} paths found: the documents are no longer read");
-}
-
-/// The sources of every crate in one text.
-fn sources() -> String {
-    let mut text = String::new();
-    let mut folders: Vec<PathBuf> =
-        ["vision", "map", "formats", "protos", "sim", "client", "server", "lab", "tests"]
-            .map(|f| root().join(f))
-            .into();
-    while let Some(folder) = folders.pop() {
-        for entry in fs::read_dir(folder).expect("a folder of sources") {
-            let path = entry.expect("an entry of a folder of sources").path();
-            if path.is_dir() {
-                folders.push(path);
-            } else if path.extension().is_some_and(|e| e == "rs") {
-                text += &fs::read_to_string(path).expect("a source in UTF-8");
-            }
-        }
-    }
-    text
+    assert!(named > 200, "only {named} paths found: the documents are no longer read");
 }
 
 #[test]
 fn tests_named_in_the_method_exist() {
-    let method = fs::read_to_string(root().join("docs/METHOD.md")).expect("docs/METHOD.md");
     let sources = sources();
-    // Rows of tables: | section | file | test | departure |
-    let columns = method.lines().filter(|line| line.starts_with('|')).filter_map(|row| row.split('|').nth(3));
-    let names: Vec<&str> = columns.flat_map(|column| column.split('`').skip(1).step_by(2)).collect();
-    let missing: Vec<_> = names.iter().filter(|name| !sources.contains(&format!("fn {name}("))).collect();
+    let tests = declared(&sources, "fn ");
+    let method = method();
+    // Parts "Files and tests": every name in backticks that is no path is a test.
+    let parts = method.split("\n#").filter(|part| part.contains("# Files and tests\n"));
+    let names: Vec<&str> = parts.flat_map(quoted).filter(|name| !name.contains(['/', '.'])).collect();
+    let missing: Vec<_> = names.iter().filter(|name| !tests.contains(**name)).collect();
     assert!(missing.is_empty(), "{missing:#?}");
-    assert!(names.len() > 20, "only {} names found: the tables are no longer read", names.len());
+    assert!(names.len() > 300, "only {} names found: the pages are no longer read", names.len());
+}
+
+#[test]
+fn parameters_and_constants_named_in_the_method_exist() {
+    let sources = sources();
+    let (constants, structs) = (declared(&sources, "const "), declared(&sources, "struct "));
+    let method = method();
+    let is_constant = |name: &str| {
+        let is_of = |c: char| c.is_ascii_uppercase() || c.is_ascii_digit() || c == '_';
+        name.contains('_') && name.starts_with(|c: char| c.is_ascii_uppercase()) && name.chars().all(is_of)
+    };
+    let (mut missing, mut named) = (Vec::new(), 0);
+    for word in quoted(&method) {
+        let name = word.split("::").next().unwrap_or(word);
+        let is_there = if is_constant(name) {
+            constants.contains(name)
+        } else if name.ends_with("Params") && name.chars().all(char::is_alphanumeric) {
+            structs.contains(name)
+        } else {
+            continue;
+        };
+        named += 1;
+        missing.extend((!is_there).then_some(word));
+    }
+    assert!(missing.is_empty(), "{missing:#?}");
+    assert!(named > 100, "only {named} names found: the pages are no longer read");
+}
+
+/// What pages and their tables define: section numbers of headings, labels of rows (`A10`, `E9`).
+fn sections(method: &str) -> BTreeSet<&str> {
+    let headings = method.lines().filter_map(|line| line.trim_start_matches('#').strip_prefix(' '));
+    let numbers = headings.filter_map(|title| title.split(' ').next()).filter(|word| is_number(word));
+    let rows = method.lines().filter_map(|line| line.strip_prefix("| ")?.split(' ').next());
+    numbers.chain(rows.filter(|word| is_label(word))).collect()
+}
+
+/// `3`, `3.6`, `16.3.3`.
+fn is_number(word: &str) -> bool {
+    word.split('.').all(|part| !part.is_empty() && part.chars().all(|c| c.is_ascii_digit()))
+}
+
+/// `A` or `E` and one or two digits.
+fn is_label(word: &str) -> bool {
+    word.strip_prefix(['A', 'E'])
+        .is_some_and(|number| matches!(number.len(), 1 | 2) && number.chars().all(|c| c.is_ascii_digit()))
+}
+
+/// The words of the comments of a file, with the number of their line.
+fn comment_words(text: &str) -> Vec<(usize, &str)> {
+    let mut words = Vec::new();
+    for (i, line) in text.lines().enumerate() {
+        let start = line.trim_start();
+        let whole = ["//", "--", "#"].iter().find(|mark| start.starts_with(**mark));
+        let said = match whole {
+            Some(_) if start.starts_with("#[") || start.starts_with("#!") => continue,
+            Some(_) => start,
+            None => line.split_once(" // ").map_or("", |(_, after)| after),
+        };
+        let said = said.trim_start_matches(['/', '!', '-', '#']);
+        words.extend(said.split_whitespace().map(|word| (i + 1, word)));
+    }
+    words
+}
+
+/// A word without the marks around it.
+fn bare(word: &str) -> &str {
+    let word = word.trim_start_matches(['(', '`', '"', '[']);
+    word.trim_end_matches([')', '`', '"', ']', ',', '.', ':', ';'])
+}
+
+/// What comments cite of the method, with the number of the line: `method 3.6`, `method 17.1 to 17.3`, `section 6.3`,
+/// the labels `A10` and `E9`, and documents by their path.
+fn citations(text: &str) -> Vec<(usize, &str)> {
+    let words = comment_words(text);
+    let trimmed = |i: usize| words.get(i).map(|(line, word)| (*line, bare(word)));
+    let mut found = Vec::new();
+    let mut i = 0;
+    while let Some((line, word)) = trimmed(i) {
+        i += 1;
+        if is_label(word) || (word.starts_with("docs/") && word.ends_with(DOCUMENT) && !word.contains('*')) {
+            found.push((line, word));
+        }
+        if !["method", "section", "sections"].iter().any(|mark| word.eq_ignore_ascii_case(mark)) {
+            continue;
+        }
+        // A list goes on after a comma and after "to" and "and".
+        let mut next = i;
+        while let Some((line, number)) = trimmed(next).filter(|(_, number)| is_number(number)) {
+            found.push((line, number));
+            i = next + 1;
+            let goes_on = words.get(i).is_some_and(|(_, word)| ["to", "and"].contains(word));
+            next = if goes_on { i + 1 } else { i };
+            if !goes_on && !words[next - 1].1.ends_with(',') {
+                break;
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn citations_are_told_from_other_words() {
+    let text = [
+        "/// Departs from method 3.6, 13.4: see the",
+        "/// method",
+        "// 17.1 to 17.3 (register A3), E9; 4.5 px",
+        "let x = 1; // method 2.",
+    ]
+    .join("\n");
+    let expected = [(1, "3.6"), (1, "13.4"), (3, "17.1"), (3, "17.3"), (3, "A3"), (3, "E9"), (4, "2")];
+    assert_eq!(citations(&text), expected);
+    let none = "fn method() { 3.6 }\n// a method of 1.5 px\n#[doc = \"method 9.9\"]\n// A300 and E";
+    assert_eq!(citations(none), []);
+    assert_eq!(citations("-- docs/method/README.md, Sections 8."), [(1, "docs/method/README.md"), (1, "8")]);
+}
+
+#[test]
+fn every_section_cited_in_a_comment_exists() {
+    let method = method();
+    let sections = sections(&method);
+    let (mut missing, mut cited) = (Vec::new(), 0);
+    for (path, text) in files(&["rs", "sql", "proto", "toml"]) {
+        for (line, what) in citations(&text) {
+            cited += 1;
+            let is_there =
+                if what.ends_with(DOCUMENT) { root().join(what).is_file() } else { sections.contains(what) };
+            if !is_there {
+                missing.push(format!("{}:{line}: {what}", path.display()));
+            }
+        }
+    }
+    assert!(missing.is_empty(), "{missing:#?}");
+    assert!(cited > 150, "only {cited} citations found: the comments are no longer read");
 }

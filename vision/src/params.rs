@@ -1,4 +1,4 @@
-//! Every knob of the pipeline in one place, grouped by stage. The defaults are the method's (section 20).
+//! Every knob of the pipeline, grouped by stage. Defaults and their sources: docs/method/20-parameters.md.
 
 mod distance_hash;
 

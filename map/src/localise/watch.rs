@@ -1,4 +1,4 @@
-//! Whether a camera is what it says it is, from the residuals of the fixes it gives (issue: a watch over intrinsics).
+//! Whether a camera is what it says it is, from the residuals of the fixes it gives (method 16).
 //!
 //! In: each fix with what it rests on, and each refusal. Out: how far the focal length seems off, how well corners fit,
 //! and a suspicion with its number. It changes nothing: a suspect camera is for people to calibrate again.

@@ -107,7 +107,7 @@ impl StoreError {
     }
 
     /// The state on disk is unknown after this: an fsync that failed cannot be tried again, since the pages are then
-    /// marked clean (reliability 1.12). The only safe way on is to stop and to open again from disk.
+    /// marked clean. The only safe way on is to stop and to open again from disk.
     pub(crate) fn is_fatal(&self) -> bool {
         match self {
             Self::Database { source, .. } => {

@@ -4,7 +4,7 @@
 //! them become quads is decided by `selection`.
 //!
 //! Departs from method 3.3, 3.4: there a segment takes part in one pair and a pair in one quad, and a side that the
-//! segments miss loses the quad. What it gains is in docs/METHOD.md.
+//! segments miss loses the quad. What it gains: docs/method/24-default-detector.md.
 
 use super::{
     evidence::{Gradients, run_end},

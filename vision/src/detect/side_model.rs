@@ -2,7 +2,7 @@
 //! the edge of the picture next to it all look like sides. A quad in, the same with every side on its likeliest line
 //! out. Measurements of each line are weighed by a small network that was fitted on labelled photographs.
 //!
-//! Departs from method 3.6, which refits a side on the nearest edge only. What it gains is in docs/METHOD.md.
+//! Departs from method 3.6, which refits a side on the nearest edge only. See docs/method/24-default-detector.md.
 
 use super::{
     evidence::Gradients,

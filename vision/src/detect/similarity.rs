@@ -49,7 +49,7 @@ pub struct SimilarityParams {
 /// Weights by `waymark-lab train similarity` on photographs of paintings and rendered corridors.
 ///
 /// Departs from method 2, which asks for this fit: opposite sides of a quad are told by their lengths and a third side,
-/// hardly by the profiles across them. What it gained is in docs/METHOD.md.
+/// hardly by the profiles across them. Figures: docs/results/2026-11-22.md.
 const FITTED_WEIGHTS: [f64; 6] = [0.41, 0.0, 0.17, 0.03, 0.32, 0.07];
 
 impl Default for SimilarityParams {

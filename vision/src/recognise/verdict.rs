@@ -53,8 +53,8 @@ pub struct VerdictParams {
     pub sure_content: f64,
     /// Landmarks that are verified at most.
     pub max_verified: usize,
-    /// Whether points decide where icons would (`both`); what they say nothing of is left to the icons. Measured in
-    /// `docs/METHOD.md`, "Points".
+    /// Whether points decide where icons would (`both`); what they say nothing of is left to the icons. See
+    /// `docs/method/25-recognition-by-points.md`.
     pub points: bool,
     /// Landmarks with more points than this are never accepted by their icons: their points would have said so. One with
     /// fewer that its icon speaks for is ambiguous, with [`Refusal::Plain`]: the robot's pose may name it.
