@@ -4,7 +4,7 @@
 //! Precedence, weakest first: defaults, TOML file, `WAYMARK_...` variables (`WAYMARK_LIMITS__FRAME_BYTES=100000`),
 //! command line.
 
-use crate::engine::decode::ImageLimits;
+use engine::decode::ImageLimits;
 use figment::{
     Figment,
     providers::{Env, Format, Serialized, Toml},

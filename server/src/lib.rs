@@ -4,13 +4,11 @@
 //! zenoh appears only in `bus`, sqlx only in `store`, axum only in `http`.
 
 pub mod config;
-pub mod engine;
 pub mod bus;
 mod store;
 mod publication;
 mod jobs;
 pub mod gather;
-pub mod vitals;
 mod calibrating;
 mod http;
 mod server;

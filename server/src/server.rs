@@ -3,22 +3,22 @@
 use crate::{
     bus::{Bus, BusError, Receivers},
     config::Config,
-    engine::{
-        decode::ImageLimits,
-        intake::{FrameJob, Intake},
-        live::LiveHub,
-        motion::Motion,
-        slots::Slots,
-        snapshot::Snapshots,
-        standing::{Findings, Found, findings},
-        workers::{Engine, Workers},
-    },
     gather::{self, Gatherer, Hook},
     http::{self, App, Workshop},
     jobs::Jobs,
     publication::{Catalogue, CatalogueTasks},
     store::{OpenError, landmarks},
+};
+use engine::{
+    decode::ImageLimits,
+    intake::{FrameJob, Intake},
+    live::LiveHub,
+    motion::Motion,
+    slots::Slots,
+    snapshot::Snapshots,
+    standing::{Findings, Found, findings},
     vitals::{Failure, Pulse, Vitals},
+    workers::{Engine, Workers},
 };
 use std::{net::SocketAddr, sync::Arc, time::Duration};
 use tokio::{
@@ -163,7 +163,7 @@ fn engine(
         vitals,
         findings,
         searches: Arc::default(),
-        gather,
+        gather: Arc::new(gather),
         search_every_frame: config.search_every_frame,
     }
 }

@@ -2,8 +2,9 @@
 //! with the next message. A pose says how old it is, and a robot that falls silent has none soon.
 
 use client::{RobotClient, v1};
+use engine::motion::MAX_POSE_AGE;
 use map::pose2::Pose2;
-use server::{config::Limits, engine::motion::MAX_POSE_AGE};
+use server::config::Limits;
 use sim::{building::Building, corridor::CorridorParams};
 use std::{
     sync::Arc,

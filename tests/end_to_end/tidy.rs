@@ -11,8 +11,9 @@ const ENDINGS: [&str; 4] = [".rs", ".md", ".sql", ".proto"];
 /// End of the path of a document.
 const DOCUMENT: &str = ".md";
 /// Folders with code and text of this project; those that are not there are passed over.
-const FOLDERS: [&str; 11] = [
+const FOLDERS: [&str; 12] = [
     "client",
+    "engine",
     "formats",
     "lab",
     "map",

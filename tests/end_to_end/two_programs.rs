@@ -3,7 +3,8 @@
 //! the named time if it was killed.
 
 use client::{Capture, RobotClient, v1};
-use server::{config::Limits, engine::epochs::MESSAGE_LIVE};
+use engine::epochs::MESSAGE_LIVE;
+use server::config::Limits;
 use std::time::{Duration, Instant};
 use tests::{Inside, SOON, eventually, pictures, robots::connect};
 

@@ -2,7 +2,7 @@
 //! than a millisecond.
 
 use super::{BusError, Receivers, caught};
-use crate::engine::{gaze::Ask, panics::Edge};
+use engine::{gaze::Ask, panics::Edge};
 use map::gaze::GazeParams;
 use protos::{
     Code, Key, Keys, Name, Rejection,

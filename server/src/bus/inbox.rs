@@ -2,7 +2,7 @@
 //! over. A message that is refused costs its sender an answer and us a counter; nothing here waits or panics.
 
 use super::{BusError, Outbox, Receivers, caught};
-use crate::engine::{
+use engine::{
     panics::Edge,
     slots::SlotKey,
     workers::{Publish, failed},

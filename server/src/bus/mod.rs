@@ -15,9 +15,13 @@ mod tests;
 
 pub use outbox::Outbox;
 
-use crate::{
-    config::Config,
-    engine::{gaze::Gazes, intake::Intake, live::LiveHub, motion::Motion, panics::Edge},
+use crate::config::Config;
+use engine::{
+    gaze::Gazes,
+    intake::Intake,
+    live::LiveHub,
+    motion::Motion,
+    panics::Edge,
     vitals::{Pulse, Vitals},
 };
 use protos::{Key, Keys, v1};

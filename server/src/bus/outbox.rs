@@ -5,7 +5,7 @@
 //! of a map can be asked for at `map/{map}/version`.
 
 use super::BusError;
-use crate::engine::{
+use engine::{
     panics::{Edge, Panics},
     slots::SlotKey,
     workers::Publish,

@@ -1,16 +1,14 @@
 //! Over loopback zenoh, with the robot's own client: what is promised on the wire holds.
 
 use super::*;
-use crate::{
-    config::RawConfig,
-    engine::{
-        intake::Intake,
-        scene::{self, Scene},
-        snapshot::MapSnapshot,
-        workers::{Engine, Workers},
-    },
-};
+use crate::config::RawConfig;
 use client::{Capture, Delivery, RobotClient, RobotOptions};
+use engine::{
+    intake::Intake,
+    scene::{self, Scene},
+    snapshot::MapSnapshot,
+    workers::{Engine, Workers},
+};
 use protos::prost::Message;
 use std::time::Duration;
 use vision::frame::GrayImage;

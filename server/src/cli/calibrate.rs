@@ -1,11 +1,9 @@
 //! `waymark calibrate`: a camera's intrinsics from pictures of one flat thing of known shape, no server needed.
 
 use super::{detect, pictures, screen};
-use crate::{
-    calibrating::{CORNER_SIGMA_PX, Knowledge, Report, calibrated},
-    engine::dominant::dominant,
-};
+use crate::calibrating::{CORNER_SIGMA_PX, Knowledge, Report, calibrated};
 use anyhow::Context as _;
+use engine::dominant::dominant;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 use vision::{

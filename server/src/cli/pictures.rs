@@ -1,7 +1,7 @@
 //! Picture files in, grey images out, and the other way round for the demo's robots.
 
-use crate::engine::decode::{ImageLimits, decode_upload};
 use anyhow::Context as _;
+use engine::decode::{ImageLimits, decode_upload};
 use image::ImageEncoder as _;
 use std::{fs::File, io::Read as _, path::Path};
 use vision::{frame::GrayImage, params::DetectParams};

@@ -3,10 +3,10 @@
 use crate::{
     RunningServer, Server,
     config::{Config, RawConfig},
-    vitals::Failure,
 };
 use anyhow::{Context, anyhow};
 use clap::Args;
+use engine::vitals::Failure;
 use std::{path::PathBuf, time::Duration};
 
 /// Time that the other parts have to end after one has failed.

@@ -2,7 +2,8 @@
 //! When unsure it says doubtful, and then nothing is kept.
 
 use super::Offer;
-use crate::{engine::snapshot::MapSnapshot, store::placing::Capture};
+use crate::store::placing::Capture;
+use engine::snapshot::MapSnapshot;
 use map::{
     gather::{Glimpse, Identity},
     mounting::Mounting,

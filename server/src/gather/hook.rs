@@ -1,14 +1,12 @@
 //! The frame path's end of gathering: what a worker offers, to whom, and what is counted on the way. Never waits.
 
-use crate::{
-    engine::{slots::SlotKey, snapshot::MapSnapshot},
-    store::gatherings::GatheringRow,
-};
+use crate::store::gatherings::GatheringRow;
 use arc_swap::ArcSwap;
-use map::{
-    gather::{Outcome, Tracker},
-    pose2::Pose2Covariance,
+use engine::{
+    frame_tap::{AnalysedFrame, FrameTap},
+    slots::SlotKey,
 };
+use map::gather::{Outcome, Tracker};
 use protos::CheckedFrame;
 use serde::{Deserialize, Serialize};
 use std::{
@@ -17,7 +15,7 @@ use std::{
 };
 use tokio::sync::mpsc::{Receiver, Sender, channel, error::TrySendError};
 use utoipa::ToSchema;
-use vision::{frame::GrayImage, pipeline::QuadFacts, recognise::LandmarkId};
+use vision::recognise::LandmarkId;
 
 /// Frames that wait to be followed; beyond that they are dropped.
 pub(crate) const QUEUE: usize = 8;
@@ -112,26 +110,13 @@ impl Session {
 /// By robot.
 pub(super) type Sessions = ArcSwap<BTreeMap<String, Arc<Session>>>;
 
-/// What a worker has seen in a frame.
-#[derive(Debug)]
-pub struct Looked {
-    /// The decoded picture.
-    pub image: GrayImage,
-    /// Its quads with verdicts.
-    pub quads: Vec<QuadFacts>,
-    /// The version of the map they were recognised against.
-    pub map: Arc<MapSnapshot>,
-    /// Where the robot is believed to have been: its own word, or the fused pose without this frame.
-    pub believed: Option<Pose2Covariance>,
-}
-
 /// A frame to follow things in.
 #[derive(Debug)]
 pub struct Offer {
     pub(super) session: Arc<Session>,
     pub(super) camera: String,
     pub(super) frame: CheckedFrame,
-    pub(super) looked: Looked,
+    pub(super) looked: AnalysedFrame,
 }
 
 /// The end that workers hold.
@@ -147,18 +132,15 @@ pub fn hook() -> (Hook, Receiver<Offer>) {
     (Hook { sessions: Arc::default(), offers }, received)
 }
 
-impl Hook {
-    /// Whether this robot gathers.
-    pub fn is_wanted(&self, key: &SlotKey) -> bool {
+impl FrameTap for Hook {
+    fn is_wanted(&self, key: &SlotKey) -> bool {
         self.sessions.load().contains_key(key.robot.as_str())
     }
 
-    /// Passes a frame on if its robot gathers. Never waits.
-    pub fn offer(&self, key: &SlotKey, frame: &CheckedFrame, looked: impl FnOnce() -> Looked) {
+    fn offer(&self, key: &SlotKey, frame: &CheckedFrame, looked: AnalysedFrame) {
         let sessions = self.sessions.load();
         let Some(session) = sessions.get(key.robot.as_str()) else { return };
         lock(&session.counts).frames += 1;
-        let looked = looked();
         if looked.map.name != session.map {
             lock(&session.counts).elsewhere += 1;
             return;

@@ -9,11 +9,10 @@ mod hook;
 pub(crate) mod candidates;
 
 pub(crate) use hook::Counts;
-pub use hook::{Hook, Looked, Offer, Session, hook};
+pub use hook::{Hook, Offer, Session, hook};
 
 use crate::{
     config::Config,
-    engine::{panics::Edge, picture},
     jobs::learn,
     publication::Catalogue,
     store::{
@@ -24,6 +23,7 @@ use crate::{
         views::NewView,
     },
 };
+use engine::{panics::Edge, picture};
 use hook::{Sessions, lock};
 use map::gather::{GatherParams, Kept, Outcome, Tracker};
 use protos::convert::Encoding;

@@ -1,12 +1,13 @@
 use super::{hook::QUEUE, *};
 use crate::{
-    engine::{
-        scene::{MAP, Scene},
-        slots::SlotKey,
-        snapshot::MapSnapshot,
-    },
     publication::tests::config,
     store::{maps, robots},
+};
+use engine::{
+    frame_tap::{AnalysedFrame, FrameTap as _},
+    scene::{MAP, Scene},
+    slots::SlotKey,
+    snapshot::MapSnapshot,
 };
 use map::pose2::{Pose2, Pose2Covariance};
 use nalgebra::Matrix3;
@@ -29,7 +30,7 @@ fn key(robot: &str) -> SlotKey {
 }
 
 /// Frames of a robot that stands before a poster and looks again and again, raw grey.
-fn frames(count: u64) -> Vec<(CheckedFrame, Looked)> {
+fn frames(count: u64) -> Vec<(CheckedFrame, AnalysedFrame)> {
     let mut scene = Scene::new();
     let (_, seen) = scene.looks(1, 1).remove(0);
     let image = &seen.frame.image;
@@ -56,7 +57,7 @@ fn frames(count: u64) -> Vec<(CheckedFrame, Looked)> {
                 map: None,
             };
             let (quads, map) = (facts.quads.clone(), map.clone());
-            (frame, Looked { image: image.clone(), quads, map, believed: Some(believed) })
+            (frame, AnalysedFrame { image: image.clone(), quads, map, believed: Some(believed) })
         })
         .collect()
 }
@@ -69,12 +70,12 @@ async fn a_full_queue_drops_and_counts_and_nobody_waits() {
     let gatherer = Arc::new(Gatherer { store, params: Arc::default(), sessions: hook.sessions.clone() });
     let id = gatherer.begin(MAP, new()).await.unwrap().id;
     for (frame, looked) in frames(QUEUE as u64 + 3) {
-        hook.offer(&key("r1"), &frame, || looked);
+        hook.offer(&key("r1"), &frame, looked);
     }
     let (frame, looked) = frames(1).remove(0);
-    let other = Looked { map: Arc::new(MapSnapshot::empty("cellar", 1)), ..looked };
-    hook.offer(&key("r1"), &frame, || other);
-    hook.offer(&key("r2"), &frame, || unreachable!("it does not gather"));
+    let other = AnalysedFrame { map: Arc::new(MapSnapshot::empty("cellar", 1)), ..looked };
+    hook.offer(&key("r1"), &frame, other);
+    assert!(!hook.is_wanted(&key("r2")), "it does not gather");
     let counts = gatherer.counts(id).unwrap();
     assert_eq!((counts.frames, counts.dropped, counts.elsewhere), (QUEUE as u64 + 4, 3, 1));
     // What waits is followed; the same picture again and again is one view.
@@ -100,7 +101,7 @@ async fn a_restart_goes_on_where_it_stopped() {
     let (gatherer, task) = Gatherer::start(first, &config(dir.path()), &hook_, offers).await.unwrap();
     let id = gatherer.begin(MAP, new()).await.unwrap().id;
     for (frame, looked) in frames(QUEUE as u64) {
-        hook_.offer(&key("r1"), &frame, || looked);
+        hook_.offer(&key("r1"), &frame, looked);
     }
     drop(hook_);
     task.await.unwrap();

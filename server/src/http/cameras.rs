@@ -7,10 +7,10 @@ use super::{
 };
 use crate::{
     calibrating::{CORNER_SIGMA_PX, Knowledge, Report, calibrated},
-    engine::cameras::CameraState,
     store::robots,
 };
 use axum::{Json, extract::State, http::StatusCode};
+use engine::cameras::CameraState;
 use map::localise::watch::WatchState;
 use protos::{convert::geometry::intrinsics_wire, v1};
 use serde::{Deserialize, Serialize};

@@ -7,7 +7,6 @@ use super::{
     learning::Job,
 };
 use crate::{
-    engine::picture,
     gather::{
         Counts,
         candidates::{Candidate, candidates},
@@ -25,6 +24,7 @@ use axum::{
     http::{StatusCode, header},
     response::{IntoResponse, Response},
 };
+use engine::picture;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};

@@ -4,8 +4,9 @@ use super::{
     Shared,
     error::{ApiError, Problem},
 };
-use crate::{engine::panics::Edge, store::WRITER, vitals::Failure};
+use crate::store::WRITER;
 use axum::{Json, extract::State, http::StatusCode};
+use engine::{panics::Edge, vitals::Failure};
 use serde::Serialize;
 use serde_json::json;
 use std::collections::BTreeMap;

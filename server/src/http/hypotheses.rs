@@ -6,9 +6,10 @@ use super::{
     extract::{At, name},
     resources::row_major,
 };
-use crate::{engine::search::Need, store::robots};
+use crate::store::robots;
 use ::map::hypotheses::{HypothesesParams, Mode};
 use axum::{Json, extract::State};
+use engine::search::Need;
 use serde::Serialize;
 use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};

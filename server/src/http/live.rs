@@ -5,10 +5,7 @@ use super::{
     error::{ApiError, Problem},
     extract::{At, name},
 };
-use crate::{
-    engine::live::{LiveEvent, LiveFrame},
-    store::{StoreError, maps, robots},
-};
+use crate::store::{StoreError, maps, robots};
 use axum::{
     Json,
     extract::State,
@@ -18,6 +15,7 @@ use axum::{
         sse::{Event, KeepAlive},
     },
 };
+use engine::live::{LiveEvent, LiveFrame};
 use futures::{Stream, StreamExt};
 use map::pose2::Pose2;
 use protos::{convert::geometry::pose2_wire, v1};

@@ -5,14 +5,12 @@ use super::{
     error::{ApiError, Problem},
     extract::{At, Body, name},
 };
-use crate::{
-    engine::{
-        mapping::{MappingError, Progress, Walls},
-        panics::Edge,
-    },
-    store::{laser, maps, robots},
-};
+use crate::store::{laser, maps, robots};
 use axum::{Json, extract::State, http::StatusCode};
+use engine::{
+    mapping::{MappingError, Progress, Walls},
+    panics::Edge,
+};
 use futures::FutureExt;
 use map::{pose2::Pose2, segments::LaserSegment};
 use serde::Deserialize;

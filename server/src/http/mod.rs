@@ -33,14 +33,9 @@ mod tests;
 
 pub(crate) use router::router;
 
-use crate::{
-    config::Config,
-    engine::{live::LiveHub, motion::Motion, panics::Edge, search::Searches, workers::Engine},
-    gather::Gatherer,
-    jobs::Jobs,
-    publication::Catalogue,
-};
+use crate::{config::Config, gather::Gatherer, jobs::Jobs, publication::Catalogue};
 use axum::http::StatusCode;
+use engine::{live::LiveHub, motion::Motion, panics::Edge, search::Searches, workers::Engine};
 use error::ApiError;
 use std::{sync::Arc, time::Duration};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, SemaphorePermit, watch};

@@ -6,14 +6,12 @@ use super::{
     extract::{At, json},
     upload::{FORM_OVERHEAD, Form},
 };
-use crate::{
-    engine::{picture, verdicts::answer_to_photograph},
-    store::StoreError,
-};
+use crate::store::StoreError;
 use axum::{
     Json,
     extract::{DefaultBodyLimit, Request, State},
 };
+use engine::{picture, verdicts::answer_to_photograph};
 use protos::{convert::geometry, v1};
 use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};

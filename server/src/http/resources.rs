@@ -1,18 +1,16 @@
 //! The shapes of the API's resources, with their checks, and how rows become them.
 
 use super::error::ApiError;
-use crate::{
-    engine::{
-        epochs::Conflict,
-        live::LiveHub,
-        motion::{Known, Motion},
-    },
-    store::{
-        landmarks::{self, LandmarkRow, Measures},
-        maps::MapRow,
-        robots::RobotRow,
-        sites::Whereabouts,
-    },
+use crate::store::{
+    landmarks::{self, LandmarkRow, Measures},
+    maps::MapRow,
+    robots::RobotRow,
+    sites::Whereabouts,
+};
+use engine::{
+    epochs::Conflict,
+    live::LiveHub,
+    motion::{Known, Motion},
 };
 use map::{
     changes::Standing,

@@ -6,8 +6,9 @@ use super::{
     extract::{At, Body, Page, PageQuery, Params, name},
     resources::Robot,
 };
-use crate::{engine::motion::Corrections, store::robots};
+use crate::store::robots;
 use axum::{Json, extract::State, http::StatusCode};
+use engine::motion::Corrections;
 use serde::Deserialize;
 use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};

@@ -4,10 +4,7 @@ use super::{
     App, Shared, areas, cameras, error::ApiError, gathering, guard, health, hypotheses, landmarks, laser,
     learning, live, mapping, maps, pages, recognise, robots, runs, sight, views, visibility,
 };
-use crate::{
-    config::Limits,
-    engine::panics::{Edge, Panics},
-};
+use crate::config::Limits;
 use axum::{
     Json, Router,
     http::StatusCode,
@@ -15,6 +12,7 @@ use axum::{
     response::{IntoResponse, Response},
     routing::get,
 };
+use engine::panics::{Edge, Panics};
 use std::{any::Any, sync::Arc};
 use tower_http::catch_panic::CatchPanicLayer;
 use utoipa::{OpenApi, openapi};

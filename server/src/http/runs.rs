@@ -6,16 +6,14 @@ use super::{
     error::{ApiError, Problem},
     extract::{At, BodyUpTo, name},
 };
-use crate::{
-    engine::motion::{Recorded, RunError},
-    store::{areas, maps, robots},
-};
+use crate::store::{areas, maps, robots};
 use ::map::{
     areas::{MAX_REFERENCE, Modules, Reference, ReferenceError, learn},
     fuse::FuseParams,
     pose2::Pose2,
 };
 use axum::{Json, extract::State, http::StatusCode};
+use engine::motion::{Recorded, RunError};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};

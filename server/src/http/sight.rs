@@ -6,16 +6,14 @@ use super::{
     error::{ApiError, Problem},
     extract::{At, Body},
 };
-use crate::{
-    engine::snapshot::MapSnapshot,
-    store::{maps, sights},
-};
+use crate::store::{maps, sights};
 use ::map::{
     check::OutOfRange,
     place::LandmarkPlace,
     visibility::{Obstacle, Sight, Viewer, VisibilityMap, VisibilityParams, visibility},
 };
 use axum::{Json, extract::State, http::StatusCode};
+use engine::snapshot::MapSnapshot;
 use serde::{Deserialize, Serialize};
 use std::{collections::BTreeMap, sync::Arc};
 use utoipa::{IntoParams, ToSchema};
@@ -188,8 +186,8 @@ pub(super) fn areas(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::snapshot::LandmarkInfo;
     use ::map::place::PlaceSigmas;
+    use engine::snapshot::LandmarkInfo;
     use nalgebra::Vector3;
     use vision::localise::pose::LandmarkSize;
 

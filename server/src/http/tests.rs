@@ -3,7 +3,6 @@
 use super::*;
 use crate::{
     config::{Limits, RawConfig},
-    engine::{panics::Edge, scene, snapshot::MapSnapshot, workers::Engine},
     publication::CatalogueTasks,
     store::{StoreError, maps},
 };
@@ -12,6 +11,7 @@ use axum::{
     body::{Body, to_bytes},
     http::{Request, Response, header},
 };
+use engine::{panics::Edge, scene, snapshot::MapSnapshot, workers::Engine};
 use serde_json::Value;
 use std::time::Instant;
 use tower::ServiceExt;
@@ -40,7 +40,8 @@ impl Service {
         let (hook, offers) = crate::gather::hook();
         let (gatherer, _) = Gatherer::start(store.clone(), &config, &hook, offers).await.unwrap();
         let hall = Arc::new(MapSnapshot::empty("hall", 1));
-        let engine = Engine { vitals: store.vitals().clone(), gather: hook, ..scene::engine(&[hall]) };
+        let engine =
+            Engine { vitals: store.vitals().clone(), gather: Arc::new(hook), ..scene::engine(&[hall]) };
         let app = App::new(config, store.clone(), Workshop { jobs, gatherer }, &engine, stopping);
         Self { router: router(app), store, engine, _writer: writer, _stop: stop, _data: data }
     }
@@ -264,11 +265,11 @@ async fn a_known_path_may_be_as_long_as_it_is_promised() {
 /// A robot whose odometry says that it is 7 m less far than it is: a frame a second with the landmark of this number, that
 /// puts it there.
 fn framed(service: &Service, seconds: u64, (landmark, x_m): (u64, f64)) {
-    use crate::engine::motion::{FrameFixes, Moment};
     use ::map::{
         localise::{DecidedBy, Fix, Modality, RobotFix},
         pose2::{Pose2, Pose2Covariance},
     };
+    use engine::motion::{FrameFixes, Moment};
     let (r1, front) = (protos::Name::new("r1").unwrap(), protos::Name::new("front").unwrap());
     let odometry = Pose2::new(seconds as f64 * 0.1, 0.0, 0.0);
     let captured_ns = seconds as i64 * 1_000_000_000;

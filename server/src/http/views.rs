@@ -6,17 +6,11 @@ use super::{
     extract::{self, At, Page, PageQuery, Params},
     upload::{FORM_OVERHEAD, Form},
 };
-use crate::{
-    engine::{
-        dominant::{Whole, dominant, others, whole_quads},
-        picture,
-    },
-    store::{
-        landmarks, maps,
-        placing::{Capture, Placing},
-        teaching::{self, Teaching},
-        views::{self, Cut, NewView, Outcome, ViewRow},
-    },
+use crate::store::{
+    landmarks, maps,
+    placing::{Capture, Placing},
+    teaching::{self, Teaching},
+    views::{self, Cut, NewView, Outcome, ViewRow},
 };
 use axum::{
     Json,
@@ -24,6 +18,10 @@ use axum::{
     extract::{DefaultBodyLimit, Request, State},
     http::{StatusCode, header},
     response::{IntoResponse, Response},
+};
+use engine::{
+    dominant::{Whole, dominant, others, whole_quads},
+    picture,
 };
 use serde::Serialize;
 use serde_json::json;

@@ -7,14 +7,12 @@ use super::{
     resources::out_of_range,
     sight::{self, Fields},
 };
-use crate::{
-    engine::{
-        gaze::{Ask, ranked},
-        snapshot::MapSnapshot,
-    },
-    store::{landmarks, maps},
-};
+use crate::store::{landmarks, maps};
 use axum::{Json, extract::State, http::StatusCode};
+use engine::{
+    gaze::{Ask, ranked},
+    snapshot::MapSnapshot,
+};
 use map::{
     gaze::{Choice, Criterion, GazeParams, Head},
     place::LandmarkPlace,

@@ -13,7 +13,6 @@ use super::{
 };
 use crate::{
     config::Config,
-    engine::{decode::ImageLimits, panics::Edge, picture, snapshot::MapSnapshot},
     publication::Catalogue,
     store::{
         StoreError,
@@ -25,6 +24,7 @@ use crate::{
         views::{self, Cut, Digest, Lesson},
     },
 };
+use engine::{decode::ImageLimits, panics::Edge, picture, snapshot::MapSnapshot};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use std::{

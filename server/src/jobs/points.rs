@@ -11,7 +11,6 @@ use super::{
 };
 use crate::{
     config::Config,
-    engine::{panics::Edge, snapshot::MapSnapshot},
     publication::Catalogue,
     store::{
         StoreError,
@@ -21,6 +20,7 @@ use crate::{
         views::{self, Lesson},
     },
 };
+use engine::{panics::Edge, snapshot::MapSnapshot};
 use serde_json::{Value, json};
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -174,7 +174,7 @@ fn targets(map: &MapSnapshot, lessons: Vec<Lesson>, names: &BTreeSet<String>) ->
             of.push(lesson);
         }
     }
-    let target = |(id, info): (&LandmarkId, &crate::engine::snapshot::LandmarkInfo)| {
+    let target = |(id, info): (&LandmarkId, &engine::snapshot::LandmarkInfo)| {
         let learnt = map.learnt.get(id).filter(|l| !l.model.knows_points && names.contains(&info.name))?;
         let lessons = of.remove(id).unwrap_or_default();
         Some(Target { name: info.name.clone(), was: learnt.digest, model: learnt.model.clone(), lessons })

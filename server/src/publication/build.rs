@@ -2,16 +2,14 @@
 //! number, models by their digests, visibility areas by place, walls and camera. A damaged or outdated model is named and left
 //! out, never matched.
 
-use crate::{
-    engine::{
-        panics::{Edge, Panics},
-        snapshot::{LandmarkInfo, LookAlikeClasses, MapSnapshot, Pending, Snapshots, StoredModel},
-    },
-    store::{
-        StoreError, areas, laser, map_rows,
-        map_rows::MapHead,
-        models::{self, ModelDigest},
-    },
+use crate::store::{
+    StoreError, areas, laser,
+    map_rows::{self, MapHead},
+    models::{self, ModelDigest},
+};
+use engine::{
+    panics::{Edge, Panics},
+    snapshot::{LandmarkInfo, LookAlikeClasses, MapSnapshot, Pending, Snapshots, StoredModel},
 };
 use map::{areas::Areas, laser_fix::WallIndex, segments::LaserSegment, visibility::VisibilityMap};
 use sqlx::SqliteConnection;

@@ -3,11 +3,9 @@
 //! meanwhile takes over what still holds.
 
 use super::{build::digests, visibility_areas};
-use crate::{
-    engine::{
-        panics::Edge,
-        snapshot::{LookAlikeClasses, MapSnapshot, Snapshots, look_alike_classes},
-    },
+use engine::{
+    panics::Edge,
+    snapshot::{LookAlikeClasses, MapSnapshot, Snapshots, look_alike_classes},
     vitals::Vitals,
 };
 use std::{collections::BTreeMap, sync::Arc};

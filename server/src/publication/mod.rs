@@ -12,10 +12,9 @@ mod visibility_areas;
 
 use crate::{
     config::Config,
-    engine::snapshot::Snapshots,
     store::{OpenError, Store, WriterTask},
-    vitals::Vitals,
 };
+use engine::{snapshot::Snapshots, vitals::Vitals};
 use publisher::Publisher;
 use std::{ops::Deref, sync::Arc};
 use tokio::{sync::watch, task::JoinHandle};

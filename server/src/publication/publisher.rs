@@ -4,11 +4,8 @@
 //! the log and at `/readyz`, and the next write to it tries again.
 
 use super::build;
-use crate::{
-    engine::{panics::Edge, snapshot::Snapshots},
-    store::{Change, OnCommit, StoreError, map_rows, robots, sites},
-    vitals::Vitals,
-};
+use crate::store::{Change, OnCommit, StoreError, map_rows, robots, sites};
+use engine::{panics::Edge, snapshot::Snapshots, vitals::Vitals};
 use futures::{FutureExt, future::BoxFuture};
 use sqlx::SqliteConnection;
 use std::{panic::AssertUnwindSafe, sync::Arc};

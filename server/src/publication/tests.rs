@@ -3,9 +3,9 @@
 use super::{build::tests as planting, *};
 use crate::{
     config::RawConfig,
-    engine::panics::Edge,
     store::{StoreError, WRITER, jobs, landmarks, laser, maps, models, robots},
 };
+use engine::panics::Edge;
 use tokio::sync::oneshot;
 use vision::recognise::DistanceKind;
 

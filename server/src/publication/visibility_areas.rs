@@ -1,7 +1,7 @@
 //! Visibility areas of a map's landmarks; taken over from a snapshot before where neither the camera, the landmark's place nor
 //! an obstacle within its reach has changed.
 
-use crate::engine::snapshot::MapSnapshot;
+use engine::snapshot::MapSnapshot;
 use map::{
     place::LandmarkPlace,
     visibility::{Obstacle, Sight, VisibilityMap, visibility, within_reach},
@@ -52,7 +52,7 @@ fn all(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::snapshot::LandmarkInfo;
+    use engine::snapshot::LandmarkInfo;
     use map::place::PlaceSigmas;
     use nalgebra::{Point2, Vector3};
     use vision::localise::pose::LandmarkSize;

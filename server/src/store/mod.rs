@@ -30,7 +30,8 @@ pub(crate) use on_commit::{Change, OnCommit};
 pub(crate) use open::OpenError;
 pub(crate) use writer::{PART as WRITER, Tx};
 
-use crate::{config::Config, vitals::Vitals};
+use crate::config::Config;
+use engine::vitals::Vitals;
 use futures::future::BoxFuture;
 use sqlx::SqlitePool;
 use std::{sync::Arc, time::SystemTime};

@@ -11,7 +11,7 @@ use super::{
     statements::statements,
     views::{self, Cut, NewView, Outcome, ViewRow},
 };
-use crate::engine::panics::Edge;
+use engine::panics::Edge;
 use map::segments::LaserSegment;
 use sqlx::{Row, SqliteExecutor};
 use std::sync::Arc;

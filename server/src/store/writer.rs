@@ -11,8 +11,8 @@ use super::{
     error::StoreError,
     on_commit::{Change, OnCommit},
 };
-use crate::{
-    engine::panics::Edge,
+use engine::{
+    panics::Edge,
     vitals::{Pulse, Vitals},
 };
 use futures::{FutureExt, future::BoxFuture};

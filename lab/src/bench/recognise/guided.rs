@@ -2,6 +2,11 @@
 //! posters hang where they do; the other landmarks hang in other parts of a large building.
 
 use super::frames::{Scenes, number};
+use engine::{
+    guided::{Guided, guided},
+    judging::View,
+    snapshot::{LandmarkInfo, MapSnapshot},
+};
 use map::{
     mounting::Mounting,
     place::{LandmarkPlace, PlaceSigmas},
@@ -10,11 +15,6 @@ use map::{
     visibility::{Obstacle, Sight, visibility},
 };
 use nalgebra::{Matrix2, Matrix3, Vector3};
-use server::engine::{
-    guided::{Guided, guided},
-    judging::View,
-    snapshot::{LandmarkInfo, MapSnapshot},
-};
 use std::{collections::BTreeMap, sync::Arc};
 use vision::{
     frame::{GrayImage, Intrinsics},

@@ -7,23 +7,21 @@ use super::{
     kidnap::{Kidnap, KidnapOutcome},
     world::{MAP, World},
 };
+use engine::{
+    guided::{Guided, guided},
+    judging::{Seen, View, judged_frame},
+    live::LiveHub,
+    motion::{Corrections, Moment as At, Motion, ScanJob},
+    snapshot::{MapSnapshot, Snapshots},
+    verdicts::{self, StageTimes},
+};
 use map::{
     changes::{Change, Standing},
     pose2::{Pose2, Pose2Covariance},
 };
 use nalgebra::Matrix2;
 use protos::Name;
-use server::{
-    cli::simulated_errors::SimulatedRobotErrors,
-    engine::{
-        guided::{Guided, guided},
-        judging::{Seen, View, judged_frame},
-        live::LiveHub,
-        motion::{Corrections, Moment as At, Motion, ScanJob},
-        snapshot::{MapSnapshot, Snapshots},
-        verdicts::{self, StageTimes},
-    },
-};
+use server::cli::simulated_errors::SimulatedRobotErrors;
 use sim::{
     building::LandmarkKind,
     drive::DriveParams,

@@ -3,19 +3,17 @@
 
 use crate::evaluate::experiment::{lesson::points_of, mixed, of_each};
 use anyhow::Context as _;
+use engine::snapshot::{LandmarkInfo, MapSnapshot, StoredModel, look_alike_classes};
 use map::{
     laser_fix::WallIndex,
     place::{LandmarkPlace, PlaceSigmas},
     segments::LaserSegment,
     visibility::{Obstacle, Viewer, VisibilityParams, visibility},
 };
-use server::{
-    cli::{
-        screen,
-        simulated_errors::SimulatedRobotErrors,
-        survey::{SurveyView as Look, hang, survey},
-    },
-    engine::snapshot::{LandmarkInfo, MapSnapshot, StoredModel, look_alike_classes},
+use server::cli::{
+    screen,
+    simulated_errors::SimulatedRobotErrors,
+    survey::{SurveyView as Look, hang, survey},
 };
 use sim::{
     building::Building,

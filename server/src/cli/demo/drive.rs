@@ -101,7 +101,7 @@ struct Journey {
     robot: Name,
     name: String,
     client: RobotClient,
-    live: Arc<crate::engine::live::LiveHub>,
+    live: Arc<engine::live::LiveHub>,
     taught: Arc<Vec<String>>,
     period: Duration,
     record: Record,

@@ -1,7 +1,6 @@
 use super::*;
 use crate::{
     config::{Config, RawConfig},
-    engine::picture,
     publication::CatalogueTasks,
     store::{
         landmarks,
@@ -9,6 +8,7 @@ use crate::{
         views::{Cut, NewView},
     },
 };
+use engine::picture;
 use sha2::{Digest as _, Sha256};
 use std::time::Duration;
 use tokio::sync::watch;

@@ -19,7 +19,7 @@ use super::{
     verdicts::{self, StageTimes},
 };
 use crate::{
-    gather::{Hook, Looked},
+    frame_tap::{AnalysedFrame, FrameTap},
     vitals::Vitals,
 };
 use map::{hypotheses::Mode, pose2::Pose2Covariance};
@@ -55,7 +55,7 @@ pub struct Engine {
     /// Robots that do not know where they are.
     pub searches: Arc<Searches>,
     /// Where frames of robots that gather views go.
-    pub gather: Hook,
+    pub gather: Arc<dyn FrameTap>,
     /// Whether every frame is searched for all landmarks of its map.
     pub search_every_frame: bool,
 }
@@ -227,7 +227,13 @@ impl Engine {
             if let Some(captured_ns) = job.stamp_instead_ns.filter(|_| on_own_map && is_live) {
                 let frame = CheckedFrame { captured_ns, ..frame.clone() };
                 let (quads, believed) = (facts.quads, frame.prior);
-                self.gather.offer(key, &frame, || Looked { image, quads, map: map.clone(), believed });
+                if self.gather.is_wanted(key) {
+                    self.gather.offer(
+                        key,
+                        &frame,
+                        AnalysedFrame { image, quads, map: map.clone(), believed },
+                    );
+                }
             }
             return Ok(Done { answer, map, judged: None, found: None });
         }
@@ -247,10 +253,11 @@ impl Engine {
         });
         times.ended("localise");
         answer.timings = times.finish();
-        self.gather.offer(key, frame, || {
+        if self.gather.is_wanted(key) {
             let believed = frame.prior.or(judged.prior);
-            Looked { image, quads: facts.quads, map: map.clone(), believed }
-        });
+            let analysed = AnalysedFrame { image, quads: facts.quads, map: map.clone(), believed };
+            self.gather.offer(key, frame, analysed);
+        }
         Ok(Done { answer, map, judged: Some(judged), found })
     }
 
@@ -357,7 +364,7 @@ fn refused(job: &FrameJob, refusal: &Rejection) -> (v1::Answer, Outcome) {
 }
 
 /// What a panic is answered with.
-pub(crate) fn failed() -> Rejection {
+pub fn failed() -> Rejection {
     Rejection::new(Code::Internal, "frame", "the server failed on this frame; see its log")
 }
 

@@ -1,7 +1,7 @@
 //! Searches without pictures: three doors that look alike along a corridor, as in `sim`'s look-alikes.
 
 use super::*;
-use crate::engine::snapshot::LandmarkInfo;
+use crate::snapshot::LandmarkInfo;
 use map::{
     hypotheses::Glimpse,
     place::{LandmarkPlace, PlaceSigmas},

@@ -8,7 +8,7 @@ use super::{
     standing::findings,
     workers::Engine,
 };
-use crate::engine::decode::ImageLimits;
+use crate::decode::ImageLimits;
 use map::place::{LandmarkPlace, PlaceSigmas};
 use nalgebra::Vector3;
 use sim::{
@@ -26,23 +26,25 @@ use vision::{
 };
 
 /// Name of the map that is taught.
-pub(crate) const MAP: &str = "corridor";
+pub const MAP: &str = "corridor";
 
 /// The corridor with a robot that can look.
-pub(crate) struct Scene {
+pub struct Scene {
     building: Arc<Building>,
     robot: Robot,
 }
 
 impl Scene {
-    pub(crate) fn new() -> Self {
+    /// The corridor, not taught yet.
+    #[expect(clippy::new_without_default, reason = "it draws a corridor: that is no default")]
+    pub fn new() -> Self {
         let building = Arc::new(Building::corridor(7));
         let robot = Robot::new(building.clone(), &RobotParams::default());
         Self { building, robot }
     }
 
     /// What the robot sees at stops before the first two posters; another seed gives other stops.
-    pub(crate) fn looks(&mut self, seed: u64, views: usize) -> Vec<(String, Sighting)> {
+    pub fn looks(&mut self, seed: u64, views: usize) -> Vec<(String, Sighting)> {
         let near = LessonParams {
             seed,
             views,
@@ -55,41 +57,43 @@ impl Scene {
         stops.map(|stop| (stop.landmark, self.robot.look(&stop.step))).collect()
     }
 
-    pub(crate) fn intrinsics(&self) -> vision::frame::Intrinsics {
+    /// The camera of its robot.
+    pub fn intrinsics(&self) -> vision::frame::Intrinsics {
         *self.robot.camera().intrinsics()
     }
 
     /// The first two posters, each learnt from warped views of one photograph, at their true places.
-    pub(crate) fn taught(&mut self) -> Arc<MapSnapshot> {
+    pub fn taught(&mut self) -> Arc<MapSnapshot> {
         let params = Arc::new(Params::default());
         let mut models = Vec::new();
         let (mut landmarks, mut sizes) = (BTreeMap::new(), BTreeMap::new());
         for (name, look) in self.looks(1, 1) {
             let id = LandmarkId(models.len() as u64 + 1);
-            let seen = look.frame.truth.landmark(&name).unwrap();
+            let seen = look.frame.truth.landmark(&name).expect("the scene is made so");
             let views = synthesis::views(&look.frame.image, &seen.corners_px, 24, &params, id.0);
             let points = view_points(&look.frame.image, &seen.corners_px);
-            let model = learn(id, &views, &[], &params).unwrap().with_points(&[points]);
+            let model = learn(id, &views, &[], &params).expect("the scene is made so").with_points(&[points]);
             models.push(Arc::new(model));
-            let truth = self.building.landmark(&name).unwrap();
+            let truth = self.building.landmark(&name).expect("the scene is made so");
             let size = LandmarkSize { width_m: truth.width_m, height_m: truth.height_m };
             let (at, normal) =
                 (truth.map_from_landmark.translation.vector, truth.map_from_landmark.rotation * Vector3::x());
             let sigmas = PlaceSigmas::default();
-            let place = LandmarkPlace::by_hand(at, normal.y.atan2(normal.x), size, sigmas).unwrap();
+            let place = LandmarkPlace::by_hand(at, normal.y.atan2(normal.x), size, sigmas)
+                .expect("the scene is made so");
             sizes.insert(id, size);
             landmarks.insert(
                 id,
                 LandmarkInfo { name, size: Some(size), place: Some(place), ..LandmarkInfo::default() },
             );
         }
-        let models = ModelSet::new(models, &params).unwrap();
+        let models = ModelSet::new(models, &params).expect("the scene is made so");
         Arc::new(MapSnapshot { landmarks, sizes, models, params, ..MapSnapshot::empty(MAP, 3) })
     }
 }
 
 /// An engine with these maps; robot `r1` is on the first.
-pub(crate) fn engine(maps: &[Arc<MapSnapshot>]) -> Engine {
+pub fn engine(maps: &[Arc<MapSnapshot>]) -> Engine {
     let snapshots = Arc::new(Snapshots::default());
     for map in maps {
         snapshots.publish(map.clone());
@@ -105,7 +109,7 @@ pub(crate) fn engine(maps: &[Arc<MapSnapshot>]) -> Engine {
         vitals: Arc::default(),
         findings: findings().0,
         searches: Arc::default(),
-        gather: crate::gather::hook().0,
+        gather: Arc::new(crate::frame_tap::NoTap),
         search_every_frame: true,
     }
 }

@@ -12,13 +12,13 @@ use std::time::{Duration, Instant};
 
 /// A pose as it is told.
 #[derive(Debug)]
-pub(in crate::engine::motion) struct Told {
-    pub(in crate::engine::motion) fused: FusedPose,
+pub(in crate::motion) struct Told {
+    pub(in crate::motion) fused: FusedPose,
     /// Since it was captured.
-    pub(in crate::engine::motion) age: Duration,
+    pub(in crate::motion) age: Duration,
     /// What it rests on.
-    pub(in crate::engine::motion) modalities: Vec<String>,
-    pub(in crate::engine::motion) trust: PoseTrust,
+    pub(in crate::motion) modalities: Vec<String>,
+    pub(in crate::motion) trust: PoseTrust,
 }
 
 impl Robot {
@@ -38,13 +38,13 @@ impl Robot {
     }
 
     /// What to do with a camera's next frame, taken near this pose.
-    pub(in crate::engine::motion) fn plan(&mut self, camera: &Name, pose: &Pose2Covariance) -> FramePlan {
+    pub(in crate::motion) fn plan(&mut self, camera: &Name, pose: &Pose2Covariance) -> FramePlan {
         let camera = self.camera_number(camera);
         self.schedule.plan(camera, Some(pose))
     }
 
     /// The camera's number in the schedule; of too many cameras one that it does not count.
-    pub(in crate::engine::motion) fn camera_number(&mut self, camera: &Name) -> u32 {
+    pub(in crate::motion) fn camera_number(&mut self, camera: &Name) -> u32 {
         if let Some(number) = self.cameras.iter().position(|known| known == camera) {
             return number as u32;
         }
@@ -56,14 +56,14 @@ impl Robot {
     }
 
     /// Motion by odometry since the frame before, for a frame with this odometry or, without, the newest.
-    pub(in crate::engine::motion) fn since_last_frame(&mut self, odometry: Option<Pose2>) -> Pose2 {
+    pub(in crate::motion) fn since_last_frame(&mut self, odometry: Option<Pose2>) -> Pose2 {
         let Some(now) = odometry.or(self.newest.map(|(_, newest)| newest)) else { return Pose2::default() };
         let before = self.at_last_frame.replace(now).unwrap_or(now);
         before.between(&now)
     }
 
     /// A pose as it is told at this moment.
-    pub(in crate::engine::motion) fn told(&self, fused: FusedPose, now: Instant) -> Told {
+    pub(in crate::motion) fn told(&self, fused: FusedPose, now: Instant) -> Told {
         let trust = match self.schedule.trust() {
             // A pose that came along from another map, which no frame has been compared with yet.
             Trust::NoPose | Trust::Unsupported => PoseTrust::Unsupported,
@@ -103,7 +103,7 @@ impl Robot {
     }
 
     /// What the pose rests on now; nothing without a pose.
-    pub(in crate::engine::motion) fn modalities(&self) -> Vec<String> {
+    pub(in crate::motion) fn modalities(&self) -> Vec<String> {
         let near = |at_m: Option<f64>| at_m.is_some_and(|at_m| self.way_m - at_m <= RESTS_ON_M);
         let moves = self.newest.is_some();
         let posed = self.fuser.pose().is_some();

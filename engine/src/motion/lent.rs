@@ -10,16 +10,16 @@ use std::sync::{Arc, PoisonError};
 
 /// A copy of a robot's recording. While it lives nobody else gets one; dropping it leaves the recording as it was.
 #[derive(Debug)]
-pub(crate) struct Lent {
+pub struct Lent {
     motion: Arc<Motion>,
     robot: Name,
     /// The copy.
-    pub(crate) recording: Box<Recording>,
+    pub recording: Box<Recording>,
 }
 
 impl Motion {
     /// Lends the recording of a robot. Copies up to some 70 MB: not for an async thread.
-    pub(crate) fn lend_recording(self: &Arc<Self>, robot: &Name) -> Result<Lent, RunError> {
+    pub fn lend_recording(self: &Arc<Self>, robot: &Name) -> Result<Lent, RunError> {
         let followed = self.lock().robots.get(robot).cloned().ok_or(RunError::None)?;
         let mut followed = own(&followed);
         let run = followed.run.as_mut().ok_or(RunError::None)?;
@@ -31,8 +31,8 @@ impl Motion {
     }
 
     /// Whether the recording of a robot is lent.
-    #[cfg(test)]
-    pub(crate) fn is_lent(&self, robot: &Name) -> bool {
+    #[cfg(any(test, feature = "scene"))]
+    pub fn is_lent(&self, robot: &Name) -> bool {
         let followed = self.lock().robots.get(robot).cloned();
         followed.is_some_and(|followed| own(&followed).run.as_ref().is_some_and(|run| run.lent))
     }
@@ -40,7 +40,7 @@ impl Motion {
 
 impl Lent {
     /// What it taught is stored: the recording is over, unless it was given up and another has begun meanwhile.
-    pub(crate) fn learnt(self) {
+    pub fn learnt(self) {
         let mut recorded = self.motion.recorded.lock().unwrap_or_else(PoisonError::into_inner);
         let Some(followed) = self.motion.lock().robots.get(&self.robot).cloned() else { return };
         let mut followed = own(&followed);

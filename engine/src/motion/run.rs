@@ -27,6 +27,7 @@ static NEXT: AtomicU64 = AtomicU64::new(0);
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Recorded {
     /// The map.
+    /// Name of the map that the robot stood on.
     pub map: String,
     /// Whose run.
     pub robot: String,
@@ -66,12 +67,13 @@ pub enum RunError {
 
 /// What is kept of a run.
 #[derive(Debug, Clone)]
-pub(crate) struct Recording {
+pub struct Recording {
     /// Tells it from any other since the start.
     pub(super) number: u64,
     /// It is being learnt from.
     pub(super) lent: bool,
-    pub(crate) map: String,
+    /// Name of the map that the robot stood on.
+    pub map: String,
     /// Times rise.
     pub(super) odometry: Vec<(i64, Pose2)>,
     fixes: Vec<(i64, Fix)>,
@@ -132,7 +134,7 @@ impl Recording {
     }
 
     /// Its odometry and its fixes, each in order of capture, beside where the robot really was.
-    pub(crate) fn against<'a>(&'a mut self, reference: &'a Reference) -> Run<'a> {
+    pub fn against<'a>(&'a mut self, reference: &'a Reference) -> Run<'a> {
         self.fixes.sort_by_key(|(at_ns, _)| *at_ns);
         Run { odometry: &self.odometry, fixes: &self.fixes, reference }
     }

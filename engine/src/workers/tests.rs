@@ -1,7 +1,7 @@
 //! Workers without any transport: panics, late work, overload.
 
 use super::*;
-use crate::engine::{intake::Intake, scene};
+use crate::{intake::Intake, scene};
 use protos::prost::Message;
 use std::{sync::Mutex, time::Duration};
 
@@ -56,7 +56,7 @@ impl Publish for Breaks {
     fn pose(&self, _: &Name, _: &v1::RobotPose) {}
 }
 
-fn settled(engine: &Engine) -> crate::engine::slots::FrameCounts {
+fn settled(engine: &Engine) -> crate::slots::FrameCounts {
     loop {
         let counts = engine.slots.counts();
         if counts.waiting == 0 && counts.in_work == 0 {

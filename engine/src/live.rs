@@ -399,7 +399,7 @@ mod tests {
     fn raw_grey_becomes_png() {
         let (media, bytes) = frame(1).for_browsers().unwrap();
         assert_eq!(media, "image/png");
-        let back = crate::engine::decode::decode_upload(&bytes, crate::engine::decode::ImageLimits::UPLOAD);
+        let back = crate::decode::decode_upload(&bytes, crate::decode::ImageLimits::UPLOAD);
         assert_eq!(back.unwrap().data(), [0, 50, 100, 150, 200, 250]);
     }
 

@@ -1,6 +1,6 @@
 //! What robots send of their motion, checked and counted: bytes in, checked messages or refusals out.
 
-use crate::engine::snapshot::Snapshots;
+use crate::snapshot::Snapshots;
 use protos::{
     Code, Name, Rejection,
     convert::{CheckedOdometry, CheckedScan},

@@ -1,7 +1,7 @@
 //! A robot that looks at a taught poster from a pose that is known.
 
 use super::*;
-use crate::engine::{
+use crate::{
     scene::Scene,
     snapshot::{LandmarkInfo, LookAlikeClasses, MapSnapshot},
     verdicts::{self, StageTimes},

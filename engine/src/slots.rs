@@ -72,7 +72,7 @@ impl FrameCounts {
 }
 
 /// Place of a message in its stream's order, by epoch. Which epoch is live is decided elsewhere
-/// ([`crate::engine::epochs::Epochs`]); one that comes back goes on after its last number.
+/// ([`crate::epochs::Epochs`]); one that comes back goes on after its last number.
 #[derive(Debug, Default)]
 pub struct Order {
     last: Option<(u64, u64)>,

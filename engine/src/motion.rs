@@ -17,7 +17,7 @@ pub use corrections::{Correction, Corrections, MAX_CORRECTIONS};
 pub use frames::{FrameFixes, Grounds, Moment};
 pub use messages::{MAX_ODOMETRY_BYTES, MAX_SCAN_BYTES, MessageCounts};
 pub use robot::{MAX_SUPPORTERS, RESTS_ON_M};
-pub(crate) use run::Recording;
+pub use run::Recording;
 pub use run::{MAX_RECORDINGS, MAX_RUN_FIXES, MAX_RUN_ODOMETRY, Recorded, RunError};
 pub use scans::{ScanJob, Scans};
 pub use timebase::{
@@ -270,7 +270,7 @@ impl Motion {
     }
 
     /// Ends the recording and gives it.
-    pub(crate) fn take_recording(&self, robot: &Name) -> Option<Box<Recording>> {
+    pub fn take_recording(&self, robot: &Name) -> Option<Box<Recording>> {
         let mut recorded = self.recorded.lock().unwrap_or_else(PoisonError::into_inner);
         recorded.remove(robot);
         let followed = self.lock().robots.get(robot)?.clone();

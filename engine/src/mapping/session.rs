@@ -4,7 +4,7 @@ use super::{
     Progress, Shared, Stage, Walls,
     journal::{Head, Journal, Kept},
 };
-use crate::engine::{
+use crate::{
     motion::ScanJob,
     panics::{Edge, Panics},
 };

@@ -100,7 +100,7 @@ impl Intake {
 }
 
 /// There is no such map (any more).
-pub(crate) fn unknown_map(map: &str) -> Rejection {
+pub fn unknown_map(map: &str) -> Rejection {
     Rejection::new(Code::UnknownMap, "map", format!("there is no map {map}"))
 }
 
@@ -122,7 +122,7 @@ mod tests {
 
     fn intake() -> Intake {
         let snapshots = Arc::new(Snapshots::default());
-        snapshots.publish(Arc::new(crate::engine::snapshot::MapSnapshot::empty("hall", 3)));
+        snapshots.publish(Arc::new(crate::snapshot::MapSnapshot::empty("hall", 3)));
         snapshots.set_robot("r1", Some("hall"));
         snapshots.set_robot("lost", Some("gone"));
         let slots = Arc::new(Slots::new(4));
@@ -202,7 +202,7 @@ mod tests {
             let (k, job) = intake.slots.try_take().unwrap();
             assert_eq!(job.stamp_instead_ns.is_some(), is_stray, "{seq}");
             assert!(job.stamp_instead_ns.is_none_or(|ns| ns < 1_000_000_000));
-            intake.slots.finish(&k, crate::engine::slots::Outcome::Processed);
+            intake.slots.finish(&k, crate::slots::Outcome::Processed);
         }
         let counts = intake.motion.frame_stamps();
         assert_eq!((counts.accepted, counts.rejected), (3, [(protos::Code::ClockAhead, 1)].into()));
@@ -225,7 +225,7 @@ mod tests {
         let (k, job) = intake.slots.try_take().unwrap();
         assert_eq!(job.deadline - job.received, Duration::from_millis(500));
         assert!(job.clock_suspect, "captured in 1970");
-        intake.slots.finish(&k, crate::engine::slots::Outcome::Processed);
+        intake.slots.finish(&k, crate::slots::Outcome::Processed);
         let hasty = v1::Frame { deadline_ms: 40, ..frame(2) };
         intake.receive(key("r1"), hasty.encode_to_vec().into()).unwrap();
         let (_, job) = intake.slots.try_take().unwrap();

@@ -2,7 +2,7 @@
 //! [`Pulse`] for as long as it runs. A part that ends before the server is told to stop has failed: the server is not
 //! ready any more, and [`Vitals::failed`] gives the reason to whoever ends the process.
 
-use crate::engine::panics::Panics;
+use crate::panics::Panics;
 use std::{
     collections::BTreeMap,
     sync::{

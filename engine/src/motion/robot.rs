@@ -9,7 +9,7 @@ use super::{
     run::Recording,
     timebase::{AHEAD_TOLERANCE, Stamp, Stream, TimeBase},
 };
-use crate::engine::{slots::Order, snapshot::Snapshots};
+use crate::{slots::Order, snapshot::Snapshots};
 use map::{
     areas::Areas,
     changes::{Change, ChangeParams, Watch},

@@ -1,7 +1,7 @@
 //! Odometry, scans and fixes of one robot, without any transport.
 
 use super::*;
-use crate::engine::snapshot::MapSnapshot;
+use crate::snapshot::MapSnapshot;
 use map::{
     frames::Link,
     guided::FramePlan,
