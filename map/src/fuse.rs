@@ -8,14 +8,14 @@
 
 mod filter;
 mod params;
-mod trust;
+mod error_correction;
 pub use filter::{MAX_NUISANCES, MAX_SOURCES, OdometryErrors};
 pub use params::FuseParams;
 
 use crate::{
-    areas::Areas,
     check::{self, OutOfRange},
     localise::Fix,
+    modality_stats::Areas,
     pose2::{Pose2, Pose2Covariance, wrap_rad},
 };
 use filter::Filter;

@@ -8,7 +8,7 @@ mod information;
 
 use crate::{
     check::{self, OutOfRange},
-    mounting::Mounting,
+    extrinsics::Mounting,
     place::LandmarkPlace,
     pose2::{Pose2Covariance, wrap_rad},
     visibility::{PoseDraws, Viewer, VisibilityMap},
@@ -194,7 +194,8 @@ fn choice(
     }
     let incidence_rad = target.place.incidence_rad(&Point3::new(camera.x, camera.y, head.camera_m[2]));
     let margin_m = target.visible.margin_m(&camera).max(0.0);
-    let mounting = Mounting::new(crate::mounting::pan_tilt(pan_rad, tilt_rad, head.camera_m.into())).ok()?;
+    let mounting =
+        Mounting::new(crate::extrinsics::pan_tilt(pan_rad, tilt_rad, head.camera_m.into())).ok()?;
     let gain_nats =
         information::gain_nats(pose, target.place, &mounting, viewer.focal_px, p.corner_sigma_px)?;
     let turn = (pan_rad - head.pan_rad).abs().max((tilt_rad - head.tilt_rad).abs());

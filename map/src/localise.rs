@@ -8,12 +8,13 @@ mod planar;
 mod posterior;
 pub(crate) mod predict;
 mod solve;
-pub mod watch;
+pub mod intrinsics_monitor;
+pub use intrinsics_monitor as watch;
 
 use crate::{
-    areas::Cell,
     check::{self, OutOfRange},
-    mounting::Mounting,
+    extrinsics::Mounting,
+    modality_stats::Cell,
     place::LandmarkPlace,
     pose2::Pose2Covariance,
 };

@@ -8,13 +8,14 @@
 //! wrongly associated once does no harm for ever, curved walls help too, and loops cost no more than they must.
 
 pub mod cloud;
-pub(crate) mod reference;
-pub mod align;
-pub mod field;
+pub(crate) mod surface_index;
+pub mod icp;
+pub mod correlative;
 pub mod graph;
-mod track;
-mod loops;
+mod scan_matcher;
+mod loop_closure;
 mod refine;
+pub use {correlative as field, icp as align};
 
 use crate::{
     check::OutOfRange,
@@ -24,15 +25,15 @@ use crate::{
     segments::LaserSegment,
     walls::{WallParams, Walls},
 };
-use align::AlignParams;
 use cloud::{Cloud, CloudParams};
-use field::SearchParams;
+use correlative::SearchParams;
 use graph::{Edge, GraphError};
-pub use loops::{Closure, LoopParams};
+use icp::AlignParams;
+pub use loop_closure::{Closure, LoopParams};
 use nalgebra::{Matrix3, Vector3};
 pub use refine::RefineParams;
+use scan_matcher::Tracker;
 use serde::{Deserialize, Serialize};
-use track::Tracker;
 
 /// Most scans of one map.
 pub const MAX_SCANS: usize = 500_000;
@@ -172,7 +173,7 @@ pub struct Slam {
     keys: Vec<Key>,
     /// Between key poses that follow one another.
     path: Vec<Edge>,
-    closures: loops::Closures,
+    closures: loop_closure::Closures,
     placed: Vec<Placed>,
     tracker: Tracker,
 }
@@ -199,7 +200,7 @@ impl Slam {
             params,
             keys: Vec::new(),
             path: Vec::new(),
-            closures: loops::Closures::default(),
+            closures: loop_closure::Closures::default(),
             placed: Vec::new(),
             tracker: Tracker::default(),
         }

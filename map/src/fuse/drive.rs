@@ -2,8 +2,8 @@
 
 use super::*;
 use crate::{
+    extrinsics::{Mounting, pan_tilt},
     localise::{LocaliseParams, RobotFix, Sighting, robot_pose},
-    mounting::{Mounting, pan_tilt},
     place::{LandmarkPlace, PlaceSigmas},
 };
 use nalgebra::{Matrix2, Point2, Vector2};

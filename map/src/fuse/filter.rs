@@ -1,6 +1,6 @@
 //! The filter itself: robot pose and lasting errors in one Gaussian; predict, correct, start, give up.
 
-use super::{FixOutcome, FixRole, FuseParams, Rules, trust};
+use super::{FixOutcome, FixRole, FuseParams, Rules, error_correction};
 use crate::{
     localise::{Fix, Modality, Nuisance, NuisanceKey},
     pose2::{Pose2, Pose2Covariance},
@@ -145,7 +145,8 @@ impl Filter {
             let motion = before.between(odom_from_robot);
             let noise = p.motion_noise(&motion);
             if let Some(belief) = &mut self.belief {
-                let (motion, noise) = trust::motion(&motion, &noise, &rules.areas.advice(&belief.pose), p);
+                let (motion, noise) =
+                    error_correction::motion(&motion, &noise, &rules.areas.advice(&belief.pose), p);
                 belief.predict(&motion, &noise, p);
             }
             if let Some(doubt) = &mut self.doubt {
@@ -179,7 +180,7 @@ impl Filter {
         let so_far = self.so_far(p);
         let at = self.belief.as_ref().map_or(fix.pose.pose, |belief| belief.pose);
         let advice = rules.areas.advice(&at);
-        let fix = &*trust::fix(fix, &at, &advice);
+        let fix = &*error_correction::fix(fix, &at, &advice);
         let outcome = match &mut self.belief {
             None => {
                 self.belief = Some(Belief::from_fix(fix, &so_far, self.fixes));

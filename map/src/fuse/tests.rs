@@ -524,8 +524,8 @@ fn numbers_that_are_none_are_refused() {
 
 #[test]
 fn what_is_not_known_stays_so_whatever_runs_have_shown() {
-    use super::trust;
-    use crate::areas::{Advice, Fault, Module};
+    use super::error_correction;
+    use crate::modality_stats::{Advice, Fault, Module};
     let mut seen = fix(1, Pose2::new(1.0, 2.0, 0.3), 0.05, 0.02);
     seen.noise[(0, 0)] += 1e4;
     seen.pose.covariance[(0, 0)] += 1e4;
@@ -533,7 +533,7 @@ fn what_is_not_known_stays_so_whatever_runs_have_shown() {
     advice.faults[Module::Landmarks as usize] =
         Fault { bias: Vector3::new(0.0, 0.1, 0.0), excess: Vector3::new(2.0, 2.0, 2.0) };
     let at = Pose2::default();
-    let trusted = trust::fix(&seen, &at, &advice);
+    let trusted = error_correction::fix(&seen, &at, &advice);
     assert!((trusted.pose.pose.y_m - 1.9).abs() < 1e-12);
     let [lasting] = &trusted.nuisances[..] else { panic!("{trusted:?}") };
     let spread = lasting.jacobian * lasting.covariance * lasting.jacobian.transpose();
@@ -542,6 +542,6 @@ fn what_is_not_known_stays_so_whatever_runs_have_shown() {
     assert!(trusted.pose.covariance[(1, 1)] > 4.9 * seen.pose.covariance[(1, 1)], "{trusted:?}");
     let total = trusted.noise + spread;
     assert!((total - trusted.pose.covariance).norm() < 1e-6, "{total} {}", trusted.pose.covariance);
-    let untouched = trust::fix(&seen, &at, &Advice::default());
+    let untouched = error_correction::fix(&seen, &at, &Advice::default());
     assert_eq!(*untouched, seen);
 }

@@ -2,8 +2,8 @@
 //! covariance shrinks, by the predicted covariance of its corners (method 13.5, 14).
 
 use crate::{
+    extrinsics::Mounting,
     localise::predict::{self, Predicted},
-    mounting::Mounting,
     place::LandmarkPlace,
     pose2::Pose2Covariance,
 };

@@ -1,7 +1,7 @@
 use super::*;
 use crate::{
+    extrinsics::pan_tilt,
     localise::{LocaliseParams, RobotFix, Sighting, robot_pose},
-    mounting::pan_tilt,
     place::PlaceSigmas,
     pose2::Pose2,
     visibility::{VisibilityParams, visibility},

@@ -16,7 +16,7 @@ use super::{
 };
 use crate::{
     check,
-    mounting::Mounting,
+    extrinsics::Mounting,
     place::LandmarkPlace,
     pose2::{Pose2, Pose2Covariance},
     visibility::{Obstacle, VisibilityMap},

@@ -7,7 +7,7 @@ mod schedule;
 
 use super::*;
 use crate::{
-    mounting::{Mounting, pan_tilt},
+    extrinsics::{Mounting, pan_tilt},
     place::{LandmarkPlace, PlaceSigmas},
     pose2::{Pose2, Pose2Covariance},
 };

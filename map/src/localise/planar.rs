@@ -3,7 +3,7 @@
 //! word.
 
 use super::{NuisanceKey, Sighting, predict::corners};
-use crate::{mounting::Mounting, pose2::Pose2};
+use crate::{extrinsics::Mounting, pose2::Pose2};
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Matrix3x6, Matrix6, Point2, SMatrix, Vector3};
 use vision::{
     frame::Intrinsics,

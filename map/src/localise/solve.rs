@@ -6,8 +6,8 @@ use super::{
     posterior::{Moments, moments, turned},
 };
 use crate::{
+    extrinsics::Mounting,
     gate::{Z_95, chi2_quantile},
-    mounting::Mounting,
     pose2::{Pose2, Pose2Covariance, wrap_rad},
 };
 use nalgebra::{DMatrix, Isometry3, Matrix3, Matrix3x6, Rotation3, UnitQuaternion, Vector3};

@@ -1,7 +1,7 @@
 //! Exact poses, derivatives against differences, honest covariance by Monte Carlo, the planar ambiguity, refusals.
 
 use super::{planar::Planar, *};
-use crate::{mounting::pan_tilt, place::PlaceSigmas, pose2::Pose2};
+use crate::{extrinsics::pan_tilt, place::PlaceSigmas, pose2::Pose2};
 use nalgebra::{Isometry3, Matrix2, Point2, Vector2, Vector3, Vector6};
 use vision::{
     detect::quads::Corners,

@@ -3,10 +3,10 @@
 
 use super::{
     Key, SlamParams,
-    align::align,
     graph::{self, Edge, GraphError},
-    loops::Closures,
-    reference::Reference,
+    icp::align,
+    loop_closure::Closures,
+    surface_index::Reference,
 };
 use crate::pose2::Pose2;
 use serde::{Deserialize, Serialize};

@@ -10,7 +10,7 @@ pub use ceiling::{Ceiling, ViewOnCeiling, ceiling_placement, view_on_ceiling};
 pub use rays::MIN_COS_INCIDENCE;
 
 use crate::{
-    check::OutOfRange, mounting::Mounting, place::LandmarkPlace, pose2::Pose2Covariance,
+    check::OutOfRange, extrinsics::Mounting, place::LandmarkPlace, pose2::Pose2Covariance,
     segments::LaserSegment,
 };
 use nalgebra::{

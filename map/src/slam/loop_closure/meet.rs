@@ -6,11 +6,11 @@ use crate::{
     pose2::{Pose2, Pose2Covariance},
     slam::{
         Key, SlamParams,
-        align::{Aligned, align, with_floor},
         cloud::{Cloud, SurfacePoint},
-        field::{Field, Window},
+        correlative::{Field, Window},
         graph::Edge,
-        reference::Reference,
+        icp::{Aligned, align, with_floor},
+        surface_index::Reference,
     },
 };
 use nalgebra::{Point2, Vector2};

@@ -2,7 +2,7 @@
 //! surface only, so that what the walls do not tell stays untold (method 17.4 in the form of points). In: a guess,
 //! perhaps a prior. Out: the pose and what the walls alone say of it, as information: 0 along a bare corridor.
 
-use super::{cloud::Cloud, reference::Reference};
+use super::{cloud::Cloud, surface_index::Reference};
 use crate::pose2::Pose2;
 use nalgebra::{Matrix3, Vector2, Vector3};
 use serde::{Deserialize, Serialize};

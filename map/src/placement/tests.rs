@@ -1,7 +1,7 @@
 //! A synthetic room: derivatives against differences, honest covariance by Monte Carlo, the wall choice, refusals.
 
 use super::*;
-use crate::{mounting::pan_tilt, pose2::Pose2};
+use crate::{extrinsics::pan_tilt, pose2::Pose2};
 use nalgebra::{Matrix3, Point2, Vector3, Vector6};
 use vision::{
     frame::{Distortion, IntrinsicsSigmas},

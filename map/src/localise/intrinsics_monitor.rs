@@ -5,7 +5,7 @@
 
 use super::{Fix, Sighting, planar::Planar};
 use crate::{
-    mounting::Mounting,
+    extrinsics::Mounting,
     pose2::{Pose2, wrap_rad},
 };
 use nalgebra::{DMatrix, DVector};
@@ -244,8 +244,8 @@ impl CameraWatch {
 mod tests {
     use super::*;
     use crate::{
+        extrinsics::pan_tilt,
         localise::{FixRefusal, LocaliseParams, RobotFix, robot_pose},
-        mounting::pan_tilt,
         place::{LandmarkPlace, PlaceSigmas},
     };
     use nalgebra::{Matrix2, Vector2, Vector3, Vector6};

@@ -1,7 +1,7 @@
 use super::*;
 use crate::{
+    extrinsics::{Mounting, pan_tilt},
     localise::Sighting,
-    mounting::{Mounting, pan_tilt},
     place::{LandmarkPlace, PlaceSigmas},
     pose2::Pose2Covariance,
     visibility::{Viewer, VisibilityParams, visibility},

@@ -7,7 +7,7 @@ mod reach;
 
 use super::{
     Key, SlamParams,
-    field::SearchParams,
+    correlative::SearchParams,
     graph::{self, Edge, GraphError},
 };
 use crate::pose2::{Pose2, Pose2Covariance};

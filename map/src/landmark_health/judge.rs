@@ -3,8 +3,8 @@
 use super::ChangeParams;
 use crate::{
     check::OutOfRange,
+    extrinsics::Mounting,
     localise::{FixRefusal, LocaliseParams, RobotFix, Sighting, robot_pose},
-    mounting::Mounting,
     pose2::{Pose2, Pose2Covariance},
 };
 use nalgebra::{Matrix3, Vector3};

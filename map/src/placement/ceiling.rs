@@ -247,7 +247,7 @@ pub(crate) fn error_of(made: &LandmarkPlace, truth: &LandmarkPlace) -> nalgebra:
 mod tests {
     use super::*;
     use crate::{
-        mounting::{Mounting, pan_tilt},
+        extrinsics::{Mounting, pan_tilt},
         pose2::{Pose2, Pose2Covariance},
     };
     use nalgebra::{Matrix2, Matrix3, Point2, Vector3};

@@ -3,11 +3,11 @@
 
 use super::{
     Key, SlamParams,
-    align::{Prior, align},
     cloud::Cloud,
-    field::{Field, Window},
+    correlative::{Field, Window},
+    icp::{Prior, align},
     inverse,
-    reference::Reference,
+    surface_index::Reference,
 };
 use crate::pose2::{Pose2, Pose2Covariance};
 use nalgebra::{Matrix3, Point2};

@@ -3,8 +3,8 @@
 
 use super::FuseParams;
 use crate::{
-    areas::{Advice, Cell, Module, map_from_aligned},
     localise::{Fix, Nuisance, NuisanceKey},
+    modality_stats::{Advice, Cell, Module, map_from_aligned},
     pose2::Pose2,
 };
 use nalgebra::{Matrix3, Matrix3x6, Matrix6, SymmetricEigen, Vector3};

@@ -2,7 +2,7 @@
 
 use super::ChangeParams;
 use crate::{
-    mounting::Mounting,
+    extrinsics::Mounting,
     place::LandmarkPlace,
     pose2::Pose2Covariance,
     visibility::{PoseDraws, VisibilityMap},
