@@ -6,6 +6,7 @@
 pub mod check;
 pub mod gate;
 pub mod pose2;
+mod pose_cell;
 pub mod map_links;
 pub use map_links as frames;
 pub mod extrinsics;

@@ -1,8 +1,8 @@
 //! What runs have shown of a place, laid on a motion and on a fix there: a bias is taken away, and what a modality errs by
 //! more than it says is added (method 15: "reported covariance inflated to the learnt one").
 
-use super::FuseParams;
 use crate::{
+    fuse::params::FuseParams,
     localise::{Fix, Nuisance, NuisanceKey},
     modality_stats::{Advice, Cell, Module, map_from_aligned},
     pose2::Pose2,

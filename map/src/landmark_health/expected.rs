@@ -1,8 +1,8 @@
 //! Which landmarks should be in a picture, by the pose alone.
 
-use super::ChangeParams;
 use crate::{
     extrinsics::Mounting,
+    landmark_health::params::ChangeParams,
     place::LandmarkPlace,
     pose2::Pose2Covariance,
     visibility::{PoseDraws, VisibilityMap},

@@ -1,12 +1,19 @@
-use super::*;
 use crate::{
     extrinsics::{Mounting, pan_tilt},
+    landmark_health::{
+        expected::{Expectation, Eye, expected},
+        health::Standing,
+        monitor::{MAX_WATCHED, Watch},
+        params::ChangeParams,
+        place_check::{Judged, Verdict, judge, sift},
+    },
     localise::Sighting,
     place::{LandmarkPlace, PlaceSigmas},
-    pose2::Pose2Covariance,
+    pose2::{Pose2, Pose2Covariance},
     visibility::{Viewer, VisibilityParams, visibility},
 };
-use nalgebra::{Matrix2, Matrix3, Vector3};
+use nalgebra::{Matrix2, Matrix3, Point2, Vector3};
+use std::collections::BTreeMap;
 use vision::{
     detect::quads::Corners,
     frame::{Distortion, Intrinsics},
@@ -14,6 +21,7 @@ use vision::{
         pose::{LandmarkPose, LandmarkSize, landmark_pose},
         reproject::{corner_points, pixel},
     },
+    recognise::LandmarkId,
 };
 
 const SIZE: LandmarkSize = LandmarkSize { width_m: 0.6, height_m: 0.84 };

@@ -1,5 +1,15 @@
-use super::*;
-use crate::slam::world::{Walls, rectangle, ring, scan, segments};
+use crate::{
+    laser::Scan,
+    laser_fix::{
+        fix::{LaserFix, LaserRefusal},
+        index::WallIndex,
+        params::LaserFixParams,
+        search::laser_fix,
+    },
+    pose2::{Pose2, Pose2Covariance},
+    slam::world::{Walls, rectangle, ring, scan, segments},
+};
+use nalgebra::{Matrix3, Vector2, Vector3};
 use vision::learn::random::Random;
 
 fn prior(at: &Pose2, sigma_m: f64, sigma_rad: f64, random: &mut Random) -> Pose2Covariance {

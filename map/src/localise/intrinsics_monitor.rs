@@ -3,9 +3,12 @@
 //! In: each fix with what it rests on, and each refusal. Out: how far the focal length seems off, how well corners fit,
 //! and a suspicion with its number. It changes nothing: a suspect camera is for people to calibrate again.
 
-use super::{Fix, Sighting, planar::Planar};
 use crate::{
     extrinsics::Mounting,
+    localise::{
+        fix::{Fix, Sighting},
+        planar::Planar,
+    },
     pose2::{Pose2, wrap_rad},
 };
 use nalgebra::{DMatrix, DVector};

@@ -2,15 +2,19 @@
 //! (method 13.6 [M] (b)). Lasting errors (places, mounting, intrinsics) enter the weights, so nothing is trusted beyond its
 //! word.
 
-use super::{NuisanceKey, Sighting, predict::corners};
-use crate::{extrinsics::Mounting, pose2::Pose2};
-use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Matrix3x6, Matrix6, Point2, SMatrix, Vector3};
+use crate::{
+    extrinsics::Mounting,
+    localise::{
+        derivatives::point_by_pose,
+        fix::{NuisanceKey, Sighting},
+        predict::corners,
+    },
+    pose2::Pose2,
+};
+use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Matrix6, Point2, Vector2, Vector3};
 use vision::{
     frame::Intrinsics,
-    localise::{
-        pose::LandmarkSize,
-        reproject::{corner_points, project},
-    },
+    localise::reproject::{corner_points, project},
 };
 
 /// Most steps of one descent.
@@ -99,7 +103,7 @@ impl<'a> Planar<'a> {
 
     /// The point the robot is turned about: the landmarks' centre on the floor.
     pub(super) fn pivot(&self) -> Point2<f64> {
-        super::posterior::centre(self.sightings.iter().map(|s| s.place))
+        centre(self.sightings.iter().map(|s| s.place))
     }
 
     /// Keys and covariances of the lasting errors: each landmark, the mounting, then the camera where it is not exact.
@@ -236,33 +240,12 @@ impl<'a> Planar<'a> {
     }
 }
 
-/// Camera coordinates of a map point by (x, y, theta) of the robot; `from_robot` = point - robot, map axes.
-pub(super) fn point_by_pose(camera_from_map: &Matrix3<f64>, from_robot: &Vector3<f64>) -> Matrix3<f64> {
-    let turn = Vector3::z().cross(from_robot);
-    -camera_from_map * Matrix3::from_columns(&[Vector3::x(), Vector3::y(), turn])
-}
-
-/// Map coordinates of a landmark's corner by (x, y, theta, z, width, height).
-pub(super) fn point_by_place(
-    arm: &Vector3<f64>,
-    map_from_landmark: &Matrix3<f64>,
-    point: &Vector3<f64>,
-    size: &LandmarkSize,
-) -> Matrix3x6<f64> {
-    let wider = map_from_landmark * Vector3::new(0.0, point.y / size.width_m, 0.0);
-    let higher = map_from_landmark * Vector3::new(0.0, 0.0, point.z / size.height_m);
-    let turn = Vector3::z().cross(arm);
-    Matrix3x6::from_columns(&[Vector3::x(), Vector3::y(), turn, Vector3::z(), wider, higher])
-}
-
-/// Camera coordinates of a robot point by the mounting's (rotation, translation); `from_camera` = point - camera,
-/// robot axes.
-pub(super) fn point_by_mounting(
-    camera_from_robot: &Matrix3<f64>,
-    from_camera: &Vector3<f64>,
-) -> SMatrix<f64, 3, 6> {
-    let mut j = SMatrix::<f64, 3, 6>::zeros();
-    j.fixed_columns_mut::<3>(0).copy_from(&(camera_from_robot * from_camera.cross_matrix()));
-    j.fixed_columns_mut::<3>(3).copy_from(&-camera_from_robot);
-    j
+/// Centre of the landmarks on the floor.
+pub(super) fn centre<'a>(points: impl Iterator<Item = &'a crate::place::LandmarkPlace>) -> Point2<f64> {
+    let (mut sum, mut n) = (Vector2::zeros(), 0.0);
+    for p in points {
+        sum += Vector2::new(p.x_m, p.y_m);
+        n += 1.0;
+    }
+    Point2::from(sum / f64::max(n, 1.0))
 }

@@ -6,9 +6,11 @@
 //!
 //! Departs from method 13.6, which takes the covariance to first order.
 
-use super::planar::{Descended, Planar};
-use crate::pose2::Pose2;
-use nalgebra::{DMatrix, Matrix2, Matrix3, Point2, Vector2, Vector3};
+use crate::{
+    localise::planar::{Descended, Planar},
+    pose2::Pose2,
+};
+use nalgebra::{DMatrix, Matrix2, Matrix3, Point2, Vector3};
 
 /// Half-width of the first grid, in standard deviations of the minimum.
 const REACH_SIGMA: f64 = 6.0;
@@ -106,14 +108,4 @@ fn integrate(samples: &[Sample], at: &Pose2, lowest: f64) -> Option<Moments> {
     }
     let finite = mean.iter().chain(covariance.iter()).all(|v| v.is_finite());
     finite.then(|| Moments { mean: at.plus(&mean), covariance })
-}
-
-/// Centre of the landmarks on the floor.
-pub(super) fn centre<'a>(points: impl Iterator<Item = &'a crate::place::LandmarkPlace>) -> Point2<f64> {
-    let (mut sum, mut n) = (Vector2::zeros(), 0.0);
-    for p in points {
-        sum += Vector2::new(p.x_m, p.y_m);
-        n += 1.0;
-    }
-    Point2::from(sum / f64::max(n, 1.0))
 }

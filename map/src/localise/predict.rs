@@ -1,7 +1,11 @@
 //! The corners of one landmark as an upright robot would see them, and their derivatives: what a look would measure.
 
-use super::planar::{point_by_mounting, point_by_place, point_by_pose};
-use crate::{extrinsics::Mounting, place::LandmarkPlace, pose2::Pose2};
+use crate::{
+    extrinsics::Mounting,
+    localise::derivatives::{point_by_mounting, point_by_place, point_by_pose},
+    place::LandmarkPlace,
+    pose2::Pose2,
+};
 use nalgebra::SMatrix;
 use vision::{
     frame::Intrinsics,

@@ -1,13 +1,14 @@
 //! All solutions of one frame, and which of them is left (method 13.4, 13.6).
 
-use super::{
-    DecidedBy, Fix, FixRefusal, LocaliseParams, Modality, Nuisance, RobotFix, Sighting,
-    planar::{MAX_STEPS, Planar},
-    posterior::{Moments, moments, turned},
-};
 use crate::{
     extrinsics::Mounting,
     gate::{Z_95, chi2_quantile},
+    localise::{
+        fix::{DecidedBy, Fix, FixRefusal, Modality, Nuisance, RobotFix, Sighting},
+        params::LocaliseParams,
+        planar::{MAX_STEPS, Planar},
+        posterior::{Moments, moments, turned},
+    },
     pose2::{Pose2, Pose2Covariance, wrap_rad},
 };
 use nalgebra::{DMatrix, Isometry3, Matrix3, Matrix3x6, Rotation3, UnitQuaternion, Vector3};

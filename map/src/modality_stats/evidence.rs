@@ -1,11 +1,17 @@
 //! What was found of one module in one place, as sums: places and runs add up, and a run can be taken away again by adding
 //! up the others. Robot-aligned throughout: along, across (left), heading.
 
-use super::{Fault, MIN_MEASUREMENTS, MIN_VISITS};
-use crate::check::{self, OutOfRange};
+use crate::{
+    check::{self, OutOfRange},
+    modality_stats::advice::Fault,
+};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
+/// Measurements below which a place says nothing for itself: its parent speaks.
+pub const MIN_MEASUREMENTS: u64 = 30;
+/// Visits below which a bias may be chance, however many measurements they gave: those of one visit err together.
+pub const MIN_VISITS: u64 = 3;
 /// How many radians of heading weigh as much as a metre.
 const METRE_RAD: f64 = 0.1;
 /// A bias is one if it is more than this many times its standard deviation.
@@ -202,3 +208,6 @@ impl Evidence {
         }
     }
 }
+
+/// Evidence of every module, in the order of [`Module::ALL`].
+pub type Modules = [Evidence; 3];

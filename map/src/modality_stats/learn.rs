@@ -5,15 +5,18 @@
 //! itself ("loose coupling", method 15), started where the reference starts: what a corridor does to the laser shows only
 //! when nobody else tells it where it is.
 
-use super::{Cell, MAX_CELLS, Module, Modules, Reference, map_from_aligned};
 use crate::{
     fuse::{FuseParams, Fuser},
     localise::{Fix, Modality},
+    modality_stats::{advice::map_from_aligned, evidence::Modules, modality::Module, reference::Reference},
+    pose_cell::Cell,
     pose2::{Pose2, Pose2Covariance, wrap_rad},
 };
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
 
+/// Most cells that one run may tell of.
+pub const MAX_CELLS: usize = 4096;
 /// Steps of the reference at which positions are compared: after this way...
 const STEP_M: f64 = 0.05;
 /// ...or this turn.
@@ -214,7 +217,7 @@ fn measured_odometry(steps: &[Step], r: &Reference, p: &FuseParams, learnt: &mut
 }
 
 /// Adds measurements up, passage by passage.
-fn visits(module: Module, found: &[(Pose2, Vector3<f64>, Vector3<f64>)], learnt: &mut Learnt) {
+pub(super) fn visits(module: Module, found: &[(Pose2, Vector3<f64>, Vector3<f64>)], learnt: &mut Learnt) {
     for visit in found.chunk_by(|a, b| Cell::of(&a.0) == Cell::of(&b.0)) {
         let mut evidence = super::Evidence::default();
         for (_, error, variances) in visit {

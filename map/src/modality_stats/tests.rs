@@ -1,11 +1,22 @@
 //! Sums by hand, a corridor whose faults are known, levels and modes, bounds.
 
-use super::*;
 use crate::{
     fuse::{FuseParams, Fuser},
-    localise::{DecidedBy, Fix},
-    pose2::Pose2Covariance,
+    localise::{DecidedBy, Fix, Modality},
+    modality_stats::{
+        advice::{Advice, Fault, Level, map_from_aligned},
+        evidence::{Evidence, MIN_MEASUREMENTS, MIN_VISITS, Modules},
+        learn::{Learnt, MAX_CELLS, Run, learn},
+        modality::{Mode, Module},
+        modality_map::Areas,
+        named_area::{MAX_CORNERS, MAX_NAME_BYTES, NamedArea},
+        reference::{MAX_REFERENCE, Reference, ReferenceError},
+    },
+    pose_cell::Cell,
+    pose2::{Pose2, Pose2Covariance},
 };
+use nalgebra::{Matrix3, Vector3};
+use std::collections::BTreeMap;
 use vision::{learn::random::Random, recognise::LandmarkId};
 
 const SECOND: i64 = 1_000_000_000;

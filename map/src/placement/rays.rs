@@ -1,7 +1,6 @@
 //! Where the rays of four corners meet a wall or a ceiling, with the derivatives by all that is uncertain (method 11.3).
 
-use super::WallSighting;
-use crate::segments::LaserSegment;
+use crate::{placement::view::WallSighting, segments::LaserSegment};
 use nalgebra::{Matrix3, SMatrix, Vector2, Vector3};
 
 /// Columns of the derivatives: 8 corner coordinates, robot (x, y, theta), mounting (rotation, translation), wall
@@ -11,7 +10,6 @@ pub(super) const ROBOT: usize = 8;
 pub(super) const MOUNTING: usize = 11;
 pub(super) const WALL: usize = 17;
 pub(super) const INPUTS: usize = 19;
-
 /// Smallest cosine of the angle between ray and wall normal: 80 degrees of incidence.
 pub const MIN_COS_INCIDENCE: f64 = 0.17;
 
@@ -93,4 +91,25 @@ fn cast(view: &WallSighting<'_>, i: usize, n: &Vector3<f64>, r: f64) -> Option<C
 pub(super) fn is_on(wall: &LaserSegment, point: &Vector3<f64>, margin_m: f64) -> bool {
     let u = wall.direction().dot(&(Vector2::new(point.x, point.y) - wall.a.coords));
     (-margin_m..=wall.length_m() + margin_m).contains(&u)
+}
+
+/// Covariance of the hits on the wall from corners and robot pose.
+pub(super) fn new_in_each_view(view: &WallSighting<'_>, by: &SMatrix<f64, 8, INPUTS>) -> SMatrix<f64, 8, 8> {
+    let mut sum = SMatrix::<f64, 8, 8>::zeros();
+    for (i, covariance) in view.covariance_px2.iter().enumerate() {
+        let j = by.fixed_columns::<2>(CORNERS + 2 * i);
+        sum += j * covariance * j.transpose();
+    }
+    let j = by.fixed_columns::<3>(ROBOT);
+    sum + j * view.map_from_robot.covariance * j.transpose()
+}
+
+/// How the hits move with the camera's errors, each of one standard deviation. It has no part in the weights: one view's
+/// departure from a rectangle is no ground to correct the camera, and is what tells that a thing is not on the wall.
+pub(super) fn by_camera(view: &WallSighting<'_>, by: &SMatrix<f64, 8, INPUTS>) -> SMatrix<f64, 8, 3> {
+    let corners = view.by_camera.iter().enumerate();
+    // What the camera has wrong is wrong with the ray through the corner where it was seen.
+    let moved: SMatrix<f64, 8, 3> =
+        corners.map(|(i, by_camera)| by.fixed_columns::<2>(CORNERS + 2 * i) * by_camera).sum();
+    moved * Matrix3::from_diagonal(&view.camera.error_sigmas())
 }

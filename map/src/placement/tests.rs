@@ -1,12 +1,27 @@
 //! A synthetic room: derivatives against differences, honest covariance by Monte Carlo, the wall choice, refusals.
 
-use super::*;
-use crate::{extrinsics::pan_tilt, pose2::Pose2};
-use nalgebra::{Matrix3, Point2, Vector3, Vector6};
+use crate::{
+    extrinsics::{Mounting, pan_tilt},
+    place::LandmarkPlace,
+    placement::{
+        params::{PlacingError, PlacingParams},
+        rays::{self, INPUTS, MOUNTING, ROBOT, WALL},
+        view::{Placement, PlacingView, WallSighting},
+        wall::{ViewOnWall, view_on_wall},
+        wall_fusion::placement,
+    },
+    pose2::{Pose2, Pose2Covariance},
+    segments::LaserSegment,
+};
+use nalgebra::{Matrix2, Matrix2x3, Matrix3, Matrix6, Point2, SVector, Vector2, Vector3, Vector6};
 use vision::{
-    frame::{Distortion, IntrinsicsSigmas},
+    detect::quads::Corners,
+    frame::{Distortion, Intrinsics, IntrinsicsSigmas},
     learn::random::Random,
-    localise::reproject::{corner_points, perturbed, pixel},
+    localise::{
+        pose::LandmarkSize,
+        reproject::{corner_points, perturbed, pixel},
+    },
 };
 
 const SIZE: LandmarkSize = LandmarkSize { width_m: 0.6, height_m: 0.84 };

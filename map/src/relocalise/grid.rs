@@ -1,12 +1,25 @@
 //! A belief over a grid of poses: shifted by motions without blurring, spread, weighed, and read as modes.
 
-use super::{MAX_MODES, MIN_MASS, Mode};
 use crate::{
     check::{self, OutOfRange},
     pose2::{Pose2, Pose2Covariance, wrap_rad},
 };
 use nalgebra::{Matrix3, Point2, Vector2, Vector3};
 use std::f64::consts::TAU;
+
+/// Most modes that are told apart.
+pub const MAX_MODES: usize = 8;
+/// Belief below this share of a cell's even share is no mode.
+const MIN_MASS: f64 = 1e-3;
+
+/// A place where the robot may be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Mode {
+    /// Share of the belief.
+    pub mass: f64,
+    /// Mean and covariance of it.
+    pub pose: Pose2Covariance,
+}
 
 /// Most cells of a grid: 100 m by 100 m at the default steps.
 pub const MAX_CELLS: usize = 9_000_000;

@@ -1,9 +1,15 @@
-use super::*;
 use crate::{
-    place::PlaceSigmas,
+    place::{LandmarkPlace, PlaceSigmas},
+    pose2::Pose2,
+    relocalise::{
+        grid_belief::Hypotheses,
+        observation::{Glimpse, MAX_MEMBERS, Member},
+        params::HypothesesParams,
+    },
     visibility::{Viewer, VisibilityParams, visibility},
 };
-use std::f64::consts::FRAC_PI_2;
+use nalgebra::{Matrix3, Point2, Vector3};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use vision::localise::pose::LandmarkSize;
 
 fn door(x: f64, y: f64, theta: f64) -> LandmarkPlace {

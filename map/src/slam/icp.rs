@@ -2,8 +2,10 @@
 //! surface only, so that what the walls do not tell stays untold (method 17.4 in the form of points). In: a guess,
 //! perhaps a prior. Out: the pose and what the walls alone say of it, as information: 0 along a bare corridor.
 
-use super::{cloud::Cloud, surface_index::Reference};
-use crate::pose2::Pose2;
+use crate::{
+    pose2::Pose2,
+    slam::{cloud::Cloud, information::with_floor, surface_index::Reference},
+};
 use nalgebra::{Matrix3, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -170,15 +172,6 @@ fn sums(reference: &Reference, scan: &Cloud, pose: &Pose2, radius_m: f64, p: &Al
         points += 1;
     }
     (points >= 3).then_some(Sums { h, g, by_noise, squares, weights, points })
-}
-
-/// The information that is left when the floor is added to the covariance; works for singular information.
-pub(crate) fn with_floor(information: &Matrix3<f64>, [metres, radians]: [f64; 2]) -> Matrix3<f64> {
-    let floor = Vector3::new(metres.powi(2), metres.powi(2), radians.powi(2));
-    let inverse = Matrix3::from_diagonal(&floor.map(|v| 1.0 / v.max(1e-12)));
-    let Some(c) = (information + inverse).cholesky() else { return Matrix3::zeros() };
-    let made = information - information * c.inverse() * information;
-    0.5 * (made + made.transpose())
 }
 
 #[cfg(test)]

@@ -1,39 +1,17 @@
 //! The final fit: every key scan aligned with those that see the same, one by one, and all poses fitted to all of it,
 //! a few times over. In: key poses that are nearly right. Out: better ones, and the edges that hold them.
 
-use super::{
-    Key, SlamParams,
-    graph::{self, Edge, GraphError},
-    icp::align,
-    loop_closure::Closures,
-    surface_index::Reference,
+use crate::{
+    pose2::Pose2,
+    slam::{
+        graph::{self, Edge, GraphError},
+        icp::align,
+        keyframe::Key,
+        loop_closure::Closures,
+        params::SlamParams,
+        surface_index::Reference,
+    },
 };
-use crate::pose2::Pose2;
-use serde::{Deserialize, Serialize};
-
-/// Knobs of the final fit.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct RefineParams {
-    /// How often.
-    pub rounds: usize,
-    /// Partners of each key scan among those before it, the nearest.
-    pub partners: usize,
-    /// Partners are not farther off than this.
-    pub near_m: f64,
-    /// Least share of the points that find their surface.
-    pub min_matched: f64,
-    /// An alignment that moves a pose more than this is a mistake.
-    pub max_move_m: f64,
-    /// Key scans of one part of the path that are counted as one: their errors are the same.
-    pub doubt_chi2: f64,
-}
-
-impl Default for RefineParams {
-    fn default() -> Self {
-        Self { rounds: 2, partners: 6, near_m: 5.0, min_matched: 0.45, max_move_m: 0.5, doubt_chi2: 4.0 }
-    }
-}
 
 /// Moves the keys; gives all edges of the last fit.
 pub(super) fn refine(

@@ -1,15 +1,18 @@
 //! Follows the robot from scan to scan: odometry predicts, the recent key scans correct. In: a scan. Out: where it lies
 //! relative to the last key pose, and whether it should become one itself.
 
-use super::{
-    Key, SlamParams,
-    cloud::Cloud,
-    correlative::{Field, Window},
-    icp::{Prior, align},
-    inverse,
-    surface_index::Reference,
+use crate::{
+    pose2::{Pose2, Pose2Covariance},
+    slam::{
+        cloud::Cloud,
+        correlative::{Field, Window},
+        icp::{Prior, align},
+        information::inverse,
+        keyframe::Key,
+        params::SlamParams,
+        surface_index::Reference,
+    },
 };
-use crate::pose2::{Pose2, Pose2Covariance};
 use nalgebra::{Matrix3, Point2};
 
 /// Largest distance of the robot from where odometry says that is still looked at.
@@ -93,7 +96,7 @@ impl Tracker {
 }
 
 /// The best pose around the predicted one on the grid; the predicted one if none is good.
-fn guess(field: &Field, cloud: &Cloud, predicted: &Pose2Covariance, p: &SlamParams) -> Pose2 {
+pub(super) fn guess(field: &Field, cloud: &Cloud, predicted: &Pose2Covariance, p: &SlamParams) -> Pose2 {
     let c = &predicted.covariance;
     let sigma_m = c[(0, 0)].max(c[(1, 1)]).max(0.0).sqrt();
     let window = Window {

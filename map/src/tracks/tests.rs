@@ -1,7 +1,20 @@
-use super::*;
-use crate::place::PlaceSigmas;
+use crate::{
+    place::{LandmarkPlace, PlaceSigmas},
+    tracks::{
+        observation::{Glimpse, Identity, Outcome},
+        params::GatherParams,
+        track::{Kept, LOOKS_KEPT, MAX_TRACK_VIEWS, Track},
+        tracker::{MAX_TRACKS, Tracker},
+    },
+};
 use nalgebra::{Point2, Vector3};
-use vision::{icon::Icon, localise::pose::LandmarkSize, recognise::features};
+use vision::{
+    detect::quads::Corners,
+    icon::Icon,
+    localise::pose::LandmarkSize,
+    params::RecogniseParams,
+    recognise::{IconFeatures, LandmarkId, features},
+};
 
 const STEP_NS: i64 = 200_000_000;
 

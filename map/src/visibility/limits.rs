@@ -2,7 +2,10 @@
 //! (method 12.1 to 12.3), for a landmark of any tilt. In one direction on the floor what is allowed is one span of
 //! distances; each condition gives its own in closed form, but for the height's, whose ends are roots of a quartic.
 
-use super::{Moved, Viewer, VisibilityParams};
+use crate::visibility::{
+    local_frame::Moved,
+    settings::{Viewer, VisibilityParams},
+};
 use std::f64::consts::FRAC_PI_2;
 use vision::localise::pose::LandmarkSize;
 
@@ -166,7 +169,7 @@ impl Limits {
 }
 
 /// The last place from one that is on the way to one that is not.
-fn last(mut good: f64, mut bad: f64, is: impl Fn(f64) -> bool) -> f64 {
+pub(super) fn last(mut good: f64, mut bad: f64, is: impl Fn(f64) -> bool) -> f64 {
     for _ in 0..HALVINGS {
         let middle = 0.5 * (good + bad);
         if is(middle) {

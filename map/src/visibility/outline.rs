@@ -1,9 +1,10 @@
 //! From bounds over direction to polygons on the floor, and what is measured on polygons.
 
-use super::{
-    LocalFrame,
+use crate::visibility::{
     envelope::{MAX_SLOPE, Piece},
-    quarters::{Quarter, turned_back},
+    local_frame::LocalFrame,
+    quarter_turn::turned_back,
+    quarters::Quarter,
 };
 use nalgebra::{Point2, Vector2};
 

@@ -1,9 +1,9 @@
 //! What obstacles hide: of each its full penumbra, from everywhere in which some part of the landmark is not seen
 //! (method 12.4), as bounds over direction. Exact, not sampled.
 
-use super::{
+use crate::visibility::{
     envelope::{MAX_SLOPE, Piece},
-    quarters::turned,
+    quarter_turn::turned,
 };
 use nalgebra::{Point2, Vector2};
 

@@ -117,7 +117,7 @@ impl Follower<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::visibility::{Moved, Viewer, VisibilityParams, envelope::Envelope};
+    use crate::visibility::{Viewer, VisibilityParams, envelope::Envelope, local_frame::Moved};
     use std::f64::consts::FRAC_PI_2;
     use vision::localise::pose::LandmarkSize;
 

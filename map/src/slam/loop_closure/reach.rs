@@ -1,10 +1,14 @@
 //! How surely every key pose is known from the newest one, and which of them may see the same. In: the graph. Out: the
 //! old poses worth a try.
 
-use super::{LoopParams, MAX_REACH_M, spread};
 use crate::{
     pose2::{Pose2, Pose2Covariance},
-    slam::{Key, graph::Edge},
+    slam::{
+        graph::Edge,
+        information::spread,
+        keyframe::Key,
+        loop_closure::params::{LoopParams, MAX_REACH_M},
+    },
 };
 use nalgebra::Matrix3;
 use std::{cmp::Ordering, collections::BinaryHeap};
@@ -14,17 +18,21 @@ struct Reached {
     cost: f64,
     at: usize,
 }
+
 impl PartialEq for Reached {
     fn eq(&self, other: &Self) -> bool {
         self.cmp(other) == Ordering::Equal
     }
 }
+
 impl Eq for Reached {}
+
 impl PartialOrd for Reached {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         Some(self.cmp(other))
     }
 }
+
 impl Ord for Reached {
     fn cmp(&self, other: &Self) -> Ordering {
         // The heap gives the largest first.

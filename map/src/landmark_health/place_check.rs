@@ -1,9 +1,9 @@
 //! Whether a landmark is where the map says, by a pose that does not rest on it.
 
-use super::ChangeParams;
 use crate::{
     check::OutOfRange,
     extrinsics::Mounting,
+    landmark_health::params::ChangeParams,
     localise::{FixRefusal, LocaliseParams, RobotFix, Sighting, robot_pose},
     pose2::{Pose2, Pose2Covariance},
 };
@@ -99,7 +99,7 @@ fn spread_m(covariance: &Matrix3<f64>) -> f64 {
 }
 
 /// Where a landmark appears from a pose: of the two solutions of its plane the one nearer to its place.
-fn apparent(sighting: &Sighting<'_>, mounting: &Mounting, pose: &Pose2Covariance) -> (Pose2, f64) {
+pub(super) fn apparent(sighting: &Sighting<'_>, mounting: &Mounting, pose: &Pose2Covariance) -> (Pose2, f64) {
     let map_from_camera = pose.pose.to_isometry3() * mounting.robot_from_camera;
     let place = sighting.place.map_from_landmark();
     let solutions = std::iter::once(&sighting.seen.best).chain(sighting.seen.second.as_ref());

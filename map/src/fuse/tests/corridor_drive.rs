@@ -1,12 +1,13 @@
 //! The paper's corridor in small (method 18, E10): camera, fix and fusion together, everything uncertain drawn anew.
 
-use super::*;
 use crate::{
     extrinsics::{Mounting, pan_tilt},
+    fuse::{fuser::Fuser, params::FuseParams},
     localise::{LocaliseParams, RobotFix, Sighting, robot_pose},
     place::{LandmarkPlace, PlaceSigmas},
+    pose2::Pose2,
 };
-use nalgebra::{Matrix2, Point2, Vector2};
+use nalgebra::{Matrix2, Point2, Vector2, Vector3};
 use std::f64::consts::FRAC_PI_2;
 use vision::{
     detect::quads::Corners,

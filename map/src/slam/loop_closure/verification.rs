@@ -1,15 +1,17 @@
 //! One try to close a loop: the new pose's scans against those around the old one. In: two key poses and what is
 //! believed of them. Out: where the new one is seen from the old one, or nothing.
 
-use super::{MAX_REACH_M, MAX_REACH_RAD, spread};
 use crate::{
     pose2::{Pose2, Pose2Covariance},
     slam::{
-        Key, SlamParams,
         cloud::{Cloud, SurfacePoint},
         correlative::{Field, Window},
         graph::Edge,
-        icp::{Aligned, align, with_floor},
+        icp::{Aligned, align},
+        information::{spread, with_floor},
+        keyframe::Key,
+        loop_closure::params::{MAX_REACH_M, MAX_REACH_RAD},
+        params::SlamParams,
         surface_index::Reference,
     },
 };
@@ -71,7 +73,12 @@ pub(super) fn meet(keys: &[Key], old: usize, new: usize, belief: &Belief, p: &Sl
 }
 
 /// The best pose in the window, if it is good and no other is nearly as good.
-fn search(old_scans: &[(Pose2, &Cloud)], query: &Cloud, belief: &Belief, p: &SlamParams) -> Option<Pose2> {
+pub(super) fn search(
+    old_scans: &[(Pose2, &Cloud)],
+    query: &Cloud,
+    belief: &Belief,
+    p: &SlamParams,
+) -> Option<Pose2> {
     let l = &p.loops;
     let believed = &belief.old_from_new;
     let heading = believed.covariance[(2, 2)].max(0.0).sqrt();
@@ -103,7 +110,7 @@ fn seen_from<'a>(keys: &[Key], i: usize, key: &'a Key) -> (Pose2, &'a Cloud) {
 }
 
 /// Several scans as one, in the frame of their poses.
-fn joined<'a>(scans: impl Iterator<Item = (Pose2, &'a Cloud)>) -> Cloud {
+pub(super) fn joined<'a>(scans: impl Iterator<Item = (Pose2, &'a Cloud)>) -> Cloud {
     let mut all = Cloud::default();
     for (pose, cloud) in scans {
         let (s, c) = pose.theta_rad.sin_cos();

@@ -1,14 +1,16 @@
 //! Landmarks and scans together: drives along a corridor whose walls are not quite where the map says, a long standstill,
 //! and what a scan may not do.
 
-use super::{tests::fix, *};
+use super::fix;
 use crate::{
+    fuse::{filter::MAX_SOURCES, fuser::Fuser, outcome::FixOutcome, params::FuseParams},
     laser::Scan,
     laser_fix::{LaserFixParams, WallIndex, laser_fix},
-    localise::Modality,
+    localise::{Fix, Modality},
+    pose2::Pose2,
     slam::world::{Walls, rectangle, scan, segments},
 };
-use nalgebra::Vector2;
+use nalgebra::{Vector2, Vector3};
 use vision::{learn::random::Random, recognise::LandmarkId};
 
 /// Standard deviation of a wall across itself.

@@ -1,0 +1,157 @@
+//! The statistics of all runs of a map, added up by cell, named area and map.
+
+use crate::{
+    modality_stats::{
+        advice::{Advice, Level},
+        evidence::{MIN_MEASUREMENTS, Modules},
+        modality::{Mode, Module},
+        named_area::{MAX_AREAS, NamedArea},
+    },
+    pose_cell::Cell,
+    pose2::Pose2,
+};
+use std::collections::BTreeMap;
+
+/// A module belongs to the fused set if its score is at most this many times the best one's.
+const FUSED_SCORE: f64 = 2.0;
+
+/// All that runs have shown of a map.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Areas {
+    mode: Mode,
+    named: Vec<(NamedArea, [Pool; 4])>,
+    cells: BTreeMap<Cell, (Modules, Advice)>,
+    map: Pool,
+    elsewhere: Advice,
+}
+
+/// Cells added up.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+struct Pool {
+    found: Modules,
+    /// How many.
+    cells: u64,
+}
+
+impl Pool {
+    fn add(&mut self, found: &Modules) {
+        for (sum, more) in self.found.iter_mut().zip(found) {
+            sum.add(more);
+        }
+        self.cells += 1;
+    }
+}
+
+impl Areas {
+    /// Adds runs up. Names past [`MAX_AREAS`] are left out.
+    pub fn new<'a>(
+        mode: Mode,
+        named: Vec<NamedArea>,
+        runs: impl IntoIterator<Item = &'a BTreeMap<Cell, Modules>>,
+    ) -> Self {
+        let mut cells: BTreeMap<Cell, Modules> = BTreeMap::new();
+        for (cell, found) in runs.into_iter().flatten() {
+            for (sum, more) in cells.entry(*cell).or_default().iter_mut().zip(found) {
+                sum.add(more);
+            }
+        }
+        let mut made = Self { mode, ..Self::default() };
+        made.named = named.into_iter().take(MAX_AREAS).map(|area| (area, [Pool::default(); 4])).collect();
+        for (cell, found) in &cells {
+            made.map.add(found);
+            if let Some((_, pools)) = made.named.iter_mut().find(|(area, _)| area.contains(cell.middle_m())) {
+                pools[usize::from(cell.heading)].add(found);
+            }
+        }
+        made.elsewhere = made.judge(&[(Level::Map, made.map)]);
+        made.cells = cells.iter().map(|(cell, found)| (*cell, (*found, Advice::default()))).collect();
+        let told: Vec<Advice> = cells.keys().map(|cell| made.judged(cell)).collect();
+        for ((_, advice), told) in made.cells.values_mut().zip(told) {
+            *advice = told;
+        }
+        made
+    }
+
+    /// What is fused.
+    pub fn mode(&self) -> Mode {
+        self.mode
+    }
+
+    /// What is known where a pose is.
+    pub fn advice(&self, at: &Pose2) -> Advice {
+        if self.cells.is_empty() {
+            return self.elsewhere;
+        }
+        let cell = Cell::of(at);
+        self.cells.get(&cell).map_or_else(|| self.judged(&cell), |(_, advice)| *advice)
+    }
+
+    /// Every cell that was driven through, with what was found and what follows.
+    pub fn cells(&self) -> impl Iterator<Item = (&Cell, &Modules, &Advice)> {
+        self.cells.iter().map(|(cell, (found, advice))| (cell, found, advice))
+    }
+
+    /// Every named area with what was found in it, by heading, and what follows where its cells say nothing themselves.
+    pub fn named(&self) -> impl Iterator<Item = (&NamedArea, [(Modules, Advice); 4])> {
+        self.named.iter().map(|(area, by_heading)| {
+            let told =
+                |pool: &Pool| (pool.found, self.judge(&[(Level::Area, *pool), (Level::Map, self.map)]));
+            (area, std::array::from_fn(|k| told(&by_heading[k])))
+        })
+    }
+
+    /// All of the map together.
+    pub fn map(&self) -> (&Modules, &Advice) {
+        (&self.map.found, &self.elsewhere)
+    }
+
+    /// Advice for a cell.
+    fn judged(&self, cell: &Cell) -> Advice {
+        let (mut alone, mut around) = (Pool::default(), Pool::default());
+        for (dx, dy) in (-1..=1).flat_map(|dx| (-1..=1).map(move |dy| (dx, dy))) {
+            let near = Cell { x: cell.x.saturating_add(dx), y: cell.y.saturating_add(dy), ..*cell };
+            let Some((found, _)) = self.cells.get(&near) else { continue };
+            around.add(found);
+            if near == *cell {
+                alone.add(found);
+            }
+        }
+        let mut levels = vec![(Level::Cell, alone), (Level::Around, around)];
+        let named = self.named.iter().find(|(area, _)| area.contains(cell.middle_m()));
+        levels.extend(named.map(|(_, by_heading)| (Level::Area, by_heading[usize::from(cell.heading)])));
+        levels.push((Level::Map, self.map));
+        self.judge(&levels)
+    }
+
+    /// Advice from the first of the levels that know enough.
+    fn judge(&self, levels: &[(Level, Pool)]) -> Advice {
+        let mut advice = Advice::default();
+        for module in Module::ALL {
+            let enough = |(_, pool): &&(Level, Pool)| pool.found[module.index()].fixes() >= MIN_MEASUREMENTS;
+            if let Some((level, pool)) = levels.iter().find(enough) {
+                // Robot-aligned biases of different places are different things: over the whole map they only tell how much
+                // less sure a module is than it says.
+                let cells = if *level == Level::Map { None } else { Some(pool.cells) };
+                advice.faults[module.index()] = pool.found[module.index()].fault(cells);
+            }
+        }
+        // Nobody is shut out of a place for what happened elsewhere.
+        // Departs from method 15, where cells inherit all from their parents.
+        let ranked = levels
+            .iter()
+            .filter(|(level, _)| *level != Level::Map)
+            .find(|(_, pool)| pool.found[Module::Odometry.index()].available() >= MIN_MEASUREMENTS);
+        let Some((level, pool)) = ranked else { return advice };
+        let scores = pool.found.map(|evidence| evidence.score());
+        let best = Module::ALL.into_iter().min_by(|a, b| scores[a.index()].total_cmp(&scores[b.index()]));
+        let Some(best) = best else { return advice };
+        let lowest = scores[best.index()];
+        advice.used = match self.mode {
+            Mode::All => [true; 3],
+            Mode::Fuse => scores.map(|score| score <= FUSED_SCORE * lowest),
+            Mode::Single => Module::ALL.map(|module| module == best),
+        };
+        (advice.best, advice.level) = (Some(best), *level);
+        advice
+    }
+}

@@ -1,0 +1,138 @@
+//! The belief: predicted by motions, updated by observations, read as pose hypotheses.
+
+use crate::{
+    check::{self, OutOfRange},
+    place::LandmarkPlace,
+    pose2::{Pose2, wrap_rad},
+    relocalise::{
+        grid::{Grid, Mode},
+        observation::{Glimpse, MAX_MEMBERS, Member, Reading},
+        params::HypothesesParams,
+    },
+    visibility::VisibilityMap,
+};
+use nalgebra::{Matrix3, Point2, Vector3};
+use std::f64::consts::{PI, TAU};
+
+/// A sighting reaches this many standard deviations.
+const REACH_SIGMAS: f64 = 4.5;
+
+/// The belief on where the robot is.
+#[derive(Debug, Clone)]
+pub struct Hypotheses {
+    pub(super) p: HypothesesParams,
+    pub(super) grid: Grid,
+}
+
+impl Hypotheses {
+    /// Over the rectangle between two corners. `prior` weighs each pose; 0 where the robot cannot be.
+    pub fn new(
+        corners: [Point2<f64>; 2],
+        prior: impl Fn(&Pose2) -> f64,
+        p: &HypothesesParams,
+    ) -> Result<Self, OutOfRange> {
+        p.check()?;
+        for corner in corners {
+            Pose2::new(corner.x, corner.y, 0.0).check()?;
+        }
+        let grid = Grid::new(corners, p.cell_m, p.headings, prior)?;
+        Ok(Self { p: p.clone(), grid })
+    }
+
+    /// The robot moved, in its own frame.
+    pub fn moved(&mut self, motion: &Pose2) -> Result<(), OutOfRange> {
+        motion.check()?;
+        let metres = motion.position().norm();
+        self.grid.shift(motion);
+        let radians2 = self.p.turn_rad.powi(2) * (metres + motion.theta_rad.abs());
+        self.grid.spread(self.p.along_m.powi(2) * metres, radians2);
+        self.grid.mix(self.p.carried);
+        Ok(())
+    }
+
+    /// The robot saw something that may be any of `members`, or nothing of the map.
+    pub fn saw(&mut self, glimpse: &Glimpse, members: &[Member<'_>]) -> Result<(), OutOfRange> {
+        let readings: Vec<Reading<'_>> =
+            members.iter().map(|member| Reading { glimpse: *glimpse, member: *member }).collect();
+        self.saw_any(&readings)
+    }
+
+    /// The same where how it was seen depends on what it is: of another size or height it is elsewhere.
+    pub fn saw_any(&mut self, readings: &[Reading<'_>]) -> Result<(), OutOfRange> {
+        check::within("members", readings.len() as f64, 0.0, MAX_MEMBERS as f64)?;
+        let reach_m = self.p.clutter_reach_m;
+        let evenly = self.p.clutter / (PI * reach_m * reach_m * TAU);
+        let mut likelihood = self.grid.like(evenly);
+        for Reading { glimpse, member } in readings {
+            glimpse.robot_from_landmark.check()?;
+            check::covariance("covariance", &glimpse.covariance)?;
+            member.place.check()?;
+            check::within("probability", member.probability, 0.0, 1.0)?;
+            self.read(glimpse, member, &mut likelihood);
+        }
+        self.grid.weigh(|i, _| likelihood[i]);
+        Ok(())
+    }
+
+    /// Adds the likelihood that a glimpse is of a member.
+    fn read(&self, glimpse: &Glimpse, member: &Member<'_>, likelihood: &mut [f64]) {
+        // Poses stand for their cells: what is seen from a cell is uncertain by its size.
+        let (cell, bin) = (self.p.cell_m, TAU / self.p.headings as f64);
+        let within_cell = Vector3::new(cell * cell, cell * cell, bin * bin) / 12.0;
+        let covariance = glimpse.covariance + Matrix3::from_diagonal(&within_cell);
+        let Some(inverse) = covariance.try_inverse() else { return };
+        let scale = 1.0 / (TAU.powi(3) * covariance.determinant()).sqrt();
+        let z = glimpse.robot_from_landmark;
+        let reach = REACH_SIGMAS * (covariance[(0, 0)] + covariance[(1, 1)]).sqrt();
+        let at = Pose2::new(member.place.x_m, member.place.y_m, member.place.theta_rad);
+        self.grid.each_heading(
+            |heading| {
+                let off = wrap_rad(at.theta_rad - heading - z.theta_rad);
+                if off * off > REACH_SIGMAS.powi(2) * covariance[(2, 2)] {
+                    return None;
+                }
+                // Where a robot of this heading stands to see it so.
+                let from = Pose2::new(0.0, 0.0, heading).compose(&z);
+                Some((Point2::new(at.x_m - from.x_m, at.y_m - from.y_m), reach))
+            },
+            |i, pose| {
+                if member.visible.is_some_and(|v| !v.contains(&Point2::from(pose.position()))) {
+                    return;
+                }
+                let e = z.minus(&pose.between(&at));
+                likelihood[i] += member.probability * scale * (-0.5 * e.dot(&(inverse * e))).exp();
+            },
+        );
+    }
+
+    /// A landmark was not seen, though the camera looked at all bearings between two (left positive).
+    pub fn missed(&mut self, place: &LandmarkPlace, visible: &VisibilityMap, bearings_rad: [f64; 2]) {
+        let detection = self.p.detection;
+        self.grid.weigh(|_, pose| {
+            let (dx, dy) = (place.x_m - pose.x_m, place.y_m - pose.y_m);
+            let bearing = wrap_rad(dy.atan2(dx) - pose.theta_rad);
+            let looked = (bearings_rad[0]..=bearings_rad[1]).contains(&bearing);
+            if looked && visible.contains(&Point2::new(pose.x_m, pose.y_m)) { 1.0 - detection } else { 1.0 }
+        });
+    }
+
+    /// The places where the robot may be, most probable first.
+    pub fn modes(&self) -> Vec<Mode> {
+        self.grid.modes(self.p.mode_m, self.p.mode_rad)
+    }
+
+    /// The pose, once one mode holds more than the rest by far.
+    pub fn decided(&self) -> Option<Mode> {
+        self.modes().into_iter().next().filter(|m| m.mass > self.p.decided)
+    }
+
+    /// Entropy of the belief, nats: 0 when one cell has it all.
+    pub fn entropy_nats(&self) -> f64 {
+        self.grid.entropy_nats()
+    }
+
+    /// Belief of the cell that holds a pose.
+    pub fn belief(&self, pose: &Pose2) -> f64 {
+        self.grid.at(pose)
+    }
+}

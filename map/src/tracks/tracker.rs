@@ -1,0 +1,212 @@
+//! Assigns the quads of each frame to tracks and decides which views to keep.
+
+use crate::tracks::{
+    observation::{Glimpse, Identity, Outcome},
+    params::GatherParams,
+    track::{Kept, Last, MAX_TRACK_VIEWS, Track, same_place},
+};
+use vision::{
+    detect::quads::Corners,
+    geometry::polygon::iou,
+    learn::thinning::{ViewDigest, most_alike},
+    params::RecogniseParams,
+    recognise::{IconFeatures, LandmarkId},
+};
+
+/// Most tracks followed at once, those of a single glimpse included.
+pub const MAX_TRACKS: usize = 256;
+
+/// Follows what one robot drives past.
+#[derive(Debug, Clone, Default)]
+pub struct Tracker {
+    p: GatherParams,
+    tracks: Vec<Track>,
+    numbers: u32,
+}
+
+impl Tracker {
+    /// Nothing followed yet.
+    pub fn new(p: GatherParams) -> Self {
+        Self { p, tracks: vec![], numbers: 0 }
+    }
+
+    /// Takes up a track that was kept elsewhere, from its views in order. From now on it is found by its place only,
+    /// unless it is a landmark's. A number that is taken already is ignored.
+    pub fn resume(&mut self, kept: Kept, views: impl IntoIterator<Item = (Corners, IconFeatures)>) {
+        let Kept { number, landmark, sightings, known, place } = kept;
+        if self.tracks.iter().any(|t| t.number == number) {
+            return;
+        }
+        let mut track = Track { sightings, known, place, ..Track::new(number, landmark) };
+        for (corners, icon) in views.into_iter().take(MAX_TRACK_VIEWS) {
+            track.keep(ViewDigest::new(&corners, &icon.icon), &icon);
+        }
+        self.tracks.push(track);
+        self.numbers = self.numbers.max(number);
+    }
+
+    /// Every track, oldest first.
+    pub fn tracks(&self) -> &[Track] {
+        &self.tracks
+    }
+
+    /// Somebody has decided on a track: no more views of that thing are kept.
+    pub fn close(&mut self, number: u32) {
+        for track in self.tracks.iter_mut().filter(|t| t.number == number) {
+            track.closed = true;
+        }
+    }
+
+    /// Numbers up to this one are taken.
+    pub fn number_after(&mut self, number: u32) {
+        self.numbers = self.numbers.max(number);
+    }
+
+    /// The glimpses of one frame of `camera`, each answered in its place. `wanted`: views of such landmarks are kept;
+    /// `strangers`: things that are no landmark are.
+    pub fn follow(
+        &mut self,
+        (at_ns, camera): (i64, &str),
+        glimpses: &[Glimpse],
+        wanted: impl Fn(LandmarkId) -> bool,
+        strangers: bool,
+        p: &RecogniseParams,
+    ) -> Vec<Outcome> {
+        self.clear_out(at_ns);
+        let mut taken = vec![false; self.tracks.len()];
+        let places = self.assigned(at_ns, camera, glimpses, &mut taken, p);
+        glimpses
+            .iter()
+            .zip(places)
+            .map(|(glimpse, place)| {
+                let at = match (glimpse.identity, place) {
+                    (Identity::Landmark(id), _) if wanted(id) => self.of_landmark(id),
+                    (Identity::Stranger, _) if !strangers => Err(Outcome::Unwanted),
+                    (Identity::Stranger, Place::Nowhere) => self.begun(None),
+                    (_, Place::Track(i)) => Ok(i),
+                    (Identity::Stranger, Place::Occupied) => Err(Outcome::Unlike),
+                    _ => Err(Outcome::Known),
+                };
+                at.map_or_else(|outcome| outcome, |i| self.taken(i, at_ns, camera, glimpse))
+            })
+            .collect()
+    }
+
+    /// Which track each glimpse belongs to: the best pairs first, each track once.
+    fn assigned(
+        &self,
+        at_ns: i64,
+        camera: &str,
+        glimpses: &[Glimpse],
+        taken: &mut [bool],
+        p: &RecogniseParams,
+    ) -> Vec<Place> {
+        let mut places = vec![Place::Nowhere; glimpses.len()];
+        let mut pairs = vec![];
+        for (g, glimpse) in glimpses.iter().enumerate() {
+            for (t, track) in self.tracks.iter().enumerate().filter(|(_, t)| t.landmark.is_none()) {
+                if !self.lies_there(track, at_ns, camera, glimpse) {
+                    continue;
+                }
+                let distance = track.distance(&glimpse.icon, p);
+                if distance <= self.p.max_correlation {
+                    pairs.push((distance, g, t));
+                } else {
+                    places[g] = Place::Occupied;
+                }
+            }
+        }
+        pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+        for (_, g, t) in pairs {
+            match places[g] {
+                Place::Track(_) => {}
+                _ if taken[t] => places[g] = Place::Occupied,
+                _ => (taken[t], places[g]) = (true, Place::Track(t)),
+            }
+        }
+        places
+    }
+
+    fn lies_there(&self, track: &Track, at_ns: i64, camera: &str, glimpse: &Glimpse) -> bool {
+        if let (Some(a), Some(b)) = (&track.place, &glimpse.place) {
+            return same_place(a, b, &self.p);
+        }
+        // A track taken up from elsewhere has not been seen yet: its looks alone say nothing of where it is.
+        let Some(last) = &track.last else { return false };
+        let gap_s = at_ns.saturating_sub(last.at_ns) as f64 * 1e-9;
+        last.camera == camera
+            && (0.0..=self.p.gap_s).contains(&gap_s)
+            && iou(last.corners_px.points(), glimpse.corners_px.points()) >= self.p.min_iou
+    }
+
+    fn of_landmark(&mut self, id: LandmarkId) -> Result<usize, Outcome> {
+        match self.tracks.iter().position(|t| t.landmark == Some(id) && !t.closed) {
+            Some(i) => Ok(i),
+            None => self.begun(Some(id)),
+        }
+    }
+
+    fn begun(&mut self, landmark: Option<LandmarkId>) -> Result<usize, Outcome> {
+        if self.tracks.len() >= MAX_TRACKS {
+            return Err(Outcome::TooMany);
+        }
+        self.numbers = self.numbers.saturating_add(1);
+        self.tracks.push(Track::new(self.numbers, landmark));
+        Ok(self.tracks.len() - 1)
+    }
+
+    fn taken(&mut self, i: usize, at_ns: i64, camera: &str, glimpse: &Glimpse) -> Outcome {
+        let Some(track) = self.tracks.get_mut(i) else { return Outcome::Unlike };
+        track.sightings = track.sightings.saturating_add(1);
+        track.last = Some(Last {
+            at_ns,
+            camera: camera.to_owned(),
+            corners_px: glimpse.corners_px,
+            icon: glimpse.icon.clone(),
+        });
+        track.place = glimpse.place.or(track.place);
+        if track.closed {
+            return Outcome::Decided;
+        }
+        if track.landmark.is_none() && glimpse.identity != Identity::Stranger {
+            track.known = track.known.saturating_add(1);
+            return Outcome::Known;
+        }
+        if track.landmark.is_none() && track.sightings < self.p.min_sightings {
+            return Outcome::TooNew;
+        }
+        if track.views.len() >= MAX_TRACK_VIEWS {
+            return Outcome::Full;
+        }
+        let digest = ViewDigest::new(&glimpse.corners_px, &glimpse.icon.icon);
+        let late = track.views.len() >= MAX_TRACK_VIEWS / 2;
+        let needed = if late { self.p.late_novelty } else { 1.0 };
+        match most_alike(&digest, &track.views, &self.p.thinning) {
+            Some((_, novelty)) if novelty < needed => Outcome::Alike,
+            _ => {
+                track.keep(digest, &glimpse.icon);
+                Outcome::Keep(track.number)
+            }
+        }
+    }
+
+    /// Forgets what was a glimpse only.
+    fn clear_out(&mut self, now_ns: i64) {
+        let memory_s = self.p.memory_s;
+        let fresh = |t: &Track| {
+            t.last.as_ref().is_some_and(|l| now_ns.saturating_sub(l.at_ns) as f64 * 1e-9 <= memory_s)
+        };
+        self.tracks.retain(|t| t.closed || !t.views.is_empty() || fresh(t));
+    }
+}
+
+/// Where a glimpse lies among the tracks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Place {
+    /// Where no track is.
+    Nowhere,
+    /// Where a track is that looks different.
+    Occupied,
+    /// In this track.
+    Track(usize),
+}
