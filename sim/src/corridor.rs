@@ -7,9 +7,11 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-use crate::building::{Builder, Building, LandmarkKind, Thing, WallSegment};
+use crate::builder::{Builder, Thing};
+use crate::building::{Building, LandmarkKind};
 use crate::posters::poster;
 use crate::texture::Texture;
+use crate::wall::WallSegment;
 use crate::{seed, surfaces};
 
 /// How far a poster stands off its wall.

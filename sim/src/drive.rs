@@ -3,9 +3,8 @@
 
 use std::sync::Arc;
 
-use map::mounting::pan_tilt;
 use map::pose2::{Pose2, wrap_rad};
-use nalgebra::{Isometry3, Point2, Vector2, Vector3};
+use nalgebra::{Isometry3, Point2, Vector2};
 use rand::RngExt;
 use serde::{Deserialize, Serialize};
 
@@ -13,8 +12,6 @@ use crate::building::Building;
 use crate::gaze::{Gaze, GazeParams};
 use crate::odometry::{Odometry, OdometryParams};
 use crate::seed;
-
-pub use crate::robot::{Robot, RobotParams, Sighting};
 
 /// Most steps of a drive.
 pub const MAX_STEPS: u64 = 1_000_000;
@@ -243,11 +240,6 @@ fn middle(building: &Building, gap_m: f64) -> [Point2<f64>; 2] {
     let along = if half.x >= half.y { Vector2::x() } else { Vector2::y() };
     let reach = (half.x.max(half.y) - gap_m).max(0.01);
     [centre - along * reach, centre + along * reach]
-}
-
-/// Mounting of the camera at a pan and tilt.
-pub(crate) fn mounting(pan_rad: f64, tilt_rad: f64, height_m: f64) -> Isometry3<f64> {
-    pan_tilt(pan_rad, tilt_rad, Vector3::new(0.0, 0.0, height_m))
 }
 
 #[cfg(test)]

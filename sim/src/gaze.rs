@@ -1,12 +1,12 @@
 //! Where a driving robot's camera looks: at the poster that is seen best, as fast as the pan unit turns, else ahead.
 //! It uses true poses: it stands for a well-behaved robot, not for the method's choice of landmarks.
 
+use map::extrinsics::pan_tilt;
 use map::pose2::{Pose2, wrap_rad};
-use nalgebra::{Isometry3, Point2, Point3};
+use nalgebra::{Isometry3, Point2, Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::building::{Building, LandmarkTruth};
-use crate::drive::mounting;
 
 /// The pan-tilt unit and its taste.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -115,6 +115,11 @@ pub(crate) fn aim(map_from_robot: &Pose2, camera_height_m: f64, l: &LandmarkTrut
     let d = centre.xy() - map_from_robot.position();
     let pan = wrap_rad(d.y.atan2(d.x) - map_from_robot.theta_rad);
     (pan, (centre.z - camera_height_m).atan2(d.norm()))
+}
+
+/// Mounting of the camera at a pan and tilt.
+pub(crate) fn mounting(pan_rad: f64, tilt_rad: f64, height_m: f64) -> Isometry3<f64> {
+    pan_tilt(pan_rad, tilt_rad, Vector3::new(0.0, 0.0, height_m))
 }
 
 #[cfg(test)]

@@ -1,13 +1,14 @@
 //! A planar laser scanner among the building's walls, with noise and a maximum range.
 
-use map::laser::Scan;
-use map::pose2::Pose2;
+use crate::{
+    building::Building,
+    seed,
+    wall::{WallSegment, range},
+};
+use map::{laser::Scan, pose2::Pose2};
 use nalgebra::{Point2, Vector2};
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
-
-use crate::building::{Building, WallSegment};
-use crate::seed;
 
 /// Most beams of a scan; more are not cast.
 pub const MAX_BEAMS: usize = 4096;
@@ -67,25 +68,6 @@ pub fn scan_among(walls: &[WallSegment], map_from_robot: &Pose2, params: &LaserP
     let ranges = (0..beams).map(beam).collect();
     Scan::new(p.robot_from_laser, -0.5 * field, step, max_range_m, ranges)
         .expect("parameters are clamped to a scan's ranges")
-}
-
-/// Distance along a unit direction to the nearest wall nearer than `max_m`, either side of it.
-pub(crate) fn range(
-    walls: &[WallSegment],
-    from_m: &Point2<f64>,
-    direction: &Vector2<f64>,
-    max_m: f64,
-) -> Option<f64> {
-    let hit = |w: &WallSegment| {
-        let (along, to_a) = (w.b_m - w.a_m, w.a_m - from_m);
-        let cross = direction.perp(&along);
-        if cross.abs() < 1e-12 {
-            return None;
-        }
-        let (r, k) = (to_a.perp(&along) / cross, to_a.perp(direction) / cross);
-        (r > 1e-9 && r < max_m && (0.0..=1.0).contains(&k)).then_some(r)
-    };
-    walls.iter().filter_map(hit).min_by(f64::total_cmp)
 }
 
 #[cfg(test)]

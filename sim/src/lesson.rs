@@ -7,8 +7,9 @@ use rand::RngExt;
 use serde::{Deserialize, Serialize};
 
 use crate::building::{Building, LandmarkKind, LandmarkTruth};
-use crate::drive::{Step, mounting};
+use crate::drive::Step;
 use crate::gaze::aim;
+use crate::gaze::mounting;
 use crate::seed;
 
 /// Most stops per landmark.

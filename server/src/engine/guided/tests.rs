@@ -9,7 +9,7 @@ use crate::engine::{
 };
 use map::{mounting::Mounting, pose2::Pose2};
 use nalgebra::{Matrix3, Vector3};
-use sim::drive::Sighting as Seen;
+use sim::robot::Sighting as Seen;
 use vision::{pipeline::FrameFacts, recognise::models::ModelSet};
 
 const POSTER: LandmarkId = LandmarkId(1);
