@@ -9,14 +9,14 @@ pub const MAX_MOUNTING_M: f64 = 10.0;
 
 /// `robot_from_camera` with the covariance of its left perturbation (rotation vector rad, translation m; robot frame).
 #[derive(Debug, Clone, PartialEq)]
-pub struct Mounting {
+pub struct CameraExtrinsics {
     /// Maps camera coordinates (x right, y down, z forward) to robot coordinates (x forward, y left, z up).
     pub robot_from_camera: Isometry3<f64>,
     /// Over (rotation, translation).
     pub covariance: Matrix6<f64>,
 }
 
-impl Mounting {
+impl CameraExtrinsics {
     /// Standard deviation of each angle: extrinsics and encoders (method 13.5).
     pub const DEFAULT_ANGLE_SIGMA_RAD: f64 = 0.1 * PI / 180.0;
     /// Standard deviation of each coordinate.
@@ -93,9 +93,9 @@ mod tests {
     #[test]
     fn impossible_mountings_are_refused() {
         let at = |x| pan_tilt(0.0, 0.0, Vector3::new(x, 0.0, 1.0));
-        assert!(Mounting::new(at(MAX_MOUNTING_M)).is_ok());
-        assert_eq!(Mounting::new(at(10.01)).unwrap_err().field, "robot_from_camera.translation");
-        assert!(Mounting::new(at(f64::NAN)).is_err());
-        assert_eq!(Mounting::with_sigmas(at(0.0), -1.0, 0.0).unwrap_err().field, "angle_sigma_rad");
+        assert!(CameraExtrinsics::new(at(MAX_MOUNTING_M)).is_ok());
+        assert_eq!(CameraExtrinsics::new(at(10.01)).unwrap_err().field, "robot_from_camera.translation");
+        assert!(CameraExtrinsics::new(at(f64::NAN)).is_err());
+        assert_eq!(CameraExtrinsics::with_sigmas(at(0.0), -1.0, 0.0).unwrap_err().field, "angle_sigma_rad");
     }
 }

@@ -15,7 +15,7 @@ mod filter;
 mod replay;
 mod fuser;
 
-pub use belief::{MAX_NUISANCES, OdometryErrors};
+pub use belief::{MAX_NUISANCES, SystematicOdometryError};
 pub use filter::MAX_SOURCES;
 pub use fuser::{Fuser, MAX_EVENTS};
 pub use outcome::{FixOutcome, FixRole, FusedPose, OdometryOutcome};

@@ -1,17 +1,17 @@
 //! Where to look: the landmark that is worth most from an uncertain pose, and the pan and tilt that centre it (method 14).
 //!
 //! In: the robot's pose, what is known of each landmark, the pan-tilt unit. Out: every landmark that can be looked at with
-//! its worth, best first, or the advice to look ahead or about. [`Gaze`] keeps to one landmark until another is clearly
+//! its worth, best first, or the advice to look ahead or about. [`GazeController`] keeps to one landmark until another is clearly
 //! better or looking fails.
 
 mod information;
 
 use crate::{
     check::{self, OutOfRange},
-    extrinsics::Mounting,
+    extrinsics::CameraExtrinsics,
     place::LandmarkPlace,
     pose2::{Pose2Covariance, wrap_rad},
-    visibility::{PoseDraws, Viewer, VisibilityMap},
+    visibility::{PanTiltCamera, PoseDraws, VisibilityMap},
 };
 use nalgebra::{Point2, Point3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -76,7 +76,7 @@ impl Default for GazeParams {
 
 /// A landmark that might be looked at.
 #[derive(Debug, Clone, Copy)]
-pub struct Target<'a> {
+pub struct GazeCandidate<'a> {
     /// Which.
     pub landmark: LandmarkId,
     /// Where it hangs.
@@ -92,7 +92,7 @@ pub struct Target<'a> {
 /// The pan-tilt unit and where it looks now.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct Head {
+pub struct PanTiltUnit {
     /// Camera in the robot frame, metres.
     pub camera_m: [f64; 3],
     /// Present pan, left positive.
@@ -103,13 +103,13 @@ pub struct Head {
     pub rate_radps: f64,
 }
 
-impl Default for Head {
+impl Default for PanTiltUnit {
     fn default() -> Self {
         Self { camera_m: [0.0, 0.0, 1.2], pan_rad: 0.0, tilt_rad: 0.0, rate_radps: 1.0 }
     }
 }
 
-impl Head {
+impl PanTiltUnit {
     /// Every number finite and in range.
     pub fn check(&self) -> Result<(), OutOfRange> {
         for value in self.camera_m {
@@ -123,7 +123,7 @@ impl Head {
 
 /// A landmark that can be looked at, and how.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Choice {
+pub struct GazeTarget {
     /// Which.
     pub landmark: LandmarkId,
     /// Pan that centres it, left positive.
@@ -146,9 +146,9 @@ pub struct Choice {
 
 /// What to do with the camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Look {
+pub enum GazeAction {
     /// Look at this landmark.
-    Landmark(Choice),
+    Landmark(GazeTarget),
     /// No landmark is in sight: look along the path.
     Ahead,
     /// None is in sight, and the pose is so uncertain that this says little: look about.
@@ -158,17 +158,17 @@ pub enum Look {
 /// Every landmark that is seen probably enough and within reach of the unit, most useful first; equal ones by number.
 pub fn rank(
     pose: &Pose2Covariance,
-    targets: &[Target<'_>],
-    viewer: &Viewer,
-    head: &Head,
+    targets: &[GazeCandidate<'_>],
+    viewer: &PanTiltCamera,
+    head: &PanTiltUnit,
     p: &GazeParams,
-) -> Result<Vec<Choice>, OutOfRange> {
+) -> Result<Vec<GazeTarget>, OutOfRange> {
     pose.check()?;
     viewer.check()?;
     head.check()?;
     let camera = Vector3::from(head.camera_m);
     let draws = PoseDraws::new(pose, camera.xy());
-    let mut ranked: Vec<Choice> =
+    let mut ranked: Vec<GazeTarget> =
         targets.iter().filter_map(|t| choice(pose, &draws, t, viewer, head, p)).collect();
     ranked.sort_by(|a, b| b.utility.total_cmp(&a.utility).then(a.landmark.cmp(&b.landmark)));
     Ok(ranked)
@@ -177,11 +177,11 @@ pub fn rank(
 fn choice(
     pose: &Pose2Covariance,
     draws: &PoseDraws,
-    target: &Target<'_>,
-    viewer: &Viewer,
-    head: &Head,
+    target: &GazeCandidate<'_>,
+    viewer: &PanTiltCamera,
+    head: &PanTiltUnit,
     p: &GazeParams,
-) -> Option<Choice> {
+) -> Option<GazeTarget> {
     let probability = target.visible.probability(draws);
     if probability <= p.min_probability {
         return None;
@@ -195,7 +195,7 @@ fn choice(
     let incidence_rad = target.place.incidence_rad(&Point3::new(camera.x, camera.y, head.camera_m[2]));
     let margin_m = target.visible.margin_m(&camera).max(0.0);
     let mounting =
-        Mounting::new(crate::extrinsics::pan_tilt(pan_rad, tilt_rad, head.camera_m.into())).ok()?;
+        CameraExtrinsics::new(crate::extrinsics::pan_tilt(pan_rad, tilt_rad, head.camera_m.into())).ok()?;
     let gain_nats =
         information::gain_nats(pose, target.place, &mounting, viewer.focal_px, p.corner_sigma_px)?;
     let turn = (pan_rad - head.pan_rad).abs().max((tilt_rad - head.tilt_rad).abs());
@@ -206,7 +206,7 @@ fn choice(
         }
         Criterion::Information => probability * gain_nats / (turn / head.rate_radps + p.look_s.max(1e-3)),
     };
-    Some(Choice {
+    Some(GazeTarget {
         landmark: target.landmark,
         pan_rad,
         tilt_rad,
@@ -234,18 +234,24 @@ fn aim(
 
 /// Keeps a robot's gaze steady: which landmark it is told to look at, and which have failed.
 #[derive(Debug, Clone, Default)]
-pub struct Gaze {
+pub struct GazeController {
     current: Option<LandmarkId>,
     failures: u32,
     /// Landmarks that are worth less, until when.
     damped: Vec<(LandmarkId, i64)>,
 }
 
-impl Gaze {
+impl GazeController {
     /// Where to look, of what [`rank`] found. `at_ns` is the robot's own time.
-    pub fn choose(&mut self, at_ns: i64, ranked: &[Choice], pose: &Pose2Covariance, p: &GazeParams) -> Look {
+    pub fn choose(
+        &mut self,
+        at_ns: i64,
+        ranked: &[GazeTarget],
+        pose: &Pose2Covariance,
+        p: &GazeParams,
+    ) -> GazeAction {
         self.damped.retain(|(_, until)| *until > at_ns);
-        let worth = |c: &Choice| {
+        let worth = |c: &GazeTarget| {
             let damped = self.damped.iter().any(|(id, _)| *id == c.landmark);
             c.utility * if damped { p.damping } else { 1.0 }
         };
@@ -254,7 +260,7 @@ impl Gaze {
         let Some(best) = best.filter(|b| worth(b) > 0.0) else {
             self.current = None;
             let (x, y) = (pose.covariance[(0, 0)], pose.covariance[(1, 1)]);
-            return if (x + y).sqrt() > p.lost_m { Look::Sweep } else { Look::Ahead };
+            return if (x + y).sqrt() > p.lost_m { GazeAction::Sweep } else { GazeAction::Ahead };
         };
         let kept = ranked.iter().find(|c| Some(c.landmark) == self.current);
         let chosen = match kept {
@@ -264,11 +270,11 @@ impl Gaze {
         if self.current != Some(chosen.landmark) {
             (self.current, self.failures) = (Some(chosen.landmark), 0);
         }
-        Look::Landmark(*chosen)
+        GazeAction::Landmark(*chosen)
     }
 
     /// Tells whether the landmark that was looked at was recognised.
-    pub fn looked(&mut self, at_ns: i64, landmark: LandmarkId, recognised: bool, p: &GazeParams) {
+    pub fn report_outcome(&mut self, at_ns: i64, landmark: LandmarkId, recognised: bool, p: &GazeParams) {
         if recognised {
             self.damped.retain(|(id, _)| *id != landmark);
         }

@@ -11,11 +11,11 @@ mod place_check;
 mod expected;
 mod monitor;
 
-pub use expected::{Expectation, Eye, expected};
-pub use health::{Change, Finding, Standing};
-pub use monitor::{MAX_WATCHED, Watch};
-pub use params::ChangeParams;
-pub use place_check::{Judged, Verdict, judge, sift};
+pub use expected::{ExpectedLandmark, MountedCamera, expected};
+pub use health::{Finding, HealthChange, LandmarkHealth};
+pub use monitor::{HealthMonitor, MAX_WATCHED};
+pub use params::HealthParams;
+pub use place_check::{PlaceCheck, PlaceVerdict, check_place, drop_unreliable};
 
 #[cfg(test)]
 mod tests;

@@ -13,9 +13,10 @@ mod posterior;
 mod solve;
 mod robot_pose;
 pub mod intrinsics_monitor;
-pub use intrinsics_monitor as watch;
 
-pub use fix::{DecidedBy, Fix, FixRefusal, Modality, Nuisance, NuisanceKey, RobotFix, Sighting};
+pub use fix::{
+    AmbiguityResolvedBy, Fix, FixRefusal, FixResult, FixSource, LandmarkObservation, Nuisance, NuisanceKey,
+};
 pub use params::LocaliseParams;
 pub use robot_pose::{MAX_SIGHTINGS, robot_pose};
 

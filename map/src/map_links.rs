@@ -17,7 +17,7 @@ pub const MAX_LEVEL_M: f64 = 1_000.0;
 
 /// Where a map lies in its parent: turned and moved on the floor, and higher or lower.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Link<K> {
+pub struct MapLink<K> {
     /// The parent.
     pub parent: K,
     /// With covariance; errors of different links are taken for independent.
@@ -26,7 +26,7 @@ pub struct Link<K> {
     pub level_m: f64,
 }
 
-impl<K> Link<K> {
+impl<K> MapLink<K> {
     /// Numbers in range, covariance possible.
     pub fn check(&self) -> Result<(), OutOfRange> {
         self.parent_from_map.check()?;
@@ -36,7 +36,7 @@ impl<K> Link<K> {
 
 /// How one map lies in another.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Relation<K> {
+pub struct MapTransform<K> {
     /// Maps coordinates of the one to the other.
     pub to_from_map: Pose2Covariance,
     /// Height of the one's floor above the other's, metres.
@@ -47,7 +47,7 @@ pub struct Relation<K> {
 
 /// Why maps have no relation.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum FrameError {
+pub enum MapLinkError {
     /// They hang on different maps, or on nothing.
     #[error("no map lies above both, directly or indirectly")]
     NotRelated,
@@ -60,18 +60,18 @@ pub enum FrameError {
 }
 
 /// The links of maps.
-pub type Links<K> = BTreeMap<K, Link<K>>;
+pub type MapLinks<K> = BTreeMap<K, MapLink<K>>;
 
 /// The map itself and all above it.
-fn above<K: Ord + Clone>(links: &Links<K>, map: &K) -> Result<Vec<K>, FrameError> {
+fn above<K: Ord + Clone>(links: &MapLinks<K>, map: &K) -> Result<Vec<K>, MapLinkError> {
     let mut chain = vec![map.clone()];
     let mut at = map;
     while let Some(link) = links.get(at) {
         if chain.contains(&link.parent) {
-            return Err(FrameError::Cycle);
+            return Err(MapLinkError::Cycle);
         }
         if chain.len() > MAX_DEPTH {
-            return Err(FrameError::TooDeep);
+            return Err(MapLinkError::TooDeep);
         }
         chain.push(link.parent.clone());
         at = &link.parent;
@@ -80,24 +80,32 @@ fn above<K: Ord + Clone>(links: &Links<K>, map: &K) -> Result<Vec<K>, FrameError
 }
 
 /// Every map lies in others within bounds, and none in itself.
-pub fn check_all<K: Ord + Clone>(links: &Links<K>) -> Result<(), FrameError> {
+pub fn check_all<K: Ord + Clone>(links: &MapLinks<K>) -> Result<(), MapLinkError> {
     links.keys().try_for_each(|map| above(links, map).map(drop))
 }
 
 /// How `from` lies in `to`.
-pub fn relation<K: Ord + Clone>(links: &Links<K>, from: &K, to: &K) -> Result<Relation<K>, FrameError> {
+pub fn relation<K: Ord + Clone>(
+    links: &MapLinks<K>,
+    from: &K,
+    to: &K,
+) -> Result<MapTransform<K>, MapLinkError> {
     let (up, down) = (above(links, from)?, above(links, to)?);
-    let meet = up.iter().find(|map| down.contains(map)).ok_or(FrameError::NotRelated)?;
+    let meet = up.iter().find(|map| down.contains(map)).ok_or(MapLinkError::NotRelated)?;
     let part = |chain: &[K]| chain.iter().take_while(|map| *map != meet).cloned().collect::<Vec<_>>();
     let (up, mut down) = (part(&up), part(&down));
     let ((meet_from_map, from_m), (meet_from_to, to_m)) = (climb(links, &up), climb(links, &down));
     down.reverse();
     let via = up.into_iter().chain([meet.clone()]).chain(down).collect();
-    Ok(Relation { to_from_map: meet_from_to.inverse().compose(&meet_from_map), level_m: from_m - to_m, via })
+    Ok(MapTransform {
+        to_from_map: meet_from_to.inverse().compose(&meet_from_map),
+        level_m: from_m - to_m,
+        via,
+    })
 }
 
 /// From the first map of a chain to the parent of the last.
-fn climb<K: Ord>(links: &Links<K>, chain: &[K]) -> (Pose2Covariance, f64) {
+fn climb<K: Ord>(links: &MapLinks<K>, chain: &[K]) -> (Pose2Covariance, f64) {
     let nowhere = Pose2Covariance {
         pose: crate::pose2::Pose2::new(0.0, 0.0, 0.0),
         covariance: nalgebra::Matrix3::zeros(),
@@ -113,14 +121,14 @@ mod tests {
     use crate::pose2::Pose2;
     use nalgebra::{Matrix3, Point2, Vector3};
 
-    fn link(parent: u32, pose: [f64; 3], sigma: f64, level_m: f64) -> Link<u32> {
+    fn link(parent: u32, pose: [f64; 3], sigma: f64, level_m: f64) -> MapLink<u32> {
         let covariance = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, 0.01)) * sigma * sigma;
         let pose = Pose2::new(pose[0], pose[1], pose[2]);
-        Link { parent, parent_from_map: Pose2Covariance { pose, covariance }, level_m }
+        MapLink { parent, parent_from_map: Pose2Covariance { pose, covariance }, level_m }
     }
 
     /// A site (0) with a house (1) of two floors (2, 3) and another house (4); a map (9) of its own.
-    fn links() -> Links<u32> {
+    fn links() -> MapLinks<u32> {
         [
             (1, link(0, [100.0, 50.0, 0.6], 0.5, 0.0)),
             (2, link(1, [3.0, -2.0, 1.2], 0.02, 0.0)),
@@ -146,7 +154,7 @@ mod tests {
         assert_eq!(relation(&links, &2, &4).unwrap().via, [2, 1, 0, 4]);
         let itself = relation(&links, &9, &9).unwrap();
         assert!(itself.to_from_map.covariance.norm() < 1e-15 && itself.via == [9]);
-        assert_eq!(relation(&links, &2, &9), Err(FrameError::NotRelated));
+        assert_eq!(relation(&links, &2, &9), Err(MapLinkError::NotRelated));
     }
 
     #[test]
@@ -199,18 +207,18 @@ mod tests {
     fn cycles_and_depth_are_refused() {
         let mut ring = links();
         ring.insert(0, link(3, [0.0; 3], 0.1, 0.0));
-        assert_eq!(check_all(&ring), Err(FrameError::Cycle));
-        assert_eq!(relation(&ring, &2, &4), Err(FrameError::Cycle));
-        assert_eq!(check_all(&[(7, link(7, [0.0; 3], 0.1, 0.0))].into()), Err(FrameError::Cycle));
-        let tower = |n: usize| -> Links<u32> {
+        assert_eq!(check_all(&ring), Err(MapLinkError::Cycle));
+        assert_eq!(relation(&ring, &2, &4), Err(MapLinkError::Cycle));
+        assert_eq!(check_all(&[(7, link(7, [0.0; 3], 0.1, 0.0))].into()), Err(MapLinkError::Cycle));
+        let tower = |n: usize| -> MapLinks<u32> {
             (1..=n as u32).map(|i| (i, link(i - 1, [0.0; 3], 0.1, 3.0))).collect()
         };
         assert_eq!(check_all(&tower(MAX_DEPTH)), Ok(()));
-        assert_eq!(check_all(&tower(MAX_DEPTH + 1)), Err(FrameError::TooDeep));
+        assert_eq!(check_all(&tower(MAX_DEPTH + 1)), Err(MapLinkError::TooDeep));
         let top = relation(&tower(MAX_DEPTH), &(MAX_DEPTH as u32), &0).unwrap();
         assert!((top.level_m - 3.0 * MAX_DEPTH as f64).abs() < 1e-9);
-        let high = Link { level_m: MAX_LEVEL_M + 0.1, ..link(0, [0.0; 3], 0.1, 0.0) };
+        let high = MapLink { level_m: MAX_LEVEL_M + 0.1, ..link(0, [0.0; 3], 0.1, 0.0) };
         assert_eq!(high.check().unwrap_err().field, "level_m");
-        assert!(Link { level_m: MAX_LEVEL_M, ..high }.check().is_ok());
+        assert!(MapLink { level_m: MAX_LEVEL_M, ..high }.check().is_ok());
     }
 }

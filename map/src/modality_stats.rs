@@ -13,15 +13,15 @@ mod modality_map;
 mod reference;
 mod learn;
 
-pub use crate::pose_cell::{CELL_M, Cell};
+pub use crate::pose_cell::{CELL_M, PoseCell};
 pub(crate) use advice::map_from_aligned;
-pub use advice::{Advice, Fault, Level};
-pub use evidence::{Evidence, Figures, MIN_MEASUREMENTS, MIN_VISITS, Modules};
-pub use learn::{Learnt, MAX_CELLS, Run, learn};
-pub use modality::{Mode, Module};
-pub use modality_map::Areas;
+pub use advice::{ErrorModel, ModalityAdvice, StatsScope};
+pub use evidence::{MIN_MEASUREMENTS, MIN_VISITS, ModalityStats, ModalitySummary, StatsByModality};
+pub use learn::{MAX_CELLS, ReferenceRun, RunStats, learn_modality_stats};
+pub use modality::{FusionMode, Modality};
+pub use modality_map::ModalityMap;
 pub use named_area::{MAX_AREAS, MAX_CORNERS, MAX_NAME_BYTES, NamedArea};
-pub use reference::{MAX_REFERENCE, Reference, ReferenceError};
+pub use reference::{MAX_REFERENCE, ReferenceError, ReferenceTrajectory};
 
 #[cfg(test)]
 mod tests;

@@ -11,11 +11,11 @@ mod wall;
 mod wall_fusion;
 mod ceiling;
 
-pub use ceiling::{Ceiling, ViewOnCeiling, ceiling_placement, view_on_ceiling};
-pub use params::{PlacingError, PlacingParams};
+pub use ceiling::{Ceiling, CeilingRectangle, ceiling_placement, view_on_ceiling};
+pub use params::{PlacementError, PlacementParams};
 pub use rays::MIN_COS_INCIDENCE;
-pub use view::{MAX_VIEWS, Placement, PlacingView};
-pub use wall::{ViewOnWall, view_on_wall};
+pub use view::{MAX_VIEWS, Placement, PosedView};
+pub use wall::{WallRectangle, view_on_wall};
 pub use wall_fusion::placement;
 
 #[cfg(test)]

@@ -13,7 +13,7 @@ pub const CELL_M: f64 = 1.0;
 /// A square metre of the floor, driven through in one of four headings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(into = "[i64; 3]", try_from = "[i64; 3]")]
-pub struct Cell {
+pub struct PoseCell {
     /// Metres from the origin, rounded down.
     pub x: i32,
     /// The same.
@@ -22,7 +22,7 @@ pub struct Cell {
     pub heading: u8,
 }
 
-impl Cell {
+impl PoseCell {
     /// Where a pose belongs.
     pub fn of(pose: &Pose2) -> Self {
         let square = |v: f64| (v / CELL_M).floor() as i32;
@@ -36,13 +36,13 @@ impl Cell {
     }
 }
 
-impl From<Cell> for [i64; 3] {
-    fn from(cell: Cell) -> Self {
+impl From<PoseCell> for [i64; 3] {
+    fn from(cell: PoseCell) -> Self {
         [cell.x.into(), cell.y.into(), cell.heading.into()]
     }
 }
 
-impl TryFrom<[i64; 3]> for Cell {
+impl TryFrom<[i64; 3]> for PoseCell {
     type Error = OutOfRange;
 
     fn try_from([x, y, heading]: [i64; 3]) -> Result<Self, OutOfRange> {

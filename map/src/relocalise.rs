@@ -9,10 +9,10 @@ mod observation;
 mod grid;
 mod grid_belief;
 
-pub use grid::{MAX_CELLS, MAX_MODES, Mode};
-pub use grid_belief::Hypotheses;
-pub use observation::{Glimpse, MAX_MEMBERS, Member, Reading};
-pub use params::HypothesesParams;
+pub use grid::{MAX_CELLS, MAX_MODES, PoseHypothesis};
+pub use grid_belief::GridBelief;
+pub use observation::{AssociationHypothesis, MAX_MEMBERS, PossibleLandmark, RelativeObservation};
+pub use params::GridBeliefParams;
 
 #[cfg(test)]
 mod tests;

@@ -19,9 +19,8 @@ mod scan_matcher;
 mod loop_closure;
 mod refine;
 mod map_builder;
-pub use {correlative as field, icp as align};
 
-pub use loop_closure::{Closure, LoopParams};
+pub use loop_closure::{LoopClosure, LoopParams};
 pub use map_builder::{MAX_KEYS, MAX_SCANS, Slam, SlamError, SlamMap};
 pub use params::{RefineParams, SlamParams};
 

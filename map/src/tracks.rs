@@ -11,10 +11,10 @@ mod observation;
 mod track;
 mod tracker;
 
-pub use observation::{Glimpse, Identity, Outcome};
+pub use observation::{Identity, QuadObservation, TrackOutcome};
 pub use params::GatherParams;
-pub use track::{Kept, MAX_TRACK_VIEWS, Track};
-pub use tracker::{MAX_TRACKS, Tracker};
+pub use track::{MAX_TRACK_VIEWS, StoredTrack, Track};
+pub use tracker::{MAX_TRACKS, ViewTracker};
 
 #[cfg(test)]
 mod tests;

@@ -26,11 +26,11 @@ pub mod pointwise;
 
 pub use area::{MAX_OBSTACLES, VisibilityMap, visibility, within_reach};
 pub use chance::{DRAWS, PoseDraws};
-pub use coverage::{Coverage, Gap, MAX_STEPS, Seen, coverage};
+pub use coverage::{Coverage, CoverageGap, CoverageSample, MAX_STEPS, coverage};
 pub use geojson::{Feature, Geometry, Properties};
 pub use obstacle::Obstacle;
 pub use outline::Polygon;
-pub use settings::{Sight, Viewer, VisibilityParams};
+pub use settings::{PanTiltCamera, VisibilityParams, VisibilitySettings};
 
 #[cfg(test)]
 mod tests;

@@ -42,7 +42,7 @@ impl Default for RobotParams {
 
 /// What a robot measures at one moment, with the truth.
 #[derive(Debug, Clone)]
-pub struct Sighting {
+pub struct SensorReadings {
     /// Poses and camera direction.
     pub step: Step,
     /// The picture and what it truly shows.
@@ -88,7 +88,7 @@ impl Robot {
     }
 
     /// Measures at a step, its own or any other. Noise follows from the robot's seed and the step's index.
-    pub fn look(&mut self, step: &Step) -> Sighting {
+    pub fn look(&mut self, step: &Step) -> SensorReadings {
         let seed = seed::mix(self.seed ^ seed::mix(step.index));
         let blur_px = self.exposure_s * step.sweep_radps * self.camera().intrinsics().fx_px;
         let sensor = SensorParams {
@@ -97,14 +97,14 @@ impl Robot {
         };
         let frame = self.renderer.render(&self.building, &step.map_from_camera(), &sensor, seed);
         let scan = laser::scan(&self.building, &step.map_from_robot, &self.laser, seed);
-        Sighting { step: step.clone(), frame, scan }
+        SensorReadings { step: step.clone(), frame, scan }
     }
 }
 
 impl Iterator for Robot {
-    type Item = Sighting;
+    type Item = SensorReadings;
 
-    fn next(&mut self) -> Option<Sighting> {
+    fn next(&mut self) -> Option<SensorReadings> {
         let step = self.drive.next()?;
         Some(self.look(&step))
     }

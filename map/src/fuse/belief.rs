@@ -2,7 +2,7 @@
 
 use crate::{
     fuse::params::FuseParams,
-    localise::{Fix, Modality, Nuisance, NuisanceKey},
+    localise::{Fix, FixSource, Nuisance, NuisanceKey},
     pose2::{Pose2, Pose2Covariance},
 };
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, Matrix3x2, Vector2, Vector3};
@@ -28,14 +28,14 @@ struct Carried {
 /// What lasts of odometry's errors: of one metre measured, `1 + scale` metres are driven and `turn_rad_per_m` more is
 /// turned than measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct OdometryErrors {
+pub struct SystematicOdometryError {
     /// Scale, turn in radians a metre.
     pub errors: Vector2<f64>,
     /// Their covariance.
     pub covariance: Matrix2<f64>,
 }
 
-impl OdometryErrors {
+impl SystematicOdometryError {
     /// Before anything is known of this robot.
     pub(super) fn unknown(p: &FuseParams) -> Self {
         let variances = Vector2::new(p.scale_sigma.powi(2), p.turn_bias_sigma_rad_per_m.powi(2));
@@ -55,7 +55,7 @@ pub(super) struct Belief {
 
 impl Belief {
     /// A pose, what is known of odometry, and room for `lasting` errors.
-    pub(super) fn new(at: &Pose2Covariance, odometry: &OdometryErrors, lasting: usize) -> Self {
+    pub(super) fn new(at: &Pose2Covariance, odometry: &SystematicOdometryError, lasting: usize) -> Self {
         let n = ROBOT + BLOCK * lasting;
         let mut covariance = DMatrix::zeros(n, n);
         covariance.view_mut((0, 0), (POSE, POSE)).copy_from(&at.covariance);
@@ -64,7 +64,7 @@ impl Belief {
         Self { pose: at.pose, odometry, errors, covariance, carried: Vec::new() }
     }
 
-    pub(super) fn from_fix(fix: &Fix, odometry: &OdometryErrors, now: u64) -> Self {
+    pub(super) fn from_fix(fix: &Fix, odometry: &SystematicOdometryError, now: u64) -> Self {
         let mut belief = Self::new(&fix.pose, odometry, fix.nuisances.len());
         for (k, nuisance) in fix.nuisances.iter().enumerate() {
             let at = ROBOT + BLOCK * k;
@@ -78,9 +78,9 @@ impl Belief {
         belief
     }
 
-    pub(super) fn odometry_errors(&self) -> OdometryErrors {
+    pub(super) fn odometry_errors(&self) -> SystematicOdometryError {
         let covariance = Matrix2::from_iterator(self.covariance.view((POSE, POSE), (2, 2)).iter().copied());
-        OdometryErrors { errors: self.odometry, covariance }
+        SystematicOdometryError { errors: self.odometry, covariance }
     }
 
     /// Moves on by a `measured` motion: as odometry's errors have it, with `noise` besides.
@@ -158,7 +158,7 @@ impl Belief {
     /// Keeps at most [`MAX_NUISANCES`] of each kind. To leave one out of a Gaussian is to marginalise it.
     fn forget(&mut self) {
         let is_wall = |c: &Carried| {
-            let of_area = matches!(c.key, NuisanceKey::Area(Modality::Laser, _));
+            let of_area = matches!(c.key, NuisanceKey::Area(FixSource::Laser, _));
             of_area || matches!(c.key, NuisanceKey::Wall(_) | NuisanceKey::Walls(..))
         };
         for walls in [false, true] {

@@ -4,7 +4,7 @@
 use crate::{
     fuse::params::FuseParams,
     localise::{Fix, Nuisance, NuisanceKey},
-    modality_stats::{Advice, Cell, Module, map_from_aligned},
+    modality_stats::{Modality, ModalityAdvice, PoseCell, map_from_aligned},
     pose2::Pose2,
 };
 use nalgebra::{Matrix3, Matrix3x6, Matrix6, SymmetricEigen, Vector3};
@@ -17,10 +17,10 @@ const UNKNOWN: f64 = 1.0;
 pub(super) fn motion(
     measured: &Pose2,
     noise: &Matrix3<f64>,
-    advice: &Advice,
+    advice: &ModalityAdvice,
     p: &FuseParams,
 ) -> (Pose2, Matrix3<f64>) {
-    let (fault, length_m) = (advice.fault(Module::Odometry), measured.position().norm());
+    let (fault, length_m) = (advice.fault(Modality::Odometry), measured.position().norm());
     let more = fault.excess.component_mul(&p.metre_variances()) * length_m;
     // Learnt of robots that drive forwards.
     let bias = if measured.x_m > 0.0 { fault.bias * length_m } else { Vector3::zeros() };
@@ -28,8 +28,8 @@ pub(super) fn motion(
 }
 
 /// A fix as its modality is where the robot is.
-pub(super) fn fix<'a>(fix: &'a Fix, at: &Pose2, advice: &Advice) -> Cow<'a, Fix> {
-    let fault = advice.fault(Module::from(fix.modality));
+pub(super) fn fix<'a>(fix: &'a Fix, at: &Pose2, advice: &ModalityAdvice) -> Cow<'a, Fix> {
+    let fault = advice.fault(Modality::from(fix.modality));
     if fault.bias == Vector3::zeros() && fault.excess == Vector3::zeros() {
         return Cow::Borrowed(fix);
     }
@@ -64,7 +64,7 @@ pub(super) fn fix<'a>(fix: &'a Fix, at: &Pose2, advice: &Advice) -> Cow<'a, Fix>
     covariance.fixed_view_mut::<3, 3>(0, 0).fill_with_identity();
     trusted.pose.covariance += 2.0 * more;
     trusted.nuisances.push(Nuisance {
-        key: NuisanceKey::Area(fix.modality, Cell::of(at)),
+        key: NuisanceKey::Area(fix.modality, PoseCell::of(at)),
         jacobian,
         covariance,
     });

@@ -2,13 +2,13 @@
 
 use crate::{
     fuse::{
-        belief::{Belief, MAX_NUISANCES, OdometryErrors},
+        belief::{Belief, MAX_NUISANCES, SystematicOdometryError},
         error_correction,
         outcome::{FixOutcome, FixRole},
         params::FuseParams,
         rules::Rules,
     },
-    localise::{Fix, Modality},
+    localise::{Fix, FixSource},
     pose2::{Pose2, Pose2Covariance},
 };
 use nalgebra::Matrix3;
@@ -35,8 +35,8 @@ enum Source {
 
 fn sources(fix: &Fix) -> Vec<Source> {
     match fix.modality {
-        Modality::Landmarks => fix.landmarks.iter().copied().map(Source::Landmark).collect(),
-        Modality::Laser => vec![Source::Laser],
+        FixSource::Landmarks => fix.landmarks.iter().copied().map(Source::Landmark).collect(),
+        FixSource::Laser => vec![Source::Laser],
     }
 }
 
@@ -47,7 +47,7 @@ pub(super) struct Filter {
     doubt: Option<Doubt>,
     odometry: Option<Pose2>,
     /// Of odometry's errors, what was learnt before the present belief.
-    learnt: Option<OdometryErrors>,
+    learnt: Option<SystematicOdometryError>,
     /// Each source with the odometry of its last applied fix, the latest last. One list for all would let scans between
     /// two looks at a landmark make the second look new.
     used: Vec<(Source, Pose2)>,
@@ -72,7 +72,7 @@ impl Filter {
     }
 
     /// What is known of odometry's errors.
-    pub(super) fn odometry_errors(&self) -> Option<OdometryErrors> {
+    pub(super) fn odometry_errors(&self) -> Option<SystematicOdometryError> {
         self.belief.as_ref().map(Belief::odometry_errors).or(self.learnt)
     }
 
@@ -95,8 +95,8 @@ impl Filter {
     }
 
     /// Of odometry's errors, what is known so far.
-    fn so_far(&self, p: &FuseParams) -> OdometryErrors {
-        self.odometry_errors().unwrap_or_else(|| OdometryErrors::unknown(p))
+    fn so_far(&self, p: &FuseParams) -> SystematicOdometryError {
+        self.odometry_errors().unwrap_or_else(|| SystematicOdometryError::unknown(p))
     }
 
     /// Moves on to another odometry pose.
@@ -129,7 +129,7 @@ impl Filter {
     /// Takes a fix at the time of the last odometry.
     pub(super) fn correct(&mut self, fix: &Fix, role: FixRole, rules: &Rules) -> FixOutcome {
         let p = &rules.params;
-        let only_corrects = fix.modality == Modality::Laser || role == FixRole::Guided;
+        let only_corrects = fix.modality == FixSource::Laser || role == FixRole::Guided;
         if self.belief.is_none() && only_corrects {
             return FixOutcome::NoPose;
         }
@@ -173,20 +173,20 @@ impl Filter {
         };
         if let FixOutcome::NotUsed { .. } = outcome {
             match fix.modality {
-                Modality::Laser => self.laser_doubts = 0,
-                Modality::Landmarks if role == FixRole::Guided => {}
-                Modality::Landmarks => self.doubt = None,
+                FixSource::Laser => self.laser_doubts = 0,
+                FixSource::Landmarks if role == FixRole::Guided => {}
+                FixSource::Landmarks => self.doubt = None,
             }
         } else if !matches!(outcome, FixOutcome::GatedOut { .. }) {
             match fix.modality {
                 // A scan is laid where the belief says: that it fits there is no word against landmarks that do not.
-                Modality::Laser => {
+                FixSource::Laser => {
                     self.laser_corrections += 1;
                     self.laser_doubts = 0;
                 }
                 // Nor is it that a landmark is found where the belief says.
-                Modality::Landmarks if role == FixRole::Guided => self.corrections += 1,
-                Modality::Landmarks => (self.corrections, self.doubt) = (self.corrections + 1, None),
+                FixSource::Landmarks if role == FixRole::Guided => self.corrections += 1,
+                FixSource::Landmarks => (self.corrections, self.doubt) = (self.corrections + 1, None),
             }
             self.use_up(sources);
         }
@@ -215,7 +215,7 @@ impl Filter {
 
     /// Counts contradictions; enough of them that agree, and rest on landmarks, replace the belief.
     fn contradict(&mut self, fix: &Fix, distance2: f64, p: &FuseParams) -> FixOutcome {
-        if fix.modality == Modality::Laser {
+        if fix.modality == FixSource::Laser {
             self.laser_doubts = self.laser_doubts.saturating_add(1);
             return FixOutcome::GatedOut { distance2, in_a_row: self.laser_doubts };
         }

@@ -3,7 +3,7 @@
 use crate::{
     check::{self, OutOfRange},
     fuse::{
-        belief::OdometryErrors,
+        belief::SystematicOdometryError,
         filter::Filter,
         outcome::{FixOutcome, FixRole, FusedPose, OdometryOutcome},
         params::FuseParams,
@@ -11,7 +11,7 @@ use crate::{
         rules::Rules,
     },
     localise::Fix,
-    modality_stats::Areas,
+    modality_stats::ModalityMap,
     pose2::{Pose2, Pose2Covariance},
 };
 use std::sync::Arc;
@@ -50,7 +50,7 @@ impl Fuser {
     }
 
     /// From now on modalities are trusted as runs have shown; what is replayed goes by it, too.
-    pub fn set_areas(&mut self, areas: Arc<Areas>) {
+    pub fn set_modality_map(&mut self, areas: Arc<ModalityMap>) {
         self.rules.areas = areas;
     }
 
@@ -73,7 +73,7 @@ impl Fuser {
     }
 
     /// What is known of the odometry's lasting errors; none before the first pose.
-    pub fn odometry_errors(&self) -> Option<OdometryErrors> {
+    pub fn odometry_errors(&self) -> Option<SystematicOdometryError> {
         self.now.odometry_errors()
     }
 
@@ -92,13 +92,13 @@ impl Fuser {
     }
 
     /// Takes an odometry reading.
-    pub fn odometry(&mut self, at_ns: i64, odom_from_robot: Pose2) -> Result<OdometryOutcome, OutOfRange> {
-        self.odometry_after(at_ns, odom_from_robot, 0.0)
+    pub fn apply_odometry(&mut self, at_ns: i64, odom_from_robot: Pose2) -> Result<OdometryOutcome, OutOfRange> {
+        self.apply_odometry_after(at_ns, odom_from_robot, 0.0)
     }
 
     /// Takes an odometry reading that was received `elapsed_s` after the one before it. A stamp that is a little wrong must
     /// not look like a jump of odometry: the longer of both times counts.
-    pub fn odometry_after(
+    pub fn apply_odometry_after(
         &mut self,
         at_ns: i64,
         odom_from_robot: Pose2,
@@ -156,12 +156,12 @@ impl Fuser {
     }
 
     /// Takes a fix of the time when its frame was captured, made without the pose.
-    pub fn fix(&mut self, at_ns: i64, fix: &Fix) -> Result<FixOutcome, OutOfRange> {
-        self.fix_as(at_ns, fix, FixRole::Independent)
+    pub fn apply_fix(&mut self, at_ns: i64, fix: &Fix) -> Result<FixOutcome, OutOfRange> {
+        self.apply_fix_as(at_ns, fix, FixRole::Independent)
     }
 
-    /// As [`Fuser::fix`], for a fix that may do more or less.
-    pub fn fix_as(&mut self, at_ns: i64, fix: &Fix, role: FixRole) -> Result<FixOutcome, OutOfRange> {
+    /// As [`Fuser::apply_fix`], for a fix that may do more or less.
+    pub fn apply_fix_as(&mut self, at_ns: i64, fix: &Fix, role: FixRole) -> Result<FixOutcome, OutOfRange> {
         fix.pose.check()?;
         check::covariance("noise", &fix.noise)?;
         for nuisance in &fix.nuisances {

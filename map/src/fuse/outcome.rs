@@ -52,7 +52,7 @@ pub enum FixOutcome {
         /// Squared Mahalanobis distance, 3 degrees of freedom.
         distance2: f64,
     },
-    /// It agrees with the pose, but its modality is not used where the robot is (see [`crate::areas`]).
+    /// It agrees with the pose, but its modality is not used where the robot is (see [`crate::modality_stats`]).
     NotUsed {
         /// Squared Mahalanobis distance.
         distance2: f64,

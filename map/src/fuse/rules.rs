@@ -1,11 +1,11 @@
 //! How to fuse: limits and statistics of the modalities.
 
-use crate::{fuse::params::FuseParams, modality_stats::Areas};
+use crate::{fuse::params::FuseParams, modality_stats::ModalityMap};
 use std::sync::Arc;
 
 /// How to fuse, and where to trust what.
 #[derive(Debug, Clone)]
 pub(super) struct Rules {
     pub(super) params: FuseParams,
-    pub(super) areas: Arc<Areas>,
+    pub(super) areas: Arc<ModalityMap>,
 }

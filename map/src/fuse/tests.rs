@@ -11,7 +11,7 @@ use crate::{
         outcome::{FixOutcome, OdometryOutcome},
         params::FuseParams,
     },
-    localise::{DecidedBy, Fix, Modality, Nuisance, NuisanceKey},
+    localise::{AmbiguityResolvedBy, Fix, FixSource, Nuisance, NuisanceKey},
     pose2::{Pose2, Pose2Covariance},
 };
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix3x2, Matrix3x6, Matrix6, Vector3, Vector6};
@@ -32,12 +32,12 @@ pub(super) fn fix(landmark: u64, pose: Pose2, noise_m: f64, place_m: f64) -> Fix
     let jacobian = -jacobian;
     let total = noise + jacobian * covariance * jacobian.transpose();
     Fix {
-        modality: Modality::Landmarks,
+        modality: FixSource::Landmarks,
         pose: Pose2Covariance::new(pose, total).unwrap(),
         noise,
         nuisances: vec![Nuisance { key: NuisanceKey::Landmark(LandmarkId(landmark)), jacobian, covariance }],
         landmarks: vec![LandmarkId(landmark)],
-        decided_by: DecidedBy::Single,
+        decided_by: AmbiguityResolvedBy::Single,
         chi2: 5.0,
         dof: 5,
     }
@@ -50,7 +50,7 @@ pub(super) fn eager() -> FuseParams {
 /// Odometry along x at 1 m/s, ten times a second, up to `until_s`.
 pub(super) fn drive(fuser: &mut Fuser, until_s: f64) {
     for i in 0..=(until_s * 10.0) as i64 {
-        let outcome = fuser.odometry(i * SECOND / 10, Pose2::new(i as f64 * 0.1, 0.0, 0.0)).unwrap();
+        let outcome = fuser.apply_odometry(i * SECOND / 10, Pose2::new(i as f64 * 0.1, 0.0, 0.0)).unwrap();
         assert_ne!(outcome, OdometryOutcome::Jumped);
     }
 }
@@ -60,7 +60,7 @@ fn there_is_no_pose_before_the_first_fix_or_a_given_start() {
     let mut fuser = Fuser::new(FuseParams::default());
     drive(&mut fuser, 1.0);
     assert_eq!(fuser.pose(), None);
-    let outcome = fuser.fix(SECOND, &fix(1, Pose2::new(5.0, 2.0, 0.1), 0.05, 0.01)).unwrap();
+    let outcome = fuser.apply_fix(SECOND, &fix(1, Pose2::new(5.0, 2.0, 0.1), 0.05, 0.01)).unwrap();
     assert_eq!(outcome, FixOutcome::Started);
     let fused = fuser.pose().unwrap();
     assert_eq!((fused.at_ns, fused.corrections), (SECOND, 1));
@@ -116,14 +116,14 @@ fn equals_batch_least_squares() {
             add(j, DVector::zeros(3), dynamic(&w));
             (truth, odom) = (truth.compose(&motion), odom.compose(&motion));
         }
-        fuser.odometry(i as i64 * SECOND, odom).unwrap();
+        fuser.apply_odometry(i as i64 * SECOND, odom).unwrap();
         let e = Vector3::from_fn(|_, _| 1e-7 * random.normal());
         let made = fix(1 + (i as u64 / 3) % 2, truth.plus(&e), 0.05, 0.03);
         let mut j = DMatrix::zeros(3, unknowns);
         j.view_mut((0, 3 * i), (3, 3)).fill_with_identity();
         j.view_mut((0, 3 * (steps + 1) + 6 * ((i / 3) % 2)), (3, 6)).copy_from(&made.nuisances[0].jacobian);
         add(j, DVector::from_iterator(3, e.iter().copied()), dynamic(&made.noise.try_inverse().unwrap()));
-        fuser.fix(i as i64 * SECOND, &made).unwrap();
+        fuser.apply_fix(i as i64 * SECOND, &made).unwrap();
     }
     let covariance = h.clone().cholesky().unwrap().inverse();
     let solution = &covariance * g;
@@ -144,12 +144,12 @@ fn a_hundred_fixes_know_no_more_than_the_map() {
     let mut fuser = Fuser::new(eager());
     drive(&mut fuser, 0.0);
     for _ in 0..100 {
-        fuser.fix(0, &fix(1, Pose2::default(), 0.05, 0.03)).unwrap();
+        fuser.apply_fix(0, &fix(1, Pose2::default(), 0.05, 0.03)).unwrap();
     }
     let sigma = fuser.pose().unwrap().pose.covariance[(0, 0)].sqrt();
     assert!((0.03..0.031).contains(&sigma), "{sigma}");
     // A second landmark does add something.
-    fuser.fix(0, &fix(2, Pose2::default(), 0.05, 0.03)).unwrap();
+    fuser.apply_fix(0, &fix(2, Pose2::default(), 0.05, 0.03)).unwrap();
     assert!(fuser.pose().unwrap().pose.covariance[(0, 0)].sqrt() < 0.029);
 }
 
@@ -167,7 +167,7 @@ fn drive_at_random(random: &mut Random) -> f64 {
         let drawn = motion.plus(&noise.map_diagonal(f64::sqrt).component_mul(&e));
         (truth, odom) = (truth.compose(&drawn), odom.compose(&motion));
         let at = i * SECOND / 5;
-        assert_eq!(fuser.odometry(at, odom).unwrap(), OdometryOutcome::Moved);
+        assert_eq!(fuser.apply_odometry(at, odom).unwrap(), OdometryOutcome::Moved);
         if i % 3 == 0 {
             let l = (i / 30) as usize % 4;
             let mut made = fix(l as u64, truth, 0.05, 0.02);
@@ -175,7 +175,7 @@ fn drive_at_random(random: &mut Random) -> f64 {
             let v = v.component_mul(&Vector3::new(random.normal(), random.normal(), random.normal()));
             let j = made.nuisances[0].jacobian.fixed_columns::<3>(0).into_owned();
             made.pose.pose = truth.plus(&(v + j * places[l]));
-            fuser.fix(at, &made).unwrap();
+            fuser.apply_fix(at, &made).unwrap();
         }
     }
     let fused = fuser.pose().unwrap().pose;
@@ -196,22 +196,22 @@ fn the_fused_covariance_is_honest() {
 fn an_outlier_is_left_out_and_a_kidnapped_robot_is_found() {
     let mut fuser = Fuser::new(FuseParams::default());
     drive(&mut fuser, 0.0);
-    fuser.fix(0, &fix(1, Pose2::default(), 0.05, 0.01)).unwrap();
+    fuser.apply_fix(0, &fix(1, Pose2::default(), 0.05, 0.01)).unwrap();
     let before = fuser.pose().unwrap();
     let away = |i: i64, l| fix(l, Pose2::new(9.0 + 0.1 * i as f64, 4.0, 0.0), 0.05, 0.01);
-    let outcome = fuser.fix(0, &away(0, 2)).unwrap();
+    let outcome = fuser.apply_fix(0, &away(0, 2)).unwrap();
     assert!(matches!(outcome, FixOutcome::GatedOut { in_a_row: 1, .. }), "{outcome:?}");
     let after = fuser.pose().unwrap();
     assert_eq!((after.pose, after.corrections, after.contradictions), (before.pose, 1, 1));
     // The same wrong landmark for ever does not win...
     for i in 1..20 {
-        fuser.odometry(i * SECOND / 10, Pose2::new(i as f64 * 0.1, 0.0, 0.0)).unwrap();
-        let outcome = fuser.fix(i * SECOND / 10, &away(i, 2)).unwrap();
+        fuser.apply_odometry(i * SECOND / 10, Pose2::new(i as f64 * 0.1, 0.0, 0.0)).unwrap();
+        let outcome = fuser.apply_fix(i * SECOND / 10, &away(i, 2)).unwrap();
         assert!(matches!(outcome, FixOutcome::GatedOut { .. }), "{outcome:?}");
     }
     // ...a second that agrees does.
-    fuser.odometry(2 * SECOND, Pose2::new(2.0, 0.0, 0.0)).unwrap();
-    assert_eq!(fuser.fix(2 * SECOND, &away(20, 3)).unwrap(), FixOutcome::Reset);
+    fuser.apply_odometry(2 * SECOND, Pose2::new(2.0, 0.0, 0.0)).unwrap();
+    assert_eq!(fuser.apply_fix(2 * SECOND, &away(20, 3)).unwrap(), FixOutcome::Reset);
     let found = fuser.pose().unwrap();
     assert!(found.pose.pose.minus(&Pose2::new(11.0, 4.0, 0.0)).norm() < 1e-9);
     assert_eq!(found.contradictions, 0);
@@ -221,16 +221,16 @@ fn an_outlier_is_left_out_and_a_kidnapped_robot_is_found() {
 fn contradictions_that_disagree_do_not_add_up() {
     let mut fuser = Fuser::new(FuseParams::default());
     drive(&mut fuser, 0.0);
-    fuser.fix(0, &fix(1, Pose2::default(), 0.05, 0.01)).unwrap();
+    fuser.apply_fix(0, &fix(1, Pose2::default(), 0.05, 0.01)).unwrap();
     for i in 1..30_i64 {
-        fuser.odometry(i * SECOND / 10, Pose2::new(i as f64 * 0.1, 0.0, 0.0)).unwrap();
+        fuser.apply_odometry(i * SECOND / 10, Pose2::new(i as f64 * 0.1, 0.0, 0.0)).unwrap();
         let wild = fix(i as u64, Pose2::new(5.0 + 3.0 * (i % 7) as f64, -4.0, 1.0), 0.05, 0.01);
-        let outcome = fuser.fix(i * SECOND / 10, &wild).unwrap();
+        let outcome = fuser.apply_fix(i * SECOND / 10, &wild).unwrap();
         assert!(matches!(outcome, FixOutcome::GatedOut { in_a_row: 1, .. }), "{outcome:?}");
     }
     // One good fix clears the doubt.
     let good = fix(1, Pose2::new(2.9, 0.0, 0.0), 0.05, 0.01);
-    assert!(matches!(fuser.fix(29 * SECOND / 10, &good).unwrap(), FixOutcome::Applied { .. }));
+    assert!(matches!(fuser.apply_fix(29 * SECOND / 10, &good).unwrap(), FixOutcome::Applied { .. }));
     assert_eq!(fuser.pose().unwrap().contradictions, 0);
 }
 
@@ -239,14 +239,14 @@ fn a_robot_that_stands_learns_nothing_from_the_same_view() {
     let mut fuser = Fuser::new(FuseParams::default());
     drive(&mut fuser, 0.0);
     let view = fix(1, Pose2::default(), 0.05, 0.0);
-    fuser.fix(0, &view).unwrap();
+    fuser.apply_fix(0, &view).unwrap();
     let once = fuser.pose().unwrap();
     for _ in 0..10 {
-        assert_eq!(fuser.fix(0, &view).unwrap(), FixOutcome::Repeated);
+        assert_eq!(fuser.apply_fix(0, &view).unwrap(), FixOutcome::Repeated);
     }
     assert_eq!(fuser.pose().unwrap(), once);
     assert!(matches!(
-        fuser.fix(0, &fix(2, Pose2::default(), 0.05, 0.0)).unwrap(),
+        fuser.apply_fix(0, &fix(2, Pose2::default(), 0.05, 0.0)).unwrap(),
         FixOutcome::Applied { .. }
     ));
 }
@@ -254,23 +254,23 @@ fn a_robot_that_stands_learns_nothing_from_the_same_view() {
 #[test]
 fn numbers_that_are_none_are_refused() {
     let mut fuser = Fuser::new(FuseParams::default());
-    assert_eq!(fuser.odometry(0, Pose2::new(f64::NAN, 0.0, 0.0)).unwrap_err().field, "x_m");
+    assert_eq!(fuser.apply_odometry(0, Pose2::new(f64::NAN, 0.0, 0.0)).unwrap_err().field, "x_m");
     drive(&mut fuser, 0.0);
     let good = fix(1, Pose2::default(), 0.05, 0.01);
     let mut bad = good.clone();
     bad.noise = -bad.noise;
-    assert_eq!(fuser.fix(0, &bad).unwrap_err().field, "noise");
+    assert_eq!(fuser.apply_fix(0, &bad).unwrap_err().field, "noise");
     let mut bad = good.clone();
     bad.nuisances[0].jacobian[(0, 0)] = f64::INFINITY;
-    assert_eq!(fuser.fix(0, &bad).unwrap_err().field, "nuisance.jacobian");
+    assert_eq!(fuser.apply_fix(0, &bad).unwrap_err().field, "nuisance.jacobian");
     let mut bad = good;
     bad.pose.pose.x_m = f64::NAN;
-    assert_eq!(fuser.fix(0, &bad).unwrap_err().field, "x_m");
+    assert_eq!(fuser.apply_fix(0, &bad).unwrap_err().field, "x_m");
     assert_eq!(fuser.pose(), None);
     // Any time is a time.
     let mut odd = Fuser::new(FuseParams::default());
     for t in [i64::MIN, i64::MAX, 0, -1, i64::MAX - 1] {
-        odd.odometry(t, Pose2::default()).unwrap();
+        odd.apply_odometry(t, Pose2::default()).unwrap();
         odd.pose_at(t);
     }
 }
@@ -278,13 +278,13 @@ fn numbers_that_are_none_are_refused() {
 #[test]
 fn what_is_not_known_stays_so_whatever_runs_have_shown() {
     use super::error_correction;
-    use crate::modality_stats::{Advice, Fault, Module};
+    use crate::modality_stats::{ErrorModel, Modality, ModalityAdvice};
     let mut seen = fix(1, Pose2::new(1.0, 2.0, 0.3), 0.05, 0.02);
     seen.noise[(0, 0)] += 1e4;
     seen.pose.covariance[(0, 0)] += 1e4;
-    let mut advice = Advice::default();
-    advice.faults[Module::Landmarks as usize] =
-        Fault { bias: Vector3::new(0.0, 0.1, 0.0), excess: Vector3::new(2.0, 2.0, 2.0) };
+    let mut advice = ModalityAdvice::default();
+    advice.faults[Modality::Landmarks as usize] =
+        ErrorModel { bias: Vector3::new(0.0, 0.1, 0.0), excess: Vector3::new(2.0, 2.0, 2.0) };
     let at = Pose2::default();
     let trusted = error_correction::fix(&seen, &at, &advice);
     assert!((trusted.pose.pose.y_m - 1.9).abs() < 1e-12);
@@ -295,6 +295,6 @@ fn what_is_not_known_stays_so_whatever_runs_have_shown() {
     assert!(trusted.pose.covariance[(1, 1)] > 4.9 * seen.pose.covariance[(1, 1)], "{trusted:?}");
     let total = trusted.noise + spread;
     assert!((total - trusted.pose.covariance).norm() < 1e-6, "{total} {}", trusted.pose.covariance);
-    let untouched = error_correction::fix(&seen, &at, &Advice::default());
+    let untouched = error_correction::fix(&seen, &at, &ModalityAdvice::default());
     assert_eq!(*untouched, seen);
 }

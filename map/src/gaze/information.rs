@@ -2,7 +2,7 @@
 //! covariance shrinks, by the predicted covariance of its corners (method 13.5, 14).
 
 use crate::{
-    extrinsics::Mounting,
+    extrinsics::CameraExtrinsics,
     localise::predict::{self, Predicted},
     place::LandmarkPlace,
     pose2::Pose2Covariance,
@@ -14,7 +14,7 @@ use vision::frame::{Distortion, Intrinsics};
 pub(super) fn gain_nats(
     pose: &Pose2Covariance,
     place: &LandmarkPlace,
-    mounting: &Mounting,
+    mounting: &CameraExtrinsics,
     focal_px: f64,
     corner_sigma_px: f64,
 ) -> Option<f64> {

@@ -24,7 +24,7 @@ pub use report::{Decision, FramePlan, FrameReport, GlobalReason, GuidedReport, T
 use crate::{
     fuse::FuseParams,
     guided::schedule::agreement::{Judged, is_uncertain, judge},
-    localise::{Fix, RobotFix},
+    localise::{Fix, FixResult},
     pose2::{Pose2, Pose2Covariance},
 };
 use std::collections::BTreeMap;
@@ -153,12 +153,12 @@ impl Schedule {
         self.forget();
         self.has_pose = false;
         match frame.global {
-            Some(RobotFix::Fixed(fix)) => {
+            Some(FixResult::Fixed(fix)) => {
                 self.has_pose = true;
                 self.supported(&fix.landmarks);
                 Decision::Use
             }
-            Some(RobotFix::Ambiguous(_) | RobotFix::Refused(_)) | None => Decision::Keep,
+            Some(FixResult::Ambiguous(_) | FixResult::Refused(_)) | None => Decision::Keep,
         }
     }
 

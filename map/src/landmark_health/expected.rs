@@ -1,8 +1,8 @@
 //! Which landmarks should be in a picture, by the pose alone.
 
 use crate::{
-    extrinsics::Mounting,
-    landmark_health::params::ChangeParams,
+    extrinsics::CameraExtrinsics,
+    landmark_health::params::HealthParams,
     place::LandmarkPlace,
     pose2::Pose2Covariance,
     visibility::{PoseDraws, VisibilityMap},
@@ -16,7 +16,7 @@ use vision::{
 
 /// A landmark that might be in the picture.
 #[derive(Debug, Clone, Copy)]
-pub struct Expectation<'a> {
+pub struct ExpectedLandmark<'a> {
     /// Which.
     pub landmark: LandmarkId,
     /// Where it hangs.
@@ -27,9 +27,9 @@ pub struct Expectation<'a> {
 
 /// The camera and where it looks.
 #[derive(Debug, Clone, Copy)]
-pub struct Eye<'a> {
+pub struct MountedCamera<'a> {
     /// Robot from camera.
-    pub mounting: &'a Mounting,
+    pub mounting: &'a CameraExtrinsics,
     /// Its calibration.
     pub camera: &'a Intrinsics,
     /// Width and height of the image, pixels.
@@ -40,9 +40,9 @@ pub struct Eye<'a> {
 /// robot is; by number.
 pub fn expected(
     pose: &Pose2Covariance,
-    eye: &Eye<'_>,
-    landmarks: &[Expectation<'_>],
-    p: &ChangeParams,
+    eye: &MountedCamera<'_>,
+    landmarks: &[ExpectedLandmark<'_>],
+    p: &HealthParams,
 ) -> Vec<LandmarkId> {
     let draws = PoseDraws::new(pose, eye.mounting.robot_from_camera.translation.vector.xy());
     let expected = landmarks.iter().filter(|l| {
@@ -53,11 +53,16 @@ pub fn expected(
     expected.map(|l| l.landmark).collect()
 }
 
-fn camera_at(on_floor: &Point2<f64>, eye: &Eye<'_>) -> Point3<f64> {
+fn camera_at(on_floor: &Point2<f64>, eye: &MountedCamera<'_>) -> Point3<f64> {
     Point3::new(on_floor.x, on_floor.y, eye.mounting.robot_from_camera.translation.z)
 }
 
-fn is_inside(at: &crate::pose2::Pose2, eye: &Eye<'_>, place: &LandmarkPlace, p: &ChangeParams) -> bool {
+fn is_inside(
+    at: &crate::pose2::Pose2,
+    eye: &MountedCamera<'_>,
+    place: &LandmarkPlace,
+    p: &HealthParams,
+) -> bool {
     let map_from_camera = at.to_isometry3() * eye.mounting.robot_from_camera;
     let camera_from_landmark = map_from_camera.inverse() * place.map_from_landmark();
     let inside =

@@ -7,7 +7,7 @@ use vision::recognise::LandmarkId;
 /// How far a landmark is trusted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Standing {
+pub enum LandmarkHealth {
     /// Nothing speaks against it.
     #[default]
     Sound,
@@ -38,11 +38,11 @@ pub enum Finding {
 
 /// A landmark's standing should change.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Change {
+pub struct HealthChange {
     /// Which landmark.
     pub landmark: LandmarkId,
     /// To what.
-    pub standing: Standing,
+    pub standing: LandmarkHealth,
     /// Why; nothing speaks against a sound one.
     pub finding: Option<Finding>,
 }

@@ -2,9 +2,9 @@
 
 use crate::{
     landmark_health::{
-        health::{Change, Finding, Standing},
-        params::ChangeParams,
-        place_check::{Judged, Verdict},
+        health::{Finding, HealthChange, LandmarkHealth},
+        params::HealthParams,
+        place_check::{PlaceCheck, PlaceVerdict},
     },
     pose2::Pose2,
 };
@@ -16,7 +16,7 @@ use vision::recognise::LandmarkId;
 pub const MAX_WATCHED: usize = 1024;
 
 #[derive(Debug, Clone, Default)]
-pub(super) struct Evidence {
+pub(super) struct LandmarkEvidence {
     /// Sightings elsewhere in a row, and the sum of where.
     elsewhere: u32,
     apparent: Option<Pose2>,
@@ -31,30 +31,33 @@ pub(super) struct Evidence {
     seen_from: Option<Point2<f64>>,
     missed_from: Option<Point2<f64>>,
     /// What was last said of it.
-    told: Standing,
+    told: LandmarkHealth,
     touched: u64,
 }
 
 /// One robot's evidence on the landmarks of its map.
 #[derive(Debug, Clone)]
-pub struct Watch {
-    params: ChangeParams,
-    pub(super) landmarks: BTreeMap<LandmarkId, Evidence>,
+pub struct HealthMonitor {
+    params: HealthParams,
+    pub(super) landmarks: BTreeMap<LandmarkId, LandmarkEvidence>,
     frames: u64,
 }
 
-impl Watch {
+impl HealthMonitor {
     /// Knows nothing.
-    pub fn new(params: ChangeParams) -> Self {
+    pub fn new(params: HealthParams) -> Self {
         Self { params, landmarks: BTreeMap::new(), frames: 0 }
     }
 
     /// The robot's pose has proved wrong, or the map is another one: nothing that was judged by it counts. Gives the
     /// landmarks whose flags were raised by it.
-    pub fn clear(&mut self) -> Vec<Change> {
+    pub fn clear(&mut self) -> Vec<HealthChange> {
         let cleared = std::mem::take(&mut self.landmarks);
-        let raised = cleared.into_iter().filter(|(_, e)| e.told == Standing::Flagged && e.elsewhere > 0);
-        raised.map(|(landmark, _)| Change { landmark, standing: Standing::Sound, finding: None }).collect()
+        let raised =
+            cleared.into_iter().filter(|(_, e)| e.told == LandmarkHealth::Flagged && e.elsewhere > 0);
+        raised
+            .map(|(landmark, _)| HealthChange { landmark, standing: LandmarkHealth::Sound, finding: None })
+            .collect()
     }
 
     /// Takes what one frame says, seen from `from`: judged sightings and what should have been seen and was not.
@@ -62,16 +65,16 @@ impl Watch {
     pub fn frame(
         &mut self,
         from: Point2<f64>,
-        judged: &[Judged],
+        judged: &[PlaceCheck],
         missed: &[LandmarkId],
-        standing: impl Fn(LandmarkId) -> Standing,
-    ) -> Vec<Change> {
+        standing: impl Fn(LandmarkId) -> LandmarkHealth,
+    ) -> Vec<HealthChange> {
         self.frames += 1;
         for judged in judged {
             self.sighting(from, judged);
         }
         let agreeing = |id: LandmarkId| {
-            judged.iter().any(|j| j.landmark != id && matches!(j.verdict, Verdict::InPlace { .. }))
+            judged.iter().any(|j| j.landmark != id && matches!(j.verdict, PlaceVerdict::InPlace { .. }))
         };
         for (id, evidence) in &mut self.landmarks {
             evidence.confirmed |= evidence.elsewhere > 0 && agreeing(*id);
@@ -85,7 +88,7 @@ impl Watch {
         ids.filter_map(|(id, evidence)| evidence.change(*id, standing(*id), p)).collect()
     }
 
-    fn sighting(&mut self, from: Point2<f64>, judged: &Judged) {
+    fn sighting(&mut self, from: Point2<f64>, judged: &PlaceCheck) {
         let p = &self.params;
         let evidence = self.landmarks.entry(judged.landmark).or_default();
         evidence.touched = self.frames;
@@ -93,14 +96,14 @@ impl Watch {
         evidence.misses = 0;
         let new = evidence.seen_from.is_none_or(|last| (last - from).norm() >= p.sighting_move_m);
         match judged.verdict {
-            Verdict::Undecided | Verdict::Unsure => {}
+            PlaceVerdict::Undecided | PlaceVerdict::Unsure => {}
             _ if !new => {}
-            Verdict::InPlace { .. } => {
+            PlaceVerdict::InPlace { .. } => {
                 (evidence.elsewhere, evidence.confirmed) = (0, false);
                 evidence.in_place = evidence.in_place.saturating_add(1);
                 evidence.seen_from = Some(from);
             }
-            Verdict::Elsewhere { apparent, by_m, supporters, .. } => {
+            PlaceVerdict::Elsewhere { apparent, by_m, supporters, .. } => {
                 let same = evidence
                     .apparent
                     .is_some_and(|a| (a.position() - apparent.position()).norm() < p.agree_m);
@@ -135,9 +138,14 @@ impl Watch {
     }
 }
 
-impl Evidence {
+impl LandmarkEvidence {
     /// What should become of a landmark of this standing; each thing is said once.
-    fn change(&mut self, landmark: LandmarkId, now: Standing, p: &ChangeParams) -> Option<Change> {
+    fn change(
+        &mut self,
+        landmark: LandmarkId,
+        now: LandmarkHealth,
+        p: &HealthParams,
+    ) -> Option<HealthChange> {
         let often = self.elsewhere >= p.flag_sightings && (self.firm || self.confirmed);
         let moved = self.apparent.filter(|_| often).map(|apparent| Finding::Moved {
             apparent,
@@ -148,16 +156,20 @@ impl Evidence {
         let sure = (self.elsewhere >= p.quarantine_sightings && self.confirmed)
             || self.misses >= p.quarantine_misses;
         let Some(finding) = moved.or(missing) else {
-            self.told = Standing::Sound;
-            let clear = now == Standing::Flagged && self.in_place >= p.clear_sightings;
+            self.told = LandmarkHealth::Sound;
+            let clear = now == LandmarkHealth::Flagged && self.in_place >= p.clear_sightings;
             // Said again only after as many sightings again, should nobody have heard it.
             self.in_place = if clear { 0 } else { self.in_place };
-            return clear.then_some(Change { landmark, standing: Standing::Sound, finding: None });
+            return clear.then_some(HealthChange {
+                landmark,
+                standing: LandmarkHealth::Sound,
+                finding: None,
+            });
         };
-        let standing = if sure { Standing::Quarantined } else { Standing::Flagged };
+        let standing = if sure { LandmarkHealth::Quarantined } else { LandmarkHealth::Flagged };
         // What is in quarantine is for a person; what was said is not repeated.
         let news = standing > now && standing != self.told;
         self.told = standing;
-        news.then_some(Change { landmark, standing, finding: Some(finding) })
+        news.then_some(HealthChange { landmark, standing, finding: Some(finding) })
     }
 }

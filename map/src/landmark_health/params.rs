@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 /// Knobs of the watch.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct ChangeParams {
+pub struct HealthParams {
     /// Squared Mahalanobis distance from which on a landmark is seen elsewhere: 99.9 % of chi2 with 3 degrees of freedom.
     pub moved_chi2: f64,
     /// A look tells that a landmark is in place when a move of this much would stand out.
@@ -38,7 +38,7 @@ pub struct ChangeParams {
     pub image_margin: f64,
 }
 
-impl Default for ChangeParams {
+impl Default for HealthParams {
     fn default() -> Self {
         Self {
             moved_chi2: CHI2_3_999,

@@ -2,9 +2,9 @@
 
 use crate::{
     check::OutOfRange,
-    extrinsics::Mounting,
-    landmark_health::params::ChangeParams,
-    localise::{FixRefusal, LocaliseParams, RobotFix, Sighting, robot_pose},
+    extrinsics::CameraExtrinsics,
+    landmark_health::params::HealthParams,
+    localise::{FixRefusal, FixResult, LandmarkObservation, LocaliseParams, robot_pose},
     pose2::{Pose2, Pose2Covariance},
 };
 use nalgebra::{Matrix3, Vector3};
@@ -13,7 +13,7 @@ use vision::recognise::LandmarkId;
 
 /// What a sighting says of its landmark's place.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Verdict {
+pub enum PlaceVerdict {
     /// It hangs there.
     InPlace {
         /// Squared Mahalanobis distance of the fix from it to the pose.
@@ -39,33 +39,33 @@ pub enum Verdict {
 
 /// A judged sighting.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Judged {
+pub struct PlaceCheck {
     /// Of which landmark.
     pub landmark: LandmarkId,
     /// What it says.
-    pub verdict: Verdict,
+    pub verdict: PlaceVerdict,
 }
 
 /// Judges a sighting by the robot's pose without it. `supporters` are the landmarks that pose rests on.
-pub fn judge(
-    sighting: &Sighting<'_>,
-    mounting: &Mounting,
+pub fn check_place(
+    sighting: &LandmarkObservation<'_>,
+    mounting: &CameraExtrinsics,
     pose: &Pose2Covariance,
     supporters: &[LandmarkId],
-    p: &ChangeParams,
-) -> Result<Judged, OutOfRange> {
+    p: &HealthParams,
+) -> Result<PlaceCheck, OutOfRange> {
     let landmark = sighting.landmark;
     let others = supporters.iter().collect::<BTreeSet<_>>().into_iter().filter(|id| **id != landmark).count();
     if others == 0 {
-        return Ok(Judged { landmark, verdict: Verdict::Undecided });
+        return Ok(PlaceCheck { landmark, verdict: PlaceVerdict::Undecided });
     }
     let alone = robot_pose(std::slice::from_ref(sighting), mounting, None, &LocaliseParams::default())?;
     let fixes = match &alone {
-        RobotFix::Fixed(fix) => std::slice::from_ref(&**fix),
-        RobotFix::Ambiguous(fixes) => fixes.as_slice(),
+        FixResult::Fixed(fix) => std::slice::from_ref(&**fix),
+        FixResult::Ambiguous(fixes) => fixes.as_slice(),
         // Another height or size: the corners fit no robot on this floor.
-        RobotFix::Refused(FixRefusal::Room { .. } | FixRefusal::Side) => &[],
-        RobotFix::Refused(_) => return Ok(Judged { landmark, verdict: Verdict::Undecided }),
+        FixResult::Refused(FixRefusal::Room { .. } | FixRefusal::Side) => &[],
+        FixResult::Refused(_) => return Ok(PlaceCheck { landmark, verdict: PlaceVerdict::Undecided }),
     };
     let distances = fixes.iter().map(|f| (distance2(&f.pose, pose), &f.pose));
     let nearest = distances.min_by(|a, b| a.0.total_cmp(&b.0));
@@ -75,15 +75,15 @@ pub fn judge(
         let told = p.told_m / p.moved_chi2.sqrt();
         let both = nearest.map_or(0.0, |(_, fix)| spread_m(&(fix.covariance + pose.covariance)));
         if both > told && spread_m(&pose.covariance) < told {
-            Verdict::Unsure
+            PlaceVerdict::Unsure
         } else {
-            Verdict::InPlace { distance2 }
+            PlaceVerdict::InPlace { distance2 }
         }
     } else {
         let (apparent, by_m) = apparent(sighting, mounting, pose);
-        Verdict::Elsewhere { distance2, apparent, by_m, supporters: others }
+        PlaceVerdict::Elsewhere { distance2, apparent, by_m, supporters: others }
     };
-    Ok(Judged { landmark, verdict })
+    Ok(PlaceCheck { landmark, verdict })
 }
 
 fn distance2(fix: &Pose2Covariance, pose: &Pose2Covariance) -> f64 {
@@ -99,7 +99,11 @@ fn spread_m(covariance: &Matrix3<f64>) -> f64 {
 }
 
 /// Where a landmark appears from a pose: of the two solutions of its plane the one nearer to its place.
-pub(super) fn apparent(sighting: &Sighting<'_>, mounting: &Mounting, pose: &Pose2Covariance) -> (Pose2, f64) {
+pub(super) fn apparent(
+    sighting: &LandmarkObservation<'_>,
+    mounting: &CameraExtrinsics,
+    pose: &Pose2Covariance,
+) -> (Pose2, f64) {
     let map_from_camera = pose.pose.to_isometry3() * mounting.robot_from_camera;
     let place = sighting.place.map_from_landmark();
     let solutions = std::iter::once(&sighting.seen.best).chain(sighting.seen.second.as_ref());
@@ -116,12 +120,15 @@ pub(super) fn apparent(sighting: &Sighting<'_>, mounting: &Mounting, pose: &Pose
 /// Of the sightings of one frame those that may correct the pose: without the unsure, and without those that are seen
 /// elsewhere unless no other would be left. Then they stay, and it is for the fusion to weigh them: it may be the pose
 /// that is wrong.
-pub fn sift<'a>(sightings: &[Sighting<'a>], judged: &[Judged]) -> Vec<Sighting<'a>> {
-    let is = |s: &Sighting<'_>, kind: fn(&Verdict) -> bool| {
+pub fn drop_unreliable<'a>(
+    sightings: &[LandmarkObservation<'a>],
+    judged: &[PlaceCheck],
+) -> Vec<LandmarkObservation<'a>> {
+    let is = |s: &LandmarkObservation<'_>, kind: fn(&PlaceVerdict) -> bool| {
         judged.iter().any(|j| j.landmark == s.landmark && kind(&j.verdict))
     };
-    let sure = sightings.iter().filter(|s| !is(s, |v| matches!(v, Verdict::Unsure))).copied();
+    let sure = sightings.iter().filter(|s| !is(s, |v| matches!(v, PlaceVerdict::Unsure))).copied();
     let (elsewhere, kept): (Vec<_>, Vec<_>) =
-        sure.partition(|s| is(s, |v| matches!(v, Verdict::Elsewhere { .. })));
+        sure.partition(|s| is(s, |v| matches!(v, PlaceVerdict::Elsewhere { .. })));
     if kept.is_empty() { elsewhere } else { kept }
 }

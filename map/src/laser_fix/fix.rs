@@ -1,7 +1,7 @@
 //! The pose by one scan with its error sources, or why there is none.
 
 use crate::{
-    localise::{DecidedBy, Fix, Modality, Nuisance, NuisanceKey},
+    localise::{AmbiguityResolvedBy, Fix, FixSource, Nuisance, NuisanceKey},
     pose2::Pose2Covariance,
 };
 use nalgebra::{Matrix2, Matrix3, Matrix3x2, Matrix3x6, Matrix6, SymmetricEigen};
@@ -45,12 +45,12 @@ impl LaserFix {
         let key = NuisanceKey::Walls(square(self.pose.pose.x_m), square(self.pose.pose.y_m));
         let others = Nuisance { key, jacobian, covariance };
         Fix {
-            modality: Modality::Laser,
+            modality: FixSource::Laser,
             pose: self.pose,
             noise: self.noise,
             nuisances: named.chain([others]).collect(),
             landmarks: Vec::new(),
-            decided_by: DecidedBy::Prior,
+            decided_by: AmbiguityResolvedBy::Prior,
             chi2: 0.0,
             dof: self.points.saturating_sub(3),
         }

@@ -1,12 +1,12 @@
 //! What a fix is made from and what it gives.
 
-use crate::{place::LandmarkPlace, pose_cell::Cell, pose2::Pose2Covariance};
+use crate::{place::LandmarkPlace, pose_cell::PoseCell, pose2::Pose2Covariance};
 use nalgebra::{Matrix3, Matrix3x6, Matrix6};
 use vision::{localise::pose::LandmarkPose, recognise::LandmarkId};
 
 /// A recognised landmark and where the map says it hangs.
 #[derive(Debug, Clone, Copy)]
-pub struct Sighting<'a> {
+pub struct LandmarkObservation<'a> {
     /// Which one.
     pub landmark: LandmarkId,
     /// How it was seen.
@@ -21,7 +21,7 @@ pub enum NuisanceKey {
     /// The place and size of a landmark: (x, y, theta, z, width, height).
     Landmark(LandmarkId),
     /// The mounting of the camera: left perturbation (rotation, translation), robot frame.
-    Mounting,
+    Extrinsics,
     /// The camera's intrinsics: the first three of six are the errors of its focal length (as a share) and of its
     /// principal point (px).
     Camera,
@@ -32,7 +32,7 @@ pub enum NuisanceKey {
     Walls(i32, i32),
     /// What a modality gets wrong in a place beyond what it says, as runs have shown: the first three of six are unit errors
     /// of (x, y, theta).
-    Area(Modality, Cell),
+    Area(FixSource, PoseCell),
 }
 
 /// How a lasting error moves a fix: `estimated - true pose = jacobian * (true - assumed value)`.
@@ -48,7 +48,7 @@ pub struct Nuisance {
 
 /// What told the two solutions of the planar ambiguity apart.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum DecidedBy {
+pub enum AmbiguityResolvedBy {
     /// There was one solution only.
     Single,
     /// The corners and the known mounting (camera height, tilt, no roll): the other does not fit them.
@@ -59,7 +59,7 @@ pub enum DecidedBy {
 
 /// What a fix was made from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Modality {
+pub enum FixSource {
     /// Recognised landmarks.
     Landmarks,
     /// A scan, laid on the map's walls near a pose that was known before: it corrects, and can never start one.
@@ -70,7 +70,7 @@ pub enum Modality {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fix {
     /// What it was made from.
-    pub modality: Modality,
+    pub modality: FixSource,
     /// `map_from_robot` with everything that is uncertain: corners, places of landmarks, mounting, intrinsics.
     pub pose: Pose2Covariance,
     /// The part of the covariance that is new in every frame (corners).
@@ -80,7 +80,7 @@ pub struct Fix {
     /// The landmarks it rests on.
     pub landmarks: Vec<LandmarkId>,
     /// How the planar ambiguity was resolved.
-    pub decided_by: DecidedBy,
+    pub decided_by: AmbiguityResolvedBy,
     /// Weighted squared residual of the corners.
     pub chi2: f64,
     /// Its degrees of freedom: 8 a landmark less 3.
@@ -121,7 +121,7 @@ pub enum FixRefusal {
 
 /// What a frame says of the robot's pose. There is a pose only when exactly one solution is left.
 #[derive(Debug, Clone, PartialEq)]
-pub enum RobotFix {
+pub enum FixResult {
     /// The pose.
     Fixed(Box<Fix>),
     /// Several solutions are left; best first. None of them may be used without more knowledge.

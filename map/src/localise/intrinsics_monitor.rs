@@ -4,9 +4,9 @@
 //! and a suspicion with its number. It changes nothing: a suspect camera is for people to calibrate again.
 
 use crate::{
-    extrinsics::Mounting,
+    extrinsics::CameraExtrinsics,
     localise::{
-        fix::{Fix, Sighting},
+        fix::{Fix, LandmarkObservation},
         planar::Planar,
     },
     pose2::{Pose2, wrap_rad},
@@ -22,7 +22,7 @@ pub const MAX_WATCHED: usize = 256;
 /// Knobs of the watch.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct WatchParams {
+pub struct IntrinsicsMonitorParams {
     /// Tries before anything is said.
     pub min_tries: u32,
     /// Landmarks before anything is said of the focal length: the place of one may be wrong.
@@ -43,7 +43,7 @@ pub struct WatchParams {
     pub step_rad: f64,
 }
 
-impl Default for WatchParams {
+impl Default for IntrinsicsMonitorParams {
     fn default() -> Self {
         Self {
             min_tries: 20,
@@ -71,8 +71,8 @@ pub struct FocalEvidence {
 
 /// The evidence of one fix. `None` where its numbers say nothing.
 pub fn focal_evidence(
-    sightings: &[Sighting<'_>],
-    mounting: &Mounting,
+    sightings: &[LandmarkObservation<'_>],
+    mounting: &CameraExtrinsics,
     pose: &Pose2,
 ) -> Option<FocalEvidence> {
     // What is looked for must not be explained away by what is said to be uncertain.
@@ -123,7 +123,7 @@ pub enum Suspicion {
 
 /// What is known of a camera's intrinsics from its use.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct WatchState {
+pub struct IntrinsicsMonitorState {
     /// Looks counted.
     pub tries: u32,
     /// Of them, refused because no robot on the floor sees the corners there.
@@ -149,8 +149,8 @@ struct OfLandmark {
 
 /// The watch over one camera with one set of intrinsics: a new one when they change.
 #[derive(Debug, Clone, Default)]
-pub struct CameraWatch {
-    params: WatchParams,
+pub struct IntrinsicsMonitor {
+    params: IntrinsicsMonitorParams,
     last: Option<Pose2>,
     tries: u32,
     refused: u32,
@@ -159,14 +159,14 @@ pub struct CameraWatch {
     landmarks: BTreeMap<LandmarkId, OfLandmark>,
 }
 
-impl CameraWatch {
+impl IntrinsicsMonitor {
     /// Nothing seen yet.
-    pub fn new(params: WatchParams) -> Self {
+    pub fn new(params: IntrinsicsMonitorParams) -> Self {
         Self { params, ..Self::default() }
     }
 
     /// A fix with its evidence. Looks from where the last one was are not counted.
-    pub fn fixed(&mut self, fix: &Fix, evidence: Option<FocalEvidence>) {
+    pub fn add_fix(&mut self, fix: &Fix, evidence: Option<FocalEvidence>) {
         let pose = fix.pose.pose;
         let same = self.last.is_some_and(|last| {
             let far = (pose.x_m - last.x_m).hypot(pose.y_m - last.y_m) >= self.params.step_m;
@@ -191,16 +191,16 @@ impl CameraWatch {
     }
 
     /// A landmark was recognised, but no robot on the floor sees it like this.
-    pub fn refused(&mut self) {
+    pub fn add_refusal(&mut self) {
         self.tries = self.tries.saturating_add(1);
         self.refused = self.refused.saturating_add(1);
     }
 
     /// What is known so far.
-    pub fn state(&self) -> WatchState {
+    pub fn state(&self) -> IntrinsicsMonitorState {
         let focal = self.focal();
         let reduced_chi2 = (self.dof > 0.0).then(|| self.chi2 / self.dof);
-        WatchState {
+        IntrinsicsMonitorState {
             tries: self.tries,
             refused: self.refused,
             landmarks: self.landmarks.len(),
@@ -248,7 +248,7 @@ mod tests {
     use super::*;
     use crate::{
         extrinsics::pan_tilt,
-        localise::{FixRefusal, LocaliseParams, RobotFix, robot_pose},
+        localise::{FixRefusal, FixResult, LocaliseParams, robot_pose},
         place::{LandmarkPlace, PlaceSigmas},
     };
     use nalgebra::{Matrix2, Vector2, Vector3, Vector6};
@@ -266,17 +266,17 @@ mod tests {
 
     /// A robot that looks at six posters from many places, through a camera whose focal length is `true_px` but said to
     /// be 600: the watch at the end. Places and mounting are wrong by as much as they claim.
-    fn watched(true_px: f64, looks: usize, seed: u64) -> WatchState {
+    fn watched(true_px: f64, looks: usize, seed: u64) -> IntrinsicsMonitorState {
         let mut random = Random::new(seed);
         let said = Intrinsics::new(600.0, 600.0, 320.0, 240.0, Distortion::None).unwrap();
         // Whoever says that it may be wrong is watched all the same.
         let said = said.with_sigmas(IntrinsicsSigmas { focal_px: 30.0, center_px: 2.0 }).unwrap();
         let real = Intrinsics { fx_px: true_px, fy_px: true_px, ..said };
-        let believed = Mounting::new(pan_tilt(0.0, 0.0, Vector3::new(0.1, 0.0, 1.2))).unwrap();
+        let believed = CameraExtrinsics::new(pan_tilt(0.0, 0.0, Vector3::new(0.1, 0.0, 1.2))).unwrap();
         let e = believed.covariance.map_diagonal(f64::sqrt).map(|s| s * random.normal());
         let (turn, shift) = (e.fixed_rows::<3>(0).into(), e.fixed_rows::<3>(3).into());
         let mounted = perturbed(&believed.robot_from_camera, &turn, &shift);
-        let mut watch = CameraWatch::default();
+        let mut watch = IntrinsicsMonitor::default();
         let places: Vec<(LandmarkPlace, LandmarkPlace)> = (0..6)
             .map(|i| {
                 let centre = Vector3::new(4.0 * f64::from(i), 0.0, 1.5);
@@ -300,13 +300,14 @@ mod tests {
             });
             let claimed = [Matrix2::identity() * 0.25; 4];
             let seen = landmark_pose(&Corners::new(points).unwrap(), &claimed, SIZE, &said).unwrap();
-            let sightings = [Sighting { landmark: LandmarkId(look as u64 % 6), seen: &seen, place }];
+            let sightings =
+                [LandmarkObservation { landmark: LandmarkId(look as u64 % 6), seen: &seen, place }];
             match robot_pose(&sightings, &believed, None, &LocaliseParams::default()).unwrap() {
-                RobotFix::Fixed(fix) => {
-                    watch.fixed(&fix, focal_evidence(&sightings, &believed, &fix.pose.pose));
+                FixResult::Fixed(fix) => {
+                    watch.add_fix(&fix, focal_evidence(&sightings, &believed, &fix.pose.pose));
                 }
-                RobotFix::Refused(FixRefusal::Room { .. }) => watch.refused(),
-                RobotFix::Ambiguous(_) | RobotFix::Refused(_) => {}
+                FixResult::Refused(FixRefusal::Room { .. }) => watch.add_refusal(),
+                FixResult::Ambiguous(_) | FixResult::Refused(_) => {}
             }
         }
         watch.state()
@@ -334,12 +335,12 @@ mod tests {
     #[test]
     fn nothing_is_said_before_enough_was_seen() {
         assert_eq!(watched(660.0, 10, 3).suspicion, None);
-        let mut watch = CameraWatch::default();
+        let mut watch = IntrinsicsMonitor::default();
         for _ in 0..19 {
-            watch.refused();
+            watch.add_refusal();
         }
         assert_eq!(watch.state().suspicion, None);
-        watch.refused();
+        watch.add_refusal();
         assert_eq!(watch.state().suspicion, Some(Suspicion::Refused { share: 1.0 }));
     }
 }

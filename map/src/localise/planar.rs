@@ -3,10 +3,10 @@
 //! word.
 
 use crate::{
-    extrinsics::Mounting,
+    extrinsics::CameraExtrinsics,
     localise::{
         derivatives::point_by_pose,
-        fix::{NuisanceKey, Sighting},
+        fix::{LandmarkObservation, NuisanceKey},
         predict::corners,
     },
     pose2::Pose2,
@@ -23,14 +23,14 @@ pub(super) const MAX_STEPS: usize = 40;
 const STEP_TOLERANCE: f64 = 1e-10;
 
 /// Residuals and their change with the pose; two rows a corner, eight a sighting.
-pub(super) struct Look {
+pub(super) struct PoseLinearisation {
     /// Seen minus predicted, pixels.
     pub residual: DVector<f64>,
     /// By (x, y, theta).
     pub by_pose: DMatrix<f64>,
 }
 
-impl Look {
+impl PoseLinearisation {
     /// Weighted squared residual.
     pub(super) fn chi2(&self, weight: &DMatrix<f64>) -> f64 {
         self.residual.dot(&(weight * &self.residual))
@@ -41,12 +41,12 @@ impl Look {
 pub(super) struct Descended {
     pub pose: Pose2,
     /// There.
-    pub look: Look,
+    pub look: PoseLinearisation,
     pub chi2: f64,
 }
 
 /// Residuals and all derivatives at one pose.
-pub(super) struct Linear {
+pub(super) struct FullLinearisation {
     /// Seen minus predicted, pixels.
     pub residual: DVector<f64>,
     /// By (x, y, theta).
@@ -57,8 +57,8 @@ pub(super) struct Linear {
 
 /// The least-squares problem of one frame.
 pub(super) struct Planar<'a> {
-    sightings: &'a [Sighting<'a>],
-    mounting: &'a Mounting,
+    sightings: &'a [LandmarkObservation<'a>],
+    mounting: &'a CameraExtrinsics,
     camera_from_robot: Isometry3<f64>,
     /// Standard deviations of the camera's errors, where they are stated: all sightings are by one camera.
     camera: Option<Vector3<f64>>,
@@ -67,8 +67,8 @@ pub(super) struct Planar<'a> {
 }
 
 impl<'a> Planar<'a> {
-    pub(super) fn new(sightings: &'a [Sighting<'a>], mounting: &'a Mounting) -> Self {
-        let corners = |s: &Sighting<'_>| {
+    pub(super) fn new(sightings: &'a [LandmarkObservation<'a>], mounting: &'a CameraExtrinsics) -> Self {
+        let corners = |s: &LandmarkObservation<'_>| {
             let map_from_landmark = s.place.map_from_landmark();
             let in_map =
                 |p: Vector3<f64>| map_from_landmark.rotation * p + map_from_landmark.translation.vector;
@@ -114,7 +114,7 @@ impl<'a> Planar<'a> {
             covariance.fixed_view_mut::<3, 3>(0, 0).set_diagonal(&sigmas.component_mul(&sigmas));
             (NuisanceKey::Camera, covariance)
         });
-        places.chain([(NuisanceKey::Mounting, self.mounting.covariance)]).chain(camera).collect()
+        places.chain([(NuisanceKey::Extrinsics, self.mounting.covariance)]).chain(camera).collect()
     }
 
     /// `camera_from_landmark` of sighting `i` for a robot pose.
@@ -137,9 +137,9 @@ impl<'a> Planar<'a> {
     }
 
     /// Residuals and their change with the pose; `None` when a corner is behind the camera.
-    pub(super) fn look(&self, pose: &Pose2) -> Option<Look> {
+    pub(super) fn pose_linearisation(&self, pose: &Pose2) -> Option<PoseLinearisation> {
         let rows = 8 * self.sightings.len();
-        let mut made = Look { residual: DVector::zeros(rows), by_pose: DMatrix::zeros(rows, 3) };
+        let mut made = PoseLinearisation { residual: DVector::zeros(rows), by_pose: DMatrix::zeros(rows, 3) };
         let map_from_robot = pose.to_isometry3();
         let camera_from_map = self.camera_from_robot * map_from_robot.inverse();
         let turn = camera_from_map.rotation.to_rotation_matrix().into_inner();
@@ -158,9 +158,9 @@ impl<'a> Planar<'a> {
     }
 
     /// Residuals and all derivatives; `None` when a corner is behind the camera.
-    pub(super) fn linearise(&self, pose: &Pose2) -> Option<Linear> {
+    pub(super) fn linearise(&self, pose: &Pose2) -> Option<FullLinearisation> {
         let n = self.sightings.len();
-        let Look { residual, by_pose } = self.look(pose)?;
+        let PoseLinearisation { residual, by_pose } = self.pose_linearisation(pose)?;
         let blocks = n + 1 + usize::from(self.camera.is_some());
         let mut by_nuisance = DMatrix::zeros(8 * n, 6 * blocks);
         for (i, sighting) in self.sightings.iter().enumerate() {
@@ -174,11 +174,11 @@ impl<'a> Planar<'a> {
                 }
             }
         }
-        Some(Linear { residual, by_pose, by_nuisance })
+        Some(FullLinearisation { residual, by_pose, by_nuisance })
     }
 
     /// Inverse covariance of the residual: corners plus lasting errors.
-    pub(super) fn weight(&self, at: &Linear) -> Option<DMatrix<f64>> {
+    pub(super) fn weight(&self, at: &FullLinearisation) -> Option<DMatrix<f64>> {
         let n = self.sightings.len();
         let mut s = self.corner_covariance();
         for (k, (_, covariance)) in self.nuisances().iter().enumerate() {
@@ -210,7 +210,7 @@ impl<'a> Planar<'a> {
         steps: usize,
     ) -> Option<Descended> {
         let at = |pose: Pose2| {
-            let look = self.look(&pose)?;
+            let look = self.pose_linearisation(&pose)?;
             let chi2 = look.chi2(weight);
             chi2.is_finite().then_some(Descended { pose, look, chi2 })
         };

@@ -1,7 +1,7 @@
 //! The corners of one landmark as an upright robot would see them, and their derivatives: what a look would measure.
 
 use crate::{
-    extrinsics::Mounting,
+    extrinsics::CameraExtrinsics,
     localise::derivatives::{point_by_mounting, point_by_place, point_by_pose},
     place::LandmarkPlace,
     pose2::Pose2,
@@ -26,7 +26,7 @@ pub(crate) struct Predicted {
 pub(crate) fn corners(
     pose: &Pose2,
     place: &LandmarkPlace,
-    mounting: &Mounting,
+    mounting: &CameraExtrinsics,
     camera: &Intrinsics,
 ) -> Option<Predicted> {
     let map_from_robot = pose.to_isometry3();

@@ -2,9 +2,9 @@
 
 use crate::{
     check::{self, OutOfRange},
-    extrinsics::Mounting,
+    extrinsics::CameraExtrinsics,
     localise::{
-        fix::{RobotFix, Sighting},
+        fix::{FixResult, LandmarkObservation},
         params::LocaliseParams,
         solve::solve,
     },
@@ -16,11 +16,11 @@ pub const MAX_SIGHTINGS: usize = 8;
 
 /// The robot's pose from the landmarks of one frame. Errors name an input that is out of range.
 pub fn robot_pose(
-    sightings: &[Sighting<'_>],
-    mounting: &Mounting,
+    sightings: &[LandmarkObservation<'_>],
+    mounting: &CameraExtrinsics,
     prior: Option<&Pose2Covariance>,
     p: &LocaliseParams,
-) -> Result<RobotFix, OutOfRange> {
+) -> Result<FixResult, OutOfRange> {
     check::within("sightings", sightings.len() as f64, 1.0, f64::MAX)?;
     mounting.check()?;
     for sighting in sightings {
@@ -32,7 +32,7 @@ pub fn robot_pose(
     let mut used = sightings.to_vec();
     // Largest first; stable, so equal ones stay in order.
     used.sort_by(|a, b| {
-        let area = |s: &Sighting<'_>| s.seen.measured.corners_px.area_px2();
+        let area = |s: &LandmarkObservation<'_>| s.seen.measured.corners_px.area_px2();
         area(b).total_cmp(&area(a))
     });
     used.truncate(MAX_SIGHTINGS);

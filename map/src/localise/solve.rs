@@ -1,10 +1,10 @@
 //! All solutions of one frame, and which of them is left (method 13.4, 13.6).
 
 use crate::{
-    extrinsics::Mounting,
+    extrinsics::CameraExtrinsics,
     gate::{Z_95, chi2_quantile},
     localise::{
-        fix::{DecidedBy, Fix, FixRefusal, Modality, Nuisance, RobotFix, Sighting},
+        fix::{AmbiguityResolvedBy, Fix, FixRefusal, FixResult, FixSource, LandmarkObservation, Nuisance},
         params::LocaliseParams,
         planar::{MAX_STEPS, Planar},
         posterior::{Moments, moments, turned},
@@ -28,18 +28,18 @@ struct Minimum {
 }
 
 pub(super) fn solve(
-    sightings: &[Sighting<'_>],
-    mounting: &Mounting,
+    sightings: &[LandmarkObservation<'_>],
+    mounting: &CameraExtrinsics,
     prior: Option<&Pose2Covariance>,
     p: &LocaliseParams,
-) -> RobotFix {
+) -> FixResult {
     let problem = Planar::new(sightings, mounting);
     let mut found = minima(&problem, sightings);
-    let Some(best) = found.first() else { return RobotFix::Refused(FixRefusal::Degenerate) };
+    let Some(best) = found.first() else { return FixResult::Refused(FixRefusal::Degenerate) };
     let limit = p.max_reduced_chi2 * problem.dof() as f64;
     if best.chi2 > limit {
         let chi2 = best.chi2;
-        return RobotFix::Refused(match sightings.len() {
+        return FixResult::Refused(match sightings.len() {
             1 => FixRefusal::Room { chi2, limit },
             _ => FixRefusal::Disagree { chi2, limit },
         });
@@ -49,20 +49,20 @@ pub(super) fn solve(
     let lowest = best.chi2;
     found.retain(|m| m.chi2 - lowest < p.ambiguous_chi2 * scale);
     merge(&problem, &mut found, p.merge_chi2 * scale);
-    let decided_by = if several { DecidedBy::Image } else { DecidedBy::Single };
+    let decided_by = if several { AmbiguityResolvedBy::Image } else { AmbiguityResolvedBy::Single };
     let mut fixes: Vec<Fix> =
         found.iter().filter_map(|m| fix(&problem, sightings, m, scale, decided_by)).collect();
     match (prior, fixes.len()) {
-        (_, 0) => RobotFix::Refused(FixRefusal::Degenerate),
-        (None, 1) => RobotFix::Fixed(Box::new(fixes.swap_remove(0))),
-        (None, _) => RobotFix::Ambiguous(fixes),
+        (_, 0) => FixResult::Refused(FixRefusal::Degenerate),
+        (None, 1) => FixResult::Fixed(Box::new(fixes.swap_remove(0))),
+        (None, _) => FixResult::Ambiguous(fixes),
         (Some(prior), _) => by_prior(fixes, prior, scale, p),
     }
 }
 
 /// Every minimum reachable from the solutions of each sighting and from their mirror images, by rising chi2. Only
 /// those from which every landmark shows its front.
-fn minima(problem: &Planar<'_>, sightings: &[Sighting<'_>]) -> Vec<Minimum> {
+fn minima(problem: &Planar<'_>, sightings: &[LandmarkObservation<'_>]) -> Vec<Minimum> {
     let mut found: Vec<Minimum> = Vec::new();
     for (i, sighting) in sightings.iter().enumerate() {
         let solutions = [Some(&sighting.seen.best), sighting.seen.second.as_ref()];
@@ -97,7 +97,7 @@ fn add(problem: &Planar<'_>, found: &mut Vec<Minimum>, start: Pose2) {
         }
     }
     let Some(weight) = weight_at(&pose) else { return };
-    let Some(look) = problem.look(&pose) else { return };
+    let Some(look) = problem.pose_linearisation(&pose) else { return };
     let chi2 = look.chi2(&weight);
     if chi2.is_finite() && problem.sees_fronts(&pose) {
         found.push(Minimum { pose, weight, chi2, limit_rad: (f64::NEG_INFINITY, f64::INFINITY) });
@@ -165,15 +165,15 @@ fn pass(problem: &Planar<'_>, from: &Minimum, to: &Minimum) -> (f64, f64) {
 }
 
 /// The prior decides between what is left, or rules it out.
-fn by_prior(mut fixes: Vec<Fix>, prior: &Pose2Covariance, scale: f64, p: &LocaliseParams) -> RobotFix {
+fn by_prior(mut fixes: Vec<Fix>, prior: &Pose2Covariance, scale: f64, p: &LocaliseParams) -> FixResult {
     let distances: Vec<f64> =
         fixes.iter().map(|f| f.pose.distance2(prior).unwrap_or(f64::INFINITY)).collect();
     let nearest = distances.iter().copied().fold(f64::INFINITY, f64::min);
     if nearest > p.prior_gate {
-        return RobotFix::Refused(FixRefusal::Prior { distance2: nearest, limit: p.prior_gate });
+        return FixResult::Refused(FixRefusal::Prior { distance2: nearest, limit: p.prior_gate });
     }
     if fixes.len() == 1 {
-        return RobotFix::Fixed(Box::new(fixes.swap_remove(0)));
+        return FixResult::Fixed(Box::new(fixes.swap_remove(0)));
     }
     let score = |i: usize| fixes[i].chi2 / scale + distances[i];
     let chosen = (0..fixes.len())
@@ -182,20 +182,20 @@ fn by_prior(mut fixes: Vec<Fix>, prior: &Pose2Covariance, scale: f64, p: &Locali
         .unwrap_or(0);
     let clear = (0..fixes.len()).all(|i| i == chosen || score(i) - score(chosen) >= p.ambiguous_chi2);
     if !clear {
-        return RobotFix::Ambiguous(fixes);
+        return FixResult::Ambiguous(fixes);
     }
     let mut fix = fixes.swap_remove(chosen);
-    fix.decided_by = DecidedBy::Prior;
-    RobotFix::Fixed(Box::new(fix))
+    fix.decided_by = AmbiguityResolvedBy::Prior;
+    FixResult::Fixed(Box::new(fix))
 }
 
 /// Moments around one minimum, and their split into what is new in every frame and what lasts.
 fn fix(
     problem: &Planar<'_>,
-    sightings: &[Sighting<'_>],
+    sightings: &[LandmarkObservation<'_>],
     minimum: &Minimum,
     scale: f64,
-    decided_by: DecidedBy,
+    decided_by: AmbiguityResolvedBy,
 ) -> Option<Fix> {
     let weight = &minimum.weight / scale;
     let sigma_rad = local_covariance(problem, &minimum.pose, &weight)?[(2, 2)].sqrt();
@@ -223,7 +223,7 @@ fn fix(
     let pose = Pose2Covariance::new(mean, total).ok()?;
     let landmarks = sightings.iter().map(|s| s.landmark).collect();
     Some(Fix {
-        modality: Modality::Landmarks,
+        modality: FixSource::Landmarks,
         pose,
         noise,
         nuisances,
@@ -236,7 +236,7 @@ fn fix(
 
 /// `(J^T W J)^-1` over (x, y, theta).
 fn local_covariance(problem: &Planar<'_>, pose: &Pose2, weight: &DMatrix<f64>) -> Option<Matrix3<f64>> {
-    let at = problem.look(pose)?;
+    let at = problem.pose_linearisation(pose)?;
     let h = at.by_pose.transpose() * weight * &at.by_pose;
     Some(Matrix3::from_iterator(h.iter().copied()).cholesky()?.inverse())
 }

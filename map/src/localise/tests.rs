@@ -4,9 +4,9 @@ mod derivatives;
 mod covariance;
 
 use crate::{
-    extrinsics::{Mounting, pan_tilt},
+    extrinsics::{CameraExtrinsics, pan_tilt},
     localise::{
-        fix::{DecidedBy, Fix, FixRefusal, RobotFix, Sighting},
+        fix::{AmbiguityResolvedBy, Fix, FixRefusal, FixResult, LandmarkObservation},
         params::LocaliseParams,
         robot_pose::{MAX_SIGHTINGS, robot_pose},
     },
@@ -31,8 +31,8 @@ pub(super) fn camera() -> Intrinsics {
     Intrinsics::new(700.0, 700.0, 320.0, 240.0, Distortion::None).unwrap()
 }
 
-pub(super) fn mounting() -> Mounting {
-    Mounting::new(pan_tilt(0.0, 0.05, Vector3::new(0.1, 0.02, 1.2))).unwrap()
+pub(super) fn mounting() -> CameraExtrinsics {
+    CameraExtrinsics::new(pan_tilt(0.0, 0.05, Vector3::new(0.1, 0.02, 1.2))).unwrap()
 }
 
 pub(super) fn place() -> LandmarkPlace {
@@ -88,8 +88,12 @@ pub(super) fn off(e: &Vector3<f64>) -> Intrinsics {
     Intrinsics { fx_px, fy_px, cx_px: k.cx_px + e.y, cy_px: k.cy_px + e.z, ..k }
 }
 
-pub(super) fn sighting<'a>(id: u64, seen: &'a LandmarkPose, place: &'a LandmarkPlace) -> Sighting<'a> {
-    Sighting { landmark: LandmarkId(id), seen, place }
+pub(super) fn sighting<'a>(
+    id: u64,
+    seen: &'a LandmarkPose,
+    place: &'a LandmarkPlace,
+) -> LandmarkObservation<'a> {
+    LandmarkObservation { landmark: LandmarkId(id), seen, place }
 }
 
 pub(super) fn draw(covariance: &Matrix6<f64>, random: &mut Random) -> Vector6<f64> {
@@ -108,9 +112,9 @@ pub(super) fn moved(place: &LandmarkPlace, e: &Vector6<f64>) -> LandmarkPlace {
     }
 }
 
-pub(super) fn fixed(answer: RobotFix) -> Fix {
+pub(super) fn fixed(answer: FixResult) -> Fix {
     match answer {
-        RobotFix::Fixed(fix) => *fix,
+        FixResult::Fixed(fix) => *fix,
         other => panic!("{other:?}"),
     }
 }
@@ -119,7 +123,7 @@ pub(super) fn fix_of(
     seen: &LandmarkPose,
     place: &LandmarkPlace,
     prior: Option<&Pose2Covariance>,
-) -> RobotFix {
+) -> FixResult {
     robot_pose(&[sighting(1, seen, place)], &mounting(), prior, &LocaliseParams::default()).unwrap()
 }
 
@@ -149,7 +153,7 @@ fn undecided(random: &mut Random) -> (Pose2, LandmarkPose) {
     let truth = robot(&place(), 6.0, 20.0);
     loop {
         let seen = look(&truth, &place(), &mounting().robot_from_camera, 1.5, random).unwrap();
-        if matches!(fix_of(&seen, &place(), None), RobotFix::Ambiguous(_)) {
+        if matches!(fix_of(&seen, &place(), None), FixResult::Ambiguous(_)) {
             return (truth, seen);
         }
     }
@@ -165,19 +169,19 @@ fn the_prior_decides_or_nobody_does() {
             Pose2Covariance::new(pose, Matrix3::from_diagonal(&v)).unwrap()
         };
         match fix_of(&seen, &place(), Some(&around(truth, 0.3, 0.05))) {
-            RobotFix::Fixed(fix) => {
-                assert_eq!(fix.decided_by, DecidedBy::Prior);
+            FixResult::Fixed(fix) => {
+                assert_eq!(fix.decided_by, AmbiguityResolvedBy::Prior);
                 assert!(nees(&fix, &truth) < 25.0);
             }
             other => panic!("{other:?}"),
         }
         // A prior that knows nothing decides nothing.
         let vague = fix_of(&seen, &place(), Some(&around(truth, 50.0, 3.0)));
-        assert!(matches!(vague, RobotFix::Ambiguous(_)), "{vague:?}");
+        assert!(matches!(vague, FixResult::Ambiguous(_)), "{vague:?}");
         // A prior elsewhere refuses both.
         let elsewhere = around(truth.plus(&Vector3::new(30.0, 0.0, 0.0)), 0.3, 0.05);
         let refused = fix_of(&seen, &place(), Some(&elsewhere));
-        assert!(matches!(refused, RobotFix::Refused(FixRefusal::Prior { .. })), "{refused:?}");
+        assert!(matches!(refused, FixResult::Refused(FixRefusal::Prior { .. })), "{refused:?}");
     }
 }
 
@@ -200,7 +204,7 @@ fn a_second_landmark_sharpens_the_fix_and_ends_the_doubt() {
         let alone = fix_of(&a, &first, None);
         let wide = |f: &Fix| f.pose.covariance[(0, 0)] + f.pose.covariance[(1, 1)];
         sharper += usize::from(match alone {
-            RobotFix::Fixed(one) => wide(&one) > wide(&fix),
+            FixResult::Fixed(one) => wide(&one) > wide(&fix),
             _ => true,
         });
         // Order does not matter.
@@ -220,7 +224,7 @@ fn what_cannot_be_is_refused() {
     // The map says half a metre higher: no robot on the floor sees it there.
     let raised = LandmarkPlace { z_m: 2.0, ..place() };
     let answer = fix_of(&seen, &raised, None);
-    assert!(matches!(answer, RobotFix::Refused(FixRefusal::Room { .. })), "{answer:?}");
+    assert!(matches!(answer, FixResult::Refused(FixRefusal::Room { .. })), "{answer:?}");
     // Of two landmarks one was moved by a metre.
     let other = LandmarkPlace { x_m: place().x_m + 0.9, y_m: place().y_m - 0.6, ..place() };
     let b = look(&truth, &other, &mounting().robot_from_camera, 0.5, &mut random).unwrap();
@@ -228,7 +232,7 @@ fn what_cannot_be_is_refused() {
     let home = place();
     let both = [sighting(1, &seen, &home), sighting(2, &b, &claimed)];
     let answer = robot_pose(&both, &mounting(), None, &LocaliseParams::default()).unwrap();
-    assert!(matches!(answer, RobotFix::Refused(FixRefusal::Disagree { .. })), "{answer:?}");
+    assert!(matches!(answer, FixResult::Refused(FixRefusal::Disagree { .. })), "{answer:?}");
 }
 
 #[test]
@@ -240,7 +244,7 @@ fn numbers_that_are_none_are_named() {
     assert_eq!(robot_pose(&[], &mounting(), None, &p).unwrap_err().field, "sightings");
     let home = place();
     let nowhere = LandmarkPlace { y_m: f64::NAN, ..place() };
-    let with = |place: &LandmarkPlace, mounting: &Mounting, prior: Option<&Pose2Covariance>| {
+    let with = |place: &LandmarkPlace, mounting: &CameraExtrinsics, prior: Option<&Pose2Covariance>| {
         robot_pose(&[sighting(1, &seen, place)], mounting, prior, &p).unwrap_err().field
     };
     assert_eq!(with(&nowhere, &mounting(), None), "y_m");
@@ -252,7 +256,7 @@ fn numbers_that_are_none_are_named() {
     // More sightings than are used.
     let many = vec![sighting(1, &seen, &home); MAX_SIGHTINGS + 3];
     match robot_pose(&many, &mounting(), None, &p).unwrap() {
-        RobotFix::Fixed(fix) => assert_eq!(fix.landmarks.len(), MAX_SIGHTINGS),
+        FixResult::Fixed(fix) => assert_eq!(fix.landmarks.len(), MAX_SIGHTINGS),
         other => panic!("{other:?}"),
     }
 }

@@ -1,12 +1,12 @@
 //! What the statistics of a place say about each modality there.
 
-use crate::{localise::Modality, modality_stats::modality::Module};
+use crate::{localise::FixSource, modality_stats::modality::Modality};
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
 /// How a module errs in a place, beyond what it says itself. Robot-aligned: along, across (left), heading.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Fault {
+pub struct ErrorModel {
     /// To be subtracted: metres, metres, radians; of odometry for each metre.
     pub bias: Vector3<f64>,
     /// To be added to each variance, as a share of what is claimed.
@@ -16,7 +16,7 @@ pub struct Fault {
 /// Where advice comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Level {
+pub enum StatsScope {
     /// The cell itself was driven through often enough.
     Cell,
     /// It and the eight around it.
@@ -29,32 +29,32 @@ pub enum Level {
 
 /// What is known of the modules where a robot is.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Advice {
+pub struct ModalityAdvice {
     /// The best module; none where too little is known.
-    pub best: Option<Module>,
-    /// Which are used, in the order of [`Module::ALL`].
+    pub best: Option<Modality>,
+    /// Which are used, in the order of [`Modality::ALL`].
     pub used: [bool; 3],
     /// How each errs.
-    pub faults: [Fault; 3],
+    pub faults: [ErrorModel; 3],
     /// Where the ranking comes from.
-    pub level: Level,
+    pub level: StatsScope,
 }
 
-impl Default for Advice {
+impl Default for ModalityAdvice {
     /// Nothing is known: everything is used as it says.
     fn default() -> Self {
-        Self { best: None, used: [true; 3], faults: [Fault::default(); 3], level: Level::Map }
+        Self { best: None, used: [true; 3], faults: [ErrorModel::default(); 3], level: StatsScope::Map }
     }
 }
 
-impl Advice {
+impl ModalityAdvice {
     /// Whether fixes of a modality are used.
-    pub fn uses(&self, modality: Modality) -> bool {
-        self.used[Module::from(modality).index()]
+    pub fn uses(&self, modality: FixSource) -> bool {
+        self.used[Modality::from(modality).index()]
     }
 
     /// How a module errs.
-    pub fn fault(&self, module: Module) -> &Fault {
+    pub fn fault(&self, module: Modality) -> &ErrorModel {
         &self.faults[module.index()]
     }
 }

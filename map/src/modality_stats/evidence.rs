@@ -3,7 +3,7 @@
 
 use crate::{
     check::{self, OutOfRange},
-    modality_stats::advice::Fault,
+    modality_stats::advice::ErrorModel,
 };
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -22,7 +22,7 @@ const MAX_SUM: f64 = 1e15;
 /// Sums of one module in one place.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Evidence {
+pub struct ModalityStats {
     /// Steps of the reference here, evenly along the way.
     pub(super) steps: u64,
     /// Of those, with a position of the module that something told lately.
@@ -53,7 +53,7 @@ pub struct Evidence {
 
 /// What follows from the sums, for people.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Figures {
+pub struct ModalitySummary {
     /// Mean error of the module's own position: metres along, across, radians.
     pub mean: [f64; 3],
     /// Standard deviations about it.
@@ -68,7 +68,7 @@ pub struct Figures {
     pub score: f64,
 }
 
-impl Evidence {
+impl ModalityStats {
     /// Adds what was found elsewhere or another time.
     pub fn add(&mut self, more: &Self) {
         let sum = |a: &mut [f64], b: &[f64]| a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
@@ -166,8 +166,8 @@ impl Evidence {
 
     /// How it errs beyond what it claims. A bias is subtracted only where it is one: in sums over so many `cells`, from
     /// enough passages, and more than twice its own standard deviation (method 15); never where `cells` is absent.
-    pub(super) fn fault(&self, cells: Option<u64>) -> Fault {
-        let mut fault = Fault::default();
+    pub(super) fn fault(&self, cells: Option<u64>) -> ErrorModel {
+        let mut fault = ErrorModel::default();
         if self.fixes < MIN_MEASUREMENTS {
             return fault;
         }
@@ -193,12 +193,12 @@ impl Evidence {
     }
 
     /// For people.
-    pub fn figures(&self) -> Figures {
+    pub fn figures(&self) -> ModalitySummary {
         let n = self.available.max(1) as f64;
         let mean = self.errors.map(|e| e / n);
         let second = [self.products[0], self.products[3], self.products[5]];
         let sigma = std::array::from_fn(|k| (second[k] / n - mean[k] * mean[k]).max(0.0).sqrt());
-        Figures {
+        ModalitySummary {
             mean,
             sigma,
             availability: self.available as f64 / self.steps.max(1) as f64,
@@ -210,4 +210,4 @@ impl Evidence {
 }
 
 /// Evidence of every module, in the order of [`Module::ALL`].
-pub type Modules = [Evidence; 3];
+pub type StatsByModality = [ModalityStats; 3];

@@ -7,9 +7,12 @@
 
 use crate::{
     fuse::{FuseParams, Fuser},
-    localise::{Fix, Modality},
-    modality_stats::{advice::map_from_aligned, evidence::Modules, modality::Module, reference::Reference},
-    pose_cell::Cell,
+    localise::{Fix, FixSource},
+    modality_stats::{
+        advice::map_from_aligned, evidence::StatsByModality, modality::Modality,
+        reference::ReferenceTrajectory,
+    },
+    pose_cell::PoseCell,
     pose2::{Pose2, Pose2Covariance, wrap_rad},
 };
 use nalgebra::{Matrix3, Vector3};
@@ -32,20 +35,20 @@ const LEAST: [f64; 2] = [1e-3, 1e-4];
 
 /// A robot's run.
 #[derive(Debug, Clone, Copy)]
-pub struct Run<'a> {
+pub struct ReferenceRun<'a> {
     /// `odom_from_robot` by time, in order, ns of the robot's clock.
     pub odometry: &'a [(i64, Pose2)],
     /// Its fixes by time of capture, in order; those that say nothing new left out.
     pub fixes: &'a [(i64, Fix)],
     /// Where it really was, by the same clock.
-    pub reference: &'a Reference,
+    pub reference: &'a ReferenceTrajectory,
 }
 
 /// What a run taught.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Learnt {
+pub struct RunStats {
     /// By cell.
-    pub cells: BTreeMap<Cell, Modules>,
+    pub cells: BTreeMap<PoseCell, StatsByModality>,
     /// Way of which the path is known, metres.
     pub way_m: f64,
     /// Fixes that the reference says nothing of.
@@ -54,9 +57,9 @@ pub struct Learnt {
     pub beyond: u64,
 }
 
-impl Learnt {
-    fn cell(&mut self, pose: &Pose2) -> Option<&mut Modules> {
-        let cell = Cell::of(pose);
+impl RunStats {
+    fn cell(&mut self, pose: &Pose2) -> Option<&mut StatsByModality> {
+        let cell = PoseCell::of(pose);
         if self.cells.len() >= MAX_CELLS && !self.cells.contains_key(&cell) {
             self.beyond += 1;
             return None;
@@ -75,8 +78,8 @@ struct Step {
 }
 
 /// Compares a run with its reference. Nothing is learnt where they have no time in common.
-pub fn learn(run: &Run<'_>, p: &FuseParams) -> Learnt {
-    let mut learnt = Learnt::default();
+pub fn learn_modality_stats(run: &ReferenceRun<'_>, p: &FuseParams) -> RunStats {
+    let mut learnt = RunStats::default();
     let steps = positions(run, p, &mut learnt);
     measured_fixes(run, &mut learnt);
     measured_odometry(&steps, run.reference, p, &mut learnt);
@@ -85,14 +88,14 @@ pub fn learn(run: &Run<'_>, p: &FuseParams) -> Learnt {
 
 /// A module that goes by itself.
 struct Walker {
-    modality: Modality,
+    modality: FixSource,
     fuser: Fuser,
     /// The reference's way at its last fix.
     news_m: Option<f64>,
 }
 
 impl Walker {
-    fn new(modality: Modality, p: &FuseParams) -> Self {
+    fn new(modality: FixSource, p: &FuseParams) -> Self {
         Self { modality, fuser: Fuser::new(p.clone()), news_m: None }
     }
 
@@ -104,8 +107,8 @@ impl Walker {
 }
 
 /// Lets every module go the way by itself and notes how far it is off, step by step.
-fn positions(run: &Run<'_>, p: &FuseParams, learnt: &mut Learnt) -> Vec<Step> {
-    let mut walkers = [Modality::Laser, Modality::Landmarks].map(|modality| Walker::new(modality, p));
+fn positions(run: &ReferenceRun<'_>, p: &FuseParams, learnt: &mut RunStats) -> Vec<Step> {
+    let mut walkers = [FixSource::Laser, FixSource::Landmarks].map(|modality| Walker::new(modality, p));
     let mut map_from_odom: Option<Pose2> = None;
     let (mut steps, mut piece, mut way_m): (Vec<Step>, u32, f64) = (Vec::new(), 0, 0.0);
     let (mut before, mut since_ns): (Option<Pose2>, i64) = (None, 0);
@@ -115,7 +118,7 @@ fn positions(run: &Run<'_>, p: &FuseParams, learnt: &mut Learnt) -> Vec<Step> {
             while let Some((t, fix)) = fixes.next_if(|(t, _)| *t < until_ns) {
                 for walker in walkers.iter_mut().filter(|w| w.modality == fix.modality) {
                     // What is out of range was refused when it was made; a refusal here only leaves it out.
-                    if walker.fuser.pose().is_some() && walker.fuser.fix(*t, fix).is_ok() {
+                    if walker.fuser.pose().is_some() && walker.fuser.apply_fix(*t, fix).is_ok() {
                         walker.news_m = Some(way_m);
                     }
                 }
@@ -123,7 +126,7 @@ fn positions(run: &Run<'_>, p: &FuseParams, learnt: &mut Learnt) -> Vec<Step> {
         };
         told(&mut walkers, *at_ns, way_m);
         for walker in &mut walkers {
-            walker.fuser.odometry(*at_ns, *odometry).ok();
+            walker.fuser.apply_odometry(*at_ns, *odometry).ok();
         }
         let Some(truth) = run.reference.at(*at_ns) else {
             (piece, before) = (piece + u32::from(before.is_some()), None);
@@ -164,10 +167,10 @@ fn aligned(pose: &Pose2, truth: &Pose2) -> Vector3<f64> {
 }
 
 /// Every fix against the reference; passages end where another cell begins.
-fn measured_fixes(run: &Run<'_>, learnt: &mut Learnt) {
+fn measured_fixes(run: &ReferenceRun<'_>, learnt: &mut RunStats) {
     let r = run.reference;
-    for module in [Module::Laser, Module::Landmarks] {
-        let of_module = run.fixes.iter().filter(|(_, fix)| Module::from(fix.modality) == module);
+    for module in [Modality::Laser, Modality::Landmarks] {
+        let of_module = run.fixes.iter().filter(|(_, fix)| Modality::from(fix.modality) == module);
         let mut found: Vec<(Pose2, Vector3<f64>, Vector3<f64>)> = Vec::new();
         for (at_ns, fix) in of_module {
             let Some(truth) = r.at(*at_ns) else {
@@ -188,7 +191,7 @@ fn measured_fixes(run: &Run<'_>, learnt: &mut Learnt) {
 }
 
 /// Odometry against the reference, metre by metre.
-fn measured_odometry(steps: &[Step], r: &Reference, p: &FuseParams, learnt: &mut Learnt) {
+fn measured_odometry(steps: &[Step], r: &ReferenceTrajectory, p: &FuseParams, learnt: &mut RunStats) {
     let mut found = Vec::new();
     let mut from = 0;
     for to in steps {
@@ -213,13 +216,13 @@ fn measured_odometry(steps: &[Step], r: &Reference, p: &FuseParams, learnt: &mut
         let middle = steps[from..].iter().find(|s| s.way_m >= 0.5 * (start.way_m + to.way_m)).unwrap_or(to);
         found.push((middle.truth, error, variances));
     }
-    visits(Module::Odometry, &found, learnt);
+    visits(Modality::Odometry, &found, learnt);
 }
 
 /// Adds measurements up, passage by passage.
-pub(super) fn visits(module: Module, found: &[(Pose2, Vector3<f64>, Vector3<f64>)], learnt: &mut Learnt) {
-    for visit in found.chunk_by(|a, b| Cell::of(&a.0) == Cell::of(&b.0)) {
-        let mut evidence = super::Evidence::default();
+pub(super) fn visits(module: Modality, found: &[(Pose2, Vector3<f64>, Vector3<f64>)], learnt: &mut RunStats) {
+    for visit in found.chunk_by(|a, b| PoseCell::of(&a.0) == PoseCell::of(&b.0)) {
+        let mut evidence = super::ModalityStats::default();
         for (_, error, variances) in visit {
             evidence.measure(error, variances);
         }

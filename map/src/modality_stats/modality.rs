@@ -1,12 +1,12 @@
 //! The modalities that estimate a pose, and which of them are fused.
 
-use crate::localise::Modality;
+use crate::localise::FixSource;
 use serde::{Deserialize, Serialize};
 
 /// What computes a position by itself ("localisation module" in the paper).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Module {
+pub enum Modality {
     /// Odometry alone.
     Odometry,
     /// Scans and odometry.
@@ -15,7 +15,7 @@ pub enum Module {
     Landmarks,
 }
 
-impl Module {
+impl Modality {
     /// All of them, in the order of every array here.
     pub const ALL: [Self; 3] = [Self::Odometry, Self::Laser, Self::Landmarks];
 
@@ -24,11 +24,11 @@ impl Module {
     }
 }
 
-impl From<Modality> for Module {
-    fn from(modality: Modality) -> Self {
+impl From<FixSource> for Modality {
+    fn from(modality: FixSource) -> Self {
         match modality {
-            Modality::Laser => Self::Laser,
-            Modality::Landmarks => Self::Landmarks,
+            FixSource::Laser => Self::Laser,
+            FixSource::Landmarks => Self::Landmarks,
         }
     }
 }
@@ -36,7 +36,7 @@ impl From<Modality> for Module {
 /// What is fused where runs have told which module is best. Odometry carries the pose in any case.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Mode {
+pub enum FusionMode {
     /// Everything, each as sure as it proved to be.
     // Departs from method 15, which has the other two: see docs/EVALUATION.md, "Modalities by area".
     #[default]

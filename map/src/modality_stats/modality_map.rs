@@ -2,12 +2,12 @@
 
 use crate::{
     modality_stats::{
-        advice::{Advice, Level},
-        evidence::{MIN_MEASUREMENTS, Modules},
-        modality::{Mode, Module},
+        advice::{ModalityAdvice, StatsScope},
+        evidence::{MIN_MEASUREMENTS, StatsByModality},
+        modality::{FusionMode, Modality},
         named_area::{MAX_AREAS, NamedArea},
     },
-    pose_cell::Cell,
+    pose_cell::PoseCell,
     pose2::Pose2,
 };
 use std::collections::BTreeMap;
@@ -17,24 +17,24 @@ const FUSED_SCORE: f64 = 2.0;
 
 /// All that runs have shown of a map.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Areas {
-    mode: Mode,
+pub struct ModalityMap {
+    mode: FusionMode,
     named: Vec<(NamedArea, [Pool; 4])>,
-    cells: BTreeMap<Cell, (Modules, Advice)>,
+    cells: BTreeMap<PoseCell, (StatsByModality, ModalityAdvice)>,
     map: Pool,
-    elsewhere: Advice,
+    elsewhere: ModalityAdvice,
 }
 
 /// Cells added up.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct Pool {
-    found: Modules,
+    found: StatsByModality,
     /// How many.
     cells: u64,
 }
 
 impl Pool {
-    fn add(&mut self, found: &Modules) {
+    fn add(&mut self, found: &StatsByModality) {
         for (sum, more) in self.found.iter_mut().zip(found) {
             sum.add(more);
         }
@@ -42,14 +42,14 @@ impl Pool {
     }
 }
 
-impl Areas {
+impl ModalityMap {
     /// Adds runs up. Names past [`MAX_AREAS`] are left out.
     pub fn new<'a>(
-        mode: Mode,
+        mode: FusionMode,
         named: Vec<NamedArea>,
-        runs: impl IntoIterator<Item = &'a BTreeMap<Cell, Modules>>,
+        runs: impl IntoIterator<Item = &'a BTreeMap<PoseCell, StatsByModality>>,
     ) -> Self {
-        let mut cells: BTreeMap<Cell, Modules> = BTreeMap::new();
+        let mut cells: BTreeMap<PoseCell, StatsByModality> = BTreeMap::new();
         for (cell, found) in runs.into_iter().flatten() {
             for (sum, more) in cells.entry(*cell).or_default().iter_mut().zip(found) {
                 sum.add(more);
@@ -63,9 +63,9 @@ impl Areas {
                 pools[usize::from(cell.heading)].add(found);
             }
         }
-        made.elsewhere = made.judge(&[(Level::Map, made.map)]);
-        made.cells = cells.iter().map(|(cell, found)| (*cell, (*found, Advice::default()))).collect();
-        let told: Vec<Advice> = cells.keys().map(|cell| made.judged(cell)).collect();
+        made.elsewhere = made.judge(&[(StatsScope::Map, made.map)]);
+        made.cells = cells.iter().map(|(cell, found)| (*cell, (*found, ModalityAdvice::default()))).collect();
+        let told: Vec<ModalityAdvice> = cells.keys().map(|cell| made.judged(cell)).collect();
         for ((_, advice), told) in made.cells.values_mut().zip(told) {
             *advice = told;
         }
@@ -73,65 +73,67 @@ impl Areas {
     }
 
     /// What is fused.
-    pub fn mode(&self) -> Mode {
+    pub fn mode(&self) -> FusionMode {
         self.mode
     }
 
     /// What is known where a pose is.
-    pub fn advice(&self, at: &Pose2) -> Advice {
+    pub fn advice(&self, at: &Pose2) -> ModalityAdvice {
         if self.cells.is_empty() {
             return self.elsewhere;
         }
-        let cell = Cell::of(at);
+        let cell = PoseCell::of(at);
         self.cells.get(&cell).map_or_else(|| self.judged(&cell), |(_, advice)| *advice)
     }
 
     /// Every cell that was driven through, with what was found and what follows.
-    pub fn cells(&self) -> impl Iterator<Item = (&Cell, &Modules, &Advice)> {
+    pub fn cells(&self) -> impl Iterator<Item = (&PoseCell, &StatsByModality, &ModalityAdvice)> {
         self.cells.iter().map(|(cell, (found, advice))| (cell, found, advice))
     }
 
     /// Every named area with what was found in it, by heading, and what follows where its cells say nothing themselves.
-    pub fn named(&self) -> impl Iterator<Item = (&NamedArea, [(Modules, Advice); 4])> {
+    pub fn named(&self) -> impl Iterator<Item = (&NamedArea, [(StatsByModality, ModalityAdvice); 4])> {
         self.named.iter().map(|(area, by_heading)| {
-            let told =
-                |pool: &Pool| (pool.found, self.judge(&[(Level::Area, *pool), (Level::Map, self.map)]));
+            let told = |pool: &Pool| {
+                (pool.found, self.judge(&[(StatsScope::Area, *pool), (StatsScope::Map, self.map)]))
+            };
             (area, std::array::from_fn(|k| told(&by_heading[k])))
         })
     }
 
     /// All of the map together.
-    pub fn map(&self) -> (&Modules, &Advice) {
+    pub fn map(&self) -> (&StatsByModality, &ModalityAdvice) {
         (&self.map.found, &self.elsewhere)
     }
 
     /// Advice for a cell.
-    fn judged(&self, cell: &Cell) -> Advice {
+    fn judged(&self, cell: &PoseCell) -> ModalityAdvice {
         let (mut alone, mut around) = (Pool::default(), Pool::default());
         for (dx, dy) in (-1..=1).flat_map(|dx| (-1..=1).map(move |dy| (dx, dy))) {
-            let near = Cell { x: cell.x.saturating_add(dx), y: cell.y.saturating_add(dy), ..*cell };
+            let near = PoseCell { x: cell.x.saturating_add(dx), y: cell.y.saturating_add(dy), ..*cell };
             let Some((found, _)) = self.cells.get(&near) else { continue };
             around.add(found);
             if near == *cell {
                 alone.add(found);
             }
         }
-        let mut levels = vec![(Level::Cell, alone), (Level::Around, around)];
+        let mut levels = vec![(StatsScope::Cell, alone), (StatsScope::Around, around)];
         let named = self.named.iter().find(|(area, _)| area.contains(cell.middle_m()));
-        levels.extend(named.map(|(_, by_heading)| (Level::Area, by_heading[usize::from(cell.heading)])));
-        levels.push((Level::Map, self.map));
+        levels.extend(named.map(|(_, by_heading)| (StatsScope::Area, by_heading[usize::from(cell.heading)])));
+        levels.push((StatsScope::Map, self.map));
         self.judge(&levels)
     }
 
     /// Advice from the first of the levels that know enough.
-    fn judge(&self, levels: &[(Level, Pool)]) -> Advice {
-        let mut advice = Advice::default();
-        for module in Module::ALL {
-            let enough = |(_, pool): &&(Level, Pool)| pool.found[module.index()].fixes() >= MIN_MEASUREMENTS;
+    fn judge(&self, levels: &[(StatsScope, Pool)]) -> ModalityAdvice {
+        let mut advice = ModalityAdvice::default();
+        for module in Modality::ALL {
+            let enough =
+                |(_, pool): &&(StatsScope, Pool)| pool.found[module.index()].fixes() >= MIN_MEASUREMENTS;
             if let Some((level, pool)) = levels.iter().find(enough) {
                 // Robot-aligned biases of different places are different things: over the whole map they only tell how much
                 // less sure a module is than it says.
-                let cells = if *level == Level::Map { None } else { Some(pool.cells) };
+                let cells = if *level == StatsScope::Map { None } else { Some(pool.cells) };
                 advice.faults[module.index()] = pool.found[module.index()].fault(cells);
             }
         }
@@ -139,17 +141,17 @@ impl Areas {
         // Departs from method 15, where cells inherit all from their parents.
         let ranked = levels
             .iter()
-            .filter(|(level, _)| *level != Level::Map)
-            .find(|(_, pool)| pool.found[Module::Odometry.index()].available() >= MIN_MEASUREMENTS);
+            .filter(|(level, _)| *level != StatsScope::Map)
+            .find(|(_, pool)| pool.found[Modality::Odometry.index()].available() >= MIN_MEASUREMENTS);
         let Some((level, pool)) = ranked else { return advice };
         let scores = pool.found.map(|evidence| evidence.score());
-        let best = Module::ALL.into_iter().min_by(|a, b| scores[a.index()].total_cmp(&scores[b.index()]));
+        let best = Modality::ALL.into_iter().min_by(|a, b| scores[a.index()].total_cmp(&scores[b.index()]));
         let Some(best) = best else { return advice };
         let lowest = scores[best.index()];
         advice.used = match self.mode {
-            Mode::All => [true; 3],
-            Mode::Fuse => scores.map(|score| score <= FUSED_SCORE * lowest),
-            Mode::Single => Module::ALL.map(|module| module == best),
+            FusionMode::All => [true; 3],
+            FusionMode::Fuse => scores.map(|score| score <= FUSED_SCORE * lowest),
+            FusionMode::Single => Modality::ALL.map(|module| module == best),
         };
         (advice.best, advice.level) = (Some(best), *level);
         advice

@@ -14,7 +14,7 @@ const MAX_GAP_NS: i64 = 1_000_000_000;
 
 /// A known path, `map_from_robot` by time.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Reference {
+pub struct ReferenceTrajectory {
     poses: Vec<(i64, Pose2)>,
     /// Standard deviation of its positions, metres.
     pub(super) sigma_m: f64,
@@ -44,7 +44,7 @@ pub enum ReferenceError {
     },
 }
 
-impl Reference {
+impl ReferenceTrajectory {
     /// From 2 to [`MAX_REFERENCE`] poses in order of time, ns of the robot's clock; standard deviations up to 1 m and 0.5
     /// rad.
     pub fn new(poses: Vec<(i64, Pose2)>, sigma_m: f64, sigma_rad: f64) -> Result<Self, ReferenceError> {

@@ -6,9 +6,9 @@ use crate::{
     check::{self, OutOfRange},
     place::{LandmarkPlace, MAX_HEIGHT_M},
     placement::{
-        params::{PlacingError, PlacingParams},
+        params::{PlacementError, PlacementParams},
         rays::{self, Hit, MOUNTING, WALL, by_camera, new_in_each_view},
-        view::{MAX_VIEWS, PlacingView, WallSighting, checked},
+        view::{CheckedView, MAX_VIEWS, PosedView, checked},
     },
     pose2::wrap_rad,
 };
@@ -41,7 +41,7 @@ impl Ceiling {
 
 /// The rectangle that one view gives under the ceiling.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ViewOnCeiling {
+pub struct CeilingRectangle {
     /// Centre x and y, direction of the top, width, height.
     pub rectangle: SVector<f64, 5>,
     /// What is new in every view: corners and robot pose.
@@ -60,18 +60,22 @@ pub struct ViewOnCeiling {
 
 /// The rectangle a view gives under the ceiling.
 pub fn view_on_ceiling(
-    view: &PlacingView<'_>,
+    view: &PosedView<'_>,
     ceiling: &Ceiling,
-    p: &PlacingParams,
-) -> Result<ViewOnCeiling, PlacingError> {
+    p: &PlacementParams,
+) -> Result<CeilingRectangle, PlacementError> {
     ceiling.check()?;
     let sighting = checked(view)?;
     let hits = [0, 1, 2, 3].map(|i| rays::ceiling_hit(&sighting, i, ceiling.height_m));
-    let [Some(a), Some(b), Some(c), Some(d)] = hits else { return Err(PlacingError::NoWall) };
+    let [Some(a), Some(b), Some(c), Some(d)] = hits else { return Err(PlacementError::NoWall) };
     fit(&sighting, &[a, b, c, d], p)
 }
 
-fn fit(view: &WallSighting<'_>, hits: &[Hit; 4], p: &PlacingParams) -> Result<ViewOnCeiling, PlacingError> {
+fn fit(
+    view: &CheckedView<'_>,
+    hits: &[Hit; 4],
+    p: &PlacementParams,
+) -> Result<CeilingRectangle, PlacementError> {
     let mut seen = SVector::<f64, 8>::zeros();
     let mut by = SMatrix::<f64, 8, { rays::INPUTS }>::zeros();
     for (i, hit) in hits.iter().enumerate() {
@@ -88,9 +92,9 @@ fn fit(view: &WallSighting<'_>, hits: &[Hit; 4], p: &PlacingParams) -> Result<Vi
     let rms_m = ((seen - corners_of(&q)).norm_squared() / 4.0).sqrt();
     let possible = |v: f64| (LandmarkSize::MIN_M..=LandmarkSize::MAX_M).contains(&v);
     if rms_m > p.max_rms_m || !possible(q[3]) || !possible(q[4]) {
-        return Err(PlacingError::NotOnCeiling { rms_m });
+        return Err(PlacementError::NotOnCeiling { rms_m });
     }
-    Ok(ViewOnCeiling {
+    Ok(CeilingRectangle {
         rectangle: q,
         covariance: gain * independent * gain.transpose(),
         by_mounting: gain * m,
@@ -147,28 +151,28 @@ fn rectangle(seen: &SVector<f64, 8>, weight: &SMatrix<f64, 8, 8>) -> Option<(Vec
 /// Fuses views of one thing under one ceiling; also the indices of the views that passed the gate, 99 % of chi2 with 5
 /// degrees of freedom.
 pub fn ceiling_placement(
-    views: &[ViewOnCeiling],
+    views: &[CeilingRectangle],
     ceiling: &Ceiling,
-    p: &PlacingParams,
-) -> Result<super::Placement, PlacingError> {
+    p: &PlacementParams,
+) -> Result<super::Placement, PlacementError> {
     const CHI2_5_99: f64 = 15.086;
     ceiling.check()?;
     let views = &views[..views.len().min(MAX_VIEWS)];
-    let total = |v: &ViewOnCeiling| {
+    let total = |v: &CeilingRectangle| {
         let mounting = v.by_mounting * v.mounting_covariance * v.by_mounting.transpose();
         v.covariance + mounting + v.by_camera * v.by_camera.transpose()
     };
-    let agree = |a: &ViewOnCeiling, b: &ViewOnCeiling| {
+    let agree = |a: &CeilingRectangle, b: &CeilingRectangle| {
         let d = apart(&a.rectangle, &b.rectangle);
         (total(a) + total(b)).cholesky().is_some_and(|s| d.dot(&s.solve(&d)) <= CHI2_5_99)
     };
     let votes = |i: usize| views.iter().filter(|v| agree(&views[i], v)).count();
     // Ties: the first.
     let seed =
-        (0..views.len()).max_by_key(|&i| (votes(i), std::cmp::Reverse(i))).ok_or(PlacingError::NoView)?;
+        (0..views.len()).max_by_key(|&i| (votes(i), std::cmp::Reverse(i))).ok_or(PlacementError::NoView)?;
     let used: Vec<usize> = (0..views.len()).filter(|&i| agree(&views[seed], &views[i])).collect();
-    let chosen: Vec<&ViewOnCeiling> = used.iter().map(|&i| &views[i]).collect();
-    let place = fused(&views[seed].rectangle, &chosen, ceiling, p).ok_or(PlacingError::NoView)?;
+    let chosen: Vec<&CeilingRectangle> = used.iter().map(|&i| &views[i]).collect();
+    let place = fused(&views[seed].rectangle, &chosen, ceiling, p).ok_or(PlacementError::NoView)?;
     place.check()?;
     Ok(super::Placement { place, used })
 }
@@ -183,9 +187,9 @@ fn apart(a: &Vector5, b: &Vector5) -> Vector5 {
 /// Information form; mounting, camera and ceiling move all views alike and are added once, at the end.
 fn fused(
     origin: &Vector5,
-    views: &[&ViewOnCeiling],
+    views: &[&CeilingRectangle],
     ceiling: &Ceiling,
-    p: &PlacingParams,
+    p: &PlacementParams,
 ) -> Option<LandmarkPlace> {
     let mut information = Matrix5::zeros();
     for v in views {

@@ -7,7 +7,7 @@ use vision::localise::pose::PoseError;
 /// Knobs of placing.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct PlacingParams {
+pub struct PlacementParams {
     /// A hit may lie this far beyond the end of a wall's segment, metres.
     pub margin_m: f64,
     /// Largest root mean square distance of the hits from an upright rectangle, metres.
@@ -22,7 +22,7 @@ pub struct PlacingParams {
     pub inflation: f64,
 }
 
-impl Default for PlacingParams {
+impl Default for PlacementParams {
     fn default() -> Self {
         Self {
             margin_m: 0.3,
@@ -37,7 +37,7 @@ impl Default for PlacingParams {
 
 /// Why a quad has no place.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum PlacingError {
+pub enum PlacementError {
     /// A pose, mounting or wall is out of range.
     #[error(transparent)]
     OutOfRange(#[from] OutOfRange),

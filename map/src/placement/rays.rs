@@ -1,6 +1,6 @@
 //! Where the rays of four corners meet a wall or a ceiling, with the derivatives by all that is uncertain (method 11.3).
 
-use crate::{placement::view::WallSighting, segments::LaserSegment};
+use crate::{placement::view::CheckedView, segments::LaserSegment};
 use nalgebra::{Matrix3, SMatrix, Vector2, Vector3};
 
 /// Columns of the derivatives: 8 corner coordinates, robot (x, y, theta), mounting (rotation, translation), wall
@@ -38,7 +38,7 @@ struct Cast {
 }
 
 /// The hit of corner `i` on a wall; `None` when the ray goes away from the wall, grazes it, or comes from behind.
-pub(super) fn hit(view: &WallSighting<'_>, i: usize, (theta, r): (f64, f64)) -> Option<Hit> {
+pub(super) fn hit(view: &CheckedView<'_>, i: usize, (theta, r): (f64, f64)) -> Option<Hit> {
     let Cast { mut hit, ray, along } = cast(view, i, &Vector3::new(theta.cos(), theta.sin(), 0.0), r)?;
     let side = Vector3::new(-theta.sin(), theta.cos(), 0.0);
     hit.by.set_column(WALL, &(-ray * (side.dot(&hit.point) / along)));
@@ -47,7 +47,7 @@ pub(super) fn hit(view: &WallSighting<'_>, i: usize, (theta, r): (f64, f64)) -> 
 }
 
 /// The hit of corner `i` on the ceiling `height_m` high, its derivative by that height in column [`WALL`].
-pub(super) fn ceiling_hit(view: &WallSighting<'_>, i: usize, height_m: f64) -> Option<Hit> {
+pub(super) fn ceiling_hit(view: &CheckedView<'_>, i: usize, height_m: f64) -> Option<Hit> {
     let Cast { mut hit, ray, along } = cast(view, i, &-Vector3::z(), -height_m)?;
     hit.by.set_column(WALL, &(-ray / along));
     hit.by.iter().all(|v| v.is_finite()).then_some(hit)
@@ -55,7 +55,7 @@ pub(super) fn ceiling_hit(view: &WallSighting<'_>, i: usize, height_m: f64) -> O
 
 /// Where the ray of corner `i` meets the plane of facing normal `n` and offset `r`, with the derivatives by all but the
 /// plane.
-fn cast(view: &WallSighting<'_>, i: usize, n: &Vector3<f64>, r: f64) -> Option<Cast> {
+fn cast(view: &CheckedView<'_>, i: usize, n: &Vector3<f64>, r: f64) -> Option<Cast> {
     let robot = view.map_from_robot.pose.to_isometry3();
     let robot_turn = robot.rotation.to_rotation_matrix().into_inner();
     let camera = robot * view.mounting.robot_from_camera;
@@ -94,7 +94,7 @@ pub(super) fn is_on(wall: &LaserSegment, point: &Vector3<f64>, margin_m: f64) ->
 }
 
 /// Covariance of the hits on the wall from corners and robot pose.
-pub(super) fn new_in_each_view(view: &WallSighting<'_>, by: &SMatrix<f64, 8, INPUTS>) -> SMatrix<f64, 8, 8> {
+pub(super) fn new_in_each_view(view: &CheckedView<'_>, by: &SMatrix<f64, 8, INPUTS>) -> SMatrix<f64, 8, 8> {
     let mut sum = SMatrix::<f64, 8, 8>::zeros();
     for (i, covariance) in view.covariance_px2.iter().enumerate() {
         let j = by.fixed_columns::<2>(CORNERS + 2 * i);
@@ -106,7 +106,7 @@ pub(super) fn new_in_each_view(view: &WallSighting<'_>, by: &SMatrix<f64, 8, INP
 
 /// How the hits move with the camera's errors, each of one standard deviation. It has no part in the weights: one view's
 /// departure from a rectangle is no ground to correct the camera, and is what tells that a thing is not on the wall.
-pub(super) fn by_camera(view: &WallSighting<'_>, by: &SMatrix<f64, 8, INPUTS>) -> SMatrix<f64, 8, 3> {
+pub(super) fn by_camera(view: &CheckedView<'_>, by: &SMatrix<f64, 8, INPUTS>) -> SMatrix<f64, 8, 3> {
     let corners = view.by_camera.iter().enumerate();
     // What the camera has wrong is wrong with the ray through the corner where it was seen.
     let moved: SMatrix<f64, 8, 3> =

@@ -1,13 +1,13 @@
 //! A synthetic room: derivatives against differences, honest covariance by Monte Carlo, the wall choice, refusals.
 
 use crate::{
-    extrinsics::{Mounting, pan_tilt},
+    extrinsics::{CameraExtrinsics, pan_tilt},
     place::LandmarkPlace,
     placement::{
-        params::{PlacingError, PlacingParams},
+        params::{PlacementError, PlacementParams},
         rays::{self, INPUTS, MOUNTING, ROBOT, WALL},
-        view::{Placement, PlacingView, WallSighting},
-        wall::{ViewOnWall, view_on_wall},
+        view::{CheckedView, Placement, PosedView},
+        wall::{WallRectangle, view_on_wall},
         wall_fusion::placement,
     },
     pose2::{Pose2, Pose2Covariance},
@@ -30,8 +30,8 @@ fn camera() -> Intrinsics {
     Intrinsics::new(700.0, 690.0, 320.0, 240.0, Distortion::None).unwrap()
 }
 
-fn mounting() -> Mounting {
-    Mounting::new(pan_tilt(0.1, 0.05, Vector3::new(0.1, 0.02, 1.2))).unwrap()
+fn mounting() -> CameraExtrinsics {
+    CameraExtrinsics::new(pan_tilt(0.1, 0.05, Vector3::new(0.1, 0.02, 1.2))).unwrap()
 }
 
 /// A wall that faces the origin from the north-east, free side on the left of a -> b.
@@ -64,7 +64,7 @@ fn robot(place: &LandmarkPlace, d_m: f64, psi_deg: f64) -> Pose2Covariance {
     Pose2Covariance { pose, covariance: Matrix3::from_diagonal(&v) }
 }
 
-fn project(place: &LandmarkPlace, robot: &Pose2, mounting: &Mounting) -> [Point2<f64>; 4] {
+fn project(place: &LandmarkPlace, robot: &Pose2, mounting: &CameraExtrinsics) -> [Point2<f64>; 4] {
     projected(&camera(), place, robot, mounting)
 }
 
@@ -72,7 +72,7 @@ fn projected(
     camera: &Intrinsics,
     place: &LandmarkPlace,
     robot: &Pose2,
-    mounting: &Mounting,
+    mounting: &CameraExtrinsics,
 ) -> [Point2<f64>; 4] {
     let camera_from_landmark =
         mounting.robot_from_camera.inverse() * robot.to_isometry3().inverse() * place.map_from_landmark();
@@ -89,7 +89,7 @@ fn look(
     points: [Point2<f64>; 4],
     robot: &Pose2Covariance,
     walls: &[LaserSegment],
-) -> Result<ViewOnWall, PlacingError> {
+) -> Result<WallRectangle, PlacementError> {
     look_with(&camera(), points, robot, walls)
 }
 
@@ -98,15 +98,15 @@ fn look_with(
     points: [Point2<f64>; 4],
     robot: &Pose2Covariance,
     walls: &[LaserSegment],
-) -> Result<ViewOnWall, PlacingError> {
-    let view = PlacingView {
+) -> Result<WallRectangle, PlacementError> {
+    let view = PosedView {
         corners: &Corners::new(points).unwrap(),
         covariance_px2: &covariances(),
         camera,
         map_from_robot: robot,
         mounting: &mounting(),
     };
-    view_on_wall(&view, walls, &PlacingParams::default())
+    view_on_wall(&view, walls, &PlacementParams::default())
 }
 
 #[test]
@@ -121,7 +121,7 @@ fn exact_views_give_the_exact_place() {
         })
         .collect();
     for used in [&views[..1], &views[..]] {
-        let made = placement(used, &walls, &PlacingParams::default()).unwrap();
+        let made = placement(used, &walls, &PlacementParams::default()).unwrap();
         let (a, b) = (made.place.map_from_landmark(), truth.map_from_landmark());
         assert!((a.to_homogeneous() - b.to_homogeneous()).norm() < 1e-9);
         assert!(
@@ -146,8 +146,8 @@ fn derivatives_are_the_finite_differences() {
             Pose2Covariance { pose: base_robot.pose.plus(&d.fixed_rows::<3>(ROBOT).into()), ..base_robot };
         let (turn, shift) = (d.fixed_rows::<3>(MOUNTING).into(), d.fixed_rows::<3>(MOUNTING + 3).into());
         let robot_from_camera = perturbed(&base.robot_from_camera, &turn, &shift);
-        let mounting = Mounting { robot_from_camera, ..base.clone() };
-        let view = WallSighting {
+        let mounting = CameraExtrinsics { robot_from_camera, ..base.clone() };
+        let view = CheckedView {
             corners_px: Corners::new(px).unwrap(),
             covariance_px2: covariances(),
             camera: camera(),
@@ -189,7 +189,8 @@ fn draw_with(
     let m = mounting();
     let e = m.covariance.map_diagonal(f64::sqrt).map(|s| s * random.normal());
     let (turn, shift) = (e.fixed_rows::<3>(0).into(), e.fixed_rows::<3>(3).into());
-    let mounted = Mounting { robot_from_camera: perturbed(&m.robot_from_camera, &turn, &shift), ..m.clone() };
+    let mounted =
+        CameraExtrinsics { robot_from_camera: perturbed(&m.robot_from_camera, &turn, &shift), ..m.clone() };
     let seen: Vec<_> = views
         .iter()
         .filter_map(|(d, psi)| {
@@ -202,7 +203,7 @@ fn draw_with(
             made.inspect_err(|_| assert!(stated.sigmas.is_some())).ok()
         })
         .collect();
-    let Ok(Placement { place, .. }) = placement(&seen, &[wall()], &PlacingParams::default()) else {
+    let Ok(Placement { place, .. }) = placement(&seen, &[wall()], &PlacementParams::default()) else {
         return draw_with(stated, views, random);
     };
     let error = Vector6::new(
@@ -282,11 +283,11 @@ fn a_view_that_disagrees_is_left_out() {
         look(project(place, &robot.pose, &mounting()), &robot, &[wall()]).unwrap()
     };
     let views = [of(&moved, 2.0, 20.0), of(&truth, 2.0, 20.0), of(&truth, 2.5, -30.0), of(&truth, 3.0, 0.0)];
-    let made = placement(&views, &[wall()], &PlacingParams::default()).unwrap();
+    let made = placement(&views, &[wall()], &PlacementParams::default()).unwrap();
     assert_eq!(made.used, [1, 2, 3]);
     assert!((made.place.x_m - truth.x_m).abs() < 1e-9);
-    let none = placement(&[], &[wall()], &PlacingParams::default());
-    assert_eq!(none, Err(PlacingError::NoView));
+    let none = placement(&[], &[wall()], &PlacementParams::default());
+    assert_eq!(none, Err(PlacementError::NoView));
 }
 
 #[test]
@@ -306,12 +307,12 @@ fn the_nearest_wall_that_is_met_counts() {
     assert_eq!(on(&[wall(), before]), Ok(1), "a board before the wall");
     // A pillar that hides half of it.
     let half = shifted(0.5, 0.5, 1.8);
-    assert_eq!(on(&[wall(), half]), Err(PlacingError::Straddles));
+    assert_eq!(on(&[wall(), half]), Err(PlacementError::Straddles));
     // The back of a wall is none.
     let back = LaserSegment::from_ends(wall().b, wall().a, wall().covariance).unwrap();
-    assert_eq!(on(&[back]), Err(PlacingError::NoWall));
-    assert_eq!(on(&[]), Err(PlacingError::NoWall));
-    assert_eq!(on(&[shifted(0.0, 3.2, 5.0)]), Err(PlacingError::NoWall), "beside it");
+    assert_eq!(on(&[back]), Err(PlacementError::NoWall));
+    assert_eq!(on(&[]), Err(PlacementError::NoWall));
+    assert_eq!(on(&[shifted(0.0, 3.2, 5.0)]), Err(PlacementError::NoWall), "beside it");
 }
 
 #[test]
@@ -320,11 +321,11 @@ fn an_open_door_is_not_on_the_wall() {
     open.theta_rad += 0.9;
     let robot = robot(&hung(&wall(), 2.0), 2.5, 20.0);
     let refused = look(project(&open, &robot.pose, &mounting()), &robot, &[wall()]);
-    assert!(matches!(refused, Err(PlacingError::NotOnWall { .. })), "{refused:?}");
+    assert!(matches!(refused, Err(PlacementError::NotOnWall { .. })), "{refused:?}");
     let mut askew = hung(&wall(), 2.0);
     askew.roll_rad = 0.15;
     let refused = look(project(&askew, &robot.pose, &mounting()), &robot, &[wall()]);
-    assert!(matches!(refused, Err(PlacingError::NotOnWall { .. })), "{refused:?}");
+    assert!(matches!(refused, Err(PlacementError::NotOnWall { .. })), "{refused:?}");
 }
 
 #[test]
@@ -332,9 +333,9 @@ fn grazing_rays_and_bad_numbers_are_refused() {
     let truth = hung(&wall(), 2.0);
     let grazing = robot(&truth, 3.0, 82.0);
     let points = project(&truth, &grazing.pose, &mounting());
-    assert_eq!(look(points, &grazing, &[wall()]), Err(PlacingError::NoWall));
+    assert_eq!(look(points, &grazing, &[wall()]), Err(PlacementError::NoWall));
     let mut nowhere = robot(&truth, 2.0, 0.0);
     let points = project(&truth, &nowhere.pose, &mounting());
     nowhere.pose.x_m = f64::NAN;
-    assert!(matches!(look(points, &nowhere, &[wall()]), Err(PlacingError::OutOfRange(_))));
+    assert!(matches!(look(points, &nowhere, &[wall()]), Err(PlacementError::OutOfRange(_))));
 }

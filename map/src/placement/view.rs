@@ -1,7 +1,8 @@
 //! One posed view of a quad, checked and undistorted, and the result of several.
 
 use crate::{
-    extrinsics::Mounting, place::LandmarkPlace, placement::params::PlacingError, pose2::Pose2Covariance,
+    extrinsics::CameraExtrinsics, place::LandmarkPlace, placement::params::PlacementError,
+    pose2::Pose2Covariance,
 };
 use nalgebra::{Matrix2, Matrix2x3};
 use vision::{
@@ -15,7 +16,7 @@ pub const MAX_VIEWS: usize = 256;
 
 /// One look at a quad.
 #[derive(Debug, Clone)]
-pub struct PlacingView<'a> {
+pub struct PosedView<'a> {
     /// Corners as seen, in the landmark's order.
     pub corners: &'a Corners,
     /// Their covariance.
@@ -25,26 +26,26 @@ pub struct PlacingView<'a> {
     /// The robot at capture.
     pub map_from_robot: &'a Pose2Covariance,
     /// Where the camera sits.
-    pub mounting: &'a Mounting,
+    pub mounting: &'a CameraExtrinsics,
 }
 
 /// Checked and undistorted.
-pub(super) struct WallSighting<'a> {
+pub(super) struct CheckedView<'a> {
     pub(super) corners_px: Corners,
     pub(super) covariance_px2: [Matrix2<f64>; 4],
     pub(super) camera: Intrinsics,
     pub(super) by_camera: [Matrix2x3<f64>; 4],
     pub(super) map_from_robot: &'a Pose2Covariance,
-    pub(super) mounting: &'a Mounting,
+    pub(super) mounting: &'a CameraExtrinsics,
 }
 
-pub(super) fn checked<'a>(view: &PlacingView<'a>) -> Result<WallSighting<'a>, PlacingError> {
+pub(super) fn checked<'a>(view: &PosedView<'a>) -> Result<CheckedView<'a>, PlacementError> {
     view.map_from_robot.check()?;
     view.mounting.check()?;
     let Straightened { corners_px, covariance_px2, camera, by_camera } =
         straightened(view.corners, view.covariance_px2, view.camera)?;
     let (map_from_robot, mounting) = (view.map_from_robot, view.mounting);
-    Ok(WallSighting { corners_px, covariance_px2, camera, by_camera, map_from_robot, mounting })
+    Ok(CheckedView { corners_px, covariance_px2, camera, by_camera, map_from_robot, mounting })
 }
 
 /// The place that several views agree on.

@@ -2,9 +2,9 @@
 
 use crate::{
     placement::{
-        params::{PlacingError, PlacingParams},
+        params::{PlacementError, PlacementParams},
         rays::{self, Hit, INPUTS, MOUNTING, WALL, by_camera, new_in_each_view},
-        view::{PlacingView, WallSighting, checked},
+        view::{CheckedView, PosedView, checked},
     },
     segments::LaserSegment,
 };
@@ -13,7 +13,7 @@ use vision::localise::pose::{LandmarkSize, PoseError};
 
 /// The rectangle that one view gives on its wall.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ViewOnWall {
+pub struct WallRectangle {
     /// Index of the wall.
     pub wall: usize,
     /// Centre along the wall (m, from the foot of the map's origin, towards the viewer's right), height of the centre,
@@ -37,10 +37,10 @@ pub struct ViewOnWall {
 
 /// The rectangle a view gives on the nearest wall that all four corners meet.
 pub fn view_on_wall(
-    view: &PlacingView<'_>,
+    view: &PosedView<'_>,
     walls: &[LaserSegment],
-    p: &PlacingParams,
-) -> Result<ViewOnWall, PlacingError> {
+    p: &PlacementParams,
+) -> Result<WallRectangle, PlacementError> {
     let sighting = checked(view)?;
     let (wall, hits) = nearest(&sighting, walls, p)?;
     fit(&sighting, wall, rays::plane(&walls[wall]).0, &hits, p)
@@ -49,10 +49,10 @@ pub fn view_on_wall(
 /// The nearest wall that all four rays meet. Refused when the quad reaches over the end of a wall to one behind it: a
 /// place on the wrong one would be off by their distance.
 fn nearest(
-    sighting: &WallSighting<'_>,
+    sighting: &CheckedView<'_>,
     walls: &[LaserSegment],
-    p: &PlacingParams,
-) -> Result<(usize, [Hit; 4]), PlacingError> {
+    p: &PlacementParams,
+) -> Result<(usize, [Hit; 4]), PlacementError> {
     let mut met: Vec<(usize, [Hit; 4], f64)> = Vec::new();
     let mut partly = f64::INFINITY;
     for (i, wall) in walls.iter().enumerate() {
@@ -71,11 +71,11 @@ fn nearest(
     // Stable: of walls at the same distance the first.
     met.sort_by(|a, b| a.2.total_cmp(&b.2));
     let behind = met.get(1).map_or(f64::INFINITY, |m| m.2);
-    let (wall, hits, near) = met.into_iter().next().ok_or(PlacingError::NoWall)?;
+    let (wall, hits, near) = met.into_iter().next().ok_or(PlacementError::NoWall)?;
     let overhangs = hits.iter().any(|h| !rays::is_on(&walls[wall], &h.point, 0.0));
     let other = behind.is_finite() && behind > near + p.margin_m;
     if partly < near - p.margin_m || (overhangs && other) {
-        return Err(PlacingError::Straddles);
+        return Err(PlacementError::Straddles);
     }
     Ok((wall, hits))
 }
@@ -88,12 +88,12 @@ fn strictly(found: &[Option<Hit>; 4], wall: &LaserSegment) -> f64 {
 
 /// The upright rectangle through the hits, by least squares weighed with their whole covariance.
 fn fit(
-    view: &WallSighting<'_>,
+    view: &CheckedView<'_>,
     wall: usize,
     theta: f64,
     hits: &[Hit; 4],
-    p: &PlacingParams,
-) -> Result<ViewOnWall, PlacingError> {
+    p: &PlacementParams,
+) -> Result<WallRectangle, PlacementError> {
     // Along the wall and up; y is the viewer's right.
     let side = Vector2::new(-theta.sin(), theta.cos());
     let facing = Vector2::new(theta.cos(), theta.sin());
@@ -118,10 +118,10 @@ fn fit(
     let rms_m = ((seen - corners_of(&q)).norm_squared() / 4.0).sqrt();
     let possible = |v: f64| (LandmarkSize::MIN_M..=LandmarkSize::MAX_M).contains(&v);
     if rms_m > p.max_rms_m || q[4].abs() > p.max_roll_rad || !possible(q[2]) || !possible(q[3]) {
-        return Err(PlacingError::NotOnWall { rms_m, roll_rad: q[4] });
+        return Err(PlacementError::NotOnWall { rms_m, roll_rad: q[4] });
     }
     let gain = gain.fixed_rows::<4>(0).into_owned();
-    Ok(ViewOnWall {
+    Ok(WallRectangle {
         wall,
         rectangle: q.fixed_rows::<4>(0).into_owned(),
         covariance: gain * independent * gain.transpose(),

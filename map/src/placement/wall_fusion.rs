@@ -3,10 +3,10 @@
 use crate::{
     place::LandmarkPlace,
     placement::{
-        params::{PlacingError, PlacingParams},
+        params::{PlacementError, PlacementParams},
         rays,
         view::{MAX_VIEWS, Placement},
-        wall::ViewOnWall,
+        wall::WallRectangle,
     },
     segments::LaserSegment,
 };
@@ -16,12 +16,12 @@ use vision::localise::pose::LandmarkSize;
 /// Fuses views of one thing on one wall. The seed is the view that most others agree with; what leaves the gate is
 /// left out.
 pub fn placement(
-    views: &[ViewOnWall],
+    views: &[WallRectangle],
     walls: &[LaserSegment],
-    p: &PlacingParams,
-) -> Result<Placement, PlacingError> {
+    p: &PlacementParams,
+) -> Result<Placement, PlacementError> {
     let views = &views[..views.len().min(MAX_VIEWS)];
-    let agree = |a: &ViewOnWall, b: &ViewOnWall| {
+    let agree = |a: &WallRectangle, b: &WallRectangle| {
         let d = a.rectangle - b.rectangle;
         let s = (total(a) + total(b)).cholesky();
         a.wall == b.wall && s.is_some_and(|s| d.dot(&s.solve(&d)) <= p.gate_chi2)
@@ -29,23 +29,23 @@ pub fn placement(
     let votes = |i: usize| views.iter().filter(|v| agree(&views[i], v)).count();
     // Ties: the first.
     let seed =
-        (0..views.len()).max_by_key(|&i| (votes(i), std::cmp::Reverse(i))).ok_or(PlacingError::NoView)?;
-    let wall = walls.get(views[seed].wall).ok_or(PlacingError::NoView)?;
+        (0..views.len()).max_by_key(|&i| (votes(i), std::cmp::Reverse(i))).ok_or(PlacementError::NoView)?;
+    let wall = walls.get(views[seed].wall).ok_or(PlacementError::NoView)?;
     let used: Vec<usize> = (0..views.len()).filter(|&i| agree(&views[seed], &views[i])).collect();
-    let chosen: Vec<&ViewOnWall> = used.iter().map(|&i| &views[i]).collect();
-    let place = fused(&chosen, wall, p).ok_or(PlacingError::NoView)?;
+    let chosen: Vec<&WallRectangle> = used.iter().map(|&i| &views[i]).collect();
+    let place = fused(&chosen, wall, p).ok_or(PlacementError::NoView)?;
     place.check()?;
     Ok(Placement { place, used })
 }
 
 /// Covariance of a view with the wall fixed.
-fn total(v: &ViewOnWall) -> Matrix4<f64> {
+fn total(v: &WallRectangle) -> Matrix4<f64> {
     let mounting = v.by_mounting * v.mounting_covariance * v.by_mounting.transpose();
     v.covariance + mounting + v.by_camera * v.by_camera.transpose()
 }
 
 /// Information form with the wall fixed; mounting, camera and wall move all views alike and are added once, at the end.
-fn fused(views: &[&ViewOnWall], wall: &LaserSegment, p: &PlacingParams) -> Option<LandmarkPlace> {
+fn fused(views: &[&WallRectangle], wall: &LaserSegment, p: &PlacementParams) -> Option<LandmarkPlace> {
     let mut information = Matrix4::zeros();
     for v in views {
         information += v.covariance.try_inverse()?;

@@ -14,7 +14,7 @@ const MIN_MASS: f64 = 1e-3;
 
 /// A place where the robot may be.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Mode {
+pub struct PoseHypothesis {
     /// Share of the belief.
     pub mass: f64,
     /// Mean and covariance of it.
@@ -33,7 +33,7 @@ struct Layer {
 }
 
 #[derive(Debug, Clone)]
-pub(super) struct Grid {
+pub(super) struct PoseGrid {
     low: Point2<f64>,
     cell_m: f64,
     columns: usize,
@@ -47,7 +47,7 @@ pub(super) struct Grid {
     unspread: (f64, f64),
 }
 
-impl Grid {
+impl PoseGrid {
     pub(super) fn new(
         corners: [Point2<f64>; 2],
         cell_m: f64,
@@ -266,10 +266,10 @@ impl Grid {
     }
 
     /// Peaks with what is about them, each without what belongs to a greater one.
-    pub(super) fn modes(&self, within_m: f64, within_rad: f64) -> Vec<Mode> {
+    pub(super) fn modes(&self, within_m: f64, within_rad: f64) -> Vec<PoseHypothesis> {
         let cells = self.columns * self.rows;
         let mut taken = vec![false; self.layers.len() * cells];
-        let mut made: Vec<Mode> = Vec::new();
+        let mut made: Vec<PoseHypothesis> = Vec::new();
         while made.len() < MAX_MODES {
             let left = (0..taken.len()).filter(|j| !taken[*j]);
             let belief = |j: usize| self.layers[j / cells].belief[j % cells];
@@ -305,7 +305,10 @@ impl Grid {
             let bin = TAU / self.layers.len() as f64;
             let within_cell = Vector3::new(self.cell_m.powi(2), self.cell_m.powi(2), bin * bin) / 12.0;
             let covariance = spread + Matrix3::from_diagonal(&within_cell);
-            made.push(Mode { mass, pose: Pose2Covariance { pose: centre.plus(&mean), covariance } });
+            made.push(PoseHypothesis {
+                mass,
+                pose: Pose2Covariance { pose: centre.plus(&mean), covariance },
+            });
         }
         made.sort_by(|a, b| b.mass.total_cmp(&a.mass));
         made

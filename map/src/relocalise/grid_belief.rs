@@ -5,9 +5,9 @@ use crate::{
     place::LandmarkPlace,
     pose2::{Pose2, wrap_rad},
     relocalise::{
-        grid::{Grid, Mode},
-        observation::{Glimpse, MAX_MEMBERS, Member, Reading},
-        params::HypothesesParams,
+        grid::{PoseGrid, PoseHypothesis},
+        observation::{AssociationHypothesis, MAX_MEMBERS, PossibleLandmark, RelativeObservation},
+        params::GridBeliefParams,
     },
     visibility::VisibilityMap,
 };
@@ -19,28 +19,28 @@ const REACH_SIGMAS: f64 = 4.5;
 
 /// The belief on where the robot is.
 #[derive(Debug, Clone)]
-pub struct Hypotheses {
-    pub(super) p: HypothesesParams,
-    pub(super) grid: Grid,
+pub struct GridBelief {
+    pub(super) p: GridBeliefParams,
+    pub(super) grid: PoseGrid,
 }
 
-impl Hypotheses {
+impl GridBelief {
     /// Over the rectangle between two corners. `prior` weighs each pose; 0 where the robot cannot be.
     pub fn new(
         corners: [Point2<f64>; 2],
         prior: impl Fn(&Pose2) -> f64,
-        p: &HypothesesParams,
+        p: &GridBeliefParams,
     ) -> Result<Self, OutOfRange> {
         p.check()?;
         for corner in corners {
             Pose2::new(corner.x, corner.y, 0.0).check()?;
         }
-        let grid = Grid::new(corners, p.cell_m, p.headings, prior)?;
+        let grid = PoseGrid::new(corners, p.cell_m, p.headings, prior)?;
         Ok(Self { p: p.clone(), grid })
     }
 
     /// The robot moved, in its own frame.
-    pub fn moved(&mut self, motion: &Pose2) -> Result<(), OutOfRange> {
+    pub fn predict(&mut self, motion: &Pose2) -> Result<(), OutOfRange> {
         motion.check()?;
         let metres = motion.position().norm();
         self.grid.shift(motion);
@@ -51,19 +51,25 @@ impl Hypotheses {
     }
 
     /// The robot saw something that may be any of `members`, or nothing of the map.
-    pub fn saw(&mut self, glimpse: &Glimpse, members: &[Member<'_>]) -> Result<(), OutOfRange> {
-        let readings: Vec<Reading<'_>> =
-            members.iter().map(|member| Reading { glimpse: *glimpse, member: *member }).collect();
-        self.saw_any(&readings)
+    pub fn update(
+        &mut self,
+        glimpse: &RelativeObservation,
+        members: &[PossibleLandmark<'_>],
+    ) -> Result<(), OutOfRange> {
+        let readings: Vec<AssociationHypothesis<'_>> = members
+            .iter()
+            .map(|member| AssociationHypothesis { glimpse: *glimpse, member: *member })
+            .collect();
+        self.update_associations(&readings)
     }
 
     /// The same where how it was seen depends on what it is: of another size or height it is elsewhere.
-    pub fn saw_any(&mut self, readings: &[Reading<'_>]) -> Result<(), OutOfRange> {
+    pub fn update_associations(&mut self, readings: &[AssociationHypothesis<'_>]) -> Result<(), OutOfRange> {
         check::within("members", readings.len() as f64, 0.0, MAX_MEMBERS as f64)?;
         let reach_m = self.p.clutter_reach_m;
         let evenly = self.p.clutter / (PI * reach_m * reach_m * TAU);
         let mut likelihood = self.grid.like(evenly);
-        for Reading { glimpse, member } in readings {
+        for AssociationHypothesis { glimpse, member } in readings {
             glimpse.robot_from_landmark.check()?;
             check::covariance("covariance", &glimpse.covariance)?;
             member.place.check()?;
@@ -75,7 +81,7 @@ impl Hypotheses {
     }
 
     /// Adds the likelihood that a glimpse is of a member.
-    fn read(&self, glimpse: &Glimpse, member: &Member<'_>, likelihood: &mut [f64]) {
+    fn read(&self, glimpse: &RelativeObservation, member: &PossibleLandmark<'_>, likelihood: &mut [f64]) {
         // Poses stand for their cells: what is seen from a cell is uncertain by its size.
         let (cell, bin) = (self.p.cell_m, TAU / self.p.headings as f64);
         let within_cell = Vector3::new(cell * cell, cell * cell, bin * bin) / 12.0;
@@ -106,7 +112,7 @@ impl Hypotheses {
     }
 
     /// A landmark was not seen, though the camera looked at all bearings between two (left positive).
-    pub fn missed(&mut self, place: &LandmarkPlace, visible: &VisibilityMap, bearings_rad: [f64; 2]) {
+    pub fn update_missed(&mut self, place: &LandmarkPlace, visible: &VisibilityMap, bearings_rad: [f64; 2]) {
         let detection = self.p.detection;
         self.grid.weigh(|_, pose| {
             let (dx, dy) = (place.x_m - pose.x_m, place.y_m - pose.y_m);
@@ -117,12 +123,12 @@ impl Hypotheses {
     }
 
     /// The places where the robot may be, most probable first.
-    pub fn modes(&self) -> Vec<Mode> {
+    pub fn modes(&self) -> Vec<PoseHypothesis> {
         self.grid.modes(self.p.mode_m, self.p.mode_rad)
     }
 
     /// The pose, once one mode holds more than the rest by far.
-    pub fn decided(&self) -> Option<Mode> {
+    pub fn resolved(&self) -> Option<PoseHypothesis> {
         self.modes().into_iter().next().filter(|m| m.mass > self.p.decided)
     }
 

@@ -8,7 +8,7 @@ pub const MAX_MEMBERS: usize = 256;
 
 /// A landmark that a sighting may be of.
 #[derive(Debug, Clone, Copy)]
-pub struct Member<'a> {
+pub struct PossibleLandmark<'a> {
     /// Where it hangs.
     pub place: &'a LandmarkPlace,
     /// From where it is seen; without it from everywhere.
@@ -19,7 +19,7 @@ pub struct Member<'a> {
 
 /// Something that was seen: the landmark's centre and the direction of its normal in the robot frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Glimpse {
+pub struct RelativeObservation {
     /// `robot_from_landmark` on the floor.
     pub robot_from_landmark: Pose2,
     /// Of (x, y, theta).
@@ -28,9 +28,9 @@ pub struct Glimpse {
 
 /// A landmark that something may be, and how it was seen if it is.
 #[derive(Debug, Clone, Copy)]
-pub struct Reading<'a> {
+pub struct AssociationHypothesis<'a> {
     /// Seen so.
-    pub glimpse: Glimpse,
+    pub glimpse: RelativeObservation,
     /// What it would be.
-    pub member: Member<'a>,
+    pub member: PossibleLandmark<'a>,
 }

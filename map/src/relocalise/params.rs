@@ -7,7 +7,7 @@ use std::f64::consts::PI;
 /// Knobs of the belief.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct HypothesesParams {
+pub struct GridBeliefParams {
     /// Side of a cell; 0.05 to 2 m.
     pub cell_m: f64,
     /// Headings in a turn; 4 to 360.
@@ -32,7 +32,7 @@ pub struct HypothesesParams {
     pub mode_rad: f64,
 }
 
-impl Default for HypothesesParams {
+impl Default for GridBeliefParams {
     fn default() -> Self {
         Self {
             cell_m: 0.2,
@@ -50,7 +50,7 @@ impl Default for HypothesesParams {
     }
 }
 
-impl HypothesesParams {
+impl GridBeliefParams {
     pub(super) fn check(&self) -> Result<(), OutOfRange> {
         check::within("cell_m", self.cell_m, 0.05, 2.0)?;
         check::within("headings", self.headings as f64, 4.0, 360.0)?;

@@ -19,7 +19,7 @@ const MAX_VISITS: usize = 200_000;
 /// Knobs of the search.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct SearchParams {
+pub struct CorrelativeParams {
     /// Side of a cell.
     pub cell_m: f64,
     /// Distance from a surface at which the field has fallen to exp(-1/2).
@@ -28,7 +28,7 @@ pub struct SearchParams {
     pub turn_rad: f64,
 }
 
-impl Default for SearchParams {
+impl Default for CorrelativeParams {
     fn default() -> Self {
         Self { cell_m: 0.05, sigma_m: 0.08, turn_rad: 0.012 }
     }
@@ -36,7 +36,7 @@ impl Default for SearchParams {
 
 /// The poses to try: a square and a range of turns around the middle.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Window {
+pub(crate) struct PoseWindow {
     pub middle: Pose2,
     pub reach_m: f64,
     pub reach_rad: f64,
@@ -46,7 +46,7 @@ pub(crate) struct Window {
 
 /// The best pose of a window.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Found {
+pub(crate) struct GridMatch {
     pub pose: Pose2,
     /// Mean of the field over the points, 0 to 1, less the pull.
     pub score: f64,
@@ -54,7 +54,7 @@ pub(crate) struct Found {
 
 /// High near surfaces.
 #[derive(Debug, Clone)]
-pub(crate) struct Field {
+pub(crate) struct LikelihoodField {
     low: Point2<f64>,
     cell_m: f64,
     width: usize,
@@ -63,14 +63,14 @@ pub(crate) struct Field {
     levels: Vec<Vec<u8>>,
 }
 
-impl Field {
+impl LikelihoodField {
     /// Of scans, no farther than `reach_m` from `middle`; good for windows up to `window_m`.
     pub(crate) fn new<'a>(
         scans: impl Iterator<Item = (Pose2, &'a Cloud)>,
         middle: &Point2<f64>,
         reach_m: f64,
         window_m: f64,
-        p: &SearchParams,
+        p: &CorrelativeParams,
     ) -> Self {
         let samples = samples(scans, middle, reach_m, p.cell_m.max(0.01));
         let (mut low, mut high) = (*middle, *middle);
@@ -131,11 +131,11 @@ impl Field {
     pub(crate) fn search(
         &self,
         points: &[Point2<f64>],
-        window: &Window,
+        window: &PoseWindow,
         at_least: f64,
         not: Option<(&Pose2, f64, f64)>,
-        p: &SearchParams,
-    ) -> Option<Found> {
+        p: &CorrelativeParams,
+    ) -> Option<GridMatch> {
         if points.is_empty() || window.middle.check().is_err() {
             return None;
         }
@@ -188,9 +188,9 @@ struct Block {
 }
 
 struct Search<'a> {
-    field: &'a Field,
+    field: &'a LikelihoodField,
     views: &'a [View],
-    window: &'a Window,
+    window: &'a PoseWindow,
     reach: i64,
     not: Option<(&'a Pose2, f64, f64)>,
 }
@@ -220,7 +220,7 @@ impl Search<'_> {
         Block { view, x, y, level, bound: score - self.window.pull * away }
     }
 
-    fn best(&self, mut open: Vec<Block>, at_least: f64) -> Option<Found> {
+    fn best(&self, mut open: Vec<Block>, at_least: f64) -> Option<GridMatch> {
         // Last is best; equal ones stay in the order they were made.
         let order = |a: &Block, b: &Block| a.bound.total_cmp(&b.bound);
         open.retain(|b| b.bound > at_least);
@@ -239,7 +239,7 @@ impl Search<'_> {
                     d.xy().norm() < metres && d.z.abs() < radians
                 });
                 if !left_out {
-                    (best, least) = (Some(Found { pose, score: block.bound }), block.bound);
+                    (best, least) = (Some(GridMatch { pose, score: block.bound }), block.bound);
                 }
                 continue;
             }

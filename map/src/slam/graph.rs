@@ -22,7 +22,7 @@ const MAX_ITERATIONS: usize = 50;
 
 /// One relation between two poses.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Edge {
+pub struct PoseConstraint {
     /// Index of the pose whose frame it is in.
     pub from: usize,
     /// Index of the other pose.
@@ -44,14 +44,14 @@ pub enum GraphError {
     TooLarge(usize, usize),
     /// An edge names a pose that is not there, or a number is not finite.
     #[error("edge {0} is not usable")]
-    Edge(usize),
+    Constraint(usize),
     /// The edges do not hold every pose.
     #[error("the edges do not determine every pose")]
     Loose,
 }
 
 /// Error of an edge (x, y, theta), and its derivatives by both poses.
-fn error(edge: &Edge, from: &Pose2, to: &Pose2) -> Vector3<f64> {
+fn error(edge: &PoseConstraint, from: &Pose2, to: &Pose2) -> Vector3<f64> {
     let h = from.between(to);
     Vector3::new(
         h.x_m - edge.measured.x_m,
@@ -69,19 +69,19 @@ fn jacobians(from: &Pose2, to: &Pose2) -> (Matrix3<f64>, Matrix3<f64>) {
 }
 
 /// chi2 of an edge at these poses, without scaling.
-pub fn chi2(edge: &Edge, poses: &[Pose2]) -> f64 {
+pub fn chi2(edge: &PoseConstraint, poses: &[Pose2]) -> f64 {
     let e = error(edge, &poses[edge.from], &poses[edge.to]);
     e.dot(&(edge.information * e))
 }
 
 /// Weight of an edge with this chi2: 1, or less if it may be wrong.
-pub fn weight(edge: &Edge, chi2: f64) -> f64 {
+pub fn weight(edge: &PoseConstraint, chi2: f64) -> f64 {
     edge.doubt_chi2.map_or(1.0, |phi| (2.0 * phi / (phi + chi2)).min(1.0).powi(2))
 }
 
 /// What the robust edges cost: chi2 where they are believed, bounded where they are not.
-fn cost(edges: &[Edge], poses: &[Pose2]) -> f64 {
-    let one = |e: &Edge| {
+fn cost(edges: &[PoseConstraint], poses: &[Pose2]) -> f64 {
+    let one = |e: &PoseConstraint| {
         let c = chi2(e, poses);
         match e.doubt_chi2 {
             // Integral of the weight over chi2.
@@ -92,18 +92,18 @@ fn cost(edges: &[Edge], poses: &[Pose2]) -> f64 {
     edges.iter().map(one).sum()
 }
 
-fn check(poses: &[Pose2], edges: &[Edge]) -> Result<(), GraphError> {
+fn check(poses: &[Pose2], edges: &[PoseConstraint]) -> Result<(), GraphError> {
     if poses.len() > MAX_POSES || edges.len() > MAX_EDGES {
         return Err(GraphError::TooLarge(poses.len(), edges.len()));
     }
-    let good = |e: &Edge| {
+    let good = |e: &PoseConstraint| {
         e.from < poses.len()
             && e.to < poses.len()
             && e.from != e.to
             && e.measured.check().is_ok()
             && e.information.iter().all(|v| v.is_finite())
     };
-    edges.iter().position(|e| !good(e)).map_or(Ok(()), |i| Err(GraphError::Edge(i)))
+    edges.iter().position(|e| !good(e)).map_or(Ok(()), |i| Err(GraphError::Constraint(i)))
 }
 
 /// The factorised normal equations; the first pose is held.
@@ -112,7 +112,7 @@ struct Normal {
     gradient: Vec<f64>,
 }
 
-fn normal(poses: &[Pose2], edges: &[Edge], damping: f64) -> Result<Normal, GraphError> {
+fn normal(poses: &[Pose2], edges: &[PoseConstraint], damping: f64) -> Result<Normal, GraphError> {
     let n = 3 * (poses.len() - 1);
     let mut gradient = vec![0.0; n];
     let mut triplets = Vec::with_capacity(24 * edges.len() + n);
@@ -162,7 +162,7 @@ fn factor(normal: &Normal, symbolic: &SymbolicLlt<usize>) -> Result<Llt<usize, f
 }
 
 /// Moves all poses but the first to where the edges want them (Levenberg-Marquardt). Gives the final cost.
-pub fn optimise(poses: &mut [Pose2], edges: &[Edge]) -> Result<f64, GraphError> {
+pub fn optimise(poses: &mut [Pose2], edges: &[PoseConstraint]) -> Result<f64, GraphError> {
     check(poses, edges)?;
     if poses.len() < 2 {
         return Ok(0.0);
@@ -211,7 +211,11 @@ pub fn optimise(poses: &mut [Pose2], edges: &[Edge]) -> Result<f64, GraphError> 
 }
 
 /// Covariance of (x, y, theta) of the poses `at`, in the map frame, the first pose held.
-pub fn covariances(poses: &[Pose2], edges: &[Edge], at: &[usize]) -> Result<Vec<Matrix3<f64>>, GraphError> {
+pub fn covariances(
+    poses: &[Pose2],
+    edges: &[PoseConstraint],
+    at: &[usize],
+) -> Result<Vec<Matrix3<f64>>, GraphError> {
     check(poses, edges)?;
     if poses.len() < 2 {
         return Ok(vec![Matrix3::zeros(); at.len()]);

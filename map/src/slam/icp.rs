@@ -4,7 +4,7 @@
 
 use crate::{
     pose2::Pose2,
-    slam::{cloud::Cloud, information::with_floor, surface_index::Reference},
+    slam::{cloud::Cloud, information::with_floor, surface_index::SurfaceIndex},
 };
 use nalgebra::{Matrix3, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 /// Knobs of the alignment.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct AlignParams {
+pub struct IcpParams {
     /// How far a point's surface is looked for at first...
     pub start_radius_m: f64,
     /// ...and at last.
@@ -33,7 +33,7 @@ pub struct AlignParams {
     pub floor_rad: f64,
 }
 
-impl Default for AlignParams {
+impl Default for IcpParams {
     fn default() -> Self {
         Self {
             start_radius_m: 0.5,
@@ -51,14 +51,14 @@ impl Default for AlignParams {
 
 /// A prior of the pose: its mean and information.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Prior {
+pub(crate) struct PosePrior {
     pub pose: Pose2,
     pub information: Matrix3<f64>,
 }
 
 /// How a scan lies on its reference.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Aligned {
+pub(crate) struct IcpResult {
     /// `reference_from_robot`.
     pub pose: Pose2,
     /// Of (x, y, theta), by the points alone, without the prior; singular where they say nothing.
@@ -71,12 +71,12 @@ pub(crate) struct Aligned {
 
 /// Fits `scan` to `reference` from `guess` on. `None` if fewer than three points have a surface.
 pub(crate) fn align(
-    reference: &Reference,
+    reference: &SurfaceIndex,
     scan: &Cloud,
     guess: &Pose2,
-    prior: Option<&Prior>,
-    p: &AlignParams,
-) -> Option<Aligned> {
+    prior: Option<&PosePrior>,
+    p: &IcpParams,
+) -> Option<IcpResult> {
     let mut pose = *guess;
     let mut radius_m = p.start_radius_m;
     let mut done = None;
@@ -106,7 +106,7 @@ pub(crate) fn align(
     let flat = scan.points.iter().filter(|q| q.normal.is_some()).count();
     let information = with_floor(&(sums.told() * scale), [p.floor_m, p.floor_rad]);
     let finite = pose.check().is_ok() && information.iter().all(|v| v.is_finite());
-    finite.then(|| Aligned {
+    finite.then(|| IcpResult {
         pose,
         information,
         matched: sums.points as f64 / flat.max(1) as f64,
@@ -139,12 +139,12 @@ impl Sums {
         back * eigen.recompose() * back
     }
 
-    fn variance(&self, p: &AlignParams) -> f64 {
+    fn variance(&self, p: &IcpParams) -> f64 {
         (self.squares / self.weights.max(1e-9)).max(p.sigma_m * p.sigma_m)
     }
 }
 
-fn sums(reference: &Reference, scan: &Cloud, pose: &Pose2, radius_m: f64, p: &AlignParams) -> Option<Sums> {
+fn sums(reference: &SurfaceIndex, scan: &Cloud, pose: &Pose2, radius_m: f64, p: &IcpParams) -> Option<Sums> {
     let (s, c) = pose.theta_rad.sin_cos();
     let cos_turn = p.max_turn_rad.cos();
     let (mut h, mut g) = (Matrix3::zeros(), Vector3::zeros());

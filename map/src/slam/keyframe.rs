@@ -4,7 +4,7 @@ use crate::{pose2::Pose2, segments::LaserSegment, slam::cloud::Cloud};
 
 /// A pose from which the map is made.
 #[derive(Debug, Clone)]
-pub(crate) struct Key {
+pub(crate) struct Keyframe {
     pub pose: Pose2,
     pub odom: Pose2,
     pub cloud: Cloud,

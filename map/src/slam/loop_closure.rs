@@ -7,6 +7,6 @@ mod reach;
 mod verification;
 mod closures;
 
-pub use closures::Closure;
-pub(super) use closures::Closures;
+pub(super) use closures::LoopCloser;
+pub use closures::LoopClosure;
 pub use params::LoopParams;

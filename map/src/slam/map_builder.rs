@@ -8,13 +8,13 @@ use crate::{
     segments::LaserSegment,
     slam::{
         cloud::{Cloud, cloud},
-        graph::{self, Edge, GraphError},
+        graph::{self, GraphError, PoseConstraint},
         information::inverse,
-        keyframe::Key,
-        loop_closure::{Closure, Closures},
+        keyframe::Keyframe,
+        loop_closure::{LoopCloser, LoopClosure},
         params::SlamParams,
         refine::refine,
-        scan_matcher::Tracker,
+        scan_matcher::ScanMatcher,
     },
     walls::Walls,
 };
@@ -52,12 +52,12 @@ struct Placed {
 #[derive(Debug, Clone)]
 pub struct Slam {
     params: SlamParams,
-    keys: Vec<Key>,
+    keys: Vec<Keyframe>,
     /// Between key poses that follow one another.
-    path: Vec<Edge>,
-    closures: Closures,
+    path: Vec<PoseConstraint>,
+    closures: LoopCloser,
     placed: Vec<Placed>,
-    tracker: Tracker,
+    tracker: ScanMatcher,
 }
 
 /// The finished map.
@@ -68,7 +68,7 @@ pub struct SlamMap {
     /// The key poses: index of the scan, pose and covariance relative to the first.
     pub keys: Vec<(usize, Pose2Covariance)>,
     /// Loops that were closed, by key pose.
-    pub loops: Vec<Closure>,
+    pub loops: Vec<LoopClosure>,
     /// Loops that looked right but were refused.
     pub refused: usize,
     /// The walls.
@@ -82,9 +82,9 @@ impl Slam {
             params,
             keys: Vec::new(),
             path: Vec::new(),
-            closures: Closures::default(),
+            closures: LoopCloser::default(),
             placed: Vec::new(),
-            tracker: Tracker::default(),
+            tracker: ScanMatcher::default(),
         }
     }
 
@@ -103,7 +103,7 @@ impl Slam {
         if seen.is_new && self.keys.len() < MAX_KEYS {
             let path_m = self.keys[last].path_m + seen.key_from_robot.pose.position().norm();
             let pose = self.keys[last].pose.compose(&seen.key_from_robot.pose);
-            self.path.push(Edge {
+            self.path.push(PoseConstraint {
                 from: last,
                 to: last + 1,
                 measured: seen.key_from_robot.pose,
@@ -111,7 +111,7 @@ impl Slam {
                 doubt_chi2: None,
             });
             self.push_key(pose, odom_from_robot, cloud, scan, path_m);
-            if self.closures.look(&mut self.keys, &self.path, &self.params)? {
+            if self.closures.detect(&mut self.keys, &self.path, &self.params)? {
                 self.tracker.relaid(&self.keys, &self.params);
             }
             return Ok(self.keys[last + 1].pose);
@@ -128,7 +128,7 @@ impl Slam {
     fn push_key(&mut self, pose: Pose2, odom: &Pose2, cloud: Cloud, scan: &Scan, path_m: f64) {
         let lines = lines::segments(scan, &self.params.lines);
         self.placed.push(Placed { key: self.keys.len(), key_from_robot: Pose2::default() });
-        self.keys.push(Key { pose, odom: *odom, cloud, lines, path_m });
+        self.keys.push(Keyframe { pose, odom: *odom, cloud, lines, path_m });
         self.tracker.start(&self.keys, &self.params);
     }
 

@@ -3,7 +3,7 @@
 use crate::{
     lines::LineParams,
     pose2::{Pose2, Pose2Covariance},
-    slam::{cloud::CloudParams, correlative::SearchParams, icp::AlignParams, loop_closure::LoopParams},
+    slam::{cloud::CloudParams, correlative::CorrelativeParams, icp::IcpParams, loop_closure::LoopParams},
     walls::WallParams,
 };
 use nalgebra::{Matrix3, Vector3};
@@ -16,9 +16,9 @@ pub struct SlamParams {
     /// Points of a scan.
     pub cloud: CloudParams,
     /// Search for a pose near the predicted one.
-    pub search: SearchParams,
+    pub search: CorrelativeParams,
     /// The last step of every match.
-    pub align: AlignParams,
+    pub align: IcpParams,
     /// Loops.
     pub loops: LoopParams,
     /// The final fit.
@@ -59,8 +59,8 @@ impl Default for SlamParams {
     fn default() -> Self {
         Self {
             cloud: CloudParams::default(),
-            search: SearchParams::default(),
-            align: AlignParams::default(),
+            search: CorrelativeParams::default(),
+            align: IcpParams::default(),
             loops: LoopParams::default(),
             refine: RefineParams::default(),
             lines: LineParams {

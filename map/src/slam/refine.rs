@@ -4,23 +4,25 @@
 use crate::{
     pose2::Pose2,
     slam::{
-        graph::{self, Edge, GraphError},
+        graph::{self, GraphError, PoseConstraint},
         icp::align,
-        keyframe::Key,
-        loop_closure::Closures,
+        keyframe::Keyframe,
+        loop_closure::LoopCloser,
         params::SlamParams,
-        surface_index::Reference,
+        surface_index::SurfaceIndex,
     },
 };
 
 /// Moves the keys; gives all edges of the last fit.
 pub(super) fn refine(
-    keys: &mut [Key],
-    path: &[Edge],
-    closures: &mut Closures,
+    keys: &mut [Keyframe],
+    path: &[PoseConstraint],
+    closures: &mut LoopCloser,
     p: &SlamParams,
-) -> Result<Vec<Edge>, GraphError> {
-    let base = |closures: &Closures| -> Vec<Edge> { path.iter().chain(closures.edges()).copied().collect() };
+) -> Result<Vec<PoseConstraint>, GraphError> {
+    let base = |closures: &LoopCloser| -> Vec<PoseConstraint> {
+        path.iter().chain(closures.edges()).copied().collect()
+    };
     let mut edges = base(closures);
     let mut poses: Vec<Pose2> = keys.iter().map(|k| k.pose).collect();
     for _ in 0..p.refine.rounds {
@@ -28,7 +30,7 @@ pub(super) fn refine(
         edges = base(closures);
         edges.extend(found);
         graph::optimise(&mut poses, &edges)?;
-        if closures.judge(&poses, &p.loops) {
+        if closures.prune(&poses, &p.loops) {
             edges.retain(|e| e.doubt_chi2 != Some(p.loops.doubt_chi2) || closures.edges().contains(e));
             graph::optimise(&mut poses, &edges)?;
         }
@@ -40,12 +42,12 @@ pub(super) fn refine(
 }
 
 /// Alignments of key scans with their nearest partners.
-fn pairs(keys: &[Key], p: &SlamParams) -> Vec<Edge> {
+fn pairs(keys: &[Keyframe], p: &SlamParams) -> Vec<PoseConstraint> {
     let r = &p.refine;
     let mut edges = Vec::new();
     for (i, key) in keys.iter().enumerate() {
         let reference =
-            Reference::new(std::iter::once((Pose2::default(), &key.cloud)), p.align.start_radius_m);
+            SurfaceIndex::new(std::iter::once((Pose2::default(), &key.cloud)), p.align.start_radius_m);
         let mut near: Vec<(usize, f64)> = keys[i + 1..]
             .iter()
             .enumerate()
@@ -68,7 +70,7 @@ fn pairs(keys: &[Key], p: &SlamParams) -> Vec<Edge> {
             if a.matched < r.min_matched || d.xy().norm() > r.max_move_m || d.z.abs() > 0.2 {
                 continue;
             }
-            edges.push(Edge {
+            edges.push(PoseConstraint {
                 from: i,
                 to: *k,
                 measured: a.pose,

@@ -5,12 +5,12 @@ use crate::{
     pose2::{Pose2, Pose2Covariance},
     slam::{
         cloud::Cloud,
-        correlative::{Field, Window},
-        icp::{Prior, align},
+        correlative::{LikelihoodField, PoseWindow},
+        icp::{PosePrior, align},
         information::inverse,
-        keyframe::Key,
+        keyframe::Keyframe,
         params::SlamParams,
-        surface_index::Reference,
+        surface_index::SurfaceIndex,
     },
 };
 use nalgebra::{Matrix3, Point2};
@@ -22,7 +22,7 @@ const MAX_REACH_RAD: f64 = 0.7;
 
 /// Where a scan lies.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Seen {
+pub(super) struct ScanPlacement {
     /// With covariance in the key's frame.
     pub key_from_robot: Pose2Covariance,
     /// It should become a key scan.
@@ -31,8 +31,8 @@ pub(super) struct Seen {
 
 /// The recent map, in the frame of the last key pose.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Tracker {
-    recent: Option<(Reference, Field)>,
+pub(super) struct ScanMatcher {
+    recent: Option<(SurfaceIndex, LikelihoodField)>,
     /// The last scan in the key's frame.
     last: Pose2,
     /// Covariance of the last scan's pose.
@@ -42,9 +42,9 @@ pub(super) struct Tracker {
     odom: Pose2,
 }
 
-impl Tracker {
+impl ScanMatcher {
     /// A new key pose: the recent map is laid anew around it.
-    pub(super) fn start(&mut self, keys: &[Key], p: &SlamParams) {
+    pub(super) fn start(&mut self, keys: &[Keyframe], p: &SlamParams) {
         let Some(key) = keys.last() else { return };
         self.relaid(keys, p);
         self.last = Pose2::default();
@@ -53,23 +53,30 @@ impl Tracker {
     }
 
     /// The key poses have moved.
-    pub(super) fn relaid(&mut self, keys: &[Key], p: &SlamParams) {
+    pub(super) fn relaid(&mut self, keys: &[Keyframe], p: &SlamParams) {
         let Some(key) = keys.last() else { return };
         let first = keys.len().saturating_sub(p.recent_keys.max(1));
         let near = || {
             let recent = keys[first..].iter().filter(|k| key.path_m - k.path_m <= p.recent_m);
             recent.map(|k| (key.pose.between(&k.pose), &k.cloud))
         };
-        let reference = Reference::new(near(), p.align.start_radius_m);
-        let field = Field::new(near(), &Point2::origin(), p.cloud.max_range_m, MAX_REACH_M, &p.search);
+        let reference = SurfaceIndex::new(near(), p.align.start_radius_m);
+        let field =
+            LikelihoodField::new(near(), &Point2::origin(), p.cloud.max_range_m, MAX_REACH_M, &p.search);
         self.recent = Some((reference, field));
     }
 
     /// Finds the scan near the place that odometry says.
-    pub(super) fn track(&mut self, keys: &[Key], odom: &Pose2, cloud: &Cloud, p: &SlamParams) -> Seen {
+    pub(super) fn track(
+        &mut self,
+        keys: &[Keyframe],
+        odom: &Pose2,
+        cloud: &Cloud,
+        p: &SlamParams,
+    ) -> ScanPlacement {
         let (Some(key), Some((reference, field))) = (keys.last(), &self.recent) else {
             let key_from_robot = Pose2Covariance { pose: Pose2::default(), covariance: Matrix3::zeros() };
-            return Seen { key_from_robot, is_new: true };
+            return ScanPlacement { key_from_robot, is_new: true };
         };
         let motion = p.motion(&self.odom.between(odom));
         let predicted = Pose2Covariance { pose: self.last, covariance: self.spread }.compose(&motion);
@@ -78,7 +85,7 @@ impl Tracker {
         self.by_odometry = alone.covariance;
         let by_odometry = if since.covariance.trace() > alone.covariance.trace() { since } else { alone };
         let guess = guess(field, cloud, &predicted, p);
-        let prior = Prior { pose: predicted.pose, information: inverse(&predicted.covariance) };
+        let prior = PosePrior { pose: predicted.pose, information: inverse(&predicted.covariance) };
         let aligned = align(reference, cloud, &guess, Some(&prior), &p.align)
             .filter(|a| a.matched >= p.min_matched && fits(&a.pose, &predicted));
         let (pose, information, matched) = match &aligned {
@@ -91,15 +98,20 @@ impl Tracker {
         let is_new = pose.position().norm() > p.key_m
             || pose.theta_rad.abs() > p.key_rad
             || (matched < p.key_matched && pose.position().norm() > 0.25 * p.key_m);
-        Seen { key_from_robot: Pose2Covariance { pose, covariance }, is_new }
+        ScanPlacement { key_from_robot: Pose2Covariance { pose, covariance }, is_new }
     }
 }
 
 /// The best pose around the predicted one on the grid; the predicted one if none is good.
-pub(super) fn guess(field: &Field, cloud: &Cloud, predicted: &Pose2Covariance, p: &SlamParams) -> Pose2 {
+pub(super) fn guess(
+    field: &LikelihoodField,
+    cloud: &Cloud,
+    predicted: &Pose2Covariance,
+    p: &SlamParams,
+) -> Pose2 {
     let c = &predicted.covariance;
     let sigma_m = c[(0, 0)].max(c[(1, 1)]).max(0.0).sqrt();
-    let window = Window {
+    let window = PoseWindow {
         middle: predicted.pose,
         reach_m: (3.0 * sigma_m + 0.05).min(MAX_REACH_M),
         reach_rad: (3.0 * c[(2, 2)].max(0.0).sqrt() + 0.02).min(MAX_REACH_RAD),

@@ -20,7 +20,7 @@ pub(crate) struct Surface {
 
 /// Surface points in square buckets.
 #[derive(Debug, Clone)]
-pub(crate) struct Reference {
+pub(crate) struct SurfaceIndex {
     low: Point2<f64>,
     bucket_m: f64,
     width: usize,
@@ -30,8 +30,8 @@ pub(crate) struct Reference {
     surfaces: Vec<Surface>,
 }
 
-impl Reference {
-    /// Lays the flat points of `scans` together; `bucket_m` is the largest radius of [`Reference::nearest`].
+impl SurfaceIndex {
+    /// Lays the flat points of `scans` together; `bucket_m` is the largest radius of [`SurfaceIndex::nearest`].
     pub(crate) fn new<'a>(scans: impl Iterator<Item = (Pose2, &'a Cloud)>, bucket_m: f64) -> Self {
         let mut all = Vec::new();
         for (pose, cloud) in scans {

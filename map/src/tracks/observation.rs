@@ -20,7 +20,7 @@ pub enum Identity {
 
 /// One quad of a frame.
 #[derive(Debug, Clone)]
-pub struct Glimpse {
+pub struct QuadObservation {
     /// Where in the picture.
     pub corners_px: Corners,
     /// Its icon.
@@ -34,7 +34,7 @@ pub struct Glimpse {
 /// What came of a glimpse.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Outcome {
+pub enum TrackOutcome {
     /// A view to keep in this track.
     Keep(u32),
     /// Followed; the track has a view like it.

@@ -1,10 +1,10 @@
 use crate::{
     place::{LandmarkPlace, PlaceSigmas},
     tracks::{
-        observation::{Glimpse, Identity, Outcome},
+        observation::{Identity, QuadObservation, TrackOutcome},
         params::GatherParams,
-        track::{Kept, LOOKS_KEPT, MAX_TRACK_VIEWS, Track},
-        tracker::{MAX_TRACKS, Tracker},
+        track::{LOOKS_KEPT, MAX_TRACK_VIEWS, StoredTrack, Track},
+        tracker::{MAX_TRACKS, ViewTracker},
     },
 };
 use nalgebra::{Point2, Vector3};
@@ -43,36 +43,36 @@ fn at(x_m: f64) -> LandmarkPlace {
     LandmarkPlace::by_hand(Vector3::new(x_m, 0.0, 1.5), 1.5, size, PlaceSigmas::default()).unwrap()
 }
 
-fn glimpse(seed: u64, u_px: f64, width_px: f64, x_m: Option<f64>) -> Glimpse {
+fn glimpse(seed: u64, u_px: f64, width_px: f64, x_m: Option<f64>) -> QuadObservation {
     let (icon, place) = (icon(seed), x_m.map(at));
-    Glimpse { corners_px: corners(u_px, width_px), icon, place, identity: Identity::Stranger }
+    QuadObservation { corners_px: corners(u_px, width_px), icon, place, identity: Identity::Stranger }
 }
 
-fn seen(tracker: &mut Tracker, step: i64, glimpses: &[Glimpse]) -> Vec<Outcome> {
+fn seen(tracker: &mut ViewTracker, step: i64, glimpses: &[QuadObservation]) -> Vec<TrackOutcome> {
     let p = RecogniseParams::default();
-    tracker.follow((step * STEP_NS, "front"), glimpses, |id| id == LandmarkId(7), true, &p)
+    tracker.update((step * STEP_NS, "front"), glimpses, |id| id == LandmarkId(7), true, &p)
 }
 
 #[test]
 fn things_are_followed_by_their_place_over_any_gap() {
-    let mut tracker = Tracker::default();
+    let mut tracker = ViewTracker::default();
     let two = |width| [glimpse(1, 0.0, width, Some(1.0)), glimpse(2, 300.0, width, Some(2.0))];
-    assert_eq!(seen(&mut tracker, 1, &two(100.0)), [Outcome::TooNew; 2]);
-    assert_eq!(seen(&mut tracker, 2, &two(101.0)), [Outcome::TooNew; 2]);
-    assert_eq!(seen(&mut tracker, 3, &two(102.0)), [Outcome::Keep(1), Outcome::Keep(2)]);
-    assert_eq!(seen(&mut tracker, 4, &two(102.5)), [Outcome::Alike; 2]);
+    assert_eq!(seen(&mut tracker, 1, &two(100.0)), [TrackOutcome::TooNew; 2]);
+    assert_eq!(seen(&mut tracker, 2, &two(101.0)), [TrackOutcome::TooNew; 2]);
+    assert_eq!(seen(&mut tracker, 3, &two(102.0)), [TrackOutcome::Keep(1), TrackOutcome::Keep(2)]);
+    assert_eq!(seen(&mut tracker, 4, &two(102.5)), [TrackOutcome::Alike; 2]);
     // A minute later, elsewhere in the picture, and the other way round.
     let back: Vec<_> = two(150.0).into_iter().rev().collect();
-    assert_eq!(seen(&mut tracker, 300, &back), [Outcome::Keep(2), Outcome::Keep(1)]);
+    assert_eq!(seen(&mut tracker, 300, &back), [TrackOutcome::Keep(2), TrackOutcome::Keep(1)]);
     // Something else hangs there now: neither joined nor begun anew.
-    assert_eq!(seen(&mut tracker, 301, &[glimpse(3, 0.0, 190.0, Some(1.0))]), [Outcome::Unlike]);
+    assert_eq!(seen(&mut tracker, 301, &[glimpse(3, 0.0, 190.0, Some(1.0))]), [TrackOutcome::Unlike]);
     // The same picture elsewhere is another thing; so is one of another size at the same place.
-    assert_eq!(seen(&mut tracker, 302, &[glimpse(1, 0.0, 190.0, Some(4.0))]), [Outcome::TooNew]);
+    assert_eq!(seen(&mut tracker, 302, &[glimpse(1, 0.0, 190.0, Some(4.0))]), [TrackOutcome::TooNew]);
     let mut larger = glimpse(2, 0.0, 190.0, Some(2.0));
     larger.place = larger
         .place
         .map(|place| LandmarkPlace { size: LandmarkSize { width_m: 0.9, height_m: 0.84 }, ..place });
-    assert_eq!(seen(&mut tracker, 303, &[larger]), [Outcome::TooNew]);
+    assert_eq!(seen(&mut tracker, 303, &[larger]), [TrackOutcome::TooNew]);
     let of = |t: &Track| (t.number, t.sightings, t.views());
     assert_eq!(
         tracker.tracks().iter().map(of).collect::<Vec<_>>(),
@@ -82,68 +82,68 @@ fn things_are_followed_by_their_place_over_any_gap() {
 
 #[test]
 fn without_a_place_things_are_followed_from_picture_to_picture_only() {
-    let mut tracker = Tracker::default();
+    let mut tracker = ViewTracker::default();
     let one = |u_px, width_px| [glimpse(1, u_px, width_px, None)];
     for (step, u_px) in [(1, 0.0), (2, 20.0)] {
-        assert_eq!(seen(&mut tracker, step, &one(u_px, 100.0)), [Outcome::TooNew]);
+        assert_eq!(seen(&mut tracker, step, &one(u_px, 100.0)), [TrackOutcome::TooNew]);
     }
-    assert_eq!(seen(&mut tracker, 3, &one(40.0, 100.0)), [Outcome::Keep(1)]);
+    assert_eq!(seen(&mut tracker, 3, &one(40.0, 100.0)), [TrackOutcome::Keep(1)]);
     // What is in the same place of the picture next and looks different is not joined.
-    assert_eq!(seen(&mut tracker, 4, &[glimpse(2, 40.0, 140.0, None)]), [Outcome::Unlike]);
+    assert_eq!(seen(&mut tracker, 4, &[glimpse(2, 40.0, 140.0, None)]), [TrackOutcome::Unlike]);
     // Too far in the picture, too long ago, another camera: each begins anew.
-    assert_eq!(seen(&mut tracker, 5, &one(300.0, 100.0)), [Outcome::TooNew]);
-    assert_eq!(seen(&mut tracker, 12, &one(40.0, 100.0)), [Outcome::TooNew]);
+    assert_eq!(seen(&mut tracker, 5, &one(300.0, 100.0)), [TrackOutcome::TooNew]);
+    assert_eq!(seen(&mut tracker, 12, &one(40.0, 100.0)), [TrackOutcome::TooNew]);
     let p = RecogniseParams::default();
-    let other = tracker.follow((13 * STEP_NS, "back"), &one(40.0, 100.0), |_| false, true, &p);
-    assert_eq!((other, tracker.tracks().len()), (vec![Outcome::TooNew], 4));
+    let other = tracker.update((13 * STEP_NS, "back"), &one(40.0, 100.0), |_| false, true, &p);
+    assert_eq!((other, tracker.tracks().len()), (vec![TrackOutcome::TooNew], 4));
 }
 
 #[test]
 fn nothing_of_a_doubtful_identity_is_kept() {
-    let mut tracker = Tracker::default();
-    let with = |identity, width_px| [Glimpse { identity, ..glimpse(1, 0.0, width_px, Some(1.0)) }];
+    let mut tracker = ViewTracker::default();
+    let with = |identity, width_px| [QuadObservation { identity, ..glimpse(1, 0.0, width_px, Some(1.0)) }];
     for step in 0..5 {
         let width_px = 100.0 + 20.0 * step as f64;
-        assert_eq!(seen(&mut tracker, step, &with(Identity::Doubtful, width_px)), [Outcome::Known]);
+        assert_eq!(seen(&mut tracker, step, &with(Identity::Doubtful, width_px)), [TrackOutcome::Known]);
         let unwanted = with(Identity::Landmark(LandmarkId(8)), width_px);
-        assert_eq!(seen(&mut tracker, step, &unwanted), [Outcome::Known]);
+        assert_eq!(seen(&mut tracker, step, &unwanted), [TrackOutcome::Known]);
     }
     assert!(tracker.tracks().is_empty());
     // Views of the landmark that is wanted are kept at once, in a track of its own, wherever it seems to be.
     let wanted = |width_px| with(Identity::Landmark(LandmarkId(7)), width_px);
-    assert_eq!(seen(&mut tracker, 6, &wanted(100.0)), [Outcome::Keep(1)]);
-    assert_eq!(seen(&mut tracker, 6, &wanted(101.0)), [Outcome::Alike]);
-    assert_eq!(seen(&mut tracker, 7, &with(Identity::Doubtful, 150.0)), [Outcome::Known]);
+    assert_eq!(seen(&mut tracker, 6, &wanted(100.0)), [TrackOutcome::Keep(1)]);
+    assert_eq!(seen(&mut tracker, 6, &wanted(101.0)), [TrackOutcome::Alike]);
+    assert_eq!(seen(&mut tracker, 7, &with(Identity::Doubtful, 150.0)), [TrackOutcome::Known]);
     assert_eq!(tracker.tracks()[0].landmark, Some(LandmarkId(7)));
     // A thing that is taken for a landmark later is remembered for that.
     for step in 8..12 {
         seen(&mut tracker, step, &[glimpse(2, 300.0, 100.0, Some(3.0))]);
     }
-    let doubtful = Glimpse { identity: Identity::Doubtful, ..glimpse(2, 300.0, 140.0, Some(3.0)) };
-    assert_eq!(seen(&mut tracker, 12, &[doubtful]), [Outcome::Known]);
+    let doubtful = QuadObservation { identity: Identity::Doubtful, ..glimpse(2, 300.0, 140.0, Some(3.0)) };
+    assert_eq!(seen(&mut tracker, 12, &[doubtful]), [TrackOutcome::Known]);
     assert_eq!((tracker.tracks()[1].known, tracker.tracks()[1].views()), (1, 1));
     // Where only landmarks are wanted, a stranger is not even followed.
     let p = RecogniseParams::default();
     let alone =
-        tracker.follow((13 * STEP_NS, "front"), &[glimpse(3, 0.0, 90.0, Some(6.0))], |_| true, false, &p);
-    assert_eq!(alone, [Outcome::Unwanted]);
+        tracker.update((13 * STEP_NS, "front"), &[glimpse(3, 0.0, 90.0, Some(6.0))], |_| true, false, &p);
+    assert_eq!(alone, [TrackOutcome::Unwanted]);
 }
 
 #[test]
 fn both_bounds_hold() {
     let p = GatherParams { memory_s: 1e6, ..GatherParams::default() };
-    let mut tracker = Tracker::new(p);
+    let mut tracker = ViewTracker::new(p);
     for i in 0..MAX_TRACKS {
         assert_eq!(
             seen(&mut tracker, 1, &[glimpse(1, 0.0, 100.0, Some(i as f64))]),
-            [Outcome::TooNew],
+            [TrackOutcome::TooNew],
             "{i}"
         );
     }
-    assert_eq!(seen(&mut tracker, 1, &[glimpse(1, 0.0, 100.0, Some(-9.0))]), [Outcome::TooMany]);
+    assert_eq!(seen(&mut tracker, 1, &[glimpse(1, 0.0, 100.0, Some(-9.0))]), [TrackOutcome::TooMany]);
     assert_eq!(tracker.tracks().len(), MAX_TRACKS);
 
-    let mut tracker = Tracker::default();
+    let mut tracker = ViewTracker::default();
     let mut outcomes = vec![];
     for step in 0..200 {
         // Ever larger in the picture, by more than any limit asks for.
@@ -153,34 +153,34 @@ fn both_bounds_hold() {
             break;
         }
     }
-    assert_eq!(seen(&mut tracker, 201, &[glimpse(1, 0.0, 1.0, Some(1.0))]), [Outcome::Full]);
-    assert_eq!(outcomes.iter().filter(|o| matches!(o, Outcome::Keep(1))).count(), MAX_TRACK_VIEWS);
+    assert_eq!(seen(&mut tracker, 201, &[glimpse(1, 0.0, 1.0, Some(1.0))]), [TrackOutcome::Full]);
+    assert_eq!(outcomes.iter().filter(|o| matches!(o, TrackOutcome::Keep(1))).count(), MAX_TRACK_VIEWS);
     assert_eq!(tracker.tracks()[0].looks.len(), LOOKS_KEPT);
 }
 
 #[test]
 fn glimpses_are_forgotten_and_tracks_taken_up_again() {
-    let mut tracker = Tracker::default();
+    let mut tracker = ViewTracker::default();
     for step in 0..3 {
         seen(&mut tracker, step, &[glimpse(1, 0.0, 100.0, Some(1.0))]);
     }
     seen(&mut tracker, 3, &[glimpse(2, 0.0, 100.0, Some(5.0))]);
     seen(&mut tracker, 100, &[]);
-    let numbers = |t: &Tracker| t.tracks().iter().map(|t| t.number).collect::<Vec<u32>>();
+    let numbers = |t: &ViewTracker| t.tracks().iter().map(|t| t.number).collect::<Vec<u32>>();
     assert_eq!(numbers(&tracker), [1], "kept views stay");
     tracker.close(1);
-    assert_eq!(seen(&mut tracker, 101, &[glimpse(1, 0.0, 150.0, Some(1.0))]), [Outcome::Decided]);
+    assert_eq!(seen(&mut tracker, 101, &[glimpse(1, 0.0, 150.0, Some(1.0))]), [TrackOutcome::Decided]);
     seen(&mut tracker, 102, &[glimpse(2, 0.0, 100.0, Some(5.0))]);
     assert_eq!(numbers(&tracker), [1, 3], "no number is used twice");
 
-    let mut resumed = Tracker::default();
-    let kept = Kept { number: 4, landmark: None, sightings: 9, known: 2, place: Some(at(1.0)) };
+    let mut resumed = ViewTracker::default();
+    let kept = StoredTrack { number: 4, landmark: None, sightings: 9, known: 2, place: Some(at(1.0)) };
     resumed.resume(kept, [(corners(0.0, 100.0), icon(1)), (corners(0.0, 150.0), icon(1))]);
     resumed.resume(kept, []);
     assert_eq!((resumed.tracks().len(), resumed.tracks()[0].views()), (1, 2));
-    assert_eq!(seen(&mut resumed, 200, &[glimpse(1, 0.0, 101.0, Some(1.0))]), [Outcome::Alike]);
-    assert_eq!(seen(&mut resumed, 201, &[glimpse(1, 0.0, 240.0, Some(1.0))]), [Outcome::Keep(4)]);
-    assert_eq!(seen(&mut resumed, 202, &[glimpse(5, 0.0, 240.0, Some(8.0))]), [Outcome::TooNew]);
+    assert_eq!(seen(&mut resumed, 200, &[glimpse(1, 0.0, 101.0, Some(1.0))]), [TrackOutcome::Alike]);
+    assert_eq!(seen(&mut resumed, 201, &[glimpse(1, 0.0, 240.0, Some(1.0))]), [TrackOutcome::Keep(4)]);
+    assert_eq!(seen(&mut resumed, 202, &[glimpse(5, 0.0, 240.0, Some(8.0))]), [TrackOutcome::TooNew]);
     resumed.number_after(8);
     seen(&mut resumed, 203, &[glimpse(6, 0.0, 240.0, Some(12.0))]);
     assert_eq!(numbers(&resumed), [4, 5, 9]);
@@ -189,7 +189,7 @@ fn glimpses_are_forgotten_and_tracks_taken_up_again() {
 #[test]
 fn the_same_glimpses_in_another_order_end_in_the_same_tracks() {
     let glimpses = [glimpse(1, 0.0, 100.0, Some(1.0)), glimpse(2, 300.0, 100.0, Some(2.0))];
-    let (mut a, mut b) = (Tracker::default(), Tracker::default());
+    let (mut a, mut b) = (ViewTracker::default(), ViewTracker::default());
     for tracker in [&mut a, &mut b] {
         for step in 0..3 {
             seen(tracker, step, &glimpses);

@@ -92,7 +92,7 @@ pub(super) fn same_place(a: &LandmarkPlace, b: &LandmarkPlace, p: &GatherParams)
 
 /// A track as it was kept, without its views.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Kept {
+pub struct StoredTrack {
     /// Its number.
     pub number: u32,
     /// The landmark whose views these are.

@@ -1,9 +1,9 @@
 //! Assigns the quads of each frame to tracks and decides which views to keep.
 
 use crate::tracks::{
-    observation::{Glimpse, Identity, Outcome},
+    observation::{Identity, QuadObservation, TrackOutcome},
     params::GatherParams,
-    track::{Kept, Last, MAX_TRACK_VIEWS, Track, same_place},
+    track::{Last, MAX_TRACK_VIEWS, StoredTrack, Track, same_place},
 };
 use vision::{
     detect::quads::Corners,
@@ -18,13 +18,13 @@ pub const MAX_TRACKS: usize = 256;
 
 /// Follows what one robot drives past.
 #[derive(Debug, Clone, Default)]
-pub struct Tracker {
+pub struct ViewTracker {
     p: GatherParams,
     tracks: Vec<Track>,
     numbers: u32,
 }
 
-impl Tracker {
+impl ViewTracker {
     /// Nothing followed yet.
     pub fn new(p: GatherParams) -> Self {
         Self { p, tracks: vec![], numbers: 0 }
@@ -32,8 +32,8 @@ impl Tracker {
 
     /// Takes up a track that was kept elsewhere, from its views in order. From now on it is found by its place only,
     /// unless it is a landmark's. A number that is taken already is ignored.
-    pub fn resume(&mut self, kept: Kept, views: impl IntoIterator<Item = (Corners, IconFeatures)>) {
-        let Kept { number, landmark, sightings, known, place } = kept;
+    pub fn resume(&mut self, kept: StoredTrack, views: impl IntoIterator<Item = (Corners, IconFeatures)>) {
+        let StoredTrack { number, landmark, sightings, known, place } = kept;
         if self.tracks.iter().any(|t| t.number == number) {
             return;
         }
@@ -64,14 +64,14 @@ impl Tracker {
 
     /// The glimpses of one frame of `camera`, each answered in its place. `wanted`: views of such landmarks are kept;
     /// `strangers`: things that are no landmark are.
-    pub fn follow(
+    pub fn update(
         &mut self,
         (at_ns, camera): (i64, &str),
-        glimpses: &[Glimpse],
+        glimpses: &[QuadObservation],
         wanted: impl Fn(LandmarkId) -> bool,
         strangers: bool,
         p: &RecogniseParams,
-    ) -> Vec<Outcome> {
+    ) -> Vec<TrackOutcome> {
         self.clear_out(at_ns);
         let mut taken = vec![false; self.tracks.len()];
         let places = self.assigned(at_ns, camera, glimpses, &mut taken, p);
@@ -81,11 +81,11 @@ impl Tracker {
             .map(|(glimpse, place)| {
                 let at = match (glimpse.identity, place) {
                     (Identity::Landmark(id), _) if wanted(id) => self.of_landmark(id),
-                    (Identity::Stranger, _) if !strangers => Err(Outcome::Unwanted),
+                    (Identity::Stranger, _) if !strangers => Err(TrackOutcome::Unwanted),
                     (Identity::Stranger, Place::Nowhere) => self.begun(None),
                     (_, Place::Track(i)) => Ok(i),
-                    (Identity::Stranger, Place::Occupied) => Err(Outcome::Unlike),
-                    _ => Err(Outcome::Known),
+                    (Identity::Stranger, Place::Occupied) => Err(TrackOutcome::Unlike),
+                    _ => Err(TrackOutcome::Known),
                 };
                 at.map_or_else(|outcome| outcome, |i| self.taken(i, at_ns, camera, glimpse))
             })
@@ -97,7 +97,7 @@ impl Tracker {
         &self,
         at_ns: i64,
         camera: &str,
-        glimpses: &[Glimpse],
+        glimpses: &[QuadObservation],
         taken: &mut [bool],
         p: &RecogniseParams,
     ) -> Vec<Place> {
@@ -127,7 +127,7 @@ impl Tracker {
         places
     }
 
-    fn lies_there(&self, track: &Track, at_ns: i64, camera: &str, glimpse: &Glimpse) -> bool {
+    fn lies_there(&self, track: &Track, at_ns: i64, camera: &str, glimpse: &QuadObservation) -> bool {
         if let (Some(a), Some(b)) = (&track.place, &glimpse.place) {
             return same_place(a, b, &self.p);
         }
@@ -139,24 +139,24 @@ impl Tracker {
             && iou(last.corners_px.points(), glimpse.corners_px.points()) >= self.p.min_iou
     }
 
-    fn of_landmark(&mut self, id: LandmarkId) -> Result<usize, Outcome> {
+    fn of_landmark(&mut self, id: LandmarkId) -> Result<usize, TrackOutcome> {
         match self.tracks.iter().position(|t| t.landmark == Some(id) && !t.closed) {
             Some(i) => Ok(i),
             None => self.begun(Some(id)),
         }
     }
 
-    fn begun(&mut self, landmark: Option<LandmarkId>) -> Result<usize, Outcome> {
+    fn begun(&mut self, landmark: Option<LandmarkId>) -> Result<usize, TrackOutcome> {
         if self.tracks.len() >= MAX_TRACKS {
-            return Err(Outcome::TooMany);
+            return Err(TrackOutcome::TooMany);
         }
         self.numbers = self.numbers.saturating_add(1);
         self.tracks.push(Track::new(self.numbers, landmark));
         Ok(self.tracks.len() - 1)
     }
 
-    fn taken(&mut self, i: usize, at_ns: i64, camera: &str, glimpse: &Glimpse) -> Outcome {
-        let Some(track) = self.tracks.get_mut(i) else { return Outcome::Unlike };
+    fn taken(&mut self, i: usize, at_ns: i64, camera: &str, glimpse: &QuadObservation) -> TrackOutcome {
+        let Some(track) = self.tracks.get_mut(i) else { return TrackOutcome::Unlike };
         track.sightings = track.sightings.saturating_add(1);
         track.last = Some(Last {
             at_ns,
@@ -166,26 +166,26 @@ impl Tracker {
         });
         track.place = glimpse.place.or(track.place);
         if track.closed {
-            return Outcome::Decided;
+            return TrackOutcome::Decided;
         }
         if track.landmark.is_none() && glimpse.identity != Identity::Stranger {
             track.known = track.known.saturating_add(1);
-            return Outcome::Known;
+            return TrackOutcome::Known;
         }
         if track.landmark.is_none() && track.sightings < self.p.min_sightings {
-            return Outcome::TooNew;
+            return TrackOutcome::TooNew;
         }
         if track.views.len() >= MAX_TRACK_VIEWS {
-            return Outcome::Full;
+            return TrackOutcome::Full;
         }
         let digest = ViewDigest::new(&glimpse.corners_px, &glimpse.icon.icon);
         let late = track.views.len() >= MAX_TRACK_VIEWS / 2;
         let needed = if late { self.p.late_novelty } else { 1.0 };
         match most_alike(&digest, &track.views, &self.p.thinning) {
-            Some((_, novelty)) if novelty < needed => Outcome::Alike,
+            Some((_, novelty)) if novelty < needed => TrackOutcome::Alike,
             _ => {
                 track.keep(digest, &glimpse.icon);
-                Outcome::Keep(track.number)
+                TrackOutcome::Keep(track.number)
             }
         }
     }

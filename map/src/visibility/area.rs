@@ -9,7 +9,7 @@ use crate::{
         obstacle::Obstacle,
         outline::{Polygon, distance_to_segment, measure, outline},
         quarters::{Quarter, contains, quarters},
-        settings::{Viewer, VisibilityParams},
+        settings::{PanTiltCamera, VisibilityParams},
     },
 };
 use nalgebra::Point2;
@@ -44,7 +44,7 @@ pub struct VisibilityMap {
 pub fn visibility(
     place: &LandmarkPlace,
     obstacles: &[Obstacle],
-    viewer: &Viewer,
+    viewer: &PanTiltCamera,
     p: &VisibilityParams,
 ) -> Result<VisibilityMap, OutOfRange> {
     place.check()?;
@@ -80,7 +80,7 @@ pub fn visibility(
 pub fn within_reach(
     place: &LandmarkPlace,
     obstacles: &[Obstacle],
-    viewer: &Viewer,
+    viewer: &PanTiltCamera,
     p: &VisibilityParams,
 ) -> Vec<Obstacle> {
     let frame = LocalFrame::new(place, p.standoff_m);

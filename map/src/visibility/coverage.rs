@@ -13,7 +13,7 @@ pub const MAX_STEPS: usize = 10_000;
 
 /// One place of a path.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Seen {
+pub struct CoverageSample {
     /// Way from the start.
     pub along_m: f64,
     /// Where that is.
@@ -24,7 +24,7 @@ pub struct Seen {
 
 /// A piece of the path without any landmark.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Gap {
+pub struct CoverageGap {
     /// Way from the start at which it begins, and ends.
     pub from_m: f64,
     /// Where it ends.
@@ -37,9 +37,9 @@ pub struct Coverage {
     /// Length of the path.
     pub length_m: f64,
     /// Place by place.
-    pub steps: Vec<Seen>,
+    pub steps: Vec<CoverageSample>,
     /// Where nothing is seen; to the step.
-    pub gaps: Vec<Gap>,
+    pub gaps: Vec<CoverageGap>,
 }
 
 impl Coverage {
@@ -90,30 +90,30 @@ fn seen(
     position: Point2<f64>,
     heading_rad: Option<f64>,
     maps: &[(LandmarkId, &VisibilityMap)],
-) -> Seen {
+) -> CoverageSample {
     let sees = |map: &VisibilityMap| {
         map.contains(&position) && heading_rad.is_none_or(|heading| map.pans(&position, heading))
     };
     let landmarks = maps.iter().filter(|(_, map)| sees(map)).map(|(id, _)| *id).collect();
-    Seen { along_m, position, landmarks }
+    CoverageSample { along_m, position, landmarks }
 }
 
 /// From the last place that sees something to the next that does.
-fn gaps(steps: &[Seen]) -> Vec<Gap> {
-    let mut made: Vec<Gap> = Vec::new();
+fn gaps(steps: &[CoverageSample]) -> Vec<CoverageGap> {
+    let mut made: Vec<CoverageGap> = Vec::new();
     let mut open: Option<f64> = None;
     for (i, step) in steps.iter().enumerate() {
         match (step.landmarks.is_empty(), open) {
             (true, None) => open = Some(if i == 0 { step.along_m } else { steps[i - 1].along_m }),
             (false, Some(from_m)) => {
-                made.push(Gap { from_m, to_m: step.along_m });
+                made.push(CoverageGap { from_m, to_m: step.along_m });
                 open = None;
             }
             _ => {}
         }
     }
     if let (Some(from_m), Some(last)) = (open, steps.last()) {
-        made.push(Gap { from_m, to_m: last.along_m });
+        made.push(CoverageGap { from_m, to_m: last.along_m });
     }
     made
 }

@@ -4,7 +4,7 @@
 
 use crate::visibility::{
     local_frame::Moved,
-    settings::{Viewer, VisibilityParams},
+    settings::{PanTiltCamera, VisibilityParams},
 };
 use std::f64::consts::FRAC_PI_2;
 use vision::localise::pose::LandmarkSize;
@@ -53,7 +53,7 @@ fn tilt_range_m(rise_m: f64, [low, high]: [f64; 2]) -> Option<(f64, f64)> {
 
 impl Limits {
     /// None when the landmark can be seen from nowhere.
-    pub(super) fn new(moved: &Moved, viewer: &Viewer, p: &VisibilityParams) -> Option<Self> {
+    pub(super) fn new(moved: &Moved, viewer: &PanTiltCamera, p: &VisibilityParams) -> Option<Self> {
         let rise = moved.height_m - viewer.camera_height_m;
         let tilt_m = tilt_range_m(rise, viewer.tilt_rad)?;
         let size = moved.size;
@@ -198,7 +198,7 @@ mod tests {
 
     fn limits(tilt_rad: f64, height_m: f64) -> Limits {
         let size = LandmarkSize { width_m: 0.6, height_m: 0.6 };
-        let viewer = Viewer { tilt_rad: [-1.5, 1.5], ..Viewer::default() };
+        let viewer = PanTiltCamera { tilt_rad: [-1.5, 1.5], ..PanTiltCamera::default() };
         Limits::new(&Moved { height_m, tilt_rad, size }, &viewer, &VisibilityParams::default()).unwrap()
     }
 

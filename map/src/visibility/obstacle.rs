@@ -1,6 +1,6 @@
 //! What hides landmarks.
 
-use crate::{place::LandmarkPlace, visibility::settings::Viewer};
+use crate::{place::LandmarkPlace, visibility::settings::PanTiltCamera};
 use nalgebra::Point2;
 
 /// Something straight that stands on the floor and hides what is behind it.
@@ -22,7 +22,7 @@ impl From<&crate::segments::LaserSegment> for Obstacle {
 
 impl Obstacle {
     /// Whether it can come between camera and landmark at all: the lines of sight run above the lower of the two.
-    pub(super) fn hides(&self, place: &LandmarkPlace, viewer: &Viewer) -> bool {
+    pub(super) fn hides(&self, place: &LandmarkPlace, viewer: &PanTiltCamera) -> bool {
         let half_height = 0.5 * place.size.height_m * place.tilt_rad.cos();
         let lowest = (place.z_m - half_height).min(viewer.camera_height_m);
         self.height_m.is_none_or(|height| height > lowest)

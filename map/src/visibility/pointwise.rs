@@ -1,7 +1,7 @@
 //! Whether one point sees a landmark: every condition of method 12 by itself, obstacle by obstacle. Slow and exact; what
 //! the polygons are compared with. Shares nothing with them but the definition.
 
-use super::{Obstacle, Viewer, VisibilityParams};
+use super::{Obstacle, PanTiltCamera, VisibilityParams};
 use crate::place::LandmarkPlace;
 use nalgebra::{Point2, Point3, Vector3};
 
@@ -9,7 +9,7 @@ use nalgebra::{Point2, Point3, Vector3};
 pub fn sees(
     place: &LandmarkPlace,
     obstacles: &[Obstacle],
-    viewer: &Viewer,
+    viewer: &PanTiltCamera,
     p: &VisibilityParams,
     q: &Point2<f64>,
 ) -> bool {

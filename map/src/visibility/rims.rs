@@ -117,14 +117,14 @@ impl Follower<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::visibility::{Viewer, VisibilityParams, envelope::Envelope, local_frame::Moved};
+    use crate::visibility::{PanTiltCamera, VisibilityParams, envelope::Envelope, local_frame::Moved};
     use std::f64::consts::FRAC_PI_2;
     use vision::localise::pose::LandmarkSize;
 
     #[test]
     fn chords_follow_the_limits() {
         let size = LandmarkSize { width_m: 0.9, height_m: 0.7 };
-        let viewer = Viewer { tilt_rad: [-1.2, 1.2], ..Viewer::default() };
+        let viewer = PanTiltCamera { tilt_rad: [-1.2, 1.2], ..PanTiltCamera::default() };
         for tilt_rad in [0.0, 0.5, 1.1, FRAC_PI_2, -0.8] {
             let moved = Moved { height_m: 1.2 + 1.3_f64.copysign(tilt_rad), tilt_rad, size };
             let limits = Limits::new(&moved, &viewer, &VisibilityParams::default()).unwrap();

@@ -8,7 +8,7 @@ use vision::localise::pose::LandmarkSize;
 /// The camera that is to see landmarks.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct Viewer {
+pub struct PanTiltCamera {
     /// Focal length, pixels; 10 to 20 000.
     pub focal_px: f64,
     /// Width of the image, pixels; 16 to 20 000.
@@ -23,7 +23,7 @@ pub struct Viewer {
     pub pan_rad: [f64; 2],
 }
 
-impl Default for Viewer {
+impl Default for PanTiltCamera {
     /// 640 x 480, 64 degrees across, at 1.2 m on a unit that tilts by 20 and pans by 97 degrees.
     fn default() -> Self {
         Self {
@@ -37,7 +37,7 @@ impl Default for Viewer {
     }
 }
 
-impl Viewer {
+impl PanTiltCamera {
     /// Every number finite and in range.
     pub fn check(&self) -> Result<(), OutOfRange> {
         check::within("focal_px", self.focal_px, 10.0, 20_000.0)?;
@@ -86,14 +86,14 @@ impl VisibilityParams {
 /// Who looks for landmarks, and what counts as seen.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct Sight {
+pub struct VisibilitySettings {
     /// The camera.
-    pub viewer: Viewer,
+    pub viewer: PanTiltCamera,
     /// What counts.
     pub seen: VisibilityParams,
 }
 
-impl Sight {
+impl VisibilitySettings {
     /// Every number finite and in range.
     pub fn check(&self) -> Result<(), OutOfRange> {
         self.viewer.check()?;

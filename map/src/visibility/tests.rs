@@ -11,7 +11,7 @@ use crate::{
         coverage::coverage,
         obstacle::Obstacle,
         outline::Polygon,
-        settings::{Viewer, VisibilityParams},
+        settings::{PanTiltCamera, VisibilityParams},
         tests::monte_carlo::random_map,
     },
 };
@@ -47,14 +47,14 @@ fn wall(ax: f64, ay: f64, bx: f64, by: f64) -> Obstacle {
 }
 
 fn seen_among(obstacles: &[Obstacle]) -> VisibilityMap {
-    visibility(&poster(), obstacles, &Viewer::default(), &VisibilityParams::default()).unwrap()
+    visibility(&poster(), obstacles, &PanTiltCamera::default(), &VisibilityParams::default()).unwrap()
 }
 
 /// A square sign under a ceiling 1.3 m above the camera, whose unit reaches up to a radian.
 fn ceiling_sign(obstacles: &[Obstacle]) -> VisibilityMap {
     let mut sign = place(4.0, 3.0, 2.5, 0.7, (0.6, 0.6));
     sign.tilt_rad = FRAC_PI_2;
-    let viewer = Viewer { tilt_rad: [-0.35, 1.0], ..Viewer::default() };
+    let viewer = PanTiltCamera { tilt_rad: [-0.35, 1.0], ..PanTiltCamera::default() };
     visibility(&sign, obstacles, &viewer, &VisibilityParams::default()).unwrap()
 }
 
@@ -103,7 +103,7 @@ fn the_open_area_is_two_discs_and_a_cone() {
     // By hand: alone on its wall a poster as wide as high is seen in the disc tangent to the wall, cut by the cone, less
     // the discs of what does not fit. Polar about the centre: r from max(0, ...) to D cos(psi).
     let landmark = place(0.0, 0.0, 1.2, 0.0, (0.6, 0.6));
-    let viewer = Viewer { height_px: 640.0, ..Viewer::default() };
+    let viewer = PanTiltCamera { height_px: 640.0, ..PanTiltCamera::default() };
     let p = VisibilityParams { standoff_m: 0.001, ..VisibilityParams::default() };
     let map = visibility(&landmark, &[], &viewer, &p).unwrap();
     let diameter = 512.0 * 0.6 / 75.0;
@@ -249,7 +249,10 @@ fn coverage_names_landmarks_and_gaps() {
         visibility(
             &far,
             &[],
-            &Viewer { pan_rad: [-std::f64::consts::PI, std::f64::consts::PI], ..Viewer::default() },
+            &PanTiltCamera {
+                pan_rad: [-std::f64::consts::PI, std::f64::consts::PI],
+                ..PanTiltCamera::default()
+            },
             &VisibilityParams::default(),
         )
         .unwrap()
@@ -276,17 +279,17 @@ fn coverage_names_landmarks_and_gaps() {
 
 #[test]
 fn bounds_are_held_and_named() {
-    let with = |viewer: Viewer, p: VisibilityParams| {
+    let with = |viewer: PanTiltCamera, p: VisibilityParams| {
         visibility(&poster(), &[], &viewer, &p).map(|_| ()).map_err(|e| e.field)
     };
-    let (v, p) = (Viewer::default, VisibilityParams::default);
+    let (v, p) = (PanTiltCamera::default, VisibilityParams::default);
     assert_eq!(with(v(), p()), Ok(()));
-    assert_eq!(with(Viewer { focal_px: 9.0, ..v() }, p()), Err("focal_px"));
-    assert_eq!(with(Viewer { tilt_rad: [0.2, 0.1], ..v() }, p()), Err("tilt_rad[1]"));
-    assert_eq!(with(Viewer { camera_height_m: f64::NAN, ..v() }, p()), Err("camera_height_m"));
+    assert_eq!(with(PanTiltCamera { focal_px: 9.0, ..v() }, p()), Err("focal_px"));
+    assert_eq!(with(PanTiltCamera { tilt_rad: [0.2, 0.1], ..v() }, p()), Err("tilt_rad[1]"));
+    assert_eq!(with(PanTiltCamera { camera_height_m: f64::NAN, ..v() }, p()), Err("camera_height_m"));
     assert_eq!(with(v(), VisibilityParams { max_incidence_rad: 1.5, ..p() }), Err("max_incidence_rad"));
     assert_eq!(with(v(), VisibilityParams { standoff_m: 0.0, ..p() }), Err("standoff_m"));
-    let nowhere = with(Viewer { tilt_rad: [-0.3, -0.2], ..v() }, p());
+    let nowhere = with(PanTiltCamera { tilt_rad: [-0.3, -0.2], ..v() }, p());
     assert_eq!(nowhere, Ok(()), "seen from nowhere is an answer");
 }
 
@@ -307,9 +310,9 @@ fn only_the_nearest_obstacles_count_beyond_the_bound() {
     let mut many = vec![far];
     many.extend(std::iter::repeat_n(wall(1.0, 2.0, 1.0, 2.1), MAX_OBSTACLES - 1));
     let p = VisibilityParams::default();
-    assert!(within_reach(&poster(), &many, &Viewer::default(), &p).contains(&far));
+    assert!(within_reach(&poster(), &many, &PanTiltCamera::default(), &p).contains(&far));
     many.push(wall(1.0, 2.0, 1.0, 2.1));
-    let kept = within_reach(&poster(), &many, &Viewer::default(), &p);
+    let kept = within_reach(&poster(), &many, &PanTiltCamera::default(), &p);
     assert_eq!(kept.len(), MAX_OBSTACLES);
     assert!(!kept.contains(&far));
 }

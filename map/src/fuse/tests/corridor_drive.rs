@@ -1,9 +1,9 @@
 //! The paper's corridor in small (method 18, E10): camera, fix and fusion together, everything uncertain drawn anew.
 
 use crate::{
-    extrinsics::{Mounting, pan_tilt},
+    extrinsics::{CameraExtrinsics, pan_tilt},
     fuse::{fuser::Fuser, params::FuseParams},
-    localise::{LocaliseParams, RobotFix, Sighting, robot_pose},
+    localise::{FixResult, LandmarkObservation, LocaliseParams, robot_pose},
     place::{LandmarkPlace, PlaceSigmas},
     pose2::Pose2,
 };
@@ -43,7 +43,7 @@ fn corridor(random: &mut Random) -> (f64, f64, u64) {
             LandmarkPlace { x_m, y_m, z_m, theta_rad: p.theta_rad + e[2], size, ..*p }
         })
         .collect();
-    let base = Mounting::new(pan_tilt(0.0, 0.0, Vector3::new(0.1, 0.0, 1.3))).unwrap();
+    let base = CameraExtrinsics::new(pan_tilt(0.0, 0.0, Vector3::new(0.1, 0.0, 1.3))).unwrap();
     let wrong = base.covariance.map_diagonal(f64::sqrt).map(|s| s * random.normal());
     let params = FuseParams::default();
     let mut fuser = Fuser::new(params.clone());
@@ -58,11 +58,11 @@ fn corridor(random: &mut Random) -> (f64, f64, u64) {
         let steer = Pose2::new(0.0, 0.0, -0.1 * truth.y_m - 0.3 * truth.theta_rad);
         (truth, odom) = (truth.compose(&steer), odom.compose(&steer));
         let at = i * 200_000_000;
-        fuser.odometry(at, odom).unwrap();
+        fuser.apply_odometry(at, odom).unwrap();
         let ahead = (0..4).find(|&l| (1.0..4.0).contains(&(places[l].x_m - truth.x_m)));
         if let Some(l) = ahead.filter(|_| i % 3 == 0) {
             let pan = if places[l].y_m > 0.0 { 0.6 } else { -0.6 };
-            let believed = Mounting {
+            let believed = CameraExtrinsics {
                 robot_from_camera: pan_tilt(pan, 0.0, Vector3::new(0.1, 0.0, 1.3)),
                 covariance: base.covariance,
             };
@@ -79,11 +79,12 @@ fn corridor(random: &mut Random) -> (f64, f64, u64) {
             }
             let claimed = [Matrix2::identity() * SIGMA_PX * SIGMA_PX; 4];
             let seen = landmark_pose(&Corners::new(points).unwrap(), &claimed, SIZE, &camera).unwrap();
-            let sighting = Sighting { landmark: LandmarkId(l as u64), seen: &seen, place: &places[l] };
+            let sighting =
+                LandmarkObservation { landmark: LandmarkId(l as u64), seen: &seen, place: &places[l] };
             let prior = fuser.pose_at(at);
             let answer = robot_pose(&[sighting], &believed, prior.as_ref(), &LocaliseParams::default());
-            if let RobotFix::Fixed(fix) = answer.unwrap() {
-                fuser.fix(at, &fix).unwrap();
+            if let FixResult::Fixed(fix) = answer.unwrap() {
+                fuser.apply_fix(at, &fix).unwrap();
             }
         }
         if let Some(fused) = fuser.pose() {

@@ -6,7 +6,7 @@ use crate::{
     fuse::{filter::MAX_SOURCES, fuser::Fuser, outcome::FixOutcome, params::FuseParams},
     laser::Scan,
     laser_fix::{LaserFixParams, WallIndex, laser_fix},
-    localise::{Fix, Modality},
+    localise::{Fix, FixSource},
     pose2::Pose2,
     slam::world::{Walls, rectangle, scan, segments},
 };
@@ -42,7 +42,7 @@ fn mapped(walls: &Walls, random: &mut Random) -> WallIndex {
 fn laser(fuser: &mut Fuser, at: i64, map: &WallIndex, seen: &Scan, p: &LaserFixParams) -> Option<FixOutcome> {
     let prior = fuser.pose_at(at)?;
     let found = laser_fix(map, seen, &prior, p).unwrap().ok()?;
-    Some(fuser.fix(at, &found.fix()).unwrap())
+    Some(fuser.apply_fix(at, &found.fix()).unwrap())
 }
 
 struct Driven {
@@ -72,14 +72,14 @@ fn drive(random: &mut Random, scans: Option<&LaserFixParams>) -> Driven {
         let steer = Pose2::new(0.0, 0.0, -0.1 * truth.y_m - 0.3 * truth.theta_rad);
         (truth, odom) = (truth.compose(&steer), odom.compose(&steer));
         let at = i * SECOND / 5;
-        fuser.odometry(at, odom).unwrap();
+        fuser.apply_odometry(at, odom).unwrap();
         if i % 70 < 15 && i % 5 == 0 {
             let l = (i / 70) as usize % 4;
             let mut made = fix(l as u64, truth, 0.04, 0.02);
             let v = made.noise.map_diagonal(f64::sqrt).map(|s| s * random.normal());
             let j = made.nuisances[0].jacobian.fixed_columns::<3>(0).into_owned();
             made.pose.pose = truth.plus(&(v + j * places[l]));
-            fuser.fix(at, &made).unwrap();
+            fuser.apply_fix(at, &made).unwrap();
         }
         if let Some(p) = scans {
             laser(&mut fuser, at, &map, &scan(&walls, &truth, 0.02, 8.0, random), p);
@@ -127,22 +127,22 @@ fn a_long_standstill_makes_nobody_surer() {
     let map = mapped(&walls, &mut random);
     let at = Pose2::new(2.0, 1.5, 0.4);
     let mut fuser = Fuser::new(FuseParams::default());
-    fuser.odometry(0, Pose2::default()).unwrap();
-    fuser.fix(0, &fix(1, at, 0.04, 0.02)).unwrap();
+    fuser.apply_odometry(0, Pose2::default()).unwrap();
+    fuser.apply_fix(0, &fix(1, at, 0.04, 0.02)).unwrap();
     let view = scan(&walls, &at, 0.02, 8.0, &mut random);
     assert!(matches!(laser(&mut fuser, 0, &map, &view, &p), Some(FixOutcome::Applied { .. })));
     let both = Fix { landmarks: vec![LandmarkId(1), LandmarkId(2)], ..fix(2, at, 0.04, 0.02) };
-    fuser.fix(0, &both).unwrap();
+    fuser.apply_fix(0, &both).unwrap();
     let once = fuser.pose().unwrap();
     // Half a minute: scans between looks at one landmark, at another and at both do not make them new.
     for i in 1..300 {
         let now = i * SECOND / 10;
-        fuser.odometry(now, Pose2::default()).unwrap();
+        fuser.apply_odometry(now, Pose2::default()).unwrap();
         let view = scan(&walls, &at, 0.02, 8.0, &mut random);
         for outcome in [
             laser(&mut fuser, now, &map, &view, &p).unwrap(),
-            fuser.fix(now, &fix(1 + i as u64 % 2, at, 0.04, 0.02)).unwrap(),
-            fuser.fix(now, &both).unwrap(),
+            fuser.apply_fix(now, &fix(1 + i as u64 % 2, at, 0.04, 0.02)).unwrap(),
+            fuser.apply_fix(now, &both).unwrap(),
         ] {
             assert_eq!(outcome, FixOutcome::Repeated);
         }
@@ -157,14 +157,14 @@ fn however_often_it_is_passed_a_wall_is_no_surer_than_the_map_says() {
     let walls = rectangle([0.0, 0.0, 4.0, 4.0]);
     let map = mapped(&walls, &mut random);
     let mut fuser = Fuser::new(FuseParams::default());
-    fuser.odometry(0, Pose2::default()).unwrap();
-    fuser.fix(0, &fix(1, Pose2::new(2.0, 2.0, 0.0), 0.04, 0.02)).unwrap();
+    fuser.apply_odometry(0, Pose2::default()).unwrap();
+    fuser.apply_fix(0, &fix(1, Pose2::new(2.0, 2.0, 0.0), 0.04, 0.02)).unwrap();
     let mut odom = Pose2::default();
     for i in 1..400 {
         // To and fro on the spot, by exact odometry.
         let step = if i % 2 == 0 { 0.06 } else { -0.06 };
         odom = odom.compose(&Pose2::new(step, 0.0, 0.0));
-        fuser.odometry(i * SECOND / 10, odom).unwrap();
+        fuser.apply_odometry(i * SECOND / 10, odom).unwrap();
         let view = scan(&walls, &Pose2::new(2.0, 2.0, 0.0).compose(&odom), 0.02, 8.0, &mut random);
         laser(&mut fuser, i * SECOND / 10, &map, &view, &p);
     }
@@ -179,32 +179,32 @@ fn however_often_it_is_passed_a_wall_is_no_surer_than_the_map_says() {
 fn a_scan_starts_nothing_and_keeps_out_no_landmark() {
     let mut fuser = Fuser::new(FuseParams::default());
     let by_scan = |pose| Fix {
-        modality: Modality::Laser,
+        modality: FixSource::Laser,
         landmarks: Vec::new(),
         nuisances: Vec::new(),
         ..fix(1, pose, 0.02, 0.0)
     };
-    fuser.odometry(0, Pose2::default()).unwrap();
-    assert_eq!(fuser.fix(0, &by_scan(Pose2::default())).unwrap(), FixOutcome::NoPose);
+    fuser.apply_odometry(0, Pose2::default()).unwrap();
+    assert_eq!(fuser.apply_fix(0, &by_scan(Pose2::default())).unwrap(), FixOutcome::NoPose);
     assert_eq!(fuser.pose(), None);
     // A pose that is wrong, and scans that are laid where it says: two landmarks that agree win all the same.
-    fuser.fix(0, &fix(1, Pose2::default(), 0.05, 0.01)).unwrap();
+    fuser.apply_fix(0, &fix(1, Pose2::default(), 0.05, 0.01)).unwrap();
     for i in 1..=6_i64 {
         let (now, x) = (i * SECOND / 10, i as f64 * 0.1);
-        fuser.odometry(now, Pose2::new(x, 0.0, 0.0)).unwrap();
+        fuser.apply_odometry(now, Pose2::new(x, 0.0, 0.0)).unwrap();
         if fuser.pose().unwrap().pose.pose.y_m < 1.0 {
-            let outcome = fuser.fix(now, &by_scan(Pose2::new(x, 0.0, 0.0))).unwrap();
+            let outcome = fuser.apply_fix(now, &by_scan(Pose2::new(x, 0.0, 0.0))).unwrap();
             assert!(matches!(outcome, FixOutcome::Applied { .. }), "{outcome:?}");
         }
-        fuser.fix(now, &fix(2 + i as u64 % 2, Pose2::new(x, 4.0, 0.0), 0.05, 0.01)).unwrap();
+        fuser.apply_fix(now, &fix(2 + i as u64 % 2, Pose2::new(x, 4.0, 0.0), 0.05, 0.01)).unwrap();
     }
     let fused = fuser.pose().unwrap();
     assert!((fused.pose.pose.y_m - 4.0).abs() < 0.1, "{fused:?}");
     // Scans that contradict are counted, and never replace it.
     for i in 7..40_i64 {
         let (now, x) = (i * SECOND / 10, i as f64 * 0.1);
-        fuser.odometry(now, Pose2::new(x, 0.0, 0.0)).unwrap();
-        let outcome = fuser.fix(now, &by_scan(Pose2::new(x, 0.0, 0.0))).unwrap();
+        fuser.apply_odometry(now, Pose2::new(x, 0.0, 0.0)).unwrap();
+        let outcome = fuser.apply_fix(now, &by_scan(Pose2::new(x, 0.0, 0.0))).unwrap();
         assert!(
             matches!(outcome, FixOutcome::GatedOut { in_a_row, .. } if in_a_row == i as u32 - 6),
             "{outcome:?}"
@@ -217,12 +217,12 @@ fn a_scan_starts_nothing_and_keeps_out_no_landmark() {
 #[test]
 fn remembered_sources_are_bounded() {
     let mut fuser = Fuser::new(FuseParams::default());
-    fuser.odometry(0, Pose2::default()).unwrap();
+    fuser.apply_odometry(0, Pose2::default()).unwrap();
     let count = MAX_SOURCES as u64;
     for l in 0..=count {
-        fuser.fix(0, &fix(l, Pose2::default(), 0.05, 0.01)).unwrap();
+        fuser.apply_fix(0, &fix(l, Pose2::default(), 0.05, 0.01)).unwrap();
     }
-    assert_eq!(fuser.fix(0, &fix(1, Pose2::default(), 0.05, 0.01)).unwrap(), FixOutcome::Repeated);
-    let forgotten = fuser.fix(0, &fix(0, Pose2::default(), 0.05, 0.01)).unwrap();
+    assert_eq!(fuser.apply_fix(0, &fix(1, Pose2::default(), 0.05, 0.01)).unwrap(), FixOutcome::Repeated);
+    let forgotten = fuser.apply_fix(0, &fix(0, Pose2::default(), 0.05, 0.01)).unwrap();
     assert!(matches!(forgotten, FixOutcome::Applied { .. }), "{forgotten:?}");
 }

@@ -25,7 +25,7 @@ fn odometry_learns_its_own_errors() {
         let (mut truth, mut odom) = (Pose2::default(), Pose2::default());
         let mut missed_m = Vec::new();
         for i in 0..=240_i64 {
-            fuser.odometry(i * SECOND / 10, odom).unwrap();
+            fuser.apply_odometry(i * SECOND / 10, odom).unwrap();
             if i % 60 == 0 {
                 if let Some(fused) = fuser.pose() {
                     missed_m.push(fused.pose.pose.minus(&truth).fixed_rows::<2>(0).norm());
@@ -33,7 +33,7 @@ fn odometry_learns_its_own_errors() {
                 let off =
                     Vector3::new(0.01 * random.normal(), 0.01 * random.normal(), 0.002 * random.normal());
                 let seen = fix(i as u64, truth.plus(&off), 0.01, 1e-4);
-                fuser.fix(i * SECOND / 10, &seen).unwrap();
+                fuser.apply_fix(i * SECOND / 10, &seen).unwrap();
             }
             let measured = Pose2::new(0.1, 0.0, 0.0);
             let turn_rad = 0.1 * true_errors.y;
@@ -59,17 +59,17 @@ fn what_odometry_learnt_outlives_a_jump() {
     let start = Pose2Covariance::new(Pose2::default(), Matrix3::identity() * 1e-4).unwrap();
     fuser.start(&start).unwrap();
     for i in 11..=100 {
-        fuser.odometry(i * SECOND / 10, Pose2::new(i as f64 * 0.1, 0.0, 0.0)).unwrap();
+        fuser.apply_odometry(i * SECOND / 10, Pose2::new(i as f64 * 0.1, 0.0, 0.0)).unwrap();
     }
     // 9 m by odometry were 9.09 m.
-    fuser.fix(10 * SECOND, &fix(1, Pose2::new(9.09, 0.0, 0.0), 0.01, 1e-4)).unwrap();
+    fuser.apply_fix(10 * SECOND, &fix(1, Pose2::new(9.09, 0.0, 0.0), 0.01, 1e-4)).unwrap();
     let learnt = fuser.odometry_errors().unwrap();
     assert!((0.007..0.01).contains(&learnt.errors.x), "{}", learnt.errors);
     let before: Matrix2<f64> = learnt.covariance;
-    assert_eq!(fuser.odometry(11 * SECOND, Pose2::new(900.0, 0.0, 0.0)).unwrap(), OdometryOutcome::Jumped);
+    assert_eq!(fuser.apply_odometry(11 * SECOND, Pose2::new(900.0, 0.0, 0.0)).unwrap(), OdometryOutcome::Jumped);
     assert_eq!(fuser.pose(), None);
     assert_eq!(fuser.odometry_errors(), Some(learnt));
-    fuser.fix(11 * SECOND, &fix(1, Pose2::new(3.0, 0.0, 0.0), 0.01, 1e-4)).unwrap();
+    fuser.apply_fix(11 * SECOND, &fix(1, Pose2::new(3.0, 0.0, 0.0), 0.01, 1e-4)).unwrap();
     assert_eq!(fuser.odometry_errors().unwrap().covariance, before);
 }
 
@@ -77,21 +77,21 @@ fn what_odometry_learnt_outlives_a_jump() {
 fn jumps_of_odometry_lose_the_pose_and_steps_of_the_clock_do_not() {
     let mut fuser = Fuser::new(FuseParams::default());
     drive(&mut fuser, 1.0);
-    fuser.fix(SECOND, &fix(1, Pose2::default(), 0.05, 0.01)).unwrap();
+    fuser.apply_fix(SECOND, &fix(1, Pose2::default(), 0.05, 0.01)).unwrap();
     let far = |x| Pose2::new(1.0 + x, 0.0, 0.0);
     // 10 m/s for 0.1 s, and 0.1 s of slack.
     let mut near = fuser.clone();
-    assert_eq!(near.odometry(11 * SECOND / 10, far(1.99)).unwrap(), OdometryOutcome::Moved);
-    assert_eq!(fuser.odometry(11 * SECOND / 10, far(2.01)).unwrap(), OdometryOutcome::Jumped);
+    assert_eq!(near.apply_odometry(11 * SECOND / 10, far(1.99)).unwrap(), OdometryOutcome::Moved);
+    assert_eq!(fuser.apply_odometry(11 * SECOND / 10, far(2.01)).unwrap(), OdometryOutcome::Jumped);
     assert_eq!(fuser.pose(), None);
     assert_eq!(
-        fuser.fix(11 * SECOND / 10, &fix(1, Pose2::default(), 0.05, 0.01)).unwrap(),
+        fuser.apply_fix(11 * SECOND / 10, &fix(1, Pose2::default(), 0.05, 0.01)).unwrap(),
         FixOutcome::Started
     );
     // A clock that was wrong by an hour is set, back and forth: the pose goes on by odometry.
     let mut set = Fuser::new(FuseParams::default());
     drive(&mut set, 1.0);
-    set.fix(SECOND, &fix(1, Pose2::default(), 0.05, 0.01)).unwrap();
+    set.apply_fix(SECOND, &fix(1, Pose2::default(), 0.05, 0.01)).unwrap();
     let started = set.pose().unwrap();
     for (at_ns, x) in [(3600 * SECOND, 2.0), (2 * SECOND, 3.0)] {
         assert_eq!(set.set_clock(at_ns, Pose2::new(x, 0.0, 0.0), 1.0).unwrap(), OdometryOutcome::Moved);
@@ -100,7 +100,7 @@ fn jumps_of_odometry_lose_the_pose_and_steps_of_the_clock_do_not() {
         assert!((pose.pose.pose.x_m - started.pose.pose.x_m - (x - 1.0)).abs() < 1e-9);
         assert!(pose.pose.covariance[(0, 0)] > started.pose.covariance[(0, 0)]);
     }
-    assert_eq!(set.odometry(3 * SECOND, Pose2::new(4.0, 0.0, 0.0)).unwrap(), OdometryOutcome::Moved);
+    assert_eq!(set.apply_odometry(3 * SECOND, Pose2::new(4.0, 0.0, 0.0)).unwrap(), OdometryOutcome::Moved);
     // So far a robot cannot have come meanwhile: it is another odometry frame.
     assert_eq!(set.set_clock(SECOND, Pose2::new(40.0, 0.0, 0.0), 1.0).unwrap(), OdometryOutcome::Jumped);
     assert_eq!(set.pose(), None);
@@ -111,9 +111,9 @@ fn jumps_of_odometry_lose_the_pose_and_steps_of_the_clock_do_not() {
 fn one_reading_far_behind_loses_nothing() {
     let mut fuser = Fuser::new(FuseParams::default());
     drive(&mut fuser, 5.0);
-    fuser.fix(5 * SECOND, &fix(1, Pose2::default(), 0.05, 0.01)).unwrap();
+    fuser.apply_fix(5 * SECOND, &fix(1, Pose2::default(), 0.05, 0.01)).unwrap();
     let before = fuser.pose().unwrap();
-    assert_eq!(fuser.odometry(-20 * SECOND, Pose2::new(5.0, 0.0, 0.0)).unwrap(), OdometryOutcome::TooOld);
+    assert_eq!(fuser.apply_odometry(-20 * SECOND, Pose2::new(5.0, 0.0, 0.0)).unwrap(), OdometryOutcome::TooOld);
     assert_eq!(fuser.pose().unwrap(), before);
 }
 
@@ -121,17 +121,17 @@ fn one_reading_far_behind_loses_nothing() {
 fn a_reading_that_is_retracted_was_never_there() {
     let mut with = Fuser::new(FuseParams::default());
     drive(&mut with, 1.0);
-    with.fix(SECOND, &fix(1, Pose2::default(), 0.05, 0.01)).unwrap();
+    with.apply_fix(SECOND, &fix(1, Pose2::default(), 0.05, 0.01)).unwrap();
     let mut without = with.clone();
-    with.odometry(13 * SECOND / 10, Pose2::new(1.05, 0.0, 0.0)).unwrap();
+    with.apply_odometry(13 * SECOND / 10, Pose2::new(1.05, 0.0, 0.0)).unwrap();
     // It waits for odometry of its time, or is judged by the stray reading.
     let late = fix(2, Pose2::new(0.2, 0.0, 0.0), 0.05, 0.01);
-    with.fix(12 * SECOND / 10, &late).unwrap();
-    without.fix(12 * SECOND / 10, &late).unwrap();
+    with.apply_fix(12 * SECOND / 10, &late).unwrap();
+    without.apply_fix(12 * SECOND / 10, &late).unwrap();
     with.retract(13 * SECOND / 10);
     for fuser in [&mut with, &mut without] {
         for (tenths, x) in [(11, 1.1), (12, 1.2), (13, 1.3)] {
-            fuser.odometry(tenths * SECOND / 10, Pose2::new(x, 0.0, 0.0)).unwrap();
+            fuser.apply_odometry(tenths * SECOND / 10, Pose2::new(x, 0.0, 0.0)).unwrap();
         }
     }
     assert_eq!(with.pose(), without.pose());
@@ -144,12 +144,12 @@ fn a_reading_that_is_retracted_was_never_there() {
 fn a_slow_stamp_is_no_jump_if_the_reading_came_later() {
     let mut fuser = Fuser::new(FuseParams::default());
     drive(&mut fuser, 1.0);
-    fuser.fix(SECOND, &fix(1, Pose2::default(), 0.05, 0.01)).unwrap();
+    fuser.apply_fix(SECOND, &fix(1, Pose2::default(), 0.05, 0.01)).unwrap();
     // 2 m in a second, stamped 50 ms after the reading before.
     let at_ns = SECOND + SECOND / 20;
     let mut by_stamp = fuser.clone();
-    assert_eq!(by_stamp.odometry(at_ns, Pose2::new(3.0, 0.0, 0.0)).unwrap(), OdometryOutcome::Jumped);
-    let outcome = fuser.odometry_after(at_ns, Pose2::new(3.0, 0.0, 0.0), 1.0).unwrap();
+    assert_eq!(by_stamp.apply_odometry(at_ns, Pose2::new(3.0, 0.0, 0.0)).unwrap(), OdometryOutcome::Jumped);
+    let outcome = fuser.apply_odometry_after(at_ns, Pose2::new(3.0, 0.0, 0.0), 1.0).unwrap();
     assert_eq!(outcome, OdometryOutcome::Moved);
 }
 
@@ -157,7 +157,7 @@ fn a_slow_stamp_is_no_jump_if_the_reading_came_later() {
 fn a_newer_reading_with_an_earlier_time_moves_the_pose() {
     let mut fuser = Fuser::new(FuseParams::default());
     drive(&mut fuser, 1.0);
-    fuser.fix(SECOND, &fix(1, Pose2::default(), 0.05, 0.01)).unwrap();
+    fuser.apply_fix(SECOND, &fix(1, Pose2::default(), 0.05, 0.01)).unwrap();
     let held = fuser.pose().unwrap();
     let pose = fuser.pose_by(SECOND - 1, &Pose2::new(1.1, 0.0, 0.0)).unwrap();
     assert_eq!((pose.at_ns, pose.corrections), (SECOND - 1, 1));

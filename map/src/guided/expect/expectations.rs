@@ -1,7 +1,7 @@
 //! The landmarks expected in one image, and their corners as a function of the errors that they share.
 
 use crate::{
-    extrinsics::Mounting,
+    extrinsics::CameraExtrinsics,
     guided::{
         expect::{search_gate::SearchGate, view::InView},
         joint::{ByCommon, CommonMatrix, CommonVector, CornerMatrix, CornerVector, Prediction},
@@ -59,7 +59,7 @@ pub struct Expectations {
     pub(in crate::guided) image_px: [f64; 2],
     /// What the errors are errors of.
     pub(super) pose: Pose2,
-    pub(super) mounting: Mounting,
+    pub(super) mounting: CameraExtrinsics,
     pub(super) intrinsics: Intrinsics,
 }
 
@@ -87,12 +87,12 @@ impl Prediction for Predicted<'_> {
 
 impl Predicted<'_> {
     /// Pose, extrinsics and intrinsics with these errors.
-    fn with(&self, error: &CommonVector) -> (Pose2, Mounting, Intrinsics) {
+    fn with(&self, error: &CommonVector) -> (Pose2, CameraExtrinsics, Intrinsics) {
         let Expectations { pose, mounting, intrinsics, .. } = self.expectations;
         let pose = pose.plus(&error.fixed_rows::<3>(0).into());
         let (turn, shift) = (error.fixed_rows::<3>(3).into(), error.fixed_rows::<3>(6).into());
         let robot_from_camera = perturbed(&mounting.robot_from_camera, &turn, &shift);
-        let mounting = Mounting { robot_from_camera, covariance: mounting.covariance };
+        let mounting = CameraExtrinsics { robot_from_camera, covariance: mounting.covariance };
         let share = 1.0 + error[9];
         let intrinsics = Intrinsics {
             fx_px: intrinsics.fx_px * share,

@@ -1,7 +1,7 @@
 //! What may be in view of a camera, and how much of it is.
 
 use crate::{
-    extrinsics::Mounting, guided::projection::Camera, place::LandmarkPlace, visibility::VisibilityMap,
+    extrinsics::CameraExtrinsics, guided::projection::Camera, place::LandmarkPlace, visibility::VisibilityMap,
 };
 use nalgebra::Point2;
 use vision::{frame::Intrinsics, recognise::LandmarkId};
@@ -21,7 +21,7 @@ pub struct KnownLandmark<'a> {
 #[derive(Debug, Clone, Copy)]
 pub struct CameraView<'a> {
     /// Extrinsics at the time of the image, pan and tilt included.
-    pub mounting: &'a Mounting,
+    pub mounting: &'a CameraExtrinsics,
     /// Intrinsics with lens, and with standard deviations where they are stated.
     pub intrinsics: &'a Intrinsics,
     /// Width and height of the image, px; 1 to [`MAX_SIDE_PX`].

@@ -2,7 +2,7 @@
 
 use crate::{
     guided::schedule::params::ScheduleParams,
-    localise::{DecidedBy, Fix, RobotFix},
+    localise::{AmbiguityResolvedBy, Fix, FixResult},
     pose2::Pose2Covariance,
 };
 
@@ -14,18 +14,20 @@ pub(super) enum Judged<'a> {
     Silent,
 }
 
-pub(super) fn judge<'a>(global: &'a RobotFix, prior: &Pose2Covariance, p: &ScheduleParams) -> Judged<'a> {
+pub(super) fn judge<'a>(global: &'a FixResult, prior: &Pose2Covariance, p: &ScheduleParams) -> Judged<'a> {
     let distance2 = |fix: &Fix| prior.distance2(&fix.pose).unwrap_or(f64::INFINITY);
     let fixes = match global {
-        RobotFix::Fixed(fix) => std::slice::from_ref(&**fix),
-        RobotFix::Ambiguous(fixes) => fixes.as_slice(),
-        RobotFix::Refused(_) => &[],
+        FixResult::Fixed(fix) => std::slice::from_ref(&**fix),
+        FixResult::Ambiguous(fixes) => fixes.as_slice(),
+        FixResult::Refused(_) => &[],
     };
     let nearest = fixes.iter().map(distance2).fold(f64::INFINITY, f64::min);
     match fixes {
         [] => Judged::Silent,
         // A fix that a prior decided was drawn to the pose by it.
-        [fix] if nearest <= p.support_chi2 && fix.decided_by != DecidedBy::Prior => Judged::Agrees(fix),
+        [fix] if nearest <= p.support_chi2 && fix.decided_by != AmbiguityResolvedBy::Prior => {
+            Judged::Agrees(fix)
+        }
         _ if nearest > p.contradict_chi2 => Judged::Contradicts(fixes),
         _ => Judged::Silent,
     }

@@ -1,7 +1,7 @@
 //! What goes into the schedule and what comes out of it, frame by frame.
 
 use crate::{
-    localise::{Fix, RobotFix},
+    localise::{Fix, FixResult},
     pose2::{Pose2, Pose2Covariance},
 };
 use serde::{Deserialize, Serialize};
@@ -86,7 +86,7 @@ pub struct FrameReport<'a> {
     /// Whether the whole map was searched.
     pub searched: bool,
     /// The pose by the uniquely recognised landmarks of that search alone, made without any prior.
-    pub global: Option<&'a RobotFix>,
+    pub global: Option<&'a FixResult>,
     /// Landmarks surely in view ([`super::Expected::is_sure`]) that neither way found. Only those that are recognised
     /// reliably when they are there: not members of look-alike classes, not quarantined ones.
     pub missed: &'a [LandmarkId],

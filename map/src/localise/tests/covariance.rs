@@ -1,7 +1,7 @@
 //! The covariance against Monte Carlo.
 
 use crate::localise::{
-    fix::{NuisanceKey, RobotFix},
+    fix::{FixResult, NuisanceKey},
     tests::{camera, draw, fix_of, fixed, look, mounting, moved, nees, off, place, robot, seen_by, stated},
 };
 use nalgebra::Matrix3;
@@ -24,7 +24,7 @@ fn covariance_is_honest_in_twelve_cells() {
                     let (turn, shift) = (e.fixed_rows::<3>(0).into(), e.fixed_rows::<3>(3).into());
                     let mounted = perturbed(&m.robot_from_camera, &turn, &shift);
                     let seen = look(&truth, &hung, &mounted, sigma_px, &mut random).unwrap();
-                    if let RobotFix::Fixed(fix) = fix_of(&seen, &place(), None) {
+                    if let FixResult::Fixed(fix) = fix_of(&seen, &place(), None) {
                         let value = nees(&fix, &truth);
                         wild += usize::from(value > 30.0);
                         (sum, n) = (sum + value, n + 1);
@@ -61,7 +61,7 @@ fn what_the_camera_has_wrong_is_in_the_covariance_and_lasts() {
             let seed = random.clone();
             let seen = seen_by(&real, &stated(), &view, hung.size, 0.4, &mut random).unwrap();
             let bare = seen_by(&real, &camera(), &view, hung.size, 0.4, &mut seed.clone()).unwrap();
-            let (RobotFix::Fixed(fix), RobotFix::Fixed(exact)) =
+            let (FixResult::Fixed(fix), FixResult::Fixed(exact)) =
                 (fix_of(&seen, &place(), None), fix_of(&bare, &place(), None))
             else {
                 continue;
@@ -85,7 +85,7 @@ fn seen_from_the_front_it_is_careful_rather_than_sure() {
     let (mut sum, mut n, mut heading) = (0.0, 0.0, 0.0);
     for _ in 0..200 {
         let seen = look(&truth, &place(), &mounting().robot_from_camera, 0.5, &mut random).unwrap();
-        if let RobotFix::Fixed(fix) = fix_of(&seen, &place(), None) {
+        if let FixResult::Fixed(fix) = fix_of(&seen, &place(), None) {
             (sum, n) = (sum + nees(&fix, &truth), n + 1.0);
             heading += fix.pose.covariance[(2, 2)].sqrt();
         }
@@ -109,6 +109,6 @@ fn parts_of_the_covariance_add_up() {
         assert!((sum - fix.pose.covariance).norm() < 1e-9 * sum.norm());
         assert!(fix.noise.symmetric_eigenvalues().min() > 0.0);
         let keys: Vec<_> = fix.nuisances.iter().map(|n| n.key).collect();
-        assert_eq!(keys, [NuisanceKey::Landmark(LandmarkId(1)), NuisanceKey::Mounting]);
+        assert_eq!(keys, [NuisanceKey::Landmark(LandmarkId(1)), NuisanceKey::Extrinsics]);
     }
 }

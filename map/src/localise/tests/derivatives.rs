@@ -1,7 +1,7 @@
 //! Derivatives against finite differences.
 
 use crate::{
-    extrinsics::Mounting,
+    extrinsics::CameraExtrinsics,
     localise::{
         planar::Planar,
         tests::{SIZE, camera, look, mounting, moved, off, place, robot, seen_by, sighting, stated},
@@ -22,7 +22,7 @@ fn derivatives_are_the_finite_differences() {
     let mut tilted = place();
     tilted.roll_rad = 0.05;
     let seen = look(&truth, &tilted, &mounting().robot_from_camera, 0.5, &mut random).unwrap();
-    let residual = |pose: &Pose2, place: &LandmarkPlace, mounting: &Mounting| {
+    let residual = |pose: &Pose2, place: &LandmarkPlace, mounting: &CameraExtrinsics| {
         let sightings = [sighting(1, &seen, place)];
         Planar::new(&sightings, mounting).linearise(pose).unwrap()
     };
@@ -45,7 +45,7 @@ fn derivatives_are_the_finite_differences() {
         let turned = |d: Vector6<f64>| {
             let base = mounting();
             let (turn, shift) = (d.fixed_rows::<3>(0).into(), d.fixed_rows::<3>(3).into());
-            Mounting { robot_from_camera: perturbed(&base.robot_from_camera, &turn, &shift), ..base }
+            CameraExtrinsics { robot_from_camera: perturbed(&base.robot_from_camera, &turn, &shift), ..base }
         };
         let up = residual(&truth, &tilted, &turned(d)).residual;
         let down = residual(&truth, &tilted, &turned(-d)).residual;

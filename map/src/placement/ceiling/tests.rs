@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::{
-    extrinsics::{Mounting, pan_tilt},
+    extrinsics::{CameraExtrinsics, pan_tilt},
     pose2::{Pose2, Pose2Covariance},
 };
 use nalgebra::{Matrix2, Matrix3, Point2, Vector3};
@@ -20,8 +20,8 @@ fn camera() -> Intrinsics {
     Intrinsics::new(500.0, 490.0, 320.0, 240.0, Distortion::None).unwrap()
 }
 
-fn mounting() -> Mounting {
-    Mounting::new(pan_tilt(0.1, 0.8, Vector3::new(0.1, 0.02, 1.2))).unwrap()
+fn mounting() -> CameraExtrinsics {
+    CameraExtrinsics::new(pan_tilt(0.1, 0.8, Vector3::new(0.1, 0.02, 1.2))).unwrap()
 }
 
 fn truth(height_m: f64) -> LandmarkPlace {
@@ -43,7 +43,7 @@ fn robot(direction: f64) -> Pose2Covariance {
     Pose2Covariance { pose, covariance: Matrix3::from_diagonal(&v) }
 }
 
-fn project(place: &LandmarkPlace, robot: &Pose2, mounting: &Mounting) -> [Point2<f64>; 4] {
+fn project(place: &LandmarkPlace, robot: &Pose2, mounting: &CameraExtrinsics) -> [Point2<f64>; 4] {
     projected(&camera(), place, robot, mounting)
 }
 
@@ -51,7 +51,7 @@ fn projected(
     camera: &Intrinsics,
     place: &LandmarkPlace,
     robot: &Pose2,
-    mounting: &Mounting,
+    mounting: &CameraExtrinsics,
 ) -> [Point2<f64>; 4] {
     let camera_from_landmark =
         mounting.robot_from_camera.inverse() * robot.to_isometry3().inverse() * place.map_from_landmark();
@@ -63,15 +63,15 @@ fn stated() -> Intrinsics {
     camera().with_sigmas(IntrinsicsSigmas { focal_px: 4.0, center_px: 3.0 }).unwrap()
 }
 
-fn look(points: [Point2<f64>; 4], robot: &Pose2Covariance) -> Result<ViewOnCeiling, PlacingError> {
-    let view = PlacingView {
+fn look(points: [Point2<f64>; 4], robot: &Pose2Covariance) -> Result<CeilingRectangle, PlacementError> {
+    let view = PosedView {
         corners: &Corners::new(points).unwrap(),
         covariance_px2: &[Matrix2::identity() * 0.25; 4],
         camera: &stated(),
         map_from_robot: robot,
         mounting: &mounting(),
     };
-    view_on_ceiling(&view, &CEILING, &PlacingParams::default())
+    view_on_ceiling(&view, &CEILING, &PlacementParams::default())
 }
 
 #[test]
@@ -82,7 +82,7 @@ fn exact_views_give_the_exact_place() {
             look(project(&truth(2.6), &robot.pose, &mounting()), &robot).unwrap()
         })
         .into();
-    let made = ceiling_placement(&views, &CEILING, &PlacingParams::default()).unwrap();
+    let made = ceiling_placement(&views, &CEILING, &PlacementParams::default()).unwrap();
     let (a, b) = (made.place.map_from_landmark(), truth(2.6).map_from_landmark());
     assert!((a.to_homogeneous() - b.to_homogeneous()).norm() < 1e-9, "{a} {b}");
     assert!((made.place.size.width_m - 1.2).abs() < 1e-9 && made.used == [0, 1, 2]);
@@ -99,7 +99,8 @@ fn the_covariance_is_honest() {
             let m = mounting();
             let e = m.covariance.map_diagonal(f64::sqrt).map(|s| s * random.normal());
             let (turn, shift) = (e.fixed_rows::<3>(0).into(), e.fixed_rows::<3>(3).into());
-            let real = Mounting { robot_from_camera: perturbed(&m.robot_from_camera, &turn, &shift), ..m };
+            let real =
+                CameraExtrinsics { robot_from_camera: perturbed(&m.robot_from_camera, &turn, &shift), ..m };
             let k = camera();
             let share = 1.0 + 0.008 * random.normal();
             let (cx_px, cy_px) = (k.cx_px + 3.0 * random.normal(), k.cy_px + 3.0 * random.normal());
@@ -116,7 +117,7 @@ fn the_covariance_is_honest() {
                     look(points, &believed).unwrap()
                 })
                 .collect();
-            let made = ceiling_placement(&views, &CEILING, &PlacingParams::default()).unwrap();
+            let made = ceiling_placement(&views, &CEILING, &PlacementParams::default()).unwrap();
             let e = error_of(&made.place, &hung);
             let value = e.dot(&made.place.covariance.cholesky().unwrap().solve(&e));
             (sum, n) = (sum + value, n + 1.0);
@@ -135,19 +136,22 @@ fn what_is_not_up_there_is_refused() {
     // A poster on a wall, seen by the same camera.
     let wall = LandmarkPlace { tilt_rad: 0.0, theta_rad: 0.4 + std::f64::consts::PI, z_m: 2.2, ..truth(2.6) };
     let refused = look(project(&wall, &robot.pose, &mounting()), &robot);
-    assert!(matches!(refused, Err(PlacingError::NotOnCeiling { .. } | PlacingError::NoWall)), "{refused:?}");
+    assert!(
+        matches!(refused, Err(PlacementError::NotOnCeiling { .. } | PlacementError::NoWall)),
+        "{refused:?}"
+    );
     let bad = Ceiling { height_m: MAX_HEIGHT_M + 0.1, ..CEILING };
     assert_eq!(bad.check().unwrap_err().field, "ceiling.height_m");
     assert!(Ceiling { sigma_m: f64::NAN, ..CEILING }.check().is_err());
     assert!(Ceiling { height_m: MAX_HEIGHT_M, sigma_m: 1.0 }.check().is_ok());
-    assert_eq!(ceiling_placement(&[], &CEILING, &PlacingParams::default()), Err(PlacingError::NoView));
+    assert_eq!(ceiling_placement(&[], &CEILING, &PlacementParams::default()), Err(PlacementError::NoView));
 }
 
 #[test]
 fn the_derivative_by_the_height_is_the_finite_difference() {
     let robot = robot(0.4);
     let points = project(&truth(2.6), &robot.pose, &mounting());
-    let view = PlacingView {
+    let view = PosedView {
         corners: &Corners::new(points).unwrap(),
         covariance_px2: &[Matrix2::identity() * 0.25; 4],
         camera: &camera(),
@@ -156,7 +160,7 @@ fn the_derivative_by_the_height_is_the_finite_difference() {
     };
     let at = |h: f64| {
         let ceiling = Ceiling { height_m: h, ..CEILING };
-        view_on_ceiling(&view, &ceiling, &PlacingParams::default()).unwrap()
+        view_on_ceiling(&view, &ceiling, &PlacementParams::default()).unwrap()
     };
     let numeric = (at(2.6 + 1e-5).rectangle - at(2.6 - 1e-5).rectangle) / 2e-5;
     assert!((numeric - at(2.6).by_height).norm() < 1e-5, "{numeric}");

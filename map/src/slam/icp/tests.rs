@@ -14,9 +14,9 @@ fn a_known_motion_is_found_again() {
     let mut random = Random::new(1);
     let (a, b) = (Pose2::new(12.5, 1.0, 0.1), Pose2::new(12.9, 0.9, 0.25));
     let (old, new) = (seen(&ring(), &a, 0.0, &mut random), seen(&ring(), &b, 0.0, &mut random));
-    let reference = Reference::new([(a, &old)].into_iter(), 0.5);
+    let reference = SurfaceIndex::new([(a, &old)].into_iter(), 0.5);
     let guess = Pose2::new(12.75, 1.05, 0.15);
-    let found = align(&reference, &new, &guess, None, &AlignParams::default()).unwrap();
+    let found = align(&reference, &new, &guess, None, &IcpParams::default()).unwrap();
     let d = found.pose.minus(&b);
     assert!(d.xy().norm() < 0.01 && d.z.abs() < 0.002, "{d}");
     assert!(found.matched > 0.6, "{found:?}");
@@ -30,8 +30,8 @@ fn a_corridor_tells_nothing_along_itself() {
         // The same corridor, the robot turned: the unknown direction follows the walls, not the robot.
         let at = Pose2::new(0.0, 0.1, turn.sin() * 0.3);
         let old = seen(&walls, &at, 0.01, &mut random);
-        let reference = Reference::new([(at, &old)].into_iter(), 0.5);
-        let found = align(&reference, &old, &at, None, &AlignParams::default()).unwrap();
+        let reference = SurfaceIndex::new([(at, &old)].into_iter(), 0.5);
+        let found = align(&reference, &old, &at, None, &IcpParams::default()).unwrap();
         let eigen = found.information.symmetric_eigen();
         let (least, k) =
             (0..3).map(|i| (eigen.eigenvalues[i], i)).min_by(|a, b| a.0.total_cmp(&b.0)).unwrap();
@@ -53,8 +53,8 @@ fn claimed_and_true_errors_agree() {
         let a = Pose2::new(1.5, 2.0, 0.4 + 0.2 * random.normal());
         let b = a.compose(&Pose2::new(0.3, 0.02, 0.1));
         let (old, new) = (seen(&walls, &a, 0.015, &mut random), seen(&walls, &b, 0.015, &mut random));
-        let reference = Reference::new([(a, &old)].into_iter(), 0.5);
-        let found = align(&reference, &new, &b, None, &AlignParams::default()).unwrap();
+        let reference = SurfaceIndex::new([(a, &old)].into_iter(), 0.5);
+        let found = align(&reference, &new, &b, None, &IcpParams::default()).unwrap();
         let e = found.pose.minus(&b);
         sum += e.dot(&(found.information * e));
     }
@@ -79,8 +79,8 @@ fn a_floor_is_added_to_the_covariance() {
 
 #[test]
 fn too_few_points_are_no_alignment() {
-    let reference = Reference::new(std::iter::empty(), 0.5);
+    let reference = SurfaceIndex::new(std::iter::empty(), 0.5);
     let mut random = Random::new(3);
     let new = seen(&ring(), &Pose2::new(12.5, 1.0, 0.1), 0.0, &mut random);
-    assert!(align(&reference, &new, &Pose2::default(), None, &AlignParams::default()).is_none());
+    assert!(align(&reference, &new, &Pose2::default(), None, &IcpParams::default()).is_none());
 }

@@ -3,13 +3,13 @@
 use crate::{
     pose2::{Pose2, Pose2Covariance},
     slam::{
-        graph::{self, Edge, GraphError},
+        graph::{self, GraphError, PoseConstraint},
         information::spread,
-        keyframe::Key,
+        keyframe::Keyframe,
         loop_closure::{
             params::LoopParams,
-            reach::{candidates, reach},
-            verification::{Belief, meet},
+            reach::{candidates, relative_covariances},
+            verification::{LoopPrior, verify_loop},
         },
         params::SlamParams,
     },
@@ -21,7 +21,7 @@ const MAX_WAITING: usize = 64;
 
 /// A loop that was closed.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Closure {
+pub struct LoopClosure {
     /// Key pose met again.
     pub old: usize,
     /// Key pose that met it.
@@ -32,16 +32,16 @@ pub struct Closure {
 
 /// All loops so far.
 #[derive(Debug, Clone, Default)]
-pub(in crate::slam) struct Closures {
-    edges: Vec<Edge>,
-    waiting: Vec<Edge>,
+pub(in crate::slam) struct LoopCloser {
+    edges: Vec<PoseConstraint>,
+    waiting: Vec<PoseConstraint>,
     refused: usize,
     /// Way at the last try.
     tried_m: f64,
 }
 
-impl Closures {
-    pub(in crate::slam) fn edges(&self) -> &[Edge] {
+impl LoopCloser {
+    pub(in crate::slam) fn edges(&self) -> &[PoseConstraint] {
         &self.edges
     }
 
@@ -49,8 +49,8 @@ impl Closures {
         self.refused
     }
 
-    pub(in crate::slam) fn taken(&self) -> Vec<Closure> {
-        let closure = |e: &Edge| Closure {
+    pub(in crate::slam) fn taken(&self) -> Vec<LoopClosure> {
+        let closure = |e: &PoseConstraint| LoopClosure {
             old: e.from,
             new: e.to,
             old_from_new: Pose2Covariance { pose: e.measured, covariance: spread(&e.information) },
@@ -59,7 +59,7 @@ impl Closures {
     }
 
     /// Drops the loops that contradict the fitted poses.
-    pub(in crate::slam) fn judge(&mut self, poses: &[Pose2], p: &LoopParams) -> bool {
+    pub(in crate::slam) fn prune(&mut self, poses: &[Pose2], p: &LoopParams) -> bool {
         let before = self.edges.len();
         self.edges.retain(|e| graph::weight(e, graph::chi2(e, poses)) >= p.min_weight);
         self.refused += before - self.edges.len();
@@ -67,10 +67,10 @@ impl Closures {
     }
 
     /// Looks for places that the last key pose meets again. True if key poses were moved.
-    pub(in crate::slam) fn look(
+    pub(in crate::slam) fn detect(
         &mut self,
-        keys: &mut [Key],
-        path: &[Edge],
+        keys: &mut [Keyframe],
+        path: &[PoseConstraint],
         p: &SlamParams,
     ) -> Result<bool, GraphError> {
         let Some(new) = keys.len().checked_sub(1) else { return Ok(false) };
@@ -78,7 +78,7 @@ impl Closures {
             return Ok(false);
         }
         self.tried_m = keys[new].path_m;
-        let reached = reach(keys, path, &self.edges, new);
+        let reached = relative_covariances(keys, path, &self.edges, new);
         let before = self.edges.len();
         for old in candidates(keys, &reached, new, &p.loops) {
             let Some(believed) = &reached[old] else { continue };
@@ -86,7 +86,7 @@ impl Closures {
             let mut believed = believed.inverse();
             believed.covariance *= p.loops.doubt.powi(2);
             let sigma = believed.covariance.view((0, 0), (2, 2)).trace().max(0.0).sqrt();
-            let met = meet(keys, old, new, &Belief { old_from_new: believed, sigma_m: sigma }, p);
+            let met = verify_loop(keys, old, new, &LoopPrior { old_from_new: believed, sigma_m: sigma }, p);
             let Some(edge) = met else { continue };
             if sigma <= p.loops.sure_m {
                 self.edges.push(edge);
@@ -104,13 +104,16 @@ impl Closures {
         }
         let mut poses: Vec<Pose2> = keys.iter().map(|k| k.pose).collect();
         // New loops may be far from closed: doubted from the start they would never pull.
-        let trusted = |(i, e): (usize, &Edge)| if i < before { *e } else { Edge { doubt_chi2: None, ..*e } };
-        let all: Vec<Edge> = path.iter().copied().chain(self.edges.iter().enumerate().map(trusted)).collect();
+        let trusted = |(i, e): (usize, &PoseConstraint)| {
+            if i < before { *e } else { PoseConstraint { doubt_chi2: None, ..*e } }
+        };
+        let all: Vec<PoseConstraint> =
+            path.iter().copied().chain(self.edges.iter().enumerate().map(trusted)).collect();
         graph::optimise(&mut poses, &all)?;
-        let all: Vec<Edge> = path.iter().chain(&self.edges).copied().collect();
+        let all: Vec<PoseConstraint> = path.iter().chain(&self.edges).copied().collect();
         graph::optimise(&mut poses, &all)?;
-        if self.judge(&poses, &p.loops) {
-            let all: Vec<Edge> = path.iter().chain(&self.edges).copied().collect();
+        if self.prune(&poses, &p.loops) {
+            let all: Vec<PoseConstraint> = path.iter().chain(&self.edges).copied().collect();
             graph::optimise(&mut poses, &all)?;
         }
         for (key, pose) in keys.iter_mut().zip(&poses) {
@@ -120,7 +123,7 @@ impl Closures {
     }
 
     /// Takes the waiting loops that agree with the newest, if they are enough.
-    fn confirm(&mut self, keys: &[Key], path: &[Edge], p: &LoopParams) {
+    fn confirm(&mut self, keys: &[Keyframe], path: &[PoseConstraint], p: &LoopParams) {
         let Some(newest) = self.waiting.last().copied() else { return };
         let agreeing: Vec<usize> = (0..self.waiting.len())
             .filter(|&i| {
@@ -141,7 +144,13 @@ impl Closures {
 }
 
 /// Two loops and the path between their ends make a circle that closes.
-fn agree(keys: &[Key], path: &[Edge], a: &Edge, b: &Edge, p: &LoopParams) -> bool {
+fn agree(
+    keys: &[Keyframe],
+    path: &[PoseConstraint],
+    a: &PoseConstraint,
+    b: &PoseConstraint,
+    p: &LoopParams,
+) -> bool {
     let along = |from: usize, to: usize| {
         let (low, high) = (from.min(to), from.max(to));
         let mut sum = Pose2Covariance { pose: Pose2::default(), covariance: Matrix3::zeros() };
@@ -155,7 +164,8 @@ fn agree(keys: &[Key], path: &[Edge], a: &Edge, b: &Edge, p: &LoopParams) -> boo
     if far(a.to, b.to) || far(a.from, b.from) {
         return false;
     }
-    let measured = |e: &Edge| Pose2Covariance { pose: e.measured, covariance: spread(&e.information) };
+    let measured =
+        |e: &PoseConstraint| Pose2Covariance { pose: e.measured, covariance: spread(&e.information) };
     let through_b = along(a.from, b.from).compose(&measured(b)).compose(&along(b.to, a.to));
     measured(a).distance2(&through_b).is_some_and(|d2| d2 <= p.agree_chi2 * p.doubt.powi(2))
 }

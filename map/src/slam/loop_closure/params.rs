@@ -1,6 +1,6 @@
 //! Limits of loop closure.
 
-use crate::slam::correlative::SearchParams;
+use crate::slam::correlative::CorrelativeParams;
 use serde::{Deserialize, Serialize};
 
 /// Widest window that is searched; when the robot may be farther off, nothing is closed.
@@ -33,7 +33,7 @@ pub struct LoopParams {
     /// What the graph says of its own doubt is multiplied by this: errors of neighbouring matches are not independent.
     pub doubt: f64,
     /// Search on the grid when in doubt.
-    pub search: SearchParams,
+    pub search: CorrelativeParams,
     /// Least score on the grid.
     pub min_score: f64,
     /// The second best place in the window must be this much worse.
@@ -69,7 +69,7 @@ impl Default for LoopParams {
             doubt: 2.0,
             way_m: 0.04,
             way_rad: 0.006,
-            search: SearchParams { cell_m: 0.1, sigma_m: 0.12, turn_rad: 0.015 },
+            search: CorrelativeParams { cell_m: 0.1, sigma_m: 0.12, turn_rad: 0.015 },
             min_score: 0.55,
             min_margin: 0.08,
             min_matched: 0.55,

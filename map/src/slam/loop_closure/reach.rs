@@ -4,9 +4,9 @@
 use crate::{
     pose2::{Pose2, Pose2Covariance},
     slam::{
-        graph::Edge,
+        graph::PoseConstraint,
         information::spread,
-        keyframe::Key,
+        keyframe::Keyframe,
         loop_closure::params::{LoopParams, MAX_REACH_M},
     },
 };
@@ -42,7 +42,12 @@ impl Ord for Reached {
 
 /// `new_from_pose` of every pose with covariance along the surest chain of edges: never surer than the whole graph
 /// (Olson 2009).
-pub(super) fn reach(keys: &[Key], path: &[Edge], loops: &[Edge], new: usize) -> Vec<Option<Pose2Covariance>> {
+pub(super) fn relative_covariances(
+    keys: &[Keyframe],
+    path: &[PoseConstraint],
+    loops: &[PoseConstraint],
+    new: usize,
+) -> Vec<Option<Pose2Covariance>> {
     let mut joined: Vec<Vec<(usize, Matrix3<f64>, bool)>> = vec![Vec::new(); keys.len()];
     for e in path.iter().chain(loops) {
         let covariance = spread(&e.information);
@@ -86,7 +91,7 @@ pub(super) fn reach(keys: &[Key], path: &[Edge], loops: &[Edge], new: usize) -> 
 
 /// Old poses that may see what the new one sees: the nearest of every pass.
 pub(super) fn candidates(
-    keys: &[Key],
+    keys: &[Keyframe],
     reached: &[Option<Pose2Covariance>],
     new: usize,
     p: &LoopParams,

@@ -5,14 +5,14 @@ use crate::{
     pose2::{Pose2, Pose2Covariance},
     slam::{
         cloud::{Cloud, SurfacePoint},
-        correlative::{Field, Window},
-        graph::Edge,
-        icp::{Aligned, align},
+        correlative::{LikelihoodField, PoseWindow},
+        graph::PoseConstraint,
+        icp::{IcpResult, align},
         information::{spread, with_floor},
-        keyframe::Key,
+        keyframe::Keyframe,
         loop_closure::params::{MAX_REACH_M, MAX_REACH_RAD},
         params::SlamParams,
-        surface_index::Reference,
+        surface_index::SurfaceIndex,
     },
 };
 use nalgebra::{Point2, Vector2};
@@ -28,14 +28,20 @@ const RIVAL_RAD: f64 = 0.3;
 
 /// What is believed before the try.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Belief {
+pub(super) struct LoopPrior {
     pub old_from_new: Pose2Covariance,
     /// Standard deviation of the position.
     pub sigma_m: f64,
 }
 
 /// Matches the new pose's scans with those around the old one.
-pub(super) fn meet(keys: &[Key], old: usize, new: usize, belief: &Belief, p: &SlamParams) -> Option<Edge> {
+pub(super) fn verify_loop(
+    keys: &[Keyframe],
+    old: usize,
+    new: usize,
+    belief: &LoopPrior,
+    p: &SlamParams,
+) -> Option<PoseConstraint> {
     let l = &p.loops;
     let sure = belief.sigma_m <= l.sure_m;
     let limit_m = keys[new].path_m - 0.5 * l.min_way_m;
@@ -52,7 +58,7 @@ pub(super) fn meet(keys: &[Key], old: usize, new: usize, belief: &Belief, p: &Sl
     } else {
         belief.old_from_new.pose
     };
-    let reference = Reference::new(old_scans.iter().copied(), p.align.start_radius_m);
+    let reference = SurfaceIndex::new(old_scans.iter().copied(), p.align.start_radius_m);
     let aligned = align(&reference, &query, &guess, None, &p.align)?;
     let good = aligned.matched >= l.min_matched && aligned.rms_m <= l.max_rms_m;
     let moved = aligned.pose.minus(&guess);
@@ -67,8 +73,13 @@ pub(super) fn meet(keys: &[Key], old: usize, new: usize, belief: &Belief, p: &Sl
     let information = with_floor(&aligned.information, floor);
     let measured = Pose2Covariance { pose: aligned.pose, covariance: spread(&information) };
     let d2 = measured.distance2(&belief.old_from_new)?;
-    let edge =
-        Edge { from: old, to: new, measured: aligned.pose, information, doubt_chi2: Some(l.doubt_chi2) };
+    let edge = PoseConstraint {
+        from: old,
+        to: new,
+        measured: aligned.pose,
+        information,
+        doubt_chi2: Some(l.doubt_chi2),
+    };
     (d2 <= l.gate_chi2).then_some(edge)
 }
 
@@ -76,13 +87,13 @@ pub(super) fn meet(keys: &[Key], old: usize, new: usize, belief: &Belief, p: &Sl
 pub(super) fn search(
     old_scans: &[(Pose2, &Cloud)],
     query: &Cloud,
-    belief: &Belief,
+    belief: &LoopPrior,
     p: &SlamParams,
 ) -> Option<Pose2> {
     let l = &p.loops;
     let believed = &belief.old_from_new;
     let heading = believed.covariance[(2, 2)].max(0.0).sqrt();
-    let window = Window {
+    let window = PoseWindow {
         middle: believed.pose,
         reach_m: (3.0 * belief.sigma_m + 0.3).min(MAX_REACH_M),
         reach_rad: (3.0 * heading + 0.05).min(MAX_REACH_RAD),
@@ -91,7 +102,7 @@ pub(super) fn search(
     let points = thinned(query, MAX_TRIED);
     let middle = Point2::from(believed.pose.position() * 0.5);
     let scans = old_scans.iter().copied();
-    let field = Field::new(scans, &middle, p.cloud.max_range_m, window.reach_m, &l.search);
+    let field = LikelihoodField::new(scans, &middle, p.cloud.max_range_m, window.reach_m, &l.search);
     let best = field.search(&points, &window, l.min_score, None, &l.search)?;
     let rival = (&best.pose, RIVAL_M, RIVAL_RAD);
     let nearly = (best.score - l.min_margin).max(0.0);
@@ -100,12 +111,12 @@ pub(super) fn search(
 }
 
 /// Key poses within a way of one of them, before and after.
-fn around(keys: &[Key], i: usize, way_m: f64) -> impl Iterator<Item = &Key> {
+fn around(keys: &[Keyframe], i: usize, way_m: f64) -> impl Iterator<Item = &Keyframe> {
     let here = keys[i].path_m;
     keys.iter().filter(move |k| (k.path_m - here).abs() <= way_m)
 }
 
-fn seen_from<'a>(keys: &[Key], i: usize, key: &'a Key) -> (Pose2, &'a Cloud) {
+fn seen_from<'a>(keys: &[Keyframe], i: usize, key: &'a Keyframe) -> (Pose2, &'a Cloud) {
     (keys[i].pose.between(&key.pose), &key.cloud)
 }
 
@@ -129,7 +140,7 @@ fn thinned(cloud: &Cloud, most: usize) -> Vec<Point2<f64>> {
 }
 
 /// Share of the scan's beams that pass through surfaces of the reference which face them.
-fn through(reference: &Reference, cloud: &Cloud, aligned: &Aligned) -> f64 {
+fn through(reference: &SurfaceIndex, cloud: &Cloud, aligned: &IcpResult) -> f64 {
     let origin = aligned.pose.apply(&cloud.origin);
     let (mut crossed, mut beams) = (0_u32, 0_u32);
     for point in &cloud.points {

@@ -7,7 +7,7 @@ use crate::{
         obstacle::Obstacle,
         outline::Polygon,
         pointwise,
-        settings::{Viewer, VisibilityParams},
+        settings::{PanTiltCamera, VisibilityParams},
         tests::{Dice, place},
     },
 };
@@ -15,7 +15,7 @@ use nalgebra::{Point2, Rotation2, Vector2};
 use std::f64::consts::FRAC_PI_2;
 
 /// The same scene with the landmark under the ceiling, on the floor or leaning, at any height, and a camera that looks there.
-fn random_tilted_map(seed: u64) -> (LandmarkPlace, Vec<Obstacle>, Viewer) {
+fn random_tilted_map(seed: u64) -> (LandmarkPlace, Vec<Obstacle>, PanTiltCamera) {
     let (mut landmark, mut obstacles, mut viewer) = random_map(seed);
     let mut dice = Dice::new(5000 + seed);
     landmark.tilt_rad = match seed % 4 {
@@ -32,7 +32,7 @@ fn random_tilted_map(seed: u64) -> (LandmarkPlace, Vec<Obstacle>, Viewer) {
 }
 
 /// A landmark on its wall with long and short, near and far, high and low obstacles about it.
-pub(super) fn random_map(seed: u64) -> (LandmarkPlace, Vec<Obstacle>, Viewer) {
+pub(super) fn random_map(seed: u64) -> (LandmarkPlace, Vec<Obstacle>, PanTiltCamera) {
     let mut dice = Dice::new(seed);
     let theta = dice.within(-3.1, 3.1);
     let landmark = place(
@@ -59,15 +59,15 @@ pub(super) fn random_map(seed: u64) -> (LandmarkPlace, Vec<Obstacle>, Viewer) {
         height_m: None,
     });
     obstacles[2].height_m = Some(dice.within(0.2, 1.6));
-    let viewer = Viewer {
+    let viewer = PanTiltCamera {
         focal_px: dice.within(400.0, 900.0),
         camera_height_m: dice.within(0.5, 1.6),
-        ..Viewer::default()
+        ..PanTiltCamera::default()
     };
     (landmark, obstacles, viewer)
 }
 
-type Scene = fn(u64) -> (LandmarkPlace, Vec<Obstacle>, Viewer);
+type Scene = fn(u64) -> (LandmarkPlace, Vec<Obstacle>, PanTiltCamera);
 
 /// How many of 200 points each of so many maps were compared, how many differ, from how many it is seen.
 fn compared_with_brute_force(scene: Scene, seeds: u64) -> (u32, u32, u32) {
