@@ -11,7 +11,7 @@ pub mod lessons;
 pub mod map;
 pub mod named;
 pub mod robot;
-pub mod runs;
+pub mod reference_runs;
 mod transport;
 
 pub use capture::Capture;

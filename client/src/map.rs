@@ -23,7 +23,7 @@ const REQUEST_TIMEOUT: Duration = Duration::from_mins(1);
 
 /// What part of an uploaded image is the landmark.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Extent {
+pub enum LandmarkRegion {
     /// The server looks for the one dominant quad.
     Detect,
     /// The whole image is the landmark, cut out beforehand.
@@ -73,17 +73,17 @@ impl MapClient {
     }
 
     /// Says where a map is; what is not named stays, null forgets.
-    pub async fn place_map(&self, name: &str, whereabouts: &Value) -> Result<Map, ClientError> {
+    pub async fn locate_map(&self, name: &str, whereabouts: &Value) -> Result<Map, ClientError> {
         self.send(self.request(Method::PATCH, &format!("/maps/{name}")).json(whereabouts)).await
     }
 
     /// The camera that looks for a map's landmarks, and what counts as seen, as the server's documentation has it.
-    pub async fn sight(&self, map: &str) -> Result<Value, ClientError> {
+    pub async fn visibility_settings(&self, map: &str) -> Result<Value, ClientError> {
         self.send(self.request(Method::GET, &format!("/maps/{map}/sight"))).await
     }
 
     /// Sets it; what is not named becomes that of a usual robot.
-    pub async fn set_sight(&self, map: &str, sight: &Value) -> Result<Value, ClientError> {
+    pub async fn set_visibility_settings(&self, map: &str, sight: &Value) -> Result<Value, ClientError> {
         self.send(self.request(Method::PUT, &format!("/maps/{map}/sight")).json(sight)).await
     }
 
@@ -103,7 +103,7 @@ impl MapClient {
     }
 
     /// Replaces the walls: segments of two end points each, in metres, map frame.
-    pub async fn set_laser(&self, map: &str, segments_m: &[[[f64; 2]; 2]]) -> Result<Value, ClientError> {
+    pub async fn set_walls(&self, map: &str, segments_m: &[[[f64; 2]; 2]]) -> Result<Value, ClientError> {
         let segments: Vec<_> = segments_m.iter().map(|[a, b]| json!({ "a": a, "b": b })).collect();
         let path = format!("/maps/{map}/laser");
         self.send(self.request(Method::PUT, &path).json(&json!({ "segments": segments }))).await
@@ -153,13 +153,13 @@ impl MapClient {
         map: &str,
         landmark: &str,
         image: Vec<u8>,
-        extent: Extent,
+        extent: LandmarkRegion,
     ) -> Result<View, ClientError> {
         let mut form = Form::new().part("image", image_part(image));
         match extent {
-            Extent::Detect => {}
-            Extent::WholeImage => form = form.text("whole_image", "true"),
-            Extent::Corners(corners) => form = form.text("corners", json!(corners).to_string()),
+            LandmarkRegion::Detect => {}
+            LandmarkRegion::WholeImage => form = form.text("whole_image", "true"),
+            LandmarkRegion::Corners(corners) => form = form.text("corners", json!(corners).to_string()),
         }
         let path = format!("/maps/{map}/landmarks/{landmark}/views");
         self.send(self.request(Method::POST, &path).multipart(form)).await

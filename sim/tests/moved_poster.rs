@@ -101,7 +101,7 @@ impl Robot {
     /// The way of one frame.
     fn frame(&mut self, at_ns: i64, step: &Step, sightings: &[LandmarkObservation<'_>]) -> Vec<HealthChange> {
         let mounting = CameraExtrinsics::new(step.robot_from_camera).expect("in range");
-        self.fuser.odometry(at_ns, step.odom_from_robot).expect("in range");
+        self.fuser.apply_odometry(at_ns, step.odom_from_robot).expect("in range");
         let used: Vec<_> = sightings
             .iter()
             .filter(|s| self.standings.get(&s.landmark) != Some(&LandmarkHealth::Quarantined))
@@ -142,7 +142,7 @@ impl Robot {
             fix = robot_pose(sightings, mounting, Some(prior), &p).expect("in range");
         }
         let FixResult::Fixed(fix) = fix else { return false };
-        let outcome = self.fuser.fix(at_ns, &fix).expect("in range");
+        let outcome = self.fuser.apply_fix(at_ns, &fix).expect("in range");
         if matches!(outcome, FixOutcome::Started | FixOutcome::Reset) {
             self.supporters.clear();
         }

@@ -92,7 +92,11 @@ impl Fuser {
     }
 
     /// Takes an odometry reading.
-    pub fn apply_odometry(&mut self, at_ns: i64, odom_from_robot: Pose2) -> Result<OdometryOutcome, OutOfRange> {
+    pub fn apply_odometry(
+        &mut self,
+        at_ns: i64,
+        odom_from_robot: Pose2,
+    ) -> Result<OdometryOutcome, OutOfRange> {
         self.apply_odometry_after(at_ns, odom_from_robot, 0.0)
     }
 

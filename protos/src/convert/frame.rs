@@ -3,7 +3,7 @@
 use super::geometry;
 use crate::{Code, Name, Rejection, v1};
 use map::{
-    mounting::Mounting,
+    extrinsics::CameraExtrinsics,
     pose2::{Pose2, Pose2Covariance},
 };
 use prost::bytes::Bytes;
@@ -51,7 +51,7 @@ pub struct CheckedFrame {
     /// The camera, where calibrated.
     pub intrinsics: Option<Intrinsics>,
     /// Camera on robot.
-    pub mounting: Option<Mounting>,
+    pub mounting: Option<CameraExtrinsics>,
     /// Odometry at capture.
     pub odometry: Option<Pose2>,
     /// The robot's belief, `map_from_robot`, with its covariance.

@@ -3,7 +3,7 @@
 use crate::{Code, Rejection, v1};
 use map::{
     check::{MAX_COORDINATE_M, MAX_VARIANCE, OutOfRange},
-    mounting::Mounting,
+    extrinsics::CameraExtrinsics,
     pose2::{Pose2, Pose2Covariance},
 };
 use nalgebra::{Isometry3, Matrix3, Quaternion, Translation3, UnitQuaternion};
@@ -89,8 +89,8 @@ pub fn pose2_covariance_wire(value: &Pose2Covariance) -> v1::Pose2Covariance {
 }
 
 /// Where a camera sits on its robot, with the default covariance.
-pub fn mounting(pose: &v1::Pose3) -> Result<Mounting, Rejection> {
-    Mounting::new(pose3(pose)?).map_err(|e| {
+pub fn mounting(pose: &v1::Pose3) -> Result<CameraExtrinsics, Rejection> {
+    CameraExtrinsics::new(pose3(pose)?).map_err(|e| {
         let r = refused(&e);
         Rejection { field: String::new(), ..r }
     })
@@ -295,8 +295,8 @@ mod tests {
     #[test]
     fn a_camera_far_from_its_robot_is_refused() {
         let at = |x_m| mounting(&v1::Pose3 { qw: 1.0, x_m, ..v1::Pose3::default() });
-        assert!(at(map::mounting::MAX_MOUNTING_M).is_ok());
-        assert_eq!(at(map::mounting::MAX_MOUNTING_M + 0.01).unwrap_err().code, Code::OutOfRange);
+        assert!(at(map::extrinsics::MAX_MOUNTING_M).is_ok());
+        assert_eq!(at(map::extrinsics::MAX_MOUNTING_M + 0.01).unwrap_err().code, Code::OutOfRange);
     }
 
     #[test]

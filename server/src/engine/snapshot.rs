@@ -5,13 +5,13 @@ use super::doubles::Doubles;
 use crate::store::areas::Kept;
 use arc_swap::ArcSwap;
 use map::{
-    changes::Standing,
-    frames::{Links, relation},
+    landmark_health::LandmarkHealth,
     laser_fix::WallIndex,
+    map_links::{MapLinks, relation},
     place::LandmarkPlace,
     pose2::Pose2Covariance,
     segments::LaserSegment,
-    visibility::{Sight, VisibilityMap},
+    visibility::{VisibilityMap, VisibilitySettings},
 };
 use std::{collections::BTreeMap, sync::Arc};
 use tokio::sync::broadcast;
@@ -51,7 +51,7 @@ pub struct MapSnapshot {
     /// What runs have shown of modalities; kept from version to version while it is the same.
     pub(crate) areas: Kept,
     /// The camera that looks for its landmarks, and what counts as seen.
-    pub sight: Sight,
+    pub sight: VisibilitySettings,
     /// From where each placed landmark is seen by that camera.
     pub visibility: BTreeMap<LandmarkId, Arc<VisibilityMap>>,
     /// Which distance decides.
@@ -75,7 +75,7 @@ impl MapSnapshot {
             walls: Vec::new(),
             wall_index: Arc::new(WallIndex::new([])),
             areas: Kept::default(),
-            sight: Sight::default(),
+            sight: VisibilitySettings::default(),
             visibility: BTreeMap::new(),
             distance: DistanceKind::Both,
             params: Arc::default(),
@@ -93,13 +93,13 @@ pub struct LandmarkInfo {
     /// Where it hangs, if that and its size are known; without it there is no robot pose.
     pub place: Option<LandmarkPlace>,
     /// How far it is trusted: what is quarantined corrects no pose.
-    pub standing: Standing,
+    pub standing: LandmarkHealth,
 }
 
 impl LandmarkInfo {
     /// Whether it may correct poses.
     pub fn is_trusted(&self) -> bool {
-        self.standing != Standing::Quarantined
+        self.standing != LandmarkHealth::Quarantined
     }
 }
 
@@ -125,7 +125,7 @@ pub struct MapChange {
 struct World {
     maps: BTreeMap<String, Arc<MapSnapshot>>,
     robots: BTreeMap<String, String>,
-    links: Arc<Links<String>>,
+    links: Arc<MapLinks<String>>,
 }
 
 /// All maps and the robots' assignments, readable from any thread without waiting.
@@ -197,7 +197,7 @@ impl Snapshots {
     }
 
     /// How maps lie to each other from now on. For the store, after the commit.
-    pub fn set_links(&self, links: Links<String>) {
+    pub fn set_links(&self, links: MapLinks<String>) {
         let links = Arc::new(links);
         self.world.rcu(|world| World { links: links.clone(), ..World::clone(world) });
     }

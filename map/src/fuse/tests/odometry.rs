@@ -66,7 +66,10 @@ fn what_odometry_learnt_outlives_a_jump() {
     let learnt = fuser.odometry_errors().unwrap();
     assert!((0.007..0.01).contains(&learnt.errors.x), "{}", learnt.errors);
     let before: Matrix2<f64> = learnt.covariance;
-    assert_eq!(fuser.apply_odometry(11 * SECOND, Pose2::new(900.0, 0.0, 0.0)).unwrap(), OdometryOutcome::Jumped);
+    assert_eq!(
+        fuser.apply_odometry(11 * SECOND, Pose2::new(900.0, 0.0, 0.0)).unwrap(),
+        OdometryOutcome::Jumped
+    );
     assert_eq!(fuser.pose(), None);
     assert_eq!(fuser.odometry_errors(), Some(learnt));
     fuser.apply_fix(11 * SECOND, &fix(1, Pose2::new(3.0, 0.0, 0.0), 0.01, 1e-4)).unwrap();
@@ -113,7 +116,10 @@ fn one_reading_far_behind_loses_nothing() {
     drive(&mut fuser, 5.0);
     fuser.apply_fix(5 * SECOND, &fix(1, Pose2::default(), 0.05, 0.01)).unwrap();
     let before = fuser.pose().unwrap();
-    assert_eq!(fuser.apply_odometry(-20 * SECOND, Pose2::new(5.0, 0.0, 0.0)).unwrap(), OdometryOutcome::TooOld);
+    assert_eq!(
+        fuser.apply_odometry(-20 * SECOND, Pose2::new(5.0, 0.0, 0.0)).unwrap(),
+        OdometryOutcome::TooOld
+    );
     assert_eq!(fuser.pose().unwrap(), before);
 }
 

@@ -380,7 +380,10 @@ fn a_guided_fix_starts_nothing_and_ends_no_doubt() {
     assert!(matches!(fuser.apply_fix(SECOND / 10, &away).unwrap(), FixOutcome::GatedOut { in_a_row: 1, .. }));
     // Guided: it corrects, and the contradiction stays.
     let next = at(4.1, &mut random);
-    assert!(matches!(fuser.apply_fix_as(SECOND / 10, &next, FixRole::Guided).unwrap(), FixOutcome::Applied { .. }));
+    assert!(matches!(
+        fuser.apply_fix_as(SECOND / 10, &next, FixRole::Guided).unwrap(),
+        FixOutcome::Applied { .. }
+    ));
     assert_eq!(fuser.pose().unwrap().contradictions, 1);
     // Guided and far off: left out, not counted.
     assert!(matches!(
@@ -390,7 +393,10 @@ fn a_guided_fix_starts_nothing_and_ends_no_doubt() {
     assert_eq!(fuser.pose().unwrap().contradictions, 1);
     // An independent one that agrees ends it.
     step(&mut fuser, 2);
-    assert!(matches!(fuser.apply_fix(SECOND / 5, &at(4.2, &mut random)).unwrap(), FixOutcome::Applied { .. }));
+    assert!(matches!(
+        fuser.apply_fix(SECOND / 5, &at(4.2, &mut random)).unwrap(),
+        FixOutcome::Applied { .. }
+    ));
     assert_eq!(fuser.pose().unwrap().contradictions, 0);
     // One that replaces needs no row, is applied late like any other, and starts a pose as well.
     assert_eq!(fuser.apply_fix_as(SECOND / 10, &away, FixRole::Replacing).unwrap(), FixOutcome::Reset);

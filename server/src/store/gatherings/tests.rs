@@ -1,6 +1,6 @@
 use super::*;
 use crate::store::{Store, WriterTask, accepting, landmarks::Measures, maps, tests::config};
-use map::gather::Kept;
+use map::tracks::StoredTrack;
 use vision::{detect::quads::Corners, icon::Icon, recognise::DistanceKind};
 
 const BOUNDS: Bounds = Bounds { open: 2, of_map: 3, tracks: 2, views: 2, bytes: 40 };
@@ -21,7 +21,7 @@ async fn begun(store: &Store, robot: &str) -> Result<GatheringRow, StoreError> {
 }
 
 async fn kept(store: &Store, id: i64, number: u32, picture: u8, bytes: usize) -> Result<(), StoreError> {
-    let track = Kept { number, landmark: None, sightings: u32::from(picture), known: 0, place: None };
+    let track = StoredTrack { number, landmark: None, sightings: u32::from(picture), known: 0, place: None };
     let corners = Corners::try_from([[1.0, 1.0], [90.0, 1.0], [90.0, 99.0], [1.0, 99.0]]).unwrap();
     let new = NewView {
         image: vec![picture; bytes],
