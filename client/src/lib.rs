@@ -7,6 +7,8 @@
 
 pub mod capture;
 pub mod error;
+mod gatherings;
+mod http;
 pub mod lessons;
 pub mod map;
 pub mod named;

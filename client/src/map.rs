@@ -2,16 +2,12 @@
 
 use crate::{
     ClientError,
-    lessons::{
-        Accepted, Candidate, Gathering, Job, JobState, Landmark, Map, Page, Pick, Place, Problem, Robot,
-        Size, View,
-    },
+    lessons::{Job, JobState, Landmark, Map, Place, Robot, Size, View},
 };
 use reqwest::{
-    Method, RequestBuilder, Response,
+    Method,
     multipart::{Form, Part},
 };
-use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 use std::time::{Duration, Instant};
 use vision::{frame::Intrinsics, recognise::DistanceKind};
@@ -35,8 +31,8 @@ pub enum LandmarkRegion {
 /// A connection to the server's HTTP interface.
 #[derive(Debug, Clone)]
 pub struct MapClient {
-    http: reqwest::Client,
-    base: String,
+    pub(crate) http: reqwest::Client,
+    pub(crate) base: String,
 }
 
 impl MapClient {
@@ -142,11 +138,6 @@ impl MapClient {
         self.all(&format!("/maps/{map}/landmarks")).await
     }
 
-    /// Removes a landmark with its views and model.
-    pub async fn delete_landmark(&self, map: &str, name: &str) -> Result<(), ClientError> {
-        self.checked(self.request(Method::DELETE, &format!("/maps/{map}/landmarks/{name}"))).await.map(drop)
-    }
-
     /// Teaches one view: a JPEG or PNG photograph.
     pub async fn upload_view(
         &self,
@@ -183,80 +174,9 @@ impl MapClient {
         self.send(self.request(Method::POST, &format!("/maps/{map}/learn")).json(&body)).await
     }
 
-    /// Begins to gather views with a robot: of one landmark, or of whatever is new (and of known landmarks, too).
-    pub async fn gather(
-        &self,
-        map: &str,
-        robot: &str,
-        landmark: Option<&str>,
-        known: bool,
-    ) -> Result<Gathering, ClientError> {
-        let body = json!({ "robot": robot, "landmark": landmark, "known": known });
-        self.send(self.request(Method::POST, &format!("/maps/{map}/gatherings")).json(&body)).await
-    }
-
-    /// Ends a gathering; what was gathered waits for a decision.
-    pub async fn stop_gathering(&self, map: &str, gathering: i64) -> Result<Gathering, ClientError> {
-        self.send(self.request(Method::POST, &format!("/maps/{map}/gatherings/{gathering}/stop"))).await
-    }
-
-    /// All gatherings of a map.
-    pub async fn gatherings(&self, map: &str) -> Result<Vec<Gathering>, ClientError> {
-        self.all(&format!("/maps/{map}/gatherings")).await
-    }
-
-    /// What waits for a decision.
-    pub async fn candidates(&self, map: &str, gathering: i64) -> Result<Vec<Candidate>, ClientError> {
-        let path = format!("/maps/{map}/gatherings/{gathering}/candidates");
-        let found: Candidates = self.send(self.request(Method::GET, &path)).await?;
-        Ok(found.candidates)
-    }
-
-    /// The rectified picture of a view of a candidate, PNG.
-    pub async fn candidate_picture(
-        &self,
-        map: &str,
-        gathering: i64,
-        candidate: u32,
-        view: i64,
-    ) -> Result<Vec<u8>, ClientError> {
-        let path = format!("/maps/{map}/gatherings/{gathering}/candidates/{candidate}/views/{view}/icon");
-        let response = self.checked(self.request(Method::GET, &path)).await?;
-        let url = response.url().to_string();
-        let bytes = response.bytes().await.map_err(|e| ClientError::Http { url, detail: reason(&e) })?;
-        Ok(bytes.to_vec())
-    }
-
-    /// Makes landmarks of candidates and begins to learn them. All or nothing.
-    pub async fn accept_candidates(
-        &self,
-        map: &str,
-        gathering: i64,
-        picks: &[Pick],
-    ) -> Result<Accepted, ClientError> {
-        let path = format!("/maps/{map}/gatherings/{gathering}/accept");
-        self.send(self.request(Method::POST, &path).json(&json!({ "candidates": picks }))).await
-    }
-
-    /// Throws a candidate away.
-    pub async fn discard_candidate(
-        &self,
-        map: &str,
-        gathering: i64,
-        candidate: u32,
-    ) -> Result<(), ClientError> {
-        let path = format!("/maps/{map}/gatherings/{gathering}/candidates/{candidate}");
-        self.checked(self.request(Method::DELETE, &path)).await.map(drop)
-    }
-
     /// A job as it stands.
     pub async fn job(&self, id: &str) -> Result<Job, ClientError> {
         self.send(self.request(Method::GET, &format!("/jobs/{id}"))).await
-    }
-
-    /// Asks a job to stop.
-    pub async fn cancel_job(&self, id: &str) -> Result<(), ClientError> {
-        self.checked(self.request(Method::DELETE, &format!("/jobs/{id}"))).await.map(drop)
     }
 
     /// Waits until a job is done, telling `progress` of every state seen.
@@ -316,89 +236,15 @@ impl MapClient {
     pub async fn robots(&self) -> Result<Vec<Robot>, ClientError> {
         self.all("/robots").await
     }
-
-    pub(crate) fn request(&self, method: Method, path: &str) -> RequestBuilder {
-        self.http.request(method, format!("{}/api/v1{path}", self.base))
-    }
-
-    /// Every page of a list.
-    async fn all<T: DeserializeOwned>(&self, path: &str) -> Result<Vec<T>, ClientError> {
-        let mut items = Vec::new();
-        let mut cursor: Option<String> = None;
-        loop {
-            // Cursors come from the server and may hold any character.
-            let query = cursor.map_or_else(String::new, |c| format!("?cursor={}", escaped(&c)));
-            let page: Page<T> = self.send(self.request(Method::GET, &format!("{path}{query}"))).await?;
-            items.extend(page.items);
-            match page.next {
-                Some(next) => cursor = Some(next),
-                None => return Ok(items),
-            }
-        }
-    }
-
-    pub(crate) async fn send<T: DeserializeOwned>(&self, request: RequestBuilder) -> Result<T, ClientError> {
-        let response = self.checked(request).await?;
-        let url = response.url().to_string();
-        let bytes =
-            response.bytes().await.map_err(|e| ClientError::Http { url: url.clone(), detail: reason(&e) })?;
-        serde_json::from_slice(&bytes).map_err(|e| ClientError::Unexpected { url, detail: e.to_string() })
-    }
-
-    /// Sends, and turns refusals into errors.
-    pub(crate) async fn checked(&self, request: RequestBuilder) -> Result<Response, ClientError> {
-        let response = request.send().await.map_err(|e| {
-            let url = e.url().map_or_else(|| self.base.clone(), ToString::to_string);
-            ClientError::Http { url, detail: reason(&e) }
-        })?;
-        let status = response.status();
-        if status.is_success() {
-            return Ok(response);
-        }
-        let body = response.bytes().await.unwrap_or_default();
-        let problem: Problem = serde_json::from_slice(&body).unwrap_or_default();
-        Err(ClientError::Refused {
-            status: status.as_u16(),
-            code: if problem.code.is_empty() { "unknown".to_owned() } else { problem.code },
-            field: problem.field.unwrap_or_default(),
-            detail: problem.detail.unwrap_or(problem.title),
-        })
-    }
-}
-
-#[derive(serde::Deserialize)]
-struct Candidates {
-    candidates: Vec<Candidate>,
 }
 
 fn image_part(image: Vec<u8>) -> Part {
     Part::bytes(image).file_name("image")
 }
 
-/// An error with its causes: the outer one alone says little.
-fn reason(error: &reqwest::Error) -> String {
-    let mut text = error.to_string();
-    let mut cause = std::error::Error::source(error);
-    while let Some(inner) = cause {
-        text = format!("{text}: {inner}");
-        cause = inner.source();
-    }
-    text
-}
-
-fn escaped(text: &str) -> String {
-    let plain = |b: u8| b.is_ascii_alphanumeric() || b"-_.~".contains(&b);
-    text.bytes().map(|b| if plain(b) { char::from(b).to_string() } else { format!("%{b:02X}") }).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn cursors_are_escaped() {
-        assert_eq!(escaped("a-1/é&="), "a-1%2F%C3%A9%26%3D");
-    }
 
     #[tokio::test]
     async fn nobody_there_says_what_to_do() {
