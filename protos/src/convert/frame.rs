@@ -11,8 +11,6 @@ use vision::frame::Intrinsics;
 
 /// Largest image of a frame, in encoded bytes: holds raw grey of [`MAX_FRAME_PX`] pixels.
 pub const MAX_FRAME_IMAGE_BYTES: usize = 2_400_000;
-/// What a frame should not exceed: above one transport batch it is fragmented, and easier lost.
-pub const ADVISED_FRAME_BYTES: usize = 60_000;
 /// Largest frame, in pixels (1920 x 1200).
 pub const MAX_FRAME_PX: u32 = 2_304_000;
 /// Longest side of a frame, in pixels.
