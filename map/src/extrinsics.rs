@@ -1,25 +1,27 @@
-//! Where the camera sits on the robot, pan and tilt included, and how surely that is known (method 0.2, 13.5).
+//! Camera extrinsics: the camera's pose on the robot at the time of the image, pan and tilt included, with covariance
+//! (method 0.2, 13.5).
 
 use crate::check::{self, OutOfRange};
 use nalgebra::{Isometry3, Matrix3, Matrix6, Rotation3, Translation3, UnitQuaternion, Vector3, Vector6};
 use std::f64::consts::PI;
 
-/// Largest accepted distance of a camera from the robot's origin.
+/// Largest accepted distance of a camera from the robot's origin, metres.
 pub const MAX_MOUNTING_M: f64 = 10.0;
 
-/// `robot_from_camera` with the covariance of its left perturbation (rotation vector rad, translation m; robot frame).
+/// `robot_from_camera` with the covariance of its left perturbation (rotation vector, radians; translation, metres;
+/// robot frame).
 #[derive(Debug, Clone, PartialEq)]
 pub struct CameraExtrinsics {
     /// Maps camera coordinates (x right, y down, z forward) to robot coordinates (x forward, y left, z up).
     pub robot_from_camera: Isometry3<f64>,
-    /// Over (rotation, translation).
+    /// Covariance over (rotation, translation): rad^2, rad m, m^2.
     pub covariance: Matrix6<f64>,
 }
 
 impl CameraExtrinsics {
-    /// Standard deviation of each angle: extrinsics and encoders (method 13.5).
+    /// Default standard deviation of each angle, radians: calibration and encoders (method 13.5).
     pub const DEFAULT_ANGLE_SIGMA_RAD: f64 = 0.1 * PI / 180.0;
-    /// Standard deviation of each coordinate.
+    /// Default standard deviation of each coordinate, metres.
     pub const DEFAULT_POSITION_SIGMA_M: f64 = 0.002;
 
     /// Checks the transform and gives it the default covariance.

@@ -1,9 +1,10 @@
-//! Moved, changed, gone: what the map says should be seen, against what is seen (issue of landmarks that do not stay).
+//! Landmark health: compares observed and expected landmarks with the map, to find landmarks that were moved or
+//! removed.
 //!
-//! In: sightings with the pose that the robot has without them, and what should have been in the picture. Out: which
-//! landmarks to flag, to quarantine and to trust again. A landmark is only judged by a pose that rests on others, and only
-//! quarantined once another has agreed with that pose afterwards: a robot that was carried away must not condemn a room.
-//! Moves nothing and forgets nothing by itself: a person decides.
+//! In: observations with the robot's pose by other landmarks, and the landmarks that should have been visible. Out:
+//! which landmarks to flag, to quarantine and to clear. A landmark is judged only by a pose that rests on others, and
+//! quarantined only after another landmark has agreed with that pose: a kidnapped robot must not quarantine landmarks
+//! that are in place. Nothing is moved or removed here; a person decides.
 
 mod params;
 mod health;

@@ -1,8 +1,9 @@
-//! From landmarks of known place, seen by a camera of known mounting, to the robot's pose on the floor (method 13.6).
+//! Localisation by landmarks: from landmarks of known place, observed by a camera of known extrinsics, to the robot's
+//! pose on the floor (method 13.6).
 //!
-//! In: sightings, the mounting, perhaps a prior. Out: one pose with its covariance, or that several are left, or why
-//! there is none. The robot stands upright on the floor, so three numbers are fitted to all corners of all landmarks at
-//! once (method 13.6, variant b). It never picks a solution that image, wall and prior leave undecided.
+//! In: observations, extrinsics, an optional prior pose. Out: one pose with its covariance, several that cannot be
+//! told apart, or a refusal. The robot stands upright on the floor, so (x, y, theta) is fitted to all corners of all
+//! landmarks at once (method 13.6, variant b). A solution is chosen only if image, wall and prior decide.
 
 mod params;
 mod fix;

@@ -1,8 +1,8 @@
-//! How maps lie to each other: each may name a parent and where it lies in it, so that a pose on one floor can be said in
-//! the frame of another. A forest of maps; a move between two goes up to the nearest map both hang on, and down again.
+//! Links between maps. Each map may name a parent map and its pose in it, so that a pose on one floor can be
+//! expressed in the frame of another.
 //!
-//! In: for each map its link. Out: the transform between two, with covariance, or why there is none. What both share
-//! above is left out: it moves them together and makes their relation no less sure.
+//! In: one link for each map. Out: the transform between two maps with covariance, or why there is none. The path
+//! goes up to the nearest common ancestor and down again. Links above it are left out: they move both maps alike.
 
 use crate::{
     check::{self, OutOfRange},
@@ -10,59 +10,59 @@ use crate::{
 };
 use std::collections::BTreeMap;
 
-/// Most links from a map up to the map on which all hangs.
+/// Most links between a map and its root.
 pub const MAX_DEPTH: usize = 16;
-/// Largest height of a floor above its parent's, metres.
+/// Largest height of a floor above or below its parent's, metres.
 pub const MAX_LEVEL_M: f64 = 1_000.0;
 
-/// Where a map lies in its parent: turned and moved on the floor, and higher or lower.
+/// Pose and level of a map in its parent.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MapLink<K> {
-    /// The parent.
+    /// The parent map.
     pub parent: K,
-    /// With covariance; errors of different links are taken for independent.
+    /// Pose of the map in its parent. Errors of different links are independent.
     pub parent_from_map: Pose2Covariance,
     /// Height of the map's floor above the parent's, metres.
     pub level_m: f64,
 }
 
 impl<K> MapLink<K> {
-    /// Numbers in range, covariance possible.
+    /// Refuses numbers out of range and impossible covariances.
     pub fn check(&self) -> Result<(), OutOfRange> {
         self.parent_from_map.check()?;
         check::within("level_m", self.level_m, -MAX_LEVEL_M, MAX_LEVEL_M)
     }
 }
 
-/// How one map lies in another.
+/// The transform from one map to another.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MapTransform<K> {
-    /// Maps coordinates of the one to the other.
+    /// Transforms coordinates of the source map to those of the target map.
     pub to_from_map: Pose2Covariance,
-    /// Height of the one's floor above the other's, metres.
+    /// Height of the source map's floor above the target map's, metres.
     pub level_m: f64,
-    /// The maps on the way, both ends included.
+    /// The maps on the path, both ends included.
     pub via: Vec<K>,
 }
 
-/// Why maps have no relation.
+/// Why two maps have no transform.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum MapLinkError {
-    /// They hang on different maps, or on nothing.
-    #[error("no map lies above both, directly or indirectly")]
+    /// They have no common ancestor.
+    #[error("the maps have no common ancestor: link both to one map")]
     NotRelated,
-    /// A map would lie in itself.
-    #[error("a map would lie in itself")]
+    /// A map is its own ancestor.
+    #[error("the link makes a map its own ancestor: link it to another map")]
     Cycle,
-    /// Too many links one above the other.
-    #[error("more than {MAX_DEPTH} maps one above the other")]
+    /// More than [`MAX_DEPTH`] links above one another.
+    #[error("more than {MAX_DEPTH} links above one another: link the map nearer to its root")]
     TooDeep,
 }
 
-/// The links of maps.
+/// The links of all maps, by map.
 pub type MapLinks<K> = BTreeMap<K, MapLink<K>>;
 
-/// The map itself and all above it.
+/// The map itself and its ancestors, nearest first.
 fn above<K: Ord + Clone>(links: &MapLinks<K>, map: &K) -> Result<Vec<K>, MapLinkError> {
     let mut chain = vec![map.clone()];
     let mut at = map;
@@ -79,12 +79,12 @@ fn above<K: Ord + Clone>(links: &MapLinks<K>, map: &K) -> Result<Vec<K>, MapLink
     Ok(chain)
 }
 
-/// Every map lies in others within bounds, and none in itself.
+/// Refuses cycles and chains that are too long.
 pub fn check_all<K: Ord + Clone>(links: &MapLinks<K>) -> Result<(), MapLinkError> {
     links.keys().try_for_each(|map| above(links, map).map(drop))
 }
 
-/// How `from` lies in `to`.
+/// The transform from one map to another.
 pub fn relation<K: Ord + Clone>(
     links: &MapLinks<K>,
     from: &K,
@@ -104,7 +104,7 @@ pub fn relation<K: Ord + Clone>(
     })
 }
 
-/// From the first map of a chain to the parent of the last.
+/// The transform from the first map of a chain to the parent of its last, and the height.
 fn climb<K: Ord>(links: &MapLinks<K>, chain: &[K]) -> (Pose2Covariance, f64) {
     let nowhere = Pose2Covariance {
         pose: crate::pose2::Pose2::new(0.0, 0.0, 0.0),

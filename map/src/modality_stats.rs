@@ -1,9 +1,8 @@
-//! Which modality to trust where (method 15): what runs with a known path have shown of odometry, laser and landmarks in
-//! every part of a map, and what follows from it for a fix or a motion there.
+//! Statistics of modalities (method 15): which modality to trust in which part of a map, learnt from reference runs.
 //!
-//! In: evidence of runs by cell (a square metre and one of four headings), areas that somebody named, the mode. Out: advice
-//! for a pose: the best module, which are used, by how much each is biased and how much less sure it is than it claims.
-//! Where a cell was hardly driven through, those around speak for it, then the named area it lies in, then the whole map.
+//! In: statistics of runs by pose cell, named areas, the fusion mode. Out: advice for a pose: the best modality, the
+//! modalities used, and the error model of each. A cell with too few measurements takes the statistics of its
+//! neighbours, then of its named area, then of the whole map.
 
 mod modality;
 mod named_area;

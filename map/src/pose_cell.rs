@@ -7,30 +7,30 @@ use crate::{
 use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_PI_2;
 
-/// Side of a cell.
+/// Side of a cell, metres.
 pub const CELL_M: f64 = 1.0;
 
-/// A square metre of the floor, driven through in one of four headings.
+/// A square metre of the floor with one of four headings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(into = "[i64; 3]", try_from = "[i64; 3]")]
 pub struct PoseCell {
-    /// Metres from the origin, rounded down.
+    /// Column: x of the map in whole metres, rounded down.
     pub x: i32,
-    /// The same.
+    /// Row: y of the map in whole metres, rounded down.
     pub y: i32,
     /// Quarter of the circle about 0, 90, 180, 270 degrees: 0 to 3.
     pub heading: u8,
 }
 
 impl PoseCell {
-    /// Where a pose belongs.
+    /// The cell that contains a pose.
     pub fn of(pose: &Pose2) -> Self {
         let square = |v: f64| (v / CELL_M).floor() as i32;
         let quarter = (pose.theta_rad / FRAC_PI_2).round().rem_euclid(4.0);
         Self { x: square(pose.x_m), y: square(pose.y_m), heading: quarter as u8 % 4 }
     }
 
-    /// Its middle.
+    /// Centre of the cell's square, metres, map frame.
     pub fn middle_m(&self) -> [f64; 2] {
         [(f64::from(self.x) + 0.5) * CELL_M, (f64::from(self.y) + 0.5) * CELL_M]
     }

@@ -7,17 +7,17 @@ use crate::{
 };
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, Matrix3x2, Vector2, Vector3};
 
-/// Most lasting errors carried along of landmarks and mounting, and as many of walls; the one unused for longest goes
-/// first.
+/// Most nuisance parameters of landmarks and extrinsics in the state, and as many of walls; the one unused for
+/// longest is dropped first.
 pub const MAX_NUISANCES: usize = 12;
 /// Size of the pose's block.
 const POSE: usize = 3;
-/// Size of the robot's block: its pose, then its odometry's errors (scale, turn per metre).
+/// Size of the robot's block: pose and systematic odometry errors (scale, drift).
 const ROBOT: usize = 5;
-/// Size of a lasting error's block.
+/// Size of a nuisance parameter's block.
 const BLOCK: usize = 6;
 
-/// A lasting error in the state.
+/// A nuisance parameter in the state.
 #[derive(Debug, Clone)]
 struct Carried {
     key: NuisanceKey,
@@ -25,25 +25,24 @@ struct Carried {
     used: u64,
 }
 
-/// What lasts of odometry's errors: of one metre measured, `1 + scale` metres are driven and `turn_rad_per_m` more is
-/// turned than measured.
+/// Systematic odometry errors: true distance = (1 + scale) x measured; true heading = measured + drift x distance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SystematicOdometryError {
-    /// Scale, turn in radians a metre.
+    /// Scale (share) and drift (rad/m).
     pub errors: Vector2<f64>,
-    /// Their covariance.
+    /// Covariance of (scale, drift).
     pub covariance: Matrix2<f64>,
 }
 
 impl SystematicOdometryError {
-    /// Before anything is known of this robot.
+    /// The prior for a robot without history.
     pub(super) fn unknown(p: &FuseParams) -> Self {
         let variances = Vector2::new(p.scale_sigma.powi(2), p.turn_bias_sigma_rad_per_m.powi(2));
         Self { errors: Vector2::zeros(), covariance: Matrix2::from_diagonal(&variances) }
     }
 }
 
-/// What is believed: the pose, odometry's errors, then the lasting errors (true minus assumed) in the order of `carried`.
+/// The state: pose, odometry errors, nuisance parameters (true minus assumed) in the order of `carried`.
 #[derive(Debug, Clone)]
 pub(super) struct Belief {
     pub(super) pose: Pose2,
@@ -54,7 +53,7 @@ pub(super) struct Belief {
 }
 
 impl Belief {
-    /// A pose, what is known of odometry, and room for `lasting` errors.
+    /// A pose, the odometry errors, and zeros for `lasting` nuisance parameters.
     pub(super) fn new(at: &Pose2Covariance, odometry: &SystematicOdometryError, lasting: usize) -> Self {
         let n = ROBOT + BLOCK * lasting;
         let mut covariance = DMatrix::zeros(n, n);
@@ -83,7 +82,7 @@ impl Belief {
         SystematicOdometryError { errors: self.odometry, covariance }
     }
 
-    /// Moves on by a `measured` motion: as odometry's errors have it, with `noise` besides.
+    /// Prediction by a `measured` motion, corrected by the systematic odometry errors, with additional `noise`.
     pub(super) fn predict(&mut self, measured: &Pose2, noise: &Matrix3<f64>, p: &FuseParams) {
         let (length_m, scale) = (measured.position().norm(), 1.0 + self.odometry.x);
         let turn_rad = measured.theta_rad + self.odometry.y * length_m;
@@ -101,12 +100,13 @@ impl Belief {
         let added = by_motion * noise * by_motion.transpose();
         let mut block = self.covariance.view_mut((0, 0), (POSE, POSE));
         block += added;
-        // Floors and loads change: what was learnt of them ages.
+        // Random walk of the systematic errors: floors and loads change.
         self.covariance[(3, 3)] += p.scale_drift.powi(2) * length_m;
         self.covariance[(4, 4)] += p.turn_bias_drift_rad_per_m.powi(2) * length_m;
     }
 
-    /// Kalman update; the squared Mahalanobis distance of the innovation. `None` when that is singular.
+    /// Kalman update. Gives the squared Mahalanobis distance of the innovation; `None` when its covariance is
+    /// singular.
     pub(super) fn correct(&mut self, fix: &Fix, now: u64) -> Option<f64> {
         let mut at = Vec::with_capacity(fix.nuisances.len());
         for nuisance in &fix.nuisances {
@@ -143,7 +143,7 @@ impl Belief {
         Some(innovation.dot(&(inverse * innovation)))
     }
 
-    /// Adds a lasting error; its index.
+    /// Adds a nuisance parameter; gives its index.
     fn carry(&mut self, nuisance: &Nuisance) -> usize {
         let n = self.covariance.nrows();
         let old = std::mem::replace(&mut self.covariance, DMatrix::zeros(0, 0));
@@ -155,7 +155,7 @@ impl Belief {
         self.carried.len() - 1
     }
 
-    /// Keeps at most [`MAX_NUISANCES`] of each kind. To leave one out of a Gaussian is to marginalise it.
+    /// Keeps at most [`MAX_NUISANCES`] of each kind; the others are marginalised.
     fn forget(&mut self) {
         let is_wall = |c: &Carried| {
             let of_area = matches!(c.key, NuisanceKey::Area(FixSource::Laser, _));
@@ -171,7 +171,7 @@ impl Belief {
         }
     }
 
-    /// Leaves one lasting error out.
+    /// Marginalises one nuisance parameter.
     fn leave_out(&mut self, k: usize) {
         let at = ROBOT + BLOCK * k;
         let old = std::mem::replace(&mut self.covariance, DMatrix::zeros(0, 0));

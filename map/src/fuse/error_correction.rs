@@ -1,5 +1,5 @@
-//! What runs have shown of a place, laid on a motion and on a fix there: a bias is taken away, and what a modality errs by
-//! more than it says is added (method 15: "reported covariance inflated to the learnt one").
+//! Applies error models to motions and fixes: subtracts the bias and inflates the covariance (method 15: "reported
+//! covariance inflated to the learnt one").
 
 use crate::{
     fuse::params::FuseParams,
@@ -10,10 +10,10 @@ use crate::{
 use nalgebra::{Matrix3, Matrix3x6, Matrix6, SymmetricEigen, Vector3};
 use std::borrow::Cow;
 
-/// Variance beyond which a fix does not know a direction (of position: 1 m^2).
+/// Variance beyond which a fix does not determine a direction (of position: 1 m^2).
 const UNKNOWN: f64 = 1.0;
 
-/// A measured motion and its noise, in the frame where it starts, as odometry is there.
+/// A measured motion and its noise, in the frame where it starts, corrected by the error model of odometry.
 pub(super) fn motion(
     measured: &Pose2,
     noise: &Matrix3<f64>,
@@ -22,12 +22,12 @@ pub(super) fn motion(
 ) -> (Pose2, Matrix3<f64>) {
     let (fault, length_m) = (advice.fault(Modality::Odometry), measured.position().norm());
     let more = fault.excess.component_mul(&p.metre_variances()) * length_m;
-    // Learnt of robots that drive forwards.
+    // The bias was learnt from forward motion only.
     let bias = if measured.x_m > 0.0 { fault.bias * length_m } else { Vector3::zeros() };
     (measured.plus(&-bias), noise + Matrix3::from_diagonal(&more))
 }
 
-/// A fix as its modality is where the robot is.
+/// A fix corrected by the error model of its source.
 pub(super) fn fix<'a>(fix: &'a Fix, at: &Pose2, advice: &ModalityAdvice) -> Cow<'a, Fix> {
     let fault = advice.fault(Modality::from(fix.modality));
     if fault.bias == Vector3::zeros() && fault.excess == Vector3::zeros() {
@@ -35,18 +35,18 @@ pub(super) fn fix<'a>(fix: &'a Fix, at: &Pose2, advice: &ModalityAdvice) -> Cow<
     }
     let turn = map_from_aligned(at.theta_rad);
     let claimed = (turn.transpose() * fix.pose.covariance * turn).diagonal();
-    // A direction that the fix does not know stays unknown: what lasts must not make it known.
+    // A direction that the fix does not determine stays undetermined.
     let known = claimed.map(|v| if v < UNKNOWN { v } else { 0.0 });
     let more = fault.excess.component_mul(&known);
     let more = turn * Matrix3::from_diagonal(&more) * turn.transpose();
     let mut trusted = fix.clone();
     trusted.pose.pose = fix.pose.pose.plus(&-(turn * fault.bias));
-    // Whether it is the same every time is not known: counted as both.
+    // Whether the excess is shared by fixes is unknown: it counts as independent and as shared.
     trusted.noise += more;
     let mut lasting = more;
     if fault.bias != Vector3::zeros() {
-        // The bias is what walls or places are wrong by as seen from here. What is left of it is this cell's: it tells
-        // nothing of the same walls seen from elsewhere.
+        // The bias contains the errors of walls or places as observed from this cell. The rest belongs to the cell and
+        // says nothing about the same walls observed from elsewhere.
         lasting += fix
             .nuisances
             .iter()

@@ -1,4 +1,5 @@
-//! The filter itself: robot pose and lasting errors in one Gaussian; predict, correct, start, give up.
+//! The filter: a belief with its counts of contradictions and the sources used lately. Predicts, corrects, starts,
+//! loses the pose.
 
 use crate::{
     fuse::{
@@ -14,19 +15,19 @@ use crate::{
 use nalgebra::Matrix3;
 use vision::recognise::LandmarkId;
 
-/// Most sources of fixes (landmarks, the laser) whose last use is remembered; the one unused for longest goes first.
+/// Most sources (landmarks, the laser) whose last use is remembered; the one unused for longest is dropped first.
 pub const MAX_SOURCES: usize = 32;
 
-/// Fixes that contradict the filter but agree with one another.
+/// Fixes that contradict the belief and agree with one another.
 #[derive(Debug, Clone)]
 struct Doubt {
-    /// The latest of them, carried along by odometry.
+    /// The latest of them, moved along by odometry.
     pose: Pose2Covariance,
     count: u32,
     landmarks: Vec<LandmarkId>,
 }
 
-/// Where the errors of a fix come from, besides what lasts: the corners of a landmark, or a scan.
+/// Where the independent errors of a fix come from: the corners of a landmark, or a scan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Source {
     Landmark(LandmarkId),
@@ -40,22 +41,22 @@ fn sources(fix: &Fix) -> Vec<Source> {
     }
 }
 
-/// Everything the filter knows at one time.
+/// The state of the filter at one time.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Filter {
     belief: Option<Belief>,
     doubt: Option<Doubt>,
     odometry: Option<Pose2>,
-    /// Of odometry's errors, what was learnt before the present belief.
+    /// Systematic odometry errors known before the present belief.
     learnt: Option<SystematicOdometryError>,
-    /// Each source with the odometry of its last applied fix, the latest last. One list for all would let scans between
-    /// two looks at a landmark make the second look new.
+    /// Each source with the odometry of its last applied fix, the latest last. One entry for each source: scans
+    /// between two observations of a landmark do not make the second one new.
     used: Vec<(Source, Pose2)>,
-    /// Fixes by landmarks that were applied.
+    /// Fixes by landmarks applied.
     pub corrections: u64,
-    /// Scans that were applied.
+    /// Scans applied.
     pub laser_corrections: u64,
-    /// Scans in a row that contradict the belief.
+    /// Consecutive scans that contradict the belief.
     laser_doubts: u32,
     fixes: u64,
 }
@@ -71,35 +72,35 @@ impl Filter {
         self.odometry.as_ref()
     }
 
-    /// What is known of odometry's errors.
+    /// Estimate of the systematic odometry errors.
     pub(super) fn odometry_errors(&self) -> Option<SystematicOdometryError> {
         self.belief.as_ref().map(Belief::odometry_errors).or(self.learnt)
     }
 
-    /// Contradicting fixes in a row.
+    /// Number of consecutive contradicting fixes.
     pub(super) fn doubts(&self) -> u32 {
         self.doubt.as_ref().map_or(0, |d| d.count).max(self.laser_doubts)
     }
 
-    /// Starts, or starts again, from a pose that is given.
+    /// Starts, or starts again, from a given pose.
     pub(super) fn start(&mut self, at: &Pose2Covariance, p: &FuseParams) {
         let belief = Belief::new(at, &self.so_far(p), 0);
         self.belief = Some(belief);
         self.afresh();
     }
 
-    /// Nothing speaks for or against the belief yet.
+    /// Clears contradictions and used sources.
     fn afresh(&mut self) {
         (self.doubt, self.laser_doubts) = (None, 0);
         self.used.clear();
     }
 
-    /// Of odometry's errors, what is known so far.
+    /// Present estimate of the systematic odometry errors, or the prior.
     fn so_far(&self, p: &FuseParams) -> SystematicOdometryError {
         self.odometry_errors().unwrap_or_else(|| SystematicOdometryError::unknown(p))
     }
 
-    /// Moves on to another odometry pose.
+    /// Prediction to the next odometry pose.
     pub(super) fn predict(&mut self, odom_from_robot: &Pose2, rules: &Rules) {
         if let Some(before) = self.odometry {
             let p = &rules.params;
@@ -117,16 +118,15 @@ impl Filter {
         self.odometry = Some(*odom_from_robot);
     }
 
-    /// The odometry frame is no longer the same: where the robot is now is unknown.
+    /// Starts a new odometry frame: the pose is unknown, the systematic errors stay.
     pub(super) fn lose(&mut self, odom_from_robot: &Pose2) {
-        // It is still the same robot.
         self.learnt = self.odometry_errors();
         self.belief = None;
         self.afresh();
         self.odometry = Some(*odom_from_robot);
     }
 
-    /// Takes a fix at the time of the last odometry.
+    /// Applies a fix at the time of the last odometry.
     pub(super) fn correct(&mut self, fix: &Fix, role: FixRole, rules: &Rules) -> FixOutcome {
         let p = &rules.params;
         let only_corrects = fix.modality == FixSource::Laser || role == FixRole::Guided;
@@ -179,12 +179,12 @@ impl Filter {
             }
         } else if !matches!(outcome, FixOutcome::GatedOut { .. }) {
             match fix.modality {
-                // A scan is laid where the belief says: that it fits there is no word against landmarks that do not.
+                // A scan is matched around the belief, so its fit says nothing against contradicting landmarks.
                 FixSource::Laser => {
                     self.laser_corrections += 1;
                     self.laser_doubts = 0;
                 }
-                // Nor is it that a landmark is found where the belief says.
+                // Neither does a guided observation.
                 FixSource::Landmarks if role == FixRole::Guided => self.corrections += 1,
                 FixSource::Landmarks => (self.corrections, self.doubt) = (self.corrections + 1, None),
             }
@@ -193,7 +193,7 @@ impl Filter {
         outcome
     }
 
-    /// Remembers where sources were used.
+    /// Records where sources were used.
     fn use_up(&mut self, sources: Vec<Source>) {
         let Some(now) = self.odometry else { return };
         self.used.retain(|(source, _)| !sources.contains(source));
@@ -202,7 +202,7 @@ impl Filter {
         self.used.drain(..gone);
     }
 
-    /// Nothing but what was used from the same place: the errors of corners and ranges are largely those of that time.
+    /// Whether all sources were used from the same pose: the errors of corners and ranges are largely the same there.
     fn is_repeated(&self, sources: &[Source], p: &FuseParams) -> bool {
         let Some(now) = &self.odometry else { return false };
         let still = |before: &Pose2| {
@@ -213,7 +213,7 @@ impl Filter {
         !sources.is_empty() && sources.iter().all(used)
     }
 
-    /// Counts contradictions; enough of them that agree, and rest on landmarks, replace the belief.
+    /// Counts a contradiction. Enough of them that agree and rest on several landmarks replace the belief.
     fn contradict(&mut self, fix: &Fix, distance2: f64, p: &FuseParams) -> FixOutcome {
         if fix.modality == FixSource::Laser {
             self.laser_doubts = self.laser_doubts.saturating_add(1);

@@ -23,20 +23,20 @@ pub const MAX_EVENTS: usize = 1024;
 #[derive(Debug, Clone)]
 pub struct Fuser {
     rules: Rules,
-    /// Just before the first kept event.
+    /// State just before the first kept event.
     anchor: Filter,
-    /// Time of the last odometry in `anchor`.
+    /// Time of the last odometry in `anchor`, ns.
     anchor_ns: Option<i64>,
-    /// By time; odometry before a fix of the same time.
+    /// Kept events by time; odometry before a fix of the same time.
     pub(super) events: Vec<(i64, Event)>,
-    /// After the first `applied` events.
+    /// State after the first `applied` events.
     now: Filter,
     now_ns: Option<i64>,
     applied: usize,
 }
 
 impl Fuser {
-    /// Knows nothing yet.
+    /// A fusion without pose.
     pub fn new(params: FuseParams) -> Self {
         Self {
             rules: Rules { params, areas: Arc::default() },
@@ -49,12 +49,12 @@ impl Fuser {
         }
     }
 
-    /// From now on modalities are trusted as runs have shown; what is replayed goes by it, too.
+    /// Applies these modality statistics to later and replayed events.
     pub fn set_modality_map(&mut self, areas: Arc<ModalityMap>) {
         self.rules.areas = areas;
     }
 
-    /// Sets the pose of this moment (that of the last odometry), and forgets all before.
+    /// Sets the pose at the last odometry and forgets everything before.
     pub fn start(&mut self, map_from_robot: &Pose2Covariance) -> Result<(), OutOfRange> {
         map_from_robot.check()?;
         self.now.start(map_from_robot, &self.rules.params);
@@ -72,12 +72,12 @@ impl Fuser {
         Some(FusedPose { at_ns, pose, corrections, laser_corrections, contradictions })
     }
 
-    /// What is known of the odometry's lasting errors; none before the first pose.
+    /// Estimate of the systematic odometry errors; `None` before the first pose.
     pub fn odometry_errors(&self) -> Option<SystematicOdometryError> {
         self.now.odometry_errors()
     }
 
-    /// The pose at a time within the window, by what was known before it: the prior for a frame.
+    /// The pose at a time within the window, by earlier events only: the prior of a frame.
     pub fn pose_at(&self, at_ns: i64) -> Option<Pose2Covariance> {
         if self.now_ns == Some(at_ns) && self.events.last().is_none_or(|(t, _)| *t <= at_ns) {
             return self.now.pose();
@@ -91,7 +91,7 @@ impl Fuser {
         filter.pose()
     }
 
-    /// Takes an odometry reading.
+    /// Applies an odometry reading.
     pub fn apply_odometry(
         &mut self,
         at_ns: i64,
@@ -100,8 +100,8 @@ impl Fuser {
         self.apply_odometry_after(at_ns, odom_from_robot, 0.0)
     }
 
-    /// Takes an odometry reading that was received `elapsed_s` after the one before it. A stamp that is a little wrong must
-    /// not look like a jump of odometry: the longer of both times counts.
+    /// Applies an odometry reading that was received `elapsed_s` after the one before it. The longer of stamped and
+    /// received time counts, so that a slightly wrong stamp is not taken for a jump.
     pub fn apply_odometry_after(
         &mut self,
         at_ns: i64,
@@ -121,9 +121,9 @@ impl Fuser {
         Ok(OdometryOutcome::Moved)
     }
 
-    /// The robot's clock was set: the window starts again at the reading `odom_from_robot`, received `elapsed_s` after the
-    /// last, at the new time `at_ns`. The pose is carried along by odometry, unless the robot cannot have moved so far.
-    /// What could be replayed, and fixes that waited for odometry, are forgotten.
+    /// Starts the window again after the robot's clock was set: `odom_from_robot` was received `elapsed_s` after the
+    /// last reading and has the new time `at_ns`. Odometry carries the pose along, unless the robot cannot have moved
+    /// so far. Replayable events and waiting fixes are forgotten.
     pub fn set_clock(
         &mut self,
         at_ns: i64,
@@ -140,8 +140,8 @@ impl Fuser {
         Ok(OdometryOutcome::Moved)
     }
 
-    /// Forgets the odometry reading of this time: its time proved wrong. Odometry is cumulative, so that the reading after
-    /// it says as much. Nothing happens if it cannot be replayed any more.
+    /// Removes the odometry reading of this time, which proved wrong. Odometry is cumulative, so the next reading
+    /// contains its motion. No effect if the reading cannot be replayed any more.
     pub fn retract(&mut self, at_ns: i64) {
         let found = self.events.iter().position(|(t, e)| *t == at_ns && matches!(e, Event::Odometry(_)));
         let Some(place) = found else { return };
@@ -152,19 +152,19 @@ impl Fuser {
         }
     }
 
-    /// The pose by this odometry reading, which is newer than that of [`Self::pose`] though its time is not.
+    /// The pose by an odometry reading that is newer than that of [`Self::pose`] although its time is not.
     pub fn pose_by(&self, at_ns: i64, odom_from_robot: &Pose2) -> Option<FusedPose> {
         let mut filter = self.now.clone();
         filter.predict(odom_from_robot, &self.rules);
         Some(FusedPose { at_ns, pose: filter.pose()?, ..self.pose()? })
     }
 
-    /// Takes a fix of the time when its frame was captured, made without the pose.
+    /// Applies a fix that was made without the pose, at the capture time of its frame.
     pub fn apply_fix(&mut self, at_ns: i64, fix: &Fix) -> Result<FixOutcome, OutOfRange> {
         self.apply_fix_as(at_ns, fix, FixRole::Independent)
     }
 
-    /// As [`Fuser::apply_fix`], for a fix that may do more or less.
+    /// As [`Fuser::apply_fix`], with a role.
     pub fn apply_fix_as(&mut self, at_ns: i64, fix: &Fix, role: FixRole) -> Result<FixOutcome, OutOfRange> {
         fix.pose.check()?;
         check::covariance("noise", &fix.noise)?;
@@ -180,13 +180,13 @@ impl Fuser {
         Ok(self.insert(at_ns, Event::Fix(Box::new(fix.clone()), role)).unwrap_or(FixOutcome::Waiting))
     }
 
-    /// Forgets all but the count of corrections: where the robot is now is unknown.
+    /// Forgets all but the counts: the pose is unknown.
     fn restart(&mut self, at_ns: i64, odom_from_robot: &Pose2) {
         self.now.lose(odom_from_robot);
         self.begin_window(at_ns);
     }
 
-    /// Nothing before this moment can be replayed any more.
+    /// Starts the replay window here.
     fn begin_window(&mut self, at_ns: i64) {
         self.now_ns = Some(at_ns);
         self.events.clear();
@@ -194,7 +194,7 @@ impl Fuser {
         (self.anchor, self.anchor_ns) = (self.now.clone(), self.now_ns);
     }
 
-    /// Before everything that can still be replayed.
+    /// Whether a time is before every event that can be replayed.
     fn is_too_old(&self, at_ns: i64) -> bool {
         self.anchor_ns.is_some_and(|t| at_ns < t)
     }
@@ -214,7 +214,7 @@ impl Fuser {
         before.between(odom_from_robot).position().norm() > limit
     }
 
-    /// Puts an event in its place and brings `now` up to date. What became of it, if it could be applied.
+    /// Inserts an event by time and updates `now`. Gives its outcome if it was applied.
     fn insert(&mut self, at_ns: i64, event: Event) -> Option<FixOutcome> {
         let rank = |t: i64, e: &Event| (t, matches!(e, Event::Fix(..)));
         let key = rank(at_ns, &event);
@@ -228,7 +228,7 @@ impl Fuser {
         outcome
     }
 
-    /// Applies what is not applied yet; what became of the event at `place`.
+    /// Applies pending events; gives the outcome of the event at `place`.
     fn advance(&mut self, place: usize) -> Option<FixOutcome> {
         let mut outcome = None;
         while self.applied < self.events.len() {
@@ -242,7 +242,7 @@ impl Fuser {
         outcome
     }
 
-    /// Moves the anchor on, past events out of the window or beyond the bound.
+    /// Moves the anchor past events outside of the window or beyond the limit.
     fn prune(&mut self) {
         let newest = self.events.last().map_or(0, |(t, _)| *t);
         let oldest = newest.saturating_sub((self.rules.params.window_s * 1e9) as i64);
@@ -256,7 +256,7 @@ impl Fuser {
         }
         self.events.drain(..gone);
         self.applied -= gone;
-        // Fixes that wait for odometry are bounded too: the oldest are given up.
+        // Waiting fixes are bounded too: the oldest are dropped.
         while self.events.len() > MAX_EVENTS {
             self.events.remove(self.applied);
         }

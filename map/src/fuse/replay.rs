@@ -17,13 +17,13 @@ pub(super) enum Event {
     Fix(Box<Fix>, FixRole),
 }
 
-/// What applying an event did.
+/// Result of applying an event.
 pub(super) enum Step {
     /// Odometry moved the filter.
     Moved,
-    /// A fix was judged.
+    /// A fix was applied or refused.
     Judged(FixOutcome),
-    /// A fix has to wait for odometry.
+    /// A fix waits for odometry.
     Waits,
 }
 
@@ -45,7 +45,7 @@ pub(super) fn apply(
         Event::Fix(fix, role) => {
             let odometry_follows = events[i..].iter().any(|(_, e)| matches!(e, Event::Odometry(_)));
             if filter.odometry().is_none() && odometry_follows {
-                // Nothing tells how the robot moved from here to its first reading.
+                // The motion from here to the first odometry is unknown.
                 return Step::Judged(FixOutcome::TooOld);
             }
             match reach(filter, filter_ns, &events[i + 1..], *at_ns, rules) {
@@ -56,7 +56,8 @@ pub(super) fn apply(
     }
 }
 
-/// Moves the filter on to `at_ns`, between its last odometry and the next one among the `later` events.
+/// Moves the filter on to `at_ns`, between its last odometry and the next one among the `later` events. `None` if
+/// there is no later odometry.
 pub(super) fn reach(
     filter: &mut Filter,
     filter_ns: &mut Option<i64>,

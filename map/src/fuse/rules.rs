@@ -3,7 +3,7 @@
 use crate::{fuse::params::FuseParams, modality_stats::ModalityMap};
 use std::sync::Arc;
 
-/// How to fuse, and where to trust what.
+/// Parameters of the fusion and statistics of the modalities.
 #[derive(Debug, Clone)]
 pub(super) struct Rules {
     pub(super) params: FuseParams,

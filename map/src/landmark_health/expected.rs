@@ -1,4 +1,4 @@
-//! Which landmarks should be in a picture, by the pose alone.
+//! Landmarks that should be visible in an image, by the pose alone.
 
 use crate::{
     extrinsics::CameraExtrinsics,
@@ -14,30 +14,30 @@ use vision::{
     recognise::LandmarkId,
 };
 
-/// A landmark that might be in the picture.
+/// A landmark that may be in view.
 #[derive(Debug, Clone, Copy)]
 pub struct ExpectedLandmark<'a> {
-    /// Which.
+    /// Number of the landmark.
     pub landmark: LandmarkId,
-    /// Where it hangs.
+    /// Place of the landmark, map frame.
     pub place: &'a LandmarkPlace,
-    /// From where it is seen.
+    /// Its visibility area.
     pub visible: &'a VisibilityMap,
 }
 
-/// The camera and where it looks.
+/// A camera with its extrinsics.
 #[derive(Debug, Clone, Copy)]
 pub struct MountedCamera<'a> {
-    /// Robot from camera.
+    /// Extrinsics at the time of the image.
     pub mounting: &'a CameraExtrinsics,
-    /// Its calibration.
+    /// Intrinsics of the camera.
     pub camera: &'a Intrinsics,
     /// Width and height of the image, pixels.
     pub image_px: [f64; 2],
 }
 
-/// Those that should be seen whole, not obliquely, and well inside the picture, wherever within its uncertainty the
-/// robot is; by number.
+/// The landmarks that should be visible as a whole, not obliquely and well inside the image, everywhere within the
+/// uncertainty of the pose; by number.
 pub fn expected(
     pose: &Pose2Covariance,
     eye: &MountedCamera<'_>,

@@ -4,45 +4,45 @@ use crate::pose2::Pose2;
 use serde::{Deserialize, Serialize};
 use vision::recognise::LandmarkId;
 
-/// How far a landmark is trusted.
+/// Whether a landmark may be used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LandmarkHealth {
-    /// Nothing speaks against it.
+    /// No finding.
     #[default]
     Sound,
-    /// Something does; it is still used, and whoever looks after the map is told.
+    /// There is a finding; the landmark is still used, and the operator is informed.
     Flagged,
-    /// It corrects no pose until a person has decided.
+    /// Excluded from fixes until a person decides.
     Quarantined,
 }
 
-/// What speaks against a landmark.
+/// Evidence against the place of a landmark.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Finding {
-    /// It is seen elsewhere.
+    /// It is observed elsewhere.
     Moved {
-        /// Where it appears: centre on the floor and direction of its normal.
+        /// Observed centre on the floor and direction of the normal, map frame.
         apparent: Pose2,
-        /// How far that is from its place.
+        /// Distance from its place, metres.
         by_m: f64,
-        /// How many sightings say so.
+        /// Number of observations.
         sightings: u32,
     },
-    /// It should be seen and is not.
+    /// It should be visible and is not.
     Missing {
-        /// How many looks in a row.
+        /// Consecutive frames without it.
         looks: u32,
     },
 }
 
-/// A landmark's standing should change.
+/// A change of a landmark's health.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HealthChange {
-    /// Which landmark.
+    /// Number of the landmark.
     pub landmark: LandmarkId,
-    /// To what.
+    /// The new health.
     pub standing: LandmarkHealth,
-    /// Why; nothing speaks against a sound one.
+    /// The finding; `None` for a sound landmark.
     pub finding: Option<Finding>,
 }

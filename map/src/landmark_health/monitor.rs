@@ -12,25 +12,25 @@ use nalgebra::Point2;
 use std::collections::BTreeMap;
 use vision::recognise::LandmarkId;
 
-/// Most landmarks that one robot keeps evidence on; the longest unseen go first.
+/// Most landmarks that one robot keeps evidence on; those unseen for longest are dropped first.
 pub const MAX_WATCHED: usize = 1024;
 
 #[derive(Debug, Clone, Default)]
 pub(super) struct LandmarkEvidence {
-    /// Sightings elsewhere in a row, and the sum of where.
+    /// Consecutive observations elsewhere, and where.
     elsewhere: u32,
     apparent: Option<Pose2>,
     by_m: f64,
-    /// The pose rested on enough others.
+    /// The pose rested on enough other landmarks.
     firm: bool,
-    /// Another landmark has agreed with the pose since the first of them.
+    /// Another landmark has agreed with the pose since the first observation elsewhere.
     confirmed: bool,
     misses: u32,
     in_place: u32,
-    /// Where the robot was at the last sighting and the last miss.
+    /// Robot position at the last observation and at the last miss.
     seen_from: Option<Point2<f64>>,
     missed_from: Option<Point2<f64>>,
-    /// What was last said of it.
+    /// The health last reported.
     told: LandmarkHealth,
     touched: u64,
 }
@@ -44,13 +44,13 @@ pub struct HealthMonitor {
 }
 
 impl HealthMonitor {
-    /// Knows nothing.
+    /// A monitor without evidence.
     pub fn new(params: HealthParams) -> Self {
         Self { params, landmarks: BTreeMap::new(), frames: 0 }
     }
 
-    /// The robot's pose has proved wrong, or the map is another one: nothing that was judged by it counts. Gives the
-    /// landmarks whose flags were raised by it.
+    /// Drops all evidence, since the robot's pose was wrong or the map is another one. Gives the landmarks whose
+    /// flags were raised by it.
     pub fn clear(&mut self) -> Vec<HealthChange> {
         let cleared = std::mem::take(&mut self.landmarks);
         let raised =
@@ -60,8 +60,8 @@ impl HealthMonitor {
             .collect()
     }
 
-    /// Takes what one frame says, seen from `from`: judged sightings and what should have been seen and was not.
-    /// `standing` gives the present standing of a landmark in the map. Gives what should change, by landmark.
+    /// Adds one frame taken from `from`: place checks of the observed landmarks, and the expected landmarks that were
+    /// missed. `standing` gives the present health of a landmark. Gives the changes, by landmark.
     pub fn frame(
         &mut self,
         from: Point2<f64>,
@@ -92,7 +92,7 @@ impl HealthMonitor {
         let p = &self.params;
         let evidence = self.landmarks.entry(judged.landmark).or_default();
         evidence.touched = self.frames;
-        // Recognised is not missing, wherever it hangs.
+        // An observation elsewhere ends a row of misses, too.
         evidence.misses = 0;
         let new = evidence.seen_from.is_none_or(|last| (last - from).norm() >= p.sighting_move_m);
         match judged.verdict {
@@ -139,7 +139,7 @@ impl HealthMonitor {
 }
 
 impl LandmarkEvidence {
-    /// What should become of a landmark of this standing; each thing is said once.
+    /// The change for a landmark of this health; each change is reported once.
     fn change(
         &mut self,
         landmark: LandmarkId,
@@ -158,7 +158,7 @@ impl LandmarkEvidence {
         let Some(finding) = moved.or(missing) else {
             self.told = LandmarkHealth::Sound;
             let clear = now == LandmarkHealth::Flagged && self.in_place >= p.clear_sightings;
-            // Said again only after as many sightings again, should nobody have heard it.
+            // Reported again only after as many observations, in case the report was lost.
             self.in_place = if clear { 0 } else { self.in_place };
             return clear.then_some(HealthChange {
                 landmark,
@@ -167,7 +167,7 @@ impl LandmarkEvidence {
             });
         };
         let standing = if sure { LandmarkHealth::Quarantined } else { LandmarkHealth::Flagged };
-        // What is in quarantine is for a person; what was said is not repeated.
+        // Only a person ends a quarantine; a report is not repeated.
         let news = standing > now && standing != self.told;
         self.told = standing;
         news.then_some(HealthChange { landmark, standing, finding: Some(finding) })

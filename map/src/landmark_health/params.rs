@@ -1,40 +1,41 @@
-//! Limits of the health monitor.
+//! Parameters of the health monitor.
 
 use crate::gate::CHI2_3_999;
 use serde::{Deserialize, Serialize};
 
-/// Knobs of the watch.
+/// Parameters of the health monitor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct HealthParams {
-    /// Squared Mahalanobis distance from which on a landmark is seen elsewhere: 99.9 % of chi2 with 3 degrees of freedom.
+    /// Squared Mahalanobis distance beyond which a landmark is observed elsewhere: 99.9 % of chi2 with 3 degrees of
+    /// freedom.
     pub moved_chi2: f64,
-    /// A look tells that a landmark is in place when a move of this much would stand out.
+    /// An observation confirms a place only if a displacement of this much would be detected, metres.
     pub told_m: f64,
-    /// On how many other landmarks the pose must rest for a flag at once. By a pose that rests on one other it may be
-    /// either that has moved: then a third must agree first.
+    /// Supporting landmarks of a pose that may flag at once. With a single one either landmark may have moved: a
+    /// third must agree first.
     pub supporters: usize,
-    /// Sightings elsewhere count together when the landmark appears within this of the same place.
+    /// Observations elsewhere count together within this distance of the same place, metres.
     pub agree_m: f64,
-    /// So many sightings elsewhere flag a landmark...
+    /// Observations elsewhere that flag a landmark.
     pub flag_sightings: u32,
-    /// ...so many quarantine it, once another landmark has agreed since.
+    /// Observations elsewhere that quarantine it, after another landmark has agreed.
     pub quarantine_sightings: u32,
-    /// So many looks in a row without it flag a landmark...
+    /// Consecutive misses that flag a landmark.
     pub flag_misses: u32,
-    /// ...and so many quarantine it.
+    /// Consecutive misses that quarantine it.
     pub quarantine_misses: u32,
-    /// So many sightings in place clear a flag.
+    /// Observations in place that clear a flag.
     pub clear_sightings: u32,
-    /// A sighting is new only after the robot has moved this far...
+    /// An observation counts only after the robot has moved this far, metres.
     pub sighting_move_m: f64,
-    /// ...and a look without the landmark after this: whoever stands before it walks on.
+    /// A miss counts only after this distance, metres: a person in front of the landmark walks on.
     pub miss_move_m: f64,
-    /// What is seen less probably is not missed.
+    /// Least visibility probability of an expected landmark.
     pub expected_probability: f64,
-    /// Nor what would be seen more obliquely.
+    /// Largest angle of view of an expected landmark, radians.
     pub expected_incidence_rad: f64,
-    /// Share of the image left free all round what is expected in it.
+    /// Margin of the image, as a share, that an expected landmark must keep.
     pub image_margin: f64,
 }
 

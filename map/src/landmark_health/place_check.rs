@@ -1,4 +1,4 @@
-//! Whether a landmark is where the map says, by a pose that does not rest on it.
+//! Checks a landmark's place by a pose that does not rest on it.
 
 use crate::{
     check::OutOfRange,
@@ -11,42 +11,42 @@ use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeSet;
 use vision::recognise::LandmarkId;
 
-/// What a sighting says of its landmark's place.
+/// Result of a place check.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum PlaceVerdict {
-    /// It hangs there.
+    /// The landmark is at its place.
     InPlace {
-        /// Squared Mahalanobis distance of the fix from it to the pose.
+        /// Squared Mahalanobis distance of its own fix to the pose, 3 degrees of freedom.
         distance2: f64,
     },
-    /// It hangs elsewhere, or it is another one that looks the same.
+    /// The landmark is elsewhere, or another one that looks the same was observed.
     Elsewhere {
-        /// The same distance; infinite where no upright robot can see it so.
+        /// The same distance; infinite where no floor pose fits.
         distance2: f64,
-        /// Where it appears: centre on the floor and direction of its normal.
+        /// Observed centre on the floor and direction of the normal, map frame.
         apparent: Pose2,
-        /// How far that is from its place, height included.
+        /// Distance from its place, height included, metres.
         by_m: f64,
-        /// On how many other landmarks the pose rests.
+        /// Number of other landmarks that support the pose.
         supporters: usize,
     },
-    /// It agrees with the pose, but so it might if it had been moved: seen from too far. The pose is known well enough
-    /// without it, and many such looks would drag it along.
+    /// It agrees with the pose, but from too far to detect a displacement. The pose is certain enough without it;
+    /// many such observations would pull the pose along.
     Unsure,
-    /// The pose rests on no other, or the sighting gave no fix.
+    /// The pose has no other supporting landmark, or the observation gave no fix.
     Undecided,
 }
 
-/// A judged sighting.
+/// The place check of one landmark.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlaceCheck {
-    /// Of which landmark.
+    /// Number of the landmark.
     pub landmark: LandmarkId,
-    /// What it says.
+    /// Result of the check.
     pub verdict: PlaceVerdict,
 }
 
-/// Judges a sighting by the robot's pose without it. `supporters` are the landmarks that pose rests on.
+/// Checks an observed landmark by the robot's pose without it. `supporters` are the landmarks that support the pose.
 pub fn check_place(
     sighting: &LandmarkObservation<'_>,
     mounting: &CameraExtrinsics,
@@ -71,7 +71,7 @@ pub fn check_place(
     let nearest = distances.min_by(|a, b| a.0.total_cmp(&b.0));
     let distance2 = nearest.map_or(f64::INFINITY, |(distance2, _)| distance2);
     let verdict = if distance2 <= p.moved_chi2 {
-        // A move of this much must stand out from both uncertainties, in whatever direction.
+        // A displacement of this much must be detectable in every direction.
         let told = p.told_m / p.moved_chi2.sqrt();
         let both = nearest.map_or(0.0, |(_, fix)| spread_m(&(fix.covariance + pose.covariance)));
         if both > told && spread_m(&pose.covariance) < told {
@@ -92,14 +92,14 @@ fn distance2(fix: &Pose2Covariance, pose: &Pose2Covariance) -> f64 {
     both.cholesky().map_or(f64::INFINITY, |c| error.dot(&c.solve(&error)))
 }
 
-/// Standard deviation of the position in its worst direction.
+/// Standard deviation of the position in its worst direction, metres.
 fn spread_m(covariance: &Matrix3<f64>) -> f64 {
     let (xx, xy, yy) = (covariance[(0, 0)], covariance[(0, 1)], covariance[(1, 1)]);
     (0.5 * (xx + yy) + (0.25 * (xx - yy).powi(2) + xy * xy).sqrt()).max(0.0).sqrt()
 }
 
-/// Where a landmark appears from a pose: of the two solutions of its plane the one nearer to its place.
-pub(super) fn apparent(
+/// Observed place of a landmark from a pose: the solution of its plane that is nearer to its place.
+fn apparent(
     sighting: &LandmarkObservation<'_>,
     mounting: &CameraExtrinsics,
     pose: &Pose2Covariance,
@@ -117,9 +117,8 @@ pub(super) fn apparent(
     (Pose2::new(t.x, t.y, normal.y.atan2(normal.x)), (t - place.translation.vector).norm())
 }
 
-/// Of the sightings of one frame those that may correct the pose: without the unsure, and without those that are seen
-/// elsewhere unless no other would be left. Then they stay, and it is for the fusion to weigh them: it may be the pose
-/// that is wrong.
+/// The observations of one frame that may correct the pose: without unsure ones, and without those observed elsewhere
+/// unless no other is left. Then they stay and the fusion decides, since the pose may be wrong.
 pub fn drop_unreliable<'a>(
     sightings: &[LandmarkObservation<'a>],
     judged: &[PlaceCheck],

@@ -1,89 +1,89 @@
-//! What a fix is made from and what it gives.
+//! Input and result of a fix: observations, nuisance parameters, the fix, refusals.
 
 use crate::{place::LandmarkPlace, pose_cell::PoseCell, pose2::Pose2Covariance};
 use nalgebra::{Matrix3, Matrix3x6, Matrix6};
 use vision::{localise::pose::LandmarkPose, recognise::LandmarkId};
 
-/// A recognised landmark and where the map says it hangs.
+/// A recognised landmark with its measured pose and its place in the map.
 #[derive(Debug, Clone, Copy)]
 pub struct LandmarkObservation<'a> {
-    /// Which one.
+    /// Number of the landmark.
     pub landmark: LandmarkId,
-    /// How it was seen.
+    /// Pose of the landmark in the camera frame, with covariance.
     pub seen: &'a LandmarkPose,
-    /// Where it hangs.
+    /// Place of the landmark, map frame.
     pub place: &'a LandmarkPlace,
 }
 
-/// A source of error that stays the same from fix to fix: fusing fixes as if it did not makes a filter overconfident.
+/// A nuisance parameter: an error that several fixes share. A filter that takes it as independent becomes
+/// overconfident.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum NuisanceKey {
-    /// The place and size of a landmark: (x, y, theta, z, width, height).
+    /// Place and size of a landmark: (x, y, theta, z, width, height).
     Landmark(LandmarkId),
-    /// The mounting of the camera: left perturbation (rotation, translation), robot frame.
+    /// Extrinsics of the camera: left perturbation (rotation, translation), robot frame.
     Extrinsics,
-    /// The camera's intrinsics: the first three of six are the errors of its focal length (as a share) and of its
+    /// Intrinsics of the camera: the first three of six are the errors of the focal length (as a share) and of the
     /// principal point (px).
     Camera,
-    /// A wall, by a number of its own: the first two of six are the errors of its direction and offset.
+    /// One wall, by the hash of its ends: the first two of six are the errors of its direction and offset.
     Wall(u64),
-    /// All other walls about a place, by its square of the floor: the first three of six are unit errors of (x, y,
-    /// theta).
+    /// All other walls of a square of the floor: the first three of six are unit errors of (x, y, theta).
     Walls(i32, i32),
-    /// What a modality gets wrong in a place beyond what it says, as runs have shown: the first three of six are unit errors
-    /// of (x, y, theta).
+    /// Error of a fix source in a pose cell beyond its claimed covariance, by reference runs: the first three of six
+    /// are unit errors of (x, y, theta).
     Area(FixSource, PoseCell),
 }
 
-/// How a lasting error moves a fix: `estimated - true pose = jacobian * (true - assumed value)`.
+/// Effect of a nuisance parameter on a fix: `estimated - true pose = jacobian * (true - assumed value)`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Nuisance {
-    /// Whose error.
+    /// The nuisance parameter.
     pub key: NuisanceKey,
     /// Derivative of (x, y, theta) by it.
     pub jacobian: Matrix3x6<f64>,
-    /// Its covariance.
+    /// Covariance of the nuisance parameter.
     pub covariance: Matrix6<f64>,
 }
 
-/// What told the two solutions of the planar ambiguity apart.
+/// What resolved the planar ambiguity of a fix.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AmbiguityResolvedBy {
     /// There was one solution only.
     Single,
-    /// The corners and the known mounting (camera height, tilt, no roll): the other does not fit them.
+    /// The corners and the known extrinsics (camera height, tilt, no roll): the other solution does not fit them.
     Image,
-    /// The prior.
+    /// The prior pose.
     Prior,
 }
 
-/// What a fix was made from.
+/// The sensor that a fix was made from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum FixSource {
     /// Recognised landmarks.
     Landmarks,
-    /// A scan, laid on the map's walls near a pose that was known before: it corrects, and can never start one.
+    /// A scan, matched to the map's walls near a known pose: it corrects a pose and never starts one.
     Laser,
 }
 
-/// The robot's pose from one frame, or one scan.
+/// The robot's pose by one frame or one scan.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fix {
-    /// What it was made from.
+    /// The sensor it was made from.
     pub modality: FixSource,
-    /// `map_from_robot` with everything that is uncertain: corners, places of landmarks, mounting, intrinsics.
+    /// `map_from_robot` with the covariance of all errors: corners, places, extrinsics, intrinsics.
     pub pose: Pose2Covariance,
-    /// The part of the covariance that is new in every frame (corners).
+    /// The part of the covariance that is independent from frame to frame (corners).
     pub noise: Matrix3<f64>,
-    /// The parts that last.
+    /// The parts that several fixes share.
     pub nuisances: Vec<Nuisance>,
     /// The landmarks it rests on.
     pub landmarks: Vec<LandmarkId>,
-    /// How the planar ambiguity was resolved.
+    /// What resolved the planar ambiguity.
     pub decided_by: AmbiguityResolvedBy,
-    /// Weighted squared residual of the corners.
+    /// Weighted squared re-projection error.
     pub chi2: f64,
-    /// Its degrees of freedom: 8 a landmark less 3.
+    /// Degrees of freedom of `chi2`: 8 for each landmark, less 3.
     pub dof: usize,
 }
 
@@ -91,41 +91,42 @@ pub struct Fix {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum FixRefusal {
     /// No upright robot on the floor sees the corners there: camera height, tilt or the landmark's place is wrong.
-    // Departs from method 13.6, which gates |z|, |roll| and |pitch| of the pose in space: the same residuals, but weighed
-    // by what the corners know of them, which is little from afar and very much from near.
+    // Departs from method 13.6, which gates |z|, |roll| and |pitch| of the pose in space. These are the same residuals,
+    // weighted by the information of the corners, which is small from afar and large from near.
+    /// Re-projection error above the gate for every floor pose: camera height, tilt or the landmark's place is wrong.
     Room {
-        /// Weighted squared residual of the best try.
+        /// Weighted squared residual of the best solution.
         chi2: f64,
-        /// The gate.
+        /// Largest accepted value.
         limit: f64,
     },
-    /// The prior rules every solution out.
+    /// Every solution is outside the gate of the prior.
     Prior {
         /// Squared Mahalanobis distance of the nearest solution.
         distance2: f64,
-        /// The gate.
+        /// Largest accepted value.
         limit: f64,
     },
-    /// The robot would stand behind the wall.
+    /// The camera would be behind the landmark's wall.
     Side,
     /// The landmarks contradict one another.
     Disagree {
-        /// Weighted squared residual of the best try.
+        /// Weighted squared residual of the best solution.
         chi2: f64,
-        /// The gate.
+        /// Largest accepted value.
         limit: f64,
     },
-    /// The corners do not fix the pose.
+    /// The corners do not determine the pose.
     Degenerate,
 }
 
-/// What a frame says of the robot's pose. There is a pose only when exactly one solution is left.
+/// Result of localisation by one frame. A pose is given only when exactly one solution is left.
 #[derive(Debug, Clone, PartialEq)]
 pub enum FixResult {
-    /// The pose.
+    /// One solution.
     Fixed(Box<Fix>),
-    /// Several solutions are left; best first. None of them may be used without more knowledge.
+    /// Several solutions, best first. None may be used without further knowledge.
     Ambiguous(Vec<Fix>),
-    /// No solution is left.
+    /// No solution.
     Refused(FixRefusal),
 }

@@ -1,7 +1,7 @@
-//! Whether a camera is what it says it is, from the residuals of the fixes it gives (issue: a watch over intrinsics).
+//! Intrinsics monitor: residual statistics of fixes that expose wrong intrinsics.
 //!
-//! In: each fix with what it rests on, and each refusal. Out: how far the focal length seems off, how well corners fit,
-//! and a suspicion with its number. It changes nothing: a suspect camera is for people to calibrate again.
+//! In: each fix with its observations, and each refusal. Out: the error of the focal length, the fit of the corners,
+//! and a suspicion with its value. It changes nothing; a suspect camera must be calibrated again by a person.
 
 use crate::{
     extrinsics::CameraExtrinsics,
@@ -16,30 +16,30 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use vision::recognise::LandmarkId;
 
-/// Most landmarks that one camera is watched by; later ones are not counted.
+/// Most landmarks counted for one camera; later ones are left out.
 pub const MAX_WATCHED: usize = 256;
 
-/// Knobs of the watch.
+/// Parameters of the intrinsics monitor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct IntrinsicsMonitorParams {
-    /// Tries before anything is said.
+    /// Tries before a suspicion is given.
     pub min_tries: u32,
-    /// Landmarks before anything is said of the focal length: the place of one may be wrong.
+    /// Landmarks before the focal length is suspected: the place of a single one may be wrong.
     pub min_landmarks: usize,
-    /// A focal length off by less than this share is no matter.
+    /// Errors of the focal length below this share are accepted.
     pub focal_tolerance: f64,
-    /// Its error must stand out from its uncertainty by this factor.
+    /// The error must exceed its standard deviation by this factor.
     pub focal_sigmas: f64,
-    /// Looks at one landmark that count for its evidence: more of them share the error of its place.
+    /// Observations of one landmark that count: further ones share the error of its place.
     pub looks_a_landmark: f64,
-    /// Mean chi2 a degree of freedom, from which corners do not fit.
+    /// Mean chi2 per degree of freedom above which corners do not fit.
     pub max_reduced_chi2: f64,
-    /// Share of the tries that may be refused because no upright robot on the floor sees the corners there.
+    /// Largest accepted share of tries refused by re-projection error.
     pub max_refused: f64,
-    /// A look from nearer than this (metres) and
+    /// A fix counts only if the robot has moved this far since the last one, metres,
     pub step_m: f64,
-    /// less turned than this since the last is the same look.
+    /// or has turned this far, radians.
     pub step_rad: f64,
 }
 
@@ -59,23 +59,23 @@ impl Default for IntrinsicsMonitorParams {
     }
 }
 
-/// What one fix says of the focal length: derivative and curvature of half its chi2 by the logarithm of the focal
+/// Evidence of one fix on the focal length: derivative and curvature of half its chi2 by the logarithm of the focal
 /// length, the pose refitted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FocalEvidence {
-    /// Downhill derivative: positive where a longer focal length fits better.
+    /// Negative derivative: positive where a longer focal length fits better.
     pub gradient: f64,
-    /// Curvature, not negative.
+    /// Curvature, 0 or more.
     pub information: f64,
 }
 
-/// The evidence of one fix. `None` where its numbers say nothing.
+/// The evidence of one fix. `None` where the numbers carry no information.
 pub fn focal_evidence(
     sightings: &[LandmarkObservation<'_>],
     mounting: &CameraExtrinsics,
     pose: &Pose2,
 ) -> Option<FocalEvidence> {
-    // What is looked for must not be explained away by what is said to be uncertain.
+    // Without the stated uncertainty of the intrinsics: it would absorb the error that is estimated here.
     let problem = Planar::new(sightings, mounting).exact_camera();
     let at = problem.linearise(pose)?;
     let weight = problem.weight(&at)?;
@@ -102,41 +102,41 @@ pub fn focal_evidence(
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "reason", rename_all = "snake_case")]
 pub enum Suspicion {
-    /// The true focal length seems longer than stated by this share (shorter: negative), with standard deviation.
+    /// The true focal length differs from the stated one by this share.
     Focal {
-        /// True over stated, less 1.
+        /// True over stated, less 1; negative if shorter.
         error: f64,
-        /// Of it.
+        /// Standard deviation of `error`.
         sigma: f64,
     },
-    /// Corners do not fit by this mean chi2 a degree of freedom.
+    /// The mean chi2 per degree of freedom is too large.
     Misfit {
-        /// About 1 where all is well.
+        /// About 1 for right intrinsics.
         reduced_chi2: f64,
     },
-    /// So many of the tries gave no pose because the corners cannot be seen from a robot on the floor.
+    /// Too many tries gave no pose because of their re-projection error.
     Refused {
-        /// Share of the tries.
+        /// Share of the tries, 0 to 1.
         share: f64,
     },
 }
 
-/// What is known of a camera's intrinsics from its use.
+/// What the fixes of a camera say of its intrinsics.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct IntrinsicsMonitorState {
-    /// Looks counted.
+    /// Fixes and refusals counted.
     pub tries: u32,
-    /// Of them, refused because no robot on the floor sees the corners there.
+    /// Of them, refused by re-projection error.
     pub refused: u32,
-    /// Landmarks looked at.
+    /// Landmarks observed.
     pub landmarks: usize,
-    /// Mean chi2 a degree of freedom of the fixes.
+    /// Mean chi2 per degree of freedom of the fixes.
     pub reduced_chi2: Option<f64>,
-    /// True over stated focal length, less 1, by the residuals.
+    /// Estimated true over stated focal length, less 1.
     pub focal_error: Option<f64>,
-    /// Its standard deviation.
+    /// Standard deviation of `focal_error`.
     pub focal_sigma: Option<f64>,
-    /// Set when the intrinsics should be looked at.
+    /// Set when the camera should be calibrated again.
     pub suspicion: Option<Suspicion>,
 }
 
@@ -147,7 +147,7 @@ struct OfLandmark {
     information: f64,
 }
 
-/// The watch over one camera with one set of intrinsics: a new one when they change.
+/// Monitors one camera with one set of intrinsics; create a new one when they change.
 #[derive(Debug, Clone, Default)]
 pub struct IntrinsicsMonitor {
     params: IntrinsicsMonitorParams,
@@ -160,12 +160,12 @@ pub struct IntrinsicsMonitor {
 }
 
 impl IntrinsicsMonitor {
-    /// Nothing seen yet.
+    /// An empty monitor.
     pub fn new(params: IntrinsicsMonitorParams) -> Self {
         Self { params, ..Self::default() }
     }
 
-    /// A fix with its evidence. Looks from where the last one was are not counted.
+    /// Adds a fix with its evidence. A fix from the same pose as the last one is not counted.
     pub fn add_fix(&mut self, fix: &Fix, evidence: Option<FocalEvidence>) {
         let pose = fix.pose.pose;
         let same = self.last.is_some_and(|last| {
@@ -179,7 +179,7 @@ impl IntrinsicsMonitor {
         self.tries = self.tries.saturating_add(1);
         self.chi2 += fix.chi2;
         self.dof += fix.dof as f64;
-        // Evidence of several landmarks in one frame is booked under the first: they are looked at together.
+        // The evidence of a frame with several landmarks counts for the first: they are observed together.
         let (Some(evidence), Some(landmark)) = (evidence, fix.landmarks.first()) else { return };
         if self.landmarks.len() >= MAX_WATCHED && !self.landmarks.contains_key(landmark) {
             return;
@@ -190,13 +190,13 @@ impl IntrinsicsMonitor {
         sum.information += evidence.information;
     }
 
-    /// A landmark was recognised, but no robot on the floor sees it like this.
+    /// Adds a recognised landmark whose re-projection error is above the gate for every floor pose.
     pub fn add_refusal(&mut self) {
         self.tries = self.tries.saturating_add(1);
         self.refused = self.refused.saturating_add(1);
     }
 
-    /// What is known so far.
+    /// Present state.
     pub fn state(&self) -> IntrinsicsMonitorState {
         let focal = self.focal();
         let reduced_chi2 = (self.dof > 0.0).then(|| self.chi2 / self.dof);
@@ -211,7 +211,7 @@ impl IntrinsicsMonitor {
         }
     }
 
-    /// Error of the focal length and its standard deviation: means of the landmarks, each worth a few looks at most.
+    /// Error of the focal length and its standard deviation: mean over landmarks, each limited to a few observations.
     fn focal(&self) -> Option<(f64, f64)> {
         let (mut gradient, mut information) = (0.0, 0.0);
         for sum in self.landmarks.values() {

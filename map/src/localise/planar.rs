@@ -1,6 +1,6 @@
-//! The corners of all sightings as a function of the robot's pose on the floor, and the descent to the nearest minimum
-//! (method 13.6 [M] (b)). Lasting errors (places, mounting, intrinsics) enter the weights, so nothing is trusted beyond its
-//! word.
+//! The least-squares problem of one frame: corners of all observations as a function of the robot's floor pose, and
+//! the descent to the nearest minimum (method 13.6 [M] (b)). Nuisance parameters (places, extrinsics, intrinsics)
+//! enter the weights.
 
 use crate::{
     extrinsics::CameraExtrinsics,
@@ -22,9 +22,9 @@ pub(super) const MAX_STEPS: usize = 40;
 /// A step below this (metres and radians) ends it.
 const STEP_TOLERANCE: f64 = 1e-10;
 
-/// Residuals and their change with the pose; two rows a corner, eight a sighting.
+/// Residuals and their derivative by the pose; two rows for each corner, eight for each observation.
 pub(super) struct PoseLinearisation {
-    /// Seen minus predicted, pixels.
+    /// Measured minus predicted, px.
     pub residual: DVector<f64>,
     /// By (x, y, theta).
     pub by_pose: DMatrix<f64>,
@@ -37,21 +37,21 @@ impl PoseLinearisation {
     }
 }
 
-/// Where a descent ended.
+/// Result of a descent.
 pub(super) struct Descended {
     pub pose: Pose2,
-    /// There.
+    /// Residuals at `pose`.
     pub look: PoseLinearisation,
     pub chi2: f64,
 }
 
 /// Residuals and all derivatives at one pose.
 pub(super) struct FullLinearisation {
-    /// Seen minus predicted, pixels.
+    /// Measured minus predicted, px.
     pub residual: DVector<f64>,
     /// By (x, y, theta).
     pub by_pose: DMatrix<f64>,
-    /// By each nuisance, in the order of [`Planar::nuisances`]: 6 columns each.
+    /// By each nuisance parameter, in the order of [`Planar::nuisances`]: 6 columns each.
     pub by_nuisance: DMatrix<f64>,
 }
 
@@ -60,7 +60,7 @@ pub(super) struct Planar<'a> {
     sightings: &'a [LandmarkObservation<'a>],
     mounting: &'a CameraExtrinsics,
     camera_from_robot: Isometry3<f64>,
-    /// Standard deviations of the camera's errors, where they are stated: all sightings are by one camera.
+    /// Standard deviations of the camera's intrinsics, where they are stated; all observations are by one camera.
     camera: Option<Vector3<f64>>,
     /// Corners of each landmark, map frame.
     corners_m: Vec<[Vector3<f64>; 4]>,
@@ -81,7 +81,7 @@ impl<'a> Planar<'a> {
         Self { sightings, mounting, camera_from_robot, camera, corners_m }
     }
 
-    /// The same with a camera that is taken as exact.
+    /// The same problem with exact intrinsics.
     pub(super) fn exact_camera(self) -> Self {
         Self { camera: None, ..self }
     }
@@ -91,7 +91,7 @@ impl<'a> Planar<'a> {
         8 * self.sightings.len() - 3
     }
 
-    /// Whether the camera stands before every landmark's wall, not behind it.
+    /// Whether the camera is in front of every landmark's wall.
     pub(super) fn sees_fronts(&self, pose: &Pose2) -> bool {
         let camera = pose.to_isometry3() * self.mounting.robot_from_camera.translation.vector;
         let position = camera + pose.to_isometry3().translation.vector;
@@ -101,12 +101,13 @@ impl<'a> Planar<'a> {
         })
     }
 
-    /// The point the robot is turned about: the landmarks' centre on the floor.
+    /// Centre of the landmarks on the floor; the robot is turned about it.
     pub(super) fn pivot(&self) -> Point2<f64> {
         centre(self.sightings.iter().map(|s| s.place))
     }
 
-    /// Keys and covariances of the lasting errors: each landmark, the mounting, then the camera where it is not exact.
+    /// Keys and covariances of the nuisance parameters: each landmark, the extrinsics, then the intrinsics unless
+    /// exact.
     pub(super) fn nuisances(&self) -> Vec<(NuisanceKey, Matrix6<f64>)> {
         let places = self.sightings.iter().map(|s| (NuisanceKey::Landmark(s.landmark), s.place.covariance));
         let camera = self.camera.map(|sigmas| {
@@ -136,7 +137,7 @@ impl<'a> Planar<'a> {
         (Pose2::new(t.x, t.y, r[(1, 0)].atan2(r[(0, 0)])), map_from_robot)
     }
 
-    /// Residuals and their change with the pose; `None` when a corner is behind the camera.
+    /// Residuals and their derivative by the pose; `None` when a corner is behind the camera.
     pub(super) fn pose_linearisation(&self, pose: &Pose2) -> Option<PoseLinearisation> {
         let rows = 8 * self.sightings.len();
         let mut made = PoseLinearisation { residual: DVector::zeros(rows), by_pose: DMatrix::zeros(rows, 3) };
@@ -177,7 +178,7 @@ impl<'a> Planar<'a> {
         Some(FullLinearisation { residual, by_pose, by_nuisance })
     }
 
-    /// Inverse covariance of the residual: corners plus lasting errors.
+    /// Inverse covariance of the residual: corners plus nuisance parameters.
     pub(super) fn weight(&self, at: &FullLinearisation) -> Option<DMatrix<f64>> {
         let n = self.sightings.len();
         let mut s = self.corner_covariance();

@@ -1,4 +1,4 @@
-//! The corners of one landmark as an upright robot would see them, and their derivatives: what a look would measure.
+//! Predicted corners of one landmark for an upright robot, with their derivatives.
 
 use crate::{
     extrinsics::CameraExtrinsics,
@@ -18,7 +18,7 @@ pub(crate) struct Predicted {
     pub pose: SMatrix<f64, 8, 3>,
     /// By (x, y, theta, z, width, height) of the landmark.
     pub place: SMatrix<f64, 8, 6>,
-    /// By (rotation, translation) of the mounting.
+    /// By (rotation, translation) of the extrinsics.
     pub mounting: SMatrix<f64, 8, 6>,
 }
 

@@ -11,7 +11,7 @@ use crate::{
     pose2::Pose2Covariance,
 };
 
-/// Most sightings used in one fix; of more, those with the largest image.
+/// Most observations used in one fix; of more, those with the largest image.
 pub const MAX_SIGHTINGS: usize = 8;
 
 /// The robot's pose from the landmarks of one frame. Errors name an input that is out of range.

@@ -1,4 +1,4 @@
-//! All solutions of one frame, and which of them is left (method 13.4, 13.6).
+//! All solutions of one frame, and which of them remain (method 13.4, 13.6).
 
 use crate::{
     extrinsics::CameraExtrinsics,
@@ -13,7 +13,7 @@ use crate::{
 };
 use nalgebra::{DMatrix, Isometry3, Matrix3, Matrix3x6, Rotation3, UnitQuaternion, Vector3};
 
-/// Two minima nearer than this (metres and radians) are one, and a descent that comes so near one ends in it.
+/// Two minima nearer than this (metres and radians) are one; a descent that comes so near to one stops.
 const SAME_POSE: f64 = 1e-3;
 /// Points on the way from one minimum to another.
 const PATH_POINTS: usize = 24;
@@ -23,7 +23,7 @@ struct Minimum {
     pose: Pose2,
     weight: DMatrix<f64>,
     chi2: f64,
-    /// Turns, down and up, at which another minimum's basin begins.
+    /// Turns, negative and positive, at which the basin of another minimum begins.
     limit_rad: (f64, f64),
 }
 
@@ -60,8 +60,8 @@ pub(super) fn solve(
     }
 }
 
-/// Every minimum reachable from the solutions of each sighting and from their mirror images, by rising chi2. Only
-/// those from which every landmark shows its front.
+/// Every minimum reachable from the solutions of each observation and their mirror images, by rising chi2. Minima
+/// from which a landmark would show its back are left out.
 fn minima(problem: &Planar<'_>, sightings: &[LandmarkObservation<'_>]) -> Vec<Minimum> {
     let mut found: Vec<Minimum> = Vec::new();
     for (i, sighting) in sightings.iter().enumerate() {
@@ -71,7 +71,7 @@ fn minima(problem: &Planar<'_>, sightings: &[LandmarkObservation<'_>]) -> Vec<Mi
             add(problem, &mut found, start);
         }
     }
-    // The other side of each minimum found, one landmark at a time.
+    // Mirror images of each minimum, one landmark at a time.
     let seeds: Vec<Pose2> = found.iter().map(|m| m.pose).collect();
     for pose in seeds {
         for i in 0..sightings.len() {
@@ -114,7 +114,7 @@ fn mirrored(camera_from_landmark: &Isometry3<f64>) -> Isometry3<f64> {
     Isometry3::from_parts(camera_from_landmark.translation, rotation)
 }
 
-/// Drops minima that only a low barrier parts from a better one, and sets the borders between those that stay.
+/// Drops minima that a low barrier separates from a better one; sets the borders between the others.
 fn merge(problem: &Planar<'_>, found: &mut Vec<Minimum>, barrier: f64) {
     let mut kept: Vec<Minimum> = Vec::new();
     for mut minimum in found.drain(..) {
@@ -144,7 +144,7 @@ fn narrow(limit_rad: &mut (f64, f64), border_rad: f64) {
     }
 }
 
-/// The highest point on the way from `from` to the worse minimum `to`: its turn, and its rise above `to`.
+/// The highest point on the path from `from` to the worse minimum `to`: its turn, and its rise above `to`.
 fn pass(problem: &Planar<'_>, from: &Minimum, to: &Minimum) -> (f64, f64) {
     let whole = wrap_rad(to.pose.theta_rad - from.pose.theta_rad);
     let step = whole / PATH_POINTS as f64;
@@ -164,7 +164,7 @@ fn pass(problem: &Planar<'_>, from: &Minimum, to: &Minimum) -> (f64, f64) {
     top
 }
 
-/// The prior decides between what is left, or rules it out.
+/// Chooses among the remaining solutions by the prior, or refuses all of them.
 fn by_prior(mut fixes: Vec<Fix>, prior: &Pose2Covariance, scale: f64, p: &LocaliseParams) -> FixResult {
     let distances: Vec<f64> =
         fixes.iter().map(|f| f.pose.distance2(prior).unwrap_or(f64::INFINITY)).collect();
@@ -189,7 +189,7 @@ fn by_prior(mut fixes: Vec<Fix>, prior: &Pose2Covariance, scale: f64, p: &Locali
     FixResult::Fixed(Box::new(fix))
 }
 
-/// Moments around one minimum, and their split into what is new in every frame and what lasts.
+/// Moments around one minimum, split into independent noise and shared nuisance parameters.
 fn fix(
     problem: &Planar<'_>,
     sightings: &[LandmarkObservation<'_>],
@@ -215,7 +215,7 @@ fn fix(
         let jacobian = Matrix3x6::from_iterator(j.iter().copied());
         let part = jacobian * covariance * jacobian.transpose();
         total += part * scale;
-        // What a bad fit adds is not a property of the place.
+        // The inflation of a bad fit is not an error of the place.
         noise += part * (scale - 1.0);
         nuisances.push(Nuisance { key, jacobian, covariance });
     }

@@ -1,65 +1,65 @@
-//! What the statistics of a place say about each modality there.
+//! Advice: what the statistics of a place say about each modality there.
 
 use crate::{localise::FixSource, modality_stats::modality::Modality};
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
-/// How a module errs in a place, beyond what it says itself. Robot-aligned: along, across (left), heading.
+/// Error of a modality in a place beyond its claimed covariance. Robot-aligned: along, across (left), heading.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ErrorModel {
-    /// To be subtracted: metres, metres, radians; of odometry for each metre.
+    /// Bias to subtract: metres, metres, radians; of odometry for each metre driven.
     pub bias: Vector3<f64>,
-    /// To be added to each variance, as a share of what is claimed.
+    /// Variance to add, as a share of the claimed one.
     pub excess: Vector3<f64>,
 }
 
-/// Where advice comes from.
+/// The part of the map that statistics come from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum StatsScope {
-    /// The cell itself was driven through often enough.
+    /// The pose cell itself.
     Cell,
-    /// It and the eight around it.
+    /// The cell and its eight neighbours.
     Around,
-    /// The named area it lies in.
+    /// The named area that contains the cell.
     Area,
-    /// All of the map.
+    /// The whole map.
     Map,
 }
 
-/// What is known of the modules where a robot is.
+/// Which modalities to use at a pose, and with which error models.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ModalityAdvice {
-    /// The best module; none where too little is known.
+    /// The best modality; `None` where too little is known.
     pub best: Option<Modality>,
-    /// Which are used, in the order of [`Modality::ALL`].
+    /// Whether each modality is used, in the order of [`Modality::ALL`].
     pub used: [bool; 3],
-    /// How each errs.
+    /// The error model of each modality, in the order of [`Modality::ALL`].
     pub faults: [ErrorModel; 3],
-    /// Where the ranking comes from.
+    /// The scope of the ranking.
     pub level: StatsScope,
 }
 
 impl Default for ModalityAdvice {
-    /// Nothing is known: everything is used as it says.
+    /// Without statistics every modality is used as it claims.
     fn default() -> Self {
         Self { best: None, used: [true; 3], faults: [ErrorModel::default(); 3], level: StatsScope::Map }
     }
 }
 
 impl ModalityAdvice {
-    /// Whether fixes of a modality are used.
+    /// Whether fixes of a source are used.
     pub fn uses(&self, modality: FixSource) -> bool {
         self.used[Modality::from(modality).index()]
     }
 
-    /// How a module errs.
+    /// The error model of a modality.
     pub fn fault(&self, module: Modality) -> &ErrorModel {
         &self.faults[module.index()]
     }
 }
 
-/// The turn that takes robot-aligned (along, across, heading) to (x, y, theta) of the map.
+/// The rotation from robot-aligned errors (along, across, heading) to (x, y, theta) of the map.
 pub(crate) fn map_from_aligned(theta_rad: f64) -> Matrix3<f64> {
     let (s, c) = theta_rad.sin_cos();
     Matrix3::new(c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0)

@@ -1,5 +1,5 @@
-//! What was found of one module in one place, as sums: places and runs add up, and a run can be taken away again by adding
-//! up the others. Robot-aligned throughout: along, across (left), heading.
+//! Statistics of one modality in one place, as sums: cells and runs add up, and a run is removed by adding the others
+//! again. Robot-aligned: along, across (left), heading.
 
 use crate::{
     check::{self, OutOfRange},
@@ -8,68 +8,68 @@ use crate::{
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-/// Measurements below which a place says nothing for itself: its parent speaks.
+/// A place with fewer measurements takes the statistics of its parent.
 pub const MIN_MEASUREMENTS: u64 = 30;
-/// Visits below which a bias may be chance, however many measurements they gave: those of one visit err together.
+/// Fewer passages than this do not tell a bias from chance: the errors of one passage are correlated.
 pub const MIN_VISITS: u64 = 3;
-/// How many radians of heading weigh as much as a metre.
+/// Radians of heading that weigh as much as one metre (method 15, matrix W).
 const METRE_RAD: f64 = 0.1;
-/// A bias is one if it is more than this many times its standard deviation.
+/// A bias is significant beyond this many of its standard deviations (method 15).
 const BIAS_SIGMAS: f64 = 2.0;
-/// Nothing adds up to more.
+/// Largest accepted sum.
 const MAX_SUM: f64 = 1e15;
 
-/// Sums of one module in one place.
+/// Error sums of one modality in one place.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ModalityStats {
-    /// Steps of the reference here, evenly along the way.
+    /// Steps of the reference trajectory here, at equal distances.
     pub(super) steps: u64,
-    /// Of those, with a position of the module that something told lately.
+    /// Of those, steps with a recent fix of the modality.
     pub(super) available: u64,
-    /// Time that was spent here.
+    /// Time spent here, seconds.
     pub(super) seconds: f64,
-    /// Errors of the module's own position at those steps.
+    /// Sums of the errors of the modality's own position at those steps: metres, metres, radians.
     pub(super) errors: [f64; 3],
-    /// Their products: xx, xy, xt, yy, yt, tt.
+    /// Sums of their products: xx, xy, xt, yy, yt, tt.
     pub(super) products: [f64; 6],
-    /// Single measurements: fixes; of odometry, stretches of a metre.
+    /// Single measurements: fixes; for odometry, stretches of a metre.
     pub(super) fixes: u64,
-    /// Of those, off by more than three standard deviations of what they claim.
+    /// Of those, with an error of more than three claimed standard deviations.
     pub(super) outliers: u64,
-    /// By claimed variance v and error e of each measurement: the sums of 1/v...
+    /// Sum of 1/v over the measurements, v the claimed variance.
     pub(super) weights: [f64; 3],
-    /// ...of e/v...
+    /// Sum of e/v, e the error.
     pub(super) weighted: [f64; 3],
-    /// ...and of e^2/v.
+    /// Sum of e^2/v.
     pub(super) normalised: [f64; 3],
     /// Passages through the place.
     pub(super) visits: u64,
-    /// Weighted mean error of each passage: their sum...
+    /// Sum of the weighted mean errors of the passages.
     pub(super) means: [f64; 3],
-    /// ...and that of their squares.
+    /// Sum of their squares.
     pub(super) mean_squares: [f64; 3],
 }
 
-/// What follows from the sums, for people.
+/// Figures that follow from the sums.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ModalitySummary {
-    /// Mean error of the module's own position: metres along, across, radians.
+    /// Mean error of the modality's own position: metres along, metres across, radians.
     pub mean: [f64; 3],
-    /// Standard deviations about it.
+    /// Standard deviations about the mean, same units.
     pub sigma: [f64; 3],
-    /// Share of the way on which something told its position.
+    /// Share of the steps with a recent fix, 0 to 1.
     pub availability: f64,
-    /// Measurements a second.
+    /// Measurements per second.
     pub rate_hz: f64,
-    /// Share of measurements off by more than three standard deviations.
+    /// Share of measurements off by more than three claimed standard deviations, 0 to 1.
     pub outliers: f64,
-    /// The lower the better; infinite if it was never available.
+    /// Weighted mean squared error over availability; lower is better, infinite without any fix.
     pub score: f64,
 }
 
 impl ModalityStats {
-    /// Adds what was found elsewhere or another time.
+    /// Adds the statistics of another place or run.
     pub fn add(&mut self, more: &Self) {
         let sum = |a: &mut [f64], b: &[f64]| a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
         self.steps = self.steps.saturating_add(more.steps);
@@ -87,7 +87,7 @@ impl ModalityStats {
         sum(&mut self.mean_squares, &more.mean_squares);
     }
 
-    /// Every sum finite, none larger than can be: for what comes from outside.
+    /// Refuses sums that are not finite, too large or contradictory; for statistics from outside.
     pub fn check(&self) -> Result<(), OutOfRange> {
         let free = [&self.errors[..], &self.products, &self.weighted, &self.means];
         for value in free.into_iter().flatten() {
@@ -102,17 +102,17 @@ impl ModalityStats {
         check::within("visits", self.visits as f64, 0.0, self.fixes as f64)
     }
 
-    /// Steps at which the module had a position that something told lately.
+    /// Steps with a recent fix of the modality.
     pub fn available(&self) -> u64 {
         self.available
     }
 
-    /// Single measurements.
+    /// Number of single measurements.
     pub fn fixes(&self) -> u64 {
         self.fixes
     }
 
-    /// A step of the reference here, after `seconds` on the way; the module's error if it was available.
+    /// Adds a step of the reference trajectory that took `seconds`, with the modality's error if it was available.
     pub(super) fn step(&mut self, seconds: f64, error: Option<&Vector3<f64>>) {
         self.steps += 1;
         self.seconds += seconds;
@@ -127,7 +127,7 @@ impl ModalityStats {
         }
     }
 
-    /// A single measurement that is off by `error` and claims these variances.
+    /// Adds a measurement with its error and its claimed variances.
     pub(super) fn measure(&mut self, error: &Vector3<f64>, variances: &Vector3<f64>) {
         self.fixes += 1;
         let mut outlier = false;
@@ -141,7 +141,7 @@ impl ModalityStats {
         self.outliers += u64::from(outlier);
     }
 
-    /// Closes a passage, in which only this was measured.
+    /// Ends the only passage that was measured.
     pub(super) fn end_visit(&mut self) {
         if self.fixes == 0 {
             return;
@@ -153,8 +153,8 @@ impl ModalityStats {
         }
     }
 
-    /// Weighed mean squared error over availability (method 15): `J = tr(W (Sigma + mu mu^T)) / availability`, W =
-    /// diag(1, 1, 1 / (0.1 rad)^2). Infinite if it was never available.
+    /// Weighted mean squared error over availability (method 15): `J = tr(W (Sigma + mu mu^T)) / availability`, W =
+    /// diag(1, 1, 1 / (0.1 rad)^2). Infinite if the modality was never available.
     pub fn score(&self) -> f64 {
         if self.available == 0 {
             return f64::INFINITY;
@@ -164,22 +164,22 @@ impl ModalityStats {
         squares * self.steps as f64 / self.available as f64
     }
 
-    /// How it errs beyond what it claims. A bias is subtracted only where it is one: in sums over so many `cells`, from
-    /// enough passages, and more than twice its own standard deviation (method 15); never where `cells` is absent.
+    /// The error model. A bias counts only in sums over `cells`, after enough passages, and if significant (method
+    /// 15); `None` for `cells` gives no bias.
     pub(super) fn fault(&self, cells: Option<u64>) -> ErrorModel {
         let mut fault = ErrorModel::default();
         if self.fixes < MIN_MEASUREMENTS {
             return fault;
         }
         let n = self.fixes as f64;
-        // One passage through several cells errs alike in all of them.
+        // The errors of one passage are the same in all cells that it crosses.
         let passages = cells.map_or(0.0, |cells| self.visits as f64 / cells.max(1) as f64);
         for k in 0..3 {
             if passages >= MIN_VISITS as f64 {
                 let visits = self.visits as f64;
                 let mean = self.means[k] / visits;
                 let scatter = (self.mean_squares[k] / visits - mean * mean).max(0.0) / (passages - 1.0);
-                // Few passages know their own scatter badly: about Student's quantile.
+                // Few passages determine their own scatter badly: an approximation of Student's quantile.
                 let sigmas = BIAS_SIGMAS * (1.0 + 2.0 / (passages - 1.0));
                 if mean * mean > sigmas * sigmas * scatter {
                     fault.bias[k] = mean;
@@ -192,7 +192,7 @@ impl ModalityStats {
         fault
     }
 
-    /// For people.
+    /// The figures that follow from the sums.
     pub fn figures(&self) -> ModalitySummary {
         let n = self.available.max(1) as f64;
         let mean = self.errors.map(|e| e / n);
@@ -209,5 +209,5 @@ impl ModalityStats {
     }
 }
 
-/// Evidence of every module, in the order of [`Module::ALL`].
+/// Statistics of every modality, in the order of [`Modality::ALL`](super::Modality::ALL).
 pub type StatsByModality = [ModalityStats; 3];

@@ -1,9 +1,9 @@
-//! From a run whose path is known to evidence: how far every module's own position was off, and how far single
-//! measurements were off compared with what they claimed, each where the robot was.
+//! From a reference run to statistics: the errors of every modality's own position, and of single measurements
+//! against their claimed covariance, by pose cell.
 //!
-//! In: the odometry and the fixes of a robot, the reference. Out: evidence by cell. Each module goes the whole way by
-//! itself ("loose coupling", method 15), started where the reference starts: what a corridor does to the laser shows only
-//! when nobody else tells it where it is.
+//! In: odometry and fixes of a robot, the reference trajectory. Out: statistics by cell. Each modality covers the
+//! whole trajectory by itself, from the start of the reference ("loose coupling", method 15), so that its drift is
+//! not hidden by the other one.
 
 use crate::{
     fuse::{FuseParams, Fuser},
@@ -18,40 +18,40 @@ use crate::{
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
 
-/// Most cells that one run may tell of.
+/// Most cells of one run.
 pub const MAX_CELLS: usize = 4096;
-/// Steps of the reference at which positions are compared: after this way...
+/// Positions are compared after this distance along the reference, metres,
 const STEP_M: f64 = 0.05;
-/// ...or this turn.
+/// or after this turn, radians.
 const STEP_RAD: f64 = 0.05;
-/// A module is available until this far from its last fix.
+/// A modality is available within this distance of its last fix, metres.
 const NEWS_M: f64 = 0.5;
-/// Length of the stretches on which odometry is measured.
+/// Length of the stretches over which odometry is compared, metres.
 const STRETCH_M: f64 = 1.0;
-/// Stretches that turn by more are left out: along and across would not mean one thing.
+/// Stretches that turn by more than this are left out: along and across would not be defined, radians.
 const STRETCH_RAD: f64 = 0.5;
-/// Standard deviations less than this are not believed: metres and radians. Keeps weights finite.
+/// Smallest standard deviations assumed, metres and radians; they keep the weights finite.
 const LEAST: [f64; 2] = [1e-3, 1e-4];
 
-/// A robot's run.
+/// A recording compared with a reference trajectory.
 #[derive(Debug, Clone, Copy)]
 pub struct ReferenceRun<'a> {
     /// `odom_from_robot` by time, in order, ns of the robot's clock.
     pub odometry: &'a [(i64, Pose2)],
-    /// Its fixes by time of capture, in order; those that say nothing new left out.
+    /// Fixes by time of capture, in order; repeated ones left out.
     pub fixes: &'a [(i64, Fix)],
-    /// Where it really was, by the same clock.
+    /// True pose by time, same clock.
     pub reference: &'a ReferenceTrajectory,
 }
 
-/// What a run taught.
+/// Statistics of one reference run.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct RunStats {
-    /// By cell.
+    /// Statistics by pose cell.
     pub cells: BTreeMap<PoseCell, StatsByModality>,
-    /// Way of which the path is known, metres.
+    /// Distance along the reference trajectory, metres.
     pub way_m: f64,
-    /// Fixes that the reference says nothing of.
+    /// Fixes at times without a reference pose.
     pub unknown_fixes: u64,
     /// Steps in cells beyond [`MAX_CELLS`], left out.
     pub beyond: u64,
@@ -68,16 +68,16 @@ impl RunStats {
     }
 }
 
-/// One step along the reference.
+/// One step along the reference trajectory.
 struct Step {
-    /// Counts pieces of the reference that hang together.
+    /// Number of the contiguous piece of the reference.
     piece: u32,
     way_m: f64,
     truth: Pose2,
     odometry: Pose2,
 }
 
-/// Compares a run with its reference. Nothing is learnt where they have no time in common.
+/// Compares a run with its reference trajectory. The result is empty where they have no time in common.
 pub fn learn_modality_stats(run: &ReferenceRun<'_>, p: &FuseParams) -> RunStats {
     let mut learnt = RunStats::default();
     let steps = positions(run, p, &mut learnt);
@@ -86,11 +86,11 @@ pub fn learn_modality_stats(run: &ReferenceRun<'_>, p: &FuseParams) -> RunStats 
     learnt
 }
 
-/// A module that goes by itself.
+/// A modality with its own fusion.
 struct Walker {
     modality: FixSource,
     fuser: Fuser,
-    /// The reference's way at its last fix.
+    /// Distance along the reference at its last fix.
     news_m: Option<f64>,
 }
 
@@ -99,14 +99,14 @@ impl Walker {
         Self { modality, fuser: Fuser::new(p.clone()), news_m: None }
     }
 
-    /// Its position, if something told it lately.
+    /// Its position, if its last fix is recent.
     fn position(&self, way_m: f64) -> Option<Pose2> {
         self.news_m.filter(|at_m| way_m - at_m <= NEWS_M)?;
         Some(self.fuser.pose()?.pose.pose)
     }
 }
 
-/// Lets every module go the way by itself and notes how far it is off, step by step.
+/// Fuses every modality by itself and records its error step by step.
 fn positions(run: &ReferenceRun<'_>, p: &FuseParams, learnt: &mut RunStats) -> Vec<Step> {
     let mut walkers = [FixSource::Laser, FixSource::Landmarks].map(|modality| Walker::new(modality, p));
     let mut map_from_odom: Option<Pose2> = None;
@@ -166,7 +166,7 @@ fn aligned(pose: &Pose2, truth: &Pose2) -> Vector3<f64> {
     map_from_aligned(truth.theta_rad).transpose() * pose.minus(truth)
 }
 
-/// Every fix against the reference; passages end where another cell begins.
+/// Adds the error of every fix; a passage ends where another cell begins.
 fn measured_fixes(run: &ReferenceRun<'_>, learnt: &mut RunStats) {
     let r = run.reference;
     for module in [Modality::Laser, Modality::Landmarks] {
@@ -190,7 +190,7 @@ fn measured_fixes(run: &ReferenceRun<'_>, learnt: &mut RunStats) {
     }
 }
 
-/// Odometry against the reference, metre by metre.
+/// Adds the error of odometry over stretches of a metre.
 fn measured_odometry(steps: &[Step], r: &ReferenceTrajectory, p: &FuseParams, learnt: &mut RunStats) {
     let mut found = Vec::new();
     let mut from = 0;
@@ -203,13 +203,13 @@ fn measured_odometry(steps: &[Step], r: &ReferenceTrajectory, p: &FuseParams, le
         let start = &steps[from];
         let length_m = to.way_m - start.way_m;
         let (truly, measured) = (start.truth.between(&to.truth), start.odometry.between(&to.odometry));
-        // Backwards a fault of the floor has the other sign: only drives forwards are learnt from.
+        // Driving backwards changes the sign of a bias: only forward motion is used.
         if length_m < 0.999 * STRETCH_M || truly.theta_rad.abs() > STRETCH_RAD || measured.x_m <= 0.0 {
             continue;
         }
         let d = measured.minus(&truly);
         let error = Vector3::new(d.x, d.y, wrap_rad(d.z)) / length_m;
-        // Both ends of the stretch are known as well as the reference knows them, and its beginning turns it.
+        // Both ends have the uncertainty of the reference; the heading error at the start rotates the stretch.
         let (place, heading) = (2.0 * r.sigma_m.powi(2), r.sigma_rad.powi(2));
         let turned = p.turn_per_turn_rad.powi(2) * measured.theta_rad.abs();
         let variances = p.metre_variances() + Vector3::new(place, place + heading, 2.0 * heading + turned);
@@ -219,8 +219,8 @@ fn measured_odometry(steps: &[Step], r: &ReferenceTrajectory, p: &FuseParams, le
     visits(Modality::Odometry, &found, learnt);
 }
 
-/// Adds measurements up, passage by passage.
-pub(super) fn visits(module: Modality, found: &[(Pose2, Vector3<f64>, Vector3<f64>)], learnt: &mut RunStats) {
+/// Adds measurements, passage by passage.
+fn visits(module: Modality, found: &[(Pose2, Vector3<f64>, Vector3<f64>)], learnt: &mut RunStats) {
     for visit in found.chunk_by(|a, b| PoseCell::of(&a.0) == PoseCell::of(&b.0)) {
         let mut evidence = super::ModalityStats::default();
         for (_, error, variances) in visit {

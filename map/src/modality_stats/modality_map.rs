@@ -12,10 +12,10 @@ use crate::{
 };
 use std::collections::BTreeMap;
 
-/// A module belongs to the fused set if its score is at most this many times the best one's.
+/// `Fuse` uses a modality if its score is at most this many times the best one's.
 const FUSED_SCORE: f64 = 2.0;
 
-/// All that runs have shown of a map.
+/// The statistics of all reference runs of a map.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ModalityMap {
     mode: FusionMode,
@@ -25,11 +25,11 @@ pub struct ModalityMap {
     elsewhere: ModalityAdvice,
 }
 
-/// Cells added up.
+/// The sum of several cells.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct Pool {
     found: StatsByModality,
-    /// How many.
+    /// Number of cells added.
     cells: u64,
 }
 
@@ -43,7 +43,7 @@ impl Pool {
 }
 
 impl ModalityMap {
-    /// Adds runs up. Names past [`MAX_AREAS`] are left out.
+    /// Adds the statistics of runs. Named areas beyond [`MAX_AREAS`] are left out.
     pub fn new<'a>(
         mode: FusionMode,
         named: Vec<NamedArea>,
@@ -72,12 +72,12 @@ impl ModalityMap {
         made
     }
 
-    /// What is fused.
+    /// The fusion mode.
     pub fn mode(&self) -> FusionMode {
         self.mode
     }
 
-    /// What is known where a pose is.
+    /// The advice at a pose.
     pub fn advice(&self, at: &Pose2) -> ModalityAdvice {
         if self.cells.is_empty() {
             return self.elsewhere;
@@ -86,12 +86,13 @@ impl ModalityMap {
         self.cells.get(&cell).map_or_else(|| self.judged(&cell), |(_, advice)| *advice)
     }
 
-    /// Every cell that was driven through, with what was found and what follows.
+    /// Every cell with measurements, its statistics, and the advice there.
     pub fn cells(&self) -> impl Iterator<Item = (&PoseCell, &StatsByModality, &ModalityAdvice)> {
         self.cells.iter().map(|(cell, (found, advice))| (cell, found, advice))
     }
 
-    /// Every named area with what was found in it, by heading, and what follows where its cells say nothing themselves.
+    /// Every named area with its statistics and advice by heading; the advice holds where the cells have too few
+    /// measurements.
     pub fn named(&self) -> impl Iterator<Item = (&NamedArea, [(StatsByModality, ModalityAdvice); 4])> {
         self.named.iter().map(|(area, by_heading)| {
             let told = |pool: &Pool| {
@@ -101,12 +102,12 @@ impl ModalityMap {
         })
     }
 
-    /// All of the map together.
+    /// Statistics and advice of the whole map.
     pub fn map(&self) -> (&StatsByModality, &ModalityAdvice) {
         (&self.map.found, &self.elsewhere)
     }
 
-    /// Advice for a cell.
+    /// Advice from the first of the scopes with enough measurements.
     fn judged(&self, cell: &PoseCell) -> ModalityAdvice {
         let (mut alone, mut around) = (Pool::default(), Pool::default());
         for (dx, dy) in (-1..=1).flat_map(|dx| (-1..=1).map(move |dy| (dx, dy))) {
@@ -131,13 +132,12 @@ impl ModalityMap {
             let enough =
                 |(_, pool): &&(StatsScope, Pool)| pool.found[module.index()].fixes() >= MIN_MEASUREMENTS;
             if let Some((level, pool)) = levels.iter().find(enough) {
-                // Robot-aligned biases of different places are different things: over the whole map they only tell how much
-                // less sure a module is than it says.
+                // Robot-aligned biases differ from place to place: over the whole map only the variance is inflated.
                 let cells = if *level == StatsScope::Map { None } else { Some(pool.cells) };
                 advice.faults[module.index()] = pool.found[module.index()].fault(cells);
             }
         }
-        // Nobody is shut out of a place for what happened elsewhere.
+        // Whole-map statistics never exclude a modality.
         // Departs from method 15, where cells inherit all from their parents.
         let ranked = levels
             .iter()

@@ -3,25 +3,25 @@
 use crate::check::{self, MAX_COORDINATE_M, OutOfRange};
 use serde::{Deserialize, Serialize};
 
-/// Most areas with a name.
+/// Most named areas of a map.
 pub const MAX_AREAS: usize = 64;
-/// Most corners of one.
+/// Most corners of one area.
 pub const MAX_CORNERS: usize = 64;
 /// Longest name of an area, bytes.
 pub const MAX_NAME_BYTES: usize = 64;
 
-/// A part of the map that somebody named: a room, a piece of corridor.
+/// A part of the map with a name: a room, a piece of corridor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NamedArea {
-    /// Its name.
+    /// Name of the area, 1 to [`MAX_NAME_BYTES`] bytes.
     pub name: String,
-    /// Its corners in order, x and y in metres; at least three. Where areas overlap the first one speaks.
+    /// Corners in order, x and y in metres; at least three. Where areas overlap the first one counts.
     pub corners_m: Vec<[f64; 2]>,
 }
 
 impl NamedArea {
-    /// A name, three corners or more, all in range.
+    /// Refuses an empty or long name, fewer than three corners, and corners out of range.
     pub fn check(&self) -> Result<(), OutOfRange> {
         check::within("name", self.name.len() as f64, 1.0, MAX_NAME_BYTES as f64)?;
         check::within("corners_m", self.corners_m.len() as f64, 3.0, MAX_CORNERS as f64)?;
@@ -31,7 +31,7 @@ impl NamedArea {
         Ok(())
     }
 
-    /// Whether a point lies in it (even-odd rule).
+    /// Whether a point lies in the area (even-odd rule).
     pub fn contains(&self, [x, y]: [f64; 2]) -> bool {
         let n = self.corners_m.len();
         let crosses = |i: &usize| {

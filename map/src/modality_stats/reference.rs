@@ -1,5 +1,5 @@
-//! Where a robot really was, as somebody else knows: a survey, a camera above, a slower drive. In: poses with times of the
-//! robot's clock. Out: the pose at any time between, none across gaps.
+//! Reference trajectory: where a robot really was, by an independent measurement. In: poses with times of the robot's
+//! clock. Out: the pose at any time between them, none across gaps.
 
 use crate::{
     check::{self, OutOfRange},
@@ -7,46 +7,46 @@ use crate::{
 };
 use nalgebra::Vector3;
 
-/// Most poses of a reference.
+/// Most poses of a reference trajectory.
 pub const MAX_REFERENCE: usize = 200_000;
-/// Poses further apart are not interpolated.
+/// Poses further apart than this are not interpolated, ns.
 const MAX_GAP_NS: i64 = 1_000_000_000;
 
-/// A known path, `map_from_robot` by time.
+/// True `map_from_robot` by robot time, ns.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReferenceTrajectory {
     poses: Vec<(i64, Pose2)>,
     /// Standard deviation of its positions, metres.
     pub(super) sigma_m: f64,
-    /// Of its headings, radians.
+    /// Standard deviation of its headings, radians.
     pub(super) sigma_rad: f64,
 }
 
-/// Why poses are no reference.
+/// Why poses are not a reference trajectory.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum ReferenceError {
-    /// A pose or standard deviation is out of range.
+    /// A pose is out of range.
     #[error("pose {index}: {error}")]
     Pose {
-        /// Which, from 0.
+        /// Index of the pose, from 0.
         index: usize,
-        /// What is wrong.
+        /// The value that is out of range.
         error: OutOfRange,
     },
-    /// A number that is not of one pose.
+    /// The number of poses or a standard deviation is out of range.
     #[error(transparent)]
     Range(#[from] OutOfRange),
-    /// Times must rise.
+    /// A time does not rise.
     #[error("pose {index} is not later than the one before it")]
     Order {
-        /// Which, from 0.
+        /// Index of the pose, from 0.
         index: usize,
     },
 }
 
 impl ReferenceTrajectory {
-    /// From 2 to [`MAX_REFERENCE`] poses in order of time, ns of the robot's clock; standard deviations up to 1 m and 0.5
-    /// rad.
+    /// From 2 to [`MAX_REFERENCE`] poses in order of time, ns of the robot's clock; standard deviations up to 1 m and
+    /// 0.5 rad.
     pub fn new(poses: Vec<(i64, Pose2)>, sigma_m: f64, sigma_rad: f64) -> Result<Self, ReferenceError> {
         check::within("poses", poses.len() as f64, 2.0, MAX_REFERENCE as f64)?;
         check::within("sigma_m", sigma_m, 0.0, 1.0)?;
@@ -60,7 +60,7 @@ impl ReferenceTrajectory {
         Ok(Self { poses, sigma_m, sigma_rad })
     }
 
-    /// The pose at a time; none before, after, and within gaps of more than a second.
+    /// The pose at a time; `None` before, after, and within gaps of more than a second.
     pub fn at(&self, at_ns: i64) -> Option<Pose2> {
         let next = self.poses.partition_point(|(t, _)| *t < at_ns);
         let (to_ns, to) = self.poses.get(next)?;

@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, SMatrix, Vector2, Vector3};
 
 /// Columns of the derivatives: 8 corner coordinates, robot (x, y, theta), mounting (rotation, translation), wall
 /// (facing angle, signed distance from the map's origin along the facing normal).
-pub(super) const CORNERS: usize = 0;
+const CORNERS: usize = 0;
 pub(super) const ROBOT: usize = 8;
 pub(super) const MOUNTING: usize = 11;
 pub(super) const WALL: usize = 17;

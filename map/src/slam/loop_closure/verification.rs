@@ -121,7 +121,7 @@ fn seen_from<'a>(keys: &[Keyframe], i: usize, key: &'a Keyframe) -> (Pose2, &'a 
 }
 
 /// Several scans as one, in the frame of their poses.
-pub(super) fn joined<'a>(scans: impl Iterator<Item = (Pose2, &'a Cloud)>) -> Cloud {
+fn joined<'a>(scans: impl Iterator<Item = (Pose2, &'a Cloud)>) -> Cloud {
     let mut all = Cloud::default();
     for (pose, cloud) in scans {
         let (s, c) = pose.theta_rad.sin_cos();
