@@ -1,8 +1,9 @@
-//! Where to look: the landmark that is worth most from an uncertain pose, and the pan and tilt that centre it (method 14).
+//! Gaze control: the landmark that is most useful to look at from an uncertain pose, with the pan and tilt that
+//! centre it (method 14).
 //!
-//! In: the robot's pose, what is known of each landmark, the pan-tilt unit. Out: every landmark that can be looked at with
-//! its worth, best first, or the advice to look ahead or about. [`GazeController`] keeps to one landmark until another is clearly
-//! better or looking fails.
+//! In: the robot's pose, candidates with their visibility areas, the pan-tilt unit. Out: the candidates that can be
+//! looked at with their utility, best first, or the action to look ahead or sweep. [`GazeController`] keeps its
+//! target until another one is clearly better or observations fail.
 
 mod information;
 
@@ -20,40 +21,40 @@ use vision::recognise::LandmarkId;
 /// Most landmarks whose failures are remembered.
 pub const MAX_DAMPED: usize = 64;
 
-/// By what a landmark is chosen.
+/// Criterion of the choice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Criterion {
     /// The paper's product: probability, saliency, margin, visibility confidence.
     #[default]
     Product,
-    /// Expected gain of information on the pose, by the time it takes to look.
+    /// Expected information gain on the pose over the time that the observation takes.
     Information,
 }
 
-/// Knobs of the choice.
+/// Parameters of gaze control.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct GazeParams {
-    /// By what.
+    /// Criterion of the choice.
     pub criterion: Criterion,
-    /// Landmarks that are seen less probably are left out.
+    /// Candidates with a lower visibility probability are left out, 0 to 1.
     pub min_probability: f64,
-    /// Distance to the boundary of the visibility area from which on being further inside is worth no more.
+    /// Distance to the boundary of the visibility area beyond which the utility no longer rises, metres.
     pub full_margin_m: f64,
-    /// Another landmark must be worth this many times the present one.
+    /// Another target must exceed the present one's utility by this factor.
     pub switch_ratio: f64,
-    /// So many failures in a row make a landmark worth less...
+    /// Consecutive failures that damp a landmark's utility.
     pub failures: u32,
-    /// ...by this factor...
+    /// Factor on the utility of a damped landmark, 0 to 1.
     pub damping: f64,
-    /// ...for so long.
+    /// Duration of the damping, seconds.
     pub damped_s: f64,
-    /// Expected error of a corner, pixels.
+    /// Expected standard deviation of a measured corner, px.
     pub corner_sigma_px: f64,
-    /// Time to settle, expose and recognise.
+    /// Time to settle, expose and recognise, seconds.
     pub look_s: f64,
-    /// With the position known worse than this and nothing to look at, the advice is to look about.
+    /// With a larger position uncertainty and no target, the action is to sweep, metres.
     pub lost_m: f64,
 }
 
@@ -74,14 +75,14 @@ impl Default for GazeParams {
     }
 }
 
-/// A landmark that might be looked at.
+/// A landmark that may be looked at.
 #[derive(Debug, Clone, Copy)]
 pub struct GazeCandidate<'a> {
-    /// Which.
+    /// Number of the landmark.
     pub landmark: LandmarkId,
-    /// Where it hangs.
+    /// Place of the landmark, map frame.
     pub place: &'a LandmarkPlace,
-    /// From where it is seen.
+    /// Its visibility area.
     pub visible: &'a VisibilityMap,
     /// Saliency of its model, 0 to 1 (method 9).
     pub saliency: f64,
@@ -89,17 +90,17 @@ pub struct GazeCandidate<'a> {
     pub v_c: f64,
 }
 
-/// The pan-tilt unit and where it looks now.
+/// The pan-tilt unit and its present direction.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct PanTiltUnit {
-    /// Camera in the robot frame, metres.
+    /// Position of the camera in the robot frame, metres.
     pub camera_m: [f64; 3],
-    /// Present pan, left positive.
+    /// Present pan, radians, left positive.
     pub pan_rad: f64,
-    /// Present tilt, up positive.
+    /// Present tilt, radians, up positive.
     pub tilt_rad: f64,
-    /// How fast it turns.
+    /// Speed of pan and tilt, rad/s.
     pub rate_radps: f64,
 }
 
@@ -110,7 +111,7 @@ impl Default for PanTiltUnit {
 }
 
 impl PanTiltUnit {
-    /// Every number finite and in range.
+    /// Refuses numbers that are not finite or out of range.
     pub fn check(&self) -> Result<(), OutOfRange> {
         for value in self.camera_m {
             check::within("head.camera_m", value, -10.0, 10.0)?;
@@ -121,26 +122,26 @@ impl PanTiltUnit {
     }
 }
 
-/// A landmark that can be looked at, and how.
+/// A landmark that can be looked at, with pan and tilt.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GazeTarget {
-    /// Which.
+    /// Number of the landmark.
     pub landmark: LandmarkId,
-    /// Pan that centres it, left positive.
+    /// Pan that centres it, radians, left positive.
     pub pan_rad: f64,
-    /// Tilt that centres it, up positive.
+    /// Tilt that centres it, radians, up positive.
     pub tilt_rad: f64,
-    /// What looking at it is worth by the criterion asked for.
+    /// Utility by the requested criterion.
     pub utility: f64,
-    /// Probability that it is seen.
+    /// Probability that it is visible, 0 to 1.
     pub probability: f64,
-    /// Distance of the camera to the boundary of its visibility area, inside.
+    /// Distance of the camera to the boundary of its visibility area, inside, metres.
     pub margin_m: f64,
-    /// Expected gain of information, nats; infinite where the pose is entirely unknown.
+    /// Expected information gain, nats; infinite where the pose is unknown.
     pub gain_nats: f64,
-    /// Distance on the floor.
+    /// Distance on the floor, metres.
     pub range_m: f64,
-    /// Angle of view against its normal.
+    /// Angle of view against its normal, radians.
     pub incidence_rad: f64,
 }
 
@@ -149,13 +150,13 @@ pub struct GazeTarget {
 pub enum GazeAction {
     /// Look at this landmark.
     Landmark(GazeTarget),
-    /// No landmark is in sight: look along the path.
+    /// No landmark is visible: look along the path.
     Ahead,
-    /// None is in sight, and the pose is so uncertain that this says little: look about.
+    /// No landmark is visible and the pose is uncertain: look around.
     Sweep,
 }
 
-/// Every landmark that is seen probably enough and within reach of the unit, most useful first; equal ones by number.
+/// Candidates that are probably visible and within the range of the unit, by falling utility, then by number.
 pub fn rank(
     pose: &Pose2Covariance,
     targets: &[GazeCandidate<'_>],
@@ -219,7 +220,7 @@ fn choice(
     })
 }
 
-/// Pan, tilt and distance on the floor that centre a landmark for a camera at a place.
+/// Pan, tilt and distance on the floor that centre a landmark from a camera position.
 fn aim(
     pose: &Pose2Covariance,
     camera: &Point2<f64>,
@@ -232,17 +233,17 @@ fn aim(
     (pan, (place.z_m - camera_height_m).atan2(range), range)
 }
 
-/// Keeps a robot's gaze steady: which landmark it is told to look at, and which have failed.
+/// Keeps the target of one robot's gaze and the failures of its landmarks.
 #[derive(Debug, Clone, Default)]
 pub struct GazeController {
     current: Option<LandmarkId>,
     failures: u32,
-    /// Landmarks that are worth less, until when.
+    /// Damped landmarks, and until when (ns).
     damped: Vec<(LandmarkId, i64)>,
 }
 
 impl GazeController {
-    /// Where to look, of what [`rank`] found. `at_ns` is the robot's own time.
+    /// Chooses the action among the targets of [`rank`]. `at_ns` is the robot's clock.
     pub fn choose(
         &mut self,
         at_ns: i64,
@@ -255,7 +256,7 @@ impl GazeController {
             let damped = self.damped.iter().any(|(id, _)| *id == c.landmark);
             c.utility * if damped { p.damping } else { 1.0 }
         };
-        // Ranked: of equal ones the first.
+        // Ties: the first in rank.
         let best = ranked.iter().rev().max_by(|a, b| worth(a).total_cmp(&worth(b)));
         let Some(best) = best.filter(|b| worth(b) > 0.0) else {
             self.current = None;
@@ -273,7 +274,7 @@ impl GazeController {
         GazeAction::Landmark(*chosen)
     }
 
-    /// Tells whether the landmark that was looked at was recognised.
+    /// Reports whether the target was recognised.
     pub fn report_outcome(&mut self, at_ns: i64, landmark: LandmarkId, recognised: bool, p: &GazeParams) {
         if recognised {
             self.damped.retain(|(id, _)| *id != landmark);

@@ -9,8 +9,7 @@
 //!    extrinsics and intrinsics. Unique, ambiguous, or none, for each observation.
 //! 3. [`Schedule`]: frame reports -> when to search globally, how far the pose is trusted, when a pose is replaced.
 //!
-//! A guided observation corrects a pose. It never starts one, never supports one against a global observation, and never
-//! replaces one: see [`crate::fuse::FixRole`].
+//! A guided observation corrects a pose. It never starts, supports or replaces one: see [`crate::fuse::FixRole`].
 
 mod associate;
 mod error;

@@ -1,8 +1,8 @@
-//! A landmark's place from views of it: corner rays meet a wall, an upright rectangle is fitted (method 11).
+//! Placement: a landmark's place from posed views of it. Corner rays are intersected with a wall and an upright
+//! rectangle is fitted (method 11).
 //!
-//! In: corners with covariance, the robot's pose at capture, the mounting, the walls. Out: place and size with their
-//! covariance, or why the thing does not hang on a wall. Recognition is not its business: all views must be of one
-//! thing.
+//! In: corners with covariance, the robot's pose at capture, extrinsics, walls. Out: place and size with covariance,
+//! or why the object does not hang on a wall. All views must be of one object.
 
 mod params;
 mod view;

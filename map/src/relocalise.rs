@@ -1,8 +1,8 @@
-//! Where the robot might be while only ambiguous landmarks are seen: Markov localisation over a grid of poses (method
-//! 19.1).
+//! Relocalisation: global localisation of a robot without a pose from ambiguous landmarks, by a grid belief over (x,
+//! y, theta) (Markov localisation, method 19.1).
 //!
-//! In: motions, sightings of things that may be any of several landmarks, landmarks that should have been seen. Out: the
-//! modes of the belief, and one pose once a single mode holds enough of it. Never says one while several are left.
+//! In: motions, observations of objects that may be any of several landmarks, landmarks that should have been
+//! visible. Out: pose hypotheses, and one pose once a single hypothesis is probable enough.
 
 mod params;
 mod observation;

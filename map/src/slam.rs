@@ -1,11 +1,11 @@
-//! The laser map from scans and odometry: every scan is matched with those before it, places met again close loops, and
-//! all key poses are fitted to everything at once (method 17; 17.6's global optimisation).
+//! SLAM: the laser map from scans and odometry. Every scan is matched to those before it, loop closures join places
+//! met again, and all keyframes are fitted together (method 17; 17.6's global optimisation).
 //!
-//! In: scans with odometry, in order. Out: the path, the walls with their covariance, the loops. The first pose is the
-//! origin of the map. What does not fit is left out and counted: a false loop folds a building over.
+//! In: scans with odometry, in order. Out: the trajectory, the walls with covariance, the loop closures. The first
+//! pose is the origin of the map. Uncertain loop closures are refused and counted, since a false one folds the map.
 //!
-//! Departs from method 17.6, an EKF over robot and lines: key poses and scans are kept instead of lines, so that a line
-//! wrongly associated once does no harm for ever, curved walls help too, and loops cost no more than they must.
+//! Departs from method 17.6, an EKF over robot and lines: keyframes and scans are kept instead of lines. A wrong
+//! association of a line then does no lasting harm, curved walls contribute, and the cost of loops stays bounded.
 
 pub mod cloud;
 pub(crate) mod surface_index;

@@ -1,10 +1,10 @@
-//! Views of things a robot drives past, followed from frame to frame into tracks: what lies where the track lies, by its
-//! place on the wall or else in the picture just before, and looks like it. Of each track the views that say something
-//! new are to be kept (`vision::learn::thinning`).
+//! Tracks: objects that a robot drives past, followed from frame to frame. A quad belongs to a track by its place on
+//! the wall, or else by its position in the previous image, and by its appearance. Of each track the views that add
+//! something new are kept (`vision::learn::thinning`).
 //!
-//! In: the quads of a frame with icon, place and what is known of their identity. Out: for each, whether to keep it and
-//! in which track. Nothing is joined in doubt: a wrong view would poison the model learnt from the track, a thing that
-//! is found twice is only a choice for a person.
+//! In: the quads of a frame with icon, place and identity. Out: for each, whether to keep it and in which track.
+//! Doubtful quads start a new track: a wrong view would spoil the model learnt from the track, while an object with
+//! two tracks only costs a person a choice.
 
 mod params;
 mod observation;

@@ -1,12 +1,13 @@
-//! From where a landmark can be seen: the closed-form visibility map of method 12, for a landmark of any tilt: on a wall,
-//! under a ceiling, on the floor, or leaning.
+//! Visibility: the area from which a landmark is visible, in closed form (method 12), for a landmark of any tilt: on
+//! a wall, under a ceiling, on the floor, or leaning.
 //!
-//! In: the landmark's place, the walls and other obstacles, the camera that is to see it. Out: a multipolygon on the floor
-//! with area and centroid, and tests of points and of uncertain poses against it. Says nothing of recognition.
+//! In: the landmark's place, walls and other obstacles, the camera. Out: a multipolygon on the floor with area and
+//! centroid, and tests of points and uncertain poses.
 //!
-//! Seen from the middle of the landmark the area is a range of distances in every direction: whatever is seen from a point
-//! is seen from everywhere between it and the landmark, but for what is too near. So penumbrae and limits become bounds
-//! over direction (`envelope`), a quarter of all directions at a time, and no polygons are cut with each other.
+//! Seen from the landmark's centre the area is a range of distances in every direction: whatever is visible from a
+//! point is visible from everywhere between it and the landmark, except from too near. Penumbrae and limits are
+//! therefore bounds over direction (`envelope`), a quarter of all directions at a time, and no polygons are
+//! intersected.
 
 mod settings;
 mod obstacle;

@@ -2,7 +2,7 @@
 
 use crate::check::OutOfRange;
 
-/// Why guided recognition refuses its input.
+/// An input of guided recognition was refused.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum GuidedError {
     /// A number is out of range.
@@ -13,9 +13,9 @@ pub enum GuidedError {
     TooMany {
         /// Name of the list.
         field: &'static str,
-        /// Its length.
+        /// Number of its entries.
         count: usize,
-        /// The limit.
+        /// Largest accepted number.
         limit: usize,
     },
 }

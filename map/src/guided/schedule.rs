@@ -142,13 +142,13 @@ impl Schedule {
         }
     }
 
-    /// How many landmarks are remembered, in all lists.
+    /// Number of landmarks remembered, in all lists.
     #[cfg(test)]
     pub(super) fn remembered(&self) -> usize {
         self.support.len() + self.contradiction.as_ref().map_or(0, |c| c.landmarks.len() + c.missed.len())
     }
 
-    /// A pose begins with a global fix, or not at all.
+    /// A global fix starts a pose.
     fn without_pose(&mut self, frame: &FrameReport<'_>) -> Decision {
         self.forget();
         self.has_pose = false;

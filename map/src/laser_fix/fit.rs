@@ -12,17 +12,17 @@ use crate::{
 };
 use nalgebra::{Matrix3, Matrix3x2, Point2, SymmetricEigen, Vector2, Vector3};
 
-/// Variance that stands for "the walls do not tell": (100 m)^2, and (pi)^2 for the heading.
+/// Variance of an undetermined coordinate: (100 m)^2, and about pi^2 for the heading.
 const UNKNOWN: [f64; 3] = [1e4, 1e4, 10.0];
-/// A pose known less well than this along some direction is not known there: what walls wrong by a centimetre say of a
-/// direction that they hardly show is mostly their own error.
+/// A direction with a larger standard deviation counts as undetermined, metres: there the result is mostly the walls'
+/// own error.
 const LEAST_M: f64 = 1.0;
-/// How many metres a radian weighs as much as.
+/// Metres that weigh as much as one radian.
 const LEVER_M: f64 = 3.0;
-/// Walls whose own errors a fix names one by one: those that move it most.
+/// Walls whose errors a fix names one by one: those that affect it most.
 const NAMED_WALLS: usize = 6;
 
-/// Points that found their wall: the wall, the derivative of the distance, where along the wall, weight, distance.
+/// A point with its wall: derivative of the distance, position along the wall, weight, distance.
 struct Matched {
     wall: usize,
     j: Vector3<f64>,
@@ -103,8 +103,8 @@ pub(super) fn descend(
     Some(LaserFix { pose, noise, walls: parts, matched, points: count, rms_m: variance.sqrt() })
 }
 
-/// What the walls' own errors do to the pose that the points gave, each carried through the fit; the greatest first. A
-/// hundred points on one wall do not make its place better known than the map says.
+/// The effect of the walls' own errors on the pose, each propagated through the fit; the largest first. Many points
+/// on one wall do not make its place more certain than the map says.
 fn by_walls(walls: &WallIndex, points: &[Matched], gain: &Matrix3<f64>) -> Vec<WallPart> {
     let mut order: Vec<usize> = (0..points.len()).collect();
     order.sort_by_key(|&i| points[i].wall);
@@ -114,7 +114,7 @@ fn by_walls(walls: &WallIndex, points: &[Matched], gain: &Matrix3<f64>) -> Vec<W
         let mut pull = Matrix3x2::zeros();
         for &i in group {
             let m = &points[i];
-            // Both move the wall towards its free side: a turn by the lever, an offset everywhere the same.
+            // A turn of the wall moves a point by its distance from the middle, an offset by the same everywhere.
             pull += m.j * Vector2::new(m.along_m, 1.0).transpose() * m.weight;
         }
         let wall = &walls.walls[points[first].wall];
@@ -125,8 +125,8 @@ fn by_walls(walls: &WallIndex, points: &[Matched], gain: &Matrix3<f64>) -> Vec<W
     parts
 }
 
-/// Which part of a covariance is knowledge, as a projection, and the covariance of the rest: where the walls tell less
-/// than [`LEAST_M`], they tell nothing.
+/// The determined part of a covariance, as a projection, and the covariance of the rest: directions beyond
+/// [`LEAST_M`] count as undetermined.
 fn known(covariance: &Matrix3<f64>) -> (Matrix3<f64>, Matrix3<f64>) {
     let lever = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, LEVER_M));
     let back = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, 1.0 / LEVER_M));
@@ -140,8 +140,8 @@ fn known(covariance: &Matrix3<f64>) -> (Matrix3<f64>, Matrix3<f64>) {
     (back * known * lever, back * unknown * back)
 }
 
-/// Covariance of an information that may be singular: what is unknown has the variance [`UNKNOWN`].
-pub(super) fn spread(information: &Matrix3<f64>) -> Option<Matrix3<f64>> {
+/// Covariance of an information that may be singular: undetermined coordinates have the variance [`UNKNOWN`].
+fn spread(information: &Matrix3<f64>) -> Option<Matrix3<f64>> {
     let floor = Matrix3::from_diagonal(&Vector3::from(UNKNOWN).map(|v| 1.0 / v));
     let made = (information + floor).cholesky()?.inverse();
     let made = 0.5 * (made + made.transpose());

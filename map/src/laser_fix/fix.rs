@@ -6,29 +6,29 @@ use crate::{
 };
 use nalgebra::{Matrix2, Matrix3, Matrix3x2, Matrix3x6, Matrix6, SymmetricEigen};
 
-/// Side of the squares of floor in which all other walls err alike.
+/// Side of the squares of floor in which all unnamed walls share one error, metres.
 const AREA_M: f64 = 10.0;
 
 /// The robot's pose by one scan.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LaserFix {
-    /// `map_from_robot`, without the prior: along what the walls do not tell its variance is some 100 m.
+    /// `map_from_robot`, without the prior; the standard deviation is about 100 m where the walls determine nothing.
     pub pose: Pose2Covariance,
-    /// The part of its covariance that is new in every scan; the rest is the walls' own and lasts.
+    /// The part of the covariance that is independent in every scan; the rest is the walls' own error.
     pub noise: Matrix3<f64>,
-    /// The walls that move it most.
+    /// The walls that affect it most.
     pub walls: Vec<WallPart>,
-    /// Share of the scan's flat points on a wall.
+    /// Share of the scan's flat points with a wall, 0 to 1.
     pub matched: f64,
-    /// How many points that are.
+    /// Number of those points.
     pub points: usize,
-    /// Root mean square of their distances across the walls.
+    /// Root mean square of their distances across the walls, metres.
     pub rms_m: f64,
 }
 
 impl LaserFix {
-    /// For [`crate::fuse::Fuser::fix`]: rests on no landmark, and cannot start or replace a pose by itself. What walls
-    /// are wrong by lasts: each of the most important is named, the others count as one about a place.
+    /// The fix for [`crate::fuse::Fuser::apply_fix`]: it rests on no landmark and cannot start or replace a pose. The
+    /// errors of the most important walls are named one by one, those of all others as one for the place.
     pub fn fix(&self) -> Fix {
         let named = self.walls.iter().map(|part| {
             let mut jacobian = Matrix3x6::zeros();
@@ -56,7 +56,7 @@ impl LaserFix {
         }
     }
 
-    /// The root of what lasts of the covariance and is not of the named walls.
+    /// Square root of the shared covariance that is not of the named walls.
     fn by_others(&self) -> Matrix3<f64> {
         let named: Matrix3<f64> = self.walls.iter().map(WallPart::spread).sum();
         let eigen = SymmetricEigen::new(self.pose.covariance - self.noise - named);
@@ -65,14 +65,14 @@ impl LaserFix {
     }
 }
 
-/// What the error of one wall does to a fix.
+/// The effect of one wall's error on a fix.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WallPart {
-    /// Names the wall by its place: the same in every scan and in every version of a map that keeps it.
+    /// Hash of the wall's ends: the same in every scan, and in every version of a map that keeps the wall.
     pub wall: u64,
     /// Derivative of (x, y, theta) by the wall's (direction, offset) about its middle.
     pub by_wall: Matrix3x2<f64>,
-    /// Covariance of those.
+    /// Covariance of (direction, offset).
     pub covariance: Matrix2<f64>,
 }
 
@@ -89,19 +89,19 @@ impl WallPart {
 pub enum LaserRefusal {
     /// Too few returns from flat surfaces near walls.
     FewPoints {
-        /// How many there were.
+        /// Number of such returns.
         points: usize,
     },
-    /// The scan shows something else than the map.
+    /// The scan does not match the map.
     Unlike {
-        /// Share of the points that have a wall.
+        /// Share of the points with a wall, 0 to 1.
         matched: f64,
     },
     /// The pose contradicts the prior.
     Prior {
-        /// Squared Mahalanobis distance.
+        /// Squared Mahalanobis distance, 3 degrees of freedom.
         distance2: f64,
     },
-    /// Several poses fit.
+    /// Several poses match.
     Ambiguous,
 }

@@ -1,43 +1,43 @@
-//! Limits of localisation in walls.
+//! Parameters of localisation in walls.
 
 use crate::slam::cloud::CloudParams;
 use serde::{Deserialize, Serialize};
 
-/// Knobs of localisation in walls.
+/// Parameters of localisation in walls.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LaserFixParams {
-    /// Points of the scan.
+    /// Extraction of surface points.
     pub cloud: CloudParams,
-    /// How far from a point its wall is looked for at first...
+    /// Search radius for a point's wall at first, metres,
     pub start_radius_m: f64,
-    /// ...and at last.
+    /// and at last, metres.
     pub end_radius_m: f64,
-    /// Surface and wall turn less than this against each other.
+    /// Largest angle between surface and wall, radians.
     pub max_turn_rad: f64,
-    /// Most iterations from one start.
+    /// Largest number of iterations from one start.
     pub iterations: usize,
-    /// Smallest standard deviation of a point across its wall.
+    /// Smallest standard deviation of a point across its wall, metres.
     pub sigma_m: f64,
-    /// Beyond it a point's weight falls off.
+    /// Distance beyond which a point's weight falls off, metres.
     pub outlier_m: f64,
-    /// Points that err together: their number is divided by this.
+    /// Number of points with a common error; the information is divided by it.
     pub correlated: f64,
-    /// Standard deviation that no number of points removes: position, metres, and heading, radians.
+    /// Smallest standard deviations, whatever the number of points: position, metres, and heading, radians.
     pub floor: [f64; 2],
-    /// Fewest points with a wall.
+    /// Least number of points with a wall.
     pub min_points: usize,
-    /// Least share of the points that have a wall.
+    /// Least share of points with a wall, 0 to 1.
     pub min_matched: f64,
     /// Gate on the squared Mahalanobis distance to the prior: 99.9 % of chi2 with 3 degrees of freedom.
     pub prior_gate: f64,
-    /// Priors wider than this are tried from several starts...
+    /// A prior with a larger standard deviation is tried from several starts, metres,
     pub wide_m: f64,
-    /// ...or wider in the heading.
+    /// or with a larger one of the heading, radians.
     pub wide_rad: f64,
-    /// Another solution that matches so nearly as many points makes it ambiguous.
+    /// Another solution with this share of the best one's points makes the result ambiguous.
     pub rival_share: f64,
-    /// Two results are two solutions if they differ by more than this chi2.
+    /// Results that differ by more than this chi2 are different solutions.
     pub apart_chi2: f64,
 }
 

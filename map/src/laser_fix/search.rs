@@ -14,7 +14,7 @@ use crate::{
 };
 use nalgebra::{SymmetricEigen, Vector3};
 
-/// Most points of a scan that are used; evenly thinned beyond.
+/// Most points of a scan; more are thinned evenly.
 const MAX_POINTS: usize = 360;
 
 /// The pose of the robot when it took `scan`, near `prior`. Errors name an input that is out of range.
@@ -59,7 +59,7 @@ pub fn laser_fix(
     Ok(if rival { Err(LaserRefusal::Ambiguous) } else { Ok(best.clone()) })
 }
 
-/// The prior's mean, and where it is wide, points along its axes.
+/// The prior's mean and, if the prior is wide, points along its axes.
 fn starts(prior: &Pose2Covariance, p: &LaserFixParams) -> Vec<Pose2> {
     let mut starts = vec![prior.pose];
     let c = &prior.covariance;

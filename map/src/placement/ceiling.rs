@@ -1,6 +1,6 @@
-//! A landmark's place under a ceiling of given height (method 11.2, A24: the laser does not see ceilings).
+//! A landmark's place under a ceiling of given height (method 11.2, A24: the laser does not measure ceilings).
 //!
-//! In: views as for walls, the ceiling. Out: place and size with covariance, or why the thing is not up there.
+//! In: posed views, the ceiling. Out: place and size with covariance, or why the object is not there.
 
 use crate::{
     check::{self, OutOfRange},
@@ -25,14 +25,14 @@ const CORNERS: [(f64, f64); 4] = [(-0.5, 0.5), (0.5, 0.5), (0.5, -0.5), (-0.5, -
 /// A horizontal plane above the robots.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ceiling {
-    /// Above the floor.
+    /// Height above the floor, metres.
     pub height_m: f64,
-    /// Standard deviation.
+    /// Standard deviation of the height, metres.
     pub sigma_m: f64,
 }
 
 impl Ceiling {
-    /// Within 0 to [`MAX_HEIGHT_M`], its standard deviation 0 to 1 m.
+    /// Height within 0 to [`MAX_HEIGHT_M`], standard deviation 0 to 1 m.
     pub fn check(&self) -> Result<(), OutOfRange> {
         check::within("ceiling.height_m", self.height_m, 0.0, MAX_HEIGHT_M)?;
         check::within("ceiling.sigma_m", self.sigma_m, 0.0, 1.0)
@@ -42,23 +42,23 @@ impl Ceiling {
 /// The rectangle that one view gives under the ceiling.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CeilingRectangle {
-    /// Centre x and y, direction of the top, width, height.
+    /// Centre x and y, direction of the top, width, height; metres and radians.
     pub rectangle: SVector<f64, 5>,
-    /// What is new in every view: corners and robot pose.
+    /// Covariance by the errors that are independent in every view: corners and robot pose.
     pub covariance: SMatrix<f64, 5, 5>,
-    /// By the mounting's (rotation, translation).
+    /// Derivative by the extrinsics' (rotation, translation).
     pub by_mounting: SMatrix<f64, 5, 6>,
-    /// Covariance of the mounting.
+    /// Covariance of the extrinsics.
     pub mounting_covariance: Matrix6<f64>,
-    /// By the camera's (focal length, principal point), each in its standard deviations.
+    /// Derivative by the intrinsics' (focal length, principal point), each in its standard deviations.
     pub by_camera: SMatrix<f64, 5, 3>,
-    /// By the ceiling's height.
+    /// Derivative by the ceiling's height.
     pub by_height: SVector<f64, 5>,
-    /// Distance of the hits from the rectangle.
+    /// Root mean square distance of the intersections from the rectangle, metres.
     pub rms_m: f64,
 }
 
-/// The rectangle a view gives under the ceiling.
+/// The rectangle of a view under the ceiling.
 pub fn view_on_ceiling(
     view: &PosedView<'_>,
     ceiling: &Ceiling,
@@ -115,14 +115,14 @@ fn corners_of(q: &Vector5) -> SVector<f64, 8> {
     made
 }
 
-/// Weighted least squares over the rectangle, with the gain from hits to it.
+/// Weighted least squares over the rectangle, with the gain from intersections to rectangle.
 fn rectangle(seen: &SVector<f64, 8>, weight: &SMatrix<f64, 8, 8>) -> Option<(Vector5, SMatrix<f64, 5, 8>)> {
     /// Steps: the problem is linear but for the direction, whose start is good.
     const STEPS: usize = 8;
     let at = |i: usize| Vector2::new(seen[2 * i], seen[2 * i + 1]);
     let centre = (at(0) + at(1) + at(2) + at(3)) * 0.25;
     let (up, right) = ((at(0) + at(1) - at(2) - at(3)) * 0.5, (at(1) + at(2) - at(0) - at(3)) * 0.5);
-    // A mirrored quad is no view from below.
+    // A mirrored quad cannot be a view from below.
     if up.x * right.y - up.y * right.x <= 0.0 {
         return None;
     }
@@ -148,8 +148,8 @@ fn rectangle(seen: &SVector<f64, 8>, weight: &SMatrix<f64, 8, 8>) -> Option<(Vec
     q.iter().all(|v| v.is_finite()).then_some((q, gain))
 }
 
-/// Fuses views of one thing under one ceiling; also the indices of the views that passed the gate, 99 % of chi2 with 5
-/// degrees of freedom.
+/// Fuses views of one object under one ceiling. Views outside of the gate, 99 % of chi2 with 5 degrees of freedom,
+/// are left out.
 pub fn ceiling_placement(
     views: &[CeilingRectangle],
     ceiling: &Ceiling,
@@ -184,7 +184,8 @@ fn apart(a: &Vector5, b: &Vector5) -> Vector5 {
     d
 }
 
-/// Information form; mounting, camera and ceiling move all views alike and are added once, at the end.
+/// Fusion in information form; the errors of extrinsics, intrinsics and ceiling are common to all views and added
+/// once.
 fn fused(
     origin: &Vector5,
     views: &[&CeilingRectangle],

@@ -1,24 +1,24 @@
-//! Limits of placement, and why a quad has no place.
+//! Parameters of placement, and why a quad has no place.
 
 use crate::check::OutOfRange;
 use serde::{Deserialize, Serialize};
 use vision::localise::pose::PoseError;
 
-/// Knobs of placing.
+/// Parameters of placement.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct PlacementParams {
-    /// A hit may lie this far beyond the end of a wall's segment, metres.
+    /// A ray may meet a wall this far beyond the end of its segment, metres.
     pub margin_m: f64,
-    /// Largest root mean square distance of the hits from an upright rectangle, metres.
+    /// Largest root mean square distance of the intersections from an upright rectangle, metres.
     pub max_rms_m: f64,
-    /// Largest roll, radians.
+    /// Largest roll of the rectangle, radians.
     pub max_roll_rad: f64,
-    /// How level things are hung: standard deviation of the roll, radians.
+    /// Prior standard deviation of the roll: how level objects are hung, radians.
     pub roll_sigma_rad: f64,
-    /// Gate on a further view, 99 % of chi2 with 4 degrees of freedom.
+    /// Gate on a further view: 99 % of chi2 with 4 degrees of freedom.
     pub gate_chi2: f64,
-    /// Inflation of the covariance of several views, for errors they share (method 11.5).
+    /// Factor on the covariance of several views, for errors they share (method 11.5).
     pub inflation: f64,
 }
 
@@ -38,10 +38,10 @@ impl Default for PlacementParams {
 /// Why a quad has no place.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PlacementError {
-    /// A pose, mounting or wall is out of range.
+    /// A pose, extrinsics or wall is out of range.
     #[error(transparent)]
     OutOfRange(#[from] OutOfRange),
-    /// Corners, covariance or camera are unusable.
+    /// Corners, covariance or intrinsics are unusable.
     #[error(transparent)]
     Corners(#[from] PoseError),
     /// No wall is met by all four rays.
@@ -50,21 +50,22 @@ pub enum PlacementError {
     /// A nearer wall is met by some rays only.
     #[error("the quad reaches over the end of a wall")]
     Straddles,
-    /// The hits are not an upright rectangle of possible size: an open door, a board on an easel, another wall.
+    /// The intersections are not an upright rectangle of possible size: an open door, a board on an easel, another
+    /// wall.
     #[error("not on this wall: no upright rectangle (rms {rms_m:.3} m, roll {roll_rad:.3} rad)")]
     NotOnWall {
-        /// Distance of the hits from the rectangle.
+        /// Root mean square distance of the intersections from the rectangle, metres.
         rms_m: f64,
-        /// Its roll.
+        /// Roll of the rectangle, radians.
         roll_rad: f64,
     },
-    /// The hits are no rectangle of possible size under this ceiling.
+    /// The intersections are not a rectangle of possible size under this ceiling.
     #[error("not under this ceiling: no rectangle (rms {rms_m:.3} m)")]
     NotOnCeiling {
-        /// Distance of the hits from the rectangle.
+        /// Root mean square distance of the intersections from the rectangle, metres.
         rms_m: f64,
     },
-    /// No view given, or they lie on different walls.
+    /// No view was given, or the views lie on different walls.
     #[error("the views do not share a wall")]
     NoView,
 }

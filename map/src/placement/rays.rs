@@ -1,4 +1,5 @@
-//! Where the rays of four corners meet a wall or a ceiling, with the derivatives by all that is uncertain (method 11.3).
+//! Intersections of corner rays with a wall or a ceiling, and their derivatives by all uncertain inputs (method
+//! 11.3).
 
 use crate::{placement::view::CheckedView, segments::LaserSegment};
 use nalgebra::{Matrix3, SMatrix, Vector2, Vector3};
@@ -13,13 +14,13 @@ pub(super) const INPUTS: usize = 19;
 /// Smallest cosine of the angle between ray and wall normal: 80 degrees of incidence.
 pub const MIN_COS_INCIDENCE: f64 = 0.17;
 
-/// A ray met the wall's plane.
+/// Intersection of a ray with the plane of a wall or ceiling.
 pub(super) struct Hit {
-    /// Where, map frame.
+    /// The intersection, map frame, metres.
     pub point: Vector3<f64>,
-    /// Distance from the camera.
+    /// Distance from the camera, metres.
     pub distance_m: f64,
-    /// By all inputs.
+    /// Derivative by all inputs.
     pub by: SMatrix<f64, 3, INPUTS>,
 }
 
@@ -29,15 +30,16 @@ pub(super) fn plane(wall: &LaserSegment) -> (f64, f64) {
     (f.y.atan2(f.x), f.dot(&wall.a.coords))
 }
 
-/// A hit with the ray that made it.
+/// An intersection with its ray.
 struct Cast {
     hit: Hit,
     ray: Vector3<f64>,
-    /// Normal times ray.
+    /// Scalar product of normal and ray.
     along: f64,
 }
 
-/// The hit of corner `i` on a wall; `None` when the ray goes away from the wall, grazes it, or comes from behind.
+/// Intersection of the ray of corner `i` with a wall; `None` when the ray leaves the wall, grazes it, or comes from
+/// behind.
 pub(super) fn hit(view: &CheckedView<'_>, i: usize, (theta, r): (f64, f64)) -> Option<Hit> {
     let Cast { mut hit, ray, along } = cast(view, i, &Vector3::new(theta.cos(), theta.sin(), 0.0), r)?;
     let side = Vector3::new(-theta.sin(), theta.cos(), 0.0);
@@ -46,15 +48,16 @@ pub(super) fn hit(view: &CheckedView<'_>, i: usize, (theta, r): (f64, f64)) -> O
     hit.by.iter().all(|v| v.is_finite()).then_some(hit)
 }
 
-/// The hit of corner `i` on the ceiling `height_m` high, its derivative by that height in column [`WALL`].
+/// Intersection of the ray of corner `i` with the ceiling at `height_m`, with its derivative by that height in column
+/// [`WALL`].
 pub(super) fn ceiling_hit(view: &CheckedView<'_>, i: usize, height_m: f64) -> Option<Hit> {
     let Cast { mut hit, ray, along } = cast(view, i, &-Vector3::z(), -height_m)?;
     hit.by.set_column(WALL, &(-ray / along));
     hit.by.iter().all(|v| v.is_finite()).then_some(hit)
 }
 
-/// Where the ray of corner `i` meets the plane of facing normal `n` and offset `r`, with the derivatives by all but the
-/// plane.
+/// Intersection of the ray of corner `i` with the plane of facing normal `n` and offset `r`, with the derivatives by
+/// all inputs but the plane.
 fn cast(view: &CheckedView<'_>, i: usize, n: &Vector3<f64>, r: f64) -> Option<Cast> {
     let robot = view.map_from_robot.pose.to_isometry3();
     let robot_turn = robot.rotation.to_rotation_matrix().into_inner();
@@ -65,7 +68,7 @@ fn cast(view: &CheckedView<'_>, i: usize, n: &Vector3<f64>, r: f64) -> Option<Ca
     let ray = Vector3::new((px.x - k.cx_px) / k.fx_px, (px.y - k.cy_px) / k.fy_px, 1.0);
     let d = turn * ray;
     let along = n.dot(&d);
-    // The camera stands on the free side: the ray runs against the facing normal.
+    // The camera is on the free side: the ray runs against the facing normal.
     if -along / d.norm() <= MIN_COS_INCIDENCE || n.dot(&c) <= r {
         return None;
     }
@@ -87,13 +90,13 @@ fn cast(view: &CheckedView<'_>, i: usize, n: &Vector3<f64>, r: f64) -> Option<Ca
     finite.then(|| Cast { hit: Hit { point, distance_m: s * d.norm(), by }, ray: d, along })
 }
 
-/// Whether a hit lies on the wall's segment, lengthened by `margin_m` at both ends.
+/// Whether an intersection lies on the wall's segment, extended by `margin_m` at both ends.
 pub(super) fn is_on(wall: &LaserSegment, point: &Vector3<f64>, margin_m: f64) -> bool {
     let u = wall.direction().dot(&(Vector2::new(point.x, point.y) - wall.a.coords));
     (-margin_m..=wall.length_m() + margin_m).contains(&u)
 }
 
-/// Covariance of the hits on the wall from corners and robot pose.
+/// Covariance of the intersections by corners and robot pose, which are independent in every view.
 pub(super) fn new_in_each_view(view: &CheckedView<'_>, by: &SMatrix<f64, 8, INPUTS>) -> SMatrix<f64, 8, 8> {
     let mut sum = SMatrix::<f64, 8, 8>::zeros();
     for (i, covariance) in view.covariance_px2.iter().enumerate() {
@@ -104,11 +107,11 @@ pub(super) fn new_in_each_view(view: &CheckedView<'_>, by: &SMatrix<f64, 8, INPU
     sum + j * view.map_from_robot.covariance * j.transpose()
 }
 
-/// How the hits move with the camera's errors, each of one standard deviation. It has no part in the weights: one view's
-/// departure from a rectangle is no ground to correct the camera, and is what tells that a thing is not on the wall.
+/// Derivative of the intersections by the intrinsics' errors, each of one standard deviation. They have no part in
+/// the weights: the misfit of one view must not correct the camera, since it shows that an object is not on the wall.
 pub(super) fn by_camera(view: &CheckedView<'_>, by: &SMatrix<f64, 8, INPUTS>) -> SMatrix<f64, 8, 3> {
     let corners = view.by_camera.iter().enumerate();
-    // What the camera has wrong is wrong with the ray through the corner where it was seen.
+    // An error of the intrinsics moves the ray through the measured corner.
     let moved: SMatrix<f64, 8, 3> =
         corners.map(|(i, by_camera)| by.fixed_columns::<2>(CORNERS + 2 * i) * by_camera).sum();
     moved * Matrix3::from_diagonal(&view.camera.error_sigmas())

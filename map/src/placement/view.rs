@@ -1,4 +1,4 @@
-//! One posed view of a quad, checked and undistorted, and the result of several.
+//! A posed view of a quad, checked and undistorted, and the placement that several views give.
 
 use crate::{
     extrinsics::CameraExtrinsics, place::LandmarkPlace, placement::params::PlacementError,
@@ -11,25 +11,25 @@ use vision::{
     localise::pose::{Straightened, straightened},
 };
 
-/// Most views fused into one place; later ones are ignored.
+/// Most views of one placement; later ones are ignored.
 pub const MAX_VIEWS: usize = 256;
 
-/// One look at a quad.
+/// A view of a quad from a known robot pose.
 #[derive(Debug, Clone)]
 pub struct PosedView<'a> {
-    /// Corners as seen, in the landmark's order.
+    /// Measured corners in the landmark's order, px.
     pub corners: &'a Corners,
-    /// Their covariance.
+    /// Covariance of each corner, px^2.
     pub covariance_px2: &'a [Matrix2<f64>; 4],
-    /// The camera.
+    /// Intrinsics of the camera.
     pub camera: &'a Intrinsics,
-    /// The robot at capture.
+    /// Robot pose at capture.
     pub map_from_robot: &'a Pose2Covariance,
-    /// Where the camera sits.
+    /// Extrinsics at capture.
     pub mounting: &'a CameraExtrinsics,
 }
 
-/// Checked and undistorted.
+/// A view with checked poses and undistorted corners.
 pub(super) struct CheckedView<'a> {
     pub(super) corners_px: Corners,
     pub(super) covariance_px2: [Matrix2<f64>; 4],

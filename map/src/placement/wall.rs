@@ -16,26 +16,26 @@ use vision::localise::pose::{LandmarkSize, PoseError};
 pub struct WallRectangle {
     /// Index of the wall.
     pub wall: usize,
-    /// Centre along the wall (m, from the foot of the map's origin, towards the viewer's right), height of the centre,
-    /// width, height.
+    /// Centre along the wall (metres from the foot of the map's origin, towards the viewer's right), height of the
+    /// centre, width, height; metres.
     pub rectangle: Vector4<f64>,
-    /// What is new in every view: corners and robot pose.
+    /// Covariance by the errors that are independent in every view: corners and robot pose.
     pub covariance: Matrix4<f64>,
-    /// By the mounting's (rotation, translation).
+    /// Derivative by the extrinsics' (rotation, translation).
     pub by_mounting: SMatrix<f64, 4, 6>,
-    /// Covariance of the mounting.
+    /// Covariance of the extrinsics.
     pub mounting_covariance: Matrix6<f64>,
-    /// By the camera's (focal length, principal point), each in its standard deviations.
+    /// Derivative by the intrinsics' (focal length, principal point), each in its standard deviations.
     pub by_camera: Matrix4x3<f64>,
-    /// By the wall's facing angle and signed distance.
+    /// Derivative by the wall's facing angle and signed distance.
     pub by_wall: Matrix4x2<f64>,
-    /// Roll.
+    /// Roll, radians.
     pub roll_rad: f64,
-    /// Distance of the hits from the rectangle.
+    /// Root mean square distance of the intersections from the rectangle, metres.
     pub rms_m: f64,
 }
 
-/// The rectangle a view gives on the nearest wall that all four corners meet.
+/// The rectangle of a view on the nearest wall that all four rays meet.
 pub fn view_on_wall(
     view: &PosedView<'_>,
     walls: &[LaserSegment],
@@ -46,8 +46,8 @@ pub fn view_on_wall(
     fit(&sighting, wall, rays::plane(&walls[wall]).0, &hits, p)
 }
 
-/// The nearest wall that all four rays meet. Refused when the quad reaches over the end of a wall to one behind it: a
-/// place on the wrong one would be off by their distance.
+/// The nearest wall that all four rays meet. Refused when the quad reaches beyond the end of a wall to one behind it:
+/// a place on the wrong wall would be off by their distance.
 fn nearest(
     sighting: &CheckedView<'_>,
     walls: &[LaserSegment],
@@ -80,13 +80,13 @@ fn nearest(
     Ok((wall, hits))
 }
 
-/// Distance of the nearest hit that lies on the segment itself.
+/// Distance of the nearest intersection on the segment itself.
 fn strictly(found: &[Option<Hit>; 4], wall: &LaserSegment) -> f64 {
     let on = found.iter().flatten().filter(|h| rays::is_on(wall, &h.point, 0.0));
     on.map(|h| h.distance_m).fold(f64::INFINITY, f64::min)
 }
 
-/// The upright rectangle through the hits, by least squares weighed with their whole covariance.
+/// The upright rectangle through the intersections, by least squares with their full covariance.
 fn fit(
     view: &CheckedView<'_>,
     wall: usize,
@@ -94,7 +94,7 @@ fn fit(
     hits: &[Hit; 4],
     p: &PlacementParams,
 ) -> Result<WallRectangle, PlacementError> {
-    // Along the wall and up; y is the viewer's right.
+    // Coordinates on the wall: along it towards the viewer's right, and up.
     let side = Vector2::new(-theta.sin(), theta.cos());
     let facing = Vector2::new(theta.cos(), theta.sin());
     let mut seen = SVector::<f64, 8>::zeros();
@@ -145,8 +145,9 @@ fn corners_of(q: &SVector<f64, 5>) -> SVector<f64, 8> {
     made
 }
 
-/// Weighted least squares over the rectangle, its roll held by how level things hang; with the gain from hits to it.
-pub(super) fn rectangle(
+/// Weighted least squares over the rectangle, with a prior on its roll; with the gain from intersections to
+/// rectangle.
+fn rectangle(
     seen: &SVector<f64, 8>,
     weight: &SMatrix<f64, 8, 8>,
     roll_sigma_rad: f64,

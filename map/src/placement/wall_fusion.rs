@@ -1,4 +1,4 @@
-//! The place that several views on one wall agree on.
+//! The placement that several views on one wall agree on.
 
 use crate::{
     place::LandmarkPlace,
@@ -13,8 +13,8 @@ use crate::{
 use nalgebra::{DMatrix, Matrix2, Matrix4, Matrix4x2, Matrix4x3, Matrix6, SMatrix, Vector2, Vector4};
 use vision::localise::pose::LandmarkSize;
 
-/// Fuses views of one thing on one wall. The seed is the view that most others agree with; what leaves the gate is
-/// left out.
+/// Fuses views of one object on one wall. The seed is the view that most others agree with; views outside of its gate
+/// are left out.
 pub fn placement(
     views: &[WallRectangle],
     walls: &[LaserSegment],
@@ -27,7 +27,7 @@ pub fn placement(
         a.wall == b.wall && s.is_some_and(|s| d.dot(&s.solve(&d)) <= p.gate_chi2)
     };
     let votes = |i: usize| views.iter().filter(|v| agree(&views[i], v)).count();
-    // Ties: the first.
+    // Ties: the first view.
     let seed =
         (0..views.len()).max_by_key(|&i| (votes(i), std::cmp::Reverse(i))).ok_or(PlacementError::NoView)?;
     let wall = walls.get(views[seed].wall).ok_or(PlacementError::NoView)?;
@@ -44,7 +44,8 @@ fn total(v: &WallRectangle) -> Matrix4<f64> {
     v.covariance + mounting + v.by_camera * v.by_camera.transpose()
 }
 
-/// Information form with the wall fixed; mounting, camera and wall move all views alike and are added once, at the end.
+/// Fusion in information form with the wall fixed; the errors of extrinsics, intrinsics and wall are common to all
+/// views and added once.
 fn fused(views: &[&WallRectangle], wall: &LaserSegment, p: &PlacementParams) -> Option<LandmarkPlace> {
     let mut information = Matrix4::zeros();
     for v in views {

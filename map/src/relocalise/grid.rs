@@ -1,4 +1,4 @@
-//! A belief over a grid of poses: shifted by motions without blurring, spread, weighed, and read as modes.
+//! A belief over a grid of poses: prediction without blur, diffusion, update, pose hypotheses.
 
 use crate::{
     check::{self, OutOfRange},
@@ -7,27 +7,27 @@ use crate::{
 use nalgebra::{Matrix3, Point2, Vector2, Vector3};
 use std::f64::consts::TAU;
 
-/// Most modes that are told apart.
+/// Most pose hypotheses.
 pub const MAX_MODES: usize = 8;
-/// Belief below this share of a cell's even share is no mode.
+/// Hypotheses below this probability are left out.
 const MIN_MASS: f64 = 1e-3;
 
-/// A place where the robot may be.
+/// A pose hypothesis: one peak of the belief.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PoseHypothesis {
-    /// Share of the belief.
+    /// Probability, 0 to 1.
     pub mass: f64,
-    /// Mean and covariance of it.
+    /// Mean and covariance of the poses around the peak.
     pub pose: Pose2Covariance,
 }
 
-/// Most cells of a grid: 100 m by 100 m at the default steps.
+/// Most cells of a grid: 100 m by 100 m at the default resolution.
 pub const MAX_CELLS: usize = 9_000_000;
 
 /// All positions at one heading.
 #[derive(Debug, Clone)]
 struct Layer {
-    /// What motions have left over of whole cells, metres.
+    /// Offset of the layer by motions of less than a cell, metres.
     rest: Vector2<f64>,
     belief: Vec<f64>,
 }
@@ -39,11 +39,11 @@ pub(super) struct PoseGrid {
     columns: usize,
     rows: usize,
     layers: Vec<Layer>,
-    /// What turns have left over of whole headings.
+    /// Offset of all headings by turns of less than a step, radians.
     rest_rad: f64,
-    /// Where the robot can be, evenly.
+    /// The prior: uniform over the possible poses.
     even: Vec<f64>,
-    /// Variances of motions not yet spread, metres and radians squared.
+    /// Motion variances not yet diffused, m^2 and rad^2.
     unspread: (f64, f64),
 }
 
@@ -90,7 +90,7 @@ impl PoseGrid {
         Pose2::new(at.x, at.y, self.heading(k))
     }
 
-    /// Sets every cell by a function of its number and pose.
+    /// Sets every cell by a function of its index and pose.
     fn weigh_all(&mut self, weight: impl Fn(usize, &Pose2) -> f64) {
         let cells = self.columns * self.rows;
         for k in 0..self.layers.len() {
@@ -109,13 +109,13 @@ impl PoseGrid {
         Ok(())
     }
 
-    /// A number for every cell.
+    /// A vector with one value for every cell.
     pub(super) fn like(&self, value: f64) -> Vec<f64> {
         vec![value; self.layers.len() * self.columns * self.rows]
     }
 
-    /// Calls `visit` with number and pose of the cells within a distance of a point, for every heading for which `near`
-    /// gives them.
+    /// Calls `visit` with index and pose of the cells within a distance of a point, for every heading for which
+    /// `near` gives both.
     pub(super) fn each_heading(
         &self,
         near: impl Fn(f64) -> Option<(Point2<f64>, f64)>,
@@ -139,7 +139,7 @@ impl PoseGrid {
         }
     }
 
-    /// Multiplies the belief by a likelihood. One that is nought everywhere changes nothing.
+    /// Update: multiplies the belief by a likelihood. A likelihood that is zero everywhere changes nothing.
     pub(super) fn weigh(&mut self, likelihood: impl Fn(usize, &Pose2) -> f64) {
         let before = self.layers.clone();
         let cells = self.columns * self.rows;
@@ -155,7 +155,7 @@ impl PoseGrid {
         }
     }
 
-    /// Moves every pose. What leaves the grid is lost, and made up for by the rest.
+    /// Prediction: shifts the belief by `motion` (robot frame) and renormalises. Cells that leave the grid are lost.
     pub(super) fn shift(&mut self, motion: &Pose2) {
         let step = TAU / self.layers.len() as f64;
         for k in 0..self.layers.len() {
@@ -189,7 +189,7 @@ impl PoseGrid {
         made
     }
 
-    /// Nothing is left of the belief: anywhere.
+    /// Resets the belief to the prior.
     fn reset(&mut self) {
         let cells = self.columns * self.rows;
         for (layer, even) in self.layers.iter_mut().zip(self.even.chunks(cells)) {
@@ -197,7 +197,7 @@ impl PoseGrid {
         }
     }
 
-    /// Adds variance of motion, in whole steps of what the grid can show.
+    /// Diffusion: adds motion variance in steps that the grid can represent.
     pub(super) fn spread(&mut self, metres2: f64, radians2: f64) {
         /// Share of the belief of a cell that goes to each neighbour in one step.
         const SHARE: f64 = 0.1;
@@ -240,7 +240,7 @@ impl PoseGrid {
         made
     }
 
-    /// Spreads a share evenly over where the robot can be.
+    /// Mixes a share of the prior into the belief.
     pub(super) fn mix(&mut self, share: f64) {
         let even = self.even.iter();
         for (value, even) in self.layers.iter_mut().flat_map(|l| &mut l.belief).zip(even) {
@@ -265,7 +265,7 @@ impl PoseGrid {
         layer.belief[cell.y as usize * self.columns + cell.x as usize]
     }
 
-    /// Peaks with what is about them, each without what belongs to a greater one.
+    /// Peaks with the cells around them, each without the cells of a greater one.
     pub(super) fn modes(&self, within_m: f64, within_rad: f64) -> Vec<PoseHypothesis> {
         let cells = self.columns * self.rows;
         let mut taken = vec![false; self.layers.len() * cells];
@@ -292,7 +292,7 @@ impl PoseGrid {
                     mine.push(j);
                 }
             });
-            // Always at least the peak itself: rounding must not keep it for ever.
+            // At least the peak itself, or rounding could repeat it for ever.
             taken[peak] = true;
             for j in mine {
                 taken[j] = true;

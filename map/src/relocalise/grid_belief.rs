@@ -14,10 +14,10 @@ use crate::{
 use nalgebra::{Matrix3, Point2, Vector3};
 use std::f64::consts::{PI, TAU};
 
-/// A sighting reaches this many standard deviations.
+/// An observation affects poses within this many standard deviations.
 const REACH_SIGMAS: f64 = 4.5;
 
-/// The belief on where the robot is.
+/// The belief over the robot's pose.
 #[derive(Debug, Clone)]
 pub struct GridBelief {
     pub(super) p: GridBeliefParams,
@@ -25,7 +25,7 @@ pub struct GridBelief {
 }
 
 impl GridBelief {
-    /// Over the rectangle between two corners. `prior` weighs each pose; 0 where the robot cannot be.
+    /// A belief over the rectangle between two corners. `prior` weights each pose; 0 where the robot cannot be.
     pub fn new(
         corners: [Point2<f64>; 2],
         prior: impl Fn(&Pose2) -> f64,
@@ -39,7 +39,7 @@ impl GridBelief {
         Ok(Self { p: p.clone(), grid })
     }
 
-    /// The robot moved, in its own frame.
+    /// Prediction by a motion in the robot frame.
     pub fn predict(&mut self, motion: &Pose2) -> Result<(), OutOfRange> {
         motion.check()?;
         let metres = motion.position().norm();
@@ -50,7 +50,7 @@ impl GridBelief {
         Ok(())
     }
 
-    /// The robot saw something that may be any of `members`, or nothing of the map.
+    /// Update by an observation that may be any of `members`, or clutter.
     pub fn update(
         &mut self,
         glimpse: &RelativeObservation,
@@ -63,7 +63,7 @@ impl GridBelief {
         self.update_associations(&readings)
     }
 
-    /// The same where how it was seen depends on what it is: of another size or height it is elsewhere.
+    /// Update where the relative pose depends on the landmark: another size or height gives another distance.
     pub fn update_associations(&mut self, readings: &[AssociationHypothesis<'_>]) -> Result<(), OutOfRange> {
         check::within("members", readings.len() as f64, 0.0, MAX_MEMBERS as f64)?;
         let reach_m = self.p.clutter_reach_m;
@@ -80,9 +80,9 @@ impl GridBelief {
         Ok(())
     }
 
-    /// Adds the likelihood that a glimpse is of a member.
+    /// Adds the likelihood that an observation is of a landmark.
     fn read(&self, glimpse: &RelativeObservation, member: &PossibleLandmark<'_>, likelihood: &mut [f64]) {
-        // Poses stand for their cells: what is seen from a cell is uncertain by its size.
+        // A pose represents its cell: the observation gets the variance of a uniform cell.
         let (cell, bin) = (self.p.cell_m, TAU / self.p.headings as f64);
         let within_cell = Vector3::new(cell * cell, cell * cell, bin * bin) / 12.0;
         let covariance = glimpse.covariance + Matrix3::from_diagonal(&within_cell);
@@ -97,7 +97,7 @@ impl GridBelief {
                 if off * off > REACH_SIGMAS.powi(2) * covariance[(2, 2)] {
                     return None;
                 }
-                // Where a robot of this heading stands to see it so.
+                // Position of a robot with this heading for this observation.
                 let from = Pose2::new(0.0, 0.0, heading).compose(&z);
                 Some((Point2::new(at.x_m - from.x_m, at.y_m - from.y_m), reach))
             },
@@ -111,7 +111,8 @@ impl GridBelief {
         );
     }
 
-    /// A landmark was not seen, though the camera looked at all bearings between two (left positive).
+    /// Update by a landmark that was not observed, although the camera covered the bearings between two (radians,
+    /// left positive).
     pub fn update_missed(&mut self, place: &LandmarkPlace, visible: &VisibilityMap, bearings_rad: [f64; 2]) {
         let detection = self.p.detection;
         self.grid.weigh(|_, pose| {
@@ -122,22 +123,22 @@ impl GridBelief {
         });
     }
 
-    /// The places where the robot may be, most probable first.
+    /// Pose hypotheses, most probable first.
     pub fn modes(&self) -> Vec<PoseHypothesis> {
         self.grid.modes(self.p.mode_m, self.p.mode_rad)
     }
 
-    /// The pose, once one mode holds more than the rest by far.
+    /// The pose, once one hypothesis is probable enough.
     pub fn resolved(&self) -> Option<PoseHypothesis> {
         self.modes().into_iter().next().filter(|m| m.mass > self.p.decided)
     }
 
-    /// Entropy of the belief, nats: 0 when one cell has it all.
+    /// Entropy of the belief, nats; 0 when one cell holds all of it.
     pub fn entropy_nats(&self) -> f64 {
         self.grid.entropy_nats()
     }
 
-    /// Belief of the cell that holds a pose.
+    /// Probability of the cell that contains a pose.
     pub fn belief(&self, pose: &Pose2) -> f64 {
         self.grid.at(pose)
     }

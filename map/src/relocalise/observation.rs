@@ -3,34 +3,34 @@
 use crate::{place::LandmarkPlace, pose2::Pose2, visibility::VisibilityMap};
 use nalgebra::Matrix3;
 
-/// Most landmarks that one sighting may be.
+/// Most landmarks that one observation may be.
 pub const MAX_MEMBERS: usize = 256;
 
-/// A landmark that a sighting may be of.
+/// A landmark that an observation may be of.
 #[derive(Debug, Clone, Copy)]
 pub struct PossibleLandmark<'a> {
-    /// Where it hangs.
+    /// Place of the landmark, map frame.
     pub place: &'a LandmarkPlace,
-    /// From where it is seen; without it from everywhere.
+    /// Its visibility area; without it the landmark is visible from everywhere.
     pub visible: Option<&'a VisibilityMap>,
-    /// Probability that the sighting is of this one, by its looks alone. All members and clutter come to 1.
+    /// Probability of this landmark by appearance alone. All members and clutter sum to 1.
     pub probability: f64,
 }
 
-/// Something that was seen: the landmark's centre and the direction of its normal in the robot frame.
+/// The pose of an observed object in the robot frame: centre, and direction of its normal.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RelativeObservation {
     /// `robot_from_landmark` on the floor.
     pub robot_from_landmark: Pose2,
-    /// Of (x, y, theta).
+    /// Covariance over (x, y, theta).
     pub covariance: Matrix3<f64>,
 }
 
-/// A landmark that something may be, and how it was seen if it is.
+/// An observation assigned to one landmark.
 #[derive(Debug, Clone, Copy)]
 pub struct AssociationHypothesis<'a> {
-    /// Seen so.
+    /// The relative pose for this landmark's size and height.
     pub glimpse: RelativeObservation,
-    /// What it would be.
+    /// The landmark.
     pub member: PossibleLandmark<'a>,
 }

@@ -1,34 +1,34 @@
-//! Limits of the grid belief.
+//! Parameters of the grid belief.
 
 use crate::check::{self, OutOfRange};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
-/// Knobs of the belief.
+/// Parameters of the grid belief.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct GridBeliefParams {
-    /// Side of a cell; 0.05 to 2 m.
+    /// Side of a cell, 0.05 to 2 m.
     pub cell_m: f64,
-    /// Headings in a turn; 4 to 360.
+    /// Headings in a full turn, 4 to 360.
     pub headings: usize,
-    /// Probability that a sighting is of something that is not on the map.
+    /// Probability that an observation is of no landmark of the map, 0 to 1.
     pub clutter: f64,
-    /// How far such things are seen: they may be anywhere within this.
+    /// Such objects are uniformly distributed within this distance, metres.
     pub clutter_reach_m: f64,
-    /// Share of the belief that is spread evenly at every motion: the robot may have been carried away.
+    /// Share of the belief that is spread uniformly at every motion, for a kidnapped robot, 0 to 1.
     pub carried: f64,
-    /// Probability that a landmark in sight is recognised.
+    /// Probability that a visible landmark is recognised, 0 to 1.
     pub detection: f64,
-    /// Standard deviation along a motion after 1 m (grows with the square root).
+    /// Standard deviation of a motion after 1 m, metres; grows with the square root of the distance.
     pub along_m: f64,
-    /// The same of the heading.
+    /// Standard deviation of the heading after 1 m or 1 rad, radians.
     pub turn_rad: f64,
-    /// A mode with more than this is the pose.
+    /// A hypothesis with a higher probability is the pose.
     pub decided: f64,
-    /// Poses within this of a peak, and [`Self::mode_rad`], belong to its mode.
+    /// Poses within this distance of a peak belong to its hypothesis, metres,
     pub mode_m: f64,
-    /// See [`Self::mode_m`].
+    /// if their headings differ by at most this, radians.
     pub mode_rad: f64,
 }
 

@@ -1,30 +1,30 @@
-//! Where a scan lies when no good guess is at hand: every pose of a window is tried against a field that is high near
-//! the reference's surfaces, coarse to fine, without missing the best one (correlative matching, Olson 2009, by branch
-//! and bound). In: reference scans, points, a window. Out: the best pose of the grid and whether another is as good.
+//! Correlative scan matching (Olson 2009) by branch and bound: every pose of a window is compared with a likelihood
+//! field of the reference, coarse to fine, without missing the best one. In: reference scans, points, a window. Out:
+//! the best pose of the grid, and by a second search whether another is as good.
 
 use super::cloud::Cloud;
 use crate::pose2::Pose2;
 use nalgebra::Point2;
 use serde::{Deserialize, Serialize};
 
-/// Most cells of a field; of a larger area the cells are larger.
+/// Most cells of a field; a larger area gets larger cells.
 const MAX_CELLS: usize = 4 << 20;
-/// Most turns that are tried.
+/// Most turns of a window.
 const MAX_TURNS: usize = 721;
 /// Coarsest level: blocks of 2^5 cells.
 const MAX_LEVEL: usize = 5;
-/// Most leaves and blocks looked at; then the best so far is the answer.
+/// Most blocks visited; then the best result so far counts.
 const MAX_VISITS: usize = 200_000;
 
-/// Knobs of the search.
+/// Parameters of correlative scan matching.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct CorrelativeParams {
-    /// Side of a cell.
+    /// Side of a cell, metres.
     pub cell_m: f64,
-    /// Distance from a surface at which the field has fallen to exp(-1/2).
+    /// Distance from a surface at which the field is exp(-1/2), metres.
     pub sigma_m: f64,
-    /// Step between turns.
+    /// Step between turns, radians.
     pub turn_rad: f64,
 }
 
@@ -34,13 +34,13 @@ impl Default for CorrelativeParams {
     }
 }
 
-/// The poses to try: a square and a range of turns around the middle.
+/// The poses to try: a square and a range of turns around a centre.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct PoseWindow {
     pub middle: Pose2,
     pub reach_m: f64,
     pub reach_rad: f64,
-    /// Score lost at the reach, by squares from the middle: breaks ties towards what odometry says.
+    /// Score lost at the border, quadratic from the centre: breaks ties towards odometry.
     pub pull: f64,
 }
 
@@ -48,23 +48,23 @@ pub(crate) struct PoseWindow {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct GridMatch {
     pub pose: Pose2,
-    /// Mean of the field over the points, 0 to 1, less the pull.
+    /// Mean of the field over the points, 0 to 1, less the loss by distance from the centre.
     pub score: f64,
 }
 
-/// High near surfaces.
+/// A grid with high values near surfaces.
 #[derive(Debug, Clone)]
 pub(crate) struct LikelihoodField {
     low: Point2<f64>,
     cell_m: f64,
     width: usize,
     height: usize,
-    /// Level k: the highest value of the 2^k x 2^k cells from here on, up and to the right.
+    /// Level k: the largest value of the 2^k x 2^k cells from each cell on, up and to the right.
     levels: Vec<Vec<u8>>,
 }
 
 impl LikelihoodField {
-    /// Of scans, no farther than `reach_m` from `middle`; good for windows up to `window_m`.
+    /// The field of scans within `reach_m` of `middle`, for windows up to `window_m`.
     pub(crate) fn new<'a>(
         scans: impl Iterator<Item = (Pose2, &'a Cloud)>,
         middle: &Point2<f64>,
@@ -126,7 +126,7 @@ impl LikelihoodField {
         (((p.x - self.low.x) / self.cell_m).floor() as i64, ((p.y - self.low.y) / self.cell_m).floor() as i64)
     }
 
-    /// The best pose of a window with a score above `at_least`, leaving out those within `not` (metres and radians of a
+    /// The best pose of a window with a score above `at_least`, except those within `not` (metres and radians of a
     /// pose).
     pub(crate) fn search(
         &self,
@@ -221,7 +221,7 @@ impl Search<'_> {
     }
 
     fn best(&self, mut open: Vec<Block>, at_least: f64) -> Option<GridMatch> {
-        // Last is best; equal ones stay in the order they were made.
+        // The best block is last; the sort is stable.
         let order = |a: &Block, b: &Block| a.bound.total_cmp(&b.bound);
         open.retain(|b| b.bound > at_least);
         open.sort_by(order);
@@ -268,7 +268,7 @@ impl Search<'_> {
     }
 }
 
-/// Points of the surfaces, a cell apart.
+/// Points of the surfaces at the distance of a cell.
 fn samples<'a>(
     scans: impl Iterator<Item = (Pose2, &'a Cloud)>,
     middle: &Point2<f64>,
@@ -295,7 +295,7 @@ fn samples<'a>(
     samples
 }
 
-/// From blocks of `step` cells to blocks of twice that.
+/// The next coarser level from blocks of `step` cells.
 fn coarser(fine: &[u8], width: usize, height: usize, step: usize) -> Vec<u8> {
     let mut across = fine.to_vec();
     for row in across.chunks_exact_mut(width) {

@@ -1,6 +1,6 @@
-//! From a good guess to the pose itself: points of a scan onto the surfaces of others, distances measured across the
-//! surface only, so that what the walls do not tell stays untold (method 17.4 in the form of points). In: a guess,
-//! perhaps a prior. Out: the pose and what the walls alone say of it, as information: 0 along a bare corridor.
+//! Point-to-line ICP: refines a good guess. Points of a scan are matched to surfaces of others, with distances across
+//! the surface only (method 17.4 for points). In: a guess, an optional prior. Out: the pose and its information by
+//! the walls alone: zero along a bare corridor.
 
 use crate::{
     pose2::Pose2,
@@ -9,27 +9,27 @@ use crate::{
 use nalgebra::{Matrix3, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
-/// Knobs of the alignment.
+/// Parameters of the ICP.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct IcpParams {
-    /// How far a point's surface is looked for at first...
+    /// Search radius for a point's surface at first, metres,
     pub start_radius_m: f64,
-    /// ...and at last.
+    /// and at last, metres.
     pub end_radius_m: f64,
-    /// Surfaces that turn more than this against each other are not one.
+    /// Largest angle between matched surfaces, radians.
     pub max_turn_rad: f64,
-    /// Most iterations.
+    /// Largest number of iterations.
     pub iterations: usize,
-    /// Smallest standard deviation of a point across its surface.
+    /// Smallest standard deviation of a point across its surface, metres.
     pub sigma_m: f64,
-    /// Beyond it a point's weight falls off.
+    /// Distance beyond which a point's weight falls off, metres.
     pub outlier_m: f64,
-    /// Points that err together: their number is divided by this.
+    /// Number of points with a common error; the information is divided by it.
     pub correlated: f64,
-    /// Standard deviation that no number of points removes: position.
+    /// Smallest standard deviation of the position, whatever the number of points, metres.
     pub floor_m: f64,
-    /// The same for the heading.
+    /// Smallest standard deviation of the heading, radians.
     pub floor_rad: f64,
 }
 
@@ -49,27 +49,27 @@ impl Default for IcpParams {
     }
 }
 
-/// A prior of the pose: its mean and information.
+/// A prior pose: mean and information.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct PosePrior {
     pub pose: Pose2,
     pub information: Matrix3<f64>,
 }
 
-/// How a scan lies on its reference.
+/// A matched scan.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct IcpResult {
-    /// `reference_from_robot`.
+    /// Pose of the robot in the reference frame.
     pub pose: Pose2,
-    /// Of (x, y, theta), by the points alone, without the prior; singular where they say nothing.
+    /// Information over (x, y, theta) by the points alone; singular where they determine nothing.
     pub information: Matrix3<f64>,
-    /// Share of the scan's flat points that have a surface.
+    /// Share of the scan's flat points with a surface, 0 to 1.
     pub matched: f64,
-    /// Root mean square distance of those from it.
+    /// Root mean square distance of those points, metres.
     pub rms_m: f64,
 }
 
-/// Fits `scan` to `reference` from `guess` on. `None` if fewer than three points have a surface.
+/// Matches `scan` to `reference`, starting at `guess`. `None` if fewer than three points have a surface.
 pub(crate) fn align(
     reference: &SurfaceIndex,
     scan: &Cloud,
@@ -86,11 +86,11 @@ pub(crate) fn align(
         let (mut h, mut g) = (sums.h * scale, sums.g * scale);
         done = Some((sums.clone(), scale));
         if let Some(prior) = prior {
-            // What the walls only feign to tell would hold the pose at the guess against the prior.
+            // Without the correction, noise of the normals would hold the pose at the guess against the prior.
             h = sums.told() * scale + prior.information;
             g += prior.information * pose.minus(&prior.pose);
         }
-        // A little damping: where nothing is known the pose stays.
+        // Slight damping keeps the pose where it is not determined.
         let damped = h + Matrix3::from_diagonal(&Vector3::new(1e-3, 1e-3, 1e-3));
         let d = damped.cholesky()?.solve(&-g);
         pose = pose.plus(&d);
@@ -114,12 +114,12 @@ pub(crate) fn align(
     })
 }
 
-/// Sums over the matched points: normal equations with unit variance, and the residuals.
+/// Normal equations with unit variance, and residuals, over the matched points.
 #[derive(Debug, Clone)]
 struct Sums {
     h: Matrix3<f64>,
     g: Vector3<f64>,
-    /// What the noise of the normals adds to `h`.
+    /// Part of `h` that the noise of the normals adds.
     by_noise: Matrix3<f64>,
     squares: f64,
     weights: f64,
@@ -127,10 +127,10 @@ struct Sums {
 }
 
 impl Sums {
-    /// The information without what only the noise of the normals feigns: walls of a bare corridor seem to look a little
-    /// along it, now here, now there.
+    /// The information without the part by noise of the normals: walls of a bare corridor seem to face slightly along
+    /// it.
     fn told(&self) -> Matrix3<f64> {
-        // Metres and radians weigh alike at the mean distance of the points.
+        // Metres and radians have equal weight at the mean distance of the points.
         let arm = (self.h[(2, 2)] / (self.h[(0, 0)] + self.h[(1, 1)]).max(1e-12)).sqrt().clamp(0.1, 100.0);
         let unit = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, 1.0 / arm));
         let back = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, arm));
@@ -150,7 +150,7 @@ fn sums(reference: &SurfaceIndex, scan: &Cloud, pose: &Pose2, radius_m: f64, p: 
     let (mut h, mut g) = (Matrix3::zeros(), Vector3::zeros());
     let mut by_noise = Matrix3::zeros();
     let (mut squares, mut weights, mut points) = (0.0, 0.0, 0);
-    // While the radius is wide, so is the kernel: the first steps have far to go.
+    // The kernel is as wide as the radius, since the first steps are long.
     let outlier2 = (p.outlier_m * (radius_m / p.end_radius_m)).powi(2);
     for point in &scan.points {
         let Some(n) = point.normal else { continue };

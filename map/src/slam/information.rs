@@ -1,14 +1,14 @@
-//! Covariances and information matrices that may be singular.
+//! Covariance and information matrices that may be singular.
 
 use nalgebra::{Matrix3, Vector3};
 
-/// Inverse of a covariance that may be singular; as information it may not be.
+/// Information of a covariance that may be singular.
 pub(crate) fn inverse(m: &Matrix3<f64>) -> Matrix3<f64> {
     let floor = Matrix3::from_diagonal(&Vector3::new(1e-8, 1e-8, 1e-9));
     (m + floor).cholesky().map_or_else(Matrix3::zeros, |c| c.inverse())
 }
 
-/// Covariance of an edge; where it knows nothing, 30 m.
+/// Covariance of a constraint; about 30 m where its information is zero.
 pub(super) fn spread(information: &Matrix3<f64>) -> Matrix3<f64> {
     let floor = Matrix3::from_diagonal(&Vector3::new(1e-3, 1e-3, 1e-1));
     (information + floor).cholesky().map_or_else(|| Matrix3::identity() * 1e3, |c| c.inverse())

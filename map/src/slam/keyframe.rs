@@ -1,4 +1,4 @@
-//! A pose whose scan stays in the pose graph.
+//! Keyframe: a pose whose scan stays in the pose graph.
 
 use crate::{pose2::Pose2, segments::LaserSegment, slam::cloud::Cloud};
 
@@ -9,6 +9,6 @@ pub(crate) struct Keyframe {
     pub odom: Pose2,
     pub cloud: Cloud,
     pub lines: Vec<LaserSegment>,
-    /// Way driven up to here.
+    /// Distance driven up to here, metres.
     pub path_m: f64,
 }

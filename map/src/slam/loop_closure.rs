@@ -1,6 +1,6 @@
-//! Places met again. In: the key poses and how surely they are known relative to each other. Out: edges between poses
-//! that the path has not joined. A loop is taken only if the scans agree, nothing is seen through, no other place in the
-//! window fits as well, and, from far off, if several loops in a row say the same.
+//! Loop closure: constraints between keyframes far apart on the path. In: keyframes with relative covariances. Out:
+//! constraints. A loop is closed only if the scans match, no beam passes through a wall, no other pose in the window
+//! fits as well, and, with a large uncertainty, if several loops agree.
 
 mod params;
 mod reach;

@@ -1,4 +1,4 @@
-//! Builds a map scan by scan, and finishes it.
+//! Builds a map scan by scan and finishes it.
 
 use crate::{
     check::OutOfRange,
@@ -22,9 +22,9 @@ use nalgebra::{Matrix3, Vector3};
 
 /// Most scans of one map.
 pub const MAX_SCANS: usize = 500_000;
-/// Most key poses of one map; when they are reached, scans are still placed but add nothing.
+/// Most keyframes of one map; further scans are placed but add nothing.
 pub const MAX_KEYS: usize = 20_000;
-/// Most key poses whose covariance is computed; the others take that of the one before.
+/// Most keyframes whose covariance is computed; the others take that of the one before.
 const MAX_COVARIANCES: usize = 400;
 
 /// Why no map can be made.
@@ -33,50 +33,50 @@ pub enum SlamError {
     /// Odometry is out of range.
     #[error(transparent)]
     OutOfRange(#[from] OutOfRange),
-    /// Too many scans.
+    /// There are [`MAX_SCANS`] scans already.
     #[error("more than {MAX_SCANS} scans")]
     TooMany,
-    /// The key poses cannot be fitted.
+    /// The pose graph cannot be optimised.
     #[error(transparent)]
     Graph(#[from] GraphError),
 }
 
-/// A scan's place: relative to a key pose, which may still move.
+/// A scan's pose relative to a keyframe, which may still move.
 #[derive(Debug, Clone, Copy)]
 struct Placed {
     key: usize,
     key_from_robot: Pose2,
 }
 
-/// Builds a map scan by scan.
+/// A map that is being built.
 #[derive(Debug, Clone)]
 pub struct Slam {
     params: SlamParams,
     keys: Vec<Keyframe>,
-    /// Between key poses that follow one another.
+    /// Constraints between consecutive keyframes.
     path: Vec<PoseConstraint>,
     closures: LoopCloser,
     placed: Vec<Placed>,
     tracker: ScanMatcher,
 }
 
-/// The finished map.
+/// A finished map.
 #[derive(Debug, Clone)]
 pub struct SlamMap {
     /// `map_from_robot` of every scan, in order.
     pub path: Vec<Pose2>,
-    /// The key poses: index of the scan, pose and covariance relative to the first.
+    /// Keyframes: index of the scan, pose, and covariance relative to the first.
     pub keys: Vec<(usize, Pose2Covariance)>,
-    /// Loops that were closed, by key pose.
+    /// Loop closures, by keyframe.
     pub loops: Vec<LoopClosure>,
-    /// Loops that looked right but were refused.
+    /// Loop closures refused after their match.
     pub refused: usize,
-    /// The walls.
+    /// Walls, map frame.
     pub walls: Vec<LaserSegment>,
 }
 
 impl Slam {
-    /// No scan yet.
+    /// An empty map.
     pub fn new(params: SlamParams) -> Self {
         Self {
             params,
@@ -88,7 +88,7 @@ impl Slam {
         }
     }
 
-    /// Takes the next scan and the odometry of its moment. Gives the robot's pose in the map so far.
+    /// Adds the next scan with the odometry of its time. Gives the robot's pose in the present map.
     pub fn add(&mut self, odom_from_robot: &Pose2, scan: &Scan) -> Result<Pose2, SlamError> {
         odom_from_robot.check()?;
         if self.placed.len() >= MAX_SCANS {
@@ -120,7 +120,7 @@ impl Slam {
         Ok(self.keys[last].pose.compose(&seen.key_from_robot.pose))
     }
 
-    /// How many scans were taken.
+    /// Number of scans added.
     pub fn scans(&self) -> usize {
         self.placed.len()
     }
@@ -132,7 +132,7 @@ impl Slam {
         self.tracker.start(&self.keys, &self.params);
     }
 
-    /// Fits everything once more and collects the walls.
+    /// Runs the final fit and collects the walls.
     pub fn finish(mut self) -> Result<SlamMap, SlamError> {
         let refined = refine(&mut self.keys, &self.path, &mut self.closures, &self.params)?;
         let poses: Vec<Pose2> = self.keys.iter().map(|k| k.pose).collect();
@@ -158,8 +158,8 @@ impl Slam {
 }
 
 impl Slam {
-    /// The walls, their covariance relative to the first pose. Sightings are joined by how surely the scans lie on each
-    /// other, which is far better than where they lie in the map; that is added at the end.
+    /// Walls with covariance relative to the first pose. Lines are merged with the relative covariance of
+    /// neighbouring scans, which is far smaller than that of the map; the latter is added at the end.
     fn walls(&self, known: &impl Fn(usize) -> Pose2Covariance) -> Result<Vec<LaserSegment>, SlamError> {
         let p = &self.params;
         let near = Vector3::new(p.near_m.powi(2), p.near_m.powi(2), p.near_rad.powi(2));

@@ -1,4 +1,4 @@
-//! Limits of mapping.
+//! Parameters of mapping.
 
 use crate::{
     lines::LineParams,
@@ -9,49 +9,49 @@ use crate::{
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
-/// Knobs of mapping.
+/// Parameters of mapping.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SlamParams {
-    /// Points of a scan.
+    /// Extraction of surface points.
     pub cloud: CloudParams,
-    /// Search for a pose near the predicted one.
+    /// Correlative search near the predicted pose.
     pub search: CorrelativeParams,
-    /// The last step of every match.
+    /// Point-to-line ICP, the last step of every match.
     pub align: IcpParams,
-    /// Loops.
+    /// Loop closure.
     pub loops: LoopParams,
-    /// The final fit.
+    /// Final fit.
     pub refine: RefineParams,
-    /// Segments of a scan.
+    /// Line extraction of the keyframes.
     pub lines: LineParams,
-    /// Walls from segments.
+    /// Merging of lines into walls.
     pub walls: WallParams,
-    /// How surely neighbouring key scans lie on each other: position, for joining their segments to walls...
+    /// Standard deviation between neighbouring keyframes when their lines are merged into walls: position, metres,
     pub near_m: f64,
-    /// ...and heading.
+    /// and heading, radians.
     pub near_rad: f64,
-    /// Odometry: standard deviation of the position per metre driven.
+    /// Odometry: standard deviation of the position per metre driven, metres.
     pub odometry_m_per_m: f64,
-    /// Of the heading per metre driven.
+    /// Odometry: standard deviation of the heading per metre driven, radians.
     pub odometry_rad_per_m: f64,
-    /// Of the heading per radian turned.
+    /// Odometry: standard deviation of the heading per radian turned, radians.
     pub odometry_rad_per_rad: f64,
-    /// Of the position, whatever the motion.
+    /// Odometry: standard deviation of the position for any motion, metres.
     pub odometry_m: f64,
-    /// Of the heading, whatever the motion.
+    /// Odometry: standard deviation of the heading for any motion, radians.
     pub odometry_rad: f64,
-    /// A new key pose after this way...
+    /// A new keyframe after this distance, metres,
     pub key_m: f64,
-    /// ...or this turn...
+    /// or after this turn, radians,
     pub key_rad: f64,
-    /// ...or when less than this share of a scan is seen again.
+    /// or when a smaller share of the scan matches.
     pub key_matched: f64,
-    /// Key scans that make up the recent map.
+    /// Keyframes of the recent map, at most this many
     pub recent_keys: usize,
-    /// And no older than this way.
+    /// and no older than this distance, metres.
     pub recent_m: f64,
-    /// A match with a smaller share of the scan is none: odometry alone counts.
+    /// With a smaller share of the scan matched, odometry alone counts.
     pub min_matched: f64,
 }
 
@@ -101,21 +101,21 @@ impl SlamParams {
     }
 }
 
-/// Knobs of the final fit.
+/// Parameters of the final fit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RefineParams {
-    /// How often.
+    /// Number of rounds.
     pub rounds: usize,
-    /// Partners of each key scan among those before it, the nearest.
+    /// Keyframes that each one is matched with: the nearest.
     pub partners: usize,
-    /// Partners are not farther off than this.
+    /// Partners are at most this far apart, metres.
     pub near_m: f64,
-    /// Least share of the points that find their surface.
+    /// Least share of matched points.
     pub min_matched: f64,
-    /// An alignment that moves a pose more than this is a mistake.
+    /// Matches that move a pose by more than this are refused, metres.
     pub max_move_m: f64,
-    /// Key scans of one part of the path that are counted as one: their errors are the same.
+    /// A constraint's weight falls off beyond this chi2.
     pub doubt_chi2: f64,
 }
 

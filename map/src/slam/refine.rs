@@ -1,5 +1,5 @@
-//! The final fit: every key scan aligned with those that see the same, one by one, and all poses fitted to all of it,
-//! a few times over. In: key poses that are nearly right. Out: better ones, and the edges that hold them.
+//! The final fit: every keyframe is matched to others of the same place, and all poses are fitted to the results, in
+//! a few rounds. In: keyframes that are nearly right. Out: better poses, and the constraints that determine them.
 
 use crate::{
     pose2::Pose2,
@@ -13,7 +13,7 @@ use crate::{
     },
 };
 
-/// Moves the keys; gives all edges of the last fit.
+/// Moves the keyframes; gives all constraints of the last fit.
 pub(super) fn refine(
     keys: &mut [Keyframe],
     path: &[PoseConstraint],
@@ -41,7 +41,7 @@ pub(super) fn refine(
     Ok(edges)
 }
 
-/// Alignments of key scans with their nearest partners.
+/// Matches of keyframes with their nearest partners.
 fn pairs(keys: &[Keyframe], p: &SlamParams) -> Vec<PoseConstraint> {
     let r = &p.refine;
     let mut edges = Vec::new();
@@ -53,13 +53,13 @@ fn pairs(keys: &[Keyframe], p: &SlamParams) -> Vec<PoseConstraint> {
             .enumerate()
             .map(|(k, other)| {
                 let between = key.pose.between(&other.pose);
-                // A turn hides as much as a way of its own.
+                // A turn changes the visible walls as much as a distance.
                 (i + 1 + k, between.position().norm() + between.theta_rad.abs())
             })
             .filter(|(_, d)| *d <= r.near_m)
             .collect();
         near.sort_by(|a, b| a.1.total_cmp(&b.1));
-        // Half from near in time, half from another time.
+        // Half of the partners from the same passage, half from others.
         let later = |k: usize| keys[k].path_m - key.path_m > p.loops.min_way_m;
         let same = near.iter().filter(|(k, _)| !later(*k)).take(r.partners.div_ceil(2));
         let other = near.iter().filter(|(k, _)| later(*k)).take(r.partners.div_ceil(2));

@@ -1,5 +1,5 @@
-//! Follows the robot from scan to scan: odometry predicts, the recent key scans correct. In: a scan. Out: where it lies
-//! relative to the last key pose, and whether it should become one itself.
+//! Scan matching from scan to scan: odometry predicts, the recent keyframes correct. In: a scan. Out: its pose
+//! relative to the last keyframe, and whether it should become one.
 
 use crate::{
     pose2::{Pose2, Pose2Covariance},
@@ -15,35 +15,35 @@ use crate::{
 };
 use nalgebra::{Matrix3, Point2};
 
-/// Largest distance of the robot from where odometry says that is still looked at.
+/// Largest searched distance from the predicted position, metres.
 const MAX_REACH_M: f64 = 1.2;
-/// The same for the heading.
+/// Largest searched turn from the predicted heading, radians.
 const MAX_REACH_RAD: f64 = 0.7;
 
-/// Where a scan lies.
+/// The pose of a scan.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ScanPlacement {
-    /// With covariance in the key's frame.
+    /// Pose relative to the last keyframe, with covariance in its frame.
     pub key_from_robot: Pose2Covariance,
-    /// It should become a key scan.
+    /// Whether the scan should become a keyframe.
     pub is_new: bool,
 }
 
-/// The recent map, in the frame of the last key pose.
+/// The recent map, in the frame of the last keyframe.
 #[derive(Debug, Clone, Default)]
 pub(super) struct ScanMatcher {
     recent: Option<(SurfaceIndex, LikelihoodField)>,
-    /// The last scan in the key's frame.
+    /// Pose of the last scan in the keyframe's frame.
     last: Pose2,
-    /// Covariance of the last scan's pose.
+    /// Covariance of that pose.
     spread: Matrix3<f64>,
-    /// What odometry alone says since the key.
+    /// Covariance since the keyframe by odometry alone.
     by_odometry: Matrix3<f64>,
     odom: Pose2,
 }
 
 impl ScanMatcher {
-    /// A new key pose: the recent map is laid anew around it.
+    /// Rebuilds the recent map around a new keyframe.
     pub(super) fn start(&mut self, keys: &[Keyframe], p: &SlamParams) {
         let Some(key) = keys.last() else { return };
         self.relaid(keys, p);
@@ -52,7 +52,7 @@ impl ScanMatcher {
         self.odom = key.odom;
     }
 
-    /// The key poses have moved.
+    /// Rebuilds the recent map after the keyframes have moved.
     pub(super) fn relaid(&mut self, keys: &[Keyframe], p: &SlamParams) {
         let Some(key) = keys.last() else { return };
         let first = keys.len().saturating_sub(p.recent_keys.max(1));
@@ -66,7 +66,7 @@ impl ScanMatcher {
         self.recent = Some((reference, field));
     }
 
-    /// Finds the scan near the place that odometry says.
+    /// Matches a scan near the pose predicted by odometry.
     pub(super) fn track(
         &mut self,
         keys: &[Keyframe],
@@ -102,13 +102,8 @@ impl ScanMatcher {
     }
 }
 
-/// The best pose around the predicted one on the grid; the predicted one if none is good.
-pub(super) fn guess(
-    field: &LikelihoodField,
-    cloud: &Cloud,
-    predicted: &Pose2Covariance,
-    p: &SlamParams,
-) -> Pose2 {
+/// The best pose around the predicted one on the grid; the predicted one if none scores well.
+fn guess(field: &LikelihoodField, cloud: &Cloud, predicted: &Pose2Covariance, p: &SlamParams) -> Pose2 {
     let c = &predicted.covariance;
     let sigma_m = c[(0, 0)].max(c[(1, 1)]).max(0.0).sqrt();
     let window = PoseWindow {
@@ -121,7 +116,7 @@ pub(super) fn guess(
     field.search(&points, &window, 0.3, None, &p.search).map_or(predicted.pose, |f| f.pose)
 }
 
-/// Not farther from the prediction than odometry can err.
+/// Whether a pose is within the error of odometry from the prediction.
 fn fits(pose: &Pose2, predicted: &Pose2Covariance) -> bool {
     let d = pose.minus(&predicted.pose);
     d.dot(&(inverse(&predicted.covariance) * d)) < 50.0

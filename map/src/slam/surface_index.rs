@@ -1,16 +1,16 @@
-//! Points of several scans laid together, found again by place: what a scan is aligned with. In: scans at poses. Out:
-//! the nearest surface point of a similar direction.
+//! Surface points of several scans in one frame, indexed by position; scans are matched to them. In: scans at poses.
+//! Out: the nearest surface point of similar direction.
 
 use super::cloud::Cloud;
 use crate::pose2::Pose2;
 use nalgebra::{Point2, Vector2};
 
-/// Most buckets; of a larger area the buckets are larger.
+/// Most buckets; a larger area gets larger buckets.
 const MAX_BUCKETS: usize = 1 << 20;
 /// Most points; later ones are left out.
 const MAX_POINTS: usize = 1 << 20;
 
-/// A flat surface's point, reference frame.
+/// A point of a flat surface, reference frame.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Surface {
     pub at: Point2<f64>,
@@ -25,13 +25,13 @@ pub(crate) struct SurfaceIndex {
     bucket_m: f64,
     width: usize,
     height: usize,
-    /// Where each bucket begins in `surfaces`.
+    /// Index in `surfaces` at which each bucket begins.
     starts: Vec<u32>,
     surfaces: Vec<Surface>,
 }
 
 impl SurfaceIndex {
-    /// Lays the flat points of `scans` together; `bucket_m` is the largest radius of [`SurfaceIndex::nearest`].
+    /// Indexes the flat points of `scans`; `bucket_m` is the largest radius of [`SurfaceIndex::nearest`].
     pub(crate) fn new<'a>(scans: impl Iterator<Item = (Pose2, &'a Cloud)>, bucket_m: f64) -> Self {
         let mut all = Vec::new();
         for (pose, cloud) in scans {
@@ -84,7 +84,8 @@ impl SurfaceIndex {
         Self { low, bucket_m, width, height, starts, surfaces }
     }
 
-    /// The nearest surface point within `radius_m` (at most a bucket) whose normal turns less than `cos_turn` says.
+    /// The nearest surface point within `radius_m` (at most a bucket) whose normal differs by less than `cos_turn`
+    /// says.
     pub(crate) fn nearest(
         &self,
         p: &Point2<f64>,

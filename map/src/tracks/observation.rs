@@ -7,50 +7,50 @@ use vision::{
     recognise::{IconFeatures, LandmarkId},
 };
 
-/// What is known of who is seen.
+/// What recognition says of a quad.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Identity {
-    /// No landmark of the map, nor nearly.
+    /// No landmark of the map, nor nearly one.
     Stranger,
-    /// This landmark beyond doubt.
+    /// This landmark, uniquely.
     Landmark(LandmarkId),
-    /// It may be a landmark of the map.
+    /// Possibly a landmark of the map.
     Doubtful,
 }
 
 /// One quad of a frame.
 #[derive(Debug, Clone)]
 pub struct QuadObservation {
-    /// Where in the picture.
+    /// Corners in the image, px.
     pub corners_px: Corners,
-    /// Its icon.
+    /// Features of its icon.
     pub icon: IconFeatures,
-    /// Where on the walls, if that is known.
+    /// Place on the walls, if known.
     pub place: Option<LandmarkPlace>,
-    /// Who it is.
+    /// What recognition says of it.
     pub identity: Identity,
 }
 
-/// What came of a glimpse.
+/// What the tracker did with a quad.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum TrackOutcome {
-    /// A view to keep in this track.
+    /// The view is to be kept in the track of this number.
     Keep(u32),
-    /// Followed; the track has a view like it.
+    /// Followed; the track has a near-duplicate of the view.
     Alike,
-    /// Followed, but not seen often enough yet to be kept.
+    /// Followed; not observed often enough yet to be kept.
     TooNew,
-    /// The track has all the views it may have.
+    /// The track has [`super::MAX_TRACK_VIEWS`] views.
     Full,
-    /// Somebody has decided on its track.
+    /// A person has decided on the track.
     Decided,
-    /// It may be a landmark of the map, or is one whose views are not wanted.
+    /// It may be a landmark of the map, or is one whose views are not requested.
     Known,
-    /// No landmark, and only views of landmarks are wanted.
+    /// It is no landmark, and only views of landmarks are requested.
     Unwanted,
-    /// It lies where a track lies and looks different.
+    /// Its appearance does not match the track at its place.
     Unlike,
-    /// Too many tracks.
+    /// There are [`super::MAX_TRACKS`] tracks.
     TooMany,
 }

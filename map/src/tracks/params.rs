@@ -1,32 +1,32 @@
-//! Limits of the tracker.
+//! Parameters of the tracker.
 
 use serde::{Deserialize, Serialize};
 use vision::learn::thinning::ThinningParams;
 
-/// Knobs of following.
+/// Parameters of the tracker.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct GatherParams {
-    /// Glimpses of a thing that is no landmark before the first is kept: what is seen once is mostly nothing.
+    /// Observations of an unknown object before its first view is kept: most single observations are noise.
     pub min_sightings: u32,
-    /// A track without kept views is forgotten when it was not seen for so long, seconds.
+    /// A track without kept views is forgotten when it was not observed for this long, seconds.
     pub memory_s: f64,
-    /// By the picture alone a thing is followed over gaps of at most so long, seconds.
+    /// By the image alone an object is followed over gaps of at most this long, seconds.
     pub gap_s: f64,
-    /// By the picture alone: least intersection over union of the quads.
+    /// By the image alone: least intersection over union of the quads, 0 to 1.
     pub min_iou: f64,
-    /// By place: centres at most so far apart, as a share of the longer side...
+    /// By place: largest distance of the centres, as a share of the longest side.
     pub centre_share: f64,
-    /// ... sides within this ratio...
+    /// By place: largest ratio of the sides.
     pub size_ratio: f64,
-    /// ... and normals within this angle.
+    /// By place: largest angle between the normals, radians.
     pub normal_rad: f64,
-    /// Largest C^r to the icons of the track: the cap that tau of C^r has where nothing else is known
-    /// (`vision::learn::model::LearnParams`), beyond which no painting was like another.
+    /// Largest C^r to the icons of the track: the upper limit of the C^r threshold where nothing else is known
+    /// (`vision::learn::model::LearnParams`).
     pub max_correlation: f64,
-    /// From half of [`MAX_TRACK_VIEWS`] on a view must be so many times farther from the others.
+    /// From half of [`super::MAX_TRACK_VIEWS`] on a view must be farther from the others by this factor.
     pub late_novelty: f64,
-    /// What is new.
+    /// What counts as a new view.
     pub thinning: ThinningParams,
 }
 

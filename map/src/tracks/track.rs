@@ -11,24 +11,24 @@ use vision::{
 
 /// Most views kept of a track.
 pub const MAX_TRACK_VIEWS: usize = 40;
-/// Icons of a track that a new glimpse is compared with: the last one, and so many spread over the kept ones.
+/// Icons of a track that a new observation is compared with: the last one, and this many spread over the kept views.
 pub(super) const LOOKS_KEPT: usize = 4;
 
-/// One thing that was followed.
+/// One object that is followed.
 #[derive(Debug, Clone)]
 pub struct Track {
-    /// Counts from 1, never used twice.
+    /// Number of the track, from 1; never reused.
     pub number: u32,
-    /// The landmark whose views these are; `None` for a thing that is none yet.
+    /// The landmark whose views these are; `None` for an unknown object.
     pub landmark: Option<LandmarkId>,
-    /// Frames in which it was followed.
+    /// Frames in which it was observed.
     pub sightings: u32,
-    /// Of these, such in which it was taken for a landmark, or nearly.
+    /// Of these, frames in which it was recognised as a landmark, or nearly.
     pub known: u32,
     pub(super) closed: bool,
     pub(super) views: Vec<ViewDigest>,
     pub(super) looks: VecDeque<IconFeatures>,
-    /// Where it was on the walls when that was last known.
+    /// Last known place on the walls.
     pub(super) place: Option<LandmarkPlace>,
     pub(super) last: Option<Last>,
 }
@@ -56,7 +56,7 @@ impl Track {
         }
     }
 
-    /// Views kept.
+    /// Number of kept views.
     pub fn views(&self) -> usize {
         self.views.len()
     }
@@ -69,7 +69,7 @@ impl Track {
 
     pub(super) fn keep(&mut self, digest: ViewDigest, icon: &IconFeatures) {
         self.views.push(digest);
-        // The first ones and, later, every so often another: what it looked like on the way.
+        // The first views, later one at regular intervals.
         if self.looks.len() < LOOKS_KEPT {
             self.looks.push_back(icon.clone());
         } else if self.views.len().is_multiple_of(MAX_TRACK_VIEWS / LOOKS_KEPT) {
@@ -79,7 +79,7 @@ impl Track {
     }
 }
 
-/// The same rectangle of a wall, as well as one can tell.
+/// Whether two places are the same rectangle of a wall within the limits.
 pub(super) fn same_place(a: &LandmarkPlace, b: &LandmarkPlace, p: &GatherParams) -> bool {
     let longer = a.size.width_m.max(a.size.height_m).max(b.size.width_m).max(b.size.height_m);
     let apart = (a.x_m - b.x_m).hypot(a.y_m - b.y_m).hypot(a.z_m - b.z_m);
@@ -90,17 +90,17 @@ pub(super) fn same_place(a: &LandmarkPlace, b: &LandmarkPlace, p: &GatherParams)
         && wrap_rad(a.theta_rad - b.theta_rad).abs() <= p.normal_rad
 }
 
-/// A track as it was kept, without its views.
+/// A track as stored, without its views.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StoredTrack {
-    /// Its number.
+    /// Number of the track.
     pub number: u32,
-    /// The landmark whose views these are.
+    /// The landmark whose views these are; `None` for an unknown object.
     pub landmark: Option<LandmarkId>,
-    /// Frames in which it was followed.
+    /// Frames in which it was observed.
     pub sightings: u32,
-    /// Of these, such in which it was taken for a landmark, or nearly.
+    /// Of these, frames in which it was recognised as a landmark, or nearly.
     pub known: u32,
-    /// Where on the walls, by its views.
+    /// Place on the walls, by its views.
     pub place: Option<LandmarkPlace>,
 }

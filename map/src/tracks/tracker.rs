@@ -13,10 +13,10 @@ use vision::{
     recognise::{IconFeatures, LandmarkId},
 };
 
-/// Most tracks followed at once, those of a single glimpse included.
+/// Most tracks at once, those of a single observation included.
 pub const MAX_TRACKS: usize = 256;
 
-/// Follows what one robot drives past.
+/// The tracks of one robot.
 #[derive(Debug, Clone, Default)]
 pub struct ViewTracker {
     p: GatherParams,
@@ -25,13 +25,13 @@ pub struct ViewTracker {
 }
 
 impl ViewTracker {
-    /// Nothing followed yet.
+    /// A tracker without tracks.
     pub fn new(p: GatherParams) -> Self {
         Self { p, tracks: vec![], numbers: 0 }
     }
 
-    /// Takes up a track that was kept elsewhere, from its views in order. From now on it is found by its place only,
-    /// unless it is a landmark's. A number that is taken already is ignored.
+    /// Resumes a stored track from its views in order. It is found again by its place only, unless it is a
+    /// landmark's. A number that is in use is ignored.
     pub fn resume(&mut self, kept: StoredTrack, views: impl IntoIterator<Item = (Corners, IconFeatures)>) {
         let StoredTrack { number, landmark, sightings, known, place } = kept;
         if self.tracks.iter().any(|t| t.number == number) {
@@ -45,25 +45,25 @@ impl ViewTracker {
         self.numbers = self.numbers.max(number);
     }
 
-    /// Every track, oldest first.
+    /// All tracks, oldest first.
     pub fn tracks(&self) -> &[Track] {
         &self.tracks
     }
 
-    /// Somebody has decided on a track: no more views of that thing are kept.
+    /// Marks a track as decided by a person: no more views of the object are kept.
     pub fn close(&mut self, number: u32) {
         for track in self.tracks.iter_mut().filter(|t| t.number == number) {
             track.closed = true;
         }
     }
 
-    /// Numbers up to this one are taken.
+    /// Reserves the numbers up to this one.
     pub fn number_after(&mut self, number: u32) {
         self.numbers = self.numbers.max(number);
     }
 
-    /// The glimpses of one frame of `camera`, each answered in its place. `wanted`: views of such landmarks are kept;
-    /// `strangers`: things that are no landmark are.
+    /// Adds the quads of one frame of `camera` and gives the outcome of each. `wanted`: landmarks whose views are
+    /// requested; `strangers`: whether views of unknown objects are.
     pub fn update(
         &mut self,
         (at_ns, camera): (i64, &str),
@@ -92,7 +92,7 @@ impl ViewTracker {
             .collect()
     }
 
-    /// Which track each glimpse belongs to: the best pairs first, each track once.
+    /// Assigns quads to tracks: the best pairs first, each track once.
     fn assigned(
         &self,
         at_ns: i64,
@@ -131,7 +131,7 @@ impl ViewTracker {
         if let (Some(a), Some(b)) = (&track.place, &glimpse.place) {
             return same_place(a, b, &self.p);
         }
-        // A track taken up from elsewhere has not been seen yet: its looks alone say nothing of where it is.
+        // A resumed track has no last frame: appearance alone does not locate it.
         let Some(last) = &track.last else { return false };
         let gap_s = at_ns.saturating_sub(last.at_ns) as f64 * 1e-9;
         last.camera == camera
@@ -190,7 +190,7 @@ impl ViewTracker {
         }
     }
 
-    /// Forgets what was a glimpse only.
+    /// Forgets old tracks without views.
     fn clear_out(&mut self, now_ns: i64) {
         let memory_s = self.p.memory_s;
         let fresh = |t: &Track| {
@@ -200,13 +200,13 @@ impl ViewTracker {
     }
 }
 
-/// Where a glimpse lies among the tracks.
+/// Position of a quad among the tracks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Place {
-    /// Where no track is.
+    /// No track is there.
     Nowhere,
-    /// Where a track is that looks different.
+    /// A track of different appearance is there.
     Occupied,
-    /// In this track.
+    /// It belongs to this track.
     Track(usize),
 }

@@ -1,4 +1,4 @@
-//! The area from which one landmark is visible.
+//! The visibility area of one landmark.
 
 use crate::{
     check::OutOfRange,
@@ -14,18 +14,18 @@ use crate::{
 };
 use nalgebra::Point2;
 
-/// Most obstacles of one landmark's map; of more, the nearest.
+/// Most obstacles of one landmark's area; of more, the nearest.
 pub const MAX_OBSTACLES: usize = 20_000;
 
-/// From where one landmark can be seen.
+/// The visibility area of one landmark.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VisibilityMap {
     pub(super) frame: LocalFrame,
-    /// Centre of the landmark on the floor.
+    /// Centre of the landmark on the floor, metres, map frame.
     pub(super) centre: Point2<f64>,
-    /// Pan range of the viewer.
+    /// Pan range of the camera, radians.
     pub(super) pan_rad: [f64; 2],
-    /// Bounds of what is seen, over direction.
+    /// Bounds of the area over direction.
     quarters: [Quarter; 4],
     polygons: Vec<Polygon>,
     area_m2: f64,
@@ -38,9 +38,13 @@ pub struct VisibilityMap {
 ///
 /// A landmark that an obstacle cuts is seen from nowhere; neither is one that the camera cannot show large enough, or whole.
 /// Its roll counts for nothing.
-// Departs from method 12: no polygon Booleans, see the head of this file; the area is the same. Free space known
-// otherwise is not asked: what walls enclose they hide. Every condition is asked of the landmark moved off its wall, not only
-// what hides it: 5 cm of the way.
+// Departs from method 12: no polygon Booleans, see the module `visibility`; the area is the same. Free space is not an
+// input, since walls hide what they enclose. Every condition applies to the landmark moved off its wall, not only
+// occlusion: a difference of 5 cm.
+/// The visibility area of a landmark among `obstacles`: `O(M log M)` in those within reach.
+///
+/// A landmark that an obstacle cuts is visible from nowhere, and so is one that the camera cannot show large enough
+/// or as a whole. Its roll is ignored.
 pub fn visibility(
     place: &LandmarkPlace,
     obstacles: &[Obstacle],
@@ -76,7 +80,7 @@ pub fn visibility(
     Ok(made)
 }
 
-/// The obstacles that can matter to a landmark's map, in the order given: as long as these are the same, so is the map.
+/// The obstacles that can affect a landmark's area, in the order given: the area changes only if they do.
 pub fn within_reach(
     place: &LandmarkPlace,
     obstacles: &[Obstacle],
@@ -104,38 +108,38 @@ pub fn within_reach(
 }
 
 impl VisibilityMap {
-    /// The area as polygons, counter-clockwise, apart from each other.
+    /// The area as disjoint polygons, counter-clockwise.
     pub fn polygons(&self) -> &[Polygon] {
         &self.polygons
     }
 
-    /// Size of the area, square metres; 0 when the landmark is seen from nowhere.
+    /// Size of the area, square metres; 0 when the landmark is visible from nowhere.
     pub fn area_m2(&self) -> f64 {
         self.area_m2
     }
 
-    /// Centre of gravity of the area; it may lie outside of it. None when there is no area.
+    /// Centroid of the area, which may lie outside of it; `None` without an area.
     pub fn centroid(&self) -> Option<Point2<f64>> {
         self.centroid
     }
 
-    /// Nothing further from the landmark's middle is in the area.
+    /// Largest distance of the area from the landmark's centre, metres.
     pub fn reach_m(&self) -> f64 {
         self.reach_m
     }
 
-    /// The obstacles that were looked at ([`within_reach`]).
+    /// The obstacles that were considered ([`within_reach`]).
     pub fn obstacles(&self) -> &[Obstacle] {
         &self.obstacles
     }
 
-    /// Whether a camera at a point sees the landmark.
+    /// Whether the landmark is visible for a camera at a point.
     pub fn contains(&self, camera: &Point2<f64>) -> bool {
         let q = self.frame.local(camera);
         !self.polygons.is_empty() && q.coords.norm() <= self.reach_m && contains(&self.quarters, &q)
     }
 
-    /// Distance to the boundary of the area, positive inside; minus infinity when there is no area.
+    /// Distance to the boundary of the area, metres, positive inside; minus infinity without an area.
     pub fn margin_m(&self, camera: &Point2<f64>) -> f64 {
         let distance =
             self.polygons.iter().map(|p| p.boundary_distance_m(camera)).fold(f64::INFINITY, f64::min);

@@ -1,4 +1,4 @@
-//! Which landmarks a robot sees along a path, and where it sees none.
+//! Coverage of a path: which landmarks are visible along it, and where none is.
 
 use super::VisibilityMap;
 use crate::{
@@ -8,51 +8,51 @@ use crate::{
 use nalgebra::Point2;
 use vision::recognise::LandmarkId;
 
-/// Most places looked at along one path.
+/// Most samples of one path.
 pub const MAX_STEPS: usize = 10_000;
 
-/// One place of a path.
+/// Visible landmarks along a path.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CoverageSample {
-    /// Way from the start.
+    /// Distance from the start, metres.
     pub along_m: f64,
-    /// Where that is.
+    /// Position, metres, map frame.
     pub position: Point2<f64>,
-    /// The landmarks that are seen from there, by number.
+    /// Landmarks visible from there, by number.
     pub landmarks: Vec<LandmarkId>,
 }
 
-/// A piece of the path without any landmark.
+/// A part of the path without any visible landmark.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CoverageGap {
-    /// Way from the start at which it begins, and ends.
+    /// Distance from the start at which it begins, metres.
     pub from_m: f64,
-    /// Where it ends.
+    /// Distance from the start at which it ends, metres.
     pub to_m: f64,
 }
 
 /// What is seen along a path.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Coverage {
-    /// Length of the path.
+    /// Length of the path, metres.
     pub length_m: f64,
-    /// Place by place.
+    /// Samples in the order of the path.
     pub steps: Vec<CoverageSample>,
-    /// Where nothing is seen; to the step.
+    /// Parts without visible landmarks, at the resolution of the samples.
     pub gaps: Vec<CoverageGap>,
 }
 
 impl Coverage {
-    /// Share of the path's places from which some landmark is seen.
+    /// Share of the samples with a visible landmark, 0 to 1.
     pub fn share(&self) -> f64 {
         let seen = self.steps.iter().filter(|s| !s.landmarks.is_empty()).count();
         seen as f64 / self.steps.len().max(1) as f64
     }
 }
 
-/// Looks at a path of at least one point every `step_m` (0.01 to 10 m), and at its end.
+/// Samples a path of at least one point every `step_m` (0.01 to 10 m), and its end.
 ///
-/// The robot looks wherever its camera pans to when it drives forward.
+/// The robot drives forward; its camera pans within its range.
 pub fn coverage(
     path: &[Point2<f64>],
     step_m: f64,
@@ -98,7 +98,7 @@ fn seen(
     CoverageSample { along_m, position, landmarks }
 }
 
-/// From the last place that sees something to the next that does.
+/// Gaps from the last sample with a landmark to the next one.
 fn gaps(steps: &[CoverageSample]) -> Vec<CoverageGap> {
     let mut made: Vec<CoverageGap> = Vec::new();
     let mut open: Option<f64> = None;

@@ -1,10 +1,10 @@
-//! The landmark moved off its wall, and coordinates about it.
+//! Coordinates about the landmark, which is moved off its wall by the standoff.
 
 use crate::{place::LandmarkPlace, visibility::penumbra::Footprint};
 use nalgebra::{Point2, Vector2};
 use vision::localise::pose::LandmarkSize;
 
-/// Tilted less, a landmark hangs on a wall: what is behind it hides nothing.
+/// A landmark with a smaller tilt hangs on a wall: what is behind it hides nothing.
 const UPRIGHT_RAD: f64 = 1e-9;
 
 /// The frame whose origin is the landmark's middle, moved off its wall; x along the normal on the floor.

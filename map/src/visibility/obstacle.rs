@@ -1,16 +1,16 @@
-//! What hides landmarks.
+//! Obstacles: straight objects on the floor that hide landmarks.
 
 use crate::{place::LandmarkPlace, visibility::settings::PanTiltCamera};
 use nalgebra::Point2;
 
-/// Something straight that stands on the floor and hides what is behind it.
+/// A straight object that stands on the floor and hides what is behind it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Obstacle {
-    /// One end, metres.
+    /// First end, metres, map frame.
     pub a: Point2<f64>,
-    /// The other.
+    /// Second end, metres, map frame.
     pub b: Point2<f64>,
-    /// How high it is; a wall of the laser map has none and hides everything.
+    /// Height above the floor, metres; `None` for a wall of the laser map, which hides everything.
     pub height_m: Option<f64>,
 }
 

@@ -1,8 +1,8 @@
-//! Quarter turns about a landmark.
+//! Rotations by quarter turns about a landmark.
 
 use nalgebra::Point2;
 
-/// A point in the frame of a quarter, whose x is its axis.
+/// A point in the frame of a quarter, whose x is the quarter's axis.
 pub(super) fn turned(p: &Point2<f64>, quarter: usize) -> Point2<f64> {
     match quarter % 4 {
         0 => *p,
@@ -12,7 +12,7 @@ pub(super) fn turned(p: &Point2<f64>, quarter: usize) -> Point2<f64> {
     }
 }
 
-/// Back from it.
+/// The inverse of [`turned`].
 pub(super) fn turned_back(p: &Point2<f64>, quarter: usize) -> Point2<f64> {
     turned(p, 4 - quarter % 4)
 }

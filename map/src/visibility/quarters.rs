@@ -13,9 +13,9 @@ use std::f64::consts::FRAC_PI_2;
 /// The bounds of one quarter.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Quarter {
-    /// Nearest bound beyond which nothing is seen; nothing is seen where there is none.
+    /// Farthest visible distance; nothing is visible where it is not defined.
     pub far: Envelope,
-    /// Bound within which it is too near; it reaches over all that `far` does.
+    /// Nearest visible distance; defined wherever `far` is.
     pub near: Envelope,
 }
 
@@ -45,7 +45,7 @@ pub(super) fn contains(quarters: &[Quarter; 4], q: &Point2<f64>) -> bool {
         (false, _, false) => 3,
     };
     let q = turned(q, quarter);
-    // The middle itself is as what is next to it.
+    // The centre itself counts as the point next to it.
     let ahead = q.x.max(2.0 * MIN_NEAR_M);
     let (slope, inverse) = (q.y / ahead, 1.0 / ahead);
     let Quarter { far, near } = &quarters[quarter];

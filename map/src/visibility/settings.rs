@@ -1,11 +1,11 @@
-//! The camera that is to see landmarks, and what counts as seen.
+//! The camera and the limits that define "visible".
 
 use crate::check::{self, OutOfRange};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_PI_2;
 use vision::localise::pose::LandmarkSize;
 
-/// The camera that is to see landmarks.
+/// The camera that should see landmarks.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct PanTiltCamera {
@@ -15,16 +15,16 @@ pub struct PanTiltCamera {
     pub width_px: f64,
     /// Height of the image, pixels; 16 to 20 000.
     pub height_px: f64,
-    /// Height of the camera above the floor; 0 to 10 m.
+    /// Height of the camera above the floor, 0 to 10 m.
     pub camera_height_m: f64,
-    /// Lowest and highest tilt, up positive; within 89 degrees.
+    /// Lowest and highest tilt, radians, up positive; within 89 degrees.
     pub tilt_rad: [f64; 2],
-    /// Rightmost and leftmost pan, left positive; from -pi to pi is all round.
+    /// Rightmost and leftmost pan, radians, left positive; -pi to pi is all round.
     pub pan_rad: [f64; 2],
 }
 
 impl Default for PanTiltCamera {
-    /// 640 x 480, 64 degrees across, at 1.2 m on a unit that tilts by 20 and pans by 97 degrees.
+    /// 640 x 480 px, 64 degrees wide, at 1.2 m, on a unit that tilts by 20 and pans by 97 degrees.
     fn default() -> Self {
         Self {
             focal_px: 512.0,
@@ -38,7 +38,7 @@ impl Default for PanTiltCamera {
 }
 
 impl PanTiltCamera {
-    /// Every number finite and in range.
+    /// Refuses numbers that are not finite or out of range.
     pub fn check(&self) -> Result<(), OutOfRange> {
         check::within("focal_px", self.focal_px, 10.0, 20_000.0)?;
         check::within("width_px", self.width_px, 16.0, 20_000.0)?;
@@ -53,17 +53,17 @@ impl PanTiltCamera {
     }
 }
 
-/// What counts as seen.
+/// Limits within which a landmark is visible.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct VisibilityParams {
-    /// Most oblique view against the normal; up to 85 degrees.
+    /// Largest angle of view against the normal, radians; up to 85 degrees.
     pub max_incidence_rad: f64,
-    /// Shortest side in the image, pixels: that of an icon.
+    /// Shortest side in the image, px: the side of an icon.
     pub min_side_px: f64,
-    /// Largest share of the image that a side may take; method 12.3 has 0.9.
+    /// Largest share of the image that a side may take, 0 to 1; 0.9 by method 12.3.
     pub max_fill: f64,
-    /// How far before its wall the landmark is taken to hang, so that its own wall does not hide it; 1 mm to 0.5 m.
+    /// Distance of the landmark in front of its wall, so that its own wall does not hide it; 1 mm to 0.5 m.
     pub standoff_m: f64,
 }
 
@@ -74,7 +74,7 @@ impl Default for VisibilityParams {
 }
 
 impl VisibilityParams {
-    /// Every number finite and in range.
+    /// Refuses numbers that are not finite or out of range.
     pub fn check(&self) -> Result<(), OutOfRange> {
         check::within("max_incidence_rad", self.max_incidence_rad, 0.01, 85.0_f64.to_radians())?;
         check::within("min_side_px", self.min_side_px, 1.0, 20_000.0)?;
@@ -83,24 +83,24 @@ impl VisibilityParams {
     }
 }
 
-/// Who looks for landmarks, and what counts as seen.
+/// The camera and the limits that define "visible" in a map.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct VisibilitySettings {
     /// The camera.
     pub viewer: PanTiltCamera,
-    /// What counts.
+    /// The limits.
     pub seen: VisibilityParams,
 }
 
 impl VisibilitySettings {
-    /// Every number finite and in range.
+    /// Refuses numbers that are not finite or out of range.
     pub fn check(&self) -> Result<(), OutOfRange> {
         self.viewer.check()?;
         self.seen.check()
     }
 
-    /// No landmark of this size is seen from further, metres.
+    /// Largest distance from which a landmark of this size is visible, metres.
     pub fn reach_m(&self, size: &LandmarkSize) -> f64 {
         self.viewer.focal_px * size.width_m.min(size.height_m) / self.seen.min_side_px
     }

@@ -9,7 +9,7 @@ pub enum NotAssociated {
     NotExpected,
     /// No candidate that is expected has enough picture evidence.
     WeakEvidence {
-        /// The largest, nats.
+        /// The largest picture evidence, nats.
         picture_nats: f64,
     },
     /// It is outside of the gate of every candidate: the prior, the map or the identity is wrong.
@@ -31,9 +31,9 @@ impl NotAssociated {
 /// Which landmark an observation is.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Association {
-    /// This one.
+    /// It is this landmark.
     Unique {
-        /// Its number.
+        /// Number of the landmark.
         landmark: LandmarkId,
         /// Squared Mahalanobis distance to its prediction, 8 degrees of freedom.
         distance2: f64,

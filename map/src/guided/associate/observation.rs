@@ -14,7 +14,7 @@ const MAX_EVIDENCE_NATS: f64 = 1e6;
 /// A landmark that an observation may be.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Candidate {
-    /// Its number.
+    /// Number of the landmark.
     pub landmark: LandmarkId,
     /// Picture evidence, nats: ln of p(picture, if it is this landmark) over p(picture, if it is none). Members of one
     /// look-alike class get the same value: what differs between them is not evidence.

@@ -19,7 +19,7 @@ pub const MAX_EXPECTED: usize = 64;
 /// One landmark that is expected in the image.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Expected {
-    /// Its number.
+    /// Number of the landmark.
     pub landmark: LandmarkId,
     /// What of it is in view.
     pub view: InView,

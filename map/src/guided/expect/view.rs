@@ -9,11 +9,11 @@ use vision::{frame::Intrinsics, recognise::LandmarkId};
 /// A landmark of the map that may be in view.
 #[derive(Debug, Clone, Copy)]
 pub struct KnownLandmark<'a> {
-    /// Its number.
+    /// Number of the landmark.
     pub landmark: LandmarkId,
-    /// Its place.
+    /// Place of the landmark, map frame.
     pub place: &'a LandmarkPlace,
-    /// From where the whole of it is visible, if that was computed. Inside this area no line of sight is tested.
+    /// Its visibility area, if it was computed. Inside this area no line of sight is tested.
     pub visible: Option<&'a VisibilityMap>,
 }
 
@@ -37,7 +37,7 @@ impl<'a> CameraView<'a> {
 /// What of a landmark is in view from the prior pose.
 #[derive(Debug, Clone, PartialEq)]
 pub enum InView {
-    /// All of it.
+    /// The whole landmark is in view.
     Full,
     /// The image border cuts it.
     Cut {
@@ -57,12 +57,12 @@ pub enum InView {
         /// Its shortest side, px.
         side_px: f64,
     },
-    /// Seen too obliquely.
+    /// The angle of view is too large.
     TooOblique {
         /// Angle against its normal, radians.
         incidence_rad: f64,
     },
-    /// The prior does not say well enough where it is.
+    /// The prior is too uncertain to locate it.
     TooUncertain {
         /// Largest half extent of its search gates, px.
         gate_px: f64,

@@ -1,4 +1,4 @@
-//! What a global fix says of the prior pose, and whether a prior pose is too uncertain.
+//! The agreement of a global fix with the prior pose, and the uncertainty of a prior pose.
 
 use crate::{
     guided::schedule::params::ScheduleParams,

@@ -35,7 +35,7 @@ pub enum GlobalReason {
     Uncertain,
     /// Nothing has supported the pose for too many frames or metres.
     Stale,
-    /// It is time.
+    /// The last global search is [`super::ScheduleParams::interval_frames`] frames ago.
     Interval,
     /// A landmark that is surely in view was not found.
     Missed,

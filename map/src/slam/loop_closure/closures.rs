@@ -16,27 +16,27 @@ use crate::{
 };
 use nalgebra::Matrix3;
 
-/// Most loops waiting for others to confirm them.
+/// Most loops that wait for confirmation.
 const MAX_WAITING: usize = 64;
 
-/// A loop that was closed.
+/// A closed loop.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LoopClosure {
-    /// Key pose met again.
+    /// Index of the keyframe met again.
     pub old: usize,
-    /// Key pose that met it.
+    /// Index of the keyframe that met it.
     pub new: usize,
-    /// Where the new one is seen from the old one, with covariance.
+    /// Relative pose of the new keyframe, with covariance.
     pub old_from_new: Pose2Covariance,
 }
 
-/// All loops so far.
+/// Closed and waiting loops.
 #[derive(Debug, Clone, Default)]
 pub(in crate::slam) struct LoopCloser {
     edges: Vec<PoseConstraint>,
     waiting: Vec<PoseConstraint>,
     refused: usize,
-    /// Way at the last try.
+    /// Path length at the last try, metres.
     tried_m: f64,
 }
 
@@ -58,7 +58,7 @@ impl LoopCloser {
         self.edges.iter().map(closure).collect()
     }
 
-    /// Drops the loops that contradict the fitted poses.
+    /// Drops the loops that contradict the fitted poses. True if any was dropped.
     pub(in crate::slam) fn prune(&mut self, poses: &[Pose2], p: &LoopParams) -> bool {
         let before = self.edges.len();
         self.edges.retain(|e| graph::weight(e, graph::chi2(e, poses)) >= p.min_weight);
@@ -66,7 +66,7 @@ impl LoopCloser {
         before != self.edges.len()
     }
 
-    /// Looks for places that the last key pose meets again. True if key poses were moved.
+    /// Detects loops of the last keyframe. True if keyframes were moved.
     pub(in crate::slam) fn detect(
         &mut self,
         keys: &mut [Keyframe],
@@ -82,7 +82,7 @@ impl LoopCloser {
         let before = self.edges.len();
         for old in candidates(keys, &reached, new, &p.loops) {
             let Some(believed) = &reached[old] else { continue };
-            // Doubt is told of the new pose in the frame of the old one.
+            // Covariance of the new pose in the frame of the old one.
             let mut believed = believed.inverse();
             believed.covariance *= p.loops.doubt.powi(2);
             let sigma = believed.covariance.view((0, 0), (2, 2)).trace().max(0.0).sqrt();
@@ -103,7 +103,7 @@ impl LoopCloser {
             return Ok(false);
         }
         let mut poses: Vec<Pose2> = keys.iter().map(|k| k.pose).collect();
-        // New loops may be far from closed: doubted from the start they would never pull.
+        // New loops may be far from closed: a robust weight would suppress them from the start.
         let trusted = |(i, e): (usize, &PoseConstraint)| {
             if i < before { *e } else { PoseConstraint { doubt_chi2: None, ..*e } }
         };
@@ -122,13 +122,13 @@ impl LoopCloser {
         Ok(true)
     }
 
-    /// Takes the waiting loops that agree with the newest, if they are enough.
+    /// Accepts the waiting loops that agree with the newest, if there are enough.
     fn confirm(&mut self, keys: &[Keyframe], path: &[PoseConstraint], p: &LoopParams) {
         let Some(newest) = self.waiting.last().copied() else { return };
         let agreeing: Vec<usize> = (0..self.waiting.len())
             .filter(|&i| {
                 let other = &self.waiting[i];
-                // Two from one place are one opinion.
+                // Two loops of one keyframe are not independent.
                 *other == newest || (other.to != newest.to && agree(keys, path, other, &newest, p))
             })
             .collect();
@@ -143,7 +143,7 @@ impl LoopCloser {
     }
 }
 
-/// Two loops and the path between their ends make a circle that closes.
+/// Whether two loops and the path between their ends form a closed circle.
 fn agree(
     keys: &[Keyframe],
     path: &[PoseConstraint],
@@ -159,7 +159,7 @@ fn agree(
         }
         if from <= to { sum } else { sum.inverse() }
     };
-    // Paths that are long say nothing of each other.
+    // Over a long path the agreement means nothing.
     let far = |x: usize, y: usize| (keys[x].path_m - keys[y].path_m).abs() > 30.0;
     if far(a.to, b.to) || far(a.from, b.from) {
         return false;

@@ -1,58 +1,58 @@
-//! Limits of loop closure.
+//! Parameters of loop closure.
 
 use crate::slam::correlative::CorrelativeParams;
 use serde::{Deserialize, Serialize};
 
-/// Widest window that is searched; when the robot may be farther off, nothing is closed.
+/// Widest search window, metres; with a larger uncertainty no loop is closed.
 pub(super) const MAX_REACH_M: f64 = 12.0;
-/// The same for the heading.
+/// Widest search window of the heading, radians.
 pub(super) const MAX_REACH_RAD: f64 = 0.9;
 
-/// Knobs of loop closure.
+/// Parameters of loop closure.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LoopParams {
-    /// A place is met again after this way at least.
+    /// A place is met again only after this distance along the path, metres.
     pub min_way_m: f64,
-    /// Poses nearer than this (and the doubt about it) may see the same.
+    /// Poses nearer than this, plus their uncertainty, may observe the same walls, metres.
     pub near_m: f64,
-    /// Places tried from one pose.
+    /// Places tried from one keyframe.
     pub places: usize,
-    /// Way between two tries.
+    /// Distance between two tries, metres.
     pub every_m: f64,
-    /// Way on each side of the old pose whose scans are matched with.
+    /// Distance along the path on each side of the old keyframe whose scans are matched to, metres.
     pub old_m: f64,
-    /// Way back from the new pose whose scans are matched, when the doubt is large.
+    /// Distance back from the new keyframe whose scans are matched when the uncertainty is large, metres.
     pub new_m: f64,
-    /// Error of scans laid together along that way: position...
+    /// Error of the scans joined along that distance: position, metres,
     pub way_m: f64,
-    /// ...and heading.
+    /// and heading, radians.
     pub way_rad: f64,
-    /// Doubt (standard deviation) up to which one loop is believed alone.
+    /// Standard deviation up to which a single loop is accepted, metres.
     pub sure_m: f64,
-    /// What the graph says of its own doubt is multiplied by this: errors of neighbouring matches are not independent.
+    /// Factor on the graph's standard deviations: errors of neighbouring matches are not independent.
     pub doubt: f64,
-    /// Search on the grid when in doubt.
+    /// Correlative search, used when the uncertainty is large.
     pub search: CorrelativeParams,
-    /// Least score on the grid.
+    /// Least score of the search.
     pub min_score: f64,
-    /// The second best place in the window must be this much worse.
+    /// The second best pose in the window must score lower by this much.
     pub min_margin: f64,
-    /// Least share of the points that find their surface.
+    /// Least share of matched points.
     pub min_matched: f64,
-    /// Largest root mean square distance of them.
+    /// Largest root mean square distance of the matched points, metres.
     pub max_rms_m: f64,
-    /// Most of the beams that may pass through what the others saw.
+    /// Largest share of beams that may pass through known surfaces.
     pub max_through: f64,
-    /// Gate on the difference to what is believed: 99.9 % of chi2 with 3 degrees of freedom.
+    /// Gate on the difference to the expected pose: 99.9 % of chi2 with 3 degrees of freedom.
     pub gate_chi2: f64,
-    /// Loops in agreement that are believed together.
+    /// Agreeing loops that are accepted together.
     pub together: usize,
-    /// Gate of their agreement: 99 % with 3 degrees of freedom.
+    /// Gate of their agreement: 99 % of chi2 with 3 degrees of freedom.
     pub agree_chi2: f64,
-    /// Beyond this chi2 a loop's weight in the fit falls off.
+    /// A loop's weight in the fit falls off beyond this chi2.
     pub doubt_chi2: f64,
-    /// A loop whose weight falls below it is refused.
+    /// A loop with a smaller weight is refused.
     pub min_weight: f64,
 }
 

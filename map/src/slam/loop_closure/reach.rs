@@ -1,5 +1,5 @@
-//! How surely every key pose is known from the newest one, and which of them may see the same. In: the graph. Out: the
-//! old poses worth a try.
+//! Relative covariances of all keyframes from the newest one, and which of them may observe the same walls. In: the
+//! pose graph. Out: the old keyframes worth a try.
 
 use crate::{
     pose2::{Pose2, Pose2Covariance},
@@ -13,7 +13,7 @@ use crate::{
 use nalgebra::Matrix3;
 use std::{cmp::Ordering, collections::BinaryHeap};
 
-/// A pose on its way through the graph.
+/// A pose on its way through the graph (Dijkstra).
 struct Reached {
     cost: f64,
     at: usize,
@@ -40,8 +40,8 @@ impl Ord for Reached {
     }
 }
 
-/// `new_from_pose` of every pose with covariance along the surest chain of edges: never surer than the whole graph
-/// (Olson 2009).
+/// `new_from_pose` of every pose with covariance along the most certain chain of constraints: never more certain than
+/// by the whole graph (Olson 2009).
 pub(super) fn relative_covariances(
     keys: &[Keyframe],
     path: &[PoseConstraint],
@@ -70,7 +70,7 @@ pub(super) fn relative_covariances(
                 continue;
             }
             let step = keys[at].pose.between(&keys[*next].pose);
-            // The covariance is told in the frame of the edge's first pose.
+            // The covariance is in the frame of the constraint's first pose.
             let step = if *forward {
                 Pose2Covariance { pose: step, covariance: *covariance }
             } else {
@@ -89,7 +89,7 @@ pub(super) fn relative_covariances(
     best
 }
 
-/// Old poses that may see what the new one sees: the nearest of every pass.
+/// Old keyframes that may observe what the new one does: the nearest of every passage.
 pub(super) fn candidates(
     keys: &[Keyframe],
     reached: &[Option<Pose2Covariance>],
@@ -111,7 +111,7 @@ pub(super) fn candidates(
             continue;
         }
         match passes.last_mut() {
-            // A pass is cut where it grows long, so that a wide doubt is met at several places.
+            // A long passage is cut, so that a large uncertainty is tried at several places.
             Some(last) if in_pass && keys[i].path_m - keys[last.0].path_m < 2.0 * p.near_m => {
                 if away < last.1 {
                     *last = (i, away);

@@ -1,5 +1,5 @@
-//! One try to close a loop: the new pose's scans against those around the old one. In: two key poses and what is
-//! believed of them. Out: where the new one is seen from the old one, or nothing.
+//! Verifies one loop: matches the scans of a new keyframe to those around an old one. In: two keyframes and their
+//! expected relative pose. Out: the measured relative pose as a constraint, or nothing.
 
 use crate::{
     pose2::{Pose2, Pose2Covariance},
@@ -17,24 +17,24 @@ use crate::{
 };
 use nalgebra::{Point2, Vector2};
 
-/// Doubt below which the believed pose is guess enough.
+/// With a smaller uncertainty the expected pose is a sufficient guess, metres.
 const SURE_M: f64 = 0.1;
-/// Most points tried on the grid.
+/// Most points of the correlative search.
 const MAX_TRIED: usize = 400;
-/// A rival stands at least this far off the best pose...
+/// A rival pose is at least this far from the best one, metres,
 const RIVAL_M: f64 = 1.0;
-/// ...or is turned so much.
+/// or turned by this much, radians.
 const RIVAL_RAD: f64 = 0.3;
 
-/// What is believed before the try.
+/// The expected relative pose.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct LoopPrior {
     pub old_from_new: Pose2Covariance,
-    /// Standard deviation of the position.
+    /// Standard deviation of the position, metres.
     pub sigma_m: f64,
 }
 
-/// Matches the new pose's scans with those around the old one.
+/// Matches the scans of the new keyframe to those around the old one.
 pub(super) fn verify_loop(
     keys: &[Keyframe],
     old: usize,
@@ -68,7 +68,7 @@ pub(super) fn verify_loop(
     if through(&reference, &keys[new].cloud, &aligned) > l.max_through {
         return None;
     }
-    // Several scans laid together carry the error of their path.
+    // Joined scans have the error of the path between them.
     let floor = if sure { [0.0, 0.0] } else { [l.way_m, l.way_rad] };
     let information = with_floor(&aligned.information, floor);
     let measured = Pose2Covariance { pose: aligned.pose, covariance: spread(&information) };
@@ -83,13 +83,8 @@ pub(super) fn verify_loop(
     (d2 <= l.gate_chi2).then_some(edge)
 }
 
-/// The best pose in the window, if it is good and no other is nearly as good.
-pub(super) fn search(
-    old_scans: &[(Pose2, &Cloud)],
-    query: &Cloud,
-    belief: &LoopPrior,
-    p: &SlamParams,
-) -> Option<Pose2> {
+/// The best pose in the window, if it scores well and no other is nearly as good.
+fn search(old_scans: &[(Pose2, &Cloud)], query: &Cloud, belief: &LoopPrior, p: &SlamParams) -> Option<Pose2> {
     let l = &p.loops;
     let believed = &belief.old_from_new;
     let heading = believed.covariance[(2, 2)].max(0.0).sqrt();
@@ -110,7 +105,7 @@ pub(super) fn search(
     second.is_none().then_some(best.pose)
 }
 
-/// Key poses within a way of one of them, before and after.
+/// Keyframes within a distance along the path of one of them, before and after.
 fn around(keys: &[Keyframe], i: usize, way_m: f64) -> impl Iterator<Item = &Keyframe> {
     let here = keys[i].path_m;
     keys.iter().filter(move |k| (k.path_m - here).abs() <= way_m)
@@ -120,7 +115,7 @@ fn seen_from<'a>(keys: &[Keyframe], i: usize, key: &'a Keyframe) -> (Pose2, &'a 
     (keys[i].pose.between(&key.pose), &key.cloud)
 }
 
-/// Several scans as one, in the frame of their poses.
+/// Several scans joined in one frame.
 fn joined<'a>(scans: impl Iterator<Item = (Pose2, &'a Cloud)>) -> Cloud {
     let mut all = Cloud::default();
     for (pose, cloud) in scans {
@@ -133,13 +128,13 @@ fn joined<'a>(scans: impl Iterator<Item = (Pose2, &'a Cloud)>) -> Cloud {
     all
 }
 
-/// At most `most` points, evenly taken.
+/// At most `most` points, at regular intervals.
 fn thinned(cloud: &Cloud, most: usize) -> Vec<Point2<f64>> {
     let stride = cloud.points.len().div_ceil(most.max(1)).max(1);
     cloud.points.iter().step_by(stride).map(|q| q.at).collect()
 }
 
-/// Share of the scan's beams that pass through surfaces of the reference which face them.
+/// Share of the scan's beams that pass through surfaces which face them.
 fn through(reference: &SurfaceIndex, cloud: &Cloud, aligned: &IcpResult) -> f64 {
     let origin = aligned.pose.apply(&cloud.origin);
     let (mut crossed, mut beams) = (0_u32, 0_u32);
@@ -153,7 +148,7 @@ fn through(reference: &SurfaceIndex, cloud: &Cloud, aligned: &IcpResult) -> f64 
         beams += 1;
         let steps = (length / 0.1) as usize;
         let towards = -d / length;
-        // From a little before the laser to well before the end.
+        // From 0.3 m in front of the laser to 0.4 m before the end.
         let hit = (3..steps.saturating_sub(4)).any(|k| {
             let at = origin + d * (k as f64 / steps as f64);
             reference.nearest(&at, &towards, 0.07, 0.5).is_some()
