@@ -14,7 +14,8 @@ struct Candidates {
 }
 
 impl MapClient {
-    /// Begins to gather views with a robot: of one landmark, or of whatever is new (and of known landmarks, too).
+    /// Starts gathering with a robot: views of one landmark, or of unknown objects (and of known landmarks if
+    /// `known`).
     pub async fn gather(
         &self,
         map: &str,
@@ -26,7 +27,7 @@ impl MapClient {
         self.send(self.request(Method::POST, &format!("/maps/{map}/gatherings")).json(&body)).await
     }
 
-    /// Ends a gathering; what was gathered waits for a decision.
+    /// Ends a gathering; its tracks wait for a decision.
     pub async fn stop_gathering(&self, map: &str, gathering: i64) -> Result<Gathering, ClientError> {
         self.send(self.request(Method::POST, &format!("/maps/{map}/gatherings/{gathering}/stop"))).await
     }
@@ -36,14 +37,14 @@ impl MapClient {
         self.all(&format!("/maps/{map}/gatherings")).await
     }
 
-    /// What waits for a decision.
+    /// The tracks that wait for a decision.
     pub async fn candidates(&self, map: &str, gathering: i64) -> Result<Vec<Candidate>, ClientError> {
         let path = format!("/maps/{map}/gatherings/{gathering}/candidates");
         let found: Candidates = self.send(self.request(Method::GET, &path)).await?;
         Ok(found.candidates)
     }
 
-    /// The rectified picture of a view of a candidate, PNG.
+    /// The rectified picture of a view of a track, PNG.
     pub async fn candidate_picture(
         &self,
         map: &str,
@@ -58,7 +59,7 @@ impl MapClient {
         Ok(bytes.to_vec())
     }
 
-    /// Makes landmarks of candidates and begins to learn them. All or nothing.
+    /// Turns tracks into landmarks and starts learning. All or nothing.
     pub async fn accept_candidates(
         &self,
         map: &str,
@@ -69,7 +70,7 @@ impl MapClient {
         self.send(self.request(Method::POST, &path).json(&json!({ "candidates": picks }))).await
     }
 
-    /// Throws a candidate away.
+    /// Discards a track.
     pub async fn discard_candidate(
         &self,
         map: &str,

@@ -12,19 +12,19 @@ use serde_json::{Value, json};
 use std::time::{Duration, Instant};
 use vision::{frame::Intrinsics, recognise::DistanceKind};
 
-/// How often a job is asked for.
+/// Interval at which a job's state is requested.
 const JOB_POLL: Duration = Duration::from_millis(200);
 /// Longest wait for one request.
 const REQUEST_TIMEOUT: Duration = Duration::from_mins(1);
 
-/// What part of an uploaded image is the landmark.
+/// The part of an uploaded image that is the landmark.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum LandmarkRegion {
-    /// The server looks for the one dominant quad.
+    /// The dominant quad, found by the server.
     Detect,
-    /// The whole image is the landmark, cut out beforehand.
+    /// The whole image, cut out beforehand.
     WholeImage,
-    /// These corners, TL, TR, BR, BL, in pixels.
+    /// A quad with these corners, TL, TR, BR, BL, in pixels.
     Corners([[f64; 2]; 4]),
 }
 
@@ -38,7 +38,7 @@ pub struct MapClient {
 impl MapClient {
     /// A client of the server at `base`, such as `http://127.0.0.1:8080`. Nothing is sent yet.
     pub fn new(base: &str) -> Result<Self, ClientError> {
-        // Straight to the server: a proxy of the environment has no business between a robot and its map.
+        // Directly to the server: a proxy of the environment is not used between a robot and its map.
         let http = reqwest::Client::builder().no_proxy().timeout(REQUEST_TIMEOUT).build();
         let http = http.map_err(|e| ClientError::Http { url: base.to_owned(), detail: e.to_string() })?;
         Ok(Self { http, base: base.trim_end_matches('/').to_owned() })
@@ -53,7 +53,7 @@ impl MapClient {
         self.send(self.request(Method::POST, "/maps").json(&body)).await
     }
 
-    /// Creates a map and says where it is: `site`, `building`, `floor`, `parent`, as the server's documentation has them.
+    /// Creates a map with its location: `site`, `building`, `floor`, `parent`, as in the server's API documentation.
     pub async fn create_map_at(
         &self,
         name: &str,
@@ -68,44 +68,44 @@ impl MapClient {
         self.send(self.request(Method::POST, "/maps").json(&body)).await
     }
 
-    /// Says where a map is; what is not named stays, null forgets.
+    /// Sets the location of a map; absent fields stay, null removes them.
     pub async fn locate_map(&self, name: &str, whereabouts: &Value) -> Result<Map, ClientError> {
         self.send(self.request(Method::PATCH, &format!("/maps/{name}")).json(whereabouts)).await
     }
 
-    /// The camera that looks for a map's landmarks, and what counts as seen, as the server's documentation has it.
+    /// The visibility settings of a map, as in the server's API documentation.
     pub async fn visibility_settings(&self, map: &str) -> Result<Value, ClientError> {
         self.send(self.request(Method::GET, &format!("/maps/{map}/sight"))).await
     }
 
-    /// Sets it; what is not named becomes that of a usual robot.
+    /// Replaces the visibility settings; absent fields take their defaults.
     pub async fn set_visibility_settings(&self, map: &str, sight: &Value) -> Result<Value, ClientError> {
         self.send(self.request(Method::PUT, &format!("/maps/{map}/sight")).json(sight)).await
     }
 
-    /// How a map lies in another, as the server's documentation has it.
+    /// The transform between two maps, as in the server's API documentation.
     pub async fn transform(&self, from: &str, to: &str) -> Result<Value, ClientError> {
         self.send(self.request(Method::GET, &format!("/maps/{from}/transform?to={to}"))).await
     }
 
-    /// One map.
+    /// Reads one map.
     pub async fn map(&self, name: &str) -> Result<Map, ClientError> {
         self.send(self.request(Method::GET, &format!("/maps/{name}"))).await
     }
 
-    /// All maps.
+    /// Reads all maps.
     pub async fn maps(&self) -> Result<Vec<Map>, ClientError> {
         self.all("/maps").await
     }
 
-    /// Replaces the walls: segments of two end points each, in metres, map frame.
+    /// Replaces the walls: segments of two end points each, metres, map frame.
     pub async fn set_walls(&self, map: &str, segments_m: &[[[f64; 2]; 2]]) -> Result<Value, ClientError> {
         let segments: Vec<_> = segments_m.iter().map(|[a, b]| json!({ "a": a, "b": b })).collect();
         let path = format!("/maps/{map}/laser");
         self.send(self.request(Method::PUT, &path).json(&json!({ "segments": segments }))).await
     }
 
-    /// The walls, as stored.
+    /// The walls of a map.
     pub async fn laser(&self, map: &str) -> Result<Value, ClientError> {
         self.send(self.request(Method::GET, &format!("/maps/{map}/laser"))).await
     }
@@ -128,7 +128,7 @@ impl MapClient {
         self.send(self.request(Method::POST, &format!("/maps/{map}/landmarks")).json(&body)).await
     }
 
-    /// One landmark.
+    /// Reads one landmark.
     pub async fn landmark(&self, map: &str, name: &str) -> Result<Landmark, ClientError> {
         self.send(self.request(Method::GET, &format!("/maps/{map}/landmarks/{name}"))).await
     }
@@ -156,8 +156,8 @@ impl MapClient {
         self.send(self.request(Method::POST, &path).multipart(form)).await
     }
 
-    /// Starts to learn: these landmarks, or all that have new views. `generated_views` warped views are made of each
-    /// photograph; `None` leaves the number to the server.
+    /// Starts learning of these landmarks, or of all with new views. `generated_views` warped views are generated
+    /// from each photograph; `None` leaves the number to the server.
     pub async fn learn(
         &self,
         map: &str,
@@ -174,12 +174,12 @@ impl MapClient {
         self.send(self.request(Method::POST, &format!("/maps/{map}/learn")).json(&body)).await
     }
 
-    /// A job as it stands.
+    /// The present state of a job.
     pub async fn job(&self, id: &str) -> Result<Job, ClientError> {
         self.send(self.request(Method::GET, &format!("/jobs/{id}"))).await
     }
 
-    /// Waits until a job is done, telling `progress` of every state seen.
+    /// Waits until a job is done; `progress` is called with every state.
     pub async fn wait_for_job(
         &self,
         job: Job,
@@ -207,7 +207,7 @@ impl MapClient {
         }
     }
 
-    /// Recognises one photograph.
+    /// Recognises the landmarks in one photograph.
     pub async fn recognise(
         &self,
         map: &str,
@@ -222,7 +222,7 @@ impl MapClient {
         self.send(self.request(Method::POST, &format!("/maps/{map}/recognise")).multipart(form)).await
     }
 
-    /// Registers a robot, or gives it another map.
+    /// Registers a robot, or assigns it to another map.
     pub async fn put_robot(&self, robot: &str, map: &str) -> Result<Robot, ClientError> {
         self.send(self.request(Method::PUT, &format!("/robots/{robot}")).json(&json!({ "map": map }))).await
     }
@@ -232,7 +232,7 @@ impl MapClient {
         self.send(self.request(Method::GET, &format!("/robots/{name}"))).await
     }
 
-    /// All robots.
+    /// Reads all robots.
     pub async fn robots(&self) -> Result<Vec<Robot>, ClientError> {
         self.all("/robots").await
     }

@@ -1,68 +1,68 @@
-//! Runs whose path is known, and what they show: which modality to trust where.
+//! Reference runs: recordings compared with a reference trajectory, and the modality statistics that they give.
 
 use crate::{ClientError, MapClient};
 use reqwest::Method;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-/// A run as it is recorded.
+/// The recording of a robot.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RecordingStatus {
-    /// The map.
+    /// Name of the map.
     pub map: String,
-    /// Whose run.
+    /// Name of the robot.
     pub robot: String,
-    /// It goes on.
+    /// Whether the recording is active.
     pub going: bool,
-    /// Why it goes on no longer.
+    /// Why it is not active any more.
     #[serde(default)]
     pub reason: Option<String>,
-    /// Way driven by odometry, metres.
+    /// Distance driven by odometry, metres.
     pub way_m: f64,
-    /// Fixes by landmarks.
+    /// Number of fixes by landmarks.
     pub landmarks: u64,
-    /// Fixes by the laser.
+    /// Number of fixes by the laser.
     pub laser: u64,
 }
 
-/// What a run showed of one module.
+/// Statistics of one modality over a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ModalityStats {
-    /// `odometry`, `laser` or `landmarks`.
+    /// The modality: `odometry`, `laser` or `landmarks`.
     pub module: String,
     /// Mean error of its own position: metres along, metres to the left, radians.
     pub mean: [f64; 3],
-    /// Standard deviations about that.
+    /// Standard deviations about the mean, same units.
     pub sigma: [f64; 3],
-    /// Share of the way on which it knew something lately.
+    /// Share of the distance with a recent fix, 0 to 1.
     pub availability: f64,
-    /// Share of measurements off by more than three standard deviations.
+    /// Share of measurements off by more than three claimed standard deviations, 0 to 1.
     pub outliers: f64,
 }
 
-/// A run that was learnt from.
+/// A recording that was compared with a reference trajectory.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ReferenceRun {
-    /// Its number.
+    /// Number of the run.
     pub id: i64,
-    /// Whose.
+    /// Name of the robot.
     pub robot: String,
-    /// Way of which the path was known, metres.
+    /// Distance along the reference trajectory, metres.
     pub way_m: f64,
-    /// Square metres by heading that it tells of.
+    /// Number of pose cells with statistics.
     pub cells: u64,
-    /// What it showed.
+    /// Statistics by modality.
     pub modules: Vec<ModalityStats>,
 }
 
-/// Where a robot really was.
+/// True poses of a robot by an independent measurement.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ReferenceTrajectory {
-    /// Time (ns of the robot's clock), x and y in metres on the map, heading in radians; times rise.
+    /// Time (ns of the robot's clock), x and y in metres, heading in radians, map frame; times rise.
     pub poses: Vec<(i64, f64, f64, f64)>,
-    /// Standard deviation of its positions, metres; the server's usual one if absent.
+    /// Standard deviation of the positions, metres; the server's default if absent.
     pub sigma_m: Option<f64>,
-    /// Of its headings, radians.
+    /// Standard deviation of the headings, radians; the server's default if absent.
     pub sigma_rad: Option<f64>,
 }
 
@@ -72,22 +72,22 @@ struct Runs {
 }
 
 impl MapClient {
-    /// Begins to record a run of a robot.
+    /// Starts the recording of a robot.
     pub async fn start_recording(&self, robot: &str) -> Result<RecordingStatus, ClientError> {
         self.send(self.request(Method::POST, &format!("/robots/{robot}/run"))).await
     }
 
-    /// What was recorded so far.
+    /// The present recording of a robot.
     pub async fn recording(&self, robot: &str) -> Result<RecordingStatus, ClientError> {
         self.send(self.request(Method::GET, &format!("/robots/{robot}/run"))).await
     }
 
-    /// Gives the recording up.
+    /// Cancels the recording.
     pub async fn cancel_recording(&self, robot: &str) -> Result<(), ClientError> {
         self.checked(self.request(Method::DELETE, &format!("/robots/{robot}/run"))).await.map(drop)
     }
 
-    /// Ends the recording by telling where the robot really was; the map learns from it.
+    /// Ends the recording and compares it with the robot's true trajectory; the map takes the statistics.
     pub async fn finish_recording(
         &self,
         robot: &str,
@@ -97,23 +97,23 @@ impl MapClient {
         self.send(self.request(Method::POST, &format!("/robots/{robot}/run/reference")).json(&body)).await
     }
 
-    /// The runs that a map has learnt from.
+    /// The reference runs of a map.
     pub async fn reference_runs(&self, map: &str) -> Result<Vec<ReferenceRun>, ClientError> {
         let runs: Runs = self.send(self.request(Method::GET, &format!("/maps/{map}/runs"))).await?;
         Ok(runs.runs)
     }
 
-    /// Forgets a run and what it showed.
+    /// Deletes a reference run with its statistics.
     pub async fn delete_reference_run(&self, map: &str, run: i64) -> Result<(), ClientError> {
         self.checked(self.request(Method::DELETE, &format!("/maps/{map}/runs/{run}"))).await.map(drop)
     }
 
-    /// Which modality is best where, as the server's documentation has it.
+    /// The modality statistics of a map, as in the server's API documentation.
     pub async fn modalities(&self, map: &str) -> Result<Value, ClientError> {
         self.send(self.request(Method::GET, &format!("/maps/{map}/areas"))).await
     }
 
-    /// Sets what is fused (`mode`) and the areas that have names (`areas`); what is not named stays.
+    /// Sets the fusion mode (`mode`) and the named areas (`areas`); absent fields stay.
     pub async fn set_modalities(&self, map: &str, change: &Value) -> Result<Value, ClientError> {
         self.send(self.request(Method::PUT, &format!("/maps/{map}/areas")).json(change)).await
     }

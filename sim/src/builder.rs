@@ -1,4 +1,4 @@
-//! Puts a building together: walls, floors, ceilings, things on walls, lamps; lights it at the end.
+//! Builds a building: walls, floors, ceilings, objects on walls, lamps; lights it at the end.
 
 use crate::{
     building::{Building, LandmarkKind, LandmarkTruth, MAX_SURFACES, Surface},
@@ -9,20 +9,20 @@ use crate::{
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use std::sync::Arc;
 
-/// Something to hang on a wall.
+/// An object to hang on a wall.
 #[derive(Debug, Clone)]
 pub(crate) struct Thing {
     pub(crate) name: String,
     pub(crate) kind: Option<LandmarkKind>,
     pub(crate) size_m: [f64; 2],
-    /// Height of its centre above the floor.
+    /// Height of its centre above the floor, metres.
     pub(crate) centre_z_m: f64,
-    /// Distance of its face from the wall.
+    /// Distance of its face from the wall, metres.
     pub(crate) stand_off_m: f64,
     pub(crate) texture: Arc<Texture>,
 }
 
-/// Puts a building together.
+/// A building under construction.
 #[derive(Debug)]
 pub(crate) struct Builder {
     height_m: f64,
@@ -37,7 +37,7 @@ impl Builder {
         Self { height_m, surfaces: vec![], walls: vec![], landmarks: vec![], lamps: vec![] }
     }
 
-    /// A wall over the whole height; the room is on the left of a to b. The texture repeats every `texture_m`.
+    /// Adds a wall over the whole height; the room is on the left of a to b. The texture repeats every `texture_m`.
     pub(crate) fn wall(
         &mut self,
         a_m: [f64; 2],
@@ -63,7 +63,7 @@ impl Builder {
         wall
     }
 
-    /// Hangs a thing with its centre `along_m` from the wall's end a.
+    /// Hangs an object with its centre `along_m` from the wall's end a.
     pub(crate) fn hang(&mut self, wall: &WallSegment, along_m: f64, thing: &Thing) {
         let n = wall.normal();
         let foot = wall.a_m + wall.direction() * along_m + n * thing.stand_off_m;
@@ -74,7 +74,7 @@ impl Builder {
         self.add(map_from_surface, thing, false);
     }
 
-    /// A floor (normal up) or a ceiling (normal down) from corner to opposite corner.
+    /// Adds a floor (normal up) or a ceiling (normal down) from corner to opposite corner.
     pub(crate) fn level(
         &mut self,
         name: &str,
@@ -99,7 +99,7 @@ impl Builder {
         }
     }
 
-    /// A lamp just below the ceiling, centred at (x, y), `size_m` along y and x.
+    /// Adds a lamp just below the ceiling, centred at (x, y), `size_m` along y and x.
     pub(crate) fn lamp(&mut self, centre_m: [f64; 2], size_m: [f64; 2], power: f64, texture: &Arc<Texture>) {
         let centre = Vector3::new(centre_m[0], centre_m[1], self.height_m - 0.01);
         let thing = Thing {

@@ -11,15 +11,15 @@ use std::sync::Arc;
 /// Most surfaces of a building; further ones are not added.
 pub const MAX_SURFACES: usize = 4096;
 
-/// What a landmark is.
+/// Kind of a landmark.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LandmarkKind {
-    /// A picture on the wall: the thing to learn.
+    /// A poster on a wall; the landmark to learn.
     Poster,
-    /// A door, three sides and the floor.
+    /// A door; the floor is its lower side.
     Door,
-    /// A window.
+    /// A window with its frame.
     Window,
     /// A lamp in the ceiling.
     Lamp,
@@ -31,18 +31,18 @@ pub enum LandmarkKind {
     Board,
 }
 
-/// Where a landmark is, exactly.
+/// A landmark with its exact place.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LandmarkTruth {
     /// Name, unique in the building, `[a-z0-9_-]{1,64}`.
     pub name: String,
-    /// What it is.
+    /// Kind of the landmark.
     pub kind: LandmarkKind,
     /// Landmark frame: origin at the centre, x outward (towards the viewer), y the viewer's right, z up.
     pub map_from_landmark: Isometry3<f64>,
-    /// Extent along y.
+    /// Extent along y, metres.
     pub width_m: f64,
-    /// Extent along z.
+    /// Extent along z, metres.
     pub height_m: f64,
 }
 
@@ -62,26 +62,26 @@ pub fn rectangle(width_m: f64, height_m: f64) -> [Point3<f64>; 4] {
 /// A textured rectangle, seen from its outward side only. Its frame is that of a landmark.
 #[derive(Debug, Clone)]
 pub struct Surface {
-    /// Name; that of the landmark when it is one.
+    /// Name of the surface; the landmark's name if it is one.
     pub name: String,
     /// Surface frame: x outward normal, y right, z up as a viewer in front sees it.
     pub map_from_surface: Isometry3<f64>,
-    /// Extent along y.
+    /// Extent along y, metres.
     pub width_m: f64,
-    /// Extent along z.
+    /// Extent along z, metres.
     pub height_m: f64,
-    /// Reflectance 0 to 255.
+    /// Reflectance, 0 to 255.
     pub texture: Arc<Texture>,
-    /// Width and height of one repetition of the texture; the surface's own size when it does not repeat.
+    /// Width and height of one repetition of the texture, metres; the surface's size when it does not repeat.
     pub texture_m: [f64; 2],
-    /// Index into [`Building::landmarks`] when it is one.
+    /// Index into [`Building::landmarks`] if it is one.
     pub landmark: Option<usize>,
-    /// Shines by itself: not lit by the lamps.
+    /// Whether it emits light and is not lit by the lamps.
     pub glows: bool,
     pub(crate) light: LightMap,
 }
 
-/// A finished building.
+/// A building, lit and read only.
 #[derive(Debug, Clone)]
 pub struct Building {
     pub(crate) surfaces: Vec<Surface>,
@@ -90,17 +90,17 @@ pub struct Building {
 }
 
 impl Building {
-    /// All rectangles.
+    /// All textured rectangles.
     pub fn surfaces(&self) -> &[Surface] {
         &self.surfaces
     }
 
-    /// Walls as the laser sees them.
+    /// Walls for the laser.
     pub fn walls(&self) -> &[WallSegment] {
         &self.walls
     }
 
-    /// Truth about every landmark, in the order they were hung.
+    /// All landmarks, in the order they were added.
     pub fn landmarks(&self) -> &[LandmarkTruth] {
         &self.landmarks
     }
@@ -110,19 +110,19 @@ impl Building {
         self.landmarks.iter().find(|l| l.name == name)
     }
 
-    /// The posters alone.
+    /// All posters.
     pub fn posters(&self) -> impl Iterator<Item = &LandmarkTruth> {
         self.landmarks.iter().filter(|l| l.kind == LandmarkKind::Poster)
     }
 
-    /// Whether the straight line between two points of the floor plan meets no wall.
+    /// Whether no wall crosses the straight line between two points of the floor.
     pub fn in_sight(&self, from_m: &Point2<f64>, to_m: &Point2<f64>) -> bool {
         let d = to_m - from_m;
         let length = d.norm();
         length < 1e-9 || range(&self.walls, from_m, &(d / length), length - 1e-6).is_none()
     }
 
-    /// Distance from a point of the floor plan to the nearest wall; infinite without walls.
+    /// Distance from a point of the floor to the nearest wall, metres; infinite without walls.
     pub fn clearance_m(&self, p_m: &Point2<f64>) -> f64 {
         let distance = |w: &WallSegment| {
             let along = (p_m - w.a_m).dot(&w.direction()).clamp(0.0, w.length_m());

@@ -1,6 +1,6 @@
 //! One picture on a plastered wall, seen by a camera under conditions that are set one by one: for experiments that
-//! change a single thing and keep all others as they are (method 18). Conditions and a seed in, an image and the exact
-//! corners out; the same in, the same bytes out. Where pictures hang in a building is not of interest here.
+//! vary a single condition (method 18). In: conditions and a seed. Out: an image and the exact corners; equal input
+//! gives equal bytes.
 
 mod conditions;
 
@@ -34,7 +34,7 @@ const EDGE_SAMPLES: usize = 3;
 /// How much of the camera's image is made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Extent {
-    /// All of it.
+    /// The whole image.
     Whole,
     /// The picture with a third of its larger side around it: enough to recognise it by its corners, and quicker.
     Around,
@@ -43,9 +43,9 @@ pub enum Extent {
 /// What the camera sees.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Exhibit {
-    /// The image.
+    /// The rendered image.
     pub image: GrayImage,
-    /// Where the picture is in it, exactly.
+    /// Exact corners of the picture in the image, px.
     pub corners: Corners,
 }
 

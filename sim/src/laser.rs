@@ -1,4 +1,4 @@
-//! A planar laser scanner among the building's walls, with noise and a maximum range.
+//! A planar laser scanner with noise and a maximum range.
 
 use crate::{
     building::Building,
@@ -10,22 +10,22 @@ use nalgebra::{Point2, Vector2};
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
-/// Most beams of a scan; more are not cast.
+/// Most beams of a scan.
 pub const MAX_BEAMS: usize = 4096;
 
-/// A laser scanner. The default sweeps half a turn in half-degree steps.
+/// Parameters of a laser scanner. The default covers half a turn in half-degree steps.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LaserParams {
-    /// Where it sits on the robot.
+    /// Pose of the laser on the robot.
     pub robot_from_laser: Pose2,
     /// Beams over the field of view, 2 to [`MAX_BEAMS`].
     pub beams: usize,
-    /// From the first beam (right) to the last (left), 0.01 to one turn; centred on the laser's x axis.
+    /// Angle from the first beam (right) to the last (left), 0.01 to one turn; centred on the laser's x axis.
     pub field_rad: f64,
-    /// Beyond it there is no return, 0.5 to 200 m.
+    /// Range beyond which there is no return, 0.5 to 200 m.
     pub max_range_m: f64,
-    /// Standard deviation of a range.
+    /// Standard deviation of a range, metres.
     pub range_sigma_m: f64,
 }
 
@@ -46,7 +46,7 @@ pub fn scan(building: &Building, map_from_robot: &Pose2, params: &LaserParams, s
     scan_among(building.walls(), map_from_robot, params, seed)
 }
 
-/// The same among walls that are no building's.
+/// As [`scan`], among given walls.
 pub fn scan_among(walls: &[WallSegment], map_from_robot: &Pose2, params: &LaserParams, seed: u64) -> Scan {
     let p = params;
     let within = |x: f64, low: f64, high: f64| if x.is_finite() { x.clamp(low, high) } else { low };

@@ -1,5 +1,5 @@
-//! Pictures that are nearly the same: a poster and its next printing, two doors of a corridor, a mirror image. A picture
-//! and a kind of change in, the two look-alikes out. Whether anybody can tell them apart is for others to say.
+//! Look-alikes: pairs of pictures that are nearly equal, such as two printings of a poster, two doors of a corridor,
+//! a mirror image. In: a picture and a kind of change. Out: the pair.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -33,7 +33,7 @@ pub enum LookAlikeKind {
 }
 
 impl LookAlikeKind {
-    /// All kinds.
+    /// All kinds, in the order of tables.
     pub const ALL: [Self; 7] =
         [Self::Text, Self::Block, Self::Quarter, Self::Half, Self::Tone, Self::Mirrored, Self::Doors];
 

@@ -1,18 +1,18 @@
-//! Walls as lines on the floor, and the rays that they stop.
+//! Walls as segments on the floor, and their intersections with rays.
 
 use nalgebra::{Point2, Vector2};
 
-/// An opaque wall for the laser, full height.
+/// An opaque wall over the whole height.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WallSegment {
-    /// One end, in the map frame.
+    /// First end, metres, map frame.
     pub a_m: Point2<f64>,
-    /// The other end; the room is on the left when going from a to b.
+    /// Second end, metres; the room is on the left of a to b.
     pub b_m: Point2<f64>,
 }
 
 impl WallSegment {
-    /// Length in metres.
+    /// Distance between the ends, metres.
     pub fn length_m(&self) -> f64 {
         (self.b_m - self.a_m).norm()
     }
@@ -30,7 +30,7 @@ impl WallSegment {
     }
 }
 
-/// Distance along a unit direction to the nearest wall nearer than `max_m`, either side of it.
+/// Distance along a unit direction to the nearest wall within `max_m`, from either side of it, metres.
 pub(crate) fn range(
     walls: &[WallSegment],
     from_m: &Point2<f64>,

@@ -1,4 +1,4 @@
-//! A question where to look, as it enters, and the advice as it leaves.
+//! A gaze request on arrival, and the advice that answers it.
 
 use super::geometry;
 use crate::{Code, Rejection, v1};
@@ -8,22 +8,22 @@ use map::{
     visibility::PanTiltCamera,
 };
 
-/// A question that can be relied on.
+/// A checked gaze request.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CheckedGaze {
-    /// Where the robot is, if it says so.
+    /// The robot's own pose, if given.
     pub pose: Option<Pose2Covariance>,
-    /// Where its camera is and looks.
+    /// Pan-tilt unit with its present direction.
     pub head: PanTiltUnit,
-    /// Rightmost and leftmost pan of its unit, if it says so.
+    /// Rightmost and leftmost pan of the unit, radians, if given.
     pub pan_range_rad: Option<[f64; 2]>,
-    /// Lowest and highest tilt, if it says so.
+    /// Lowest and highest tilt of the unit, radians, if given.
     pub tilt_range_rad: Option<[f64; 2]>,
-    /// By what to choose.
+    /// Criterion of the choice.
     pub criterion: Criterion,
-    /// Robot's clock.
+    /// Robot's clock, ns.
     pub at_ns: i64,
-    /// The landmark that it looked at last, and whether that was recognised.
+    /// The last target, and whether it was recognised.
     pub looked: Option<(String, bool)>,
 }
 
@@ -62,7 +62,7 @@ impl TryFrom<v1::GazeRequest> for CheckedGaze {
 }
 
 impl CheckedGaze {
-    /// The robot's camera: what it does not say is as in `usual`.
+    /// The robot's camera: absent ranges are those of `usual`.
     pub fn viewer(&self, usual: &PanTiltCamera) -> PanTiltCamera {
         PanTiltCamera {
             pan_rad: self.pan_range_rad.unwrap_or(usual.pan_rad),
