@@ -10,7 +10,7 @@
 
 use anyhow::Context;
 use clap::Parser;
-use client::{ClientError, MapClient, lessons::Size, map::Extent};
+use client::{ClientError, MapClient, lessons::Size, map::LandmarkRegion};
 use std::{
     path::{Path, PathBuf},
     time::Duration,
@@ -62,7 +62,7 @@ async fn main() -> Result<(), anyhow::Error> {
 
     // 1. Landmarks and views.
     let size = arguments.size.as_ref().map(|s| Size { width_m: s[0], height_m: s[1] });
-    let extent = if arguments.cropped { Extent::WholeImage } else { Extent::Detect };
+    let extent = if arguments.cropped { LandmarkRegion::WholeImage } else { LandmarkRegion::Detect };
     let mut names = Vec::new();
     for path in &arguments.images {
         let name = name_of(path)?;

@@ -1,5 +1,5 @@
-//! One image with what the robot knows about it, before it gets its number and goes out. Reads the size of JPEG and
-//! PNG from their headers; decodes nothing.
+//! One image with its capture data, before it is numbered and sent. Reads the size of JPEG and PNG from their
+//! headers; decodes nothing.
 
 use crate::ClientError;
 use map::pose2::{Pose2, Pose2Covariance};
@@ -12,7 +12,7 @@ use protos::{
 use std::time::{SystemTime, UNIX_EPOCH};
 use vision::frame::{GrayImage, Intrinsics};
 
-/// One image and what is known about it. Built from an image, then filled with `with_...`.
+/// One image with its capture data. Built from an image, then completed with `with_...`.
 #[derive(Debug, Clone)]
 pub struct Capture {
     frame: v1::Frame,
@@ -40,67 +40,67 @@ impl Capture {
         }
     }
 
-    /// The calibrated camera: without it there is recognition, but no pose.
+    /// Sets the intrinsics; without them there is recognition but no pose.
     #[must_use]
     pub fn with_intrinsics(mut self, camera: &Intrinsics) -> Self {
         self.frame.intrinsics = Some(intrinsics_wire(camera));
         self
     }
 
-    /// Camera on robot at capture: without it there is no robot pose.
+    /// Sets `robot_from_camera` at capture; without it there is no robot pose.
     #[must_use]
     pub fn with_mounting(mut self, robot_from_camera: &Isometry3<f64>) -> Self {
         self.frame.robot_from_camera = Some(pose3_wire(robot_from_camera));
         self
     }
 
-    /// Odometry at capture.
+    /// Sets `odom_from_robot` at capture.
     #[must_use]
     pub fn with_odometry(mut self, odom_from_robot: &Pose2) -> Self {
         self.frame.odometry = Some(pose2_wire(odom_from_robot));
         self
     }
 
-    /// What the robot believes, with covariance over (x, y, theta).
+    /// Sets the robot's own pose estimate, with covariance over (x, y, theta).
     #[must_use]
     pub fn with_prior(mut self, map_from_robot: &Pose2Covariance) -> Self {
         self.frame.prior = Some(pose2_covariance_wire(map_from_robot));
         self
     }
 
-    /// The robot's clock at capture, ns since the Unix epoch.
+    /// Sets the robot's clock at capture, ns since the Unix epoch.
     #[must_use]
     pub fn captured_at_ns(mut self, captured_ns: i64) -> Self {
         self.frame.captured_ns = captured_ns;
         self
     }
 
-    /// Do not start work later than this after receipt, in milliseconds.
+    /// Sets the latest start of work after receipt, ms.
     #[must_use]
     pub fn with_deadline_ms(mut self, deadline_ms: u32) -> Self {
         self.frame.deadline_ms = deadline_ms;
         self
     }
 
-    /// Recognise against this map instead of the robot's own.
+    /// Selects a map other than the robot's own.
     #[must_use]
     pub fn against_map(mut self, map: impl Into<String>) -> Self {
         self.frame.map = map.into();
         self
     }
 
-    /// Size in pixels, (width, height).
+    /// Width and height, px.
     pub fn size_px(&self) -> (u32, u32) {
         (self.frame.width_px, self.frame.height_px)
     }
 
-    /// The message, numbered.
+    /// The message with epoch and sequence number.
     pub(crate) fn numbered(self, epoch: u64, seq: u64) -> v1::Frame {
         v1::Frame { epoch, seq, ..self.frame }
     }
 }
 
-/// The robot's clock.
+/// The system clock, ns since the Unix epoch.
 pub(crate) fn now_ns() -> i64 {
     let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     i64::try_from(since.as_nanos()).unwrap_or(i64::MAX)

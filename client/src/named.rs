@@ -1,22 +1,23 @@
-//! The landmarks that an answer names, and how each was named. In: an answer. Out: one item for each named quad.
+//! The landmarks that an answer names, and whether each was recognised globally or guided. In: an answer. Out: one
+//! item for each named quad.
 
 use protos::v1::{Answer, QuadAnswer, Sighting, Verdict};
 use vision::detect::quads::Corners;
 
-/// A quad that has a landmark's name.
+/// A quad with a landmark's name.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NamedLandmark<'a> {
-    /// The landmark.
+    /// Name of the landmark.
     pub name: &'a str,
     /// [`Sighting::Global`]: the picture alone names it; it may start a pose. [`Sighting::Guided`]: the pose known before
     /// names it; it may correct that pose, and says nothing to a program that does not know where the robot is.
     pub sighting: Sighting,
-    /// Where it is in the image, and its pose.
+    /// Position in the image, and pose.
     pub quad: &'a QuadAnswer,
 }
 
 impl NamedLandmark<'_> {
-    /// The pose known before names it.
+    /// Whether the landmark was recognised by guided recognition.
     pub fn is_guided(&self) -> bool {
         self.sighting == Sighting::Guided
     }

@@ -18,31 +18,31 @@ use zenoh::{
     sample::Sample,
 };
 
-/// Answers and poses kept for a reader that is slow; it then misses the oldest.
+/// Answers and poses kept for a slow reader; it misses the oldest beyond.
 pub const INBOX: usize = 64;
 
-/// What to do when the link is full.
+/// Behaviour when the link is full.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Delivery {
-    /// Drop after 50 ms: right for a robot, whose next frame is worth more.
+    /// Drop a message after 50 ms: for robots, whose next frame is more useful.
     #[default]
     Latest,
-    /// Wait: right for an evaluation, where every frame counts.
+    /// Wait: for evaluations that need every frame.
     Every,
 }
 
-/// How to reach the server, and who we are.
+/// Endpoint of the server and identity of the robot.
 #[derive(Debug, Clone)]
 pub struct RobotOptions {
     /// The server's zenoh endpoint, such as `tcp/127.0.0.1:7447`.
     pub endpoint: String,
-    /// Fleet: part of every key.
+    /// Name of the fleet, part of every key.
     pub fleet: String,
-    /// The robot's name, as registered at the server.
+    /// Name of the robot, as registered at the server.
     pub robot: String,
-    /// When the link is full.
+    /// Behaviour when the link is full.
     pub delivery: Delivery,
-    /// How long to look for the server.
+    /// Longest time to find the server.
     pub timeout: Duration,
     /// The epoch of a session before, for a program that was started again while odometry went on; drawn at random if
     /// absent. Only for a server that was started again too: to one that went on, numbers that begin anew are stale. Two
@@ -67,9 +67,9 @@ impl RobotOptions {
 /// An answer and the camera it is for.
 #[derive(Debug, Clone)]
 pub struct CameraAnswer {
-    /// The camera.
+    /// Name of the camera.
     pub camera: Name,
-    /// What the server said.
+    /// The server's answer.
     pub answer: v1::Answer,
 }
 
@@ -242,7 +242,7 @@ impl RobotClient {
         self.put(&key, bytes, Priority::DataLow).await
     }
 
-    /// Asks where to look, and waits for the advice.
+    /// Requests gaze advice and waits for it.
     pub async fn gaze(
         &self,
         request: &v1::GazeRequest,

@@ -5,11 +5,11 @@
 
 use super::{slots::SlotKey, snapshot::MapSnapshot};
 use map::{
+    extrinsics::CameraExtrinsics,
     localise::{
-        Fix, Sighting,
-        watch::{CameraWatch, WatchState, focal_evidence},
+        Fix, LandmarkObservation,
+        intrinsics_monitor::{IntrinsicsMonitor, IntrinsicsMonitorState, focal_evidence},
     },
-    mounting::Mounting,
 };
 use nalgebra::{Matrix2, Point2, Vector3};
 use std::{
@@ -44,7 +44,7 @@ struct Record {
     intrinsics: Intrinsics,
     image_px: [u32; 2],
     frames: u64,
-    watch: CameraWatch,
+    watch: IntrinsicsMonitor,
     kept: Vec<Kept>,
 }
 
@@ -58,7 +58,7 @@ pub struct CameraState {
     /// Frames with these intrinsics in which something was recognised.
     pub frames: u64,
     /// What its residuals say.
-    pub watch: WatchState,
+    pub watch: IntrinsicsMonitorState,
     /// Views kept to calibrate from.
     pub views: usize,
 }
@@ -79,7 +79,7 @@ pub struct Look<'a> {
     /// The map they hang in.
     pub map: &'a MapSnapshot,
     /// Where the camera sits.
-    pub mounting: Option<&'a Mounting>,
+    pub mounting: Option<&'a CameraExtrinsics>,
     /// The fix, or the word that says why there is none.
     pub fix: Result<&'a Fix, &'a str>,
 }
@@ -91,13 +91,13 @@ impl Cameras {
             return;
         }
         let evidence = look.fix.ok().and_then(|fix| {
-            let sightings: Vec<Sighting<'_>> = look
+            let sightings: Vec<LandmarkObservation<'_>> = look
                 .seen
                 .iter()
                 .filter(|(id, _)| fix.landmarks.contains(id))
                 .filter_map(|(id, seen)| {
                     let place = look.map.landmarks.get(id)?.place.as_ref()?;
-                    Some(Sighting { landmark: *id, seen, place })
+                    Some(LandmarkObservation { landmark: *id, seen, place })
                 })
                 .collect();
             (!sightings.is_empty())
@@ -112,7 +112,7 @@ impl Cameras {
             intrinsics: *look.intrinsics,
             image_px: look.image_px,
             frames: 0,
-            watch: CameraWatch::default(),
+            watch: IntrinsicsMonitor::default(),
             kept: vec![],
         };
         let record = all.entry(key.clone()).or_insert_with(new);
@@ -125,8 +125,8 @@ impl Cameras {
         }
         record.frames += 1;
         match look.fix {
-            Ok(fix) => record.watch.fixed(fix, evidence),
-            Err("gate_room" | "disagree") => record.watch.refused(),
+            Ok(fix) => record.watch.add_fix(fix, evidence),
+            Err("gate_room" | "disagree") => record.watch.add_refusal(),
             Err(_) => {}
         }
         for (id, seen) in look.seen {

@@ -7,11 +7,11 @@
 
 use super::snapshot::map_snapshot::MapSnapshot;
 use map::{
-    hypotheses::{Glimpse, Member, Reading},
-    localise::{LocaliseParams, RobotFix, Sighting, robot_pose},
-    mounting::Mounting,
+    extrinsics::CameraExtrinsics,
+    localise::{FixResult, LandmarkObservation, LocaliseParams, robot_pose},
     place::LandmarkPlace,
     pose2::Pose2,
+    relocalise::{AssociationHypothesis, PossibleLandmark, RelativeObservation},
 };
 use nalgebra::{Matrix2, Matrix6};
 use std::{
@@ -29,10 +29,10 @@ use vision::{
 };
 
 /// Most landmarks that look the same: a sighting of more says too little for what it costs.
-pub const MAX_ALIKE: usize = map::hypotheses::MAX_MEMBERS / 2;
+pub const MAX_ALIKE: usize = map::relocalise::MAX_MEMBERS / 2;
 
 /// One thing that was seen: each landmark it may be, and how it was seen if it is that one.
-pub type Sighted = Vec<(LandmarkId, Glimpse)>;
+pub type Sighted = Vec<(LandmarkId, RelativeObservation)>;
 
 /// What a frame shows of landmarks that have doubles. Only what may be several, all of known and trusted place: one that
 /// hangs nobody knows where would be taken for the others again and again.
@@ -40,7 +40,7 @@ pub fn sighted(
     image: &GrayImage,
     facts: &FrameFacts,
     map: &MapSnapshot,
-    mounting: &Mounting,
+    mounting: &CameraExtrinsics,
     camera: &Intrinsics,
 ) -> Vec<Sighted> {
     if map.look_alikes.models.is_empty() {
@@ -55,7 +55,7 @@ fn one(
     image: &GrayImage,
     facts: &QuadFacts,
     map: &MapSnapshot,
-    mounting: &Mounting,
+    mounting: &CameraExtrinsics,
     camera: &Intrinsics,
 ) -> Option<Sighted> {
     let alike = resembling(image, &facts.quad, map).filter(|alike| alike.fitting >= 2)?;
@@ -121,34 +121,45 @@ fn members(
 }
 
 /// Where the landmark is from the robot: one, or two where its picture allows both.
-fn glimpses(id: LandmarkId, place: &LandmarkPlace, seen: &LandmarkPose, mounting: &Mounting) -> Vec<Glimpse> {
+fn glimpses(
+    id: LandmarkId,
+    place: &LandmarkPlace,
+    seen: &LandmarkPose,
+    mounting: &CameraExtrinsics,
+) -> Vec<RelativeObservation> {
     // As if it hung at the origin: what robot_pose gives then is the robot in the landmark's own frame.
     let at_origin =
         LandmarkPlace { x_m: 0.0, y_m: 0.0, theta_rad: 0.0, covariance: Matrix6::zeros(), ..*place };
-    let sighting = Sighting { landmark: id, seen, place: &at_origin };
+    let sighting = LandmarkObservation { landmark: id, seen, place: &at_origin };
     let fixes = match robot_pose(&[sighting], mounting, None, &LocaliseParams::default()) {
-        Ok(RobotFix::Fixed(fix)) => vec![*fix],
-        Ok(RobotFix::Ambiguous(fixes)) => fixes,
-        Ok(RobotFix::Refused(_)) | Err(_) => Vec::new(),
+        Ok(FixResult::Fixed(fix)) => vec![*fix],
+        Ok(FixResult::Ambiguous(fixes)) => fixes,
+        Ok(FixResult::Refused(_)) | Err(_) => Vec::new(),
     };
     let turned = |fix: map::localise::Fix| {
         let robot_from_landmark = fix.pose.inverse();
-        Glimpse { robot_from_landmark: robot_from_landmark.pose, covariance: robot_from_landmark.covariance }
+        RelativeObservation {
+            robot_from_landmark: robot_from_landmark.pose,
+            covariance: robot_from_landmark.covariance,
+        }
     };
     fixes.into_iter().map(turned).collect()
 }
 
 /// The readings of a sighting, all as probable; `clutter` is left for what is on no map.
 pub fn readings<'a>(
-    sighted: &[(LandmarkId, Glimpse)],
+    sighted: &[(LandmarkId, RelativeObservation)],
     map: &'a MapSnapshot,
     clutter: f64,
-) -> Vec<Reading<'a>> {
+) -> Vec<AssociationHypothesis<'a>> {
     let probability = (1.0 - clutter) / sighted.len().max(1) as f64;
-    let reading = |(id, glimpse): &(LandmarkId, Glimpse)| {
+    let reading = |(id, glimpse): &(LandmarkId, RelativeObservation)| {
         let place = map.landmarks.get(id)?.place.as_ref()?;
         let visible = map.visibility.get(id).map(Arc::as_ref);
-        Some(Reading { glimpse: *glimpse, member: Member { place, visible, probability } })
+        Some(AssociationHypothesis {
+            glimpse: *glimpse,
+            member: PossibleLandmark { place, visible, probability },
+        })
     };
     sighted.iter().filter_map(reading).collect()
 }

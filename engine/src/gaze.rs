@@ -4,9 +4,9 @@
 use super::snapshot::MapSnapshot;
 use map::{
     check::OutOfRange,
-    gaze::{Choice, Gaze, GazeParams, Head, Look, Target, rank},
+    gaze::{GazeAction, GazeCandidate, GazeController, GazeParams, GazeTarget, PanTiltUnit, rank},
     pose2::Pose2Covariance,
-    visibility::Viewer,
+    visibility::PanTiltCamera,
 };
 use protos::Name;
 use std::{
@@ -24,23 +24,23 @@ pub struct Ask {
     /// Where the robot is.
     pub pose: Pose2Covariance,
     /// Ranges of its pan-tilt unit, and its focal length.
-    pub viewer: Viewer,
+    pub viewer: PanTiltCamera,
     /// Where its camera is and looks.
-    pub head: Head,
+    pub head: PanTiltUnit,
     /// How to choose.
     pub params: GazeParams,
 }
 
 /// Every landmark worth looking at, best first.
-pub fn ranked(map: &MapSnapshot, ask: &Ask) -> Result<Vec<Choice>, OutOfRange> {
-    let targets: Vec<Target<'_>> = map
+pub fn ranked(map: &MapSnapshot, ask: &Ask) -> Result<Vec<GazeTarget>, OutOfRange> {
+    let targets: Vec<GazeCandidate<'_>> = map
         .models
         .iter()
         .filter_map(|model| {
             let (info, visible) = (map.landmarks.get(&model.id)?, map.visibility.get(&model.id)?);
             let place = info.place.as_ref().filter(|_| info.is_trusted())?;
             let (saliency, v_c) = (model.saliency, model.v_c);
-            Some(Target { landmark: model.id, place, visible, saliency, v_c })
+            Some(GazeCandidate { landmark: model.id, place, visible, saliency, v_c })
         })
         .collect();
     rank(&ask.pose, &targets, &ask.viewer, &ask.head, &ask.params)
@@ -48,7 +48,7 @@ pub fn ranked(map: &MapSnapshot, ask: &Ask) -> Result<Vec<Choice>, OutOfRange> {
 
 /// Which landmark each robot was told to look at.
 #[derive(Debug, Default)]
-pub struct Gazes(Mutex<BTreeMap<Name, (u64, Gaze)>>);
+pub struct Gazes(Mutex<BTreeMap<Name, (u64, GazeController)>>);
 
 impl Gazes {
     /// Where a robot should look at its own time `at_ns`; `looked` is what came of the last look.
@@ -59,7 +59,7 @@ impl Gazes {
         looked: Option<(LandmarkId, bool)>,
         map: &MapSnapshot,
         ask: &Ask,
-    ) -> Result<Look, OutOfRange> {
+    ) -> Result<GazeAction, OutOfRange> {
         let ranked = ranked(map, ask)?;
         let mut gazes = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let tick = gazes.values().map(|(tick, _)| *tick).max().unwrap_or(0) + 1;
@@ -70,7 +70,7 @@ impl Gazes {
         let (ticked, gaze) = gazes.entry(robot.clone()).or_default();
         *ticked = tick;
         if let Some((landmark, recognised)) = looked {
-            gaze.looked(at_ns, landmark, recognised, &ask.params);
+            gaze.report_outcome(at_ns, landmark, recognised, &ask.params);
         }
         Ok(gaze.choose(at_ns, &ranked, &ask.pose, &ask.params))
     }

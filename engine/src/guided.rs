@@ -14,7 +14,7 @@ use map::{
         AssociateParams, CameraView, Candidate, ExpectParams, Expectations, Expected, GuidedReport,
         KnownLandmark, MAX_OBSERVATIONS, Observation, associate, expect,
     },
-    localise::Sighting,
+    localise::LandmarkObservation,
     pose2::Pose2Covariance,
     visibility::Obstacle,
 };
@@ -71,10 +71,10 @@ pub struct Guided {
 
 impl Guided {
     /// As sightings of known place.
-    pub fn placed<'a>(&'a self, map: &'a MapSnapshot) -> Vec<Sighting<'a>> {
+    pub fn placed<'a>(&'a self, map: &'a MapSnapshot) -> Vec<LandmarkObservation<'a>> {
         let place = |s: &'a GuidedSighting| {
             let place = map.landmarks.get(&s.landmark)?.place.as_ref()?;
-            Some(Sighting { landmark: s.landmark, seen: &s.seen, place })
+            Some(LandmarkObservation { landmark: s.landmark, seen: &s.seen, place })
         };
         self.sightings.iter().filter_map(place).collect()
     }

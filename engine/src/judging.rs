@@ -10,9 +10,12 @@ use super::{
     verdicts,
 };
 use map::{
-    changes::{ChangeParams, Expectation, Eye, Judged, Verdict as InPlace, expected, judge, sift},
-    localise::{Fix, RobotFix, Sighting},
-    mounting::Mounting,
+    extrinsics::CameraExtrinsics,
+    landmark_health::{
+        ExpectedLandmark, HealthParams, MountedCamera, PlaceCheck, PlaceVerdict as InPlace, check_place,
+        drop_unreliable, expected,
+    },
+    localise::{Fix, FixResult, LandmarkObservation},
     pose2::Pose2Covariance,
 };
 use vision::{
@@ -29,7 +32,7 @@ pub struct View<'a> {
     /// The map it was compared with.
     pub map: &'a MapSnapshot,
     /// Where the camera sat.
-    pub mounting: Option<&'a Mounting>,
+    pub mounting: Option<&'a CameraExtrinsics>,
     /// The camera.
     pub camera: Option<&'a Intrinsics>,
     /// Width and height.
@@ -44,7 +47,7 @@ pub struct Seen {
     /// That pose.
     pub grounds: Grounds,
     /// Landmarks that are in the frame.
-    pub judged: Vec<Judged>,
+    pub judged: Vec<PlaceCheck>,
     /// Landmarks that should be and are not.
     pub missed: Vec<LandmarkId>,
 }
@@ -57,7 +60,7 @@ pub struct JudgedFrame {
     /// The fix by the landmarks that the picture alone names, or the word that says why there is none.
     pub fix: Result<Fix, &'static str>,
     /// The same without a pose of ours to choose among several solutions.
-    pub independent: Option<RobotFix>,
+    pub independent: Option<FixResult>,
     /// The fix by the landmarks that the pose names, and by the others where they alone gave none.
     pub guided: Option<Fix>,
     /// What it says of the landmarks, where the robot's pose was known without it.
@@ -87,7 +90,7 @@ pub fn judged_frame(view: &View<'_>, grounds: Option<Grounds>, guided: &Guided) 
     let seen = grounds.and_then(|grounds| seen(view, global.as_deref().ok(), grounds));
     let judged = seen.as_ref().map_or(&[][..], |s| &s.judged);
     let prior = known.as_ref().or(view.prior);
-    let global = global.map(|all| sift(&all, judged));
+    let global = global.map(|all| drop_unreliable(&all, judged));
     let (fix, independent) = match &global {
         Ok(sightings) => fixes(view, sightings, prior),
         Err(word) => (Err(*word), None),
@@ -111,12 +114,12 @@ pub fn judged_expected(view: &View<'_>, grounds: Grounds, guided: &Guided) -> Ju
 /// pose gone wrong cannot keep out the fixes that would correct it.
 fn fixes(
     view: &View<'_>,
-    sightings: &[Sighting<'_>],
+    sightings: &[LandmarkObservation<'_>],
     prior: Option<&Pose2Covariance>,
-) -> (Result<Fix, &'static str>, Option<RobotFix>) {
+) -> (Result<Fix, &'static str>, Option<FixResult>) {
     let independent = verdicts::robot_fixes(sightings, view.mounting, view.prior);
     let fix = match &independent {
-        Ok(RobotFix::Ambiguous(_)) if view.prior.is_none() && prior.is_some() => {
+        Ok(FixResult::Ambiguous(_)) if view.prior.is_none() && prior.is_some() => {
             verdicts::robot_fix(sightings, view.mounting, prior)
         }
         Ok(fix) => verdicts::only(fix),
@@ -130,21 +133,21 @@ fn fixes(
 fn guided_fix(
     view: &View<'_>,
     guided: &Guided,
-    with: &[Sighting<'_>],
+    with: &[LandmarkObservation<'_>],
     (prior, seen): (&Pose2Covariance, Option<&Seen>),
 ) -> Option<Fix> {
     let named = guided.placed(view.map);
     let mounting = view.mounting.filter(|_| !named.is_empty())?;
     let supporters = seen.map_or(&[][..], |s| &s.grounds.supporters);
-    let p = ChangeParams::default();
-    let judged = named.iter().filter_map(|s| judge(s, mounting, prior, supporters, &p).ok());
+    let p = HealthParams::default();
+    let judged = named.iter().filter_map(|s| check_place(s, mounting, prior, supporters, &p).ok());
     let judged: Vec<_> = judged.collect();
-    let in_place = |s: &&Sighting<'_>| {
+    let in_place = |s: &&LandmarkObservation<'_>| {
         judged.iter().any(|j| {
             j.landmark == s.landmark && matches!(j.verdict, InPlace::InPlace { .. } | InPlace::Undecided)
         })
     };
-    let all: Vec<Sighting<'_>> = named.iter().filter(in_place).chain(with).copied().collect();
+    let all: Vec<LandmarkObservation<'_>> = named.iter().filter(in_place).chain(with).copied().collect();
     verdicts::robot_fix(&all, Some(mounting), Some(prior)).ok()
 }
 
@@ -160,19 +163,20 @@ fn may_be(verdict: &Verdict, id: LandmarkId) -> bool {
 }
 
 /// Which landmarks hang where they should, and which should be in the frame and are not.
-fn seen(view: &View<'_>, sightings: Option<&[Sighting<'_>]>, grounds: Grounds) -> Option<Seen> {
+fn seen(view: &View<'_>, sightings: Option<&[LandmarkObservation<'_>]>, grounds: Grounds) -> Option<Seen> {
     let View { facts, map, image_px, .. } = *view;
     let (mounting, camera) = (view.mounting?, view.camera?);
-    let p = ChangeParams::default();
-    let judge = |s: &Sighting<'_>| judge(s, mounting, &grounds.pose, &grounds.supporters, &p).ok();
+    let p = HealthParams::default();
+    let judge =
+        |s: &LandmarkObservation<'_>| check_place(s, mounting, &grounds.pose, &grounds.supporters, &p).ok();
     let judged = sightings.unwrap_or_default().iter().filter_map(judge).collect();
     let there = |id: LandmarkId| facts.quads.iter().filter_map(|q| q.verdict.as_ref()).any(|v| may_be(v, id));
     let learnt = map.models.iter().filter_map(|model| {
         let (info, visible) = (map.landmarks.get(&model.id)?, map.visibility.get(&model.id)?);
         let place = info.place.as_ref().filter(|_| info.is_trusted() && !there(model.id))?;
-        Some(Expectation { landmark: model.id, place, visible })
+        Some(ExpectedLandmark { landmark: model.id, place, visible })
     });
-    let eye = Eye { mounting, camera, image_px };
+    let eye = MountedCamera { mounting, camera, image_px };
     // Missing is told only by a pose that others hold up.
     let missed = if grounds.supporters.len() >= p.supporters {
         expected(&grounds.pose, &eye, &learnt.collect::<Vec<_>>(), &p)

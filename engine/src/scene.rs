@@ -13,8 +13,8 @@ use map::place::{LandmarkPlace, PlaceSigmas};
 use nalgebra::Vector3;
 use sim::{
     building::Building,
-    drive::{Robot, RobotParams, Sighting},
     lesson::{LessonParams, stops},
+    robot::{Robot, RobotParams, SensorReadings},
 };
 use std::{collections::BTreeMap, sync::Arc};
 use vision::{
@@ -44,7 +44,7 @@ impl Scene {
     }
 
     /// What the robot sees at stops before the first two posters; another seed gives other stops.
-    pub fn looks(&mut self, seed: u64, views: usize) -> Vec<(String, Sighting)> {
+    pub fn looks(&mut self, seed: u64, views: usize) -> Vec<(String, SensorReadings)> {
         let near = LessonParams {
             seed,
             views,

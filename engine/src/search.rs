@@ -1,4 +1,4 @@
-//! Where a robot may be while nothing it sees is unique: the belief of `map::hypotheses` over the map, for each robot that
+//! Where a robot may be while nothing it sees is unique: the belief of `map::relocalise` over the map, for each robot that
 //! searches. In: frames with odometry that show landmarks that have doubles. Out: the hypotheses that are left, and a pose
 //! once one of them holds 95 %, explains sightings of two different landmarks, and no other place does nearly as well. On
 //! the vision threads only.
@@ -8,8 +8,8 @@ use super::{
     snapshot::MapSnapshot,
 };
 use map::{
-    hypotheses::{Hypotheses, HypothesesParams, Mode},
     pose2::{Pose2, Pose2Covariance, wrap_rad},
+    relocalise::{GridBelief, GridBeliefParams, PoseHypothesis},
 };
 use nalgebra::{Matrix3, Point2, Vector2, Vector3};
 use protos::Name;
@@ -67,7 +67,7 @@ pub struct Progress {
     /// Its version.
     pub map_version: u64,
     /// The hypotheses, most probable first.
-    pub modes: Vec<Mode>,
+    pub modes: Vec<PoseHypothesis>,
     /// Of the belief, nats.
     pub entropy_nats: f64,
     /// Sightings so far, the latest 32 at most.
@@ -96,7 +96,7 @@ pub enum Need {
 #[derive(Debug, Clone, Default)]
 pub struct Left {
     /// The hypotheses, most probable first.
-    pub modes: Vec<Mode>,
+    pub modes: Vec<PoseHypothesis>,
     /// The pose at the frame, once it is decided, and the landmarks that it explains.
     pub decided: Option<(Pose2Covariance, Vec<LandmarkId>)>,
 }
@@ -106,13 +106,13 @@ struct Search {
     epoch: u64,
     map: String,
     version: u64,
-    p: HypothesesParams,
-    belief: Hypotheses,
+    p: GridBeliefParams,
+    belief: GridBelief,
     odometry: Pose2,
     way_m: f64,
     looks: VecDeque<(Pose2, f64, Vec<Sighted>)>,
     /// After the last sighting.
-    modes: Vec<Mode>,
+    modes: Vec<PoseHypothesis>,
     entropy_nats: f64,
     landmarks: Vec<LandmarkId>,
     needed: Vec<Need>,
@@ -187,13 +187,13 @@ impl Search {
     fn new(glance: &Glance<'_>) -> Option<Self> {
         let corners = extent(glance.map)?;
         let area = (corners[1] - corners[0]).map(|v| v.max(0.1)).product();
-        let fine = HypothesesParams::default();
+        let fine = GridBeliefParams::default();
         let cell_m = fine.cell_m.max((area * fine.headings as f64 / MAX_CELLS as f64).sqrt() * 1.01);
         if cell_m > MAX_CELL_M {
             return None;
         }
-        let p = HypothesesParams { cell_m, ..fine };
-        let belief = Hypotheses::new(corners, |_| 1.0, &p).ok()?;
+        let p = GridBeliefParams { cell_m, ..fine };
+        let belief = GridBelief::new(corners, |_| 1.0, &p).ok()?;
         let Glance { epoch, map, odometry, .. } = *glance;
         let (name, version) = (map.name.clone(), map.version);
         Some(Self {
@@ -229,9 +229,9 @@ impl Search {
         let motion = since(&self.odometry);
         self.way_m += motion.position().norm();
         self.odometry = glance.odometry;
-        self.belief.moved(&motion).ok()?;
+        self.belief.predict(&motion).ok()?;
         for sighted in glance.sighted {
-            self.belief.saw_any(&readings(sighted, glance.map, self.p.clutter)).ok()?;
+            self.belief.update_associations(&readings(sighted, glance.map, self.p.clutter)).ok()?;
         }
         if self.looks.len() == MAX_LOOKS {
             self.looks.pop_front();
@@ -295,7 +295,7 @@ impl Search {
             let drift = DRIFT * (self.way_m - way_m);
             for sighted in looks {
                 all += 1.0;
-                let fits = |(id, glimpse): &&(LandmarkId, map::hypotheses::Glimpse)| {
+                let fits = |(id, glimpse): &&(LandmarkId, map::relocalise::RelativeObservation)| {
                     let Some(place) = map.landmarks.get(id).and_then(|l| l.place.as_ref()) else {
                         return false;
                     };
@@ -317,7 +317,7 @@ impl Search {
 fn extent(map: &MapSnapshot) -> Option<[Point2<f64>; 2]> {
     let (points, margin): (Vec<Point2<f64>>, f64) = if map.walls.is_empty() {
         let places = map.landmarks.values().filter_map(|l| l.place.as_ref());
-        (places.map(|p| Point2::new(p.x_m, p.y_m)).collect(), HypothesesParams::default().clutter_reach_m)
+        (places.map(|p| Point2::new(p.x_m, p.y_m)).collect(), GridBeliefParams::default().clutter_reach_m)
     } else {
         (map.walls.iter().flat_map(|w| [w.a, w.b]).collect(), MARGIN_M)
     };

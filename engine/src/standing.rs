@@ -1,7 +1,7 @@
 //! What robots find out about landmarks, on its way to whoever keeps the map: moved, missing, in place again. The store
 //! commits it, then the new version of the map is what every frame sees.
 
-use map::changes::{Change, Finding, Standing};
+use map::landmark_health::{Finding, HealthChange, LandmarkHealth};
 use serde_json::json;
 use tokio::sync::mpsc::{Receiver, Sender, channel, error::TrySendError};
 use vision::recognise::LandmarkId;
@@ -19,14 +19,14 @@ pub struct Found {
     /// Its name.
     pub name: String,
     /// How far to trust it from now on.
-    pub standing: Standing,
+    pub standing: LandmarkHealth,
     /// JSON: why; none for a sound one.
     pub finding: Option<String>,
 }
 
 impl Found {
     /// Of what a robot's watch says.
-    pub fn new(map: &str, name: &str, change: &Change) -> Self {
+    pub fn new(map: &str, name: &str, change: &HealthChange) -> Self {
         let finding = change.finding.map(|finding| match finding {
             Finding::Moved { apparent, by_m, sightings } => json!({
                 "kind": "moved", "by_m": by_m, "sightings": sightings,

@@ -7,8 +7,8 @@ use super::{
     snapshot::MapSnapshot,
 };
 use map::{
-    localise::{Fix, FixRefusal, LocaliseParams, RobotFix, Sighting, robot_pose},
-    mounting::Mounting,
+    extrinsics::CameraExtrinsics,
+    localise::{Fix, FixRefusal, FixResult, LandmarkObservation, LocaliseParams, robot_pose},
     pose2::Pose2Covariance,
 };
 use protos::{
@@ -155,7 +155,10 @@ pub fn recognised(facts: &FrameFacts) -> Vec<(LandmarkId, &LandmarkPose)> {
 
 /// Landmarks that were recognised, posed, and have a place that is trusted; or the word that says why there are none:
 /// empty when no landmark was recognised.
-pub fn sightings<'a>(facts: &'a FrameFacts, map: &'a MapSnapshot) -> Result<Vec<Sighting<'a>>, &'static str> {
+pub fn sightings<'a>(
+    facts: &'a FrameFacts,
+    map: &'a MapSnapshot,
+) -> Result<Vec<LandmarkObservation<'a>>, &'static str> {
     let posed = recognised(facts);
     if posed.is_empty() {
         // The quads say why each has no pose.
@@ -163,7 +166,7 @@ pub fn sightings<'a>(facts: &'a FrameFacts, map: &'a MapSnapshot) -> Result<Vec<
     }
     let placed = |(landmark, seen)| {
         let info = map.landmarks.get(&landmark)?;
-        Some((info, Sighting { landmark, seen, place: info.place.as_ref()? }))
+        Some((info, LandmarkObservation { landmark, seen, place: info.place.as_ref()? }))
     };
     let placed: Vec<_> = posed.into_iter().filter_map(placed).collect();
     if placed.is_empty() {
@@ -175,10 +178,10 @@ pub fn sightings<'a>(facts: &'a FrameFacts, map: &'a MapSnapshot) -> Result<Vec<
 
 /// What sightings say of the robot's pose, or the word that says why they say nothing.
 pub fn robot_fixes(
-    sightings: &[Sighting<'_>],
-    mounting: Option<&Mounting>,
+    sightings: &[LandmarkObservation<'_>],
+    mounting: Option<&CameraExtrinsics>,
     prior: Option<&Pose2Covariance>,
-) -> Result<RobotFix, &'static str> {
+) -> Result<FixResult, &'static str> {
     let Some(mounting) = mounting else { return Err("no_mounting") };
     if sightings.is_empty() {
         return Err("unsure");
@@ -190,18 +193,18 @@ pub fn robot_fixes(
 }
 
 /// The one pose that is left, or the word that says why there is none.
-pub fn only(fix: &RobotFix) -> Result<Fix, &'static str> {
+pub fn only(fix: &FixResult) -> Result<Fix, &'static str> {
     match fix {
-        RobotFix::Fixed(fix) => Ok((**fix).clone()),
-        RobotFix::Ambiguous(_) => Err(AMBIGUOUS),
-        RobotFix::Refused(refusal) => Err(refusal_word(refusal)),
+        FixResult::Fixed(fix) => Ok((**fix).clone()),
+        FixResult::Ambiguous(_) => Err(AMBIGUOUS),
+        FixResult::Refused(refusal) => Err(refusal_word(refusal)),
     }
 }
 
 /// The robot's pose by sightings, or the word that says why not.
 pub fn robot_fix(
-    sightings: &[Sighting<'_>],
-    mounting: Option<&Mounting>,
+    sightings: &[LandmarkObservation<'_>],
+    mounting: Option<&CameraExtrinsics>,
     prior: Option<&Pose2Covariance>,
 ) -> Result<Fix, &'static str> {
     only(&robot_fixes(sightings, mounting, prior)?)

@@ -22,7 +22,7 @@ use crate::{
     frame_tap::{AnalysedFrame, FrameTap},
     vitals::Vitals,
 };
-use map::{hypotheses::Mode, pose2::Pose2Covariance};
+use map::{pose2::Pose2Covariance, relocalise::PoseHypothesis};
 use protos::{CheckedFrame, Code, Name, Rejection, convert::geometry::pose2_covariance_wire, v1};
 use std::{cell::Cell, sync::Arc, thread::JoinHandle, time::Instant};
 use vision::{frame::GrayImage, pipeline::FrameFacts, recognise::LandmarkId};
@@ -344,7 +344,7 @@ fn view<'a>(frame: &'a CheckedFrame, facts: &'a FrameFacts, map: &'a MapSnapshot
     }
 }
 
-fn hypothesis(mode: &Mode) -> v1::Hypothesis {
+fn hypothesis(mode: &PoseHypothesis) -> v1::Hypothesis {
     v1::Hypothesis { mass: mode.mass, map_from_robot: Some(pose2_covariance_wire(&mode.pose)) }
 }
 

@@ -1,5 +1,5 @@
-//! Checks of numbers that come from outside: finite, inside a named range, a covariance that can be one.
-//! Says which field is wrong; decides nothing else.
+//! Checks of numbers that come from outside: finite, within a named range, covariances symmetric and positive
+//! semidefinite. An error names the field.
 
 use nalgebra::SMatrix;
 
@@ -14,7 +14,7 @@ pub const MAX_VARIANCE: f64 = 1e12;
 pub struct OutOfRange {
     /// Name of the input, with its unit.
     pub field: &'static str,
-    /// What it was.
+    /// The value that was refused.
     pub value: f64,
 }
 

@@ -1,4 +1,4 @@
-//! Quantiles of chi2, for gates.
+//! Quantiles of chi2 and of the normal distribution, for gates.
 
 /// 99 % quantile with 3 degrees of freedom: the gate of a planar pose (method 13.6, 15).
 pub const CHI2_3_99: f64 = 11.345;

@@ -1,17 +1,18 @@
-//! Where to look: the landmark that is worth most from an uncertain pose, and the pan and tilt that centre it (method 14).
+//! Gaze control: the landmark that is most useful to look at from an uncertain pose, with the pan and tilt that
+//! centre it (method 14).
 //!
-//! In: the robot's pose, what is known of each landmark, the pan-tilt unit. Out: every landmark that can be looked at with
-//! its worth, best first, or the advice to look ahead or about. [`Gaze`] keeps to one landmark until another is clearly
-//! better or looking fails.
+//! In: the robot's pose, candidates with their visibility areas, the pan-tilt unit. Out: the candidates that can be
+//! looked at with their utility, best first, or the action to look ahead or sweep. [`GazeController`] keeps its
+//! target until another one is clearly better or observations fail.
 
 mod information;
 
 use crate::{
     check::{self, OutOfRange},
-    mounting::Mounting,
+    extrinsics::CameraExtrinsics,
     place::LandmarkPlace,
     pose2::{Pose2Covariance, wrap_rad},
-    visibility::{PoseDraws, Viewer, VisibilityMap},
+    visibility::{PanTiltCamera, PoseDraws, VisibilityMap},
 };
 use nalgebra::{Point2, Point3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -20,40 +21,40 @@ use vision::recognise::LandmarkId;
 /// Most landmarks whose failures are remembered.
 pub const MAX_DAMPED: usize = 64;
 
-/// By what a landmark is chosen.
+/// Criterion of the choice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Criterion {
     /// The paper's product: probability, saliency, margin, visibility confidence.
     #[default]
     Product,
-    /// Expected gain of information on the pose, by the time it takes to look.
+    /// Expected information gain on the pose over the time that the observation takes.
     Information,
 }
 
-/// Knobs of the choice.
+/// Parameters of gaze control.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct GazeParams {
-    /// By what.
+    /// Criterion of the choice.
     pub criterion: Criterion,
-    /// Landmarks that are seen less probably are left out.
+    /// Candidates with a lower visibility probability are left out, 0 to 1.
     pub min_probability: f64,
-    /// Distance to the boundary of the visibility area from which on being further inside is worth no more.
+    /// Distance to the boundary of the visibility area beyond which the utility no longer rises, metres.
     pub full_margin_m: f64,
-    /// Another landmark must be worth this many times the present one.
+    /// Another target must exceed the present one's utility by this factor.
     pub switch_ratio: f64,
-    /// So many failures in a row make a landmark worth less...
+    /// Consecutive failures that damp a landmark's utility.
     pub failures: u32,
-    /// ...by this factor...
+    /// Factor on the utility of a damped landmark, 0 to 1.
     pub damping: f64,
-    /// ...for so long.
+    /// Duration of the damping, seconds.
     pub damped_s: f64,
-    /// Expected error of a corner, pixels.
+    /// Expected standard deviation of a measured corner, px.
     pub corner_sigma_px: f64,
-    /// Time to settle, expose and recognise.
+    /// Time to settle, expose and recognise, seconds.
     pub look_s: f64,
-    /// With the position known worse than this and nothing to look at, the advice is to look about.
+    /// With a larger position uncertainty and no target, the action is to sweep, metres.
     pub lost_m: f64,
 }
 
@@ -74,14 +75,14 @@ impl Default for GazeParams {
     }
 }
 
-/// A landmark that might be looked at.
+/// A landmark that may be looked at.
 #[derive(Debug, Clone, Copy)]
-pub struct Target<'a> {
-    /// Which.
+pub struct GazeCandidate<'a> {
+    /// Number of the landmark.
     pub landmark: LandmarkId,
-    /// Where it hangs.
+    /// Place of the landmark, map frame.
     pub place: &'a LandmarkPlace,
-    /// From where it is seen.
+    /// Its visibility area.
     pub visible: &'a VisibilityMap,
     /// Saliency of its model, 0 to 1 (method 9).
     pub saliency: f64,
@@ -89,28 +90,28 @@ pub struct Target<'a> {
     pub v_c: f64,
 }
 
-/// The pan-tilt unit and where it looks now.
+/// The pan-tilt unit and its present direction.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct Head {
-    /// Camera in the robot frame, metres.
+pub struct PanTiltUnit {
+    /// Position of the camera in the robot frame, metres.
     pub camera_m: [f64; 3],
-    /// Present pan, left positive.
+    /// Present pan, radians, left positive.
     pub pan_rad: f64,
-    /// Present tilt, up positive.
+    /// Present tilt, radians, up positive.
     pub tilt_rad: f64,
-    /// How fast it turns.
+    /// Speed of pan and tilt, rad/s.
     pub rate_radps: f64,
 }
 
-impl Default for Head {
+impl Default for PanTiltUnit {
     fn default() -> Self {
         Self { camera_m: [0.0, 0.0, 1.2], pan_rad: 0.0, tilt_rad: 0.0, rate_radps: 1.0 }
     }
 }
 
-impl Head {
-    /// Every number finite and in range.
+impl PanTiltUnit {
+    /// Refuses numbers that are not finite or out of range.
     pub fn check(&self) -> Result<(), OutOfRange> {
         for value in self.camera_m {
             check::within("head.camera_m", value, -10.0, 10.0)?;
@@ -121,54 +122,54 @@ impl Head {
     }
 }
 
-/// A landmark that can be looked at, and how.
+/// A landmark that can be looked at, with pan and tilt.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Choice {
-    /// Which.
+pub struct GazeTarget {
+    /// Number of the landmark.
     pub landmark: LandmarkId,
-    /// Pan that centres it, left positive.
+    /// Pan that centres it, radians, left positive.
     pub pan_rad: f64,
-    /// Tilt that centres it, up positive.
+    /// Tilt that centres it, radians, up positive.
     pub tilt_rad: f64,
-    /// What looking at it is worth by the criterion asked for.
+    /// Utility by the requested criterion.
     pub utility: f64,
-    /// Probability that it is seen.
+    /// Probability that it is visible, 0 to 1.
     pub probability: f64,
-    /// Distance of the camera to the boundary of its visibility area, inside.
+    /// Distance of the camera to the boundary of its visibility area, inside, metres.
     pub margin_m: f64,
-    /// Expected gain of information, nats; infinite where the pose is entirely unknown.
+    /// Expected information gain, nats; infinite where the pose is unknown.
     pub gain_nats: f64,
-    /// Distance on the floor.
+    /// Distance on the floor, metres.
     pub range_m: f64,
-    /// Angle of view against its normal.
+    /// Angle of view against its normal, radians.
     pub incidence_rad: f64,
 }
 
 /// What to do with the camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Look {
+pub enum GazeAction {
     /// Look at this landmark.
-    Landmark(Choice),
-    /// No landmark is in sight: look along the path.
+    Landmark(GazeTarget),
+    /// No landmark is visible: look along the path.
     Ahead,
-    /// None is in sight, and the pose is so uncertain that this says little: look about.
+    /// No landmark is visible and the pose is uncertain: look around.
     Sweep,
 }
 
-/// Every landmark that is seen probably enough and within reach of the unit, most useful first; equal ones by number.
+/// Candidates that are probably visible and within the range of the unit, by falling utility, then by number.
 pub fn rank(
     pose: &Pose2Covariance,
-    targets: &[Target<'_>],
-    viewer: &Viewer,
-    head: &Head,
+    targets: &[GazeCandidate<'_>],
+    viewer: &PanTiltCamera,
+    head: &PanTiltUnit,
     p: &GazeParams,
-) -> Result<Vec<Choice>, OutOfRange> {
+) -> Result<Vec<GazeTarget>, OutOfRange> {
     pose.check()?;
     viewer.check()?;
     head.check()?;
     let camera = Vector3::from(head.camera_m);
     let draws = PoseDraws::new(pose, camera.xy());
-    let mut ranked: Vec<Choice> =
+    let mut ranked: Vec<GazeTarget> =
         targets.iter().filter_map(|t| choice(pose, &draws, t, viewer, head, p)).collect();
     ranked.sort_by(|a, b| b.utility.total_cmp(&a.utility).then(a.landmark.cmp(&b.landmark)));
     Ok(ranked)
@@ -177,11 +178,11 @@ pub fn rank(
 fn choice(
     pose: &Pose2Covariance,
     draws: &PoseDraws,
-    target: &Target<'_>,
-    viewer: &Viewer,
-    head: &Head,
+    target: &GazeCandidate<'_>,
+    viewer: &PanTiltCamera,
+    head: &PanTiltUnit,
     p: &GazeParams,
-) -> Option<Choice> {
+) -> Option<GazeTarget> {
     let probability = target.visible.probability(draws);
     if probability <= p.min_probability {
         return None;
@@ -194,7 +195,8 @@ fn choice(
     }
     let incidence_rad = target.place.incidence_rad(&Point3::new(camera.x, camera.y, head.camera_m[2]));
     let margin_m = target.visible.margin_m(&camera).max(0.0);
-    let mounting = Mounting::new(crate::mounting::pan_tilt(pan_rad, tilt_rad, head.camera_m.into())).ok()?;
+    let mounting =
+        CameraExtrinsics::new(crate::extrinsics::pan_tilt(pan_rad, tilt_rad, head.camera_m.into())).ok()?;
     let gain_nats =
         information::gain_nats(pose, target.place, &mounting, viewer.focal_px, p.corner_sigma_px)?;
     let turn = (pan_rad - head.pan_rad).abs().max((tilt_rad - head.tilt_rad).abs());
@@ -205,7 +207,7 @@ fn choice(
         }
         Criterion::Information => probability * gain_nats / (turn / head.rate_radps + p.look_s.max(1e-3)),
     };
-    Some(Choice {
+    Some(GazeTarget {
         landmark: target.landmark,
         pan_rad,
         tilt_rad,
@@ -218,7 +220,7 @@ fn choice(
     })
 }
 
-/// Pan, tilt and distance on the floor that centre a landmark for a camera at a place.
+/// Pan, tilt and distance on the floor that centre a landmark from a camera position.
 fn aim(
     pose: &Pose2Covariance,
     camera: &Point2<f64>,
@@ -231,29 +233,35 @@ fn aim(
     (pan, (place.z_m - camera_height_m).atan2(range), range)
 }
 
-/// Keeps a robot's gaze steady: which landmark it is told to look at, and which have failed.
+/// Keeps the target of one robot's gaze and the failures of its landmarks.
 #[derive(Debug, Clone, Default)]
-pub struct Gaze {
+pub struct GazeController {
     current: Option<LandmarkId>,
     failures: u32,
-    /// Landmarks that are worth less, until when.
+    /// Damped landmarks, and until when (ns).
     damped: Vec<(LandmarkId, i64)>,
 }
 
-impl Gaze {
-    /// Where to look, of what [`rank`] found. `at_ns` is the robot's own time.
-    pub fn choose(&mut self, at_ns: i64, ranked: &[Choice], pose: &Pose2Covariance, p: &GazeParams) -> Look {
+impl GazeController {
+    /// Chooses the action among the targets of [`rank`]. `at_ns` is the robot's clock.
+    pub fn choose(
+        &mut self,
+        at_ns: i64,
+        ranked: &[GazeTarget],
+        pose: &Pose2Covariance,
+        p: &GazeParams,
+    ) -> GazeAction {
         self.damped.retain(|(_, until)| *until > at_ns);
-        let worth = |c: &Choice| {
+        let worth = |c: &GazeTarget| {
             let damped = self.damped.iter().any(|(id, _)| *id == c.landmark);
             c.utility * if damped { p.damping } else { 1.0 }
         };
-        // Ranked: of equal ones the first.
+        // Ties: the first in rank.
         let best = ranked.iter().rev().max_by(|a, b| worth(a).total_cmp(&worth(b)));
         let Some(best) = best.filter(|b| worth(b) > 0.0) else {
             self.current = None;
             let (x, y) = (pose.covariance[(0, 0)], pose.covariance[(1, 1)]);
-            return if (x + y).sqrt() > p.lost_m { Look::Sweep } else { Look::Ahead };
+            return if (x + y).sqrt() > p.lost_m { GazeAction::Sweep } else { GazeAction::Ahead };
         };
         let kept = ranked.iter().find(|c| Some(c.landmark) == self.current);
         let chosen = match kept {
@@ -263,11 +271,11 @@ impl Gaze {
         if self.current != Some(chosen.landmark) {
             (self.current, self.failures) = (Some(chosen.landmark), 0);
         }
-        Look::Landmark(*chosen)
+        GazeAction::Landmark(*chosen)
     }
 
-    /// Tells whether the landmark that was looked at was recognised.
-    pub fn looked(&mut self, at_ns: i64, landmark: LandmarkId, recognised: bool, p: &GazeParams) {
+    /// Reports whether the target was recognised.
+    pub fn report_outcome(&mut self, at_ns: i64, landmark: LandmarkId, recognised: bool, p: &GazeParams) {
         if recognised {
             self.damped.retain(|(id, _)| *id != landmark);
         }

@@ -9,10 +9,10 @@
 //!    extrinsics and intrinsics. Unique, ambiguous, or none, for each observation.
 //! 3. [`Schedule`]: frame reports -> when to search globally, how far the pose is trusted, when a pose is replaced.
 //!
-//! A guided observation corrects a pose. It never starts one, never supports one against a global observation, and never
-//! replaces one: see [`crate::fuse::FixRole`].
+//! A guided observation corrects a pose. It never starts, supports or replaces one: see [`crate::fuse::FixRole`].
 
 mod associate;
+mod error;
 mod expect;
 mod joint;
 mod projection;
@@ -23,6 +23,7 @@ pub use associate::{
     Assignment, AssociateParams, Association, Candidate, MAX_CANDIDATES, MAX_NODES, MAX_OBSERVATIONS,
     NotAssociated, Observation, associate,
 };
+pub use error::GuidedError;
 pub use expect::{
     CameraView, ExpectParams, Expectations, Expected, InView, KnownLandmark, MAX_EXPECTED, SearchGate, expect,
 };
@@ -30,26 +31,6 @@ pub use schedule::{
     Decision, FramePlan, FrameReport, GlobalReason, GuidedReport, MAX_CAMERAS, MAX_SUPPORT, Schedule,
     ScheduleParams, Trust,
 };
-
-use crate::check::OutOfRange;
-
-/// Why guided recognition refuses its input.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum GuidedError {
-    /// A number is out of range.
-    #[error(transparent)]
-    OutOfRange(#[from] OutOfRange),
-    /// A list is longer than its limit.
-    #[error("{field} has {count} entries, at most {limit} are accepted")]
-    TooMany {
-        /// Name of the list.
-        field: &'static str,
-        /// Its length.
-        count: usize,
-        /// The limit.
-        limit: usize,
-    },
-}
 
 #[cfg(test)]
 mod tests;

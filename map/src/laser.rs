@@ -1,4 +1,4 @@
-//! A planar laser scan, checked once: in come bearings and ranges, out come points in the laser frame.
+//! A planar laser scan, checked once. In: bearings and ranges. Out: points in the laser frame.
 
 use crate::{
     check::{self, OutOfRange},
@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 
 /// Most beams accepted in a scan.
 pub const MAX_BEAMS: usize = 16_384;
-/// Largest accepted maximum range.
+/// Largest accepted maximum range, metres.
 pub const MAX_RANGE_M: f64 = 1000.0;
 
 /// Why a scan cannot be used.
@@ -55,37 +55,37 @@ impl Scan {
         Ok(Self { robot_from_laser, first_bearing_rad, bearing_step_rad, max_range_m, ranges_m })
     }
 
-    /// Where the laser sits on the robot.
+    /// Pose of the laser on the robot.
     pub fn robot_from_laser(&self) -> &Pose2 {
         &self.robot_from_laser
     }
 
-    /// Angle between two beams, signed.
+    /// Angle from one beam to the next, radians, signed.
     pub fn bearing_step_rad(&self) -> f64 {
         self.bearing_step_rad
     }
 
-    /// At and beyond it there is no return.
+    /// Ranges from here on are beams without a return, metres.
     pub fn max_range_m(&self) -> f64 {
         self.max_range_m
     }
 
-    /// Ranges as given.
+    /// All ranges, metres, as measured; some are not finite.
     pub fn ranges_m(&self) -> &[f32] {
         &self.ranges_m
     }
 
-    /// Bearing of beam `i`.
+    /// Bearing of beam `i`, radians, laser frame.
     pub fn bearing_rad(&self, i: usize) -> f64 {
         self.first_bearing_rad + i as f64 * self.bearing_step_rad
     }
 
-    /// Range of beam `i`, if it came back.
+    /// Range of beam `i`, metres; `None` without a return.
     pub fn range_m(&self, i: usize) -> Option<f64> {
         self.ranges_m.get(i).map(|r| f64::from(*r)).filter(|r| *r > 0.0 && *r < self.max_range_m)
     }
 
-    /// Point of beam `i` in the laser frame, if it came back.
+    /// End point of beam `i` in the laser frame, metres; `None` without a return.
     pub fn point(&self, i: usize) -> Option<Point2<f64>> {
         let (s, c) = self.bearing_rad(i).sin_cos();
         self.range_m(i).map(|r| Point2::new(r * c, r * s))

@@ -1,7 +1,7 @@
-//! From a laser scan to straight pieces of wall: break at jumps, split, merge, fit (method 17.1 to 17.3).
+//! Line extraction from a laser scan: break at jumps, split, merge, fit (method 17.1 to 17.3).
 //!
 //! In: a checked scan. Out: segments in the robot frame, each with the covariance of its line, free side on the left.
-//! Beams without a return break a run; what is not straight or too short is left out.
+//! Beams without a return break a run. Pieces that are not straight or too short are left out.
 
 use crate::{laser::Scan, pose2::Pose2Covariance, segments::LaserSegment};
 use nalgebra::{Matrix2, Matrix3, Point2, Vector2};
@@ -14,19 +14,19 @@ pub const MAX_SEGMENTS_PER_SCAN: usize = 256;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LineParams {
-    /// Noise of a range, metres.
+    /// Standard deviation of a range, metres.
     pub range_sigma_m: f64,
-    /// A jump in range of at least this breaks the run...
+    /// A jump in range of at least this breaks the run, metres.
     pub jump_m: f64,
-    /// ...plus this many times `range * step`: a wall seen at a grazing angle is one wall.
+    /// Added to the jump, as a multiple of `range * bearing step`: a wall seen at a grazing angle is one run.
     pub jump_steps: f64,
-    /// A point farther than this from the chord splits the run.
+    /// A point farther than this from the chord splits the run, metres.
     pub split_m: f64,
-    /// Two neighbours are merged when their lines differ by less than this chi2 (2 degrees of freedom, 99 %).
+    /// Neighbours whose lines differ by less than this chi2 are merged (2 degrees of freedom, 99 %).
     pub merge_chi2: f64,
     /// Fewest points of a segment.
     pub min_points: usize,
-    /// Shortest segment, metres.
+    /// Length of the shortest segment, metres.
     pub min_length_m: f64,
 }
 
@@ -137,7 +137,7 @@ fn is_one_line(a: &[Point2<f64>], b: &[Point2<f64>], joint: &[Point2<f64>], p: &
     agree && joint.iter().all(|q| fj.distance(q).abs() <= p.split_m)
 }
 
-/// Wraps a difference of undirected line angles into (-pi/2, pi/2].
+/// Wraps the difference of two undirected line angles into (-pi/2, pi/2].
 fn half_turn(angle_rad: f64) -> f64 {
     let a = angle_rad.rem_euclid(std::f64::consts::PI);
     if a > std::f64::consts::FRAC_PI_2 { a - std::f64::consts::PI } else { a }
@@ -149,7 +149,7 @@ pub(crate) struct LineFit {
     /// Direction of the normal; `cos(alpha) x + sin(alpha) y = rho`, rho >= 0.
     pub alpha_rad: f64,
     pub rho_m: f64,
-    /// Of (alpha, rho).
+    /// Covariance of (alpha, rho): rad^2, rad m, m^2.
     pub covariance: Matrix2<f64>,
     centre: Point2<f64>,
     var_alpha: f64,

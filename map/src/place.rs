@@ -1,44 +1,45 @@
-//! Where a landmark hangs: a rectangle on a wall or under a ceiling, with the covariance of its place and size (method 11).
+//! The place of a landmark: a rectangle on a wall or under a ceiling, with the covariance of its pose and size
+//! (method 11).
 
 use crate::check::{self, MAX_COORDINATE_M, OutOfRange};
 use nalgebra::{Isometry3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3, Vector6};
 use std::f64::consts::{FRAC_PI_2, TAU};
 use vision::localise::pose::LandmarkSize;
 
-/// Largest height of a landmark's centre above or below the floor.
+/// Largest height of a landmark's centre above or below the floor, metres.
 pub const MAX_HEIGHT_M: f64 = 100.0;
-/// Largest roll of a landmark in its wall.
+/// Largest roll of a landmark in its wall, radians.
 pub const MAX_ROLL_RAD: f64 = 0.5;
 
 /// Place of a landmark in the map: its centre, the direction of its outward normal, its size.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LandmarkPlace {
-    /// Centre, map x.
+    /// Centre along x, metres, map frame.
     pub x_m: f64,
-    /// Centre, map y.
+    /// Centre along y, metres, map frame.
     pub y_m: f64,
-    /// Centre above the floor.
+    /// Height of the centre above the floor, metres.
     pub z_m: f64,
-    /// Direction of the outward normal on the floor; under a ceiling, where the top of the landmark points.
+    /// Direction of the outward normal on the floor, radians; under a ceiling, the direction of the landmark's top.
     pub theta_rad: f64,
-    /// Turn about the outward normal; 0 when its sides are vertical.
+    /// Rotation about the outward normal, radians; 0 when the sides are vertical.
     pub roll_rad: f64,
-    /// Turn of the outward normal from level downwards: 0 on a wall, pi/2 under a ceiling.
+    /// Rotation of the outward normal from level downwards, radians: 0 on a wall, pi/2 under a ceiling.
     pub tilt_rad: f64,
-    /// Width and height.
+    /// Width and height, metres.
     pub size: LandmarkSize,
-    /// Over (x, y, theta, z, width, height), in this order.
+    /// Covariance over (x, y, theta, z, width, height), in this order; metres and radians.
     pub covariance: Matrix6<f64>,
 }
 
-/// How surely a landmark was placed by hand: standard deviations.
+/// Standard deviations of a place that was measured by hand.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlaceSigmas {
-    /// Of each coordinate of the centre.
+    /// Of each coordinate of the centre, metres.
     pub position_m: f64,
-    /// Of the normal's direction.
+    /// Of the normal's direction, radians.
     pub theta_rad: f64,
-    /// Of width and height.
+    /// Of width and height, metres.
     pub size_m: f64,
 }
 
@@ -82,7 +83,7 @@ impl LandmarkPlace {
         check::covariance("covariance", &self.covariance)
     }
 
-    /// Angle between the outward normal and the way from the landmark's middle to a camera in the map.
+    /// Angle between the outward normal and the direction from the landmark's centre to a camera, radians.
     pub fn incidence_rad(&self, camera_m: &Point3<f64>) -> f64 {
         let from_landmark = self.map_from_landmark().inverse() * camera_m;
         from_landmark.coords.yz().norm().atan2(from_landmark.x)

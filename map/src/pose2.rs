@@ -1,12 +1,11 @@
-//! A pose on the floor, alone and with its covariance: compose, invert, carry the covariance along.
-//! Knows nothing of sensors.
+//! Poses on the floor, alone and with covariance: composition, inverse, propagation of the covariance.
 
 use crate::check::{self, MAX_COORDINATE_M, OutOfRange};
 use nalgebra::{Isometry3, Matrix3, Point2, Translation3, UnitQuaternion, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
 
-/// The same angle in (-pi, pi]. NaN stays NaN.
+/// The equivalent angle in (-pi, pi]. NaN stays NaN.
 pub fn wrap_rad(angle_rad: f64) -> f64 {
     let a = angle_rad.rem_euclid(TAU);
     if a > PI { a - TAU } else { a }
@@ -16,11 +15,11 @@ pub fn wrap_rad(angle_rad: f64) -> f64 {
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Pose2 {
-    /// Position, x.
+    /// Position along x, metres.
     pub x_m: f64,
-    /// Position, y.
+    /// Position along y, metres.
     pub y_m: f64,
-    /// Heading, counter-clockwise from x, in (-pi, pi].
+    /// Heading, radians, counter-clockwise from x, in (-pi, pi].
     pub theta_rad: f64,
 }
 
@@ -63,7 +62,7 @@ impl Pose2 {
         Point2::new(self.x_m + c * p_b.x - s * p_b.y, self.y_m + s * p_b.x + c * p_b.y)
     }
 
-    /// Position alone.
+    /// Position, metres.
     pub fn position(&self) -> Vector2<f64> {
         Vector2::new(self.x_m, self.y_m)
     }
@@ -79,7 +78,7 @@ impl Pose2 {
         Self::new(self.x_m + d.x, self.y_m + d.y, self.theta_rad + d.z)
     }
 
-    /// The same transform in space: upright, at height 0.
+    /// The same transform in space: no roll, no pitch, height 0.
     pub fn to_isometry3(&self) -> Isometry3<f64> {
         Isometry3::from_parts(
             Translation3::new(self.x_m, self.y_m, 0.0),
@@ -100,9 +99,9 @@ impl Pose2 {
 /// A pose and the covariance of its (x, y, theta), in the frame a of `a_from_b` (m^2, m rad, rad^2).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pose2Covariance {
-    /// The mean.
+    /// Mean pose.
     pub pose: Pose2,
-    /// Symmetric, positive semidefinite. The off-diagonal terms matter (method 13.6): never drop them.
+    /// Symmetric, positive semidefinite. The off-diagonal terms carry information (method 13.6).
     pub covariance: Matrix3<f64>,
 }
 

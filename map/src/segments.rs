@@ -1,5 +1,5 @@
-//! A piece of wall as the laser sees it: the supporting line with its covariance and the two ends.
-//! Made by `lines`, kept by `walls`.
+//! A laser segment: a piece of wall as the laser measures it, with the covariance of its supporting line and its two
+//! ends.
 
 use crate::{
     check::{self, MAX_COORDINATE_M, OutOfRange},
@@ -17,9 +17,9 @@ const BY_HAND_SIGMA_M: f64 = 0.01;
 /// faces of a wall are two segments. The ends lie on the line `cos(alpha) x + sin(alpha) y = rho`, rho >= 0.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LaserSegment {
-    /// First end, metres.
+    /// First end, metres, map or robot frame.
     pub a: Point2<f64>,
-    /// Second end, metres.
+    /// Second end, metres, in the same frame.
     pub b: Point2<f64>,
     /// Direction of the line's normal, in (-pi, pi].
     pub alpha_rad: f64,
@@ -77,7 +77,7 @@ impl LaserSegment {
         Self { a: foot(a), b: foot(b), alpha_rad, rho_m, covariance, hits }
     }
 
-    /// Length in metres.
+    /// Distance between the ends, metres.
     pub fn length_m(&self) -> f64 {
         (self.b - self.a).norm()
     }

@@ -1,7 +1,7 @@
-//! The map of walls: segments seen from known poses, associated and merged (method 17.4, 17.5).
+//! The map of walls for poses that are known: segments are associated and merged (method 17.4, 17.5).
 //!
-//! In: segments of a scan with the robot's pose and its covariance. Out: the walls seen often enough. It corrects no
-//! pose: that is SLAM, which this is not.
+//! In: segments of a scan with the robot's pose and covariance. Out: the walls observed often enough. It corrects no
+//! pose; [`crate::slam`] does.
 
 use crate::{
     check::OutOfRange,
@@ -20,15 +20,15 @@ pub const MAX_WALLS: usize = 4096;
 pub struct WallParams {
     /// Gate on the squared Mahalanobis distance of two lines (2 degrees of freedom, 99 %).
     pub gate_chi2: f64,
-    /// Unevenness of real walls, added to every line: offset, metres.
+    /// Unevenness of real walls, added to the offset of every line: standard deviation, metres.
     pub rough_m: f64,
-    /// The same for the direction, radians.
+    /// Unevenness of real walls, added to the direction of every line: standard deviation, radians.
     pub rough_rad: f64,
-    /// Segments that overlap by this share of the shorter belong together...
+    /// Segments that overlap by this share of the shorter one belong together.
     pub overlap: f64,
-    /// ...or those whose gap is smaller, metres.
+    /// So do segments whose gap is smaller than this, metres.
     pub gap_m: f64,
-    /// Sightings that make a wall.
+    /// Observations that confirm a wall.
     pub min_hits: u32,
 }
 
@@ -46,17 +46,17 @@ pub struct Walls {
 }
 
 impl Walls {
-    /// No wall yet.
+    /// An empty map.
     pub fn new(params: WallParams) -> Self {
         Self { params, segments: Vec::new() }
     }
 
-    /// Walls seen at least `min_hits` times, in the order they were first seen.
+    /// Confirmed walls, in the order of their first observation.
     pub fn segments(&self) -> impl Iterator<Item = &LaserSegment> {
         self.segments.iter().filter(|s| s.hits >= self.params.min_hits)
     }
 
-    /// Everything, sightings that are no wall yet included.
+    /// All segments, unconfirmed ones included.
     pub fn candidates(&self) -> &[LaserSegment] {
         &self.segments
     }

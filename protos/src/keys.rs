@@ -1,5 +1,5 @@
-//! Key expressions under `waymark/1/{fleet}/`: built from checked names, parsed back into them. A handler of the
-//! transport cannot see who sent a message, so the robot's name is in every key that a robot writes.
+//! Key expressions under `waymark/1/{fleet}/`, built from checked names and parsed back into them. The transport does not
+//! tell a handler who sent a message, so the robot's name is in every key that a robot writes.
 
 use std::fmt;
 
@@ -27,7 +27,7 @@ pub enum NameError {
 pub struct Name(String);
 
 impl Name {
-    /// Checks the text.
+    /// Checks a text.
     pub fn new(text: impl Into<String>) -> Result<Self, NameError> {
         let text = text.into();
         if text.is_empty() || text.len() > MAX_NAME_BYTES {
@@ -39,7 +39,7 @@ impl Name {
         }
     }
 
-    /// The text.
+    /// The name as text.
     pub fn as_str(&self) -> &str {
         &self.0
     }
@@ -107,7 +107,7 @@ pub enum Key {
     MapVersion(Name),
 }
 
-/// Why a key is none of ours.
+/// Why a key expression is not one of the protocol.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum KeyError {
     /// Another root, protocol version or fleet.
@@ -138,7 +138,7 @@ impl Keys {
         Self { prefix: format!("{ROOT}/{PROTOCOL}/{fleet}/") }
     }
 
-    /// The full key.
+    /// The full key expression.
     pub fn build(&self, key: &Key) -> String {
         let p = &self.prefix;
         match key {
@@ -155,37 +155,37 @@ impl Keys {
         }
     }
 
-    /// All frames of all robots.
+    /// Key expression of the frames of all robots.
     pub fn all_frames(&self) -> String {
         format!("{}robot/*/frame/*", self.prefix)
     }
 
-    /// All odometry.
+    /// Key expression of the odometry of all robots.
     pub fn all_odometry(&self) -> String {
         format!("{}robot/*/odometry", self.prefix)
     }
 
-    /// All laser scans.
+    /// Key expression of the laser scans of all robots.
     pub fn all_scans(&self) -> String {
         format!("{}robot/*/scan", self.prefix)
     }
 
-    /// All questions where to look.
+    /// Key expression of the gaze requests of all robots.
     pub fn all_gaze(&self) -> String {
         format!("{}robot/*/rpc/gaze", self.prefix)
     }
 
-    /// The versions of all maps.
+    /// Key expression of the versions of all maps.
     pub fn all_map_versions(&self) -> String {
         format!("{}map/*/version", self.prefix)
     }
 
-    /// All liveliness tokens.
+    /// Key expression of all liveliness tokens.
     pub fn all_alive(&self) -> String {
         format!("{}robot/*/alive/**", self.prefix)
     }
 
-    /// All answers for one robot.
+    /// Key expression of all answers for one robot.
     pub fn answers_of(&self, robot: &Name) -> String {
         format!("{}robot/{robot}/answer/*", self.prefix)
     }

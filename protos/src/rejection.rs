@@ -1,5 +1,5 @@
-//! Why a message was refused: a stable code for programs, the field at fault and a sentence for a person.
-//! The codes are part of the wire: never renamed, only added.
+//! Why a message was refused: a stable code for programs, the field at fault, and a sentence for a person. The codes
+//! are part of the wire: none is renamed, new ones are added.
 
 use crate::v1;
 
@@ -24,9 +24,9 @@ pub enum Code {
     WrongEncoding,
     /// The image cannot be decoded.
     BadImage,
-    /// No such robot.
+    /// The robot is not registered.
     UnknownRobot,
-    /// No such map.
+    /// There is no such map.
     UnknownMap,
     /// Not newer than the last message of this robot and camera.
     NotNewer,
@@ -45,7 +45,7 @@ pub enum Code {
 }
 
 impl Code {
-    /// Every code.
+    /// All codes.
     pub const ALL: [Code; 18] = [
         Code::BadMessage,
         Code::BadName,
@@ -67,7 +67,7 @@ impl Code {
         Code::Internal,
     ];
 
-    /// The word on the wire.
+    /// The word of the code on the wire.
     pub fn as_str(self) -> &'static str {
         match self {
             Code::BadMessage => "bad_message",
@@ -102,7 +102,7 @@ impl std::fmt::Display for Code {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{code}: {field}: {detail}")]
 pub struct Rejection {
-    /// Stable code.
+    /// The stable code.
     pub code: Code,
     /// The field at fault, with dots and indices (`intrinsics.fx_px`, `prior.covariance[4]`).
     pub field: String,

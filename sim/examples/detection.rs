@@ -5,7 +5,7 @@
 use std::sync::Arc;
 
 use sim::building::{Building, LandmarkKind};
-use sim::robot::{Robot, RobotParams, Sighting};
+use sim::robot::{Robot, RobotParams, SensorReadings};
 use sim::truth::{LandmarkView, ViewState};
 use vision::detect::detect;
 use vision::detect::quads::{Corners, QuadKind};
@@ -82,7 +82,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-fn save(sighting: &Sighting, path: &str) -> Result<(), Box<dyn std::error::Error>> {
+fn save(sighting: &SensorReadings, path: &str) -> Result<(), Box<dyn std::error::Error>> {
     let image = &sighting.frame.image;
     let size = (image.width() as u32, image.height() as u32);
     Ok(image::save_buffer(path, image.data(), size.0, size.1, image::ExtendedColorType::L8)?)

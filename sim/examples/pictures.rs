@@ -20,7 +20,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let (x, y) = (1.0 + 2.4 * i as f64, 0.35 * (i as f64).sin());
         let pan = [0.0, 0.6, -0.6, 0.9][i as usize % 4];
         let robot = map::pose2::Pose2::new(x, y, 0.0).to_isometry3();
-        let camera = map::mounting::pan_tilt(pan, 0.0, nalgebra::Vector3::new(0.0, 0.0, 1.2));
+        let camera = map::extrinsics::pan_tilt(pan, 0.0, nalgebra::Vector3::new(0.0, 0.0, 1.2));
         let start = Instant::now();
         let rendered = renderer.render(&building, &(robot * camera), &SensorParams::default(), i);
         let took = start.elapsed();

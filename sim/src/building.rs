@@ -1,29 +1,25 @@
-//! A building: flat textured rectangles in the map frame, walls as lines for the laser, lamps for the light, and the
-//! exact truth about its landmarks. Built once with `Builder`, then read only.
-//! Which things hang where is decided elsewhere (`corridor`); how they look to a camera too (`render`).
+//! A building: flat textured rectangles in the map frame, walls as lines for the laser, and the exact truth about its
+//! landmarks. Read only; `builder` makes it, `corridor` decides what hangs where.
 
-use std::sync::Arc;
+pub use crate::wall::WallSegment;
 
-use nalgebra::{
-    Isometry3, Matrix3, Point2, Point3, Rotation3, Translation3, UnitQuaternion, Vector2, Vector3,
-};
+use crate::{lighting::LightMap, texture::Texture, wall::range};
+use nalgebra::{Isometry3, Point2, Point3};
 use serde::{Deserialize, Serialize};
-
-use crate::lighting::{Lamp, LightMap, Lighting};
-use crate::texture::Texture;
+use std::sync::Arc;
 
 /// Most surfaces of a building; further ones are not added.
 pub const MAX_SURFACES: usize = 4096;
 
-/// What a landmark is.
+/// Kind of a landmark.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LandmarkKind {
-    /// A picture on the wall: the thing to learn.
+    /// A poster on a wall; the landmark to learn.
     Poster,
-    /// A door, three sides and the floor.
+    /// A door; the floor is its lower side.
     Door,
-    /// A window.
+    /// A window with its frame.
     Window,
     /// A lamp in the ceiling.
     Lamp,
@@ -35,18 +31,18 @@ pub enum LandmarkKind {
     Board,
 }
 
-/// Where a landmark is, exactly.
+/// A landmark with its exact place.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LandmarkTruth {
     /// Name, unique in the building, `[a-z0-9_-]{1,64}`.
     pub name: String,
-    /// What it is.
+    /// Kind of the landmark.
     pub kind: LandmarkKind,
     /// Landmark frame: origin at the centre, x outward (towards the viewer), y the viewer's right, z up.
     pub map_from_landmark: Isometry3<f64>,
-    /// Extent along y.
+    /// Extent along y, metres.
     pub width_m: f64,
-    /// Extent along z.
+    /// Extent along z, metres.
     pub height_m: f64,
 }
 
@@ -66,73 +62,45 @@ pub fn rectangle(width_m: f64, height_m: f64) -> [Point3<f64>; 4] {
 /// A textured rectangle, seen from its outward side only. Its frame is that of a landmark.
 #[derive(Debug, Clone)]
 pub struct Surface {
-    /// Name; that of the landmark when it is one.
+    /// Name of the surface; the landmark's name if it is one.
     pub name: String,
     /// Surface frame: x outward normal, y right, z up as a viewer in front sees it.
     pub map_from_surface: Isometry3<f64>,
-    /// Extent along y.
+    /// Extent along y, metres.
     pub width_m: f64,
-    /// Extent along z.
+    /// Extent along z, metres.
     pub height_m: f64,
-    /// Reflectance 0 to 255.
+    /// Reflectance, 0 to 255.
     pub texture: Arc<Texture>,
-    /// Width and height of one repetition of the texture; the surface's own size when it does not repeat.
+    /// Width and height of one repetition of the texture, metres; the surface's size when it does not repeat.
     pub texture_m: [f64; 2],
-    /// Index into [`Building::landmarks`] when it is one.
+    /// Index into [`Building::landmarks`] if it is one.
     pub landmark: Option<usize>,
-    /// Shines by itself: not lit by the lamps.
+    /// Whether it emits light and is not lit by the lamps.
     pub glows: bool,
     pub(crate) light: LightMap,
 }
 
-/// An opaque wall for the laser, full height.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct WallSegment {
-    /// One end, in the map frame.
-    pub a_m: Point2<f64>,
-    /// The other end; the room is on the left when going from a to b.
-    pub b_m: Point2<f64>,
-}
-
-impl WallSegment {
-    /// Length in metres.
-    pub fn length_m(&self) -> f64 {
-        (self.b_m - self.a_m).norm()
-    }
-
-    /// Unit vector from a to b.
-    pub fn direction(&self) -> Vector2<f64> {
-        let d = self.b_m - self.a_m;
-        d / d.norm().max(f64::MIN_POSITIVE)
-    }
-
-    /// Unit normal into the room.
-    pub fn normal(&self) -> Vector2<f64> {
-        let d = self.direction();
-        Vector2::new(-d.y, d.x)
-    }
-}
-
-/// A finished building.
+/// A building, lit and read only.
 #[derive(Debug, Clone)]
 pub struct Building {
-    surfaces: Vec<Surface>,
-    walls: Vec<WallSegment>,
-    landmarks: Vec<LandmarkTruth>,
+    pub(crate) surfaces: Vec<Surface>,
+    pub(crate) walls: Vec<WallSegment>,
+    pub(crate) landmarks: Vec<LandmarkTruth>,
 }
 
 impl Building {
-    /// All rectangles.
+    /// All textured rectangles.
     pub fn surfaces(&self) -> &[Surface] {
         &self.surfaces
     }
 
-    /// Walls as the laser sees them.
+    /// Walls for the laser.
     pub fn walls(&self) -> &[WallSegment] {
         &self.walls
     }
 
-    /// Truth about every landmark, in the order they were hung.
+    /// All landmarks, in the order they were added.
     pub fn landmarks(&self) -> &[LandmarkTruth] {
         &self.landmarks
     }
@@ -142,235 +110,24 @@ impl Building {
         self.landmarks.iter().find(|l| l.name == name)
     }
 
-    /// The posters alone.
+    /// All posters.
     pub fn posters(&self) -> impl Iterator<Item = &LandmarkTruth> {
         self.landmarks.iter().filter(|l| l.kind == LandmarkKind::Poster)
     }
 
-    /// Whether the straight line between two points of the floor plan meets no wall.
+    /// Whether no wall crosses the straight line between two points of the floor.
     pub fn in_sight(&self, from_m: &Point2<f64>, to_m: &Point2<f64>) -> bool {
         let d = to_m - from_m;
         let length = d.norm();
-        length < 1e-9 || crate::laser::range(&self.walls, from_m, &(d / length), length - 1e-6).is_none()
+        length < 1e-9 || range(&self.walls, from_m, &(d / length), length - 1e-6).is_none()
     }
 
-    /// Distance from a point of the floor plan to the nearest wall; infinite without walls.
+    /// Distance from a point of the floor to the nearest wall, metres; infinite without walls.
     pub fn clearance_m(&self, p_m: &Point2<f64>) -> f64 {
         let distance = |w: &WallSegment| {
             let along = (p_m - w.a_m).dot(&w.direction()).clamp(0.0, w.length_m());
             (p_m - (w.a_m + w.direction() * along)).norm()
         };
         self.walls.iter().map(distance).fold(f64::INFINITY, f64::min)
-    }
-}
-
-/// Something to hang on a wall.
-#[derive(Debug, Clone)]
-pub(crate) struct Thing {
-    pub(crate) name: String,
-    pub(crate) kind: Option<LandmarkKind>,
-    pub(crate) size_m: [f64; 2],
-    /// Height of its centre above the floor.
-    pub(crate) centre_z_m: f64,
-    /// Distance of its face from the wall.
-    pub(crate) stand_off_m: f64,
-    pub(crate) texture: Arc<Texture>,
-}
-
-/// Puts a building together.
-#[derive(Debug)]
-pub(crate) struct Builder {
-    height_m: f64,
-    surfaces: Vec<Surface>,
-    walls: Vec<WallSegment>,
-    landmarks: Vec<LandmarkTruth>,
-    lamps: Vec<Lamp>,
-}
-
-impl Builder {
-    pub(crate) fn new(height_m: f64) -> Self {
-        Self { height_m, surfaces: vec![], walls: vec![], landmarks: vec![], lamps: vec![] }
-    }
-
-    /// A wall over the whole height; the room is on the left of a to b. The texture repeats every `texture_m`.
-    pub(crate) fn wall(
-        &mut self,
-        a_m: [f64; 2],
-        b_m: [f64; 2],
-        texture: &Arc<Texture>,
-        texture_m: f64,
-    ) -> WallSegment {
-        let wall = WallSegment { a_m: a_m.into(), b_m: b_m.into() };
-        let (name, size) = (format!("wall-{}", self.walls.len()), [wall.length_m(), self.height_m]);
-        let thing = Thing {
-            name,
-            kind: None,
-            size_m: size,
-            centre_z_m: 0.5 * self.height_m,
-            stand_off_m: 0.0,
-            texture: texture.clone(),
-        };
-        self.hang(&wall, 0.5 * wall.length_m(), &thing);
-        if let Some(surface) = self.surfaces.last_mut() {
-            surface.texture_m = [texture_m, texture_m];
-        }
-        self.walls.push(wall);
-        wall
-    }
-
-    /// Hangs a thing with its centre `along_m` from the wall's end a.
-    pub(crate) fn hang(&mut self, wall: &WallSegment, along_m: f64, thing: &Thing) {
-        let n = wall.normal();
-        let foot = wall.a_m + wall.direction() * along_m + n * thing.stand_off_m;
-        let map_from_surface = Isometry3::from_parts(
-            Translation3::new(foot.x, foot.y, thing.centre_z_m),
-            UnitQuaternion::from_axis_angle(&Vector3::z_axis(), n.y.atan2(n.x)),
-        );
-        self.add(map_from_surface, thing, false);
-    }
-
-    /// A floor (normal up) or a ceiling (normal down) from corner to opposite corner.
-    pub(crate) fn level(
-        &mut self,
-        name: &str,
-        [low, high]: [[f64; 2]; 2],
-        z_m: f64,
-        up: bool,
-        texture: (&Arc<Texture>, f64),
-    ) {
-        let size_m = [high[1] - low[1], high[0] - low[0]];
-        let centre = Vector3::new(f64::midpoint(low[0], high[0]), f64::midpoint(low[1], high[1]), z_m);
-        let thing = Thing {
-            name: name.into(),
-            kind: None,
-            size_m,
-            centre_z_m: z_m,
-            stand_off_m: 0.0,
-            texture: texture.0.clone(),
-        };
-        self.add(lying(centre, up), &thing, false);
-        if let Some(surface) = self.surfaces.last_mut() {
-            surface.texture_m = [texture.1, texture.1];
-        }
-    }
-
-    /// A lamp just below the ceiling, centred at (x, y), `size_m` along y and x.
-    pub(crate) fn lamp(&mut self, centre_m: [f64; 2], size_m: [f64; 2], power: f64, texture: &Arc<Texture>) {
-        let centre = Vector3::new(centre_m[0], centre_m[1], self.height_m - 0.01);
-        let thing = Thing {
-            name: format!("lamp-{}", self.lamps.len()),
-            kind: Some(LandmarkKind::Lamp),
-            size_m,
-            centre_z_m: centre.z,
-            stand_off_m: 0.0,
-            texture: texture.clone(),
-        };
-        self.add(lying(centre, false), &thing, true);
-        self.lamps.push(Lamp { position_m: centre.into(), power });
-    }
-
-    fn add(&mut self, map_from_surface: Isometry3<f64>, thing: &Thing, glows: bool) {
-        if self.surfaces.len() >= MAX_SURFACES {
-            return;
-        }
-        let [width_m, height_m] = thing.size_m;
-        let landmark = thing.kind.map(|kind| {
-            let name = thing.name.clone();
-            self.landmarks.push(LandmarkTruth {
-                name,
-                kind,
-                map_from_landmark: map_from_surface,
-                width_m,
-                height_m,
-            });
-            self.landmarks.len() - 1
-        });
-        self.surfaces.push(Surface {
-            name: thing.name.clone(),
-            map_from_surface,
-            width_m,
-            height_m,
-            texture: thing.texture.clone(),
-            texture_m: thing.size_m,
-            landmark,
-            glows,
-            light: LightMap::uniform(1.0),
-        });
-    }
-
-    /// Lights everything and closes the building.
-    pub(crate) fn finish(self) -> Building {
-        let mut surfaces = self.surfaces;
-        let lighting = Lighting::new(self.lamps);
-        for surface in surfaces.iter_mut().filter(|s| !s.glows) {
-            surface.light = lighting.bake(&surface.map_from_surface, surface.width_m, surface.height_m);
-        }
-        crate::lighting::normalise(&mut surfaces);
-        Building { surfaces, walls: self.walls, landmarks: self.landmarks }
-    }
-}
-
-/// Frame of a horizontal surface: z (the picture's up) along map x; y along -map y on a floor, +map y on a ceiling.
-fn lying(centre_m: Vector3<f64>, up: bool) -> Isometry3<f64> {
-    let x = Vector3::new(0.0, 0.0, if up { 1.0 } else { -1.0 });
-    let z = Vector3::x();
-    let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[x, z.cross(&x), z]));
-    Isometry3::from_parts(centre_m.into(), UnitQuaternion::from_rotation_matrix(&rotation))
-}
-
-#[cfg(test)]
-pub(crate) mod tests {
-    use super::*;
-    use crate::texture::Edge;
-
-    /// One rectangle `width_m` x `height_m` of a texture in the plane x = 0, lit evenly, facing +x, centre at z = 1.
-    pub(crate) fn one_rectangle(width_m: f64, height_m: f64, texture: Texture) -> Building {
-        let mut builder = Builder::new(4.0);
-        let wall = WallSegment { a_m: Point2::new(0.0, 5.0), b_m: Point2::new(0.0, -5.0) };
-        let thing = Thing {
-            name: "poster-0".into(),
-            kind: Some(LandmarkKind::Poster),
-            size_m: [width_m, height_m],
-            centre_z_m: 1.0,
-            stand_off_m: 0.0,
-            texture: Arc::new(texture),
-        };
-        builder.hang(&wall, 5.0, &thing);
-        builder.finish()
-    }
-
-    #[test]
-    fn frames_are_those_of_the_method() {
-        let mut builder = Builder::new(3.0);
-        let texture = Arc::new(Texture::new(1, 1, vec![100], Edge::Repeat));
-        // A room on the left of a -> b: the wall y = 2 seen from below.
-        let wall = builder.wall([4.0, 2.0], [0.0, 2.0], &texture, 1.0);
-        assert!((wall.normal() - Vector2::new(0.0, -1.0)).norm() < 1e-12);
-        builder.level("floor", [[0.0, 0.0], [4.0, 2.0]], 0.0, true, (&texture, 1.0));
-        builder.level("ceiling", [[0.0, 0.0], [4.0, 2.0]], 3.0, false, (&texture, 1.0));
-        let building = builder.finish();
-        let corners = |i: usize| {
-            let s = &building.surfaces()[i];
-            rectangle(s.width_m, s.height_m).map(|p| s.map_from_surface * p)
-        };
-        // Looking along +y at the wall, x is to the right.
-        let tl = corners(0)[0];
-        assert!((tl - Point3::new(0.0, 2.0, 3.0)).norm() < 1e-12, "{tl}");
-        for (i, z) in [(1, 0.0), (2, 3.0)] {
-            let c = corners(i);
-            assert!(c.iter().all(|p| (p.z - z).abs() < 1e-12));
-            // Clockwise from the top-left as seen from the room: the normal points into it.
-            let outward = (c[3] - c[0]).cross(&(c[1] - c[0]));
-            assert!(outward.z * if i == 1 { 1.0 } else { -1.0 } > 7.9);
-        }
-    }
-
-    #[test]
-    fn walls_hide_and_keep_clear() {
-        let building = Building::corridor(1);
-        let (a, b) = (Point2::new(2.0, 0.0), Point2::new(20.0, 0.3));
-        assert!(building.in_sight(&a, &b));
-        assert!(!building.in_sight(&a, &Point2::new(2.0, 9.0)));
-        assert!(building.clearance_m(&a) > 1.0 && building.clearance_m(&a) < 1.6);
     }
 }

@@ -1,5 +1,5 @@
-//! A camera of the simulator: intrinsics and image size, with a table of where an undistorted pinhole would see each
-//! pixel, and tiles of pixels for quick rejection.
+//! A simulated camera: intrinsics and image size, with a table of the undistorted pinhole's pixel for each pixel, and
+//! tiles of pixels for quick rejection.
 
 use std::ops::Range;
 
@@ -36,7 +36,7 @@ impl Camera {
             _ => (0..width_px * height_px)
                 .map(|i| {
                     let px = Point2::new((i % width_px) as f64, (i / width_px) as f64);
-                    // Where no pinhole sees what the lens shows, the edge of a fisheye, the ray of the pixel itself.
+                    // At the edge of a fisheye no pinhole has the ray: the pixel itself stands in for it.
                     let straight = intrinsics.undistort(&px).unwrap_or(px);
                     [straight.x as f32, straight.y as f32]
                 })
@@ -48,7 +48,7 @@ impl Camera {
         camera
     }
 
-    /// The usual robot camera: 640 x 480, 64 degrees across, no distortion.
+    /// A typical robot camera: 640 x 480 px, 64 degrees wide, no distortion.
     pub fn vga() -> Self {
         let intrinsics = Intrinsics {
             fx_px: 512.0,
@@ -61,17 +61,17 @@ impl Camera {
         Self::new(intrinsics, 640, 480)
     }
 
-    /// Focal lengths, principal point, distortion.
+    /// Focal lengths, principal point and distortion.
     pub fn intrinsics(&self) -> &Intrinsics {
         &self.intrinsics
     }
 
-    /// Image width.
+    /// Width of the image, px.
     pub fn width_px(&self) -> usize {
         self.width_px
     }
 
-    /// Image height.
+    /// Height of the image, px.
     pub fn height_px(&self) -> usize {
         self.height_px
     }

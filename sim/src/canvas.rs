@@ -1,6 +1,6 @@
 //! Drawing for the texture generators: flat fills, discs, polygons, noise and block letters on a grey canvas.
 //! Units are canvas widths (x 0 to 1, y 0 to height/width), so that a drawing does not depend on its resolution;
-//! greys run from 0 to 1. Not a general graphics library: what the posters need and no more.
+//! greys run from 0 to 1. It has only what the posters need.
 
 use crate::font;
 use crate::texture::{Edge, Texture};

@@ -1,4 +1,4 @@
-//! The paper's place: a corridor 25 m long with doors, windows, lamps, a column and posters on both sides and at the
+//! The corridor of the paper: 25 m long, with doors, windows, lamps, a column and posters on both sides and at the
 //! ends (method 18, E10). Everything that is not a parameter follows from the seed.
 
 use std::sync::Arc;
@@ -7,9 +7,11 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-use crate::building::{Builder, Building, LandmarkKind, Thing, WallSegment};
+use crate::builder::{Builder, Thing};
+use crate::building::{Building, LandmarkKind};
 use crate::posters::poster;
 use crate::texture::Texture;
+use crate::wall::WallSegment;
 use crate::{seed, surfaces};
 
 /// How far a poster stands off its wall.
@@ -17,15 +19,15 @@ pub const POSTER_STAND_OFF_M: f64 = 0.005;
 /// Most posters in a corridor.
 pub const MAX_POSTERS: usize = 64;
 
-/// What a corridor is like. The map's x axis runs along it, y = 0 is the middle, z = 0 the floor.
+/// Parameters of a corridor. The map's x axis runs along it, y = 0 is the middle, z = 0 the floor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct CorridorParams {
-    /// From end wall to end wall, 6 to 200 m.
+    /// Distance of the end walls, 6 to 200 m.
     pub length_m: f64,
-    /// From side to side, 1.6 to 10 m.
+    /// Distance of the side walls, 1.6 to 10 m.
     pub width_m: f64,
-    /// Floor to ceiling, 2.3 to 6 m.
+    /// Height of the ceiling, 2.3 to 6 m.
     pub height_m: f64,
     /// Posters, at most [`MAX_POSTERS`]: alternately left and right, the last two on the far and the near end wall.
     pub posters: usize,

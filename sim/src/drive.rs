@@ -1,11 +1,10 @@
-//! How a robot drives up and down a corridor: true pose, odometry and camera direction, step by step. It follows its
-//! true path; what it believes is for others to compute. [`crate::robot`] adds what it sees.
+//! A robot drives up and down a corridor: true pose, odometry and camera direction, step by step. It follows its true
+//! path; [`crate::robot`] adds what camera and laser measure.
 
 use std::sync::Arc;
 
-use map::mounting::pan_tilt;
 use map::pose2::{Pose2, wrap_rad};
-use nalgebra::{Isometry3, Point2, Vector2, Vector3};
+use nalgebra::{Isometry3, Point2, Vector2};
 use rand::RngExt;
 use serde::{Deserialize, Serialize};
 
@@ -14,38 +13,36 @@ use crate::gaze::{Gaze, GazeParams};
 use crate::odometry::{Odometry, OdometryParams};
 use crate::seed;
 
-pub use crate::robot::{Robot, RobotParams, Sighting};
-
 /// Most steps of a drive.
 pub const MAX_STEPS: u64 = 1_000_000;
 
-/// One robot's drive. Seeds, starts and directions make robots differ.
+/// The motion of one robot, step by step; it ends after the last leg.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct DriveParams {
-    /// Seed of weave, odometry and noise.
+    /// Seed of path, odometry and noise.
     pub seed: u64,
-    /// Where to start, along the path, in metres.
+    /// Start along the path, metres.
     pub start_m: f64,
-    /// Start towards the path's beginning.
+    /// Whether the robot starts towards the path's beginning.
     pub reverse: bool,
-    /// How many times to drive to an end; between, the robot turns on the spot.
+    /// Number of drives to an end of the path; the robot turns on the spot between them.
     pub legs: u32,
-    /// Driving, 0.01 to 3 m/s.
+    /// Speed, 0.01 to 3 m/s.
     pub speed_mps: f64,
-    /// Turning on the spot, 0.05 to 3 rad/s.
+    /// Rate of turning on the spot, 0.05 to 3 rad/s.
     pub turn_rate_radps: f64,
     /// Steps per second, 0.1 to 100.
     pub rate_hz: f64,
-    /// Largest swerve to either side.
+    /// Largest deviation to either side of the path, metres.
     pub weave_m: f64,
-    /// Length of one swerve to both sides, 2 m or more.
+    /// Length of one period of the deviation, 2 m or more.
     pub weave_length_m: f64,
-    /// How near to the end walls the path goes.
+    /// Distance of the path from the end walls, metres.
     pub end_gap_m: f64,
-    /// Odometry's errors.
+    /// Errors of the odometry.
     pub odometry: OdometryParams,
-    /// Where the camera looks.
+    /// Parameters of the camera's direction.
     pub gaze: GazeParams,
 }
 
@@ -68,26 +65,26 @@ impl Default for DriveParams {
     }
 }
 
-/// The robot at one moment.
+/// The state of the robot at one step.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Step {
-    /// Counts from 0.
+    /// Number of the step, from 0.
     pub index: u64,
-    /// Since the start.
+    /// Time since the start, seconds.
     pub time_s: f64,
-    /// True pose.
+    /// True pose of the robot.
     pub map_from_robot: Pose2,
-    /// What odometry believes; starts at the true pose.
+    /// Pose by odometry; equal to the true pose at the start.
     pub odom_from_robot: Pose2,
-    /// Pan-tilt unit and mounting.
+    /// Extrinsics of the camera, pan and tilt included.
     pub robot_from_camera: Isometry3<f64>,
-    /// Camera's pan, left positive.
+    /// Pan of the camera, radians, left positive.
     pub pan_rad: f64,
-    /// Camera's tilt, up positive.
+    /// Tilt of the camera, radians, up positive.
     pub tilt_rad: f64,
-    /// Speed at which the camera's view turns to the left.
+    /// Angular speed of the camera in the map, rad/s, left positive.
     pub sweep_radps: f64,
-    /// Landmark the camera is told to look at.
+    /// Name of the landmark that the camera is aimed at.
     pub target: Option<String>,
 }
 
@@ -115,7 +112,7 @@ pub struct Drive {
 }
 
 impl Drive {
-    /// Along the middle of the building's longer side. Parameters are clamped to their ranges.
+    /// A drive along the middle of the building's longer side. Parameters are clamped to their ranges.
     pub fn new(building: Arc<Building>, params: &DriveParams) -> Self {
         let p = clamped(params);
         let path = middle(&building, p.end_gap_m);
@@ -139,7 +136,7 @@ impl Drive {
         drive
     }
 
-    /// True pose now.
+    /// Present true pose.
     pub fn pose(&self) -> Pose2 {
         Pose2 { theta_rad: self.heading_rad, ..self.course() }
     }
@@ -243,11 +240,6 @@ fn middle(building: &Building, gap_m: f64) -> [Point2<f64>; 2] {
     let along = if half.x >= half.y { Vector2::x() } else { Vector2::y() };
     let reach = (half.x.max(half.y) - gap_m).max(0.01);
     [centre - along * reach, centre + along * reach]
-}
-
-/// Mounting of the camera at a pan and tilt.
-pub(crate) fn mounting(pan_rad: f64, tilt_rad: f64, height_m: f64) -> Isometry3<f64> {
-    pan_tilt(pan_rad, tilt_rad, Vector3::new(0.0, 0.0, height_m))
 }
 
 #[cfg(test)]

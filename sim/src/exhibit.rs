@@ -1,18 +1,18 @@
 //! One picture on a plastered wall, seen by a camera under conditions that are set one by one: for experiments that
-//! change a single thing and keep all others as they are (method 18). Conditions and a seed in, an image and the exact
-//! corners out; the same in, the same bytes out. Where pictures hang in a building is not of interest here.
+//! vary a single condition (method 18). In: conditions and a seed. Out: an image and the exact corners; equal input
+//! gives equal bytes.
 
-use nalgebra::{Matrix3, Point2, Vector3};
-use rand::RngExt;
-use serde::{Deserialize, Serialize};
-use vision::{detect::quads::Corners, frame::GrayImage};
+mod conditions;
+
+pub use conditions::{Conditions, Shadow};
 
 use crate::{
     scenes::compression::jpeg,
-    seed,
-    sensor::{SensorParams, expose},
+    sensor::expose,
     texture::{Footprint, Texture},
 };
+use nalgebra::{Matrix3, Point2, Vector3};
+use vision::{detect::quads::Corners, frame::GrayImage};
 
 /// Width and height of the camera's image, in pixels.
 pub const IMAGE_PX: [usize; 2] = [640, 480];
@@ -31,106 +31,10 @@ const PENUMBRA: f64 = 0.03;
 /// Samples along a pixel's side where the picture's border or a cover's edge crosses it.
 const EDGE_SAMPLES: usize = 3;
 
-/// A shadow whose edge crosses the picture.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Shadow {
-    /// Share of the light that it takes, 0 to 1.
-    pub depth: f64,
-    /// Direction into the shadow, from the picture's right towards its bottom.
-    pub direction_rad: f64,
-    /// How far its edge is from the picture's centre along that direction, in sides of the picture.
-    pub offset: f64,
-}
-
-/// How the picture is seen.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Conditions {
-    /// Angle between the picture's normal and the line of sight in the horizontal plane, at most [`MAX_ANGLE_RAD`]
-    /// either way.
-    pub yaw_rad: f64,
-    /// The same in the vertical plane.
-    pub pitch_rad: f64,
-    /// Roll of the camera.
-    pub roll_rad: f64,
-    /// Square root of the area that the picture would have seen from the front at the same distance, in pixels.
-    pub size_px: f64,
-    /// The picture's centre from the image's, in pixels.
-    pub aim_px: [f64; 2],
-    /// Share of the light that is lost from the bright side of the picture to the other, 0 to 1.
-    pub side_light: f64,
-    /// Direction in which it gets darker, from the picture's right towards its bottom.
-    pub side_light_rad: f64,
-    /// A shadow on wall and picture.
-    pub shadow: Option<Shadow>,
-    /// Share of the picture's area that something stands before, a plain rectangle in its middle, 0 to 1.
-    pub cover: f64,
-    /// Its brightness, 0 to 255.
-    pub cover_grey: f64,
-    /// Exposure, lens, noise.
-    pub sensor: SensorParams,
-    /// Quality of the JPEG that the image was sent as, 1 to 100; `None`: not compressed.
-    pub jpeg: Option<u8>,
-    /// How bright the wall is, as a share of its plaster's own brightness.
-    pub wall: f64,
-}
-
-impl Default for Conditions {
-    fn default() -> Self {
-        Self {
-            yaw_rad: 0.0,
-            pitch_rad: 0.0,
-            roll_rad: 0.0,
-            size_px: 160.0,
-            aim_px: [0.0; 2],
-            side_light: 0.0,
-            side_light_rad: 0.0,
-            shadow: None,
-            cover: 0.0,
-            cover_grey: 128.0,
-            sensor: SensorParams::ideal(),
-            jpeg: None,
-            wall: 1.0,
-        }
-    }
-}
-
-impl Conditions {
-    /// What a robot's camera makes of any view: a little off the level, a little blur, noise and compression, light
-    /// not quite that of the lesson. Every draw is another.
-    pub fn realistic(draw: u64) -> Self {
-        let mut rng = seed::stream(draw, 0x6578_6869);
-        let mut within = |low: f64, high: f64| rng.random_range(low..=high);
-        let sensor = SensorParams {
-            exposure: within(-0.22, 0.22).exp(),
-            offset: within(-8.0, 8.0),
-            blur_sigma_px: within(0.3, 0.9),
-            motion_px: [within(-1.0, 1.0), within(-0.4, 0.4)],
-            read_noise: within(0.8, 3.0),
-            shot_noise: 0.012,
-            vignetting: 0.0,
-        };
-        Self {
-            yaw_rad: within(-0.5, 0.5),
-            pitch_rad: within(-0.15, 0.15),
-            roll_rad: within(-0.05, 0.05),
-            size_px: within(90f64.ln(), 220f64.ln()).exp(),
-            aim_px: [within(-40.0, 40.0), within(-25.0, 25.0)],
-            side_light: within(0.0, 0.25),
-            side_light_rad: within(0.0, std::f64::consts::TAU),
-            cover_grey: within(20.0, 220.0),
-            jpeg: (within(0.0, 1.0) < 0.6).then(|| within(70.0, 95.0) as u8),
-            wall: within(0.45, 1.1),
-            sensor,
-            ..Self::default()
-        }
-    }
-}
-
 /// How much of the camera's image is made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Extent {
-    /// All of it.
+    /// The whole image.
     Whole,
     /// The picture with a third of its larger side around it: enough to recognise it by its corners, and quicker.
     Around,
@@ -139,9 +43,9 @@ pub enum Extent {
 /// What the camera sees.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Exhibit {
-    /// The image.
+    /// The rendered image.
     pub image: GrayImage,
-    /// Where the picture is in it, exactly.
+    /// Exact corners of the picture in the image, px.
     pub corners: Corners,
 }
 
@@ -304,99 +208,4 @@ impl<'a> Stage<'a> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::{posters::poster, surfaces::plaster, texture::Edge};
-
-    fn paper() -> Texture {
-        Texture::new(64, 64, vec![200; 64 * 64], Edge::Clamp)
-    }
-
-    fn mean(seen: &Exhibit, x: f64, y: f64) -> f64 {
-        let [a, b, c, d] = *seen.corners.points();
-        let at = a.coords * (1.0 - x) * (1.0 - y)
-            + b.coords * x * (1.0 - y)
-            + c.coords * x * y
-            + d.coords * (1.0 - x) * y;
-        f64::from(seen.image.sample(at.x, at.y))
-    }
-
-    fn see(conditions: &Conditions) -> Exhibit {
-        exhibit(&paper(), &plaster(1), conditions, Extent::Whole, 1).unwrap()
-    }
-
-    #[test]
-    fn corners_are_where_geometry_puts_them() {
-        let seen = see(&Conditions { size_px: 100.0, ..Conditions::default() });
-        let expected = [[269.5, 189.5], [369.5, 189.5], [369.5, 289.5], [269.5, 289.5]];
-        for (found, expected) in seen.corners.points().iter().zip(expected) {
-            assert!((found - Point2::from(expected)).norm() < 1e-9, "{found} {expected:?}");
-        }
-        // Turned by 60 degrees it is half as wide, and its height grows on the near side.
-        let seen = see(&Conditions { size_px: 100.0, yaw_rad: 60f64.to_radians(), ..Conditions::default() });
-        let [a, b, c, d] = seen.corners.points();
-        assert!(((b - a).x - 50.0).abs() < 1.0, "{}", (b - a).x);
-        assert!((d - a).norm() > 105.0 && (c - b).norm() < 95.0);
-        assert!((mean(&seen, 0.5, 0.5) - 180.0).abs() <= 1.0);
-    }
-
-    #[test]
-    fn cover_light_and_shadow_are_where_they_are_asked_for() {
-        let plain = Conditions { size_px: 200.0, ..Conditions::default() };
-        let covered = see(&Conditions { cover: 0.25, cover_grey: 40.0, ..plain.clone() });
-        assert!(
-            (mean(&covered, 0.5, 0.5) - 36.0).abs() <= 1.0 && (mean(&covered, 0.27, 0.5) - 36.0).abs() <= 1.0
-        );
-        assert!((mean(&covered, 0.2, 0.5) - 180.0).abs() <= 1.0);
-        let dark = (0..200 * 200).filter(|i| {
-            let (u, v) = (220 + i % 200, 140 + i / 200);
-            covered.image.at(u, v) < 100
-        });
-        assert!((dark.count() as f64 / 40_000.0 - 0.25).abs() < 0.01);
-        let side = see(&Conditions { side_light: 0.5, ..plain.clone() });
-        assert!(
-            (mean(&side, 0.1, 0.5) - 0.95 * 180.0).abs() < 2.0
-                && (mean(&side, 0.9, 0.5) - 0.55 * 180.0).abs() < 2.0
-        );
-        let shadow = Shadow { depth: 0.6, direction_rad: 0.0, offset: 0.1 };
-        let shadow = see(&Conditions { shadow: Some(shadow), ..plain });
-        assert!(
-            (mean(&shadow, 0.5, 0.5) - 180.0).abs() <= 1.0 && (mean(&shadow, 0.7, 0.5) - 72.0).abs() <= 1.0
-        );
-    }
-
-    #[test]
-    fn the_cut_is_the_whole_around_the_picture() {
-        let conditions = Conditions { aim_px: [30.3, -20.7], yaw_rad: 0.4, ..Conditions::default() };
-        let poster = poster(3);
-        let whole = exhibit(&poster, &plaster(1), &conditions, Extent::Whole, 5).unwrap();
-        let cut = exhibit(&poster, &plaster(1), &conditions, Extent::Around, 5).unwrap();
-        let shift = whole.corners.points()[0] - cut.corners.points()[0];
-        for (u, v) in [(20, 20), (90, 100), (60, 140)] {
-            let (a, b) = (
-                cut.image.at(u, v),
-                whole.image.at(u + shift.x.round() as usize, v + shift.y.round() as usize),
-            );
-            assert!(a.abs_diff(b) <= 1, "{a} {b}");
-        }
-    }
-
-    #[test]
-    fn the_draw_decides_and_what_leaves_the_image_is_none() {
-        let poster = poster(1);
-        let see =
-            |draw| exhibit(&poster, &plaster(1), &Conditions::realistic(4), Extent::Around, draw).unwrap();
-        assert_eq!(see(1), see(1));
-        assert_ne!(see(1), see(2));
-        assert_ne!(Conditions::realistic(1), Conditions::realistic(2));
-        let away = Conditions { aim_px: [400.0, 0.0], ..Conditions::default() };
-        assert!(exhibit(&poster, &plaster(1), &away, Extent::Whole, 1).is_none());
-        let broken = Conditions {
-            yaw_rad: f64::NAN,
-            size_px: f64::INFINITY,
-            aim_px: [f64::NAN, 0.0],
-            ..Conditions::default()
-        };
-        assert!(exhibit(&poster, &plaster(1), &broken, Extent::Whole, 1).is_none());
-    }
-}
+mod tests;

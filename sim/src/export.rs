@@ -32,7 +32,7 @@ pub struct DataSet {
     pub images: Vec<ImageEntry>,
 }
 
-/// Intrinsics and size.
+/// Intrinsics and image size.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CameraEntry {
     /// Focal length along u, px.
@@ -62,12 +62,12 @@ pub struct TeachEntry {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum QuadState {
-    /// All of it.
+    /// The whole quad is visible.
     #[default]
     Full,
     /// Cut by the image border.
     Truncated,
-    /// Partly hidden.
+    /// Another object hides a part of it.
     Occluded,
 }
 
@@ -76,7 +76,7 @@ pub enum QuadState {
 pub struct QuadEntry {
     /// TL, TR, BR, BL in pixels.
     pub corners: Corners,
-    /// Its name, or none for a stranger.
+    /// Name of the landmark; `None` for a distractor.
     pub landmark: Option<String>,
     /// How much of it is there.
     #[serde(default)]
@@ -84,7 +84,7 @@ pub struct QuadEntry {
     /// Whether a detector must find it. One that is not counted is neither missed nor false.
     #[serde(default = "yes", skip_serializing_if = "is_true")]
     pub counted: bool,
-    /// What it is.
+    /// Kind of the object.
     pub kind: LandmarkKind,
     /// Hidden share of what lies within the image.
     pub occluded_share: f64,
@@ -125,7 +125,7 @@ fn is_true(value: &bool) -> bool {
 /// Which quads of a rendered picture are listed, and under which names.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Labels<'a> {
-    /// Landmarks that are taught; all others are strangers.
+    /// Landmarks that are taught; all others are distractors.
     pub taught: &'a [String],
     /// Quads with a shorter side are left out.
     pub min_side_px: f64,

@@ -1,30 +1,30 @@
-//! Where a driving robot's camera looks: at the poster that is seen best, as fast as the pan unit turns, else ahead.
-//! It uses true poses: it stands for a well-behaved robot, not for the method's choice of landmarks.
+//! Ideal gaze controller on ground-truth poses; not `map::gaze`. The camera is aimed at the poster with the best
+//! view, as fast as the pan-tilt unit turns, else ahead.
 
+use map::extrinsics::pan_tilt;
 use map::pose2::{Pose2, wrap_rad};
-use nalgebra::{Isometry3, Point2, Point3};
+use nalgebra::{Isometry3, Point2, Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::building::{Building, LandmarkTruth};
-use crate::drive::mounting;
 
-/// The pan-tilt unit and its taste.
+/// Parameters of the pan-tilt unit and of the choice.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct GazeParams {
-    /// Look at posters; otherwise straight ahead.
+    /// Whether to aim at posters; otherwise the camera points ahead.
     pub look_at_posters: bool,
-    /// Height of the camera above the floor.
+    /// Height of the camera above the floor, metres.
     pub camera_height_m: f64,
-    /// Furthest pan to either side.
+    /// Largest pan to either side, radians.
     pub max_pan_rad: f64,
-    /// Furthest tilt up or down.
+    /// Largest tilt up or down, radians.
     pub max_tilt_rad: f64,
-    /// Speed of pan and tilt.
+    /// Speed of pan and tilt, rad/s.
     pub rate_radps: f64,
-    /// Nearest and furthest distance of a poster to look at.
+    /// Nearest and farthest distance of a target, metres.
     pub distance_m: [f64; 2],
-    /// Most oblique view of a poster to look at.
+    /// Largest angle of view of a target, radians.
     pub max_view_angle_rad: f64,
 }
 
@@ -89,7 +89,7 @@ impl Gaze {
         self.target.clone()
     }
 
-    /// How well a poster would be seen; `None` when not at all. The present target gets a bonus: no flicker.
+    /// Quality of the view of a poster; `None` without a view. The present target gets a bonus against flicker.
     fn score(&self, building: &Building, map_from_robot: &Pose2, l: &LandmarkTruth) -> Option<f64> {
         if !self.p.look_at_posters {
             return None;
@@ -115,6 +115,11 @@ pub(crate) fn aim(map_from_robot: &Pose2, camera_height_m: f64, l: &LandmarkTrut
     let d = centre.xy() - map_from_robot.position();
     let pan = wrap_rad(d.y.atan2(d.x) - map_from_robot.theta_rad);
     (pan, (centre.z - camera_height_m).atan2(d.norm()))
+}
+
+/// Extrinsics of the camera for a pan and tilt.
+pub(crate) fn mounting(pan_rad: f64, tilt_rad: f64, height_m: f64) -> Isometry3<f64> {
+    pan_tilt(pan_rad, tilt_rad, Vector3::new(0.0, 0.0, height_m))
 }
 
 #[cfg(test)]

@@ -1,30 +1,31 @@
-//! A planar laser scanner among the building's walls, with noise and a maximum range.
+//! A planar laser scanner with noise and a maximum range.
 
-use map::laser::Scan;
-use map::pose2::Pose2;
+use crate::{
+    building::Building,
+    seed,
+    wall::{WallSegment, range},
+};
+use map::{laser::Scan, pose2::Pose2};
 use nalgebra::{Point2, Vector2};
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
-use crate::building::{Building, WallSegment};
-use crate::seed;
-
-/// Most beams of a scan; more are not cast.
+/// Most beams of a scan.
 pub const MAX_BEAMS: usize = 4096;
 
-/// A laser scanner. The default sweeps half a turn in half-degree steps.
+/// Parameters of a laser scanner. The default covers half a turn in half-degree steps.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LaserParams {
-    /// Where it sits on the robot.
+    /// Pose of the laser on the robot.
     pub robot_from_laser: Pose2,
     /// Beams over the field of view, 2 to [`MAX_BEAMS`].
     pub beams: usize,
-    /// From the first beam (right) to the last (left), 0.01 to one turn; centred on the laser's x axis.
+    /// Angle from the first beam (right) to the last (left), 0.01 to one turn; centred on the laser's x axis.
     pub field_rad: f64,
-    /// Beyond it there is no return, 0.5 to 200 m.
+    /// Range beyond which there is no return, 0.5 to 200 m.
     pub max_range_m: f64,
-    /// Standard deviation of a range.
+    /// Standard deviation of a range, metres.
     pub range_sigma_m: f64,
 }
 
@@ -45,7 +46,7 @@ pub fn scan(building: &Building, map_from_robot: &Pose2, params: &LaserParams, s
     scan_among(building.walls(), map_from_robot, params, seed)
 }
 
-/// The same among walls that are no building's.
+/// As [`scan`], among given walls.
 pub fn scan_among(walls: &[WallSegment], map_from_robot: &Pose2, params: &LaserParams, seed: u64) -> Scan {
     let p = params;
     let within = |x: f64, low: f64, high: f64| if x.is_finite() { x.clamp(low, high) } else { low };
@@ -67,25 +68,6 @@ pub fn scan_among(walls: &[WallSegment], map_from_robot: &Pose2, params: &LaserP
     let ranges = (0..beams).map(beam).collect();
     Scan::new(p.robot_from_laser, -0.5 * field, step, max_range_m, ranges)
         .expect("parameters are clamped to a scan's ranges")
-}
-
-/// Distance along a unit direction to the nearest wall nearer than `max_m`, either side of it.
-pub(crate) fn range(
-    walls: &[WallSegment],
-    from_m: &Point2<f64>,
-    direction: &Vector2<f64>,
-    max_m: f64,
-) -> Option<f64> {
-    let hit = |w: &WallSegment| {
-        let (along, to_a) = (w.b_m - w.a_m, w.a_m - from_m);
-        let cross = direction.perp(&along);
-        if cross.abs() < 1e-12 {
-            return None;
-        }
-        let (r, k) = (to_a.perp(&along) / cross, to_a.perp(direction) / cross);
-        (r > 1e-9 && r < max_m && (0.0..=1.0).contains(&k)).then_some(r)
-    };
-    walls.iter().filter_map(hit).min_by(f64::total_cmp)
 }
 
 #[cfg(test)]

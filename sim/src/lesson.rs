@@ -1,5 +1,5 @@
-//! Where a robot stops to learn: before every poster, and every door and window if so asked, from several distances and
-//! angles, camera aimed at it.
+//! Stops of a robot that learns landmarks: in front of every poster, and on request every door and window, at several
+//! distances and angles, camera aimed at it.
 
 use map::pose2::Pose2;
 use nalgebra::{Point2, Point3};
@@ -7,8 +7,9 @@ use rand::RngExt;
 use serde::{Deserialize, Serialize};
 
 use crate::building::{Building, LandmarkKind, LandmarkTruth};
-use crate::drive::{Step, mounting};
+use crate::drive::Step;
 use crate::gaze::aim;
+use crate::gaze::mounting;
 use crate::seed;
 
 /// Most stops per landmark.

@@ -3,16 +3,12 @@
 
 use nalgebra::{Isometry3, Point3};
 
-use crate::building::Surface;
-
 /// Spacing of the baked grid.
 const CELL_M: f64 = 0.25;
 /// Most grid cells a side.
 const MAX_CELLS: usize = 512;
 /// Share of light that comes from everywhere.
 const DIFFUSE: f64 = 0.5;
-/// Mean light over the surfaces that do not shine, after normalisation: white plaster stays below saturation.
-const MEAN_LIGHT: f32 = 0.9;
 
 /// A lamp that shines downwards.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,7 +24,7 @@ pub(crate) struct Lamp {
 pub(crate) struct LightMap {
     columns: usize,
     rows: usize,
-    light: Vec<f32>,
+    pub(super) light: Vec<f32>,
 }
 
 impl LightMap {
@@ -84,24 +80,6 @@ fn direct(lamp: &Lamp, p: &Point3<f64>, normal: &nalgebra::Vector3<f64>) -> f64 
     let d = d2.sqrt();
     let (received, emitted) = (normal.dot(&to_lamp) / d, to_lamp.z / d);
     lamp.power * received.max(0.0) * emitted.max(0.0) / d2
-}
-
-/// Scales all light so that its mean over the area of lit surfaces is [`MEAN_LIGHT`]. Without lamps all stays 1.
-pub(crate) fn normalise(surfaces: &mut [Surface]) {
-    let lit = |s: &&Surface| !s.glows && s.light.light.len() > 1;
-    let (mut sum, mut area) = (0.0, 0.0);
-    for s in surfaces.iter().filter(lit) {
-        let size = (s.width_m * s.height_m) as f32;
-        sum += size * s.light.light.iter().sum::<f32>() / s.light.light.len() as f32;
-        area += size;
-    }
-    if area <= 0.0 || sum <= 0.0 {
-        return;
-    }
-    let scale = MEAN_LIGHT * area / sum;
-    for s in surfaces.iter_mut().filter(|s| !s.glows) {
-        s.light.light.iter_mut().for_each(|l| *l *= scale);
-    }
 }
 
 #[cfg(test)]

@@ -1,5 +1,5 @@
-//! Pictures that are nearly the same: a poster and its next printing, two doors of a corridor, a mirror image. A picture
-//! and a kind of change in, the two look-alikes out. Whether anybody can tell them apart is for others to say.
+//! Look-alikes: pairs of pictures that are nearly equal, such as two printings of a poster, two doors of a corridor,
+//! a mirror image. In: a picture and a kind of change. Out: the pair.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -15,7 +15,7 @@ use crate::{
 /// How two look-alikes differ.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Change {
+pub enum LookAlikeKind {
     /// Another line of letters in a band over the lower part: 12 % of the area.
     Text,
     /// One of 5 x 5 blocks shows something else.
@@ -32,8 +32,8 @@ pub enum Change {
     Doors,
 }
 
-impl Change {
-    /// All kinds.
+impl LookAlikeKind {
+    /// All kinds, in the order of tables.
     pub const ALL: [Self; 7] =
         [Self::Text, Self::Block, Self::Quarter, Self::Half, Self::Tone, Self::Mirrored, Self::Doors];
 
@@ -52,35 +52,35 @@ impl Change {
 }
 
 /// Two pictures that differ by `change`: `picture` (for doors another; for text with a line of letters) and its double.
-pub fn lookalikes(picture: &Texture, change: Change, draw: u64) -> [Texture; 2] {
+pub fn lookalikes(picture: &Texture, change: LookAlikeKind, draw: u64) -> [Texture; 2] {
     let mut rng = seed::stream(draw, 0x6c6f_6f6b);
     match change {
-        Change::Text => [0, 1].map(|_| lettered(picture, &mut rng)),
-        Change::Block => {
+        LookAlikeKind::Text => [0, 1].map(|_| lettered(picture, &mut rng)),
+        LookAlikeKind::Block => {
             let corner = [0, 1].map(|_| 0.2 * f32::from(rng.random_range(0..5_u8)));
             [
                 picture.clone(),
                 replaced(picture, [corner[0], corner[1], corner[0] + 0.2, corner[1] + 0.2], &mut rng),
             ]
         }
-        Change::Quarter => {
+        LookAlikeKind::Quarter => {
             let corner = [0, 1].map(|_| 0.5 * f32::from(rng.random_range(0..2_u8)));
             [
                 picture.clone(),
                 replaced(picture, [corner[0], corner[1], corner[0] + 0.5, corner[1] + 0.5], &mut rng),
             ]
         }
-        Change::Half => [picture.clone(), replaced(picture, [0.5, 0.0, 1.0, 1.0], &mut rng)],
-        Change::Tone => {
+        LookAlikeKind::Half => [picture.clone(), replaced(picture, [0.5, 0.0, 1.0, 1.0], &mut rng)],
+        LookAlikeKind::Tone => {
             let (low, power) = (rng.random_range(0.0..0.25_f32), rng.random_range(0.45..2.2_f32));
             [picture.clone(), mapped(picture, |_, _, grey| low + (1.0 - low) * grey.powf(power))]
         }
-        Change::Mirrored => {
+        LookAlikeKind::Mirrored => {
             let last = picture.width() - 1;
             let mirrored = mapped_from(picture, |u, v| (last - u, v));
             [picture.clone(), mirrored]
         }
-        Change::Doors => {
+        LookAlikeKind::Doors => {
             let numbers: [u32; 2] = [0, 1].map(|_| rng.random_range(100..400));
             let door = rng.random();
             [numbers[0], numbers[1] + u32::from(numbers[0] == numbers[1])]
@@ -159,20 +159,20 @@ mod tests {
     fn every_change_is_as_large_as_it_says() {
         let picture = poster(7);
         for (change, low, high) in [
-            (Change::Text, 0.01, 0.12),
-            (Change::Block, 0.01, 0.041),
-            (Change::Quarter, 0.08, 0.251),
-            (Change::Half, 0.2, 0.501),
-            (Change::Tone, 0.3, 1.0),
-            (Change::Mirrored, 0.2, 1.0),
-            (Change::Doors, 0.0001, 0.02),
+            (LookAlikeKind::Text, 0.01, 0.12),
+            (LookAlikeKind::Block, 0.01, 0.041),
+            (LookAlikeKind::Quarter, 0.08, 0.251),
+            (LookAlikeKind::Half, 0.2, 0.501),
+            (LookAlikeKind::Tone, 0.3, 1.0),
+            (LookAlikeKind::Mirrored, 0.2, 1.0),
+            (LookAlikeKind::Doors, 0.0001, 0.02),
         ] {
             let pair = lookalikes(&picture, change, 3);
             let share = differs(&pair);
             assert!(share >= low && share <= high, "{change:?}: {share}");
             assert_eq!(pair, lookalikes(&picture, change, 3));
         }
-        let mirrored = lookalikes(&picture, Change::Mirrored, 1);
+        let mirrored = lookalikes(&picture, LookAlikeKind::Mirrored, 1);
         assert_eq!(
             mirrored[0].data()[..480].iter().rev().copied().collect::<Vec<_>>(),
             mirrored[1].data()[..480]

@@ -1,4 +1,4 @@
-//! Wheel odometry that drifts: a wrong scale, a heading that turns a little with every metre, and noise.
+//! Wheel odometry with systematic errors (scale, heading drift) and noise.
 
 use map::pose2::Pose2;
 use rand_chacha::ChaCha8Rng;

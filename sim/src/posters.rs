@@ -1,6 +1,5 @@
-//! Posters: a picture of its own for every seed, as different from its neighbours as film posters are: a ground,
-//! two or three motifs, block letters, a border or none. The picture fills the quad, frame included.
-//! Not here: where posters hang (`corridor`), and the surfaces of the building itself (`surfaces`).
+//! Posters: a different picture for every seed, with a ground, two or three motifs, block letters, and a border or
+//! none. The picture fills the quad, frame included. `corridor` hangs them; `surfaces` draws the building itself.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;

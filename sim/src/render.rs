@@ -14,9 +14,9 @@ use crate::truth::{self, FrameTruth};
 /// A picture and what it truly shows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rendered {
-    /// The picture.
+    /// The rendered image.
     pub image: GrayImage,
-    /// Camera pose, landmarks, corners.
+    /// Camera pose, landmarks and corners.
     pub truth: FrameTruth,
 }
 
@@ -29,13 +29,13 @@ pub struct Renderer {
 }
 
 impl Renderer {
-    /// Prepares the buffers.
+    /// A renderer for one camera, with its buffers.
     pub fn new(camera: Camera) -> Self {
         let pixels = camera.width_px() * camera.height_px();
         Self { camera, raster: Raster::new(pixels), light: vec![0.0; pixels] }
     }
 
-    /// The camera it renders for.
+    /// The camera of the renderer.
     pub fn camera(&self) -> &Camera {
         &self.camera
     }

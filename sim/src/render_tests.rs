@@ -4,7 +4,7 @@
 use nalgebra::{Isometry3, Matrix3, Point2, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use vision::frame::{Distortion, GrayImage, Intrinsics};
 
-use crate::building::tests::one_rectangle;
+use crate::builder::tests::one_rectangle;
 use crate::building::{Building, Surface};
 use crate::camera::Camera;
 use crate::posters::poster_of_size;

@@ -1,5 +1,5 @@
-//! A robot in a building: its drive with what camera and laser measure at every step. Noise follows from the robot's
-//! seed and the step, not from the order of looking.
+//! A robot in a building: its drive with the readings of camera and laser at every step. Noise follows from the
+//! robot's seed and the step, not from the order of the calls.
 
 use std::sync::Arc;
 
@@ -13,18 +13,18 @@ use crate::render::{Rendered, Renderer};
 use crate::seed;
 use crate::sensor::SensorParams;
 
-/// A robot's sensors and drive.
+/// Parameters of a robot's drive and sensors.
 #[derive(Debug, Clone)]
 pub struct RobotParams {
-    /// How it moves.
+    /// Parameters of its drive.
     pub drive: DriveParams,
-    /// Its camera; 640 x 480 without distortion by default.
+    /// Its camera; 640 x 480 px without distortion by default.
     pub camera: Option<Camera>,
-    /// How its camera sees.
+    /// Parameters of the image sensor.
     pub sensor: SensorParams,
-    /// Its laser.
+    /// Parameters of the laser.
     pub laser: LaserParams,
-    /// Exposure time: with the speed of turning it makes the motion blur. 0 for none.
+    /// Exposure time, seconds: with the angular speed it makes the motion blur; 0 for none.
     pub exposure_s: f64,
 }
 
@@ -40,18 +40,18 @@ impl Default for RobotParams {
     }
 }
 
-/// What a robot measures at one moment, with the truth.
+/// Readings of camera and laser at one step, with the truth.
 #[derive(Debug, Clone)]
-pub struct Sighting {
+pub struct SensorReadings {
     /// Poses and camera direction.
     pub step: Step,
-    /// The picture and what it truly shows.
+    /// The image and its truth.
     pub frame: Rendered,
-    /// The laser's ranges.
+    /// The laser scan.
     pub scan: Scan,
 }
 
-/// A robot in a building: an iterator of what it measures along its drive.
+/// A robot in a building: an iterator over its readings along its drive.
 #[derive(Debug, Clone)]
 pub struct Robot {
     building: Arc<Building>,
@@ -64,7 +64,7 @@ pub struct Robot {
 }
 
 impl Robot {
-    /// Puts a robot at the start of its drive.
+    /// A robot at the start of its drive.
     pub fn new(building: Arc<Building>, params: &RobotParams) -> Self {
         Self {
             drive: Drive::new(building.clone(), &params.drive),
@@ -77,18 +77,18 @@ impl Robot {
         }
     }
 
-    /// The camera.
+    /// The camera of the robot.
     pub fn camera(&self) -> &Camera {
         self.renderer.camera()
     }
 
-    /// The motion alone, for those who skip pictures: take steps here, then [`Robot::look`] at some of them.
+    /// The drive alone: take steps here and call [`Robot::look`] for some of them.
     pub fn drive_mut(&mut self) -> &mut Drive {
         &mut self.drive
     }
 
-    /// Measures at a step, its own or any other. Noise follows from the robot's seed and the step's index.
-    pub fn look(&mut self, step: &Step) -> Sighting {
+    /// The readings at a step, its own or any other. Noise follows from the robot's seed and the step's index.
+    pub fn look(&mut self, step: &Step) -> SensorReadings {
         let seed = seed::mix(self.seed ^ seed::mix(step.index));
         let blur_px = self.exposure_s * step.sweep_radps * self.camera().intrinsics().fx_px;
         let sensor = SensorParams {
@@ -97,14 +97,14 @@ impl Robot {
         };
         let frame = self.renderer.render(&self.building, &step.map_from_camera(), &sensor, seed);
         let scan = laser::scan(&self.building, &step.map_from_robot, &self.laser, seed);
-        Sighting { step: step.clone(), frame, scan }
+        SensorReadings { step: step.clone(), frame, scan }
     }
 }
 
 impl Iterator for Robot {
-    type Item = Sighting;
+    type Item = SensorReadings;
 
-    fn next(&mut self) -> Option<Sighting> {
+    fn next(&mut self) -> Option<SensorReadings> {
         let step = self.drive.next()?;
         Some(self.look(&step))
     }

@@ -1,5 +1,5 @@
-//! What is truly in a picture: where each landmark's corners are, how much of it is seen, from which angle.
-//! Corners come from projecting the landmark; the shares come from the depth buffer.
+//! Ground truth of an image: corners, visible share and angle of each landmark. Corners are projected; the shares
+//! come from the depth buffer.
 
 use nalgebra::{Isometry3, Point2, Point3};
 use vision::detect::quads::Corners;
@@ -15,7 +15,7 @@ pub const OCCLUDED_SHARE: f64 = 0.02;
 /// How much of a landmark a picture holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ViewState {
-    /// All of it.
+    /// The whole landmark is visible.
     Full,
     /// The image border cuts it.
     Truncated,
@@ -28,7 +28,7 @@ pub enum ViewState {
 pub struct LandmarkView {
     /// Name of the landmark.
     pub name: String,
-    /// What it is.
+    /// Kind of the landmark.
     pub kind: LandmarkKind,
     /// Corners in pixels, distortion included. They may lie outside the image.
     pub corners_px: Corners,

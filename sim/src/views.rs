@@ -1,6 +1,6 @@
-//! The rendered set for detection: corridors of all proportions seen by hand-held cameras from everywhere, with exact
-//! truth. Seed in, pictures with their entries out; the same parameters give the same bytes. Writes no files and judges
-//! no detector: what is counted is marked in the entries.
+//! The rendered set for detection: corridors of all proportions seen by hand-held cameras, with exact truth. In: a
+//! seed. Out: images with their entries; the same parameters give the same bytes. The entries mark which quads count;
+//! nothing is written or evaluated here.
 
 use std::f64::consts::TAU;
 
@@ -56,7 +56,7 @@ impl Default for ViewsParams {
 /// A picture with its entry in the set.
 #[derive(Debug, Clone)]
 pub struct LabelledView {
-    /// 640 x 480.
+    /// The image, 640 x 480 px.
     pub image: GrayImage,
     /// Its quads and other real things.
     pub entry: ImageEntry,

@@ -4,10 +4,12 @@
 use std::{collections::BTreeMap, sync::Arc};
 
 use map::{
-    changes::{Change, ChangeParams, Judged, Standing, Watch, judge, sift},
+    extrinsics::CameraExtrinsics,
     fuse::{FixOutcome, FuseParams, Fuser},
-    localise::{LocaliseParams, RobotFix, Sighting, robot_pose},
-    mounting::Mounting,
+    landmark_health::{
+        HealthChange, HealthMonitor, HealthParams, LandmarkHealth, PlaceCheck, check_place, drop_unreliable,
+    },
+    localise::{FixResult, LandmarkObservation, LocaliseParams, robot_pose},
     place::{LandmarkPlace, PlaceSigmas},
 };
 use nalgebra::{Matrix2, Point2, Point3, Vector2, Vector3};
@@ -45,9 +47,9 @@ struct Run {
 
 struct Robot {
     fuser: Fuser,
-    watch: Watch,
+    watch: HealthMonitor,
     supporters: Vec<LandmarkId>,
-    standings: BTreeMap<LandmarkId, Standing>,
+    standings: BTreeMap<LandmarkId, LandmarkHealth>,
     random: Random,
 }
 
@@ -55,7 +57,7 @@ impl Robot {
     fn new(seed: u64) -> Self {
         Self {
             fuser: Fuser::new(FuseParams::default()),
-            watch: Watch::new(ChangeParams::default()),
+            watch: HealthMonitor::new(HealthParams::default()),
             supporters: Vec::new(),
             standings: BTreeMap::new(),
             random: Random::new(seed),
@@ -97,24 +99,24 @@ impl Robot {
     }
 
     /// The way of one frame.
-    fn frame(&mut self, at_ns: i64, step: &Step, sightings: &[Sighting<'_>]) -> Vec<Change> {
-        let mounting = Mounting::new(step.robot_from_camera).expect("in range");
-        self.fuser.odometry(at_ns, step.odom_from_robot).expect("in range");
+    fn frame(&mut self, at_ns: i64, step: &Step, sightings: &[LandmarkObservation<'_>]) -> Vec<HealthChange> {
+        let mounting = CameraExtrinsics::new(step.robot_from_camera).expect("in range");
+        self.fuser.apply_odometry(at_ns, step.odom_from_robot).expect("in range");
         let used: Vec<_> = sightings
             .iter()
-            .filter(|s| self.standings.get(&s.landmark) != Some(&Standing::Quarantined))
+            .filter(|s| self.standings.get(&s.landmark) != Some(&LandmarkHealth::Quarantined))
             .copied()
             .collect();
         let Some(prior) = self.fuser.pose_at(at_ns) else {
             self.fuse(at_ns, &used, &mounting, None);
             return Vec::new();
         };
-        let p = ChangeParams::default();
-        let judged: Vec<Judged> = used
+        let p = HealthParams::default();
+        let judged: Vec<PlaceCheck> = used
             .iter()
-            .map(|s| judge(s, &mounting, &prior, &self.supporters, &p).expect("in range"))
+            .map(|s| check_place(s, &mounting, &prior, &self.supporters, &p).expect("in range"))
             .collect();
-        let kept = sift(&used, &judged);
+        let kept = drop_unreliable(&used, &judged);
         let reset = self.fuse(at_ns, &kept, &mounting, Some(&prior));
         if reset {
             return self.watch.clear();
@@ -127,8 +129,8 @@ impl Robot {
     fn fuse(
         &mut self,
         at_ns: i64,
-        sightings: &[Sighting<'_>],
-        mounting: &Mounting,
+        sightings: &[LandmarkObservation<'_>],
+        mounting: &CameraExtrinsics,
         prior: Option<&map::pose2::Pose2Covariance>,
     ) -> bool {
         if sightings.is_empty() {
@@ -136,11 +138,11 @@ impl Robot {
         }
         let p = LocaliseParams::default();
         let mut fix = robot_pose(sightings, mounting, None, &p).expect("in range");
-        if let (RobotFix::Ambiguous(_), Some(prior)) = (&fix, prior) {
+        if let (FixResult::Ambiguous(_), Some(prior)) = (&fix, prior) {
             fix = robot_pose(sightings, mounting, Some(prior), &p).expect("in range");
         }
-        let RobotFix::Fixed(fix) = fix else { return false };
-        let outcome = self.fuser.fix(at_ns, &fix).expect("in range");
+        let FixResult::Fixed(fix) = fix else { return false };
+        let outcome = self.fuser.apply_fix(at_ns, &fix).expect("in range");
         if matches!(outcome, FixOutcome::Started | FixOutcome::Reset) {
             self.supporters.clear();
         }
@@ -196,7 +198,11 @@ fn drive(seed: u64, length_m: f64, moved: usize, hidden: bool) -> Run {
             .collect();
         let sightings: Vec<_> = seen
             .iter()
-            .map(|(i, seen)| Sighting { landmark: LandmarkId(*i as u64), seen, place: &places[*i] })
+            .map(|(i, seen)| LandmarkObservation {
+                landmark: LandmarkId(*i as u64),
+                seen,
+                place: &places[*i],
+            })
             .collect();
         let others = robot.supporters.iter().filter(|id| **id != moved).count();
         let holds = sightings.iter().any(|s| s.landmark == moved);
@@ -204,13 +210,13 @@ fn drive(seed: u64, length_m: f64, moved: usize, hidden: bool) -> Run {
         for change in robot.frame(at_ns, &step, &sightings) {
             robot.standings.insert(change.landmark, change.standing);
             if change.landmark != moved {
-                run.blamed_others += usize::from(change.standing != Standing::Sound);
-            } else if change.standing >= Standing::Flagged && run.sightings_until_flagged.is_none() {
+                run.blamed_others += usize::from(change.standing != LandmarkHealth::Sound);
+            } else if change.standing >= LandmarkHealth::Flagged && run.sightings_until_flagged.is_none() {
                 run.sightings_until_flagged = Some(sightings_so_far);
                 run.with_two_others = others >= 2;
             }
         }
-        run.quarantined = robot.standings.get(&moved) == Some(&Standing::Quarantined);
+        run.quarantined = robot.standings.get(&moved) == Some(&LandmarkHealth::Quarantined);
         if let Some(pose) = robot.fuser.pose() {
             let error = pose.pose.pose.position() - step.map_from_robot.position();
             errors.push(error.norm());

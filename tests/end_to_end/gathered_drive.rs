@@ -4,7 +4,7 @@
 
 use client::{
     Capture, Delivery, RobotClient, RobotOptions,
-    map::Extent,
+    map::LandmarkRegion,
     v1::{self, Verdict},
 };
 use map::pose2::{Pose2, Pose2Covariance};
@@ -16,7 +16,7 @@ use sim::{
     building::Building,
     drive::DriveParams,
     lesson::{LessonParams, stops},
-    robot::{Robot, RobotParams, Sighting},
+    robot::{Robot, RobotParams, SensorReadings},
     truth::{LandmarkView, ViewState},
 };
 use std::{collections::BTreeMap, sync::Arc, time::Duration};
@@ -64,7 +64,7 @@ fn robot(building: &Arc<Building>, seed: u64, legs: u32, reverse: bool) -> Robot
 }
 
 /// What the laser says of the pose: 1 cm and 2 mrad off, other at every step.
-fn believed(seen: &Sighting) -> Pose2Covariance {
+fn believed(seen: &SensorReadings) -> Pose2Covariance {
     let phase = seen.step.index as f64;
     let off = Vector3::new(0.014 * phase.sin(), 0.014 * (2.3 * phase).sin(), 0.0028 * (3.7 * phase).sin());
     let covariance = Matrix3::from_diagonal(&Vector3::new(1e-4, 1e-4, 4e-6));
@@ -74,7 +74,7 @@ fn believed(seen: &Sighting) -> Pose2Covariance {
 }
 
 /// Every other picture of a drive, answered.
-async fn drive(client: &RobotClient, mut robot: Robot, localised: bool) -> Vec<(Sighting, v1::Answer)> {
+async fn drive(client: &RobotClient, mut robot: Robot, localised: bool) -> Vec<(SensorReadings, v1::Answer)> {
     let steps: Vec<_> = robot.drive_mut().collect();
     let mut answered = Vec::new();
     let began = tokio::time::Instant::now();
@@ -108,7 +108,7 @@ struct Figures {
     worst_m: f64,
 }
 
-fn figures(drive: &[(Sighting, v1::Answer)]) -> Figures {
+fn figures(drive: &[(SensorReadings, v1::Answer)]) -> Figures {
     let mut f = Figures::default();
     for (seen, answer) in drive {
         let truth = &seen.frame.truth;
@@ -277,7 +277,7 @@ async fn photographed(building: &Arc<Building>) -> Figures {
         let corners = seen.frame.truth.landmark(&stop.landmark).expect("aimed at").corners_px;
         let maps = inside.maps();
         maps.add_landmark(MAP, &stop.landmark, None, None).await.expect("landmark");
-        let extent = Extent::Corners(corners.into());
+        let extent = LandmarkRegion::Corners(corners.into());
         maps.upload_view(MAP, &stop.landmark, jpeg(&seen.frame.image), extent).await.expect("view");
     }
     let job = inside.maps().learn(MAP, None, None).await.expect("job");

@@ -10,7 +10,7 @@ use sim::{
     building::Building,
     corridor::CorridorParams,
     drive::DriveParams,
-    robot::{Robot, RobotParams, Sighting},
+    robot::{Robot, RobotParams, SensorReadings},
 };
 use std::sync::Arc;
 use tests::{
@@ -23,7 +23,7 @@ use vision::{detect::quads::Corners, geometry::polygon};
 const POSTERS: usize = 14;
 
 /// Names given by the pose: right and wrong ones.
-fn score(answer: &v1::Answer, seen: &Sighting) -> (usize, usize) {
+fn score(answer: &v1::Answer, seen: &SensorReadings) -> (usize, usize) {
     let named = answer.quads.iter().filter(|q| q.sighting() == v1::Sighting::Guided);
     let is_right = |quad: &v1::QuadAnswer| {
         let points: Vec<[f64; 2]> = quad.corners.iter().map(|p| [p.u_px, p.v_px]).collect();

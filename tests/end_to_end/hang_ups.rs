@@ -1,6 +1,6 @@
 //! Claim: what was accepted is done although its client goes away at once, and what was not does not block anything.
 
-use client::{lessons::JobState, map::Extent};
+use client::{lessons::JobState, map::LandmarkRegion};
 use serde_json::Value;
 use server::config::Limits;
 use tests::{Inside, eventually, pictures};
@@ -15,7 +15,7 @@ async fn no_job_stays_behind_when_clients_hang_up() {
     let maps = inside.maps();
     maps.create_map("hall", None).await.expect("map");
     maps.add_landmark("hall", "p1", None, None).await.expect("landmark");
-    maps.upload_view("hall", "p1", pictures::picture(1), Extent::WholeImage).await.expect("view");
+    maps.upload_view("hall", "p1", pictures::picture(1), LandmarkRegion::WholeImage).await.expect("view");
     for i in 0..REQUESTS {
         let mut stream = TcpStream::connect(inside.server.http_addr).await.expect("connection");
         let path = "/api/v1/maps/hall/landmarks/p1/learn";

@@ -1,7 +1,7 @@
 //! Claim: bad input over HTTP gets a status, a stable code and the field at fault; nothing stored changes; bounds hold
 //! at the bound and refuse beyond it.
 
-use client::map::Extent;
+use client::map::LandmarkRegion;
 use reqwest::{
     Client, Method, StatusCode,
     header::CONTENT_TYPE,
@@ -259,9 +259,11 @@ async fn bounds_hold_at_the_bound() {
 
     for seed in [1, 2, 2] {
         // The third is the second again: no new view.
-        maps.upload_view("hall", "p1", pictures::picture(seed), Extent::WholeImage).await.expect("view");
+        maps.upload_view("hall", "p1", pictures::picture(seed), LandmarkRegion::WholeImage)
+            .await
+            .expect("view");
     }
-    let third = maps.upload_view("hall", "p1", pictures::picture(3), Extent::WholeImage).await;
+    let third = maps.upload_view("hall", "p1", pictures::picture(3), LandmarkRegion::WholeImage).await;
     assert!(third.expect_err("beyond the bound").to_string().contains("too_many"));
 
     let body = |n: usize| format!("{{\"name\": \"hall\"{}}}", " ".repeat(n - 16));

@@ -12,7 +12,7 @@ use sim::{
     building::Building,
     corridor::CorridorParams,
     drive::{DriveParams, Step},
-    robot::{Robot, RobotParams, Sighting},
+    robot::{Robot, RobotParams, SensorReadings},
 };
 use std::{
     sync::Arc,
@@ -64,7 +64,7 @@ impl Run {
     }
 
     /// Sends a scan and waits until the server has done with it.
-    async fn scan(&mut self, seen: &Sighting) {
+    async fn scan(&mut self, seen: &SensorReadings) {
         let captured_ns = now_ns();
         self.path.push((captured_ns, seen.step.map_from_robot));
         self.client.publish_scan(scan_message(seen, captured_ns)).await.expect("sent");
@@ -78,7 +78,7 @@ impl Run {
     }
 
     /// Sends a frame; whether the landmark was named in it, and whether it gave a pose.
-    async fn frame(&mut self, seen: &Sighting) -> [bool; 2] {
+    async fn frame(&mut self, seen: &SensorReadings) -> [bool; 2] {
         let capture = Capture::encoded(jpeg(&seen.frame.image))
             .expect("a picture")
             .with_intrinsics(sim::camera::Camera::vga().intrinsics())

@@ -10,7 +10,7 @@ use sim::{
     building::Building,
     corridor::CorridorParams,
     drive::DriveParams,
-    robot::{Robot, RobotParams, Sighting},
+    robot::{Robot, RobotParams, SensorReadings},
 };
 use std::sync::Arc;
 use tests::{
@@ -22,7 +22,7 @@ use vision::geometry::polygon::iou;
 /// Three posters with the same picture, left, right and left.
 const ALIKE: [&str; 3] = ["poster-0", "poster-1", "poster-2"];
 
-async fn ask(client: &RobotClient, seen: &Sighting) -> v1::Answer {
+async fn ask(client: &RobotClient, seen: &SensorReadings) -> v1::Answer {
     let capture = Capture::encoded(jpeg(&seen.frame.image))
         .expect("a picture")
         .with_intrinsics(sim::camera::Camera::vga().intrinsics())
@@ -104,7 +104,7 @@ async fn twelve_like_doors_are_twelve_places_and_never_one_too_early() {
 }
 
 /// From there on the pose says which of them each one is; the API says that it was the pose.
-async fn named_by_pose(inside: &Inside, client: &RobotClient, looks: impl Iterator<Item = Sighting>) {
+async fn named_by_pose(inside: &Inside, client: &RobotClient, looks: impl Iterator<Item = SensorReadings>) {
     let mut poses = client.poses();
     let (mut right, mut trust) = (0, Vec::new());
     for seen in looks {

@@ -5,7 +5,7 @@
 use client::{
     Capture, Delivery, RobotClient, RobotOptions,
     lessons::{Place, Size},
-    map::Extent,
+    map::LandmarkRegion,
     v1::{self, GazeLook, Verdict},
 };
 use reqwest::{Method, StatusCode};
@@ -14,7 +14,7 @@ use server::config::Limits;
 use sim::{
     building::Building,
     lesson::{LessonParams, stops},
-    robot::{Robot, RobotParams, Sighting},
+    robot::{Robot, RobotParams, SensorReadings},
     truth::ViewState,
 };
 use std::sync::Arc;
@@ -56,7 +56,7 @@ async fn teach(inside: &Inside, building: &Arc<Building>) {
         else {
             continue;
         };
-        let corners = Extent::Corners(view.corners_px.into());
+        let corners = LandmarkRegion::Corners(view.corners_px.into());
         maps.upload_view(MAP, &stop.landmark, jpeg(&seen.frame.image), corners).await.expect("view");
     }
     let job = maps.learn(MAP, None, None).await.expect("job");
@@ -84,7 +84,7 @@ async fn standing(inside: &Inside) -> String {
 }
 
 /// Sends what was seen, with everything a robot knows.
-async fn ask(robot: &RobotClient, seen: &Sighting) -> v1::Answer {
+async fn ask(robot: &RobotClient, seen: &SensorReadings) -> v1::Answer {
     let camera = sim::camera::Camera::vga();
     let capture = Capture::encoded(jpeg(&seen.frame.image))
         .expect("a picture")

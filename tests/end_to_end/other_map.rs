@@ -5,7 +5,7 @@ use client::{RobotClient, v1};
 use reqwest::Method;
 use serde_json::Value;
 use server::config::Limits;
-use sim::{building::Building, corridor::CorridorParams, robot::Sighting};
+use sim::{building::Building, corridor::CorridorParams, robot::SensorReadings};
 use std::sync::Arc;
 use tests::{
     Inside, SOON,
@@ -16,7 +16,7 @@ use tests::{
 const OTHER: &str = "cellar";
 
 /// Sends what was seen, compared with `map`.
-async fn ask(robot: &RobotClient, seen: &Sighting, map: &str) -> v1::Answer {
+async fn ask(robot: &RobotClient, seen: &SensorReadings, map: &str) -> v1::Answer {
     let answer = robot.recognise("front", capture(seen).against_map(map), SOON).await.expect("an answer");
     assert_eq!(answer.map, map);
     answer

@@ -1,7 +1,7 @@
 //! Claim: killing the server at any moment and starting it again loses nothing that was acknowledged, repeats nothing,
 //! and leaves a database in order (the server checks that at each start and would refuse).
 
-use client::{ClientError, MapClient, lessons::JobState, map::Extent};
+use client::{ClientError, MapClient, lessons::JobState, map::LandmarkRegion};
 use std::{
     collections::BTreeMap,
     sync::{
@@ -38,7 +38,8 @@ async fn teach(
         maps.add_landmark(MAP, &name, None, None).await?;
         journal.lock().expect("journal").landmarks.insert(name.clone(), Vec::new());
         for seed in [2 * number, 2 * number + 1] {
-            let view = maps.upload_view(MAP, &name, pictures::picture(seed), Extent::WholeImage).await?;
+            let view =
+                maps.upload_view(MAP, &name, pictures::picture(seed), LandmarkRegion::WholeImage).await?;
             let id = view.id.as_i64().expect("a number");
             journal.lock().expect("journal").landmarks.get_mut(&name).expect("own landmark").push(id);
         }

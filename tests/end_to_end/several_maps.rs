@@ -2,7 +2,7 @@
 //! floor can be said in the frame of another, no map lies in itself; and the plan of a building as GeoJSON becomes the
 //! walls of a map on a running server, by the command line.
 
-use client::{MapClient, map::Extent};
+use client::{MapClient, map::LandmarkRegion};
 use reqwest::{Client, Method, StatusCode};
 use serde_json::{Value, json};
 use server::config::Limits;
@@ -155,7 +155,8 @@ async fn a_near_duplicate_view_is_answered_and_not_stored() {
             .collect();
         pictures::png(200, 160, &grey)
     };
-    let corners = |right: f64| Extent::Corners([[20.0, 20.0], [right, 20.0], [right, 140.0], [20.0, 140.0]]);
+    let corners =
+        |right: f64| LandmarkRegion::Corners([[20.0, 20.0], [right, 20.0], [right, 140.0], [20.0, 140.0]]);
     let first = maps.upload_view("hall", "p1", picture(0), corners(180.0)).await.expect("view");
     let same = maps.upload_view("hall", "p1", picture(0), corners(180.0)).await.expect("view");
     let alike = maps.upload_view("hall", "p1", picture(2), corners(180.5)).await.expect("view");

@@ -28,7 +28,7 @@ async fn hall(server: &Child) {
     server.maps().create_map("hall", None).await.expect("created");
     server
         .maps()
-        .set_laser("hall", &[[[0.0, 0.0], [10.0, 0.0]], [[10.0, 8.0], [0.0, 8.0]]])
+        .set_walls("hall", &[[[0.0, 0.0], [10.0, 0.0]], [[10.0, 8.0], [0.0, 8.0]]])
         .await
         .expect("walls");
     for (name, place) in [

@@ -4,14 +4,14 @@
 use client::{
     Capture, Delivery, RobotClient, RobotOptions,
     lessons::{Place, Size},
-    map::Extent,
+    map::LandmarkRegion,
     v1::{self, Verdict},
 };
 use server::config::Limits;
 use sim::{
     building::Building,
     lesson::{LessonParams, Stop, stops},
-    robot::{Robot, RobotParams, Sighting},
+    robot::{Robot, RobotParams, SensorReadings},
     truth::ViewState,
 };
 use std::{sync::Arc, time::Duration};
@@ -21,7 +21,7 @@ use vision::geometry::polygon::iou;
 const MAP: &str = "corridor";
 
 /// Pictures of every poster, from places that `seed` chooses.
-fn round(building: &Arc<Building>, seed: u64, views: usize) -> Vec<(Stop, Sighting)> {
+fn round(building: &Arc<Building>, seed: u64, views: usize) -> Vec<(Stop, SensorReadings)> {
     let mut robot = Robot::new(building.clone(), &RobotParams::default());
     let stops = stops(building, &LessonParams { seed, views, ..LessonParams::default() });
     stops
@@ -49,7 +49,7 @@ async fn teach(inside: &Inside, building: &Arc<Building>) {
         else {
             continue;
         };
-        let corners = Extent::Corners(view.corners_px.into());
+        let corners = LandmarkRegion::Corners(view.corners_px.into());
         maps.upload_view(MAP, &stop.landmark, jpeg(&seen.frame.image), corners).await.expect("view");
     }
     let job = maps.learn(MAP, None, None).await.expect("job");
@@ -60,7 +60,7 @@ async fn teach(inside: &Inside, building: &Arc<Building>) {
 }
 
 /// Sends what was seen, with everything a robot knows, and returns the answer.
-async fn ask(robot: &RobotClient, seen: &Sighting) -> v1::Answer {
+async fn ask(robot: &RobotClient, seen: &SensorReadings) -> v1::Answer {
     let camera = sim::camera::Camera::vga();
     let capture = Capture::encoded(jpeg(&seen.frame.image))
         .expect("a picture")

@@ -4,7 +4,7 @@ use crate::{Inside, SOON, eventually};
 use client::{
     Capture, Delivery, RobotClient, RobotOptions,
     lessons::{Place, Size},
-    map::Extent,
+    map::LandmarkRegion,
     v1,
 };
 use image::{ExtendedColorType, codecs::jpeg::JpegEncoder};
@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 use sim::{
     building::Building,
     lesson::{LessonParams, stops},
-    robot::{Robot, RobotParams, Sighting},
+    robot::{Robot, RobotParams, SensorReadings},
     truth::ViewState,
 };
 use std::sync::Arc;
@@ -75,7 +75,7 @@ pub async fn teach(inside: &Inside, building: &Arc<Building>, names: &[&str], vi
         let seen = robot.look(&stop.step);
         let view = seen.frame.truth.landmark(&stop.landmark).filter(|v| v.state == ViewState::Full);
         if let Some(view) = view {
-            let corners = Extent::Corners(view.corners_px.into());
+            let corners = LandmarkRegion::Corners(view.corners_px.into());
             let view = maps.upload_view(MAP, &stop.landmark, jpeg(&seen.frame.image), corners).await;
             view.expect("view");
         }
@@ -91,7 +91,7 @@ pub async fn connect(endpoint: &str, robot: &str) -> RobotClient {
 }
 
 /// What was seen, with everything a robot knows.
-pub fn capture(seen: &Sighting) -> Capture {
+pub fn capture(seen: &SensorReadings) -> Capture {
     Capture::encoded(jpeg(&seen.frame.image))
         .expect("a picture")
         .with_intrinsics(sim::camera::Camera::vga().intrinsics())
@@ -106,7 +106,7 @@ pub async fn find_itself(
     building: &Arc<Building>,
     client: &RobotClient,
     name: &str,
-) -> Sighting {
+) -> SensorReadings {
     let mut robot = Robot::new(building.clone(), &RobotParams::default());
     let near = LessonParams { seed: 9, views: 12, ..LessonParams::default() };
     let stops: Vec<_> = stops(building, &near).into_iter().filter(|s| s.landmark == "poster-0").collect();
@@ -128,7 +128,7 @@ pub async fn find_itself(
 }
 
 /// What the laser measured, as a message.
-pub fn scan_message(seen: &Sighting, captured_ns: i64) -> v1::Scan {
+pub fn scan_message(seen: &SensorReadings, captured_ns: i64) -> v1::Scan {
     scan_of(&seen.scan, &seen.step.odom_from_robot, captured_ns)
 }
 

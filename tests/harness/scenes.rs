@@ -6,7 +6,7 @@ use sim::{
     camera::Camera,
     export::{CameraEntry, DataSet, ImageEntry, Labels, TeachEntry, sizes_m},
     lesson::{LessonParams, stops},
-    robot::{Robot, RobotParams, Sighting},
+    robot::{Robot, RobotParams, SensorReadings},
 };
 use std::{fs, path::Path, sync::Arc};
 use vision::frame::GrayImage;
@@ -17,7 +17,7 @@ pub fn png(image: &GrayImage) -> Vec<u8> {
 }
 
 /// Looks at every poster from `views` places, each with the poster's name.
-pub fn looks(building: &Arc<Building>, params: &LessonParams) -> Vec<(String, Sighting)> {
+pub fn looks(building: &Arc<Building>, params: &LessonParams) -> Vec<(String, SensorReadings)> {
     let mut robot = Robot::new(building.clone(), &RobotParams::default());
     let look = |stop: sim::lesson::Stop| {
         let seen = robot.look(&stop.step);
@@ -31,7 +31,7 @@ pub fn looks(building: &Arc<Building>, params: &LessonParams) -> Vec<(String, Si
 pub fn write_set(
     folder: &Path,
     building: &Building,
-    looks: &[(String, Sighting)],
+    looks: &[(String, SensorReadings)],
     taught: &[String],
     min_side_px: f64,
 ) -> DataSet {

@@ -6,9 +6,9 @@ use crate::{
     snapshot::{LandmarkInfo, LookAlikeClasses, MapSnapshot},
     verdicts::{self, StageTimes},
 };
-use map::{mounting::Mounting, pose2::Pose2};
+use map::{extrinsics::CameraExtrinsics, pose2::Pose2};
 use nalgebra::{Matrix3, Vector3};
-use sim::drive::Sighting as Seen;
+use sim::robot::SensorReadings as Seen;
 use vision::{pipeline::FrameFacts, recognise::models::ModelSet};
 
 const POSTER: LandmarkId = LandmarkId(1);
@@ -41,7 +41,7 @@ impl Look {
 
     /// What a pose adds to these facts.
     fn guided(&self, image: &GrayImage, facts: &FrameFacts, map: &MapSnapshot, pose: Pose2) -> Guided {
-        let mounting = Mounting::new(self.seen.step.robot_from_camera).unwrap();
+        let mounting = CameraExtrinsics::new(self.seen.step.robot_from_camera).unwrap();
         let image_px = [image.width() as f64, image.height() as f64];
         let camera = self.scene.intrinsics();
         let view =
@@ -183,7 +183,8 @@ fn a_class_of_which_one_hangs_nobody_knows_where_is_not_named() {
     let placed = with_twin(&map, 2.0);
     let (mut unplaced, mut quarantined) = (placed.clone(), placed);
     unplaced.landmarks.get_mut(&TWIN).unwrap().place = None;
-    quarantined.landmarks.get_mut(&TWIN).unwrap().standing = map::changes::Standing::Quarantined;
+    quarantined.landmarks.get_mut(&TWIN).unwrap().standing =
+        map::landmark_health::LandmarkHealth::Quarantined;
     for map in [unplaced, quarantined] {
         for facts in [look.facts(&map), FrameFacts { quads: Vec::new() }] {
             let made = look.guided(&look.seen.frame.image, &facts, &map, look.truth());

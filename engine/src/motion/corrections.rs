@@ -1,6 +1,6 @@
 //! What became of every fix of a robot: the latest in a bounded log, all of them in counters. In memory only.
 
-use map::{fuse::FixOutcome, laser_fix::LaserRefusal, localise::Modality, pose2::Pose2};
+use map::{fuse::FixOutcome, laser_fix::LaserRefusal, localise::FixSource, pose2::Pose2};
 use serde::Serialize;
 use std::collections::{BTreeMap, VecDeque};
 use utoipa::ToSchema;
@@ -92,10 +92,10 @@ pub(super) fn moved(before: Option<&Pose2>, after: Option<&Pose2>) -> Option<Pos
 }
 
 /// The word of a modality.
-pub(super) fn modality(modality: Modality) -> &'static str {
+pub(super) fn modality(modality: FixSource) -> &'static str {
     match modality {
-        Modality::Landmarks => "landmarks",
-        Modality::Laser => "laser",
+        FixSource::Landmarks => "landmarks",
+        FixSource::Laser => "laser",
     }
 }
 

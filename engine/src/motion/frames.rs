@@ -6,10 +6,10 @@
 
 use super::{Motion, own, robot::Robot, timebase::Stream};
 use map::{
-    changes::{Change, Judged, Standing},
     fuse::{FixRole, FusedPose},
     guided::{Decision, FramePlan, FrameReport},
-    localise::{DecidedBy, Fix, RobotFix},
+    landmark_health::{HealthChange, LandmarkHealth, PlaceCheck},
+    localise::{AmbiguityResolvedBy, Fix, FixResult},
     pose2::{Pose2, Pose2Covariance},
 };
 use protos::{CheckedFrame, Name, v1};
@@ -48,7 +48,7 @@ pub struct FrameFixes<'a> {
     /// The pose without the frame: that of [`Grounds`].
     pub prior: Option<&'a Pose2Covariance>,
     /// By landmarks that were named without a pose, and without a pose of ours to choose among several solutions.
-    pub independent: Option<&'a RobotFix>,
+    pub independent: Option<&'a FixResult>,
     /// By the same landmarks, chosen among several solutions where need be.
     pub chosen: Option<&'a Fix>,
     /// By landmarks that were named by the pose.
@@ -65,13 +65,13 @@ impl<'a> FrameFixes<'a> {
         match decision {
             Decision::Replace(fix) => Some((fix, FixRole::Replacing)),
             Decision::Use | Decision::Doubt { .. } => match self.independent? {
-                RobotFix::Fixed(fix) => Some((fix, FixRole::Independent)),
-                RobotFix::Ambiguous(_) | RobotFix::Refused(_) => None,
+                FixResult::Fixed(fix) => Some((fix, FixRole::Independent)),
+                FixResult::Ambiguous(_) | FixResult::Refused(_) => None,
             },
             // A solution that the pose chose agrees with the pose in any case: it may correct it, and is no support.
             Decision::Keep => self
                 .chosen
-                .filter(|fix| guided_corrects && fix.decided_by == DecidedBy::Prior)
+                .filter(|fix| guided_corrects && fix.decided_by == AmbiguityResolvedBy::Prior)
                 .map(|fix| (fix, FixRole::Guided)),
         }
     }
@@ -176,9 +176,9 @@ impl Motion {
         robot: &Name,
         at: Moment<'_>,
         grounds: &Grounds,
-        judged: &[Judged],
+        judged: &[PlaceCheck],
         missed: &[LandmarkId],
-    ) -> Vec<Change> {
+    ) -> Vec<HealthChange> {
         let map = self.snapshots.get(at.map);
         let standing = |id| map.as_ref().and_then(|m| Some(m.landmarks.get(&id)?.standing));
         let Some(followed) = self.followed(robot, at.map, at.epoch) else { return Vec::new() };
@@ -187,7 +187,7 @@ impl Motion {
         let mut changes = std::mem::take(&mut followed.found);
         if changes.is_empty() {
             let from = grounds.pose.pose.position().into();
-            let now = |id| standing(id).unwrap_or(Standing::Sound);
+            let now = |id| standing(id).unwrap_or(LandmarkHealth::Sound);
             changes = followed.watch.frame(from, judged, missed, now);
         }
         changes

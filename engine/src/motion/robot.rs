@@ -11,11 +11,11 @@ use super::{
 };
 use crate::{slots::Order, snapshot::Snapshots};
 use map::{
-    areas::Areas,
-    changes::{Change, ChangeParams, Watch},
     fuse::{FixOutcome, FixRole, FuseParams, FusedPose, Fuser, OdometryOutcome},
     guided::{Schedule, ScheduleParams},
+    landmark_health::{HealthChange, HealthMonitor, HealthParams},
     localise::Fix,
+    modality_stats::ModalityMap,
     pose2::{Pose2, Pose2Covariance},
 };
 use protos::{Name, Rejection};
@@ -61,14 +61,14 @@ pub(super) struct Robot {
     /// The landmarks that the pose rests on.
     pub(super) supporters: Vec<LandmarkId>,
     /// What it has found out about landmarks...
-    pub(super) watch: Watch,
+    pub(super) watch: HealthMonitor,
     /// ...and what of that was not passed on yet.
-    pub(super) found: Vec<Change>,
+    pub(super) found: Vec<HealthChange>,
     pub(super) log: Log,
     /// The run that is being recorded.
     pub(super) run: Option<Box<Recording>>,
     /// What its fusion goes by.
-    areas: Arc<Areas>,
+    areas: Arc<ModalityMap>,
     /// When landmarks may be named by the pose, and how far it is trusted.
     pub(super) schedule: Schedule,
     /// Its cameras, by their numbers in the schedule.
@@ -96,7 +96,7 @@ impl Default for Robot {
             by_laser_m: None,
             by_hypotheses: false,
             supporters: Vec::new(),
-            watch: Watch::new(ChangeParams::default()),
+            watch: HealthMonitor::new(HealthParams::default()),
             found: Vec::new(),
             log: Log::default(),
             run: None,
@@ -225,7 +225,7 @@ impl Robot {
         let Some(map) = maps.get(&self.map) else { return };
         if !Arc::ptr_eq(&map.modalities, &self.areas) {
             self.areas = map.modalities.clone();
-            self.fuser.set_areas(self.areas.clone());
+            self.fuser.set_modality_map(self.areas.clone());
         }
     }
 
@@ -266,7 +266,7 @@ impl Robot {
     /// Takes an odometry reading, at a time of the server's clock.
     pub(super) fn moved(&mut self, captured_ns: i64, odom_from_robot: Pose2, now: Instant) {
         let elapsed_s = self.elapsed_s(now);
-        match self.fuser.odometry_after(captured_ns, odom_from_robot, elapsed_s) {
+        match self.fuser.apply_odometry_after(captured_ns, odom_from_robot, elapsed_s) {
             Ok(OdometryOutcome::Jumped) => {
                 self.jumped(captured_ns, odom_from_robot);
                 self.moved_at = Some(now);
@@ -315,7 +315,7 @@ impl Robot {
         landmarks: Vec<String>,
     ) -> Option<(FixOutcome, FusedPose)> {
         let before = self.fuser.pose().map(|fused| fused.pose.pose);
-        let judged = match self.fuser.fix_as(captured_ns, fix, role) {
+        let judged = match self.fuser.apply_fix_as(captured_ns, fix, role) {
             Ok(judged) => judged,
             Err(error) => {
                 tracing::error!(%error, "a fix of ours is out of range");

@@ -2,8 +2,8 @@
 //! really was, gives it up, or the server stops. In: what the robot's fusion gets. Out: the same, in order of capture.
 
 use map::{
-    areas::{Reference, Run},
-    localise::{Fix, Modality},
+    localise::{Fix, FixSource},
+    modality_stats::{ReferenceRun, ReferenceTrajectory},
     pose2::Pose2,
 };
 use serde::Serialize;
@@ -134,9 +134,9 @@ impl Recording {
     }
 
     /// Its odometry and its fixes, each in order of capture, beside where the robot really was.
-    pub fn against<'a>(&'a mut self, reference: &'a Reference) -> Run<'a> {
+    pub fn against<'a>(&'a mut self, reference: &'a ReferenceTrajectory) -> ReferenceRun<'a> {
         self.fixes.sort_by_key(|(at_ns, _)| *at_ns);
-        Run { odometry: &self.odometry, fixes: &self.fixes, reference }
+        ReferenceRun { odometry: &self.odometry, fixes: &self.fixes, reference }
     }
 
     pub(super) fn told(&self, robot: &str) -> Recorded {
@@ -150,8 +150,8 @@ impl Recording {
             way_m: self.way_m,
             span_ns,
             odometry: self.odometry.len(),
-            landmarks: of(Modality::Landmarks),
-            laser: of(Modality::Laser),
+            landmarks: of(FixSource::Landmarks),
+            laser: of(FixSource::Laser),
         }
     }
 }
@@ -159,10 +159,10 @@ impl Recording {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use map::{localise::DecidedBy, pose2::Pose2Covariance};
+    use map::{localise::AmbiguityResolvedBy, pose2::Pose2Covariance};
     use nalgebra::Matrix3;
 
-    fn fix(modality: Modality) -> Fix {
+    fn fix(modality: FixSource) -> Fix {
         let covariance = Matrix3::identity() * 1e-4;
         Fix {
             modality,
@@ -170,7 +170,7 @@ mod tests {
             noise: covariance,
             nuisances: Vec::new(),
             landmarks: Vec::new(),
-            decided_by: DecidedBy::Single,
+            decided_by: AmbiguityResolvedBy::Single,
             chi2: 1.0,
             dof: 5,
         }
@@ -183,9 +183,10 @@ mod tests {
             run.moved(at_ns, Pose2::new(x_m, 0.0, 0.0));
         }
         assert_eq!(run.odometry.iter().map(|(t, _)| *t).collect::<Vec<_>>(), [10, 30, 40]);
-        run.fix(35, &fix(Modality::Laser));
-        run.fix(12, &fix(Modality::Landmarks));
-        let path = Reference::new(vec![(0, Pose2::default()), (1, Pose2::default())], 0.0, 0.0).unwrap();
+        run.fix(35, &fix(FixSource::Laser));
+        run.fix(12, &fix(FixSource::Landmarks));
+        let path =
+            ReferenceTrajectory::new(vec![(0, Pose2::default()), (1, Pose2::default())], 0.0, 0.0).unwrap();
         assert_eq!(run.against(&path).fixes.iter().map(|(t, _)| *t).collect::<Vec<_>>(), [12, 35]);
         let told = run.told("r1");
         assert!((told.way_m - 0.04).abs() < 1e-12);
@@ -193,7 +194,7 @@ mod tests {
         run.end("odometry jumped");
         run.end("full");
         run.moved(50, Pose2::new(9.0, 0.0, 0.0));
-        run.fix(50, &fix(Modality::Laser));
+        run.fix(50, &fix(FixSource::Laser));
         let after = run.told("r1");
         assert_eq!((after.going, after.reason.as_deref()), (false, Some("odometry jumped")));
         assert_eq!((after.odometry, after.laser), (3, 1));
@@ -203,7 +204,7 @@ mod tests {
     fn a_recording_is_bounded() {
         let mut run = Recording::new("hall");
         for i in 0..=MAX_RUN_FIXES as i64 {
-            run.fix(i, &fix(Modality::Laser));
+            run.fix(i, &fix(FixSource::Laser));
         }
         assert_eq!((run.fixes.len(), run.ended), (MAX_RUN_FIXES, Some("full")));
         let mut run = Recording::new("hall");

@@ -3,10 +3,10 @@
 use super::*;
 use crate::snapshot::MapSnapshot;
 use map::{
-    frames::Link,
     guided::FramePlan,
     laser_fix::WallIndex,
-    localise::{DecidedBy, Fix, Modality, RobotFix},
+    localise::{AmbiguityResolvedBy, Fix, FixResult, FixSource},
+    map_links::MapLink,
     pose2::{Pose2, Pose2Covariance},
 };
 use nalgebra::Matrix3;
@@ -56,12 +56,12 @@ fn odometry(seq: u64, x_m: f64) -> Bytes {
 
 fn fix(x_m: f64) -> Fix {
     Fix {
-        modality: Modality::Landmarks,
+        modality: FixSource::Landmarks,
         pose: Pose2Covariance { pose: Pose2::new(x_m, 1.0, 0.0), covariance: Matrix3::identity() * 1e-4 },
         noise: Matrix3::identity() * 1e-4,
         nuisances: Vec::new(),
         landmarks: Vec::new(),
-        decided_by: DecidedBy::Single,
+        decided_by: AmbiguityResolvedBy::Single,
         chi2: 1.0,
         dof: 5,
     }
@@ -109,7 +109,7 @@ impl Motion {
     /// A frame whose landmarks, named without the pose, give this fix.
     fn fixed(&self, robot: &Name, at: Moment<'_>, fix: &Fix) -> Option<v1::RobotPose> {
         let known = self.grounds(robot, &front(), at).map(|grounds| grounds.pose);
-        let independent = RobotFix::Fixed(Box::new(fix.clone()));
+        let independent = FixResult::Fixed(Box::new(fix.clone()));
         let (independent, chosen) = (Some(&independent), Some(fix));
         let says = FrameFixes { prior: known.as_ref(), independent, chosen, ..FrameFixes::default() };
         self.looked(robot, &front(), at, &says)
@@ -183,7 +183,7 @@ fn a_pose_goes_along_to_a_map_that_lies_known() {
         pose: Pose2::new(4.0, 3.0, std::f64::consts::FRAC_PI_2),
         covariance: Matrix3::identity() * 1e-2,
     };
-    let link = Link { parent: "hall".to_owned(), parent_from_map: hall_from_floor, level_m: 3.5 };
+    let link = MapLink { parent: "hall".to_owned(), parent_from_map: hall_from_floor, level_m: 3.5 };
     motion.snapshots.set_links([("floor".to_owned(), link)].into());
     let on = |map: &'static str| {
         motion.snapshots.set_robot("r1", Some(map));
@@ -406,12 +406,12 @@ fn a_run_on_another_map_ends_at_once() {
 
 #[test]
 fn what_runs_have_shown_is_heeded_from_the_next_message_on() {
-    use map::areas::{Areas, Cell, Evidence, Mode, Modules};
+    use map::modality_stats::{FusionMode, ModalityMap, ModalityStats, PoseCell, StatsByModality};
     let (motion, r1) = motion();
     motion.odometry_of(&r1, odometry(1, 0.0));
     motion.fixed(&r1, at(1_000_000_000, 0.0), &fix(10.0)).unwrap();
     // Where the robot will be odometry was exact and landmarks far off: the best alone means odometry.
-    let sums = |error: f64| -> Evidence {
+    let sums = |error: f64| -> ModalityStats {
         let one = serde_json::json!({
             "steps": 100, "available": 100, "seconds": 1.0, "errors": [0.0, 0.0, 0.0],
             "products": [error, 0.0, 0.0, 0.0, 0.0, 0.0], "fixes": 0, "outliers": 0, "weights": [0.0, 0.0, 0.0],
@@ -420,10 +420,10 @@ fn what_runs_have_shown_is_heeded_from_the_next_message_on() {
         });
         serde_json::from_value(one).unwrap()
     };
-    let found: Modules = [sums(0.0), sums(100.0), sums(100.0)];
-    let cells = (10..14).map(|x| (Cell { x, y: 1, heading: 0 }, found)).collect::<BTreeMap<_, _>>();
+    let found: StatsByModality = [sums(0.0), sums(100.0), sums(100.0)];
+    let cells = (10..14).map(|x| (PoseCell { x, y: 1, heading: 0 }, found)).collect::<BTreeMap<_, _>>();
     let mut map = MapSnapshot::empty("hall", 2);
-    map.modalities = Arc::new(Areas::new(Mode::Single, Vec::new(), [&cells]));
+    map.modalities = Arc::new(ModalityMap::new(FusionMode::Single, Vec::new(), [&cells]));
     motion.snapshots.publish(Arc::new(map));
     motion.odometry_of(&r1, odometry(2, 1.0));
     motion.fixed(&r1, at(2_000_000_000, 1.0), &fix(11.0)).unwrap();

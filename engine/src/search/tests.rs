@@ -3,8 +3,8 @@
 use super::*;
 use crate::snapshot::LandmarkInfo;
 use map::{
-    hypotheses::Glimpse,
     place::{LandmarkPlace, PlaceSigmas},
+    relocalise::RelativeObservation,
 };
 use std::f64::consts::FRAC_PI_2;
 use vision::localise::pose::LandmarkSize;
@@ -35,7 +35,7 @@ fn map() -> MapSnapshot {
 /// A door at `x` seen from a pose: it may be any of them.
 fn seen(x: f64, from: &Pose2) -> Vec<Sighted> {
     let covariance = Matrix3::from_diagonal(&Vector3::new(0.01, 0.01, 0.005));
-    let glimpse = Glimpse { robot_from_landmark: from.between(&on_floor(&place(x))), covariance };
+    let glimpse = RelativeObservation { robot_from_landmark: from.between(&on_floor(&place(x))), covariance };
     vec![(0..DOORS.len() as u64).map(|i| (LandmarkId(i), glimpse)).collect()]
 }
 

@@ -2,12 +2,12 @@
 
 use super::{look_alike_classes::LookAlikeClasses, stored_model::StoredModel};
 use map::{
-    areas::Areas,
-    changes::Standing,
+    landmark_health::LandmarkHealth,
     laser_fix::WallIndex,
+    modality_stats::ModalityMap,
     place::LandmarkPlace,
     segments::LaserSegment,
-    visibility::{Sight, VisibilityMap},
+    visibility::{VisibilityMap, VisibilitySettings},
 };
 use std::{collections::BTreeMap, sync::Arc};
 use vision::{
@@ -42,11 +42,11 @@ pub struct MapSnapshot {
     /// The walls, made ready for localisation by scans; kept from version to version while the walls are the same.
     pub wall_index: Arc<WallIndex>,
     /// What reference runs have shown of the modalities, by pose cell.
-    pub modalities: Arc<Areas>,
+    pub modalities: Arc<ModalityMap>,
     /// Number of reference runs that `modalities` rests on, and the latest.
     pub runs: (i64, i64),
     /// The camera that looks for its landmarks, and what counts as seen.
-    pub sight: Sight,
+    pub sight: VisibilitySettings,
     /// From where each placed landmark is seen by that camera. Without those that are still computed.
     pub visibility: BTreeMap<LandmarkId, Arc<VisibilityMap>>,
     /// What is still computed of this version: until then it is absent, never out of date.
@@ -74,7 +74,7 @@ impl MapSnapshot {
             wall_index: Arc::new(WallIndex::new([])),
             modalities: Arc::default(),
             runs: (0, 0),
-            sight: Sight::default(),
+            sight: VisibilitySettings::default(),
             visibility: BTreeMap::new(),
             pending: Pending::default(),
             distance: DistanceKind::Both,
@@ -109,12 +109,12 @@ pub struct LandmarkInfo {
     /// Where it hangs, if that and its size are known; without it there is no robot pose.
     pub place: Option<LandmarkPlace>,
     /// How far it is trusted: what is quarantined corrects no pose.
-    pub standing: Standing,
+    pub standing: LandmarkHealth,
 }
 
 impl LandmarkInfo {
     /// Whether it may correct poses.
     pub fn is_trusted(&self) -> bool {
-        self.standing != Standing::Quarantined
+        self.standing != LandmarkHealth::Quarantined
     }
 }

@@ -4,7 +4,7 @@
 use super::map_snapshot::MapSnapshot;
 use arc_swap::ArcSwap;
 use map::{
-    frames::{Links, relation},
+    map_links::{MapLinks, relation},
     pose2::Pose2Covariance,
 };
 use std::{collections::BTreeMap, sync::Arc};
@@ -26,7 +26,7 @@ pub struct MapChange {
 struct World {
     maps: BTreeMap<String, Arc<MapSnapshot>>,
     robots: BTreeMap<String, String>,
-    links: Arc<Links<String>>,
+    links: Arc<MapLinks<String>>,
 }
 
 /// All maps and the robots' assignments, readable from any thread without waiting.
@@ -118,7 +118,7 @@ impl Snapshots {
     }
 
     /// How maps lie to each other from now on. For the publication, after the commit.
-    pub fn set_links(&self, links: Links<String>) {
+    pub fn set_links(&self, links: MapLinks<String>) {
         let links = Arc::new(links);
         self.world.rcu(|world| World { links: links.clone(), ..World::clone(world) });
     }

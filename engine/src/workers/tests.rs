@@ -170,7 +170,7 @@ fn overload_conserves_frames() {
 /// The scene's robot before the first poster, at the pose that odometry gives, again and again.
 struct Standing {
     engine: Engine,
-    looks: Vec<(Arc<MapSnapshot>, sim::robot::Sighting)>,
+    looks: Vec<(Arc<MapSnapshot>, sim::robot::SensorReadings)>,
     intrinsics: vision::frame::Intrinsics,
     seq: u64,
 }
@@ -198,7 +198,7 @@ impl Standing {
             height_px: 480,
             image: seen.frame.image.data().to_vec().into(),
             intrinsics: Some(self.intrinsics),
-            mounting: Some(map::mounting::Mounting::new(seen.step.robot_from_camera).unwrap()),
+            mounting: Some(map::extrinsics::CameraExtrinsics::new(seen.step.robot_from_camera).unwrap()),
             odometry: Some(odometry),
             prior: None,
             deadline_ms: None,

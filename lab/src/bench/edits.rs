@@ -4,7 +4,7 @@
 use super::recognise::landmarks::models;
 use crate::evaluate::statistics::quantile;
 use anyhow::Context as _;
-use client::{MapClient, lessons::Place, map::Extent};
+use client::{MapClient, lessons::Place, map::LandmarkRegion};
 use serde::Serialize;
 use serde_json::{Value, json};
 use server::{
@@ -117,7 +117,7 @@ async fn measured(args: &Args) -> anyhow::Result<()> {
     for i in 0..(args.changes as usize).div_ceil(4) {
         let name = format!("l{}", i * 11 % args.landmarks as usize);
         let image = picture(1_000_000 + i);
-        large.maps.upload_view(MAP, &name, pictures::jpeg(&image)?, Extent::WholeImage).await?;
+        large.maps.upload_view(MAP, &name, pictures::jpeg(&image)?, LandmarkRegion::WholeImage).await?;
         let started = Instant::now();
         let job = large.maps.learn(MAP, Some(&[name]), Some(4)).await?;
         large.maps.wait_for_job(job, LESSON_TIMEOUT, |_| ()).await?;
@@ -171,7 +171,7 @@ async fn fill(data: &Path, args: &Args) -> anyhow::Result<()> {
     let server = Server::start(settings(data, args)?).await?;
     let maps = MapClient::new(&format!("http://{}", server.http_addr))?;
     maps.create_map(MAP, None).await?;
-    maps.set_laser(MAP, &walls(args)).await?;
+    maps.set_walls(MAP, &walls(args)).await?;
     server.stop().await;
     let (count, threads) = (args.landmarks as usize, std::thread::available_parallelism()?.get());
     let params = Params::default();

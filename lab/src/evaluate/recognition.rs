@@ -8,7 +8,7 @@ use super::{
 use anyhow::Context as _;
 use client::{
     Capture, Delivery, MapClient, RobotClient, RobotOptions,
-    map::Extent,
+    map::LandmarkRegion,
     quad_corners,
     v1::{Answer, QuadAnswer, Verdict},
 };
@@ -155,7 +155,7 @@ async fn teach(truth: &Truth, args: &Args, maps: &MapClient, report: &mut Report
             maps.add_landmark(MAP, landmark, None, None).await?;
         }
         let image = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
-        maps.upload_view(MAP, landmark, image, Extent::WholeImage).await?;
+        maps.upload_view(MAP, landmark, image, LandmarkRegion::WholeImage).await?;
         progress.inc(1);
     }
     progress.finish_and_clear();

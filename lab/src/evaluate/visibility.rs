@@ -2,10 +2,10 @@
 //! and the choice where to look cost; of landmarks on walls, and of tilted ones. Needs neither server nor data.
 
 use map::{
-    gaze::{GazeParams, Head, Target, rank},
+    gaze::{GazeCandidate, GazeParams, PanTiltUnit, rank},
     place::{LandmarkPlace, PlaceSigmas},
     pose2::{Pose2, Pose2Covariance},
-    visibility::{Obstacle, Viewer, VisibilityMap, VisibilityParams, pointwise, visibility},
+    visibility::{Obstacle, PanTiltCamera, VisibilityMap, VisibilityParams, pointwise, visibility},
 };
 use nalgebra::{Matrix3, Point2, Rotation2, Vector2, Vector3};
 use server::cli::{clock::Clock, screen};
@@ -39,7 +39,7 @@ pub(crate) struct Args {
 struct Plan {
     place: LandmarkPlace,
     obstacles: Vec<Obstacle>,
-    viewer: Viewer,
+    viewer: PanTiltCamera,
 }
 
 /// What was counted over maps of one kind.
@@ -171,10 +171,10 @@ fn plan(random: &mut Random) -> anyhow::Result<Plan> {
         let height_m = (i == 4).then(|| random.range(0.2, 1.6));
         obstacles.push(wall(a, if i < 4 { long } else { short }, height_m));
     }
-    let viewer = Viewer {
+    let viewer = PanTiltCamera {
         focal_px: random.range(400.0, 900.0),
         camera_height_m: random.range(0.5, 1.6),
-        ..Viewer::default()
+        ..PanTiltCamera::default()
     };
     Ok(Plan { place, obstacles, viewer })
 }
@@ -210,7 +210,7 @@ fn counted_m2(plan: &Plan, p: &VisibilityParams, reach_m: f64) -> f64 {
 
 /// A hall with a thousand landmarks in rows: milliseconds of a choice, and how many landmarks were in sight.
 fn gaze_ms(seed: u64) -> anyhow::Result<([f64; 2], usize)> {
-    let (viewer, p) = (Viewer::default(), VisibilityParams::default());
+    let (viewer, p) = (PanTiltCamera::default(), VisibilityParams::default());
     let size = LandmarkSize { width_m: 0.6, height_m: 0.84 };
     let mut random = Random::new(seed);
     let mut hall = Vec::with_capacity(HALL);
@@ -222,10 +222,10 @@ fn gaze_ms(seed: u64) -> anyhow::Result<([f64; 2], usize)> {
         let map = visibility(&place, &[], &viewer, &p)?;
         hall.push((place, map));
     }
-    let targets: Vec<Target<'_>> = hall
+    let targets: Vec<GazeCandidate<'_>> = hall
         .iter()
         .enumerate()
-        .map(|(i, (place, visible))| Target {
+        .map(|(i, (place, visible))| GazeCandidate {
             landmark: LandmarkId(i as u64),
             place,
             visible,
@@ -242,7 +242,7 @@ fn gaze_ms(seed: u64) -> anyhow::Result<([f64; 2], usize)> {
             &Pose2Covariance { pose, covariance },
             &targets,
             &viewer,
-            &Head::default(),
+            &PanTiltUnit::default(),
             &GazeParams::default(),
         )?;
         times.push(clock.ms());

@@ -1,51 +1,51 @@
-//! Knobs of the fusion, and what they say of odometry's noise.
+//! Parameters of the fusion, and the noise model of odometry.
 
 use crate::{gate::CHI2_3_99, pose2::Pose2};
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
-/// Knobs of the fusion.
+/// Parameters of the fusion.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct FuseParams {
-    /// Odometry: standard deviation along the motion after 1 m (grows with the square root).
+    /// Odometry: standard deviation along the motion after 1 m, metres; grows with the square root of the distance.
     pub along_m: f64,
-    /// The same across the motion.
+    /// Odometry: standard deviation across the motion after 1 m, metres.
     pub across_m: f64,
-    /// Of the heading after 1 m.
+    /// Odometry: standard deviation of the heading after 1 m, radians.
     pub turn_rad: f64,
-    /// Of the heading after turning 1 rad.
+    /// Odometry: standard deviation of the heading after turning 1 rad, radians.
     pub turn_per_turn_rad: f64,
-    /// How far odometry's scale may be off before anything is known of this robot: standard deviation of the share.
+    /// Standard deviation of the scale error of an unknown robot, share.
     ///
-    /// Not in method 15: wheels wear and loads press them, so that a share of odometry's error is the same every metre.
-    /// Left in the noise it would come back after every landmark.
+    /// Not in method 15: worn wheels and loads make a share of odometry's error the same every metre. As noise it
+    /// would return after every landmark.
     pub scale_sigma: f64,
-    /// The same of a turn that is made but not measured, per metre.
+    /// Standard deviation of the heading drift of an unknown robot, rad/m.
     pub turn_bias_sigma_rad_per_m: f64,
-    /// How far they wander within 1 m (grows with the square root).
+    /// Random walk of the scale within 1 m, share; grows with the square root of the distance.
     pub scale_drift: f64,
-    /// The same of the turn.
+    /// Random walk of the heading drift within 1 m, rad/m.
     pub turn_bias_drift_rad_per_m: f64,
     /// Gate on a fix: 99 % of chi2 with 3 degrees of freedom.
     pub gate_chi2: f64,
-    /// Fixes older than this behind the newest event are refused.
+    /// Fixes older than the newest event by more than this are refused, seconds.
     pub window_s: f64,
-    /// Contradicting fixes in a row that agree with one another and thereby replace the pose...
+    /// Consecutive contradicting fixes that agree with one another and replace the pose,
     pub reset_count: u32,
-    /// ...if they rest on this many landmarks: one wrong identity in view can be as steady as the truth.
+    /// if they rest on this many landmarks: a single wrong identity can be as steady as the truth.
     ///
     /// Departs from method 15, where five fixes gated out mark their source as failed: odometry drifts, landmarks do
     /// not, so agreeing landmarks win.
     pub reset_landmarks: usize,
-    /// A fix on the same landmarks, or another scan, is new only after this motion: from the same place its errors are
-    /// the same.
+    /// A further fix by the same landmarks, or a further scan, counts only after this motion, metres: from the same
+    /// pose its errors are the same.
     ///
     /// Departs from method 15, which applies every fix.
     pub min_move_m: f64,
-    /// Or after this turn.
+    /// Or after this turn, radians.
     pub min_turn_rad: f64,
-    /// Faster than this between two readings is a jump of odometry.
+    /// A motion faster than this between two readings is a jump of odometry.
     pub max_speed_mps: f64,
 }
 
@@ -72,8 +72,8 @@ impl Default for FuseParams {
 }
 
 impl FuseParams {
-    /// Covariance of a motion, in the frame where it starts. Linear in its length, so that cutting a motion in pieces
-    /// changes nothing.
+    /// Covariance of a motion, in the frame where it starts. Linear in the distance, so that cutting a motion into
+    /// pieces changes nothing.
     pub fn motion_noise(&self, motion: &Pose2) -> Matrix3<f64> {
         let (metres, radians) = (motion.position().norm(), motion.theta_rad.abs());
         let turn = self.turn_rad.powi(2) * metres + self.turn_per_turn_rad.powi(2) * radians;
@@ -87,11 +87,10 @@ impl FuseParams {
         noise
     }
 
-    /// Variances (along, across, heading) of a metre straight on by odometry of which nothing is known yet: noise, and what
-    /// it always gets wrong.
+    /// Variances (along, across, heading) of one metre straight on for an unknown robot: noise and systematic errors.
     pub(crate) fn metre_variances(&self) -> Vector3<f64> {
         let turn = self.turn_rad.powi(2) + self.turn_bias_sigma_rad_per_m.powi(2);
-        // A heading that wanders on the way moves the end aside by a third of its square.
+        // Random heading along the metre adds a third of its variance across.
         let across = self.across_m.powi(2) + turn / 3.0;
         Vector3::new(self.along_m.powi(2) + self.scale_sigma.powi(2), across, turn)
     }

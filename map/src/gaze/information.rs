@@ -1,24 +1,24 @@
-//! What looking at a landmark is expected to tell of the pose: half the logarithm of how the determinant of the
-//! covariance shrinks, by the predicted covariance of its corners (method 13.5, 14).
+//! Expected information gain of an observation: half the logarithm of the ratio of the pose covariance's determinants
+//! before and after it, by the predicted covariance of the corners (method 13.5, 14).
 
 use crate::{
+    extrinsics::CameraExtrinsics,
     localise::predict::{self, Predicted},
-    mounting::Mounting,
     place::LandmarkPlace,
     pose2::Pose2Covariance,
 };
 use nalgebra::{Matrix3, SMatrix};
 use vision::frame::{Distortion, Intrinsics};
 
-/// Expected gain, nats. None where the landmark is not in front of the camera.
+/// Expected gain, nats. `None` where the landmark is not in front of the camera.
 pub(super) fn gain_nats(
     pose: &Pose2Covariance,
     place: &LandmarkPlace,
-    mounting: &Mounting,
+    mounting: &CameraExtrinsics,
     focal_px: f64,
     corner_sigma_px: f64,
 ) -> Option<f64> {
-    // Where the image's middle is does not matter to an ideal camera.
+    // The principal point does not matter for an ideal camera.
     let camera = Intrinsics {
         fx_px: focal_px,
         fy_px: focal_px,

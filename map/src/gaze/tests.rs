@@ -1,7 +1,7 @@
 use super::*;
 use crate::{
-    localise::{LocaliseParams, RobotFix, Sighting, robot_pose},
-    mounting::pan_tilt,
+    extrinsics::pan_tilt,
+    localise::{FixResult, LandmarkObservation, LocaliseParams, robot_pose},
     place::PlaceSigmas,
     pose2::Pose2,
     visibility::{VisibilityParams, visibility},
@@ -24,8 +24,8 @@ fn poster(x: f64) -> LandmarkPlace {
     LandmarkPlace::by_hand(Vector3::new(x, 0.0, 1.5), FRAC_PI_2, SIZE, PlaceSigmas::default()).unwrap()
 }
 
-fn viewer() -> Viewer {
-    Viewer { pan_rad: [-PI, PI], ..Viewer::default() }
+fn viewer() -> PanTiltCamera {
+    PanTiltCamera { pan_rad: [-PI, PI], ..PanTiltCamera::default() }
 }
 
 fn seen(place: &LandmarkPlace) -> VisibilityMap {
@@ -43,11 +43,11 @@ fn ranked(
     pose: &Pose2Covariance,
     things: &[(LandmarkPlace, VisibilityMap, f64, f64)],
     p: &GazeParams,
-) -> Vec<Choice> {
+) -> Vec<GazeTarget> {
     let targets: Vec<_> = things
         .iter()
         .enumerate()
-        .map(|(i, (place, visible, saliency, v_c))| Target {
+        .map(|(i, (place, visible, saliency, v_c))| GazeCandidate {
             landmark: LandmarkId(i as u64),
             place,
             visible,
@@ -55,7 +55,7 @@ fn ranked(
             v_c: *v_c,
         })
         .collect();
-    rank(pose, &targets, &viewer(), &Head::default(), p).unwrap()
+    rank(pose, &targets, &viewer(), &PanTiltUnit::default(), p).unwrap()
 }
 
 fn two(saliency: [f64; 2]) -> Vec<(LandmarkPlace, VisibilityMap, f64, f64)> {
@@ -103,13 +103,13 @@ fn each_factor_counts() {
 #[test]
 fn the_landmark_comes_to_the_axis() {
     let p = GazeParams::default();
-    let head = Head { camera_m: [0.2, -0.1, 1.1], ..Head::default() };
+    let head = PanTiltUnit { camera_m: [0.2, -0.1, 1.1], ..PanTiltUnit::default() };
     for (x, y, theta) in [(0.5, 2.5, 0.3), (-1.0, 1.8, -2.0), (0.0, 3.0, 3.0)] {
         let pose = at(x, y, theta, SURE);
         let place = poster(0.0);
         let map = seen(&place);
         let target =
-            Target { landmark: LandmarkId(1), place: &place, visible: &map, saliency: 1.0, v_c: 1.0 };
+            GazeCandidate { landmark: LandmarkId(1), place: &place, visible: &map, saliency: 1.0, v_c: 1.0 };
         let found = rank(&pose, &[target], &viewer(), &head, &p).unwrap()[0];
         let camera = pose.pose.to_isometry3() * pan_tilt(found.pan_rad, found.tilt_rad, head.camera_m.into());
         let centre = camera.inverse() * Point3::new(place.x_m, place.y_m, place.z_m);
@@ -123,11 +123,12 @@ fn the_landmark_comes_to_the_axis() {
 fn a_sign_under_the_ceiling_is_looked_at_from_where_it_is_seen() {
     let mut sign = poster(0.0);
     (sign.z_m, sign.tilt_rad) = (2.5, FRAC_PI_2);
-    let viewer = Viewer { tilt_rad: [-0.3, 1.0], ..viewer() };
+    let viewer = PanTiltCamera { tilt_rad: [-0.3, 1.0], ..viewer() };
     let visible = visibility(&sign, &[], &viewer, &VisibilityParams::default()).unwrap();
-    let target = Target { landmark: LandmarkId(1), place: &sign, visible: &visible, saliency: 1.0, v_c: 1.0 };
+    let target =
+        GazeCandidate { landmark: LandmarkId(1), place: &sign, visible: &visible, saliency: 1.0, v_c: 1.0 };
     let ask = |pose: &Pose2Covariance| {
-        rank(pose, &[target], &viewer, &Head::default(), &GazeParams::default()).unwrap()
+        rank(pose, &[target], &viewer, &PanTiltUnit::default(), &GazeParams::default()).unwrap()
     };
     // By hand: 1.3 m above the camera, 1.3 m away from every side, it is up and oblique by 45 degrees.
     for theta in [0.0, 1.0, 2.0, -2.5_f64] {
@@ -148,14 +149,21 @@ fn a_sign_under_the_ceiling_is_looked_at_from_where_it_is_seen() {
 fn what_the_unit_cannot_reach_is_not_offered() {
     let place = poster(0.0);
     let map = seen(&place);
-    let target = Target { landmark: LandmarkId(1), place: &place, visible: &map, saliency: 1.0, v_c: 1.0 };
-    let ask = |viewer: &Viewer| {
-        rank(&at(0.0, 2.5, -FRAC_PI_2, SURE), &[target], viewer, &Head::default(), &GazeParams::default())
-            .unwrap()
+    let target =
+        GazeCandidate { landmark: LandmarkId(1), place: &place, visible: &map, saliency: 1.0, v_c: 1.0 };
+    let ask = |viewer: &PanTiltCamera| {
+        rank(
+            &at(0.0, 2.5, -FRAC_PI_2, SURE),
+            &[target],
+            viewer,
+            &PanTiltUnit::default(),
+            &GazeParams::default(),
+        )
+        .unwrap()
     };
     assert_eq!(ask(&viewer()).len(), 1);
-    assert!(ask(&Viewer { pan_rad: [0.5, 1.0], ..viewer() }).is_empty());
-    assert!(ask(&Viewer { tilt_rad: [-0.3, 0.05], ..viewer() }).is_empty());
+    assert!(ask(&PanTiltCamera { pan_rad: [0.5, 1.0], ..viewer() }).is_empty());
+    assert!(ask(&PanTiltCamera { tilt_rad: [-0.3, 0.05], ..viewer() }).is_empty());
 }
 
 #[test]
@@ -169,19 +177,20 @@ fn the_gain_is_that_of_a_real_fix() {
             pose: robot,
             covariance: Matrix3::new(0.04, 0.01, 0.0, 0.01, 0.09, 0.002, 0.0, 0.002, 0.01),
         };
-        let head = Head::default();
+        let head = PanTiltUnit::default();
         let things = [(place, seen(&place), 1.0, 1.0)];
         let found = ranked(&pose, &things, &GazeParams::default())[0];
         let mounting =
-            Mounting::new(pan_tilt(found.pan_rad, found.tilt_rad, Vector3::from(head.camera_m))).unwrap();
+            CameraExtrinsics::new(pan_tilt(found.pan_rad, found.tilt_rad, Vector3::from(head.camera_m)))
+                .unwrap();
         let camera_from_landmark =
             mounting.robot_from_camera.inverse() * robot.to_isometry3().inverse() * place.map_from_landmark();
         let corners = corner_points(&SIZE).map(|c| pixel(&camera_from_landmark, &c, &camera).unwrap());
         let claimed = [Matrix2::identity() * 0.25; 4];
         let seen = landmark_pose(&Corners::new(corners).unwrap(), &claimed, SIZE, &camera).unwrap();
-        let sighting = Sighting { landmark: LandmarkId(1), seen: &seen, place: &place };
+        let sighting = LandmarkObservation { landmark: LandmarkId(1), seen: &seen, place: &place };
         let fix = robot_pose(&[sighting], &mounting, Some(&pose), &LocaliseParams::default()).unwrap();
-        let RobotFix::Fixed(fix) = fix else { panic!("{fix:?}") };
+        let FixResult::Fixed(fix) = fix else { panic!("{fix:?}") };
         let after = pose.covariance.try_inverse().unwrap() + fix.pose.covariance.try_inverse().unwrap();
         let expected = 0.5 * (pose.covariance.determinant() * after.determinant()).ln();
         assert!((found.gain_nats - expected).abs() < 0.05, "{psi}: {} for {expected}", found.gain_nats);
@@ -209,12 +218,24 @@ fn looking_far_aside_costs() {
     let p = GazeParams { criterion: Criterion::Information, ..GazeParams::default() };
     let (left, right) = (poster(-1.2), poster(1.2));
     let targets = [
-        Target { landmark: LandmarkId(0), place: &left, visible: &seen(&left), saliency: 1.0, v_c: 1.0 },
-        Target { landmark: LandmarkId(1), place: &right, visible: &seen(&right), saliency: 1.0, v_c: 1.0 },
+        GazeCandidate {
+            landmark: LandmarkId(0),
+            place: &left,
+            visible: &seen(&left),
+            saliency: 1.0,
+            v_c: 1.0,
+        },
+        GazeCandidate {
+            landmark: LandmarkId(1),
+            place: &right,
+            visible: &seen(&right),
+            saliency: 1.0,
+            v_c: 1.0,
+        },
     ];
     let pose = at(0.0, 2.4, -FRAC_PI_2, SURE);
     for (pan_rad, expected) in [(0.4, 1), (-0.4, 0)] {
-        let head = Head { pan_rad, ..Head::default() };
+        let head = PanTiltUnit { pan_rad, ..PanTiltUnit::default() };
         let found = rank(&pose, &targets, &viewer(), &head, &p).unwrap();
         assert_eq!(found[0].landmark, LandmarkId(expected), "the one it already looks at");
     }
@@ -224,11 +245,11 @@ fn looking_far_aside_costs() {
 fn it_stays_until_another_is_clearly_better() {
     let p = GazeParams { full_margin_m: 10.0, ..GazeParams::default() };
     let things = two([1.0, 1.0]);
-    let mut gaze = Gaze::default();
+    let mut gaze = GazeController::default();
     let mut look = |x: f64| {
         let pose = at(x, 3.2, 0.0, SURE);
         match gaze.choose(0, &ranked(&pose, &things, &p), &pose, &p) {
-            Look::Landmark(choice) => (choice.landmark.0, choice.utility),
+            GazeAction::Landmark(choice) => (choice.landmark.0, choice.utility),
             other => panic!("{other:?}"),
         }
     };
@@ -244,49 +265,56 @@ fn failures_make_it_look_elsewhere_for_a_while() {
     let things = two([1.0, 0.7]);
     let pose = at(1.5, 2.0, 0.0, SURE);
     let ranked = ranked(&pose, &things, &p);
-    let mut gaze = Gaze::default();
-    let chosen = |look: Look| match look {
-        Look::Landmark(choice) => choice.landmark.0,
+    let mut gaze = GazeController::default();
+    let chosen = |look: GazeAction| match look {
+        GazeAction::Landmark(choice) => choice.landmark.0,
         other => panic!("{other:?}"),
     };
     assert_eq!(chosen(gaze.choose(0, &ranked, &pose, &p)), 0);
     for _ in 0..2 {
-        gaze.looked(0, LandmarkId(0), false, &p);
+        gaze.report_outcome(0, LandmarkId(0), false, &p);
     }
-    gaze.looked(0, LandmarkId(0), true, &p);
-    gaze.looked(0, LandmarkId(0), false, &p);
+    gaze.report_outcome(0, LandmarkId(0), true, &p);
+    gaze.report_outcome(0, LandmarkId(0), false, &p);
     assert_eq!(chosen(gaze.choose(1, &ranked, &pose, &p)), 0, "a success starts the count afresh");
     for _ in 0..2 {
-        gaze.looked(1, LandmarkId(0), false, &p);
+        gaze.report_outcome(1, LandmarkId(0), false, &p);
     }
     assert_eq!(chosen(gaze.choose(2, &ranked, &pose, &p)), 1);
     let after = 1 + 10_000_000_001;
-    gaze.looked(after, LandmarkId(1), true, &p);
+    gaze.report_outcome(after, LandmarkId(1), true, &p);
     assert_eq!(chosen(gaze.choose(after, &ranked, &pose, &p)), 0, "1 against 0.7 is more than 1.2 times");
 }
 
 #[test]
 fn with_nothing_in_sight_it_looks_ahead_or_about() {
     let p = GazeParams::default();
-    let mut gaze = Gaze::default();
-    assert_eq!(gaze.choose(0, &[], &at(0.0, 0.0, 0.0, SURE), &p), Look::Ahead);
-    assert_eq!(gaze.choose(0, &[], &at(0.0, 0.0, 0.0, [0.9, 0.9, 0.1]), &p), Look::Sweep);
+    let mut gaze = GazeController::default();
+    assert_eq!(gaze.choose(0, &[], &at(0.0, 0.0, 0.0, SURE), &p), GazeAction::Ahead);
+    assert_eq!(gaze.choose(0, &[], &at(0.0, 0.0, 0.0, [0.9, 0.9, 0.1]), &p), GazeAction::Sweep);
 }
 
 #[test]
 fn bounds_are_held_and_named() {
-    let ask = |head: Head| rank(&at(0.0, 0.0, 0.0, SURE), &[], &viewer(), &head, &GazeParams::default());
-    assert_eq!(ask(Head { rate_radps: 0.0, ..Head::default() }).unwrap_err().field, "head.rate_radps");
+    let ask =
+        |head: PanTiltUnit| rank(&at(0.0, 0.0, 0.0, SURE), &[], &viewer(), &head, &GazeParams::default());
     assert_eq!(
-        ask(Head { camera_m: [0.0, f64::NAN, 1.0], ..Head::default() }).unwrap_err().field,
+        ask(PanTiltUnit { rate_radps: 0.0, ..PanTiltUnit::default() }).unwrap_err().field,
+        "head.rate_radps"
+    );
+    assert_eq!(
+        ask(PanTiltUnit { camera_m: [0.0, f64::NAN, 1.0], ..PanTiltUnit::default() }).unwrap_err().field,
         "head.camera_m"
     );
-    assert_eq!(ask(Head { tilt_rad: 2.0, ..Head::default() }).unwrap_err().field, "head.tilt_rad");
-    let mut gaze = Gaze::default();
+    assert_eq!(
+        ask(PanTiltUnit { tilt_rad: 2.0, ..PanTiltUnit::default() }).unwrap_err().field,
+        "head.tilt_rad"
+    );
+    let mut gaze = GazeController::default();
     let p = GazeParams { failures: 1, ..GazeParams::default() };
     for id in 0..=MAX_DAMPED as u64 {
         gaze.current = Some(LandmarkId(id));
-        gaze.looked(0, LandmarkId(id), false, &p);
+        gaze.report_outcome(0, LandmarkId(id), false, &p);
     }
     assert_eq!(gaze.damped.len(), MAX_DAMPED);
 }

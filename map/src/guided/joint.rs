@@ -5,7 +5,7 @@
 use nalgebra::{SMatrix, SVector};
 
 /// Coordinates of four corners.
-pub(super) const CORNERS: usize = 8;
+const CORNERS: usize = 8;
 /// Common errors: pose (x, y, theta), extrinsics (rotation, translation), intrinsics (focal share, cx, cy).
 pub(super) const COMMON: usize = 12;
 

@@ -1,7 +1,7 @@
 //! Corners of a landmark in an image as it comes, lens included, with their derivatives; the part that the image shows.
 
 use super::joint::{ByCommon, CornerVector};
-use crate::{localise::predict, mounting::Mounting, place::LandmarkPlace, pose2::Pose2};
+use crate::{extrinsics::CameraExtrinsics, localise::predict, place::LandmarkPlace, pose2::Pose2};
 use nalgebra::{Isometry3, Matrix2, Point2, Point3, SMatrix, Vector3};
 use vision::{
     frame::{Distortion, Intrinsics, MAX_RAY_RAD},
@@ -14,7 +14,7 @@ const SAME_PX: f64 = 1e-3;
 /// Extrinsics and intrinsics.
 #[derive(Clone, Copy)]
 pub(super) struct Camera<'a> {
-    pub mounting: &'a Mounting,
+    pub mounting: &'a CameraExtrinsics,
     pub intrinsics: &'a Intrinsics,
 }
 

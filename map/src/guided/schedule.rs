@@ -15,14 +15,18 @@
 //! missing. One landmark that was moved must not carry robots along.
 
 mod params;
+mod report;
+mod agreement;
+
 pub use params::ScheduleParams;
+pub use report::{Decision, FramePlan, FrameReport, GlobalReason, GuidedReport, Trust};
 
 use crate::{
     fuse::FuseParams,
-    localise::{DecidedBy, Fix, RobotFix},
+    guided::schedule::agreement::{Judged, is_uncertain, judge},
+    localise::{Fix, FixResult},
     pose2::{Pose2, Pose2Covariance},
 };
-use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use vision::recognise::LandmarkId;
 
@@ -30,108 +34,6 @@ use vision::recognise::LandmarkId;
 pub const MAX_SUPPORT: usize = 16;
 /// Most cameras of a robot whose searches are counted.
 pub const MAX_CAMERAS: usize = 16;
-
-/// How far a pose is trusted.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Trust {
-    /// There is no pose.
-    NoPose,
-    /// No global observation has agreed with it.
-    Unsupported,
-    /// Global observations have agreed with it lately.
-    Supported,
-    /// The last global observation that agreed is too long ago.
-    Stale,
-    /// The last global observation contradicts it.
-    Contradicted,
-}
-
-/// Why a frame is searched globally.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum GlobalReason {
-    /// There is no pose to guide.
-    NoPose,
-    /// A global observation contradicts the pose.
-    Contradicted,
-    /// The pose is too uncertain.
-    Uncertain,
-    /// Nothing has supported the pose for too many frames or metres.
-    Stale,
-    /// It is time.
-    Interval,
-    /// A landmark that is surely in view was not found.
-    Missed,
-    /// A guided observation contradicts the pose.
-    GuidedContradiction,
-}
-
-/// What to do with a frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct FramePlan {
-    /// Whether to look for expected landmarks. Not while the pose is contradicted.
-    pub guided: bool,
-    /// Whether to search the whole map as well, and why.
-    pub global: Option<GlobalReason>,
-}
-
-/// What guided recognition of a frame found.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct GuidedReport {
-    /// Observations that speak against the pose ([`super::Assignment::contradictions`]).
-    pub contradictions: usize,
-    /// Whether a landmark that is surely in view was not found (as in [`FrameReport::missed`]).
-    pub missed: bool,
-}
-
-impl GuidedReport {
-    /// Whether the frame must be searched globally after all, and why.
-    pub fn global_reason(&self) -> Option<GlobalReason> {
-        if self.contradictions > 0 {
-            Some(GlobalReason::GuidedContradiction)
-        } else if self.missed {
-            Some(GlobalReason::Missed)
-        } else {
-            None
-        }
-    }
-}
-
-/// What became of a frame.
-#[derive(Debug, Clone, Copy)]
-pub struct FrameReport<'a> {
-    /// The camera, as in [`Schedule::plan`].
-    pub camera: u32,
-    /// Motion by odometry since the frame before, in the robot frame then; the identity for the first.
-    pub motion: Pose2,
-    /// The pose at the frame's time without the frame, if there is one.
-    pub prior: Option<&'a Pose2Covariance>,
-    /// Whether the whole map was searched.
-    pub searched: bool,
-    /// The pose by the uniquely recognised landmarks of that search alone, made without any prior.
-    pub global: Option<&'a RobotFix>,
-    /// Landmarks surely in view ([`super::Expected::is_sure`]) that neither way found. Only those that are recognised
-    /// reliably when they are there: not members of look-alike classes, not quarantined ones.
-    pub missed: &'a [LandmarkId],
-}
-
-/// How the global fix of a frame goes to the fuser.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Decision {
-    /// Nothing global was seen, or it says nothing of the pose.
-    Keep,
-    /// The global fix agrees with the pose, or starts one: it goes to the fuser as `FixRole::Independent`.
-    Use,
-    /// The global fix contradicts the pose: it goes to the fuser as `FixRole::Independent`, which leaves it out and counts
-    /// it.
-    Doubt {
-        /// How many global fixes in a row contradict the pose and agree with one another.
-        in_a_row: u32,
-    },
-    /// The global fix replaces the pose (`FixRole::Replacing`).
-    Replace(Box<Fix>),
-}
 
 /// Global fixes that contradict the pose and agree with one another.
 #[derive(Debug, Clone)]
@@ -240,23 +142,23 @@ impl Schedule {
         }
     }
 
-    /// How many landmarks are remembered, in all lists.
+    /// Number of landmarks remembered, in all lists.
     #[cfg(test)]
     pub(super) fn remembered(&self) -> usize {
         self.support.len() + self.contradiction.as_ref().map_or(0, |c| c.landmarks.len() + c.missed.len())
     }
 
-    /// A pose begins with a global fix, or not at all.
+    /// A global fix starts a pose.
     fn without_pose(&mut self, frame: &FrameReport<'_>) -> Decision {
         self.forget();
         self.has_pose = false;
         match frame.global {
-            Some(RobotFix::Fixed(fix)) => {
+            Some(FixResult::Fixed(fix)) => {
                 self.has_pose = true;
                 self.supported(&fix.landmarks);
                 Decision::Use
             }
-            Some(RobotFix::Ambiguous(_) | RobotFix::Refused(_)) | None => Decision::Keep,
+            Some(FixResult::Ambiguous(_) | FixResult::Refused(_)) | None => Decision::Keep,
         }
     }
 
@@ -352,44 +254,10 @@ impl Schedule {
     }
 }
 
-/// What a global fix says of the pose.
-enum Judged<'a> {
-    Agrees(&'a Fix),
-    /// All of its solutions.
-    Contradicts(&'a [Fix]),
-    Silent,
-}
-
-fn judge<'a>(global: &'a RobotFix, prior: &Pose2Covariance, p: &ScheduleParams) -> Judged<'a> {
-    let distance2 = |fix: &Fix| prior.distance2(&fix.pose).unwrap_or(f64::INFINITY);
-    let fixes = match global {
-        RobotFix::Fixed(fix) => std::slice::from_ref(&**fix),
-        RobotFix::Ambiguous(fixes) => fixes.as_slice(),
-        RobotFix::Refused(_) => &[],
-    };
-    let nearest = fixes.iter().map(distance2).fold(f64::INFINITY, f64::min);
-    match fixes {
-        [] => Judged::Silent,
-        // A fix that a prior decided was drawn to the pose by it.
-        [fix] if nearest <= p.support_chi2 && fix.decided_by != DecidedBy::Prior => Judged::Agrees(fix),
-        _ if nearest > p.contradict_chi2 => Judged::Contradicts(fixes),
-        _ => Judged::Silent,
-    }
-}
-
 fn remember(known: &mut Vec<LandmarkId>, more: &[LandmarkId]) {
     for id in more {
         if known.len() < MAX_SUPPORT && !known.contains(id) {
             known.push(*id);
         }
     }
-}
-
-fn is_uncertain(prior: &Pose2Covariance, p: &ScheduleParams) -> bool {
-    let c = &prior.covariance;
-    let (xx, xy, yy, variance_rad2) = (c[(0, 0)], c[(0, 1)], c[(1, 1)], c[(2, 2)]);
-    // Largest eigenvalue of the position's block.
-    let variance_m2 = 0.5 * (xx + yy) + (0.5 * (xx - yy)).hypot(xy);
-    // NaN is uncertain.
-    !(variance_m2 <= p.max_sigma_m.powi(2) && variance_rad2 <= p.max_sigma_rad.powi(2))
 }

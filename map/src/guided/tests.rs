@@ -7,7 +7,7 @@ mod schedule;
 
 use super::*;
 use crate::{
-    mounting::{Mounting, pan_tilt},
+    extrinsics::{CameraExtrinsics, pan_tilt},
     place::{LandmarkPlace, PlaceSigmas},
     pose2::{Pose2, Pose2Covariance},
 };
@@ -36,8 +36,8 @@ fn camera() -> Intrinsics {
 }
 
 /// Turned left by 60 degrees, towards the wall.
-fn mounting() -> Mounting {
-    Mounting::new(pan_tilt(60.0_f64.to_radians(), 0.0, Vector3::new(0.1, 0.02, 1.2))).unwrap()
+fn mounting() -> CameraExtrinsics {
+    CameraExtrinsics::new(pan_tilt(60.0_f64.to_radians(), 0.0, Vector3::new(0.1, 0.02, 1.2))).unwrap()
 }
 
 fn on_wall(x_m: f64, z_m: f64, width_m: f64, height_m: f64) -> LandmarkPlace {
@@ -82,17 +82,20 @@ fn drawn_place(place: &LandmarkPlace, random: &mut Random) -> LandmarkPlace {
 }
 
 /// The extrinsics as they really are.
-fn drawn_mounting(mounting: &Mounting, random: &mut Random) -> Mounting {
+fn drawn_mounting(mounting: &CameraExtrinsics, random: &mut Random) -> CameraExtrinsics {
     let e = draw6(&mounting.covariance, random);
     let (turn, shift) = (e.fixed_rows::<3>(0).into(), e.fixed_rows::<3>(3).into());
-    Mounting { robot_from_camera: perturbed(&mounting.robot_from_camera, &turn, &shift), ..mounting.clone() }
+    CameraExtrinsics {
+        robot_from_camera: perturbed(&mounting.robot_from_camera, &turn, &shift),
+        ..mounting.clone()
+    }
 }
 
 /// Corners in an image by the camera model alone; `None` when one is behind the camera.
 fn project(
     pose: &Pose2,
     place: &LandmarkPlace,
-    mounting: &Mounting,
+    mounting: &CameraExtrinsics,
     camera: &Intrinsics,
 ) -> Option<[Point2<f64>; 4]> {
     let map_from_camera = pose.to_isometry3() * mounting.robot_from_camera;
@@ -116,7 +119,7 @@ fn is_inside(px: &Point2<f64>) -> bool {
 fn seen(
     pose: &Pose2,
     places: &BTreeMap<LandmarkId, LandmarkPlace>,
-    mounting: &Mounting,
+    mounting: &CameraExtrinsics,
     random: &mut Random,
 ) -> Vec<(LandmarkId, Corners)> {
     let mut made = Vec::new();

@@ -1,17 +1,17 @@
-//! A map's walls, made ready for scans: which wall is nearest to a point, by buckets of the floor. In: segments. Out: the
-//! index, made once for each version of the walls.
+//! An index of a map's walls: the wall nearest to a point, by buckets of the floor. In: segments. Out: the index,
+//! made once for each version of the walls.
 
 use crate::{segments::LaserSegment, walls::local};
 use nalgebra::{Matrix2, Point2, Vector2};
 
-/// Most walls of a map that is localised in; later ones are left out.
+/// Most walls of an index; later ones are left out.
 pub const MAX_WALLS: usize = 1 << 17;
 /// Most buckets of the index.
 const MAX_BUCKETS: usize = 1 << 20;
-/// Most entries of the index, a wall counted once in every bucket it passes.
+/// Most entries of the index; a wall has one in every bucket it passes.
 const MAX_ENTRIES: usize = 1 << 23;
 
-/// A map's walls, made ready for localisation.
+/// The walls of a map, indexed for localisation.
 #[derive(Debug, Clone)]
 pub struct WallIndex {
     pub(super) walls: Vec<Ready>,
@@ -23,7 +23,7 @@ pub struct WallIndex {
     entries: Vec<u32>,
 }
 
-/// A wall with what every point asks of it.
+/// A wall with the quantities that every point needs.
 #[derive(Debug, Clone)]
 pub(super) struct Ready {
     pub(super) a: Point2<f64>,
@@ -36,7 +36,7 @@ pub(super) struct Ready {
 }
 
 impl WallIndex {
-    /// Of the walls of a map.
+    /// Indexes the walls of a map.
     pub fn new<'a>(walls: impl IntoIterator<Item = &'a LaserSegment>) -> Self {
         let ready = |s: &LaserSegment| {
             let middle = nalgebra::center(&s.a, &s.b);
@@ -75,7 +75,7 @@ impl WallIndex {
         index
     }
 
-    /// Lists the walls that pass within a bucket of each bucket.
+    /// Lists the walls that pass within a bucket's size of each bucket.
     fn fill(&mut self) {
         let mut pairs: Vec<(u32, u32)> = Vec::new();
         for (i, wall) in self.walls.iter().enumerate() {
@@ -107,12 +107,13 @@ impl WallIndex {
         (f(p.x - self.low.x), f(p.y - self.low.y))
     }
 
-    /// Whether there is any wall.
+    /// Whether there are no walls.
     pub fn is_empty(&self) -> bool {
         self.walls.is_empty()
     }
 
-    /// The wall nearest to a point within the radius whose line is turned less than `cos_turn` says from the surface.
+    /// The wall nearest to a point within the radius whose direction differs from the surface by less than `cos_turn`
+    /// says.
     pub(super) fn nearest(
         &self,
         p: &Point2<f64>,
@@ -145,7 +146,7 @@ impl WallIndex {
     }
 }
 
-/// A number for a place of a wall (FNV-1a of its ends).
+/// A hash of a wall's ends (FNV-1a): its name.
 fn name(wall: &LaserSegment) -> u64 {
     let ends = [wall.a.x, wall.a.y, wall.b.x, wall.b.y];
     let bytes = ends.into_iter().flat_map(|v| v.to_bits().to_le_bytes());

@@ -1,5 +1,15 @@
-use super::*;
-use crate::slam::world::{Walls, rectangle, ring, scan, segments};
+use crate::{
+    laser::Scan,
+    laser_fix::{
+        fix::{LaserFix, LaserRefusal},
+        index::WallIndex,
+        params::LaserFixParams,
+        search::laser_fix,
+    },
+    pose2::{Pose2, Pose2Covariance},
+    slam::world::{Walls, rectangle, ring, scan, segments},
+};
+use nalgebra::{Matrix3, Vector2, Vector3};
 use vision::learn::random::Random;
 
 fn prior(at: &Pose2, sigma_m: f64, sigma_rad: f64, random: &mut Random) -> Pose2Covariance {
@@ -136,10 +146,10 @@ fn fused_along_a_corridor_the_doubt_stays_and_across_it_goes() {
     let believed =
         Pose2Covariance { pose: Pose2::new(2.6, 0.1, 0.12), covariance: Matrix3::from_diagonal(&v) };
     let mut fuser = Fuser::new(FuseParams::default());
-    fuser.odometry(0, Pose2::default()).unwrap();
+    fuser.apply_odometry(0, Pose2::default()).unwrap();
     fuser.start(&believed).unwrap();
     let found = fix(&walls, &at, &believed, &mut random).unwrap();
-    assert!(matches!(fuser.fix(0, &found.fix()).unwrap(), FixOutcome::Applied { .. }));
+    assert!(matches!(fuser.apply_fix(0, &found.fix()).unwrap(), FixOutcome::Applied { .. }));
     let fused = fuser.pose().unwrap().pose;
     assert!((fused.pose.y_m - 0.2).abs() < 0.02 && (fused.pose.theta_rad - 0.1).abs() < 0.01, "{fused:?}");
     assert!((fused.pose.x_m - 2.6).abs() < 0.02, "{fused:?}");

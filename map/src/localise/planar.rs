@@ -1,16 +1,20 @@
-//! The corners of all sightings as a function of the robot's pose on the floor, and the descent to the nearest minimum
-//! (method 13.6 [M] (b)). Lasting errors (places, mounting, intrinsics) enter the weights, so nothing is trusted beyond its
-//! word.
+//! The least-squares problem of one frame: corners of all observations as a function of the robot's floor pose, and
+//! the descent to the nearest minimum (method 13.6 [M] (b)). Nuisance parameters (places, extrinsics, intrinsics)
+//! enter the weights.
 
-use super::{NuisanceKey, Sighting, predict::corners};
-use crate::{mounting::Mounting, pose2::Pose2};
-use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Matrix3x6, Matrix6, Point2, SMatrix, Vector3};
+use crate::{
+    extrinsics::CameraExtrinsics,
+    localise::{
+        derivatives::point_by_pose,
+        fix::{LandmarkObservation, NuisanceKey},
+        predict::corners,
+    },
+    pose2::Pose2,
+};
+use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Matrix6, Point2, Vector2, Vector3};
 use vision::{
     frame::Intrinsics,
-    localise::{
-        pose::LandmarkSize,
-        reproject::{corner_points, project},
-    },
+    localise::reproject::{corner_points, project},
 };
 
 /// Most steps of one descent.
@@ -18,53 +22,53 @@ pub(super) const MAX_STEPS: usize = 40;
 /// A step below this (metres and radians) ends it.
 const STEP_TOLERANCE: f64 = 1e-10;
 
-/// Residuals and their change with the pose; two rows a corner, eight a sighting.
-pub(super) struct Look {
-    /// Seen minus predicted, pixels.
+/// Residuals and their derivative by the pose; two rows for each corner, eight for each observation.
+pub(super) struct PoseLinearisation {
+    /// Measured minus predicted, px.
     pub residual: DVector<f64>,
     /// By (x, y, theta).
     pub by_pose: DMatrix<f64>,
 }
 
-impl Look {
+impl PoseLinearisation {
     /// Weighted squared residual.
     pub(super) fn chi2(&self, weight: &DMatrix<f64>) -> f64 {
         self.residual.dot(&(weight * &self.residual))
     }
 }
 
-/// Where a descent ended.
+/// Result of a descent.
 pub(super) struct Descended {
     pub pose: Pose2,
-    /// There.
-    pub look: Look,
+    /// Residuals at `pose`.
+    pub look: PoseLinearisation,
     pub chi2: f64,
 }
 
 /// Residuals and all derivatives at one pose.
-pub(super) struct Linear {
-    /// Seen minus predicted, pixels.
+pub(super) struct FullLinearisation {
+    /// Measured minus predicted, px.
     pub residual: DVector<f64>,
     /// By (x, y, theta).
     pub by_pose: DMatrix<f64>,
-    /// By each nuisance, in the order of [`Planar::nuisances`]: 6 columns each.
+    /// By each nuisance parameter, in the order of [`Planar::nuisances`]: 6 columns each.
     pub by_nuisance: DMatrix<f64>,
 }
 
 /// The least-squares problem of one frame.
 pub(super) struct Planar<'a> {
-    sightings: &'a [Sighting<'a>],
-    mounting: &'a Mounting,
+    sightings: &'a [LandmarkObservation<'a>],
+    mounting: &'a CameraExtrinsics,
     camera_from_robot: Isometry3<f64>,
-    /// Standard deviations of the camera's errors, where they are stated: all sightings are by one camera.
+    /// Standard deviations of the camera's intrinsics, where they are stated; all observations are by one camera.
     camera: Option<Vector3<f64>>,
     /// Corners of each landmark, map frame.
     corners_m: Vec<[Vector3<f64>; 4]>,
 }
 
 impl<'a> Planar<'a> {
-    pub(super) fn new(sightings: &'a [Sighting<'a>], mounting: &'a Mounting) -> Self {
-        let corners = |s: &Sighting<'_>| {
+    pub(super) fn new(sightings: &'a [LandmarkObservation<'a>], mounting: &'a CameraExtrinsics) -> Self {
+        let corners = |s: &LandmarkObservation<'_>| {
             let map_from_landmark = s.place.map_from_landmark();
             let in_map =
                 |p: Vector3<f64>| map_from_landmark.rotation * p + map_from_landmark.translation.vector;
@@ -77,7 +81,7 @@ impl<'a> Planar<'a> {
         Self { sightings, mounting, camera_from_robot, camera, corners_m }
     }
 
-    /// The same with a camera that is taken as exact.
+    /// The same problem with exact intrinsics.
     pub(super) fn exact_camera(self) -> Self {
         Self { camera: None, ..self }
     }
@@ -87,7 +91,7 @@ impl<'a> Planar<'a> {
         8 * self.sightings.len() - 3
     }
 
-    /// Whether the camera stands before every landmark's wall, not behind it.
+    /// Whether the camera is in front of every landmark's wall.
     pub(super) fn sees_fronts(&self, pose: &Pose2) -> bool {
         let camera = pose.to_isometry3() * self.mounting.robot_from_camera.translation.vector;
         let position = camera + pose.to_isometry3().translation.vector;
@@ -97,12 +101,13 @@ impl<'a> Planar<'a> {
         })
     }
 
-    /// The point the robot is turned about: the landmarks' centre on the floor.
+    /// Centre of the landmarks on the floor; the robot is turned about it.
     pub(super) fn pivot(&self) -> Point2<f64> {
-        super::posterior::centre(self.sightings.iter().map(|s| s.place))
+        centre(self.sightings.iter().map(|s| s.place))
     }
 
-    /// Keys and covariances of the lasting errors: each landmark, the mounting, then the camera where it is not exact.
+    /// Keys and covariances of the nuisance parameters: each landmark, the extrinsics, then the intrinsics unless
+    /// exact.
     pub(super) fn nuisances(&self) -> Vec<(NuisanceKey, Matrix6<f64>)> {
         let places = self.sightings.iter().map(|s| (NuisanceKey::Landmark(s.landmark), s.place.covariance));
         let camera = self.camera.map(|sigmas| {
@@ -110,7 +115,7 @@ impl<'a> Planar<'a> {
             covariance.fixed_view_mut::<3, 3>(0, 0).set_diagonal(&sigmas.component_mul(&sigmas));
             (NuisanceKey::Camera, covariance)
         });
-        places.chain([(NuisanceKey::Mounting, self.mounting.covariance)]).chain(camera).collect()
+        places.chain([(NuisanceKey::Extrinsics, self.mounting.covariance)]).chain(camera).collect()
     }
 
     /// `camera_from_landmark` of sighting `i` for a robot pose.
@@ -132,10 +137,10 @@ impl<'a> Planar<'a> {
         (Pose2::new(t.x, t.y, r[(1, 0)].atan2(r[(0, 0)])), map_from_robot)
     }
 
-    /// Residuals and their change with the pose; `None` when a corner is behind the camera.
-    pub(super) fn look(&self, pose: &Pose2) -> Option<Look> {
+    /// Residuals and their derivative by the pose; `None` when a corner is behind the camera.
+    pub(super) fn pose_linearisation(&self, pose: &Pose2) -> Option<PoseLinearisation> {
         let rows = 8 * self.sightings.len();
-        let mut made = Look { residual: DVector::zeros(rows), by_pose: DMatrix::zeros(rows, 3) };
+        let mut made = PoseLinearisation { residual: DVector::zeros(rows), by_pose: DMatrix::zeros(rows, 3) };
         let map_from_robot = pose.to_isometry3();
         let camera_from_map = self.camera_from_robot * map_from_robot.inverse();
         let turn = camera_from_map.rotation.to_rotation_matrix().into_inner();
@@ -154,9 +159,9 @@ impl<'a> Planar<'a> {
     }
 
     /// Residuals and all derivatives; `None` when a corner is behind the camera.
-    pub(super) fn linearise(&self, pose: &Pose2) -> Option<Linear> {
+    pub(super) fn linearise(&self, pose: &Pose2) -> Option<FullLinearisation> {
         let n = self.sightings.len();
-        let Look { residual, by_pose } = self.look(pose)?;
+        let PoseLinearisation { residual, by_pose } = self.pose_linearisation(pose)?;
         let blocks = n + 1 + usize::from(self.camera.is_some());
         let mut by_nuisance = DMatrix::zeros(8 * n, 6 * blocks);
         for (i, sighting) in self.sightings.iter().enumerate() {
@@ -170,11 +175,11 @@ impl<'a> Planar<'a> {
                 }
             }
         }
-        Some(Linear { residual, by_pose, by_nuisance })
+        Some(FullLinearisation { residual, by_pose, by_nuisance })
     }
 
-    /// Inverse covariance of the residual: corners plus lasting errors.
-    pub(super) fn weight(&self, at: &Linear) -> Option<DMatrix<f64>> {
+    /// Inverse covariance of the residual: corners plus nuisance parameters.
+    pub(super) fn weight(&self, at: &FullLinearisation) -> Option<DMatrix<f64>> {
         let n = self.sightings.len();
         let mut s = self.corner_covariance();
         for (k, (_, covariance)) in self.nuisances().iter().enumerate() {
@@ -206,7 +211,7 @@ impl<'a> Planar<'a> {
         steps: usize,
     ) -> Option<Descended> {
         let at = |pose: Pose2| {
-            let look = self.look(&pose)?;
+            let look = self.pose_linearisation(&pose)?;
             let chi2 = look.chi2(weight);
             chi2.is_finite().then_some(Descended { pose, look, chi2 })
         };
@@ -236,33 +241,12 @@ impl<'a> Planar<'a> {
     }
 }
 
-/// Camera coordinates of a map point by (x, y, theta) of the robot; `from_robot` = point - robot, map axes.
-pub(super) fn point_by_pose(camera_from_map: &Matrix3<f64>, from_robot: &Vector3<f64>) -> Matrix3<f64> {
-    let turn = Vector3::z().cross(from_robot);
-    -camera_from_map * Matrix3::from_columns(&[Vector3::x(), Vector3::y(), turn])
-}
-
-/// Map coordinates of a landmark's corner by (x, y, theta, z, width, height).
-pub(super) fn point_by_place(
-    arm: &Vector3<f64>,
-    map_from_landmark: &Matrix3<f64>,
-    point: &Vector3<f64>,
-    size: &LandmarkSize,
-) -> Matrix3x6<f64> {
-    let wider = map_from_landmark * Vector3::new(0.0, point.y / size.width_m, 0.0);
-    let higher = map_from_landmark * Vector3::new(0.0, 0.0, point.z / size.height_m);
-    let turn = Vector3::z().cross(arm);
-    Matrix3x6::from_columns(&[Vector3::x(), Vector3::y(), turn, Vector3::z(), wider, higher])
-}
-
-/// Camera coordinates of a robot point by the mounting's (rotation, translation); `from_camera` = point - camera,
-/// robot axes.
-pub(super) fn point_by_mounting(
-    camera_from_robot: &Matrix3<f64>,
-    from_camera: &Vector3<f64>,
-) -> SMatrix<f64, 3, 6> {
-    let mut j = SMatrix::<f64, 3, 6>::zeros();
-    j.fixed_columns_mut::<3>(0).copy_from(&(camera_from_robot * from_camera.cross_matrix()));
-    j.fixed_columns_mut::<3>(3).copy_from(&-camera_from_robot);
-    j
+/// Centre of the landmarks on the floor.
+pub(super) fn centre<'a>(points: impl Iterator<Item = &'a crate::place::LandmarkPlace>) -> Point2<f64> {
+    let (mut sum, mut n) = (Vector2::zeros(), 0.0);
+    for p in points {
+        sum += Vector2::new(p.x_m, p.y_m);
+        n += 1.0;
+    }
+    Point2::from(sum / f64::max(n, 1.0))
 }

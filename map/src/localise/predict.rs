@@ -1,7 +1,11 @@
-//! The corners of one landmark as an upright robot would see them, and their derivatives: what a look would measure.
+//! Predicted corners of one landmark for an upright robot, with their derivatives.
 
-use super::planar::{point_by_mounting, point_by_place, point_by_pose};
-use crate::{mounting::Mounting, place::LandmarkPlace, pose2::Pose2};
+use crate::{
+    extrinsics::CameraExtrinsics,
+    localise::derivatives::{point_by_mounting, point_by_place, point_by_pose},
+    place::LandmarkPlace,
+    pose2::Pose2,
+};
 use nalgebra::SMatrix;
 use vision::{
     frame::Intrinsics,
@@ -14,7 +18,7 @@ pub(crate) struct Predicted {
     pub pose: SMatrix<f64, 8, 3>,
     /// By (x, y, theta, z, width, height) of the landmark.
     pub place: SMatrix<f64, 8, 6>,
-    /// By (rotation, translation) of the mounting.
+    /// By (rotation, translation) of the extrinsics.
     pub mounting: SMatrix<f64, 8, 6>,
 }
 
@@ -22,7 +26,7 @@ pub(crate) struct Predicted {
 pub(crate) fn corners(
     pose: &Pose2,
     place: &LandmarkPlace,
-    mounting: &Mounting,
+    mounting: &CameraExtrinsics,
     camera: &Intrinsics,
 ) -> Option<Predicted> {
     let map_from_robot = pose.to_isometry3();

@@ -1,18 +1,19 @@
-//! All solutions of one frame, and which of them is left (method 13.4, 13.6).
+//! All solutions of one frame, and which of them remain (method 13.4, 13.6).
 
-use super::{
-    DecidedBy, Fix, FixRefusal, LocaliseParams, Modality, Nuisance, RobotFix, Sighting,
-    planar::{MAX_STEPS, Planar},
-    posterior::{Moments, moments, turned},
-};
 use crate::{
+    extrinsics::CameraExtrinsics,
     gate::{Z_95, chi2_quantile},
-    mounting::Mounting,
+    localise::{
+        fix::{AmbiguityResolvedBy, Fix, FixRefusal, FixResult, FixSource, LandmarkObservation, Nuisance},
+        params::LocaliseParams,
+        planar::{MAX_STEPS, Planar},
+        posterior::{Moments, moments, turned},
+    },
     pose2::{Pose2, Pose2Covariance, wrap_rad},
 };
 use nalgebra::{DMatrix, Isometry3, Matrix3, Matrix3x6, Rotation3, UnitQuaternion, Vector3};
 
-/// Two minima nearer than this (metres and radians) are one, and a descent that comes so near one ends in it.
+/// Two minima nearer than this (metres and radians) are one; a descent that comes so near to one stops.
 const SAME_POSE: f64 = 1e-3;
 /// Points on the way from one minimum to another.
 const PATH_POINTS: usize = 24;
@@ -22,23 +23,23 @@ struct Minimum {
     pose: Pose2,
     weight: DMatrix<f64>,
     chi2: f64,
-    /// Turns, down and up, at which another minimum's basin begins.
+    /// Turns, negative and positive, at which the basin of another minimum begins.
     limit_rad: (f64, f64),
 }
 
 pub(super) fn solve(
-    sightings: &[Sighting<'_>],
-    mounting: &Mounting,
+    sightings: &[LandmarkObservation<'_>],
+    mounting: &CameraExtrinsics,
     prior: Option<&Pose2Covariance>,
     p: &LocaliseParams,
-) -> RobotFix {
+) -> FixResult {
     let problem = Planar::new(sightings, mounting);
     let mut found = minima(&problem, sightings);
-    let Some(best) = found.first() else { return RobotFix::Refused(FixRefusal::Degenerate) };
+    let Some(best) = found.first() else { return FixResult::Refused(FixRefusal::Degenerate) };
     let limit = p.max_reduced_chi2 * problem.dof() as f64;
     if best.chi2 > limit {
         let chi2 = best.chi2;
-        return RobotFix::Refused(match sightings.len() {
+        return FixResult::Refused(match sightings.len() {
             1 => FixRefusal::Room { chi2, limit },
             _ => FixRefusal::Disagree { chi2, limit },
         });
@@ -48,20 +49,20 @@ pub(super) fn solve(
     let lowest = best.chi2;
     found.retain(|m| m.chi2 - lowest < p.ambiguous_chi2 * scale);
     merge(&problem, &mut found, p.merge_chi2 * scale);
-    let decided_by = if several { DecidedBy::Image } else { DecidedBy::Single };
+    let decided_by = if several { AmbiguityResolvedBy::Image } else { AmbiguityResolvedBy::Single };
     let mut fixes: Vec<Fix> =
         found.iter().filter_map(|m| fix(&problem, sightings, m, scale, decided_by)).collect();
     match (prior, fixes.len()) {
-        (_, 0) => RobotFix::Refused(FixRefusal::Degenerate),
-        (None, 1) => RobotFix::Fixed(Box::new(fixes.swap_remove(0))),
-        (None, _) => RobotFix::Ambiguous(fixes),
+        (_, 0) => FixResult::Refused(FixRefusal::Degenerate),
+        (None, 1) => FixResult::Fixed(Box::new(fixes.swap_remove(0))),
+        (None, _) => FixResult::Ambiguous(fixes),
         (Some(prior), _) => by_prior(fixes, prior, scale, p),
     }
 }
 
-/// Every minimum reachable from the solutions of each sighting and from their mirror images, by rising chi2. Only
-/// those from which every landmark shows its front.
-fn minima(problem: &Planar<'_>, sightings: &[Sighting<'_>]) -> Vec<Minimum> {
+/// Every minimum reachable from the solutions of each observation and their mirror images, by rising chi2. Minima
+/// from which a landmark would show its back are left out.
+fn minima(problem: &Planar<'_>, sightings: &[LandmarkObservation<'_>]) -> Vec<Minimum> {
     let mut found: Vec<Minimum> = Vec::new();
     for (i, sighting) in sightings.iter().enumerate() {
         let solutions = [Some(&sighting.seen.best), sighting.seen.second.as_ref()];
@@ -70,7 +71,7 @@ fn minima(problem: &Planar<'_>, sightings: &[Sighting<'_>]) -> Vec<Minimum> {
             add(problem, &mut found, start);
         }
     }
-    // The other side of each minimum found, one landmark at a time.
+    // Mirror images of each minimum, one landmark at a time.
     let seeds: Vec<Pose2> = found.iter().map(|m| m.pose).collect();
     for pose in seeds {
         for i in 0..sightings.len() {
@@ -96,7 +97,7 @@ fn add(problem: &Planar<'_>, found: &mut Vec<Minimum>, start: Pose2) {
         }
     }
     let Some(weight) = weight_at(&pose) else { return };
-    let Some(look) = problem.look(&pose) else { return };
+    let Some(look) = problem.pose_linearisation(&pose) else { return };
     let chi2 = look.chi2(&weight);
     if chi2.is_finite() && problem.sees_fronts(&pose) {
         found.push(Minimum { pose, weight, chi2, limit_rad: (f64::NEG_INFINITY, f64::INFINITY) });
@@ -113,7 +114,7 @@ fn mirrored(camera_from_landmark: &Isometry3<f64>) -> Isometry3<f64> {
     Isometry3::from_parts(camera_from_landmark.translation, rotation)
 }
 
-/// Drops minima that only a low barrier parts from a better one, and sets the borders between those that stay.
+/// Drops minima that a low barrier separates from a better one; sets the borders between the others.
 fn merge(problem: &Planar<'_>, found: &mut Vec<Minimum>, barrier: f64) {
     let mut kept: Vec<Minimum> = Vec::new();
     for mut minimum in found.drain(..) {
@@ -143,7 +144,7 @@ fn narrow(limit_rad: &mut (f64, f64), border_rad: f64) {
     }
 }
 
-/// The highest point on the way from `from` to the worse minimum `to`: its turn, and its rise above `to`.
+/// The highest point on the path from `from` to the worse minimum `to`: its turn, and its rise above `to`.
 fn pass(problem: &Planar<'_>, from: &Minimum, to: &Minimum) -> (f64, f64) {
     let whole = wrap_rad(to.pose.theta_rad - from.pose.theta_rad);
     let step = whole / PATH_POINTS as f64;
@@ -163,16 +164,16 @@ fn pass(problem: &Planar<'_>, from: &Minimum, to: &Minimum) -> (f64, f64) {
     top
 }
 
-/// The prior decides between what is left, or rules it out.
-fn by_prior(mut fixes: Vec<Fix>, prior: &Pose2Covariance, scale: f64, p: &LocaliseParams) -> RobotFix {
+/// Chooses among the remaining solutions by the prior, or refuses all of them.
+fn by_prior(mut fixes: Vec<Fix>, prior: &Pose2Covariance, scale: f64, p: &LocaliseParams) -> FixResult {
     let distances: Vec<f64> =
         fixes.iter().map(|f| f.pose.distance2(prior).unwrap_or(f64::INFINITY)).collect();
     let nearest = distances.iter().copied().fold(f64::INFINITY, f64::min);
     if nearest > p.prior_gate {
-        return RobotFix::Refused(FixRefusal::Prior { distance2: nearest, limit: p.prior_gate });
+        return FixResult::Refused(FixRefusal::Prior { distance2: nearest, limit: p.prior_gate });
     }
     if fixes.len() == 1 {
-        return RobotFix::Fixed(Box::new(fixes.swap_remove(0)));
+        return FixResult::Fixed(Box::new(fixes.swap_remove(0)));
     }
     let score = |i: usize| fixes[i].chi2 / scale + distances[i];
     let chosen = (0..fixes.len())
@@ -181,20 +182,20 @@ fn by_prior(mut fixes: Vec<Fix>, prior: &Pose2Covariance, scale: f64, p: &Locali
         .unwrap_or(0);
     let clear = (0..fixes.len()).all(|i| i == chosen || score(i) - score(chosen) >= p.ambiguous_chi2);
     if !clear {
-        return RobotFix::Ambiguous(fixes);
+        return FixResult::Ambiguous(fixes);
     }
     let mut fix = fixes.swap_remove(chosen);
-    fix.decided_by = DecidedBy::Prior;
-    RobotFix::Fixed(Box::new(fix))
+    fix.decided_by = AmbiguityResolvedBy::Prior;
+    FixResult::Fixed(Box::new(fix))
 }
 
-/// Moments around one minimum, and their split into what is new in every frame and what lasts.
+/// Moments around one minimum, split into independent noise and shared nuisance parameters.
 fn fix(
     problem: &Planar<'_>,
-    sightings: &[Sighting<'_>],
+    sightings: &[LandmarkObservation<'_>],
     minimum: &Minimum,
     scale: f64,
-    decided_by: DecidedBy,
+    decided_by: AmbiguityResolvedBy,
 ) -> Option<Fix> {
     let weight = &minimum.weight / scale;
     let sigma_rad = local_covariance(problem, &minimum.pose, &weight)?[(2, 2)].sqrt();
@@ -214,7 +215,7 @@ fn fix(
         let jacobian = Matrix3x6::from_iterator(j.iter().copied());
         let part = jacobian * covariance * jacobian.transpose();
         total += part * scale;
-        // What a bad fit adds is not a property of the place.
+        // The inflation of a bad fit is not an error of the place.
         noise += part * (scale - 1.0);
         nuisances.push(Nuisance { key, jacobian, covariance });
     }
@@ -222,7 +223,7 @@ fn fix(
     let pose = Pose2Covariance::new(mean, total).ok()?;
     let landmarks = sightings.iter().map(|s| s.landmark).collect();
     Some(Fix {
-        modality: Modality::Landmarks,
+        modality: FixSource::Landmarks,
         pose,
         noise,
         nuisances,
@@ -235,7 +236,7 @@ fn fix(
 
 /// `(J^T W J)^-1` over (x, y, theta).
 fn local_covariance(problem: &Planar<'_>, pose: &Pose2, weight: &DMatrix<f64>) -> Option<Matrix3<f64>> {
-    let at = problem.look(pose)?;
+    let at = problem.pose_linearisation(pose)?;
     let h = at.by_pose.transpose() * weight * &at.by_pose;
     Some(Matrix3::from_iterator(h.iter().copied()).cholesky()?.inverse())
 }

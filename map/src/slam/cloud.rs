@@ -1,27 +1,27 @@
-//! A scan as points of surfaces, robot frame: thinned to even spacing, with the direction of the surface where the
-//! beams next to it tell. In: a scan. Out: what matching works on. It knows no map.
+//! Surface points of a scan, robot frame: thinned to even spacing, with the surface's direction where neighbouring
+//! beams determine it. In: a scan. Out: the points that scan matching uses.
 
 use crate::laser::Scan;
 use nalgebra::{Matrix2, Point2, Vector2};
 use serde::{Deserialize, Serialize};
 
-/// Knobs of taking points from a scan.
+/// The surface points of one scan.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct CloudParams {
-    /// Returns farther than this are left out: their points lie too far apart.
+    /// Longer returns are left out: their points are too far apart, metres.
     pub max_range_m: f64,
-    /// Points nearer than this to the one before are left out, so that near walls do not outvote far ones.
+    /// Points nearer than this to the one before are left out, so that near walls do not outweigh far ones, metres.
     pub spacing_m: f64,
-    /// Two neighbouring returns are one surface if their ranges differ by less than this...
+    /// Neighbouring returns are one surface if their ranges differ by less than this, metres,
     pub jump_m: f64,
-    /// ...or this many beam steps times the range: a wall at a grazing angle.
+    /// or by less than this many times the beam step times the range: a wall at a grazing angle.
     pub jump_steps: f64,
-    /// Beams on each side that tell the direction of the surface...
+    /// Least beams on each side that determine the surface's direction,
     pub reach: usize,
-    /// ...and more, up to this far: near walls have many beams and noise that would turn few of them.
+    /// and all beams up to this distance, metres: near walls have many.
     pub reach_m: f64,
-    /// Neighbours farther off their line than this are no flat surface.
+    /// A surface with a neighbour farther off its line is not flat, metres.
     pub flat_m: f64,
 }
 
@@ -39,16 +39,16 @@ impl Default for CloudParams {
     }
 }
 
-/// One point of a surface.
+/// A point of a surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SurfacePoint {
-    /// Where, robot frame.
+    /// Position, robot frame, metres.
     pub at: Point2<f64>,
     /// Unit normal towards the laser, where the surface is flat.
     pub normal: Option<Vector2<f64>>,
     /// Variance of the normal's direction, rad^2; 0 without a normal.
     pub turn_variance: f64,
-    /// The surface goes on to the point before this one in the list.
+    /// Whether the surface continues to the previous point in the list.
     pub joined: bool,
 }
 
@@ -57,13 +57,13 @@ pub struct SurfacePoint {
 pub struct Cloud {
     /// In the order of the beams.
     pub points: Vec<SurfacePoint>,
-    /// Where the laser stood, robot frame.
+    /// Position of the laser, robot frame, metres.
     pub origin: Point2<f64>,
-    /// Bearings of the first and the last beam in the laser's frame, with the laser's heading added: robot frame.
+    /// Bearings of the first and the last beam, robot frame, radians.
     pub fan_rad: [f64; 2],
 }
 
-/// Takes the points of a scan.
+/// Extracts the surface points of a scan.
 pub fn cloud(scan: &Scan, p: &CloudParams) -> Cloud {
     let n = scan.ranges_m().len();
     let range = |i: usize| scan.range_m(i).filter(|r| *r <= p.max_range_m);
@@ -126,7 +126,7 @@ fn normal(scan: &Scan, i: usize, joined: &[bool], p: &CloudParams) -> Option<(Ve
         return None;
     }
     let (squares, spread) = (across.dot(&(scatter * across)), scatter.trace());
-    // Two of the points are used up by the line itself.
+    // The line itself takes two degrees of freedom.
     let variance = (squares / (n - 2.0)).max(0.0) / (spread - squares).max(1e-9);
     Some((if across.dot(&-here.coords) < 0.0 { -across } else { across }, variance))
 }

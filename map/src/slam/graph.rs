@@ -1,6 +1,5 @@
-//! The graph of key poses: relative poses with information between them, and the poses that fit them all best (sparse
-//! nonlinear least squares). In: poses and edges. Out: poses, the misfit of every edge, covariances. Which edges there
-//! are is decided elsewhere.
+//! The pose graph: relative poses with information between keyframes, and the poses that fit them best (sparse
+//! nonlinear least squares). In: poses and constraints. Out: poses, chi2 of every constraint, covariances.
 
 use crate::pose2::{Pose2, wrap_rad};
 use faer::{
@@ -20,38 +19,38 @@ pub const MAX_EDGES: usize = 1_000_000;
 /// Most iterations of an optimisation.
 const MAX_ITERATIONS: usize = 50;
 
-/// One relation between two poses.
+/// A measured relative pose between two poses.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Edge {
-    /// Index of the pose whose frame it is in.
+pub struct PoseConstraint {
+    /// Index of the pose whose frame the measurement is in.
     pub from: usize,
     /// Index of the other pose.
     pub to: usize,
-    /// The measured `from_from_to`.
+    /// The measured relative pose, `from` to `to`.
     pub measured: Pose2,
-    /// Inverse covariance of (x, y, theta) in the frame `from`; may be singular.
+    /// Inverse covariance over (x, y, theta) in the frame of `from`; may be singular.
     pub information: Matrix3<f64>,
-    /// If given, the edge may be wrong: beyond this chi2 its weight falls off (dynamic covariance scaling,
-    /// Agarwal et al. 2013).
+    /// For a constraint that may be wrong: its weight falls off beyond this chi2 (dynamic covariance scaling, Agarwal
+    /// et al. 2013).
     pub doubt_chi2: Option<f64>,
 }
 
 /// Why a graph cannot be optimised.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum GraphError {
-    /// Too large.
+    /// There are too many poses or constraints.
     #[error("{0} poses and {1} edges: at most {MAX_POSES} and {MAX_EDGES}")]
     TooLarge(usize, usize),
-    /// An edge names a pose that is not there, or a number is not finite.
-    #[error("edge {0} is not usable")]
-    Edge(usize),
-    /// The edges do not hold every pose.
-    #[error("the edges do not determine every pose")]
+    /// A constraint names a missing pose, or has a number that is not finite.
+    #[error("constraint {0} names a missing pose, or has a number that is not finite")]
+    Constraint(usize),
+    /// The constraints do not determine every pose.
+    #[error("the constraints do not determine every pose")]
     Loose,
 }
 
-/// Error of an edge (x, y, theta), and its derivatives by both poses.
-fn error(edge: &Edge, from: &Pose2, to: &Pose2) -> Vector3<f64> {
+/// Error of a constraint (x, y, theta).
+fn error(edge: &PoseConstraint, from: &Pose2, to: &Pose2) -> Vector3<f64> {
     let h = from.between(to);
     Vector3::new(
         h.x_m - edge.measured.x_m,
@@ -68,20 +67,20 @@ fn jacobians(from: &Pose2, to: &Pose2) -> (Matrix3<f64>, Matrix3<f64>) {
     (by_from, by_to)
 }
 
-/// chi2 of an edge at these poses, without scaling.
-pub fn chi2(edge: &Edge, poses: &[Pose2]) -> f64 {
+/// chi2 of a constraint at these poses, without scaling.
+pub fn chi2(edge: &PoseConstraint, poses: &[Pose2]) -> f64 {
     let e = error(edge, &poses[edge.from], &poses[edge.to]);
     e.dot(&(edge.information * e))
 }
 
-/// Weight of an edge with this chi2: 1, or less if it may be wrong.
-pub fn weight(edge: &Edge, chi2: f64) -> f64 {
+/// Weight of a constraint with this chi2: 1, or less if it may be wrong.
+pub fn weight(edge: &PoseConstraint, chi2: f64) -> f64 {
     edge.doubt_chi2.map_or(1.0, |phi| (2.0 * phi / (phi + chi2)).min(1.0).powi(2))
 }
 
-/// What the robust edges cost: chi2 where they are believed, bounded where they are not.
-fn cost(edges: &[Edge], poses: &[Pose2]) -> f64 {
-    let one = |e: &Edge| {
+/// Robust cost: chi2, bounded for constraints that may be wrong.
+fn cost(edges: &[PoseConstraint], poses: &[Pose2]) -> f64 {
+    let one = |e: &PoseConstraint| {
         let c = chi2(e, poses);
         match e.doubt_chi2 {
             // Integral of the weight over chi2.
@@ -92,27 +91,27 @@ fn cost(edges: &[Edge], poses: &[Pose2]) -> f64 {
     edges.iter().map(one).sum()
 }
 
-fn check(poses: &[Pose2], edges: &[Edge]) -> Result<(), GraphError> {
+fn check(poses: &[Pose2], edges: &[PoseConstraint]) -> Result<(), GraphError> {
     if poses.len() > MAX_POSES || edges.len() > MAX_EDGES {
         return Err(GraphError::TooLarge(poses.len(), edges.len()));
     }
-    let good = |e: &Edge| {
+    let good = |e: &PoseConstraint| {
         e.from < poses.len()
             && e.to < poses.len()
             && e.from != e.to
             && e.measured.check().is_ok()
             && e.information.iter().all(|v| v.is_finite())
     };
-    edges.iter().position(|e| !good(e)).map_or(Ok(()), |i| Err(GraphError::Edge(i)))
+    edges.iter().position(|e| !good(e)).map_or(Ok(()), |i| Err(GraphError::Constraint(i)))
 }
 
-/// The factorised normal equations; the first pose is held.
+/// Sparse normal equations; the first pose is fixed.
 struct Normal {
     lower: SparseColMat<usize, f64>,
     gradient: Vec<f64>,
 }
 
-fn normal(poses: &[Pose2], edges: &[Edge], damping: f64) -> Result<Normal, GraphError> {
+fn normal(poses: &[Pose2], edges: &[PoseConstraint], damping: f64) -> Result<Normal, GraphError> {
     let n = 3 * (poses.len() - 1);
     let mut gradient = vec![0.0; n];
     let mut triplets = Vec::with_capacity(24 * edges.len() + n);
@@ -151,7 +150,7 @@ fn normal(poses: &[Pose2], edges: &[Edge], damping: f64) -> Result<Normal, Graph
     for (i, d) in diagonal.iter().enumerate() {
         triplets.push(Triplet { row: i, col: i, val: d * (1.0 + damping) + 1e-12 });
     }
-    // What is no matrix cannot be factorised either.
+    // An invalid matrix counts as one that cannot be factorised.
     let lower = SparseColMat::try_new_from_triplets(n, n, &triplets).or(Err(GraphError::Loose))?;
     Ok(Normal { lower, gradient })
 }
@@ -161,8 +160,8 @@ fn factor(normal: &Normal, symbolic: &SymbolicLlt<usize>) -> Result<Llt<usize, f
         .or(Err(GraphError::Loose))
 }
 
-/// Moves all poses but the first to where the edges want them (Levenberg-Marquardt). Gives the final cost.
-pub fn optimise(poses: &mut [Pose2], edges: &[Edge]) -> Result<f64, GraphError> {
+/// Optimises all poses but the first (Levenberg-Marquardt). Gives the final cost.
+pub fn optimise(poses: &mut [Pose2], edges: &[PoseConstraint]) -> Result<f64, GraphError> {
     check(poses, edges)?;
     if poses.len() < 2 {
         return Ok(0.0);
@@ -210,8 +209,12 @@ pub fn optimise(poses: &mut [Pose2], edges: &[Edge]) -> Result<f64, GraphError> 
     Ok(now)
 }
 
-/// Covariance of (x, y, theta) of the poses `at`, in the map frame, the first pose held.
-pub fn covariances(poses: &[Pose2], edges: &[Edge], at: &[usize]) -> Result<Vec<Matrix3<f64>>, GraphError> {
+/// Covariance over (x, y, theta) of the poses `at`, in the map frame, the first pose fixed.
+pub fn covariances(
+    poses: &[Pose2],
+    edges: &[PoseConstraint],
+    at: &[usize],
+) -> Result<Vec<Matrix3<f64>>, GraphError> {
     check(poses, edges)?;
     if poses.len() < 2 {
         return Ok(vec![Matrix3::zeros(); at.len()]);

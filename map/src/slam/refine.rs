@@ -1,48 +1,28 @@
-//! The final fit: every key scan aligned with those that see the same, one by one, and all poses fitted to all of it,
-//! a few times over. In: key poses that are nearly right. Out: better ones, and the edges that hold them.
+//! The final fit: every keyframe is matched to others of the same place, and all poses are fitted to the results, in
+//! a few rounds. In: keyframes that are nearly right. Out: better poses, and the constraints that determine them.
 
-use super::{
-    Key, SlamParams,
-    align::align,
-    graph::{self, Edge, GraphError},
-    loops::Closures,
-    reference::Reference,
+use crate::{
+    pose2::Pose2,
+    slam::{
+        graph::{self, GraphError, PoseConstraint},
+        icp::align,
+        keyframe::Keyframe,
+        loop_closure::LoopCloser,
+        params::SlamParams,
+        surface_index::SurfaceIndex,
+    },
 };
-use crate::pose2::Pose2;
-use serde::{Deserialize, Serialize};
 
-/// Knobs of the final fit.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct RefineParams {
-    /// How often.
-    pub rounds: usize,
-    /// Partners of each key scan among those before it, the nearest.
-    pub partners: usize,
-    /// Partners are not farther off than this.
-    pub near_m: f64,
-    /// Least share of the points that find their surface.
-    pub min_matched: f64,
-    /// An alignment that moves a pose more than this is a mistake.
-    pub max_move_m: f64,
-    /// Key scans of one part of the path that are counted as one: their errors are the same.
-    pub doubt_chi2: f64,
-}
-
-impl Default for RefineParams {
-    fn default() -> Self {
-        Self { rounds: 2, partners: 6, near_m: 5.0, min_matched: 0.45, max_move_m: 0.5, doubt_chi2: 4.0 }
-    }
-}
-
-/// Moves the keys; gives all edges of the last fit.
+/// Moves the keyframes; gives all constraints of the last fit.
 pub(super) fn refine(
-    keys: &mut [Key],
-    path: &[Edge],
-    closures: &mut Closures,
+    keys: &mut [Keyframe],
+    path: &[PoseConstraint],
+    closures: &mut LoopCloser,
     p: &SlamParams,
-) -> Result<Vec<Edge>, GraphError> {
-    let base = |closures: &Closures| -> Vec<Edge> { path.iter().chain(closures.edges()).copied().collect() };
+) -> Result<Vec<PoseConstraint>, GraphError> {
+    let base = |closures: &LoopCloser| -> Vec<PoseConstraint> {
+        path.iter().chain(closures.edges()).copied().collect()
+    };
     let mut edges = base(closures);
     let mut poses: Vec<Pose2> = keys.iter().map(|k| k.pose).collect();
     for _ in 0..p.refine.rounds {
@@ -50,7 +30,7 @@ pub(super) fn refine(
         edges = base(closures);
         edges.extend(found);
         graph::optimise(&mut poses, &edges)?;
-        if closures.judge(&poses, &p.loops) {
+        if closures.prune(&poses, &p.loops) {
             edges.retain(|e| e.doubt_chi2 != Some(p.loops.doubt_chi2) || closures.edges().contains(e));
             graph::optimise(&mut poses, &edges)?;
         }
@@ -61,25 +41,25 @@ pub(super) fn refine(
     Ok(edges)
 }
 
-/// Alignments of key scans with their nearest partners.
-fn pairs(keys: &[Key], p: &SlamParams) -> Vec<Edge> {
+/// Matches of keyframes with their nearest partners.
+fn pairs(keys: &[Keyframe], p: &SlamParams) -> Vec<PoseConstraint> {
     let r = &p.refine;
     let mut edges = Vec::new();
     for (i, key) in keys.iter().enumerate() {
         let reference =
-            Reference::new(std::iter::once((Pose2::default(), &key.cloud)), p.align.start_radius_m);
+            SurfaceIndex::new(std::iter::once((Pose2::default(), &key.cloud)), p.align.start_radius_m);
         let mut near: Vec<(usize, f64)> = keys[i + 1..]
             .iter()
             .enumerate()
             .map(|(k, other)| {
                 let between = key.pose.between(&other.pose);
-                // A turn hides as much as a way of its own.
+                // A turn changes the visible walls as much as a distance.
                 (i + 1 + k, between.position().norm() + between.theta_rad.abs())
             })
             .filter(|(_, d)| *d <= r.near_m)
             .collect();
         near.sort_by(|a, b| a.1.total_cmp(&b.1));
-        // Half from near in time, half from another time.
+        // Half of the partners from the same passage, half from others.
         let later = |k: usize| keys[k].path_m - key.path_m > p.loops.min_way_m;
         let same = near.iter().filter(|(k, _)| !later(*k)).take(r.partners.div_ceil(2));
         let other = near.iter().filter(|(k, _)| later(*k)).take(r.partners.div_ceil(2));
@@ -90,7 +70,7 @@ fn pairs(keys: &[Key], p: &SlamParams) -> Vec<Edge> {
             if a.matched < r.min_matched || d.xy().norm() > r.max_move_m || d.z.abs() > 0.2 {
                 continue;
             }
-            edges.push(Edge {
+            edges.push(PoseConstraint {
                 from: i,
                 to: *k,
                 measured: a.pose,

@@ -1,6 +1,13 @@
 use super::world::{Walls, around, odometry, rectangle, ring, scan};
-use super::*;
-use nalgebra::Point2;
+use crate::{
+    laser::Scan,
+    pose2::{Pose2, Pose2Covariance},
+    slam::{
+        map_builder::{Slam, SlamError, SlamMap},
+        params::SlamParams,
+    },
+};
+use nalgebra::{Matrix3, Point2};
 use vision::learn::random::Random;
 
 fn build(walls: &Walls, path: &[Pose2], odom: &[Pose2], seed: u64) -> SlamMap {

@@ -1,25 +1,25 @@
-//! How likely a landmark is seen when the robot's pose is uncertain (method 12.5): the share of draws of the pose from
-//! which it is. The draws are fixed points of a low-discrepancy sequence, so the same question has the same answer.
+//! Visibility probability for an uncertain pose (method 12.5): the share of draws of the pose from which the landmark
+//! is visible. The draws are fixed points of a low-discrepancy sequence, so the result is reproducible.
 
 use super::VisibilityMap;
 use crate::pose2::{Pose2, Pose2Covariance, wrap_rad};
 use nalgebra::{Matrix3, Point2, SymmetricEigen, Vector2, Vector3};
 use std::f64::consts::TAU;
 
-/// How many draws of a pose are looked at.
+/// Number of draws of a pose.
 pub const DRAWS: usize = 64;
 
-/// Draws of an uncertain pose, to be asked of many landmarks.
+/// Draws of an uncertain pose, to be used for many landmarks.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PoseDraws {
-    /// Camera position and robot pose of each.
+    /// Camera position and robot pose of each draw.
     draws: Vec<(Point2<f64>, Pose2)>,
     mean: Point2<f64>,
-    /// All draws are within this of `mean`.
+    /// Largest distance of a draw from `mean`, metres.
     spread_m: f64,
 }
 
-/// Digits of `index` in `base`, mirrored at the point.
+/// The digits of `index` in `base`, mirrored at the point.
 fn radical_inverse(mut index: usize, base: usize) -> f64 {
     let (mut value, mut digit) = (0.0, 1.0 / base as f64);
     while index > 0 {
@@ -38,7 +38,7 @@ fn normals(index: usize) -> Vector3<f64> {
     Vector3::new(r * angle.cos(), r * angle.sin(), r3 * angle3.cos())
 }
 
-/// Half of the draws of a standard normal vector, brought to its covariance exactly; the others are opposite.
+/// Half of the draws of a standard normal vector, transformed to the exact covariance; the others are opposite.
 fn standard() -> Vec<Vector3<f64>> {
     let raw: Vec<_> = (1..=DRAWS / 2).map(normals).collect();
     let spread = raw.iter().map(|z| z * z.transpose()).sum::<Matrix3<f64>>() / raw.len() as f64;
@@ -49,7 +49,7 @@ fn standard() -> Vec<Vector3<f64>> {
 }
 
 impl PoseDraws {
-    /// Of a pose; `camera_m` is where the camera is in the robot frame.
+    /// Draws of a pose; `camera_m` is the camera's position in the robot frame.
     pub fn new(pose: &Pose2Covariance, camera_m: Vector2<f64>) -> Self {
         let eigen = SymmetricEigen::new(pose.covariance);
         let root = eigen.eigenvectors * Matrix3::from_diagonal(&eigen.eigenvalues.map(|v| v.max(0.0).sqrt()));
@@ -67,12 +67,12 @@ impl PoseDraws {
         Self { draws, mean, spread_m }
     }
 
-    /// The camera at the mean pose.
+    /// Camera position at the mean pose.
     pub fn mean(&self) -> Point2<f64> {
         self.mean
     }
 
-    /// All draws are within this of the mean, metres.
+    /// Largest distance of a draw from the mean, metres.
     pub fn spread_m(&self) -> f64 {
         self.spread_m
     }
@@ -84,7 +84,7 @@ impl PoseDraws {
 }
 
 impl VisibilityMap {
-    /// Probability that the landmark is seen, the camera turned to it as far as it pans.
+    /// Probability that the landmark is visible, the camera panned to it as far as possible.
     pub fn probability(&self, pose: &PoseDraws) -> f64 {
         if (pose.mean - self.frame.origin).norm() > self.reach_m + pose.spread_m {
             return 0.0;
@@ -94,7 +94,7 @@ impl VisibilityMap {
         inside.count() as f64 / DRAWS as f64
     }
 
-    /// Whether a robot's camera can be panned to the landmark.
+    /// Whether the camera can be panned to the landmark.
     pub(super) fn pans(&self, camera: &Point2<f64>, heading_rad: f64) -> bool {
         let to = self.centre - camera;
         let pan = wrap_rad(to.y.atan2(to.x) - heading_rad);

@@ -1,4 +1,4 @@
-//! Which landmarks a robot sees along a path, and where it sees none.
+//! Coverage of a path: which landmarks are visible along it, and where none is.
 
 use super::VisibilityMap;
 use crate::{
@@ -8,51 +8,51 @@ use crate::{
 use nalgebra::Point2;
 use vision::recognise::LandmarkId;
 
-/// Most places looked at along one path.
+/// Most samples of one path.
 pub const MAX_STEPS: usize = 10_000;
 
-/// One place of a path.
+/// Visible landmarks along a path.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Seen {
-    /// Way from the start.
+pub struct CoverageSample {
+    /// Distance from the start, metres.
     pub along_m: f64,
-    /// Where that is.
+    /// Position, metres, map frame.
     pub position: Point2<f64>,
-    /// The landmarks that are seen from there, by number.
+    /// Landmarks visible from there, by number.
     pub landmarks: Vec<LandmarkId>,
 }
 
-/// A piece of the path without any landmark.
+/// A part of the path without any visible landmark.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Gap {
-    /// Way from the start at which it begins, and ends.
+pub struct CoverageGap {
+    /// Distance from the start at which it begins, metres.
     pub from_m: f64,
-    /// Where it ends.
+    /// Distance from the start at which it ends, metres.
     pub to_m: f64,
 }
 
 /// What is seen along a path.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Coverage {
-    /// Length of the path.
+    /// Length of the path, metres.
     pub length_m: f64,
-    /// Place by place.
-    pub steps: Vec<Seen>,
-    /// Where nothing is seen; to the step.
-    pub gaps: Vec<Gap>,
+    /// Samples in the order of the path.
+    pub steps: Vec<CoverageSample>,
+    /// Parts without visible landmarks, at the resolution of the samples.
+    pub gaps: Vec<CoverageGap>,
 }
 
 impl Coverage {
-    /// Share of the path's places from which some landmark is seen.
+    /// Share of the samples with a visible landmark, 0 to 1.
     pub fn share(&self) -> f64 {
         let seen = self.steps.iter().filter(|s| !s.landmarks.is_empty()).count();
         seen as f64 / self.steps.len().max(1) as f64
     }
 }
 
-/// Looks at a path of at least one point every `step_m` (0.01 to 10 m), and at its end.
+/// Samples a path of at least one point every `step_m` (0.01 to 10 m), and its end.
 ///
-/// The robot looks wherever its camera pans to when it drives forward.
+/// The robot drives forward; its camera pans within its range.
 pub fn coverage(
     path: &[Point2<f64>],
     step_m: f64,
@@ -90,30 +90,30 @@ fn seen(
     position: Point2<f64>,
     heading_rad: Option<f64>,
     maps: &[(LandmarkId, &VisibilityMap)],
-) -> Seen {
+) -> CoverageSample {
     let sees = |map: &VisibilityMap| {
         map.contains(&position) && heading_rad.is_none_or(|heading| map.pans(&position, heading))
     };
     let landmarks = maps.iter().filter(|(_, map)| sees(map)).map(|(id, _)| *id).collect();
-    Seen { along_m, position, landmarks }
+    CoverageSample { along_m, position, landmarks }
 }
 
-/// From the last place that sees something to the next that does.
-fn gaps(steps: &[Seen]) -> Vec<Gap> {
-    let mut made: Vec<Gap> = Vec::new();
+/// Gaps from the last sample with a landmark to the next one.
+fn gaps(steps: &[CoverageSample]) -> Vec<CoverageGap> {
+    let mut made: Vec<CoverageGap> = Vec::new();
     let mut open: Option<f64> = None;
     for (i, step) in steps.iter().enumerate() {
         match (step.landmarks.is_empty(), open) {
             (true, None) => open = Some(if i == 0 { step.along_m } else { steps[i - 1].along_m }),
             (false, Some(from_m)) => {
-                made.push(Gap { from_m, to_m: step.along_m });
+                made.push(CoverageGap { from_m, to_m: step.along_m });
                 open = None;
             }
             _ => {}
         }
     }
     if let (Some(from_m), Some(last)) = (open, steps.last()) {
-        made.push(Gap { from_m, to_m: last.along_m });
+        made.push(CoverageGap { from_m, to_m: last.along_m });
     }
     made
 }

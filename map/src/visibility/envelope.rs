@@ -1,17 +1,18 @@
-//! Bounds over direction. A point (x, y) before the landmark is (slope, inverse) = (y / x, 1 / x): straight lines stay
-//! straight, and nearer is larger. So the nearest of many bounds is the upper envelope of straight pieces.
+//! Bounds over direction. A point (x, y) in front of the landmark is (slope, inverse) = (y / x, 1 / x): straight
+//! lines stay straight, and nearer points have larger inverses. The nearest of many bounds is therefore the upper
+//! envelope of straight pieces.
 
-/// Slopes are looked at from minus this to this.
+/// Slopes range from minus this to this.
 pub(super) const MAX_SLOPE: f64 = 1.0;
-/// Pieces narrower than this in slope, relative to it, bound nothing.
+/// Pieces narrower than this in slope, relative to it, are dropped.
 const NARROW: f64 = 1e-12;
 
 /// A straight bound from one slope to another.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Piece {
-    /// Where it begins.
+    /// Slope at which it begins.
     pub from: f64,
-    /// Where it ends, beyond `from`.
+    /// Slope at which it ends, larger than `from`.
     pub to: f64,
     /// The line: its value at a slope, and how it rises.
     anchor: (f64, f64),
@@ -19,12 +20,13 @@ pub(super) struct Piece {
 }
 
 impl Piece {
-    /// Through two points (slope, inverse) in any order, cut to the slopes that are looked at. None where nothing is left.
+    /// A piece through two points (slope, inverse) in any order, cut to the range of slopes. `None` where nothing is
+    /// left.
     pub(super) fn through(a: (f64, f64), b: (f64, f64)) -> Option<Self> {
         let (a, b) = if a.0 <= b.0 { (a, b) } else { (b, a) };
         let (from, to) = (a.0.max(-MAX_SLOPE), b.0.min(MAX_SLOPE));
         let wide = to - from > NARROW * (1.0 + from.abs());
-        // The end nearer to the middle is the better known one.
+        // The end nearer to the middle is numerically better.
         let anchor = if a.0.abs() <= b.0.abs() { a } else { b };
         let rise = (b.1 - a.1) / (b.0 - a.0);
         (wide && rise.is_finite()).then_some(Self { from, to, anchor, rise })

@@ -12,9 +12,9 @@ pub struct Feature {
     /// `Feature`.
     #[serde(rename = "type")]
     pub kind: &'static str,
-    /// The area.
+    /// The visibility area.
     pub geometry: Geometry,
-    /// What is known of it.
+    /// Figures of the area.
     pub properties: Properties,
 }
 
@@ -34,11 +34,11 @@ pub struct Geometry {
 pub struct Properties {
     /// Name of the landmark.
     pub landmark: String,
-    /// Square metres.
+    /// Size of the area, square metres.
     pub area_m2: f64,
-    /// Centre of gravity, where there is an area.
+    /// Centroid of the area, metres; absent without an area.
     pub centroid_m: Option<[f64; 2]>,
-    /// Furthest possible distance from the landmark.
+    /// Largest possible distance from the landmark, metres.
     pub reach_m: f64,
 }
 

@@ -1,16 +1,20 @@
-//! What the landmark and the camera alone allow, without any wall: incidence, apparent size, fit in the image, tilt range
-//! (method 12.1 to 12.3), for a landmark of any tilt. In one direction on the floor what is allowed is one span of
-//! distances; each condition gives its own in closed form, but for the height's, whose ends are roots of a quartic.
+//! The limits of landmark and camera without any wall: incidence, apparent size, fit in the image, tilt range (method
+//! 12.1 to 12.3), for a landmark of any tilt. In one direction on the floor each limit allows one range of distances,
+//! in closed form except for the height, whose ends are roots of a quartic.
 
-use super::{Moved, Viewer, VisibilityParams};
+use crate::visibility::{
+    local_frame::Moved,
+    settings::{PanTiltCamera, VisibilityParams},
+};
 use std::f64::consts::FRAC_PI_2;
 use vision::localise::pose::LandmarkSize;
 
-/// A landmark nearer to the camera's height than this counts as this far above it, metres: it has elevations all the same.
+/// A landmark nearer to the camera's height than this counts as this far above it, metres, so that elevations are
+/// defined.
 const MIN_RISE_M: f64 = 1e-6;
-/// Halvings of a span in which a bound is sought: to a billionth of a millionth of it.
+/// Bisections of a range in which a bound is sought: a relative precision of 1e-15.
 const HALVINGS: u32 = 50;
-/// Part of a span that is kept in the search for the distance from which the height looks largest.
+/// Golden section: share of a range kept in the search for the largest apparent height.
 const GOLDEN: f64 = 0.618_033_988_749_895;
 
 /// The conditions of one landmark for one camera.
@@ -24,17 +28,17 @@ pub(super) struct Limits {
     rise_m: f64,
     tilt: (f64, f64),
     size: LandmarkSize,
-    /// Distances at which width and height, unforeshortened, have the least size.
+    /// Distances at which width and height, unforeshortened, have the least size, metres.
     wide_m: f64,
     high_m: f64,
-    /// Width and height of the image that may be filled, at 1 m.
+    /// Width and height of the image that may be filled, at 1 m distance, metres.
     room: [f64; 2],
     min_cosine: f64,
-    /// Distances on the floor to which the unit can tilt.
+    /// Distances on the floor to which the unit can tilt, metres.
     tilt_m: (f64, f64),
 }
 
-/// Nearest and furthest distance on the floor at which the unit can tilt towards the landmark's centre.
+/// Nearest and farthest distance on the floor at which the unit can tilt towards the landmark's centre, metres.
 fn tilt_range_m(rise_m: f64, [low, high]: [f64; 2]) -> Option<(f64, f64)> {
     // Looking down at a landmark is looking up at its mirror image.
     let (rise, low, high) = if rise_m < 0.0 { (-rise_m, -high, -low) } else { (rise_m, low, high) };
@@ -49,8 +53,8 @@ fn tilt_range_m(rise_m: f64, [low, high]: [f64; 2]) -> Option<(f64, f64)> {
 }
 
 impl Limits {
-    /// None when the landmark can be seen from nowhere.
-    pub(super) fn new(moved: &Moved, viewer: &Viewer, p: &VisibilityParams) -> Option<Self> {
+    /// `None` when the landmark is visible from nowhere.
+    pub(super) fn new(moved: &Moved, viewer: &PanTiltCamera, p: &VisibilityParams) -> Option<Self> {
         let rise = moved.height_m - viewer.camera_height_m;
         let tilt_m = tilt_range_m(rise, viewer.tilt_rad)?;
         let size = moved.size;
@@ -68,12 +72,12 @@ impl Limits {
         (made.rise_m.abs() < made.wide_m.min(made.high_m)).then_some(made)
     }
 
-    /// Nothing is further from the landmark's middle.
+    /// Upper bound of the distance from the landmark's centre, metres.
     pub(super) fn reach_m(&self) -> f64 {
         self.wide_m.min(self.high_m).min(self.tilt_m.1)
     }
 
-    /// From where to where in a direction a camera sees it.
+    /// Range of distances in a direction at which a camera sees the landmark, metres.
     pub(super) fn span_m(&self, direction_rad: f64) -> Option<(f64, f64)> {
         let (sine, cosine) = direction_rad.sin_cos();
         let (near, far) = self.upright_m(cosine)?;
@@ -85,7 +89,8 @@ impl Limits {
         self.high_within_m(cosine, (near, far))
     }
 
-    /// Incidence: in terms of the angle e from the vertical, r = rise tan e, it is a sin e + b cos e, at least `min_cosine`.
+    /// Limit of incidence: with the angle e from the vertical, r = rise tan e, it is a sin e + b cos e >=
+    /// `min_cosine`.
     fn upright_m(&self, cosine: f64) -> Option<(f64, f64)> {
         let (sin_tilt, cos_tilt) = self.tilt;
         let (across, down) = (cosine * cos_tilt, sin_tilt.copysign(sin_tilt * self.rise_m));
@@ -103,7 +108,7 @@ impl Limits {
         Some((rise * low.max(0.0).tan(), far))
     }
 
-    /// It is wide enough up to there: (r^2 + rise^2)^2 = wide^2 (r^2 cos^2 d + rise^2).
+    /// Largest distance at which it is wide enough: (r^2 + rise^2)^2 = wide^2 (r^2 cos^2 d + rise^2).
     fn wide_to_m(&self, cosine: f64) -> Option<f64> {
         let (rise2, wide2) = (self.rise_m.powi(2), self.wide_m.powi(2));
         let half = rise2 - 0.5 * wide2 * cosine * cosine;
@@ -113,7 +118,8 @@ impl Limits {
         (square > 0.0).then(|| square.sqrt())
     }
 
-    /// Nearer it does not fit: the box about it in the image, its height taken as if no elevation foreshortened it.
+    /// Smallest distance at which it fits: its bounding box in the image, without foreshortening of the height by
+    /// elevation.
     fn fits_from_m(&self, sine: f64, cosine: f64) -> f64 {
         let (sin_tilt, cos_tilt) = self.tilt;
         let LandmarkSize { width_m, height_m } = self.size;
@@ -130,6 +136,7 @@ impl Limits {
     /// The part of a span in which it is high enough.
     // Behind and below a landmark tilted by 20 to 40 degrees the height can look less and then again more on the way away
     // from it, by 12 % at most, where it is seen very obliquely: such a dip is not cut out.
+    /// The part of a range in which it is high enough.
     fn high_within_m(&self, cosine: f64, (near, far): (f64, f64)) -> Option<(f64, f64)> {
         let enough = |r: f64| self.high_m * self.height_m2(cosine, r).sqrt() >= r * r + self.rise_m.powi(2);
         match (enough(near), enough(far)) {
@@ -143,14 +150,14 @@ impl Limits {
         }
     }
 
-    /// Squared distance of the camera from the line of the landmark's height: what its foreshortening goes by.
+    /// Squared distance of the camera from the line of the landmark's height, which determines its foreshortening.
     fn height_m2(&self, cosine: f64, r: f64) -> f64 {
         let (sin_tilt, cos_tilt) = self.tilt;
         let along = r * cosine * sin_tilt - self.rise_m * cos_tilt;
         (r * r + self.rise_m.powi(2) - along * along).max(0.0)
     }
 
-    /// From where in a span its height looks largest.
+    /// Distance within a range at which the height appears largest.
     fn highest_m(&self, cosine: f64, (mut near, mut far): (f64, f64)) -> f64 {
         let looks = |r: f64| self.height_m2(cosine, r) / (r * r + self.rise_m.powi(2)).powi(2);
         for _ in 0..HALVINGS {
@@ -165,7 +172,7 @@ impl Limits {
     }
 }
 
-/// The last place from one that is on the way to one that is not.
+/// The last point with the property on the way from one with it to one without it.
 fn last(mut good: f64, mut bad: f64, is: impl Fn(f64) -> bool) -> f64 {
     for _ in 0..HALVINGS {
         let middle = 0.5 * (good + bad);
@@ -195,7 +202,7 @@ mod tests {
 
     fn limits(tilt_rad: f64, height_m: f64) -> Limits {
         let size = LandmarkSize { width_m: 0.6, height_m: 0.6 };
-        let viewer = Viewer { tilt_rad: [-1.5, 1.5], ..Viewer::default() };
+        let viewer = PanTiltCamera { tilt_rad: [-1.5, 1.5], ..PanTiltCamera::default() };
         Limits::new(&Moved { height_m, tilt_rad, size }, &viewer, &VisibilityParams::default()).unwrap()
     }
 

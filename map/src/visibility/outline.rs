@@ -1,28 +1,29 @@
-//! From bounds over direction to polygons on the floor, and what is measured on polygons.
+//! From bounds over direction to polygons on the floor, and measures of polygons.
 
-use super::{
-    LocalFrame,
+use crate::visibility::{
     envelope::{MAX_SLOPE, Piece},
-    quarters::{Quarter, turned_back},
+    local_frame::LocalFrame,
+    quarter_turn::turned_back,
+    quarters::Quarter,
 };
 use nalgebra::{Point2, Vector2};
 
-/// Corners nearer to each other than this are one, metres.
+/// Corners nearer to each other than this are merged, metres.
 const SAME_M: f64 = 1e-9;
-/// Corners nearer than this to the landmark's middle are there, metres.
+/// Corners nearer than this to the landmark's centre are moved there, metres.
 const MIDDLE_M: f64 = 1e-5;
-/// Corners nearer than this to the line between their neighbours are none, metres.
+/// Corners nearer than this to the line between their neighbours are dropped, metres.
 const STRAIGHT_M: f64 = 1e-8;
-/// Pieces of area smaller than this are left out, square metres; and so are holes.
+/// Smaller pieces and holes are dropped, square metres.
 const MIN_AREA_M2: f64 = 1e-6;
 
-/// A polygon, counter-clockwise; the last corner is not the first.
+/// A polygon, counter-clockwise; the first corner is not repeated.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Polygon {
-    /// Corners, metres.
+    /// Corners, metres, map frame.
     pub corners: Vec<Point2<f64>>,
-    /// Corners of the hole in it, clockwise; empty for none. A landmark under a ceiling that is seen from all sides, but not
-    /// from right below, has one.
+    /// Corners of its hole, clockwise; empty for none. A landmark under a ceiling that is visible from all sides but
+    /// not from directly below has one.
     pub hole: Vec<Point2<f64>>,
 }
 
@@ -56,7 +57,7 @@ impl Polygon {
         self.corners.first().map_or(0.0, |o| self.moments(o).0)
     }
 
-    /// Distance of a point to the nearest side, from inside or outside.
+    /// Distance of a point to the nearest side, from inside or outside, metres.
     pub fn boundary_distance_m(&self, q: &Point2<f64>) -> f64 {
         self.sides().map(|(a, b)| distance_to_segment(q, a, b)).fold(f64::INFINITY, f64::min)
     }
@@ -127,15 +128,15 @@ fn closed(mut runs: Vec<Run>) -> Vec<(Run, bool)> {
     runs.into_iter().map(|r| (r, meets)).collect()
 }
 
-/// Directions closer than this are one.
+/// Directions closer than this are equal.
 const SAME: f64 = 1e-12;
 
-/// Counts up all round: from -1 over each quarter by 2.
+/// A continuous measure of direction over all quarters: from -1, 2 for each quarter.
 fn direction(quarter: usize, slope: f64) -> f64 {
     2.0 * MAX_SLOPE * quarter as f64 + slope
 }
 
-/// What lies between two bounds from one slope to another.
+/// The area between two bounds from one slope to another.
 struct Strip<'a> {
     quarter: usize,
     outer: &'a Piece,
@@ -144,7 +145,7 @@ struct Strip<'a> {
     to: f64,
 }
 
-/// Outer and inner corners of one piece of area, by direction, about the landmark's middle.
+/// Outer and inner corners of one piece of area, by direction, about the landmark's centre.
 struct Run {
     from: f64,
     to: f64,
@@ -204,7 +205,7 @@ impl Run {
     }
 }
 
-/// Without corners that are the same, or at which the outline goes straight on.
+/// A ring without coinciding corners and without corners on a straight line.
 fn tidied(corners: &[Point2<f64>]) -> Vec<Point2<f64>> {
     let mut apart: Vec<Point2<f64>> = Vec::with_capacity(corners.len());
     for corner in corners {

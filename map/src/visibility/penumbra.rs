@@ -1,16 +1,16 @@
-//! What obstacles hide: of each its full penumbra, from everywhere in which some part of the landmark is not seen
-//! (method 12.4), as bounds over direction. Exact, not sampled.
+//! Occlusion: the full penumbra of each obstacle, from which some part of the landmark is hidden (method 12.4), as
+//! bounds over direction. Exact, not sampled.
 
-use super::{
+use crate::visibility::{
     envelope::{MAX_SLOPE, Piece},
-    quarters::turned,
+    quarter_turn::turned,
 };
 use nalgebra::{Point2, Vector2};
 
-/// How near to the landmark's middle obstacles are looked at, metres.
+/// Obstacles nearer than this to the landmark's centre are cut there, metres.
 const MIN_AHEAD_M: f64 = 1e-6;
 
-/// What the landmark covers on the floor, about the origin: half its depth along x, half its width along y.
+/// The landmark's extent on the floor about the origin: half its depth along x, half its width along y.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Footprint {
     pub half_depth_m: f64,
@@ -18,7 +18,7 @@ pub(super) struct Footprint {
 }
 
 impl Footprint {
-    /// Whether a to b touches it.
+    /// Whether the segment from a to b touches it.
     pub(super) fn touches(&self, a: &Point2<f64>, b: &Point2<f64>) -> bool {
         let (mut from, mut to) = (0.0_f64, 1.0_f64);
         for (start, end, half) in [(a.x, b.x, self.half_depth_m), (a.y, b.y, self.half_width_m)] {
@@ -43,8 +43,8 @@ impl Footprint {
 
 /// The near borders of one obstacle's penumbra within a quarter.
 ///
-/// What it hides of one point of the landmark lies behind it between the lines from that point past its ends. Of all
-/// points the landmark's corners give the borders: every such line lies in the penumbra, and its tangents are among them.
+/// A point of the landmark is hidden behind the obstacle, between the lines from that point past its ends. The
+/// corners of the landmark give the borders: every such line lies in the penumbra, and its tangents are among them.
 pub(super) fn penumbra(
     footprint: &Footprint,
     a: &Point2<f64>,
@@ -53,7 +53,7 @@ pub(super) fn penumbra(
 ) -> Vec<Piece> {
     let turn = |v: Vector2<f64>| turned(&Point2::from(v), quarter).coords;
     let mut pieces: Vec<Piece> = straight(turn(a.coords), turn(b - a), 1.0).into_iter().collect();
-    // A landmark on a wall has no depth: two of its corners are the other two.
+    // A landmark on a wall has no depth: its corners coincide in pairs.
     let corners = footprint.corners();
     let count = if footprint.half_depth_m > 0.0 { 4 } else { 2 };
     for end in [a, b] {

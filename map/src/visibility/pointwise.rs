@@ -1,15 +1,15 @@
-//! Whether one point sees a landmark: every condition of method 12 by itself, obstacle by obstacle. Slow and exact; what
-//! the polygons are compared with. Shares nothing with them but the definition.
+//! Visibility of a landmark from one point: every condition of method 12 separately, obstacle by obstacle. Slow and
+//! exact; the reference for the polygons, with which it shares only the definition.
 
-use super::{Obstacle, Viewer, VisibilityParams};
+use super::{Obstacle, PanTiltCamera, VisibilityParams};
 use crate::place::LandmarkPlace;
 use nalgebra::{Point2, Point3, Vector3};
 
-/// Whether a camera at `q` sees the whole landmark, near, upright and large enough, with nothing in between.
+/// Whether a camera at `q` sees the whole landmark, large enough, not too obliquely, with no obstacle between.
 pub fn sees(
     place: &LandmarkPlace,
     obstacles: &[Obstacle],
-    viewer: &Viewer,
+    viewer: &PanTiltCamera,
     p: &VisibilityParams,
     q: &Point2<f64>,
 ) -> bool {
@@ -21,7 +21,7 @@ pub fn sees(
     let (sight, distance) = ((camera - centre).normalize(), (camera - centre).norm());
     let [normal, wide, high] = [Vector3::x(), Vector3::y(), Vector3::z()].map(|v| map_from_landmark * v);
     let length_px = |side_m: f64| viewer.focal_px * side_m / distance;
-    // Incidence and size: the sides as they look from there.
+    // Incidence and apparent size.
     let width_px = length_px(place.size.width_m * wide.cross(&sight).norm());
     let height_px = length_px(place.size.height_m * high.cross(&sight).norm());
     if normal.dot(&sight) < p.max_incidence_rad.cos() || width_px.min(height_px) < p.min_side_px {
@@ -41,7 +41,7 @@ pub fn sees(
     }
     let corners = [(-1.0, -1.0), (-1.0, 1.0), (1.0, 1.0), (1.0, -1.0)]
         .map(|(y, z)| Point2::from(face(y * half_width, z * half_height).coords.xy()));
-    // The hull of camera and landmark on the floor is covered by the camera's triangles with all pairs of corners.
+    // Triangles of the camera with all pairs of corners cover the hull of camera and landmark on the floor.
     let hidden =
         |o: &Obstacle| (0..4).any(|i| (0..i).any(|j| meets(&[*q, corners[i], corners[j]], &o.a, &o.b)));
     let lowest = (place.z_m - half_height * place.tilt_rad.cos()).min(viewer.camera_height_m);

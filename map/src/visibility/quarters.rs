@@ -1,35 +1,21 @@
 //! Bounds in all directions about a landmark: four quarters, each with its own axis, so that no slope exceeds one.
 
-use super::{
+use crate::visibility::{
     envelope::{Envelope, Piece},
     limits::Limits,
     penumbra::{Footprint, penumbra},
+    quarter_turn::turned,
     rims::{MIN_NEAR_M, rims},
 };
 use nalgebra::Point2;
 use std::f64::consts::FRAC_PI_2;
 
-/// A point in the frame of a quarter, whose x is its axis.
-pub(super) fn turned(p: &Point2<f64>, quarter: usize) -> Point2<f64> {
-    match quarter % 4 {
-        0 => *p,
-        1 => Point2::new(p.y, -p.x),
-        2 => Point2::new(-p.x, -p.y),
-        _ => Point2::new(-p.y, p.x),
-    }
-}
-
-/// Back from it.
-pub(super) fn turned_back(p: &Point2<f64>, quarter: usize) -> Point2<f64> {
-    turned(p, 4 - quarter % 4)
-}
-
 /// The bounds of one quarter.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Quarter {
-    /// Nearest bound beyond which nothing is seen; nothing is seen where there is none.
+    /// Farthest visible distance; nothing is visible where it is not defined.
     pub far: Envelope,
-    /// Bound within which it is too near; it reaches over all that `far` does.
+    /// Nearest visible distance; defined wherever `far` is.
     pub near: Envelope,
 }
 
@@ -59,7 +45,7 @@ pub(super) fn contains(quarters: &[Quarter; 4], q: &Point2<f64>) -> bool {
         (false, _, false) => 3,
     };
     let q = turned(q, quarter);
-    // The middle itself is as what is next to it.
+    // The centre itself counts as the point next to it.
     let ahead = q.x.max(2.0 * MIN_NEAR_M);
     let (slope, inverse) = (q.y / ahead, 1.0 / ahead);
     let Quarter { far, near } = &quarters[quarter];
@@ -69,6 +55,7 @@ pub(super) fn contains(quarters: &[Quarter; 4], q: &Point2<f64>) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::visibility::quarter_turn::turned_back;
 
     #[test]
     fn each_quarter_looks_along_its_axis() {

@@ -1,5 +1,5 @@
-//! Where the limits end, as straight pieces over direction, in one quarter of all directions: chords that leave the curves
-//! by at most a fifth of a millimetre where they can be followed.
+//! The limits as straight pieces over direction in one quarter: chords that differ from the curves by at most a fifth
+//! of a millimetre.
 
 use super::{
     envelope::{MAX_SLOPE, Piece},
@@ -8,13 +8,13 @@ use super::{
 
 /// Largest distance between a curve and its chord, metres.
 const MAX_SAGITTA_M: f64 = 2e-4;
-/// Directions of a quarter that are always looked at.
+/// Directions of a quarter that are always evaluated.
 const GRID: u32 = 64;
-/// Halvings between two of them: to a hundred millionth of a radian.
+/// Bisections between two of them: to 1e-8 radians.
 const DEPTH: u32 = 20;
-/// Halvings in search of the direction in which a landmark begins to be seen.
+/// Bisections for the direction in which a landmark becomes visible.
 const EDGE_HALVINGS: u32 = 50;
-/// Nearer than this is at the landmark, metres.
+/// Smaller distances count as this, metres.
 pub(super) const MIN_NEAR_M: f64 = 1e-6;
 
 /// The rims of one quarter.
@@ -22,7 +22,7 @@ pub(super) const MIN_NEAR_M: f64 = 1e-6;
 pub(super) struct Rims {
     pub far: Vec<Piece>,
     pub near: Vec<Piece>,
-    /// The slopes in which anything is seen, in order.
+    /// The ranges of slope in which the landmark is visible, in order.
     pub open: Vec<(f64, f64)>,
 }
 
@@ -43,7 +43,7 @@ impl Look {
 
 struct Follower<'a> {
     limits: &'a Limits,
-    /// Middle of the quarter.
+    /// Direction of the quarter's axis, radians.
     ahead_rad: f64,
     made: Rims,
 }
@@ -117,14 +117,14 @@ impl Follower<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::visibility::{Moved, Viewer, VisibilityParams, envelope::Envelope};
+    use crate::visibility::{PanTiltCamera, VisibilityParams, envelope::Envelope, local_frame::Moved};
     use std::f64::consts::FRAC_PI_2;
     use vision::localise::pose::LandmarkSize;
 
     #[test]
     fn chords_follow_the_limits() {
         let size = LandmarkSize { width_m: 0.9, height_m: 0.7 };
-        let viewer = Viewer { tilt_rad: [-1.2, 1.2], ..Viewer::default() };
+        let viewer = PanTiltCamera { tilt_rad: [-1.2, 1.2], ..PanTiltCamera::default() };
         for tilt_rad in [0.0, 0.5, 1.1, FRAC_PI_2, -0.8] {
             let moved = Moved { height_m: 1.2 + 1.3_f64.copysign(tilt_rad), tilt_rad, size };
             let limits = Limits::new(&moved, &viewer, &VisibilityParams::default()).unwrap();

@@ -1,9 +1,21 @@
-use super::*;
+//! Known scenes, bounds, probabilities, coverage, GeoJSON.
+
+mod monte_carlo;
+
 use crate::{
-    place::PlaceSigmas,
+    place::{LandmarkPlace, PlaceSigmas},
     pose2::{Pose2, Pose2Covariance},
+    visibility::{
+        area::{MAX_OBSTACLES, VisibilityMap, visibility, within_reach},
+        chance::PoseDraws,
+        coverage::coverage,
+        obstacle::Obstacle,
+        outline::Polygon,
+        settings::{PanTiltCamera, VisibilityParams},
+        tests::monte_carlo::random_map,
+    },
 };
-use nalgebra::{Matrix3, Rotation2, Vector3};
+use nalgebra::{Matrix3, Point2, Rotation2, Vector2, Vector3};
 use std::f64::consts::FRAC_PI_2;
 use vision::{localise::pose::LandmarkSize, recognise::LandmarkId};
 
@@ -21,7 +33,7 @@ impl Dice {
     }
 }
 
-fn place(x: f64, y: f64, z: f64, theta: f64, size: (f64, f64)) -> LandmarkPlace {
+pub(super) fn place(x: f64, y: f64, z: f64, theta: f64, size: (f64, f64)) -> LandmarkPlace {
     let size = LandmarkSize { width_m: size.0, height_m: size.1 };
     LandmarkPlace::by_hand(Vector3::new(x, y, z), theta, size, PlaceSigmas::default()).unwrap()
 }
@@ -35,138 +47,14 @@ fn wall(ax: f64, ay: f64, bx: f64, by: f64) -> Obstacle {
 }
 
 fn seen_among(obstacles: &[Obstacle]) -> VisibilityMap {
-    visibility(&poster(), obstacles, &Viewer::default(), &VisibilityParams::default()).unwrap()
-}
-
-/// The same scene with the landmark under the ceiling, on the floor or leaning, at any height, and a camera that looks there.
-fn random_tilted_map(seed: u64) -> (LandmarkPlace, Vec<Obstacle>, Viewer) {
-    let (mut landmark, mut obstacles, mut viewer) = random_map(seed);
-    let mut dice = Dice::new(5000 + seed);
-    landmark.tilt_rad = match seed % 4 {
-        0 => FRAC_PI_2,
-        1 => -FRAC_PI_2,
-        _ => dice.within(-FRAC_PI_2, FRAC_PI_2),
-    };
-    let rise = dice.within(-0.3, 2.5);
-    landmark.z_m = viewer.camera_height_m + rise.copysign(rise * landmark.tilt_rad);
-    viewer.tilt_rad = [dice.within(-1.5, -0.6), dice.within(0.6, 1.5)];
-    // Its own wall would cut what leans out of it.
-    obstacles.pop();
-    (landmark, obstacles, viewer)
-}
-
-/// A landmark on its wall with long and short, near and far, high and low obstacles about it.
-fn random_map(seed: u64) -> (LandmarkPlace, Vec<Obstacle>, Viewer) {
-    let mut dice = Dice::new(seed);
-    let theta = dice.within(-3.1, 3.1);
-    let landmark = place(
-        dice.within(-50.0, 50.0),
-        dice.within(-50.0, 50.0),
-        dice.within(0.8, 2.2),
-        theta,
-        (dice.within(0.2, 1.5), dice.within(0.2, 1.5)),
-    );
-    let centre = Point2::new(landmark.x_m, landmark.y_m);
-    let turn = Rotation2::new(theta);
-    let mut at = |ahead: (f64, f64), aside: f64| {
-        centre + turn * Vector2::new(dice.within(ahead.0, ahead.1), dice.within(-aside, aside))
-    };
-    let mut obstacles: Vec<Obstacle> =
-        (0..4).map(|_| Obstacle { a: at((0.3, 8.0), 6.0), b: at((0.3, 8.0), 6.0), height_m: None }).collect();
-    for _ in 0..8 {
-        let a = at((-1.0, 6.0), 6.0);
-        obstacles.push(Obstacle { a, b: a + (at((-0.5, 0.5), 0.5) - centre), height_m: None });
-    }
-    obstacles.push(Obstacle {
-        a: centre + turn * Vector2::new(0.0, -5.0),
-        b: centre + turn * Vector2::new(0.0, 5.0),
-        height_m: None,
-    });
-    obstacles[2].height_m = Some(dice.within(0.2, 1.6));
-    let viewer = Viewer {
-        focal_px: dice.within(400.0, 900.0),
-        camera_height_m: dice.within(0.5, 1.6),
-        ..Viewer::default()
-    };
-    (landmark, obstacles, viewer)
-}
-
-type Scene = fn(u64) -> (LandmarkPlace, Vec<Obstacle>, Viewer);
-
-/// How many of 200 points each of so many maps were compared, how many differ, from how many it is seen.
-fn compared_with_brute_force(scene: Scene, seeds: u64) -> (u32, u32, u32) {
-    let p = VisibilityParams::default();
-    let (mut looked, mut differ, mut seen) = (0, 0, 0);
-    for seed in 0..seeds {
-        let (landmark, obstacles, viewer) = scene(seed);
-        let map = visibility(&landmark, &obstacles, &viewer, &p).unwrap();
-        let mut dice = Dice::new(1000 + seed);
-        let centre = Point2::new(landmark.x_m, landmark.y_m);
-        let reach = 1.05 * map.reach_m();
-        for _ in 0..200 {
-            let q = centre + Vector2::new(dice.within(-reach, reach), dice.within(-reach, reach));
-            let expected = pointwise::sees(&landmark, &obstacles, &viewer, &p, &q);
-            let by_polygon = map.polygons().iter().any(|polygon| polygon.contains(&q));
-            assert_eq!(by_polygon, map.contains(&q), "{seed} {q}: polygon and bounds");
-            looked += 1;
-            differ += u32::from(by_polygon != expected);
-            seen += u32::from(expected);
-        }
-    }
-    (looked, differ, seen)
-}
-
-#[test]
-fn polygons_agree_with_brute_force() {
-    // Oracle: every condition at every point by itself. The whole comparison is `waymark-lab evaluate visibility`.
-    let (looked, differ, seen) = compared_with_brute_force(random_map, 40);
-    assert!(seen > 500, "{seen} of {looked}");
-    assert!(differ <= 1, "{differ} of {looked}");
-}
-
-#[test]
-fn tilted_polygons_agree_with_brute_force() {
-    let (looked, differ, seen) = compared_with_brute_force(random_tilted_map, 120);
-    assert!(seen > 1000, "{seen} of {looked}");
-    assert!(differ <= 2, "{differ} of {looked}");
-}
-
-/// The area over that counted on grids, of 12 maps.
-fn area_over_counted(scene: Scene) -> f64 {
-    let p = VisibilityParams::default();
-    let (mut expected, mut got) = (0.0, 0.0);
-    for seed in 0..12 {
-        let (landmark, obstacles, viewer) = scene(seed);
-        let map = visibility(&landmark, &obstacles, &viewer, &p).unwrap();
-        let (reach, side) = (map.reach_m(), 160);
-        let centre = Point2::new(landmark.x_m, landmark.y_m);
-        let cell = 2.0 * reach / f64::from(side);
-        let at = |i: i32| (f64::from(i) + 0.5) * cell - reach;
-        let seen = (0..side * side).filter(|i| {
-            let q = centre + Vector2::new(at(i / side), at(i % side));
-            pointwise::sees(&landmark, &obstacles, &viewer, &p, &q)
-        });
-        expected += seen.count() as f64 * cell * cell;
-        got += map.area_m2();
-        let parts: f64 = map.polygons().iter().map(Polygon::area_m2).sum();
-        assert!((parts - map.area_m2()).abs() < 1e-9);
-    }
-    got / expected
-}
-
-#[test]
-fn areas_agree_with_monte_carlo() {
-    for scene in [random_map as Scene, random_tilted_map] {
-        let ratio = area_over_counted(scene);
-        assert!((ratio - 1.0).abs() < 0.01, "{ratio}");
-    }
+    visibility(&poster(), obstacles, &PanTiltCamera::default(), &VisibilityParams::default()).unwrap()
 }
 
 /// A square sign under a ceiling 1.3 m above the camera, whose unit reaches up to a radian.
 fn ceiling_sign(obstacles: &[Obstacle]) -> VisibilityMap {
     let mut sign = place(4.0, 3.0, 2.5, 0.7, (0.6, 0.6));
     sign.tilt_rad = FRAC_PI_2;
-    let viewer = Viewer { tilt_rad: [-0.35, 1.0], ..Viewer::default() };
+    let viewer = PanTiltCamera { tilt_rad: [-0.35, 1.0], ..PanTiltCamera::default() };
     visibility(&sign, obstacles, &viewer, &VisibilityParams::default()).unwrap()
 }
 
@@ -215,7 +103,7 @@ fn the_open_area_is_two_discs_and_a_cone() {
     // By hand: alone on its wall a poster as wide as high is seen in the disc tangent to the wall, cut by the cone, less
     // the discs of what does not fit. Polar about the centre: r from max(0, ...) to D cos(psi).
     let landmark = place(0.0, 0.0, 1.2, 0.0, (0.6, 0.6));
-    let viewer = Viewer { height_px: 640.0, ..Viewer::default() };
+    let viewer = PanTiltCamera { height_px: 640.0, ..PanTiltCamera::default() };
     let p = VisibilityParams { standoff_m: 0.001, ..VisibilityParams::default() };
     let map = visibility(&landmark, &[], &viewer, &p).unwrap();
     let diameter = 512.0 * 0.6 / 75.0;
@@ -361,7 +249,10 @@ fn coverage_names_landmarks_and_gaps() {
         visibility(
             &far,
             &[],
-            &Viewer { pan_rad: [-std::f64::consts::PI, std::f64::consts::PI], ..Viewer::default() },
+            &PanTiltCamera {
+                pan_rad: [-std::f64::consts::PI, std::f64::consts::PI],
+                ..PanTiltCamera::default()
+            },
             &VisibilityParams::default(),
         )
         .unwrap()
@@ -388,17 +279,17 @@ fn coverage_names_landmarks_and_gaps() {
 
 #[test]
 fn bounds_are_held_and_named() {
-    let with = |viewer: Viewer, p: VisibilityParams| {
+    let with = |viewer: PanTiltCamera, p: VisibilityParams| {
         visibility(&poster(), &[], &viewer, &p).map(|_| ()).map_err(|e| e.field)
     };
-    let (v, p) = (Viewer::default, VisibilityParams::default);
+    let (v, p) = (PanTiltCamera::default, VisibilityParams::default);
     assert_eq!(with(v(), p()), Ok(()));
-    assert_eq!(with(Viewer { focal_px: 9.0, ..v() }, p()), Err("focal_px"));
-    assert_eq!(with(Viewer { tilt_rad: [0.2, 0.1], ..v() }, p()), Err("tilt_rad[1]"));
-    assert_eq!(with(Viewer { camera_height_m: f64::NAN, ..v() }, p()), Err("camera_height_m"));
+    assert_eq!(with(PanTiltCamera { focal_px: 9.0, ..v() }, p()), Err("focal_px"));
+    assert_eq!(with(PanTiltCamera { tilt_rad: [0.2, 0.1], ..v() }, p()), Err("tilt_rad[1]"));
+    assert_eq!(with(PanTiltCamera { camera_height_m: f64::NAN, ..v() }, p()), Err("camera_height_m"));
     assert_eq!(with(v(), VisibilityParams { max_incidence_rad: 1.5, ..p() }), Err("max_incidence_rad"));
     assert_eq!(with(v(), VisibilityParams { standoff_m: 0.0, ..p() }), Err("standoff_m"));
-    let nowhere = with(Viewer { tilt_rad: [-0.3, -0.2], ..v() }, p());
+    let nowhere = with(PanTiltCamera { tilt_rad: [-0.3, -0.2], ..v() }, p());
     assert_eq!(nowhere, Ok(()), "seen from nowhere is an answer");
 }
 
@@ -419,9 +310,9 @@ fn only_the_nearest_obstacles_count_beyond_the_bound() {
     let mut many = vec![far];
     many.extend(std::iter::repeat_n(wall(1.0, 2.0, 1.0, 2.1), MAX_OBSTACLES - 1));
     let p = VisibilityParams::default();
-    assert!(within_reach(&poster(), &many, &Viewer::default(), &p).contains(&far));
+    assert!(within_reach(&poster(), &many, &PanTiltCamera::default(), &p).contains(&far));
     many.push(wall(1.0, 2.0, 1.0, 2.1));
-    let kept = within_reach(&poster(), &many, &Viewer::default(), &p);
+    let kept = within_reach(&poster(), &many, &PanTiltCamera::default(), &p);
     assert_eq!(kept.len(), MAX_OBSTACLES);
     assert!(!kept.contains(&far));
 }

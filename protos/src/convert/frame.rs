@@ -1,9 +1,9 @@
-//! A camera frame as it enters: everything but the pixels checked.
+//! A camera frame on arrival: everything but the pixels is checked.
 
 use super::geometry;
 use crate::{Code, Name, Rejection, v1};
 use map::{
-    mounting::Mounting,
+    extrinsics::CameraExtrinsics,
     pose2::{Pose2, Pose2Covariance},
 };
 use prost::bytes::Bytes;
@@ -11,8 +11,6 @@ use vision::frame::Intrinsics;
 
 /// Largest image of a frame, in encoded bytes: holds raw grey of [`MAX_FRAME_PX`] pixels.
 pub const MAX_FRAME_IMAGE_BYTES: usize = 2_400_000;
-/// What a frame should not exceed: above one transport batch it is fragmented, and easier lost.
-pub const ADVISED_FRAME_BYTES: usize = 60_000;
 /// Largest frame, in pixels (1920 x 1200).
 pub const MAX_FRAME_PX: u32 = 2_304_000;
 /// Longest side of a frame, in pixels.
@@ -20,45 +18,45 @@ pub const MAX_FRAME_SIDE_PX: u32 = 4096;
 /// Longest deadline that a robot may ask for, in milliseconds.
 pub const MAX_DEADLINE_MS: u32 = 600_000;
 
-/// How the image is packed.
+/// Encoding of the image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Encoding {
-    /// JPEG.
+    /// JPEG, greyscale or colour.
     Jpeg,
-    /// PNG.
+    /// PNG, greyscale or colour.
     Png,
-    /// One byte a pixel, row-major.
+    /// One byte per pixel, row-major, uncompressed.
     Gray8,
 }
 
-/// A frame whose fields can be relied on. The pixels are still encoded.
+/// A checked frame. The pixels are still encoded.
 #[derive(Debug, Clone)]
 pub struct CheckedFrame {
-    /// Which start of the robot's software.
+    /// Epoch of the robot's software, drawn at its start.
     pub epoch: u64,
-    /// Counts up within the epoch.
+    /// Sequence number, rising within the epoch.
     pub seq: u64,
-    /// Robot's clock at capture, ns since the Unix epoch; echoed only.
+    /// Robot's clock at capture, ns since the Unix epoch.
     pub captured_ns: i64,
-    /// How `image` is packed.
+    /// Encoding of `image`.
     pub encoding: Encoding,
-    /// Claimed width, checked against the decoded one later.
+    /// Claimed width, px; compared with the decoded one later.
     pub width_px: u32,
-    /// Claimed height.
+    /// Claimed height, px; compared with the decoded one later.
     pub height_px: u32,
     /// Encoded image, at most [`MAX_FRAME_IMAGE_BYTES`].
     pub image: Bytes,
-    /// The camera, where calibrated.
+    /// Intrinsics of the camera, where it is calibrated.
     pub intrinsics: Option<Intrinsics>,
-    /// Camera on robot.
-    pub mounting: Option<Mounting>,
-    /// Odometry at capture.
+    /// Extrinsics of the camera at capture.
+    pub mounting: Option<CameraExtrinsics>,
+    /// `odom_from_robot` at capture.
     pub odometry: Option<Pose2>,
-    /// The robot's belief, `map_from_robot`, with its covariance.
+    /// The robot's own estimate of `map_from_robot`, with covariance.
     pub prior: Option<Pose2Covariance>,
-    /// Start of work at the latest so long after receipt; `None` for the server's default.
+    /// Latest start of work after receipt, ms; `None` for the server's default.
     pub deadline_ms: Option<u32>,
-    /// Map asked for; `None` for the robot's.
+    /// The requested map; `None` for the robot's.
     pub map: Option<Name>,
 }
 

@@ -1,29 +1,29 @@
-//! A question where to look, as it enters, and the advice as it leaves.
+//! A gaze request on arrival, and the advice that answers it.
 
 use super::geometry;
 use crate::{Code, Rejection, v1};
 use map::{
-    gaze::{Choice, Criterion, Head, Look},
+    gaze::{Criterion, GazeAction, GazeTarget, PanTiltUnit},
     pose2::Pose2Covariance,
-    visibility::Viewer,
+    visibility::PanTiltCamera,
 };
 
-/// A question that can be relied on.
+/// A checked gaze request.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CheckedGaze {
-    /// Where the robot is, if it says so.
+    /// The robot's own pose, if given.
     pub pose: Option<Pose2Covariance>,
-    /// Where its camera is and looks.
-    pub head: Head,
-    /// Rightmost and leftmost pan of its unit, if it says so.
+    /// Pan-tilt unit with its present direction.
+    pub head: PanTiltUnit,
+    /// Rightmost and leftmost pan of the unit, radians, if given.
     pub pan_range_rad: Option<[f64; 2]>,
-    /// Lowest and highest tilt, if it says so.
+    /// Lowest and highest tilt of the unit, radians, if given.
     pub tilt_range_rad: Option<[f64; 2]>,
-    /// By what to choose.
+    /// Criterion of the choice.
     pub criterion: Criterion,
-    /// Robot's clock.
+    /// Robot's clock, ns.
     pub at_ns: i64,
-    /// The landmark that it looked at last, and whether that was recognised.
+    /// The last target, and whether it was recognised.
     pub looked: Option<(String, bool)>,
 }
 
@@ -32,9 +32,9 @@ impl TryFrom<v1::GazeRequest> for CheckedGaze {
 
     fn try_from(g: v1::GazeRequest) -> Result<Self, Rejection> {
         let pose = g.map_from_robot.as_ref().map(geometry::pose2_covariance).transpose();
-        let usual = Head::default();
+        let usual = PanTiltUnit::default();
         let or = |value: f64, usual: f64| if value == 0.0 { usual } else { value };
-        let head = Head {
+        let head = PanTiltUnit {
             camera_m: [g.camera_x_m, g.camera_y_m, or(g.camera_z_m, usual.camera_m[2])],
             pan_rad: g.pan_rad,
             tilt_rad: g.tilt_rad,
@@ -55,16 +55,16 @@ impl TryFrom<v1::GazeRequest> for CheckedGaze {
             at_ns: g.at_ns,
             looked: (!g.looked_at.is_empty()).then_some((g.looked_at, g.recognised)),
         };
-        let viewer = made.viewer(&Viewer::default());
+        let viewer = made.viewer(&PanTiltCamera::default());
         made.head.check().and_then(|()| viewer.check()).map_err(|e| geometry::refused(&e))?;
         Ok(made)
     }
 }
 
 impl CheckedGaze {
-    /// The robot's camera: what it does not say is as in `usual`.
-    pub fn viewer(&self, usual: &Viewer) -> Viewer {
-        Viewer {
+    /// The robot's camera: absent ranges are those of `usual`.
+    pub fn viewer(&self, usual: &PanTiltCamera) -> PanTiltCamera {
+        PanTiltCamera {
             pan_rad: self.pan_range_rad.unwrap_or(usual.pan_rad),
             tilt_rad: self.tilt_range_rad.unwrap_or(usual.tilt_rad),
             ..usual.clone()
@@ -84,11 +84,11 @@ fn range(field: &str, given: &[f64]) -> Result<Option<[f64; 2]>, Rejection> {
 }
 
 /// The advice; `name` gives the name of a landmark.
-pub fn advice(look: &Look, name: impl Fn(&Choice) -> String) -> v1::GazeAdvice {
+pub fn advice(look: &GazeAction, name: impl Fn(&GazeTarget) -> String) -> v1::GazeAdvice {
     let (kind, choice) = match look {
-        Look::Landmark(choice) => (v1::GazeLook::Landmark, Some(choice)),
-        Look::Ahead => (v1::GazeLook::Ahead, None),
-        Look::Sweep => (v1::GazeLook::Sweep, None),
+        GazeAction::Landmark(choice) => (v1::GazeLook::Landmark, Some(choice)),
+        GazeAction::Ahead => (v1::GazeLook::Ahead, None),
+        GazeAction::Sweep => (v1::GazeLook::Sweep, None),
     };
     let mut advice = v1::GazeAdvice { look: kind.into(), ..v1::GazeAdvice::default() };
     if let Some(c) = choice {
@@ -108,8 +108,8 @@ mod tests {
     #[test]
     fn absent_numbers_are_the_usual_ones_and_wrong_ones_are_named() {
         let empty = CheckedGaze::try_from(v1::GazeRequest::default()).unwrap();
-        assert_eq!(empty.viewer(&Viewer::default()), Viewer::default());
-        assert_eq!((empty.head, empty.pose), (Head::default(), None));
+        assert_eq!(empty.viewer(&PanTiltCamera::default()), PanTiltCamera::default());
+        assert_eq!((empty.head, empty.pose), (PanTiltUnit::default(), None));
         let refused = |g: v1::GazeRequest| CheckedGaze::try_from(g).unwrap_err().field;
         let g = v1::GazeRequest::default;
         assert_eq!(refused(v1::GazeRequest { pan_range_rad: vec![1.0], ..g() }), "pan_range_rad");

@@ -1,17 +1,17 @@
-//! Numbers, poses, covariances and cameras, both ways.
+//! Numbers, poses, covariances and cameras: from the wire and to the wire.
 
 use crate::{Code, Rejection, v1};
 use map::{
     check::{MAX_COORDINATE_M, MAX_VARIANCE, OutOfRange},
-    mounting::Mounting,
+    extrinsics::CameraExtrinsics,
     pose2::{Pose2, Pose2Covariance},
 };
 use nalgebra::{Isometry3, Matrix3, Quaternion, Translation3, UnitQuaternion};
 use vision::frame::{Distortion, FrameError, Intrinsics, IntrinsicsSigmas};
 
-/// Largest accepted angle, in radians: odometry may wind up, but not for ever.
+/// Largest accepted angle, radians: a limit for unwrapped odometry headings.
 pub const MAX_ANGLE_RAD: f64 = 1e4;
-/// A quaternion whose length is further from 1 than this is refused, not repaired.
+/// A quaternion whose length differs from 1 by more than this is refused.
 pub const QUATERNION_TOLERANCE: f64 = 1e-3;
 /// Relative asymmetry and negative eigenvalue that rounding may leave in a covariance.
 pub const COVARIANCE_TOLERANCE: f64 = 1e-6;
@@ -49,7 +49,7 @@ pub fn pose3(pose: &v1::Pose3) -> Result<Isometry3<f64>, Rejection> {
     Ok(Isometry3::from_parts(Translation3::new(x, y, z), UnitQuaternion::from_quaternion(q)))
 }
 
-/// The wire form, with `qw >= 0`.
+/// The wire form of a rigid transform, with `qw >= 0`.
 pub fn pose3_wire(pose: &Isometry3<f64>) -> v1::Pose3 {
     let q = pose.rotation.quaternion();
     let sign = if q.w < 0.0 { -1.0 } else { 1.0 };
@@ -64,7 +64,7 @@ pub fn pose2(pose: &v1::Pose2) -> Result<Pose2, Rejection> {
     Ok(Pose2::new(x_m, y_m, within("theta_rad", pose.theta_rad, MAX_ANGLE_RAD)?))
 }
 
-/// The wire form.
+/// The wire form of a pose on the floor.
 pub fn pose2_wire(pose: &Pose2) -> v1::Pose2 {
     v1::Pose2 { x_m: pose.x_m, y_m: pose.y_m, theta_rad: pose.theta_rad }
 }
@@ -88,15 +88,15 @@ pub fn pose2_covariance_wire(value: &Pose2Covariance) -> v1::Pose2Covariance {
     }
 }
 
-/// Where a camera sits on its robot, with the default covariance.
-pub fn mounting(pose: &v1::Pose3) -> Result<Mounting, Rejection> {
-    Mounting::new(pose3(pose)?).map_err(|e| {
+/// Extrinsics of a camera, with the default covariance.
+pub fn mounting(pose: &v1::Pose3) -> Result<CameraExtrinsics, Rejection> {
+    CameraExtrinsics::new(pose3(pose)?).map_err(|e| {
         let r = refused(&e);
         Rejection { field: String::new(), ..r }
     })
 }
 
-/// A refusal by the map crate in wire words.
+/// An out-of-range error of `map` as a rejection.
 pub fn refused(error: &OutOfRange) -> Rejection {
     let code = if error.value.is_finite() { Code::OutOfRange } else { Code::NotFinite };
     Rejection::new(code, error.field, error.to_string())
@@ -121,13 +121,13 @@ fn covariance(numbers: &[f64]) -> Result<Matrix3<f64>, Rejection> {
     Ok(symmetric)
 }
 
-/// A calibrated camera: no lens, or one of `plumb_bob` (5 numbers), `rational_polynomial` (8), `equidistant` (4). Where
-/// it is not said how surely it is known, [`IntrinsicsSigmas::usual`].
+/// A calibrated camera: no lens, or one of `plumb_bob` (5 coefficients), `rational_polynomial` (8), `equidistant`
+/// (4). Absent standard deviations are [`IntrinsicsSigmas::usual`].
 pub fn intrinsics(wire: &v1::Intrinsics) -> Result<Intrinsics, Rejection> {
     let (distortion, lens) = lens(wire)?;
     let made = Intrinsics::new(wire.fx_px, wire.fy_px, wire.cx_px, wire.cy_px, distortion);
     made.and_then(|camera| {
-        // Nobody's camera is exact: where nothing is said it is a usual one.
+        // No camera is exact: absent standard deviations get usual values.
         let usual = IntrinsicsSigmas::usual(camera.fx_px);
         let focal_px = wire.focal_sigma_px.unwrap_or(usual.focal_px);
         camera.with_sigmas(IntrinsicsSigmas {
@@ -295,8 +295,8 @@ mod tests {
     #[test]
     fn a_camera_far_from_its_robot_is_refused() {
         let at = |x_m| mounting(&v1::Pose3 { qw: 1.0, x_m, ..v1::Pose3::default() });
-        assert!(at(map::mounting::MAX_MOUNTING_M).is_ok());
-        assert_eq!(at(map::mounting::MAX_MOUNTING_M + 0.01).unwrap_err().code, Code::OutOfRange);
+        assert!(at(map::extrinsics::MAX_MOUNTING_M).is_ok());
+        assert_eq!(at(map::extrinsics::MAX_MOUNTING_M + 0.01).unwrap_err().code, Code::OutOfRange);
     }
 
     #[test]

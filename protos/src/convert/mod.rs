@@ -1,7 +1,6 @@
-//! Checked conversions between the wire and the types of `vision` and `map`. In: messages as decoded. Out: values
-//! that are finite, in range and bounded, or a [`Rejection`](crate::Rejection) that names the field. What is unsure
-//! is refused here, once; later stages do not check again. Deliberately knows no clock, robot list or map: that is
-//! the server's part.
+//! Checked conversions between the wire and the types of `vision` and `map`. In: decoded messages. Out: values that
+//! are finite, in range and bounded, or a [`Rejection`](crate::Rejection) that names the field. Doubtful input is
+//! refused here, once; later stages do not check again. Clock, robots and maps are checked by the server.
 
 pub mod frame;
 pub mod gaze;

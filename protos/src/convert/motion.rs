@@ -1,4 +1,4 @@
-//! Odometry and laser scans as they enter.
+//! Odometry and laser scans on arrival.
 
 use super::geometry;
 use crate::{Code, Rejection, v1};
@@ -7,16 +7,16 @@ use map::{
     pose2::Pose2,
 };
 
-/// Odometry that can be relied on.
+/// Checked odometry.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CheckedOdometry {
-    /// Which start of the robot's software.
+    /// Epoch of the robot's software, drawn at its start.
     pub epoch: u64,
-    /// Counts up within the epoch.
+    /// Sequence number, rising within the epoch.
     pub seq: u64,
-    /// Robot's clock.
+    /// Robot's clock at capture, ns since the Unix epoch.
     pub captured_ns: i64,
-    /// The robot in its odometry frame.
+    /// Pose of the robot in its odometry frame.
     pub odom_from_robot: Pose2,
 }
 
@@ -33,18 +33,18 @@ impl TryFrom<v1::Odometry> for CheckedOdometry {
     }
 }
 
-/// A laser scan that can be relied on.
+/// A checked laser scan.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CheckedScan {
-    /// Which start of the robot's software.
+    /// Epoch of the robot's software, drawn at its start.
     pub epoch: u64,
-    /// Counts up within the epoch.
+    /// Sequence number, rising within the epoch.
     pub seq: u64,
-    /// Robot's clock.
+    /// Robot's clock at capture, ns since the Unix epoch.
     pub captured_ns: i64,
-    /// The robot in its odometry frame.
+    /// Pose of the robot in its odometry frame.
     pub odom_from_robot: Pose2,
-    /// Bearings and ranges. A single range that is no number is a beam without return, as drivers send it.
+    /// Bearings and ranges. A range that is not a number is a beam without return, as drivers send it.
     pub scan: Scan,
 }
 

@@ -73,8 +73,9 @@ fn asked(to: &Receivers, robot: &Name, query: &Query) -> Result<v1::GazeAdvice, 
     let params = GazeParams { criterion: question.criterion, ..GazeParams::default() };
     let ask = Ask { pose, viewer, head: question.head, params };
     let look = to.gazes.choose(robot, question.at_ns, looked, &map, &ask).map_err(|e| refused(&e))?;
-    let name_of =
-        |c: &map::gaze::Choice| map.landmarks.get(&c.landmark).map(|l| l.name.clone()).unwrap_or_default();
+    let name_of = |c: &map::gaze::GazeTarget| {
+        map.landmarks.get(&c.landmark).map(|l| l.name.clone()).unwrap_or_default()
+    };
     let advice = advice(&look, name_of);
     Ok(v1::GazeAdvice { map: map.name.clone(), map_version: map.version, ..advice })
 }

@@ -4,7 +4,7 @@ use super::teach::{ServerArgs, counted, show};
 use anyhow::{Context as _, bail};
 use client::{
     MapClient,
-    runs::{KnownPath, LearntRun, Recorded},
+    reference_runs::{RecordingStatus, ReferenceRun, ReferenceTrajectory},
 };
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -86,45 +86,45 @@ pub(crate) enum Command {
 pub(crate) async fn run(command: &Command) -> anyhow::Result<()> {
     match command {
         Command::Start { robot, server } => {
-            let begun = MapClient::new(server.address())?.record_run(robot).await?;
+            let begun = MapClient::new(server.address())?.start_recording(robot).await?;
             show(server, &begun, &format!("a run of {robot} on {} is being recorded", begun.map))
         }
         Command::Status { robot, server } => {
-            let recorded = MapClient::new(server.address())?.recorded_run(robot).await?;
+            let recorded = MapClient::new(server.address())?.recording(robot).await?;
             show(server, &recorded, &recorded_line(&recorded))
         }
         Command::Cancel { robot, server } => {
-            MapClient::new(server.address())?.cancel_run(robot).await?;
+            MapClient::new(server.address())?.cancel_recording(robot).await?;
             show(server, robot, "given up")
         }
         Command::Learn { robot, path, sigma_m, sigma_rad, server } => {
             let text =
                 std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
             let poses = poses(&text).with_context(|| path.display().to_string())?;
-            let known = KnownPath { poses, sigma_m: *sigma_m, sigma_rad: *sigma_rad };
-            let learnt = MapClient::new(server.address())?.learn_run(robot, &known).await?;
+            let known = ReferenceTrajectory { poses, sigma_m: *sigma_m, sigma_rad: *sigma_rad };
+            let learnt = MapClient::new(server.address())?.finish_recording(robot, &known).await?;
             show(server, &learnt, &learnt_lines(&learnt))
         }
         Command::List { map, server } => {
-            let runs = MapClient::new(server.address())?.runs(map).await?;
+            let runs = MapClient::new(server.address())?.reference_runs(map).await?;
             show(server, &runs, &runs.iter().map(learnt_lines).collect::<Vec<_>>().join("\n"))
         }
         Command::Forget { run, map, server } => {
-            MapClient::new(server.address())?.forget_run(map, *run).await?;
+            MapClient::new(server.address())?.delete_reference_run(map, *run).await?;
             show(server, run, "forgotten")
         }
         Command::Mode { map, mode, server } => {
             let maps = MapClient::new(server.address())?;
             let known = match mode {
-                Some(mode) => maps.set_areas(map, &json!({ "mode": mode })).await?,
-                None => maps.areas(map).await?,
+                Some(mode) => maps.set_modalities(map, &json!({ "mode": mode })).await?,
+                None => maps.modalities(map).await?,
             };
             show(server, &known, &mode_line(&known))
         }
     }
 }
 
-fn recorded_line(r: &Recorded) -> String {
+fn recorded_line(r: &RecordingStatus) -> String {
     let state = match &r.reason {
         Some(reason) => format!("ended ({reason})"),
         None => "goes on".to_owned(),
@@ -133,7 +133,7 @@ fn recorded_line(r: &Recorded) -> String {
     format!("{} on {}: {state}, {:.1} m, fixes by {landmarks}, {laser}", r.robot, r.map, r.way_m)
 }
 
-fn learnt_lines(run: &LearntRun) -> String {
+fn learnt_lines(run: &ReferenceRun) -> String {
     let mut lines =
         vec![format!("{}  {}: {:.1} m, {}", run.id, run.robot, run.way_m, counted(run.cells, "cell"))];
     lines.extend(run.modules.iter().map(|m| {

@@ -71,14 +71,14 @@ impl SightArgs {
 
     /// Sets what is given, if anything is, and gives what holds then.
     pub(super) async fn set(&self, maps: &MapClient, map: &str) -> anyhow::Result<Value> {
-        let now = maps.sight(map).await?;
+        let now = maps.visibility_settings(map).await?;
         let given = self.given();
         if given.is_empty() && !self.usual {
             return Ok(now);
         }
         let mut all = if self.usual { Map::new() } else { now.as_object().cloned().unwrap_or_default() };
         all.extend(given);
-        Ok(maps.set_sight(map, &all.into()).await?)
+        Ok(maps.set_visibility_settings(map, &all.into()).await?)
     }
 }
 

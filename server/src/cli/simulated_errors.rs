@@ -3,7 +3,7 @@
 
 use map::{
     check::OutOfRange,
-    mounting::Mounting,
+    extrinsics::CameraExtrinsics,
     pose2::{Pose2, Pose2Covariance},
 };
 use nalgebra::{Isometry3, Matrix3, Vector3, Vector6};
@@ -42,7 +42,7 @@ impl SimulatedRobotErrors {
         let e = usual.error_sigmas().map(|s| s * random.normal());
         let (fx_px, fy_px) = (camera.fx_px * (1.0 + e.x), camera.fy_px * (1.0 + e.x));
         let said = Intrinsics { fx_px, fy_px, cx_px: camera.cx_px + e.y, cy_px: camera.cy_px + e.z, ..usual };
-        let (a, t) = (Mounting::DEFAULT_ANGLE_SIGMA_RAD, Mounting::DEFAULT_POSITION_SIGMA_M);
+        let (a, t) = (CameraExtrinsics::DEFAULT_ANGLE_SIGMA_RAD, CameraExtrinsics::DEFAULT_POSITION_SIGMA_M);
         let seat = Vector6::new(a, a, a, t, t, t).map(|s| s * random.normal());
         Self { camera: said, random: Some(random), seat }
     }
@@ -53,9 +53,9 @@ impl SimulatedRobotErrors {
     }
 
     /// Where it says that its camera sits.
-    pub fn mounting(&self, robot_from_camera: &Isometry3<f64>) -> Result<Mounting, OutOfRange> {
+    pub fn mounting(&self, robot_from_camera: &Isometry3<f64>) -> Result<CameraExtrinsics, OutOfRange> {
         let (turn, shift) = (self.seat.fixed_rows::<3>(0).into(), self.seat.fixed_rows::<3>(3).into());
-        Mounting::new(perturbed(robot_from_camera, &turn, &shift))
+        CameraExtrinsics::new(perturbed(robot_from_camera, &turn, &shift))
     }
 
     /// Where it says that it stands, on a survey.
@@ -82,7 +82,7 @@ mod tests {
             let mut robot = SimulatedRobotErrors::drawn(&camera, u64::from(seed));
             focal += ((robot.camera.fx_px / 500.0 - 1.0) / IntrinsicsSigmas::USUAL_FOCAL_SHARE).powi(2);
             let angle = robot.mounting(&seat).unwrap().robot_from_camera.rotation.angle();
-            turn += (angle / Mounting::DEFAULT_ANGLE_SIGMA_RAD).powi(2);
+            turn += (angle / CameraExtrinsics::DEFAULT_ANGLE_SIGMA_RAD).powi(2);
             let said = robot.surveyed(&at).unwrap();
             let e = said.pose.minus(&at);
             nees += e.dot(&said.covariance.cholesky().unwrap().solve(&e));

@@ -6,17 +6,17 @@
 
 use super::{screen, simulated_errors::SimulatedRobotErrors};
 use map::{
+    extrinsics::CameraExtrinsics,
     lines::{self, LineParams},
-    mounting::Mounting,
     place::LandmarkPlace,
-    placing::{PlacingParams, PlacingView, ViewOnWall, placement, view_on_wall},
+    placement::{PlacementParams, PosedView, WallRectangle, placement, view_on_wall},
     pose2::Pose2Covariance,
     segments::LaserSegment,
     walls::{WallParams, Walls},
 };
 use sim::{
     lesson::Stop,
-    robot::{Robot, Sighting},
+    robot::{Robot, SensorReadings},
 };
 use std::collections::BTreeMap;
 use vision::{
@@ -39,10 +39,10 @@ pub struct SurveyView {
     /// The poster's quad.
     pub quad: Quad,
     /// The frame, and the truth about it.
-    pub sighting: Sighting,
+    pub sighting: SensorReadings,
     // Pose and extrinsics as the robot states them.
     map_from_robot: Pose2Covariance,
-    mounting: Mounting,
+    mounting: CameraExtrinsics,
 }
 
 /// What a surveying robot gathered.
@@ -82,7 +82,7 @@ pub fn survey(mut robot: Robot, stops: &[Stop], mut wrong: SimulatedRobotErrors)
 }
 
 /// The detected quad that a person would click on.
-fn clicked(sighting: &Sighting, name: &str) -> Option<Quad> {
+fn clicked(sighting: &SensorReadings, name: &str) -> Option<Quad> {
     let truth = sighting.frame.truth.landmark(name)?;
     detect(&sighting.frame.image, &DetectParams::default(), &mut NoTrace)
         .into_iter()
@@ -97,12 +97,12 @@ pub fn hang(
     walls: &[LaserSegment],
     camera: &Intrinsics,
 ) -> Option<(LandmarkPlace, Vec<usize>)> {
-    let p = PlacingParams::default();
-    let on_walls: Vec<(usize, ViewOnWall)> = views
+    let p = PlacementParams::default();
+    let on_walls: Vec<(usize, WallRectangle)> = views
         .iter()
         .enumerate()
         .filter_map(|(i, view)| {
-            let look = PlacingView {
+            let look = PosedView {
                 corners: &view.quad.corners_px,
                 covariance_px2: &view.quad.believed_covariance_px2(),
                 camera,
@@ -112,7 +112,7 @@ pub fn hang(
             Some((i, view_on_wall(&look, walls, &p).ok()?))
         })
         .collect();
-    let rectangles: Vec<ViewOnWall> = on_walls.iter().map(|(_, rectangle)| rectangle.clone()).collect();
+    let rectangles: Vec<WallRectangle> = on_walls.iter().map(|(_, rectangle)| rectangle.clone()).collect();
     let placement = placement(&rectangles, walls, &p).ok()?;
     Some((placement.place, placement.used.iter().map(|&i| on_walls[i].0).collect()))
 }

@@ -9,7 +9,7 @@ use super::{
 use client::{
     ClientError, MapClient,
     lessons::{Job, Size},
-    map::Extent,
+    map::LandmarkRegion,
 };
 use std::{path::PathBuf, process::ExitCode, time::Duration};
 use vision::{frame::Intrinsics, recognise::DistanceKind};
@@ -222,7 +222,7 @@ pub(crate) async fn map(command: &MapCommand) -> anyhow::Result<()> {
             show(server, &map, &format!("map {} created", map.name))
         }
         MapCommand::Place { name, found, server } => {
-            let map = MapClient::new(&server.server)?.place_map(name, &found.changes()).await?;
+            let map = MapClient::new(&server.server)?.locate_map(name, &found.changes()).await?;
             show(server, &map, &format!("{}  {}", map.name, map.whereabouts()))
         }
         MapCommand::Sight { name, sight, server } => {
@@ -285,7 +285,7 @@ pub(crate) async fn learn(args: &LearnArgs) -> anyhow::Result<ExitCode> {
         }
         Err(error) => return Err(error.into()),
     }
-    let extent = if args.whole_image { Extent::WholeImage } else { Extent::Detect };
+    let extent = if args.whole_image { LandmarkRegion::WholeImage } else { LandmarkRegion::Detect };
     let mut status = ExitCode::SUCCESS;
     let progress = screen::progress(args.images.len(), "uploading");
     for path in &args.images {

@@ -5,11 +5,11 @@ use super::Offer;
 use crate::store::placing::Capture;
 use engine::snapshot::MapSnapshot;
 use map::{
-    gather::{Glimpse, Identity},
-    mounting::Mounting,
+    extrinsics::CameraExtrinsics,
     place::LandmarkPlace,
-    placing::{PlacingParams, PlacingView, placement, view_on_wall},
+    placement::{PlacementParams, PosedView, placement, view_on_wall},
     pose2::Pose2Covariance,
+    tracks::{Identity, QuadObservation},
 };
 use nalgebra::Matrix2;
 use vision::{
@@ -33,7 +33,7 @@ const NEARLY: f64 = 1.5;
 
 /// What a frame gives.
 pub(super) struct Found {
-    pub(super) glimpses: Vec<Glimpse>,
+    pub(super) glimpses: Vec<QuadObservation>,
     /// Of each, the covariance of its corners by the detector.
     pub(super) corners_px2: Vec<[Matrix2<f64>; 4]>,
     /// How the picture was taken, if that is known well enough.
@@ -45,7 +45,7 @@ pub(super) struct Found {
 /// From where a frame was taken.
 struct Stand<'a> {
     camera: &'a Intrinsics,
-    mounting: &'a Mounting,
+    mounting: &'a CameraExtrinsics,
     map_from_robot: &'a Pose2Covariance,
 }
 
@@ -91,7 +91,7 @@ pub(super) fn glimpses(offer: &Offer, params: &Params) -> Found {
         let mut covariance = facts.quad.corner_covariance_px2;
         covariance.rotate_left(turn % 4);
         found.corners_px2.push(covariance);
-        found.glimpses.push(Glimpse { corners_px, icon, place, identity });
+        found.glimpses.push(QuadObservation { corners_px, icon, place, identity });
     }
     found
 }
@@ -117,8 +117,8 @@ fn place(
     let Some(Stand { camera, mounting, map_from_robot }) = stand.filter(|_| !map.walls.is_empty()) else {
         return Ok(None);
     };
-    let view = PlacingView { corners, covariance_px2, camera, map_from_robot, mounting };
-    let p = PlacingParams::default();
+    let view = PosedView { corners, covariance_px2, camera, map_from_robot, mounting };
+    let p = PlacementParams::default();
     let on_wall = view_on_wall(&view, &map.walls, &p).map_err(drop)?;
     placement(&[on_wall], &map.walls, &p).map(|made| Some(made.place)).map_err(drop)
 }
@@ -138,7 +138,8 @@ fn identity(
     let place_of = |id: &LandmarkId| map.landmarks.get(id).and_then(|l| l.place.as_ref());
     let there = |id: &LandmarkId| place.zip(place_of(id)).map(|(seen, known)| overlap(seen, known));
     if let Some(id) = recognised {
-        let trusted = map.landmarks.get(&id).is_some_and(|l| l.standing == map::changes::Standing::Sound);
+        let trusted =
+            map.landmarks.get(&id).is_some_and(|l| l.standing == map::landmark_health::LandmarkHealth::Sound);
         // Elsewhere than it hangs: moved, or not it.
         return if trusted && there(&id) != Some(false) {
             Identity::Landmark(id)

@@ -6,7 +6,7 @@ use engine::{
     frame_tap::{AnalysedFrame, FrameTap},
     slots::SlotKey,
 };
-use map::gather::{Outcome, Tracker};
+use map::tracks::{TrackOutcome, ViewTracker};
 use protos::CheckedFrame;
 use serde::{Deserialize, Serialize};
 use std::{
@@ -57,18 +57,18 @@ pub(crate) struct Counts {
 }
 
 impl Counts {
-    pub(super) fn add(&mut self, outcome: Outcome) {
+    pub(super) fn add(&mut self, outcome: TrackOutcome) {
         let count = match outcome {
             // Counted when it is committed.
-            Outcome::Keep(_) => return,
-            Outcome::Alike => &mut self.alike,
-            Outcome::TooNew => &mut self.too_new,
-            Outcome::Full => &mut self.full,
-            Outcome::Decided => &mut self.decided,
-            Outcome::Known => &mut self.known,
-            Outcome::Unwanted => &mut self.unwanted,
-            Outcome::Unlike => &mut self.unlike,
-            Outcome::TooMany => &mut self.too_many,
+            TrackOutcome::Keep(_) => return,
+            TrackOutcome::Alike => &mut self.alike,
+            TrackOutcome::TooNew => &mut self.too_new,
+            TrackOutcome::Full => &mut self.full,
+            TrackOutcome::Decided => &mut self.decided,
+            TrackOutcome::Known => &mut self.known,
+            TrackOutcome::Unwanted => &mut self.unwanted,
+            TrackOutcome::Unlike => &mut self.unlike,
+            TrackOutcome::TooMany => &mut self.too_many,
         };
         *count += 1;
     }
@@ -83,7 +83,7 @@ pub struct Session {
     pub(super) known: bool,
     /// Short holds only: workers count here.
     pub(super) counts: Mutex<Counts>,
-    pub(super) tracker: Mutex<Tracker>,
+    pub(super) tracker: Mutex<ViewTracker>,
     /// Tracks that somebody has decided on since the last frame. Short holds only: the writer tells of them here.
     pub(super) decided: Mutex<Vec<u32>>,
 }
@@ -94,7 +94,7 @@ pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 impl Session {
-    pub(super) fn new(row: &GatheringRow, tracker: Tracker) -> Self {
+    pub(super) fn new(row: &GatheringRow, tracker: ViewTracker) -> Self {
         Self {
             id: row.id,
             map: row.map.clone(),

@@ -1,5 +1,5 @@
 //! Gathering views while robots drive. The frame path offers what it has looked at and never waits: a bounded queue, and
-//! what does not fit is dropped and counted. One task follows things from frame to frame (`map::gather`), and what is
+//! what does not fit is dropped and counted. One task follows things from frame to frame (`map::tracks`), and what is
 //! worth keeping is committed before it counts as kept.
 //!
 //! It decides on no landmark: that is for a person (`store::accepting`).
@@ -25,7 +25,7 @@ use crate::{
 };
 use engine::{panics::Edge, picture};
 use hook::{Sessions, lock};
-use map::gather::{GatherParams, Kept, Outcome, Tracker};
+use map::tracks::{GatherParams, StoredTrack, TrackOutcome, ViewTracker};
 use protos::convert::Encoding;
 use sha2::{Digest, Sha256};
 use std::{collections::BTreeMap, sync::Arc};
@@ -67,8 +67,8 @@ impl Gatherer {
         Ok((gatherer, task))
     }
 
-    async fn resumed(&self, row: &GatheringRow) -> Result<Tracker, StoreError> {
-        let mut tracker = Tracker::new(GatherParams::default());
+    async fn resumed(&self, row: &GatheringRow) -> Result<ViewTracker, StoreError> {
+        let mut tracker = ViewTracker::new(GatherParams::default());
         let walls = self.store.snapshots().get(&row.map).map(|map| map.walls.clone()).unwrap_or_default();
         for track in gatherings::tracks(self.store.reads(), row.id).await? {
             tracker.number_after(track.number);
@@ -77,7 +77,7 @@ impl Gatherer {
             }
             let views = gatherings::track_views(self.store.reads(), row.id, track.number).await?;
             let captures = views.iter().map(|v| (&v.cut.corners_px, v.capture.as_deref()));
-            let kept = Kept {
+            let kept = StoredTrack {
                 number: track.number,
                 landmark: track.landmark_id.map(|id| LandmarkId(id as u64)),
                 sightings: track.sightings,
@@ -92,7 +92,7 @@ impl Gatherer {
         Ok(tracker)
     }
 
-    fn enter(&self, row: &GatheringRow, tracker: Tracker) {
+    fn enter(&self, row: &GatheringRow, tracker: ViewTracker) {
         let session = Arc::new(Session::new(row, tracker));
         self.sessions.rcu(|sessions| {
             let mut sessions = BTreeMap::clone(sessions);
@@ -124,7 +124,7 @@ impl Gatherer {
             Box::pin(async move {
                 let row = gatherings::create(tx, &map, &new, Bounds::SERVER).await?;
                 let begun = row.clone();
-                tx.after(move || gatherer.enter(&begun, Tracker::new(GatherParams::default())));
+                tx.after(move || gatherer.enter(&begun, ViewTracker::new(GatherParams::default())));
                 Ok(row)
             })
         });
@@ -211,7 +211,7 @@ impl Gatherer {
         }
     }
 
-    async fn keep(&self, session: &Session, kept: Box<Kept>, view: NewView) {
+    async fn keep(&self, session: &Session, kept: Box<StoredTrack>, view: NewView) {
         let id = session.id;
         let write = self.store.write(move |tx| {
             Box::pin(async move { gatherings::add_view(tx, id, &kept, &view, Bounds::SERVER).await })
@@ -234,7 +234,7 @@ impl Gatherer {
 }
 
 /// One frame: which of its quads are views to keep, and in which track.
-fn follow(offer: &Offer, params: &Params) -> Vec<(Kept, NewView)> {
+fn follow(offer: &Offer, params: &Params) -> Vec<(StoredTrack, NewView)> {
     let (session, frame) = (&offer.session, &offer.frame);
     let found = glimpses::glimpses(offer, params);
     let wanted = |id| session.landmark.map_or(session.known, |only| only == id);
@@ -244,7 +244,7 @@ fn follow(offer: &Offer, params: &Params) -> Vec<(Kept, NewView)> {
     }
     let at = (frame.captured_ns, offer.camera.as_str());
     let recognise: &RecogniseParams = &params.recognise;
-    let outcomes = tracker.follow(at, &found.glimpses, wanted, session.landmark.is_none(), recognise);
+    let outcomes = tracker.update(at, &found.glimpses, wanted, session.landmark.is_none(), recognise);
     let mut counts = lock(&session.counts);
     counts.unusable += found.unusable;
     counts.not_on_wall += found.not_on_wall;
@@ -254,9 +254,9 @@ fn follow(offer: &Offer, params: &Params) -> Vec<(Kept, NewView)> {
     drop(counts);
     let mut views = vec![];
     for ((glimpse, corners_px2), outcome) in found.glimpses.iter().zip(&found.corners_px2).zip(outcomes) {
-        let Outcome::Keep(number) = outcome else { continue };
+        let TrackOutcome::Keep(number) = outcome else { continue };
         let Some(track) = tracker.tracks().iter().find(|t| t.number == number) else { continue };
-        let kept = Kept {
+        let kept = StoredTrack {
             number,
             landmark: track.landmark,
             sightings: track.sightings,
@@ -272,7 +272,7 @@ fn follow(offer: &Offer, params: &Params) -> Vec<(Kept, NewView)> {
     views
 }
 
-fn view(offer: &Offer, glimpse: &map::gather::Glimpse, capture: Option<&Capture>) -> Option<NewView> {
+fn view(offer: &Offer, glimpse: &map::tracks::QuadObservation, capture: Option<&Capture>) -> Option<NewView> {
     let (frame, grey) = (&offer.frame, &offer.looked.image);
     let (image, image_kind) = match frame.encoding {
         Encoding::Jpeg => (frame.image.to_vec(), "jpeg"),

@@ -9,11 +9,14 @@ use crate::store::{
     areas::{self, Settings},
     maps,
 };
-use ::map::{
-    areas::{Advice, Areas, CELL_M, Cell, Level, MAX_AREAS, Mode, Module, Modules, NamedArea},
+use axum::{Json, extract::State};
+use map::{
+    modality_stats::{
+        CELL_M, FusionMode, MAX_AREAS, Modality, ModalityAdvice, ModalityMap, NamedArea, PoseCell,
+        StatsByModality, StatsScope,
+    },
     pose2::Pose2,
 };
-use axum::{Json, extract::State};
 use serde::{Deserialize, Serialize};
 use std::{f64::consts::FRAC_PI_2, sync::Arc};
 use utoipa::{IntoParams, ToSchema};
@@ -38,7 +41,7 @@ enum Fusion {
     Single,
 }
 
-impl From<Fusion> for Mode {
+impl From<Fusion> for FusionMode {
     fn from(fusion: Fusion) -> Self {
         match fusion {
             Fusion::All => Self::All,
@@ -48,12 +51,12 @@ impl From<Fusion> for Mode {
     }
 }
 
-impl From<Mode> for Fusion {
-    fn from(mode: Mode) -> Self {
+impl From<FusionMode> for Fusion {
+    fn from(mode: FusionMode) -> Self {
         match mode {
-            Mode::All => Self::All,
-            Mode::Fuse => Self::Fuse,
-            Mode::Single => Self::Single,
+            FusionMode::All => Self::All,
+            FusionMode::Fuse => Self::Fuse,
+            FusionMode::Single => Self::Single,
         }
     }
 }
@@ -85,7 +88,7 @@ struct Change {
 pub(super) struct Shown {
     /// `odometry`, `laser` or `landmarks`.
     #[schema(value_type = String)]
-    module: Module,
+    module: Modality,
     /// Mean error of its own position.
     mean: [f64; 3],
     /// Standard deviations about that.
@@ -105,8 +108,8 @@ pub(super) struct Shown {
 }
 
 impl Shown {
-    pub(super) fn all(found: &Modules) -> Vec<Self> {
-        let one = |(module, evidence): (Module, &::map::areas::Evidence)| {
+    pub(super) fn all(found: &StatsByModality) -> Vec<Self> {
+        let one = |(module, evidence): (Modality, &::map::modality_stats::ModalityStats)| {
             let figures = evidence.figures();
             Self {
                 module,
@@ -120,7 +123,7 @@ impl Shown {
                 measurements: evidence.fixes(),
             }
         };
-        Module::ALL.into_iter().zip(found).map(one).collect()
+        Modality::ALL.into_iter().zip(found).map(one).collect()
     }
 }
 
@@ -129,13 +132,13 @@ impl Shown {
 struct Told {
     /// The best module; absent where too little is known, and everything is fused.
     #[schema(value_type = Option<String>)]
-    best: Option<Module>,
+    best: Option<Modality>,
     /// What is fused.
     #[schema(value_type = Vec<String>)]
-    used: Vec<Module>,
+    used: Vec<Modality>,
     /// Whose runs say so: those through the `cell`, those through the named `area`, or all of the `map`.
     #[schema(value_type = String)]
-    level: Level,
+    level: StatsScope,
     /// What each module gets wrong there beyond what it claims.
     faults: Vec<Wrong>,
 }
@@ -145,28 +148,28 @@ struct Told {
 struct Wrong {
     /// Which.
     #[schema(value_type = String)]
-    module: Module,
+    module: Modality,
     /// Subtracted from what it says: metres, metres, radians; of odometry for each metre.
     bias: [f64; 3],
     /// Added to each variance, as a share of what it claims.
     excess: [f64; 3],
 }
 
-impl From<&Advice> for Told {
-    fn from(advice: &Advice) -> Self {
+impl From<&ModalityAdvice> for Told {
+    fn from(advice: &ModalityAdvice) -> Self {
         let wrong = |module| {
             let fault = advice.fault(module);
             Wrong { module, bias: fault.bias.into(), excess: fault.excess.into() }
         };
         Self {
             best: advice.best,
-            used: Module::ALL
+            used: Modality::ALL
                 .into_iter()
                 .zip(advice.used)
                 .filter_map(|(m, used)| used.then_some(m))
                 .collect(),
             level: advice.level,
-            faults: Module::ALL.map(wrong).into(),
+            faults: Modality::ALL.map(wrong).into(),
         }
     }
 }
@@ -182,10 +185,10 @@ struct Square {
     heading_rad: f64,
     /// The best module; absent where too little is known.
     #[schema(value_type = Option<String>)]
-    best: Option<Module>,
+    best: Option<Modality>,
     /// What is fused.
     #[schema(value_type = Vec<String>)]
-    used: Vec<Module>,
+    used: Vec<Modality>,
 }
 
 /// A named area and what is known of it.
@@ -229,7 +232,7 @@ fn heading_rad(heading: u8) -> f64 {
     Pose2::new(0.0, 0.0, f64::from(heading) * FRAC_PI_2).theta_rad
 }
 
-fn square(cell: &Cell, advice: &Advice) -> Square {
+fn square(cell: &PoseCell, advice: &ModalityAdvice) -> Square {
     let told = Told::from(advice);
     Square {
         x_m: f64::from(cell.x) * CELL_M,
@@ -241,7 +244,7 @@ fn square(cell: &Cell, advice: &Advice) -> Square {
 }
 
 impl AllAreas {
-    fn new(areas: &Areas) -> Self {
+    fn new(areas: &ModalityMap) -> Self {
         let named = areas.named().map(|(area, by_heading)| KnownArea {
             name: area.name.clone(),
             corners_m: area.corners_m.clone(),
@@ -263,7 +266,7 @@ impl AllAreas {
     }
 }
 
-fn known(app: &Shared, map: &str) -> Result<Arc<Areas>, ApiError> {
+fn known(app: &Shared, map: &str) -> Result<Arc<ModalityMap>, ApiError> {
     let found = app.store.snapshots().get(map);
     let found =
         found.ok_or_else(|| crate::store::StoreError::NotFound { what: "map", name: map.to_owned() })?;
@@ -306,7 +309,7 @@ async fn put(
     Body(change): Body<Change>,
 ) -> Result<Json<AllAreas>, ApiError> {
     let named = change.areas.map(checked).transpose()?;
-    let mode = change.mode.map(Mode::from);
+    let mode = change.mode.map(FusionMode::from);
     let name = map.clone();
     let write = app.store.write(move |tx| {
         Box::pin(async move {
@@ -346,7 +349,7 @@ async fn at(
     maps::get(app.store.reads(), &map).await?;
     let pose = Pose2::new(place.x_m, place.y_m, place.theta_rad);
     pose.check().map_err(|e| ApiError::invalid("out_of_range", e.field, e.to_string()))?;
-    let (areas, cell) = (known(&app, &map)?, Cell::of(&pose));
+    let (areas, cell) = (known(&app, &map)?, PoseCell::of(&pose));
     let found = areas.cells().find(|(other, ..)| **other == cell).map(|(_, found, _)| *found);
     let advice = areas.advice(&pose);
     Ok(Json(Known { told: (&advice).into(), modules: Shown::all(&found.unwrap_or_default()) }))

@@ -11,7 +11,7 @@ use crate::{
 };
 use axum::{Json, extract::State, http::StatusCode};
 use engine::cameras::CameraState;
-use map::localise::watch::WatchState;
+use map::localise::intrinsics_monitor::IntrinsicsMonitorState;
 use protos::{convert::geometry::intrinsics_wire, v1};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -43,7 +43,7 @@ struct Camera {
     views: usize,
     /// What the residuals of its fixes say: `suspicion` is set when the intrinsics seem off, with the reason and its number.
     #[schema(value_type = Object)]
-    watch: WatchState,
+    watch: IntrinsicsMonitorState,
 }
 
 impl From<(String, CameraState)> for Camera {

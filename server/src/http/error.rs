@@ -2,7 +2,7 @@
 //! caused by is logged, never sent.
 
 use crate::store::StoreError;
-use ::map::frames::FrameError;
+use ::map::map_links::MapLinkError;
 use axum::{
     http::{HeaderValue, StatusCode, header},
     response::{IntoResponse, Response},
@@ -128,9 +128,9 @@ impl From<StoreError> for ApiError {
             StoreError::InUse(_) => Self::new(StatusCode::CONFLICT, "in_use", detail),
             StoreError::Frames(error) => {
                 let code = match error {
-                    FrameError::Cycle => "cycle",
-                    FrameError::TooDeep => "too_deep",
-                    FrameError::NotRelated => "not_related",
+                    MapLinkError::Cycle => "cycle",
+                    MapLinkError::TooDeep => "too_deep",
+                    MapLinkError::NotRelated => "not_related",
                 };
                 Self::new(StatusCode::CONFLICT, code, detail).field("parent.map")
             }

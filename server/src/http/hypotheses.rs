@@ -7,9 +7,9 @@ use super::{
     resources::row_major,
 };
 use crate::store::robots;
-use ::map::hypotheses::{HypothesesParams, Mode};
 use axum::{Json, extract::State};
 use engine::search::Need;
+use map::relocalise::{GridBeliefParams, PoseHypothesis};
 use serde::Serialize;
 use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
@@ -33,8 +33,8 @@ struct Hypothesis {
     covariance: [f64; 9],
 }
 
-impl From<&Mode> for Hypothesis {
-    fn from(Mode { mass, pose }: &Mode) -> Self {
+impl From<&PoseHypothesis> for Hypothesis {
+    fn from(PoseHypothesis { mass, pose }: &PoseHypothesis) -> Self {
         let (x_m, y_m, theta_rad) = (pose.pose.x_m, pose.pose.y_m, pose.pose.theta_rad);
         Self { probability: *mass, x_m, y_m, theta_rad, covariance: row_major(&pose.covariance) }
     }
@@ -69,7 +69,7 @@ struct Possible {
     responses((status = 200, body = Possible), (status = 404, body = Problem)))]
 async fn hypotheses(State(app): State<Shared>, At(robot): At<String>) -> Result<Json<Possible>, ApiError> {
     robots::get(app.store.reads(), &robot).await?;
-    let decided_above = HypothesesParams::default().decided;
+    let decided_above = GridBeliefParams::default().decided;
     let (robot, searches) = (name("robot", robot)?, app.searches.clone());
     // A search may be in work for some milliseconds, on its own thread.
     let asked = tokio::task::spawn_blocking(move || searches.progress(&robot));

@@ -14,7 +14,7 @@ use crate::{
     },
 };
 use axum::{Json, extract::State, http::StatusCode};
-use map::changes::Standing;
+use map::landmark_health::LandmarkHealth;
 use serde::{Deserialize, Deserializer};
 use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
@@ -127,7 +127,7 @@ async fn patch(
 ) -> Result<Json<Landmark>, ApiError> {
     let checked = measures(changes.size.flatten(), changes.place.flatten())?;
     let (size, place) = (changes.size.is_some(), changes.place.is_some());
-    let (map_name, standing) = (map.clone(), changes.standing.map(Standing::from));
+    let (map_name, standing) = (map.clone(), changes.standing.map(LandmarkHealth::from));
     let write = app.store.write(move |tx| {
         Box::pin(async move {
             let changed = landmarks::update(tx, &map, &landmark, |old| landmarks::Measures {

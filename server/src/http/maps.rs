@@ -11,11 +11,11 @@ use crate::store::{
     maps,
     sites::{self, Whereabouts},
 };
-use ::map::{
-    frames::{Link, relation},
+use axum::{Json, extract::State, http::StatusCode};
+use map::{
+    map_links::{MapLink, relation},
     pose2::{Pose2, Pose2Covariance},
 };
-use axum::{Json, extract::State, http::StatusCode};
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
@@ -242,7 +242,7 @@ async fn transform(
 ) -> Result<Json<Transform>, ApiError> {
     maps::get(app.store.reads(), &map).await?;
     maps::get(app.store.reads(), &query.to).await.map_err(|e| ApiError::from(e).field("to"))?;
-    let links: std::collections::BTreeMap<String, Link<String>> =
+    let links: std::collections::BTreeMap<String, MapLink<String>> =
         sites::links(&sites::all(app.store.reads()).await?);
     let found = relation(&links, &map, &query.to)
         .map_err(|e| ApiError::from(crate::store::StoreError::from(e)).field("to"))?;

@@ -13,9 +13,9 @@ use engine::{
     motion::{Known, Motion},
 };
 use map::{
-    changes::Standing,
     check::OutOfRange,
-    frames::Link,
+    landmark_health::LandmarkHealth,
+    map_links::MapLink,
     place::{LandmarkPlace, PlaceSigmas},
     pose2::{Pose2, Pose2Covariance},
     segments::LaserSegment,
@@ -106,19 +106,19 @@ const LINK_SIGMA: [f64; 3] = [0.05, 0.05, 0.0087];
 
 impl Parent {
     /// Checked.
-    pub(super) fn link(self) -> Result<Link<String>, ApiError> {
+    pub(super) fn link(self) -> Result<MapLink<String>, ApiError> {
         let usual = || Matrix3::from_diagonal(&Vector3::from(LINK_SIGMA.map(|sigma| sigma * sigma)));
         let covariance = self.covariance.map_or_else(usual, |c| Matrix3::from_row_slice(&c));
         let pose = Pose2::new(self.x_m, self.y_m, self.theta_rad);
         let parent_from_map = Pose2Covariance { pose, covariance };
-        let link = Link { parent: self.map, parent_from_map, level_m: self.level_m };
+        let link = MapLink { parent: self.map, parent_from_map, level_m: self.level_m };
         link.check().map_err(|e| out_of_range(&e, "parent"))?;
         Ok(link)
     }
 }
 
-impl From<&Link<String>> for Parent {
-    fn from(link: &Link<String>) -> Self {
+impl From<&MapLink<String>> for Parent {
+    fn from(link: &MapLink<String>) -> Self {
         let Pose2Covariance { pose, covariance } = &link.parent_from_map;
         Self {
             map: link.parent.clone(),
@@ -281,17 +281,17 @@ pub(super) enum Trust {
     Quarantined,
 }
 
-impl From<Standing> for Trust {
-    fn from(standing: Standing) -> Self {
+impl From<LandmarkHealth> for Trust {
+    fn from(standing: LandmarkHealth) -> Self {
         match standing {
-            Standing::Sound => Self::Sound,
-            Standing::Flagged => Self::Flagged,
-            Standing::Quarantined => Self::Quarantined,
+            LandmarkHealth::Sound => Self::Sound,
+            LandmarkHealth::Flagged => Self::Flagged,
+            LandmarkHealth::Quarantined => Self::Quarantined,
         }
     }
 }
 
-impl From<Trust> for Standing {
+impl From<Trust> for LandmarkHealth {
     fn from(trust: Trust) -> Self {
         match trust {
             Trust::Sound => Self::Sound,

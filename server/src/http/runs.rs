@@ -7,13 +7,15 @@ use super::{
     extract::{At, BodyUpTo, name},
 };
 use crate::store::{areas, maps, robots};
-use ::map::{
-    areas::{MAX_REFERENCE, Modules, Reference, ReferenceError, learn},
-    fuse::FuseParams,
-    pose2::Pose2,
-};
 use axum::{Json, extract::State, http::StatusCode};
 use engine::motion::{Recorded, RunError};
+use map::{
+    fuse::FuseParams,
+    modality_stats::{
+        MAX_REFERENCE, ReferenceError, ReferenceTrajectory, StatsByModality, learn_modality_stats,
+    },
+    pose2::Pose2,
+};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
@@ -107,7 +109,7 @@ struct LearntRun {
 
 impl From<areas::RunRow> for LearntRun {
     fn from(row: areas::RunRow) -> Self {
-        let mut sums = Modules::default();
+        let mut sums = StatsByModality::default();
         for found in row.cells.values() {
             for (sum, more) in sums.iter_mut().zip(found) {
                 sum.add(more);
@@ -124,7 +126,7 @@ impl From<areas::RunRow> for LearntRun {
     }
 }
 
-fn reference_of(path: KnownPath) -> Result<Reference, ApiError> {
+fn reference_of(path: KnownPath) -> Result<ReferenceTrajectory, ApiError> {
     if path.poses.len() > MAX_REFERENCE {
         return Err(ApiError::invalid("too_many", "poses", format!("more than {MAX_REFERENCE} poses")));
     }
@@ -133,8 +135,11 @@ fn reference_of(path: KnownPath) -> Result<Reference, ApiError> {
         .into_iter()
         .map(|(at_ns, x, y, theta)| (at_ns, Pose2 { x_m: x, y_m: y, theta_rad: theta }));
     let [sigma_m, sigma_rad] = USUAL;
-    let made =
-        Reference::new(poses.collect(), path.sigma_m.unwrap_or(sigma_m), path.sigma_rad.unwrap_or(sigma_rad));
+    let made = ReferenceTrajectory::new(
+        poses.collect(),
+        path.sigma_m.unwrap_or(sigma_m),
+        path.sigma_rad.unwrap_or(sigma_rad),
+    );
     made.map_err(|error| {
         let (code, field) = match &error {
             ReferenceError::Pose { index, error } => {
@@ -166,7 +171,7 @@ async fn reference(
     let (motion, whose) = (app.motion.clone(), robot.to_string());
     let work = move |_: &App| {
         let mut lent = motion.lend_recording(&robot)?;
-        let learnt = learn(&lent.recording.against(&known), &FuseParams::default());
+        let learnt = learn_modality_stats(&lent.recording.against(&known), &FuseParams::default());
         Ok((lent, learnt))
     };
     let (lent, learnt) = app.clone().on_vision_thread(work).await?.map_err(refused)?;

@@ -10,7 +10,7 @@ use crate::store::{maps, sights};
 use ::map::{
     check::OutOfRange,
     place::LandmarkPlace,
-    visibility::{Obstacle, Sight, Viewer, VisibilityMap, VisibilityParams, visibility},
+    visibility::{Obstacle, PanTiltCamera, VisibilityMap, VisibilityParams, VisibilitySettings, visibility},
 };
 use axum::{Json, extract::State, http::StatusCode};
 use engine::snapshot::MapSnapshot;
@@ -59,8 +59,8 @@ pub(super) struct Fields {
     standoff_m: Option<f64>,
 }
 
-impl From<&Sight> for Fields {
-    fn from(Sight { viewer, seen }: &Sight) -> Self {
+impl From<&VisibilitySettings> for Fields {
+    fn from(VisibilitySettings { viewer, seen }: &VisibilitySettings) -> Self {
         Self {
             focal_px: Some(viewer.focal_px),
             width_px: Some(viewer.width_px),
@@ -80,11 +80,11 @@ impl From<&Sight> for Fields {
 
 impl Fields {
     /// What is absent is as in `usual`.
-    fn over(&self, usual: &Sight) -> Result<Sight, OutOfRange> {
-        let Sight { viewer, seen } = usual;
+    fn over(&self, usual: &VisibilitySettings) -> Result<VisibilitySettings, OutOfRange> {
+        let VisibilitySettings { viewer, seen } = usual;
         let or = |given: Option<f64>, usual: f64| given.unwrap_or(usual);
-        let made = Sight {
-            viewer: Viewer {
+        let made = VisibilitySettings {
+            viewer: PanTiltCamera {
                 focal_px: or(self.focal_px, viewer.focal_px),
                 width_px: or(self.width_px, viewer.width_px),
                 height_px: or(self.height_px, viewer.height_px),
@@ -107,7 +107,11 @@ impl Fields {
     }
 
     /// The camera of one question, if it names any: the map's with these numbers.
-    pub(super) fn other(&self, map: &MapSnapshot, outer: &str) -> Result<Option<Sight>, ApiError> {
+    pub(super) fn other(
+        &self,
+        map: &MapSnapshot,
+        outer: &str,
+    ) -> Result<Option<VisibilitySettings>, ApiError> {
         let made = self.over(&map.sight).map_err(|e| refused(&e, outer))?;
         Ok((made != map.sight).then_some(made))
     }
@@ -151,7 +155,7 @@ async fn put(
     At(map): At<String>,
     Body(fields): Body<Fields>,
 ) -> Result<Json<Fields>, ApiError> {
-    let sight = fields.over(&Sight::default()).map_err(|e| refused(&e, ""))?;
+    let sight = fields.over(&VisibilitySettings::default()).map_err(|e| refused(&e, ""))?;
     let stored = Fields::from(&sight);
     app.store.write(move |tx| Box::pin(async move { sights::set(tx, &map, &sight).await })).await?;
     Ok(Json(stored))
@@ -164,7 +168,7 @@ pub(super) type Areas = BTreeMap<LandmarkId, Arc<VisibilityMap>>;
 /// and how far it could be seen) says may matter.
 pub(super) fn areas(
     map: &MapSnapshot,
-    other: Option<&Sight>,
+    other: Option<&VisibilitySettings>,
     near: impl Fn(&LandmarkPlace, f64) -> bool,
 ) -> Result<Areas, ApiError> {
     let Some(sight) = other else { return Ok(map.visibility.clone()) };
@@ -201,7 +205,7 @@ mod tests {
         assert_eq!(made.viewer.width_px.to_bits(), map.sight.viewer.width_px.to_bits());
         let wrong = Fields { tilt_low_rad: Some(0.4), ..Fields::default() };
         assert_eq!(wrong.other(&map, "sight").unwrap_err().field.as_deref(), Some("sight.tilt_high_rad"));
-        assert_eq!(Fields::from(&made).over(&Sight::default()).unwrap(), made, "there and back");
+        assert_eq!(Fields::from(&made).over(&VisibilitySettings::default()).unwrap(), made, "there and back");
     }
 
     #[test]
@@ -214,7 +218,10 @@ mod tests {
             landmarks: (0..count).map(|i| (LandmarkId(i), info())).collect(),
             ..MapSnapshot::empty("hall", 1)
         };
-        let sight = Sight { viewer: Viewer { focal_px: 300.0, ..Viewer::default() }, ..Sight::default() };
+        let sight = VisibilitySettings {
+            viewer: PanTiltCamera { focal_px: 300.0, ..PanTiltCamera::default() },
+            ..VisibilitySettings::default()
+        };
         let near = |_: &LandmarkPlace, reach: f64| reach > 2.3;
         let made = areas(&map(MAX_MADE as u64), Some(&sight), near).unwrap();
         assert!(made.len() == MAX_MADE && made[&LandmarkId(0)].area_m2() > 1.0);

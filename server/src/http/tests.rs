@@ -245,7 +245,7 @@ async fn large_bodies_take_a_place_before_they_are_read() {
 
 #[tokio::test]
 async fn a_known_path_may_be_as_long_as_it_is_promised() {
-    use ::map::areas::MAX_REFERENCE;
+    use ::map::modality_stats::MAX_REFERENCE;
     let service = Service::start(Limits::default()).await;
     let path = |poses: usize| {
         let pose = |i: usize| {
@@ -265,24 +265,24 @@ async fn a_known_path_may_be_as_long_as_it_is_promised() {
 /// A robot whose odometry says that it is 7 m less far than it is: a frame a second with the landmark of this number, that
 /// puts it there.
 fn framed(service: &Service, seconds: u64, (landmark, x_m): (u64, f64)) {
-    use ::map::{
-        localise::{DecidedBy, Fix, Modality, RobotFix},
+    use engine::motion::{FrameFixes, Moment};
+    use map::{
+        localise::{AmbiguityResolvedBy, Fix, FixResult, FixSource},
         pose2::{Pose2, Pose2Covariance},
     };
-    use engine::motion::{FrameFixes, Moment};
     let (r1, front) = (protos::Name::new("r1").unwrap(), protos::Name::new("front").unwrap());
     let odometry = Pose2::new(seconds as f64 * 0.1, 0.0, 0.0);
     let captured_ns = seconds as i64 * 1_000_000_000;
     let at = Moment { map: "hall", epoch: 1, captured_ns, odometry: Some(odometry), now: Instant::now() };
     let prior = service.engine.motion.grounds(&r1, &front, at).map(|grounds| grounds.pose);
     let covariance = nalgebra::Matrix3::identity() * 1e-4;
-    let fix = RobotFix::Fixed(Box::new(Fix {
-        modality: Modality::Landmarks,
+    let fix = FixResult::Fixed(Box::new(Fix {
+        modality: FixSource::Landmarks,
         pose: Pose2Covariance { pose: Pose2::new(x_m, 0.0, 0.0), covariance },
         noise: covariance,
         nuisances: Vec::new(),
         landmarks: vec![vision::recognise::LandmarkId(landmark)],
-        decided_by: DecidedBy::Single,
+        decided_by: AmbiguityResolvedBy::Single,
         chi2: 1.0,
         dof: 5,
     }));

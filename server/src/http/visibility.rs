@@ -14,10 +14,10 @@ use engine::{
     snapshot::MapSnapshot,
 };
 use map::{
-    gaze::{Choice, Criterion, GazeParams, Head},
+    gaze::{Criterion, GazeParams, GazeTarget, PanTiltUnit},
     place::LandmarkPlace,
     pose2::{Pose2, Pose2Covariance},
-    visibility::{Feature, PoseDraws, Sight, Viewer, coverage},
+    visibility::{Feature, PanTiltCamera, PoseDraws, VisibilitySettings, coverage},
 };
 use nalgebra::{Matrix3, Point2, Vector2};
 use serde::{Deserialize, Serialize};
@@ -146,7 +146,7 @@ async fn visible(
 fn visible_from(
     map: &MapSnapshot,
     pose: &Pose2Covariance,
-    other: Option<&Sight>,
+    other: Option<&VisibilitySettings>,
 ) -> Result<Visible, ApiError> {
     let draws = PoseDraws::new(pose, Vector2::zeros());
     let near = |place: &LandmarkPlace, reach: f64| {
@@ -232,7 +232,7 @@ fn covered(map: &MapSnapshot, along: &Along) -> Result<Coverage, ApiError> {
     let made = sight::areas(map, other.as_ref(), near)?;
     let areas: Vec<_> = made.iter().map(|(id, area)| (*id, &**area)).collect();
     let found = coverage(&path, along.step_m, &areas).map_err(|e| out_of_range(&e, "path"))?;
-    let step = |s: &map::visibility::Seen| Step {
+    let step = |s: &map::visibility::CoverageSample| Step {
         along_m: s.along_m,
         x_m: s.position.x,
         y_m: s.position.y,
@@ -264,10 +264,10 @@ struct Question {
     /// `camera_m`, `pan_rad`, `tilt_rad`, `rate_radps`.
     #[serde(default)]
     #[schema(value_type = Object)]
-    head: Head,
+    head: PanTiltUnit,
     /// `focal_px`, `pan_rad`, `tilt_rad` and the rest of the camera; absent for the map's (`/maps/{map}/sight`).
     #[schema(value_type = Option<Object>)]
-    viewer: Option<Viewer>,
+    viewer: Option<PanTiltCamera>,
     /// `product` (the paper's) or `information`.
     #[serde(default)]
     #[schema(value_type = String)]
@@ -296,7 +296,7 @@ struct Advice {
     ranked: Vec<Aim>,
 }
 
-fn aim(map: &MapSnapshot, c: &Choice) -> Aim {
+fn aim(map: &MapSnapshot, c: &GazeTarget) -> Aim {
     Aim {
         landmark: name_of(map, c.landmark),
         pan_rad: c.pan_rad,

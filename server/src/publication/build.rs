@@ -11,7 +11,9 @@ use engine::{
     panics::{Edge, Panics},
     snapshot::{LandmarkInfo, LookAlikeClasses, MapSnapshot, Pending, Snapshots, StoredModel},
 };
-use map::{areas::Areas, laser_fix::WallIndex, segments::LaserSegment, visibility::VisibilityMap};
+use map::{
+    laser_fix::WallIndex, modality_stats::ModalityMap, segments::LaserSegment, visibility::VisibilityMap,
+};
 use sqlx::SqliteConnection;
 use std::{collections::BTreeMap, sync::Arc};
 use vision::{
@@ -103,7 +105,7 @@ async fn modalities(
     conn: &mut SqliteConnection,
     id: i64,
     before: Option<&MapSnapshot>,
-) -> Result<(Arc<Areas>, (i64, i64)), StoreError> {
+) -> Result<(Arc<ModalityMap>, (i64, i64)), StoreError> {
     let settings = areas::settings(&mut *conn, id).await?;
     let numbers = areas::run_numbers(&mut *conn, id).await?;
     let is_same = |before: &&MapSnapshot| {
@@ -116,7 +118,7 @@ async fn modalities(
         return Ok((before.modalities.clone(), numbers));
     }
     let runs = areas::runs(conn, id).await?;
-    let areas = Areas::new(settings.mode, settings.named, runs.iter().map(|run| &run.cells));
+    let areas = ModalityMap::new(settings.mode, settings.named, runs.iter().map(|run| &run.cells));
     Ok((Arc::new(areas), numbers))
 }
 

@@ -4,7 +4,7 @@
 use engine::snapshot::MapSnapshot;
 use map::{
     place::LandmarkPlace,
-    visibility::{Obstacle, Sight, VisibilityMap, visibility, within_reach},
+    visibility::{Obstacle, VisibilityMap, VisibilitySettings, visibility, within_reach},
 };
 use std::{collections::BTreeMap, sync::Arc};
 use vision::recognise::LandmarkId;
@@ -29,7 +29,7 @@ pub(super) fn areas(map: &MapSnapshot, before: Option<&MapSnapshot>) -> Areas {
 fn all(
     places: &[(LandmarkId, LandmarkPlace)],
     obstacles: &[Obstacle],
-    sight: &Sight,
+    sight: &VisibilitySettings,
     before: Option<&MapSnapshot>,
 ) -> Areas {
     let before = before.filter(|before| before.sight == *sight);
@@ -64,7 +64,7 @@ mod tests {
             |x| LandmarkPlace::by_hand(Vector3::new(x, 0.0, 1.5), 0.0, size, PlaceSigmas::default()).unwrap();
         let places = [(LandmarkId(1), place(0.0)), (LandmarkId(2), place(50.0))];
         let wall = |x: f64| Obstacle { a: Point2::new(x, -1.0), b: Point2::new(x, 1.0), height_m: None };
-        let usual = Sight::default();
+        let usual = VisibilitySettings::default();
         let first = all(&places, &[wall(2.0), wall(53.0)], &usual, None);
         let info = |place| LandmarkInfo {
             name: String::new(),

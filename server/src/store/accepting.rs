@@ -315,7 +315,8 @@ pub(super) mod tests {
     }
 
     async fn keep(store: &Catalogue, id: i64, view: NewView) {
-        let kept = map::gather::Kept { number: 1, landmark: None, sightings: 3, known: 0, place: None };
+        let kept =
+            map::tracks::StoredTrack { number: 1, landmark: None, sightings: 3, known: 0, place: None };
         let bounds = gatherings::Bounds::SERVER;
         let write = store.write(move |tx| {
             Box::pin(async move { gatherings::add_view(tx, id, &kept, &view, bounds).await })

@@ -1,7 +1,7 @@
 //! What runs have shown of a map's modalities, the areas that somebody named, and what is fused.
 
 use super::{StoreError, Tx, maps, now_ms, statements::statements, within};
-use map::areas::{Cell, MAX_AREAS, Mode, Modules, NamedArea};
+use map::modality_stats::{FusionMode, MAX_AREAS, NamedArea, PoseCell, StatsByModality};
 use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 use std::collections::BTreeMap;
 
@@ -25,29 +25,29 @@ pub(crate) struct RunRow {
     pub(crate) robot: String,
     pub(crate) created_ms: i64,
     pub(crate) way_m: f64,
-    pub(crate) cells: BTreeMap<Cell, Modules>,
+    pub(crate) cells: BTreeMap<PoseCell, StatsByModality>,
 }
 
 /// What administrators set.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Settings {
-    pub(crate) mode: Mode,
+    pub(crate) mode: FusionMode,
     pub(crate) named: Vec<NamedArea>,
 }
 
-fn mode_word(mode: Mode) -> &'static str {
+fn mode_word(mode: FusionMode) -> &'static str {
     match mode {
-        Mode::All => "all",
-        Mode::Fuse => "fuse",
-        Mode::Single => "single",
+        FusionMode::All => "all",
+        FusionMode::Fuse => "fuse",
+        FusionMode::Single => "single",
     }
 }
 
-fn mode_of(word: &str) -> Mode {
+fn mode_of(word: &str) -> FusionMode {
     match word {
-        "fuse" => Mode::Fuse,
-        "single" => Mode::Single,
-        _ => Mode::All,
+        "fuse" => FusionMode::Fuse,
+        "single" => FusionMode::Single,
+        _ => FusionMode::All,
     }
 }
 
@@ -57,8 +57,8 @@ fn json<T: serde::Serialize>(what: &'static str, value: &T) -> Result<String, St
 }
 
 /// Cells of a run; those that cannot be (a file from elsewhere) are left out.
-fn cells_of(text: &str) -> BTreeMap<Cell, Modules> {
-    let read: Vec<(Cell, Modules)> = serde_json::from_str(text).unwrap_or_else(|error| {
+fn cells_of(text: &str) -> BTreeMap<PoseCell, StatsByModality> {
+    let read: Vec<(PoseCell, StatsByModality)> = serde_json::from_str(text).unwrap_or_else(|error| {
         tracing::warn!(%error, "what a run showed cannot be read and is not used");
         Vec::new()
     });
@@ -116,7 +116,7 @@ pub(crate) async fn add(
     map: &str,
     robot: &str,
     way_m: f64,
-    cells: &BTreeMap<Cell, Modules>,
+    cells: &BTreeMap<PoseCell, StatsByModality>,
 ) -> Result<i64, StoreError> {
     let map = maps::get(&mut tx.conn, map).await?;
     let cells = json("a run", &cells.iter().collect::<Vec<_>>())?;
@@ -160,19 +160,19 @@ pub(crate) async fn run_numbers(
 mod tests {
     use super::*;
     use crate::publication::{Catalogue, tests::config};
-    use map::areas::Areas;
+    use map::modality_stats::ModalityMap;
     use std::sync::Arc;
     use vision::recognise::DistanceKind;
 
-    fn shown(x: i32) -> BTreeMap<Cell, Modules> {
-        [(Cell { x, y: -2, heading: 3 }, Modules::default())].into()
+    fn shown(x: i32) -> BTreeMap<PoseCell, StatsByModality> {
+        [(PoseCell { x, y: -2, heading: 3 }, StatsByModality::default())].into()
     }
 
     async fn put(store: &Catalogue, x: i32) -> Result<i64, StoreError> {
         store.write(move |tx| Box::pin(async move { add(tx, "a", "r1", 12.5, &shown(x)).await })).await
     }
 
-    fn known(store: &Catalogue) -> (u64, Arc<Areas>) {
+    fn known(store: &Catalogue) -> (u64, Arc<ModalityMap>) {
         let map = store.snapshots().get("a").unwrap();
         (map.version, map.modalities.clone())
     }
@@ -188,10 +188,10 @@ mod tests {
         assert_eq!(known(&store).1.cells().count(), 2);
         let hall = NamedArea { name: "hall".into(), corners_m: vec![[0.0, 0.0], [4.0, 0.0], [4.0, 3.0]] };
         let named = vec![hall.clone()];
-        let settings = Settings { mode: Mode::Single, named };
+        let settings = Settings { mode: FusionMode::Single, named };
         store.write(|tx| Box::pin(async move { set(tx, "a", |_| settings).await })).await.unwrap();
         let (version, areas) = known(&store);
-        assert_eq!((areas.mode(), areas.named().count(), areas.cells().count()), (Mode::Single, 1, 2));
+        assert_eq!((areas.mode(), areas.named().count(), areas.cells().count()), (FusionMode::Single, 1, 2));
         // What has nothing to do with it makes a new version and leaves it as it is.
         store
             .write(|tx| {
@@ -208,7 +208,7 @@ mod tests {
         task.close().await;
         let (store, task) = Catalogue::open(&config).await.unwrap();
         let areas = known(&store).1;
-        assert_eq!((areas.mode(), areas.named().next().unwrap().0), (Mode::Single, &hall));
+        assert_eq!((areas.mode(), areas.named().next().unwrap().0), (FusionMode::Single, &hall));
         let id = maps::get(store.reads(), "a").await.unwrap().id;
         let kept = runs(store.reads(), id).await.unwrap();
         assert_eq!((kept.len(), kept[0].id, kept[0].way_m, &kept[0].cells), (1, second, 12.5, &shown(2)));

@@ -32,7 +32,7 @@ pub(crate) enum StoreError {
     InUse(String),
     /// Maps cannot lie like that.
     #[error(transparent)]
-    Frames(#[from] map::frames::FrameError),
+    Frames(#[from] map::map_links::MapLinkError),
     /// The disk is full; reading goes on.
     #[error("the disk is full")]
     Full,

@@ -68,7 +68,7 @@ pub(crate) struct Bounds {
 impl Bounds {
     /// Those of the server.
     pub(crate) const SERVER: Self =
-        Self { open: 32, of_map: 100, tracks: 64, views: map::gather::MAX_TRACK_VIEWS, bytes: 256 << 20 };
+        Self { open: 32, of_map: 100, tracks: 64, views: map::tracks::MAX_TRACK_VIEWS, bytes: 256 << 20 };
 }
 
 /// What to gather.
@@ -231,7 +231,7 @@ pub(crate) async fn delete(tx: &mut Tx, map: &str, id: i64) -> Result<(), StoreE
 pub(crate) async fn add_view(
     tx: &mut Tx,
     id: i64,
-    track: &map::gather::Kept,
+    track: &map::tracks::StoredTrack,
     new: &NewView,
     bounds: Bounds,
 ) -> Result<(), StoreError> {

@@ -2,7 +2,7 @@
 
 use super::{StoreError, Tx, maps, now_ms, statements::statements, within};
 use map::{
-    changes::Standing,
+    landmark_health::LandmarkHealth,
     place::{LandmarkPlace, PlaceSigmas},
 };
 use nalgebra::{Matrix6, Vector3};
@@ -93,26 +93,26 @@ pub(crate) struct LandmarkRow {
     pub(crate) measures: Measures,
     pub(crate) views: u64,
     pub(crate) model: Option<ModelSummary>,
-    pub(crate) standing: Standing,
+    pub(crate) standing: LandmarkHealth,
     /// JSON: what speaks against it.
     pub(crate) finding: Option<String>,
 }
 
 /// The word for a standing in the database.
-fn word(standing: Standing) -> &'static str {
+fn word(standing: LandmarkHealth) -> &'static str {
     match standing {
-        Standing::Sound => "sound",
-        Standing::Flagged => "flagged",
-        Standing::Quarantined => "quarantined",
+        LandmarkHealth::Sound => "sound",
+        LandmarkHealth::Flagged => "flagged",
+        LandmarkHealth::Quarantined => "quarantined",
     }
 }
 
 /// The standing behind a word; an unknown one (a file from elsewhere) is the most careful.
-pub(super) fn standing_of(word: &str) -> Standing {
+pub(super) fn standing_of(word: &str) -> LandmarkHealth {
     match word {
-        "sound" => Standing::Sound,
-        "flagged" => Standing::Flagged,
-        _ => Standing::Quarantined,
+        "sound" => LandmarkHealth::Sound,
+        "flagged" => LandmarkHealth::Flagged,
+        _ => LandmarkHealth::Quarantined,
     }
 }
 
@@ -223,7 +223,7 @@ pub(crate) async fn create(
         measures,
         views: 0,
         model: None,
-        standing: Standing::Sound,
+        standing: LandmarkHealth::Sound,
         finding: None,
     })
 }
@@ -262,7 +262,7 @@ pub(crate) async fn set_standing(
     tx: &mut Tx,
     map: &str,
     name: &str,
-    standing: Standing,
+    standing: LandmarkHealth,
     finding: Option<&str>,
 ) -> Result<LandmarkRow, StoreError> {
     let map = maps::get(&mut tx.conn, map).await?;
@@ -290,11 +290,11 @@ pub(crate) async fn update(
     let mut landmark = get(&mut tx.conn, &map.name, name).await?;
     let old = landmark.measures;
     landmark.measures = change(old);
-    if landmark.measures != old && landmark.standing != Standing::Sound {
+    if landmark.measures != old && landmark.standing != LandmarkHealth::Sound {
         // What was found out was about another place.
         landmark = LandmarkRow {
             measures: landmark.measures,
-            ..set_standing(tx, &map.name, name, Standing::Sound, None).await?
+            ..set_standing(tx, &map.name, name, LandmarkHealth::Sound, None).await?
         };
     }
     set(tx, landmark.id, &landmark.measures).await?;

@@ -1,7 +1,7 @@
 //! What a version of a map is made of, row by row: the map itself and its landmarks.
 
 use super::{StoreError, landmarks, maps, sights, statements::statements};
-use map::{changes::Standing, visibility::Sight};
+use map::{landmark_health::LandmarkHealth, visibility::VisibilitySettings};
 use sqlx::{Row, SqliteConnection};
 use vision::recognise::{DistanceKind, LandmarkId};
 
@@ -20,7 +20,7 @@ pub(crate) struct MapHead {
     pub(crate) version: u64,
     pub(crate) distance: DistanceKind,
     /// Camera and limits of its visibility areas.
-    pub(crate) sight: Sight,
+    pub(crate) sight: VisibilitySettings,
     /// Counts up whenever the walls are replaced.
     pub(crate) walls_version: i64,
 }
@@ -31,7 +31,7 @@ pub(crate) struct LandmarkHead {
     pub(crate) id: LandmarkId,
     pub(crate) name: String,
     pub(crate) measures: landmarks::Measures,
-    pub(crate) standing: Standing,
+    pub(crate) standing: LandmarkHealth,
 }
 
 /// Numbers of all maps.

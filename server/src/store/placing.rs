@@ -9,10 +9,10 @@ use super::{
     views,
 };
 use map::{
-    mounting::Mounting,
+    extrinsics::CameraExtrinsics,
     place::{LandmarkPlace, PlaceSigmas},
-    placing::{
-        Ceiling, Placement, PlacingError, PlacingParams, PlacingView, ceiling_placement, placement,
+    placement::{
+        Ceiling, Placement, PlacementError, PlacementParams, PosedView, ceiling_placement, placement,
         view_on_ceiling, view_on_wall,
     },
     pose2::Pose2Covariance,
@@ -61,7 +61,7 @@ pub(crate) struct Capture {
 struct Taken {
     camera: Intrinsics,
     map_from_robot: Pose2Covariance,
-    mounting: Mounting,
+    mounting: CameraExtrinsics,
     ceiling: Option<Ceiling>,
     corners_px2: [Matrix2<f64>; 4],
 }
@@ -235,8 +235,8 @@ pub(crate) fn preview<'a>(
     })
 }
 
-fn view((corners, taken): &(Corners, Taken)) -> PlacingView<'_> {
-    PlacingView {
+fn view((corners, taken): &(Corners, Taken)) -> PosedView<'_> {
+    PosedView {
         corners,
         covariance_px2: &taken.corners_px2,
         camera: &taken.camera,
@@ -246,11 +246,11 @@ fn view((corners, taken): &(Corners, Taken)) -> PlacingView<'_> {
 }
 
 /// `used` are indices of `looks`.
-fn placed(looks: &[(Corners, Taken)], walls: &[LaserSegment]) -> Result<Placement, PlacingError> {
-    let p = PlacingParams::default();
+fn placed(looks: &[(Corners, Taken)], walls: &[LaserSegment]) -> Result<Placement, PlacementError> {
+    let p = PlacementParams::default();
     // The last view says what it hangs on.
     let ceiling = looks.first().and_then(|(_, taken)| taken.ceiling);
-    let mut why = PlacingError::NoView;
+    let mut why = PlacementError::NoView;
     if let Some(ceiling) = ceiling {
         let (mut seen, mut from) = (vec![], vec![]);
         for (i, look) in looks.iter().enumerate() {
@@ -323,7 +323,7 @@ pub(super) mod tests {
             views::NewView,
         },
     };
-    use map::{mounting::pan_tilt, pose2::Pose2};
+    use map::{extrinsics::pan_tilt, pose2::Pose2};
     use nalgebra::{Matrix3, Matrix6};
     use vision::{
         icon::Icon,
@@ -432,7 +432,7 @@ pub(super) mod tests {
         let new = seen_from(1.0, 1, 60.0);
         let capture: Capture = serde_json::from_str(new.capture.as_deref().unwrap()).unwrap();
         let refused = placed(&[(new.cut.corners_px, capture.taken().unwrap())], &[wall]).unwrap_err();
-        assert!(matches!(refused, PlacingError::NotOnWall { rms_m, .. } if rms_m > 0.05), "{refused:?}");
+        assert!(matches!(refused, PlacementError::NotOnWall { rms_m, .. } if rms_m > 0.05), "{refused:?}");
         assert!(refused.to_string().contains("not on this wall"));
         let high = Capture { ceiling_height_m: Some(101.0), ..capture };
         assert_eq!(high.check().unwrap_err().field, "ceiling_height_m");

@@ -2,7 +2,7 @@
 
 use super::{Change, StoreError, Tx, maps, statements::statements};
 use map::{
-    frames::{self, Link, Links},
+    map_links::{self, MapLink, MapLinks},
     pose2::{Pose2, Pose2Covariance},
 };
 use nalgebra::Matrix3;
@@ -22,22 +22,22 @@ pub(crate) struct Whereabouts {
     pub(crate) building: Option<String>,
     pub(crate) floor: Option<String>,
     /// Where it lies in another.
-    pub(crate) link: Option<Link<String>>,
+    pub(crate) link: Option<MapLink<String>>,
 }
 
 /// x, y, theta, level, covariance row by row; symmetric, so the order within is no matter.
-fn bytes_of(link: &Link<String>) -> Vec<u8> {
+fn bytes_of(link: &MapLink<String>) -> Vec<u8> {
     let Pose2Covariance { pose, covariance } = &link.parent_from_map;
     let numbers = [pose.x_m, pose.y_m, pose.theta_rad, link.level_m];
     numbers.iter().chain(covariance.iter()).flat_map(|v| v.to_le_bytes()).collect()
 }
 
-fn link_of(parent: String, bytes: &[u8]) -> Option<Link<String>> {
+fn link_of(parent: String, bytes: &[u8]) -> Option<MapLink<String>> {
     let numbers: Vec<f64> = bytes.as_chunks::<8>().0.iter().map(|b| f64::from_le_bytes(*b)).collect();
     let [x_m, y_m, theta_rad, level_m, covariance @ ..] = &numbers[..] else { return None };
     let covariance = (covariance.len() == 9).then(|| Matrix3::from_row_slice(covariance))?;
     let pose = Pose2 { x_m: *x_m, y_m: *y_m, theta_rad: *theta_rad };
-    let link = Link { parent, parent_from_map: Pose2Covariance { pose, covariance }, level_m: *level_m };
+    let link = MapLink { parent, parent_from_map: Pose2Covariance { pose, covariance }, level_m: *level_m };
     // Out of range (a file from elsewhere) counts as not known.
     link.check().is_ok().then_some(link)
 }
@@ -60,7 +60,7 @@ pub(crate) async fn all(db: impl SqliteExecutor<'_>) -> Result<BTreeMap<String, 
 }
 
 /// How maps lie to each other.
-pub(crate) fn links(all: &BTreeMap<String, Whereabouts>) -> Links<String> {
+pub(crate) fn links(all: &BTreeMap<String, Whereabouts>) -> MapLinks<String> {
     all.iter().filter_map(|(map, found)| Some((map.clone(), found.link.clone()?))).collect()
 }
 
@@ -78,7 +78,7 @@ pub(crate) async fn set(
         None => None,
     };
     known.insert(map.to_owned(), found.clone());
-    frames::check_all(&links(&known))?;
+    map_links::check_all(&links(&known))?;
     sqlx::query(SET)
         .bind(row.id)
         .bind(&found.site)
@@ -104,7 +104,7 @@ mod tests {
         let covariance = Matrix3::from_diagonal(&Vector3::new(1e-2, 2e-2, 3e-4));
         let pose = Pose2::new(1.5, -2.0, 0.7);
         let parent_from_map = Pose2Covariance { pose, covariance };
-        let link = Link { parent: parent.to_owned(), parent_from_map, level_m: 3.4 };
+        let link = MapLink { parent: parent.to_owned(), parent_from_map, level_m: 3.4 };
         let word = |text: &str| Some(text.to_owned());
         Whereabouts { site: word("Works"), building: word("B 2"), floor: word("1st"), link: Some(link) }
     }
@@ -130,7 +130,7 @@ mod tests {
         assert!(store.snapshots().relation("c", "a").is_some(), "published with the commit");
         assert!(matches!(
             put(&store, "a", lies_in("c")).await,
-            Err(StoreError::Frames(frames::FrameError::Cycle))
+            Err(StoreError::Frames(map_links::MapLinkError::Cycle))
         ));
         assert!(matches!(
             put(&store, "a", lies_in("z")).await,

@@ -1,6 +1,6 @@
-//! What must not be found: the surfaces of the room with their patterns and joints, columns, rails, radiators, shelves,
-//! pipes, patches of light, people. Whole walls, floors and columns are listed nowhere: lines that meet by chance. What
-//! has four sides in its own right (cupboards, plates, lamps) is listed as neither missed nor false.
+//! Distractors of a scene: the surfaces of the room with their patterns and joints, columns, rails, radiators,
+//! shelves, pipes, patches of light, people. Whole walls, floors and columns are not listed: their lines meet by
+//! chance. Objects with four sides of their own (cupboards, plates, lamps) are listed as neither missed nor false.
 
 use nalgebra::Vector3;
 use rand::RngExt;

@@ -2,8 +2,8 @@
 //! signs and boards on their walls, and with whatever else makes lines there. Seed in, pictures with exact truth out;
 //! the same parameters and pictures give the same bytes. Writes no files and trains nothing.
 //!
-//! Unlike `views`, no two rooms are alike and little is like a real building: breadth counts, not likeness. Planes are
-//! painted over each other, so that nothing casts a true shadow: shadows are painted too.
+//! Unlike `views`, rooms vary widely and are not realistic. Planes are painted over each other without ray casting, so
+//! shadows are painted, too.
 
 mod clutter;
 pub(crate) mod compression;

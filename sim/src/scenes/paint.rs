@@ -1,6 +1,6 @@
 //! Flat shapes in space onto a picture of light, one over the other: a shape of a plane in, its pixels filled to the
-//! share that it covers out. Edges lie where they are projected to. Knows no things and no depth: who paints later is in
-//! front.
+//! share that it covers out. Edges lie where they are projected to. There is no depth buffer: what is painted
+//! later is in front.
 
 use nalgebra::{Matrix3, Point2, Vector3};
 use vision::detect::quads::Corners;

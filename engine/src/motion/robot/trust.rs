@@ -4,7 +4,7 @@ use super::{GUIDED, MAX_SUPPORTERS, RESTS_ON_M, Robot, schedule};
 use map::{
     fuse::{FixOutcome, FixRole, FusedPose},
     guided::{FramePlan, MAX_CAMERAS, Trust},
-    localise::{Fix, Modality},
+    localise::{Fix, FixSource},
     pose2::{Pose2, Pose2Covariance},
 };
 use protos::{Name, v1::PoseTrust};
@@ -88,10 +88,10 @@ impl Robot {
             _ => return,
         }
         match fix.modality {
-            Modality::Laser => self.by_laser_m = Some(self.way_m),
+            FixSource::Laser => self.by_laser_m = Some(self.way_m),
             // The pose does not rest on what was named by it, in the sense that it could be judged by it.
-            Modality::Landmarks if role == FixRole::Guided => self.by_guided_m = Some(self.way_m),
-            Modality::Landmarks => {
+            FixSource::Landmarks if role == FixRole::Guided => self.by_guided_m = Some(self.way_m),
+            FixSource::Landmarks => {
                 self.by_landmarks_m = Some(self.way_m);
                 self.by_hypotheses = false;
                 self.supporters.retain(|id| !fix.landmarks.contains(id));

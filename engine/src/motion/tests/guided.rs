@@ -32,7 +32,7 @@ impl Robot {
         self.motion.odometry_of(&self.r1, odometry(self.seconds, x_m));
         let at = at(self.seconds as i64 * 1_000_000_000, x_m);
         let known = self.motion.grounds(&self.r1, &front(), at).map(|grounds| grounds.pose);
-        let fixed = independent.map(|fix| RobotFix::Fixed(Box::new(fix.clone())));
+        let fixed = independent.map(|fix| FixResult::Fixed(Box::new(fix.clone())));
         let says = FrameFixes {
             prior: known.as_ref(),
             independent: fixed.as_ref(),
@@ -114,7 +114,7 @@ fn a_solution_that_the_pose_chose_corrects_it_and_is_no_support() {
     let mut last = None;
     for _ in 0..40 {
         let x_m = 7.0 + 0.5 * (robot.seconds + 1) as f64;
-        let chosen = Fix { decided_by: DecidedBy::Prior, ..of(LandmarkId(robot.seconds), x_m) };
+        let chosen = Fix { decided_by: AmbiguityResolvedBy::Prior, ..of(LandmarkId(robot.seconds), x_m) };
         last = robot.frame(Some(&chosen), None);
     }
     assert_eq!(last.unwrap().trust(), PoseTrust::Stale);

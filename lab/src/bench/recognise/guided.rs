@@ -8,11 +8,11 @@ use engine::{
     snapshot::{LandmarkInfo, MapSnapshot},
 };
 use map::{
-    mounting::Mounting,
+    extrinsics::CameraExtrinsics,
     place::{LandmarkPlace, PlaceSigmas},
     pose2::Pose2Covariance,
     segments::LaserSegment,
-    visibility::{Obstacle, Sight, visibility},
+    visibility::{Obstacle, VisibilitySettings, visibility},
 };
 use nalgebra::{Matrix2, Matrix3, Vector3};
 use std::{collections::BTreeMap, sync::Arc};
@@ -35,7 +35,7 @@ const PER_PART: u64 = 50;
 /// A map of known places, and a pose for every frame.
 pub(super) struct Guide {
     map: MapSnapshot,
-    poses: Vec<(Pose2Covariance, Mounting)>,
+    poses: Vec<(Pose2Covariance, CameraExtrinsics)>,
 }
 
 impl Guide {
@@ -77,7 +77,7 @@ impl Guide {
             };
             hang(model.id, place);
         }
-        let sight = Sight::default();
+        let sight = VisibilitySettings::default();
         for (id, place) in posters.iter().filter(|(id, _)| models.get(**id).is_some()) {
             let area = visibility(place, &obstacles, &sight.viewer, &sight.seen)?;
             map.visibility.insert(*id, Arc::new(area));
@@ -89,7 +89,7 @@ impl Guide {
         let mut pose = |step: &sim::drive::Step| {
             let off = Vector3::new(POSITION_M * normal(), POSITION_M * normal(), HEADING_RAD * normal());
             let pose = Pose2Covariance { pose: step.map_from_robot.plus(&off), covariance };
-            Ok((pose, Mounting::new(step.robot_from_camera)?))
+            Ok((pose, CameraExtrinsics::new(step.robot_from_camera)?))
         };
         let poses = scenes.steps.iter().map(&mut pose).collect::<anyhow::Result<_>>()?;
         Ok(Self { map, poses })

@@ -13,7 +13,7 @@ use crate::evaluate::statistics::{Interval, upper_bound, wilson};
 use serde::Serialize;
 use sim::{
     exhibit::{Conditions, Extent, exhibit},
-    lookalikes::{Change, lookalikes},
+    lookalikes::{LookAlikeKind, lookalikes},
 };
 use std::sync::Arc;
 use vision::{
@@ -70,7 +70,7 @@ struct Report {
 
 /// A picture of a pair: even ones and their successors are doubles of each other.
 struct Pair {
-    change: Change,
+    change: LookAlikeKind,
     pictures: [Picture; 2],
 }
 
@@ -96,17 +96,17 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         };
         (one, [of(0), of(1)])
     });
-    let kinds = Change::ALL.into_iter().map(|change| kind(change, &pairs, &counted)).collect();
+    let kinds = LookAlikeKind::ALL.into_iter().map(|change| kind(change, &pairs, &counted)).collect();
     let report = Report { setting: Setting::new("lookalikes", &args.common, &both, &p), kinds };
     say(args.common.json, &report, || table(&report))
 }
 
 /// Pairs of all kinds, each of a picture of its own.
 fn pairs(photographs: &[Picture], args: &Args) -> Vec<Pair> {
-    let numbers: Vec<usize> = (0..Change::ALL.len() * args.pairs as usize).collect();
+    let numbers: Vec<usize> = (0..LookAlikeKind::ALL.len() * args.pairs as usize).collect();
     of_each(&numbers, "drawing", |_, i| {
         let (seed, part) = (args.common.seed, args.common.part);
-        let change = Change::ALL[i % Change::ALL.len()];
+        let change = LookAlikeKind::ALL[i % LookAlikeKind::ALL.len()];
         // Every other picture is a photograph, as long as there are any.
         let photograph = photographs.get(i / 2).filter(|_| i % 2 == 0).cloned();
         let picture = photograph.unwrap_or_else(|| generated(part, seed, *i));
@@ -158,7 +158,7 @@ impl Counts {
     }
 }
 
-fn kind(change: Change, pairs: &[Pair], counted: &[(Counts, [Option<Counts>; 2])]) -> Kind {
+fn kind(change: LookAlikeKind, pairs: &[Pair], counted: &[(Counts, [Option<Counts>; 2])]) -> Kind {
     let (mut alone, mut both, mut kept_out, mut count) = (Counts::default(), Counts::default(), 0, 0);
     for (_, (one, two)) in pairs.iter().zip(counted).filter(|(pair, _)| pair.change == change) {
         count += 1;
@@ -226,13 +226,13 @@ mod tests {
         let picture = || generated(super::super::pictures::Part::Tune, 1, 0);
         let pair = |change| Pair { change, pictures: [picture(), picture()] };
         let counts = |right, double| Counts { views: 4, right, double, ..Counts::default() };
-        let pairs = [pair(Change::Text), pair(Change::Doors), pair(Change::Text)];
+        let pairs = [pair(LookAlikeKind::Text), pair(LookAlikeKind::Doors), pair(LookAlikeKind::Text)];
         let counted = [
             (counts(0, 1), [Some(counts(4, 0)), None]),
             (counts(0, 4), [Some(counts(0, 4)), Some(counts(0, 4))]),
             (counts(0, 0), [Some(counts(3, 1)), Some(counts(2, 0))]),
         ];
-        let text = kind(Change::Text, &pairs, &counted);
+        let text = kind(LookAlikeKind::Text, &pairs, &counted);
         assert_eq!((text.pairs, text.alone.double, text.kept_out), (2, 1, 1));
         assert_eq!((text.both.views, text.both.right, text.both.double), (12, 9, 1));
         assert!((text.both_bound - upper_bound(1, 12)).abs() < 1e-12);

@@ -8,7 +8,7 @@ use super::{
     pictures::{Picture, generated},
 };
 use sim::{
-    lookalikes::{Change, halves, lookalikes},
+    lookalikes::{LookAlikeKind, halves, lookalikes},
     surfaces,
     texture::Texture,
 };
@@ -71,8 +71,8 @@ fn building(seed: u64) -> Vec<Stranger> {
 
 /// The doubles of a taught picture, of all kinds but doors, which have nothing of it.
 fn doubles(picture: &Picture, seed: u64) -> Vec<Stranger> {
-    let kinds = Change::ALL.into_iter().filter(|c| *c != Change::Doors);
-    let double = |change: Change| {
+    let kinds = LookAlikeKind::ALL.into_iter().filter(|c| *c != LookAlikeKind::Doors);
+    let double = |change: LookAlikeKind| {
         let [_, double] = lookalikes(&picture.texture, change, seed);
         Stranger { stratum: change.name(), hard: true, texture: Arc::new(double) }
     };

@@ -2,12 +2,12 @@
 
 use super::world::World;
 use map::{
-    areas::Areas,
+    extrinsics::{CameraExtrinsics, pan_tilt},
     fuse::{FuseParams, Fuser},
     laser::Scan,
     laser_fix::{LaserFixParams, laser_fix},
-    localise::{Fix, LocaliseParams, RobotFix, Sighting, robot_pose},
-    mounting::{Mounting, pan_tilt},
+    localise::{Fix, FixResult, LandmarkObservation, LocaliseParams, robot_pose},
+    modality_stats::ModalityMap,
     place::LandmarkPlace,
     pose2::{Pose2, Pose2Covariance},
 };
@@ -49,7 +49,7 @@ struct Step {
 /// A drive with everything that is measured on it.
 pub(super) struct Drive {
     steps: Vec<Step>,
-    mounting: Mounting,
+    mounting: CameraExtrinsics,
     seed: u64,
 }
 
@@ -100,7 +100,7 @@ impl Drive {
                 seen: looked(&truth, world, &hung, &mut random),
             });
         }
-        Self { steps, mounting: Mounting::new(mounting(0.0)).expect("in range"), seed }
+        Self { steps, mounting: CameraExtrinsics::new(mounting(0.0)).expect("in range"), seed }
     }
 
     /// `odom_from_robot` by time.
@@ -184,12 +184,12 @@ fn pan_to(y_m: f64) -> f64 {
 }
 
 /// Fuses a drive as the server does, from its first fix on.
-pub(super) fn follow(world: &World, drive: &Drive, areas: &Arc<Areas>) -> Driven {
+pub(super) fn follow(world: &World, drive: &Drive, areas: &Arc<ModalityMap>) -> Driven {
     let mut fuser = Fuser::new(FuseParams::default());
-    fuser.set_areas(areas.clone());
+    fuser.set_modality_map(areas.clone());
     let mut driven = Driven { moments: Vec::new(), fixes: Vec::new() };
     for step in &drive.steps {
-        fuser.odometry(step.at_ns, step.odometry).ok();
+        fuser.apply_odometry(step.at_ns, step.odometry).ok();
         let mut found: Vec<Fix> = Vec::new();
         if let Some(prior) = fuser.pose_at(step.at_ns) {
             let laid = laser_fix(&world.index, &step.scan, &prior, &LaserFixParams::default());
@@ -201,7 +201,7 @@ pub(super) fn follow(world: &World, drive: &Drive, areas: &Arc<Areas>) -> Driven
                 .filter_map(|seen| by_poster(world, drive, step, seen, fuser.pose_at(step.at_ns))),
         );
         for fix in found {
-            let outcome = fuser.fix(step.at_ns, &fix);
+            let outcome = fuser.apply_fix(step.at_ns, &fix);
             if !matches!(outcome, Ok(map::fuse::FixOutcome::Repeated)) {
                 driven.fixes.push((step.at_ns, fix));
             }
@@ -229,17 +229,17 @@ fn by_poster(
     let place = &world.posters[*number];
     let side = step.truth.inverse().apply(&Point2::new(place.x_m, place.y_m)).y;
     let mounting =
-        Mounting { robot_from_camera: mounting(pan_to(side)), covariance: drive.mounting.covariance };
-    let sighting = Sighting { landmark: LandmarkId(*number as u64), seen, place };
+        CameraExtrinsics { robot_from_camera: mounting(pan_to(side)), covariance: drive.mounting.covariance };
+    let sighting = LandmarkObservation { landmark: LandmarkId(*number as u64), seen, place };
     let ask = |prior: Option<&Pose2Covariance>| {
         robot_pose(&[sighting], &mounting, prior, &LocaliseParams::default())
     };
     let fix = match ask(None).ok()? {
-        RobotFix::Ambiguous(_) => ask(prior.as_ref()).ok()?,
+        FixResult::Ambiguous(_) => ask(prior.as_ref()).ok()?,
         fix => fix,
     };
     match fix {
-        RobotFix::Fixed(fix) => Some(*fix),
+        FixResult::Fixed(fix) => Some(*fix),
         _ => None,
     }
 }

@@ -12,8 +12,8 @@ use super::{
 };
 use drive::{Drive, Driven, follow};
 use map::{
-    areas::{Areas, Mode, Reference, Run, learn},
     fuse::FuseParams,
+    modality_stats::{FusionMode, ModalityMap, ReferenceRun, ReferenceTrajectory, learn_modality_stats},
 };
 use serde::Serialize;
 use std::{path::PathBuf, sync::Arc};
@@ -93,15 +93,15 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let drives = |n: u32, what: u64| -> Vec<Drive> {
         (0..n).map(|i| Drive::new(&world, mixed(&[args.seed, what, u64::from(i)]), i % 2 == 1)).collect()
     };
-    let untaught = Arc::new(Areas::default());
+    let untaught = Arc::new(ModalityMap::default());
     let teaching = drives(args.runs, 15);
     let learnt = of_each(&teaching, "runs", |_, drive| taught(&world, drive));
-    let areas = |mode| Arc::new(Areas::new(mode, Vec::new(), &learnt));
-    let ways: [(&'static str, Arc<Areas>); 4] = [
+    let areas = |mode| Arc::new(ModalityMap::new(mode, Vec::new(), &learnt));
+    let ways: [(&'static str, Arc<ModalityMap>); 4] = [
         ("untaught", untaught),
-        ("all, as sure as it proved", areas(Mode::All)),
-        ("fuse, nearly the best", areas(Mode::Fuse)),
-        ("single, the best alone", areas(Mode::Single)),
+        ("all, as sure as it proved", areas(FusionMode::All)),
+        ("fuse, nearly the best", areas(FusionMode::Fuse)),
+        ("single, the best alone", areas(FusionMode::Single)),
     ];
     let judged = drives(args.drives, 16);
     let of_ways: Vec<(&'static str, Vec<Driven>)> = ways
@@ -110,8 +110,8 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         .collect();
     let rows = of_ways.iter().flat_map(|(way, driven)| rows(way, driven)).collect();
     let all = &ways[1].1;
-    let best =
-        map::areas::Module::ALL.map(|m| all.cells().filter(|(.., advice)| advice.best == Some(m)).count());
+    let best = map::modality_stats::Modality::ALL
+        .map(|m| all.cells().filter(|(.., advice)| advice.best == Some(m)).count());
     let report = Report {
         experiment: "modalities",
         seed: args.seed,
@@ -126,13 +126,16 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
 }
 
 /// What a run whose path is told shows.
-fn taught(world: &World, drive: &Drive) -> std::collections::BTreeMap<map::areas::Cell, map::areas::Modules> {
+fn taught(
+    world: &World,
+    drive: &Drive,
+) -> std::collections::BTreeMap<map::modality_stats::PoseCell, map::modality_stats::StatsByModality> {
     let driven = follow(world, drive, &Arc::default());
     let [sigma_m, sigma_rad] = PATH_SIGMA;
-    let path =
-        Reference::new(drive.told(PATH_SIGMA), sigma_m, sigma_rad).expect("a drive has poses in order");
-    let run = Run { odometry: &drive.odometry(), fixes: &driven.fixes, reference: &path };
-    learn(&run, &FuseParams::default()).cells
+    let path = ReferenceTrajectory::new(drive.told(PATH_SIGMA), sigma_m, sigma_rad)
+        .expect("a drive has poses in order");
+    let run = ReferenceRun { odometry: &drive.odometry(), fixes: &driven.fixes, reference: &path };
+    learn_modality_stats(&run, &FuseParams::default()).cells
 }
 
 fn rows(way: &'static str, driven: &[Driven]) -> Vec<Row> {
@@ -165,9 +168,10 @@ mod tests {
     fn what_runs_show_makes_the_pose_better_where_a_modality_fails() {
         let world = World::new();
         let cells: Vec<_> = (0..6).map(|i| taught(&world, &Drive::new(&world, 50 + i, i % 2 == 1))).collect();
-        let p95 = |mode: Option<Mode>| {
-            let areas =
-                Arc::new(mode.map_or_else(Areas::default, |mode| Areas::new(mode, Vec::new(), &cells)));
+        let p95 = |mode: Option<FusionMode>| {
+            let areas = Arc::new(
+                mode.map_or_else(ModalityMap::default, |mode| ModalityMap::new(mode, Vec::new(), &cells)),
+            );
             let driven: Vec<Driven> =
                 (0..4).map(|i| follow(&world, &Drive::new(&world, 90 + i, i % 2 == 0), &areas)).collect();
             let rows = rows("", &driven);
@@ -176,7 +180,7 @@ mod tests {
                 .map(|row| (row.p95_m, row.nees))
                 .expect("driven through")
         };
-        let (untaught, taught) = (p95(None), p95(Some(Mode::All)));
+        let (untaught, taught) = (p95(None), p95(Some(FusionMode::All)));
         assert!(taught.0 < 0.75 * untaught.0, "{taught:?} {untaught:?}");
         assert!(taught.1 < 3.5, "{taught:?}");
     }

@@ -3,7 +3,7 @@
 use super::{drive::Driven, world::World};
 use crate::evaluate::{chart::COLOURS, statistics::quantile};
 use formats::svg::{put, text};
-use map::areas::{Areas, CELL_M, Module};
+use map::modality_stats::{CELL_M, Modality, ModalityMap};
 
 const WIDTH_PX: f64 = 1100.0;
 const LEFT_PX: f64 = 60.0;
@@ -14,11 +14,11 @@ const ERROR_PX: f64 = 220.0;
 /// The error at the top of the lower panel.
 const MOST_M: f64 = 0.5;
 
-fn colour(module: Module) -> &'static str {
+fn colour(module: Modality) -> &'static str {
     match module {
-        Module::Odometry => COLOURS[0],
-        Module::Laser => COLOURS[3],
-        Module::Landmarks => COLOURS[4],
+        Modality::Odometry => COLOURS[0],
+        Modality::Laser => COLOURS[3],
+        Modality::Landmarks => COLOURS[4],
     }
 }
 
@@ -27,7 +27,7 @@ fn at(x_m: f64, y_m: f64) -> (f64, f64) {
 }
 
 /// The picture.
-pub(super) fn svg(world: &World, areas: &Areas, ways: &[(&'static str, Vec<Driven>)]) -> String {
+pub(super) fn svg(world: &World, areas: &ModalityMap, ways: &[(&'static str, Vec<Driven>)]) -> String {
     let mut svg = String::new();
     let height = TOP_PX + 2.0 * HALF_M * SCALE + 60.0 + ERROR_PX + 60.0;
     put(
@@ -37,7 +37,7 @@ pub(super) fn svg(world: &World, areas: &Areas, ways: &[(&'static str, Vec<Drive
         ),
     );
     put(&mut svg, r#"<rect width="100%" height="100%" fill="white"/>"#);
-    for (i, module) in Module::ALL.into_iter().enumerate() {
+    for (i, module) in Modality::ALL.into_iter().enumerate() {
         let x = LEFT_PX + 150.0 * i as f64;
         put(&mut svg, &format!(r#"<rect x="{x}" y="14" width="14" height="14" fill="{}"/>"#, colour(module)));
         let name = format!("{module:?} is best").to_lowercase();

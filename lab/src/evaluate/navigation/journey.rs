@@ -16,7 +16,7 @@ use engine::{
     verdicts::{self, StageTimes},
 };
 use map::{
-    changes::{Change, Standing},
+    landmark_health::{HealthChange, LandmarkHealth},
     pose2::{Pose2, Pose2Covariance},
 };
 use nalgebra::Matrix2;
@@ -25,7 +25,7 @@ use server::cli::simulated_errors::SimulatedRobotErrors;
 use sim::{
     building::LandmarkKind,
     drive::DriveParams,
-    robot::{Robot, RobotParams, Sighting},
+    robot::{Robot, RobotParams, SensorReadings},
     truth::{LandmarkView, ViewState},
 };
 use std::{collections::BTreeMap, sync::Arc, time::Instant};
@@ -140,7 +140,7 @@ impl Server {
         self.snapshots.get(MAP).ok_or_else(|| anyhow::anyhow!("the map is gone"))
     }
 
-    fn scan(&self, seen: &Sighting, odom_from_robot: Pose2, captured_ns: i64) {
+    fn scan(&self, seen: &SensorReadings, odom_from_robot: Pose2, captured_ns: i64) {
         let scan = seen.scan.clone();
         self.motion.laser(
             &self.robot,
@@ -154,9 +154,9 @@ impl Server {
         &self,
         map: &MapSnapshot,
         facts: &FrameFacts,
-        (seen, odom_from_robot): (&Sighting, Pose2),
+        (seen, odom_from_robot): (&SensorReadings, Pose2),
         (wrong, captured_ns): (&SimulatedRobotErrors, i64),
-    ) -> (Vec<Change>, Option<Guided>) {
+    ) -> (Vec<HealthChange>, Option<Guided>) {
         let at = At { map: MAP, epoch: EPOCH, captured_ns, odometry: Some(odom_from_robot), now: self.now };
         let mounting = wrong.mounting(&seen.step.robot_from_camera).ok();
         let image = &seen.frame.image;
@@ -178,7 +178,7 @@ impl Server {
     }
 
     /// As the store does.
-    fn change(&self, map: &MapSnapshot, changes: &[Change]) {
+    fn change(&self, map: &MapSnapshot, changes: &[HealthChange]) {
         let mut next = map.clone();
         next.version += 1;
         for change in changes {
@@ -228,8 +228,8 @@ pub(super) fn drive(world: &World, way: Way) -> anyhow::Result<Journey> {
         frames_that_show += usize::from(shows);
         if !changes.is_empty() {
             let of = |standing| changes.iter().filter(|c| c.standing == standing).count();
-            journey.flagged += of(Standing::Flagged);
-            journey.quarantined += of(Standing::Quarantined);
+            journey.flagged += of(LandmarkHealth::Flagged);
+            journey.quarantined += of(LandmarkHealth::Quarantined);
             server.change(&map, &changes);
         }
         let fused = server.motion.pose(&server.robot, MAP, server.now);
@@ -253,7 +253,13 @@ pub(super) fn drive(world: &World, way: Way) -> anyhow::Result<Journey> {
 
 impl Journey {
     /// Counts what the frame shows and what was named in it; whether it shows a landmark in use at all.
-    fn score(&mut self, world: &World, seen: &Sighting, facts: &FrameFacts, guided: Option<&Guided>) -> bool {
+    fn score(
+        &mut self,
+        world: &World,
+        seen: &SensorReadings,
+        facts: &FrameFacts,
+        guided: Option<&Guided>,
+    ) -> bool {
         let truth = &seen.frame.truth;
         let is_there = |id: LandmarkId, found: &Corners| {
             let view = truth.landmark(world.name(id));

@@ -8,7 +8,7 @@ use map::{
     laser_fix::WallIndex,
     place::{LandmarkPlace, PlaceSigmas},
     segments::LaserSegment,
-    visibility::{Obstacle, Viewer, VisibilityParams, visibility},
+    visibility::{Obstacle, PanTiltCamera, VisibilityParams, visibility},
 };
 use server::cli::{
     screen,
@@ -196,8 +196,9 @@ fn snapshot(
         .collect();
     // Where each should be seen from, so that it can be missed: as the store makes it.
     let obstacles: Vec<Obstacle> = walls.iter().map(Obstacle::from).collect();
-    let area =
-        |l: &Lesson| visibility(&l.place, &obstacles, &Viewer::default(), &VisibilityParams::default());
+    let area = |l: &Lesson| {
+        visibility(&l.place, &obstacles, &PanTiltCamera::default(), &VisibilityParams::default())
+    };
     let visibility = numbered().filter_map(|(id, l)| Some((id, Arc::new(area(l).ok()?)))).collect();
     let (params, wall_index) = (Arc::new(params), Arc::new(WallIndex::new(walls)));
     let walls = walls.to_vec();

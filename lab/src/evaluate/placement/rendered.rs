@@ -4,9 +4,11 @@
 use super::{Outcome, Summary};
 use crate::evaluate::experiment::{mixed, of_each};
 use map::{
-    mounting::{Mounting, pan_tilt},
+    extrinsics::{CameraExtrinsics, pan_tilt},
     place::LandmarkPlace,
-    placing::{Ceiling, PlacingParams, PlacingView, ViewOnCeiling, ViewOnWall, ceiling_placement, placement},
+    placement::{
+        Ceiling, CeilingRectangle, PlacementParams, PosedView, WallRectangle, ceiling_placement, placement,
+    },
     pose2::{Pose2, Pose2Covariance},
     segments::LaserSegment,
 };
@@ -39,8 +41,8 @@ const TRIES: usize = 4;
 const MIN_SIDE_PX: f64 = 30.0;
 
 enum Seen {
-    Wall(ViewOnWall),
-    Ceiling(ViewOnCeiling),
+    Wall(WallRectangle),
+    Ceiling(CeilingRectangle),
 }
 
 pub(super) fn judged(corridors: usize, views: usize, seed: u64) -> Vec<Summary> {
@@ -69,7 +71,7 @@ pub(super) fn judged(corridors: usize, views: usize, seed: u64) -> Vec<Summary> 
 }
 
 fn place(building: &Building, thing: &LandmarkTruth, views: usize, seed: u64) -> Option<Outcome> {
-    let p = PlacingParams::default();
+    let p = PlacementParams::default();
     let walls: Vec<LaserSegment> = building
         .walls()
         .iter()
@@ -117,7 +119,7 @@ fn look(
         return None;
     }
     let tilt = (at.z - 1.2).atan2(d);
-    let mounting = Mounting::new(pan_tilt(0.0, tilt, Vector3::new(0.1, 0.0, 1.2))).ok()?;
+    let mounting = CameraExtrinsics::new(pan_tilt(0.0, tilt, Vector3::new(0.1, 0.0, 1.2))).ok()?;
     let stood = Pose2::new(x, y, a + PI + random.range(-0.1, 0.1));
     let rendered = renderer.render(
         building,
@@ -143,18 +145,18 @@ fn look(
     let e = Vector3::from(ROBOT_SIGMA).map(|s| s * random.normal());
     let spread = Matrix3::from_diagonal(&Vector3::from(ROBOT_SIGMA.map(|s| s * s)));
     let robot = Pose2Covariance { pose: stood.plus(&e), covariance: spread };
-    let view = PlacingView {
+    let view = PosedView {
         corners: &corners,
         covariance_px2: &covariance,
         camera: renderer.camera().intrinsics(),
         map_from_robot: &robot,
         mounting: &mounting,
     };
-    let p = PlacingParams::default();
+    let p = PlacementParams::default();
     if is_up {
-        map::placing::view_on_ceiling(&view, &CEILING, &p).ok().map(Seen::Ceiling)
+        map::placement::view_on_ceiling(&view, &CEILING, &p).ok().map(Seen::Ceiling)
     } else {
-        map::placing::view_on_wall(&view, walls, &p).ok().map(Seen::Wall)
+        map::placement::view_on_wall(&view, walls, &p).ok().map(Seen::Wall)
     }
 }
 

@@ -4,10 +4,10 @@
 use super::{Outcome, Strays, Summary};
 use crate::evaluate::statistics::median;
 use map::{
-    mounting::{Mounting, pan_tilt},
+    extrinsics::{CameraExtrinsics, pan_tilt},
     place::LandmarkPlace,
-    placing::{
-        Ceiling, PlacingError, PlacingParams, PlacingView, ceiling_placement, placement, view_on_ceiling,
+    placement::{
+        Ceiling, PlacementError, PlacementParams, PosedView, ceiling_placement, placement, view_on_ceiling,
         view_on_wall,
     },
     pose2::{Pose2, Pose2Covariance},
@@ -82,8 +82,8 @@ fn room(random: &mut Random) -> Option<Room> {
     Some(Room { size, walls, ceiling, true_walls, true_ceiling_m, mounting_error })
 }
 
-fn mounting(pan: f64, tilt: f64) -> Option<Mounting> {
-    Mounting::new(pan_tilt(pan, tilt, Vector3::new(0.1, 0.02, 1.2))).ok()
+fn mounting(pan: f64, tilt: f64) -> Option<CameraExtrinsics> {
+    CameraExtrinsics::new(pan_tilt(pan, tilt, Vector3::new(0.1, 0.02, 1.2))).ok()
 }
 
 /// A poster on a random wall, by the walls as they are.
@@ -122,12 +122,12 @@ fn lamp(room: &Room, random: &mut Random) -> LandmarkPlace {
 struct Look {
     corners: Corners,
     robot: Pose2Covariance,
-    mounting: Mounting,
+    mounting: CameraExtrinsics,
 }
 
 impl Look {
-    fn view<'a>(&'a self, covariance: &'a [Matrix2<f64>; 4]) -> PlacingView<'a> {
-        PlacingView {
+    fn view<'a>(&'a self, covariance: &'a [Matrix2<f64>; 4]) -> PosedView<'a> {
+        PosedView {
             corners: &self.corners,
             covariance_px2: covariance,
             camera: &CAMERA,
@@ -185,9 +185,9 @@ fn on_walls(
     thing: &LandmarkPlace,
     views: usize,
     random: &mut Random,
-) -> Option<Result<LandmarkPlace, PlacingError>> {
+) -> Option<Result<LandmarkPlace, PlacementError>> {
     let covariance = [Matrix2::identity() * SIGMA_PX * SIGMA_PX; 4];
-    let p = PlacingParams::default();
+    let p = PlacementParams::default();
     let looks: Option<Vec<Look>> = (0..views).map(|_| look(room, thing, random)).collect();
     let (mut seen, mut why) = (vec![], None);
     for look in looks? {
@@ -207,9 +207,9 @@ fn on_ceiling(
     thing: &LandmarkPlace,
     views: usize,
     random: &mut Random,
-) -> Option<Result<LandmarkPlace, PlacingError>> {
+) -> Option<Result<LandmarkPlace, PlacementError>> {
     let covariance = [Matrix2::identity() * SIGMA_PX * SIGMA_PX; 4];
-    let p = PlacingParams::default();
+    let p = PlacementParams::default();
     let looks: Option<Vec<Look>> = (0..views).map(|_| look(room, thing, random)).collect();
     let seen: Result<Vec<_>, _> =
         looks?.iter().map(|look| view_on_ceiling(&look.view(&covariance), &room.ceiling, &p)).collect();
@@ -274,7 +274,7 @@ fn strays(rooms: usize, random: &mut Random) -> Vec<Strays> {
                 Some(Ok(_)) => made.shown += 1,
                 Some(Err(error)) => {
                     (made.shown, made.refused) = (made.shown + 1, made.refused + 1);
-                    if let PlacingError::NotOnWall { rms_m, roll_rad } = error {
+                    if let PlacementError::NotOnWall { rms_m, roll_rad } = error {
                         residuals.push(rms_m);
                         rolls.push(roll_rad.abs().to_degrees());
                     }

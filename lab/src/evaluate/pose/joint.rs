@@ -5,9 +5,9 @@ use super::{
     single::{Cost, cost_of},
 };
 use map::{
+    extrinsics::{CameraExtrinsics, pan_tilt},
     fuse::{FuseParams, Fuser},
-    localise::{LocaliseParams, RobotFix, Sighting, robot_pose},
-    mounting::{Mounting, pan_tilt},
+    localise::{FixResult, LandmarkObservation, LocaliseParams, robot_pose},
     place::{LandmarkPlace, PlaceSigmas},
     pose2::Pose2,
 };
@@ -61,9 +61,9 @@ fn drawn(place: &LandmarkPlace, random: &mut Random) -> LandmarkPlace {
 }
 
 /// A mounting as it truly is: the believed one moved by an error.
-fn moved(believed: &Mounting, error: &Vector6<f64>) -> Mounting {
+fn moved(believed: &CameraExtrinsics, error: &Vector6<f64>) -> CameraExtrinsics {
     let (turn, shift) = (error.fixed_rows::<3>(0).into(), error.fixed_rows::<3>(3).into());
-    Mounting {
+    CameraExtrinsics {
         robot_from_camera: perturbed(&believed.robot_from_camera, &turn, &shift),
         covariance: believed.covariance,
     }
@@ -76,7 +76,7 @@ fn mounting_error(covariance: &Matrix6<f64>, random: &mut Random) -> Vector6<f64
 fn look(
     robot: &Pose2,
     hung: &LandmarkPlace,
-    (real, eye): (&Mounting, &Eye),
+    (real, eye): (&CameraExtrinsics, &Eye),
     random: &mut Random,
 ) -> Option<LandmarkPose> {
     let view = real.robot_from_camera.inverse() * robot.to_isometry3().inverse() * hung.map_from_landmark();
@@ -102,7 +102,9 @@ pub(super) fn joint(landmarks: usize, frames: usize, cameras: Cameras, seed: u64
     while tried < frames {
         let (d, psi) = (random.range(3.0, 5.0), random.range(-0.9, 0.9));
         let truth = Pose2::new(d * f64::sin(psi), d * f64::cos(psi), -FRAC_PI_2 - psi);
-        let Ok(believed) = Mounting::new(pan_tilt(0.0, 0.0, Vector3::new(0.1, 0.0, 1.3))) else { break };
+        let Ok(believed) = CameraExtrinsics::new(pan_tilt(0.0, 0.0, Vector3::new(0.1, 0.0, 1.3))) else {
+            break;
+        };
         let real = moved(&believed, &mounting_error(&believed.covariance, &mut random));
         let hung: Vec<LandmarkPlace> = places.iter().map(|p| drawn(p, &mut random)).collect();
         let eye = Eye::drawn(&CAMERA, cameras, &mut random);
@@ -110,16 +112,16 @@ pub(super) fn joint(landmarks: usize, frames: usize, cameras: Cameras, seed: u64
             hung.iter().map(|h| look(&truth, h, (&real, &eye), &mut random)).collect();
         let Some(seen) = seen else { continue };
         tried += 1;
-        let sightings: Vec<Sighting<'_>> = seen
+        let sightings: Vec<LandmarkObservation<'_>> = seen
             .iter()
             .zip(&places)
             .enumerate()
-            .map(|(i, (seen, place))| Sighting { landmark: LandmarkId(i as u64), seen, place })
+            .map(|(i, (seen, place))| LandmarkObservation { landmark: LandmarkId(i as u64), seen, place })
             .collect();
         let started = Instant::now();
         let answer = robot_pose(&sightings, &believed, None, &LocaliseParams::default());
         times.push(started.elapsed().as_secs_f64() * 1e6);
-        if let Ok(RobotFix::Fixed(fix)) = answer {
+        if let Ok(FixResult::Fixed(fix)) = answer {
             let e = fix.pose.pose.minus(&truth);
             fixed += 1;
             sum += mean_nees(&fix.pose, &truth);
@@ -197,7 +199,7 @@ fn drive(cameras: Cameras, random: &mut Random) -> Drive {
         })
         .collect();
     let hung: Vec<LandmarkPlace> = places.iter().map(|p| drawn(p, random)).collect();
-    let mounted = |pan| Mounting::new(pan_tilt(pan, 0.0, Vector3::new(0.1, 0.0, 1.3)));
+    let mounted = |pan| CameraExtrinsics::new(pan_tilt(pan, 0.0, Vector3::new(0.1, 0.0, 1.3)));
     let Ok(base) = mounted(0.0) else { return made };
     let error = mounting_error(&base.covariance, random);
     let eye = Eye::drawn(&CAMERA, cameras, random);
@@ -213,7 +215,7 @@ fn drive(cameras: Cameras, random: &mut Random) -> Drive {
         let steer = Pose2::new(0.0, 0.0, -0.1 * truth.y_m - 0.3 * truth.theta_rad);
         (truth, odom) = (truth.compose(&steer), odom.compose(&steer));
         let at = i * 200_000_000;
-        if fuser.odometry(at, odom).is_err() {
+        if fuser.apply_odometry(at, odom).is_err() {
             return made;
         }
         let ahead = (0..4).find(|&l: &usize| (1.0..4.0).contains(&(places[l].x_m - truth.x_m)));
@@ -221,12 +223,13 @@ fn drive(cameras: Cameras, random: &mut Random) -> Drive {
             let Ok(believed) = mounted(if places[l].y_m > 0.0 { 0.6 } else { -0.6 }) else { return made };
             let real = moved(&believed, &error);
             if let Some(seen) = look(&truth, &hung[l], (&real, &eye), random) {
-                let sighting = Sighting { landmark: LandmarkId(l as u64), seen: &seen, place: &places[l] };
+                let sighting =
+                    LandmarkObservation { landmark: LandmarkId(l as u64), seen: &seen, place: &places[l] };
                 let prior = fuser.pose_at(at);
                 let answer = robot_pose(&[sighting], &believed, prior.as_ref(), &LocaliseParams::default());
-                if let Ok(RobotFix::Fixed(fix)) = answer {
+                if let Ok(FixResult::Fixed(fix)) = answer {
                     // Whatever it makes of the fix shows in the pose.
-                    if fuser.fix(at, &fix).is_err() {
+                    if fuser.apply_fix(at, &fix).is_err() {
                         return made;
                     }
                 }

@@ -1,7 +1,13 @@
 //! Depth-first branch and bound over assignments: the best that is jointly compatible, and all that come within the margin.
 
-use super::{Expectations, Gates, MAX_NODES, Row};
-use crate::guided::{expect::MAX_EXPECTED, joint::CommonError};
+use crate::guided::{
+    associate::pairing::{Gates, Row},
+    expect::{Expectations, MAX_EXPECTED},
+    joint::CommonError,
+};
+
+/// Most partial assignments that are looked at; when there are more, no observation is unique.
+pub const MAX_NODES: usize = 1024;
 
 /// An assignment of all rows.
 #[derive(Debug, Clone)]

@@ -1,8 +1,13 @@
 //! One image: what it shows of each landmark, the covariance of the corners, what obstacles hide.
 
-use super::{CameraView, ExpectParams, Expected, InView, KnownLandmark, SearchGate};
 use crate::{
     guided::{
+        expect::{
+            expectations::Expected,
+            params::ExpectParams,
+            search_gate::SearchGate,
+            view::{CameraView, InView, KnownLandmark},
+        },
         joint::{ByCommon, CommonMatrix, CornerMatrix},
         projection::{clipped, corner_vector, corners, corners_m, derivatives, project, shortest_side_px},
         sight_line::unoccluded_share,

@@ -1,35 +1,35 @@
-//! Limits of the schedule.
+//! Parameters of the schedule.
 
 use crate::gate::{CHI2_3_99, CHI2_3_999};
 use serde::{Deserialize, Serialize};
 
-/// Limits of the schedule.
+/// Parameters of the schedule.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ScheduleParams {
-    /// At least every so many frames are searched globally...
+    /// Largest distance of two global searches, frames.
     pub interval_frames: u32,
-    /// ...and while nothing supports the pose.
+    /// The same while nothing supports the pose, frames.
     pub unsupported_interval_frames: u32,
-    /// After so many frames without support every frame is searched globally...
+    /// Without support for this many frames every frame is searched globally,
     pub max_guided_frames: u32,
-    /// ...or after so many metres.
+    /// or without support for this distance, metres.
     pub max_guided_m: f64,
-    /// With the position known worse than this in its worst direction every frame is searched globally, metres...
+    /// With a larger position uncertainty in its worst direction every frame is searched globally, metres,
     pub max_sigma_m: f64,
-    /// ...or with the heading known worse than this, radians.
+    /// or with a larger heading uncertainty, radians.
     pub max_sigma_rad: f64,
     /// A global fix within this squared Mahalanobis distance of the pose supports it (3 degrees of freedom).
     pub support_chi2: f64,
     /// A global fix beyond this contradicts the pose (3 degrees of freedom).
     pub contradict_chi2: f64,
-    /// Support older than this counts for nothing, metres.
+    /// Older support does not count, metres driven.
     pub support_m: f64,
-    /// A pose that so many landmarks support needs two witnesses to be replaced.
+    /// A pose with support by this many landmarks needs two witnesses to be replaced.
     pub established_landmarks: usize,
-    /// Contradicting global fixes in a row, which agree, that replace a pose...
+    /// Consecutive contradicting global fixes that agree and replace a supported pose.
     pub reset_fixes: u32,
-    /// ...and one that nothing supports.
+    /// The same for an unsupported pose.
     pub unsupported_reset_fixes: u32,
 }
 

@@ -4,7 +4,7 @@
 use super::*;
 use crate::{
     fuse::{FixOutcome, FixRole, FuseParams, Fuser},
-    localise::{Fix, LocaliseParams, RobotFix, Sighting, robot_pose},
+    localise::{Fix, FixResult, LandmarkObservation, LocaliseParams, robot_pose},
 };
 use vision::localise::pose::landmark_pose;
 
@@ -39,7 +39,7 @@ struct Frame {
 struct Drive {
     map: BTreeMap<LandmarkId, LandmarkPlace>,
     real: BTreeMap<LandmarkId, LandmarkPlace>,
-    real_mounting: Mounting,
+    real_mounting: CameraExtrinsics,
     truth: Pose2,
     odometry: Pose2,
     /// Of each metre driven, so much is measured.
@@ -57,7 +57,7 @@ impl Drive {
         let real = map.iter().map(|(id, place)| (*id, drawn_place(place, &mut random))).collect();
         let truth = Pose2::new(x_m, 0.0, 0.0);
         let mut fuser = Fuser::new(FuseParams::default());
-        fuser.odometry(0, Pose2::default()).unwrap();
+        fuser.apply_odometry(0, Pose2::default()).unwrap();
         fuser.start(&prior(Pose2::new(x_m + off_m, 0.0, 0.0), 0.05, 1.0)).unwrap();
         Self {
             real_mounting: drawn_mounting(&mounting(), &mut random),
@@ -77,14 +77,16 @@ impl Drive {
         (self.fuser.pose().unwrap().pose.pose.position() - self.truth.position()).norm()
     }
 
-    fn fix(&self, shown: &[(LandmarkId, Corners)], prior: Option<&Pose2Covariance>) -> Option<RobotFix> {
+    fn fix(&self, shown: &[(LandmarkId, Corners)], prior: Option<&Pose2Covariance>) -> Option<FixResult> {
         let claimed = [Matrix2::identity() * CORNER_PX.powi(2); 4];
         let of = |(id, c): &(LandmarkId, Corners)| {
             landmark_pose(c, &claimed, self.map[id].size, &camera()).map(|pose| (*id, pose)).ok()
         };
         let poses: Vec<_> = shown.iter().filter_map(of).collect();
-        let sightings: Vec<_> =
-            poses.iter().map(|(id, seen)| Sighting { landmark: *id, seen, place: &self.map[id] }).collect();
+        let sightings: Vec<_> = poses
+            .iter()
+            .map(|(id, seen)| LandmarkObservation { landmark: *id, seen, place: &self.map[id] })
+            .collect();
         let all = (!sightings.is_empty()).then_some(sightings)?;
         Some(robot_pose(&all, &mounting(), prior, &LocaliseParams::default()).unwrap())
     }
@@ -95,7 +97,7 @@ impl Drive {
         self.truth = self.truth.compose(&Pose2::new(STEP_M, 0.0, 0.0));
         self.odometry = self.odometry.compose(&motion);
         self.now_ns += SECOND / 2;
-        self.fuser.odometry(self.now_ns, self.odometry).unwrap();
+        self.fuser.apply_odometry(self.now_ns, self.odometry).unwrap();
         let before = self.fuser.pose_at(self.now_ns);
         let plan = self.schedule.plan(0, before.as_ref());
         let shown = seen(&self.truth, &self.real, &self.real_mounting, &mut self.random);
@@ -152,16 +154,16 @@ impl Drive {
     fn apply(
         &mut self,
         decision: &Decision,
-        global: Option<&RobotFix>,
+        global: Option<&FixResult>,
         guided: &[(LandmarkId, Corners)],
         before: Option<&Pose2Covariance>,
     ) {
-        let fixed = |fix: Option<&RobotFix>| match fix {
-            Some(RobotFix::Fixed(fix)) => Some((**fix).clone()),
-            Some(RobotFix::Ambiguous(_) | RobotFix::Refused(_)) | None => None,
+        let fixed = |fix: Option<&FixResult>| match fix {
+            Some(FixResult::Fixed(fix)) => Some((**fix).clone()),
+            Some(FixResult::Ambiguous(_) | FixResult::Refused(_)) | None => None,
         };
         let mut give =
-            |fix: Option<Fix>, role| fix.map(|fix| self.fuser.fix_as(self.now_ns, &fix, role).unwrap());
+            |fix: Option<Fix>, role| fix.map(|fix| self.fuser.apply_fix_as(self.now_ns, &fix, role).unwrap());
         match decision {
             Decision::Keep => {}
             Decision::Use | Decision::Doubt { .. } => drop(give(fixed(global), FixRole::Independent)),
@@ -172,7 +174,7 @@ impl Drive {
         if self.schedule.guided_corrects() {
             let fix = fixed(self.fix(guided, before).as_ref());
             if let Some(fix) = fix {
-                self.fuser.fix_as(self.now_ns, &fix, FixRole::Guided).unwrap();
+                self.fuser.apply_fix_as(self.now_ns, &fix, FixRole::Guided).unwrap();
             }
         }
     }
@@ -362,38 +364,44 @@ fn a_guided_fix_starts_nothing_and_ends_no_doubt() {
     let at = |x: f64, random: &mut Random| {
         let shown: Vec<_> =
             seen(&Pose2::new(x, 0.0, 0.0), &drive.map, &mounting(), random).into_iter().collect();
-        let Some(RobotFix::Fixed(fix)) = drive.fix(&shown, None) else { panic!("{shown:?}") };
+        let Some(FixResult::Fixed(fix)) = drive.fix(&shown, None) else { panic!("{shown:?}") };
         *fix
     };
     let mut fuser = Fuser::new(FuseParams::default());
-    fuser.odometry(0, Pose2::default()).unwrap();
+    fuser.apply_odometry(0, Pose2::default()).unwrap();
     let (here, away) = (at(4.0, &mut random), at(8.0, &mut random));
-    assert_eq!(fuser.fix_as(0, &here, FixRole::Guided).unwrap(), FixOutcome::NoPose);
+    assert_eq!(fuser.apply_fix_as(0, &here, FixRole::Guided).unwrap(), FixOutcome::NoPose);
     assert_eq!(fuser.pose(), None);
-    assert_eq!(fuser.fix(0, &here).unwrap(), FixOutcome::Started);
+    assert_eq!(fuser.apply_fix(0, &here).unwrap(), FixOutcome::Started);
     let step = |fuser: &mut Fuser, i: i64| {
-        fuser.odometry(i * SECOND / 10, Pose2::new(0.1 * i as f64, 0.0, 0.0)).unwrap()
+        fuser.apply_odometry(i * SECOND / 10, Pose2::new(0.1 * i as f64, 0.0, 0.0)).unwrap()
     };
     step(&mut fuser, 1);
-    assert!(matches!(fuser.fix(SECOND / 10, &away).unwrap(), FixOutcome::GatedOut { in_a_row: 1, .. }));
+    assert!(matches!(fuser.apply_fix(SECOND / 10, &away).unwrap(), FixOutcome::GatedOut { in_a_row: 1, .. }));
     // Guided: it corrects, and the contradiction stays.
     let next = at(4.1, &mut random);
-    assert!(matches!(fuser.fix_as(SECOND / 10, &next, FixRole::Guided).unwrap(), FixOutcome::Applied { .. }));
+    assert!(matches!(
+        fuser.apply_fix_as(SECOND / 10, &next, FixRole::Guided).unwrap(),
+        FixOutcome::Applied { .. }
+    ));
     assert_eq!(fuser.pose().unwrap().contradictions, 1);
     // Guided and far off: left out, not counted.
     assert!(matches!(
-        fuser.fix_as(SECOND / 10, &away, FixRole::Guided).unwrap(),
+        fuser.apply_fix_as(SECOND / 10, &away, FixRole::Guided).unwrap(),
         FixOutcome::GatedOut { in_a_row: 1, .. }
     ));
     assert_eq!(fuser.pose().unwrap().contradictions, 1);
     // An independent one that agrees ends it.
     step(&mut fuser, 2);
-    assert!(matches!(fuser.fix(SECOND / 5, &at(4.2, &mut random)).unwrap(), FixOutcome::Applied { .. }));
+    assert!(matches!(
+        fuser.apply_fix(SECOND / 5, &at(4.2, &mut random)).unwrap(),
+        FixOutcome::Applied { .. }
+    ));
     assert_eq!(fuser.pose().unwrap().contradictions, 0);
     // One that replaces needs no row, is applied late like any other, and starts a pose as well.
-    assert_eq!(fuser.fix_as(SECOND / 10, &away, FixRole::Replacing).unwrap(), FixOutcome::Reset);
+    assert_eq!(fuser.apply_fix_as(SECOND / 10, &away, FixRole::Replacing).unwrap(), FixOutcome::Reset);
     assert!((fuser.pose().unwrap().pose.pose.x_m - 8.1).abs() < 0.2, "{:?}", fuser.pose());
     let mut empty = Fuser::new(FuseParams::default());
-    empty.odometry(0, Pose2::default()).unwrap();
-    assert_eq!(empty.fix_as(0, &away, FixRole::Replacing).unwrap(), FixOutcome::Started);
+    empty.apply_odometry(0, Pose2::default()).unwrap();
+    assert_eq!(empty.apply_fix_as(0, &away, FixRole::Replacing).unwrap(), FixOutcome::Started);
 }

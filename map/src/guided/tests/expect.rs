@@ -1,7 +1,7 @@
 //! Predicted corners and their covariance against projection, finite differences and Monte Carlo; what is in view.
 
 use super::*;
-use crate::visibility::{Obstacle, Viewer, VisibilityParams, visibility};
+use crate::visibility::{Obstacle, PanTiltCamera, VisibilityParams, visibility};
 use vision::frame::IntrinsicsSigmas;
 
 /// With a lens, and with stated errors: 1 % and 2 px.
@@ -11,13 +11,13 @@ fn lens_camera() -> Intrinsics {
     camera.with_sigmas(IntrinsicsSigmas { focal_px: 5.12, center_px: 2.0 }).unwrap()
 }
 
-fn level(pan_rad: f64) -> Mounting {
-    Mounting::new(pan_tilt(pan_rad, 0.0, Vector3::new(0.0, 0.0, 1.0))).unwrap()
+fn level(pan_rad: f64) -> CameraExtrinsics {
+    CameraExtrinsics::new(pan_tilt(pan_rad, 0.0, Vector3::new(0.0, 0.0, 1.0))).unwrap()
 }
 
 fn expected_by(
     prior: &Pose2Covariance,
-    mounting: &Mounting,
+    mounting: &CameraExtrinsics,
     camera: &Intrinsics,
     place: &LandmarkPlace,
     obstacles: &[Obstacle],
@@ -55,7 +55,7 @@ fn the_covariance_of_a_frontal_square_by_hand() {
     // the centre by 64 * 0.01 / 4 px.
     let mut place = ahead(4.0, 0.0, 1.0);
     place.covariance = Matrix6::zeros();
-    let mounting = Mounting { covariance: Matrix6::zeros(), ..level(0.0) };
+    let mounting = CameraExtrinsics { covariance: Matrix6::zeros(), ..level(0.0) };
     let covariance = Matrix3::from_diagonal(&Vector3::new(1e-4, 1e-4, 0.0));
     let at = Pose2Covariance::new(Pose2::default(), covariance).unwrap();
     let made = expected_by(&at, &mounting, &camera(), &place, &[]).unwrap();
@@ -139,7 +139,7 @@ fn derivatives_are_the_finite_differences() {
             e[k] = step;
             let pose = at.plus(&Vector3::new(e[0], e[1], e[2]));
             let (turn, shift) = (Vector3::new(e[3], e[4], e[5]), Vector3::new(e[6], e[7], e[8]));
-            let moved = Mounting {
+            let moved = CameraExtrinsics {
                 robot_from_camera: perturbed(&seat.robot_from_camera, &turn, &shift),
                 ..seat.clone()
             };
@@ -203,7 +203,8 @@ fn what_is_in_view_is_told() {
 #[test]
 fn inside_its_visibility_area_no_line_of_sight_is_tested() {
     let place = ahead(4.0, 0.0, 1.0);
-    let (viewer, seen) = (Viewer { camera_height_m: 1.0, ..Viewer::default() }, VisibilityParams::default());
+    let (viewer, seen) =
+        (PanTiltCamera { camera_height_m: 1.0, ..PanTiltCamera::default() }, VisibilityParams::default());
     let area = visibility(&place, &[], &viewer, &seen).unwrap();
     let (seat, camera) = (level(0.0), camera());
     let view = CameraView { mounting: &seat, intrinsics: &camera, image_px: IMAGE_PX };

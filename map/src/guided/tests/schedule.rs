@@ -3,24 +3,24 @@
 use super::*;
 use crate::{
     fuse::FuseParams,
-    localise::{DecidedBy, Fix, Modality, RobotFix},
+    localise::{AmbiguityResolvedBy, Fix, FixResult, FixSource},
 };
 
 fn fix(landmark: u64, x_m: f64) -> Fix {
     Fix {
-        modality: Modality::Landmarks,
+        modality: FixSource::Landmarks,
         pose: prior(Pose2::new(x_m, 0.0, 0.0), 0.03, 0.5),
         noise: Matrix3::identity() * 1e-4,
         nuisances: Vec::new(),
         landmarks: vec![LandmarkId(landmark)],
-        decided_by: DecidedBy::Single,
+        decided_by: AmbiguityResolvedBy::Single,
         chi2: 5.0,
         dof: 5,
     }
 }
 
-fn fixed(landmark: u64, x_m: f64) -> RobotFix {
-    RobotFix::Fixed(Box::new(fix(landmark, x_m)))
+fn fixed(landmark: u64, x_m: f64) -> FixResult {
+    FixResult::Fixed(Box::new(fix(landmark, x_m)))
 }
 
 /// A robot that drives 0.1 m a frame; the pose is where it says.
@@ -78,7 +78,7 @@ fn without_a_pose_every_frame_is_searched_and_only_a_global_fix_starts_one() {
         assert_eq!(schedule.finish(&none), Decision::Keep);
         assert_eq!(schedule.trust(), Trust::NoPose);
     }
-    let two = RobotFix::Ambiguous(vec![fix(1, 0.0), fix(1, 1.0)]);
+    let two = FixResult::Ambiguous(vec![fix(1, 0.0), fix(1, 1.0)]);
     assert_eq!(schedule.finish(&FrameReport { global: Some(&two), ..none }), Decision::Keep);
     assert_eq!(schedule.trust(), Trust::NoPose);
     assert_eq!(schedule.finish(&FrameReport { global: Some(&fixed(1, 0.0)), ..none }), Decision::Use);
@@ -193,7 +193,7 @@ fn contradictions_that_disagree_do_not_add_up_and_ambiguous_fixes_replace_nothin
     }
     let mut schedule = Schedule::default();
     let at = prior(Pose2::default(), 0.03, 0.5);
-    let two = RobotFix::Ambiguous(vec![fix(7, 3.0), fix(7, 4.0)]);
+    let two = FixResult::Ambiguous(vec![fix(7, 3.0), fix(7, 4.0)]);
     for _ in 0..20 {
         let report = FrameReport {
             camera: 0,
@@ -206,7 +206,7 @@ fn contradictions_that_disagree_do_not_add_up_and_ambiguous_fixes_replace_nothin
         assert_eq!(schedule.finish(&report), Decision::Doubt { in_a_row: 0 });
     }
     // One of the solutions agrees: it says nothing.
-    let one_agrees = RobotFix::Ambiguous(vec![fix(7, 0.0), fix(7, 4.0)]);
+    let one_agrees = FixResult::Ambiguous(vec![fix(7, 0.0), fix(7, 4.0)]);
     let report = FrameReport {
         camera: 0,
         motion: Pose2::default(),
@@ -222,7 +222,7 @@ fn contradictions_that_disagree_do_not_add_up_and_ambiguous_fixes_replace_nothin
 fn a_fix_that_a_prior_decided_supports_nothing() {
     let mut schedule = Schedule::default();
     let at = prior(Pose2::default(), 0.03, 0.5);
-    let drawn = RobotFix::Fixed(Box::new(Fix { decided_by: DecidedBy::Prior, ..fix(1, 0.0) }));
+    let drawn = FixResult::Fixed(Box::new(Fix { decided_by: AmbiguityResolvedBy::Prior, ..fix(1, 0.0) }));
     let report = FrameReport {
         camera: 0,
         motion: Pose2::default(),

@@ -14,7 +14,7 @@ fn poses(n: usize, random: &mut Random) -> Vec<Pose2> {
 }
 
 /// A chain with a few chords; measurements off by `sigma`.
-fn graph(truth: &[Pose2], sigma: f64, random: &mut Random) -> Vec<Edge> {
+fn graph(truth: &[Pose2], sigma: f64, random: &mut Random) -> Vec<PoseConstraint> {
     let n = truth.len();
     let chords = (0..n).filter(|i| i % 5 == 0 && i + 8 < n).map(|i| (i, i + 8));
     let pairs = (1..n).map(|i| (i - 1, i)).chain(chords);
@@ -22,7 +22,7 @@ fn graph(truth: &[Pose2], sigma: f64, random: &mut Random) -> Vec<Edge> {
         let e = Vector3::new(random.normal(), random.normal(), 0.3 * random.normal()) * sigma;
         let m = Matrix3::new(4.0, 0.5, 0.2, 0.5, 3.0, 0.1, 0.2, 0.1, 30.0) / sigma.max(0.01).powi(2);
         let measured = truth[from].between(&truth[to]).plus(&e);
-        Edge { from, to, measured, information: m, doubt_chi2: None }
+        PoseConstraint { from, to, measured, information: m, doubt_chi2: None }
     };
     pairs.map(edge).collect()
 }
@@ -30,7 +30,7 @@ fn graph(truth: &[Pose2], sigma: f64, random: &mut Random) -> Vec<Edge> {
 #[test]
 fn jacobians_are_the_finite_differences() {
     let (a, b) = (Pose2::new(1.0, -2.0, 0.7), Pose2::new(-0.4, 3.0, 2.9));
-    let edge = Edge {
+    let edge = PoseConstraint {
         from: 0,
         to: 1,
         measured: Pose2::new(0.3, 0.2, 0.1),
@@ -49,7 +49,7 @@ fn jacobians_are_the_finite_differences() {
 }
 
 /// The same problem by dense Gauss-Newton with numeric derivatives. Gives poses and the inverse of its matrix.
-fn dense(poses: &[Pose2], edges: &[Edge]) -> (Vec<Pose2>, DMatrix<f64>) {
+fn dense(poses: &[Pose2], edges: &[PoseConstraint]) -> (Vec<Pose2>, DMatrix<f64>) {
     let mut at = poses.to_vec();
     let n = 3 * (at.len() - 1);
     let whitened = |at: &[Pose2]| {
@@ -134,7 +134,7 @@ fn a_false_loop_is_outvoted() {
     for e in edges.iter_mut().filter(|e| e.to != e.from + 1) {
         e.doubt_chi2 = Some(5.0);
     }
-    let wrong = Edge {
+    let wrong = PoseConstraint {
         from: 2,
         to: 27,
         measured: Pose2::new(0.5, 0.5, 0.0),
@@ -154,7 +154,7 @@ fn a_false_loop_is_outvoted() {
 
 #[test]
 fn what_cannot_be_fitted_is_refused() {
-    let edge = |from, to| Edge {
+    let edge = |from, to| PoseConstraint {
         from,
         to,
         measured: Pose2::default(),
@@ -162,10 +162,10 @@ fn what_cannot_be_fitted_is_refused() {
         doubt_chi2: None,
     };
     let mut two = vec![Pose2::default(); 2];
-    assert_eq!(optimise(&mut two, &[edge(0, 2)]), Err(GraphError::Edge(0)));
-    assert_eq!(optimise(&mut two, &[edge(0, 1), edge(1, 1)]), Err(GraphError::Edge(1)));
-    let nan = Edge { information: Matrix3::repeat(f64::NAN), ..edge(0, 1) };
-    assert_eq!(optimise(&mut two, &[nan]), Err(GraphError::Edge(0)));
+    assert_eq!(optimise(&mut two, &[edge(0, 2)]), Err(GraphError::Constraint(0)));
+    assert_eq!(optimise(&mut two, &[edge(0, 1), edge(1, 1)]), Err(GraphError::Constraint(1)));
+    let nan = PoseConstraint { information: Matrix3::repeat(f64::NAN), ..edge(0, 1) };
+    assert_eq!(optimise(&mut two, &[nan]), Err(GraphError::Constraint(0)));
     assert!(optimise(&mut [], &[]).is_ok());
     let mut many = vec![Pose2::default(); MAX_POSES + 1];
     assert_eq!(optimise(&mut many, &[]), Err(GraphError::TooLarge(MAX_POSES + 1, 0)));

@@ -12,7 +12,7 @@ use protos::Name;
 use sim::{
     building::Building,
     drive::DriveParams,
-    robot::{Robot, RobotParams, Sighting},
+    robot::{Robot, RobotParams, SensorReadings},
     truth::{FrameTruth, ViewState},
 };
 use std::{sync::Arc, time::Duration};
@@ -150,7 +150,7 @@ impl Journey {
         Ok(self.record)
     }
 
-    fn score(&mut self, answer: &Answer, sighting: &Sighting) {
+    fn score(&mut self, answer: &Answer, sighting: &SensorReadings) {
         self.record.ages_ms.push(answer.age_ms);
         let truth = &sighting.frame.truth;
         self.record.landmark_views += truth

@@ -12,7 +12,7 @@ use crate::{
 use client::{
     MapClient,
     lessons::{Job, Place, Size},
-    map::Extent,
+    map::LandmarkRegion,
 };
 use sim::{
     building::Building,
@@ -54,7 +54,7 @@ pub(super) async fn teach(
 
     let mut taught = Taught { walls: survey.walls.len(), views_missed: survey.missed, ..Taught::default() };
     let ends: Vec<[[f64; 2]; 2]> = survey.walls.iter().map(|w| [w.a.into(), w.b.into()]).collect();
-    maps.set_laser(MAP, &ends).await?;
+    maps.set_walls(MAP, &ends).await?;
     let progress = screen::progress(survey.views.values().map(Vec::len).sum(), "teaching");
     for (name, views) in &survey.views {
         taught.landmarks += 1;
@@ -67,7 +67,7 @@ pub(super) async fn teach(
         maps.add_landmark(MAP, name, Some(size), Some(place)).await?;
         taught.views_left_out += views.len() - agreed.len();
         for view in agreed.iter().map(|&i| &views[i]) {
-            let extent = Extent::Corners(view.quad.corners_px.into());
+            let extent = LandmarkRegion::Corners(view.quad.corners_px.into());
             let jpeg = pictures::jpeg(&view.sighting.frame.image)?;
             maps.upload_view(MAP, name, jpeg, extent).await?;
             taught.views += 1;

@@ -29,7 +29,7 @@ impl Upload {
     pub(crate) async fn send(&self, map: &MapFile) -> anyhow::Result<()> {
         let (Some(server), Some(name)) = (&self.server, &self.map) else { return Ok(()) };
         let ends: Vec<[[f64; 2]; 2]> = map.segments.iter().map(|s| [s.a, s.b]).collect();
-        MapClient::new(server)?.set_laser(name, &ends).await.context("upload")?;
+        MapClient::new(server)?.set_walls(name, &ends).await.context("upload")?;
         screen::complain(&format!("{} segments are the walls of {name} now", ends.len()));
         Ok(())
     }

@@ -3,7 +3,7 @@ use crate::{
     publication::{Catalogue, CatalogueTasks, tests::config},
     store::{accepting, landmarks::Measures, maps},
 };
-use map::gather::Kept;
+use map::tracks::StoredTrack;
 use vision::{detect::quads::Corners, icon::Icon, recognise::DistanceKind};
 
 const BOUNDS: Bounds = Bounds { open: 2, of_map: 3, tracks: 2, views: 2, bytes: 40 };
@@ -24,7 +24,7 @@ async fn begun(store: &Catalogue, robot: &str) -> Result<GatheringRow, StoreErro
 }
 
 async fn kept(store: &Catalogue, id: i64, number: u32, picture: u8, bytes: usize) -> Result<(), StoreError> {
-    let track = Kept { number, landmark: None, sightings: u32::from(picture), known: 0, place: None };
+    let track = StoredTrack { number, landmark: None, sightings: u32::from(picture), known: 0, place: None };
     let corners = Corners::try_from([[1.0, 1.0], [90.0, 1.0], [90.0, 99.0], [1.0, 99.0]]).unwrap();
     let new = NewView {
         image: vec![picture; bytes],

@@ -1,0 +1,114 @@
+//! The paper's corridor in small (method 18, E10): camera, fix and fusion together, everything uncertain drawn anew.
+
+use crate::{
+    extrinsics::{CameraExtrinsics, pan_tilt},
+    fuse::{fuser::Fuser, params::FuseParams},
+    localise::{FixResult, LandmarkObservation, LocaliseParams, robot_pose},
+    place::{LandmarkPlace, PlaceSigmas},
+    pose2::Pose2,
+};
+use nalgebra::{Matrix2, Point2, Vector2, Vector3};
+use std::f64::consts::FRAC_PI_2;
+use vision::{
+    detect::quads::Corners,
+    frame::{Distortion, Intrinsics},
+    learn::random::Random,
+    localise::{
+        pose::{LandmarkSize, landmark_pose},
+        reproject::{corner_points, perturbed, pixel},
+    },
+    recognise::LandmarkId,
+};
+
+const SIZE: LandmarkSize = LandmarkSize { width_m: 0.6, height_m: 0.84 };
+const SIGMA_PX: f64 = 0.5;
+
+/// 25 m along x; posters on the walls at y = 1.2 and -1.2, seen from 1 to 4 m ahead by a camera turned to that wall.
+/// Mean squared error along the corridor after the first fix, NEES at the end, corrections.
+fn corridor(random: &mut Random) -> (f64, f64, u64) {
+    let camera = Intrinsics::new(500.0, 500.0, 320.0, 240.0, Distortion::None).unwrap();
+    let places: Vec<LandmarkPlace> = (0..4)
+        .map(|i| {
+            let (y, theta) = if i % 2 == 0 { (1.2, -FRAC_PI_2) } else { (-1.2, FRAC_PI_2) };
+            let centre = Vector3::new(4.0 + 6.0 * f64::from(i), y, 1.5);
+            LandmarkPlace::by_hand(centre, theta, SIZE, PlaceSigmas::default()).unwrap()
+        })
+        .collect();
+    let hung: Vec<LandmarkPlace> = places
+        .iter()
+        .map(|p| {
+            let e = p.covariance.map_diagonal(f64::sqrt).map(|s| s * random.normal());
+            let size = LandmarkSize { width_m: p.size.width_m + e[4], height_m: p.size.height_m + e[5] };
+            let (x_m, y_m, z_m) = (p.x_m + e[0], p.y_m + e[1], p.z_m + e[3]);
+            LandmarkPlace { x_m, y_m, z_m, theta_rad: p.theta_rad + e[2], size, ..*p }
+        })
+        .collect();
+    let base = CameraExtrinsics::new(pan_tilt(0.0, 0.0, Vector3::new(0.1, 0.0, 1.3))).unwrap();
+    let wrong = base.covariance.map_diagonal(f64::sqrt).map(|s| s * random.normal());
+    let params = FuseParams::default();
+    let mut fuser = Fuser::new(params.clone());
+    let (mut truth, mut odom) = (Pose2::new(1.0, 0.1, 0.0), Pose2::default());
+    let (mut squares, mut n) = (0.0, 0.0);
+    for i in 0..230_i64 {
+        let motion = Pose2::new(0.1, 0.0, 0.0);
+        let noise = params.motion_noise(&motion).map_diagonal(f64::sqrt);
+        let drawn = noise.map(|s| s * random.normal());
+        (truth, odom) = (truth.compose(&motion.plus(&drawn)), odom.compose(&motion));
+        // A robot that keeps to the middle: the turn is commanded, measured and made.
+        let steer = Pose2::new(0.0, 0.0, -0.1 * truth.y_m - 0.3 * truth.theta_rad);
+        (truth, odom) = (truth.compose(&steer), odom.compose(&steer));
+        let at = i * 200_000_000;
+        fuser.apply_odometry(at, odom).unwrap();
+        let ahead = (0..4).find(|&l| (1.0..4.0).contains(&(places[l].x_m - truth.x_m)));
+        if let Some(l) = ahead.filter(|_| i % 3 == 0) {
+            let pan = if places[l].y_m > 0.0 { 0.6 } else { -0.6 };
+            let believed = CameraExtrinsics {
+                robot_from_camera: pan_tilt(pan, 0.0, Vector3::new(0.1, 0.0, 1.3)),
+                covariance: base.covariance,
+            };
+            let (turn, shift) = (wrong.fixed_rows::<3>(0).into(), wrong.fixed_rows::<3>(3).into());
+            let mounted = perturbed(&believed.robot_from_camera, &turn, &shift);
+            let view = mounted.inverse() * truth.to_isometry3().inverse() * hung[l].map_from_landmark();
+            let points = corner_points(&hung[l].size).map(|p| {
+                let noise = Vector2::new(random.normal(), random.normal()) * SIGMA_PX;
+                pixel(&view, &p, &camera).map_or(Point2::new(-1e3, 0.0), |px| px + noise)
+            });
+            let inside = |p: &Point2<f64>| (0.0..640.0).contains(&p.x) && (0.0..480.0).contains(&p.y);
+            if !points.iter().all(inside) {
+                continue;
+            }
+            let claimed = [Matrix2::identity() * SIGMA_PX * SIGMA_PX; 4];
+            let seen = landmark_pose(&Corners::new(points).unwrap(), &claimed, SIZE, &camera).unwrap();
+            let sighting =
+                LandmarkObservation { landmark: LandmarkId(l as u64), seen: &seen, place: &places[l] };
+            let prior = fuser.pose_at(at);
+            let answer = robot_pose(&[sighting], &believed, prior.as_ref(), &LocaliseParams::default());
+            if let FixResult::Fixed(fix) = answer.unwrap() {
+                fuser.apply_fix(at, &fix).unwrap();
+            }
+        }
+        if let Some(fused) = fuser.pose() {
+            squares += (fused.pose.pose.x_m - truth.x_m).powi(2);
+            n += 1.0;
+        }
+    }
+    let fused = fuser.pose().unwrap();
+    let e = fused.pose.pose.minus(&truth);
+    let nees = e.dot(&fused.pose.covariance.cholesky().unwrap().solve(&e));
+    (squares / n, nees, fused.corrections)
+}
+
+#[test]
+fn the_corridor_is_driven_within_a_hand() {
+    let mut random = Random::new(1);
+    let (mut squares, mut nees, drives) = (0.0, 0.0, 60);
+    for _ in 0..drives {
+        let (s, e, corrections) = corridor(&mut random);
+        assert!(corrections >= 8, "{corrections}");
+        (squares, nees) = (squares + s, nees + e);
+    }
+    let (rms, nees) = ((squares / f64::from(drives)).sqrt(), nees / f64::from(drives));
+    // Paper: below 20 cm along the corridor. NEES: 99 % band of the mean of 60 draws, 3 degrees of freedom.
+    assert!(rms < 0.2, "{rms} m along");
+    assert!((2.25..3.85).contains(&nees), "{nees}");
+}

@@ -1,0 +1,74 @@
+//! Landmarks that should be visible in an image, by the pose alone.
+
+use crate::{
+    extrinsics::CameraExtrinsics,
+    landmark_health::params::HealthParams,
+    place::LandmarkPlace,
+    pose2::Pose2Covariance,
+    visibility::{PoseDraws, VisibilityMap},
+};
+use nalgebra::{Point2, Point3};
+use vision::{
+    frame::Intrinsics,
+    localise::reproject::{corner_points, pixel},
+    recognise::LandmarkId,
+};
+
+/// A landmark that may be in view.
+#[derive(Debug, Clone, Copy)]
+pub struct ExpectedLandmark<'a> {
+    /// Number of the landmark.
+    pub landmark: LandmarkId,
+    /// Place of the landmark, map frame.
+    pub place: &'a LandmarkPlace,
+    /// Its visibility area.
+    pub visible: &'a VisibilityMap,
+}
+
+/// A camera with its extrinsics.
+#[derive(Debug, Clone, Copy)]
+pub struct MountedCamera<'a> {
+    /// Extrinsics at the time of the image.
+    pub mounting: &'a CameraExtrinsics,
+    /// Intrinsics of the camera.
+    pub camera: &'a Intrinsics,
+    /// Width and height of the image, pixels.
+    pub image_px: [f64; 2],
+}
+
+/// The landmarks that should be visible as a whole, not obliquely and well inside the image, everywhere within the
+/// uncertainty of the pose; by number.
+pub fn expected(
+    pose: &Pose2Covariance,
+    eye: &MountedCamera<'_>,
+    landmarks: &[ExpectedLandmark<'_>],
+    p: &HealthParams,
+) -> Vec<LandmarkId> {
+    let draws = PoseDraws::new(pose, eye.mounting.robot_from_camera.translation.vector.xy());
+    let expected = landmarks.iter().filter(|l| {
+        l.visible.probability(&draws) >= p.expected_probability
+            && l.place.incidence_rad(&camera_at(&draws.mean(), eye)) <= p.expected_incidence_rad
+            && draws.poses().all(|at| is_inside(&at, eye, l.place, p))
+    });
+    expected.map(|l| l.landmark).collect()
+}
+
+fn camera_at(on_floor: &Point2<f64>, eye: &MountedCamera<'_>) -> Point3<f64> {
+    Point3::new(on_floor.x, on_floor.y, eye.mounting.robot_from_camera.translation.z)
+}
+
+fn is_inside(
+    at: &crate::pose2::Pose2,
+    eye: &MountedCamera<'_>,
+    place: &LandmarkPlace,
+    p: &HealthParams,
+) -> bool {
+    let map_from_camera = at.to_isometry3() * eye.mounting.robot_from_camera;
+    let camera_from_landmark = map_from_camera.inverse() * place.map_from_landmark();
+    let inside =
+        |value: f64, side: f64| value >= p.image_margin * side && value <= (1.0 - p.image_margin) * side;
+    corner_points(&place.size).iter().all(|corner| {
+        pixel(&camera_from_landmark, corner, eye.camera)
+            .is_some_and(|px| inside(px.x, eye.image_px[0]) && inside(px.y, eye.image_px[1]))
+    })
+}

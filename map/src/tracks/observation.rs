@@ -1,0 +1,56 @@
+//! What one frame shows of a quad, and what the tracker did with it.
+
+use crate::place::LandmarkPlace;
+use serde::{Deserialize, Serialize};
+use vision::{
+    detect::quads::Corners,
+    recognise::{IconFeatures, LandmarkId},
+};
+
+/// What recognition says of a quad.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Identity {
+    /// No landmark of the map, nor nearly one.
+    Stranger,
+    /// This landmark, uniquely.
+    Landmark(LandmarkId),
+    /// Possibly a landmark of the map.
+    Doubtful,
+}
+
+/// One quad of a frame.
+#[derive(Debug, Clone)]
+pub struct QuadObservation {
+    /// Corners in the image, px.
+    pub corners_px: Corners,
+    /// Features of its icon.
+    pub icon: IconFeatures,
+    /// Place on the walls, if known.
+    pub place: Option<LandmarkPlace>,
+    /// What recognition says of it.
+    pub identity: Identity,
+}
+
+/// What the tracker did with a quad.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum TrackOutcome {
+    /// The view is to be kept in the track of this number.
+    Keep(u32),
+    /// Followed; the track has a near-duplicate of the view.
+    Alike,
+    /// Followed; not observed often enough yet to be kept.
+    TooNew,
+    /// The track has [`super::MAX_TRACK_VIEWS`] views.
+    Full,
+    /// A person has decided on the track.
+    Decided,
+    /// It may be a landmark of the map, or is one whose views are not requested.
+    Known,
+    /// It is no landmark, and only views of landmarks are requested.
+    Unwanted,
+    /// Its appearance does not match the track at its place.
+    Unlike,
+    /// There are [`super::MAX_TRACKS`] tracks.
+    TooMany,
+}

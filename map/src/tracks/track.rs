@@ -1,0 +1,106 @@
+//! One object followed from frame to frame, with the views kept of it.
+
+use crate::{place::LandmarkPlace, pose2::wrap_rad, tracks::params::GatherParams};
+use std::collections::VecDeque;
+use vision::{
+    detect::quads::Corners,
+    learn::thinning::ViewDigest,
+    params::RecogniseParams,
+    recognise::{IconFeatures, LandmarkId, correlation::correlation},
+};
+
+/// Most views kept of a track.
+pub const MAX_TRACK_VIEWS: usize = 40;
+/// Icons of a track that a new observation is compared with: the last one, and this many spread over the kept views.
+pub(super) const LOOKS_KEPT: usize = 4;
+
+/// One object that is followed.
+#[derive(Debug, Clone)]
+pub struct Track {
+    /// Number of the track, from 1; never reused.
+    pub number: u32,
+    /// The landmark whose views these are; `None` for an unknown object.
+    pub landmark: Option<LandmarkId>,
+    /// Frames in which it was observed.
+    pub sightings: u32,
+    /// Of these, frames in which it was recognised as a landmark, or nearly.
+    pub known: u32,
+    pub(super) closed: bool,
+    pub(super) views: Vec<ViewDigest>,
+    pub(super) looks: VecDeque<IconFeatures>,
+    /// Last known place on the walls.
+    pub(super) place: Option<LandmarkPlace>,
+    pub(super) last: Option<Last>,
+}
+
+#[derive(Debug, Clone)]
+pub(super) struct Last {
+    pub(super) at_ns: i64,
+    pub(super) camera: String,
+    pub(super) corners_px: Corners,
+    pub(super) icon: IconFeatures,
+}
+
+impl Track {
+    pub(super) fn new(number: u32, landmark: Option<LandmarkId>) -> Self {
+        Self {
+            number,
+            landmark,
+            sightings: 0,
+            known: 0,
+            closed: false,
+            views: vec![],
+            looks: VecDeque::new(),
+            place: None,
+            last: None,
+        }
+    }
+
+    /// Number of kept views.
+    pub fn views(&self) -> usize {
+        self.views.len()
+    }
+
+    /// C^r to the nearest of its icons.
+    pub(super) fn distance(&self, icon: &IconFeatures, p: &RecogniseParams) -> f64 {
+        let icons = self.looks.iter().chain(self.last.as_ref().map(|l| &l.icon));
+        icons.map(|own| correlation(icon, own, &p.correlation)).fold(f64::INFINITY, f64::min)
+    }
+
+    pub(super) fn keep(&mut self, digest: ViewDigest, icon: &IconFeatures) {
+        self.views.push(digest);
+        // The first views, later one at regular intervals.
+        if self.looks.len() < LOOKS_KEPT {
+            self.looks.push_back(icon.clone());
+        } else if self.views.len().is_multiple_of(MAX_TRACK_VIEWS / LOOKS_KEPT) {
+            self.looks.pop_front();
+            self.looks.push_back(icon.clone());
+        }
+    }
+}
+
+/// Whether two places are the same rectangle of a wall within the limits.
+pub(super) fn same_place(a: &LandmarkPlace, b: &LandmarkPlace, p: &GatherParams) -> bool {
+    let longer = a.size.width_m.max(a.size.height_m).max(b.size.width_m).max(b.size.height_m);
+    let apart = (a.x_m - b.x_m).hypot(a.y_m - b.y_m).hypot(a.z_m - b.z_m);
+    let ratio = |x: f64, y: f64| (x / y).max(y / x);
+    apart <= p.centre_share * longer
+        && ratio(a.size.width_m, b.size.width_m) <= p.size_ratio
+        && ratio(a.size.height_m, b.size.height_m) <= p.size_ratio
+        && wrap_rad(a.theta_rad - b.theta_rad).abs() <= p.normal_rad
+}
+
+/// A track as stored, without its views.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StoredTrack {
+    /// Number of the track.
+    pub number: u32,
+    /// The landmark whose views these are; `None` for an unknown object.
+    pub landmark: Option<LandmarkId>,
+    /// Frames in which it was observed.
+    pub sightings: u32,
+    /// Of these, frames in which it was recognised as a landmark, or nearly.
+    pub known: u32,
+    /// Place on the walls, by its views.
+    pub place: Option<LandmarkPlace>,
+}

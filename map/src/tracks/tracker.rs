@@ -1,0 +1,212 @@
+//! Assigns the quads of each frame to tracks and decides which views to keep.
+
+use crate::tracks::{
+    observation::{Identity, QuadObservation, TrackOutcome},
+    params::GatherParams,
+    track::{Last, MAX_TRACK_VIEWS, StoredTrack, Track, same_place},
+};
+use vision::{
+    detect::quads::Corners,
+    geometry::polygon::iou,
+    learn::thinning::{ViewDigest, most_alike},
+    params::RecogniseParams,
+    recognise::{IconFeatures, LandmarkId},
+};
+
+/// Most tracks at once, those of a single observation included.
+pub const MAX_TRACKS: usize = 256;
+
+/// The tracks of one robot.
+#[derive(Debug, Clone, Default)]
+pub struct ViewTracker {
+    p: GatherParams,
+    tracks: Vec<Track>,
+    numbers: u32,
+}
+
+impl ViewTracker {
+    /// A tracker without tracks.
+    pub fn new(p: GatherParams) -> Self {
+        Self { p, tracks: vec![], numbers: 0 }
+    }
+
+    /// Resumes a stored track from its views in order. It is found again by its place only, unless it is a
+    /// landmark's. A number that is in use is ignored.
+    pub fn resume(&mut self, kept: StoredTrack, views: impl IntoIterator<Item = (Corners, IconFeatures)>) {
+        let StoredTrack { number, landmark, sightings, known, place } = kept;
+        if self.tracks.iter().any(|t| t.number == number) {
+            return;
+        }
+        let mut track = Track { sightings, known, place, ..Track::new(number, landmark) };
+        for (corners, icon) in views.into_iter().take(MAX_TRACK_VIEWS) {
+            track.keep(ViewDigest::new(&corners, &icon.icon), &icon);
+        }
+        self.tracks.push(track);
+        self.numbers = self.numbers.max(number);
+    }
+
+    /// All tracks, oldest first.
+    pub fn tracks(&self) -> &[Track] {
+        &self.tracks
+    }
+
+    /// Marks a track as decided by a person: no more views of the object are kept.
+    pub fn close(&mut self, number: u32) {
+        for track in self.tracks.iter_mut().filter(|t| t.number == number) {
+            track.closed = true;
+        }
+    }
+
+    /// Reserves the numbers up to this one.
+    pub fn number_after(&mut self, number: u32) {
+        self.numbers = self.numbers.max(number);
+    }
+
+    /// Adds the quads of one frame of `camera` and gives the outcome of each. `wanted`: landmarks whose views are
+    /// requested; `strangers`: whether views of unknown objects are.
+    pub fn update(
+        &mut self,
+        (at_ns, camera): (i64, &str),
+        glimpses: &[QuadObservation],
+        wanted: impl Fn(LandmarkId) -> bool,
+        strangers: bool,
+        p: &RecogniseParams,
+    ) -> Vec<TrackOutcome> {
+        self.clear_out(at_ns);
+        let mut taken = vec![false; self.tracks.len()];
+        let places = self.assigned(at_ns, camera, glimpses, &mut taken, p);
+        glimpses
+            .iter()
+            .zip(places)
+            .map(|(glimpse, place)| {
+                let at = match (glimpse.identity, place) {
+                    (Identity::Landmark(id), _) if wanted(id) => self.of_landmark(id),
+                    (Identity::Stranger, _) if !strangers => Err(TrackOutcome::Unwanted),
+                    (Identity::Stranger, Place::Nowhere) => self.begun(None),
+                    (_, Place::Track(i)) => Ok(i),
+                    (Identity::Stranger, Place::Occupied) => Err(TrackOutcome::Unlike),
+                    _ => Err(TrackOutcome::Known),
+                };
+                at.map_or_else(|outcome| outcome, |i| self.taken(i, at_ns, camera, glimpse))
+            })
+            .collect()
+    }
+
+    /// Assigns quads to tracks: the best pairs first, each track once.
+    fn assigned(
+        &self,
+        at_ns: i64,
+        camera: &str,
+        glimpses: &[QuadObservation],
+        taken: &mut [bool],
+        p: &RecogniseParams,
+    ) -> Vec<Place> {
+        let mut places = vec![Place::Nowhere; glimpses.len()];
+        let mut pairs = vec![];
+        for (g, glimpse) in glimpses.iter().enumerate() {
+            for (t, track) in self.tracks.iter().enumerate().filter(|(_, t)| t.landmark.is_none()) {
+                if !self.lies_there(track, at_ns, camera, glimpse) {
+                    continue;
+                }
+                let distance = track.distance(&glimpse.icon, p);
+                if distance <= self.p.max_correlation {
+                    pairs.push((distance, g, t));
+                } else {
+                    places[g] = Place::Occupied;
+                }
+            }
+        }
+        pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+        for (_, g, t) in pairs {
+            match places[g] {
+                Place::Track(_) => {}
+                _ if taken[t] => places[g] = Place::Occupied,
+                _ => (taken[t], places[g]) = (true, Place::Track(t)),
+            }
+        }
+        places
+    }
+
+    fn lies_there(&self, track: &Track, at_ns: i64, camera: &str, glimpse: &QuadObservation) -> bool {
+        if let (Some(a), Some(b)) = (&track.place, &glimpse.place) {
+            return same_place(a, b, &self.p);
+        }
+        // A resumed track has no last frame: appearance alone does not locate it.
+        let Some(last) = &track.last else { return false };
+        let gap_s = at_ns.saturating_sub(last.at_ns) as f64 * 1e-9;
+        last.camera == camera
+            && (0.0..=self.p.gap_s).contains(&gap_s)
+            && iou(last.corners_px.points(), glimpse.corners_px.points()) >= self.p.min_iou
+    }
+
+    fn of_landmark(&mut self, id: LandmarkId) -> Result<usize, TrackOutcome> {
+        match self.tracks.iter().position(|t| t.landmark == Some(id) && !t.closed) {
+            Some(i) => Ok(i),
+            None => self.begun(Some(id)),
+        }
+    }
+
+    fn begun(&mut self, landmark: Option<LandmarkId>) -> Result<usize, TrackOutcome> {
+        if self.tracks.len() >= MAX_TRACKS {
+            return Err(TrackOutcome::TooMany);
+        }
+        self.numbers = self.numbers.saturating_add(1);
+        self.tracks.push(Track::new(self.numbers, landmark));
+        Ok(self.tracks.len() - 1)
+    }
+
+    fn taken(&mut self, i: usize, at_ns: i64, camera: &str, glimpse: &QuadObservation) -> TrackOutcome {
+        let Some(track) = self.tracks.get_mut(i) else { return TrackOutcome::Unlike };
+        track.sightings = track.sightings.saturating_add(1);
+        track.last = Some(Last {
+            at_ns,
+            camera: camera.to_owned(),
+            corners_px: glimpse.corners_px,
+            icon: glimpse.icon.clone(),
+        });
+        track.place = glimpse.place.or(track.place);
+        if track.closed {
+            return TrackOutcome::Decided;
+        }
+        if track.landmark.is_none() && glimpse.identity != Identity::Stranger {
+            track.known = track.known.saturating_add(1);
+            return TrackOutcome::Known;
+        }
+        if track.landmark.is_none() && track.sightings < self.p.min_sightings {
+            return TrackOutcome::TooNew;
+        }
+        if track.views.len() >= MAX_TRACK_VIEWS {
+            return TrackOutcome::Full;
+        }
+        let digest = ViewDigest::new(&glimpse.corners_px, &glimpse.icon.icon);
+        let late = track.views.len() >= MAX_TRACK_VIEWS / 2;
+        let needed = if late { self.p.late_novelty } else { 1.0 };
+        match most_alike(&digest, &track.views, &self.p.thinning) {
+            Some((_, novelty)) if novelty < needed => TrackOutcome::Alike,
+            _ => {
+                track.keep(digest, &glimpse.icon);
+                TrackOutcome::Keep(track.number)
+            }
+        }
+    }
+
+    /// Forgets old tracks without views.
+    fn clear_out(&mut self, now_ns: i64) {
+        let memory_s = self.p.memory_s;
+        let fresh = |t: &Track| {
+            t.last.as_ref().is_some_and(|l| now_ns.saturating_sub(l.at_ns) as f64 * 1e-9 <= memory_s)
+        };
+        self.tracks.retain(|t| t.closed || !t.views.is_empty() || fresh(t));
+    }
+}
+
+/// Position of a quad among the tracks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Place {
+    /// No track is there.
+    Nowhere,
+    /// A track of different appearance is there.
+    Occupied,
+    /// It belongs to this track.
+    Track(usize),
+}
