@@ -1,4 +1,4 @@
-//! Whether a camera is what it says it is, from the residuals of the fixes it gives (method 16).
+//! Intrinsics monitor: residual statistics of fixes that expose wrong intrinsics (method 16).
 //!
 //! In: each fix with its observations, and each refusal. Out: the error of the focal length, the fit of the corners,
 //! and a suspicion with its value. It changes nothing; a suspect camera must be calibrated again by a person.
