@@ -103,7 +103,7 @@ impl RobotClient {
             move |sample: Sample| {
                 let Ok(Key::Answer(_, camera)) = keys.parse(sample.key_expr().as_str()) else { return };
                 let Ok(answer) = v1::Answer::decode(&*sample.payload().to_bytes()) else { return };
-                // Nobody listening is no fault.
+                // No receiver is not an error.
                 drop(answers.send(CameraAnswer { camera, answer }));
             }
         };

@@ -16,7 +16,8 @@ use std::{
 };
 use tokio::sync::broadcast;
 
-use super::{cameras::Cameras, motion::MAX_ROBOTS, slots::SlotKey};
+use super::{cameras::Cameras, slots::SlotKey};
+use crate::limits::MAX_ROBOTS;
 
 /// Cameras whose last frame is kept; the one longest without a frame gives way.
 pub const MAX_CAMERAS: usize = 32;

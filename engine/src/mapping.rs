@@ -7,7 +7,8 @@ mod session;
 
 pub use session::{MAX_SCANS, QUEUE};
 
-use super::{motion::ScanJob, panics::Panics};
+use super::panics::Panics;
+use crate::scan_job::ScanJob;
 use journal::{Head, Journal, Kept};
 use map::pose2::Pose2;
 use protos::Name;

@@ -13,19 +13,21 @@ mod run;
 mod scans;
 mod timebase;
 
+pub use crate::limits::MAX_SCAN_BYTES;
+pub use crate::scan_job::ScanJob;
 pub use corrections::{Correction, Corrections, MAX_CORRECTIONS};
 pub use frames::{FrameFixes, Grounds, Moment};
-pub use messages::{MAX_ODOMETRY_BYTES, MAX_SCAN_BYTES, MessageCounts};
+pub use messages::{MAX_ODOMETRY_BYTES, MessageCounts};
 pub use robot::{MAX_SUPPORTERS, RESTS_ON_M};
 pub use run::Recording;
 pub use run::{MAX_RECORDINGS, MAX_RUN_FIXES, MAX_RUN_ODOMETRY, Recorded, RunError};
-pub use scans::{ScanJob, Scans};
+pub use scans::Scans;
 pub use timebase::{
     AHEAD_TOLERANCE, BEHIND_TOLERANCE, CLOCK_SET_AFTER, CLOCK_SET_COUNT, CLOCK_SET_SPREAD, LEADER_SILENT,
     MAX_LEADS, MAX_STREAMS,
 };
 
-use super::{epochs::Epochs, live::LiveHub, mapping::Mappings, snapshot::Snapshots};
+use super::{epochs::Epochs, limits::MAX_ROBOTS, live::LiveHub, mapping::Mappings, snapshot::Snapshots};
 use map::{
     fuse::{FixOutcome, FixRole, FusedPose},
     laser_fix::{LaserFixParams, laser_fix},
@@ -45,8 +47,6 @@ use std::{
 };
 use timebase::Stream;
 
-/// Robots whose motion is followed; the number of registered robots bounds it first.
-pub const MAX_ROBOTS: usize = 10_000;
 /// A fused pose is published, and used, only while the odometry or fix that supports it was captured no longer ago.
 /// Robots that send odometry once a second are within it.
 pub const MAX_POSE_AGE: Duration = Duration::from_secs(2);

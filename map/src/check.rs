@@ -59,7 +59,7 @@ fn is_positive_semidefinite<const N: usize>(m: &SMatrix<f64, N, N>) -> bool {
             return false;
         }
         if pivot <= TOLERANCE {
-            // A zero variance: everything it is correlated with must be zero as well.
+            // A zero variance allows no correlation.
             if (k + 1..N).any(|i| a[(i, k)].abs() > TOLERANCE.sqrt()) {
                 return false;
             }

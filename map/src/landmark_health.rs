@@ -1,5 +1,5 @@
 //! Landmark health: compares observed and expected landmarks with the map, to find landmarks that were moved or
-//! removed.
+//! removed (docs/method/27-landmark-health.md).
 //!
 //! In: observations with the robot's pose by other landmarks, and the landmarks that should have been visible. Out:
 //! which landmarks to flag, to quarantine and to clear. A landmark is judged only by a pose that rests on others, and

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 /// Most segments taken from one scan.
 pub const MAX_SEGMENTS_PER_SCAN: usize = 256;
 
-/// Knobs of line extraction.
+/// Parameters of line extraction.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LineParams {

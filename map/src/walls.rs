@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 /// Most walls kept, confirmed or not.
 pub const MAX_WALLS: usize = 4096;
 
-/// Knobs of the wall map.
+/// Parameters of the wall map.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct WallParams {
@@ -140,14 +140,14 @@ fn along(a: &LaserSegment, b: &LaserSegment) -> (f64, f64) {
     ((high - low).max(0.0), (low - high).max(0.0))
 }
 
-/// Both sightings of one wall in one; the extent is the union.
+/// Two observations of one wall merged; the extent is the union.
 fn fused(a: &LaserSegment, b: &LaserSegment) -> LaserSegment {
     let middle = Point2::from((a.a.coords + a.b.coords + b.a.coords + b.b.coords) * 0.25);
     let ((la, ca), (lb, cb)) = (local(a, &middle), local(b, &middle));
     let d = Vector2::new(wrap_rad(lb.x - la.x), lb.y - la.y);
     let (Some(ia), Some(ib)) = (ca.try_inverse(), cb.try_inverse()) else { return a.clone() };
     // Departs from method 17.6, a filter over robot and lines, which knows what they share.
-    // Covariance intersection, weighted by hits: sightings share the error of the robot's pose by an unknown amount,
+    // Covariance intersection, weighted by hits: observations share the robot's pose error by an unknown amount,
     // so their number must not shrink the covariance (method 11.5 meets the same by inflation).
     let share = f64::from(a.hits) / (f64::from(a.hits) + f64::from(b.hits));
     let Some(covariance) = (ia * share + ib * (1.0 - share)).try_inverse() else { return a.clone() };

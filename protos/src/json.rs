@@ -1,4 +1,4 @@
-//! Enumerations of the wire as lower-case words in JSON (`"matched"`, `"three_sided"`), the way HTTP shows them.
+//! Enumerations of the wire as lower-case words in JSON (`"matched"`, `"three_sided"`), as in the HTTP API.
 
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};

@@ -4,7 +4,7 @@
 //! A record is its length (4 bytes), the first 8 bytes of its SHA-256, and itself: first the head as JSON, then scans as on
 //! the wire, which are checked again when they are read.
 
-use crate::motion::ScanJob;
+use crate::scan_job::ScanJob;
 use map::pose2::Pose2;
 use protos::{Name, convert::CheckedScan, convert::geometry::pose2_wire, prost::Message, v1};
 use serde::{Deserialize, Serialize};
@@ -18,7 +18,7 @@ use std::{
 /// Largest journal: some hours of a large scanner.
 pub(super) const MAX_BYTES: u64 = 2 << 30;
 /// Largest record: a scan of the most beams that are accepted.
-const MAX_RECORD: u32 = crate::motion::MAX_SCAN_BYTES as u32;
+const MAX_RECORD: u32 = crate::limits::MAX_SCAN_BYTES as u32;
 /// Scans after which the disk is told to keep them, should the power fail.
 const SYNC_EVERY: u32 = 50;
 /// Of the length and the digest.

@@ -5,8 +5,8 @@ use super::{
     journal::{Head, Journal, Kept},
 };
 use crate::{
-    motion::ScanJob,
     panics::{Edge, Panics},
+    scan_job::ScanJob,
 };
 use map::{
     pose2::Pose2,

@@ -1,6 +1,6 @@
 //! What robots send of their motion, checked and counted: bytes in, checked messages or refusals out.
 
-use crate::snapshot::Snapshots;
+use crate::{limits::MAX_SCAN_BYTES, snapshot::Snapshots};
 use protos::{
     Code, Name, Rejection,
     convert::{CheckedOdometry, CheckedScan},
@@ -11,8 +11,6 @@ use std::collections::BTreeMap;
 
 /// Largest odometry message, in bytes: it has nine numbers.
 pub const MAX_ODOMETRY_BYTES: usize = 1024;
-/// Largest scan, in bytes: [`map::laser::MAX_BEAMS`] ranges and their head.
-pub const MAX_SCAN_BYTES: usize = map::laser::MAX_BEAMS * 5 + 1024;
 
 /// What came in, of one kind.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]

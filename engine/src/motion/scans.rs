@@ -1,27 +1,12 @@
 //! Laser scans that wait to be laid on the walls: one of each robot, the newest wins, robots in turn. In: checked scans
 //! from the transport's threads, which never wait. Out: work for the laser's own thread.
 
-use map::{laser::Scan, pose2::Pose2};
+use crate::scan_job::ScanJob;
 use protos::Name;
 use std::{
     collections::{BTreeMap, VecDeque},
     sync::{Condvar, Mutex, MutexGuard, PoisonError},
 };
-
-/// A checked scan.
-#[derive(Debug, Clone)]
-pub struct ScanJob {
-    /// The robot's map.
-    pub map: String,
-    /// Echo of the scan.
-    pub epoch: u64,
-    /// Robot's clock.
-    pub captured_ns: i64,
-    /// Odometry of its moment.
-    pub odom_from_robot: Pose2,
-    /// Bearings and ranges.
-    pub scan: Scan,
-}
 
 #[derive(Debug, Default)]
 struct State {
@@ -85,6 +70,7 @@ impl Scans {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use map::{laser::Scan, pose2::Pose2};
 
     #[test]
     fn the_newest_wins_and_robots_take_turns() {

@@ -55,7 +55,7 @@ pub fn associate(
             Err(why) => answers.push(Association::None(why)),
         }
     }
-    // Few candidates first, then by what the corners are: not by the order of the list.
+    // Few candidates first, then by the corners: the order of the list has no effect.
     rows.sort_by(|a, b| {
         let key = |r: &Row| corner_vector(observations[r.observation].corners_px.points());
         let (ka, kb) = (key(a), key(b));
@@ -89,7 +89,7 @@ fn answer(r: usize, row: &Row, found: &Outcome, expectations: &Expectations, gat
     }
     landmarks.extend(best.map(number));
     if found.is_exhausted {
-        // What was not looked at may be as good: all that the gates allow is possible.
+        // An assignment that was not visited may be as good: all that the gates allow is possible.
         landmarks.extend((0..row.pairings.len()).map(number));
         or_none = true;
     }

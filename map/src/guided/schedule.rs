@@ -235,7 +235,7 @@ impl Schedule {
         let p = &self.params;
         let missing = missed.iter().any(|id| !landmarks.contains(id));
         let witnesses = landmarks.len() + usize::from(missing);
-        // Support that is stale protects nothing.
+        // Stale support does not count.
         let support = if self.is_stale() { 0 } else { self.support.len() };
         let needed = if support >= p.established_landmarks { 2 } else { 1 };
         let fixes_needed = if support == 0 { p.unsupported_reset_fixes } else { p.reset_fixes };

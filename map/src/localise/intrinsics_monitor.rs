@@ -1,4 +1,4 @@
-//! Whether a camera is what it says it is, from the residuals of the fixes it gives (method 16).
+//! Intrinsics monitor: residual statistics of fixes that expose wrong intrinsics (method 16).
 //!
 //! In: each fix with its observations, and each refusal. Out: the error of the focal length, the fit of the corners,
 //! and a suspicion with its value. It changes nothing; a suspect camera must be calibrated again by a person.
@@ -269,7 +269,7 @@ mod tests {
     fn watched(true_px: f64, looks: usize, seed: u64) -> IntrinsicsMonitorState {
         let mut random = Random::new(seed);
         let said = Intrinsics::new(600.0, 600.0, 320.0, 240.0, Distortion::None).unwrap();
-        // Whoever says that it may be wrong is watched all the same.
+        // A stated uncertainty does not switch the monitor off.
         let said = said.with_sigmas(IntrinsicsSigmas { focal_px: 30.0, center_px: 2.0 }).unwrap();
         let real = Intrinsics { fx_px: true_px, fy_px: true_px, ..said };
         let believed = CameraExtrinsics::new(pan_tilt(0.0, 0.0, Vector3::new(0.1, 0.0, 1.2))).unwrap();

@@ -118,12 +118,12 @@ impl<'a> Planar<'a> {
         places.chain([(NuisanceKey::Extrinsics, self.mounting.covariance)]).chain(camera).collect()
     }
 
-    /// `camera_from_landmark` of sighting `i` for a robot pose.
+    /// `camera_from_landmark` of observation `i` for a robot pose.
     pub(super) fn camera_from_landmark(&self, i: usize, pose: &Pose2) -> Isometry3<f64> {
         self.camera_from_robot * pose.to_isometry3().inverse() * self.sightings[i].place.map_from_landmark()
     }
 
-    /// The robot pose on the floor behind a `camera_from_landmark` of sighting `i`, and the pose in space.
+    /// Robot pose on the floor for a `camera_from_landmark` of observation `i`, and the pose in space.
     pub(super) fn robot_from_sighting(
         &self,
         i: usize,
@@ -170,7 +170,7 @@ impl<'a> Planar<'a> {
             by_nuisance.view_mut((8 * i, 6 * n), (8, 6)).copy_from(&seen.mounting);
             if self.camera.is_some() {
                 for (c, by_camera) in sighting.seen.measured.by_camera.iter().enumerate() {
-                    // The residual is seen minus predicted: what moves the seen corner moves the predicted the other way.
+                    // The residual is measured minus predicted, so the derivative of the measured corner changes its sign.
                     by_nuisance.view_mut((8 * i + 2 * c, 6 * (n + 1)), (2, 3)).copy_from(&-by_camera);
                 }
             }

@@ -117,7 +117,7 @@ fn positions(run: &ReferenceRun<'_>, p: &FuseParams, learnt: &mut RunStats) -> V
         let mut told = |walkers: &mut [Walker; 2], until_ns: i64, way_m: f64| {
             while let Some((t, fix)) = fixes.next_if(|(t, _)| *t < until_ns) {
                 for walker in walkers.iter_mut().filter(|w| w.modality == fix.modality) {
-                    // What is out of range was refused when it was made; a refusal here only leaves it out.
+                    // Fixes out of range were refused before; a refusal here only leaves the fix out.
                     if walker.fuser.pose().is_some() && walker.fuser.apply_fix(*t, fix).is_ok() {
                         walker.news_m = Some(way_m);
                     }

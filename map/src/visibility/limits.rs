@@ -134,8 +134,8 @@ impl Limits {
     }
 
     /// The part of a span in which it is high enough.
-    // Behind and below a landmark tilted by 20 to 40 degrees the height can look less and then again more on the way away
-    // from it, by 12 % at most, where it is seen very obliquely: such a dip is not cut out.
+    // Behind and below a landmark tilted by 20 to 40 degrees the apparent height is not monotonic at very oblique views:
+    // it dips by at most 12 %. Such a dip is not cut out.
     /// The part of a range in which it is high enough.
     fn high_within_m(&self, cosine: f64, (near, far): (f64, f64)) -> Option<(f64, f64)> {
         let enough = |r: f64| self.high_m * self.height_m2(cosine, r).sqrt() >= r * r + self.rise_m.powi(2);

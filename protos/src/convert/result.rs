@@ -1,4 +1,4 @@
-//! What recognition found, in wire form. Names are the caller's: `vision` knows landmarks by number only.
+//! The result of recognition in wire form. Names are given by the caller: `vision` knows landmarks by number only.
 
 use super::geometry::pose3_wire;
 use crate::v1;
@@ -36,7 +36,7 @@ pub fn candidate(c: &Candidate, name: impl Fn(LandmarkId) -> String) -> v1::Cand
     v1::Candidate {
         landmark: name(c.landmark),
         correlation: c.correlation,
-        // Infinite (too few points) is told by absence: JSON has no infinity.
+        // JSON has no infinity: an infinite distance (too few points) is absent.
         hausdorff: c.hausdorff.is_finite().then_some(c.hausdorff),
         distance: finite(c.distance),
         tau: finite(c.tau),
@@ -95,7 +95,7 @@ pub fn points(evidence: &PointEvidence, landmarks: usize) -> v1::PointEvidence {
     }
 }
 
-/// The landmark that is in doubt because a part of it shows something else.
+/// The doubtful landmark: a part of it shows something else.
 fn doubtful(v: &Verdict) -> Option<LandmarkId> {
     let best = v.candidates.first()?;
     let named = v.recognition == Recognition::Ambiguous(best.landmark);
@@ -205,7 +205,7 @@ mod tests {
         assert!(serde_json::to_value(points(&never, 1)).unwrap()["log10_false_alarms"].is_number());
     }
 
-    /// It is named, but not as the landmark that was recognised: who knows nothing of doubt reads "ambiguous".
+    /// The doubtful landmark has a field of its own: a client without that field reads "ambiguous".
     #[test]
     fn a_doubtful_landmark_is_named_apart() {
         let refused = |refusal| Candidate {

@@ -1,6 +1,6 @@
 //! Answers and poses as lines for a person. In: what the server sent. Out: text. Prints nothing.
 
-use super::teach::counted;
+use super::screen::counted;
 use client::{
     NamedLandmark,
     lessons::Robot,

@@ -2,7 +2,7 @@
 
 use super::{
     screen,
-    teach::{LESSON_TIMEOUT, ServerArgs, counted, show},
+    teach::{LESSON_TIMEOUT, ServerArgs, show},
 };
 use anyhow::Context as _;
 use client::{
@@ -91,11 +91,11 @@ fn pick(text: &str) -> Result<Pick, String> {
 fn line(g: &Gathering) -> String {
     let of = g.landmark.as_deref().unwrap_or("whatever is new");
     let state = if g.open { "goes on" } else { "ended" };
-    format!("{}  {} with {}, of {of}: {}", g.id, state, g.robot, counted(g.kept(), "view"))
+    format!("{}  {} with {}, of {of}: {}", g.id, state, g.robot, screen::counted(g.kept(), "view"))
 }
 
 fn candidate_line(c: &Candidate) -> String {
-    let views = counted(c.views.len() as u64, "view");
+    let views = screen::counted(c.views.len() as u64, "view");
     let verdict = if c.passes { "passes every gate".to_owned() } else { c.details().join("; ") };
     let known = c.landmark.as_ref().map_or_else(String::new, |name| format!(" of {name}"));
     format!("{}  {views}{known}, {}: {verdict}", c.number, c.place_text())
@@ -133,7 +133,7 @@ pub(crate) async fn run(command: &Command) -> anyhow::Result<()> {
             show(
                 &at.server,
                 candidates,
-                &format!("{} thrown away", counted(candidates.len() as u64, "candidate")),
+                &format!("{} thrown away", screen::counted(candidates.len() as u64, "candidate")),
             )
         }
     }

@@ -1,6 +1,9 @@
 //! `waymark run`: record a robot's run, tell where it really was, and so teach the map which modality to trust where.
 
-use super::teach::{ServerArgs, counted, show};
+use super::{
+    screen::counted,
+    teach::{ServerArgs, show},
+};
 use anyhow::{Context as _, bail};
 use client::{
     MapClient,

@@ -236,7 +236,7 @@ pub(crate) async fn map(command: &MapCommand) -> anyhow::Result<()> {
                 .map(|m| {
                     let found = m.whereabouts();
                     let gap = if found.is_empty() { "" } else { ", " };
-                    let landmarks = counted(m.landmarks, "landmark");
+                    let landmarks = screen::counted(m.landmarks, "landmark");
                     format!("{}  version {}, {landmarks}{gap}{found}", m.name, m.version)
                 })
                 .collect();
@@ -322,16 +322,12 @@ pub(crate) async fn learn(args: &LearnArgs) -> anyhow::Result<ExitCode> {
     let lines: Vec<String> = std::iter::once(format!(
         "{landmark}: {}, {} photographed",
         learnt.status,
-        counted(learnt.views, "view")
+        screen::counted(learnt.views, "view")
     ))
     .chain(learnt.reasons.iter().map(|r| format!("  {}", reason(r))))
     .collect();
     show(&args.server, &learnt, &lines.join("\n"))?;
     Ok(status)
-}
-
-pub(super) fn counted(count: u64, what: &str) -> String {
-    if count == 1 { format!("1 {what}") } else { format!("{count} {what}s") }
 }
 
 fn reason(value: &serde_json::Value) -> String {

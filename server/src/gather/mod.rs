@@ -13,7 +13,7 @@ pub use hook::{Hook, Offer, Session, hook};
 
 use crate::{
     config::Config,
-    jobs::learn,
+    jobs::request,
     publication::Catalogue,
     store::{
         StoreError,
@@ -166,7 +166,7 @@ impl Gatherer {
         bounds: accepting::Bounds,
     ) -> Result<Accepted, StoreError> {
         let (map, numbers) = (map.to_owned(), picks.iter().map(|p| p.number).collect::<Vec<_>>());
-        let lesson = lesson.then_some(learn::Request::of as fn(&[String]) -> String);
+        let lesson = lesson.then_some(request::Request::of as fn(&[String]) -> String);
         let gatherer = self.clone();
         let after = Arc::new(move || gatherer.decided(id, numbers.iter().copied()));
         let decision = Decision { map, gathering: id, picks, lesson, bounds, after };

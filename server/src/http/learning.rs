@@ -6,7 +6,7 @@ use super::{
     extract::{At, Body},
 };
 use crate::{
-    jobs::{Progress, learn},
+    jobs::{Progress, request},
     store::{
         StoreError,
         jobs::{self, JobRow},
@@ -119,8 +119,8 @@ impl Job {
 
 fn check_generated(generated_views: Option<usize>) -> Result<Option<usize>, ApiError> {
     match generated_views {
-        Some(n) if n > learn::MAX_GENERATED => {
-            let detail = format!("{n} is more than {}", learn::MAX_GENERATED);
+        Some(n) if n > request::MAX_GENERATED => {
+            let detail = format!("{n} is more than {}", request::MAX_GENERATED);
             Err(ApiError::invalid("out_of_range", "generated_views", detail))
         }
         n => Ok(n),
@@ -138,7 +138,7 @@ async fn learn_one(
     lesson: Option<Body<Lesson>>,
 ) -> Result<(StatusCode, Json<Job>), ApiError> {
     let lesson = lesson.map(|Body(l)| l).unwrap_or_default();
-    let request = learn::Request {
+    let request = request::Request {
         landmarks: Some(vec![landmark]),
         generated_views: check_generated(lesson.generated_views)?,
         only_points: false,
@@ -163,7 +163,7 @@ async fn learn_map(
             "an empty list; leave it out to mean all",
         ));
     }
-    let request = learn::Request {
+    let request = request::Request {
         landmarks: lesson.landmarks,
         generated_views: check_generated(lesson.generated_views)?,
         only_points: false,
@@ -174,7 +174,7 @@ async fn learn_map(
 async fn submit(
     app: &Shared,
     map: &str,
-    request: learn::Request,
+    request: request::Request,
 ) -> Result<(StatusCode, Json<Job>), ApiError> {
     maps::get(app.store.reads(), map).await?;
     let max = app.config.limits.landmarks;

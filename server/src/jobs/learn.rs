@@ -9,7 +9,10 @@ use super::{
     JobError, Reporter,
     look_alikes::{LookAlike, look_alikes},
     negatives::{Negatives, each, real_strangers, spread},
+    pictures::{Pictures, point_views},
     points,
+    request::Request,
+    spread_work::each_of,
 };
 use crate::{
     config::Config,
@@ -24,46 +27,21 @@ use crate::{
         views::{self, Cut, Digest, Lesson},
     },
 };
-use engine::{decode::ImageLimits, panics::Edge, picture, snapshot::MapSnapshot};
-use serde::{Deserialize, Serialize};
+use engine::{panics::Edge, snapshot::MapSnapshot};
 use serde_json::{Value, json};
-use std::{
-    collections::BTreeMap,
-    sync::{
-        Arc, Mutex, PoisonError,
-        atomic::{AtomicUsize, Ordering},
-    },
-    time::Instant,
-};
+use std::{collections::BTreeMap, sync::Arc, time::Instant};
 use vision::{
-    frame::GrayImage,
     learn::{
         model::{LandmarkModel, MAX_VIEWS, ModelStatus, View, add_negatives, learn},
         synthesis,
     },
     params::Params,
-    points::taught::{MAX_POINT_VIEWS, TaughtPoint, view_points},
+    points::taught::{TaughtPoint, view_points},
     recognise::{IconFeatures, LandmarkId, features},
 };
 
 /// Views a landmark is learnt from at least: what photographs do not give is generated from them.
 const VIEWS_WANTED: usize = 30;
-/// Most generated views that can be asked for, of each photograph.
-pub(crate) const MAX_GENERATED: usize = 100;
-
-/// What to learn.
-#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub(crate) struct Request {
-    /// Names; `None` means every landmark that has views.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) landmarks: Option<Vec<String>>,
-    /// Views generated from each photograph; `None` fills up to [`VIEWS_WANTED`] where photographs are few.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) generated_views: Option<usize>,
-    /// The models stay as they are, and those without points get them: see [`super::points`].
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub(crate) only_points: bool,
-}
 
 impl Request {
     /// A lesson of these landmarks, as it is stored.
@@ -78,33 +56,6 @@ impl Request {
     /// Our own text; an unreadable one (a row from elsewhere) means everything.
     pub(crate) fn from_json(text: &str) -> Self {
         serde_json::from_str(text).unwrap_or_default()
-    }
-}
-
-/// The stored pictures, for threads that are not the runtime's.
-pub(super) struct Pictures {
-    store: Catalogue,
-    runtime: tokio::runtime::Handle,
-    upload: ImageLimits,
-}
-
-impl Pictures {
-    pub(super) fn new(store: &Catalogue, config: &Config) -> Self {
-        let runtime = tokio::runtime::Handle::current();
-        Self { store: store.clone(), runtime, upload: config.limits.upload() }
-    }
-
-    /// The picture of a view; `None`, with a word in the log, if it cannot be read.
-    fn of(&self, lesson: &Lesson) -> Option<GrayImage> {
-        let image = self.runtime.block_on(views::image(self.store.reads(), lesson.view));
-        let decoded = image
-            .map_err(|e| e.to_string())
-            .and_then(|bytes| picture::decode(&bytes, self.upload).map_err(|e| e.to_string()));
-        let skipped = |reason: &String| {
-            let what = "this picture cannot be read: no views are generated and no points taken from it";
-            tracing::warn!(view = lesson.view, reason, "{what}");
-        };
-        decoded.inspect_err(skipped).ok()
     }
 }
 
@@ -306,17 +257,6 @@ fn sights(m: &Material, id: LandmarkId) -> Sights {
     Sights { views, points }
 }
 
-/// The photographs of a landmark that give it points.
-fn point_views(lessons: &[Lesson]) -> impl Iterator<Item = &Lesson> {
-    spread(lessons, MAX_POINT_VIEWS)
-}
-
-/// The points of a landmark's photographs; those that cannot be read are left out.
-pub(super) fn points_of(lessons: &[Lesson], pictures: &Pictures) -> Vec<Vec<TaughtPoint>> {
-    let of = |lesson: &Lesson| Some(view_points(&pictures.of(lesson)?, &lesson.cut.corners_px));
-    point_views(lessons).filter_map(of).collect()
-}
-
 fn collect_negatives(
     m: &Material,
     views: &BTreeMap<LandmarkId, Vec<View>>,
@@ -342,40 +282,6 @@ fn collect_negatives(
     }
     negatives.set_strangers(m.strangers.iter().map(|s| features(s.clone(), &m.params.recognise)).collect());
     Ok(negatives)
-}
-
-/// `work` on every item, over `threads` threads, results in the order of the items. Progress goes from and to the
-/// given shares.
-pub(super) fn each_of<T: Sync, R: Send>(
-    items: &[T],
-    threads: usize,
-    reporter: &Reporter,
-    (from, to, what): (f64, f64, &str),
-    work: impl Fn(&T) -> R + Sync,
-) -> Result<Vec<R>, JobError> {
-    let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
-    let results = Mutex::new(Vec::with_capacity(items.len()));
-    std::thread::scope(|scope| {
-        for _ in 0..threads.min(items.len()) {
-            scope.spawn(|| {
-                while !reporter.unwanted() {
-                    let index = next.fetch_add(1, Ordering::Relaxed);
-                    let Some(item) = items.get(index) else { return };
-                    let result = work(item);
-                    results.lock().unwrap_or_else(PoisonError::into_inner).push((index, result));
-                    let done = done.fetch_add(1, Ordering::Relaxed) + 1;
-                    let share = from + (to - from) * done as f64 / items.len() as f64;
-                    reporter.report(share, format!("{what}: {done} of {}", items.len()));
-                }
-            });
-        }
-    });
-    if reporter.unwanted() {
-        return Err(JobError::Unwanted);
-    }
-    let mut results = results.into_inner().unwrap_or_else(PoisonError::into_inner);
-    results.sort_unstable_by_key(|(index, _)| *index);
-    Ok(results.into_iter().map(|(_, result)| result).collect())
 }
 
 async fn commit(

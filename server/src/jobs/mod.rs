@@ -7,7 +7,10 @@
 pub(crate) mod learn;
 mod negatives;
 mod look_alikes;
+mod pictures;
 mod points;
+pub(crate) mod request;
+mod spread_work;
 
 use crate::{
     config::Config,
@@ -141,7 +144,7 @@ impl Jobs {
     }
 
     /// Accepts a lesson. Durable when this returns, and begun with whether or not the caller is still there.
-    pub(crate) async fn submit(&self, map: &str, request: &learn::Request) -> Result<JobRow, StoreError> {
+    pub(crate) async fn submit(&self, map: &str, request: &request::Request) -> Result<JobRow, StoreError> {
         let limits = (self.config.limits.jobs, self.config.limits.jobs_kept);
         let (map, text) = (map.to_owned(), request.to_json());
         let write = self
@@ -194,7 +197,7 @@ impl Jobs {
     pub(crate) async fn learning(&self, map: &str) -> Result<Learning, StoreError> {
         let mut learning = Learning::default();
         for row in jobs::open(self.store.reads()).await?.into_iter().filter(|row| row.map == map) {
-            let request = learn::Request::from_json(&row.request);
+            let request = request::Request::from_json(&row.request);
             match request.landmarks {
                 _ if request.only_points => {}
                 Some(names) => learning.landmarks.extend(names),

@@ -7,7 +7,9 @@
 
 use super::{
     JobError, Jobs, Reporter,
-    learn::{Pictures, Request, each_of, points_of},
+    pictures::{Pictures, points_of},
+    request::Request,
+    spread_work::each_of,
 };
 use crate::{
     config::Config,

@@ -56,7 +56,7 @@ async fn a_job_is_begun_although_its_caller_has_gone() {
         assert_eq!((row.state.as_str(), row.attempts), ("failed", 1));
         assert!(row.message.contains("no landmark"), "{row:?}");
     }
-    assert_eq!(jobs.submit("a", &learn::Request::default()).await.unwrap().state, "queued");
+    assert_eq!(jobs.submit("a", &request::Request::default()).await.unwrap().state, "queued");
 }
 
 #[tokio::test]
@@ -114,7 +114,7 @@ async fn open_jobs_are_bounded() {
     let (jobs, _stop) = started(&store, dir.path()).await;
     // Many times more than may be open at once: those that have ended make room.
     for _ in 0..=limits.jobs {
-        let row = jobs.submit("a", &learn::Request::default()).await.unwrap();
+        let row = jobs.submit("a", &request::Request::default()).await.unwrap();
         ended(&store, row.id).await;
     }
     assert!(jobs::open(store.reads()).await.unwrap().is_empty());

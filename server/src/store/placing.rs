@@ -5,7 +5,6 @@ use super::{
     StoreError, Tx,
     landmarks::{self, Measures, Place},
     statements::statements,
-    teaching::Captured,
     views,
 };
 use map::{
@@ -40,6 +39,9 @@ const MAX_CAPTURES: usize = 256;
 const CORNER_SIGMA_PX: f64 = 1.0;
 /// Of a ceiling's height as it is given.
 const CEILING_SIGMA_M: f64 = 0.02;
+
+/// Corners and capture of a view that was taken with a known pose.
+pub(super) type Captured = (Corners, String);
 
 /// How a picture was taken.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

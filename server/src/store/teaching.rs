@@ -15,10 +15,7 @@ use engine::panics::Edge;
 use map::segments::LaserSegment;
 use sqlx::{Row, SqliteExecutor};
 use std::sync::Arc;
-use vision::{
-    detect::quads::Corners,
-    learn::thinning::{ThinningParams, ViewDigest, most_alike},
-};
+use vision::learn::thinning::{ThinningParams, ViewDigest, most_alike};
 
 statements! {
     STAMP = "SELECT m.id AS map, m.walls_version, l.id AS landmark, count(v.id) AS views, \
@@ -191,9 +188,6 @@ async fn write(
     };
     Ok((row, Outcome::New, placing))
 }
-
-/// Corners and capture of a view that was taken with a known pose.
-pub(super) type Captured = (Corners, String);
 
 #[cfg(test)]
 mod tests {

@@ -19,7 +19,7 @@ pub struct Shadow {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Conditions {
-    /// Angle between the picture's normal and the line of sight in the horizontal plane, at most [`MAX_ANGLE_RAD`]
+    /// Angle between the picture's normal and the line of sight in the horizontal plane, at most `MAX_ANGLE_RAD`
     /// either way.
     pub yaw_rad: f64,
     /// The same in the vertical plane.

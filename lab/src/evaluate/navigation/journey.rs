@@ -11,7 +11,8 @@ use engine::{
     guided::{Guided, guided},
     judging::{Seen, View, judged_frame},
     live::LiveHub,
-    motion::{Corrections, Moment as At, Motion, ScanJob},
+    motion::{Corrections, Moment as At, Motion},
+    scan_job::ScanJob,
     snapshot::{MapSnapshot, Snapshots},
     verdicts::{self, StageTimes},
 };

@@ -58,9 +58,9 @@ pub struct Assignment {
     pub distance2: f64,
     /// Its degrees of freedom: 8 for each observation that it gives a landmark.
     pub dof: usize,
-    /// Partial assignments that were looked at, at most [`MAX_NODES`].
+    /// Partial assignments that were looked at, at most [`super::MAX_NODES`].
     pub nodes: usize,
-    /// Whether the search ended at [`MAX_NODES`].
+    /// Whether the search ended at [`super::MAX_NODES`].
     pub is_exhausted: bool,
 }
 

@@ -24,7 +24,7 @@ pub struct CameraView<'a> {
     pub mounting: &'a CameraExtrinsics,
     /// Intrinsics with lens, and with standard deviations where they are stated.
     pub intrinsics: &'a Intrinsics,
-    /// Width and height of the image, px; 1 to [`MAX_SIDE_PX`].
+    /// Width and height of the image, px; 1 to [`vision::frame::MAX_SIDE_PX`].
     pub image_px: [f64; 2],
 }
 

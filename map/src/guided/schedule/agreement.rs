@@ -24,7 +24,7 @@ pub(super) fn judge<'a>(global: &'a FixResult, prior: &Pose2Covariance, p: &Sche
     let nearest = fixes.iter().map(distance2).fold(f64::INFINITY, f64::min);
     match fixes {
         [] => Judged::Silent,
-        // A fix that a prior decided was drawn to the pose by it.
+        // A fix that the prior disambiguated is not independent of the pose.
         [fix] if nearest <= p.support_chi2 && fix.decided_by != AmbiguityResolvedBy::Prior => {
             Judged::Agrees(fix)
         }

@@ -55,7 +55,7 @@ pub struct FramePlan {
 /// What guided recognition of a frame found.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct GuidedReport {
-    /// Observations that speak against the pose ([`super::Assignment::contradictions`]).
+    /// Observations that speak against the pose ([`crate::guided::Assignment::contradictions`]).
     pub contradictions: usize,
     /// Whether a landmark that is surely in view was not found (as in [`FrameReport::missed`]).
     pub missed: bool,
@@ -77,7 +77,7 @@ impl GuidedReport {
 /// What became of a frame.
 #[derive(Debug, Clone, Copy)]
 pub struct FrameReport<'a> {
-    /// The camera, as in [`Schedule::plan`].
+    /// The camera, as in [`super::Schedule::plan`].
     pub camera: u32,
     /// Motion by odometry since the frame before, in the robot frame then; the identity for the first.
     pub motion: Pose2,
@@ -87,7 +87,7 @@ pub struct FrameReport<'a> {
     pub searched: bool,
     /// The pose by the uniquely recognised landmarks of that search alone, made without any prior.
     pub global: Option<&'a FixResult>,
-    /// Landmarks surely in view ([`super::Expected::is_sure`]) that neither way found. Only those that are recognised
+    /// Landmarks surely in view ([`crate::guided::Expected::is_sure`]) that neither way found. Only those that are recognised
     /// reliably when they are there: not members of look-alike classes, not quarantined ones.
     pub missed: &'a [LandmarkId],
 }

@@ -86,7 +86,7 @@ async fn accepted(
         .iter()
         .map(|(n, name)| accepting::Pick { number: *n, name: Some((*name).to_owned()) })
         .collect();
-    let lesson = Some(crate::jobs::learn::Request::of as fn(&[String]) -> String);
+    let lesson = Some(crate::jobs::request::Request::of as fn(&[String]) -> String);
     let (map, after) = ("a".to_owned(), std::sync::Arc::new(|| ()));
     let decision = accepting::Decision { map, gathering: id, picks, lesson, bounds: LIMITS, after };
     accepting::accept(store, decision).await
