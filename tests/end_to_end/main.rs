@@ -9,6 +9,7 @@ mod gathered_drive;
 mod guided;
 mod hang_ups;
 mod http_contract;
+mod imports;
 mod laser;
 mod live_mapping;
 mod look_alikes;

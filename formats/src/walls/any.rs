@@ -2,9 +2,9 @@
 
 use super::{
     geojson::{self, GeoJsonError},
+    grid::{GridError, OccupancyGrid},
     map_file::{MAX_WALLS, MapFile, MapFileError},
-    occupancy_grid::{GridError, OccupancyGrid},
-    vector_map,
+    outline, ros_grid, vector_map,
 };
 use crate::scan_log::ReadError;
 use map::check::OutOfRange;
@@ -62,7 +62,7 @@ fn extension(path: &Path) -> String {
 pub fn read(path: &Path, min_length_m: f64) -> Result<MapFile, WallFileError> {
     let of = |segments| MapFile { segments, ..MapFile::default() };
     let map = match extension(path).as_str() {
-        "yaml" | "yml" => of(OccupancyGrid::read(path)?.walls(min_length_m)),
+        "yaml" | "yml" => of(outline::walls(&ros_grid::read(path)?, min_length_m)),
         "json" => MapFile::read(path)?,
         "geojson" => {
             if std::fs::metadata(path)?.len() > geojson::MAX_BYTES {
@@ -87,7 +87,7 @@ pub fn write(map: &MapFile, path: &Path, resolution_m: f64) -> Result<(), WallFi
         "yaml" | "yml" if !RESOLUTION_M.contains(&resolution_m) => {
             Err(WallFileError::Resolution(resolution_m))
         }
-        "yaml" | "yml" => Ok(OccupancyGrid::of_walls(&map.segments, resolution_m)?.write(path)?),
+        "yaml" | "yml" => Ok(ros_grid::write(&OccupancyGrid::of_walls(&map.segments, resolution_m)?, path)?),
         "json" => Ok(map.write(path)?),
         "txt" => Ok(std::fs::write(path, vector_map::text(&map.segments))?),
         other => Err(WallFileError::Extension(other.to_owned())),

@@ -2,16 +2,17 @@
 
 mod any;
 mod geojson;
+mod grid;
 mod map_file;
-mod occupancy_grid;
 mod outline;
 mod pgm;
+mod ros_grid;
 mod vector_map;
 
 pub use any::{WallFileError, read, write};
 pub use geojson::GeoJsonError;
+pub use grid::{CellState, GridError, OccupancyGrid};
 pub use map_file::{MAX_WALLS, MapFile, MapFileError, Wall};
-pub use occupancy_grid::{CellState, GridError, OccupancyGrid};
 
 #[cfg(test)]
 mod tests;

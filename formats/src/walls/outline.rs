@@ -2,14 +2,16 @@
 //! bends, and every piece is fitted with a line.
 
 use super::{
+    grid::{CellState, OccupancyGrid},
     map_file::Wall,
-    occupancy_grid::{CellState, OccupancyGrid},
 };
 use nalgebra::{Matrix2, Point2, Vector2};
 
 /// A corner of the border farther than this from the chord cuts it, in cells: a stair of cells is a straight wall.
 const CUT_CELLS: f64 = 1.2;
 
+/// Width of the band that smoothing leaves.
+const SOFT_CELLS: usize = 2;
 /// East, north, west, south.
 const STEPS: [(i64, i64); 4] = [(1, 0), (0, 1), (-1, 0), (0, -1)];
 
@@ -71,8 +73,9 @@ impl Border {
     }
 }
 
-/// The straight pieces of the border at least this long.
+/// The walls between free and occupied cells, the free side on the left; pieces shorter than `min_length_m` are left out.
 pub(super) fn walls(grid: &OccupancyGrid, min_length_m: f64) -> Vec<Wall> {
+    let grid = &hardened(grid);
     let mut border = Border::of(grid);
     let mut walls = Vec::new();
     // Ends of open chains first; what is left are closed ones.
@@ -124,4 +127,21 @@ fn fitted(corners: &[Point2<f64>]) -> Option<[Point2<f64>; 2]> {
     let along = Vector2::new(angle.cos(), angle.sin());
     let foot = |p: &Point2<f64>| Point2::from(centre + along * along.dot(&(p.coords - centre)));
     Some([foot(first), foot(last)])
+}
+
+/// Pictures that were smoothed have a band of unknown cells between free and occupied ones: free cells grow into it.
+fn hardened(grid: &OccupancyGrid) -> OccupancyGrid {
+    let mut grid = grid.clone();
+    for _ in 0..SOFT_CELLS {
+        let before = grid.clone();
+        for y in 0..grid.height as i64 {
+            for x in 0..grid.width as i64 {
+                let beside = [(1, 0), (-1, 0), (0, 1), (0, -1)].map(|(dx, dy)| before.at(x + dx, y + dy));
+                if before.at(x, y) == CellState::Unknown && beside.contains(&CellState::Free) {
+                    grid.set(x, y, CellState::Free);
+                }
+            }
+        }
+    }
+    grid
 }

@@ -1,6 +1,6 @@
 //! Grey pictures of maps: PGM (text and binary) read and written here, PNG by the image library.
 
-use super::occupancy_grid::{GridError, MAX_CELLS};
+use super::grid::{GridError, MAX_CELLS};
 use std::path::Path;
 
 /// Largest picture file.

@@ -1,6 +1,8 @@
 use super::{
+    grid::{CellState, OccupancyGrid},
     map_file::Wall,
-    occupancy_grid::{CellState, OccupancyGrid},
+    outline::walls as walls_of,
+    ros_grid,
 };
 use map::pose2::Pose2;
 
@@ -14,10 +16,10 @@ fn a_grid_becomes_its_walls_and_back() {
     assert_eq!(grid.at(2, 2), CellState::Unknown, "outside");
     let folder = tempfile::tempdir().unwrap();
     let yaml = folder.path().join("room.yaml");
-    grid.write(&yaml).unwrap();
-    let again = OccupancyGrid::read(&yaml).unwrap();
+    ros_grid::write(&grid, &yaml).unwrap();
+    let again = ros_grid::read(&yaml).unwrap();
     assert_eq!(again, grid);
-    let walls = again.walls(0.3);
+    let walls = walls_of(&again, 0.3);
     assert_eq!(walls.len(), 4, "{walls:?}");
     for w in &walls {
         let s = w.segment().unwrap();
@@ -41,7 +43,7 @@ fn a_smoothed_grid_has_its_walls_too() {
     ];
     let cells: Vec<CellState> = (0..40).flat_map(|_| row).collect();
     let grid = OccupancyGrid { width: 6, height: 40, resolution_m: 0.05, origin: Pose2::default(), cells };
-    let walls = grid.walls(0.3);
+    let walls = walls_of(&grid, 0.3);
     assert_eq!(walls.len(), 1, "{walls:?}");
     assert!([walls[0].a, walls[0].b].iter().all(|p| (p[0] - 0.15).abs() < 1e-9), "{walls:?}");
 }
@@ -50,7 +52,7 @@ fn a_smoothed_grid_has_its_walls_too() {
 fn a_slanted_wall_of_a_grid_is_one_wall() {
     let slanted = [Wall::between([0.0, 0.0], [6.0, 2.0]), Wall::between([6.0, 4.0], [0.0, 4.0])];
     let grid = OccupancyGrid::of_walls(&slanted, 0.05).unwrap();
-    let walls = grid.walls(1.0);
+    let walls = walls_of(&grid, 1.0);
     let along = |w: &&Wall| {
         let d = [w.b[0] - w.a[0], w.b[1] - w.a[1]];
         (d[1] / d[0] - 1.0 / 3.0).abs() < 0.05 && d[0] > 0.0
@@ -67,7 +69,7 @@ fn what_is_no_grid_is_refused_by_name() {
     std::fs::write(folder.path().join("short.pgm"), b"P5\n9 9\n255\n\x00").unwrap();
     let good = "image: m.pgm\nresolution: 0.05\norigin: [1, 2, 0.5]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n";
     std::fs::write(&yaml, good).unwrap();
-    let grid = OccupancyGrid::read(&yaml).unwrap();
+    let grid = ros_grid::read(&yaml).unwrap();
     // The top row of the picture is the upper row of the map.
     assert_eq!(grid.cells, [CellState::Unknown, CellState::Occupied, CellState::Occupied, CellState::Free]);
     assert_eq!(grid.origin, Pose2::new(1.0, 2.0, 0.5));
@@ -81,7 +83,7 @@ fn what_is_no_grid_is_refused_by_name() {
         ("m.pgm", "none.pgm", "none.pgm"),
     ] {
         std::fs::write(&yaml, good.replace(from, to)).unwrap();
-        let error = OccupancyGrid::read(&yaml).unwrap_err().to_string();
+        let error = ros_grid::read(&yaml).unwrap_err().to_string();
         assert!(error.contains(field), "{error}");
     }
 }
