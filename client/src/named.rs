@@ -1,7 +1,7 @@
 //! The landmarks that an answer names, and how each was named. In: an answer. Out: one item for each named quad.
 
 use protos::v1::{Answer, QuadAnswer, Sighting, Verdict};
-use vision::detect::quads::Corners;
+use vision::geometry::Corners;
 
 /// A quad that has a landmark's name.
 #[derive(Debug, Clone, Copy, PartialEq)]

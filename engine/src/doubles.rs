@@ -19,12 +19,14 @@ use std::{
     sync::Arc,
 };
 use vision::{
-    detect::quads::{Corners, Quad},
+    detect::Quad,
     frame::{GrayImage, Intrinsics},
-    localise::pose::{LandmarkPose, landmark_pose},
+    geometry::Corners,
+    model::LandmarkId,
     params::Params,
-    pipeline::{FrameFacts, QuadFacts, matched},
-    recognise::{DistanceKind, LandmarkId, Recognition, Refusal, verdict::recognise},
+    pipeline::{FrameFacts, QuadFacts, recognise_quad},
+    pose::{LandmarkPose, landmark_pose},
+    recognise::{Recognition, Refusal},
     seen_border::SeenBorder,
 };
 
@@ -91,10 +93,10 @@ pub fn hang_where_known(landmarks: &BTreeSet<LandmarkId>, map: &MapSnapshot) -> 
 
 /// Which landmarks with doubles a quad may be; `None` where it is none of them, or may be one that hangs nobody knows where.
 pub fn resembling(image: &GrayImage, quad: &Quad, map: &MapSnapshot) -> Option<Resembling> {
-    let asked = |p: &Params| recognise(image, quad, &map.look_alikes.models, DistanceKind::Both, p);
-    let mut verdict = asked(&map.params);
+    let asked = |p: &Params| recognise_quad(image, quad, &map.look_alikes.models, p);
+    let (mut verdict, mut border) = asked(&map.params);
     if map.params.recognise.verdict.points && verdict.recognition == Recognition::Unknown {
-        verdict = asked(&map.look_alikes.by_icons);
+        (verdict, border) = asked(&map.look_alikes.by_icons);
     }
     let (Recognition::Ambiguous(_) | Recognition::Unique(_)) = verdict.recognition else { return None };
     let fits = |refusal: Option<Refusal>| matches!(refusal, None | Some(Refusal::Margin));
@@ -104,7 +106,7 @@ pub fn resembling(image: &GrayImage, quad: &Quad, map: &MapSnapshot) -> Option<R
     if !hang_where_known(&members, map) {
         return None;
     }
-    let SeenBorder { corners_px, covariance_px2, .. } = matched(quad, &verdict, &map.params)?;
+    let SeenBorder { corners_px, covariance_px2, .. } = border?;
     let ratio = verdict.candidates.first()?.ratio;
     Some(Resembling { members, fitting: fitting.len(), ratio, corners_px, covariance_px2 })
 }

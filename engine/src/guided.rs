@@ -21,16 +21,13 @@ use map::{
 use nalgebra::Matrix2;
 use std::{collections::BTreeSet, sync::Arc};
 use vision::{
-    detect::quads::Corners,
     frame::GrayImage,
-    geometry::polygon,
-    localise::pose::{LandmarkPose, landmark_pose},
-    pipeline::{QuadFacts, matched},
+    geometry::{Corners, polygon},
+    model::LandmarkId,
+    pipeline::{ACCEPTED_NATS, Found, QuadFacts, expected, matched_border},
     points::verify::PointEvidence,
-    recognise::{
-        LandmarkId, Recognition, Refusal,
-        expected::{ACCEPTED_NATS, Found, expected},
-    },
+    pose::{LandmarkPose, landmark_pose},
+    recognise::{Recognition, Refusal},
     seen_border::SeenBorder,
 };
 
@@ -182,7 +179,8 @@ fn may_be(image: &GrayImage, quad: usize, facts: &QuadFacts, view: &View<'_>) ->
     let verdict = facts.verdict.as_ref()?;
     let quad = Some(quad);
     if let Recognition::Unique(landmark) = verdict.recognition {
-        let SeenBorder { corners_px, covariance_px2, .. } = matched(&facts.quad, verdict, &view.map.params)?;
+        let SeenBorder { corners_px, covariance_px2, .. } =
+            matched_border(&facts.quad, verdict, &view.map.params)?;
         let ratio = verdict.candidates.first().map_or(0.0, |c| c.ratio);
         let members = [landmark].into();
         let resembling = Resembling { members, fitting: 1, ratio, corners_px, covariance_px2 };
@@ -208,7 +206,8 @@ fn plain(facts: &QuadFacts, view: &View<'_>) -> Option<Resembling> {
     if first.refusal != Some(Refusal::Plain) || !is_alone {
         return None;
     }
-    let SeenBorder { corners_px, covariance_px2, .. } = matched(&facts.quad, verdict, &view.map.params)?;
+    let SeenBorder { corners_px, covariance_px2, .. } =
+        matched_border(&facts.quad, verdict, &view.map.params)?;
     Some(Resembling { members, fitting: 1, ratio: first.ratio, corners_px, covariance_px2 })
 }
 

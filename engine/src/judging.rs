@@ -17,8 +17,9 @@ use map::{
 };
 use vision::{
     frame::Intrinsics,
+    model::LandmarkId,
     pipeline::FrameFacts,
-    recognise::{LandmarkId, Recognition, Verdict},
+    recognise::{Recognition, Verdict},
 };
 
 /// A frame that was looked at.

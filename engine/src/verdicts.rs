@@ -20,11 +20,11 @@ use protos::{
 };
 use std::{cell::RefCell, time::Instant};
 use vision::{
-    detect::{Memory, detect_in},
     frame::{GrayImage, Intrinsics},
-    localise::pose::LandmarkPose,
-    pipeline::{FrameFacts, Landmarks, NoPose, QuadFacts, analyse_quads},
-    recognise::{LandmarkId, Recognition},
+    model::LandmarkId,
+    pipeline::{FrameFacts, Landmarks, NoPose, Pipeline, QuadFacts},
+    pose::LandmarkPose,
+    recognise::Recognition,
     trace::{Stage, Trace},
 };
 
@@ -73,15 +73,15 @@ pub fn look(
 ) -> FrameFacts {
     let landmarks = Landmarks { models: &map.models, sizes: &map.sizes, kind: map.distance };
     // Taken out while in use: a panic leaves none behind that is half written.
-    let mut memory = MEMORY.take();
-    let quads = detect_in(&mut memory, image, &map.params.detect, times);
-    MEMORY.set(memory);
-    analyse_quads(image, quads, camera, landmarks, &map.params, times)
+    let mut pipeline = PIPELINE.take();
+    let facts = pipeline.analyse(image, camera, landmarks, &map.params, times);
+    PIPELINE.set(pipeline);
+    facts
 }
 
 thread_local! {
-    /// What detection keeps from frame to frame; each worker thread its own.
-    static MEMORY: RefCell<Memory> = RefCell::default();
+    /// What the pipeline keeps from frame to frame; each worker thread its own.
+    static PIPELINE: RefCell<Pipeline> = RefCell::default();
 }
 
 /// The answer to one image without a robot: an uploaded photograph.

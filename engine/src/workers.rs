@@ -25,7 +25,7 @@ use crate::{
 use map::{hypotheses::Mode, pose2::Pose2Covariance};
 use protos::{CheckedFrame, Code, Name, Rejection, convert::geometry::pose2_covariance_wire, v1};
 use std::{cell::Cell, sync::Arc, thread::JoinHandle, time::Instant};
-use vision::{frame::GrayImage, pipeline::FrameFacts, recognise::LandmarkId};
+use vision::{frame::GrayImage, model::LandmarkId, pipeline::FrameFacts};
 
 /// Where answers and poses go. Must not wait.
 pub trait Publish: Send + Sync + 'static {

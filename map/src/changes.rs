@@ -15,7 +15,7 @@ use crate::{gate::CHI2_3_999, pose2::Pose2};
 use nalgebra::Point2;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use vision::recognise::LandmarkId;
+use vision::model::LandmarkId;
 
 /// Most landmarks that one robot keeps evidence on; the longest unseen go first.
 pub const MAX_WATCHED: usize = 1024;

@@ -1,6 +1,6 @@
 //! Views of things a robot drives past, followed from frame to frame into tracks: what lies where the track lies, by its
 //! place on the wall or else in the picture just before, and looks like it. Of each track the views that say something
-//! new are to be kept (`vision::learn::thinning`).
+//! new are to be kept (`vision::learn::near_duplicates`).
 //!
 //! In: the quads of a frame with icon, place and what is known of their identity. Out: for each, whether to keep it and
 //! in which track. Nothing is joined in doubt: a wrong view would poison the model learnt from the track, a thing that
@@ -10,11 +10,10 @@ use crate::{place::LandmarkPlace, pose2::wrap_rad};
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 use vision::{
-    detect::quads::Corners,
-    geometry::polygon::iou,
-    learn::thinning::{ThinningParams, ViewDigest, most_alike},
-    params::RecogniseParams,
-    recognise::{IconFeatures, LandmarkId, correlation::correlation},
+    geometry::{Corners, polygon::iou},
+    learn::near_duplicates::{ThinningParams, ViewDigest, most_alike},
+    model::LandmarkId,
+    recognise::{IconFeatures, RecogniseParams, features::correlation::correlation},
 };
 
 /// Most tracks followed at once, those of a single glimpse included.
@@ -43,7 +42,7 @@ pub struct GatherParams {
     /// ... and normals within this angle.
     pub normal_rad: f64,
     /// Largest C^r to the icons of the track: the cap that tau of C^r has where nothing else is known
-    /// (`vision::learn::model::LearnParams`), beyond which no painting was like another.
+    /// (`vision::learn::LearnParams`), beyond which no painting was like another.
     pub max_correlation: f64,
     /// From half of [`MAX_TRACK_VIEWS`] on a view must be so many times farther from the others.
     pub late_novelty: f64,
@@ -166,7 +165,9 @@ impl Track {
     /// C^r to the nearest of its icons.
     fn distance(&self, icon: &IconFeatures, p: &RecogniseParams) -> f64 {
         let icons = self.looks.iter().chain(self.last.as_ref().map(|l| &l.icon));
-        icons.map(|own| correlation(icon, own, &p.correlation)).fold(f64::INFINITY, f64::min)
+        icons
+            .map(|own| correlation(&icon.buckets, &own.buckets, &p.correlation))
+            .fold(f64::INFINITY, f64::min)
     }
 
     fn keep(&mut self, digest: ViewDigest, icon: &IconFeatures) {

@@ -19,7 +19,7 @@ use crate::{
 };
 use nalgebra::{Matrix3, Matrix3x6, Matrix6};
 use serde::{Deserialize, Serialize};
-use vision::{localise::pose::LandmarkPose, recognise::LandmarkId};
+use vision::{model::LandmarkId, pose::LandmarkPose};
 
 /// Most sightings used in one fix; of more, those with the largest image.
 pub const MAX_SIGHTINGS: usize = 8;
@@ -29,7 +29,7 @@ pub const MAX_SIGHTINGS: usize = 8;
 #[serde(default, deny_unknown_fields)]
 pub struct LocaliseParams {
     /// Two solutions whose chi2 (image, and prior where there is one) differ by less are ambiguous. 16 leaves a wrong choice 3e-5 at worst (see
-    /// `vision::localise::pose::AMBIGUOUS_CHI2`).
+    /// `vision::pose::AMBIGUOUS_CHI2`).
     pub ambiguous_chi2: f64,
     /// Gate on chi2 per degree of freedom: no upright robot on the floor sees the corners there. 10 allows corner
     /// errors three times as large as claimed; the covariance is scaled accordingly.

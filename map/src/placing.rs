@@ -20,9 +20,9 @@ use nalgebra::{
 use rays::{CORNERS, Hit, INPUTS, MOUNTING, ROBOT, WALL};
 use serde::{Deserialize, Serialize};
 use vision::{
-    detect::quads::Corners,
     frame::Intrinsics,
-    localise::pose::{LandmarkSize, PoseError, Straightened, straightened},
+    geometry::Corners,
+    pose::{LandmarkSize, PoseError, Straightened, straightened},
 };
 
 /// Most views fused into one place; later ones are ignored.

@@ -34,7 +34,7 @@ use penumbra::Footprint;
 use quarters::Quarter;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_PI_2;
-use vision::localise::pose::LandmarkSize;
+use vision::pose::LandmarkSize;
 
 /// Most obstacles of one landmark's map; of more, the nearest.
 pub const MAX_OBSTACLES: usize = 20_000;

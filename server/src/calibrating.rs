@@ -1,15 +1,15 @@
 //! A camera from views of one landmark, for the command line and over HTTP: corners in, a report out. The computation
-//! is `vision::localise::calibrate`.
+//! is `vision::camera_calibration::calibrate`.
 
 use protos::{convert::geometry::intrinsics_wire, v1};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 use vision::{
-    detect::quads::BORDER_SIGMA_PX,
-    frame::{Intrinsics, IntrinsicsSigmas},
-    localise::calibrate::{
+    camera_calibration::{
         CalibrateError, CalibrateParams, Calibration, Chosen, Height, PlanarView, calibrate_choosing,
     },
+    detect::BORDER_SIGMA_PX,
+    frame::{Intrinsics, IntrinsicsSigmas},
 };
 
 /// Standard deviation of a corner per coordinate, where nobody says.
@@ -170,9 +170,9 @@ mod tests {
     use super::*;
     use nalgebra::{Isometry3, Matrix2, Matrix3, Rotation3, UnitQuaternion, Vector3};
     use vision::{
-        detect::quads::Corners,
         frame::Distortion,
-        localise::{pose::LandmarkSize, reproject::corner_points},
+        geometry::Corners,
+        pose::{LandmarkSize, reprojection::corner_points},
     };
 
     /// Nine views of a poster by a camera whose principal point is `cy`.

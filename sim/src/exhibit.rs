@@ -5,7 +5,7 @@
 use nalgebra::{Matrix3, Point2, Vector3};
 use rand::RngExt;
 use serde::{Deserialize, Serialize};
-use vision::{detect::quads::Corners, frame::GrayImage};
+use vision::{frame::GrayImage, geometry::Corners};
 
 use crate::{
     scenes::compression::jpeg,

@@ -4,16 +4,14 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use nalgebra::Matrix2;
 use std::{hint::black_box, sync::Arc};
 use vision::{
-    detect::quads::{Corners, Quad, QuadKind},
+    detect::{Quad, QuadKind},
     frame::GrayImage,
+    geometry::Corners,
     icon::icon,
-    learn::{
-        exemplar::Exemplar,
-        model::{LandmarkModel, View, learn},
-        synthesis::views,
-    },
+    learn::{View, learn, synthesis::views},
+    model::{Exemplar, LandmarkId, LandmarkModel, ModelSet},
     params::Params,
-    recognise::{DistanceKind, LandmarkId, ModelSet, features, verdict::recognise},
+    recognise::{DistanceKind, features, recognise},
 };
 
 const LANDMARKS: u64 = 1000;

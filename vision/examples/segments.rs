@@ -5,12 +5,11 @@
 use std::{error::Error, time::Instant};
 use vision::{
     detect::{
-        chains::chains,
-        edges::{EdgeMap, edges_into},
-        segments::segments,
+        DetectParams,
+        edges::edge_map::{EdgeMap, edges_into},
+        segments::{chains::chains, edge_segments::segments},
     },
     frame::GrayImage,
-    params::DetectParams,
 };
 
 /// Runs of which the fastest counts.

@@ -9,7 +9,7 @@ use crate::{
 use map::{mounting::Mounting, pose2::Pose2};
 use nalgebra::{Matrix3, Vector3};
 use sim::drive::Sighting as Seen;
-use vision::{pipeline::FrameFacts, recognise::models::ModelSet};
+use vision::{model::ModelSet, pipeline::FrameFacts};
 
 const POSTER: LandmarkId = LandmarkId(1);
 const TWIN: LandmarkId = LandmarkId(7);
@@ -58,7 +58,7 @@ impl Look {
 /// by itself.
 fn with_twin(map: &MapSnapshot, along_m: f64) -> MapSnapshot {
     let poster = map.models.get(POSTER).unwrap();
-    let twin = Arc::new(vision::learn::model::LandmarkModel { id: TWIN, ..(**poster).clone() });
+    let twin = Arc::new(vision::model::LandmarkModel { id: TWIN, ..(**poster).clone() });
     let mut info: LandmarkInfo = map.landmarks[&POSTER].clone();
     "twin".clone_into(&mut info.name);
     let place = info.place.as_mut().unwrap();
@@ -97,7 +97,7 @@ fn what_the_picture_alone_names_is_not_guided() {
 fn what_an_icon_alone_speaks_for_is_named_by_the_pose() {
     let (look, map) = Look::new();
     let poster = map.models.get(POSTER).unwrap();
-    let plain = Arc::new(vision::learn::model::LandmarkModel { points: vec![], ..(**poster).clone() });
+    let plain = Arc::new(vision::model::LandmarkModel { points: vec![], ..(**poster).clone() });
     let mut map = (*map).clone();
     map.models = ModelSet::new(vec![plain], &map.params).unwrap();
     let facts = look.facts(&map);

@@ -6,12 +6,10 @@
 use super::stored_model::StoredModel;
 use std::{collections::BTreeMap, sync::Arc};
 use vision::{
-    learn::{
-        model::{LandmarkModel, refit_thresholds, unlikeness_of},
-        threshold::LimitedBy,
-    },
+    learn::{refit_thresholds, unlikeness_of},
+    model::{LandmarkId, LandmarkModel, LimitedBy, ModelSet},
     params::Params,
-    recognise::{DistanceKind, IconFeatures, LandmarkId, models::ModelSet},
+    recognise::{DistanceKind, IconFeatures},
 };
 
 /// Most landmarks with look-alikes; what is beyond is left out.
@@ -86,12 +84,9 @@ fn alike(models: &[Arc<LandmarkModel>], p: &Params) -> BTreeMap<LandmarkId, Arc<
 mod tests {
     use super::*;
     use vision::{
-        detect::quads::Corners,
         frame::GrayImage,
-        learn::{
-            model::{View, learn},
-            synthesis,
-        },
+        geometry::Corners,
+        learn::{View, learn, synthesis},
     };
 
     /// Blocks of grey with a little of its own in a corner; another number, other blocks.

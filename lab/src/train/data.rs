@@ -8,16 +8,20 @@ use server::cli::{pictures, screen};
 use std::collections::{BTreeMap, BTreeSet};
 use vision::{
     detect::{
+        DetectParams, Quad,
+        border_model::{
+            choose_sides::rivals,
+            network_training::{Example, Rivals},
+        },
         candidates,
-        evidence::Gradients,
-        fitting::{Example, Rivals},
+        edge_support::gradients::Gradients,
         pyramid,
-        quads::{Corners, Quad},
-        selection::{resolve, settle},
-        side_model::rivals,
+        suppression::non_maximum::{resolve, settle},
     },
-    geometry::polygon::{self, Relation},
-    params::DetectParams,
+    geometry::{
+        Corners,
+        polygon::{self, Relation},
+    },
     trace::NoTrace,
 };
 

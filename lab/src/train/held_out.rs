@@ -10,13 +10,13 @@ use crate::evaluate::{
 use anyhow::Context as _;
 use serde::Serialize;
 use server::cli::{pictures, screen};
-use vision::{
-    detect::{
-        calibration::Calibration,
-        fitting::{Example, FitError, Rivals},
+use vision::detect::{
+    DetectParams,
+    border_model::{
         network::Network,
+        network_training::{Example, FitError, Rivals},
+        platt_scaling::Calibration,
     },
-    params::DetectParams,
 };
 
 /// A first choice that is off by so much more than the best rival, in pixels of the working image, is right.

@@ -13,12 +13,12 @@ use serde_json::json;
 use server::cli::{parameters::ParameterArgs, scratch, screen};
 use sim::{scenes::ScenesParams, views::ViewsParams};
 use std::path::{Path, PathBuf};
-use vision::{
-    detect::{
-        fitting::{Example, Rivals, TrainParams, to_choose, to_tell},
+use vision::detect::{
+    DetectParams,
+    border_model::{
         network::Network,
+        network_training::{Example, Rivals, TrainParams, to_choose, to_tell},
     },
-    params::DetectParams,
 };
 
 /// `waymark-lab train search`.
@@ -54,7 +54,7 @@ pub(crate) struct SearchArgs {
     /// Write the networks as parameters here, for --params.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Write the networks as the source file `vision/src/detect/learnt.rs` here; run `cargo fmt` after.
+    /// Write the networks as the source file `vision/src/detect/border_model/network_weights.rs` here; run `cargo fmt` after.
     #[arg(long, value_name = "FILE")]
     rust: Option<PathBuf>,
     /// Rendered views to learn from, where `corridor` is among the sets.

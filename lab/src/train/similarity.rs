@@ -8,16 +8,15 @@ use sim::views::ViewsParams;
 use std::path::PathBuf;
 use vision::{
     detect::{
-        chains::chains,
-        edges::edges,
-        quads::Corners,
-        segments::segments,
-        similarity::{
-            self, SimilarityParams,
-            fit::{FOLDS, FittedSimilarity, JudgedPair, fit, judge, ungraded},
+        DetectParams,
+        edges::edge_map::edges,
+        relaxation::{
+            cue_fit::{FOLDS, FittedSimilarity, JudgedPair, fit, judge, ungraded},
+            similarity::{self, SimilarityParams},
         },
+        segments::{chains::chains, edge_segments::segments},
     },
-    params::DetectParams,
+    geometry::Corners,
 };
 
 /// Names of the cues c1 to c6.

@@ -6,7 +6,7 @@ use crate::{
     localise::{DecidedBy, Fix},
     pose2::Pose2Covariance,
 };
-use vision::{learn::random::Random, recognise::LandmarkId};
+use vision::{model::LandmarkId, random::Random};
 
 const SECOND: i64 = 1_000_000_000;
 

@@ -9,7 +9,7 @@ use crate::{
 };
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeSet;
-use vision::recognise::LandmarkId;
+use vision::model::LandmarkId;
 
 /// What a sighting says of its landmark's place.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -8,11 +8,11 @@ use crate::{
 };
 use nalgebra::{Matrix2, Matrix3, Vector3};
 use vision::{
-    detect::quads::Corners,
     frame::{Distortion, Intrinsics},
-    localise::{
-        pose::{LandmarkPose, LandmarkSize, landmark_pose},
-        reproject::{corner_points, pixel},
+    geometry::Corners,
+    pose::{
+        LandmarkPose, LandmarkSize, landmark_pose,
+        reprojection::{corner_points, pixel},
     },
 };
 

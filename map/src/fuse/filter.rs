@@ -6,7 +6,7 @@ use crate::{
     pose2::{Pose2, Pose2Covariance},
 };
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, Matrix3x2, Vector2, Vector3};
-use vision::recognise::LandmarkId;
+use vision::model::LandmarkId;
 
 /// Most lasting errors carried along of landmarks and mounting, and as many of walls; the one unused for longest goes
 /// first.

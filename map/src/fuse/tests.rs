@@ -3,7 +3,7 @@
 use super::*;
 use crate::localise::{DecidedBy, Modality, Nuisance, NuisanceKey};
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, Matrix3x2, Matrix3x6, Matrix6, Vector2, Vector6};
-use vision::{learn::random::Random, recognise::LandmarkId};
+use vision::{model::LandmarkId, random::Random};
 
 const SECOND: i64 = 1_000_000_000;
 

@@ -1,7 +1,7 @@
 use super::*;
 use crate::place::PlaceSigmas;
 use nalgebra::{Point2, Vector3};
-use vision::{icon::Icon, localise::pose::LandmarkSize, recognise::features};
+use vision::{icon::Icon, pose::LandmarkSize, recognise::features};
 
 const STEP_NS: i64 = 200_000_000;
 

@@ -27,7 +27,10 @@ use nalgebra::{Matrix2, SMatrix};
 use search::{Hypothesis, Outcome};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
-use vision::{detect::quads::Corners, geometry::polygon, recognise::LandmarkId};
+use vision::{
+    geometry::{Corners, polygon},
+    model::LandmarkId,
+};
 
 /// Most observations of one image; a longer list is refused.
 pub const MAX_OBSERVATIONS: usize = 32;
@@ -51,7 +54,7 @@ pub struct AssociateParams {
     /// Prior odds beyond this in either direction count as this, nats.
     pub max_prior_nats: f64,
     /// Two assignments whose scores differ by less are both possible, nats. 8 nats are odds of 3000, the same as a
-    /// difference of 16 in chi2 (see `vision::localise::pose::AMBIGUOUS_CHI2`).
+    /// difference of 16 in chi2 (see `vision::pose::AMBIGUOUS_CHI2`).
     pub margin_nats: f64,
     /// Gates, individual and joint: standard normal quantile of the share of true pairings that pass. 3.09 is 99.9 %.
     pub gate_z: f64,

@@ -28,8 +28,8 @@ use std::collections::BTreeSet;
 use vision::{
     frame::{Intrinsics, MAX_SIDE_PX},
     geometry::polygon,
-    localise::reproject::perturbed,
-    recognise::LandmarkId,
+    model::LandmarkId,
+    pose::reprojection::perturbed,
 };
 
 /// Most landmarks expected in one image; of more, those with the largest part in the image.

@@ -5,7 +5,7 @@ use crate::{localise::predict, mounting::Mounting, place::LandmarkPlace, pose2::
 use nalgebra::{Isometry3, Matrix2, Point2, Point3, SMatrix, Vector3};
 use vision::{
     frame::{Distortion, Intrinsics, MAX_RAY_RAD},
-    localise::reproject::{MIN_DEPTH_M, corner_points},
+    pose::reprojection::{MIN_DEPTH_M, corner_points},
 };
 
 /// A lens describes a point if undoing it gives that point back within this, px.

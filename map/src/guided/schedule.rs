@@ -24,7 +24,7 @@ use crate::{
 };
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use vision::recognise::LandmarkId;
+use vision::model::LandmarkId;
 
 /// Most landmarks remembered as support of a pose, or as contradicting it; the oldest go first.
 pub const MAX_SUPPORT: usize = 16;

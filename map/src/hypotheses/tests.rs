@@ -4,7 +4,7 @@ use crate::{
     visibility::{Viewer, VisibilityParams, visibility},
 };
 use std::f64::consts::FRAC_PI_2;
-use vision::localise::pose::LandmarkSize;
+use vision::pose::LandmarkSize;
 
 fn door(x: f64, y: f64, theta: f64) -> LandmarkPlace {
     let size = LandmarkSize { width_m: 0.9, height_m: 2.0 };

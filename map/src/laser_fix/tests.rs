@@ -1,6 +1,6 @@
 use super::*;
 use crate::slam::world::{Walls, rectangle, ring, scan, segments};
-use vision::learn::random::Random;
+use vision::random::Random;
 
 fn prior(at: &Pose2, sigma_m: f64, sigma_rad: f64, random: &mut Random) -> Pose2Covariance {
     let e = Vector3::new(sigma_m * random.normal(), sigma_m * random.normal(), sigma_rad * random.normal());

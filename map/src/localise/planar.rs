@@ -7,9 +7,9 @@ use crate::{mounting::Mounting, pose2::Pose2};
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Matrix3x6, Matrix6, Point2, SMatrix, Vector3};
 use vision::{
     frame::Intrinsics,
-    localise::{
-        pose::LandmarkSize,
-        reproject::{corner_points, project},
+    pose::{
+        LandmarkSize,
+        reprojection::{corner_points, project},
     },
 };
 

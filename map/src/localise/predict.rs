@@ -5,7 +5,7 @@ use crate::{mounting::Mounting, place::LandmarkPlace, pose2::Pose2};
 use nalgebra::SMatrix;
 use vision::{
     frame::Intrinsics,
-    localise::reproject::{corner_points, project},
+    pose::reprojection::{corner_points, project},
 };
 
 /// Derivatives of the eight corner coordinates.

@@ -4,13 +4,13 @@ use super::{planar::Planar, *};
 use crate::{mounting::pan_tilt, place::PlaceSigmas, pose2::Pose2};
 use nalgebra::{Isometry3, Matrix2, Point2, Vector2, Vector3, Vector6};
 use vision::{
-    detect::quads::Corners,
     frame::{Distortion, Intrinsics, IntrinsicsSigmas},
-    learn::random::Random,
-    localise::{
-        pose::{LandmarkSize, landmark_pose},
-        reproject::{corner_points, perturbed, pixel},
+    geometry::Corners,
+    pose::{
+        LandmarkSize, landmark_pose,
+        reprojection::{corner_points, perturbed, pixel},
     },
+    random::Random,
 };
 
 const SIZE: LandmarkSize = LandmarkSize { width_m: 0.6, height_m: 0.84 };

@@ -11,7 +11,7 @@ use crate::{
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use vision::recognise::LandmarkId;
+use vision::model::LandmarkId;
 
 /// Most landmarks that one camera is watched by; later ones are not counted.
 pub const MAX_WATCHED: usize = 256;
@@ -250,13 +250,13 @@ mod tests {
     };
     use nalgebra::{Matrix2, Vector2, Vector3, Vector6};
     use vision::{
-        detect::quads::Corners,
         frame::{Distortion, Intrinsics, IntrinsicsSigmas},
-        learn::random::Random,
-        localise::{
-            pose::{LandmarkSize, landmark_pose},
-            reproject::{corner_points, perturbed, pixel},
+        geometry::Corners,
+        pose::{
+            LandmarkSize, landmark_pose,
+            reprojection::{corner_points, perturbed, pixel},
         },
+        random::Random,
     };
 
     const SIZE: LandmarkSize = LandmarkSize { width_m: 0.6, height_m: 0.84 };

@@ -13,7 +13,7 @@ use crate::{
 };
 use nalgebra::{DMatrix, Matrix6, SMatrix, SVector, Vector2};
 use std::f64::consts::FRAC_PI_2;
-use vision::localise::pose::{LandmarkSize, PoseError};
+use vision::pose::{LandmarkSize, PoseError};
 
 type Matrix5 = SMatrix<f64, 5, 5>;
 type Vector5 = SVector<f64, 5>;
@@ -252,10 +252,10 @@ mod tests {
     };
     use nalgebra::{Matrix2, Matrix3, Point2, Vector3};
     use vision::{
-        detect::quads::Corners,
         frame::{Distortion, Intrinsics, IntrinsicsSigmas},
-        learn::random::Random,
-        localise::reproject::{corner_points, perturbed, pixel},
+        geometry::Corners,
+        pose::reprojection::{corner_points, perturbed, pixel},
+        random::Random,
     };
 
     const SIZE: LandmarkSize = LandmarkSize { width_m: 1.2, height_m: 0.8 };

@@ -5,8 +5,8 @@ use crate::{mounting::pan_tilt, pose2::Pose2};
 use nalgebra::{Matrix3, Point2, Vector3, Vector6};
 use vision::{
     frame::{Distortion, IntrinsicsSigmas},
-    learn::random::Random,
-    localise::reproject::{corner_points, perturbed, pixel},
+    pose::reprojection::{corner_points, perturbed, pixel},
+    random::Random,
 };
 
 const SIZE: LandmarkSize = LandmarkSize { width_m: 0.6, height_m: 0.84 };

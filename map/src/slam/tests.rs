@@ -1,7 +1,7 @@
 use super::world::{Walls, around, odometry, rectangle, ring, scan};
 use super::*;
 use nalgebra::Point2;
-use vision::learn::random::Random;
+use vision::random::Random;
 
 fn build(walls: &Walls, path: &[Pose2], odom: &[Pose2], seed: u64) -> SlamMap {
     let mut random = Random::new(seed);

@@ -4,7 +4,7 @@
 
 use super::{Moved, Viewer, VisibilityParams};
 use std::f64::consts::FRAC_PI_2;
-use vision::localise::pose::LandmarkSize;
+use vision::pose::LandmarkSize;
 
 /// A landmark nearer to the camera's height than this counts as this far above it, metres: it has elevations all the same.
 const MIN_RISE_M: f64 = 1e-6;

@@ -3,10 +3,12 @@
 use super::geometry::pose3_wire;
 use crate::v1;
 use vision::{
-    detect::quads::{Corners, QuadKind},
-    localise::pose::{LandmarkPose, PoseSolution},
+    detect::QuadKind,
+    geometry::Corners,
+    model::LandmarkId,
     points::{agreement::Part, verify::PointEvidence},
-    recognise::{Candidate, LandmarkId, Recognition, Refusal, Verdict, log10_false_alarms},
+    pose::{LandmarkPose, PoseSolution},
+    recognise::{Candidate, Recognition, Refusal, Verdict, log10_false_alarms},
 };
 
 /// Four corners, TL, TR, BR, BL.

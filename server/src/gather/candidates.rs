@@ -10,12 +10,9 @@ use serde::Serialize;
 use serde_json::{Value, json};
 use utoipa::ToSchema;
 use vision::{
-    learn::{
-        gates::v_c,
-        model::{Gate, LandmarkModel, ModelStatus, View, learn, unlikeness_of},
-    },
+    learn::{View, gates::v_c, learn, unlikeness_of},
+    model::{Gate, LandmarkId, LandmarkModel, ModelStatus},
     params::Params,
-    recognise::LandmarkId,
 };
 
 /// Where a candidate seems to hang.

@@ -13,12 +13,14 @@ use map::{
 };
 use nalgebra::Matrix2;
 use vision::{
-    detect::quads::{Corners, QuadKind},
+    detect::QuadKind,
     frame::Intrinsics,
+    geometry::Corners,
     icon::icon,
+    model::LandmarkId,
     params::Params,
-    pipeline::{QuadFacts, matched},
-    recognise::{LandmarkId, Recognition, Refusal, features},
+    pipeline::{QuadFacts, matched_border},
+    recognise::{Recognition, Refusal, features},
     seen_border::{FoundBy, SeenBorder},
 };
 
@@ -104,7 +106,9 @@ fn recognised(facts: &QuadFacts, params: &Params) -> Option<(LandmarkId, SeenBor
     if verdict.confidence < MIN_CONFIDENCE || verdict.border != 0 {
         return None;
     }
-    matched(&facts.quad, verdict, params).filter(|s| s.found_by == FoundBy::Edges).map(|seen| (id, seen))
+    matched_border(&facts.quad, verdict, params)
+        .filter(|s| s.found_by == FoundBy::Edges)
+        .map(|seen| (id, seen))
 }
 
 /// Where it hangs; `None` where that cannot be known, an error where it is known not to hang flat on a wall.

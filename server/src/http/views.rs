@@ -29,10 +29,10 @@ use sha2::{Digest, Sha256};
 use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
 use vision::{
-    detect::quads::Corners,
     frame::GrayImage,
+    geometry::Corners,
     icon::{Icon, IconError, icon},
-    learn::thinning::ThinningParams,
+    learn::near_duplicates::ThinningParams,
     params::Params as Algorithm,
 };
 

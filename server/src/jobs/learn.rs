@@ -37,13 +37,11 @@ use std::{
 };
 use vision::{
     frame::GrayImage,
-    learn::{
-        model::{LandmarkModel, MAX_VIEWS, ModelStatus, View, add_negatives, learn},
-        synthesis,
-    },
+    learn::{View, add_negatives, learn, synthesis},
+    model::{LandmarkId, LandmarkModel, MAX_VIEWS, ModelStatus},
     params::Params,
     points::taught::{MAX_POINT_VIEWS, TaughtPoint, view_points},
-    recognise::{IconFeatures, LandmarkId, features},
+    recognise::{IconFeatures, features},
 };
 
 /// Views a landmark is learnt from at least: what photographs do not give is generated from them.

@@ -3,9 +3,9 @@
 
 use super::negatives::Negatives;
 use vision::{
-    learn::model::{LandmarkModel, unlikeness_of},
+    learn::unlikeness_of,
+    model::{LandmarkId, LandmarkModel},
     params::Params,
-    recognise::LandmarkId,
 };
 
 /// Look-alikes of one landmark that are named, most alike first.
@@ -41,12 +41,9 @@ pub(super) fn look_alikes(model: &LandmarkModel, negatives: &Negatives, p: &Para
 mod tests {
     use super::*;
     use vision::{
-        detect::quads::Corners,
         frame::GrayImage,
-        learn::{
-            model::{View, learn, refit_thresholds},
-            synthesis,
-        },
+        geometry::Corners,
+        learn::{View, learn, refit_thresholds, synthesis},
     };
 
     /// Blocks of grey; another number, other blocks; `stain` paints a corner over.

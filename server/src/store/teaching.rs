@@ -16,8 +16,8 @@ use map::segments::LaserSegment;
 use sqlx::{Row, SqliteExecutor};
 use std::sync::Arc;
 use vision::{
-    detect::quads::Corners,
-    learn::thinning::{ThinningParams, ViewDigest, most_alike},
+    geometry::Corners,
+    learn::near_duplicates::{ThinningParams, ViewDigest, most_alike},
 };
 
 statements! {

@@ -1,22 +1,56 @@
 //! The lesson: views of one landmark in, its model out (method 7 to 9 on one page). Thresholds are `fitting`'s.
 //! Collecting views, storing models and telling look-alikes apart is the caller's.
 
-use super::{
-    exemplar::Exemplar,
-    fitting::{Templates, ready, refit_thresholds},
-    gates::{saliency, saliency_f, stable_points, v_c},
-    model::{Evidence, LandmarkModel, LearnError, MAX_VIEWS, ModelStatus, View, distances},
-    pca::{exemplars, modes},
-    threshold::Threshold,
-};
 use crate::{
     icon::Icon,
-    params::{Params, RecogniseParams},
-    recognise::{IconFeatures, LandmarkId, features},
+    learn::{
+        gates::{saliency, saliency_f, stable_points, v_c},
+        pca::{exemplars, modes},
+        threshold_fit::{Templates, ready, refit_thresholds},
+        training_view::View,
+    },
+    model::{
+        exemplar::Exemplar,
+        landmark_id::LandmarkId,
+        landmark_model::{Evidence, LandmarkModel, MAX_VIEWS, ModelStatus, distances},
+        threshold::Threshold,
+    },
+    params::Params,
+    recognise::{
+        features::icon_features::{IconFeatures, features},
+        params::RecogniseParams,
+    },
 };
 
+/// Why nothing could be learnt.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum LearnError {
+    /// No view.
+    #[error("views: none given")]
+    NoView,
+    /// Too many views.
+    #[error("views: {found} given, at most {MAX_VIEWS} allowed")]
+    TooManyViews {
+        /// How many.
+        found: usize,
+    },
+    /// A view's icon has another size than the parameters say.
+    #[error("views: icon {index} is {found} px wide, the parameters say {expected}")]
+    IconSize {
+        /// Which view.
+        index: usize,
+        /// Its icon's side in pixels.
+        found: usize,
+        /// The side the parameters ask for.
+        expected: usize,
+    },
+    /// A view's icon holds numbers that are no grey levels, or the components do not converge.
+    #[error("views: the icons have no principal components")]
+    NoComponents,
+}
+
 /// Learns a landmark. `negatives` are icons of everything it must be told from: other landmarks, and quads that are
-/// no landmark. Without any, the absolute caps of [`super::model::LearnParams`] stand in for them.
+/// no landmark. Without any, the absolute caps of [`crate::learn::params::LearnParams`] stand in for them.
 pub fn learn(
     id: LandmarkId,
     views: &[View],

@@ -1,14 +1,13 @@
 //! Drawn posters and photographs of them, for tests.
 
 use crate::{
-    detect::quads::{Corners, Quad, QuadKind},
+    detect::quad::{Quad, QuadKind},
     frame::GrayImage,
-    geometry::homography::Homography,
+    geometry::{corners::Corners, homography::Homography},
     icon::Icon,
-    learn::model::{LandmarkModel, View, learn, refit_thresholds},
-    learn::synthesis::views,
+    learn::{lesson::learn, synthesis::views, threshold_fit::refit_thresholds, training_view::View},
+    model::{landmark_id::LandmarkId, landmark_model::LandmarkModel, model_set::ModelSet},
     params::Params,
-    recognise::{LandmarkId, ModelSet},
 };
 use nalgebra::{Matrix2, Point2};
 use std::sync::Arc;

@@ -23,9 +23,10 @@ use std::{collections::BTreeMap, sync::Arc};
 use vision::{
     detect::{Memory, detect_in},
     frame::{GrayImage, Intrinsics},
+    model::{LandmarkId, ModelSet},
     params::Params,
     pipeline::{Landmarks, analyse_quads},
-    recognise::{DistanceKind, LandmarkId, ModelSet, Recognition},
+    recognise::{DistanceKind, Recognition},
     trace::{NoTrace, Stage, Trace},
 };
 

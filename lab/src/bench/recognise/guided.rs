@@ -18,10 +18,10 @@ use nalgebra::{Matrix2, Matrix3, Vector3};
 use std::{collections::BTreeMap, sync::Arc};
 use vision::{
     frame::{GrayImage, Intrinsics},
-    learn::random::Random,
-    localise::pose::LandmarkSize,
+    model::{LandmarkId, ModelSet},
     pipeline::FrameFacts,
-    recognise::{LandmarkId, ModelSet},
+    pose::LandmarkSize,
+    random::Random,
 };
 
 /// Standard deviations of the known pose: of its position along each axis, and of its heading.

@@ -5,17 +5,14 @@ use server::cli::screen;
 use sim::posters;
 use std::sync::{Arc, Mutex, PoisonError};
 use vision::{
-    detect::quads::Corners,
     frame::{FrameError, GrayImage},
+    geometry::Corners,
     icon::icon,
-    learn::{
-        exemplar::Exemplar,
-        model::{LandmarkModel, View, learn, refit_thresholds},
-        synthesis,
-    },
+    learn::{View, learn, refit_thresholds, synthesis},
+    model::{Exemplar, LandmarkId, LandmarkModel},
     params::Params,
     points::taught::view_points,
-    recognise::{IconFeatures, LandmarkId},
+    recognise::IconFeatures,
 };
 
 /// Width of the posters' pictures, in pixels; also what SIFT learns from.

@@ -11,13 +11,9 @@ use serde::Serialize;
 use server::cli::clock::Clock;
 use std::{collections::BTreeMap, sync::Arc};
 use vision::{
-    learn::model::LandmarkModel,
+    model::{LandmarkModel, ModelSet},
     params::Params,
-    recognise::{
-        DistanceKind, ModelSet, Recognition,
-        verdict::{recognise, recognise_watched},
-        watch::{Step, Watch},
-    },
+    recognise::{DistanceKind, Recognition, Step, Watch, recognise, recognise_watched},
 };
 
 /// Strangers are posters from this number on.
@@ -134,6 +130,6 @@ pub(super) fn recall(args: &Args, first: u64, models: &ModelSet, p: &Params) -> 
 
 fn listed(q: &Query, index: usize, models: &ModelSet, p: &Params) -> bool {
     let Ok(icon) = vision::icon::icon(&q.image, &q.quad.corners_px, &p.icon) else { return false };
-    let signature = vision::recognise::signature::Signature::new(&icon);
+    let signature = vision::recognise::features::signature::Signature::new(&icon);
     models.short_list(&signature, p.recognise.verdict.short_list).iter().any(|l| l.model == index)
 }

@@ -5,8 +5,8 @@ use super::sets::{Set, Stated};
 use crate::evaluate::{experiment::mixed, statistics::median};
 use serde::Serialize;
 use vision::{
-    learn::random::Random,
-    localise::calibrate::{CalibrateError, CalibrateParams, Calibration, PlanarView, calibrate},
+    camera_calibration::{CalibrateError, CalibrateParams, Calibration, PlanarView, calibrate},
+    random::Random,
 };
 
 /// Standard deviation of the principal point about the image's centre, as a share of the width.

@@ -8,14 +8,11 @@ use crate::evaluate::{
 use nalgebra::{Isometry3, Matrix2, Matrix3, Point2, Rotation3, UnitQuaternion, Vector2, Vector3};
 use serde::Serialize;
 use vision::{
-    detect::quads::Corners,
+    camera_calibration::{CalibrateParams, Height, PlanarView, calibrate},
     frame::{Distortion, Intrinsics},
-    learn::random::Random,
-    localise::{
-        calibrate::{CalibrateParams, Height, PlanarView, calibrate},
-        pose::LandmarkSize,
-        reproject::corner_points,
-    },
+    geometry::Corners,
+    pose::{LandmarkSize, reprojection::corner_points},
+    random::Random,
 };
 
 /// The method's poster.

@@ -15,13 +15,14 @@ use sim::{
 };
 use std::f64::consts::TAU;
 use vision::{
-    detect::quads::Corners,
-    learn::random::Random,
+    geometry::Corners,
+    model::LandmarkId,
     params::Params,
+    random::Random,
     recognise::{
-        DistanceKind, LandmarkId, Recognition, Verdict,
-        confidence::{MEASURES, measures},
-        verdict::recognise,
+        DistanceKind, Recognition, Verdict,
+        decision::measures::{MEASURES, measures},
+        recognise,
     },
 };
 

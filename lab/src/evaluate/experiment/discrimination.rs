@@ -16,10 +16,11 @@ use serde::Serialize;
 use sim::exhibit::{Conditions, Exhibit, Extent, exhibit};
 use std::collections::BTreeMap;
 use vision::{
-    detect::quads::Corners,
-    learn::random::Random,
+    geometry::Corners,
+    model::LandmarkId,
     params::Params,
-    recognise::{DistanceKind, LandmarkId, Recognition, verdict::recognise},
+    random::Random,
+    recognise::{DistanceKind, Recognition, recognise},
 };
 
 /// `waymark-lab evaluate discrimination`.

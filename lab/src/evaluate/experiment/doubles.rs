@@ -17,9 +17,10 @@ use sim::{
 };
 use std::sync::Arc;
 use vision::{
-    learn::random::Random,
+    model::LandmarkId,
     params::Params,
-    recognise::{DistanceKind, LandmarkId, Recognition, verdict::recognise},
+    random::Random,
+    recognise::{DistanceKind, Recognition, recognise},
 };
 
 /// `waymark-lab evaluate lookalikes`.

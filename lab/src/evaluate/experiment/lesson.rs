@@ -10,16 +10,14 @@ use sim::{
 };
 use std::sync::Arc;
 use vision::{
-    detect::quads::Corners,
     frame::GrayImage,
-    learn::{
-        model::{LandmarkModel, View, add_negatives, learn},
-        random::Random,
-        synthesis,
-    },
+    geometry::Corners,
+    learn::{View, add_negatives, learn, synthesis},
+    model::{LandmarkId, LandmarkModel, ModelSet},
     params::Params,
     points::taught::{MAX_POINT_VIEWS, TaughtPoint, view_points},
-    recognise::{IconFeatures, LandmarkId, ModelSet, features},
+    random::Random,
+    recognise::{IconFeatures, features},
 };
 
 /// Views of each landmark, as the server wants them.

@@ -6,14 +6,12 @@ use nalgebra::Matrix2;
 use serde::Serialize;
 use sim::exhibit::Exhibit;
 use vision::{
-    detect::{
-        detect,
-        quads::{Corners, Quad, QuadKind},
-    },
-    geometry::polygon,
+    detect::{Quad, QuadKind, detect},
+    geometry::{Corners, polygon},
     icon::icon,
+    model::LandmarkId,
     params::Params,
-    recognise::{DistanceKind, LandmarkId, Recognition, Refusal, Verdict, features, verdict::recognise},
+    recognise::{DistanceKind, Recognition, Refusal, Verdict, features, recognise},
     trace::NoTrace,
 };
 

@@ -30,10 +30,10 @@ use sim::{
 };
 use std::{collections::BTreeMap, sync::Arc, time::Instant};
 use vision::{
-    detect::quads::Corners,
-    geometry::polygon,
-    pipeline::{FrameFacts, matched},
-    recognise::{LandmarkId, Recognition},
+    geometry::{Corners, polygon},
+    model::LandmarkId,
+    pipeline::{FrameFacts, matched_border},
+    recognise::Recognition,
     seen_border::FoundBy,
 };
 
@@ -268,7 +268,8 @@ impl Journey {
             let found = quad.verdict.as_ref().and_then(|v| v.aligned_px).unwrap_or(quad.quad.corners_px);
             if is_there(id, &found) {
                 global.push(world.name(id));
-                let corners = quad.verdict.as_ref().and_then(|v| matched(&quad.quad, v, &world.map.params));
+                let corners =
+                    quad.verdict.as_ref().and_then(|v| matched_border(&quad.quad, v, &world.map.params));
                 if let (Some(corners), Some(view)) = (corners, truth.landmark(world.name(id))) {
                     let how = match corners.found_by {
                         FoundBy::Edges => "by the picture, detected",

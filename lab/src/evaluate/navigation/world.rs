@@ -23,14 +23,12 @@ use sim::{
 };
 use std::{collections::BTreeMap, sync::Arc};
 use vision::{
-    learn::{
-        model::{LandmarkModel, ModelStatus, View, add_negatives, learn},
-        synthesis,
-    },
-    localise::pose::LandmarkSize,
+    learn::{View, add_negatives, learn, synthesis},
+    model::{LandmarkId, LandmarkModel, ModelSet, ModelStatus},
     params::Params,
     points::taught::TaughtPoint,
-    recognise::{DistanceKind, IconFeatures, LandmarkId, ModelSet, features},
+    pose::LandmarkSize,
+    recognise::{DistanceKind, IconFeatures, features},
 };
 
 /// Views each landmark is learnt from: what the first drive did not photograph is generated.

@@ -13,12 +13,9 @@ use sha2::{Digest as _, Sha256};
 use std::time::Duration;
 use tokio::sync::watch;
 use vision::{
-    detect::quads::Corners,
     frame::GrayImage,
-    learn::{
-        model::{View, learn},
-        synthesis,
-    },
+    geometry::Corners,
+    learn::{View, learn, synthesis},
     params::Params,
     recognise::DistanceKind,
 };

@@ -2,20 +2,19 @@
 
 use super::*;
 use crate::{
-    detect::quads::Corners,
     frame::GrayImage,
+    geometry::corners::Corners,
     learn::{
-        fitting::{add_negatives, fitted, unlikeness_of},
-        model::Gate,
-        threshold::ThresholdError,
-    },
-    learn::{
-        model::{MAX_EXEMPLARS, StoredModelError},
-        random::Random,
         synthesis,
-        threshold::LimitedBy,
+        threshold_fit::{add_negatives, fitted, unlikeness_of},
+    },
+    model::{
+        landmark_model::{Gate, MAX_EXEMPLARS},
+        model_bytes::StoredModelError,
+        threshold::{LimitedBy, ThresholdError},
     },
     points::taught::view_points,
+    random::Random,
 };
 use proptest::prelude::*;
 
@@ -245,7 +244,7 @@ fn counted_negatives_hold_tau_below_those_kept() {
     assert_eq!((evidence.others, evidence.nearest_others.len()), (200, Evidence::MAX_NEAREST));
     assert!(evidence.nearest_others.is_sorted() && evidence.nearest_others[63] < 0.3325);
     let cheap = Params {
-        learn: crate::learn::model::LearnParams {
+        learn: crate::learn::params::LearnParams {
             threshold: crate::learn::threshold::ThresholdParams {
                 false_positive_weight: 0.1,
                 nearest_share: 0.9,
@@ -275,7 +274,7 @@ fn a_stored_model_is_the_same_bit_for_bit() {
     // A model of the version before points loads, and says that it knows none.
     let mut older = bytes[..bytes.len() - 8 - 3].to_vec();
     older[4] = 2;
-    older.extend(crate::learn::stored::digest(&older).to_le_bytes());
+    older.extend(crate::model::model_bytes::digest(&older).to_le_bytes());
     let read = LandmarkModel::from_bytes(&older, &p).unwrap();
     assert!(!read.knows_points && read == model);
     let points = crate::points::taught::view_points(
@@ -316,7 +315,7 @@ proptest! {
             forged[*at] = *value;
         }
         if seal {
-            let sum = crate::learn::stored::digest(&forged);
+            let sum = crate::model::model_bytes::digest(&forged);
             forged.extend(sum.to_le_bytes());
         }
         if let Ok(model) = LandmarkModel::from_bytes(&forged, &Params::default()) {
