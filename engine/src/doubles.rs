@@ -24,9 +24,9 @@ use vision::{
     geometry::Corners,
     model::LandmarkId,
     params::Params,
-    pipeline::{FrameFacts, QuadFacts, recognise_quad},
+    pipeline::{FrameAnalysis, QuadAnalysis, recognise_quad},
     pose::{LandmarkPose, landmark_pose},
-    recognise::{Recognition, Refusal},
+    recognise::{MatchRefusal, Verdict},
     seen_border::SeenBorder,
 };
 
@@ -40,7 +40,7 @@ pub type Sighted = Vec<(LandmarkId, Glimpse)>;
 /// hangs nobody knows where would be taken for the others again and again.
 pub fn sighted(
     image: &GrayImage,
-    facts: &FrameFacts,
+    facts: &FrameAnalysis,
     map: &MapSnapshot,
     mounting: &Mounting,
     camera: &Intrinsics,
@@ -49,13 +49,13 @@ pub fn sighted(
         return Vec::new();
     }
     let unsure =
-        |q: &&QuadFacts| q.verdict.as_ref().is_some_and(|v| !matches!(v.recognition, Recognition::Unique(_)));
+        |q: &&QuadAnalysis| q.verdict.as_ref().is_some_and(|v| !matches!(v.recognition, Verdict::Unique(_)));
     facts.quads.iter().filter(unsure).filter_map(|q| one(image, q, map, mounting, camera)).collect()
 }
 
 fn one(
     image: &GrayImage,
-    facts: &QuadFacts,
+    facts: &QuadAnalysis,
     map: &MapSnapshot,
     mounting: &Mounting,
     camera: &Intrinsics,
@@ -95,11 +95,11 @@ pub fn hang_where_known(landmarks: &BTreeSet<LandmarkId>, map: &MapSnapshot) -> 
 pub fn resembling(image: &GrayImage, quad: &Quad, map: &MapSnapshot) -> Option<Resembling> {
     let asked = |p: &Params| recognise_quad(image, quad, &map.look_alikes.models, p);
     let (mut verdict, mut border) = asked(&map.params);
-    if map.params.recognise.verdict.points && verdict.recognition == Recognition::Unknown {
+    if map.params.recognise.verdict.points && verdict.recognition == Verdict::Unknown {
         (verdict, border) = asked(&map.look_alikes.by_icons);
     }
-    let (Recognition::Ambiguous(_) | Recognition::Unique(_)) = verdict.recognition else { return None };
-    let fits = |refusal: Option<Refusal>| matches!(refusal, None | Some(Refusal::Margin));
+    let (Verdict::Ambiguous(_) | Verdict::Unique(_)) = verdict.recognition else { return None };
+    let fits = |refusal: Option<MatchRefusal>| matches!(refusal, None | Some(MatchRefusal::Margin));
     let fitting: BTreeSet<LandmarkId> =
         verdict.candidates.iter().filter(|c| fits(c.refusal)).map(|c| c.landmark).collect();
     let members = members(&fitting, &map.look_alikes.alike)?;

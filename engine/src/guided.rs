@@ -24,10 +24,10 @@ use vision::{
     frame::GrayImage,
     geometry::{Corners, polygon},
     model::LandmarkId,
-    pipeline::{ACCEPTED_NATS, Found, QuadFacts, expected, matched_border},
+    pipeline::{ACCEPTED_NATS, ExpectedLandmark, QuadAnalysis, expected, matched_border},
     points::verify::PointEvidence,
     pose::{LandmarkPose, landmark_pose},
-    recognise::{Recognition, Refusal},
+    recognise::{MatchRefusal, Verdict},
     seen_border::SeenBorder,
 };
 
@@ -175,10 +175,10 @@ fn is_found(kept: &MayBe, e: &Expected) -> bool {
 }
 
 /// The landmarks that one quad may be.
-fn may_be(image: &GrayImage, quad: usize, facts: &QuadFacts, view: &View<'_>) -> Option<MayBe> {
+fn may_be(image: &GrayImage, quad: usize, facts: &QuadAnalysis, view: &View<'_>) -> Option<MayBe> {
     let verdict = facts.verdict.as_ref()?;
     let quad = Some(quad);
-    if let Recognition::Unique(landmark) = verdict.recognition {
+    if let Verdict::Unique(landmark) = verdict.recognition {
         let SeenBorder { corners_px, covariance_px2, .. } =
             matched_border(&facts.quad, verdict, &view.map.params)?;
         let ratio = verdict.candidates.first().map_or(0.0, |c| c.ratio);
@@ -196,14 +196,14 @@ fn may_be(image: &GrayImage, quad: usize, facts: &QuadFacts, view: &View<'_>) ->
 }
 
 /// A quad that the icon of one landmark alone speaks for, and nothing of the map looks like that landmark.
-fn plain(facts: &QuadFacts, view: &View<'_>) -> Option<Resembling> {
+fn plain(facts: &QuadAnalysis, view: &View<'_>) -> Option<Resembling> {
     let verdict = facts.verdict.as_ref()?;
-    let Recognition::Ambiguous(landmark) = verdict.recognition else { return None };
+    let Verdict::Ambiguous(landmark) = verdict.recognition else { return None };
     let first = verdict.candidates.iter().find(|c| c.landmark == landmark)?;
     let members = [landmark].into();
     let is_alone =
         !view.map.look_alikes.alike.contains_key(&landmark) && hang_where_known(&members, view.map);
-    if first.refusal != Some(Refusal::Plain) || !is_alone {
+    if first.refusal != Some(MatchRefusal::Plain) || !is_alone {
         return None;
     }
     let SeenBorder { corners_px, covariance_px2, .. } =
@@ -222,7 +222,7 @@ fn asked(image: &GrayImage, e: &Expected, view: &View<'_>) -> Option<MayBe> {
     if !hang_where_known(&members, map) {
         return None;
     }
-    let Found { corners_px, covariance_px2, picture_nats, points } = found;
+    let ExpectedLandmark { corners_px, covariance_px2, picture_nats, points } = found;
     let resembling = Resembling { members, fitting: 1, ratio: 1.0, corners_px, covariance_px2 };
     Some(MayBe { quad: None, is_unique: false, picture_nats, resembling, points })
 }

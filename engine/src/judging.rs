@@ -18,15 +18,15 @@ use map::{
 use vision::{
     frame::Intrinsics,
     model::LandmarkId,
-    pipeline::FrameFacts,
-    recognise::{Recognition, Verdict},
+    pipeline::FrameAnalysis,
+    recognise::{RecognitionResult, Verdict},
 };
 
 /// A frame that was looked at.
 #[derive(Debug, Clone, Copy)]
 pub struct View<'a> {
     /// What is in it.
-    pub facts: &'a FrameFacts,
+    pub facts: &'a FrameAnalysis,
     /// The map it was compared with.
     pub map: &'a MapSnapshot,
     /// Where the camera sat.
@@ -153,8 +153,8 @@ fn guided_fix(
 const NEARLY: f64 = 1.5;
 
 /// Whether a quad shows a landmark, or something that is taken for it, or nearly.
-fn may_be(verdict: &Verdict, id: LandmarkId) -> bool {
-    let (Recognition::Unique(seen) | Recognition::Ambiguous(seen)) = verdict.recognition else {
+fn may_be(verdict: &RecognitionResult, id: LandmarkId) -> bool {
+    let (Verdict::Unique(seen) | Verdict::Ambiguous(seen)) = verdict.recognition else {
         return verdict.candidates.first().is_some_and(|c| c.landmark == id && c.ratio < NEARLY);
     };
     seen == id

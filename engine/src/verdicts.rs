@@ -22,9 +22,9 @@ use std::{cell::RefCell, time::Instant};
 use vision::{
     frame::{GrayImage, Intrinsics},
     model::LandmarkId,
-    pipeline::{FrameFacts, Landmarks, NoPose, Pipeline, QuadFacts},
+    pipeline::{FrameAnalysis, LandmarkDatabase, Pipeline, PoseUnavailable, QuadAnalysis},
     pose::LandmarkPose,
-    recognise::Recognition,
+    recognise::Verdict,
     trace::{Stage, Trace},
 };
 
@@ -70,8 +70,8 @@ pub fn look(
     camera: Option<&Intrinsics>,
     map: &MapSnapshot,
     times: &mut StageTimes,
-) -> FrameFacts {
-    let landmarks = Landmarks { models: &map.models, sizes: &map.sizes, kind: map.distance };
+) -> FrameAnalysis {
+    let landmarks = LandmarkDatabase { models: &map.models, sizes: &map.sizes, kind: map.distance };
     // Taken out while in use: a panic leaves none behind that is half written.
     let mut pipeline = PIPELINE.take();
     let facts = pipeline.analyse(image, camera, landmarks, &map.params, times);
@@ -95,7 +95,7 @@ pub fn answer_to_photograph(image: &GrayImage, camera: Option<&Intrinsics>, map:
 }
 
 /// Facts with names: status and quads, without echo, times and robot pose.
-pub fn answer(facts: &FrameFacts, map: &MapSnapshot) -> v1::Answer {
+pub fn answer(facts: &FrameAnalysis, map: &MapSnapshot) -> v1::Answer {
     let quads: Vec<_> = facts.quads.iter().map(|q| quad(q, map)).collect();
     let any = |verdict| quads.iter().any(|q: &v1::QuadAnswer| q.verdict() == verdict);
     let status = if any(v1::Verdict::Unique) {
@@ -114,7 +114,7 @@ pub fn answer(facts: &FrameFacts, map: &MapSnapshot) -> v1::Answer {
     }
 }
 
-fn quad(facts: &QuadFacts, map: &MapSnapshot) -> v1::QuadAnswer {
+fn quad(facts: &QuadAnalysis, map: &MapSnapshot) -> v1::QuadAnswer {
     let mut quad = v1::QuadAnswer {
         corners: corners(&facts.quad.corners_px),
         kind: kind(facts.quad.kind).into(),
@@ -132,10 +132,10 @@ fn quad(facts: &QuadFacts, map: &MapSnapshot) -> v1::QuadAnswer {
     }
     match &facts.pose {
         Ok(pose) => fill_pose(&mut quad, pose),
-        Err(NoPose::NotUnique) => {}
-        Err(NoPose::NoCamera) => "no_intrinsics".clone_into(&mut quad.pose_refusal),
-        Err(NoPose::NoSize(_)) => "no_size".clone_into(&mut quad.pose_refusal),
-        Err(NoPose::Pose(_)) => "degenerate".clone_into(&mut quad.pose_refusal),
+        Err(PoseUnavailable::NotUnique) => {}
+        Err(PoseUnavailable::NoCamera) => "no_intrinsics".clone_into(&mut quad.pose_refusal),
+        Err(PoseUnavailable::NoSize(_)) => "no_size".clone_into(&mut quad.pose_refusal),
+        Err(PoseUnavailable::Pose(_)) => "degenerate".clone_into(&mut quad.pose_refusal),
     }
     quad
 }
@@ -145,17 +145,20 @@ fn name(map: &MapSnapshot, id: LandmarkId) -> String {
 }
 
 /// The landmarks that were recognised without doubt, with their poses.
-pub fn recognised(facts: &FrameFacts) -> Vec<(LandmarkId, &LandmarkPose)> {
-    let unique = |q: &QuadFacts| match q.verdict.as_ref()?.recognition {
-        Recognition::Unique(id) => Some(id),
-        Recognition::Unknown | Recognition::Ambiguous(_) => None,
+pub fn recognised(facts: &FrameAnalysis) -> Vec<(LandmarkId, &LandmarkPose)> {
+    let unique = |q: &QuadAnalysis| match q.verdict.as_ref()?.recognition {
+        Verdict::Unique(id) => Some(id),
+        Verdict::Unknown | Verdict::Ambiguous(_) => None,
     };
     facts.quads.iter().filter_map(|q| Some((unique(q)?, q.pose.as_ref().ok()?))).collect()
 }
 
 /// Landmarks that were recognised, posed, and have a place that is trusted; or the word that says why there are none:
 /// empty when no landmark was recognised.
-pub fn sightings<'a>(facts: &'a FrameFacts, map: &'a MapSnapshot) -> Result<Vec<Sighting<'a>>, &'static str> {
+pub fn sightings<'a>(
+    facts: &'a FrameAnalysis,
+    map: &'a MapSnapshot,
+) -> Result<Vec<Sighting<'a>>, &'static str> {
     let posed = recognised(facts);
     if posed.is_empty() {
         // The quads say why each has no pose.

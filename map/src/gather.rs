@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 use vision::{
     geometry::{Corners, polygon::iou},
-    learn::near_duplicates::{ThinningParams, ViewDigest, most_alike},
+    learn::near_duplicates::{NoveltyParams, ViewSummary, most_alike},
     model::LandmarkId,
     recognise::{IconFeatures, RecogniseParams, features::correlation::correlation},
 };
@@ -47,7 +47,7 @@ pub struct GatherParams {
     /// From half of [`MAX_TRACK_VIEWS`] on a view must be so many times farther from the others.
     pub late_novelty: f64,
     /// What is new.
-    pub thinning: ThinningParams,
+    pub thinning: NoveltyParams,
 }
 
 impl Default for GatherParams {
@@ -62,7 +62,7 @@ impl Default for GatherParams {
             normal_rad: 0.26,
             max_correlation: 0.5,
             late_novelty: 2.0,
-            thinning: ThinningParams::default(),
+            thinning: NoveltyParams::default(),
         }
     }
 }
@@ -127,7 +127,7 @@ pub struct Track {
     /// Of these, such in which it was taken for a landmark, or nearly.
     pub known: u32,
     closed: bool,
-    views: Vec<ViewDigest>,
+    views: Vec<ViewSummary>,
     looks: VecDeque<IconFeatures>,
     /// Where it was on the walls when that was last known.
     place: Option<LandmarkPlace>,
@@ -170,7 +170,7 @@ impl Track {
             .fold(f64::INFINITY, f64::min)
     }
 
-    fn keep(&mut self, digest: ViewDigest, icon: &IconFeatures) {
+    fn keep(&mut self, digest: ViewSummary, icon: &IconFeatures) {
         self.views.push(digest);
         // The first ones and, later, every so often another: what it looked like on the way.
         if self.looks.len() < LOOKS_KEPT {
@@ -231,7 +231,7 @@ impl Tracker {
         }
         let mut track = Track { sightings, known, place, ..Track::new(number, landmark) };
         for (corners, icon) in views.into_iter().take(MAX_TRACK_VIEWS) {
-            track.keep(ViewDigest::new(&corners, &icon.icon), &icon);
+            track.keep(ViewSummary::new(&corners, &icon.icon), &icon);
         }
         self.tracks.push(track);
         self.numbers = self.numbers.max(number);
@@ -370,7 +370,7 @@ impl Tracker {
         if track.views.len() >= MAX_TRACK_VIEWS {
             return Outcome::Full;
         }
-        let digest = ViewDigest::new(&glimpse.corners_px, &glimpse.icon.icon);
+        let digest = ViewSummary::new(&glimpse.corners_px, &glimpse.icon.icon);
         let late = track.views.len() >= MAX_TRACK_VIEWS / 2;
         let needed = if late { self.p.late_novelty } else { 1.0 };
         match most_alike(&digest, &track.views, &self.p.thinning) {

@@ -22,7 +22,7 @@ use serde::{Deserialize, Serialize};
 use vision::{
     frame::Intrinsics,
     geometry::Corners,
-    pose::{LandmarkSize, PoseError, Straightened, straightened},
+    pose::{LandmarkSize, PoseError, UndistortedCorners, straightened},
 };
 
 /// Most views fused into one place; later ones are ignored.
@@ -165,7 +165,7 @@ pub fn view_on_wall(
 fn checked<'a>(view: &PlacingView<'a>) -> Result<WallSighting<'a>, PlacingError> {
     view.map_from_robot.check()?;
     view.mounting.check()?;
-    let Straightened { corners_px, covariance_px2, camera, by_camera } =
+    let UndistortedCorners { corners_px, covariance_px2, camera, by_camera } =
         straightened(view.corners, view.covariance_px2, view.camera)?;
     let (map_from_robot, mounting) = (view.map_from_robot, view.mounting);
     Ok(WallSighting { corners_px, covariance_px2, camera, by_camera, map_from_robot, mounting })

@@ -6,7 +6,8 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 use vision::{
     camera_calibration::{
-        CalibrateError, CalibrateParams, Calibration, Chosen, Height, PlanarView, calibrate_choosing,
+        CalibrateError, CalibrateParams, CameraCalibration, CameraHeight, PlanarView, RobustCalibration,
+        calibrate_choosing,
     },
     detect::BORDER_SIGMA_PX,
     frame::{Intrinsics, IntrinsicsSigmas},
@@ -54,9 +55,10 @@ impl Knowledge {
         CalibrateParams {
             radial: usize::from(self.radial),
             roll_sigma_rad: if self.level { LEVEL_SIGMA_RAD } else { 0.0 },
-            height: self
-                .height_m
-                .map_or(Height::Free, |height_m| Height::Known { height_m, sigma_m: HEIGHT_SIGMA_M }),
+            height: self.height_m.map_or(CameraHeight::Free, |height_m| CameraHeight::Known {
+                height_m,
+                sigma_m: HEIGHT_SIGMA_M,
+            }),
             known_aspect: !self.unknown_aspect,
             centre_sigma: CENTRE_SIGMA,
             ..CalibrateParams::default()
@@ -104,7 +106,7 @@ pub(crate) struct Report {
 }
 
 /// What speaks against a camera that came out.
-fn doubts(c: &Calibration, image_px: [usize; 2]) -> Vec<String> {
+fn doubts(c: &CameraCalibration, image_px: [usize; 2]) -> Vec<String> {
     let mut all = vec![];
     let chi2 = c.chi2 / c.dof.max(1) as f64;
     if chi2 > DOUBTFUL_CHI2 {
@@ -131,7 +133,7 @@ pub(crate) fn calibrated(
     for covariance in views.iter_mut().flat_map(|v| &mut v.covariance_px2) {
         *covariance += nalgebra::Matrix2::identity() * BORDER_SIGMA_PX.powi(2);
     }
-    let Chosen { calibration: c, used } = calibrate_choosing(&views, image_px, &known.params())?;
+    let RobustCalibration { calibration: c, used } = calibrate_choosing(&views, image_px, &known.params())?;
     let sigma = |i: usize| c.covariance.map_or(f64::INFINITY, |m| m[(i, i)].sqrt());
     let view = |i: usize| {
         let fit = used.iter().position(|u| *u == i).and_then(|k| c.views.get(k));

@@ -8,7 +8,7 @@ use vision::{
     frame::GrayImage,
     geometry::Corners,
     icon::icon,
-    learn::{View, learn, synthesis::views},
+    learn::{TrainingView, learn, synthesis::views},
     model::{Exemplar, LandmarkId, LandmarkModel, ModelSet},
     params::Params,
     recognise::{DistanceKind, features, recognise},
@@ -31,7 +31,7 @@ fn corners() -> Corners {
 
 /// Many landmarks from one lesson: exemplars are exchanged, thresholds stay.
 fn landmarks(p: &Params) -> ModelSet {
-    let mut lesson = vec![View::photographed(&picture(0), &corners(), p).expect("large enough")];
+    let mut lesson = vec![TrainingView::photographed(&picture(0), &corners(), p).expect("large enough")];
     lesson.extend(views(&picture(0), &corners(), 10, p, 1));
     let model = learn(LandmarkId(0), &lesson, &[], p).expect("textured");
     let all = (0..LANDMARKS).map(|id| {

@@ -5,7 +5,7 @@
 use crate::{
     detect::{
         detector::detect_in,
-        edge_buffers::Memory,
+        edge_buffers::DetectBuffers,
         quad::{Quad, QuadKind},
     },
     frame::{GrayImage, Intrinsics},
@@ -17,7 +17,7 @@ use crate::{
     },
     recognise::{
         decision::{
-            result::{Recognition, Verdict},
+            result::{RecognitionResult, Verdict},
             verdict::recognise,
         },
         distance_kind::DistanceKind,
@@ -28,7 +28,7 @@ use crate::{
 use std::collections::BTreeMap;
 
 pub use crate::recognise::decision::{
-    expected::{ACCEPTED_NATS, Found, expected},
+    expected::{ACCEPTED_NATS, ExpectedLandmark, expected},
     matched_border::matched_border,
 };
 
@@ -37,7 +37,7 @@ pub const MAX_RECOGNISED_QUADS: usize = 24;
 
 /// What of a map the pipeline needs. Immutable while an image is worked on.
 #[derive(Debug, Clone, Copy)]
-pub struct Landmarks<'a> {
+pub struct LandmarkDatabase<'a> {
     /// Models of the landmarks to recognise.
     pub models: &'a ModelSet,
     /// Sizes of those whose size is known.
@@ -48,25 +48,25 @@ pub struct Landmarks<'a> {
 
 /// Everything seen in one image.
 #[derive(Debug, Clone, PartialEq)]
-pub struct FrameFacts {
+pub struct FrameAnalysis {
     /// The quads, best first.
-    pub quads: Vec<QuadFacts>,
+    pub quads: Vec<QuadAnalysis>,
 }
 
 /// What is known of one quad.
 #[derive(Debug, Clone, PartialEq)]
-pub struct QuadFacts {
+pub struct QuadAnalysis {
     /// The quad as detected.
     pub quad: Quad,
     /// What recognition says; `None` if it was not asked (three-sided, or beyond [`MAX_RECOGNISED_QUADS`]).
-    pub verdict: Option<Verdict>,
+    pub verdict: Option<RecognitionResult>,
     /// The landmark in the camera frame, or why not.
-    pub pose: Result<LandmarkPose, NoPose>,
+    pub pose: Result<LandmarkPose, PoseUnavailable>,
 }
 
 /// Why a quad has no pose.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum NoPose {
+pub enum PoseUnavailable {
     /// It is not exactly one landmark.
     #[error("not recognised as exactly one landmark")]
     NotUnique,
@@ -85,7 +85,7 @@ pub enum NoPose {
 /// The memory never changes a result.
 #[derive(Debug, Default)]
 pub struct Pipeline {
-    buffers: Memory,
+    buffers: DetectBuffers,
 }
 
 impl Pipeline {
@@ -94,10 +94,10 @@ impl Pipeline {
         &mut self,
         image: &GrayImage,
         camera: Option<&Intrinsics>,
-        landmarks: Landmarks<'_>,
+        landmarks: LandmarkDatabase<'_>,
         p: &Params,
         trace: &mut impl Trace,
-    ) -> FrameFacts {
+    ) -> FrameAnalysis {
         let quads = detect_in(&mut self.buffers, image, &p.detect, trace);
         analyse_quads(image, quads, camera, landmarks, p, trace)
     }
@@ -108,17 +108,17 @@ pub fn analyse_quads(
     image: &GrayImage,
     quads: Vec<Quad>,
     camera: Option<&Intrinsics>,
-    landmarks: Landmarks<'_>,
+    landmarks: LandmarkDatabase<'_>,
     p: &Params,
     trace: &mut impl Trace,
-) -> FrameFacts {
+) -> FrameAnalysis {
     let mut asked = 0;
     let mut verdict = |quad: &Quad| {
         asked += usize::from(quad.kind == QuadKind::Full);
         (quad.kind == QuadKind::Full && asked <= MAX_RECOGNISED_QUADS)
             .then(|| recognise(image, quad, landmarks.models, landmarks.kind, p))
     };
-    let verdicts: Vec<Option<Verdict>> = quads.iter().map(&mut verdict).collect();
+    let verdicts: Vec<Option<RecognitionResult>> = quads.iter().map(&mut verdict).collect();
     trace.finished(Stage::Recognition);
     let quads = quads
         .into_iter()
@@ -128,11 +128,11 @@ pub fn analyse_quads(
                 turn_to_recognised(&mut quad, verdict);
             }
             let pose = pose(&quad, verdict.as_ref(), camera, landmarks.sizes, p);
-            QuadFacts { quad, verdict, pose }
+            QuadAnalysis { quad, verdict, pose }
         })
         .collect();
     trace.finished(Stage::Poses);
-    FrameFacts { quads }
+    FrameAnalysis { quads }
 }
 
 /// Which of the landmarks a single quad may be, by its picture alone, and their common border in the image; `None` for the
@@ -142,17 +142,17 @@ pub fn recognise_quad(
     quad: &Quad,
     models: &ModelSet,
     p: &Params,
-) -> (Verdict, Option<SeenBorder>) {
+) -> (RecognitionResult, Option<SeenBorder>) {
     let verdict = recognise(image, quad, models, DistanceKind::Both, p);
-    let is_known = verdict.recognition != Recognition::Unknown;
+    let is_known = verdict.recognition != Verdict::Unknown;
     let border = if is_known { matched_border(quad, &verdict, p) } else { None };
     (verdict, border)
 }
 
 /// Where another border of `quad` than its corners was recognised, that one becomes its corners: whoever reads what was
 /// recognised must not take the wall round a poster for it.
-fn turn_to_recognised(quad: &mut Quad, verdict: &mut Verdict) {
-    if verdict.recognition == Recognition::Unknown || verdict.border == 0 {
+fn turn_to_recognised(quad: &mut Quad, verdict: &mut RecognitionResult) {
+    if verdict.recognition == Verdict::Unknown || verdict.border == 0 {
         return;
     }
     if let Some(recognised) = quad.alternates.get_mut(verdict.border - 1) {
@@ -164,17 +164,17 @@ fn turn_to_recognised(quad: &mut Quad, verdict: &mut Verdict) {
 /// Only a unique recognition of a landmark of known size, seen by a known camera, has a pose.
 fn pose(
     quad: &Quad,
-    verdict: Option<&Verdict>,
+    verdict: Option<&RecognitionResult>,
     camera: Option<&Intrinsics>,
     sizes: &BTreeMap<LandmarkId, LandmarkSize>,
     p: &Params,
-) -> Result<LandmarkPose, NoPose> {
-    let Some(Verdict { recognition: Recognition::Unique(landmark), .. }) = verdict else {
-        return Err(NoPose::NotUnique);
+) -> Result<LandmarkPose, PoseUnavailable> {
+    let Some(RecognitionResult { recognition: Verdict::Unique(landmark), .. }) = verdict else {
+        return Err(PoseUnavailable::NotUnique);
     };
-    let seen = verdict.and_then(|v| matched_border(quad, v, p)).ok_or(NoPose::NotUnique)?;
-    let camera = camera.ok_or(NoPose::NoCamera)?;
-    let size = sizes.get(landmark).ok_or(NoPose::NoSize(*landmark))?;
+    let seen = verdict.and_then(|v| matched_border(quad, v, p)).ok_or(PoseUnavailable::NotUnique)?;
+    let camera = camera.ok_or(PoseUnavailable::NoCamera)?;
+    let size = sizes.get(landmark).ok_or(PoseUnavailable::NoSize(*landmark))?;
     Ok(landmark_pose(&seen.corners_px, &seen.covariance_px2, *size, camera)?)
 }
 

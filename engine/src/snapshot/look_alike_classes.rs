@@ -86,7 +86,7 @@ mod tests {
     use vision::{
         frame::GrayImage,
         geometry::Corners,
-        learn::{View, learn, synthesis},
+        learn::{TrainingView, learn, synthesis},
     };
 
     /// Blocks of grey with a little of its own in a corner; another number, other blocks.
@@ -106,7 +106,7 @@ mod tests {
         let p = Params::default();
         let whole = Corners::try_from([[-0.5, -0.5], [239.5, -0.5], [239.5, 239.5], [-0.5, 239.5]]).unwrap();
         let lesson = |id: u64, image: &GrayImage| {
-            let mut views = vec![View::photographed(image, &whole, &p).unwrap()];
+            let mut views = vec![TrainingView::photographed(image, &whole, &p).unwrap()];
             views.extend(synthesis::views(image, &whole, 8, &p, id));
             Arc::new(refit_thresholds(&learn(LandmarkId(id), &views, &[], &p).unwrap(), &[], &p))
         };

@@ -10,7 +10,7 @@ use server::cli::{clock::Clock, parameters::ParameterArgs, scratch, screen};
 use std::{collections::BTreeMap, hint::black_box, path::PathBuf};
 use vision::{
     detect::{
-        DetectParams, Grouping, Memory, detect_in,
+        DetectBuffers, DetectParams, Grouping, detect_in,
         edges::edge_map,
         segments::{chains, edge_segments},
     },
@@ -214,7 +214,7 @@ fn time_ours(
         let chained = chains::chains(&kept, &params.chains);
         black_box(edge_segments::segments(&chained, &kept, &params.segments));
     });
-    let mut memory = Memory::default();
+    let mut memory = DetectBuffers::default();
     let mut found = 0;
     timed(QUADS, &mut || found = detect_in(&mut memory, black_box(frame), params, &mut NoTrace).len());
     let mut paper = params.clone();

@@ -18,7 +18,7 @@ use vision::{
     learn::{self, synthesis},
     model::{LandmarkId, ModelSet},
     params::Params,
-    pipeline::{Landmarks, Pipeline},
+    pipeline::{LandmarkDatabase, Pipeline},
     points::taught::view_points,
     pose::LandmarkSize,
     recognise::DistanceKind,
@@ -84,7 +84,7 @@ pub(super) fn run(args: &PipelineArgs) -> anyhow::Result<()> {
 
     let sizes: BTreeMap<LandmarkId, LandmarkSize> =
         models.iter().map(|m| (m.id, LandmarkSize { width_m: 0.6, height_m: 0.84 })).collect();
-    let landmarks = Landmarks { models: &models, sizes: &sizes, kind: DistanceKind::default() };
+    let landmarks = LandmarkDatabase { models: &models, sizes: &sizes, kind: DistanceKind::default() };
     let mut costs: BTreeMap<&'static str, Vec<f64>> = BTreeMap::new();
     let mut totals = Vec::new();
     let (mut quads, mut recognised) = (0, 0);

@@ -11,7 +11,7 @@ use vision::{
         DetectParams, Quad,
         border_model::{
             choose_sides::rivals,
-            network_training::{Example, Rivals},
+            network_training::{ChoiceExample, LabelledExample},
         },
         candidates,
         edge_support::gradients::Gradients,
@@ -96,8 +96,8 @@ fn dealt(images: &[TruthImage], parts: usize) -> Vec<usize> {
 #[derive(Debug, Default)]
 pub(super) struct Data {
     pub(super) images: usize,
-    pub(super) sides: Vec<Rivals>,
-    pub(super) things: Vec<Example>,
+    pub(super) sides: Vec<ChoiceExample>,
+    pub(super) things: Vec<LabelledExample>,
 }
 
 impl Data {
@@ -143,7 +143,7 @@ impl Data {
         for settled in settle(rated, &g, &params.quads) {
             let Some(corners) = settled.quad.corners_px.scaled(factor as f64) else { continue };
             let Some(is_one) = is_thing(&corners, image) else { continue };
-            self.things.push(Example { group, weight, features: settled.features.to_vec(), is_one });
+            self.things.push(LabelledExample { group, weight, features: settled.features.to_vec(), is_one });
         }
         self.images += 1;
         Ok(())
@@ -151,7 +151,7 @@ impl Data {
 }
 
 /// The lines beside each side of the quad found on a label, with their distance from the labelled side.
-fn sides(g: &Gradients, found: &[Quad], label: &Corners, group: usize, weight: f64) -> Vec<Rivals> {
+fn sides(g: &Gradients, found: &[Quad], label: &Corners, group: usize, weight: f64) -> Vec<ChoiceExample> {
     let overlap = |q: &Quad| polygon::iou(label.points(), q.corners_px.points());
     let best = found.iter().map(|q| (overlap(q), q)).reduce(|a, b| if b.0 > a.0 { b } else { a });
     let Some((_, quad)) = best.filter(|b| b.0 > SAME_THING) else { return vec![] };
@@ -167,7 +167,7 @@ fn sides(g: &Gradients, found: &[Quad], label: &Corners, group: usize, weight: f
         let off: Vec<f64> = lines.iter().map(|line| off(&line.ends_px)).collect();
         if off.iter().any(|o| *o < MAX_OFF_PX) && off.iter().all(|o| o.is_finite()) {
             let features = lines.iter().map(|line| line.features.to_vec()).collect();
-            all.push(Rivals { group, weight, features, off });
+            all.push(ChoiceExample { group, weight, features, off });
         }
     }
     all

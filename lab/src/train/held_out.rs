@@ -14,8 +14,8 @@ use vision::detect::{
     DetectParams,
     border_model::{
         network::Network,
-        network_training::{Example, FitError, Rivals},
-        platt_scaling::Calibration,
+        network_training::{ChoiceExample, LabelledExample, TrainError},
+        platt_scaling::PlattScaling,
     },
 };
 
@@ -76,7 +76,7 @@ pub(super) fn line_of_parts(
     name: &'static str,
     sides: &Data,
     parts: &[Part],
-    calibration: &Calibration,
+    calibration: &PlattScaling,
     params: &DetectParams,
 ) -> Line {
     let mut offs = Vec::new();
@@ -90,12 +90,13 @@ pub(super) fn line_of_parts(
 }
 
 /// From the outputs for things that each part's networks have not seen.
-pub(super) fn calibration(parts: &[Part]) -> Result<Calibration, FitError> {
-    let (examples, outputs): (Vec<Example>, Vec<f64>) = unseen(parts).map(|(e, o)| (e.clone(), o)).unzip();
-    Calibration::fit(&outputs, &examples)
+pub(super) fn calibration(parts: &[Part]) -> Result<PlattScaling, TrainError> {
+    let (examples, outputs): (Vec<LabelledExample>, Vec<f64>) =
+        unseen(parts).map(|(e, o)| (e.clone(), o)).unzip();
+    PlattScaling::fit(&outputs, &examples)
 }
 
-fn unseen(parts: &[Part]) -> impl Iterator<Item = (&Example, f64)> {
+fn unseen(parts: &[Part]) -> impl Iterator<Item = (&LabelledExample, f64)> {
     parts.iter().flat_map(|p| {
         let unseen = p.data.things.iter().filter(|e| Some(e.group) == p.unseen);
         unseen.map(|e| (e, p.networks[1].output(&e.features)))
@@ -103,7 +104,7 @@ fn unseen(parts: &[Part]) -> impl Iterator<Item = (&Example, f64)> {
 }
 
 /// How far the first choice is off, and the best rival; of equal outputs the earlier.
-fn off(net: &Network, r: &Rivals) -> [f64; 2] {
+fn off(net: &Network, r: &ChoiceExample) -> [f64; 2] {
     let outputs: Vec<f64> = r.features.iter().map(|f| net.output(f)).collect();
     let first = (0..outputs.len()).reduce(|a, b| if outputs[b] > outputs[a] { b } else { a });
     [first.map_or(f64::INFINITY, |i| r.off[i]), r.off.iter().copied().fold(f64::INFINITY, f64::min)]

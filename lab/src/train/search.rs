@@ -17,7 +17,7 @@ use vision::detect::{
     DetectParams,
     border_model::{
         network::Network,
-        network_training::{Example, Rivals, TrainParams, to_choose, to_tell},
+        network_training::{ChoiceExample, LabelledExample, TrainParams, to_choose, to_tell},
     },
 };
 
@@ -220,13 +220,14 @@ struct Fit<'a> {
 impl Fit<'_> {
     /// Networks of sides and of things from all but one part of the data. Things are told by their sides as the new
     /// network of sides places them.
-    fn networks(&self, sides: &[Rivals], without: Option<usize>) -> anyhow::Result<held_out::Part> {
-        let learnt: Vec<Rivals> = sides.iter().filter(|r| Some(r.group) != without).cloned().collect();
+    fn networks(&self, sides: &[ChoiceExample], without: Option<usize>) -> anyhow::Result<held_out::Part> {
+        let learnt: Vec<ChoiceExample> = sides.iter().filter(|r| Some(r.group) != without).cloned().collect();
         let side = to_choose(&learnt, &self.how[0]).context("the network of sides")?;
         let mut params = self.params.clone();
         params.quads.side_model = Some(side.clone());
         let data = Data::gather(self.sets, &params, self.min_side_px)?;
-        let learnt: Vec<Example> = data.things.iter().filter(|e| Some(e.group) != without).cloned().collect();
+        let learnt: Vec<LabelledExample> =
+            data.things.iter().filter(|e| Some(e.group) != without).cloned().collect();
         let thing = to_tell(&learnt, &self.how[1]).context("the network of things")?;
         Ok(held_out::Part { unseen: without, networks: [side, thing], data })
     }

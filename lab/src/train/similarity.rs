@@ -11,7 +11,7 @@ use vision::{
         DetectParams,
         edges::edge_map::edges,
         relaxation::{
-            cue_fit::{FOLDS, FittedSimilarity, JudgedPair, fit, judge, ungraded},
+            cue_fit::{FOLDS, FittedSimilarity, LabelledPair, fit, judge, ungraded},
             similarity::{self, SimilarityParams},
         },
         segments::{chains::chains, edge_segments::segments},
@@ -66,7 +66,7 @@ pub(crate) fn run(args: &SimilarityArgs) -> anyhow::Result<()> {
 }
 
 /// Candidate pairs of all completely labelled pictures, judged by their labels.
-fn judged(args: &SimilarityArgs, params: &DetectParams) -> anyhow::Result<Vec<JudgedPair>> {
+fn judged(args: &SimilarityArgs, params: &DetectParams) -> anyhow::Result<Vec<LabelledPair>> {
     let keep_all = ungraded(&params.similarity);
     let mut pairs = Vec::new();
     for folder in &args.sets {

@@ -19,8 +19,8 @@ use vision::{
     icon::icon,
     model::LandmarkId,
     params::Params,
-    pipeline::{QuadFacts, matched_border},
-    recognise::{Recognition, Refusal, features},
+    pipeline::{QuadAnalysis, matched_border},
+    recognise::{MatchRefusal, Verdict, features},
     seen_border::{FoundBy, SeenBorder},
 };
 
@@ -100,9 +100,9 @@ pub(super) fn glimpses(offer: &Offer, params: &Params) -> Found {
 
 /// The landmark that is seen beyond doubt, with its corners. Where its border was found only by laying the learnt picture
 /// on it, the corners are not good enough to learn from.
-fn recognised(facts: &QuadFacts, params: &Params) -> Option<(LandmarkId, SeenBorder)> {
+fn recognised(facts: &QuadAnalysis, params: &Params) -> Option<(LandmarkId, SeenBorder)> {
     let verdict = facts.verdict.as_ref()?;
-    let Recognition::Unique(id) = verdict.recognition else { return None };
+    let Verdict::Unique(id) = verdict.recognition else { return None };
     if verdict.confidence < MIN_CONFIDENCE || verdict.border != 0 {
         return None;
     }
@@ -134,7 +134,7 @@ fn overlap(a: &LandmarkPlace, b: &LandmarkPlace) -> bool {
 }
 
 fn identity(
-    facts: &QuadFacts,
+    facts: &QuadAnalysis,
     recognised: Option<LandmarkId>,
     place: Option<&LandmarkPlace>,
     map: &MapSnapshot,
@@ -151,10 +151,10 @@ fn identity(
         };
     }
     let Some(verdict) = &facts.verdict else { return Identity::Doubtful };
-    if let Recognition::Ambiguous(id) = verdict.recognition {
+    if let Verdict::Ambiguous(id) = verdict.recognition {
         // What its icon alone speaks for is the landmark where that hangs.
         let is_plain =
-            verdict.candidates.iter().any(|c| c.landmark == id && c.refusal == Some(Refusal::Plain));
+            verdict.candidates.iter().any(|c| c.landmark == id && c.refusal == Some(MatchRefusal::Plain));
         let is_it = is_plain && there(&id) == Some(true);
         return if is_it { Identity::Landmark(id) } else { Identity::Doubtful };
     }

@@ -43,7 +43,7 @@ mod tests {
     use vision::{
         frame::GrayImage,
         geometry::Corners,
-        learn::{View, learn, refit_thresholds, synthesis},
+        learn::{TrainingView, learn, refit_thresholds, synthesis},
     };
 
     /// Blocks of grey; another number, other blocks; `stain` paints a corner over.
@@ -63,7 +63,7 @@ mod tests {
         let p = Params::default();
         let whole = Corners::try_from([[-0.5, -0.5], [239.5, -0.5], [239.5, 239.5], [-0.5, 239.5]]).unwrap();
         let lesson = |id: u64, image: &GrayImage| {
-            let mut views = vec![View::photographed(image, &whole, &p).unwrap()];
+            let mut views = vec![TrainingView::photographed(image, &whole, &p).unwrap()];
             views.extend(synthesis::views(image, &whole, 20, &p, id));
             learn(LandmarkId(id), &views, &[], &p).unwrap()
         };

@@ -118,7 +118,7 @@ async fn store_model(store: &Catalogue, landmark: i64, params: &vision::params::
     use vision::{geometry::Corners, icon::Icon, learn, model::LandmarkId};
     let side = params.icon.size;
     let pixels = (0..side * side).map(|i| ((i * i * 31 + i * 7) % 251) as f32).collect();
-    let view = learn::View {
+    let view = learn::TrainingView {
         icon: Icon::new(side, pixels, 1.0).unwrap(),
         corners_px: Corners::try_from([[0.0, 0.0], [90.0, 0.0], [90.0, 90.0], [0.0, 90.0]]).unwrap(),
         image_size_px: [91, 91],

@@ -17,7 +17,7 @@ use sqlx::{Row, SqliteExecutor};
 use std::sync::Arc;
 use vision::{
     geometry::Corners,
-    learn::near_duplicates::{ThinningParams, ViewDigest, most_alike},
+    learn::near_duplicates::{NoveltyParams, ViewSummary, most_alike},
 };
 
 statements! {
@@ -103,7 +103,7 @@ pub(crate) struct Teaching {
     /// Most views of a landmark.
     pub(crate) max: usize,
     /// What counts as saying nothing new; without it every view is stored.
-    pub(crate) thinning: Option<ThinningParams>,
+    pub(crate) thinning: Option<NoveltyParams>,
 }
 
 /// What was computed for a view, and from what.
@@ -161,9 +161,9 @@ async fn prepare(store: &Store, teaching: &Arc<Teaching>) -> Result<Prepared, St
 }
 
 /// The stored view that the new one adds nothing to.
-fn alike(new: &Cut, stored: &[(i64, Cut)], p: &ThinningParams) -> Option<i64> {
-    let digest = |cut: &Cut| ViewDigest::new(&cut.corners_px, &cut.icon);
-    let digests: Vec<ViewDigest> = stored.iter().map(|(_, cut)| digest(cut)).collect();
+fn alike(new: &Cut, stored: &[(i64, Cut)], p: &NoveltyParams) -> Option<i64> {
+    let digest = |cut: &Cut| ViewSummary::new(&cut.corners_px, &cut.icon);
+    let digests: Vec<ViewSummary> = stored.iter().map(|(_, cut)| digest(cut)).collect();
     let (index, novelty) = most_alike(&digest(new), &digests, p)?;
     (novelty < 1.0).then(|| stored[index].0)
 }

@@ -7,7 +7,7 @@ use vision::{
     detect::{Quad, QuadKind},
     frame::GrayImage,
     geometry::Corners,
-    learn::{View, learn, refit_thresholds, synthesis::views},
+    learn::{TrainingView, learn, refit_thresholds, synthesis::views},
     model::{LandmarkId, LandmarkModel, ModelSet},
     params::Params,
     points::taught::view_points,
@@ -51,7 +51,7 @@ pub(crate) fn teach(root: &Path, truth: &Value, p: &Params) -> Result<Vec<Taught
         let id: u64 = entry["landmark"].as_str().ok_or("landmark")?.parse()?;
         let image = load(&root.join(entry["file"].as_str().ok_or("file")?))?;
         let corners = whole(&image)?;
-        let mut lesson = vec![View::photographed(&image, &corners, p)?];
+        let mut lesson = vec![TrainingView::photographed(&image, &corners, p)?];
         lesson.extend(views(&image, &corners, GENERATED, p, id));
         let photograph = features(lesson[0].icon.clone(), &p.recognise);
         let points = [view_points(&image, &corners)];

@@ -20,7 +20,9 @@ use vision::{
     params::Params,
     pipeline::{MAX_RECOGNISED_QUADS, matched_border},
     points::search::search,
-    recognise::{DistanceKind, Recognition, Step, Watch, log10_false_alarms, recognise, recognise_watched},
+    recognise::{
+        DistanceKind, RecogniseStep, StepListener, Verdict, log10_false_alarms, recognise, recognise_watched,
+    },
     seen_border::SeenBorder,
     trace::NoTrace,
 };
@@ -103,11 +105,11 @@ fn labelled(
         let v = recognise(&q.image, &q.quad, models, kind, p);
         let is = |id: LandmarkId| q.landmark.is_some_and(|l| same(l) == same(id.0));
         let word = match (q.landmark, v.recognition) {
-            (Some(_), Recognition::Unique(id)) if is(id) => (&mut score.right, "right"),
-            (Some(_), Recognition::Unique(_)) => (&mut score.wrong, "WRONG"),
-            (Some(_), Recognition::Ambiguous(_)) => (&mut score.ambiguous, "ambiguous"),
-            (Some(_), Recognition::Unknown) => (&mut score.missed, "missed"),
-            (None, Recognition::Unique(_)) => (&mut score.accepted, "ACCEPTED"),
+            (Some(_), Verdict::Unique(id)) if is(id) => (&mut score.right, "right"),
+            (Some(_), Verdict::Unique(_)) => (&mut score.wrong, "WRONG"),
+            (Some(_), Verdict::Ambiguous(_)) => (&mut score.ambiguous, "ambiguous"),
+            (Some(_), Verdict::Unknown) => (&mut score.missed, "missed"),
+            (None, Verdict::Unique(_)) => (&mut score.accepted, "ACCEPTED"),
             (None, _) => (&mut score.refused, "refused"),
         };
         *word.0 += 1;
@@ -141,7 +143,7 @@ fn strangers(
             }
             strangers += 1;
             let v = recognise(&q.image, &q.quad, half, kind, p);
-            let accepted = matches!(v.recognition, Recognition::Unique(_));
+            let accepted = matches!(v.recognition, Verdict::Unique(_));
             strangers_accepted += usize::from(accepted);
             if verbose && accepted {
                 println!("HALF {kind:?} {} {:?} accepted {:?}", q.file, q.landmark, v.candidates[0]);
@@ -155,11 +157,11 @@ fn strangers(
 #[derive(Default)]
 struct Steps {
     last: Option<Instant>,
-    ms: BTreeMap<Step, f64>,
+    ms: BTreeMap<RecogniseStep, f64>,
 }
 
-impl Watch for Steps {
-    fn finished(&mut self, step: Step) {
+impl StepListener for Steps {
+    fn finished(&mut self, step: RecogniseStep) {
         let now = Instant::now();
         let last = self.last.replace(now).unwrap_or(now);
         *self.ms.entry(step).or_default() += (now - last).as_secs_f64() * 1e3;
@@ -216,7 +218,7 @@ fn detected(
             let nearest =
                 (0..labelled.len()).max_by(|a, b| overlap(labelled[*a]).total_cmp(&overlap(labelled[*b])));
             let hit = nearest.filter(|i| overlap(labelled[*i]) > 0.3);
-            let Recognition::Unique(id) = v.recognition else {
+            let Verdict::Unique(id) = v.recognition else {
                 if verbose && hit.is_some_and(|i| labelled[i].landmark.is_some()) {
                     println!(
                         "REFUSED {} {:?} {:?}",
@@ -345,7 +347,7 @@ fn strangers_in(
                 models.at(i).map_or(&[][..], |m| m.points.as_slice())
             });
             nearest.extend(found.first().map(|f| log10_false_alarms(&f.evidence, models.len())));
-            if matches!(v.recognition, Recognition::Unique(_)) {
+            if matches!(v.recognition, Verdict::Unique(_)) {
                 accepted += 1;
                 println!("STRANGER {} {:?} {:?}", file.display(), v.candidates[0], v.points);
             }

@@ -9,7 +9,7 @@ use crate::{
         camera_model::{ALPHA, CAMERA, HEIGHT, K1, PIXEL_ASPECT, POSTER, State, U0, V0},
         least_squares::{Problem, Summary, ViewFit},
         linear::{Constraints, LinearCamera, solve},
-        params::{CalibrateParams, Height, MAX_RADIAL},
+        params::{CalibrateParams, CameraHeight, MAX_RADIAL},
         views::{MAX_POINTS, MAX_VIEWS, MIN_VIEWS, PlanarView},
     },
     frame::{Distortion, FrameError, Intrinsics, MAX_SIDE_PX},
@@ -89,7 +89,7 @@ pub enum CalibrateError {
 
 /// A calibrated camera.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Calibration {
+pub struct CameraCalibration {
     /// The camera.
     pub camera: Intrinsics,
     /// Over (fx, cx, cy, k1, k2, fy / fx), px and 1; rows of what was not fitted are zero. `None` without refinement.
@@ -114,7 +114,7 @@ pub struct Calibration {
     pub sigma_ratio: f64,
 }
 
-impl Calibration {
+impl CameraCalibration {
     /// Standard deviation of the focal length, pixels.
     pub fn fx_sigma_px(&self) -> Option<f64> {
         self.covariance.map(|c| c[(0, 0)].sqrt())
@@ -126,7 +126,7 @@ pub fn calibrate(
     views: &[PlanarView],
     image_size_px: [usize; 2],
     p: &CalibrateParams,
-) -> Result<Calibration, CalibrateError> {
+) -> Result<CameraCalibration, CalibrateError> {
     check(views, image_size_px, p)?;
     let size = image_size_px.map(|s| s as f64);
     let mut homographies = Vec::with_capacity(views.len());
@@ -190,10 +190,10 @@ fn start(
         solve(homographies, square, &Constraints { known_aspect: p.known_aspect, zero_roll, height_m })
     };
     match p.height {
-        Height::Known { height_m, .. } => with(Some(height_m)),
+        CameraHeight::Known { height_m, .. } => with(Some(height_m)),
         // Departs from method 16.2 (a 1-D search): without C3 the start is good enough, and the refinement finds the
         // height with all the rest.
-        Height::Free | Height::Constant { .. } => with(None),
+        CameraHeight::Free | CameraHeight::Constant { .. } => with(None),
     }
 }
 
@@ -250,12 +250,12 @@ fn check(views: &[PlanarView], image_size_px: [usize; 2], p: &CalibrateParams) -
     within("orientation_step_rad", p.orientation_step_rad, 0.0, 1.5)?;
     within("max_rms_px", p.max_rms_px, 0.0, 1e4)?;
     match p.height {
-        Height::Free => {}
-        Height::Known { height_m, sigma_m } => {
+        CameraHeight::Free => {}
+        CameraHeight::Known { height_m, sigma_m } => {
             within("height_m", height_m, -100.0, 100.0)?;
             within("sigma_m", sigma_m, 1e-6, 100.0)?;
         }
-        Height::Constant { sigma_m } => within("sigma_m", sigma_m, 1e-6, 100.0)?,
+        CameraHeight::Constant { sigma_m } => within("sigma_m", sigma_m, 1e-6, 100.0)?,
     }
     // Two numbers of the camera a view with known aspect, one without.
     let least = if p.known_aspect { MIN_VIEWS } else { 2 * MIN_VIEWS };
@@ -289,7 +289,7 @@ fn finished(
     linear_fx_px: Option<f64>,
     (orientations, sigma_ratio): (usize, f64),
     p: &CalibrateParams,
-) -> Result<Calibration, CalibrateError> {
+) -> Result<CameraCalibration, CalibrateError> {
     if made.rms_px > p.max_rms_px {
         let worst = (0..made.views.len())
             .max_by(|&a, &b| made.views[a].rms_px.total_cmp(&made.views[b].rms_px))
@@ -303,12 +303,12 @@ fn finished(
         _ => Distortion::PlumbBob([c[K1], c[K1 + 1], 0.0, 0.0, 0.0]),
     };
     let camera = Intrinsics::new(c[ALPHA], c[ALPHA] * c[PIXEL_ASPECT], c[U0], c[V0], distortion)?;
-    Ok(Calibration {
+    Ok(CameraCalibration {
         camera,
         covariance: made.covariance,
         linear_fx_px,
         aspect_ratio: c[POSTER].exp(),
-        height_m: (p.height != Height::Free).then_some(c[HEIGHT]),
+        height_m: (p.height != CameraHeight::Free).then_some(c[HEIGHT]),
         views: made.views,
         rms_px: made.rms_px,
         chi2: made.chi2,

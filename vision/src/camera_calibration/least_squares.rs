@@ -8,7 +8,7 @@ use crate::{
             view_chi2,
         },
         normal_equations::{Normal, Shared, SharedVector},
-        params::{CalibrateParams, Height},
+        params::{CalibrateParams, CameraHeight},
         views::PlanarView,
     },
     pose::linear::{faces_camera, mirrored},
@@ -76,13 +76,13 @@ impl Problem {
             (at[U0], at[V0]) = (0.5 * (size_px[0] - 1.0), 0.5 * (size_px[1] - 1.0));
         }
         let height_weight = match p.height {
-            Height::Free => 0.0,
+            CameraHeight::Free => 0.0,
             // One height for all views, known to sigma: as a number of its own it would be held twice.
-            Height::Known { height_m, sigma_m } => {
+            CameraHeight::Known { height_m, sigma_m } => {
                 at[HEIGHT] = height_m;
                 1.0 / sigma_m
             }
-            Height::Constant { sigma_m } => {
+            CameraHeight::Constant { sigma_m } => {
                 free[HEIGHT] = true;
                 1.0 / sigma_m
             }
@@ -356,7 +356,7 @@ mod tests {
             free_pixel_aspect: true,
             known_aspect: false,
             roll_sigma_rad: 0.02,
-            height: Height::Constant { sigma_m: 0.05 },
+            height: CameraHeight::Constant { sigma_m: 0.05 },
             radial: 2,
             centre_sigma: 0.1,
             ..CalibrateParams::default()

@@ -9,8 +9,8 @@ pub(crate) mod least_squares;
 pub mod calibrate;
 pub mod robust;
 
-pub use calibrate::{CalibrateError, Calibration, calibrate};
+pub use calibrate::{CalibrateError, CameraCalibration, calibrate};
 pub use least_squares::ViewFit;
-pub use params::{CalibrateParams, Height, MAX_RADIAL};
-pub use robust::{Chosen, LENS_GAIN, OUTLIER_PX, OUTLIER_SHARE, calibrate_choosing};
+pub use params::{CalibrateParams, CameraHeight, MAX_RADIAL};
+pub use robust::{LENS_GAIN, OUTLIER_PX, OUTLIER_SHARE, RobustCalibration, calibrate_choosing};
 pub use views::{MAX_POINTS, MAX_VIEWS, MIN_VIEWS, PlanarView};

@@ -9,7 +9,7 @@ pub const MAX_RADIAL: usize = 2;
 /// (C3).
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
-pub enum Height {
+pub enum CameraHeight {
     /// Nothing, or it changes.
     #[default]
     Free,
@@ -40,7 +40,7 @@ pub struct CalibrateParams {
     /// The camera does not roll (C2): standard deviation of the roll, radians. Zero: nothing is known of it.
     pub roll_sigma_rad: f64,
     /// The camera's height (C3).
-    pub height: Height,
+    pub height: CameraHeight,
     /// Fit the reprojection of all views (Zhang); without it the linear solution stands, and has no covariance.
     pub refine: bool,
     /// Radial coefficients (k1, k2) that are fitted, 0 to [`MAX_RADIAL`].
@@ -63,7 +63,7 @@ impl Default for CalibrateParams {
             free_pixel_aspect: false,
             known_aspect: true,
             roll_sigma_rad: 0.0,
-            height: Height::Free,
+            height: CameraHeight::Free,
             refine: true,
             radial: 0,
             centre_sigma: 0.0,

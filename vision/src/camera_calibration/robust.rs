@@ -2,7 +2,7 @@
 //! not fit, and takes as few radial coefficients as the residuals ask for.
 
 use crate::camera_calibration::{
-    calibrate::{CalibrateError, Calibration, calibrate},
+    calibrate::{CalibrateError, CameraCalibration, calibrate},
     params::CalibrateParams,
     views::PlanarView,
 };
@@ -21,9 +21,9 @@ const MAX_RMS_PX: f64 = 1e4;
 
 /// A camera and the views it rests on.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Chosen {
+pub struct RobustCalibration {
     /// The camera; its views are those in `used`.
-    pub calibration: Calibration,
+    pub calibration: CameraCalibration,
     /// Indices of the views that fit, ascending.
     pub used: Vec<usize>,
 }
@@ -34,7 +34,7 @@ pub fn calibrate_choosing(
     views: &[PlanarView],
     image_size_px: [usize; 2],
     p: &CalibrateParams,
-) -> Result<Chosen, CalibrateError> {
+) -> Result<RobustCalibration, CalibrateError> {
     let mut best = fitting(views, image_size_px, &CalibrateParams { radial: 0, ..p.clone() });
     for radial in 1..=p.radial {
         let Ok(next) = fitting(views, image_size_px, &CalibrateParams { radial, ..p.clone() }) else {
@@ -60,7 +60,7 @@ fn fitting(
     views: &[PlanarView],
     image_size_px: [usize; 2],
     p: &CalibrateParams,
-) -> Result<Chosen, CalibrateError> {
+) -> Result<RobustCalibration, CalibrateError> {
     let of = |used: &[usize]| {
         let chosen: Vec<PlanarView> = used.iter().map(|&i| views[i].clone()).collect();
         // Residuals are needed of what does not fit, too.
@@ -87,9 +87,9 @@ fn fitting(
     }
     // With the limit that was asked for.
     let chosen: Vec<PlanarView> = used.iter().map(|&i| views[i].clone()).collect();
-    calibrate(&chosen, image_size_px, p).map(|calibration| Chosen { calibration, used })
+    calibrate(&chosen, image_size_px, p).map(|calibration| RobustCalibration { calibration, used })
 }
 
-fn reduced(c: &Calibration) -> f64 {
+fn reduced(c: &CameraCalibration) -> f64 {
     c.chi2 / c.dof.max(1) as f64
 }

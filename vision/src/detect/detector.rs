@@ -2,7 +2,7 @@
 
 use crate::{
     detect::{
-        edge_buffers::{MAX_SCALES, Memory},
+        edge_buffers::{DetectBuffers, MAX_SCALES},
         edge_support::gradients::Gradients,
         edges::edge_map::EdgeMap,
         params::{DetectParams, Grouping, Nested},
@@ -11,7 +11,7 @@ use crate::{
         quad::Quad,
         refine::{
             full_size::at_full_size,
-            rating::{Rated, rate},
+            rating::{ScoredQuad, rate},
             refit::sharpen,
         },
         relaxation::{grouping::match_pairs, paired_quads::quads as quads_of_pairs, similarity::pairs},
@@ -35,12 +35,12 @@ pub const MAX_QUADS: usize = 64;
 
 /// Finds the quads of an image, best first; ties by corners. At most [`MAX_QUADS`]. Same image, same quads.
 pub fn detect(image: &GrayImage, p: &DetectParams, trace: &mut impl Trace) -> Vec<Quad> {
-    detect_in(&mut Memory::default(), image, p, trace)
+    detect_in(&mut DetectBuffers::default(), image, p, trace)
 }
 
 /// [`detect`] in the memory of earlier images.
 pub fn detect_in(
-    memory: &mut Memory,
+    memory: &mut DetectBuffers,
     image: &GrayImage,
     p: &DetectParams,
     trace: &mut impl Trace,
@@ -57,7 +57,7 @@ pub fn detect_in(
 
 /// The paper's way: pairs by similarity, both relaxations, sets of three sides.
 fn by_relaxation(
-    memory: &mut Memory,
+    memory: &mut DetectBuffers,
     image: &GrayImage,
     p: &DetectParams,
     trace: &mut impl Trace,
@@ -75,7 +75,12 @@ fn by_relaxation(
 }
 
 /// The search, on one scale or several. Coordinates of the trace are those of the working scale.
-fn by_search(memory: &mut Memory, image: &GrayImage, p: &DetectParams, trace: &mut impl Trace) -> Vec<Quad> {
+fn by_search(
+    memory: &mut DetectBuffers,
+    image: &GrayImage,
+    p: &DetectParams,
+    trace: &mut impl Trace,
+) -> Vec<Quad> {
     let factor = working_factor(image, p.quads.working_side_px);
     let reduced = (factor > 1).then(|| reduce(image, factor));
     let work = reduced.as_ref().unwrap_or(image);
@@ -107,18 +112,18 @@ fn by_search(memory: &mut Memory, image: &GrayImage, p: &DetectParams, trace: &m
 }
 
 /// Everything the search proposes on the scales of an image, rated, not yet chosen from; and the finest edge map.
-pub fn candidates(work: &GrayImage, p: &DetectParams, trace: &mut impl Trace) -> (Vec<Rated>, EdgeMap) {
-    let (rated, edges, _) = searched(&mut Memory::default(), work, p, trace);
+pub fn candidates(work: &GrayImage, p: &DetectParams, trace: &mut impl Trace) -> (Vec<ScoredQuad>, EdgeMap) {
+    let (rated, edges, _) = searched(&mut DetectBuffers::default(), work, p, trace);
     (rated, edges)
 }
 
 /// The same with the finest segments.
 fn searched(
-    memory: &mut Memory,
+    memory: &mut DetectBuffers,
     work: &GrayImage,
     p: &DetectParams,
     trace: &mut impl Trace,
-) -> (Vec<Rated>, EdgeMap, Vec<EdgeSegment>) {
+) -> (Vec<ScoredQuad>, EdgeMap, Vec<EdgeSegment>) {
     let (edges, segments) = traced_segments(memory, work, p, trace);
     let gradients = Gradients { image: work, gx: edges.gx(), gy: edges.gy() };
     let seeds = hypotheses(&segments, &gradients, &p.quads.hypotheses);
@@ -148,7 +153,7 @@ fn searched(
 const MIN_LEVEL_SIDE_PX: usize = 80;
 
 fn traced_segments(
-    memory: &mut Memory,
+    memory: &mut DetectBuffers,
     image: &GrayImage,
     p: &DetectParams,
     trace: &mut impl Trace,

@@ -8,11 +8,11 @@ use crate::{
 /// Memory of earlier images, for whoever works on many: fresh planes cost more than a tenth of the time to segments.
 /// It never changes a result.
 #[derive(Debug, Default)]
-pub struct Memory {
+pub struct DetectBuffers {
     pub(crate) maps: Vec<EdgeMap>,
 }
 
-impl Memory {
+impl DetectBuffers {
     /// The edges of an image, in the memory of the map that was given back last.
     pub(crate) fn edges(&mut self, image: &GrayImage, p: &EdgeParams) -> EdgeMap {
         let mut map = self.maps.pop().unwrap_or_default();

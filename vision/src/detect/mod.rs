@@ -18,6 +18,6 @@ pub mod detector;
 pub(crate) mod tests;
 
 pub use detector::{MAX_QUADS, candidates, detect, detect_in};
-pub use edge_buffers::{MAX_SCALES, Memory};
+pub use edge_buffers::{DetectBuffers, MAX_SCALES};
 pub use params::{DetectParams, Grouping, Nested, QuadParams};
 pub use quad::{BORDER_SIGMA_PX, Quad, QuadKind};

@@ -5,7 +5,7 @@ use crate::detect::{
         network::Network, network_weights, quad_classifier::THING_FEATURES, side_features::SIDE_FEATURES,
     },
     edges::edge_map::EdgeParams,
-    proposals::quad_proposals::HypothesisParams,
+    proposals::quad_proposals::ProposalParams,
     relaxation::{labelling::RelaxationParams, similarity::SimilarityParams},
     segments::{bridging::ChainParams, joining::SegmentParams},
     tiling::tiling_params::TilingParams,
@@ -65,7 +65,7 @@ pub struct QuadParams {
     /// Scales of the search, each half the one before: a coarse one sees through ragged, ornate borders.
     pub scales: usize,
     /// The search.
-    pub hypotheses: HypothesisParams,
+    pub hypotheses: ProposalParams,
     /// Share of each side that edges must support for the outermost border of a group to be its quad.
     pub min_side_support: f64,
     /// Nested quads above this `IoU` are borders of one thing.
@@ -109,7 +109,7 @@ impl Default for QuadParams {
             grouping: Grouping::default(),
             working_side_px: 640,
             scales: 2,
-            hypotheses: HypothesisParams::default(),
+            hypotheses: ProposalParams::default(),
             min_side_support: 0.5,
             nested_iou: 0.6,
             nested: Nested::default(),

@@ -33,7 +33,7 @@ pub enum Distortion {
 
 /// A point behind the lens, and how it moves.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Bent {
+pub struct DistortedPoint {
     /// Normalised, as the lens shows it.
     pub point: Point2<f64>,
     /// By the straight point.
@@ -52,9 +52,9 @@ impl Distortion {
     }
 
     /// Where the lens shows the straight point `p`, with the derivative.
-    pub fn bend(&self, p: &Point2<f64>) -> Bent {
+    pub fn bend(&self, p: &Point2<f64>) -> DistortedPoint {
         match *self {
-            Self::None => Bent { point: *p, by_straight: Matrix2::identity() },
+            Self::None => DistortedPoint { point: *p, by_straight: Matrix2::identity() },
             Self::PlumbBob([k1, k2, p1, p2, k3]) => polynomial(p, [k1, k2, k3], [0.0; 3], [p1, p2]),
             Self::RationalPolynomial([k1, k2, p1, p2, k3, k4, k5, k6]) => {
                 polynomial(p, [k1, k2, k3], [k4, k5, k6], [p1, p2])
@@ -106,7 +106,7 @@ fn radial([a, b, c]: [f64; 3], r2: f64) -> (f64, f64) {
 }
 
 /// Brown's model with a denominator.
-fn polynomial(p: &Point2<f64>, up: [f64; 3], down: [f64; 3], [p1, p2]: [f64; 2]) -> Bent {
+fn polynomial(p: &Point2<f64>, up: [f64; 3], down: [f64; 3], [p1, p2]: [f64; 2]) -> DistortedPoint {
     let (x, y) = (p.x, p.y);
     let r2 = x * x + y * y;
     let ((n, dn), (d, dd)) = (radial(up, r2), radial(down, r2));
@@ -122,7 +122,7 @@ fn polynomial(p: &Point2<f64>, up: [f64; 3], down: [f64; 3], [p1, p2]: [f64; 2])
         cross,
         g + 2.0 * y * y * dg + 6.0 * p1 * y + 2.0 * p2 * x,
     );
-    Bent { point, by_straight }
+    DistortedPoint { point, by_straight }
 }
 
 /// Value and derivative of the angle behind the lens by the angle before it.
@@ -132,17 +132,17 @@ fn angle([k1, k2, k3, k4]: &[f64; 4], t: f64) -> (f64, f64) {
     (value, 1.0 + t2 * (3.0 * k1 + t2 * (5.0 * k2 + t2 * (7.0 * k3 + t2 * 9.0 * k4))))
 }
 
-fn equidistant(p: &Point2<f64>, k: [f64; 4]) -> Bent {
+fn equidistant(p: &Point2<f64>, k: [f64; 4]) -> DistortedPoint {
     let r = p.coords.norm();
     if r < 1e-9 {
-        return Bent { point: *p, by_straight: Matrix2::identity() };
+        return DistortedPoint { point: *p, by_straight: Matrix2::identity() };
     }
     let (bent, slope) = angle(&k, r.atan());
     let out = p.coords / r;
     let (along, across) = (slope / (1.0 + r * r), bent / r);
     let outer: Matrix2<f64> = out * out.transpose();
     let by_straight = outer * along + (Matrix2::identity() - outer) * across;
-    Bent { point: Point2::from(out * bent), by_straight }
+    DistortedPoint { point: Point2::from(out * bent), by_straight }
 }
 
 /// Newton on the angle, which must grow all the way to the answer.

@@ -8,7 +8,7 @@ mod sigmas;
 
 pub use image::{FrameError, GrayImage, MAX_AREA_PX, MAX_SIDE_PX};
 pub use intrinsics::{Intrinsics, IntrinsicsSigmas};
-pub use lens::{Bent, Distortion, MAX_RAY_RAD};
+pub use lens::{DistortedPoint, Distortion, MAX_RAY_RAD};
 
 #[cfg(test)]
 mod tests {

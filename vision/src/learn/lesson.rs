@@ -7,12 +7,12 @@ use crate::{
         gates::{saliency, saliency_f, stable_points, v_c},
         pca::{exemplars, modes},
         threshold_fit::{Templates, ready, refit_thresholds},
-        training_view::View,
+        training_view::TrainingView,
     },
     model::{
         exemplar::Exemplar,
         landmark_id::LandmarkId,
-        landmark_model::{Evidence, LandmarkModel, MAX_VIEWS, ModelStatus, distances},
+        landmark_model::{DistanceSamples, LandmarkModel, MAX_VIEWS, ModelStatus, distances},
         threshold::Threshold,
     },
     params::Params,
@@ -53,7 +53,7 @@ pub enum LearnError {
 /// no landmark. Without any, the absolute caps of [`crate::learn::params::LearnParams`] stand in for them.
 pub fn learn(
     id: LandmarkId,
-    views: &[View],
+    views: &[TrainingView],
     negatives: &[IconFeatures],
     p: &Params,
 ) -> Result<LandmarkModel, LearnError> {
@@ -82,12 +82,18 @@ pub fn learn(
         total_variance: components.total_variance,
         correlation: Threshold::NEVER,
         hausdorff: Threshold::NEVER,
-        correlation_evidence: Evidence { own: rising(own.iter().map(|d| d.0)), ..Evidence::default() },
-        hausdorff_evidence: Evidence { own: rising(own.iter().map(|d| d.1)), ..Evidence::default() },
+        correlation_evidence: DistanceSamples {
+            own: rising(own.iter().map(|d| d.0)),
+            ..DistanceSamples::default()
+        },
+        hausdorff_evidence: DistanceSamples {
+            own: rising(own.iter().map(|d| d.1)),
+            ..DistanceSamples::default()
+        },
         likeness: Threshold::NEVER,
-        likeness_evidence: Evidence {
+        likeness_evidence: DistanceSamples {
             own: rising(own_unlikeness(&icons, (&chosen, &kept), p).into_iter()),
-            ..Evidence::default()
+            ..DistanceSamples::default()
         },
         saliency_f,
         stable_points,
@@ -159,12 +165,12 @@ fn rising(distances: impl Iterator<Item = f64>) -> Vec<f32> {
 }
 
 /// Corners and image sizes of all views, or of the photographed ones.
-fn seen_at(views: &[View], generated: bool) -> Vec<([nalgebra::Point2<f64>; 4], [f64; 2])> {
+fn seen_at(views: &[TrainingView], generated: bool) -> Vec<([nalgebra::Point2<f64>; 4], [f64; 2])> {
     let of_interest = views.iter().filter(|v| generated || !v.generated);
     of_interest.map(|v| (*v.corners_px.points(), v.image_size_px.map(|s| s as f64))).collect()
 }
 
-fn check(views: &[View], p: &Params) -> Result<(), LearnError> {
+fn check(views: &[TrainingView], p: &Params) -> Result<(), LearnError> {
     if views.is_empty() {
         return Err(LearnError::NoView);
     }

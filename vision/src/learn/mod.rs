@@ -14,4 +14,4 @@ pub mod lesson;
 pub use lesson::{LearnError, learn};
 pub use params::{LearnParams, SynthesisParams};
 pub use threshold_fit::{add_negatives, refit_thresholds, unlikeness_of};
-pub use training_view::View;
+pub use training_view::TrainingView;

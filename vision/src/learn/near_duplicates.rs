@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 /// limits are set on what such a step changes in the picture.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct ThinningParams {
+pub struct NoveltyParams {
     /// Another side: how far a corner moves when both quads are brought to area 1. 5 degrees move it by 0.02 at 45
     /// degrees off the normal.
     pub shape: f64,
@@ -30,7 +30,7 @@ pub struct ThinningParams {
     pub appearance: f64,
 }
 
-impl Default for ThinningParams {
+impl Default for NoveltyParams {
     fn default() -> Self {
         Self { shape: 0.02, scale: 1.1, light_grey: 12.0, appearance: 0.15 }
     }
@@ -38,7 +38,7 @@ impl Default for ThinningParams {
 
 /// What is kept of a view to compare others with.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ViewDigest {
+pub struct ViewSummary {
     /// Corners about their centroid, at area 1.
     shape: [Vector2<f64>; 4],
     side_px: f64,
@@ -47,7 +47,7 @@ pub struct ViewDigest {
     signature: Signature,
 }
 
-impl ViewDigest {
+impl ViewSummary {
     /// Of a quad and its icon.
     pub fn new(corners_px: &Corners, icon: &Icon) -> Self {
         let points = corners_px.points();
@@ -71,7 +71,7 @@ impl ViewDigest {
     }
 
     /// How far two views are apart, symmetric: 0 for the same, 1 where one of the limits is just reached.
-    pub fn novelty(&self, other: &Self, p: &ThinningParams) -> f64 {
+    pub fn novelty(&self, other: &Self, p: &NoveltyParams) -> f64 {
         let moved = self.shape.iter().zip(&other.shape).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
         let unlike = 1.0 - f64::from(likeness(self.signature.values(), other.signature.values()));
         // Two blank icons have no signatures; they are alike.
@@ -89,9 +89,9 @@ impl ViewDigest {
 
 /// The kept view that is most like `new`, and how far apart they are; the first of equals. `None` when nothing is kept.
 pub fn most_alike<'a>(
-    new: &ViewDigest,
-    kept: impl IntoIterator<Item = &'a ViewDigest>,
-    p: &ThinningParams,
+    new: &ViewSummary,
+    kept: impl IntoIterator<Item = &'a ViewSummary>,
+    p: &NoveltyParams,
 ) -> Option<(usize, f64)> {
     let each = kept.into_iter().map(|view| new.novelty(view, p)).enumerate();
     each.min_by(|a, b| a.1.total_cmp(&b.1))
@@ -104,7 +104,7 @@ mod tests {
     use nalgebra::{Rotation3, Vector3};
 
     /// A poster of 0.6 m x 0.84 m seen by a camera of 500 px from `distance_m`, `angle_rad` off its normal.
-    fn seen(distance_m: f64, angle_rad: f64, gain: f64) -> ViewDigest {
+    fn seen(distance_m: f64, angle_rad: f64, gain: f64) -> ViewSummary {
         let turn = Rotation3::from_axis_angle(&Vector3::y_axis(), angle_rad);
         let corners = [[-0.3, -0.42], [0.3, -0.42], [0.3, 0.42], [-0.3, 0.42]].map(|[x, y]| {
             let p = turn * Vector3::new(x, y, 0.0) + Vector3::new(0.0, 0.0, distance_m);
@@ -117,12 +117,12 @@ mod tests {
             let wave = f64::sin(9.0 * p.x) * f64::cos(7.0 * p.y + 2.0 * p.x);
             (gain * (110.0 + 70.0 * wave)).clamp(0.0, 255.0) as u8
         });
-        ViewDigest::new(&corners, &icon(&image, &corners, &Params::default().icon).unwrap())
+        ViewSummary::new(&corners, &icon(&image, &corners, &Params::default().icon).unwrap())
     }
 
     #[test]
     fn the_limits_are_those_of_the_method() {
-        let p = ThinningParams::default();
+        let p = NoveltyParams::default();
         let from = |d, degrees: f64| seen(d, degrees.to_radians(), 1.0);
         let at = from(2.0, 45.0);
         // Half the method's step is a near-duplicate, twice the step is a view of its own, in each way.
@@ -142,7 +142,7 @@ mod tests {
 
     #[test]
     fn the_most_alike_is_found() {
-        let p = ThinningParams::default();
+        let p = NoveltyParams::default();
         let kept = [seen(2.0, 0.0, 1.0), seen(3.0, 0.0, 1.0), seen(3.0, 0.9, 1.0)];
         assert_eq!(most_alike(&seen(2.9, 0.0, 1.0), &kept, &p).unwrap().0, 1);
         assert_eq!(most_alike(&kept[0], [], &p), None);
@@ -152,8 +152,8 @@ mod tests {
     fn blank_icons_are_alike_and_nothing_is_infinite() {
         let square = [[0.0, 0.0], [90.0, 0.0], [90.0, 90.0], [0.0, 90.0]].map(|[x, y]| Point2::new(x, y));
         let square = Corners::new(square);
-        let blank = ViewDigest::new(&square.unwrap(), &Icon::new(75, vec![90.0; 5625], 1.0).unwrap());
-        assert!(blank.novelty(&blank, &ThinningParams::default()) < 1e-12);
-        assert!(seen(2.0, 0.3, 1.0).novelty(&blank, &ThinningParams::default()).is_finite());
+        let blank = ViewSummary::new(&square.unwrap(), &Icon::new(75, vec![90.0; 5625], 1.0).unwrap());
+        assert!(blank.novelty(&blank, &NoveltyParams::default()) < 1e-12);
+        assert!(seen(2.0, 0.3, 1.0).novelty(&blank, &NoveltyParams::default()).is_finite());
     }
 }

@@ -12,7 +12,7 @@ use crate::{
     frame::GrayImage,
     geometry::corners::Corners,
     icon::icon,
-    learn::{gates::quad_from_unit, params::SynthesisParams, texture::Texture, training_view::View},
+    learn::{gates::quad_from_unit, params::SynthesisParams, texture::Texture, training_view::TrainingView},
     params::Params,
     random::Random,
 };
@@ -29,7 +29,13 @@ const BORDER_PX: f64 = 12.0;
 
 /// `count` generated views of the landmark at `corners` of `photograph`; fewer where the icon stage refuses what was
 /// drawn, none where the corners cannot be used at all.
-pub fn views(photograph: &GrayImage, corners: &Corners, count: usize, p: &Params, seed: u64) -> Vec<View> {
+pub fn views(
+    photograph: &GrayImage,
+    corners: &Corners,
+    count: usize,
+    p: &Params,
+    seed: u64,
+) -> Vec<TrainingView> {
     let Some(texture) = Texture::lift(photograph, corners) else { return vec![] };
     let aspect = aspect(corners);
     let mut random = Random::new(seed);
@@ -38,7 +44,7 @@ pub fn views(photograph: &GrayImage, corners: &Corners, count: usize, p: &Params
         .collect()
 }
 
-fn view(texture: &Texture, aspect: f64, p: &Params, random: &mut Random) -> Option<View> {
+fn view(texture: &Texture, aspect: f64, p: &Params, random: &mut Random) -> Option<TrainingView> {
     let s = &p.learn.synthesis;
     let corners = corners_from(&Pose::draw(s, random), aspect)?;
     let (image, shift) = photograph(texture, &corners, s, random)?;
@@ -48,7 +54,7 @@ fn view(texture: &Texture, aspect: f64, p: &Params, random: &mut Random) -> Opti
     });
     let local = Corners::new(noisy.map(|c| c - shift)).ok()?;
     let exact = Corners::new(corners.points().map(|c| c - shift)).ok()?;
-    Some(View {
+    Some(TrainingView {
         exact: Some(icon(&image, &exact, &p.icon).ok()?),
         icon: icon(&image, &local, &p.icon).ok()?,
         corners_px: Corners::new(noisy).ok()?,
@@ -258,7 +264,7 @@ mod tests {
         let sizes: Vec<f64> = views.iter().map(|v| v.corners_px.area_px2().sqrt()).collect();
         assert!(sizes.iter().any(|s| *s < 85.0) && sizes.iter().any(|s| *s > 180.0));
         // Width over height against the frontal 0.75: the yaw reaches beyond 50 degrees.
-        let slant = |v: &View| {
+        let slant = |v: &TrainingView| {
             let [tl, tr, _, bl] = v.corners_px.points();
             (tr - tl).norm() / (bl - tl).norm() / 0.75
         };

@@ -6,13 +6,13 @@ use crate::{
     learn::threshold::threshold,
     model::{
         exemplar::Exemplar,
-        landmark_model::{Evidence, Gate, GateFailure, LandmarkModel, ModelStatus, distances},
+        landmark_model::{DistanceSamples, Gate, GateFailure, LandmarkModel, ModelStatus, distances},
         threshold::{LimitedBy, Threshold, ThresholdError},
     },
     params::Params,
     recognise::{
         alignment::{
-            aligner::{Aligner, Lattices, Template},
+            aligner::{Aligner, SamplingGrids, Template},
             surroundings::Surroundings,
         },
         features::{
@@ -67,7 +67,7 @@ pub fn add_negatives(model: &LandmarkModel, negatives: &[IconFeatures], p: &Para
     model
 }
 
-impl Evidence {
+impl DistanceSamples {
     /// Counts a distance of something else, and keeps it if it is among the nearest.
     pub(crate) fn add(&mut self, distance: f64) {
         self.others += 1;
@@ -81,7 +81,7 @@ impl Evidence {
 }
 
 /// tau from the evidence. Distances that were only counted lie beyond the farthest one kept, so tau stays below it.
-pub(crate) fn fitted(evidence: &Evidence, cap: f64, p: &Params) -> Result<Threshold, ThresholdError> {
+pub(crate) fn fitted(evidence: &DistanceSamples, cap: f64, p: &Params) -> Result<Threshold, ThresholdError> {
     let own: Vec<f64> = evidence.own.iter().map(|d| f64::from(*d)).collect();
     let mut others: Vec<f64> = evidence.nearest_others.iter().map(|d| f64::from(*d)).collect();
     let counted_only = evidence.others > others.len();
@@ -120,14 +120,14 @@ pub(crate) fn ready<'a>(exemplars: &'a [Exemplar], p: &Params) -> Vec<Ready<'a>>
 /// Exemplars on which icons are laid.
 pub(crate) struct Templates<'a> {
     each: Vec<(&'a Ready<'a>, Template<'a>)>,
-    lattices: Lattices,
+    lattices: SamplingGrids,
     p: &'a Params,
 }
 
 impl<'a> Templates<'a> {
     pub(crate) fn new(exemplars: &'a [Ready<'a>], p: &'a Params) -> Self {
         let each = exemplars.iter().map(|e| (e, Template::new(&e.icon, &e.coarse))).collect();
-        Self { each, lattices: Lattices::new(p.icon.size, &p.recognise.correlation), p }
+        Self { each, lattices: SamplingGrids::new(p.icon.size, &p.recognise.correlation), p }
     }
 
     /// The smallest 1 minus likeness of `icon` to the exemplars after alignment, of those whose signatures are alike
@@ -154,7 +154,7 @@ impl<'a> Templates<'a> {
 /// landmark's own views would be refused.
 // Departs from method 8: own distances have no say in tau but that. Those of generated views, or of one robot's drive,
 // are far smaller than another day's (reflections, dust, another camera); what is safe is said by the others alone.
-fn fitted_likeness(evidence: &Evidence, p: &Params) -> Result<Threshold, ThresholdError> {
+fn fitted_likeness(evidence: &DistanceSamples, p: &Params) -> Result<Threshold, ThresholdError> {
     let mut own: Vec<f64> = evidence.own.iter().map(|d| f64::from(*d)).collect();
     own.sort_by(f64::total_cmp);
     let median = own.get(own.len() / 2).copied().ok_or(ThresholdError::NoPositive)?;

@@ -9,7 +9,7 @@ use crate::{
 
 /// One sighting of a landmark, to learn from.
 #[derive(Debug, Clone, PartialEq)]
-pub struct View {
+pub struct TrainingView {
     /// The rectified picture, cut out along corners as inexact as the detector's.
     pub icon: Icon,
     /// The same along its true corners, where those are known: of a generated view. What is laid on it is as exact as they.
@@ -22,7 +22,7 @@ pub struct View {
     pub generated: bool,
 }
 
-impl View {
+impl TrainingView {
     /// Cuts the landmark at `corners_px` out of a photograph.
     pub fn photographed(image: &GrayImage, corners_px: &Corners, p: &Params) -> Result<Self, IconError> {
         let icon = icon(image, corners_px, &p.icon)?;

@@ -35,16 +35,16 @@ pub struct Distances {
 /// Distances that a threshold was fitted to, as 32-bit floats: kept, so that tau can be fitted again when other
 /// landmarks come and go.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Evidence {
+pub struct DistanceSamples {
     /// Held-out distances of the landmark's own views, rising.
     pub own: Vec<f32>,
-    /// The smallest distances of everything else, rising; at most [`Evidence::MAX_NEAREST`].
+    /// The smallest distances of everything else, rising; at most [`DistanceSamples::MAX_NEAREST`].
     pub nearest_others: Vec<f32>,
     /// How many other distances there were (n-).
     pub others: usize,
 }
 
-impl Evidence {
+impl DistanceSamples {
     /// Other distances kept; the rest are only counted.
     pub const MAX_NEAREST: usize = 64;
 }
@@ -74,11 +74,11 @@ pub struct LandmarkModel {
     /// tau of 1 minus the likeness after alignment.
     pub likeness: Threshold,
     /// What tau of C^r was fitted to.
-    pub correlation_evidence: Evidence,
+    pub correlation_evidence: DistanceSamples,
     /// What tau of H^r was fitted to.
-    pub hausdorff_evidence: Evidence,
+    pub hausdorff_evidence: DistanceSamples,
     /// What tau of the likeness was fitted to; those that are nothing like it by their signature count as infinitely far.
-    pub likeness_evidence: Evidence,
+    pub likeness_evidence: DistanceSamples,
     /// Saliency F (method 9).
     pub saliency_f: f64,
     /// Points of the first exemplar that come back in the other views.

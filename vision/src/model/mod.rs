@@ -10,7 +10,7 @@ pub mod model_set;
 pub use exemplar::Exemplar;
 pub use landmark_id::LandmarkId;
 pub use landmark_model::{
-    Distances, Evidence, Gate, GateFailure, LandmarkModel, MAX_EXEMPLARS, MAX_VIEWS, ModelStatus,
+    DistanceSamples, Distances, Gate, GateFailure, LandmarkModel, MAX_EXEMPLARS, MAX_VIEWS, ModelStatus,
 };
 pub use model_bytes::StoredModelError;
 pub use model_set::{MAX_LANDMARKS, ModelSet, ModelSetError};

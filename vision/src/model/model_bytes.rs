@@ -8,7 +8,7 @@ use crate::{
     model::{
         exemplar::Exemplar,
         landmark_id::LandmarkId,
-        landmark_model::{Evidence, LandmarkModel, MAX_EXEMPLARS, MAX_VIEWS, ModelStatus},
+        landmark_model::{DistanceSamples, LandmarkModel, MAX_EXEMPLARS, MAX_VIEWS, ModelStatus},
         threshold::Threshold,
     },
     params::Params,
@@ -181,16 +181,16 @@ impl Reader<'_> {
         Ok((known, points.collect::<Result<_, _>>()?))
     }
 
-    fn evidence(&mut self) -> Result<Evidence, StoredModelError> {
+    fn evidence(&mut self) -> Result<DistanceSamples, StoredModelError> {
         const MAX_OTHERS: u64 = 10_000_000;
         let others = u64::from_le_bytes(self.take("others")?);
         let own = self.distances("own", MAX_VIEWS)?;
-        let nearest_others = self.distances("nearest_others", Evidence::MAX_NEAREST)?;
+        let nearest_others = self.distances("nearest_others", DistanceSamples::MAX_NEAREST)?;
         let kept = nearest_others.len() as u64;
-        if others > MAX_OTHERS || kept != others.min(Evidence::MAX_NEAREST as u64) {
+        if others > MAX_OTHERS || kept != others.min(DistanceSamples::MAX_NEAREST as u64) {
             return Err(StoredModelError::Malformed { field: "others" });
         }
-        Ok(Evidence { own, nearest_others, others: others as usize })
+        Ok(DistanceSamples { own, nearest_others, others: others as usize })
     }
 
     fn distances(&mut self, field: &'static str, most: usize) -> Result<Vec<f32>, StoredModelError> {

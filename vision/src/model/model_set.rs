@@ -6,7 +6,7 @@ use crate::{
     params::Params,
     points::{index::PointIndex, taught::TaughtPoint},
     recognise::{
-        alignment::aligner::Lattices,
+        alignment::aligner::SamplingGrids,
         features::signature::{SIGNATURE_BYTES, Signature, likeness},
     },
 };
@@ -55,7 +55,7 @@ pub struct ModelSet {
     /// Whose each signature is: index of the model and of its exemplar.
     owners: Vec<(u32, u8)>,
     /// Where pictures are compared with the exemplars that they are laid on.
-    lattices: Arc<Lattices>,
+    lattices: Arc<SamplingGrids>,
     /// The points of all models, then of all rivals.
     points: Arc<PointIndex>,
 }
@@ -116,7 +116,7 @@ impl ModelSet {
         };
         let signatures = exemplars().map(|(_, _, exemplar)| *exemplar.signature.values()).collect();
         let owners = exemplars().map(|(m, e, _)| (m as u32, e as u8)).collect();
-        let lattices = Arc::new(Lattices::new(p.icon.size, &p.recognise.correlation));
+        let lattices = Arc::new(SamplingGrids::new(p.icon.size, &p.recognise.correlation));
         let all: Vec<&[TaughtPoint]> = models.iter().chain(&rivals).map(|m| m.points.as_slice()).collect();
         let points = Arc::new(PointIndex::new(all.into_iter()));
         Ok(Self { models, rivals, params_hash: expected, signatures, owners, lattices, points })
@@ -213,7 +213,7 @@ impl ModelSet {
     }
 
     /// For laying pictures on exemplars.
-    pub(crate) fn lattices(&self) -> &Lattices {
+    pub(crate) fn lattices(&self) -> &SamplingGrids {
         &self.lattices
     }
 

@@ -83,14 +83,14 @@ fn scene(seed: u64) -> (GrayImage, Quad) {
     (GrayImage::new(640, 480, picture.into_iter().map(|g| g.round() as u8).collect()).unwrap(), quad)
 }
 
-fn facts(image: &GrayImage, quad: Quad, camera: Option<&Intrinsics>) -> QuadFacts {
+fn facts(image: &GrayImage, quad: Quad, camera: Option<&Intrinsics>) -> QuadAnalysis {
     let sizes = BTreeMap::from([(LandmarkId(1), SIZE)]);
     let models = models();
-    let landmarks = Landmarks { models: &models, sizes: &sizes, kind: DistanceKind::Both };
+    let landmarks = LandmarkDatabase { models: &models, sizes: &sizes, kind: DistanceKind::Both };
     analyse_quads(image, vec![quad], camera, landmarks, &Params::default(), &mut NoTrace).quads.remove(0)
 }
 
-fn assert_pose(facts: &QuadFacts) {
+fn assert_pose(facts: &QuadAnalysis) {
     let pose = facts.pose.as_ref().unwrap();
     let error = pose.best.camera_from_landmark.inverse() * camera_from_landmark();
     assert!(error.translation.vector.norm() < 1e-3 && error.rotation.angle() < 1e-3, "{error:?}");
@@ -100,7 +100,7 @@ fn assert_pose(facts: &QuadFacts) {
 fn a_known_landmark_gives_its_pose() {
     let (image, quad) = scene(1);
     let facts = facts(&image, quad, Some(&camera()));
-    assert_eq!(facts.verdict.as_ref().unwrap().recognition, Recognition::Unique(LandmarkId(1)));
+    assert_eq!(facts.verdict.as_ref().unwrap().recognition, Verdict::Unique(LandmarkId(1)));
     assert_pose(&facts);
 }
 
@@ -116,7 +116,7 @@ fn the_whole_method() {
     }
     let (image, _) = scene(1);
     let (models, sizes) = (models(), BTreeMap::from([(LandmarkId(1), SIZE)]));
-    let landmarks = Landmarks { models: &models, sizes: &sizes, kind: DistanceKind::Both };
+    let landmarks = LandmarkDatabase { models: &models, sizes: &sizes, kind: DistanceKind::Both };
     let mut stages = Stages::default();
     let facts =
         Pipeline::default().analyse(&image, Some(&camera()), landmarks, &Params::default(), &mut stages);
@@ -169,7 +169,7 @@ fn another_border_than_the_taught_one_gives_the_same_pose() {
     let inner = quad.corners_px.points().map(|c| Point2::from(centre + (c.coords - centre) * 0.95));
     quad.corners_px = Corners::new(inner).unwrap();
     let facts = facts(&image, quad, Some(&camera()));
-    assert_eq!(facts.verdict.as_ref().unwrap().recognition, Recognition::Unique(LandmarkId(1)));
+    assert_eq!(facts.verdict.as_ref().unwrap().recognition, Verdict::Unique(LandmarkId(1)));
     let pose = facts.pose.unwrap();
     let error = pose.best.camera_from_landmark.inverse() * camera_from_landmark();
     // As detected it would stand 5 % farther away: 10 cm.
@@ -181,13 +181,13 @@ fn another_border_than_the_taught_one_gives_the_same_pose() {
 #[test]
 fn no_pose_without_its_reasons() {
     let (image, quad) = scene(1);
-    assert_eq!(facts(&image, quad.clone(), None).pose, Err(NoPose::NoCamera));
+    assert_eq!(facts(&image, quad.clone(), None).pose, Err(PoseUnavailable::NoCamera));
     let (other, other_quad) = scene(2);
-    assert_eq!(facts(&other, other_quad, Some(&camera())).pose, Err(NoPose::NoSize(LandmarkId(2))));
+    assert_eq!(facts(&other, other_quad, Some(&camera())).pose, Err(PoseUnavailable::NoSize(LandmarkId(2))));
     let (stranger, stranger_quad) = scene(3);
-    assert_eq!(facts(&stranger, stranger_quad, Some(&camera())).pose, Err(NoPose::NotUnique));
+    assert_eq!(facts(&stranger, stranger_quad, Some(&camera())).pose, Err(PoseUnavailable::NotUnique));
     let three_sided = facts(&image, Quad { kind: QuadKind::ThreeSided, ..quad }, Some(&camera()));
-    assert_eq!((three_sided.verdict, three_sided.pose), (None, Err(NoPose::NotUnique)));
+    assert_eq!((three_sided.verdict, three_sided.pose), (None, Err(PoseUnavailable::NotUnique)));
 }
 
 #[test]
@@ -196,7 +196,7 @@ fn only_so_many_quads_are_asked() {
     let mut quads = vec![Quad { kind: QuadKind::ThreeSided, ..quad.clone() }];
     quads.resize(MAX_RECOGNISED_QUADS + 2, quad);
     let (models, sizes) = (ModelSet::default(), BTreeMap::new());
-    let landmarks = Landmarks { models: &models, sizes: &sizes, kind: DistanceKind::Both };
+    let landmarks = LandmarkDatabase { models: &models, sizes: &sizes, kind: DistanceKind::Both };
     let facts = analyse_quads(&image, quads, None, landmarks, &Params::default(), &mut NoTrace);
     let asked: Vec<bool> = facts.quads.iter().map(|q| q.verdict.is_some()).collect();
     assert_eq!(asked.iter().filter(|a| **a).count(), MAX_RECOGNISED_QUADS);

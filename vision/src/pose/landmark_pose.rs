@@ -9,7 +9,7 @@ use crate::{
     geometry::corners::Corners,
     pose::{
         linear::{faces_camera, linear_pose, mirrored},
-        measurement::{LandmarkSize, Measured, PoseError, measured},
+        measurement::{LandmarkSize, PoseError, PoseMeasurement, measured},
         refine::{CHI2_2_95, PoseSolution, Problem},
         spread::second_moment,
     },
@@ -26,7 +26,7 @@ pub struct LandmarkPose {
     /// The second cannot be told from the first by its error (ratio below 2): only a prior can decide.
     pub ambiguous: bool,
     /// The corners behind it: localisation fits the robot's pose directly to them.
-    pub measured: Measured,
+    pub measured: PoseMeasurement,
 }
 
 /// Ratio of the reprojection errors below which two solutions are ambiguous (method 13.4).

@@ -2,12 +2,12 @@
 
 use crate::{
     geometry::homography::Homography,
-    pose::{measurement::Measured, reprojection::corner_points},
+    pose::{measurement::PoseMeasurement, reprojection::corner_points},
 };
 use nalgebra::{Isometry3, Matrix3, Point2, Rotation3, UnitQuaternion};
 
 /// Eq. (2): `[r2 r3 T] = lambda K^-1 H`, then the nearest rotation (method 13.1, 13.2).
-pub fn linear_pose(measured: &Measured) -> Option<Isometry3<f64>> {
+pub fn linear_pose(measured: &PoseMeasurement) -> Option<Isometry3<f64>> {
     let c = &measured.camera;
     let ray = |p: &Point2<f64>| Point2::new((p.x - c.cx_px) / c.fx_px, (p.y - c.cy_px) / c.fy_px);
     let plane = corner_points(&measured.size).map(|p| Point2::new(p.y, p.z));

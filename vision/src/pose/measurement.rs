@@ -24,7 +24,7 @@ impl LandmarkSize {
 
 /// What a pose was computed from, free of lens distortion.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Measured {
+pub struct PoseMeasurement {
     /// Corners as a pinhole with the same K would see them, in the landmark's order.
     pub corners_px: Corners,
     /// Covariance of each of them.
@@ -87,20 +87,20 @@ pub(crate) fn measured(
     covariance_px2: &[Matrix2<f64>; 4],
     size: LandmarkSize,
     camera: &Intrinsics,
-) -> Result<Measured, PoseError> {
+) -> Result<PoseMeasurement, PoseError> {
     for (field, value) in [("width_m", size.width_m), ("height_m", size.height_m)] {
         if !(LandmarkSize::MIN_M..=LandmarkSize::MAX_M).contains(&value) {
             return Err(PoseError::Size { field, value });
         }
     }
-    let Straightened { corners_px, covariance_px2, camera, by_camera } =
+    let UndistortedCorners { corners_px, covariance_px2, camera, by_camera } =
         straightened(corners, covariance_px2, camera)?;
-    Ok(Measured { corners_px, covariance_px2, camera, by_camera, size })
+    Ok(PoseMeasurement { corners_px, covariance_px2, camera, by_camera, size })
 }
 
 /// Corners free of lens distortion.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Straightened {
+pub struct UndistortedCorners {
     /// As a pinhole with the same K would see them.
     pub corners_px: Corners,
     /// Covariance of each of them.
@@ -117,7 +117,7 @@ pub fn straightened(
     corners: &Corners,
     covariance_px2: &[Matrix2<f64>; 4],
     camera: &Intrinsics,
-) -> Result<Straightened, PoseError> {
+) -> Result<UndistortedCorners, PoseError> {
     let c = Intrinsics::new(camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px, camera.distortion)?;
     let c = camera.sigmas.map_or(Ok(c), |sigmas| c.with_sigmas(sigmas))?;
     let mut by_camera = [Matrix2x3::zeros(); 4];
@@ -136,7 +136,7 @@ pub fn straightened(
     }
     let corners_px = Corners::new(straight).map_err(|_folded| PoseError::Distortion)?;
     let camera = Intrinsics { distortion: Distortion::None, ..c };
-    Ok(Straightened { corners_px, covariance_px2: covariances, camera, by_camera })
+    Ok(UndistortedCorners { corners_px, covariance_px2: covariances, camera, by_camera })
 }
 
 /// Symmetric, with both standard deviations in range.

@@ -10,7 +10,7 @@ pub mod landmark_pose;
 pub use landmark_pose::{AMBIGUOUS_CHI2, AMBIGUOUS_RATIO, LandmarkPose, landmark_pose};
 pub use linear::linear_pose;
 pub use measurement::{
-    LandmarkSize, MAX_CORNER_PX, MAX_CORNER_SIGMA_PX, MIN_CORNER_SIGMA_PX, Measured, PoseError, Straightened,
-    straightened,
+    LandmarkSize, MAX_CORNER_PX, MAX_CORNER_SIGMA_PX, MIN_CORNER_SIGMA_PX, PoseError, PoseMeasurement,
+    UndistortedCorners, straightened,
 };
 pub use refine::PoseSolution;

@@ -1,7 +1,7 @@
 //! Least squares over the pose: the nearest minimum of the weighted reprojection error (method 13.3, 13.5).
 
 use crate::pose::{
-    measurement::Measured,
+    measurement::PoseMeasurement,
     reprojection::{corner_points, perturbed, pixel, project},
 };
 use nalgebra::{Isometry3, Matrix2, Matrix3, Matrix6, SMatrix, Vector2, Vector6};
@@ -30,13 +30,13 @@ pub(crate) const CHI2_2_95: f64 = 5.991;
 
 /// Corners whitened by their covariance: `weights[i]` has `W^T W = covariance^-1`.
 pub(crate) struct Problem<'a> {
-    measured: &'a Measured,
+    measured: &'a PoseMeasurement,
     weights: [Matrix2<f64>; 4],
 }
 
 impl<'a> Problem<'a> {
     /// `None` when a covariance is not positive definite.
-    pub(crate) fn new(measured: &'a Measured) -> Option<Self> {
+    pub(crate) fn new(measured: &'a PoseMeasurement) -> Option<Self> {
         let mut weights = [Matrix2::zeros(); 4];
         for (w, covariance) in weights.iter_mut().zip(&measured.covariance_px2) {
             *w = covariance.cholesky()?.l().try_inverse()?;

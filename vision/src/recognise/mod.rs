@@ -13,10 +13,10 @@ pub(crate) mod fixture;
 
 pub use decision::{
     by_points::{DOUBTFUL_PARTS, LOG10_EPSILON, log10_false_alarms},
-    result::{Candidate, MAX_CANDIDATES, Recognition, Refusal, Verdict},
+    result::{MAX_CANDIDATES, MatchCandidate, MatchRefusal, RecognitionResult, Verdict},
     verdict::{recognise, recognise_watched},
 };
 pub use distance_kind::DistanceKind;
 pub use features::icon_features::{IconFeatures, features};
 pub use params::{RecogniseParams, VerdictParams};
-pub use step_listener::{NoWatch, Step, Watch};
+pub use step_listener::{NoListener, RecogniseStep, StepListener};

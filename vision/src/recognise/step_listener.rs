@@ -2,7 +2,7 @@
 
 /// The steps of recognising one quad, in their order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Step {
+pub enum RecogniseStep {
     /// Patches, points, votes, homographies, verification.
     Points,
     /// Icons of every border and rotation, with what the short list needs of them.
@@ -17,30 +17,30 @@ pub enum Step {
     Decision,
 }
 
-impl Step {
+impl RecogniseStep {
     /// Short name.
     pub fn name(self) -> &'static str {
         match self {
-            Step::Points => "points",
-            Step::Icons => "icons",
-            Step::ShortList => "short list",
-            Step::Alignment => "alignment",
-            Step::Distances => "distances",
-            Step::Decision => "decision",
+            RecogniseStep::Points => "points",
+            RecogniseStep::Icons => "icons",
+            RecogniseStep::ShortList => "short list",
+            RecogniseStep::Alignment => "alignment",
+            RecogniseStep::Distances => "distances",
+            RecogniseStep::Decision => "decision",
         }
     }
 }
 
 /// Is told of every step. A step may end several times for one quad.
-pub trait Watch {
+pub trait StepListener {
     /// `step` has just ended.
-    fn finished(&mut self, step: Step);
+    fn finished(&mut self, step: RecogniseStep);
 }
 
 /// Nobody.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct NoWatch;
+pub struct NoListener;
 
-impl Watch for NoWatch {
-    fn finished(&mut self, _step: Step) {}
+impl StepListener for NoListener {
+    fn finished(&mut self, _step: RecogniseStep) {}
 }

@@ -21,12 +21,12 @@ use sim::{
 };
 use std::{collections::BTreeMap, sync::Arc};
 use vision::{
-    detect::{Memory, detect_in},
+    detect::{DetectBuffers, detect_in},
     frame::{GrayImage, Intrinsics},
     model::{LandmarkId, ModelSet},
     params::Params,
-    pipeline::{Landmarks, analyse_quads},
-    recognise::{DistanceKind, Recognition},
+    pipeline::{LandmarkDatabase, analyse_quads},
+    recognise::{DistanceKind, Verdict},
     trace::{NoTrace, Stage, Trace},
 };
 
@@ -191,10 +191,11 @@ struct Timed<'a> {
 
 impl Timed<'_> {
     /// Does one frame both ways; the quads that were detected.
-    fn frame(&mut self, i: usize, scenes: &Scenes, memory: &mut Memory, p: &Params) -> usize {
+    fn frame(&mut self, i: usize, scenes: &Scenes, memory: &mut DetectBuffers, p: &Params) -> usize {
         let frame = &scenes.frames[i];
         let sizes = BTreeMap::new();
-        let landmarks = Landmarks { models: self.models, sizes: &sizes, kind: DistanceKind::default() };
+        let landmarks =
+            LandmarkDatabase { models: self.models, sizes: &sizes, kind: DistanceKind::default() };
         let clock = Clock::start();
         let found = detect_in(memory, frame, &p.detect, &mut NoTrace);
         let mut split = Split { clock: Clock::start(), recognition_ms: 0.0 };
@@ -242,7 +243,7 @@ pub(super) fn run(
     };
     let mut maps: Vec<Timed<'_>> = maps.iter().map(timed).collect::<anyhow::Result<_>>()?;
     let mut by_sift = Tally::new(n);
-    let (mut memory, mut quads) = (Memory::default(), 0);
+    let (mut memory, mut quads) = (DetectBuffers::default(), 0);
     let progress = screen::progress(args.rounds as usize * n, "frames");
     for round in 0..args.rounds {
         for i in 0..n {
@@ -279,10 +280,10 @@ pub(super) fn run(
     })
 }
 
-fn unique(verdict: &vision::recognise::Verdict) -> Option<usize> {
+fn unique(verdict: &vision::recognise::RecognitionResult) -> Option<usize> {
     match verdict.recognition {
-        Recognition::Unique(id) => index(id),
-        Recognition::Unknown | Recognition::Ambiguous(_) => None,
+        Verdict::Unique(id) => index(id),
+        Verdict::Unknown | Verdict::Ambiguous(_) => None,
     }
 }
 

@@ -19,7 +19,7 @@ use std::{collections::BTreeMap, sync::Arc};
 use vision::{
     frame::{GrayImage, Intrinsics},
     model::{LandmarkId, ModelSet},
-    pipeline::FrameFacts,
+    pipeline::FrameAnalysis,
     pose::LandmarkSize,
     random::Random,
 };
@@ -98,7 +98,7 @@ impl Guide {
     /// What the pose adds to frame `i`, of which nothing was detected.
     pub(super) fn look(&self, i: usize, frame: &GrayImage, camera: &Intrinsics) -> Guided {
         let (pose, mounting) = &self.poses[i];
-        let nothing = FrameFacts { quads: Vec::new() };
+        let nothing = FrameAnalysis { quads: Vec::new() };
         let view = View {
             facts: &nothing,
             map: &self.map,

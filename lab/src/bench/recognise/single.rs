@@ -13,7 +13,7 @@ use std::{collections::BTreeMap, sync::Arc};
 use vision::{
     model::{LandmarkModel, ModelSet},
     params::Params,
-    recognise::{DistanceKind, Recognition, Step, Watch, recognise, recognise_watched},
+    recognise::{DistanceKind, RecogniseStep, StepListener, Verdict, recognise, recognise_watched},
 };
 
 /// Strangers are posters from this number on.
@@ -71,9 +71,9 @@ impl Asked {
         let ask = |q: &Query| {
             fastest(rounds, || recognise(&q.image, &q.quad, models, DistanceKind::default(), p).recognition)
         };
-        let own: Vec<(u64, (f64, Recognition))> = self.own.iter().map(|(id, q)| (*id, ask(q))).collect();
-        let strangers: Vec<(f64, Recognition)> = self.strangers.iter().map(ask).collect();
-        let unique = |r: &Recognition| if let Recognition::Unique(id) = r { Some(id.0) } else { None };
+        let own: Vec<(u64, (f64, Verdict))> = self.own.iter().map(|(id, q)| (*id, ask(q))).collect();
+        let strangers: Vec<(f64, Verdict)> = self.strangers.iter().map(ask).collect();
+        let unique = |r: &Verdict| if let Verdict::Unique(id) = r { Some(id.0) } else { None };
         let mut steps = StepClock { last: Clock::start(), ms: BTreeMap::new() };
         for q in self.own.iter().map(|(_, q)| q).chain(&self.strangers) {
             steps.last = Clock::start();
@@ -99,8 +99,8 @@ struct StepClock {
     ms: BTreeMap<&'static str, f64>,
 }
 
-impl Watch for StepClock {
-    fn finished(&mut self, step: Step) {
+impl StepListener for StepClock {
+    fn finished(&mut self, step: RecogniseStep) {
         *self.ms.entry(step.name()).or_default() += self.last.ms();
         self.last = Clock::start();
     }
@@ -116,7 +116,7 @@ pub(super) fn recall(args: &Args, first: u64, models: &ModelSet, p: &Params) -> 
         let q = query(first, index, args.seed.wrapping_add(0x5000_0000 + i as u64))?;
         let alone = ModelSet::new(vec![Arc::clone(all[index])], p)?;
         let kind = DistanceKind::default();
-        let accepted = recognise(&q.image, &q.quad, &alone, kind, p).recognition != Recognition::Unknown;
+        let accepted = recognise(&q.image, &q.quad, &alone, kind, p).recognition != Verdict::Unknown;
         let listed = accepted && listed(&q, index, models, p);
         Ok((accepted, listed))
     })?;

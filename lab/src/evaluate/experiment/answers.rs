@@ -20,7 +20,7 @@ use vision::{
     params::Params,
     random::Random,
     recognise::{
-        DistanceKind, Recognition, Verdict,
+        DistanceKind, RecognitionResult, Verdict,
         decision::measures::{MEASURES, measures},
         recognise,
     },
@@ -140,8 +140,8 @@ fn hard(draw: u64, random: &mut Random) -> Conditions {
 }
 
 /// What a verdict names, if anything, and whether that is right.
-fn named(verdict: &Verdict, truth: Option<LandmarkId>) -> Option<Named> {
-    let Recognition::Unique(id) = verdict.recognition else { return None };
+fn named(verdict: &RecognitionResult, truth: Option<LandmarkId>) -> Option<Named> {
+    let Verdict::Unique(id) = verdict.recognition else { return None };
     let best = verdict.candidates.iter().position(|c| c.landmark == id)?;
     Some(Named {
         measures: measures(&verdict.candidates, best, verdict.landmarks)?,

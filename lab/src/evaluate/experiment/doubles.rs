@@ -20,7 +20,7 @@ use vision::{
     model::LandmarkId,
     params::Params,
     random::Random,
-    recognise::{DistanceKind, Recognition, recognise},
+    recognise::{DistanceKind, Verdict, recognise},
 };
 
 /// `waymark-lab evaluate lookalikes`.
@@ -138,11 +138,11 @@ fn count(
         let Some(corners) = noisy(&seen.corners, args.common.corner_noise_px, &mut random) else { continue };
         counts.views += 1;
         match recognise(&seen.image, &quad(corners), &class.models, DistanceKind::Both, p).recognition {
-            Recognition::Unique(id) if is(id, own) => counts.right += 1,
-            Recognition::Unique(id) if is(id, double) => counts.double += 1,
-            Recognition::Unique(_) => counts.other += 1,
-            Recognition::Ambiguous(_) => counts.ambiguous += 1,
-            Recognition::Unknown => counts.unknown += 1,
+            Verdict::Unique(id) if is(id, own) => counts.right += 1,
+            Verdict::Unique(id) if is(id, double) => counts.double += 1,
+            Verdict::Unique(_) => counts.other += 1,
+            Verdict::Ambiguous(_) => counts.ambiguous += 1,
+            Verdict::Unknown => counts.unknown += 1,
         }
     }
     counts

@@ -32,8 +32,8 @@ use std::{collections::BTreeMap, sync::Arc, time::Instant};
 use vision::{
     geometry::{Corners, polygon},
     model::LandmarkId,
-    pipeline::{FrameFacts, matched_border},
-    recognise::Recognition,
+    pipeline::{FrameAnalysis, matched_border},
+    recognise::Verdict,
     seen_border::FoundBy,
 };
 
@@ -153,7 +153,7 @@ impl Server {
     fn frame(
         &self,
         map: &MapSnapshot,
-        facts: &FrameFacts,
+        facts: &FrameAnalysis,
         (seen, odom_from_robot): (&Sighting, Pose2),
         (wrong, captured_ns): (&SimulatedRobotErrors, i64),
     ) -> (Vec<Change>, Option<Guided>) {
@@ -253,7 +253,13 @@ pub(super) fn drive(world: &World, way: Way) -> anyhow::Result<Journey> {
 
 impl Journey {
     /// Counts what the frame shows and what was named in it; whether it shows a landmark in use at all.
-    fn score(&mut self, world: &World, seen: &Sighting, facts: &FrameFacts, guided: Option<&Guided>) -> bool {
+    fn score(
+        &mut self,
+        world: &World,
+        seen: &Sighting,
+        facts: &FrameAnalysis,
+        guided: Option<&Guided>,
+    ) -> bool {
         let truth = &seen.frame.truth;
         let is_there = |id: LandmarkId, found: &Corners| {
             let view = truth.landmark(world.name(id));
@@ -261,7 +267,7 @@ impl Journey {
         };
         let mut global = Vec::new();
         for quad in &facts.quads {
-            let Some(Recognition::Unique(id)) = quad.verdict.as_ref().map(|v| v.recognition) else {
+            let Some(Verdict::Unique(id)) = quad.verdict.as_ref().map(|v| v.recognition) else {
                 continue;
             };
             // Where the picture was found to lie: the quad itself may be a border around it.

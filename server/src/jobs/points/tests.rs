@@ -15,7 +15,7 @@ use tokio::sync::watch;
 use vision::{
     frame::GrayImage,
     geometry::Corners,
-    learn::{View, learn, synthesis},
+    learn::{TrainingView, learn, synthesis},
     params::Params,
     recognise::DistanceKind,
 };
@@ -38,7 +38,7 @@ fn corners() -> Corners {
 
 /// Adds a view whose stored picture is `bytes`.
 async fn teach(store: &Catalogue, landmark: &str, image: &GrayImage, bytes: Vec<u8>) {
-    let photographed = View::photographed(image, &corners(), &Params::default()).unwrap();
+    let photographed = TrainingView::photographed(image, &corners(), &Params::default()).unwrap();
     let cut = Cut { corners_px: corners(), icon: photographed.icon };
     let view = NewView {
         image_sha256: Sha256::digest(&bytes).into(),

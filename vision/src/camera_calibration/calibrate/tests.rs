@@ -57,13 +57,13 @@ pub(crate) fn scene(n: usize, seed: u64, sigma_px: f64) -> (Vec<PlanarView>, Vec
     all.collect()
 }
 
-fn known() -> Height {
-    Height::Known { height_m: HEIGHT_M, sigma_m: 0.01 }
+fn known() -> CameraHeight {
+    CameraHeight::Known { height_m: HEIGHT_M, sigma_m: 0.01 }
 }
 
 /// C1, C1 + C2, C1 + C3, all.
 fn constraint_sets() -> [CalibrateParams; 4] {
-    [(0.0, Height::Free), (0.01, Height::Free), (0.0, known()), (0.01, known())].map(
+    [(0.0, CameraHeight::Free), (0.01, CameraHeight::Free), (0.0, known()), (0.01, known())].map(
         |(roll_sigma_rad, height)| CalibrateParams { roll_sigma_rad, height, ..CalibrateParams::default() },
     )
 }
@@ -110,7 +110,7 @@ fn what_is_unknown_is_found_as_well() {
     assert!(worst(&found.camera, &tall) < 1e-7, "{:?}", found.camera);
 
     let mut views = views_of(&camera(), 8, 0.0, &mut random);
-    let p = CalibrateParams { height: Height::Constant { sigma_m: 0.01 }, ..base.clone() };
+    let p = CalibrateParams { height: CameraHeight::Constant { sigma_m: 0.01 }, ..base.clone() };
     let found = calibrate(&views, IMAGE, &p).unwrap();
     assert!((found.height_m.unwrap() - HEIGHT_M).abs() < 1e-7 && worst(&found.camera, &camera()) < 1e-8);
 
@@ -301,7 +301,7 @@ fn bad_input_is_refused_by_name() {
     };
     assert_eq!(param(CalibrateParams { pixel_aspect: f64::NAN, ..p.clone() }), "pixel_aspect");
     assert_eq!(param(CalibrateParams { radial: MAX_RADIAL + 1, ..p.clone() }), "radial");
-    let height = Height::Known { height_m: 101.0, sigma_m: 0.1 };
+    let height = CameraHeight::Known { height_m: 101.0, sigma_m: 0.1 };
     assert_eq!(param(CalibrateParams { height, ..p.clone() }), "height_m");
     let zero = calibrate(&views, [0, 480], &p);
     assert_eq!(zero, Err(CalibrateError::OutOfRange { field: "width_px", value: 0.0 }));

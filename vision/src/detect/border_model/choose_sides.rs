@@ -7,7 +7,9 @@
 use crate::detect::{
     border_model::{
         network::Network,
-        side_features::{BAND_FEATURES, Measured, Met, SIDE_FEATURES, Sides, Tones, joined, meet_all},
+        side_features::{
+            BAND_FEATURES, LogGreyLevels, Met, SIDE_FEATURES, SideMeasurement, Sides, joined, meet_all,
+        },
     },
     edge_support::gradients::Gradients,
 };
@@ -18,7 +20,7 @@ const ROUNDS: usize = 2;
 
 /// A line beside a side with its measurements.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Rival {
+pub struct SideCandidate {
     /// Its ends, beside the ends of the side.
     pub ends_px: [Point2<f64>; 2],
     /// See [`choose_sides`].
@@ -27,20 +29,20 @@ pub struct Rival {
 
 /// A quad with its sides on the likeliest lines.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Chosen {
+pub struct SnappedSides {
     /// Corners in the order of the sides.
     pub corners_px: [Point2<f64>; 4],
     /// What was measured of each side's line; all 0 for a side without a line.
-    pub sides: [Measured; 4],
+    pub sides: [SideMeasurement; 4],
     /// The same of the lines nearest to the sides as they were.
-    pub nearest: [Measured; 4],
+    pub nearest: [SideMeasurement; 4],
 }
 
 /// Moves every side of a quad, clockwise on screen, to the line beside it that looks most like the border of a thing.
 /// None if no side has a line, or if what comes out has no corners.
-pub fn choose_sides(g: &Gradients, corners: &[Point2<f64>; 4], model: &Network) -> Option<Chosen> {
+pub fn choose_sides(g: &Gradients, corners: &[Point2<f64>; 4], model: &Network) -> Option<SnappedSides> {
     let sides = Sides::new(g, corners);
-    let known: [Vec<([f64; BAND_FEATURES], Tones)>; 4] =
+    let known: [Vec<([f64; BAND_FEATURES], LogGreyLevels)>; 4] =
         std::array::from_fn(|i| (0..sides.lines(i).len()).map(|j| sides.band_features(i, j)).collect());
     let mut chosen: [Option<usize>; 4] = std::array::from_fn(|i| sides.nearest(i));
     if chosen.iter().all(Option::is_none) {
@@ -48,11 +50,11 @@ pub fn choose_sides(g: &Gradients, corners: &[Point2<f64>; 4], model: &Network) 
     }
     let mut met = sides.met(&chosen);
     let measure = |met: &Met, lines: &[Option<usize>; 4]| {
-        let of_line = |i: usize, j: usize| Measured {
+        let of_line = |i: usize, j: usize| SideMeasurement {
             features: joined(&known[i][j].0, &sides.corner_features(i, j, &met[i])),
             tones: known[i][j].1,
         };
-        std::array::from_fn(|i| lines[i].map_or_else(Measured::default, |j| of_line(i, j)))
+        std::array::from_fn(|i| lines[i].map_or_else(SideMeasurement::default, |j| of_line(i, j)))
     };
     let nearest = measure(&met, &chosen);
     for _ in 0..ROUNDS {
@@ -68,19 +70,19 @@ pub fn choose_sides(g: &Gradients, corners: &[Point2<f64>; 4], model: &Network) 
         }
         met = sides.met(&chosen);
     }
-    Some(Chosen { corners_px: meet_all(&sides.ends(&chosen))?, sides: measure(&met, &chosen), nearest })
+    Some(SnappedSides { corners_px: meet_all(&sides.ends(&chosen))?, sides: measure(&met, &chosen), nearest })
 }
 
 /// The lines beside every side with their measurements, the corners made with the lines nearest to the other sides:
 /// what a model is fitted on.
-pub fn rivals(g: &Gradients, corners: &[Point2<f64>; 4]) -> [Vec<Rival>; 4] {
+pub fn rivals(g: &Gradients, corners: &[Point2<f64>; 4]) -> [Vec<SideCandidate>; 4] {
     let sides = Sides::new(g, corners);
     let met = sides.met(&std::array::from_fn(|i| sides.nearest(i)));
     std::array::from_fn(|i| {
         (0..sides.lines(i).len())
             .map(|j| {
                 let features = joined(&sides.band_features(i, j).0, &sides.corner_features(i, j, &met[i]));
-                Rival { ends_px: sides.line_ends(i, j), features }
+                SideCandidate { ends_px: sides.line_ends(i, j), features }
             })
             .collect()
     })

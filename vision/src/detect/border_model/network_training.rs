@@ -23,7 +23,7 @@ pub const MAX_STEPS: usize = 100_000;
 
 /// Candidates of which one or more are right.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Rivals {
+pub struct ChoiceExample {
     /// Which part of the data they are in: for whoever holds parts out.
     pub group: usize,
     /// How many times these rivals count, above 0.
@@ -36,8 +36,8 @@ pub struct Rivals {
 
 /// One candidate that is right or is not.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Example {
-    /// As for [`Rivals`].
+pub struct LabelledExample {
+    /// As for [`ChoiceExample`].
     pub group: usize,
     /// How many times it counts, above 0.
     pub weight: f64,
@@ -72,7 +72,7 @@ impl Default for TrainParams {
 
 /// Why there is no network.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum FitError {
+pub enum TrainError {
     /// No set of rivals has a right and a wrong one, or all examples are alike.
     #[error("nothing to learn from: right ones and wrong ones are needed")]
     NothingToLearn,
@@ -85,18 +85,18 @@ pub enum FitError {
 }
 
 /// A network that gives the right one of some rivals the greatest output.
-pub fn to_choose(rivals: &[Rivals], p: &TrainParams) -> Result<Network, FitError> {
+pub fn to_choose(rivals: &[ChoiceExample], p: &TrainParams) -> Result<Network, TrainError> {
     if p.reach.is_nan() || p.reach <= 0.0 {
-        return Err(FitError::Range("reach"));
+        return Err(TrainError::Range("reach"));
     }
     train(rivals.iter().map(|r| Task::choice(r, p.reach)).collect(), p)
 }
 
 /// A network whose output is the logarithm of the odds that an example is one.
-pub fn to_tell(examples: &[Example], p: &TrainParams) -> Result<Network, FitError> {
+pub fn to_tell(examples: &[LabelledExample], p: &TrainParams) -> Result<Network, TrainError> {
     let both = examples.iter().any(|e| e.is_one) && examples.iter().any(|e| !e.is_one);
     if !both {
-        return Err(FitError::NothingToLearn);
+        return Err(TrainError::NothingToLearn);
     }
     train(examples.iter().map(Task::telling).collect(), p)
 }
@@ -110,7 +110,7 @@ struct Task<'a> {
 }
 
 impl<'a> Task<'a> {
-    fn choice(r: &'a Rivals, reach: f64) -> Self {
+    fn choice(r: &'a ChoiceExample, reach: f64) -> Self {
         let best = r.off.iter().copied().fold(f64::INFINITY, f64::min);
         let share: Vec<f64> = r.off.iter().map(|off| ((best - off) / reach).exp()).collect();
         let sum: f64 = share.iter().sum();
@@ -119,7 +119,7 @@ impl<'a> Task<'a> {
         Self { weight: r.weight, features, wanted, alone: false }
     }
 
-    fn telling(e: &'a Example) -> Self {
+    fn telling(e: &'a LabelledExample) -> Self {
         let wanted = vec![f64::from(e.is_one)];
         Self { weight: e.weight, features: vec![&e.features], wanted, alone: true }
     }
@@ -130,11 +130,11 @@ impl<'a> Task<'a> {
     }
 }
 
-fn train(tasks: Vec<Task>, p: &TrainParams) -> Result<Network, FitError> {
+fn train(tasks: Vec<Task>, p: &TrainParams) -> Result<Network, TrainError> {
     check(&tasks, p)?;
     let tasks: Vec<Task> = tasks.into_iter().filter(Task::tells).collect();
     let Some(width) = tasks.first().and_then(|t| t.features.first()).map(|f| f.len()) else {
-        return Err(FitError::NothingToLearn);
+        return Err(TrainError::NothingToLearn);
     };
     let (mean, deviation) = spread(&tasks, width);
     let scaled: Vec<Vec<Vec<f64>>> = tasks
@@ -167,8 +167,8 @@ fn train(tasks: Vec<Task>, p: &TrainParams) -> Result<Network, FitError> {
     Ok(net.into_network(mean, deviation))
 }
 
-fn check(tasks: &[Task], p: &TrainParams) -> Result<(), FitError> {
-    let within = |name, sound: bool| if sound { Ok(()) } else { Err(FitError::Range(name)) };
+fn check(tasks: &[Task], p: &TrainParams) -> Result<(), TrainError> {
+    let within = |name, sound: bool| if sound { Ok(()) } else { Err(TrainError::Range(name)) };
     within("hidden", p.hidden <= MAX_HIDDEN)?;
     within("steps", (1..=MAX_STEPS).contains(&p.steps))?;
     within("rate", p.rate > 0.0 && p.rate.is_finite())?;
@@ -181,10 +181,10 @@ fn check(tasks: &[Task], p: &TrainParams) -> Result<(), FitError> {
             && t.wanted.iter().all(|w| w.is_finite())
             && t.features.iter().all(|f| f.len() == width && f.iter().all(|x| x.is_finite()));
         if !sound {
-            return Err(FitError::Malformed(i));
+            return Err(TrainError::Malformed(i));
         }
     }
-    if tasks.iter().any(Task::tells) { Ok(()) } else { Err(FitError::NothingToLearn) }
+    if tasks.iter().any(Task::tells) { Ok(()) } else { Err(TrainError::NothingToLearn) }
 }
 
 /// Mean and standard deviation of every measurement over all candidates.

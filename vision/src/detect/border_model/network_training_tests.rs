@@ -5,35 +5,35 @@ fn quick() -> TrainParams {
 }
 
 /// Of six candidates the one nearest to the middle is right, which no linear model sees.
-fn rivals(count: usize, seed: u64) -> Vec<Rivals> {
+fn rivals(count: usize, seed: u64) -> Vec<ChoiceExample> {
     let mut random = Random::new(seed);
     (0..count)
         .map(|group| {
             let features: Vec<Vec<f64>> =
                 (0..6).map(|_| vec![random.range(-2.0, 2.0), random.range(-2.0, 2.0)]).collect();
             let off = features.iter().map(|f| f[0].hypot(f[1])).collect();
-            Rivals { group, weight: 1.0, features, off }
+            ChoiceExample { group, weight: 1.0, features, off }
         })
         .collect()
 }
 
-fn examples(count: usize, seed: u64, turned: impl Fn(usize) -> bool) -> Vec<Example> {
+fn examples(count: usize, seed: u64, turned: impl Fn(usize) -> bool) -> Vec<LabelledExample> {
     let mut random = Random::new(seed);
     (0..count)
         .map(|group| {
             let features = vec![random.range(-1.0, 1.0), random.range(-1.0, 1.0)];
             let is_one = (features[0] > 0.2) != turned(group);
-            Example { group, weight: 1.0, features, is_one }
+            LabelledExample { group, weight: 1.0, features, is_one }
         })
         .collect()
 }
 
-fn chosen(net: &Network, r: &Rivals) -> bool {
+fn chosen(net: &Network, r: &ChoiceExample) -> bool {
     let best = |v: Vec<f64>| (0..v.len()).reduce(|a, b| if v[b] > v[a] { b } else { a });
     best(r.features.iter().map(|f| net.output(f)).collect()) == best(r.off.iter().map(|x| -x).collect())
 }
 
-fn right_share(net: &Network, examples: &[Example]) -> f64 {
+fn right_share(net: &Network, examples: &[LabelledExample]) -> f64 {
     examples.iter().filter(|e| (net.output(&e.features) > 0.0) == e.is_one).count() as f64
         / examples.len() as f64
 }
@@ -53,7 +53,7 @@ fn hidden_units_learn_what_lines_cannot() {
 #[test]
 fn slopes_are_those_of_the_loss() {
     let data = rivals(3, 7);
-    let one = Example { group: 0, weight: 1.0, features: vec![0.3, -0.8], is_one: true };
+    let one = LabelledExample { group: 0, weight: 1.0, features: vec![0.3, -0.8], is_one: true };
     let tasks = [Task::choice(&data[0], 1.0), Task::telling(&one)];
     let mut net = Weights::new(2, &TrainParams { hidden: 3, ..quick() });
     let loss = |net: &Weights, t: &Task| {
@@ -101,20 +101,24 @@ fn odds_are_told_and_repeat() {
 
 #[test]
 fn what_is_further_off_is_wanted_less() {
-    let r =
-        |off: &[f64]| Rivals { group: 0, weight: 1.0, features: vec![vec![0.0]; off.len()], off: off.into() };
+    let r = |off: &[f64]| ChoiceExample {
+        group: 0,
+        weight: 1.0,
+        features: vec![vec![0.0]; off.len()],
+        off: off.into(),
+    };
     let data = r(&[3.0, 1.0, 2.0]);
     let wanted = Task::choice(&data, 1.0).wanted;
     let e = std::f64::consts::E;
     assert!((wanted[1] / wanted[2] - e).abs() < 1e-12 && (wanted[1] / wanted[0] - e * e).abs() < 1e-12);
     assert!((wanted.iter().sum::<f64>() - 1.0).abs() < 1e-12);
-    assert_eq!(to_choose(&[r(&[1.0])], &quick()), Err(FitError::NothingToLearn));
+    assert_eq!(to_choose(&[r(&[1.0])], &quick()), Err(TrainError::NothingToLearn));
 }
 
 #[test]
 fn a_weight_of_two_is_two_of_them() {
     let mut data = examples(40, 8, |_| false);
-    let doubled: Vec<Example> = data.iter().chain(&data[..10]).cloned().collect();
+    let doubled: Vec<LabelledExample> = data.iter().chain(&data[..10]).cloned().collect();
     data[..10].iter_mut().for_each(|e| e.weight = 2.0);
     let p = TrainParams { hidden: 0, ..quick() };
     let scale = |n: &Network| [n.linear[0] / n.deviation[0], n.linear[1] / n.deviation[1]];
@@ -127,25 +131,25 @@ fn a_weight_of_two_is_two_of_them() {
 fn what_cannot_be_trained_is_refused() {
     let good = examples(10, 6, |_| false);
     let with = |p: TrainParams| to_tell(&good, &p).unwrap_err();
-    assert_eq!(with(TrainParams { hidden: MAX_HIDDEN + 1, ..quick() }), FitError::Range("hidden"));
-    assert_eq!(with(TrainParams { steps: MAX_STEPS + 1, ..quick() }), FitError::Range("steps"));
-    assert_eq!(with(TrainParams { rate: f64::NAN, ..quick() }), FitError::Range("rate"));
-    assert_eq!(with(TrainParams { ridge: -1.0, ..quick() }), FitError::Range("ridge"));
+    assert_eq!(with(TrainParams { hidden: MAX_HIDDEN + 1, ..quick() }), TrainError::Range("hidden"));
+    assert_eq!(with(TrainParams { steps: MAX_STEPS + 1, ..quick() }), TrainError::Range("steps"));
+    assert_eq!(with(TrainParams { rate: f64::NAN, ..quick() }), TrainError::Range("rate"));
+    assert_eq!(with(TrainParams { ridge: -1.0, ..quick() }), TrainError::Range("ridge"));
     assert!(to_tell(&good, &TrainParams { hidden: MAX_HIDDEN, steps: 1, ..quick() }).is_ok());
     let reach = TrainParams { reach: 0.0, ..quick() };
-    assert_eq!(to_choose(&rivals(2, 1), &reach), Err(FitError::Range("reach")));
+    assert_eq!(to_choose(&rivals(2, 1), &reach), Err(TrainError::Range("reach")));
     let mut bad = good.clone();
     bad[4].weight = 0.0;
-    assert_eq!(to_tell(&bad, &quick()), Err(FitError::Malformed(4)));
+    assert_eq!(to_tell(&bad, &quick()), Err(TrainError::Malformed(4)));
     bad = good.clone();
     bad[3].features.push(1.0);
-    assert_eq!(to_tell(&bad, &quick()), Err(FitError::Malformed(3)));
+    assert_eq!(to_tell(&bad, &quick()), Err(TrainError::Malformed(3)));
     bad = good.clone();
     bad[2].features[0] = f64::INFINITY;
-    assert_eq!(to_tell(&bad, &quick()), Err(FitError::Malformed(2)));
+    assert_eq!(to_tell(&bad, &quick()), Err(TrainError::Malformed(2)));
     let mut torn = rivals(2, 1);
     torn[1].off.pop();
-    assert_eq!(to_choose(&torn, &quick()), Err(FitError::Malformed(1)));
-    let ones: Vec<Example> = good.iter().filter(|e| e.is_one).cloned().collect();
-    assert_eq!(to_tell(&ones, &quick()), Err(FitError::NothingToLearn));
+    assert_eq!(to_choose(&torn, &quick()), Err(TrainError::Malformed(1)));
+    let ones: Vec<LabelledExample> = good.iter().filter(|e| e.is_one).cloned().collect();
+    assert_eq!(to_tell(&ones, &quick()), Err(TrainError::NothingToLearn));
 }

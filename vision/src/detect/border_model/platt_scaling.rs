@@ -4,7 +4,7 @@
 
 use crate::detect::border_model::{
     network::Network,
-    network_training::{Example, FitError},
+    network_training::{LabelledExample, TrainError},
 };
 
 /// Newton's steps; a few are enough, as the loss is convex.
@@ -16,25 +16,25 @@ const LONGEST: f64 = 1.0;
 
 /// The calibrated output is `factor * output + offset`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Calibration {
+pub struct PlattScaling {
     /// Above 0; below 1 for a network that is too sure.
     pub factor: f64,
     /// Logarithm of odds at an output of 0.
     pub offset: f64,
 }
 
-impl Calibration {
+impl PlattScaling {
     /// The line under which held-out examples are likeliest, each counted by its weight. Outputs and examples in pairs.
-    pub fn fit(outputs: &[f64], examples: &[Example]) -> Result<Self, FitError> {
+    pub fn fit(outputs: &[f64], examples: &[LabelledExample]) -> Result<Self, TrainError> {
         let pairs = || outputs.iter().zip(examples);
         if let Some(i) = pairs().position(|(o, e)| !o.is_finite() || !e.weight.is_finite() || e.weight <= 0.0)
         {
-            return Err(FitError::Malformed(i));
+            return Err(TrainError::Malformed(i));
         }
         let count = |is_one: bool| pairs().filter(|p| p.1.is_one == is_one).map(|p| p.1.weight).sum::<f64>();
         let (ones, others) = (count(true), count(false));
         if ones <= 0.0 || others <= 0.0 {
-            return Err(FitError::NothingToLearn);
+            return Err(TrainError::NothingToLearn);
         }
         // Platt's targets: as if one more of either kind had been seen.
         let wanted = [1.0 / (others + 2.0), (ones + 1.0) / (ones + 2.0)];
@@ -57,7 +57,7 @@ impl Calibration {
             line.offset -= step[1].clamp(-LONGEST, LONGEST);
         }
         let sound = line.factor > 0.0 && line.factor.is_finite() && line.offset.is_finite();
-        if sound { Ok(line) } else { Err(FitError::NothingToLearn) }
+        if sound { Ok(line) } else { Err(TrainError::NothingToLearn) }
     }
 
     /// The calibrated output.
@@ -80,12 +80,12 @@ mod tests {
     use super::*;
     use crate::random::Random;
 
-    fn example(is_one: bool) -> Example {
-        Example { group: 0, weight: 1.0, features: vec![], is_one }
+    fn example(is_one: bool) -> LabelledExample {
+        LabelledExample { group: 0, weight: 1.0, features: vec![], is_one }
     }
 
     /// Outputs four times as sure as they should be, and shifted.
-    fn overconfident(n: usize) -> (Vec<f64>, Vec<Example>) {
+    fn overconfident(n: usize) -> (Vec<f64>, Vec<LabelledExample>) {
         let mut random = Random::new(7);
         let draw = |_| {
             let odds = 2.0 * random.normal();
@@ -98,7 +98,7 @@ mod tests {
     #[test]
     fn what_was_too_sure_is_as_sure_as_it_should_be() {
         let (outputs, examples) = overconfident(20_000);
-        let line = Calibration::fit(&outputs, &examples).unwrap();
+        let line = PlattScaling::fit(&outputs, &examples).unwrap();
         assert!((line.factor - 0.25).abs() < 0.01 && (line.offset + 0.75).abs() < 0.06, "{line:?}");
         // One in two, where one half is said.
         let near = |o: &f64| (1.0 / (1.0 + (-line.of(*o)).exp()) - 0.5).abs() < 0.05;
@@ -119,7 +119,7 @@ mod tests {
             hidden_out: vec![-2.0],
             bias: 0.3,
         };
-        let line = Calibration { factor: 0.4, offset: -0.2 };
+        let line = PlattScaling { factor: 0.4, offset: -0.2 };
         let wanted = line.of(network.output(&[1.7]));
         assert!((line.applied(network).output(&[1.7]) - wanted).abs() < 1e-12);
     }
@@ -127,16 +127,16 @@ mod tests {
     #[test]
     fn nothing_is_made_of_nothing() {
         let both = [example(true), example(false)];
-        assert_eq!(Calibration::fit(&[1.0], &[example(true)]), Err(FitError::NothingToLearn));
-        assert_eq!(Calibration::fit(&[], &[]), Err(FitError::NothingToLearn));
-        assert_eq!(Calibration::fit(&[0.0, f64::NAN], &both), Err(FitError::Malformed(1)));
+        assert_eq!(PlattScaling::fit(&[1.0], &[example(true)]), Err(TrainError::NothingToLearn));
+        assert_eq!(PlattScaling::fit(&[], &[]), Err(TrainError::NothingToLearn));
+        assert_eq!(PlattScaling::fit(&[0.0, f64::NAN], &both), Err(TrainError::Malformed(1)));
         // Told the wrong way round: no line upwards.
-        let many: Vec<Example> = (0..100).map(|i| example(i % 2 == 0)).collect();
+        let many: Vec<LabelledExample> = (0..100).map(|i| example(i % 2 == 0)).collect();
         let outputs: Vec<f64> =
             (0..100).map(|i| if i % 2 == 0 { -2.0 } else { 2.0 } + f64::from(i % 7)).collect();
-        assert_eq!(Calibration::fit(&outputs, &many), Err(FitError::NothingToLearn));
+        assert_eq!(PlattScaling::fit(&outputs, &many), Err(TrainError::NothingToLearn));
         // All alike: finite, and only as sure as their share.
-        let alike = Calibration::fit(&[1.0; 100], &many).unwrap();
+        let alike = PlattScaling::fit(&[1.0; 100], &many).unwrap();
         assert!(alike.of(1.0).abs() < 0.05, "{alike:?}");
     }
 }

@@ -6,7 +6,7 @@
 
 use crate::detect::border_model::{
     network::Network,
-    side_features::{Measured, SIDE_FEATURES},
+    side_features::{SIDE_FEATURES, SideMeasurement},
 };
 use nalgebra::Point2;
 
@@ -20,7 +20,7 @@ const WHOLE_FEATURES: usize = 10;
 /// outside and just inside; how alike their steps are, 0 to 1; sine of the sharpest corner; of opposite sides the log of
 /// the length ratio, of the pair that differs less and of the other; how far corners lie outside the image, in mean sides.
 pub fn thing_features(
-    sides: &[Measured; 4],
+    sides: &[SideMeasurement; 4],
     corners_px: &[Point2<f64>; 4],
     score: f64,
     size_px: (usize, usize),
@@ -37,7 +37,7 @@ pub fn thing_features(
 }
 
 fn of_the_whole(
-    sides: &[Measured; 4],
+    sides: &[SideMeasurement; 4],
     corners_px: &[Point2<f64>; 4],
     score: f64,
     (width, height): (usize, usize),
@@ -45,7 +45,7 @@ fn of_the_whole(
     let way = |i: usize| corners_px[(i + 1) % 4] - corners_px[i % 4];
     let length: [f64; 4] = std::array::from_fn(|i| way(i).norm().max(1.0));
     let mean_side = length.iter().sum::<f64>() / 4.0;
-    let spread = |tone: fn(&Measured) -> f64| {
+    let spread = |tone: fn(&SideMeasurement) -> f64| {
         let tones = sides.iter().map(tone);
         tones.clone().fold(f64::NEG_INFINITY, f64::max) - tones.fold(f64::INFINITY, f64::min)
     };
@@ -79,18 +79,20 @@ pub fn probability(model: &Network, features: &[f64; THING_FEATURES]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::detect::border_model::side_features::Tones;
+    use crate::detect::border_model::side_features::LogGreyLevels;
 
     const SQUARE: [[f64; 2]; 4] = [[10.0, 10.0], [110.0, 10.0], [110.0, 110.0], [10.0, 110.0]];
 
-    fn features(tones: [Tones; 4], corners: [[f64; 2]; 4]) -> [f64; THING_FEATURES] {
+    fn features(tones: [LogGreyLevels; 4], corners: [[f64; 2]; 4]) -> [f64; THING_FEATURES] {
         let values = [1.0, 3.0, -2.0, 6.0];
-        let sides =
-            std::array::from_fn(|i| Measured { features: [values[i]; SIDE_FEATURES], tones: tones[i] });
+        let sides = std::array::from_fn(|i| SideMeasurement {
+            features: [values[i]; SIDE_FEATURES],
+            tones: tones[i],
+        });
         thing_features(&sides, &corners.map(Point2::from), 0.7, (200, 150))
     }
 
-    fn whole(tones: [Tones; 4], corners: [[f64; 2]; 4]) -> [f64; WHOLE_FEATURES] {
+    fn whole(tones: [LogGreyLevels; 4], corners: [[f64; 2]; 4]) -> [f64; WHOLE_FEATURES] {
         features(tones, corners)[3 * SIDE_FEATURES..].try_into().unwrap()
     }
 
@@ -100,7 +102,7 @@ mod tests {
 
     #[test]
     fn the_measurements_are_mean_least_and_most_of_the_sides() {
-        let features = features([Tones::default(); 4], SQUARE);
+        let features = features([LogGreyLevels::default(); 4], SQUARE);
         for (from, wanted) in [(0, 2.0), (SIDE_FEATURES, -2.0), (2 * SIDE_FEATURES, 6.0)] {
             assert!(close(&features[from..from + SIDE_FEATURES], &[wanted; SIDE_FEATURES]));
         }
@@ -111,7 +113,7 @@ mod tests {
     #[test]
     fn tones_are_compared_between_the_sides() {
         let tones = [[5.0, 4.0, 3.0, 2.0], [5.5, 4.1, 3.0, 1.0], [5.2, 4.0, 3.7, -1.0], [5.0, 4.0, 3.0, 2.0]]
-            .map(|[wall, outside, inside, step]| Tones { wall, outside, inside, step });
+            .map(|[wall, outside, inside, step]| LogGreyLevels { wall, outside, inside, step });
         let spread = &whole(tones, SQUARE)[2..6];
         assert!(close(spread, &[0.5, 4.1 - 4.0, 3.7 - 3.0, 4.0 / 6.0]), "{spread:?}");
     }
@@ -122,7 +124,10 @@ mod tests {
         let corners = [[100.0, 50.0], [209.0, 20.0], [209.0, 150.0], [100.0, 110.0]];
         let mut seen: Vec<[f64; WHOLE_FEATURES]> = Vec::new();
         for first in 0..4 {
-            seen.push(whole([Tones::default(); 4], std::array::from_fn(|i| corners[(i + first) % 4])));
+            seen.push(whole(
+                [LogGreyLevels::default(); 4],
+                std::array::from_fn(|i| corners[(i + first) % 4]),
+            ));
         }
         assert!(seen.iter().all(|s| close(s, &seen[0])), "{seen:?}");
         let [upper, lower] = [30.0_f64, 40.0].map(|rise| rise.hypot(109.0));

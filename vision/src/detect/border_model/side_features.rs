@@ -21,16 +21,16 @@ pub(crate) const CORNER_FEATURES: usize = 8;
 pub const SIDE_FEATURES: usize = BAND_FEATURES + CORNER_FEATURES;
 /// What was measured of the line of a side.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Measured {
+pub struct SideMeasurement {
     /// See [`choose_sides`].
     pub features: [f64; SIDE_FEATURES],
     /// What can be compared between sides only.
-    pub tones: Tones,
+    pub tones: LogGreyLevels,
 }
 
 /// Tones beside a line: logs of grey levels, 8 added.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Tones {
+pub struct LogGreyLevels {
     /// Some way outside, where the wall is.
     pub wall: f64,
     /// Just outside.
@@ -124,8 +124,8 @@ impl<'a> Sides<'a> {
     /// out and 13 further in, 14 largest support further out, 15 number of lines further out; share of samples with
     /// an edge further out, 16 weak and 17 stronger; 18 how much the strip to the next line inside looks like a shadow on
     /// the wall, 19 the strip from the next line outside.
-    pub(crate) fn band_features(&self, side: usize, line: usize) -> ([f64; BAND_FEATURES], Tones) {
-        let Some(band) = &self.bands[side] else { return ([0.0; BAND_FEATURES], Tones::default()) };
+    pub(crate) fn band_features(&self, side: usize, line: usize) -> ([f64; BAND_FEATURES], LogGreyLevels) {
+        let Some(band) = &self.bands[side] else { return ([0.0; BAND_FEATURES], LogGreyLevels::default()) };
         let (c, extent) = (band.lines[line], self.extent_px[side]);
         let broad = (0.12 * extent).max(8.0);
         let along = band.along_line(&c);
@@ -144,7 +144,7 @@ impl<'a> Sides<'a> {
         let next_out = outer().min_by(|a, b| a.offset_px.total_cmp(&b.offset_px));
         let [weak, stronger] = along.edges_outside(2.5);
         let log = |grey: f64| (grey + 8.0).ln();
-        let tones = Tones {
+        let tones = LogGreyLevels {
             wall: log(wall),
             outside: log(outside),
             inside: log(inside),

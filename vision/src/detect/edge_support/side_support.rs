@@ -16,7 +16,7 @@ const MIN_SAMPLES: usize = 12;
 pub(crate) const CORNER_SHARE: f64 = 0.04;
 /// How a side is searched.
 #[derive(Debug, Clone, Copy)]
-pub struct Search {
+pub struct EdgeProbeParams {
     /// How far from the supposed side its edge may lie.
     pub reach_px: f64,
     /// Smallest step height of an edge point, in grey levels.
@@ -31,7 +31,7 @@ pub struct Search {
 
 /// What was found along a side.
 #[derive(Debug, Clone, PartialEq)]
-pub struct SideEvidence {
+pub struct SideSupport {
     /// Share of the samples inside the image that have an edge along the side, 0 to 1.
     pub support: f64,
     /// Share of the edge points with the more frequent sign, 0.5 to 1; 0 without points.
@@ -42,7 +42,7 @@ pub struct SideEvidence {
     pub line: Option<FittedLine>,
 }
 
-impl SideEvidence {
+impl SideSupport {
     pub(crate) const NONE: Self = Self { support: 0.0, agreement: 0.0, strength: 0.0, line: None };
 }
 
@@ -59,14 +59,19 @@ pub(crate) struct SidePoints {
 }
 
 /// Looks for an edge along the way from `from` to `to`.
-pub fn measure(g: &Gradients, from: &Point2<f64>, to: &Point2<f64>, search: Search) -> SideEvidence {
-    let found = SidePoints::new(g, from, to, Search { least_support: 0.0, ..search });
-    found.map_or(SideEvidence::NONE, |s| s.evidence())
+pub fn measure(g: &Gradients, from: &Point2<f64>, to: &Point2<f64>, search: EdgeProbeParams) -> SideSupport {
+    let found = SidePoints::new(g, from, to, EdgeProbeParams { least_support: 0.0, ..search });
+    found.map_or(SideSupport::NONE, |s| s.evidence())
 }
 
 impl SidePoints {
     /// Looks for edge points along the way from `from` to `to`. None once the support cannot reach what is asked for.
-    pub(crate) fn new(g: &Gradients, from: &Point2<f64>, to: &Point2<f64>, search: Search) -> Option<Self> {
+    pub(crate) fn new(
+        g: &Gradients,
+        from: &Point2<f64>,
+        to: &Point2<f64>,
+        search: EdgeProbeParams,
+    ) -> Option<Self> {
         let side = to - from;
         let length_px = side.norm();
         if !length_px.is_finite() || length_px < 1.0 || g.width() < 2 || g.height() < 2 {
@@ -93,13 +98,13 @@ impl SidePoints {
     }
 
     /// What the points say of the side.
-    pub(crate) fn evidence(&self) -> SideEvidence {
+    pub(crate) fn evidence(&self) -> SideSupport {
         if self.seen == 0 || self.points.is_empty() {
-            return SideEvidence::NONE;
+            return SideSupport::NONE;
         }
         let n = self.points.len();
         let positive = self.points.iter().filter(|p| p.step > 0.0).count();
-        SideEvidence {
+        SideSupport {
             support: n as f64 / self.seen as f64,
             agreement: positive.max(n - positive) as f64 / n as f64,
             strength: self.points.iter().map(|p| p.step.abs()).sum::<f64>() / self.seen as f64,
@@ -171,7 +176,7 @@ struct Across {
 }
 
 impl Across {
-    fn new(normal: &Vector2<f64>, search: Search) -> Self {
+    fn new(normal: &Vector2<f64>, search: EdgeProbeParams) -> Self {
         Self {
             normal: *normal,
             facing: normal.cast().into(),
@@ -240,7 +245,7 @@ mod tests {
         frame::GrayImage,
     };
 
-    const FULL: Search = Search {
+    const FULL: EdgeProbeParams = EdgeProbeParams {
         reach_px: 3.0,
         min_step: 6.0,
         samples: MAX_SAMPLES,
@@ -292,7 +297,8 @@ mod tests {
         assert!((found.support - 0.5).abs() < 0.06, "{found:?}");
         // Whoever asks for more than there is gets nothing, and for less the same.
         let (from, to) = (Point2::new(10.0, 39.5), Point2::new(110.0, 39.5));
-        let asked = |least_support| SidePoints::new(&g, &from, &to, Search { least_support, ..FULL });
+        let asked =
+            |least_support| SidePoints::new(&g, &from, &to, EdgeProbeParams { least_support, ..FULL });
         assert!(asked(0.6).is_none());
         assert_eq!(asked(0.4).unwrap().evidence(), found);
     }

@@ -29,7 +29,7 @@ pub const MAX_COLLECTED: usize = 4 * MAX_HYPOTHESES;
 /// How hypotheses are formed and checked.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct HypothesisParams {
+pub struct ProposalParams {
     /// Smallest angle at a corner, degrees.
     pub min_corner_angle_deg: f64,
     /// A segment may end this share of its length before the corner.
@@ -48,7 +48,7 @@ pub struct HypothesisParams {
     pub facing: bool,
 }
 
-impl Default for HypothesisParams {
+impl Default for ProposalParams {
     fn default() -> Self {
         Self {
             min_corner_angle_deg: 30.0,
@@ -78,7 +78,7 @@ struct Corner {
 type CornerTable = Vec<[Vec<Corner>; 2]>;
 
 /// Seeds of quads whose sides the gradient supports, best first.
-pub fn hypotheses(segments: &[EdgeSegment], g: &Gradients, p: &HypothesisParams) -> Vec<QuadSeed> {
+pub fn hypotheses(segments: &[EdgeSegment], g: &Gradients, p: &ProposalParams) -> Vec<QuadSeed> {
     let order = longest(segments);
     let table = corners(segments, &order, p);
     let mut found = Tightest::default();
@@ -143,7 +143,7 @@ fn longest(segments: &[EdgeSegment]) -> Vec<usize> {
     order
 }
 
-fn corners(segments: &[EdgeSegment], order: &[usize], p: &HypothesisParams) -> CornerTable {
+fn corners(segments: &[EdgeSegment], order: &[usize], p: &ProposalParams) -> CornerTable {
     let mut table: CornerTable = vec![[Vec::new(), Vec::new()]; segments.len()];
     let min_sin = p.min_corner_angle_deg.to_radians().sin();
     for (i, &a) in order.iter().enumerate() {
@@ -170,7 +170,7 @@ fn corners(segments: &[EdgeSegment], order: &[usize], p: &HypothesisParams) -> C
 }
 
 /// Which end of the segment the corner belongs to and how far that end misses it; none when too far.
-fn end_at(segment: &EdgeSegment, corner: &Point2<f64>, p: &HypothesisParams) -> Option<(usize, f64)> {
+fn end_at(segment: &EdgeSegment, corner: &Point2<f64>, p: &ProposalParams) -> Option<(usize, f64)> {
     let length = segment.length_px;
     let t = (corner - segment.p_px).dot(&(segment.q_px - segment.p_px)) / length;
     let (end, beyond) = if t > 0.5 * length { (1, t - length) } else { (0, -t) };
@@ -232,7 +232,7 @@ fn complete(
     table: &CornerTable,
     order: &[usize],
     g: &Gradients,
-    p: &HypothesisParams,
+    p: &ProposalParams,
     found: &mut Tightest,
 ) {
     let ends: Vec<[Point2<f64>; 2]> = segments
@@ -331,7 +331,7 @@ mod tests {
         let g = Gradients { image: &image, gx: map.gx(), gy: map.gy() };
         let found = segments(&chains(&map, &ChainParams::default()), &map, &SegmentParams::default());
         assert_eq!(found.len(), 2, "{found:?}");
-        let seeds = |facing| hypotheses(&found, &g, &HypothesisParams { facing, ..Default::default() });
+        let seeds = |facing| hypotheses(&found, &g, &ProposalParams { facing, ..Default::default() });
         let overlap = polygon::iou(&sign.map(Point2::from), &seeds(true)[0].corners_px);
         assert!(overlap > 0.8, "{overlap}");
         assert!(seeds(false).is_empty());

@@ -10,7 +10,7 @@ use crate::{
         edge_support::{
             gradients::Gradients,
             side_fit::FittedLine,
-            side_support::{Search, measure, run_end},
+            side_support::{EdgeProbeParams, measure, run_end},
         },
         params::DetectParams,
         proposals::quad_seed::{corner_of, plausible},
@@ -204,7 +204,7 @@ fn free_end(g: &Gradients, near: &Point2<f64>, far: &Point2<f64>, min_step: f64)
 
 /// Refits the three sides; none unless edges support them. The chord keeps its ends.
 fn three_sided(set: &OpenSet, g: &Gradients, p: &DetectParams) -> Option<Quad> {
-    let search = Search {
+    let search = EdgeProbeParams {
         reach_px: p.quads.refit_reach_px,
         min_step: p.quads.min_step,
         samples: SAMPLES,
@@ -227,7 +227,7 @@ fn three_sided(set: &OpenSet, g: &Gradients, p: &DetectParams) -> Option<Quad> {
     if moved || !plausible(&clockwise, (g.width(), g.height())) {
         return None;
     }
-    let mean = |f: fn(&crate::detect::edge_support::side_support::SideEvidence) -> f64| {
+    let mean = |f: fn(&crate::detect::edge_support::side_support::SideSupport) -> f64| {
         sides[..3].iter().map(f).sum::<f64>() / 3.0
     };
     let score = set.score * worst * mean(|s| s.support) * mean(|s| s.agreement);

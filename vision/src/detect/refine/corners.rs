@@ -5,7 +5,7 @@ use crate::{
     detect::edge_support::{
         gradients::Gradients,
         side_fit::FittedLine,
-        side_support::{Search, SideEvidence, SidePoints},
+        side_support::{EdgeProbeParams, SidePoints, SideSupport},
     },
     geometry::corners::Corners,
 };
@@ -26,7 +26,7 @@ pub struct RefinedQuad {
     /// Covariance of each corner, px^2.
     pub covariance_px2: [Matrix2<f64>; 4],
     /// What the gradient says about each side, TL-TR first.
-    pub sides: [SideEvidence; 4],
+    pub sides: [SideSupport; 4],
     /// Whether each side runs into the image border.
     pub clipped: [bool; 4],
     /// A second naming of the corners is nearly as upright.
@@ -48,7 +48,7 @@ impl RefinedQuad {
 /// Refits the four sides on the edge points near them and intersects. `corners_px` is clockwise on screen. None when
 /// what comes out is no convex quad, a corner left its place by more than `search.reach_px` times four, or a side has
 /// less support than `search.least_support`.
-pub fn refine(g: &Gradients, corners_px: &[Point2<f64>; 4], search: Search) -> Option<RefinedQuad> {
+pub fn refine(g: &Gradients, corners_px: &[Point2<f64>; 4], search: EdgeProbeParams) -> Option<RefinedQuad> {
     let mut points = [const { None }; 4];
     for (i, points) in points.iter_mut().enumerate() {
         *points = SidePoints::new(g, &corners_px[i], &corners_px[(i + 1) % 4], search);
@@ -56,7 +56,7 @@ pub fn refine(g: &Gradients, corners_px: &[Point2<f64>; 4], search: Search) -> O
             return None;
         }
     }
-    let sides = points.map(|p| p.map_or(SideEvidence::NONE, |p| p.evidence()));
+    let sides = points.map(|p| p.map_or(SideSupport::NONE, |p| p.evidence()));
     let lines: [Line; 4] = std::array::from_fn(|i| {
         sides[i].line.map_or_else(|| Line::through(&corners_px[i], &corners_px[(i + 1) % 4]), Line::Fitted)
     });
@@ -77,7 +77,7 @@ fn name_corners(
     g: &Gradients,
     clockwise: &[Point2<f64>; 4],
     covariance: &[Matrix2<f64>; 4],
-    sides: [SideEvidence; 4],
+    sides: [SideSupport; 4],
 ) -> Option<RefinedQuad> {
     let corners_px = Corners::from_unordered(*clockwise).ok()?;
     let first = corners_px.points()[0];

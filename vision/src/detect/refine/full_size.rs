@@ -4,7 +4,7 @@
 
 use crate::{
     detect::{
-        edge_buffers::Memory,
+        edge_buffers::DetectBuffers,
         edge_support::gradients::Gradients,
         params::{DetectParams, QuadParams},
         quad::{Quad, QuadKind},
@@ -28,7 +28,7 @@ pub(crate) fn at_full_size(
     image: &GrayImage,
     factor: usize,
     p: &DetectParams,
-    memory: &mut Memory,
+    memory: &mut DetectBuffers,
 ) -> Vec<Quad> {
     if factor <= 1 {
         return quads;
@@ -150,7 +150,7 @@ mod tests {
         };
         let window = Window::around(&off.corners_px, 14, &image);
         let fit = MAX_CUT_SHARE * 1280 * 960 / window.area_px();
-        let sharp = at_full_size(vec![off.clone(); fit + 1], &image, 2, &p, &mut Memory::default());
+        let sharp = at_full_size(vec![off.clone(); fit + 1], &image, 2, &p, &mut DetectBuffers::default());
         assert!(sharp[..fit].iter().all(|q| worst_px(q) < 0.15));
         assert_eq!(sharp[fit], off);
     }

@@ -2,7 +2,7 @@
 //! They may contradict each other; which of them stay is `selection`'s.
 
 use crate::detect::{
-    edge_support::{gradients::Gradients, side_support::Search},
+    edge_support::{gradients::Gradients, side_support::EdgeProbeParams},
     params::QuadParams,
     proposals::quad_seed::{Extent, QuadSeed},
     quad::{Quad, QuadKind},
@@ -21,14 +21,14 @@ const MIN_SIDE_PX: f64 = 15.0;
 
 /// A refitted quad with what its score rests on.
 #[derive(Debug, Clone)]
-pub struct Rated {
+pub struct ScoredQuad {
     /// Corners, support and score.
     pub quad: Quad,
     /// Which of two contradicting quads goes first: its score, and its size.
     pub rank: f64,
 }
 
-impl Rated {
+impl ScoredQuad {
     /// The same in an image larger by `factor`.
     pub fn scaled(&self, factor: f64) -> Option<Self> {
         Some(Self { quad: self.quad.scaled(factor)?, ..self.clone() })
@@ -37,11 +37,11 @@ impl Rated {
 
 /// Refits the seeds, best first, and drops those whose sides the gradient does not support. A share of the places is
 /// kept for small seeds: the large ones of a full wall would take them all.
-pub fn rate(seeds: &[QuadSeed], g: &Gradients, p: &QuadParams) -> Vec<Rated> {
+pub fn rate(seeds: &[QuadSeed], g: &Gradients, p: &QuadParams) -> Vec<ScoredQuad> {
     let mut order: Vec<(f64, &QuadSeed)> = seeds.iter().map(|s| (s.fit * size(&s.corners_px), s)).collect();
     order.sort_by(|a, b| b.0.total_cmp(&a.0));
     let search = rating_search(p, p.refit_reach_px + 1.0);
-    let (mut seen, mut rated): (Vec<[Point2<f64>; 4]>, Vec<Rated>) = (Vec::new(), Vec::new());
+    let (mut seen, mut rated): (Vec<[Point2<f64>; 4]>, Vec<ScoredQuad>) = (Vec::new(), Vec::new());
     let mut extents = Vec::new();
     let places = p.max_refitted.min(MAX_REFITTED);
     let mut left = [places, places / 2];
@@ -79,8 +79,8 @@ const SMALL_PERIMETER_PX: f64 = 240.0;
 const ALIKE_IOU: f64 = 0.6;
 
 /// How a side is searched while quads are compared.
-pub(crate) fn rating_search(p: &QuadParams, reach_px: f64) -> Search {
-    Search {
+pub(crate) fn rating_search(p: &QuadParams, reach_px: f64) -> EdgeProbeParams {
+    EdgeProbeParams {
         reach_px,
         min_step: p.min_step,
         samples: RATING_SAMPLES,
@@ -90,7 +90,7 @@ pub(crate) fn rating_search(p: &QuadParams, reach_px: f64) -> Search {
 }
 
 /// The rating of a refitted quad; none if a side is too short or has too little support.
-pub(crate) fn rate_one(refined: &RefinedQuad, p: &QuadParams) -> Option<Rated> {
+pub(crate) fn rate_one(refined: &RefinedQuad, p: &QuadParams) -> Option<ScoredQuad> {
     if refined.min_support() < p.min_side_support || refined.corners_px.min_side_px() < MIN_SIDE_PX {
         return None;
     }
@@ -108,7 +108,7 @@ pub(crate) fn rate_one(refined: &RefinedQuad, p: &QuadParams) -> Option<Rated> {
         upright_ambiguous: refined.upright_ambiguous,
         alternates: Vec::new(),
     };
-    Some(Rated { quad, rank })
+    Some(ScoredQuad { quad, rank })
 }
 
 fn size(corners: &[Point2<f64>; 4]) -> f64 {

@@ -3,7 +3,7 @@
 use crate::detect::{
     edge_support::{
         gradients::Gradients,
-        side_support::{MAX_SAMPLES, Search},
+        side_support::{EdgeProbeParams, MAX_SAMPLES},
     },
     params::QuadParams,
     quad::Quad,
@@ -13,7 +13,7 @@ use crate::detect::{
 /// Refits a chosen quad with all samples. One that was seen on a coarser scale only may lose its edges here: then it
 /// stays as it was.
 pub fn sharpen(quad: Quad, g: &Gradients, p: &QuadParams) -> Quad {
-    let search = Search {
+    let search = EdgeProbeParams {
         reach_px: p.refit_reach_px,
         min_step: p.min_step,
         samples: MAX_SAMPLES,

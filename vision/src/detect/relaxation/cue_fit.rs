@@ -26,7 +26,7 @@ const MAX_ROUNDS: usize = 200;
 
 /// Why there is no fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum FitError {
+pub enum CueFitError {
     /// Too few pairs of one kind.
     #[error(
         "{pairs} pairs of opposite sides and {others} others: at least {MIN_PAIRS_OF_A_KIND} of each needed"
@@ -47,7 +47,7 @@ pub enum FitError {
 
 /// A candidate pair that labels judged.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct JudgedPair {
+pub struct LabelledPair {
     /// c1 to c6.
     pub cues: [f64; 6],
     /// Opposite sides of a labelled quad.
@@ -73,13 +73,13 @@ pub fn judge(
     labelled: &[Corners],
     others: &[Corners],
     photograph: usize,
-) -> Vec<JudgedPair> {
+) -> Vec<LabelledPair> {
     let judged = |pair: &SegmentPair| {
         let (k, l) = (&segments[pair.k], &segments[pair.l]);
         let opposite = labelled.iter().any(|q| opposite_sides(k, l, q.points()));
         let near = |q: &Corners| polygon::iou(&pair.quad_px, q.points()) >= 0.5;
         let fair = opposite || !labelled.iter().chain(others).any(near);
-        fair.then_some(JudgedPair { cues: pair.cues, opposite, photograph })
+        fair.then_some(LabelledPair { cues: pair.cues, opposite, photograph })
     };
     pairs.iter().filter_map(judged).collect()
 }
@@ -120,9 +120,9 @@ pub struct FittedSimilarity {
 }
 
 /// Fits the weights. `photograph` modulo [`FOLDS`] is the part of the cross-validation.
-pub fn fit(pairs: &[JudgedPair], before: &SimilarityParams) -> Result<FittedSimilarity, FitError> {
+pub fn fit(pairs: &[LabelledPair], before: &SimilarityParams) -> Result<FittedSimilarity, CueFitError> {
     if pairs.len() > MAX_PAIRS_FITTED {
-        return Err(FitError::TooMany(pairs.len()));
+        return Err(CueFitError::TooMany(pairs.len()));
     }
     let weights = weights(pairs)?;
     let mean = |opposite: bool| {
@@ -132,8 +132,8 @@ pub fn fit(pairs: &[JudgedPair], before: &SimilarityParams) -> Result<FittedSimi
     };
     let mut held_out = Vec::with_capacity(pairs.len());
     for fold in 0..FOLDS {
-        let inside = |s: &&JudgedPair| s.photograph % FOLDS == fold;
-        let rest: Vec<JudgedPair> = pairs.iter().filter(|s| !inside(s)).copied().collect();
+        let inside = |s: &&LabelledPair| s.photograph % FOLDS == fold;
+        let rest: Vec<LabelledPair> = pairs.iter().filter(|s| !inside(s)).copied().collect();
         if pairs.iter().any(|s| inside(&s)) {
             let part = self::weights(&rest)?;
             held_out.extend(pairs.iter().filter(inside).map(|s| (score(&s.cues, &part), s.opposite)));
@@ -163,15 +163,15 @@ fn score(cues: &[f64; 6], weights: &[f64; 6]) -> f64 {
 
 /// Weights that sum to 1: coefficients of a logistic regression, none below zero, by Newton steps on one coefficient
 /// after the other. The function is convex and each step lowers a bound on it, so it converges from anywhere.
-fn weights(pairs: &[JudgedPair]) -> Result<[f64; 6], FitError> {
+fn weights(pairs: &[LabelledPair]) -> Result<[f64; 6], CueFitError> {
     let opposite = pairs.iter().filter(|s| s.opposite).count();
     let others = pairs.len() - opposite;
     if opposite.min(others) < MIN_PAIRS_OF_A_KIND {
-        return Err(FitError::TooFew { pairs: opposite, others });
+        return Err(CueFitError::TooFew { pairs: opposite, others });
     }
-    let share = |s: &JudgedPair| 0.5 / if s.opposite { opposite as f64 } else { others as f64 };
+    let share = |s: &LabelledPair| 0.5 / if s.opposite { opposite as f64 } else { others as f64 };
     let mut coefficients = [0.0; 7];
-    let cue = |s: &JudgedPair, c: usize| if c < 6 { s.cues[c] } else { 1.0 };
+    let cue = |s: &LabelledPair, c: usize| if c < 6 { s.cues[c] } else { 1.0 };
     let mut logits = vec![0.0; pairs.len()];
     for _ in 0..MAX_ROUNDS {
         let mut moved: f64 = 0.0;
@@ -204,7 +204,7 @@ fn weights(pairs: &[JudgedPair]) -> Result<[f64; 6], FitError> {
     if total > 1e-9 {
         Ok(std::array::from_fn(|c| coefficients[c] / total))
     } else {
-        Err(FitError::NothingTells)
+        Err(CueFitError::NothingTells)
     }
 }
 
@@ -250,14 +250,14 @@ mod tests {
     };
 
     /// Pairs whose first two cues tell, three times as much the first, the others being noise.
-    fn judged(count: usize, seed: u64) -> Vec<JudgedPair> {
+    fn judged(count: usize, seed: u64) -> Vec<LabelledPair> {
         let mut random = Noise(seed);
         (0..count)
             .map(|i| {
                 let cues: [f64; 6] = std::array::from_fn(|_| random.uniform());
                 let logit = 9.0 * cues[0] + 3.0 * cues[1] - 6.0;
                 let opposite = random.uniform() < 1.0 / (1.0 + f64::exp(-logit));
-                JudgedPair { cues, opposite, photograph: i / 40 }
+                LabelledPair { cues, opposite, photograph: i / 40 }
             })
             .collect()
     }
@@ -280,7 +280,7 @@ mod tests {
         let found = weights(&pairs).unwrap();
         let n = pairs.iter().filter(|s| s.opposite).count() as f64;
         let loss = |direction: &[f64; 6], scale: f64, offset: f64| {
-            let of = |s: &JudgedPair| {
+            let of = |s: &LabelledPair| {
                 let logit = scale * score(&s.cues, direction) + offset;
                 let (sign, weight) =
                     if s.opposite { (-1.0, 0.5 / n) } else { (1.0, 0.5 / (pairs.len() as f64 - n)) };
@@ -321,7 +321,7 @@ mod tests {
     fn too_little_and_too_much_are_refused() {
         let pairs = judged(400, 3);
         let p = SimilarityParams::default();
-        let few: Vec<JudgedPair> = pairs
+        let few: Vec<LabelledPair> = pairs
             .iter()
             .filter(|s| s.opposite)
             .take(MIN_PAIRS_OF_A_KIND - 1)
@@ -329,13 +329,13 @@ mod tests {
             .copied()
             .collect();
         assert!(
-            matches!(fit(&few, &p), Err(FitError::TooFew { pairs, .. }) if pairs == MIN_PAIRS_OF_A_KIND - 1)
+            matches!(fit(&few, &p), Err(CueFitError::TooFew { pairs, .. }) if pairs == MIN_PAIRS_OF_A_KIND - 1)
         );
-        assert_eq!(fit(&[], &p), Err(FitError::TooFew { pairs: 0, others: 0 }));
-        let same: Vec<JudgedPair> = pairs.iter().map(|s| JudgedPair { cues: [0.0; 6], ..*s }).collect();
-        assert_eq!(fit(&same, &p), Err(FitError::NothingTells));
+        assert_eq!(fit(&[], &p), Err(CueFitError::TooFew { pairs: 0, others: 0 }));
+        let same: Vec<LabelledPair> = pairs.iter().map(|s| LabelledPair { cues: [0.0; 6], ..*s }).collect();
+        assert_eq!(fit(&same, &p), Err(CueFitError::NothingTells));
         let many = vec![pairs[0]; MAX_PAIRS_FITTED + 1];
-        assert_eq!(fit(&many, &p), Err(FitError::TooMany(MAX_PAIRS_FITTED + 1)));
+        assert_eq!(fit(&many, &p), Err(CueFitError::TooMany(MAX_PAIRS_FITTED + 1)));
     }
 
     #[test]
@@ -372,7 +372,7 @@ mod tests {
         assert!(judge_all(&segments, &found, &labels).len() < found.len());
     }
 
-    fn judge_all(segments: &[EdgeSegment], pairs: &[SegmentPair], others: &[Corners]) -> Vec<JudgedPair> {
+    fn judge_all(segments: &[EdgeSegment], pairs: &[SegmentPair], others: &[Corners]) -> Vec<LabelledPair> {
         judge(segments, pairs, &[], others, 0)
     }
 }

@@ -3,7 +3,7 @@
 use crate::detect::{
     edge_support::{
         gradients::Gradients,
-        side_support::{MAX_SAMPLES, Search},
+        side_support::{EdgeProbeParams, MAX_SAMPLES},
     },
     params::{DetectParams, QuadParams},
     proposals::quad_seed::QuadSeed,
@@ -36,7 +36,7 @@ pub fn quads(segments: &[EdgeSegment], pairs: &[SegmentPair], g: &Gradients, p: 
 /// Refits a seed on the gradient planes. The score is the similarity of its pairs times the support of its worst
 /// side (method 3.6); of three sides, the worst of those that were seen.
 fn quad(seed: &QuadSeed, kind: QuadKind, g: &Gradients, p: &QuadParams) -> Option<Quad> {
-    let search = Search {
+    let search = EdgeProbeParams {
         reach_px: p.refit_reach_px,
         min_step: p.min_step,
         samples: MAX_SAMPLES,

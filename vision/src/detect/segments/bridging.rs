@@ -26,7 +26,7 @@ impl Default for ChainParams {
 
 /// A traced run of pixels, before bridging: row-major indices in a buffer shared by all runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Run {
+pub(crate) struct PixelRun {
     pub(crate) start: usize,
     pub(crate) end: usize,
     pub(crate) closed: bool,
@@ -52,7 +52,7 @@ pub(crate) fn bridged(
     edges: &EdgeMap,
     p: &ChainParams,
     pixels: &[u32],
-    runs: &[Run],
+    runs: &[PixelRun],
     mut emit: impl FnMut(&[u32], bool),
 ) {
     let links = links(edges, p, pixels, runs);
@@ -72,7 +72,7 @@ pub(crate) fn bridged(
             let mut at = entry;
             loop {
                 used[at / 2] = true;
-                let Run { start, end, .. } = runs[at / 2];
+                let PixelRun { start, end, .. } = runs[at / 2];
                 // Two runs that end in one junction share its pixel.
                 let shared = joined.last() == Some(&pixels[if at % 2 == 0 { start } else { end - 1 }]);
                 let skip = usize::from(shared);
@@ -92,7 +92,7 @@ pub(crate) fn bridged(
 }
 
 /// For every end, the end it is joined to.
-fn links(edges: &EdgeMap, p: &ChainParams, pixels: &[u32], runs: &[Run]) -> Vec<Option<usize>> {
+fn links(edges: &EdgeMap, p: &ChainParams, pixels: &[u32], runs: &[PixelRun]) -> Vec<Option<usize>> {
     let ends = ends(edges, pixels, runs);
     let reach = p.max_gap_px.min(MAX_GAP_PX) as i32 + 1;
     let min_cos = p.max_bend_deg.to_radians().cos();
@@ -133,7 +133,7 @@ fn cost(a: &End, b: &End, min_cos: f64) -> Option<f64> {
 }
 
 /// The ends of open runs, sorted by row, then column.
-fn ends(edges: &EdgeMap, pixels: &[u32], runs: &[Run]) -> Vec<End> {
+fn ends(edges: &EdgeMap, pixels: &[u32], runs: &[PixelRun]) -> Vec<End> {
     let width = edges.width();
     let end = |id: usize, tip: usize, base: usize| {
         let (tip, base) = (pixels[tip] as usize, pixels[base] as usize);

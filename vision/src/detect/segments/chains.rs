@@ -8,7 +8,7 @@ use crate::detect::{
         edge_map::EdgeMap,
         thinning::{BRANCHES, EDGE, RING, changing_ring_code, ring_code},
     },
-    segments::bridging::{ChainParams, Run, bridged},
+    segments::bridging::{ChainParams, PixelRun, bridged},
 };
 use nalgebra::{Point2, Vector2};
 
@@ -62,7 +62,7 @@ struct Tracer<'a> {
     /// Edge pixels not yet in a run. Junctions stay free: several runs may end there.
     free: Vec<u8>,
     pixels: Vec<u32>,
-    runs: Vec<Run>,
+    runs: Vec<PixelRun>,
 }
 
 impl<'a> Tracer<'a> {
@@ -76,7 +76,7 @@ impl<'a> Tracer<'a> {
     }
 
     /// From ends, from junctions, then what is left: closed loops.
-    fn trace_all(mut self) -> (Vec<u32>, Vec<Run>) {
+    fn trace_all(mut self) -> (Vec<u32>, Vec<PixelRun>) {
         let mut junctions = Vec::new();
         let all = self.edges.pixels();
         for &at in all {
@@ -126,7 +126,7 @@ impl<'a> Tracer<'a> {
         }
         let end = self.pixels.len();
         if end - start > 1 {
-            self.runs.push(Run { start, end, closed });
+            self.runs.push(PixelRun { start, end, closed });
         } else {
             self.pixels.truncate(start);
         }

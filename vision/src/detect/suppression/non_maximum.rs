@@ -5,7 +5,7 @@
 use crate::{
     detect::{
         border_model::{
-            choose_sides::{Chosen, choose_sides},
+            choose_sides::{SnappedSides, choose_sides},
             quad_classifier::{THING_FEATURES, probability, thing_features},
         },
         edge_support::gradients::Gradients,
@@ -14,7 +14,7 @@ use crate::{
         quad::Quad,
         refine::{
             corners::refine,
-            rating::{Rated, rate_one, rating_search, same},
+            rating::{ScoredQuad, rate_one, rating_search, same},
         },
     },
     geometry::polygon::{self, Relation},
@@ -54,7 +54,7 @@ const SHARED_SIDE_PX: f64 = 4.0;
 ///
 /// Departs from method 3.4: its table of compatible quads is kept (disjoint and nested may stay, crossing may not), but
 /// quads are taken greedily by rank instead of by relaxation over pairs.
-pub fn resolve(rated: Vec<Rated>, p: &QuadParams) -> Vec<Quad> {
+pub fn resolve(rated: Vec<ScoredQuad>, p: &QuadParams) -> Vec<Quad> {
     let mut kept: Vec<Quad> = Vec::new();
     for quad in different(rated, p) {
         if !kept.iter().any(|k| contradict(k.corners_px.points(), quad.corners_px.points())) {
@@ -65,7 +65,7 @@ pub fn resolve(rated: Vec<Rated>, p: &QuadParams) -> Vec<Quad> {
 }
 
 /// The quads by rank, each once, at most [`MAX_RATED`].
-fn different(mut rated: Vec<Rated>, p: &QuadParams) -> Vec<Quad> {
+fn different(mut rated: Vec<ScoredQuad>, p: &QuadParams) -> Vec<Quad> {
     rated.retain(|r| r.quad.score >= p.min_score);
     rated.sort_by(|a, b| {
         b.rank
@@ -94,7 +94,7 @@ fn contradict(a: &[Point2<f64>; 4], b: &[Point2<f64>; 4]) -> bool {
 
 /// A quad with its sides where they look most like a border, and what its score rests on.
 #[derive(Debug, Clone)]
-pub struct Settled {
+pub struct ClassifiedQuad {
     /// The quad; its score is the thing model's probability.
     pub quad: Quad,
     /// See [`thing_features`].
@@ -104,10 +104,10 @@ pub struct Settled {
 /// Moves the sides of the rated quads, by rank, to the lines that look most like borders, and tells how likely they are
 /// things. A quad that contradicts one of at least `sure_probability` is passed over; nothing else stands in its way. All
 /// that were looked at are returned, at most [`MAX_SETTLED`]. The border that a quad had before stays among its alternates.
-pub fn settle(rated: Vec<Rated>, g: &Gradients, p: &QuadParams) -> Vec<Settled> {
+pub fn settle(rated: Vec<ScoredQuad>, g: &Gradients, p: &QuadParams) -> Vec<ClassifiedQuad> {
     let side_model = p.side_network();
     let thing_model = p.thing_network();
-    let mut settled: Vec<Settled> = Vec::new();
+    let mut settled: Vec<ClassifiedQuad> = Vec::new();
     for quad in different(rated, p) {
         // What is much larger than a thing that it holds may yet take its place.
         let taken = |q: &Quad| {
@@ -129,7 +129,7 @@ pub fn settle(rated: Vec<Rated>, g: &Gradients, p: &QuadParams) -> Vec<Settled> 
         };
         let features = thing_features(sides, quad.corners_px.points(), quad.score, (g.width(), g.height()));
         let score = probability(thing_model, &features);
-        settled.push(Settled { quad: Quad { score, ..quad }, features });
+        settled.push(ClassifiedQuad { quad: Quad { score, ..quad }, features });
     }
     settled
 }
@@ -137,9 +137,9 @@ pub fn settle(rated: Vec<Rated>, g: &Gradients, p: &QuadParams) -> Vec<Settled> 
 /// The things among settled quads. Of those that contradict each other the likeliest, of those that are sure the first;
 /// but a quad of which all that it contradicts are parts, no likelier and no better supported, takes their place: a pane
 /// looks like a thing too and comes before its window when that is seen a little worse.
-pub fn things(mut settled: Vec<Settled>, p: &QuadParams) -> Vec<Quad> {
+pub fn things(mut settled: Vec<ClassifiedQuad>, p: &QuadParams) -> Vec<Quad> {
     let mut kept: Vec<Quad> = Vec::new();
-    let likely = |s: &Settled| s.quad.score.min(p.sure_probability);
+    let likely = |s: &ClassifiedQuad| s.quad.score.min(p.sure_probability);
     settled.retain(|s| s.quad.score >= p.min_probability);
     settled.sort_by(|a, b| likely(b).total_cmp(&likely(a)));
     for quad in settled.into_iter().map(|s| s.quad) {
@@ -187,7 +187,7 @@ const SAME_IOU: f64 = 0.8;
 const MOVED_IOU: f64 = 0.4;
 
 /// The quad with its sides where they look most like a border; none if that is no well supported quad.
-fn moved(quad: &Quad, chosen: &Chosen, g: &Gradients, p: &QuadParams) -> Option<Quad> {
+fn moved(quad: &Quad, chosen: &SnappedSides, g: &Gradients, p: &QuadParams) -> Option<Quad> {
     let before = quad.corners_px.points();
     let search = rating_search(p, p.refit_reach_px);
     let rated = rate_one(&refine(g, &chosen.corners_px, search)?, p)?;
@@ -231,7 +231,7 @@ mod tests {
         assert_eq!(settle(rated[..MAX_SETTLED - 1].to_vec(), &g, &p).len(), MAX_SETTLED - 1);
     }
 
-    fn thing([left, top, right, bottom]: [f64; 4], score: f64, support: f64) -> Settled {
+    fn thing([left, top, right, bottom]: [f64; 4], score: f64, support: f64) -> ClassifiedQuad {
         let corners = [[left, top], [right, top], [right, bottom], [left, bottom]];
         let quad = Quad {
             corners_px: Corners::try_from(corners).unwrap(),
@@ -243,7 +243,7 @@ mod tests {
             upright_ambiguous: false,
             alternates: Vec::new(),
         };
-        Settled { quad, features: [0.0; THING_FEATURES] }
+        ClassifiedQuad { quad, features: [0.0; THING_FEATURES] }
     }
 
     fn params() -> QuadParams {
@@ -256,7 +256,7 @@ mod tests {
     fn a_window_takes_the_place_of_its_panes() {
         let panes =
             || vec![thing([20.0, 20.0, 120.0, 90.0], 0.99, 1.0), thing([20.0, 90.0, 120.0, 160.0], 0.9, 1.0)];
-        let kept = |whole: Settled| {
+        let kept = |whole: ClassifiedQuad| {
             let mut all = panes();
             all.push(whole);
             things(all, &params())

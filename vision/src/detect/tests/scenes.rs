@@ -3,7 +3,7 @@
 use crate::{
     detect::{
         detector::{MAX_QUADS, detect, detect_in},
-        edge_buffers::{MAX_SCALES, Memory},
+        edge_buffers::{DetectBuffers, MAX_SCALES},
         params::{DetectParams, Grouping, Nested},
         quad::{Quad, QuadKind},
         tests::fixtures::render,
@@ -163,7 +163,7 @@ fn the_same_image_gives_the_same_quads_bit_for_bit() {
 #[test]
 fn memory_of_earlier_images_changes_nothing() {
     let image = |seed| render(600 - 40 * seed as usize, 420, seed, &scene());
-    let mut memory = Memory::default();
+    let mut memory = DetectBuffers::default();
     for p in [DetectParams::default(), paper()] {
         for image in [image(1), image(3), image(1), image(2)] {
             let quads = detect_in(&mut memory, &image, &p, &mut NoTrace);

@@ -13,7 +13,7 @@ use crate::{
         alignment::{
             align_params::{self, AlignParams, LEVELS},
             goal::{Goal, Levels},
-            sampling_grid::{Lattice, Pattern, Picture, SquareMap, sample, square},
+            sampling_grid::{PaddedIcon, Pattern, SamplingGrid, SquareMap, sample, square},
             settle::{Limits, Settled, settle},
             surroundings::{Surroundings, coarse_size},
         },
@@ -40,7 +40,7 @@ const SETTLED_PX: [f64; LEVELS] = [0.08, 0.08, 0.02];
 
 /// A picture laid on a template.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Laid {
+pub struct Alignment {
     /// Where the template's corners are in the image.
     pub corners_px: Corners,
     /// Their covariances, px^2, as far as the two pictures tell.
@@ -67,7 +67,7 @@ impl<'a> Template<'a> {
 
 /// Where a picture lies after the coarse look.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Glance {
+pub struct CoarseAlignment {
     corners: [Point2<f64>; 4],
     /// Mean squared correlation of the buckets, 0 to 1.
     pub alike: f64,
@@ -75,18 +75,18 @@ pub struct Glance {
 
 /// Where icons of one size are compared at each look. Worked out once, for any number of pictures.
 #[derive(Debug, Clone, Default)]
-pub struct Lattices {
+pub struct SamplingGrids {
     size: usize,
     min_deviation: f32,
-    coarse: Lattice,
-    second: Lattice,
-    last: Lattice,
+    coarse: SamplingGrid,
+    second: SamplingGrid,
+    last: SamplingGrid,
 }
 
-impl Lattices {
+impl SamplingGrids {
     /// For icons of `size`, cut into buckets as `c` says.
     pub fn new(size: usize, c: &CorrelationParams) -> Self {
-        let lattice = |size, border, pattern| Lattice::new(size, c.per_side(), border, pattern);
+        let lattice = |size, border, pattern| SamplingGrid::new(size, c.per_side(), border, pattern);
         Self {
             size,
             min_deviation: c.min_deviation as f32,
@@ -100,23 +100,23 @@ impl Lattices {
 /// How icons are laid on each other.
 #[derive(Debug, Clone, Copy)]
 pub struct Aligner<'a> {
-    on: &'a Lattices,
+    on: &'a SamplingGrids,
     p: &'a AlignParams,
 }
 
 impl<'a> Aligner<'a> {
     /// Compares on `on`.
-    pub fn new(on: &'a Lattices, p: &'a AlignParams) -> Self {
+    pub fn new(on: &'a SamplingGrids, p: &'a AlignParams) -> Self {
         Self { on, p }
     }
 
     /// Lays the picture on `template`. `None` when it is of something else, or says nothing about where it lies.
-    pub fn align(&self, around: &Surroundings<'_>, template: &Template<'_>) -> Option<Laid> {
+    pub fn align(&self, around: &Surroundings<'_>, template: &Template<'_>) -> Option<Alignment> {
         self.finish(around, template, &self.glance(around, template)?)
     }
 
     /// The coarse look. `None` when the picture is of something else.
-    pub fn glance(&self, around: &Surroundings<'_>, template: &Template<'_>) -> Option<Glance> {
+    pub fn glance(&self, around: &Surroundings<'_>, template: &Template<'_>) -> Option<CoarseAlignment> {
         let size = coarse_size(self.on.size);
         if around.icon.size != self.on.size
             || template.icon.size != self.on.size
@@ -134,11 +134,16 @@ impl<'a> Aligner<'a> {
         let scale = self.on.size as f64 / size as f64;
         let corners =
             settled.corners.map(|c| Point2::new((c.x + 0.5) * scale - 0.5, (c.y + 0.5) * scale - 0.5));
-        Some(Glance { corners, alike: settled.alike })
+        Some(CoarseAlignment { corners, alike: settled.alike })
     }
 
     /// The fine looks, from where the coarse one came to.
-    pub fn finish(&self, around: &Surroundings<'_>, template: &Template<'_>, from: &Glance) -> Option<Laid> {
+    pub fn finish(
+        &self,
+        around: &Surroundings<'_>,
+        template: &Template<'_>,
+        from: &CoarseAlignment,
+    ) -> Option<Alignment> {
         let enough = |settled: &Settled, level: usize| settled.alike >= self.p.min_alike[level];
         let second = self.second(around, template, from.corners).filter(|s| enough(s, 1))?;
         let last = self.last(around, template, second.corners).filter(|s| enough(s, 2))?;
@@ -152,7 +157,7 @@ impl<'a> Aligner<'a> {
         let cut = SquareMap::new(size, &corners)?;
         let pixels = dispatch!(Level::new(), _s => whole(&cut, size, around.full()));
         let covariance_px2 = in_image(&corners_px, size, last.covariances);
-        Some(Laid { corners_px, covariance_px2, icon: Icon { size, pixels, source_scale: 1.0 } })
+        Some(Alignment { corners_px, covariance_px2, icon: Icon { size, pixels, source_scale: 1.0 } })
     }
 
     /// The second look, at surroundings that were smoothed whole.
@@ -230,7 +235,7 @@ fn in_image(corners_px: &Corners, size: usize, covariances: Option<[Matrix2<f64>
     reason = "an instruction set holds only in what is inlined where it was chosen"
 )]
 #[inline(always)]
-fn whole(map: &SquareMap, size: usize, picture: Picture<'_>) -> Vec<f32> {
+fn whole(map: &SquareMap, size: usize, picture: PaddedIcon<'_>) -> Vec<f32> {
     let padded = size.next_multiple_of(crate::recognise::features::separable::LANES);
     let x: Vec<f32> = (0..padded).map(|x| x as f32).collect();
     let (mut y, mut row) = (vec![0.0; padded], vec![0.0; padded]);
@@ -261,12 +266,12 @@ mod tests {
     }
 
     /// Lays what `around` shows on `template`.
-    fn aligned(around: &Surroundings<'_>, template: &Icon) -> Option<Laid> {
-        let (on, p) = (Lattices::new(75, &CorrelationParams::default()), AlignParams::default());
+    fn aligned(around: &Surroundings<'_>, template: &Icon) -> Option<Alignment> {
+        let (on, p) = (SamplingGrids::new(75, &CorrelationParams::default()), AlignParams::default());
         Aligner::new(&on, &p).align(around, &Template::new(template, &coarse(template, &p)))
     }
 
-    fn laid(image: &GrayImage, corners: &Corners, template: &Icon) -> Option<Laid> {
+    fn laid(image: &GrayImage, corners: &Corners, template: &Icon) -> Option<Alignment> {
         let icon = cut(image, corners);
         aligned(&Surroundings::new(image, corners, &icon, &AlignParams::default()).unwrap(), template)
     }

@@ -7,7 +7,7 @@
 )]
 
 use crate::recognise::{
-    alignment::sampling_grid::{Cells, Lattice},
+    alignment::sampling_grid::{GridBucket, SamplingGrid},
     features::separable::LANES,
 };
 use nalgebra::{SMatrix, SVector};
@@ -25,7 +25,7 @@ pub(crate) struct Goal<const D: usize> {
 
 #[derive(Debug, Clone)]
 pub(crate) struct Bucket<const D: usize> {
-    pub(crate) cells: Cells,
+    pub(crate) cells: GridBucket,
     /// Products of the slopes.
     pub(crate) normal: SMatrix<f64, D, D>,
     /// Of the slopes with the template's grey levels.
@@ -38,13 +38,13 @@ pub(crate) struct Levels {
     /// Zeros for padding and for buckets with nothing to see.
     values: Vec<f32>,
     /// Buckets in which there is something to see, and what their grey levels were divided by.
-    buckets: Vec<(Cells, f32)>,
+    buckets: Vec<(GridBucket, f32)>,
 }
 
 impl Levels {
     /// Of the smoothed icon `smooth`. A bucket whose grey levels deviate by less than `min_deviation` says nothing.
     #[inline(always)]
-    pub(crate) fn new(lattice: &Lattice, smooth: &[f32], min_deviation: f32) -> Self {
+    pub(crate) fn new(lattice: &SamplingGrid, smooth: &[f32], min_deviation: f32) -> Self {
         let mut values: Vec<f32> = lattice.at.iter().map(|at| smooth[*at as usize]).collect();
         let mut buckets = Vec::with_capacity(lattice.buckets.len());
         for cells in &lattice.buckets {
@@ -84,7 +84,7 @@ fn moved<const D: usize>([gx, gy]: [[f32; LANES]; 2], s: [f32; LANES], t: [f32; 
 impl<const D: usize> Goal<D> {
     /// Of the smoothed icon `smooth`. A bucket whose grey levels deviate by less than `min_deviation` says nothing.
     #[inline(always)]
-    pub(crate) fn new(lattice: &Lattice, smooth: &[f32], min_deviation: f32) -> Self {
+    pub(crate) fn new(lattice: &SamplingGrid, smooth: &[f32], min_deviation: f32) -> Self {
         let levels = Levels::new(lattice, smooth, min_deviation);
         Self::with_slopes(lattice, &levels, &levels, smooth)
     }
@@ -92,18 +92,18 @@ impl<const D: usize> Goal<D> {
     /// `levels` with the slopes of `smooth`, the picture itself as it lies now, instead of the template's: those would
     /// pull where one of the two is softer.
     #[inline(always)]
-    pub(crate) fn with_slopes_of(lattice: &Lattice, levels: &Levels, smooth: &[f32]) -> Self {
+    pub(crate) fn with_slopes_of(lattice: &SamplingGrid, levels: &Levels, smooth: &[f32]) -> Self {
         Self::with_slopes(lattice, levels, &Levels::new(lattice, smooth, 0.0), smooth)
     }
 
     /// Slopes of `smooth`, whose grey levels are `own`.
     #[inline(always)]
-    fn with_slopes(lattice: &Lattice, levels: &Levels, own: &Levels, smooth: &[f32]) -> Self {
+    fn with_slopes(lattice: &SamplingGrid, levels: &Levels, own: &Levels, smooth: &[f32]) -> Self {
         let mut slopes = std::array::from_fn(|_| vec![0.0; lattice.len()]);
         for (cells, norm) in &own.buckets {
             add_slopes(&mut slopes, lattice, smooth, *cells, &own.values, *norm);
         }
-        let of = |(cells, _): &(Cells, f32)| Bucket::new(*cells, &levels.values, &slopes);
+        let of = |(cells, _): &(GridBucket, f32)| Bucket::new(*cells, &levels.values, &slopes);
         let buckets = levels.buckets.iter().map(of).collect();
         Self { values: levels.values.clone(), buckets, slopes }
     }
@@ -113,9 +113,9 @@ impl<const D: usize> Goal<D> {
 #[inline(always)]
 fn add_slopes<const D: usize>(
     slopes: &mut [Vec<f32>; D],
-    lattice: &Lattice,
+    lattice: &SamplingGrid,
     smooth: &[f32],
-    cells: Cells,
+    cells: GridBucket,
     values: &[f32],
     norm: f32,
 ) {
@@ -151,7 +151,7 @@ fn add_slopes<const D: usize>(
 impl<const D: usize> Bucket<D> {
     /// Works out the products.
     #[inline(always)]
-    fn new(cells: Cells, values: &[f32], slopes: &[Vec<f32>; D]) -> Self {
+    fn new(cells: GridBucket, values: &[f32], slopes: &[Vec<f32>; D]) -> Self {
         let part = cells.start..cells.end;
         let mut bucket = Self { cells, normal: SMatrix::zeros(), level: SVector::zeros() };
         for i in 0..D {
@@ -207,7 +207,7 @@ pub(crate) fn dot(a: &[f32], b: &[f32]) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::recognise::alignment::sampling_grid::{Pattern, Picture, SquareMap, sample, square};
+    use crate::recognise::alignment::sampling_grid::{PaddedIcon, Pattern, SquareMap, sample, square};
 
     fn waves(x: i32, y: i32) -> f32 {
         let (x, y) = (f64::from(x), f64::from(y));
@@ -216,13 +216,13 @@ mod tests {
 
     #[test]
     fn slopes_are_the_finite_differences() {
-        let lattice = Lattice::new(75, 5, 4, Pattern::Fourth);
+        let lattice = SamplingGrid::new(75, 5, 4, Pattern::Fourth);
         let pixels: Vec<f32> = (0..75 * 75).map(|i| waves(i % 75, i / 75)).collect();
         let goal = Goal::<8>::new(&lattice, &pixels, 1.0);
         assert_eq!(goal.buckets.len(), 25);
         // The picture with 10 px around, and one corner moved there and back.
         let wide: Vec<f32> = (0..95 * 95).map(|i| waves((i % 95) - 10, (i / 95) - 10)).collect();
-        let picture = Picture { pixels: &wide, width: 95, margin: 10 };
+        let picture = PaddedIcon { pixels: &wide, width: 95, margin: 10 };
         for way in 0..8 {
             let seen = |by: f64| {
                 let mut corners = square(75);
@@ -246,7 +246,7 @@ mod tests {
 
     #[test]
     fn sides_are_sums_of_corners() {
-        let lattice = Lattice::new(25, 5, 1, Pattern::All);
+        let lattice = SamplingGrid::new(25, 5, 1, Pattern::All);
         let pixels: Vec<f32> = (0..625).map(|i| waves(3 * (i % 25), 3 * (i / 25))).collect();
         let (sides, corners) =
             (Goal::<4>::new(&lattice, &pixels, 1.0), Goal::<8>::new(&lattice, &pixels, 1.0));
@@ -260,7 +260,7 @@ mod tests {
 
     #[test]
     fn flat_buckets_say_nothing() {
-        let lattice = Lattice::new(75, 5, 0, Pattern::All);
+        let lattice = SamplingGrid::new(75, 5, 0, Pattern::All);
         let pixels: Vec<f32> =
             (0..75 * 75).map(|i| if i % 75 < 15 { waves(i % 75, i / 75) } else { 80.0 }).collect();
         let goal = Goal::<4>::new(&lattice, &pixels, 1.0);

@@ -27,12 +27,12 @@ pub(crate) enum Pattern {
 
 /// The pixels of all buckets, one bucket after the other, each padded to a multiple of [`LANES`] with its last pixel.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Lattice {
+pub(crate) struct SamplingGrid {
     /// Side of the icon.
     pub(crate) size: usize,
     /// Those without enough points included.
     pub(crate) all_buckets: usize,
-    pub(crate) buckets: Vec<Cells>,
+    pub(crate) buckets: Vec<GridBucket>,
     /// Column, row.
     pub(crate) x: Vec<f32>,
     pub(crate) y: Vec<f32>,
@@ -48,7 +48,7 @@ pub(crate) struct Lattice {
 
 /// One bucket's part of the lattice.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Cells {
+pub(crate) struct GridBucket {
     pub(crate) start: usize,
     /// Padding included.
     pub(crate) end: usize,
@@ -56,7 +56,7 @@ pub(crate) struct Cells {
     pub(crate) count: usize,
 }
 
-impl Lattice {
+impl SamplingGrid {
     /// Of an icon of `size`, cut into `per_side` x `per_side` buckets, without `border` pixels all around.
     pub(crate) fn new(size: usize, per_side: usize, border: usize, pattern: Pattern) -> Self {
         let step = if pattern == Pattern::Fourth { 2 } else { 1 };
@@ -106,7 +106,7 @@ impl Lattice {
             }
         }
         self.real.extend(std::iter::repeat_n(1.0, count).chain(std::iter::repeat_n(0.0, padding)));
-        self.buckets.push(Cells { start, end: self.x.len(), count });
+        self.buckets.push(GridBucket { start, end: self.x.len(), count });
     }
 
     /// Points, padding included.
@@ -117,7 +117,7 @@ impl Lattice {
 
 /// A square of grey levels, `width` wide, with the icon's pixel (0, 0) at (`margin`, `margin`).
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Picture<'a> {
+pub(crate) struct PaddedIcon<'a> {
     pub(crate) pixels: &'a [f32],
     pub(crate) width: usize,
     pub(crate) margin: usize,
@@ -162,8 +162,8 @@ impl SquareMap {
 
 /// Grey levels of `picture` where `map` takes the points (x, y), bilinearly; [`LANES`] at a time.
 #[inline(always)]
-pub(crate) fn sample(picture: Picture<'_>, map: &SquareMap, x: &[f32], y: &[f32], seen: &mut [f32]) {
-    let Picture { pixels, width, margin } = picture;
+pub(crate) fn sample(picture: PaddedIcon<'_>, map: &SquareMap, x: &[f32], y: &[f32], seen: &mut [f32]) {
+    let PaddedIcon { pixels, width, margin } = picture;
     let m = map.0.map(|e| e as f32);
     let (offset, last) = (margin as f32, (width - 1) as f32 - 1e-3);
     let (xs, ys) = (x.as_chunks::<LANES>().0, y.as_chunks::<LANES>().0);
@@ -207,17 +207,17 @@ mod tests {
     #[test]
     fn every_pixel_is_in_one_bucket() {
         for (size, per_side) in [(75, 5), (60, 5), (25, 5), (20, 5), (100, 10)] {
-            let all = Lattice::new(size, per_side, 0, Pattern::All);
+            let all = SamplingGrid::new(size, per_side, 0, Pattern::All);
             assert!(all.buckets.iter().all(|c| (c.end - c.start).is_multiple_of(LANES)));
             let real = all.at.iter().zip(&all.real).filter(|(_, r)| **r > 0.5);
             let mut at: Vec<u32> = real.map(|(at, _)| *at).collect();
             at.sort_unstable();
             assert_eq!(at, (0..(size * size) as u32).collect::<Vec<_>>(), "{size} {per_side}");
         }
-        let half = Lattice::new(75, 5, 2, Pattern::Half);
+        let half = SamplingGrid::new(75, 5, 2, Pattern::Half);
         assert_eq!(half.buckets.iter().map(|c| c.count).sum::<usize>(), 71 * 71 / 2 + 1);
         assert_eq!(
-            Lattice::new(75, 5, 0, Pattern::Fourth).buckets.iter().map(|c| c.count).sum::<usize>(),
+            SamplingGrid::new(75, 5, 0, Pattern::Fourth).buckets.iter().map(|c| c.count).sum::<usize>(),
             40 * 40
         );
     }
@@ -225,7 +225,7 @@ mod tests {
     #[test]
     fn samples_are_bilinear() {
         let pixels: Vec<f32> = (0..100).map(|i| (i % 10) as f32 * 3.0 + (i / 10) as f32 * 7.0).collect();
-        let picture = Picture { pixels: &pixels, width: 10, margin: 2 };
+        let picture = PaddedIcon { pixels: &pixels, width: 10, margin: 2 };
         let map = SquareMap::new(4, &square(4).map(|c| c + nalgebra::Vector2::new(0.25, -0.5))).unwrap();
         let (x, y): (Vec<f32>, Vec<f32>) = (0..16).map(|i| ((i % 4) as f32, (i / 4) as f32)).unzip();
         let mut seen = [0.0; 16];

@@ -9,7 +9,7 @@
 use crate::recognise::alignment::{
     certainty::corner_covariances,
     goal::{Goal, dot},
-    sampling_grid::{Lattice, SquareMap, square},
+    sampling_grid::{SamplingGrid, SquareMap, square},
 };
 use nalgebra::{Const, DimMin, Matrix2, Point2, SMatrix, SVector, Vector2};
 
@@ -47,7 +47,7 @@ pub(crate) struct Limits {
 #[inline(always)]
 pub(crate) fn settle<const D: usize>(
     goal: &Goal<D>,
-    lattice: &Lattice,
+    lattice: &SamplingGrid,
     mut see: impl FnMut(&SquareMap, &mut [f32]),
     start: [Point2<f64>; 4],
     limits: Limits,
@@ -125,7 +125,7 @@ where
     #[inline(always)]
     fn new(
         goal: &Goal<D>,
-        lattice: &Lattice,
+        lattice: &SamplingGrid,
         see: &mut impl FnMut(&SquareMap, &mut [f32]),
         map: &SquareMap,
         least: f64,

@@ -6,7 +6,7 @@ use crate::{
     geometry::{corners::Corners, homography::Homography},
     icon::{Icon, sample_cells},
     recognise::{
-        alignment::{align_params::AlignParams, sampling_grid::Picture},
+        alignment::{align_params::AlignParams, sampling_grid::PaddedIcon},
         features::harris::blurred,
     },
 };
@@ -102,7 +102,7 @@ impl<'a> Surroundings<'a> {
     }
 
     /// The picture of the coarse look.
-    pub(crate) fn coarse(&self, p: &AlignParams) -> Picture<'_> {
+    pub(crate) fn coarse(&self, p: &AlignParams) -> PaddedIcon<'_> {
         let size = coarse_size(self.icon.size);
         let (margin, width) = (self.margins[0], size + 2 * self.margins[0]);
         let pixels = self.coarse.get_or_init(|| {
@@ -113,22 +113,22 @@ impl<'a> Surroundings<'a> {
             let wide = self.framed(&thirds(self.icon), size, margin, map.as_ref());
             blurred(&wide, width, coarse_sigma(self.icon.size, p))
         });
-        Picture { pixels, width, margin }
+        PaddedIcon { pixels, width, margin }
     }
 
     /// The picture as it is.
-    pub(crate) fn full(&self) -> Picture<'_> {
+    pub(crate) fn full(&self) -> PaddedIcon<'_> {
         let (size, margin) = (self.icon.size, self.margins[1]);
         let map = Some(&self.image_from_icon);
         let pixels = self.full.get_or_init(|| self.framed(&self.icon.pixels, size, margin, map));
-        Picture { pixels, width: size + 2 * margin, margin }
+        PaddedIcon { pixels, width: size + 2 * margin, margin }
     }
 
     /// The same, smoothed.
-    pub(crate) fn smooth(&self, sigma: f64) -> Picture<'_> {
+    pub(crate) fn smooth(&self, sigma: f64) -> PaddedIcon<'_> {
         let full = self.full();
         let pixels = self.smooth.get_or_init(|| blurred(full.pixels, full.width, sigma));
-        Picture { pixels, ..full }
+        PaddedIcon { pixels, ..full }
     }
 
     /// `inner` of `size` with `margin` pixels around, from the image or, without a map into one, from its own border.

@@ -18,7 +18,7 @@ use crate::{
     recognise::{
         decision::{
             confidence::{entropy_m, entropy_norm, probability},
-            result::{Candidate, MAX_CANDIDATES, Recognition, Refusal, Verdict},
+            result::{MAX_CANDIDATES, MatchCandidate, MatchRefusal, RecognitionResult, Verdict},
         },
         verification::icon_alignment::{IconAlignment, align_to_icon},
     },
@@ -38,7 +38,12 @@ pub fn log10_false_alarms(evidence: &PointEvidence, landmarks: usize) -> f64 {
 }
 
 /// What points say of `quad`. `None` if they speak for no landmark.
-pub(crate) fn by_points(image: &GrayImage, quad: &Quad, models: &ModelSet, p: &Params) -> Option<Verdict> {
+pub(crate) fn by_points(
+    image: &GrayImage,
+    quad: &Quad,
+    models: &ModelSet,
+    p: &Params,
+) -> Option<RecognitionResult> {
     let of = |index: usize| models.at_point_index(index).map_or(&[][..], |m| m.points.as_slice());
     let n = models.len();
     let (found, rivals): (Vec<Found>, Vec<Found>) =
@@ -57,11 +62,12 @@ pub(crate) fn by_points(image: &GrayImage, quad: &Quad, models: &ModelSet, p: &P
     let is_located = is_detected || is_well_known(&evidence);
     let others = found.iter().skip(1).chain(&rivals);
     let refusal =
-        refusal(best, others, (model, &alignment), n, p).or((!is_located).then_some(Refusal::Corners));
+        refusal(best, others, (model, &alignment), n, p).or((!is_located).then_some(MatchRefusal::Corners));
     let of = |(i, f): (usize, &Found)| {
         let ratio = if alarms[i] < 0.0 { LOG10_EPSILON / alarms[i] } else { f64::INFINITY };
-        let refused = if i == 0 { refusal } else { (alarms[i] > LOG10_EPSILON).then_some(Refusal::Points) };
-        Some(Candidate {
+        let refused =
+            if i == 0 { refusal } else { (alarms[i] > LOG10_EPSILON).then_some(MatchRefusal::Points) };
+        Some(MatchCandidate {
             landmark: models.at(f.model)?.id,
             correlation: 2.0,
             hausdorff: f64::INFINITY,
@@ -74,8 +80,8 @@ pub(crate) fn by_points(image: &GrayImage, quad: &Quad, models: &ModelSet, p: &P
         })
     };
     let sure = refusal.is_none();
-    Some(Verdict {
-        recognition: if sure { Recognition::Unique(model.id) } else { Recognition::Ambiguous(model.id) },
+    Some(RecognitionResult {
+        recognition: if sure { Verdict::Unique(model.id) } else { Verdict::Ambiguous(model.id) },
         candidates: found.iter().enumerate().filter_map(of).take(MAX_CANDIDATES).collect(),
         entropy_m: entropy_m(accepted, n),
         entropy_norm: entropy_norm(accepted, n),
@@ -106,9 +112,9 @@ fn refusal<'a>(
     (model, alignment): (&LandmarkModel, &IconAlignment),
     landmarks: usize,
     p: &Params,
-) -> Option<Refusal> {
+) -> Option<MatchRefusal> {
     if is_doubtful(&best.evidence, alignment) {
-        return Some(Refusal::Disagreement);
+        return Some(MatchRefusal::Disagreement);
     }
     // Its share of the best one's exponent says how much was taught of a rival, not whether it hangs there: a look-alike
     // that was taught with fewer points agrees wherever it has any.
@@ -118,11 +124,11 @@ fn refusal<'a>(
         alarms(f) / alarms(best) >= p.recognise.verdict.margin || (accepted && !is_contradicted(f))
     };
     if others.any(is_rival) {
-        return Some(Refusal::Margin);
+        return Some(MatchRefusal::Margin);
     }
     // Where the image does not show all of it there is no likeness.
     let is_like = alignment.likeness.is_none_or(|l| 1.0 - l < model.likeness.tau);
-    (has_double(model, p) && !is_like).then_some(Refusal::Likeness)
+    (has_double(model, p) && !is_like).then_some(MatchRefusal::Likeness)
 }
 
 /// Something of the map is nearer to it than what is accepted where nothing is like it: to be told from that by points

@@ -5,7 +5,7 @@ use crate::recognise::{
     decision::{
         confidence_weights,
         measures::{MEASURES, measures},
-        result::Candidate,
+        result::MatchCandidate,
     },
     distance_kind::DistanceKind,
 };
@@ -28,7 +28,7 @@ pub fn probability(is_accepted: bool, accepted: usize) -> f64 {
 /// Chance that the identity of candidate `best` is right: a logistic curve over [`measures`], fitted to answers whose truth
 /// is known (`waymark-lab train confidence`), by the distance that decides. It never rises with any measure. How well it keeps
 /// its word is in docs/EVALUATION.md. 0 without such a candidate.
-pub fn confidence(candidates: &[Candidate], best: usize, landmarks: usize, kind: DistanceKind) -> f64 {
+pub fn confidence(candidates: &[MatchCandidate], best: usize, landmarks: usize, kind: DistanceKind) -> f64 {
     let weights = match kind {
         DistanceKind::Both => &confidence_weights::BOTH,
         DistanceKind::Correlation => &confidence_weights::CORRELATION,
@@ -78,8 +78,8 @@ mod tests {
         }
     }
 
-    fn candidate(ratio: f64, correlation: f64, hausdorff: f64) -> Candidate {
-        Candidate {
+    fn candidate(ratio: f64, correlation: f64, hausdorff: f64) -> MatchCandidate {
+        MatchCandidate {
             landmark: LandmarkId(1),
             correlation,
             hausdorff,

@@ -1,6 +1,6 @@
 //! One landmark, asked for where its corners are expected, whatever was detected there.
 //!
-//! In: an image, the landmark's model, its expected corners. Out: [`Found`]: its corners with covariance and how much the
+//! In: an image, the landmark's model, its expected corners. Out: [`ExpectedLandmark`]: its corners with covariance and how much the
 //! picture speaks for it, or nothing. Points find it also where the image border cuts it or something hides a part of it;
 //! where they say nothing it is laid on its icon, and must be in view as a whole.
 
@@ -14,7 +14,7 @@ use crate::{
     recognise::{
         decision::{
             by_points::{is_doubtful, is_well_known},
-            result::Recognition,
+            result::Verdict,
             verdict::recognise,
         },
         distance_kind::DistanceKind,
@@ -32,7 +32,7 @@ pub const ACCEPTED_NATS: f64 = 6.9;
 
 /// A landmark found where it was expected.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Found {
+pub struct ExpectedLandmark {
     /// Its corners, TL first; outside of the image where its border cuts it.
     pub corners_px: Corners,
     /// Their covariances, px^2.
@@ -46,7 +46,7 @@ pub struct Found {
 /// What points say of an expected landmark.
 enum Said {
     /// It is there.
-    Found(Box<Found>),
+    Found(Box<ExpectedLandmark>),
     /// Its points are there while a part of it shows something else.
     Doubtful,
     /// Nothing.
@@ -60,7 +60,7 @@ pub fn expected(
     id: LandmarkId,
     models: &ModelSet,
     p: &Params,
-) -> Option<Found> {
+) -> Option<ExpectedLandmark> {
     let is_whole = expected_px.points().iter().all(|c| is_inside(image, c));
     match by_points(image, expected_px, (id, is_whole), models, p) {
         Said::Found(found) => Some(*found),
@@ -93,7 +93,7 @@ fn by_points(
     if !is_well_known(&evidence) {
         return Said::Silent;
     }
-    Said::Found(Box::new(Found {
+    Said::Found(Box::new(ExpectedLandmark {
         corners_px: evidence.corners_px,
         covariance_px2: evidence.corner_covariance_px2,
         picture_nats: -evidence.log10_nfa * std::f64::consts::LN_10,
@@ -107,16 +107,16 @@ fn by_icon(
     id: LandmarkId,
     models: &ModelSet,
     p: &Params,
-) -> Option<Found> {
+) -> Option<ExpectedLandmark> {
     // Points had their say.
     let mut by_icons = p.clone();
     by_icons.recognise.verdict.points = false;
     let verdict = recognise(image, &as_quad(expected_px), &models.only(id)?, DistanceKind::Both, &by_icons);
-    let (Recognition::Unique(_), Some(corners_px)) = (verdict.recognition, verdict.aligned_px) else {
+    let (Verdict::Unique(_), Some(corners_px)) = (verdict.recognition, verdict.aligned_px) else {
         return None;
     };
     let covariance_px2 = aligned_covariance_px2(&corners_px, p.icon.size);
-    Some(Found { corners_px, covariance_px2, picture_nats: ACCEPTED_NATS, points: None })
+    Some(ExpectedLandmark { corners_px, covariance_px2, picture_nats: ACCEPTED_NATS, points: None })
 }
 
 fn is_inside(image: &GrayImage, c: &Point2<f64>) -> bool {

@@ -3,14 +3,14 @@
 use crate::{
     detect::quad::Quad,
     params::Params,
-    recognise::decision::result::Verdict,
+    recognise::decision::result::RecognitionResult,
     seen_border::{ALIGNED_SIGMA_ICON_PX, FoundBy, SeenBorder, is_same_border},
 };
 use nalgebra::Matrix2;
 
 /// The landmark's border: as detected, or, where another border of the same thing was taught than the one detected, as
 /// aligned. An alternate border has no covariances of its own: the quad's stand in, both were found by the same edges.
-pub fn matched_border(quad: &Quad, verdict: &Verdict, p: &Params) -> Option<SeenBorder> {
+pub fn matched_border(quad: &Quad, verdict: &RecognitionResult, p: &Params) -> Option<SeenBorder> {
     let detected_px = match verdict.border {
         0 => &quad.corners_px,
         border => quad.alternates.get(border - 1)?,

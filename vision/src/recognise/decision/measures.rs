@@ -1,6 +1,6 @@
 //! Match candidates in, the measures that the confidence of an identity rests on out.
 
-use crate::recognise::decision::result::Candidate;
+use crate::recognise::decision::result::MatchCandidate;
 
 /// Distances are measured up to here, as no distance is as bad as a large one.
 pub(crate) const FAR: f64 = 2.0;
@@ -14,7 +14,7 @@ pub const MEASURES: usize = 7;
 /// What a verdict knows for and against its candidate `best`, each the worse the larger, all within 0 to 2: D/tau and its
 /// square, the share of it in the next best's and its square, C^r, H^r, and how many landmarks there were to err with.
 /// `None` if there is no such candidate.
-pub fn measures(candidates: &[Candidate], best: usize, landmarks: usize) -> Option<[f64; MEASURES]> {
+pub fn measures(candidates: &[MatchCandidate], best: usize, landmarks: usize) -> Option<[f64; MEASURES]> {
     let answer = candidates.get(best)?;
     let others = candidates.iter().enumerate().filter(|(i, _)| *i != best);
     let next = others.map(|(_, c)| c.ratio).fold(f64::INFINITY, f64::min);

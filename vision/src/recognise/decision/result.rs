@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 /// Why a candidate was refused although it was looked at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Refusal {
+pub enum MatchRefusal {
     /// C^r is not below tau.
     Correlation,
     /// H^r is not below tau.
@@ -31,7 +31,7 @@ pub enum Refusal {
 
 /// A landmark compared with one icon.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Candidate {
+pub struct MatchCandidate {
     /// The landmark.
     pub landmark: LandmarkId,
     /// C^r in [0, 2] (method 6.1): to the nearest exemplar, or, where the likeness refuses already, where the quad was
@@ -53,12 +53,12 @@ pub struct Candidate {
     /// `P(C_l | Q)` of method 10.
     pub probability: f64,
     /// The gate that refused it, if one did.
-    pub refusal: Option<Refusal>,
+    pub refusal: Option<MatchRefusal>,
 }
 
 /// The paper's three cases. "Unknown" is an answer, not a failure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Recognition {
+pub enum Verdict {
     /// No landmark of the map.
     Unknown,
     /// Exactly this landmark: fit for a pose.
@@ -69,11 +69,11 @@ pub enum Recognition {
 
 /// What recognition says of one icon.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Verdict {
+pub struct RecognitionResult {
     /// The answer.
-    pub recognition: Recognition,
+    pub recognition: Verdict,
     /// Nearest landmarks by increasing ratio, at most [`MAX_CANDIDATES`]; refused ones included.
-    pub candidates: Vec<Candidate>,
+    pub candidates: Vec<MatchCandidate>,
     /// The paper's m with the printed 1/(N+1), natural logarithm (method 10). Never a gate.
     pub entropy_m: f64,
     /// 1 - ln K / ln(N+1), in (0, 1].

@@ -11,15 +11,15 @@ use crate::{
         decision::{
             by_points::by_points,
             confidence::{confidence, entropy_m, entropy_norm, probability},
-            result::{Candidate, MAX_CANDIDATES, Recognition, Refusal, Verdict},
+            result::{MAX_CANDIDATES, MatchCandidate, MatchRefusal, RecognitionResult, Verdict},
         },
         distance_kind::DistanceKind,
         params::VerdictParams,
-        retrieval::nearest::{Near, Sighting, nearest, short_list, sightings},
-        step_listener::{NoWatch, Step, Watch},
+        retrieval::nearest::{NearLandmark, QuadReading, nearest, short_list, sightings},
+        step_listener::{NoListener, RecogniseStep, StepListener},
         verification::{
             content::Content,
-            short_list::{Judged, look, verify},
+            short_list::{VerifiedLandmark, look, verify},
         },
     },
 };
@@ -31,8 +31,8 @@ pub fn recognise(
     models: &ModelSet,
     kind: DistanceKind,
     p: &Params,
-) -> Verdict {
-    recognise_watched(image, quad, models, kind, p, &mut NoWatch)
+) -> RecognitionResult {
+    recognise_watched(image, quad, models, kind, p, &mut NoListener)
 }
 
 /// The same, and `watch` is told of every step.
@@ -42,47 +42,47 @@ pub fn recognise_watched(
     models: &ModelSet,
     kind: DistanceKind,
     p: &Params,
-    watch: &mut impl Watch,
-) -> Verdict {
+    watch: &mut impl StepListener,
+) -> RecognitionResult {
     if models.is_empty() || models.params_hash() != p.distance_hash() {
         return unknown(models.len());
     }
     if kind == DistanceKind::Both && p.recognise.verdict.points {
         let said = by_points(image, quad, models, p);
-        watch.finished(Step::Points);
+        watch.finished(RecogniseStep::Points);
         if let Some(verdict) = said {
             return verdict;
         }
     }
     let sightings = sightings(image, quad, p);
-    watch.finished(Step::Icons);
+    watch.finished(RecogniseStep::Icons);
     let near = match kind {
         DistanceKind::Both => short_list(&sightings, models, p.recognise.verdict.short_list),
         DistanceKind::Correlation | DistanceKind::Hausdorff => {
             nearest(&sightings, models, kind, MAX_CANDIDATES, p)
         }
     };
-    watch.finished(Step::ShortList);
-    let mut found: Vec<Judged> = near
+    watch.finished(RecogniseStep::ShortList);
+    let mut found: Vec<VerifiedLandmark> = near
         .into_iter()
-        .map(|near| Judged { near, moved: None, contradicting: 0.0, content: Content::NONE })
+        .map(|near| VerifiedLandmark { near, moved: None, contradicting: 0.0, content: Content::NONE })
         .collect();
     match kind {
         DistanceKind::Both => look(image, &sightings, &mut found, models.lattices(), p, watch),
         DistanceKind::Correlation | DistanceKind::Hausdorff => {
             verify(image, &sightings, &mut found, kind, models.lattices(), p);
-            watch.finished(Step::Alignment);
+            watch.finished(RecogniseStep::Alignment);
         }
     }
     let verdict = decide(&found, &sightings, kind, models.len(), &p.recognise.verdict);
-    watch.finished(Step::Decision);
+    watch.finished(RecogniseStep::Decision);
     verdict
 }
 
 /// No landmark, no candidate.
-fn unknown(landmarks: usize) -> Verdict {
-    Verdict {
-        recognition: Recognition::Unknown,
+fn unknown(landmarks: usize) -> RecognitionResult {
+    RecognitionResult {
+        recognition: Verdict::Unknown,
         candidates: Vec::new(),
         entropy_m: 1.0,
         entropy_norm: 1.0,
@@ -97,14 +97,14 @@ fn unknown(landmarks: usize) -> Verdict {
 
 /// Thresholds, margin, probabilities: the paper's three cases.
 fn decide(
-    found: &[Judged],
-    sightings: &[Sighting],
+    found: &[VerifiedLandmark],
+    sightings: &[QuadReading],
     kind: DistanceKind,
     landmarks: usize,
     p: &VerdictParams,
-) -> Verdict {
+) -> RecognitionResult {
     let share = if kind == DistanceKind::Both { p.tau_share(landmarks) } else { 1.0 };
-    let refusals: Vec<Option<Refusal>> = found.iter().map(|j| j.refusal(kind, share, p)).collect();
+    let refusals: Vec<Option<MatchRefusal>> = found.iter().map(|j| j.refusal(kind, share, p)).collect();
     let accepted = refusals.iter().filter(|r| r.is_none()).count();
     let mut verdict = unknown(landmarks);
     verdict.entropy_m = entropy_m(accepted, landmarks);
@@ -123,16 +123,16 @@ fn decide(
     // Departs from method 10, which asks for a margin only where two or more are accepted: a runner-up just above its
     // own threshold is as much reason for doubt as one just below.
     let refusal = if margin >= p.margin {
-        Some(Refusal::Margin)
+        Some(MatchRefusal::Margin)
     } else {
-        (kind == DistanceKind::Both && p.points).then_some(Refusal::Plain)
+        (kind == DistanceKind::Both && p.points).then_some(MatchRefusal::Plain)
     };
     if refusal.is_none() {
-        verdict.recognition = Recognition::Unique(near.model.id);
+        verdict.recognition = Verdict::Unique(near.model.id);
         verdict.confidence = confidence(&verdict.candidates, best, landmarks, kind);
         return verdict;
     }
-    verdict.recognition = Recognition::Ambiguous(near.model.id);
+    verdict.recognition = Verdict::Ambiguous(near.model.id);
     if let Some(c) = verdict.candidates.get_mut(best) {
         c.refusal = refusal;
     }
@@ -140,34 +140,34 @@ fn decide(
 }
 
 /// The ratio of `best` over that of the nearest other landmark. 0 when there is no other landmark, 1 when the others have no distance to compare with.
-fn margin(found: &[Judged], best: usize, kind: DistanceKind) -> f64 {
+fn margin(found: &[VerifiedLandmark], best: usize, kind: DistanceKind) -> f64 {
     if found.len() < 2 {
         return 0.0;
     }
-    let over = |ratio: &dyn Fn(&Near) -> f64| {
+    let over = |ratio: &dyn Fn(&NearLandmark) -> f64| {
         let others = found.iter().enumerate().filter(|(i, _)| *i != best);
         let runner_up = others.map(|(_, j)| ratio(&j.near)).fold(f64::INFINITY, f64::min);
         if runner_up.is_finite() { ratio(&found[best].near) / runner_up } else { 1.0 }
     };
     match kind {
-        DistanceKind::Correlation => over(&Near::correlation_ratio),
-        DistanceKind::Hausdorff => over(&Near::hausdorff_ratio),
+        DistanceKind::Correlation => over(&NearLandmark::correlation_ratio),
+        DistanceKind::Hausdorff => over(&NearLandmark::hausdorff_ratio),
         DistanceKind::Both => over(&|near| near.ratio(kind)),
     }
 }
 
 fn candidate(
-    near: &Near,
-    refusal: Option<Refusal>,
+    near: &NearLandmark,
+    refusal: Option<MatchRefusal>,
     accepted: usize,
     (kind, share): (DistanceKind, f64),
-) -> Candidate {
+) -> MatchCandidate {
     let (distance, tau) = match kind {
         DistanceKind::Hausdorff => (near.hausdorff, near.model.hausdorff.tau),
         DistanceKind::Correlation => (near.correlation, near.model.correlation.tau),
         DistanceKind::Both => (1.0 - near.likeness.unwrap_or(-1.0), near.model.likeness.tau),
     };
-    Candidate {
+    MatchCandidate {
         landmark: near.model.id,
         correlation: near.correlation,
         hausdorff: near.hausdorff,

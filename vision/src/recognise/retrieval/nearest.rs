@@ -29,7 +29,7 @@ pub const MAX_BORDERS: usize = 6;
 
 /// One way to read a quad: which border, which corner is top-left.
 #[derive(Debug, Clone)]
-pub(crate) struct Sighting {
+pub(crate) struct QuadReading {
     /// 0 for the quad's corners, i for alternate i - 1.
     pub(crate) border: usize,
     /// Which corner of the quad is the icon's top-left.
@@ -44,7 +44,7 @@ pub(crate) struct Sighting {
     points: OnceCell<PointSet>,
 }
 
-impl Sighting {
+impl QuadReading {
     fn new(border: usize, rotation: usize, corners_px: Corners, icon: Icon) -> Self {
         let signature = Signature::new(&icon);
         let (buckets, points) = (OnceCell::new(), OnceCell::new());
@@ -64,7 +64,7 @@ impl Sighting {
 }
 
 /// Every reading of `quad` whose icon can be cut: all borders, and all four rotations where upright is unsure.
-pub(crate) fn sightings(image: &GrayImage, quad: &Quad, p: &Params) -> Vec<Sighting> {
+pub(crate) fn sightings(image: &GrayImage, quad: &Quad, p: &Params) -> Vec<QuadReading> {
     let borders = std::iter::once(&quad.corners_px).chain(&quad.alternates).take(MAX_BORDERS);
     let rotations = if quad.upright_ambiguous { 4 } else { 1 };
     let mut all = Vec::new();
@@ -72,7 +72,7 @@ pub(crate) fn sightings(image: &GrayImage, quad: &Quad, p: &Params) -> Vec<Sight
         let Ok(upright) = icon(image, corners_px, &p.icon) else { continue };
         for rotation in 0..rotations {
             let corners_px = corners_px.rotated(rotation);
-            all.push(Sighting::new(border, rotation, corners_px, upright.rotated(rotation)));
+            all.push(QuadReading::new(border, rotation, corners_px, upright.rotated(rotation)));
         }
     }
     all
@@ -80,7 +80,7 @@ pub(crate) fn sightings(image: &GrayImage, quad: &Quad, p: &Params) -> Vec<Sight
 
 /// A landmark near one sighting.
 #[derive(Debug, Clone)]
-pub(crate) struct Near {
+pub(crate) struct NearLandmark {
     pub(crate) model: Arc<LandmarkModel>,
     /// Index of the sighting.
     pub(crate) sighting: usize,
@@ -94,7 +94,7 @@ pub(crate) struct Near {
     pub(crate) signature: f32,
 }
 
-impl Near {
+impl NearLandmark {
     /// C^r over its tau.
     pub(crate) fn correlation_ratio(&self) -> f64 {
         ratio(self.correlation, self.model.correlation.tau)
@@ -124,19 +124,19 @@ fn ratio(distance: f64, tau: f64) -> f64 {
 
 /// The `count` landmarks whose signatures are most like one of the sightings', best first, each with its best sighting;
 /// of equal ones the lower id. Distances are left at their worst.
-pub(crate) fn short_list(sightings: &[Sighting], models: &ModelSet, count: usize) -> Vec<Near> {
+pub(crate) fn short_list(sightings: &[QuadReading], models: &ModelSet, count: usize) -> Vec<NearLandmark> {
     let mut found: Vec<(usize, Listed)> = Vec::new();
     for (i, sighting) in sightings.iter().enumerate() {
         found.extend(models.short_list(&sighting.signature, count).into_iter().map(|l| (i, l)));
     }
     found.sort_by(|a, b| b.1.likeness.total_cmp(&a.1.likeness).then((a.1.model, a.0).cmp(&(b.1.model, b.0))));
-    let mut near: Vec<Near> = Vec::new();
+    let mut near: Vec<NearLandmark> = Vec::new();
     for (sighting, listed) in found {
         let Some(model) = models.at(listed.model) else { continue };
         if near.len() == count || near.iter().any(|n| n.model.id == model.id) {
             continue;
         }
-        near.push(Near {
+        near.push(NearLandmark {
             model: Arc::clone(model),
             sighting,
             exemplar: listed.exemplar,
@@ -153,7 +153,7 @@ pub(crate) fn short_list(sightings: &[Sighting], models: &ModelSet, count: usize
 const WORST_CORRELATION: f64 = 2.0;
 
 /// C^r where the quad was found, to the exemplar that is nearest by its signature.
-pub(crate) fn correlation_as_found(near: &Near, sightings: &[Sighting], p: &Params) -> f64 {
+pub(crate) fn correlation_as_found(near: &NearLandmark, sightings: &[QuadReading], p: &Params) -> f64 {
     let (Some(sighting), Some(exemplar)) =
         (sightings.get(near.sighting), near.model.exemplars.get(near.exemplar))
     else {
@@ -167,13 +167,13 @@ pub(crate) fn correlation_as_found(near: &Near, sightings: &[Sighting], p: &Para
 /// The `count` landmarks of least ratio by one of the paper's distances, and every one with a ratio below 1, rising; of
 /// equal ones the lower id. Where C^r decides and nothing comes within `verify_reach`, H^r is left infinite.
 pub(crate) fn nearest(
-    sightings: &[Sighting],
+    sightings: &[QuadReading],
     models: &ModelSet,
     kind: DistanceKind,
     count: usize,
     p: &Params,
-) -> Vec<Near> {
-    let mut found: Vec<Near> = Vec::new();
+) -> Vec<NearLandmark> {
+    let mut found: Vec<NearLandmark> = Vec::new();
     let mut ratios: Vec<f64> = Vec::new();
     // What is further than the worst of the best `count` so far cannot be among them.
     let mut reach = f64::INFINITY;
@@ -208,11 +208,11 @@ pub(crate) fn nearest(
 
 /// Least C^r over sightings and exemplars, unless its ratio is above `reach`.
 fn nearest_by_correlation(
-    sightings: &[Sighting],
+    sightings: &[QuadReading],
     model: &Arc<LandmarkModel>,
     reach: f64,
     p: &Params,
-) -> Option<Near> {
+) -> Option<NearLandmark> {
     let tau = model.correlation.tau;
     if tau <= 0.0 {
         return None;
@@ -228,7 +228,7 @@ fn nearest_by_correlation(
             }
         }
     }
-    best.map(|(sighting, exemplar, correlation)| Near {
+    best.map(|(sighting, exemplar, correlation)| NearLandmark {
         model: Arc::clone(model),
         sighting,
         exemplar,
@@ -240,7 +240,11 @@ fn nearest_by_correlation(
 }
 
 /// Least H^r over sightings and exemplars.
-fn nearest_by_points(sightings: &[Sighting], model: &Arc<LandmarkModel>, p: &Params) -> Option<Near> {
+fn nearest_by_points(
+    sightings: &[QuadReading],
+    model: &Arc<LandmarkModel>,
+    p: &Params,
+) -> Option<NearLandmark> {
     let mut best: Option<(usize, usize, f64)> = None;
     for (sighting, s) in sightings.iter().enumerate() {
         let (d, exemplar) = least_hausdorff(s.points(p), model, p);
@@ -256,7 +260,7 @@ fn nearest_by_points(sightings: &[Sighting], model: &Arc<LandmarkModel>, p: &Par
         .iter()
         .filter_map(|e| correlation_within(buckets, e.buckets(&p.recognise), rank, f64::INFINITY))
         .fold(2.0, f64::min);
-    Some(Near {
+    Some(NearLandmark {
         model: Arc::clone(model),
         sighting,
         exemplar,

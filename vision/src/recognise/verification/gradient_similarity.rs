@@ -48,7 +48,7 @@ impl Smoothed {
 
 /// How two icons compare.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Alike {
+pub struct IconComparison {
     /// Mean over the buckets of the correlation of their slopes, -1 to 1; 0 where both are flat, or cut differently.
     pub likeness: f64,
     /// Share of the buckets in which both show something, and not the same, 0 to 1. What stands plain before a picture
@@ -63,24 +63,24 @@ const SHOWS_SHARE: f32 = 0.1;
 const SHOWS_LEAST: f32 = 10.0;
 
 /// Compares two icons of the same thing.
-pub fn alike(a: &Icon, b: &Icon, p: &CorrelationParams) -> Alike {
+pub fn alike(a: &Icon, b: &Icon, p: &CorrelationParams) -> IconComparison {
     between(&Smoothed::new(a), &Smoothed::new(b), p)
 }
 
-/// How alike two icons are, see [`Alike::likeness`].
+/// How alike two icons are, see [`IconComparison::likeness`].
 pub fn likeness(a: &Icon, b: &Icon, p: &CorrelationParams) -> f64 {
     alike(a, b, p).likeness
 }
 
 /// The same as [`alike`] of smoothed icons.
-pub fn between(a: &Smoothed, b: &Smoothed, p: &CorrelationParams) -> Alike {
-    let Some(buckets) = compare(a, b, p) else { return Alike { likeness: 0.0, contradicting: 0.0 } };
+pub fn between(a: &Smoothed, b: &Smoothed, p: &CorrelationParams) -> IconComparison {
+    let Some(buckets) = compare(a, b, p) else { return IconComparison { likeness: 0.0, contradicting: 0.0 } };
     let count = buckets.len() as f64;
     let mean = |power: fn(&Bucket) -> f32| buckets.iter().map(power).sum::<f32>() / count as f32;
     let (mean, other_mean) = (mean(|b| b.power), mean(|b| b.other_power));
     let contradicts =
         |b: &&Bucket| b.correlation < CONTRADICTS && shows(b.power, mean) && shows(b.other_power, other_mean);
-    Alike {
+    IconComparison {
         likeness: buckets.iter().map(|b| f64::from(b.correlation)).sum::<f64>() / count,
         contradicting: buckets.iter().filter(contradicts).count() as f64 / count,
     }

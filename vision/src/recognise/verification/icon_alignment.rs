@@ -10,7 +10,7 @@ use crate::{
     points::verify::PointEvidence,
     recognise::{
         alignment::{
-            aligner::{Aligner, Laid, Template},
+            aligner::{Aligner, Alignment, Template},
             surroundings::Surroundings,
         },
         features::signature::{Signature, likeness},
@@ -95,7 +95,7 @@ fn aligned(
     start_px: &Corners,
     (model, models): (&LandmarkModel, &ModelSet),
     p: &Params,
-) -> Option<(Laid, Smoothed)> {
+) -> Option<(Alignment, Smoothed)> {
     let align = &p.recognise.verdict.align;
     let icon = rectify(image, start_px, &p.icon).ok()?;
     let signature = Signature::new(&icon);

@@ -9,10 +9,10 @@ use crate::{
     params::Params,
     recognise::{
         alignment::{
-            aligner::{Aligner, Lattices, Template},
+            aligner::{Aligner, SamplingGrids, Template},
             surroundings::Surroundings,
         },
-        decision::result::{MAX_CANDIDATES, Refusal},
+        decision::result::{MAX_CANDIDATES, MatchRefusal},
         distance_kind::DistanceKind,
         features::{
             correlation::{Buckets, CorrelationParams, correlation},
@@ -20,8 +20,8 @@ use crate::{
             harris::harris,
         },
         params::VerdictParams,
-        retrieval::nearest::{Near, Sighting, correlation_as_found, least_hausdorff},
-        step_listener::{Step, Watch},
+        retrieval::nearest::{NearLandmark, QuadReading, correlation_as_found, least_hausdorff},
+        step_listener::{RecogniseStep, StepListener},
         verification::{
             content::{Content, content},
             gradient_similarity::{Smoothed, between},
@@ -30,8 +30,8 @@ use crate::{
 };
 
 /// A near landmark, with or without alignment.
-pub(crate) struct Judged {
-    pub(crate) near: Near,
+pub(crate) struct VerifiedLandmark {
+    pub(crate) near: NearLandmark,
     /// Where alignment moved the corners, if the distances are those after it.
     pub(crate) moved: Option<Corners>,
     /// Share of the buckets that contradict after alignment, 0 to 1.
@@ -40,10 +40,10 @@ pub(crate) struct Judged {
     pub(crate) content: Content,
 }
 
-impl Judged {
+impl VerifiedLandmark {
     /// The first gate that refuses it.
     /// `share` of the likeness's tau is what a map of this size leaves.
-    pub(crate) fn refusal(&self, kind: DistanceKind, share: f64, p: &VerdictParams) -> Option<Refusal> {
+    pub(crate) fn refusal(&self, kind: DistanceKind, share: f64, p: &VerdictParams) -> Option<MatchRefusal> {
         // The corners were moved to please the landmark, but for Both, whose tau was learnt after such moves.
         let limit = if self.moved.is_some() { p.verified_share } else { 1.0 };
         // Written so that a NaN refuses.
@@ -57,13 +57,15 @@ impl Judged {
         let sure = agrees(p.sure_content_likeness, p.sure_content);
         let by_points = p.points && self.near.model.points.len() > p.max_icon_points;
         match kind {
-            DistanceKind::Both if by_points => Some(Refusal::Points),
-            DistanceKind::Correlation => (!correlation).then_some(Refusal::Correlation),
-            DistanceKind::Hausdorff => (!hausdorff).then_some(Refusal::Hausdorff),
-            DistanceKind::Both if !below(self.near.ratio(kind), share) => Some(Refusal::Likeness),
-            DistanceKind::Both if doubtful && contradicted => Some(Refusal::Contradiction),
-            DistanceKind::Both if !agrees(p.min_content_likeness, p.min_content) => Some(Refusal::Content),
-            DistanceKind::Both => (!correlation && !hausdorff && !sure).then_some(Refusal::Correlation),
+            DistanceKind::Both if by_points => Some(MatchRefusal::Points),
+            DistanceKind::Correlation => (!correlation).then_some(MatchRefusal::Correlation),
+            DistanceKind::Hausdorff => (!hausdorff).then_some(MatchRefusal::Hausdorff),
+            DistanceKind::Both if !below(self.near.ratio(kind), share) => Some(MatchRefusal::Likeness),
+            DistanceKind::Both if doubtful && contradicted => Some(MatchRefusal::Contradiction),
+            DistanceKind::Both if !agrees(p.min_content_likeness, p.min_content) => {
+                Some(MatchRefusal::Content)
+            }
+            DistanceKind::Both => (!correlation && !hausdorff && !sure).then_some(MatchRefusal::Correlation),
         }
     }
 }
@@ -72,17 +74,17 @@ impl Judged {
 /// those of the picture where it came to lie. What a glance tells to be something else gets no further look.
 pub(crate) fn look(
     image: &GrayImage,
-    sightings: &[Sighting],
-    found: &mut [Judged],
-    on: &Lattices,
+    sightings: &[QuadReading],
+    found: &mut [VerifiedLandmark],
+    on: &SamplingGrids,
     p: &Params,
-    watch: &mut impl Watch,
+    watch: &mut impl StepListener,
 ) {
     let (c, v) = (&p.recognise.correlation, &p.recognise.verdict);
     let aligner = Aligner::new(on, &v.align);
     let mut surroundings: Vec<Option<Option<Surroundings<'_>>>> = sightings.iter().map(|_| None).collect();
     let least = found.first().map_or(0.0, |f| f.near.signature - v.signature_gap).max(v.min_signature);
-    for Judged { near, moved, contradicting, content: beyond } in found.iter_mut() {
+    for VerifiedLandmark { near, moved, contradicting, content: beyond } in found.iter_mut() {
         near.likeness = Some(0.0);
         let sighting = &sightings[near.sighting];
         let Some(exemplar) = near.model.exemplars.get(near.exemplar).filter(|_| near.signature >= least)
@@ -100,27 +102,27 @@ pub(crate) fn look(
         *moved = Some(laid.corners_px);
         if near.ratio(DistanceKind::Both) < 1.0 {
             *beyond = content(&seen, &learnt, c);
-            watch.finished(Step::Alignment);
+            watch.finished(RecogniseStep::Alignment);
             (near.correlation, near.hausdorff) = distances(&laid.icon, &near.model, p);
-            watch.finished(Step::Distances);
+            watch.finished(RecogniseStep::Distances);
         }
     }
     if found.iter().any(|j| j.near.ratio(DistanceKind::Both) < 1.0) {
         compare_as_found(sightings, found, c);
     }
     found.sort_by(|a, b| a.near.ratio(DistanceKind::Both).total_cmp(&b.near.ratio(DistanceKind::Both)));
-    watch.finished(Step::Alignment);
+    watch.finished(RecogniseStep::Alignment);
     for judged in found.iter_mut().take(MAX_CANDIDATES).filter(|j| j.near.ratio(DistanceKind::Both) >= 1.0) {
         judged.near.correlation = correlation_as_found(&judged.near, sightings, p);
     }
-    watch.finished(Step::Distances);
+    watch.finished(RecogniseStep::Distances);
 }
 
 /// Gives those that were not laid on anything the likeness of the picture where it was found: an accepted landmark's
 /// margin is over them, too.
-fn compare_as_found(sightings: &[Sighting], found: &mut [Judged], c: &CorrelationParams) {
+fn compare_as_found(sightings: &[QuadReading], found: &mut [VerifiedLandmark], c: &CorrelationParams) {
     let mut smoothed: Vec<Option<Smoothed>> = vec![None; sightings.len()];
-    for Judged { near, .. } in found.iter_mut().filter(|j| j.moved.is_none()) {
+    for VerifiedLandmark { near, .. } in found.iter_mut().filter(|j| j.moved.is_none()) {
         let Some(exemplar) = near.model.exemplars.get(near.exemplar) else { continue };
         let own =
             smoothed[near.sighting].get_or_insert_with(|| Smoothed::new(&sightings[near.sighting].icon));
@@ -131,10 +133,10 @@ fn compare_as_found(sightings: &[Sighting], found: &mut [Judged], c: &Correlatio
 /// Lays the quad's picture on each candidate within reach, nearest first, and keeps what the better fit says.
 pub(crate) fn verify(
     image: &GrayImage,
-    sightings: &[Sighting],
-    found: &mut [Judged],
+    sightings: &[QuadReading],
+    found: &mut [VerifiedLandmark],
     kind: DistanceKind,
-    on: &Lattices,
+    on: &SamplingGrids,
     p: &Params,
 ) {
     let v = &p.recognise.verdict;
@@ -143,8 +145,9 @@ pub(crate) fn verify(
         let sighting = &sightings[judged.near.sighting];
         let Some((icon, corners_px)) = laid_on(image, sighting, &judged.near, &aligner, p) else { continue };
         let (correlation, hausdorff) = distances(&icon, &judged.near.model, p);
-        let near = Near { correlation, hausdorff, ..judged.near.clone() };
-        let moved = Judged { near, moved: Some(corners_px), contradicting: 0.0, content: Content::NONE };
+        let near = NearLandmark { correlation, hausdorff, ..judged.near.clone() };
+        let moved =
+            VerifiedLandmark { near, moved: Some(corners_px), contradicting: 0.0, content: Content::NONE };
         // What was accepted where it stood is not lost by a move that fits worse.
         let lost = judged.refusal(kind, 1.0, v).is_none() && moved.refusal(kind, 1.0, v).is_some();
         if moved.near.ratio(kind) < judged.near.ratio(kind) && !lost {
@@ -171,8 +174,8 @@ fn distances(icon: &Icon, model: &LandmarkModel, p: &Params) -> (f64, f64) {
 /// The quad's picture after its corners were moved to fit the nearest exemplar, and those corners.
 fn laid_on(
     image: &GrayImage,
-    sighting: &Sighting,
-    near: &Near,
+    sighting: &QuadReading,
+    near: &NearLandmark,
     aligner: &Aligner<'_>,
     p: &Params,
 ) -> Option<(Icon, Corners)> {

@@ -6,8 +6,8 @@ use super::*;
 fn gates_refuse_at_tau() {
     let model = SIX.get(LandmarkId(1)).unwrap();
     let anywhere = Corners::try_from([[0.0, 0.0], [90.0, 0.0], [90.0, 90.0], [0.0, 90.0]]).unwrap();
-    let judged = |correlation: f64, hausdorff: f64, moved: bool| Judged {
-        near: Near {
+    let judged = |correlation: f64, hausdorff: f64, moved: bool| VerifiedLandmark {
+        near: NearLandmark {
             model: Arc::clone(model),
             sighting: 0,
             exemplar: 0,
@@ -24,13 +24,16 @@ fn gates_refuse_at_tau() {
     let tight = v.verified_share;
     let alone = |kind, c, h, moved| judged(c, h, moved).refusal(kind, 1.0, v);
     assert_eq!(alone(DistanceKind::Correlation, 0.99 * c, f64::NAN, false), None);
-    assert_eq!(alone(DistanceKind::Correlation, c, 0.0, false), Some(Refusal::Correlation));
+    assert_eq!(alone(DistanceKind::Correlation, c, 0.0, false), Some(MatchRefusal::Correlation));
     assert_eq!(alone(DistanceKind::Correlation, 0.99 * tight * c, h, true), None);
-    assert_eq!(alone(DistanceKind::Correlation, 1.01 * tight * c, 0.0, true), Some(Refusal::Correlation));
+    assert_eq!(
+        alone(DistanceKind::Correlation, 1.01 * tight * c, 0.0, true),
+        Some(MatchRefusal::Correlation)
+    );
     assert_eq!(alone(DistanceKind::Hausdorff, c, 0.99 * h, false), None);
-    assert_eq!(alone(DistanceKind::Hausdorff, 0.0, h, false), Some(Refusal::Hausdorff));
-    assert_eq!(alone(DistanceKind::Hausdorff, 0.0, f64::NAN, false), Some(Refusal::Hausdorff));
-    assert_eq!(alone(DistanceKind::Hausdorff, 0.0, 1.01 * tight * h, true), Some(Refusal::Hausdorff));
+    assert_eq!(alone(DistanceKind::Hausdorff, 0.0, h, false), Some(MatchRefusal::Hausdorff));
+    assert_eq!(alone(DistanceKind::Hausdorff, 0.0, f64::NAN, false), Some(MatchRefusal::Hausdorff));
+    assert_eq!(alone(DistanceKind::Hausdorff, 0.0, 1.01 * tight * h, true), Some(MatchRefusal::Hausdorff));
     // Both: the likeness, and one of the two.
     let least = 1.0 - model.likeness.tau;
     let both = |likeness: Option<f64>, c, h| {
@@ -41,9 +44,9 @@ fn gates_refuse_at_tau() {
     let alike = Some(least + 1e-6);
     assert_eq!(both(alike, 0.99 * tight * c, f64::INFINITY), None);
     assert_eq!(both(alike, c, 0.99 * tight * h), None);
-    assert_eq!(both(alike, 1.01 * tight * c, f64::NAN), Some(Refusal::Correlation));
+    assert_eq!(both(alike, 1.01 * tight * c, f64::NAN), Some(MatchRefusal::Correlation));
     for refused in [Some(least), Some(f64::NAN), None] {
-        assert_eq!(both(refused, 0.0, 0.0), Some(Refusal::Likeness));
+        assert_eq!(both(refused, 0.0, 0.0), Some(MatchRefusal::Likeness));
     }
     // In doubt, what contradicts decides.
     let contradicted = |ratio: f64, share: f64| {
@@ -53,10 +56,10 @@ fn gates_refuse_at_tau() {
         judged.refusal(DistanceKind::Both, 1.0, v)
     };
     assert_eq!(contradicted(0.99, v.max_contradicting), None);
-    assert_eq!(contradicted(0.99, v.max_contradicting + 1e-9), Some(Refusal::Contradiction));
-    assert_eq!(contradicted(0.99, f64::NAN), Some(Refusal::Contradiction));
+    assert_eq!(contradicted(0.99, v.max_contradicting + 1e-9), Some(MatchRefusal::Contradiction));
+    assert_eq!(contradicted(0.99, f64::NAN), Some(MatchRefusal::Contradiction));
     assert_eq!(contradicted(v.doubtful_share - 1e-6, 1.0), None);
-    assert_eq!(contradicted(v.doubtful_share + 1e-6, 1.0), Some(Refusal::Contradiction));
+    assert_eq!(contradicted(v.doubtful_share + 1e-6, 1.0), Some(MatchRefusal::Contradiction));
     // Beyond the frame it must agree; where it does so very well, neither distance is asked.
     let beyond = |likeness: f64, shown: f64, c: f64| {
         let mut judged = judged(c, f64::INFINITY, true);
@@ -66,13 +69,13 @@ fn gates_refuse_at_tau() {
     };
     let (least, enough) = (v.min_content_likeness, v.min_content);
     assert_eq!(beyond(least, enough, 0.0), None);
-    assert_eq!(beyond(least - 1e-9, 20.0, 0.0), Some(Refusal::Content));
-    assert_eq!(beyond(1.0, enough - 1e-9, 0.0), Some(Refusal::Content));
-    assert_eq!(beyond(f64::NAN, 20.0, 0.0), Some(Refusal::Content));
+    assert_eq!(beyond(least - 1e-9, 20.0, 0.0), Some(MatchRefusal::Content));
+    assert_eq!(beyond(1.0, enough - 1e-9, 0.0), Some(MatchRefusal::Content));
+    assert_eq!(beyond(f64::NAN, 20.0, 0.0), Some(MatchRefusal::Content));
     let (sure, well) = (v.sure_content_likeness, v.sure_content);
     assert_eq!(beyond(sure, well, 2.0 * c), None);
-    assert_eq!(beyond(sure - 1e-9, well, 2.0 * c), Some(Refusal::Correlation));
-    assert_eq!(beyond(sure, well - 1e-9, 2.0 * c), Some(Refusal::Correlation));
+    assert_eq!(beyond(sure - 1e-9, well, 2.0 * c), Some(MatchRefusal::Correlation));
+    assert_eq!(beyond(sure, well - 1e-9, 2.0 * c), Some(MatchRefusal::Correlation));
 }
 
 /// What the gate on content lets through by a hair.
@@ -91,7 +94,7 @@ fn framed(inside: Option<u64>) -> GrayImage {
 #[test]
 fn a_frame_alone_is_no_landmark() {
     let lesson = |image: &GrayImage| {
-        let mut all = vec![View::photographed(image, &whole(), &PARAMS).unwrap()];
+        let mut all = vec![TrainingView::photographed(image, &whole(), &PARAMS).unwrap()];
         all.extend(views(image, &whole(), 20, &PARAMS, 5));
         learn(LandmarkId(9), &all, &[], &PARAMS).unwrap()
     };
@@ -107,20 +110,20 @@ fn a_frame_alone_is_no_landmark() {
         let image = photograph(&framed(inside), &oblique(), 0.9, 10.0);
         recognise(&image, &quad(oblique()), &set, DistanceKind::Both, &PARAMS)
     };
-    assert_eq!(asked(Some(3)).recognition, Recognition::Unique(LandmarkId(9)));
-    for (inside, refusal) in [(None, Refusal::Content), (Some(4), Refusal::Content)] {
+    assert_eq!(asked(Some(3)).recognition, Verdict::Unique(LandmarkId(9)));
+    for (inside, refusal) in [(None, MatchRefusal::Content), (Some(4), MatchRefusal::Content)] {
         let v = asked(inside);
-        assert_eq!(v.recognition, Recognition::Unknown, "{inside:?}");
+        assert_eq!(v.recognition, Verdict::Unknown, "{inside:?}");
         let told = v.candidates[0].refusal;
-        assert!(told == Some(refusal) || told == Some(Refusal::Likeness), "{inside:?} {told:?}");
+        assert!(told == Some(refusal) || told == Some(MatchRefusal::Likeness), "{inside:?} {told:?}");
     }
 }
 
 #[test]
 fn the_margin_is_over_the_nearest_other() {
     let models = lessons(2, &PARAMS);
-    let judged = |i: usize, c: f64, h: f64, l: f64| Judged {
-        near: Near {
+    let judged = |i: usize, c: f64, h: f64, l: f64| VerifiedLandmark {
+        near: NearLandmark {
             model: Arc::clone(&models[i]),
             sighting: 0,
             exemplar: 0,
@@ -156,7 +159,7 @@ fn a_large_map_asks_for_more() {
     let image = photograph(&poster(2), &oblique(), 1.0, 0.0);
     let seen = sightings(&image, &quad(oblique()), &PARAMS);
     let model = SIX.get(LandmarkId(2)).unwrap();
-    let near = Near {
+    let near = NearLandmark {
         model: Arc::clone(model),
         sighting: 0,
         exemplar: 0,
@@ -165,13 +168,13 @@ fn a_large_map_asks_for_more() {
         likeness: Some(1.0 - 0.9 * model.likeness.tau),
         signature: 1.0,
     };
-    let found = [Judged { near, moved: Some(oblique()), contradicting: 0.0, content: JUST_ENOUGH }];
+    let found = [VerifiedLandmark { near, moved: Some(oblique()), contradicting: 0.0, content: JUST_ENOUGH }];
     let among = |n: usize| decide(&found, &seen, DistanceKind::Both, n, v);
-    assert_eq!(among(v.crowd).recognition, Recognition::Unique(LandmarkId(2)));
+    assert_eq!(among(v.crowd).recognition, Verdict::Unique(LandmarkId(2)));
     let large = among(10 * v.crowd);
     assert_eq!(
         (large.recognition, large.candidates[0].refusal),
-        (Recognition::Unknown, Some(Refusal::Likeness))
+        (Verdict::Unknown, Some(MatchRefusal::Likeness))
     );
     // What is told is what decided.
     let told = &large.candidates[0];
@@ -183,10 +186,10 @@ fn a_large_map_asks_for_more() {
 fn where_points_decide_an_icon_alone_names_nothing() {
     let image = photograph(&poster(1), &oblique(), 0.8, 20.0);
     let v = recognise(&image, &quad(oblique()), &SIX, DistanceKind::Both, &Params::default());
-    assert_eq!(v.recognition, Recognition::Ambiguous(LandmarkId(1)));
-    assert_eq!((v.candidates[0].refusal, v.confidence), (Some(Refusal::Plain), 0.0));
+    assert_eq!(v.recognition, Verdict::Ambiguous(LandmarkId(1)));
+    assert_eq!((v.candidates[0].refusal, v.confidence), (Some(MatchRefusal::Plain), 0.0));
     let by_icon = recognise(&image, &quad(oblique()), &SIX, DistanceKind::Both, &PARAMS);
-    assert_eq!(by_icon.recognition, Recognition::Unique(LandmarkId(1)));
+    assert_eq!(by_icon.recognition, Verdict::Unique(LandmarkId(1)));
 }
 
 #[test]
@@ -200,11 +203,7 @@ fn few_points_keep_a_landmark_from_the_papers_distances_only() {
         for kind in KINDS {
             let v = recognise(&image, &quad(oblique()), &set, kind, &PARAMS);
             let expected = known || kind == DistanceKind::Both;
-            assert_eq!(
-                v.recognition == Recognition::Unique(LandmarkId(1)),
-                expected,
-                "{kind:?} {stable_points}"
-            );
+            assert_eq!(v.recognition == Verdict::Unique(LandmarkId(1)), expected, "{kind:?} {stable_points}");
         }
     }
 }
@@ -231,7 +230,7 @@ proptest! {
             q.upright_ambiguous = ambiguous;
             for kind in KINDS {
                 let v = recognise(&image, &q, &SIX, kind, &p);
-                prop_assert_eq!(v.recognition, Recognition::Unknown);
+                prop_assert_eq!(v.recognition, Verdict::Unknown);
                 prop_assert!(v.candidates.len() <= MAX_CANDIDATES);
                 prop_assert!(v.candidates.iter().all(|c| c.refusal.is_some() && !c.ratio.is_nan()));
             }
