@@ -49,7 +49,7 @@ pub fn sighted(
         return Vec::new();
     }
     let unsure =
-        |q: &&QuadAnalysis| q.verdict.as_ref().is_some_and(|v| !matches!(v.recognition, Verdict::Unique(_)));
+        |q: &&QuadAnalysis| q.recognition.as_ref().is_some_and(|v| !matches!(v.verdict, Verdict::Unique(_)));
     facts.quads.iter().filter(unsure).filter_map(|q| one(image, q, map, mounting, camera)).collect()
 }
 
@@ -95,10 +95,10 @@ pub fn hang_where_known(landmarks: &BTreeSet<LandmarkId>, map: &MapSnapshot) -> 
 pub fn resembling(image: &GrayImage, quad: &Quad, map: &MapSnapshot) -> Option<Resembling> {
     let asked = |p: &Params| recognise_quad(image, quad, &map.look_alikes.models, p);
     let (mut verdict, mut border) = asked(&map.params);
-    if map.params.recognise.verdict.points && verdict.recognition == Verdict::Unknown {
+    if map.params.recognise.verdict.points && verdict.verdict == Verdict::Unknown {
         (verdict, border) = asked(&map.look_alikes.by_icons);
     }
-    let (Verdict::Ambiguous(_) | Verdict::Unique(_)) = verdict.recognition else { return None };
+    let (Verdict::Ambiguous(_) | Verdict::Unique(_)) = verdict.verdict else { return None };
     let fits = |refusal: Option<MatchRefusal>| matches!(refusal, None | Some(MatchRefusal::Margin));
     let fitting: BTreeSet<LandmarkId> =
         verdict.candidates.iter().filter(|c| fits(c.refusal)).map(|c| c.landmark).collect();

@@ -176,9 +176,9 @@ fn is_found(kept: &MayBe, e: &Expected) -> bool {
 
 /// The landmarks that one quad may be.
 fn may_be(image: &GrayImage, quad: usize, facts: &QuadAnalysis, view: &View<'_>) -> Option<MayBe> {
-    let verdict = facts.verdict.as_ref()?;
+    let verdict = facts.recognition.as_ref()?;
     let quad = Some(quad);
-    if let Verdict::Unique(landmark) = verdict.recognition {
+    if let Verdict::Unique(landmark) = verdict.verdict {
         let SeenBorder { corners_px, covariance_px2, .. } =
             matched_border(&facts.quad, verdict, &view.map.params)?;
         let ratio = verdict.candidates.first().map_or(0.0, |c| c.ratio);
@@ -197,8 +197,8 @@ fn may_be(image: &GrayImage, quad: usize, facts: &QuadAnalysis, view: &View<'_>)
 
 /// A quad that the icon of one landmark alone speaks for, and nothing of the map looks like that landmark.
 fn plain(facts: &QuadAnalysis, view: &View<'_>) -> Option<Resembling> {
-    let verdict = facts.verdict.as_ref()?;
-    let Verdict::Ambiguous(landmark) = verdict.recognition else { return None };
+    let verdict = facts.recognition.as_ref()?;
+    let Verdict::Ambiguous(landmark) = verdict.verdict else { return None };
     let first = verdict.candidates.iter().find(|c| c.landmark == landmark)?;
     let members = [landmark].into();
     let is_alone =

@@ -154,7 +154,7 @@ const NEARLY: f64 = 1.5;
 
 /// Whether a quad shows a landmark, or something that is taken for it, or nearly.
 fn may_be(verdict: &RecognitionResult, id: LandmarkId) -> bool {
-    let (Verdict::Unique(seen) | Verdict::Ambiguous(seen)) = verdict.recognition else {
+    let (Verdict::Unique(seen) | Verdict::Ambiguous(seen)) = verdict.verdict else {
         return verdict.candidates.first().is_some_and(|c| c.landmark == id && c.ratio < NEARLY);
     };
     seen == id
@@ -167,7 +167,8 @@ fn seen(view: &View<'_>, sightings: Option<&[Sighting<'_>]>, grounds: Grounds) -
     let p = ChangeParams::default();
     let judge = |s: &Sighting<'_>| judge(s, mounting, &grounds.pose, &grounds.supporters, &p).ok();
     let judged = sightings.unwrap_or_default().iter().filter_map(judge).collect();
-    let there = |id: LandmarkId| facts.quads.iter().filter_map(|q| q.verdict.as_ref()).any(|v| may_be(v, id));
+    let there =
+        |id: LandmarkId| facts.quads.iter().filter_map(|q| q.recognition.as_ref()).any(|v| may_be(v, id));
     let learnt = map.models.iter().filter_map(|model| {
         let (info, visible) = (map.landmarks.get(&model.id)?, map.visibility.get(&model.id)?);
         let place = info.place.as_ref().filter(|_| info.is_trusted() && !there(model.id))?;

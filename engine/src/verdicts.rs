@@ -122,7 +122,7 @@ fn quad(facts: &QuadAnalysis, map: &MapSnapshot) -> v1::QuadAnswer {
         verdict: v1::Verdict::Unknown.into(),
         ..v1::QuadAnswer::default()
     };
-    if let Some(verdict) = &facts.verdict {
+    if let Some(verdict) = &facts.recognition {
         fill_verdict(&mut quad, verdict, |id| name(map, id));
         if quad.verdict() == v1::Verdict::Unique {
             quad.set_sighting(v1::Sighting::Global);
@@ -146,7 +146,7 @@ fn name(map: &MapSnapshot, id: LandmarkId) -> String {
 
 /// The landmarks that were recognised without doubt, with their poses.
 pub fn recognised(facts: &FrameAnalysis) -> Vec<(LandmarkId, &LandmarkPose)> {
-    let unique = |q: &QuadAnalysis| match q.verdict.as_ref()?.recognition {
+    let unique = |q: &QuadAnalysis| match q.recognition.as_ref()?.verdict {
         Verdict::Unique(id) => Some(id),
         Verdict::Unknown | Verdict::Ambiguous(_) => None,
     };

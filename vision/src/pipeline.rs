@@ -4,7 +4,7 @@
 
 use crate::{
     detect::{
-        detector::detect_in,
+        detector::detect_with,
         edge_buffers::DetectBuffers,
         quad::{Quad, QuadKind},
     },
@@ -59,7 +59,7 @@ pub struct QuadAnalysis {
     /// The quad as detected.
     pub quad: Quad,
     /// What recognition says; `None` if it was not asked (three-sided, or beyond [`MAX_RECOGNISED_QUADS`]).
-    pub verdict: Option<RecognitionResult>,
+    pub recognition: Option<RecognitionResult>,
     /// The landmark in the camera frame, or why not.
     pub pose: Result<LandmarkPose, PoseUnavailable>,
 }
@@ -98,7 +98,7 @@ impl Pipeline {
         p: &Params,
         trace: &mut impl Trace,
     ) -> FrameAnalysis {
-        let quads = detect_in(&mut self.buffers, image, &p.detect, trace);
+        let quads = detect_with(&mut self.buffers, image, &p.detect, trace);
         analyse_quads(image, quads, camera, landmarks, p, trace)
     }
 }
@@ -128,7 +128,7 @@ pub fn analyse_quads(
                 turn_to_recognised(&mut quad, verdict);
             }
             let pose = pose(&quad, verdict.as_ref(), camera, landmarks.sizes, p);
-            QuadAnalysis { quad, verdict, pose }
+            QuadAnalysis { quad, recognition: verdict, pose }
         })
         .collect();
     trace.finished(Stage::Poses);
@@ -144,7 +144,7 @@ pub fn recognise_quad(
     p: &Params,
 ) -> (RecognitionResult, Option<SeenBorder>) {
     let verdict = recognise(image, quad, models, DistanceKind::Both, p);
-    let is_known = verdict.recognition != Verdict::Unknown;
+    let is_known = verdict.verdict != Verdict::Unknown;
     let border = if is_known { matched_border(quad, &verdict, p) } else { None };
     (verdict, border)
 }
@@ -152,7 +152,7 @@ pub fn recognise_quad(
 /// Where another border of `quad` than its corners was recognised, that one becomes its corners: whoever reads what was
 /// recognised must not take the wall round a poster for it.
 fn turn_to_recognised(quad: &mut Quad, verdict: &mut RecognitionResult) {
-    if verdict.recognition == Verdict::Unknown || verdict.border == 0 {
+    if verdict.verdict == Verdict::Unknown || verdict.border == 0 {
         return;
     }
     if let Some(recognised) = quad.alternates.get_mut(verdict.border - 1) {
@@ -169,7 +169,7 @@ fn pose(
     sizes: &BTreeMap<LandmarkId, LandmarkSize>,
     p: &Params,
 ) -> Result<LandmarkPose, PoseUnavailable> {
-    let Some(RecognitionResult { recognition: Verdict::Unique(landmark), .. }) = verdict else {
+    let Some(RecognitionResult { verdict: Verdict::Unique(landmark), .. }) = verdict else {
         return Err(PoseUnavailable::NotUnique);
     };
     let seen = verdict.and_then(|v| matched_border(quad, v, p)).ok_or(PoseUnavailable::NotUnique)?;

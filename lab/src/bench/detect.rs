@@ -10,7 +10,7 @@ use server::cli::{clock::Clock, parameters::ParameterArgs, scratch, screen};
 use std::{collections::BTreeMap, hint::black_box, path::PathBuf};
 use vision::{
     detect::{
-        DetectBuffers, DetectParams, Grouping, detect_in,
+        DetectBuffers, DetectParams, Grouping, detect_with,
         edges::edge_map,
         segments::{chains, edge_segments},
     },
@@ -216,14 +216,14 @@ fn time_ours(
     });
     let mut memory = DetectBuffers::default();
     let mut found = 0;
-    timed(QUADS, &mut || found = detect_in(&mut memory, black_box(frame), params, &mut NoTrace).len());
+    timed(QUADS, &mut || found = detect_with(&mut memory, black_box(frame), params, &mut NoTrace).len());
     let mut paper = params.clone();
     paper.quads.grouping = Grouping::Relaxation;
     timed(PAPER, &mut || {
-        black_box(detect_in(&mut memory, black_box(frame), &paper, &mut NoTrace));
+        black_box(detect_with(&mut memory, black_box(frame), &paper, &mut NoTrace));
     });
     let mut clock = StageClock { last: Clock::start(), ms: BTreeMap::new() };
-    detect_in(&mut memory, frame, params, &mut clock);
+    detect_with(&mut memory, frame, params, &mut clock);
     for (stage, ms) in clock.ms {
         stages.add(stage, i, ms);
     }

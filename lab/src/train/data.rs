@@ -13,10 +13,9 @@ use vision::{
             choose_sides::rivals,
             network_training::{ChoiceExample, LabelledExample},
         },
-        candidates,
         edge_support::gradients::Gradients,
-        pyramid,
-        suppression::non_maximum::{resolve, settle},
+        pyramid, scored_quads,
+        suppression::non_maximum::{snap_sides, suppress_overlaps},
     },
     geometry::{
         Corners,
@@ -131,19 +130,24 @@ impl Data {
         let gray = pictures::read(&image.path).with_context(|| image.path.display().to_string())?;
         let factor = pyramid::working_factor(&gray, params.quads.working_side_px);
         let work = pyramid::reduce(&gray, factor);
-        let (rated, edges) = candidates(&work, params, &mut NoTrace);
+        let (rated, edges) = scored_quads(&work, params, &mut NoTrace);
         let g = Gradients { image: &work, gx: edges.gx(), gy: edges.gy() };
-        let found = resolve(rated.clone(), &params.quads);
+        let found = suppress_overlaps(rated.clone(), &params.quads);
         for quad in image.quads.iter().filter(|q| q.counts()) {
             let Some(label) = quad.corners.scaled(1.0 / factor as f64) else { continue };
             if label.min_side_px() >= min_side_px {
                 self.sides.extend(sides(&g, &found, &label, group, weight));
             }
         }
-        for settled in settle(rated, &g, &params.quads) {
-            let Some(corners) = settled.quad.corners_px.scaled(factor as f64) else { continue };
+        for classified in snap_sides(rated, &g, &params.quads) {
+            let Some(corners) = classified.quad.corners_px.scaled(factor as f64) else { continue };
             let Some(is_one) = is_thing(&corners, image) else { continue };
-            self.things.push(LabelledExample { group, weight, features: settled.features.to_vec(), is_one });
+            self.things.push(LabelledExample {
+                group,
+                weight,
+                features: classified.features.to_vec(),
+                is_one,
+            });
         }
         self.images += 1;
         Ok(())

@@ -17,7 +17,7 @@ use vision::detect::{
     DetectParams,
     border_model::{
         network::Network,
-        network_training::{ChoiceExample, LabelledExample, TrainParams, to_choose, to_tell},
+        network_training::{ChoiceExample, LabelledExample, TrainParams, train_choice, train_classifier},
     },
 };
 
@@ -222,13 +222,13 @@ impl Fit<'_> {
     /// network of sides places them.
     fn networks(&self, sides: &[ChoiceExample], without: Option<usize>) -> anyhow::Result<held_out::Part> {
         let learnt: Vec<ChoiceExample> = sides.iter().filter(|r| Some(r.group) != without).cloned().collect();
-        let side = to_choose(&learnt, &self.how[0]).context("the network of sides")?;
+        let side = train_choice(&learnt, &self.how[0]).context("the network of sides")?;
         let mut params = self.params.clone();
         params.quads.side_model = Some(side.clone());
         let data = Data::gather(self.sets, &params, self.min_side_px)?;
         let learnt: Vec<LabelledExample> =
             data.things.iter().filter(|e| Some(e.group) != without).cloned().collect();
-        let thing = to_tell(&learnt, &self.how[1]).context("the network of things")?;
+        let thing = train_classifier(&learnt, &self.how[1]).context("the network of things")?;
         Ok(held_out::Part { unseen: without, networks: [side, thing], data })
     }
 }

@@ -67,8 +67,8 @@ pub fn refusal(refusal: MatchRefusal) -> &'static str {
 
 /// The verdict's part of a quad's answer: everything but corners, kind, score and poses.
 pub fn fill_verdict(quad: &mut v1::QuadAnswer, v: &RecognitionResult, name: impl Fn(LandmarkId) -> String) {
-    quad.set_verdict(verdict(v.recognition));
-    if let Verdict::Unique(id) = v.recognition {
+    quad.set_verdict(verdict(v.verdict));
+    if let Verdict::Unique(id) = v.verdict {
         quad.landmark = name(id);
     }
     quad.candidates = v.candidates.iter().map(|c| candidate(c, &name)).collect();
@@ -100,7 +100,7 @@ pub fn points(evidence: &PointEvidence, landmarks: usize) -> v1::PointEvidence {
 /// The landmark that is in doubt because a part of it shows something else.
 fn doubtful(v: &RecognitionResult) -> Option<LandmarkId> {
     let best = v.candidates.first()?;
-    let named = v.recognition == Verdict::Ambiguous(best.landmark);
+    let named = v.verdict == Verdict::Ambiguous(best.landmark);
     (named && best.refusal == Some(MatchRefusal::Disagreement)).then_some(best.landmark)
 }
 
@@ -154,7 +154,7 @@ mod tests {
 
     fn ambiguous() -> RecognitionResult {
         RecognitionResult {
-            recognition: Verdict::Ambiguous(LandmarkId(1)),
+            verdict: Verdict::Ambiguous(LandmarkId(1)),
             candidates: vec![],
             entropy_m: 1.0,
             entropy_norm: 0.5,
@@ -244,7 +244,7 @@ mod tests {
         let mut quad = v1::QuadAnswer::default();
         fill_verdict(&mut quad, &v, |_| "door".into());
         assert_eq!((quad.verdict(), quad.landmark.as_str()), (v1::Verdict::Ambiguous, ""));
-        v.recognition = Verdict::Unique(LandmarkId(1));
+        v.verdict = Verdict::Unique(LandmarkId(1));
         fill_verdict(&mut quad, &v, |_| "door".into());
         assert_eq!((quad.verdict(), quad.landmark.as_str()), (v1::Verdict::Unique, "door"));
     }

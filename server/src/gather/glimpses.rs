@@ -89,7 +89,7 @@ pub(super) fn glimpses(offer: &Offer, params: &Params) -> Found {
         let identity = identity(facts, recognised.map(|(id, _)| id), place.as_ref(), &offer.looked.map);
         let icon = features(icon, &params.recognise);
         // Of a landmark that is seen the corners are those detected, turned.
-        let turn = facts.verdict.as_ref().filter(|_| recognised.is_some()).map_or(0, |v| v.rotation);
+        let turn = facts.recognition.as_ref().filter(|_| recognised.is_some()).map_or(0, |v| v.rotation);
         let mut covariance = facts.quad.corner_covariance_px2;
         covariance.rotate_left(turn % 4);
         found.corners_px2.push(covariance);
@@ -101,8 +101,8 @@ pub(super) fn glimpses(offer: &Offer, params: &Params) -> Found {
 /// The landmark that is seen beyond doubt, with its corners. Where its border was found only by laying the learnt picture
 /// on it, the corners are not good enough to learn from.
 fn recognised(facts: &QuadAnalysis, params: &Params) -> Option<(LandmarkId, SeenBorder)> {
-    let verdict = facts.verdict.as_ref()?;
-    let Verdict::Unique(id) = verdict.recognition else { return None };
+    let verdict = facts.recognition.as_ref()?;
+    let Verdict::Unique(id) = verdict.verdict else { return None };
     if verdict.confidence < MIN_CONFIDENCE || verdict.border != 0 {
         return None;
     }
@@ -150,8 +150,8 @@ fn identity(
             Identity::Doubtful
         };
     }
-    let Some(verdict) = &facts.verdict else { return Identity::Doubtful };
-    if let Verdict::Ambiguous(id) = verdict.recognition {
+    let Some(verdict) = &facts.recognition else { return Identity::Doubtful };
+    if let Verdict::Ambiguous(id) = verdict.verdict {
         // What its icon alone speaks for is the landmark where that hangs.
         let is_plain =
             verdict.candidates.iter().any(|c| c.landmark == id && c.refusal == Some(MatchRefusal::Plain));

@@ -104,7 +104,7 @@ fn labelled(
     for q in queries {
         let v = recognise(&q.image, &q.quad, models, kind, p);
         let is = |id: LandmarkId| q.landmark.is_some_and(|l| same(l) == same(id.0));
-        let word = match (q.landmark, v.recognition) {
+        let word = match (q.landmark, v.verdict) {
             (Some(_), Verdict::Unique(id)) if is(id) => (&mut score.right, "right"),
             (Some(_), Verdict::Unique(_)) => (&mut score.wrong, "WRONG"),
             (Some(_), Verdict::Ambiguous(_)) => (&mut score.ambiguous, "ambiguous"),
@@ -143,7 +143,7 @@ fn strangers(
             }
             strangers += 1;
             let v = recognise(&q.image, &q.quad, half, kind, p);
-            let accepted = matches!(v.recognition, Verdict::Unique(_));
+            let accepted = matches!(v.verdict, Verdict::Unique(_));
             strangers_accepted += usize::from(accepted);
             if verbose && accepted {
                 println!("HALF {kind:?} {} {:?} accepted {:?}", q.file, q.landmark, v.candidates[0]);
@@ -218,7 +218,7 @@ fn detected(
             let nearest =
                 (0..labelled.len()).max_by(|a, b| overlap(labelled[*a]).total_cmp(&overlap(labelled[*b])));
             let hit = nearest.filter(|i| overlap(labelled[*i]) > 0.3);
-            let Verdict::Unique(id) = v.recognition else {
+            let Verdict::Unique(id) = v.verdict else {
                 if verbose && hit.is_some_and(|i| labelled[i].landmark.is_some()) {
                     println!(
                         "REFUSED {} {:?} {:?}",
@@ -347,7 +347,7 @@ fn strangers_in(
                 models.at(i).map_or(&[][..], |m| m.points.as_slice())
             });
             nearest.extend(found.first().map(|f| log10_false_alarms(&f.evidence, models.len())));
-            if matches!(v.recognition, Verdict::Unique(_)) {
+            if matches!(v.verdict, Verdict::Unique(_)) {
                 accepted += 1;
                 println!("STRANGER {} {:?} {:?}", file.display(), v.candidates[0], v.points);
             }

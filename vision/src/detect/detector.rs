@@ -12,7 +12,7 @@ use crate::{
         refine::{
             full_size::at_full_size,
             rating::{ScoredQuad, rate},
-            refit::sharpen,
+            refit::refit_corners,
         },
         relaxation::{grouping::match_pairs, paired_quads::quads as quads_of_pairs, similarity::pairs},
         segments::{
@@ -22,7 +22,7 @@ use crate::{
         suppression::{
             nested_borders::{by_corners, canonical},
             nested_quads::absorb,
-            non_maximum::{resolve, settle, things},
+            non_maximum::{snap_sides, suppress_non_maxima, suppress_overlaps},
         },
         tiling::floor_tiling::{Untiled, untile},
     },
@@ -35,11 +35,11 @@ pub const MAX_QUADS: usize = 64;
 
 /// Finds the quads of an image, best first; ties by corners. At most [`MAX_QUADS`]. Same image, same quads.
 pub fn detect(image: &GrayImage, p: &DetectParams, trace: &mut impl Trace) -> Vec<Quad> {
-    detect_in(&mut DetectBuffers::default(), image, p, trace)
+    detect_with(&mut DetectBuffers::default(), image, p, trace)
 }
 
 /// [`detect`] in the memory of earlier images.
-pub fn detect_in(
+pub fn detect_with(
     memory: &mut DetectBuffers,
     image: &GrayImage,
     p: &DetectParams,
@@ -87,9 +87,9 @@ fn by_search(
     let (rated, edges, segments) = searched(memory, work, p, trace);
     let gradients = Gradients { image: work, gx: edges.gx(), gy: edges.gy() };
     let found: Vec<Quad> = if p.quads.choose_sides {
-        things(settle(rated, &gradients, &p.quads), &p.quads)
+        suppress_non_maxima(snap_sides(rated, &gradients, &p.quads), &p.quads)
     } else {
-        resolve(rated, &p.quads)
+        suppress_overlaps(rated, &p.quads)
     };
     let tolerance = p.relaxation.pair_tolerance_px;
     let quads = canonical(found, p.quads.nested_iou, p.quads.min_side_support, tolerance);
@@ -97,7 +97,7 @@ fn by_search(
         Nested::Alternates => absorb(quads, tolerance),
         Nested::Quads => quads,
     };
-    let mut quads: Vec<Quad> = quads.into_iter().map(|q| sharpen(q, &gradients, &p.quads)).collect();
+    let mut quads: Vec<Quad> = quads.into_iter().map(|q| refit_corners(q, &gradients, &p.quads)).collect();
     if p.quads.three_sided {
         let open = leftover(&segments, &quads, &gradients, p);
         // They never take the place of a full quad.
@@ -112,7 +112,11 @@ fn by_search(
 }
 
 /// Everything the search proposes on the scales of an image, rated, not yet chosen from; and the finest edge map.
-pub fn candidates(work: &GrayImage, p: &DetectParams, trace: &mut impl Trace) -> (Vec<ScoredQuad>, EdgeMap) {
+pub fn scored_quads(
+    work: &GrayImage,
+    p: &DetectParams,
+    trace: &mut impl Trace,
+) -> (Vec<ScoredQuad>, EdgeMap) {
     let (rated, edges, _) = searched(&mut DetectBuffers::default(), work, p, trace);
     (rated, edges)
 }

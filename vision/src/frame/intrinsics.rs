@@ -86,26 +86,26 @@ impl Intrinsics {
     /// Pixel of a point in camera coordinates (z > 0), distortion included.
     pub fn project(&self, p_camera: &Vector3<f64>) -> Point2<f64> {
         let straight = Point2::new(p_camera.x / p_camera.z, p_camera.y / p_camera.z);
-        self.pixel(&self.distortion.bend(&straight).point)
+        self.pixel(&self.distortion.distort(&straight).point)
     }
 
     /// As [`Intrinsics::project`], with the derivative by the point.
     pub fn project_with(&self, p_camera: &Vector3<f64>) -> (Point2<f64>, Matrix2x3<f64>) {
         let inverse = 1.0 / p_camera.z;
         let straight = Point2::new(p_camera.x * inverse, p_camera.y * inverse);
-        let bent = self.distortion.bend(&straight);
+        let bent = self.distortion.distort(&straight);
         let perspective = Matrix2x3::new(1.0, 0.0, -straight.x, 0.0, 1.0, -straight.y) * inverse;
         let focal = Matrix2::new(self.fx_px, 0.0, 0.0, self.fy_px);
         (self.pixel(&bent.point), focal * bent.by_straight * perspective)
     }
 
     /// The pixel where an undistorted pinhole with the same K would see what this camera sees at `px`. `None` where the
-    /// lens cannot be undone: see [`Distortion::straighten`].
+    /// lens cannot be undone: see [`Distortion::undistort`].
     pub fn undistort(&self, px: &Point2<f64>) -> Option<Point2<f64>> {
         if self.distortion == Distortion::None {
             return Some(*px);
         }
-        Some(self.pixel(&self.distortion.straighten(&self.normalised(px))?))
+        Some(self.pixel(&self.distortion.undistort(&self.normalised(px))?))
     }
 
     /// As [`Intrinsics::undistort`], with the derivative by `px`: what turns the covariance of a corner.
@@ -113,8 +113,8 @@ impl Intrinsics {
         if self.distortion == Distortion::None {
             return Some((*px, Matrix2::identity()));
         }
-        let straight = self.distortion.straighten(&self.normalised(px))?;
-        let back = self.distortion.bend(&straight).by_straight.try_inverse()?;
+        let straight = self.distortion.undistort(&self.normalised(px))?;
+        let back = self.distortion.distort(&straight).by_straight.try_inverse()?;
         let focal = Matrix2::new(self.fx_px, 0.0, 0.0, self.fy_px);
         let inverse = Matrix2::new(1.0 / self.fx_px, 0.0, 0.0, 1.0 / self.fy_px);
         Some((self.pixel(&straight), focal * back * inverse))

@@ -29,7 +29,7 @@ impl Intrinsics {
     /// camera's (share of the focal length, cx, cy) were more; still written as a pixel of this pinhole. `None` where the
     /// lens cannot be undone.
     pub fn straight_by_errors(&self, straight_px: &Point2<f64>) -> Option<Matrix2x3<f64>> {
-        let bent = self.distortion.bend(&self.normalised(straight_px));
+        let bent = self.distortion.distort(&self.normalised(straight_px));
         let focal = Matrix2::new(self.fx_px, 0.0, 0.0, self.fy_px);
         let back = focal * bent.by_straight.try_inverse()?;
         let share = back * bent.point.coords;

@@ -100,7 +100,7 @@ fn assert_pose(facts: &QuadAnalysis) {
 fn a_known_landmark_gives_its_pose() {
     let (image, quad) = scene(1);
     let facts = facts(&image, quad, Some(&camera()));
-    assert_eq!(facts.verdict.as_ref().unwrap().recognition, Verdict::Unique(LandmarkId(1)));
+    assert_eq!(facts.recognition.as_ref().unwrap().verdict, Verdict::Unique(LandmarkId(1)));
     assert_pose(&facts);
 }
 
@@ -138,7 +138,7 @@ fn corners_that_start_elsewhere_are_turned_back() {
     quad.upright_ambiguous = true;
     let facts = facts(&image, quad.clone(), Some(&camera()));
     assert_pose(&facts);
-    let seen = matched_border(&quad, facts.verdict.as_ref().unwrap(), &Params::default()).unwrap();
+    let seen = matched_border(&quad, facts.recognition.as_ref().unwrap(), &Params::default()).unwrap();
     let border = BORDER_SIGMA_PX.powi(2);
     assert!(
         (seen.covariance_px2[0][(0, 0)] - 0.05 - border).abs() < 1e-12,
@@ -157,7 +157,7 @@ fn an_inner_border_counts_as_its_own_corners() {
     (quad.corners_px, quad.alternates) = (outer, vec![inner]);
     let facts = facts(&image, quad, Some(&camera()));
     assert_eq!((facts.quad.corners_px, &facts.quad.alternates[..]), (inner, &[outer][..]));
-    assert_eq!(facts.verdict.as_ref().unwrap().border, 0);
+    assert_eq!(facts.recognition.as_ref().unwrap().border, 0);
     assert_pose(&facts);
 }
 
@@ -169,7 +169,7 @@ fn another_border_than_the_taught_one_gives_the_same_pose() {
     let inner = quad.corners_px.points().map(|c| Point2::from(centre + (c.coords - centre) * 0.95));
     quad.corners_px = Corners::new(inner).unwrap();
     let facts = facts(&image, quad, Some(&camera()));
-    assert_eq!(facts.verdict.as_ref().unwrap().recognition, Verdict::Unique(LandmarkId(1)));
+    assert_eq!(facts.recognition.as_ref().unwrap().verdict, Verdict::Unique(LandmarkId(1)));
     let pose = facts.pose.unwrap();
     let error = pose.best.camera_from_landmark.inverse() * camera_from_landmark();
     // As detected it would stand 5 % farther away: 10 cm.
@@ -187,7 +187,7 @@ fn no_pose_without_its_reasons() {
     let (stranger, stranger_quad) = scene(3);
     assert_eq!(facts(&stranger, stranger_quad, Some(&camera())).pose, Err(PoseUnavailable::NotUnique));
     let three_sided = facts(&image, Quad { kind: QuadKind::ThreeSided, ..quad }, Some(&camera()));
-    assert_eq!((three_sided.verdict, three_sided.pose), (None, Err(PoseUnavailable::NotUnique)));
+    assert_eq!((three_sided.recognition, three_sided.pose), (None, Err(PoseUnavailable::NotUnique)));
 }
 
 #[test]
@@ -198,7 +198,7 @@ fn only_so_many_quads_are_asked() {
     let (models, sizes) = (ModelSet::default(), BTreeMap::new());
     let landmarks = LandmarkDatabase { models: &models, sizes: &sizes, kind: DistanceKind::Both };
     let facts = analyse_quads(&image, quads, None, landmarks, &Params::default(), &mut NoTrace);
-    let asked: Vec<bool> = facts.quads.iter().map(|q| q.verdict.is_some()).collect();
+    let asked: Vec<bool> = facts.quads.iter().map(|q| q.recognition.is_some()).collect();
     assert_eq!(asked.iter().filter(|a| **a).count(), MAX_RECOGNISED_QUADS);
     assert!(!asked[0] && !asked[MAX_RECOGNISED_QUADS + 1]);
 }

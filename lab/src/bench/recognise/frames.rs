@@ -21,7 +21,7 @@ use sim::{
 };
 use std::{collections::BTreeMap, sync::Arc};
 use vision::{
-    detect::{DetectBuffers, detect_in},
+    detect::{DetectBuffers, detect_with},
     frame::{GrayImage, Intrinsics},
     model::{LandmarkId, ModelSet},
     params::Params,
@@ -197,13 +197,13 @@ impl Timed<'_> {
         let landmarks =
             LandmarkDatabase { models: self.models, sizes: &sizes, kind: DistanceKind::default() };
         let clock = Clock::start();
-        let found = detect_in(memory, frame, &p.detect, &mut NoTrace);
+        let found = detect_with(memory, frame, &p.detect, &mut NoTrace);
         let mut split = Split { clock: Clock::start(), recognition_ms: 0.0 };
         let facts = analyse_quads(frame, found, Some(&scenes.camera), landmarks, p, &mut split);
         let ms = clock.ms();
         let least = &mut self.global.recognition_ms[i];
         *least = least.min(split.recognition_ms);
-        let named = facts.quads.iter().filter_map(|q| q.verdict.as_ref()).filter_map(unique).collect();
+        let named = facts.quads.iter().filter_map(|q| q.recognition.as_ref()).filter_map(unique).collect();
         self.global.put(i, named, ms);
         let clock = Clock::start();
         let guided = self.guide.look(i, frame, &scenes.camera);
@@ -281,7 +281,7 @@ pub(super) fn run(
 }
 
 fn unique(verdict: &vision::recognise::RecognitionResult) -> Option<usize> {
-    match verdict.recognition {
+    match verdict.verdict {
         Verdict::Unique(id) => index(id),
         Verdict::Unknown | Verdict::Ambiguous(_) => None,
     }

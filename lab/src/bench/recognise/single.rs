@@ -69,7 +69,7 @@ impl Asked {
     /// Times of every quad in the map `models`.
     pub(super) fn time(&self, models: &ModelSet, rounds: usize, p: &Params) -> Report {
         let ask = |q: &Query| {
-            fastest(rounds, || recognise(&q.image, &q.quad, models, DistanceKind::default(), p).recognition)
+            fastest(rounds, || recognise(&q.image, &q.quad, models, DistanceKind::default(), p).verdict)
         };
         let own: Vec<(u64, (f64, Verdict))> = self.own.iter().map(|(id, q)| (*id, ask(q))).collect();
         let strangers: Vec<(f64, Verdict)> = self.strangers.iter().map(ask).collect();
@@ -116,7 +116,7 @@ pub(super) fn recall(args: &Args, first: u64, models: &ModelSet, p: &Params) -> 
         let q = query(first, index, args.seed.wrapping_add(0x5000_0000 + i as u64))?;
         let alone = ModelSet::new(vec![Arc::clone(all[index])], p)?;
         let kind = DistanceKind::default();
-        let accepted = recognise(&q.image, &q.quad, &alone, kind, p).recognition != Verdict::Unknown;
+        let accepted = recognise(&q.image, &q.quad, &alone, kind, p).verdict != Verdict::Unknown;
         let listed = accepted && listed(&q, index, models, p);
         Ok((accepted, listed))
     })?;

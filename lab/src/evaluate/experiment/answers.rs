@@ -141,7 +141,7 @@ fn hard(draw: u64, random: &mut Random) -> Conditions {
 
 /// What a verdict names, if anything, and whether that is right.
 fn named(verdict: &RecognitionResult, truth: Option<LandmarkId>) -> Option<Named> {
-    let Verdict::Unique(id) = verdict.recognition else { return None };
+    let Verdict::Unique(id) = verdict.verdict else { return None };
     let best = verdict.candidates.iter().position(|c| c.landmark == id)?;
     Some(Named {
         measures: measures(&verdict.candidates, best, verdict.landmarks)?,

@@ -191,7 +191,7 @@ fn stranger_view(
         view(class, &stranger.texture, mixed(&[common.seed, 3, i as u64, u64::from(v)]), common)?;
     let quads = corners.map_or_else(|| detected(&seen, p), |c| vec![quad(c)]);
     let verdicts =
-        quads.iter().map(|q| recognise(&seen.image, q, &class.models, DistanceKind::Both, p).recognition);
+        quads.iter().map(|q| recognise(&seen.image, q, &class.models, DistanceKind::Both, p).verdict);
     let worst = verdicts.min_by_key(|r| match r {
         Verdict::Unique(_) => 0,
         Verdict::Ambiguous(_) => 1,

@@ -137,7 +137,7 @@ fn count(
         };
         let Some(corners) = noisy(&seen.corners, args.common.corner_noise_px, &mut random) else { continue };
         counts.views += 1;
-        match recognise(&seen.image, &quad(corners), &class.models, DistanceKind::Both, p).recognition {
+        match recognise(&seen.image, &quad(corners), &class.models, DistanceKind::Both, p).verdict {
             Verdict::Unique(id) if is(id, own) => counts.right += 1,
             Verdict::Unique(id) if is(id, double) => counts.double += 1,
             Verdict::Unique(_) => counts.other += 1,

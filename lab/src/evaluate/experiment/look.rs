@@ -147,7 +147,7 @@ fn paper_ratios(class: &Class, id: LandmarkId, seen: &Exhibit, corners: &Corners
 }
 
 fn outcome(verdict: &RecognitionResult, id: LandmarkId) -> Outcome {
-    match verdict.recognition {
+    match verdict.verdict {
         Verdict::Unique(named) if named == id => return Outcome::Right,
         Verdict::Unique(_) => return Outcome::Wrong,
         Verdict::Ambiguous(named) => {
@@ -188,7 +188,7 @@ mod tests {
             refusal,
         };
         RecognitionResult {
-            recognition,
+            verdict: recognition,
             candidates: vec![candidate],
             entropy_m: 1.0,
             entropy_norm: 1.0,

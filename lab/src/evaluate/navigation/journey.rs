@@ -267,15 +267,15 @@ impl Journey {
         };
         let mut global = Vec::new();
         for quad in &facts.quads {
-            let Some(Verdict::Unique(id)) = quad.verdict.as_ref().map(|v| v.recognition) else {
+            let Some(Verdict::Unique(id)) = quad.recognition.as_ref().map(|v| v.verdict) else {
                 continue;
             };
             // Where the picture was found to lie: the quad itself may be a border around it.
-            let found = quad.verdict.as_ref().and_then(|v| v.aligned_px).unwrap_or(quad.quad.corners_px);
+            let found = quad.recognition.as_ref().and_then(|v| v.aligned_px).unwrap_or(quad.quad.corners_px);
             if is_there(id, &found) {
                 global.push(world.name(id));
                 let corners =
-                    quad.verdict.as_ref().and_then(|v| matched_border(&quad.quad, v, &world.map.params));
+                    quad.recognition.as_ref().and_then(|v| matched_border(&quad.quad, v, &world.map.params));
                 if let (Some(corners), Some(view)) = (corners, truth.landmark(world.name(id))) {
                     let how = match corners.found_by {
                         FoundBy::Edges => "by the picture, detected",
@@ -286,7 +286,7 @@ impl Journey {
                     self.corners.entry(how).or_default().extend(off(&corners, view));
                 }
             } else {
-                tracing::info!(landmark = world.name(id), ?found, verdict = ?quad.verdict, "a wrong name");
+                tracing::info!(landmark = world.name(id), ?found, verdict = ?quad.recognition, "a wrong name");
                 self.false_matches += 1;
             }
         }

@@ -85,7 +85,7 @@ pub enum TrainError {
 }
 
 /// A network that gives the right one of some rivals the greatest output.
-pub fn to_choose(rivals: &[ChoiceExample], p: &TrainParams) -> Result<Network, TrainError> {
+pub fn train_choice(rivals: &[ChoiceExample], p: &TrainParams) -> Result<Network, TrainError> {
     if p.reach.is_nan() || p.reach <= 0.0 {
         return Err(TrainError::Range("reach"));
     }
@@ -93,7 +93,7 @@ pub fn to_choose(rivals: &[ChoiceExample], p: &TrainParams) -> Result<Network, T
 }
 
 /// A network whose output is the logarithm of the odds that an example is one.
-pub fn to_tell(examples: &[LabelledExample], p: &TrainParams) -> Result<Network, TrainError> {
+pub fn train_classifier(examples: &[LabelledExample], p: &TrainParams) -> Result<Network, TrainError> {
     let both = examples.iter().any(|e| e.is_one) && examples.iter().any(|e| !e.is_one);
     if !both {
         return Err(TrainError::NothingToLearn);

@@ -42,7 +42,7 @@ fn right_share(net: &Network, examples: &[LabelledExample]) -> f64 {
 fn hidden_units_learn_what_lines_cannot() {
     let (seen, new) = (rivals(300, 1), rivals(200, 2));
     let share = |hidden| {
-        let net = to_choose(&seen, &TrainParams { hidden, ..quick() }).unwrap();
+        let net = train_choice(&seen, &TrainParams { hidden, ..quick() }).unwrap();
         assert_eq!(net.check(2), Ok(()));
         new.iter().filter(|r| chosen(&net, r)).count()
     };
@@ -93,10 +93,10 @@ fn the_network_says_what_was_trained() {
 #[test]
 fn odds_are_told_and_repeat() {
     let data = examples(300, 3, |_| false);
-    let net = to_tell(&data, &quick()).unwrap();
+    let net = train_classifier(&data, &quick()).unwrap();
     assert!(right_share(&net, &examples(300, 4, |_| false)) > 0.95);
-    assert_eq!(net, to_tell(&data, &quick()).unwrap());
-    assert_ne!(net, to_tell(&data, &TrainParams { seed: 2, ..quick() }).unwrap());
+    assert_eq!(net, train_classifier(&data, &quick()).unwrap());
+    assert_ne!(net, train_classifier(&data, &TrainParams { seed: 2, ..quick() }).unwrap());
 }
 
 #[test]
@@ -112,7 +112,7 @@ fn what_is_further_off_is_wanted_less() {
     let e = std::f64::consts::E;
     assert!((wanted[1] / wanted[2] - e).abs() < 1e-12 && (wanted[1] / wanted[0] - e * e).abs() < 1e-12);
     assert!((wanted.iter().sum::<f64>() - 1.0).abs() < 1e-12);
-    assert_eq!(to_choose(&[r(&[1.0])], &quick()), Err(TrainError::NothingToLearn));
+    assert_eq!(train_choice(&[r(&[1.0])], &quick()), Err(TrainError::NothingToLearn));
 }
 
 #[test]
@@ -122,7 +122,8 @@ fn a_weight_of_two_is_two_of_them() {
     data[..10].iter_mut().for_each(|e| e.weight = 2.0);
     let p = TrainParams { hidden: 0, ..quick() };
     let scale = |n: &Network| [n.linear[0] / n.deviation[0], n.linear[1] / n.deviation[1]];
-    let (a, b) = (scale(&to_tell(&data, &p).unwrap()), scale(&to_tell(&doubled, &p).unwrap()));
+    let (a, b) =
+        (scale(&train_classifier(&data, &p).unwrap()), scale(&train_classifier(&doubled, &p).unwrap()));
     // Only the scaling of the measurements, and with it the ridge, differs a little.
     assert!((a[0] - b[0]).abs() < 0.05 * a[0].abs(), "{a:?} {b:?}");
 }
@@ -130,26 +131,26 @@ fn a_weight_of_two_is_two_of_them() {
 #[test]
 fn what_cannot_be_trained_is_refused() {
     let good = examples(10, 6, |_| false);
-    let with = |p: TrainParams| to_tell(&good, &p).unwrap_err();
+    let with = |p: TrainParams| train_classifier(&good, &p).unwrap_err();
     assert_eq!(with(TrainParams { hidden: MAX_HIDDEN + 1, ..quick() }), TrainError::Range("hidden"));
     assert_eq!(with(TrainParams { steps: MAX_STEPS + 1, ..quick() }), TrainError::Range("steps"));
     assert_eq!(with(TrainParams { rate: f64::NAN, ..quick() }), TrainError::Range("rate"));
     assert_eq!(with(TrainParams { ridge: -1.0, ..quick() }), TrainError::Range("ridge"));
-    assert!(to_tell(&good, &TrainParams { hidden: MAX_HIDDEN, steps: 1, ..quick() }).is_ok());
+    assert!(train_classifier(&good, &TrainParams { hidden: MAX_HIDDEN, steps: 1, ..quick() }).is_ok());
     let reach = TrainParams { reach: 0.0, ..quick() };
-    assert_eq!(to_choose(&rivals(2, 1), &reach), Err(TrainError::Range("reach")));
+    assert_eq!(train_choice(&rivals(2, 1), &reach), Err(TrainError::Range("reach")));
     let mut bad = good.clone();
     bad[4].weight = 0.0;
-    assert_eq!(to_tell(&bad, &quick()), Err(TrainError::Malformed(4)));
+    assert_eq!(train_classifier(&bad, &quick()), Err(TrainError::Malformed(4)));
     bad = good.clone();
     bad[3].features.push(1.0);
-    assert_eq!(to_tell(&bad, &quick()), Err(TrainError::Malformed(3)));
+    assert_eq!(train_classifier(&bad, &quick()), Err(TrainError::Malformed(3)));
     bad = good.clone();
     bad[2].features[0] = f64::INFINITY;
-    assert_eq!(to_tell(&bad, &quick()), Err(TrainError::Malformed(2)));
+    assert_eq!(train_classifier(&bad, &quick()), Err(TrainError::Malformed(2)));
     let mut torn = rivals(2, 1);
     torn[1].off.pop();
-    assert_eq!(to_choose(&torn, &quick()), Err(TrainError::Malformed(1)));
+    assert_eq!(train_choice(&torn, &quick()), Err(TrainError::Malformed(1)));
     let ones: Vec<LabelledExample> = good.iter().filter(|e| e.is_one).cloned().collect();
-    assert_eq!(to_tell(&ones, &quick()), Err(TrainError::NothingToLearn));
+    assert_eq!(train_classifier(&ones, &quick()), Err(TrainError::NothingToLearn));
 }

@@ -8,7 +8,7 @@ use crate::{
         edge_support::gradients::Gradients,
         params::{DetectParams, QuadParams},
         quad::{Quad, QuadKind},
-        refine::refit::sharpen,
+        refine::refit::refit_corners,
     },
     frame::GrayImage,
     geometry::corners::Corners,
@@ -47,7 +47,7 @@ pub(crate) fn at_full_size(
         let g = Gradients { image: &cut, gx: map.gx(), gy: map.gy() };
         let sharp = window.moved(&quad.corners_px, -1.0).map(|corners_px| {
             let here = Quad { corners_px, alternates: Vec::new(), ..quad.clone() };
-            sharpen(here, &g, &search)
+            refit_corners(here, &g, &search)
         });
         memory.give_back(map);
         let back = sharp.and_then(|s| Some(Quad { corners_px: window.moved(&s.corners_px, 1.0)?, ..s }));

@@ -12,7 +12,7 @@ use crate::detect::{
 
 /// Refits a chosen quad with all samples. One that was seen on a coarser scale only may lose its edges here: then it
 /// stays as it was.
-pub fn sharpen(quad: Quad, g: &Gradients, p: &QuadParams) -> Quad {
+pub fn refit_corners(quad: Quad, g: &Gradients, p: &QuadParams) -> Quad {
     let search = EdgeProbeParams {
         reach_px: p.refit_reach_px,
         min_step: p.min_step,

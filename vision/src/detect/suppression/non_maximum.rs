@@ -54,7 +54,7 @@ const SHARED_SIDE_PX: f64 = 4.0;
 ///
 /// Departs from method 3.4: its table of compatible quads is kept (disjoint and nested may stay, crossing may not), but
 /// quads are taken greedily by rank instead of by relaxation over pairs.
-pub fn resolve(rated: Vec<ScoredQuad>, p: &QuadParams) -> Vec<Quad> {
+pub fn suppress_overlaps(rated: Vec<ScoredQuad>, p: &QuadParams) -> Vec<Quad> {
     let mut kept: Vec<Quad> = Vec::new();
     for quad in different(rated, p) {
         if !kept.iter().any(|k| contradict(k.corners_px.points(), quad.corners_px.points())) {
@@ -103,22 +103,22 @@ pub struct ClassifiedQuad {
 
 /// Moves the sides of the rated quads, by rank, to the lines that look most like borders, and tells how likely they are
 /// things. A quad that contradicts one of at least `sure_probability` is passed over; nothing else stands in its way. All
-/// that were looked at are returned, at most [`MAX_SETTLED`]. The border that a quad had before stays among its alternates.
-pub fn settle(rated: Vec<ScoredQuad>, g: &Gradients, p: &QuadParams) -> Vec<ClassifiedQuad> {
+/// that were looked at are returned, at most [`MAX_CLASSIFIED`]. The border that a quad had before stays among its alternates.
+pub fn snap_sides(rated: Vec<ScoredQuad>, g: &Gradients, p: &QuadParams) -> Vec<ClassifiedQuad> {
     let side_model = p.side_network();
     let thing_model = p.thing_network();
-    let mut settled: Vec<ClassifiedQuad> = Vec::new();
+    let mut classified: Vec<ClassifiedQuad> = Vec::new();
     for quad in different(rated, p) {
         // What is much larger than a thing that it holds may yet take its place.
         let taken = |q: &Quad| {
             let corners = q.corners_px.points();
-            let things = settled.iter().filter(|s| s.quad.score >= p.sure_probability);
+            let things = classified.iter().filter(|s| s.quad.score >= p.sure_probability);
             things.map(|s| s.quad.corners_px.points()).any(|k| against(k, corners) && !is_part(k, corners))
         };
         if taken(&quad) {
             continue;
         }
-        if settled.len() >= MAX_SETTLED {
+        if classified.len() >= MAX_CLASSIFIED {
             break;
         }
         let Some(chosen) = choose_sides(g, quad.corners_px.points(), side_model) else { continue };
@@ -129,20 +129,20 @@ pub fn settle(rated: Vec<ScoredQuad>, g: &Gradients, p: &QuadParams) -> Vec<Clas
         };
         let features = thing_features(sides, quad.corners_px.points(), quad.score, (g.width(), g.height()));
         let score = probability(thing_model, &features);
-        settled.push(ClassifiedQuad { quad: Quad { score, ..quad }, features });
+        classified.push(ClassifiedQuad { quad: Quad { score, ..quad }, features });
     }
-    settled
+    classified
 }
 
-/// The things among settled quads. Of those that contradict each other the likeliest, of those that are sure the first;
+/// The things among classified quads. Of those that contradict each other the likeliest, of those that are sure the first;
 /// but a quad of which all that it contradicts are parts, no likelier and no better supported, takes their place: a pane
 /// looks like a thing too and comes before its window when that is seen a little worse.
-pub fn things(mut settled: Vec<ClassifiedQuad>, p: &QuadParams) -> Vec<Quad> {
+pub fn suppress_non_maxima(mut classified: Vec<ClassifiedQuad>, p: &QuadParams) -> Vec<Quad> {
     let mut kept: Vec<Quad> = Vec::new();
     let likely = |s: &ClassifiedQuad| s.quad.score.min(p.sure_probability);
-    settled.retain(|s| s.quad.score >= p.min_probability);
-    settled.sort_by(|a, b| likely(b).total_cmp(&likely(a)));
-    for quad in settled.into_iter().map(|s| s.quad) {
+    classified.retain(|s| s.quad.score >= p.min_probability);
+    classified.sort_by(|a, b| likely(b).total_cmp(&likely(a)));
+    for quad in classified.into_iter().map(|s| s.quad) {
         let corners = quad.corners_px.points();
         let rivals = |k: &Quad| against(k.corners_px.points(), corners);
         let worst = |q: &Quad| q.side_support.iter().copied().fold(1.0, f64::min);
@@ -180,7 +180,7 @@ const SUPPORT_SLACK: f64 = 0.06;
 const MAX_PART: f64 = 0.6;
 
 /// Most quads whose sides are moved.
-pub const MAX_SETTLED: usize = 80;
+pub const MAX_CLASSIFIED: usize = 80;
 /// Quads that overlap by more than this are one.
 const SAME_IOU: f64 = 0.8;
 /// A quad whose sides moved is still the same thing if both overlap by this much.
@@ -224,11 +224,11 @@ mod tests {
         // Nothing is a thing, so nothing stands in anybody's way.
         let p = QuadParams { max_refitted: usize::MAX, sure_probability: 2.0, ..QuadParams::default() };
         let rated = rate(&seeds, &g, &p);
-        assert!(rated.len() > MAX_RATED && MAX_RATED > MAX_SETTLED);
-        assert_eq!(resolve(rated.clone(), &p).len(), MAX_RATED);
-        assert_eq!(settle(rated.clone(), &g, &p).len(), MAX_SETTLED);
-        // Fewer are all settled.
-        assert_eq!(settle(rated[..MAX_SETTLED - 1].to_vec(), &g, &p).len(), MAX_SETTLED - 1);
+        assert!(rated.len() > MAX_RATED && MAX_RATED > MAX_CLASSIFIED);
+        assert_eq!(suppress_overlaps(rated.clone(), &p).len(), MAX_RATED);
+        assert_eq!(snap_sides(rated.clone(), &g, &p).len(), MAX_CLASSIFIED);
+        // Fewer are all classified.
+        assert_eq!(snap_sides(rated[..MAX_CLASSIFIED - 1].to_vec(), &g, &p).len(), MAX_CLASSIFIED - 1);
     }
 
     fn thing([left, top, right, bottom]: [f64; 4], score: f64, support: f64) -> ClassifiedQuad {
@@ -259,7 +259,7 @@ mod tests {
         let kept = |whole: ClassifiedQuad| {
             let mut all = panes();
             all.push(whole);
-            things(all, &params())
+            suppress_non_maxima(all, &params())
         };
         let found = kept(thing(WINDOW, 0.98, 0.95));
         assert_eq!(found.len(), 1);
@@ -275,14 +275,15 @@ mod tests {
         }
         // What is hardly larger than what is there is the same thing seen differently.
         let same = vec![thing(WINDOW, 0.985, 1.0), thing([20.0, 20.0, 120.0, 210.0], 0.99, 1.0)];
-        assert!(things(same, &params())[0].corners_px.area_px2() < 14_100.0);
+        assert!(suppress_non_maxima(same, &params())[0].corners_px.area_px2() < 14_100.0);
     }
 
     #[test]
     fn of_what_contradicts_the_likeliest_stays() {
         let beside = [60.0, 0.0, 160.0, 140.0];
         let left = |first: f64, second: f64| {
-            let found = things(vec![thing(WINDOW, first, 1.0), thing(beside, second, 1.0)], &params());
+            let found =
+                suppress_non_maxima(vec![thing(WINDOW, first, 1.0), thing(beside, second, 1.0)], &params());
             found.iter().map(|q| q.corners_px.points()[0].x).collect::<Vec<_>>()
         };
         assert_eq!(left(0.9, 0.95), [60.0]);

@@ -3,7 +3,7 @@
 
 use crate::{
     detect::{
-        detector::{MAX_QUADS, candidates, detect},
+        detector::{MAX_QUADS, detect, scored_quads},
         edge_buffers::MAX_SCALES,
         edge_support::gradients::Gradients,
         edges::edge_map::{EdgeMap, MAX_EDGE_POINTS},
@@ -92,7 +92,7 @@ fn hold(image: &GrayImage) {
     let p = DetectParams::default();
     let work = pyramid::reduce(image, pyramid::working_factor(image, p.quads.working_side_px));
     let mut counted = Counted { area: work.width() * work.height(), ..Counted::default() };
-    let (rated, edges) = candidates(&work, &p, &mut counted);
+    let (rated, edges) = scored_quads(&work, &p, &mut counted);
     assert!(rated.len() <= (MAX_REFITTED + MAX_REFITTED / 2) * p.quads.scales);
     let g = Gradients { image: &work, gx: edges.gx(), gy: edges.gy() };
     assert!(hypotheses(&counted.segments, &g, &p.quads.hypotheses).len() <= MAX_HYPOTHESES);

@@ -2,7 +2,7 @@
 
 use crate::{
     detect::{
-        detector::{MAX_QUADS, detect, detect_in},
+        detector::{MAX_QUADS, detect, detect_with},
         edge_buffers::{DetectBuffers, MAX_SCALES},
         params::{DetectParams, Grouping, Nested},
         quad::{Quad, QuadKind},
@@ -166,7 +166,7 @@ fn memory_of_earlier_images_changes_nothing() {
     let mut memory = DetectBuffers::default();
     for p in [DetectParams::default(), paper()] {
         for image in [image(1), image(3), image(1), image(2)] {
-            let quads = detect_in(&mut memory, &image, &p, &mut NoTrace);
+            let quads = detect_with(&mut memory, &image, &p, &mut NoTrace);
             assert!(!quads.is_empty());
             assert_eq!(quads, detect(&image, &p, &mut NoTrace));
         }

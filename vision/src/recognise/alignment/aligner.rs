@@ -112,11 +112,15 @@ impl<'a> Aligner<'a> {
 
     /// Lays the picture on `template`. `None` when it is of something else, or says nothing about where it lies.
     pub fn align(&self, around: &Surroundings<'_>, template: &Template<'_>) -> Option<Alignment> {
-        self.finish(around, template, &self.glance(around, template)?)
+        self.align_fine(around, template, &self.align_coarse(around, template)?)
     }
 
     /// The coarse look. `None` when the picture is of something else.
-    pub fn glance(&self, around: &Surroundings<'_>, template: &Template<'_>) -> Option<CoarseAlignment> {
+    pub fn align_coarse(
+        &self,
+        around: &Surroundings<'_>,
+        template: &Template<'_>,
+    ) -> Option<CoarseAlignment> {
         let size = coarse_size(self.on.size);
         if around.icon.size != self.on.size
             || template.icon.size != self.on.size
@@ -138,7 +142,7 @@ impl<'a> Aligner<'a> {
     }
 
     /// The fine looks, from where the coarse one came to.
-    pub fn finish(
+    pub fn align_fine(
         &self,
         around: &Surroundings<'_>,
         template: &Template<'_>,

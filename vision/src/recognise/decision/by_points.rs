@@ -81,7 +81,7 @@ pub(crate) fn by_points(
     };
     let sure = refusal.is_none();
     Some(RecognitionResult {
-        recognition: if sure { Verdict::Unique(model.id) } else { Verdict::Ambiguous(model.id) },
+        verdict: if sure { Verdict::Unique(model.id) } else { Verdict::Ambiguous(model.id) },
         candidates: found.iter().enumerate().filter_map(of).take(MAX_CANDIDATES).collect(),
         entropy_m: entropy_m(accepted, n),
         entropy_norm: entropy_norm(accepted, n),

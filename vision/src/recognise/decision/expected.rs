@@ -112,7 +112,7 @@ fn by_icon(
     let mut by_icons = p.clone();
     by_icons.recognise.verdict.points = false;
     let verdict = recognise(image, &as_quad(expected_px), &models.only(id)?, DistanceKind::Both, &by_icons);
-    let (Verdict::Unique(_), Some(corners_px)) = (verdict.recognition, verdict.aligned_px) else {
+    let (Verdict::Unique(_), Some(corners_px)) = (verdict.verdict, verdict.aligned_px) else {
         return None;
     };
     let covariance_px2 = aligned_covariance_px2(&corners_px, p.icon.size);

@@ -71,7 +71,7 @@ pub enum Verdict {
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecognitionResult {
     /// The answer.
-    pub recognition: Verdict,
+    pub verdict: Verdict,
     /// Nearest landmarks by increasing ratio, at most [`MAX_CANDIDATES`]; refused ones included.
     pub candidates: Vec<MatchCandidate>,
     /// The paper's m with the printed 1/(N+1), natural logarithm (method 10). Never a gate.

@@ -15,11 +15,11 @@ use crate::{
         },
         distance_kind::DistanceKind,
         params::VerdictParams,
-        retrieval::nearest::{NearLandmark, QuadReading, nearest, short_list, sightings},
+        retrieval::nearest::{NearLandmark, QuadReading, nearest, quad_readings, short_list},
         step_listener::{NoListener, RecogniseStep, StepListener},
         verification::{
             content::Content,
-            short_list::{VerifiedLandmark, look, verify},
+            short_list::{VerifiedLandmark, verify, verify_short_list},
         },
     },
 };
@@ -54,12 +54,12 @@ pub fn recognise_watched(
             return verdict;
         }
     }
-    let sightings = sightings(image, quad, p);
+    let readings = quad_readings(image, quad, p);
     watch.finished(RecogniseStep::Icons);
     let near = match kind {
-        DistanceKind::Both => short_list(&sightings, models, p.recognise.verdict.short_list),
+        DistanceKind::Both => short_list(&readings, models, p.recognise.verdict.short_list),
         DistanceKind::Correlation | DistanceKind::Hausdorff => {
-            nearest(&sightings, models, kind, MAX_CANDIDATES, p)
+            nearest(&readings, models, kind, MAX_CANDIDATES, p)
         }
     };
     watch.finished(RecogniseStep::ShortList);
@@ -68,13 +68,13 @@ pub fn recognise_watched(
         .map(|near| VerifiedLandmark { near, moved: None, contradicting: 0.0, content: Content::NONE })
         .collect();
     match kind {
-        DistanceKind::Both => look(image, &sightings, &mut found, models.lattices(), p, watch),
+        DistanceKind::Both => verify_short_list(image, &readings, &mut found, models.lattices(), p, watch),
         DistanceKind::Correlation | DistanceKind::Hausdorff => {
-            verify(image, &sightings, &mut found, kind, models.lattices(), p);
+            verify(image, &readings, &mut found, kind, models.lattices(), p);
             watch.finished(RecogniseStep::Alignment);
         }
     }
-    let verdict = decide(&found, &sightings, kind, models.len(), &p.recognise.verdict);
+    let verdict = decide(&found, &readings, kind, models.len(), &p.recognise.verdict);
     watch.finished(RecogniseStep::Decision);
     verdict
 }
@@ -82,7 +82,7 @@ pub fn recognise_watched(
 /// No landmark, no candidate.
 fn unknown(landmarks: usize) -> RecognitionResult {
     RecognitionResult {
-        recognition: Verdict::Unknown,
+        verdict: Verdict::Unknown,
         candidates: Vec::new(),
         entropy_m: 1.0,
         entropy_norm: 1.0,
@@ -98,7 +98,7 @@ fn unknown(landmarks: usize) -> RecognitionResult {
 /// Thresholds, margin, probabilities: the paper's three cases.
 fn decide(
     found: &[VerifiedLandmark],
-    sightings: &[QuadReading],
+    readings: &[QuadReading],
     kind: DistanceKind,
     landmarks: usize,
     p: &VerdictParams,
@@ -117,7 +117,7 @@ fn decide(
         .collect();
     let Some(best) = refusals.iter().position(Option::is_none) else { return verdict };
     let near = &found[best].near;
-    (verdict.rotation, verdict.border) = (sightings[near.sighting].rotation, sightings[near.sighting].border);
+    (verdict.rotation, verdict.border) = (readings[near.reading].rotation, readings[near.reading].border);
     verdict.aligned_px = found[best].moved;
     let margin = margin(found, best, kind);
     // Departs from method 10, which asks for a margin only where two or more are accepted: a runner-up just above its
@@ -128,11 +128,11 @@ fn decide(
         (kind == DistanceKind::Both && p.points).then_some(MatchRefusal::Plain)
     };
     if refusal.is_none() {
-        verdict.recognition = Verdict::Unique(near.model.id);
+        verdict.verdict = Verdict::Unique(near.model.id);
         verdict.confidence = confidence(&verdict.candidates, best, landmarks, kind);
         return verdict;
     }
-    verdict.recognition = Verdict::Ambiguous(near.model.id);
+    verdict.verdict = Verdict::Ambiguous(near.model.id);
     if let Some(c) = verdict.candidates.get_mut(best) {
         c.refusal = refusal;
     }

@@ -1,5 +1,5 @@
-//! Sightings of one quad (borders times rotations) and a set of landmarks in, the nearest landmarks out, by the
-//! smallest distance over sightings and exemplars (method 7.5). Deciding is the verdict's work.
+//! Readings of one quad (borders times rotations) and a set of landmarks in, the nearest landmarks out, by the
+//! smallest distance over readings and exemplars (method 7.5). Deciding is the verdict's work.
 
 use crate::{
     detect::quad::Quad,
@@ -64,7 +64,7 @@ impl QuadReading {
 }
 
 /// Every reading of `quad` whose icon can be cut: all borders, and all four rotations where upright is unsure.
-pub(crate) fn sightings(image: &GrayImage, quad: &Quad, p: &Params) -> Vec<QuadReading> {
+pub(crate) fn quad_readings(image: &GrayImage, quad: &Quad, p: &Params) -> Vec<QuadReading> {
     let borders = std::iter::once(&quad.corners_px).chain(&quad.alternates).take(MAX_BORDERS);
     let rotations = if quad.upright_ambiguous { 4 } else { 1 };
     let mut all = Vec::new();
@@ -78,12 +78,12 @@ pub(crate) fn sightings(image: &GrayImage, quad: &Quad, p: &Params) -> Vec<QuadR
     all
 }
 
-/// A landmark near one sighting.
+/// A landmark near one reading.
 #[derive(Debug, Clone)]
 pub(crate) struct NearLandmark {
     pub(crate) model: Arc<LandmarkModel>,
-    /// Index of the sighting.
-    pub(crate) sighting: usize,
+    /// Index of the reading.
+    pub(crate) reading: usize,
     /// Index of the nearest exemplar.
     pub(crate) exemplar: usize,
     pub(crate) correlation: f64,
@@ -122,23 +122,23 @@ fn ratio(distance: f64, tau: f64) -> f64 {
     if tau > 0.0 { distance / tau } else { f64::INFINITY }
 }
 
-/// The `count` landmarks whose signatures are most like one of the sightings', best first, each with its best sighting;
+/// The `count` landmarks whose signatures are most like one of the readings', best first, each with its best reading;
 /// of equal ones the lower id. Distances are left at their worst.
-pub(crate) fn short_list(sightings: &[QuadReading], models: &ModelSet, count: usize) -> Vec<NearLandmark> {
+pub(crate) fn short_list(readings: &[QuadReading], models: &ModelSet, count: usize) -> Vec<NearLandmark> {
     let mut found: Vec<(usize, Listed)> = Vec::new();
-    for (i, sighting) in sightings.iter().enumerate() {
-        found.extend(models.short_list(&sighting.signature, count).into_iter().map(|l| (i, l)));
+    for (i, reading) in readings.iter().enumerate() {
+        found.extend(models.short_list(&reading.signature, count).into_iter().map(|l| (i, l)));
     }
     found.sort_by(|a, b| b.1.likeness.total_cmp(&a.1.likeness).then((a.1.model, a.0).cmp(&(b.1.model, b.0))));
     let mut near: Vec<NearLandmark> = Vec::new();
-    for (sighting, listed) in found {
+    for (reading, listed) in found {
         let Some(model) = models.at(listed.model) else { continue };
         if near.len() == count || near.iter().any(|n| n.model.id == model.id) {
             continue;
         }
         near.push(NearLandmark {
             model: Arc::clone(model),
-            sighting,
+            reading,
             exemplar: listed.exemplar,
             correlation: WORST_CORRELATION,
             hausdorff: f64::INFINITY,
@@ -153,21 +153,21 @@ pub(crate) fn short_list(sightings: &[QuadReading], models: &ModelSet, count: us
 const WORST_CORRELATION: f64 = 2.0;
 
 /// C^r where the quad was found, to the exemplar that is nearest by its signature.
-pub(crate) fn correlation_as_found(near: &NearLandmark, sightings: &[QuadReading], p: &Params) -> f64 {
-    let (Some(sighting), Some(exemplar)) =
-        (sightings.get(near.sighting), near.model.exemplars.get(near.exemplar))
+pub(crate) fn correlation_as_found(near: &NearLandmark, readings: &[QuadReading], p: &Params) -> f64 {
+    let (Some(reading), Some(exemplar)) =
+        (readings.get(near.reading), near.model.exemplars.get(near.exemplar))
     else {
         return WORST_CORRELATION;
     };
     let rank = p.recognise.correlation.rank();
     let buckets = Buckets::new(&exemplar.icon(), &p.recognise.correlation);
-    correlation_within(sighting.buckets(p), &buckets, rank, WORST_CORRELATION).unwrap_or(WORST_CORRELATION)
+    correlation_within(reading.buckets(p), &buckets, rank, WORST_CORRELATION).unwrap_or(WORST_CORRELATION)
 }
 
 /// The `count` landmarks of least ratio by one of the paper's distances, and every one with a ratio below 1, rising; of
 /// equal ones the lower id. Where C^r decides and nothing comes within `verify_reach`, H^r is left infinite.
 pub(crate) fn nearest(
-    sightings: &[QuadReading],
+    readings: &[QuadReading],
     models: &ModelSet,
     kind: DistanceKind,
     count: usize,
@@ -181,9 +181,9 @@ pub(crate) fn nearest(
     let stable = p.learn.gates.min_stable_points;
     for model in models.iter().filter(|m| m.stable_points >= stable) {
         let near = match kind {
-            DistanceKind::Hausdorff => nearest_by_points(sightings, model, p),
+            DistanceKind::Hausdorff => nearest_by_points(readings, model, p),
             DistanceKind::Correlation | DistanceKind::Both => {
-                nearest_by_correlation(sightings, model, reach, p)
+                nearest_by_correlation(readings, model, reach, p)
             }
         };
         let Some(near) = near.filter(|n| n.ratio(kind) <= reach) else { continue };
@@ -200,15 +200,15 @@ pub(crate) fn nearest(
     let reach = p.recognise.verdict.verify_reach.max(1.0);
     if kind != DistanceKind::Hausdorff && found.first().is_some_and(|n| n.ratio(kind) < reach) {
         for near in &mut found {
-            near.hausdorff = least_hausdorff(sightings[near.sighting].points(p), &near.model, p).0;
+            near.hausdorff = least_hausdorff(readings[near.reading].points(p), &near.model, p).0;
         }
     }
     found
 }
 
-/// Least C^r over sightings and exemplars, unless its ratio is above `reach`.
+/// Least C^r over readings and exemplars, unless its ratio is above `reach`.
 fn nearest_by_correlation(
-    sightings: &[QuadReading],
+    readings: &[QuadReading],
     model: &Arc<LandmarkModel>,
     reach: f64,
     p: &Params,
@@ -220,17 +220,17 @@ fn nearest_by_correlation(
     let rank = p.recognise.correlation.rank();
     let mut limit = reach * tau;
     let mut best = None;
-    for (sighting, s) in sightings.iter().enumerate() {
+    for (reading, s) in readings.iter().enumerate() {
         for (exemplar, e) in model.exemplars.iter().enumerate() {
             if let Some(d) = correlation_within(s.buckets(p), e.buckets(&p.recognise), rank, limit) {
                 limit = d;
-                best = Some((sighting, exemplar, d));
+                best = Some((reading, exemplar, d));
             }
         }
     }
-    best.map(|(sighting, exemplar, correlation)| NearLandmark {
+    best.map(|(reading, exemplar, correlation)| NearLandmark {
         model: Arc::clone(model),
-        sighting,
+        reading,
         exemplar,
         correlation,
         hausdorff: f64::INFINITY,
@@ -239,21 +239,21 @@ fn nearest_by_correlation(
     })
 }
 
-/// Least H^r over sightings and exemplars.
+/// Least H^r over readings and exemplars.
 fn nearest_by_points(
-    sightings: &[QuadReading],
+    readings: &[QuadReading],
     model: &Arc<LandmarkModel>,
     p: &Params,
 ) -> Option<NearLandmark> {
     let mut best: Option<(usize, usize, f64)> = None;
-    for (sighting, s) in sightings.iter().enumerate() {
+    for (reading, s) in readings.iter().enumerate() {
         let (d, exemplar) = least_hausdorff(s.points(p), model, p);
         if d.is_finite() && best.is_none_or(|b| d < b.2) {
-            best = Some((sighting, exemplar, d));
+            best = Some((reading, exemplar, d));
         }
     }
-    let (sighting, exemplar, hausdorff) = best.filter(|_| model.hausdorff.tau > 0.0)?;
-    let buckets = sightings[sighting].buckets(p);
+    let (reading, exemplar, hausdorff) = best.filter(|_| model.hausdorff.tau > 0.0)?;
+    let buckets = readings[reading].buckets(p);
     let rank = p.recognise.correlation.rank();
     let correlation = model
         .exemplars
@@ -262,7 +262,7 @@ fn nearest_by_points(
         .fold(2.0, f64::min);
     Some(NearLandmark {
         model: Arc::clone(model),
-        sighting,
+        reading,
         exemplar,
         correlation,
         hausdorff,

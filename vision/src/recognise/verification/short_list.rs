@@ -72,9 +72,9 @@ impl VerifiedLandmark {
 
 /// Lays the quad's picture on the exemplar of each landmark of the short list, and compares it there; the distances are
 /// those of the picture where it came to lie. What a glance tells to be something else gets no further look.
-pub(crate) fn look(
+pub(crate) fn verify_short_list(
     image: &GrayImage,
-    sightings: &[QuadReading],
+    readings: &[QuadReading],
     found: &mut [VerifiedLandmark],
     on: &SamplingGrids,
     p: &Params,
@@ -82,17 +82,17 @@ pub(crate) fn look(
 ) {
     let (c, v) = (&p.recognise.correlation, &p.recognise.verdict);
     let aligner = Aligner::new(on, &v.align);
-    let mut surroundings: Vec<Option<Option<Surroundings<'_>>>> = sightings.iter().map(|_| None).collect();
+    let mut surroundings: Vec<Option<Option<Surroundings<'_>>>> = readings.iter().map(|_| None).collect();
     let least = found.first().map_or(0.0, |f| f.near.signature - v.signature_gap).max(v.min_signature);
     for VerifiedLandmark { near, moved, contradicting, content: beyond } in found.iter_mut() {
         near.likeness = Some(0.0);
-        let sighting = &sightings[near.sighting];
+        let reading = &readings[near.reading];
         let Some(exemplar) = near.model.exemplars.get(near.exemplar).filter(|_| near.signature >= least)
         else {
             continue;
         };
-        let around = surroundings[near.sighting]
-            .get_or_insert_with(|| Surroundings::new(image, &sighting.corners_px, &sighting.icon, &v.align));
+        let around = surroundings[near.reading]
+            .get_or_insert_with(|| Surroundings::new(image, &reading.corners_px, &reading.icon, &v.align));
         let (learnt, coarse) = exemplar.template(&v.align);
         let template = Template::new(&learnt, &coarse);
         let Some(laid) = around.as_ref().and_then(|s| aligner.align(s, &template)) else { continue };
@@ -108,24 +108,23 @@ pub(crate) fn look(
         }
     }
     if found.iter().any(|j| j.near.ratio(DistanceKind::Both) < 1.0) {
-        compare_as_found(sightings, found, c);
+        compare_as_found(readings, found, c);
     }
     found.sort_by(|a, b| a.near.ratio(DistanceKind::Both).total_cmp(&b.near.ratio(DistanceKind::Both)));
     watch.finished(RecogniseStep::Alignment);
     for judged in found.iter_mut().take(MAX_CANDIDATES).filter(|j| j.near.ratio(DistanceKind::Both) >= 1.0) {
-        judged.near.correlation = correlation_as_found(&judged.near, sightings, p);
+        judged.near.correlation = correlation_as_found(&judged.near, readings, p);
     }
     watch.finished(RecogniseStep::Distances);
 }
 
 /// Gives those that were not laid on anything the likeness of the picture where it was found: an accepted landmark's
 /// margin is over them, too.
-fn compare_as_found(sightings: &[QuadReading], found: &mut [VerifiedLandmark], c: &CorrelationParams) {
-    let mut smoothed: Vec<Option<Smoothed>> = vec![None; sightings.len()];
+fn compare_as_found(readings: &[QuadReading], found: &mut [VerifiedLandmark], c: &CorrelationParams) {
+    let mut smoothed: Vec<Option<Smoothed>> = vec![None; readings.len()];
     for VerifiedLandmark { near, .. } in found.iter_mut().filter(|j| j.moved.is_none()) {
         let Some(exemplar) = near.model.exemplars.get(near.exemplar) else { continue };
-        let own =
-            smoothed[near.sighting].get_or_insert_with(|| Smoothed::new(&sightings[near.sighting].icon));
+        let own = smoothed[near.reading].get_or_insert_with(|| Smoothed::new(&readings[near.reading].icon));
         near.likeness = Some(between(own, &Smoothed::new(&exemplar.icon()), c).likeness);
     }
 }
@@ -133,7 +132,7 @@ fn compare_as_found(sightings: &[QuadReading], found: &mut [VerifiedLandmark], c
 /// Lays the quad's picture on each candidate within reach, nearest first, and keeps what the better fit says.
 pub(crate) fn verify(
     image: &GrayImage,
-    sightings: &[QuadReading],
+    readings: &[QuadReading],
     found: &mut [VerifiedLandmark],
     kind: DistanceKind,
     on: &SamplingGrids,
@@ -142,8 +141,8 @@ pub(crate) fn verify(
     let v = &p.recognise.verdict;
     let aligner = Aligner::new(on, &v.align);
     for judged in found.iter_mut().filter(|j| j.near.ratio(kind) < v.verify_reach).take(v.max_verified) {
-        let sighting = &sightings[judged.near.sighting];
-        let Some((icon, corners_px)) = laid_on(image, sighting, &judged.near, &aligner, p) else { continue };
+        let reading = &readings[judged.near.reading];
+        let Some((icon, corners_px)) = laid_on(image, reading, &judged.near, &aligner, p) else { continue };
         let (correlation, hausdorff) = distances(&icon, &judged.near.model, p);
         let near = NearLandmark { correlation, hausdorff, ..judged.near.clone() };
         let moved =
@@ -174,14 +173,14 @@ fn distances(icon: &Icon, model: &LandmarkModel, p: &Params) -> (f64, f64) {
 /// The quad's picture after its corners were moved to fit the nearest exemplar, and those corners.
 fn laid_on(
     image: &GrayImage,
-    sighting: &QuadReading,
+    reading: &QuadReading,
     near: &NearLandmark,
     aligner: &Aligner<'_>,
     p: &Params,
 ) -> Option<(Icon, Corners)> {
     let r = &p.recognise;
     let exemplar = near.model.exemplars.get(near.exemplar)?;
-    let around = Surroundings::new(image, &sighting.corners_px, &sighting.icon, &r.verdict.align)?;
+    let around = Surroundings::new(image, &reading.corners_px, &reading.icon, &r.verdict.align)?;
     let (learnt, coarse) = exemplar.template(&r.verdict.align);
     let corners = aligner.align(&around, &Template::new(&learnt, &coarse))?.corners_px;
     Some((rectify(image, &corners, &p.icon).ok()?, corners))

@@ -39,13 +39,13 @@ fn a_double_that_was_taught_with_few_points_is_a_rival() {
     let verdict = by_points(&image, &quad(oblique()), &set, &p).unwrap();
     let ratios = [verdict.candidates[0].ratio, verdict.candidates[1].ratio];
     assert!(ratios[0] < p.recognise.verdict.margin * ratios[1], "clearly behind by its number: {verdict:?}");
-    assert_eq!(verdict.recognition, Verdict::Ambiguous(LandmarkId(1)));
+    assert_eq!(verdict.verdict, Verdict::Ambiguous(LandmarkId(1)));
     assert_eq!(verdict.candidates[0].refusal, Some(MatchRefusal::Margin));
     assert_eq!((verdict.candidates[1].landmark, verdict.candidates[1].refusal), (LandmarkId(2), None));
 
     let alone = models(&[(1, taught(1)), (2, taught(2)), (3, taught(3))], &p);
     let verdict = by_points(&image, &quad(oblique()), &alone, &p).unwrap();
-    assert_eq!(verdict.recognition, Verdict::Unique(LandmarkId(1)));
+    assert_eq!(verdict.verdict, Verdict::Unique(LandmarkId(1)));
 }
 
 #[test]
@@ -54,7 +54,7 @@ fn twelve_of_one_picture_are_ambiguous() {
     let image = photograph(&poster(2), &oblique(), 0.9, 10.0);
     let set = models(&vec![(2, taught(2)); 12], &p);
     let verdict = by_points(&image, &quad(oblique()), &set, &p).unwrap();
-    assert!(matches!(verdict.recognition, Verdict::Ambiguous(_)), "{verdict:?}");
+    assert!(matches!(verdict.verdict, Verdict::Ambiguous(_)), "{verdict:?}");
     assert!(verdict.candidates.iter().filter(|c| c.ratio < 1.0).count() >= 2, "{verdict:?}");
 }
 
@@ -69,9 +69,9 @@ fn what_look_alikes_keep_out_of_use_is_a_rival() {
         by_points(&image, &quad(oblique()), &set, &p).unwrap()
     };
     let verdict = decided(1);
-    assert_eq!(verdict.recognition, Verdict::Ambiguous(LandmarkId(1)));
+    assert_eq!(verdict.verdict, Verdict::Ambiguous(LandmarkId(1)));
     assert_eq!((verdict.candidates[0].refusal, verdict.landmarks), (Some(MatchRefusal::Margin), 2));
-    assert_eq!(decided(3).recognition, Verdict::Unique(LandmarkId(1)));
+    assert_eq!(decided(3).verdict, Verdict::Unique(LandmarkId(1)));
     // What is not in use is never named, though it alone is there.
     let set = ModelSet::with_rivals(vec![model(2, 2)], vec![model(3, 1)], &p).unwrap();
     assert_eq!(by_points(&image, &quad(oblique()), &set, &p), None);
@@ -88,7 +88,7 @@ fn a_landmark_of_which_a_quarter_is_another_picture_is_doubtful() {
         });
         let image = photograph(&replaced, &oblique(), 0.9, 10.0);
         let verdict = by_points(&image, &quad(oblique()), &six(&p), &p).unwrap();
-        (verdict.recognition, verdict.candidates[0].refusal, verdict.points.unwrap().agreement)
+        (verdict.verdict, verdict.candidates[0].refusal, verdict.points.unwrap().agreement)
     };
     for (left, top) in [(0, 0), (120, 0), (0, 120), (120, 120)] {
         let (recognition, refusal, table) = decided(left, top);
@@ -112,7 +112,7 @@ fn a_picture_with_a_part_in_common_is_no_rival() {
     let set = models(&[(1, taught(1)), (4, view_points(&both, &whole()))], &p);
     let image = photograph(&first, &oblique(), 0.9, 10.0);
     let verdict = by_points(&image, &quad(oblique()), &set, &p).unwrap();
-    assert_eq!(verdict.recognition, Verdict::Unique(LandmarkId(1)), "{verdict:?}");
+    assert_eq!(verdict.verdict, Verdict::Unique(LandmarkId(1)), "{verdict:?}");
 }
 
 #[test]
@@ -124,7 +124,7 @@ fn where_something_is_like_it_the_likeness_counts() {
         model.likeness.tau = tau;
         let set = ModelSet::new(vec![Arc::new(model)], &p).unwrap();
         let verdict = by_points(&image, &quad(oblique()), &set, &p).unwrap();
-        (verdict.recognition, verdict.candidates[0].refusal)
+        (verdict.verdict, verdict.candidates[0].refusal)
     };
     let double = p.learn.threshold.nearest_share * p.learn.likeness_cap;
     assert_eq!(decided(double + 0.01), (Verdict::Unique(LandmarkId(1)), None));
@@ -160,7 +160,7 @@ fn a_landmark_whose_corners_are_not_told_is_not_named() {
         let border =
             Corners::try_from([[90.0, 80.0], [262.0, 107.0], [266.0, 280.0], [94.0, 306.0]]).unwrap();
         let verdict = by_points(&image, &quad(border), &set, &p)?;
-        Some((verdict.recognition, verdict.candidates[0].refusal))
+        Some((verdict.verdict, verdict.candidates[0].refusal))
     };
     let first = LandmarkId(1);
     assert_eq!(asked(1.0), Some((Verdict::Unique(first), None)));

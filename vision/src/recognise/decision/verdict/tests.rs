@@ -39,7 +39,7 @@ fn each_poster_is_recognised_and_strangers_are_not() {
         let image = photograph(&poster(seed), &oblique(), 0.8, 20.0);
         for kind in KINDS {
             let v = recognise(&image, &quad(oblique()), &SIX, kind, &PARAMS);
-            assert_eq!(v.recognition, Verdict::Unique(LandmarkId(seed)), "{kind:?} {:?}", v.candidates);
+            assert_eq!(v.verdict, Verdict::Unique(LandmarkId(seed)), "{kind:?} {:?}", v.candidates);
             assert!(v.confidence > 0.2 && v.confidence <= 1.0);
             assert_eq!((v.rotation, v.border, v.landmarks), (0, 0, 6));
             assert!((v.candidates[0].probability - 1.0).abs() < 1e-12);
@@ -49,7 +49,7 @@ fn each_poster_is_recognised_and_strangers_are_not() {
         let image = photograph(&poster(seed), &oblique(), 0.8, 20.0);
         for kind in KINDS {
             let v = recognise(&image, &quad(oblique()), &SIX, kind, &PARAMS);
-            assert_eq!(v.recognition, Verdict::Unknown, "{seed} {kind:?} {:?}", v.candidates);
+            assert_eq!(v.verdict, Verdict::Unknown, "{seed} {kind:?} {:?}", v.candidates);
             assert!(v.confidence.abs() < 1e-12 && (v.entropy_m - 1.0).abs() < 1e-12);
             assert!(v.candidates.iter().all(|c| c.refusal.is_some() && c.probability.abs() < 1e-12));
         }
@@ -64,12 +64,12 @@ fn any_naming_of_the_corners_is_found_when_upright_is_unsure() {
         q.upright_ambiguous = true;
         for kind in KINDS {
             let v = recognise(&image, &q, &SIX, kind, &PARAMS);
-            assert_eq!(v.recognition, Verdict::Unique(LandmarkId(3)));
+            assert_eq!(v.verdict, Verdict::Unique(LandmarkId(3)));
             assert_eq!(v.rotation, (4 - turn) % 4);
         }
         q.upright_ambiguous = false;
         let v = recognise(&image, &q, &SIX, DistanceKind::Both, &PARAMS);
-        assert_eq!(v.recognition == Verdict::Unknown, turn != 0, "{turn}");
+        assert_eq!(v.verdict == Verdict::Unknown, turn != 0, "{turn}");
     }
 }
 
@@ -79,10 +79,10 @@ fn an_inner_border_is_found() {
     // Too far out for alignment to get from one to the other.
     let outer = [[4.0, 4.0], [390.0, 10.0], [385.0, 380.0], [8.0, 395.0]];
     let mut q = quad(Corners::try_from(outer).unwrap());
-    assert_eq!(recognise(&image, &q, &SIX, DistanceKind::Both, &PARAMS).recognition, Verdict::Unknown);
+    assert_eq!(recognise(&image, &q, &SIX, DistanceKind::Both, &PARAMS).verdict, Verdict::Unknown);
     q.alternates = vec![oblique()];
     let v = recognise(&image, &q, &SIX, DistanceKind::Both, &PARAMS);
-    assert_eq!((v.recognition, v.border), (Verdict::Unique(LandmarkId(2)), 1));
+    assert_eq!((v.verdict, v.border), (Verdict::Unique(LandmarkId(2)), 1));
     // Borders beyond the limit are not looked at.
     let mut many = vec![q.corners_px; nearest::MAX_BORDERS - 2];
     many.push(oblique());
@@ -91,7 +91,7 @@ fn an_inner_border_is_found() {
     assert_eq!(v.border, nearest::MAX_BORDERS - 1);
     q.alternates.insert(0, q.corners_px);
     let v = recognise(&image, &q, &SIX, DistanceKind::Both, &PARAMS);
-    assert_eq!(v.recognition, Verdict::Unknown);
+    assert_eq!(v.verdict, Verdict::Unknown);
 }
 
 #[test]
@@ -102,7 +102,7 @@ fn a_third_may_be_covered() {
         if inside { if (u / 9 + v / 9) % 2 == 0 { 250 } else { 10 } } else { image.at(u, v) }
     });
     let v = recognise(&covered, &quad(oblique()), &SIX, DistanceKind::Both, &PARAMS);
-    assert_eq!(v.recognition, Verdict::Unique(LandmarkId(5)), "{:?}", v.candidates);
+    assert_eq!(v.verdict, Verdict::Unique(LandmarkId(5)), "{:?}", v.candidates);
 }
 
 #[test]
@@ -115,7 +115,7 @@ fn look_alikes_are_ambiguous() {
     let image = photograph(&poster(2), &oblique(), 1.0, 0.0);
     for kind in KINDS {
         let v = recognise(&image, &quad(oblique()), &set, kind, &PARAMS);
-        assert_eq!(v.recognition, Verdict::Ambiguous(LandmarkId(2)));
+        assert_eq!(v.verdict, Verdict::Ambiguous(LandmarkId(2)));
         assert_eq!(v.candidates[0].refusal, Some(MatchRefusal::Margin));
         assert!((v.candidates[1].probability - 0.5).abs() < 1e-12);
         assert!((v.candidates.iter().map(|c| c.probability).sum::<f64>() - 1.0).abs() < 1e-12);
@@ -133,7 +133,7 @@ fn nothing_to_compare_is_unknown() {
     let mut p = PARAMS.clone();
     p.recognise.descriptor.sigma = 2.1;
     let v = recognise(&image, &quad(oblique()), &SIX, DistanceKind::Both, &p);
-    assert!(v.recognition == Verdict::Unknown && v.candidates.is_empty());
+    assert!(v.verdict == Verdict::Unknown && v.candidates.is_empty());
     // Too small a quad has no icon.
     let small = Corners::try_from([[90.0, 80.0], [110.0, 80.0], [110.0, 100.0], [90.0, 100.0]]).unwrap();
     assert!(recognise(&image, &quad(small), &SIX, DistanceKind::Both, &PARAMS).candidates.is_empty());
@@ -144,16 +144,16 @@ fn the_only_landmark_needs_no_margin() {
     let set = ModelSet::new(vec![Arc::new(lesson(7, 4, &PARAMS))], &PARAMS).unwrap();
     let image = photograph(&poster(4), &oblique(), 1.0, 0.0);
     let v = recognise(&image, &quad(oblique()), &set, DistanceKind::Both, &PARAMS);
-    assert_eq!(v.recognition, Verdict::Unique(LandmarkId(7)), "{:?}", v.candidates);
+    assert_eq!(v.verdict, Verdict::Unique(LandmarkId(7)), "{:?}", v.candidates);
 }
 
 #[test]
 fn nearest_equals_comparing_everything() {
-    // Oracle: C^r and H^r of every sighting with every exemplar, sorted.
+    // Oracle: C^r and H^r of every reading with every exemplar, sorted.
     let image = photograph(&poster(4), &oblique(), 0.9, 5.0);
     let mut q = quad(oblique());
     q.upright_ambiguous = true;
-    let seen = sightings(&image, &q, &PARAMS);
+    let seen = quad_readings(&image, &q, &PARAMS);
     assert_eq!(seen.len(), 4);
     for kind in [DistanceKind::Hausdorff, DistanceKind::Correlation] {
         let mut expected: Vec<(f64, LandmarkId)> = SIX

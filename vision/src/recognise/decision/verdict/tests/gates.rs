@@ -9,7 +9,7 @@ fn gates_refuse_at_tau() {
     let judged = |correlation: f64, hausdorff: f64, moved: bool| VerifiedLandmark {
         near: NearLandmark {
             model: Arc::clone(model),
-            sighting: 0,
+            reading: 0,
             exemplar: 0,
             correlation,
             hausdorff,
@@ -110,10 +110,10 @@ fn a_frame_alone_is_no_landmark() {
         let image = photograph(&framed(inside), &oblique(), 0.9, 10.0);
         recognise(&image, &quad(oblique()), &set, DistanceKind::Both, &PARAMS)
     };
-    assert_eq!(asked(Some(3)).recognition, Verdict::Unique(LandmarkId(9)));
+    assert_eq!(asked(Some(3)).verdict, Verdict::Unique(LandmarkId(9)));
     for (inside, refusal) in [(None, MatchRefusal::Content), (Some(4), MatchRefusal::Content)] {
         let v = asked(inside);
-        assert_eq!(v.recognition, Verdict::Unknown, "{inside:?}");
+        assert_eq!(v.verdict, Verdict::Unknown, "{inside:?}");
         let told = v.candidates[0].refusal;
         assert!(told == Some(refusal) || told == Some(MatchRefusal::Likeness), "{inside:?} {told:?}");
     }
@@ -125,7 +125,7 @@ fn the_margin_is_over_the_nearest_other() {
     let judged = |i: usize, c: f64, h: f64, l: f64| VerifiedLandmark {
         near: NearLandmark {
             model: Arc::clone(&models[i]),
-            sighting: 0,
+            reading: 0,
             exemplar: 0,
             correlation: c * models[i].correlation.tau,
             hausdorff: h * models[i].hausdorff.tau,
@@ -157,11 +157,11 @@ fn a_large_map_asks_for_more() {
     assert!(v.tau_share(v.crowd + 1) < 1.0);
 
     let image = photograph(&poster(2), &oblique(), 1.0, 0.0);
-    let seen = sightings(&image, &quad(oblique()), &PARAMS);
+    let seen = quad_readings(&image, &quad(oblique()), &PARAMS);
     let model = SIX.get(LandmarkId(2)).unwrap();
     let near = NearLandmark {
         model: Arc::clone(model),
-        sighting: 0,
+        reading: 0,
         exemplar: 0,
         correlation: 0.0,
         hausdorff: 0.0,
@@ -170,10 +170,10 @@ fn a_large_map_asks_for_more() {
     };
     let found = [VerifiedLandmark { near, moved: Some(oblique()), contradicting: 0.0, content: JUST_ENOUGH }];
     let among = |n: usize| decide(&found, &seen, DistanceKind::Both, n, v);
-    assert_eq!(among(v.crowd).recognition, Verdict::Unique(LandmarkId(2)));
+    assert_eq!(among(v.crowd).verdict, Verdict::Unique(LandmarkId(2)));
     let large = among(10 * v.crowd);
     assert_eq!(
-        (large.recognition, large.candidates[0].refusal),
+        (large.verdict, large.candidates[0].refusal),
         (Verdict::Unknown, Some(MatchRefusal::Likeness))
     );
     // What is told is what decided.
@@ -186,10 +186,10 @@ fn a_large_map_asks_for_more() {
 fn where_points_decide_an_icon_alone_names_nothing() {
     let image = photograph(&poster(1), &oblique(), 0.8, 20.0);
     let v = recognise(&image, &quad(oblique()), &SIX, DistanceKind::Both, &Params::default());
-    assert_eq!(v.recognition, Verdict::Ambiguous(LandmarkId(1)));
+    assert_eq!(v.verdict, Verdict::Ambiguous(LandmarkId(1)));
     assert_eq!((v.candidates[0].refusal, v.confidence), (Some(MatchRefusal::Plain), 0.0));
     let by_icon = recognise(&image, &quad(oblique()), &SIX, DistanceKind::Both, &PARAMS);
-    assert_eq!(by_icon.recognition, Verdict::Unique(LandmarkId(1)));
+    assert_eq!(by_icon.verdict, Verdict::Unique(LandmarkId(1)));
 }
 
 #[test]
@@ -203,7 +203,7 @@ fn few_points_keep_a_landmark_from_the_papers_distances_only() {
         for kind in KINDS {
             let v = recognise(&image, &quad(oblique()), &set, kind, &PARAMS);
             let expected = known || kind == DistanceKind::Both;
-            assert_eq!(v.recognition == Verdict::Unique(LandmarkId(1)), expected, "{kind:?} {stable_points}");
+            assert_eq!(v.verdict == Verdict::Unique(LandmarkId(1)), expected, "{kind:?} {stable_points}");
         }
     }
 }
@@ -230,7 +230,7 @@ proptest! {
             q.upright_ambiguous = ambiguous;
             for kind in KINDS {
                 let v = recognise(&image, &q, &SIX, kind, &p);
-                prop_assert_eq!(v.recognition, Verdict::Unknown);
+                prop_assert_eq!(v.verdict, Verdict::Unknown);
                 prop_assert!(v.candidates.len() <= MAX_CANDIDATES);
                 prop_assert!(v.candidates.iter().all(|c| c.refusal.is_some() && !c.ratio.is_nan()));
             }
