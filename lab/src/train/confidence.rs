@@ -1,6 +1,7 @@
 //! `waymark-lab train confidence`: the weights of the confidence from answers whose truth is known. Answers in, a source file
 //! out; the regression is `vision`'s, the answers are those of `waymark-lab evaluate confidence`, of another set.
 
+use super::confidence_fit::{Answer, fit};
 use crate::evaluate::experiment::{
     Common,
     answers::{Answers, KINDS, answers},
@@ -13,10 +14,7 @@ use vision::{
     params::Params,
     recognise::{
         DistanceKind,
-        decision::{
-            confidence_fit::{Answer, chance_of, fit},
-            measures::MEASURES,
-        },
+        decision::{confidence::chance, measures::MEASURES},
     },
 };
 
@@ -44,7 +42,7 @@ pub(super) fn run(args: &ConfidenceArgs) -> anyhow::Result<()> {
     for (kind, answers) in KINDS.into_iter().zip(&mut found) {
         let learnt = fitted(answers).with_context(|| format!("{kind:?}"))?;
         for named in &mut answers.named {
-            named.confidence = chance_of(&learnt, &named.measures);
+            named.confidence = chance(&learnt, &named.measures);
         }
         weights.push((kind, learnt));
     }

@@ -1,6 +1,7 @@
 //! What the networks of the search learn from: the detector runs over labelled pictures, and its lines and quads are
 //! compared with the labels.
 
+use super::network_training::{ChoiceExample, LabelledExample};
 use crate::evaluate::truth::{Truth, TruthImage};
 use anyhow::Context as _;
 use nalgebra::Point2;
@@ -9,10 +10,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use vision::{
     detect::{
         DetectParams, Quad,
-        border_model::{
-            choose_sides::rivals,
-            network_training::{ChoiceExample, LabelledExample},
-        },
+        border_model::choose_sides::rivals,
         edge_support::gradients::Gradients,
         pyramid, scored_quads,
         suppression::non_maximum::{snap_sides, suppress_overlaps},

@@ -1,7 +1,11 @@
 //! What fitted networks are worth on pictures that they were not trained on: how well they choose and tell, and how well
 //! the detector finds with them. Networks and sets in, figures out; trains nothing.
 
-use super::data::{Data, Set};
+use super::{
+    data::{Data, Set},
+    network_training::{ChoiceExample, LabelledExample, TrainError},
+    platt_scaling::PlattScaling,
+};
 use crate::evaluate::{
     detection::score::{FOUND, FOUND_WELL, ImageScore, score},
     reviewed::Reviewed,
@@ -10,14 +14,7 @@ use crate::evaluate::{
 use anyhow::Context as _;
 use serde::Serialize;
 use server::cli::{pictures, screen};
-use vision::detect::{
-    DetectParams,
-    border_model::{
-        network::Network,
-        network_training::{ChoiceExample, LabelledExample, TrainError},
-        platt_scaling::PlattScaling,
-    },
-};
+use vision::detect::{DetectParams, border_model::network::Network};
 
 /// A first choice that is off by so much more than the best rival, in pixels of the working image, is right.
 const RIGHT_PX: f64 = 1.5;

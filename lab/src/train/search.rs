@@ -1,6 +1,7 @@
 //! `waymark-lab train search`: the two networks of the search from labelled pictures. Labels in, parameters out; the training
 //! is `vision`'s, what they are worth on pictures held out is `held_out`'s.
 
+use super::network_training::{ChoiceExample, LabelledExample, TrainParams, train_choice, train_classifier};
 use super::{
     data::{Data, Set},
     held_out::{self, Judged, Line},
@@ -13,13 +14,7 @@ use serde_json::json;
 use server::cli::{parameters::ParameterArgs, scratch, screen};
 use sim::{scenes::ScenesParams, views::ViewsParams};
 use std::path::{Path, PathBuf};
-use vision::detect::{
-    DetectParams,
-    border_model::{
-        network::Network,
-        network_training::{ChoiceExample, LabelledExample, TrainParams, train_choice, train_classifier},
-    },
-};
+use vision::detect::{DetectParams, border_model::network::Network};
 
 /// `waymark-lab train search`.
 #[derive(Debug, clap::Args)]

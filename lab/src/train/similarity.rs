@@ -1,5 +1,6 @@
 //! `waymark-lab train similarity`: the weights of the six cues (method 2) from labelled pictures.
 
+use super::cue_fit::{FOLDS, FittedSimilarity, LabelledPair, fit, judge, ungraded};
 use crate::evaluate::{rendered, truth::Truth};
 use anyhow::{Context as _, bail};
 use serde_json::json;
@@ -10,10 +11,7 @@ use vision::{
     detect::{
         DetectParams,
         edges::edge_map::edges,
-        relaxation::{
-            cue_fit::{FOLDS, FittedSimilarity, LabelledPair, fit, judge, ungraded},
-            similarity::{self, SimilarityParams},
-        },
+        relaxation::similarity::{self, SimilarityParams},
         segments::{chains::chains, edge_segments::segments},
     },
     geometry::Corners,

@@ -7,5 +7,3 @@ pub mod side_band;
 pub mod side_features;
 pub mod choose_sides;
 pub mod quad_classifier;
-pub mod network_training;
-pub mod platt_scaling;

@@ -3,7 +3,6 @@
 pub(crate) mod profiles;
 pub mod labelling;
 pub mod similarity;
-pub mod cue_fit;
 pub mod grouping;
 pub mod three_sided;
 pub mod paired_quads;

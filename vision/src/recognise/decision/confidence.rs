@@ -38,7 +38,7 @@ pub fn confidence(candidates: &[MatchCandidate], best: usize, landmarks: usize, 
 }
 
 /// The logistic curve: the last weight is that of no measure.
-pub(crate) fn chance(weights: &[f64; MEASURES + 1], measures: &[f64; MEASURES]) -> f64 {
+pub fn chance(weights: &[f64; MEASURES + 1], measures: &[f64; MEASURES]) -> f64 {
     let odds = weights[MEASURES] + weights.iter().zip(measures).map(|(w, m)| w * m).sum::<f64>();
     1.0 / (1.0 + (-odds).exp())
 }

@@ -4,7 +4,6 @@ pub mod result;
 pub mod measures;
 pub mod confidence;
 pub(crate) mod confidence_weights;
-pub mod confidence_fit;
 pub mod matched_border;
 pub(crate) mod by_points;
 pub mod verdict;

@@ -2,23 +2,23 @@
 //! quad against all others that pass the gates. Logistic regression with no weight below zero, both classes weighing
 //! the same; every photograph is judged by a fit without its fifth of the photographs. Reads no files.
 
-use crate::{
+use nalgebra::Point2;
+use vision::{
     detect::{
         relaxation::similarity::{SegmentPair, SimilarityParams},
         segments::edge_segments::EdgeSegment,
     },
     geometry::{corners::Corners, polygon},
 };
-use nalgebra::Point2;
 
 /// Most labelled pairs of one fit.
-pub const MAX_PAIRS_FITTED: usize = 1_000_000;
+pub(crate) const MAX_PAIRS_FITTED: usize = 1_000_000;
 /// Fewest pairs of either kind.
-pub const MIN_PAIRS_OF_A_KIND: usize = 20;
+pub(crate) const MIN_PAIRS_OF_A_KIND: usize = 20;
 /// Parts of the cross-validation.
-pub const FOLDS: usize = 5;
+pub(crate) const FOLDS: usize = 5;
 /// Share of the true pairs whose score the smallest score lets through.
-pub const KEPT_SHARE: f64 = 0.95;
+pub(crate) const KEPT_SHARE: f64 = 0.95;
 /// Weight of the squared coefficients, so that cues that say the same share what they say.
 const RIDGE: f64 = 1e-4;
 /// Rounds over all coefficients.
@@ -26,7 +26,7 @@ const MAX_ROUNDS: usize = 200;
 
 /// Why there is no fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum CueFitError {
+pub(crate) enum CueFitError {
     /// Too few pairs of one kind.
     #[error(
         "{pairs} pairs of opposite sides and {others} others: at least {MIN_PAIRS_OF_A_KIND} of each needed"
@@ -47,27 +47,27 @@ pub enum CueFitError {
 
 /// A candidate pair that labels judged.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LabelledPair {
+pub(crate) struct LabelledPair {
     /// c1 to c6.
-    pub cues: [f64; 6],
+    pub(crate) cues: [f64; 6],
     /// Opposite sides of a labelled quad.
-    pub opposite: bool,
+    pub(crate) opposite: bool,
     /// The photograph it comes from.
-    pub photograph: usize,
+    pub(crate) photograph: usize,
 }
 
-/// Parameters of [`crate::detect::relaxation::similarity::pairs`] that keep every pair that passes the gates, whatever its score.
-pub fn ungraded(p: &SimilarityParams) -> SimilarityParams {
+/// Parameters of [`vision::detect::relaxation::similarity::pairs`] that keep every pair that passes the gates, whatever its score.
+pub(crate) fn ungraded(p: &SimilarityParams) -> SimilarityParams {
     SimilarityParams {
         min_score: 0.0,
-        max_candidates: crate::detect::relaxation::labelling::MAX_ROW_CANDIDATES,
+        max_candidates: vision::detect::relaxation::labelling::MAX_ROW_CANDIDATES,
         ..p.clone()
     }
 }
 
 /// Judges candidate pairs by labelled quads. A pair along another border of a labelled thing (`IoU` of half with it), or
 /// along one of `others` (real quads that nobody asks for), is left out, as neither answer would be fair.
-pub fn judge(
+pub(crate) fn judge(
     segments: &[EdgeSegment],
     pairs: &[SegmentPair],
     labelled: &[Corners],
@@ -102,25 +102,28 @@ fn on_side(s: &EdgeSegment, corners: &[Point2<f64>; 4], side: usize) -> bool {
 
 /// What a fit found.
 #[derive(Debug, Clone, PartialEq)]
-pub struct FittedSimilarity {
+pub(crate) struct FittedSimilarity {
     /// Weights of the cues; they sum to 1.
-    pub weights: [f64; 6],
+    pub(crate) weights: [f64; 6],
     /// Smallest score: [`KEPT_SHARE`] of the pairs of opposite sides lie above it.
-    pub min_score: f64,
+    pub(crate) min_score: f64,
     /// Pairs of opposite sides, and others.
-    pub counts: [usize; 2],
+    pub(crate) counts: [usize; 2],
     /// Mean cues of both.
-    pub mean_cues: [[f64; 6]; 2],
+    pub(crate) mean_cues: [[f64; 6]; 2],
     /// How often a pair of opposite sides scores above another pair, with the weights given at the start.
-    pub order_before: f64,
+    pub(crate) order_before: f64,
     /// The same with fitted weights, each pair scored by a fit without its part of the photographs.
-    pub order_after: f64,
+    pub(crate) order_after: f64,
     /// Share of the other pairs above the smallest score that keeps [`KEPT_SHARE`], before and (held out) after.
-    pub passing: [f64; 2],
+    pub(crate) passing: [f64; 2],
 }
 
 /// Fits the weights. `photograph` modulo [`FOLDS`] is the part of the cross-validation.
-pub fn fit(pairs: &[LabelledPair], before: &SimilarityParams) -> Result<FittedSimilarity, CueFitError> {
+pub(crate) fn fit(
+    pairs: &[LabelledPair],
+    before: &SimilarityParams,
+) -> Result<FittedSimilarity, CueFitError> {
     if pairs.len() > MAX_PAIRS_FITTED {
         return Err(CueFitError::TooMany(pairs.len()));
     }
@@ -242,137 +245,4 @@ fn order(scored: &[(f64, bool)]) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::detect::tests::{
-        fixtures::{render, segment, sides},
-        rendering::Noise,
-    };
-
-    /// Pairs whose first two cues tell, three times as much the first, the others being noise.
-    fn judged(count: usize, seed: u64) -> Vec<LabelledPair> {
-        let mut random = Noise(seed);
-        (0..count)
-            .map(|i| {
-                let cues: [f64; 6] = std::array::from_fn(|_| random.uniform());
-                let logit = 9.0 * cues[0] + 3.0 * cues[1] - 6.0;
-                let opposite = random.uniform() < 1.0 / (1.0 + f64::exp(-logit));
-                LabelledPair { cues, opposite, photograph: i / 40 }
-            })
-            .collect()
-    }
-
-    #[test]
-    fn weights_that_made_the_data_come_back() {
-        let fitted = fit(&judged(20_000, 1), &SimilarityParams::default()).unwrap();
-        assert!((fitted.weights[0] - 0.75).abs() < 0.03, "{fitted:?}");
-        assert!((fitted.weights[1] - 0.25).abs() < 0.03);
-        assert!(fitted.weights[2..].iter().all(|w| (0.0..0.03).contains(w)));
-        assert!((fitted.weights.iter().sum::<f64>() - 1.0).abs() < 1e-9);
-        assert!(fitted.order_after > fitted.order_before + 0.1, "{fitted:?}");
-        assert!(fitted.passing[1] < fitted.passing[0]);
-    }
-
-    #[test]
-    fn the_fit_is_the_minimum() {
-        // Oracle: the balanced loss itself, on a grid of small moves about the fit.
-        let pairs = judged(3000, 2);
-        let found = weights(&pairs).unwrap();
-        let n = pairs.iter().filter(|s| s.opposite).count() as f64;
-        let loss = |direction: &[f64; 6], scale: f64, offset: f64| {
-            let of = |s: &LabelledPair| {
-                let logit = scale * score(&s.cues, direction) + offset;
-                let (sign, weight) =
-                    if s.opposite { (-1.0, 0.5 / n) } else { (1.0, 0.5 / (pairs.len() as f64 - n)) };
-                weight * f64::exp(sign * logit).ln_1p()
-            };
-            let ridge: f64 = direction.iter().map(|w| (scale * w).powi(2)).sum::<f64>() * 0.5 * RIDGE;
-            pairs.iter().map(of).sum::<f64>() + ridge
-        };
-        let best = |direction: &[f64; 6]| {
-            let mut least = f64::INFINITY;
-            for scale in 20..60 {
-                for offset in -40..0 {
-                    least = least.min(loss(direction, 0.3 * f64::from(scale), 0.25 * f64::from(offset)));
-                }
-            }
-            least
-        };
-        let at_fit = best(&found);
-        for c in 0..6 {
-            let mut moved = found;
-            moved[c] += 0.15;
-            assert!(best(&moved) > at_fit, "cue {c}");
-        }
-    }
-
-    #[test]
-    fn order_and_threshold_by_hand() {
-        let scored = [(0.1, false), (0.4, true), (0.4, false), (0.8, true)];
-        // 0.4 beats one and ties one, 0.8 beats both: 3.5 of 4.
-        assert!((order(&scored) - 0.875).abs() < 1e-12);
-        let many: Vec<(f64, bool)> =
-            (0..100).map(|i| (f64::from(i), true)).chain([(4.0, false), (6.0, false)]).collect();
-        assert!((keeping(&many) - 5.0).abs() < 1e-6);
-        assert!((passing(&many) - 0.5).abs() < 1e-12);
-    }
-
-    #[test]
-    fn too_little_and_too_much_are_refused() {
-        let pairs = judged(400, 3);
-        let p = SimilarityParams::default();
-        let few: Vec<LabelledPair> = pairs
-            .iter()
-            .filter(|s| s.opposite)
-            .take(MIN_PAIRS_OF_A_KIND - 1)
-            .chain(pairs.iter().filter(|s| !s.opposite))
-            .copied()
-            .collect();
-        assert!(
-            matches!(fit(&few, &p), Err(CueFitError::TooFew { pairs, .. }) if pairs == MIN_PAIRS_OF_A_KIND - 1)
-        );
-        assert_eq!(fit(&[], &p), Err(CueFitError::TooFew { pairs: 0, others: 0 }));
-        let same: Vec<LabelledPair> = pairs.iter().map(|s| LabelledPair { cues: [0.0; 6], ..*s }).collect();
-        assert_eq!(fit(&same, &p), Err(CueFitError::NothingTells));
-        let many = vec![pairs[0]; MAX_PAIRS_FITTED + 1];
-        assert_eq!(fit(&many, &p), Err(CueFitError::TooMany(MAX_PAIRS_FITTED + 1)));
-    }
-
-    #[test]
-    fn pairs_are_judged_by_the_labels() {
-        let outer = [[50.0, 40.0], [250.0, 40.0], [250.0, 190.0], [50.0, 190.0]];
-        let inner = [[80.0, 70.0], [220.0, 70.0], [220.0, 160.0], [80.0, 160.0]];
-        let mut segments = sides(outer, 1.0);
-        segments.extend(sides(inner, 1.0));
-        // Half of a side is not the side.
-        segments.push(segment([50.0, 40.0], [140.0, 40.0]));
-        let image = render(300, 230, 200, &[(outer, 60), (inner, 220)]);
-        let found = crate::detect::relaxation::similarity::pairs(
-            &segments,
-            &image,
-            &ungraded(&SimilarityParams::default()),
-        );
-        let labels = [Corners::try_from(outer).unwrap()];
-        let judged = judge(&segments, &found, &labels, &[], 3);
-        assert!(judged.iter().all(|j| j.photograph == 3));
-        assert_eq!(judged.iter().filter(|j| j.opposite).count(), 2);
-        let of = |pair: &SegmentPair| judge(&segments, std::slice::from_ref(pair), &labels, &[], 0);
-        for pair in &found {
-            match (pair.k, pair.l) {
-                (0, 2) | (1, 3) => assert!(of(pair)[0].opposite),
-                // Outer top and inner bottom overlap the label by more than half, as does the whole of the inner border's
-                // height by width; nobody can say.
-                (0, 6) | (2, 4) => assert!(of(pair).is_empty()),
-                (2, 8) => assert!(of(pair).iter().all(|j| !j.opposite)),
-                _ => {}
-            }
-        }
-        // Without labels all are other pairs, unless a known quad explains them.
-        assert!(judge_all(&segments, &found, &[]).iter().all(|j| !j.opposite));
-        assert!(judge_all(&segments, &found, &labels).len() < found.len());
-    }
-
-    fn judge_all(segments: &[EdgeSegment], pairs: &[SegmentPair], others: &[Corners]) -> Vec<LabelledPair> {
-        judge(segments, pairs, &[], others, 0)
-    }
-}
+mod tests;

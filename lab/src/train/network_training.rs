@@ -5,7 +5,7 @@
 //! Two tasks: of some rivals the right one (the share of its exponential is its chance, as in a conditional logit), and
 //! of every example whether it is one (logistic). All data at every step, Adam, weights kept small by a ridge.
 
-use crate::{
+use vision::{
     detect::border_model::network::{MAX_HIDDEN, Network},
     random::Random,
 };
@@ -19,49 +19,49 @@ const FIRST: [f64; 2] = [0.6, 0.3];
 /// A measurement that varies less tells nothing: it is scaled by 1.
 const MIN_DEVIATION: f64 = 1e-9;
 /// Most steps of a training.
-pub const MAX_STEPS: usize = 100_000;
+pub(crate) const MAX_STEPS: usize = 100_000;
 
 /// Candidates of which one or more are right.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ChoiceExample {
+pub(crate) struct ChoiceExample {
     /// Which part of the data they are in: for whoever holds parts out.
-    pub group: usize,
+    pub(crate) group: usize,
     /// How many times these rivals count, above 0.
-    pub weight: f64,
+    pub(crate) weight: f64,
     /// Each candidate's measurements.
-    pub features: Vec<Vec<f64>>,
+    pub(crate) features: Vec<Vec<f64>>,
     /// How far each candidate is from what is right.
-    pub off: Vec<f64>,
+    pub(crate) off: Vec<f64>,
 }
 
 /// One candidate that is right or is not.
 #[derive(Debug, Clone, PartialEq)]
-pub struct LabelledExample {
+pub(crate) struct LabelledExample {
     /// As for [`ChoiceExample`].
-    pub group: usize,
+    pub(crate) group: usize,
     /// How many times it counts, above 0.
-    pub weight: f64,
+    pub(crate) weight: f64,
     /// Its measurements.
-    pub features: Vec<f64>,
+    pub(crate) features: Vec<f64>,
     /// Whether it is one.
-    pub is_one: bool,
+    pub(crate) is_one: bool,
 }
 
 /// How to train.
 #[derive(Debug, Clone, PartialEq)]
-pub struct TrainParams {
+pub(crate) struct TrainParams {
     /// Hidden units, at most [`MAX_HIDDEN`]; 0 for a linear model.
-    pub hidden: usize,
+    pub(crate) hidden: usize,
     /// Steps, at most [`MAX_STEPS`].
-    pub steps: usize,
+    pub(crate) steps: usize,
     /// Length of a step.
-    pub rate: f64,
+    pub(crate) rate: f64,
     /// Half of it weighs the squares of all weights but biases, against the sum of the losses.
-    pub ridge: f64,
+    pub(crate) ridge: f64,
     /// A rival that is off by so much more than the best one should have 1/e of its chance. Above 0.
-    pub reach: f64,
+    pub(crate) reach: f64,
     /// The hidden units' first weights follow from it.
-    pub seed: u64,
+    pub(crate) seed: u64,
 }
 
 impl Default for TrainParams {
@@ -72,7 +72,7 @@ impl Default for TrainParams {
 
 /// Why there is no network.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum TrainError {
+pub(crate) enum TrainError {
     /// No set of rivals has a right and a wrong one, or all examples are alike.
     #[error("nothing to learn from: right ones and wrong ones are needed")]
     NothingToLearn,
@@ -85,7 +85,7 @@ pub enum TrainError {
 }
 
 /// A network that gives the right one of some rivals the greatest output.
-pub fn train_choice(rivals: &[ChoiceExample], p: &TrainParams) -> Result<Network, TrainError> {
+pub(crate) fn train_choice(rivals: &[ChoiceExample], p: &TrainParams) -> Result<Network, TrainError> {
     if p.reach.is_nan() || p.reach <= 0.0 {
         return Err(TrainError::Range("reach"));
     }
@@ -93,7 +93,7 @@ pub fn train_choice(rivals: &[ChoiceExample], p: &TrainParams) -> Result<Network
 }
 
 /// A network whose output is the logarithm of the odds that an example is one.
-pub fn train_classifier(examples: &[LabelledExample], p: &TrainParams) -> Result<Network, TrainError> {
+pub(crate) fn train_classifier(examples: &[LabelledExample], p: &TrainParams) -> Result<Network, TrainError> {
     let both = examples.iter().any(|e| e.is_one) && examples.iter().any(|e| !e.is_one);
     if !both {
         return Err(TrainError::NothingToLearn);
@@ -295,5 +295,4 @@ fn add(to: &mut [f64], factor: f64, x: &[f64]) {
 }
 
 #[cfg(test)]
-#[path = "network_training_tests.rs"]
 mod tests;

@@ -2,10 +2,8 @@
 //! should be one in two. Outputs with what is right in, a straight line for the output out (Platt's scaling). The order
 //! of examples does not change, so it tells no better than before.
 
-use crate::detect::border_model::{
-    network::Network,
-    network_training::{LabelledExample, TrainError},
-};
+use super::network_training::{LabelledExample, TrainError};
+use vision::detect::border_model::network::Network;
 
 /// Newton's steps; a few are enough, as the loss is convex.
 const STEPS: usize = 60;
@@ -16,16 +14,16 @@ const LONGEST: f64 = 1.0;
 
 /// The calibrated output is `factor * output + offset`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PlattScaling {
+pub(crate) struct PlattScaling {
     /// Above 0; below 1 for a network that is too sure.
-    pub factor: f64,
+    pub(crate) factor: f64,
     /// Logarithm of odds at an output of 0.
-    pub offset: f64,
+    pub(crate) offset: f64,
 }
 
 impl PlattScaling {
     /// The line under which held-out examples are likeliest, each counted by its weight. Outputs and examples in pairs.
-    pub fn fit(outputs: &[f64], examples: &[LabelledExample]) -> Result<Self, TrainError> {
+    pub(crate) fn fit(outputs: &[f64], examples: &[LabelledExample]) -> Result<Self, TrainError> {
         let pairs = || outputs.iter().zip(examples);
         if let Some(i) = pairs().position(|(o, e)| !o.is_finite() || !e.weight.is_finite() || e.weight <= 0.0)
         {
@@ -61,13 +59,13 @@ impl PlattScaling {
     }
 
     /// The calibrated output.
-    pub fn of(&self, output: f64) -> f64 {
+    pub(crate) fn of(&self, output: f64) -> f64 {
         self.factor * output + self.offset
     }
 
     /// A network with this output: the same hidden units, weighed anew.
     #[must_use]
-    pub fn applied(&self, mut network: Network) -> Network {
+    pub(crate) fn applied(&self, mut network: Network) -> Network {
         let weights = network.linear.iter_mut().chain(&mut network.hidden_out);
         weights.for_each(|w| *w *= self.factor);
         network.bias = self.of(network.bias);
@@ -78,7 +76,7 @@ impl PlattScaling {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::Random;
+    use vision::random::Random;
 
     fn example(is_one: bool) -> LabelledExample {
         LabelledExample { group: 0, weight: 1.0, features: vec![], is_one }

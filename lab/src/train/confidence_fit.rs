@@ -1,8 +1,8 @@
 //! Answers whose truth is known in, the weights of the confidence out: logistic regression with a small ridge, in which
 //! no measure may speak for an answer the worse it is. Gathering answers, and judging what came of it, is the caller's.
 
-use crate::recognise::decision::{confidence::chance, measures::MEASURES};
 use nalgebra::{SMatrix, SVector};
+use vision::recognise::decision::{confidence::chance, measures::MEASURES};
 
 /// Newton's steps; a few are enough, as the loss is convex.
 const STEPS: usize = 50;
@@ -11,20 +11,20 @@ const LONGEST: f64 = 4.0;
 /// What a weight's square costs, in answers. Keeps weights finite where right and wrong are separable.
 const RIDGE: f64 = 0.05;
 /// One for each measure, and one of no measure, the last.
-pub const WEIGHTS: usize = MEASURES + 1;
+pub(crate) const WEIGHTS: usize = MEASURES + 1;
 
 /// One answer: what it rests on, and whether it was right.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Answer {
-    /// See [`crate::recognise::decision::confidence::measures`].
-    pub measures: [f64; MEASURES],
+pub(crate) struct Answer {
+    /// See [`vision::recognise::decision::confidence::measures`].
+    pub(crate) measures: [f64; MEASURES],
     /// The identity was right.
-    pub is_right: bool,
+    pub(crate) is_right: bool,
 }
 
 /// Why nothing could be learnt.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum ConfidenceError {
+pub(crate) enum ConfidenceError {
     /// All answers are right, or all wrong.
     #[error("{right} of {answers} answers are right: there must be both")]
     OneClass {
@@ -38,13 +38,8 @@ pub enum ConfidenceError {
     Malformed(usize),
 }
 
-/// The chance that weights give an answer.
-pub fn chance_of(weights: &[f64; WEIGHTS], measures: &[f64; MEASURES]) -> f64 {
-    chance(weights, measures)
-}
-
 /// The weights under which the answers are likeliest, with four digits after the point: what is written is what is used.
-pub fn fit(answers: &[Answer]) -> Result<[f64; WEIGHTS], ConfidenceError> {
+pub(crate) fn fit(answers: &[Answer]) -> Result<[f64; WEIGHTS], ConfidenceError> {
     if let Some(i) = answers.iter().position(|a| a.measures.iter().any(|m| !m.is_finite())) {
         return Err(ConfidenceError::Malformed(i));
     }
@@ -96,7 +91,7 @@ fn newton(answers: &[Answer], free: [bool; WEIGHTS]) -> [f64; WEIGHTS] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::Random;
+    use vision::random::Random;
 
     /// Answers that are right as often as a logistic curve of the first and third measure says; the fifth measure speaks
     /// the wrong way round.
