@@ -1,7 +1,7 @@
 //! Intrinsics of a camera: focal length, principal point, lens, and how surely they are known.
 
 use crate::frame::{image::FrameError, lens::Distortion};
-use nalgebra::{Matrix2, Matrix2x3, Matrix3, Point2, Vector3};
+use nalgebra::{Matrix2, Matrix3, Point2, Vector3};
 use serde::{Deserialize, Serialize};
 
 /// Standard deviations of intrinsics, as a calibration states them. fx and fy err together: of a calibration their
@@ -87,16 +87,6 @@ impl Intrinsics {
     pub fn project(&self, p_camera: &Vector3<f64>) -> Point2<f64> {
         let straight = Point2::new(p_camera.x / p_camera.z, p_camera.y / p_camera.z);
         self.pixel(&self.distortion.distort(&straight).point)
-    }
-
-    /// As [`Intrinsics::project`], with the derivative by the point.
-    pub fn project_with(&self, p_camera: &Vector3<f64>) -> (Point2<f64>, Matrix2x3<f64>) {
-        let inverse = 1.0 / p_camera.z;
-        let straight = Point2::new(p_camera.x * inverse, p_camera.y * inverse);
-        let bent = self.distortion.distort(&straight);
-        let perspective = Matrix2x3::new(1.0, 0.0, -straight.x, 0.0, 1.0, -straight.y) * inverse;
-        let focal = Matrix2::new(self.fx_px, 0.0, 0.0, self.fy_px);
-        (self.pixel(&bent.point), focal * bent.by_straight * perspective)
     }
 
     /// The pixel where an undistorted pinhole with the same K would see what this camera sees at `px`. `None` where the

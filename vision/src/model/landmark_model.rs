@@ -129,11 +129,6 @@ impl LandmarkModel {
         self.exemplars.iter().map(|e| e.features(p)).collect()
     }
 
-    /// Learnt from generated views, at least in part.
-    pub fn views_generated(&self) -> bool {
-        self.generated_views > 0
-    }
-
     /// Memory that it takes, in bytes, by what it is for.
     pub fn memory_parts(&self) -> Vec<(&'static str, usize)> {
         let evidence = [&self.correlation_evidence, &self.hausdorff_evidence, &self.likeness_evidence];

@@ -11,6 +11,7 @@ pub(crate) mod scale;
 pub(crate) mod illumination;
 pub(crate) mod occlusion;
 pub(crate) mod strangers;
+mod gaussian;
 pub(crate) mod humps;
 pub(crate) mod discrimination;
 pub(crate) mod doubles;

@@ -103,20 +103,6 @@ impl EdgeMap {
         Vector2::new(self.gx[at], self.gy[at])
     }
 
-    /// Bilinear gradient at `p_px`, coordinates clamped to the image.
-    pub fn gradient_at(&self, p_px: &Point2<f64>) -> Vector2<f64> {
-        if self.marks.is_empty() {
-            return Vector2::zeros();
-        }
-        let u = p_px.x.clamp(0.0, (self.width - 1) as f64);
-        let v = p_px.y.clamp(0.0, (self.height - 1) as f64);
-        let (u0, v0) = (u as usize, v as usize);
-        let (u1, v1) = ((u0 + 1).min(self.width - 1), (v0 + 1).min(self.height - 1));
-        let (a, b) = (u - u0 as f64, v - v0 as f64);
-        let g = |u, v| self.gradient(u, v).cast::<f64>();
-        (g(u0, v0) * (1.0 - a) + g(u1, v0) * a) * (1.0 - b) + (g(u0, v1) * (1.0 - a) + g(u1, v1) * a) * b
-    }
-
     /// Sub-pixel position of the edge through edge pixel `at` (row-major index, off the border): the vertex of a
     /// parabola along the gradient, at most half a step away.
     ///

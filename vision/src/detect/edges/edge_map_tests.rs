@@ -130,17 +130,6 @@ fn the_strongest_points_are_kept_up_to_the_bound() {
 }
 
 #[test]
-fn bilinear_gradient_meets_the_pixels() {
-    let image = polygon((32, 24), &rectangle((15.0, 11.0), (16.0, 10.0), 0.2), (200.0, 50.0), 0.0, 0);
-    let map = edges(&image, &EdgeParams::default());
-    let at = map.gradient_at(&Point2::new(7.0, 9.0));
-    assert!((at - map.gradient(7, 9).cast()).norm() < 1e-6);
-    let middle = map.gradient_at(&Point2::new(7.5, 9.0));
-    assert!((middle - (map.gradient(7, 9) + map.gradient(8, 9)).cast::<f64>() * 0.5).norm() < 1e-6);
-    assert!((map.gradient_at(&Point2::new(-5.0, 99.0)) - map.gradient(0, 23).cast()).norm() < 1e-6);
-}
-
-#[test]
 fn thresholds_rise_with_the_noise() {
     // Flat apart from noise: its deviation is found, and no edge.
     let p = EdgeParams { low: 3.0, high: 8.0, noise_factors: [2.5, 6.0], ..EdgeParams::default() };

@@ -2,16 +2,12 @@
 //! rotation and to I -> a I + b, whitened by the covariance that one point shows from view to view.
 
 use crate::{icon::Icon, recognise::features::harris::HarrisPoint};
-use nalgebra::SMatrix;
 use serde::{Deserialize, Serialize};
 
 /// Components of a descriptor.
 pub const DIMENSION: usize = 7;
 /// A described point: `L_uu, L_uw, L_ww, L_uuu, L_uuw, L_uww, L_www` over `L_u`, whitened.
 pub type Descriptor = [f32; DIMENSION];
-/// Covariance of raw descriptors.
-pub type DescriptorCovariance = SMatrix<f64, DIMENSION, DIMENSION>;
-
 /// Standard deviations of the raw components between views of one point, measured on synthetic posters (method 5).
 const COLD_START: [f64; DIMENSION] = [0.29, 0.21, 0.30, 0.26, 0.12, 0.13, 0.25];
 /// Largest kernel radius in icon pixels, whatever the parameters say.
@@ -27,7 +23,7 @@ pub struct DescriptorParams {
     pub regularisation: f64,
     /// Raw components are clipped to this magnitude.
     pub clip: f64,
-    /// W with `W Lambda W^T = 1`, row by row: whitened = W raw. See [`DescriptorParams::whitened_by`].
+    /// W, row by row: whitened = W raw. The default divides each component by its standard deviation over views.
     pub whitening: [[f64; DIMENSION]; DIMENSION],
 }
 
@@ -35,25 +31,6 @@ impl Default for DescriptorParams {
     fn default() -> Self {
         let row = |i| std::array::from_fn(|j| if i == j { 1.0 / COLD_START[i] } else { 0.0 });
         Self { sigma: 2.0, regularisation: 0.05, clip: 10.0, whitening: std::array::from_fn(row) }
-    }
-}
-
-/// The covariance is not symmetric positive definite.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("descriptor covariance is not positive definite")]
-pub struct NotPositiveDefinite;
-
-impl DescriptorParams {
-    /// The same parameters with the whitening of covariance `lambda` (7 x 7, of raw descriptors): the inverse of its
-    /// Cholesky factor.
-    pub fn whitened_by(&self, lambda: &DescriptorCovariance) -> Result<Self, NotPositiveDefinite> {
-        let factor = lambda.cholesky().ok_or(NotPositiveDefinite)?.l();
-        let inverse = factor.try_inverse().ok_or(NotPositiveDefinite)?;
-        if inverse.iter().any(|w| !w.is_finite()) {
-            return Err(NotPositiveDefinite);
-        }
-        let whitening = std::array::from_fn(|i| std::array::from_fn(|j| inverse[(i, j)]));
-        Ok(Self { whitening, ..self.clone() })
     }
 }
 
@@ -276,21 +253,6 @@ fn kernels(centre: f64, sigma: f64) -> (i32, Vec<[f64; 4]>) {
         }
     }
     (first, weights)
-}
-
-/// Pooled within-landmark covariance from differences of raw descriptors of the same point in two views: half the
-/// covariance of the differences, shrunk by `shrinkage` (method: 0.1) to its diagonal. `None` below 2 differences.
-pub fn pooled_covariance(differences: &[[f64; DIMENSION]], shrinkage: f64) -> Option<DescriptorCovariance> {
-    if differences.len() < 2 {
-        return None;
-    }
-    let n = differences.len() as f64;
-    let mean: [f64; DIMENSION] = std::array::from_fn(|i| differences.iter().map(|d| d[i]).sum::<f64>() / n);
-    Some(DescriptorCovariance::from_fn(|i, j| {
-        let sum: f64 = differences.iter().map(|d| (d[i] - mean[i]) * (d[j] - mean[j])).sum();
-        let covariance = 0.5 * sum / (n - 1.0);
-        if i == j { covariance } else { (1.0 - shrinkage) * covariance }
-    }))
 }
 
 #[cfg(test)]
