@@ -5,6 +5,7 @@
 //! from its one photograph and views generated from it. Each quad is looked for among all landmarks; then, as a stranger,
 //! among the half that does not hold it. Odd photographs, by the number in their name, may be tuned on; even ones are for
 //! the report: every figure has both columns.
+#![expect(clippy::disallowed_methods, clippy::disallowed_types, reason = "a program with files and a clock")]
 #![expect(clippy::print_stdout, reason = "a program that prints a table")]
 
 mod data;

@@ -197,6 +197,7 @@ fn images_of_the_maximum_area() {
 }
 
 #[test]
+#[expect(clippy::disallowed_methods, reason = "the threads of the caller")]
 fn all_threads_find_the_same_bit_for_bit() {
     let images = [rectangles(400, 300, 60, 1), noise(400, 300, 20, 2), checkerboard(400, 300, 37)];
     for p in both() {
