@@ -2,7 +2,7 @@
 //! item for each named quad.
 
 use protos::v1::{Answer, QuadAnswer, Sighting, Verdict};
-use vision::detect::quads::Corners;
+use vision::geometry::Corners;
 
 /// A quad with a landmark's name.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -17,9 +17,10 @@ use std::{
     sync::{Mutex, MutexGuard, PoisonError},
 };
 use vision::{
+    camera_calibration::PlanarView,
     frame::Intrinsics,
-    localise::{calibrate::PlanarView, pose::LandmarkPose, reproject::corner_points},
-    recognise::LandmarkId,
+    model::LandmarkId,
+    pose::{LandmarkPose, reprojection::corner_points},
 };
 
 /// Cameras that are known at a time; a new one beyond is not watched.
@@ -201,12 +202,10 @@ mod tests {
     use nalgebra::{Isometry3, UnitQuaternion};
     use protos::Name;
     use vision::{
-        detect::quads::Corners,
+        camera_calibration::{CalibrateParams, calibrate},
         frame::Distortion,
-        localise::{
-            calibrate,
-            pose::{LandmarkSize, landmark_pose},
-        },
+        geometry::Corners,
+        pose::{LandmarkSize, landmark_pose},
     };
 
     const SIZE: LandmarkSize = LandmarkSize { width_m: 0.6, height_m: 0.84 };
@@ -260,9 +259,7 @@ mod tests {
         // The same sides again are not kept twice; poses that may be flipped are not kept at all.
         assert!((5..=9).contains(&views.len()), "{}", views.len());
         assert_eq!(shown[0].1.views, views.len());
-        let found =
-            calibrate::calibrate(&views, size.map(|s| s as usize), &calibrate::CalibrateParams::default())
-                .unwrap();
+        let found = calibrate(&views, size.map(|s| s as usize), &CalibrateParams::default()).unwrap();
         assert!((found.camera.fx_px - 600.0).abs() < 1e-3 && (found.camera.cx_px - 330.0).abs() < 1e-3);
         assert!(cameras.of_robot("r2").is_empty() && cameras.views("r1", "rear").is_none());
     }

@@ -3,12 +3,9 @@
 
 use nalgebra::Matrix2;
 use vision::{
-    detect::{
-        detect,
-        quads::{Corners, Quad, QuadKind},
-    },
+    detect::{Quad, QuadKind, detect},
     frame::GrayImage,
-    geometry::polygon::iou,
+    geometry::{Corners, polygon::iou},
     params::Params,
     trace::NoTrace,
 };

@@ -19,12 +19,14 @@ use std::{
     sync::Arc,
 };
 use vision::{
-    detect::quads::{Corners, Quad},
+    detect::Quad,
     frame::{GrayImage, Intrinsics},
-    localise::pose::{LandmarkPose, landmark_pose},
+    geometry::Corners,
+    model::LandmarkId,
     params::Params,
-    pipeline::{FrameFacts, QuadFacts, matched},
-    recognise::{DistanceKind, LandmarkId, Recognition, Refusal, verdict::recognise},
+    pipeline::{FrameAnalysis, QuadAnalysis, recognise_quad},
+    pose::{LandmarkPose, landmark_pose},
+    recognise::{MatchRefusal, Verdict},
     seen_border::SeenBorder,
 };
 
@@ -38,7 +40,7 @@ pub type Sighted = Vec<(LandmarkId, RelativeObservation)>;
 /// hangs nobody knows where would be taken for the others again and again.
 pub fn sighted(
     image: &GrayImage,
-    facts: &FrameFacts,
+    facts: &FrameAnalysis,
     map: &MapSnapshot,
     mounting: &CameraExtrinsics,
     camera: &Intrinsics,
@@ -47,13 +49,13 @@ pub fn sighted(
         return Vec::new();
     }
     let unsure =
-        |q: &&QuadFacts| q.verdict.as_ref().is_some_and(|v| !matches!(v.recognition, Recognition::Unique(_)));
+        |q: &&QuadAnalysis| q.recognition.as_ref().is_some_and(|v| !matches!(v.verdict, Verdict::Unique(_)));
     facts.quads.iter().filter(unsure).filter_map(|q| one(image, q, map, mounting, camera)).collect()
 }
 
 fn one(
     image: &GrayImage,
-    facts: &QuadFacts,
+    facts: &QuadAnalysis,
     map: &MapSnapshot,
     mounting: &CameraExtrinsics,
     camera: &Intrinsics,
@@ -91,20 +93,20 @@ pub fn hang_where_known(landmarks: &BTreeSet<LandmarkId>, map: &MapSnapshot) -> 
 
 /// Which landmarks with doubles a quad may be; `None` where it is none of them, or may be one that hangs nobody knows where.
 pub fn resembling(image: &GrayImage, quad: &Quad, map: &MapSnapshot) -> Option<Resembling> {
-    let asked = |p: &Params| recognise(image, quad, &map.look_alikes.models, DistanceKind::Both, p);
-    let mut verdict = asked(&map.params);
-    if map.params.recognise.verdict.points && verdict.recognition == Recognition::Unknown {
-        verdict = asked(&map.look_alikes.by_icons);
+    let asked = |p: &Params| recognise_quad(image, quad, &map.look_alikes.models, p);
+    let (mut verdict, mut border) = asked(&map.params);
+    if map.params.recognise.verdict.points && verdict.verdict == Verdict::Unknown {
+        (verdict, border) = asked(&map.look_alikes.by_icons);
     }
-    let (Recognition::Ambiguous(_) | Recognition::Unique(_)) = verdict.recognition else { return None };
-    let fits = |refusal: Option<Refusal>| matches!(refusal, None | Some(Refusal::Margin));
+    let (Verdict::Ambiguous(_) | Verdict::Unique(_)) = verdict.verdict else { return None };
+    let fits = |refusal: Option<MatchRefusal>| matches!(refusal, None | Some(MatchRefusal::Margin));
     let fitting: BTreeSet<LandmarkId> =
         verdict.candidates.iter().filter(|c| fits(c.refusal)).map(|c| c.landmark).collect();
     let members = members(&fitting, &map.look_alikes.alike)?;
     if !hang_where_known(&members, map) {
         return None;
     }
-    let SeenBorder { corners_px, covariance_px2, .. } = matched(quad, &verdict, &map.params)?;
+    let SeenBorder { corners_px, covariance_px2, .. } = border?;
     let ratio = verdict.candidates.first()?.ratio;
     Some(Resembling { members, fitting: fitting.len(), ratio, corners_px, covariance_px2 })
 }

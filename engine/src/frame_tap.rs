@@ -4,7 +4,7 @@ use crate::{slots::SlotKey, snapshot::MapSnapshot};
 use map::pose2::Pose2Covariance;
 use protos::CheckedFrame;
 use std::{fmt::Debug, sync::Arc};
-use vision::{frame::GrayImage, pipeline::QuadFacts};
+use vision::{frame::GrayImage, pipeline::QuadAnalysis};
 
 /// What a worker found in a frame.
 #[derive(Debug)]
@@ -12,7 +12,7 @@ pub struct AnalysedFrame {
     /// The decoded picture.
     pub image: GrayImage,
     /// Its quads with verdicts.
-    pub quads: Vec<QuadFacts>,
+    pub quads: Vec<QuadAnalysis>,
     /// The version of the map they were recognised against.
     pub map: Arc<MapSnapshot>,
     /// `map_from_robot` at the frame: as the robot states it, or the fused pose without this frame.

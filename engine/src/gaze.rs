@@ -13,7 +13,7 @@ use std::{
     collections::BTreeMap,
     sync::{Mutex, PoisonError},
 };
-use vision::recognise::LandmarkId;
+use vision::model::LandmarkId;
 
 /// Robots whose gaze is remembered; the one longest silent gives way.
 pub const MAX_ROBOTS: usize = 10_000;

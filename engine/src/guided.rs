@@ -21,16 +21,13 @@ use map::{
 use nalgebra::Matrix2;
 use std::{collections::BTreeSet, sync::Arc};
 use vision::{
-    detect::quads::Corners,
     frame::GrayImage,
-    geometry::polygon,
-    localise::pose::{LandmarkPose, landmark_pose},
-    pipeline::{QuadFacts, matched},
+    geometry::{Corners, polygon},
+    model::LandmarkId,
+    pipeline::{ACCEPTED_NATS, ExpectedLandmark, QuadAnalysis, expected, matched_border},
     points::verify::PointEvidence,
-    recognise::{
-        LandmarkId, Recognition, Refusal,
-        expected::{ACCEPTED_NATS, Found, expected},
-    },
+    pose::{LandmarkPose, landmark_pose},
+    recognise::{MatchRefusal, Verdict},
     seen_border::SeenBorder,
 };
 
@@ -178,11 +175,12 @@ fn is_found(kept: &MayBe, e: &Expected) -> bool {
 }
 
 /// The landmarks that one quad may be.
-fn may_be(image: &GrayImage, quad: usize, facts: &QuadFacts, view: &View<'_>) -> Option<MayBe> {
-    let verdict = facts.verdict.as_ref()?;
+fn may_be(image: &GrayImage, quad: usize, facts: &QuadAnalysis, view: &View<'_>) -> Option<MayBe> {
+    let verdict = facts.recognition.as_ref()?;
     let quad = Some(quad);
-    if let Recognition::Unique(landmark) = verdict.recognition {
-        let SeenBorder { corners_px, covariance_px2, .. } = matched(&facts.quad, verdict, &view.map.params)?;
+    if let Verdict::Unique(landmark) = verdict.verdict {
+        let SeenBorder { corners_px, covariance_px2, .. } =
+            matched_border(&facts.quad, verdict, &view.map.params)?;
         let ratio = verdict.candidates.first().map_or(0.0, |c| c.ratio);
         let members = [landmark].into();
         let resembling = Resembling { members, fitting: 1, ratio, corners_px, covariance_px2 };
@@ -198,17 +196,18 @@ fn may_be(image: &GrayImage, quad: usize, facts: &QuadFacts, view: &View<'_>) ->
 }
 
 /// A quad that the icon of one landmark alone speaks for, and nothing of the map looks like that landmark.
-fn plain(facts: &QuadFacts, view: &View<'_>) -> Option<Resembling> {
-    let verdict = facts.verdict.as_ref()?;
-    let Recognition::Ambiguous(landmark) = verdict.recognition else { return None };
+fn plain(facts: &QuadAnalysis, view: &View<'_>) -> Option<Resembling> {
+    let verdict = facts.recognition.as_ref()?;
+    let Verdict::Ambiguous(landmark) = verdict.verdict else { return None };
     let first = verdict.candidates.iter().find(|c| c.landmark == landmark)?;
     let members = [landmark].into();
     let is_alone =
         !view.map.look_alikes.alike.contains_key(&landmark) && hang_where_known(&members, view.map);
-    if first.refusal != Some(Refusal::Plain) || !is_alone {
+    if first.refusal != Some(MatchRefusal::Plain) || !is_alone {
         return None;
     }
-    let SeenBorder { corners_px, covariance_px2, .. } = matched(&facts.quad, verdict, &view.map.params)?;
+    let SeenBorder { corners_px, covariance_px2, .. } =
+        matched_border(&facts.quad, verdict, &view.map.params)?;
     Some(Resembling { members, fitting: 1, ratio: first.ratio, corners_px, covariance_px2 })
 }
 
@@ -223,7 +222,7 @@ fn asked(image: &GrayImage, e: &Expected, view: &View<'_>) -> Option<MayBe> {
     if !hang_where_known(&members, map) {
         return None;
     }
-    let Found { corners_px, covariance_px2, picture_nats, points } = found;
+    let ExpectedLandmark { corners_px, covariance_px2, picture_nats, points } = found;
     let resembling = Resembling { members, fitting: 1, ratio: 1.0, corners_px, covariance_px2 };
     Some(MayBe { quad: None, is_unique: false, picture_nats, resembling, points })
 }

@@ -20,15 +20,16 @@ use map::{
 };
 use vision::{
     frame::Intrinsics,
-    pipeline::FrameFacts,
-    recognise::{LandmarkId, Recognition, Verdict},
+    model::LandmarkId,
+    pipeline::FrameAnalysis,
+    recognise::{RecognitionResult, Verdict},
 };
 
 /// A frame that was looked at.
 #[derive(Debug, Clone, Copy)]
 pub struct View<'a> {
     /// What is in it.
-    pub facts: &'a FrameFacts,
+    pub facts: &'a FrameAnalysis,
     /// The map it was compared with.
     pub map: &'a MapSnapshot,
     /// Where the camera sat.
@@ -155,8 +156,8 @@ fn guided_fix(
 const NEARLY: f64 = 1.5;
 
 /// Whether a quad shows a landmark, or something that is taken for it, or nearly.
-fn may_be(verdict: &Verdict, id: LandmarkId) -> bool {
-    let (Recognition::Unique(seen) | Recognition::Ambiguous(seen)) = verdict.recognition else {
+fn may_be(verdict: &RecognitionResult, id: LandmarkId) -> bool {
+    let (Verdict::Unique(seen) | Verdict::Ambiguous(seen)) = verdict.verdict else {
         return verdict.candidates.first().is_some_and(|c| c.landmark == id && c.ratio < NEARLY);
     };
     seen == id
@@ -170,7 +171,8 @@ fn seen(view: &View<'_>, sightings: Option<&[LandmarkObservation<'_>]>, grounds:
     let judge =
         |s: &LandmarkObservation<'_>| check_place(s, mounting, &grounds.pose, &grounds.supporters, &p).ok();
     let judged = sightings.unwrap_or_default().iter().filter_map(judge).collect();
-    let there = |id: LandmarkId| facts.quads.iter().filter_map(|q| q.verdict.as_ref()).any(|v| may_be(v, id));
+    let there =
+        |id: LandmarkId| facts.quads.iter().filter_map(|q| q.recognition.as_ref()).any(|v| may_be(v, id));
     let learnt = map.models.iter().filter_map(|model| {
         let (info, visible) = (map.landmarks.get(&model.id)?, map.visibility.get(&model.id)?);
         let place = info.place.as_ref().filter(|_| info.is_trusted() && !there(model.id))?;

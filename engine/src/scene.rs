@@ -18,11 +18,11 @@ use sim::{
 };
 use std::{collections::BTreeMap, sync::Arc};
 use vision::{
-    learn::{model::learn, synthesis},
-    localise::pose::LandmarkSize,
+    learn::{learn, synthesis},
+    model::{LandmarkId, ModelSet},
     params::Params,
     points::taught::view_points,
-    recognise::{LandmarkId, models::ModelSet},
+    pose::LandmarkSize,
 };
 
 /// Name of the map that is taught.

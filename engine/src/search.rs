@@ -19,7 +19,7 @@ use std::{
     sync::{Arc, Mutex, PoisonError},
 };
 use utoipa::ToSchema;
-use vision::recognise::LandmarkId;
+use vision::model::LandmarkId;
 
 /// Robots that search at a time, some 50 MB each at most; the one longest without a sighting gives way.
 pub const MAX_SEARCHES: usize = 8;

@@ -4,7 +4,7 @@
 use map::landmark_health::{Finding, HealthChange, LandmarkHealth};
 use serde_json::json;
 use tokio::sync::mpsc::{Receiver, Sender, channel, error::TrySendError};
-use vision::recognise::LandmarkId;
+use vision::model::LandmarkId;
 
 /// Findings that wait for the store; beyond that they are dropped, and found again.
 const QUEUE: usize = 256;

@@ -20,11 +20,11 @@ use protos::{
 };
 use std::{cell::RefCell, time::Instant};
 use vision::{
-    detect::{Memory, detect_in},
     frame::{GrayImage, Intrinsics},
-    localise::pose::LandmarkPose,
-    pipeline::{FrameFacts, Landmarks, NoPose, QuadFacts, analyse_quads},
-    recognise::{LandmarkId, Recognition},
+    model::LandmarkId,
+    pipeline::{FrameAnalysis, LandmarkDatabase, Pipeline, PoseUnavailable, QuadAnalysis},
+    pose::LandmarkPose,
+    recognise::Verdict,
     trace::{Stage, Trace},
 };
 
@@ -70,18 +70,18 @@ pub fn look(
     camera: Option<&Intrinsics>,
     map: &MapSnapshot,
     times: &mut StageTimes,
-) -> FrameFacts {
-    let landmarks = Landmarks { models: &map.models, sizes: &map.sizes, kind: map.distance };
+) -> FrameAnalysis {
+    let landmarks = LandmarkDatabase { models: &map.models, sizes: &map.sizes, kind: map.distance };
     // Taken out while in use: a panic leaves none behind that is half written.
-    let mut memory = MEMORY.take();
-    let quads = detect_in(&mut memory, image, &map.params.detect, times);
-    MEMORY.set(memory);
-    analyse_quads(image, quads, camera, landmarks, &map.params, times)
+    let mut pipeline = PIPELINE.take();
+    let facts = pipeline.analyse(image, camera, landmarks, &map.params, times);
+    PIPELINE.set(pipeline);
+    facts
 }
 
 thread_local! {
-    /// What detection keeps from frame to frame; each worker thread its own.
-    static MEMORY: RefCell<Memory> = RefCell::default();
+    /// What the pipeline keeps from frame to frame; each worker thread its own.
+    static PIPELINE: RefCell<Pipeline> = RefCell::default();
 }
 
 /// The answer to one image without a robot: an uploaded photograph.
@@ -95,7 +95,7 @@ pub fn answer_to_photograph(image: &GrayImage, camera: Option<&Intrinsics>, map:
 }
 
 /// Facts with names: status and quads, without echo, times and robot pose.
-pub fn answer(facts: &FrameFacts, map: &MapSnapshot) -> v1::Answer {
+pub fn answer(facts: &FrameAnalysis, map: &MapSnapshot) -> v1::Answer {
     let quads: Vec<_> = facts.quads.iter().map(|q| quad(q, map)).collect();
     let any = |verdict| quads.iter().any(|q: &v1::QuadAnswer| q.verdict() == verdict);
     let status = if any(v1::Verdict::Unique) {
@@ -114,7 +114,7 @@ pub fn answer(facts: &FrameFacts, map: &MapSnapshot) -> v1::Answer {
     }
 }
 
-fn quad(facts: &QuadFacts, map: &MapSnapshot) -> v1::QuadAnswer {
+fn quad(facts: &QuadAnalysis, map: &MapSnapshot) -> v1::QuadAnswer {
     let mut quad = v1::QuadAnswer {
         corners: corners(&facts.quad.corners_px),
         kind: kind(facts.quad.kind).into(),
@@ -122,7 +122,7 @@ fn quad(facts: &QuadFacts, map: &MapSnapshot) -> v1::QuadAnswer {
         verdict: v1::Verdict::Unknown.into(),
         ..v1::QuadAnswer::default()
     };
-    if let Some(verdict) = &facts.verdict {
+    if let Some(verdict) = &facts.recognition {
         fill_verdict(&mut quad, verdict, |id| name(map, id));
         if quad.verdict() == v1::Verdict::Unique {
             quad.set_sighting(v1::Sighting::Global);
@@ -132,10 +132,10 @@ fn quad(facts: &QuadFacts, map: &MapSnapshot) -> v1::QuadAnswer {
     }
     match &facts.pose {
         Ok(pose) => fill_pose(&mut quad, pose),
-        Err(NoPose::NotUnique) => {}
-        Err(NoPose::NoCamera) => "no_intrinsics".clone_into(&mut quad.pose_refusal),
-        Err(NoPose::NoSize(_)) => "no_size".clone_into(&mut quad.pose_refusal),
-        Err(NoPose::Pose(_)) => "degenerate".clone_into(&mut quad.pose_refusal),
+        Err(PoseUnavailable::NotUnique) => {}
+        Err(PoseUnavailable::NoCamera) => "no_intrinsics".clone_into(&mut quad.pose_refusal),
+        Err(PoseUnavailable::NoSize(_)) => "no_size".clone_into(&mut quad.pose_refusal),
+        Err(PoseUnavailable::Pose(_)) => "degenerate".clone_into(&mut quad.pose_refusal),
     }
     quad
 }
@@ -145,10 +145,10 @@ fn name(map: &MapSnapshot, id: LandmarkId) -> String {
 }
 
 /// The landmarks that were recognised without doubt, with their poses.
-pub fn recognised(facts: &FrameFacts) -> Vec<(LandmarkId, &LandmarkPose)> {
-    let unique = |q: &QuadFacts| match q.verdict.as_ref()?.recognition {
-        Recognition::Unique(id) => Some(id),
-        Recognition::Unknown | Recognition::Ambiguous(_) => None,
+pub fn recognised(facts: &FrameAnalysis) -> Vec<(LandmarkId, &LandmarkPose)> {
+    let unique = |q: &QuadAnalysis| match q.recognition.as_ref()?.verdict {
+        Verdict::Unique(id) => Some(id),
+        Verdict::Unknown | Verdict::Ambiguous(_) => None,
     };
     facts.quads.iter().filter_map(|q| Some((unique(q)?, q.pose.as_ref().ok()?))).collect()
 }
@@ -156,7 +156,7 @@ pub fn recognised(facts: &FrameFacts) -> Vec<(LandmarkId, &LandmarkPose)> {
 /// Landmarks that were recognised, posed, and have a place that is trusted; or the word that says why there are none:
 /// empty when no landmark was recognised.
 pub fn sightings<'a>(
-    facts: &'a FrameFacts,
+    facts: &'a FrameAnalysis,
     map: &'a MapSnapshot,
 ) -> Result<Vec<LandmarkObservation<'a>>, &'static str> {
     let posed = recognised(facts);

@@ -25,7 +25,7 @@ use crate::{
 use map::{pose2::Pose2Covariance, relocalise::PoseHypothesis};
 use protos::{CheckedFrame, Code, Name, Rejection, convert::geometry::pose2_covariance_wire, v1};
 use std::{cell::Cell, sync::Arc, thread::JoinHandle, time::Instant};
-use vision::{frame::GrayImage, pipeline::FrameFacts, recognise::LandmarkId};
+use vision::{frame::GrayImage, model::LandmarkId, pipeline::FrameAnalysis};
 
 /// Where answers and poses go. Must not wait.
 pub trait Publish: Send + Sync + 'static {
@@ -277,7 +277,7 @@ impl Engine {
         if self.gather.is_wanted(key) {
             return None;
         }
-        let nothing = FrameFacts { quads: Vec::new() };
+        let nothing = FrameAnalysis { quads: Vec::new() };
         let view = view(frame, &nothing, map);
         let guided = guided(image, &view, &grounds.pose);
         let judged = judged_expected(&view, grounds.clone(), &guided);
@@ -298,7 +298,7 @@ impl Engine {
         &self,
         key: &SlotKey,
         frame: &CheckedFrame,
-        (image, facts): (&GrayImage, &FrameFacts),
+        (image, facts): (&GrayImage, &FrameAnalysis),
         map: &MapSnapshot,
         is_known: bool,
     ) -> Option<Left> {
@@ -333,7 +333,7 @@ impl Engine {
     }
 }
 
-fn view<'a>(frame: &'a CheckedFrame, facts: &'a FrameFacts, map: &'a MapSnapshot) -> View<'a> {
+fn view<'a>(frame: &'a CheckedFrame, facts: &'a FrameAnalysis, map: &'a MapSnapshot) -> View<'a> {
     View {
         facts,
         map,

@@ -16,7 +16,7 @@ use crate::{
 };
 use nalgebra::{Point2, Point3, Vector3};
 use serde::{Deserialize, Serialize};
-use vision::recognise::LandmarkId;
+use vision::model::LandmarkId;
 
 /// Most landmarks whose failures are remembered.
 pub const MAX_DAMPED: usize = 64;

@@ -4,7 +4,7 @@
 use crate::check::{self, MAX_COORDINATE_M, OutOfRange};
 use nalgebra::{Isometry3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3, Vector6};
 use std::f64::consts::{FRAC_PI_2, TAU};
-use vision::localise::pose::LandmarkSize;
+use vision::pose::LandmarkSize;
 
 /// Largest height of a landmark's centre above or below the floor, metres.
 pub const MAX_HEIGHT_M: f64 = 100.0;

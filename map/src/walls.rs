@@ -271,7 +271,7 @@ mod tests {
     #[test]
     fn noisy_sightings_stay_within_their_covariance() {
         // Oracle: Monte Carlo over robot poses; the line's error against its claimed covariance.
-        let mut random = vision::learn::random::Random::new(4);
+        let mut random = vision::random::Random::new(4);
         let (mut sum, draws) = (0.0, 300);
         for _ in 0..draws {
             let mut walls = Walls::default();

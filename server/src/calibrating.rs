@@ -1,15 +1,16 @@
 //! A camera from views of one landmark, for the command line and over HTTP: corners in, a report out. The computation
-//! is `vision::localise::calibrate`.
+//! is `vision::camera_calibration::calibrate`.
 
 use protos::{convert::geometry::intrinsics_wire, v1};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 use vision::{
-    detect::quads::BORDER_SIGMA_PX,
-    frame::{Intrinsics, IntrinsicsSigmas},
-    localise::calibrate::{
-        CalibrateError, CalibrateParams, Calibration, Chosen, Height, PlanarView, calibrate_choosing,
+    camera_calibration::{
+        CalibrateError, CalibrateParams, CameraCalibration, CameraHeight, PlanarView, RobustCalibration,
+        calibrate_choosing,
     },
+    detect::BORDER_SIGMA_PX,
+    frame::{Intrinsics, IntrinsicsSigmas},
 };
 
 /// Standard deviation of a corner per coordinate, where nobody says.
@@ -54,9 +55,10 @@ impl Knowledge {
         CalibrateParams {
             radial: usize::from(self.radial),
             roll_sigma_rad: if self.level { LEVEL_SIGMA_RAD } else { 0.0 },
-            height: self
-                .height_m
-                .map_or(Height::Free, |height_m| Height::Known { height_m, sigma_m: HEIGHT_SIGMA_M }),
+            height: self.height_m.map_or(CameraHeight::Free, |height_m| CameraHeight::Known {
+                height_m,
+                sigma_m: HEIGHT_SIGMA_M,
+            }),
             known_aspect: !self.unknown_aspect,
             centre_sigma: CENTRE_SIGMA,
             ..CalibrateParams::default()
@@ -104,7 +106,7 @@ pub(crate) struct Report {
 }
 
 /// What speaks against a camera that came out.
-fn doubts(c: &Calibration, image_px: [usize; 2]) -> Vec<String> {
+fn doubts(c: &CameraCalibration, image_px: [usize; 2]) -> Vec<String> {
     let mut all = vec![];
     let chi2 = c.chi2 / c.dof.max(1) as f64;
     if chi2 > DOUBTFUL_CHI2 {
@@ -131,7 +133,7 @@ pub(crate) fn calibrated(
     for covariance in views.iter_mut().flat_map(|v| &mut v.covariance_px2) {
         *covariance += nalgebra::Matrix2::identity() * BORDER_SIGMA_PX.powi(2);
     }
-    let Chosen { calibration: c, used } = calibrate_choosing(&views, image_px, &known.params())?;
+    let RobustCalibration { calibration: c, used } = calibrate_choosing(&views, image_px, &known.params())?;
     let sigma = |i: usize| c.covariance.map_or(f64::INFINITY, |m| m[(i, i)].sqrt());
     let view = |i: usize| {
         let fit = used.iter().position(|u| *u == i).and_then(|k| c.views.get(k));
@@ -170,9 +172,9 @@ mod tests {
     use super::*;
     use nalgebra::{Isometry3, Matrix2, Matrix3, Rotation3, UnitQuaternion, Vector3};
     use vision::{
-        detect::quads::Corners,
         frame::Distortion,
-        localise::{pose::LandmarkSize, reproject::corner_points},
+        geometry::Corners,
+        pose::{LandmarkSize, reprojection::corner_points},
     };
 
     /// Nine views of a poster by a camera whose principal point is `cy`.

@@ -16,7 +16,7 @@ use std::{
     path::{Path, PathBuf},
     sync::Arc,
 };
-use vision::{params::Params, recognise::models::MAX_LANDMARKS};
+use vision::{model::MAX_LANDMARKS, params::Params};
 
 /// Variables that begin with `WAYMARK_` but are read by the command line, not by the settings.
 const NOT_SETTINGS: [&str; 3] = ["config", "server", "log"];

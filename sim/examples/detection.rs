@@ -7,11 +7,11 @@ use std::sync::Arc;
 use sim::building::{Building, LandmarkKind};
 use sim::robot::{Robot, RobotParams, SensorReadings};
 use sim::truth::{LandmarkView, ViewState};
+use vision::detect::DetectParams;
 use vision::detect::detect;
-use vision::detect::quads::{Corners, QuadKind};
 use vision::geometry::polygon::iou;
-use vision::params::DetectParams;
 use vision::trace::NoTrace;
+use vision::{detect::QuadKind, geometry::Corners};
 
 /// Root mean square distance of the corners, whichever is named first.
 fn corner_error_px(found: &Corners, truth: &Corners) -> f64 {

@@ -12,7 +12,7 @@ use crate::{
     texture::{Footprint, Texture},
 };
 use nalgebra::{Matrix3, Point2, Vector3};
-use vision::{detect::quads::Corners, frame::GrayImage};
+use vision::{frame::GrayImage, geometry::Corners};
 
 /// Width and height of the camera's image, in pixels.
 pub const IMAGE_PX: [usize; 2] = [640, 480];

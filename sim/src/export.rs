@@ -4,8 +4,8 @@
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
-use vision::detect::quads::Corners;
 use vision::frame::GrayImage;
+use vision::geometry::Corners;
 
 use crate::building::{Building, LandmarkKind};
 use crate::camera::Camera;

@@ -2,7 +2,7 @@
 //! come from the depth buffer.
 
 use nalgebra::{Isometry3, Point2, Point3};
-use vision::detect::quads::Corners;
+use vision::geometry::Corners;
 
 use crate::building::{LandmarkKind, LandmarkTruth};
 use crate::camera::Camera;

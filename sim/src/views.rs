@@ -9,8 +9,8 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
-use vision::detect::quads::Corners;
 use vision::frame::GrayImage;
+use vision::geometry::Corners;
 
 use crate::building::{Building, LandmarkKind, LandmarkTruth, Surface};
 use crate::camera::Camera;

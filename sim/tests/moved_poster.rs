@@ -20,13 +20,13 @@ use sim::{
     drive::{Drive, DriveParams, Step},
 };
 use vision::{
-    detect::quads::Corners,
-    learn::random::Random,
-    localise::{
-        pose::{LandmarkPose, LandmarkSize, landmark_pose},
-        reproject::{corner_points, pixel},
+    geometry::Corners,
+    model::LandmarkId,
+    pose::{
+        LandmarkPose, LandmarkSize, landmark_pose,
+        reprojection::{corner_points, pixel},
     },
-    recognise::LandmarkId,
+    random::Random,
 };
 
 const CORNER_SIGMA_PX: f64 = 0.5;

@@ -17,7 +17,7 @@ use tests::{
     command::{Run, check_help, check_refused, program, waymark},
     scenes,
 };
-use vision::{detect::quads::Corners, geometry::polygon};
+use vision::geometry::{Corners, polygon};
 
 const LONGEST: Duration = Duration::from_mins(2);
 

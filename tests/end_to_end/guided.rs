@@ -17,7 +17,7 @@ use tests::{
     Inside, SOON,
     robots::{MAP, call, capture, connect, put_walls, teach},
 };
-use vision::{detect::quads::Corners, geometry::polygon};
+use vision::geometry::{Corners, polygon};
 
 /// Twelve posters with one picture, then two with pictures of their own, on the end walls.
 const POSTERS: usize = 14;

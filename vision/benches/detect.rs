@@ -4,12 +4,11 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
 use vision::{
     detect::{
-        chains::chains,
-        edges::{EdgeMap, edges, edges_into},
-        segments::segments,
+        DetectParams,
+        edges::edge_map::{EdgeMap, edges, edges_into},
+        segments::{chains::chains, edge_segments::segments},
     },
     frame::GrayImage,
-    params::DetectParams,
 };
 
 /// Six framed posters, a quarter of the image each way filled with blocks of texture, noise of +-3 levels.

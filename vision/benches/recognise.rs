@@ -4,16 +4,14 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use nalgebra::Matrix2;
 use std::{hint::black_box, sync::Arc};
 use vision::{
-    detect::quads::{Corners, Quad, QuadKind},
+    detect::{Quad, QuadKind},
     frame::GrayImage,
+    geometry::Corners,
     icon::icon,
-    learn::{
-        exemplar::Exemplar,
-        model::{LandmarkModel, View, learn},
-        synthesis::views,
-    },
+    learn::{TrainingView, learn, synthesis::views},
+    model::{Exemplar, LandmarkId, LandmarkModel, ModelSet},
     params::Params,
-    recognise::{DistanceKind, LandmarkId, ModelSet, features, verdict::recognise},
+    recognise::{DistanceKind, features, recognise},
 };
 
 const LANDMARKS: u64 = 1000;
@@ -33,7 +31,7 @@ fn corners() -> Corners {
 
 /// Many landmarks from one lesson: exemplars are exchanged, thresholds stay.
 fn landmarks(p: &Params) -> ModelSet {
-    let mut lesson = vec![View::photographed(&picture(0), &corners(), p).expect("large enough")];
+    let mut lesson = vec![TrainingView::photographed(&picture(0), &corners(), p).expect("large enough")];
     lesson.extend(views(&picture(0), &corners(), 10, p, 1));
     let model = learn(LandmarkId(0), &lesson, &[], p).expect("textured");
     let all = (0..LANDMARKS).map(|id| {

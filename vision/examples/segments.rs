@@ -1,16 +1,16 @@
 //! Prints the straight segments of photographs as CSV, and the time of each stage to standard error:
 //! `cargo run --release -p vision --example segments -- [PARAMS.json] IMAGE...`, the parameters as in `DetectParams`.
+#![expect(clippy::disallowed_methods, clippy::disallowed_types, reason = "a program with files and a clock")]
 #![expect(clippy::print_stdout, reason = "a command-line example")]
 
 use std::{error::Error, time::Instant};
 use vision::{
     detect::{
-        chains::chains,
-        edges::{EdgeMap, edges_into},
-        segments::segments,
+        DetectParams,
+        edges::edge_map::{EdgeMap, edges_into},
+        segments::{chains::chains, edge_segments::segments},
     },
     frame::GrayImage,
-    params::DetectParams,
 };
 
 /// Runs of which the fastest counts.

@@ -2,9 +2,8 @@
 //! cell. Corner order decides which way is up; nothing here guesses it.
 
 use crate::{
-    detect::quads::Corners,
     frame::GrayImage,
-    geometry::{homography::Homography, interpolate::cell},
+    geometry::{corners::Corners, homography::Homography, interpolate::cell},
 };
 use nalgebra::Point2;
 use serde::{Deserialize, Serialize};

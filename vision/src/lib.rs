@@ -7,15 +7,18 @@
 //! y down, z forward; landmark frame origin at the rectangle's centre, x = outward normal (towards the viewer),
 //! y = the viewer's right, z = up. Transforms read `a_from_b`. Units end names.
 
+pub mod random;
 pub mod frame;
+pub mod geometry;
 pub mod params;
 pub mod trace;
-pub mod geometry;
 pub mod detect;
 pub mod icon;
 pub mod seen_border;
 pub mod recognise;
 pub mod points;
+pub mod model;
 pub mod learn;
-pub mod localise;
+pub mod pose;
+pub mod camera_calibration;
 pub mod pipeline;

@@ -1,6 +1,6 @@
 //! The taught border of a landmark as an image shows it: corners, covariances, and how they were found.
 
-use crate::detect::quads::{BORDER_SIGMA_PX, Corners};
+use crate::{detect::quad::BORDER_SIGMA_PX, geometry::corners::Corners, params::Params};
 use nalgebra::Matrix2;
 
 /// Standard deviation of an aligned corner, in icon pixels: twice what the alignment's own test allows.
@@ -47,4 +47,13 @@ pub enum FoundBy {
 pub(crate) fn aligned_covariance_px2(corners_px: &Corners, icon_size: usize) -> [Matrix2<f64>; 4] {
     let sigma_px = ALIGNED_SIGMA_ICON_PX * corners_px.area_px2().sqrt() / icon_size as f64;
     [Matrix2::identity() * (sigma_px.powi(2) + BORDER_SIGMA_PX.powi(2)); 4]
+}
+
+/// Corners that differ by less, in icon pixels, are those of one border.
+const SAME_BORDER_ICON_PX: f64 = 1.5;
+
+/// Whether aligned corners are those of the border that was detected, which are better known from its edges.
+pub(crate) fn is_same_border(detected_px: &Corners, aligned_px: &Corners, p: &Params) -> bool {
+    let icon_px = detected_px.area_px2().sqrt() / p.icon.size as f64;
+    detected_px.furthest_px(aligned_px) < SAME_BORDER_ICON_PX * icon_px
 }

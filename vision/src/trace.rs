@@ -2,8 +2,11 @@
 //! with [`NoTrace`] that costs nothing. The clock and all drawing live with whoever implements the trait.
 
 use crate::detect::{
-    chains::EdgeChain, edges::EdgeMap, grouping::QuadSeed, quads::Quad, segments::EdgeSegment,
-    similarity::SegmentPair,
+    edges::edge_map::EdgeMap,
+    proposals::quad_seed::QuadSeed,
+    quad::Quad,
+    relaxation::similarity::SegmentPair,
+    segments::{chains::EdgeChain, edge_segments::EdgeSegment},
 };
 
 /// The stages in their order; names appear in timings and picture files.

@@ -9,7 +9,7 @@ use crate::{
 use map::{extrinsics::CameraExtrinsics, pose2::Pose2};
 use nalgebra::{Matrix3, Vector3};
 use sim::robot::SensorReadings as Seen;
-use vision::{pipeline::FrameFacts, recognise::models::ModelSet};
+use vision::{model::ModelSet, pipeline::FrameAnalysis};
 
 const POSTER: LandmarkId = LandmarkId(1);
 const TWIN: LandmarkId = LandmarkId(7);
@@ -34,13 +34,13 @@ impl Look {
         (Self { seen, scene }, map)
     }
 
-    fn facts(&self, map: &MapSnapshot) -> FrameFacts {
+    fn facts(&self, map: &MapSnapshot) -> FrameAnalysis {
         let camera = self.scene.intrinsics();
         verdicts::look(&self.seen.frame.image, Some(&camera), map, &mut StageTimes::start())
     }
 
     /// What a pose adds to these facts.
-    fn guided(&self, image: &GrayImage, facts: &FrameFacts, map: &MapSnapshot, pose: Pose2) -> Guided {
+    fn guided(&self, image: &GrayImage, facts: &FrameAnalysis, map: &MapSnapshot, pose: Pose2) -> Guided {
         let mounting = CameraExtrinsics::new(self.seen.step.robot_from_camera).unwrap();
         let image_px = [image.width() as f64, image.height() as f64];
         let camera = self.scene.intrinsics();
@@ -58,7 +58,7 @@ impl Look {
 /// by itself.
 fn with_twin(map: &MapSnapshot, along_m: f64) -> MapSnapshot {
     let poster = map.models.get(POSTER).unwrap();
-    let twin = Arc::new(vision::learn::model::LandmarkModel { id: TWIN, ..(**poster).clone() });
+    let twin = Arc::new(vision::model::LandmarkModel { id: TWIN, ..(**poster).clone() });
     let mut info: LandmarkInfo = map.landmarks[&POSTER].clone();
     "twin".clone_into(&mut info.name);
     let place = info.place.as_mut().unwrap();
@@ -97,7 +97,7 @@ fn what_the_picture_alone_names_is_not_guided() {
 fn what_an_icon_alone_speaks_for_is_named_by_the_pose() {
     let (look, map) = Look::new();
     let poster = map.models.get(POSTER).unwrap();
-    let plain = Arc::new(vision::learn::model::LandmarkModel { points: vec![], ..(**poster).clone() });
+    let plain = Arc::new(vision::model::LandmarkModel { points: vec![], ..(**poster).clone() });
     let mut map = (*map).clone();
     map.models = ModelSet::new(vec![plain], &map.params).unwrap();
     let facts = look.facts(&map);
@@ -116,7 +116,7 @@ fn what_an_icon_alone_speaks_for_is_named_by_the_pose() {
 #[test]
 fn a_landmark_that_was_not_detected_is_found_where_it_is_expected() {
     let (look, map) = Look::new();
-    let nothing = FrameFacts { quads: Vec::new() };
+    let nothing = FrameAnalysis { quads: Vec::new() };
     let made = look.guided(&look.seen.frame.image, &nothing, &map, look.truth());
     let found = made.sightings.iter().find(|s| s.landmark == POSTER).expect("found");
     let truth = look.seen.frame.truth.landmark(&map.landmarks[&POSTER].name).unwrap();
@@ -132,7 +132,7 @@ fn a_landmark_that_was_not_detected_is_found_where_it_is_expected() {
 #[test]
 fn nothing_is_found_in_another_picture_or_from_a_wrong_pose() {
     let (look, map) = Look::new();
-    let (image, nothing) = (&look.seen.frame.image, FrameFacts { quads: Vec::new() });
+    let (image, nothing) = (&look.seen.frame.image, FrameAnalysis { quads: Vec::new() });
     let grey = GrayImage::from_fn(image.width(), image.height(), |_, _| 128);
     let made = look.guided(&grey, &nothing, &map, look.truth());
     assert!(made.sightings.is_empty() && made.report.contradictions == 0, "{made:?}");
@@ -186,7 +186,7 @@ fn a_class_of_which_one_hangs_nobody_knows_where_is_not_named() {
     quarantined.landmarks.get_mut(&TWIN).unwrap().standing =
         map::landmark_health::LandmarkHealth::Quarantined;
     for map in [unplaced, quarantined] {
-        for facts in [look.facts(&map), FrameFacts { quads: Vec::new() }] {
+        for facts in [look.facts(&map), FrameAnalysis { quads: Vec::new() }] {
             let made = look.guided(&look.seen.frame.image, &facts, &map, look.truth());
             assert!(made.sightings.iter().all(|s| s.landmark != POSTER), "{:?}", made.sightings);
         }

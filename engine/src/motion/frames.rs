@@ -14,7 +14,7 @@ use map::{
 };
 use protos::{CheckedFrame, Name, v1};
 use std::time::Instant;
-use vision::recognise::LandmarkId;
+use vision::model::LandmarkId;
 
 /// Which frame of a robot.
 #[derive(Debug, Clone, Copy)]

@@ -23,7 +23,7 @@ use std::{
     sync::Arc,
     time::{Duration, Instant},
 };
-use vision::recognise::LandmarkId;
+use vision::model::LandmarkId;
 
 /// Landmarks that a pose is said to rest on: the latest.
 pub const MAX_SUPPORTERS: usize = 16;

@@ -16,7 +16,7 @@ use sim::{
     laser::LaserParams,
 };
 use std::sync::LazyLock;
-use vision::recognise::LandmarkId;
+use vision::model::LandmarkId;
 
 mod guided;
 mod stamps;

@@ -7,7 +7,7 @@ use map::{
     relocalise::RelativeObservation,
 };
 use std::f64::consts::FRAC_PI_2;
-use vision::localise::pose::LandmarkSize;
+use vision::pose::LandmarkSize;
 
 /// Along the corridor, all on its left side when looking east.
 const DOORS: [f64; 3] = [6.0, 11.0, 18.0];

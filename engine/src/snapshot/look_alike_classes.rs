@@ -6,12 +6,10 @@
 use super::stored_model::StoredModel;
 use std::{collections::BTreeMap, sync::Arc};
 use vision::{
-    learn::{
-        model::{LandmarkModel, refit_thresholds, unlikeness_of},
-        threshold::LimitedBy,
-    },
+    learn::{refit_thresholds, unlikeness_of},
+    model::{LandmarkId, LandmarkModel, LimitedBy, ModelSet},
     params::Params,
-    recognise::{DistanceKind, IconFeatures, LandmarkId, models::ModelSet},
+    recognise::{DistanceKind, IconFeatures},
 };
 
 /// Most landmarks with look-alikes; what is beyond is left out.
@@ -86,12 +84,9 @@ fn alike(models: &[Arc<LandmarkModel>], p: &Params) -> BTreeMap<LandmarkId, Arc<
 mod tests {
     use super::*;
     use vision::{
-        detect::quads::Corners,
         frame::GrayImage,
-        learn::{
-            model::{View, learn},
-            synthesis,
-        },
+        geometry::Corners,
+        learn::{TrainingView, learn, synthesis},
     };
 
     /// Blocks of grey with a little of its own in a corner; another number, other blocks.
@@ -111,7 +106,7 @@ mod tests {
         let p = Params::default();
         let whole = Corners::try_from([[-0.5, -0.5], [239.5, -0.5], [239.5, 239.5], [-0.5, 239.5]]).unwrap();
         let lesson = |id: u64, image: &GrayImage| {
-            let mut views = vec![View::photographed(image, &whole, &p).unwrap()];
+            let mut views = vec![TrainingView::photographed(image, &whole, &p).unwrap()];
             views.extend(synthesis::views(image, &whole, 8, &p, id));
             Arc::new(refit_thresholds(&learn(LandmarkId(id), &views, &[], &p).unwrap(), &[], &p))
         };

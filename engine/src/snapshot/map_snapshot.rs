@@ -11,9 +11,10 @@ use map::{
 };
 use std::{collections::BTreeMap, sync::Arc};
 use vision::{
-    localise::pose::LandmarkSize,
+    model::{LandmarkId, ModelSet},
     params::Params,
-    recognise::{DistanceKind, LandmarkId, models::ModelSet},
+    pose::LandmarkSize,
+    recognise::DistanceKind,
 };
 
 /// One version of one map.

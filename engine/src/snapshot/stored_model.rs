@@ -1,7 +1,7 @@
 //! A learnt model as it is stored.
 
 use std::sync::Arc;
-use vision::learn::model::LandmarkModel;
+use vision::model::LandmarkModel;
 
 /// A model with the digest of its stored bytes: the same digest is the same model.
 #[derive(Debug, Clone)]

@@ -9,9 +9,12 @@ use serde::Serialize;
 use server::cli::{clock::Clock, parameters::ParameterArgs, scratch, screen};
 use std::{collections::BTreeMap, hint::black_box, path::PathBuf};
 use vision::{
-    detect::{Memory, chains, detect_in, edges, quads::Grouping, segments},
+    detect::{
+        DetectBuffers, DetectParams, Grouping, detect_with,
+        edges::edge_map,
+        segments::{chains, edge_segments},
+    },
     frame::GrayImage,
-    params::DetectParams,
     trace::{NoTrace, Stage, Trace},
 };
 
@@ -204,23 +207,23 @@ fn time_ours(
         work();
         ours.add(name, i, clock.ms());
     };
-    let mut kept = edges::EdgeMap::default();
-    timed(EDGES, &mut || edges::edges_into(black_box(frame), &params.edges, &mut kept));
+    let mut kept = edge_map::EdgeMap::default();
+    timed(EDGES, &mut || edge_map::edges_into(black_box(frame), &params.edges, &mut kept));
     timed(SEGMENTS, &mut || {
-        edges::edges_into(black_box(frame), &params.edges, &mut kept);
+        edge_map::edges_into(black_box(frame), &params.edges, &mut kept);
         let chained = chains::chains(&kept, &params.chains);
-        black_box(segments::segments(&chained, &kept, &params.segments));
+        black_box(edge_segments::segments(&chained, &kept, &params.segments));
     });
-    let mut memory = Memory::default();
+    let mut memory = DetectBuffers::default();
     let mut found = 0;
-    timed(QUADS, &mut || found = detect_in(&mut memory, black_box(frame), params, &mut NoTrace).len());
+    timed(QUADS, &mut || found = detect_with(&mut memory, black_box(frame), params, &mut NoTrace).len());
     let mut paper = params.clone();
     paper.quads.grouping = Grouping::Relaxation;
     timed(PAPER, &mut || {
-        black_box(detect_in(&mut memory, black_box(frame), &paper, &mut NoTrace));
+        black_box(detect_with(&mut memory, black_box(frame), &paper, &mut NoTrace));
     });
     let mut clock = StageClock { last: Clock::start(), ms: BTreeMap::new() };
-    detect_in(&mut memory, frame, params, &mut clock);
+    detect_with(&mut memory, frame, params, &mut clock);
     for (stage, ms) in clock.ms {
         stages.add(stage, i, ms);
     }

@@ -19,7 +19,7 @@ use std::{
     path::Path,
     time::{Duration, Instant},
 };
-use vision::{frame::GrayImage, learn::model::LandmarkModel, params::Params};
+use vision::{frame::GrayImage, model::LandmarkModel, params::Params};
 
 const MAP: &str = "large";
 /// Widest poster that is taught, in pixels: what is measured does not depend on it.

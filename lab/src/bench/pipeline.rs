@@ -13,14 +13,15 @@ use sim::{
 };
 use std::{collections::BTreeMap, sync::Arc, time::Instant};
 use vision::{
-    detect::{Memory, detect_in, quads::Corners},
     frame::{FrameError, GrayImage},
-    learn::{model, synthesis},
-    localise::pose::LandmarkSize,
+    geometry::Corners,
+    learn::{self, synthesis},
+    model::{LandmarkId, ModelSet},
     params::Params,
-    pipeline::{Landmarks, analyse_quads},
+    pipeline::{LandmarkDatabase, Pipeline},
     points::taught::view_points,
-    recognise::{DistanceKind, LandmarkId, ModelSet},
+    pose::LandmarkSize,
+    recognise::DistanceKind,
     trace::Stage,
 };
 
@@ -83,17 +84,16 @@ pub(super) fn run(args: &PipelineArgs) -> anyhow::Result<()> {
 
     let sizes: BTreeMap<LandmarkId, LandmarkSize> =
         models.iter().map(|m| (m.id, LandmarkSize { width_m: 0.6, height_m: 0.84 })).collect();
-    let landmarks = Landmarks { models: &models, sizes: &sizes, kind: DistanceKind::default() };
+    let landmarks = LandmarkDatabase { models: &models, sizes: &sizes, kind: DistanceKind::default() };
     let mut costs: BTreeMap<&'static str, Vec<f64>> = BTreeMap::new();
     let mut totals = Vec::new();
     let (mut quads, mut recognised) = (0, 0);
-    let mut memory = Memory::default();
+    let mut pipeline = Pipeline::default();
     for frame in &frames {
         let mut fastest: Option<Stopwatch> = None;
         for round in 0..args.rounds {
             let mut watch = Stopwatch::start();
-            let found = detect_in(&mut memory, frame, &params.detect, &mut watch);
-            let facts = analyse_quads(frame, found, Some(&camera), landmarks, &params, &mut watch);
+            let facts = pipeline.analyse(frame, Some(&camera), landmarks, &params, &mut watch);
             if fastest.as_ref().is_none_or(|f| watch.total_ms() < f.total_ms()) {
                 fastest = Some(watch);
             }
@@ -141,7 +141,7 @@ fn models(building: &Building, args: &PipelineArgs, params: &Params) -> anyhow::
         let (w, h) = (picture.width() as f64 - 0.5, picture.height() as f64 - 0.5);
         let whole = Corners::try_from([[-0.5, -0.5], [w, -0.5], [w, h], [-0.5, h]])?;
         let views = synthesis::views(picture, &whole, VIEWS, params, args.seed ^ id);
-        let model = model::learn(LandmarkId(id), &views, &[], params)?;
+        let model = learn::learn(LandmarkId(id), &views, &[], params)?;
         models.push(Arc::new(model.with_points_if_used(params, || vec![view_points(picture, &whole)])));
         progress.inc(1);
     }

@@ -12,7 +12,10 @@ use frames::{Named, Scenes};
 use serde::Serialize;
 use server::cli::{clock::Clock, screen};
 use std::{collections::BTreeMap, path::PathBuf, sync::Arc};
-use vision::{learn::model::LandmarkModel, params::Params, recognise::ModelSet};
+use vision::{
+    model::{LandmarkModel, ModelSet},
+    params::Params,
+};
 
 /// Landmarks that SIFT gets, and those that a lesson's landmark must be told from.
 const MAP: usize = 1000;

@@ -18,7 +18,10 @@ use server::{
     cli::{scratch, screen},
 };
 use std::{collections::BTreeMap, path::PathBuf, time::Duration};
-use vision::{detect::quads::Corners, geometry::polygon, recognise::DistanceKind};
+use vision::{
+    geometry::{Corners, polygon},
+    recognise::DistanceKind,
+};
 
 /// An answer belongs to a labelled quad from this overlap on, or when it lies inside it (an inner border).
 const IOU_SAME: f64 = 0.5;

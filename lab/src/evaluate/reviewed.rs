@@ -6,7 +6,7 @@
 use anyhow::Context as _;
 use serde::Deserialize;
 use std::{collections::BTreeMap, path::Path};
-use vision::detect::quads::Corners;
+use vision::geometry::Corners;
 
 /// Lists that come with the program, by name of the set.
 const BUILT_IN: [(&str, &str); 6] = [

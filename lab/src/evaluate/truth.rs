@@ -6,7 +6,7 @@ use std::{
     collections::BTreeMap,
     path::{Path, PathBuf},
 };
-use vision::detect::quads::{Corners, CornersError};
+use vision::geometry::{Corners, CornersError};
 
 /// Why a data set cannot be scored.
 #[derive(Debug, thiserror::Error)]

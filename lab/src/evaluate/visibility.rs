@@ -10,7 +10,7 @@ use map::{
 use nalgebra::{Matrix3, Point2, Rotation2, Vector2, Vector3};
 use server::cli::{clock::Clock, screen};
 use std::{f64::consts::FRAC_PI_2, path::PathBuf};
-use vision::{learn::random::Random, localise::pose::LandmarkSize, recognise::LandmarkId};
+use vision::{model::LandmarkId, pose::LandmarkSize, random::Random};
 
 /// Landmarks of the hall in which the choice where to look is timed.
 const HALL: usize = 1000;

@@ -1,6 +1,7 @@
 //! `waymark-lab train confidence`: the weights of the confidence from answers whose truth is known. Answers in, a source file
 //! out; the regression is `vision`'s, the answers are those of `waymark-lab evaluate confidence`, of another set.
 
+use super::confidence_fit::{Answer, fit};
 use crate::evaluate::experiment::{
     Common,
     answers::{Answers, KINDS, answers},
@@ -13,8 +14,7 @@ use vision::{
     params::Params,
     recognise::{
         DistanceKind,
-        confidence::MEASURES,
-        confidence_fit::{Answer, chance_of, fit},
+        decision::{confidence::chance, measures::MEASURES},
     },
 };
 
@@ -24,7 +24,7 @@ pub(crate) struct ConfidenceArgs {
     /// Quads, of which about four in ten are named.
     #[arg(long, default_value_t = 12_000, value_parser = clap::value_parser!(u32).range(1000..=1_000_000))]
     quads: u32,
-    /// Write the weights as the source file `vision/src/recognise/confidence_learnt.rs` here.
+    /// Write the weights as the source file `vision/src/recognise/decision/confidence_weights.rs` here.
     #[arg(long, value_name = "FILE")]
     rust: Option<PathBuf>,
     #[command(flatten)]
@@ -42,7 +42,7 @@ pub(super) fn run(args: &ConfidenceArgs) -> anyhow::Result<()> {
     for (kind, answers) in KINDS.into_iter().zip(&mut found) {
         let learnt = fitted(answers).with_context(|| format!("{kind:?}"))?;
         for named in &mut answers.named {
-            named.confidence = chance_of(&learnt, &named.measures);
+            named.confidence = chance(&learnt, &named.measures);
         }
         weights.push((kind, learnt));
     }
@@ -66,7 +66,7 @@ fn fitted(answers: &Answers) -> anyhow::Result<[f64; MEASURES + 1]> {
     Ok(fit(&answers.named.iter().map(answer).collect::<Vec<_>>())?)
 }
 
-/// `vision/src/recognise/confidence_learnt.rs` with these weights.
+/// `vision/src/recognise/decision/confidence_weights.rs` with these weights.
 fn source(weights: &[(DistanceKind, [f64; MEASURES + 1])]) -> String {
     let mut text = String::from(
         "//! The weights of the confidence, by the distance that decides. Not for editing: this command writes the file, byte\n\
@@ -74,9 +74,9 @@ fn source(weights: &[(DistanceKind, [f64; MEASURES + 1])]) -> String {
          //!\n\
          //! ```text\n\
          //! waymark-lab train confidence --set calibrate --photographs museum-paintings --photographs poster-textures-estense \\\n\
-         //!   --rust vision/src/recognise/confidence_learnt.rs\n\
+         //!   --rust vision/src/recognise/decision/confidence_weights.rs\n\
          //! ```\n\n\
-         use super::confidence::MEASURES;\n",
+         use super::measures::MEASURES;\n",
     );
     for (kind, weights) in weights {
         let (name, what) = match kind {

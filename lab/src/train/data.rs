@@ -1,6 +1,7 @@
 //! What the networks of the search learn from: the detector runs over labelled pictures, and its lines and quads are
 //! compared with the labels.
 
+use super::network_training::{ChoiceExample, LabelledExample};
 use crate::evaluate::truth::{Truth, TruthImage};
 use anyhow::Context as _;
 use nalgebra::Point2;
@@ -8,16 +9,16 @@ use server::cli::{pictures, screen};
 use std::collections::{BTreeMap, BTreeSet};
 use vision::{
     detect::{
-        candidates,
-        evidence::Gradients,
-        fitting::{Example, Rivals},
-        pyramid,
-        quads::{Corners, Quad},
-        selection::{resolve, settle},
-        side_model::rivals,
+        DetectParams, Quad,
+        border_model::choose_sides::rivals,
+        edge_support::gradients::Gradients,
+        pyramid, scored_quads,
+        suppression::non_maximum::{snap_sides, suppress_overlaps},
     },
-    geometry::polygon::{self, Relation},
-    params::DetectParams,
+    geometry::{
+        Corners,
+        polygon::{self, Relation},
+    },
     trace::NoTrace,
 };
 
@@ -92,8 +93,8 @@ fn dealt(images: &[TruthImage], parts: usize) -> Vec<usize> {
 #[derive(Debug, Default)]
 pub(super) struct Data {
     pub(super) images: usize,
-    pub(super) sides: Vec<Rivals>,
-    pub(super) things: Vec<Example>,
+    pub(super) sides: Vec<ChoiceExample>,
+    pub(super) things: Vec<LabelledExample>,
 }
 
 impl Data {
@@ -127,19 +128,24 @@ impl Data {
         let gray = pictures::read(&image.path).with_context(|| image.path.display().to_string())?;
         let factor = pyramid::working_factor(&gray, params.quads.working_side_px);
         let work = pyramid::reduce(&gray, factor);
-        let (rated, edges) = candidates(&work, params, &mut NoTrace);
+        let (rated, edges) = scored_quads(&work, params, &mut NoTrace);
         let g = Gradients { image: &work, gx: edges.gx(), gy: edges.gy() };
-        let found = resolve(rated.clone(), &params.quads);
+        let found = suppress_overlaps(rated.clone(), &params.quads);
         for quad in image.quads.iter().filter(|q| q.counts()) {
             let Some(label) = quad.corners.scaled(1.0 / factor as f64) else { continue };
             if label.min_side_px() >= min_side_px {
                 self.sides.extend(sides(&g, &found, &label, group, weight));
             }
         }
-        for settled in settle(rated, &g, &params.quads) {
-            let Some(corners) = settled.quad.corners_px.scaled(factor as f64) else { continue };
+        for classified in snap_sides(rated, &g, &params.quads) {
+            let Some(corners) = classified.quad.corners_px.scaled(factor as f64) else { continue };
             let Some(is_one) = is_thing(&corners, image) else { continue };
-            self.things.push(Example { group, weight, features: settled.features.to_vec(), is_one });
+            self.things.push(LabelledExample {
+                group,
+                weight,
+                features: classified.features.to_vec(),
+                is_one,
+            });
         }
         self.images += 1;
         Ok(())
@@ -147,7 +153,7 @@ impl Data {
 }
 
 /// The lines beside each side of the quad found on a label, with their distance from the labelled side.
-fn sides(g: &Gradients, found: &[Quad], label: &Corners, group: usize, weight: f64) -> Vec<Rivals> {
+fn sides(g: &Gradients, found: &[Quad], label: &Corners, group: usize, weight: f64) -> Vec<ChoiceExample> {
     let overlap = |q: &Quad| polygon::iou(label.points(), q.corners_px.points());
     let best = found.iter().map(|q| (overlap(q), q)).reduce(|a, b| if b.0 > a.0 { b } else { a });
     let Some((_, quad)) = best.filter(|b| b.0 > SAME_THING) else { return vec![] };
@@ -163,7 +169,7 @@ fn sides(g: &Gradients, found: &[Quad], label: &Corners, group: usize, weight: f
         let off: Vec<f64> = lines.iter().map(|line| off(&line.ends_px)).collect();
         if off.iter().any(|o| *o < MAX_OFF_PX) && off.iter().all(|o| o.is_finite()) {
             let features = lines.iter().map(|line| line.features.to_vec()).collect();
-            all.push(Rivals { group, weight, features, off });
+            all.push(ChoiceExample { group, weight, features, off });
         }
     }
     all

@@ -1,7 +1,11 @@
 //! What fitted networks are worth on pictures that they were not trained on: how well they choose and tell, and how well
 //! the detector finds with them. Networks and sets in, figures out; trains nothing.
 
-use super::data::{Data, Set};
+use super::{
+    data::{Data, Set},
+    network_training::{ChoiceExample, LabelledExample, TrainError},
+    platt_scaling::PlattScaling,
+};
 use crate::evaluate::{
     detection::score::{FOUND, FOUND_WELL, ImageScore, score},
     reviewed::Reviewed,
@@ -10,14 +14,7 @@ use crate::evaluate::{
 use anyhow::Context as _;
 use serde::Serialize;
 use server::cli::{pictures, screen};
-use vision::{
-    detect::{
-        calibration::Calibration,
-        fitting::{Example, FitError, Rivals},
-        network::Network,
-    },
-    params::DetectParams,
-};
+use vision::detect::{DetectParams, border_model::network::Network};
 
 /// A first choice that is off by so much more than the best rival, in pixels of the working image, is right.
 const RIGHT_PX: f64 = 1.5;
@@ -76,7 +73,7 @@ pub(super) fn line_of_parts(
     name: &'static str,
     sides: &Data,
     parts: &[Part],
-    calibration: &Calibration,
+    calibration: &PlattScaling,
     params: &DetectParams,
 ) -> Line {
     let mut offs = Vec::new();
@@ -90,12 +87,13 @@ pub(super) fn line_of_parts(
 }
 
 /// From the outputs for things that each part's networks have not seen.
-pub(super) fn calibration(parts: &[Part]) -> Result<Calibration, FitError> {
-    let (examples, outputs): (Vec<Example>, Vec<f64>) = unseen(parts).map(|(e, o)| (e.clone(), o)).unzip();
-    Calibration::fit(&outputs, &examples)
+pub(super) fn calibration(parts: &[Part]) -> Result<PlattScaling, TrainError> {
+    let (examples, outputs): (Vec<LabelledExample>, Vec<f64>) =
+        unseen(parts).map(|(e, o)| (e.clone(), o)).unzip();
+    PlattScaling::fit(&outputs, &examples)
 }
 
-fn unseen(parts: &[Part]) -> impl Iterator<Item = (&Example, f64)> {
+fn unseen(parts: &[Part]) -> impl Iterator<Item = (&LabelledExample, f64)> {
     parts.iter().flat_map(|p| {
         let unseen = p.data.things.iter().filter(|e| Some(e.group) == p.unseen);
         unseen.map(|e| (e, p.networks[1].output(&e.features)))
@@ -103,7 +101,7 @@ fn unseen(parts: &[Part]) -> impl Iterator<Item = (&Example, f64)> {
 }
 
 /// How far the first choice is off, and the best rival; of equal outputs the earlier.
-fn off(net: &Network, r: &Rivals) -> [f64; 2] {
+fn off(net: &Network, r: &ChoiceExample) -> [f64; 2] {
     let outputs: Vec<f64> = r.features.iter().map(|f| net.output(f)).collect();
     let first = (0..outputs.len()).reduce(|a, b| if outputs[b] > outputs[a] { b } else { a });
     [first.map_or(f64::INFINITY, |i| r.off[i]), r.off.iter().copied().fold(f64::INFINITY, f64::min)]

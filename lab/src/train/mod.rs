@@ -2,8 +2,12 @@
 //! pictures that were held out. Prints parameters; changes nothing.
 
 mod confidence;
+mod confidence_fit;
+mod cue_fit;
 mod data;
 mod held_out;
+mod network_training;
+mod platt_scaling;
 mod search;
 mod similarity;
 mod source;

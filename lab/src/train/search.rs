@@ -1,6 +1,7 @@
 //! `waymark-lab train search`: the two networks of the search from labelled pictures. Labels in, parameters out; the training
 //! is `vision`'s, what they are worth on pictures held out is `held_out`'s.
 
+use super::network_training::{ChoiceExample, LabelledExample, TrainParams, train_choice, train_classifier};
 use super::{
     data::{Data, Set},
     held_out::{self, Judged, Line},
@@ -13,13 +14,7 @@ use serde_json::json;
 use server::cli::{parameters::ParameterArgs, scratch, screen};
 use sim::{scenes::ScenesParams, views::ViewsParams};
 use std::path::{Path, PathBuf};
-use vision::{
-    detect::{
-        fitting::{Example, Rivals, TrainParams, to_choose, to_tell},
-        network::Network,
-    },
-    params::DetectParams,
-};
+use vision::detect::{DetectParams, border_model::network::Network};
 
 /// `waymark-lab train search`.
 #[derive(Debug, clap::Args)]
@@ -54,7 +49,7 @@ pub(crate) struct SearchArgs {
     /// Write the networks as parameters here, for --params.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Write the networks as the source file `vision/src/detect/learnt.rs` here; run `cargo fmt` after.
+    /// Write the networks as the source file `vision/src/detect/border_model/network_weights.rs` here; run `cargo fmt` after.
     #[arg(long, value_name = "FILE")]
     rust: Option<PathBuf>,
     /// Rendered views to learn from, where `corridor` is among the sets.
@@ -220,14 +215,15 @@ struct Fit<'a> {
 impl Fit<'_> {
     /// Networks of sides and of things from all but one part of the data. Things are told by their sides as the new
     /// network of sides places them.
-    fn networks(&self, sides: &[Rivals], without: Option<usize>) -> anyhow::Result<held_out::Part> {
-        let learnt: Vec<Rivals> = sides.iter().filter(|r| Some(r.group) != without).cloned().collect();
-        let side = to_choose(&learnt, &self.how[0]).context("the network of sides")?;
+    fn networks(&self, sides: &[ChoiceExample], without: Option<usize>) -> anyhow::Result<held_out::Part> {
+        let learnt: Vec<ChoiceExample> = sides.iter().filter(|r| Some(r.group) != without).cloned().collect();
+        let side = train_choice(&learnt, &self.how[0]).context("the network of sides")?;
         let mut params = self.params.clone();
         params.quads.side_model = Some(side.clone());
         let data = Data::gather(self.sets, &params, self.min_side_px)?;
-        let learnt: Vec<Example> = data.things.iter().filter(|e| Some(e.group) != without).cloned().collect();
-        let thing = to_tell(&learnt, &self.how[1]).context("the network of things")?;
+        let learnt: Vec<LabelledExample> =
+            data.things.iter().filter(|e| Some(e.group) != without).cloned().collect();
+        let thing = train_classifier(&learnt, &self.how[1]).context("the network of things")?;
         Ok(held_out::Part { unseen: without, networks: [side, thing], data })
     }
 }

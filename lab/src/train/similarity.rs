@@ -1,5 +1,6 @@
 //! `waymark-lab train similarity`: the weights of the six cues (method 2) from labelled pictures.
 
+use super::cue_fit::{FOLDS, FittedSimilarity, LabelledPair, fit, judge, ungraded};
 use crate::evaluate::{rendered, truth::Truth};
 use anyhow::{Context as _, bail};
 use serde_json::json;
@@ -8,16 +9,12 @@ use sim::views::ViewsParams;
 use std::path::PathBuf;
 use vision::{
     detect::{
-        chains::chains,
-        edges::edges,
-        quads::Corners,
-        segments::segments,
-        similarity::{
-            self, SimilarityParams,
-            fit::{FOLDS, FittedSimilarity, JudgedPair, fit, judge, ungraded},
-        },
+        DetectParams,
+        edges::edge_map::edges,
+        relaxation::similarity::{self, SimilarityParams},
+        segments::{chains::chains, edge_segments::segments},
     },
-    params::DetectParams,
+    geometry::Corners,
 };
 
 /// Names of the cues c1 to c6.
@@ -67,7 +64,7 @@ pub(crate) fn run(args: &SimilarityArgs) -> anyhow::Result<()> {
 }
 
 /// Candidate pairs of all completely labelled pictures, judged by their labels.
-fn judged(args: &SimilarityArgs, params: &DetectParams) -> anyhow::Result<Vec<JudgedPair>> {
+fn judged(args: &SimilarityArgs, params: &DetectParams) -> anyhow::Result<Vec<LabelledPair>> {
     let keep_all = ungraded(&params.similarity);
     let mut pairs = Vec::new();
     for folder in &args.sets {

@@ -1,7 +1,7 @@
 //! Networks as the source file that the detector is built with.
 
 use std::fmt::Write as _;
-use vision::detect::network::Network;
+use vision::detect::border_model::network::Network;
 
 /// Longest line.
 const WIDTH: usize = 108;
@@ -18,7 +18,7 @@ pub(super) fn rounded(mut net: Network) -> Network {
     net
 }
 
-/// `vision/src/detect/learnt.rs` with these networks.
+/// `vision/src/detect/border_model/network_weights.rs` with these networks.
 pub(super) fn source(models: &[(&str, Network); 2]) -> String {
     let mut text = String::from(
         "//! The weights of the two networks of the search, as learnt from rendered scenes and the open sets. Not for editing:\n\
@@ -28,7 +28,7 @@ pub(super) fn source(models: &[(&str, Network); 2]) -> String {
          //! ```text\n\
          //! waymark-lab train search museum-paintings exit-signs corridor museum-walk-estense corridor-loop-rtabmap \\\n\
          //!   corridor-multifloor doors-bbox signs-misc --pictures poster-textures-estense \\\n\
-         //!   --weight museum-paintings=6 --weight scenes=0.5 --rust vision/src/detect/learnt.rs\n\
+         //!   --weight museum-paintings=6 --weight scenes=0.5 --rust vision/src/detect/border_model/network_weights.rs\n\
          //! ```\n\
          #![allow(clippy::approx_constant, reason = \"weights that happen to be near one\")]\n\n\
          use super::network::Network;\nuse std::sync::LazyLock;\n",
@@ -39,7 +39,7 @@ pub(super) fn source(models: &[(&str, Network); 2]) -> String {
         // Writing to a String cannot fail.
         write!(
             text,
-            "\n/// Weighs the measurements of `{name}`.\npub(super) fn {name}() -> &'static Network {{\n"
+            "\n/// Weighs the measurements of `{name}`.\npub(crate) fn {name}() -> &'static Network {{\n"
         )
         .ok();
         text.push_str("    static MODEL: LazyLock<Network> = LazyLock::new(|| Network {\n");
@@ -101,7 +101,7 @@ mod tests {
             "const SIDE_MODEL_MEAN: [f64; 2] = [\n    0.1234, 0.0,\n];",
             "const THING_MODEL_DEVIATION: [f64; 2] = [\n    0.0001, 2.0,\n];",
             "bias: 0.5185,",
-            "pub(super) fn thing_model() -> &'static Network {",
+            "pub(crate) fn thing_model() -> &'static Network {",
         ] {
             assert!(text.contains(part), "{part} not in\n{text}");
         }

@@ -13,7 +13,7 @@ use crate::{
     pose2::{Pose2, Pose2Covariance},
 };
 use nalgebra::Matrix3;
-use vision::recognise::LandmarkId;
+use vision::model::LandmarkId;
 
 /// Most sources (landmarks, the laser) whose last use is remembered; the one unused for longest is dropped first.
 pub const MAX_SOURCES: usize = 32;

@@ -15,7 +15,7 @@ use crate::{
     pose2::{Pose2, Pose2Covariance},
 };
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix3x2, Matrix3x6, Matrix6, Vector3, Vector6};
-use vision::{learn::random::Random, recognise::LandmarkId};
+use vision::{model::LandmarkId, random::Random};
 
 pub(super) const SECOND: i64 = 1_000_000_000;
 

@@ -9,11 +9,11 @@ use crate::{
 use nalgebra::{Matrix2, Matrix3, Point3};
 use std::f64::consts::{FRAC_PI_2, PI};
 use vision::{
-    detect::quads::Corners,
     frame::{Distortion, Intrinsics},
-    localise::{
-        pose::{LandmarkSize, landmark_pose},
-        reproject::{corner_points, pixel},
+    geometry::Corners,
+    pose::{
+        LandmarkSize, landmark_pose,
+        reprojection::{corner_points, pixel},
     },
 };
 

@@ -34,7 +34,7 @@ use crate::guided::{
     projection::corner_vector,
 };
 use std::collections::BTreeSet;
-use vision::recognise::LandmarkId;
+use vision::model::LandmarkId;
 
 /// Assigns observations to expected landmarks, each landmark at most once.
 pub fn associate(

@@ -5,7 +5,7 @@ use crate::{extrinsics::CameraExtrinsics, localise::predict, place::LandmarkPlac
 use nalgebra::{Isometry3, Matrix2, Point2, Point3, SMatrix, Vector3};
 use vision::{
     frame::{Distortion, Intrinsics, MAX_RAY_RAD},
-    localise::reproject::{MIN_DEPTH_M, corner_points},
+    pose::reprojection::{MIN_DEPTH_M, corner_points},
 };
 
 /// A lens describes a point if undoing it gives that point back within this, px.
@@ -52,7 +52,7 @@ pub(super) fn derivatives(
         let straight = Point2::new(straight.x / straight.z, straight.y / straight.z);
         let focal = Matrix2::new(intrinsics.fx_px, 0.0, 0.0, intrinsics.fy_px);
         let back = Matrix2::new(1.0 / intrinsics.fx_px, 0.0, 0.0, 1.0 / intrinsics.fy_px);
-        let lens = focal * intrinsics.distortion.bend(&straight).by_straight * back;
+        let lens = focal * intrinsics.distortion.distort(&straight).by_straight * back;
         let row = 2 * c;
         by_common.fixed_view_mut::<2, 3>(row, 0).copy_from(&(lens * pinhole.pose.fixed_rows::<2>(row)));
         by_common.fixed_view_mut::<2, 6>(row, 3).copy_from(&(lens * pinhole.mounting.fixed_rows::<2>(row)));

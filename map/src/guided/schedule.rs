@@ -28,7 +28,7 @@ use crate::{
     pose2::{Pose2, Pose2Covariance},
 };
 use std::collections::BTreeMap;
-use vision::recognise::LandmarkId;
+use vision::model::LandmarkId;
 
 /// Most landmarks remembered as support of a pose, or as contradicting it; the oldest go first.
 pub const MAX_SUPPORT: usize = 16;

@@ -66,7 +66,7 @@ mod tests {
     use super::*;
     use crate::place::PlaceSigmas;
     use nalgebra::Vector3;
-    use vision::localise::pose::LandmarkSize;
+    use vision::pose::LandmarkSize;
 
     /// On the wall x = 4, facing a camera at the origin.
     fn poster() -> LandmarkPlace {

@@ -14,14 +14,14 @@ use crate::{
 use nalgebra::{Matrix2, Matrix3, Matrix6, Point2, Vector2, Vector3, Vector6};
 use std::{collections::BTreeMap, f64::consts::FRAC_PI_2};
 use vision::{
-    detect::quads::Corners,
     frame::{Distortion, Intrinsics},
-    learn::random::Random,
-    localise::{
-        pose::LandmarkSize,
-        reproject::{MIN_DEPTH_M, corner_points, perturbed},
+    geometry::Corners,
+    model::LandmarkId,
+    pose::{
+        LandmarkSize,
+        reprojection::{MIN_DEPTH_M, corner_points, perturbed},
     },
-    recognise::LandmarkId,
+    random::Random,
 };
 
 const IMAGE_PX: [f64; 2] = [640.0, 480.0];

@@ -10,8 +10,8 @@ use crate::{
 use nalgebra::{Point2, Point3};
 use vision::{
     frame::Intrinsics,
-    localise::reproject::{corner_points, pixel},
-    recognise::LandmarkId,
+    model::LandmarkId,
+    pose::reprojection::{corner_points, pixel},
 };
 
 /// A landmark that may be in view.

@@ -2,7 +2,7 @@
 
 use crate::pose2::Pose2;
 use serde::{Deserialize, Serialize};
-use vision::recognise::LandmarkId;
+use vision::model::LandmarkId;
 
 /// Whether a landmark may be used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]

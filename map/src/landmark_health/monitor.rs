@@ -10,7 +10,7 @@ use crate::{
 };
 use nalgebra::Point2;
 use std::collections::BTreeMap;
-use vision::recognise::LandmarkId;
+use vision::model::LandmarkId;
 
 /// Most landmarks that one robot keeps evidence on; those unseen for longest are dropped first.
 pub const MAX_WATCHED: usize = 1024;

@@ -9,7 +9,7 @@ use crate::{
 };
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeSet;
-use vision::recognise::LandmarkId;
+use vision::model::LandmarkId;
 
 /// Result of a place check.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -15,13 +15,13 @@ use crate::{
 use nalgebra::{Matrix2, Matrix3, Point2, Vector3};
 use std::collections::BTreeMap;
 use vision::{
-    detect::quads::Corners,
     frame::{Distortion, Intrinsics},
-    localise::{
-        pose::{LandmarkPose, LandmarkSize, landmark_pose},
-        reproject::{corner_points, pixel},
+    geometry::Corners,
+    model::LandmarkId,
+    pose::{
+        LandmarkPose, LandmarkSize, landmark_pose,
+        reprojection::{corner_points, pixel},
     },
-    recognise::LandmarkId,
 };
 
 const SIZE: LandmarkSize = LandmarkSize { width_m: 0.6, height_m: 0.84 };

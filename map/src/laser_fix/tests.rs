@@ -10,7 +10,7 @@ use crate::{
     slam::world::{Walls, rectangle, ring, scan, segments},
 };
 use nalgebra::{Matrix3, Vector2, Vector3};
-use vision::learn::random::Random;
+use vision::random::Random;
 
 fn prior(at: &Pose2, sigma_m: f64, sigma_rad: f64, random: &mut Random) -> Pose2Covariance {
     let e = Vector3::new(sigma_m * random.normal(), sigma_m * random.normal(), sigma_rad * random.normal());

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::pose2::Pose2;
-use vision::learn::random::Random;
+use vision::random::Random;
 
 /// Ranges of a laser at `pose` among walls (pairs of points), by brute force.
 fn scan(walls: &[[f64; 4]], pose: &Pose2, n: usize, sigma_m: f64, random: &mut Random) -> Scan {

@@ -1,7 +1,7 @@
 //! Derivatives of points by robot pose, landmark place and extrinsics.
 
 use nalgebra::{Matrix3, Matrix3x6, SMatrix, Vector3};
-use vision::localise::pose::LandmarkSize;
+use vision::pose::LandmarkSize;
 
 /// Camera coordinates of a map point by (x, y, theta) of the robot; `from_robot` = point - robot, map axes.
 pub(super) fn point_by_pose(camera_from_map: &Matrix3<f64>, from_robot: &Vector3<f64>) -> Matrix3<f64> {

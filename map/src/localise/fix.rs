@@ -2,7 +2,7 @@
 
 use crate::{place::LandmarkPlace, pose_cell::PoseCell, pose2::Pose2Covariance};
 use nalgebra::{Matrix3, Matrix3x6, Matrix6};
-use vision::{localise::pose::LandmarkPose, recognise::LandmarkId};
+use vision::{model::LandmarkId, pose::LandmarkPose};
 
 /// A recognised landmark with its measured pose and its place in the map.
 #[derive(Debug, Clone, Copy)]

@@ -14,7 +14,7 @@ use crate::{
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use vision::recognise::LandmarkId;
+use vision::model::LandmarkId;
 
 /// Most landmarks counted for one camera; later ones are left out.
 pub const MAX_WATCHED: usize = 256;
@@ -253,13 +253,13 @@ mod tests {
     };
     use nalgebra::{Matrix2, Vector2, Vector3, Vector6};
     use vision::{
-        detect::quads::Corners,
         frame::{Distortion, Intrinsics, IntrinsicsSigmas},
-        learn::random::Random,
-        localise::{
-            pose::{LandmarkSize, landmark_pose},
-            reproject::{corner_points, perturbed, pixel},
+        geometry::Corners,
+        pose::{
+            LandmarkSize, landmark_pose,
+            reprojection::{corner_points, perturbed, pixel},
         },
+        random::Random,
     };
 
     const SIZE: LandmarkSize = LandmarkSize { width_m: 0.6, height_m: 0.84 };

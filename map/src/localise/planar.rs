@@ -14,7 +14,7 @@ use crate::{
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Matrix6, Point2, Vector2, Vector3};
 use vision::{
     frame::Intrinsics,
-    localise::reproject::{corner_points, project},
+    pose::reprojection::{corner_points, project},
 };
 
 /// Most steps of one descent.

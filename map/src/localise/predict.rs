@@ -9,7 +9,7 @@ use crate::{
 use nalgebra::SMatrix;
 use vision::{
     frame::Intrinsics,
-    localise::reproject::{corner_points, project},
+    pose::reprojection::{corner_points, project},
 };
 
 /// Derivatives of the eight corner coordinates.

@@ -15,14 +15,14 @@ use crate::{
 };
 use nalgebra::{Isometry3, Matrix2, Matrix3, Matrix6, Point2, Vector2, Vector3, Vector6};
 use vision::{
-    detect::quads::Corners,
     frame::{Distortion, Intrinsics, IntrinsicsSigmas},
-    learn::random::Random,
-    localise::{
-        pose::{LandmarkPose, LandmarkSize, landmark_pose},
-        reproject::{corner_points, pixel},
+    geometry::Corners,
+    model::LandmarkId,
+    pose::{
+        LandmarkPose, LandmarkSize, landmark_pose,
+        reprojection::{corner_points, pixel},
     },
-    recognise::LandmarkId,
+    random::Random,
 };
 
 pub(super) const SIZE: LandmarkSize = LandmarkSize { width_m: 0.6, height_m: 0.84 };

@@ -17,7 +17,7 @@ use crate::{
 };
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
-use vision::{learn::random::Random, recognise::LandmarkId};
+use vision::{model::LandmarkId, random::Random};
 
 const SECOND: i64 = 1_000_000_000;
 

@@ -14,7 +14,7 @@ use crate::{
 };
 use nalgebra::{DMatrix, Matrix6, SMatrix, SVector, Vector2};
 use std::f64::consts::FRAC_PI_2;
-use vision::localise::pose::{LandmarkSize, PoseError};
+use vision::pose::{LandmarkSize, PoseError};
 
 type Matrix5 = SMatrix<f64, 5, 5>;
 type Vector5 = SVector<f64, 5>;

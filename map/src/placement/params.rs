@@ -2,7 +2,7 @@
 
 use crate::check::OutOfRange;
 use serde::{Deserialize, Serialize};
-use vision::localise::pose::PoseError;
+use vision::pose::PoseError;
 
 /// Parameters of placement.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

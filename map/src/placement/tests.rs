@@ -15,13 +15,13 @@ use crate::{
 };
 use nalgebra::{Matrix2, Matrix2x3, Matrix3, Matrix6, Point2, SVector, Vector2, Vector3, Vector6};
 use vision::{
-    detect::quads::Corners,
     frame::{Distortion, Intrinsics, IntrinsicsSigmas},
-    learn::random::Random,
-    localise::{
-        pose::LandmarkSize,
-        reproject::{corner_points, perturbed, pixel},
+    geometry::Corners,
+    pose::{
+        LandmarkSize,
+        reprojection::{corner_points, perturbed, pixel},
     },
+    random::Random,
 };
 
 const SIZE: LandmarkSize = LandmarkSize { width_m: 0.6, height_m: 0.84 };

@@ -6,9 +6,9 @@ use crate::{
 };
 use nalgebra::{Matrix2, Matrix2x3};
 use vision::{
-    detect::quads::Corners,
     frame::Intrinsics,
-    localise::pose::{Straightened, straightened},
+    geometry::Corners,
+    pose::{UndistortedCorners, straightened},
 };
 
 /// Most views of one placement; later ones are ignored.
@@ -42,7 +42,7 @@ pub(super) struct CheckedView<'a> {
 pub(super) fn checked<'a>(view: &PosedView<'a>) -> Result<CheckedView<'a>, PlacementError> {
     view.map_from_robot.check()?;
     view.mounting.check()?;
-    let Straightened { corners_px, covariance_px2, camera, by_camera } =
+    let UndistortedCorners { corners_px, covariance_px2, camera, by_camera } =
         straightened(view.corners, view.covariance_px2, view.camera)?;
     let (map_from_robot, mounting) = (view.map_from_robot, view.mounting);
     Ok(CheckedView { corners_px, covariance_px2, camera, by_camera, map_from_robot, mounting })

@@ -9,7 +9,7 @@ use crate::{
     segments::LaserSegment,
 };
 use nalgebra::{Matrix4, Matrix4x2, Matrix4x3, Matrix6, SMatrix, SVector, Vector2, Vector4};
-use vision::localise::pose::{LandmarkSize, PoseError};
+use vision::pose::{LandmarkSize, PoseError};
 
 /// The rectangle that one view gives on its wall.
 #[derive(Debug, Clone, PartialEq)]

@@ -11,7 +11,7 @@ use crate::{
     segments::LaserSegment,
 };
 use nalgebra::{DMatrix, Matrix2, Matrix4, Matrix4x2, Matrix4x3, Matrix6, SMatrix, Vector2, Vector4};
-use vision::localise::pose::LandmarkSize;
+use vision::pose::LandmarkSize;
 
 /// Fuses views of one object on one wall. The seed is the view that most others agree with; views outside of its gate
 /// are left out.

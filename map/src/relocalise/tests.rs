@@ -10,7 +10,7 @@ use crate::{
 };
 use nalgebra::{Matrix3, Point2, Vector3};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
-use vision::localise::pose::LandmarkSize;
+use vision::pose::LandmarkSize;
 
 fn door(x: f64, y: f64, theta: f64) -> LandmarkPlace {
     let size = LandmarkSize { width_m: 0.9, height_m: 2.0 };

@@ -8,7 +8,7 @@ use crate::{
     },
 };
 use nalgebra::{Matrix3, Point2};
-use vision::learn::random::Random;
+use vision::random::Random;
 
 fn build(walls: &Walls, path: &[Pose2], odom: &[Pose2], seed: u64) -> SlamMap {
     let mut random = Random::new(seed);

@@ -2,7 +2,7 @@
 
 use crate::{laser::Scan, pose2::Pose2, segments::LaserSegment};
 use nalgebra::{Matrix2, Point2, Vector2};
-use vision::learn::random::Random;
+use vision::random::Random;
 
 /// Walls: x and y of both ends.
 pub(crate) type Walls = Vec<[f64; 4]>;

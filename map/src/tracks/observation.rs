@@ -2,10 +2,7 @@
 
 use crate::place::LandmarkPlace;
 use serde::{Deserialize, Serialize};
-use vision::{
-    detect::quads::Corners,
-    recognise::{IconFeatures, LandmarkId},
-};
+use vision::{geometry::Corners, model::LandmarkId, recognise::IconFeatures};
 
 /// What recognition says of a quad.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

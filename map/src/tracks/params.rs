@@ -1,7 +1,7 @@
 //! Parameters of the tracker.
 
 use serde::{Deserialize, Serialize};
-use vision::learn::thinning::ThinningParams;
+use vision::learn::near_duplicates::NoveltyParams;
 
 /// Parameters of the tracker.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -27,7 +27,7 @@ pub struct GatherParams {
     /// From half of [`super::MAX_TRACK_VIEWS`] on a view must be farther from the others by this factor.
     pub late_novelty: f64,
     /// What counts as a new view.
-    pub thinning: ThinningParams,
+    pub thinning: NoveltyParams,
 }
 
 impl Default for GatherParams {
@@ -42,7 +42,7 @@ impl Default for GatherParams {
             normal_rad: 0.26,
             max_correlation: 0.5,
             late_novelty: 2.0,
-            thinning: ThinningParams::default(),
+            thinning: NoveltyParams::default(),
         }
     }
 }

@@ -9,11 +9,11 @@ use crate::{
 };
 use nalgebra::{Point2, Vector3};
 use vision::{
-    detect::quads::Corners,
+    geometry::Corners,
     icon::Icon,
-    localise::pose::LandmarkSize,
-    params::RecogniseParams,
-    recognise::{IconFeatures, LandmarkId, features},
+    model::LandmarkId,
+    pose::LandmarkSize,
+    recognise::{IconFeatures, RecogniseParams, features},
 };
 
 const STEP_NS: i64 = 200_000_000;

@@ -3,10 +3,10 @@
 use crate::{place::LandmarkPlace, pose2::wrap_rad, tracks::params::GatherParams};
 use std::collections::VecDeque;
 use vision::{
-    detect::quads::Corners,
-    learn::thinning::ViewDigest,
-    params::RecogniseParams,
-    recognise::{IconFeatures, LandmarkId, correlation::correlation},
+    geometry::Corners,
+    learn::near_duplicates::ViewSummary,
+    model::LandmarkId,
+    recognise::{IconFeatures, RecogniseParams, features::correlation::correlation},
 };
 
 /// Most views kept of a track.
@@ -26,7 +26,7 @@ pub struct Track {
     /// Of these, frames in which it was recognised as a landmark, or nearly.
     pub known: u32,
     pub(super) closed: bool,
-    pub(super) views: Vec<ViewDigest>,
+    pub(super) views: Vec<ViewSummary>,
     pub(super) looks: VecDeque<IconFeatures>,
     /// Last known place on the walls.
     pub(super) place: Option<LandmarkPlace>,
@@ -64,10 +64,12 @@ impl Track {
     /// C^r to the nearest of its icons.
     pub(super) fn distance(&self, icon: &IconFeatures, p: &RecogniseParams) -> f64 {
         let icons = self.looks.iter().chain(self.last.as_ref().map(|l| &l.icon));
-        icons.map(|own| correlation(icon, own, &p.correlation)).fold(f64::INFINITY, f64::min)
+        icons
+            .map(|own| correlation(&icon.buckets, &own.buckets, &p.correlation))
+            .fold(f64::INFINITY, f64::min)
     }
 
-    pub(super) fn keep(&mut self, digest: ViewDigest, icon: &IconFeatures) {
+    pub(super) fn keep(&mut self, digest: ViewSummary, icon: &IconFeatures) {
         self.views.push(digest);
         // The first views, later one at regular intervals.
         if self.looks.len() < LOOKS_KEPT {

@@ -6,11 +6,10 @@ use crate::tracks::{
     track::{Last, MAX_TRACK_VIEWS, StoredTrack, Track, same_place},
 };
 use vision::{
-    detect::quads::Corners,
-    geometry::polygon::iou,
-    learn::thinning::{ViewDigest, most_alike},
-    params::RecogniseParams,
-    recognise::{IconFeatures, LandmarkId},
+    geometry::{Corners, polygon::iou},
+    learn::near_duplicates::{ViewSummary, most_alike},
+    model::LandmarkId,
+    recognise::{IconFeatures, RecogniseParams},
 };
 
 /// Most tracks at once, those of a single observation included.
@@ -39,7 +38,7 @@ impl ViewTracker {
         }
         let mut track = Track { sightings, known, place, ..Track::new(number, landmark) };
         for (corners, icon) in views.into_iter().take(MAX_TRACK_VIEWS) {
-            track.keep(ViewDigest::new(&corners, &icon.icon), &icon);
+            track.keep(ViewSummary::new(&corners, &icon.icon), &icon);
         }
         self.tracks.push(track);
         self.numbers = self.numbers.max(number);
@@ -178,7 +177,7 @@ impl ViewTracker {
         if track.views.len() >= MAX_TRACK_VIEWS {
             return TrackOutcome::Full;
         }
-        let digest = ViewDigest::new(&glimpse.corners_px, &glimpse.icon.icon);
+        let digest = ViewSummary::new(&glimpse.corners_px, &glimpse.icon.icon);
         let late = track.views.len() >= MAX_TRACK_VIEWS / 2;
         let needed = if late { self.p.late_novelty } else { 1.0 };
         match most_alike(&digest, &track.views, &self.p.thinning) {

@@ -6,7 +6,7 @@ use crate::{
     pose2::Pose2,
 };
 use nalgebra::Point2;
-use vision::recognise::LandmarkId;
+use vision::model::LandmarkId;
 
 /// Most samples of one path.
 pub const MAX_STEPS: usize = 10_000;

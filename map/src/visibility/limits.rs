@@ -7,7 +7,7 @@ use crate::visibility::{
     settings::{PanTiltCamera, VisibilityParams},
 };
 use std::f64::consts::FRAC_PI_2;
-use vision::localise::pose::LandmarkSize;
+use vision::pose::LandmarkSize;
 
 /// A landmark nearer to the camera's height than this counts as this far above it, metres, so that elevations are
 /// defined.

@@ -2,7 +2,7 @@
 
 use crate::{place::LandmarkPlace, visibility::penumbra::Footprint};
 use nalgebra::{Point2, Vector2};
-use vision::localise::pose::LandmarkSize;
+use vision::pose::LandmarkSize;
 
 /// A landmark with a smaller tilt hangs on a wall: what is behind it hides nothing.
 const UPRIGHT_RAD: f64 = 1e-9;

@@ -119,7 +119,7 @@ mod tests {
     use super::*;
     use crate::visibility::{PanTiltCamera, VisibilityParams, envelope::Envelope, local_frame::Moved};
     use std::f64::consts::FRAC_PI_2;
-    use vision::localise::pose::LandmarkSize;
+    use vision::pose::LandmarkSize;
 
     #[test]
     fn chords_follow_the_limits() {

@@ -3,7 +3,7 @@
 use crate::check::{self, OutOfRange};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_PI_2;
-use vision::localise::pose::LandmarkSize;
+use vision::pose::LandmarkSize;
 
 /// The camera that should see landmarks.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -17,7 +17,7 @@ use crate::{
 };
 use nalgebra::{Matrix3, Point2, Rotation2, Vector2, Vector3};
 use std::f64::consts::FRAC_PI_2;
-use vision::{localise::pose::LandmarkSize, recognise::LandmarkId};
+use vision::{model::LandmarkId, pose::LandmarkSize};
 
 /// Uniform numbers in [0, 1).
 pub(super) struct Dice(u64);

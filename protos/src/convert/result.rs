@@ -3,10 +3,12 @@
 use super::geometry::pose3_wire;
 use crate::v1;
 use vision::{
-    detect::quads::{Corners, QuadKind},
-    localise::pose::{LandmarkPose, PoseSolution},
+    detect::QuadKind,
+    geometry::Corners,
+    model::LandmarkId,
     points::{agreement::Part, verify::PointEvidence},
-    recognise::{Candidate, LandmarkId, Recognition, Refusal, Verdict, log10_false_alarms},
+    pose::{LandmarkPose, PoseSolution},
+    recognise::{MatchCandidate, MatchRefusal, RecognitionResult, Verdict, log10_false_alarms},
 };
 
 /// Four corners, TL, TR, BR, BL.
@@ -23,16 +25,16 @@ pub fn kind(kind: QuadKind) -> v1::QuadKind {
 }
 
 /// The three cases of a verdict.
-pub fn verdict(recognition: Recognition) -> v1::Verdict {
+pub fn verdict(recognition: Verdict) -> v1::Verdict {
     match recognition {
-        Recognition::Unknown => v1::Verdict::Unknown,
-        Recognition::Unique(_) => v1::Verdict::Unique,
-        Recognition::Ambiguous(_) => v1::Verdict::Ambiguous,
+        Verdict::Unknown => v1::Verdict::Unknown,
+        Verdict::Unique(_) => v1::Verdict::Unique,
+        Verdict::Ambiguous(_) => v1::Verdict::Ambiguous,
     }
 }
 
 /// A candidate; `name` gives the landmark's name.
-pub fn candidate(c: &Candidate, name: impl Fn(LandmarkId) -> String) -> v1::Candidate {
+pub fn candidate(c: &MatchCandidate, name: impl Fn(LandmarkId) -> String) -> v1::Candidate {
     v1::Candidate {
         landmark: name(c.landmark),
         correlation: c.correlation,
@@ -48,25 +50,25 @@ pub fn candidate(c: &Candidate, name: impl Fn(LandmarkId) -> String) -> v1::Cand
 }
 
 /// The word of a refusal.
-pub fn refusal(refusal: Refusal) -> &'static str {
+pub fn refusal(refusal: MatchRefusal) -> &'static str {
     match refusal {
-        Refusal::Correlation => "correlation",
-        Refusal::Hausdorff => "hausdorff",
-        Refusal::Likeness => "likeness",
-        Refusal::Contradiction => "contradiction",
-        Refusal::Content => "content",
-        Refusal::Margin => "margin",
-        Refusal::Points => "points",
-        Refusal::Disagreement => "disagreement",
-        Refusal::Corners => "corners",
-        Refusal::Plain => "plain",
+        MatchRefusal::Correlation => "correlation",
+        MatchRefusal::Hausdorff => "hausdorff",
+        MatchRefusal::Likeness => "likeness",
+        MatchRefusal::Contradiction => "contradiction",
+        MatchRefusal::Content => "content",
+        MatchRefusal::Margin => "margin",
+        MatchRefusal::Points => "points",
+        MatchRefusal::Disagreement => "disagreement",
+        MatchRefusal::Corners => "corners",
+        MatchRefusal::Plain => "plain",
     }
 }
 
 /// The verdict's part of a quad's answer: everything but corners, kind, score and poses.
-pub fn fill_verdict(quad: &mut v1::QuadAnswer, v: &Verdict, name: impl Fn(LandmarkId) -> String) {
-    quad.set_verdict(verdict(v.recognition));
-    if let Recognition::Unique(id) = v.recognition {
+pub fn fill_verdict(quad: &mut v1::QuadAnswer, v: &RecognitionResult, name: impl Fn(LandmarkId) -> String) {
+    quad.set_verdict(verdict(v.verdict));
+    if let Verdict::Unique(id) = v.verdict {
         quad.landmark = name(id);
     }
     quad.candidates = v.candidates.iter().map(|c| candidate(c, &name)).collect();
@@ -95,11 +97,11 @@ pub fn points(evidence: &PointEvidence, landmarks: usize) -> v1::PointEvidence {
     }
 }
 
-/// The doubtful landmark: a part of it shows something else.
-fn doubtful(v: &Verdict) -> Option<LandmarkId> {
+/// The landmark that is in doubt because a part of it shows something else.
+fn doubtful(v: &RecognitionResult) -> Option<LandmarkId> {
     let best = v.candidates.first()?;
-    let named = v.recognition == Recognition::Ambiguous(best.landmark);
-    (named && best.refusal == Some(Refusal::Disagreement)).then_some(best.landmark)
+    let named = v.verdict == Verdict::Ambiguous(best.landmark);
+    (named && best.refusal == Some(MatchRefusal::Disagreement)).then_some(best.landmark)
 }
 
 /// Best and second pose, and whether they can be told apart.
@@ -130,7 +132,7 @@ mod tests {
 
     #[test]
     fn an_infinite_distance_stays_writable() {
-        let c = Candidate {
+        let c = MatchCandidate {
             landmark: LandmarkId(4),
             correlation: 0.25,
             hausdorff: f64::INFINITY,
@@ -139,7 +141,7 @@ mod tests {
             tau: 0.5,
             ratio: f64::INFINITY,
             probability: 0.0,
-            refusal: Some(Refusal::Hausdorff),
+            refusal: Some(MatchRefusal::Hausdorff),
         };
         let wire = candidate(&c, |id| format!("l{}", id.0));
         assert_eq!(
@@ -150,9 +152,9 @@ mod tests {
         assert!(json["distance"].is_number() && json["ratio"].is_number());
     }
 
-    fn ambiguous() -> Verdict {
-        Verdict {
-            recognition: Recognition::Ambiguous(LandmarkId(1)),
+    fn ambiguous() -> RecognitionResult {
+        RecognitionResult {
+            verdict: Verdict::Ambiguous(LandmarkId(1)),
             candidates: vec![],
             entropy_m: 1.0,
             entropy_norm: 0.5,
@@ -208,7 +210,7 @@ mod tests {
     /// The doubtful landmark has a field of its own: a client without that field reads "ambiguous".
     #[test]
     fn a_doubtful_landmark_is_named_apart() {
-        let refused = |refusal| Candidate {
+        let refused = |refusal| MatchCandidate {
             landmark: LandmarkId(1),
             correlation: 0.2,
             hausdorff: 1.0,
@@ -221,19 +223,19 @@ mod tests {
         };
         let filled = |refusal| {
             let points = Some(Box::new(evidence()));
-            let v = Verdict { candidates: vec![refused(refusal)], points, ..ambiguous() };
+            let v = RecognitionResult { candidates: vec![refused(refusal)], points, ..ambiguous() };
             let mut quad = v1::QuadAnswer::default();
             fill_verdict(&mut quad, &v, |_| "door".into());
             quad
         };
-        let quad = filled(Refusal::Disagreement);
+        let quad = filled(MatchRefusal::Disagreement);
         assert_eq!((quad.verdict(), quad.landmark.as_str()), (v1::Verdict::Ambiguous, ""));
         assert_eq!(
             (quad.doubtful_landmark.as_str(), quad.candidates[0].refusal.as_str()),
             ("door", "disagreement")
         );
         assert_eq!(quad.points.map(|p| p.inliers), Some(21));
-        assert_eq!(filled(Refusal::Margin).doubtful_landmark, "");
+        assert_eq!(filled(MatchRefusal::Margin).doubtful_landmark, "");
     }
 
     #[test]
@@ -242,7 +244,7 @@ mod tests {
         let mut quad = v1::QuadAnswer::default();
         fill_verdict(&mut quad, &v, |_| "door".into());
         assert_eq!((quad.verdict(), quad.landmark.as_str()), (v1::Verdict::Ambiguous, ""));
-        v.recognition = Recognition::Unique(LandmarkId(1));
+        v.verdict = Verdict::Unique(LandmarkId(1));
         fill_verdict(&mut quad, &v, |_| "door".into());
         assert_eq!((quad.verdict(), quad.landmark.as_str()), (v1::Verdict::Unique, "door"));
     }

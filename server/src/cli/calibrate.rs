@@ -7,12 +7,10 @@ use engine::dominant::dominant;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 use vision::{
-    detect::{
-        detect,
-        quads::{Corners, Quad, QuadKind},
-    },
-    localise::{calibrate::PlanarView, pose::LandmarkSize},
-    params::DetectParams,
+    camera_calibration::PlanarView,
+    detect::{DetectParams, Quad, QuadKind, detect},
+    geometry::Corners,
+    pose::LandmarkSize,
     trace::NoTrace,
 };
 

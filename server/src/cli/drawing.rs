@@ -4,7 +4,10 @@
 use image::{ExtendedColorType, ImageEncoder as _, codecs::png};
 use sim::font;
 use std::path::Path;
-use vision::{detect::quads::Corners, frame::GrayImage, geometry::polygon};
+use vision::{
+    frame::GrayImage,
+    geometry::{Corners, polygon},
+};
 
 /// Red, green, blue.
 pub type Colour = [u8; 3];

@@ -5,7 +5,7 @@ use super::pictures;
 use anyhow::{Context as _, bail};
 use serde_json::Value;
 use std::path::PathBuf;
-use vision::params::DetectParams;
+use vision::detect::DetectParams;
 
 /// How quads are looked for.
 #[derive(Debug, Clone, Default, clap::Args)]
@@ -134,7 +134,7 @@ fn put(all: &mut Value, path: &str, value: Value) -> anyhow::Result<()> {
 mod tests {
     use super::*;
     use clap::Parser;
-    use vision::detect::quads::{Grouping, Nested};
+    use vision::detect::{Grouping, Nested};
 
     #[derive(Parser)]
     struct Line {

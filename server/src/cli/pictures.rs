@@ -4,7 +4,7 @@ use anyhow::Context as _;
 use engine::decode::{ImageLimits, decode_upload};
 use image::ImageEncoder as _;
 use std::{fs::File, io::Read as _, path::Path};
-use vision::{frame::GrayImage, params::DetectParams};
+use vision::{detect::DetectParams, frame::GrayImage};
 
 /// Quality of the demo's JPEG frames: a VGA frame stays below one zenoh batch.
 const JPEG_QUALITY: u8 = 85;

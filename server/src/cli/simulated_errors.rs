@@ -9,8 +9,8 @@ use map::{
 use nalgebra::{Isometry3, Matrix3, Vector3, Vector6};
 use vision::{
     frame::{Intrinsics, IntrinsicsSigmas},
-    learn::random::Random,
-    localise::reproject::perturbed,
+    pose::reprojection::perturbed,
+    random::Random,
 };
 
 /// How well a surveying robot knows its pose: standard deviations of x, y (metres) and heading (radians).

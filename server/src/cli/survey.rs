@@ -20,13 +20,9 @@ use sim::{
 };
 use std::collections::BTreeMap;
 use vision::{
-    detect::{
-        detect,
-        quads::{Quad, QuadKind},
-    },
+    detect::{DetectParams, Quad, QuadKind, detect},
     frame::Intrinsics,
     geometry::polygon,
-    params::DetectParams,
     trace::NoTrace,
 };
 

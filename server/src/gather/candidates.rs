@@ -10,12 +10,9 @@ use serde::Serialize;
 use serde_json::{Value, json};
 use utoipa::ToSchema;
 use vision::{
-    learn::{
-        gates::v_c,
-        model::{Gate, LandmarkModel, ModelStatus, View, learn, unlikeness_of},
-    },
+    learn::{TrainingView, gates::v_c, learn, unlikeness_of},
+    model::{Gate, LandmarkId, LandmarkModel, ModelStatus},
     params::Params,
-    recognise::LandmarkId,
 };
 
 /// Where a candidate seems to hang.
@@ -119,9 +116,9 @@ fn one(
     let apart = preview.as_ref().map_or(&[][..], |p| &p.apart);
     let views: Vec<&TrackView> =
         all.iter().enumerate().filter(|(i, _)| !apart.contains(i)).map(|(_, v)| v).collect();
-    let taught: Vec<View> = views
+    let taught: Vec<TrainingView> = views
         .iter()
-        .map(|v| View {
+        .map(|v| TrainingView {
             icon: v.cut.icon.clone(),
             corners_px: v.cut.corners_px,
             image_size_px: v.size_px,

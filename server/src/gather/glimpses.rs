@@ -13,12 +13,14 @@ use map::{
 };
 use nalgebra::Matrix2;
 use vision::{
-    detect::quads::{Corners, QuadKind},
+    detect::QuadKind,
     frame::Intrinsics,
+    geometry::Corners,
     icon::icon,
+    model::LandmarkId,
     params::Params,
-    pipeline::{QuadFacts, matched},
-    recognise::{LandmarkId, Recognition, Refusal, features},
+    pipeline::{QuadAnalysis, matched_border},
+    recognise::{MatchRefusal, Verdict, features},
     seen_border::{FoundBy, SeenBorder},
 };
 
@@ -87,7 +89,7 @@ pub(super) fn glimpses(offer: &Offer, params: &Params) -> Found {
         let identity = identity(facts, recognised.map(|(id, _)| id), place.as_ref(), &offer.looked.map);
         let icon = features(icon, &params.recognise);
         // Of a landmark that is seen the corners are those detected, turned.
-        let turn = facts.verdict.as_ref().filter(|_| recognised.is_some()).map_or(0, |v| v.rotation);
+        let turn = facts.recognition.as_ref().filter(|_| recognised.is_some()).map_or(0, |v| v.rotation);
         let mut covariance = facts.quad.corner_covariance_px2;
         covariance.rotate_left(turn % 4);
         found.corners_px2.push(covariance);
@@ -98,13 +100,15 @@ pub(super) fn glimpses(offer: &Offer, params: &Params) -> Found {
 
 /// The landmark that is seen beyond doubt, with its corners. Where its border was found only by laying the learnt picture
 /// on it, the corners are not good enough to learn from.
-fn recognised(facts: &QuadFacts, params: &Params) -> Option<(LandmarkId, SeenBorder)> {
-    let verdict = facts.verdict.as_ref()?;
-    let Recognition::Unique(id) = verdict.recognition else { return None };
+fn recognised(facts: &QuadAnalysis, params: &Params) -> Option<(LandmarkId, SeenBorder)> {
+    let verdict = facts.recognition.as_ref()?;
+    let Verdict::Unique(id) = verdict.verdict else { return None };
     if verdict.confidence < MIN_CONFIDENCE || verdict.border != 0 {
         return None;
     }
-    matched(&facts.quad, verdict, params).filter(|s| s.found_by == FoundBy::Edges).map(|seen| (id, seen))
+    matched_border(&facts.quad, verdict, params)
+        .filter(|s| s.found_by == FoundBy::Edges)
+        .map(|seen| (id, seen))
 }
 
 /// Where it hangs; `None` where that cannot be known, an error where it is known not to hang flat on a wall.
@@ -130,7 +134,7 @@ fn overlap(a: &LandmarkPlace, b: &LandmarkPlace) -> bool {
 }
 
 fn identity(
-    facts: &QuadFacts,
+    facts: &QuadAnalysis,
     recognised: Option<LandmarkId>,
     place: Option<&LandmarkPlace>,
     map: &MapSnapshot,
@@ -147,11 +151,11 @@ fn identity(
             Identity::Doubtful
         };
     }
-    let Some(verdict) = &facts.verdict else { return Identity::Doubtful };
-    if let Recognition::Ambiguous(id) = verdict.recognition {
+    let Some(verdict) = &facts.recognition else { return Identity::Doubtful };
+    if let Verdict::Ambiguous(id) = verdict.verdict {
         // What its icon alone speaks for is the landmark where that hangs.
         let is_plain =
-            verdict.candidates.iter().any(|c| c.landmark == id && c.refusal == Some(Refusal::Plain));
+            verdict.candidates.iter().any(|c| c.landmark == id && c.refusal == Some(MatchRefusal::Plain));
         let is_it = is_plain && there(&id) == Some(true);
         return if is_it { Identity::Landmark(id) } else { Identity::Doubtful };
     }

@@ -15,7 +15,7 @@ use std::{
 };
 use tokio::sync::mpsc::{Receiver, Sender, channel, error::TrySendError};
 use utoipa::ToSchema;
-use vision::recognise::LandmarkId;
+use vision::model::LandmarkId;
 
 /// Frames that wait to be followed; beyond that they are dropped.
 pub(crate) const QUEUE: usize = 8;

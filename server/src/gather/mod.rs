@@ -31,8 +31,9 @@ use sha2::{Digest, Sha256};
 use std::{collections::BTreeMap, sync::Arc};
 use tokio::sync::mpsc::Receiver;
 use vision::{
-    params::{Params, RecogniseParams},
-    recognise::{LandmarkId, features},
+    model::LandmarkId,
+    params::Params,
+    recognise::{RecogniseParams, features},
 };
 
 /// Who gathers, and what is kept.

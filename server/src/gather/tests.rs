@@ -36,8 +36,8 @@ fn frames(count: u64) -> Vec<(CheckedFrame, AnalysedFrame)> {
     let image = &seen.frame.image;
     let params = Params::default();
     let map = Arc::new(MapSnapshot::empty(MAP, 1));
-    let landmarks = pipeline::Landmarks { models: &map.models, sizes: &map.sizes, kind: map.distance };
-    let facts = pipeline::analyse(image, None, landmarks, &params, &mut NoTrace);
+    let landmarks = pipeline::LandmarkDatabase { models: &map.models, sizes: &map.sizes, kind: map.distance };
+    let facts = pipeline::Pipeline::default().analyse(image, None, landmarks, &params, &mut NoTrace);
     let believed = Pose2Covariance { pose: Pose2::new(1.0, 0.0, 0.0), covariance: Matrix3::zeros() };
     (1..=count)
         .map(|seq| {

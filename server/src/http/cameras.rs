@@ -16,10 +16,7 @@ use protos::{convert::geometry::intrinsics_wire, v1};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
-use vision::{
-    detect::quads::Corners,
-    localise::{calibrate::PlanarView, pose::LandmarkSize},
-};
+use vision::{camera_calibration::PlanarView, geometry::Corners, pose::LandmarkSize};
 
 pub(super) fn router() -> OpenApiRouter<Shared> {
     OpenApiRouter::new().routes(routes!(list)).routes(routes!(calibrate))
@@ -124,7 +121,7 @@ async fn calibrate(
 ) -> Result<Json<Report>, ApiError> {
     robots::get(app.store.reads(), &robot).await?;
     let Request { given, known } = asked.map_or_else(Request::default, |Body(request)| request);
-    if usize::from(known.radial) > vision::localise::calibrate::MAX_RADIAL {
+    if usize::from(known.radial) > vision::camera_calibration::MAX_RADIAL {
         return Err(ApiError::invalid("out_of_range", "known.radial", "0 to 2 coefficients can be fitted"));
     }
     let (views, image_px) = match given {

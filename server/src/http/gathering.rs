@@ -28,7 +28,7 @@ use engine::picture;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
-use vision::recognise::LandmarkId;
+use vision::model::LandmarkId;
 
 pub(super) fn router() -> OpenApiRouter<Shared> {
     OpenApiRouter::new()

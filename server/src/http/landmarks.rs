@@ -18,7 +18,7 @@ use map::landmark_health::LandmarkHealth;
 use serde::{Deserialize, Deserializer};
 use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
-use vision::recognise::LandmarkId;
+use vision::model::LandmarkId;
 
 pub(super) fn router() -> OpenApiRouter<Shared> {
     OpenApiRouter::new().routes(routes!(create, list)).routes(routes!(get, patch, delete))

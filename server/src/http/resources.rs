@@ -26,7 +26,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use std::time::Instant;
 use utoipa::ToSchema;
-use vision::{localise::pose::LandmarkSize, recognise::DistanceKind};
+use vision::{pose::LandmarkSize, recognise::DistanceKind};
 
 /// Which distance decides in a map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]

@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 use std::{collections::BTreeMap, sync::Arc};
 use utoipa::{IntoParams, ToSchema};
 use utoipa_axum::{router::OpenApiRouter, routes};
-use vision::recognise::LandmarkId;
+use vision::model::LandmarkId;
 
 /// Landmarks in reach whose areas are made for one question.
 pub(super) const MAX_MADE: usize = 500;
@@ -193,7 +193,7 @@ mod tests {
     use ::map::place::PlaceSigmas;
     use engine::snapshot::LandmarkInfo;
     use nalgebra::Vector3;
-    use vision::localise::pose::LandmarkSize;
+    use vision::pose::LandmarkSize;
 
     #[test]
     fn absent_numbers_are_those_of_the_map_and_wrong_ones_are_named() {

@@ -281,7 +281,7 @@ fn framed(service: &Service, seconds: u64, (landmark, x_m): (u64, f64)) {
         pose: Pose2Covariance { pose: Pose2::new(x_m, 0.0, 0.0), covariance },
         noise: covariance,
         nuisances: Vec::new(),
-        landmarks: vec![vision::recognise::LandmarkId(landmark)],
+        landmarks: vec![vision::model::LandmarkId(landmark)],
         decided_by: AmbiguityResolvedBy::Single,
         chi2: 1.0,
         dof: 5,

@@ -29,10 +29,10 @@ use sha2::{Digest, Sha256};
 use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
 use vision::{
-    detect::quads::Corners,
     frame::GrayImage,
+    geometry::Corners,
     icon::{Icon, IconError, icon},
-    learn::thinning::ThinningParams,
+    learn::near_duplicates::NoveltyParams,
     params::Params as Algorithm,
 };
 
@@ -132,7 +132,7 @@ async fn add(
     let image = form.needed("image")?;
     let extent = extent(form.optional("corners").as_ref(), form.optional("whole_image").as_ref())?;
     let mut capture = capture(form.optional("capture").as_ref())?;
-    let thinning = (!flag("keep_alike", form.optional("keep_alike").as_ref())?).then(ThinningParams::default);
+    let thinning = (!flag("keep_alike", form.optional("keep_alike").as_ref())?).then(NoveltyParams::default);
     let max = app.config.limits.views;
     let (new, detected) = app.clone().on_vision_thread(move |app| prepare(app, &image, &extent)).await??;
     if let (Some(capture), Some(quad)) = (&mut capture, detected) {

@@ -24,7 +24,7 @@ use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
-use vision::recognise::LandmarkId;
+use vision::model::LandmarkId;
 
 /// Landmarks are taken to hang so far before their walls at most.
 const STANDOFF_M: f64 = 0.5;

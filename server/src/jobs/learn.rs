@@ -31,13 +31,11 @@ use engine::{panics::Edge, snapshot::MapSnapshot};
 use serde_json::{Value, json};
 use std::{collections::BTreeMap, sync::Arc, time::Instant};
 use vision::{
-    learn::{
-        model::{LandmarkModel, MAX_VIEWS, ModelStatus, View, add_negatives, learn},
-        synthesis,
-    },
+    learn::{TrainingView, add_negatives, learn, synthesis},
+    model::{LandmarkId, LandmarkModel, MAX_VIEWS, ModelStatus},
     params::Params,
     points::taught::{TaughtPoint, view_points},
-    recognise::{IconFeatures, LandmarkId, features},
+    recognise::{IconFeatures, features},
 };
 
 /// Views a landmark is learnt from at least: what photographs do not give is generated from them.
@@ -175,7 +173,7 @@ fn compute(m: &Material, reporter: &Reporter) -> Result<Learnt, JobError> {
     let sights = each_of(&m.targets, m.workers, reporter, (0.0, 0.3, "views"), |id| sights(m, *id))?;
     let (views, points): (Vec<_>, Vec<_>) = sights.into_iter().map(|s| (s.views, s.points)).unzip();
     let of_targets = || m.targets.iter().copied();
-    let views: BTreeMap<LandmarkId, Vec<View>> = of_targets().zip(views).collect();
+    let views: BTreeMap<LandmarkId, Vec<TrainingView>> = of_targets().zip(views).collect();
     let points: BTreeMap<LandmarkId, Vec<Vec<TaughtPoint>>> = of_targets().zip(points).collect();
     let negatives = collect_negatives(m, &views, reporter)?;
     let p = &m.params;
@@ -213,7 +211,7 @@ fn compute(m: &Material, reporter: &Reporter) -> Result<Learnt, JobError> {
 /// What a landmark is learnt from.
 struct Sights {
     /// Its photographs and what is generated from them.
-    views: Vec<View>,
+    views: Vec<TrainingView>,
     /// Points of its photographs, of at most [`MAX_POINT_VIEWS`] evenly chosen ones.
     points: Vec<Vec<TaughtPoint>>,
 }
@@ -221,9 +219,9 @@ struct Sights {
 fn sights(m: &Material, id: LandmarkId) -> Sights {
     let lessons = m.lessons.get(&id).map_or(&[][..], Vec::as_slice);
     let lessons = &lessons[..lessons.len().min(MAX_VIEWS)];
-    let mut views: Vec<View> = lessons
+    let mut views: Vec<TrainingView> = lessons
         .iter()
-        .map(|l| View {
+        .map(|l| TrainingView {
             icon: l.cut.icon.clone(),
             corners_px: l.cut.corners_px,
             image_size_px: l.size_px,
@@ -259,7 +257,7 @@ fn sights(m: &Material, id: LandmarkId) -> Sights {
 
 fn collect_negatives(
     m: &Material,
-    views: &BTreeMap<LandmarkId, Vec<View>>,
+    views: &BTreeMap<LandmarkId, Vec<TrainingView>>,
     reporter: &Reporter,
 ) -> Result<Negatives, JobError> {
     let all: Vec<LandmarkId> = m.lessons.keys().copied().collect();

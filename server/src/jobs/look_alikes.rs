@@ -3,9 +3,9 @@
 
 use super::negatives::Negatives;
 use vision::{
-    learn::model::{LandmarkModel, unlikeness_of},
+    learn::unlikeness_of,
+    model::{LandmarkId, LandmarkModel},
     params::Params,
-    recognise::LandmarkId,
 };
 
 /// Look-alikes of one landmark that are named, most alike first.
@@ -41,12 +41,9 @@ pub(super) fn look_alikes(model: &LandmarkModel, negatives: &Negatives, p: &Para
 mod tests {
     use super::*;
     use vision::{
-        detect::quads::Corners,
         frame::GrayImage,
-        learn::{
-            model::{View, learn, refit_thresholds},
-            synthesis,
-        },
+        geometry::Corners,
+        learn::{TrainingView, learn, refit_thresholds, synthesis},
     };
 
     /// Blocks of grey; another number, other blocks; `stain` paints a corner over.
@@ -66,7 +63,7 @@ mod tests {
         let p = Params::default();
         let whole = Corners::try_from([[-0.5, -0.5], [239.5, -0.5], [239.5, 239.5], [-0.5, 239.5]]).unwrap();
         let lesson = |id: u64, image: &GrayImage| {
-            let mut views = vec![View::photographed(image, &whole, &p).unwrap()];
+            let mut views = vec![TrainingView::photographed(image, &whole, &p).unwrap()];
             views.extend(synthesis::views(image, &whole, 20, &p, id));
             learn(LandmarkId(id), &views, &[], &p).unwrap()
         };

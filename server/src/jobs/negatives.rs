@@ -4,12 +4,12 @@
 use crate::store::views::{Cut, Digest, Lesson};
 use std::ops::Range;
 use vision::{
-    detect::quads::Corners,
-    geometry::polygon::intersection_area,
+    geometry::{Corners, polygon::intersection_area},
     icon::Icon,
-    learn::model::{LandmarkModel, add_negatives},
+    learn::add_negatives,
+    model::{LandmarkId, LandmarkModel},
     params::Params,
-    recognise::{IconFeatures, LandmarkId},
+    recognise::IconFeatures,
 };
 
 /// Other landmarks' icons compared with each model, about. 300 are needed to speak of 1 % (method 8).

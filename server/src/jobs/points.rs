@@ -29,10 +29,7 @@ use std::{
     sync::Arc,
     time::Instant,
 };
-use vision::{
-    learn::model::{LandmarkModel, MAX_VIEWS},
-    recognise::LandmarkId,
-};
+use vision::model::{LandmarkId, LandmarkModel, MAX_VIEWS};
 
 /// A model without points and the photographs to take them from.
 struct Target {

@@ -17,9 +17,9 @@ use map::{
 use sqlx::SqliteConnection;
 use std::{collections::BTreeMap, sync::Arc};
 use vision::{
-    learn::model::LandmarkModel,
+    model::{LandmarkId, LandmarkModel, ModelSet},
     params::Params,
-    recognise::{DistanceKind, LandmarkId, models::ModelSet},
+    recognise::DistanceKind,
 };
 
 /// The current version of a map as it is in the database, without what is derived from it; `None` if the map is gone.

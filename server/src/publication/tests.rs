@@ -21,7 +21,7 @@ async fn what_is_acknowledged_is_published_and_survives() {
     store.write(|tx| Box::pin(maps::create(tx, "a", DistanceKind::Both, 2))).await.unwrap();
     assert_eq!(store.snapshots().get("a").unwrap().version, 1);
     let new = landmarks::Measures {
-        size: Some(vision::localise::pose::LandmarkSize { width_m: 0.5, height_m: 0.7 }),
+        size: Some(vision::pose::LandmarkSize { width_m: 0.5, height_m: 0.7 }),
         place: Some(landmarks::Place {
             x_m: 1.0,
             y_m: 2.0,
@@ -38,7 +38,7 @@ async fn what_is_acknowledged_is_published_and_survives() {
     store.write(|tx| Box::pin(robots::put(tx, "r1", "a", 5))).await.unwrap();
     let snapshot = store.snapshots().get("a").unwrap();
     assert_eq!((snapshot.version, snapshot.landmarks.len(), snapshot.walls.len()), (3, 1, 1));
-    assert!(snapshot.landmarks[&vision::recognise::LandmarkId(made.id as u64)].place.is_some());
+    assert!(snapshot.landmarks[&vision::model::LandmarkId(made.id as u64)].place.is_some());
     task.close().await;
     assert!(matches!(
         store.write(|tx| Box::pin(maps::create(tx, "late", DistanceKind::Both, 2))).await,
@@ -115,10 +115,10 @@ async fn a_job_ends_once() {
 
 /// A model of one view of random grey levels, stored.
 async fn store_model(store: &Catalogue, landmark: i64, params: &vision::params::Params) {
-    use vision::{detect::quads::Corners, icon::Icon, learn::model, recognise::LandmarkId};
+    use vision::{geometry::Corners, icon::Icon, learn, model::LandmarkId};
     let side = params.icon.size;
     let pixels = (0..side * side).map(|i| ((i * i * 31 + i * 7) % 251) as f32).collect();
-    let view = model::View {
+    let view = learn::TrainingView {
         icon: Icon::new(side, pixels, 1.0).unwrap(),
         corners_px: Corners::try_from([[0.0, 0.0], [90.0, 0.0], [90.0, 90.0], [0.0, 90.0]]).unwrap(),
         image_size_px: [91, 91],
@@ -126,7 +126,7 @@ async fn store_model(store: &Catalogue, landmark: i64, params: &vision::params::
         generated: false,
     };
     let id = LandmarkId(landmark as u64);
-    let model = model::learn(id, &[view.clone(), view], &[], params).unwrap();
+    let model = learn::learn(id, &[view.clone(), view], &[], params).unwrap();
     let new = models::NewModel {
         landmark: id,
         bytes: model.to_bytes(),
@@ -151,7 +151,7 @@ async fn store_model(store: &Catalogue, landmark: i64, params: &vision::params::
 
 #[tokio::test]
 async fn damaged_and_outdated_models_are_named_and_not_used() {
-    use vision::recognise::LandmarkId;
+    use vision::model::LandmarkId;
     let dir = tempfile::tempdir().unwrap();
     let config = config(dir.path());
     let (store, task) = Catalogue::open(&config).await.unwrap();
@@ -313,7 +313,7 @@ async fn a_map_that_cannot_be_made_ready_keeps_its_version_and_stops_nothing() {
 
 #[tokio::test]
 async fn a_model_that_cannot_be_read_is_quarantined_and_the_others_are_used() {
-    use vision::recognise::LandmarkId;
+    use vision::model::LandmarkId;
     let dir = tempfile::tempdir().unwrap();
     let config = config(dir.path());
     let (store, task) = Catalogue::open(&config).await.unwrap();
@@ -345,13 +345,13 @@ pub(crate) async fn refuse_runs(store: &Catalogue) {
 }
 
 /// A map with a wall and two landmarks 40 m apart, so that neither's area reaches the other.
-async fn two_placed(store: &Store) -> [vision::recognise::LandmarkId; 2] {
+async fn two_placed(store: &Store) -> [vision::model::LandmarkId; 2] {
     store.write(|tx| Box::pin(maps::create(tx, "a", DistanceKind::Both, 2))).await.unwrap();
     store
         .write(|tx| Box::pin(async { laser::replace(tx, "a", &[[0.0, -0.1, 60.0, -0.1]]).await }))
         .await
         .unwrap();
-    let mut ids = [vision::recognise::LandmarkId(0); 2];
+    let mut ids = [vision::model::LandmarkId(0); 2];
     for (id, (name, x_m)) in ids.iter_mut().zip([("p1", 5.0), ("p2", 45.0)]) {
         let new = placed_at(x_m);
         let row = store.write(move |tx| Box::pin(landmarks::create(tx, "a", name, new, 5))).await.unwrap();
@@ -363,7 +363,7 @@ async fn two_placed(store: &Store) -> [vision::recognise::LandmarkId; 2] {
 fn placed_at(x_m: f64) -> landmarks::Measures {
     let (z_m, theta_rad) = (1.5, std::f64::consts::FRAC_PI_2);
     landmarks::Measures {
-        size: Some(vision::localise::pose::LandmarkSize { width_m: 0.5, height_m: 0.7 }),
+        size: Some(vision::pose::LandmarkSize { width_m: 0.5, height_m: 0.7 }),
         place: Some(landmarks::Place {
             x_m,
             y_m: 0.0,

@@ -7,7 +7,7 @@ use map::{
     visibility::{Obstacle, VisibilityMap, VisibilitySettings, visibility, within_reach},
 };
 use std::{collections::BTreeMap, sync::Arc};
-use vision::recognise::LandmarkId;
+use vision::model::LandmarkId;
 
 type Areas = BTreeMap<LandmarkId, Arc<VisibilityMap>>;
 
@@ -55,7 +55,7 @@ mod tests {
     use engine::snapshot::LandmarkInfo;
     use map::place::PlaceSigmas;
     use nalgebra::{Point2, Vector3};
-    use vision::localise::pose::LandmarkSize;
+    use vision::pose::LandmarkSize;
 
     #[test]
     fn only_what_changed_is_made_anew() {

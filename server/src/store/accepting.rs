@@ -17,7 +17,7 @@ use super::{
 use map::segments::LaserSegment;
 use sqlx::{Row, sqlite::SqliteRow};
 use std::{collections::BTreeMap, sync::Arc};
-use vision::detect::quads::Corners;
+use vision::geometry::Corners;
 
 statements! {
     MOVE = "INSERT INTO views (landmark_id, image_sha256, image_kind, image, width_px, height_px, corners_px, icon_side, \

@@ -7,7 +7,7 @@ use map::{
 };
 use nalgebra::{Matrix6, Vector3};
 use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
-use vision::localise::pose::LandmarkSize;
+use vision::pose::LandmarkSize;
 
 /// Columns of [`LandmarkRow`]; views and model are joined so that a list is one query.
 macro_rules! select {

@@ -3,7 +3,7 @@
 use super::{StoreError, landmarks, maps, sights, statements::statements};
 use map::{landmark_health::LandmarkHealth, visibility::VisibilitySettings};
 use sqlx::{Row, SqliteConnection};
-use vision::recognise::{DistanceKind, LandmarkId};
+use vision::{model::LandmarkId, recognise::DistanceKind};
 
 statements! {
     MAP = "SELECT name, version, distance, sight, walls_version FROM maps WHERE id = ?1";

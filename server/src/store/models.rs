@@ -4,7 +4,7 @@ use super::{StoreError, Tx, landmarks::ModelSummary, statements::statements};
 use sha2::{Digest as _, Sha256};
 use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 use std::collections::BTreeSet;
-use vision::recognise::LandmarkId;
+use vision::model::LandmarkId;
 
 statements! {
     PUT = "INSERT INTO models (landmark_id, model, sha256, params_hash, active, reasons, facts, views, generated_views, \

@@ -23,9 +23,10 @@ use serde::{Deserialize, Serialize};
 use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 use utoipa::ToSchema;
 use vision::{
-    detect::quads::{BORDER_SIGMA_PX, Corners},
+    detect::BORDER_SIGMA_PX,
     frame::Intrinsics,
-    localise::pose::{LandmarkSize, MAX_CORNER_SIGMA_PX},
+    geometry::Corners,
+    pose::{LandmarkSize, MAX_CORNER_SIGMA_PX},
 };
 
 statements! {
@@ -329,8 +330,9 @@ pub(super) mod tests {
     use nalgebra::{Matrix3, Matrix6};
     use vision::{
         icon::Icon,
-        localise::reproject::{corner_points, pixel},
-        recognise::{DistanceKind, LandmarkId},
+        model::LandmarkId,
+        pose::reprojection::{corner_points, pixel},
+        recognise::DistanceKind,
     };
 
     const SIZE: LandmarkSize = LandmarkSize { width_m: 0.6, height_m: 0.84 };

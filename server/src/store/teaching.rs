@@ -15,7 +15,7 @@ use engine::panics::Edge;
 use map::segments::LaserSegment;
 use sqlx::{Row, SqliteExecutor};
 use std::sync::Arc;
-use vision::learn::thinning::{ThinningParams, ViewDigest, most_alike};
+use vision::learn::near_duplicates::{NoveltyParams, ViewSummary, most_alike};
 
 statements! {
     STAMP = "SELECT m.id AS map, m.walls_version, l.id AS landmark, count(v.id) AS views, \
@@ -100,7 +100,7 @@ pub(crate) struct Teaching {
     /// Most views of a landmark.
     pub(crate) max: usize,
     /// What counts as saying nothing new; without it every view is stored.
-    pub(crate) thinning: Option<ThinningParams>,
+    pub(crate) thinning: Option<NoveltyParams>,
 }
 
 /// What was computed for a view, and from what.
@@ -158,9 +158,9 @@ async fn prepare(store: &Store, teaching: &Arc<Teaching>) -> Result<Prepared, St
 }
 
 /// The stored view that the new one adds nothing to.
-fn alike(new: &Cut, stored: &[(i64, Cut)], p: &ThinningParams) -> Option<i64> {
-    let digest = |cut: &Cut| ViewDigest::new(&cut.corners_px, &cut.icon);
-    let digests: Vec<ViewDigest> = stored.iter().map(|(_, cut)| digest(cut)).collect();
+fn alike(new: &Cut, stored: &[(i64, Cut)], p: &NoveltyParams) -> Option<i64> {
+    let digest = |cut: &Cut| ViewSummary::new(&cut.corners_px, &cut.icon);
+    let digests: Vec<ViewSummary> = stored.iter().map(|(_, cut)| digest(cut)).collect();
     let (index, novelty) = most_alike(&digest(new), &digests, p)?;
     (novelty < 1.0).then(|| stored[index].0)
 }

@@ -4,7 +4,7 @@ use super::{StoreError, Tx, landmarks, now_ms, statements::statements, within};
 use serde::Serialize;
 use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 use utoipa::ToSchema;
-use vision::{detect::quads::Corners, icon::Icon, recognise::LandmarkId};
+use vision::{geometry::Corners, icon::Icon, model::LandmarkId};
 
 statements! {
     COUNT = "SELECT count(*) FROM views WHERE landmark_id = ?1";

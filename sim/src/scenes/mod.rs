@@ -112,7 +112,7 @@ impl Scenes {
         let quad = |listed: &Listed| self.quad(stage, listed);
         let quads: Vec<QuadEntry> = stage.quads.iter().filter_map(quad).collect();
         let size = [stage.painter.width, stage.painter.height];
-        let large = |c: &&vision::detect::quads::Corners| {
+        let large = |c: &&vision::geometry::Corners| {
             c.min_side_px() >= MIN_OTHER_SIDE_PX && c.points().iter().any(|p| within(p, size))
         };
         ImageEntry {

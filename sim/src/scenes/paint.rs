@@ -3,7 +3,7 @@
 //! later is in front.
 
 use nalgebra::{Matrix3, Point2, Vector3};
-use vision::detect::quads::Corners;
+use vision::geometry::Corners;
 
 use crate::texture::Footprint;
 

@@ -2,7 +2,7 @@
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
-use vision::detect::quads::Corners;
+use vision::geometry::Corners;
 
 use super::paint::{Painter, Plane, Rect, corners};
 use super::pictures;

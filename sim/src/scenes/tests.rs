@@ -100,7 +100,7 @@ fn all_sorts_of_things_are_there_and_only_whole_ones_count() {
 fn inner_borders_are_listed_within_their_things() {
     let within = |scene: &LabelledScene| {
         let quads = &scene.entry.quads;
-        let inside = |o: &vision::detect::quads::Corners| {
+        let inside = |o: &vision::geometry::Corners| {
             quads.iter().any(|q| {
                 let inside = |p| vision::geometry::polygon::contains(q.corners.points(), p, 0.5);
                 o.points().iter().all(inside) && o.area_px2() > 0.25 * q.corners.area_px2()

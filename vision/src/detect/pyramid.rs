@@ -3,8 +3,7 @@
 //!
 //! Departs from method 1, which works at full size: time is bounded, and ornate frames are lines only when seen coarsely.
 
-use super::quads::{Corners, Quad};
-use crate::frame::GrayImage;
+use crate::{detect::quad::Quad, frame::GrayImage, geometry::corners::Corners};
 use nalgebra::Point2;
 
 /// The whole factor that brings the longer side nearest to `side_px`; 1 if it is smaller, or `side_px` is 0.

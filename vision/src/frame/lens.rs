@@ -33,7 +33,7 @@ pub enum Distortion {
 
 /// A point behind the lens, and how it moves.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Bent {
+pub struct DistortedPoint {
     /// Normalised, as the lens shows it.
     pub point: Point2<f64>,
     /// By the straight point.
@@ -52,9 +52,9 @@ impl Distortion {
     }
 
     /// Where the lens shows the straight point `p`, with the derivative.
-    pub fn bend(&self, p: &Point2<f64>) -> Bent {
+    pub fn distort(&self, p: &Point2<f64>) -> DistortedPoint {
         match *self {
-            Self::None => Bent { point: *p, by_straight: Matrix2::identity() },
+            Self::None => DistortedPoint { point: *p, by_straight: Matrix2::identity() },
             Self::PlumbBob([k1, k2, p1, p2, k3]) => polynomial(p, [k1, k2, k3], [0.0; 3], [p1, p2]),
             Self::RationalPolynomial([k1, k2, p1, p2, k3, k4, k5, k6]) => {
                 polynomial(p, [k1, k2, k3], [k4, k5, k6], [p1, p2])
@@ -65,7 +65,7 @@ impl Distortion {
 
     /// The straight point that the lens shows at `bent`. `None` where there is none, beyond [`MAX_RAY_RAD`], and where
     /// the lens folds between the axis and it: there the polynomial describes no lens, and another point looks the same.
-    pub fn straighten(&self, bent: &Point2<f64>) -> Option<Point2<f64>> {
+    pub fn undistort(&self, bent: &Point2<f64>) -> Option<Point2<f64>> {
         let start = match *self {
             Self::None => return Some(*bent),
             Self::Equidistant(k) => return straighten_angle(bent, &k),
@@ -73,12 +73,12 @@ impl Distortion {
         };
         let mut p = start;
         for _ in 0..MAX_STEPS {
-            let at = self.bend(&p);
+            let at = self.distort(&p);
             let error = bent - at.point;
             let step = at.by_straight.try_inverse()? * error;
             // Halved until it helps: far out the polynomial is steep.
             let next = (0..8).map(|i| p + step * 0.5_f64.powi(i)).find(|next| {
-                let left = (bent - self.bend(next).point).norm();
+                let left = (bent - self.distort(next).point).norm();
                 left < error.norm() || left < ROUND_TRIP
             });
             p = next?;
@@ -86,7 +86,7 @@ impl Distortion {
                 break;
             }
         }
-        let back = self.bend(&p).point;
+        let back = self.distort(&p).point;
         let found = (back - bent).norm() < ROUND_TRIP && p.coords.norm().atan() <= MAX_RAY_RAD;
         (found && self.is_unfolded(&p)).then_some(p)
     }
@@ -94,7 +94,7 @@ impl Distortion {
     /// Whether nearby straight points keep their order all the way from the axis to `p`.
     fn is_unfolded(&self, p: &Point2<f64>) -> bool {
         (1..=WAY_POINTS).all(|i| {
-            let at = self.bend(&Point2::from(p.coords * (i as f64 / WAY_POINTS as f64))).by_straight;
+            let at = self.distort(&Point2::from(p.coords * (i as f64 / WAY_POINTS as f64))).by_straight;
             at.determinant() > 0.0 && at.trace() > 0.0
         })
     }
@@ -106,7 +106,7 @@ fn radial([a, b, c]: [f64; 3], r2: f64) -> (f64, f64) {
 }
 
 /// Brown's model with a denominator.
-fn polynomial(p: &Point2<f64>, up: [f64; 3], down: [f64; 3], [p1, p2]: [f64; 2]) -> Bent {
+fn polynomial(p: &Point2<f64>, up: [f64; 3], down: [f64; 3], [p1, p2]: [f64; 2]) -> DistortedPoint {
     let (x, y) = (p.x, p.y);
     let r2 = x * x + y * y;
     let ((n, dn), (d, dd)) = (radial(up, r2), radial(down, r2));
@@ -122,7 +122,7 @@ fn polynomial(p: &Point2<f64>, up: [f64; 3], down: [f64; 3], [p1, p2]: [f64; 2])
         cross,
         g + 2.0 * y * y * dg + 6.0 * p1 * y + 2.0 * p2 * x,
     );
-    Bent { point, by_straight }
+    DistortedPoint { point, by_straight }
 }
 
 /// Value and derivative of the angle behind the lens by the angle before it.
@@ -132,17 +132,17 @@ fn angle([k1, k2, k3, k4]: &[f64; 4], t: f64) -> (f64, f64) {
     (value, 1.0 + t2 * (3.0 * k1 + t2 * (5.0 * k2 + t2 * (7.0 * k3 + t2 * 9.0 * k4))))
 }
 
-fn equidistant(p: &Point2<f64>, k: [f64; 4]) -> Bent {
+fn equidistant(p: &Point2<f64>, k: [f64; 4]) -> DistortedPoint {
     let r = p.coords.norm();
     if r < 1e-9 {
-        return Bent { point: *p, by_straight: Matrix2::identity() };
+        return DistortedPoint { point: *p, by_straight: Matrix2::identity() };
     }
     let (bent, slope) = angle(&k, r.atan());
     let out = p.coords / r;
     let (along, across) = (slope / (1.0 + r * r), bent / r);
     let outer: Matrix2<f64> = out * out.transpose();
     let by_straight = outer * along + (Matrix2::identity() - outer) * across;
-    Bent { point: Point2::from(out * bent), by_straight }
+    DistortedPoint { point: Point2::from(out * bent), by_straight }
 }
 
 /// Newton on the angle, which must grow all the way to the answer.
@@ -224,7 +224,7 @@ mod tests {
             [(PLUMB_BOB, OPENCV_PLUMB_BOB), (RATIONAL, OPENCV_RATIONAL), (EQUIDISTANT, OPENCV_EQUIDISTANT)];
         for (lens, expected) in golden {
             for (p, want) in points.iter().zip(expected) {
-                let got = lens.bend(&Point2::from(*p)).point;
+                let got = lens.distort(&Point2::from(*p)).point;
                 assert!((got - Point2::from(want)).norm() < 1e-9, "{lens:?} {p:?}: {got} for {want:?}");
             }
         }
@@ -234,11 +234,11 @@ mod tests {
     fn derivatives_are_the_finite_differences() {
         for lens in [Distortion::None, PLUMB_BOB, RATIONAL, EQUIDISTANT] {
             for p in [[0.3, -0.2], [-0.5, 0.35], [0.02, 0.7], [1e-12, 0.0]].map(Point2::from) {
-                let at = |d: Vector2<f64>| lens.bend(&(p + d)).point;
+                let at = |d: Vector2<f64>| lens.distort(&(p + d)).point;
                 let along = |d: Vector2<f64>| (at(d) - at(-d)) / 2e-6;
                 let numeric =
                     Matrix2::from_columns(&[along(Vector2::x() * 1e-6), along(Vector2::y() * 1e-6)]);
-                assert!((numeric - lens.bend(&p).by_straight).norm() < 1e-8, "{lens:?} {p}");
+                assert!((numeric - lens.distort(&p).by_straight).norm() < 1e-8, "{lens:?} {p}");
             }
         }
     }
@@ -248,22 +248,22 @@ mod tests {
         // r (1 - 0.5 r2) has its greatest value 0.544 at r = 0.816: beyond, no straight point; a steep fifth power
         // brings the picture back further out, which is another branch.
         let folding = Distortion::PlumbBob([-0.5, 0.0, 0.0, 0.0, 0.0]);
-        let straight = folding.straighten(&Point2::new(0.54, 0.0)).unwrap();
+        let straight = folding.undistort(&Point2::new(0.54, 0.0)).unwrap();
         assert!(
-            (folding.bend(&straight).point - Point2::new(0.54, 0.0)).norm() < 1e-9 && straight.x < 0.8165
+            (folding.distort(&straight).point - Point2::new(0.54, 0.0)).norm() < 1e-9 && straight.x < 0.8165
         );
-        assert_eq!(folding.straighten(&Point2::new(0.55, 0.0)), None);
+        assert_eq!(folding.undistort(&Point2::new(0.55, 0.0)), None);
         let returning = Distortion::PlumbBob([-0.5, 0.0, 0.0, 0.0, 0.02]);
-        assert_eq!(returning.straighten(&Point2::new(1.5, 0.0)), None);
+        assert_eq!(returning.undistort(&Point2::new(1.5, 0.0)), None);
         let fisheye = Distortion::Equidistant([-0.5, 0.0, 0.0, 0.0]);
-        assert_eq!(fisheye.straighten(&Point2::new(0.6, 0.0)), None);
-        assert_eq!(Distortion::PlumbBob([f64::NAN; 5]).straighten(&Point2::new(0.1, 0.0)), None);
+        assert_eq!(fisheye.undistort(&Point2::new(0.6, 0.0)), None);
+        assert_eq!(Distortion::PlumbBob([f64::NAN; 5]).undistort(&Point2::new(0.1, 0.0)), None);
     }
 
     #[test]
     fn no_pinhole_sees_beyond_85_degrees() {
         let ideal = Distortion::Equidistant([0.0; 4]);
-        let at = |t: f64| ideal.straighten(&Point2::new(0.0, t));
+        let at = |t: f64| ideal.undistort(&Point2::new(0.0, t));
         assert!((at(1.4).unwrap().y - 1.4_f64.tan()).abs() < 1e-9);
         assert!(at(MAX_RAY_RAD - 1e-6).is_some());
         assert_eq!(at(MAX_RAY_RAD + 1e-6), None);
@@ -274,7 +274,7 @@ mod tests {
         fn straight_points_come_back(x in -0.7..0.7_f64, y in -0.6..0.6_f64, model in 0_usize..4) {
             let lens = [Distortion::None, PLUMB_BOB, RATIONAL, EQUIDISTANT][model];
             let p = Point2::new(x, y);
-            let back = lens.straighten(&lens.bend(&p).point).unwrap();
+            let back = lens.undistort(&lens.distort(&p).point).unwrap();
             prop_assert!((back - p).norm() < 1e-9, "{lens:?} {p} {back}");
         }
 
@@ -288,8 +288,8 @@ mod tests {
                 Distortion::Equidistant([k[0], k[1], k[2], k[3]]),
             ][model];
             let bent = Point2::new(x, y);
-            if let Some(p) = lens.straighten(&bent) {
-                prop_assert!((lens.bend(&p).point - bent).norm() < 1e-8);
+            if let Some(p) = lens.undistort(&bent) {
+                prop_assert!((lens.distort(&p).point - bent).norm() < 1e-8);
             }
         }
     }

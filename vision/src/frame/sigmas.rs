@@ -1,37 +1,11 @@
 //! How surely a camera's intrinsics are known, and how a wrong camera moves what it sees. First order: a share of the
 //! focal length that fx and fy share, and the principal point. Errors of the lens's coefficients are not modelled.
 
-use super::{FrameError, Intrinsics};
+use crate::frame::{
+    image::FrameError,
+    intrinsics::{Intrinsics, IntrinsicsSigmas},
+};
 use nalgebra::{Matrix2, Matrix2x3, Point2, Vector3};
-use serde::{Deserialize, Serialize};
-
-/// Standard deviations of intrinsics, as a calibration states them. fx and fy err together: of a calibration their
-/// errors are almost fully correlated.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct IntrinsicsSigmas {
-    /// Of the focal length along u; that along v errs by the same share.
-    pub focal_px: f64,
-    /// Of each coordinate of the principal point.
-    pub center_px: f64,
-}
-
-impl IntrinsicsSigmas {
-    /// Of a camera about which nothing is said, as a share of the focal length. Calibrations state 0.1 to 0.5 %, and two
-    /// of them of the same pictures differ by as much as 0.6 %: docs/EVALUATION.md, "Cameras".
-    pub const USUAL_FOCAL_SHARE: f64 = 0.005;
-    /// Of its principal point, as a share of the focal length: 2 px at 640 x 480. What is wrong with it is mostly the same
-    /// as a turn of the camera, and so in whatever the mounting was found with.
-    pub const USUAL_CENTER_SHARE: f64 = 0.003;
-    /// Largest accepted, as a share of the focal length: beyond it first order says nothing.
-    pub const MAX_SHARE: f64 = 0.25;
-
-    /// Of a camera of this focal length about which nothing is said.
-    pub fn usual(focal_px: f64) -> Self {
-        let (focal, center) = (Self::USUAL_FOCAL_SHARE * focal_px, Self::USUAL_CENTER_SHARE * focal_px);
-        Self { focal_px: focal, center_px: center }
-    }
-}
 
 impl Intrinsics {
     /// The same camera, known so surely. Both finite, 0 to [`IntrinsicsSigmas::MAX_SHARE`] of fx.
@@ -55,7 +29,7 @@ impl Intrinsics {
     /// camera's (share of the focal length, cx, cy) were more; still written as a pixel of this pinhole. `None` where the
     /// lens cannot be undone.
     pub fn straight_by_errors(&self, straight_px: &Point2<f64>) -> Option<Matrix2x3<f64>> {
-        let bent = self.distortion.bend(&self.normalised(straight_px));
+        let bent = self.distortion.distort(&self.normalised(straight_px));
         let focal = Matrix2::new(self.fx_px, 0.0, 0.0, self.fy_px);
         let back = focal * bent.by_straight.try_inverse()?;
         let share = back * bent.point.coords;

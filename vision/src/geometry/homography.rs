@@ -1,7 +1,7 @@
 //! Four point pairs in, plane homography out (method 4): `a_from_b` as a 3x3 matrix of Frobenius norm 1 whose
 //! denominator is positive over the points it was made from. It does not fit more than four points.
 
-use crate::detect::quads::Corners;
+use crate::geometry::corners::Corners;
 use nalgebra::{Matrix3, Point2, SMatrix, SVector, Vector3};
 
 /// Why four point pairs have no usable homography.

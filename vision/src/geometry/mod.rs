@@ -1,6 +1,9 @@
-//! Homographies, lines and polygons in the image plane.
+//! Corners, homographies, lines and polygons in the image plane.
 
+pub mod corners;
 pub mod homography;
 pub mod line;
 pub mod polygon;
 pub(crate) mod interpolate;
+
+pub use corners::{Corners, CornersError};

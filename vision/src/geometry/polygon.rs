@@ -1,5 +1,5 @@
 //! Convex polygons as slices of vertices: area, intersection, overlap and the relations that the constraint tables
-//! ask for. Vertices run clockwise on screen (u right, v down), as in [`crate::detect::quads::Corners`]; for the
+//! ask for. Vertices run clockwise on screen (u right, v down), as in [`crate::geometry::corners::Corners`]; for the
 //! measures the other direction works as well. Does not handle concave or self-crossing polygons.
 
 use nalgebra::{Point2, Vector2};

@@ -1,9 +1,9 @@
 //! Gates at the end of modelling (method 9): is the landmark salient, stable, and seen from far enough apart?
 //!
 //! In: the training icons, their points and the corners they were cut from. Out: numbers with their limits. Whether a
-//! failed gate keeps a landmark back is said in [`super::model::ModelStatus`].
+//! failed gate keeps a landmark back is said in [`crate::model::landmark_model::ModelStatus`].
 
-use crate::recognise::descriptor::PointSet;
+use crate::recognise::features::descriptor::PointSet;
 use nalgebra::{Matrix3, Point2, Vector2};
 use serde::{Deserialize, Serialize};
 
@@ -130,7 +130,7 @@ fn departure(h: &Matrix3<f64>) -> f64 {
 }
 
 /// Homography from the unit square to a convex quad, in closed form.
-pub(super) fn quad_from_unit(corners: &[Point2<f64>; 4]) -> Matrix3<f64> {
+pub(crate) fn quad_from_unit(corners: &[Point2<f64>; 4]) -> Matrix3<f64> {
     let [p0, p1, p2, p3] = corners.map(|c| c.coords);
     let (d1, d2, sum) = (p1 - p2, p3 - p2, p0 - p1 + p2 - p3);
     let det = d1.perp(&d2);
@@ -156,7 +156,7 @@ fn variance(values: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::learn::random::Random;
+    use crate::random::Random;
     use nalgebra::{Isometry3, Point3, Rotation3, Translation3, Vector3};
 
     /// Corners of the golden poster (0.60 x 0.84 m) for a level camera (f = 700, 640 x 480) 0.3 m below its centre,

@@ -1,25 +1,59 @@
 //! The lesson: views of one landmark in, its model out (method 7 to 9 on one page). Thresholds are `fitting`'s.
 //! Collecting views, storing models and telling look-alikes apart is the caller's.
 
-use super::{
-    exemplar::Exemplar,
-    fitting::{Templates, ready, refit_thresholds},
-    gates::{saliency, saliency_f, stable_points, v_c},
-    model::{Evidence, LandmarkModel, LearnError, MAX_VIEWS, ModelStatus, View, distances},
-    pca::{exemplars, modes},
-    threshold::Threshold,
-};
 use crate::{
     icon::Icon,
-    params::{Params, RecogniseParams},
-    recognise::{IconFeatures, LandmarkId, features},
+    learn::{
+        gates::{saliency, saliency_f, stable_points, v_c},
+        pca::{exemplars, modes},
+        threshold_fit::{Templates, ready, refit_thresholds},
+        training_view::TrainingView,
+    },
+    model::{
+        exemplar::Exemplar,
+        landmark_id::LandmarkId,
+        landmark_model::{DistanceSamples, LandmarkModel, MAX_VIEWS, ModelStatus, distances},
+        threshold::Threshold,
+    },
+    params::Params,
+    recognise::{
+        features::icon_features::{IconFeatures, features},
+        params::RecogniseParams,
+    },
 };
 
+/// Why nothing could be learnt.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum LearnError {
+    /// No view.
+    #[error("views: none given")]
+    NoView,
+    /// Too many views.
+    #[error("views: {found} given, at most {MAX_VIEWS} allowed")]
+    TooManyViews {
+        /// How many.
+        found: usize,
+    },
+    /// A view's icon has another size than the parameters say.
+    #[error("views: icon {index} is {found} px wide, the parameters say {expected}")]
+    IconSize {
+        /// Which view.
+        index: usize,
+        /// Its icon's side in pixels.
+        found: usize,
+        /// The side the parameters ask for.
+        expected: usize,
+    },
+    /// A view's icon holds numbers that are no grey levels, or the components do not converge.
+    #[error("views: the icons have no principal components")]
+    NoComponents,
+}
+
 /// Learns a landmark. `negatives` are icons of everything it must be told from: other landmarks, and quads that are
-/// no landmark. Without any, the absolute caps of [`super::model::LearnParams`] stand in for them.
+/// no landmark. Without any, the absolute caps of [`crate::learn::params::LearnParams`] stand in for them.
 pub fn learn(
     id: LandmarkId,
-    views: &[View],
+    views: &[TrainingView],
     negatives: &[IconFeatures],
     p: &Params,
 ) -> Result<LandmarkModel, LearnError> {
@@ -48,12 +82,18 @@ pub fn learn(
         total_variance: components.total_variance,
         correlation: Threshold::NEVER,
         hausdorff: Threshold::NEVER,
-        correlation_evidence: Evidence { own: rising(own.iter().map(|d| d.0)), ..Evidence::default() },
-        hausdorff_evidence: Evidence { own: rising(own.iter().map(|d| d.1)), ..Evidence::default() },
+        correlation_evidence: DistanceSamples {
+            own: rising(own.iter().map(|d| d.0)),
+            ..DistanceSamples::default()
+        },
+        hausdorff_evidence: DistanceSamples {
+            own: rising(own.iter().map(|d| d.1)),
+            ..DistanceSamples::default()
+        },
         likeness: Threshold::NEVER,
-        likeness_evidence: Evidence {
+        likeness_evidence: DistanceSamples {
             own: rising(own_unlikeness(&icons, (&chosen, &kept), p).into_iter()),
-            ..Evidence::default()
+            ..DistanceSamples::default()
         },
         saliency_f,
         stable_points,
@@ -125,12 +165,12 @@ fn rising(distances: impl Iterator<Item = f64>) -> Vec<f32> {
 }
 
 /// Corners and image sizes of all views, or of the photographed ones.
-fn seen_at(views: &[View], generated: bool) -> Vec<([nalgebra::Point2<f64>; 4], [f64; 2])> {
+fn seen_at(views: &[TrainingView], generated: bool) -> Vec<([nalgebra::Point2<f64>; 4], [f64; 2])> {
     let of_interest = views.iter().filter(|v| generated || !v.generated);
     of_interest.map(|v| (*v.corners_px.points(), v.image_size_px.map(|s| s as f64))).collect()
 }
 
-fn check(views: &[View], p: &Params) -> Result<(), LearnError> {
+fn check(views: &[TrainingView], p: &Params) -> Result<(), LearnError> {
     if views.is_empty() {
         return Err(LearnError::NoView);
     }

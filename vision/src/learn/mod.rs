@@ -1,14 +1,17 @@
 //! From views of one landmark to its model (method 7 to 9).
 
-pub mod random;
+pub mod params;
+pub mod training_view;
 pub(crate) mod texture;
 pub mod synthesis;
+pub mod near_duplicates;
 pub mod pca;
 pub mod threshold;
 pub mod gates;
-pub mod thinning;
-pub mod exemplar;
-pub mod model;
-mod fitting;
-mod lesson;
-mod stored;
+pub mod threshold_fit;
+pub mod lesson;
+
+pub use lesson::{LearnError, learn};
+pub use params::{LearnParams, SynthesisParams};
+pub use threshold_fit::{add_negatives, refit_thresholds, unlikeness_of};
+pub use training_view::TrainingView;

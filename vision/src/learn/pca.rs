@@ -160,7 +160,7 @@ fn falling(values: &[f64]) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::learn::random::Random;
+    use crate::random::Random;
     use proptest::prelude::*;
 
     fn icons(n: usize, pixels: usize, seed: u64) -> Vec<Vec<f32>> {

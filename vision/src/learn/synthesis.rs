@@ -6,12 +6,17 @@
 //!
 //! What they cannot show: whether the thing is flat, reflections, its real surroundings, other states of the light.
 //! Distances measured on them are therefore smaller than real ones, and a model learnt from them says so
-//! ([`super::model::LandmarkModel::generated_views`]).
+//! ([`crate::model::landmark_model::LandmarkModel::generated_views`]).
 
-use super::{gates::quad_from_unit, model::View, random::Random, texture::Texture};
-use crate::{detect::quads::Corners, frame::GrayImage, icon::icon, params::Params};
+use crate::{
+    frame::GrayImage,
+    geometry::corners::Corners,
+    icon::icon,
+    learn::{gates::quad_from_unit, params::SynthesisParams, texture::Texture, training_view::TrainingView},
+    params::Params,
+    random::Random,
+};
 use nalgebra::{Matrix3, Point2, Vector3};
-use serde::{Deserialize, Serialize};
 
 /// Image of the generated camera, in pixels.
 const CAMERA_SIZE_PX: [usize; 2] = [640, 480];
@@ -22,67 +27,24 @@ const MAX_DRAWS: usize = 30;
 /// Pixels rendered around the landmark.
 const BORDER_PX: f64 = 12.0;
 
-/// Ranges that views are drawn from.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct SynthesisParams {
-    /// Largest angle between the landmark's normal and the line of sight, in the horizontal plane.
-    pub max_yaw_rad: f64,
-    /// The same in the vertical plane.
-    pub max_pitch_rad: f64,
-    /// Largest roll of the camera.
-    pub max_roll_rad: f64,
-    /// Apparent size (square root of the frontal area) from, in pixels.
-    pub min_size_px: f64,
-    /// Apparent size to, in pixels.
-    pub max_size_px: f64,
-    /// Standard deviation of the corners per coordinate: the detector's.
-    pub corner_noise_px: f64,
-    /// Contrast factor is drawn from 1 / `max_gain` to `max_gain`.
-    pub max_gain: f64,
-    /// Brightness offset is drawn from minus to plus this, in grey levels.
-    pub max_offset: f64,
-    /// Exponent of the tone curve is drawn from 1 / `max_gamma` to `max_gamma`.
-    pub max_gamma: f64,
-    /// Largest standard deviation of the blur, in pixels.
-    pub max_blur_px: f64,
-    /// Largest standard deviation of the noise, in grey levels.
-    pub max_noise: f64,
-    /// Largest share of the landmark that something stands before; 0 for none.
-    pub max_occluded_share: f64,
-}
-
-impl Default for SynthesisParams {
-    fn default() -> Self {
-        Self {
-            max_yaw_rad: 60f64.to_radians(),
-            max_pitch_rad: 15f64.to_radians(),
-            max_roll_rad: 3f64.to_radians(),
-            min_size_px: 80.0,
-            max_size_px: 240.0,
-            corner_noise_px: 1.0,
-            max_gain: 1.6,
-            max_offset: 30.0,
-            max_gamma: 1.4,
-            max_blur_px: 0.8,
-            max_noise: 5.0,
-            max_occluded_share: 0.0,
-        }
-    }
-}
-
 /// `count` generated views of the landmark at `corners` of `photograph`; fewer where the icon stage refuses what was
 /// drawn, none where the corners cannot be used at all.
-pub fn views(photograph: &GrayImage, corners: &Corners, count: usize, p: &Params, seed: u64) -> Vec<View> {
+pub fn views(
+    photograph: &GrayImage,
+    corners: &Corners,
+    count: usize,
+    p: &Params,
+    seed: u64,
+) -> Vec<TrainingView> {
     let Some(texture) = Texture::lift(photograph, corners) else { return vec![] };
     let aspect = aspect(corners);
     let mut random = Random::new(seed);
-    (0..count.min(super::model::MAX_VIEWS))
+    (0..count.min(crate::model::landmark_model::MAX_VIEWS))
         .filter_map(|_| (0..MAX_DRAWS).find_map(|_| view(&texture, aspect, p, &mut random)))
         .collect()
 }
 
-fn view(texture: &Texture, aspect: f64, p: &Params, random: &mut Random) -> Option<View> {
+fn view(texture: &Texture, aspect: f64, p: &Params, random: &mut Random) -> Option<TrainingView> {
     let s = &p.learn.synthesis;
     let corners = corners_from(&Pose::draw(s, random), aspect)?;
     let (image, shift) = photograph(texture, &corners, s, random)?;
@@ -92,7 +54,7 @@ fn view(texture: &Texture, aspect: f64, p: &Params, random: &mut Random) -> Opti
     });
     let local = Corners::new(noisy.map(|c| c - shift)).ok()?;
     let exact = Corners::new(corners.points().map(|c| c - shift)).ok()?;
-    Some(View {
+    Some(TrainingView {
         exact: Some(icon(&image, &exact, &p.icon).ok()?),
         icon: icon(&image, &local, &p.icon).ok()?,
         corners_px: Corners::new(noisy).ok()?,
@@ -258,7 +220,7 @@ fn aspect(corners: &Corners) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{learn::model::MAX_VIEWS, recognise::features};
+    use crate::{model::landmark_model::MAX_VIEWS, recognise::features::icon_features::features};
 
     fn poster(seed: u64) -> GrayImage {
         let mut random = Random::new(seed);
@@ -302,7 +264,7 @@ mod tests {
         let sizes: Vec<f64> = views.iter().map(|v| v.corners_px.area_px2().sqrt()).collect();
         assert!(sizes.iter().any(|s| *s < 85.0) && sizes.iter().any(|s| *s > 180.0));
         // Width over height against the frontal 0.75: the yaw reaches beyond 50 degrees.
-        let slant = |v: &View| {
+        let slant = |v: &TrainingView| {
             let [tl, tr, _, bl] = v.corners_px.points();
             (tr - tl).norm() / (bl - tl).norm() / 0.75
         };

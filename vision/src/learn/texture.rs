@@ -2,10 +2,13 @@
 //!
 //! In: a photograph and the landmark's corners in it. Out: a square texture with some surroundings and two coarser
 //! levels, and small pictures of it under a new homography, filtered to their scale. No light, lens or noise here:
-//! see [`super::synthesis`].
+//! see [`crate::learn::synthesis`].
 
-use super::gates::quad_from_unit;
-use crate::{detect::quads::Corners, frame::GrayImage, geometry::interpolate::cell};
+use crate::{
+    frame::GrayImage,
+    geometry::{corners::Corners, interpolate::cell},
+    learn::gates::quad_from_unit,
+};
 use nalgebra::{Matrix3, Point2, Vector3};
 
 /// Texels along the landmark's side at the finest level: more than the largest generated view shows.

@@ -3,6 +3,7 @@
 //! In: distances of the landmark's own icons and of everything else. Out: tau with its error rates, where the
 //! weighted cost of false positives and false negatives is least. It knows nothing of icons or of which distance.
 
+use crate::model::threshold::{LimitedBy, Threshold, ThresholdError};
 use serde::{Deserialize, Serialize};
 
 /// With fewer negatives than this the absolute cap counts as one of them.
@@ -25,68 +26,6 @@ impl Default for ThresholdParams {
     fn default() -> Self {
         Self { false_positive_weight: 6.0, nearest_share: 0.9 }
     }
-}
-
-/// What held tau where it is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum LimitedBy {
-    /// The least weighted cost.
-    Cost,
-    /// The share of the nearest other distance.
-    NearestNegative,
-    /// The absolute cap, which holds where there are few negatives.
-    AbsoluteCap,
-}
-
-/// A threshold with its evidence. A distance is accepted only when it is strictly below `tau`.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Threshold {
-    /// The threshold; 0 accepts nothing.
-    pub tau: f64,
-    /// Share of other distances below tau.
-    pub false_positive_rate: f64,
-    /// Share of own distances at or above tau.
-    pub false_negative_rate: f64,
-    /// Own distances used (n+).
-    pub positives: usize,
-    /// Other distances used (n-). Below 300 a rate of 1 % is not measurable.
-    pub negatives: usize,
-    /// What held tau.
-    pub limited_by: LimitedBy,
-}
-
-impl Threshold {
-    /// Accepts nothing: what a landmark gets for which there is no threshold.
-    pub const NEVER: Threshold = Threshold {
-        tau: 0.0,
-        false_positive_rate: 0.0,
-        false_negative_rate: 1.0,
-        positives: 0,
-        negatives: 0,
-        limited_by: LimitedBy::Cost,
-    };
-}
-
-/// Why there is no threshold.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, thiserror::Error, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum ThresholdError {
-    /// No distance of the landmark's own icons.
-    #[error("the landmark has no held-out view to measure its own distances")]
-    NoPositive,
-    /// No distance of anything else.
-    #[error("there is nothing to tell the landmark from")]
-    NoNegative,
-    /// A distance is NaN or negative.
-    #[error("a distance is not a number, or is negative")]
-    NotADistance,
-    /// No own distance is finite.
-    #[error("every own distance is infinite: too few points")]
-    NothingFinite,
-    /// Refusing everything is cheapest.
-    #[error("the landmark cannot be told from others: refusing everything costs least")]
-    Overlap,
 }
 
 /// Weighted empirical cost `S(tau)` with lambda = `weight`, mu = 1. `S` of method 8.
@@ -167,43 +106,6 @@ pub fn threshold(
     })
 }
 
-/// Mean and standard deviation of a class of distances, taken for normal.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Gaussian {
-    /// Mean.
-    pub mean: f64,
-    /// Standard deviation, positive.
-    pub deviation: f64,
-}
-
-impl Gaussian {
-    /// Fits the finite values; `None` with fewer than two or without spread.
-    pub fn fit(values: &[f64]) -> Option<Self> {
-        let finite: Vec<f64> = values.iter().copied().filter(|d| d.is_finite()).collect();
-        let n = finite.len() as f64;
-        let mean = finite.iter().sum::<f64>() / n;
-        let variance = finite.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0);
-        (finite.len() >= 2 && variance > 0.0).then(|| Self { mean, deviation: variance.sqrt() })
-    }
-}
-
-/// Where the weighted densities cross between the means: for small sets (n+ < 30 or n- < 300). `None` when the own
-/// distances are not the smaller ones or the curves do not cross there.
-pub fn gaussian(own: Gaussian, others: Gaussian, weight: f64) -> Option<f64> {
-    let (m1, s1, m0, s0) = (own.mean, own.deviation, others.mean, others.deviation);
-    let a = 0.5 / (s0 * s0) - 0.5 / (s1 * s1);
-    let b = m1 / (s1 * s1) - m0 / (s0 * s0);
-    let c = 0.5 * (m0 / s0).powi(2) - 0.5 * (m1 / s1).powi(2) - (weight * s1 / s0).ln();
-    let roots = if a.abs() < 1e-12 * (1.0 / (s0 * s0)).max(1.0 / (s1 * s1)) {
-        [-c / b, f64::NAN]
-    } else {
-        let root = (b * b - 4.0 * a * c).sqrt();
-        [(-b - root) / (2.0 * a), (-b + root) / (2.0 * a)]
-    };
-    // Without m1 < m0 nothing lies between them.
-    roots.into_iter().find(|tau| *tau > m1 && *tau < m0)
-}
-
 /// The other end of the interval that begins at the largest distance.
 fn beyond(largest: f64) -> f64 {
     1.2 * largest + f64::MIN_POSITIVE
@@ -236,37 +138,6 @@ mod tests {
         assert_eq!(capped.limited_by, LimitedBy::NearestNegative);
         assert_eq!((capped.positives, capped.negatives), (5, 6));
         assert!((capped.false_negative_rate - 0.4).abs() < 1e-12 && capped.false_positive_rate < 1e-12);
-    }
-
-    /// Golden value of method 8, and a numerical minimum of the Gaussian cost as oracle.
-    #[test]
-    fn golden_gaussians() {
-        let (own, others) = (Gaussian { mean: 2.0, deviation: 0.7 }, Gaussian { mean: 5.0, deviation: 1.2 });
-        let tau = gaussian(own, others, 6.0).unwrap();
-        assert!((tau - 2.7276).abs() < 5e-5, "{tau}");
-        // d(cost)/d(tau) by a fine sum of the densities: the cost falls before tau and rises after it.
-        let density = |g: Gaussian, x: f64| (-0.5 * ((x - g.mean) / g.deviation).powi(2)).exp() / g.deviation;
-        let slope = |x: f64| 6.0 * density(others, x) - density(own, x);
-        assert!(slope(tau - 1e-4) < 0.0 && slope(tau + 1e-4) > 0.0);
-    }
-
-    #[test]
-    fn equal_deviations_give_the_linear_case() {
-        let own = Gaussian { mean: 1.0, deviation: 0.5 };
-        let others = Gaussian { mean: 4.0, deviation: 0.5 };
-        // (m1 + m0)/2 - s^2 ln(6) / (m0 - m1)
-        let expected = 2.5 - 0.25 * 6.0_f64.ln() / 3.0;
-        assert!((gaussian(own, others, 6.0).unwrap() - expected).abs() < 1e-9);
-        assert!(gaussian(others, own, 6.0).is_none());
-        assert!(gaussian(own, own, 6.0).is_none());
-    }
-
-    #[test]
-    fn gaussian_fit() {
-        let fit = Gaussian::fit(&[1.0, 2.0, 3.0, f64::INFINITY]).unwrap();
-        assert!((fit.mean - 2.0).abs() < 1e-12 && (fit.deviation - 1.0).abs() < 1e-12);
-        assert!(Gaussian::fit(&[1.0, f64::INFINITY]).is_none());
-        assert!(Gaussian::fit(&[1.0, 1.0]).is_none());
     }
 
     #[test]

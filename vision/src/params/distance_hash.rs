@@ -1,7 +1,7 @@
 //! The identity of the distances: which settings a stored threshold was learnt under. An explicit list of numbers is hashed, so
 //! that renaming a field changes nothing and changing a number does.
 
-use super::Params;
+use crate::params::Params;
 
 /// Raised when the same numbers give other distances: an algorithm of icon, points, descriptors, ranks or alignment changed.
 const VERSION: u64 = 1;

@@ -1,12 +1,14 @@
 //! A landmark's points and where they should be seen in; whether the patch looks like each of them there out. No
 //! keypoint need be found in the patch: the descriptor is taken where the homography puts it.
 
-use super::{
-    Point, SeenPatch,
-    descriptor::{Descriptor, Window, describe},
-    keypoints::{BASE_SIGMA, SCALES},
+use crate::{
+    geometry::homography::Homography,
+    points::{
+        descriptor::{Descriptor, Window, describe},
+        keypoints::{BASE_SIGMA, SCALES},
+        point::{Point, SeenPatch},
+    },
 };
-use crate::geometry::homography::Homography;
 use fearless_simd::{Level, dispatch};
 use nalgebra::Point2;
 use serde::{Deserialize, Serialize};
@@ -207,7 +209,7 @@ const ELSEWHERE: f32 = 0.1;
 const REACH: f32 = 3.0;
 
 /// Place in the patch's own landmark coordinates of one in those after `turned` quarters.
-pub(super) fn unturned([x, y]: [f64; 2], turned: usize) -> [f64; 2] {
+pub(crate) fn unturned([x, y]: [f64; 2], turned: usize) -> [f64; 2] {
     match turned % 4 {
         0 => [x, y],
         1 => [1.0 - y, x],

@@ -4,8 +4,10 @@
 //! A patch is rectified already, so that a pair of matches (a scale along each axis and a translation) starts close
 //! enough for the refits, which free the affine and then the perspective part.
 
-use super::{Point, matching::Match};
-use crate::geometry::homography::Homography;
+use crate::{
+    geometry::homography::Homography,
+    points::{matching::Match, point::Point},
+};
 use fearless_simd::{Level, dispatch};
 use nalgebra::{Matrix3, Point2};
 

@@ -4,7 +4,7 @@
 //! Each value of the histogram is compared with two thresholds and stored as the two answers, so that the Hamming
 //! distance of two descriptors is the L1 distance of their values on three levels.
 
-use super::keypoints::Octave;
+use crate::points::keypoints::Octave;
 use fearless_simd::{Level, Simd, dispatch, f32x8, prelude::*};
 use std::sync::LazyLock;
 

@@ -1,8 +1,8 @@
 //! The points of all landmarks of a map, by word: a patch's points vote for landmarks without being compared with every one
 //! of theirs. Half of each descriptor is kept here, enough for votes; matches are made with the landmarks' own points.
 
-use super::{
-    Point,
+use crate::points::{
+    point::Point,
     taught::{TaughtPoint, scale_step},
     vocabulary::{VOCABULARY, words},
 };

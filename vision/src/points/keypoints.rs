@@ -1,8 +1,7 @@
 //! A patch in, its keypoints out: extrema of the difference of Gaussians over place and scale (Lowe 2004). No
 //! orientation: the patch is rectified already.
 
-use super::patch::Patch;
-use crate::recognise::harris::blurred;
+use crate::{points::patch::Patch, recognise::features::harris::blurred};
 use fearless_simd::{Level, dispatch};
 
 /// Smoothing of the first level of an octave, in its pixels.

@@ -1,7 +1,7 @@
 //! Points of a patch and of a landmark in, tentative matches out: mutual nearest neighbours within a gate of place and
 //! scale, clearly nearer than the next neighbour elsewhere.
 
-use super::Point;
+use crate::points::point::Point;
 use fearless_simd::{Level, dispatch};
 
 /// How matches are found.

@@ -3,9 +3,8 @@
 //! Landmark coordinates: the quad's corners TL, TR, BR, BL are (0, 0), (1, 0), (1, 1), (0, 1).
 
 use crate::{
-    detect::quads::Corners,
     frame::GrayImage,
-    geometry::homography::Homography,
+    geometry::{corners::Corners, homography::Homography},
     icon::{sample_row, samples_for},
 };
 use nalgebra::{Matrix3, Point2};

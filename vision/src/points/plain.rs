@@ -1,8 +1,10 @@
 //! What tells nothing of a landmark's identity: straight edges, bars and right angles along the sides of its rectangle.
 //! Frames, mats, panels, window bars and door leaves consist of them, and so do their strangers.
 
-use super::descriptor::{Descriptor, VALUES, Window, describe};
-use super::keypoints::Octave;
+use crate::points::{
+    descriptor::{Descriptor, VALUES, Window, describe},
+    keypoints::Octave,
+};
 use fearless_simd::{Level, dispatch};
 use std::sync::LazyLock;
 

@@ -1,17 +1,17 @@
 //! A quad and the landmarks of a map in, the landmarks that points speak for out: votes by the index, homographies for the
 //! landmarks with most votes, verification of the best of these.
 
-use super::{
-    Point, SeenPatch,
-    index::PointIndex,
-    patch::{Patch, inner_px},
-    taught::TaughtPoint,
-    verify::{Hypothesis, MAX_PATCH_POINTS, PointEvidence, Target, global_hypothesis, verified},
-};
 use crate::{
-    detect::quads::{Corners, Quad},
+    detect::quad::Quad,
     frame::GrayImage,
-    geometry::polygon::iou,
+    geometry::{corners::Corners, polygon::iou},
+    points::{
+        index::PointIndex,
+        patch::{Patch, inner_px},
+        point::{Point, SeenPatch},
+        taught::TaughtPoint,
+        verify::{Hypothesis, MAX_PATCH_POINTS, PointEvidence, Target, global_hypothesis, verified},
+    },
 };
 
 /// Landmarks for which a homography is looked for.

@@ -1,13 +1,16 @@
 //! Views of a landmark in, the points that are kept of it out.
 
-use super::{
-    Point, SeenPatch,
-    descriptor::{Descriptor, WORDS},
-    patch::{INNER_PX, Patch, inner_px},
-    plain::distance_to_plain,
-    vocabulary::word,
+use crate::{
+    frame::GrayImage,
+    geometry::corners::Corners,
+    points::{
+        descriptor::{Descriptor, WORDS},
+        patch::{INNER_PX, Patch, inner_px},
+        plain::distance_to_plain,
+        point::{Point, SeenPatch},
+        vocabulary::word,
+    },
 };
-use crate::{detect::quads::Corners, frame::GrayImage};
 use std::sync::LazyLock;
 
 /// Most points of a landmark.
@@ -46,7 +49,7 @@ pub struct TaughtPoint {
 }
 
 /// The stored step of a scale in landmark units.
-pub(super) fn scale_step(sigma: f32) -> u8 {
+pub(crate) fn scale_step(sigma: f32) -> u8 {
     (-sigma.log2() * SCALE_STEPS).round().clamp(0.0, 255.0) as u8
 }
 
@@ -69,12 +72,12 @@ impl TaughtPoint {
     }
 
     /// Word of its descriptor.
-    pub(super) fn word(&self) -> u16 {
+    pub(crate) fn word(&self) -> u16 {
         self.word
     }
 
     /// Its scale as it is kept.
-    pub(super) fn scale_step(&self) -> u8 {
+    pub(crate) fn scale_step(&self) -> u8 {
         self.sigma
     }
 

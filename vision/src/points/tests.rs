@@ -1,16 +1,18 @@
-use super::{
-    agreement::Part,
-    descriptor::MAX_DISTANCE,
-    evidence::log10_tail,
-    index::PointIndex,
-    plain::distance_to_plain,
-    taught::{MAX_LANDMARK_POINTS, POINT_BYTES, TaughtPoint, landmark_points, view_points},
-    verify::verify_at,
-    *,
-};
+use super::*;
 use crate::{
-    detect::quads::Corners,
     frame::GrayImage,
+    geometry::corners::Corners,
+    points::{
+        agreement::Part,
+        descriptor::MAX_DISTANCE,
+        evidence::log10_tail,
+        index::PointIndex,
+        patch::Patch,
+        plain::distance_to_plain,
+        point::SeenPatch,
+        taught::{MAX_LANDMARK_POINTS, POINT_BYTES, TaughtPoint, landmark_points, view_points},
+        verify::verify_at,
+    },
     recognise::fixture::{oblique, photograph, poster, whole},
 };
 use nalgebra::Point2;

@@ -2,19 +2,19 @@
 //! puts it. The search for the homography uses up the evidence of the points that it was found by; the others were not
 //! asked before, so that their agreement counts at its full improbability.
 
-use super::{
-    Point, SeenPatch,
-    agreement::{AGREEING_BY_CHANCE, Agreement, Check, checks, unturned},
-    consensus::{Consensus, consensus, distinct},
-    evidence::log10_tail,
-    matching::{Match, MatchGate, matches},
-    patch::{Patch, inner_px},
-    taught::TaughtPoint,
-};
 use crate::{
-    detect::quads::{BORDER_SIGMA_PX, Corners},
+    detect::quad::BORDER_SIGMA_PX,
     frame::GrayImage,
-    geometry::homography::Homography,
+    geometry::{corners::Corners, homography::Homography},
+    points::{
+        agreement::{AGREEING_BY_CHANCE, Agreement, Check, checks, unturned},
+        consensus::{Consensus, consensus, distinct},
+        evidence::log10_tail,
+        matching::{Match, MatchGate, matches},
+        patch::{Patch, inner_px},
+        point::{Point, SeenPatch},
+        taught::TaughtPoint,
+    },
     seen_border::{FoundBy, SeenBorder},
 };
 use nalgebra::{Matrix2, Point2, SMatrix};

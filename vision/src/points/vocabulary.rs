@@ -1,12 +1,16 @@
 //! A division of all descriptors into words, so that a point is compared with a few of a map's points only. It is the same
 //! for every map: its medoids are descriptors of generated textures, in two levels.
 
-use super::{
-    SeenPatch,
-    descriptor::Descriptor,
-    patch::{INNER_PX, Patch},
+use crate::{
+    frame::GrayImage,
+    geometry::corners::Corners,
+    points::{
+        descriptor::Descriptor,
+        patch::{INNER_PX, Patch},
+        point::SeenPatch,
+    },
+    random::Random,
 };
-use crate::{detect::quads::Corners, frame::GrayImage, learn::random::Random};
 use fearless_simd::{Level, dispatch};
 use std::sync::LazyLock;
 

@@ -1,14 +1,13 @@
 //! Drawn posters and photographs of them, for tests.
 
 use crate::{
-    detect::quads::{Corners, Quad, QuadKind},
+    detect::quad::{Quad, QuadKind},
     frame::GrayImage,
-    geometry::homography::Homography,
+    geometry::{corners::Corners, homography::Homography},
     icon::Icon,
-    learn::model::{LandmarkModel, View, learn, refit_thresholds},
-    learn::synthesis::views,
+    learn::{lesson::learn, synthesis::views, threshold_fit::refit_thresholds, training_view::TrainingView},
+    model::{landmark_id::LandmarkId, landmark_model::LandmarkModel, model_set::ModelSet},
     params::Params,
-    recognise::{LandmarkId, ModelSet},
 };
 use nalgebra::{Matrix2, Point2};
 use std::sync::Arc;
@@ -111,7 +110,7 @@ pub(crate) fn quad(corners_px: Corners) -> Quad {
 /// Poster `seed`, learnt as landmark `id` from itself and generated views.
 pub(crate) fn lesson(id: u64, seed: u64, p: &Params) -> LandmarkModel {
     let image = poster(seed);
-    let mut all = vec![View::photographed(&image, &whole(), p).unwrap()];
+    let mut all = vec![TrainingView::photographed(&image, &whole(), p).unwrap()];
     all.extend(views(&image, &whole(), 12, p, seed));
     learn(LandmarkId(id), &all, &[], p).unwrap()
 }

@@ -1,199 +1,22 @@
-//! From icon to verdict: points, descriptors, two distances, candidates, confidence (method 5, 6, 10).
+//! From icon to verdict (method 5, 6, 10). The folders stand in the order of the data.
 
-mod separable;
-pub mod harris;
-pub mod descriptor;
-pub mod correlation;
-pub mod hausdorff;
-pub mod signature;
-pub mod models;
-pub mod align;
-pub mod likeness;
-pub mod content;
-pub mod watch;
-pub mod compare;
-mod look;
-pub mod confidence;
-pub mod confidence_fit;
-mod confidence_learnt;
-mod mismatch;
-mod icon_alignment;
-mod by_points;
-pub mod verdict;
-pub mod expected;
+pub mod distance_kind;
+pub mod params;
+pub mod features;
+pub mod alignment;
+pub mod retrieval;
+pub mod verification;
+pub mod decision;
+pub mod step_listener;
 #[cfg(test)]
 pub(crate) mod fixture;
 
-use crate::{
-    detect::quads::Corners,
-    icon::Icon,
-    params::{Params, RecogniseParams},
-    points::verify::PointEvidence,
+pub use decision::{
+    by_points::{DOUBTFUL_PARTS, LOG10_EPSILON, log10_false_alarms},
+    result::{MAX_CANDIDATES, MatchCandidate, MatchRefusal, RecognitionResult, Verdict},
+    verdict::{recognise, recognise_watched},
 };
-use correlation::Buckets;
-use descriptor::PointSet;
-use serde::{Deserialize, Serialize};
-use signature::Signature;
-
-pub use by_points::{DOUBTFUL_PARTS, LOG10_EPSILON, log10_false_alarms};
-pub use models::{ModelSet, ModelSetError};
-
-/// An icon with everything that both distances need, worked out once. Depends on icon, points, descriptor and bucket
-/// parameters only; never stored, since it follows from the icon.
-#[derive(Debug, Clone, PartialEq)]
-pub struct IconFeatures {
-    /// The icon.
-    pub icon: Icon,
-    /// Normalised buckets for C^r.
-    pub buckets: Buckets,
-    /// Described points for H^r.
-    pub points: PointSet,
-    /// For the short list.
-    pub signature: Signature,
-    /// For the coarse look of alignment.
-    pub coarse: Vec<f32>,
-}
-
-impl IconFeatures {
-    /// The features of `icon.rotated(shift)`.
-    #[must_use]
-    pub fn rotated(&self, shift: usize, p: &RecogniseParams) -> Self {
-        let icon = self.icon.rotated(shift);
-        let buckets = Buckets::new(&icon, &p.correlation);
-        let signature = Signature::new(&icon);
-        let coarse = align::coarse(&icon, &p.verdict.align);
-        Self { buckets, points: self.points.rotated(shift, icon.size), signature, coarse, icon }
-    }
-}
-
-/// Works out buckets, points and descriptors of `icon`.
-pub fn features(icon: Icon, p: &RecogniseParams) -> IconFeatures {
-    let points = descriptor::describe(&icon, &harris::harris(&icon, &p.harris), &p.descriptor);
-    IconFeatures {
-        buckets: Buckets::new(&icon, &p.correlation),
-        points,
-        signature: Signature::new(&icon),
-        coarse: align::coarse(&icon, &p.verdict.align),
-        icon,
-    }
-}
-
-/// Number that names a landmark inside one map. The server keeps the readable name.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
-pub struct LandmarkId(pub u64);
-
-/// Which distance decides. A setting of a map.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum DistanceKind {
-    /// Partial Hausdorff distance over Harris points, H^r.
-    Hausdorff,
-    /// Bucketed correlation, C^r.
-    Correlation,
-    /// The picture itself: what is near by its signature is laid on the learnt icon; slopes must agree there, beyond the
-    /// frame, too, and one of the two distances must accept unless they agree very well. Ratios and order are those of the slopes.
-    #[default]
-    Both,
-}
-
-/// Why a candidate was refused although it was looked at.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Refusal {
-    /// C^r is not below tau.
-    Correlation,
-    /// H^r is not below tau.
-    Hausdorff,
-    /// Laid on the learnt icon, the picture is not like it.
-    Likeness,
-    /// It is like it, but too much of it shows something else.
-    Contradiction,
-    /// It is like it, but hardly by more than the frame.
-    Content,
-    /// Accepted by its own thresholds, but another landmark is too close behind.
-    Margin,
-    /// So many points would agree by chance too often.
-    Points,
-    /// Its points are there, but a connected part of it shows something else: perhaps not the landmark that was taught.
-    Disagreement,
-    /// Its points agree, but do not tell where its corners are.
-    Corners,
-    /// Its icon alone speaks for it, where points decide: too little to name it without the robot's pose.
-    Plain,
-}
-
-/// A landmark compared with one icon.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Candidate {
-    /// The landmark.
-    pub landmark: LandmarkId,
-    /// C^r in [0, 2] (method 6.1): to the nearest exemplar, or, where the likeness refuses already, where the quad was
-    /// found, to the exemplar nearest by its signature.
-    pub correlation: f64,
-    /// H^r in icon pixels times descriptor distance (method 6.2); infinite with too few points, and where another gate
-    /// refuses already.
-    pub hausdorff: f64,
-    /// How alike the picture and the learnt icon are, one laid on the other, -1 to 1; 0 where a glance told them to be
-    /// different things and nothing was accepted; `None` where the map's distances decide alone, and where points name a
-    /// landmark at the border that was detected.
-    pub likeness: Option<f64>,
-    /// The deciding distance of the map's [`DistanceKind`].
-    pub distance: f64,
-    /// The deciding threshold.
-    pub tau: f64,
-    /// `distance / tau`; accepted only below 1.
-    pub ratio: f64,
-    /// `P(C_l | Q)` of method 10.
-    pub probability: f64,
-    /// The gate that refused it, if one did.
-    pub refusal: Option<Refusal>,
-}
-
-/// The paper's three cases. "Unknown" is an answer, not a failure.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Recognition {
-    /// No landmark of the map.
-    Unknown,
-    /// Exactly this landmark: fit for a pose.
-    Unique(LandmarkId),
-    /// Several fit; this one is nearest. Never enough for a pose by itself.
-    Ambiguous(LandmarkId),
-}
-
-/// What recognition says of one icon.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Verdict {
-    /// The answer.
-    pub recognition: Recognition,
-    /// Nearest landmarks by increasing ratio, at most [`MAX_CANDIDATES`]; refused ones included.
-    pub candidates: Vec<Candidate>,
-    /// The paper's m with the printed 1/(N+1), natural logarithm (method 10). Never a gate.
-    pub entropy_m: f64,
-    /// 1 - ln K / ln(N+1), in (0, 1].
-    pub entropy_norm: f64,
-    /// Chance that the identity is right, 0 to 1, learnt from data (`confidence.rs`); 0 unless `Unique`.
-    pub confidence: f64,
-    /// Which of the four corner rotations matched: corner `rotation` of the quad is the landmark's top-left.
-    pub rotation: usize,
-    /// Which border matched: 0 for the quad's corners, i for alternate i - 1.
-    pub border: usize,
-    /// The landmark's corners after its picture was laid on the learnt one, its top-left first; `None` when it was
-    /// accepted where it stood. They differ from the quad's where another border of the same thing was taught.
-    pub aligned_px: Option<Corners>,
-    /// Landmarks compared (N).
-    pub landmarks: usize,
-    /// What points say of the first candidate, where they decided.
-    pub points: Option<Box<PointEvidence>>,
-}
-
-/// Corners that differ by less, in icon pixels, are those of one border.
-const SAME_BORDER_ICON_PX: f64 = 1.5;
-
-/// Whether aligned corners are those of the border that was detected, which are better known from its edges.
-pub(crate) fn is_same_border(detected_px: &Corners, aligned_px: &Corners, p: &Params) -> bool {
-    let icon_px = detected_px.area_px2().sqrt() / p.icon.size as f64;
-    detected_px.furthest_px(aligned_px) < SAME_BORDER_ICON_PX * icon_px
-}
-
-/// Candidates kept in a verdict.
-pub const MAX_CANDIDATES: usize = 5;
+pub use distance_kind::DistanceKind;
+pub use features::icon_features::{IconFeatures, features};
+pub use params::{RecogniseParams, VerdictParams};
+pub use step_listener::{NoListener, RecogniseStep, StepListener};

@@ -21,11 +21,12 @@ use sim::{
 };
 use std::{collections::BTreeMap, sync::Arc};
 use vision::{
-    detect::{Memory, detect_in},
+    detect::{DetectBuffers, detect_with},
     frame::{GrayImage, Intrinsics},
+    model::{LandmarkId, ModelSet},
     params::Params,
-    pipeline::{Landmarks, analyse_quads},
-    recognise::{DistanceKind, LandmarkId, ModelSet, Recognition},
+    pipeline::{LandmarkDatabase, analyse_quads},
+    recognise::{DistanceKind, Verdict},
     trace::{NoTrace, Stage, Trace},
 };
 
@@ -190,18 +191,19 @@ struct Timed<'a> {
 
 impl Timed<'_> {
     /// Does one frame both ways; the quads that were detected.
-    fn frame(&mut self, i: usize, scenes: &Scenes, memory: &mut Memory, p: &Params) -> usize {
+    fn frame(&mut self, i: usize, scenes: &Scenes, memory: &mut DetectBuffers, p: &Params) -> usize {
         let frame = &scenes.frames[i];
         let sizes = BTreeMap::new();
-        let landmarks = Landmarks { models: self.models, sizes: &sizes, kind: DistanceKind::default() };
+        let landmarks =
+            LandmarkDatabase { models: self.models, sizes: &sizes, kind: DistanceKind::default() };
         let clock = Clock::start();
-        let found = detect_in(memory, frame, &p.detect, &mut NoTrace);
+        let found = detect_with(memory, frame, &p.detect, &mut NoTrace);
         let mut split = Split { clock: Clock::start(), recognition_ms: 0.0 };
         let facts = analyse_quads(frame, found, Some(&scenes.camera), landmarks, p, &mut split);
         let ms = clock.ms();
         let least = &mut self.global.recognition_ms[i];
         *least = least.min(split.recognition_ms);
-        let named = facts.quads.iter().filter_map(|q| q.verdict.as_ref()).filter_map(unique).collect();
+        let named = facts.quads.iter().filter_map(|q| q.recognition.as_ref()).filter_map(unique).collect();
         self.global.put(i, named, ms);
         let clock = Clock::start();
         let guided = self.guide.look(i, frame, &scenes.camera);
@@ -241,7 +243,7 @@ pub(super) fn run(
     };
     let mut maps: Vec<Timed<'_>> = maps.iter().map(timed).collect::<anyhow::Result<_>>()?;
     let mut by_sift = Tally::new(n);
-    let (mut memory, mut quads) = (Memory::default(), 0);
+    let (mut memory, mut quads) = (DetectBuffers::default(), 0);
     let progress = screen::progress(args.rounds as usize * n, "frames");
     for round in 0..args.rounds {
         for i in 0..n {
@@ -278,10 +280,10 @@ pub(super) fn run(
     })
 }
 
-fn unique(verdict: &vision::recognise::Verdict) -> Option<usize> {
-    match verdict.recognition {
-        Recognition::Unique(id) => index(id),
-        Recognition::Unknown | Recognition::Ambiguous(_) => None,
+fn unique(verdict: &vision::recognise::RecognitionResult) -> Option<usize> {
+    match verdict.verdict {
+        Verdict::Unique(id) => index(id),
+        Verdict::Unknown | Verdict::Ambiguous(_) => None,
     }
 }
 

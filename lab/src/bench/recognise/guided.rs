@@ -18,10 +18,10 @@ use nalgebra::{Matrix2, Matrix3, Vector3};
 use std::{collections::BTreeMap, sync::Arc};
 use vision::{
     frame::{GrayImage, Intrinsics},
-    learn::random::Random,
-    localise::pose::LandmarkSize,
-    pipeline::FrameFacts,
-    recognise::{LandmarkId, ModelSet},
+    model::{LandmarkId, ModelSet},
+    pipeline::FrameAnalysis,
+    pose::LandmarkSize,
+    random::Random,
 };
 
 /// Standard deviations of the known pose: of its position along each axis, and of its heading.
@@ -98,7 +98,7 @@ impl Guide {
     /// What the pose adds to frame `i`, of which nothing was detected.
     pub(super) fn look(&self, i: usize, frame: &GrayImage, camera: &Intrinsics) -> Guided {
         let (pose, mounting) = &self.poses[i];
-        let nothing = FrameFacts { quads: Vec::new() };
+        let nothing = FrameAnalysis { quads: Vec::new() };
         let view = View {
             facts: &nothing,
             map: &self.map,

@@ -5,17 +5,14 @@ use server::cli::screen;
 use sim::posters;
 use std::sync::{Arc, Mutex, PoisonError};
 use vision::{
-    detect::quads::Corners,
     frame::{FrameError, GrayImage},
+    geometry::Corners,
     icon::icon,
-    learn::{
-        exemplar::Exemplar,
-        model::{LandmarkModel, View, learn, refit_thresholds},
-        synthesis,
-    },
+    learn::{TrainingView, learn, refit_thresholds, synthesis},
+    model::{Exemplar, LandmarkId, LandmarkModel},
     params::Params,
     points::taught::view_points,
-    recognise::{IconFeatures, LandmarkId},
+    recognise::IconFeatures,
 };
 
 /// Width of the posters' pictures, in pixels; also what SIFT learns from.
@@ -81,10 +78,10 @@ fn with_points(model: LandmarkModel, first: u64, index: usize, p: &Params) -> an
 }
 
 /// The poster itself and `count` views generated from it.
-pub(super) fn views(first: u64, index: usize, count: usize, p: &Params) -> anyhow::Result<Vec<View>> {
+pub(super) fn views(first: u64, index: usize, count: usize, p: &Params) -> anyhow::Result<Vec<TrainingView>> {
     let image = picture(first, index)?;
     let corners = whole(&image)?;
-    let mut views = vec![View::photographed(&image, &corners, p)?];
+    let mut views = vec![TrainingView::photographed(&image, &corners, p)?];
     views.extend(synthesis::views(&image, &corners, count, p, index as u64));
     Ok(views)
 }

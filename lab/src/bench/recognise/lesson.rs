@@ -6,10 +6,11 @@ use super::{
 };
 use serde::Serialize;
 use vision::{
-    learn::model::learn,
+    learn::learn,
+    model::{LandmarkId, ModelSet},
     params::Params,
     points::taught::view_points,
-    recognise::{IconFeatures, LandmarkId, ModelSet},
+    recognise::IconFeatures,
 };
 
 /// The poster that is learnt: no landmark of the maps.

@@ -4,10 +4,10 @@
 use super::landmarks::{picture, whole};
 use nalgebra::{Matrix2, Point2};
 use vision::{
-    detect::quads::{Corners, Quad, QuadKind},
+    detect::{Quad, QuadKind},
     frame::GrayImage,
-    geometry::homography::Homography,
-    learn::random::Random,
+    geometry::{Corners, homography::Homography},
+    random::Random,
 };
 
 /// Side of the pictures.

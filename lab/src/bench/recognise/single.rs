@@ -11,13 +11,9 @@ use serde::Serialize;
 use server::cli::clock::Clock;
 use std::{collections::BTreeMap, sync::Arc};
 use vision::{
-    learn::model::LandmarkModel,
+    model::{LandmarkModel, ModelSet},
     params::Params,
-    recognise::{
-        DistanceKind, ModelSet, Recognition,
-        verdict::{recognise, recognise_watched},
-        watch::{Step, Watch},
-    },
+    recognise::{DistanceKind, RecogniseStep, StepListener, Verdict, recognise, recognise_watched},
 };
 
 /// Strangers are posters from this number on.
@@ -73,11 +69,11 @@ impl Asked {
     /// Times of every quad in the map `models`.
     pub(super) fn time(&self, models: &ModelSet, rounds: usize, p: &Params) -> Report {
         let ask = |q: &Query| {
-            fastest(rounds, || recognise(&q.image, &q.quad, models, DistanceKind::default(), p).recognition)
+            fastest(rounds, || recognise(&q.image, &q.quad, models, DistanceKind::default(), p).verdict)
         };
-        let own: Vec<(u64, (f64, Recognition))> = self.own.iter().map(|(id, q)| (*id, ask(q))).collect();
-        let strangers: Vec<(f64, Recognition)> = self.strangers.iter().map(ask).collect();
-        let unique = |r: &Recognition| if let Recognition::Unique(id) = r { Some(id.0) } else { None };
+        let own: Vec<(u64, (f64, Verdict))> = self.own.iter().map(|(id, q)| (*id, ask(q))).collect();
+        let strangers: Vec<(f64, Verdict)> = self.strangers.iter().map(ask).collect();
+        let unique = |r: &Verdict| if let Verdict::Unique(id) = r { Some(id.0) } else { None };
         let mut steps = StepClock { last: Clock::start(), ms: BTreeMap::new() };
         for q in self.own.iter().map(|(_, q)| q).chain(&self.strangers) {
             steps.last = Clock::start();
@@ -103,8 +99,8 @@ struct StepClock {
     ms: BTreeMap<&'static str, f64>,
 }
 
-impl Watch for StepClock {
-    fn finished(&mut self, step: Step) {
+impl StepListener for StepClock {
+    fn finished(&mut self, step: RecogniseStep) {
         *self.ms.entry(step.name()).or_default() += self.last.ms();
         self.last = Clock::start();
     }
@@ -120,7 +116,7 @@ pub(super) fn recall(args: &Args, first: u64, models: &ModelSet, p: &Params) -> 
         let q = query(first, index, args.seed.wrapping_add(0x5000_0000 + i as u64))?;
         let alone = ModelSet::new(vec![Arc::clone(all[index])], p)?;
         let kind = DistanceKind::default();
-        let accepted = recognise(&q.image, &q.quad, &alone, kind, p).recognition != Recognition::Unknown;
+        let accepted = recognise(&q.image, &q.quad, &alone, kind, p).verdict != Verdict::Unknown;
         let listed = accepted && listed(&q, index, models, p);
         Ok((accepted, listed))
     })?;
@@ -134,6 +130,6 @@ pub(super) fn recall(args: &Args, first: u64, models: &ModelSet, p: &Params) -> 
 
 fn listed(q: &Query, index: usize, models: &ModelSet, p: &Params) -> bool {
     let Ok(icon) = vision::icon::icon(&q.image, &q.quad.corners_px, &p.icon) else { return false };
-    let signature = vision::recognise::signature::Signature::new(&icon);
+    let signature = vision::recognise::features::signature::Signature::new(&icon);
     models.short_list(&signature, p.recognise.verdict.short_list).iter().any(|l| l.model == index)
 }

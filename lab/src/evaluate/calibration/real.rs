@@ -5,8 +5,8 @@ use super::sets::{Set, Stated};
 use crate::evaluate::{experiment::mixed, statistics::median};
 use serde::Serialize;
 use vision::{
-    learn::random::Random,
-    localise::calibrate::{CalibrateError, CalibrateParams, Calibration, PlanarView, calibrate},
+    camera_calibration::{CalibrateError, CalibrateParams, CameraCalibration, PlanarView, calibrate},
+    random::Random,
 };
 
 /// Standard deviation of the principal point about the image's centre, as a share of the width.
@@ -58,7 +58,7 @@ pub(super) fn judged(set: &Set, seed: u64) -> RealSet {
         Ok(reference) => curve(&quads, set.image_px, reference.camera.fx_px, seed),
         Err(_) => vec![],
     };
-    let told = |result: Result<Calibration, CalibrateError>| {
+    let told = |result: Result<CameraCalibration, CalibrateError>| {
         result.map(|c| found(&c)).map_err(|error| error.to_string())
     };
     RealSet {
@@ -74,7 +74,11 @@ pub(super) fn judged(set: &Set, seed: u64) -> RealSet {
     }
 }
 
-fn run(views: &[PlanarView], image_px: [usize; 2], radial: usize) -> Result<Calibration, CalibrateError> {
+fn run(
+    views: &[PlanarView],
+    image_px: [usize; 2],
+    radial: usize,
+) -> Result<CameraCalibration, CalibrateError> {
     calibrate(
         views,
         image_px,
@@ -82,7 +86,7 @@ fn run(views: &[PlanarView], image_px: [usize; 2], radial: usize) -> Result<Cali
     )
 }
 
-fn found(c: &Calibration) -> Found {
+fn found(c: &CameraCalibration) -> Found {
     Found {
         fx_px: c.camera.fx_px,
         fx_sigma_px: c.fx_sigma_px(),

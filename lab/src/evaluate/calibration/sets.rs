@@ -11,7 +11,7 @@ use std::{
     collections::BTreeMap,
     path::{Path, PathBuf},
 };
-use vision::localise::calibrate::PlanarView;
+use vision::camera_calibration::PlanarView;
 
 /// Finds the inner corners of a chessboard in pictures.
 const PROGRAM: &str = include_str!("../../../peers/chessboard.py");

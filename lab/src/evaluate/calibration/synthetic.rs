@@ -8,14 +8,11 @@ use crate::evaluate::{
 use nalgebra::{Isometry3, Matrix2, Matrix3, Point2, Rotation3, UnitQuaternion, Vector2, Vector3};
 use serde::Serialize;
 use vision::{
-    detect::quads::Corners,
+    camera_calibration::{CalibrateParams, CameraHeight, PlanarView, calibrate},
     frame::{Distortion, Intrinsics},
-    learn::random::Random,
-    localise::{
-        calibrate::{CalibrateParams, Height, PlanarView, calibrate},
-        pose::LandmarkSize,
-        reproject::corner_points,
-    },
+    geometry::Corners,
+    pose::{LandmarkSize, reprojection::corner_points},
+    random::Random,
 };
 
 /// The method's poster.
@@ -64,9 +61,9 @@ fn params(zero_roll: bool, known_height: bool, refine: bool) -> CalibrateParams 
     CalibrateParams {
         roll_sigma_rad: if zero_roll { ROLL_SIGMA_RAD } else { 0.0 },
         height: if known_height {
-            Height::Known { height_m: HEIGHT_M, sigma_m: HEIGHT_SIGMA_M }
+            CameraHeight::Known { height_m: HEIGHT_M, sigma_m: HEIGHT_SIGMA_M }
         } else {
-            Height::Free
+            CameraHeight::Free
         },
         refine,
         ..CalibrateParams::default()

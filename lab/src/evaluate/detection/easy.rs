@@ -2,7 +2,7 @@
 
 use crate::evaluate::truth::TruthQuad;
 use nalgebra::Point2;
-use vision::{detect::quads::Corners, frame::GrayImage};
+use vision::{frame::GrayImage, geometry::Corners};
 
 /// The shortest side of an easy quad is longer than this, in pixels.
 pub(super) const MIN_SIDE_PX: f64 = 60.0;

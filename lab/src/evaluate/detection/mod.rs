@@ -16,10 +16,7 @@ use score::{FOUND, ImageScore};
 use server::cli::{parameters::ParameterArgs, pictures as files, screen};
 use sim::views::ViewsParams;
 use std::path::{Path, PathBuf};
-use vision::{
-    detect::quads::{Grouping, QuadParams},
-    params::DetectParams,
-};
+use vision::detect::{DetectParams, Grouping, QuadParams};
 
 /// Worst images that are drawn when their number is not given.
 const DRAWN: usize = 20;
@@ -165,7 +162,7 @@ fn name_misses(score: &ImageScore) {
 }
 
 /// Corners as the reviewed lists have them.
-fn words(corners: &vision::detect::quads::Corners) -> String {
+fn words(corners: &vision::geometry::Corners) -> String {
     let points = corners.points().map(|p| format!("[{:.1}, {:.1}]", p.x, p.y));
     format!("[{}]", points.join(", "))
 }

@@ -7,13 +7,9 @@ use crate::evaluate::{
 };
 use server::cli::clock::Clock;
 use vision::{
-    detect::{
-        detect,
-        quads::{Corners, Quad, QuadKind},
-    },
+    detect::{DetectParams, Quad, QuadKind, detect},
     frame::GrayImage,
-    geometry::polygon,
-    params::DetectParams,
+    geometry::{Corners, polygon},
     trace::NoTrace,
 };
 

@@ -15,13 +15,14 @@ use sim::{
 };
 use std::f64::consts::TAU;
 use vision::{
-    detect::quads::Corners,
-    learn::random::Random,
+    geometry::Corners,
+    model::LandmarkId,
     params::Params,
+    random::Random,
     recognise::{
-        DistanceKind, LandmarkId, Recognition, Verdict,
-        confidence::{MEASURES, measures},
-        verdict::recognise,
+        DistanceKind, RecognitionResult, Verdict,
+        decision::measures::{MEASURES, measures},
+        recognise,
     },
 };
 
@@ -139,8 +140,8 @@ fn hard(draw: u64, random: &mut Random) -> Conditions {
 }
 
 /// What a verdict names, if anything, and whether that is right.
-fn named(verdict: &Verdict, truth: Option<LandmarkId>) -> Option<Named> {
-    let Recognition::Unique(id) = verdict.recognition else { return None };
+fn named(verdict: &RecognitionResult, truth: Option<LandmarkId>) -> Option<Named> {
+    let Verdict::Unique(id) = verdict.verdict else { return None };
     let best = verdict.candidates.iter().position(|c| c.landmark == id)?;
     Some(Named {
         measures: measures(&verdict.candidates, best, verdict.landmarks)?,

@@ -16,10 +16,11 @@ use serde::Serialize;
 use sim::exhibit::{Conditions, Exhibit, Extent, exhibit};
 use std::collections::BTreeMap;
 use vision::{
-    detect::quads::Corners,
-    learn::random::Random,
+    geometry::Corners,
+    model::LandmarkId,
     params::Params,
-    recognise::{DistanceKind, LandmarkId, Recognition, verdict::recognise},
+    random::Random,
+    recognise::{DistanceKind, Verdict, recognise},
 };
 
 /// `waymark-lab evaluate discrimination`.
@@ -95,7 +96,7 @@ struct Report {
 
 /// What one view of a stranger says.
 struct Sight {
-    recognition: Recognition,
+    recognition: Verdict,
     /// H^r and C^r to the first landmark, and pairs below tau of those compared.
     distances: Option<[f64; 2]>,
     below: [usize; 2],
@@ -190,11 +191,11 @@ fn stranger_view(
         view(class, &stranger.texture, mixed(&[common.seed, 3, i as u64, u64::from(v)]), common)?;
     let quads = corners.map_or_else(|| detected(&seen, p), |c| vec![quad(c)]);
     let verdicts =
-        quads.iter().map(|q| recognise(&seen.image, q, &class.models, DistanceKind::Both, p).recognition);
+        quads.iter().map(|q| recognise(&seen.image, q, &class.models, DistanceKind::Both, p).verdict);
     let worst = verdicts.min_by_key(|r| match r {
-        Recognition::Unique(_) => 0,
-        Recognition::Ambiguous(_) => 1,
-        Recognition::Unknown => 2,
+        Verdict::Unique(_) => 0,
+        Verdict::Ambiguous(_) => 1,
+        Verdict::Unknown => 2,
     });
     let mut sight = Sight { recognition: worst?, distances: None, below: [0; 2], pairs: 0 };
     let Ok(icon) = vision::icon::icon(&seen.image, &quads.first()?.corners_px, &p.icon) else {
@@ -267,13 +268,12 @@ fn strata(strangers: &[Stranger], seen: &[Vec<Sight>]) -> Vec<Stratum> {
     let of = |name: &str, hard: bool, is: &dyn Fn(&Stranger) -> bool| {
         let mut s = Stratum { name: name.to_owned(), hard, ..Stratum::default() };
         for (_, sights) in strangers.iter().zip(seen).filter(|(stranger, _)| is(stranger)) {
-            let accepted = sights.iter().filter(|s| matches!(s.recognition, Recognition::Unique(_))).count();
+            let accepted = sights.iter().filter(|s| matches!(s.recognition, Verdict::Unique(_))).count();
             s.textures += 1;
             s.quads += sights.len();
             s.accepted += accepted;
             s.accepted_textures += usize::from(accepted > 0);
-            s.ambiguous +=
-                sights.iter().filter(|s| matches!(s.recognition, Recognition::Ambiguous(_))).count();
+            s.ambiguous += sights.iter().filter(|s| matches!(s.recognition, Verdict::Ambiguous(_))).count();
         }
         (s.bound, s.texture_bound) =
             (upper_bound(s.accepted, s.quads), upper_bound(s.accepted_textures, s.textures));
@@ -299,7 +299,7 @@ fn taken(strangers: &[Stranger], seen: &[Vec<Sight>], name: impl Fn(LandmarkId) 
     for (number, (stranger, sights)) in strangers.iter().zip(seen).enumerate().filter(|(_, (s, _))| !s.hard) {
         let mut views = BTreeMap::new();
         for sight in sights {
-            if let Recognition::Unique(id) = sight.recognition {
+            if let Verdict::Unique(id) = sight.recognition {
                 *views.entry(id).or_insert(0) += 1;
             }
         }
@@ -369,11 +369,11 @@ mod tests {
         let stranger = |stratum, hard| Stranger { stratum, hard, texture: texture.clone() };
         let strangers = [stranger("posters", false), stranger("posters", false), stranger("tones", true)];
         let sight = |recognition| Sight { recognition, distances: None, below: [0; 2], pairs: 0 };
-        let unique = || sight(Recognition::Unique(LandmarkId(1)));
-        let unknown = || sight(Recognition::Unknown);
+        let unique = || sight(Verdict::Unique(LandmarkId(1)));
+        let unknown = || sight(Verdict::Unknown);
         let seen = vec![
             vec![unique(), unique(), unknown()],
-            vec![unknown(), unknown(), sight(Recognition::Ambiguous(LandmarkId(1)))],
+            vec![unknown(), unknown(), sight(Verdict::Ambiguous(LandmarkId(1)))],
             vec![unknown()],
         ];
         let all = strata(&strangers, &seen);

@@ -17,9 +17,10 @@ use sim::{
 };
 use std::sync::Arc;
 use vision::{
-    learn::random::Random,
+    model::LandmarkId,
     params::Params,
-    recognise::{DistanceKind, LandmarkId, Recognition, verdict::recognise},
+    random::Random,
+    recognise::{DistanceKind, Verdict, recognise},
 };
 
 /// `waymark-lab evaluate lookalikes`.
@@ -136,12 +137,12 @@ fn count(
         };
         let Some(corners) = noisy(&seen.corners, args.common.corner_noise_px, &mut random) else { continue };
         counts.views += 1;
-        match recognise(&seen.image, &quad(corners), &class.models, DistanceKind::Both, p).recognition {
-            Recognition::Unique(id) if is(id, own) => counts.right += 1,
-            Recognition::Unique(id) if is(id, double) => counts.double += 1,
-            Recognition::Unique(_) => counts.other += 1,
-            Recognition::Ambiguous(_) => counts.ambiguous += 1,
-            Recognition::Unknown => counts.unknown += 1,
+        match recognise(&seen.image, &quad(corners), &class.models, DistanceKind::Both, p).verdict {
+            Verdict::Unique(id) if is(id, own) => counts.right += 1,
+            Verdict::Unique(id) if is(id, double) => counts.double += 1,
+            Verdict::Unique(_) => counts.other += 1,
+            Verdict::Ambiguous(_) => counts.ambiguous += 1,
+            Verdict::Unknown => counts.unknown += 1,
         }
     }
     counts

@@ -1,12 +1,12 @@
 //! The two humps of the paper's Fig. 11: distances of a landmark's own views and of everything else, with normal curves,
 //! both thresholds of method 8 and what each costs. Distances in, figures and the picture out.
 
+use super::gaussian::{Gaussian, crossing};
 use crate::evaluate::{
     chart::{COLOURS, Panel, picture},
     statistics::upper_bound,
 };
 use serde::Serialize;
-use vision::learn::threshold::{Gaussian, gaussian};
 
 /// A wrong acceptance costs as much as so many misses (method 8).
 const COST: f64 = 6.0;
@@ -70,7 +70,7 @@ pub(crate) struct Humps {
 impl Humps {
     pub(crate) fn new(distance: &'static str, own: Vec<f64>, others: Vec<f64>, tau: f64) -> Self {
         let fits = Gaussian::fit(&own).zip(Gaussian::fit(&others));
-        let taus = [Some(tau), fits.and_then(|(own, others)| gaussian(own, others, COST))];
+        let taus = [Some(tau), fits.and_then(|(own, others)| crossing(own, others, COST))];
         let share = |all: &[f64], is: &dyn Fn(f64) -> bool| {
             all.iter().filter(|d| is(**d)).count() as f64 / all.len().max(1) as f64
         };

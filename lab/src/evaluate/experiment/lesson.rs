@@ -10,16 +10,14 @@ use sim::{
 };
 use std::sync::Arc;
 use vision::{
-    detect::quads::Corners,
     frame::GrayImage,
-    learn::{
-        model::{LandmarkModel, View, add_negatives, learn},
-        random::Random,
-        synthesis,
-    },
+    geometry::Corners,
+    learn::{TrainingView, add_negatives, learn, synthesis},
+    model::{LandmarkId, LandmarkModel, ModelSet},
     params::Params,
     points::taught::{MAX_POINT_VIEWS, TaughtPoint, view_points},
-    recognise::{IconFeatures, LandmarkId, ModelSet, features},
+    random::Random,
+    recognise::{IconFeatures, features},
 };
 
 /// Views of each landmark, as the server wants them.
@@ -60,7 +58,7 @@ pub(crate) fn taught(text: &str) -> Result<Taught, String> {
 /// What a landmark is learnt from: views, and the points of its photographs.
 #[derive(Default)]
 struct Sights {
-    views: Vec<View>,
+    views: Vec<TrainingView>,
     points: Vec<Vec<TaughtPoint>>,
 }
 
@@ -136,7 +134,7 @@ fn gathered(picture: &Picture, wall: &Texture, draw: impl Fn(u64) -> u64, p: &Pa
         conditions.yaw_rad = random.range(-MAX_YAW_RAD, MAX_YAW_RAD);
         let seen = exhibit(&picture.texture, wall, &conditions, Extent::Around, noise)?;
         let corners = noisy(&seen.corners, 1.0, &mut random)?;
-        let view = View::photographed(&seen.image, &corners, p).ok()?;
+        let view = TrainingView::photographed(&seen.image, &corners, p).ok()?;
         Some((view, seen.image, corners))
     };
     let all: Vec<_> = (0..TRIES * VIEWS as u64).filter_map(view).take(VIEWS).collect();
@@ -156,7 +154,7 @@ fn from_one(picture: &Picture, wall: &Texture, draw: impl Fn(u64) -> u64, p: &Pa
         };
         let seen = exhibit(&picture.texture, wall, &conditions, Extent::Around, noise)?;
         let corners = noisy(&seen.corners, 1.0, &mut random)?;
-        let view = View::photographed(&seen.image, &corners, p).ok()?;
+        let view = TrainingView::photographed(&seen.image, &corners, p).ok()?;
         let generated = synthesis::views(&seen.image, &corners, VIEWS, p, noise);
         let points = points_of(&[(&seen.image, &corners)]);
         Some(Sights { views: std::iter::once(view).chain(generated).collect(), points })

@@ -6,14 +6,12 @@ use nalgebra::Matrix2;
 use serde::Serialize;
 use sim::exhibit::Exhibit;
 use vision::{
-    detect::{
-        detect,
-        quads::{Corners, Quad, QuadKind},
-    },
-    geometry::polygon,
+    detect::{Quad, QuadKind, detect},
+    geometry::{Corners, polygon},
     icon::icon,
+    model::LandmarkId,
     params::Params,
-    recognise::{DistanceKind, LandmarkId, Recognition, Refusal, Verdict, features, verdict::recognise},
+    recognise::{DistanceKind, MatchRefusal, RecognitionResult, Verdict, features, recognise},
     trace::NoTrace,
 };
 
@@ -118,13 +116,13 @@ pub(crate) fn look(
     p: &Params,
 ) -> Look {
     let quads = corners.map_or_else(|| detected(seen, p), |c| vec![quad(*c)]);
-    let verdicts: Vec<Verdict> =
+    let verdicts: Vec<RecognitionResult> =
         quads.iter().map(|q| recognise(&seen.image, q, &class.models, DistanceKind::Both, p)).collect();
     let mut ratios = [f64::INFINITY; 3];
     if let Some(at) = quads.first().map(|q| q.corners_px) {
         ratios = paper_ratios(class, id, seen, &at, p);
     }
-    let own = |v: &Verdict| v.candidates.iter().find(|c| c.landmark == id).map(|c| c.ratio);
+    let own = |v: &RecognitionResult| v.candidates.iter().find(|c| c.landmark == id).map(|c| c.ratio);
     ratios[2] = verdicts.iter().filter_map(own).fold(f64::INFINITY, f64::min);
     let outcome = verdicts.iter().map(|v| outcome(v, id)).min().unwrap_or(Outcome::NotDetected);
     // A wrong name on any of its quads is wrong, whatever the others say.
@@ -148,26 +146,26 @@ fn paper_ratios(class: &Class, id: LandmarkId, seen: &Exhibit, corners: &Corners
     [d.hausdorff / model.hausdorff.tau, d.correlation / model.correlation.tau, f64::INFINITY]
 }
 
-fn outcome(verdict: &Verdict, id: LandmarkId) -> Outcome {
-    match verdict.recognition {
-        Recognition::Unique(named) if named == id => return Outcome::Right,
-        Recognition::Unique(_) => return Outcome::Wrong,
-        Recognition::Ambiguous(named) => {
+fn outcome(verdict: &RecognitionResult, id: LandmarkId) -> Outcome {
+    match verdict.verdict {
+        Verdict::Unique(named) if named == id => return Outcome::Right,
+        Verdict::Unique(_) => return Outcome::Wrong,
+        Verdict::Ambiguous(named) => {
             let own = verdict.candidates.iter().find(|c| c.landmark == id && named == id);
             return match own.and_then(|c| c.refusal) {
-                Some(Refusal::Disagreement) => Outcome::Doubtful,
-                Some(Refusal::Corners) => Outcome::Corners,
-                Some(Refusal::Plain) => Outcome::Plain,
+                Some(MatchRefusal::Disagreement) => Outcome::Doubtful,
+                Some(MatchRefusal::Corners) => Outcome::Corners,
+                Some(MatchRefusal::Plain) => Outcome::Plain,
                 _ => Outcome::Ambiguous,
             };
         }
-        Recognition::Unknown => {}
+        Verdict::Unknown => {}
     }
     let Some(own) = verdict.candidates.iter().find(|c| c.landmark == id) else { return Outcome::NotListed };
     match own.refusal {
-        Some(Refusal::Contradiction) => Outcome::Contradiction,
-        Some(Refusal::Content) => Outcome::Content,
-        Some(Refusal::Correlation | Refusal::Hausdorff) => Outcome::Distances,
+        Some(MatchRefusal::Contradiction) => Outcome::Contradiction,
+        Some(MatchRefusal::Content) => Outcome::Content,
+        Some(MatchRefusal::Correlation | MatchRefusal::Hausdorff) => Outcome::Distances,
         _ => Outcome::Likeness,
     }
 }
@@ -175,10 +173,10 @@ fn outcome(verdict: &Verdict, id: LandmarkId) -> Outcome {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use vision::recognise::Candidate;
+    use vision::recognise::MatchCandidate;
 
-    fn verdict(recognition: Recognition, refusal: Option<Refusal>) -> Verdict {
-        let candidate = Candidate {
+    fn verdict(recognition: Verdict, refusal: Option<MatchRefusal>) -> RecognitionResult {
+        let candidate = MatchCandidate {
             landmark: LandmarkId(3),
             correlation: 0.1,
             hausdorff: 1.0,
@@ -189,8 +187,8 @@ mod tests {
             probability: 0.0,
             refusal,
         };
-        Verdict {
-            recognition,
+        RecognitionResult {
+            verdict: recognition,
             candidates: vec![candidate],
             entropy_m: 1.0,
             entropy_norm: 1.0,
@@ -207,21 +205,21 @@ mod tests {
     fn the_outcome_names_the_gate() {
         let id = LandmarkId(3);
         for (recognition, refusal, expected) in [
-            (Recognition::Unique(id), None, Outcome::Right),
-            (Recognition::Unique(LandmarkId(4)), None, Outcome::Wrong),
-            (Recognition::Ambiguous(LandmarkId(4)), None, Outcome::Ambiguous),
-            (Recognition::Ambiguous(id), Some(Refusal::Disagreement), Outcome::Doubtful),
-            (Recognition::Ambiguous(id), Some(Refusal::Corners), Outcome::Corners),
-            (Recognition::Ambiguous(id), Some(Refusal::Plain), Outcome::Plain),
-            (Recognition::Ambiguous(id), Some(Refusal::Margin), Outcome::Ambiguous),
-            (Recognition::Ambiguous(LandmarkId(4)), Some(Refusal::Plain), Outcome::Ambiguous),
-            (Recognition::Unknown, Some(Refusal::Likeness), Outcome::Likeness),
-            (Recognition::Unknown, Some(Refusal::Contradiction), Outcome::Contradiction),
-            (Recognition::Unknown, Some(Refusal::Content), Outcome::Content),
-            (Recognition::Unknown, Some(Refusal::Correlation), Outcome::Distances),
+            (Verdict::Unique(id), None, Outcome::Right),
+            (Verdict::Unique(LandmarkId(4)), None, Outcome::Wrong),
+            (Verdict::Ambiguous(LandmarkId(4)), None, Outcome::Ambiguous),
+            (Verdict::Ambiguous(id), Some(MatchRefusal::Disagreement), Outcome::Doubtful),
+            (Verdict::Ambiguous(id), Some(MatchRefusal::Corners), Outcome::Corners),
+            (Verdict::Ambiguous(id), Some(MatchRefusal::Plain), Outcome::Plain),
+            (Verdict::Ambiguous(id), Some(MatchRefusal::Margin), Outcome::Ambiguous),
+            (Verdict::Ambiguous(LandmarkId(4)), Some(MatchRefusal::Plain), Outcome::Ambiguous),
+            (Verdict::Unknown, Some(MatchRefusal::Likeness), Outcome::Likeness),
+            (Verdict::Unknown, Some(MatchRefusal::Contradiction), Outcome::Contradiction),
+            (Verdict::Unknown, Some(MatchRefusal::Content), Outcome::Content),
+            (Verdict::Unknown, Some(MatchRefusal::Correlation), Outcome::Distances),
         ] {
             assert_eq!(outcome(&verdict(recognition, refusal), id), expected);
         }
-        assert_eq!(outcome(&verdict(Recognition::Unknown, None), LandmarkId(5)), Outcome::NotListed);
+        assert_eq!(outcome(&verdict(Verdict::Unknown, None), LandmarkId(5)), Outcome::NotListed);
     }
 }

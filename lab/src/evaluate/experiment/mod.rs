@@ -11,6 +11,7 @@ pub(crate) mod scale;
 pub(crate) mod illumination;
 pub(crate) mod occlusion;
 pub(crate) mod strangers;
+mod gaussian;
 pub(crate) mod humps;
 pub(crate) mod discrimination;
 pub(crate) mod doubles;
@@ -152,7 +153,7 @@ pub(crate) fn write_plot(path: Option<&Path>, svg: impl FnOnce() -> String) -> a
 /// One seed from several numbers.
 pub(crate) fn mixed(parts: &[u64]) -> u64 {
     parts.iter().fold(0x7761_796d_6172_6b00, |seed, part| {
-        vision::learn::random::Random::new(seed ^ part.wrapping_mul(0x9e37_79b9_7f4a_7c15)).next_u64()
+        vision::random::Random::new(seed ^ part.wrapping_mul(0x9e37_79b9_7f4a_7c15)).next_u64()
     })
 }
 

@@ -11,7 +11,7 @@ use crate::evaluate::statistics::{Interval, bootstrap, quantile, wilson};
 use serde::Serialize;
 use sim::exhibit::{Conditions, Extent, exhibit};
 use std::collections::BTreeMap;
-use vision::{learn::random::Random, params::Params};
+use vision::{params::Params, random::Random};
 
 /// What is measured against tau, in the order of [`Look::ratios`].
 pub(crate) const DISTANCES: [&str; 3] = ["H^r", "C^r", "likeness"];

@@ -2,7 +2,7 @@
 
 use formats::scan_log::LogEntry;
 use map::pose2::Pose2;
-use vision::learn::random::Random;
+use vision::random::Random;
 
 /// How odometry goes wrong.
 #[derive(Debug, Clone, Copy)]

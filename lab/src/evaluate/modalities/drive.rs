@@ -15,14 +15,14 @@ use nalgebra::{Isometry3, Matrix2, Point2, Vector2, Vector3};
 use sim::laser::{LaserParams, scan_among};
 use std::{f64::consts::PI, sync::Arc};
 use vision::{
-    detect::quads::Corners,
     frame::{Distortion, Intrinsics},
-    learn::random::Random,
-    localise::{
-        pose::{LandmarkPose, landmark_pose},
-        reproject::{corner_points, pixel},
+    geometry::Corners,
+    model::LandmarkId,
+    pose::{
+        LandmarkPose, landmark_pose,
+        reprojection::{corner_points, pixel},
     },
-    recognise::LandmarkId,
+    random::Random,
 };
 
 const STEP_M: f64 = 0.1;

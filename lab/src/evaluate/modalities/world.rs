@@ -9,7 +9,7 @@ use map::{
 use nalgebra::{Matrix2, Point2, Vector3};
 use sim::building::WallSegment;
 use std::f64::consts::FRAC_PI_2;
-use vision::localise::pose::LandmarkSize;
+use vision::pose::LandmarkSize;
 
 /// A part of the way.
 pub(super) struct Zone {

@@ -31,10 +31,10 @@ use sim::{
 };
 use std::{collections::BTreeMap, sync::Arc, time::Instant};
 use vision::{
-    detect::quads::Corners,
-    geometry::polygon,
-    pipeline::{FrameFacts, matched},
-    recognise::{LandmarkId, Recognition},
+    geometry::{Corners, polygon},
+    model::LandmarkId,
+    pipeline::{FrameAnalysis, matched_border},
+    recognise::Verdict,
     seen_border::FoundBy,
 };
 
@@ -154,7 +154,7 @@ impl Server {
     fn frame(
         &self,
         map: &MapSnapshot,
-        facts: &FrameFacts,
+        facts: &FrameAnalysis,
         (seen, odom_from_robot): (&SensorReadings, Pose2),
         (wrong, captured_ns): (&SimulatedRobotErrors, i64),
     ) -> (Vec<HealthChange>, Option<Guided>) {
@@ -258,7 +258,7 @@ impl Journey {
         &mut self,
         world: &World,
         seen: &SensorReadings,
-        facts: &FrameFacts,
+        facts: &FrameAnalysis,
         guided: Option<&Guided>,
     ) -> bool {
         let truth = &seen.frame.truth;
@@ -268,14 +268,15 @@ impl Journey {
         };
         let mut global = Vec::new();
         for quad in &facts.quads {
-            let Some(Recognition::Unique(id)) = quad.verdict.as_ref().map(|v| v.recognition) else {
+            let Some(Verdict::Unique(id)) = quad.recognition.as_ref().map(|v| v.verdict) else {
                 continue;
             };
             // Where the picture was found to lie: the quad itself may be a border around it.
-            let found = quad.verdict.as_ref().and_then(|v| v.aligned_px).unwrap_or(quad.quad.corners_px);
+            let found = quad.recognition.as_ref().and_then(|v| v.aligned_px).unwrap_or(quad.quad.corners_px);
             if is_there(id, &found) {
                 global.push(world.name(id));
-                let corners = quad.verdict.as_ref().and_then(|v| matched(&quad.quad, v, &world.map.params));
+                let corners =
+                    quad.recognition.as_ref().and_then(|v| matched_border(&quad.quad, v, &world.map.params));
                 if let (Some(corners), Some(view)) = (corners, truth.landmark(world.name(id))) {
                     let how = match corners.found_by {
                         FoundBy::Edges => "by the picture, detected",
@@ -286,7 +287,7 @@ impl Journey {
                     self.corners.entry(how).or_default().extend(off(&corners, view));
                 }
             } else {
-                tracing::info!(landmark = world.name(id), ?found, verdict = ?quad.verdict, "a wrong name");
+                tracing::info!(landmark = world.name(id), ?found, verdict = ?quad.recognition, "a wrong name");
                 self.false_matches += 1;
             }
         }

@@ -23,14 +23,12 @@ use sim::{
 };
 use std::{collections::BTreeMap, sync::Arc};
 use vision::{
-    learn::{
-        model::{LandmarkModel, ModelStatus, View, add_negatives, learn},
-        synthesis,
-    },
-    localise::pose::LandmarkSize,
+    learn::{TrainingView, add_negatives, learn, synthesis},
+    model::{LandmarkId, LandmarkModel, ModelSet, ModelStatus},
     params::Params,
     points::taught::TaughtPoint,
-    recognise::{DistanceKind, IconFeatures, LandmarkId, ModelSet, features},
+    pose::LandmarkSize,
+    recognise::{DistanceKind, IconFeatures, features},
 };
 
 /// Views each landmark is learnt from: what the first drive did not photograph is generated.
@@ -78,7 +76,7 @@ pub(super) struct World {
 struct Lesson {
     name: String,
     place: LandmarkPlace,
-    views: Vec<View>,
+    views: Vec<TrainingView>,
     icons: Vec<IconFeatures>,
     points: Vec<Vec<TaughtPoint>>,
 }
@@ -145,10 +143,11 @@ impl World {
     }
 }
 
-fn views(looks: &[&Look], seed: u64, p: &Params) -> Vec<View> {
+fn views(looks: &[&Look], seed: u64, p: &Params) -> Vec<TrainingView> {
     let image = |look: &Look| look.sighting.frame.image.clone();
-    let photographed = looks.iter().filter_map(|l| View::photographed(&image(l), &l.quad.corners_px, p).ok());
-    let mut views: Vec<View> = photographed.collect();
+    let photographed =
+        looks.iter().filter_map(|l| TrainingView::photographed(&image(l), &l.quad.corners_px, p).ok());
+    let mut views: Vec<TrainingView> = photographed.collect();
     let wanted = VIEWS.saturating_sub(views.len());
     for (i, look) in looks.iter().enumerate() {
         let count = (wanted + looks.len() - 1 - i) / looks.len();

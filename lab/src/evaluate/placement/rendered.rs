@@ -21,11 +21,10 @@ use sim::{
 };
 use std::f64::consts::{FRAC_PI_2, PI};
 use vision::{
-    detect::{detect, quads::Quad},
+    detect::{DetectParams, Quad, detect},
     geometry::polygon::iou,
-    learn::random::Random,
-    localise::pose::LandmarkSize,
-    params::DetectParams,
+    pose::LandmarkSize,
+    random::Random,
     trace::NoTrace,
 };
 

@@ -16,13 +16,13 @@ use map::{
 use nalgebra::{Matrix2, Matrix3, Matrix6, Point2, Vector2, Vector3};
 use std::f64::consts::{FRAC_PI_2, PI};
 use vision::{
-    detect::quads::Corners,
     frame::{Distortion, Intrinsics},
-    learn::random::Random,
-    localise::{
-        pose::LandmarkSize,
-        reproject::{corner_points, perturbed, pixel},
+    geometry::Corners,
+    pose::{
+        LandmarkSize,
+        reprojection::{corner_points, perturbed, pixel},
     },
+    random::Random,
 };
 
 const CAMERA: Intrinsics = Intrinsics {

@@ -3,13 +3,13 @@
 use nalgebra::{Isometry3, Point2, Vector2};
 use serde::Serialize;
 use vision::{
-    detect::quads::Corners,
     frame::{Intrinsics, IntrinsicsSigmas},
-    learn::random::Random,
-    localise::{
-        pose::{LandmarkPose, LandmarkSize, landmark_pose},
-        reproject::{corner_points, pixel},
+    geometry::Corners,
+    pose::{
+        LandmarkPose, LandmarkSize, landmark_pose,
+        reprojection::{corner_points, pixel},
     },
+    random::Random,
 };
 
 /// What is wrong with cameras.

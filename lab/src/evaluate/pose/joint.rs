@@ -16,12 +16,9 @@ use serde::Serialize;
 use std::{f64::consts::FRAC_PI_2, time::Instant};
 use vision::{
     frame::{Distortion, Intrinsics},
-    learn::random::Random,
-    localise::{
-        pose::{LandmarkPose, LandmarkSize},
-        reproject::perturbed,
-    },
-    recognise::LandmarkId,
+    model::LandmarkId,
+    pose::{LandmarkPose, LandmarkSize, reprojection::perturbed},
+    random::Random,
 };
 
 const SIZE: LandmarkSize = LandmarkSize { width_m: 0.6, height_m: 0.84 };

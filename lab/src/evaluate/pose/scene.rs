@@ -2,10 +2,10 @@
 
 use nalgebra::{Isometry3, Matrix2, Matrix3, Point2, Rotation3, UnitQuaternion, Vector2, Vector3};
 use vision::{
-    detect::quads::Corners,
     frame::{Distortion, Intrinsics},
-    learn::random::Random,
-    localise::{pose::LandmarkSize, reproject::corner_points},
+    geometry::Corners,
+    pose::{LandmarkSize, reprojection::corner_points},
+    random::Random,
 };
 
 pub(super) const SIZE: LandmarkSize = LandmarkSize { width_m: 0.6, height_m: 0.84 };

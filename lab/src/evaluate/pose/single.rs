@@ -5,12 +5,9 @@ use nalgebra::{Isometry3, Matrix3, SMatrix, UnitQuaternion, Vector3, Vector6};
 use serde::Serialize;
 use std::time::Instant;
 use vision::{
-    detect::quads::Corners,
-    learn::random::Random,
-    localise::{
-        pose::{LandmarkPose, PoseSolution, landmark_pose, linear_pose},
-        reproject::perturbed,
-    },
+    geometry::Corners,
+    pose::{LandmarkPose, PoseSolution, landmark_pose, linear_pose, reprojection::perturbed},
+    random::Random,
 };
 
 /// Rows of the table: distance, azimuth; the method's sigma along the normal, along the wall, of the heading (degrees):

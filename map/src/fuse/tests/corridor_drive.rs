@@ -10,14 +10,14 @@ use crate::{
 use nalgebra::{Matrix2, Point2, Vector2, Vector3};
 use std::f64::consts::FRAC_PI_2;
 use vision::{
-    detect::quads::Corners,
     frame::{Distortion, Intrinsics},
-    learn::random::Random,
-    localise::{
-        pose::{LandmarkSize, landmark_pose},
-        reproject::{corner_points, perturbed, pixel},
+    geometry::Corners,
+    model::LandmarkId,
+    pose::{
+        LandmarkSize, landmark_pose,
+        reprojection::{corner_points, perturbed, pixel},
     },
-    recognise::LandmarkId,
+    random::Random,
 };
 
 const SIZE: LandmarkSize = LandmarkSize { width_m: 0.6, height_m: 0.84 };

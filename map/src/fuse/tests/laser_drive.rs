@@ -11,7 +11,7 @@ use crate::{
     slam::world::{Walls, rectangle, scan, segments},
 };
 use nalgebra::{Vector2, Vector3};
-use vision::{learn::random::Random, recognise::LandmarkId};
+use vision::{model::LandmarkId, random::Random};
 
 /// Standard deviation of a wall across itself.
 const WALL_M: f64 = 0.01;

@@ -10,7 +10,7 @@ use crate::{
     pose2::{Pose2, Pose2Covariance},
 };
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
-use vision::learn::random::Random;
+use vision::random::Random;
 
 #[test]
 fn odometry_learns_its_own_errors() {

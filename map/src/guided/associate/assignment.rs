@@ -1,6 +1,6 @@
 //! Which observation is which landmark.
 
-use vision::recognise::LandmarkId;
+use vision::model::LandmarkId;
 
 /// Why an observation is no expected landmark.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -2,7 +2,7 @@
 
 use crate::{check, guided::error::GuidedError};
 use nalgebra::{Matrix2, SMatrix};
-use vision::{detect::quads::Corners, recognise::LandmarkId};
+use vision::{geometry::Corners, model::LandmarkId};
 
 /// Most observations of one image; a longer list is refused.
 pub const MAX_OBSERVATIONS: usize = 32;

@@ -11,7 +11,7 @@ use crate::{
     pose2::Pose2,
 };
 use nalgebra::{Point2, SMatrix};
-use vision::{frame::Intrinsics, localise::reproject::perturbed, recognise::LandmarkId};
+use vision::{frame::Intrinsics, model::LandmarkId, pose::reprojection::perturbed};
 
 /// Most landmarks expected in one image; of more, those with the largest part in the image.
 pub const MAX_EXPECTED: usize = 64;

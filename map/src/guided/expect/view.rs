@@ -4,7 +4,7 @@ use crate::{
     extrinsics::CameraExtrinsics, guided::projection::Camera, place::LandmarkPlace, visibility::VisibilityMap,
 };
 use nalgebra::Point2;
-use vision::{frame::Intrinsics, recognise::LandmarkId};
+use vision::{frame::Intrinsics, model::LandmarkId};
 
 /// A landmark of the map that may be in view.
 #[derive(Debug, Clone, Copy)]

@@ -5,7 +5,7 @@ use crate::{
     pose2::{Pose2, Pose2Covariance},
 };
 use serde::{Deserialize, Serialize};
-use vision::recognise::LandmarkId;
+use vision::model::LandmarkId;
 
 /// How far a pose is trusted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

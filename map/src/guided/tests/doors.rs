@@ -6,7 +6,7 @@ use crate::{
     fuse::{FixOutcome, FixRole, FuseParams, Fuser},
     localise::{Fix, FixResult, LandmarkObservation, LocaliseParams, robot_pose},
 };
-use vision::localise::pose::landmark_pose;
+use vision::pose::landmark_pose;
 
 const SECOND: i64 = 1_000_000_000;
 /// Way of the robot between two frames.

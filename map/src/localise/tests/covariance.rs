@@ -5,7 +5,7 @@ use crate::localise::{
     tests::{camera, draw, fix_of, fixed, look, mounting, moved, nees, off, place, robot, seen_by, stated},
 };
 use nalgebra::Matrix3;
-use vision::{learn::random::Random, localise::reproject::perturbed, recognise::LandmarkId};
+use vision::{model::LandmarkId, pose::reprojection::perturbed, random::Random};
 
 #[test]
 fn covariance_is_honest_in_twelve_cells() {

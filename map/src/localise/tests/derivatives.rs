@@ -11,8 +11,8 @@ use crate::{
 };
 use nalgebra::{Vector3, Vector6};
 use vision::{
-    learn::random::Random,
-    localise::reproject::{corner_points, perturbed, pixel},
+    pose::reprojection::{corner_points, perturbed, pixel},
+    random::Random,
 };
 
 #[test]

@@ -7,10 +7,10 @@ use crate::{
 };
 use nalgebra::{Matrix2, Matrix3, Point2, Vector3};
 use vision::{
-    detect::quads::Corners,
     frame::{Distortion, Intrinsics, IntrinsicsSigmas},
-    learn::random::Random,
-    localise::reproject::{corner_points, perturbed, pixel},
+    geometry::Corners,
+    pose::reprojection::{corner_points, perturbed, pixel},
+    random::Random,
 };
 
 const SIZE: LandmarkSize = LandmarkSize { width_m: 1.2, height_m: 0.8 };

@@ -3,7 +3,7 @@ use crate::slam::{
     cloud::{CloudParams, cloud},
     world::{ring, scan},
 };
-use vision::learn::random::Random;
+use vision::random::Random;
 
 #[test]
 fn branch_and_bound_finds_what_trying_everything_finds() {

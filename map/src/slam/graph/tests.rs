@@ -1,6 +1,6 @@
 use super::*;
 use nalgebra::{DMatrix, DVector};
-use vision::learn::random::Random;
+use vision::random::Random;
 
 fn poses(n: usize, random: &mut Random) -> Vec<Pose2> {
     let mut at = Pose2::default();

@@ -3,7 +3,7 @@ use crate::slam::{
     cloud::{CloudParams, cloud},
     world::{Walls, rectangle, ring, scan},
 };
-use vision::learn::random::Random;
+use vision::random::Random;
 
 fn seen(walls: &Walls, at: &Pose2, sigma_m: f64, random: &mut Random) -> Cloud {
     cloud(&scan(walls, at, sigma_m, 12.0, random), &CloudParams::default())

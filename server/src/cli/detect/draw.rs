@@ -4,7 +4,7 @@ use super::record::Record;
 use crate::cli::drawing::{BLUE, CYAN, Colour, GREEN, MAGENTA, ORANGE, Picture, RED, SERIES, WHITE, YELLOW};
 use nalgebra::Point2;
 use std::path::Path;
-use vision::detect::quads::{Quad, QuadKind};
+use vision::detect::{Quad, QuadKind};
 
 /// Width that stage pictures are enlarged to, and those of the overview; whole factors only.
 const STAGE_WIDTH_PX: usize = 1280;

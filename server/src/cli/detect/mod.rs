@@ -13,9 +13,8 @@ use std::{
     process::ExitCode,
 };
 use vision::{
-    detect::{detect, quads::Quad},
+    detect::{DetectParams, Quad, detect},
     frame::GrayImage,
-    params::DetectParams,
 };
 
 /// `waymark detect`.
@@ -52,7 +51,7 @@ struct Line {
 #[derive(Serialize)]
 struct QuadLine {
     corners: [[f64; 2]; 4],
-    kind: vision::detect::quads::QuadKind,
+    kind: vision::detect::QuadKind,
     score: f64,
     side_support: [f64; 4],
     /// Inner borders of the same thing, outermost first.

@@ -2,11 +2,14 @@
 
 use vision::{
     detect::{
-        chains::EdgeChain, detect, edges::EdgeMap, grouping::QuadSeed, pyramid, quads::Quad,
-        segments::EdgeSegment, similarity::SegmentPair,
+        DetectParams, Quad, detect,
+        edges::edge_map::EdgeMap,
+        proposals::quad_seed::QuadSeed,
+        pyramid,
+        relaxation::similarity::SegmentPair,
+        segments::{chains::EdgeChain, edge_segments::EdgeSegment},
     },
     frame::GrayImage,
-    params::DetectParams,
     trace::Trace,
 };
 

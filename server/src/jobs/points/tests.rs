@@ -13,12 +13,9 @@ use sha2::{Digest as _, Sha256};
 use std::time::Duration;
 use tokio::sync::watch;
 use vision::{
-    detect::quads::Corners,
     frame::GrayImage,
-    learn::{
-        model::{View, learn},
-        synthesis,
-    },
+    geometry::Corners,
+    learn::{TrainingView, learn, synthesis},
     params::Params,
     recognise::DistanceKind,
 };
@@ -41,7 +38,7 @@ fn corners() -> Corners {
 
 /// Adds a view whose stored picture is `bytes`.
 async fn teach(store: &Catalogue, landmark: &str, image: &GrayImage, bytes: Vec<u8>) {
-    let photographed = View::photographed(image, &corners(), &Params::default()).unwrap();
+    let photographed = TrainingView::photographed(image, &corners(), &Params::default()).unwrap();
     let cut = Cut { corners_px: corners(), icon: photographed.icon };
     let view = NewView {
         image_sha256: Sha256::digest(&bytes).into(),

@@ -4,7 +4,7 @@ use crate::{
     store::{accepting, landmarks::Measures, maps},
 };
 use map::tracks::StoredTrack;
-use vision::{detect::quads::Corners, icon::Icon, recognise::DistanceKind};
+use vision::{geometry::Corners, icon::Icon, recognise::DistanceKind};
 
 const BOUNDS: Bounds = Bounds { open: 2, of_map: 3, tracks: 2, views: 2, bytes: 40 };
 const LIMITS: accepting::Bounds = accepting::Bounds { landmarks: 2, views: 3, jobs: (1, 5) };

@@ -2,48 +2,35 @@
 //! map: below a level horizon `x / (v - h), 1 / (v - h)` keeps parallels parallel and even spacing even, whatever the
 //! camera. The row h of the horizon is one on which the image's lines meet.
 
-use super::{EdgeSegment, TilingParams};
-use crate::frame::{Distortion, Intrinsics};
+use crate::{
+    detect::{segments::edge_segments::EdgeSegment, tiling::tiling_params::TilingParams},
+    frame::{Distortion, Intrinsics},
+};
 use nalgebra::{Point2, Vector2};
-use serde::{Deserialize, Serialize};
-
-/// A camera above a level floor, without roll.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct FloorView {
-    /// The camera.
-    pub intrinsics: Intrinsics,
-    /// Width of the images that the intrinsics are for; others are taken for the same images at another scale.
-    pub width_px: usize,
-    /// Height of the camera's centre above the floor, metres.
-    pub height_m: f64,
-    /// Angle of the optical axis above the horizontal, rad.
-    pub tilt_rad: f64,
-}
 
 /// A segment seen as a line on the floor.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct FloorLine {
+pub(crate) struct FloorLine {
     /// Index of the segment.
-    pub(super) segment: usize,
+    pub(crate) segment: usize,
     /// Undirected direction on the floor, [0, pi).
-    pub(super) direction_rad: f64,
+    pub(crate) direction_rad: f64,
     /// Length on the floor.
-    pub(super) length: f64,
+    pub(crate) length: f64,
     middle: Point2<f64>,
 }
 
 impl FloorLine {
     /// Distance of the line's middle across a direction. The direction is the family's: a short line's own would throw
     /// its offset far off.
-    pub(super) fn offset_along(&self, direction_rad: f64) -> f64 {
+    pub(crate) fn offset_along(&self, direction_rad: f64) -> f64 {
         let (sin, cos) = direction_rad.sin_cos();
         cos * self.middle.y - sin * self.middle.x
     }
 }
 
 /// The floor as an image of it shows it.
-pub(super) struct Floor {
+pub(crate) struct Floor {
     camera: Intrinsics,
     height: f64,
     tilt_rad: f64,
@@ -63,7 +50,7 @@ const MEETING_RANGE_DEG: [f64; 2] = [4.0, 80.0];
 
 impl Floor {
     /// The floors that the image may show: one with a camera that makes sense, several without any.
-    pub(super) fn possible(
+    pub(crate) fn possible(
         segments: &[EdgeSegment],
         image_size: (usize, usize),
         p: &TilingParams,
@@ -99,12 +86,12 @@ impl Floor {
     }
 
     /// Whether right angles on the floor are right angles here.
-    pub(super) fn square(&self) -> bool {
+    pub(crate) fn square(&self) -> bool {
         self.square
     }
 
     /// The segment on the floor, if it may lie there.
-    pub(super) fn line(&self, index: usize, segment: &EdgeSegment, p: &TilingParams) -> Option<FloorLine> {
+    pub(crate) fn line(&self, index: usize, segment: &EdgeSegment, p: &TilingParams) -> Option<FloorLine> {
         let ends = [self.camera.undistort(&segment.p_px)?, self.camera.undistort(&segment.q_px)?];
         let middle_px = nalgebra::center(&ends[0], &ends[1]);
         let (image_direction, gravity) = (ends[1] - ends[0], self.gravity_at(&middle_px));

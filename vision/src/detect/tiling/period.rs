@@ -1,6 +1,6 @@
 //! Offsets of parallel lines in, the distance at which they repeat out (method 1.5, period accumulator).
 
-use super::TilingParams;
+use crate::detect::tiling::tiling_params::TilingParams;
 use std::f64::consts::TAU;
 
 /// Most periods that are tried.
@@ -15,7 +15,7 @@ const MAX_CHANCE: f64 = 0.05;
 
 /// Evenly spaced places on a line: `phase + i * period`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Lattice {
+pub(crate) struct Lattice {
     period: f64,
     phase: f64,
 }
@@ -25,7 +25,7 @@ impl Lattice {
     ///
     /// Departs from method 1.5, which steps the period by 5 mm: that jumps over the narrow peaks of small tiles on a
     /// wide floor. Steps here are even in 1 / period and as fine as the spread of the lines asks for.
-    pub(super) fn find(offsets: &[(f64, f64)], p: &TilingParams) -> Option<Self> {
+    pub(crate) fn find(offsets: &[(f64, f64)], p: &TilingParams) -> Option<Self> {
         let (low, high) =
             offsets.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), o| (l.min(o.0), h.max(o.0)));
         let span = high - low;
@@ -63,18 +63,18 @@ impl Lattice {
     }
 
     /// Number of the nearest place.
-    pub(super) fn index(&self, offset: f64) -> i64 {
+    pub(crate) fn index(&self, offset: f64) -> i64 {
         ((offset - self.phase) / self.period).round() as i64
     }
 
     /// Distance from the nearest place, in periods.
-    pub(super) fn residual(&self, offset: f64) -> f64 {
+    pub(crate) fn residual(&self, offset: f64) -> f64 {
         let places = (offset - self.phase) / self.period;
         (places - places.round()).abs()
     }
 
     #[cfg(test)]
-    pub(super) fn period(&self) -> f64 {
+    pub(crate) fn period(&self) -> f64 {
         self.period
     }
 }

@@ -2,20 +2,19 @@
 
 use super::*;
 use crate::{
-    detect::quads::Corners,
     frame::GrayImage,
+    geometry::corners::Corners,
     learn::{
-        fitting::{add_negatives, fitted, unlikeness_of},
-        model::Gate,
-        threshold::ThresholdError,
-    },
-    learn::{
-        model::{MAX_EXEMPLARS, StoredModelError},
-        random::Random,
         synthesis,
-        threshold::LimitedBy,
+        threshold_fit::{add_negatives, fitted, unlikeness_of},
+    },
+    model::{
+        landmark_model::{Gate, MAX_EXEMPLARS},
+        model_bytes::StoredModelError,
+        threshold::{LimitedBy, ThresholdError},
     },
     points::taught::view_points,
+    random::Random,
 };
 use proptest::prelude::*;
 
@@ -105,7 +104,7 @@ fn likeness_is_held_by_the_nearest_of_the_others() {
     stained = GrayImage::from_fn(300, 400, |u, v| {
         if u > 110 && v > 180 { (60 + (u / 9 + v / 11) % 2 * 90) as u8 } else { stained.at(u, v) }
     });
-    let view = View::photographed(&stained, &whole(), &p).unwrap();
+    let view = TrainingView::photographed(&stained, &whole(), &p).unwrap();
     let near = add_negatives(&alone, &[features(view.icon, &p.recognise)], &p);
     assert_eq!(near.likeness.limited_by, LimitedBy::NearestNegative);
     assert!(near.likeness.tau < 0.9 * p.learn.likeness_cap, "{:?}", near.likeness);
@@ -119,10 +118,10 @@ fn likeness_is_held_by_the_nearest_of_the_others() {
 fn a_model_tells_what_it_was_learnt_from() {
     let p = Params::default();
     let mut views = synthesis::views(&poster(1), &whole(), 24, &p, 1);
-    views.push(View::photographed(&poster(1), &whole(), &p).unwrap());
+    views.push(TrainingView::photographed(&poster(1), &whole(), &p).unwrap());
     let model = learn(LandmarkId(7), &views, &[], &p).unwrap();
     assert_eq!((model.id, model.views, model.generated_views), (LandmarkId(7), 25, 24));
-    assert!(model.views_generated() && model.v_c > 0.5 && model.photographed_v_c.abs() < 1e-12);
+    assert!(model.generated_views > 0 && model.v_c > 0.5 && model.photographed_v_c.abs() < 1e-12);
     assert!((1..=MAX_EXEMPLARS).contains(&model.exemplars.len()));
     assert_eq!(model.correlation.positives, 25 - model.exemplars.len());
     assert_eq!(model.params_hash, p.distance_hash());
@@ -196,7 +195,7 @@ fn what_fails_a_gate_stays_a_candidate_with_its_number() {
     assert_eq!(gates, [Gate::Saliency, Gate::Content, overlap]);
     assert!(model.hausdorff.tau.abs() < 1e-12, "accepts nothing");
 
-    let one = View::photographed(&poster(1), &whole(), &p).unwrap();
+    let one = TrainingView::photographed(&poster(1), &whole(), &p).unwrap();
     let model = learn(LandmarkId(1), &[one.clone(), one], &[], &p).unwrap();
     let ModelStatus::Candidate(failures) = &model.status else { panic!("two equal views are not enough") };
     let views = failures.iter().find(|f| f.gate == Gate::Views).unwrap();
@@ -208,7 +207,7 @@ fn what_fails_a_gate_stays_a_candidate_with_its_number() {
 fn impossible_lessons_are_refused() {
     let p = Params::default();
     assert_eq!(learn(LandmarkId(1), &[], &[], &p), Err(LearnError::NoView));
-    let view = View::photographed(&poster(1), &whole(), &p).unwrap();
+    let view = TrainingView::photographed(&poster(1), &whole(), &p).unwrap();
     let many = vec![view.clone(); MAX_VIEWS + 1];
     assert_eq!(learn(LandmarkId(1), &many, &[], &p), Err(LearnError::TooManyViews { found: MAX_VIEWS + 1 }));
     assert!(learn(LandmarkId(1), &many[1..], &[], &p).is_ok());
@@ -238,14 +237,14 @@ fn negatives_may_come_one_after_the_other() {
 
 #[test]
 fn counted_negatives_hold_tau_below_those_kept() {
-    let mut evidence = Evidence { own: vec![0.1, 0.2, 0.9], ..Evidence::default() };
+    let mut evidence = DistanceSamples { own: vec![0.1, 0.2, 0.9], ..DistanceSamples::default() };
     for i in 0..200 {
         evidence.add(0.3 + f64::from(i % 100) * 1e-3);
     }
-    assert_eq!((evidence.others, evidence.nearest_others.len()), (200, Evidence::MAX_NEAREST));
+    assert_eq!((evidence.others, evidence.nearest_others.len()), (200, DistanceSamples::MAX_NEAREST));
     assert!(evidence.nearest_others.is_sorted() && evidence.nearest_others[63] < 0.3325);
     let cheap = Params {
-        learn: crate::learn::model::LearnParams {
+        learn: crate::learn::params::LearnParams {
             threshold: crate::learn::threshold::ThresholdParams {
                 false_positive_weight: 0.1,
                 nearest_share: 0.9,
@@ -275,7 +274,7 @@ fn a_stored_model_is_the_same_bit_for_bit() {
     // A model of the version before points loads, and says that it knows none.
     let mut older = bytes[..bytes.len() - 8 - 3].to_vec();
     older[4] = 2;
-    older.extend(crate::learn::stored::digest(&older).to_le_bytes());
+    older.extend(crate::model::model_bytes::digest(&older).to_le_bytes());
     let read = LandmarkModel::from_bytes(&older, &p).unwrap();
     assert!(!read.knows_points && read == model);
     let points = crate::points::taught::view_points(
@@ -316,7 +315,7 @@ proptest! {
             forged[*at] = *value;
         }
         if seal {
-            let sum = crate::learn::stored::digest(&forged);
+            let sum = crate::model::model_bytes::digest(&forged);
             forged.extend(sum.to_le_bytes());
         }
         if let Ok(model) = LandmarkModel::from_bytes(&forged, &Params::default()) {

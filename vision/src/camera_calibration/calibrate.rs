@@ -1,0 +1,322 @@
+//! A camera's intrinsics from several views of one flat thing of known shape (method 16).
+//!
+//! In: views (points of the plane and the pixels they are seen at, four corners of a quad or more), the image's size.
+//! Out: focal length, principal point, perhaps radial distortion, with covariance, and how well each view fits; or why
+//! the views do not determine them. The quads are found and named elsewhere.
+
+use crate::{
+    camera_calibration::{
+        camera_model::{ALPHA, CAMERA, HEIGHT, K1, PIXEL_ASPECT, POSTER, State, U0, V0},
+        least_squares::{Problem, Summary, ViewFit},
+        linear::{Constraints, LinearCamera, solve},
+        params::{CalibrateParams, CameraHeight, MAX_RADIAL},
+        views::{MAX_POINTS, MAX_VIEWS, MIN_VIEWS, PlanarView},
+    },
+    frame::{Distortion, FrameError, Intrinsics, MAX_SIDE_PX},
+    geometry::homography::Homography,
+    pose::measurement::{LandmarkSize, MAX_CORNER_PX, is_corner_covariance},
+};
+use nalgebra::{Isometry3, Matrix3, Point2, SMatrix, Vector3};
+
+/// Focal lengths tried where the linear solution fails, in image widths.
+const STARTS: [f64; 5] = [0.4, 0.7, 1.1, 1.8, 3.0];
+
+/// Why there is no camera.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum CalibrateError {
+    /// A number of the parameters or the image's size is out of range.
+    #[error("{field} = {value} is out of range")]
+    OutOfRange {
+        /// Which.
+        field: &'static str,
+        /// What it was.
+        value: f64,
+    },
+    /// Too few or too many views.
+    #[error("{given} views given, {least} to {MAX_VIEWS} wanted")]
+    Views {
+        /// How many there are.
+        given: usize,
+        /// How many are wanted at least.
+        least: usize,
+    },
+    /// A view's lists are of different lengths, too short or too long, or a number in them is impossible.
+    #[error("view {view}: {reason}")]
+    View {
+        /// Its index.
+        view: usize,
+        /// What is wrong.
+        reason: &'static str,
+    },
+    /// The views look at the plane from too few sides (method 16.4).
+    #[error(
+        "the views show {orientations} orientations of the plane that differ by more than {step_deg:.0} degrees, {wanted} are wanted"
+    )]
+    Orientations {
+        /// How many differ.
+        orientations: usize,
+        /// How many are wanted.
+        wanted: usize,
+        /// What counts as different.
+        step_deg: f64,
+    },
+    /// No camera sees the plane like this, or any does.
+    #[error(
+        "the views do not determine a camera (sigma3 / sigma4 = {sigma_ratio:.3}, sigma3 / sigma1 = {sigma_share:.1e})"
+    )]
+    Undetermined {
+        /// Second smallest over smallest singular value of the linear system.
+        sigma_ratio: f64,
+        /// Second smallest over greatest.
+        sigma_share: f64,
+    },
+    /// The views are not of one plane of this shape.
+    #[error(
+        "the views do not fit one plane of this shape: rms {rms_px:.2} px, view {worst} the worst with {worst_px:.2} px"
+    )]
+    Misfit {
+        /// Root mean square residual per coordinate.
+        rms_px: f64,
+        /// The view that fits worst.
+        worst: usize,
+        /// Its own.
+        worst_px: f64,
+    },
+    /// What comes out is no camera.
+    #[error(transparent)]
+    Camera(#[from] FrameError),
+}
+
+/// A calibrated camera.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CameraCalibration {
+    /// The camera.
+    pub camera: Intrinsics,
+    /// Over (fx, cx, cy, k1, k2, fy / fx), px and 1; rows of what was not fitted are zero. `None` without refinement.
+    pub covariance: Option<SMatrix<f64, 6, 6>>,
+    /// The start (method 16.2): focal length by the linear solution, where there was one.
+    pub linear_fx_px: Option<f64>,
+    /// Height over width of the plane over what the views claim: 1 where the aspect is known.
+    pub aspect_ratio: f64,
+    /// Height of the camera over the plane's origin, where it was constant or known.
+    pub height_m: Option<f64>,
+    /// Each view.
+    pub views: Vec<ViewFit>,
+    /// Root mean square residual per coordinate, pixels.
+    pub rms_px: f64,
+    /// Weighted squared residual and its degrees of freedom.
+    pub chi2: f64,
+    /// See `chi2`.
+    pub dof: usize,
+    /// Different orientations of the plane.
+    pub orientations: usize,
+    /// Second smallest over smallest singular value of the linear system.
+    pub sigma_ratio: f64,
+}
+
+impl CameraCalibration {
+    /// Standard deviation of the focal length, pixels.
+    pub fn fx_sigma_px(&self) -> Option<f64> {
+        self.covariance.map(|c| c[(0, 0)].sqrt())
+    }
+}
+
+/// The camera behind `views` of one flat thing, in an image of `image_size_px` (width, height).
+pub fn calibrate(
+    views: &[PlanarView],
+    image_size_px: [usize; 2],
+    p: &CalibrateParams,
+) -> Result<CameraCalibration, CalibrateError> {
+    check(views, image_size_px, p)?;
+    let size = image_size_px.map(|s| s as f64);
+    let mut homographies = Vec::with_capacity(views.len());
+    for (view, v) in views.iter().enumerate() {
+        // Known pixel aspect: v is divided by it, and the camera has square pixels.
+        let seen: Vec<_> = v.seen_px.iter().map(|q| Point2::new(q.x, q.y / p.pixel_aspect)).collect();
+        let h = Homography::fit(&v.plane_m, &seen);
+        let h = h.map_err(|_horizon| CalibrateError::View { view, reason: "its points are degenerate" })?;
+        // z up becomes v down: from the front the orientation changes.
+        if h.matrix().determinant() >= 0.0 {
+            return Err(CalibrateError::View {
+                view,
+                reason: "it is seen from behind: its points run the other way round",
+            });
+        }
+        homographies.push(*h.matrix());
+    }
+    let square = [size[0], size[1] / p.pixel_aspect];
+    let (linear, sigmas) = start(&homographies, square, p);
+    let guess = |f: f64| LinearCamera {
+        alpha: f * square[0],
+        u0: 0.5 * (square[0] - 1.0),
+        v0: 0.5 * (square[1] - 1.0),
+    };
+    let [sigma_ratio, sigma_share] = sigmas;
+    let starts: Vec<LinearCamera> = match linear {
+        Some(camera) => vec![camera],
+        None if p.refine => STARTS.map(guess).to_vec(),
+        None => vec![],
+    };
+    let problem = Problem::new(views, size, p)
+        .ok_or(CalibrateError::View { view: 0, reason: "a covariance is impossible" })?;
+    let mut best: Option<State> = None;
+    for camera in &starts {
+        let Some(state) = settled(&problem, camera, &homographies, p) else { continue };
+        if best.as_ref().is_none_or(|b| problem.chi2(&state) < problem.chi2(b)) {
+            best = Some(state);
+        }
+    }
+    let seen_from =
+        best.as_ref().map_or_else(|| poses(&homographies, &guess(1.0)), |state| Some(state.poses.clone()));
+    let orientations = seen_from.map_or(0, |poses| orientations(&poses, p.orientation_step_rad));
+    if orientations < p.min_orientations {
+        let step_deg = p.orientation_step_rad.to_degrees();
+        return Err(CalibrateError::Orientations { orientations, wanted: p.min_orientations, step_deg });
+    }
+    let undetermined = CalibrateError::Undetermined { sigma_ratio, sigma_share };
+    let state = best.ok_or(undetermined.clone())?;
+    let made = problem.summary(&state, p.refine).ok_or(undetermined)?;
+    finished(&state, made, linear.map(|l| l.alpha), (orientations, sigma_ratio), p)
+}
+
+/// The linear solution; an unknown constant height is searched.
+fn start(
+    homographies: &[Matrix3<f64>],
+    square: [f64; 2],
+    p: &CalibrateParams,
+) -> (Option<LinearCamera>, [f64; 2]) {
+    let with = |height_m| {
+        let zero_roll = p.roll_sigma_rad > 0.0;
+        solve(homographies, square, &Constraints { known_aspect: p.known_aspect, zero_roll, height_m })
+    };
+    match p.height {
+        CameraHeight::Known { height_m, .. } => with(Some(height_m)),
+        // Departs from method 16.2 (a 1-D search): without C3 the start is good enough, and the refinement finds the
+        // height with all the rest.
+        CameraHeight::Free | CameraHeight::Constant { .. } => with(None),
+    }
+}
+
+/// All poses for a camera, then the least squares if asked for, every view in the better of its two minima.
+fn settled(
+    problem: &Problem,
+    camera: &LinearCamera,
+    homographies: &[Matrix3<f64>],
+    p: &CalibrateParams,
+) -> Option<State> {
+    let poses = poses(homographies, camera)?;
+    let mut numbers = [0.0; CAMERA];
+    (numbers[ALPHA], numbers[PIXEL_ASPECT]) = (camera.alpha, p.pixel_aspect);
+    (numbers[U0], numbers[V0]) = (camera.u0, camera.v0 * p.pixel_aspect);
+    let mut state = State { camera: numbers, poses };
+    problem.fit_poster(&mut state, homographies);
+    state = problem.posed(state)?;
+    problem.fit_height(&mut state);
+    if p.refine { problem.descend(state) } else { Some(state) }
+}
+
+/// Eq. (2) for every view; homographies and camera have square pixels.
+fn poses(homographies: &[Matrix3<f64>], camera: &LinearCamera) -> Option<Vec<Isometry3<f64>>> {
+    let k = Matrix3::new(camera.alpha, 0.0, camera.u0, 0.0, camera.alpha, camera.v0, 0.0, 0.0, 1.0);
+    let inverse = k.try_inverse()?;
+    homographies.iter().map(|h| crate::pose::linear::pose_of_columns(&(inverse * h))).collect()
+}
+
+/// How many of the poses' normals differ from all others counted by more than `step_rad`: counted greedily, in order.
+fn orientations(poses: &[Isometry3<f64>], step_rad: f64) -> usize {
+    let mut kept: Vec<Vector3<f64>> = Vec::new();
+    for pose in poses {
+        let normal = pose.rotation * Vector3::x();
+        if kept.iter().all(|k| k.angle(&normal) > step_rad) {
+            kept.push(normal);
+        }
+    }
+    kept.len()
+}
+
+/// Everything finite and in range.
+fn check(views: &[PlanarView], image_size_px: [usize; 2], p: &CalibrateParams) -> Result<(), CalibrateError> {
+    let within = |field, value: f64, low: f64, high: f64| {
+        let good = (low..=high).contains(&value);
+        if good { Ok(()) } else { Err(CalibrateError::OutOfRange { field, value }) }
+    };
+    for (field, side) in [("width_px", image_size_px[0]), ("height_px", image_size_px[1])] {
+        within(field, side as f64, 1.0, MAX_SIDE_PX as f64)?;
+    }
+    within("pixel_aspect", p.pixel_aspect, 0.1, 10.0)?;
+    within("roll_sigma_rad", p.roll_sigma_rad, 0.0, 1.0)?;
+    within("centre_sigma", p.centre_sigma, 0.0, 10.0)?;
+    within("radial", p.radial as f64, 0.0, MAX_RADIAL as f64)?;
+    within("orientation_step_rad", p.orientation_step_rad, 0.0, 1.5)?;
+    within("max_rms_px", p.max_rms_px, 0.0, 1e4)?;
+    match p.height {
+        CameraHeight::Free => {}
+        CameraHeight::Known { height_m, sigma_m } => {
+            within("height_m", height_m, -100.0, 100.0)?;
+            within("sigma_m", sigma_m, 1e-6, 100.0)?;
+        }
+        CameraHeight::Constant { sigma_m } => within("sigma_m", sigma_m, 1e-6, 100.0)?,
+    }
+    // Two numbers of the camera a view with known aspect, one without.
+    let least = if p.known_aspect { MIN_VIEWS } else { 2 * MIN_VIEWS };
+    if !(least..=MAX_VIEWS).contains(&views.len()) {
+        return Err(CalibrateError::Views { given: views.len(), least });
+    }
+    for (view, v) in views.iter().enumerate() {
+        let refuse = |reason| Err(CalibrateError::View { view, reason });
+        let n = v.plane_m.len();
+        if n != v.seen_px.len() || n != v.covariance_px2.len() || !(4..=MAX_POINTS).contains(&n) {
+            return refuse("its lists have not the same length of 4 to 4096");
+        }
+        let far = |q: &Point2<f64>, limit: f64| !(q.x.abs() <= limit && q.y.abs() <= limit);
+        if v.plane_m.iter().any(|q| far(q, LandmarkSize::MAX_M)) {
+            return refuse("a point of the plane is out of range");
+        }
+        if v.seen_px.iter().any(|q| far(q, MAX_CORNER_PX)) {
+            return refuse("a pixel is out of range");
+        }
+        if !v.covariance_px2.iter().all(is_corner_covariance) {
+            return refuse("a covariance is impossible");
+        }
+    }
+    Ok(())
+}
+
+/// Puts the answer together.
+fn finished(
+    state: &State,
+    made: Summary,
+    linear_fx_px: Option<f64>,
+    (orientations, sigma_ratio): (usize, f64),
+    p: &CalibrateParams,
+) -> Result<CameraCalibration, CalibrateError> {
+    if made.rms_px > p.max_rms_px {
+        let worst = (0..made.views.len())
+            .max_by(|&a, &b| made.views[a].rms_px.total_cmp(&made.views[b].rms_px))
+            .unwrap_or(0);
+        let worst_px = made.views.get(worst).map_or(0.0, |v| v.rms_px);
+        return Err(CalibrateError::Misfit { rms_px: made.rms_px, worst, worst_px });
+    }
+    let c = &state.camera;
+    let distortion = match p.radial {
+        0 => Distortion::None,
+        _ => Distortion::PlumbBob([c[K1], c[K1 + 1], 0.0, 0.0, 0.0]),
+    };
+    let camera = Intrinsics::new(c[ALPHA], c[ALPHA] * c[PIXEL_ASPECT], c[U0], c[V0], distortion)?;
+    Ok(CameraCalibration {
+        camera,
+        covariance: made.covariance,
+        linear_fx_px,
+        aspect_ratio: c[POSTER].exp(),
+        height_m: (p.height != CameraHeight::Free).then_some(c[HEIGHT]),
+        views: made.views,
+        rms_px: made.rms_px,
+        chi2: made.chi2,
+        dof: made.dof,
+        orientations,
+        sigma_ratio,
+    })
+}
+
+#[cfg(test)]
+pub(crate) mod tests;

@@ -1,0 +1,16 @@
+//! Views of a flat thing in, the intrinsics of the camera out (method 16).
+
+pub mod params;
+pub mod views;
+pub(crate) mod linear;
+pub(crate) mod camera_model;
+pub(crate) mod normal_equations;
+pub(crate) mod least_squares;
+pub mod calibrate;
+pub mod robust;
+
+pub use calibrate::{CalibrateError, CameraCalibration, calibrate};
+pub use least_squares::ViewFit;
+pub use params::{CalibrateParams, CameraHeight, MAX_RADIAL};
+pub use robust::{LENS_GAIN, OUTLIER_PX, OUTLIER_SHARE, RobustCalibration, calibrate_choosing};
+pub use views::{MAX_POINTS, MAX_VIEWS, MIN_VIEWS, PlanarView};

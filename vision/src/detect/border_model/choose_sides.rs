@@ -1,0 +1,126 @@
+//! Which of the lines beside each side of a quad is its border: the shadow under a frame, the inner edge of a mat and
+//! the edge of the picture next to it all look like sides. A quad in, the same with every side on its likeliest line
+//! out. Measurements of each line are weighed by a small network that was fitted on labelled photographs.
+//!
+//! Departs from method 3.6, which refits a side on the nearest edge only. See docs/method/24-default-detector.md.
+
+use crate::detect::{
+    border_model::{
+        network::Network,
+        side_features::{
+            BAND_FEATURES, LogGreyLevels, Met, SIDE_FEATURES, SideMeasurement, Sides, joined, meet_all,
+        },
+    },
+    edge_support::gradients::Gradients,
+};
+use nalgebra::Point2;
+
+/// How often every side is chosen again with the others as chosen before.
+const ROUNDS: usize = 2;
+
+/// A line beside a side with its measurements.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SideCandidate {
+    /// Its ends, beside the ends of the side.
+    pub ends_px: [Point2<f64>; 2],
+    /// See [`choose_sides`].
+    pub features: [f64; SIDE_FEATURES],
+}
+
+/// A quad with its sides on the likeliest lines.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SnappedSides {
+    /// Corners in the order of the sides.
+    pub corners_px: [Point2<f64>; 4],
+    /// What was measured of each side's line; all 0 for a side without a line.
+    pub sides: [SideMeasurement; 4],
+    /// The same of the lines nearest to the sides as they were.
+    pub nearest: [SideMeasurement; 4],
+}
+
+/// Moves every side of a quad, clockwise on screen, to the line beside it that looks most like the border of a thing.
+/// None if no side has a line, or if what comes out has no corners.
+pub fn choose_sides(g: &Gradients, corners: &[Point2<f64>; 4], model: &Network) -> Option<SnappedSides> {
+    let sides = Sides::new(g, corners);
+    let known: [Vec<([f64; BAND_FEATURES], LogGreyLevels)>; 4] =
+        std::array::from_fn(|i| (0..sides.lines(i).len()).map(|j| sides.band_features(i, j)).collect());
+    let mut chosen: [Option<usize>; 4] = std::array::from_fn(|i| sides.nearest(i));
+    if chosen.iter().all(Option::is_none) {
+        return None;
+    }
+    let mut met = sides.met(&chosen);
+    let measure = |met: &Met, lines: &[Option<usize>; 4]| {
+        let of_line = |i: usize, j: usize| SideMeasurement {
+            features: joined(&known[i][j].0, &sides.corner_features(i, j, &met[i])),
+            tones: known[i][j].1,
+        };
+        std::array::from_fn(|i| lines[i].map_or_else(SideMeasurement::default, |j| of_line(i, j)))
+    };
+    let nearest = measure(&met, &chosen);
+    for _ in 0..ROUNDS {
+        let before = chosen;
+        for i in 0..4 {
+            let weigh =
+                |j: usize| model.output(&joined(&known[i][j].0, &sides.corner_features(i, j, &met[i])));
+            let weights: Vec<f64> = (0..known[i].len()).map(weigh).collect();
+            chosen[i] = (0..weights.len()).max_by(|a, b| weights[*a].total_cmp(&weights[*b]).then(b.cmp(a)));
+        }
+        if chosen == before {
+            break;
+        }
+        met = sides.met(&chosen);
+    }
+    Some(SnappedSides { corners_px: meet_all(&sides.ends(&chosen))?, sides: measure(&met, &chosen), nearest })
+}
+
+/// The lines beside every side with their measurements, the corners made with the lines nearest to the other sides:
+/// what a model is fitted on.
+pub fn rivals(g: &Gradients, corners: &[Point2<f64>; 4]) -> [Vec<SideCandidate>; 4] {
+    let sides = Sides::new(g, corners);
+    let met = sides.met(&std::array::from_fn(|i| sides.nearest(i)));
+    std::array::from_fn(|i| {
+        (0..sides.lines(i).len())
+            .map(|j| {
+                let features = joined(&sides.band_features(i, j).0, &sides.corner_features(i, j, &met[i]));
+                SideCandidate { ends_px: sides.line_ends(i, j), features }
+            })
+            .collect()
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::detect::{
+        edges::edge_map::{EdgeParams, edges},
+        params::QuadParams,
+        tests::fixtures::render,
+    };
+
+    const PICTURE: [[f64; 2]; 4] = [[100.0, 80.0], [300.0, 80.0], [300.0, 240.0], [100.0, 240.0]];
+
+    #[test]
+    fn the_shadow_under_a_picture_is_not_its_side() {
+        // Light from above: the wall under the picture is at six tenths, down to 20 px below it.
+        let shadow = [[102.0, 95.0], [298.0, 95.0], [298.0, 260.0], [102.0, 260.0]];
+        let inner = [[125.0, 105.0], [275.0, 105.0], [275.0, 215.0], [125.0, 215.0]];
+        let image = render(420, 340, 200, &[(shadow, 120), (PICTURE, 50), (inner, 170)]);
+        let map = edges(&image, &EdgeParams::default());
+        let g = Gradients { image: &image, gx: map.gx(), gy: map.gy() };
+        let with_shadow = [[100.0, 80.0], [300.0, 80.0], [300.0, 260.0], [100.0, 260.0]].map(Point2::from);
+        let chosen = choose_sides(&g, &with_shadow, QuadParams::default().side_network()).unwrap();
+        for (found, wanted) in chosen.corners_px.iter().zip(PICTURE.map(Point2::from)) {
+            assert!((found - wanted).norm() < 0.5, "{:?}", chosen.corners_px);
+        }
+    }
+
+    #[test]
+    fn nothing_to_choose_from_is_none() {
+        let image = render(200, 200, 128, &[]);
+        let map = edges(&image, &EdgeParams::default());
+        let g = Gradients { image: &image, gx: map.gx(), gy: map.gy() };
+        let quad = [[50.0, 50.0], [150.0, 50.0], [150.0, 150.0], [50.0, 150.0]].map(Point2::from);
+        assert!(choose_sides(&g, &quad, QuadParams::default().side_network()).is_none());
+        assert!(rivals(&g, &quad).iter().all(Vec::is_empty));
+    }
+}

@@ -1,0 +1,9 @@
+//! Small networks that move the sides of a quad to its border and tell whether it is an object.
+
+pub mod network;
+pub(crate) mod network_weights;
+pub(crate) mod side_lines;
+pub mod side_band;
+pub mod side_features;
+pub mod choose_sides;
+pub mod quad_classifier;

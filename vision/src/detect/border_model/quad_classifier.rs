@@ -1,0 +1,160 @@
+//! Whether a quad is the border of a flat thing at all, or lines that happen to meet: joints of tiles, a wall between two
+//! corners, strokes inside a picture. The measurements of its four sides in, a probability out. The weights were fitted
+//! on labelled photographs and renderings.
+//!
+//! Departs from method 3.6, whose score (similarity times support) tells how well a quad is seen, not what it is.
+
+use crate::detect::border_model::{
+    network::Network,
+    side_features::{SIDE_FEATURES, SideMeasurement},
+};
+use nalgebra::Point2;
+
+/// Number of measurements: mean, smallest and largest of each measurement of a side, and ten of the whole.
+pub const THING_FEATURES: usize = 3 * SIDE_FEATURES + WHOLE_FEATURES;
+/// Measurements of the quad as a whole.
+const WHOLE_FEATURES: usize = 10;
+
+/// The measurements of a quad in an image of some width and height: mean, smallest and largest of each measurement of a
+/// side; its support score; log of its mean side in pixels; how much the sides differ in the tone of the wall, just
+/// outside and just inside; how alike their steps are, 0 to 1; sine of the sharpest corner; of opposite sides the log of
+/// the length ratio, of the pair that differs less and of the other; how far corners lie outside the image, in mean sides.
+pub fn thing_features(
+    sides: &[SideMeasurement; 4],
+    corners_px: &[Point2<f64>; 4],
+    score: f64,
+    size_px: (usize, usize),
+) -> [f64; THING_FEATURES] {
+    let mut features = [0.0; THING_FEATURES];
+    for i in 0..SIDE_FEATURES {
+        let values = sides.map(|s| s.features[i]);
+        features[i] = values.iter().sum::<f64>() / 4.0;
+        features[SIDE_FEATURES + i] = values.iter().copied().fold(f64::INFINITY, f64::min);
+        features[2 * SIDE_FEATURES + i] = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    }
+    features[3 * SIDE_FEATURES..].copy_from_slice(&of_the_whole(sides, corners_px, score, size_px));
+    features
+}
+
+fn of_the_whole(
+    sides: &[SideMeasurement; 4],
+    corners_px: &[Point2<f64>; 4],
+    score: f64,
+    (width, height): (usize, usize),
+) -> [f64; WHOLE_FEATURES] {
+    let way = |i: usize| corners_px[(i + 1) % 4] - corners_px[i % 4];
+    let length: [f64; 4] = std::array::from_fn(|i| way(i).norm().max(1.0));
+    let mean_side = length.iter().sum::<f64>() / 4.0;
+    let spread = |tone: fn(&SideMeasurement) -> f64| {
+        let tones = sides.iter().map(tone);
+        tones.clone().fold(f64::NEG_INFINITY, f64::max) - tones.fold(f64::INFINITY, f64::min)
+    };
+    let steps = sides.map(|s| s.tones.step);
+    let all = steps.iter().map(|s| s.abs()).sum::<f64>();
+    let sine = |i: usize| way(i).perp(&way(i + 1)).abs() / (length[i] * length[(i + 1) % 4]);
+    let ratios = [0, 1].map(|i| (length[i] / length[i + 2]).ln().abs());
+    let beyond = |p: &Point2<f64>| {
+        let past = |x: f64, size: usize| (-x).max(x - size as f64 + 1.0).max(0.0);
+        past(p.x, width).max(past(p.y, height)) / mean_side
+    };
+    [
+        score,
+        mean_side.ln(),
+        spread(|s| s.tones.wall),
+        spread(|s| s.tones.outside),
+        spread(|s| s.tones.inside),
+        if all > 0.0 { steps.iter().sum::<f64>().abs() / all } else { 0.0 },
+        (0..4).map(sine).fold(1.0, f64::min),
+        ratios[0].min(ratios[1]),
+        ratios[0].max(ratios[1]),
+        corners_px.iter().map(beyond).fold(0.0, f64::max).min(1.0),
+    ]
+}
+
+/// Probability that a quad of such measurements is the border of a thing, 0 to 1.
+pub fn probability(model: &Network, features: &[f64; THING_FEATURES]) -> f64 {
+    1.0 / (1.0 + (-model.output(features)).exp())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::detect::border_model::side_features::LogGreyLevels;
+
+    const SQUARE: [[f64; 2]; 4] = [[10.0, 10.0], [110.0, 10.0], [110.0, 110.0], [10.0, 110.0]];
+
+    fn features(tones: [LogGreyLevels; 4], corners: [[f64; 2]; 4]) -> [f64; THING_FEATURES] {
+        let values = [1.0, 3.0, -2.0, 6.0];
+        let sides = std::array::from_fn(|i| SideMeasurement {
+            features: [values[i]; SIDE_FEATURES],
+            tones: tones[i],
+        });
+        thing_features(&sides, &corners.map(Point2::from), 0.7, (200, 150))
+    }
+
+    fn whole(tones: [LogGreyLevels; 4], corners: [[f64; 2]; 4]) -> [f64; WHOLE_FEATURES] {
+        features(tones, corners)[3 * SIDE_FEATURES..].try_into().unwrap()
+    }
+
+    fn close(actual: &[f64], wanted: &[f64]) -> bool {
+        actual.len() == wanted.len() && actual.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-12)
+    }
+
+    #[test]
+    fn the_measurements_are_mean_least_and_most_of_the_sides() {
+        let features = features([LogGreyLevels::default(); 4], SQUARE);
+        for (from, wanted) in [(0, 2.0), (SIDE_FEATURES, -2.0), (2 * SIDE_FEATURES, 6.0)] {
+            assert!(close(&features[from..from + SIDE_FEATURES], &[wanted; SIDE_FEATURES]));
+        }
+        let whole = &features[3 * SIDE_FEATURES..];
+        assert!(close(whole, &[0.7, 100.0_f64.ln(), 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]), "{whole:?}");
+    }
+
+    #[test]
+    fn tones_are_compared_between_the_sides() {
+        let tones = [[5.0, 4.0, 3.0, 2.0], [5.5, 4.1, 3.0, 1.0], [5.2, 4.0, 3.7, -1.0], [5.0, 4.0, 3.0, 2.0]]
+            .map(|[wall, outside, inside, step]| LogGreyLevels { wall, outside, inside, step });
+        let spread = &whole(tones, SQUARE)[2..6];
+        assert!(close(spread, &[0.5, 4.1 - 4.0, 3.7 - 3.0, 4.0 / 6.0]), "{spread:?}");
+    }
+
+    #[test]
+    fn the_shape_is_measured_the_same_from_any_corner() {
+        // 10 px beyond the right border, 1 px beyond the lower one.
+        let corners = [[100.0, 50.0], [209.0, 20.0], [209.0, 150.0], [100.0, 110.0]];
+        let mut seen: Vec<[f64; WHOLE_FEATURES]> = Vec::new();
+        for first in 0..4 {
+            seen.push(whole(
+                [LogGreyLevels::default(); 4],
+                std::array::from_fn(|i| corners[(i + first) % 4]),
+            ));
+        }
+        assert!(seen.iter().all(|s| close(s, &seen[0])), "{seen:?}");
+        let [upper, lower] = [30.0_f64, 40.0].map(|rise| rise.hypot(109.0));
+        let mean_side = (60.0 + 130.0 + upper + lower) / 4.0;
+        let wanted = [109.0 / lower, (lower / upper).ln(), (130.0_f64 / 60.0).ln(), 10.0 / mean_side];
+        assert!(close(&seen[0][6..], &wanted), "{:?} {wanted:?}", &seen[0][6..]);
+    }
+
+    #[test]
+    fn odds_of_three_to_one_are_three_quarters() {
+        let model = Network {
+            mean: vec![0.0; THING_FEATURES],
+            deviation: vec![1.0; THING_FEATURES],
+            linear: vec![0.0; THING_FEATURES],
+            hidden_in: Vec::new(),
+            hidden_bias: Vec::new(),
+            hidden_out: Vec::new(),
+            bias: 3.0_f64.ln(),
+        };
+        assert!((probability(&model, &[0.5; THING_FEATURES]) - 0.75).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_network_for_other_measurements_is_refused_by_name() {
+        let wrong = r#"{"thing_model": {"mean": [0], "deviation": [1], "linear": [0], "hidden_in": [],
+            "hidden_bias": [], "hidden_out": [], "bias": 0}}"#;
+        let error = serde_json::from_str::<crate::detect::params::QuadParams>(wrong).unwrap_err().to_string();
+        assert!(error.contains("mean has 1 numbers, 94 expected"), "{error}");
+    }
+}

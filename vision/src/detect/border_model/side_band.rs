@@ -1,0 +1,358 @@
+//! What runs beside a supposed side of a quad: the band of image around it, unrolled, with the lines in it that edges
+//! support. Two points in; what is measured along a line comes out. Finding the lines is `side_lines`', which of them is
+//! the border `side_model`'s.
+
+use crate::detect::{
+    border_model::side_lines::{self, Peak, SideLine},
+    edge_support::{
+        fixed_point::Fixed,
+        gradients::{Gradients, MIN_COS},
+    },
+};
+use fearless_simd::{Level, dispatch};
+use nalgebra::{Point2, Vector2};
+
+/// Most samples along a side: a line keeps which of them it has in a 64-bit word.
+pub const MAX_BAND_SAMPLES: usize = 48;
+/// Fewest samples along a side.
+const MIN_BAND_SAMPLES: usize = 12;
+/// Half the width of a band, as a share of the quad's extent across the side.
+const REACH_SHARE: f64 = 0.25;
+/// Half the width of a band, smallest and largest.
+const REACH_PX: (f64, f64) = (6.0, 128.0);
+/// Share of the side left out at both ends: near a corner the other side's gradient mixes in.
+const CORNER_SHARE: f64 = 0.06;
+/// Smallest step height of an edge, grey levels.
+pub const MIN_STEP: f32 = 4.0;
+/// Smallest step heights of the edges that [`AlongLine::edges_outside`] counts.
+const STEPS_OUTSIDE: [f32; 2] = [MIN_STEP, 2.0 * MIN_STEP];
+
+/// A number for each row; rows that a band does not have are 0.
+type Rows = [i32; MAX_BAND_SAMPLES];
+
+/// The image around a side, a row for each sample along it, a column for each pixel across, from inside outwards.
+#[derive(Debug, Clone)]
+pub struct Band {
+    from: Point2<f64>,
+    direction: Vector2<f64>,
+    normal: Vector2<f64>,
+    length_px: f64,
+    /// Offset of column 0.
+    first_px: i32,
+    columns: usize,
+    rows: usize,
+    /// The columns of each row that lie in the image: from the first to before the second.
+    inside: [Rows; 2],
+    /// Derivative along the normal; 0 outside the image.
+    step: Vec<f32>,
+    level: Vec<u8>,
+    /// How many pixels of the row before a column are not plain; a column more than there are.
+    rough: Vec<u16>,
+    /// Outermost column of each row with an edge along the side of at least each of [`STEPS_OUTSIDE`]; -1 without.
+    outermost: [Rows; 2],
+    /// The lines, by descending support when found.
+    pub lines: Vec<SideLine>,
+}
+
+impl Band {
+    /// Unrolls the band of the side from `from` to `to`, of a quad walked clockwise on screen that reaches `extent_px`
+    /// across the side, and finds its lines. None for a side shorter than 4 px.
+    pub fn new(g: &Gradients, from: &Point2<f64>, to: &Point2<f64>, extent_px: f64) -> Option<Self> {
+        let length_px = (to - from).norm();
+        if !(length_px >= 4.0 && length_px.is_finite() && extent_px.is_finite()) {
+            return None;
+        }
+        let direction = (to - from) / length_px;
+        let reach = (REACH_SHARE * extent_px).clamp(REACH_PX.0, REACH_PX.1) as i32;
+        let mut band = Self {
+            from: *from,
+            direction,
+            normal: Vector2::new(direction.y, -direction.x),
+            length_px,
+            first_px: -reach,
+            columns: (2 * reach + 1) as usize,
+            rows: ((length_px / 2.0) as usize).clamp(MIN_BAND_SAMPLES, MAX_BAND_SAMPLES),
+            inside: [[0; MAX_BAND_SAMPLES]; 2],
+            step: Vec::new(),
+            level: Vec::new(),
+            rough: Vec::new(),
+            outermost: [[-1; MAX_BAND_SAMPLES]; 2],
+            lines: Vec::new(),
+        };
+        dispatch!(Level::new(), _s => band.fill(g));
+        Some(band)
+    }
+
+    #[expect(
+        clippy::inline_always,
+        reason = "an instruction set holds only in what is inlined where it was chosen"
+    )]
+    #[inline(always)]
+    fn fill(&mut self, g: &Gradients) {
+        let cells = self.rows * self.columns;
+        self.step = vec![0.0; cells];
+        self.level = vec![0; cells];
+        self.rough = vec![0; cells + self.rows];
+        let mut square = vec![0.0; self.columns];
+        let mut peaks = Vec::new();
+        for row in 0..self.rows {
+            square.fill(0.0);
+            self.unroll(g, row, &mut square);
+            self.look_through(row, &square);
+            self.peaks(row, &square, &mut peaks);
+        }
+        self.lines = side_lines::find(&peaks, self.rows, (self.first_px, self.columns), self.length_px);
+    }
+
+    /// Reads the pixels of a row. What lies outside the image stays 0.
+    #[expect(clippy::inline_always, reason = "as above")]
+    #[inline(always)]
+    fn unroll(&mut self, g: &Gradients, row: usize, square: &mut [f32]) {
+        let (width, height) = (g.width(), g.height());
+        let [nx, ny]: [f32; 2] = self.normal.cast().into();
+        let across = Fixed::step(&self.normal);
+        let mut place = Fixed::point(&self.at(self.along(row) * self.length_px, f64::from(self.first_px)));
+        let cells = row * self.columns..(row + 1) * self.columns;
+        let (steps, levels) = (&mut self.step[cells.clone()], &mut self.level[cells]);
+        let (mut first, mut end) = (0, 0);
+        for (i, ((step, level), square)) in steps.iter_mut().zip(levels).zip(square).enumerate() {
+            let pixel = place.pixel(width, height);
+            place = place.on(across, 1);
+            let Some(at) = pixel else { continue };
+            let (x, y) = (g.gx[at], g.gy[at]);
+            (*step, *square, *level) = (x * nx + y * ny, x * x + y * y, g.image.data()[at]);
+            // A straight line lies in the image from one column to another.
+            (first, end) = (if end == 0 { i } else { first }, i + 1);
+        }
+        (self.inside[0][row], self.inside[1][row]) = (first as i32, end as i32);
+    }
+
+    /// Sums up where a row is rough, and where its last edges are.
+    #[expect(clippy::inline_always, reason = "as above")]
+    #[inline(always)]
+    fn look_through(&mut self, row: usize, square: &[f32]) {
+        let step = &self.step[row * self.columns..(row + 1) * self.columns];
+        let rough = &mut self.rough[row * (self.columns + 1)..(row + 1) * (self.columns + 1)];
+        let mut sum = 0;
+        for (rough, square) in rough[1..].iter_mut().zip(square) {
+            sum += u16::from(*square > MIN_STEP * MIN_STEP);
+            *rough = sum;
+        }
+        for (outermost, least) in self.outermost.iter_mut().zip(STEPS_OUTSIDE) {
+            let is_edge = |i: &usize| step[*i].abs() > least && along_side(step[*i], square[*i]);
+            outermost[row] = (0..self.columns).rev().find(is_edge).map_or(-1, |i| i as i32);
+        }
+    }
+
+    #[expect(clippy::inline_always, reason = "as above")]
+    #[inline(always)]
+    fn peaks(&self, row: usize, square: &[f32], peaks: &mut Vec<Peak>) {
+        let along = (self.along(row) - 0.5) as f32;
+        let step = &self.step[row * self.columns..(row + 1) * self.columns];
+        for (i, (w, square)) in step.windows(3).zip(&square[1..]).enumerate() {
+            let (a, b, c) = (w[0].abs(), w[1].abs(), w[2].abs());
+            if b < MIN_STEP || b < a || b <= c || !along_side(b, *square) {
+                continue;
+            }
+            let bend = a - 2.0 * b + c;
+            let shift = if bend < 0.0 { (0.5 * (a - c) / bend).clamp(-0.5, 0.5) } else { 0.0 };
+            peaks.push(Peak {
+                row: row as u32,
+                along,
+                offset_px: (self.first_px + i as i32 + 1) as f32 + shift,
+                step: w[1],
+            });
+        }
+    }
+
+    /// Where along the side a row lies, 0 to 1.
+    fn along(&self, row: usize) -> f64 {
+        CORNER_SHARE + (1.0 - 2.0 * CORNER_SHARE) * (row as f64 + 0.5) / self.rows as f64
+    }
+
+    fn at(&self, along_px: f64, offset_px: f64) -> Point2<f64> {
+        self.from + self.direction * along_px + self.normal * offset_px
+    }
+
+    /// The line's ends, beside the ends of the side.
+    pub fn ends(&self, line: &SideLine) -> [Point2<f64>; 2] {
+        [
+            self.at(0.0, line.offset_px - 0.5 * line.slope_px),
+            self.at(self.length_px, line.offset_px + 0.5 * line.slope_px),
+        ]
+    }
+
+    /// What is to be measured along one of its lines.
+    pub fn along_line(&self, line: &SideLine) -> AlongLine<'_> {
+        let mut column = [0; MAX_BAND_SAMPLES];
+        for (row, column) in column.iter_mut().enumerate().take(self.rows) {
+            let at = line.offset_px + line.slope_px * (self.along(row) - 0.5) - f64::from(self.first_px);
+            *column = columns(at);
+        }
+        AlongLine { band: self, column }
+    }
+}
+
+/// The gradient points along the normal to within about 35 degrees.
+#[inline]
+fn along_side(step: f32, square: f32) -> bool {
+    step * step >= MIN_COS * MIN_COS * square
+}
+
+/// Bits behind the point of a column.
+const BITS: u32 = 16;
+
+/// A place between columns in fixed point; far outside any band at most.
+#[inline]
+fn columns(x: f64) -> i32 {
+    const FARTHEST: f64 = 8192.0;
+    (x.clamp(-FARTHEST, FARTHEST) * f64::from(1 << BITS)) as i32
+}
+
+/// A line in its band. Strips beside it go from one offset to another, positive ones outwards.
+#[derive(Debug, Clone)]
+pub struct AlongLine<'a> {
+    band: &'a Band,
+    /// Where it crosses each row, by [`columns`].
+    column: Rows,
+}
+
+impl AlongLine<'_> {
+    /// The columns of a strip that lie in the image, row by row.
+    #[inline]
+    fn strip(&self, (from_px, to_px): (f64, f64)) -> impl Iterator<Item = (usize, std::ops::Range<usize>)> {
+        let (from, to) = (columns(from_px) + (1 << BITS) - 1, columns(to_px));
+        let rows = self.column.iter().zip(self.band.inside[0].iter().zip(&self.band.inside[1]));
+        rows.take(self.band.rows).enumerate().map(move |(row, (at, (first, end)))| {
+            let (low, high) = (((at + from) >> BITS).max(*first), (((at + to) >> BITS) + 1).min(*end));
+            (row, low as usize..high.max(low) as usize)
+        })
+    }
+
+    /// Number of pixels of a strip in the image, and how many of them are not plain.
+    pub fn rough(&self, range_px: (f64, f64)) -> (usize, usize) {
+        let stride = self.band.columns + 1;
+        self.strip(range_px).filter(|(_, columns)| !columns.is_empty()).fold(
+            (0, 0),
+            |(seen, rough), (row, columns)| {
+                let sums = &self.band.rough[row * stride..(row + 1) * stride];
+                (seen + columns.len(), rough + usize::from(sums[columns.end] - sums[columns.start]))
+            },
+        )
+    }
+
+    /// Calls `pixel` with the step and the grey level of every pixel of a strip in the image, and gives their number.
+    #[inline]
+    pub fn pixels(&self, range_px: (f64, f64), mut pixel: impl FnMut(f32, u8)) -> usize {
+        let mut seen = 0;
+        for (row, columns) in self.strip(range_px) {
+            seen += columns.len();
+            let start = row * self.band.columns;
+            for i in start + columns.start..start + columns.end {
+                pixel(self.band.step[i], self.band.level[i]);
+            }
+        }
+        seen
+    }
+
+    /// Share of the samples with an edge along the side further out than `beyond_px`: weak ones, and stronger ones.
+    pub fn edges_outside(&self, beyond_px: f64) -> [f64; 2] {
+        let from = columns(beyond_px) + (1 << BITS) - 1;
+        self.band.outermost.each_ref().map(|outermost| {
+            let rows = outermost.iter().zip(&self.column).take(self.band.rows);
+            let with = rows.filter(|(last, at)| **last >= ((**at + from) >> BITS).max(0)).count();
+            with as f64 / self.band.rows as f64
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        detect::{
+            border_model::side_lines::MAX_LINES,
+            edges::edge_map::{EdgeParams, edges},
+            tests::fixtures::render,
+        },
+        frame::GrayImage,
+    };
+
+    fn band(image: &GrayImage, from: [f64; 2], to: [f64; 2], extent_px: f64) -> Option<Band> {
+        let map = edges(image, &EdgeParams::default());
+        let g = Gradients { image, gx: map.gx(), gy: map.gy() };
+        Band::new(&g, &Point2::from(from), &Point2::from(to), extent_px)
+    }
+
+    #[test]
+    fn lines_beside_a_side_are_found_where_they_are() {
+        // A frame with an inner border 12 px in, and something 20 px above; slightly slanted.
+        let frame = [[50.0, 80.2], [250.0, 84.2], [250.0, 200.0], [50.0, 200.0]];
+        let inner = [[62.0, 92.2], [238.0, 96.2], [238.0, 188.0], [62.0, 188.0]];
+        let above = [[0.0, 10.0], [300.0, 10.0], [300.0, 64.2], [0.0, 58.2]];
+        let image = render(300, 240, 200, &[(above, 120), (frame, 60), (inner, 160)]);
+        let band = band(&image, [50.0, 83.0], [250.0, 83.0], 120.0).unwrap();
+        let offset = |wanted: f64| {
+            let near = |l: &&SideLine| (l.offset_px - wanted).abs() < 0.3;
+            *band.lines.iter().find(near).unwrap_or_else(|| panic!("{wanted}: {:?}", band.lines))
+        };
+        // Out of the quad is up here; the middle of the frame's upper side is at 82.2, of the inner one's at 94.2.
+        let (side, inside, outside) = (offset(0.8), offset(-11.2), offset(21.8));
+        assert!(side.support > 0.95 && side.sign > 0.99 && inside.sign < -0.99 && outside.sign < -0.99);
+        assert!((side.slope_px + 4.0).abs() < 0.3, "{side:?}");
+        let [from, to] = band.ends(&side);
+        assert!((from.y - 80.2).abs() < 0.3 && (to.y - 84.2).abs() < 0.3, "{from} {to}");
+    }
+
+    #[test]
+    fn bands_and_their_lines_are_bounded() {
+        let stripes = GrayImage::from_fn(600, 600, |_, v| if v / 5 % 2 == 0 { 40 } else { 220 });
+        let band_ = band(&stripes, [20.0, 300.0], [580.0, 300.0], 1e6).unwrap();
+        assert_eq!(band_.lines.len(), MAX_LINES);
+        assert!(band_.lines.iter().all(|l| l.offset_px.abs() <= REACH_PX.1 + 1.0));
+        assert!(band(&stripes, [20.0, 300.0], [23.0, 300.0], 100.0).is_none());
+        assert!(band(&stripes, [20.0, 300.0], [f64::NAN, 300.0], 100.0).is_none());
+        // Wholly outside the image there is nothing.
+        assert!(band(&stripes, [-300.0, -300.0], [-200.0, -300.0], 100.0).unwrap().lines.is_empty());
+    }
+
+    #[test]
+    fn strips_are_what_lies_between_two_offsets() {
+        // Grey levels that tell the row of the image; the side runs along row 50, out of the quad is up.
+        let image = GrayImage::from_fn(300, 200, |_, v| v as u8);
+        let band = band(&image, [50.0, 50.0], [250.0, 50.0], 80.0).unwrap();
+        let line = SideLine { offset_px: 0.25, slope_px: 0.0, support: 1.0, sign: 1.0, step: 1.0 };
+        let levels = |range| {
+            let mut all = std::collections::BTreeSet::new();
+            let seen = band.along_line(&line).pixels(range, |_, level| {
+                all.insert(level);
+            });
+            assert_eq!(seen, band.along_line(&line).rough(range).0);
+            (seen / MAX_BAND_SAMPLES, all.into_iter().collect::<Vec<_>>())
+        };
+        // From 1.25 to 4.25 above row 50: rows 48, 47 and 46.
+        assert_eq!(levels((1.0, 4.0)), (3, vec![46, 47, 48]));
+        assert_eq!(levels((-2.25, -0.25)), (3, vec![50, 51, 52]));
+        assert_eq!(levels((4.0, 1.0)), (0, vec![]));
+        // No further than the band is wide: a quarter of 80 px to each side.
+        assert_eq!(levels((18.0, 1e9)), (2, vec![30, 31]));
+    }
+
+    #[test]
+    fn strips_end_at_the_border_of_the_image() {
+        let image = GrayImage::from_fn(300, 200, |u, v| if v < 25 { 0 } else { (u / 2 % 2 * 200) as u8 });
+        // Rows 191 to 199 lie further in, and then nothing.
+        let low = band(&image, [50.0, 190.0], [250.0, 190.0], 200.0).unwrap();
+        let band = band(&image, [50.0, 28.0], [250.0, 28.0], 200.0).unwrap();
+        let line = SideLine { offset_px: 0.0, slope_px: 0.0, support: 1.0, sign: 1.0, step: 1.0 };
+        assert_eq!(low.along_line(&line).rough((-40.0, -0.5)).0, 9 * MAX_BAND_SAMPLES);
+        let along = band.along_line(&line);
+        // Rows 27 to 0 of the image lie further out, however wide the strip.
+        assert_eq!(along.rough((0.5, 40.0)).0, 28 * MAX_BAND_SAMPLES);
+        let (seen, rough) = along.rough((-20.0, -3.0));
+        assert_eq!((seen, rough), (18 * MAX_BAND_SAMPLES, 18 * MAX_BAND_SAMPLES));
+        assert_eq!(along.rough((18.0, 40.0)).1, 0);
+        assert!(along.edges_outside(18.0).iter().all(|share| *share <= 0.0));
+        assert!(along.edges_outside(-18.0).iter().all(|share| *share >= 1.0));
+    }
+}

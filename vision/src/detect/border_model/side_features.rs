@@ -1,0 +1,315 @@
+//! Which of the lines beside each side of a quad is its border: the shadow under a frame, the inner edge of a mat and
+//! the edge of the picture next to it all look like sides. A quad in, the same with every side on its likeliest line
+//! out. Measurements of each line are weighed by a small network that was fitted on labelled photographs.
+//!
+//! Departs from method 3.6, which refits a side on the nearest edge only. See docs/method/24-default-detector.md.
+
+use crate::detect::{
+    border_model::{
+        side_band::{AlongLine, Band, MIN_STEP},
+        side_lines::SideLine,
+    },
+    edge_support::{fixed_point::Fixed, gradients::Gradients},
+};
+use nalgebra::{Point2, Vector2};
+
+/// Measurements of a line that rest on its band alone.
+pub(crate) const BAND_FEATURES: usize = 20;
+/// Measurements of the two corners it makes.
+pub(crate) const CORNER_FEATURES: usize = 8;
+/// Number of measurements of a line.
+pub const SIDE_FEATURES: usize = BAND_FEATURES + CORNER_FEATURES;
+/// What was measured of the line of a side.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct SideMeasurement {
+    /// See [`choose_sides`].
+    pub features: [f64; SIDE_FEATURES],
+    /// What can be compared between sides only.
+    pub tones: LogGreyLevels,
+}
+
+/// Tones beside a line: logs of grey levels, 8 added.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct LogGreyLevels {
+    /// Some way outside, where the wall is.
+    pub wall: f64,
+    /// Just outside.
+    pub outside: f64,
+    /// Just inside.
+    pub inside: f64,
+    /// Log of the step in grey levels, 2 added, positive where it is brighter on the one side; times how alike its signs
+    /// are.
+    pub step: f64,
+}
+
+pub(crate) fn joined(band: &[f64; BAND_FEATURES], corners: &[f64; CORNER_FEATURES]) -> [f64; SIDE_FEATURES] {
+    let mut features = [0.0; SIDE_FEATURES];
+    features[..BAND_FEATURES].copy_from_slice(band);
+    features[BAND_FEATURES..].copy_from_slice(corners);
+    features
+}
+
+/// The ends of the line chosen for each side.
+pub(crate) type Ends = [[Point2<f64>; 2]; 4];
+/// The sides that each side meets, with what they usually do: the one before it and the one after it.
+pub(crate) type Met = [[Option<Neighbour>; 2]; 4];
+
+/// A side as seen from one that it meets.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Neighbour {
+    ends: [Point2<f64>; 2],
+    along: Vector2<f64>,
+    /// Mean step over most of its length, away from the corner.
+    usual: f64,
+}
+
+/// A quad's sides with the bands around them.
+pub(crate) struct Sides<'a> {
+    g: &'a Gradients<'a>,
+    corners: [Point2<f64>; 4],
+    extent_px: [f64; 4],
+    bands: [Option<Band>; 4],
+}
+
+impl<'a> Sides<'a> {
+    pub(crate) fn new(g: &'a Gradients<'a>, corners: &[Point2<f64>; 4]) -> Self {
+        let length = |i: usize| (corners[(i + 1) % 4] - corners[i % 4]).norm();
+        let extent_px: [f64; 4] = std::array::from_fn(|i| length(i + 1).min(length(i + 3)));
+        let bands = std::array::from_fn(|i| Band::new(g, &corners[i], &corners[(i + 1) % 4], extent_px[i]));
+        Self { g, corners: *corners, extent_px, bands }
+    }
+
+    pub(crate) fn lines(&self, side: usize) -> &[SideLine] {
+        self.bands[side].as_ref().map_or(&[], |b| &b.lines)
+    }
+
+    pub(crate) fn line_ends(&self, side: usize, line: usize) -> [Point2<f64>; 2] {
+        match &self.bands[side] {
+            Some(band) => band.ends(&band.lines[line]),
+            None => [self.corners[side], self.corners[(side + 1) % 4]],
+        }
+    }
+
+    /// The line nearest to the side itself.
+    pub(crate) fn nearest(&self, side: usize) -> Option<usize> {
+        let lines = self.lines(side);
+        let far = |l: &SideLine| l.offset_px.abs() + l.slope_px.abs();
+        (0..lines.len()).min_by(|a, b| far(&lines[*a]).total_cmp(&far(&lines[*b])).then(a.cmp(b)))
+    }
+
+    /// The chosen lines; a side without one stays.
+    pub(crate) fn ends(&self, chosen: &[Option<usize>; 4]) -> Ends {
+        std::array::from_fn(|i| match chosen[i] {
+            Some(line) => self.line_ends(i, line),
+            None => [self.corners[i], self.corners[(i + 1) % 4]],
+        })
+    }
+
+    /// What each side meets when these lines are chosen.
+    pub(crate) fn met(&self, chosen: &[Option<usize>; 4]) -> Met {
+        let ends = self.ends(chosen);
+        let neighbour = |ends: [Point2<f64>; 2], shares: [f64; 2]| {
+            let along = (ends[1] - ends[0]).try_normalize(1e-9)?;
+            let [p, q] = shares.map(|share| ends[0] + (ends[1] - ends[0]) * share);
+            Some(Neighbour { ends, along, usual: step_along(self.g, &p, &q, 24).0 })
+        };
+        std::array::from_fn(|i| {
+            [neighbour(ends[(i + 3) % 4], [0.2, 0.75]), neighbour(ends[(i + 1) % 4], [0.25, 0.8])]
+        })
+    }
+
+    /// 0 support, 1 how alike the signs of its steps are, 2 log of the step; roughness of the strips beside it: 3 just
+    /// outside, 4 further outside, 5 and 6 the same inside; log ratio of grey just outside to the wall further out,
+    /// 7 signed and 8 absolute, 9 and 10 the same of just inside; 11 log of blur; 12 weight of the heaviest line further
+    /// out and 13 further in, 14 largest support further out, 15 number of lines further out; share of samples with
+    /// an edge further out, 16 weak and 17 stronger; 18 how much the strip to the next line inside looks like a shadow on
+    /// the wall, 19 the strip from the next line outside.
+    pub(crate) fn band_features(&self, side: usize, line: usize) -> ([f64; BAND_FEATURES], LogGreyLevels) {
+        let Some(band) = &self.bands[side] else { return ([0.0; BAND_FEATURES], LogGreyLevels::default()) };
+        let (c, extent) = (band.lines[line], self.extent_px[side]);
+        let broad = (0.12 * extent).max(8.0);
+        let along = band.along_line(&c);
+        let rough = |range| roughness(&along, range);
+        let inside = level(&along, (-5.0, -1.5));
+        let outside = level(&along, (1.5, 5.0)).or(inside).unwrap_or(0.0);
+        let wall = level(&along, ((0.08 * extent).max(6.0), (0.2 * extent).max(12.0))).unwrap_or(outside);
+        let inside = inside.unwrap_or(outside);
+        let darker = |grey: f64| ((grey + 8.0) / (wall + 8.0)).ln();
+        let (out_ratio, in_ratio) = (darker(outside), darker(inside));
+        let outer = || band.lines.iter().filter(|l| l.offset_px > c.offset_px + 1.5);
+        let inner = || band.lines.iter().filter(|l| l.offset_px < c.offset_px - 1.5);
+        let weight = |l: &SideLine| l.support * (l.step + 2.0).ln();
+        let most = |a: f64, b: f64| a.max(b);
+        let next_in = inner().max_by(|a, b| a.offset_px.total_cmp(&b.offset_px));
+        let next_out = outer().min_by(|a, b| a.offset_px.total_cmp(&b.offset_px));
+        let [weak, stronger] = along.edges_outside(2.5);
+        let log = |grey: f64| (grey + 8.0).ln();
+        let tones = LogGreyLevels {
+            wall: log(wall),
+            outside: log(outside),
+            inside: log(inside),
+            step: c.sign * (c.step + 2.0).ln(),
+        };
+        let features = [
+            c.support,
+            c.sign.abs(),
+            (c.step + 2.0).ln(),
+            rough((2.5, 6.0)),
+            rough((2.5, broad)),
+            rough((-6.0, -2.5)),
+            rough((-broad, -2.5)),
+            out_ratio,
+            out_ratio.abs(),
+            in_ratio,
+            in_ratio.abs(),
+            blur(&along),
+            outer().map(weight).fold(0.0, most),
+            inner().map(weight).fold(0.0, most),
+            outer().map(|l| l.support).fold(0.0, most),
+            outer().count() as f64 / 5.0,
+            weak,
+            stronger,
+            next_in.map_or(0.0, |i| shadow(&along, c.offset_px - i.offset_px)),
+            next_out.map_or(0.0, |o| shadow(&band.along_line(o), o.offset_px - c.offset_px)),
+        ];
+        (features, tones)
+    }
+
+    /// What the two neighbouring sides do at the corners with a line, as a share of what they do along their own length:
+    /// at the border of a thing they are there just before the corner and gone just after. Of the two: 0 smallest and 1
+    /// mean step inwards, 2 smallest support inwards, 3 largest step outwards, 4 largest and 5 mean support outwards, 6
+    /// largest difference of the inward step from the side's own, 7 mean step outwards.
+    pub(crate) fn corner_features(
+        &self,
+        side: usize,
+        line: usize,
+        met: &[Option<Neighbour>; 2],
+    ) -> [f64; CORNER_FEATURES] {
+        let own = self.line_ends(side, line);
+        let section = (0.07 * self.extent_px[side]).max(6.0);
+        let look = |neighbour: &Option<Neighbour>, before: bool| {
+            let Neighbour { ends, along, usual } = (*neighbour)?;
+            let corner = meet(&own, &ends)?;
+            // Along the neighbour away from the corner, into the quad; both ways it is walked as its side is.
+            let between = |a: f64, b: f64| {
+                let (p, q) = if before { (-b, -a) } else { (a, b) };
+                step_along(self.g, &(corner + along * p.min(q)), &(corner + along * p.max(q)), 10)
+            };
+            let share = |step: f64| {
+                let usual = if usual.abs() > 2.0 { usual } else { 2.0_f64.copysign(usual) };
+                (step / usual).clamp(-1.0, 1.5)
+            };
+            let (inner, outer) = (between(1.5, section), between(-1.5, -6.0));
+            Some([share(inner.0), inner.1, share(outer.0), outer.1, (inner.0 - usual).abs() / 20.0])
+        };
+        let [Some(a), Some(b)] = [look(&met[0], true), look(&met[1], false)] else {
+            return [0.0; CORNER_FEATURES];
+        };
+        [
+            a[0].min(b[0]),
+            f64::midpoint(a[0], b[0]),
+            a[1].min(b[1]),
+            a[2].max(b[2]),
+            a[3].max(b[3]),
+            f64::midpoint(a[3], b[3]),
+            a[4].max(b[4]),
+            f64::midpoint(a[2], b[2]),
+        ]
+    }
+}
+
+/// Share of a strip that is not plain.
+fn roughness(along: &AlongLine, range_px: (f64, f64)) -> f64 {
+    let (seen, rough) = along.rough(range_px);
+    if seen > MIN_CELLS { rough as f64 / seen as f64 } else { 0.0 }
+}
+
+/// Strips of fewer pixels in the image say nothing.
+const MIN_CELLS: usize = 20;
+
+/// Median grey level of a strip.
+fn level(along: &AlongLine, range_px: (f64, f64)) -> Option<f64> {
+    let mut counts = [0_u32; 256];
+    let seen = along.pixels(range_px, |_, level| counts[usize::from(level)] += 1);
+    if seen <= MIN_CELLS {
+        return None;
+    }
+    let mut left = seen as u32 / 2;
+    counts
+        .iter()
+        .position(|n| {
+            if *n > left {
+                true
+            } else {
+                left -= n;
+                false
+            }
+        })
+        .map(|l| l as f64)
+}
+
+/// Log of the step 2 px beside the line over the step on it: high for a soft edge.
+fn blur(along: &AlongLine) -> f64 {
+    let mean = |range| {
+        let mut sum = 0.0;
+        let seen = along.pixels(range, |step, _| sum += f64::from(step.abs()));
+        if seen > 0 { sum / seen as f64 } else { 0.0 }
+    };
+    ((mean((1.6, 2.6)) + mean((-2.6, -1.6)) + 1.0) / (mean((-0.6, 0.6)) + 1.0)).ln()
+}
+
+/// How much the strip of some width inside a line looks like a shadow on the wall outside: plain, and darker by about
+/// 0.6.
+fn shadow(along: &AlongLine, width_px: f64) -> f64 {
+    if width_px < 4.0 {
+        return 0.0;
+    }
+    let between = (1.5 - width_px, -1.5);
+    let (Some(within), Some(wall)) = (level(along, between), level(along, (1.5, 8.0))) else {
+        return 0.0;
+    };
+    let ratio = within / (wall + 1.0);
+    (1.0 - roughness(along, between)) * (1.0 - (ratio - 0.6).abs() / 0.35).max(0.0)
+}
+
+/// Mean signed step across the way from `p` to `q`, the strongest within a pixel that follows it, and the share of
+/// samples that have one. Samples outside the image count 0.
+fn step_along(g: &Gradients, p: &Point2<f64>, q: &Point2<f64>, samples: usize) -> (f64, f64) {
+    let Some(along) = (q - p).try_normalize(1e-6) else { return (0.0, 0.0) };
+    let across = Vector2::new(along.y, -along.x);
+    let normal = across.cast().into();
+    let stride = (q - p) / samples as f64;
+    let (start, stride, across) =
+        (Fixed::point(&(p + stride * 0.5)), Fixed::step(&stride), Fixed::step(&across));
+    let (mut sum, mut with) = (0.0, 0_usize);
+    for i in 0..samples as i64 {
+        let foot = start.on(stride, i);
+        let mut best = 0.0_f32;
+        for offset in [-1, 0, 1] {
+            let step = g.step_following(foot.on(across, offset), normal).unwrap_or(0.0);
+            if step.abs() > best.abs() {
+                best = step;
+            }
+        }
+        sum += f64::from(best);
+        with += usize::from(best.abs() > MIN_STEP);
+    }
+    (sum / samples as f64, with as f64 / samples as f64)
+}
+
+fn meet(a: &[Point2<f64>; 2], b: &[Point2<f64>; 2]) -> Option<Point2<f64>> {
+    let (along_a, along_b) = (a[1] - a[0], b[1] - b[0]);
+    let determinant = along_a.perp(&along_b);
+    if determinant.abs() < 1e-6 {
+        return None;
+    }
+    Some(a[0] + along_a * ((b[0] - a[0]).perp(&along_b) / determinant))
+}
+
+pub(crate) fn meet_all(ends: &Ends) -> Option<[Point2<f64>; 4]> {
+    let mut corners = [Point2::origin(); 4];
+    for i in 0..4 {
+        corners[i] = meet(&ends[(i + 3) % 4], &ends[i])?;
+    }
+    Some(corners)
+}

@@ -1,0 +1,179 @@
+//! From grey image to quads, one stage a file (method 1 to 3).
+
+use crate::{
+    detect::{
+        edge_buffers::{DetectBuffers, MAX_SCALES},
+        edge_support::gradients::Gradients,
+        edges::edge_map::EdgeMap,
+        params::{DetectParams, Grouping, Nested},
+        proposals::{quad_proposals::hypotheses, three_sided::leftover},
+        pyramid::{reduce, working_factor},
+        quad::Quad,
+        refine::{
+            full_size::at_full_size,
+            rating::{ScoredQuad, rate},
+            refit::refit_corners,
+        },
+        relaxation::{grouping::match_pairs, paired_quads::quads as quads_of_pairs, similarity::pairs},
+        segments::{
+            chains::chains,
+            edge_segments::{EdgeSegment, segments as straight_segments},
+        },
+        suppression::{
+            nested_borders::{by_corners, canonical},
+            nested_quads::absorb,
+            non_maximum::{snap_sides, suppress_non_maxima, suppress_overlaps},
+        },
+        tiling::floor_tiling::{Untiled, untile},
+    },
+    frame::GrayImage,
+    trace::{Stage, Trace},
+};
+
+/// Most quads of one image, the best first.
+pub const MAX_QUADS: usize = 64;
+
+/// Finds the quads of an image, best first; ties by corners. At most [`MAX_QUADS`]. Same image, same quads.
+pub fn detect(image: &GrayImage, p: &DetectParams, trace: &mut impl Trace) -> Vec<Quad> {
+    detect_with(&mut DetectBuffers::default(), image, p, trace)
+}
+
+/// [`detect`] in the memory of earlier images.
+pub fn detect_with(
+    memory: &mut DetectBuffers,
+    image: &GrayImage,
+    p: &DetectParams,
+    trace: &mut impl Trace,
+) -> Vec<Quad> {
+    let mut quads = match p.quads.grouping {
+        Grouping::Relaxation => by_relaxation(memory, image, p, trace),
+        Grouping::Hypotheses => by_search(memory, image, p, trace),
+    };
+    quads.truncate(MAX_QUADS);
+    trace.quads(&quads);
+    trace.finished(Stage::Quads);
+    quads
+}
+
+/// The paper's way: pairs by similarity, both relaxations, sets of three sides.
+fn by_relaxation(
+    memory: &mut DetectBuffers,
+    image: &GrayImage,
+    p: &DetectParams,
+    trace: &mut impl Trace,
+) -> Vec<Quad> {
+    let (edges, segments) = traced_segments(memory, image, p, trace);
+    let candidates = pairs(&segments, image, &p.similarity);
+    let matched = match_pairs(&segments, &candidates, p.similarity.min_score, &p.relaxation);
+    let pairs: Vec<_> = matched.iter().map(|i| candidates[*i].clone()).collect();
+    trace.pairs(&pairs);
+    trace.finished(Stage::Pairs);
+    let gradients = Gradients { image, gx: edges.gx(), gy: edges.gy() };
+    let quads = quads_of_pairs(&segments, &pairs, &gradients, p);
+    memory.give_back(edges);
+    quads
+}
+
+/// The search, on one scale or several. Coordinates of the trace are those of the working scale.
+fn by_search(
+    memory: &mut DetectBuffers,
+    image: &GrayImage,
+    p: &DetectParams,
+    trace: &mut impl Trace,
+) -> Vec<Quad> {
+    let factor = working_factor(image, p.quads.working_side_px);
+    let reduced = (factor > 1).then(|| reduce(image, factor));
+    let work = reduced.as_ref().unwrap_or(image);
+    let (rated, edges, segments) = searched(memory, work, p, trace);
+    let gradients = Gradients { image: work, gx: edges.gx(), gy: edges.gy() };
+    let found: Vec<Quad> = if p.quads.choose_sides {
+        suppress_non_maxima(snap_sides(rated, &gradients, &p.quads), &p.quads)
+    } else {
+        suppress_overlaps(rated, &p.quads)
+    };
+    let tolerance = p.relaxation.pair_tolerance_px;
+    let quads = canonical(found, p.quads.nested_iou, p.quads.min_side_support, tolerance);
+    let quads = match p.quads.nested {
+        Nested::Alternates => absorb(quads, tolerance),
+        Nested::Quads => quads,
+    };
+    let mut quads: Vec<Quad> = quads.into_iter().map(|q| refit_corners(q, &gradients, &p.quads)).collect();
+    if p.quads.three_sided {
+        let open = leftover(&segments, &quads, &gradients, p);
+        // They never take the place of a full quad.
+        quads.truncate(MAX_QUADS);
+        let room = MAX_QUADS - quads.len();
+        quads.extend(open.into_iter().take(room));
+        quads.sort_by(|a, b| b.score.total_cmp(&a.score).then(by_corners(a, b)));
+    }
+    memory.give_back(edges);
+    let quads = quads.into_iter().filter_map(|q| q.scaled(factor as f64)).collect();
+    at_full_size(quads, image, factor, p, memory)
+}
+
+/// Everything the search proposes on the scales of an image, rated, not yet chosen from; and the finest edge map.
+pub fn scored_quads(
+    work: &GrayImage,
+    p: &DetectParams,
+    trace: &mut impl Trace,
+) -> (Vec<ScoredQuad>, EdgeMap) {
+    let (rated, edges, _) = searched(&mut DetectBuffers::default(), work, p, trace);
+    (rated, edges)
+}
+
+/// The same with the finest segments.
+fn searched(
+    memory: &mut DetectBuffers,
+    work: &GrayImage,
+    p: &DetectParams,
+    trace: &mut impl Trace,
+) -> (Vec<ScoredQuad>, EdgeMap, Vec<EdgeSegment>) {
+    let (edges, segments) = traced_segments(memory, work, p, trace);
+    let gradients = Gradients { image: work, gx: edges.gx(), gy: edges.gy() };
+    let seeds = hypotheses(&segments, &gradients, &p.quads.hypotheses);
+    trace.seeds(&seeds);
+    trace.finished(Stage::Pairs);
+    let mut rated = rate(&seeds, &gradients, &p.quads);
+    let mut scale = 1;
+    for _ in 1..p.quads.scales.clamp(1, MAX_SCALES) {
+        scale *= 2;
+        if work.width() / scale < MIN_LEVEL_SIDE_PX || work.height() / scale < MIN_LEVEL_SIDE_PX {
+            break;
+        }
+        let level = reduce(work, scale);
+        let edges = memory.edges(&level, &p.edges);
+        let segments = straight_segments(&chains(&edges, &p.chains), &edges, &p.segments);
+        let segments = untile(segments, (level.width(), level.height()), &p.tiling).kept;
+        let gradients = Gradients { image: &level, gx: edges.gx(), gy: edges.gy() };
+        let seeds = hypotheses(&segments, &gradients, &p.quads.hypotheses);
+        let coarse = rate(&seeds, &gradients, &p.quads);
+        rated.extend(coarse.into_iter().filter_map(|r| r.scaled(scale as f64)));
+        memory.give_back(edges);
+    }
+    (rated, edges, segments)
+}
+
+/// No scale is smaller than this.
+const MIN_LEVEL_SIDE_PX: usize = 80;
+
+fn traced_segments(
+    memory: &mut DetectBuffers,
+    image: &GrayImage,
+    p: &DetectParams,
+    trace: &mut impl Trace,
+) -> (EdgeMap, Vec<EdgeSegment>) {
+    let edges = memory.edges(image, &p.edges);
+    trace.edges(&edges);
+    trace.finished(Stage::Edges);
+    let chains = chains(&edges, &p.chains);
+    trace.chains(&chains);
+    trace.finished(Stage::Chains);
+    let segments = straight_segments(&chains, &edges, &p.segments);
+    let Untiled { kept: segments, removed } = untile(segments, (image.width(), image.height()), &p.tiling);
+    if !removed.is_empty() {
+        trace.tiling(&removed);
+    }
+    trace.segments(&segments);
+    trace.finished(Stage::Segments);
+    (edges, segments)
+}

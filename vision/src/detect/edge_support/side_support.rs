@@ -1,0 +1,305 @@
+//! What the gradient planes say about a supposed side: which share of it an edge supports, and where that edge runs
+//! to a fraction of a pixel (method 3.6). Takes two points, gives a line with its variance; forms no hypotheses.
+
+use crate::detect::edge_support::{
+    fixed_point::Fixed,
+    gradients::{Gradients, MIN_COS, across},
+    side_fit::{EdgePoint, FittedLine, fit},
+};
+use nalgebra::{Point2, Vector2};
+
+/// Most samples taken along one side.
+pub const MAX_SAMPLES: usize = 96;
+/// Fewest samples taken along one side.
+const MIN_SAMPLES: usize = 12;
+/// Share of a side left out at both ends: near a corner the other side's gradient mixes in.
+pub(crate) const CORNER_SHARE: f64 = 0.04;
+/// How a side is searched.
+#[derive(Debug, Clone, Copy)]
+pub struct EdgeProbeParams {
+    /// How far from the supposed side its edge may lie.
+    pub reach_px: f64,
+    /// Smallest step height of an edge point, in grey levels.
+    pub min_step: f64,
+    /// Most samples along a side; [`MAX_SAMPLES`] for the best line.
+    pub samples: usize,
+    /// Read the gradient between pixels, for the best line, or at the nearest, which is quicker.
+    pub between_pixels: bool,
+    /// Support of a side below which nothing else is asked of it; 0 for all there is to know.
+    pub least_support: f64,
+}
+
+/// What was found along a side.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SideSupport {
+    /// Share of the samples inside the image that have an edge along the side, 0 to 1.
+    pub support: f64,
+    /// Share of the edge points with the more frequent sign, 0.5 to 1; 0 without points.
+    pub agreement: f64,
+    /// Mean step height over all samples, in grey levels, unsupported samples counting 0.
+    pub strength: f64,
+    /// The refitted line, if there were points enough.
+    pub line: Option<FittedLine>,
+}
+
+impl SideSupport {
+    pub(crate) const NONE: Self = Self { support: 0.0, agreement: 0.0, strength: 0.0, line: None };
+}
+
+/// The edge points along the way from one point to another.
+#[derive(Debug, Clone)]
+pub(crate) struct SidePoints {
+    from: Point2<f64>,
+    direction: Vector2<f64>,
+    normal: Vector2<f64>,
+    length_px: f64,
+    /// Number of samples inside the image.
+    seen: usize,
+    points: Vec<EdgePoint>,
+}
+
+/// Looks for an edge along the way from `from` to `to`.
+pub fn measure(g: &Gradients, from: &Point2<f64>, to: &Point2<f64>, search: EdgeProbeParams) -> SideSupport {
+    let found = SidePoints::new(g, from, to, EdgeProbeParams { least_support: 0.0, ..search });
+    found.map_or(SideSupport::NONE, |s| s.evidence())
+}
+
+impl SidePoints {
+    /// Looks for edge points along the way from `from` to `to`. None once the support cannot reach what is asked for.
+    pub(crate) fn new(
+        g: &Gradients,
+        from: &Point2<f64>,
+        to: &Point2<f64>,
+        search: EdgeProbeParams,
+    ) -> Option<Self> {
+        let side = to - from;
+        let length_px = side.norm();
+        if !length_px.is_finite() || length_px < 1.0 || g.width() < 2 || g.height() < 2 {
+            return None;
+        }
+        let direction = side / length_px;
+        let normal = Vector2::new(direction.y, -direction.x);
+        let count =
+            ((length_px / 2.0) as usize).clamp(MIN_SAMPLES, search.samples.clamp(MIN_SAMPLES, MAX_SAMPLES));
+        let mut looked =
+            Self { from: *from, direction, normal, length_px, seen: 0, points: Vec::with_capacity(count) };
+        let across = Across::new(&normal, search);
+        let most_missed = (1.0 - search.least_support) * count as f64;
+        for i in scattered(count) {
+            let along_px = share_along(i, count) * length_px;
+            let (inside, found) = across.strongest(g, &(from + direction * along_px));
+            looked.seen += usize::from(inside);
+            looked.points.extend(found.map(|(offset_px, step)| EdgePoint { along_px, offset_px, step }));
+            if (looked.seen - looked.points.len()) as f64 > most_missed {
+                return None;
+            }
+        }
+        Some(looked)
+    }
+
+    /// What the points say of the side.
+    pub(crate) fn evidence(&self) -> SideSupport {
+        if self.seen == 0 || self.points.is_empty() {
+            return SideSupport::NONE;
+        }
+        let n = self.points.len();
+        let positive = self.points.iter().filter(|p| p.step > 0.0).count();
+        SideSupport {
+            support: n as f64 / self.seen as f64,
+            agreement: positive.max(n - positive) as f64 / n as f64,
+            strength: self.points.iter().map(|p| p.step.abs()).sum::<f64>() / self.seen as f64,
+            line: fit(&self.points, self.length_px)
+                .map(|f| f.line(&self.from, &self.direction, &self.normal)),
+        }
+    }
+}
+
+/// The numbers below `count`, each once, far from one another one after the other: a bad side shows before all of its
+/// samples are taken.
+pub(crate) fn scattered(count: usize) -> impl Iterator<Item = usize> {
+    // Two primes whose product is above every count: one of them is no factor.
+    let stride = if count.is_multiple_of(STRIDES[0]) { STRIDES[1] } else { STRIDES[0] };
+    (0..count).map(move |i| i * stride % count)
+}
+
+const STRIDES: [usize; 2] = [7, 17];
+
+/// Where along a side a sample lies, 0 to 1.
+pub(crate) fn share_along(sample: usize, count: usize) -> f64 {
+    CORNER_SHARE + (1.0 - 2.0 * CORNER_SHARE) * (sample as f64 + 0.5) / count as f64
+}
+
+/// Where the edge that runs from `from` through `to` ends: the last supported point on the line beyond `to`.
+pub fn run_end(g: &Gradients, from: &Point2<f64>, to: &Point2<f64>, min_step: f64) -> Point2<f64> {
+    /// Steps of 2 px without an edge that end the run.
+    const MAX_MISSES: usize = 4;
+    /// No image is longer.
+    const MAX_STEPS: i64 = 8192;
+    let length = (to - from).norm();
+    if length.is_nan() || length < 1.0 {
+        return *to;
+    }
+    let (direction, min_step) = ((to - from) / length, min_step as f32);
+    let across = Vector2::new(direction.y, -direction.x);
+    let normal = across.cast().into();
+    let (start, along, across) = (Fixed::point(to), Fixed::step(&direction), Fixed::step(&across));
+    let (mut end, mut misses) = (0, 0);
+    for i in 1..MAX_STEPS {
+        let foot = start.on(along, 2 * i);
+        let Some(here) = g.follows(foot, normal, min_step) else { break };
+        let beside = |offset: i64| g.follows(foot.on(across, offset), normal, min_step) == Some(true);
+        if here || beside(-1) || beside(1) {
+            (end, misses) = (i, 0);
+        } else {
+            misses += 1;
+            if misses > MAX_MISSES {
+                break;
+            }
+        }
+    }
+    to + direction * (2 * end) as f64
+}
+
+/// Most pixels looked at to each side of a foot.
+const MAX_REACH_PX: usize = 16;
+/// Pixels across a side at most: one more at both ends, to tell whether the strongest is a peak.
+const MAX_ACROSS: usize = 2 * MAX_REACH_PX + 3;
+
+/// The look across a side for its edge.
+struct Across {
+    normal: Vector2<f64>,
+    facing: [f32; 2],
+    step: Fixed,
+    reach: usize,
+    min_step: f32,
+    between_pixels: bool,
+}
+
+impl Across {
+    fn new(normal: &Vector2<f64>, search: EdgeProbeParams) -> Self {
+        Self {
+            normal: *normal,
+            facing: normal.cast().into(),
+            step: Fixed::step(normal),
+            reach: (search.reach_px.round() as usize).clamp(1, MAX_REACH_PX),
+            min_step: search.min_step as f32,
+            between_pixels: search.between_pixels,
+        }
+    }
+
+    /// Strongest edge across the side at `foot`: whether the foot lies in the image, and the edge's offset and signed
+    /// step height. The gradient must point along the normal to within about 35 degrees.
+    fn strongest(&self, g: &Gradients, foot: &Point2<f64>) -> (bool, Option<(f64, f64)>) {
+        let from = -(self.reach as i64) - 1;
+        if self.between_pixels {
+            self.among(|i| {
+                let p = foot + self.normal * (i as i64 + from) as f64;
+                g.sample(p.x, p.y)
+            })
+        } else {
+            let start = Fixed::point(foot).on(self.step, from);
+            self.among(|i| g.nearest(start.on(self.step, i as i64)))
+        }
+    }
+
+    /// [`Self::strongest`] among the gradients at steps of a pixel; none outside the image, where nothing is known.
+    #[inline]
+    fn among(&self, gradient: impl Fn(usize) -> Option<[f32; 2]>) -> (bool, Option<(f64, f64)>) {
+        let mut steps = [f32::NAN; MAX_ACROSS];
+        let last = 2 * self.reach + 2;
+        let (mut at, mut best) = (0, 0.0_f32);
+        for (i, slot) in steps.iter_mut().enumerate().take(last + 1) {
+            let Some(v) = gradient(i) else { continue };
+            let (step, square) = across(v, self.facing);
+            *slot = step;
+            let follows = step.abs() >= self.min_step && step * step >= MIN_COS * MIN_COS * square;
+            if follows && i != 0 && i != last && (at == 0 || step.abs() > best.abs()) {
+                (at, best) = (i, step);
+            }
+        }
+        if steps[self.reach + 1].is_nan() {
+            return (false, None);
+        }
+        if at == 0 {
+            return (true, None);
+        }
+        let known = |step: f32| if step.is_nan() { best.abs() } else { step * best.signum() };
+        let (a, b, c) = (known(steps[at - 1]), best.abs(), known(steps[at + 1]));
+        // At the end of the reach a still rising gradient belongs to another edge.
+        let peak = a <= b && c <= b;
+        let bend = a - 2.0 * b + c;
+        let shift = if bend < 0.0 { (0.5 * (a - c) / bend).clamp(-0.5, 0.5) } else { 0.0 };
+        let offset_px = at as f64 - self.reach as f64 - 1.0 + f64::from(shift);
+        (true, peak.then_some((offset_px, f64::from(best))))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        detect::{
+            edges::edge_map::{EdgeParams, edges},
+            tests::fixtures::render,
+        },
+        frame::GrayImage,
+    };
+
+    const FULL: EdgeProbeParams = EdgeProbeParams {
+        reach_px: 3.0,
+        min_step: 6.0,
+        samples: MAX_SAMPLES,
+        between_pixels: true,
+        least_support: 0.0,
+    };
+
+    #[test]
+    fn every_sample_is_looked_at_once() {
+        for count in MIN_SAMPLES..=MAX_SAMPLES {
+            let mut all: Vec<usize> = scattered(count).collect();
+            all.sort_unstable();
+            assert!(all.into_iter().eq(0..count), "{count}");
+        }
+    }
+
+    #[test]
+    fn a_side_is_placed_to_a_tenth_of_a_pixel() {
+        let quad = [[30.0, 40.3], [170.0, 52.3], [165.0, 140.0], [35.0, 140.0]];
+        let image = render(200, 180, 200, &[(quad, 60)]);
+        let map = edges(&image, &EdgeParams::default());
+        let g = Gradients { image: &image, gx: map.gx(), gy: map.gy() };
+        let (from, to) = (Point2::from(quad[0]), Point2::from(quad[1]));
+        // The supposed side is a pixel and a half off.
+        let shift = Vector2::new(0.0, 1.5);
+        let found = measure(&g, &(from + shift), &(to + shift), FULL);
+        assert!(found.support > 0.95 && found.agreement > 0.99 && found.strength > 100.0, "{found:?}");
+        let line = found.line.expect("a line");
+        for p in [from, to] {
+            assert!((line.normal.dot(&p.coords) - line.rho_px).abs() < 0.1);
+            assert!(line.variance_at(&p) > 0.0 && line.variance_at(&p) < 0.05);
+        }
+        // Out of a polygon that is walked clockwise: upwards here.
+        assert!(line.normal.y < -0.9);
+        // Beside the quad there is nothing.
+        let away = Vector2::new(0.0, -20.0);
+        assert!(measure(&g, &(from + away), &(to + away), FULL).support < 0.05);
+        // The run from the middle of the side ends at its corner.
+        let end = run_end(&g, &from, &nalgebra::center(&from, &to), 6.0);
+        assert!((end - to).norm() < 6.0, "{end:?}");
+    }
+
+    #[test]
+    fn half_a_side_is_half_supported() {
+        let image = GrayImage::from_fn(120, 80, |u, v| if v >= 40 && u < 60 { 60 } else { 200 });
+        let map = edges(&image, &EdgeParams::default());
+        let g = Gradients { image: &image, gx: map.gx(), gy: map.gy() };
+        let found = measure(&g, &Point2::new(10.0, 39.5), &Point2::new(110.0, 39.5), FULL);
+        assert!((found.support - 0.5).abs() < 0.06, "{found:?}");
+        // Whoever asks for more than there is gets nothing, and for less the same.
+        let (from, to) = (Point2::new(10.0, 39.5), Point2::new(110.0, 39.5));
+        let asked =
+            |least_support| SidePoints::new(&g, &from, &to, EdgeProbeParams { least_support, ..FULL });
+        assert!(asked(0.6).is_none());
+        assert_eq!(asked(0.4).unwrap().evidence(), found);
+    }
+}

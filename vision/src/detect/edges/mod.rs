@@ -1,0 +1,7 @@
+//! Grey image in, edges one pixel wide out (method 1.1, 1.2).
+
+pub(crate) mod row_transpose;
+pub(crate) mod deriche;
+pub(crate) mod maxima;
+pub(crate) mod thinning;
+pub mod edge_map;

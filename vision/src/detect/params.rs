@@ -1,0 +1,152 @@
+//! Parameters from image to quads.
+
+use crate::detect::{
+    border_model::{
+        network::Network, network_weights, quad_classifier::THING_FEATURES, side_features::SIDE_FEATURES,
+    },
+    edges::edge_map::EdgeParams,
+    proposals::quad_proposals::ProposalParams,
+    relaxation::{labelling::RelaxationParams, similarity::SimilarityParams},
+    segments::{bridging::ChainParams, joining::SegmentParams},
+    tiling::tiling_params::TilingParams,
+};
+use serde::{Deserialize, Deserializer, Serialize, de::Error as _};
+
+/// Parameters from image to quads.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct DetectParams {
+    /// Canny-Deriche edges.
+    pub edges: EdgeParams,
+    /// Thinning and chaining.
+    pub chains: ChainParams,
+    /// Straight segments.
+    pub segments: SegmentParams,
+    /// Removal of floor tiling.
+    pub tiling: TilingParams,
+    /// Cues and gates of pairs.
+    pub similarity: SimilarityParams,
+    /// Both relaxations.
+    pub relaxation: RelaxationParams,
+    /// Quads and their corners.
+    pub quads: QuadParams,
+}
+
+/// How quads are formed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Grouping {
+    /// The paper's: two relaxations and sets of three sides.
+    Relaxation,
+    /// Corner chains with a searched fourth side, checked against the gradient.
+    #[default]
+    Hypotheses,
+}
+
+/// What a quad of the search becomes that lies inside another and is no border of the same thing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Nested {
+    /// An alternate of the outer one, unless that is the more doubtful of the two or holds several things.
+    #[default]
+    Alternates,
+    /// A quad of its own.
+    Quads,
+}
+
+/// Parameters of the last stage.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct QuadParams {
+    /// The paper's grouping or the search.
+    pub grouping: Grouping,
+    /// The search works on an image reduced by a whole factor to about this longer side; 0 for full size.
+    pub working_side_px: usize,
+    /// Scales of the search, each half the one before: a coarse one sees through ragged, ornate borders.
+    pub scales: usize,
+    /// The search.
+    pub hypotheses: ProposalParams,
+    /// Share of each side that edges must support for the outermost border of a group to be its quad.
+    pub min_side_support: f64,
+    /// Nested quads above this `IoU` are borders of one thing.
+    pub nested_iou: f64,
+    /// What other nested quads become, for the search.
+    pub nested: Nested,
+    /// How far from a rough side its edge points are looked for.
+    pub refit_reach_px: f64,
+    /// Smallest step height of an edge point, grey levels.
+    pub min_step: f64,
+    /// Most seeds of a scale that are refitted, at most [`MAX_REFITTED`](crate::detect::refine::rating::MAX_REFITTED); half as many
+    /// small ones come on top.
+    pub max_refitted: usize,
+    /// Most borders of one thing that are rated on a scale.
+    pub max_alike: usize,
+    /// Smallest score of a quad of the search.
+    pub min_score: f64,
+    /// Whether the search moves each side to the line beside it that looks most like a border.
+    pub choose_sides: bool,
+    /// What makes a side a border; without one, what was learnt with the program.
+    #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "checked::<SIDE_FEATURES, _>")]
+    pub side_model: Option<Network>,
+    /// What makes a quad a thing; without one, what was learnt with the program.
+    #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "checked::<THING_FEATURES, _>")]
+    pub thing_model: Option<Network>,
+    /// Smallest probability that a quad of the search is a thing.
+    pub min_probability: f64,
+    /// A quad that is a thing with at least this probability keeps what contradicts it from being looked at.
+    pub sure_probability: f64,
+    /// Whether to report sets of three sides.
+    pub three_sided: bool,
+    /// Smallest c5 of a set of three sides.
+    pub min_three_sided_closing: f64,
+    /// Smallest score of a set of three sides of the search.
+    pub min_three_sided_score: f64,
+}
+
+impl Default for QuadParams {
+    fn default() -> Self {
+        Self {
+            grouping: Grouping::default(),
+            working_side_px: 640,
+            scales: 2,
+            hypotheses: ProposalParams::default(),
+            min_side_support: 0.5,
+            nested_iou: 0.6,
+            nested: Nested::default(),
+            refit_reach_px: 2.0,
+            min_step: 4.0,
+            max_refitted: 60,
+            max_alike: 8,
+            min_score: 0.4,
+            choose_sides: true,
+            side_model: None,
+            thing_model: None,
+            min_probability: 0.65,
+            sure_probability: 0.95,
+            three_sided: true,
+            min_three_sided_closing: 0.5,
+            min_three_sided_score: 0.5,
+        }
+    }
+}
+
+/// A network for `N` measurements, checked where it comes in.
+fn checked<'de, const N: usize, D: Deserializer<'de>>(from: D) -> Result<Option<Network>, D::Error> {
+    let network = Option::<Network>::deserialize(from)?;
+    if let Some(network) = &network {
+        network.check(N).map_err(D::Error::custom)?;
+    }
+    Ok(network)
+}
+
+impl QuadParams {
+    /// What makes a side a border.
+    pub fn side_network(&self) -> &Network {
+        self.side_model.as_ref().unwrap_or_else(|| network_weights::side_model())
+    }
+
+    /// What makes a quad a thing.
+    pub fn thing_network(&self) -> &Network {
+        self.thing_model.as_ref().unwrap_or_else(|| network_weights::thing_model())
+    }
+}

@@ -1,0 +1,6 @@
+//! Segments in, quad proposals out.
+
+pub mod quad_seed;
+pub mod facing;
+pub mod quad_proposals;
+pub mod three_sided;

@@ -1,0 +1,175 @@
+//! Sides refitted in the image as it came: a large image is searched at a working scale, and a fraction of a pixel there
+//! is several times as much here. Quads in coordinates of the full image in, the same quads with sharper corners out.
+//! Finds and drops nothing.
+
+use crate::{
+    detect::{
+        edge_buffers::DetectBuffers,
+        edge_support::gradients::Gradients,
+        params::{DetectParams, QuadParams},
+        quad::{Quad, QuadKind},
+        refine::refit::refit_corners,
+    },
+    frame::GrayImage,
+    geometry::corners::Corners,
+};
+use nalgebra::Vector2;
+
+/// Sides are looked for within this many pixels of the working scale.
+const REACH_WORKING_PX: f64 = 1.0;
+/// Pixels around a quad that its gradients need: the filter forgets within ten.
+const MARGIN_PX: usize = 12;
+/// Cut-outs of all quads together are at most this many images large; the best quads come first.
+const MAX_CUT_SHARE: usize = 2;
+
+/// Refits the full quads of an image that was searched at a scale `factor` times smaller.
+pub(crate) fn at_full_size(
+    quads: Vec<Quad>,
+    image: &GrayImage,
+    factor: usize,
+    p: &DetectParams,
+    memory: &mut DetectBuffers,
+) -> Vec<Quad> {
+    if factor <= 1 {
+        return quads;
+    }
+    let reach_px = p.quads.refit_reach_px.max(REACH_WORKING_PX * factor as f64);
+    let search = QuadParams { refit_reach_px: reach_px, ..p.quads.clone() };
+    let mut left_px = MAX_CUT_SHARE * image.width() * image.height();
+    let refitted = |quad: Quad| {
+        let window = Window::around(&quad.corners_px, reach_px.ceil() as usize + MARGIN_PX, image);
+        let Some(rest) = left_px.checked_sub(window.area_px()).filter(|_| quad.kind == QuadKind::Full) else {
+            return quad;
+        };
+        left_px = rest;
+        let cut = window.cut(image);
+        let map = memory.edges(&cut, &p.edges);
+        let g = Gradients { image: &cut, gx: map.gx(), gy: map.gy() };
+        let sharp = window.moved(&quad.corners_px, -1.0).map(|corners_px| {
+            let here = Quad { corners_px, alternates: Vec::new(), ..quad.clone() };
+            refit_corners(here, &g, &search)
+        });
+        memory.give_back(map);
+        let back = sharp.and_then(|s| Some(Quad { corners_px: window.moved(&s.corners_px, 1.0)?, ..s }));
+        match back {
+            Some(sharp) => Quad { alternates: quad.alternates, ..sharp },
+            None => quad,
+        }
+    };
+    quads.into_iter().map(refitted).collect()
+}
+
+/// A part of an image: its top-left pixel and its size.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Window {
+    left: usize,
+    top: usize,
+    width: usize,
+    height: usize,
+}
+
+impl Window {
+    /// The box around the corners, wider by `margin` on all sides, as far as the image goes. Where it meets the image's
+    /// border, so does the quad: nothing else is near enough to be taken for clipped.
+    fn around(corners: &Corners, margin: usize, image: &GrayImage) -> Self {
+        let span = |at: fn(&nalgebra::Point2<f64>) -> f64, size: usize| {
+            let values = corners.points().map(|c| at(&c));
+            let low = values.into_iter().fold(f64::INFINITY, f64::min);
+            let high = values.into_iter().fold(f64::NEG_INFINITY, f64::max);
+            // Saturating casts: a corner may lie outside of the image.
+            let from = (low.floor().max(0.0) as usize).saturating_sub(margin).min(size - 1);
+            let to = (high.ceil().max(0.0) as usize).saturating_add(margin + 1).clamp(from + 1, size);
+            (from, to - from)
+        };
+        let (left, width) = span(|c| c.x, image.width());
+        let (top, height) = span(|c| c.y, image.height());
+        Self { left, top, width, height }
+    }
+
+    fn area_px(&self) -> usize {
+        self.width * self.height
+    }
+
+    fn cut(&self, image: &GrayImage) -> GrayImage {
+        let rows = image.data().chunks_exact(image.width()).skip(self.top).take(self.height);
+        let data = rows.flat_map(|row| &row[self.left..self.left + self.width]).copied().collect();
+        // A part of an image is never too large for one.
+        GrayImage::new(self.width, self.height, data).unwrap_or_else(|_| image.clone())
+    }
+
+    /// The corners by this window's place: `sign` 1 for the whole image's coordinates, -1 for the window's.
+    fn moved(&self, corners: &Corners, sign: f64) -> Option<Corners> {
+        let shift = Vector2::new(self.left as f64, self.top as f64) * sign;
+        Corners::new(corners.points().map(|c| c + shift)).ok()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        detect::{detector::detect, tests::fixtures::render},
+        trace::NoTrace,
+    };
+    use nalgebra::Point2;
+
+    const QUAD: [[f64; 2]; 4] = [[301.3, 240.2], [903.7, 290.4], [880.1, 760.3], [322.6, 700.9]];
+
+    fn worst_px(found: &Quad) -> f64 {
+        let errors = found.corners_px.points().iter().zip(QUAD);
+        errors.map(|(a, b)| (a - Point2::from(b)).norm()).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn corners_of_a_large_image_are_as_sharp_as_those_of_a_small_one() {
+        // A little noise, the same on every run.
+        let mut image = render(1280, 960, 140, &[(QUAD, 80)]);
+        let mut state = 1_u32;
+        image = GrayImage::from_fn(1280, 960, |u, v| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            image.at(u, v).saturating_add_signed((state >> 24) as i8 / 24)
+        });
+        let p = DetectParams::default();
+        let found = detect(&image, &p, &mut NoTrace);
+        let best = found.iter().min_by(|a, b| worst_px(a).total_cmp(&worst_px(b))).expect("a quad");
+        assert!(worst_px(best) < 0.025, "{} px", worst_px(best));
+        assert!(best.corner_covariance_px2.iter().all(|c| c.trace() < 0.2), "{best:?}");
+    }
+
+    #[test]
+    fn only_so_much_is_cut_out() {
+        let image = render(1280, 960, 140, &[(QUAD, 80)]);
+        let p = DetectParams::default();
+        let found = detect(&image, &p, &mut NoTrace);
+        let quad = found.iter().find(|q| worst_px(q) < 2.0).expect("the quad");
+        // The same quad, off by a pixel, so often that its cut-outs fill more than two images.
+        let shift = Vector2::new(1.0, 0.0);
+        let off = Quad {
+            corners_px: Corners::new(quad.corners_px.points().map(|c| c + shift)).expect("a quad"),
+            ..quad.clone()
+        };
+        let window = Window::around(&off.corners_px, 14, &image);
+        let fit = MAX_CUT_SHARE * 1280 * 960 / window.area_px();
+        let sharp = at_full_size(vec![off.clone(); fit + 1], &image, 2, &p, &mut DetectBuffers::default());
+        assert!(sharp[..fit].iter().all(|q| worst_px(q) < 0.15));
+        assert_eq!(sharp[fit], off);
+    }
+
+    #[test]
+    fn windows_stay_in_the_image() {
+        let image = GrayImage::from_fn(50, 40, |u, v| (u + 3 * v) as u8);
+        let corners = |points: [[f64; 2]; 4]| Corners::new(points.map(Point2::from)).expect("convex");
+        let all =
+            Window::around(&corners([[-9.0, -9.0], [90.0, -9.0], [90.0, 90.0], [-9.0, 90.0]]), 3, &image);
+        assert_eq!(all, Window { left: 0, top: 0, width: 50, height: 40 });
+        assert_eq!(all.cut(&image), image);
+        let part =
+            Window::around(&corners([[10.2, 9.0], [20.0, 9.0], [20.0, 20.5], [10.2, 20.0]]), 3, &image);
+        assert_eq!(part, Window { left: 7, top: 6, width: 17, height: 19 });
+        assert_eq!(part.cut(&image).at(4, 5), image.at(11, 11));
+        // Wholly outside: still a window, of at least a pixel.
+        let away =
+            Window::around(&corners([[60.0, 60.0], [70.0, 60.0], [70.0, 70.0], [60.0, 70.0]]), 3, &image);
+        assert!(away.area_px() >= 1 && away.left + away.width <= 50 && away.top + away.height <= 40);
+    }
+}

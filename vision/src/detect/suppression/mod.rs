@@ -1,0 +1,5 @@
+//! Overlapping quads in, those that stay out (method 3.4, 3.6).
+
+pub mod non_maximum;
+pub mod nested_borders;
+pub mod nested_quads;

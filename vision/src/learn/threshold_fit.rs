@@ -1,0 +1,214 @@
+//! Thresholds of a model from what it must be told from: evidence is added, tau fitted anew, gates asked again. How a
+//! model comes to be is in `lesson.rs`.
+
+use crate::{
+    icon::Icon,
+    learn::threshold::threshold,
+    model::{
+        exemplar::Exemplar,
+        landmark_model::{DistanceSamples, Gate, GateFailure, LandmarkModel, ModelStatus, distances},
+        threshold::{LimitedBy, Threshold, ThresholdError},
+    },
+    params::Params,
+    recognise::{
+        alignment::{
+            aligner::{Aligner, SamplingGrids, Template},
+            surroundings::Surroundings,
+        },
+        features::{
+            icon_features::IconFeatures,
+            signature::{self, Signature},
+        },
+        verification::{
+            content::shown,
+            gradient_similarity::{Smoothed, likeness},
+        },
+    },
+};
+
+/// The same model with tau fitted to its own distances and to `negatives`, forgetting earlier ones. Cheap: the own
+/// distances are kept in the model.
+#[must_use]
+pub fn refit_thresholds(model: &LandmarkModel, negatives: &[IconFeatures], p: &Params) -> LandmarkModel {
+    let mut model = model.clone();
+    let LandmarkModel { correlation_evidence, hausdorff_evidence, likeness_evidence, .. } = &mut model;
+    for evidence in [correlation_evidence, hausdorff_evidence, likeness_evidence] {
+        (evidence.nearest_others, evidence.others) = (vec![], 0);
+    }
+    add_negatives(&model, negatives, p)
+}
+
+/// The same model with `negatives` added to those it was fitted to: one new landmark costs one comparison with its
+/// icons, not with everybody's.
+#[must_use]
+pub fn add_negatives(model: &LandmarkModel, negatives: &[IconFeatures], p: &Params) -> LandmarkModel {
+    let mut model = model.clone();
+    let ready = ready(&model.exemplars, p);
+    let templates = Templates::new(&ready, p);
+    let exemplars = if negatives.is_empty() { Vec::new() } else { model.features(&p.recognise) };
+    for negative in negatives {
+        let d = distances(&exemplars, negative, &p.recognise);
+        model.correlation_evidence.add(d.correlation);
+        model.hausdorff_evidence.add(d.hausdorff);
+        model.likeness_evidence.add(templates.unlikeness(negative, MIN_SIGNATURE));
+    }
+    let correlation = fitted(&model.correlation_evidence, p.learn.correlation_cap, p);
+    let hausdorff = fitted(&model.hausdorff_evidence, p.learn.hausdorff_cap, p);
+    let likeness = fitted_likeness(&model.likeness_evidence, p);
+    model.correlation = correlation.unwrap_or(Threshold::NEVER);
+    model.hausdorff = hausdorff.unwrap_or(Threshold::NEVER);
+    model.likeness = likeness.unwrap_or(Threshold::NEVER);
+    let missing = [
+        correlation.err().map(Gate::CorrelationThreshold),
+        hausdorff.err().map(Gate::HausdorffThreshold),
+        likeness.err().map(Gate::LikenessThreshold),
+    ];
+    model.status = status(&model, missing, p);
+    model
+}
+
+impl DistanceSamples {
+    /// Counts a distance of something else, and keeps it if it is among the nearest.
+    pub(crate) fn add(&mut self, distance: f64) {
+        self.others += 1;
+        let distance = distance as f32;
+        let at = self.nearest_others.partition_point(|d| *d <= distance);
+        if at < Self::MAX_NEAREST {
+            self.nearest_others.insert(at, distance);
+            self.nearest_others.truncate(Self::MAX_NEAREST);
+        }
+    }
+}
+
+/// tau from the evidence. Distances that were only counted lie beyond the farthest one kept, so tau stays below it.
+pub(crate) fn fitted(evidence: &DistanceSamples, cap: f64, p: &Params) -> Result<Threshold, ThresholdError> {
+    let own: Vec<f64> = evidence.own.iter().map(|d| f64::from(*d)).collect();
+    let mut others: Vec<f64> = evidence.nearest_others.iter().map(|d| f64::from(*d)).collect();
+    let counted_only = evidence.others > others.len();
+    let cap = others.last().filter(|_| counted_only).map_or(cap, |farthest| cap.min(*farthest));
+    others.resize(evidence.others, f64::INFINITY);
+    threshold(&own, &others, cap, &p.learn.threshold)
+}
+
+/// The smallest 1 minus likeness of `icons` to the model's exemplars, one laid on the other: what tau of the likeness is
+/// held by. Infinite where nothing is like it. For naming look-alikes.
+pub fn unlikeness_of(model: &LandmarkModel, icons: &[IconFeatures], p: &Params) -> f64 {
+    let ready = ready(&model.exemplars, p);
+    let templates = Templates::new(&ready, p);
+    icons.iter().map(|icon| templates.unlikeness(icon, MIN_SIGNATURE)).fold(f64::INFINITY, f64::min)
+}
+
+/// Negatives whose signatures are less alike are not laid on the exemplars: they count as infinitely far.
+const MIN_SIGNATURE: f32 = 0.45;
+
+/// An exemplar on which icons can be laid.
+pub(crate) struct Ready<'a> {
+    signature: &'a Signature,
+    icon: Icon,
+    coarse: Vec<f32>,
+}
+
+/// Makes exemplars ready.
+pub(crate) fn ready<'a>(exemplars: &'a [Exemplar], p: &Params) -> Vec<Ready<'a>> {
+    let of = |e: &'a Exemplar| {
+        let (icon, coarse) = e.template(&p.recognise.verdict.align);
+        Ready { signature: &e.signature, icon, coarse }
+    };
+    exemplars.iter().map(of).collect()
+}
+
+/// Exemplars on which icons are laid.
+pub(crate) struct Templates<'a> {
+    each: Vec<(&'a Ready<'a>, Template<'a>)>,
+    lattices: SamplingGrids,
+    p: &'a Params,
+}
+
+impl<'a> Templates<'a> {
+    pub(crate) fn new(exemplars: &'a [Ready<'a>], p: &'a Params) -> Self {
+        let each = exemplars.iter().map(|e| (e, Template::new(&e.icon, &e.coarse))).collect();
+        Self { each, lattices: SamplingGrids::new(p.icon.size, &p.recognise.correlation), p }
+    }
+
+    /// The smallest 1 minus likeness of `icon` to the exemplars after alignment, of those whose signatures are alike
+    /// enough.
+    pub(crate) fn unlikeness(&self, icon: &IconFeatures, min_signature: f32) -> f64 {
+        let (c, a) = (&self.p.recognise.correlation, &self.p.recognise.verdict.align);
+        let aligner = Aligner::new(&self.lattices, a);
+        let mut around = None;
+        let mut least = f64::INFINITY;
+        for (exemplar, template) in &self.each {
+            if signature::likeness(exemplar.signature.values(), icon.signature.values()) < min_signature {
+                continue;
+            }
+            let around = around.get_or_insert_with(|| Surroundings::of_icon(&icon.icon, a));
+            let laid = around.as_ref().and_then(|s| aligner.align(s, template));
+            let laid = laid.as_ref().map_or(&icon.icon, |l| &l.icon);
+            least = least.min(1.0 - likeness(laid, &exemplar.icon, c));
+        }
+        least
+    }
+}
+
+/// tau of the likeness: the cap, or a share of the nearest of everything else. None where the greater part of the
+/// landmark's own views would be refused.
+// Departs from method 8: own distances have no say in tau but that. Those of generated views, or of one robot's drive,
+// are far smaller than another day's (reflections, dust, another camera); what is safe is said by the others alone.
+fn fitted_likeness(evidence: &DistanceSamples, p: &Params) -> Result<Threshold, ThresholdError> {
+    let mut own: Vec<f64> = evidence.own.iter().map(|d| f64::from(*d)).collect();
+    own.sort_by(f64::total_cmp);
+    let median = own.get(own.len() / 2).copied().ok_or(ThresholdError::NoPositive)?;
+    let nearest = evidence.nearest_others.first().map_or(f64::INFINITY, |d| f64::from(*d));
+    let share = p.learn.threshold.nearest_share * nearest;
+    let (tau, limited_by) = if share < p.learn.likeness_cap {
+        (share, LimitedBy::NearestNegative)
+    } else {
+        (p.learn.likeness_cap, LimitedBy::AbsoluteCap)
+    };
+    if median >= tau {
+        return Err(ThresholdError::Overlap);
+    }
+    let missed = own.iter().filter(|d| **d >= tau).count();
+    Ok(Threshold {
+        tau,
+        // tau is below the nearest of them.
+        false_positive_rate: 0.0,
+        false_negative_rate: missed as f64 / own.len() as f64,
+        positives: own.len(),
+        negatives: evidence.others,
+        limited_by,
+    })
+}
+
+/// Method 9: what the model fails, if anything.
+// Departs from method 9: stable points, and a threshold for each of the paper's distances, are asked only where neither
+// distance has one; what it shows beyond its frame is asked besides. The likeness decides, and one of the two must agree; a picture of few points is told well enough by
+// the other. Where a map's kind is one of the paper's, too few stable points keep a landmark out (recognise/compare.rs).
+fn status(model: &LandmarkModel, missing: [Option<Gate>; 3], p: &Params) -> ModelStatus {
+    let g = &p.learn.gates;
+    let photographed = model.views - model.generated_views;
+    let observed = if photographed > 1 { photographed as f64 / model.views as f64 } else { 0.0 };
+    let generated_f = g.min_saliency_f_generated;
+    let min_saliency_f = generated_f + observed * (g.min_saliency_f - generated_f);
+    let shown = |e: &Exemplar| shown(&Smoothed::new(&e.icon()), &p.recognise.correlation);
+    let content = model.exemplars.iter().map(shown).fold(0.0, f64::max);
+    let mut measured = vec![
+        (Gate::Views, model.views as f64, g.min_views as f64),
+        (Gate::Saliency, model.saliency_f, min_saliency_f),
+        (Gate::Content, content, p.recognise.verdict.min_content),
+        (Gate::VisibilityConfidence, model.v_c, g.min_v_c),
+    ];
+    let [correlation, hausdorff, likeness] = missing;
+    let mut thresholds: Vec<Gate> = likeness.into_iter().collect();
+    if let (Some(correlation), Some(hausdorff)) = (correlation, hausdorff) {
+        measured.push((Gate::StablePoints, model.stable_points as f64, g.min_stable_points as f64));
+        thresholds.extend([correlation, hausdorff]);
+    }
+    let mut failures: Vec<GateFailure> = measured
+        .into_iter()
+        .filter(|(_, value, limit)| value < limit)
+        .map(|(gate, value, limit)| GateFailure { gate, value, limit })
+        .collect();
+    failures.extend(thresholds.into_iter().map(|gate| GateFailure { gate, value: 0.0, limit: 0.0 }));
+    if failures.is_empty() { ModelStatus::Active } else { ModelStatus::Candidate(failures) }
+}

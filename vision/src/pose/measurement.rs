@@ -1,0 +1,159 @@
+//! Corners of a landmark in, the same free of lens distortion out, checked: what a pose is computed from.
+
+use crate::{
+    frame::{Distortion, FrameError, Intrinsics},
+    geometry::corners::Corners,
+};
+use nalgebra::{Matrix2, Matrix2x3, Point2};
+
+/// Width and height of a landmark, in metres.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct LandmarkSize {
+    /// Along the landmark's y.
+    pub width_m: f64,
+    /// Along the landmark's z.
+    pub height_m: f64,
+}
+
+impl LandmarkSize {
+    /// Smallest accepted side.
+    pub const MIN_M: f64 = 0.01;
+    /// Largest accepted side.
+    pub const MAX_M: f64 = 100.0;
+}
+
+/// What a pose was computed from, free of lens distortion.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PoseMeasurement {
+    /// Corners as a pinhole with the same K would see them, in the landmark's order.
+    pub corners_px: Corners,
+    /// Covariance of each of them.
+    pub covariance_px2: [Matrix2<f64>; 4],
+    /// The pinhole.
+    pub camera: Intrinsics,
+    /// How each corner would move if the camera's (share of the focal length, cx, cy) were more.
+    pub by_camera: [Matrix2x3<f64>; 4],
+    /// The size that was assumed.
+    pub size: LandmarkSize,
+}
+
+/// Largest accepted corner coordinate, in pixels: four times the largest image.
+pub const MAX_CORNER_PX: f64 = 32_768.0;
+
+/// Smallest accepted standard deviation of a corner: finer than any detector.
+pub const MIN_CORNER_SIGMA_PX: f64 = 1e-4;
+
+/// Largest accepted standard deviation of a corner.
+pub const MAX_CORNER_SIGMA_PX: f64 = 1e4;
+
+/// Why there is no pose.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum PoseError {
+    /// A side of the landmark is not finite or not in [`LandmarkSize::MIN_M`] to [`LandmarkSize::MAX_M`].
+    #[error("{field} = {value} is out of range")]
+    Size {
+        /// `width_m` or `height_m`.
+        field: &'static str,
+        /// What it was.
+        value: f64,
+    },
+    /// The intrinsics are impossible.
+    #[error(transparent)]
+    Camera(#[from] FrameError),
+    /// A corner lies beyond [`MAX_CORNER_PX`].
+    #[error("corner {corner} lies beyond {MAX_CORNER_PX} px")]
+    Corner {
+        /// Its index, TL TR BR BL.
+        corner: usize,
+    },
+    /// A covariance is not symmetric, or a standard deviation is not in [`MIN_CORNER_SIGMA_PX`] to
+    /// [`MAX_CORNER_SIGMA_PX`].
+    #[error("covariance of corner {corner} is impossible")]
+    Covariance {
+        /// Its index, TL TR BR BL.
+        corner: usize,
+    },
+    /// The distortion cannot be undone at a corner, or undoing it folds the quad.
+    #[error("lens distortion cannot be undone at the corners")]
+    Distortion,
+    /// The corners do not determine a pose in front of the camera.
+    #[error("the corners do not determine a pose")]
+    Degenerate,
+}
+
+/// Checks everything and takes the lens distortion out.
+pub(crate) fn measured(
+    corners: &Corners,
+    covariance_px2: &[Matrix2<f64>; 4],
+    size: LandmarkSize,
+    camera: &Intrinsics,
+) -> Result<PoseMeasurement, PoseError> {
+    for (field, value) in [("width_m", size.width_m), ("height_m", size.height_m)] {
+        if !(LandmarkSize::MIN_M..=LandmarkSize::MAX_M).contains(&value) {
+            return Err(PoseError::Size { field, value });
+        }
+    }
+    let UndistortedCorners { corners_px, covariance_px2, camera, by_camera } =
+        straightened(corners, covariance_px2, camera)?;
+    Ok(PoseMeasurement { corners_px, covariance_px2, camera, by_camera, size })
+}
+
+/// Corners free of lens distortion.
+#[derive(Debug, Clone, PartialEq)]
+pub struct UndistortedCorners {
+    /// As a pinhole with the same K would see them.
+    pub corners_px: Corners,
+    /// Covariance of each of them.
+    pub covariance_px2: [Matrix2<f64>; 4],
+    /// The pinhole.
+    pub camera: Intrinsics,
+    /// See [`Intrinsics::straight_by_errors`].
+    pub by_camera: [Matrix2x3<f64>; 4],
+}
+
+/// Corners and covariances as the pinhole of the same K would have them, and that pinhole. Checks camera, corners and
+/// covariances.
+pub fn straightened(
+    corners: &Corners,
+    covariance_px2: &[Matrix2<f64>; 4],
+    camera: &Intrinsics,
+) -> Result<UndistortedCorners, PoseError> {
+    let c = Intrinsics::new(camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px, camera.distortion)?;
+    let c = camera.sigmas.map_or(Ok(c), |sigmas| c.with_sigmas(sigmas))?;
+    let mut by_camera = [Matrix2x3::zeros(); 4];
+    let (mut straight, mut covariances) = (*corners.points(), *covariance_px2);
+    for (corner, (p, s)) in straight.iter_mut().zip(&mut covariances).enumerate() {
+        if p.x.abs() > MAX_CORNER_PX || p.y.abs() > MAX_CORNER_PX {
+            return Err(PoseError::Corner { corner });
+        }
+        if !is_corner_covariance(s) {
+            return Err(PoseError::Covariance { corner });
+        }
+        if c.distortion != Distortion::None {
+            (*p, *s) = undistorted(&c, p, s).ok_or(PoseError::Distortion)?;
+        }
+        by_camera[corner] = c.straight_by_errors(p).ok_or(PoseError::Distortion)?;
+    }
+    let corners_px = Corners::new(straight).map_err(|_folded| PoseError::Distortion)?;
+    let camera = Intrinsics { distortion: Distortion::None, ..c };
+    Ok(UndistortedCorners { corners_px, covariance_px2: covariances, camera, by_camera })
+}
+
+/// Symmetric, with both standard deviations in range.
+pub(crate) fn is_corner_covariance(s: &Matrix2<f64>) -> bool {
+    let symmetric = (s.m12 - s.m21).abs() <= 1e-6 * (s.m11 + s.m22);
+    let (mean, spread) = (0.5 * (s.m11 + s.m22), (0.5 * (s.m11 - s.m22)).hypot(s.m12));
+    // NaN fails every comparison.
+    symmetric && mean - spread >= MIN_CORNER_SIGMA_PX.powi(2) && mean + spread <= MAX_CORNER_SIGMA_PX.powi(2)
+}
+
+/// The undistorted point and its covariance.
+fn undistorted(
+    camera: &Intrinsics,
+    p: &Point2<f64>,
+    s: &Matrix2<f64>,
+) -> Option<(Point2<f64>, Matrix2<f64>)> {
+    let (straight, j) = camera.undistort_with(p)?;
+    let covariance = j * s * j.transpose();
+    is_corner_covariance(&covariance).then_some((straight, covariance))
+}

@@ -1,0 +1,206 @@
+//! Moving a quad's corners until its picture is as near to a goal as it gets: damped least squares over normalised
+//! buckets, each weighted by how well it correlates already, so that covered parts have no say.
+
+#![expect(
+    clippy::inline_always,
+    reason = "an instruction set holds only in what is inlined where it was chosen"
+)]
+
+use crate::recognise::alignment::{
+    certainty::corner_covariances,
+    goal::{Goal, dot},
+    sampling_grid::{SamplingGrid, SquareMap, square},
+};
+use nalgebra::{Const, DimMin, Matrix2, Point2, SMatrix, SVector, Vector2};
+
+/// A step that brings nothing is not tried again, shorter, if it was less than so many times [`Limits::settled_px`].
+const HARDLY_WRONG: f64 = 5.0;
+/// Share of the mean diagonal element that is added to each.
+const LEAST_DAMPING: f64 = 1e-3;
+/// A step that brings nothing although it is held back by more is given up.
+const MOST_DAMPING: f64 = 1.0;
+
+/// Where an icon's corners came to lie, and how alike the pictures are there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Settled {
+    pub(crate) corners: [Point2<f64>; 4],
+    /// Mean squared correlation of the buckets.
+    pub(crate) alike: f64,
+    /// How surely the corners are known, in squared pixels of the icon, where all eight coordinates moved.
+    pub(crate) covariances: Option<[Matrix2<f64>; 4]>,
+}
+
+/// How far and how often corners may move.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Limits {
+    /// From their own corner of the square, in pixels of the icon, along either axis.
+    pub(crate) shift_px: f64,
+    pub(crate) steps: usize,
+    /// A step of less than this, in pixels of the icon, is the last.
+    pub(crate) settled_px: f64,
+}
+
+/// Moves the corners of the icon from `start` on; `see` reads the picture at the lattice's points under a map. `None` when nothing says where.
+///
+/// Levenberg-Marquardt: a step that brings nothing is taken back and tried again, shorter. Inverse compositional (Baker
+/// and Matthews 2004): the goal's slopes are worked out once, not at every step.
+#[inline(always)]
+pub(crate) fn settle<const D: usize>(
+    goal: &Goal<D>,
+    lattice: &SamplingGrid,
+    mut see: impl FnMut(&SquareMap, &mut [f32]),
+    start: [Point2<f64>; 4],
+    limits: Limits,
+) -> Option<Settled>
+where
+    Const<D>: DimMin<Const<D>, Output = Const<D>>,
+{
+    let square = square(lattice.size);
+    let mut damping = LEAST_DAMPING;
+    let mut map = SquareMap::new(lattice.size, &start)?;
+    let mut seen = vec![0.0; lattice.len()];
+    let (mut corners, mut here) = (start, Equations::new(goal, lattice, &mut see, &map, -1.0, &mut seen));
+    for _ in 0..limits.steps {
+        let step = corner_moves(&here.step(damping)?);
+        // The template was moved in thought: the picture moves by the inverse, before what it moved already.
+        let moved: [Point2<f64>; 4] = std::array::from_fn(|i| map.apply(&(square[i] + step[i])));
+        let shift = moved.iter().zip(&square).map(|(m, s)| (m - s).amax()).fold(0.0, f64::max);
+        let next = (shift <= limits.shift_px).then(|| SquareMap::new(lattice.size, &moved)).flatten();
+        let length_px = step.iter().map(Vector2::amax).fold(0.0, f64::max);
+        let next = next.map(|m| (m, Equations::new(goal, lattice, &mut see, &m, here.likeness, &mut seen)));
+        match next {
+            Some((there, equations)) if equations.likeness > here.likeness => {
+                (map, corners, here) = (there, moved, equations);
+                damping = LEAST_DAMPING.max(damping / 10.0);
+                if length_px < limits.settled_px {
+                    break;
+                }
+            }
+            _ if damping > MOST_DAMPING || length_px < HARDLY_WRONG * limits.settled_px => break,
+            _ => damping *= 10.0,
+        }
+    }
+    let said: Vec<_> =
+        here.said.iter().map(|s| (goal.buckets[s.bucket].normal * s.weight, s.gradient)).collect();
+    let covariances = corner_covariances(&said);
+    Some(Settled { corners, alike: here.alike / lattice.all_buckets as f64, covariances })
+}
+
+/// Moves of TL, TR, BR, BL: from those of the left, right, top and bottom sides, or as they are.
+fn corner_moves<const D: usize>(step: &SVector<f64, D>) -> [Vector2<f64>; 4] {
+    if D == 4 {
+        let (left, right, top, bottom) = (step[0], step[1], step[2], step[3]);
+        [[left, top], [right, top], [right, bottom], [left, bottom]].map(Vector2::from)
+    } else {
+        std::array::from_fn(|i| Vector2::new(step[2 * i], step[2 * i + 1]))
+    }
+}
+
+/// What one bucket adds to the equations.
+struct Said<const D: usize> {
+    /// Its index.
+    bucket: usize,
+    weight: f64,
+    /// What it adds to the right side.
+    gradient: SVector<f64, D>,
+}
+
+/// Normal equations of the moves, and how alike picture and template are.
+struct Equations<const D: usize> {
+    normal: SMatrix<f64, D, D>,
+    right: SVector<f64, D>,
+    /// What each bucket says.
+    said: Vec<Said<D>>,
+    /// What the moves make greater: a bucket that is covered in part has far less say than one that is not.
+    likeness: f64,
+    /// Squared correlations of the buckets, added up.
+    alike: f64,
+}
+
+impl<const D: usize> Equations<D>
+where
+    Const<D>: DimMin<Const<D>, Output = Const<D>>,
+{
+    /// How alike the picture is at `map`, and how to move on from there, if it is more alike than `least`.
+    #[inline(always)]
+    fn new(
+        goal: &Goal<D>,
+        lattice: &SamplingGrid,
+        see: &mut impl FnMut(&SquareMap, &mut [f32]),
+        map: &SquareMap,
+        least: f64,
+        seen: &mut [f32],
+    ) -> Self {
+        let mut sum = Self {
+            normal: SMatrix::zeros(),
+            right: SVector::zeros(),
+            said: vec![],
+            likeness: 0.0,
+            alike: 0.0,
+        };
+        see(map, seen);
+        let mut looked = Vec::with_capacity(goal.buckets.len());
+        for (i, bucket) in goal.buckets.iter().enumerate() {
+            let part = bucket.cells.start..bucket.cells.end;
+            let (seen, real) = (&seen[part.clone()], &lattice.real[part.clone()]);
+            let mean = dot(seen, real) / bucket.cells.count as f32;
+            let norm = squares(seen, real, mean).sqrt();
+            if norm.is_nan() || norm <= 0.0 {
+                continue;
+            }
+            let correlation = dot(seen, &goal.values[part]) / norm;
+            if correlation > 0.0 {
+                let correlation = f64::from(correlation);
+                let weight = correlation * correlation * correlation;
+                sum.likeness += weight * correlation;
+                sum.alike += correlation * correlation;
+                looked.push((i, norm, weight));
+            }
+        }
+        if sum.likeness <= least {
+            return sum;
+        }
+        for (i, norm, weight) in looked {
+            let bucket = &goal.buckets[i];
+            let part = bucket.cells.start..bucket.cells.end;
+            sum.normal += bucket.normal * weight;
+            let mut gradient = SVector::zeros();
+            for d in 0..D {
+                // Slopes have mean 0: what is subtracted from the grey levels does not matter.
+                let level = f64::from(dot(&goal.slopes[d][part.clone()], &seen[part.clone()]) / norm);
+                gradient[d] = weight * (bucket.level[d] - level);
+            }
+            sum.right += gradient;
+            sum.said.push(Said { bucket: i, weight, gradient });
+        }
+        sum
+    }
+
+    /// Solves the normal equations. Damping keeps still what nothing ties down.
+    fn step(&self, damping: f64) -> Option<SVector<f64, D>> {
+        let mut normal = self.normal;
+        let damping = damping * normal.trace() / D as f64;
+        if damping <= 0.0 || !damping.is_finite() {
+            return None;
+        }
+        for i in 0..D {
+            normal[(i, i)] += damping;
+        }
+        let step = normal.cholesky().map(|factor| factor.solve(&self.right));
+        step.filter(|step| step.iter().all(|s| s.is_finite()))
+    }
+}
+
+/// Sum of the squared deviations from `mean`, padding left out.
+#[inline(always)]
+fn squares(seen: &[f32], real: &[f32], mean: f32) -> f32 {
+    const LANES: usize = crate::recognise::features::separable::LANES;
+    let mut sums = [0.0_f32; LANES];
+    for (s, r) in seen.as_chunks::<LANES>().0.iter().zip(real.as_chunks::<LANES>().0) {
+        for i in 0..LANES {
+            let d = (s[i] - mean) * r[i];
+            sums[i] += d * d;
+        }
+    }
+    sums.iter().sum()
+}

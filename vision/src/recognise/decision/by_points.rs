@@ -1,0 +1,169 @@
+//! The decision by points: landmarks that points speak for in, the verdict out, or `None` where points say nothing and the
+//! icons are asked. Corners are those of the homography, sharpened by alignment the picture on the learnt icon.
+//!
+//! False alarms are counted against things that have nothing in common with the landmark. Against its look-alikes two
+//! more conditions stand: no other landmark whose points are there may go uncontradicted, and where something of the map
+//! is so like the landmark that its icon would be taken for it, the likeness must be within the threshold that this left.
+
+use crate::{
+    detect::quad::Quad,
+    frame::GrayImage,
+    geometry::corners::Corners,
+    model::{landmark_model::LandmarkModel, model_set::ModelSet},
+    params::Params,
+    points::{
+        search::{Found, search},
+        verify::PointEvidence,
+    },
+    recognise::{
+        decision::{
+            confidence::{entropy_m, entropy_norm, probability},
+            result::{MAX_CANDIDATES, MatchCandidate, MatchRefusal, RecognitionResult, Verdict},
+        },
+        verification::icon_alignment::{IconAlignment, align_to_icon},
+    },
+    seen_border::is_same_border,
+};
+
+/// log10 of the false alarms that a comparison of a quad with a whole map may have, expected.
+pub const LOG10_EPSILON: f64 = -5.0;
+/// log10 of the comparisons of a quad with one landmark: four turns.
+const LOG10_TURNS: f64 = 0.6;
+/// A landmark with so many connected parts of 25 that show something else is in doubt.
+pub const DOUBTFUL_PARTS: usize = 5;
+
+/// log10 of the expected false alarms of `evidence` in a map of `landmarks`.
+pub fn log10_false_alarms(evidence: &PointEvidence, landmarks: usize) -> f64 {
+    evidence.log10_nfa + LOG10_TURNS + (landmarks.max(1) as f64).log10()
+}
+
+/// What points say of `quad`. `None` if they speak for no landmark.
+pub(crate) fn by_points(
+    image: &GrayImage,
+    quad: &Quad,
+    models: &ModelSet,
+    p: &Params,
+) -> Option<RecognitionResult> {
+    let of = |index: usize| models.at_point_index(index).map_or(&[][..], |m| m.points.as_slice());
+    let n = models.len();
+    let (found, rivals): (Vec<Found>, Vec<Found>) =
+        search(image, quad, models.points(), of).into_iter().partition(|f| f.model < n);
+    let alarms: Vec<f64> = found.iter().map(|f| log10_false_alarms(&f.evidence, n)).collect();
+    let accepted = alarms.iter().filter(|a| **a <= LOG10_EPSILON).count();
+    if accepted == 0 {
+        return None;
+    }
+    let (best, model) = (found.first()?, models.at(found.first()?.model)?);
+    let mut evidence = best.evidence.clone();
+    let (border, corners_px) = nearest_border(quad, &evidence);
+    let is_detected = is_same_border(&corners_px, &evidence.corners_px, p);
+    let alignment = align_to_icon(image, &mut evidence, Some(&corners_px), (model, models), p);
+    // The homography's corners stand unless the detector found the same.
+    let is_located = is_detected || is_well_known(&evidence);
+    let others = found.iter().skip(1).chain(&rivals);
+    let refusal =
+        refusal(best, others, (model, &alignment), n, p).or((!is_located).then_some(MatchRefusal::Corners));
+    let of = |(i, f): (usize, &Found)| {
+        let ratio = if alarms[i] < 0.0 { LOG10_EPSILON / alarms[i] } else { f64::INFINITY };
+        let refused =
+            if i == 0 { refusal } else { (alarms[i] > LOG10_EPSILON).then_some(MatchRefusal::Points) };
+        Some(MatchCandidate {
+            landmark: models.at(f.model)?.id,
+            correlation: 2.0,
+            hausdorff: f64::INFINITY,
+            likeness: if i == 0 { alignment.likeness } else { None },
+            distance: ratio,
+            tau: 1.0,
+            ratio,
+            probability: probability(alarms[i] <= LOG10_EPSILON, accepted),
+            refusal: refused,
+        })
+    };
+    let sure = refusal.is_none();
+    Some(RecognitionResult {
+        verdict: if sure { Verdict::Unique(model.id) } else { Verdict::Ambiguous(model.id) },
+        candidates: found.iter().enumerate().filter_map(of).take(MAX_CANDIDATES).collect(),
+        entropy_m: entropy_m(accepted, n),
+        entropy_norm: entropy_norm(accepted, n),
+        confidence: if sure { confidence(alarms[0]) } else { 0.0 },
+        rotation: evidence.turned,
+        border,
+        aligned_px: Some(evidence.corners_px),
+        landmarks: n,
+        points: Some(Box::new(evidence)),
+    })
+}
+
+/// A landmark of which a corner is known worse than this share of its size is not told, standard deviations: what is seen of
+/// it does not say where the rest is.
+const MAX_CORNER_SIGMA_SHARE: f64 = 0.1;
+
+/// Whether the points tell where the landmark's corners are.
+pub(crate) fn is_well_known(evidence: &PointEvidence) -> bool {
+    let limit_px2 = MAX_CORNER_SIGMA_SHARE.powi(2) * evidence.corners_px.area_px2();
+    evidence.corner_covariance_px2.iter().all(|c| c.symmetric_eigenvalues().max() <= limit_px2)
+}
+
+/// Why `best`, which is `model` and was aligned with its icon, is not named among `landmarks` although its points are there, while
+/// points speak for `others`, too.
+fn refusal<'a>(
+    best: &Found,
+    mut others: impl Iterator<Item = &'a Found>,
+    (model, alignment): (&LandmarkModel, &IconAlignment),
+    landmarks: usize,
+    p: &Params,
+) -> Option<MatchRefusal> {
+    if is_doubtful(&best.evidence, alignment) {
+        return Some(MatchRefusal::Disagreement);
+    }
+    // Its share of the best one's exponent says how much was taught of a rival, not whether it hangs there: a look-alike
+    // that was taught with fewer points agrees wherever it has any.
+    let alarms = |f: &Found| log10_false_alarms(&f.evidence, landmarks);
+    let is_rival = |f: &Found| {
+        let accepted = alarms(f) <= LOG10_EPSILON;
+        alarms(f) / alarms(best) >= p.recognise.verdict.margin || (accepted && !is_contradicted(f))
+    };
+    if others.any(is_rival) {
+        return Some(MatchRefusal::Margin);
+    }
+    // Where the image does not show all of it there is no likeness.
+    let is_like = alignment.likeness.is_none_or(|l| 1.0 - l < model.likeness.tau);
+    (has_double(model, p) && !is_like).then_some(MatchRefusal::Likeness)
+}
+
+/// Something of the map is nearer to it than what is accepted where nothing is like it: to be told from that by points
+/// alone is not certain.
+fn has_double(model: &LandmarkModel, p: &Params) -> bool {
+    model.likeness.tau < p.learn.threshold.nearest_share * p.learn.likeness_cap
+}
+
+/// Whether a connected part of the landmark shows something else: by its icon where it was aligned with that, as the icon covers
+/// every part; else by its points.
+pub(crate) fn is_doubtful(evidence: &PointEvidence, alignment: &IconAlignment) -> bool {
+    alignment.has_mismatch.unwrap_or_else(|| evidence.agreement.largest_disagreement() >= DOUBTFUL_PARTS)
+}
+
+/// A connected part of it shows something else by its points.
+fn is_contradicted(found: &Found) -> bool {
+    is_doubtful(&found.evidence, &IconAlignment::NONE)
+}
+
+/// Which border of `quad` lies nearest to where the landmark's is: 0 for its corners, i for alternate i - 1; and its
+/// corners, the landmark's top-left first.
+fn nearest_border(quad: &Quad, evidence: &PointEvidence) -> (usize, Corners) {
+    let turned =
+        std::iter::once(&quad.corners_px).chain(&quad.alternates).map(|c| c.rotated(evidence.turned));
+    let off_px = |c: &Corners| c.furthest_px(&evidence.corners_px);
+    let nearest = turned.enumerate().min_by(|a, b| off_px(&a.1).total_cmp(&off_px(&b.1)));
+    nearest.unwrap_or((0, quad.corners_px.rotated(evidence.turned)))
+}
+
+/// Chance that the identity is right: false alarms are as rare as they are computed to be only if the model of chance
+/// holds, so that the exponent is discounted.
+fn confidence(log10_false_alarms: f64) -> f64 {
+    const DISCOUNT: f64 = 0.35;
+    1.0 - 10.0_f64.powf(DISCOUNT * log10_false_alarms.min(0.0))
+}
+
+#[cfg(test)]
+mod tests;

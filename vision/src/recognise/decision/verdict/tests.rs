@@ -1,0 +1,191 @@
+//! The decision on drawn posters: right, unknown, ambiguous; rotations, borders, light, occlusion; every refusal.
+
+use super::*;
+use crate::{
+    geometry::corners::Corners,
+    learn::{lesson::learn, synthesis::views, training_view::TrainingView},
+    model::{
+        landmark_id::LandmarkId,
+        landmark_model::{Gate, ModelStatus},
+    },
+    recognise::{
+        features::{
+            correlation::correlation,
+            icon_features::{IconFeatures, features},
+        },
+        fixture::{Dice, lesson, lessons, model_set, oblique, photograph, poster, quad, whole},
+        retrieval::nearest,
+    },
+};
+use nalgebra::Point2;
+use proptest::prelude::*;
+use std::sync::{Arc, LazyLock};
+
+mod gates;
+
+const KINDS: [DistanceKind; 3] = [DistanceKind::Hausdorff, DistanceKind::Correlation, DistanceKind::Both];
+
+/// The icons decide.
+static PARAMS: LazyLock<Params> = LazyLock::new(|| {
+    let mut p = Params::default();
+    p.recognise.verdict.points = false;
+    p
+});
+static SIX: LazyLock<ModelSet> = LazyLock::new(|| model_set(6, &PARAMS));
+
+#[test]
+fn each_poster_is_recognised_and_strangers_are_not() {
+    for seed in 1..=6 {
+        let image = photograph(&poster(seed), &oblique(), 0.8, 20.0);
+        for kind in KINDS {
+            let v = recognise(&image, &quad(oblique()), &SIX, kind, &PARAMS);
+            assert_eq!(v.verdict, Verdict::Unique(LandmarkId(seed)), "{kind:?} {:?}", v.candidates);
+            assert!(v.confidence > 0.2 && v.confidence <= 1.0);
+            assert_eq!((v.rotation, v.border, v.landmarks), (0, 0, 6));
+            assert!((v.candidates[0].probability - 1.0).abs() < 1e-12);
+        }
+    }
+    for seed in 101..=110 {
+        let image = photograph(&poster(seed), &oblique(), 0.8, 20.0);
+        for kind in KINDS {
+            let v = recognise(&image, &quad(oblique()), &SIX, kind, &PARAMS);
+            assert_eq!(v.verdict, Verdict::Unknown, "{seed} {kind:?} {:?}", v.candidates);
+            assert!(v.confidence.abs() < 1e-12 && (v.entropy_m - 1.0).abs() < 1e-12);
+            assert!(v.candidates.iter().all(|c| c.refusal.is_some() && c.probability.abs() < 1e-12));
+        }
+    }
+}
+
+#[test]
+fn any_naming_of_the_corners_is_found_when_upright_is_unsure() {
+    let image = photograph(&poster(3), &oblique(), 1.0, 0.0);
+    for turn in 0..4 {
+        let mut q = quad(oblique().rotated(turn));
+        q.upright_ambiguous = true;
+        for kind in KINDS {
+            let v = recognise(&image, &q, &SIX, kind, &PARAMS);
+            assert_eq!(v.verdict, Verdict::Unique(LandmarkId(3)));
+            assert_eq!(v.rotation, (4 - turn) % 4);
+        }
+        q.upright_ambiguous = false;
+        let v = recognise(&image, &q, &SIX, DistanceKind::Both, &PARAMS);
+        assert_eq!(v.verdict == Verdict::Unknown, turn != 0, "{turn}");
+    }
+}
+
+#[test]
+fn an_inner_border_is_found() {
+    let image = photograph(&poster(2), &oblique(), 1.0, 0.0);
+    // Too far out for alignment to get from one to the other.
+    let outer = [[4.0, 4.0], [390.0, 10.0], [385.0, 380.0], [8.0, 395.0]];
+    let mut q = quad(Corners::try_from(outer).unwrap());
+    assert_eq!(recognise(&image, &q, &SIX, DistanceKind::Both, &PARAMS).verdict, Verdict::Unknown);
+    q.alternates = vec![oblique()];
+    let v = recognise(&image, &q, &SIX, DistanceKind::Both, &PARAMS);
+    assert_eq!((v.verdict, v.border), (Verdict::Unique(LandmarkId(2)), 1));
+    // Borders beyond the limit are not looked at.
+    let mut many = vec![q.corners_px; nearest::MAX_BORDERS - 2];
+    many.push(oblique());
+    q.alternates = many;
+    let v = recognise(&image, &q, &SIX, DistanceKind::Both, &PARAMS);
+    assert_eq!(v.border, nearest::MAX_BORDERS - 1);
+    q.alternates.insert(0, q.corners_px);
+    let v = recognise(&image, &q, &SIX, DistanceKind::Both, &PARAMS);
+    assert_eq!(v.verdict, Verdict::Unknown);
+}
+
+#[test]
+fn a_third_may_be_covered() {
+    let image = photograph(&poster(5), &oblique(), 1.0, 0.0);
+    let covered = GrayImage::from_fn(400, 400, |u, v| {
+        let inside = (120..260).contains(&u) && (170..260).contains(&v);
+        if inside { if (u / 9 + v / 9) % 2 == 0 { 250 } else { 10 } } else { image.at(u, v) }
+    });
+    let v = recognise(&covered, &quad(oblique()), &SIX, DistanceKind::Both, &PARAMS);
+    assert_eq!(v.verdict, Verdict::Unique(LandmarkId(5)), "{:?}", v.candidates);
+}
+
+#[test]
+fn look_alikes_are_ambiguous() {
+    let mut models = lessons(4, &PARAMS);
+    let mut twin = (*models[1]).clone();
+    twin.id = LandmarkId(9);
+    models.push(Arc::new(twin));
+    let set = ModelSet::new(models, &PARAMS).unwrap();
+    let image = photograph(&poster(2), &oblique(), 1.0, 0.0);
+    for kind in KINDS {
+        let v = recognise(&image, &quad(oblique()), &set, kind, &PARAMS);
+        assert_eq!(v.verdict, Verdict::Ambiguous(LandmarkId(2)));
+        assert_eq!(v.candidates[0].refusal, Some(MatchRefusal::Margin));
+        assert!((v.candidates[1].probability - 0.5).abs() < 1e-12);
+        assert!((v.candidates.iter().map(|c| c.probability).sum::<f64>() - 1.0).abs() < 1e-12);
+        assert!((v.entropy_norm - (1.0 - 2.0_f64.ln() / 6.0_f64.ln())).abs() < 1e-12);
+        assert!(v.confidence.abs() < 1e-12);
+    }
+}
+
+#[test]
+fn nothing_to_compare_is_unknown() {
+    let image = photograph(&poster(1), &oblique(), 1.0, 0.0);
+    let empty = ModelSet::default();
+    assert_eq!(recognise(&image, &quad(oblique()), &empty, DistanceKind::Both, &PARAMS).landmarks, 0);
+    // The set was made for other parameters.
+    let mut p = PARAMS.clone();
+    p.recognise.descriptor.sigma = 2.1;
+    let v = recognise(&image, &quad(oblique()), &SIX, DistanceKind::Both, &p);
+    assert!(v.verdict == Verdict::Unknown && v.candidates.is_empty());
+    // Too small a quad has no icon.
+    let small = Corners::try_from([[90.0, 80.0], [110.0, 80.0], [110.0, 100.0], [90.0, 100.0]]).unwrap();
+    assert!(recognise(&image, &quad(small), &SIX, DistanceKind::Both, &PARAMS).candidates.is_empty());
+}
+
+#[test]
+fn the_only_landmark_needs_no_margin() {
+    let set = ModelSet::new(vec![Arc::new(lesson(7, 4, &PARAMS))], &PARAMS).unwrap();
+    let image = photograph(&poster(4), &oblique(), 1.0, 0.0);
+    let v = recognise(&image, &quad(oblique()), &set, DistanceKind::Both, &PARAMS);
+    assert_eq!(v.verdict, Verdict::Unique(LandmarkId(7)), "{:?}", v.candidates);
+}
+
+#[test]
+fn nearest_equals_comparing_everything() {
+    // Oracle: C^r and H^r of every reading with every exemplar, sorted.
+    let image = photograph(&poster(4), &oblique(), 0.9, 5.0);
+    let mut q = quad(oblique());
+    q.upright_ambiguous = true;
+    let seen = quad_readings(&image, &q, &PARAMS);
+    assert_eq!(seen.len(), 4);
+    for kind in [DistanceKind::Hausdorff, DistanceKind::Correlation] {
+        let mut expected: Vec<(f64, LandmarkId)> = SIX
+            .iter()
+            .map(|m| {
+                let seen: Vec<IconFeatures> =
+                    seen.iter().map(|s| features(s.icon.clone(), &PARAMS.recognise)).collect();
+                let learnt = m.features(&PARAMS.recognise);
+                let least = |d: &dyn Fn(&IconFeatures, &IconFeatures) -> f64| {
+                    let pairs = seen.iter().flat_map(|s| learnt.iter().map(move |e| (s, e)));
+                    pairs.map(|(a, b)| d(a, b)).fold(f64::INFINITY, f64::min)
+                };
+                let r = &PARAMS.recognise;
+                let ratio = if kind == DistanceKind::Hausdorff {
+                    let d = |a: &IconFeatures, b: &IconFeatures| {
+                        crate::recognise::features::hausdorff::hausdorff(&a.points, &b.points, &r.hausdorff)
+                    };
+                    least(&d) / m.hausdorff.tau
+                } else {
+                    least(&|a, b| correlation(&a.buckets, &b.buckets, &r.correlation)) / m.correlation.tau
+                };
+                (ratio, m.id)
+            })
+            .collect();
+        expected.sort_by(|a, b| a.0.total_cmp(&b.0));
+        for count in 1..=5 {
+            let found = nearest(&seen, &SIX, kind, count, &PARAMS);
+            assert_eq!(found.len(), count);
+            for (near, (ratio, id)) in found.iter().zip(&expected) {
+                assert!((near.ratio(kind) - ratio).abs() < 1e-6);
+                assert_eq!(near.model.id, *id);
+            }
+        }
+    }
+}

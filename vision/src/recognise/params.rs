@@ -1,0 +1,110 @@
+//! Parameters from icon to verdict.
+
+use crate::recognise::{
+    alignment::align_params::AlignParams,
+    features::{
+        correlation::CorrelationParams, descriptor::DescriptorParams, harris::HarrisParams,
+        hausdorff::HausdorffParams,
+    },
+};
+use serde::{Deserialize, Serialize};
+
+/// Parameters of points, descriptors, distances and the decision.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RecogniseParams {
+    /// Harris points.
+    pub harris: HarrisParams,
+    /// The 7-component descriptor.
+    pub descriptor: DescriptorParams,
+    /// C^r.
+    pub correlation: CorrelationParams,
+    /// H^r.
+    pub hausdorff: HausdorffParams,
+    /// The decision.
+    pub verdict: VerdictParams,
+}
+
+/// Parameters of the decision.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct VerdictParams {
+    /// The nearest landmark is the answer only while its ratio is below this share of the runner-up's (method 10:
+    /// 0.7).
+    pub margin: f64,
+    /// Candidates below this ratio are verified by alignment; 0 turns verification off.
+    pub verify_reach: f64,
+    /// After alignment a distance is accepted below this share of tau: the corners were moved to please the landmark.
+    pub verified_share: f64,
+    /// Landmarks on the short list, of which the picture is laid on each.
+    pub short_list: usize,
+    /// Landmarks of the short list whose signature is less alike are not looked at, -1 to 1.
+    pub min_signature: f32,
+    /// Nor those that are further behind the first one.
+    pub signature_gap: f32,
+    /// Landmarks up to which tau of the likeness holds as it is.
+    pub crowd: usize,
+    /// From there on tau shrinks by this share with every factor of e: the more landmarks, the nearer the nearest of them
+    /// is to any stranger. On 732 quads of other buildings among 267 landmarks, strangers within a ratio grow by e with
+    /// 0.08 of ratio.
+    pub crowd_share: f64,
+    /// A landmark whose likeness uses more than this share of its tau...
+    pub doubtful_share: f64,
+    /// ... is refused where more than this share of the picture shows something else, 0 to 1.
+    pub max_contradicting: f64,
+    /// Beyond the frame the picture must be at least this much like the learnt one, -1 to 1...
+    pub min_content_likeness: f64,
+    /// ... in what amounts to at least so many buckets. A landmark that shows less is not used.
+    pub min_content: f64,
+    /// From this likeness beyond the frame on...
+    pub sure_content_likeness: f64,
+    /// ... in so many buckets, none of the paper's distances need agree: saturation moves them far.
+    pub sure_content: f64,
+    /// Landmarks that are verified at most.
+    pub max_verified: usize,
+    /// Whether points decide where icons would (`both`); what they say nothing of is left to the icons. See
+    /// `docs/method/25-recognition-by-points.md`.
+    pub points: bool,
+    /// Landmarks with more points than this are never accepted by their icons: their points would have said so. One with
+    /// fewer that its icon speaks for is ambiguous, with [`Refusal::Plain`]: the robot's pose may name it.
+    pub max_icon_points: usize,
+    /// How corners are moved.
+    pub align: AlignParams,
+}
+
+impl Default for VerdictParams {
+    fn default() -> Self {
+        Self {
+            margin: 0.7,
+            verify_reach: 1.5,
+            verified_share: 0.8,
+            short_list: 8,
+            min_signature: 0.3,
+            signature_gap: 0.35,
+            crowd: 300,
+            crowd_share: 0.08,
+            doubtful_share: 0.85,
+            max_contradicting: 0.12,
+            min_content_likeness: 0.45,
+            min_content: 1.5,
+            sure_content_likeness: 0.6,
+            sure_content: 4.0,
+            max_verified: 2,
+            points: true,
+            max_icon_points: 40,
+            align: AlignParams::default(),
+        }
+    }
+}
+
+/// What is left of tau in the largest map.
+pub(crate) const LEAST_TAU_SHARE: f64 = 0.5;
+
+impl VerdictParams {
+    /// The share of tau of the likeness that holds among `landmarks`: as many strangers are accepted by a large map as by
+    /// one of `crowd` landmarks.
+    pub fn tau_share(&self, landmarks: usize) -> f64 {
+        let crowds = landmarks.max(1) as f64 / self.crowd.max(1) as f64;
+        (1.0 - self.crowd_share * crowds.ln().max(0.0)).clamp(LEAST_TAU_SHARE, 1.0)
+    }
+}
