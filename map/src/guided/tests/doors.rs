@@ -1,5 +1,5 @@
-//! Twelve identical doors in a row, the whole way from image to fused pose: used where the pose is right, no support for
-//! one that is wrong.
+//! Twelve identical doors in a row, the whole way from image to fused pose: used where the pose is right, no support
+//! for one that is wrong.
 
 use super::*;
 use crate::{
@@ -256,8 +256,8 @@ fn a_robot_that_knows_where_it_is_uses_every_door() {
     assert!(right > frames && worst_m < 0.15, "{right} {worst_m}");
 }
 
-/// Drives with a pose that is wrong by `off_m` from between the doors until the poster has been in view for a while. Frames
-/// that show the poster until the pose is found out, and until it is right again.
+/// Drives with a pose that is wrong by `off_m` from between the doors until the poster has been in view for a while.
+/// Frames that show the poster until the pose is found out, and until it is right again.
 fn found_out(spacing_m: f64, off_m: f64, seed: u64) -> (usize, usize) {
     let mut drive = Drive::new(spacing_m, 2.5 * spacing_m, off_m, seed);
     let (mut shown, mut doubted, mut replaced, mut misled) = (0, None, None, 0);
