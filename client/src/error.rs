@@ -19,7 +19,6 @@ pub enum ClientError {
     #[error(
         "timeout, or no server reachable at {endpoint}: is `waymark serve` running, is this its zenoh endpoint? ({detail})"
     )]
-    /// No session with the server's router.
     Unreachable {
         /// The zenoh endpoint that was tried.
         endpoint: String,
@@ -38,7 +37,6 @@ pub enum ClientError {
     #[error(
         "no answer to frame {seq} within {waited:?}: the frame or its answer was dropped, the server is not reachable at {endpoint}, or its work takes longer; send again or wait longer"
     )]
-    /// No answer arrived in time.
     NoAnswer {
         /// Number of the frame.
         seq: u64,
@@ -51,7 +49,6 @@ pub enum ClientError {
     #[error(
         "frame {seq} was superseded by a newer one of the same camera: send the next when the last is answered"
     )]
-    /// A newer frame of the same camera replaced this one.
     Superseded {
         /// Number of the frame.
         seq: u64,

@@ -9,8 +9,9 @@ use vision::geometry::Corners;
 pub struct NamedLandmark<'a> {
     /// Name of the landmark.
     pub name: &'a str,
-    /// [`Sighting::Global`]: the picture alone names it; it may start a pose. [`Sighting::Guided`]: the pose known before
-    /// names it; it may correct that pose, and says nothing to a program that does not know where the robot is.
+    /// [`Sighting::Global`]: the picture alone names it; it may start a pose. [`Sighting::Guided`]: the pose known
+    /// before names it; it may correct that pose, and says nothing to a program that does not know where the robot
+    /// is.
     pub sighting: Sighting,
     /// Position in the image, and pose.
     pub quad: &'a QuadAnswer,
@@ -25,8 +26,8 @@ impl NamedLandmark<'_> {
 
 /// The landmark that a quad is, and how it was named; none for a quad without a name.
 ///
-/// A server from before guided recognition does not say how: what it names is global. A name of a kind that is not known
-/// here is none.
+/// A server from before guided recognition does not say how: what it names is global. A name of a kind that is not
+/// known here is none.
 pub fn named(quad: &QuadAnswer) -> Option<NamedLandmark<'_>> {
     let sighting = Sighting::try_from(quad.sighting).ok()?;
     let (name, sighting) = match sighting {
@@ -42,8 +43,8 @@ pub fn named_landmarks(answer: &Answer) -> impl Iterator<Item = NamedLandmark<'_
     answer.quads.iter().filter_map(named)
 }
 
-/// Corners of a quad of an answer (pixels of the frame sent, clockwise from top left); `None` where they are not those of
-/// a convex quad.
+/// Corners of a quad of an answer (pixels of the frame sent, clockwise from top left); `None` where they are not
+/// those of a convex quad.
 pub fn quad_corners(quad: &QuadAnswer) -> Option<Corners> {
     let points: Vec<[f64; 2]> = quad.corners.iter().map(|p| [p.u_px, p.v_px]).collect();
     Corners::try_from(<[[f64; 2]; 4]>::try_from(points).ok()?).ok()

@@ -45,8 +45,8 @@ pub struct RobotOptions {
     /// Longest time to find the server.
     pub timeout: Duration,
     /// The epoch of a session before, for a program that was started again while odometry went on; drawn at random if
-    /// absent. Only for a server that was started again too: to one that went on, numbers that begin anew are stale. Two
-    /// programs must not use one robot's name at a time: the later one is refused with `epoch_conflict`.
+    /// absent. Only for a server that was started again too: to one that went on, numbers that begin anew are stale.
+    /// Two programs must not use one robot's name at a time: the later one is refused with `epoch_conflict`.
     pub epoch: Option<u64>,
 }
 
@@ -200,8 +200,8 @@ impl RobotClient {
         self.answers.subscribe()
     }
 
-    /// Every fused pose of this epoch from now on; [`v1::RobotPose::age_ms`] says how old it was when it was sent. The server
-    /// sends none that is more than 2 s old, so that silence means that the pose is unknown.
+    /// Every fused pose of this epoch from now on; [`v1::RobotPose::age_ms`] says how old it was when it was sent.
+    /// The server sends none that is more than 2 s old, so that silence means that the pose is unknown.
     pub fn poses(&self) -> broadcast::Receiver<v1::RobotPose> {
         self.poses.subscribe()
     }
@@ -259,8 +259,8 @@ impl RobotClient {
             .map_err(|e| ClientError::Transport { action: "read where to look", detail: e.to_string() })
     }
 
-    /// The present version of a map; `None` if the server has no such map. For a program that keeps something derived from a
-    /// map: `MapChanged` events may be lost on a full link, this cannot.
+    /// The present version of a map; `None` if the server has no such map. For a program that keeps something derived
+    /// from a map: `MapChanged` events may be lost on a full link, this cannot.
     pub async fn map_version(&self, map: &str, wait: Duration) -> Result<Option<u64>, ClientError> {
         let key = self.keys.build(&Key::MapVersion(name("map", map)?));
         let replies = self.session.get(key).timeout(wait).await.map_err(fault("ask for a map's version"))?;

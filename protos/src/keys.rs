@@ -1,5 +1,5 @@
-//! Key expressions under `waymark/1/{fleet}/`, built from checked names and parsed back into them. The transport does not
-//! tell a handler who sent a message, so the robot's name is in every key that a robot writes.
+//! Key expressions under `waymark/1/{fleet}/`, built from checked names and parsed back into them. The transport does
+//! not tell a handler who sent a message, so the robot's name is in every key that a robot writes.
 
 use std::fmt;
 
@@ -96,8 +96,8 @@ pub enum Key {
     Scan(Name),
     /// `robot/{robot}/pose`: server to robot, `RobotPose`.
     Pose(Name),
-    /// `robot/{robot}/alive/{epoch}`: liveliness token of a start of a robot's software; the epoch in decimal digits. The
-    /// older `robot/{robot}/alive` names no epoch.
+    /// `robot/{robot}/alive/{epoch}`: liveliness token of a start of a robot's software; the epoch in decimal digits.
+    /// The older `robot/{robot}/alive` names no epoch.
     Alive(Name, Option<u64>),
     /// `robot/{robot}/rpc/gaze`: a query of the robot, `GazeRequest` in, `GazeAdvice` out.
     Gaze(Name),

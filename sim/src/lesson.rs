@@ -63,8 +63,8 @@ pub struct Stop {
     pub step: Step,
 }
 
-/// Stops before all posters (and doors and windows), in the building's order; fewer where there is no room. Views go from one side to the
-/// other, one per equal share of the angles.
+/// Stops before all posters (and doors and windows), in the building's order; fewer where there is no room. Views go
+/// from one side to the other, one per equal share of the angles.
 pub fn stops(building: &Building, params: &LessonParams) -> Vec<Stop> {
     let mut all = vec![];
     let learnt = building.landmarks().iter().filter(|l| match l.kind {

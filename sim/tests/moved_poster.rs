@@ -1,5 +1,6 @@
-//! A poster was moved by a metre and the map does not know: it is found out, no other is blamed, and the pose stays good.
-//! Corners come from the exact truth with noise, motion from drifting odometry; the way of a frame is the server's.
+//! A poster was moved by a metre and the map does not know: it is found out, no other is blamed, and the pose stays
+//! good. Corners come from the exact truth with noise, motion from drifting odometry; the way of a frame is the
+//! server's.
 
 use std::{collections::BTreeMap, sync::Arc};
 

@@ -74,8 +74,9 @@ fn there_is_no_pose_before_the_first_fix_or_a_given_start() {
 
 #[test]
 fn equals_batch_least_squares() {
-    // Oracle: all poses, both places and odometry's errors in one weighted least-squares problem. Errors are a millionth of their sigma,
-    // so that every derivative is taken at the same point and the two must agree to rounding.
+    // Oracle: all poses, both places and odometry's errors in one weighted least-squares problem. Errors are a
+    // millionth of their sigma, so that every derivative is taken at the same point and the two must agree to
+    // rounding.
     let mut random = Random::new(1);
     let p = FuseParams { scale_drift: 0.0, turn_bias_drift_rad_per_m: 0.0, ..eager() };
     let steps = 6;

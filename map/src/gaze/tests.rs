@@ -64,8 +64,8 @@ fn two(saliency: [f64; 2]) -> Vec<(LandmarkPlace, VisibilityMap, f64, f64)> {
 
 #[test]
 fn the_choice_flips_where_the_product_says() {
-    // By hand: on y = 3.2 the nearest boundary is the far disc, tangent to the wall: of diameter D, centre (x, D/2). With
-    // saliencies 1 and 0.8 the choice flips where (R - |q - c0|) = 0.8 (R - |q - c1|).
+    // By hand: on y = 3.2 the nearest boundary is the far disc, tangent to the wall: of diameter D, centre (x, D/2).
+    // With saliencies 1 and 0.8 the choice flips where (R - |q - c0|) = 0.8 (R - |q - c1|).
     let p = GazeParams { full_margin_m: 10.0, ..GazeParams::default() };
     let things = two([1.0, 0.8]);
     let r = 0.5 * 512.0 * 0.6 / 75.0;

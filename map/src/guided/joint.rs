@@ -1,6 +1,6 @@
-//! The error that all observations of one frame share (pose, extrinsics, intrinsics), conditioned on observations one by
-//! one. The sum of the squared distances of the steps is the joint Mahalanobis distance of all innovations under their full
-//! covariance: Neira and Tardos 2001, computed without the stacked matrix.
+//! The error that all observations of one frame share (pose, extrinsics, intrinsics), conditioned on observations one
+//! by one. The sum of the squared distances of the steps is the joint Mahalanobis distance of all innovations under
+//! their full covariance: Neira and Tardos 2001, computed without the stacked matrix.
 
 use nalgebra::{SMatrix, SVector};
 
@@ -49,9 +49,9 @@ impl CommonError {
         Self { mean: CommonVector::zeros(), covariance: *covariance }
     }
 
-    /// Conditions on observed corners with covariance `own` of what is not common: an iterated extended Kalman update, so
-    /// that a neighbour of the right landmark is not ruled out by linearisation alone. `None` when it does not settle, the
-    /// covariance is singular, or a number is not finite.
+    /// Conditions on observed corners with covariance `own` of what is not common: an iterated extended Kalman
+    /// update, so that a neighbour of the right landmark is not ruled out by linearisation alone. `None` when it does
+    /// not settle, the covariance is singular, or a number is not finite.
     pub(super) fn update(
         &self,
         predicted: &impl Prediction,

@@ -170,7 +170,8 @@ impl<'a> Planar<'a> {
             by_nuisance.view_mut((8 * i, 6 * n), (8, 6)).copy_from(&seen.mounting);
             if self.camera.is_some() {
                 for (c, by_camera) in sighting.seen.measured.by_camera.iter().enumerate() {
-                    // The residual is measured minus predicted, so the derivative of the measured corner changes its sign.
+                    // The residual is measured minus predicted, so the derivative of the measured corner changes its
+                    // sign.
                     by_nuisance.view_mut((8 * i + 2 * c, 6 * (n + 1)), (2, 3)).copy_from(&-by_camera);
                 }
             }

@@ -47,8 +47,8 @@ struct Recorded {
 /// Sigma of the laser along a corridor: nothing known.
 const LOST: f64 = 100.0;
 
-/// 12 m along y = 2.5, there or back. Odometry measures 4 % too much, 12 % between x = 4 and 8; a wall that was moved puts the
-/// laser 0.2 m to the south everywhere, sigma 2 cm; landmarks (sigma 5 cm) are seen below x = 4 only.
+/// 12 m along y = 2.5, there or back. Odometry measures 4 % too much, 12 % between x = 4 and 8; a wall that was moved
+/// puts the laser 0.2 m to the south everywhere, sigma 2 cm; landmarks (sigma 5 cm) are seen below x = 4 only.
 fn drive(random: &mut Random, back: bool) -> Recorded {
     let (start, step) = if back { (12.0, -0.05) } else { (0.0, 0.05) };
     let heading = if back { std::f64::consts::PI } else { 0.0 };

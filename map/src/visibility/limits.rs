@@ -21,8 +21,9 @@ const GOLDEN: f64 = 0.618_033_988_749_895;
 ///
 /// The camera is at (r cos d, r sin d, -rise) from the landmark's middle, direction d from its normal on the floor. The
 /// normal is n = (cos t, 0, -sin t), its height runs along u = (sin t, 0, cos t), its width along (0, 1, 0).
-// Departs from method 12.1 to 12.3: these are its conditions in space. For a landmark at the camera's height, on a wall, they
-// are those of the plan view; high up on a wall the plan view takes the landmark for nearer and less oblique than it is.
+// Departs from method 12.1 to 12.3: these are its conditions in space. For a landmark at the camera's height, on a
+// wall, they are those of the plan view; high up on a wall the plan view takes the landmark for nearer and less
+// oblique than it is.
 #[derive(Debug, Clone)]
 pub(super) struct Limits {
     rise_m: f64,
@@ -134,8 +135,8 @@ impl Limits {
     }
 
     /// The part of a span in which it is high enough.
-    // Behind and below a landmark tilted by 20 to 40 degrees the apparent height is not monotonic at very oblique views:
-    // it dips by at most 12 %. Such a dip is not cut out.
+    // Behind and below a landmark tilted by 20 to 40 degrees the apparent height is not monotonic at very oblique
+    // views: it dips by at most 12 %. Such a dip is not cut out.
     /// The part of a range in which it is high enough.
     fn high_within_m(&self, cosine: f64, (near, far): (f64, f64)) -> Option<(f64, f64)> {
         let enough = |r: f64| self.high_m * self.height_m2(cosine, r).sqrt() >= r * r + self.rise_m.powi(2);

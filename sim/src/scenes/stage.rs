@@ -1,4 +1,5 @@
-//! A scene under way: the painter, the random numbers, and what is to be listed. Things and clutter are painted onto it.
+//! A scene under way: the painter, the random numbers, and what is to be listed. Things and clutter are painted onto
+//! it.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;

@@ -1,5 +1,5 @@
-//! Landmarks and scans together: drives along a corridor whose walls are not quite where the map says, a long standstill,
-//! and what a scan may not do.
+//! Landmarks and scans together: drives along a corridor whose walls are not quite where the map says, a long
+//! standstill, and what a scan may not do.
 
 use super::fix;
 use crate::{
@@ -98,7 +98,8 @@ fn drive(random: &mut Random, scans: Option<&LaserFixParams>) -> Driven {
 
 #[test]
 fn with_the_laser_the_pose_is_sharper_and_still_honest() {
-    // The simulated ranges err each for itself; by default points are taken to err together, as those of real lasers do.
+    // The simulated ranges err each for itself; by default points are taken to err together, as those of real lasers
+    // do.
     let exact = LaserFixParams { correlated: 1.0, floor: [0.0; 2], ..LaserFixParams::default() };
     let careful = LaserFixParams::default();
     let mut random = Random::new(3);

@@ -26,8 +26,8 @@ pub struct Candidate {
 /// A quad observed in the image.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Observation {
-    /// Corners in the landmark's order (TL, TR, BR, BL), px of the image as it comes. Of a landmark that the image border
-    /// cuts, corners outside of the image come from alignment.
+    /// Corners in the landmark's order (TL, TR, BR, BL), px of the image as it comes. Of a landmark that the image
+    /// border cuts, corners outside of the image come from alignment.
     pub corners_px: Corners,
     /// Their covariance (u, v of TL, TR, BR, BL), px^2.
     pub covariance_px2: SMatrix<f64, 8, 8>,

@@ -16,8 +16,8 @@ use crate::{
 use nalgebra::{Matrix2, SMatrix};
 use vision::geometry::polygon;
 
-/// Pairings with a corner this many times beyond the gate of rivals are left out before anything is computed of them. Far
-/// beyond, since the distance of one corner rests on a linear prediction.
+/// Pairings with a corner this many times beyond the gate of rivals are left out before anything is computed of them.
+/// Far beyond, since the distance of one corner rests on a linear prediction.
 const FAR_FACTOR: f64 = 4.0;
 
 /// An observation and a landmark that pass the individual gate of rivals.
@@ -141,8 +141,8 @@ fn is_far_off(expected: &Expected, observed: &Observation, chi2: f64) -> bool {
     })
 }
 
-/// Logarithm of the density, per px^8, of the corners of a quad that is on no map: its middle anywhere in the image, the
-/// other six coordinates anywhere within its own size.
+/// Logarithm of the density, per px^8, of the corners of a quad that is on no map: its middle anywhere in the image,
+/// the other six coordinates anywhere within its own size.
 fn log_clutter(expectations: &Expectations, observed: &Observation) -> f64 {
     let [width, height] = expectations.image_px;
     let size_px = polygon::area(observed.corners_px.points()).sqrt().max(1.0);

@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct AssociateParams {
-    /// Least picture evidence of a candidate, nats: logarithm of how much likelier the picture is if it is this landmark
-    /// than if it is none. ln 100.
+    /// Least picture evidence of a candidate, nats: logarithm of how much likelier the picture is if it is this
+    /// landmark than if it is none. ln 100.
     pub min_picture_nats: f64,
     /// Prior odds beyond this in either direction count as this, nats.
     pub max_prior_nats: f64,
@@ -17,8 +17,8 @@ pub struct AssociateParams {
     pub margin_nats: f64,
     /// Gates, individual and joint: standard normal quantile of the share of true pairings that pass. 3.09 is 99.9 %.
     pub gate_z: f64,
-    /// Standard deviation of what a measured corner errs by beyond its covariance, px: frames that stand off their wall,
-    /// lens residuals.
+    /// Standard deviation of what a measured corner errs by beyond its covariance, px: frames that stand off their
+    /// wall, lens residuals.
     pub model_sigma_px: f64,
 }
 

@@ -1,4 +1,5 @@
-//! Depth-first branch and bound over assignments: the best that is jointly compatible, and all that come within the margin.
+//! Depth-first branch and bound over assignments: the best that is jointly compatible, and all that come within the
+//! margin.
 
 use crate::guided::{
     associate::pairing::{Gates, Row},

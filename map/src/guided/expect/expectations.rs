@@ -37,8 +37,8 @@ pub struct Expected {
     pub side_px: f64,
     /// Share of its face that obstacles leave free, 0 to 1.
     pub unoccluded_share: f64,
-    /// Whether it is in full view wherever within [`super::ExpectParams::sure_sigmas`] the robot is: not finding it speaks against
-    /// the prior, or against the landmark.
+    /// Whether it is in full view wherever within [`super::ExpectParams::sure_sigmas`] the robot is: not finding it
+    /// speaks against the prior, or against the landmark.
     pub is_sure: bool,
     /// Whether obstacles hide it from everywhere within its uncertainty: then nothing in the image can be it.
     pub(in crate::guided) is_hidden: bool,

@@ -87,8 +87,8 @@ pub struct FrameReport<'a> {
     pub searched: bool,
     /// The pose by the uniquely recognised landmarks of that search alone, made without any prior.
     pub global: Option<&'a FixResult>,
-    /// Landmarks surely in view ([`crate::guided::Expected::is_sure`]) that neither way found. Only those that are recognised
-    /// reliably when they are there: not members of look-alike classes, not quarantined ones.
+    /// Landmarks surely in view ([`crate::guided::Expected::is_sure`]) that neither way found. Only those that are
+    /// recognised reliably when they are there: not members of look-alike classes, not quarantined ones.
     pub missed: &'a [LandmarkId],
 }
 
@@ -99,8 +99,8 @@ pub enum Decision {
     Keep,
     /// The global fix agrees with the pose, or starts one: it goes to the fuser as `FixRole::Independent`.
     Use,
-    /// The global fix contradicts the pose: it goes to the fuser as `FixRole::Independent`, which leaves it out and counts
-    /// it.
+    /// The global fix contradicts the pose: it goes to the fuser as `FixRole::Independent`, which leaves it out and
+    /// counts it.
     Doubt {
         /// How many global fixes in a row contradict the pose and agree with one another.
         in_a_row: u32,

@@ -51,8 +51,8 @@ fn a_frontal_square_is_where_the_pinhole_sees_it() {
 
 #[test]
 fn the_covariance_of_a_frontal_square_by_hand() {
-    // Only the robot's position is uncertain: 1 cm aside moves every corner by 512 * 0.01 / 4 px; 1 cm ahead moves it from
-    // the centre by 64 * 0.01 / 4 px.
+    // Only the robot's position is uncertain: 1 cm aside moves every corner by 512 * 0.01 / 4 px; 1 cm ahead moves it
+    // from the centre by 64 * 0.01 / 4 px.
     let mut place = ahead(4.0, 0.0, 1.0);
     place.covariance = Matrix6::zeros();
     let mounting = CameraExtrinsics { covariance: Matrix6::zeros(), ..level(0.0) };

@@ -14,7 +14,8 @@ use crate::{
 use nalgebra::{Point2, Rotation2, Vector2};
 use std::f64::consts::FRAC_PI_2;
 
-/// The same scene with the landmark under the ceiling, on the floor or leaning, at any height, and a camera that looks there.
+/// The same scene with the landmark under the ceiling, on the floor or leaning, at any height, and a camera that
+/// looks there.
 fn random_tilted_map(seed: u64) -> (LandmarkPlace, Vec<Obstacle>, PanTiltCamera) {
     let (mut landmark, mut obstacles, mut viewer) = random_map(seed);
     let mut dice = Dice::new(5000 + seed);
