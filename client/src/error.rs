@@ -75,6 +75,8 @@ pub enum ClientError {
         field: String,
         /// A sentence.
         detail: String,
+        /// More, by code, such as the `quads` that were found: [`protos::api::Problem::more`].
+        more: serde_json::Map<String, serde_json::Value>,
     },
     /// The answer is not what this version of the client understands.
     #[error("{url} answered something unexpected ({detail}): are client and server of the same version?")]
@@ -88,7 +90,7 @@ pub enum ClientError {
     #[error("job {id} {state}: {message}")]
     Job {
         /// Its number.
-        id: String,
+        id: i64,
         /// `failed` or `cancelled`.
         state: &'static str,
         /// Why.
@@ -98,7 +100,7 @@ pub enum ClientError {
     #[error("job {id} is not done after {waited:?}; it goes on, ask again for it")]
     JobTimeout {
         /// Its number.
-        id: String,
+        id: i64,
         /// How long we waited.
         waited: Duration,
     },

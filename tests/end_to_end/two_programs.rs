@@ -2,7 +2,7 @@
 //! by the API; the first goes on undisturbed. When it ends, the next is admitted: at once if it left in order, and within
 //! the named time if it was killed.
 
-use client::{Capture, RobotClient, v1};
+use client::{Capture, RobotClient, api::NewMap, v1};
 use server::{config::Limits, engine::epochs::MESSAGE_LIVE};
 use std::time::{Duration, Instant};
 use tests::{Inside, SOON, eventually, pictures, robots::connect};
@@ -18,7 +18,7 @@ fn code(answer: &v1::Answer) -> &str {
 
 async fn started() -> Inside {
     let inside = Inside::start(Limits::default()).await;
-    inside.maps().create_map("hall", None).await.expect("map");
+    inside.maps().create_map(&NewMap::new("hall")).await.expect("map");
     inside.maps().put_robot("r1", "hall").await.expect("robot");
     inside
 }

@@ -2,10 +2,11 @@
 
 use super::{detect, pictures, screen};
 use crate::{
-    calibrating::{CORNER_SIGMA_PX, Knowledge, Report, calibrated},
+    calibrating::{CORNER_SIGMA_PX, Knowledge, calibrated},
     engine::dominant::dominant,
 };
 use anyhow::Context as _;
+use protos::api::CalibrationReport;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 use vision::{
@@ -109,7 +110,7 @@ fn largest(quads: &[Quad]) -> Option<&Quad> {
     meant.or(whole.first()).copied()
 }
 
-fn table(r: &Report, names: &[String]) -> String {
+fn table(r: &CalibrationReport, names: &[String]) -> String {
     let k = &r.intrinsics;
     let mut lines = vec![
         format!(

@@ -2,11 +2,14 @@
 
 use super::teach::{ServerArgs, counted, show};
 use anyhow::{Context as _, bail};
+use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 use client::{
     MapClient,
-    runs::{KnownPath, LearntRun, Recorded},
+    api::{
+        FusionModeBody, ModalityBody, ModalityMapBody, ModalityMapPatch, RecordingStatusBody,
+        ReferenceRunBody, ReferenceTrajectoryBody,
+    },
 };
-use serde_json::{Value, json};
 use std::path::PathBuf;
 
 /// `waymark run`.
@@ -75,8 +78,8 @@ pub(crate) enum Command {
         map: String,
         /// `all`: everything, each as sure as it proved to be; `fuse`: those nearly as good as the best; `single`: the best
         /// alone. Odometry carries the pose in any case.
-        #[arg(value_parser = ["all", "fuse", "single"])]
-        mode: Option<String>,
+        #[arg(value_parser = PossibleValuesParser::new(["all", "fuse", "single"]).map(|word| mode(&word)))]
+        mode: Option<FusionModeBody>,
         #[command(flatten)]
         server: ServerArgs,
     },
@@ -86,56 +89,59 @@ pub(crate) enum Command {
 pub(crate) async fn run(command: &Command) -> anyhow::Result<()> {
     match command {
         Command::Start { robot, server } => {
-            let begun = MapClient::new(server.address())?.record_run(robot).await?;
+            let begun = MapClient::new(server.address())?.start_recording(robot).await?;
             show(server, &begun, &format!("a run of {robot} on {} is being recorded", begun.map))
         }
         Command::Status { robot, server } => {
-            let recorded = MapClient::new(server.address())?.recorded_run(robot).await?;
+            let recorded = MapClient::new(server.address())?.recording(robot).await?;
             show(server, &recorded, &recorded_line(&recorded))
         }
         Command::Cancel { robot, server } => {
-            MapClient::new(server.address())?.cancel_run(robot).await?;
+            MapClient::new(server.address())?.cancel_recording(robot).await?;
             show(server, robot, "given up")
         }
         Command::Learn { robot, path, sigma_m, sigma_rad, server } => {
             let text =
                 std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
             let poses = poses(&text).with_context(|| path.display().to_string())?;
-            let known = KnownPath { poses, sigma_m: *sigma_m, sigma_rad: *sigma_rad };
-            let learnt = MapClient::new(server.address())?.learn_run(robot, &known).await?;
+            let known = ReferenceTrajectoryBody { poses, sigma_m: *sigma_m, sigma_rad: *sigma_rad };
+            let learnt = MapClient::new(server.address())?.finish_recording(robot, &known).await?;
             show(server, &learnt, &learnt_lines(&learnt))
         }
         Command::List { map, server } => {
-            let runs = MapClient::new(server.address())?.runs(map).await?;
+            let runs = MapClient::new(server.address())?.reference_runs(map).await?;
             show(server, &runs, &runs.iter().map(learnt_lines).collect::<Vec<_>>().join("\n"))
         }
         Command::Forget { run, map, server } => {
-            MapClient::new(server.address())?.forget_run(map, *run).await?;
+            MapClient::new(server.address())?.delete_reference_run(map, *run).await?;
             show(server, run, "forgotten")
         }
         Command::Mode { map, mode, server } => {
             let maps = MapClient::new(server.address())?;
             let known = match mode {
-                Some(mode) => maps.set_areas(map, &json!({ "mode": mode })).await?,
-                None => maps.areas(map).await?,
+                Some(mode) => {
+                    maps.set_modalities(map, &ModalityMapPatch { mode: Some(*mode), areas: None }).await?
+                }
+                None => maps.modalities(map).await?,
             };
             show(server, &known, &mode_line(&known))
         }
     }
 }
 
-fn recorded_line(r: &Recorded) -> String {
+fn recorded_line(r: &RecordingStatusBody) -> String {
     let state = match &r.reason {
         Some(reason) => format!("ended ({reason})"),
         None => "goes on".to_owned(),
     };
-    let [landmarks, laser] = [(r.landmarks, "landmark"), (r.laser, "scan")].map(|(n, what)| counted(n, what));
+    let [landmarks, laser] =
+        [(r.landmarks, "landmark"), (r.laser, "scan")].map(|(n, what)| counted(n as u64, what));
     format!("{} on {}: {state}, {:.1} m, fixes by {landmarks}, {laser}", r.robot, r.map, r.way_m)
 }
 
-fn learnt_lines(run: &LearntRun) -> String {
+fn learnt_lines(run: &ReferenceRunBody) -> String {
     let mut lines =
-        vec![format!("{}  {}: {:.1} m, {}", run.id, run.robot, run.way_m, counted(run.cells, "cell"))];
+        vec![format!("{}  {}: {:.1} m, {}", run.id, run.robot, run.way_m, counted(run.cells as u64, "cell"))];
     lines.extend(run.modules.iter().map(|m| {
         let [along, across, heading] = [0, 1, 2].map(|k| m.mean[k].hypot(m.sigma[k]));
         format!(
@@ -147,13 +153,21 @@ fn learnt_lines(run: &LearntRun) -> String {
     lines.join("\n")
 }
 
+/// A mode by its word, one of the three that the argument may have.
+fn mode(word: &str) -> FusionModeBody {
+    match word {
+        "all" => FusionModeBody::All,
+        "fuse" => FusionModeBody::Fuse,
+        _ => FusionModeBody::Single,
+    }
+}
+
 /// How much of the map each is best on.
-fn mode_line(known: &Value) -> String {
-    let cells = known["cells"].as_array().map_or(&[][..], Vec::as_slice);
-    let best = |module: &str| cells.iter().filter(|cell| cell["best"] == module).count() as u64;
-    let mode = known["mode"].as_str().unwrap_or_default();
-    let each = ["odometry", "laser", "landmarks"].map(|module| format!("{module} {}", best(module)));
-    format!("{mode}; best in {}: {}", counted(cells.len() as u64, "cell"), each.join(", "))
+fn mode_line(known: &ModalityMapBody) -> String {
+    let best = |modality| known.cells.iter().filter(|cell| cell.best == Some(modality)).count();
+    let each = [ModalityBody::Odometry, ModalityBody::Laser, ModalityBody::Landmarks];
+    let each = each.map(|modality| format!("{modality} {}", best(modality)));
+    format!("{}; best in {}: {}", known.mode, counted(known.cells.len() as u64, "cell"), each.join(", "))
 }
 
 /// Poses of a file.

@@ -40,7 +40,7 @@ impl Service {
         let (gatherer, _) = Gatherer::start(store.clone(), &config, &hook, offers).await.unwrap();
         let hall = Arc::new(MapSnapshot::empty("hall", 1));
         let engine = Engine { vitals: store.vitals().clone(), gather: hook, ..scene::engine(&[hall]) };
-        let app = App::new(config, store.clone(), Workshop { jobs, gatherer }, &engine, stopping);
+        let app = App::new(config, store.clone(), Services { jobs, gatherer }, &engine, stopping);
         Self { router: router(app), store, engine, _writer: writer, _stop: stop, _data: data }
     }
 
