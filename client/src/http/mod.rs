@@ -27,11 +27,11 @@ pub use operation::Operation;
 pub use views::{LandmarkRegion, NewView};
 
 use crate::ClientError;
-use operation::{path_of, query_of};
+use operation::{PathValue, path_of, query_of};
 use protos::api::{Page, PageQuery, Problem};
 use reqwest::{RequestBuilder, Response};
 use serde::{Serialize, de::DeserializeOwned};
-use std::{fmt::Display, time::Duration};
+use std::time::Duration;
 
 /// Longest wait for one request.
 const REQUEST_TIMEOUT: Duration = Duration::from_mins(1);
@@ -76,7 +76,7 @@ impl MapClient {
     }
 
     /// A request of an operation; `at` are the parameters of its path, in order.
-    fn ask(&self, operation: &Operation, at: &[&dyn Display]) -> Result<RequestBuilder, ClientError> {
+    fn ask(&self, operation: &Operation, at: &[PathValue<'_>]) -> Result<RequestBuilder, ClientError> {
         let path = path_of(operation.path, at)?;
         Ok(self.http.request(operation.method.clone(), format!("{}/api/v1{path}", self.base)))
     }
@@ -85,7 +85,7 @@ impl MapClient {
     fn ask_query(
         &self,
         operation: &Operation,
-        at: &[&dyn Display],
+        at: &[PathValue<'_>],
         query: &impl Serialize,
     ) -> Result<RequestBuilder, ClientError> {
         let (path, query) = (path_of(operation.path, at)?, query_of(query));
@@ -96,7 +96,7 @@ impl MapClient {
     async fn all<T: DeserializeOwned>(
         &self,
         operation: &Operation,
-        at: &[&dyn Display],
+        at: &[PathValue<'_>],
     ) -> Result<Vec<T>, ClientError> {
         let mut items = Vec::new();
         let mut query = PageQuery::default();
@@ -177,6 +177,15 @@ mod tests {
         let all: Vec<_> = operations().map(|o| (o.method.as_str(), o.path)).collect();
         let calls: BTreeSet<_> = operations().map(|o| o.call).collect();
         assert_eq!((all.iter().collect::<BTreeSet<_>>().len(), calls.len()), (all.len(), all.len()));
+    }
+
+    #[test]
+    fn requests_may_be_made_on_any_thread() {
+        fn sent<T: Send>(_: T) {}
+        let maps = MapClient::new("http://127.0.0.1:1").unwrap();
+        sent(maps.maps());
+        sent(maps.delete_view("hall", "poster", 1));
+        sent(maps.live_events("hall"));
     }
 
     #[tokio::test]

@@ -36,8 +36,11 @@ macro_rules! operations {
 }
 pub(super) use operations;
 
+/// A value of a path.
+pub(super) type PathValue<'a> = &'a (dyn Display + Sync);
+
 /// The path with these values in its braces, in order.
-pub(super) fn path_of(path: &'static str, at: &[&dyn Display]) -> Result<String, ClientError> {
+pub(super) fn path_of(path: &'static str, at: &[PathValue<'_>]) -> Result<String, ClientError> {
     let mut values = at.iter();
     let mut made = String::new();
     for segment in path.split('/').skip(1) {
@@ -63,17 +66,16 @@ pub(super) fn path_of(path: &'static str, at: &[&dyn Display]) -> Result<String,
 /// The fields of an object as a query; those that are null are left out. Empty if nothing is left.
 pub(super) fn query_of(fields: &impl Serialize) -> String {
     let Ok(Value::Object(fields)) = serde_json::to_value(fields) else { return String::new() };
-    let mut query = String::new();
-    for (name, value) in fields {
+    let pair = |(name, value)| {
         let text = match value {
-            Value::Null => continue,
+            Value::Null => return None,
             Value::String(text) => text,
             other => other.to_string(),
         };
-        query.push(if query.is_empty() { '?' } else { '&' });
-        query.push_str(&format!("{name}={}", escaped(&text)));
-    }
-    query
+        Some(format!("{name}={}", escaped(&text)))
+    };
+    let pairs: Vec<String> = fields.into_iter().filter_map(pair).collect();
+    if pairs.is_empty() { String::new() } else { format!("?{}", pairs.join("&")) }
 }
 
 /// Percent-encodes all but unreserved characters (RFC 3986).

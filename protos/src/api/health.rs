@@ -28,7 +28,6 @@ pub struct Readiness {
 /// What runs here.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
-#[expect(clippy::struct_field_names, reason = "they are the names in the JSON")]
 pub struct Version {
     /// `waymark`.
     pub name: String,

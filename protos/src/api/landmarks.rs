@@ -157,7 +157,6 @@ pub struct NewLandmark {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
-#[expect(clippy::option_option, reason = "absent and null differ in a PATCH")]
 pub struct LandmarkPatch {
     /// Width and height.
     #[serde(default, deserialize_with = "super::null_or_value", skip_serializing_if = "Option::is_none")]

@@ -124,7 +124,6 @@ impl NewMap {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
-#[expect(clippy::option_option, reason = "absent and null differ in a PATCH")]
 pub struct MapPatch {
     /// The site it belongs to, in words: 1 to 64 characters.
     #[serde(default, deserialize_with = "super::null_or_value", skip_serializing_if = "Option::is_none")]

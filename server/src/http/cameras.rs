@@ -119,3 +119,31 @@ fn uploaded(given: &UploadedViews) -> Result<(Vec<PlanarView>, [u32; 2]), ApiErr
     }
     Ok((views, [given.width_px, given.height_px]))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_known_of_intrinsics_is_shown_whole() {
+        let state = |suspicion| WatchState {
+            tries: 40,
+            refused: 3,
+            landmarks: 5,
+            reduced_chi2: Some(1.5),
+            focal_error: Some(-0.02),
+            focal_sigma: None,
+            suspicion,
+        };
+        for suspicion in [
+            None,
+            Some(Suspicion::Focal { error: 0.1, sigma: 0.01 }),
+            Some(Suspicion::Misfit { reduced_chi2: 9.0 }),
+            Some(Suspicion::Refused { share: 0.6 }),
+        ] {
+            let state = state(suspicion);
+            let shown = serde_json::to_value(monitor_shown(&state)).unwrap();
+            assert_eq!(shown, serde_json::to_value(state).unwrap());
+        }
+    }
+}

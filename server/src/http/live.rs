@@ -120,3 +120,57 @@ async fn events(
 fn shown(event: &LiveEvent) -> Option<Event> {
     Event::default().event(event.kind()).json_data(event).ok()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use protos::{
+        Name,
+        api::{LiveEventBody, PoseTrust},
+    };
+    use std::sync::Arc;
+
+    #[test]
+    fn every_event_is_what_readers_are_told_to_expect() {
+        let name = |text: &str| Name::new(text).unwrap();
+        let (robot, camera, map) = (name("r1"), name("front"), "hall".to_owned());
+        let pose = v1::Pose2 { x_m: 1.0, y_m: 2.0, theta_rad: 0.5 };
+        let answer = Arc::new(v1::Answer { seq: 7, map: map.clone(), ..v1::Answer::default() });
+        let events = [
+            LiveEvent::Answer { robot: robot.clone(), camera, answer },
+            LiveEvent::Pose {
+                robot: robot.clone(),
+                map: map.clone(),
+                pose,
+                covariance: vec![0.0; 9],
+                corrections: 3,
+                age_ms: 12.5,
+                trust: v1::PoseTrust::Stale,
+            },
+            LiveEvent::Odometry { robot: robot.clone(), map: map.clone(), pose },
+            LiveEvent::Truth { robot: robot.clone(), map: map.clone(), pose },
+            LiveEvent::Presence { robot, map: map.clone(), alive: true },
+            LiveEvent::MapChanged { map, version: Some(4) },
+        ];
+        for event in events {
+            let data = serde_json::to_string(&event).unwrap();
+            match (event.kind(), LiveEventBody::read(event.kind(), &data).unwrap().unwrap()) {
+                ("answer", LiveEventBody::Answer(told)) => {
+                    assert_eq!(
+                        (told.robot.as_str(), told.camera.as_str(), told.answer.seq),
+                        ("r1", "front", 7)
+                    );
+                }
+                ("pose", LiveEventBody::Pose(told)) => {
+                    assert_eq!((told.pose, told.corrections, told.trust), (pose, 3, PoseTrust::Stale));
+                }
+                ("odometry", LiveEventBody::Odometry(told)) | ("truth", LiveEventBody::Truth(told)) => {
+                    assert_eq!((told.map.as_str(), told.pose), ("hall", pose));
+                }
+                ("presence", LiveEventBody::Presence(told)) => assert!(told.alive),
+                ("map_changed", LiveEventBody::MapChanged(told)) => assert_eq!(told.version, Some(4)),
+                (kind, other) => panic!("{kind} is read as {other:?}"),
+            }
+        }
+    }
+}
