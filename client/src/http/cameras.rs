@@ -1,6 +1,9 @@
 //! Cameras of a robot: intrinsics, calibration, the last frame and its answer.
 
-use super::{MapClient, operation::operations, whole};
+use super::{
+    map_client::{MapClient, whole},
+    operation::operations,
+};
 use crate::ClientError;
 use protos::{
     api::{CalibrationReport, CalibrationRequest, Camera, Cameras},

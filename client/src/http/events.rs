@@ -1,6 +1,6 @@
 //! Server-sent events. In: the parts of a body as they come. Out: events, each with its name and data.
 
-use super::reason;
+use super::map_client::reason;
 use crate::ClientError;
 use reqwest::{RequestBuilder, Response};
 use std::time::Duration;

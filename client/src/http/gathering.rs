@@ -1,6 +1,6 @@
 //! Training views gathered by a robot that drives past, and a person's decision on them.
 
-use super::{MapClient, operation::operations};
+use super::{map_client::MapClient, operation::operations};
 use crate::ClientError;
 use protos::api::{AcceptRequest, AcceptanceBody, Gathering, NewGatheringBody, TrackList, TrackSummary};
 

@@ -1,6 +1,6 @@
 //! Whether the server can do its work, and what runs there.
 
-use super::{MapClient, operation::operations};
+use super::{map_client::MapClient, operation::operations};
 use crate::ClientError;
 use protos::api::{Health, Readiness, Version};
 

@@ -1,6 +1,6 @@
 //! Landmarks with size, place and health.
 
-use super::{MapClient, operation::operations};
+use super::{map_client::MapClient, operation::operations};
 use crate::ClientError;
 use protos::api::{
     Landmark, LandmarkPatch, NewLandmark, Place, Size, VisibilityAreaBody, VisibilitySettingsBody,

@@ -1,8 +1,8 @@
 //! Lessons and jobs.
 
 use super::{
-    MapClient,
     events::{Events, endless},
+    map_client::MapClient,
     operation::operations,
 };
 use crate::ClientError;

@@ -1,8 +1,8 @@
 //! The events of a map as they come.
 
 use super::{
-    MapClient,
     events::{Events, endless},
+    map_client::MapClient,
     operation::operations,
 };
 use crate::ClientError;

@@ -1,6 +1,6 @@
 //! Maps, where they are, and how they lie to each other.
 
-use super::{MapClient, operation::operations};
+use super::{map_client::MapClient, operation::operations};
 use crate::ClientError;
 use protos::api::{Map, MapPatch, NewMap, TransformQuery, TransformResponse};
 

@@ -1,6 +1,6 @@
 //! Which modality is best where, and what is fused.
 
-use super::{MapClient, operation::operations};
+use super::{map_client::MapClient, operation::operations};
 use crate::ClientError;
 use protos::api::{AreaStatsBody, ModalityMapBody, ModalityMapPatch, ModalityQuery};
 

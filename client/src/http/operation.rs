@@ -22,15 +22,15 @@ pub struct Operation {
 /// Declares the operations of a file, and their list. A call that is no method of [`crate::MapClient`] does not compile.
 macro_rules! operations {
     ($($name:ident: $method:ident $path:literal => $call:ident),+ $(,)?) => {
-        $(const $name: $crate::http::Operation = $crate::http::Operation {
+        $(const $name: $crate::http::operation::Operation = $crate::http::operation::Operation {
             method: ::reqwest::Method::$method,
             path: $path,
             call: stringify!($call),
         };)+
         /// The operations of this file.
-        pub(super) const OPERATIONS: &[$crate::http::Operation] = &[$($name),+];
+        pub(super) const OPERATIONS: &[$crate::http::operation::Operation] = &[$($name),+];
         const _: () = {
-            $(let _ = $crate::MapClient::$call;)+
+            $(let _ = $crate::http::map_client::MapClient::$call;)+
         };
     };
 }

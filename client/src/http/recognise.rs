@@ -1,6 +1,6 @@
 //! Recognition of one photograph.
 
-use super::{MapClient, operation::operations, views::image_part};
+use super::{map_client::MapClient, operation::operations, views::image_part};
 use crate::ClientError;
 use protos::{convert::geometry::intrinsics_wire, v1::Answer};
 use reqwest::multipart::Form;

@@ -1,6 +1,6 @@
 //! Recordings of robots, and the reference runs that maps have learnt from.
 
-use super::{MapClient, operation::operations};
+use super::{map_client::MapClient, operation::operations};
 use crate::ClientError;
 use protos::api::{RecordingStatusBody, ReferenceRunBody, ReferenceRuns, ReferenceTrajectoryBody};
 

@@ -1,6 +1,6 @@
 //! Robots: where each is, what its pose rests on, where it may be, where it was.
 
-use super::{MapClient, operation::operations};
+use super::{map_client::MapClient, operation::operations};
 use crate::ClientError;
 use protos::api::{CorrectionsBody, RelocalisationStatus, Robot, RobotAssignment, TrajectoriesBody};
 

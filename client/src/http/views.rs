@@ -1,6 +1,6 @@
 //! Training views of a landmark.
 
-use super::{MapClient, operation::operations};
+use super::{map_client::MapClient, operation::operations};
 use crate::ClientError;
 use protos::api::{CaptureMetadata, TrainingView};
 use reqwest::multipart::{Form, Part};

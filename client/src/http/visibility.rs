@@ -1,6 +1,6 @@
 //! What is seen from a pose and along a path, and where to look.
 
-use super::{MapClient, operation::operations};
+use super::{map_client::MapClient, operation::operations};
 use crate::ClientError;
 use protos::api::{
     CoverageRequest, CoverageResponse, GazeQueryBody, GazeRankingBody, VisibleRequest, VisibleResponse,

@@ -1,6 +1,6 @@
 //! The camera that looks for a map's landmarks, and what counts as seen.
 
-use super::{MapClient, operation::operations};
+use super::{map_client::MapClient, operation::operations};
 use crate::ClientError;
 use protos::api::VisibilitySettingsBody;
 

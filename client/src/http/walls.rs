@@ -1,6 +1,6 @@
 //! The walls of a map.
 
-use super::{MapClient, operation::operations};
+use super::{map_client::MapClient, operation::operations};
 use crate::ClientError;
 use protos::api::WallsBody;
 

@@ -1,7 +1,7 @@
 //! `/robots/{robot}/cameras`: what is known of a robot's cameras, and their calibration from views of landmarks.
 
 use crate::v1;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
 /// A camera of a robot, since the server started.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -145,7 +145,12 @@ pub struct CalibrationViewReport {
     pub distance_m: Option<f64>,
 }
 
-/// A calibrated camera.
+/// JSON has no infinity: a number that nothing is known of is null.
+fn null_is_infinite<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    Ok(Option::deserialize(from)?.unwrap_or(f64::INFINITY))
+}
+
+/// A calibrated camera. Standard deviations are infinite (null in JSON) where the views do not determine them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct CalibrationReport {
@@ -153,10 +158,13 @@ pub struct CalibrationReport {
     #[cfg_attr(feature = "openapi", schema(value_type = Object))]
     pub intrinsics: v1::Intrinsics,
     /// Standard deviation of the focal length.
+    #[serde(deserialize_with = "null_is_infinite")]
     pub fx_sigma_px: f64,
     /// Standard deviation of the principal point, to the right.
+    #[serde(deserialize_with = "null_is_infinite")]
     pub cx_sigma_px: f64,
     /// Standard deviation of the principal point, down.
+    #[serde(deserialize_with = "null_is_infinite")]
     pub cy_sigma_px: f64,
     /// Focal length of the linear solution, where there was one.
     pub linear_fx_px: Option<f64>,
@@ -172,4 +180,29 @@ pub struct CalibrationReport {
     pub doubts: Vec<String>,
     /// Each view, in the order given.
     pub views: Vec<CalibrationViewReport>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_camera_that_nothing_is_known_of_comes_back() {
+        let report = CalibrationReport {
+            intrinsics: v1::Intrinsics::default(),
+            fx_sigma_px: f64::INFINITY,
+            cx_sigma_px: 1.0,
+            cy_sigma_px: f64::INFINITY,
+            linear_fx_px: None,
+            rms_px: 0.5,
+            reduced_chi2: 1.0,
+            orientations: 1,
+            aspect_ratio: 1.0,
+            doubts: Vec::new(),
+            views: Vec::new(),
+        };
+        let text = serde_json::to_string(&report).unwrap();
+        assert!(text.contains(r#""fx_sigma_px":null"#), "{text}");
+        assert_eq!(serde_json::from_str::<CalibrationReport>(&text).unwrap(), report);
+    }
 }

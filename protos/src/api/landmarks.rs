@@ -159,11 +159,19 @@ pub struct NewLandmark {
 #[serde(deny_unknown_fields)]
 pub struct LandmarkPatch {
     /// Width and height.
-    #[serde(default, deserialize_with = "super::null_or_value", skip_serializing_if = "Option::is_none")]
+    #[serde(
+        default,
+        deserialize_with = "super::patch::null_or_value",
+        skip_serializing_if = "Option::is_none"
+    )]
     #[cfg_attr(feature = "openapi", schema(value_type = Option<Size>))]
     pub size: Option<Option<Size>>,
     /// Where it is.
-    #[serde(default, deserialize_with = "super::null_or_value", skip_serializing_if = "Option::is_none")]
+    #[serde(
+        default,
+        deserialize_with = "super::patch::null_or_value",
+        skip_serializing_if = "Option::is_none"
+    )]
     #[cfg_attr(feature = "openapi", schema(value_type = Option<Place>))]
     pub place: Option<Option<Place>>,
     /// A person's decision; a new size or place is sound by itself.

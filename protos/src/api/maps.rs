@@ -126,19 +126,35 @@ impl NewMap {
 #[serde(deny_unknown_fields)]
 pub struct MapPatch {
     /// The site it belongs to, in words: 1 to 64 characters.
-    #[serde(default, deserialize_with = "super::null_or_value", skip_serializing_if = "Option::is_none")]
+    #[serde(
+        default,
+        deserialize_with = "super::patch::null_or_value",
+        skip_serializing_if = "Option::is_none"
+    )]
     #[cfg_attr(feature = "openapi", schema(value_type = Option<String>))]
     pub site: Option<Option<String>>,
     /// The building it belongs to, in words: 1 to 64 characters.
-    #[serde(default, deserialize_with = "super::null_or_value", skip_serializing_if = "Option::is_none")]
+    #[serde(
+        default,
+        deserialize_with = "super::patch::null_or_value",
+        skip_serializing_if = "Option::is_none"
+    )]
     #[cfg_attr(feature = "openapi", schema(value_type = Option<String>))]
     pub building: Option<Option<String>>,
     /// The floor it belongs to, in words: 1 to 64 characters.
-    #[serde(default, deserialize_with = "super::null_or_value", skip_serializing_if = "Option::is_none")]
+    #[serde(
+        default,
+        deserialize_with = "super::patch::null_or_value",
+        skip_serializing_if = "Option::is_none"
+    )]
     #[cfg_attr(feature = "openapi", schema(value_type = Option<String>))]
     pub floor: Option<Option<String>>,
     /// Where it lies in another map.
-    #[serde(default, deserialize_with = "super::null_or_value", skip_serializing_if = "Option::is_none")]
+    #[serde(
+        default,
+        deserialize_with = "super::patch::null_or_value",
+        skip_serializing_if = "Option::is_none"
+    )]
     #[cfg_attr(feature = "openapi", schema(value_type = Option<Parent>))]
     pub parent: Option<Option<Parent>>,
 }

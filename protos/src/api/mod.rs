@@ -17,6 +17,7 @@ pub mod mapping;
 pub mod maps;
 pub mod modalities;
 pub mod page;
+mod patch;
 pub mod problem;
 #[cfg(feature = "openapi")]
 pub mod recognise;
@@ -48,13 +49,3 @@ pub use views::*;
 pub use visibility::*;
 pub use visibility_settings::*;
 pub use walls::*;
-
-use serde::{Deserialize, Deserializer};
-
-/// Reads a field of a PATCH: null is `Some(None)`, a value `Some(Some(value))`. Absent is `None` by `serde(default)`.
-#[expect(clippy::option_option, reason = "absent and null differ in a PATCH")]
-pub(crate) fn null_or_value<'de, D: Deserializer<'de>, T: Deserialize<'de>>(
-    from: D,
-) -> Result<Option<Option<T>>, D::Error> {
-    Option::deserialize(from).map(Some)
-}
