@@ -10,7 +10,10 @@
 
 use anyhow::Context;
 use clap::Parser;
-use client::{ClientError, MapClient, lessons::Size, map::LandmarkRegion};
+use client::{
+    ClientError, LandmarkRegion, MapClient,
+    api::{Job, NewMap, Size},
+};
 use std::{
     path::{Path, PathBuf},
     time::Duration,
@@ -50,7 +53,7 @@ async fn main() -> Result<(), anyhow::Error> {
     let arguments = Arguments::parse();
     let server = MapClient::new(&arguments.server)?;
     let map = arguments.map.as_str();
-    match server.create_map(map, None).await {
+    match server.create_map(&NewMap::new(map)).await {
         Ok(_) => println!("map {map}: new"),
         // Somebody's map of that name stays and is added to: say so.
         Err(ClientError::Refused { status: 409, .. }) => {
@@ -75,8 +78,8 @@ async fn main() -> Result<(), anyhow::Error> {
 
     // 2. One job learns them all, so that their thresholds see each other.
     let job = server.learn(map, Some(&names), Some(arguments.generated)).await?;
-    let report = |job: &client::lessons::Job| {
-        println!("learning: {:3.0} % {}", 100.0 * job.progress, job.message.as_deref().unwrap_or_default());
+    let report = |job: &Job| {
+        println!("learning: {:3.0} % {}", 100.0 * job.progress, job.message);
     };
     server.wait_for_job(job, Duration::from_mins(30), report).await?;
     for name in &names {

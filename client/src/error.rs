@@ -1,16 +1,16 @@
-//! Errors of the robot's and the teacher's side. Every message says what to do next.
+//! What can go wrong on the robot's or the teacher's side. Every message says what to do next.
 
 use std::time::Duration;
 
-/// An error of the client.
+/// A failure of the client.
 #[derive(Debug, thiserror::Error)]
 pub enum ClientError {
-    /// A name has a wrong length or character.
+    /// A name that is none.
     #[error("{field} {text:?}: {error}")]
     Name {
         /// Which name: `fleet`, `robot`, `camera`.
         field: &'static str,
-        /// The refused text.
+        /// The text given.
         text: String,
         /// What is wrong with it.
         error: protos::NameError,
@@ -20,17 +20,17 @@ pub enum ClientError {
         "timeout, or no server reachable at {endpoint}: is `waymark serve` running, is this its zenoh endpoint? ({detail})"
     )]
     Unreachable {
-        /// The zenoh endpoint that was tried.
+        /// Where we looked.
         endpoint: String,
-        /// The error of the transport.
+        /// What the transport said.
         detail: String,
     },
     /// The transport refused an action on an open session.
     #[error("zenoh could not {action}: {detail}")]
     Transport {
-        /// The action that failed.
+        /// What was tried.
         action: &'static str,
-        /// The error of the transport.
+        /// What it said.
         detail: String,
     },
     /// No answer came in time.
@@ -38,11 +38,11 @@ pub enum ClientError {
         "no answer to frame {seq} within {waited:?}: the frame or its answer was dropped, the server is not reachable at {endpoint}, or its work takes longer; send again or wait longer"
     )]
     NoAnswer {
-        /// Number of the frame.
+        /// The frame.
         seq: u64,
-        /// Time waited.
+        /// How long we waited.
         waited: Duration,
-        /// The server's zenoh endpoint.
+        /// The server.
         endpoint: String,
     },
     /// A newer frame of the same camera took this one's place; its own answer tells more.
@@ -50,36 +50,38 @@ pub enum ClientError {
         "frame {seq} was superseded by a newer one of the same camera: send the next when the last is answered"
     )]
     Superseded {
-        /// Number of the frame.
+        /// The frame.
         seq: u64,
     },
-    /// The image is neither JPEG nor PNG, or its header is damaged.
+    /// Neither JPEG nor PNG.
     #[error("not a JPEG or PNG image, or its header is damaged: {0}")]
     Image(String),
-    /// The HTTP server cannot be reached, or the connection broke.
+    /// The HTTP server cannot be reached or broke off.
     #[error("no answer from {url}: is `waymark serve` running there? ({detail})")]
     Http {
-        /// The requested address.
+        /// Address asked.
         url: String,
-        /// The error of the connection.
+        /// What went wrong.
         detail: String,
     },
-    /// The server refused the request.
+    /// The server refused, and said why.
     #[error("{status} {code}{}{detail}", if field.is_empty() { ": ".to_owned() } else { format!(" in {field}: ") })]
     Refused {
         /// HTTP status.
         status: u16,
-        /// Stable code of the problem.
+        /// Stable code.
         code: String,
-        /// The field at fault, or empty.
+        /// Field at fault, or empty.
         field: String,
-        /// A sentence for a person.
+        /// A sentence.
         detail: String,
+        /// More, by code, such as the `quads` that were found: [`protos::api::Problem::more`].
+        more: serde_json::Map<String, serde_json::Value>,
     },
-    /// This version of the client does not understand the answer.
+    /// The answer is not what this version of the client understands.
     #[error("{url} answered something unexpected ({detail}): are client and server of the same version?")]
     Unexpected {
-        /// The requested address.
+        /// Address asked.
         url: String,
         /// What was not understood.
         detail: String,
@@ -87,27 +89,27 @@ pub enum ClientError {
     /// A job ended without success.
     #[error("job {id} {state}: {message}")]
     Job {
-        /// Number of the job.
-        id: String,
+        /// Its number.
+        id: i64,
         /// `failed` or `cancelled`.
         state: &'static str,
-        /// The server's reason.
+        /// Why.
         message: String,
     },
     /// A job did not end in time; it goes on at the server.
     #[error("job {id} is not done after {waited:?}; it goes on, ask again for it")]
     JobTimeout {
-        /// Number of the job.
-        id: String,
-        /// Time waited.
+        /// Its number.
+        id: i64,
+        /// How long we waited.
         waited: Duration,
     },
     /// The file could not be read.
     #[error("{path}: {error}")]
     File {
-        /// Path of the file.
+        /// Which.
         path: String,
-        /// The error of the file system.
+        /// Why.
         error: std::io::Error,
     },
 }

@@ -1,24 +1,21 @@
 //! Robot SDK over zenoh and HTTP.
 //!
 //! [`RobotClient`] is the robot's side: frames, odometry and scans go out, answers and poses come back, over zenoh.
-//! [`MapClient`] is the teacher's side: maps, landmarks, views, lessons and single recognitions, over HTTP.
-//! [`named_landmarks`] lists the landmarks that an answer names, and whether each was recognised globally or guided.
-//! Recognition runs at the server. `examples/` shows both sides, numbered in reading order.
+//! [`MapClient`] is the teacher's side over HTTP: it has a method for every operation of the API, with the types of
+//! [`api`].
+//! [`named_landmarks`] tells which landmarks an answer names, and whether the picture alone or a known pose named each.
+//! Neither decides anything: no vision runs here. `examples/` shows both, numbered in reading order.
 
 pub mod capture;
 pub mod error;
-mod gatherings;
-mod http;
-pub mod lessons;
-pub mod map;
+pub mod http;
 pub mod named;
 pub mod robot;
-pub mod reference_runs;
 mod transport;
 
 pub use capture::Capture;
 pub use error::ClientError;
-pub use map::MapClient;
+pub use http::{LandmarkRegion, MapClient, NewView};
 pub use named::{NamedLandmark, named, named_landmarks, quad_corners};
-pub use protos::{self, v1};
+pub use protos::{self, api, v1};
 pub use robot::{Delivery, RobotClient, RobotOptions};

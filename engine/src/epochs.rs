@@ -6,13 +6,11 @@
 //! a robot is live, every other one is refused. When its token goes, it is over at once, and the next one is admitted.
 
 use protos::{Code, Name, Rejection};
-use serde::Serialize;
 use std::{
     collections::{BTreeMap, VecDeque},
     sync::{Mutex, MutexGuard, PoisonError},
     time::{Duration, Instant},
 };
-use utoipa::ToSchema;
 
 /// An epoch without a liveliness token is live for so long after its last message: the longest wait of a robot that was
 /// started again. Longer than zenoh's lease (2 s), after which the token of a lost link goes.
@@ -31,7 +29,7 @@ pub const CONFLICT_SHOWN: Duration = Duration::from_secs(10);
 pub const CONFLICT_LOGGED: Duration = Duration::from_secs(10);
 
 /// A second epoch speaks under the name of a robot while the first is live.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Conflict {
     /// The epoch that was refused last.
     pub epoch: u64,

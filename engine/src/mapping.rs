@@ -12,7 +12,6 @@ use crate::scan_job::ScanJob;
 use journal::{Head, Journal, Kept};
 use map::pose2::Pose2;
 use protos::Name;
-use serde::Serialize;
 use session::{Session, Start};
 use std::{
     collections::BTreeMap,
@@ -20,7 +19,6 @@ use std::{
     sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError},
 };
 use tokio::sync::oneshot;
-use utoipa::ToSchema;
 
 /// Maps that are made at a time.
 pub const MAX_MAPPINGS: usize = 4;
@@ -31,8 +29,7 @@ pub const MAX_REMEMBERED: usize = 64;
 pub type Walls = Vec<[f64; 4]>;
 
 /// How far a mapping has come.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stage {
     /// The server was started again: the scans that were kept are mapped once more. New ones wait, as many as there is room
     /// for.
@@ -48,7 +45,7 @@ pub enum Stage {
 }
 
 /// A mapping as it stands.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Progress {
     /// The map.
     pub map: String,

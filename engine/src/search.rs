@@ -13,12 +13,10 @@ use map::{
 };
 use nalgebra::{Matrix3, Point2, Vector2, Vector3};
 use protos::Name;
-use serde::Serialize;
 use std::{
     collections::{BTreeMap, BTreeSet, VecDeque},
     sync::{Arc, Mutex, PoisonError},
 };
-use utoipa::ToSchema;
 use vision::model::LandmarkId;
 
 /// Robots that search at a time, some 50 MB each at most; the one longest without a sighting gives way.
@@ -79,8 +77,7 @@ pub struct Progress {
 }
 
 /// Why the first hypothesis is not yet the pose.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Need {
     /// Other places are too probable still.
     FewerPlaces,

@@ -18,10 +18,8 @@ use super::{
     standing::{Findings, Found},
     verdicts::{self, StageTimes},
 };
-use crate::{
-    frame_tap::{AnalysedFrame, FrameTap},
-    vitals::Vitals,
-};
+use crate::frame_tap::{AnalysedFrame, FrameTap};
+use crate::vitals::Vitals;
 use map::{pose2::Pose2Covariance, relocalise::PoseHypothesis};
 use protos::{CheckedFrame, Code, Name, Rejection, convert::geometry::pose2_covariance_wire, v1};
 use std::{cell::Cell, sync::Arc, thread::JoinHandle, time::Instant};

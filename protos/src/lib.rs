@@ -1,9 +1,10 @@
 //! The wire: messages, key expressions and checked conversions.
 //!
-//! In: Protocol Buffers from robots. Out: values that are finite, in range and bounded, or a [`Rejection`] with a
-//! stable code and the field at fault. There is no transport here: zenoh is used by `client` and by the server's
-//! `bus`. README.md lists keys, units, limits and codes.
+//! Comes in: Protocol Buffers from robots. Goes out: values that every later stage may rely on (finite, in range,
+//! bounded), or a [`Rejection`] with a stable code and the field at fault. [`api`] has the bodies of the HTTP interface.
+//! Knows no transport: zenoh lives in `client` and in the server's `bus`. README.md lists keys, units, limits and codes.
 
+pub mod api;
 pub mod keys;
 pub mod rejection;
 pub mod convert;

@@ -1,9 +1,10 @@
 //! A camera from views of one landmark, for the command line and over HTTP: corners in, a report out. The computation
 //! is `vision::camera_calibration::calibrate`.
 
-use protos::{convert::geometry::intrinsics_wire, v1};
-use serde::{Deserialize, Serialize};
-use utoipa::ToSchema;
+use protos::{
+    api::{CalibrationConstraintsBody, CalibrationReport, CalibrationViewReport},
+    convert::geometry::intrinsics_wire,
+};
 use vision::{
     camera_calibration::{
         CalibrateError, CalibrateParams, CameraCalibration, CameraHeight, PlanarView, RobustCalibration,
@@ -27,8 +28,7 @@ const LEVEL_SIGMA_RAD: f64 = 0.0175;
 const HEIGHT_SIGMA_M: f64 = 0.02;
 
 /// What may be said beside the views.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema, clap::Args)]
-#[serde(default, deny_unknown_fields)]
+#[derive(Debug, Clone, PartialEq, clap::Args)]
 pub(crate) struct Knowledge {
     /// Radial coefficients (k1, k2) that may be fitted, 0 to 2; only those are that the views ask for.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u8).range(0..=2))]
@@ -44,9 +44,10 @@ pub(crate) struct Knowledge {
     pub(crate) unknown_aspect: bool,
 }
 
-impl Default for Knowledge {
-    fn default() -> Self {
-        Self { radial: 1, level: false, height_m: None, unknown_aspect: false }
+impl From<CalibrationConstraintsBody> for Knowledge {
+    fn from(body: CalibrationConstraintsBody) -> Self {
+        let CalibrationConstraintsBody { radial, level, height_m, unknown_aspect } = body;
+        Self { radial, level, height_m, unknown_aspect }
     }
 }
 
@@ -64,45 +65,6 @@ impl Knowledge {
             ..CalibrateParams::default()
         }
     }
-}
-
-/// One view of the report.
-#[derive(Debug, Clone, Serialize, ToSchema)]
-pub(crate) struct ViewReport {
-    /// Whether the camera rests on it; a view that does not fit is left out.
-    pub(crate) used: bool,
-    /// Root mean square residual per coordinate.
-    pub(crate) rms_px: Option<f64>,
-    /// Distance of the camera from the landmark's centre, metres.
-    pub(crate) distance_m: Option<f64>,
-}
-
-/// A calibrated camera.
-#[derive(Debug, Clone, Serialize, ToSchema)]
-pub(crate) struct Report {
-    /// As frames carry it, with the standard deviations below: what is not known of the camera is then in the poses.
-    #[schema(value_type = Object)]
-    pub(crate) intrinsics: v1::Intrinsics,
-    /// Standard deviations.
-    pub(crate) fx_sigma_px: f64,
-    /// Of the principal point.
-    pub(crate) cx_sigma_px: f64,
-    /// Of the principal point.
-    pub(crate) cy_sigma_px: f64,
-    /// Focal length of the linear solution, where there was one.
-    pub(crate) linear_fx_px: Option<f64>,
-    /// Root mean square residual per coordinate.
-    pub(crate) rms_px: f64,
-    /// Weighted squared residual over its degrees of freedom: about 1 where corners are as good as claimed.
-    pub(crate) reduced_chi2: f64,
-    /// Orientations of the landmark that differ by more than 15 degrees.
-    pub(crate) orientations: usize,
-    /// Height over width of the landmark over what its size says.
-    pub(crate) aspect_ratio: f64,
-    /// Why it should not be believed without a look: empty where nothing speaks against it.
-    pub(crate) doubts: Vec<String>,
-    /// Each view, in the order given.
-    pub(crate) views: Vec<ViewReport>,
 }
 
 /// What speaks against a camera that came out.
@@ -128,7 +90,7 @@ pub(crate) fn calibrated(
     views: &[PlanarView],
     image_px: [usize; 2],
     known: &Knowledge,
-) -> Result<Report, CalibrateError> {
+) -> Result<CalibrationReport, CalibrateError> {
     let mut views = views.to_vec();
     for covariance in views.iter_mut().flat_map(|v| &mut v.covariance_px2) {
         *covariance += nalgebra::Matrix2::identity() * BORDER_SIGMA_PX.powi(2);
@@ -137,13 +99,13 @@ pub(crate) fn calibrated(
     let sigma = |i: usize| c.covariance.map_or(f64::INFINITY, |m| m[(i, i)].sqrt());
     let view = |i: usize| {
         let fit = used.iter().position(|u| *u == i).and_then(|k| c.views.get(k));
-        ViewReport {
+        CalibrationViewReport {
             used: fit.is_some(),
             rms_px: fit.map(|f| f.rms_px),
             distance_m: fit.map(|f| f.camera_from_plane.translation.vector.norm()),
         }
     };
-    Ok(Report {
+    Ok(CalibrationReport {
         intrinsics: intrinsics_wire(&stated(&c.camera, [sigma(0), sigma(1), sigma(2)])),
         fx_sigma_px: sigma(0),
         cx_sigma_px: sigma(1),
@@ -196,7 +158,7 @@ mod tests {
 
     #[test]
     fn a_camera_that_cannot_quite_be_is_doubted() {
-        let known = Knowledge::default();
+        let known = Knowledge::from(CalibrationConstraintsBody::default());
         let good = calibrated(&views(239.5), [640, 480], &known).unwrap();
         assert!(good.doubts.is_empty() && (good.intrinsics.fx_px - 600.0).abs() < 1.0, "{good:?}");
         // What it is known to goes along with it.

@@ -4,7 +4,7 @@ use crate::{
     bus::{Bus, BusError, Receivers},
     config::Config,
     gather::{self, Gatherer, Hook},
-    http::{self, App, Workshop},
+    http::{self, App, Services},
     jobs::Jobs,
     publication::{Catalogue, CatalogueTasks},
     store::{OpenError, landmarks},
@@ -132,8 +132,8 @@ impl Server {
         let workers = Workers::start(&engine, config.workers, &Arc::new(bus.outbox().clone()))
             .map_err(StartError::Threads)?;
         let zenoh_endpoint = bus.endpoint().to_owned();
-        let workshop = Workshop { jobs, gatherer };
-        let app = App::new(config.clone(), store, workshop, &engine, stopping.clone());
+        let services = Services { jobs, gatherer };
+        let app = App::new(config.clone(), store, services, &engine, stopping.clone());
         let pulse = vitals.begin("the HTTP listener");
         let router = http::router(app);
         let http = tokio::spawn(async move {

@@ -3,6 +3,7 @@
 
 use client::{
     Delivery, RobotClient, RobotOptions,
+    api::NewMap,
     protos::prost::Message,
     robot::CameraAnswer,
     v1::{self, ImageEncoding, Status},
@@ -110,7 +111,7 @@ fn refusal(answer: &v1::Answer) -> (String, String) {
 #[tokio::test(flavor = "multi_thread")]
 async fn bad_frames_are_refused_by_name_and_the_server_goes_on() {
     let inside = Inside::start(Limits { frame_bytes: 100_000, ..Limits::default() }).await;
-    inside.maps().create_map("hall", None).await.expect("map");
+    inside.maps().create_map(&NewMap::new("hall")).await.expect("map");
     inside.maps().put_robot("r1", "hall").await.expect("robot");
     let robot = connect(&inside, "r1").await;
     let mut answers = robot.answers();
@@ -150,7 +151,7 @@ async fn bad_frames_are_refused_by_name_and_the_server_goes_on() {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_robot_that_nobody_registered_is_told_so() {
     let inside = Inside::start(Limits::default()).await;
-    inside.maps().create_map("hall", None).await.expect("map");
+    inside.maps().create_map(&NewMap::new("hall")).await.expect("map");
     let robot = connect(&inside, "stranger").await;
     let mut answers = robot.answers();
     robot.publish_raw_frame(CAMERA, good(1).encode_to_vec()).await.expect("sent");

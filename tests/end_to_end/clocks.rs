@@ -1,7 +1,7 @@
 //! Claim: a time stamp that cannot be right has no influence on the fused pose, whatever message it is in; the pose goes on
 //! with the next message. A pose says how old it is, and a robot that falls silent has none soon.
 
-use client::{RobotClient, v1};
+use client::{RobotClient, api::NewMap, v1};
 use engine::motion::MAX_POSE_AGE;
 use map::pose2::Pose2;
 use server::config::Limits;
@@ -47,7 +47,7 @@ async fn one_message_an_hour_ahead_does_not_hold_the_pose() {
     let params = CorridorParams { posters: 1, column: false, ..CorridorParams::default() };
     let building = Arc::new(Building::corridor_with(&params, 3));
     let maps = inside.maps();
-    maps.create_map(MAP, None).await.expect("map");
+    maps.create_map(&NewMap::new(MAP)).await.expect("map");
     teach(&inside, &building, &["poster-0"], 6).await;
     maps.put_robot("r1", MAP).await.expect("robot");
     let client = connect(&inside.server.zenoh_endpoint, "r1").await;

@@ -1,7 +1,10 @@
 //! Claim: a database of an earlier build opens, and what it was taught is recognised without a new lesson; its models get
 //! points from the stored views by one job, once.
 
-use client::{MapClient, lessons::JobState};
+use client::{
+    MapClient,
+    api::{JobState, LandmarkStatus},
+};
 use flate2::read::GzDecoder;
 use protos::v1;
 use serde_json::json;
@@ -39,7 +42,7 @@ async fn a_database_of_2026_11_22_recognises_what_it_was_taught() {
     let named: Vec<&str> =
         answer.quads.iter().map(|q| q.landmark.as_str()).filter(|name| !name.is_empty()).collect();
     assert_eq!((answer.status(), named.as_slice()), (v1::Status::Matched, &["poster-0"][..]));
-    assert!(maps.job("2").await.is_err(), "nothing is learnt again where points do not decide");
+    assert!(maps.job(2).await.is_err(), "nothing is learnt again where points do not decide");
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -52,7 +55,7 @@ async fn models_of_2026_11_22_get_points_once_where_points_decide() {
     assert_eq!(active(&maps, map).await, POSTERS, "a stored model is not used");
 
     // The fixture has one job, that of its lesson.
-    let job = maps.job("2").await.expect("the job that takes points");
+    let job = maps.job(2).await.expect("the job that takes points");
     let job = maps.wait_for_job(job, 6 * SOON, |_| {}).await.expect("points");
     assert_eq!((job.kind.as_str(), job.state), ("learn", JobState::Done), "{job:?}");
     let result = job.result.expect("a result");
@@ -61,7 +64,7 @@ async fn models_of_2026_11_22_get_points_once_where_points_decide() {
     for poster in POSTERS {
         let landmark = maps.landmark(map, poster).await.expect("a landmark");
         let model = landmark.model.expect("a model");
-        assert!(model["points"].as_u64().is_some_and(|points| points >= 10), "{poster}: {model}");
+        assert!(model.facts["points"].as_u64().is_some_and(|points| points >= 10), "{poster}: {model:?}");
     }
 
     let answer = recognise(&maps, map).await;
@@ -76,7 +79,7 @@ async fn models_of_2026_11_22_get_points_once_where_points_decide() {
     server.kill();
     let server = Child::start(data.path());
     let maps = server.maps();
-    assert!(maps.job("3").await.is_err(), "points are taken a second time");
+    assert!(maps.job(3).await.is_err(), "points are taken a second time");
     assert!(recognise(&maps, map).await.quads.iter().any(|q| q.points.is_some()));
 }
 
@@ -84,7 +87,7 @@ const POSTERS: [&str; 6] = ["poster-0", "poster-1", "poster-2", "poster-3", "pos
 
 async fn active(maps: &MapClient, map: &str) -> Vec<String> {
     let landmarks = maps.landmarks(map).await.expect("landmarks");
-    landmarks.into_iter().filter(|l| l.status == "active").map(|l| l.name).collect()
+    landmarks.into_iter().filter(|l| l.status == LandmarkStatus::Active).map(|l| l.name).collect()
 }
 
 /// The answer to the frame, in which the poster alone is recognised.

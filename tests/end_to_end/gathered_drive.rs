@@ -3,8 +3,8 @@
 //! photograph. Views of a landmark that is known are added only where it was recognised, and only when asked for.
 
 use client::{
-    Capture, Delivery, RobotClient, RobotOptions,
-    map::LandmarkRegion,
+    Capture, Delivery, LandmarkRegion, RobotClient, RobotOptions,
+    api::NewMap,
     v1::{self, Verdict},
 };
 use map::pose2::{Pose2, Pose2Covariance};
@@ -36,7 +36,7 @@ const MIN_SIDE_PX: f64 = 38.0;
 
 /// A map with walls and a robot on it, nothing taught.
 async fn walls(inside: &Inside, building: &Building) -> RobotClient {
-    inside.maps().create_map(MAP, None).await.expect("map");
+    inside.maps().create_map(&NewMap::new(MAP)).await.expect("map");
     let walls: Vec<_> = building
         .walls()
         .iter()
@@ -359,7 +359,7 @@ async fn bad_wishes_are_refused_with_a_reason_and_ends_are_final() {
     let inside = Inside::start(Limits::default()).await;
     let building = Building::corridor(11);
     let client = walls(&inside, &building).await;
-    inside.maps().create_map("cellar", None).await.expect("map");
+    inside.maps().create_map(&NewMap::new("cellar")).await.expect("map");
     inside.maps().add_landmark(MAP, "blank", None, None).await.expect("landmark");
     let all = format!("/maps/{MAP}/gatherings");
     for (path, body, status, code) in [

@@ -1,7 +1,7 @@
 //! Claim: a robot that knows where it is uses posters that look the same, each named by where it hangs and told as such; what
 //! is named so never gives a pose to a robot that has none, and the API says what corrected the pose.
 
-use client::v1;
+use client::{api::NewMap, v1};
 use map::pose2::Pose2Covariance;
 use nalgebra::{Matrix3, Vector3};
 use reqwest::Method;
@@ -52,7 +52,7 @@ async fn posters_that_look_the_same_correct_a_pose_that_is_known() {
     };
     let building = Arc::new(Building::corridor_with(&params, 5));
     let inside = Inside::start(Limits::default()).await;
-    inside.maps().create_map(MAP, None).await.expect("map");
+    inside.maps().create_map(&NewMap::new(MAP)).await.expect("map");
     put_walls(&inside, &building).await;
     let names: Vec<String> = (0..POSTERS).map(|i| format!("poster-{i}")).collect();
     teach(&inside, &building, &names.iter().map(String::as_str).collect::<Vec<_>>(), 3).await;

@@ -1,6 +1,9 @@
 //! Claim: what was accepted is done although its client goes away at once, and what was not does not block anything.
 
-use client::{lessons::JobState, map::LandmarkRegion};
+use client::{
+    LandmarkRegion,
+    api::{JobState, NewMap},
+};
 use serde_json::Value;
 use server::config::Limits;
 use tests::{Inside, eventually, pictures};
@@ -13,7 +16,7 @@ const REQUESTS: u64 = 20;
 async fn no_job_stays_behind_when_clients_hang_up() {
     let inside = Inside::start(Limits { jobs: 4, ..Limits::default() }).await;
     let maps = inside.maps();
-    maps.create_map("hall", None).await.expect("map");
+    maps.create_map(&NewMap::new("hall")).await.expect("map");
     maps.add_landmark("hall", "p1", None, None).await.expect("landmark");
     maps.upload_view("hall", "p1", pictures::picture(1), LandmarkRegion::WholeImage).await.expect("view");
     for i in 0..REQUESTS {
@@ -26,7 +29,7 @@ async fn no_job_stays_behind_when_clients_hang_up() {
         drop(stream);
     }
     let url = inside.url();
-    let state = async |job: u64| {
+    let state = async |job: i64| {
         let answer = reqwest::get(format!("{url}/api/v1/jobs/{job}")).await.expect("answer");
         let job: Value = answer.json().await.expect("JSON");
         job["state"].as_str().map(str::to_owned)
@@ -36,10 +39,10 @@ async fn no_job_stays_behind_when_clients_hang_up() {
     })
     .await;
     eventually("the lesson after all of them is done", || async {
-        (maps.job(&last.id_text()).await.expect("job").state == JobState::Done).then_some(())
+        (maps.job(last.id).await.expect("job").state == JobState::Done).then_some(())
     })
     .await;
-    let number: u64 = last.id_text().parse().expect("a number");
+    let number = last.id;
     for job in 1..number {
         assert_eq!(state(job).await.as_deref(), Some("done"), "job {job} of {number}");
     }

@@ -3,7 +3,7 @@
 //! frames that show a unique landmark do, and every correction can be read. From a run whose path is told the server learns
 //! what to trust where.
 
-use client::{Capture, Delivery, RobotClient, RobotOptions, v1};
+use client::{Capture, Delivery, RobotClient, RobotOptions, api::NewMap, v1};
 use map::pose2::Pose2;
 use reqwest::{Method, StatusCode};
 use serde_json::{Value, json};
@@ -43,7 +43,7 @@ impl Run {
     async fn start(params: &CorridorParams, drive: DriveParams) -> Self {
         let inside = Inside::start(Limits::default()).await;
         let building = Arc::new(Building::corridor_with(params, 3));
-        inside.maps().create_map(MAP, None).await.expect("map");
+        inside.maps().create_map(&NewMap::new(MAP)).await.expect("map");
         put_walls(&inside, &building).await;
         teach(&inside, &building, &["poster-0"], 6).await;
         inside.maps().put_robot("r1", MAP).await.expect("robot");

@@ -1,7 +1,7 @@
 //! Claim: a robot that drives and sends scans over zenoh makes the walls of a map, the same that `waymark map build` makes of
 //! a recording of them; they are stored when it is finished, and not before.
 
-use client::{Delivery, RobotClient, RobotOptions};
+use client::{Delivery, RobotClient, RobotOptions, api::NewMap};
 use reqwest::{Method, StatusCode};
 use serde_json::{Value, json};
 use server::config::Limits;
@@ -73,7 +73,7 @@ async fn a_drive_over_zenoh_gives_the_walls_that_its_recording_gives() {
     let inside = Inside::start(Limits::default()).await;
     let params = CorridorParams { length_m: 12.0, posters: 0, ..CorridorParams::default() };
     let building = Arc::new(Building::corridor_with(&params, 4));
-    inside.maps().create_map(MAP, None).await.expect("map");
+    inside.maps().create_map(&NewMap::new(MAP)).await.expect("map");
     inside.maps().put_robot("r1", MAP).await.expect("robot");
     let path = format!("/maps/{MAP}/mapping");
     refusals(&inside, &path).await;
@@ -172,7 +172,7 @@ async fn a_server_that_is_killed_in_mid_drive_goes_on_with_the_map() {
     let mut server = Child::start(data.path());
     let params = CorridorParams { length_m: 12.0, posters: 0, ..CorridorParams::default() };
     let building = Arc::new(Building::corridor_with(&params, 4));
-    server.maps().create_map(MAP, None).await.expect("map");
+    server.maps().create_map(&NewMap::new(MAP)).await.expect("map");
     server.maps().put_robot("r1", MAP).await.expect("robot");
     let begun = ask(&server, Method::POST, "mapping", Some(json!({ "robot": "r1" }))).await;
     assert_eq!((&begun["stage"], &begun["not_kept"]), (&json!("mapping"), &Value::Null), "{begun}");

@@ -1,7 +1,7 @@
 //! Claim: a robot that starts nobody knows where and sees only things that all look the same is told where it may be, never
 //! that it is at one of them, until one place is left; then it is there, and its pose says which of them it sees.
 
-use client::{Capture, Delivery, RobotClient, RobotOptions, named_landmarks, v1};
+use client::{Capture, Delivery, RobotClient, RobotOptions, api::NewMap, named_landmarks, v1};
 use map::pose2::{Pose2, wrap_rad};
 use nalgebra::Point2;
 use reqwest::Method;
@@ -67,7 +67,7 @@ async fn twelve_like_doors_are_twelve_places_and_never_one_too_early() {
     };
     let building = Arc::new(Building::corridor_with(&params, 3));
     let inside = Inside::start(Limits::default()).await;
-    inside.maps().create_map(MAP, None).await.expect("map");
+    inside.maps().create_map(&NewMap::new(MAP)).await.expect("map");
     put_walls(&inside, &building).await;
     let names: Vec<String> = (0..12).map(|i| format!("poster-{i}")).collect();
     teach(&inside, &building, &names.iter().map(String::as_str).collect::<Vec<_>>(), 3).await;
@@ -133,7 +133,7 @@ async fn among_look_alikes_there_are_hypotheses_and_no_pose_until_one_is_left() 
     let params = CorridorParams { posters: 3, pictures: 1, column: false, ..CorridorParams::default() };
     let building = Arc::new(Building::corridor_with(&params, 3));
     let inside = Inside::start(Limits::default()).await;
-    inside.maps().create_map(MAP, None).await.expect("map");
+    inside.maps().create_map(&NewMap::new(MAP)).await.expect("map");
     put_walls(&inside, &building).await;
     teach(&inside, &building, &ALIKE, 6).await;
     inside.maps().put_robot("r1", MAP).await.expect("robot");

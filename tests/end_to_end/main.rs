@@ -1,5 +1,6 @@
 //! End-to-end claims, one file each, against a real server.
 
+mod api_client;
 mod bad_frames;
 mod clocks;
 mod command_line;

@@ -3,9 +3,8 @@
 //! until somebody decides.
 
 use client::{
-    Capture, Delivery, RobotClient, RobotOptions,
-    lessons::{Place, Size},
-    map::LandmarkRegion,
+    Capture, Delivery, LandmarkRegion, RobotClient, RobotOptions,
+    api::{NewMap, Place, Size},
     v1::{self, GazeLook, Verdict},
 };
 use reqwest::{Method, StatusCode};
@@ -29,7 +28,7 @@ const MOVED: &str = "poster-3";
 
 async fn teach(inside: &Inside, building: &Arc<Building>) {
     let maps = inside.maps();
-    maps.create_map(MAP, None).await.expect("map");
+    maps.create_map(&NewMap::new(MAP)).await.expect("map");
     let walls: Vec<_> = building
         .walls()
         .iter()
@@ -44,8 +43,13 @@ async fn teach(inside: &Inside, building: &Arc<Building>) {
             centre += poster.map_from_landmark * nalgebra::Vector3::y();
         }
         let outward = poster.map_from_landmark.rotation * nalgebra::Vector3::x();
-        let place =
-            Place { x_m: centre.x, y_m: centre.y, z_m: centre.z, theta_rad: outward.y.atan2(outward.x) };
+        let place = Place {
+            x_m: centre.x,
+            y_m: centre.y,
+            z_m: centre.z,
+            theta_rad: outward.y.atan2(outward.x),
+            ..Place::default()
+        };
         let size = Size { width_m: poster.width_m, height_m: poster.height_m };
         maps.add_landmark(MAP, &poster.name, Some(size), Some(place)).await.expect("landmark");
     }

@@ -1,7 +1,7 @@
 //! Claim: a robot may ask about any map, and is answered; but its pose and what the map knows follow only from frames
 //! against the map it stands on. A frame that names another map does not disturb the fused pose.
 
-use client::{RobotClient, v1};
+use client::{RobotClient, api::NewMap, v1};
 use reqwest::Method;
 use serde_json::Value;
 use server::config::Limits;
@@ -34,8 +34,8 @@ async fn a_frame_against_another_map_is_answered_and_changes_nothing() {
     let params = CorridorParams { posters: 1, column: false, ..CorridorParams::default() };
     let building = Arc::new(Building::corridor_with(&params, 3));
     let maps = inside.maps();
-    maps.create_map(MAP, None).await.expect("map");
-    maps.create_map(OTHER, None).await.expect("map");
+    maps.create_map(&NewMap::new(MAP)).await.expect("map");
+    maps.create_map(&NewMap::new(OTHER)).await.expect("map");
     teach(&inside, &building, &["poster-0"], 6).await;
     maps.put_robot("r1", MAP).await.expect("robot");
     maps.put_robot("r2", OTHER).await.expect("robot");

@@ -1,7 +1,10 @@
 //! Claim: killing the server at any moment and starting it again loses nothing that was acknowledged, repeats nothing,
 //! and leaves a database in order (the server checks that at each start and would refuse).
 
-use client::{ClientError, MapClient, lessons::JobState, map::LandmarkRegion};
+use client::{
+    ClientError, LandmarkRegion, MapClient,
+    api::{JobState, NewMap},
+};
 use std::{
     collections::BTreeMap,
     sync::{
@@ -22,7 +25,7 @@ struct Journal {
     /// Landmarks with the numbers of their confirmed views.
     landmarks: BTreeMap<String, Vec<i64>>,
     /// Accepted jobs, each with its landmark.
-    jobs: Vec<(String, String)>,
+    jobs: Vec<(i64, String)>,
     version: u64,
 }
 
@@ -40,12 +43,12 @@ async fn teach(
         for seed in [2 * number, 2 * number + 1] {
             let view =
                 maps.upload_view(MAP, &name, pictures::picture(seed), LandmarkRegion::WholeImage).await?;
-            let id = view.id.as_i64().expect("a number");
+            let id = view.id;
             journal.lock().expect("journal").landmarks.get_mut(&name).expect("own landmark").push(id);
         }
         if number.is_multiple_of(5) {
             let job = maps.learn(MAP, Some(std::slice::from_ref(&name)), Some(3)).await?;
-            journal.lock().expect("journal").jobs.push((job.id_text(), name));
+            journal.lock().expect("journal").jobs.push((job.id, name));
         }
         let version = maps.map(MAP).await?.version;
         let mut journal = journal.lock().expect("journal");
@@ -78,7 +81,7 @@ async fn check(server: &Child, journal: &Journal, attempted: u64) {
         assert!(stored.len() <= 2, "{name}: a view is there twice: {stored:?}");
     }
     for (job, _) in &journal.jobs {
-        maps.job(job).await.expect("an accepted job is there");
+        maps.job(*job).await.expect("an accepted job is there");
     }
     assert!(maps.map(MAP).await.expect("map").version >= journal.version, "the version went back");
 }
@@ -96,7 +99,7 @@ async fn nothing_acknowledged_is_lost_by_a_kill() {
     for kill in 0..KILLS {
         let server = Child::start(data.path());
         if kill == 0 {
-            server.maps().create_map(MAP, None).await.expect("map");
+            server.maps().create_map(&NewMap::new(MAP)).await.expect("map");
         }
         let confirmed = journal.lock().expect("journal").clone();
         check(&server, &confirmed, next.load(Ordering::Relaxed)).await;
@@ -125,7 +128,7 @@ async fn nothing_acknowledged_is_lost_by_a_kill() {
     for (job, name) in &journal.jobs {
         let maps = server.maps();
         let state = eventually("the job ends", || async {
-            let state = maps.job(job).await.expect("job").state;
+            let state = maps.job(*job).await.expect("job").state;
             (!matches!(state, JobState::Queued | JobState::Running)).then_some(state)
         })
         .await;

@@ -2,7 +2,10 @@
 //! floor can be said in the frame of another, no map lies in itself; and the plan of a building as GeoJSON becomes the
 //! walls of a map on a running server, by the command line.
 
-use client::{MapClient, map::LandmarkRegion};
+use client::{
+    LandmarkRegion, MapClient,
+    api::{NewMap, TransformQuery, UploadOutcomeBody, WallBody},
+};
 use reqwest::{Client, Method, StatusCode};
 use serde_json::{Value, json};
 use server::config::Limits;
@@ -127,8 +130,11 @@ async fn maps_lie_in_maps_and_poses_go_between_them() {
     // Both floors' links make it unsure (the ground's is a tape's), and a metre away the turn does, too.
     let variance = number(&found["pose"]["covariance"][0]);
     assert!((variance - (0.01 + 0.0025 + 0.0001 + 0.0087 * 0.0087)).abs() < 1e-6, "{found}");
-    let back = maps.transform("ground", "upper").await.expect("the way back");
-    assert!((number(&back["to_from_map"]["theta_rad"]) + std::f64::consts::FRAC_PI_2).abs() < 1e-9);
+    let back = maps
+        .transform("ground", &TransformQuery { to: "upper".into(), ..TransformQuery::default() })
+        .await
+        .expect("the way back");
+    assert!((back.to_from_map.theta_rad + std::f64::consts::FRAC_PI_2).abs() < 1e-9);
     refusals(&url).await;
     // What is not named stays, null forgets; then the house may go.
     let (_, upper) =
@@ -144,7 +150,7 @@ async fn maps_lie_in_maps_and_poses_go_between_them() {
 async fn a_near_duplicate_view_is_answered_and_not_stored() {
     let inside = Inside::start(Limits::default()).await;
     let maps = inside.maps();
-    maps.create_map("hall", None).await.expect("map");
+    maps.create_map(&NewMap::new("hall")).await.expect("map");
     maps.add_landmark("hall", "p1", None, None).await.expect("landmark");
     let picture = |noise: u8| {
         let grey: Vec<u8> = (0..200 * 160)
@@ -161,9 +167,10 @@ async fn a_near_duplicate_view_is_answered_and_not_stored() {
     let same = maps.upload_view("hall", "p1", picture(0), corners(180.0)).await.expect("view");
     let alike = maps.upload_view("hall", "p1", picture(2), corners(180.5)).await.expect("view");
     let other = maps.upload_view("hall", "p1", picture(0), corners(150.0)).await.expect("view");
-    let said: Vec<_> =
-        [&first, &same, &alike, &other].iter().map(|v| v.outcome.clone().unwrap_or_default()).collect();
-    assert_eq!(said, ["new", "same", "alike", "new"]);
+    let said: Vec<_> = [&first, &same, &alike, &other].iter().map(|v| v.outcome).collect();
+    let expected =
+        [UploadOutcomeBody::New, UploadOutcomeBody::Same, UploadOutcomeBody::Alike, UploadOutcomeBody::New];
+    assert_eq!(said, expected.map(Some));
     assert!(alike.id == first.id && same.id == first.id && other.id != first.id);
     assert_eq!(maps.landmark("hall", "p1").await.expect("landmark").views, 2);
     inside.server.stop().await;
@@ -193,10 +200,9 @@ async fn a_plan_becomes_the_walls_of_a_map_on_a_server() {
     let listed = run(&["map", "list", "--server", &server.url]);
     assert!(listed.contains("1st, in house at -2.00, 3.00 m") && listed.contains("Works"), "{listed}");
     run(&["map", "import", plan, "--server", &server.url, "--map", "hall"]);
-    let walls = server.maps().laser("hall").await.expect("walls");
-    let segments = walls["segments"].as_array().expect("a list");
-    assert_eq!(segments.len(), 9, "{walls}");
-    assert_eq!(segments[0], json!({ "a": [0.0, 0.0], "b": [12.0, 0.0] }), "{walls}");
+    let walls = server.maps().walls("hall").await.expect("walls");
+    assert_eq!(walls.segments.len(), 9, "{walls:?}");
+    assert_eq!(walls.segments[0], WallBody { a: [0.0, 0.0], b: [12.0, 0.0] }, "{walls:?}");
     // A landmark on a wall of the plan is seen from inside the hall, not through the column.
     let (_, made) = call(
         &server.url,
@@ -225,6 +231,6 @@ async fn a_plan_becomes_the_walls_of_a_map_on_a_server() {
         Duration::from_secs(30),
     );
     assert!(refused.status == 1 && refused.stderr.contains("ring"), "{refused:?}");
-    assert_eq!(server.maps().laser("hall").await.expect("walls"), walls);
+    assert_eq!(server.maps().walls("hall").await.expect("walls"), walls);
     server.kill();
 }

@@ -2,6 +2,7 @@
 //! command line with errors that name the field, kept over a restart; one question may ask for another. A sign under the
 //! ceiling is seen by a camera that looks up, and by no other.
 
+use client::api::NewMap;
 use reqwest::{Client, Method, StatusCode};
 use serde_json::{Value, json};
 use std::{f64::consts::FRAC_PI_2, time::Duration};
@@ -25,10 +26,10 @@ async fn get(server: &Child, path: &str) -> Value {
 
 /// A hall with a poster on a wall and a sign under the ceiling.
 async fn hall(server: &Child) {
-    server.maps().create_map("hall", None).await.expect("created");
+    server.maps().create_map(&NewMap::new("hall")).await.expect("created");
     server
         .maps()
-        .set_walls("hall", &[[[0.0, 0.0], [10.0, 0.0]], [[10.0, 8.0], [0.0, 8.0]]])
+        .set_walls("hall", &[[[0.0, 0.0], [10.0, 0.0]], [[10.0, 8.0], [0.0, 8.0]]].into_iter().collect())
         .await
         .expect("walls");
     for (name, place) in [

@@ -2,9 +2,8 @@
 //! never one for another, and tell where the robot is; in another building with other posters nothing is recognised.
 
 use client::{
-    Capture, Delivery, RobotClient, RobotOptions,
-    lessons::{Place, Size},
-    map::LandmarkRegion,
+    Capture, Delivery, LandmarkRegion, RobotClient, RobotOptions,
+    api::{LandmarkStatus, NewMap, Place, Size},
     v1::{self, Verdict},
 };
 use server::config::Limits;
@@ -35,12 +34,17 @@ fn round(building: &Arc<Building>, seed: u64, views: usize) -> Vec<(Stop, Sensor
 
 async fn teach(inside: &Inside, building: &Arc<Building>) {
     let maps = inside.maps();
-    maps.create_map(MAP, None).await.expect("map");
+    maps.create_map(&NewMap::new(MAP)).await.expect("map");
     for poster in building.posters() {
         let centre = poster.map_from_landmark.translation.vector;
         let outward = poster.map_from_landmark.rotation * nalgebra::Vector3::x();
-        let place =
-            Place { x_m: centre.x, y_m: centre.y, z_m: centre.z, theta_rad: outward.y.atan2(outward.x) };
+        let place = Place {
+            x_m: centre.x,
+            y_m: centre.y,
+            z_m: centre.z,
+            theta_rad: outward.y.atan2(outward.x),
+            ..Place::default()
+        };
         let size = Size { width_m: poster.width_m, height_m: poster.height_m };
         maps.add_landmark(MAP, &poster.name, Some(size), Some(place)).await.expect("landmark");
     }
@@ -55,7 +59,7 @@ async fn teach(inside: &Inside, building: &Arc<Building>) {
     let job = maps.learn(MAP, None, None).await.expect("job");
     let job = maps.wait_for_job(job, 3 * SOON, |_| {}).await.expect("the lesson ends");
     let landmarks = maps.landmarks(MAP).await.expect("landmarks");
-    let active = landmarks.iter().filter(|l| l.status == "active").count();
+    let active = landmarks.iter().filter(|l| l.status == LandmarkStatus::Active).count();
     assert!(active >= 5, "{active} of {} active: {:?}", landmarks.len(), job.result);
 }
 

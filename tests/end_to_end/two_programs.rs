@@ -2,7 +2,7 @@
 //! by the API; the first goes on undisturbed. When it ends, the next is admitted: at once if it left in order, and within
 //! the named time if it was killed.
 
-use client::{Capture, RobotClient, v1};
+use client::{Capture, RobotClient, api::NewMap, v1};
 use engine::epochs::MESSAGE_LIVE;
 use server::config::Limits;
 use std::time::{Duration, Instant};
@@ -19,7 +19,7 @@ fn code(answer: &v1::Answer) -> &str {
 
 async fn started() -> Inside {
     let inside = Inside::start(Limits::default()).await;
-    inside.maps().create_map("hall", None).await.expect("map");
+    inside.maps().create_map(&NewMap::new("hall")).await.expect("map");
     inside.maps().put_robot("r1", "hall").await.expect("robot");
     inside
 }

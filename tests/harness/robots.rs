@@ -2,9 +2,8 @@
 
 use crate::{Inside, SOON, eventually};
 use client::{
-    Capture, Delivery, RobotClient, RobotOptions,
-    lessons::{Place, Size},
-    map::LandmarkRegion,
+    Capture, Delivery, LandmarkRegion, RobotClient, RobotOptions,
+    api::{Place, Size},
     v1,
 };
 use image::{ExtendedColorType, codecs::jpeg::JpegEncoder};
@@ -62,8 +61,13 @@ pub async fn teach(inside: &Inside, building: &Arc<Building>, names: &[&str], vi
         let truth = building.landmark(name).expect("a landmark of the building");
         let centre = truth.map_from_landmark.translation.vector;
         let outward = truth.map_from_landmark.rotation * nalgebra::Vector3::x();
-        let place =
-            Place { x_m: centre.x, y_m: centre.y, z_m: centre.z, theta_rad: outward.y.atan2(outward.x) };
+        let place = Place {
+            x_m: centre.x,
+            y_m: centre.y,
+            z_m: centre.z,
+            theta_rad: outward.y.atan2(outward.x),
+            ..Place::default()
+        };
         let size = Size { width_m: truth.width_m, height_m: truth.height_m };
         maps.add_landmark(MAP, name, Some(size), Some(place)).await.expect("landmark");
     }

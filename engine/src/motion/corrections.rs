@@ -1,15 +1,13 @@
 //! What became of every fix of a robot: the latest in a bounded log, all of them in counters. In memory only.
 
 use map::{fuse::FixOutcome, laser_fix::LaserRefusal, localise::FixSource, pose2::Pose2};
-use serde::Serialize;
 use std::collections::{BTreeMap, VecDeque};
-use utoipa::ToSchema;
 
 /// Corrections kept for each robot and modality; the oldest give way.
 pub const MAX_CORRECTIONS: usize = 200;
 
 /// A fix, what became of it, and by how much it moved the pose.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Correction {
     /// Echo of the frame or scan.
     pub epoch: u64,
@@ -47,14 +45,13 @@ pub(super) struct Log {
 }
 
 /// What the log says, for readers.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Corrections {
     /// What the pose rests on now: `odometry`, `landmarks`, `guided`, `laser`, `hypotheses`; empty without a pose.
     pub modalities: Vec<String>,
     /// For each modality how many fixes came to which end. For the laser also why scans gave no fix: `no_pose` (there is
     /// none to correct), `no_walls` (the map has none), `few_points`, `unlike` (it shows something else than the map),
     /// `prior` (it contradicts the pose), `ambiguous` (several poses fit), `superseded` (a newer one came first).
-    #[schema(value_type = Object)]
     pub totals: BTreeMap<&'static str, BTreeMap<&'static str, u64>>,
     /// The latest 200 of each modality, oldest first; without `repeated` ones, which tell nothing new.
     pub corrections: Vec<Correction>,

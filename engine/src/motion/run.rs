@@ -6,9 +6,7 @@ use map::{
     modality_stats::{ReferenceRun, ReferenceTrajectory},
     pose2::Pose2,
 };
-use serde::Serialize;
 use std::sync::atomic::{AtomicU64, Ordering};
-use utoipa::ToSchema;
 
 /// Runs recorded at a time.
 pub const MAX_RECORDINGS: usize = 8;
@@ -24,7 +22,7 @@ const STEP_RAD: f64 = 0.01;
 static NEXT: AtomicU64 = AtomicU64::new(0);
 
 /// A run as it is recorded.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Recorded {
     /// The map.
     /// Name of the map that the robot stood on.

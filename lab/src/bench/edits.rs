@@ -4,7 +4,10 @@
 use super::recognise::landmarks::models;
 use crate::evaluate::statistics::quantile;
 use anyhow::Context as _;
-use client::{MapClient, lessons::Place, map::LandmarkRegion};
+use client::{
+    LandmarkRegion, MapClient,
+    api::{NewMap, Place, WallsBody},
+};
 use serde::Serialize;
 use serde_json::{Value, json};
 use server::{
@@ -61,7 +64,6 @@ pub(super) struct Args {
 }
 
 /// Milliseconds of several changes of one kind.
-#[expect(clippy::struct_field_names, reason = "units come last")]
 #[derive(Debug, Serialize)]
 struct Cost {
     median_ms: f64,
@@ -170,7 +172,7 @@ fn settings(data: &Path, args: &Args) -> anyhow::Result<Config> {
 async fn fill(data: &Path, args: &Args) -> anyhow::Result<()> {
     let server = Server::start(settings(data, args)?).await?;
     let maps = MapClient::new(&format!("http://{}", server.http_addr))?;
-    maps.create_map(MAP, None).await?;
+    maps.create_map(&NewMap::new(MAP)).await?;
     maps.set_walls(MAP, &walls(args)).await?;
     server.stop().await;
     let (count, threads) = (args.landmarks as usize, std::thread::available_parallelism()?.get());
@@ -216,7 +218,7 @@ fn picture(number: usize) -> GrayImage {
 fn place(i: usize, shift_m: f64) -> Place {
     let (row, column) = (i / ROW_LANDMARKS, i % ROW_LANDMARKS);
     let (x_m, y_m) = (SPACING_M * column as f64 + shift_m, ROW_M * row as f64);
-    Place { x_m, y_m, z_m: 1.5, theta_rad: std::f64::consts::FRAC_PI_2 }
+    Place { x_m, y_m, z_m: 1.5, theta_rad: std::f64::consts::FRAC_PI_2, ..Place::default() }
 }
 
 impl Large {
@@ -237,7 +239,7 @@ impl Large {
 }
 
 /// Walls behind the landmarks, cut into as many segments.
-fn walls(args: &Args) -> Vec<[[f64; 2]; 2]> {
+fn walls(args: &Args) -> WallsBody {
     let rows = (args.landmarks as usize).div_ceil(ROW_LANDMARKS);
     let pieces = (args.walls as usize).div_ceil(rows);
     let piece_m = SPACING_M * ROW_LANDMARKS as f64 / pieces as f64;

@@ -7,8 +7,8 @@ use super::{
 };
 use anyhow::Context as _;
 use client::{
-    Capture, Delivery, MapClient, RobotClient, RobotOptions,
-    map::LandmarkRegion,
+    Capture, Delivery, LandmarkRegion, MapClient, RobotClient, RobotOptions,
+    api::{Distance, Job, JobState, LandmarkStatus, NewMap},
     quad_corners,
     v1::{Answer, QuadAnswer, Verdict},
 };
@@ -151,7 +151,8 @@ async fn evaluate(truth: &Truth, args: &Args) -> anyhow::Result<Report> {
 }
 
 async fn teach(truth: &Truth, args: &Args, maps: &MapClient, report: &mut Report) -> anyhow::Result<()> {
-    maps.create_map(MAP, args.distance).await?;
+    let distance = args.distance.map(Distance::from).unwrap_or_default();
+    maps.create_map(&NewMap { distance, ..NewMap::new(MAP) }).await?;
     let progress = screen::progress(truth.teach.len(), "teaching");
     for (path, landmark) in &truth.teach {
         if maps.landmark(MAP, landmark).await.is_err() {
@@ -166,22 +167,17 @@ async fn teach(truth: &Truth, args: &Args, maps: &MapClient, report: &mut Report
     let job = maps.learn(MAP, None, args.generated_views).await?;
     let bar = screen::progress(1000, "learning");
     let job = maps
-        .wait_for_job(job, Duration::from_hours(2), |job: &client::lessons::Job| {
+        .wait_for_job(job, Duration::from_hours(2), |job: &Job| {
             bar.set_position((job.progress * 1000.0) as u64);
         })
         .await?;
     bar.finish_and_clear();
-    anyhow::ensure!(
-        job.state == client::lessons::JobState::Done,
-        "learning ended as {:?}: {:?}",
-        job.state,
-        job.message
-    );
+    anyhow::ensure!(job.state == JobState::Done, "learning ended as {:?}: {}", job.state, job.message);
     report.learn_s = start.elapsed().as_secs_f64();
     let landmarks = maps.landmarks(MAP).await?;
-    report.active = landmarks.iter().filter(|l| l.status == "active").count();
+    report.active = landmarks.iter().filter(|l| l.status == LandmarkStatus::Active).count();
     if args.misses {
-        for landmark in landmarks.iter().filter(|l| l.status != "active") {
+        for landmark in landmarks.iter().filter(|l| l.status != LandmarkStatus::Active) {
             screen::complain(&format!("not active: {} {:?}", landmark.name, landmark.reasons));
         }
     }

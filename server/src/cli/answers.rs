@@ -3,9 +3,9 @@
 use super::screen::counted;
 use client::{
     NamedLandmark,
-    lessons::Robot,
+    api::{PoseTrust, Robot},
     named,
-    v1::{Answer, PoseTrust, QuadAnswer, QuadKind, Verdict},
+    v1::{Answer, QuadAnswer, QuadKind, Verdict},
 };
 
 /// What was recognised in a picture.
@@ -70,12 +70,11 @@ fn by_points(quad: &QuadAnswer) -> String {
 
 /// A robot, its map, and where it is if that is known.
 pub(super) fn robot_line(robot: &Robot) -> String {
-    let map = robot.map.as_deref().unwrap_or("no map");
     let at = robot.pose.as_ref().map_or_else(String::new, |pose| {
         let (x_m, y_m, degrees) = (pose.x_m, pose.y_m, pose.theta_rad.to_degrees());
         format!(", at {x_m:.2}, {y_m:.2} m, {degrees:.0} degrees: {}", trust(pose.trust))
     });
-    format!("{}  {map}{at}", robot.name)
+    format!("{}  {}{at}", robot.name, robot.map)
 }
 
 /// How far a pose is trusted.
@@ -93,7 +92,7 @@ fn trust(trust: PoseTrust) -> &'static str {
 mod tests {
     use super::*;
     use client::{
-        lessons::RobotPose,
+        api::RobotPose,
         v1::{Candidate, PointEvidence, Sighting},
     };
 
@@ -158,7 +157,7 @@ mod tests {
 
     #[test]
     fn a_robot_is_told_with_its_pose_and_how_far_that_is_trusted() {
-        let robot: Robot = serde_json::from_str(r#"{"name":"r1","map":"hall"}"#).unwrap();
+        let robot: Robot = serde_json::from_str(r#"{"name":"r1","map":"hall","alive":true}"#).unwrap();
         assert_eq!(robot_line(&robot), "r1  hall");
         let at = |trust| {
             let pose = RobotPose {

@@ -1,6 +1,6 @@
 //! Parsers of command line values: sizes, cameras, distances.
 
-use client::lessons::Size;
+use client::api::Size;
 use vision::{
     frame::{Intrinsics, IntrinsicsSigmas},
     recognise::DistanceKind,

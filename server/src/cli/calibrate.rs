@@ -1,9 +1,10 @@
 //! `waymark calibrate`: a camera's intrinsics from pictures of one flat thing of known shape, no server needed.
 
 use super::{detect, pictures, screen};
-use crate::calibrating::{CORNER_SIGMA_PX, Knowledge, Report, calibrated};
+use crate::calibrating::{CORNER_SIGMA_PX, Knowledge, calibrated};
 use anyhow::Context as _;
 use engine::dominant::dominant;
+use protos::api::CalibrationReport;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 use vision::{
@@ -105,7 +106,7 @@ fn largest(quads: &[Quad]) -> Option<&Quad> {
     meant.or(whole.first()).copied()
 }
 
-fn table(r: &Report, names: &[String]) -> String {
+fn table(r: &CalibrationReport, names: &[String]) -> String {
     let k = &r.intrinsics;
     let mut lines = vec![
         format!(

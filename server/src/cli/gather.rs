@@ -2,12 +2,12 @@
 
 use super::{
     screen,
-    teach::{LESSON_TIMEOUT, ServerArgs, show},
+    teach::{LESSON_TIMEOUT, ServerArgs, counted, show},
 };
 use anyhow::Context as _;
 use client::{
     MapClient,
-    lessons::{Candidate, Gathering, Job, Pick},
+    api::{AcceptRequest, AcceptedTrackBody, Gathering, Job, NewGatheringBody, TrackSummary},
 };
 use std::path::{Path, PathBuf};
 
@@ -56,7 +56,7 @@ pub(crate) enum Command {
         gathering: i64,
         /// NUMBER=NAME of each candidate; NUMBER alone for views of a landmark that is known.
         #[arg(required = true, value_parser = pick)]
-        picks: Vec<Pick>,
+        picks: Vec<AcceptedTrackBody>,
         #[command(flatten)]
         at: At,
     },
@@ -82,20 +82,20 @@ pub(crate) struct At {
     server: ServerArgs,
 }
 
-fn pick(text: &str) -> Result<Pick, String> {
+fn pick(text: &str) -> Result<AcceptedTrackBody, String> {
     let (number, name) = text.split_once('=').map_or((text, None), |(n, name)| (n, Some(name.to_owned())));
     let candidate = number.parse().map_err(|_e| "NUMBER=NAME, such as 3=poster".to_owned())?;
-    Ok(Pick { candidate, name })
+    Ok(AcceptedTrackBody { candidate, name })
 }
 
 fn line(g: &Gathering) -> String {
     let of = g.landmark.as_deref().unwrap_or("whatever is new");
     let state = if g.open { "goes on" } else { "ended" };
-    format!("{}  {} with {}, of {of}: {}", g.id, state, g.robot, screen::counted(g.kept(), "view"))
+    format!("{}  {} with {}, of {of}: {}", g.id, state, g.robot, counted(g.counts.kept, "view"))
 }
 
-fn candidate_line(c: &Candidate) -> String {
-    let views = screen::counted(c.views.len() as u64, "view");
+fn candidate_line(c: &TrackSummary) -> String {
+    let views = counted(c.views.len() as u64, "view");
     let verdict = if c.passes { "passes every gate".to_owned() } else { c.details().join("; ") };
     let known = c.landmark.as_ref().map_or_else(String::new, |name| format!(" of {name}"));
     format!("{}  {views}{known}, {}: {verdict}", c.number, c.place_text())
@@ -105,7 +105,8 @@ fn candidate_line(c: &Candidate) -> String {
 pub(crate) async fn run(command: &Command) -> anyhow::Result<()> {
     match command {
         Command::Start { robot, landmark, known, at } => {
-            let begun = at.client()?.gather(&at.map, robot, landmark.as_deref(), *known).await?;
+            let new = NewGatheringBody { robot: robot.clone(), landmark: landmark.clone(), known: *known };
+            let begun = at.client()?.start_gathering(&at.map, &new).await?;
             show(&at.server, &begun, &format!("gathering {} has begun", begun.id))
         }
         Command::Stop { gathering, at } => {
@@ -118,7 +119,7 @@ pub(crate) async fn run(command: &Command) -> anyhow::Result<()> {
         }
         Command::Show { gathering, pictures, at } => {
             let maps = at.client()?;
-            let found = maps.candidates(&at.map, *gathering).await?;
+            let found = maps.tracks(&at.map, *gathering).await?;
             if let Some(folder) = pictures {
                 draw(&maps, (&at.map, *gathering), &found, folder).await?;
             }
@@ -128,12 +129,12 @@ pub(crate) async fn run(command: &Command) -> anyhow::Result<()> {
         Command::Discard { gathering, candidates, at } => {
             let maps = at.client()?;
             for candidate in candidates {
-                maps.discard_candidate(&at.map, *gathering, *candidate).await?;
+                maps.discard_track(&at.map, *gathering, *candidate).await?;
             }
             show(
                 &at.server,
                 candidates,
-                &format!("{} thrown away", screen::counted(candidates.len() as u64, "candidate")),
+                &format!("{} thrown away", counted(candidates.len() as u64, "candidate")),
             )
         }
     }
@@ -142,33 +143,34 @@ pub(crate) async fn run(command: &Command) -> anyhow::Result<()> {
 async fn draw(
     maps: &MapClient,
     (map, gathering): (&str, i64),
-    found: &[Candidate],
+    found: &[TrackSummary],
     folder: &Path,
 ) -> anyhow::Result<()> {
     std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
     for candidate in found {
         let Some(best) = candidate.best else { continue };
-        let png = maps.candidate_picture(map, gathering, candidate.number, best).await?;
+        let png = maps.track_icon(map, gathering, candidate.number, best).await?;
         let path = folder.join(format!("{}.png", candidate.number));
         std::fs::write(&path, png).with_context(|| path.display().to_string())?;
     }
     Ok(())
 }
 
-async fn accept(at: &At, gathering: i64, picks: &[Pick]) -> anyhow::Result<()> {
+async fn accept(at: &At, gathering: i64, picks: &[AcceptedTrackBody]) -> anyhow::Result<()> {
     let maps = at.client()?;
-    let accepted = maps.accept_candidates(&at.map, gathering, picks).await?;
+    let request = AcceptRequest { candidates: picks.to_vec(), learn: true };
+    let accepted = maps.accept_tracks(&at.map, gathering, &request).await?;
     let bar = screen::progress(1000, "learning");
     let job = match accepted.job.clone() {
         Some(job) => {
             let told = |job: &Job| bar.set_position((job.progress * 1000.0) as u64);
             maps.wait_for_job(job, LESSON_TIMEOUT, told).await?.message
         }
-        None => None,
+        None => String::new(),
     };
     bar.finish_and_clear();
     let names: Vec<&str> = accepted.landmarks.iter().map(|l| l.name.as_str()).collect();
-    show(&at.server, &accepted, &format!("{}: {}", names.join(", "), job.unwrap_or_default()))
+    show(&at.server, &accepted, &format!("{}: {}", names.join(", "), job))
 }
 
 impl At {
@@ -183,8 +185,11 @@ mod tests {
 
     #[test]
     fn picks_are_read() {
-        assert_eq!(pick("3=poster").unwrap(), Pick { candidate: 3, name: Some("poster".into()) });
-        assert_eq!(pick("12").unwrap(), Pick { candidate: 12, name: None });
+        assert_eq!(
+            pick("3=poster").unwrap(),
+            AcceptedTrackBody { candidate: 3, name: Some("poster".into()) }
+        );
+        assert_eq!(pick("12").unwrap(), AcceptedTrackBody { candidate: 12, name: None });
         assert!(pick("poster=3").is_err() && pick("-1=a").is_err() && pick("").is_err());
     }
 }

@@ -1,15 +1,15 @@
 //! `waymark run`: record a robot's run, tell where it really was, and so teach the map which modality to trust where.
 
-use super::{
-    screen::counted,
-    teach::{ServerArgs, show},
-};
+use super::teach::{ServerArgs, counted, show};
 use anyhow::{Context as _, bail};
+use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 use client::{
     MapClient,
-    reference_runs::{RecordingStatus, ReferenceRun, ReferenceTrajectory},
+    api::{
+        FusionModeBody, ModalityBody, ModalityMapBody, ModalityMapPatch, RecordingStatusBody,
+        ReferenceRunBody, ReferenceTrajectoryBody,
+    },
 };
-use serde_json::{Value, json};
 use std::path::PathBuf;
 
 /// `waymark run`.
@@ -78,8 +78,8 @@ pub(crate) enum Command {
         map: String,
         /// `all`: everything, each as sure as it proved to be; `fuse`: those nearly as good as the best; `single`: the best
         /// alone. Odometry carries the pose in any case.
-        #[arg(value_parser = ["all", "fuse", "single"])]
-        mode: Option<String>,
+        #[arg(value_parser = PossibleValuesParser::new(["all", "fuse", "single"]).map(|word| mode(&word)))]
+        mode: Option<FusionModeBody>,
         #[command(flatten)]
         server: ServerArgs,
     },
@@ -104,7 +104,7 @@ pub(crate) async fn run(command: &Command) -> anyhow::Result<()> {
             let text =
                 std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
             let poses = poses(&text).with_context(|| path.display().to_string())?;
-            let known = ReferenceTrajectory { poses, sigma_m: *sigma_m, sigma_rad: *sigma_rad };
+            let known = ReferenceTrajectoryBody { poses, sigma_m: *sigma_m, sigma_rad: *sigma_rad };
             let learnt = MapClient::new(server.address())?.finish_recording(robot, &known).await?;
             show(server, &learnt, &learnt_lines(&learnt))
         }
@@ -119,7 +119,9 @@ pub(crate) async fn run(command: &Command) -> anyhow::Result<()> {
         Command::Mode { map, mode, server } => {
             let maps = MapClient::new(server.address())?;
             let known = match mode {
-                Some(mode) => maps.set_modalities(map, &json!({ "mode": mode })).await?,
+                Some(mode) => {
+                    maps.set_modalities(map, &ModalityMapPatch { mode: Some(*mode), areas: None }).await?
+                }
                 None => maps.modalities(map).await?,
             };
             show(server, &known, &mode_line(&known))
@@ -127,18 +129,19 @@ pub(crate) async fn run(command: &Command) -> anyhow::Result<()> {
     }
 }
 
-fn recorded_line(r: &RecordingStatus) -> String {
+fn recorded_line(r: &RecordingStatusBody) -> String {
     let state = match &r.reason {
         Some(reason) => format!("ended ({reason})"),
         None => "goes on".to_owned(),
     };
-    let [landmarks, laser] = [(r.landmarks, "landmark"), (r.laser, "scan")].map(|(n, what)| counted(n, what));
+    let [landmarks, laser] =
+        [(r.landmarks, "landmark"), (r.laser, "scan")].map(|(n, what)| counted(n as u64, what));
     format!("{} on {}: {state}, {:.1} m, fixes by {landmarks}, {laser}", r.robot, r.map, r.way_m)
 }
 
-fn learnt_lines(run: &ReferenceRun) -> String {
+fn learnt_lines(run: &ReferenceRunBody) -> String {
     let mut lines =
-        vec![format!("{}  {}: {:.1} m, {}", run.id, run.robot, run.way_m, counted(run.cells, "cell"))];
+        vec![format!("{}  {}: {:.1} m, {}", run.id, run.robot, run.way_m, counted(run.cells as u64, "cell"))];
     lines.extend(run.modules.iter().map(|m| {
         let [along, across, heading] = [0, 1, 2].map(|k| m.mean[k].hypot(m.sigma[k]));
         format!(
@@ -150,13 +153,21 @@ fn learnt_lines(run: &ReferenceRun) -> String {
     lines.join("\n")
 }
 
+/// A mode by its word, one of the three that the argument may have.
+fn mode(word: &str) -> FusionModeBody {
+    match word {
+        "all" => FusionModeBody::All,
+        "fuse" => FusionModeBody::Fuse,
+        _ => FusionModeBody::Single,
+    }
+}
+
 /// How much of the map each is best on.
-fn mode_line(known: &Value) -> String {
-    let cells = known["cells"].as_array().map_or(&[][..], Vec::as_slice);
-    let best = |module: &str| cells.iter().filter(|cell| cell["best"] == module).count() as u64;
-    let mode = known["mode"].as_str().unwrap_or_default();
-    let each = ["odometry", "laser", "landmarks"].map(|module| format!("{module} {}", best(module)));
-    format!("{mode}; best in {}: {}", counted(cells.len() as u64, "cell"), each.join(", "))
+fn mode_line(known: &ModalityMapBody) -> String {
+    let best = |modality| known.cells.iter().filter(|cell| cell.best == Some(modality)).count();
+    let each = [ModalityBody::Odometry, ModalityBody::Laser, ModalityBody::Landmarks];
+    let each = each.map(|modality| format!("{modality} {}", best(modality)));
+    format!("{}; best in {}: {}", known.mode, counted(known.cells.len() as u64, "cell"), each.join(", "))
 }
 
 /// Poses of a file.

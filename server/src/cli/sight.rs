@@ -1,8 +1,7 @@
 //! `waymark map sight`: the camera that looks for a map's landmarks, with angles in degrees, as people have them.
 
 use super::arg_parsers::numbers;
-use client::MapClient;
-use serde_json::{Map, Value};
+use client::{MapClient, api::VisibilitySettingsBody};
 
 /// A camera, and what counts as seen. What is not given stays as it is.
 #[derive(Debug, Clone, clap::Args)]
@@ -48,66 +47,63 @@ fn angles(text: &str) -> Result<[f64; 2], String> {
 }
 
 impl SightArgs {
-    /// The numbers that are given, as the server calls them.
-    fn given(&self) -> Map<String, Value> {
+    /// The settings with what is given in place of what they have.
+    fn over(&self, settings: &VisibilitySettingsBody) -> VisibilitySettingsBody {
         let pair = |pair: Option<[f64; 2]>, i: usize| pair.map(|p| p[i]);
         let rad = |degrees: Option<f64>| degrees.map(f64::to_radians);
-        let all = [
-            ("width_px", pair(self.image, 0)),
-            ("height_px", pair(self.image, 1)),
-            ("focal_px", self.focal_px),
-            ("camera_height_m", self.camera_height_m),
-            ("tilt_low_rad", rad(pair(self.tilt_deg, 0))),
-            ("tilt_high_rad", rad(pair(self.tilt_deg, 1))),
-            ("pan_low_rad", rad(pair(self.pan_deg, 0))),
-            ("pan_high_rad", rad(pair(self.pan_deg, 1))),
-            ("max_incidence_rad", rad(self.max_incidence_deg)),
-            ("min_side_px", self.min_side_px),
-            ("max_fill", self.max_fill),
-            ("standoff_m", self.standoff_m),
-        ];
-        all.into_iter().filter_map(|(name, value)| Some((name.to_owned(), value?.into()))).collect()
+        VisibilitySettingsBody {
+            width_px: pair(self.image, 0).or(settings.width_px),
+            height_px: pair(self.image, 1).or(settings.height_px),
+            focal_px: self.focal_px.or(settings.focal_px),
+            camera_height_m: self.camera_height_m.or(settings.camera_height_m),
+            tilt_low_rad: rad(pair(self.tilt_deg, 0)).or(settings.tilt_low_rad),
+            tilt_high_rad: rad(pair(self.tilt_deg, 1)).or(settings.tilt_high_rad),
+            pan_low_rad: rad(pair(self.pan_deg, 0)).or(settings.pan_low_rad),
+            pan_high_rad: rad(pair(self.pan_deg, 1)).or(settings.pan_high_rad),
+            max_incidence_rad: rad(self.max_incidence_deg).or(settings.max_incidence_rad),
+            min_side_px: self.min_side_px.or(settings.min_side_px),
+            max_fill: self.max_fill.or(settings.max_fill),
+            standoff_m: self.standoff_m.or(settings.standoff_m),
+        }
     }
 
     /// Sets what is given, if anything is, and gives what holds then.
-    pub(super) async fn set(&self, maps: &MapClient, map: &str) -> anyhow::Result<Value> {
+    pub(super) async fn set(&self, maps: &MapClient, map: &str) -> anyhow::Result<VisibilitySettingsBody> {
         let now = maps.visibility_settings(map).await?;
-        let given = self.given();
-        if given.is_empty() && !self.usual {
+        let none = VisibilitySettingsBody::default();
+        if self.over(&none) == none && !self.usual {
             return Ok(now);
         }
-        let mut all = if self.usual { Map::new() } else { now.as_object().cloned().unwrap_or_default() };
-        all.extend(given);
-        Ok(maps.set_visibility_settings(map, &all.into()).await?)
+        let all = self.over(if self.usual { &none } else { &now });
+        Ok(maps.set_visibility_settings(map, &all).await?)
     }
 }
 
 /// A setting for people.
-pub(super) fn sentences(map: &str, sight: &Value) -> String {
-    let number = |name: &str| sight[name].as_f64().unwrap_or_default();
-    let degrees = |name: &str| number(name).to_degrees();
+pub(super) fn sentences(map: &str, settings: &VisibilitySettingsBody) -> String {
+    let number = Option::unwrap_or_default;
+    let degrees = |angle: Option<f64>| number(angle).to_degrees();
     format!(
         "{map}: camera {} x {} px, focal length {} px, {} m up, tilts {:.1} to {:.1}, pans {:.1} to {:.1} degrees\n\
          seen: sides from {} px, at most {:.0} % of the image, up to {:.1} degrees oblique, {} m off the wall",
-        number("width_px"),
-        number("height_px"),
-        number("focal_px"),
-        number("camera_height_m"),
-        degrees("tilt_low_rad"),
-        degrees("tilt_high_rad"),
-        degrees("pan_low_rad"),
-        degrees("pan_high_rad"),
-        number("min_side_px"),
-        100.0 * number("max_fill"),
-        degrees("max_incidence_rad"),
-        number("standoff_m"),
+        number(settings.width_px),
+        number(settings.height_px),
+        number(settings.focal_px),
+        number(settings.camera_height_m),
+        degrees(settings.tilt_low_rad),
+        degrees(settings.tilt_high_rad),
+        degrees(settings.pan_low_rad),
+        degrees(settings.pan_high_rad),
+        number(settings.min_side_px),
+        100.0 * number(settings.max_fill),
+        degrees(settings.max_incidence_rad),
+        number(settings.standoff_m),
     )
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use serde_json::json;
 
     #[test]
     fn what_is_given_goes_in_radians() {
@@ -123,9 +119,20 @@ mod tests {
             standoff_m: None,
             usual: false,
         };
-        let expected = json!({ "width_px": 1280.0, "height_px": 720.0, "tilt_low_rad": (-10.0_f64).to_radians(),
-            "tilt_high_rad": 60.0_f64.to_radians(), "max_incidence_rad": 60.0_f64.to_radians() });
-        assert_eq!(Value::from(args.given()), expected);
+        let now = VisibilitySettingsBody {
+            width_px: Some(640.0),
+            focal_px: Some(512.0),
+            ..VisibilitySettingsBody::default()
+        };
+        let expected = VisibilitySettingsBody {
+            width_px: Some(1280.0),
+            height_px: Some(720.0),
+            tilt_low_rad: Some((-10.0_f64).to_radians()),
+            tilt_high_rad: Some(60.0_f64.to_radians()),
+            max_incidence_rad: Some(60.0_f64.to_radians()),
+            ..now
+        };
+        assert_eq!(args.over(&now), expected);
         assert!(image("1280").is_err() && angles("1;2").is_err());
     }
 }

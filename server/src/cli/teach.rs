@@ -7,9 +7,8 @@ use super::{
     sight::{self, SightArgs},
 };
 use client::{
-    ClientError, MapClient,
-    lessons::{Job, Size},
-    map::LandmarkRegion,
+    ClientError, LandmarkRegion, MapClient,
+    api::{Distance, Job, MapPatch, NewMap, Parent, Size, UploadOutcomeBody},
 };
 use std::{path::PathBuf, process::ExitCode, time::Duration};
 use vision::{frame::Intrinsics, recognise::DistanceKind};
@@ -132,18 +131,33 @@ pub(crate) struct WhereArgs {
 }
 
 impl WhereArgs {
-    /// What is given, as the server takes it.
-    fn changes(&self) -> serde_json::Value {
-        let mut changes = serde_json::Map::new();
-        for (field, word) in [("site", &self.site), ("building", &self.building), ("floor", &self.floor)] {
-            changes.extend(word.as_ref().map(|word| (field.to_owned(), word.as_str().into())));
+    /// Where the map lies in another, if that is given.
+    fn lies(&self) -> Option<Parent> {
+        let (map, [x_m, y_m, degrees]) = self.parent.as_ref().zip(self.at)?;
+        let theta_rad = degrees.to_radians();
+        Some(Parent { map: map.clone(), x_m, y_m, theta_rad, level_m: self.level_m, covariance: None })
+    }
+
+    /// A map with what is given.
+    fn new_map(&self, name: &str, distance: Option<DistanceKind>) -> NewMap {
+        NewMap {
+            name: name.to_owned(),
+            distance: distance.map(Distance::from).unwrap_or_default(),
+            site: self.site.clone(),
+            building: self.building.clone(),
+            floor: self.floor.clone(),
+            parent: self.lies(),
         }
-        if let Some((map, [x_m, y_m, degrees])) = self.parent.as_ref().zip(self.at) {
-            let parent = serde_json::json!({ "map": map, "x_m": x_m, "y_m": y_m, "theta_rad": degrees.to_radians(),
-                "level_m": self.level_m });
-            changes.insert("parent".to_owned(), parent);
+    }
+
+    /// A change to what is given; the rest stays.
+    fn patch(&self) -> MapPatch {
+        MapPatch {
+            site: self.site.clone().map(Some),
+            building: self.building.clone().map(Some),
+            floor: self.floor.clone().map(Some),
+            parent: self.lies().map(Some),
         }
-        changes.into()
     }
 }
 
@@ -218,11 +232,11 @@ pub(crate) async fn map(command: &MapCommand) -> anyhow::Result<()> {
     match command {
         MapCommand::Create { name, distance, found, server } => {
             let maps = MapClient::new(&server.server)?;
-            let map = maps.create_map_at(name, *distance, &found.changes()).await?;
+            let map = maps.create_map(&found.new_map(name, *distance)).await?;
             show(server, &map, &format!("map {} created", map.name))
         }
         MapCommand::Place { name, found, server } => {
-            let map = MapClient::new(&server.server)?.locate_map(name, &found.changes()).await?;
+            let map = MapClient::new(&server.server)?.locate_map(name, &found.patch()).await?;
             show(server, &map, &format!("{}  {}", map.name, map.whereabouts()))
         }
         MapCommand::Sight { name, sight, server } => {
@@ -236,7 +250,7 @@ pub(crate) async fn map(command: &MapCommand) -> anyhow::Result<()> {
                 .map(|m| {
                     let found = m.whereabouts();
                     let gap = if found.is_empty() { "" } else { ", " };
-                    let landmarks = screen::counted(m.landmarks, "landmark");
+                    let landmarks = counted(m.landmarks, "landmark");
                     format!("{}  version {}, {landmarks}{gap}{found}", m.name, m.version)
                 })
                 .collect();
@@ -293,7 +307,7 @@ pub(crate) async fn learn(args: &LearnArgs) -> anyhow::Result<ExitCode> {
         let uploaded = match std::fs::read(path) {
             Ok(image) => match maps.upload_view(map, landmark, image, extent).await {
                 Ok(view) => {
-                    if view.outcome.as_deref() == Some("alike") {
+                    if view.outcome == Some(UploadOutcomeBody::Alike) {
                         let like = format!(
                             "waymark: {name}: not kept, it shows nothing that view {} does not",
                             view.id
@@ -322,12 +336,16 @@ pub(crate) async fn learn(args: &LearnArgs) -> anyhow::Result<ExitCode> {
     let lines: Vec<String> = std::iter::once(format!(
         "{landmark}: {}, {} photographed",
         learnt.status,
-        screen::counted(learnt.views, "view")
+        counted(learnt.views, "view")
     ))
     .chain(learnt.reasons.iter().map(|r| format!("  {}", reason(r))))
     .collect();
     show(&args.server, &learnt, &lines.join("\n"))?;
     Ok(status)
+}
+
+pub(super) fn counted(count: u64, what: &str) -> String {
+    if count == 1 { format!("1 {what}") } else { format!("{count} {what}s") }
 }
 
 fn reason(value: &serde_json::Value) -> String {

@@ -6,78 +6,27 @@ use crate::store::{
     placing,
 };
 use map::segments::LaserSegment;
-use serde::Serialize;
+use protos::api::{EstimatedPlace, TrackSummary};
 use serde_json::{Value, json};
-use utoipa::ToSchema;
 use vision::{
     learn::{TrainingView, gates::v_c, learn, unlikeness_of},
     model::{Gate, LandmarkId, LandmarkModel, ModelStatus},
     params::Params,
 };
 
-/// Where a candidate seems to hang.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
-pub(crate) struct Hangs {
-    x_m: f64,
-    y_m: f64,
-    z_m: f64,
-    theta_rad: f64,
-    width_m: f64,
-    height_m: f64,
-    /// Views that agree on it.
-    views: usize,
-    /// How far off the normal the camera looked: least and most.
-    angle_rad: [f64; 2],
-}
-
-/// A thing that a robot drove past, for a person to decide on.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
-pub(crate) struct Candidate {
-    /// Its number in the gathering.
-    number: u32,
-    /// The landmark whose views these are; null for a thing that is none yet.
-    landmark: Option<String>,
-    /// Frames in which it was followed.
-    sightings: u32,
-    /// Of these, such in which it was taken for a landmark of the map, or nearly.
-    known: u32,
-    /// Numbers of its views; `views/{number}/icon` is the picture.
-    views: Vec<i64>,
-    /// Views beside these that do not agree on its place: another border of it was found, or something else. They are left
-    /// out.
-    apart: usize,
-    /// The view that stands best for all.
-    best: Option<i64>,
-    /// Smallest and largest side of the quad in the picture.
-    side_px: [f64; 2],
-    /// How far apart the views are (the gate `visibility_confidence`).
-    v_c: f64,
-    /// Where it hangs by its views.
-    hangs: Option<Hangs>,
-    /// Why that is not known.
-    not_placed: Option<String>,
-    /// Whether a lesson of these views would pass every gate, look-alikes apart, and nothing else speaks against it.
-    passes: bool,
-    /// What does not pass: `gate`, `value`, `limit`, `detail`.
-    #[schema(value_type = Vec<Object>)]
-    reasons: Vec<Value>,
-    /// Other candidates that look or hang alike: perhaps the same thing twice, or two of one kind.
-    rivals: Vec<u32>,
-}
-
 /// The candidates with all that can be said of them. Works on every picture: not for an async thread.
 pub(crate) fn candidates(
     tracks: &[(TrackRow, Vec<TrackView>)],
     walls: &[LaserSegment],
     params: &Params,
-) -> Vec<Candidate> {
-    let mut made: Vec<(Candidate, Option<LandmarkModel>)> =
+) -> Vec<TrackSummary> {
+    let mut made: Vec<(TrackSummary, Option<LandmarkModel>)> =
         tracks.iter().map(|(track, views)| one(track, views, walls, params)).collect();
     let rivals: Vec<Vec<u32>> = made
         .iter()
         .map(|(a, own)| {
             let others = made.iter().filter(|(b, _)| b.number != a.number);
-            let rival = |(b, other): &&(Candidate, Option<LandmarkModel>)| {
+            let rival = |(b, other): &&(TrackSummary, Option<LandmarkModel>)| {
                 // As near as is accepted where nothing else is like it.
                 let near = |x: &LandmarkModel, y: &LandmarkModel| {
                     unlikeness_of(x, &y.features(&params.recognise), params) < params.learn.likeness_cap
@@ -100,9 +49,9 @@ pub(crate) fn candidates(
     made.into_iter().map(|(candidate, _)| candidate).collect()
 }
 
-fn overlap(a: &Candidate, b: &Candidate) -> bool {
+fn overlap(a: &TrackSummary, b: &TrackSummary) -> bool {
     let Some((a, b)) = a.hangs.as_ref().zip(b.hangs.as_ref()) else { return false };
-    let reach = |h: &Hangs| 0.5 * h.width_m.max(h.height_m);
+    let reach = |h: &EstimatedPlace| 0.5 * h.width_m.max(h.height_m);
     (a.x_m - b.x_m).hypot(a.y_m - b.y_m).hypot(a.z_m - b.z_m) < reach(a).max(reach(b))
 }
 
@@ -111,7 +60,7 @@ fn one(
     all: &[TrackView],
     walls: &[LaserSegment],
     params: &Params,
-) -> (Candidate, Option<LandmarkModel>) {
+) -> (TrackSummary, Option<LandmarkModel>) {
     let preview = placing::preview(all.iter().map(|v| (&v.cut.corners_px, v.capture.as_deref())), walls);
     let apart = preview.as_ref().map_or(&[][..], |p| &p.apart);
     let views: Vec<&TrackView> =
@@ -142,7 +91,7 @@ fn one(
     let best = exemplar.and_then(|e| views.iter().find(|v| v.cut.icon.pixels == e.icon().pixels));
     let seen: Vec<_> =
         views.iter().map(|v| (*v.cut.corners_px.points(), v.size_px.map(|side| side as f64))).collect();
-    let candidate = Candidate {
+    let candidate = TrackSummary {
         number: track.number,
         landmark: track.landmark.clone(),
         sightings: track.sightings,
@@ -174,9 +123,9 @@ fn reasons(model: Option<&LandmarkModel>) -> Vec<Value> {
         .collect()
 }
 
-fn hangs(preview: &placing::Preview) -> Hangs {
+fn hangs(preview: &placing::Preview) -> EstimatedPlace {
     let place = &preview.place;
-    Hangs {
+    EstimatedPlace {
         x_m: place.x_m,
         y_m: place.y_m,
         z_m: place.z_m,

@@ -14,14 +14,13 @@ use std::{
     sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
 use tokio::sync::mpsc::{Receiver, Sender, channel, error::TrySendError};
-use utoipa::ToSchema;
 use vision::model::LandmarkId;
 
 /// Frames that wait to be followed; beyond that they are dropped.
 pub(crate) const QUEUE: usize = 8;
 
 /// What became of frames and quads.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(default)]
 pub(crate) struct Counts {
     /// Frames offered.

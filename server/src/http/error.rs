@@ -2,40 +2,16 @@
 //! caused by is logged, never sent.
 
 use crate::store::StoreError;
-use ::map::map_links::MapLinkError;
 use axum::{
     http::{HeaderValue, StatusCode, header},
     response::{IntoResponse, Response},
 };
-use serde::Serialize;
+use map::{check::OutOfRange, map_links::MapLinkError};
+use protos::api::Problem;
 use serde_json::Value;
-use utoipa::ToSchema;
 
 /// The media type of errors.
 pub(crate) const PROBLEM_JSON: &str = "application/problem+json";
-
-/// An error as sent.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
-pub(crate) struct Problem {
-    /// `/problems/{code}`.
-    #[serde(rename = "type")]
-    pub(crate) kind: String,
-    /// The status in words.
-    pub(crate) title: String,
-    /// The HTTP status.
-    pub(crate) status: u16,
-    /// Stable name of the error, for programs.
-    pub(crate) code: &'static str,
-    /// The input at fault: a path into the JSON body, a part of the form, a parameter.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(crate) field: Option<String>,
-    /// A sentence for a person.
-    pub(crate) detail: String,
-    /// More, by code: `quads` with `quad_not_found` and `quad_ambiguous`; `may_be_done` (true) with `timeout` and
-    /// `not_published`, if the change that was asked for may have been made; `part` with `part_ended`.
-    #[serde(flatten)]
-    pub(crate) more: serde_json::Map<String, Value>,
-}
 
 /// What a handler returns when it cannot do as asked.
 #[derive(Debug)]
@@ -84,7 +60,7 @@ impl ApiError {
             kind: format!("/problems/{}", self.code),
             title: self.status.canonical_reason().unwrap_or("Error").to_owned(),
             status: self.status.as_u16(),
-            code: self.code,
+            code: self.code.to_owned(),
             field: self.field,
             detail: self.detail,
             more: self.more,
@@ -154,4 +130,10 @@ impl From<protos::Rejection> for ApiError {
     fn from(rejection: protos::Rejection) -> Self {
         Self::invalid(rejection.code.as_str(), rejection.field, rejection.detail)
     }
+}
+
+/// 422 for a number outside its range, in this part of the input.
+pub(super) fn out_of_range(error: &OutOfRange, outer: &str) -> ApiError {
+    let code = if error.value.is_finite() { "out_of_range" } else { "not_finite" };
+    ApiError::invalid(code, format!("{outer}.{}", error.field), error.to_string())
 }

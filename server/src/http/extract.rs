@@ -1,23 +1,22 @@
 //! From bytes to checked values: JSON bodies within their bound, names in paths, pages in queries. Every failure is a
 //! problem with a code and a field.
 
-use super::{Shared, error::ApiError};
+use super::{AppState, error::ApiError};
 use axum::{
     body::HttpBody,
     extract::{FromRequest, FromRequestParts, OptionalFromRequest, Path, Query, Request},
     http::{StatusCode, header, request::Parts},
 };
-use protos::Name;
-use serde::{Deserialize, Serialize, de::DeserializeOwned};
-use utoipa::{IntoParams, ToSchema};
+use protos::{Name, api::PageQuery};
+use serde::de::DeserializeOwned;
 
 /// A JSON body of at most `limits.json_bytes`.
 pub(super) struct Body<T>(pub(super) T);
 
-impl<T: DeserializeOwned + Send + 'static> FromRequest<Shared> for Body<T> {
+impl<T: DeserializeOwned + Send + 'static> FromRequest<AppState> for Body<T> {
     type Rejection = ApiError;
 
-    async fn from_request(request: Request, app: &Shared) -> Result<Self, ApiError> {
+    async fn from_request(request: Request, app: &AppState) -> Result<Self, ApiError> {
         read(request, app.config.limits.json_bytes).await.map(Self)
     }
 }
@@ -25,10 +24,10 @@ impl<T: DeserializeOwned + Send + 'static> FromRequest<Shared> for Body<T> {
 /// A JSON body of at most so many bytes, for a route that promises to take more than `limits.json_bytes`.
 pub(super) struct BodyUpTo<T, const BYTES: usize>(pub(super) T);
 
-impl<T: DeserializeOwned + Send + 'static, const BYTES: usize> FromRequest<Shared> for BodyUpTo<T, BYTES> {
+impl<T: DeserializeOwned + Send + 'static, const BYTES: usize> FromRequest<AppState> for BodyUpTo<T, BYTES> {
     type Rejection = ApiError;
 
-    async fn from_request(request: Request, _: &Shared) -> Result<Self, ApiError> {
+    async fn from_request(request: Request, _: &AppState) -> Result<Self, ApiError> {
         read(request, BYTES).await.map(Self)
     }
 }
@@ -53,15 +52,15 @@ async fn read<T: DeserializeOwned + Send + 'static>(request: Request, max: usize
 }
 
 /// No body at all is fine where the body is optional.
-impl<T: DeserializeOwned + Send + 'static> OptionalFromRequest<Shared> for Body<T> {
+impl<T: DeserializeOwned + Send + 'static> OptionalFromRequest<AppState> for Body<T> {
     type Rejection = ApiError;
 
-    async fn from_request(request: Request, app: &Shared) -> Result<Option<Self>, ApiError> {
+    async fn from_request(request: Request, app: &AppState) -> Result<Option<Self>, ApiError> {
         let empty = request.body().size_hint().exact() == Some(0);
         if empty {
             Ok(None)
         } else {
-            <Self as FromRequest<Shared>>::from_request(request, app).await.map(Some)
+            <Self as FromRequest<AppState>>::from_request(request, app).await.map(Some)
         }
     }
 }
@@ -106,12 +105,12 @@ pub(super) fn name(field: &'static str, text: String) -> Result<Name, ApiError> 
 }
 
 /// Path parameters. A path with wrong percent-encoding or a number that is none is a thing that does not exist.
-pub(super) struct At<T>(pub(super) T);
+pub(super) struct PathParams<T>(pub(super) T);
 
-impl<T: DeserializeOwned + Send> FromRequestParts<Shared> for At<T> {
+impl<T: DeserializeOwned + Send> FromRequestParts<AppState> for PathParams<T> {
     type Rejection = ApiError;
 
-    async fn from_request_parts(parts: &mut Parts, app: &Shared) -> Result<Self, ApiError> {
+    async fn from_request_parts(parts: &mut Parts, app: &AppState) -> Result<Self, ApiError> {
         let path = Path::<T>::from_request_parts(parts, app).await;
         path.map(|Path(value)| Self(value))
             .map_err(|e| ApiError::new(StatusCode::NOT_FOUND, "not_found", e.body_text()).field("path"))
@@ -119,12 +118,12 @@ impl<T: DeserializeOwned + Send> FromRequestParts<Shared> for At<T> {
 }
 
 /// Query parameters.
-pub(super) struct Params<T>(pub(super) T);
+pub(super) struct QueryParams<T>(pub(super) T);
 
-impl<T: DeserializeOwned> FromRequestParts<Shared> for Params<T> {
+impl<T: DeserializeOwned> FromRequestParts<AppState> for QueryParams<T> {
     type Rejection = ApiError;
 
-    async fn from_request_parts(parts: &mut Parts, app: &Shared) -> Result<Self, ApiError> {
+    async fn from_request_parts(parts: &mut Parts, app: &AppState) -> Result<Self, ApiError> {
         let query = Query::<T>::from_request_parts(parts, app).await;
         query
             .map(|Query(value)| Self(value))
@@ -132,64 +131,27 @@ impl<T: DeserializeOwned> FromRequestParts<Shared> for Params<T> {
     }
 }
 
-/// Which page of a list.
-#[derive(Debug, Clone, Default, Deserialize, IntoParams)]
-#[serde(deny_unknown_fields)]
-#[into_params(parameter_in = Query)]
-pub(super) struct PageQuery {
-    /// Most items; 100 by default, bounded by `limits.page`.
-    pub(super) limit: Option<usize>,
-    /// The `next` of the page before; absent for the first page.
-    pub(super) cursor: Option<String>,
-}
-
 /// Items of a page that does not say how many it wants.
 const PAGE_DEFAULT: usize = 100;
 
-impl PageQuery {
-    /// Checked against the bound.
-    pub(super) fn limit(&self, max: usize) -> Result<usize, ApiError> {
-        match self.limit {
-            None => Ok(PAGE_DEFAULT.min(max)),
-            Some(limit) if (1..=max).contains(&limit) => Ok(limit),
-            Some(limit) => {
-                Err(ApiError::invalid("out_of_range", "limit", format!("{limit} is not in 1 to {max}")))
-            }
+/// How many items a page may have, checked against the bound.
+pub(super) fn page_limit(query: &PageQuery, max: usize) -> Result<usize, ApiError> {
+    match query.limit {
+        None => Ok(PAGE_DEFAULT.min(max)),
+        Some(limit) if (1..=max).contains(&limit) => Ok(limit),
+        Some(limit) => {
+            Err(ApiError::invalid("out_of_range", "limit", format!("{limit} is not in 1 to {max}")))
         }
     }
-
-    /// The cursor of a list by number; 0 comes before every number.
-    pub(super) fn after_number(&self) -> Result<i64, ApiError> {
-        let bad = |_e| ApiError::invalid("bad_value", "cursor", "not one of this list");
-        self.cursor.as_deref().map_or(Ok(0), |text| text.parse().map_err(bad))
-    }
-
-    /// The cursor; empty comes before every name.
-    pub(super) fn after(&self) -> String {
-        self.cursor.clone().unwrap_or_default()
-    }
 }
 
-/// A page of a list.
-#[derive(Debug, Clone, Serialize, ToSchema)]
-pub(super) struct Page<T> {
-    /// The items, in order.
-    pub(super) items: Vec<T>,
-    /// Give this as `cursor` for the next page; null on the last.
-    pub(super) next: Option<String>,
+/// The cursor of a list by number; 0 comes before every number.
+pub(super) fn after_number(query: &PageQuery) -> Result<i64, ApiError> {
+    let bad = |_e| ApiError::invalid("bad_value", "cursor", "not one of this list");
+    query.cursor.as_deref().map_or(Ok(0), |text| text.parse().map_err(bad))
 }
 
-impl<T> Page<T> {
-    /// From one row more than asked for, which only says that there is a next page.
-    pub(super) fn new<R>(
-        mut rows: Vec<R>,
-        limit: usize,
-        key: impl Fn(&R) -> String,
-        item: impl Fn(R) -> T,
-    ) -> Self {
-        let more = rows.len() > limit;
-        rows.truncate(limit);
-        let next = if more { rows.last().map(key) } else { None };
-        Self { items: rows.into_iter().map(item).collect(), next }
-    }
+/// The cursor of a list by name; empty comes before every name.
+pub(super) fn after_name(query: &PageQuery) -> String {
+    query.cursor.clone().unwrap_or_default()
 }

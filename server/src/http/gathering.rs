@@ -1,21 +1,19 @@
 //! `/maps/{map}/gatherings`: views gathered by a robot that drives past, and a person's decision on them.
 
 use super::{
-    Shared,
-    error::{ApiError, Problem},
-    extract::{At, Body, Page, PageQuery, Params, name},
-    learning::Job,
+    AppState,
+    answers::page,
+    error::ApiError,
+    extract::{Body, PathParams, QueryParams, after_number, name, page_limit},
+    learning::job_shown,
+    views::placement_shown,
 };
 use crate::{
-    gather::{
-        Counts,
-        candidates::{Candidate, candidates},
-    },
+    gather::{Counts, candidates::candidates},
     store::{
         accepting::{self, Pick},
         gatherings::{self, GatheringRow, NewGathering},
         landmarks, maps,
-        placing::Placing,
     },
 };
 use axum::{
@@ -25,12 +23,14 @@ use axum::{
     response::{IntoResponse, Response},
 };
 use engine::picture;
-use serde::{Deserialize, Serialize};
-use utoipa::ToSchema;
+use protos::api::{
+    AcceptRequest, AcceptanceBody, AcceptedTrackBody, ExtendedLandmark, Gathering, GatheringCountsBody,
+    NewGatheringBody, Page, PageQuery, Problem, TrackList,
+};
 use utoipa_axum::{router::OpenApiRouter, routes};
 use vision::model::LandmarkId;
 
-pub(super) fn router() -> OpenApiRouter<Shared> {
+pub(super) fn router() -> OpenApiRouter<AppState> {
     OpenApiRouter::new()
         .routes(routes!(begin, list))
         .routes(routes!(get, delete))
@@ -41,56 +41,38 @@ pub(super) fn router() -> OpenApiRouter<Shared> {
         .routes(routes!(accept))
 }
 
-/// Who gathers what.
-#[derive(Debug, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-struct NewGatheringBody {
-    /// A robot that stands on this map.
-    robot: String,
-    /// Only views of this landmark, which must be learnt already; absent: of whatever flat four-sided thing is none yet.
-    landmark: Option<String>,
-    /// Views of every landmark that is recognised beyond doubt, too.
-    #[serde(default)]
-    known: bool,
+fn counts_shown(counts: Counts) -> GatheringCountsBody {
+    GatheringCountsBody {
+        frames: counts.frames,
+        dropped: counts.dropped,
+        elsewhere: counts.elsewhere,
+        unusable: counts.unusable,
+        not_on_wall: counts.not_on_wall,
+        kept: counts.kept,
+        alike: counts.alike,
+        too_new: counts.too_new,
+        full: counts.full,
+        decided: counts.decided,
+        known: counts.known,
+        unwanted: counts.unwanted,
+        unlike: counts.unlike,
+        too_many: counts.too_many,
+        refused: counts.refused,
+    }
 }
 
-/// Views being gathered, or gathered.
-#[derive(Debug, Serialize, ToSchema)]
-struct Gathering {
-    /// Its number.
-    id: i64,
-    /// The map.
-    map: String,
-    /// Who gathers.
-    robot: String,
-    /// The only landmark whose views are wanted.
-    landmark: Option<String>,
-    /// Whether views of recognised landmarks are wanted.
-    known: bool,
-    /// It goes on.
-    open: bool,
-    /// What became of the frames. Of a gathering that was interrupted by a restart: since then.
-    counts: Counts,
-    /// ms since the Unix epoch.
-    created_ms: i64,
-    /// ms since the Unix epoch.
-    ended_ms: Option<i64>,
-}
-
-impl Gathering {
-    fn new(app: &Shared, row: GatheringRow) -> Self {
-        let kept = || serde_json::from_str(&row.counts).unwrap_or_default();
-        Self {
-            counts: app.gatherer.counts(row.id).unwrap_or_else(kept),
-            id: row.id,
-            map: row.map,
-            robot: row.robot,
-            landmark: row.landmark,
-            known: row.known,
-            open: row.open,
-            created_ms: row.created_ms,
-            ended_ms: row.ended_ms,
-        }
+fn gathering_shown(app: &AppState, row: GatheringRow) -> Gathering {
+    let kept = || serde_json::from_str(&row.counts).unwrap_or_default();
+    Gathering {
+        counts: counts_shown(app.gatherer.counts(row.id).unwrap_or_else(kept)),
+        id: row.id,
+        map: row.map,
+        robot: row.robot,
+        landmark: row.landmark,
+        known: row.known,
+        open: row.open,
+        created_ms: row.created_ms,
+        ended_ms: row.ended_ms,
     }
 }
 
@@ -102,8 +84,8 @@ impl Gathering {
     (status = 409, body = Problem, description = "in_use: it gathers already or stands on another map; not_learnt; too_many"),
     (status = 422, body = Problem)))]
 async fn begin(
-    State(app): State<Shared>,
-    At(map): At<String>,
+    State(app): State<AppState>,
+    PathParams(map): PathParams<String>,
     Body(new): Body<NewGatheringBody>,
 ) -> Result<(StatusCode, Json<Gathering>), ApiError> {
     if let Some(landmark) = &new.landmark {
@@ -123,21 +105,21 @@ async fn begin(
     }
     let new = NewGathering { robot: new.robot, landmark: new.landmark, known: new.known };
     let row = app.gatherer.begin(&map, new).await?;
-    Ok((StatusCode::CREATED, Json(Gathering::new(&app, row))))
+    Ok((StatusCode::CREATED, Json(gathering_shown(&app, row))))
 }
 
 /// Lists gatherings by number, ended ones included.
 #[utoipa::path(get, path = "/maps/{map}/gatherings", tag = "gathering", params(("map" = String, Path), PageQuery),
     responses((status = 200, body = Page<Gathering>), (status = 404, body = Problem)))]
 async fn list(
-    State(app): State<Shared>,
-    At(map): At<String>,
-    Params(page): Params<PageQuery>,
+    State(app): State<AppState>,
+    PathParams(map): PathParams<String>,
+    QueryParams(query): QueryParams<PageQuery>,
 ) -> Result<Json<Page<Gathering>>, ApiError> {
-    let (limit, after) = (page.limit(app.config.limits.page)?, page.after_number()?);
+    let (limit, after) = (page_limit(&query, app.config.limits.page)?, after_number(&query)?);
     let map = maps::get(app.store.reads(), &map).await?;
     let rows = gatherings::page(app.store.reads(), map.id, after, limit + 1).await?;
-    Ok(Json(Page::new(rows, limit, |r| r.id.to_string(), |r| Gathering::new(&app, r))))
+    Ok(Json(page(rows, limit, |r| r.id.to_string(), |r| gathering_shown(&app, r))))
 }
 
 /// One gathering.
@@ -145,11 +127,11 @@ async fn list(
     params(("map" = String, Path), ("gathering" = i64, Path)),
     responses((status = 200, body = Gathering), (status = 404, body = Problem)))]
 async fn get(
-    State(app): State<Shared>,
-    At((map, id)): At<(String, i64)>,
+    State(app): State<AppState>,
+    PathParams((map, id)): PathParams<(String, i64)>,
 ) -> Result<Json<Gathering>, ApiError> {
     let row = gatherings::get(app.store.reads(), &map, id).await?;
-    Ok(Json(Gathering::new(&app, row)))
+    Ok(Json(gathering_shown(&app, row)))
 }
 
 /// Stops; what was gathered waits for a decision. One that has ended stays as it is.
@@ -157,37 +139,33 @@ async fn get(
     params(("map" = String, Path), ("gathering" = i64, Path)),
     responses((status = 200, body = Gathering), (status = 404, body = Problem)))]
 async fn stop(
-    State(app): State<Shared>,
-    At((map, id)): At<(String, i64)>,
+    State(app): State<AppState>,
+    PathParams((map, id)): PathParams<(String, i64)>,
 ) -> Result<Json<Gathering>, ApiError> {
     let row = app.gatherer.end(&map, id).await?;
-    Ok(Json(Gathering::new(&app, row)))
+    Ok(Json(gathering_shown(&app, row)))
 }
 
 /// Stops, and throws away all that nobody has accepted.
 #[utoipa::path(delete, path = "/maps/{map}/gatherings/{gathering}", tag = "gathering",
     params(("map" = String, Path), ("gathering" = i64, Path)),
     responses((status = 204), (status = 404, body = Problem)))]
-async fn delete(State(app): State<Shared>, At((map, id)): At<(String, i64)>) -> Result<StatusCode, ApiError> {
+async fn delete(
+    State(app): State<AppState>,
+    PathParams((map, id)): PathParams<(String, i64)>,
+) -> Result<StatusCode, ApiError> {
     app.gatherer.delete(&map, id).await?;
     Ok(StatusCode::NO_CONTENT)
-}
-
-/// All candidates of a gathering.
-#[derive(Debug, Serialize, ToSchema)]
-struct Candidates {
-    /// By number; those that somebody has decided on are not among them.
-    candidates: Vec<Candidate>,
 }
 
 /// What waits for a decision, with all that helps to decide. Also while the robot still drives.
 #[utoipa::path(get, path = "/maps/{map}/gatherings/{gathering}/candidates", tag = "gathering",
     params(("map" = String, Path), ("gathering" = i64, Path)),
-    responses((status = 200, body = Candidates), (status = 404, body = Problem)))]
+    responses((status = 200, body = TrackList), (status = 404, body = Problem)))]
 async fn list_candidates(
-    State(app): State<Shared>,
-    At((map, id)): At<(String, i64)>,
-) -> Result<Json<Candidates>, ApiError> {
+    State(app): State<AppState>,
+    PathParams((map, id)): PathParams<(String, i64)>,
+) -> Result<Json<TrackList>, ApiError> {
     gatherings::get(app.store.reads(), &map, id).await?;
     let mut tracks = vec![];
     for track in gatherings::tracks(app.store.reads(), id).await?.into_iter().filter(|t| t.state == "open") {
@@ -196,7 +174,7 @@ async fn list_candidates(
     }
     let walls = app.store.snapshots().get(&map).map(|map| map.walls.clone()).unwrap_or_default();
     let work = move |app: &super::App| candidates(&tracks, &walls, &app.config.params);
-    Ok(Json(Candidates { candidates: app.on_vision_thread(work).await? }))
+    Ok(Json(TrackList { candidates: app.on_vision_thread(work).await? }))
 }
 
 /// Throws a candidate away. While the gathering goes on, no more views of that thing are kept.
@@ -204,8 +182,8 @@ async fn list_candidates(
     params(("map" = String, Path), ("gathering" = i64, Path), ("candidate" = u32, Path)),
     responses((status = 204), (status = 404, body = Problem)))]
 async fn discard(
-    State(app): State<Shared>,
-    At((map, id, number)): At<(String, i64, u32)>,
+    State(app): State<AppState>,
+    PathParams((map, id, number)): PathParams<(String, i64, u32)>,
 ) -> Result<StatusCode, ApiError> {
     app.gatherer.discard(&map, id, number).await?;
     Ok(StatusCode::NO_CONTENT)
@@ -216,8 +194,8 @@ async fn discard(
     tag = "gathering", params(("map" = String, Path), ("gathering" = i64, Path), ("candidate" = u32, Path),
     ("view" = i64, Path)), responses((status = 200, content_type = "image/png"), (status = 404, body = Problem)))]
 async fn show_icon(
-    State(app): State<Shared>,
-    At((map, id, number, view)): At<(String, i64, u32, i64)>,
+    State(app): State<AppState>,
+    PathParams((map, id, number, view)): PathParams<(String, i64, u32, i64)>,
 ) -> Result<Response, ApiError> {
     gatherings::get(app.store.reads(), &map, id).await?;
     let views = gatherings::track_views(app.store.reads(), id, number).await?;
@@ -233,70 +211,26 @@ async fn show_icon(
     Ok((headers, png).into_response())
 }
 
-/// One acceptance.
-#[derive(Debug, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-struct PickBody {
-    /// Number of the candidate.
-    candidate: u32,
-    /// Name of the landmark it becomes: a new one, or one without views. Several candidates of one thing may be given one
-    /// name. Not needed for views of a landmark that is known.
-    name: Option<String>,
-}
-
-/// What is accepted.
-#[derive(Debug, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-struct Decision {
-    /// At least one.
-    candidates: Vec<PickBody>,
-    /// Learn these landmarks at once.
-    #[serde(default = "yes")]
-    learn: bool,
-}
-
-fn yes() -> bool {
-    true
-}
-
-/// A landmark that got views.
-#[derive(Debug, Serialize, ToSchema)]
-struct Grown {
-    name: String,
-    /// How many it got.
-    views: u64,
-    /// Whether they place it.
-    placing: Placing,
-}
-
-/// What an acceptance came to.
-#[derive(Debug, Serialize, ToSchema)]
-struct Accepted {
-    landmarks: Vec<Grown>,
-    /// The lesson, if one was wanted.
-    job: Option<Job>,
-}
-
 /// Most candidates of one decision.
 const MAX_PICKS: usize = 64;
 
 /// Makes landmarks of candidates, or adds views to the landmarks they show; places them; and learns them. All or nothing.
 #[utoipa::path(post, path = "/maps/{map}/gatherings/{gathering}/accept", tag = "gathering",
-    params(("map" = String, Path), ("gathering" = i64, Path)), request_body = Decision,
-    responses((status = 202, body = Accepted), (status = 200, body = Accepted, description = "without a lesson"),
+    params(("map" = String, Path), ("gathering" = i64, Path)), request_body = AcceptRequest,
+    responses((status = 202, body = AcceptanceBody), (status = 200, body = AcceptanceBody, description = "without a lesson"),
     (status = 404, body = Problem, description = "unknown_gathering, unknown_candidate"),
     (status = 409, body = Problem, description = "exists: the landmark has views of its own; in_use; too_many"),
     (status = 422, body = Problem, description = "bad_name, bad_value, out_of_range")))]
 async fn accept(
-    State(app): State<Shared>,
-    At((map, id)): At<(String, i64)>,
-    Body(decision): Body<Decision>,
-) -> Result<(StatusCode, Json<Accepted>), ApiError> {
+    State(app): State<AppState>,
+    PathParams((map, id)): PathParams<(String, i64)>,
+    Body(decision): Body<AcceptRequest>,
+) -> Result<(StatusCode, Json<AcceptanceBody>), ApiError> {
     if !(1..=MAX_PICKS).contains(&decision.candidates.len()) {
         let detail = format!("1 to {MAX_PICKS} candidates at a time");
         return Err(ApiError::invalid("out_of_range", "candidates", detail));
     }
-    let pick = |(i, pick): (usize, PickBody)| {
+    let pick = |(i, pick): (usize, AcceptedTrackBody)| {
         let name = pick.name.map(|text| name("name", text)).transpose();
         let name = name.map_err(|e| e.field(format!("candidates[{i}].name")))?;
         Ok(Pick { number: pick.candidate, name: name.map(|n| n.to_string()) })
@@ -310,8 +244,11 @@ async fn accept(
         jobs: (limits.jobs, limits.jobs_kept),
     };
     let done = app.gatherer.accept((&map, id), picks, decision.learn, bounds).await?;
-    let landmarks =
-        done.landmarks.into_iter().map(|(name, (views, placing))| Grown { name, views, placing }).collect();
+    let landmarks = done
+        .landmarks
+        .into_iter()
+        .map(|(name, (views, placing))| ExtendedLandmark { name, views, placing: placement_shown(placing) })
+        .collect();
     let status = if done.job.is_some() { StatusCode::ACCEPTED } else { StatusCode::OK };
-    Ok((status, Json(Accepted { landmarks, job: done.job.map(|row| Job::new(row, None)) })))
+    Ok((status, Json(AcceptanceBody { landmarks, job: done.job.map(|row| job_shown(row, None)) })))
 }

@@ -4,7 +4,7 @@
 //! any page it shows; so a request must name this server as its host and, if it changes anything, come from its own
 //! pages or from no page at all.
 
-use super::{Shared, error::ApiError};
+use super::{AppState, error::ApiError};
 use axum::{
     body::HttpBody,
     extract::{Request, State},
@@ -36,7 +36,7 @@ const CSP_DOCS: &str = "default-src 'none'; script-src 'self'; style-src 'self' 
 static NEXT_ID: AtomicU64 = AtomicU64::new(1);
 
 /// The middleware.
-pub(super) async fn guard(State(app): State<Shared>, request: Request, next: Next) -> Response {
+pub(super) async fn guard(State(app): State<AppState>, request: Request, next: Next) -> Response {
     let id = request_id(request.headers());
     let (method, path) = (request.method().clone(), request.uri().path().to_owned());
     let started = Instant::now();
@@ -63,7 +63,7 @@ pub(super) async fn guard(State(app): State<Shared>, request: Request, next: Nex
 }
 
 /// Handles a request. One with a large body has a place from before its body is read until it is answered.
-async fn placed(app: &Shared, request: Request, next: Next) -> Response {
+async fn placed(app: &AppState, request: Request, next: Next) -> Response {
     let small = request.body().size_hint().upper().is_some_and(|bytes| bytes <= SMALL_BODY);
     let _place = if small {
         None

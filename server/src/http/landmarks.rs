@@ -1,64 +1,124 @@
 //! `/maps/{map}/landmarks`: create, list, read, measure, delete.
 
 use super::{
-    App, Shared,
-    error::{ApiError, Problem},
-    extract::{At, Body, Page, PageQuery, Params, name},
-    resources::{Landmark, Place, Size, Trust, measures},
+    App, AppState,
+    answers::page,
+    error::{ApiError, out_of_range},
+    extract::{Body, PathParams, QueryParams, after_name, name, page_limit},
 };
 use crate::{
     jobs::Learning,
     store::{
-        landmarks::{self, LandmarkRow},
+        landmarks::{self, LandmarkRow, Measures},
         maps,
     },
 };
 use axum::{Json, extract::State, http::StatusCode};
-use map::landmark_health::LandmarkHealth;
-use serde::{Deserialize, Deserializer};
-use utoipa::ToSchema;
+use map::{
+    landmark_health::LandmarkHealth,
+    place::{LandmarkPlace, PlaceSigmas},
+};
+use nalgebra::Vector3;
+use protos::api::{
+    Landmark, LandmarkHealthBody, LandmarkModelBody, LandmarkPatch, LandmarkStatus, NewLandmark, Page,
+    PageQuery, Place, PlaceSigma, Problem, Size,
+};
+use serde_json::json;
 use utoipa_axum::{router::OpenApiRouter, routes};
-use vision::model::LandmarkId;
+use vision::{model::LandmarkId, pose::LandmarkSize};
 
-pub(super) fn router() -> OpenApiRouter<Shared> {
+pub(super) fn router() -> OpenApiRouter<AppState> {
     OpenApiRouter::new().routes(routes!(create, list)).routes(routes!(get, patch, delete))
 }
 
-/// A landmark to be.
-#[derive(Debug, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-struct NewLandmark {
-    /// `[a-z0-9_-]{1,64}`, unique in the map.
-    name: String,
-    /// Width and height; without it there is no pose.
-    size: Option<Size>,
-    /// Where it hangs; without it there is no robot pose.
-    place: Option<Place>,
+/// Size and place, checked. Either may be missing.
+fn measures(size: Option<Size>, place: Option<Place>) -> Result<Measures, ApiError> {
+    let size = size.map(|s| LandmarkSize { width_m: s.width_m, height_m: s.height_m });
+    // A place is checked with some size, a size at some place: each has its own ranges.
+    let stand_in = LandmarkSize { width_m: 1.0, height_m: 1.0 };
+    let centre = place.map_or(Vector3::zeros(), |p| Vector3::new(p.x_m, p.y_m, p.z_m));
+    let theta_rad = place.map_or(0.0, |p| p.theta_rad);
+    let (roll_rad, tilt_rad) = place.map_or((0.0, 0.0), |p| (p.roll_rad, p.tilt_rad));
+    let made = LandmarkPlace::by_hand(centre, theta_rad, size.unwrap_or(stand_in), PlaceSigmas::default());
+    made.and_then(|made| LandmarkPlace { roll_rad, tilt_rad, ..made }.check()).map_err(|e| {
+        let outer = if matches!(e.field, "width_m" | "height_m") { "size" } else { "place" };
+        out_of_range(&e, outer)
+    })?;
+    let place = place.map(|p| landmarks::Place {
+        x_m: p.x_m,
+        y_m: p.y_m,
+        z_m: p.z_m,
+        theta_rad: p.theta_rad,
+        roll_rad: p.roll_rad,
+        tilt_rad: p.tilt_rad,
+        covariance: None,
+    });
+    Ok(Measures { size, place, size_from_views: false })
 }
 
-/// What changes. A field that is absent stays, one that is null is forgotten.
-#[derive(Debug, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-#[expect(clippy::option_option, reason = "absent and null differ in a PATCH")]
-struct Changes {
-    /// Width and height.
-    #[serde(default, deserialize_with = "given")]
-    #[schema(value_type = Option<Size>)]
-    size: Option<Option<Size>>,
-    /// Where it hangs.
-    #[serde(default, deserialize_with = "given")]
-    #[schema(value_type = Option<Place>)]
-    place: Option<Option<Place>>,
-    /// A person's decision; a new size or place is sound by itself.
-    standing: Option<Trust>,
+fn health(body: LandmarkHealthBody) -> LandmarkHealth {
+    match body {
+        LandmarkHealthBody::Sound => LandmarkHealth::Sound,
+        LandmarkHealthBody::Flagged => LandmarkHealth::Flagged,
+        LandmarkHealthBody::Quarantined => LandmarkHealth::Quarantined,
+    }
 }
 
-/// Tells null from absent.
-#[expect(clippy::option_option, reason = "absent and null differ in a PATCH")]
-pub(super) fn given<'de, D: Deserializer<'de>, T: Deserialize<'de>>(
-    from: D,
-) -> Result<Option<Option<T>>, D::Error> {
-    Option::deserialize(from).map(Some)
+fn health_shown(standing: LandmarkHealth) -> LandmarkHealthBody {
+    match standing {
+        LandmarkHealth::Sound => LandmarkHealthBody::Sound,
+        LandmarkHealth::Flagged => LandmarkHealthBody::Flagged,
+        LandmarkHealth::Quarantined => LandmarkHealthBody::Quarantined,
+    }
+}
+
+/// A landmark. `quarantined`: why its stored model is out of use. `learning`: whether a job has it in work.
+fn landmark_shown(mut row: LandmarkRow, quarantined: Option<String>, learning: bool) -> Landmark {
+    if let (Some(model), Some(reason)) = (&mut row.model, quarantined) {
+        model.active = false;
+        model.reasons = json!([{ "gate": "stored_model", "detail": reason }]).to_string();
+    }
+    let status = match (&row.model, learning) {
+        (_, true) => LandmarkStatus::Learning,
+        (None, _) => LandmarkStatus::Empty,
+        (Some(model), _) if model.active => LandmarkStatus::Active,
+        _ => LandmarkStatus::Candidate,
+    };
+    let reasons = row.model.as_ref().map(|m| serde_json::from_str(&m.reasons).unwrap_or_default());
+    let model = row.model.map(|m| LandmarkModelBody {
+        views: m.views,
+        generated_views: m.generated_views,
+        learnt_ms: m.learnt_ms,
+        facts: serde_json::from_str(&m.facts).unwrap_or_default(),
+    });
+    let Measures { size, place, .. } = row.measures;
+    let sigma = place.and_then(|p| p.covariance).map(|c| c.diagonal().map(f64::sqrt));
+    Landmark {
+        standing: health_shown(row.standing),
+        finding: row.finding.and_then(|f| serde_json::from_str(&f).ok()),
+        name: row.name,
+        status,
+        reasons: reasons.unwrap_or_default(),
+        views: row.views,
+        size: size.map(|s| Size { width_m: s.width_m, height_m: s.height_m }),
+        place: place.map(|p| Place {
+            x_m: p.x_m,
+            y_m: p.y_m,
+            z_m: p.z_m,
+            theta_rad: p.theta_rad,
+            roll_rad: p.roll_rad,
+            tilt_rad: p.tilt_rad,
+        }),
+        place_sigma: sigma.map(|s| PlaceSigma {
+            x_m: s[0],
+            y_m: s[1],
+            z_m: s[3],
+            theta_rad: s[2],
+            width_m: s[4],
+            height_m: s[5],
+        }),
+        model,
+    }
 }
 
 /// The landmark with what only the running server knows: a model out of use, a job at work.
@@ -66,7 +126,7 @@ fn shown(app: &App, learning: &Learning, map: &str, row: LandmarkRow) -> Landmar
     let snapshot = app.store.snapshots().get(map);
     let quarantined = snapshot.and_then(|s| s.unusable_models.get(&LandmarkId(row.id as u64)).cloned());
     let learning = learning.has(&row.name) && row.views > 0;
-    Landmark::new(row, quarantined, learning)
+    landmark_shown(row, quarantined, learning)
 }
 
 /// Creates a landmark without views.
@@ -75,8 +135,8 @@ fn shown(app: &App, learning: &Learning, map: &str, row: LandmarkRow) -> Landmar
     (status = 409, body = Problem, description = "exists, too_many"),
     (status = 422, body = Problem, description = "bad_name, bad_value, out_of_range")))]
 async fn create(
-    State(app): State<Shared>,
-    At(map): At<String>,
+    State(app): State<AppState>,
+    PathParams(map): PathParams<String>,
     Body(new): Body<NewLandmark>,
 ) -> Result<(StatusCode, Json<Landmark>), ApiError> {
     let (name, measures) = (name("name", new.name)?, measures(new.size, new.place)?);
@@ -84,22 +144,22 @@ async fn create(
     let write = app.store.write(move |tx| {
         Box::pin(async move { landmarks::create(tx, &map, name.as_str(), measures, max).await })
     });
-    Ok((StatusCode::CREATED, Json(Landmark::new(write.await?, None, false))))
+    Ok((StatusCode::CREATED, Json(landmark_shown(write.await?, None, false))))
 }
 
 /// Lists the landmarks of a map by name.
 #[utoipa::path(get, path = "/maps/{map}/landmarks", tag = "landmarks", params(("map" = String, Path), PageQuery),
     responses((status = 200, body = Page<Landmark>), (status = 404, body = Problem)))]
 async fn list(
-    State(app): State<Shared>,
-    At(map): At<String>,
-    Params(page): Params<PageQuery>,
+    State(app): State<AppState>,
+    PathParams(map): PathParams<String>,
+    QueryParams(query): QueryParams<PageQuery>,
 ) -> Result<Json<Page<Landmark>>, ApiError> {
-    let limit = page.limit(app.config.limits.page)?;
+    let limit = page_limit(&query, app.config.limits.page)?;
     let map = maps::get(app.store.reads(), &map).await?;
-    let rows = landmarks::page(app.store.reads(), map.id, &page.after(), limit + 1).await?;
+    let rows = landmarks::page(app.store.reads(), map.id, &after_name(&query), limit + 1).await?;
     let learning = app.jobs.learning(&map.name).await?;
-    Ok(Json(Page::new(rows, limit, |r| r.name.clone(), |r| shown(&app, &learning, &map.name, r))))
+    Ok(Json(page(rows, limit, |r| r.name.clone(), |r| shown(&app, &learning, &map.name, r))))
 }
 
 /// One landmark.
@@ -107,8 +167,8 @@ async fn list(
     params(("map" = String, Path), ("landmark" = String, Path)),
     responses((status = 200, body = Landmark), (status = 404, body = Problem)))]
 async fn get(
-    State(app): State<Shared>,
-    At((map, landmark)): At<(String, String)>,
+    State(app): State<AppState>,
+    PathParams((map, landmark)): PathParams<(String, String)>,
 ) -> Result<Json<Landmark>, ApiError> {
     maps::get(app.store.reads(), &map).await?;
     let row = landmarks::get(app.store.reads(), &map, &landmark).await?;
@@ -117,20 +177,20 @@ async fn get(
 
 /// Sets or forgets size and place; sets how far it is trusted.
 #[utoipa::path(patch, path = "/maps/{map}/landmarks/{landmark}", tag = "landmarks",
-    params(("map" = String, Path), ("landmark" = String, Path)), request_body = Changes,
+    params(("map" = String, Path), ("landmark" = String, Path)), request_body = LandmarkPatch,
     responses((status = 200, body = Landmark), (status = 404, body = Problem),
     (status = 422, body = Problem, description = "out_of_range, bad_value")))]
 async fn patch(
-    State(app): State<Shared>,
-    At((map, landmark)): At<(String, String)>,
-    Body(changes): Body<Changes>,
+    State(app): State<AppState>,
+    PathParams((map, landmark)): PathParams<(String, String)>,
+    Body(changes): Body<LandmarkPatch>,
 ) -> Result<Json<Landmark>, ApiError> {
     let checked = measures(changes.size.flatten(), changes.place.flatten())?;
     let (size, place) = (changes.size.is_some(), changes.place.is_some());
-    let (map_name, standing) = (map.clone(), changes.standing.map(LandmarkHealth::from));
+    let (map_name, standing) = (map.clone(), changes.standing.map(health));
     let write = app.store.write(move |tx| {
         Box::pin(async move {
-            let changed = landmarks::update(tx, &map, &landmark, |old| landmarks::Measures {
+            let changed = landmarks::update(tx, &map, &landmark, |old| Measures {
                 size: if size { checked.size } else { old.size },
                 place: if place { checked.place } else { old.place },
                 size_from_views: old.size_from_views && !size,
@@ -151,8 +211,8 @@ async fn patch(
     params(("map" = String, Path), ("landmark" = String, Path)),
     responses((status = 204), (status = 404, body = Problem)))]
 async fn delete(
-    State(app): State<Shared>,
-    At((map, landmark)): At<(String, String)>,
+    State(app): State<AppState>,
+    PathParams((map, landmark)): PathParams<(String, String)>,
 ) -> Result<StatusCode, ApiError> {
     app.store.write(move |tx| Box::pin(async move { landmarks::delete(tx, &map, &landmark).await })).await?;
     Ok(StatusCode::NO_CONTENT)

@@ -1,9 +1,9 @@
 //! Lessons and jobs: start, watch, stop.
 
 use super::{
-    Shared,
-    error::{ApiError, Problem},
-    extract::{At, Body},
+    AppState,
+    error::ApiError,
+    extract::{Body, PathParams},
 };
 use crate::{
     jobs::{Progress, request},
@@ -23,14 +23,12 @@ use axum::{
     },
 };
 use futures::{Stream, StreamExt, stream};
-use serde::{Deserialize, Serialize};
-use serde_json::Value;
+use protos::api::{Job, JobState, LandmarkLesson, MapLesson, Problem};
 use std::convert::Infallible;
 use tokio_stream::wrappers::WatchStream;
-use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
-pub(super) fn router() -> OpenApiRouter<Shared> {
+pub(super) fn router() -> OpenApiRouter<AppState> {
     OpenApiRouter::new()
         .routes(routes!(learn_one))
         .routes(routes!(learn_map))
@@ -38,82 +36,28 @@ pub(super) fn router() -> OpenApiRouter<Shared> {
         .routes(routes!(events))
 }
 
-/// How to learn one landmark.
-#[derive(Debug, Default, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-struct Lesson {
-    /// Views generated from each photograph, 0 to 100; absent fills up where photographs are few.
-    generated_views: Option<usize>,
-}
-
-/// What to learn of a map, and how.
-#[derive(Debug, Default, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-struct MapLesson {
-    /// Names; absent means every landmark that has views.
-    landmarks: Option<Vec<String>>,
-    /// Views generated from each photograph, 0 to 100; absent fills up where photographs are few.
-    generated_views: Option<usize>,
-}
-
-/// Where a job stands.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
-enum JobState {
-    /// Waits.
-    Queued,
-    /// At work.
-    Running,
-    /// Ended well; `result` is set.
-    Done,
-    /// Ended badly; `message` says why.
-    Failed,
-    /// Stopped on request; nothing was changed.
-    Cancelled,
-}
-
-/// Long work.
-#[derive(Debug, Clone, Serialize, ToSchema)]
-pub(super) struct Job {
-    /// Its number.
-    id: i64,
-    /// `learn`.
-    kind: String,
-    /// The map it works on.
-    map: String,
-    /// Where it stands.
-    state: JobState,
-    /// 0 to 1.
-    progress: f64,
-    /// What it does, or why it failed.
-    message: String,
-    /// What came of it.
-    result: Option<Value>,
-}
-
-impl Job {
-    pub(super) fn new(row: JobRow, progress: Option<&Progress>) -> Self {
-        let state = match row.state.as_str() {
-            "done" => JobState::Done,
-            "failed" => JobState::Failed,
-            "cancelled" => JobState::Cancelled,
-            "running" => JobState::Running,
-            _ => JobState::Queued,
-        };
-        // The row is committed with the models, before they are published: until then the job is still at work.
-        let published = progress.is_none();
-        let state = if state == JobState::Done && !published { JobState::Running } else { state };
-        let open = matches!(state, JobState::Queued | JobState::Running);
-        let progress = progress.filter(|_| open);
-        Self {
-            id: row.id,
-            kind: row.kind,
-            map: row.map,
-            state: if progress.is_some_and(|p| p.running) { JobState::Running } else { state },
-            progress: progress.map_or(if state == JobState::Done { 1.0 } else { 0.0 }, |p| p.share),
-            message: progress.map_or(row.message, |p| p.message.clone()),
-            result: row.result.and_then(|text| serde_json::from_str(&text).ok()),
-        }
+/// A job as it stands.
+pub(super) fn job_shown(row: JobRow, progress: Option<&Progress>) -> Job {
+    let state = match row.state.as_str() {
+        "done" => JobState::Done,
+        "failed" => JobState::Failed,
+        "cancelled" => JobState::Cancelled,
+        "running" => JobState::Running,
+        _ => JobState::Queued,
+    };
+    // The row is committed with the models, before they are published: until then the job is still at work.
+    let published = progress.is_none();
+    let state = if state == JobState::Done && !published { JobState::Running } else { state };
+    let open = matches!(state, JobState::Queued | JobState::Running);
+    let progress = progress.filter(|_| open);
+    Job {
+        id: row.id,
+        kind: row.kind,
+        map: row.map,
+        state: if progress.is_some_and(|p| p.running) { JobState::Running } else { state },
+        progress: progress.map_or(if state == JobState::Done { 1.0 } else { 0.0 }, |p| p.share),
+        message: progress.map_or(row.message, |p| p.message.clone()),
+        result: row.result.and_then(|text| serde_json::from_str(&text).ok()),
     }
 }
 
@@ -129,13 +73,13 @@ fn check_generated(generated_views: Option<usize>) -> Result<Option<usize>, ApiE
 
 /// Learns one landmark again from its views.
 #[utoipa::path(post, path = "/maps/{map}/landmarks/{landmark}/learn", tag = "lessons",
-    params(("map" = String, Path), ("landmark" = String, Path)), request_body = Option<Lesson>,
+    params(("map" = String, Path), ("landmark" = String, Path)), request_body = Option<LandmarkLesson>,
     responses((status = 202, body = Job), (status = 404, body = Problem),
     (status = 409, body = Problem, description = "no_views, too_many"), (status = 422, body = Problem)))]
 async fn learn_one(
-    State(app): State<Shared>,
-    At((map, landmark)): At<(String, String)>,
-    lesson: Option<Body<Lesson>>,
+    State(app): State<AppState>,
+    PathParams((map, landmark)): PathParams<(String, String)>,
+    lesson: Option<Body<LandmarkLesson>>,
 ) -> Result<(StatusCode, Json<Job>), ApiError> {
     let lesson = lesson.map(|Body(l)| l).unwrap_or_default();
     let request = request::Request {
@@ -151,8 +95,8 @@ async fn learn_one(
     request_body = Option<MapLesson>, responses((status = 202, body = Job), (status = 404, body = Problem),
     (status = 409, body = Problem, description = "no_views, too_many"), (status = 422, body = Problem)))]
 async fn learn_map(
-    State(app): State<Shared>,
-    At(map): At<String>,
+    State(app): State<AppState>,
+    PathParams(map): PathParams<String>,
     lesson: Option<Body<MapLesson>>,
 ) -> Result<(StatusCode, Json<Job>), ApiError> {
     let lesson = lesson.map(|Body(l)| l).unwrap_or_default();
@@ -172,7 +116,7 @@ async fn learn_map(
 }
 
 async fn submit(
-    app: &Shared,
+    app: &AppState,
     map: &str,
     request: request::Request,
 ) -> Result<(StatusCode, Json<Job>), ApiError> {
@@ -189,26 +133,26 @@ async fn submit(
         }
     }
     let row = app.jobs.submit(map, &request).await?;
-    Ok((StatusCode::ACCEPTED, Json(Job::new(row, None))))
+    Ok((StatusCode::ACCEPTED, Json(job_shown(row, None))))
 }
 
-async fn read(app: &Shared, id: i64) -> Result<Job, StoreError> {
+async fn read(app: &AppState, id: i64) -> Result<Job, StoreError> {
     // Progress before the row: a job that ends in between is then shown as ended.
     let progress = app.jobs.progress(id);
-    Ok(Job::new(jobs::get(app.store.reads(), id).await?, progress.as_ref()))
+    Ok(job_shown(jobs::get(app.store.reads(), id).await?, progress.as_ref()))
 }
 
 /// One job.
 #[utoipa::path(get, path = "/jobs/{job}", tag = "lessons", params(("job" = i64, Path)),
     responses((status = 200, body = Job), (status = 404, body = Problem)))]
-async fn get(State(app): State<Shared>, At(id): At<i64>) -> Result<Json<Job>, ApiError> {
+async fn get(State(app): State<AppState>, PathParams(id): PathParams<i64>) -> Result<Json<Job>, ApiError> {
     Ok(Json(read(&app, id).await?))
 }
 
 /// Asks a job to stop: one that waits is cancelled at once. One that has ended stays as it is.
 #[utoipa::path(delete, path = "/jobs/{job}", tag = "lessons", params(("job" = i64, Path)),
     responses((status = 200, body = Job), (status = 404, body = Problem)))]
-async fn cancel(State(app): State<Shared>, At(id): At<i64>) -> Result<Json<Job>, ApiError> {
+async fn cancel(State(app): State<AppState>, PathParams(id): PathParams<i64>) -> Result<Json<Job>, ApiError> {
     app.jobs.cancel(id).await?;
     Ok(Json(read(&app, id).await?))
 }
@@ -218,8 +162,8 @@ async fn cancel(State(app): State<Shared>, At(id): At<i64>) -> Result<Json<Job>,
     responses((status = 200, content_type = "text/event-stream", body = Job), (status = 404, body = Problem),
     (status = 503, body = Problem, description = "too_many_streams")))]
 async fn events(
-    State(app): State<Shared>,
-    At(id): At<i64>,
+    State(app): State<AppState>,
+    PathParams(id): PathParams<i64>,
 ) -> Result<Sse<impl Stream<Item = Result<Event, Infallible>>>, ApiError> {
     let place = app.stream_place()?;
     let progress = app.jobs.watch(id).await?;

@@ -1,9 +1,9 @@
 //! What is happening: the last frame and answer of a camera, and the events of a map as they come.
 
 use super::{
-    Shared,
-    error::{ApiError, Problem},
-    extract::{At, name},
+    AppState,
+    error::ApiError,
+    extract::{PathParams, name},
 };
 use crate::store::{StoreError, maps, robots};
 use axum::{
@@ -18,13 +18,16 @@ use axum::{
 use engine::live::{LiveEvent, LiveFrame};
 use futures::{Stream, StreamExt};
 use map::pose2::Pose2;
-use protos::{convert::geometry::pose2_wire, v1};
-use serde::Serialize;
+use protos::{
+    api::{Problem, TrajectoriesBody},
+    convert::geometry::pose2_wire,
+    v1,
+};
 use std::{collections::VecDeque, convert::Infallible};
 use tokio_stream::wrappers::BroadcastStream;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
-pub(super) fn router() -> OpenApiRouter<Shared> {
+pub(super) fn router() -> OpenApiRouter<AppState> {
     OpenApiRouter::new()
         .routes(routes!(frame))
         .routes(routes!(answer))
@@ -33,7 +36,7 @@ pub(super) fn router() -> OpenApiRouter<Shared> {
 }
 
 /// The last frame of a camera.
-async fn last(app: &Shared, robot: String, camera: String) -> Result<LiveFrame, ApiError> {
+async fn last(app: &AppState, robot: String, camera: String) -> Result<LiveFrame, ApiError> {
     robots::get(app.store.reads(), &robot).await?;
     let (robot, camera) = (name("robot", robot)?, name("camera", camera)?);
     let frame = app.live.frame(&robot, &camera);
@@ -45,8 +48,8 @@ async fn last(app: &Shared, robot: String, camera: String) -> Result<LiveFrame, 
     params(("robot" = String, Path), ("camera" = String, Path)),
     responses((status = 200, content_type = "image/jpeg"), (status = 404, body = Problem)))]
 async fn frame(
-    State(app): State<Shared>,
-    At((robot, camera)): At<(String, String)>,
+    State(app): State<AppState>,
+    PathParams((robot, camera)): PathParams<(String, String)>,
 ) -> Result<Response, ApiError> {
     let frame = last(&app, robot, camera).await?;
     let seq = frame.answer.seq;
@@ -61,8 +64,8 @@ async fn frame(
     responses((status = 200, body = Object, description = "`Answer` of protos/waymark/v1/waymark.proto as JSON"),
     (status = 404, body = Problem)))]
 async fn answer(
-    State(app): State<Shared>,
-    At((robot, camera)): At<(String, String)>,
+    State(app): State<AppState>,
+    PathParams((robot, camera)): PathParams<(String, String)>,
 ) -> Result<Json<v1::Answer>, ApiError> {
     Ok(Json(last(&app, robot, camera).await?.answer.as_ref().clone()))
 }
@@ -72,23 +75,18 @@ async fn answer(
 #[utoipa::path(get, path = "/robots/{robot}/tracks", tag = "robots", params(("robot" = String, Path)),
     responses((status = 200, body = Object, description = "lists `pose`, `odometry`, `truth` of {x_m, y_m, theta_rad}"),
     (status = 404, body = Problem)))]
-async fn tracks(State(app): State<Shared>, At(robot): At<String>) -> Result<Json<TracksBody>, ApiError> {
+async fn tracks(
+    State(app): State<AppState>,
+    PathParams(robot): PathParams<String>,
+) -> Result<Json<TrajectoriesBody>, ApiError> {
     robots::get(app.store.reads(), &robot).await?;
     let tracks = app.live.tracks(&name("robot", robot)?).unwrap_or_default();
     let wire = |track: VecDeque<Pose2>| track.iter().map(pose2_wire).collect();
-    Ok(Json(TracksBody {
+    Ok(Json(TrajectoriesBody {
         pose: wire(tracks.pose),
         odometry: wire(tracks.odometry),
         truth: wire(tracks.truth),
     }))
-}
-
-/// The tracks of one robot.
-#[derive(Debug, Serialize)]
-struct TracksBody {
-    pose: Vec<v1::Pose2>,
-    odometry: Vec<v1::Pose2>,
-    truth: Vec<v1::Pose2>,
 }
 
 /// Follows a map: events `answer`, `pose`, `odometry`, `truth`, `presence`, `map_changed` as they happen. A `pose` has the
@@ -99,8 +97,8 @@ struct TracksBody {
     responses((status = 200, content_type = "text/event-stream"), (status = 404, body = Problem),
     (status = 503, body = Problem, description = "too_many_streams")))]
 async fn events(
-    State(app): State<Shared>,
-    At(map): At<String>,
+    State(app): State<AppState>,
+    PathParams(map): PathParams<String>,
 ) -> Result<Sse<impl Stream<Item = Result<Event, Infallible>>>, ApiError> {
     let place = app.stream_place()?;
     let events = BroadcastStream::new(app.live.events());
@@ -119,4 +117,58 @@ async fn events(
 
 fn shown(event: &LiveEvent) -> Option<Event> {
     Event::default().event(event.kind()).json_data(event).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use protos::{
+        Name,
+        api::{LiveEventBody, PoseTrust},
+    };
+    use std::sync::Arc;
+
+    #[test]
+    fn every_event_is_what_readers_are_told_to_expect() {
+        let name = |text: &str| Name::new(text).unwrap();
+        let (robot, camera, map) = (name("r1"), name("front"), "hall".to_owned());
+        let pose = v1::Pose2 { x_m: 1.0, y_m: 2.0, theta_rad: 0.5 };
+        let answer = Arc::new(v1::Answer { seq: 7, map: map.clone(), ..v1::Answer::default() });
+        let events = [
+            LiveEvent::Answer { robot: robot.clone(), camera, answer },
+            LiveEvent::Pose {
+                robot: robot.clone(),
+                map: map.clone(),
+                pose,
+                covariance: vec![0.0; 9],
+                corrections: 3,
+                age_ms: 12.5,
+                trust: v1::PoseTrust::Stale,
+            },
+            LiveEvent::Odometry { robot: robot.clone(), map: map.clone(), pose },
+            LiveEvent::Truth { robot: robot.clone(), map: map.clone(), pose },
+            LiveEvent::Presence { robot, map: map.clone(), alive: true },
+            LiveEvent::MapChanged { map, version: Some(4) },
+        ];
+        for event in events {
+            let data = serde_json::to_string(&event).unwrap();
+            match (event.kind(), LiveEventBody::read(event.kind(), &data).unwrap().unwrap()) {
+                ("answer", LiveEventBody::Answer(told)) => {
+                    assert_eq!(
+                        (told.robot.as_str(), told.camera.as_str(), told.answer.seq),
+                        ("r1", "front", 7)
+                    );
+                }
+                ("pose", LiveEventBody::Pose(told)) => {
+                    assert_eq!((told.pose, told.corrections, told.trust), (pose, 3, PoseTrust::Stale));
+                }
+                ("odometry", LiveEventBody::Odometry(told)) | ("truth", LiveEventBody::Truth(told)) => {
+                    assert_eq!((told.map.as_str(), told.pose), ("hall", pose));
+                }
+                ("presence", LiveEventBody::Presence(told)) => assert!(told.alive),
+                ("map_changed", LiveEventBody::MapChanged(told)) => assert_eq!(told.version, Some(4)),
+                (kind, other) => panic!("{kind} is read as {other:?}"),
+            }
+        }
+    }
 }

@@ -1,37 +1,25 @@
 //! `/maps/{map}/mapping`: the walls of a map made by a robot that drives.
 
 use super::{
-    App, Shared,
-    error::{ApiError, Problem},
-    extract::{At, Body, name},
+    App, AppState,
+    error::ApiError,
+    extract::{Body, PathParams, name},
 };
 use crate::store::{laser, maps, robots};
 use axum::{Json, extract::State, http::StatusCode};
 use engine::{
-    mapping::{MappingError, Progress, Walls},
+    mapping::{MappingError, Progress, Stage, Walls},
     panics::Edge,
 };
 use futures::FutureExt;
-use map::{pose2::Pose2, segments::LaserSegment};
-use serde::Deserialize;
+use map::pose2::Pose2;
+use protos::api::{MappingProgressBody, MappingStageBody, NewMapping, Problem};
 use std::panic::AssertUnwindSafe;
 use tokio::sync::oneshot;
-use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
-pub(super) fn router() -> OpenApiRouter<Shared> {
+pub(super) fn router() -> OpenApiRouter<AppState> {
     OpenApiRouter::new().routes(routes!(begin, get, cancel)).routes(routes!(finish))
-}
-
-/// Who makes the map.
-#[derive(Debug, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-struct NewMapping {
-    /// A robot that stands on this map; its scans must come with odometry.
-    robot: String,
-    /// Where on the map its first pose is: x, y in metres, heading in radians. The origin, if absent.
-    #[serde(default)]
-    origin: [f64; 3],
 }
 
 fn refused(error: MappingError) -> ApiError {
@@ -44,19 +32,41 @@ fn refused(error: MappingError) -> ApiError {
     ApiError::new(status, code, error.to_string()).field("map")
 }
 
+fn shown(progress: Progress) -> MappingProgressBody {
+    MappingProgressBody {
+        map: progress.map,
+        robot: progress.robot,
+        stage: match progress.stage {
+            Stage::Resuming => MappingStageBody::Resuming,
+            Stage::Mapping => MappingStageBody::Mapping,
+            Stage::Finishing => MappingStageBody::Finishing,
+            Stage::Done => MappingStageBody::Done,
+            Stage::Failed => MappingStageBody::Failed,
+        },
+        scans: progress.scans,
+        dropped: progress.dropped,
+        way_m: progress.way_m,
+        pose: progress.pose,
+        segments: progress.segments,
+        loops: progress.loops,
+        reason: progress.reason,
+        not_kept: progress.not_kept,
+    }
+}
+
 /// Begins to make the walls of a map from the scans of a robot. While it lasts, they are mapped and localise nothing. The map
 /// stays as it is until the mapping is finished. The scans are kept on disk until then: after a restart of the server the
 /// mapping goes on by itself (`resuming`), with a robot whose software went on; `not_kept` says if they cannot be.
 #[utoipa::path(post, path = "/maps/{map}/mapping", tag = "maps", params(("map" = String, Path)),
-    request_body = NewMapping, responses((status = 201, body = Progress),
+    request_body = NewMapping, responses((status = 201, body = MappingProgressBody),
     (status = 404, body = Problem, description = "unknown_map, unknown_robot"),
     (status = 409, body = Problem, description = "in_use: it is being made already, or the robot makes or stands on another; too_many"),
     (status = 422, body = Problem, description = "out_of_range")))]
 async fn begin(
-    State(app): State<Shared>,
-    At(map): At<String>,
+    State(app): State<AppState>,
+    PathParams(map): PathParams<String>,
     Body(new): Body<NewMapping>,
-) -> Result<(StatusCode, Json<Progress>), ApiError> {
+) -> Result<(StatusCode, Json<MappingProgressBody>), ApiError> {
     maps::get(app.store.reads(), &map).await?;
     let row = robots::get(app.store.reads(), &new.robot).await?;
     if row.map != map {
@@ -70,21 +80,27 @@ async fn begin(
     // It opens a file.
     let begun = tokio::task::spawn_blocking(move || app.motion.mappings().begin(&map, &robot, origin)).await;
     let begun = begun.map_err(|e| ApiError::internal(&e))?;
-    Ok((StatusCode::CREATED, Json(begun.map_err(refused)?)))
+    Ok((StatusCode::CREATED, Json(shown(begun.map_err(refused)?))))
 }
 
 /// How far it has come: the mapping that goes on, or the last since the server started.
 #[utoipa::path(get, path = "/maps/{map}/mapping", tag = "maps", params(("map" = String, Path)),
-    responses((status = 200, body = Progress), (status = 404, body = Problem, description = "unknown_map, not_mapping")))]
-async fn get(State(app): State<Shared>, At(map): At<String>) -> Result<Json<Progress>, ApiError> {
+    responses((status = 200, body = MappingProgressBody), (status = 404, body = Problem, description = "unknown_map, not_mapping")))]
+async fn get(
+    State(app): State<AppState>,
+    PathParams(map): PathParams<String>,
+) -> Result<Json<MappingProgressBody>, ApiError> {
     maps::get(app.store.reads(), &map).await?;
-    app.motion.mappings().progress(&map).map(Json).ok_or_else(|| refused(MappingError::None))
+    app.motion.mappings().progress(&map).map(shown).map(Json).ok_or_else(|| refused(MappingError::None))
 }
 
 /// Gives it up, or forgets one that failed: the map stays as it is, what was kept of the scans is removed.
 #[utoipa::path(delete, path = "/maps/{map}/mapping", tag = "maps", params(("map" = String, Path)),
     responses((status = 204), (status = 404, body = Problem, description = "unknown_map, not_mapping")))]
-async fn cancel(State(app): State<Shared>, At(map): At<String>) -> Result<StatusCode, ApiError> {
+async fn cancel(
+    State(app): State<AppState>,
+    PathParams(map): PathParams<String>,
+) -> Result<StatusCode, ApiError> {
     maps::get(app.store.reads(), &map).await?;
     let open = app.motion.mappings().cancel(&map);
     if open { Ok(StatusCode::NO_CONTENT) } else { Err(refused(MappingError::None)) }
@@ -93,11 +109,11 @@ async fn cancel(State(app): State<Shared>, At(map): At<String>) -> Result<Status
 /// Ends the drive: everything is fitted once more, and the walls replace those of the map in one transaction. Answers at once;
 /// `stage` says when they are stored.
 #[utoipa::path(post, path = "/maps/{map}/mapping/finish", tag = "maps", params(("map" = String, Path)),
-    responses((status = 202, body = Progress), (status = 404, body = Problem, description = "unknown_map, not_mapping")))]
+    responses((status = 202, body = MappingProgressBody), (status = 404, body = Problem, description = "unknown_map, not_mapping")))]
 async fn finish(
-    State(app): State<Shared>,
-    At(map): At<String>,
-) -> Result<(StatusCode, Json<Progress>), ApiError> {
+    State(app): State<AppState>,
+    PathParams(map): PathParams<String>,
+) -> Result<(StatusCode, Json<MappingProgressBody>), ApiError> {
     maps::get(app.store.reads(), &map).await?;
     let (progress, walls) = app.motion.mappings().finish(&map).map_err(refused)?;
     // Whoever asked may go away: it is stored all the same.
@@ -113,7 +129,7 @@ async fn finish(
         }
         app.motion.mappings().stored(&map, stored);
     });
-    Ok((StatusCode::ACCEPTED, Json(progress)))
+    Ok((StatusCode::ACCEPTED, Json(shown(progress))))
 }
 
 /// Stores the walls when they come; how many.
@@ -130,7 +146,7 @@ async fn store(
     if count > max {
         return Err(format!("{count} walls are more than {max}"));
     }
-    if let Some(error) = walls.iter().find_map(|ends| LaserSegment::by_hand(ends).err()) {
+    if let Some(error) = walls.iter().find_map(|ends| map::segments::LaserSegment::by_hand(ends).err()) {
         return Err(error.to_string());
     }
     let map = map.to_owned();

@@ -1,73 +1,73 @@
 //! `/maps`: create, list, read, say where they are, delete; and how they lie to each other.
 
 use super::{
-    Shared,
-    error::{ApiError, Problem},
-    extract::{At, Body, Page, PageQuery, Params, name},
-    landmarks::given,
-    resources::{Distance, Map, Parent, out_of_range, row_major},
+    AppState,
+    answers::{page, row_major},
+    error::{ApiError, out_of_range},
+    extract::{Body, PathParams, QueryParams, after_name, name, page_limit},
 };
 use crate::store::{
-    maps,
+    maps::{self, MapRow},
     sites::{self, Whereabouts},
 };
 use axum::{Json, extract::State, http::StatusCode};
 use map::{
-    map_links::{MapLink, relation},
+    map_links::MapLink,
+    map_links::relation,
     pose2::{Pose2, Pose2Covariance},
 };
-use nalgebra::Matrix3;
-use serde::{Deserialize, Serialize};
-use utoipa::{IntoParams, ToSchema};
+use nalgebra::{Matrix3, Vector3};
+use protos::api::{
+    Map, MapPatch, NewMap, Page, PageQuery, Parent, Problem, TransformQuery, TransformResponse,
+    TransformedPose,
+};
 use utoipa_axum::{router::OpenApiRouter, routes};
 
-pub(super) fn router() -> OpenApiRouter<Shared> {
+pub(super) fn router() -> OpenApiRouter<AppState> {
     OpenApiRouter::new()
         .routes(routes!(create, list))
         .routes(routes!(get, patch, delete))
         .routes(routes!(transform))
 }
 
-/// A map to be.
-#[derive(Debug, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-struct NewMap {
-    /// `[a-z0-9_-]{1,64}`, unique.
-    name: String,
-    /// Which distance decides.
-    #[serde(default)]
-    distance: Distance,
-    /// Where it belongs, in words: 1 to 64 characters.
-    site: Option<String>,
-    /// Where it belongs.
-    building: Option<String>,
-    /// Where it belongs.
-    floor: Option<String>,
-    /// Where it lies in another map.
-    parent: Option<Parent>,
+/// Standard deviations of a link that says nothing of its own: x, y in metres, heading in radians.
+const LINK_SIGMA: [f64; 3] = [0.05, 0.05, 0.0087];
+
+/// Where a map lies in another, checked.
+fn link(parent: Parent) -> Result<MapLink<String>, ApiError> {
+    let usual = || Matrix3::from_diagonal(&Vector3::from(LINK_SIGMA.map(|sigma| sigma * sigma)));
+    let covariance = parent.covariance.map_or_else(usual, |c| Matrix3::from_row_slice(&c));
+    let pose = Pose2::new(parent.x_m, parent.y_m, parent.theta_rad);
+    let parent_from_map = Pose2Covariance { pose, covariance };
+    let link = MapLink { parent: parent.map, parent_from_map, level_m: parent.level_m };
+    link.check().map_err(|e| out_of_range(&e, "parent"))?;
+    Ok(link)
 }
 
-/// What changes. A field that is absent stays, one that is null is forgotten.
-#[derive(Debug, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-#[expect(clippy::option_option, reason = "absent and null differ in a PATCH")]
-struct Changes {
-    /// Where it belongs.
-    #[serde(default, deserialize_with = "given")]
-    #[schema(value_type = Option<String>)]
-    site: Option<Option<String>>,
-    /// Where it belongs.
-    #[serde(default, deserialize_with = "given")]
-    #[schema(value_type = Option<String>)]
-    building: Option<Option<String>>,
-    /// Where it belongs.
-    #[serde(default, deserialize_with = "given")]
-    #[schema(value_type = Option<String>)]
-    floor: Option<Option<String>>,
-    /// Where it lies in another map.
-    #[serde(default, deserialize_with = "given")]
-    #[schema(value_type = Option<Parent>)]
-    parent: Option<Option<Parent>>,
+fn parent_shown(link: &MapLink<String>) -> Parent {
+    let Pose2Covariance { pose, covariance } = &link.parent_from_map;
+    Parent {
+        map: link.parent.clone(),
+        x_m: pose.x_m,
+        y_m: pose.y_m,
+        theta_rad: pose.theta_rad,
+        level_m: link.level_m,
+        covariance: Some(row_major(covariance)),
+    }
+}
+
+/// A map and where it is.
+fn map_shown(row: MapRow, found: Whereabouts) -> Map {
+    Map {
+        name: row.name,
+        version: row.version,
+        landmarks: row.landmarks,
+        distance: row.distance.into(),
+        parent: found.link.as_ref().map(parent_shown),
+        site: found.site,
+        building: found.building,
+        floor: found.floor,
+    }
 }
 
 /// Longest word for a site, a building or a floor.
@@ -95,7 +95,7 @@ fn unknown_parent(error: ApiError) -> ApiError {
     (status = 409, body = Problem, description = "exists, too_many, too_deep"),
     (status = 422, body = Problem, description = "bad_name, bad_value, out_of_range")))]
 async fn create(
-    State(app): State<Shared>,
+    State(app): State<AppState>,
     Body(new): Body<NewMap>,
 ) -> Result<(StatusCode, Json<Map>), ApiError> {
     let (name, distance, max) = (name("name", new.name)?, new.distance.into(), app.config.limits.maps);
@@ -103,7 +103,7 @@ async fn create(
         site: word("site", new.site)?,
         building: word("building", new.building)?,
         floor: word("floor", new.floor)?,
-        link: new.parent.map(Parent::link).transpose()?,
+        link: new.parent.map(link).transpose()?,
     };
     let write = app.store.write(move |tx| {
         Box::pin(async move {
@@ -113,26 +113,26 @@ async fn create(
         })
     });
     let (row, found) = write.await.map_err(|e| unknown_parent(e.into()))?;
-    Ok((StatusCode::CREATED, Json(Map::new(row, found))))
+    Ok((StatusCode::CREATED, Json(map_shown(row, found))))
 }
 
 /// Lists maps by name.
 #[utoipa::path(get, path = "/maps", tag = "maps", params(PageQuery), responses((status = 200, body = Page<Map>)))]
 async fn list(
-    State(app): State<Shared>,
-    Params(page): Params<PageQuery>,
+    State(app): State<AppState>,
+    QueryParams(query): QueryParams<PageQuery>,
 ) -> Result<Json<Page<Map>>, ApiError> {
-    let limit = page.limit(app.config.limits.page)?;
-    let rows = maps::page(app.store.reads(), &page.after(), limit + 1).await?;
+    let limit = page_limit(&query, app.config.limits.page)?;
+    let rows = maps::page(app.store.reads(), &after_name(&query), limit + 1).await?;
     let known = sites::all(app.store.reads()).await?;
     let found = |name: &str| known.get(name).cloned().unwrap_or_default();
-    Ok(Json(Page::new(
+    Ok(Json(page(
         rows,
         limit,
         |r| r.name.clone(),
         |r| {
             let found = found(&r.name);
-            Map::new(r, found)
+            map_shown(r, found)
         },
     )))
 }
@@ -140,26 +140,29 @@ async fn list(
 /// One map.
 #[utoipa::path(get, path = "/maps/{map}", tag = "maps", params(("map" = String, Path)), responses(
     (status = 200, body = Map), (status = 404, body = Problem)))]
-async fn get(State(app): State<Shared>, At(map): At<String>) -> Result<Json<Map>, ApiError> {
+async fn get(
+    State(app): State<AppState>,
+    PathParams(map): PathParams<String>,
+) -> Result<Json<Map>, ApiError> {
     let row = maps::get(app.store.reads(), &map).await?;
     let found = sites::all(app.store.reads()).await?.remove(&map).unwrap_or_default();
-    Ok(Json(Map::new(row, found)))
+    Ok(Json(map_shown(row, found)))
 }
 
 /// Says where a map is.
-#[utoipa::path(patch, path = "/maps/{map}", tag = "maps", params(("map" = String, Path)), request_body = Changes,
+#[utoipa::path(patch, path = "/maps/{map}", tag = "maps", params(("map" = String, Path)), request_body = MapPatch,
     responses((status = 200, body = Map), (status = 404, body = Problem),
     (status = 409, body = Problem, description = "cycle: it would lie in itself; too_deep"),
     (status = 422, body = Problem, description = "out_of_range, bad_value")))]
 async fn patch(
-    State(app): State<Shared>,
-    At(map): At<String>,
-    Body(changes): Body<Changes>,
+    State(app): State<AppState>,
+    PathParams(map): PathParams<String>,
+    Body(changes): Body<MapPatch>,
 ) -> Result<Json<Map>, ApiError> {
     let changed = |field, given: Option<Option<String>>| given.map(|text| word(field, text)).transpose();
     let (site, building) = (changed("site", changes.site)?, changed("building", changes.building)?);
     let floor = changed("floor", changes.floor)?;
-    let link = changes.parent.map(|parent| parent.map(Parent::link).transpose()).transpose()?;
+    let parent = changes.parent.map(|parent| parent.map(link).transpose()).transpose()?;
     maps::get(app.store.reads(), &map).await?;
     let write = app.store.write(move |tx| {
         Box::pin(async move {
@@ -167,79 +170,43 @@ async fn patch(
                 site: site.unwrap_or(old.site),
                 building: building.unwrap_or(old.building),
                 floor: floor.unwrap_or(old.floor),
-                link: link.unwrap_or(old.link),
+                link: parent.unwrap_or(old.link),
             })
             .await?;
             Ok((maps::of(tx, &map).await?, found))
         })
     });
     let (row, found) = write.await.map_err(|e| unknown_parent(e.into()))?;
-    Ok(Json(Map::new(row, found)))
+    Ok(Json(map_shown(row, found)))
 }
 
 /// Deletes a map and all that is in it.
 #[utoipa::path(delete, path = "/maps/{map}", tag = "maps", params(("map" = String, Path)), responses(
     (status = 204), (status = 404, body = Problem),
     (status = 409, body = Problem, description = "in_use: a robot stands on it, or another map lies in it")))]
-async fn delete(State(app): State<Shared>, At(map): At<String>) -> Result<StatusCode, ApiError> {
+async fn delete(
+    State(app): State<AppState>,
+    PathParams(map): PathParams<String>,
+) -> Result<StatusCode, ApiError> {
     app.store.write(move |tx| Box::pin(async move { maps::delete(tx, &map).await })).await?;
     Ok(StatusCode::NO_CONTENT)
 }
 
-/// Into which map, and perhaps a pose to say there.
-#[derive(Debug, Deserialize, IntoParams)]
-#[serde(deny_unknown_fields)]
-#[into_params(parameter_in = Query)]
-struct Wanted {
-    /// Name of the other map.
-    to: String,
-    /// A pose in the first map, all three numbers or none.
-    x_m: Option<f64>,
-    /// Of the pose.
-    y_m: Option<f64>,
-    /// Of the pose.
-    theta_rad: Option<f64>,
-}
-
-/// A pose with its covariance over (x, y, theta), row-major.
-#[derive(Debug, Serialize, ToSchema)]
-struct Laid {
-    x_m: f64,
-    y_m: f64,
-    theta_rad: f64,
-    covariance: [f64; 9],
-}
-
-impl From<&Pose2Covariance> for Laid {
-    fn from(p: &Pose2Covariance) -> Self {
-        let covariance = row_major(&p.covariance);
-        Self { x_m: p.pose.x_m, y_m: p.pose.y_m, theta_rad: p.pose.theta_rad, covariance }
-    }
-}
-
-/// How one map lies in another.
-#[derive(Debug, Serialize, ToSchema)]
-struct Transform {
-    /// The maps on the way, both ends included.
-    via: Vec<String>,
-    /// Maps coordinates of the first to the other.
-    to_from_map: Laid,
-    /// Height of the first one's floor above the other's.
-    level_m: f64,
-    /// The pose that was asked for, in the other map; its covariance is that of the maps alone.
-    pose: Option<Laid>,
+fn pose_shown(p: &Pose2Covariance) -> TransformedPose {
+    let covariance = row_major(&p.covariance);
+    TransformedPose { x_m: p.pose.x_m, y_m: p.pose.y_m, theta_rad: p.pose.theta_rad, covariance }
 }
 
 /// How a map lies in another, by the links of both up to a map that both hang on; and a pose in that other map's frame.
-#[utoipa::path(get, path = "/maps/{map}/transform", tag = "maps", params(("map" = String, Path), Wanted),
-    responses((status = 200, body = Transform), (status = 400, body = Problem, description = "bad_query"),
+#[utoipa::path(get, path = "/maps/{map}/transform", tag = "maps", params(("map" = String, Path), TransformQuery),
+    responses((status = 200, body = TransformResponse), (status = 400, body = Problem, description = "bad_query"),
     (status = 404, body = Problem), (status = 409, body = Problem, description = "not_related"),
     (status = 422, body = Problem, description = "missing, out_of_range")))]
 async fn transform(
-    State(app): State<Shared>,
-    At(map): At<String>,
-    Params(query): Params<Wanted>,
-) -> Result<Json<Transform>, ApiError> {
+    State(app): State<AppState>,
+    PathParams(map): PathParams<String>,
+    QueryParams(query): QueryParams<TransformQuery>,
+) -> Result<Json<TransformResponse>, ApiError> {
     maps::get(app.store.reads(), &map).await?;
     maps::get(app.store.reads(), &query.to).await.map_err(|e| ApiError::from(e).field("to"))?;
     let links: std::collections::BTreeMap<String, MapLink<String>> =
@@ -254,10 +221,10 @@ async fn transform(
         }
         _ => return Err(ApiError::invalid("missing", "query", "x_m, y_m and theta_rad go together")),
     };
-    Ok(Json(Transform {
+    Ok(Json(TransformResponse {
         via: found.via,
-        to_from_map: (&found.to_from_map).into(),
+        to_from_map: pose_shown(&found.to_from_map),
         level_m: found.level_m,
-        pose: pose.as_ref().map(Laid::from),
+        pose: pose.as_ref().map(pose_shown),
     }))
 }

@@ -3,30 +3,30 @@
 //! `/api/v1`, JSON with `snake_case` names, `application/problem+json` errors with a stable `code` and the `field`, lists in
 //! pages. Handlers parse, call the store, the jobs or the engine, and shape the answer; they decide nothing.
 
-mod areas;
+mod answers;
+mod cameras;
 mod error;
 mod extract;
 mod gathering;
 mod guard;
 mod health;
-mod hypotheses;
-mod laser;
 mod landmarks;
 mod learning;
 mod live;
-mod maps;
 mod mapping;
+mod maps;
+mod modalities;
 mod pages;
 mod recognise;
-mod resources;
+mod reference_runs;
+mod relocalisation;
 mod robots;
-mod runs;
-mod sight;
 mod router;
 mod upload;
-mod cameras;
 mod views;
 mod visibility;
+mod visibility_settings;
+mod walls;
 pub(crate) mod listen;
 #[cfg(test)]
 mod tests;
@@ -66,19 +66,19 @@ pub(crate) struct App {
 
 /// Who works on what is asked for.
 #[derive(Debug)]
-pub(crate) struct Workshop {
+pub(crate) struct Services {
     pub(crate) jobs: Arc<Jobs>,
     pub(crate) gatherer: Arc<Gatherer>,
 }
 
 /// The state of the router.
-pub(crate) type Shared = Arc<App>;
+pub(crate) type AppState = Arc<App>;
 
 impl App {
     pub(crate) fn new(
         config: Arc<Config>,
         store: Catalogue,
-        Workshop { jobs, gatherer }: Workshop,
+        Services { jobs, gatherer }: Services,
         engine: &Engine,
         stopping: watch::Receiver<bool>,
     ) -> Self {

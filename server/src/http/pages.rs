@@ -1,6 +1,6 @@
 //! The administrator's pages, embedded in the program.
 
-use super::Shared;
+use super::AppState;
 use axum::{Router, http::header, response::IntoResponse, routing::get};
 
 /// Path, media type, content.
@@ -17,7 +17,7 @@ const FILES: [(&str, &str, &str); 10] = [
     ("/style.css", "text/css; charset=utf-8", include_str!("../../../web/style.css")),
 ];
 
-pub(super) fn router() -> Router<Shared> {
+pub(super) fn router() -> Router<AppState> {
     FILES.into_iter().fold(Router::new(), |router, (path, kind, content)| {
         // A new program brings new pages: the browser asks again each time.
         let headers = [(header::CONTENT_TYPE, kind), (header::CACHE_CONTROL, "no-cache")];

@@ -1,9 +1,9 @@
 //! `/maps/{map}/recognise`: one photograph, the same pipeline that robots' frames go through.
 
 use super::{
-    Shared,
-    error::{ApiError, Problem},
-    extract::{At, json},
+    AppState,
+    error::ApiError,
+    extract::{PathParams, json},
     upload::{FORM_OVERHEAD, Form},
 };
 use crate::store::StoreError;
@@ -12,24 +12,15 @@ use axum::{
     extract::{DefaultBodyLimit, Request, State},
 };
 use engine::{picture, verdicts::answer_to_photograph};
-use protos::{convert::geometry, v1};
-use utoipa::ToSchema;
+use protos::{
+    api::{PhotographForm, Problem},
+    convert::geometry,
+    v1,
+};
 use utoipa_axum::{router::OpenApiRouter, routes};
 
-pub(super) fn router(upload_bytes: usize) -> OpenApiRouter<Shared> {
+pub(super) fn router(upload_bytes: usize) -> OpenApiRouter<AppState> {
     OpenApiRouter::new().routes(routes!(recognise)).layer(DefaultBodyLimit::max(upload_bytes + FORM_OVERHEAD))
-}
-
-/// The form, for the documentation.
-#[derive(ToSchema)]
-#[expect(dead_code, reason = "read part by part; this only describes it")]
-struct PhotographForm {
-    /// PNG or JPEG.
-    #[schema(value_type = String, format = Binary)]
-    image: Vec<u8>,
-    /// JSON: `fx_px`, `fy_px`, `cx_px`, `cy_px` and optionally a lens: `plumb_bob` (5 numbers), `rational_polynomial` (8) or `equidistant` (4). Without it there is
-    /// recognition but no pose.
-    intrinsics: Option<String>,
 }
 
 /// Recognises the landmarks of a photograph.
@@ -39,8 +30,8 @@ struct PhotographForm {
     (status = 404, body = Problem), (status = 413, body = Problem),
     (status = 422, body = Problem, description = "bad_image, wrong_encoding, too_large, out_of_range, not_finite")))]
 async fn recognise(
-    State(app): State<Shared>,
-    At(map): At<String>,
+    State(app): State<AppState>,
+    PathParams(map): PathParams<String>,
     request: Request,
 ) -> Result<Json<v1::Answer>, ApiError> {
     let snapshot = app.store.snapshots().get(&map);

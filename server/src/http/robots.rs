@@ -1,45 +1,93 @@
 //! `/robots`: which robots there are and on which map each stands.
 
 use super::{
-    Shared,
-    error::{ApiError, Problem},
-    extract::{At, Body, Page, PageQuery, Params, name},
-    resources::Robot,
+    AppState,
+    answers::{page, row_major},
+    error::ApiError,
+    extract::{Body, PathParams, QueryParams, after_name, name, page_limit},
 };
-use crate::store::robots;
+use crate::store::robots::{self, RobotRow};
 use axum::{Json, extract::State, http::StatusCode};
-use engine::motion::Corrections;
-use serde::Deserialize;
-use utoipa::ToSchema;
+use engine::{
+    epochs::Conflict,
+    live::LiveHub,
+    motion::{Correction, Corrections, Known, Motion},
+};
+use map::pose2::Pose2;
+use protos::{
+    Name,
+    api::{
+        CorrectionBody, CorrectionsBody, EpochConflictBody, Page, PageQuery, Problem, Robot, RobotAssignment,
+        RobotPose,
+    },
+};
+use std::{collections::BTreeMap, time::Instant};
 use utoipa_axum::{router::OpenApiRouter, routes};
 
-pub(super) fn router() -> OpenApiRouter<Shared> {
+pub(super) fn router() -> OpenApiRouter<AppState> {
     OpenApiRouter::new().routes(routes!(list)).routes(routes!(put, get, delete)).routes(routes!(corrections))
 }
 
-/// Where a robot stands.
-#[derive(Debug, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-struct Assignment {
-    /// Name of the map.
-    map: String,
+/// A registered robot with what is known of it now.
+fn robot_shown(row: RobotRow, motion: &Motion, live: &LiveHub) -> Robot {
+    let now = Instant::now();
+    let robot = Name::new(row.name.as_str()).ok();
+    let status = robot.as_ref().map(|robot| motion.epochs().status(robot, now)).unwrap_or_default();
+    let known = robot.as_ref().and_then(|robot| motion.known(robot, now));
+    let pose = known.filter(|known| known.map == row.map).map(|Known { fused, age, .. }| {
+        let Pose2 { x_m, y_m, theta_rad } = fused.pose.pose;
+        let covariance = row_major(&fused.pose.covariance);
+        let trust = robot.and_then(|robot| live.trust(&robot, &row.map)).unwrap_or_default().into();
+        RobotPose { x_m, y_m, theta_rad, covariance, age_ms: age.as_secs_f64() * 1e3, trust }
+    });
+    let conflict = status.conflict.map(|Conflict { epoch, refused, last_ms }| EpochConflictBody {
+        epoch,
+        refused,
+        last_ms,
+    });
+    Robot { name: row.name, map: row.map, alive: status.alive, epoch: status.epoch, conflict, pose }
+}
+
+fn correction_shown(correction: Correction) -> CorrectionBody {
+    CorrectionBody {
+        epoch: correction.epoch,
+        captured_ns: correction.captured_ns,
+        map: correction.map,
+        modality: correction.modality.to_owned(),
+        landmarks: correction.landmarks,
+        outcome: correction.outcome.to_owned(),
+        chi2: correction.chi2,
+        along_m: correction.along_m,
+        across_m: correction.across_m,
+        turn_rad: correction.turn_rad,
+    }
+}
+
+fn corrections_shown(found: Corrections) -> CorrectionsBody {
+    let counts =
+        |counts: BTreeMap<&str, u64>| counts.into_iter().map(|(end, n)| (end.to_owned(), n)).collect();
+    CorrectionsBody {
+        modalities: found.modalities,
+        totals: found.totals.into_iter().map(|(of, ends)| (of.to_owned(), counts(ends))).collect(),
+        corrections: found.corrections.into_iter().map(correction_shown).collect(),
+    }
 }
 
 /// Registers a robot, or moves it to another map.
 #[utoipa::path(put, path = "/robots/{robot}", tag = "robots", params(("robot" = String, Path)),
-    request_body = Assignment, responses((status = 200, body = Robot),
+    request_body = RobotAssignment, responses((status = 200, body = Robot),
     (status = 404, body = Problem, description = "unknown_map"), (status = 409, body = Problem),
     (status = 422, body = Problem, description = "bad_name")))]
 async fn put(
-    State(app): State<Shared>,
-    At(robot): At<String>,
-    Body(to): Body<Assignment>,
+    State(app): State<AppState>,
+    PathParams(robot): PathParams<String>,
+    Body(to): Body<RobotAssignment>,
 ) -> Result<Json<Robot>, ApiError> {
     let (robot, max) = (name("robot", robot)?, app.config.limits.robots);
     let write = app
         .store
         .write(move |tx| Box::pin(async move { robots::put(tx, robot.as_str(), &to.map, max).await }));
-    Ok(Json(Robot::new(write.await?, &app.motion, &app.live)))
+    Ok(Json(robot_shown(write.await?, &app.motion, &app.live)))
 }
 
 /// Lists robots by name, with what is known of each: whether its software is connected, whether a second program uses its
@@ -47,25 +95,31 @@ async fn put(
 #[utoipa::path(get, path = "/robots", tag = "robots", params(PageQuery),
     responses((status = 200, body = Page<Robot>)))]
 async fn list(
-    State(app): State<Shared>,
-    Params(page): Params<PageQuery>,
+    State(app): State<AppState>,
+    QueryParams(query): QueryParams<PageQuery>,
 ) -> Result<Json<Page<Robot>>, ApiError> {
-    let limit = page.limit(app.config.limits.page)?;
-    let rows = robots::page(app.store.reads(), &page.after(), limit + 1).await?;
-    Ok(Json(Page::new(rows, limit, |r| r.name.clone(), |r| Robot::new(r, &app.motion, &app.live))))
+    let limit = page_limit(&query, app.config.limits.page)?;
+    let rows = robots::page(app.store.reads(), &after_name(&query), limit + 1).await?;
+    Ok(Json(page(rows, limit, |r| r.name.clone(), |r| robot_shown(r, &app.motion, &app.live))))
 }
 
 /// One robot.
 #[utoipa::path(get, path = "/robots/{robot}", tag = "robots", params(("robot" = String, Path)),
     responses((status = 200, body = Robot), (status = 404, body = Problem)))]
-async fn get(State(app): State<Shared>, At(robot): At<String>) -> Result<Json<Robot>, ApiError> {
-    Ok(Json(Robot::new(robots::get(app.store.reads(), &robot).await?, &app.motion, &app.live)))
+async fn get(
+    State(app): State<AppState>,
+    PathParams(robot): PathParams<String>,
+) -> Result<Json<Robot>, ApiError> {
+    Ok(Json(robot_shown(robots::get(app.store.reads(), &robot).await?, &app.motion, &app.live)))
 }
 
 /// Forgets a robot; its frames are rejected from now on.
 #[utoipa::path(delete, path = "/robots/{robot}", tag = "robots", params(("robot" = String, Path)),
     responses((status = 204), (status = 404, body = Problem)))]
-async fn delete(State(app): State<Shared>, At(robot): At<String>) -> Result<StatusCode, ApiError> {
+async fn delete(
+    State(app): State<AppState>,
+    PathParams(robot): PathParams<String>,
+) -> Result<StatusCode, ApiError> {
     let (gone, motion) = (name("robot", robot)?, app.motion.clone());
     let write = app.store.write(move |tx| {
         Box::pin(async move {
@@ -84,11 +138,11 @@ async fn delete(State(app): State<Shared>, At(robot): At<String>) -> Result<Stat
 /// A guided fix corrects a pose that the others support; it never starts, supports or replaces one. Since the server
 /// started; the latest 200 of each modality.
 #[utoipa::path(get, path = "/robots/{robot}/corrections", tag = "robots", params(("robot" = String, Path)),
-    responses((status = 200, body = Corrections), (status = 404, body = Problem)))]
+    responses((status = 200, body = CorrectionsBody), (status = 404, body = Problem)))]
 async fn corrections(
-    State(app): State<Shared>,
-    At(robot): At<String>,
-) -> Result<Json<Corrections>, ApiError> {
+    State(app): State<AppState>,
+    PathParams(robot): PathParams<String>,
+) -> Result<Json<CorrectionsBody>, ApiError> {
     robots::get(app.store.reads(), &robot).await?;
-    Ok(Json(app.motion.corrections(&name("robot", robot)?)))
+    Ok(Json(corrections_shown(app.motion.corrections(&name("robot", robot)?))))
 }

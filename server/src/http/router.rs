@@ -1,8 +1,9 @@
 //! Every route, with the layers around them and the OpenAPI document made from them.
 
 use super::{
-    App, Shared, areas, cameras, error::ApiError, gathering, guard, health, hypotheses, landmarks, laser,
-    learning, live, mapping, maps, pages, recognise, robots, runs, sight, views, visibility,
+    App, AppState, cameras, error::ApiError, gathering, guard, health, landmarks, learning, live, mapping,
+    maps, modalities, pages, recognise, reference_runs, relocalisation, robots, views, visibility,
+    visibility_settings, walls,
 };
 use crate::config::Limits;
 use axum::{
@@ -30,29 +31,29 @@ const API: &str = "/api/v1";
 ))]
 struct Document;
 
-fn api(limits: &Limits) -> OpenApiRouter<Shared> {
+fn api(limits: &Limits) -> OpenApiRouter<AppState> {
     OpenApiRouter::new()
         .merge(maps::router())
-        .merge(laser::router())
+        .merge(walls::router())
         .merge(mapping::router())
         .merge(landmarks::router())
         .merge(views::router(limits.upload_bytes))
         .merge(learning::router())
         .merge(gathering::router())
         .merge(visibility::router())
-        .merge(areas::router())
-        .merge(runs::router())
-        .merge(sight::router())
+        .merge(modalities::router())
+        .merge(reference_runs::router())
+        .merge(visibility_settings::router())
         .merge(recognise::router(limits.upload_bytes))
         .merge(robots::router())
-        .merge(hypotheses::router())
+        .merge(relocalisation::router())
         .merge(cameras::router())
         .merge(live::router())
         .merge(health::router())
 }
 
 /// Routes and their OpenAPI document.
-fn parts(limits: &Limits) -> (Router<Shared>, openapi::OpenApi) {
+fn parts(limits: &Limits) -> (Router<AppState>, openapi::OpenApi) {
     OpenApiRouter::with_openapi(Document::openapi()).nest(API, api(limits)).split_for_parts()
 }
 
@@ -63,7 +64,7 @@ pub(crate) fn router(app: App) -> Router {
     let (routes, document) = parts(&app.config.limits);
     let (health, _) = health::router().split_for_parts();
     let config = utoipa_swagger_ui::Config::from(format!("{API}/openapi.json"));
-    let docs: Router<Shared> = SwaggerUi::new("/api/docs").config(config).into();
+    let docs: Router<AppState> = SwaggerUi::new("/api/docs").config(config).into();
     routes
         .route(&format!("{API}/openapi.json"), get(move || async move { Json(document) }))
         .merge(health)

@@ -42,7 +42,7 @@ impl Service {
         let hall = Arc::new(MapSnapshot::empty("hall", 1));
         let engine =
             Engine { vitals: store.vitals().clone(), gather: Arc::new(hook), ..scene::engine(&[hall]) };
-        let app = App::new(config, store.clone(), Workshop { jobs, gatherer }, &engine, stopping);
+        let app = App::new(config, store.clone(), Services { jobs, gatherer }, &engine, stopping);
         Self { router: router(app), store, engine, _writer: writer, _stop: stop, _data: data }
     }
 

@@ -1,9 +1,10 @@
 //! `/maps/{map}/landmarks/{landmark}/views`: photographs to learn from, each with the corners of the landmark.
 
 use super::{
-    App, Shared,
-    error::{ApiError, Problem},
-    extract::{self, At, Page, PageQuery, Params},
+    App, AppState,
+    answers::page,
+    error::ApiError,
+    extract::{self, PathParams, QueryParams, after_number, page_limit},
     upload::{FORM_OVERHEAD, Form},
 };
 use crate::store::{
@@ -23,10 +24,12 @@ use engine::{
     dominant::{Whole, dominant, others, whole_quads},
     picture,
 };
-use serde::Serialize;
+use protos::api::{
+    CaptureMetadata, NewViewForm, Page, PageQuery, PlacementReportBody, Problem, TrainingView,
+    UploadOutcomeBody,
+};
 use serde_json::json;
 use sha2::{Digest, Sha256};
-use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
 use vision::{
     frame::GrayImage,
@@ -36,7 +39,7 @@ use vision::{
     params::Params as Algorithm,
 };
 
-pub(super) fn router(upload_bytes: usize) -> OpenApiRouter<Shared> {
+pub(super) fn router(upload_bytes: usize) -> OpenApiRouter<AppState> {
     OpenApiRouter::new()
         .routes(routes!(add))
         .layer(DefaultBodyLimit::max(upload_bytes + FORM_OVERHEAD))
@@ -45,66 +48,34 @@ pub(super) fn router(upload_bytes: usize) -> OpenApiRouter<Shared> {
         .routes(routes!(show_icon))
 }
 
-/// A stored view.
-#[derive(Debug, Clone, Serialize, ToSchema)]
-struct View {
-    /// Its number.
-    id: i64,
-    /// The landmark's corners in the picture: top-left, top-right, bottom-right, bottom-left, in pixels.
-    corners: [[f64; 2]; 4],
-    /// Of the picture, as a viewer shows it.
-    width_px: u32,
-    /// Of the picture.
-    height_px: u32,
-    /// `png` or `jpeg`.
-    image_kind: String,
-    /// ms since the Unix epoch.
-    created_ms: i64,
-    /// In the answer to an upload: what became of it. With `same` and `alike` the view given is the one that is there.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    outcome: Option<Outcome>,
-    /// In the answer to an upload with `capture`: whether the landmark has a place by its views now, or why not.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    placing: Option<Placing>,
-}
-
-impl From<ViewRow> for View {
-    fn from(row: ViewRow) -> Self {
-        Self {
-            id: row.id,
-            corners: row.corners_px,
-            width_px: row.size_px[0],
-            height_px: row.size_px[1],
-            image_kind: row.image_kind,
-            created_ms: row.created_ms,
-            outcome: None,
-            placing: None,
-        }
+fn view_shown(row: ViewRow) -> TrainingView {
+    TrainingView {
+        id: row.id,
+        corners: row.corners_px,
+        width_px: row.size_px[0],
+        height_px: row.size_px[1],
+        image_kind: row.image_kind,
+        created_ms: row.created_ms,
+        outcome: None,
+        placing: None,
     }
 }
 
-/// The form of an upload, for the documentation.
-#[derive(ToSchema)]
-#[expect(dead_code, reason = "read part by part; this only describes it")]
-struct NewViewForm {
-    /// PNG or JPEG.
-    #[schema(value_type = String, format = Binary)]
-    image: Vec<u8>,
-    /// JSON, `[[x,y],[x,y],[x,y],[x,y]]`: top-left, top-right, bottom-right, bottom-left, in pixels.
-    corners: Option<String>,
-    /// `true`: the picture shows the landmark and nothing else.
-    whole_image: Option<String>,
-    /// JSON, how it was taken: `intrinsics`, `map_from_robot` (pose with covariance), `robot_from_camera`, and
-    /// `ceiling_height_m` for a landmark under a ceiling; also `corner_covariance_px2`, `[[uu,uv,vv], ...]` of the four
-    /// corners, where their noise is known (else 1 px, or the detector's where the server finds them). With it the server places the landmark on the map's walls
-    /// itself, unless it was placed by hand.
-    capture: Option<String>,
-    /// `true`: stored even if a stored view shows it from the same side, as large and in the same light.
-    keep_alike: Option<String>,
+fn outcome_shown(outcome: Outcome) -> UploadOutcomeBody {
+    match outcome {
+        Outcome::New => UploadOutcomeBody::New,
+        Outcome::Same => UploadOutcomeBody::Same,
+        Outcome::Alike => UploadOutcomeBody::Alike,
+    }
+}
+
+/// What came of placing a landmark by its views.
+pub(super) fn placement_shown(Placing { placed, views_used, reason }: Placing) -> PlacementReportBody {
+    PlacementReportBody { placed, views_used, reason }
 }
 
 /// What the form says of the landmark's place in the picture.
-enum Extent {
+enum LandmarkRegion {
     Detect,
     Whole,
     Corners(Corners),
@@ -117,15 +88,15 @@ enum Extent {
 #[utoipa::path(post, path = "/maps/{map}/landmarks/{landmark}/views", tag = "landmarks",
     params(("map" = String, Path), ("landmark" = String, Path)),
     request_body(content = NewViewForm, content_type = "multipart/form-data"),
-    responses((status = 201, body = View), (status = 200, body = View), (status = 404, body = Problem),
+    responses((status = 201, body = TrainingView), (status = 200, body = TrainingView), (status = 404, body = Problem),
     (status = 409, body = Problem, description = "too_many"), (status = 413, body = Problem),
     (status = 422, body = Problem, description = "bad_image, too_large, bad_value, too_small, outside, \
      quad_not_found, quad_ambiguous")))]
 async fn add(
-    State(app): State<Shared>,
-    At((map, landmark)): At<(String, String)>,
+    State(app): State<AppState>,
+    PathParams((map, landmark)): PathParams<(String, String)>,
     request: Request,
-) -> Result<(StatusCode, Json<View>), ApiError> {
+) -> Result<(StatusCode, Json<TrainingView>), ApiError> {
     landmarks::get(app.store.reads(), &map, &landmark).await?;
     let mut form =
         Form::read(&app, request, &["image", "corners", "whole_image", "capture", "keep_alike"]).await?;
@@ -142,7 +113,11 @@ async fn add(
         capture.map(|c| serde_json::to_string(&c)).transpose().map_err(|e| ApiError::internal(&e))?;
     let teaching = Teaching { map, landmark, view: NewView { capture, ..new }, max, thinning };
     let (row, outcome, placing) = teaching::add(&app.store, teaching).await?;
-    let view = View { placing, outcome: Some(outcome), ..View::from(row) };
+    let view = TrainingView {
+        placing: placing.map(placement_shown),
+        outcome: Some(outcome_shown(outcome)),
+        ..view_shown(row)
+    };
     let status = if outcome == Outcome::New { StatusCode::CREATED } else { StatusCode::OK };
     Ok((status, Json(view)))
 }
@@ -150,7 +125,7 @@ async fn add(
 /// How the picture was taken, checked.
 fn capture(bytes: Option<&Bytes>) -> Result<Option<Capture>, ApiError> {
     let Some(bytes) = bytes else { return Ok(None) };
-    let capture: Capture = extract::json(bytes, "capture")?;
+    let capture = Capture::from(extract::json::<CaptureMetadata>(bytes, "capture")?);
     capture.check().map_err(|r| r.inside("capture"))?;
     Ok(Some(capture))
 }
@@ -164,13 +139,13 @@ fn flag(name: &'static str, part: Option<&Bytes>) -> Result<bool, ApiError> {
     }
 }
 
-fn extent(corners: Option<&Bytes>, whole_image: Option<&Bytes>) -> Result<Extent, ApiError> {
+fn extent(corners: Option<&Bytes>, whole_image: Option<&Bytes>) -> Result<LandmarkRegion, ApiError> {
     let whole = flag("whole_image", whole_image)?;
     match (corners, whole) {
         (Some(_), true) => Err(ApiError::invalid("bad_value", "whole_image", "not together with corners")),
-        (Some(corners), false) => Ok(Extent::Corners(extract::json(corners, "corners")?)),
-        (None, true) => Ok(Extent::Whole),
-        (None, false) => Ok(Extent::Detect),
+        (Some(corners), false) => Ok(LandmarkRegion::Corners(extract::json(corners, "corners")?)),
+        (None, true) => Ok(LandmarkRegion::Whole),
+        (None, false) => Ok(LandmarkRegion::Detect),
     }
 }
 
@@ -178,17 +153,17 @@ fn extent(corners: Option<&Bytes>, whole_image: Option<&Bytes>) -> Result<Extent
 const MAX_STRANGERS: usize = 20;
 
 /// The view, and the quad that was taken for it where nobody said.
-fn prepare(app: &App, bytes: &Bytes, extent: &Extent) -> Result<(NewView, Option<Whole>), ApiError> {
+fn prepare(app: &App, bytes: &Bytes, extent: &LandmarkRegion) -> Result<(NewView, Option<Whole>), ApiError> {
     let image = picture::decode(bytes, app.config.limits.upload())?;
     let p = &app.config.params;
-    let quads = if matches!(extent, Extent::Whole) { Vec::new() } else { whole_quads(&image, p) };
+    let quads = if matches!(extent, LandmarkRegion::Whole) { Vec::new() } else { whole_quads(&image, p) };
     let corners: Vec<Corners> = quads.iter().map(|q| q.corners_px).collect();
     let corners_px = match extent {
-        Extent::Corners(corners) => *corners,
-        Extent::Whole => whole(&image)?,
-        Extent::Detect => found(&corners)?,
+        LandmarkRegion::Corners(corners) => *corners,
+        LandmarkRegion::Whole => whole(&image)?,
+        LandmarkRegion::Detect => found(&corners)?,
     };
-    let meant = |q: &&Whole| matches!(extent, Extent::Detect) && q.corners_px == corners_px;
+    let meant = |q: &&Whole| matches!(extent, LandmarkRegion::Detect) && q.corners_px == corners_px;
     let detected = quads.iter().find(meant).copied();
     let icon = cut(&image, &corners_px, p)?;
     let stranger =
@@ -243,18 +218,18 @@ fn cut(image: &GrayImage, corners: &Corners, p: &Algorithm) -> Result<Icon, ApiE
 /// Lists the views of a landmark by number.
 #[utoipa::path(get, path = "/maps/{map}/landmarks/{landmark}/views", tag = "landmarks",
     params(("map" = String, Path), ("landmark" = String, Path), PageQuery),
-    responses((status = 200, body = Page<View>), (status = 404, body = Problem)))]
+    responses((status = 200, body = Page<TrainingView>), (status = 404, body = Problem)))]
 async fn list(
-    State(app): State<Shared>,
-    At((map, landmark)): At<(String, String)>,
-    Params(page): Params<PageQuery>,
-) -> Result<Json<Page<View>>, ApiError> {
-    let limit = page.limit(app.config.limits.page)?;
-    let after = page.after_number()?;
+    State(app): State<AppState>,
+    PathParams((map, landmark)): PathParams<(String, String)>,
+    QueryParams(query): QueryParams<PageQuery>,
+) -> Result<Json<Page<TrainingView>>, ApiError> {
+    let limit = page_limit(&query, app.config.limits.page)?;
+    let after = after_number(&query)?;
     maps::get(app.store.reads(), &map).await?;
     let landmark = landmarks::get(app.store.reads(), &map, &landmark).await?;
     let rows = views::page(app.store.reads(), landmark.id, after, limit + 1).await?;
-    Ok(Json(Page::new(rows, limit, |r| r.id.to_string(), View::from)))
+    Ok(Json(page(rows, limit, |r| r.id.to_string(), view_shown)))
 }
 
 /// Deletes a view. The model stays until the landmark is learnt again.
@@ -262,8 +237,8 @@ async fn list(
     params(("map" = String, Path), ("landmark" = String, Path), ("view" = i64, Path)),
     responses((status = 204), (status = 404, body = Problem)))]
 async fn delete(
-    State(app): State<Shared>,
-    At((map, landmark, view)): At<(String, String, i64)>,
+    State(app): State<AppState>,
+    PathParams((map, landmark, view)): PathParams<(String, String, i64)>,
 ) -> Result<StatusCode, ApiError> {
     app.store
         .write(move |tx| Box::pin(async move { views::delete(tx, &map, &landmark, view).await }))
@@ -276,8 +251,8 @@ async fn delete(
     params(("map" = String, Path), ("landmark" = String, Path), ("view" = i64, Path)),
     responses((status = 200, content_type = "image/png"), (status = 404, body = Problem)))]
 async fn show_icon(
-    State(app): State<Shared>,
-    At((map, landmark, view)): At<(String, String, i64)>,
+    State(app): State<AppState>,
+    PathParams((map, landmark, view)): PathParams<(String, String, i64)>,
 ) -> Result<Response, ApiError> {
     let icon = views::icon(app.store.reads(), &map, &landmark, view).await?;
     let grey: Vec<u8> = icon.pixels.iter().map(|g| *g as u8).collect();

@@ -18,10 +18,9 @@ use map::{
     segments::LaserSegment,
 };
 use nalgebra::{Isometry3, Matrix2, Vector3};
-use protos::{Rejection, convert::geometry, v1};
+use protos::{Rejection, api::CaptureMetadata, convert::geometry, v1};
 use serde::{Deserialize, Serialize};
 use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
-use utoipa::ToSchema;
 use vision::{
     detect::BORDER_SIGMA_PX,
     frame::Intrinsics,
@@ -67,6 +66,18 @@ struct Taken {
     mounting: CameraExtrinsics,
     ceiling: Option<Ceiling>,
     corners_px2: [Matrix2<f64>; 4],
+}
+
+impl From<CaptureMetadata> for Capture {
+    fn from(body: CaptureMetadata) -> Self {
+        Self {
+            intrinsics: body.intrinsics,
+            map_from_robot: body.map_from_robot,
+            robot_from_camera: body.robot_from_camera,
+            ceiling_height_m: body.ceiling_height_m,
+            corner_covariance_px2: body.corner_covariance_px2,
+        }
+    }
 }
 
 impl Capture {
@@ -137,7 +148,7 @@ impl Capture {
 }
 
 /// What came of placing.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Placing {
     /// The landmark has a place by its views now.
     pub(crate) placed: bool,

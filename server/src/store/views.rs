@@ -1,9 +1,7 @@
 //! Views of landmarks with their pictures, and the strangers seen beside them.
 
 use super::{StoreError, Tx, landmarks, now_ms, statements::statements, within};
-use serde::Serialize;
 use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
-use utoipa::ToSchema;
 use vision::{geometry::Corners, icon::Icon, model::LandmarkId};
 
 statements! {
@@ -136,8 +134,7 @@ fn view_row(row: &SqliteRow) -> Result<ViewRow, StoreError> {
 }
 
 /// What became of an upload.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Outcome {
     /// Stored.
     New,

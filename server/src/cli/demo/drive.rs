@@ -6,7 +6,10 @@ use crate::{
     cli::{pictures, screen},
 };
 use anyhow::Context as _;
-use client::{Capture, MapClient, RobotClient, RobotOptions, named_landmarks, quad_corners, v1::Answer};
+use client::{
+    Capture, MapClient, RobotClient, RobotOptions, api::LandmarkStatus, named_landmarks, quad_corners,
+    v1::Answer,
+};
 use map::pose2::Pose2;
 use protos::Name;
 use sim::{
@@ -57,8 +60,13 @@ pub(super) async fn drive(
     args: &Args,
 ) -> anyhow::Result<Record> {
     let maps = MapClient::new(&format!("http://{}", server.http_addr))?;
-    let taught: Vec<String> =
-        maps.landmarks(MAP).await?.into_iter().filter(|l| l.status == "active").map(|l| l.name).collect();
+    let taught: Vec<String> = maps
+        .landmarks(MAP)
+        .await?
+        .into_iter()
+        .filter(|l| l.status == LandmarkStatus::Active)
+        .map(|l| l.name)
+        .collect();
     let taught = Arc::new(taught);
     let mut tasks = Vec::new();
     for number in 0..args.robots {

@@ -10,9 +10,8 @@ use crate::{
     },
 };
 use client::{
-    MapClient,
-    lessons::{Job, Place, Size},
-    map::LandmarkRegion,
+    LandmarkRegion, MapClient,
+    api::{Job, LandmarkStatus, NewMap, Place, Size, WallsBody},
 };
 use sim::{
     building::Building,
@@ -44,7 +43,7 @@ pub(super) async fn teach(
     seed: u64,
 ) -> anyhow::Result<Taught> {
     let maps = MapClient::new(&format!("http://{}", server.http_addr))?;
-    maps.create_map(MAP, None).await?;
+    maps.create_map(&NewMap::new(MAP)).await?;
     let robot = Robot::new(building.clone(), &RobotParams::default());
     let camera = *robot.camera().intrinsics();
     let stops = stops(building, &LessonParams { seed, ..LessonParams::default() });
@@ -53,8 +52,8 @@ pub(super) async fn teach(
             .await??;
 
     let mut taught = Taught { walls: survey.walls.len(), views_missed: survey.missed, ..Taught::default() };
-    let ends: Vec<[[f64; 2]; 2]> = survey.walls.iter().map(|w| [w.a.into(), w.b.into()]).collect();
-    maps.set_walls(MAP, &ends).await?;
+    let walls: WallsBody = survey.walls.iter().map(|w| [w.a.into(), w.b.into()]).collect();
+    maps.set_walls(MAP, &walls).await?;
     let progress = screen::progress(survey.views.values().map(Vec::len).sum(), "teaching");
     for (name, views) in &survey.views {
         taught.landmarks += 1;
@@ -63,7 +62,13 @@ pub(super) async fn teach(
             continue;
         };
         let size = Size { width_m: place.size.width_m, height_m: place.size.height_m };
-        let place = Place { x_m: place.x_m, y_m: place.y_m, z_m: place.z_m, theta_rad: place.theta_rad };
+        let place = Place {
+            x_m: place.x_m,
+            y_m: place.y_m,
+            z_m: place.z_m,
+            theta_rad: place.theta_rad,
+            ..Place::default()
+        };
         maps.add_landmark(MAP, name, Some(size), Some(place)).await?;
         taught.views_left_out += views.len() - agreed.len();
         for view in agreed.iter().map(|&i| &views[i]) {
@@ -81,7 +86,7 @@ pub(super) async fn teach(
         .await?;
     bar.finish_and_clear();
     for landmark in maps.landmarks(MAP).await? {
-        if landmark.status == "active" {
+        if landmark.status == LandmarkStatus::Active {
             taught.active += 1;
         } else {
             let reasons: Vec<String> = landmark.reasons.iter().map(ToString::to_string).collect();

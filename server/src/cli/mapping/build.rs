@@ -3,7 +3,7 @@
 use super::LaserArgs;
 use crate::cli::{clock::Clock, screen};
 use anyhow::Context as _;
-use client::MapClient;
+use client::{MapClient, api::WallsBody};
 use formats::{
     map_svg,
     scan_log::{self, LogEntry},
@@ -28,9 +28,9 @@ impl Upload {
     /// Sends the walls, if a server is named.
     pub(crate) async fn send(&self, map: &MapFile) -> anyhow::Result<()> {
         let (Some(server), Some(name)) = (&self.server, &self.map) else { return Ok(()) };
-        let ends: Vec<[[f64; 2]; 2]> = map.segments.iter().map(|s| [s.a, s.b]).collect();
-        MapClient::new(server)?.set_walls(name, &ends).await.context("upload")?;
-        screen::complain(&format!("{} segments are the walls of {name} now", ends.len()));
+        let walls: WallsBody = map.segments.iter().map(|s| [s.a, s.b]).collect();
+        MapClient::new(server)?.set_walls(name, &walls).await.context("upload")?;
+        screen::complain(&format!("{} segments are the walls of {name} now", walls.segments.len()));
         Ok(())
     }
 }

@@ -73,8 +73,8 @@ pub(crate) async fn export(args: &ExportArgs) -> anyhow::Result<()> {
     let map: MapFile = match (&args.file, &args.upload.server, &args.upload.map) {
         (Some(file), _, _) => walls::read(file, 0.0).with_context(|| file.display().to_string())?,
         (None, Some(server), Some(name)) => {
-            let stored = MapClient::new(server)?.laser(name).await?;
-            serde_json::from_value(stored).context("the server's walls")?
+            let stored = MapClient::new(server)?.walls(name).await?;
+            serde_json::from_value(serde_json::to_value(stored)?).context("the server's walls")?
         }
         _ => anyhow::bail!("name a file, or --server and --map"),
     };

@@ -1,10 +1,10 @@
-//! `/robots/{robot}/run` and `/maps/{map}/runs`: runs whose path is known, to learn which modality to trust where.
+//! `/robots/{robot}/run` and `/maps/{map}/runs`: runs whose path is known, to learn_modality_stats which modality to trust where.
 
 use super::{
-    App, Shared,
-    areas::Shown,
-    error::{ApiError, Problem},
-    extract::{At, BodyUpTo, name},
+    App, AppState,
+    error::ApiError,
+    extract::{BodyUpTo, PathParams, name},
+    modalities::stats,
 };
 use crate::store::{areas, maps, robots};
 use axum::{Json, extract::State, http::StatusCode};
@@ -16,8 +16,7 @@ use map::{
     },
     pose2::Pose2,
 };
-use serde::{Deserialize, Serialize};
-use utoipa::ToSchema;
+use protos::api::{Problem, RecordingStatusBody, ReferenceRunBody, ReferenceRuns, ReferenceTrajectoryBody};
 use utoipa_axum::{router::OpenApiRouter, routes};
 
 /// Usual standard deviations of a reference: metres, radians.
@@ -28,7 +27,7 @@ const POSE_BYTES: usize = 112;
 /// Most bytes of a path: that of [`MAX_REFERENCE`] poses, and the rest of the object.
 const PATH_BYTES: usize = MAX_REFERENCE * POSE_BYTES + 1024;
 
-pub(super) fn router() -> OpenApiRouter<Shared> {
+pub(super) fn router() -> OpenApiRouter<AppState> {
     OpenApiRouter::new()
         .routes(routes!(begin, get, cancel))
         .routes(routes!(list))
@@ -48,85 +47,73 @@ fn refused(error: RunError) -> ApiError {
 /// Begins to record a run of a robot on its map: odometry, and what landmarks and the laser say. It lies in memory until
 /// the path is told.
 #[utoipa::path(post, path = "/robots/{robot}/run", tag = "robots", params(("robot" = String, Path)),
-    responses((status = 201, body = Recorded), (status = 404, body = Problem),
+    responses((status = 201, body = RecordingStatusBody), (status = 404, body = Problem),
     (status = 409, body = Problem, description = "in_use: one is recorded already; too_many")))]
 async fn begin(
-    State(app): State<Shared>,
-    At(robot): At<String>,
-) -> Result<(StatusCode, Json<Recorded>), ApiError> {
+    State(app): State<AppState>,
+    PathParams(robot): PathParams<String>,
+) -> Result<(StatusCode, Json<RecordingStatusBody>), ApiError> {
     let row = robots::get(app.store.reads(), &robot).await?;
     let begun = app.motion.record(&name("robot", robot)?, &row.map).map_err(refused)?;
-    Ok((StatusCode::CREATED, Json(begun)))
+    Ok((StatusCode::CREATED, Json(recording_shown(begun))))
 }
 
 /// What was recorded so far.
 #[utoipa::path(get, path = "/robots/{robot}/run", tag = "robots", params(("robot" = String, Path)),
-    responses((status = 200, body = Recorded), (status = 404, body = Problem, description = "unknown_robot, not_recording")))]
-async fn get(State(app): State<Shared>, At(robot): At<String>) -> Result<Json<Recorded>, ApiError> {
+    responses((status = 200, body = RecordingStatusBody), (status = 404, body = Problem, description = "unknown_robot, not_recording")))]
+async fn get(
+    State(app): State<AppState>,
+    PathParams(robot): PathParams<String>,
+) -> Result<Json<RecordingStatusBody>, ApiError> {
     robots::get(app.store.reads(), &robot).await?;
     let recorded = app.motion.recorded(&name("robot", robot)?);
-    recorded.map(Json).ok_or_else(|| refused(RunError::None))
+    recorded.map(recording_shown).map(Json).ok_or_else(|| refused(RunError::None))
 }
 
 /// Gives the recording up.
 #[utoipa::path(delete, path = "/robots/{robot}/run", tag = "robots", params(("robot" = String, Path)),
     responses((status = 204), (status = 404, body = Problem, description = "unknown_robot, not_recording")))]
-async fn cancel(State(app): State<Shared>, At(robot): At<String>) -> Result<StatusCode, ApiError> {
+async fn cancel(
+    State(app): State<AppState>,
+    PathParams(robot): PathParams<String>,
+) -> Result<StatusCode, ApiError> {
     robots::get(app.store.reads(), &robot).await?;
     let given_up = app.motion.take_recording(&name("robot", robot)?);
     given_up.map(|_run| StatusCode::NO_CONTENT).ok_or_else(|| refused(RunError::None))
 }
 
-/// Where the robot really was.
-#[derive(Debug, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-struct KnownPath {
-    /// Time (ns of the robot's clock, as in its messages), x and y in metres on the map, heading in radians; times rise, 2 to
-    /// 200 000 (up to 112 bytes each). Nothing is learnt between two that are more than a second apart.
-    poses: Vec<(i64, f64, f64, f64)>,
-    /// Standard deviation of its positions, metres; 0.01 if absent.
-    sigma_m: Option<f64>,
-    /// Of its headings, radians; 0.005 if absent.
-    sigma_rad: Option<f64>,
-}
-
-/// A run that was learnt from.
-#[derive(Debug, Serialize, ToSchema)]
-struct LearntRun {
-    /// Its number.
-    id: i64,
-    /// Whose.
-    robot: String,
-    /// ms since the Unix epoch.
-    created_ms: i64,
-    /// Way of which the path was known, metres.
-    way_m: f64,
-    /// Square metres by heading that it tells of.
-    cells: usize,
-    /// What it showed, all of it together.
-    modules: Vec<Shown>,
-}
-
-impl From<areas::RunRow> for LearntRun {
-    fn from(row: areas::RunRow) -> Self {
-        let mut sums = StatsByModality::default();
-        for found in row.cells.values() {
-            for (sum, more) in sums.iter_mut().zip(found) {
-                sum.add(more);
-            }
+fn run_shown(row: areas::RunRow) -> ReferenceRunBody {
+    let mut sums = StatsByModality::default();
+    for found in row.cells.values() {
+        for (sum, more) in sums.iter_mut().zip(found) {
+            sum.add(more);
         }
-        Self {
-            id: row.id,
-            robot: row.robot,
-            created_ms: row.created_ms,
-            way_m: row.way_m,
-            cells: row.cells.len(),
-            modules: Shown::all(&sums),
-        }
+    }
+    ReferenceRunBody {
+        id: row.id,
+        robot: row.robot,
+        created_ms: row.created_ms,
+        way_m: row.way_m,
+        cells: row.cells.len(),
+        modules: stats(&sums),
     }
 }
 
-fn reference_of(path: KnownPath) -> Result<ReferenceTrajectory, ApiError> {
+fn recording_shown(recorded: Recorded) -> RecordingStatusBody {
+    RecordingStatusBody {
+        map: recorded.map,
+        robot: recorded.robot,
+        going: recorded.going,
+        reason: recorded.reason,
+        way_m: recorded.way_m,
+        span_ns: recorded.span_ns,
+        odometry: recorded.odometry,
+        landmarks: recorded.landmarks,
+        laser: recorded.laser,
+    }
+}
+
+fn reference_of(path: ReferenceTrajectoryBody) -> Result<ReferenceTrajectory, ApiError> {
     if path.poses.len() > MAX_REFERENCE {
         return Err(ApiError::invalid("too_many", "poses", format!("more than {MAX_REFERENCE} poses")));
     }
@@ -156,15 +143,15 @@ fn reference_of(path: KnownPath) -> Result<ReferenceTrajectory, ApiError> {
 /// What each modality was off by, and claimed, is kept by square metre and heading,
 /// and robots on this map are fused by it from now on.
 #[utoipa::path(post, path = "/robots/{robot}/run/reference", tag = "robots", params(("robot" = String, Path)),
-    request_body = KnownPath, responses((status = 201, body = LearntRun),
+    request_body = ReferenceTrajectoryBody, responses((status = 201, body = ReferenceRunBody),
     (status = 404, body = Problem, description = "unknown_robot, not_recording, unknown_map"),
     (status = 409, body = Problem, description = "too_many; in_use: it is being learnt from already"),
     (status = 422, body = Problem, description = "out_of_range, not_in_order, too_many, no_overlap: none of the run's times is within the path's")))]
 async fn reference(
-    State(app): State<Shared>,
-    At(robot): At<String>,
-    BodyUpTo(path): BodyUpTo<KnownPath, PATH_BYTES>,
-) -> Result<(StatusCode, Json<LearntRun>), ApiError> {
+    State(app): State<AppState>,
+    PathParams(robot): PathParams<String>,
+    BodyUpTo(path): BodyUpTo<ReferenceTrajectoryBody, PATH_BYTES>,
+) -> Result<(StatusCode, Json<ReferenceRunBody>), ApiError> {
     robots::get(app.store.reads(), &robot).await?;
     let (robot, known) = (name("robot", robot)?, reference_of(path)?);
     // Whatever ends this request early, the recording stays until the run is stored.
@@ -196,23 +183,19 @@ async fn reference(
     let runs = areas::runs(app.store.reads(), map.id).await?;
     let row = runs.into_iter().find(|run| run.id == id);
     let row = row.ok_or_else(|| refused(RunError::None))?;
-    Ok((StatusCode::CREATED, Json(row.into())))
-}
-
-/// Runs of a map that were learnt from.
-#[derive(Debug, Serialize, ToSchema)]
-struct Runs {
-    /// Oldest first; at most 200.
-    runs: Vec<LearntRun>,
+    Ok((StatusCode::CREATED, Json(run_shown(row))))
 }
 
 /// The runs that the map's areas have learnt from.
 #[utoipa::path(get, path = "/maps/{map}/runs", tag = "maps", params(("map" = String, Path)),
-    responses((status = 200, body = Runs), (status = 404, body = Problem)))]
-async fn list(State(app): State<Shared>, At(map): At<String>) -> Result<Json<Runs>, ApiError> {
+    responses((status = 200, body = ReferenceRuns), (status = 404, body = Problem)))]
+async fn list(
+    State(app): State<AppState>,
+    PathParams(map): PathParams<String>,
+) -> Result<Json<ReferenceRuns>, ApiError> {
     let map = maps::get(app.store.reads(), &map).await?;
     let runs = areas::runs(app.store.reads(), map.id).await?;
-    Ok(Json(Runs { runs: runs.into_iter().map(LearntRun::from).collect() }))
+    Ok(Json(ReferenceRuns { runs: runs.into_iter().map(run_shown).collect() }))
 }
 
 /// Forgets a run and what it showed.
@@ -220,8 +203,8 @@ async fn list(State(app): State<Shared>, At(map): At<String>) -> Result<Json<Run
     params(("map" = String, Path), ("run" = i64, Path)),
     responses((status = 204), (status = 404, body = Problem, description = "unknown_map, unknown_run")))]
 async fn forget(
-    State(app): State<Shared>,
-    At((map, run)): At<(String, i64)>,
+    State(app): State<AppState>,
+    PathParams((map, run)): PathParams<(String, i64)>,
 ) -> Result<StatusCode, ApiError> {
     app.store.write(move |tx| Box::pin(async move { areas::forget(tx, &map, run).await })).await?;
     Ok(StatusCode::NO_CONTENT)

@@ -1,0 +1,146 @@
+//! A connection to the server's HTTP interface: requests of operations, answers read, refusals as errors.
+
+use super::operation::{Operation, PathValue, path_of, query_of};
+use crate::ClientError;
+use protos::api::{Page, PageQuery, Problem};
+use reqwest::{RequestBuilder, Response};
+use serde::{Serialize, de::DeserializeOwned};
+use std::time::Duration;
+
+/// Longest wait for one request.
+const REQUEST_TIMEOUT: Duration = Duration::from_mins(1);
+
+/// A connection to the server's HTTP interface.
+#[derive(Debug, Clone)]
+pub struct MapClient {
+    http: reqwest::Client,
+    base: String,
+}
+
+impl MapClient {
+    /// A client of the server at `base`, such as `http://127.0.0.1:8080`. Nothing is sent yet.
+    pub fn new(base: &str) -> Result<Self, ClientError> {
+        // Straight to the server: a proxy of the environment has no business between a robot and its map.
+        let http = reqwest::Client::builder().no_proxy().timeout(REQUEST_TIMEOUT).build();
+        let http = http.map_err(|e| ClientError::Http { url: base.to_owned(), detail: e.to_string() })?;
+        Ok(Self { http, base: base.trim_end_matches('/').to_owned() })
+    }
+
+    /// A request of an operation; `at` are the parameters of its path, in order.
+    pub(super) fn ask(
+        &self,
+        operation: &Operation,
+        at: &[PathValue<'_>],
+    ) -> Result<RequestBuilder, ClientError> {
+        let path = path_of(operation.path, at)?;
+        Ok(self.http.request(operation.method.clone(), format!("{}/api/v1{path}", self.base)))
+    }
+
+    /// The same with a query.
+    pub(super) fn ask_query(
+        &self,
+        operation: &Operation,
+        at: &[PathValue<'_>],
+        query: &impl Serialize,
+    ) -> Result<RequestBuilder, ClientError> {
+        let (path, query) = (path_of(operation.path, at)?, query_of(query));
+        Ok(self.http.request(operation.method.clone(), format!("{}/api/v1{path}{query}", self.base)))
+    }
+
+    /// Every page of a list.
+    pub(super) async fn all<T: DeserializeOwned>(
+        &self,
+        operation: &Operation,
+        at: &[PathValue<'_>],
+    ) -> Result<Vec<T>, ClientError> {
+        let mut items = Vec::new();
+        let mut query = PageQuery::default();
+        loop {
+            let page: Page<T> = self.send(self.ask_query(operation, at, &query)?).await?;
+            items.extend(page.items);
+            if page.next.is_none() {
+                return Ok(items);
+            }
+            query.cursor = page.next;
+        }
+    }
+
+    /// Sends, and reads the answer.
+    pub(super) async fn send<T: DeserializeOwned>(&self, request: RequestBuilder) -> Result<T, ClientError> {
+        let response = self.checked(request).await?;
+        let url = response.url().to_string();
+        let bytes = whole(response).await?;
+        serde_json::from_slice(&bytes).map_err(|e| ClientError::Unexpected { url, detail: e.to_string() })
+    }
+
+    /// Sends; the answer says nothing.
+    pub(super) async fn done(&self, request: RequestBuilder) -> Result<(), ClientError> {
+        self.checked(request).await.map(drop)
+    }
+
+    /// Sends, and takes the answer as it is.
+    pub(super) async fn bytes(&self, request: RequestBuilder) -> Result<Vec<u8>, ClientError> {
+        whole(self.checked(request).await?).await
+    }
+
+    /// Sends, and turns refusals into errors.
+    pub(super) async fn checked(&self, request: RequestBuilder) -> Result<Response, ClientError> {
+        let response = request.send().await.map_err(|e| {
+            let url = e.url().map_or_else(|| self.base.clone(), ToString::to_string);
+            ClientError::Http { url, detail: reason(&e) }
+        })?;
+        let status = response.status();
+        if status.is_success() {
+            return Ok(response);
+        }
+        let body = response.bytes().await.unwrap_or_default();
+        let problem: Problem = serde_json::from_slice(&body).unwrap_or_default();
+        Err(ClientError::Refused {
+            status: status.as_u16(),
+            code: if problem.code.is_empty() { "unknown".to_owned() } else { problem.code },
+            field: problem.field.unwrap_or_default(),
+            detail: problem.detail,
+            more: problem.more,
+        })
+    }
+}
+
+/// The whole body of an answer.
+pub(super) async fn whole(response: Response) -> Result<Vec<u8>, ClientError> {
+    let url = response.url().to_string();
+    let bytes = response.bytes().await.map_err(|e| ClientError::Http { url, detail: reason(&e) })?;
+    Ok(bytes.to_vec())
+}
+
+/// An error with its causes: the outer one alone says little.
+pub(super) fn reason(error: &reqwest::Error) -> String {
+    let mut text = error.to_string();
+    let mut cause = std::error::Error::source(error);
+    while let Some(inner) = cause {
+        text = format!("{text}: {inner}");
+        cause = inner.source();
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn requests_may_be_made_on_any_thread() {
+        fn sent<T: Send>(_: T) {}
+        let maps = MapClient::new("http://127.0.0.1:1").unwrap();
+        sent(maps.maps());
+        sent(maps.delete_view("hall", "poster", 1));
+        sent(maps.live_events("hall"));
+    }
+
+    #[tokio::test]
+    async fn nobody_there_says_what_to_do() {
+        let free = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+        let error = MapClient::new(&format!("http://{free}")).unwrap().maps().await.unwrap_err();
+        let text = error.to_string();
+        assert!(text.contains("waymark serve") && text.contains(&free.to_string()), "{text}");
+    }
+}

@@ -1,0 +1,38 @@
+//! The walls of a map made by a robot that drives.
+
+use super::{map_client::MapClient, operation::operations};
+use crate::ClientError;
+use protos::api::{MappingProgressBody, NewMapping};
+
+operations! {
+    START: POST "/maps/{map}/mapping" => start_mapping,
+    GET: GET "/maps/{map}/mapping" => mapping,
+    CANCEL: DELETE "/maps/{map}/mapping" => cancel_mapping,
+    FINISH: POST "/maps/{map}/mapping/finish" => finish_mapping,
+}
+
+impl MapClient {
+    /// Begins to make the walls of a map from the scans of a robot.
+    pub async fn start_mapping(
+        &self,
+        map: &str,
+        new: &NewMapping,
+    ) -> Result<MappingProgressBody, ClientError> {
+        self.send(self.ask(&START, &[&map])?.json(new)).await
+    }
+
+    /// The mapping that goes on, or the last since the server started.
+    pub async fn mapping(&self, map: &str) -> Result<MappingProgressBody, ClientError> {
+        self.send(self.ask(&GET, &[&map])?).await
+    }
+
+    /// Gives a mapping up, or forgets one that failed: the map stays as it is.
+    pub async fn cancel_mapping(&self, map: &str) -> Result<(), ClientError> {
+        self.done(self.ask(&CANCEL, &[&map])?).await
+    }
+
+    /// Ends the drive: the walls are fitted once more and stored. [`MapClient::mapping`] says when they are.
+    pub async fn finish_mapping(&self, map: &str) -> Result<MappingProgressBody, ClientError> {
+        self.send(self.ask(&FINISH, &[&map])?).await
+    }
+}

@@ -1,0 +1,50 @@
+//! Maps, where they are, and how they lie to each other.
+
+use super::{map_client::MapClient, operation::operations};
+use crate::ClientError;
+use protos::api::{Map, MapPatch, NewMap, TransformQuery, TransformResponse};
+
+operations! {
+    CREATE: POST "/maps" => create_map,
+    LIST: GET "/maps" => maps,
+    GET: GET "/maps/{map}" => map,
+    LOCATE: PATCH "/maps/{map}" => locate_map,
+    DELETE: DELETE "/maps/{map}" => delete_map,
+    TRANSFORM: GET "/maps/{map}/transform" => transform,
+}
+
+impl MapClient {
+    /// Creates an empty map.
+    pub async fn create_map(&self, new: &NewMap) -> Result<Map, ClientError> {
+        self.send(self.ask(&CREATE, &[])?.json(new)).await
+    }
+
+    /// All maps, by name.
+    pub async fn maps(&self) -> Result<Vec<Map>, ClientError> {
+        self.all(&LIST, &[]).await
+    }
+
+    /// One map.
+    pub async fn map(&self, map: &str) -> Result<Map, ClientError> {
+        self.send(self.ask(&GET, &[&map])?).await
+    }
+
+    /// Sets where a map is: site, building, floor, parent.
+    pub async fn locate_map(&self, map: &str, patch: &MapPatch) -> Result<Map, ClientError> {
+        self.send(self.ask(&LOCATE, &[&map])?.json(patch)).await
+    }
+
+    /// Deletes a map and all that is in it.
+    pub async fn delete_map(&self, map: &str) -> Result<(), ClientError> {
+        self.done(self.ask(&DELETE, &[&map])?).await
+    }
+
+    /// How a map lies in another, and a pose of it in that other map.
+    pub async fn transform(
+        &self,
+        map: &str,
+        query: &TransformQuery,
+    ) -> Result<TransformResponse, ClientError> {
+        self.send(self.ask_query(&TRANSFORM, &[&map], query)?).await
+    }
+}

@@ -1,0 +1,65 @@
+//! The teacher's and the administrator's side, over HTTP: one method for each operation of the API, a file for each
+//! resource. In and out: the types of [`protos::api`].
+
+mod cameras;
+mod events;
+mod gathering;
+mod health;
+mod landmarks;
+mod learning;
+mod live;
+mod map_client;
+mod mapping;
+mod maps;
+mod modalities;
+mod operation;
+mod recognise;
+mod reference_runs;
+mod robots;
+mod views;
+mod visibility;
+mod visibility_settings;
+mod walls;
+
+pub use cameras::CameraFrame;
+pub use learning::JobEvents;
+pub use live::LiveEvents;
+pub use map_client::MapClient;
+pub use operation::Operation;
+pub use views::{LandmarkRegion, NewView};
+
+/// Every operation that [`MapClient`] has a method for.
+pub fn operations() -> impl Iterator<Item = &'static Operation> {
+    let all = [
+        cameras::OPERATIONS,
+        gathering::OPERATIONS,
+        health::OPERATIONS,
+        landmarks::OPERATIONS,
+        learning::OPERATIONS,
+        live::OPERATIONS,
+        mapping::OPERATIONS,
+        maps::OPERATIONS,
+        modalities::OPERATIONS,
+        recognise::OPERATIONS,
+        reference_runs::OPERATIONS,
+        robots::OPERATIONS,
+        views::OPERATIONS,
+        visibility::OPERATIONS,
+        visibility_settings::OPERATIONS,
+        walls::OPERATIONS,
+    ];
+    all.into_iter().flatten()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn each_operation_and_each_method_is_there_once() {
+        let all: Vec<_> = operations().map(|o| (o.method.as_str(), o.path)).collect();
+        let calls: BTreeSet<_> = operations().map(|o| o.call).collect();
+        assert_eq!((all.iter().collect::<BTreeSet<_>>().len(), calls.len()), (all.len(), all.len()));
+    }
+}

@@ -1,0 +1,51 @@
+//! Recordings of robots, and the reference runs that maps have learnt from.
+
+use super::{map_client::MapClient, operation::operations};
+use crate::ClientError;
+use protos::api::{RecordingStatusBody, ReferenceRunBody, ReferenceRuns, ReferenceTrajectoryBody};
+
+operations! {
+    START: POST "/robots/{robot}/run" => start_recording,
+    GET: GET "/robots/{robot}/run" => recording,
+    CANCEL: DELETE "/robots/{robot}/run" => cancel_recording,
+    FINISH: POST "/robots/{robot}/run/reference" => finish_recording,
+    LIST: GET "/maps/{map}/runs" => reference_runs,
+    DELETE: DELETE "/maps/{map}/runs/{run}" => delete_reference_run,
+}
+
+impl MapClient {
+    /// Begins to record a run of a robot, in the server's memory.
+    pub async fn start_recording(&self, robot: &str) -> Result<RecordingStatusBody, ClientError> {
+        self.send(self.ask(&START, &[&robot])?).await
+    }
+
+    /// What was recorded so far.
+    pub async fn recording(&self, robot: &str) -> Result<RecordingStatusBody, ClientError> {
+        self.send(self.ask(&GET, &[&robot])?).await
+    }
+
+    /// Gives the recording up.
+    pub async fn cancel_recording(&self, robot: &str) -> Result<(), ClientError> {
+        self.done(self.ask(&CANCEL, &[&robot])?).await
+    }
+
+    /// Ends the recording by telling where the robot really was; the map learns from it.
+    pub async fn finish_recording(
+        &self,
+        robot: &str,
+        trajectory: &ReferenceTrajectoryBody,
+    ) -> Result<ReferenceRunBody, ClientError> {
+        self.send(self.ask(&FINISH, &[&robot])?.json(trajectory)).await
+    }
+
+    /// The runs that a map has learnt from, oldest first.
+    pub async fn reference_runs(&self, map: &str) -> Result<Vec<ReferenceRunBody>, ClientError> {
+        let found: ReferenceRuns = self.send(self.ask(&LIST, &[&map])?).await?;
+        Ok(found.runs)
+    }
+
+    /// Deletes a run and what it showed.
+    pub async fn delete_reference_run(&self, map: &str, run: i64) -> Result<(), ClientError> {
+        self.done(self.ask(&DELETE, &[&map, &run])?).await
+    }
+}

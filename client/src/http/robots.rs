@@ -1,0 +1,53 @@
+//! Robots: where each is, what its pose rests on, where it may be, where it was.
+
+use super::{map_client::MapClient, operation::operations};
+use crate::ClientError;
+use protos::api::{CorrectionsBody, RelocalisationStatus, Robot, RobotAssignment, TrajectoriesBody};
+
+operations! {
+    PUT: PUT "/robots/{robot}" => put_robot,
+    LIST: GET "/robots" => robots,
+    GET: GET "/robots/{robot}" => robot,
+    DELETE: DELETE "/robots/{robot}" => delete_robot,
+    CORRECTIONS: GET "/robots/{robot}/corrections" => corrections,
+    RELOCALISATION: GET "/robots/{robot}/hypotheses" => relocalisation,
+    TRAJECTORIES: GET "/robots/{robot}/tracks" => trajectories,
+}
+
+impl MapClient {
+    /// Registers a robot, or gives it another map.
+    pub async fn put_robot(&self, robot: &str, map: &str) -> Result<Robot, ClientError> {
+        let to = RobotAssignment { map: map.to_owned() };
+        self.send(self.ask(&PUT, &[&robot])?.json(&to)).await
+    }
+
+    /// All robots, by name.
+    pub async fn robots(&self) -> Result<Vec<Robot>, ClientError> {
+        self.all(&LIST, &[]).await
+    }
+
+    /// One robot: whether it is connected, its pose and how old that is, and whether a second program uses its name.
+    pub async fn robot(&self, robot: &str) -> Result<Robot, ClientError> {
+        self.send(self.ask(&GET, &[&robot])?).await
+    }
+
+    /// Deletes a robot; its frames are rejected from now on.
+    pub async fn delete_robot(&self, robot: &str) -> Result<(), ClientError> {
+        self.done(self.ask(&DELETE, &[&robot])?).await
+    }
+
+    /// What a robot's pose rests on, and what became of its fixes.
+    pub async fn corrections(&self, robot: &str) -> Result<CorrectionsBody, ClientError> {
+        self.send(self.ask(&CORRECTIONS, &[&robot])?).await
+    }
+
+    /// Where a robot may be while nothing that it sees is unique.
+    pub async fn relocalisation(&self, robot: &str) -> Result<RelocalisationStatus, ClientError> {
+        self.send(self.ask(&RELOCALISATION, &[&robot])?).await
+    }
+
+    /// Where a robot was lately, by source.
+    pub async fn trajectories(&self, robot: &str) -> Result<TrajectoriesBody, ClientError> {
+        self.send(self.ask(&TRAJECTORIES, &[&robot])?).await
+    }
+}

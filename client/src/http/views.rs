@@ -1,0 +1,100 @@
+//! Training views of a landmark.
+
+use super::{map_client::MapClient, operation::operations};
+use crate::ClientError;
+use protos::api::{CaptureMetadata, TrainingView};
+use reqwest::multipart::{Form, Part};
+use serde_json::json;
+
+operations! {
+    UPLOAD: POST "/maps/{map}/landmarks/{landmark}/views" => upload_view_with,
+    LIST: GET "/maps/{map}/landmarks/{landmark}/views" => views,
+    DELETE: DELETE "/maps/{map}/landmarks/{landmark}/views/{view}" => delete_view,
+    ICON: GET "/maps/{map}/landmarks/{landmark}/views/{view}/icon" => view_icon,
+}
+
+/// What part of an uploaded image is the landmark.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum LandmarkRegion {
+    /// The server looks for the one dominant quad.
+    Detect,
+    /// The whole image is the landmark, cut out beforehand.
+    WholeImage,
+    /// These corners: top-left, top-right, bottom-right, bottom-left, in pixels.
+    Corners([[f64; 2]; 4]),
+}
+
+/// A training view to be.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NewView {
+    /// The photograph, JPEG or PNG.
+    pub image: Vec<u8>,
+    /// Where the landmark is in it.
+    pub region: LandmarkRegion,
+    /// How the photograph was taken; with it the server places the landmark, unless it was placed by hand.
+    pub capture: Option<CaptureMetadata>,
+    /// Store it even if a stored view shows the landmark from the same side, as large and in the same light.
+    pub keep_alike: bool,
+}
+
+impl NewView {
+    /// A photograph of which nothing else is known.
+    pub fn new(image: Vec<u8>, region: LandmarkRegion) -> Self {
+        Self { image, region, capture: None, keep_alike: false }
+    }
+}
+
+impl MapClient {
+    /// Adds a view: a JPEG or PNG photograph.
+    pub async fn upload_view(
+        &self,
+        map: &str,
+        landmark: &str,
+        image: Vec<u8>,
+        region: LandmarkRegion,
+    ) -> Result<TrainingView, ClientError> {
+        self.upload_view_with(map, landmark, NewView::new(image, region)).await
+    }
+
+    /// Adds a view with all that is known of it.
+    pub async fn upload_view_with(
+        &self,
+        map: &str,
+        landmark: &str,
+        new: NewView,
+    ) -> Result<TrainingView, ClientError> {
+        let mut form = Form::new().part("image", image_part(new.image));
+        match new.region {
+            LandmarkRegion::Detect => {}
+            LandmarkRegion::WholeImage => form = form.text("whole_image", "true"),
+            LandmarkRegion::Corners(corners) => form = form.text("corners", json!(corners).to_string()),
+        }
+        if let Some(capture) = new.capture {
+            form = form.text("capture", json!(capture).to_string());
+        }
+        if new.keep_alike {
+            form = form.text("keep_alike", "true");
+        }
+        self.send(self.ask(&UPLOAD, &[&map, &landmark])?.multipart(form)).await
+    }
+
+    /// All views of a landmark, by number.
+    pub async fn views(&self, map: &str, landmark: &str) -> Result<Vec<TrainingView>, ClientError> {
+        self.all(&LIST, &[&map, &landmark]).await
+    }
+
+    /// Deletes a view. The model stays until the landmark is learnt again.
+    pub async fn delete_view(&self, map: &str, landmark: &str, view: i64) -> Result<(), ClientError> {
+        self.done(self.ask(&DELETE, &[&map, &landmark, &view])?).await
+    }
+
+    /// The rectified picture that is learnt from, PNG.
+    pub async fn view_icon(&self, map: &str, landmark: &str, view: i64) -> Result<Vec<u8>, ClientError> {
+        self.bytes(self.ask(&ICON, &[&map, &landmark, &view])?).await
+    }
+}
+
+/// A part of a form with a photograph.
+pub(super) fn image_part(image: Vec<u8>) -> Part {
+    Part::bytes(image).file_name("image")
+}

@@ -1,0 +1,26 @@
+//! The camera that looks for a map's landmarks, and what counts as seen.
+
+use super::{map_client::MapClient, operation::operations};
+use crate::ClientError;
+use protos::api::VisibilitySettingsBody;
+
+operations! {
+    GET: GET "/maps/{map}/sight" => visibility_settings,
+    SET: PUT "/maps/{map}/sight" => set_visibility_settings,
+}
+
+impl MapClient {
+    /// The visibility settings; every field is there.
+    pub async fn visibility_settings(&self, map: &str) -> Result<VisibilitySettingsBody, ClientError> {
+        self.send(self.ask(&GET, &[&map])?).await
+    }
+
+    /// Replaces the visibility settings; absent fields take their defaults.
+    pub async fn set_visibility_settings(
+        &self,
+        map: &str,
+        settings: &VisibilitySettingsBody,
+    ) -> Result<VisibilitySettingsBody, ClientError> {
+        self.send(self.ask(&SET, &[&map])?.json(settings)).await
+    }
+}

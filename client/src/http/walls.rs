@@ -1,0 +1,22 @@
+//! The walls of a map.
+
+use super::{map_client::MapClient, operation::operations};
+use crate::ClientError;
+use protos::api::WallsBody;
+
+operations! {
+    SET: PUT "/maps/{map}/laser" => set_walls,
+    GET: GET "/maps/{map}/laser" => walls,
+}
+
+impl MapClient {
+    /// Replaces the walls; what is stored.
+    pub async fn set_walls(&self, map: &str, walls: &WallsBody) -> Result<WallsBody, ClientError> {
+        self.send(self.ask(&SET, &[&map])?.json(walls)).await
+    }
+
+    /// The walls, as stored.
+    pub async fn walls(&self, map: &str) -> Result<WallsBody, ClientError> {
+        self.send(self.ask(&GET, &[&map])?).await
+    }
+}

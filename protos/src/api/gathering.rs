@@ -1,0 +1,210 @@
+//! `/maps/{map}/gatherings`: training views gathered by a robot that drives past, and a person's decision on them.
+
+use super::{learning::Job, views::PlacementReportBody};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+/// Who gathers what.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+#[serde(deny_unknown_fields)]
+pub struct NewGatheringBody {
+    /// A robot that stands on this map.
+    pub robot: String,
+    /// Only views of this landmark, which must be learnt already; absent: of whatever flat four-sided thing is none yet.
+    pub landmark: Option<String>,
+    /// Views of every landmark that is recognised beyond doubt, too.
+    #[serde(default)]
+    pub known: bool,
+}
+
+/// Views being gathered, or gathered.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct Gathering {
+    /// Its number, counting up over all maps.
+    pub id: i64,
+    /// The map.
+    pub map: String,
+    /// Who gathers.
+    pub robot: String,
+    /// The only landmark whose views are wanted.
+    pub landmark: Option<String>,
+    /// Whether views of recognised landmarks are wanted.
+    pub known: bool,
+    /// It goes on.
+    pub open: bool,
+    /// What became of the frames. Of a gathering that was interrupted by a restart: since then.
+    pub counts: GatheringCountsBody,
+    /// ms since the Unix epoch.
+    pub created_ms: i64,
+    /// ms since the Unix epoch.
+    pub ended_ms: Option<i64>,
+}
+
+/// What became of frames and quads.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+#[serde(default)]
+pub struct GatheringCountsBody {
+    /// Frames offered.
+    pub frames: u64,
+    /// Of these, dropped because others were still being followed.
+    pub dropped: u64,
+    /// Frames on another map.
+    pub elsewhere: u64,
+    /// Quads that were too small, cut off or blurred to have an icon.
+    pub unusable: u64,
+    /// Quads that are not flat on a wall of the map.
+    pub not_on_wall: u64,
+    /// Views kept.
+    pub kept: u64,
+    /// Quads of which there is a view like it.
+    pub alike: u64,
+    /// Quads not yet seen often enough.
+    pub too_new: u64,
+    /// Quads of candidates that have all the views they may have.
+    pub full: u64,
+    /// Quads of candidates that were decided on.
+    pub decided: u64,
+    /// Quads that show a landmark, or may.
+    pub known: u64,
+    /// Quads that are no landmark, where only landmarks are wanted.
+    pub unwanted: u64,
+    /// Quads that lie where a candidate lies and look different.
+    pub unlike: u64,
+    /// Quads beyond the number of things that are followed.
+    pub too_many: u64,
+    /// Views that were not kept because a bound was reached or the disk is full.
+    pub refused: u64,
+}
+
+/// Where the object of a track seems to be, in the map.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct EstimatedPlace {
+    /// Centre, x.
+    pub x_m: f64,
+    /// Centre, y.
+    pub y_m: f64,
+    /// Centre, above the floor.
+    pub z_m: f64,
+    /// Direction of the outward normal on the floor.
+    pub theta_rad: f64,
+    /// Width of the rectangle on the wall.
+    pub width_m: f64,
+    /// Height of the rectangle on the wall.
+    pub height_m: f64,
+    /// Views that agree on it.
+    pub views: usize,
+    /// How far off the normal the camera looked: least and most.
+    pub angle_rad: [f64; 2],
+}
+
+/// A track: an object that a robot drove past, for a person to decide on.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct TrackSummary {
+    /// Its number in the gathering.
+    pub number: u32,
+    /// The landmark whose views these are; null for a thing that is none yet.
+    pub landmark: Option<String>,
+    /// Frames in which it was followed.
+    pub sightings: u32,
+    /// Of these, such in which it was taken for a landmark of the map, or nearly.
+    pub known: u32,
+    /// Numbers of its views; `views/{number}/icon` is the picture.
+    pub views: Vec<i64>,
+    /// Views beside these that do not agree on its place: another border of it was found, or something else. They are left
+    /// out.
+    pub apart: usize,
+    /// The view that stands best for all.
+    pub best: Option<i64>,
+    /// Smallest and largest side of the quad in the picture.
+    pub side_px: [f64; 2],
+    /// How far apart the views are (the gate `visibility_confidence`).
+    pub v_c: f64,
+    /// Where it is by its views.
+    pub hangs: Option<EstimatedPlace>,
+    /// Why that is not known.
+    pub not_placed: Option<String>,
+    /// Whether a lesson of these views would pass every gate, look-alikes apart, and nothing else speaks against it.
+    pub passes: bool,
+    /// What does not pass: `gate`, `value`, `limit`, `detail`.
+    #[cfg_attr(feature = "openapi", schema(value_type = Vec<Object>))]
+    pub reasons: Vec<Value>,
+    /// Other candidates that look or hang alike: perhaps the same thing twice, or two of one kind.
+    pub rivals: Vec<u32>,
+}
+
+impl TrackSummary {
+    /// What speaks against it, in words.
+    pub fn details(&self) -> Vec<String> {
+        self.reasons.iter().map(|r| r["detail"].as_str().unwrap_or_default().to_owned()).collect()
+    }
+
+    /// Where it is, in words.
+    pub fn place_text(&self) -> String {
+        let Some(at) = &self.hangs else { return "not placed".to_owned() };
+        format!("{:.2} x {:.2} m at {:.2}, {:.2}", at.width_m, at.height_m, at.x_m, at.y_m)
+    }
+}
+
+/// All tracks of a gathering that wait for a decision.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct TrackList {
+    /// By number; those that somebody has decided on are not among them.
+    pub candidates: Vec<TrackSummary>,
+}
+
+/// A track that is accepted.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+#[serde(deny_unknown_fields)]
+pub struct AcceptedTrackBody {
+    /// Number of the candidate.
+    pub candidate: u32,
+    /// Name of the landmark it becomes: a new one, or one without views. Several candidates of one thing may be given one
+    /// name. Not needed for views of a landmark that is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+}
+
+/// What is accepted.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+#[serde(deny_unknown_fields)]
+pub struct AcceptRequest {
+    /// At least one.
+    pub candidates: Vec<AcceptedTrackBody>,
+    /// Learn these landmarks at once.
+    #[serde(default = "yes")]
+    pub learn: bool,
+}
+
+fn yes() -> bool {
+    true
+}
+
+/// A landmark that got views.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct ExtendedLandmark {
+    /// Name of the landmark.
+    pub name: String,
+    /// How many it got.
+    pub views: u64,
+    /// Whether they place it.
+    pub placing: PlacementReportBody,
+}
+
+/// What an acceptance came to.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct AcceptanceBody {
+    /// The landmarks that got views, by name.
+    pub landmarks: Vec<ExtendedLandmark>,
+    /// The lesson, if one was wanted.
+    pub job: Option<Job>,
+}

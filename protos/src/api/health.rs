@@ -1,0 +1,40 @@
+//! `/healthz`, `/readyz`, `/version`.
+
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// The process lives.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct Health {
+    /// `ok`.
+    pub status: String,
+}
+
+/// How far the server can do its work.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct Readiness {
+    /// `ready`, or `degraded`: everything runs, but maps are named in `maps_not_in_use`.
+    pub status: String,
+    /// Maps whose stored version cannot be made ready, with the reason: an earlier version is used, or none since the
+    /// server started. A later change of the map tries again.
+    pub maps_not_in_use: BTreeMap<String, String>,
+    /// Panics caught since the start, by where: what they met was refused or dropped, everything else went on. Each is in
+    /// the log. Anything but 0 is a fault of the program.
+    pub panics: BTreeMap<String, u64>,
+}
+
+/// What runs here.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct Version {
+    /// `waymark`.
+    pub name: String,
+    /// Of the program.
+    pub version: String,
+    /// Of the HTTP interface.
+    pub api: String,
+    /// Of the protocol over zenoh.
+    pub protocol: String,
+}

@@ -1,0 +1,205 @@
+//! `/maps/{map}/landmarks`: landmarks with size, place, model and health.
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::fmt;
+
+/// Width and height of a landmark.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+#[serde(deny_unknown_fields)]
+pub struct Size {
+    /// 0.01 to 100.
+    pub width_m: f64,
+    /// 0.01 to 100.
+    pub height_m: f64,
+}
+
+/// Where a landmark is, in the map.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+#[serde(deny_unknown_fields)]
+pub struct Place {
+    /// Centre, x.
+    pub x_m: f64,
+    /// Centre, y.
+    pub y_m: f64,
+    /// Centre, above the floor.
+    pub z_m: f64,
+    /// Direction of the outward normal on the floor, counter-clockwise from map x; under a ceiling, where the top points.
+    pub theta_rad: f64,
+    /// Turn about the outward normal, within 0.5; 0 when the sides are vertical.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub roll_rad: f64,
+    /// Turn of the outward normal from level downwards: 0 on a wall, pi/2 under a ceiling.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub tilt_rad: f64,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
+fn is_zero(value: &f64) -> bool {
+    value.abs() <= 0.0
+}
+
+/// Standard deviations of a place that the server found from views.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct PlaceSigma {
+    /// Of the centre, x.
+    pub x_m: f64,
+    /// Of the centre, y.
+    pub y_m: f64,
+    /// Of the centre, above the floor.
+    pub z_m: f64,
+    /// Of the direction.
+    pub theta_rad: f64,
+    /// Of the width.
+    pub width_m: f64,
+    /// Of the height.
+    pub height_m: f64,
+}
+
+/// How far a landmark has come.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+#[serde(rename_all = "snake_case")]
+pub enum LandmarkStatus {
+    /// Not learnt yet.
+    Empty,
+    /// A job is learning it.
+    Learning,
+    /// Learnt and matched.
+    Active,
+    /// Learnt, but not matched: see `reasons`.
+    Candidate,
+}
+
+impl fmt::Display for LandmarkStatus {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Empty => "empty",
+            Self::Learning => "learning",
+            Self::Active => "active",
+            Self::Candidate => "candidate",
+        })
+    }
+}
+
+/// What was learnt of a landmark, in brief.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct LandmarkModelBody {
+    /// Real views it rests on.
+    pub views: u64,
+    /// Views generated from the real ones.
+    pub generated_views: u64,
+    /// ms since the Unix epoch.
+    pub learnt_ms: i64,
+    /// Thresholds and figures of the learning.
+    #[serde(flatten)]
+    pub facts: serde_json::Map<String, Value>,
+}
+
+/// How far a landmark is trusted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+#[serde(rename_all = "snake_case")]
+pub enum LandmarkHealthBody {
+    /// Nothing speaks against it.
+    Sound,
+    /// Robots find it elsewhere or not at all: see `finding`. It is still used.
+    Flagged,
+    /// So often that it corrects no pose until somebody sets its place or its standing.
+    Quarantined,
+}
+
+/// A landmark.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct Landmark {
+    /// `[a-z0-9_-]{1,64}`, unique in the map.
+    pub name: String,
+    /// How far it has come.
+    pub status: LandmarkStatus,
+    /// Why it is a candidate only.
+    pub reasons: Vec<Value>,
+    /// Real views stored.
+    pub views: u64,
+    /// Width and height, if measured.
+    pub size: Option<Size>,
+    /// Where it is, if known.
+    pub place: Option<Place>,
+    /// How surely, where the server found the place from views; absent for a place by hand.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub place_sigma: Option<PlaceSigma>,
+    /// What was learnt.
+    pub model: Option<LandmarkModelBody>,
+    /// How far what robots saw lets it be trusted.
+    pub standing: LandmarkHealthBody,
+    /// What speaks against it: `kind` `moved` with where it appears, or `missing`.
+    pub finding: Option<Value>,
+}
+
+/// A landmark to be.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+#[serde(deny_unknown_fields)]
+pub struct NewLandmark {
+    /// `[a-z0-9_-]{1,64}`, unique in the map.
+    pub name: String,
+    /// Width and height; without it there is no pose.
+    pub size: Option<Size>,
+    /// Where it is; without it there is no robot pose.
+    pub place: Option<Place>,
+}
+
+/// What changes of a landmark. A field that is absent stays, one that is null is forgotten.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+#[serde(deny_unknown_fields)]
+pub struct LandmarkPatch {
+    /// Width and height.
+    #[serde(
+        default,
+        deserialize_with = "super::patch::null_or_value",
+        skip_serializing_if = "Option::is_none"
+    )]
+    #[cfg_attr(feature = "openapi", schema(value_type = Option<Size>))]
+    pub size: Option<Option<Size>>,
+    /// Where it is.
+    #[serde(
+        default,
+        deserialize_with = "super::patch::null_or_value",
+        skip_serializing_if = "Option::is_none"
+    )]
+    #[cfg_attr(feature = "openapi", schema(value_type = Option<Place>))]
+    pub place: Option<Option<Place>>,
+    /// A person's decision; a new size or place is sound by itself.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub standing: Option<LandmarkHealthBody>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_place_on_a_wall_has_no_roll_and_tilt_and_one_under_a_ceiling_keeps_them() {
+        let wall = Place { x_m: 1.0, ..Place::default() };
+        let text = serde_json::to_string(&wall).unwrap();
+        assert!(!text.contains("roll_rad") && !text.contains("tilt_rad"), "{text}");
+        let ceiling = Place { roll_rad: 0.1, tilt_rad: 1.5, ..wall };
+        for place in [wall, ceiling] {
+            let back: Place = serde_json::from_str(&serde_json::to_string(&place).unwrap()).unwrap();
+            assert_eq!(back, place);
+        }
+    }
+
+    #[test]
+    fn the_word_of_a_status_is_that_of_the_json() {
+        use LandmarkStatus::{Active, Candidate, Empty, Learning};
+        for status in [Empty, Learning, Active, Candidate] {
+            assert_eq!(serde_json::to_value(status).unwrap(), status.to_string());
+        }
+    }
+}

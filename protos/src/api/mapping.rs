@@ -1,0 +1,61 @@
+//! `/maps/{map}/mapping`: the walls of a map made by a robot that drives.
+
+use serde::{Deserialize, Serialize};
+
+/// Who makes the map.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+#[serde(deny_unknown_fields)]
+pub struct NewMapping {
+    /// A robot that stands on this map; its scans must come with odometry.
+    pub robot: String,
+    /// Where on the map its first pose is: x, y in metres, heading in radians. The origin, if absent.
+    #[serde(default)]
+    pub origin: [f64; 3],
+}
+
+/// How far a mapping has come.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+#[serde(rename_all = "snake_case")]
+pub enum MappingStageBody {
+    /// The server was started again: the scans that were kept are mapped once more. New ones wait, as many as there is room
+    /// for.
+    Resuming,
+    /// Scans are taken.
+    Mapping,
+    /// Everything is fitted once more; then the walls are stored.
+    Finishing,
+    /// The walls are those of the map.
+    Done,
+    /// See `reason`; the map is as before.
+    Failed,
+}
+
+/// A mapping as it stands.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct MappingProgressBody {
+    /// Name of the map.
+    pub map: String,
+    /// Whose scans.
+    pub robot: String,
+    /// How far it has come.
+    pub stage: MappingStageBody,
+    /// Scans that were taken.
+    pub scans: u64,
+    /// Scans that were not: the queue was full, the robot's software was started again, or there were too many.
+    pub dropped: u64,
+    /// Way driven, metres.
+    pub way_m: f64,
+    /// Where the robot is in the map so far: x, y, theta; absent before the first scan.
+    pub pose: Option<[f64; 3]>,
+    /// Walls, once it is done.
+    pub segments: Option<usize>,
+    /// Loops that were closed, once fitted.
+    pub loops: Option<usize>,
+    /// Why it failed.
+    pub reason: Option<String>,
+    /// Why further scans are not kept on disk: a restart of the server would lose them. Absent while they are.
+    pub not_kept: Option<String>,
+}

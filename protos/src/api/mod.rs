@@ -1,0 +1,51 @@
+//! The HTTP interface: the bodies of requests and answers as JSON, one file for each resource.
+//!
+//! The server answers with these types and the client reads them; each is declared once. Lengths are metres, angles
+//! radians, counter-clockwise from the map's x axis, times milliseconds or nanoseconds since the Unix epoch; the last part
+//! of a field's name is its unit. Covariances of poses are over (x, y, theta), row-major, in m and rad.
+//!
+//! A body of a request refuses unknown fields. A body that is only answered ignores them, so that a newer server can say
+//! more. With the feature `openapi` every type has a schema; the server makes its OpenAPI document of them.
+
+pub mod cameras;
+pub mod gathering;
+pub mod health;
+pub mod landmarks;
+pub mod learning;
+pub mod live;
+pub mod mapping;
+pub mod maps;
+pub mod modalities;
+pub mod page;
+mod patch;
+pub mod problem;
+#[cfg(feature = "openapi")]
+pub mod recognise;
+pub mod reference_runs;
+pub mod relocalisation;
+pub mod robots;
+pub mod views;
+pub mod visibility;
+pub mod visibility_settings;
+pub mod walls;
+
+pub use cameras::*;
+pub use gathering::*;
+pub use health::*;
+pub use landmarks::*;
+pub use learning::*;
+pub use live::*;
+pub use mapping::*;
+pub use maps::*;
+pub use modalities::*;
+pub use page::*;
+pub use problem::*;
+#[cfg(feature = "openapi")]
+pub use recognise::*;
+pub use reference_runs::*;
+pub use relocalisation::*;
+pub use robots::*;
+pub use views::*;
+pub use visibility::*;
+pub use visibility_settings::*;
+pub use walls::*;

@@ -1,0 +1,13 @@
+//! `/maps/{map}/recognise`: one photograph. It is answered with a [`crate::v1::Answer`].
+
+/// The form of a photograph, for the document: it is read part by part.
+#[cfg(feature = "openapi")]
+#[derive(Debug, utoipa::ToSchema)]
+pub struct PhotographForm {
+    /// PNG or JPEG.
+    #[schema(value_type = String, format = Binary)]
+    pub image: Vec<u8>,
+    /// JSON: `fx_px`, `fy_px`, `cx_px`, `cy_px` and optionally a lens: `plumb_bob` (5 numbers), `rational_polynomial` (8) or
+    /// `equidistant` (4). Without it there is recognition but no pose.
+    pub intrinsics: Option<String>,
+}

@@ -1,0 +1,93 @@
+//! `/maps/{map}/landmarks/{landmark}/views`: training views.
+
+use crate::v1;
+use serde::{Deserialize, Serialize};
+
+/// A stored training view.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct TrainingView {
+    /// Its number, never used again.
+    pub id: i64,
+    /// The landmark's corners in the picture: top-left, top-right, bottom-right, bottom-left, in pixels.
+    pub corners: [[f64; 2]; 4],
+    /// Of the picture, as a viewer shows it.
+    pub width_px: u32,
+    /// Of the picture, as a viewer shows it.
+    pub height_px: u32,
+    /// `png` or `jpeg`.
+    pub image_kind: String,
+    /// ms since the Unix epoch.
+    pub created_ms: i64,
+    /// In the answer to an upload: what became of it. With `same` and `alike` the view given is the one that is there.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub outcome: Option<UploadOutcomeBody>,
+    /// In the answer to an upload with `capture`: whether the landmark has a place by its views now, or why not.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub placing: Option<PlacementReportBody>,
+}
+
+/// What became of an upload.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+#[serde(rename_all = "snake_case")]
+pub enum UploadOutcomeBody {
+    /// Stored.
+    New,
+    /// The same quad of the same picture is there already.
+    Same,
+    /// Not stored: the view shows nothing that this one does not. A lesson would gain nothing by it.
+    Alike,
+}
+
+/// What came of placing a landmark by its views.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct PlacementReportBody {
+    /// The landmark has a place by its views now.
+    pub placed: bool,
+    /// Views with a robot pose that the place rests on.
+    pub views_used: usize,
+    /// Why not: `by_hand` (a place by hand stays), or what is wrong with the views, with the residual.
+    pub reason: Option<String>,
+}
+
+/// How a picture was taken: the part `capture` of an upload. With it the server places the landmark itself, on the map's
+/// walls or under a ceiling, unless it was placed by hand.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CaptureMetadata {
+    /// The camera.
+    pub intrinsics: v1::Intrinsics,
+    /// Where the robot was, with covariance.
+    pub map_from_robot: v1::Pose2Covariance,
+    /// The camera on the robot.
+    pub robot_from_camera: v1::Pose3,
+    /// The landmark is under a ceiling so high, not on a wall.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ceiling_height_m: Option<f64>,
+    /// Covariance of each corner by the noise of its edges: (uu, uv, vv), top-left, top-right, bottom-right, bottom-left.
+    /// Absent: 1 px, or the detector's where the server finds the corners.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub corner_covariance_px2: Option<[[f64; 3]; 4]>,
+}
+
+/// The form of an upload, for the document: it is read part by part.
+#[cfg(feature = "openapi")]
+#[derive(Debug, utoipa::ToSchema)]
+pub struct NewViewForm {
+    /// PNG or JPEG.
+    #[schema(value_type = String, format = Binary)]
+    pub image: Vec<u8>,
+    /// JSON, `[[x,y],[x,y],[x,y],[x,y]]`: top-left, top-right, bottom-right, bottom-left, in pixels.
+    pub corners: Option<String>,
+    /// `true`: the picture shows the landmark and nothing else.
+    pub whole_image: Option<String>,
+    /// JSON, how it was taken: `intrinsics`, `map_from_robot` (pose with covariance), `robot_from_camera`, and
+    /// `ceiling_height_m` for a landmark under a ceiling; also `corner_covariance_px2`, `[[uu,uv,vv], ...]` of the four
+    /// corners, where their noise is known (else 1 px, or the detector's where the server finds them). With it the server
+    /// places the landmark on the map's walls itself, unless it was placed by hand.
+    pub capture: Option<String>,
+    /// `true`: stored even if a stored view shows it from the same side, as large and in the same light.
+    pub keep_alike: Option<String>,
+}

@@ -1,0 +1,213 @@
+//! From where landmarks are seen, what is seen from a pose and along a path, and where to look.
+
+use super::visibility_settings::VisibilitySettingsBody;
+use map::{
+    gaze::{Criterion, PanTiltUnit},
+    visibility::PanTiltCamera,
+};
+use serde::{Deserialize, Serialize};
+
+/// The floor area from which a landmark is seen: a GeoJSON `Feature` in metres of the map, not degrees.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct VisibilityAreaBody {
+    /// `Feature`.
+    #[serde(rename = "type")]
+    pub kind: String,
+    /// The polygons.
+    pub geometry: MultiPolygon,
+    /// The landmark, and figures of the area.
+    pub properties: VisibilityAreaProperties,
+}
+
+/// A GeoJSON `MultiPolygon`: polygons of rings of points, m in the map; the outer ring counter-clockwise, that of a hole
+/// clockwise, the first point repeated.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct MultiPolygon {
+    /// `MultiPolygon`.
+    #[serde(rename = "type")]
+    pub kind: String,
+    /// By polygon, ring and point: x, y in metres.
+    pub coordinates: Vec<Vec<Vec<[f64; 2]>>>,
+}
+
+/// Figures of a visibility area.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct VisibilityAreaProperties {
+    /// Name of the landmark.
+    pub landmark: String,
+    /// Square metres.
+    pub area_m2: f64,
+    /// Centre of gravity, where there is an area.
+    pub centroid_m: Option<[f64; 2]>,
+    /// Furthest possible distance from the landmark.
+    pub reach_m: f64,
+}
+
+/// A pose in the map.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+#[serde(deny_unknown_fields)]
+pub struct PoseBody {
+    /// Metres, in the map.
+    pub x_m: f64,
+    /// Metres, in the map.
+    pub y_m: f64,
+    /// Heading in the map.
+    pub theta_rad: f64,
+    /// Over (x, y, theta), row-major; absent for a pose that is exactly known.
+    pub covariance: Option<[f64; 9]>,
+}
+
+/// Where the robot is.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+#[serde(deny_unknown_fields)]
+pub struct VisibleRequest {
+    /// Pose of the robot.
+    pub pose: PoseBody,
+    /// Another camera than the map's.
+    #[serde(default)]
+    pub sight: VisibilitySettingsBody,
+}
+
+/// A landmark that may be seen.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct VisibleLandmark {
+    /// Name of the landmark.
+    pub landmark: String,
+    /// Probability that it is seen when the camera is turned to it.
+    pub probability: f64,
+    /// Distance to the boundary of its area, positive inside.
+    pub margin_m: f64,
+}
+
+/// What may be seen.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct VisibleResponse {
+    /// Of this version of the map.
+    pub map_version: u64,
+    /// Most probable first.
+    pub landmarks: Vec<VisibleLandmark>,
+}
+
+/// A path to look at.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+#[serde(deny_unknown_fields)]
+pub struct CoverageRequest {
+    /// Its points: x, y in metres.
+    pub path: Vec<[f64; 2]>,
+    /// How often to look: 0.01 to 10 m.
+    #[serde(default = "step_m")]
+    pub step_m: f64,
+    /// Another camera than the map's.
+    #[serde(default)]
+    pub sight: VisibilitySettingsBody,
+}
+
+fn step_m() -> f64 {
+    0.1
+}
+
+impl CoverageRequest {
+    /// Along these points (x, y in metres), every 0.1 m, with the map's camera.
+    pub fn new(path: Vec<[f64; 2]>) -> Self {
+        Self { path, step_m: step_m(), sight: VisibilitySettingsBody::default() }
+    }
+}
+
+/// One place of the path.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct CoverageSampleBody {
+    /// Metres from the beginning of the path.
+    pub along_m: f64,
+    /// Metres, in the map.
+    pub x_m: f64,
+    /// Metres, in the map.
+    pub y_m: f64,
+    /// Names of the landmarks that are seen.
+    pub landmarks: Vec<String>,
+}
+
+/// A piece of the path from which no landmark is seen.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct CoverageGapBody {
+    /// Its beginning, metres along the path.
+    pub from_m: f64,
+    /// Its end, metres along the path.
+    pub to_m: f64,
+}
+
+/// What is seen along a path.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct CoverageResponse {
+    /// Of this version of the map.
+    pub map_version: u64,
+    /// Length of the path.
+    pub length_m: f64,
+    /// Share of the path from which some landmark is seen.
+    pub share: f64,
+    /// Pieces without a landmark, in order.
+    pub gaps: Vec<CoverageGapBody>,
+    /// Places along the path, `step_m` apart.
+    pub steps: Vec<CoverageSampleBody>,
+}
+
+/// A question where to look.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+#[serde(deny_unknown_fields)]
+pub struct GazeQueryBody {
+    /// Where the robot is.
+    pub pose: PoseBody,
+    /// `camera_m`, `pan_rad`, `tilt_rad`, `rate_radps`.
+    #[serde(default)]
+    #[cfg_attr(feature = "openapi", schema(value_type = Object))]
+    pub head: PanTiltUnit,
+    /// `focal_px`, `pan_rad`, `tilt_rad` and the rest of the camera; absent for the map's (`/maps/{map}/sight`).
+    #[cfg_attr(feature = "openapi", schema(value_type = Option<Object>))]
+    pub viewer: Option<PanTiltCamera>,
+    /// `product` (the paper's) or `information`.
+    #[serde(default)]
+    #[cfg_attr(feature = "openapi", schema(value_type = String))]
+    pub criterion: Criterion,
+}
+
+/// A landmark worth looking at.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct GazeTargetBody {
+    /// Name of the landmark.
+    pub landmark: String,
+    /// Pan that centres it, left positive.
+    pub pan_rad: f64,
+    /// Tilt that centres it, up positive.
+    pub tilt_rad: f64,
+    /// What it is ranked by; the criterion's number.
+    pub utility: f64,
+    /// Probability that it is seen.
+    pub probability: f64,
+    /// Distance to the boundary of its area, positive inside.
+    pub margin_m: f64,
+    /// Expected gain of information on the pose.
+    pub gain_nats: f64,
+    /// Distance of the camera from its centre.
+    pub range_m: f64,
+    /// Angle between its normal and the line of sight.
+    pub incidence_rad: f64,
+}
+
+/// Where to look.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct GazeRankingBody {
+    /// Of this version of the map.
+    pub map_version: u64,
+    /// Best first; empty when nothing is in sight.
+    pub ranked: Vec<GazeTargetBody>,
+}

@@ -1,0 +1,218 @@
+//! `/maps/{map}/areas`: which modality is best where, as runs have shown; the areas that somebody named; what is fused.
+
+use super::{
+    AppState,
+    error::ApiError,
+    extract::{Body, PathParams, QueryParams},
+};
+use crate::store::{
+    areas::{self, Settings},
+    maps,
+};
+use axum::{Json, extract::State};
+use map::{
+    modality_stats::{
+        CELL_M, FusionMode, MAX_AREAS, Modality, ModalityAdvice, ModalityMap, NamedArea, PoseCell,
+        StatsByModality, StatsScope,
+    },
+    pose2::Pose2,
+};
+use protos::api::{
+    AdviceBody, AreaBody, AreaStatsBody, CellBody, ErrorModelBody, FusionModeBody, ModalityBody,
+    ModalityMapBody, ModalityMapPatch, ModalityQuery, ModalityStatsBody, NamedAreaBody, Problem,
+    StatsScopeBody,
+};
+use std::{f64::consts::FRAC_PI_2, sync::Arc};
+use utoipa_axum::{router::OpenApiRouter, routes};
+
+/// Most cells of one answer.
+const MAX_CELLS_TOLD: usize = 20_000;
+
+pub(super) fn router() -> OpenApiRouter<AppState> {
+    OpenApiRouter::new().routes(routes!(get, put)).routes(routes!(at))
+}
+
+fn heading_rad(heading: u8) -> f64 {
+    Pose2::new(0.0, 0.0, f64::from(heading) * FRAC_PI_2).theta_rad
+}
+
+fn mode(fusion: FusionModeBody) -> FusionMode {
+    match fusion {
+        FusionModeBody::All => FusionMode::All,
+        FusionModeBody::Fuse => FusionMode::Fuse,
+        FusionModeBody::Single => FusionMode::Single,
+    }
+}
+
+fn mode_shown(mode: FusionMode) -> FusionModeBody {
+    match mode {
+        FusionMode::All => FusionModeBody::All,
+        FusionMode::Fuse => FusionModeBody::Fuse,
+        FusionMode::Single => FusionModeBody::Single,
+    }
+}
+
+fn modality(module: Modality) -> ModalityBody {
+    match module {
+        Modality::Odometry => ModalityBody::Odometry,
+        Modality::Laser => ModalityBody::Laser,
+        Modality::Landmarks => ModalityBody::Landmarks,
+    }
+}
+
+fn scope(level: StatsScope) -> StatsScopeBody {
+    match level {
+        StatsScope::Cell => StatsScopeBody::Cell,
+        StatsScope::Around => StatsScopeBody::Around,
+        StatsScope::Area => StatsScopeBody::Area,
+        StatsScope::Map => StatsScopeBody::Map,
+    }
+}
+
+/// What runs have shown, by modality.
+pub(super) fn stats(found: &StatsByModality) -> Vec<ModalityStatsBody> {
+    let one = |(module, evidence): (Modality, &::map::modality_stats::ModalityStats)| {
+        let figures = evidence.figures();
+        ModalityStatsBody {
+            module: modality(module),
+            mean: figures.mean,
+            sigma: figures.sigma,
+            availability: figures.availability,
+            rate_hz: figures.rate_hz,
+            outliers: figures.outliers,
+            score: figures.score.is_finite().then_some(figures.score),
+            steps: evidence.available(),
+            measurements: evidence.fixes(),
+        }
+    };
+    Modality::ALL.into_iter().zip(found).map(one).collect()
+}
+
+fn used(advice: &ModalityAdvice) -> Vec<ModalityBody> {
+    let used = Modality::ALL.into_iter().zip(advice.used);
+    used.filter_map(|(module, used)| used.then_some(modality(module))).collect()
+}
+
+fn advice_shown(advice: &ModalityAdvice) -> AdviceBody {
+    let error_model = |module| {
+        let fault = advice.fault(module);
+        ErrorModelBody { module: modality(module), bias: fault.bias.into(), excess: fault.excess.into() }
+    };
+    AdviceBody {
+        best: advice.best.map(modality),
+        used: used(advice),
+        level: scope(advice.level),
+        faults: Modality::ALL.map(error_model).into(),
+    }
+}
+
+fn area_stats(advice: &ModalityAdvice, found: &StatsByModality) -> AreaStatsBody {
+    AreaStatsBody { told: advice_shown(advice), modules: stats(found) }
+}
+
+fn cell(cell: &PoseCell, advice: &ModalityAdvice) -> CellBody {
+    CellBody {
+        x_m: f64::from(cell.x) * CELL_M,
+        y_m: f64::from(cell.y) * CELL_M,
+        heading_rad: heading_rad(cell.heading),
+        best: advice.best.map(modality),
+        used: used(advice),
+    }
+}
+
+fn modality_map(areas: &ModalityMap) -> ModalityMapBody {
+    let named = areas.named().map(|(area, by_heading)| NamedAreaBody {
+        name: area.name.clone(),
+        corners_m: area.corners_m.clone(),
+        headings: by_heading.iter().map(|(found, advice)| area_stats(advice, found)).collect(),
+    });
+    let (found, advice) = areas.map();
+    let count = areas.cells().count();
+    ModalityMapBody {
+        mode: mode_shown(areas.mode()),
+        areas: named.collect(),
+        cell_m: CELL_M,
+        cells: areas.cells().take(MAX_CELLS_TOLD).map(|(at, _, advice)| cell(at, advice)).collect(),
+        left_off: count.saturating_sub(MAX_CELLS_TOLD),
+        map: area_stats(advice, found),
+    }
+}
+
+fn known(app: &AppState, map: &str) -> Result<Arc<ModalityMap>, ApiError> {
+    let found = app.store.snapshots().get(map);
+    let found =
+        found.ok_or_else(|| crate::store::StoreError::NotFound { what: "map", name: map.to_owned() })?;
+    Ok(found.modalities.clone())
+}
+
+/// Which modality is best where, as runs have shown, and what is fused.
+#[utoipa::path(get, path = "/maps/{map}/areas", tag = "maps", params(("map" = String, Path)),
+    responses((status = 200, body = ModalityMapBody), (status = 404, body = Problem)))]
+async fn get(
+    State(app): State<AppState>,
+    PathParams(map): PathParams<String>,
+) -> Result<Json<ModalityMapBody>, ApiError> {
+    Ok(Json(modality_map(&*known(&app, &map)?)))
+}
+
+fn checked(areas: Vec<AreaBody>) -> Result<Vec<NamedArea>, ApiError> {
+    if areas.len() > MAX_AREAS {
+        return Err(ApiError::invalid("too_many", "areas", format!("more than {MAX_AREAS} areas")));
+    }
+    let mut named: Vec<NamedArea> = Vec::new();
+    for (i, AreaBody { name, corners_m }) in areas.into_iter().enumerate() {
+        let area = NamedArea { name, corners_m };
+        area.check().map_err(|e| {
+            ApiError::invalid("out_of_range", format!("areas[{i}].{}", e.field), e.to_string())
+        })?;
+        if named.iter().any(|other| other.name == area.name) {
+            let detail = format!("two areas are named `{}`", area.name);
+            return Err(ApiError::invalid("exists", format!("areas[{i}].name"), detail));
+        }
+        named.push(area);
+    }
+    Ok(named)
+}
+
+/// Sets what is fused, and the areas that have names.
+#[utoipa::path(put, path = "/maps/{map}/areas", tag = "maps", params(("map" = String, Path)), request_body = ModalityMapPatch,
+    responses((status = 200, body = ModalityMapBody), (status = 404, body = Problem),
+    (status = 422, body = Problem, description = "out_of_range, exists, too_many")))]
+async fn put(
+    State(app): State<AppState>,
+    PathParams(map): PathParams<String>,
+    Body(change): Body<ModalityMapPatch>,
+) -> Result<Json<ModalityMapBody>, ApiError> {
+    let named = change.areas.map(checked).transpose()?;
+    let fusion = change.mode.map(mode);
+    let name = map.clone();
+    let write = app.store.write(move |tx| {
+        Box::pin(async move {
+            let new = |old: Settings| Settings {
+                mode: fusion.unwrap_or(old.mode),
+                named: named.unwrap_or(old.named),
+            };
+            areas::set(tx, &name, new).await
+        })
+    });
+    write.await?;
+    Ok(Json(modality_map(&*known(&app, &map)?)))
+}
+
+/// What is known where a robot would be: what runs have found there, and what follows.
+#[utoipa::path(get, path = "/maps/{map}/areas/at", tag = "maps", params(("map" = String, Path), ModalityQuery),
+    responses((status = 200, body = AreaStatsBody), (status = 404, body = Problem),
+    (status = 422, body = Problem, description = "out_of_range")))]
+async fn at(
+    State(app): State<AppState>,
+    PathParams(map): PathParams<String>,
+    QueryParams(place): QueryParams<ModalityQuery>,
+) -> Result<Json<AreaStatsBody>, ApiError> {
+    maps::get(app.store.reads(), &map).await?;
+    let pose = Pose2::new(place.x_m, place.y_m, place.theta_rad);
+    pose.check().map_err(|e| ApiError::invalid("out_of_range", e.field, e.to_string()))?;
+    let (areas, cell) = (known(&app, &map)?, PoseCell::of(&pose));
+    let found = areas.cells().find(|(other, ..)| **other == cell).map(|(_, found, _)| *found);
+    let advice = areas.advice(&pose);
+    Ok(Json(area_stats(&advice, &found.unwrap_or_default())))
+}

@@ -1,0 +1,55 @@
+//! `/maps/{map}/laser`: the walls, replaced and read as a whole.
+
+use super::{
+    AppState,
+    error::{ApiError, out_of_range},
+    extract::{Body, PathParams},
+};
+use crate::store::{laser, maps};
+use axum::{Json, extract::State};
+use protos::api::{Problem, WallBody, WallsBody};
+use utoipa_axum::{router::OpenApiRouter, routes};
+
+pub(super) fn router() -> OpenApiRouter<AppState> {
+    OpenApiRouter::new().routes(routes!(put, get))
+}
+
+/// Checks the ends of a wall.
+fn checked(index: usize, WallBody { a, b }: &WallBody) -> Result<[f64; 4], ApiError> {
+    let ends = [a[0], a[1], b[0], b[1]];
+    map::segments::LaserSegment::by_hand(&ends)
+        .map(|_| ends)
+        .map_err(|e| out_of_range(&e, &format!("segments[{index}]")))
+}
+
+/// Replaces the walls.
+#[utoipa::path(put, path = "/maps/{map}/laser", tag = "maps", params(("map" = String, Path)), request_body = WallsBody,
+    responses((status = 200, body = WallsBody), (status = 404, body = Problem),
+    (status = 422, body = Problem, description = "out_of_range, too_many")))]
+async fn put(
+    State(app): State<AppState>,
+    PathParams(map): PathParams<String>,
+    Body(walls): Body<WallsBody>,
+) -> Result<Json<WallsBody>, ApiError> {
+    let max = app.config.limits.laser_segments;
+    if walls.segments.len() > max {
+        return Err(ApiError::invalid("too_many", "segments", format!("more than {max} segments")));
+    }
+    let ends =
+        walls.segments.iter().enumerate().map(|(i, s)| checked(i, s)).collect::<Result<Vec<_>, _>>()?;
+    app.store.write(move |tx| Box::pin(async move { laser::replace(tx, &map, &ends).await })).await?;
+    Ok(Json(walls))
+}
+
+/// The walls.
+#[utoipa::path(get, path = "/maps/{map}/laser", tag = "maps", params(("map" = String, Path)), responses(
+    (status = 200, body = WallsBody), (status = 404, body = Problem)))]
+async fn get(
+    State(app): State<AppState>,
+    PathParams(map): PathParams<String>,
+) -> Result<Json<WallsBody>, ApiError> {
+    let map = maps::get(app.store.reads(), &map).await?;
+    let stored = laser::all_of(app.store.reads(), map.id).await?;
+    let segments = stored.into_iter().map(|[ax, ay, bx, by]| WallBody { a: [ax, ay], b: [bx, by] }).collect();
+    Ok(Json(WallsBody { segments }))
+}
