@@ -246,8 +246,8 @@ const SAMPLE_PX: f64 = 1.5;
 /// Most samples along each axis of a cell.
 const MAX_SAMPLES: usize = 4;
 
-/// Grey levels of cells `first`, `first + 1`, ... of `row`, by samples spread over each: as many along each axis as leave
-/// one for every [`SAMPLE_PX`] of the image's pixels, up to four. For the surroundings of an icon.
+/// Grey levels of cells `first`, `first + 1`, ... of `row`, by samples spread over each: as many along each axis as
+/// leave one for every [`SAMPLE_PX`] of the image's pixels, up to four. For the surroundings of an icon.
 pub(crate) fn sample_cells(
     image: &GrayImage,
     image_from_cell: &Homography,

@@ -1,6 +1,6 @@
-//! The whole method on one page: an image, the landmarks of a map and perhaps a camera in; what was seen out.
+//! The whole method on one page. In: an image, the landmarks of a map, perhaps a camera. Out: quads, verdicts, poses.
 //!
-//! No arithmetic here, and no stage steers an earlier one. Where the robot is follows in the map crate.
+//! No arithmetic here, and no stage calls an earlier one. The map crate computes where the robot is.
 
 use crate::{
     detect::{
@@ -35,7 +35,7 @@ pub use crate::recognise::decision::{
 /// Most quads of one image that are compared with the landmarks, the detector's best first.
 pub const MAX_RECOGNISED_QUADS: usize = 24;
 
-/// What of a map the pipeline needs. Immutable while an image is worked on.
+/// The part of a map that the pipeline reads. Immutable during a frame.
 #[derive(Debug, Clone, Copy)]
 pub struct LandmarkDatabase<'a> {
     /// Models of the landmarks to recognise.
@@ -46,14 +46,14 @@ pub struct LandmarkDatabase<'a> {
     pub kind: DistanceKind,
 }
 
-/// Everything seen in one image.
+/// The quads of one image with their recognition and poses.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FrameAnalysis {
     /// The quads, best first.
     pub quads: Vec<QuadAnalysis>,
 }
 
-/// What is known of one quad.
+/// One quad with its recognition and pose.
 #[derive(Debug, Clone, PartialEq)]
 pub struct QuadAnalysis {
     /// The quad as detected.
@@ -81,8 +81,8 @@ pub enum PoseUnavailable {
     Pose(#[from] PoseError),
 }
 
-/// The method with the memory of earlier frames: fresh planes cost more than a tenth of the time to segments. One a thread.
-/// The memory never changes a result.
+/// The method with the memory of earlier frames: fresh planes cost more than a tenth of the time to segments. One a
+/// thread. The memory never changes a result.
 #[derive(Debug, Default)]
 pub struct Pipeline {
     buffers: DetectBuffers,
@@ -135,8 +135,8 @@ pub fn analyse_quads(
     FrameAnalysis { quads }
 }
 
-/// Which of the landmarks a single quad may be, by its picture alone, and their common border in the image; `None` for the
-/// border where it is none of them. For landmarks that look alike, which no frame names by itself.
+/// Which of the landmarks a single quad may be, by its picture alone, and their common border in the image; `None`
+/// for the border where it is none of them. For landmarks that look alike, which no frame names by itself.
 pub fn recognise_quad(
     image: &GrayImage,
     quad: &Quad,
@@ -149,8 +149,8 @@ pub fn recognise_quad(
     (verdict, border)
 }
 
-/// Where another border of `quad` than its corners was recognised, that one becomes its corners: whoever reads what was
-/// recognised must not take the wall round a poster for it.
+/// Where an alternate border was recognised, it becomes the corners of the quad: readers of the result must not take
+/// the wall round a poster for the poster.
 fn turn_to_recognised(quad: &mut Quad, verdict: &mut RecognitionResult) {
     if verdict.verdict == Verdict::Unknown || verdict.border == 0 {
         return;

@@ -1,4 +1,4 @@
-//! The taught border of a landmark as an image shows it: corners, covariances, and how they were found.
+//! The border of a landmark as an image shows it: corners, covariances, and how they were found.
 
 use crate::{detect::quad::BORDER_SIGMA_PX, geometry::corners::Corners, params::Params};
 use nalgebra::Matrix2;

@@ -1,8 +1,8 @@
-//! A camera's intrinsics from several views of one flat thing of known shape (method 16).
+//! A camera's intrinsics from several views of one flat object of known shape (method 16).
 //!
-//! In: views (points of the plane and the pixels they are seen at, four corners of a quad or more), the image's size.
-//! Out: focal length, principal point, perhaps radial distortion, with covariance, and how well each view fits; or why
-//! the views do not determine them. The quads are found and named elsewhere.
+//! In: views (points of the plane and their pixels, at least four), the image's size. Out: focal length, principal
+//! point, perhaps radial distortion, with covariance, and the residual of each view; or why the views do not
+//! determine them.
 
 use crate::{
     camera_calibration::{

@@ -34,8 +34,8 @@ pub(crate) fn rho(a: &Vector3<f64>, b: &Vector3<f64>) -> RowVector4<f64> {
 
 /// The rows of one view. `h` is normalised in the image and has `|h1| = 1`.
 ///
-/// The C3 row is divided by `|h3|`. The C2 row is left as it is: at zero tilt h2 is nearly (0, c, 0), the row is nothing
-/// for a good reason, and at length 1 it would be noise alone.
+/// The C3 row is divided by `|h3|`. The C2 row is left as it is: at zero tilt h2 is nearly (0, c, 0), the row is
+/// nothing for a good reason, and at length 1 it would be noise alone.
 fn rows(h: &Matrix3<f64>, c: &Constraints, made: &mut Vec<RowVector4<f64>>) {
     let (h1, h2, h3): (Vector3<f64>, Vector3<f64>, Vector3<f64>) =
         (h.column(0).into(), h.column(1).into(), h.column(2).into());

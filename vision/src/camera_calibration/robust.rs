@@ -1,5 +1,5 @@
-//! Calibration from views of which some may be of something else, through a lens that may bend: leaves out what does
-//! not fit, and takes as few radial coefficients as the residuals ask for.
+//! Calibration that drops outlier views (a share may show something else) and selects the number of radial
+//! coefficients by an F test on the residuals.
 
 use crate::camera_calibration::{
     calibrate::{CalibrateError, CameraCalibration, calibrate},

@@ -1,4 +1,4 @@
-//! From grey image to quads, one stage a file (method 1 to 3).
+//! Grey image in, quads out, best first (method 1 to 3): the stages in order, on one scale or several.
 
 use crate::{
     detect::{

@@ -76,8 +76,8 @@ pub struct QuadParams {
     pub refit_reach_px: f64,
     /// Smallest step height of an edge point, grey levels.
     pub min_step: f64,
-    /// Most seeds of a scale that are refitted, at most [`MAX_REFITTED`](crate::detect::refine::rating::MAX_REFITTED); half as many
-    /// small ones come on top.
+    /// Most seeds of a scale that are refitted, at most
+    /// [`MAX_REFITTED`](crate::detect::refine::rating::MAX_REFITTED); half as many small ones come on top.
     pub max_refitted: usize,
     /// Most borders of one thing that are rated on a scale.
     pub max_alike: usize,

@@ -1,7 +1,8 @@
 //! Smaller copies of an image, by averaging whole blocks, and quads carried between scales. A large image is searched
 //! at a working scale: sides of quads are long, so nothing is lost but time. Finds nothing itself.
 //!
-//! Departs from method 1, which works at full size: time is bounded, and ornate frames are lines only when seen coarsely.
+//! Departs from method 1, which works at full size: time is bounded, and ornate frames are lines only when seen
+//! coarsely.
 
 use crate::{detect::quad::Quad, frame::GrayImage, geometry::corners::Corners};
 use nalgebra::Point2;

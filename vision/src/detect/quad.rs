@@ -14,9 +14,9 @@ pub enum QuadKind {
     ThreeSided,
 }
 
-/// What a border that was found in a picture is off by besides the noise of its edges, per coordinate: another edge of the
-/// frame, a shadow, a side that bends. The covariance of the corners knows nothing of it: where that says 0.04 px, corners
-/// of rendered posters are 0.2 to 0.4 px off, whatever their size (docs/EVALUATION.md, "Navigation").
+/// What a border that was found in a picture is off by besides the noise of its edges, per coordinate: another edge
+/// of the frame, a shadow, a side that bends. The covariance of the corners knows nothing of it: where that says 0.04
+/// px, corners of rendered posters are 0.2 to 0.4 px off, whatever their size (docs/EVALUATION.md, "Navigation").
 pub const BORDER_SIGMA_PX: f64 = 0.3;
 
 /// A detected quad.

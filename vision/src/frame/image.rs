@@ -1,5 +1,4 @@
-//! What enters the pipeline: a grey image and, when known, the camera's intrinsics. Both are checked here, once;
-//! every later stage may rely on it.
+//! A grey image, checked once: every later stage relies on its size and length.
 
 /// Largest accepted image side, in pixels.
 pub const MAX_SIDE_PX: usize = 8192;

@@ -16,11 +16,11 @@ pub struct IntrinsicsSigmas {
 }
 
 impl IntrinsicsSigmas {
-    /// Of a camera about which nothing is said, as a share of the focal length. Calibrations state 0.1 to 0.5 %, and two
-    /// of them of the same pictures differ by as much as 0.6 %: docs/EVALUATION.md, "Cameras".
+    /// Of a camera about which nothing is said, as a share of the focal length. Calibrations state 0.1 to 0.5 %, and
+    /// two of them of the same pictures differ by as much as 0.6 %: docs/EVALUATION.md, "Cameras".
     pub const USUAL_FOCAL_SHARE: f64 = 0.005;
-    /// Of its principal point, as a share of the focal length: 2 px at 640 x 480. What is wrong with it is mostly the same
-    /// as a turn of the camera, and so in whatever the mounting was found with.
+    /// Of its principal point, as a share of the focal length: 2 px at 640 x 480. What is wrong with it is mostly the
+    /// same as a turn of the camera, and so in whatever the mounting was found with.
     pub const USUAL_CENTER_SHARE: f64 = 0.003;
     /// Largest accepted, as a share of the focal length: beyond it first order says nothing.
     pub const MAX_SHARE: f64 = 0.25;

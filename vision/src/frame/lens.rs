@@ -1,5 +1,5 @@
-//! Lens models of OpenCV and ROS on normalised coordinates (x / z, y / z): bent from straight, straight from bent, both
-//! with their derivatives. Knows nothing of pixels; a lens that cannot be undone at a point says so.
+//! Lens models of OpenCV and ROS on normalised coordinates (x / z, y / z): distortion, its inverse and both
+//! derivatives. A lens that cannot be undone at a point gives `None`.
 
 use nalgebra::{Matrix2, Point2, Vector2};
 use serde::{Deserialize, Serialize};
@@ -63,8 +63,9 @@ impl Distortion {
         }
     }
 
-    /// The straight point that the lens shows at `bent`. `None` where there is none, beyond [`MAX_RAY_RAD`], and where
-    /// the lens folds between the axis and it: there the polynomial describes no lens, and another point looks the same.
+    /// The straight point that the lens shows at `bent`. `None` where there is none, beyond [`MAX_RAY_RAD`], and
+    /// where the lens folds between the axis and it: there the polynomial describes no lens, and another point looks
+    /// the same.
     pub fn undistort(&self, bent: &Point2<f64>) -> Option<Point2<f64>> {
         let start = match *self {
             Self::None => return Some(*bent),

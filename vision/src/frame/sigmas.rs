@@ -1,5 +1,5 @@
-//! How surely a camera's intrinsics are known, and how a wrong camera moves what it sees. First order: a share of the
-//! focal length that fx and fy share, and the principal point. Errors of the lens's coefficients are not modelled.
+//! Standard deviations of intrinsics, and how wrong intrinsics move a pixel. First order: one share of the focal
+//! length for fx and fy, and the principal point. Errors of the lens coefficients are not modelled.
 
 use crate::frame::{
     image::FrameError,
@@ -26,8 +26,8 @@ impl Intrinsics {
     }
 
     /// How the undistorted pixel `straight_px` (see [`Intrinsics::undistort`]) of a given raw pixel would move if the
-    /// camera's (share of the focal length, cx, cy) were more; still written as a pixel of this pinhole. `None` where the
-    /// lens cannot be undone.
+    /// camera's (share of the focal length, cx, cy) were more; still written as a pixel of this pinhole. `None` where
+    /// the lens cannot be undone.
     pub fn straight_by_errors(&self, straight_px: &Point2<f64>) -> Option<Matrix2x3<f64>> {
         let bent = self.distortion.distort(&self.normalised(straight_px));
         let focal = Matrix2::new(self.fx_px, 0.0, 0.0, self.fy_px);

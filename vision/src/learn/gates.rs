@@ -20,9 +20,9 @@ pub struct GateParams {
     pub min_views: usize,
     /// Least saliency F.
     pub min_saliency_f: f64,
-    /// The same where at most one view was photographed; else the limit lies between, by the share of photographed ones. Generated views are flat and registered by construction, so
-    /// F only has to tell texture from a blank panel (1.1), while their corner noise and light are harsher than a
-    /// robot's own.
+    /// The same where at most one view was photographed; else the limit lies between, by the share of photographed
+    /// ones. Generated views are flat and registered by construction, so F only has to tell texture from a blank
+    /// panel (1.1), while their corner noise and light are harsher than a robot's own.
     pub min_saliency_f_generated: f64,
     /// Fewest stable points, where one of the paper's distances decides alone.
     pub min_stable_points: usize,

@@ -1,5 +1,5 @@
-//! The lesson: views of one landmark in, its model out (method 7 to 9 on one page). Thresholds are `fitting`'s.
-//! Collecting views, storing models and telling look-alikes apart is the caller's.
+//! Views of one landmark in, its model out (method 7 to 9 on one page). `threshold_fit` sets the thresholds. The caller
+//! collects views, stores models and names look-alikes.
 
 use crate::{
     icon::Icon,

@@ -1,8 +1,8 @@
-//! Which views of one thing say something that the kept ones do not (method 7.1): seen from another side, larger or
-//! smaller, in another light, or simply looking different. Near-duplicates teach nothing and crowd out the rest.
+//! Which views of one object add something to those kept (method 7.1): another side, size, light or appearance.
+//! Near-duplicates add nothing and crowd out the rest.
 //!
-//! In: corners and icons. Out: how far two views are apart, 1 where they only just differ. It does not say whether they
-//! show the same thing; that is for whoever put them together.
+//! In: corners and icons. Out: how far two views are apart; 1 where they just differ. Whether they show the same
+//! object is not asked.
 
 use crate::{
     geometry::corners::Corners,

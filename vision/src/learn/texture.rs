@@ -1,8 +1,8 @@
-//! A landmark's face lifted off one photograph, to be seen again from elsewhere.
+//! A landmark's face taken from one photograph, to be rendered from elsewhere.
 //!
 //! In: a photograph and the landmark's corners in it. Out: a square texture with some surroundings and two coarser
-//! levels, and small pictures of it under a new homography, filtered to their scale. No light, lens or noise here:
-//! see [`crate::learn::synthesis`].
+//! levels, and small pictures of it under a homography, filtered to their scale. [`crate::learn::synthesis`] adds
+//! light and noise.
 
 use crate::{
     frame::GrayImage,
@@ -128,8 +128,8 @@ impl Level {
         Matrix3::new(scale, 0.0, shift, 0.0, scale, shift, 0.0, 0.0, 1.0)
     }
 
-    /// Adds what a row of pixels shows from `start` on, one to the right each: grey levels bilinearly, and the wall where
-    /// nothing covers it; only wall beyond the margin.
+    /// Adds what a row of pixels shows from `start` on, one to the right each: grey levels bilinearly, and the wall
+    /// where nothing covers it; only wall beyond the margin.
     #[expect(
         clippy::inline_always,
         reason = "an instruction set holds only in what is inlined where it was chosen"

@@ -1,7 +1,7 @@
 //! The threshold tau of one landmark (method 8).
 //!
 //! In: distances of the landmark's own icons and of everything else. Out: tau with its error rates, where the
-//! weighted cost of false positives and false negatives is least. It knows nothing of icons or of which distance.
+//! weighted cost of false positives and false negatives is least.
 
 use crate::model::threshold::{LimitedBy, Threshold, ThresholdError};
 use serde::{Deserialize, Serialize};

@@ -1,5 +1,4 @@
-//! Thresholds of a model from what it must be told from: evidence is added, tau fitted anew, gates asked again. How a
-//! model comes to be is in `lesson.rs`.
+//! Re-fits a model's thresholds when negatives are added; re-evaluates its quality gates.
 
 use crate::{
     icon::Icon,
@@ -90,8 +89,8 @@ pub(crate) fn fitted(evidence: &DistanceSamples, cap: f64, p: &Params) -> Result
     threshold(&own, &others, cap, &p.learn.threshold)
 }
 
-/// The smallest 1 minus likeness of `icons` to the model's exemplars, one laid on the other: what tau of the likeness is
-/// held by. Infinite where nothing is like it. For naming look-alikes.
+/// The smallest 1 minus likeness of `icons` to the model's exemplars, one laid on the other: what tau of the likeness
+/// is held by. Infinite where nothing is like it. For naming look-alikes.
 pub fn unlikeness_of(model: &LandmarkModel, icons: &[IconFeatures], p: &Params) -> f64 {
     let ready = ready(&model.exemplars, p);
     let templates = Templates::new(&ready, p);
@@ -183,7 +182,7 @@ fn fitted_likeness(evidence: &DistanceSamples, p: &Params) -> Result<Threshold, 
 /// Method 9: what the model fails, if anything.
 // Departs from method 9: stable points, and a threshold for each of the paper's distances, are asked only where neither
 // distance has one; what it shows beyond its frame is asked besides. The likeness decides, and one of the two must agree; a picture of few points is told well enough by
-// the other. Where a map's kind is one of the paper's, too few stable points keep a landmark out (recognise/compare.rs).
+// the other. Where a map's kind is one of the paper's, too few stable points keep a landmark out (recognise/retrieval/nearest.rs).
 fn status(model: &LandmarkModel, missing: [Option<Gate>; 3], p: &Params) -> ModelStatus {
     let g = &p.learn.gates;
     let photographed = model.views - model.generated_views;

@@ -12,7 +12,8 @@ use crate::{
 pub struct TrainingView {
     /// The rectified picture, cut out along corners as inexact as the detector's.
     pub icon: Icon,
-    /// The same along its true corners, where those are known: of a generated view. What is laid on it is as exact as they.
+    /// The same along its true corners, where those are known: of a generated view. What is laid on it is as exact as
+    /// they.
     pub exact: Option<Icon>,
     /// Where it was in the image.
     pub corners_px: Corners,

@@ -1,5 +1,5 @@
-//! An icon as a model keeps it: whole grey levels, as bytes, shared by the copies of the model. What follows from it is
-//! worked out when it is asked for; what the paper's own distances ask of every landmark of a map is kept from then on.
+//! An icon as a model keeps it: whole grey levels as bytes, shared by the copies of the model. Features are computed on
+//! demand; those for the paper's distances are kept from then on.
 
 use crate::{
     icon::Icon,

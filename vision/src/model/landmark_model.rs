@@ -1,7 +1,5 @@
-//! What is known of one landmark's appearance (method 7 to 9): the views it is learnt from, the model itself, and
-//! whether the model may be used.
-//!
-//! How a model is made is in `lesson.rs`, how it is stored in `stored.rs`.
+//! The learnt appearance of one landmark, and whether it may be used (method 7 to 9). `learn/lesson.rs` makes it,
+//! `model_bytes.rs` stores it.
 
 use crate::{
     model::{
@@ -77,7 +75,8 @@ pub struct LandmarkModel {
     pub correlation_evidence: DistanceSamples,
     /// What tau of H^r was fitted to.
     pub hausdorff_evidence: DistanceSamples,
-    /// What tau of the likeness was fitted to; those that are nothing like it by their signature count as infinitely far.
+    /// What tau of the likeness was fitted to; those that are nothing like it by their signature count as infinitely
+    /// far.
     pub likeness_evidence: DistanceSamples,
     /// Saliency F (method 9).
     pub saliency_f: f64,
@@ -91,8 +90,8 @@ pub struct LandmarkModel {
     pub photographed_v_c: f64,
     /// Whether it may be used.
     pub status: ModelStatus,
-    /// Points of up to three photographed views (`points/`). Empty where none were given, and in models that were stored
-    /// before there were any: see [`LandmarkModel::knows_points`].
+    /// Points of up to three photographed views (`points/`). Empty where none were given, and in models that were
+    /// stored before there were any: see [`LandmarkModel::knows_points`].
     pub points: Vec<TaughtPoint>,
     /// Points were looked for, even if none were found.
     pub knows_points: bool,

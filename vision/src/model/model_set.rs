@@ -1,5 +1,5 @@
 //! The landmarks that one version of a map recognises: immutable, in the order of their ids, all learnt under the
-//! parameters in use. Whether a model is good enough to be in it is the caller's choice.
+//! parameters in use. The caller chooses which models are good enough.
 
 use crate::{
     model::{landmark_id::LandmarkId, landmark_model::LandmarkModel},
@@ -80,7 +80,8 @@ impl ModelSet {
         Self::with_rivals(models, Vec::new(), p)
     }
 
-    /// Of `all` landmarks those in use; as rivals those that are not, because a distance does not tell them from others.
+    /// Of `all` landmarks those in use; as rivals those that are not, because a distance does not tell them from
+    /// others.
     pub fn in_use(all: impl Iterator<Item = Arc<LandmarkModel>>, p: &Params) -> Result<Self, ModelSetError> {
         let (active, others): (Vec<_>, Vec<_>) = all.partition(|m| m.is_active());
         let rivals = others.into_iter().filter(|m| m.overlaps_others()).collect();

@@ -60,6 +60,6 @@ pub enum ThresholdError {
     #[error("every own distance is infinite: too few points")]
     NothingFinite,
     /// Refusing everything is cheapest.
-    #[error("the landmark cannot be told from others: refusing everything costs least")]
+    #[error("no threshold separates this landmark from the negatives: refusing everything costs least")]
     Overlap,
 }

@@ -1,14 +1,16 @@
-//! The identity of the distances: which settings a stored threshold was learnt under. An explicit list of numbers is hashed, so
-//! that renaming a field changes nothing and changing a number does.
+//! The identity of the distances: the settings that a stored threshold was learnt under. An explicit list of numbers is
+//! hashed: renaming a field changes nothing, changing a number does.
 
 use crate::params::Params;
 
-/// Raised when the same numbers give other distances: an algorithm of icon, points, descriptors, ranks or alignment changed.
+/// Raised when the same numbers give other distances: an algorithm of icon, points, descriptors, ranks or alignment
+/// changed.
 const VERSION: u64 = 1;
 
 impl Params {
-    /// Names the settings that define the distances: icon, points, descriptor, ranks, alignment. A threshold learnt under one
-    /// hash means nothing under another. FNV-1a, 64 bits, of a version and of the numbers, each group preceded by its length.
+    /// Names the settings that define the distances: icon, points, descriptor, ranks, alignment. A threshold learnt
+    /// under one hash means nothing under another. FNV-1a, 64 bits, of a version and of the numbers, each group
+    /// preceded by its length.
     pub fn distance_hash(&self) -> u64 {
         let groups = self.distance_numbers();
         let words = groups.iter().flat_map(|group| {
@@ -24,7 +26,8 @@ impl Params {
         hash == self.distance_hash() || hash == self.distance_hash_of_text()
     }
 
-    /// Every number that defines the distances, by stage. Only ever appended to; a change of order or meaning raises [`VERSION`].
+    /// Every number that defines the distances, by stage. Only ever appended to; a change of order or meaning raises
+    /// [`VERSION`].
     fn distance_numbers(&self) -> [Vec<f64>; 6] {
         let (icon, r) = (&self.icon, &self.recognise);
         let (harris, descriptor) = (&r.harris, &r.descriptor);
@@ -49,8 +52,8 @@ impl Params {
         ]
     }
 
-    /// The hash that builds before 2026-11-23 stored: of a text with the names that types and fields had then. The text is frozen;
-    /// only databases of those builds need it.
+    /// The hash that builds before 2026-11-23 stored: of a text with the names that types and fields had then. The
+    /// text is frozen; only databases of those builds need it.
     fn distance_hash_of_text(&self) -> u64 {
         let (icon, r) = (&self.icon, &self.recognise);
         let (h, d, c, f, a) = (&r.harris, &r.descriptor, &r.correlation, &r.hausdorff, &r.verdict.align);
@@ -102,8 +105,8 @@ fn fnv1a(bytes: impl Iterator<Item = u8>) -> u64 {
 mod tests {
     use super::*;
 
-    /// Of the default settings. A change here puts every stored model of every installation out of use: it needs a raised
-    /// [`VERSION`] and a migration.
+    /// Of the default settings. A change here puts every stored model of every installation out of use: it needs a
+    /// raised [`VERSION`] and a migration.
     const DEFAULT: u64 = 0xc207_d0a0_41ff_bfb9;
     /// What the builds before 2026-11-23 stored for the default settings.
     const DEFAULT_OF_TEXT: u64 = 0xe31b_6db6_d7dd_08be;

@@ -1,4 +1,4 @@
-//! A landmark's points and where they should be seen in; whether the patch looks like each of them there out. No
+//! A landmark's points with their expected places in, whether the patch looks like each of them there out. No
 //! keypoint need be found in the patch: the descriptor is taken where the homography puts it.
 
 use crate::{

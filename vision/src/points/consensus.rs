@@ -1,5 +1,5 @@
-//! Tentative matches in, the homography that most of them agree on out. Deterministic: hypotheses come from pairs of the
-//! best matches, in their order.
+//! Tentative matches in, the homography that most of them agree on out. Deterministic: hypotheses come from pairs of
+//! the best matches, in their order.
 //!
 //! A patch is rectified already, so that a pair of matches (a scale along each axis and a translation) starts close
 //! enough for the refits, which free the affine and then the perspective part.

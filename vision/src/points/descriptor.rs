@@ -102,8 +102,8 @@ pub fn describe(octave: &Octave, window: &Window) -> (Descriptor, f32) {
     })
 }
 
-/// A line of samples, the same for rows and columns and for every window: where each lies from the centre, in cells, and
-/// its weight. Samples lie between the centres of one cell and the next, padding included, [`PER_CELL`] in a row.
+/// A line of samples, the same for rows and columns and for every window: where each lies from the centre, in cells,
+/// and its weight. Samples lie between the centres of one cell and the next, padding included, [`PER_CELL`] in a row.
 struct Line {
     from_centre: [f32; PADDED],
     weight: [f32; PADDED],

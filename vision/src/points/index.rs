@@ -1,5 +1,5 @@
-//! The points of all landmarks of a map, by word: a patch's points vote for landmarks without being compared with every one
-//! of theirs. Half of each descriptor is kept here, enough for votes; matches are made with the landmarks' own points.
+//! The points of all landmarks of a map, by word: a patch's points vote for landmarks without being compared with all
+//! of them. Half of each descriptor is kept here, enough for votes.
 
 use crate::points::{
     point::Point,
@@ -81,10 +81,10 @@ impl PointIndex {
         self.entries.len() * size_of::<Entry>() + self.starts.len() * size_of::<u32>()
     }
 
-    /// The `count` models with most votes of `points`, most first, of equal ones the lower index; those with less than
-    /// `least` are left out. Each with its votes: a point votes for the landmarks of its nearest neighbours, by how much
-    /// nearer they are than the next landmark's, so that what many landmarks show counts for little, but never for nothing:
-    /// more landmarks than that may have the same picture.
+    /// The `count` models with most votes of `points`, most first, of equal ones the lower index; those with less
+    /// than `least` are left out. Each with its votes: a point votes for the landmarks of its nearest neighbours, by
+    /// how much nearer they are than the next landmark's, so that what many landmarks show counts for little, but
+    /// never for nothing: more landmarks than that may have the same picture.
     pub fn vote(&self, points: &[Point], count: usize, least: u32) -> Vec<(usize, u32)> {
         if self.is_empty() {
             return Vec::new();

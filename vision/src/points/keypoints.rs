@@ -153,8 +153,8 @@ fn marked(peaks: &[u8]) -> impl Iterator<Item = usize> {
     parts.flat_map(|(start, part)| (start..).zip(part).filter(|(_, mark)| **mark != 0).map(|(x, _)| x))
 }
 
-/// Marks what may be an extremum in a row that begins at `start`: strong enough, and beyond its neighbours to the left, the
-/// right, and at the two next scales.
+/// Marks what may be an extremum in a row that begins at `start`: strong enough, and beyond its neighbours to the
+/// left, the right, and at the two next scales.
 #[expect(
     clippy::inline_always,
     reason = "an instruction set holds only in what is inlined where it was chosen"

@@ -39,8 +39,8 @@ pub fn inner_px(corners_px: &Corners) -> usize {
 }
 
 impl Patch {
-    /// Rectifies what `corners_px` enclose to `inner` x `inner` pixels, with [`MARGIN`] around. What lies outside of the
-    /// image repeats its border. `None` where the corners are degenerate or the margin reaches the horizon.
+    /// Rectifies what `corners_px` enclose to `inner` x `inner` pixels, with [`MARGIN`] around. What lies outside of
+    /// the image repeats its border. `None` where the corners are degenerate or the margin reaches the horizon.
     pub fn new(image: &GrayImage, corners_px: &Corners, inner: usize) -> Option<Self> {
         let margin = (inner as f64 * MARGIN).round() as usize;
         let side = inner + 2 * margin;

@@ -1,5 +1,5 @@
-//! What tells nothing of a landmark's identity: straight edges, bars and right angles along the sides of its rectangle.
-//! Frames, mats, panels, window bars and door leaves consist of them, and so do their strangers.
+//! Descriptors that do not identify a landmark: straight edges, bars and right angles along the sides of its rectangle.
+//! Frames, mats, panels, window bars and door leaves have them, and so do distractors.
 
 use crate::points::{
     descriptor::{Descriptor, VALUES, Window, describe},

@@ -1,5 +1,4 @@
-//! Point evidence for the identity of a landmark: keypoints on a rectified patch, matches with what was taught, a
-//! homography, and how improbable so many consistent matches are by chance.
+//! A described keypoint, and a patch with its keypoints.
 
 use crate::points::{
     descriptor::{Descriptor, Window, describe},

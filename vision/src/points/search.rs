@@ -1,5 +1,5 @@
-//! A quad and the landmarks of a map in, the landmarks that points speak for out: votes by the index, homographies for the
-//! landmarks with most votes, verification of the best of these.
+//! A quad and the landmarks of a map in, the landmarks with point evidence out: votes by the index, homographies for
+//! the landmarks with most votes, verification of the best of these.
 
 use crate::{
     detect::quad::Quad,
@@ -23,8 +23,8 @@ const MIN_VOTES: u32 = 4;
 /// Landmarks with less than this share of the most votes are left out: what looks like the landmark that is there gets
 /// about as many.
 const MIN_VOTES_SHARE: f64 = 0.2;
-/// Once a landmark is beyond doubt, others are verified if at least this share of their matches agrees on the homography:
-/// a look-alike agrees with most, an accident with a few.
+/// Once a landmark is beyond doubt, others are verified if at least this share of their matches agrees on the
+/// homography: a look-alike agrees with most, an accident with a few.
 const MIN_RIVAL_SHARE: f64 = 0.25;
 /// log10 of the false alarms in one comparison from which on a landmark is beyond doubt.
 const LOG10_SURE: f64 = -12.0;

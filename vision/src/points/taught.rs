@@ -101,8 +101,8 @@ impl TaughtPoint {
     }
 }
 
-/// The points of one photographed view: those on the landmark that are no plain structures, strongest first. Empty where
-/// the corners are degenerate.
+/// The points of one photographed view: those on the landmark that are no plain structures, strongest first. Empty
+/// where the corners are degenerate.
 pub fn view_points(image: &GrayImage, corners_px: &Corners) -> Vec<TaughtPoint> {
     let Some(patch) = Patch::new(image, corners_px, inner_px(corners_px).min(INNER_PX[0])) else {
         return Vec::new();
@@ -113,8 +113,8 @@ pub fn view_points(image: &GrayImage, corners_px: &Corners) -> Vec<TaughtPoint> 
     seen.points.iter().filter(|p| inside(p)).map(of).filter(|p| p.plain() >= MIN_PLAIN_DISTANCE).collect()
 }
 
-/// The points of a landmark from those of its photographed views: of up to [`MAX_POINT_VIEWS`] views, evenly chosen, each
-/// with what the ones before do not show. At most [`MAX_LANDMARK_POINTS`].
+/// The points of a landmark from those of its photographed views: of up to [`MAX_POINT_VIEWS`] views, evenly chosen,
+/// each with what the ones before do not show. At most [`MAX_LANDMARK_POINTS`].
 pub fn landmark_points(views: &[Vec<TaughtPoint>]) -> Vec<TaughtPoint> {
     let chosen = views.len().min(MAX_POINT_VIEWS);
     let mut kept: Vec<TaughtPoint> = Vec::new();

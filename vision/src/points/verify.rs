@@ -1,6 +1,6 @@
-//! Whether a patch shows a landmark: matches, homography, and then every other point of the landmark where the homography
-//! puts it. The search for the homography uses up the evidence of the points that it was found by; the others were not
-//! asked before, so that their agreement counts at its full improbability.
+//! Whether a patch shows a landmark: matches, homography, and then every other point of the landmark where the
+//! homography puts it. The search for the homography uses up the evidence of the points that it was found by; the
+//! others were not asked before, so that their agreement counts at its full improbability.
 
 use crate::{
     detect::quad::BORDER_SIGMA_PX,
@@ -222,8 +222,8 @@ fn corners(
     Some((corners, std::array::from_fn(of)))
 }
 
-/// The evidence for ONE landmark, whose corners are expected at `predicted_px` (TL first), whatever was detected there and
-/// also where the image shows only a part of it. `None`: no homography that would be worth a look.
+/// The evidence for ONE landmark, whose corners are expected at `predicted_px` (TL first), whatever was detected
+/// there and also where the image shows only a part of it. `None`: no homography that would be worth a look.
 pub fn verify_at(image: &GrayImage, taught: &[TaughtPoint], predicted_px: &Corners) -> Option<PointEvidence> {
     let patch = Patch::new(image, predicted_px, inner_px(predicted_px))?;
     let seen = SeenPatch::new(patch, MAX_PATCH_POINTS);

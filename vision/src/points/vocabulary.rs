@@ -1,5 +1,5 @@
-//! A division of all descriptors into words, so that a point is compared with a few of a map's points only. It is the same
-//! for every map: its medoids are descriptors of generated textures, in two levels.
+//! A division of all descriptors into words, so that a point is compared with few points of a map. The same for every
+//! map: its medoids are descriptors of generated textures, in two levels.
 
 use crate::{
     frame::GrayImage,

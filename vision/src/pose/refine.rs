@@ -115,7 +115,8 @@ impl<'a> Problem<'a> {
         Some(pose)
     }
 
-    /// The solution at a minimum, with `(J^T S^-1 J)^-1` scaled by max(1, chi2 / 5.99). `None` when it is not determined.
+    /// The solution at a minimum, with `(J^T S^-1 J)^-1` scaled by max(1, chi2 / 5.99). `None` when it is not
+    /// determined.
     // Departs from method 13.5 (max(1, chi2 / 2)): with 2 degrees of freedom that factor exceeds 1 in 37 % of honest
     // draws and makes the mean NEES 5.1 instead of 6, outside the band that honesty asks for. Scaling from the 95 %
     // quantile on still answers corners that are worse than they claim.

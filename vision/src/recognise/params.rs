@@ -44,9 +44,9 @@ pub struct VerdictParams {
     pub signature_gap: f32,
     /// Landmarks up to which tau of the likeness holds as it is.
     pub crowd: usize,
-    /// From there on tau shrinks by this share with every factor of e: the more landmarks, the nearer the nearest of them
-    /// is to any stranger. On 732 quads of other buildings among 267 landmarks, strangers within a ratio grow by e with
-    /// 0.08 of ratio.
+    /// From there on tau shrinks by this share with every factor of e: the more landmarks, the nearer the nearest of
+    /// them is to any stranger. On 732 quads of other buildings among 267 landmarks, strangers within a ratio grow by
+    /// e with 0.08 of ratio.
     pub crowd_share: f64,
     /// A landmark whose likeness uses more than this share of its tau...
     pub doubtful_share: f64,
@@ -65,8 +65,8 @@ pub struct VerdictParams {
     /// Whether points decide where icons would (`both`); what they say nothing of is left to the icons. See
     /// `docs/method/25-recognition-by-points.md`.
     pub points: bool,
-    /// Landmarks with more points than this are never accepted by their icons: their points would have said so. One with
-    /// fewer that its icon speaks for is ambiguous, with [`Refusal::Plain`]: the robot's pose may name it.
+    /// Landmarks with more points than this are never accepted by their icons: their points would have said so. One
+    /// with fewer that its icon speaks for is ambiguous, with [`Refusal::Plain`]: the robot's pose may name it.
     pub max_icon_points: usize,
     /// How corners are moved.
     pub align: AlignParams,
@@ -101,8 +101,8 @@ impl Default for VerdictParams {
 pub(crate) const LEAST_TAU_SHARE: f64 = 0.5;
 
 impl VerdictParams {
-    /// The share of tau of the likeness that holds among `landmarks`: as many strangers are accepted by a large map as by
-    /// one of `crowd` landmarks.
+    /// The share of tau of the likeness that holds among `landmarks`: as many strangers are accepted by a large map
+    /// as by one of `crowd` landmarks.
     pub fn tau_share(&self, landmarks: usize) -> f64 {
         let crowds = landmarks.max(1) as f64 / self.crowd.max(1) as f64;
         (1.0 - self.crowd_share * crowds.ln().max(0.0)).clamp(LEAST_TAU_SHARE, 1.0)

@@ -1,4 +1,4 @@
-//! Who wants to know how far the recognition of a quad is: for timing. Says nothing about results.
+//! Reports each step of the recognition of a quad, for timing. It does not change results.
 
 /// The steps of recognising one quad, in their order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]

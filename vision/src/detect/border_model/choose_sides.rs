@@ -1,6 +1,6 @@
-//! Which of the lines beside each side of a quad is its border: the shadow under a frame, the inner edge of a mat and
-//! the edge of the picture next to it all look like sides. A quad in, the same with every side on its likeliest line
-//! out. Measurements of each line are weighed by a small network that was fitted on labelled photographs.
+//! Snaps every side of a quad to the line beside it that is most likely its border. A shadow under a frame, the inner
+//! edge of a mat and the edge of the picture next to it all look like sides. A small network weighs the measurements
+//! of each line. In: corners. Out: corners on the likeliest lines, with their measurements.
 //!
 //! Departs from method 3.6, which refits a side on the nearest edge only. See docs/method/24-default-detector.md.
 

@@ -1,13 +1,14 @@
-//! A small network: one layer of hidden units beside a linear path, one output. Measurements in, a number out. What
-//! `side_model` and `thing_model` weigh their measurements with. It learns elsewhere.
+//! A small network: one layer of hidden units beside a linear path, one output. Measurements in, a number out.
+//! `choose_sides` and `quad_classifier` use it. Training is in the laboratory (`lab/src/train`).
 
 use serde::{Deserialize, Serialize};
 
 /// Measurements further from their mean than this many standard deviations count as this far.
 const CLIP: f64 = 4.0;
 
-/// The weights. With `n` measurements and `h` hidden units: `output = bias + linear . x + hidden_out . tanh(hidden_bias +
-/// hidden_in x)`, with `x` the measurements scaled by `mean` and `deviation` and clipped to 4 deviations.
+/// The weights. With `n` measurements and `h` hidden units: `output = bias + linear . x + hidden_out .
+/// tanh(hidden_bias + hidden_in x)`, with `x` the measurements scaled by `mean` and `deviation` and clipped to 4
+/// deviations.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Network {

@@ -1,8 +1,8 @@
-//! Whether a quad is the border of a flat thing at all, or lines that happen to meet: joints of tiles, a wall between two
-//! corners, strokes inside a picture. The measurements of its four sides in, a probability out. The weights were fitted
-//! on labelled photographs and renderings.
+//! The probability that a quad is the border of a flat object, not lines that happen to meet: joints of tiles, a wall
+//! between two corners, strokes inside a picture. In: the measurements of its four sides. Out: a probability.
+//! The weights were fitted on labelled photographs and renderings.
 //!
-//! Departs from method 3.6, whose score (similarity times support) tells how well a quad is seen, not what it is.
+//! Departs from method 3.6, whose score (similarity times support) says how well a quad is seen, not what it is.
 
 use crate::detect::border_model::{
     network::Network,
@@ -15,10 +15,11 @@ pub const THING_FEATURES: usize = 3 * SIDE_FEATURES + WHOLE_FEATURES;
 /// Measurements of the quad as a whole.
 const WHOLE_FEATURES: usize = 10;
 
-/// The measurements of a quad in an image of some width and height: mean, smallest and largest of each measurement of a
-/// side; its support score; log of its mean side in pixels; how much the sides differ in the tone of the wall, just
-/// outside and just inside; how alike their steps are, 0 to 1; sine of the sharpest corner; of opposite sides the log of
-/// the length ratio, of the pair that differs less and of the other; how far corners lie outside the image, in mean sides.
+/// The measurements of a quad in an image of some width and height: mean, smallest and largest of each measurement of
+/// a side; its support score; log of its mean side in pixels; how much the sides differ in the tone of the wall, just
+/// outside and just inside; how alike their steps are, 0 to 1; sine of the sharpest corner; of opposite sides the log
+/// of the length ratio, of the pair that differs less and of the other; how far corners lie outside the image, in
+/// mean sides.
 pub fn thing_features(
     sides: &[SideMeasurement; 4],
     corners_px: &[Point2<f64>; 4],

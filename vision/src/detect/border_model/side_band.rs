@@ -1,6 +1,5 @@
-//! What runs beside a supposed side of a quad: the band of image around it, unrolled, with the lines in it that edges
-//! support. Two points in; what is measured along a line comes out. Finding the lines is `side_lines`', which of them is
-//! the border `side_model`'s.
+//! The band of image around a supposed side, unrolled, with the lines in it that edges support. In: two points. Out:
+//! what is measured along each line. `side_lines` finds the lines, `choose_sides` picks the border.
 
 use crate::detect::{
     border_model::side_lines::{self, Peak, SideLine},

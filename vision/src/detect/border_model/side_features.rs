@@ -1,8 +1,5 @@
-//! Which of the lines beside each side of a quad is its border: the shadow under a frame, the inner edge of a mat and
-//! the edge of the picture next to it all look like sides. A quad in, the same with every side on its likeliest line
-//! out. Measurements of each line are weighed by a small network that was fitted on labelled photographs.
-//!
-//! Departs from method 3.6, which refits a side on the nearest edge only. See docs/method/24-default-detector.md.
+//! The lines beside the sides of a quad in, 28 measurements of each out: of the band beside the line, and of the two
+//! corners that it makes with the neighbouring sides.
 
 use crate::detect::{
     border_model::{
@@ -37,8 +34,8 @@ pub struct LogGreyLevels {
     pub outside: f64,
     /// Just inside.
     pub inside: f64,
-    /// Log of the step in grey levels, 2 added, positive where it is brighter on the one side; times how alike its signs
-    /// are.
+    /// Log of the step in grey levels, 2 added, positive where it is brighter on the one side; times how alike its
+    /// signs are.
     pub step: f64,
 }
 
@@ -119,11 +116,11 @@ impl<'a> Sides<'a> {
     }
 
     /// 0 support, 1 how alike the signs of its steps are, 2 log of the step; roughness of the strips beside it: 3 just
-    /// outside, 4 further outside, 5 and 6 the same inside; log ratio of grey just outside to the wall further out,
-    /// 7 signed and 8 absolute, 9 and 10 the same of just inside; 11 log of blur; 12 weight of the heaviest line further
-    /// out and 13 further in, 14 largest support further out, 15 number of lines further out; share of samples with
-    /// an edge further out, 16 weak and 17 stronger; 18 how much the strip to the next line inside looks like a shadow on
-    /// the wall, 19 the strip from the next line outside.
+    /// outside, 4 further outside, 5 and 6 the same inside; log ratio of grey just outside to the wall further out, 7
+    /// signed and 8 absolute, 9 and 10 the same of just inside; 11 log of blur; 12 weight of the heaviest line
+    /// further out and 13 further in, 14 largest support further out, 15 number of lines further out; share of
+    /// samples with an edge further out, 16 weak and 17 stronger; 18 how much the strip to the next line inside looks
+    /// like a shadow on the wall, 19 the strip from the next line outside.
     pub(crate) fn band_features(&self, side: usize, line: usize) -> ([f64; BAND_FEATURES], LogGreyLevels) {
         let Some(band) = &self.bands[side] else { return ([0.0; BAND_FEATURES], LogGreyLevels::default()) };
         let (c, extent) = (band.lines[line], self.extent_px[side]);
@@ -175,10 +172,10 @@ impl<'a> Sides<'a> {
         (features, tones)
     }
 
-    /// What the two neighbouring sides do at the corners with a line, as a share of what they do along their own length:
-    /// at the border of a thing they are there just before the corner and gone just after. Of the two: 0 smallest and 1
-    /// mean step inwards, 2 smallest support inwards, 3 largest step outwards, 4 largest and 5 mean support outwards, 6
-    /// largest difference of the inward step from the side's own, 7 mean step outwards.
+    /// What the two neighbouring sides do at the corners with a line, as a share of what they do along their own
+    /// length: at the border of a thing they are there just before the corner and gone just after. Of the two: 0
+    /// smallest and 1 mean step inwards, 2 smallest support inwards, 3 largest step outwards, 4 largest and 5 mean
+    /// support outwards, 6 largest difference of the inward step from the side's own, 7 mean step outwards.
     pub(crate) fn corner_features(
         &self,
         side: usize,

@@ -1,5 +1,4 @@
-//! The straight lines among the edge points of a band: points in, lines out, the best supported first. What the points
-//! are and what is measured along a line is `side_band`'s.
+//! The straight lines among the edge points of a band. In: points. Out: lines, the best supported first.
 
 /// Most lines of a band, the best supported first.
 pub(crate) const MAX_LINES: usize = 24;
@@ -40,7 +39,8 @@ pub(crate) struct Peak {
 /// Which rows have an edge point within about a pixel and a half of a line, for an offset and every slope.
 type Votes = [u64; ALL_SLOPES];
 
-/// Lines by Hough transform over offset and slope, each refitted. `first_px` is the offset of the first of the `columns`.
+/// Lines by Hough transform over offset and slope, each refitted. `first_px` is the offset of the first of the
+/// `columns`.
 #[expect(
     clippy::inline_always,
     reason = "an instruction set holds only in what is inlined where it was chosen"

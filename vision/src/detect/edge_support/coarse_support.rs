@@ -1,5 +1,6 @@
-//! A coarse look at the sides of a supposed quad: which share of each an edge follows, and whether it is the same step
-//! all round. Corners and gradient planes in, a number to rank seeds by out; where the edges run exactly is `evidence`'s.
+//! Coarse edge support of a quad proposal: the share of each side that an edge follows, and whether it is the same
+//! step all round. In: corners and gradient planes. Out: a number that ranks proposals. `side_support` measures
+//! exactly.
 
 use crate::detect::edge_support::{
     fixed_point::Fixed,

@@ -1,5 +1,5 @@
-//! Points of an image in fixed point, for those who look at thousands of pixels along lines: going on is an addition,
-//! and the pixel around a point a shift. Numbers in, indices of pixels out.
+//! Points of an image in fixed point, for loops over thousands of pixels along lines: a step is an addition, the
+//! pixel of a point a shift. In: coordinates. Out: indices of pixels.
 
 use nalgebra::{Point2, Vector2};
 

@@ -1,5 +1,5 @@
-//! The straight line through edge points found along a side, to a fraction of a pixel (method 3.6). Points in, a line
-//! with its variance out; `evidence` looks for the points.
+//! The straight line through edge points along a side, to a fraction of a pixel (method 3.6). In: points, which
+//! `side_support` finds. Out: a line with its variance.
 
 use nalgebra::{Point2, Vector2};
 

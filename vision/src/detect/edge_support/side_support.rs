@@ -1,5 +1,5 @@
-//! What the gradient planes say about a supposed side: which share of it an edge supports, and where that edge runs
-//! to a fraction of a pixel (method 3.6). Takes two points, gives a line with its variance; forms no hypotheses.
+//! Edge support of a side: the share of it that an edge supports, and where that edge runs, to a fraction of a pixel
+//! (method 3.6). In: two points. Out: a line with its variance.
 
 use crate::detect::edge_support::{
     fixed_point::Fixed,

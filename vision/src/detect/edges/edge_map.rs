@@ -106,9 +106,9 @@ impl EdgeMap {
     /// Sub-pixel position of the edge through edge pixel `at` (row-major index, off the border): the vertex of a
     /// parabola along the gradient, at most half a step away.
     ///
-    /// Departs from method 1.2, where the parabola goes through the magnitudes m: here it goes through `1 / sqrt(m)`. The
-    /// filter answers a step by `(1 + a |x|) exp(-a |x|)`, which is more pointed than a parabola: that pulled positions to
-    /// the middle of the pixel, by up to 0.05 px and along a diagonal side everywhere alike.
+    /// Departs from method 1.2, where the parabola goes through the magnitudes m: here it goes through `1 / sqrt(m)`.
+    /// The filter answers a step by `(1 + a |x|) exp(-a |x|)`, which is more pointed than a parabola: that pulled
+    /// positions to the middle of the pixel, by up to 0.05 px and along a diagonal side everywhere alike.
     pub fn position_px(&self, at: usize) -> Point2<f64> {
         let (behind, ahead, step) = self.along_gradient(at);
         // Roots, and numerator and denominator times all three.

@@ -15,8 +15,8 @@ fn normal_integral(x: f64) -> f64 {
     if x < 0.0 { tail } else { 1.0 - tail }
 }
 
-/// A straight edge of 80 levels, `shift` from the middle along `normal`, blurred like a lens does and then averaged over
-/// the pixels.
+/// A straight edge of 80 levels, `shift` from the middle along `normal`, blurred like a lens does and then averaged
+/// over the pixels.
 fn picture(normal: Vector2<f64>, shift: f64, blur_px: f64, sigma: f64, noise: &mut Noise) -> GrayImage {
     GrayImage::from_fn(SIDE_PX, SIDE_PX, |u, v| {
         let offset = |i: usize| (i as f64 + 0.5) / 4.0 - 0.5 - MIDDLE_PX;

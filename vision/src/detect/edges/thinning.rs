@@ -97,8 +97,8 @@ pub(crate) fn changing_ring_code(marks: &[u8], width: usize, at: usize) -> usize
         | (bit(below[1], 4) | bit(below[0], 5) | bit(level[0], 6) | bit(above[0], 7))
 }
 
-/// Clears staircase corners in `marks` and `pixels` (row-major, none within two rows of the border) alike. Of two corners
-/// that touch, the weaker goes: which one must not depend on how the image lies. `corners` is scratch.
+/// Clears staircase corners in `marks` and `pixels` (row-major, none within two rows of the border) alike. Of two
+/// corners that touch, the weaker goes: which one must not depend on how the image lies. `corners` is scratch.
 pub(crate) fn thin(
     marks: &mut [u8],
     width: usize,

@@ -1,6 +1,6 @@
-//! Quads of two segments that face each other, their ends its corners: of a small, blurred or rounded thing the other two
-//! sides are too short to be segments. Segments in, rough corners out; whether there is anything between the ends is
-//! asked by `hypotheses`.
+//! Quad proposals from two segments that face each other, their ends the corners. The other two sides of a small,
+//! blurred or rounded object are too short to be segments. In: segments. Out: rough corners; `quad_proposals` checks
+//! their sides.
 //!
 //! Departs from method 2, where the sides of such a pair are scored by cues: here the gradient decides.
 

@@ -1,7 +1,6 @@
-//! Quads by search, past the paper's two relaxations: segments that meet in corners are followed round, four in a
-//! circle or three with the fourth side looked for in the gradient planes, or two that face each other are taken for
-//! opposite sides, and every hypothesis must be supported by edges along all four sides. Segments in, seeds out; which of
-//! them become quads is decided by `selection`.
+//! Quad proposals, the default instead of the paper's two relaxations. Segments that meet in corners are followed
+//! round: four in a circle, or three with the fourth side looked for in the gradient planes, or two that face each
+//! other. Edges must support all four sides. In: segments. Out: proposals; `suppression` decides which become quads.
 //!
 //! Departs from method 3.3, 3.4: there a segment takes part in one pair and a pair in one quad, and a side that the
 //! segments miss loses the quad. What it gains: docs/method/24-default-detector.md.

@@ -1,6 +1,6 @@
-//! Sides refitted in the image as it came: a large image is searched at a working scale, and a fraction of a pixel there
-//! is several times as much here. Quads in coordinates of the full image in, the same quads with sharper corners out.
-//! Finds and drops nothing.
+//! Refits sides in the image as it came: a large image is searched at a working scale, where a fraction of a pixel is
+//! several times as much. In: quads in coordinates of the full image. Out: the same quads with sharper corners, none
+//! dropped.
 
 use crate::{
     detect::{

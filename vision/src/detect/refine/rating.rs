@@ -1,5 +1,5 @@
-//! Which seeds are worth a closer look: seeds in, the best of them refitted and rated by the edges along their sides out.
-//! They may contradict each other; which of them stay is `selection`'s.
+//! Quad proposals in, the best of them refitted and scored by the edges along their sides out. They may conflict with
+//! each other; `suppression` decides which stay.
 
 use crate::detect::{
     edge_support::{gradients::Gradients, side_support::EdgeProbeParams},

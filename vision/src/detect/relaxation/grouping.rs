@@ -1,5 +1,6 @@
-//! The two relaxations of the method with their constraint tables (method 3.3, 3.4): candidate pairs in, matched
-//! pairs out; matched pairs in, quads out. The solver is in `relaxation`; three-sided sets are in `three_sided`.
+//! The two relaxations of the method with their constraint tables (method 3.3, 3.4). In: candidate pairs, then
+//! matched pairs. Out: matched pairs, then quad proposals. `labelling` is the solver; `three_sided` makes sets of
+//! three sides.
 
 use crate::{
     detect::{

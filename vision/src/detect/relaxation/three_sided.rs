@@ -1,6 +1,5 @@
-//! Sets of three sides (method 3.5): what pass 2 left over, closed by a segment that pass 1 left over. Doors and
-//! occluded posters. The search's own way is in `leftover`. Whoever confirms the fourth side makes them full quads; here
-//! they stay three-sided.
+//! Sets of three sides of the paper's grouping (method 3.5): pairs that pass 2 left over, closed by a segment that
+//! pass 1 left over. Doors and occluded posters. They stay three-sided.
 
 use crate::detect::{
     proposals::quad_seed::{QuadSeed, corner_of, plausible},

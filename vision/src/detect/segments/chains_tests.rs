@@ -97,8 +97,8 @@ fn shared(a: &[EdgeChain], b: &[EdgeChain], map: Map) -> f64 {
     a.iter().filter(near).count() as f64 / a.len() as f64
 }
 
-/// Lengths and kinds of the chains, to a pixel or two: which pixel of a junction or a staircase stays depends on how the
-/// image lies.
+/// Lengths and kinds of the chains, to a pixel or two: which pixel of a junction or a staircase stays depends on how
+/// the image lies.
 fn same_lengths(a: &[EdgeChain], b: &[EdgeChain]) -> bool {
     let lengths = |chains: &[EdgeChain]| {
         let mut all: Vec<_> = chains.iter().map(|c| (c.closed, c.points.len())).collect();

@@ -233,7 +233,8 @@ impl Polyline {
         }
     }
 
-    /// Inner point with the largest distance to the chord of `range`, if that exceeds the tolerance; the first of equals.
+    /// Inner point with the largest distance to the chord of `range`, if that exceeds the tolerance; the first of
+    /// equals.
     fn corner(&self, range: &Range<usize>, tolerance_px: f64) -> Option<usize> {
         if range.len() < 3 {
             return None;

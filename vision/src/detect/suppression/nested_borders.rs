@@ -1,6 +1,6 @@
-//! Which border of a thing is its quad (method 3.6): frames, mats and canvases give nested near-equal quads, and an
-//! icon must not flip between them. Groups nested quads, outputs the outermost that edges support well, keeps the
-//! others as alternates.
+//! The canonical border of an object (method 3.6). Frames, mats and canvases give nested near-equal quads, and an
+//! icon must not flip between them. In: quads. Out: of each group the outermost that edges support well; the others
+//! are alternates.
 
 use crate::{
     detect::{proposals::quad_seed::overlap_exceeds, quad::Quad},

@@ -1,6 +1,6 @@
-//! What becomes of a quad that lies inside another (method 3.6): the content of a picture or a text box on it is no
-//! landmark of its own, a poster on a door may be one. Chosen quads in, the same with such quads as alternates of the
-//! outer one out: recognition tries them as further borders. Borders of one thing are `border`'s.
+//! Quads inside other quads (method 3.6): the content of a picture or a text box on it is no landmark, a poster on a
+//! door may be one. In: chosen quads. Out: the same with inner quads as alternates of the outer one, which
+//! recognition tries as well.
 
 use crate::{
     detect::{

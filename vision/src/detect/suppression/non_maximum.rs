@@ -1,6 +1,5 @@
-//! Which rated quads stay: quads that may contradict each other in, those with their sides moved to borders, told from
-//! chance, that contradict no better one out. Nested quads may stay together, quads that partly cross may not. Which line
-//! is a side is `side_model`'s, what is a thing `thing_model`'s, which of nested borders is canonical `border`'s.
+//! Non-maximum suppression. In: scored quads that may conflict. Out: quads with their sides on borders, each more
+//! likely an object than those it conflicts with. Nested quads may both stay; quads that cross may not.
 
 use crate::{
     detect::{
@@ -82,8 +81,8 @@ fn different(mut rated: Vec<ScoredQuad>, p: &QuadParams) -> Vec<Quad> {
     different
 }
 
-/// Whether two quads cannot both be there: they cross, or one edge would belong to both. Two borders of one thing differ
-/// on all four sides.
+/// Whether two quads cannot both be there: they cross, or one edge would belong to both. Two borders of one thing
+/// differ on all four sides.
 fn contradict(a: &[Point2<f64>; 4], b: &[Point2<f64>; 4]) -> bool {
     match polygon::relation(a, b, SHARED_SIDE_PX) {
         Relation::Disjoint => false,
@@ -101,9 +100,10 @@ pub struct ClassifiedQuad {
     pub features: [f64; THING_FEATURES],
 }
 
-/// Moves the sides of the rated quads, by rank, to the lines that look most like borders, and tells how likely they are
-/// things. A quad that contradicts one of at least `sure_probability` is passed over; nothing else stands in its way. All
-/// that were looked at are returned, at most [`MAX_CLASSIFIED`]. The border that a quad had before stays among its alternates.
+/// Moves the sides of the rated quads, by rank, to the lines that look most like borders, and tells how likely they
+/// are things. A quad that contradicts one of at least `sure_probability` is passed over; nothing else stands in its
+/// way. All that were looked at are returned, at most [`MAX_CLASSIFIED`]. The border that a quad had before stays
+/// among its alternates.
 pub fn snap_sides(rated: Vec<ScoredQuad>, g: &Gradients, p: &QuadParams) -> Vec<ClassifiedQuad> {
     let side_model = p.side_network();
     let thing_model = p.thing_network();
@@ -134,9 +134,8 @@ pub fn snap_sides(rated: Vec<ScoredQuad>, g: &Gradients, p: &QuadParams) -> Vec<
     classified
 }
 
-/// The things among classified quads. Of those that contradict each other the likeliest, of those that are sure the first;
-/// but a quad of which all that it contradicts are parts, no likelier and no better supported, takes their place: a pane
-/// looks like a thing too and comes before its window when that is seen a little worse.
+/// Non-maximum suppression by probability; above `sure_probability` by rank. Exception: a quad replaces the quads
+/// that it conflicts with if all of them are parts of it (a window and its panes) and none is clearly better.
 pub fn suppress_non_maxima(mut classified: Vec<ClassifiedQuad>, p: &QuadParams) -> Vec<Quad> {
     let mut kept: Vec<Quad> = Vec::new();
     let likely = |s: &ClassifiedQuad| s.quad.score.min(p.sure_probability);

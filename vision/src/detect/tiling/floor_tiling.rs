@@ -1,6 +1,6 @@
-//! Segments in, the same without those of a regularly patterned floor out (method 1.5), and those apart. Tile joints
-//! make corners and parallels in plenty, hence quads that nobody hung up. They are told by being evenly spaced on the
-//! floor, never by their direction alone: posters and floors share vanishing points. Does not look at the image.
+//! Sets apart the segments of a regularly patterned floor (method 1.5). Joints of tiles make corners and parallels,
+//! hence quads that are no landmarks. They are evenly spaced on the floor; direction alone does not tell, since
+//! posters and floors share vanishing points. In: segments, not the image. Out: segments that stay and those removed.
 
 use crate::detect::{
     segments::edge_segments::EdgeSegment,

@@ -19,8 +19,8 @@ pub struct AlignParams {
     pub sigmas: [f64; LEVELS],
     /// Gauss-Newton steps at each smoothing, at most [`MAX_STEPS`].
     pub steps: usize,
-    /// Mean squared correlation of the buckets below which a picture is given up after each smoothing: it is of something
-    /// else. Accepted quads of real photographs stay above 0.42 and 0.56; a cover costs its share.
+    /// Mean squared correlation of the buckets below which a picture is given up after each smoothing: it is of
+    /// something else. Accepted quads of real photographs stay above 0.42 and 0.56; a cover costs its share.
     pub min_alike: [f64; LEVELS],
 }
 

@@ -1,9 +1,9 @@
-//! A quad and a learnt icon in, the quad's corners moved so that its picture lies on the icon out. Evidence for the
-//! decision (a true match fits far better afterwards, a false one hardly does) and sharper corners for the pose.
-//! Beyond the method (its sections 4 and 6.3 name it as an option). It decides nothing itself.
+//! Template alignment: moves the corners of a quad until its picture agrees with a learnt icon. A true match fits far
+//! better afterwards, a false one hardly does; the corners get sharper for the pose. Beyond the method (its sections
+//! 4 and 6.3 name it as an option). It decides nothing itself.
 //!
-//! Three looks from coarse to fine. The first is cheap and tells most candidates to be something else: sides only, in
-//! thirds of the icon's resolution. The second moves all corners; the third is for their last tenths of a pixel.
+//! Three levels, coarse to fine. The first rejects most candidates cheaply: sides only, at a third of the icon's
+//! resolution. The second moves all corners; the third gives the last tenths of a pixel.
 
 use crate::{
     detect::quad::BORDER_SIGMA_PX,
@@ -34,8 +34,8 @@ const COARSE_BORDER_PX: usize = 1;
 /// Least standard deviation of an aligned corner, in icon pixels.
 const LEAST_SIGMA_ICON_PX: f64 = 0.1;
 
-/// A step of less than this is the last of its look, in pixels of that look: the next one goes on from there, the last one
-/// gives the corners.
+/// A step of less than this is the last of its look, in pixels of that look: the next one goes on from there, the
+/// last one gives the corners.
 const SETTLED_PX: [f64; LEVELS] = [0.08, 0.08, 0.02];
 
 /// A picture laid on a template.
@@ -110,12 +110,12 @@ impl<'a> Aligner<'a> {
         Self { on, p }
     }
 
-    /// Lays the picture on `template`. `None` when it is of something else, or says nothing about where it lies.
+    /// Aligns the picture with `template`. `None` when it shows something else or does not determine the corners.
     pub fn align(&self, around: &Surroundings<'_>, template: &Template<'_>) -> Option<Alignment> {
         self.align_fine(around, template, &self.align_coarse(around, template)?)
     }
 
-    /// The coarse look. `None` when the picture is of something else.
+    /// The coarse level. `None` when the picture shows something else.
     pub fn align_coarse(
         &self,
         around: &Surroundings<'_>,
@@ -141,7 +141,7 @@ impl<'a> Aligner<'a> {
         Some(CoarseAlignment { corners, alike: settled.alike })
     }
 
-    /// The fine looks, from where the coarse one came to.
+    /// The two fine levels, from the corners of the coarse one.
     pub fn align_fine(
         &self,
         around: &Surroundings<'_>,
@@ -181,8 +181,8 @@ impl<'a> Aligner<'a> {
         })
     }
 
-    /// The last look smooths after cutting, as the template was: the wall around must not bleed in, and so all of the icon
-    /// counts. Its slopes are the picture's own: the template's would pull where one of the two is softer.
+    /// The last look smooths after cutting, as the template was: the wall around must not bleed in, and so all of the
+    /// icon counts. Its slopes are the picture's own: the template's would pull where one of the two is softer.
     fn last(
         &self,
         around: &Surroundings<'_>,

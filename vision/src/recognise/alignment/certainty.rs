@@ -1,5 +1,5 @@
-//! How surely the corners of a picture that was laid on an icon are known: from the normal equations of the last step, and
-//! from how much the buckets disagree about it.
+//! How surely the corners of a picture that was laid on an icon are known: from the normal equations of the last
+//! step, and from how much the buckets disagree about it.
 //!
 //! Neighbouring pixels of a smoothed picture err together, so that residuals of pixels say too much. Buckets are nearly
 //! independent: the spread of their gradients gives the scale, the normal equations give the shape.
@@ -13,8 +13,9 @@ const LEAST_FREE: f64 = 1.0;
 /// Fewest buckets beyond the corners' coordinates.
 const MIN_SPARE: usize = 2;
 
-/// The covariances of four corners, in squared icon pixels, from the normal equations and the gradient of each bucket (at
-/// the end, where gradients add up to about nothing). `None` with too few buckets, or where sides were moved only.
+/// The covariances of four corners, in squared icon pixels, from the normal equations and the gradient of each bucket
+/// (at the end, where gradients add up to about nothing). `None` with too few buckets, or where sides were moved
+/// only.
 pub(crate) fn corner_covariances<const D: usize>(
     buckets: &[(SMatrix<f64, D, D>, SVector<f64, D>)],
 ) -> Option<[Matrix2<f64>; 4]>

@@ -1,5 +1,5 @@
-//! Where an icon is compared, bucket by bucket, and reading a picture there under a homography. No picture is made here,
-//! and nothing is decided.
+//! Where an icon is compared, bucket by bucket, and reading a picture there under a homography. No picture is made
+//! here, and nothing is decided.
 
 #![expect(
     clippy::inline_always,
@@ -134,7 +134,8 @@ pub(crate) fn square(size: usize) -> [Point2<f64>; 4] {
 }
 
 impl SquareMap {
-    /// From the square of an icon of `size` to `quad`, by Heckbert's closed form. `None` where the horizon would cross it.
+    /// From the square of an icon of `size` to `quad`, by Heckbert's closed form. `None` where the horizon would
+    /// cross it.
     pub(crate) fn new(size: usize, quad: &[Point2<f64>; 4]) -> Option<Self> {
         let [tl, tr, br, bl] = quad;
         let sum = tl - tr + (br - bl);

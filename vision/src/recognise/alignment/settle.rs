@@ -40,7 +40,8 @@ pub(crate) struct Limits {
     pub(crate) settled_px: f64,
 }
 
-/// Moves the corners of the icon from `start` on; `see` reads the picture at the lattice's points under a map. `None` when nothing says where.
+/// Moves the corners of the icon from `start` on; `see` reads the picture at the lattice's points under a map. `None`
+/// when nothing says where.
 ///
 /// Levenberg-Marquardt: a step that brings nothing is taken back and tried again, shorter. Inverse compositional (Baker
 /// and Matthews 2004): the goal's slopes are worked out once, not at every step.

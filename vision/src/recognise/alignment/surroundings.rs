@@ -1,5 +1,5 @@
-//! The surroundings of a quad, rectified, in which its corners may move: once in thirds of the icon's resolution for the
-//! coarse look, once in full for the fine ones, each only when it is asked for.
+//! The surroundings of a quad, rectified, in which its corners may move: once in thirds of the icon's resolution for
+//! the coarse look, once in full for the fine ones, each only when it is asked for.
 
 use crate::{
     frame::GrayImage,

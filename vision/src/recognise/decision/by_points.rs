@@ -1,9 +1,11 @@
-//! The decision by points: landmarks that points speak for in, the verdict out, or `None` where points say nothing and the
-//! icons are asked. Corners are those of the homography, sharpened by alignment the picture on the learnt icon.
+//! The decision by points: landmarks that points speak for in, the verdict out, or `None` where points say nothing
+//! and the icons are asked. Corners are those of the homography, sharpened by alignment the picture on the learnt
+//! icon.
 //!
 //! False alarms are counted against things that have nothing in common with the landmark. Against its look-alikes two
-//! more conditions stand: no other landmark whose points are there may go uncontradicted, and where something of the map
-//! is so like the landmark that its icon would be taken for it, the likeness must be within the threshold that this left.
+//! more conditions stand: no other landmark whose points are there may go uncontradicted, and where something of the
+//! map is so like the landmark that its icon would be taken for it, the likeness must be within the threshold that
+//! this left.
 
 use crate::{
     detect::quad::Quad,
@@ -94,8 +96,8 @@ pub(crate) fn by_points(
     })
 }
 
-/// A landmark of which a corner is known worse than this share of its size is not told, standard deviations: what is seen of
-/// it does not say where the rest is.
+/// A landmark of which a corner is known worse than this share of its size is not told, standard deviations: what is
+/// seen of it does not say where the rest is.
 const MAX_CORNER_SIGMA_SHARE: f64 = 0.1;
 
 /// Whether the points tell where the landmark's corners are.
@@ -104,8 +106,8 @@ pub(crate) fn is_well_known(evidence: &PointEvidence) -> bool {
     evidence.corner_covariance_px2.iter().all(|c| c.symmetric_eigenvalues().max() <= limit_px2)
 }
 
-/// Why `best`, which is `model` and was aligned with its icon, is not named among `landmarks` although its points are there, while
-/// points speak for `others`, too.
+/// Why `best`, which is `model` and was aligned with its icon, is not named among `landmarks` although its points are
+/// there, while points speak for `others`, too.
 fn refusal<'a>(
     best: &Found,
     mut others: impl Iterator<Item = &'a Found>,
@@ -137,8 +139,8 @@ fn has_double(model: &LandmarkModel, p: &Params) -> bool {
     model.likeness.tau < p.learn.threshold.nearest_share * p.learn.likeness_cap
 }
 
-/// Whether a connected part of the landmark shows something else: by its icon where it was aligned with that, as the icon covers
-/// every part; else by its points.
+/// Whether a connected part of the landmark shows something else: by its icon where it was aligned with that, as the
+/// icon covers every part; else by its points.
 pub(crate) fn is_doubtful(evidence: &PointEvidence, alignment: &IconAlignment) -> bool {
     alignment.has_mismatch.unwrap_or_else(|| evidence.agreement.largest_disagreement() >= DOUBTFUL_PARTS)
 }

@@ -25,9 +25,9 @@ pub fn probability(is_accepted: bool, accepted: usize) -> f64 {
     if is_accepted { 1.0 / accepted.max(1) as f64 } else { 0.0 }
 }
 
-/// Chance that the identity of candidate `best` is right: a logistic curve over [`measures`], fitted to answers whose truth
-/// is known (`waymark-lab train confidence`), by the distance that decides. It never rises with any measure. How well it keeps
-/// its word is in docs/EVALUATION.md. 0 without such a candidate.
+/// Chance that the identity of candidate `best` is right: a logistic curve over [`measures`], fitted to answers whose
+/// truth is known (`waymark-lab train confidence`), by the distance that decides. It never rises with any measure.
+/// How well it keeps its word is in docs/EVALUATION.md. 0 without such a candidate.
 pub fn confidence(candidates: &[MatchCandidate], best: usize, landmarks: usize, kind: DistanceKind) -> f64 {
     let weights = match kind {
         DistanceKind::Both => &confidence_weights::BOTH,

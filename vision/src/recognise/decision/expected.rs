@@ -1,8 +1,8 @@
 //! One landmark, asked for where its corners are expected, whatever was detected there.
 //!
-//! In: an image, the landmark's model, its expected corners. Out: [`ExpectedLandmark`]: its corners with covariance and how much the
-//! picture speaks for it, or nothing. Points find it also where the image border cuts it or something hides a part of it;
-//! where they say nothing it is laid on its icon, and must be in view as a whole.
+//! In: an image, the landmark's model, its expected corners. Out: [`ExpectedLandmark`]: its corners with covariance
+//! and how much the picture speaks for it, or nothing. Points find it also where the image border cuts it or
+//! something hides a part of it; where they say nothing it is laid on its icon, and must be in view as a whole.
 
 use crate::{
     detect::quad::{Quad, QuadKind},
@@ -26,8 +26,8 @@ use nalgebra::{Matrix2, Point2};
 
 /// log10 of the false alarms that asking for one landmark at one place may have, expected.
 pub const LOG10_EPSILON_EXPECTED: f64 = -4.0;
-/// Evidence of a landmark that passes every gate of its icon, nats: of the quads of strangers less than one in a thousand
-/// does (`docs/EVALUATION.md`).
+/// Evidence of a landmark that passes every gate of its icon, nats: of the quads of strangers less than one in a
+/// thousand does (`docs/EVALUATION.md`).
 pub const ACCEPTED_NATS: f64 = 6.9;
 
 /// A landmark found where it was expected.

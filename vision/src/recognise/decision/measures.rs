@@ -11,9 +11,9 @@ const HAUSDORFF_UNIT: f64 = 10.0;
 /// Numbers that a confidence rests on.
 pub const MEASURES: usize = 7;
 
-/// What a verdict knows for and against its candidate `best`, each the worse the larger, all within 0 to 2: D/tau and its
-/// square, the share of it in the next best's and its square, C^r, H^r, and how many landmarks there were to err with.
-/// `None` if there is no such candidate.
+/// What a verdict knows for and against its candidate `best`, each the worse the larger, all within 0 to 2: D/tau and
+/// its square, the share of it in the next best's and its square, C^r, H^r, and how many landmarks there were to err
+/// with. `None` if there is no such candidate.
 pub fn measures(candidates: &[MatchCandidate], best: usize, landmarks: usize) -> Option<[f64; MEASURES]> {
     let answer = candidates.get(best)?;
     let others = candidates.iter().enumerate().filter(|(i, _)| *i != best);

@@ -1,4 +1,4 @@
-//! From icon to verdict: points, descriptors, two distances, candidates, confidence (method 5, 6, 10).
+//! The verdict on one quad with the match candidates behind it.
 
 use crate::{geometry::corners::Corners, model::landmark_id::LandmarkId, points::verify::PointEvidence};
 use serde::{Deserialize, Serialize};
@@ -40,9 +40,9 @@ pub struct MatchCandidate {
     /// H^r in icon pixels times descriptor distance (method 6.2); infinite with too few points, and where another gate
     /// refuses already.
     pub hausdorff: f64,
-    /// How alike the picture and the learnt icon are, one laid on the other, -1 to 1; 0 where a glance told them to be
-    /// different things and nothing was accepted; `None` where the map's distances decide alone, and where points name a
-    /// landmark at the border that was detected.
+    /// How alike the picture and the learnt icon are, one laid on the other, -1 to 1; 0 where a glance told them to
+    /// be different things and nothing was accepted; `None` where the map's distances decide alone, and where points
+    /// name a landmark at the border that was detected.
     pub likeness: Option<f64>,
     /// The deciding distance of the map's [`DistanceKind`].
     pub distance: f64,

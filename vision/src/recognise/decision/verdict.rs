@@ -1,6 +1,6 @@
-//! A quad and the landmarks of a map in, the verdict out (method 10). Nearest landmarks first; those within reach are
-//! verified by laying the quad's picture on the learnt icon; then thresholds, margin, probabilities and confidence.
-//! "Unknown" whenever in doubt.
+//! A quad and the landmarks of a map in, the verdict out (method 10). Retrieval of the nearest landmarks,
+//! verification by template alignment, then thresholds, margin, probabilities and confidence. `Unknown` when in
+//! doubt.
 
 use crate::{
     detect::quad::Quad,
@@ -139,7 +139,8 @@ fn decide(
     verdict
 }
 
-/// The ratio of `best` over that of the nearest other landmark. 0 when there is no other landmark, 1 when the others have no distance to compare with.
+/// The ratio of `best` over that of the nearest other landmark. 0 when there is no other landmark, 1 when the others
+/// have no distance to compare with.
 fn margin(found: &[VerifiedLandmark], best: usize, kind: DistanceKind) -> f64 {
     if found.len() < 2 {
         return 0.0;

@@ -145,8 +145,8 @@ pub(crate) fn correlation_within(a: &Buckets, b: &Buckets, rank: usize, limit: f
     Some(ranked(&mut all[..total], rank)).filter(|d| *d <= limit)
 }
 
-/// C^r of two icons by their buckets, in [0, 2]: 0 for the same picture under any gain and offset. Icons cut differently
-/// are as different as can be: 2.
+/// C^r of two icons by their buckets, in [0, 2]: 0 for the same picture under any gain and offset. Icons cut
+/// differently are as different as can be: 2.
 pub fn correlation(a: &Buckets, b: &Buckets, p: &CorrelationParams) -> f64 {
     bucket_correlations(a, b).map_or(2.0, |mut all| ranked(&mut all, p.rank()))
 }

@@ -66,7 +66,8 @@ impl TryFrom<UncheckedPoints> for PointSet {
 }
 
 impl PointSet {
-    /// Checks that the three lists have one length, at most [`crate::recognise::features::harris::MAX_POINTS`], and are finite.
+    /// Checks that the three lists have one length, at most [`crate::recognise::features::harris::MAX_POINTS`], and
+    /// are finite.
     pub fn new(
         xy_px: Vec<[f32; 2]>,
         descriptors: Vec<Descriptor>,

@@ -1,5 +1,5 @@
-//! Readings of one quad (borders times rotations) and a set of landmarks in, the nearest landmarks out, by the
-//! smallest distance over readings and exemplars (method 7.5). Deciding is the verdict's work.
+//! Readings of one quad (borders times rotations) and a set of landmarks in, the nearest landmarks out, by the smallest
+//! distance over readings and exemplars (method 7.5). `decision` decides.
 
 use crate::{
     detect::quad::Quad,

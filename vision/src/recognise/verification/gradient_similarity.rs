@@ -1,9 +1,9 @@
-//! Two icons of the same thing, one laid on the other, in; how alike their pictures are out. Slopes are compared, bucket
-//! by bucket: unlike grey levels they do not agree by chance where two pictures are dark below and bright above, and a
-//! bucket without any says nothing for either.
+//! Two icons of the same thing, one laid on the other, in; how alike their pictures are out. Slopes are compared,
+//! bucket by bucket: unlike grey levels they do not agree by chance where two pictures are dark below and bright
+//! above, and a bucket without any says nothing for either.
 //!
 //! Beyond the method: its distances compare icons where they were found; this one is for icons after alignment
-//! (`align.rs`), where it tells landmarks from look-alikes far better (docs/EVALUATION.md).
+//! (`aligner.rs`), where it tells landmarks from look-alikes far better (docs/EVALUATION.md).
 
 use crate::{
     icon::Icon,
@@ -106,8 +106,8 @@ pub(crate) fn compare(a: &Smoothed, b: &Smoothed, p: &CorrelationParams) -> Opti
     Some(cells(a, b, p.per_side())?.iter().map(Cell::bucket).collect())
 }
 
-/// What a cell of two icons adds up to: products of slopes, squares of the one's and the other's with what noise adds, and
-/// pixels.
+/// What a cell of two icons adds up to: products of slopes, squares of the one's and the other's with what noise
+/// adds, and pixels.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Cell {
     products: f32,

@@ -1,5 +1,6 @@
-//! Template alignment of a landmark that points speak for. In: the image, the evidence with the corners of the homography,
-//! the landmark. Out: the aligned corners in the evidence, the likeness there, and whether a part shows something else.
+//! Template alignment of a landmark that points speak for. In: the image, the evidence with the corners of the
+//! homography, the landmark. Out: the aligned corners in the evidence, the likeness there, and whether a part shows
+//! something else.
 
 use crate::{
     frame::GrayImage,
@@ -28,8 +29,8 @@ const MIN_LIKENESS: f64 = 0.4;
 const MAX_MOVED_ICON_PX: f64 = 4.0;
 /// ... so many squared standard deviations: 99.99 % of a corner in the plane.
 const MAX_SQUARE: f64 = 18.4;
-/// From this likeness on alignment is believed wherever it moved the corners: the covariance of points that lie at one end of a
-/// landmark is too small at its other end.
+/// From this likeness on alignment is believed wherever it moved the corners: the covariance of points that lie at
+/// one end of a landmark is too small at its other end.
 const SURE_LIKENESS: f64 = 0.65;
 
 /// How the picture in the image, aligned with a learnt icon, compares with it.
@@ -46,8 +47,9 @@ impl IconAlignment {
     pub(crate) const NONE: Self = Self { likeness: None, has_mismatch: None };
 }
 
-/// Aligns the picture with the learnt icon, starting at the corners of `evidence` and, if that fails, at `detected_px`. The
-/// aligned corners replace those of `evidence` if its covariance allows them, or from [`SURE_LIKENESS`] on.
+/// Aligns the picture with the learnt icon, starting at the corners of `evidence` and, if that fails, at
+/// `detected_px`. The aligned corners replace those of `evidence` if its covariance allows them, or from
+/// [`SURE_LIKENESS`] on.
 pub(crate) fn align_to_icon(
     image: &GrayImage,
     evidence: &mut PointEvidence,

@@ -1,5 +1,5 @@
-//! Which parts of a landmark show something else. In: the picture in the image, aligned with the learnt icon, and that icon.
-//! Out: a map of mismatches. A plain occluder, which shows nothing itself, is no mismatch.
+//! Which parts of a landmark show something else. In: the picture in the image, aligned with the learnt icon, and
+//! that icon. Out: a map of mismatches. A plain occluder, which shows nothing itself, is no mismatch.
 
 use crate::{
     points::agreement::{Agreement, Part, TABLE},
@@ -12,10 +12,11 @@ const CELLS: usize = 2 * TABLE;
 const WINDOWS: usize = CELLS - 1;
 /// Side of a block of windows, a quarter of the picture...
 const BLOCK: usize = 4;
-/// ... that shows something else if at least so many of its windows do. Chosen on the set `tune`; what it finds and costs is in
-/// docs/EVALUATION.md, "Recognition with points".
+/// ... that shows something else if at least so many of its windows do. Chosen on the set `tune`; what it finds and
+/// costs is in docs/EVALUATION.md, "Recognition with points".
 const MIN_DIFFERING: usize = 9;
-/// With more cells of the block that show nothing where the icon does, it is occluded: only the edge of the occluder differs.
+/// With more cells of the block that show nothing where the icon does, it is occluded: only the edge of the occluder
+/// differs.
 const MAX_HIDDEN: usize = 4;
 
 /// Where the icon shows nothing, the picture shows something else with slopes of more than this share of its mean.

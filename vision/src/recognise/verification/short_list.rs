@@ -1,5 +1,5 @@
-//! Near landmarks in, the same after the quad's picture was laid on their learnt icons out: sharper evidence than any
-//! distance where the quad was found. Thresholds are only read; deciding is the verdict's work.
+//! Nearest landmarks in, the same after template alignment out: sharper evidence than a distance where the quad was
+//! found. Thresholds are only read; `decision` decides.
 
 use crate::{
     frame::GrayImage,
@@ -44,7 +44,7 @@ impl VerifiedLandmark {
     /// The first gate that refuses it.
     /// `share` of the likeness's tau is what a map of this size leaves.
     pub(crate) fn refusal(&self, kind: DistanceKind, share: f64, p: &VerdictParams) -> Option<MatchRefusal> {
-        // The corners were moved to please the landmark, but for Both, whose tau was learnt after such moves.
+        // Alignment favours the template, so its limit is stricter, except for `Both`: its tau was learnt after alignment.
         let limit = if self.moved.is_some() { p.verified_share } else { 1.0 };
         // Written so that a NaN refuses.
         let below = |ratio: f64, limit: f64| ratio < limit;
@@ -156,8 +156,8 @@ pub(crate) fn verify(
     found.sort_by(|a, b| a.near.ratio(kind).total_cmp(&b.near.ratio(kind)));
 }
 
-/// C^r and H^r of an icon to the nearest of a model's exemplars. Of a landmark that is named by points alone they would say
-/// nothing: H^r is left infinite.
+/// C^r and H^r of an icon to the nearest of a model's exemplars. Of a landmark that is named by points alone they
+/// would say nothing: H^r is left infinite.
 fn distances(icon: &Icon, model: &LandmarkModel, p: &Params) -> (f64, f64) {
     let c = &p.recognise.correlation;
     let own = Buckets::new(icon, c);

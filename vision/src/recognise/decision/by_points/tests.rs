@@ -142,8 +142,8 @@ fn the_border_of_the_landmark_is_told_from_the_wall_round_it() {
     assert_eq!(by_points(&image, &nested, &six(&p), &p).unwrap().border, 1);
 }
 
-/// Only the upper left of the landmark has points, the rest is hidden, and another border was detected: who it is is clear,
-/// where its lower right corner is is not.
+/// Only the upper left of the landmark has points, the rest is hidden, and another border was detected: who it is is
+/// clear, where its lower right corner is is not.
 #[test]
 fn a_landmark_whose_corners_are_not_told_is_not_named() {
     let p = Params::default();
@@ -167,8 +167,9 @@ fn a_landmark_whose_corners_are_not_told_is_not_named() {
     assert_eq!(asked(0.5), Some((Verdict::Ambiguous(first), Some(MatchRefusal::Corners))));
 }
 
-/// Corners of small and large posters that were found by another border than the taught one, in blurred and noisy images:
-/// squared errors are what their covariances say without the 0.3 px of the taught border, which is exact here.
+/// Corners of small and large posters that were found by another border than the taught one, in blurred and noisy
+/// images: squared errors are what their covariances say without the 0.3 px of the taught border, which is exact
+/// here.
 #[test]
 fn corners_are_as_good_as_their_covariance_says() {
     let p = Params::default();
