@@ -66,7 +66,8 @@ pub struct VerdictParams {
     /// `docs/method/25-recognition-by-points.md`.
     pub points: bool,
     /// Landmarks with more points than this are never accepted by their icons: their points would have said so. One
-    /// with fewer that its icon speaks for is ambiguous, with [`Refusal::Plain`]: the robot's pose may name it.
+    /// with fewer that its icon speaks for is ambiguous, with
+    /// [`Plain`](crate::recognise::decision::result::MatchRefusal::Plain): the robot's pose may name it.
     pub max_icon_points: usize,
     /// How corners are moved.
     pub align: AlignParams,

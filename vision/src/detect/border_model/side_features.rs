@@ -19,7 +19,7 @@ pub const SIDE_FEATURES: usize = BAND_FEATURES + CORNER_FEATURES;
 /// What was measured of the line of a side.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct SideMeasurement {
-    /// See [`choose_sides`].
+    /// Of the band beside the line, then of its two corners: see `Sides::band_features` and `Sides::corner_features`.
     pub features: [f64; SIDE_FEATURES],
     /// What can be compared between sides only.
     pub tones: LogGreyLevels,

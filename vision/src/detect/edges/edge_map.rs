@@ -92,7 +92,7 @@ impl EdgeMap {
     }
 
     /// Row-major indices of the edge pixels, ascending, thinned to lines one pixel wide. At most [`MAX_EDGE_POINTS`],
-    /// none within [`BORDER_PX`].
+    /// none within `BORDER_PX` of the border.
     pub fn pixels(&self) -> &[u32] {
         &self.pixels
     }

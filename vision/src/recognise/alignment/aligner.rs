@@ -59,7 +59,7 @@ pub struct Template<'a> {
 }
 
 impl<'a> Template<'a> {
-    /// Takes the icon as it is, and what [`coarse()`] makes of it.
+    /// Takes the icon as it is, and what [`coarse()`](crate::recognise::alignment::surroundings::coarse) makes of it.
     pub fn new(icon: &'a Icon, coarse: &'a [f32]) -> Self {
         Self { icon, coarse, second: OnceCell::new(), last: OnceCell::new() }
     }

@@ -44,7 +44,7 @@ pub struct MatchCandidate {
     /// be different things and nothing was accepted; `None` where the map's distances decide alone, and where points
     /// name a landmark at the border that was detected.
     pub likeness: Option<f64>,
-    /// The deciding distance of the map's [`DistanceKind`].
+    /// The deciding distance of the map's [`DistanceKind`](crate::recognise::distance_kind::DistanceKind).
     pub distance: f64,
     /// The deciding threshold.
     pub tau: f64,
