@@ -4,6 +4,7 @@
 //! In: frames with what was seen in them. Bounded; nothing is stored on disk.
 
 use super::{slots::SlotKey, snapshot::MapSnapshot};
+use crate::fixes::NoFix;
 use map::{
     extrinsics::CameraExtrinsics,
     localise::{
@@ -81,8 +82,8 @@ pub struct Look<'a> {
     pub map: &'a MapSnapshot,
     /// Where the camera sits.
     pub mounting: Option<&'a CameraExtrinsics>,
-    /// The fix, or the word that says why there is none.
-    pub fix: Result<&'a Fix, &'a str>,
+    /// The fix, or why there is none.
+    pub fix: Result<&'a Fix, NoFix>,
 }
 
 impl Cameras {
@@ -127,7 +128,7 @@ impl Cameras {
         record.frames += 1;
         match look.fix {
             Ok(fix) => record.watch.add_fix(fix, evidence),
-            Err("gate_room" | "disagree") => record.watch.add_refusal(),
+            Err(NoFix::GateReprojection | NoFix::GateInconsistent) => record.watch.add_refusal(),
             Err(_) => {}
         }
         for (id, seen) in look.seen {
@@ -249,7 +250,7 @@ mod tests {
                 seen: &seen,
                 map: &map,
                 mounting: None,
-                fix: Err("no_mounting"),
+                fix: Err(NoFix::NoExtrinsics),
             };
             cameras.looked(&key("front"), &look);
         }
@@ -271,7 +272,7 @@ mod tests {
         let poses = poses(&real, &real);
         let look_with = |k: &Intrinsics, width| {
             let seen = [(LandmarkId(1), &poses[0])];
-            let (image_px, fix) = ([width, 480], Err("gate_room"));
+            let (image_px, fix) = ([width, 480], Err(NoFix::GateReprojection));
             cameras.looked(
                 &key("front"),
                 &Look { intrinsics: k, image_px, seen: &seen, map: &map, mounting: None, fix },

@@ -6,7 +6,7 @@
 
 use super::{
     doubles::{Resembling, hang_where_known, resembling},
-    judging::View,
+    frame_context::FrameContext,
     snapshot::MapSnapshot,
 };
 use map::{
@@ -90,7 +90,7 @@ struct MayBe {
 
 /// Names what the picture alone leaves open by `prior`, the pose without the frame. Where the camera or its mounting is not
 /// known, nothing is added.
-pub fn guided(image: &GrayImage, view: &View<'_>, prior: &Pose2Covariance) -> Guided {
+pub fn guided(image: &GrayImage, view: &FrameContext<'_>, prior: &Pose2Covariance) -> Guided {
     let (Some(mounting), Some(intrinsics)) = (view.mounting, view.camera) else { return Guided::default() };
     let map = view.map;
     // Until it is known what looks alike, a pose may not choose between landmarks.
@@ -134,7 +134,7 @@ fn is_told_apart(map: &MapSnapshot, id: LandmarkId) -> bool {
 
 /// What may be landmarks, each thing once: of several borders the one that fits best, of what was detected and what was
 /// asked for the former.
-fn observed(image: &GrayImage, view: &View<'_>, expected: &Expectations) -> Vec<MayBe> {
+fn observed(image: &GrayImage, view: &FrameContext<'_>, expected: &Expectations) -> Vec<MayBe> {
     let quads = view.facts.quads.iter().enumerate();
     let mut all: Vec<MayBe> = quads.filter_map(|(i, facts)| may_be(image, i, facts, view)).collect();
     all.sort_by(|a, b| {
@@ -175,7 +175,7 @@ fn is_found(kept: &MayBe, e: &Expected) -> bool {
 }
 
 /// The landmarks that one quad may be.
-fn may_be(image: &GrayImage, quad: usize, facts: &QuadAnalysis, view: &View<'_>) -> Option<MayBe> {
+fn may_be(image: &GrayImage, quad: usize, facts: &QuadAnalysis, view: &FrameContext<'_>) -> Option<MayBe> {
     let verdict = facts.recognition.as_ref()?;
     let quad = Some(quad);
     if let Verdict::Unique(landmark) = verdict.verdict {
@@ -196,7 +196,7 @@ fn may_be(image: &GrayImage, quad: usize, facts: &QuadAnalysis, view: &View<'_>)
 }
 
 /// A quad that the icon of one landmark alone speaks for, and nothing of the map looks like that landmark.
-fn plain(facts: &QuadAnalysis, view: &View<'_>) -> Option<Resembling> {
+fn plain(facts: &QuadAnalysis, view: &FrameContext<'_>) -> Option<Resembling> {
     let verdict = facts.recognition.as_ref()?;
     let Verdict::Ambiguous(landmark) = verdict.verdict else { return None };
     let first = verdict.candidates.iter().find(|c| c.landmark == landmark)?;
@@ -212,7 +212,7 @@ fn plain(facts: &QuadAnalysis, view: &View<'_>) -> Option<Resembling> {
 }
 
 /// An expected landmark that was not detected, asked for; it may as well be another that looks the same.
-fn asked(image: &GrayImage, e: &Expected, view: &View<'_>) -> Option<MayBe> {
+fn asked(image: &GrayImage, e: &Expected, view: &FrameContext<'_>) -> Option<MayBe> {
     let (map, id) = (view.map, e.landmark);
     let models =
         [&map.models, &map.look_alikes.models].into_iter().find(|models| models.get(id).is_some())?;
@@ -234,7 +234,7 @@ fn observation(may_be: &MayBe) -> Observation {
     Observation::new(*corners_px, covariance_px2, members.iter().map(candidate).collect())
 }
 
-fn sighting(may_be: &MayBe, landmark: LandmarkId, view: &View<'_>) -> Option<GuidedSighting> {
+fn sighting(may_be: &MayBe, landmark: LandmarkId, view: &FrameContext<'_>) -> Option<GuidedSighting> {
     let Resembling { corners_px, covariance_px2, .. } = &may_be.resembling;
     let size = view.map.sizes.get(&landmark)?;
     let seen = landmark_pose(corners_px, covariance_px2, *size, view.camera?).ok()?;

@@ -4,13 +4,12 @@
 //! nothing.
 
 use super::{
+    fixes::{self, NoFix},
+    frame_context::FrameContext,
     guided::Guided,
     motion::{FrameFixes, Grounds},
-    snapshot::MapSnapshot,
-    verdicts,
 };
 use map::{
-    extrinsics::CameraExtrinsics,
     landmark_health::{
         ExpectedLandmark, HealthParams, MountedCamera, PlaceCheck, PlaceVerdict as InPlace, check_place,
         drop_unreliable, expected,
@@ -19,28 +18,9 @@ use map::{
     pose2::Pose2Covariance,
 };
 use vision::{
-    frame::Intrinsics,
     model::LandmarkId,
-    pipeline::FrameAnalysis,
     recognise::{RecognitionResult, Verdict},
 };
-
-/// A frame that was looked at.
-#[derive(Debug, Clone, Copy)]
-pub struct View<'a> {
-    /// What is in it.
-    pub facts: &'a FrameAnalysis,
-    /// The map it was compared with.
-    pub map: &'a MapSnapshot,
-    /// Where the camera sat.
-    pub mounting: Option<&'a CameraExtrinsics>,
-    /// The camera.
-    pub camera: Option<&'a Intrinsics>,
-    /// Width and height.
-    pub image_px: [f64; 2],
-    /// What the robot itself believes.
-    pub prior: Option<&'a Pose2Covariance>,
-}
 
 /// What a frame says about the landmarks themselves, by the pose without it.
 #[derive(Debug)]
@@ -58,8 +38,8 @@ pub struct Seen {
 pub struct JudgedFrame {
     /// The robot's pose without the frame.
     pub prior: Option<Pose2Covariance>,
-    /// The fix by the landmarks that the picture alone names, or the word that says why there is none.
-    pub fix: Result<Fix, &'static str>,
+    /// The fix by the landmarks that the picture alone names, or why there is none.
+    pub fix: Result<Fix, NoFix>,
     /// The same without a pose of ours to choose among several solutions.
     pub independent: Option<FixResult>,
     /// The fix by the landmarks that the pose names, and by the others where they alone gave none.
@@ -85,45 +65,52 @@ impl JudgedFrame {
 }
 
 /// Judges a frame by what is known without it, and `guided`, the landmarks that this names.
-pub fn judged_frame(view: &View<'_>, grounds: Option<Grounds>, guided: &Guided) -> JudgedFrame {
-    let global = verdicts::sightings(view.facts, view.map);
+pub fn judged_frame(view: &FrameContext<'_>, grounds: Option<Grounds>, guided: &Guided) -> JudgedFrame {
+    let global = fixes::sightings(view.facts, view.map);
     let known = grounds.as_ref().map(|grounds| grounds.pose);
     let seen = grounds.and_then(|grounds| seen(view, global.as_deref().ok(), grounds));
     let judged = seen.as_ref().map_or(&[][..], |s| &s.judged);
     let prior = known.as_ref().or(view.prior);
     let global = global.map(|all| drop_unreliable(&all, judged));
     let (fix, independent) = match &global {
-        Ok(sightings) => fixes(view, sightings, prior),
+        Ok(sightings) => frame_fixes(view, sightings, prior),
         Err(word) => (Err(*word), None),
     };
-    let with = if fix == Err(verdicts::AMBIGUOUS) { global.as_deref().unwrap_or_default() } else { &[] };
+    let with = if fix == Err(NoFix::Ambiguous) { global.as_deref().unwrap_or_default() } else { &[] };
     let guided = prior.and_then(|prior| guided_fix(view, guided, with, (prior, seen.as_ref())));
     JudgedFrame { prior: known, fix, independent, guided, seen, only_expected: false }
 }
 
 /// Judges a frame of which only the landmarks were looked for that the pose without it expects: they may correct that pose.
 /// What hangs elsewhere, or not at all, is said by frames that are searched.
-pub fn judged_expected(view: &View<'_>, grounds: Grounds, guided: &Guided) -> JudgedFrame {
+pub fn judged_expected(view: &FrameContext<'_>, grounds: Grounds, guided: &Guided) -> JudgedFrame {
     let prior = grounds.pose;
     let seen = Seen { grounds, judged: Vec::new(), missed: Vec::new() };
     let guided = guided_fix(view, guided, &[], (&prior, Some(&seen)));
     let (prior, seen) = (Some(prior), Some(seen));
-    JudgedFrame { prior, fix: Err(""), independent: None, guided, seen, only_expected: true }
+    JudgedFrame {
+        prior,
+        fix: Err(NoFix::NothingRecognised),
+        independent: None,
+        guided,
+        seen,
+        only_expected: true,
+    }
 }
 
 /// The robot's pose by landmarks. The robot's own prior gates; ours only chooses between two solutions, so that a fused
 /// pose gone wrong cannot keep out the fixes that would correct it.
-fn fixes(
-    view: &View<'_>,
+fn frame_fixes(
+    view: &FrameContext<'_>,
     sightings: &[LandmarkObservation<'_>],
     prior: Option<&Pose2Covariance>,
-) -> (Result<Fix, &'static str>, Option<FixResult>) {
-    let independent = verdicts::robot_fixes(sightings, view.mounting, view.prior);
+) -> (Result<Fix, NoFix>, Option<FixResult>) {
+    let independent = fixes::robot_fixes(sightings, view.mounting, view.prior);
     let fix = match &independent {
         Ok(FixResult::Ambiguous(_)) if view.prior.is_none() && prior.is_some() => {
-            verdicts::robot_fix(sightings, view.mounting, prior)
+            fixes::robot_fix(sightings, view.mounting, prior)
         }
-        Ok(fix) => verdicts::only(fix),
+        Ok(fix) => fixes::only(fix),
         Err(word) => Err(*word),
     };
     (fix, independent.ok())
@@ -132,7 +119,7 @@ fn fixes(
 /// The robot's pose by landmarks that the pose names, and those given. What may have been moved is left out: by a pose that
 /// is known well, nothing is gained by what hardly tells.
 fn guided_fix(
-    view: &View<'_>,
+    view: &FrameContext<'_>,
     guided: &Guided,
     with: &[LandmarkObservation<'_>],
     (prior, seen): (&Pose2Covariance, Option<&Seen>),
@@ -149,7 +136,7 @@ fn guided_fix(
         })
     };
     let all: Vec<LandmarkObservation<'_>> = named.iter().filter(in_place).chain(with).copied().collect();
-    verdicts::robot_fix(&all, Some(mounting), Some(prior)).ok()
+    fixes::robot_fix(&all, Some(mounting), Some(prior)).ok()
 }
 
 /// A candidate whose distance is below this many times its threshold may well be there, though nobody would swear to it.
@@ -164,8 +151,12 @@ fn may_be(verdict: &RecognitionResult, id: LandmarkId) -> bool {
 }
 
 /// Which landmarks hang where they should, and which should be in the frame and are not.
-fn seen(view: &View<'_>, sightings: Option<&[LandmarkObservation<'_>]>, grounds: Grounds) -> Option<Seen> {
-    let View { facts, map, image_px, .. } = *view;
+fn seen(
+    view: &FrameContext<'_>,
+    sightings: Option<&[LandmarkObservation<'_>]>,
+    grounds: Grounds,
+) -> Option<Seen> {
+    let FrameContext { facts, map, image_px, .. } = *view;
     let (mounting, camera) = (view.mounting?, view.camera?);
     let p = HealthParams::default();
     let judge =

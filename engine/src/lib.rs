@@ -1,7 +1,7 @@
 //! Frames in, answers out, away from any transport, file and HTTP: one slot per camera, workers, the snapshot of the map that
 //! they read, and what is known of every robot (`motion`).
 //!
-//! A frame walks `intake -> slots -> workers -> decode -> verdicts -> judging -> motion`; its answer goes to whoever gave the
+//! A frame walks `intake -> slots -> workers -> decode -> frame_analysis -> guided -> judging -> frame_answer -> motion`; its answer goes to whoever gave the
 //! workers an outlet. Nothing here waits for a disk or a network.
 
 pub mod snapshot;
@@ -24,7 +24,10 @@ pub mod dominant;
 pub mod epochs;
 pub mod gaze;
 pub mod standing;
-pub mod verdicts;
+pub mod fixes;
+pub mod frame_analysis;
+pub mod frame_answer;
+pub mod frame_context;
 pub mod frame_tap;
 pub mod vitals;
 pub mod workers;

@@ -6,9 +6,11 @@ use super::{
     cameras::Look,
     decode::{ImageLimits, decode_frame},
     doubles::sighted,
+    frame_analysis::{StageTimes, analyse_frame},
+    frame_context::FrameContext,
     guided::{Guided, guided},
     intake::{FrameJob, unknown_map},
-    judging::{JudgedFrame, Seen, View, judged_expected, judged_frame},
+    judging::{JudgedFrame, Seen, judged_expected, judged_frame},
     live::{LiveFrame, LiveHub},
     motion::{Grounds, Moment, Motion},
     panics::Edge,
@@ -16,7 +18,6 @@ use super::{
     slots::{Outcome, SlotKey, Slots},
     snapshot::{MapSnapshot, Snapshots},
     standing::{Findings, Found},
-    verdicts::{self, StageTimes},
 };
 use crate::frame_tap::{AnalysedFrame, FrameTap};
 use crate::vitals::Vitals;
@@ -208,8 +209,8 @@ impl Engine {
         {
             return Ok(Done { answer, map, judged: Some(judged), found: None });
         }
-        let facts = verdicts::look(&image, frame.intrinsics.as_ref(), &map, &mut times);
-        let mut answer = verdicts::answer(&facts, &map);
+        let facts = analyse_frame(&image, frame.intrinsics.as_ref(), &map, &mut times);
+        let mut answer = crate::frame_answer::answer(&facts, &map);
         let view = view(frame, &facts, &map);
         // The fused pose while nothing contradicts it; without one, what the robot itself believes.
         let guide = match &grounds {
@@ -218,7 +219,7 @@ impl Engine {
         };
         let guided = guide.map_or_else(Guided::default, |pose| guided(&image, &view, pose));
         let judged = judged_frame(&view, grounds, &guided);
-        verdicts::fill_fixes(&mut answer, &judged, &guided, &map);
+        crate::frame_answer::fill_fixes(&mut answer, &judged, &guided, &map);
         if !counts {
             times.ended("localise");
             answer.timings = times.finish();
@@ -236,9 +237,9 @@ impl Engine {
             return Ok(Done { answer, map, judged: None, found: None });
         }
         if let Some(intrinsics) = &frame.intrinsics {
-            let (seen, mounting) = (verdicts::recognised(&facts), frame.mounting.as_ref());
+            let (seen, mounting) = (crate::fixes::unique_landmarks(&facts), frame.mounting.as_ref());
             let image_px = [image.width() as u32, image.height() as u32];
-            let fix = judged.fix.as_ref().map_err(|word| *word);
+            let fix = judged.fix.as_ref().map_err(|reason| *reason);
             self.live
                 .watched()
                 .looked(key, &Look { intrinsics, image_px, seen: &seen, map: &map, mounting, fix });
@@ -283,9 +284,9 @@ impl Engine {
         if guided.report.global_reason().is_some() || judged.guided.is_none() {
             return None;
         }
-        let mut answer = verdicts::answer(&nothing, map);
+        let mut answer = crate::frame_answer::answer(&nothing, map);
         answer.only_expected = true;
-        verdicts::fill_fixes(&mut answer, &judged, &guided, map);
+        crate::frame_answer::fill_fixes(&mut answer, &judged, &guided, map);
         times.ended("localise");
         answer.timings = times.finish();
         Some((answer, judged))
@@ -331,8 +332,8 @@ impl Engine {
     }
 }
 
-fn view<'a>(frame: &'a CheckedFrame, facts: &'a FrameAnalysis, map: &'a MapSnapshot) -> View<'a> {
-    View {
+fn view<'a>(frame: &'a CheckedFrame, facts: &'a FrameAnalysis, map: &'a MapSnapshot) -> FrameContext<'a> {
+    FrameContext {
         facts,
         map,
         mounting: frame.mounting.as_ref(),

@@ -2,9 +2,9 @@
 
 use super::*;
 use crate::{
+    frame_analysis::{StageTimes, analyse_frame},
     scene::Scene,
     snapshot::{LandmarkInfo, LookAlikeClasses, MapSnapshot},
-    verdicts::{self, StageTimes},
 };
 use map::{extrinsics::CameraExtrinsics, pose2::Pose2};
 use nalgebra::{Matrix3, Vector3};
@@ -36,7 +36,7 @@ impl Look {
 
     fn facts(&self, map: &MapSnapshot) -> FrameAnalysis {
         let camera = self.scene.intrinsics();
-        verdicts::look(&self.seen.frame.image, Some(&camera), map, &mut StageTimes::start())
+        analyse_frame(&self.seen.frame.image, Some(&camera), map, &mut StageTimes::start())
     }
 
     /// What a pose adds to these facts.
@@ -44,8 +44,14 @@ impl Look {
         let mounting = CameraExtrinsics::new(self.seen.step.robot_from_camera).unwrap();
         let image_px = [image.width() as f64, image.height() as f64];
         let camera = self.scene.intrinsics();
-        let view =
-            View { facts, map, mounting: Some(&mounting), camera: Some(&camera), image_px, prior: None };
+        let view = FrameContext {
+            facts,
+            map,
+            mounting: Some(&mounting),
+            camera: Some(&camera),
+            image_px,
+            prior: None,
+        };
         guided(image, &view, &known(pose))
     }
 
@@ -85,7 +91,7 @@ fn off_px(a: &Corners, b: &Corners) -> f64 {
 fn what_the_picture_alone_names_is_not_guided() {
     let (look, map) = Look::new();
     let facts = look.facts(&map);
-    assert!(!verdicts::recognised(&facts).is_empty());
+    assert!(!crate::fixes::unique_landmarks(&facts).is_empty());
     let made = look.guided(&look.seen.frame.image, &facts, &map, look.truth());
     assert!(made.sightings.iter().all(|s| s.landmark != POSTER), "{:?}", made.sightings);
     assert_eq!(made.report.contradictions, 0);
@@ -101,7 +107,7 @@ fn what_an_icon_alone_speaks_for_is_named_by_the_pose() {
     let mut map = (*map).clone();
     map.models = ModelSet::new(vec![plain], &map.params).unwrap();
     let facts = look.facts(&map);
-    assert_eq!(verdicts::recognised(&facts), []);
+    assert_eq!(crate::fixes::unique_landmarks(&facts), []);
     let image = &look.seen.frame.image;
     let made = look.guided(image, &facts, &map, look.truth());
     let found = made.sightings.iter().find(|s| s.landmark == POSTER).expect("named");
@@ -156,7 +162,7 @@ fn of_two_that_look_the_same_the_pose_says_which() {
     // Two metres: far beyond the gates.
     let map = with_twin(&map, 2.0);
     let facts = look.facts(&map);
-    assert!(verdicts::recognised(&facts).is_empty(), "neither is in use by itself");
+    assert!(crate::fixes::unique_landmarks(&facts).is_empty(), "neither is in use by itself");
     let image = &look.seen.frame.image;
     let made = look.guided(image, &facts, &map, look.truth());
     let named: Vec<_> = made.sightings.iter().map(|s| (s.landmark, s.quad.is_some())).collect();

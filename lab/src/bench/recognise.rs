@@ -5,10 +5,12 @@ pub(super) mod landmarks;
 mod queries;
 mod frames;
 mod guided;
+mod scenes;
 mod single;
 mod lesson;
 
-use frames::{Named, Scenes};
+use frames::Named;
+use scenes::Scenes;
 use serde::Serialize;
 use server::cli::{clock::Clock, screen};
 use std::{collections::BTreeMap, path::PathBuf, sync::Arc};

@@ -11,7 +11,7 @@ use axum::{
     Json,
     extract::{DefaultBodyLimit, Request, State},
 };
-use engine::{picture, verdicts::answer_to_photograph};
+use engine::{frame_answer::answer_to_photograph, picture};
 use protos::{
     api::{PhotographForm, Problem},
     convert::geometry,

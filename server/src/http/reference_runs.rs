@@ -1,4 +1,4 @@
-//! `/robots/{robot}/run` and `/maps/{map}/runs`: runs whose path is known, to learn_modality_stats which modality to trust where.
+//! `/robots/{robot}/run` and `/maps/{map}/runs`: runs whose path is known, to learn which modality to trust where.
 
 use super::{
     App, AppState,

@@ -6,23 +6,15 @@ use super::{
     Args, MAP,
     guided::Guide,
     landmarks::{each_of, picture},
+    scenes::Scenes,
     threads,
 };
 use crate::evaluate::statistics::median;
 use serde::{Deserialize, Serialize};
 use server::cli::{clock::Clock, scratch, screen};
-use sim::{
-    building::{Building, LandmarkKind},
-    corridor::CorridorParams,
-    drive::Step,
-    lesson::{LessonParams, stops},
-    robot::{Robot, RobotParams},
-    truth::{LandmarkView, ViewState},
-};
-use std::{collections::BTreeMap, sync::Arc};
+use std::collections::BTreeMap;
 use vision::{
     detect::{DetectBuffers, detect_with},
-    frame::{GrayImage, Intrinsics},
     model::{LandmarkId, ModelSet},
     params::Params,
     pipeline::{LandmarkDatabase, analyse_quads},
@@ -32,24 +24,6 @@ use vision::{
 
 /// What runs over there.
 const PROGRAM: &str = include_str!("../../../peers/sift.py");
-/// Posters in the corridor: the first landmarks.
-pub(super) const POSTERS: usize = 24;
-/// A poster counts as visible when each side is at least this long, and it is seen at most this obliquely.
-const MIN_SIDE_PX: f64 = 40.0;
-const MAX_ANGLE_RAD: f64 = 1.22;
-
-/// Frames with the numbers of the landmarks in them, from 0.
-pub(super) struct Scenes {
-    frames: Vec<GrayImage>,
-    /// Where the robot stood.
-    pub(super) steps: Vec<Step>,
-    pub(super) building: Arc<Building>,
-    pub(super) camera: Intrinsics,
-    /// Wholly visible and large enough to be asked for.
-    wanted: Vec<Vec<usize>>,
-    /// In view at all: naming one is no error.
-    present: Vec<Vec<usize>>,
-}
 
 /// What somebody made of the frames.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -92,45 +66,6 @@ pub(super) struct Report {
 }
 
 impl Scenes {
-    /// `count` frames of a corridor with the posters `first`, `first + 1`, ...
-    pub(super) fn new(first: u64, count: usize, seed: u64) -> Self {
-        let corridor = CorridorParams {
-            posters: POSTERS,
-            length_m: 40.0,
-            first_poster: first,
-            ..CorridorParams::default()
-        };
-        let building = Arc::new(Building::corridor_with(&corridor, seed));
-        let mut robot = Robot::new(building.clone(), &RobotParams::default());
-        let lesson = LessonParams { seed, views: count.div_ceil(POSTERS), ..LessonParams::default() };
-        let camera = *robot.camera().intrinsics();
-        let (frames, steps) = (vec![], vec![]);
-        let (wanted, present) = (vec![], vec![]);
-        let mut scenes = Self { frames, steps, building: building.clone(), camera, wanted, present };
-        let all = stops(&building, &lesson);
-        let progress = screen::progress(count, "rendering");
-        // Evenly over the posters.
-        for i in 0..count.min(all.len()) {
-            let step = all[i * all.len() / count].step.clone();
-            let shot = robot.look(&step).frame;
-            let numbers = |keep: &dyn Fn(&LandmarkView) -> bool| {
-                let posters = shot.truth.landmarks.iter().filter(|l| l.kind == LandmarkKind::Poster);
-                posters.filter(|l| keep(l)).filter_map(|l| number(&l.name)).collect::<Vec<usize>>()
-            };
-            scenes.wanted.push(numbers(&|l| {
-                l.state == ViewState::Full
-                    && l.min_side_px() >= MIN_SIDE_PX
-                    && l.view_angle_rad <= MAX_ANGLE_RAD
-            }));
-            scenes.present.push(numbers(&|_| true));
-            scenes.frames.push(shot.image);
-            scenes.steps.push(step);
-            progress.inc(1);
-        }
-        progress.finish_and_clear();
-        scenes
-    }
-
     fn named(&self, accepted: &[Vec<usize>], least_ms: &[f64]) -> Named {
         let mut named = Named { right: 0, missed: 0, wrong: 0, frame_ms: 0.0 };
         for ((accepted, wanted), present) in accepted.iter().zip(&self.wanted).zip(&self.present) {
@@ -142,11 +77,6 @@ impl Scenes {
         named.frame_ms = median(&mut least_ms.to_vec()).unwrap_or(0.0);
         named
     }
-}
-
-/// `poster-3` is landmark 3.
-pub(super) fn number(name: &str) -> Option<usize> {
-    name.strip_prefix("poster-")?.parse().ok()
 }
 
 /// Processor time up to the end of the stage before recognition, and of recognition.
@@ -330,7 +260,9 @@ fn start(
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{super::scenes::number, *};
+    use sim::building::Building;
+    use std::sync::Arc;
 
     #[test]
     fn names_are_counted() {

@@ -1,10 +1,10 @@
 //! Frames of a robot whose pose is known: what the server then does instead of searching the whole map. The corridor's
 //! posters hang where they do; the other landmarks hang in other parts of a large building.
 
-use super::frames::{Scenes, number};
+use super::scenes::{Scenes, number};
 use engine::{
+    frame_context::FrameContext,
     guided::{Guided, guided},
-    judging::View,
     snapshot::{LandmarkInfo, MapSnapshot},
 };
 use map::{
@@ -99,7 +99,7 @@ impl Guide {
     pub(super) fn look(&self, i: usize, frame: &GrayImage, camera: &Intrinsics) -> Guided {
         let (pose, mounting) = &self.poses[i];
         let nothing = FrameAnalysis { quads: Vec::new() };
-        let view = View {
+        let view = FrameContext {
             facts: &nothing,
             map: &self.map,
             mounting: Some(mounting),

@@ -8,13 +8,14 @@ use super::{
     world::{MAP, World},
 };
 use engine::{
+    frame_analysis::{StageTimes, analyse_frame},
+    frame_context::FrameContext,
     guided::{Guided, guided},
-    judging::{Seen, View, judged_frame},
+    judging::{Seen, judged_frame},
     live::LiveHub,
     motion::{Corrections, Moment as At, Motion},
     scan_job::ScanJob,
     snapshot::{MapSnapshot, Snapshots},
-    verdicts::{self, StageTimes},
 };
 use map::{
     landmark_health::{HealthChange, LandmarkHealth},
@@ -161,7 +162,7 @@ impl Server {
         let at = At { map: MAP, epoch: EPOCH, captured_ns, odometry: Some(odom_from_robot), now: self.now };
         let mounting = wrong.mounting(&seen.step.robot_from_camera).ok();
         let image = &seen.frame.image;
-        let view = View {
+        let view = FrameContext {
             facts,
             map,
             mounting: mounting.as_ref(),
@@ -222,7 +223,7 @@ pub(super) fn drive(world: &World, way: Way) -> anyhow::Result<Journey> {
             server.scan(&seen, odom_from_robot, captured_ns);
         }
         let map = server.map()?;
-        let facts = verdicts::look(&seen.frame.image, Some(&wrong.camera), &map, &mut StageTimes::start());
+        let facts = analyse_frame(&seen.frame.image, Some(&wrong.camera), &map, &mut StageTimes::start());
         let (changes, guided) = server.frame(&map, &facts, (&seen, odom_from_robot), (&wrong, captured_ns));
         let misled = journey.guided_false;
         let shows = journey.score(world, &seen, &facts, guided.as_ref());

@@ -1,0 +1,137 @@
+//! The robot's pose by the landmarks that a frame shows. In: analysed quads, the map, extrinsics, an optional prior pose. Out: a
+//! fix, or why there is none.
+
+use super::snapshot::MapSnapshot;
+use map::{
+    extrinsics::CameraExtrinsics,
+    localise::{Fix, FixRefusal, FixResult, LandmarkObservation, LocaliseParams, robot_pose},
+    pose2::Pose2Covariance,
+};
+use vision::{
+    model::LandmarkId,
+    pipeline::{FrameAnalysis, QuadAnalysis},
+    pose::LandmarkPose,
+    recognise::Verdict,
+};
+
+/// Why a frame gives no pose of the robot.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum NoFix {
+    /// No landmark was recognised and posed; the quads say why each has no pose.
+    NothingRecognised,
+    /// None of the recognised landmarks has a place.
+    LandmarkNotPlaced,
+    /// All of the placed landmarks are quarantined.
+    LandmarkQuarantined,
+    /// Where the camera sits on the robot is not known.
+    NoExtrinsics,
+    /// All observations were left out as unreliable.
+    WeakObservation,
+    /// Several poses are left.
+    Ambiguous,
+    /// The geometry does not determine a pose.
+    Degenerate,
+    /// The re-projection error is above its gate for every pose on the floor.
+    GateReprojection,
+    /// The prior pose rules every solution out.
+    GatePrior,
+    /// The robot would stand behind the wall.
+    GateBehindWall,
+    /// The landmarks contradict one another.
+    GateInconsistent,
+}
+
+impl NoFix {
+    /// The word on the wire; empty where the quads say why.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::NothingRecognised => "",
+            Self::LandmarkNotPlaced => "landmark_not_placed",
+            Self::LandmarkQuarantined => "landmark_quarantined",
+            Self::NoExtrinsics => "no_mounting",
+            Self::WeakObservation => "unsure",
+            Self::Ambiguous => "ambiguous",
+            Self::Degenerate => "degenerate",
+            Self::GateReprojection => "gate_room",
+            Self::GatePrior => "gate_prior",
+            Self::GateBehindWall => "gate_side",
+            Self::GateInconsistent => "disagree",
+        }
+    }
+}
+
+impl From<&FixRefusal> for NoFix {
+    fn from(refusal: &FixRefusal) -> Self {
+        match refusal {
+            FixRefusal::Room { .. } => Self::GateReprojection,
+            FixRefusal::Prior { .. } => Self::GatePrior,
+            FixRefusal::Side => Self::GateBehindWall,
+            FixRefusal::Disagree { .. } => Self::GateInconsistent,
+            FixRefusal::Degenerate => Self::Degenerate,
+        }
+    }
+}
+
+/// The landmarks that were recognised without doubt, with their poses.
+pub fn unique_landmarks(facts: &FrameAnalysis) -> Vec<(LandmarkId, &LandmarkPose)> {
+    let unique = |q: &QuadAnalysis| match q.recognition.as_ref()?.verdict {
+        Verdict::Unique(id) => Some(id),
+        Verdict::Unknown | Verdict::Ambiguous(_) => None,
+    };
+    facts.quads.iter().filter_map(|q| Some((unique(q)?, q.pose.as_ref().ok()?))).collect()
+}
+
+/// Observations of the landmarks that were recognised, posed, and have a place that is trusted; or why there are none.
+pub fn sightings<'a>(
+    facts: &'a FrameAnalysis,
+    map: &'a MapSnapshot,
+) -> Result<Vec<LandmarkObservation<'a>>, NoFix> {
+    let posed = unique_landmarks(facts);
+    if posed.is_empty() {
+        return Err(NoFix::NothingRecognised);
+    }
+    let placed = |(landmark, seen)| {
+        let info = map.landmarks.get(&landmark)?;
+        Some((info, LandmarkObservation { landmark, seen, place: info.place.as_ref()? }))
+    };
+    let placed: Vec<_> = posed.into_iter().filter_map(placed).collect();
+    if placed.is_empty() {
+        return Err(NoFix::LandmarkNotPlaced);
+    }
+    let trusted: Vec<_> = placed.into_iter().filter(|(info, _)| info.is_trusted()).map(|(_, s)| s).collect();
+    if trusted.is_empty() { Err(NoFix::LandmarkQuarantined) } else { Ok(trusted) }
+}
+
+/// The pose of the robot by observations, one or several; or why there is none.
+pub fn robot_fixes(
+    sightings: &[LandmarkObservation<'_>],
+    mounting: Option<&CameraExtrinsics>,
+    prior: Option<&Pose2Covariance>,
+) -> Result<FixResult, NoFix> {
+    let Some(mounting) = mounting else { return Err(NoFix::NoExtrinsics) };
+    if sightings.is_empty() {
+        return Err(NoFix::WeakObservation);
+    }
+    robot_pose(sightings, mounting, prior, &LocaliseParams::default()).map_err(|error| {
+        tracing::error!(%error, "checked inputs were refused by localisation");
+        NoFix::Degenerate
+    })
+}
+
+/// The one pose that is left, or why there is none.
+pub fn only(fix: &FixResult) -> Result<Fix, NoFix> {
+    match fix {
+        FixResult::Fixed(fix) => Ok((**fix).clone()),
+        FixResult::Ambiguous(_) => Err(NoFix::Ambiguous),
+        FixResult::Refused(refusal) => Err(NoFix::from(refusal)),
+    }
+}
+
+/// The one pose of the robot by observations, or why there is none.
+pub fn robot_fix(
+    sightings: &[LandmarkObservation<'_>],
+    mounting: Option<&CameraExtrinsics>,
+    prior: Option<&Pose2Covariance>,
+) -> Result<Fix, NoFix> {
+    only(&robot_fixes(sightings, mounting, prior)?)
+}

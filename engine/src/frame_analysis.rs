@@ -1,0 +1,64 @@
+//! A frame through the pipeline of `vision`, with the times of its stages. In: image, camera, a version of the map. Out: quads
+//! with verdicts and poses of landmarks.
+
+use super::snapshot::MapSnapshot;
+use protos::v1;
+use std::{cell::RefCell, time::Instant};
+use vision::{
+    frame::{GrayImage, Intrinsics},
+    pipeline::{FrameAnalysis, LandmarkDatabase, Pipeline},
+    trace::{Stage, Trace},
+};
+
+/// Times the stages of the pipeline.
+#[derive(Debug)]
+pub struct StageTimes {
+    since: Instant,
+    times: Vec<v1::StageTime>,
+}
+
+impl StageTimes {
+    /// The first stage begins now.
+    pub fn start() -> Self {
+        Self { since: Instant::now(), times: Vec::new() }
+    }
+
+    /// A stage outside the pipeline has just ended.
+    pub fn ended(&mut self, stage: &str) {
+        let now = Instant::now();
+        let ms = (now - self.since).as_secs_f64() * 1e3;
+        self.times.push(v1::StageTime { stage: stage.to_owned(), ms });
+        self.since = now;
+    }
+
+    /// Every stage so far.
+    pub fn finish(&mut self) -> Vec<v1::StageTime> {
+        std::mem::take(&mut self.times)
+    }
+}
+
+impl Trace for StageTimes {
+    fn finished(&mut self, stage: Stage) {
+        self.ended(stage.name());
+    }
+}
+
+/// Recognises an image against one version of a map: the whole pipeline.
+pub fn analyse_frame(
+    image: &GrayImage,
+    camera: Option<&Intrinsics>,
+    map: &MapSnapshot,
+    times: &mut StageTimes,
+) -> FrameAnalysis {
+    let landmarks = LandmarkDatabase { models: &map.models, sizes: &map.sizes, kind: map.distance };
+    // Taken out while in use: a panic leaves none behind that is half written.
+    let mut pipeline = PIPELINE.take();
+    let facts = pipeline.analyse(image, camera, landmarks, &map.params, times);
+    PIPELINE.set(pipeline);
+    facts
+}
+
+thread_local! {
+    /// What the pipeline keeps from frame to frame; each worker thread its own.
+    static PIPELINE: RefCell<Pipeline> = RefCell::default();
+}
