@@ -2,13 +2,12 @@
 //! from then on they are recognised and placed, never one for another, at least as often as when each was taught by a
 //! photograph. Views of a landmark that is known are added only where it was recognised, and only when asked for.
 
-use client::{
-    Capture, Delivery, LandmarkRegion, RobotClient, RobotOptions,
-    api::NewMap,
-    v1::{self, Verdict},
-};
+mod figures;
+
+use client::{Capture, Delivery, LandmarkRegion, RobotClient, RobotOptions, api::NewMap, v1};
+use figures::{Figures, figures};
 use map::pose2::{Pose2, Pose2Covariance};
-use nalgebra::{Matrix3, Point2, Vector3};
+use nalgebra::{Matrix3, Vector3};
 use reqwest::{Client, Method, StatusCode};
 use serde_json::{Value, json};
 use server::config::Limits;
@@ -17,7 +16,6 @@ use sim::{
     drive::DriveParams,
     lesson::{LessonParams, stops},
     robot::{Robot, RobotParams, SensorReadings},
-    truth::{LandmarkView, ViewState},
 };
 use std::{collections::BTreeMap, sync::Arc, time::Duration};
 use tests::{
@@ -26,13 +24,8 @@ use tests::{
     eventually,
     robots::{call, jpeg},
 };
-use vision::geometry::polygon::iou;
 
 const MAP: &str = "corridor";
-/// Posters with a shorter side in the picture are counted by themselves...
-const LARGE_PX: f64 = 60.0;
-/// ... and below this not at all: they have no icon.
-const MIN_SIDE_PX: f64 = 38.0;
 
 /// A map with walls and a robot on it, nothing taught.
 async fn walls(inside: &Inside, building: &Building) -> RobotClient {
@@ -95,46 +88,6 @@ async fn drive(client: &RobotClient, mut robot: Robot, localised: bool) -> Vec<(
         answered.push((seen, answer));
     }
     answered
-}
-
-/// What a drive gave.
-#[derive(Debug, Default)]
-struct Figures {
-    /// Posters wholly in a picture, large and small, and those of them that were recognised.
-    shown: [usize; 2],
-    right: [usize; 2],
-    wrong: usize,
-    poses: usize,
-    worst_m: f64,
-}
-
-fn figures(drive: &[(SensorReadings, v1::Answer)]) -> Figures {
-    let mut f = Figures::default();
-    for (seen, answer) in drive {
-        let truth = &seen.frame.truth;
-        let whole = |l: &&LandmarkView| l.name.starts_with("poster") && l.state == ViewState::Full;
-        let size = |l: &LandmarkView| usize::from(l.min_side_px() < LARGE_PX);
-        let shown = truth.landmarks.iter().filter(whole).filter(|l| l.min_side_px() >= MIN_SIDE_PX);
-        for poster in shown.clone() {
-            f.shown[size(poster)] += 1;
-        }
-        for quad in answer.quads.iter().filter(|q| q.verdict() == Verdict::Unique) {
-            let corners: Vec<_> = quad.corners.iter().map(|c| Point2::new(c.u_px, c.v_px)).collect();
-            let there = truth.landmarks.iter().find(|l| iou(&corners, l.corners_px.points()) > 0.5);
-            f.wrong += usize::from(there.is_none_or(|l| l.name != quad.landmark));
-            if let Some(poster) = there.filter(|t| t.name == quad.landmark)
-                && shown.clone().any(|l| l.name == poster.name)
-            {
-                f.right[size(poster)] += 1;
-            }
-        }
-        if let Some(pose) = answer.map_from_robot.as_ref().and_then(|p| p.pose.as_ref()) {
-            let t = seen.step.map_from_robot;
-            f.poses += 1;
-            f.worst_m = f.worst_m.max((pose.x_m - t.x_m).hypot(pose.y_m - t.y_m));
-        }
-    }
-    f
 }
 
 fn list<'a>(value: &'a Value, name: &str) -> &'a [Value] {

@@ -19,6 +19,7 @@ use std::sync::LazyLock;
 use vision::model::LandmarkId;
 
 mod guided;
+mod runs;
 mod stamps;
 
 /// A moment of the server's clock.
@@ -348,86 +349,4 @@ fn a_forged_message_leaves_the_robot_alone() {
     assert!((pose.map_from_robot.unwrap().pose.unwrap().x_m - 11.0).abs() < 1e-9);
     assert_eq!(motion.counts().0.rejected, [(Code::EpochConflict, 1)].into());
     assert_eq!(motion.epochs().status(&r1, time(2.0)).conflict.unwrap().epoch, 2);
-}
-
-#[test]
-fn runs_are_recorded_one_by_one_and_bounded() {
-    let (motion, r1) = motion();
-    assert_eq!(motion.recorded(&r1), None);
-    let begun = motion.record(&r1, "hall").unwrap();
-    assert!(begun.going && begun.span_ns.is_none());
-    assert_eq!(motion.record(&r1, "hall"), Err(RunError::Going));
-    motion.odometry_of(&r1, odometry(1, 0.0));
-    motion.fixed(&r1, at(1_000_000_000, 0.0), &fix(10.0)).unwrap();
-    motion.odometry_of(&r1, odometry(2, 1.0));
-    let told = motion.recorded(&r1).unwrap();
-    assert_eq!((told.odometry, told.landmarks, told.laser, told.going), (2, 1, 0, true));
-    // Its software is started again: what was recorded stays, nothing is added.
-    let again = v1::Odometry {
-        epoch: 2,
-        seq: 1,
-        captured_ns: 9_000_000_000,
-        odom_from_robot: Some(v1::Pose2::default()),
-    };
-    motion.odometry(&r1, again.encode_to_vec().into(), time(9.0));
-    let told = motion.recorded(&r1).unwrap();
-    assert_eq!((told.odometry, told.going), (2, false));
-    // Lent to be learnt from: it stays, and is lent once at a time, until what it taught is stored.
-    let motion = Arc::new(motion);
-    let lent = motion.lend_recording(&r1).unwrap();
-    assert_eq!(motion.lend_recording(&r1).err(), Some(RunError::Lent));
-    assert_eq!((lent.recording.odometry.len(), motion.recorded(&r1).unwrap().odometry), (2, 2));
-    drop(lent);
-    motion.lend_recording(&r1).unwrap().learnt();
-    assert_eq!((motion.recorded(&r1), motion.lend_recording(&r1).err()), (None, Some(RunError::None)));
-    motion.record(&r1, "hall").unwrap();
-    // Given up and begun anew while it is learnt from: the new one stays.
-    let lent = motion.lend_recording(&r1).unwrap();
-    motion.take_recording(&r1).unwrap();
-    motion.record(&r1, "hall").unwrap();
-    lent.learnt();
-    assert!(motion.recorded(&r1).is_some());
-    for i in 1..MAX_RECORDINGS {
-        motion.record(&Name::new(format!("r{}", i + 1)).unwrap(), "hall").unwrap();
-    }
-    assert_eq!(motion.record(&Name::new("one-more").unwrap(), "hall"), Err(RunError::TooMany));
-    assert!(motion.take_recording(&r1).is_some() && motion.take_recording(&r1).is_none());
-    motion.record(&Name::new("one-more").unwrap(), "hall").unwrap();
-}
-
-#[test]
-fn a_run_on_another_map_ends_at_once() {
-    let (motion, r1) = motion();
-    motion.record(&r1, "attic").unwrap();
-    motion.odometry_of(&r1, odometry(1, 0.0));
-    let told = motion.recorded(&r1).unwrap();
-    assert_eq!((told.going, told.odometry), (false, 0));
-}
-
-#[test]
-fn what_runs_have_shown_is_heeded_from_the_next_message_on() {
-    use map::modality_stats::{FusionMode, ModalityMap, ModalityStats, PoseCell, StatsByModality};
-    let (motion, r1) = motion();
-    motion.odometry_of(&r1, odometry(1, 0.0));
-    motion.fixed(&r1, at(1_000_000_000, 0.0), &fix(10.0)).unwrap();
-    // Where the robot will be odometry was exact and landmarks far off: the best alone means odometry.
-    let sums = |error: f64| -> ModalityStats {
-        let one = serde_json::json!({
-            "steps": 100, "available": 100, "seconds": 1.0, "errors": [0.0, 0.0, 0.0],
-            "products": [error, 0.0, 0.0, 0.0, 0.0, 0.0], "fixes": 0, "outliers": 0, "weights": [0.0, 0.0, 0.0],
-            "weighted": [0.0, 0.0, 0.0], "normalised": [0.0, 0.0, 0.0], "visits": 0, "means": [0.0, 0.0, 0.0],
-            "mean_squares": [0.0, 0.0, 0.0]
-        });
-        serde_json::from_value(one).unwrap()
-    };
-    let found: StatsByModality = [sums(0.0), sums(100.0), sums(100.0)];
-    let cells = (10..14).map(|x| (PoseCell { x, y: 1, heading: 0 }, found)).collect::<BTreeMap<_, _>>();
-    let mut map = MapSnapshot::empty("hall", 2);
-    map.modalities = Arc::new(ModalityMap::new(FusionMode::Single, Vec::new(), [&cells]));
-    motion.snapshots.publish(Arc::new(map));
-    motion.odometry_of(&r1, odometry(2, 1.0));
-    motion.fixed(&r1, at(2_000_000_000, 1.0), &fix(11.0)).unwrap();
-    let log = motion.corrections(&r1);
-    assert_eq!(log.totals["landmarks"], [("not_used", 1), ("started", 1)].into());
-    assert!((motion.pose(&r1, "hall", time(2.0)).unwrap().pose.x_m - 11.0).abs() < 1e-9);
 }

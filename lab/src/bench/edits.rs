@@ -64,6 +64,7 @@ pub(super) struct Args {
 }
 
 /// Milliseconds of several changes of one kind.
+#[expect(clippy::struct_field_names, reason = "units come last")]
 #[derive(Debug, Serialize)]
 struct Cost {
     median_ms: f64,

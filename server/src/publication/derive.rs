@@ -74,3 +74,6 @@ fn look_alikes(map: &MapSnapshot, before: Option<&MapSnapshot>) -> Arc<LookAlike
         None => Arc::new(look_alike_classes(&map.learnt, map.distance, &map.params)),
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,75 @@
+//! Derived data: when it is there, and what is computed.
+
+use super::super::{tests::config, *};
+use crate::store::{landmarks, laser, maps};
+use vision::recognise::DistanceKind;
+
+/// A map with a wall and two landmarks 40 m apart, so that neither's area reaches the other.
+async fn two_placed(store: &Store) -> [vision::model::LandmarkId; 2] {
+    store.write(|tx| Box::pin(maps::create(tx, "a", DistanceKind::Both, 2))).await.unwrap();
+    store
+        .write(|tx| Box::pin(async { laser::replace(tx, "a", &[[0.0, -0.1, 60.0, -0.1]]).await }))
+        .await
+        .unwrap();
+    let mut ids = [vision::model::LandmarkId(0); 2];
+    for (id, (name, x_m)) in ids.iter_mut().zip([("p1", 5.0), ("p2", 45.0)]) {
+        let new = placed_at(x_m);
+        let row = store.write(move |tx| Box::pin(landmarks::create(tx, "a", name, new, 5))).await.unwrap();
+        id.0 = row.id as u64;
+    }
+    ids
+}
+
+fn placed_at(x_m: f64) -> landmarks::Measures {
+    let (z_m, theta_rad) = (1.5, std::f64::consts::FRAC_PI_2);
+    landmarks::Measures {
+        size: Some(vision::pose::LandmarkSize { width_m: 0.5, height_m: 0.7 }),
+        place: Some(landmarks::Place {
+            x_m,
+            y_m: 0.0,
+            z_m,
+            theta_rad,
+            roll_rad: 0.0,
+            tilt_rad: 0.0,
+            covariance: None,
+        }),
+        size_from_views: false,
+    }
+}
+
+#[tokio::test]
+async fn an_edit_computes_only_what_it_changed_and_not_in_the_writer() {
+    let dir = tempfile::tempdir().unwrap();
+    let config = config(dir.path());
+    let (snapshots, vitals) = (Arc::new(Snapshots::default()), Arc::new(Vitals::default()));
+    let publisher = Publisher::new(snapshots.clone(), config.params.clone(), vitals.clone());
+    let wake = publisher.derive.clone();
+    // Nothing derives yet: what the writer publishes is all there is.
+    let (store, _task) = Store::open(&config, Arc::new(publisher), vitals.clone()).await.unwrap();
+    let [p1, p2] = two_placed(&store).await;
+    let map = snapshots.get("a").unwrap();
+    assert!(map.pending.visibility && map.visibility.is_empty());
+
+    let (stop, stopping) = watch::channel(false);
+    let deriver = tokio::spawn(derive::run(snapshots.clone(), vitals.clone(), wake.clone(), stopping));
+    let before = snapshots.with_visibility("a").await.unwrap();
+    assert_eq!((before.version, before.visibility.len()), (map.version, 2));
+    stop.send_replace(true);
+    deriver.await.unwrap();
+
+    let (moved, walls) = (placed_at(6.0), before.walls.clone());
+    store
+        .write(move |tx| Box::pin(async move { landmarks::update(tx, "a", "p1", |_| moved).await }))
+        .await
+        .unwrap();
+    let after = snapshots.get("a").unwrap();
+    assert!(after.version > before.version && Arc::ptr_eq(&after.walls, &walls));
+    assert!(after.pending.visibility && !after.visibility.contains_key(&p1), "never one of another place");
+    assert!(Arc::ptr_eq(&after.visibility[&p2], &before.visibility[&p2]), "its inputs are the same");
+
+    let (_stop, stopping) = watch::channel(false);
+    tokio::spawn(derive::run(snapshots.clone(), vitals, wake, stopping));
+    let derived = snapshots.with_visibility("a").await.unwrap();
+    assert!(derived.version == after.version && derived.visibility.contains_key(&p1));
+    assert!(Arc::ptr_eq(&derived.visibility[&p2], &before.visibility[&p2]));
+}
