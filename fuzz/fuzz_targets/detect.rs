@@ -6,7 +6,18 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use vision::{detect::{MAX_QUADS, detect, MAX_SCALES, edges::edge_map::EdgeMap, Grouping, Nested, DetectParams, Quad, segments::edge_segments::{EdgeSegment, MAX_SEGMENTS}, relaxation::similarity::{MAX_PAIRS, SegmentPair}, tiling::tiling_params::FloorView}, frame::{Distortion, GrayImage, Intrinsics}, geometry::polygon, trace::Trace};
+use vision::{
+    detect::{
+        DetectParams, Grouping, MAX_QUADS, MAX_SCALES, Nested, Quad, detect,
+        edges::edge_map::EdgeMap,
+        relaxation::similarity::{MAX_PAIRS, SegmentPair},
+        segments::edge_segments::{EdgeSegment, MAX_SEGMENTS},
+        tiling::tiling_params::FloorView,
+    },
+    frame::{Distortion, GrayImage, Intrinsics},
+    geometry::polygon,
+    trace::Trace,
+};
 
 fuzz_target!(|data: &[u8]| {
     let Some(([width, height, zoom, switches, more, knob, value], levels)) = data.split_first_chunk() else {
