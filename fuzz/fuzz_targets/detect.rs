@@ -11,7 +11,7 @@ use vision::{
         DetectParams, Grouping, MAX_QUADS, MAX_SCALES, Nested, Quad, detect,
         edges::edge_map::EdgeMap,
         relaxation::similarity::{MAX_PAIRS, SegmentPair},
-        segments::edge_segments::{EdgeSegment, MAX_SEGMENTS},
+        segments::{edge_segments::EdgeSegment, joining::MAX_SEGMENTS},
         tiling::tiling_params::FloorView,
     },
     frame::{Distortion, GrayImage, Intrinsics},
