@@ -16,7 +16,7 @@ pub(crate) const WEIGHTS: usize = MEASURES + 1;
 /// One answer: what it rests on, and whether it was right.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Answer {
-    /// See [`vision::recognise::decision::confidence::measures`].
+    /// See [`vision::recognise::decision::measures::measures`].
     pub(crate) measures: [f64; MEASURES],
     /// The identity was right.
     pub(crate) is_right: bool,
