@@ -30,7 +30,7 @@ macro_rules! operations {
         /// The operations of this file.
         pub(super) const OPERATIONS: &[$crate::http::operation::Operation] = &[$($name),+];
         const _: () = {
-            $(let _ = $crate::http::map_client::MapClient::$call;)+
+            $(let _ = $crate::MapClient::$call;)+
         };
     };
 }
