@@ -67,11 +67,11 @@ pub struct CameraState {
 
 /// All cameras.
 #[derive(Debug, Default)]
-pub struct Cameras(Mutex<BTreeMap<SlotKey, Record>>);
+pub struct CameraRegistry(Mutex<BTreeMap<SlotKey, Record>>);
 
 /// What one frame showed.
 #[derive(Debug, Clone, Copy)]
-pub struct Look<'a> {
+pub struct CameraSample<'a> {
     /// As the frame says.
     pub intrinsics: &'a Intrinsics,
     /// Of the frame.
@@ -86,9 +86,9 @@ pub struct Look<'a> {
     pub fix: Result<&'a Fix, NoFix>,
 }
 
-impl Cameras {
+impl CameraRegistry {
     /// Takes note of a frame in which landmarks were recognised.
-    pub fn looked(&self, key: &SlotKey, look: &Look<'_>) {
+    pub fn looked(&self, key: &SlotKey, look: &CameraSample<'_>) {
         if look.seen.is_empty() {
             return;
         }
@@ -240,11 +240,11 @@ mod tests {
         let real = Intrinsics::new(600.0, 600.0, 330.0, 250.0, Distortion::None).unwrap();
         // What frames claim: wrong focal length, and a lens that is not there.
         let said = Intrinsics::new(640.0, 640.0, 319.5, 239.5, lens).unwrap();
-        let (cameras, map) = (Cameras::default(), MapSnapshot::empty("hall", 1));
+        let (cameras, map) = (CameraRegistry::default(), MapSnapshot::empty("hall", 1));
         let poses = poses(&real, &said);
         for pose in poses.iter().chain(&poses) {
             let seen = [(LandmarkId(1), pose)];
-            let look = Look {
+            let look = CameraSample {
                 intrinsics: &said,
                 image_px: [640, 480],
                 seen: &seen,
@@ -268,14 +268,14 @@ mod tests {
     #[test]
     fn a_change_of_intrinsics_begins_the_watch_anew_and_keeps_the_views() {
         let real = Intrinsics::new(600.0, 600.0, 330.0, 250.0, Distortion::None).unwrap();
-        let (cameras, map) = (Cameras::default(), MapSnapshot::empty("hall", 1));
+        let (cameras, map) = (CameraRegistry::default(), MapSnapshot::empty("hall", 1));
         let poses = poses(&real, &real);
         let look_with = |k: &Intrinsics, width| {
             let seen = [(LandmarkId(1), &poses[0])];
             let (image_px, fix) = ([width, 480], Err(NoFix::GateReprojection));
             cameras.looked(
                 &key("front"),
-                &Look { intrinsics: k, image_px, seen: &seen, map: &map, mounting: None, fix },
+                &CameraSample { intrinsics: k, image_px, seen: &seen, map: &map, mounting: None, fix },
             );
             let state = cameras.of_robot("r1").remove(0).1;
             (state.frames, state.watch.refused, state.views)

@@ -34,7 +34,7 @@ use vision::{
 pub const MAX_ALIKE: usize = map::relocalise::MAX_MEMBERS / 2;
 
 /// One thing that was seen: each landmark it may be, and how it was seen if it is that one.
-pub type Sighted = Vec<(LandmarkId, RelativeObservation)>;
+pub type AmbiguousObservation = Vec<(LandmarkId, RelativeObservation)>;
 
 /// What a frame shows of landmarks that have doubles. Only what may be several, all of known and trusted place: one that
 /// hangs nobody knows where would be taken for the others again and again.
@@ -44,7 +44,7 @@ pub fn sighted(
     map: &MapSnapshot,
     mounting: &CameraExtrinsics,
     camera: &Intrinsics,
-) -> Vec<Sighted> {
+) -> Vec<AmbiguousObservation> {
     if map.look_alikes.models.is_empty() {
         return Vec::new();
     }
@@ -59,7 +59,7 @@ fn one(
     map: &MapSnapshot,
     mounting: &CameraExtrinsics,
     camera: &Intrinsics,
-) -> Option<Sighted> {
+) -> Option<AmbiguousObservation> {
     let alike = resembling(image, &facts.quad, map).filter(|alike| alike.fitting >= 2)?;
     let mut sighted = Vec::new();
     for id in alike.members {

@@ -20,7 +20,7 @@ pub const MAX_ROBOTS: usize = 10_000;
 
 /// What is asked.
 #[derive(Debug, Clone)]
-pub struct Ask {
+pub struct GazeQuery {
     /// Where the robot is.
     pub pose: Pose2Covariance,
     /// Ranges of its pan-tilt unit, and its focal length.
@@ -32,7 +32,7 @@ pub struct Ask {
 }
 
 /// Every landmark worth looking at, best first.
-pub fn ranked(map: &MapSnapshot, ask: &Ask) -> Result<Vec<GazeTarget>, OutOfRange> {
+pub fn ranked(map: &MapSnapshot, ask: &GazeQuery) -> Result<Vec<GazeTarget>, OutOfRange> {
     let targets: Vec<GazeCandidate<'_>> = map
         .models
         .iter()
@@ -48,9 +48,9 @@ pub fn ranked(map: &MapSnapshot, ask: &Ask) -> Result<Vec<GazeTarget>, OutOfRang
 
 /// Which landmark each robot was told to look at.
 #[derive(Debug, Default)]
-pub struct Gazes(Mutex<BTreeMap<Name, (u64, GazeController)>>);
+pub struct GazeControllers(Mutex<BTreeMap<Name, (u64, GazeController)>>);
 
-impl Gazes {
+impl GazeControllers {
     /// Where a robot should look at its own time `at_ns`; `looked` is what came of the last look.
     pub fn choose(
         &self,
@@ -58,7 +58,7 @@ impl Gazes {
         at_ns: i64,
         looked: Option<(LandmarkId, bool)>,
         map: &MapSnapshot,
-        ask: &Ask,
+        ask: &GazeQuery,
     ) -> Result<GazeAction, OutOfRange> {
         let ranked = ranked(map, ask)?;
         let mut gazes = self.0.lock().unwrap_or_else(PoisonError::into_inner);

@@ -2,7 +2,7 @@
 //! publish at once. Checks everything but the pixels, and never waits: it runs on the transport's threads.
 
 use super::slots::{SlotKey, Slots};
-use super::{motion::Motion, snapshot::Snapshots};
+use super::{motion::MotionTracker, snapshot::Snapshots};
 use protos::{
     CheckedFrame, Code, Rejection,
     prost::{Message, bytes::Bytes},
@@ -42,7 +42,7 @@ pub struct Intake {
     /// Which robots and maps there are.
     pub snapshots: Arc<Snapshots>,
     /// Which epoch of a robot is live, and its clock.
-    pub motion: Arc<Motion>,
+    pub motion: Arc<MotionTracker>,
     /// Largest message, in bytes.
     pub frame_bytes: usize,
     /// Deadline of frames that name none.
@@ -126,7 +126,7 @@ mod tests {
         snapshots.set_robot("r1", Some("hall"));
         snapshots.set_robot("lost", Some("gone"));
         let slots = Arc::new(Slots::new(4));
-        let motion = Arc::new(Motion::new(snapshots.clone(), Arc::default()));
+        let motion = Arc::new(MotionTracker::new(snapshots.clone(), Arc::default()));
         Intake { slots, snapshots, motion, frame_bytes: 1000, deadline: Duration::from_millis(500) }
     }
 
@@ -202,7 +202,7 @@ mod tests {
             let (k, job) = intake.slots.try_take().unwrap();
             assert_eq!(job.stamp_instead_ns.is_some(), is_stray, "{seq}");
             assert!(job.stamp_instead_ns.is_none_or(|ns| ns < 1_000_000_000));
-            intake.slots.finish(&k, crate::slots::Outcome::Processed);
+            intake.slots.finish(&k, crate::slots::FrameOutcome::Processed);
         }
         let counts = intake.motion.frame_stamps();
         assert_eq!((counts.accepted, counts.rejected), (3, [(protos::Code::ClockAhead, 1)].into()));
@@ -225,7 +225,7 @@ mod tests {
         let (k, job) = intake.slots.try_take().unwrap();
         assert_eq!(job.deadline - job.received, Duration::from_millis(500));
         assert!(job.clock_suspect, "captured in 1970");
-        intake.slots.finish(&k, crate::slots::Outcome::Processed);
+        intake.slots.finish(&k, crate::slots::FrameOutcome::Processed);
         let hasty = v1::Frame { deadline_ms: 40, ..frame(2) };
         intake.receive(key("r1"), hasty.encode_to_vec().into()).unwrap();
         let (_, job) = intake.slots.try_take().unwrap();

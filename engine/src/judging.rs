@@ -7,7 +7,7 @@ use super::{
     fixes::{self, NoFix},
     frame_context::FrameContext,
     guided::Guided,
-    motion::{FrameFixes, Grounds},
+    motion::{FrameFixes, PriorPose},
 };
 use map::{
     landmark_health::{
@@ -24,9 +24,9 @@ use vision::{
 
 /// What a frame says about the landmarks themselves, by the pose without it.
 #[derive(Debug)]
-pub struct Seen {
+pub struct LandmarkChecks {
     /// That pose.
-    pub grounds: Grounds,
+    pub grounds: PriorPose,
     /// Landmarks that are in the frame.
     pub judged: Vec<PlaceCheck>,
     /// Landmarks that should be and are not.
@@ -45,7 +45,7 @@ pub struct JudgedFrame {
     /// The fix by the landmarks that the pose names, and by the others where they alone gave none.
     pub guided: Option<Fix>,
     /// What it says of the landmarks, where the robot's pose was known without it.
-    pub seen: Option<Seen>,
+    pub seen: Option<LandmarkChecks>,
     /// The frame was not searched for all landmarks of the map.
     pub only_expected: bool,
 }
@@ -65,7 +65,7 @@ impl JudgedFrame {
 }
 
 /// Judges a frame by what is known without it, and `guided`, the landmarks that this names.
-pub fn judged_frame(view: &FrameContext<'_>, grounds: Option<Grounds>, guided: &Guided) -> JudgedFrame {
+pub fn judged_frame(view: &FrameContext<'_>, grounds: Option<PriorPose>, guided: &Guided) -> JudgedFrame {
     let global = fixes::sightings(view.facts, view.map);
     let known = grounds.as_ref().map(|grounds| grounds.pose);
     let seen = grounds.and_then(|grounds| seen(view, global.as_deref().ok(), grounds));
@@ -83,9 +83,9 @@ pub fn judged_frame(view: &FrameContext<'_>, grounds: Option<Grounds>, guided: &
 
 /// Judges a frame of which only the landmarks were looked for that the pose without it expects: they may correct that pose.
 /// What hangs elsewhere, or not at all, is said by frames that are searched.
-pub fn judged_expected(view: &FrameContext<'_>, grounds: Grounds, guided: &Guided) -> JudgedFrame {
+pub fn judged_expected(view: &FrameContext<'_>, grounds: PriorPose, guided: &Guided) -> JudgedFrame {
     let prior = grounds.pose;
-    let seen = Seen { grounds, judged: Vec::new(), missed: Vec::new() };
+    let seen = LandmarkChecks { grounds, judged: Vec::new(), missed: Vec::new() };
     let guided = guided_fix(view, guided, &[], (&prior, Some(&seen)));
     let (prior, seen) = (Some(prior), Some(seen));
     JudgedFrame {
@@ -122,7 +122,7 @@ fn guided_fix(
     view: &FrameContext<'_>,
     guided: &Guided,
     with: &[LandmarkObservation<'_>],
-    (prior, seen): (&Pose2Covariance, Option<&Seen>),
+    (prior, seen): (&Pose2Covariance, Option<&LandmarkChecks>),
 ) -> Option<Fix> {
     let named = guided.placed(view.map);
     let mounting = view.mounting.filter(|_| !named.is_empty())?;
@@ -154,8 +154,8 @@ fn may_be(verdict: &RecognitionResult, id: LandmarkId) -> bool {
 fn seen(
     view: &FrameContext<'_>,
     sightings: Option<&[LandmarkObservation<'_>]>,
-    grounds: Grounds,
-) -> Option<Seen> {
+    grounds: PriorPose,
+) -> Option<LandmarkChecks> {
     let FrameContext { facts, map, image_px, .. } = *view;
     let (mounting, camera) = (view.mounting?, view.camera?);
     let p = HealthParams::default();
@@ -176,5 +176,5 @@ fn seen(
     } else {
         Vec::new()
     };
-    Some(Seen { grounds, judged, missed })
+    Some(LandmarkChecks { grounds, judged, missed })
 }

@@ -16,7 +16,7 @@ use std::{
 };
 use tokio::sync::broadcast;
 
-use super::{cameras::Cameras, slots::SlotKey};
+use super::{cameras::CameraRegistry, slots::SlotKey};
 use crate::limits::MAX_ROBOTS;
 
 /// Cameras whose last frame is kept; the one longest without a frame gives way.
@@ -63,7 +63,7 @@ impl LiveFrame {
 
 /// Where a robot was, by source; oldest first.
 #[derive(Debug, Clone, Default)]
-pub struct Tracks {
+pub struct Trajectories {
     /// Odometry, laid on the map at the robot's first known pose.
     pub odometry: VecDeque<Pose2>,
     /// Fused poses.
@@ -74,7 +74,7 @@ pub struct Tracks {
 
 /// Which track a pose belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum TrackKind {
+pub enum TrajectoryKind {
     /// Odometry.
     Odometry,
     /// Fused.
@@ -185,7 +185,7 @@ impl LiveEvent {
 struct State {
     /// With the count of frames at its last frame: the smallest is the stalest.
     frames: BTreeMap<SlotKey, (u64, LiveFrame)>,
-    tracks: BTreeMap<Name, (u64, Tracks)>,
+    tracks: BTreeMap<Name, (u64, Trajectories)>,
     /// Of each robot's last published pose: the map it is in, and how far it is trusted.
     trust: BTreeMap<Name, (String, v1::PoseTrust)>,
     ticks: u64,
@@ -196,7 +196,7 @@ struct State {
 pub struct LiveHub {
     state: Mutex<State>,
     events: broadcast::Sender<Arc<LiveEvent>>,
-    watched: Cameras,
+    watched: CameraRegistry,
 }
 
 impl Default for LiveHub {
@@ -204,14 +204,14 @@ impl Default for LiveHub {
         Self {
             state: Mutex::default(),
             events: broadcast::channel(EVENTS_KEPT).0,
-            watched: Cameras::default(),
+            watched: CameraRegistry::default(),
         }
     }
 }
 
 impl LiveHub {
     /// What frames say of the cameras they come from.
-    pub fn watched(&self) -> &Cameras {
+    pub fn watched(&self) -> &CameraRegistry {
         &self.watched
     }
 
@@ -233,7 +233,7 @@ impl LiveHub {
     }
 
     /// Tracks of a robot so far.
-    pub fn tracks(&self, robot: &Name) -> Option<Tracks> {
+    pub fn tracks(&self, robot: &Name) -> Option<Trajectories> {
         self.lock().tracks.get(robot).map(|(_, tracks)| tracks.clone())
     }
 
@@ -273,7 +273,7 @@ impl LiveHub {
         (corrections, age_ms): (u64, f64),
         trust: v1::PoseTrust,
     ) {
-        self.extend(robot, TrackKind::Pose, pose.pose);
+        self.extend(robot, TrajectoryKind::Pose, pose.pose);
         self.trusted(robot, map, trust);
         self.tell(LiveEvent::Pose {
             robot: robot.clone(),
@@ -288,14 +288,14 @@ impl LiveHub {
 
     /// Odometry laid on the map.
     pub fn odometry(&self, robot: &Name, map: &str, map_from_robot: Pose2) {
-        self.extend(robot, TrackKind::Odometry, map_from_robot);
+        self.extend(robot, TrajectoryKind::Odometry, map_from_robot);
         let pose = pose2_wire(&map_from_robot);
         self.tell(LiveEvent::Odometry { robot: robot.clone(), map: map.to_owned(), pose });
     }
 
     /// Where a simulated robot really is.
     pub fn truth(&self, robot: &Name, map: &str, map_from_robot: Pose2) {
-        self.extend(robot, TrackKind::Truth, map_from_robot);
+        self.extend(robot, TrajectoryKind::Truth, map_from_robot);
         let pose = pose2_wire(&map_from_robot);
         self.tell(LiveEvent::Truth { robot: robot.clone(), map: map.to_owned(), pose });
     }
@@ -317,16 +317,16 @@ impl LiveHub {
         }
     }
 
-    fn extend(&self, robot: &Name, kind: TrackKind, pose: Pose2) {
+    fn extend(&self, robot: &Name, kind: TrajectoryKind, pose: Pose2) {
         let mut guard = self.lock();
         let state = &mut *guard;
         state.ticks += 1;
         let (tick, tracks) = state.tracks.entry(robot.clone()).or_default();
         *tick = state.ticks;
         let track = match kind {
-            TrackKind::Odometry => &mut tracks.odometry,
-            TrackKind::Pose => &mut tracks.pose,
-            TrackKind::Truth => &mut tracks.truth,
+            TrajectoryKind::Odometry => &mut tracks.odometry,
+            TrajectoryKind::Pose => &mut tracks.pose,
+            TrajectoryKind::Truth => &mut tracks.truth,
         };
         if track.len() == MAX_TRACK_POINTS {
             track.pop_front();

@@ -9,7 +9,7 @@ pub use session::{MAX_SCANS, QUEUE};
 
 use super::panics::Panics;
 use crate::scan_job::ScanJob;
-use journal::{Head, Journal, Kept};
+use journal::{Journal, JournalHeader, JournalReader};
 use map::pose2::Pose2;
 use protos::Name;
 use session::{Session, Start};
@@ -30,7 +30,7 @@ pub type Walls = Vec<[f64; 4]>;
 
 /// How far a mapping has come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Stage {
+pub enum MappingStage {
     /// The server was started again: the scans that were kept are mapped once more. New ones wait, as many as there is room
     /// for.
     Resuming,
@@ -46,13 +46,13 @@ pub enum Stage {
 
 /// A mapping as it stands.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Progress {
+pub struct MappingProgress {
     /// The map.
     pub map: String,
     /// Whose scans.
     pub robot: String,
     /// How far it has come.
-    pub stage: Stage,
+    pub stage: MappingStage,
     /// Scans that were taken.
     pub scans: u64,
     /// Scans that were not: the queue was full, the robot's software was started again, or there were too many.
@@ -93,7 +93,7 @@ pub enum MappingError {
 
 /// All mappings, by map.
 #[derive(Debug, Default)]
-pub struct Mappings {
+pub struct MappingSessions {
     all: Mutex<BTreeMap<String, Session>>,
     /// Where their scans are kept.
     dir: OnceLock<PathBuf>,
@@ -101,7 +101,7 @@ pub struct Mappings {
     panics: OnceLock<Arc<Panics>>,
 }
 
-impl Mappings {
+impl MappingSessions {
     /// Counts the panics of mappings here from now on.
     pub fn count_in(&self, panics: Arc<Panics>) {
         self.panics.get_or_init(|| panics);
@@ -112,7 +112,7 @@ impl Mappings {
     pub fn keep_in(&self, dir: PathBuf, stands: impl Fn(&Name, &Name) -> bool) {
         let dir = self.dir.get_or_init(|| dir);
         let mut all = self.lock();
-        for kept in Kept::all(dir) {
+        for kept in JournalReader::all(dir) {
             let (map, robot) = (kept.head.map.clone(), kept.head.robot.clone());
             if !stands(&map, &robot) {
                 tracing::warn!(%map, %robot, "a mapping is forgotten: the robot stands elsewhere now");
@@ -127,7 +127,7 @@ impl Mappings {
     }
 
     /// Begins to make a map with a robot, whose first pose is `origin` on it.
-    pub fn begin(&self, map: &Name, robot: &Name, origin: Pose2) -> Result<Progress, MappingError> {
+    pub fn begin(&self, map: &Name, robot: &Name, origin: Pose2) -> Result<MappingProgress, MappingError> {
         let mut all = self.lock();
         if all.get(map.as_str()).is_some_and(Session::is_open) {
             return Err(MappingError::Going);
@@ -139,7 +139,7 @@ impl Mappings {
         if open().count() >= MAX_MAPPINGS {
             return Err(MappingError::TooMany);
         }
-        let head = Head::new(map, robot, &origin);
+        let head = JournalHeader::new(map, robot, &origin);
         let journal = self.dir.get().map(|dir| Journal::create(dir, &head));
         let session = Session::begin(Start::New(head, journal), self.panics()).ok_or(MappingError::Thread)?;
         let progress = session.progress();
@@ -166,11 +166,11 @@ impl Mappings {
         }
     }
 
-    /// Ends the taking of scans; the walls come when everything is fitted. Tell [`Mappings::stored`] what became of them.
+    /// Ends the taking of scans; the walls come when everything is fitted. Tell [`MappingSessions::stored`] what became of them.
     pub fn finish(
         &self,
         map: &str,
-    ) -> Result<(Progress, oneshot::Receiver<Result<Walls, String>>), MappingError> {
+    ) -> Result<(MappingProgress, oneshot::Receiver<Result<Walls, String>>), MappingError> {
         let mut all = self.lock();
         let session = all.get_mut(map).filter(|s| s.takes()).ok_or(MappingError::None)?;
         let walls = session.finish().ok_or(MappingError::None)?;
@@ -197,7 +197,7 @@ impl Mappings {
     }
 
     /// How far the mapping of a map has come: the one that goes on, or the last.
-    pub fn progress(&self, map: &str) -> Option<Progress> {
+    pub fn progress(&self, map: &str) -> Option<MappingProgress> {
         self.lock().get(map).map(Session::progress)
     }
 
@@ -218,7 +218,7 @@ impl Mappings {
 }
 
 /// The counters of one mapping, shared with its thread.
-type Shared = Arc<Mutex<Progress>>;
+type Shared = Arc<Mutex<MappingProgress>>;
 
 #[cfg(test)]
 mod tests;

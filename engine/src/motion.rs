@@ -16,18 +16,20 @@ mod timebase;
 pub use crate::limits::MAX_SCAN_BYTES;
 pub use crate::scan_job::ScanJob;
 pub use corrections::{Correction, Corrections, MAX_CORRECTIONS};
-pub use frames::{FrameFixes, Grounds, Moment};
+pub use frames::{FrameFixes, FrameStamp, PriorPose};
 pub use messages::{MAX_ODOMETRY_BYTES, MessageCounts};
 pub use robot::{MAX_SUPPORTERS, RESTS_ON_M};
-pub use run::Recording;
-pub use run::{MAX_RECORDINGS, MAX_RUN_FIXES, MAX_RUN_ODOMETRY, Recorded, RunError};
+pub use run::RunRecording;
+pub use run::{MAX_RECORDINGS, MAX_RUN_FIXES, MAX_RUN_ODOMETRY, RecordingError, RecordingStatus};
 pub use scans::Scans;
 pub use timebase::{
     AHEAD_TOLERANCE, BEHIND_TOLERANCE, CLOCK_SET_AFTER, CLOCK_SET_COUNT, CLOCK_SET_SPREAD, LEADER_SILENT,
     MAX_LEADS, MAX_STREAMS,
 };
 
-use super::{epochs::Epochs, limits::MAX_ROBOTS, live::LiveHub, mapping::Mappings, snapshot::Snapshots};
+use super::{
+    epochs::Epochs, limits::MAX_ROBOTS, live::LiveHub, mapping::MappingSessions, snapshot::Snapshots,
+};
 use map::{
     fuse::{FixOutcome, FixRole, FusedPose},
     laser_fix::{LaserFixParams, laser_fix},
@@ -39,7 +41,7 @@ use protos::{
     prost::bytes::Bytes,
     v1,
 };
-use robot::{Robot, Told};
+use robot::{RobotState, StatedPose};
 use std::{
     collections::{BTreeMap, BTreeSet},
     sync::{Arc, Mutex, MutexGuard, PoisonError},
@@ -56,7 +58,7 @@ const LASER: &str = "laser";
 #[derive(Debug, Default)]
 struct State {
     /// Each with its own lock: replaying one robot's last seconds holds up no other.
-    robots: BTreeMap<Name, Arc<Mutex<Robot>>>,
+    robots: BTreeMap<Name, Arc<Mutex<RobotState>>>,
     odometry: MessageCounts,
     scans: MessageCounts,
     /// Capture times of frames.
@@ -76,18 +78,18 @@ pub struct Known {
 
 /// The motion of all robots.
 #[derive(Debug)]
-pub struct Motion {
+pub struct MotionTracker {
     snapshots: Arc<Snapshots>,
     live: Arc<LiveHub>,
     epochs: Epochs,
     state: Mutex<State>,
     scans: Scans,
-    mappings: Mappings,
+    mappings: MappingSessions,
     /// Robots whose run is recorded; taken before their own locks.
     recorded: Mutex<BTreeSet<Name>>,
 }
 
-impl Motion {
+impl MotionTracker {
     /// Nothing known of any robot yet.
     pub fn new(snapshots: Arc<Snapshots>, live: Arc<LiveHub>) -> Self {
         Self {
@@ -96,7 +98,7 @@ impl Motion {
             epochs: Epochs::default(),
             state: Mutex::default(),
             scans: Scans::default(),
-            mappings: Mappings::default(),
+            mappings: MappingSessions::default(),
             recorded: Mutex::default(),
         }
     }
@@ -126,7 +128,7 @@ impl Motion {
         robot: &Name,
         message: Bytes,
         received: Instant,
-    ) -> Result<(String, CheckedOdometry, Arc<Mutex<Robot>>), Rejection> {
+    ) -> Result<(String, CheckedOdometry, Arc<Mutex<RobotState>>), Rejection> {
         let (map, odometry) = messages::odometry(&self.snapshots, robot, message)?;
         self.epochs.admit(robot, odometry.epoch, received)?;
         let shared = self.lock().robot(robot)?;
@@ -139,7 +141,7 @@ impl Motion {
         Ok((map, odometry, shared))
     }
 
-    /// A laser scan, with the time of receipt: checked, counted, and put where [`Motion::laser`] takes it from; that of a
+    /// A laser scan, with the time of receipt: checked, counted, and put where [`MotionTracker::laser`] takes it from; that of a
     /// robot that makes a map, where it is mapped.
     pub fn scan(&self, robot: &Name, message: Bytes, received: Instant) {
         let taken = self.checked_scan(robot, message, received);
@@ -179,7 +181,7 @@ impl Motion {
     }
 
     /// Maps that are being made.
-    pub fn mappings(&self) -> &Mappings {
+    pub fn mappings(&self) -> &MappingSessions {
         &self.mappings
     }
 
@@ -246,31 +248,31 @@ impl Motion {
     }
 
     /// Begins to record a run of a robot on a map.
-    pub fn record(&self, robot: &Name, map: &str) -> Result<Recorded, RunError> {
+    pub fn record(&self, robot: &Name, map: &str) -> Result<RecordingStatus, RecordingError> {
         let mut recorded = self.recorded.lock().unwrap_or_else(PoisonError::into_inner);
         if recorded.contains(robot) {
-            return Err(RunError::Going);
+            return Err(RecordingError::Going);
         }
         if recorded.len() >= MAX_RECORDINGS {
-            return Err(RunError::TooMany);
+            return Err(RecordingError::TooMany);
         }
-        let followed = self.lock().robot(robot).map_err(|_full| RunError::TooMany)?;
+        let followed = self.lock().robot(robot).map_err(|_full| RecordingError::TooMany)?;
         let mut followed = own(&followed);
-        let run = followed.run.insert(Box::new(Recording::new(map)));
+        let run = followed.run.insert(Box::new(RunRecording::new(map)));
         let told = run.told(robot.as_str());
         recorded.insert(robot.clone());
         Ok(told)
     }
 
     /// The run of a robot as it is recorded.
-    pub fn recorded(&self, robot: &Name) -> Option<Recorded> {
+    pub fn recorded(&self, robot: &Name) -> Option<RecordingStatus> {
         let followed = self.lock().robots.get(robot)?.clone();
         let followed = own(&followed);
         Some(followed.run.as_ref()?.told(robot.as_str()))
     }
 
     /// Ends the recording and gives it.
-    pub fn take_recording(&self, robot: &Name) -> Option<Box<Recording>> {
+    pub fn take_recording(&self, robot: &Name) -> Option<Box<RunRecording>> {
         let mut recorded = self.recorded.lock().unwrap_or_else(PoisonError::into_inner);
         recorded.remove(robot);
         let followed = self.lock().robots.get(robot)?.clone();
@@ -280,7 +282,7 @@ impl Motion {
     /// The state of a robot that stands on this map, for its live epoch; `None` for any other. What a frame shows of a map
     /// that its robot does not stand on says nothing about the robot's pose, and must not restart its fusion; no more must
     /// what was still in work when another epoch began.
-    fn followed(&self, robot: &Name, map: &str, epoch: u64) -> Option<Arc<Mutex<Robot>>> {
+    fn followed(&self, robot: &Name, map: &str, epoch: u64) -> Option<Arc<Mutex<RobotState>>> {
         let stands_on = self.snapshots.robot_map(robot.as_str())?;
         if stands_on != map || self.epochs.current(robot).is_some_and(|current| current != epoch) {
             return None;
@@ -289,8 +291,8 @@ impl Motion {
     }
 
     /// The pose to publish, unless it is too old.
-    fn tell(&self, robot: &Name, map: &str, epoch: u64, told: Told) -> Option<v1::RobotPose> {
-        let Told { fused, age, modalities, trust } = told;
+    fn tell(&self, robot: &Name, map: &str, epoch: u64, told: StatedPose) -> Option<v1::RobotPose> {
+        let StatedPose { fused, age, modalities, trust } = told;
         if age > MAX_POSE_AGE {
             tracing::debug!(%robot, ?age, "a pose is too old to be published");
             return None;
@@ -327,7 +329,7 @@ impl Motion {
 }
 
 impl State {
-    fn robot(&mut self, robot: &Name) -> Result<Arc<Mutex<Robot>>, Rejection> {
+    fn robot(&mut self, robot: &Name) -> Result<Arc<Mutex<RobotState>>, Rejection> {
         if self.robots.len() >= MAX_ROBOTS && !self.robots.contains_key(robot) {
             return Err(Rejection::new(Code::TooMany, "robot", format!("more than {MAX_ROBOTS} robots")));
         }
@@ -335,7 +337,7 @@ impl State {
     }
 }
 
-fn own(robot: &Mutex<Robot>) -> MutexGuard<'_, Robot> {
+fn own(robot: &Mutex<RobotState>) -> MutexGuard<'_, RobotState> {
     robot.lock().unwrap_or_else(PoisonError::into_inner)
 }
 

@@ -2,7 +2,7 @@
 
 use super::{
     live::LiveHub,
-    motion::Motion,
+    motion::MotionTracker,
     slots::Slots,
     snapshot::{LandmarkInfo, MapSnapshot, Snapshots},
     standing::findings,
@@ -102,7 +102,7 @@ pub fn engine(maps: &[Arc<MapSnapshot>]) -> Engine {
     let live = Arc::new(LiveHub::default());
     Engine {
         slots: Arc::new(Slots::new(8)),
-        motion: Arc::new(Motion::new(snapshots.clone(), live.clone())),
+        motion: Arc::new(MotionTracker::new(snapshots.clone(), live.clone())),
         snapshots,
         live,
         limits: ImageLimits::FRAME,

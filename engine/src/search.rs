@@ -4,7 +4,7 @@
 //! the vision threads only.
 
 use super::{
-    doubles::{Sighted, on_floor, readings},
+    doubles::{AmbiguousObservation, on_floor, readings},
     snapshot::MapSnapshot,
 };
 use map::{
@@ -46,7 +46,7 @@ const MARGIN_M: f64 = 1.0;
 
 /// A frame of a robot that does not know where it is.
 #[derive(Debug, Clone, Copy)]
-pub struct Glance<'a> {
+pub struct RelocalisationInput<'a> {
     /// Which start of the robot's software.
     pub epoch: u64,
     /// The map.
@@ -54,12 +54,12 @@ pub struct Glance<'a> {
     /// Odometry at capture.
     pub odometry: Pose2,
     /// What it shows that may be several landmarks.
-    pub sighted: &'a [Sighted],
+    pub sighted: &'a [AmbiguousObservation],
 }
 
 /// How far a robot's search has come.
 #[derive(Debug, Clone, Default)]
-pub struct Progress {
+pub struct RelocalisationProgress {
     /// On which map.
     pub map: String,
     /// Its version.
@@ -73,12 +73,12 @@ pub struct Progress {
     /// Landmarks by which the first hypothesis explains them.
     pub landmarks: Vec<LandmarkId>,
     /// What is missing before the first one is the robot's pose.
-    pub needed: Vec<Need>,
+    pub needed: Vec<MissingCondition>,
 }
 
 /// Why the first hypothesis is not yet the pose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Need {
+pub enum MissingCondition {
     /// Other places are too probable still.
     FewerPlaces,
     /// All sightings could be of one landmark: another is to be seen.
@@ -91,7 +91,7 @@ pub enum Need {
 
 /// What is left after a frame.
 #[derive(Debug, Clone, Default)]
-pub struct Left {
+pub struct RelocalisationUpdate {
     /// The hypotheses, most probable first.
     pub modes: Vec<PoseHypothesis>,
     /// The pose at the frame, once it is decided, and the landmarks that it explains.
@@ -107,17 +107,17 @@ struct Search {
     belief: GridBelief,
     odometry: Pose2,
     way_m: f64,
-    looks: VecDeque<(Pose2, f64, Vec<Sighted>)>,
+    looks: VecDeque<(Pose2, f64, Vec<AmbiguousObservation>)>,
     /// After the last sighting.
     modes: Vec<PoseHypothesis>,
     entropy_nats: f64,
     landmarks: Vec<LandmarkId>,
-    needed: Vec<Need>,
+    needed: Vec<MissingCondition>,
 }
 
 /// All searches.
 #[derive(Debug, Default)]
-pub struct Searches(Mutex<Open>);
+pub struct Relocalisers(Mutex<Open>);
 
 /// The robots that search, each with the tick of its last frame.
 #[derive(Debug, Default)]
@@ -126,22 +126,22 @@ struct Open {
     all: BTreeMap<Name, (u64, Arc<Mutex<Search>>)>,
 }
 
-impl Searches {
+impl Relocalisers {
     /// Takes a frame in. `None` while the robot has seen nothing to search with.
-    pub fn glance(&self, robot: &Name, glance: &Glance<'_>) -> Option<Left> {
+    pub fn glance(&self, robot: &Name, glance: &RelocalisationInput<'_>) -> Option<RelocalisationUpdate> {
         let search = self.of(robot, glance)?;
         let mut search = search.lock().unwrap_or_else(PoisonError::into_inner);
         search.glance(glance)
     }
 
     /// How far a robot's search has come; `None` for one that is not searching.
-    pub fn progress(&self, robot: &Name) -> Option<Progress> {
+    pub fn progress(&self, robot: &Name) -> Option<RelocalisationProgress> {
         let search = {
             let open = self.0.lock().unwrap_or_else(PoisonError::into_inner);
             open.all.get(robot).map(|(_, search)| search.clone())?
         };
         let search = search.lock().unwrap_or_else(PoisonError::into_inner);
-        Some(Progress {
+        Some(RelocalisationProgress {
             map: search.map.clone(),
             map_version: search.version,
             modes: search.modes.clone(),
@@ -158,7 +158,7 @@ impl Searches {
     }
 
     /// The robot's search, begun by a sighting.
-    fn of(&self, robot: &Name, glance: &Glance<'_>) -> Option<Arc<Mutex<Search>>> {
+    fn of(&self, robot: &Name, glance: &RelocalisationInput<'_>) -> Option<Arc<Mutex<Search>>> {
         let mut guard = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let Open { ticks, all } = &mut *guard;
         *ticks += 1;
@@ -181,7 +181,7 @@ impl Searches {
 
 impl Search {
     /// Anywhere on the map; `None` if the map is too large or shows no extent.
-    fn new(glance: &Glance<'_>) -> Option<Self> {
+    fn new(glance: &RelocalisationInput<'_>) -> Option<Self> {
         let corners = extent(glance.map)?;
         let area = (corners[1] - corners[0]).map(|v| v.max(0.1)).product();
         let fine = GridBeliefParams::default();
@@ -191,7 +191,7 @@ impl Search {
         }
         let p = GridBeliefParams { cell_m, ..fine };
         let belief = GridBelief::new(corners, |_| 1.0, &p).ok()?;
-        let Glance { epoch, map, odometry, .. } = *glance;
+        let RelocalisationInput { epoch, map, odometry, .. } = *glance;
         let (name, version) = (map.name.clone(), map.version);
         Some(Self {
             epoch,
@@ -205,11 +205,11 @@ impl Search {
             looks: VecDeque::new(),
             modes: Vec::new(),
             landmarks: Vec::new(),
-            needed: vec![Need::FewerPlaces, Need::AnotherLandmark],
+            needed: vec![MissingCondition::FewerPlaces, MissingCondition::AnotherLandmark],
         })
     }
 
-    fn glance(&mut self, glance: &Glance<'_>) -> Option<Left> {
+    fn glance(&mut self, glance: &RelocalisationInput<'_>) -> Option<RelocalisationUpdate> {
         let same = (self.epoch, self.map.as_str(), self.version)
             == (glance.epoch, glance.map.name.as_str(), glance.map.version);
         if !same {
@@ -221,7 +221,7 @@ impl Search {
             motion.position().norm() >= NEW_LOOK_M || motion.theta_rad.abs() >= NEW_LOOK_RAD
         });
         if glance.sighted.is_empty() || !new {
-            return Some(Left { modes: self.modes.clone(), decided: None });
+            return Some(RelocalisationUpdate { modes: self.modes.clone(), decided: None });
         }
         let motion = since(&self.odometry);
         self.way_m += motion.position().norm();
@@ -236,27 +236,27 @@ impl Search {
         self.looks.push_back((glance.odometry, self.way_m, glance.sighted.to_vec()));
         self.modes = self.belief.modes();
         self.entropy_nats = self.belief.entropy_nats();
-        Some(Left { modes: self.modes.clone(), decided: self.decided(glance.map) })
+        Some(RelocalisationUpdate { modes: self.modes.clone(), decided: self.decided(glance.map) })
     }
 
     /// The pose, if nothing is missing any more.
     fn decided(&mut self, map: &MapSnapshot) -> Option<(Pose2Covariance, Vec<LandmarkId>)> {
         self.needed = Vec::new();
         let Some(mode) = self.modes.first().copied().filter(|m| m.mass > self.p.decided) else {
-            self.needed.push(Need::FewerPlaces);
+            self.needed.push(MissingCondition::FewerPlaces);
             self.landmarks =
                 self.modes.first().map_or_else(Vec::new, |m| self.explained(&m.pose.pose, map).0);
             return None;
         };
         let (landmarks, share) = self.explained(&mode.pose.pose, map);
         if landmarks.len() < LEAST_LANDMARKS {
-            self.needed.push(Need::AnotherLandmark);
+            self.needed.push(MissingCondition::AnotherLandmark);
         }
         if share < LEAST_EXPLAINED {
-            self.needed.push(Need::AgreeingSightings);
+            self.needed.push(MissingCondition::AgreeingSightings);
         }
         if self.needed.is_empty() && self.has_rival(&mode.pose.pose, &landmarks, map) {
-            self.needed.push(Need::NoOtherPlace);
+            self.needed.push(MissingCondition::NoOtherPlace);
         }
         self.landmarks.clone_from(&landmarks);
         let cell = Vector3::new(self.p.cell_m, self.p.cell_m, 0.1).map(|s| s * s);

@@ -30,7 +30,7 @@ pub struct SlotKey {
 
 /// How a frame that was taken for work ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Outcome {
+pub enum FrameOutcome {
     /// Answered.
     Processed,
     /// Too old when its turn came.
@@ -74,12 +74,12 @@ impl FrameCounts {
 /// Place of a message in its stream's order, by epoch. Which epoch is live is decided elsewhere
 /// ([`crate::epochs::Epochs`]); one that comes back goes on after its last number.
 #[derive(Debug, Default)]
-pub struct Order {
+pub struct SequenceTracker {
     last: Option<(u64, u64)>,
     past: VecDeque<(u64, u64)>,
 }
 
-impl Order {
+impl SequenceTracker {
     /// Takes (epoch, seq) as the newest, or refuses it as not newer than the last of its epoch.
     pub fn advance(&mut self, epoch: u64, seq: u64) -> Result<(), Rejection> {
         let place = self.past.iter().position(|(past, _)| *past == epoch);
@@ -107,13 +107,13 @@ struct Slot<T> {
     waiting: Option<T>,
     in_work: bool,
     queued: bool,
-    order: Order,
+    order: SequenceTracker,
     touched: Instant,
 }
 
 impl<T> Slot<T> {
     fn new(now: Instant) -> Self {
-        Self { waiting: None, in_work: false, queued: false, order: Order::default(), touched: now }
+        Self { waiting: None, in_work: false, queued: false, order: SequenceTracker::default(), touched: now }
     }
 }
 
@@ -206,16 +206,16 @@ impl<T> Slots<T> {
     }
 
     /// Ends the work on the frame last taken from this slot; its next one gets in line, behind the others.
-    pub fn finish(&self, key: &SlotKey, outcome: Outcome) {
+    pub fn finish(&self, key: &SlotKey, outcome: FrameOutcome) {
         let mut guard = self.lock();
         let state = &mut *guard;
         let Some(slot) = state.slots.get_mut(key).filter(|slot| slot.in_work) else { return };
         slot.in_work = false;
         state.counts.in_work -= 1;
         match outcome {
-            Outcome::Processed => state.counts.processed += 1,
-            Outcome::Expired => state.counts.expired += 1,
-            Outcome::Rejected(code) => *state.counts.rejected.entry(code).or_default() += 1,
+            FrameOutcome::Processed => state.counts.processed += 1,
+            FrameOutcome::Expired => state.counts.expired += 1,
+            FrameOutcome::Rejected(code) => *state.counts.rejected.entry(code).or_default() += 1,
         }
         if slot.waiting.is_some() && !slot.queued {
             slot.queued = true;

@@ -11,7 +11,7 @@ const QUEUE: usize = 256;
 
 /// A finding about a landmark of a map.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Found {
+pub struct LandmarkFinding {
     /// Name of the map.
     pub map: String,
     /// Number of the landmark.
@@ -24,7 +24,7 @@ pub struct Found {
     pub finding: Option<String>,
 }
 
-impl Found {
+impl LandmarkFinding {
     /// Of what a robot's watch says.
     pub fn new(map: &str, name: &str, change: &HealthChange) -> Self {
         let finding = change.finding.map(|finding| match finding {
@@ -46,17 +46,17 @@ impl Found {
 
 /// Takes findings from workers, who never wait.
 #[derive(Debug, Clone)]
-pub struct Findings(Sender<Found>);
+pub struct FindingSender(Sender<LandmarkFinding>);
 
 /// Both ends.
-pub fn findings() -> (Findings, Receiver<Found>) {
+pub fn findings() -> (FindingSender, Receiver<LandmarkFinding>) {
     let (sender, receiver) = channel(QUEUE);
-    (Findings(sender), receiver)
+    (FindingSender(sender), receiver)
 }
 
-impl Findings {
+impl FindingSender {
     /// Passes one on.
-    pub fn tell(&self, found: Found) {
+    pub fn tell(&self, found: LandmarkFinding) {
         tracing::warn!(map = found.map, landmark = found.name, standing = ?found.standing, finding = found.finding, "landmark");
         if let Err(TrySendError::Full(found)) = self.0.try_send(found) {
             tracing::warn!(landmark = found.name, "too many findings at once: this one is dropped");

@@ -3,21 +3,21 @@
 //! and counted; its slot is free again and the worker goes on. A thread that ends untold makes the server fail.
 
 use super::{
-    cameras::Look,
+    cameras::CameraSample,
     decode::{ImageLimits, decode_frame},
     doubles::sighted,
     frame_analysis::{StageTimes, analyse_frame},
     frame_context::FrameContext,
     guided::{Guided, guided},
     intake::{FrameJob, unknown_map},
-    judging::{JudgedFrame, Seen, judged_expected, judged_frame},
+    judging::{JudgedFrame, LandmarkChecks, judged_expected, judged_frame},
     live::{LiveFrame, LiveHub},
-    motion::{Grounds, Moment, Motion},
+    motion::{FrameStamp, MotionTracker, PriorPose},
     panics::Edge,
-    search::{Glance, Left, Searches},
-    slots::{Outcome, SlotKey, Slots},
+    search::{RelocalisationInput, RelocalisationUpdate, Relocalisers},
+    slots::{FrameOutcome, SlotKey, Slots},
     snapshot::{MapSnapshot, Snapshots},
-    standing::{Findings, Found},
+    standing::{FindingSender, LandmarkFinding},
 };
 use crate::frame_tap::{AnalysedFrame, FrameTap};
 use crate::vitals::Vitals;
@@ -42,7 +42,7 @@ pub struct Engine {
     /// Maps.
     pub snapshots: Arc<Snapshots>,
     /// Robots on the move.
-    pub motion: Arc<Motion>,
+    pub motion: Arc<MotionTracker>,
     /// What pages show.
     pub live: Arc<LiveHub>,
     /// What a frame may cost.
@@ -50,9 +50,9 @@ pub struct Engine {
     /// Where threads say that they run and panics are counted.
     pub vitals: Arc<Vitals>,
     /// Where findings about landmarks go.
-    pub findings: Findings,
+    pub findings: FindingSender,
     /// Robots that do not know where they are.
-    pub searches: Arc<Searches>,
+    pub searches: Arc<Relocalisers>,
     /// Where frames of robots that gather views go.
     pub gather: Arc<dyn FrameTap>,
     /// Whether every frame is searched for all landmarks of its map.
@@ -63,7 +63,7 @@ pub struct Engine {
 #[derive(Debug)]
 pub struct Workers {
     slots: Arc<Slots<FrameJob>>,
-    motion: Arc<Motion>,
+    motion: Arc<MotionTracker>,
     threads: Vec<JoinHandle<()>>,
 }
 
@@ -126,7 +126,7 @@ struct Done {
 impl Engine {
     /// Answers one frame and publishes the answer; never panics. What a frame has come to once it is answered stands,
     /// whatever happens to the pose and the findings after it.
-    fn contained(&self, key: &SlotKey, job: &FrameJob, publish: &dyn Publish) -> Outcome {
+    fn contained(&self, key: &SlotKey, job: &FrameJob, publish: &dyn Publish) -> FrameOutcome {
         let answered = Cell::new(None);
         let seq = job.frame.seq;
         let what = format_args!("frame {seq} of robot {}, camera {}", key.robot, key.camera);
@@ -147,8 +147,8 @@ impl Engine {
         key: &SlotKey,
         job: &FrameJob,
         publish: &dyn Publish,
-        answered: &Cell<Option<Outcome>>,
-    ) -> Outcome {
+        answered: &Cell<Option<FrameOutcome>>,
+    ) -> FrameOutcome {
         let done = if Instant::now() > job.deadline {
             let detail = format!("waited {} ms", job.received.elapsed().as_millis());
             Err(Rejection::new(Code::Expired, "deadline_ms", detail))
@@ -164,7 +164,7 @@ impl Engine {
                 return outcome;
             }
         };
-        let (frame, outcome) = (&job.frame, Outcome::Processed);
+        let (frame, outcome) = (&job.frame, FrameOutcome::Processed);
         answered.set(Some(outcome));
         self.reply(key, job, answer, publish);
         let Some(judged) = judged else { return outcome };
@@ -178,11 +178,11 @@ impl Engine {
             self.searches.end(&key.robot);
             publish.pose(&key.robot, &pose);
         }
-        if let Some(Seen { grounds, judged, missed }) = judged.seen {
+        if let Some(LandmarkChecks { grounds, judged, missed }) = judged.seen {
             let changes = self.motion.judged(&key.robot, moment(frame, &map), &grounds, &judged, &missed);
             for change in changes {
                 let name = map.landmarks.get(&change.landmark).map_or("", |l| l.name.as_str());
-                self.findings.tell(Found::new(&map.name, name, &change));
+                self.findings.tell(LandmarkFinding::new(&map.name, name, &change));
             }
         }
         outcome
@@ -242,7 +242,7 @@ impl Engine {
             let fix = judged.fix.as_ref().map_err(|reason| *reason);
             self.live
                 .watched()
-                .looked(key, &Look { intrinsics, image_px, seen: &seen, map: &map, mounting, fix });
+                .looked(key, &CameraSample { intrinsics, image_px, seen: &seen, map: &map, mounting, fix });
         }
         let searched =
             self.search(key, frame, (&image, &facts), &map, judged.seen.is_some() || judged.fix.is_ok());
@@ -268,10 +268,10 @@ impl Engine {
         key: &SlotKey,
         frame: &CheckedFrame,
         (image, map): (&GrayImage, &MapSnapshot),
-        grounds: Option<&Grounds>,
+        grounds: Option<&PriorPose>,
         times: &mut StageTimes,
     ) -> Option<(v1::Answer, JudgedFrame)> {
-        let is_spared = |g: &&Grounds| g.plan.guided && g.plan.global.is_none();
+        let is_spared = |g: &&PriorPose| g.plan.guided && g.plan.global.is_none();
         let grounds = grounds.filter(is_spared).filter(|_| !self.search_every_frame)?;
         if self.gather.is_wanted(key) {
             return None;
@@ -300,7 +300,7 @@ impl Engine {
         (image, facts): (&GrayImage, &FrameAnalysis),
         map: &MapSnapshot,
         is_known: bool,
-    ) -> Option<Left> {
+    ) -> Option<RelocalisationUpdate> {
         let (mounting, camera) = (frame.mounting.as_ref()?, frame.intrinsics.as_ref()?);
         let odometry = frame.odometry?;
         if is_known {
@@ -308,7 +308,7 @@ impl Engine {
             return None;
         }
         let sighted = sighted(image, facts, map, mounting, camera);
-        let glance = Glance { epoch: frame.epoch, map, odometry, sighted: &sighted };
+        let glance = RelocalisationInput { epoch: frame.epoch, map, odometry, sighted: &sighted };
         self.searches.glance(&key.robot, &glance)
     }
 
@@ -347,16 +347,16 @@ fn hypothesis(mode: &PoseHypothesis) -> v1::Hypothesis {
     v1::Hypothesis { mass: mode.mass, map_from_robot: Some(pose2_covariance_wire(&mode.pose)) }
 }
 
-fn moment<'a>(frame: &CheckedFrame, map: &'a MapSnapshot) -> Moment<'a> {
+fn moment<'a>(frame: &CheckedFrame, map: &'a MapSnapshot) -> FrameStamp<'a> {
     let CheckedFrame { epoch, captured_ns, odometry, .. } = *frame;
-    Moment { map: &map.name, epoch, captured_ns, odometry, now: Instant::now() }
+    FrameStamp { map: &map.name, epoch, captured_ns, odometry, now: Instant::now() }
 }
 
 /// The answer that says why there is none, and how the frame has ended.
-fn refused(job: &FrameJob, refusal: &Rejection) -> (v1::Answer, Outcome) {
+fn refused(job: &FrameJob, refusal: &Rejection) -> (v1::Answer, FrameOutcome) {
     let (status, outcome) = match refusal.code {
-        Code::Expired => (v1::Status::Expired, Outcome::Expired),
-        code => (v1::Status::Rejected, Outcome::Rejected(code)),
+        Code::Expired => (v1::Status::Expired, FrameOutcome::Expired),
+        code => (v1::Status::Rejected, FrameOutcome::Rejected(code)),
     };
     let (rejection, map) = (Some(refusal.into()), job.map.clone());
     (v1::Answer { status: status.into(), rejection, map, ..v1::Answer::default() }, outcome)

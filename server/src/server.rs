@@ -13,10 +13,10 @@ use engine::{
     decode::ImageLimits,
     intake::{FrameJob, Intake},
     live::LiveHub,
-    motion::Motion,
+    motion::MotionTracker,
     slots::Slots,
     snapshot::Snapshots,
-    standing::{Findings, Found, findings},
+    standing::{FindingSender, LandmarkFinding, findings},
     vitals::{Failure, Pulse, Vitals},
     workers::{Engine, Workers},
 };
@@ -151,12 +151,12 @@ fn engine(
     config: &Config,
     snapshots: Arc<Snapshots>,
     vitals: Arc<Vitals>,
-    (findings, gather): (Findings, Hook),
+    (findings, gather): (FindingSender, Hook),
 ) -> Engine {
     let live = Arc::new(LiveHub::default());
     Engine {
         slots: Arc::new(Slots::new(config.limits.cameras)),
-        motion: Arc::new(Motion::new(snapshots.clone(), live.clone())),
+        motion: Arc::new(MotionTracker::new(snapshots.clone(), live.clone())),
         snapshots,
         live,
         limits: ImageLimits { bytes: config.limits.frame_bytes, pixels: config.limits.frame_pixels },
@@ -169,8 +169,8 @@ fn engine(
 }
 
 /// Writes down what robots find out about landmarks, until no worker is left to find anything.
-async fn keep_findings(store: Catalogue, mut found: Receiver<Found>, pulse: Pulse) {
-    while let Some(Found { map, name, standing, finding, .. }) = found.recv().await {
+async fn keep_findings(store: Catalogue, mut found: Receiver<LandmarkFinding>, pulse: Pulse) {
+    while let Some(LandmarkFinding { map, name, standing, finding, .. }) = found.recv().await {
         let kept = store.write(move |tx| {
             Box::pin(async move {
                 landmarks::set_standing(tx, &map, &name, standing, finding.as_deref()).await.map(drop)

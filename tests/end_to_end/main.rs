@@ -19,6 +19,7 @@ mod other_map;
 mod restart;
 mod several_maps;
 mod sight;
+mod style;
 mod teach_and_recognise;
 mod tidy;
 mod two_programs;

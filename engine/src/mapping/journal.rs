@@ -28,7 +28,7 @@ const EXTENSION: &str = "scans";
 
 /// Whose scans these are.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(super) struct Head {
+pub(super) struct JournalHeader {
     /// The format.
     waymark_mapping: u32,
     /// The map.
@@ -39,7 +39,7 @@ pub(super) struct Head {
     pub origin: [f64; 3],
 }
 
-impl Head {
+impl JournalHeader {
     pub(super) fn new(map: &Name, robot: &Name, origin: &Pose2) -> Self {
         let origin = [origin.x_m, origin.y_m, origin.theta_rad];
         Self { waymark_mapping: 1, map: map.clone(), robot: robot.clone(), origin }
@@ -74,7 +74,7 @@ fn framed(record: &[u8]) -> io::Result<Vec<u8>> {
 
 impl Journal {
     /// A new one, in place of any other of the map.
-    pub(super) fn create(dir: &Path, head: &Head) -> io::Result<Self> {
+    pub(super) fn create(dir: &Path, head: &JournalHeader) -> io::Result<Self> {
         std::fs::create_dir_all(dir)?;
         let file = File::create(path(dir, head.map.as_str()))?;
         let mut made = Self { file, bytes: 0, unsynced: 0 };
@@ -129,15 +129,15 @@ pub(super) fn remove(dir: &Path, map: &str) {
 
 /// What was kept of a mapping: first read, then gone on with.
 #[derive(Debug)]
-pub(super) struct Kept {
-    pub(super) head: Head,
+pub(super) struct JournalReader {
+    pub(super) head: JournalHeader,
     from: BufReader<File>,
     file: File,
     /// Up to here every record is whole.
     whole: u64,
 }
 
-impl Kept {
+impl JournalReader {
     /// All journals of a folder, by map. What is none is left alone and said.
     pub(super) fn all(dir: &Path) -> Vec<Self> {
         let entries = std::fs::read_dir(dir).into_iter().flatten().flatten();
@@ -155,7 +155,7 @@ impl Kept {
         let mut from = BufReader::new(file.try_clone()?);
         let mut whole = 0;
         let record = record(&mut from, &mut whole).ok_or_else(|| io::Error::other("it has no head"))?;
-        let head: Head = serde_json::from_slice(&record)?;
+        let head: JournalHeader = serde_json::from_slice(&record)?;
         let named = path.file_stem().is_some_and(|stem| stem == head.map.as_str());
         if !named || head.waymark_mapping != 1 || head.origin().is_none() {
             return Err(io::Error::other("its head is not one of this map"));
@@ -219,7 +219,7 @@ mod tests {
     }
 
     fn written(dir: &Path, scans: i64) {
-        let head = Head::new(&name("hall"), &name("r1"), &Pose2::new(1.0, 2.0, 0.5));
+        let head = JournalHeader::new(&name("hall"), &name("r1"), &Pose2::new(1.0, 2.0, 0.5));
         let mut journal = Journal::create(dir, &head).unwrap();
         for i in 1..=scans {
             journal.scan(&job(i)).unwrap();
@@ -227,7 +227,7 @@ mod tests {
     }
 
     fn read(dir: &Path) -> (Vec<i64>, Option<Journal>) {
-        let Some(mut kept) = Kept::all(dir).pop() else { return (Vec::new(), None) };
+        let Some(mut kept) = JournalReader::all(dir).pop() else { return (Vec::new(), None) };
         let scans = std::iter::from_fn(|| kept.next()).map(|job| job.captured_ns).collect();
         (scans, kept.reopened().ok())
     }
@@ -236,7 +236,7 @@ mod tests {
     fn what_was_written_is_read_and_gone_on_with() {
         let dir = tempfile::tempdir().unwrap();
         written(dir.path(), 3);
-        let mut kept = Kept::all(dir.path()).pop().unwrap();
+        let mut kept = JournalReader::all(dir.path()).pop().unwrap();
         assert_eq!((kept.head.robot.as_str(), kept.head.origin()), ("r1", Some(Pose2::new(1.0, 2.0, 0.5))));
         let first = kept.next().unwrap();
         assert_eq!((first.epoch, first.odom_from_robot), (7, job(1).odom_from_robot));
@@ -247,7 +247,7 @@ mod tests {
         assert_eq!(read(dir.path()).0, [1, 2, 3, 4]);
         remove(dir.path(), "hall");
         remove(dir.path(), "hall");
-        assert!(Kept::all(dir.path()).is_empty());
+        assert!(JournalReader::all(dir.path()).is_empty());
     }
 
     #[test]
@@ -289,12 +289,12 @@ mod tests {
         journal.unwrap().scan(&job(9)).unwrap();
         assert_eq!(read(dir.path()).0, [1, 9], "what came after the damage does not come back");
         flipped(20);
-        assert!(Kept::all(dir.path()).is_empty());
+        assert!(JournalReader::all(dir.path()).is_empty());
         std::fs::write(&file, []).unwrap();
-        assert!(Kept::all(dir.path()).is_empty());
+        assert!(JournalReader::all(dir.path()).is_empty());
         std::fs::write(&file, &whole).unwrap();
         std::fs::rename(&file, path(dir.path(), "other")).unwrap();
-        assert!(Kept::all(dir.path()).is_empty(), "under the name of another map");
+        assert!(JournalReader::all(dir.path()).is_empty(), "under the name of another map");
     }
 
     #[test]

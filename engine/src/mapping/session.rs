@@ -1,8 +1,8 @@
 //! One mapping: its queue, its thread, its progress.
 
 use super::{
-    Progress, Shared, Stage, Walls,
-    journal::{Head, Journal, Kept},
+    MappingProgress, MappingStage, Shared, Walls,
+    journal::{Journal, JournalHeader, JournalReader},
 };
 use crate::{
     panics::{Edge, Panics},
@@ -39,9 +39,9 @@ enum Order {
 /// How a mapping begins.
 pub(super) enum Start {
     /// Anew; with its journal, if scans are kept, or why there is none.
-    New(Head, Option<io::Result<Journal>>),
+    New(JournalHeader, Option<io::Result<Journal>>),
     /// With what was kept.
-    Again(Kept),
+    Again(JournalReader),
 }
 
 /// A mapping, from its beginning until it is forgotten. Dropping it gives it up.
@@ -67,8 +67,9 @@ impl Session {
             Start::Again(kept) => kept.next(),
         };
         let epoch = first.as_ref().map(|job| job.epoch);
-        let stage = if matches!(start, Start::New(..)) { Stage::Mapping } else { Stage::Resuming };
-        let progress = Arc::new(Mutex::new(Progress {
+        let stage =
+            if matches!(start, Start::New(..)) { MappingStage::Mapping } else { MappingStage::Resuming };
+        let progress = Arc::new(Mutex::new(MappingProgress {
             map: head.map.to_string(),
             robot: head.robot.to_string(),
             stage,
@@ -98,19 +99,22 @@ impl Session {
 
     /// Whether it goes on, be it only to be stored.
     pub(super) fn is_open(&self) -> bool {
-        matches!(own(&self.progress).stage, Stage::Resuming | Stage::Mapping | Stage::Finishing)
+        matches!(
+            own(&self.progress).stage,
+            MappingStage::Resuming | MappingStage::Mapping | MappingStage::Finishing
+        )
     }
 
     pub(super) fn has_failed(&self) -> bool {
-        own(&self.progress).stage == Stage::Failed
+        own(&self.progress).stage == MappingStage::Failed
     }
 
     /// Whether it takes scans.
     pub(super) fn takes(&self) -> bool {
-        matches!(own(&self.progress).stage, Stage::Resuming | Stage::Mapping)
+        matches!(own(&self.progress).stage, MappingStage::Resuming | MappingStage::Mapping)
     }
 
-    pub(super) fn progress(&self) -> Progress {
+    pub(super) fn progress(&self) -> MappingProgress {
         own(&self.progress).clone()
     }
 
@@ -129,7 +133,7 @@ impl Session {
         let (reply, walls) = oneshot::channel();
         self.orders.as_ref()?.try_send(Order::Finish(reply)).ok()?;
         self.orders = None;
-        own(&self.progress).stage = Stage::Finishing;
+        own(&self.progress).stage = MappingStage::Finishing;
         Some(walls)
     }
 
@@ -137,8 +141,8 @@ impl Session {
     pub(super) fn end(&mut self, stored: Result<usize, String>) {
         let mut progress = own(&self.progress);
         match stored {
-            Ok(segments) => (progress.stage, progress.segments) = (Stage::Done, Some(segments)),
-            Err(reason) => (progress.stage, progress.reason) = (Stage::Failed, Some(reason)),
+            Ok(segments) => (progress.stage, progress.segments) = (MappingStage::Done, Some(segments)),
+            Err(reason) => (progress.stage, progress.reason) = (MappingStage::Failed, Some(reason)),
         }
     }
 }
@@ -172,7 +176,7 @@ impl Mapper {
     }
 
     /// Maps the scans that were kept, as long as the session is there.
-    fn again(&mut self, mut kept: Kept, first: Option<ScanJob>) -> Result<(), String> {
+    fn again(&mut self, mut kept: JournalReader, first: Option<ScanJob>) -> Result<(), String> {
         let mut next = first;
         while let Some(job) = next {
             if Arc::strong_count(&self.progress) <= OWN_HANDLES {
@@ -183,8 +187,8 @@ impl Mapper {
         }
         self.keep(Some(kept.reopened()));
         let mut progress = own(&self.progress);
-        if progress.stage == Stage::Resuming {
-            progress.stage = Stage::Mapping;
+        if progress.stage == MappingStage::Resuming {
+            progress.stage = MappingStage::Mapping;
         }
         Ok(())
     }
@@ -248,9 +252,9 @@ fn walls(map: &SlamMap, origin: &Pose2) -> Walls {
 
 fn fail(progress: &Shared, reason: &str) {
     let mut progress = own(progress);
-    (progress.stage, progress.reason) = (Stage::Failed, Some(reason.to_owned()));
+    (progress.stage, progress.reason) = (MappingStage::Failed, Some(reason.to_owned()));
 }
 
-fn own(progress: &Mutex<Progress>) -> MutexGuard<'_, Progress> {
+fn own(progress: &Mutex<MappingProgress>) -> MutexGuard<'_, MappingProgress> {
     progress.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -33,7 +33,7 @@ async fn scans_become_the_walls_that_mapping_them_gives() {
     let building = Arc::new(Building::corridor(7));
     let drive = DriveParams { odometry: OdometryParams::default(), ..DriveParams::default() };
     let steps: Vec<_> = sim::drive::Drive::new(building.clone(), &drive).step_by(3).take(60).collect();
-    let (mappings, mut slam) = (Mappings::default(), Slam::new(SlamParams::default()));
+    let (mappings, mut slam) = (MappingSessions::default(), Slam::new(SlamParams::default()));
     let origin = Pose2::new(3.0, 1.0, 0.5);
     mappings.begin(&name("hall"), &name("r1"), origin).unwrap();
     for (i, step) in steps.iter().enumerate() {
@@ -46,10 +46,10 @@ async fn scans_become_the_walls_that_mapping_them_gives() {
     assert!(mappings.offer(&name("r2"), job("hall", 1, Pose2::default(), other.clone())).is_some());
     assert!(mappings.offer(&name("r1"), job("hall", 2, Pose2::default(), other)).is_none());
     let so_far = mappings.progress("hall").unwrap();
-    assert_eq!((so_far.stage, so_far.scans, so_far.dropped), (Stage::Mapping, 60, 1));
+    assert_eq!((so_far.stage, so_far.scans, so_far.dropped), (MappingStage::Mapping, 60, 1));
     assert!(so_far.way_m > 10.0 && so_far.pose.is_some());
     let (finishing, walls) = mappings.finish("hall").unwrap();
-    assert_eq!(finishing.stage, Stage::Finishing);
+    assert_eq!(finishing.stage, MappingStage::Finishing);
     let walls = walls.await.unwrap().unwrap();
     let expected: Vec<_> = slam.finish().unwrap().walls;
     assert_eq!(walls.len(), expected.len());
@@ -59,30 +59,30 @@ async fn scans_become_the_walls_that_mapping_them_gives() {
         assert!(off.iter().all(|d| d.abs() < 1e-12), "{off:?}");
     }
     mappings.stored("hall", Ok(walls.len()));
-    assert_eq!(mappings.progress("hall").unwrap().stage, Stage::Done);
+    assert_eq!(mappings.progress("hall").unwrap().stage, MappingStage::Done);
     assert_eq!(mappings.finish("hall").unwrap_err(), MappingError::None);
     mappings.begin(&name("hall"), &name("r1"), origin).unwrap();
 }
 
 #[test]
 fn mappings_are_bounded_and_one_robot_makes_one_map() {
-    let mappings = Mappings::default();
+    let mappings = MappingSessions::default();
     let begin = |map: usize, robot: &str| {
         mappings.begin(&name(&format!("m{map}")), &name(robot), Pose2::default()).map(|p| p.stage)
     };
     for i in 0..MAX_MAPPINGS {
-        assert_eq!(begin(i, &format!("r{i}")), Ok(Stage::Mapping));
+        assert_eq!(begin(i, &format!("r{i}")), Ok(MappingStage::Mapping));
     }
     assert_eq!(begin(0, "other"), Err(MappingError::Going));
     assert_eq!(begin(9, "r0"), Err(MappingError::Busy));
     assert_eq!(begin(9, "other"), Err(MappingError::TooMany));
     assert!(mappings.cancel("m0") && !mappings.cancel("m0"));
-    assert_eq!((begin(9, "r0"), mappings.progress("m0")), (Ok(Stage::Mapping), None));
+    assert_eq!((begin(9, "r0"), mappings.progress("m0")), (Ok(MappingStage::Mapping), None));
 }
 
 #[test]
 fn old_mappings_are_forgotten_at_the_bound() {
-    let mappings = Mappings::default();
+    let mappings = MappingSessions::default();
     for i in 0..=MAX_REMEMBERED {
         let map = format!("m{i:03}");
         mappings.begin(&name(&map), &name("r1"), Pose2::default()).unwrap();
@@ -90,12 +90,12 @@ fn old_mappings_are_forgotten_at_the_bound() {
     }
     assert_eq!(mappings.progress("m000"), None);
     let kept = mappings.progress("m001").unwrap();
-    assert_eq!((kept.stage, kept.reason.as_deref()), (Stage::Failed, Some("planted")));
+    assert_eq!((kept.stage, kept.reason.as_deref()), (MappingStage::Failed, Some("planted")));
 }
 
 #[test]
 fn what_the_queue_does_not_hold_is_dropped_and_counted() {
-    let mappings = Mappings::default();
+    let mappings = MappingSessions::default();
     let building = Building::corridor(7);
     mappings.begin(&name("hall"), &name("r1"), Pose2::default()).unwrap();
     let sent = 4 * QUEUE as u64;
@@ -118,12 +118,12 @@ fn steps_of(building: &Arc<Building>) -> Vec<sim::drive::Step> {
 async fn a_mapping_goes_on_after_a_restart_as_if_there_had_been_none() {
     let (building, dir) = (Arc::new(Building::corridor(7)), tempfile::tempdir().unwrap());
     let (mut slam, origin) = (Slam::new(SlamParams::default()), Pose2::new(3.0, 1.0, 0.5));
-    let mut mappings = Mappings::default();
+    let mut mappings = MappingSessions::default();
     mappings.keep_in(dir.path().join("mapping"), |_, _| true);
     mappings.begin(&name("hall"), &name("r1"), origin).unwrap();
     for (i, step) in steps_of(&building).iter().enumerate() {
         if i == 25 {
-            mappings = Mappings::default();
+            mappings = MappingSessions::default();
             mappings.keep_in(dir.path().join("mapping"), |map, robot| {
                 (map.as_str(), robot.as_str()) == ("hall", "r1")
             });
@@ -138,7 +138,7 @@ async fn a_mapping_goes_on_after_a_restart_as_if_there_had_been_none() {
     let so_far = mappings.progress("hall").unwrap();
     assert_eq!(
         (so_far.stage, so_far.dropped, so_far.not_kept),
-        (Stage::Mapping, 1, None),
+        (MappingStage::Mapping, 1, None),
         "its epoch is kept"
     );
     let walls = mappings.finish("hall").unwrap().1.await.unwrap().unwrap();
@@ -151,7 +151,7 @@ async fn a_mapping_goes_on_after_a_restart_as_if_there_had_been_none() {
         );
     }
     mappings.stored("hall", Ok(walls.len()));
-    let again = Mappings::default();
+    let again = MappingSessions::default();
     again.keep_in(dir.path().join("mapping"), |_, _| true);
     assert_eq!(again.progress("hall"), None, "what is stored is not gone on with");
 }
@@ -161,7 +161,7 @@ fn what_cannot_be_kept_is_said_and_what_is_given_up_is_removed() {
     let (building, dir) = (Building::corridor(7), tempfile::tempdir().unwrap());
     let file = dir.path().join("file");
     std::fs::write(&file, "not a folder").unwrap();
-    let mappings = Mappings::default();
+    let mappings = MappingSessions::default();
     mappings.keep_in(file, |_, _| true);
     mappings.begin(&name("hall"), &name("r1"), Pose2::default()).unwrap();
     let seen = scan(&building, &Pose2::new(3.0, 0.0, 0.0), 1);
@@ -169,13 +169,13 @@ fn what_cannot_be_kept_is_said_and_what_is_given_up_is_removed() {
     wait(|| mappings.progress("hall").unwrap().scans == 1);
     assert!(mappings.progress("hall").unwrap().not_kept.is_some(), "and it goes on");
     let folder = dir.path().join("mapping");
-    let mappings = Mappings::default();
+    let mappings = MappingSessions::default();
     mappings.keep_in(folder.clone(), |_, _| true);
     mappings.begin(&name("hall"), &name("r1"), Pose2::default()).unwrap();
     mappings.begin(&name("house"), &name("r2"), Pose2::default()).unwrap();
     let files = || std::fs::read_dir(&folder).unwrap().count();
     assert!(files() == 2 && mappings.cancel("hall") && files() == 1);
-    let again = Mappings::default();
+    let again = MappingSessions::default();
     again.keep_in(folder.clone(), |_, robot| robot.as_str() != "r2");
     assert!(again.progress("house").is_none() && files() == 0, "its robot stands elsewhere");
 }

@@ -1,10 +1,10 @@
 //! Frames of a robot: what is known of its pose without one, and what one does to that pose.
 //!
-//! For each frame on the robot's own map, in this order: [`Motion::frame_stamp`], [`Motion::grounds`], recognition,
-//! [`Motion::looked`], and [`Motion::found`] and [`Motion::judged`] where there is something to say. How a fix goes to the
+//! For each frame on the robot's own map, in this order: [`MotionTracker::frame_stamp`], [`MotionTracker::grounds`], recognition,
+//! [`MotionTracker::looked`], and [`MotionTracker::found`] and [`MotionTracker::judged`] where there is something to say. How a fix goes to the
 //! fusion is for [`map::guided::Schedule`] to decide: landmarks that were named by the pose correct it and do nothing else.
 
-use super::{Motion, own, robot::Robot, timebase::Stream};
+use super::{MotionTracker, own, robot::RobotState, timebase::Stream};
 use map::{
     fuse::{FixRole, FusedPose},
     guided::{Decision, FramePlan, FrameReport},
@@ -18,7 +18,7 @@ use vision::model::LandmarkId;
 
 /// Which frame of a robot.
 #[derive(Debug, Clone, Copy)]
-pub struct Moment<'a> {
+pub struct FrameStamp<'a> {
     /// The map it is in.
     pub map: &'a str,
     /// Echo of the frame.
@@ -33,7 +33,7 @@ pub struct Moment<'a> {
 
 /// What is known of a robot's pose without its frame.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Grounds {
+pub struct PriorPose {
     /// `map_from_robot`.
     pub pose: Pose2Covariance,
     /// The landmarks that it rests on.
@@ -45,7 +45,7 @@ pub struct Grounds {
 /// What a frame says of its robot's pose.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct FrameFixes<'a> {
-    /// The pose without the frame: that of [`Grounds`].
+    /// The pose without the frame: that of [`PriorPose`].
     pub prior: Option<&'a Pose2Covariance>,
     /// By landmarks that were named without a pose, and without a pose of ours to choose among several solutions.
     pub independent: Option<&'a FixResult>,
@@ -77,7 +77,7 @@ impl<'a> FrameFixes<'a> {
     }
 }
 
-impl Motion {
+impl MotionTracker {
     /// Judges the capture time of a frame on its robot's own map. Where it is refused, the frame may be answered, but says
     /// nothing about the robot's pose; what the robot's clock showed at receipt is given instead. Counted.
     pub fn frame_stamp(
@@ -102,13 +102,13 @@ impl Motion {
 
     /// What is known of a robot's pose at a frame without the frame itself: for choosing between two solutions, for naming
     /// landmarks that look alike, and for judging landmarks.
-    pub fn grounds(&self, robot: &Name, camera: &Name, at: Moment<'_>) -> Option<Grounds> {
+    pub fn grounds(&self, robot: &Name, camera: &Name, at: FrameStamp<'_>) -> Option<PriorPose> {
         let followed = self.followed(robot, at.map, at.epoch)?;
         let mut followed = own(&followed);
         self.caught_up(&mut followed, at);
         let pose = followed.fuser.pose_at(at.captured_ns)?;
         let plan = followed.plan(camera, &pose);
-        Some(Grounds { pose, supporters: followed.supporters.clone(), plan })
+        Some(PriorPose { pose, supporters: followed.supporters.clone(), plan })
     }
 
     /// A frame was looked at: what it says of the pose goes to the fusion. Gives the pose to publish if it said something;
@@ -117,7 +117,7 @@ impl Motion {
         &self,
         robot: &Name,
         camera: &Name,
-        at: Moment<'_>,
+        at: FrameStamp<'_>,
         says: &FrameFixes<'_>,
     ) -> Option<v1::RobotPose> {
         let followed = self.followed(robot, at.map, at.epoch)?;
@@ -155,7 +155,7 @@ impl Motion {
     pub fn found(
         &self,
         robot: &Name,
-        at: Moment<'_>,
+        at: FrameStamp<'_>,
         pose: &Pose2Covariance,
         landmarks: &[LandmarkId],
     ) -> Option<v1::RobotPose> {
@@ -174,8 +174,8 @@ impl Motion {
     pub fn judged(
         &self,
         robot: &Name,
-        at: Moment<'_>,
-        grounds: &Grounds,
+        at: FrameStamp<'_>,
+        grounds: &PriorPose,
         judged: &[PlaceCheck],
         missed: &[LandmarkId],
     ) -> Vec<HealthChange> {
@@ -194,7 +194,7 @@ impl Motion {
     }
 
     /// Brings a robot's state to the frame: its epoch, its map, its odometry.
-    fn caught_up(&self, followed: &mut Robot, at: Moment<'_>) {
+    fn caught_up(&self, followed: &mut RobotState, at: FrameStamp<'_>) {
         followed.belong(at.epoch, at.map, &self.snapshots);
         if let Some(odometry) = at.odometry {
             followed.moved(at.captured_ns, odometry, at.now);

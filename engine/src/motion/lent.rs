@@ -2,8 +2,8 @@
 //! happens before that, it can be learnt from again.
 
 use super::{
-    Motion, own,
-    run::{Recording, RunError},
+    MotionTracker, own,
+    run::{RecordingError, RunRecording},
 };
 use protos::Name;
 use std::sync::{Arc, PoisonError};
@@ -11,20 +11,20 @@ use std::sync::{Arc, PoisonError};
 /// A copy of a robot's recording. While it lives nobody else gets one; dropping it leaves the recording as it was.
 #[derive(Debug)]
 pub struct Lent {
-    motion: Arc<Motion>,
+    motion: Arc<MotionTracker>,
     robot: Name,
     /// The copy.
-    pub recording: Box<Recording>,
+    pub recording: Box<RunRecording>,
 }
 
-impl Motion {
+impl MotionTracker {
     /// Lends the recording of a robot. Copies up to some 70 MB: not for an async thread.
-    pub fn lend_recording(self: &Arc<Self>, robot: &Name) -> Result<Lent, RunError> {
-        let followed = self.lock().robots.get(robot).cloned().ok_or(RunError::None)?;
+    pub fn lend_recording(self: &Arc<Self>, robot: &Name) -> Result<Lent, RecordingError> {
+        let followed = self.lock().robots.get(robot).cloned().ok_or(RecordingError::None)?;
         let mut followed = own(&followed);
-        let run = followed.run.as_mut().ok_or(RunError::None)?;
+        let run = followed.run.as_mut().ok_or(RecordingError::None)?;
         if run.lent {
-            return Err(RunError::Lent);
+            return Err(RecordingError::Lent);
         }
         run.lent = true;
         Ok(Lent { motion: self.clone(), robot: robot.clone(), recording: run.clone() })

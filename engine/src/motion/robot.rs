@@ -2,14 +2,14 @@
 //! starts afresh; which epoch speaks for the robot is decided in `engine/epochs.rs`.
 
 mod trust;
-pub(super) use trust::Told;
+pub(super) use trust::StatedPose;
 
 use super::{
     corrections::{Correction, Log, modality, moved, outcome},
-    run::Recording,
+    run::RunRecording,
     timebase::{AHEAD_TOLERANCE, Stamp, Stream, TimeBase},
 };
-use crate::{slots::Order, snapshot::Snapshots};
+use crate::{slots::SequenceTracker, snapshot::Snapshots};
 use map::{
     fuse::{FixOutcome, FixRole, FuseParams, FusedPose, Fuser, OdometryOutcome},
     guided::{Schedule, ScheduleParams},
@@ -33,9 +33,9 @@ const GUIDED: &str = "guided";
 pub const RESTS_ON_M: f64 = 10.0;
 
 #[derive(Debug)]
-pub(super) struct Robot {
-    pub(super) odometry: Order,
-    pub(super) scans: Order,
+pub(super) struct RobotState {
+    pub(super) odometry: SequenceTracker,
+    pub(super) scans: SequenceTracker,
     /// What the rest belongs to.
     epoch: u64,
     pub(super) map: String,
@@ -66,7 +66,7 @@ pub(super) struct Robot {
     pub(super) found: Vec<HealthChange>,
     pub(super) log: Log,
     /// The run that is being recorded.
-    pub(super) run: Option<Box<Recording>>,
+    pub(super) run: Option<Box<RunRecording>>,
     /// What its fusion goes by.
     areas: Arc<ModalityMap>,
     /// When landmarks may be named by the pose, and how far it is trusted.
@@ -77,11 +77,11 @@ pub(super) struct Robot {
     at_last_frame: Option<Pose2>,
 }
 
-impl Default for Robot {
+impl Default for RobotState {
     fn default() -> Self {
         Self {
-            odometry: Order::default(),
-            scans: Order::default(),
+            odometry: SequenceTracker::default(),
+            scans: SequenceTracker::default(),
             epoch: 0,
             map: String::new(),
             clock: TimeBase::default(),
@@ -112,7 +112,7 @@ fn schedule() -> Schedule {
     Schedule::new(ScheduleParams::default(), FuseParams::default())
 }
 
-impl Robot {
+impl RobotState {
     /// Starts afresh when the robot's software did, or when it is on another map; its pose goes with it where it is known
     /// how the two maps lie to each other.
     pub(super) fn belong(&mut self, epoch: u64, map: &str, maps: &Snapshots) {

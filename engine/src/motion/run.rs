@@ -23,7 +23,7 @@ static NEXT: AtomicU64 = AtomicU64::new(0);
 
 /// A run as it is recorded.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Recorded {
+pub struct RecordingStatus {
     /// The map.
     /// Name of the map that the robot stood on.
     pub map: String,
@@ -48,7 +48,7 @@ pub struct Recorded {
 
 /// Why a run cannot be recorded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum RunError {
+pub enum RecordingError {
     /// One is being recorded.
     #[error("a run of this robot is being recorded already")]
     Going,
@@ -65,7 +65,7 @@ pub enum RunError {
 
 /// What is kept of a run.
 #[derive(Debug, Clone)]
-pub struct Recording {
+pub struct RunRecording {
     /// Tells it from any other since the start.
     pub(super) number: u64,
     /// It is being learnt from.
@@ -79,7 +79,7 @@ pub struct Recording {
     way_m: f64,
 }
 
-impl Recording {
+impl RunRecording {
     pub(super) fn new(map: &str) -> Self {
         let number = NEXT.fetch_add(1, Ordering::Relaxed);
         Self {
@@ -137,10 +137,10 @@ impl Recording {
         ReferenceRun { odometry: &self.odometry, fixes: &self.fixes, reference }
     }
 
-    pub(super) fn told(&self, robot: &str) -> Recorded {
+    pub(super) fn told(&self, robot: &str) -> RecordingStatus {
         let of = |modality| self.fixes.iter().filter(|(_, fix)| fix.modality == modality).count();
         let span_ns = self.odometry.first().zip(self.odometry.last()).map(|(a, b)| [a.0, b.0]);
-        Recorded {
+        RecordingStatus {
             map: self.map.clone(),
             robot: robot.to_owned(),
             going: self.ended.is_none(),
@@ -176,7 +176,7 @@ mod tests {
 
     #[test]
     fn what_tells_nothing_new_is_not_kept_and_the_order_is_that_of_capture() {
-        let mut run = Recording::new("hall");
+        let mut run = RunRecording::new("hall");
         for (at_ns, x_m) in [(10, 0.0), (20, 0.005), (30, 0.02), (25, 0.5), (40, 0.04)] {
             run.moved(at_ns, Pose2::new(x_m, 0.0, 0.0));
         }
@@ -200,12 +200,12 @@ mod tests {
 
     #[test]
     fn a_recording_is_bounded() {
-        let mut run = Recording::new("hall");
+        let mut run = RunRecording::new("hall");
         for i in 0..=MAX_RUN_FIXES as i64 {
             run.fix(i, &fix(FixSource::Laser));
         }
         assert_eq!((run.fixes.len(), run.ended), (MAX_RUN_FIXES, Some("full")));
-        let mut run = Recording::new("hall");
+        let mut run = RunRecording::new("hall");
         for i in 0..=MAX_RUN_ODOMETRY as i64 {
             run.moved(i, Pose2::new(0.02 * i as f64, 0.0, 0.0));
         }

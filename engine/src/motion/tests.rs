@@ -28,7 +28,7 @@ fn time(seconds: f64) -> Instant {
     *START + Duration::from_secs_f64(seconds)
 }
 
-impl Motion {
+impl MotionTracker {
     /// Odometry that is received as it is captured: number 1 at 1 s.
     fn odometry_of(&self, robot: &Name, message: Bytes) -> Option<v1::RobotPose> {
         let seq = v1::Odometry::decode(message.clone()).map_or(0, |o| o.seq);
@@ -42,10 +42,10 @@ impl Motion {
     }
 }
 
-fn motion() -> (Motion, Name) {
+fn motion() -> (MotionTracker, Name) {
     let snapshots = Arc::new(Snapshots::default());
     snapshots.set_robot("r1", Some("hall"));
-    (Motion::new(snapshots, Arc::default()), Name::new("r1").unwrap())
+    (MotionTracker::new(snapshots, Arc::default()), Name::new("r1").unwrap())
 }
 
 fn odometry(seq: u64, x_m: f64) -> Bytes {
@@ -106,9 +106,9 @@ fn front() -> Name {
     Name::new("front").unwrap()
 }
 
-impl Motion {
+impl MotionTracker {
     /// A frame whose landmarks, named without the pose, give this fix.
-    fn fixed(&self, robot: &Name, at: Moment<'_>, fix: &Fix) -> Option<v1::RobotPose> {
+    fn fixed(&self, robot: &Name, at: FrameStamp<'_>, fix: &Fix) -> Option<v1::RobotPose> {
         let known = self.grounds(robot, &front(), at).map(|grounds| grounds.pose);
         let independent = FixResult::Fixed(Box::new(fix.clone()));
         let (independent, chosen) = (Some(&independent), Some(fix));
@@ -117,9 +117,9 @@ impl Motion {
     }
 }
 
-fn at(captured_ns: i64, x_m: f64) -> Moment<'static> {
+fn at(captured_ns: i64, x_m: f64) -> FrameStamp<'static> {
     let now = time(captured_ns as f64 * 1e-9);
-    Moment { map: "hall", epoch: 1, captured_ns, odometry: Some(Pose2::new(x_m, 0.0, 0.0)), now }
+    FrameStamp { map: "hall", epoch: 1, captured_ns, odometry: Some(Pose2::new(x_m, 0.0, 0.0)), now }
 }
 
 #[test]
@@ -144,7 +144,7 @@ fn a_prior_follows_from_odometry_alone() {
     motion.fixed(&r1, at(1_000_000_000, 3.0), &fix(10.0)).unwrap();
     let prior = motion.grounds(&r1, &front(), at(1_500_000_000, 3.5)).unwrap().pose;
     assert!((prior.pose.x_m - 10.5).abs() < 1e-9);
-    let anew = Moment { epoch: 2, ..at(1_600_000_000, 0.0) };
+    let anew = FrameStamp { epoch: 2, ..at(1_600_000_000, 0.0) };
     assert!(motion.grounds(&r1, &front(), anew).is_none(), "a new epoch has its own odometry");
 }
 
@@ -153,7 +153,7 @@ fn another_map_starts_afresh() {
     let (motion, r1) = motion();
     motion.fixed(&r1, at(1_000_000_000, 3.0), &fix(10.0)).unwrap();
     motion.snapshots.set_robot("r1", Some("cellar"));
-    let there = Moment { map: "cellar", ..at(2_000_000_000, 3.0) };
+    let there = FrameStamp { map: "cellar", ..at(2_000_000_000, 3.0) };
     assert!(motion.grounds(&r1, &front(), there).is_none());
     assert!(motion.pose(&r1, "hall", time(2.0)).is_none(), "what was known is gone");
 }
@@ -164,9 +164,9 @@ fn a_frame_against_another_map_leaves_the_fusion_alone() {
     let (motion, r1) = motion();
     motion.snapshots.publish(Arc::new(MapSnapshot::empty("cellar", 1)));
     motion.fixed(&r1, at(1_000_000_000, 3.0), &fix(10.0)).unwrap();
-    let there = Moment { map: "cellar", ..at(1_500_000_000, 3.0) };
+    let there = FrameStamp { map: "cellar", ..at(1_500_000_000, 3.0) };
     let plan = FramePlan { guided: true, global: None };
-    let grounds = Grounds { pose: fix(0.0).pose, supporters: Vec::new(), plan };
+    let grounds = PriorPose { pose: fix(0.0).pose, supporters: Vec::new(), plan };
     assert!(motion.grounds(&r1, &front(), there).is_none());
     assert!(motion.fixed(&r1, there, &fix(0.0)).is_none());
     assert!(motion.found(&r1, there, &fix(0.0).pose, &[]).is_none());
@@ -188,7 +188,7 @@ fn a_pose_goes_along_to_a_map_that_lies_known() {
     motion.snapshots.set_links([("floor".to_owned(), link)].into());
     let on = |map: &'static str| {
         motion.snapshots.set_robot("r1", Some(map));
-        motion.grounds(&r1, &front(), Moment { map, ..at(2_000_000_000, 5.0) })
+        motion.grounds(&r1, &front(), FrameStamp { map, ..at(2_000_000_000, 5.0) })
     };
     motion.fixed(&r1, at(1_000_000_000, 3.0), &fix(10.0)).unwrap();
     motion.odometry_of(&r1, odometry(2, 5.0));
@@ -210,14 +210,14 @@ fn a_pose_goes_along_to_a_map_that_lies_known() {
 #[test]
 fn without_odometry_the_fix_is_the_pose() {
     let (motion, r1) = motion();
-    let still = Moment { odometry: None, ..at(1_000_000_000, 0.0) };
+    let still = FrameStamp { odometry: None, ..at(1_000_000_000, 0.0) };
     let pose = motion.fixed(&r1, still, &fix(10.0)).unwrap();
     assert_eq!(pose.modalities, ["landmarks"]);
     assert!((pose.map_from_robot.unwrap().pose.unwrap().x_m - 10.0).abs() < 1e-12);
 }
 
 /// The rendered corridor with its walls as the map `hall`, without any landmark.
-fn walled() -> (Motion, Name, Building) {
+fn walled() -> (MotionTracker, Name, Building) {
     let building = Building::corridor(7);
     let wall = |w: &WallSegment| {
         map::segments::LaserSegment::by_hand(&[w.a_m.x, w.a_m.y, w.b_m.x, w.b_m.y]).unwrap()
@@ -252,7 +252,7 @@ fn scan_at(building: &Building, seq: u64, at: &Pose2) -> Bytes {
     .into()
 }
 
-fn laid(motion: &Motion) -> Option<v1::RobotPose> {
+fn laid(motion: &MotionTracker) -> Option<v1::RobotPose> {
     let (robot, job) = motion.scans().take().unwrap();
     motion.laser(&robot, &job, time(job.captured_ns as f64 * 1e-9))
 }
@@ -267,7 +267,7 @@ fn scans_correct_a_pose_and_never_start_one() {
     // Landmarks say 8 cm too far to the left, and how little they know.
     let pose = Pose2Covariance { pose: Pose2::new(12.0, 0.18, 0.0), covariance: Matrix3::identity() * 0.01 };
     let unsure = Fix { pose, noise: pose.covariance, ..fix(0.0) };
-    let first = Moment { captured_ns: 1_000_000_000, odometry: None, ..at(0, 0.0) };
+    let first = FrameStamp { captured_ns: 1_000_000_000, odometry: None, ..at(0, 0.0) };
     let started = motion.fixed(&r1, first, &unsure).unwrap();
     assert_eq!(started.modalities, ["odometry", "landmarks"]);
     motion.scan_of(&r1, scan_at(&building, 2, &Pose2::new(12.1, 0.1, 0.0)));
@@ -294,7 +294,7 @@ fn scans_correct_a_pose_and_never_start_one() {
 fn after_ten_metres_a_pose_rests_on_odometry_alone() {
     let (motion, r1, _) = walled();
     motion.odometry_of(&r1, odometry(1, 0.0));
-    motion.fixed(&r1, Moment { odometry: None, ..at(1_000_000_000, 0.0) }, &fix(3.0)).unwrap();
+    motion.fixed(&r1, FrameStamp { odometry: None, ..at(1_000_000_000, 0.0) }, &fix(3.0)).unwrap();
     let after = |seq, x_m| motion.odometry_of(&r1, odometry(seq, x_m)).unwrap().modalities;
     assert_eq!(after(2, 5.0), ["odometry", "landmarks"]);
     assert_eq!(after(3, RESTS_ON_M), ["odometry", "landmarks"]);
@@ -325,7 +325,7 @@ fn an_epoch_that_is_over_says_nothing_more() {
     motion.epochs().token(&r1, (Some(1), true), time(1.1), |_| true);
     motion.epochs().token(&r1, (Some(1), false), time(1.2), |_| true);
     motion.epochs().admit(&r1, 2, time(1.3)).unwrap();
-    let anew = Moment { epoch: 2, ..at(2_000_000_000, 0.0) };
+    let anew = FrameStamp { epoch: 2, ..at(2_000_000_000, 0.0) };
     motion.fixed(&r1, anew, &fix(20.0)).unwrap();
     // What was still in work of the first.
     assert!(motion.fixed(&r1, at(3_000_000_000, 4.0), &fix(11.0)).is_none());

@@ -21,9 +21,9 @@ fn one_in_work_one_waiting_newest_wins() {
     assert_eq!(slots.try_take(), None, "its camera is in work");
     let counts = slots.counts();
     assert_eq!((counts.waiting, counts.in_work, counts.superseded), (1, 1, 3));
-    slots.finish(&k, Outcome::Processed);
+    slots.finish(&k, FrameOutcome::Processed);
     assert_eq!(slots.try_take(), Some((k.clone(), 5)));
-    slots.finish(&k, Outcome::Rejected(Code::BadImage));
+    slots.finish(&k, FrameOutcome::Rejected(Code::BadImage));
     let counts = slots.counts();
     assert_eq!((counts.received, counts.processed, counts.superseded, counts.rejected_total()), (5, 1, 3, 1));
     whole(&counts);
@@ -47,7 +47,7 @@ fn old_numbers_are_refused_in_each_epoch() {
 
 #[test]
 fn epochs_are_remembered_up_to_the_bound() {
-    let mut order = Order::default();
+    let mut order = SequenceTracker::default();
     for epoch in 0..=PAST_EPOCHS as u64 {
         order.advance(epoch, 5).unwrap();
     }
@@ -69,7 +69,7 @@ fn the_camera_longest_without_a_frame_gives_way() {
     }
     assert_eq!(offer("front", 1, start + IDLE_CAMERA), Err(Code::TooMany), "all have a frame that waits");
     while let Some((k, _)) = slots.try_take() {
-        slots.finish(&k, Outcome::Processed);
+        slots.finish(&k, FrameOutcome::Processed);
     }
     assert_eq!(
         offer("front", 2, start + IDLE_CAMERA.saturating_sub(Duration::from_millis(1))),
@@ -98,7 +98,7 @@ fn slots_take_turns() {
         slots.offer(slow.clone(), (1, seq), 0, now).unwrap();
         let (k, _) = slots.try_take().unwrap();
         slots.offer(fast.clone(), (1, 10 * seq + 1), 0, now).unwrap();
-        slots.finish(&k, Outcome::Processed);
+        slots.finish(&k, FrameOutcome::Processed);
         turns.push(k.robot.as_str().to_owned());
     }
     assert_eq!(turns, ["fast", "slow", "fast", "slow", "fast", "slow"]);
@@ -118,7 +118,7 @@ fn cameras_at_the_bounds() {
     assert_eq!(more("r3", "a", now), Err(Code::TooMany));
     // An idle slot gives way, one that holds work does not.
     let (k, _) = slots.try_take().unwrap();
-    slots.finish(&k, Outcome::Processed);
+    slots.finish(&k, FrameOutcome::Processed);
     assert_eq!(more("r3", "a", now + IDLE_SLOT / 2), Err(Code::TooMany));
     assert_eq!(more("r3", "a", now + IDLE_SLOT), Ok(()));
     assert_eq!(more("r4", "a", now + IDLE_SLOT), Err(Code::TooMany));
@@ -171,7 +171,7 @@ proptest! {
     fn every_frame_ends_exactly_once(steps in steps()) {
         let slots = Slots::new(3);
         let now = Instant::now();
-        let mut held: Vec<(SlotKey, Outcome)> = Vec::new();
+        let mut held: Vec<(SlotKey, FrameOutcome)> = Vec::new();
         let mut newest: BTreeMap<SlotKey, u64> = BTreeMap::new();
         for (i, step) in steps.into_iter().enumerate() {
             match step {
@@ -185,7 +185,7 @@ proptest! {
                 Step::Take => if let Some((k, job)) = slots.try_take() {
                     prop_assert!(held.iter().all(|(h, _)| *h != k));
                     prop_assert_eq!(newest[&k], job);
-                    held.push((k, [Outcome::Processed, Outcome::Expired, Outcome::Rejected(Code::BadImage)][i % 3]));
+                    held.push((k, [FrameOutcome::Processed, FrameOutcome::Expired, FrameOutcome::Rejected(Code::BadImage)][i % 3]));
                 },
                 Step::Finish(which) => if !held.is_empty() {
                     let (k, outcome) = held.remove(usize::from(which) % held.len());

@@ -94,7 +94,7 @@ fn a_panic_of_the_analysis_is_answered_and_counted() {
     let answer = sent.0.lock().unwrap().pop().unwrap();
     assert!(sent.0.lock().unwrap().is_empty());
     let code = answer.rejection.map(|r| r.code);
-    assert_eq!((outcome, code.as_deref()), (Outcome::Rejected(Code::Internal), Some("internal")));
+    assert_eq!((outcome, code.as_deref()), (FrameOutcome::Rejected(Code::Internal), Some("internal")));
     assert_eq!(engine.vitals.panics().at(Edge::Frame), 1);
 }
 
@@ -123,7 +123,7 @@ fn late_work_is_not_begun() {
     intake(&engine, Duration::ZERO).receive(key(0), message(1, 768)).unwrap();
     let (k, job) = engine.slots.try_take().unwrap();
     std::thread::sleep(Duration::from_millis(2));
-    assert_eq!(engine.contained(&k, &job, &sent), Outcome::Expired);
+    assert_eq!(engine.contained(&k, &job, &sent), FrameOutcome::Expired);
     let answer = sent.0.lock().unwrap().pop().unwrap();
     assert_eq!((answer.status(), answer.seq, answer.timings.len()), (v1::Status::Expired, 1, 0));
 }
@@ -134,7 +134,7 @@ fn a_map_that_is_gone_is_a_refusal() {
     intake(&engine, Duration::from_secs(9)).receive(key(0), message(1, 768)).unwrap();
     engine.snapshots.remove_map("hall");
     let (k, job) = engine.slots.try_take().unwrap();
-    assert_eq!(engine.contained(&k, &job, &sent), Outcome::Rejected(Code::UnknownMap));
+    assert_eq!(engine.contained(&k, &job, &sent), FrameOutcome::Rejected(Code::UnknownMap));
 }
 
 /// Far more frames than the pool can take: each is answered or superseded, none is lost, none answered twice.
@@ -214,7 +214,7 @@ impl Standing {
             stamp_instead_ns: None,
         };
         let sent = Sent::default();
-        assert_eq!(self.engine.contained(&key(0), &job, &sent), Outcome::Processed);
+        assert_eq!(self.engine.contained(&key(0), &job, &sent), FrameOutcome::Processed);
         sent.0.lock().unwrap().pop().unwrap()
     }
 

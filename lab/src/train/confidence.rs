@@ -2,6 +2,7 @@
 //! out; the regression is `vision`'s, the answers are those of `waymark-lab evaluate confidence`, of another set.
 
 use super::confidence_fit::{Answer, fit};
+use super::provenance::Provenance;
 use crate::evaluate::experiment::{
     Common,
     answers::{Answers, KINDS, answers},
@@ -47,7 +48,9 @@ pub(super) fn run(args: &ConfidenceArgs) -> anyhow::Result<()> {
         weights.push((kind, learnt));
     }
     if let Some(path) = &args.rust {
-        std::fs::write(path, source(&weights)).with_context(|| format!("cannot write {}", path.display()))?;
+        let from = Provenance::of_this_run(&args.common.photographs)?;
+        std::fs::write(path, source(&weights, &from))
+            .with_context(|| format!("cannot write {}", path.display()))?;
     }
     let mut lines = vec![format!("set {}, {} quads; in use:", args.common.part.name(), found[0].quads)];
     lines.extend(before.iter().map(line));
@@ -67,17 +70,13 @@ fn fitted(answers: &Answers) -> anyhow::Result<[f64; MEASURES + 1]> {
 }
 
 /// `vision/src/recognise/decision/confidence_weights.rs` with these weights.
-fn source(weights: &[(DistanceKind, [f64; MEASURES + 1])]) -> String {
+fn source(weights: &[(DistanceKind, [f64; MEASURES + 1])], from: &Provenance) -> String {
     let mut text = String::from(
         "//! The weights of the confidence, by the distance that decides. Not for editing: this command writes the file, byte\n\
-         //! for byte, with the open sets as pictures (see docs/EVALUATION.md).\n\
-         //!\n\
-         //! ```text\n\
-         //! waymark-lab train confidence --set calibrate --photographs museum-paintings --photographs poster-textures-estense \\\n\
-         //!   --rust vision/src/recognise/decision/confidence_weights.rs\n\
-         //! ```\n\n\
-         use super::measures::MEASURES;\n",
+         //! for byte:\n//!\n",
     );
+    text.push_str(&from.lines());
+    text.push_str("\nuse super::measures::MEASURES;\n");
     for (kind, weights) in weights {
         let (name, what) = match kind {
             DistanceKind::Both => ("BOTH", "Where slopes decide."),
@@ -96,7 +95,8 @@ mod tests {
 
     #[test]
     fn weights_are_written_as_they_are() {
-        let text = source(&[(DistanceKind::Both, [-1.5, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 6.25])]);
+        let from = Provenance::of_this_run(&[]).unwrap();
+        let text = source(&[(DistanceKind::Both, [-1.5, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 6.25])], &from);
         let constant =
             "pub(super) const BOTH: [f64; MEASURES + 1] =\n    [-1.5, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 6.25];";
         assert!(text.contains(constant), "{text}");

@@ -44,7 +44,7 @@ pub(super) struct Line {
 
 /// What the detector finds with networks that have not seen the pictures.
 #[derive(Debug, Serialize)]
-pub(super) struct Judged {
+pub(super) struct HeldOutFigures {
     pub(super) set: String,
     pub(super) quads: usize,
     pub(super) recall_70: f64,
@@ -135,7 +135,7 @@ pub(super) fn photographs(
     sets: &[Set],
     networks: &[[Network; 2]],
     params: &DetectParams,
-) -> anyhow::Result<Vec<Judged>> {
+) -> anyhow::Result<Vec<HeldOutFigures>> {
     let real = sets.iter().filter(|s| s.images().any(|(i, _)| i.quads.iter().any(TruthQuad::counts)));
     real.map(|set| judged(&set.truth.name, set, networks, params)).collect()
 }
@@ -146,7 +146,7 @@ pub(super) fn judged(
     set: &Set,
     networks: &[[Network; 2]],
     params: &DetectParams,
-) -> anyhow::Result<Judged> {
+) -> anyhow::Result<HeldOutFigures> {
     let by = |[side, thing]: &[Network; 2]| {
         let mut params = params.clone();
         params.quads.side_model = Some(side.clone());
@@ -167,7 +167,7 @@ pub(super) fn judged(
     Ok(sums(title, &scores))
 }
 
-fn sums(title: &str, scores: &[ImageScore]) -> Judged {
+fn sums(title: &str, scores: &[ImageScore]) -> HeldOutFigures {
     let labels = || scores.iter().flat_map(|s| &s.labels).filter(|l| l.state == QuadState::Full);
     let quads = labels().count();
     let share = |least: f64| labels().filter(|l| l.iou >= least).count() as f64 / quads.max(1) as f64;
@@ -175,7 +175,7 @@ fn sums(title: &str, scores: &[ImageScore]) -> Judged {
     let wrong: usize = scores.iter().map(ImageScore::false_left).sum();
     let mut errors: Vec<f64> = labels().filter_map(|l| l.corner_error_px).collect();
     errors.sort_by(f64::total_cmp);
-    Judged {
+    HeldOutFigures {
         set: title.to_owned(),
         quads,
         recall_70: share(FOUND),

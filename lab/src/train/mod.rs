@@ -8,6 +8,7 @@ mod data;
 mod held_out;
 mod network_training;
 mod platt_scaling;
+mod provenance;
 mod search;
 mod similarity;
 mod source;

@@ -4,7 +4,8 @@
 use super::network_training::{ChoiceExample, LabelledExample, TrainParams, train_choice, train_classifier};
 use super::{
     data::{Data, Set},
-    held_out::{self, Judged, Line},
+    held_out::{self, HeldOutFigures, Line},
+    provenance::Provenance,
     source,
 };
 use crate::evaluate::{rendered, reviewed::Reviewed, truth::Truth};
@@ -87,7 +88,7 @@ struct Report {
     /// What held-out outputs of the network of things were multiplied by.
     calibration: f64,
     results: Vec<Line>,
-    detection: Vec<Judged>,
+    detection: Vec<HeldOutFigures>,
 }
 
 /// The name under which rendered pictures are asked for.
@@ -185,7 +186,7 @@ fn others(
     sets: &[Set],
     networks: &[Network; 2],
     params: &DetectParams,
-) -> anyhow::Result<Vec<Judged>> {
+) -> anyhow::Result<Vec<HeldOutFigures>> {
     let mut judged = Vec::new();
     for name in [CORRIDOR, SCENES].into_iter().filter(|name| sets.iter().any(|s| s.truth.name == *name)) {
         if args.held_out_views == 0 {
@@ -239,7 +240,8 @@ fn keep(args: &SearchArgs, [side, thing]: [Network; 2]) -> anyhow::Result<()> {
         )?;
     }
     if let Some(path) = &args.rust {
-        write(path, &source::source(&models))?;
+        let from = Provenance::of_this_run(&args.sets)?;
+        write(path, &source::source(&models, &from))?;
     }
     Ok(())
 }

@@ -1,5 +1,6 @@
 //! Networks as the source file that the detector is built with.
 
+use super::provenance::Provenance;
 use std::fmt::Write as _;
 use vision::detect::border_model::network::Network;
 
@@ -19,18 +20,14 @@ pub(super) fn rounded(mut net: Network) -> Network {
 }
 
 /// `vision/src/detect/border_model/network_weights.rs` with these networks.
-pub(super) fn source(models: &[(&str, Network); 2]) -> String {
+pub(super) fn source(models: &[(&str, Network); 2], from: &Provenance) -> String {
     let mut text = String::from(
-        "//! The weights of the two networks of the search, as learnt from rendered scenes and the open sets. Not for editing:\n\
-         //! this command writes the file, byte for byte on one machine, in the folder of the sets (see docs/EVALUATION.md),\n\
-         //! and `cargo fmt` puts it in form:\n\
-         //!\n\
-         //! ```text\n\
-         //! waymark-lab train search museum-paintings exit-signs corridor museum-walk-estense corridor-loop-rtabmap \\\n\
-         //!   corridor-multifloor doors-bbox signs-misc --pictures poster-textures-estense \\\n\
-         //!   --weight museum-paintings=6 --weight scenes=0.5 --rust vision/src/detect/border_model/network_weights.rs\n\
-         //! ```\n\
-         #![allow(clippy::approx_constant, reason = \"weights that happen to be near one\")]\n\n\
+        "//! The weights of the networks of the default detector. Not for editing: this command writes the file, byte for byte\n\
+         //! on one machine, and `cargo fmt` puts it in form:\n//!\n",
+    );
+    text.push_str(&from.lines());
+    text.push_str(
+        "#![allow(clippy::approx_constant, reason = \"weights that happen to be near one\")]\n\n\
          use super::network::Network;\nuse std::sync::LazyLock;\n",
     );
     for (name, net) in models {
@@ -96,7 +93,8 @@ mod tests {
             bias: 0.518_46,
         });
         assert_eq!(net.check(2), Ok(()));
-        let text = source(&[("side_model", net.clone()), ("thing_model", net)]);
+        let from = Provenance::of_this_run(&[]).unwrap();
+        let text = source(&[("side_model", net.clone()), ("thing_model", net)], &from);
         for part in [
             "const SIDE_MODEL_MEAN: [f64; 2] = [\n    0.1234, 0.0,\n];",
             "const THING_MODEL_DEVIATION: [f64; 2] = [\n    0.0001, 2.0,\n];",
@@ -105,7 +103,8 @@ mod tests {
         ] {
             assert!(text.contains(part), "{part} not in\n{text}");
         }
-        assert!(text.lines().all(|l| l.len() <= 120));
+        let code = text.lines().filter(|l| !l.starts_with("//!"));
+        assert!(code.into_iter().all(|l| l.len() <= 120));
         assert_eq!(text.matches("-1.0,").count(), 120);
     }
 }

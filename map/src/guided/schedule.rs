@@ -23,7 +23,7 @@ pub use report::{Decision, FramePlan, FrameReport, GlobalReason, GuidedReport, T
 
 use crate::{
     fuse::FuseParams,
-    guided::schedule::agreement::{Judged, is_uncertain, judge},
+    guided::schedule::agreement::{PoseAgreement, is_uncertain, judge},
     localise::{Fix, FixResult},
     pose2::{Pose2, Pose2Covariance},
 };
@@ -133,12 +133,12 @@ impl Schedule {
         self.has_pose = true;
         let Some(global) = frame.global else { return Decision::Keep };
         match judge(global, prior, &self.params) {
-            Judged::Agrees(fix) => {
+            PoseAgreement::Agrees(fix) => {
                 self.supported(&fix.landmarks);
                 Decision::Use
             }
-            Judged::Silent => Decision::Keep,
-            Judged::Contradicts(fixes) => self.contradicted(fixes, frame.missed),
+            PoseAgreement::Silent => Decision::Keep,
+            PoseAgreement::Contradicts(fixes) => self.contradicted(fixes, frame.missed),
         }
     }
 

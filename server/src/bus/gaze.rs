@@ -2,7 +2,7 @@
 //! than a millisecond.
 
 use super::{BusError, Receivers, caught};
-use engine::{gaze::Ask, panics::Edge};
+use engine::{gaze::GazeQuery, panics::Edge};
 use map::gaze::GazeParams;
 use protos::{
     Code, Key, Keys, Name, Rejection,
@@ -71,7 +71,7 @@ fn asked(to: &Receivers, robot: &Name, query: &Query) -> Result<v1::GazeAdvice, 
     let number = |text: &str| map.landmarks.iter().find(|(_, l)| l.name == text).map(|(id, _)| *id);
     let looked = question.looked.and_then(|(text, recognised)| Some((number(&text)?, recognised)));
     let params = GazeParams { criterion: question.criterion, ..GazeParams::default() };
-    let ask = Ask { pose, viewer, head: question.head, params };
+    let ask = GazeQuery { pose, viewer, head: question.head, params };
     let look = to.gazes.choose(robot, question.at_ns, looked, &map, &ask).map_err(|e| refused(&e))?;
     let name_of = |c: &map::gaze::GazeTarget| {
         map.landmarks.get(&c.landmark).map(|l| l.name.clone()).unwrap_or_default()

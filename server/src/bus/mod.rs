@@ -17,10 +17,10 @@ pub use outbox::Outbox;
 
 use crate::config::Config;
 use engine::{
-    gaze::Gazes,
+    gaze::GazeControllers,
     intake::Intake,
     live::LiveHub,
-    motion::Motion,
+    motion::MotionTracker,
     panics::Edge,
     vitals::{Pulse, Vitals},
 };
@@ -64,11 +64,11 @@ pub struct Receivers {
     /// Frames.
     pub intake: Arc<Intake>,
     /// Odometry and scans.
-    pub motion: Arc<Motion>,
+    pub motion: Arc<MotionTracker>,
     /// Presence, and refusals for pages.
     pub live: Arc<LiveHub>,
     /// Which landmark each robot was told to look at.
-    pub gazes: Arc<Gazes>,
+    pub gazes: Arc<GazeControllers>,
     /// Where tasks say that they run and panics are counted.
     pub vitals: Arc<Vitals>,
 }

@@ -34,7 +34,7 @@ pub(crate) const MIN_CONFIDENCE: f64 = 0.9;
 const NEARLY: f64 = 1.5;
 
 /// What a frame gives.
-pub(super) struct Found {
+pub(super) struct FrameObservations {
     pub(super) glimpses: Vec<QuadObservation>,
     /// Of each, the covariance of its corners by the detector.
     pub(super) corners_px2: Vec<[Matrix2<f64>; 4]>,
@@ -63,11 +63,12 @@ fn stand(offer: &Offer) -> Option<Stand<'_>> {
 }
 
 /// The glimpses of a frame.
-pub(super) fn glimpses(offer: &Offer, params: &Params) -> Found {
+pub(super) fn glimpses(offer: &Offer, params: &Params) -> FrameObservations {
     let stand = stand(offer);
     let capture =
         stand.as_ref().map(|s| Capture::of_robot(s.camera, s.map_from_robot, &s.mounting.robot_from_camera));
-    let mut found = Found { glimpses: vec![], corners_px2: vec![], capture, unusable: 0, not_on_wall: 0 };
+    let mut found =
+        FrameObservations { glimpses: vec![], corners_px2: vec![], capture, unusable: 0, not_on_wall: 0 };
     for facts in &offer.looked.quads {
         if facts.quad.kind != QuadKind::Full || facts.quad.side_clipped.contains(&true) {
             found.unusable += 1;

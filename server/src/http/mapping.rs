@@ -8,7 +8,7 @@ use super::{
 use crate::store::{laser, maps, robots};
 use axum::{Json, extract::State, http::StatusCode};
 use engine::{
-    mapping::{MappingError, Progress, Stage, Walls},
+    mapping::{MappingError, MappingProgress, MappingStage, Walls},
     panics::Edge,
 };
 use futures::FutureExt;
@@ -32,16 +32,16 @@ fn refused(error: MappingError) -> ApiError {
     ApiError::new(status, code, error.to_string()).field("map")
 }
 
-fn shown(progress: Progress) -> MappingProgressBody {
+fn shown(progress: MappingProgress) -> MappingProgressBody {
     MappingProgressBody {
         map: progress.map,
         robot: progress.robot,
         stage: match progress.stage {
-            Stage::Resuming => MappingStageBody::Resuming,
-            Stage::Mapping => MappingStageBody::Mapping,
-            Stage::Finishing => MappingStageBody::Finishing,
-            Stage::Done => MappingStageBody::Done,
-            Stage::Failed => MappingStageBody::Failed,
+            MappingStage::Resuming => MappingStageBody::Resuming,
+            MappingStage::Mapping => MappingStageBody::Mapping,
+            MappingStage::Finishing => MappingStageBody::Finishing,
+            MappingStage::Done => MappingStageBody::Done,
+            MappingStage::Failed => MappingStageBody::Failed,
         },
         scans: progress.scans,
         dropped: progress.dropped,

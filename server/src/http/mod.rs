@@ -35,7 +35,7 @@ pub(crate) use router::router;
 
 use crate::{config::Config, gather::Gatherer, jobs::Jobs, publication::Catalogue};
 use axum::http::StatusCode;
-use engine::{live::LiveHub, motion::Motion, panics::Edge, search::Searches, workers::Engine};
+use engine::{live::LiveHub, motion::MotionTracker, panics::Edge, search::Relocalisers, workers::Engine};
 use error::ApiError;
 use std::{sync::Arc, time::Duration};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, SemaphorePermit, watch};
@@ -51,9 +51,9 @@ pub(crate) struct App {
     /// What robots are doing now.
     pub(crate) live: Arc<LiveHub>,
     /// Where they are.
-    pub(crate) motion: Arc<Motion>,
+    pub(crate) motion: Arc<MotionTracker>,
     /// Where those may be that do not know.
-    pub(crate) searches: Arc<Searches>,
+    pub(crate) searches: Arc<Relocalisers>,
     /// Becomes true when the server stops; ends event streams.
     pub(crate) stopping: watch::Receiver<bool>,
     /// Places for vision work asked for over HTTP: as many as there are vision threads.

@@ -8,7 +8,7 @@ use super::{
 };
 use crate::store::{areas, maps, robots};
 use axum::{Json, extract::State, http::StatusCode};
-use engine::motion::{Recorded, RunError};
+use engine::motion::{RecordingError, RecordingStatus};
 use map::{
     fuse::FuseParams,
     modality_stats::{
@@ -35,11 +35,11 @@ pub(super) fn router() -> OpenApiRouter<AppState> {
         .routes(routes!(reference))
 }
 
-fn refused(error: RunError) -> ApiError {
+fn refused(error: RecordingError) -> ApiError {
     let (status, code) = match error {
-        RunError::Going | RunError::Lent => (StatusCode::CONFLICT, "in_use"),
-        RunError::TooMany => (StatusCode::CONFLICT, "too_many"),
-        RunError::None => (StatusCode::NOT_FOUND, "not_recording"),
+        RecordingError::Going | RecordingError::Lent => (StatusCode::CONFLICT, "in_use"),
+        RecordingError::TooMany => (StatusCode::CONFLICT, "too_many"),
+        RecordingError::None => (StatusCode::NOT_FOUND, "not_recording"),
     };
     ApiError::new(status, code, error.to_string()).field("robot")
 }
@@ -67,7 +67,7 @@ async fn get(
 ) -> Result<Json<RecordingStatusBody>, ApiError> {
     robots::get(app.store.reads(), &robot).await?;
     let recorded = app.motion.recorded(&name("robot", robot)?);
-    recorded.map(recording_shown).map(Json).ok_or_else(|| refused(RunError::None))
+    recorded.map(recording_shown).map(Json).ok_or_else(|| refused(RecordingError::None))
 }
 
 /// Gives the recording up.
@@ -79,7 +79,7 @@ async fn cancel(
 ) -> Result<StatusCode, ApiError> {
     robots::get(app.store.reads(), &robot).await?;
     let given_up = app.motion.take_recording(&name("robot", robot)?);
-    given_up.map(|_run| StatusCode::NO_CONTENT).ok_or_else(|| refused(RunError::None))
+    given_up.map(|_run| StatusCode::NO_CONTENT).ok_or_else(|| refused(RecordingError::None))
 }
 
 fn run_shown(row: areas::RunRow) -> ReferenceRunBody {
@@ -99,7 +99,7 @@ fn run_shown(row: areas::RunRow) -> ReferenceRunBody {
     }
 }
 
-fn recording_shown(recorded: Recorded) -> RecordingStatusBody {
+fn recording_shown(recorded: RecordingStatus) -> RecordingStatusBody {
     RecordingStatusBody {
         map: recorded.map,
         robot: recorded.robot,
@@ -182,7 +182,7 @@ async fn reference(
     let map = maps::get(app.store.reads(), &map).await?;
     let runs = areas::runs(app.store.reads(), map.id).await?;
     let row = runs.into_iter().find(|run| run.id == id);
-    let row = row.ok_or_else(|| refused(RunError::None))?;
+    let row = row.ok_or_else(|| refused(RecordingError::None))?;
     Ok((StatusCode::CREATED, Json(run_shown(row))))
 }
 

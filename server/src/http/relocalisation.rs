@@ -8,7 +8,7 @@ use super::{
 };
 use crate::store::robots;
 use axum::{Json, extract::State};
-use engine::search::Need;
+use engine::search::MissingCondition;
 use map::relocalise::{GridBeliefParams, PoseHypothesis};
 use protos::api::{MissingConditionBody, PoseHypothesisBody, Problem, RelocalisationStatus};
 use utoipa_axum::{router::OpenApiRouter, routes};
@@ -22,12 +22,12 @@ fn shown(PoseHypothesis { mass, pose }: &PoseHypothesis) -> PoseHypothesisBody {
     PoseHypothesisBody { probability: *mass, x_m, y_m, theta_rad, covariance: row_major(&pose.covariance) }
 }
 
-fn missing(need: Need) -> MissingConditionBody {
+fn missing(need: MissingCondition) -> MissingConditionBody {
     match need {
-        Need::FewerPlaces => MissingConditionBody::FewerPlaces,
-        Need::AnotherLandmark => MissingConditionBody::AnotherLandmark,
-        Need::AgreeingSightings => MissingConditionBody::AgreeingSightings,
-        Need::NoOtherPlace => MissingConditionBody::NoOtherPlace,
+        MissingCondition::FewerPlaces => MissingConditionBody::FewerPlaces,
+        MissingCondition::AnotherLandmark => MissingConditionBody::AnotherLandmark,
+        MissingCondition::AgreeingSightings => MissingConditionBody::AgreeingSightings,
+        MissingCondition::NoOtherPlace => MissingConditionBody::NoOtherPlace,
     }
 }
 

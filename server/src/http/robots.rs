@@ -11,7 +11,7 @@ use axum::{Json, extract::State, http::StatusCode};
 use engine::{
     epochs::Conflict,
     live::LiveHub,
-    motion::{Correction, Corrections, Known, Motion},
+    motion::{Correction, Corrections, Known, MotionTracker},
 };
 use map::pose2::Pose2;
 use protos::{
@@ -29,7 +29,7 @@ pub(super) fn router() -> OpenApiRouter<AppState> {
 }
 
 /// A registered robot with what is known of it now.
-fn robot_shown(row: RobotRow, motion: &Motion, live: &LiveHub) -> Robot {
+fn robot_shown(row: RobotRow, motion: &MotionTracker, live: &LiveHub) -> Robot {
     let now = Instant::now();
     let robot = Name::new(row.name.as_str()).ok();
     let status = robot.as_ref().map(|robot| motion.epochs().status(robot, now)).unwrap_or_default();

@@ -265,7 +265,7 @@ async fn a_known_path_may_be_as_long_as_it_is_promised() {
 /// A robot whose odometry says that it is 7 m less far than it is: a frame a second with the landmark of this number, that
 /// puts it there.
 fn framed(service: &Service, seconds: u64, (landmark, x_m): (u64, f64)) {
-    use engine::motion::{FrameFixes, Moment};
+    use engine::motion::{FrameFixes, FrameStamp};
     use map::{
         localise::{AmbiguityResolvedBy, Fix, FixResult, FixSource},
         pose2::{Pose2, Pose2Covariance},
@@ -273,7 +273,7 @@ fn framed(service: &Service, seconds: u64, (landmark, x_m): (u64, f64)) {
     let (r1, front) = (protos::Name::new("r1").unwrap(), protos::Name::new("front").unwrap());
     let odometry = Pose2::new(seconds as f64 * 0.1, 0.0, 0.0);
     let captured_ns = seconds as i64 * 1_000_000_000;
-    let at = Moment { map: "hall", epoch: 1, captured_ns, odometry: Some(odometry), now: Instant::now() };
+    let at = FrameStamp { map: "hall", epoch: 1, captured_ns, odometry: Some(odometry), now: Instant::now() };
     let prior = service.engine.motion.grounds(&r1, &front, at).map(|grounds| grounds.pose);
     let covariance = nalgebra::Matrix3::identity() * 1e-4;
     let fix = FixResult::Fixed(Box::new(Fix {

@@ -9,7 +9,7 @@ use super::{
 use crate::store::{landmarks, maps};
 use axum::{Json, extract::State, http::StatusCode};
 use engine::{
-    gaze::{Ask, ranked},
+    gaze::{GazeQuery, ranked},
     snapshot::MapSnapshot,
 };
 use map::{
@@ -205,7 +205,7 @@ async fn gaze(
     let (map, pose) = (snapshot(&app, &map).await?, checked(&question.pose)?);
     let params = GazeParams { criterion: question.criterion, ..GazeParams::default() };
     let viewer = question.viewer.unwrap_or_else(|| map.sight.viewer.clone());
-    let ask = Ask { pose, viewer, head: question.head, params };
+    let ask = GazeQuery { pose, viewer, head: question.head, params };
     let found = ranked(&map, &ask).map_err(|e| out_of_range(&e, "question"))?;
     Ok(Json(GazeRankingBody {
         map_version: map.version,

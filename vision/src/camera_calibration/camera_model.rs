@@ -38,7 +38,7 @@ pub(crate) struct Point {
 }
 
 /// A point's pixel with its derivatives.
-pub(crate) struct Seen {
+pub(crate) struct ProjectedPoint {
     pub(crate) px: Point2<f64>,
     pub(crate) by_pose: SMatrix<f64, 2, 6>,
     pub(crate) by_shared: SMatrix<f64, 2, CAMERA>,
@@ -72,7 +72,7 @@ pub(crate) fn pixel(point: &Point, pose: &Isometry3<f64>, c: &[f64; CAMERA]) -> 
     (p.z > MIN_DEPTH_M).then_some(made)
 }
 
-pub(crate) fn seen(point: &Point, pose: &Isometry3<f64>, c: &[f64; CAMERA]) -> Option<Seen> {
+pub(crate) fn seen(point: &Point, pose: &Isometry3<f64>, c: &[f64; CAMERA]) -> Option<ProjectedPoint> {
     let px = pixel(point, pose, c)?;
     let (arm, p) = placed(point, pose, c[POSTER]);
     let inverse = 1.0 / p.z;
@@ -95,5 +95,5 @@ pub(crate) fn seen(point: &Point, pose: &Isometry3<f64>, c: &[f64; CAMERA]) -> O
     by_shared.set_column(K2, &(Vector2::new(fx * x, fy * y) * (r2 * r2)));
     let higher = pose.rotation * Vector3::new(0.0, 0.0, point.plane.y * c[POSTER].exp());
     by_shared.set_column(POSTER, &(by_point * higher));
-    Some(Seen { px, by_pose, by_shared })
+    Some(ProjectedPoint { px, by_pose, by_shared })
 }

@@ -35,7 +35,7 @@ const MAX_BORDERS: usize = 2;
 
 /// A landmark that points speak for.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Found {
+pub struct LandmarkPoints {
     /// Index of the model.
     pub model: usize,
     /// Which border of the quad: 0 for its corners, i for alternate i - 1.
@@ -50,8 +50,8 @@ pub fn search<'a>(
     quad: &Quad,
     index: &PointIndex,
     taught: impl Fn(usize) -> &'a [TaughtPoint],
-) -> Vec<Found> {
-    let mut found: Vec<Found> = Vec::new();
+) -> Vec<LandmarkPoints> {
+    let mut found: Vec<LandmarkPoints> = Vec::new();
     if index.is_empty() {
         return found;
     }
@@ -87,11 +87,11 @@ pub fn search<'a>(
             }
             let Some(evidence) = verified(&seen, hypothesis, target) else { continue };
             sure |= evidence.log10_nfa <= LOG10_SURE;
-            found.push(Found { model: *model, border, evidence });
+            found.push(LandmarkPoints { model: *model, border, evidence });
         }
     }
     found.sort_by(|a, b| a.evidence.log10_nfa.total_cmp(&b.evidence.log10_nfa).then(a.model.cmp(&b.model)));
-    let mut once: Vec<Found> = Vec::new();
+    let mut once: Vec<LandmarkPoints> = Vec::new();
     for f in found {
         if once.iter().all(|o| o.model != f.model) {
             once.push(f);

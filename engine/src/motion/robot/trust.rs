@@ -1,6 +1,6 @@
 //! What a robot's pose rests on, how far it is trusted, and how it is told.
 
-use super::{GUIDED, MAX_SUPPORTERS, RESTS_ON_M, Robot, schedule};
+use super::{GUIDED, MAX_SUPPORTERS, RESTS_ON_M, RobotState, schedule};
 use map::{
     fuse::{FixOutcome, FixRole, FusedPose},
     guided::{FramePlan, MAX_CAMERAS, Trust},
@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 /// A pose as it is told.
 #[derive(Debug)]
-pub(in crate::motion) struct Told {
+pub(in crate::motion) struct StatedPose {
     pub(in crate::motion) fused: FusedPose,
     /// Since it was captured.
     pub(in crate::motion) age: Duration,
@@ -21,7 +21,7 @@ pub(in crate::motion) struct Told {
     pub(in crate::motion) trust: PoseTrust,
 }
 
-impl Robot {
+impl RobotState {
     /// The pose has proved wrong, or is unknown: nothing rests on it any more.
     pub(super) fn lost(&mut self) {
         (self.by_landmarks_m, self.by_guided_m, self.by_laser_m) = (None, None, None);
@@ -63,7 +63,7 @@ impl Robot {
     }
 
     /// A pose as it is told at this moment.
-    pub(in crate::motion) fn told(&self, fused: FusedPose, now: Instant) -> Told {
+    pub(in crate::motion) fn told(&self, fused: FusedPose, now: Instant) -> StatedPose {
         let trust = match self.schedule.trust() {
             // A pose that came along from another map, which no frame has been compared with yet.
             Trust::NoPose | Trust::Unsupported => PoseTrust::Unsupported,
@@ -73,7 +73,7 @@ impl Robot {
         };
         // Without any odometry the pose is the fix itself.
         let modalities = if self.newest.is_some() { self.modalities() } else { vec!["landmarks".to_owned()] };
-        Told { fused, age: self.age(fused.at_ns, now), modalities, trust }
+        StatedPose { fused, age: self.age(fused.at_ns, now), modalities, trust }
     }
 
     /// Keeps what the pose rests on; of landmarks the latest.

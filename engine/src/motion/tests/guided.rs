@@ -14,7 +14,7 @@ fn of(landmark: LandmarkId, x_m: f64) -> Fix {
 
 /// A robot at x = 7 m more than its odometry says.
 struct Robot {
-    motion: Motion,
+    motion: MotionTracker,
     r1: Name,
     seconds: u64,
 }

@@ -8,7 +8,7 @@ fn runs_are_recorded_one_by_one_and_bounded() {
     assert_eq!(motion.recorded(&r1), None);
     let begun = motion.record(&r1, "hall").unwrap();
     assert!(begun.going && begun.span_ns.is_none());
-    assert_eq!(motion.record(&r1, "hall"), Err(RunError::Going));
+    assert_eq!(motion.record(&r1, "hall"), Err(RecordingError::Going));
     motion.odometry_of(&r1, odometry(1, 0.0));
     motion.fixed(&r1, at(1_000_000_000, 0.0), &fix(10.0)).unwrap();
     motion.odometry_of(&r1, odometry(2, 1.0));
@@ -27,11 +27,11 @@ fn runs_are_recorded_one_by_one_and_bounded() {
     // Lent to be learnt from: it stays, and is lent once at a time, until what it taught is stored.
     let motion = Arc::new(motion);
     let lent = motion.lend_recording(&r1).unwrap();
-    assert_eq!(motion.lend_recording(&r1).err(), Some(RunError::Lent));
+    assert_eq!(motion.lend_recording(&r1).err(), Some(RecordingError::Lent));
     assert_eq!((lent.recording.odometry.len(), motion.recorded(&r1).unwrap().odometry), (2, 2));
     drop(lent);
     motion.lend_recording(&r1).unwrap().learnt();
-    assert_eq!((motion.recorded(&r1), motion.lend_recording(&r1).err()), (None, Some(RunError::None)));
+    assert_eq!((motion.recorded(&r1), motion.lend_recording(&r1).err()), (None, Some(RecordingError::None)));
     motion.record(&r1, "hall").unwrap();
     // Given up and begun anew while it is learnt from: the new one stays.
     let lent = motion.lend_recording(&r1).unwrap();
@@ -42,7 +42,7 @@ fn runs_are_recorded_one_by_one_and_bounded() {
     for i in 1..MAX_RECORDINGS {
         motion.record(&Name::new(format!("r{}", i + 1)).unwrap(), "hall").unwrap();
     }
-    assert_eq!(motion.record(&Name::new("one-more").unwrap(), "hall"), Err(RunError::TooMany));
+    assert_eq!(motion.record(&Name::new("one-more").unwrap(), "hall"), Err(RecordingError::TooMany));
     assert!(motion.take_recording(&r1).is_some() && motion.take_recording(&r1).is_none());
     motion.record(&Name::new("one-more").unwrap(), "hall").unwrap();
 }

@@ -10,7 +10,7 @@ const RATE: u64 = 20;
 
 /// A robot that drives, from its first fix on.
 struct Drive {
-    motion: Motion,
+    motion: MotionTracker,
     r1: Name,
     /// Numbers of messages, of any kind.
     seq: u64,
@@ -72,7 +72,7 @@ impl Drive {
         if self.frame(s, stamp_s, "front").is_err() {
             return None;
         }
-        let at = Moment { odometry: None, now: time(s + 0.04), ..at(ns(stamp_s), 0.0) };
+        let at = FrameStamp { odometry: None, now: time(s + 0.04), ..at(ns(stamp_s), 0.0) };
         self.motion.fixed(&self.r1, at, &fix(s + 7.0))
     }
 
@@ -136,7 +136,7 @@ fn one_stray_stamp_of_slow_odometry_is_no_jump() {
         motion.odometry(&r1, message.encode_to_vec().into(), time(seq as f64))
     };
     send(1, 1.0);
-    let there = Moment { odometry: None, ..at(ns(1.0), 0.0) };
+    let there = FrameStamp { odometry: None, ..at(ns(1.0), 0.0) };
     motion.fixed(&r1, there, &fix(10.0)).unwrap();
     send(2, 2.0).unwrap();
     send(3, 2.05).unwrap();
@@ -203,7 +203,7 @@ fn one_stray_stamp_of_a_scan_changes_nothing() {
         };
         on(0, 10);
         let pose = Pose2Covariance { pose: truth(0.9), covariance: Matrix3::identity() * 1e-4 };
-        let first = Moment { odometry: None, ..at(ns(0.9), 0.0) };
+        let first = FrameStamp { odometry: None, ..at(ns(0.9), 0.0) };
         motion.fixed(&r1, first, &Fix { pose, ..fix(0.0) }).unwrap();
         on(10, 26);
         let next = on(26, 27).expect("a pose after the stray scan");
@@ -233,7 +233,7 @@ fn a_clock_that_was_set_is_followed_after_a_second() {
         // The cameras go by the same clock.
         drive.frame(4.5, 4.5 + off_s, "front").unwrap();
         let captured_ns = ns(4.5 + off_s);
-        let at = Moment { captured_ns, odometry: None, now: time(4.5), ..at(0, 0.0) };
+        let at = FrameStamp { captured_ns, odometry: None, now: time(4.5), ..at(0, 0.0) };
         assert_eq!(drive.motion.fixed(&drive.r1, at, &fix(11.5)).unwrap().corrections, 2);
         let refused: u64 = drive.refused().values().sum();
         assert_eq!(refused, RATE, "{off_s}");
@@ -294,7 +294,7 @@ fn a_robot_that_falls_silent_has_no_pose_after_the_named_time() {
     assert_eq!(drive.motion.pose(&drive.r1, "hall", time(3.0 + max_s + 0.01)), None);
     // A frame that took too long says where the robot was, not where it is.
     drive.frame(3.0, 3.0, "front").unwrap();
-    let late = Moment { odometry: None, now: time(3.0 + max_s + 0.01), ..at(ns(3.0), 0.0) };
+    let late = FrameStamp { odometry: None, now: time(3.0 + max_s + 0.01), ..at(ns(3.0), 0.0) };
     assert!(drive.motion.fixed(&drive.r1, late, &fix(10.0)).is_none());
     // Odometry carries the pose on.
     assert!(drive.odometry(8.0, 0.0).is_some());
@@ -306,7 +306,7 @@ fn odometry_once_a_second_has_a_pose_all_the_time() {
     let (motion, r1) = motion();
     let mut drive = Drive { motion, r1, seq: 0 };
     drive.odometry(1.0, 0.0);
-    let there = Moment { odometry: None, ..at(ns(1.0), 0.0) };
+    let there = FrameStamp { odometry: None, ..at(ns(1.0), 0.0) };
     drive.motion.fixed(&drive.r1, there, &fix(8.0)).unwrap();
     for i in 2..20 {
         assert!(drive.motion.known(&drive.r1, time(f64::from(i) - 0.001)).is_some());

@@ -16,7 +16,7 @@ const SUBSETS: usize = 40;
 
 /// What came out of one calibration.
 #[derive(Debug, Clone, Serialize)]
-pub(super) struct Found {
+pub(super) struct CalibrationFigures {
     fx_px: f64,
     fx_sigma_px: Option<f64>,
     cx_px: f64,
@@ -41,11 +41,11 @@ pub(super) struct RealSet {
     points: usize,
     stated: Vec<Stated>,
     /// From all points: pinhole, and with two radial coefficients.
-    all_pinhole: Result<Found, String>,
-    all_lens: Result<Found, String>,
+    all_pinhole: Result<CalibrationFigures, String>,
+    all_lens: Result<CalibrationFigures, String>,
     /// From the outermost quad: pinhole, and with one.
-    quad_pinhole: Result<Found, String>,
-    quad_lens: Result<Found, String>,
+    quad_pinhole: Result<CalibrationFigures, String>,
+    quad_lens: Result<CalibrationFigures, String>,
     /// The quad with a lens, against all points with one, over the number of views.
     pub(super) by_views: Vec<OfViews>,
 }
@@ -86,8 +86,8 @@ fn run(
     )
 }
 
-fn found(c: &CameraCalibration) -> Found {
-    Found {
+fn found(c: &CameraCalibration) -> CalibrationFigures {
+    CalibrationFigures {
         fx_px: c.camera.fx_px,
         fx_sigma_px: c.fx_sigma_px(),
         cx_px: c.camera.cx_px,
@@ -154,7 +154,7 @@ impl RealSet {
     }
 }
 
-fn words(f: &Found) -> String {
+fn words(f: &CalibrationFigures) -> String {
     let sigma = f.fx_sigma_px.map_or(String::new(), |s| format!(" +- {s:.1}"));
     let radial: Vec<String> = f.radial.iter().map(|k| format!(" {k:.3}")).collect();
     format!(

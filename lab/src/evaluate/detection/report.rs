@@ -36,7 +36,7 @@ pub(crate) struct Group {
 
 /// False quads and time of images.
 #[derive(Debug, Clone, Serialize)]
-pub(crate) struct Seen {
+pub(crate) struct ImageFigures {
     pub(crate) images: usize,
     /// Over images whose labels are complete; `null` where there is none.
     pub(crate) false_per_image: Option<f64>,
@@ -63,7 +63,7 @@ pub(crate) struct Report {
     #[serde(flatten)]
     pub(crate) all: Group,
     #[serde(flatten)]
-    pub(crate) images: Seen,
+    pub(crate) images: ImageFigures,
     /// Those that are easy to see; `null` where there is none.
     pub(crate) easy: Option<Group>,
     pub(crate) by_state: BTreeMap<String, Group>,
@@ -71,7 +71,7 @@ pub(crate) struct Report {
     pub(crate) by_stratum: BTreeMap<String, Group>,
     pub(crate) by_shortest_side: Vec<(String, Group)>,
     pub(crate) by_view_angle: Vec<(String, Group)>,
-    pub(crate) images_by_stratum: BTreeMap<String, Seen>,
+    pub(crate) images_by_stratum: BTreeMap<String, ImageFigures>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(crate) worst: Vec<WorstImage>,
     #[serde(skip)]
@@ -116,14 +116,14 @@ impl Report {
         let strata: std::collections::BTreeSet<&String> = scores.iter().map(|s| &s.stratum).collect();
         let of_stratum = |stratum: &String| {
             let images: Vec<&ImageScore> = scores.iter().filter(|s| s.stratum == *stratum).collect();
-            (stratum.clone(), Seen::of(&images))
+            (stratum.clone(), ImageFigures::of(&images))
         };
         Self {
             set: set.to_owned(),
             params: params.to_owned(),
             unreadable,
             all: Group::of(&scores, full).unwrap_or_else(Group::empty),
-            images: Seen::of(&scores.iter().collect::<Vec<_>>()),
+            images: ImageFigures::of(&scores.iter().collect::<Vec<_>>()),
             easy: Group::of(&scores, |l| l.is_easy),
             by_state,
             by_class: by(|l| l.class.clone()),
@@ -221,7 +221,7 @@ impl Group {
     }
 }
 
-impl Seen {
+impl ImageFigures {
     fn of(scores: &[&ImageScore]) -> Self {
         let complete: Vec<[usize; 2]> =
             scores.iter().filter_map(|s| Some([s.false_quads.as_ref()?.len(), s.false_left()])).collect();

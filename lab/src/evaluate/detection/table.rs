@@ -2,7 +2,7 @@
 
 use super::{
     easy::{MIN_CONTRAST, MIN_SIDE_PX},
-    report::{Group, Report, Seen},
+    report::{Group, ImageFigures, Report},
 };
 use crate::evaluate::statistics::Interval;
 
@@ -44,7 +44,7 @@ pub(crate) fn table(r: &Report) -> String {
     }
     lines.extend(images(&r.images));
     if r.images_by_stratum.len() > 1 && r.images.false_quads > r.images.reviewed_quads {
-        let stratum = |(name, i): (&String, &Seen)| {
+        let stratum = |(name, i): (&String, &ImageFigures)| {
             Some(format!("    {name}: {:.2}, {:.1} ms", i.false_per_image_reviewed?, i.ms_per_image))
         };
         lines.extend(r.images_by_stratum.iter().filter_map(stratum));
@@ -83,7 +83,7 @@ fn row(name: &str, g: &Group) -> String {
     )
 }
 
-fn images(i: &Seen) -> Vec<String> {
+fn images(i: &ImageFigures) -> Vec<String> {
     let figure = |value: Option<f64>, interval: Option<Interval>| {
         let value = value.map_or("not labelled".to_owned(), |v| format!("{v:.3}"));
         value + &interval.map_or(String::new(), |i| format!(" ({:.3}-{:.3})", i.0, i.1))

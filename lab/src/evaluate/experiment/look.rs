@@ -72,7 +72,7 @@ impl Outcome {
 
 /// One view, judged.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Look {
+pub(crate) struct ViewFigures {
     /// H^r / tau, C^r / tau where the corners were given, and (1 - likeness) / tau after alignment; infinite without.
     pub(crate) ratios: [f64; 3],
     pub(crate) outcome: Outcome,
@@ -114,7 +114,7 @@ pub(crate) fn look(
     seen: &Exhibit,
     corners: Option<&Corners>,
     p: &Params,
-) -> Look {
+) -> ViewFigures {
     let quads = corners.map_or_else(|| detected(seen, p), |c| vec![quad(*c)]);
     let verdicts: Vec<RecognitionResult> =
         quads.iter().map(|q| recognise(&seen.image, q, &class.models, DistanceKind::Both, p)).collect();
@@ -133,7 +133,7 @@ pub(crate) fn look(
         Outcome::NotListed if too_small => Outcome::NoIcon,
         other => other,
     };
-    Look { ratios, outcome }
+    ViewFigures { ratios, outcome }
 }
 
 /// H^r and C^r of the icon at `corners` to landmark `id`, over tau.

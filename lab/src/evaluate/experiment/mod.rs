@@ -40,7 +40,7 @@ pub(crate) struct Common {
     /// A folder of pictures to use beside generated posters, or one with a truth.json of which the taught pictures are
     /// used. May be repeated.
     #[arg(long, value_name = "DIR")]
-    photographs: Vec<PathBuf>,
+    pub(crate) photographs: Vec<PathBuf>,
     /// How landmarks are taught: `views`, each from 30 rendered views as a robot would gather them, or `photograph`,
     /// each from one view and 30 generated from it.
     #[arg(long, default_value = "views", value_parser = lesson::taught)]

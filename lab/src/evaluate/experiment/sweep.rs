@@ -4,7 +4,7 @@
 use super::{
     Common,
     lesson::{Class, noisy},
-    look::{Look, Outcome, look},
+    look::{Outcome, ViewFigures, look},
     mixed, of_each,
 };
 use crate::evaluate::statistics::{Interval, bootstrap, quantile, wilson};
@@ -13,7 +13,7 @@ use sim::exhibit::{Conditions, Extent, exhibit};
 use std::collections::BTreeMap;
 use vision::{params::Params, random::Random};
 
-/// What is measured against tau, in the order of [`Look::ratios`].
+/// What is measured against tau, in the order of [`ViewFigures::ratios`].
 pub(crate) const DISTANCES: [&str; 3] = ["H^r", "C^r", "likeness"];
 /// Draws for one view before it is left out.
 const TRIES: u64 = 10;
@@ -67,7 +67,7 @@ pub(crate) struct Curve {
 }
 
 /// Views of one landmark, by value.
-type Views = Vec<Vec<Look>>;
+type Views = Vec<Vec<ViewFigures>>;
 
 /// Looks at every landmark `views` times at every value.
 pub(crate) fn sweep(
@@ -99,7 +99,7 @@ pub(crate) fn sweep(
                     Some(look(class, *id, &seen, (!common.detector).then_some(&corners), p))
                 })
             };
-            (0..views).filter_map(one).collect::<Vec<Look>>()
+            (0..views).filter_map(one).collect::<Vec<ViewFigures>>()
         };
         (0..axis.values.len()).map(at).collect::<Vec<_>>()
     });
@@ -134,20 +134,20 @@ impl Curve {
     }
 }
 
-fn at<'a>(landmarks: &[&'a Views], value: usize) -> Vec<&'a Look> {
+fn at<'a>(landmarks: &[&'a Views], value: usize) -> Vec<&'a ViewFigures> {
     landmarks.iter().filter_map(|l| l.get(value)).flatten().collect()
 }
 
-fn middle(looks: &[&Look], distance: usize, share: f64) -> f64 {
+fn middle(looks: &[&ViewFigures], distance: usize, share: f64) -> f64 {
     let mut ratios: Vec<f64> = looks.iter().map(|l| l.ratios[distance]).collect();
     quantile(&mut ratios, share).unwrap_or(f64::INFINITY)
 }
 
-fn right(looks: &[&Look]) -> f64 {
+fn right(looks: &[&ViewFigures]) -> f64 {
     looks.iter().filter(|l| l.outcome == Outcome::Right).count() as f64 / looks.len().max(1) as f64
 }
 
-fn point(value: f64, looks: &[&Look]) -> Point {
+fn point(value: f64, looks: &[&ViewFigures]) -> Point {
     let finite = |share: f64| [0, 1, 2].map(|d| Some(middle(looks, d, share)).filter(|x| x.is_finite()));
     let below =
         |d: usize| looks.iter().filter(|l| l.ratios[d] < 1.0).count() as f64 / looks.len().max(1) as f64;
@@ -182,8 +182,8 @@ pub(crate) fn cross(values: &[f64], heights: &[f64], level: f64) -> Option<f64> 
 mod tests {
     use super::*;
 
-    fn looks(ratio: f64, outcome: Outcome, count: usize) -> Vec<Look> {
-        vec![Look { ratios: [ratio, 0.5 * ratio, ratio], outcome }; count]
+    fn looks(ratio: f64, outcome: Outcome, count: usize) -> Vec<ViewFigures> {
+        vec![ViewFigures { ratios: [ratio, 0.5 * ratio, ratio], outcome }; count]
     }
 
     #[test]

@@ -11,9 +11,9 @@ use engine::{
     frame_analysis::{StageTimes, analyse_frame},
     frame_context::FrameContext,
     guided::{Guided, guided},
-    judging::{Seen, judged_frame},
+    judging::{LandmarkChecks, judged_frame},
     live::LiveHub,
-    motion::{Corrections, Moment as At, Motion},
+    motion::{Corrections, FrameStamp as At, MotionTracker},
     scan_job::ScanJob,
     snapshot::{MapSnapshot, Snapshots},
 };
@@ -120,7 +120,7 @@ pub(super) struct Way {
 /// The server's side: one robot in one map.
 struct Server {
     snapshots: Arc<Snapshots>,
-    motion: Motion,
+    motion: MotionTracker,
     robot: Name,
     camera: Name,
     /// The drive goes by its own time: here none passes.
@@ -134,7 +134,7 @@ impl Server {
         let snapshots = Arc::new(Snapshots::default());
         snapshots.publish(Arc::new(map.clone()));
         snapshots.set_robot(robot.as_ref(), Some(MAP));
-        let motion = Motion::new(snapshots.clone(), Arc::new(LiveHub::default()));
+        let motion = MotionTracker::new(snapshots.clone(), Arc::new(LiveHub::default()));
         Ok(Self { snapshots, motion, robot, camera, now: Instant::now() })
     }
 
@@ -175,7 +175,7 @@ impl Server {
         let guided = guide.map(|pose| guided(image, &view, &pose));
         let judged = judged_frame(&view, grounds, guided.as_ref().unwrap_or(&Guided::default()));
         self.motion.looked(&self.robot, &self.camera, at, &judged.fixes());
-        let found = |s: Seen| self.motion.judged(&self.robot, at, &s.grounds, &s.judged, &s.missed);
+        let found = |s: LandmarkChecks| self.motion.judged(&self.robot, at, &s.grounds, &s.judged, &s.missed);
         (judged.seen.map_or_else(Vec::new, found), guided)
     }
 

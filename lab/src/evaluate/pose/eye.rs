@@ -25,12 +25,12 @@ pub(super) enum Cameras {
 }
 
 /// One of them.
-pub(super) struct Eye {
+pub(super) struct StatedCamera {
     real: Intrinsics,
     stated: Intrinsics,
 }
 
-impl Eye {
+impl StatedCamera {
     /// A camera like `base` with errors of its own.
     pub(super) fn drawn(base: &Intrinsics, cameras: Cameras, random: &mut Random) -> Self {
         let usual = base.with_sigmas(IntrinsicsSigmas::usual(base.fx_px)).unwrap_or(*base);

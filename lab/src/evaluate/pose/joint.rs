@@ -1,7 +1,7 @@
 //! The robot's pose on the floor from one, two or three landmarks at once, and fused over drives (method 13.6, 15).
 
 use super::{
-    eye::{Cameras, Eye},
+    eye::{Cameras, StatedCamera},
     single::{Cost, cost_of},
 };
 use map::{
@@ -73,7 +73,7 @@ fn mounting_error(covariance: &Matrix6<f64>, random: &mut Random) -> Vector6<f64
 fn look(
     robot: &Pose2,
     hung: &LandmarkPlace,
-    (real, eye): (&CameraExtrinsics, &Eye),
+    (real, eye): (&CameraExtrinsics, &StatedCamera),
     random: &mut Random,
 ) -> Option<LandmarkPose> {
     let view = real.robot_from_camera.inverse() * robot.to_isometry3().inverse() * hung.map_from_landmark();
@@ -104,7 +104,7 @@ pub(super) fn joint(landmarks: usize, frames: usize, cameras: Cameras, seed: u64
         };
         let real = moved(&believed, &mounting_error(&believed.covariance, &mut random));
         let hung: Vec<LandmarkPlace> = places.iter().map(|p| drawn(p, &mut random)).collect();
-        let eye = Eye::drawn(&CAMERA, cameras, &mut random);
+        let eye = StatedCamera::drawn(&CAMERA, cameras, &mut random);
         let seen: Option<Vec<LandmarkPose>> =
             hung.iter().map(|h| look(&truth, h, (&real, &eye), &mut random)).collect();
         let Some(seen) = seen else { continue };
@@ -199,7 +199,7 @@ fn drive(cameras: Cameras, random: &mut Random) -> Drive {
     let mounted = |pan| CameraExtrinsics::new(pan_tilt(pan, 0.0, Vector3::new(0.1, 0.0, 1.3)));
     let Ok(base) = mounted(0.0) else { return made };
     let error = mounting_error(&base.covariance, random);
-    let eye = Eye::drawn(&CAMERA, cameras, random);
+    let eye = StatedCamera::drawn(&CAMERA, cameras, random);
     let params = FuseParams::default();
     let mut fuser = Fuser::new(params.clone());
     let (mut truth, mut odom) = (Pose2::new(1.0, 0.1, 0.0), Pose2::default());

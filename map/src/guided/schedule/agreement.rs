@@ -7,14 +7,18 @@ use crate::{
 };
 
 /// What a global fix says of the pose.
-pub(super) enum Judged<'a> {
+pub(super) enum PoseAgreement<'a> {
     Agrees(&'a Fix),
     /// All of its solutions.
     Contradicts(&'a [Fix]),
     Silent,
 }
 
-pub(super) fn judge<'a>(global: &'a FixResult, prior: &Pose2Covariance, p: &ScheduleParams) -> Judged<'a> {
+pub(super) fn judge<'a>(
+    global: &'a FixResult,
+    prior: &Pose2Covariance,
+    p: &ScheduleParams,
+) -> PoseAgreement<'a> {
     let distance2 = |fix: &Fix| prior.distance2(&fix.pose).unwrap_or(f64::INFINITY);
     let fixes = match global {
         FixResult::Fixed(fix) => std::slice::from_ref(&**fix),
@@ -23,13 +27,13 @@ pub(super) fn judge<'a>(global: &'a FixResult, prior: &Pose2Covariance, p: &Sche
     };
     let nearest = fixes.iter().map(distance2).fold(f64::INFINITY, f64::min);
     match fixes {
-        [] => Judged::Silent,
+        [] => PoseAgreement::Silent,
         // A fix that the prior disambiguated is not independent of the pose.
         [fix] if nearest <= p.support_chi2 && fix.decided_by != AmbiguityResolvedBy::Prior => {
-            Judged::Agrees(fix)
+            PoseAgreement::Agrees(fix)
         }
-        _ if nearest > p.contradict_chi2 => Judged::Contradicts(fixes),
-        _ => Judged::Silent,
+        _ if nearest > p.contradict_chi2 => PoseAgreement::Contradicts(fixes),
+        _ => PoseAgreement::Silent,
     }
 }
 

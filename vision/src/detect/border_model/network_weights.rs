@@ -1,12 +1,13 @@
-//! The weights of the two networks of the search, as learnt from rendered scenes and the open sets. Not for editing:
-//! this command writes the file, byte for byte on one machine, in the folder of the sets (see docs/EVALUATION.md),
-//! and `cargo fmt` puts it in form:
+//! The weights of the networks of the default detector. Not for editing: this command writes the file, byte for byte on
+//! one machine, and `cargo fmt` puts it in form:
 //!
 //! ```text
 //! waymark-lab train search museum-paintings exit-signs corridor museum-walk-estense corridor-loop-rtabmap \
 //!   corridor-multifloor doors-bbox signs-misc --pictures poster-textures-estense \
 //!   --weight museum-paintings=6 --weight scenes=0.5 --rust vision/src/detect/border_model/network_weights.rs
 //! ```
+//!
+//! Commit: not recorded. The sets are those of `data/SETS.toml`; whether their content was the same then is not recorded.
 #![allow(clippy::approx_constant, reason = "weights that happen to be near one")]
 
 use super::network::Network;

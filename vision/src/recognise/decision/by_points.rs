@@ -14,7 +14,7 @@ use crate::{
     model::{landmark_model::LandmarkModel, model_set::ModelSet},
     params::Params,
     points::{
-        search::{Found, search},
+        search::{LandmarkPoints, search},
         verify::PointEvidence,
     },
     recognise::{
@@ -48,7 +48,7 @@ pub(crate) fn by_points(
 ) -> Option<RecognitionResult> {
     let of = |index: usize| models.at_point_index(index).map_or(&[][..], |m| m.points.as_slice());
     let n = models.len();
-    let (found, rivals): (Vec<Found>, Vec<Found>) =
+    let (found, rivals): (Vec<LandmarkPoints>, Vec<LandmarkPoints>) =
         search(image, quad, models.points(), of).into_iter().partition(|f| f.model < n);
     let alarms: Vec<f64> = found.iter().map(|f| log10_false_alarms(&f.evidence, n)).collect();
     let accepted = alarms.iter().filter(|a| **a <= LOG10_EPSILON).count();
@@ -65,7 +65,7 @@ pub(crate) fn by_points(
     let others = found.iter().skip(1).chain(&rivals);
     let refusal =
         refusal(best, others, (model, &alignment), n, p).or((!is_located).then_some(MatchRefusal::Corners));
-    let of = |(i, f): (usize, &Found)| {
+    let of = |(i, f): (usize, &LandmarkPoints)| {
         let ratio = if alarms[i] < 0.0 { LOG10_EPSILON / alarms[i] } else { f64::INFINITY };
         let refused =
             if i == 0 { refusal } else { (alarms[i] > LOG10_EPSILON).then_some(MatchRefusal::Points) };
@@ -109,8 +109,8 @@ pub(crate) fn is_well_known(evidence: &PointEvidence) -> bool {
 /// Why `best`, which is `model` and was aligned with its icon, is not named among `landmarks` although its points are
 /// there, while points speak for `others`, too.
 fn refusal<'a>(
-    best: &Found,
-    mut others: impl Iterator<Item = &'a Found>,
+    best: &LandmarkPoints,
+    mut others: impl Iterator<Item = &'a LandmarkPoints>,
     (model, alignment): (&LandmarkModel, &IconAlignment),
     landmarks: usize,
     p: &Params,
@@ -120,8 +120,8 @@ fn refusal<'a>(
     }
     // Its share of the best one's exponent says how much was taught of a rival, not whether it hangs there: a look-alike
     // that was taught with fewer points agrees wherever it has any.
-    let alarms = |f: &Found| log10_false_alarms(&f.evidence, landmarks);
-    let is_rival = |f: &Found| {
+    let alarms = |f: &LandmarkPoints| log10_false_alarms(&f.evidence, landmarks);
+    let is_rival = |f: &LandmarkPoints| {
         let accepted = alarms(f) <= LOG10_EPSILON;
         alarms(f) / alarms(best) >= p.recognise.verdict.margin || (accepted && !is_contradicted(f))
     };
@@ -146,7 +146,7 @@ pub(crate) fn is_doubtful(evidence: &PointEvidence, alignment: &IconAlignment) -
 }
 
 /// A connected part of it shows something else by its points.
-fn is_contradicted(found: &Found) -> bool {
+fn is_contradicted(found: &LandmarkPoints) -> bool {
     is_doubtful(&found.evidence, &IconAlignment::NONE)
 }
 

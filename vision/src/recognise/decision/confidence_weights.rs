@@ -5,6 +5,8 @@
 //! waymark-lab train confidence --set calibrate --photographs museum-paintings --photographs poster-textures-estense \
 //!   --rust vision/src/recognise/decision/confidence_weights.rs
 //! ```
+//!
+//! Commit: not recorded.
 
 use super::measures::MEASURES;
 

@@ -1,0 +1,103 @@
+//! Claim: code and documents keep what of docs/STYLE.md a program can check.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+/// Folders with hand-written code.
+const CRATES: [&str; 10] =
+    ["vision", "map", "formats", "protos", "sim", "client", "engine", "server", "lab", "tests"];
+/// Longest file of code, in lines.
+const MAX_FILE_LINES: usize = 400;
+/// Files that a program writes.
+const GENERATED: [&str; 1] = ["protos/src/generated.rs"];
+/// Names that tell how a thing is looked at or believed, not what it is.
+const AMBIGUOUS: [&str; 15] = [
+    "Seen", "Look", "Looked", "Glance", "Glimpse", "Told", "Laid", "Grounds", "Found", "Left", "Eye", "Kept",
+    "Judged", "Doubles", "Sighted",
+];
+/// Longest cell of a table and longest line of prose, in characters.
+const MAX_CELL: usize = 300;
+const MAX_LINE: usize = 120;
+/// What belongs to docs/results, if anywhere.
+const HISTORY: [&str; 5] = ["not kept", "builds before", "the stop before", "asked were", "(issue"];
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+/// Every file below `folders` with this ending, and its text.
+fn files(folders: &[&str], ending: &str) -> Vec<(String, String)> {
+    let mut open: Vec<PathBuf> = folders.iter().map(|f| root().join(f)).collect();
+    let mut found = Vec::new();
+    while let Some(path) = open.pop() {
+        if path.is_dir() {
+            let entries = fs::read_dir(&path).expect("a folder");
+            open.extend(entries.map(|e| e.expect("an entry").path()).filter(|p| !p.ends_with("target")));
+        } else if path.extension().is_some_and(|e| e == ending) {
+            let name = path.strip_prefix(root()).expect("inside").display().to_string();
+            found.push((name, fs::read_to_string(&path).expect("UTF-8")));
+        }
+    }
+    found.sort();
+    found
+}
+
+/// The documents that state the present.
+fn documents() -> Vec<(String, String)> {
+    let mut all = files(&["docs", "README.md", "CONTRIBUTING.md", "SECURITY.md", "CHANGELOG.md"], "md");
+    all.retain(|(name, _)| !name.starts_with("docs/results"));
+    assert!(all.len() > 20, "only {} documents found", all.len());
+    all
+}
+
+#[test]
+fn no_file_of_code_is_too_long() {
+    let code = files(&CRATES, "rs");
+    assert!(code.len() > 300, "only {} files found", code.len());
+    let is_long = |(name, text): &&(String, String)| {
+        text.lines().count() > MAX_FILE_LINES && !GENERATED.contains(&name.as_str())
+    };
+    let long: Vec<_> = code.iter().filter(is_long).map(|(name, _)| name).collect();
+    assert!(long.is_empty(), "over {MAX_FILE_LINES} lines: {long:#?}");
+}
+
+#[test]
+fn types_are_named_after_what_they_are() {
+    let mut wrong = Vec::new();
+    for (name, text) in files(&CRATES, "rs") {
+        for line in text.lines().map(str::trim_start).filter(|l| l.starts_with("pub")) {
+            let mut words = line.split(|c: char| !c.is_alphanumeric() && c != '_').filter(|w| !w.is_empty());
+            let declares = words.any(|w| ["struct", "enum", "trait", "type"].contains(&w));
+            if let Some(word) = words.next().filter(|w| declares && AMBIGUOUS.contains(w)) {
+                wrong.push(format!("{name}: {word}"));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+#[test]
+fn documents_are_short_of_line_and_state_the_present() {
+    let mut wrong = Vec::new();
+    for (name, text) in documents() {
+        let mut is_code = false;
+        for (number, line) in (1..).zip(text.lines()) {
+            is_code ^= line.starts_with("```");
+            let at = format!("{name}:{number}");
+            if line.split('|').any(|cell| line.starts_with('|') && cell.chars().count() > MAX_CELL) {
+                wrong.push(format!("{at}: a cell over {MAX_CELL} characters"));
+            }
+            // Formulas, links and tables cannot be broken.
+            let is_whole = ['|', '$'].iter().any(|c| line.trim_start().starts_with(*c));
+            let is_prose = !is_code && !is_whole && !line.contains("](") && !line.contains("://");
+            if is_prose && line.chars().count() > MAX_LINE {
+                wrong.push(format!("{at}: over {MAX_LINE} characters"));
+            }
+            let lower = line.to_lowercase();
+            wrong.extend(HISTORY.iter().filter(|h| lower.contains(**h)).map(|h| format!("{at}: `{h}`")));
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
