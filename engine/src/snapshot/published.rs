@@ -81,12 +81,13 @@ impl Snapshots {
         self.announce(change);
     }
 
-    /// Replaces a map by the same version with more derived data; nothing if another version is current by now.
-    pub fn publish_derived(&self, map: &Arc<MapSnapshot>) {
+    /// Replaces `from` by `map`, the same version with more derived data; nothing if `from` is not current any more. A map
+    /// that was deleted and made again may have the same name and version: the version alone does not tell.
+    pub fn publish_derived(&self, from: &Arc<MapSnapshot>, map: &Arc<MapSnapshot>) {
         self.world.rcu(|world| {
             let mut world = World::clone(world);
             if let Some(current) = world.maps.get_mut(&map.name)
-                && current.version == map.version
+                && Arc::ptr_eq(current, from)
             {
                 *current = map.clone();
             }
@@ -152,7 +153,7 @@ impl Snapshots {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{super::map_snapshot::Pending, *};
 
     fn map(name: &str, version: u64) -> Arc<MapSnapshot> {
         Arc::new(MapSnapshot::empty(name, version))
@@ -170,6 +171,22 @@ mod tests {
         assert!(snapshots.get("a").is_none());
         let versions: Vec<_> = std::iter::from_fn(|| changes.try_recv().ok()).map(|c| c.version).collect();
         assert_eq!(versions, [Some(1), Some(2), None]);
+    }
+
+    #[test]
+    fn derived_data_goes_to_the_version_that_it_was_derived_from() {
+        let snapshots = Snapshots::default();
+        let first = map("a", 1);
+        snapshots.publish(first.clone());
+        let derived = Arc::new(MapSnapshot { pending: Pending::default(), ..MapSnapshot::clone(&first) });
+        snapshots.publish_derived(&first, &derived);
+        assert!(Arc::ptr_eq(&snapshots.get("a").unwrap(), &derived));
+        // Deleted and made again: another map of the same name and version.
+        snapshots.remove_map("a");
+        let again = map("a", 1);
+        snapshots.publish(again.clone());
+        snapshots.publish_derived(&derived, &first);
+        assert!(Arc::ptr_eq(&snapshots.get("a").unwrap(), &again));
     }
 
     #[test]

@@ -26,42 +26,57 @@ pub(super) async fn run(
 ) {
     let pulse = vitals.begin(PART);
     let mut last = Last::new();
+    // Versions of which something could not be derived: not tried again, and still pending, so nothing rests on it.
+    let mut failed: BTreeMap<String, u64> = BTreeMap::new();
     loop {
         tokio::select! {
             _ = stopping.wait_for(|stop| *stop) => break,
             () = wake.notified() => {}
         }
-        while let Some(map) = snapshots.all().into_iter().find(|map| map.pending.any()) {
+        let is_open = |map: &MapSnapshot, failed: &BTreeMap<String, u64>| {
+            map.pending.any() && failed.get(&map.name) != Some(&map.version)
+        };
+        while let Some(map) = snapshots.all().into_iter().find(|map| is_open(map, &failed)) {
             if *stopping.borrow() {
                 break;
             }
             let before = last.remove(&map.name);
-            let done = Arc::new(derived(map, before, &vitals).await);
-            snapshots.publish_derived(&done);
+            let done = Arc::new(derived(map.clone(), before, &vitals).await);
+            if done.pending == map.pending {
+                failed.insert(map.name.clone(), map.version);
+            }
+            snapshots.publish_derived(&map, &done);
             last.insert(done.name.clone(), done);
         }
         last.retain(|name, _| snapshots.get(name).is_some());
+        failed.retain(|name, _| snapshots.get(name).is_some());
     }
     pulse.end();
 }
 
-/// `map` with one more kind of derived data. What fails is left out, and the map is served without.
+/// `map` with one more kind of derived data. Areas that fail are left out. Look-alike classes that fail stay pending: while
+/// nobody knows what looks alike, a known pose names nothing.
 async fn derived(map: Arc<MapSnapshot>, before: Option<Arc<MapSnapshot>>, vitals: &Vitals) -> MapSnapshot {
     let mut next = MapSnapshot::clone(&map);
     let panics = vitals.panics();
     if map.pending.visibility {
         let made =
             tokio::task::spawn_blocking(move || visibility_areas::areas(&map, before.as_deref())).await;
-        let made = panics.joined(Edge::Publication, "visibility areas", "there are none", made);
-        next.visibility = made.unwrap_or_default();
+        let made =
+            panics.joined(Edge::Publication, "visibility areas", "those that are missing stay so", made);
+        if let Ok(areas) = made {
+            next.visibility = areas;
+        }
         next.pending.visibility = false;
         return next;
     }
     let made = tokio::task::spawn_blocking(move || look_alikes(&map, before.as_deref())).await;
-    let follows = "lost robots are found by unique landmarks only";
+    let follows = "lost robots are found by unique landmarks only, and a pose names none";
     let made = panics.joined(Edge::Publication, "look-alike classes", follows, made);
-    next.look_alikes = made.unwrap_or_default();
-    next.pending.look_alikes = false;
+    if let Ok(classes) = made {
+        next.look_alikes = classes;
+        next.pending.look_alikes = false;
+    }
     next
 }
 
