@@ -1,15 +1,8 @@
 //! The pose graph: relative poses with information between keyframes, and the poses that fit them best (sparse
 //! nonlinear least squares). In: poses and constraints. Out: poses, chi2 of every constraint, covariances.
 
+use super::normal_equations::{BlockMatrix, BlockPattern, NotPositiveDefinite};
 use crate::pose2::{Pose2, wrap_rad};
-use faer::{
-    MatMut, Side,
-    prelude::Solve as _,
-    sparse::{
-        SparseColMat, Triplet,
-        linalg::solvers::{Llt, SymbolicLlt},
-    },
-};
 use nalgebra::{Matrix3, Vector3};
 
 /// Most poses in a graph.
@@ -105,59 +98,47 @@ fn check(poses: &[Pose2], edges: &[PoseConstraint]) -> Result<(), GraphError> {
     edges.iter().position(|e| !good(e)).map_or(Ok(()), |i| Err(GraphError::Constraint(i)))
 }
 
-/// Sparse normal equations; the first pose is fixed.
-struct Normal {
-    lower: SparseColMat<usize, f64>,
-    gradient: Vec<f64>,
+impl From<NotPositiveDefinite> for GraphError {
+    fn from(_: NotPositiveDefinite) -> Self {
+        Self::Loose
+    }
 }
 
-fn normal(poses: &[Pose2], edges: &[PoseConstraint], damping: f64) -> Result<Normal, GraphError> {
-    let n = 3 * (poses.len() - 1);
-    let mut gradient = vec![0.0; n];
-    let mut triplets = Vec::with_capacity(24 * edges.len() + n);
-    let mut diagonal = vec![0.0; n];
+/// Which blocks the constraints fill; the first pose is fixed and has no row.
+fn pattern(poses: &[Pose2], edges: &[PoseConstraint]) -> BlockPattern {
+    let pairs = edges.iter().filter_map(|e| Some((e.from.checked_sub(1)?, e.to.checked_sub(1)?)));
+    BlockPattern::new(poses.len() - 1, pairs)
+}
+
+/// The normal equations at these poses: matrix and gradient.
+fn normal<'a>(
+    pattern: &'a BlockPattern,
+    poses: &[Pose2],
+    edges: &[PoseConstraint],
+    damping: f64,
+) -> (BlockMatrix<'a>, Vec<f64>) {
+    let mut gradient = vec![0.0; 3 * (poses.len() - 1)];
+    let mut matrix = pattern.zeros();
     for edge in edges {
         let (a, b) = (&poses[edge.from], &poses[edge.to]);
         let e = error(edge, a, b);
         let information = edge.information * weight(edge, e.dot(&(edge.information * e)));
         let (ja, jb) = jacobians(a, b);
-        for (p, jp) in [(edge.from, &ja), (edge.to, &jb)] {
-            let Some(row) = p.checked_sub(1) else { continue };
-            let g = jp.transpose() * information * e;
+        let ends = [(edge.from.checked_sub(1), ja), (edge.to.checked_sub(1), jb)];
+        for (row, j) in &ends {
+            let Some(row) = *row else { continue };
+            let g = j.transpose() * information * e;
             for r in 0..3 {
                 gradient[3 * row + r] += g[r];
             }
-            for (q, jq) in [(edge.from, &ja), (edge.to, &jb)] {
-                // The lower triangle, by columns.
-                let Some(column) = q.checked_sub(1) else { continue };
-                if column > row {
-                    continue;
-                }
-                let block = jp.transpose() * information * jq;
-                for r in 0..3 {
-                    for c in 0..3 {
-                        let (r_at, c_at) = (3 * row + r, 3 * column + c);
-                        if r_at == c_at {
-                            diagonal[r_at] += block[(r, c)];
-                        } else if r_at > c_at {
-                            triplets.push(Triplet { row: r_at, col: c_at, val: block[(r, c)] });
-                        }
-                    }
-                }
-            }
+            matrix.add(row, row, &(j.transpose() * information * j));
+        }
+        if let [(Some(from), ja), (Some(to), jb)] = &ends {
+            matrix.add(*to, *from, &(jb.transpose() * information * ja));
         }
     }
-    for (i, d) in diagonal.iter().enumerate() {
-        triplets.push(Triplet { row: i, col: i, val: d * (1.0 + damping) + 1e-12 });
-    }
-    // An invalid matrix counts as one that cannot be factorised.
-    let lower = SparseColMat::try_new_from_triplets(n, n, &triplets).or(Err(GraphError::Loose))?;
-    Ok(Normal { lower, gradient })
-}
-
-fn factor(normal: &Normal, symbolic: &SymbolicLlt<usize>) -> Result<Llt<usize, f64>, GraphError> {
-    Llt::try_new_with_symbolic(symbolic.clone(), normal.lower.as_ref(), Side::Lower)
-        .or(Err(GraphError::Loose))
+    matrix.change_diagonal(|d| d * (1.0 + damping) + 1e-12);
+    (matrix, gradient)
 }
 
 /// Optimises all poses but the first (Levenberg-Marquardt). Gives the final cost.
@@ -168,17 +149,11 @@ pub fn optimise(poses: &mut [Pose2], edges: &[PoseConstraint]) -> Result<f64, Gr
     }
     let mut now = cost(edges, poses);
     let mut damping = 1e-6;
-    let mut symbolic = None;
+    let pattern = pattern(poses, edges);
     for _ in 0..MAX_ITERATIONS {
-        let equations = normal(poses, edges, damping)?;
-        if symbolic.is_none() {
-            let made = SymbolicLlt::try_new(equations.lower.symbolic(), Side::Lower);
-            symbolic = Some(made.or(Err(GraphError::Loose))?);
-        }
-        let Some(symbolic) = &symbolic else { break };
-        let mut step: Vec<f64> = equations.gradient.iter().map(|g| -g).collect();
-        let rows = step.len();
-        factor(&equations, symbolic)?.solve_in_place(MatMut::from_column_major_slice_mut(&mut step, rows, 1));
+        let (matrix, gradient) = normal(&pattern, poses, edges, damping);
+        let downhill: Vec<f64> = gradient.iter().map(|g| -g).collect();
+        let step = matrix.factor()?.solve(&downhill);
         if step.iter().any(|v| !v.is_finite()) {
             return Err(GraphError::Loose);
         }
@@ -219,20 +194,14 @@ pub fn covariances(
     if poses.len() < 2 {
         return Ok(vec![Matrix3::zeros(); at.len()]);
     }
-    let equations = normal(poses, edges, 0.0)?;
-    let symbolic =
-        SymbolicLlt::try_new(equations.lower.symbolic(), Side::Lower).or(Err(GraphError::Loose))?;
-    let factor = factor(&equations, &symbolic)?;
-    let n = equations.gradient.len();
-    let one = |&i: &usize| {
-        let Some(k) = i.checked_sub(1).filter(|k| 3 * k < n) else { return Matrix3::zeros() };
-        let mut columns = vec![0.0; 3 * n];
-        for c in 0..3 {
-            columns[c * n + 3 * k + c] = 1.0;
+    let pattern = pattern(poses, edges);
+    let factor = normal(&pattern, poses, edges, 0.0).0.factor()?;
+    let one = |&i: &usize| match i.checked_sub(1).filter(|k| *k < poses.len() - 1) {
+        Some(k) => {
+            let made = factor.inverse_block(k);
+            0.5 * (made + made.transpose())
         }
-        factor.solve_in_place(MatMut::from_column_major_slice_mut(&mut columns, n, 3));
-        let made = Matrix3::from_fn(|r, c| columns[c * n + 3 * k + r]);
-        0.5 * (made + made.transpose())
+        None => Matrix3::zeros(),
     };
     Ok(at.iter().map(one).collect())
 }
