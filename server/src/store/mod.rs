@@ -5,6 +5,7 @@
 //! one listener ([`on_commit`]), which the store knows by its trait alone.
 
 mod error;
+mod migrations;
 mod open;
 mod writer;
 mod statements;

@@ -11,7 +11,7 @@ use std::{
     time::Duration,
 };
 
-use super::StoreError;
+use super::{StoreError, migrations};
 
 /// First version without the write-ahead-log corruption of 3.7.0 to 3.51.2 (sqlite.org/wal.html#walresetbug).
 pub(crate) const SQLITE_MIN: (u32, u32, u32) = (3, 51, 3);
@@ -101,7 +101,7 @@ pub(super) async fn open(data: &Path) -> Result<Opened, OpenError> {
     check_version(&mut writer).await?;
     check_pragmas(&mut writer).await?;
     check_integrity(&mut writer).await?;
-    sqlx::migrate!("../migrations").run(&mut writer).await.map_err(OpenError::Migrate)?;
+    migrations::migrator().run(&mut writer).await.map_err(OpenError::Migrate)?;
     let reads = SqlitePoolOptions::new()
         .max_connections(READERS)
         .acquire_timeout(BUSY_TIMEOUT)
