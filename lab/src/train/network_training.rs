@@ -6,7 +6,10 @@
 //! of every example whether it is one (logistic). All data at every step, Adam, weights kept small by a ridge.
 
 use vision::{
-    detect::border_model::network::{MAX_HIDDEN, Network},
+    detect::border_model::{
+        feature_constants::FeatureDigest,
+        network::{MAX_HIDDEN, Network},
+    },
     random::Random,
 };
 
@@ -274,6 +277,7 @@ impl Weights {
         let row = |k: usize| &self.values[self.unit(k)..][..self.width + 2];
         let units = || (0..self.hidden).map(row);
         Network {
+            features: FeatureDigest::OF_THIS_PROGRAM,
             mean,
             deviation,
             linear: self.values[..self.width].to_vec(),

@@ -76,6 +76,7 @@ impl PlattScaling {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use vision::detect::border_model::feature_constants::FeatureDigest;
     use vision::random::Random;
 
     fn example(is_one: bool) -> LabelledExample {
@@ -109,6 +110,7 @@ mod tests {
     #[test]
     fn the_network_has_the_calibrated_output() {
         let network = Network {
+            features: FeatureDigest::OF_THIS_PROGRAM,
             mean: vec![0.5],
             deviation: vec![2.0],
             linear: vec![1.5],

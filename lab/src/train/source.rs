@@ -2,7 +2,7 @@
 
 use super::provenance::Provenance;
 use std::fmt::Write as _;
-use vision::detect::border_model::network::Network;
+use vision::detect::border_model::{feature_constants::FeatureDigest, network::Network};
 
 /// Longest line.
 const WIDTH: usize = 108;
@@ -28,8 +28,18 @@ pub(super) fn source(models: &[(&str, Network); 2], from: &Provenance) -> String
     text.push_str(&from.lines());
     text.push_str(
         "#![allow(clippy::approx_constant, reason = \"weights that happen to be near one\")]\n\n\
-         use super::network::Network;\nuse std::sync::LazyLock;\n",
+         use super::{feature_constants::FeatureDigest, network::Network};\nuse std::sync::LazyLock;\n\n\
+         /// The measurements that the weights were fitted to.\n",
     );
+    // Writing to a String cannot fail.
+    writeln!(
+        text,
+        "const FEATURES: FeatureDigest = FeatureDigest(0x{});\nconst _: () = assert!(\n    \
+         FEATURES.is(FeatureDigest::OF_THIS_PROGRAM),\n    \
+         \"a number of the measurements changed: train the networks again\"\n);",
+        grouped(models[0].1.features)
+    )
+    .ok();
     for (name, net) in models {
         let lists = lists(net);
         let upper = name.to_uppercase();
@@ -39,7 +49,9 @@ pub(super) fn source(models: &[(&str, Network); 2], from: &Provenance) -> String
             "\n/// Weighs the measurements of `{name}`.\npub(crate) fn {name}() -> &'static Network {{\n"
         )
         .ok();
-        text.push_str("    static MODEL: LazyLock<Network> = LazyLock::new(|| Network {\n");
+        text.push_str(
+            "    static MODEL: LazyLock<Network> = LazyLock::new(|| Network {\n        features: FEATURES,\n",
+        );
         for (list, _) in lists {
             writeln!(text, "        {list}: {upper}_{}.to_vec(),", list.to_uppercase()).ok();
         }
@@ -65,6 +77,12 @@ pub(super) fn source(models: &[(&str, Network); 2], from: &Provenance) -> String
     text
 }
 
+/// Hexadecimal digits in groups of four.
+fn grouped(digest: FeatureDigest) -> String {
+    let digits = digest.to_string();
+    [0, 4, 8, 12].map(|i| &digits[i..i + 4]).join("_")
+}
+
 /// Names and values in the order of the fields.
 fn lists(net: &Network) -> [(&'static str, &[f64]); 6] {
     [
@@ -84,6 +102,7 @@ mod tests {
     #[test]
     fn every_weight_is_written_as_it_is_used() {
         let net = rounded(Network {
+            features: FeatureDigest::OF_THIS_PROGRAM,
             mean: vec![0.123_449, -0.000_01],
             deviation: vec![1e-9, 2.0],
             linear: vec![3.5; 2],
@@ -99,6 +118,8 @@ mod tests {
             "const SIDE_MODEL_MEAN: [f64; 2] = [\n    0.1234, 0.0,\n];",
             "const THING_MODEL_DEVIATION: [f64; 2] = [\n    0.0001, 2.0,\n];",
             "bias: 0.5185,",
+            "        features: FEATURES,\n",
+            &format!("FeatureDigest(0x{});", grouped(FeatureDigest::OF_THIS_PROGRAM)),
             "pub(crate) fn thing_model() -> &'static Network {",
         ] {
             assert!(text.contains(part), "{part} not in\n{text}");

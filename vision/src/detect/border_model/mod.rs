@@ -1,5 +1,6 @@
 //! Small networks that move the sides of a quad to its border and tell whether it is an object.
 
+pub mod feature_constants;
 pub mod network;
 pub(crate) mod network_weights;
 pub(crate) mod side_lines;

@@ -1,10 +1,8 @@
 //! A small network: one layer of hidden units beside a linear path, one output. Measurements in, a number out.
 //! `choose_sides` and `quad_classifier` use it. Training is in the laboratory (`lab/src/train`).
 
+use super::feature_constants::{CLIP_DEVIATIONS, FeatureDigest};
 use serde::{Deserialize, Serialize};
-
-/// Measurements further from their mean than this many standard deviations count as this far.
-const CLIP: f64 = 4.0;
 
 /// The weights. With `n` measurements and `h` hidden units: `output = bias + linear . x + hidden_out .
 /// tanh(hidden_bias + hidden_in x)`, with `x` the measurements scaled by `mean` and `deviation` and clipped to 4
@@ -12,6 +10,8 @@ const CLIP: f64 = 4.0;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Network {
+    /// The measurements that the weights were fitted to.
+    pub features: FeatureDigest,
     /// Mean of each measurement, `n`.
     pub mean: Vec<f64>,
     /// Standard deviation of each measurement, `n`.
@@ -47,14 +47,21 @@ pub enum NetworkError {
     /// A weight is not finite, or a deviation is not above 0.
     #[error("{0} has a number that is out of range")]
     Range(&'static str),
+    /// The weights were fitted to other measurements than this program makes.
+    #[error("features {0}: fitted to other measurements than those of this program ({program}); train it again",
+        program = FeatureDigest::OF_THIS_PROGRAM)]
+    Features(FeatureDigest),
 }
 
 /// Most hidden units.
 pub const MAX_HIDDEN: usize = 64;
 
 impl Network {
-    /// Checks that this is a network for `n` measurements.
+    /// Checks that this is a network for `n` measurements of those that this program makes.
     pub fn check(&self, n: usize) -> Result<(), NetworkError> {
+        if self.features != FeatureDigest::OF_THIS_PROGRAM {
+            return Err(NetworkError::Features(self.features));
+        }
         let h = self.hidden_bias.len();
         if h > MAX_HIDDEN {
             return Err(NetworkError::Hidden(h));
@@ -86,7 +93,7 @@ impl Network {
         let scaled: Vec<f64> = measurements
             .iter()
             .zip(self.mean.iter().zip(&self.deviation))
-            .map(|(x, (mean, deviation))| ((x - mean) / deviation).clamp(-CLIP, CLIP))
+            .map(|(x, (mean, deviation))| ((x - mean) / deviation).clamp(-CLIP_DEVIATIONS, CLIP_DEVIATIONS))
             .collect();
         let dot = |weights: &[f64]| dot(&scaled, weights);
         let units = self
@@ -118,6 +125,7 @@ mod tests {
 
     fn network() -> Network {
         Network {
+            features: FeatureDigest::OF_THIS_PROGRAM,
             mean: vec![1.0, 0.0],
             deviation: vec![2.0, 1.0],
             linear: vec![0.5, -1.0],
@@ -142,6 +150,8 @@ mod tests {
     #[test]
     fn what_is_no_network_is_refused() {
         assert!(network().check(3).is_err());
+        let other = FeatureDigest(1);
+        assert_eq!(Network { features: other, ..network() }.check(2), Err(NetworkError::Features(other)));
         assert_eq!(Network { bias: f64::NAN, ..network() }.check(2), Err(NetworkError::Range("bias")));
         assert!(Network { deviation: vec![1.0, 0.0], ..network() }.check(2).is_err());
         let h = MAX_HIDDEN + 1;

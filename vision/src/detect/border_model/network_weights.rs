@@ -10,12 +10,20 @@
 //! Commit: not recorded. The sets are those of `data/SETS.toml`; whether their content was the same then is not recorded.
 #![allow(clippy::approx_constant, reason = "weights that happen to be near one")]
 
-use super::network::Network;
+use super::{feature_constants::FeatureDigest, network::Network};
 use std::sync::LazyLock;
+
+/// The measurements that the weights were fitted to.
+const FEATURES: FeatureDigest = FeatureDigest(0x4624_1d79_4619_1c5b);
+const _: () = assert!(
+    FEATURES.is(FeatureDigest::OF_THIS_PROGRAM),
+    "a number of the measurements changed: train the networks again",
+);
 
 /// Weighs the measurements of `side_model`.
 pub(crate) fn side_model() -> &'static Network {
     static MODEL: LazyLock<Network> = LazyLock::new(|| Network {
+        features: FEATURES,
         mean: SIDE_MODEL_MEAN.to_vec(),
         deviation: SIDE_MODEL_DEVIATION.to_vec(),
         linear: SIDE_MODEL_LINEAR.to_vec(),
@@ -30,6 +38,7 @@ pub(crate) fn side_model() -> &'static Network {
 /// Weighs the measurements of `thing_model`.
 pub(crate) fn thing_model() -> &'static Network {
     static MODEL: LazyLock<Network> = LazyLock::new(|| Network {
+        features: FEATURES,
         mean: THING_MODEL_MEAN.to_vec(),
         deviation: THING_MODEL_DEVIATION.to_vec(),
         linear: THING_MODEL_LINEAR.to_vec(),

@@ -80,7 +80,7 @@ pub fn probability(model: &Network, features: &[f64; THING_FEATURES]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::detect::border_model::side_features::LogGreyLevels;
+    use crate::detect::border_model::{feature_constants::FeatureDigest, side_features::LogGreyLevels};
 
     const SQUARE: [[f64; 2]; 4] = [[10.0, 10.0], [110.0, 10.0], [110.0, 110.0], [10.0, 110.0]];
 
@@ -140,6 +140,7 @@ mod tests {
     #[test]
     fn odds_of_three_to_one_are_three_quarters() {
         let model = Network {
+            features: FeatureDigest::OF_THIS_PROGRAM,
             mean: vec![0.0; THING_FEATURES],
             deviation: vec![1.0; THING_FEATURES],
             linear: vec![0.0; THING_FEATURES],
@@ -153,9 +154,13 @@ mod tests {
 
     #[test]
     fn a_network_for_other_measurements_is_refused_by_name() {
-        let wrong = r#"{"thing_model": {"mean": [0], "deviation": [1], "linear": [0], "hidden_in": [],
+        let wrong = r#"{"thing_model": {"features": "DIGEST", "mean": [0], "deviation": [1], "linear": [0], "hidden_in": [],
             "hidden_bias": [], "hidden_out": [], "bias": 0}}"#;
-        let error = serde_json::from_str::<crate::detect::params::QuadParams>(wrong).unwrap_err().to_string();
+        let of_this_program = wrong.replace("DIGEST", &FeatureDigest::OF_THIS_PROGRAM.to_string());
+        let read = |text: &str| serde_json::from_str::<crate::detect::params::QuadParams>(text);
+        let error = read(&of_this_program).unwrap_err().to_string();
         assert!(error.contains("mean has 1 numbers, 94 expected"), "{error}");
+        let error = read(&wrong.replace("DIGEST", "0123456789abcdef")).unwrap_err().to_string();
+        assert!(error.contains("features 0123456789abcdef: fitted to other measurements"), "{error}");
     }
 }

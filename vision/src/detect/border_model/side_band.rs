@@ -2,7 +2,13 @@
 //! what is measured along each line. `side_lines` finds the lines, `choose_sides` picks the border.
 
 use crate::detect::{
-    border_model::side_lines::{self, Peak, SideLine},
+    border_model::{
+        feature_constants::{
+            CORNER_SHARE, MAX_BAND_SAMPLES, MIN_BAND_SAMPLES, MIN_SIDE_PX, MIN_STEP, PX_PER_SAMPLE, REACH_PX,
+            REACH_SHARE, STEPS_OUTSIDE,
+        },
+        side_lines::{self, Peak, SideLine},
+    },
     edge_support::{
         fixed_point::Fixed,
         gradients::{Gradients, MIN_COS},
@@ -10,21 +16,6 @@ use crate::detect::{
 };
 use fearless_simd::{Level, dispatch};
 use nalgebra::{Point2, Vector2};
-
-/// Most samples along a side: a line keeps which of them it has in a 64-bit word.
-pub const MAX_BAND_SAMPLES: usize = 48;
-/// Fewest samples along a side.
-const MIN_BAND_SAMPLES: usize = 12;
-/// Half the width of a band, as a share of the quad's extent across the side.
-const REACH_SHARE: f64 = 0.25;
-/// Half the width of a band, smallest and largest.
-const REACH_PX: (f64, f64) = (6.0, 128.0);
-/// Share of the side left out at both ends: near a corner the other side's gradient mixes in.
-const CORNER_SHARE: f64 = 0.06;
-/// Smallest step height of an edge, grey levels.
-pub const MIN_STEP: f32 = 4.0;
-/// Smallest step heights of the edges that [`AlongLine::edges_outside`] counts.
-const STEPS_OUTSIDE: [f32; 2] = [MIN_STEP, 2.0 * MIN_STEP];
 
 /// A number for each row; rows that a band does not have are 0.
 type Rows = [i32; MAX_BAND_SAMPLES];
@@ -58,7 +49,7 @@ impl Band {
     /// across the side, and finds its lines. None for a side shorter than 4 px.
     pub fn new(g: &Gradients, from: &Point2<f64>, to: &Point2<f64>, extent_px: f64) -> Option<Self> {
         let length_px = (to - from).norm();
-        if !(length_px >= 4.0 && length_px.is_finite() && extent_px.is_finite()) {
+        if !(length_px >= MIN_SIDE_PX && length_px.is_finite() && extent_px.is_finite()) {
             return None;
         }
         let direction = (to - from) / length_px;
@@ -70,7 +61,7 @@ impl Band {
             length_px,
             first_px: -reach,
             columns: (2 * reach + 1) as usize,
-            rows: ((length_px / 2.0) as usize).clamp(MIN_BAND_SAMPLES, MAX_BAND_SAMPLES),
+            rows: ((length_px / PX_PER_SAMPLE) as usize).clamp(MIN_BAND_SAMPLES, MAX_BAND_SAMPLES),
             inside: [[0; MAX_BAND_SAMPLES]; 2],
             step: Vec::new(),
             level: Vec::new(),

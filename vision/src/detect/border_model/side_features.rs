@@ -3,7 +3,13 @@
 
 use crate::detect::{
     border_model::{
-        side_band::{AlongLine, Band, MIN_STEP},
+        feature_constants::{
+            BEYOND_PX, BLUR_OFFSET, BLUR_PX, BROAD_STRIP, CORNER_GAP_PX, DIFFERENCE_SCALE, GREY_OFFSET,
+            INWARD_SECTION, LINES_SCALE, MIN_SHADOW_PX, MIN_STEP, MIN_STRIP_PIXELS, MIN_USUAL_STEP,
+            NEAR_STRIP_PX, OTHER_LINE_PX, OUTWARD_PX, ROUGH_STRIP_PX, SECTION_SAMPLES, SHADOW_RATIO,
+            SHADOW_WALL_PX, STEP_OFFSET, STEP_SHARE, USUAL_SAMPLES, USUAL_SHARES, WALL_STRIP,
+        },
+        side_band::{AlongLine, Band},
         side_lines::SideLine,
     },
     edge_support::{fixed_point::Fixed, gradients::Gradients},
@@ -108,10 +114,10 @@ impl<'a> Sides<'a> {
         let neighbour = |ends: [Point2<f64>; 2], shares: [f64; 2]| {
             let along = (ends[1] - ends[0]).try_normalize(1e-9)?;
             let [p, q] = shares.map(|share| ends[0] + (ends[1] - ends[0]) * share);
-            Some(Neighbour { ends, along, usual: step_along(self.g, &p, &q, 24).0 })
+            Some(Neighbour { ends, along, usual: step_along(self.g, &p, &q, USUAL_SAMPLES).0 })
         };
         std::array::from_fn(|i| {
-            [neighbour(ends[(i + 3) % 4], [0.2, 0.75]), neighbour(ends[(i + 1) % 4], [0.25, 0.8])]
+            [neighbour(ends[(i + 3) % 4], USUAL_SHARES[0]), neighbour(ends[(i + 1) % 4], USUAL_SHARES[1])]
         })
     }
 
@@ -124,37 +130,38 @@ impl<'a> Sides<'a> {
     pub(crate) fn band_features(&self, side: usize, line: usize) -> ([f64; BAND_FEATURES], LogGreyLevels) {
         let Some(band) = &self.bands[side] else { return ([0.0; BAND_FEATURES], LogGreyLevels::default()) };
         let (c, extent) = (band.lines[line], self.extent_px[side]);
-        let broad = (0.12 * extent).max(8.0);
+        let broad = BROAD_STRIP.of(extent);
         let along = band.along_line(&c);
         let rough = |range| roughness(&along, range);
-        let inside = level(&along, (-5.0, -1.5));
-        let outside = level(&along, (1.5, 5.0)).or(inside).unwrap_or(0.0);
-        let wall = level(&along, ((0.08 * extent).max(6.0), (0.2 * extent).max(12.0))).unwrap_or(outside);
+        let (near, far) = NEAR_STRIP_PX;
+        let inside = level(&along, (-far, -near));
+        let outside = level(&along, NEAR_STRIP_PX).or(inside).unwrap_or(0.0);
+        let wall = level(&along, (WALL_STRIP.0.of(extent), WALL_STRIP.1.of(extent))).unwrap_or(outside);
         let inside = inside.unwrap_or(outside);
-        let darker = |grey: f64| ((grey + 8.0) / (wall + 8.0)).ln();
+        let darker = |grey: f64| ((grey + GREY_OFFSET) / (wall + GREY_OFFSET)).ln();
         let (out_ratio, in_ratio) = (darker(outside), darker(inside));
-        let outer = || band.lines.iter().filter(|l| l.offset_px > c.offset_px + 1.5);
-        let inner = || band.lines.iter().filter(|l| l.offset_px < c.offset_px - 1.5);
-        let weight = |l: &SideLine| l.support * (l.step + 2.0).ln();
+        let outer = || band.lines.iter().filter(|l| l.offset_px > c.offset_px + OTHER_LINE_PX);
+        let inner = || band.lines.iter().filter(|l| l.offset_px < c.offset_px - OTHER_LINE_PX);
+        let weight = |l: &SideLine| l.support * (l.step + STEP_OFFSET).ln();
         let most = |a: f64, b: f64| a.max(b);
         let next_in = inner().max_by(|a, b| a.offset_px.total_cmp(&b.offset_px));
         let next_out = outer().min_by(|a, b| a.offset_px.total_cmp(&b.offset_px));
-        let [weak, stronger] = along.edges_outside(2.5);
-        let log = |grey: f64| (grey + 8.0).ln();
+        let [weak, stronger] = along.edges_outside(BEYOND_PX);
+        let log = |grey: f64| (grey + GREY_OFFSET).ln();
         let tones = LogGreyLevels {
             wall: log(wall),
             outside: log(outside),
             inside: log(inside),
-            step: c.sign * (c.step + 2.0).ln(),
+            step: c.sign * (c.step + STEP_OFFSET).ln(),
         };
         let features = [
             c.support,
             c.sign.abs(),
-            (c.step + 2.0).ln(),
-            rough((2.5, 6.0)),
-            rough((2.5, broad)),
-            rough((-6.0, -2.5)),
-            rough((-broad, -2.5)),
+            (c.step + STEP_OFFSET).ln(),
+            rough(ROUGH_STRIP_PX),
+            rough((BEYOND_PX, broad)),
+            rough((-ROUGH_STRIP_PX.1, -ROUGH_STRIP_PX.0)),
+            rough((-broad, -BEYOND_PX)),
             out_ratio,
             out_ratio.abs(),
             in_ratio,
@@ -163,7 +170,7 @@ impl<'a> Sides<'a> {
             outer().map(weight).fold(0.0, most),
             inner().map(weight).fold(0.0, most),
             outer().map(|l| l.support).fold(0.0, most),
-            outer().count() as f64 / 5.0,
+            outer().count() as f64 / LINES_SCALE,
             weak,
             stronger,
             next_in.map_or(0.0, |i| shadow(&along, c.offset_px - i.offset_px)),
@@ -183,21 +190,32 @@ impl<'a> Sides<'a> {
         met: &[Option<Neighbour>; 2],
     ) -> [f64; CORNER_FEATURES] {
         let own = self.line_ends(side, line);
-        let section = (0.07 * self.extent_px[side]).max(6.0);
+        let section = INWARD_SECTION.of(self.extent_px[side]);
         let look = |neighbour: &Option<Neighbour>, before: bool| {
             let Neighbour { ends, along, usual } = (*neighbour)?;
             let corner = meet(&own, &ends)?;
             // Along the neighbour away from the corner, into the quad; both ways it is walked as its side is.
             let between = |a: f64, b: f64| {
                 let (p, q) = if before { (-b, -a) } else { (a, b) };
-                step_along(self.g, &(corner + along * p.min(q)), &(corner + along * p.max(q)), 10)
+                step_along(
+                    self.g,
+                    &(corner + along * p.min(q)),
+                    &(corner + along * p.max(q)),
+                    SECTION_SAMPLES,
+                )
             };
             let share = |step: f64| {
-                let usual = if usual.abs() > 2.0 { usual } else { 2.0_f64.copysign(usual) };
-                (step / usual).clamp(-1.0, 1.5)
+                let usual = if usual.abs() > MIN_USUAL_STEP { usual } else { MIN_USUAL_STEP.copysign(usual) };
+                (step / usual).clamp(STEP_SHARE.0, STEP_SHARE.1)
             };
-            let (inner, outer) = (between(1.5, section), between(-1.5, -6.0));
-            Some([share(inner.0), inner.1, share(outer.0), outer.1, (inner.0 - usual).abs() / 20.0])
+            let (inner, outer) = (between(CORNER_GAP_PX, section), between(-CORNER_GAP_PX, -OUTWARD_PX));
+            Some([
+                share(inner.0),
+                inner.1,
+                share(outer.0),
+                outer.1,
+                (inner.0 - usual).abs() / DIFFERENCE_SCALE,
+            ])
         };
         let [Some(a), Some(b)] = [look(&met[0], true), look(&met[1], false)] else {
             return [0.0; CORNER_FEATURES];
@@ -218,17 +236,14 @@ impl<'a> Sides<'a> {
 /// Share of a strip that is not plain.
 fn roughness(along: &AlongLine, range_px: (f64, f64)) -> f64 {
     let (seen, rough) = along.rough(range_px);
-    if seen > MIN_CELLS { rough as f64 / seen as f64 } else { 0.0 }
+    if seen > MIN_STRIP_PIXELS { rough as f64 / seen as f64 } else { 0.0 }
 }
-
-/// Strips of fewer pixels in the image say nothing.
-const MIN_CELLS: usize = 20;
 
 /// Median grey level of a strip.
 fn level(along: &AlongLine, range_px: (f64, f64)) -> Option<f64> {
     let mut counts = [0_u32; 256];
     let seen = along.pixels(range_px, |_, level| counts[usize::from(level)] += 1);
-    if seen <= MIN_CELLS {
+    if seen <= MIN_STRIP_PIXELS {
         return None;
     }
     let mut left = seen as u32 / 2;
@@ -252,21 +267,24 @@ fn blur(along: &AlongLine) -> f64 {
         let seen = along.pixels(range, |step, _| sum += f64::from(step.abs()));
         if seen > 0 { sum / seen as f64 } else { 0.0 }
     };
-    ((mean((1.6, 2.6)) + mean((-2.6, -1.6)) + 1.0) / (mean((-0.6, 0.6)) + 1.0)).ln()
+    let [on, from, to] = BLUR_PX;
+    let beside = mean((from, to)) + mean((-to, -from));
+    ((beside + BLUR_OFFSET) / (mean((-on, on)) + BLUR_OFFSET)).ln()
 }
 
 /// How much the strip of some width inside a line looks like a shadow on the wall outside: plain, and darker by about
-/// 0.6.
+/// [`SHADOW_RATIO`].
 fn shadow(along: &AlongLine, width_px: f64) -> f64 {
-    if width_px < 4.0 {
+    if width_px < MIN_SHADOW_PX {
         return 0.0;
     }
-    let between = (1.5 - width_px, -1.5);
-    let (Some(within), Some(wall)) = (level(along, between), level(along, (1.5, 8.0))) else {
+    let between = (SHADOW_WALL_PX.0 - width_px, -SHADOW_WALL_PX.0);
+    let (Some(within), Some(wall)) = (level(along, between), level(along, SHADOW_WALL_PX)) else {
         return 0.0;
     };
     let ratio = within / (wall + 1.0);
-    (1.0 - roughness(along, between)) * (1.0 - (ratio - 0.6).abs() / 0.35).max(0.0)
+    let (usual, spread) = SHADOW_RATIO;
+    (1.0 - roughness(along, between)) * (1.0 - (ratio - usual).abs() / spread).max(0.0)
 }
 
 /// Mean signed step across the way from `p` to `q`, the strongest within a pixel that follows it, and the share of

@@ -1,15 +1,12 @@
 //! The straight lines among the edge points of a band. In: points. Out: lines, the best supported first.
 
-/// Most lines of a band, the best supported first.
-pub(crate) const MAX_LINES: usize = 24;
-/// Share of the samples that a line needs.
-const MIN_SUPPORT: f64 = 0.4;
-/// Slopes tried to each side of the supposed direction.
-const SLOPES: usize = 8;
+use super::feature_constants::{
+    FIT_REACH_PX, MAX_LINES, MIN_LINE_POINTS, MIN_SUPPORT, NEAR_LINE_PX, SAME_LINE_PX, SLOPE_STEP, SLOPES,
+    SUPPRESSED_BINS,
+};
+
 /// Slopes tried in all.
 const ALL_SLOPES: usize = 2 * SLOPES + 1;
-/// One step of slope as a share of the side, and the least step, in pixels over the whole side.
-const SLOPE_STEP: (f64, f64) = (0.006, 0.5);
 
 /// A line beside a side: its offset from the side, out of the quad for positive ones, at the middle of the side.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -52,7 +49,7 @@ pub(crate) fn find(
     (first_px, columns): (i32, usize),
     length_px: f64,
 ) -> Vec<SideLine> {
-    let unit = (SLOPE_STEP.0 * length_px).max(SLOPE_STEP.1);
+    let unit = SLOPE_STEP.of(length_px);
     let votes = vote(peaks, first_px as f32, columns + 4, unit as f32);
     let mut best = best_slopes(&votes);
     let mut lines: Vec<SideLine> = Vec::new();
@@ -63,12 +60,14 @@ pub(crate) fn find(
         if f64::from(count) < least {
             break;
         }
-        best[top.saturating_sub(2)..(top + 3).min(votes.len())].fill((0, SLOPES));
+        best[top.saturating_sub(SUPPRESSED_BINS)..(top + SUPPRESSED_BINS + 1).min(votes.len())]
+            .fill((0, SLOPES));
         let offset_px = top as f64 - 2.0 + f64::from(first_px);
         let rough = (offset_px, (j as f64 - SLOPES as f64) * unit);
         let Some(line) = fit(peaks, rows, rough) else { continue };
         let known = |l: &SideLine| {
-            (l.offset_px - line.offset_px).abs() < 1.5 && (l.slope_px - line.slope_px).abs() < 3.0
+            (l.offset_px - line.offset_px).abs() < SAME_LINE_PX.0
+                && (l.slope_px - line.slope_px).abs() < SAME_LINE_PX.1
         };
         if line.support >= MIN_SUPPORT && !lines.iter().any(known) {
             lines.push(line);
@@ -124,16 +123,12 @@ fn best_slopes(votes: &[Votes]) -> Vec<(u32, usize)> {
 /// Least squares on the edge points near a line (offset, slope), in rounds of closer ones.
 #[inline(always)]
 fn fit(peaks: &[Peak], rows: usize, mut line: (f64, f64)) -> Option<SideLine> {
-    const NEAR_PX: [f64; 4] = [1.6, 1.6, 1.3, 1.1];
-    /// No round moves a line further than this where it has points.
-    const REACH_PX: f32 = 5.0;
-    const MIN_POINTS: f64 = 8.0;
     let (offset, slope) = (line.0 as f32, line.1 as f32);
-    let within = peaks.iter().filter(|p| (p.offset_px - offset - slope * p.along).abs() < REACH_PX);
+    let within = peaks.iter().filter(|p| (p.offset_px - offset - slope * p.along).abs() < FIT_REACH_PX);
     let within: Vec<(f64, f64, &Peak)> =
         within.map(|p| (f64::from(p.along), f64::from(p.offset_px), p)).collect();
     let mut result = None;
-    for near in NEAR_PX {
+    for near in NEAR_LINE_PX {
         let (mut n, mut t, mut o, mut tt, mut to) = (0.0, 0.0, 0.0, 0.0, 0.0);
         let (mut with, mut sign, mut step) = (0_u64, 0.0, 0.0);
         for (x, y, p) in within.iter().filter(|(x, y, _)| (y - line.0 - line.1 * x).abs() < near) {
@@ -146,7 +141,7 @@ fn fit(peaks: &[Peak], rows: usize, mut line: (f64, f64)) -> Option<SideLine> {
             sign += f64::from(p.step.signum());
             step += f64::from(p.step.abs());
         }
-        if n < MIN_POINTS {
+        if n < MIN_LINE_POINTS {
             return result;
         }
         let spread = tt - t * t / n;
