@@ -102,7 +102,7 @@ async function showFrame(key, answer) {
     byId("quads").replaceChildren(...quadCells(answer).map(row));
     const work = (answer.timings ?? []).reduce((sum, t) => sum + t.ms, 0);
     byId("frame-facts").textContent = `frame ${answer.seq}: ${answer.status}, ${answer.quads.length} quads, ` +
-      `${work.toFixed(1)} ms of work, answered after ${answer.age_ms.toFixed(0)} ms`;
+      `${work.toFixed(1)} ms of work, answered after ${answer.latency_ms.toFixed(0)} ms`;
   } finally { frameBusy = false; }
 }
 

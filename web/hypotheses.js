@@ -12,7 +12,7 @@ const WORDS = {
 
 // Of an answer's hypotheses on the wire.
 export const fromAnswer = (hypotheses) => (hypotheses ?? []).filter((h) => h.map_from_robot?.pose).map((h) => ({
-  probability: h.mass, covariance: h.map_from_robot.covariance, ...h.map_from_robot.pose,
+  probability: h.probability, covariance: h.map_from_robot.covariance, ...h.map_from_robot.pose,
 }));
 
 // Of the server's own account.

@@ -149,7 +149,7 @@ pub struct Candidate {
     #[prost(double, tag = "4")]
     pub distance: f64,
     #[prost(double, tag = "5")]
-    pub tau: f64,
+    pub threshold: f64,
     #[prost(double, tag = "6")]
     pub ratio: f64,
     #[prost(double, tag = "7")]
@@ -162,7 +162,7 @@ pub struct Candidate {
     /// How alike the picture and the learnt icon are, one laid on the other, -1 to 1; absent where the map's distances
     /// decide alone.
     #[prost(double, optional, tag = "9")]
-    pub likeness: ::core::option::Option<f64>,
+    pub gradient_similarity: ::core::option::Option<f64>,
 }
 /// What matched points say of the first candidate.
 #[derive(::serde::Serialize, ::serde::Deserialize)]
@@ -272,7 +272,7 @@ pub struct StageTime {
 pub struct Hypothesis {
     /// Its share of the belief, 0 to 1.
     #[prost(double, tag = "1")]
-    pub mass: f64,
+    pub probability: f64,
     #[prost(message, optional, tag = "2")]
     pub map_from_robot: ::core::option::Option<Pose2Covariance>,
 }
@@ -306,7 +306,7 @@ pub struct Answer {
     pub pose_landmarks: ::prost::alloc::vec::Vec<::prost::alloc::string::String>,
     /// Receipt to answer, server clock.
     #[prost(double, tag = "11")]
-    pub age_ms: f64,
+    pub latency_ms: f64,
     #[prost(message, repeated, tag = "12")]
     pub timings: ::prost::alloc::vec::Vec<StageTime>,
     /// The capture time is more than 2 s from the server's clock, or does not fit those of the robot's other messages: then
@@ -465,8 +465,8 @@ pub struct GazeAdvice {
     pub map_version: u64,
     #[prost(message, optional, tag = "3")]
     pub rejection: ::core::option::Option<Rejection>,
-    #[prost(enumeration = "GazeLook", tag = "4")]
-    pub look: i32,
+    #[prost(enumeration = "GazeAction", tag = "4")]
+    pub action: i32,
     /// What follows is set for LANDMARK only.
     #[prost(string, tag = "5")]
     pub landmark: ::prost::alloc::string::String,
@@ -772,7 +772,7 @@ impl GazeCriterion {
 }
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]
 #[repr(i32)]
-pub enum GazeLook {
+pub enum GazeAction {
     Unspecified = 0,
     Landmark = 1,
     /// None is in sight: look along the path.
@@ -780,26 +780,26 @@ pub enum GazeLook {
     /// None is in sight, and the pose is very uncertain: look about.
     Sweep = 3,
 }
-impl GazeLook {
+impl GazeAction {
     /// String value of the enum field names used in the ProtoBuf definition.
     ///
     /// The values are not transformed in any way and thus are considered stable
     /// (if the ProtoBuf definition does not change) and safe for programmatic use.
     pub fn as_str_name(&self) -> &'static str {
         match self {
-            Self::Unspecified => "GAZE_LOOK_UNSPECIFIED",
-            Self::Landmark => "GAZE_LOOK_LANDMARK",
-            Self::Ahead => "GAZE_LOOK_AHEAD",
-            Self::Sweep => "GAZE_LOOK_SWEEP",
+            Self::Unspecified => "GAZE_ACTION_UNSPECIFIED",
+            Self::Landmark => "GAZE_ACTION_LANDMARK",
+            Self::Ahead => "GAZE_ACTION_AHEAD",
+            Self::Sweep => "GAZE_ACTION_SWEEP",
         }
     }
     /// Creates an enum from field names used in the ProtoBuf definition.
     pub fn from_str_name(value: &str) -> ::core::option::Option<Self> {
         match value {
-            "GAZE_LOOK_UNSPECIFIED" => Some(Self::Unspecified),
-            "GAZE_LOOK_LANDMARK" => Some(Self::Landmark),
-            "GAZE_LOOK_AHEAD" => Some(Self::Ahead),
-            "GAZE_LOOK_SWEEP" => Some(Self::Sweep),
+            "GAZE_ACTION_UNSPECIFIED" => Some(Self::Unspecified),
+            "GAZE_ACTION_LANDMARK" => Some(Self::Landmark),
+            "GAZE_ACTION_AHEAD" => Some(Self::Ahead),
+            "GAZE_ACTION_SWEEP" => Some(Self::Sweep),
             _ => None,
         }
     }

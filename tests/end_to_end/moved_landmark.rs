@@ -5,7 +5,7 @@
 use client::{
     Capture, Delivery, LandmarkRegion, RobotClient, RobotOptions,
     api::{NewMap, Place, Size},
-    v1::{self, GazeLook, Verdict},
+    v1::{self, GazeAction, Verdict},
 };
 use reqwest::{Method, StatusCode};
 use serde_json::{Value, json};
@@ -234,8 +234,8 @@ async fn gaze(inside: &Inside, client: &RobotClient, building: &Building) {
     };
     let told = client.gaze(&request, SOON).await.expect("advice");
     assert_eq!(
-        (told.look(), told.landmark.as_str(), told.map.as_str()),
-        (GazeLook::Landmark, "poster-0", MAP)
+        (told.action(), told.landmark.as_str(), told.map.as_str()),
+        (GazeAction::Landmark, "poster-0", MAP)
     );
     assert!((told.pan_rad - best["pan_rad"].as_f64().expect("as promised")).abs() < 1e-9);
     let to = poster.map_from_landmark.translation.vector;

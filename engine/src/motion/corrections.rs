@@ -103,7 +103,7 @@ pub(super) fn outcome(outcome: FixOutcome) -> (&'static str, Option<f64>) {
     match outcome {
         FixOutcome::Started => ("started", None),
         FixOutcome::Applied { distance2 } => ("applied", finite(distance2)),
-        FixOutcome::NotUsed { distance2 } => ("not_used", finite(distance2)),
+        FixOutcome::ExcludedByMode { distance2 } => ("excluded_by_mode", finite(distance2)),
         FixOutcome::GatedOut { distance2, .. } => ("gated_out", finite(distance2)),
         FixOutcome::Reset => ("reset", None),
         FixOutcome::Repeated => ("repeated", None),
@@ -117,8 +117,8 @@ pub(super) fn outcome(outcome: FixOutcome) -> (&'static str, Option<f64>) {
 pub(super) fn refusal(refusal: LaserRefusal) -> &'static str {
     match refusal {
         LaserRefusal::FewPoints { .. } => "few_points",
-        LaserRefusal::Unlike { .. } => "unlike",
-        LaserRefusal::Prior { .. } => "prior",
+        LaserRefusal::PoorMatch { .. } => "poor_match",
+        LaserRefusal::GatePrior { .. } => "gate_prior",
         LaserRefusal::Ambiguous => "ambiguous",
     }
 }
@@ -146,10 +146,10 @@ mod tests {
         for i in 1..=MAX_CORRECTIONS as i64 + 1 {
             log.keep(made("laser", i));
         }
-        log.count("laser", "unlike");
+        log.count("laser", "poor_match");
         let read = log.read(vec!["odometry".into()]);
         assert_eq!(read.corrections.len(), MAX_CORRECTIONS + 1);
         assert_eq!((read.corrections[0].modality, read.corrections[1].captured_ns), ("landmarks", 2));
-        assert_eq!(read.totals["laser"], [("applied", MAX_CORRECTIONS as u64 + 1), ("unlike", 1)].into());
+        assert_eq!(read.totals["laser"], [("applied", MAX_CORRECTIONS as u64 + 1), ("poor_match", 1)].into());
     }
 }

@@ -299,7 +299,7 @@ async fn commit(
         .look_alikes
         .iter()
         .flat_map(|(id, found)| found.iter().map(move |l| (id, l)))
-        .map(|(id, l)| json!({ "landmark": name(id), "other": name(&l.other), "likeness": l.likeness }))
+        .map(|(id, l)| json!({ "landmark": name(id), "other": name(&l.other), "gradient_similarity": l.gradient_similarity }))
         .collect();
     let result = json!({
         "look_alikes": look_alikes,
@@ -316,7 +316,7 @@ async fn commit(
     let ended = Ended { state: "done", message, result: Some(result.to_string()) };
     let of = |model: &LandmarkModel| -> Vec<Value> {
         let found = learnt.look_alikes.get(&model.id).map_or(&[][..], Vec::as_slice);
-        found.iter().map(|l| json!({ "landmark": name(&l.other), "likeness": l.likeness })).collect()
+        found.iter().map(|l| json!({ "landmark": name(&l.other), "gradient_similarity": l.gradient_similarity })).collect()
     };
     let models = learnt.models.iter().chain(&learnt.refitted);
     let rows: Vec<NewModel> = models.map(|model| row(model, &of(model))).collect();
@@ -346,7 +346,7 @@ fn row(model: &LandmarkModel, look_alikes: &[Value]) -> NewModel {
     let facts = json!({
         "correlation": model.correlation,
         "hausdorff": model.hausdorff,
-        "likeness": model.likeness,
+        "gradient_similarity": model.likeness,
         "look_alikes": look_alikes,
         "saliency": model.saliency,
         "saliency_f": model.saliency_f,

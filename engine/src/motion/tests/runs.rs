@@ -80,6 +80,6 @@ fn what_runs_have_shown_is_heeded_from_the_next_message_on() {
     motion.odometry_of(&r1, odometry(2, 1.0));
     motion.fixed(&r1, at(2_000_000_000, 1.0), &fix(11.0)).unwrap();
     let log = motion.corrections(&r1);
-    assert_eq!(log.totals["landmarks"], [("not_used", 1), ("started", 1)].into());
+    assert_eq!(log.totals["landmarks"], [("excluded_by_mode", 1), ("started", 1)].into());
     assert!((motion.pose(&r1, "hall", time(2.0)).unwrap().pose.x_m - 11.0).abs() < 1e-9);
 }
