@@ -227,9 +227,9 @@ async function choose(landmark) {
 
 function factsOf(landmark) {
   const finding = landmark.finding;
-  if (landmark.standing === "sound" || !finding) return `${landmark.name}: ${landmark.standing === "sound" ? landmark.status : landmark.standing}`;
-  const why = finding.kind === "moved" ? `appears ${finding.by_m.toFixed(2)} m from its place, ${finding.sightings} times` : `not seen where it should be, ${finding.looks} times`;
-  return `${landmark.name}: ${landmark.standing}, ${why}`;
+  if (landmark.health === "sound" || !finding) return `${landmark.name}: ${landmark.health === "sound" ? landmark.status : landmark.health}`;
+  const why = finding.kind === "moved" ? `appears ${finding.offset_m.toFixed(2)} m from its place, ${finding.sightings} times` : `not seen where it should be, ${finding.missed_frames} times`;
+  return `${landmark.name}: ${landmark.health}, ${why}`;
 }
 
 // The landmark under the pointer, within 14 pixels of its middle.
@@ -254,7 +254,7 @@ function drawLandmark(c, landmark, px, ink) {
   line(c, px(place.x_m - dx, place.y_m - dy), px(place.x_m + dx, place.y_m + dy));
   const [u, v] = px(place.x_m + 0.35 * Math.cos(place.theta_rad), place.y_m + 0.35 * Math.sin(place.theta_rad));
   c.font = seen || state.chosen === landmark.name ? "bold 12px system-ui" : "12px system-ui";
-  const label = landmark.standing === "sound" ? landmark.name : `${landmark.name} (${landmark.standing})`;
+  const label = landmark.health === "sound" ? landmark.name : `${landmark.name} (${landmark.health})`;
   c.fillText(label, u - c.measureText(label).width / 2, v + 4);
   if (seen) state.dirty = true; // to dim it again in time
 }

@@ -28,11 +28,11 @@ impl LandmarkFinding {
     /// Of what a robot's watch says.
     pub fn new(map: &str, name: &str, change: &HealthChange) -> Self {
         let finding = change.finding.map(|finding| match finding {
-            Finding::Moved { apparent, by_m, sightings } => json!({
-                "kind": "moved", "by_m": by_m, "sightings": sightings,
-                "apparent": { "x_m": apparent.x_m, "y_m": apparent.y_m, "theta_rad": apparent.theta_rad },
+            Finding::Moved { observed_place: at, offset_m, sightings } => json!({
+                "kind": "moved", "offset_m": offset_m, "sightings": sightings,
+                "observed_place": { "x_m": at.x_m, "y_m": at.y_m, "theta_rad": at.theta_rad },
             }),
-            Finding::Missing { looks } => json!({ "kind": "missing", "looks": looks }),
+            Finding::Missing { missed_frames } => json!({ "kind": "missing", "missed_frames": missed_frames }),
         });
         Self {
             map: map.to_owned(),

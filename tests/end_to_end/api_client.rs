@@ -111,11 +111,11 @@ async fn landmarks_are_placed_patched_taught_and_learnt() {
     maps.add_landmark("hall", "sign", None, None).await.expect("landmark");
     let patch = LandmarkPatch {
         place: Some(Some(place)),
-        standing: Some(LandmarkHealthBody::Quarantined),
+        health: Some(LandmarkHealthBody::Quarantined),
         ..LandmarkPatch::default()
     };
     let sign = maps.update_landmark("hall", "sign", &patch).await.expect("patched");
-    assert_eq!((sign.place, sign.standing, sign.size), (Some(place), LandmarkHealthBody::Quarantined, None));
+    assert_eq!((sign.place, sign.health, sign.size), (Some(place), LandmarkHealthBody::Quarantined, None));
     let forget = LandmarkPatch { place: Some(None), ..LandmarkPatch::default() };
     assert_eq!(maps.update_landmark("hall", "sign", &forget).await.expect("patched").place, None);
     maps.delete_landmark("hall", "sign").await.expect("deleted");
@@ -156,7 +156,7 @@ async fn landmarks_are_placed_patched_taught_and_learnt() {
     let job = maps.wait_for_job(job, SOON, |_| {}).await.expect("done");
     assert_eq!(maps.cancel_job(job.id).await.expect("job"), maps.job(job.id).await.expect("job"));
     let all = maps.landmarks("hall").await.expect("landmarks");
-    assert!(all.len() == 1 && all[0].model.is_some() && all[0].status != LandmarkStatus::Empty, "{all:?}");
+    assert!(all.len() == 1 && all[0].model.is_some() && all[0].status != LandmarkStatus::NotLearnt, "{all:?}");
     let answer = maps.recognise("hall", picture(1), None).await.expect("an answer");
     assert_eq!(answer.map, "hall");
     inside.server.stop().await;

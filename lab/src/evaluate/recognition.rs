@@ -178,7 +178,7 @@ async fn teach(truth: &Truth, args: &Args, maps: &MapClient, report: &mut Report
     report.active = landmarks.iter().filter(|l| l.status == LandmarkStatus::Active).count();
     if args.misses {
         for landmark in landmarks.iter().filter(|l| l.status != LandmarkStatus::Active) {
-            screen::complain(&format!("not active: {} {:?}", landmark.name, landmark.reasons));
+            screen::complain(&format!("not active: {} {:?}", landmark.name, landmark.failed_gates));
         }
     }
     Ok(())

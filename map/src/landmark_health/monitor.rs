@@ -147,12 +147,12 @@ impl LandmarkEvidence {
         p: &HealthParams,
     ) -> Option<HealthChange> {
         let often = self.elsewhere >= p.flag_sightings && (self.firm || self.confirmed);
-        let moved = self.apparent.filter(|_| often).map(|apparent| Finding::Moved {
-            apparent,
-            by_m: self.by_m,
+        let moved = self.apparent.filter(|_| often).map(|observed_place| Finding::Moved {
+            observed_place,
+            offset_m: self.by_m,
             sightings: self.elsewhere,
         });
-        let missing = (self.misses >= p.flag_misses).then_some(Finding::Missing { looks: self.misses });
+        let missing = (self.misses >= p.flag_misses).then_some(Finding::Missing { missed_frames: self.misses });
         let sure = (self.elsewhere >= p.quarantine_sightings && self.confirmed)
             || self.misses >= p.quarantine_misses;
         let Some(finding) = moved.or(missing) else {

@@ -338,7 +338,7 @@ pub(crate) async fn learn(args: &LearnArgs) -> anyhow::Result<ExitCode> {
         learnt.status,
         counted(learnt.views, "view")
     ))
-    .chain(learnt.reasons.iter().map(|r| format!("  {}", reason(r))))
+    .chain(learnt.failed_gates.iter().map(|r| format!("  {}", reason(r))))
     .collect();
     show(&args.server, &learnt, &lines.join("\n"))?;
     Ok(status)

@@ -292,7 +292,7 @@ async fn commit(
 ) -> Result<(), StoreError> {
     let name = |id: &LandmarkId| names.get(id).cloned().unwrap_or_default();
     let active = learnt.models.iter().filter(|m| m.is_active()).count();
-    let candidates: Vec<_> = learnt.models.iter().filter(|m| !m.is_active()).map(|m| name(&m.id)).collect();
+    let inactive: Vec<_> = learnt.models.iter().filter(|m| !m.is_active()).map(|m| name(&m.id)).collect();
     let failed: Vec<_> =
         learnt.failed.iter().map(|(id, reason)| json!({ "landmark": name(id), "reason": reason })).collect();
     let look_alikes: Vec<_> = learnt
@@ -305,7 +305,7 @@ async fn commit(
         "look_alikes": look_alikes,
         "learnt": learnt.models.len(),
         "active": active,
-        "candidates": candidates,
+        "inactive": inactive,
         "failed": failed,
         "points": learnt.models.iter().map(|m| m.points.len()).sum::<usize>(),
         "refitted": learnt.refitted.len(),
