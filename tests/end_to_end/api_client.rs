@@ -277,7 +277,7 @@ async fn drives_are_recorded_mapped_and_gathered() {
     eventually("all is recorded", whole).await;
     let trajectory = ReferenceTrajectoryBody { poses, ..ReferenceTrajectoryBody::default() };
     let run = maps.finish_recording("r1", &trajectory).await.expect("learnt");
-    assert_eq!(run.modules.iter().map(|m| m.module).next(), Some(ModalityBody::Odometry));
+    assert_eq!(run.statistics.iter().map(|s| s.modality).next(), Some(ModalityBody::Odometry));
     assert_eq!(maps.reference_runs("hall").await.expect("runs"), std::slice::from_ref(&run));
     maps.start_recording("r1").await.expect("begun");
     maps.cancel_recording("r1").await.expect("given up");
@@ -285,13 +285,13 @@ async fn drives_are_recorded_mapped_and_gathered() {
 
     // What is fused, by modality and place.
     let door = AreaBody { name: "door".into(), corners_m: vec![[0.0, 0.0], [2.0, 0.0], [2.0, 2.0]] };
-    let patch = ModalityMapPatch { mode: Some(FusionModeBody::Single), areas: Some(vec![door]) };
+    let patch = ModalityMapPatch { fusion_mode: Some(FusionModeBody::Best), areas: Some(vec![door]) };
     let set = maps.set_modalities("hall", &patch).await.expect("set");
-    assert_eq!((set.mode, set.areas.len(), set.cells.len()), (FusionModeBody::Single, 1, run.cells));
+    assert_eq!((set.fusion_mode, set.areas.len(), set.cells.len()), (FusionModeBody::Best, 1, run.cells));
     assert_eq!(maps.modalities("hall").await.expect("modalities"), set);
     let query = ModalityQuery { x_m: 4.5, y_m: 2.0, theta_rad: 0.0 };
     let here = maps.modalities_at("hall", &query).await.expect("known");
-    assert!(here.modules.len() == 3 && here.modules[0].steps > 0, "{here:?}");
+    assert!(here.statistics.len() == 3 && here.statistics[0].steps > 0, "{here:?}");
     maps.delete_reference_run("hall", run.id).await.expect("deleted");
     assert_eq!(maps.reference_runs("hall").await.expect("runs"), []);
 

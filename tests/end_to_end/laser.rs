@@ -212,28 +212,28 @@ async fn learnt_from(run: &Run) {
     let (status, learnt) = ask(Method::POST, told, Some(poses(0))).await;
     assert_eq!(status, StatusCode::CREATED, "{learnt}");
     assert!(learnt["way_m"].as_f64() > Some(5.0) && learnt["cells"].as_u64() > Some(5), "{learnt}");
-    let laser = &learnt["modules"][1];
+    let laser = &learnt["statistics"][1];
     let availability = laser["availability"].as_f64();
-    assert!(laser["module"] == "laser" && availability > Some(0.5), "{learnt}");
+    assert!(laser["modality"] == "laser" && availability > Some(0.5), "{learnt}");
     assert!(laser["sigma"][1].as_f64() < Some(0.03), "{learnt}");
-    let areas = format!("/maps/{MAP}/areas");
+    let modalities = format!("/maps/{MAP}/modalities");
     let corridor =
         json!([{ "name": "corridor", "corners_m": [[-1.0, -3.0], [40.0, -3.0], [40.0, 3.0], [-1.0, 3.0]] }]);
-    let (status, known) = ask(Method::PUT, &areas, Some(json!({ "mode": "fuse", "areas": corridor }))).await;
-    assert_eq!((status, &known["mode"]), (StatusCode::OK, &"fuse".into()), "{known}");
+    let (status, known) = ask(Method::PUT, &modalities, Some(json!({ "fusion_mode": "near_best", "areas": corridor }))).await;
+    assert_eq!((status, &known["fusion_mode"]), (StatusCode::OK, &"near_best".into()), "{known}");
     assert_eq!(known["cells"].as_array().map(Vec::len), learnt["cells"].as_u64().map(|n| n as usize));
     let at = &run.path[run.path.len() / 2].1;
-    let at = format!("{areas}/at?x_m={}&y_m={}&theta_rad={}", at.x_m, at.y_m, at.theta_rad);
+    let at = format!("{modalities}/at?x_m={}&y_m={}&theta_rad={}", at.x_m, at.y_m, at.theta_rad);
     let (_, here) = ask(Method::GET, &at, None).await;
-    assert_eq!(here["told"]["level"], "area", "{here}");
-    assert!(here["told"]["best"].is_string() && here["modules"][0]["steps"].as_u64() > Some(0), "{here}");
+    assert_eq!(here["advice"]["scope"], "area", "{here}");
+    assert!(here["advice"]["best"].is_string() && here["statistics"][0]["steps"].as_u64() > Some(0), "{here}");
     let twice = json!({ "areas": [corridor[0], corridor[0]] });
-    let (status, problem) = ask(Method::PUT, &areas, Some(twice)).await;
+    let (status, problem) = ask(Method::PUT, &modalities, Some(twice)).await;
     assert_eq!((status, &problem["field"]), (StatusCode::UNPROCESSABLE_ENTITY, &"areas[1].name".into()));
     let one = format!("/maps/{MAP}/runs/{}", learnt["id"]);
     assert_eq!(ask(Method::DELETE, &one, None).await.0, StatusCode::NO_CONTENT);
     assert_eq!(ask(Method::DELETE, &one, None).await.1["code"], "unknown_run");
-    let (_, known) = ask(Method::GET, &areas, None).await;
+    let (_, known) = ask(Method::GET, &modalities, None).await;
     assert_eq!(known["cells"], json!([]));
     assert_eq!(ask(Method::GET, "/robots/r1/run", None).await.1["code"], "not_recording");
     // A robot that is forgotten leaves no recording behind.

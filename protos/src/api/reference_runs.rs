@@ -57,7 +57,7 @@ pub struct ReferenceRunBody {
     /// Square metres by heading that it tells of.
     pub cells: usize,
     /// What it showed, all of it together.
-    pub modules: Vec<ModalityStatsBody>,
+    pub statistics: Vec<ModalityStatsBody>,
 }
 
 /// Runs of a map that were learnt from.

@@ -95,7 +95,7 @@ fn run_shown(row: areas::RunRow) -> ReferenceRunBody {
         created_ms: row.created_ms,
         way_m: row.way_m,
         cells: row.cells.len(),
-        modules: stats(&sums),
+        statistics: stats(&sums),
     }
 }
 
