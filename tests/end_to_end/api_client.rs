@@ -263,7 +263,7 @@ async fn drives_are_recorded_mapped_and_gathered() {
     maps.put_robot("r1", "hall").await.expect("robot");
 
     // A drive of 1 m whose path is known.
-    assert!(maps.start_recording("r1").await.expect("begun").going);
+    assert!(maps.start_recording("r1").await.expect("begun").active);
     let robot = connect(&inside.server.zenoh_endpoint, "r1").await;
     let mut poses = Vec::new();
     for step in 0..=20 {

@@ -175,7 +175,7 @@ async fn a_server_that_is_killed_in_mid_drive_goes_on_with_the_map() {
     server.maps().create_map(&NewMap::new(MAP)).await.expect("map");
     server.maps().put_robot("r1", MAP).await.expect("robot");
     let begun = ask(&server, Method::POST, "mapping", Some(json!({ "robot": "r1" }))).await;
-    assert_eq!((&begun["stage"], &begun["not_kept"]), (&json!("mapping"), &Value::Null), "{begun}");
+    assert_eq!((&begun["stage"], &begun["journal_error"]), (&json!("mapping"), &Value::Null), "{begun}");
     let (steps, mut client) = (drive(&building), connected(&server, 77).await);
     for (i, step) in steps.iter().enumerate() {
         if i == steps.len() / 3 || i == 2 * steps.len() / 3 {

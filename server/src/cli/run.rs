@@ -136,12 +136,12 @@ fn recorded_line(r: &RecordingStatusBody) -> String {
     };
     let [landmarks, laser] =
         [(r.landmarks, "landmark"), (r.laser, "scan")].map(|(n, what)| counted(n as u64, what));
-    format!("{} on {}: {state}, {:.1} m, fixes by {landmarks}, {laser}", r.robot, r.map, r.way_m)
+    format!("{} on {}: {state}, {:.1} m, fixes by {landmarks}, {laser}", r.robot, r.map, r.distance_m)
 }
 
 fn learnt_lines(run: &ReferenceRunBody) -> String {
     let mut lines =
-        vec![format!("{}  {}: {:.1} m, {}", run.id, run.robot, run.way_m, counted(run.cells as u64, "cell"))];
+        vec![format!("{}  {}: {:.1} m, {}", run.id, run.robot, run.distance_m, counted(run.cells as u64, "cell"))];
     lines.extend(run.statistics.iter().map(|m| {
         let [along, across, heading] = [0, 1, 2].map(|k| m.mean[k].hypot(m.sigma[k]));
         format!(

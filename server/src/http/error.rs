@@ -94,7 +94,7 @@ impl From<StoreError> for ApiError {
                     "job" => ("unknown_job", "job"),
                     "gathering" => ("unknown_gathering", "gathering"),
                     "candidate" => ("unknown_candidate", "candidate"),
-                    "run" => ("unknown_run", "run"),
+                    "run" => ("unknown_reference_run", "run"),
                     _ => ("not_found", "path"),
                 };
                 Self::new(StatusCode::NOT_FOUND, code, detail).field(field)
