@@ -180,7 +180,7 @@ async fn what_is_seen_is_told_for_the_camera_that_is_set() {
     assert_eq!((near.kind.as_str(), near.properties.landmark.as_str()), ("Feature", "poster"));
     assert!(near.properties.reach_m < far.properties.reach_m && !far.geometry.coordinates.is_empty());
     let pose = PoseBody { x_m: 5.0, y_m: 1.5, theta_rad: -FRAC_PI_2, covariance: None };
-    let request = VisibleRequest { pose, sight: own };
+    let request = VisibleRequest { pose, visibility_settings: own };
     let seen = maps.visible("hall", &request).await.expect("visible").landmarks;
     assert!(seen.len() == 1 && seen[0].landmark == "poster" && seen[0].margin_m > 0.0, "{seen:?}");
     let path = CoverageRequest::new(vec![[0.5, 1.5], [9.5, 1.5]]);
@@ -222,7 +222,7 @@ async fn a_robot_is_followed_from_its_first_frame_to_its_end() {
     assert_eq!(maps.camera_answer("r1", "front").await.expect("an answer").seq, answer.seq);
     assert!(maps.cameras("r1").await.expect("cameras").is_empty(), "no landmark was recognised");
     assert_eq!(maps.trajectories("r1").await.expect("trajectories").pose, []);
-    assert!(!maps.relocalisation("r1").await.expect("relocalisation").searching);
+    assert!(!maps.relocalisation("r1").await.expect("relocalisation").relocalising);
     assert_eq!(maps.corrections("r1").await.expect("corrections").corrections, []);
     let known = maps.robot("r1").await.expect("robot");
     assert!(known.alive && known.epoch.is_some() && known.conflict.is_none(), "{known:?}");

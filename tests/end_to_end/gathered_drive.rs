@@ -35,7 +35,7 @@ async fn walls(inside: &Inside, building: &Building) -> RobotClient {
         .iter()
         .map(|w| json!({ "a": [w.a_m.x, w.a_m.y], "b": [w.b_m.x, w.b_m.y] }))
         .collect();
-    let path = format!("/maps/{MAP}/laser");
+    let path = format!("/maps/{MAP}/walls");
     assert_eq!(call(inside, Method::PUT, &path, Some(json!({ "segments": walls }))).await.0, 200);
     inside.maps().put_robot("r1", MAP).await.expect("robot");
     let options = RobotOptions {

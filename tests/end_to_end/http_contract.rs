@@ -93,7 +93,7 @@ const ROWS: &[Row<'_>] = &[
     ),
     (
         "PUT",
-        "/maps/hall/laser",
+        "/maps/hall/walls",
         r#"{"segments": [{"a": [0, 0], "b": [1, 0]}, {"a": [0, 0], "b": [0, 0]}]}"#,
         422,
         "out_of_range",
@@ -101,7 +101,7 @@ const ROWS: &[Row<'_>] = &[
     ),
     (
         "PUT",
-        "/maps/hall/laser",
+        "/maps/hall/walls",
         r#"{"segments": [{"a": [0, 0, 0], "b": [1, 0]}]}"#,
         400,
         "bad_json",
@@ -253,8 +253,8 @@ async fn bounds_hold_at_the_bound() {
         refusal(put("/robots/r3", json!({ "map": "hall" })).await.expect("answer")).await.1,
         "too_many"
     );
-    assert_eq!(put("/maps/hall/laser", segments(3)).await.expect("answer").status(), StatusCode::OK);
-    let four = refusal(put("/maps/hall/laser", segments(4)).await.expect("answer")).await;
+    assert_eq!(put("/maps/hall/walls", segments(3)).await.expect("answer").status(), StatusCode::OK);
+    let four = refusal(put("/maps/hall/walls", segments(4)).await.expect("answer")).await;
     assert_eq!(four, (422, "too_many".into(), "segments".into()));
 
     for seed in [1, 2, 2] {

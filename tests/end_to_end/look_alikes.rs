@@ -40,9 +40,9 @@ fn off(pose: &v1::Pose2Covariance, truth: &Pose2) -> (f64, f64) {
 
 /// The page and the API are told the same as the robot, and what is still missing.
 async fn told_over_http(inside: &Inside, answer: &v1::Answer) {
-    let (_, found) = call(inside, Method::GET, "/robots/r1/hypotheses", None).await;
-    assert_eq!((&found["searching"], &found["map"]), (&true.into(), &MAP.into()), "{found}");
-    assert_eq!(found["needed"][0], "fewer_places", "{found}");
+    let (_, found) = call(inside, Method::GET, "/robots/r1/relocalisation", None).await;
+    assert_eq!((&found["relocalising"], &found["map"]), (&true.into(), &MAP.into()), "{found}");
+    assert_eq!(found["missing"][0], "higher_probability", "{found}");
     let all = found["hypotheses"].as_array().expect("a list");
     assert_eq!(all.len(), answer.hypotheses.len(), "{found}");
     for (told, sent) in all.iter().zip(&answer.hypotheses) {

@@ -34,7 +34,7 @@ async fn teach(inside: &Inside, building: &Arc<Building>) {
         .iter()
         .map(|w| json!({ "a": [w.a_m.x, w.a_m.y], "b": [w.b_m.x, w.b_m.y] }))
         .collect();
-    let path = format!("/maps/{MAP}/laser");
+    let path = format!("/maps/{MAP}/walls");
     assert_eq!(call(inside, Method::PUT, &path, Some(json!({ "segments": walls }))).await.0, 200);
     for poster in building.posters() {
         let mut centre = poster.map_from_landmark.translation.vector;

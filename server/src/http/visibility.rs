@@ -50,7 +50,7 @@ fn name_of(map: &MapSnapshot, id: LandmarkId) -> String {
 }
 
 /// The area on the floor from which a landmark is seen, as a GeoJSON feature in map metres: by the map's camera
-/// (`/maps/{map}/sight`), or by another for this question.
+/// (`/maps/{map}/visibility-settings`), or by another for this question.
 #[utoipa::path(get, path = "/maps/{map}/landmarks/{landmark}/visibility", tag = "landmarks",
     params(("map" = String, Path), ("landmark" = String, Path), VisibilitySettingsBody), responses(
     (status = 200, body = Object, description = "GeoJSON `Feature` of a `MultiPolygon`; properties landmark, area_m2, centroid_m, reach_m"),
@@ -107,7 +107,7 @@ async fn visible(
     Body(from): Body<VisibleRequest>,
 ) -> Result<Json<VisibleResponse>, ApiError> {
     let (map, pose) = (snapshot(&app, &map).await?, checked(&from.pose)?);
-    let settings = other(&from.sight, &map, "sight")?;
+    let settings = other(&from.visibility_settings, &map, "visibility_settings")?;
     app.on_vision_thread(move |_| visible_from(&map, &pose, settings.as_ref())).await?.map(Json)
 }
 
@@ -150,7 +150,7 @@ async fn along(
 
 fn covered(map: &MapSnapshot, along: &CoverageRequest) -> Result<CoverageResponse, ApiError> {
     let path: Vec<_> = along.path.iter().map(|p| Point2::new(p[0], p[1])).collect();
-    let settings = other(&along.sight, map, "sight")?;
+    let settings = other(&along.visibility_settings, map, "visibility_settings")?;
     let near = |place: &LandmarkPlace, reach: f64| comes_near(&path, place, reach + STANDOFF_M);
     let made = areas(map, settings.as_ref(), near)?;
     let areas: Vec<_> = made.iter().map(|(id, area)| (*id, &**area)).collect();
