@@ -222,7 +222,7 @@ impl Gatherer {
         match done {
             Ok(()) => counts.kept += 1,
             Err(error) => {
-                counts.refused += 1;
+                counts.not_stored += 1;
                 drop(counts);
                 tracing::debug!(gathering = id, %error, "a view was not kept");
                 // It was deleted, or its map was.

@@ -93,7 +93,7 @@ impl From<StoreError> for ApiError {
                     "camera" => ("unknown_camera", "camera"),
                     "job" => ("unknown_job", "job"),
                     "gathering" => ("unknown_gathering", "gathering"),
-                    "candidate" => ("unknown_candidate", "candidate"),
+                    "track" => ("unknown_track", "track"),
                     "run" => ("unknown_reference_run", "run"),
                     _ => ("not_found", "path"),
                 };
