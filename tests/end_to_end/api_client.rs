@@ -228,8 +228,8 @@ async fn a_robot_is_followed_from_its_first_frame_to_its_end() {
     assert!(known.alive && known.epoch.is_some() && known.conflict.is_none(), "{known:?}");
     assert_eq!(maps.robots().await.expect("robots").len(), 1);
 
-    let given = Some(uploaded_views());
-    let request = CalibrationRequest { given, ..CalibrationRequest::default() };
+    let views = Some(uploaded_views());
+    let request = CalibrationRequest { uploaded_views: views, ..CalibrationRequest::default() };
     let report = maps.calibrate_camera("r1", "front", &request).await.expect("a report");
     assert!((report.intrinsics.fx_px - 500.0).abs() < 5.0 && report.views.len() == 5, "{report:?}");
     let nothing = maps.calibrate_camera("r1", "front", &CalibrationRequest::default()).await;
