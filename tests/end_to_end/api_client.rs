@@ -134,7 +134,7 @@ async fn landmarks_are_placed_patched_taught_and_learnt() {
         corner_covariance_px2: Some([[1.0, 0.0, 1.0]; 4]),
     };
     let corners = LandmarkRegion::Corners([[20.0, 20.0], [140.0, 20.0], [140.0, 100.0], [20.0, 100.0]]);
-    let new = NewView { capture: Some(capture), keep_alike: true, ..NewView::new(picture(1), corners) };
+    let new = NewView { capture: Some(capture), keep_near_duplicate: true, ..NewView::new(picture(1), corners) };
     let second = maps.upload_view_with("hall", "poster", new).await.expect("view");
     let placing = second.placing.expect("said");
     assert_eq!((second.outcome, placing.reason.as_deref()), (Some(UploadOutcomeBody::New), Some("by_hand")));

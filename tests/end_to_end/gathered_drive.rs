@@ -319,7 +319,7 @@ async fn bad_wishes_are_refused_with_a_reason_and_ends_are_final() {
         (all.as_str(), json!({ "robot": "nobody" }), 404, "unknown_robot"),
         (&all, json!({ "robot": "r1", "landmark": "none" }), 404, "unknown_landmark"),
         (&all, json!({ "robot": "r1", "landmark": "blank" }), 409, "not_learnt"),
-        (&all, json!({ "robot": "r1", "auto_accept": true }), 422, "bad_value"),
+        (&all, json!({ "robot": "r1", "auto_accept": true }), 422, "invalid_value"),
         ("/maps/cellar/gatherings", json!({ "robot": "r1" }), 409, "in_use"),
         ("/maps/nowhere/gatherings", json!({ "robot": "r1" }), 404, "unknown_map"),
     ] {
@@ -334,7 +334,7 @@ async fn bad_wishes_are_refused_with_a_reason_and_ends_are_final() {
         (json!({ "tracks": [] }), 422, "out_of_range"),
         (json!({ "tracks": [{ "track": 1, "name": "A/B" }] }), 422, "bad_name"),
         (json!({ "tracks": [{ "track": 1, "name": "a" }] }), 404, "unknown_track"),
-        (json!({ "tracks": [{ "track": -1 }] }), 422, "bad_value"),
+        (json!({ "tracks": [{ "track": -1 }] }), 422, "invalid_value"),
     ] {
         let (got, problem) = call(&inside, Method::POST, &format!("{path}/accept"), Some(body)).await;
         assert_eq!((got.as_u16(), problem["code"].as_str()), (status, Some(code)), "{problem}");

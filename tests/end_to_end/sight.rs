@@ -68,8 +68,8 @@ async fn refusals(server: &Child) {
         (json!({ "tilt_low_rad": 0.5, "tilt_high_rad": 0.4 }), "out_of_range", "tilt_high_rad"),
         (json!({ "tilt_low_rad": -2 }), "out_of_range", "tilt_low_rad"),
         (json!({ "max_incidence_rad": 1.5 }), "out_of_range", "max_incidence_rad"),
-        (json!({ "camera_height_m": "high" }), "bad_value", "camera_height_m"),
-        (json!({ "focal": 500 }), "bad_value", "focal"),
+        (json!({ "camera_height_m": "high" }), "invalid_value", "camera_height_m"),
+        (json!({ "focal": 500 }), "invalid_value", "focal"),
     ] {
         let (status, problem) = call(server, Method::PUT, "/visibility-settings", Some(body.clone())).await;
         assert_eq!(status, StatusCode::UNPROCESSABLE_ENTITY, "{problem}");

@@ -307,7 +307,7 @@ pub(crate) async fn learn(args: &LearnArgs) -> anyhow::Result<ExitCode> {
         let uploaded = match std::fs::read(path) {
             Ok(image) => match maps.upload_view(map, landmark, image, extent).await {
                 Ok(view) => {
-                    if view.outcome == Some(UploadOutcomeBody::Alike) {
+                    if view.outcome == Some(UploadOutcomeBody::NearDuplicate) {
                         let like = format!(
                             "waymark: {name}: not kept, it shows nothing that view {} does not",
                             view.id

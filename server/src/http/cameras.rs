@@ -72,7 +72,7 @@ async fn list(
     params(("robot" = String, Path), ("camera" = String, Path)), request_body = CalibrationRequest,
     responses((status = 200, body = CalibrationReport), (status = 404, body = Problem),
     (status = 409, body = Problem, description = "not_determined: too few views, too few orientations, or views that do not fit"),
-    (status = 422, body = Problem, description = "bad_value, out_of_range")))]
+    (status = 422, body = Problem, description = "invalid_value, out_of_range")))]
 async fn calibrate(
     State(app): State<AppState>,
     PathParams((robot, camera)): PathParams<(String, String)>,
@@ -110,7 +110,7 @@ fn uploaded(given: &UploadedViews) -> Result<(Vec<PlanarView>, [u32; 2]), ApiErr
     let mut views = vec![];
     for (i, view) in given.views.iter().enumerate() {
         let corners = Corners::try_from(view.corners).map_err(|e| {
-            ApiError::invalid("bad_value", format!("uploaded_views.views[{i}].corners"), e.to_string())
+            ApiError::invalid("invalid_value", format!("uploaded_views.views[{i}].corners"), e.to_string())
         })?;
         views.push(PlanarView::of_quad(&corners, &covariance, size));
     }

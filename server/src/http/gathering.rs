@@ -220,7 +220,7 @@ const MAX_PICKS: usize = 64;
     responses((status = 202, body = AcceptanceBody), (status = 200, body = AcceptanceBody, description = "without a lesson"),
     (status = 404, body = Problem, description = "unknown_gathering, unknown_track"),
     (status = 409, body = Problem, description = "exists: the landmark has views of its own; in_use; too_many"),
-    (status = 422, body = Problem, description = "bad_name, bad_value, out_of_range")))]
+    (status = 422, body = Problem, description = "bad_name, invalid_value, out_of_range")))]
 async fn accept(
     State(app): State<AppState>,
     PathParams((map, id)): PathParams<(String, i64)>,

@@ -151,7 +151,7 @@ fn shown(app: &App, learning: &Learning, map: &str, row: LandmarkRow) -> Landmar
 #[utoipa::path(post, path = "/maps/{map}/landmarks", tag = "landmarks", params(("map" = String, Path)),
     request_body = NewLandmark, responses((status = 201, body = Landmark), (status = 404, body = Problem),
     (status = 409, body = Problem, description = "exists, too_many"),
-    (status = 422, body = Problem, description = "bad_name, bad_value, out_of_range")))]
+    (status = 422, body = Problem, description = "bad_name, invalid_value, out_of_range")))]
 async fn create(
     State(app): State<AppState>,
     PathParams(map): PathParams<String>,
@@ -197,7 +197,7 @@ async fn get(
 #[utoipa::path(patch, path = "/maps/{map}/landmarks/{landmark}", tag = "landmarks",
     params(("map" = String, Path), ("landmark" = String, Path)), request_body = LandmarkPatch,
     responses((status = 200, body = Landmark), (status = 404, body = Problem),
-    (status = 422, body = Problem, description = "out_of_range, bad_value")))]
+    (status = 422, body = Problem, description = "out_of_range, invalid_value")))]
 async fn patch(
     State(app): State<AppState>,
     PathParams((map, landmark)): PathParams<(String, String)>,

@@ -100,7 +100,7 @@ fn checked(pose: &PoseBody) -> Result<Pose2Covariance, ApiError> {
 /// Which landmarks a robot may see from an uncertain pose.
 #[utoipa::path(post, path = "/maps/{map}/visible", tag = "maps", params(("map" = String, Path)),
     request_body = VisibleRequest, responses((status = 200, body = VisibleResponse), (status = 404, body = Problem),
-    (status = 422, body = Problem, description = "out_of_range, bad_value")))]
+    (status = 422, body = Problem, description = "out_of_range, invalid_value")))]
 async fn visible(
     State(app): State<AppState>,
     PathParams(map): PathParams<String>,
@@ -138,7 +138,7 @@ fn visible_from(
 /// Which landmarks are seen along a path, and where none is. The robot drives forward and pans its camera.
 #[utoipa::path(post, path = "/maps/{map}/coverage", tag = "maps", params(("map" = String, Path)),
     request_body = CoverageRequest, responses((status = 200, body = CoverageResponse), (status = 404, body = Problem),
-    (status = 422, body = Problem, description = "out_of_range, bad_value")))]
+    (status = 422, body = Problem, description = "out_of_range, invalid_value")))]
 async fn along(
     State(app): State<AppState>,
     PathParams(map): PathParams<String>,
@@ -196,7 +196,7 @@ fn aim(map: &MapSnapshot, c: &GazeTarget) -> GazeTargetBody {
 /// zenoh (`rpc/gaze`) and are kept to one landmark until another is clearly better; this question leaves no trace.
 #[utoipa::path(post, path = "/maps/{map}/gaze", tag = "maps", params(("map" = String, Path)),
     request_body = GazeQueryBody, responses((status = 200, body = GazeRankingBody), (status = 404, body = Problem),
-    (status = 422, body = Problem, description = "out_of_range, bad_value")))]
+    (status = 422, body = Problem, description = "out_of_range, invalid_value")))]
 async fn gaze(
     State(app): State<AppState>,
     PathParams(map): PathParams<String>,

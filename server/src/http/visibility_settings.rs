@@ -112,7 +112,7 @@ async fn get(
 /// made anew and are those of the map's next version.
 #[utoipa::path(put, path = "/maps/{map}/visibility-settings", tag = "maps", params(("map" = String, Path)), request_body = VisibilitySettingsBody,
     responses((status = 200, body = VisibilitySettingsBody), (status = 404, body = Problem),
-    (status = 422, body = Problem, description = "out_of_range, bad_value")))]
+    (status = 422, body = Problem, description = "out_of_range, invalid_value")))]
 async fn put(
     State(app): State<AppState>,
     PathParams(map): PathParams<String>,
