@@ -7,7 +7,7 @@
 use engine::decode::ImageLimits;
 use figment::{
     Figment,
-    providers::{Env, Format, Serialized, Toml},
+    providers::{Env, Format, Toml},
 };
 use protos::Name;
 use serde::{Deserialize, Serialize};
@@ -215,7 +215,8 @@ impl Limits {
 impl RawConfig {
     /// Defaults, then the file (which must exist if named), then the environment.
     pub fn read(file: Option<&Path>) -> Result<Self, ConfigError> {
-        let mut figment = Figment::from(Serialized::defaults(Self::default()));
+        // Defaults are left to serde: as values they would stand beside a key of an earlier build.
+        let mut figment = Figment::new();
         if let Some(path) = file {
             figment = figment.merge(Toml::file_exact(path));
         }
@@ -386,6 +387,27 @@ mod tests {
         }
         let at_limit = RawConfig { workers: MAX_WORKERS, ..RawConfig::default() };
         assert_eq!(Config::try_from(at_limit).unwrap().workers, MAX_WORKERS);
+    }
+
+    #[test]
+    fn a_file_of_an_earlier_build_reads() {
+        let dir = tempfile::tempdir().unwrap();
+        let file = |text: &str| {
+            let path = dir.path().join("waymark.toml");
+            std::fs::write(&path, text).unwrap();
+            RawConfig::read(Some(&path)).unwrap()
+        };
+        let quads = "[algorithm.detect.quads]";
+        let earlier = file(&format!("{quads}
+grouping = \"hypotheses\"
+hypotheses.min_support = 0.25
+"));
+        let now = file(&format!("{quads}
+grouping = \"proposals\"
+proposals.min_support = 0.25
+"));
+        assert_eq!(earlier, now);
+        assert!((now.algorithm.detect.quads.proposals.min_support - 0.25).abs() < 1e-12);
     }
 
     #[test]
