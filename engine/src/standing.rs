@@ -57,7 +57,16 @@ pub fn findings() -> (FindingSender, Receiver<LandmarkFinding>) {
 impl FindingSender {
     /// Passes one on.
     pub fn tell(&self, found: LandmarkFinding) {
-        tracing::warn!(map = found.map, landmark = found.name, standing = ?found.standing, finding = found.finding, "landmark");
+        let is_quarantined = found.standing == LandmarkHealth::Quarantined;
+        let follows = is_quarantined.then_some("excluded from fixes until a person decides");
+        tracing::warn!(
+            map = found.map,
+            landmark = found.name,
+            health = ?found.standing,
+            finding = found.finding,
+            follows,
+            "landmark_health_changed"
+        );
         if let Err(TrySendError::Full(found)) = self.0.try_send(found) {
             tracing::warn!(landmark = found.name, "too many findings at once: this one is dropped");
         }

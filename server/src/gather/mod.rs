@@ -55,7 +55,7 @@ impl Gatherer {
         let gatherer =
             Arc::new(Self { store, params: config.params.clone(), sessions: hook.sessions.clone() });
         for row in gatherings::open(gatherer.store.reads()).await? {
-            tracing::info!(gathering = row.id, robot = row.robot, "taken up again");
+            tracing::info!(gathering = row.id, robot = row.robot, "gathering_resumed");
             let tracker = gatherer.resumed(&row).await?;
             gatherer.enter(&row, tracker);
         }
