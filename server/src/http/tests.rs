@@ -1,5 +1,7 @@
 //! The routes without a network: requests go straight to the router.
 
+mod earlier_build;
+
 use super::*;
 use crate::{
     config::{Limits, RawConfig},
@@ -29,12 +31,18 @@ struct Service {
 
 impl Service {
     async fn start(limits: Limits) -> Self {
-        let data = tempfile::tempdir().unwrap();
+        let service = Self::on(tempfile::tempdir().unwrap(), limits).await;
+        let store = &service.store;
+        store.write(|tx| Box::pin(maps::create(tx, "hall", DistanceKind::Both, 9))).await.unwrap();
+        store.write(|tx| Box::pin(crate::store::robots::put(tx, "r1", "hall", 9))).await.unwrap();
+        service
+    }
+
+    /// On the database of this directory.
+    async fn on(data: tempfile::TempDir, limits: Limits) -> Self {
         let raw = RawConfig { limits, data: data.path().to_owned(), ..RawConfig::default() };
         let config = Arc::new(crate::config::Config::try_from(raw).unwrap());
         let (store, writer) = Catalogue::open(&config).await.unwrap();
-        store.write(|tx| Box::pin(maps::create(tx, "hall", DistanceKind::Both, 9))).await.unwrap();
-        store.write(|tx| Box::pin(crate::store::robots::put(tx, "r1", "hall", 9))).await.unwrap();
         let (stop, stopping) = watch::channel(false);
         let (jobs, _) = Jobs::start(store.clone(), config.clone(), stopping.clone()).await.unwrap();
         let (hook, offers) = crate::gather::hook();
