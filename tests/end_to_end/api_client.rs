@@ -313,10 +313,10 @@ async fn drives_are_recorded_mapped_and_gathered() {
     assert!(maps.gathering("hall", gathering.id).await.expect("gathering").open);
     assert_eq!(maps.tracks("hall", gathering.id).await.expect("tracks"), []);
     assert!(!maps.stop_gathering("hall", gathering.id).await.expect("ended").open);
-    let track = AcceptedTrackBody { candidate: 1, name: Some("window".into()) };
-    let request = AcceptRequest { candidates: vec![track], learn: false };
-    assert_eq!(code(maps.accept_tracks("hall", gathering.id, &request).await), "unknown_candidate");
-    assert_eq!(code(maps.discard_track("hall", gathering.id, 1).await), "unknown_candidate");
+    let track = AcceptedTrackBody { track: 1, name: Some("window".into()) };
+    let request = AcceptRequest { tracks: vec![track], learn: false };
+    assert_eq!(code(maps.accept_tracks("hall", gathering.id, &request).await), "unknown_track");
+    assert_eq!(code(maps.discard_track("hall", gathering.id, 1).await), "unknown_track");
     assert_eq!(code(maps.track_icon("hall", gathering.id, 1, 1).await), "unknown_view");
     assert_eq!(maps.gatherings("hall").await.expect("gatherings").len(), 1);
     maps.delete_gathering("hall", gathering.id).await.expect("deleted");
