@@ -38,7 +38,7 @@ impl LandmarkFinding {
             map: map.to_owned(),
             landmark: change.landmark,
             name: name.to_owned(),
-            standing: change.standing,
+            standing: change.health,
             finding: finding.map(|f| f.to_string()),
         }
     }

@@ -42,7 +42,7 @@ pub struct HealthChange {
     /// Number of the landmark.
     pub landmark: LandmarkId,
     /// The new health.
-    pub standing: LandmarkHealth,
+    pub health: LandmarkHealth,
     /// The finding; `None` for a sound landmark.
     pub finding: Option<Finding>,
 }
