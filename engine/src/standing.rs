@@ -32,7 +32,9 @@ impl LandmarkFinding {
                 "kind": "moved", "offset_m": offset_m, "sightings": sightings,
                 "observed_place": { "x_m": at.x_m, "y_m": at.y_m, "theta_rad": at.theta_rad },
             }),
-            Finding::Missing { missed_frames } => json!({ "kind": "missing", "missed_frames": missed_frames }),
+            Finding::Missing { missed_frames } => {
+                json!({ "kind": "missing", "missed_frames": missed_frames })
+            }
         });
         Self {
             map: map.to_owned(),

@@ -154,12 +154,12 @@ pub struct Candidate {
     pub ratio: f64,
     #[prost(double, tag = "7")]
     pub probability: f64,
-    /// Empty, or the gate that refused it: correlation, hausdorff, likeness, contradiction, content, margin,
+    /// Empty, or the gate that refused it: correlation, hausdorff, similarity, mismatch, low_content, margin,
     /// points (so many points would agree by chance too often), disagreement (a connected part shows something else),
     /// corners (points agree, but do not tell where its corners are), plain (its icon alone speaks for it).
     #[prost(string, tag = "8")]
     pub refusal: ::prost::alloc::string::String,
-    /// How alike the picture and the learnt icon are, one laid on the other, -1 to 1; absent where the map's distances
+    /// Gradient similarity of the picture and the learnt icon after alignment, -1 to 1; absent where the map's distances
     /// decide alone.
     #[prost(double, optional, tag = "9")]
     pub gradient_similarity: ::core::option::Option<f64>,
@@ -313,11 +313,11 @@ pub struct Answer {
     /// the answer holds for the image, and the frame has no influence on the fused pose.
     #[prost(bool, tag = "13")]
     pub clock_suspect: bool,
-    /// Why recognised landmarks gave no robot pose: empty, no_mounting, landmark_not_placed, landmark_quarantined (found
-    /// moved or missing; see its standing), unsure (seen too poorly to tell whether it was moved, by a robot whose pose is
-    /// known well enough without), ambiguous, or a gate:
-    /// gate_prior (the robot's prior rules it out), gate_room (no upright robot on the floor sees them so), gate_side (it
-    /// would stand behind the wall), disagree (the landmarks contradict one another), degenerate.
+    /// Why recognised landmarks gave no robot pose: empty, no_extrinsics, landmark_not_placed, landmark_quarantined (found
+    /// moved or missing; see its health), weak_observation (seen too poorly to tell whether it was moved, by a robot whose
+    /// pose is known well enough without), ambiguous, or a gate:
+    /// gate_prior (the robot's prior rules it out), gate_reprojection (no upright robot on the floor sees them so),
+    /// gate_behind_wall (it would stand behind the wall), gate_inconsistent (the landmarks contradict one another), degenerate.
     #[prost(string, tag = "14")]
     pub pose_refusal: ::prost::alloc::string::String,
     /// Where the robot may be while it does not know its pose and sees only landmarks that each may be several, most probable
@@ -390,8 +390,9 @@ pub struct RobotPose {
     #[prost(message, optional, tag = "4")]
     pub map_from_robot: ::core::option::Option<Pose2Covariance>,
     /// What the pose rests on now: odometry, if it carries the pose; landmarks (named without the pose), guided (landmarks named
-    /// by the pose) and laser, if fixes of that kind agreed with it within the last 10 m; hypotheses, if it began with the last of several that were left and no landmark has confirmed it
-    /// yet. `odometry` alone: it is 10 m since anything else was said.
+    /// by the pose) and laser, if fixes of that kind agreed with it within the last 10 m; relocalisation, if it began with the
+    /// last of several hypotheses that were left and no landmark has confirmed it yet. `odometry` alone: it is 10 m since
+    /// anything else was said.
     #[prost(string, repeated, tag = "5")]
     pub modalities: ::prost::alloc::vec::Vec<::prost::alloc::string::String>,
     /// Corrections by landmarks applied since the start, guided ones included.

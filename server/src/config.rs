@@ -398,14 +398,18 @@ mod tests {
             RawConfig::read(Some(&path)).unwrap()
         };
         let quads = "[algorithm.detect.quads]";
-        let earlier = file(&format!("{quads}
+        let earlier = file(&format!(
+            "{quads}
 grouping = \"hypotheses\"
 hypotheses.min_support = 0.25
-"));
-        let now = file(&format!("{quads}
+"
+        ));
+        let now = file(&format!(
+            "{quads}
 grouping = \"proposals\"
 proposals.min_support = 0.25
-"));
+"
+        ));
         assert_eq!(earlier, now);
         assert!((now.algorithm.detect.quads.proposals.min_support - 0.25).abs() < 1e-12);
     }

@@ -134,7 +134,8 @@ async fn landmarks_are_placed_patched_taught_and_learnt() {
         corner_covariance_px2: Some([[1.0, 0.0, 1.0]; 4]),
     };
     let corners = LandmarkRegion::Corners([[20.0, 20.0], [140.0, 20.0], [140.0, 100.0], [20.0, 100.0]]);
-    let new = NewView { capture: Some(capture), keep_near_duplicate: true, ..NewView::new(picture(1), corners) };
+    let new =
+        NewView { capture: Some(capture), keep_near_duplicate: true, ..NewView::new(picture(1), corners) };
     let second = maps.upload_view_with("hall", "poster", new).await.expect("view");
     let placing = second.placing.expect("said");
     assert_eq!((second.outcome, placing.reason.as_deref()), (Some(UploadOutcomeBody::New), Some("by_hand")));
@@ -156,7 +157,10 @@ async fn landmarks_are_placed_patched_taught_and_learnt() {
     let job = maps.wait_for_job(job, SOON, |_| {}).await.expect("done");
     assert_eq!(maps.cancel_job(job.id).await.expect("job"), maps.job(job.id).await.expect("job"));
     let all = maps.landmarks("hall").await.expect("landmarks");
-    assert!(all.len() == 1 && all[0].model.is_some() && all[0].status != LandmarkStatus::NotLearnt, "{all:?}");
+    assert!(
+        all.len() == 1 && all[0].model.is_some() && all[0].status != LandmarkStatus::NotLearnt,
+        "{all:?}"
+    );
     let answer = maps.recognise("hall", picture(1), None).await.expect("an answer");
     assert_eq!(answer.map, "hall");
     inside.server.stop().await;

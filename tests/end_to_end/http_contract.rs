@@ -42,7 +42,14 @@ const ROWS: &[Row<'_>] = &[
         "out_of_range",
         "size.height_m",
     ),
-    ("POST", "/maps/hall/landmarks", r#"{"name": "x", "size": {"width_m": 1}}"#, 422, "invalid_value", "size"),
+    (
+        "POST",
+        "/maps/hall/landmarks",
+        r#"{"name": "x", "size": {"width_m": 1}}"#,
+        422,
+        "invalid_value",
+        "size",
+    ),
     (
         "POST",
         "/maps/hall/landmarks",

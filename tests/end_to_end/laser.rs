@@ -219,14 +219,18 @@ async fn learnt_from(run: &Run) {
     let modalities = format!("/maps/{MAP}/modalities");
     let corridor =
         json!([{ "name": "corridor", "corners_m": [[-1.0, -3.0], [40.0, -3.0], [40.0, 3.0], [-1.0, 3.0]] }]);
-    let (status, known) = ask(Method::PUT, &modalities, Some(json!({ "fusion_mode": "near_best", "areas": corridor }))).await;
+    let (status, known) =
+        ask(Method::PUT, &modalities, Some(json!({ "fusion_mode": "near_best", "areas": corridor }))).await;
     assert_eq!((status, &known["fusion_mode"]), (StatusCode::OK, &"near_best".into()), "{known}");
     assert_eq!(known["cells"].as_array().map(Vec::len), learnt["cells"].as_u64().map(|n| n as usize));
     let at = &run.path[run.path.len() / 2].1;
     let at = format!("{modalities}/at?x_m={}&y_m={}&theta_rad={}", at.x_m, at.y_m, at.theta_rad);
     let (_, here) = ask(Method::GET, &at, None).await;
     assert_eq!(here["advice"]["scope"], "area", "{here}");
-    assert!(here["advice"]["best"].is_string() && here["statistics"][0]["steps"].as_u64() > Some(0), "{here}");
+    assert!(
+        here["advice"]["best"].is_string() && here["statistics"][0]["steps"].as_u64() > Some(0),
+        "{here}"
+    );
     let twice = json!({ "areas": [corridor[0], corridor[0]] });
     let (status, problem) = ask(Method::PUT, &modalities, Some(twice)).await;
     assert_eq!((status, &problem["field"]), (StatusCode::UNPROCESSABLE_ENTITY, &"areas[1].name".into()));

@@ -152,7 +152,8 @@ impl LandmarkEvidence {
             offset_m: self.by_m,
             sightings: self.elsewhere,
         });
-        let missing = (self.misses >= p.flag_misses).then_some(Finding::Missing { missed_frames: self.misses });
+        let missing =
+            (self.misses >= p.flag_misses).then_some(Finding::Missing { missed_frames: self.misses });
         let sure = (self.elsewhere >= p.quarantine_sightings && self.confirmed)
             || self.misses >= p.quarantine_misses;
         let Some(finding) = moved.or(missing) else {
@@ -160,11 +161,7 @@ impl LandmarkEvidence {
             let clear = now == LandmarkHealth::Flagged && self.in_place >= p.clear_sightings;
             // Reported again only after as many observations, in case the report was lost.
             self.in_place = if clear { 0 } else { self.in_place };
-            return clear.then_some(HealthChange {
-                landmark,
-                health: LandmarkHealth::Sound,
-                finding: None,
-            });
+            return clear.then_some(HealthChange { landmark, health: LandmarkHealth::Sound, finding: None });
         };
         let health = if sure { LandmarkHealth::Quarantined } else { LandmarkHealth::Flagged };
         // Only a person ends a quarantine; a report is not repeated.

@@ -87,7 +87,9 @@ fn what_is_not_the_map_is_refused() {
     assert!(
         matches!(
             other,
-            Err(LaserRefusal::PoorMatch { .. } | LaserRefusal::FewPoints { .. } | LaserRefusal::GatePrior { .. })
+            Err(LaserRefusal::PoorMatch { .. }
+                | LaserRefusal::FewPoints { .. }
+                | LaserRefusal::GatePrior { .. })
         ),
         "{other:?}"
     );

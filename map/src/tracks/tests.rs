@@ -65,9 +65,15 @@ fn things_are_followed_by_their_place_over_any_gap() {
     let back: Vec<_> = two(150.0).into_iter().rev().collect();
     assert_eq!(seen(&mut tracker, 300, &back), [TrackOutcome::Keep(2), TrackOutcome::Keep(1)]);
     // Something else hangs there now: neither joined nor begun anew.
-    assert_eq!(seen(&mut tracker, 301, &[glimpse(3, 0.0, 190.0, Some(1.0))]), [TrackOutcome::AppearanceMismatch]);
+    assert_eq!(
+        seen(&mut tracker, 301, &[glimpse(3, 0.0, 190.0, Some(1.0))]),
+        [TrackOutcome::AppearanceMismatch]
+    );
     // The same picture elsewhere is another thing; so is one of another size at the same place.
-    assert_eq!(seen(&mut tracker, 302, &[glimpse(1, 0.0, 190.0, Some(4.0))]), [TrackOutcome::TooFewObservations]);
+    assert_eq!(
+        seen(&mut tracker, 302, &[glimpse(1, 0.0, 190.0, Some(4.0))]),
+        [TrackOutcome::TooFewObservations]
+    );
     let mut larger = glimpse(2, 0.0, 190.0, Some(2.0));
     larger.place = larger
         .place
@@ -104,7 +110,10 @@ fn nothing_of_a_doubtful_identity_is_kept() {
     let with = |identity, width_px| [QuadObservation { identity, ..glimpse(1, 0.0, width_px, Some(1.0)) }];
     for step in 0..5 {
         let width_px = 100.0 + 20.0 * step as f64;
-        assert_eq!(seen(&mut tracker, step, &with(Identity::Doubtful, width_px)), [TrackOutcome::KnownLandmark]);
+        assert_eq!(
+            seen(&mut tracker, step, &with(Identity::Doubtful, width_px)),
+            [TrackOutcome::KnownLandmark]
+        );
         let unwanted = with(Identity::Landmark(LandmarkId(8)), width_px);
         assert_eq!(seen(&mut tracker, step, &unwanted), [TrackOutcome::KnownLandmark]);
     }
@@ -180,7 +189,10 @@ fn glimpses_are_forgotten_and_tracks_taken_up_again() {
     assert_eq!((resumed.tracks().len(), resumed.tracks()[0].views()), (1, 2));
     assert_eq!(seen(&mut resumed, 200, &[glimpse(1, 0.0, 101.0, Some(1.0))]), [TrackOutcome::NearDuplicate]);
     assert_eq!(seen(&mut resumed, 201, &[glimpse(1, 0.0, 240.0, Some(1.0))]), [TrackOutcome::Keep(4)]);
-    assert_eq!(seen(&mut resumed, 202, &[glimpse(5, 0.0, 240.0, Some(8.0))]), [TrackOutcome::TooFewObservations]);
+    assert_eq!(
+        seen(&mut resumed, 202, &[glimpse(5, 0.0, 240.0, Some(8.0))]),
+        [TrackOutcome::TooFewObservations]
+    );
     resumed.number_after(8);
     seen(&mut resumed, 203, &[glimpse(6, 0.0, 240.0, Some(12.0))]);
     assert_eq!(numbers(&resumed), [4, 5, 9]);

@@ -131,11 +131,7 @@ pub(crate) async fn run(command: &Command) -> anyhow::Result<()> {
             for track in tracks {
                 maps.discard_track(&at.map, *gathering, *track).await?;
             }
-            show(
-                &at.server,
-                tracks,
-                &format!("{} discarded", counted(tracks.len() as u64, "track")),
-            )
+            show(&at.server, tracks, &format!("{} discarded", counted(tracks.len() as u64, "track")))
         }
     }
 }
@@ -185,10 +181,7 @@ mod tests {
 
     #[test]
     fn picks_are_read() {
-        assert_eq!(
-            pick("3=poster").unwrap(),
-            AcceptedTrackBody { track: 3, name: Some("poster".into()) }
-        );
+        assert_eq!(pick("3=poster").unwrap(), AcceptedTrackBody { track: 3, name: Some("poster".into()) });
         assert_eq!(pick("12").unwrap(), AcceptedTrackBody { track: 12, name: None });
         assert!(pick("poster=3").is_err() && pick("-1=a").is_err() && pick("").is_err());
     }

@@ -120,7 +120,8 @@ pub(crate) async fn run(command: &Command) -> anyhow::Result<()> {
             let maps = MapClient::new(server.address())?;
             let known = match mode {
                 Some(mode) => {
-                    maps.set_modalities(map, &ModalityMapPatch { fusion_mode: Some(*mode), areas: None }).await?
+                    maps.set_modalities(map, &ModalityMapPatch { fusion_mode: Some(*mode), areas: None })
+                        .await?
                 }
                 None => maps.modalities(map).await?,
             };
@@ -140,8 +141,13 @@ fn recorded_line(r: &RecordingStatusBody) -> String {
 }
 
 fn learnt_lines(run: &ReferenceRunBody) -> String {
-    let mut lines =
-        vec![format!("{}  {}: {:.1} m, {}", run.id, run.robot, run.distance_m, counted(run.cells as u64, "cell"))];
+    let mut lines = vec![format!(
+        "{}  {}: {:.1} m, {}",
+        run.id,
+        run.robot,
+        run.distance_m,
+        counted(run.cells as u64, "cell")
+    )];
     lines.extend(run.statistics.iter().map(|m| {
         let [along, across, heading] = [0, 1, 2].map(|k| m.mean[k].hypot(m.sigma[k]));
         format!(
@@ -167,7 +173,12 @@ fn mode_line(known: &ModalityMapBody) -> String {
     let best = |modality| known.cells.iter().filter(|cell| cell.best == Some(modality)).count();
     let each = [ModalityBody::Odometry, ModalityBody::Laser, ModalityBody::Landmarks];
     let each = each.map(|modality| format!("{modality} {}", best(modality)));
-    format!("{}; best in {}: {}", known.fusion_mode, counted(known.cells.len() as u64, "cell"), each.join(", "))
+    format!(
+        "{}; best in {}: {}",
+        known.fusion_mode,
+        counted(known.cells.len() as u64, "cell"),
+        each.join(", ")
+    )
 }
 
 /// Poses of a file.

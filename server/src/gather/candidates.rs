@@ -39,8 +39,10 @@ pub(crate) fn candidates(
         .collect();
     for ((track, _), similar) in made.iter_mut().zip(similar) {
         if !similar.is_empty() {
-            let detail = "other tracks look like it or are at its place: the same object twice, or two of one kind";
-            let reason = json!({ "gate": "similar_tracks", "value": similar.len(), "limit": 0, "detail": detail });
+            let detail =
+                "other tracks look like it or are at its place: the same object twice, or two of one kind";
+            let reason =
+                json!({ "gate": "similar_tracks", "value": similar.len(), "limit": 0, "detail": detail });
             track.reasons.push(reason);
             (track.passes, track.similar_tracks) = (false, similar);
         }

@@ -83,7 +83,9 @@ async fn a_full_queue_drops_and_counts_and_nobody_waits() {
     gatherer.clone().run(offers).await;
     let counts = gatherer.counts(id).unwrap();
     assert!(
-        counts.kept >= 1 && counts.near_duplicate >= 5 * counts.kept && counts.too_few_observations >= 2 * counts.kept,
+        counts.kept >= 1
+            && counts.near_duplicate >= 5 * counts.kept
+            && counts.too_few_observations >= 2 * counts.kept,
         "{counts:?}"
     );
     let tracks = gatherings::tracks(gatherer.store.reads(), id).await.unwrap();

@@ -82,7 +82,11 @@ async fn calibrate(
     let CalibrationRequest { uploaded_views, constraints } =
         asked.map_or_else(CalibrationRequest::default, |Body(request)| request);
     if usize::from(constraints.radial) > vision::camera_calibration::MAX_RADIAL {
-        return Err(ApiError::invalid("out_of_range", "constraints.radial", "0 to 2 coefficients can be fitted"));
+        return Err(ApiError::invalid(
+            "out_of_range",
+            "constraints.radial",
+            "0 to 2 coefficients can be fitted",
+        ));
     }
     let (views, image_px) = match uploaded_views {
         Some(given) => uploaded(&given)?,
@@ -101,7 +105,9 @@ async fn calibrate(
 
 fn uploaded(given: &UploadedViews) -> Result<(Vec<PlanarView>, [u32; 2]), ApiError> {
     let size = LandmarkSize { width_m: given.size_width_m, height_m: given.size_height_m };
-    for (field, value) in [("uploaded_views.size_width_m", size.width_m), ("uploaded_views.size_height_m", size.height_m)] {
+    for (field, value) in
+        [("uploaded_views.size_width_m", size.width_m), ("uploaded_views.size_height_m", size.height_m)]
+    {
         if !(LandmarkSize::MIN_M..=LandmarkSize::MAX_M).contains(&value) {
             return Err(ApiError::invalid("out_of_range", field, format!("{value} is not a side in metres")));
         }

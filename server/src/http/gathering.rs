@@ -235,8 +235,7 @@ async fn accept(
         let name = name.map_err(|e| e.field(format!("tracks[{i}].name")))?;
         Ok(Pick { number: pick.track, name: name.map(|n| n.to_string()) })
     };
-    let picks =
-        decision.tracks.into_iter().enumerate().map(pick).collect::<Result<Vec<_>, ApiError>>()?;
+    let picks = decision.tracks.into_iter().enumerate().map(pick).collect::<Result<Vec<_>, ApiError>>()?;
     let limits = &app.config.limits;
     let bounds = accepting::Bounds {
         landmarks: limits.landmarks,

@@ -261,7 +261,11 @@ async fn a_known_path_may_be_as_long_as_it_is_promised() {
             format!("[{ns}, -1234.5678901234567, 0.00012345678901234567, -1.5707963267948966]")
         };
         let poses: Vec<String> = (0..poses).map(pose).collect();
-        request("POST", "/api/v1/robots/r1/recording/reference", format!("{{\"poses\": [{}]}}", poses.join(", ")))
+        request(
+            "POST",
+            "/api/v1/robots/r1/recording/reference",
+            format!("{{\"poses\": [{}]}}", poses.join(", ")),
+        )
     };
     // Read to its end: only then it matters that there is no recording.
     let (status, problem) = read(service.ask(path(MAX_REFERENCE)).await).await;

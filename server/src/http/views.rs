@@ -99,11 +99,13 @@ async fn add(
 ) -> Result<(StatusCode, Json<TrainingView>), ApiError> {
     landmarks::get(app.store.reads(), &map, &landmark).await?;
     let mut form =
-        Form::read(&app, request, &["image", "corners", "whole_image", "capture", "keep_near_duplicate"]).await?;
+        Form::read(&app, request, &["image", "corners", "whole_image", "capture", "keep_near_duplicate"])
+            .await?;
     let image = form.needed("image")?;
     let extent = extent(form.optional("corners").as_ref(), form.optional("whole_image").as_ref())?;
     let mut capture = capture(form.optional("capture").as_ref())?;
-    let thinning = (!flag("keep_near_duplicate", form.optional("keep_near_duplicate").as_ref())?).then(NoveltyParams::default);
+    let thinning = (!flag("keep_near_duplicate", form.optional("keep_near_duplicate").as_ref())?)
+        .then(NoveltyParams::default);
     let max = app.config.limits.views;
     let (new, detected) = app.clone().on_vision_thread(move |app| prepare(app, &image, &extent)).await??;
     if let (Some(capture), Some(quad)) = (&mut capture, detected) {
@@ -142,7 +144,9 @@ fn flag(name: &'static str, part: Option<&Bytes>) -> Result<bool, ApiError> {
 fn extent(corners: Option<&Bytes>, whole_image: Option<&Bytes>) -> Result<LandmarkRegion, ApiError> {
     let whole = flag("whole_image", whole_image)?;
     match (corners, whole) {
-        (Some(_), true) => Err(ApiError::invalid("invalid_value", "whole_image", "not together with corners")),
+        (Some(_), true) => {
+            Err(ApiError::invalid("invalid_value", "whole_image", "not together with corners"))
+        }
         (Some(corners), false) => Ok(LandmarkRegion::Corners(extract::json(corners, "corners")?)),
         (None, true) => Ok(LandmarkRegion::Whole),
         (None, false) => Ok(LandmarkRegion::Detect),

@@ -171,7 +171,10 @@ mod tests {
         assert!((made.viewer.focal_px - 900.0).abs() < 1e-9 && (made.viewer.tilt_rad[1] - 1.2).abs() < 1e-9);
         assert_eq!(made.viewer.width_px.to_bits(), map.sight.viewer.width_px.to_bits());
         let wrong = VisibilitySettingsBody { tilt_low_rad: Some(0.4), ..VisibilitySettingsBody::default() };
-        assert_eq!(other(&wrong, &map, "visibility_settings").unwrap_err().field.as_deref(), Some("visibility_settings.tilt_high_rad"));
+        assert_eq!(
+            other(&wrong, &map, "visibility_settings").unwrap_err().field.as_deref(),
+            Some("visibility_settings.tilt_high_rad")
+        );
         assert_eq!(over(&shown(&made), &VisibilitySettings::default()).unwrap(), made, "there and back");
     }
 

@@ -316,7 +316,10 @@ async fn commit(
     let ended = Ended { state: "done", message, result: Some(result.to_string()) };
     let of = |model: &LandmarkModel| -> Vec<Value> {
         let found = learnt.look_alikes.get(&model.id).map_or(&[][..], Vec::as_slice);
-        found.iter().map(|l| json!({ "landmark": name(&l.other), "gradient_similarity": l.gradient_similarity })).collect()
+        found
+            .iter()
+            .map(|l| json!({ "landmark": name(&l.other), "gradient_similarity": l.gradient_similarity }))
+            .collect()
     };
     let models = learnt.models.iter().chain(&learnt.refitted);
     let rows: Vec<NewModel> = models.map(|model| row(model, &of(model))).collect();

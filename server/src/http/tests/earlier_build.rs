@@ -92,10 +92,12 @@ async fn a_mode_is_stored_in_the_words_of_the_column() {
     let service = Service::start(Limits::default()).await;
     for mode in ["near_best", "best", "all"] {
         let body = json!({ "fusion_mode": mode }).to_string();
-        let (status, set) = read(service.ask(request("PUT", "/api/v1/maps/hall/modalities", body)).await).await;
+        let (status, set) =
+            read(service.ask(request("PUT", "/api/v1/maps/hall/modalities", body)).await).await;
         assert_eq!((status, &set["fusion_mode"]), (200, &json!(mode)), "{set}");
     }
     let body = r#"{ "fusion_mode": "fuse" }"#;
-    let (status, problem) = read(service.ask(request("PUT", "/api/v1/maps/hall/modalities", body)).await).await;
+    let (status, problem) =
+        read(service.ask(request("PUT", "/api/v1/maps/hall/modalities", body)).await).await;
     assert_eq!((status, &problem["code"]), (422, &json!("invalid_value")), "{problem}");
 }
