@@ -1,4 +1,4 @@
-// The live page: the map from above with every robot's tracks, and the last frame of one camera with its quads.
+// The live page: the map from above with every robot's trajectories, and the last frame of one camera with its quads.
 // Reads the HTTP API once, then follows `maps/{map}/live` (server-sent events). Draws at most once per animation frame.
 
 import { drawFrame, quadCells } from "/frame.js";
@@ -7,7 +7,7 @@ import { drawModalities, loadModalities } from "/modalities.js";
 import { named, trustText } from "/naming.js";
 
 const API = "/api/v1";
-const TRACK_POINTS = 4000; // per robot and kind: the oldest are forgotten
+const TRAJECTORY_POINTS = 4000; // per robot and kind: the oldest are forgotten
 // A fused pose that is older is no pose.
 const MAX_POSE_AGE_S = 2;
 const CHI2_2_95 = 5.991; // 95 % of a two-dimensional Gaussian
@@ -28,18 +28,18 @@ const getJson = async (path) => {
 
 function robotOf(name) {
   if (!state.robots.has(name)) {
-    state.robots.set(name, { tracks: { truth: [], odometry: [], pose: [] }, covariance: null, hypotheses: [], needed: [], frames: 0, recognised: 0, byPose: 0, corrections: 0, trust: null });
+    state.robots.set(name, { trajectories: { truth: [], odometry: [], pose: [] }, covariance: null, hypotheses: [], missing: [], frames: 0, recognised: 0, byPose: 0, corrections: 0, trust: null });
     byId("robot-hint").textContent = "";
   }
   return state.robots.get(name);
 }
 
 function extend(name, kind, pose) {
-  const track = robotOf(name).tracks[kind];
-  const last = track[track.length - 1];
+  const trajectory = robotOf(name).trajectories[kind];
+  const last = trajectory[trajectory.length - 1];
   if (last && Math.hypot(last.x_m - pose.x_m, last.y_m - pose.y_m) < 0.005 && Math.abs(last.theta_rad - pose.theta_rad) < 0.005) return;
-  track.push(pose);
-  if (track.length > TRACK_POINTS) track.shift();
+  trajectory.push(pose);
+  if (trajectory.length > TRAJECTORY_POINTS) trajectory.shift();
 }
 
 const heard = {
@@ -102,7 +102,7 @@ async function showFrame(key, answer) {
     byId("quads").replaceChildren(...quadCells(answer).map(row));
     const work = (answer.timings ?? []).reduce((sum, t) => sum + t.ms, 0);
     byId("frame-facts").textContent = `frame ${answer.seq}: ${answer.status}, ${answer.quads.length} quads, ` +
-      `${work.toFixed(1)} ms of work, answered after ${answer.age_ms.toFixed(0)} ms`;
+      `${work.toFixed(1)} ms of work, answered after ${answer.latency_ms.toFixed(0)} ms`;
   } finally { frameBusy = false; }
 }
 
@@ -169,7 +169,7 @@ function drawMap() {
   if (layerOn("landmarks")) for (const landmark of state.landmarks) drawLandmark(c, landmark, px, ink);
   for (const kind of ["truth", "odometry", "pose"]) {
     if (!layerOn(kind)) continue;
-    for (const [name, robot] of state.robots) drawTrack(c, name, robot, kind, px, ink);
+    for (const [name, robot] of state.robots) drawTrajectory(c, name, robot, kind, px, ink);
   }
   if (layerOn("hypotheses")) for (const [name, robot] of state.robots) drawHypotheses(c, name, robot, px, px_per_m, ink.hypothesis);
 }
@@ -227,9 +227,9 @@ async function choose(landmark) {
 
 function factsOf(landmark) {
   const finding = landmark.finding;
-  if (landmark.standing === "sound" || !finding) return `${landmark.name}: ${landmark.standing === "sound" ? landmark.status : landmark.standing}`;
-  const why = finding.kind === "moved" ? `appears ${finding.by_m.toFixed(2)} m from its place, ${finding.sightings} times` : `not seen where it should be, ${finding.looks} times`;
-  return `${landmark.name}: ${landmark.standing}, ${why}`;
+  if (landmark.health === "sound" || !finding) return `${landmark.name}: ${landmark.health === "sound" ? landmark.status : landmark.health}`;
+  const why = finding.kind === "moved" ? `appears ${finding.offset_m.toFixed(2)} m from its place, ${finding.sightings} times` : `not seen where it should be, ${finding.missed_frames} times`;
+  return `${landmark.name}: ${landmark.health}, ${why}`;
 }
 
 // The landmark under the pointer, within 14 pixels of its middle.
@@ -254,23 +254,23 @@ function drawLandmark(c, landmark, px, ink) {
   line(c, px(place.x_m - dx, place.y_m - dy), px(place.x_m + dx, place.y_m + dy));
   const [u, v] = px(place.x_m + 0.35 * Math.cos(place.theta_rad), place.y_m + 0.35 * Math.sin(place.theta_rad));
   c.font = seen || state.chosen === landmark.name ? "bold 12px system-ui" : "12px system-ui";
-  const label = landmark.standing === "sound" ? landmark.name : `${landmark.name} (${landmark.standing})`;
+  const label = landmark.health === "sound" ? landmark.name : `${landmark.name} (${landmark.health})`;
   c.fillText(label, u - c.measureText(label).width / 2, v + 4);
   if (seen) state.dirty = true; // to dim it again in time
 }
 
-function drawTrack(c, name, robot, kind, px, ink) {
-  const track = robot.tracks[kind];
-  if (!track.length) return;
-  // The truth lies wide and pale beneath, so that a corrected track on top of it is still seen.
+function drawTrajectory(c, name, robot, kind, px, ink) {
+  const trajectory = robot.trajectories[kind];
+  if (!trajectory.length) return;
+  // The truth lies wide and pale beneath, so that a corrected trajectory on top of it is still seen.
   stroke(c, ink[kind], kind === "truth" ? 6 : 1.6);
   c.globalAlpha = kind === "truth" ? 0.35 : 1;
   c.beginPath();
-  track.forEach((p, i) => (i ? c.lineTo(...px(p.x_m, p.y_m)) : c.moveTo(...px(p.x_m, p.y_m))));
+  trajectory.forEach((p, i) => (i ? c.lineTo(...px(p.x_m, p.y_m)) : c.moveTo(...px(p.x_m, p.y_m))));
   c.stroke();
   c.globalAlpha = 1;
   c.lineWidth = 1.6;
-  const last = track[track.length - 1];
+  const last = trajectory[trajectory.length - 1];
   const [u, v] = px(last.x_m, last.y_m);
   c.save();
   c.translate(u, v);
@@ -297,23 +297,23 @@ function ellipse(c, u, v, covariance) {
 
 // ---- the robots ----
 
-// What a robot that searches still needs.
-async function askNeeds() {
+// What a robot that relocalises still needs.
+async function askMissing() {
   for (const [name, robot] of state.robots) {
     if (!robot.hypotheses.length) continue;
-    const found = await getJson(`/robots/${encodeURIComponent(name)}/hypotheses`).catch(() => null);
-    robot.needed = found?.needed ?? [];
+    const found = await getJson(`/robots/${encodeURIComponent(name)}/relocalisation`).catch(() => null);
+    robot.missing = found?.missing ?? [];
   }
 }
 
 function errorOf(robot, kind) {
-  const truth = robot.tracks.truth.at(-1), other = robot.tracks[kind].at(-1);
+  const truth = robot.trajectories.truth.at(-1), other = robot.trajectories[kind].at(-1);
   return truth && other ? `${Math.hypot(truth.x_m - other.x_m, truth.y_m - other.y_m).toFixed(2)} m` : "";
 }
 
 function listRobots() {
   const rows = [...state.robots].sort(([a], [b]) => a.localeCompare(b)).map(([name, robot]) => {
-    const pose = robot.tracks.pose.at(-1);
+    const pose = robot.trajectories.pose.at(-1);
     const sigma = robot.covariance ? `${Math.sqrt(robot.covariance[0] + robot.covariance[4]).toFixed(2)} m` : "";
     // The server publishes no pose that is older: what is shown then is where the robot was.
     const age_s = robot.posed === undefined ? Infinity : (performance.now() - robot.posed) / 1000;
@@ -327,12 +327,12 @@ function listRobots() {
 // ---- start ----
 
 async function loadMap(name) {
-  const [map, laser, landmarks] = await Promise.all([
-    getJson(`/maps/${encodeURIComponent(name)}`), getJson(`/maps/${encodeURIComponent(name)}/laser`),
+  const [map, walls, landmarks] = await Promise.all([
+    getJson(`/maps/${encodeURIComponent(name)}`), getJson(`/maps/${encodeURIComponent(name)}/walls`),
     getJson(`/maps/${encodeURIComponent(name)}/landmarks?limit=500`),
   ]);
-  await loadTracks(name);
-  Object.assign(state, { map: name, walls: laser.segments, landmarks: landmarks.items, dirty: true });
+  await loadTrajectories(name);
+  Object.assign(state, { map: name, walls: walls.segments, landmarks: landmarks.items, dirty: true });
   if (state.chosen) choose(state.landmarks.find((l) => l.name === state.chosen));
   const active = state.landmarks.filter((l) => l.status === "active").length;
   const where = [map.site, map.building, map.floor].filter(Boolean).join(" / ");
@@ -345,14 +345,14 @@ async function loadMap(name) {
 }
 
 // Where the map's robots have been before this page was opened.
-async function loadTracks(map) {
+async function loadTrajectories(map) {
   const robots = (await getJson("/robots?limit=100")).items.filter((robot) => robot.map === map);
   for (const { name, pose } of robots.filter((robot) => !state.robots.has(robot.name))) {
-    const tracks = await getJson(`/robots/${encodeURIComponent(name)}/tracks`);
-    if (tracks.pose.length || tracks.odometry.length || tracks.truth.length) Object.assign(robotOf(name).tracks, tracks);
+    const trajectories = await getJson(`/robots/${encodeURIComponent(name)}/trajectories`);
+    if (trajectories.pose.length || trajectories.odometry.length || trajectories.truth.length) Object.assign(robotOf(name).trajectories, trajectories);
     if (pose) Object.assign(robotOf(name), { covariance: pose.covariance, trust: pose.trust, posed: performance.now() - pose.age_ms });
-    const found = await getJson(`/robots/${encodeURIComponent(name)}/hypotheses`);
-    if (found.searching && found.map === map) Object.assign(robotOf(name), { hypotheses: fromServer(found), needed: found.needed });
+    const found = await getJson(`/robots/${encodeURIComponent(name)}/relocalisation`);
+    if (found.relocalising && found.map === map) Object.assign(robotOf(name), { hypotheses: fromServer(found), missing: found.missing });
   }
 }
 
@@ -450,6 +450,6 @@ start().catch((error) => {
   byId("map-hint").textContent = `The server does not answer as expected (${error.message}). Reload to try again.`;
 });
 setInterval(listRobots, 500);
-setInterval(askNeeds, 2000);
+setInterval(askMissing, 2000);
 const loop = () => { drawMap(); requestAnimationFrame(loop); };
 loop();

@@ -1,11 +1,11 @@
-// The panel for views gathered while a robot drives: turn it on, watch the counts, look at the candidates, accept or throw
+// The panel for views gathered while a robot drives: turn it on, watch the counts, look at the tracks, accept or throw
 // away. Hears from app.js which map is shown; talks to `maps/{map}/gatherings`.
 
 const API = "/api/v1";
 const POLL_MS = 2000;
 
 const byId = (id) => document.getElementById(id);
-const state = { map: null, gathering: null, candidates: [], busy: false };
+const state = { map: null, gathering: null, tracks: [], busy: false };
 
 async function ask(method, path, body) {
   const init = { method, headers: { accept: "application/json" } };
@@ -38,7 +38,7 @@ function options(select, values, first) {
 
 async function open(map, landmarks) {
   if (state.map !== map) {
-    Object.assign(state, { map, gathering: null, candidates: [] });
+    Object.assign(state, { map, gathering: null, tracks: [] });
     list();
   }
   options(byId("gather-landmark"), landmarks.filter((l) => l.status === "active").map((l) => l.name), "whatever is new");
@@ -47,12 +47,12 @@ async function open(map, landmarks) {
   const all = (await ask("GET", `${home()}?limit=100`)).items;
   const shown = state.gathering && all.find((g) => g.id === state.gathering.id);
   state.gathering = shown ?? all.find((g) => g.open) ?? all.at(-1) ?? null;
-  if (state.gathering && !state.candidates.length) await look();
+  if (state.gathering && !state.tracks.length) await look();
   show();
 }
 
 async function look() {
-  state.candidates = (await ask("GET", `${here()}/candidates`)).candidates;
+  state.tracks = (await ask("GET", `${here()}/tracks`)).tracks;
   list();
   show();
 }
@@ -70,51 +70,51 @@ function show() {
   byId("gather-start").disabled = !byId("gather-robot").value;
   for (const id of ["gather-stop", "gather-look", "gather-accept", "gather-drop"]) byId(id).disabled = !g;
   byId("gather-stop").disabled = !g?.open;
-  byId("gather-accept").disabled = !state.candidates.length;
+  byId("gather-accept").disabled = !state.tracks.length;
   if (!g) {
     byId("gather-facts").textContent = "Nothing has been gathered on this map.";
   } else {
     const c = g.counts;
     byId("gather-facts").textContent = `${g.open ? "gathering" : "ended"}: ${g.robot}, ${g.landmark ?? (g.known ? "whatever is new and what it recognises" : "whatever is new")}; ` +
-      `${c.frames} frames (${c.dropped} dropped), ${c.kept} views kept, ${c.alike} like one that is kept, ${c.known} known or nearly`;
+      `${c.frames} frames (${c.dropped} dropped), ${c.kept} views kept, ${c.near_duplicate} like one that is kept, ${c.known_landmark} known or nearly`;
   }
 }
 
 // Only when they were asked for anew: names that are being typed stay.
 function list() {
-  byId("gather-table").hidden = !state.candidates.length;
-  byId("candidates").replaceChildren(...state.candidates.map(rowOf));
+  byId("gather-table").hidden = !state.tracks.length;
+  byId("tracks").replaceChildren(...state.tracks.map(rowOf));
 }
 
-function rowOf(candidate) {
+function rowOf(track) {
   const tr = document.createElement("tr");
   const cell = (content) => tr.insertCell().append(content);
   const picture = new Image(75, 75);
-  picture.alt = `candidate ${candidate.number}`;
-  if (candidate.best !== null) picture.src = `${API}${here()}/candidates/${candidate.number}/views/${candidate.best}/icon`;
+  picture.alt = `track ${track.number}`;
+  if (track.best_view !== null) picture.src = `${API}${here()}/tracks/${track.number}/views/${track.best_view}/icon`;
   cell(picture);
-  cell(`${candidate.views.length} of ${candidate.sightings}${candidate.apart ? `, ${candidate.apart} left out` : ""}`);
-  const hangs = candidate.hangs;
-  cell(hangs ? `${degrees(hangs.angle_rad[0])} to ${degrees(hangs.angle_rad[1])}` : "unknown");
-  cell(candidate.side_px.map((s) => s.toFixed(0)).join(" to ") + " px");
-  cell(hangs ? `${hangs.x_m.toFixed(2)}, ${hangs.y_m.toFixed(2)} m; ${hangs.width_m.toFixed(2)} x ${hangs.height_m.toFixed(2)} m` : candidate.not_placed);
+  cell(`${track.views.length} of ${track.sightings}${track.inconsistent_views ? `, ${track.inconsistent_views} left out` : ""}`);
+  const place = track.place;
+  cell(place ? `${degrees(place.angle_rad[0])} to ${degrees(place.angle_rad[1])}` : "unknown");
+  cell(track.side_px.map((s) => s.toFixed(0)).join(" to ") + " px");
+  cell(place ? `${place.x_m.toFixed(2)}, ${place.y_m.toFixed(2)} m; ${place.width_m.toFixed(2)} x ${place.height_m.toFixed(2)} m` : track.not_placed);
   const verdict = document.createElement("span");
-  verdict.textContent = candidate.passes ? "passes" : candidate.reasons.map((r) => r.detail).join("; ");
+  verdict.textContent = track.passes ? "passes" : track.reasons.map((r) => r.detail).join("; ");
   verdict.className = "reasons";
   cell(verdict);
   const name = document.createElement("input");
   name.size = 14;
   name.maxLength = 64;
   name.placeholder = "name";
-  name.dataset.candidate = candidate.number;
-  name.setAttribute("aria-label", `name of candidate ${candidate.number}`);
-  if (candidate.landmark) Object.assign(name, { value: candidate.landmark, readOnly: true });
+  name.dataset.track = track.number;
+  name.setAttribute("aria-label", `name of track ${track.number}`);
+  if (track.landmark) Object.assign(name, { value: track.landmark, readOnly: true });
   cell(name);
   const drop = document.createElement("button");
   drop.type = "button";
   drop.textContent = "Throw away";
   drop.addEventListener("click", () => act(async () => {
-    await ask("DELETE", `${here()}/candidates/${candidate.number}`);
+    await ask("DELETE", `${here()}/tracks/${track.number}`);
     await look();
   }));
   cell(drop);
@@ -122,10 +122,10 @@ function rowOf(candidate) {
 }
 
 async function accept() {
-  const named = [...byId("candidates").querySelectorAll("input")].filter((i) => i.value.trim());
-  if (!named.length) throw new Error("Name at least one candidate.");
-  const picks = named.map((i) => (i.readOnly ? { candidate: Number(i.dataset.candidate) } : { candidate: Number(i.dataset.candidate), name: i.value.trim() }));
-  const accepted = await ask("POST", `${here()}/accept`, { candidates: picks });
+  const named = [...byId("tracks").querySelectorAll("input")].filter((i) => i.value.trim());
+  if (!named.length) throw new Error("Name at least one track.");
+  const picks = named.map((i) => (i.readOnly ? { track: Number(i.dataset.track) } : { track: Number(i.dataset.track), name: i.value.trim() }));
+  const accepted = await ask("POST", `${here()}/accept`, { tracks: picks });
   await look();
   let job = accepted.job;
   while (job && (job.state === "queued" || job.state === "running")) {
@@ -140,7 +140,7 @@ window.addEventListener("map-loaded", (e) => act(() => open(e.detail.map, e.deta
 byId("gather-start").addEventListener("click", () => act(async () => {
   const landmark = byId("gather-landmark").value || null;
   state.gathering = await ask("POST", home(), { robot: byId("gather-robot").value, landmark, known: byId("gather-known").checked });
-  state.candidates = [];
+  state.tracks = [];
   list();
   show();
 }));
@@ -152,7 +152,7 @@ byId("gather-look").addEventListener("click", () => act(look));
 byId("gather-accept").addEventListener("click", () => act(accept));
 byId("gather-drop").addEventListener("click", () => act(async () => {
   await ask("DELETE", here());
-  Object.assign(state, { gathering: null, candidates: [] });
+  Object.assign(state, { gathering: null, tracks: [] });
   list();
   show();
 }));

@@ -4,27 +4,27 @@
 const CHI2_2_95 = 5.991; // 95 % of a two-dimensional Gaussian
 const FAINTEST = 0.12;
 const WORDS = {
-  fewer_places: "other places are still too probable",
-  another_landmark: "another landmark has to be seen",
-  agreeing_sightings: "what was seen does not agree well enough",
-  no_other_place: "another place would explain what was seen nearly as well",
+  higher_probability: "other places are still too probable",
+  second_landmark: "another landmark has to be seen",
+  consistent_observations: "what was seen does not agree well enough",
+  no_rival_pose: "another place would explain what was seen nearly as well",
 };
 
 // Of an answer's hypotheses on the wire.
 export const fromAnswer = (hypotheses) => (hypotheses ?? []).filter((h) => h.map_from_robot?.pose).map((h) => ({
-  probability: h.mass, covariance: h.map_from_robot.covariance, ...h.map_from_robot.pose,
+  probability: h.probability, covariance: h.map_from_robot.covariance, ...h.map_from_robot.pose,
 }));
 
 // Of the server's own account.
 export const fromServer = (found) => found.hypotheses;
 
-export const inWords = (needed) => (needed ?? []).map((need) => WORDS[need] ?? need).join(", ");
+export const inWords = (missing) => (missing ?? []).map((condition) => WORDS[condition] ?? condition).join(", ");
 
 export function positionText(robot) {
   const best = robot.hypotheses?.[0];
   if (!best) return "not localised yet";
   const places = robot.hypotheses.length;
-  const why = inWords(robot.needed);
+  const why = inWords(robot.missing);
   return `${places === 1 ? "one possible place" : `${places} possible places`}, the best ${(100 * best.probability).toFixed(0)} %${why ? `: ${why}` : ""}`;
 }
 

@@ -18,7 +18,7 @@ function tell() {
   const { areas } = known;
   byId("modality-bar").hidden = !shown();
   if (!areas) return;
-  byId("fusion").value = areas.mode;
+  byId("fusion").value = areas.fusion_mode;
   const judged = areas.cells.filter((cell) => cell.best).length;
   byId("modality-hint").textContent = areas.cells.length
     ? `${areas.cells.length} squares and headings driven through, ${judged} often enough to be judged.`
@@ -28,7 +28,7 @@ function tell() {
 // Reads what is known of a map, if the layer is shown.
 export async function loadModalities(map, changed) {
   Object.assign(known, { map, changed });
-  known.areas = shown() ? await asked(`/maps/${encodeURIComponent(map)}/areas`).catch(() => null) : null;
+  known.areas = shown() ? await asked(`/maps/${encodeURIComponent(map)}/modalities`).catch(() => null) : null;
   tell();
   changed();
 }
@@ -65,9 +65,9 @@ export function drawModalities(c, px, ink) {
 }
 
 byId("fusion").addEventListener("change", async (event) => {
-  const body = JSON.stringify({ mode: event.target.value });
+  const body = JSON.stringify({ fusion_mode: event.target.value });
   try {
-    known.areas = await asked(`/maps/${encodeURIComponent(known.map)}/areas`, { method: "PUT", body });
+    known.areas = await asked(`/maps/${encodeURIComponent(known.map)}/modalities`, { method: "PUT", body });
     tell();
   } catch (error) {
     byId("modality-hint").textContent = `Not changed: ${error.message}.`;

@@ -44,12 +44,12 @@ const TRUST = {
 export const trustText = (trust) => (trust ? TRUST[trust] ?? trust : "");
 
 const KINDS = {
-  landmarks: "landmarks by picture", guided: "landmarks by pose", laser: "laser", hypotheses: "the last place left",
-  map: "the pose on another map",
+  landmarks: "landmarks by picture", guided: "landmarks by pose", laser: "laser", relocalisation: "the last place left",
+  map_change: "the pose on another map",
 };
 const OUTCOMES = {
   started: "began the pose", applied: "applied", gated_out: "left out: contradicts the pose", reset: "replaced the pose",
-  not_used: "not used: another modality is better here", too_old: "left out: too old", waiting: "waits for odometry",
+  excluded_by_mode: "not used: another modality is better here", too_old: "left out: too old", waiting: "waits for odometry",
   carried_over: "carried over", repeated: "repeated", no_pose: "no pose to correct",
 };
 

@@ -9,7 +9,7 @@ const DEG = Math.PI / 180;
 const WORDS = [["site", "site"], ["building", "building"], ["floor", "floor"]];
 const LINK = [["x_m", "x of its origin there", "m", 1], ["y_m", "y of its origin there", "m", 1],
   ["theta_rad", "its x axis there", "°", DEG], ["level_m", "its floor above that one", "m", 1]];
-const SIGHT = [["width_px", "image width", "px", 1], ["height_px", "image height", "px", 1], ["focal_px", "focal length", "px", 1],
+const VISIBILITY = [["width_px", "image width", "px", 1], ["height_px", "image height", "px", 1], ["focal_px", "focal length", "px", 1],
   ["camera_height_m", "camera above the floor", "m", 1], ["tilt_low_rad", "lowest tilt", "°", DEG], ["tilt_high_rad", "highest tilt", "°", DEG],
   ["pan_low_rad", "rightmost pan", "°", DEG], ["pan_high_rad", "leftmost pan", "°", DEG],
   ["max_incidence_rad", "most oblique view", "°", DEG], ["min_side_px", "shortest side seen", "px", 1],
@@ -106,10 +106,10 @@ function saveWhere(event) {
   });
 }
 
-function saveSight(event) {
+function saveVisibility(event) {
   event.preventDefault();
   const form = event.target;
-  send(form, SIGHT, async () => show(form, SIGHT, await ask("PUT", `${place()}/sight`, numbers(form, SIGHT))));
+  send(form, VISIBILITY, async () => show(form, VISIBILITY, await ask("PUT", `${place()}/visibility-settings`, numbers(form, VISIBILITY))));
 }
 
 function toggleLink(form) {
@@ -118,11 +118,11 @@ function toggleLink(form) {
 
 async function load(name) {
   map = name;
-  const [found, sight, maps] = await Promise.all([ask("GET", place()), ask("GET", `${place()}/sight`), ask("GET", "/maps?limit=500")]);
+  const [found, settings, maps] = await Promise.all([ask("GET", place()), ask("GET", `${place()}/visibility-settings`), ask("GET", "/maps?limit=500")]);
   if (map !== name) return;
   const form = byId("where-form");
   // What somebody is typing stays.
-  if (form.contains(document.activeElement) || byId("sight-form").contains(document.activeElement)) return;
+  if (form.contains(document.activeElement) || byId("visibility-form").contains(document.activeElement)) return;
   for (const [word] of WORDS) form.elements[word].value = found[word] ?? "";
   const others = maps.items.filter((m) => m.name !== name).map((m) => new Option([m.building, m.floor, m.name].filter(Boolean).join(" / "), m.name));
   form.elements.parent.replaceChildren(new Option("none: it stands for itself", ""), ...others);
@@ -131,21 +131,21 @@ async function load(name) {
   form.dataset.covariance = found.parent?.covariance ? JSON.stringify(found.parent.covariance) : "";
   show(form, LINK, found.parent);
   toggleLink(form);
-  show(byId("sight-form"), SIGHT, sight);
+  show(byId("visibility-form"), VISIBILITY, settings);
 }
 
 function build() {
-  const where = byId("where-form"), sight = byId("sight-form");
+  const where = byId("where-form"), settings = byId("visibility-form");
   const parent = field("parent", "lies in the map");
   const choice = Object.assign(document.createElement("select"), { name: "parent" });
   choice.setAttribute("aria-describedby", "wrong-parent");
   parent.querySelector("input").replaceWith(choice);
   byId("where-fields").append(...WORDS.map(([name, label]) => field(name, label)), parent, ...LINK.map(([name, label, unit]) => field(name, label, unit)));
-  byId("sight-fields").append(...SIGHT.map(([name, label, unit]) => field(name, label, unit)));
+  byId("visibility-fields").append(...VISIBILITY.map(([name, label, unit]) => field(name, label, unit)));
   choice.addEventListener("change", () => toggleLink(where));
   where.addEventListener("submit", saveWhere);
-  sight.addEventListener("submit", saveSight);
-  byId("sight-usual").addEventListener("click", () => send(sight, SIGHT, async () => show(sight, SIGHT, await ask("PUT", `${place()}/sight`, {}))));
+  settings.addEventListener("submit", saveVisibility);
+  byId("visibility-defaults").addEventListener("click", () => send(settings, VISIBILITY, async () => show(settings, VISIBILITY, await ask("PUT", `${place()}/visibility-settings`, {}))));
   window.addEventListener("map-loaded", (event) => load(event.detail.map).catch((error) => {
     where.querySelector("[role=status]").textContent = `The server does not answer as expected (${error.message}).`;
   }));

@@ -69,7 +69,7 @@ fn sentence(answer: &v1::Answer) -> String {
             answer.quads.len(),
             answer.map,
             answer.map_version,
-            answer.age_ms
+            answer.latency_ms
         ),
     }
 }

@@ -84,7 +84,7 @@ async fn main() -> Result<(), anyhow::Error> {
     server.wait_for_job(job, Duration::from_mins(30), report).await?;
     for name in &names {
         let landmark = server.landmark(map, name).await?;
-        println!("{name}: {} {}", landmark.status, serde_json::to_string(&landmark.reasons)?);
+        println!("{name}: {} {}", landmark.status, serde_json::to_string(&landmark.failed_gates)?);
     }
     if let Some(robot) = &arguments.robot {
         server.put_robot(robot, map).await?;

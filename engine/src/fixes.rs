@@ -48,14 +48,14 @@ impl NoFix {
             Self::NothingRecognised => "",
             Self::LandmarkNotPlaced => "landmark_not_placed",
             Self::LandmarkQuarantined => "landmark_quarantined",
-            Self::NoExtrinsics => "no_mounting",
-            Self::WeakObservation => "unsure",
+            Self::NoExtrinsics => "no_extrinsics",
+            Self::WeakObservation => "weak_observation",
             Self::Ambiguous => "ambiguous",
             Self::Degenerate => "degenerate",
-            Self::GateReprojection => "gate_room",
+            Self::GateReprojection => "gate_reprojection",
             Self::GatePrior => "gate_prior",
-            Self::GateBehindWall => "gate_side",
-            Self::GateInconsistent => "disagree",
+            Self::GateBehindWall => "gate_behind_wall",
+            Self::GateInconsistent => "gate_inconsistent",
         }
     }
 }

@@ -27,7 +27,7 @@ pub fn answer_to_photograph(image: &GrayImage, camera: Option<&Intrinsics>, map:
     let facts = analyse_frame(image, camera, map, &mut times);
     let mut answer = answer(&facts, map);
     answer.timings = times.finish();
-    answer.age_ms = started.elapsed().as_secs_f64() * 1e3;
+    answer.latency_ms = started.elapsed().as_secs_f64() * 1e3;
     answer
 }
 

@@ -79,14 +79,14 @@ pub struct RelocalisationProgress {
 /// Why the first hypothesis is not yet the pose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MissingCondition {
-    /// Other places are too probable still.
-    FewerPlaces,
-    /// All sightings could be of one landmark: another is to be seen.
-    AnotherLandmark,
+    /// It is not probable enough: other places are too probable still.
+    HigherProbability,
+    /// All observations could be of one landmark: a second is to be seen.
+    SecondLandmark,
     /// It does not explain enough of what was seen.
-    AgreeingSightings,
+    ConsistentObservations,
     /// The landmarks hang so evenly that another place would explain what was seen nearly as well.
-    NoOtherPlace,
+    NoRivalPose,
 }
 
 /// What is left after a frame.
@@ -205,7 +205,7 @@ impl Search {
             looks: VecDeque::new(),
             modes: Vec::new(),
             landmarks: Vec::new(),
-            needed: vec![MissingCondition::FewerPlaces, MissingCondition::AnotherLandmark],
+            needed: vec![MissingCondition::HigherProbability, MissingCondition::SecondLandmark],
         })
     }
 
@@ -243,20 +243,20 @@ impl Search {
     fn decided(&mut self, map: &MapSnapshot) -> Option<(Pose2Covariance, Vec<LandmarkId>)> {
         self.needed = Vec::new();
         let Some(mode) = self.modes.first().copied().filter(|m| m.mass > self.p.decided) else {
-            self.needed.push(MissingCondition::FewerPlaces);
+            self.needed.push(MissingCondition::HigherProbability);
             self.landmarks =
                 self.modes.first().map_or_else(Vec::new, |m| self.explained(&m.pose.pose, map).0);
             return None;
         };
         let (landmarks, share) = self.explained(&mode.pose.pose, map);
         if landmarks.len() < LEAST_LANDMARKS {
-            self.needed.push(MissingCondition::AnotherLandmark);
+            self.needed.push(MissingCondition::SecondLandmark);
         }
         if share < LEAST_EXPLAINED {
-            self.needed.push(MissingCondition::AgreeingSightings);
+            self.needed.push(MissingCondition::ConsistentObservations);
         }
         if self.needed.is_empty() && self.has_rival(&mode.pose.pose, &landmarks, map) {
-            self.needed.push(MissingCondition::NoOtherPlace);
+            self.needed.push(MissingCondition::NoRivalPose);
         }
         self.landmarks.clone_from(&landmarks);
         let cell = Vector3::new(self.p.cell_m, self.p.cell_m, 0.1).map(|s| s * s);

@@ -28,17 +28,19 @@ impl LandmarkFinding {
     /// Of what a robot's watch says.
     pub fn new(map: &str, name: &str, change: &HealthChange) -> Self {
         let finding = change.finding.map(|finding| match finding {
-            Finding::Moved { apparent, by_m, sightings } => json!({
-                "kind": "moved", "by_m": by_m, "sightings": sightings,
-                "apparent": { "x_m": apparent.x_m, "y_m": apparent.y_m, "theta_rad": apparent.theta_rad },
+            Finding::Moved { observed_place: at, offset_m, sightings } => json!({
+                "kind": "moved", "offset_m": offset_m, "sightings": sightings,
+                "observed_place": { "x_m": at.x_m, "y_m": at.y_m, "theta_rad": at.theta_rad },
             }),
-            Finding::Missing { looks } => json!({ "kind": "missing", "looks": looks }),
+            Finding::Missing { missed_frames } => {
+                json!({ "kind": "missing", "missed_frames": missed_frames })
+            }
         });
         Self {
             map: map.to_owned(),
             landmark: change.landmark,
             name: name.to_owned(),
-            standing: change.standing,
+            standing: change.health,
             finding: finding.map(|f| f.to_string()),
         }
     }
@@ -57,7 +59,16 @@ pub fn findings() -> (FindingSender, Receiver<LandmarkFinding>) {
 impl FindingSender {
     /// Passes one on.
     pub fn tell(&self, found: LandmarkFinding) {
-        tracing::warn!(map = found.map, landmark = found.name, standing = ?found.standing, finding = found.finding, "landmark");
+        let is_quarantined = found.standing == LandmarkHealth::Quarantined;
+        let follows = is_quarantined.then_some("excluded from fixes until a person decides");
+        tracing::warn!(
+            map = found.map,
+            landmark = found.name,
+            health = ?found.standing,
+            finding = found.finding,
+            follows,
+            "landmark_health_changed"
+        );
         if let Err(TrySendError::Full(found)) = self.0.try_send(found) {
             tracing::warn!(landmark = found.name, "too many findings at once: this one is dropped");
         }

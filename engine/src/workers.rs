@@ -317,7 +317,7 @@ impl Engine {
         let frame = &job.frame;
         (answer.epoch, answer.seq, answer.captured_ns) = (frame.epoch, frame.seq, frame.captured_ns);
         answer.clock_suspect = job.clock_suspect;
-        answer.age_ms = job.received.elapsed().as_secs_f64() * 1e3;
+        answer.latency_ms = job.received.elapsed().as_secs_f64() * 1e3;
         publish.answer(key, &answer);
         let answer = Arc::new(answer);
         if answer.rejection.is_none() {
@@ -344,7 +344,7 @@ fn view<'a>(frame: &'a CheckedFrame, facts: &'a FrameAnalysis, map: &'a MapSnaps
 }
 
 fn hypothesis(mode: &PoseHypothesis) -> v1::Hypothesis {
-    v1::Hypothesis { mass: mode.mass, map_from_robot: Some(pose2_covariance_wire(&mode.pose)) }
+    v1::Hypothesis { probability: mode.mass, map_from_robot: Some(pose2_covariance_wire(&mode.pose)) }
 }
 
 fn moment<'a>(frame: &CheckedFrame, map: &'a MapSnapshot) -> FrameStamp<'a> {

@@ -44,10 +44,10 @@ fuzz_target!(|data: &[u8]| {
 fn params(switches: u8, more: u8, width_px: usize) -> DetectParams {
     let on = |bit: u8| switches >> bit & 1 == 1;
     let mut p = DetectParams::default();
-    p.quads.grouping = if on(0) { Grouping::Relaxation } else { Grouping::Hypotheses };
+    p.quads.grouping = if on(0) { Grouping::Relaxation } else { Grouping::Proposals };
     p.quads.nested = if on(1) { Nested::Quads } else { Nested::Alternates };
     p.quads.three_sided = !on(2);
-    p.quads.hypotheses.complete = !on(3);
+    p.quads.proposals.complete = !on(3);
     p.tiling.remove = on(4);
     p.quads.working_side_px = if on(5) { 100 } else { 640 };
     p.quads.scales = usize::from(more) % (MAX_SCALES + 2);
@@ -102,9 +102,9 @@ fn turn(p: &mut DetectParams, knob: u8, value: u8) {
         21 => p.quads.min_step = x,
         22 => p.quads.min_side_support = x,
         23 => p.quads.min_score = x,
-        24 => p.quads.hypotheses.min_support = x,
-        25 => p.quads.hypotheses.max_gap = x,
-        26 => p.quads.hypotheses.min_step = x,
+        24 => p.quads.proposals.min_support = x,
+        25 => p.quads.proposals.max_gap = x,
+        26 => p.quads.proposals.min_step = x,
         27 => p.tiling.max_distance = x,
         28 => p.tiling.period_range[usize::from(value) % 2] = x,
         29 => p.tiling.max_residual = x,

@@ -149,20 +149,20 @@ pub struct Candidate {
     #[prost(double, tag = "4")]
     pub distance: f64,
     #[prost(double, tag = "5")]
-    pub tau: f64,
+    pub threshold: f64,
     #[prost(double, tag = "6")]
     pub ratio: f64,
     #[prost(double, tag = "7")]
     pub probability: f64,
-    /// Empty, or the gate that refused it: correlation, hausdorff, likeness, contradiction, content, margin,
+    /// Empty, or the gate that refused it: correlation, hausdorff, similarity, mismatch, low_content, margin,
     /// points (so many points would agree by chance too often), disagreement (a connected part shows something else),
     /// corners (points agree, but do not tell where its corners are), plain (its icon alone speaks for it).
     #[prost(string, tag = "8")]
     pub refusal: ::prost::alloc::string::String,
-    /// How alike the picture and the learnt icon are, one laid on the other, -1 to 1; absent where the map's distances
+    /// Gradient similarity of the picture and the learnt icon after alignment, -1 to 1; absent where the map's distances
     /// decide alone.
     #[prost(double, optional, tag = "9")]
-    pub likeness: ::core::option::Option<f64>,
+    pub gradient_similarity: ::core::option::Option<f64>,
 }
 /// What matched points say of the first candidate.
 #[derive(::serde::Serialize, ::serde::Deserialize)]
@@ -272,7 +272,7 @@ pub struct StageTime {
 pub struct Hypothesis {
     /// Its share of the belief, 0 to 1.
     #[prost(double, tag = "1")]
-    pub mass: f64,
+    pub probability: f64,
     #[prost(message, optional, tag = "2")]
     pub map_from_robot: ::core::option::Option<Pose2Covariance>,
 }
@@ -306,18 +306,18 @@ pub struct Answer {
     pub pose_landmarks: ::prost::alloc::vec::Vec<::prost::alloc::string::String>,
     /// Receipt to answer, server clock.
     #[prost(double, tag = "11")]
-    pub age_ms: f64,
+    pub latency_ms: f64,
     #[prost(message, repeated, tag = "12")]
     pub timings: ::prost::alloc::vec::Vec<StageTime>,
     /// The capture time is more than 2 s from the server's clock, or does not fit those of the robot's other messages: then
     /// the answer holds for the image, and the frame has no influence on the fused pose.
     #[prost(bool, tag = "13")]
     pub clock_suspect: bool,
-    /// Why recognised landmarks gave no robot pose: empty, no_mounting, landmark_not_placed, landmark_quarantined (found
-    /// moved or missing; see its standing), unsure (seen too poorly to tell whether it was moved, by a robot whose pose is
-    /// known well enough without), ambiguous, or a gate:
-    /// gate_prior (the robot's prior rules it out), gate_room (no upright robot on the floor sees them so), gate_side (it
-    /// would stand behind the wall), disagree (the landmarks contradict one another), degenerate.
+    /// Why recognised landmarks gave no robot pose: empty, no_extrinsics, landmark_not_placed, landmark_quarantined (found
+    /// moved or missing; see its health), weak_observation (seen too poorly to tell whether it was moved, by a robot whose
+    /// pose is known well enough without), ambiguous, or a gate:
+    /// gate_prior (the robot's prior rules it out), gate_reprojection (no upright robot on the floor sees them so),
+    /// gate_behind_wall (it would stand behind the wall), gate_inconsistent (the landmarks contradict one another), degenerate.
     #[prost(string, tag = "14")]
     pub pose_refusal: ::prost::alloc::string::String,
     /// Where the robot may be while it does not know its pose and sees only landmarks that each may be several, most probable
@@ -390,8 +390,9 @@ pub struct RobotPose {
     #[prost(message, optional, tag = "4")]
     pub map_from_robot: ::core::option::Option<Pose2Covariance>,
     /// What the pose rests on now: odometry, if it carries the pose; landmarks (named without the pose), guided (landmarks named
-    /// by the pose) and laser, if fixes of that kind agreed with it within the last 10 m; hypotheses, if it began with the last of several that were left and no landmark has confirmed it
-    /// yet. `odometry` alone: it is 10 m since anything else was said.
+    /// by the pose) and laser, if fixes of that kind agreed with it within the last 10 m; relocalisation, if it began with the
+    /// last of several hypotheses that were left and no landmark has confirmed it yet. `odometry` alone: it is 10 m since
+    /// anything else was said.
     #[prost(string, repeated, tag = "5")]
     pub modalities: ::prost::alloc::vec::Vec<::prost::alloc::string::String>,
     /// Corrections by landmarks applied since the start, guided ones included.
@@ -465,8 +466,8 @@ pub struct GazeAdvice {
     pub map_version: u64,
     #[prost(message, optional, tag = "3")]
     pub rejection: ::core::option::Option<Rejection>,
-    #[prost(enumeration = "GazeLook", tag = "4")]
-    pub look: i32,
+    #[prost(enumeration = "GazeAction", tag = "4")]
+    pub action: i32,
     /// What follows is set for LANDMARK only.
     #[prost(string, tag = "5")]
     pub landmark: ::prost::alloc::string::String,
@@ -772,7 +773,7 @@ impl GazeCriterion {
 }
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]
 #[repr(i32)]
-pub enum GazeLook {
+pub enum GazeAction {
     Unspecified = 0,
     Landmark = 1,
     /// None is in sight: look along the path.
@@ -780,26 +781,26 @@ pub enum GazeLook {
     /// None is in sight, and the pose is very uncertain: look about.
     Sweep = 3,
 }
-impl GazeLook {
+impl GazeAction {
     /// String value of the enum field names used in the ProtoBuf definition.
     ///
     /// The values are not transformed in any way and thus are considered stable
     /// (if the ProtoBuf definition does not change) and safe for programmatic use.
     pub fn as_str_name(&self) -> &'static str {
         match self {
-            Self::Unspecified => "GAZE_LOOK_UNSPECIFIED",
-            Self::Landmark => "GAZE_LOOK_LANDMARK",
-            Self::Ahead => "GAZE_LOOK_AHEAD",
-            Self::Sweep => "GAZE_LOOK_SWEEP",
+            Self::Unspecified => "GAZE_ACTION_UNSPECIFIED",
+            Self::Landmark => "GAZE_ACTION_LANDMARK",
+            Self::Ahead => "GAZE_ACTION_AHEAD",
+            Self::Sweep => "GAZE_ACTION_SWEEP",
         }
     }
     /// Creates an enum from field names used in the ProtoBuf definition.
     pub fn from_str_name(value: &str) -> ::core::option::Option<Self> {
         match value {
-            "GAZE_LOOK_UNSPECIFIED" => Some(Self::Unspecified),
-            "GAZE_LOOK_LANDMARK" => Some(Self::Landmark),
-            "GAZE_LOOK_AHEAD" => Some(Self::Ahead),
-            "GAZE_LOOK_SWEEP" => Some(Self::Sweep),
+            "GAZE_ACTION_UNSPECIFIED" => Some(Self::Unspecified),
+            "GAZE_ACTION_LANDMARK" => Some(Self::Landmark),
+            "GAZE_ACTION_AHEAD" => Some(Self::Ahead),
+            "GAZE_ACTION_SWEEP" => Some(Self::Sweep),
             _ => None,
         }
     }

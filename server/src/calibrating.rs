@@ -22,8 +22,8 @@ const CENTRE_SIGMA: f64 = 0.1;
 const DOUBTFUL_CHI2: f64 = 10.0;
 /// and with its principal point so far from the image's centre, as a share of the width.
 const DOUBTFUL_CENTRE: f64 = 0.15;
-/// How well a level camera is level, radians.
-const LEVEL_SIGMA_RAD: f64 = 0.0175;
+/// How well the roll of a camera that does not roll is 0, radians.
+const ROLL_SIGMA_RAD: f64 = 0.0175;
 /// How well a given height is known, metres.
 const HEIGHT_SIGMA_M: f64 = 0.02;
 
@@ -35,7 +35,7 @@ pub(crate) struct Knowledge {
     pub(crate) radial: u8,
     /// The camera does not roll (C2).
     #[arg(long)]
-    pub(crate) level: bool,
+    pub(crate) zero_roll: bool,
     /// The camera is this high over the landmark's centre in all views, metres; negative below (C3).
     #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
     pub(crate) height_m: Option<f64>,
@@ -46,8 +46,8 @@ pub(crate) struct Knowledge {
 
 impl From<CalibrationConstraintsBody> for Knowledge {
     fn from(body: CalibrationConstraintsBody) -> Self {
-        let CalibrationConstraintsBody { radial, level, height_m, unknown_aspect } = body;
-        Self { radial, level, height_m, unknown_aspect }
+        let CalibrationConstraintsBody { radial, zero_roll, height_m, unknown_aspect } = body;
+        Self { radial, zero_roll, height_m, unknown_aspect }
     }
 }
 
@@ -55,7 +55,7 @@ impl Knowledge {
     fn params(&self) -> CalibrateParams {
         CalibrateParams {
             radial: usize::from(self.radial),
-            roll_sigma_rad: if self.level { LEVEL_SIGMA_RAD } else { 0.0 },
+            roll_sigma_rad: if self.zero_roll { ROLL_SIGMA_RAD } else { 0.0 },
             height: self.height_m.map_or(CameraHeight::Free, |height_m| CameraHeight::Known {
                 height_m,
                 sigma_m: HEIGHT_SIGMA_M,
@@ -68,7 +68,7 @@ impl Knowledge {
 }
 
 /// What speaks against a camera that came out.
-fn doubts(c: &CameraCalibration, image_px: [usize; 2]) -> Vec<String> {
+fn warnings(c: &CameraCalibration, image_px: [usize; 2]) -> Vec<String> {
     let mut all = vec![];
     let chi2 = c.chi2 / c.dof.max(1) as f64;
     if chi2 > DOUBTFUL_CHI2 {
@@ -115,7 +115,7 @@ pub(crate) fn calibrated(
         reduced_chi2: c.chi2 / c.dof.max(1) as f64,
         orientations: c.orientations,
         aspect_ratio: c.aspect_ratio,
-        doubts: doubts(&c, image_px),
+        warnings: warnings(&c, image_px),
         views: (0..views.len()).map(view).collect(),
     })
 }
@@ -160,7 +160,7 @@ mod tests {
     fn a_camera_that_cannot_quite_be_is_doubted() {
         let known = Knowledge::from(CalibrationConstraintsBody::default());
         let good = calibrated(&views(239.5), [640, 480], &known).unwrap();
-        assert!(good.doubts.is_empty() && (good.intrinsics.fx_px - 600.0).abs() < 1.0, "{good:?}");
+        assert!(good.warnings.is_empty() && (good.intrinsics.fx_px - 600.0).abs() < 1.0, "{good:?}");
         // What it is known to goes along with it.
         assert_eq!(good.intrinsics.focal_sigma_px, Some(good.fx_sigma_px));
         assert_eq!(good.intrinsics.center_sigma_px, Some(good.cx_sigma_px.max(good.cy_sigma_px)));
@@ -169,12 +169,12 @@ mod tests {
         assert_eq!(stated(&camera, [151.0, 1.0, 1e9]).sigmas, most);
         assert_eq!(stated(&camera, [f64::INFINITY, 1.0, 1.0]).sigmas, None);
         let off = calibrated(&views(420.0), [640, 480], &known).unwrap();
-        assert!(off.doubts.iter().any(|d| d.contains("principal point")), "{off:?}");
+        assert!(off.warnings.iter().any(|d| d.contains("principal point")), "{off:?}");
         let mut bad = views(239.5);
         for (i, p) in bad.iter_mut().flat_map(|v| &mut v.seen_px).enumerate() {
             p.x += [4.0, -4.0, 3.0, -2.0, 1.0, 5.0, -3.0][i % 7];
         }
         let bad = calibrated(&bad, [640, 480], &known);
-        assert!(bad.as_ref().is_err() || bad.as_ref().is_ok_and(|b| !b.doubts.is_empty()), "{bad:?}");
+        assert!(bad.as_ref().is_err() || bad.as_ref().is_ok_and(|b| !b.warnings.is_empty()), "{bad:?}");
     }
 }

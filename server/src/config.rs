@@ -7,7 +7,7 @@
 use engine::decode::ImageLimits;
 use figment::{
     Figment,
-    providers::{Env, Format, Serialized, Toml},
+    providers::{Env, Format, Toml},
 };
 use protos::Name;
 use serde::{Deserialize, Serialize};
@@ -215,7 +215,8 @@ impl Limits {
 impl RawConfig {
     /// Defaults, then the file (which must exist if named), then the environment.
     pub fn read(file: Option<&Path>) -> Result<Self, ConfigError> {
-        let mut figment = Figment::from(Serialized::defaults(Self::default()));
+        // Defaults are left to serde: as values they would stand beside a key of an earlier build.
+        let mut figment = Figment::new();
         if let Some(path) = file {
             figment = figment.merge(Toml::file_exact(path));
         }
@@ -320,78 +321,4 @@ fn zenoh_address(endpoint: &str) -> Result<SocketAddr, ConfigError> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_example_file_is_the_default() {
-        let text = include_str!("../config.example.toml");
-        let read: RawConfig = Figment::from(Toml::string(text)).extract().unwrap();
-        assert_eq!(read, RawConfig::default());
-        // And it names every setting: without the defaults nothing is missing.
-        let table: toml_keys::Keys = Figment::from(Toml::string(text)).extract().unwrap();
-        assert_eq!(
-            table.limits.len(),
-            serde_json::to_value(Limits::default()).unwrap().as_object().unwrap().len()
-        );
-    }
-
-    mod toml_keys {
-        use std::collections::BTreeMap;
-
-        #[derive(serde::Deserialize)]
-        pub(super) struct Keys {
-            pub(super) limits: BTreeMap<String, u64>,
-        }
-    }
-
-    #[test]
-    fn plain_text_beyond_loopback_is_refused() {
-        for (http, zenoh, ok) in [
-            ("127.0.0.1:0", "tcp/[::1]:7447", true),
-            ("127.9.9.9:80", "tcp/127.0.0.1:0", true),
-            ("0.0.0.0:8080", "tcp/127.0.0.1:7447", false),
-            ("[::]:8080", "tcp/127.0.0.1:7447", false),
-            ("127.0.0.1:8080", "tcp/0.0.0.0:7447", false),
-            ("127.0.0.1:8080", "tcp/192.168.1.4:7447", false),
-        ] {
-            let raw = RawConfig { http: http.into(), zenoh: zenoh.into(), ..RawConfig::default() };
-            assert_eq!(Config::try_from(raw.clone()).is_ok(), ok, "{http} {zenoh}");
-            assert!(Config::try_from(RawConfig { insecure: true, ..raw }).is_ok());
-        }
-    }
-
-    #[test]
-    #[expect(clippy::large_stack_arrays, reason = "cases of a test")]
-    fn bad_settings_are_named() {
-        let limits = |f: fn(&mut Limits)| {
-            let mut limits = Limits::default();
-            f(&mut limits);
-            RawConfig { limits, ..RawConfig::default() }
-        };
-        for (raw, named) in [
-            (RawConfig { http: "localhost:80".into(), ..RawConfig::default() }, "http"),
-            (RawConfig { zenoh: "tcp/robot-host:7447".into(), ..RawConfig::default() }, "zenoh"),
-            (RawConfig { zenoh: "udp/127.0.0.1:7447".into(), ..RawConfig::default() }, "zenoh"),
-            (RawConfig { fleet: "A/B".into(), ..RawConfig::default() }, "fleet"),
-            (RawConfig { workers: MAX_WORKERS + 1, ..RawConfig::default() }, "workers"),
-            (limits(|l| l.landmarks = MAX_LANDMARKS + 1), "limits.landmarks"),
-            (limits(|l| l.views = 0), "limits.views"),
-            (limits(|l| l.upload_pixels = vision::frame::MAX_AREA_PX + 1), "limits.upload_pixels"),
-        ] {
-            match Config::try_from(raw) {
-                Err(ConfigError::Invalid { field, .. }) => assert_eq!(field, named),
-                other => panic!("{named}: {other:?}"),
-            }
-        }
-        let at_limit = RawConfig { workers: MAX_WORKERS, ..RawConfig::default() };
-        assert_eq!(Config::try_from(at_limit).unwrap().workers, MAX_WORKERS);
-    }
-
-    #[test]
-    fn a_missing_file_and_an_unknown_setting_are_errors() {
-        assert!(RawConfig::read(Some(Path::new("/nonexistent/waymark.toml"))).is_err());
-        let unknown: Result<RawConfig, _> = Figment::from(Toml::string("colour = 3")).extract();
-        assert!(unknown.is_err());
-    }
-}
+mod tests;

@@ -50,7 +50,7 @@ struct Robot {
     fuser: Fuser,
     watch: HealthMonitor,
     supporters: Vec<LandmarkId>,
-    standings: BTreeMap<LandmarkId, LandmarkHealth>,
+    healths: BTreeMap<LandmarkId, LandmarkHealth>,
     random: Random,
 }
 
@@ -60,7 +60,7 @@ impl Robot {
             fuser: Fuser::new(FuseParams::default()),
             watch: HealthMonitor::new(HealthParams::default()),
             supporters: Vec::new(),
-            standings: BTreeMap::new(),
+            healths: BTreeMap::new(),
             random: Random::new(seed),
         }
     }
@@ -105,7 +105,7 @@ impl Robot {
         self.fuser.apply_odometry(at_ns, step.odom_from_robot).expect("in range");
         let used: Vec<_> = sightings
             .iter()
-            .filter(|s| self.standings.get(&s.landmark) != Some(&LandmarkHealth::Quarantined))
+            .filter(|s| self.healths.get(&s.landmark) != Some(&LandmarkHealth::Quarantined))
             .copied()
             .collect();
         let Some(prior) = self.fuser.pose_at(at_ns) else {
@@ -122,8 +122,8 @@ impl Robot {
         if reset {
             return self.watch.clear();
         }
-        let standings = &self.standings;
-        let now = |id| standings.get(&id).copied().unwrap_or_default();
+        let healths = &self.healths;
+        let now = |id| healths.get(&id).copied().unwrap_or_default();
         self.watch.frame(Point2::from(prior.pose.position()), &judged, &[], now)
     }
 
@@ -209,15 +209,15 @@ fn drive(seed: u64, length_m: f64, moved: usize, hidden: bool) -> Run {
         let holds = sightings.iter().any(|s| s.landmark == moved);
         sightings_so_far += u32::from(holds && others >= 2 && run.sightings_until_flagged.is_none());
         for change in robot.frame(at_ns, &step, &sightings) {
-            robot.standings.insert(change.landmark, change.standing);
+            robot.healths.insert(change.landmark, change.health);
             if change.landmark != moved {
-                run.blamed_others += usize::from(change.standing != LandmarkHealth::Sound);
-            } else if change.standing >= LandmarkHealth::Flagged && run.sightings_until_flagged.is_none() {
+                run.blamed_others += usize::from(change.health != LandmarkHealth::Sound);
+            } else if change.health >= LandmarkHealth::Flagged && run.sightings_until_flagged.is_none() {
                 run.sightings_until_flagged = Some(sightings_so_far);
                 run.with_two_others = others >= 2;
             }
         }
-        run.quarantined = robot.standings.get(&moved) == Some(&LandmarkHealth::Quarantined);
+        run.quarantined = robot.healths.get(&moved) == Some(&LandmarkHealth::Quarantined);
         if let Some(pose) = robot.fuser.pose() {
             let error = pose.pose.pose.position() - step.map_from_robot.position();
             errors.push(error.norm());

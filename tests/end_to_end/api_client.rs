@@ -111,11 +111,11 @@ async fn landmarks_are_placed_patched_taught_and_learnt() {
     maps.add_landmark("hall", "sign", None, None).await.expect("landmark");
     let patch = LandmarkPatch {
         place: Some(Some(place)),
-        standing: Some(LandmarkHealthBody::Quarantined),
+        health: Some(LandmarkHealthBody::Quarantined),
         ..LandmarkPatch::default()
     };
     let sign = maps.update_landmark("hall", "sign", &patch).await.expect("patched");
-    assert_eq!((sign.place, sign.standing, sign.size), (Some(place), LandmarkHealthBody::Quarantined, None));
+    assert_eq!((sign.place, sign.health, sign.size), (Some(place), LandmarkHealthBody::Quarantined, None));
     let forget = LandmarkPatch { place: Some(None), ..LandmarkPatch::default() };
     assert_eq!(maps.update_landmark("hall", "sign", &forget).await.expect("patched").place, None);
     maps.delete_landmark("hall", "sign").await.expect("deleted");
@@ -134,7 +134,8 @@ async fn landmarks_are_placed_patched_taught_and_learnt() {
         corner_covariance_px2: Some([[1.0, 0.0, 1.0]; 4]),
     };
     let corners = LandmarkRegion::Corners([[20.0, 20.0], [140.0, 20.0], [140.0, 100.0], [20.0, 100.0]]);
-    let new = NewView { capture: Some(capture), keep_alike: true, ..NewView::new(picture(1), corners) };
+    let new =
+        NewView { capture: Some(capture), keep_near_duplicate: true, ..NewView::new(picture(1), corners) };
     let second = maps.upload_view_with("hall", "poster", new).await.expect("view");
     let placing = second.placing.expect("said");
     assert_eq!((second.outcome, placing.reason.as_deref()), (Some(UploadOutcomeBody::New), Some("by_hand")));
@@ -156,7 +157,10 @@ async fn landmarks_are_placed_patched_taught_and_learnt() {
     let job = maps.wait_for_job(job, SOON, |_| {}).await.expect("done");
     assert_eq!(maps.cancel_job(job.id).await.expect("job"), maps.job(job.id).await.expect("job"));
     let all = maps.landmarks("hall").await.expect("landmarks");
-    assert!(all.len() == 1 && all[0].model.is_some() && all[0].status != LandmarkStatus::Empty, "{all:?}");
+    assert!(
+        all.len() == 1 && all[0].model.is_some() && all[0].status != LandmarkStatus::NotLearnt,
+        "{all:?}"
+    );
     let answer = maps.recognise("hall", picture(1), None).await.expect("an answer");
     assert_eq!(answer.map, "hall");
     inside.server.stop().await;
@@ -180,7 +184,7 @@ async fn what_is_seen_is_told_for_the_camera_that_is_set() {
     assert_eq!((near.kind.as_str(), near.properties.landmark.as_str()), ("Feature", "poster"));
     assert!(near.properties.reach_m < far.properties.reach_m && !far.geometry.coordinates.is_empty());
     let pose = PoseBody { x_m: 5.0, y_m: 1.5, theta_rad: -FRAC_PI_2, covariance: None };
-    let request = VisibleRequest { pose, sight: own };
+    let request = VisibleRequest { pose, visibility_settings: own };
     let seen = maps.visible("hall", &request).await.expect("visible").landmarks;
     assert!(seen.len() == 1 && seen[0].landmark == "poster" && seen[0].margin_m > 0.0, "{seen:?}");
     let path = CoverageRequest::new(vec![[0.5, 1.5], [9.5, 1.5]]);
@@ -222,14 +226,14 @@ async fn a_robot_is_followed_from_its_first_frame_to_its_end() {
     assert_eq!(maps.camera_answer("r1", "front").await.expect("an answer").seq, answer.seq);
     assert!(maps.cameras("r1").await.expect("cameras").is_empty(), "no landmark was recognised");
     assert_eq!(maps.trajectories("r1").await.expect("trajectories").pose, []);
-    assert!(!maps.relocalisation("r1").await.expect("relocalisation").searching);
+    assert!(!maps.relocalisation("r1").await.expect("relocalisation").relocalising);
     assert_eq!(maps.corrections("r1").await.expect("corrections").corrections, []);
     let known = maps.robot("r1").await.expect("robot");
     assert!(known.alive && known.epoch.is_some() && known.conflict.is_none(), "{known:?}");
     assert_eq!(maps.robots().await.expect("robots").len(), 1);
 
-    let given = Some(uploaded_views());
-    let request = CalibrationRequest { given, ..CalibrationRequest::default() };
+    let views = Some(uploaded_views());
+    let request = CalibrationRequest { uploaded_views: views, ..CalibrationRequest::default() };
     let report = maps.calibrate_camera("r1", "front", &request).await.expect("a report");
     assert!((report.intrinsics.fx_px - 500.0).abs() < 5.0 && report.views.len() == 5, "{report:?}");
     let nothing = maps.calibrate_camera("r1", "front", &CalibrationRequest::default()).await;
@@ -263,7 +267,7 @@ async fn drives_are_recorded_mapped_and_gathered() {
     maps.put_robot("r1", "hall").await.expect("robot");
 
     // A drive of 1 m whose path is known.
-    assert!(maps.start_recording("r1").await.expect("begun").going);
+    assert!(maps.start_recording("r1").await.expect("begun").active);
     let robot = connect(&inside.server.zenoh_endpoint, "r1").await;
     let mut poses = Vec::new();
     for step in 0..=20 {
@@ -277,7 +281,7 @@ async fn drives_are_recorded_mapped_and_gathered() {
     eventually("all is recorded", whole).await;
     let trajectory = ReferenceTrajectoryBody { poses, ..ReferenceTrajectoryBody::default() };
     let run = maps.finish_recording("r1", &trajectory).await.expect("learnt");
-    assert_eq!(run.modules.iter().map(|m| m.module).next(), Some(ModalityBody::Odometry));
+    assert_eq!(run.statistics.iter().map(|s| s.modality).next(), Some(ModalityBody::Odometry));
     assert_eq!(maps.reference_runs("hall").await.expect("runs"), std::slice::from_ref(&run));
     maps.start_recording("r1").await.expect("begun");
     maps.cancel_recording("r1").await.expect("given up");
@@ -285,13 +289,13 @@ async fn drives_are_recorded_mapped_and_gathered() {
 
     // What is fused, by modality and place.
     let door = AreaBody { name: "door".into(), corners_m: vec![[0.0, 0.0], [2.0, 0.0], [2.0, 2.0]] };
-    let patch = ModalityMapPatch { mode: Some(FusionModeBody::Single), areas: Some(vec![door]) };
+    let patch = ModalityMapPatch { fusion_mode: Some(FusionModeBody::Best), areas: Some(vec![door]) };
     let set = maps.set_modalities("hall", &patch).await.expect("set");
-    assert_eq!((set.mode, set.areas.len(), set.cells.len()), (FusionModeBody::Single, 1, run.cells));
+    assert_eq!((set.fusion_mode, set.areas.len(), set.cells.len()), (FusionModeBody::Best, 1, run.cells));
     assert_eq!(maps.modalities("hall").await.expect("modalities"), set);
     let query = ModalityQuery { x_m: 4.5, y_m: 2.0, theta_rad: 0.0 };
     let here = maps.modalities_at("hall", &query).await.expect("known");
-    assert!(here.modules.len() == 3 && here.modules[0].steps > 0, "{here:?}");
+    assert!(here.statistics.len() == 3 && here.statistics[0].steps > 0, "{here:?}");
     maps.delete_reference_run("hall", run.id).await.expect("deleted");
     assert_eq!(maps.reference_runs("hall").await.expect("runs"), []);
 
@@ -313,10 +317,10 @@ async fn drives_are_recorded_mapped_and_gathered() {
     assert!(maps.gathering("hall", gathering.id).await.expect("gathering").open);
     assert_eq!(maps.tracks("hall", gathering.id).await.expect("tracks"), []);
     assert!(!maps.stop_gathering("hall", gathering.id).await.expect("ended").open);
-    let track = AcceptedTrackBody { candidate: 1, name: Some("window".into()) };
-    let request = AcceptRequest { candidates: vec![track], learn: false };
-    assert_eq!(code(maps.accept_tracks("hall", gathering.id, &request).await), "unknown_candidate");
-    assert_eq!(code(maps.discard_track("hall", gathering.id, 1).await), "unknown_candidate");
+    let track = AcceptedTrackBody { track: 1, name: Some("window".into()) };
+    let request = AcceptRequest { tracks: vec![track], learn: false };
+    assert_eq!(code(maps.accept_tracks("hall", gathering.id, &request).await), "unknown_track");
+    assert_eq!(code(maps.discard_track("hall", gathering.id, 1).await), "unknown_track");
     assert_eq!(code(maps.track_icon("hall", gathering.id, 1, 1).await), "unknown_view");
     assert_eq!(maps.gatherings("hall").await.expect("gatherings").len(), 1);
     maps.delete_gathering("hall", gathering.id).await.expect("deleted");

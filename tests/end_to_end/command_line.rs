@@ -101,7 +101,7 @@ const OPTIONS: [(&str, &[&str]); 29] = [
             "--size",
             "--corners",
             "--radial",
-            "--level",
+            "--zero-roll",
             "--height-m",
             "--unknown-aspect",
             "--json",

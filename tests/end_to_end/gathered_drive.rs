@@ -35,7 +35,7 @@ async fn walls(inside: &Inside, building: &Building) -> RobotClient {
         .iter()
         .map(|w| json!({ "a": [w.a_m.x, w.a_m.y], "b": [w.b_m.x, w.b_m.y] }))
         .collect();
-    let path = format!("/maps/{MAP}/laser");
+    let path = format!("/maps/{MAP}/walls");
     assert_eq!(call(inside, Method::PUT, &path, Some(json!({ "segments": walls }))).await.0, 200);
     inside.maps().put_robot("r1", MAP).await.expect("robot");
     let options = RobotOptions {
@@ -94,9 +94,9 @@ fn list<'a>(value: &'a Value, name: &str) -> &'a [Value] {
     value[name].as_array().map_or(&[], Vec::as_slice)
 }
 
-/// The poster that hangs where a candidate does: what a person sees in the picture.
-fn poster_of(building: &Building, candidate: &Value) -> Option<String> {
-    let at = |field: &str| candidate["hangs"][field].as_f64();
+/// The poster that hangs where a track does: what a person sees in the picture.
+fn poster_of(building: &Building, track: &Value) -> Option<String> {
+    let at = |field: &str| track["place"][field].as_f64();
     let (x, y, width) = (at("x_m")?, at("y_m")?, at("width_m")?);
     let near = building.posters().find(|p| {
         let c = p.map_from_landmark.translation.vector;
@@ -149,27 +149,27 @@ async fn gather_all(inside: &Inside, client: &RobotClient, building: &Arc<Buildi
     let (status, stopped) = call(inside, Method::POST, &format!("{path}/stop"), None).await;
     assert_eq!((status, &stopped["open"]), (StatusCode::OK, &json!(false)), "{stopped}");
     eprintln!("counts {}", stopped["counts"]);
-    let (_, waiting) = call(inside, Method::GET, &format!("{path}/candidates"), None).await;
+    let (_, waiting) = call(inside, Method::GET, &format!("{path}/tracks"), None).await;
     let mut picks = Vec::new();
     let mut taken = BTreeMap::new();
-    for candidate in list(&waiting, "candidates") {
-        let poster = poster_of(building, candidate);
+    for track in list(&waiting, "tracks") {
+        let poster = poster_of(building, track);
         eprintln!(
             "{:?} {}: {} views, {} apart, of {}, angles {}, sides {}, v_c {}, passes {} {}",
             poster,
-            candidate["number"],
-            list(candidate, "views").len(),
-            candidate["apart"],
-            candidate["sightings"],
-            candidate["hangs"]["angle_rad"],
-            candidate["side_px"],
-            candidate["v_c"],
-            candidate["passes"],
-            candidate["reasons"]
+            track["number"],
+            list(track, "views").len(),
+            track["inconsistent_views"],
+            track["sightings"],
+            track["place"]["angle_rad"],
+            track["side_px"],
+            track["v_c"],
+            track["passes"],
+            track["reasons"]
         );
         let Some(name) = poster else { continue };
-        taken.insert(name.clone(), candidate.clone());
-        picks.push(json!({ "candidate": candidate["number"], "name": name }));
+        taken.insert(name.clone(), track.clone());
+        picks.push(json!({ "track": track["number"], "name": name }));
     }
     assert!(taken.len() == 6, "{} of 6 posters were gathered", taken.len());
     // The same at the command line, with a picture of each.
@@ -179,26 +179,26 @@ async fn gather_all(inside: &Inside, client: &RobotClient, building: &Arc<Buildi
     let url = inside.url();
     let show = ["gather", "show", &number, "--map", MAP, "--server", &url, "--pictures", pictures];
     let shown = waymark(show, SOON);
-    let count = list(&waiting, "candidates").len();
+    let count = list(&waiting, "tracks").len();
     assert_eq!((shown.status, shown.stdout.lines().count()), (0, count), "{shown:?}");
     assert_eq!(std::fs::read_dir(folder.path()).expect("pictures").count(), count);
     let listed = waymark(["gather", "list", "--map", MAP, "--server", &url], SOON);
     assert!(listed.stdout.contains("ended with r1, of whatever is new"), "{listed:?}");
     // A picture of each can be seen.
-    let first = &list(&waiting, "candidates")[0];
+    let first = &list(&waiting, "tracks")[0];
     let icon =
-        format!("{}/api/v1{path}/candidates/{}/views/{}/icon", inside.url(), first["number"], first["best"]);
+        format!("{}/api/v1{path}/tracks/{}/views/{}/icon", inside.url(), first["number"], first["best_view"]);
     let picture = Client::new().get(icon).send().await.expect("an answer");
     assert_eq!(picture.headers()["content-type"], "image/png");
     // Nothing is taken if one of the decisions cannot be.
     let mut bad = picks.clone();
-    bad.push(json!({ "candidate": 9999, "name": "nothing" }));
+    bad.push(json!({ "track": 9999, "name": "nothing" }));
     let (status, problem) =
-        call(inside, Method::POST, &format!("{path}/accept"), Some(json!({ "candidates": bad }))).await;
-    assert_eq!((status, &problem["code"]), (StatusCode::NOT_FOUND, &json!("unknown_candidate")));
+        call(inside, Method::POST, &format!("{path}/accept"), Some(json!({ "tracks": bad }))).await;
+    assert_eq!((status, &problem["code"]), (StatusCode::NOT_FOUND, &json!("unknown_track")));
     assert!(inside.maps().landmarks(MAP).await.expect("landmarks").is_empty());
     let (status, accepted) =
-        call(inside, Method::POST, &format!("{path}/accept"), Some(json!({ "candidates": picks }))).await;
+        call(inside, Method::POST, &format!("{path}/accept"), Some(json!({ "tracks": picks }))).await;
     assert_eq!(status, StatusCode::ACCEPTED, "{accepted}");
     assert!(list(&accepted, "landmarks").iter().all(|l| l["placing"]["placed"] == true), "{accepted}");
     let result = lesson(inside, &accepted["job"]).await;
@@ -209,7 +209,7 @@ async fn gather_all(inside: &Inside, client: &RobotClient, building: &Arc<Buildi
         assert!((place.x_m - truth.x).hypot(place.y_m - truth.y) < 0.05, "{landmark:?}");
     }
     // Accepted ones do not wait any more, nor can they be accepted twice.
-    let again = json!({ "candidates": [picks[0]] });
+    let again = json!({ "tracks": [picks[0]] });
     assert_eq!(call(inside, Method::POST, &format!("{path}/accept"), Some(again)).await.0, 404);
 }
 
@@ -251,8 +251,8 @@ async fn begun(inside: &Inside, body: Value) -> String {
 /// What was gathered while every landmark was known: views of each in its own track, none of them as something new.
 async fn known_ones_are_themselves(inside: &Inside, building: &Building, path: &str) {
     let (_, stopped) = call(inside, Method::POST, &format!("{path}/stop"), None).await;
-    let (_, waiting) = call(inside, Method::GET, &format!("{path}/candidates"), None).await;
-    let all = list(&waiting, "candidates");
+    let (_, waiting) = call(inside, Method::GET, &format!("{path}/tracks"), None).await;
+    let all = list(&waiting, "tracks");
     let (of_landmarks, new): (Vec<_>, Vec<_>) = all.iter().partition(|c| c["landmark"].is_string());
     eprintln!(
         "known: {} tracks of landmarks, {} others, {}",
@@ -261,12 +261,12 @@ async fn known_ones_are_themselves(inside: &Inside, building: &Building, path: &
         stopped["counts"]
     );
     assert!(of_landmarks.len() >= 4, "{stopped}");
-    for candidate in of_landmarks {
-        let there = poster_of(building, candidate);
-        assert!(there.is_none() || candidate["landmark"] == json!(there), "{candidate}");
+    for track in of_landmarks {
+        let there = poster_of(building, track);
+        assert!(there.is_none() || track["landmark"] == json!(there), "{track}");
     }
-    for candidate in new {
-        assert_eq!(poster_of(building, candidate), None, "{candidate}");
+    for track in new {
+        assert_eq!(poster_of(building, track), None, "{track}");
     }
     assert_eq!(call(inside, Method::DELETE, path, None).await.0, 204);
 }
@@ -291,15 +291,15 @@ async fn more_of_one(inside: &Inside, client: &RobotClient, building: &Arc<Build
         client.recognise("front", capture, SOON).await.expect("an answer");
     }
     let (_, stopped) = call(inside, Method::POST, &format!("{path}/stop"), None).await;
-    let (_, waiting) = call(inside, Method::GET, &format!("{path}/candidates"), None).await;
-    let [one] = list(&waiting, "candidates") else { panic!("{waiting} {stopped}") };
+    let (_, waiting) = call(inside, Method::GET, &format!("{path}/tracks"), None).await;
+    let [one] = list(&waiting, "tracks") else { panic!("{waiting} {stopped}") };
     assert_eq!(one["landmark"], "poster-0");
     let kept = list(one, "views").len() as u64;
     assert!((4..=10).contains(&kept), "{stopped}");
-    let other = json!({ "candidates": [{ "candidate": one["number"], "name": "poster-1" }] });
+    let other = json!({ "tracks": [{ "track": one["number"], "name": "poster-1" }] });
     let (status, problem) = call(inside, Method::POST, &format!("{path}/accept"), Some(other)).await;
     assert_eq!((status, &problem["code"]), (StatusCode::CONFLICT, &json!("in_use")), "{problem}");
-    let its_own = json!({ "candidates": [{ "candidate": one["number"] }] });
+    let its_own = json!({ "tracks": [{ "track": one["number"] }] });
     let (_, accepted) = call(inside, Method::POST, &format!("{path}/accept"), Some(its_own)).await;
     let result = lesson(inside, &accepted["job"]).await;
     let others = inside.maps().landmarks(MAP).await.expect("landmarks").len() - 1;
@@ -319,7 +319,7 @@ async fn bad_wishes_are_refused_with_a_reason_and_ends_are_final() {
         (all.as_str(), json!({ "robot": "nobody" }), 404, "unknown_robot"),
         (&all, json!({ "robot": "r1", "landmark": "none" }), 404, "unknown_landmark"),
         (&all, json!({ "robot": "r1", "landmark": "blank" }), 409, "not_learnt"),
-        (&all, json!({ "robot": "r1", "auto_accept": true }), 422, "bad_value"),
+        (&all, json!({ "robot": "r1", "auto_accept": true }), 422, "invalid_value"),
         ("/maps/cellar/gatherings", json!({ "robot": "r1" }), 409, "in_use"),
         ("/maps/nowhere/gatherings", json!({ "robot": "r1" }), 404, "unknown_map"),
     ] {
@@ -331,15 +331,15 @@ async fn bad_wishes_are_refused_with_a_reason_and_ends_are_final() {
     let (status, problem) = call(&inside, Method::POST, &all, Some(json!({ "robot": "r1" }))).await;
     assert_eq!((status.as_u16(), problem["code"].as_str()), (409, Some("in_use")), "{problem}");
     for (body, status, code) in [
-        (json!({ "candidates": [] }), 422, "out_of_range"),
-        (json!({ "candidates": [{ "candidate": 1, "name": "A/B" }] }), 422, "bad_name"),
-        (json!({ "candidates": [{ "candidate": 1, "name": "a" }] }), 404, "unknown_candidate"),
-        (json!({ "candidates": [{ "candidate": -1 }] }), 422, "bad_value"),
+        (json!({ "tracks": [] }), 422, "out_of_range"),
+        (json!({ "tracks": [{ "track": 1, "name": "A/B" }] }), 422, "bad_name"),
+        (json!({ "tracks": [{ "track": 1, "name": "a" }] }), 404, "unknown_track"),
+        (json!({ "tracks": [{ "track": -1 }] }), 422, "invalid_value"),
     ] {
         let (got, problem) = call(&inside, Method::POST, &format!("{path}/accept"), Some(body)).await;
         assert_eq!((got.as_u16(), problem["code"].as_str()), (status, Some(code)), "{problem}");
     }
-    assert_eq!(call(&inside, Method::DELETE, &format!("{path}/candidates/1"), None).await.0, 404);
+    assert_eq!(call(&inside, Method::DELETE, &format!("{path}/tracks/1"), None).await.0, 404);
     let (_, stopped) = call(&inside, Method::POST, &format!("{path}/stop"), None).await;
     let (_, again) = call(&inside, Method::POST, &format!("{path}/stop"), None).await;
     assert_eq!((&stopped, stopped["open"].as_bool()), (&again, Some(false)));

@@ -18,10 +18,10 @@ type Row<'a> = (&'a str, &'a str, &'a str, u16, &'a str, &'a str);
 const ROWS: &[Row<'_>] = &[
     // Not JSON, not the shape, not a name.
     ("POST", "/maps", "{", 400, "bad_json", "body"),
-    ("POST", "/maps", "{} {}", 422, "bad_value", "body"),
-    ("POST", "/maps", r#"{"name": 3}"#, 422, "bad_value", "name"),
-    ("POST", "/maps", r#"{"name": "a", "colour": 1}"#, 422, "bad_value", "colour"),
-    ("POST", "/maps", r#"{"name": "a", "distance": "cosine"}"#, 422, "bad_value", "distance"),
+    ("POST", "/maps", "{} {}", 422, "invalid_value", "body"),
+    ("POST", "/maps", r#"{"name": 3}"#, 422, "invalid_value", "name"),
+    ("POST", "/maps", r#"{"name": "a", "colour": 1}"#, 422, "invalid_value", "colour"),
+    ("POST", "/maps", r#"{"name": "a", "distance": "cosine"}"#, 422, "invalid_value", "distance"),
     ("POST", "/maps", r#"{"name": ""}"#, 422, "bad_name", "name"),
     ("POST", "/maps", r#"{"name": "A/B"}"#, 422, "bad_name", "name"),
     ("POST", "/maps", r#"{"name": "hall"}"#, 409, "exists", "name"),
@@ -42,7 +42,14 @@ const ROWS: &[Row<'_>] = &[
         "out_of_range",
         "size.height_m",
     ),
-    ("POST", "/maps/hall/landmarks", r#"{"name": "x", "size": {"width_m": 1}}"#, 422, "bad_value", "size"),
+    (
+        "POST",
+        "/maps/hall/landmarks",
+        r#"{"name": "x", "size": {"width_m": 1}}"#,
+        422,
+        "invalid_value",
+        "size",
+    ),
     (
         "POST",
         "/maps/hall/landmarks",
@@ -93,7 +100,7 @@ const ROWS: &[Row<'_>] = &[
     ),
     (
         "PUT",
-        "/maps/hall/laser",
+        "/maps/hall/walls",
         r#"{"segments": [{"a": [0, 0], "b": [1, 0]}, {"a": [0, 0], "b": [0, 0]}]}"#,
         422,
         "out_of_range",
@@ -101,7 +108,7 @@ const ROWS: &[Row<'_>] = &[
     ),
     (
         "PUT",
-        "/maps/hall/laser",
+        "/maps/hall/walls",
         r#"{"segments": [{"a": [0, 0, 0], "b": [1, 0]}]}"#,
         400,
         "bad_json",
@@ -121,13 +128,13 @@ const ROWS: &[Row<'_>] = &[
     ("PUT", "/robots/r2", r#"{"map": "nowhere"}"#, 404, "unknown_map", "map"),
     ("PUT", "/robots/R2", r#"{"map": "hall"}"#, 422, "bad_name", "robot"),
     ("GET", "/nothing/here", "", 404, "not_found", "path"),
-    ("PUT", "/maps", "{}", 405, "wrong_method", "method"),
+    ("PUT", "/maps", "{}", 405, "method_not_allowed", "method"),
     // Pages.
     ("GET", "/maps?limit=0", "", 422, "out_of_range", "limit"),
     ("GET", "/maps?limit=4", "", 422, "out_of_range", "limit"),
     ("GET", "/maps?limit=many", "", 400, "bad_query", "query"),
     ("GET", "/maps?offset=3", "", 400, "bad_query", "query"),
-    ("GET", "/maps/hall/landmarks/p1/views?cursor=x", "", 422, "bad_value", "cursor"),
+    ("GET", "/maps/hall/landmarks/p1/views?cursor=x", "", 422, "invalid_value", "cursor"),
     // Lessons.
     ("POST", "/maps/hall/landmarks/p1/learn", "", 409, "no_views", "landmarks"),
     ("POST", "/maps/hall/learn", r#"{"landmarks": []}"#, 422, "out_of_range", "landmarks"),
@@ -207,14 +214,14 @@ async fn bad_uploads_are_named() {
         (image(&picture[..picture.len() / 2]).text("whole_image", "true"), 422, "bad_image", "image"),
         (image(&beyond).text("whole_image", "true"), 422, "too_large", "image"),
         (image(&heavy), 413, "too_large", "body"),
-        (image(&picture).text("whole_image", "perhaps"), 422, "bad_value", "whole_image"),
-        (square("[[0,0],[9,0]]").text("whole_image", "true"), 422, "bad_value", "whole_image"),
-        (square("[[0,0],[159,0],[159,119]]"), 422, "bad_value", "corners"),
-        (square("[[0,0],[159,0],[159,119],[0,\"x\"]]"), 422, "bad_value", "corners[3][1]"),
+        (image(&picture).text("whole_image", "perhaps"), 422, "invalid_value", "whole_image"),
+        (square("[[0,0],[9,0]]").text("whole_image", "true"), 422, "invalid_value", "whole_image"),
+        (square("[[0,0],[159,0],[159,119]]"), 422, "invalid_value", "corners"),
+        (square("[[0,0],[159,0],[159,119],[0,\"x\"]]"), 422, "invalid_value", "corners[3][1]"),
         (square("nonsense"), 400, "bad_json", "corners"),
         // Counter-clockwise, crossed, outside, tiny.
-        (square("[[0,0],[0,119],[159,119],[159,0]]"), 422, "bad_value", "corners"),
-        (square("[[0,0],[159,119],[159,0],[0,119]]"), 422, "bad_value", "corners"),
+        (square("[[0,0],[0,119],[159,119],[159,0]]"), 422, "invalid_value", "corners"),
+        (square("[[0,0],[159,119],[159,0],[0,119]]"), 422, "invalid_value", "corners"),
         (square("[[100,0],[300,0],[300,119],[100,119]]"), 422, "outside", "corners"),
         (square("[[0,0],[5,0],[5,5],[0,5]]"), 422, "too_small", "corners"),
         (image(&picture).text("colour", "red"), 422, "unknown_field", "colour"),
@@ -253,8 +260,8 @@ async fn bounds_hold_at_the_bound() {
         refusal(put("/robots/r3", json!({ "map": "hall" })).await.expect("answer")).await.1,
         "too_many"
     );
-    assert_eq!(put("/maps/hall/laser", segments(3)).await.expect("answer").status(), StatusCode::OK);
-    let four = refusal(put("/maps/hall/laser", segments(4)).await.expect("answer")).await;
+    assert_eq!(put("/maps/hall/walls", segments(3)).await.expect("answer").status(), StatusCode::OK);
+    let four = refusal(put("/maps/hall/walls", segments(4)).await.expect("answer")).await;
     assert_eq!(four, (422, "too_many".into(), "segments".into()));
 
     for seed in [1, 2, 2] {

@@ -163,8 +163,8 @@ async fn in_a_corridor_the_laser_keeps_a_robot_off_the_walls() {
     let params = CorridorParams { posters: 1, column: false, ..CorridorParams::default() };
     let drive_params = DriveParams { start_m: 9.0, ..DriveParams::default() };
     let mut run = Run::start(&params, drive_params).await;
-    let begun = call(&run.inside, Method::POST, "/robots/r1/run", None).await;
-    assert_eq!((begun.0, &begun.1["going"]), (StatusCode::CREATED, &Value::from(true)), "{begun:?}");
+    let begun = call(&run.inside, Method::POST, "/robots/r1/recording", None).await;
+    assert_eq!((begun.0, &begun.1["active"]), (StatusCode::CREATED, &Value::from(true)), "{begun:?}");
     let errors = drive(&mut run, 2).await;
     assert!(errors.len() > 40, "{}", errors.len());
     let (across, heading) = (rms(&errors, 1), rms(&errors, 2));
@@ -190,11 +190,11 @@ async fn in_a_corridor_the_laser_keeps_a_robot_off_the_walls() {
 /// The run was recorded; told where the robot really was, the server knows which modality is best where.
 async fn learnt_from(run: &Run) {
     let ask = async |method, path: &str, body| call(&run.inside, method, path, body).await;
-    let (status, problem) = ask(Method::POST, "/robots/r1/run", None).await;
+    let (status, problem) = ask(Method::POST, "/robots/r1/recording", None).await;
     assert_eq!((status, &problem["code"]), (StatusCode::CONFLICT, &"in_use".into()));
-    let (_, recorded) = ask(Method::GET, "/robots/r1/run", None).await;
+    let (_, recorded) = ask(Method::GET, "/robots/r1/recording", None).await;
     assert!(recorded["laser"].as_u64() > Some(40) && recorded["landmarks"].as_u64() > Some(0), "{recorded}");
-    let told = "/robots/r1/run/reference";
+    let told = "/robots/r1/recording/reference";
     let poses = |shift_ns: i64| {
         let pose = |(t, p): &(i64, Pose2)| json!([t + shift_ns, p.x_m, p.y_m, p.theta_rad]);
         json!({ "poses": run.path.iter().map(pose).collect::<Vec<_>>() })
@@ -211,36 +211,40 @@ async fn learnt_from(run: &Run) {
     }
     let (status, learnt) = ask(Method::POST, told, Some(poses(0))).await;
     assert_eq!(status, StatusCode::CREATED, "{learnt}");
-    assert!(learnt["way_m"].as_f64() > Some(5.0) && learnt["cells"].as_u64() > Some(5), "{learnt}");
-    let laser = &learnt["modules"][1];
+    assert!(learnt["distance_m"].as_f64() > Some(5.0) && learnt["cells"].as_u64() > Some(5), "{learnt}");
+    let laser = &learnt["statistics"][1];
     let availability = laser["availability"].as_f64();
-    assert!(laser["module"] == "laser" && availability > Some(0.5), "{learnt}");
+    assert!(laser["modality"] == "laser" && availability > Some(0.5), "{learnt}");
     assert!(laser["sigma"][1].as_f64() < Some(0.03), "{learnt}");
-    let areas = format!("/maps/{MAP}/areas");
+    let modalities = format!("/maps/{MAP}/modalities");
     let corridor =
         json!([{ "name": "corridor", "corners_m": [[-1.0, -3.0], [40.0, -3.0], [40.0, 3.0], [-1.0, 3.0]] }]);
-    let (status, known) = ask(Method::PUT, &areas, Some(json!({ "mode": "fuse", "areas": corridor }))).await;
-    assert_eq!((status, &known["mode"]), (StatusCode::OK, &"fuse".into()), "{known}");
+    let (status, known) =
+        ask(Method::PUT, &modalities, Some(json!({ "fusion_mode": "near_best", "areas": corridor }))).await;
+    assert_eq!((status, &known["fusion_mode"]), (StatusCode::OK, &"near_best".into()), "{known}");
     assert_eq!(known["cells"].as_array().map(Vec::len), learnt["cells"].as_u64().map(|n| n as usize));
     let at = &run.path[run.path.len() / 2].1;
-    let at = format!("{areas}/at?x_m={}&y_m={}&theta_rad={}", at.x_m, at.y_m, at.theta_rad);
+    let at = format!("{modalities}/at?x_m={}&y_m={}&theta_rad={}", at.x_m, at.y_m, at.theta_rad);
     let (_, here) = ask(Method::GET, &at, None).await;
-    assert_eq!(here["told"]["level"], "area", "{here}");
-    assert!(here["told"]["best"].is_string() && here["modules"][0]["steps"].as_u64() > Some(0), "{here}");
+    assert_eq!(here["advice"]["scope"], "area", "{here}");
+    assert!(
+        here["advice"]["best"].is_string() && here["statistics"][0]["steps"].as_u64() > Some(0),
+        "{here}"
+    );
     let twice = json!({ "areas": [corridor[0], corridor[0]] });
-    let (status, problem) = ask(Method::PUT, &areas, Some(twice)).await;
+    let (status, problem) = ask(Method::PUT, &modalities, Some(twice)).await;
     assert_eq!((status, &problem["field"]), (StatusCode::UNPROCESSABLE_ENTITY, &"areas[1].name".into()));
-    let one = format!("/maps/{MAP}/runs/{}", learnt["id"]);
+    let one = format!("/maps/{MAP}/reference-runs/{}", learnt["id"]);
     assert_eq!(ask(Method::DELETE, &one, None).await.0, StatusCode::NO_CONTENT);
-    assert_eq!(ask(Method::DELETE, &one, None).await.1["code"], "unknown_run");
-    let (_, known) = ask(Method::GET, &areas, None).await;
+    assert_eq!(ask(Method::DELETE, &one, None).await.1["code"], "unknown_reference_run");
+    let (_, known) = ask(Method::GET, &modalities, None).await;
     assert_eq!(known["cells"], json!([]));
-    assert_eq!(ask(Method::GET, "/robots/r1/run", None).await.1["code"], "not_recording");
+    assert_eq!(ask(Method::GET, "/robots/r1/recording", None).await.1["code"], "not_recording");
     // A robot that is forgotten leaves no recording behind.
-    assert_eq!(ask(Method::POST, "/robots/r1/run", None).await.0, StatusCode::CREATED);
+    assert_eq!(ask(Method::POST, "/robots/r1/recording", None).await.0, StatusCode::CREATED);
     assert_eq!(ask(Method::DELETE, "/robots/r1", None).await.0, StatusCode::NO_CONTENT);
     assert_eq!(ask(Method::PUT, "/robots/r1", Some(json!({ "map": MAP }))).await.0, StatusCode::OK);
-    assert_eq!(ask(Method::POST, "/robots/r1/run", None).await.0, StatusCode::CREATED);
+    assert_eq!(ask(Method::POST, "/robots/r1/recording", None).await.0, StatusCode::CREATED);
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -100,14 +100,14 @@ async fn a_drive_over_zenoh_gives_the_walls_that_its_recording_gives() {
     let all = || async { (mapping(&inside).await["scans"] == sent).then_some(()) };
     eventually("all mapped", all).await;
     assert_eq!(mapping(&inside).await["dropped"], 0);
-    let (_, before) = call(&inside, Method::GET, &format!("/maps/{MAP}/laser"), None).await;
+    let (_, before) = call(&inside, Method::GET, &format!("/maps/{MAP}/walls"), None).await;
     assert_eq!(before["segments"], json!([]), "nothing is stored before it is finished");
     let (status, _) = call(&inside, Method::POST, &format!("{path}/finish"), None).await;
     assert_eq!(status, StatusCode::ACCEPTED);
     let done = || async { Some(mapping(&inside).await).filter(|p| p["stage"] != "finishing") };
     let progress = eventually("stored", done).await;
     assert_eq!(progress["stage"], "done", "{progress}");
-    let (_, stored) = call(&inside, Method::GET, &format!("/maps/{MAP}/laser"), None).await;
+    let (_, stored) = call(&inside, Method::GET, &format!("/maps/{MAP}/walls"), None).await;
     let (live, file) = (ends(&stored), walls_of_file(&building, &steps));
     assert_eq!((live.len(), progress["segments"].as_u64()), (file.len(), Some(file.len() as u64)));
     assert!(live.len() >= 4, "{live:?}");
@@ -175,7 +175,7 @@ async fn a_server_that_is_killed_in_mid_drive_goes_on_with_the_map() {
     server.maps().create_map(&NewMap::new(MAP)).await.expect("map");
     server.maps().put_robot("r1", MAP).await.expect("robot");
     let begun = ask(&server, Method::POST, "mapping", Some(json!({ "robot": "r1" }))).await;
-    assert_eq!((&begun["stage"], &begun["not_kept"]), (&json!("mapping"), &Value::Null), "{begun}");
+    assert_eq!((&begun["stage"], &begun["journal_error"]), (&json!("mapping"), &Value::Null), "{begun}");
     let (steps, mut client) = (drive(&building), connected(&server, 77).await);
     for (i, step) in steps.iter().enumerate() {
         if i == steps.len() / 3 || i == 2 * steps.len() / 3 {
@@ -199,7 +199,7 @@ async fn a_server_that_is_killed_in_mid_drive_goes_on_with_the_map() {
         || async { Some(ask(&server, Method::GET, "mapping", None).await).filter(|p| p["stage"] == "done") };
     eventually("stored", done).await;
     let (live, file) =
-        (ends(&ask(&server, Method::GET, "laser", None).await), walls_of_file(&building, &steps));
+        (ends(&ask(&server, Method::GET, "walls", None).await), walls_of_file(&building, &steps));
     assert!(live.len() == file.len() && live.len() >= 4, "{live:?}");
     let off =
         live.iter().flatten().zip(file.iter().flatten()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);

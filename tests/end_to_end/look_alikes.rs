@@ -40,16 +40,16 @@ fn off(pose: &v1::Pose2Covariance, truth: &Pose2) -> (f64, f64) {
 
 /// The page and the API are told the same as the robot, and what is still missing.
 async fn told_over_http(inside: &Inside, answer: &v1::Answer) {
-    let (_, found) = call(inside, Method::GET, "/robots/r1/hypotheses", None).await;
-    assert_eq!((&found["searching"], &found["map"]), (&true.into(), &MAP.into()), "{found}");
-    assert_eq!(found["needed"][0], "fewer_places", "{found}");
+    let (_, found) = call(inside, Method::GET, "/robots/r1/relocalisation", None).await;
+    assert_eq!((&found["relocalising"], &found["map"]), (&true.into(), &MAP.into()), "{found}");
+    assert_eq!(found["missing"][0], "higher_probability", "{found}");
     let all = found["hypotheses"].as_array().expect("a list");
     assert_eq!(all.len(), answer.hypotheses.len(), "{found}");
     for (told, sent) in all.iter().zip(&answer.hypotheses) {
         let pose = sent.map_from_robot.as_ref().expect("a pose");
         let same =
             |told: &serde_json::Value, sent: f64| told.as_f64().is_some_and(|v| (v - sent).abs() < 1e-9);
-        assert!(same(&told["probability"], sent.mass), "{found}");
+        assert!(same(&told["probability"], sent.probability), "{found}");
         assert!(same(&told["x_m"], pose.pose.expect("a pose").x_m), "{found}");
         assert!(same(&told["covariance"][4], pose.covariance[4]), "{found}");
     }
@@ -163,7 +163,7 @@ async fn among_look_alikes_there_are_hypotheses_and_no_pose_until_one_is_left() 
             told = true;
             told_over_http(&inside, &answer).await;
         }
-        if answer.hypotheses.first().is_some_and(|h| h.mass > 0.95) {
+        if answer.hypotheses.first().is_some_and(|h| h.probability > 0.95) {
             // Sure enough, but of a pose only where two different ones say so.
             if let Ok(Ok(pose)) =
                 tokio::time::timeout(std::time::Duration::from_millis(300), poses.recv()).await
@@ -178,14 +178,14 @@ async fn among_look_alikes_there_are_hypotheses_and_no_pose_until_one_is_left() 
     let (step, pose) = left.expect("one is left in the end");
     let (m, rad) = off(pose.map_from_robot.as_ref().expect("a pose"), &step.map_from_robot);
     assert!(m < 0.5 && rad < 0.25, "{m} m, {rad} rad off");
-    assert_eq!(pose.modalities, ["odometry", "hypotheses"]);
+    assert_eq!(pose.modalities, ["odometry", "relocalisation"]);
     let logged = || async {
         let (_, log) = call(&inside, Method::GET, "/robots/r1/corrections", None).await;
-        (log["totals"]["hypotheses"]["started"] == 1).then_some(log)
+        (log["totals"]["relocalisation"]["started"] == 1).then_some(log)
     };
     let log = eventually("logged", logged).await;
     let names = log["corrections"][0]["landmarks"].as_array().map_or(0, Vec::len);
-    assert!(names >= 2 && log["corrections"][0]["modality"] == "hypotheses", "{log}");
+    assert!(names >= 2 && log["corrections"][0]["modality"] == "relocalisation", "{log}");
     named_by_pose(&inside, &client, ahead.take(20).map(|step| robot.look(step))).await;
     client.close().await.expect("closed");
     inside.server.stop().await;

@@ -5,7 +5,7 @@
 use client::{
     Capture, Delivery, LandmarkRegion, RobotClient, RobotOptions,
     api::{NewMap, Place, Size},
-    v1::{self, GazeLook, Verdict},
+    v1::{self, GazeAction, Verdict},
 };
 use reqwest::{Method, StatusCode};
 use serde_json::{Value, json};
@@ -34,7 +34,7 @@ async fn teach(inside: &Inside, building: &Arc<Building>) {
         .iter()
         .map(|w| json!({ "a": [w.a_m.x, w.a_m.y], "b": [w.b_m.x, w.b_m.y] }))
         .collect();
-    let path = format!("/maps/{MAP}/laser");
+    let path = format!("/maps/{MAP}/walls");
     assert_eq!(call(inside, Method::PUT, &path, Some(json!({ "segments": walls }))).await.0, 200);
     for poster in building.posters() {
         let mut centre = poster.map_from_landmark.translation.vector;
@@ -68,21 +68,21 @@ async fn teach(inside: &Inside, building: &Arc<Building>) {
     call(inside, Method::PUT, "/robots/r1", Some(json!({ "map": MAP }))).await;
 }
 
-async fn standings(inside: &Inside) -> Vec<(String, String)> {
+async fn healths(inside: &Inside) -> Vec<(String, String)> {
     let (_, page) = call(inside, Method::GET, &format!("/maps/{MAP}/landmarks?limit=100"), None).await;
     let text = |v: &Value| v.as_str().unwrap_or_default().to_owned();
     page["items"]
         .as_array()
         .expect("landmarks")
         .iter()
-        .map(|l| (text(&l["name"]), text(&l["standing"])))
+        .map(|l| (text(&l["name"]), text(&l["health"])))
         .collect()
 }
 
-async fn standing(inside: &Inside) -> String {
-    let all = standings(inside).await;
-    for (name, standing) in &all {
-        assert!(name == MOVED || standing == "sound", "{name} is blamed: {all:?}");
+async fn health(inside: &Inside) -> String {
+    let all = healths(inside).await;
+    for (name, health) in &all {
+        assert!(name == MOVED || health == "sound", "{name} is blamed: {all:?}");
     }
     all.into_iter().find(|(name, _)| name == MOVED).expect("the poster").1
 }
@@ -121,7 +121,7 @@ async fn a_moved_poster_is_found_out_and_where_to_look_is_told() {
     }
     for step in steps.iter().step_by(2) {
         let seen = robot.look(step);
-        let before = standing(&inside).await;
+        let before = health(&inside).await;
         let answer = ask(&client, &seen).await;
         let named = answer
             .quads
@@ -130,14 +130,14 @@ async fn a_moved_poster_is_found_out_and_where_to_look_is_told() {
         // By one other alone it could be either: it is counted from when the pose rests on two.
         sightings += u32::from(named && flagged_after.is_none() && others.len() >= 2);
         others.extend(answer.pose_landmarks.iter().filter(|l| *l != MOVED).cloned());
-        if flagged_after.is_none() && standing(&inside).await != "sound" {
+        if flagged_after.is_none() && health(&inside).await != "sound" {
             flagged_after = Some(sightings);
         }
         if before == "quarantined" {
             used_after_quarantine += usize::from(answer.pose_landmarks.iter().any(|l| l == MOVED));
         }
     }
-    let settled = || async { (standing(&inside).await == "quarantined").then_some(()) };
+    let settled = || async { (health(&inside).await == "quarantined").then_some(()) };
     eventually("quarantined", settled).await;
     assert!(flagged_after.is_some_and(|n| n <= 5), "flagged after {flagged_after:?}");
     assert_eq!(used_after_quarantine, 0);
@@ -151,8 +151,8 @@ async fn decision(inside: &Inside, building: &Building) {
     let path = format!("/maps/{MAP}/landmarks/{MOVED}");
     let (_, landmark) = call(inside, Method::GET, &path, None).await;
     assert_eq!(landmark["finding"]["kind"], "moved", "{landmark}");
-    let by_m = landmark["finding"]["by_m"].as_f64().expect("as promised");
-    assert!((by_m - 1.0).abs() < 0.25, "{landmark}");
+    let offset_m = landmark["finding"]["offset_m"].as_f64().expect("as promised");
+    assert!((offset_m - 1.0).abs() < 0.25, "{landmark}");
     // Put at the place where it really hangs it is trusted again.
     let truth = building.landmark(MOVED).expect("the poster");
     let (at, out) =
@@ -160,12 +160,12 @@ async fn decision(inside: &Inside, building: &Building) {
     let place = json!({ "x_m": at.x, "y_m": at.y, "z_m": at.z, "theta_rad": out.y.atan2(out.x) });
     let (status, landmark) = call(inside, Method::PATCH, &path, Some(json!({ "place": place }))).await;
     assert_eq!(
-        (status, &landmark["standing"], &landmark["finding"]),
+        (status, &landmark["health"], &landmark["finding"]),
         (StatusCode::OK, &json!("sound"), &Value::Null)
     );
-    let (_, landmark) = call(inside, Method::PATCH, &path, Some(json!({ "standing": "quarantined" }))).await;
-    assert_eq!(landmark["standing"], "quarantined");
-    let (status, _) = call(inside, Method::PATCH, &path, Some(json!({ "standing": "lost" }))).await;
+    let (_, landmark) = call(inside, Method::PATCH, &path, Some(json!({ "health": "quarantined" }))).await;
+    assert_eq!(landmark["health"], "quarantined");
+    let (status, _) = call(inside, Method::PATCH, &path, Some(json!({ "health": "lost" }))).await;
     assert_eq!(status, StatusCode::UNPROCESSABLE_ENTITY);
 }
 
@@ -234,8 +234,8 @@ async fn gaze(inside: &Inside, client: &RobotClient, building: &Building) {
     };
     let told = client.gaze(&request, SOON).await.expect("advice");
     assert_eq!(
-        (told.look(), told.landmark.as_str(), told.map.as_str()),
-        (GazeLook::Landmark, "poster-0", MAP)
+        (told.action(), told.landmark.as_str(), told.map.as_str()),
+        (GazeAction::Landmark, "poster-0", MAP)
     );
     assert!((told.pan_rad - best["pan_rad"].as_f64().expect("as promised")).abs() < 1e-9);
     let to = poster.map_from_landmark.translation.vector;

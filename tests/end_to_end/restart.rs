@@ -124,7 +124,7 @@ async fn nothing_acknowledged_is_lost_by_a_kill() {
         journal.landmarks.len() as u64 > KILLS && journal.jobs.len() > 3,
         "too little was taught: {journal:?}"
     );
-    // Jobs that a kill interrupted were taken up again: every accepted lesson ends, and its landmark has a model.
+    // Jobs that a kill interrupted were resumed: every accepted lesson ends, and its landmark has a model.
     for (job, name) in &journal.jobs {
         let maps = server.maps();
         let state = eventually("the job ends", || async {

@@ -168,8 +168,12 @@ async fn a_near_duplicate_view_is_answered_and_not_stored() {
     let alike = maps.upload_view("hall", "p1", picture(2), corners(180.5)).await.expect("view");
     let other = maps.upload_view("hall", "p1", picture(0), corners(150.0)).await.expect("view");
     let said: Vec<_> = [&first, &same, &alike, &other].iter().map(|v| v.outcome).collect();
-    let expected =
-        [UploadOutcomeBody::New, UploadOutcomeBody::Same, UploadOutcomeBody::Alike, UploadOutcomeBody::New];
+    let expected = [
+        UploadOutcomeBody::New,
+        UploadOutcomeBody::Duplicate,
+        UploadOutcomeBody::NearDuplicate,
+        UploadOutcomeBody::New,
+    ];
     assert_eq!(said, expected.map(Some));
     assert!(alike.id == first.id && same.id == first.id && other.id != first.id);
     assert_eq!(maps.landmark("hall", "p1").await.expect("landmark").views, 2);

@@ -47,8 +47,8 @@ async fn area(server: &Child, landmark: &str, query: &str) -> f64 {
     found["properties"]["area_m2"].as_f64().expect("an area")
 }
 
-async fn seen_from(server: &Child, sight: Value) -> Vec<String> {
-    let body = json!({ "pose": { "x_m": 5, "y_m": 3, "theta_rad": 0 }, "sight": sight });
+async fn seen_from(server: &Child, settings: Value) -> Vec<String> {
+    let body = json!({ "pose": { "x_m": 5, "y_m": 3, "theta_rad": 0 }, "visibility_settings": settings });
     let (status, found) = call(server, Method::POST, "/visible", Some(body)).await;
     assert_eq!(status, StatusCode::OK, "{found}");
     let mut names: Vec<String> = found["landmarks"]
@@ -68,10 +68,10 @@ async fn refusals(server: &Child) {
         (json!({ "tilt_low_rad": 0.5, "tilt_high_rad": 0.4 }), "out_of_range", "tilt_high_rad"),
         (json!({ "tilt_low_rad": -2 }), "out_of_range", "tilt_low_rad"),
         (json!({ "max_incidence_rad": 1.5 }), "out_of_range", "max_incidence_rad"),
-        (json!({ "camera_height_m": "high" }), "bad_value", "camera_height_m"),
-        (json!({ "focal": 500 }), "bad_value", "focal"),
+        (json!({ "camera_height_m": "high" }), "invalid_value", "camera_height_m"),
+        (json!({ "focal": 500 }), "invalid_value", "focal"),
     ] {
-        let (status, problem) = call(server, Method::PUT, "/sight", Some(body.clone())).await;
+        let (status, problem) = call(server, Method::PUT, "/visibility-settings", Some(body.clone())).await;
         assert_eq!(status, StatusCode::UNPROCESSABLE_ENTITY, "{problem}");
         assert_eq!(
             (problem["code"].as_str(), problem["field"].as_str()),
@@ -79,9 +79,9 @@ async fn refusals(server: &Child) {
             "{problem}"
         );
         if code == "out_of_range" {
-            let body = json!({ "pose": { "x_m": 0, "y_m": 0, "theta_rad": 0 }, "sight": body });
+            let body = json!({ "pose": { "x_m": 0, "y_m": 0, "theta_rad": 0 }, "visibility_settings": body });
             let (_, problem) = call(server, Method::POST, "/visible", Some(body)).await;
-            assert_eq!(problem["field"], format!("sight.{field}"), "{problem}");
+            assert_eq!(problem["field"], format!("visibility_settings.{field}"), "{problem}");
         }
     }
     assert_eq!(get(server, "").await["version"], version, "nothing was changed");
@@ -98,7 +98,7 @@ async fn one_question(server: &Child) {
     assert!(area(server, "sign", "?tilt_high_rad=1.2").await > 5.0);
     assert_eq!(seen_from(server, json!({})).await, ["poster"]);
     assert_eq!(seen_from(server, up.clone()).await, ["poster", "sign"]);
-    let path = json!({ "path": [[5, 2.6], [5, 3.2]], "sight": up });
+    let path = json!({ "path": [[5, 2.6], [5, 3.2]], "visibility_settings": up });
     let (status, along) = call(server, Method::POST, "/coverage", Some(path)).await;
     assert_eq!(status, StatusCode::OK, "{along}");
     assert_eq!(along["steps"][0]["landmarks"], json!(["sign"]), "{along}");
@@ -109,7 +109,7 @@ async fn areas_are_those_of_the_camera_that_looks() {
     let data = tempfile::tempdir().expect("a directory");
     let server = Child::start(data.path());
     hall(&server).await;
-    let usual = get(&server, "/sight").await;
+    let usual = get(&server, "/visibility-settings").await;
     assert_eq!(usual["focal_px"], 512.0, "{usual}");
     refusals(&server).await;
     one_question(&server).await;
@@ -122,14 +122,14 @@ async fn areas_are_those_of_the_camera_that_looks() {
     let gaze = json!({ "pose": { "x_m": 5, "y_m": 3, "theta_rad": 0 } });
     let (status, ranked) = call(&server, Method::POST, "/gaze", Some(gaze)).await;
     assert_eq!(status, StatusCode::OK, "nothing is learnt, but the question is answered: {ranked}");
-    let set = get(&server, "/sight").await;
+    let set = get(&server, "/visibility-settings").await;
     assert_eq!(set["width_px"], usual["width_px"], "what is not given stays");
     server.kill();
     let server = Child::start(data.path());
-    assert_eq!(get(&server, "/sight").await, set);
+    assert_eq!(get(&server, "/visibility-settings").await, set);
     assert!(area(&server, "sign", "").await > 5.0, "and the areas are made for it at the start");
     let run = waymark(["map", "sight", "hall", "--usual", "--server", &server.url], Duration::from_secs(30));
     assert_eq!(run.status, 0, "{run:?}");
-    assert_eq!(get(&server, "/sight").await, usual);
+    assert_eq!(get(&server, "/visibility-settings").await, usual);
     server.kill();
 }

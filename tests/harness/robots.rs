@@ -50,7 +50,7 @@ pub async fn put_walls(inside: &Inside, building: &Building) {
         .iter()
         .map(|w| json!({ "a": [w.a_m.x, w.a_m.y], "b": [w.b_m.x, w.b_m.y] }))
         .collect();
-    let path = format!("/maps/{MAP}/laser");
+    let path = format!("/maps/{MAP}/walls");
     assert_eq!(call(inside, Method::PUT, &path, Some(json!({ "segments": walls }))).await.0, StatusCode::OK);
 }
 

@@ -10,9 +10,9 @@ operations! {
     GET: GET "/maps/{map}/gatherings/{gathering}" => gathering,
     STOP: POST "/maps/{map}/gatherings/{gathering}/stop" => stop_gathering,
     DELETE: DELETE "/maps/{map}/gatherings/{gathering}" => delete_gathering,
-    TRACKS: GET "/maps/{map}/gatherings/{gathering}/candidates" => tracks,
-    DISCARD: DELETE "/maps/{map}/gatherings/{gathering}/candidates/{candidate}" => discard_track,
-    ICON: GET "/maps/{map}/gatherings/{gathering}/candidates/{candidate}/views/{view}/icon" => track_icon,
+    TRACKS: GET "/maps/{map}/gatherings/{gathering}/tracks" => tracks,
+    DISCARD: DELETE "/maps/{map}/gatherings/{gathering}/tracks/{track}" => discard_track,
+    ICON: GET "/maps/{map}/gatherings/{gathering}/tracks/{track}/views/{view}/icon" => track_icon,
     ACCEPT: POST "/maps/{map}/gatherings/{gathering}/accept" => accept_tracks,
 }
 
@@ -45,7 +45,7 @@ impl MapClient {
     /// The tracks that wait for a decision.
     pub async fn tracks(&self, map: &str, gathering: i64) -> Result<Vec<TrackSummary>, ClientError> {
         let found: TrackList = self.send(self.ask(&TRACKS, &[&map, &gathering])?).await?;
-        Ok(found.candidates)
+        Ok(found.tracks)
     }
 
     /// Throws a track away. While the gathering goes on, no more views of that object are kept.

@@ -5,9 +5,9 @@ use crate::ClientError;
 use protos::api::{AreaStatsBody, ModalityMapBody, ModalityMapPatch, ModalityQuery};
 
 operations! {
-    GET: GET "/maps/{map}/areas" => modalities,
-    SET: PUT "/maps/{map}/areas" => set_modalities,
-    AT: GET "/maps/{map}/areas/at" => modalities_at,
+    GET: GET "/maps/{map}/modalities" => modalities,
+    SET: PUT "/maps/{map}/modalities" => set_modalities,
+    AT: GET "/maps/{map}/modalities/at" => modalities_at,
 }
 
 impl MapClient {

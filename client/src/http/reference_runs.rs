@@ -5,12 +5,12 @@ use crate::ClientError;
 use protos::api::{RecordingStatusBody, ReferenceRunBody, ReferenceRuns, ReferenceTrajectoryBody};
 
 operations! {
-    START: POST "/robots/{robot}/run" => start_recording,
-    GET: GET "/robots/{robot}/run" => recording,
-    CANCEL: DELETE "/robots/{robot}/run" => cancel_recording,
-    FINISH: POST "/robots/{robot}/run/reference" => finish_recording,
-    LIST: GET "/maps/{map}/runs" => reference_runs,
-    DELETE: DELETE "/maps/{map}/runs/{run}" => delete_reference_run,
+    START: POST "/robots/{robot}/recording" => start_recording,
+    GET: GET "/robots/{robot}/recording" => recording,
+    CANCEL: DELETE "/robots/{robot}/recording" => cancel_recording,
+    FINISH: POST "/robots/{robot}/recording/reference" => finish_recording,
+    LIST: GET "/maps/{map}/reference-runs" => reference_runs,
+    DELETE: DELETE "/maps/{map}/reference-runs/{run}" => delete_reference_run,
 }
 
 impl MapClient {

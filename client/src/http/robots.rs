@@ -10,8 +10,8 @@ operations! {
     GET: GET "/robots/{robot}" => robot,
     DELETE: DELETE "/robots/{robot}" => delete_robot,
     CORRECTIONS: GET "/robots/{robot}/corrections" => corrections,
-    RELOCALISATION: GET "/robots/{robot}/hypotheses" => relocalisation,
-    TRAJECTORIES: GET "/robots/{robot}/tracks" => trajectories,
+    RELOCALISATION: GET "/robots/{robot}/relocalisation" => relocalisation,
+    TRAJECTORIES: GET "/robots/{robot}/trajectories" => trajectories,
 }
 
 impl MapClient {

@@ -34,13 +34,13 @@ pub struct NewView {
     /// How the photograph was taken; with it the server places the landmark, unless it was placed by hand.
     pub capture: Option<CaptureMetadata>,
     /// Store it even if a stored view shows the landmark from the same side, as large and in the same light.
-    pub keep_alike: bool,
+    pub keep_near_duplicate: bool,
 }
 
 impl NewView {
     /// A photograph of which nothing else is known.
     pub fn new(image: Vec<u8>, region: LandmarkRegion) -> Self {
-        Self { image, region, capture: None, keep_alike: false }
+        Self { image, region, capture: None, keep_near_duplicate: false }
     }
 }
 
@@ -72,8 +72,8 @@ impl MapClient {
         if let Some(capture) = new.capture {
             form = form.text("capture", json!(capture).to_string());
         }
-        if new.keep_alike {
-            form = form.text("keep_alike", "true");
+        if new.keep_near_duplicate {
+            form = form.text("keep_near_duplicate", "true");
         }
         self.send(self.ask(&UPLOAD, &[&map, &landmark])?.multipart(form)).await
     }

@@ -5,8 +5,8 @@ use crate::ClientError;
 use protos::api::VisibilitySettingsBody;
 
 operations! {
-    GET: GET "/maps/{map}/sight" => visibility_settings,
-    SET: PUT "/maps/{map}/sight" => set_visibility_settings,
+    GET: GET "/maps/{map}/visibility-settings" => visibility_settings,
+    SET: PUT "/maps/{map}/visibility-settings" => set_visibility_settings,
 }
 
 impl MapClient {

@@ -5,8 +5,8 @@ use crate::ClientError;
 use protos::api::WallsBody;
 
 operations! {
-    SET: PUT "/maps/{map}/laser" => set_walls,
-    GET: GET "/maps/{map}/laser" => walls,
+    SET: PUT "/maps/{map}/walls" => set_walls,
+    GET: GET "/maps/{map}/walls" => walls,
 }
 
 impl MapClient {

@@ -15,18 +15,19 @@ pub struct Correction {
     pub captured_ns: i64,
     /// The map it is a pose in.
     pub map: String,
-    /// `landmarks` (named without the pose), `guided` (landmarks named by the pose), `laser` or `hypotheses`; `map` when the
-    /// robot came from another map.
+    /// `landmarks` (named without the pose), `guided` (landmarks named by the pose), `laser` or `relocalisation`; `map_change`
+    /// when the robot came from another map.
     pub modality: &'static str,
     /// The landmarks it rests on, by name; empty for the laser.
     pub landmarks: Vec<String>,
     /// `started` (it gave the first pose), `applied`, `gated_out` (it contradicts the pose and was left out), `reset` (the
-    /// last of several that contradict the pose and agree with one another: it replaced the pose), `not_used` (it agrees, but
-    /// runs have shown another modality to be better here, and the map's mode leaves this one out), `too_old`, `waiting`
-    /// (newer than the last odometry), `carried_over` (the pose on another map, in the frame of this one).
+    /// last of several that contradict the pose and agree with one another: it replaced the pose), `excluded_by_mode` (it
+    /// agrees, but reference runs have shown another modality to be better here, and the map's fusion mode leaves this one
+    /// out), `too_old`, `waiting` (newer than the last odometry), `carried_over` (the pose on another map, in the frame of
+    /// this one).
     pub outcome: &'static str,
-    /// Squared Mahalanobis distance of the fix from the pose before it, 3 degrees of freedom; for `applied`, `not_used`
-    /// and `gated_out`.
+    /// Squared Mahalanobis distance of the fix from the pose before it, 3 degrees of freedom; for `applied`,
+    /// `excluded_by_mode` and `gated_out`.
     pub chi2: Option<f64>,
     /// By how much it moved the pose, in the robot's frame before it: forwards, metres.
     pub along_m: Option<f64>,
@@ -47,11 +48,11 @@ pub(super) struct Log {
 /// What the log says, for readers.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Corrections {
-    /// What the pose rests on now: `odometry`, `landmarks`, `guided`, `laser`, `hypotheses`; empty without a pose.
+    /// What the pose rests on now: `odometry`, `landmarks`, `guided`, `laser`, `relocalisation`; empty without a pose.
     pub modalities: Vec<String>,
     /// For each modality how many fixes came to which end. For the laser also why scans gave no fix: `no_pose` (there is
-    /// none to correct), `no_walls` (the map has none), `few_points`, `unlike` (it shows something else than the map),
-    /// `prior` (it contradicts the pose), `ambiguous` (several poses fit), `superseded` (a newer one came first).
+    /// none to correct), `no_walls` (the map has none), `few_points`, `poor_match` (it shows something else than the
+    /// map), `gate_prior` (it contradicts the pose), `ambiguous` (several poses fit), `superseded` (a newer one came first).
     pub totals: BTreeMap<&'static str, BTreeMap<&'static str, u64>>,
     /// The latest 200 of each modality, oldest first; without `repeated` ones, which tell nothing new.
     pub corrections: Vec<Correction>,
@@ -103,7 +104,7 @@ pub(super) fn outcome(outcome: FixOutcome) -> (&'static str, Option<f64>) {
     match outcome {
         FixOutcome::Started => ("started", None),
         FixOutcome::Applied { distance2 } => ("applied", finite(distance2)),
-        FixOutcome::NotUsed { distance2 } => ("not_used", finite(distance2)),
+        FixOutcome::ExcludedByMode { distance2 } => ("excluded_by_mode", finite(distance2)),
         FixOutcome::GatedOut { distance2, .. } => ("gated_out", finite(distance2)),
         FixOutcome::Reset => ("reset", None),
         FixOutcome::Repeated => ("repeated", None),
@@ -117,8 +118,8 @@ pub(super) fn outcome(outcome: FixOutcome) -> (&'static str, Option<f64>) {
 pub(super) fn refusal(refusal: LaserRefusal) -> &'static str {
     match refusal {
         LaserRefusal::FewPoints { .. } => "few_points",
-        LaserRefusal::Unlike { .. } => "unlike",
-        LaserRefusal::Prior { .. } => "prior",
+        LaserRefusal::PoorMatch { .. } => "poor_match",
+        LaserRefusal::GatePrior { .. } => "gate_prior",
         LaserRefusal::Ambiguous => "ambiguous",
     }
 }
@@ -146,10 +147,10 @@ mod tests {
         for i in 1..=MAX_CORRECTIONS as i64 + 1 {
             log.keep(made("laser", i));
         }
-        log.count("laser", "unlike");
+        log.count("laser", "poor_match");
         let read = log.read(vec!["odometry".into()]);
         assert_eq!(read.corrections.len(), MAX_CORRECTIONS + 1);
         assert_eq!((read.corrections[0].modality, read.corrections[1].captured_ns), ("landmarks", 2));
-        assert_eq!(read.totals["laser"], [("applied", MAX_CORRECTIONS as u64 + 1), ("unlike", 1)].into());
+        assert_eq!(read.totals["laser"], [("applied", MAX_CORRECTIONS as u64 + 1), ("poor_match", 1)].into());
     }
 }

@@ -142,7 +142,7 @@ impl RobotState {
         self.found.clear();
         if let (Some(pose), Some((at_ns, odometry)), Some(moved_at)) = (there, newest, moved_at) {
             self.moved(at_ns, odometry, moved_at);
-            self.begin(at_ns, &pose, ("map", "carried_over"), Vec::new());
+            self.begin(at_ns, &pose, ("map_change", "carried_over"), Vec::new());
         }
     }
 
@@ -376,7 +376,7 @@ impl RobotState {
         let covariance = FuseParams::default().motion_noise(&motion);
         let there = pose.compose(&Pose2Covariance { pose: motion, covariance });
         self.lost();
-        if !self.begin(captured_ns, &there, ("hypotheses", "started"), names) {
+        if !self.begin(captured_ns, &there, ("relocalisation", "started"), names) {
             return None;
         }
         self.schedule.relocalised(landmarks);

@@ -202,7 +202,10 @@ fn a_pose_goes_along_to_a_map_that_lies_known() {
     assert_eq!(said.modalities, ["odometry"]);
     let told = motion.odometry_of(&r1, odometry(3, 5.1)).unwrap();
     assert_eq!((told.map.as_str(), told.trust()), ("floor", v1::PoseTrust::Unsupported));
-    assert_eq!(said.corrections.last().map(|c| (c.modality, c.outcome)), Some(("map", "carried_over")));
+    assert_eq!(
+        said.corrections.last().map(|c| (c.modality, c.outcome)),
+        Some(("map_change", "carried_over"))
+    );
     assert!(on("attic").is_none(), "nothing is known of how it lies");
     assert!(on("hall").is_none(), "and what was known is gone with it");
 }

@@ -88,7 +88,7 @@ fn where_doors_hang_nearly_evenly_no_place_is_taken_for_the_only_one() {
         assert!(left.decided.is_none(), "{x}: {left:?}");
         needed = searches.progress(&name("r1")).unwrap().needed;
     }
-    assert!(matches!(needed[..], [MissingCondition::NoOtherPlace]), "{needed:?}");
+    assert!(matches!(needed[..], [MissingCondition::NoRivalPose]), "{needed:?}");
 }
 
 #[test]
@@ -106,7 +106,7 @@ fn how_far_a_search_has_come_is_told() {
     let first = searches.progress(&name("r1")).unwrap();
     assert_eq!(
         (first.sightings, first.modes.len(), &first.needed[..]),
-        (1, 3, &[MissingCondition::FewerPlaces][..])
+        (1, 3, &[MissingCondition::HigherProbability][..])
     );
     assert!(first.modes.iter().all(|m| (0.2..0.45).contains(&m.mass)) && first.landmarks.len() == 1);
     look(9.5);

@@ -113,7 +113,7 @@ async fn measured(args: &Args) -> anyhow::Result<()> {
         large.visible(&name).await?;
         settled.push(ms(started));
         let started = Instant::now();
-        large.change(&name, &json!({ "standing": if i % 2 == 0 { "quarantined" } else { "sound" } })).await?;
+        large.change(&name, &json!({ "health": if i % 2 == 0 { "quarantined" } else { "sound" } })).await?;
         trusted.push(ms(started));
         bar.inc(1);
     }

@@ -119,7 +119,7 @@ async fn evaluate(truth: &Truth, args: &Args) -> anyhow::Result<Report> {
     let options =
         RobotOptions { delivery: Delivery::Every, ..RobotOptions::new(&server.zenoh_endpoint, FLEET, ROBOT) };
     let robot = RobotClient::connect(&options).await?;
-    let mut ages_ms = Vec::new();
+    let mut latencies_ms = Vec::new();
     let progress = screen::progress(truth.images.len(), "recognising");
     for image in &truth.images {
         progress.inc(1);
@@ -140,11 +140,11 @@ async fn evaluate(truth: &Truth, args: &Args) -> anyhow::Result<Report> {
             continue;
         }
         report.images += 1;
-        ages_ms.push(answer.age_ms);
+        latencies_ms.push(answer.latency_ms);
         score(truth, image, &answer, args, &mut report);
     }
     progress.finish_and_clear();
-    report.ms_per_image = median(&mut ages_ms).unwrap_or(0.0);
+    report.ms_per_image = median(&mut latencies_ms).unwrap_or(0.0);
     robot.close().await?;
     server.stop().await;
     Ok(report)
@@ -178,7 +178,7 @@ async fn teach(truth: &Truth, args: &Args, maps: &MapClient, report: &mut Report
     report.active = landmarks.iter().filter(|l| l.status == LandmarkStatus::Active).count();
     if args.misses {
         for landmark in landmarks.iter().filter(|l| l.status != LandmarkStatus::Active) {
-            screen::complain(&format!("not active: {} {:?}", landmark.name, landmark.reasons));
+            screen::complain(&format!("not active: {} {:?}", landmark.name, landmark.failed_gates));
         }
     }
     Ok(())

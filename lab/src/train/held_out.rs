@@ -149,8 +149,8 @@ pub(super) fn judged(
 ) -> anyhow::Result<HeldOutFigures> {
     let by = |[side, thing]: &[Network; 2]| {
         let mut params = params.clone();
-        params.quads.side_model = Some(side.clone());
-        params.quads.thing_model = Some(thing.clone());
+        params.quads.border_model = Some(side.clone());
+        params.quads.quad_classifier = Some(thing.clone());
         params
     };
     let params: Vec<DetectParams> = networks.iter().map(by).collect();

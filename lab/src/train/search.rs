@@ -220,7 +220,7 @@ impl Fit<'_> {
         let learnt: Vec<ChoiceExample> = sides.iter().filter(|r| Some(r.group) != without).cloned().collect();
         let side = train_choice(&learnt, &self.how[0]).context("the network of sides")?;
         let mut params = self.params.clone();
-        params.quads.side_model = Some(side.clone());
+        params.quads.border_model = Some(side.clone());
         let data = Data::gather(self.sets, &params, self.min_side_px)?;
         let learnt: Vec<LabelledExample> =
             data.things.iter().filter(|e| Some(e.group) != without).cloned().collect();
@@ -231,12 +231,12 @@ impl Fit<'_> {
 
 /// Writes the networks where they are wanted.
 fn keep(args: &SearchArgs, [side, thing]: [Network; 2]) -> anyhow::Result<()> {
-    let models = [("side_model", side), ("thing_model", thing)];
+    let models = [("border_model", side), ("quad_classifier", thing)];
     if let Some(path) = &args.out {
         let [side, thing] = &models;
         write(
             path,
-            &serde_json::to_string(&json!({"quads": {"side_model": side.1, "thing_model": thing.1}}))?,
+            &serde_json::to_string(&json!({"quads": {"border_model": side.1, "quad_classifier": thing.1}}))?,
         )?;
     }
     if let Some(path) = &args.rust {

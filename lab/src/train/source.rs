@@ -113,14 +113,14 @@ mod tests {
         });
         assert_eq!(net.check(2), Ok(()));
         let from = Provenance::of_this_run(&[]).unwrap();
-        let text = source(&[("side_model", net.clone()), ("thing_model", net)], &from);
+        let text = source(&[("border_model", net.clone()), ("quad_classifier", net)], &from);
         for part in [
-            "const SIDE_MODEL_MEAN: [f64; 2] = [\n    0.1234, 0.0,\n];",
-            "const THING_MODEL_DEVIATION: [f64; 2] = [\n    0.0001, 2.0,\n];",
+            "const BORDER_MODEL_MEAN: [f64; 2] = [\n    0.1234, 0.0,\n];",
+            "const QUAD_CLASSIFIER_DEVIATION: [f64; 2] = [\n    0.0001, 2.0,\n];",
             "bias: 0.5185,",
             "        features: FEATURES,\n",
             &format!("FeatureDigest(0x{});", grouped(FeatureDigest::OF_THIS_PROGRAM)),
-            "pub(crate) fn thing_model() -> &'static Network {",
+            "pub(crate) fn quad_classifier() -> &'static Network {",
         ] {
             assert!(text.contains(part), "{part} not in\n{text}");
         }

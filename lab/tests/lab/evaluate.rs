@@ -245,7 +245,7 @@ fn fitted_networks_are_parameters_that_can_be_evaluated() {
     let sets = report["detection"].as_array().expect("figures of detection");
     let named = |name: &str| sets.iter().any(|s| s["set"] == name && s["quads"].as_u64() > Some(0));
     assert!(["corridor", "scenes", "corridor, seed 1", "scenes, seed 1"].into_iter().all(named), "{report}");
-    assert!(fs::read_to_string(source).expect("the source").contains("const THING_MODEL_LINEAR: [f64; "));
+    assert!(fs::read_to_string(source).expect("the source").contains("const QUAD_CLASSIFIER_LINEAR: [f64; "));
     let mut args: Vec<OsString> =
         ["evaluate", "detection", "corridor", "--views=2", "--params"].map(Into::into).into();
     args.push(networks.into());

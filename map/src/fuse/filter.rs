@@ -160,7 +160,7 @@ impl Filter {
                             *belief = next;
                             FixOutcome::Applied { distance2 }
                         } else {
-                            FixOutcome::NotUsed { distance2 }
+                            FixOutcome::ExcludedByMode { distance2 }
                         }
                     }
                     distance2 if role == FixRole::Guided => FixOutcome::GatedOut {
@@ -171,7 +171,7 @@ impl Filter {
                 }
             }
         };
-        if let FixOutcome::NotUsed { .. } = outcome {
+        if let FixOutcome::ExcludedByMode { .. } = outcome {
             match fix.modality {
                 FixSource::Laser => self.laser_doubts = 0,
                 FixSource::Landmarks if role == FixRole::Guided => {}

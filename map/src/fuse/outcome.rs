@@ -53,7 +53,7 @@ pub enum FixOutcome {
         distance2: f64,
     },
     /// It agrees with the pose, but its modality is excluded there ([`crate::modality_stats`]).
-    NotUsed {
+    ExcludedByMode {
         /// Squared Mahalanobis distance, 3 degrees of freedom.
         distance2: f64,
     },

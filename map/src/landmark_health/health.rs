@@ -23,16 +23,16 @@ pub enum Finding {
     /// It is observed elsewhere.
     Moved {
         /// Observed centre on the floor and direction of the normal, map frame.
-        apparent: Pose2,
+        observed_place: Pose2,
         /// Distance from its place, metres.
-        by_m: f64,
+        offset_m: f64,
         /// Number of observations.
         sightings: u32,
     },
     /// It should be visible and is not.
     Missing {
         /// Consecutive frames without it.
-        looks: u32,
+        missed_frames: u32,
     },
 }
 
@@ -42,7 +42,7 @@ pub struct HealthChange {
     /// Number of the landmark.
     pub landmark: LandmarkId,
     /// The new health.
-    pub standing: LandmarkHealth,
+    pub health: LandmarkHealth,
     /// The finding; `None` for a sound landmark.
     pub finding: Option<Finding>,
 }

@@ -56,18 +56,18 @@ impl HealthMonitor {
         let raised =
             cleared.into_iter().filter(|(_, e)| e.told == LandmarkHealth::Flagged && e.elsewhere > 0);
         raised
-            .map(|(landmark, _)| HealthChange { landmark, standing: LandmarkHealth::Sound, finding: None })
+            .map(|(landmark, _)| HealthChange { landmark, health: LandmarkHealth::Sound, finding: None })
             .collect()
     }
 
     /// Adds one frame taken from `from`: place checks of the observed landmarks, and the expected landmarks that were
-    /// missed. `standing` gives the present health of a landmark. Gives the changes, by landmark.
+    /// missed. `health` gives the present health of a landmark. Gives the changes, by landmark.
     pub fn frame(
         &mut self,
         from: Point2<f64>,
         judged: &[PlaceCheck],
         missed: &[LandmarkId],
-        standing: impl Fn(LandmarkId) -> LandmarkHealth,
+        health: impl Fn(LandmarkId) -> LandmarkHealth,
     ) -> Vec<HealthChange> {
         self.frames += 1;
         for judged in judged {
@@ -85,7 +85,7 @@ impl HealthMonitor {
         self.prune();
         let p = &self.params;
         let ids = self.landmarks.iter_mut();
-        ids.filter_map(|(id, evidence)| evidence.change(*id, standing(*id), p)).collect()
+        ids.filter_map(|(id, evidence)| evidence.change(*id, health(*id), p)).collect()
     }
 
     fn sighting(&mut self, from: Point2<f64>, judged: &PlaceCheck) {
@@ -147,12 +147,13 @@ impl LandmarkEvidence {
         p: &HealthParams,
     ) -> Option<HealthChange> {
         let often = self.elsewhere >= p.flag_sightings && (self.firm || self.confirmed);
-        let moved = self.apparent.filter(|_| often).map(|apparent| Finding::Moved {
-            apparent,
-            by_m: self.by_m,
+        let moved = self.apparent.filter(|_| often).map(|observed_place| Finding::Moved {
+            observed_place,
+            offset_m: self.by_m,
             sightings: self.elsewhere,
         });
-        let missing = (self.misses >= p.flag_misses).then_some(Finding::Missing { looks: self.misses });
+        let missing =
+            (self.misses >= p.flag_misses).then_some(Finding::Missing { missed_frames: self.misses });
         let sure = (self.elsewhere >= p.quarantine_sightings && self.confirmed)
             || self.misses >= p.quarantine_misses;
         let Some(finding) = moved.or(missing) else {
@@ -160,16 +161,12 @@ impl LandmarkEvidence {
             let clear = now == LandmarkHealth::Flagged && self.in_place >= p.clear_sightings;
             // Reported again only after as many observations, in case the report was lost.
             self.in_place = if clear { 0 } else { self.in_place };
-            return clear.then_some(HealthChange {
-                landmark,
-                standing: LandmarkHealth::Sound,
-                finding: None,
-            });
+            return clear.then_some(HealthChange { landmark, health: LandmarkHealth::Sound, finding: None });
         };
-        let standing = if sure { LandmarkHealth::Quarantined } else { LandmarkHealth::Flagged };
+        let health = if sure { LandmarkHealth::Quarantined } else { LandmarkHealth::Flagged };
         // Only a person ends a quarantine; a report is not repeated.
-        let news = standing > now && standing != self.told;
-        self.told = standing;
-        news.then_some(HealthChange { landmark, standing, finding: Some(finding) })
+        let news = health > now && health != self.told;
+        self.told = health;
+        news.then_some(HealthChange { landmark, health, finding: Some(finding) })
     }
 }

@@ -131,18 +131,18 @@ fn in_place(id: u64) -> PlaceCheck {
 /// A map that does what it is told.
 #[derive(Default)]
 struct Administration {
-    standings: BTreeMap<LandmarkId, LandmarkHealth>,
+    healths: BTreeMap<LandmarkId, LandmarkHealth>,
     log: Vec<(u64, LandmarkHealth)>,
 }
 
 impl Administration {
     fn frame(&mut self, watch: &mut HealthMonitor, x: f64, judged: &[PlaceCheck], missed: &[u64]) {
         let missed: Vec<_> = missed.iter().map(|id| LandmarkId(*id)).collect();
-        let standings = self.standings.clone();
-        let now = |id| standings.get(&id).copied().unwrap_or_default();
+        let healths = self.healths.clone();
+        let now = |id| healths.get(&id).copied().unwrap_or_default();
         for change in watch.frame(Point2::new(x, 0.0), judged, &missed, now) {
-            self.standings.insert(change.landmark, change.standing);
-            self.log.push((change.landmark.0, change.standing));
+            self.healths.insert(change.landmark, change.health);
+            self.log.push((change.landmark.0, change.health));
         }
     }
 }
@@ -244,7 +244,7 @@ fn a_pose_that_proved_wrong_has_condemned_nobody() {
         admin.frame(&mut watch, 0.1 * f64::from(k), &judged, &[]);
     }
     assert!(admin.log.iter().all(|(_, s)| *s == LandmarkHealth::Flagged), "{:?}", admin.log);
-    let cleared: Vec<_> = watch.clear().iter().map(|c| (c.landmark.0, c.standing)).collect();
+    let cleared: Vec<_> = watch.clear().iter().map(|c| (c.landmark.0, c.health)).collect();
     assert_eq!(cleared, [(1, LandmarkHealth::Sound), (2, LandmarkHealth::Sound)]);
 }
 

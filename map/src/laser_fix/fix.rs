@@ -93,12 +93,12 @@ pub enum LaserRefusal {
         points: usize,
     },
     /// The scan does not match the map.
-    Unlike {
+    PoorMatch {
         /// Share of the points with a wall, 0 to 1.
         matched: f64,
     },
     /// The pose contradicts the prior.
-    Prior {
+    GatePrior {
         /// Squared Mahalanobis distance, 3 degrees of freedom.
         distance2: f64,
     },

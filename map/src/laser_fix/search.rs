@@ -45,11 +45,11 @@ pub fn laser_fix(
         return Ok(Err(LaserRefusal::FewPoints { points: best.points }));
     }
     if best.matched < p.min_matched {
-        return Ok(Err(LaserRefusal::Unlike { matched: best.matched }));
+        return Ok(Err(LaserRefusal::PoorMatch { matched: best.matched }));
     }
     let distance2 = best.pose.distance2(prior).unwrap_or(f64::INFINITY);
     if distance2 > p.prior_gate {
-        return Ok(Err(LaserRefusal::Prior { distance2 }));
+        return Ok(Err(LaserRefusal::GatePrior { distance2 }));
     }
     let rival = found.iter().skip(1).any(|other| {
         other.points as f64 >= p.rival_share * best.points as f64

@@ -87,7 +87,9 @@ fn what_is_not_the_map_is_refused() {
     assert!(
         matches!(
             other,
-            Err(LaserRefusal::Unlike { .. } | LaserRefusal::FewPoints { .. } | LaserRefusal::Prior { .. })
+            Err(LaserRefusal::PoorMatch { .. }
+                | LaserRefusal::FewPoints { .. }
+                | LaserRefusal::GatePrior { .. })
         ),
         "{other:?}"
     );
@@ -109,7 +111,7 @@ fn a_prior_that_is_sure_and_wrong_is_contradicted() {
     // Off by 0.3 m, said to be within 2 cm.
     let wrong = prior(&at.plus(&Vector3::new(0.3, 0.0, 0.0)), 0.02, 0.01, &mut random);
     let found = fix(&room, &at, &wrong, &mut random);
-    assert!(matches!(found, Err(LaserRefusal::Prior { .. })), "{found:?}");
+    assert!(matches!(found, Err(LaserRefusal::GatePrior { .. })), "{found:?}");
 }
 
 #[test]

@@ -20,7 +20,7 @@ pub enum StatsScope {
     /// The pose cell itself.
     Cell,
     /// The cell and its eight neighbours.
-    Around,
+    Neighbourhood,
     /// The named area that contains the cell.
     Area,
     /// The whole map.

@@ -43,7 +43,7 @@ pub enum FusionMode {
     #[default]
     All,
     /// The modalities whose score is at most twice the best one's.
-    Fuse,
+    NearBest,
     /// The best modality alone.
-    Single,
+    Best,
 }

@@ -118,7 +118,7 @@ impl ModalityMap {
                 alone.add(found);
             }
         }
-        let mut levels = vec![(StatsScope::Cell, alone), (StatsScope::Around, around)];
+        let mut levels = vec![(StatsScope::Cell, alone), (StatsScope::Neighbourhood, around)];
         let named = self.named.iter().find(|(area, _)| area.contains(cell.middle_m()));
         levels.extend(named.map(|(_, by_heading)| (StatsScope::Area, by_heading[usize::from(cell.heading)])));
         levels.push((StatsScope::Map, self.map));
@@ -150,8 +150,8 @@ impl ModalityMap {
         let lowest = scores[best.index()];
         advice.used = match self.mode {
             FusionMode::All => [true; 3],
-            FusionMode::Fuse => scores.map(|score| score <= FUSED_SCORE * lowest),
-            FusionMode::Single => Modality::ALL.map(|module| module == best),
+            FusionMode::NearBest => scores.map(|score| score <= FUSED_SCORE * lowest),
+            FusionMode::Best => Modality::ALL.map(|module| module == best),
         };
         (advice.best, advice.level) = (Some(best), *level);
         advice

@@ -180,7 +180,7 @@ fn a_bias_wants_several_passages_and_honest_ones_have_none() {
 #[test]
 fn a_corridor_tells_who_is_best_where_and_how_each_errs() {
     let runs = runs();
-    let areas = ModalityMap::new(FusionMode::Fuse, Vec::new(), &runs);
+    let areas = ModalityMap::new(FusionMode::NearBest, Vec::new(), &runs);
     // Landmarks where they are seen; the laser knows nothing along, and is 0.2 m off across.
     let near = areas.advice(&Pose2::new(2.5, 2.5, 0.0));
     assert_eq!((near.best, near.level), (Some(Modality::Landmarks), StatsScope::Cell));
@@ -214,9 +214,9 @@ fn modes_choose_and_nothing_known_means_everything() {
     let at = Pose2::new(2.5, 2.5, 0.0);
     let used = |mode| ModalityMap::new(mode, Vec::new(), &runs).advice(&at).used;
     assert_eq!(used(FusionMode::All), [true; 3]);
-    assert_eq!(used(FusionMode::Single), [false, false, true]);
-    assert!(!used(FusionMode::Fuse)[1] && used(FusionMode::Fuse)[2]);
-    assert_eq!(ModalityMap::new(FusionMode::Single, Vec::new(), &[]).advice(&at), ModalityAdvice::default());
+    assert_eq!(used(FusionMode::Best), [false, false, true]);
+    assert!(!used(FusionMode::NearBest)[1] && used(FusionMode::NearBest)[2]);
+    assert_eq!(ModalityMap::new(FusionMode::Best, Vec::new(), &[]).advice(&at), ModalityAdvice::default());
 }
 
 #[test]
@@ -228,12 +228,12 @@ fn neighbours_speak_for_a_cell_that_was_hardly_driven_through() {
     let areas = ModalityMap::new(FusionMode::All, Vec::new(), &runs);
     let (here, beside) =
         (areas.advice(&Pose2::new(10.5, 2.5, 0.0)), areas.advice(&Pose2::new(10.5, 3.5, 0.0)));
-    assert_eq!((here.level, beside.level), (StatsScope::Around, StatsScope::Around));
+    assert_eq!((here.level, beside.level), (StatsScope::Neighbourhood, StatsScope::Neighbourhood));
     // Passages through two or three cells are as many as through one: enough for a bias all the same.
     assert!((here.fault(Modality::Laser).bias.y + 0.2).abs() < 0.01, "{here:?}");
     let once = learnt(&drive(&mut Random::new(3), false)).cells;
     let advice = ModalityMap::new(FusionMode::All, Vec::new(), [&once]).advice(&Pose2::new(9.5, 3.5, 0.0));
-    assert_eq!(advice.level, StatsScope::Around);
+    assert_eq!(advice.level, StatsScope::Neighbourhood);
     assert_eq!(advice.fault(Modality::Laser).bias, Vector3::zeros(), "one passage through three cells");
     assert_eq!(areas.advice(&Pose2::new(10.5, 4.5, 0.0)).level, StatsScope::Map);
 }
@@ -250,10 +250,10 @@ fn a_named_area_speaks_for_cells_that_were_hardly_driven_through() {
     }
     runs.push(once);
     let at = Pose2::new(2.5, 2.5, 0.0);
-    assert_eq!(ModalityMap::new(FusionMode::Fuse, Vec::new(), &runs).advice(&at).best, None);
+    assert_eq!(ModalityMap::new(FusionMode::NearBest, Vec::new(), &runs).advice(&at).best, None);
     let west =
         NamedArea { name: "west".into(), corners_m: vec![[0.0, 0.0], [4.0, 0.0], [4.0, 5.0], [0.0, 5.0]] };
-    let areas = ModalityMap::new(FusionMode::Fuse, vec![west], &runs);
+    let areas = ModalityMap::new(FusionMode::NearBest, vec![west], &runs);
     let advice = areas.advice(&at);
     assert_eq!((advice.best, advice.level), (Some(Modality::Landmarks), StatsScope::Area));
     // The same in a cell of the area that nobody ever drove through, and not outside.
@@ -368,7 +368,7 @@ fn what_was_learnt_makes_drives_better() {
     let runs = runs();
     let mut random = Random::new(77);
     let untaught = driven(&mut random, &ModalityMap::default());
-    for mode in [FusionMode::All, FusionMode::Fuse, FusionMode::Single] {
+    for mode in [FusionMode::All, FusionMode::NearBest, FusionMode::Best] {
         let taught = driven(&mut random, &ModalityMap::new(mode, Vec::new(), &runs));
         assert!(taught.0 < 0.1 * untaught.0, "{mode:?}: {taught:?}, untaught {untaught:?}");
         assert!(taught.1 < 11.3, "{mode:?}: {taught:?}, untaught {untaught:?}");

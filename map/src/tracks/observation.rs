@@ -35,19 +35,19 @@ pub enum TrackOutcome {
     /// The view is to be kept in the track of this number.
     Keep(u32),
     /// Followed; the track has a near-duplicate of the view.
-    Alike,
+    NearDuplicate,
     /// Followed; not observed often enough yet to be kept.
-    TooNew,
+    TooFewObservations,
     /// The track has [`super::MAX_TRACK_VIEWS`] views.
     Full,
     /// A person has decided on the track.
     Decided,
     /// It may be a landmark of the map, or is one whose views are not requested.
-    Known,
+    KnownLandmark,
     /// It is no landmark, and only views of landmarks are requested.
-    Unwanted,
+    NotRequested,
     /// Its appearance does not match the track at its place.
-    Unlike,
+    AppearanceMismatch,
     /// There are [`super::MAX_TRACKS`] tracks.
-    TooMany,
+    TrackLimit,
 }

@@ -57,22 +57,28 @@ fn seen(tracker: &mut ViewTracker, step: i64, glimpses: &[QuadObservation]) -> V
 fn things_are_followed_by_their_place_over_any_gap() {
     let mut tracker = ViewTracker::default();
     let two = |width| [glimpse(1, 0.0, width, Some(1.0)), glimpse(2, 300.0, width, Some(2.0))];
-    assert_eq!(seen(&mut tracker, 1, &two(100.0)), [TrackOutcome::TooNew; 2]);
-    assert_eq!(seen(&mut tracker, 2, &two(101.0)), [TrackOutcome::TooNew; 2]);
+    assert_eq!(seen(&mut tracker, 1, &two(100.0)), [TrackOutcome::TooFewObservations; 2]);
+    assert_eq!(seen(&mut tracker, 2, &two(101.0)), [TrackOutcome::TooFewObservations; 2]);
     assert_eq!(seen(&mut tracker, 3, &two(102.0)), [TrackOutcome::Keep(1), TrackOutcome::Keep(2)]);
-    assert_eq!(seen(&mut tracker, 4, &two(102.5)), [TrackOutcome::Alike; 2]);
+    assert_eq!(seen(&mut tracker, 4, &two(102.5)), [TrackOutcome::NearDuplicate; 2]);
     // A minute later, elsewhere in the picture, and the other way round.
     let back: Vec<_> = two(150.0).into_iter().rev().collect();
     assert_eq!(seen(&mut tracker, 300, &back), [TrackOutcome::Keep(2), TrackOutcome::Keep(1)]);
     // Something else hangs there now: neither joined nor begun anew.
-    assert_eq!(seen(&mut tracker, 301, &[glimpse(3, 0.0, 190.0, Some(1.0))]), [TrackOutcome::Unlike]);
+    assert_eq!(
+        seen(&mut tracker, 301, &[glimpse(3, 0.0, 190.0, Some(1.0))]),
+        [TrackOutcome::AppearanceMismatch]
+    );
     // The same picture elsewhere is another thing; so is one of another size at the same place.
-    assert_eq!(seen(&mut tracker, 302, &[glimpse(1, 0.0, 190.0, Some(4.0))]), [TrackOutcome::TooNew]);
+    assert_eq!(
+        seen(&mut tracker, 302, &[glimpse(1, 0.0, 190.0, Some(4.0))]),
+        [TrackOutcome::TooFewObservations]
+    );
     let mut larger = glimpse(2, 0.0, 190.0, Some(2.0));
     larger.place = larger
         .place
         .map(|place| LandmarkPlace { size: LandmarkSize { width_m: 0.9, height_m: 0.84 }, ..place });
-    assert_eq!(seen(&mut tracker, 303, &[larger]), [TrackOutcome::TooNew]);
+    assert_eq!(seen(&mut tracker, 303, &[larger]), [TrackOutcome::TooFewObservations]);
     let of = |t: &Track| (t.number, t.sightings, t.views());
     assert_eq!(
         tracker.tracks().iter().map(of).collect::<Vec<_>>(),
@@ -85,17 +91,17 @@ fn without_a_place_things_are_followed_from_picture_to_picture_only() {
     let mut tracker = ViewTracker::default();
     let one = |u_px, width_px| [glimpse(1, u_px, width_px, None)];
     for (step, u_px) in [(1, 0.0), (2, 20.0)] {
-        assert_eq!(seen(&mut tracker, step, &one(u_px, 100.0)), [TrackOutcome::TooNew]);
+        assert_eq!(seen(&mut tracker, step, &one(u_px, 100.0)), [TrackOutcome::TooFewObservations]);
     }
     assert_eq!(seen(&mut tracker, 3, &one(40.0, 100.0)), [TrackOutcome::Keep(1)]);
     // What is in the same place of the picture next and looks different is not joined.
-    assert_eq!(seen(&mut tracker, 4, &[glimpse(2, 40.0, 140.0, None)]), [TrackOutcome::Unlike]);
+    assert_eq!(seen(&mut tracker, 4, &[glimpse(2, 40.0, 140.0, None)]), [TrackOutcome::AppearanceMismatch]);
     // Too far in the picture, too long ago, another camera: each begins anew.
-    assert_eq!(seen(&mut tracker, 5, &one(300.0, 100.0)), [TrackOutcome::TooNew]);
-    assert_eq!(seen(&mut tracker, 12, &one(40.0, 100.0)), [TrackOutcome::TooNew]);
+    assert_eq!(seen(&mut tracker, 5, &one(300.0, 100.0)), [TrackOutcome::TooFewObservations]);
+    assert_eq!(seen(&mut tracker, 12, &one(40.0, 100.0)), [TrackOutcome::TooFewObservations]);
     let p = RecogniseParams::default();
     let other = tracker.update((13 * STEP_NS, "back"), &one(40.0, 100.0), |_| false, true, &p);
-    assert_eq!((other, tracker.tracks().len()), (vec![TrackOutcome::TooNew], 4));
+    assert_eq!((other, tracker.tracks().len()), (vec![TrackOutcome::TooFewObservations], 4));
 }
 
 #[test]
@@ -104,29 +110,32 @@ fn nothing_of_a_doubtful_identity_is_kept() {
     let with = |identity, width_px| [QuadObservation { identity, ..glimpse(1, 0.0, width_px, Some(1.0)) }];
     for step in 0..5 {
         let width_px = 100.0 + 20.0 * step as f64;
-        assert_eq!(seen(&mut tracker, step, &with(Identity::Doubtful, width_px)), [TrackOutcome::Known]);
+        assert_eq!(
+            seen(&mut tracker, step, &with(Identity::Doubtful, width_px)),
+            [TrackOutcome::KnownLandmark]
+        );
         let unwanted = with(Identity::Landmark(LandmarkId(8)), width_px);
-        assert_eq!(seen(&mut tracker, step, &unwanted), [TrackOutcome::Known]);
+        assert_eq!(seen(&mut tracker, step, &unwanted), [TrackOutcome::KnownLandmark]);
     }
     assert!(tracker.tracks().is_empty());
     // Views of the landmark that is wanted are kept at once, in a track of its own, wherever it seems to be.
     let wanted = |width_px| with(Identity::Landmark(LandmarkId(7)), width_px);
     assert_eq!(seen(&mut tracker, 6, &wanted(100.0)), [TrackOutcome::Keep(1)]);
-    assert_eq!(seen(&mut tracker, 6, &wanted(101.0)), [TrackOutcome::Alike]);
-    assert_eq!(seen(&mut tracker, 7, &with(Identity::Doubtful, 150.0)), [TrackOutcome::Known]);
+    assert_eq!(seen(&mut tracker, 6, &wanted(101.0)), [TrackOutcome::NearDuplicate]);
+    assert_eq!(seen(&mut tracker, 7, &with(Identity::Doubtful, 150.0)), [TrackOutcome::KnownLandmark]);
     assert_eq!(tracker.tracks()[0].landmark, Some(LandmarkId(7)));
     // A thing that is taken for a landmark later is remembered for that.
     for step in 8..12 {
         seen(&mut tracker, step, &[glimpse(2, 300.0, 100.0, Some(3.0))]);
     }
     let doubtful = QuadObservation { identity: Identity::Doubtful, ..glimpse(2, 300.0, 140.0, Some(3.0)) };
-    assert_eq!(seen(&mut tracker, 12, &[doubtful]), [TrackOutcome::Known]);
+    assert_eq!(seen(&mut tracker, 12, &[doubtful]), [TrackOutcome::KnownLandmark]);
     assert_eq!((tracker.tracks()[1].known, tracker.tracks()[1].views()), (1, 1));
     // Where only landmarks are wanted, a stranger is not even followed.
     let p = RecogniseParams::default();
     let alone =
         tracker.update((13 * STEP_NS, "front"), &[glimpse(3, 0.0, 90.0, Some(6.0))], |_| true, false, &p);
-    assert_eq!(alone, [TrackOutcome::Unwanted]);
+    assert_eq!(alone, [TrackOutcome::NotRequested]);
 }
 
 #[test]
@@ -136,11 +145,11 @@ fn both_bounds_hold() {
     for i in 0..MAX_TRACKS {
         assert_eq!(
             seen(&mut tracker, 1, &[glimpse(1, 0.0, 100.0, Some(i as f64))]),
-            [TrackOutcome::TooNew],
+            [TrackOutcome::TooFewObservations],
             "{i}"
         );
     }
-    assert_eq!(seen(&mut tracker, 1, &[glimpse(1, 0.0, 100.0, Some(-9.0))]), [TrackOutcome::TooMany]);
+    assert_eq!(seen(&mut tracker, 1, &[glimpse(1, 0.0, 100.0, Some(-9.0))]), [TrackOutcome::TrackLimit]);
     assert_eq!(tracker.tracks().len(), MAX_TRACKS);
 
     let mut tracker = ViewTracker::default();
@@ -178,9 +187,12 @@ fn glimpses_are_forgotten_and_tracks_taken_up_again() {
     resumed.resume(kept, [(corners(0.0, 100.0), icon(1)), (corners(0.0, 150.0), icon(1))]);
     resumed.resume(kept, []);
     assert_eq!((resumed.tracks().len(), resumed.tracks()[0].views()), (1, 2));
-    assert_eq!(seen(&mut resumed, 200, &[glimpse(1, 0.0, 101.0, Some(1.0))]), [TrackOutcome::Alike]);
+    assert_eq!(seen(&mut resumed, 200, &[glimpse(1, 0.0, 101.0, Some(1.0))]), [TrackOutcome::NearDuplicate]);
     assert_eq!(seen(&mut resumed, 201, &[glimpse(1, 0.0, 240.0, Some(1.0))]), [TrackOutcome::Keep(4)]);
-    assert_eq!(seen(&mut resumed, 202, &[glimpse(5, 0.0, 240.0, Some(8.0))]), [TrackOutcome::TooNew]);
+    assert_eq!(
+        seen(&mut resumed, 202, &[glimpse(5, 0.0, 240.0, Some(8.0))]),
+        [TrackOutcome::TooFewObservations]
+    );
     resumed.number_after(8);
     seen(&mut resumed, 203, &[glimpse(6, 0.0, 240.0, Some(12.0))]);
     assert_eq!(numbers(&resumed), [4, 5, 9]);

@@ -80,11 +80,11 @@ impl ViewTracker {
             .map(|(glimpse, place)| {
                 let at = match (glimpse.identity, place) {
                     (Identity::Landmark(id), _) if wanted(id) => self.of_landmark(id),
-                    (Identity::Stranger, _) if !strangers => Err(TrackOutcome::Unwanted),
+                    (Identity::Stranger, _) if !strangers => Err(TrackOutcome::NotRequested),
                     (Identity::Stranger, Place::Nowhere) => self.begun(None),
                     (_, Place::Track(i)) => Ok(i),
-                    (Identity::Stranger, Place::Occupied) => Err(TrackOutcome::Unlike),
-                    _ => Err(TrackOutcome::Known),
+                    (Identity::Stranger, Place::Occupied) => Err(TrackOutcome::AppearanceMismatch),
+                    _ => Err(TrackOutcome::KnownLandmark),
                 };
                 at.map_or_else(|outcome| outcome, |i| self.taken(i, at_ns, camera, glimpse))
             })
@@ -147,7 +147,7 @@ impl ViewTracker {
 
     fn begun(&mut self, landmark: Option<LandmarkId>) -> Result<usize, TrackOutcome> {
         if self.tracks.len() >= MAX_TRACKS {
-            return Err(TrackOutcome::TooMany);
+            return Err(TrackOutcome::TrackLimit);
         }
         self.numbers = self.numbers.saturating_add(1);
         self.tracks.push(Track::new(self.numbers, landmark));
@@ -155,7 +155,7 @@ impl ViewTracker {
     }
 
     fn taken(&mut self, i: usize, at_ns: i64, camera: &str, glimpse: &QuadObservation) -> TrackOutcome {
-        let Some(track) = self.tracks.get_mut(i) else { return TrackOutcome::Unlike };
+        let Some(track) = self.tracks.get_mut(i) else { return TrackOutcome::AppearanceMismatch };
         track.sightings = track.sightings.saturating_add(1);
         track.last = Some(Last {
             at_ns,
@@ -169,10 +169,10 @@ impl ViewTracker {
         }
         if track.landmark.is_none() && glimpse.identity != Identity::Stranger {
             track.known = track.known.saturating_add(1);
-            return TrackOutcome::Known;
+            return TrackOutcome::KnownLandmark;
         }
         if track.landmark.is_none() && track.sightings < self.p.min_sightings {
-            return TrackOutcome::TooNew;
+            return TrackOutcome::TooFewObservations;
         }
         if track.views.len() >= MAX_TRACK_VIEWS {
             return TrackOutcome::Full;
@@ -181,7 +181,7 @@ impl ViewTracker {
         let late = track.views.len() >= MAX_TRACK_VIEWS / 2;
         let needed = if late { self.p.late_novelty } else { 1.0 };
         match most_alike(&digest, &track.views, &self.p.thinning) {
-            Some((_, novelty)) if novelty < needed => TrackOutcome::Alike,
+            Some((_, novelty)) if novelty < needed => TrackOutcome::NearDuplicate,
             _ => {
                 track.keep(digest, &glimpse.icon);
                 TrackOutcome::Keep(track.number)

@@ -22,7 +22,7 @@ pub struct Camera {
     pub views: usize,
     /// What the residuals of its fixes say: `suspicion` is set when the intrinsics seem off, with the reason and its number.
     #[cfg_attr(feature = "openapi", schema(value_type = Object))]
-    pub watch: IntrinsicsMonitorBody,
+    pub intrinsics_monitor: IntrinsicsMonitorBody,
 }
 
 /// What is known of a camera's intrinsics from its use.
@@ -107,9 +107,9 @@ pub struct UploadedViews {
 #[serde(default, deny_unknown_fields)]
 pub struct CalibrationRequest {
     /// Views of one rectangle; without them, the views that were kept of this camera's frames.
-    pub given: Option<UploadedViews>,
+    pub uploaded_views: Option<UploadedViews>,
     /// What is known beside the views.
-    pub known: CalibrationConstraintsBody,
+    pub constraints: CalibrationConstraintsBody,
 }
 
 /// What may be said beside the views.
@@ -120,7 +120,7 @@ pub struct CalibrationConstraintsBody {
     /// Radial coefficients (k1, k2) that may be fitted, 0 to 2; only those are that the views ask for.
     pub radial: u8,
     /// The camera does not roll (C2).
-    pub level: bool,
+    pub zero_roll: bool,
     /// The camera is this high over the landmark's centre in all views, metres; negative below (C3).
     pub height_m: Option<f64>,
     /// The ratio of the landmark's sides is not what its size says, and is found with the camera.
@@ -129,7 +129,7 @@ pub struct CalibrationConstraintsBody {
 
 impl Default for CalibrationConstraintsBody {
     fn default() -> Self {
-        Self { radial: 1, level: false, height_m: None, unknown_aspect: false }
+        Self { radial: 1, zero_roll: false, height_m: None, unknown_aspect: false }
     }
 }
 
@@ -177,7 +177,7 @@ pub struct CalibrationReport {
     /// Height over width of the landmark over what its size says.
     pub aspect_ratio: f64,
     /// Why it should not be believed without a look: empty where nothing speaks against it.
-    pub doubts: Vec<String>,
+    pub warnings: Vec<String>,
     /// Each view, in the order given.
     pub views: Vec<CalibrationViewReport>,
 }
@@ -198,7 +198,7 @@ mod tests {
             reduced_chi2: 1.0,
             orientations: 1,
             aspect_ratio: 1.0,
-            doubts: Vec::new(),
+            warnings: Vec::new(),
             views: Vec::new(),
         };
         let text = serde_json::to_string(&report).unwrap();

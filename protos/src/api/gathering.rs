@@ -52,31 +52,31 @@ pub struct GatheringCountsBody {
     /// Of these, dropped because others were still being followed.
     pub dropped: u64,
     /// Frames on another map.
-    pub elsewhere: u64,
+    pub other_map: u64,
     /// Quads that were too small, cut off or blurred to have an icon.
     pub unusable: u64,
     /// Quads that are not flat on a wall of the map.
     pub not_on_wall: u64,
     /// Views kept.
     pub kept: u64,
-    /// Quads of which there is a view like it.
-    pub alike: u64,
-    /// Quads not yet seen often enough.
-    pub too_new: u64,
-    /// Quads of candidates that have all the views they may have.
+    /// Quads that repeat a stored view.
+    pub near_duplicate: u64,
+    /// Quads not yet observed often enough.
+    pub too_few_observations: u64,
+    /// Quads of tracks that have all the views they may have.
     pub full: u64,
-    /// Quads of candidates that were decided on.
+    /// Quads of tracks that were decided on.
     pub decided: u64,
     /// Quads that show a landmark, or may.
-    pub known: u64,
+    pub known_landmark: u64,
     /// Quads that are no landmark, where only landmarks are wanted.
-    pub unwanted: u64,
-    /// Quads that lie where a candidate lies and look different.
-    pub unlike: u64,
-    /// Quads beyond the number of things that are followed.
-    pub too_many: u64,
-    /// Views that were not kept because a bound was reached or the disk is full.
-    pub refused: u64,
+    pub not_requested: u64,
+    /// Quads at the place of a track that look different.
+    pub appearance_mismatch: u64,
+    /// Quads beyond the number of tracks.
+    pub track_limit: u64,
+    /// Views that were not stored because a bound was reached or the disk is full.
+    pub not_stored: u64,
 }
 
 /// Where the object of a track seems to be, in the map.
@@ -117,15 +117,15 @@ pub struct TrackSummary {
     pub views: Vec<i64>,
     /// Views beside these that do not agree on its place: another border of it was found, or something else. They are left
     /// out.
-    pub apart: usize,
+    pub inconsistent_views: usize,
     /// The view that stands best for all.
-    pub best: Option<i64>,
+    pub best_view: Option<i64>,
     /// Smallest and largest side of the quad in the picture.
     pub side_px: [f64; 2],
     /// How far apart the views are (the gate `visibility_confidence`).
     pub v_c: f64,
     /// Where it is by its views.
-    pub hangs: Option<EstimatedPlace>,
+    pub place: Option<EstimatedPlace>,
     /// Why that is not known.
     pub not_placed: Option<String>,
     /// Whether a lesson of these views would pass every gate, look-alikes apart, and nothing else speaks against it.
@@ -133,8 +133,8 @@ pub struct TrackSummary {
     /// What does not pass: `gate`, `value`, `limit`, `detail`.
     #[cfg_attr(feature = "openapi", schema(value_type = Vec<Object>))]
     pub reasons: Vec<Value>,
-    /// Other candidates that look or hang alike: perhaps the same thing twice, or two of one kind.
-    pub rivals: Vec<u32>,
+    /// Other tracks that look alike or are at the same place: perhaps the same thing twice, or two of one kind.
+    pub similar_tracks: Vec<u32>,
 }
 
 impl TrackSummary {
@@ -145,7 +145,7 @@ impl TrackSummary {
 
     /// Where it is, in words.
     pub fn place_text(&self) -> String {
-        let Some(at) = &self.hangs else { return "not placed".to_owned() };
+        let Some(at) = &self.place else { return "not placed".to_owned() };
         format!("{:.2} x {:.2} m at {:.2}, {:.2}", at.width_m, at.height_m, at.x_m, at.y_m)
     }
 }
@@ -155,7 +155,7 @@ impl TrackSummary {
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct TrackList {
     /// By number; those that somebody has decided on are not among them.
-    pub candidates: Vec<TrackSummary>,
+    pub tracks: Vec<TrackSummary>,
 }
 
 /// A track that is accepted.
@@ -163,9 +163,9 @@ pub struct TrackList {
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct AcceptedTrackBody {
-    /// Number of the candidate.
-    pub candidate: u32,
-    /// Name of the landmark it becomes: a new one, or one without views. Several candidates of one thing may be given one
+    /// Number of the track.
+    pub track: u32,
+    /// Name of the landmark it becomes: a new one, or one without views. Several tracks of one object may be given one
     /// name. Not needed for views of a landmark that is known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
@@ -177,7 +177,7 @@ pub struct AcceptedTrackBody {
 #[serde(deny_unknown_fields)]
 pub struct AcceptRequest {
     /// At least one.
-    pub candidates: Vec<AcceptedTrackBody>,
+    pub tracks: Vec<AcceptedTrackBody>,
     /// Learn these landmarks at once.
     #[serde(default = "yes")]
     pub learn: bool,

@@ -65,22 +65,22 @@ pub struct PlaceSigma {
 #[serde(rename_all = "snake_case")]
 pub enum LandmarkStatus {
     /// Not learnt yet.
-    Empty,
+    NotLearnt,
     /// A job is learning it.
     Learning,
     /// Learnt and matched.
     Active,
-    /// Learnt, but not matched: see `reasons`.
-    Candidate,
+    /// Learnt, but not matched: see `failed_gates`.
+    Inactive,
 }
 
 impl fmt::Display for LandmarkStatus {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::Empty => "empty",
+            Self::NotLearnt => "not_learnt",
             Self::Learning => "learning",
             Self::Active => "active",
-            Self::Candidate => "candidate",
+            Self::Inactive => "inactive",
         })
     }
 }
@@ -109,8 +109,44 @@ pub enum LandmarkHealthBody {
     Sound,
     /// Robots find it elsewhere or not at all: see `finding`. It is still used.
     Flagged,
-    /// So often that it corrects no pose until somebody sets its place or its standing.
+    /// So often that it corrects no pose until somebody sets its place or its health.
     Quarantined,
+}
+
+/// What robots found of a landmark that is not where the map says. Stored as JSON: the other words are of earlier builds.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum FindingBody {
+    /// It is observed elsewhere.
+    Moved {
+        /// Where it is observed.
+        #[serde(alias = "apparent")]
+        observed_place: ObservedPlaceBody,
+        /// Distance from its place.
+        #[serde(alias = "by_m")]
+        offset_m: f64,
+        /// Observations that agree on it.
+        sightings: u32,
+    },
+    /// It should be visible and is not.
+    Missing {
+        /// Consecutive frames without it.
+        #[serde(alias = "looks")]
+        missed_frames: u32,
+    },
+}
+
+/// Where a landmark is observed, in the map.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct ObservedPlaceBody {
+    /// Centre, x.
+    pub x_m: f64,
+    /// Centre, y.
+    pub y_m: f64,
+    /// Direction of the outward normal on the floor.
+    pub theta_rad: f64,
 }
 
 /// A landmark.
@@ -121,8 +157,8 @@ pub struct Landmark {
     pub name: String,
     /// How far it has come.
     pub status: LandmarkStatus,
-    /// Why it is a candidate only.
-    pub reasons: Vec<Value>,
+    /// The quality gates that its model fails, each with `gate`, `value`, `limit` and `detail`; empty unless it is inactive.
+    pub failed_gates: Vec<Value>,
     /// Real views stored.
     pub views: u64,
     /// Width and height, if measured.
@@ -135,9 +171,9 @@ pub struct Landmark {
     /// What was learnt.
     pub model: Option<LandmarkModelBody>,
     /// How far what robots saw lets it be trusted.
-    pub standing: LandmarkHealthBody,
-    /// What speaks against it: `kind` `moved` with where it appears, or `missing`.
-    pub finding: Option<Value>,
+    pub health: LandmarkHealthBody,
+    /// What speaks against it.
+    pub finding: Option<FindingBody>,
 }
 
 /// A landmark to be.
@@ -176,7 +212,7 @@ pub struct LandmarkPatch {
     pub place: Option<Option<Place>>,
     /// A person's decision; a new size or place is sound by itself.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub standing: Option<LandmarkHealthBody>,
+    pub health: Option<LandmarkHealthBody>,
 }
 
 #[cfg(test)]
@@ -195,10 +231,24 @@ mod tests {
         }
     }
 
+    /// Rows of earlier builds are read with their words and answered with those of now.
+    #[test]
+    fn a_stored_finding_reads_with_the_words_of_earlier_builds() {
+        let place = r#"{"x_m":1.5,"y_m":2.0,"theta_rad":0.5}"#;
+        let earlier = format!(r#"{{"kind":"moved","by_m":1.25,"sightings":3,"apparent":{place}}}"#);
+        let now = format!(r#"{{"kind":"moved","observed_place":{place},"offset_m":1.25,"sightings":3}}"#);
+        let missing = (r#"{"kind":"missing","looks":6}"#, r#"{"kind":"missing","missed_frames":6}"#);
+        for (earlier, now) in [(earlier.as_str(), now.as_str()), missing] {
+            let read: FindingBody = serde_json::from_str(earlier).unwrap();
+            assert_eq!(serde_json::to_string(&read).unwrap(), now);
+            assert_eq!(serde_json::from_str::<FindingBody>(now).unwrap(), read);
+        }
+    }
+
     #[test]
     fn the_word_of_a_status_is_that_of_the_json() {
-        use LandmarkStatus::{Active, Candidate, Empty, Learning};
-        for status in [Empty, Learning, Active, Candidate] {
+        use LandmarkStatus::{Active, Inactive, Learning, NotLearnt};
+        for status in [NotLearnt, Learning, Active, Inactive] {
             assert_eq!(serde_json::to_value(status).unwrap(), status.to_string());
         }
     }

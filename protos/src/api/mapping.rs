@@ -47,15 +47,15 @@ pub struct MappingProgressBody {
     /// Scans that were not: the queue was full, the robot's software was started again, or there were too many.
     pub dropped: u64,
     /// Way driven, metres.
-    pub way_m: f64,
+    pub distance_m: f64,
     /// Where the robot is in the map so far: x, y, theta; absent before the first scan.
     pub pose: Option<[f64; 3]>,
     /// Walls, once it is done.
     pub segments: Option<usize>,
-    /// Loops that were closed, once fitted.
-    pub loops: Option<usize>,
+    /// Loop closures, once fitted.
+    pub loop_closures: Option<usize>,
     /// Why it failed.
     pub reason: Option<String>,
     /// Why further scans are not kept on disk: a restart of the server would lose them. Absent while they are.
-    pub not_kept: Option<String>,
+    pub journal_error: Option<String>,
 }

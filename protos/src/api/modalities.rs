@@ -1,4 +1,4 @@
-//! `/maps/{map}/areas`: which modality is best where, as reference runs have shown; named areas; what is fused.
+//! `/maps/{map}/modalities`: which modality is best where, as reference runs have shown; named areas; what is fused.
 
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -11,17 +11,17 @@ pub enum FusionModeBody {
     /// Everything, each as sure as it proved to be.
     All,
     /// Those whose score is at most twice the best one's.
-    Fuse,
+    NearBest,
     /// The best one alone.
-    Single,
+    Best,
 }
 
 impl fmt::Display for FusionModeBody {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::All => "all",
-            Self::Fuse => "fuse",
-            Self::Single => "single",
+            Self::NearBest => "near_best",
+            Self::Best => "best",
         })
     }
 }
@@ -55,7 +55,7 @@ pub enum StatsScopeBody {
     /// Those through the cell itself.
     Cell,
     /// Those through the cell and the eight around it.
-    Around,
+    Neighbourhood,
     /// Those through the named area it lies in.
     Area,
     /// All of the map.
@@ -81,7 +81,7 @@ pub struct AreaBody {
 pub struct ModalityMapPatch {
     /// What is fused.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub mode: Option<FusionModeBody>,
+    pub fusion_mode: Option<FusionModeBody>,
     /// All named areas, at most 64; where they overlap the first one counts.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub areas: Option<Vec<AreaBody>>,
@@ -94,7 +94,7 @@ pub struct ModalityMapPatch {
 pub struct ModalityStatsBody {
     /// `odometry`, `laser` or `landmarks`.
     #[cfg_attr(feature = "openapi", schema(value_type = String))]
-    pub module: ModalityBody,
+    pub modality: ModalityBody,
     /// Mean error of its own position.
     pub mean: [f64; 3],
     /// Standard deviations about that.
@@ -123,12 +123,12 @@ pub struct AdviceBody {
     /// What is fused.
     #[cfg_attr(feature = "openapi", schema(value_type = Vec<String>))]
     pub used: Vec<ModalityBody>,
-    /// Whose runs say so: those through the `cell`, those through it and the eight `around` it, those through the named
-    /// `area`, or all of the `map`.
+    /// Whose runs say so: those through the `cell`, those through it and the eight around it (`neighbourhood`), those through
+    /// the named `area`, or all of the `map`.
     #[cfg_attr(feature = "openapi", schema(value_type = String))]
-    pub level: StatsScopeBody,
+    pub scope: StatsScopeBody,
     /// What each modality gets wrong there beyond what it claims.
-    pub faults: Vec<ErrorModelBody>,
+    pub error_models: Vec<ErrorModelBody>,
 }
 
 /// What a modality gets wrong: along, to the left, heading.
@@ -137,11 +137,11 @@ pub struct AdviceBody {
 pub struct ErrorModelBody {
     /// `odometry`, `laser` or `landmarks`.
     #[cfg_attr(feature = "openapi", schema(value_type = String))]
-    pub module: ModalityBody,
+    pub modality: ModalityBody,
     /// Subtracted from what it says: metres, metres, radians; of odometry for each metre.
     pub bias: [f64; 3],
     /// Added to each variance, as a share of what it claims.
-    pub excess: [f64; 3],
+    pub variance_inflation: [f64; 3],
 }
 
 /// A pose cell: a square metre that was driven through in one of four headings.
@@ -179,9 +179,9 @@ pub struct NamedAreaBody {
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct AreaStatsBody {
     /// What follows for a robot there.
-    pub told: AdviceBody,
+    pub advice: AdviceBody,
     /// What runs have shown, by modality.
-    pub modules: Vec<ModalityStatsBody>,
+    pub statistics: Vec<ModalityStatsBody>,
 }
 
 /// All that is known of a map's modalities.
@@ -189,15 +189,15 @@ pub struct AreaStatsBody {
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct ModalityMapBody {
     /// What is fused.
-    pub mode: FusionModeBody,
+    pub fusion_mode: FusionModeBody,
     /// Areas with a name.
     pub areas: Vec<NamedAreaBody>,
     /// Side of the cells.
     pub cell_m: f64,
-    /// Cells that were driven through; see `areas/at` for what was found in one.
+    /// Cells that were driven through; see `modalities/at` for what was found in one.
     pub cells: Vec<CellBody>,
     /// Cells that this answer has no room for.
-    pub left_off: usize,
+    pub omitted_cells: usize,
     /// All of the map.
     pub map: AreaStatsBody,
 }

@@ -1,4 +1,4 @@
-//! `/robots/{robot}/run` and `/maps/{map}/runs`: recordings, and reference runs, to learn which modality to trust where.
+//! `/robots/{robot}/recording` and `/maps/{map}/reference-runs`: recordings, and reference runs, to learn which modality to trust where.
 
 use super::modalities::ModalityStatsBody;
 use serde::{Deserialize, Serialize};
@@ -13,11 +13,11 @@ pub struct RecordingStatusBody {
     pub robot: String,
     /// False once it is full, or the robot's software was started again, or it went to another map, or its odometry
     /// jumped: what was recorded until then can be learnt from.
-    pub going: bool,
-    /// Why it goes on no longer.
+    pub active: bool,
+    /// Why it is active no longer.
     pub reason: Option<String>,
     /// Way driven by odometry, metres.
-    pub way_m: f64,
+    pub distance_m: f64,
     /// Time of the first and the last reading of odometry, ns of the robot's clock; absent before the first.
     pub span_ns: Option<[i64; 2]>,
     /// Readings of odometry that were kept.
@@ -53,11 +53,11 @@ pub struct ReferenceRunBody {
     /// ms since the Unix epoch.
     pub created_ms: i64,
     /// Way of which the path was known, metres.
-    pub way_m: f64,
+    pub distance_m: f64,
     /// Square metres by heading that it tells of.
     pub cells: usize,
     /// What it showed, all of it together.
-    pub modules: Vec<ModalityStatsBody>,
+    pub statistics: Vec<ModalityStatsBody>,
 }
 
 /// Runs of a map that were learnt from.

@@ -1,4 +1,4 @@
-//! `/robots/{robot}/hypotheses`: relocalisation, where a robot may be while nothing that it sees is unique.
+//! `/robots/{robot}/relocalisation`: relocalisation, where a robot may be while nothing that it sees is unique.
 
 use serde::{Deserialize, Serialize};
 
@@ -23,14 +23,14 @@ pub struct PoseHypothesisBody {
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum MissingConditionBody {
-    /// Other places are too probable still.
-    FewerPlaces,
-    /// All sightings could be of one landmark: another is to be seen.
-    AnotherLandmark,
+    /// It is not probable enough: other places are too probable still.
+    HigherProbability,
+    /// All observations could be of one landmark: a second is to be seen.
+    SecondLandmark,
     /// It does not explain enough of what was seen.
-    AgreeingSightings,
+    ConsistentObservations,
     /// The landmarks hang so evenly that another place would explain what was seen nearly as well.
-    NoOtherPlace,
+    NoRivalPose,
 }
 
 /// How far a robot's relocalisation has come.
@@ -38,7 +38,7 @@ pub enum MissingConditionBody {
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct RelocalisationStatus {
     /// False for a robot that knows where it is, or has seen nothing to search with: all else is empty then.
-    pub searching: bool,
+    pub relocalising: bool,
     /// The map it searches.
     pub map: Option<String>,
     /// Version of that map.
@@ -52,7 +52,7 @@ pub struct RelocalisationStatus {
     /// The landmarks by which the first hypothesis explains them.
     pub landmarks: Vec<String>,
     /// What is missing before the first one becomes the robot's pose; empty if nothing is.
-    pub needed: Vec<MissingConditionBody>,
+    pub missing: Vec<MissingConditionBody>,
     /// The first one must be more probable than this.
-    pub decided_above: f64,
+    pub min_probability: f64,
 }

@@ -113,18 +113,19 @@ pub struct CorrectionBody {
     pub captured_ns: i64,
     /// The map it is a pose in.
     pub map: String,
-    /// `landmarks` (named without the pose), `guided` (landmarks named by the pose), `laser` or `hypotheses`; `map` when the
-    /// robot came from another map.
+    /// `landmarks` (named without the pose), `guided` (landmarks named by the pose), `laser` or `relocalisation`; `map_change`
+    /// when the robot came from another map.
     pub modality: String,
     /// The landmarks it rests on, by name; empty for the laser.
     pub landmarks: Vec<String>,
     /// `started` (it gave the first pose), `applied`, `gated_out` (it contradicts the pose and was left out), `reset` (the
-    /// last of several that contradict the pose and agree with one another: it replaced the pose), `not_used` (it agrees, but
-    /// runs have shown another modality to be better here, and the map's mode leaves this one out), `too_old`, `waiting`
-    /// (newer than the last odometry), `carried_over` (the pose on another map, in the frame of this one).
+    /// last of several that contradict the pose and agree with one another: it replaced the pose), `excluded_by_mode` (it
+    /// agrees, but reference runs have shown another modality to be better here, and the map's fusion mode leaves this one
+    /// out), `too_old`, `waiting` (newer than the last odometry), `carried_over` (the pose on another map, in the frame of
+    /// this one).
     pub outcome: String,
-    /// Squared Mahalanobis distance of the fix from the pose before it, 3 degrees of freedom; for `applied`, `not_used`
-    /// and `gated_out`.
+    /// Squared Mahalanobis distance of the fix from the pose before it, 3 degrees of freedom; for `applied`,
+    /// `excluded_by_mode` and `gated_out`.
     pub chi2: Option<f64>,
     /// By how much it moved the pose, in the robot's frame before it: forwards, metres.
     pub along_m: Option<f64>,
@@ -138,11 +139,11 @@ pub struct CorrectionBody {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct CorrectionsBody {
-    /// What the pose rests on now: `odometry`, `landmarks`, `guided`, `laser`, `hypotheses`; empty without a pose.
+    /// What the pose rests on now: `odometry`, `landmarks`, `guided`, `laser`, `relocalisation`; empty without a pose.
     pub modalities: Vec<String>,
     /// For each modality how many fixes came to which end. For the laser also why scans gave no fix: `no_pose` (there is
-    /// none to correct), `no_walls` (the map has none), `few_points`, `unlike` (it shows something else than the map),
-    /// `prior` (it contradicts the pose), `ambiguous` (several poses fit), `superseded` (a newer one came first).
+    /// none to correct), `no_walls` (the map has none), `few_points`, `poor_match` (it shows something else than the
+    /// map), `gate_prior` (it contradicts the pose), `ambiguous` (several poses fit), `superseded` (a newer one came first).
     #[cfg_attr(feature = "openapi", schema(value_type = Object))]
     pub totals: BTreeMap<String, BTreeMap<String, u64>>,
     /// The latest 200 of each modality, oldest first; without `repeated` ones, which tell nothing new.

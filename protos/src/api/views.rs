@@ -19,7 +19,7 @@ pub struct TrainingView {
     pub image_kind: String,
     /// ms since the Unix epoch.
     pub created_ms: i64,
-    /// In the answer to an upload: what became of it. With `same` and `alike` the view given is the one that is there.
+    /// In the answer to an upload: what became of it. With `duplicate` and `near_duplicate` the view given is the one that is there.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub outcome: Option<UploadOutcomeBody>,
     /// In the answer to an upload with `capture`: whether the landmark has a place by its views now, or why not.
@@ -35,9 +35,9 @@ pub enum UploadOutcomeBody {
     /// Stored.
     New,
     /// The same quad of the same picture is there already.
-    Same,
+    Duplicate,
     /// Not stored: the view shows nothing that this one does not. A lesson would gain nothing by it.
-    Alike,
+    NearDuplicate,
 }
 
 /// What came of placing a landmark by its views.
@@ -89,5 +89,5 @@ pub struct NewViewForm {
     /// places the landmark on the map's walls itself, unless it was placed by hand.
     pub capture: Option<String>,
     /// `true`: stored even if a stored view shows it from the same side, as large and in the same light.
-    pub keep_alike: Option<String>,
+    pub keep_near_duplicate: Option<String>,
 }

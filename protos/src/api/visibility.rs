@@ -67,7 +67,7 @@ pub struct VisibleRequest {
     pub pose: PoseBody,
     /// Another camera than the map's.
     #[serde(default)]
-    pub sight: VisibilitySettingsBody,
+    pub visibility_settings: VisibilitySettingsBody,
 }
 
 /// A landmark that may be seen.
@@ -104,7 +104,7 @@ pub struct CoverageRequest {
     pub step_m: f64,
     /// Another camera than the map's.
     #[serde(default)]
-    pub sight: VisibilitySettingsBody,
+    pub visibility_settings: VisibilitySettingsBody,
 }
 
 fn step_m() -> f64 {
@@ -114,7 +114,7 @@ fn step_m() -> f64 {
 impl CoverageRequest {
     /// Along these points (x, y in metres), every 0.1 m, with the map's camera.
     pub fn new(path: Vec<[f64; 2]>) -> Self {
-        Self { path, step_m: step_m(), sight: VisibilitySettingsBody::default() }
+        Self { path, step_m: step_m(), visibility_settings: VisibilitySettingsBody::default() }
     }
 }
 
@@ -169,7 +169,7 @@ pub struct GazeQueryBody {
     #[serde(default)]
     #[cfg_attr(feature = "openapi", schema(value_type = Object))]
     pub head: PanTiltUnit,
-    /// `focal_px`, `pan_rad`, `tilt_rad` and the rest of the camera; absent for the map's (`/maps/{map}/sight`).
+    /// `focal_px`, `pan_rad`, `tilt_rad` and the rest of the camera; absent for the map's (`/maps/{map}/visibility-settings`).
     #[cfg_attr(feature = "openapi", schema(value_type = Option<Object>))]
     pub viewer: Option<PanTiltCamera>,
     /// `product` (the paper's) or `information`.

@@ -1,4 +1,4 @@
-//! `/maps/{map}/sight`: the camera that looks for a map's landmarks, and what counts as seen.
+//! `/maps/{map}/visibility-settings`: the camera that looks for a map's landmarks, and what counts as seen.
 
 use serde::{Deserialize, Serialize};
 

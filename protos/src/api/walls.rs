@@ -1,4 +1,4 @@
-//! `/maps/{map}/laser`: the walls of a map.
+//! `/maps/{map}/walls`: the walls of a map.
 
 use serde::{Deserialize, Serialize};
 

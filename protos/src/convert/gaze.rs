@@ -84,13 +84,13 @@ fn range(field: &str, given: &[f64]) -> Result<Option<[f64; 2]>, Rejection> {
 }
 
 /// The advice; `name` gives the name of a landmark.
-pub fn advice(look: &GazeAction, name: impl Fn(&GazeTarget) -> String) -> v1::GazeAdvice {
-    let (kind, choice) = match look {
-        GazeAction::Landmark(choice) => (v1::GazeLook::Landmark, Some(choice)),
-        GazeAction::Ahead => (v1::GazeLook::Ahead, None),
-        GazeAction::Sweep => (v1::GazeLook::Sweep, None),
+pub fn advice(action: &GazeAction, name: impl Fn(&GazeTarget) -> String) -> v1::GazeAdvice {
+    let (kind, choice) = match action {
+        GazeAction::Landmark(choice) => (v1::GazeAction::Landmark, Some(choice)),
+        GazeAction::Ahead => (v1::GazeAction::Ahead, None),
+        GazeAction::Sweep => (v1::GazeAction::Sweep, None),
     };
-    let mut advice = v1::GazeAdvice { look: kind.into(), ..v1::GazeAdvice::default() };
+    let mut advice = v1::GazeAdvice { action: kind.into(), ..v1::GazeAdvice::default() };
     if let Some(c) = choice {
         advice.landmark = name(c);
         (advice.pan_rad, advice.tilt_rad) = (c.pan_rad, c.tilt_rad);

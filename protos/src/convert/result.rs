@@ -41,11 +41,11 @@ pub fn candidate(c: &MatchCandidate, name: impl Fn(LandmarkId) -> String) -> v1:
         // JSON has no infinity: an infinite distance (too few points) is absent.
         hausdorff: c.hausdorff.is_finite().then_some(c.hausdorff),
         distance: finite(c.distance),
-        tau: finite(c.tau),
+        threshold: finite(c.tau),
         ratio: finite(c.ratio),
         probability: c.probability,
         refusal: c.refusal.map_or("", refusal).to_owned(),
-        likeness: c.likeness.filter(|l| l.is_finite()),
+        gradient_similarity: c.likeness.filter(|l| l.is_finite()),
     }
 }
 
@@ -54,9 +54,9 @@ pub fn refusal(refusal: MatchRefusal) -> &'static str {
     match refusal {
         MatchRefusal::Correlation => "correlation",
         MatchRefusal::Hausdorff => "hausdorff",
-        MatchRefusal::Likeness => "likeness",
-        MatchRefusal::Contradiction => "contradiction",
-        MatchRefusal::Content => "content",
+        MatchRefusal::Similarity => "similarity",
+        MatchRefusal::Mismatch => "mismatch",
+        MatchRefusal::LowContent => "low_content",
         MatchRefusal::Margin => "margin",
         MatchRefusal::Points => "points",
         MatchRefusal::Disagreement => "disagreement",

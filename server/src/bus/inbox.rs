@@ -80,10 +80,10 @@ fn token(to: &Receivers, robot: &Name, token: (Option<u64>, bool)) {
     let came = to.motion.epochs().token(robot, token, Instant::now(), is_registered);
     let Some(alive) = came else { return };
     let map = map_of(robot);
-    if map.is_some() {
-        tracing::info!(%robot, alive, "a robot came or went");
-    } else {
-        tracing::debug!(%robot, alive, "a robot that is not registered came or went");
+    match (&map, alive) {
+        (Some(map), true) => tracing::info!(%robot, map, "robot_connected"),
+        (Some(map), false) => tracing::info!(%robot, map, "robot_disconnected"),
+        (None, _) => tracing::debug!(%robot, alive, "robot_not_registered"),
     }
     to.live.presence(robot, map, alive);
 }

@@ -125,12 +125,12 @@ impl Bus {
         self.changes.abort();
         for subscriber in self.subscribers {
             if let Err(error) = subscriber.undeclare().await {
-                tracing::warn!(%error, "undeclare");
+                tracing::warn!(%error, "zenoh_undeclare_failed");
             }
         }
         for queryable in self.queryables {
             if let Err(error) = queryable.undeclare().await {
-                tracing::warn!(%error, "undeclare");
+                tracing::warn!(%error, "zenoh_undeclare_failed");
             }
         }
         self.outbox.drain().await;

@@ -108,7 +108,9 @@ async fn every_bad_frame_is_answered_and_the_server_goes_on() {
     let robot = running.robot("r1").await;
     let ok = robot.recognise("front", plain(), WAIT).await.unwrap();
     assert_eq!((ok.status(), ok.map.as_str()), (v1::Status::NoMatch, "hall"));
-    assert!(ok.map_from_robot.is_none() && ok.age_ms > 0.0 && ok.timings.iter().any(|t| t.stage == "edges"));
+    assert!(
+        ok.map_from_robot.is_none() && ok.latency_ms > 0.0 && ok.timings.iter().any(|t| t.stage == "edges")
+    );
 
     let mut answers = robot.answers();
     let mut refused = async |frame: Vec<u8>| {

@@ -127,7 +127,7 @@ fn table(r: &CalibrationReport, names: &[String]) -> String {
         ),
     ];
     lines.extend(r.linear_fx_px.map(|fx| format!("linear solution: fx {fx:.2}")));
-    lines.extend(r.doubts.iter().map(|doubt| format!("caution: {doubt}")));
+    lines.extend(r.warnings.iter().map(|warning| format!("caution: {warning}")));
     for (view, name) in r.views.iter().zip(names) {
         lines.push(match (view.rms_px, view.distance_m) {
             (Some(rms), Some(distance)) => format!("  {name}: rms {rms:.2} px, {distance:.2} m"),

@@ -44,29 +44,29 @@ pub(crate) enum Command {
     Show {
         /// Number of the gathering.
         gathering: i64,
-        /// Write a picture of each candidate here, NUMBER.png.
+        /// Write a picture of each track here, NUMBER.png.
         #[arg(long, value_name = "DIR")]
         pictures: Option<PathBuf>,
         #[command(flatten)]
         at: At,
     },
-    /// Make landmarks of candidates, and learn them.
+    /// Make landmarks of tracks, and learn them.
     Accept {
         /// Number of the gathering.
         gathering: i64,
-        /// NUMBER=NAME of each candidate; NUMBER alone for views of a landmark that is known.
+        /// NUMBER=NAME of each track; NUMBER alone for views of a landmark that is known.
         #[arg(required = true, value_parser = pick)]
         picks: Vec<AcceptedTrackBody>,
         #[command(flatten)]
         at: At,
     },
-    /// Throw candidates away.
+    /// Discard tracks.
     Discard {
         /// Number of the gathering.
         gathering: i64,
-        /// Numbers of the candidates.
+        /// Numbers of the tracks.
         #[arg(required = true)]
-        candidates: Vec<u32>,
+        tracks: Vec<u32>,
         #[command(flatten)]
         at: At,
     },
@@ -84,8 +84,8 @@ pub(crate) struct At {
 
 fn pick(text: &str) -> Result<AcceptedTrackBody, String> {
     let (number, name) = text.split_once('=').map_or((text, None), |(n, name)| (n, Some(name.to_owned())));
-    let candidate = number.parse().map_err(|_e| "NUMBER=NAME, such as 3=poster".to_owned())?;
-    Ok(AcceptedTrackBody { candidate, name })
+    let track = number.parse().map_err(|_e| "NUMBER=NAME, such as 3=poster".to_owned())?;
+    Ok(AcceptedTrackBody { track, name })
 }
 
 fn line(g: &Gathering) -> String {
@@ -94,7 +94,7 @@ fn line(g: &Gathering) -> String {
     format!("{}  {} with {}, of {of}: {}", g.id, state, g.robot, counted(g.counts.kept, "view"))
 }
 
-fn candidate_line(c: &TrackSummary) -> String {
+fn track_line(c: &TrackSummary) -> String {
     let views = counted(c.views.len() as u64, "view");
     let verdict = if c.passes { "passes every gate".to_owned() } else { c.details().join("; ") };
     let known = c.landmark.as_ref().map_or_else(String::new, |name| format!(" of {name}"));
@@ -123,19 +123,15 @@ pub(crate) async fn run(command: &Command) -> anyhow::Result<()> {
             if let Some(folder) = pictures {
                 draw(&maps, (&at.map, *gathering), &found, folder).await?;
             }
-            show(&at.server, &found, &found.iter().map(candidate_line).collect::<Vec<_>>().join("\n"))
+            show(&at.server, &found, &found.iter().map(track_line).collect::<Vec<_>>().join("\n"))
         }
         Command::Accept { gathering, picks, at } => accept(at, *gathering, picks).await,
-        Command::Discard { gathering, candidates, at } => {
+        Command::Discard { gathering, tracks, at } => {
             let maps = at.client()?;
-            for candidate in candidates {
-                maps.discard_track(&at.map, *gathering, *candidate).await?;
+            for track in tracks {
+                maps.discard_track(&at.map, *gathering, *track).await?;
             }
-            show(
-                &at.server,
-                candidates,
-                &format!("{} thrown away", counted(candidates.len() as u64, "candidate")),
-            )
+            show(&at.server, tracks, &format!("{} discarded", counted(tracks.len() as u64, "track")))
         }
     }
 }
@@ -147,10 +143,10 @@ async fn draw(
     folder: &Path,
 ) -> anyhow::Result<()> {
     std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
-    for candidate in found {
-        let Some(best) = candidate.best else { continue };
-        let png = maps.track_icon(map, gathering, candidate.number, best).await?;
-        let path = folder.join(format!("{}.png", candidate.number));
+    for track in found {
+        let Some(best) = track.best_view else { continue };
+        let png = maps.track_icon(map, gathering, track.number, best).await?;
+        let path = folder.join(format!("{}.png", track.number));
         std::fs::write(&path, png).with_context(|| path.display().to_string())?;
     }
     Ok(())
@@ -158,7 +154,7 @@ async fn draw(
 
 async fn accept(at: &At, gathering: i64, picks: &[AcceptedTrackBody]) -> anyhow::Result<()> {
     let maps = at.client()?;
-    let request = AcceptRequest { candidates: picks.to_vec(), learn: true };
+    let request = AcceptRequest { tracks: picks.to_vec(), learn: true };
     let accepted = maps.accept_tracks(&at.map, gathering, &request).await?;
     let bar = screen::progress(1000, "learning");
     let job = match accepted.job.clone() {
@@ -185,11 +181,8 @@ mod tests {
 
     #[test]
     fn picks_are_read() {
-        assert_eq!(
-            pick("3=poster").unwrap(),
-            AcceptedTrackBody { candidate: 3, name: Some("poster".into()) }
-        );
-        assert_eq!(pick("12").unwrap(), AcceptedTrackBody { candidate: 12, name: None });
+        assert_eq!(pick("3=poster").unwrap(), AcceptedTrackBody { track: 3, name: Some("poster".into()) });
+        assert_eq!(pick("12").unwrap(), AcceptedTrackBody { track: 12, name: None });
         assert!(pick("poster=3").is_err() && pick("-1=a").is_err() && pick("").is_err());
     }
 }

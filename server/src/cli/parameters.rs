@@ -14,7 +14,7 @@ pub struct ParameterArgs {
     /// Parameters as JSON, only what differs from the defaults, such as {"quads": {"grouping": "relaxation"}}.
     #[arg(long, value_name = "FILE")]
     params: Option<PathBuf>,
-    /// How segments become quads: `hypotheses` searches and completes missing sides, `relaxation` is the paper's way.
+    /// How segments become quads: `proposals` searches and completes missing sides, `relaxation` is the paper's way.
     #[arg(long, value_name = "NAME")]
     grouping: Option<String>,
     /// Work on the image reduced by a whole factor to about this longer side; 0 for full size. Larger finds smaller
@@ -45,7 +45,7 @@ pub struct ParameterArgs {
     /// Remove floor tiling before sides are grouped.
     #[arg(long)]
     remove_tiling: bool,
-    /// Any parameter by its path, as in `quads.hypotheses.min_corner_angle_deg=20`. May be repeated; --show-params of
+    /// Any parameter by its path, as in `quads.proposals.min_corner_angle_deg=20`. May be repeated; --show-params of
     /// `waymark detect` lists all.
     #[arg(long, value_name = "PATH=VALUE")]
     set: Vec<String>,

@@ -76,9 +76,9 @@ pub(crate) enum Command {
         /// The map.
         #[arg(long)]
         map: String,
-        /// `all`: everything, each as sure as it proved to be; `fuse`: those nearly as good as the best; `single`: the best
-        /// alone. Odometry carries the pose in any case.
-        #[arg(value_parser = PossibleValuesParser::new(["all", "fuse", "single"]).map(|word| mode(&word)))]
+        /// `all`: everything, each as sure as it proved to be; `near_best`: those nearly as good as the best; `best`: the
+        /// best alone. Odometry carries the pose in any case.
+        #[arg(value_parser = PossibleValuesParser::new(["all", "near_best", "best"]).map(|word| mode(&word)))]
         mode: Option<FusionModeBody>,
         #[command(flatten)]
         server: ServerArgs,
@@ -120,7 +120,8 @@ pub(crate) async fn run(command: &Command) -> anyhow::Result<()> {
             let maps = MapClient::new(server.address())?;
             let known = match mode {
                 Some(mode) => {
-                    maps.set_modalities(map, &ModalityMapPatch { mode: Some(*mode), areas: None }).await?
+                    maps.set_modalities(map, &ModalityMapPatch { fusion_mode: Some(*mode), areas: None })
+                        .await?
                 }
                 None => maps.modalities(map).await?,
             };
@@ -136,17 +137,22 @@ fn recorded_line(r: &RecordingStatusBody) -> String {
     };
     let [landmarks, laser] =
         [(r.landmarks, "landmark"), (r.laser, "scan")].map(|(n, what)| counted(n as u64, what));
-    format!("{} on {}: {state}, {:.1} m, fixes by {landmarks}, {laser}", r.robot, r.map, r.way_m)
+    format!("{} on {}: {state}, {:.1} m, fixes by {landmarks}, {laser}", r.robot, r.map, r.distance_m)
 }
 
 fn learnt_lines(run: &ReferenceRunBody) -> String {
-    let mut lines =
-        vec![format!("{}  {}: {:.1} m, {}", run.id, run.robot, run.way_m, counted(run.cells as u64, "cell"))];
-    lines.extend(run.modules.iter().map(|m| {
+    let mut lines = vec![format!(
+        "{}  {}: {:.1} m, {}",
+        run.id,
+        run.robot,
+        run.distance_m,
+        counted(run.cells as u64, "cell")
+    )];
+    lines.extend(run.statistics.iter().map(|m| {
         let [along, across, heading] = [0, 1, 2].map(|k| m.mean[k].hypot(m.sigma[k]));
         format!(
             "   {:9} off by {along:.3} m along, {across:.3} m across, {heading:.4} rad (RMS); available on {:.0} %",
-            m.module,
+            m.modality,
             100.0 * m.availability
         )
     }));
@@ -157,8 +163,8 @@ fn learnt_lines(run: &ReferenceRunBody) -> String {
 fn mode(word: &str) -> FusionModeBody {
     match word {
         "all" => FusionModeBody::All,
-        "fuse" => FusionModeBody::Fuse,
-        _ => FusionModeBody::Single,
+        "near_best" => FusionModeBody::NearBest,
+        _ => FusionModeBody::Best,
     }
 }
 
@@ -167,7 +173,12 @@ fn mode_line(known: &ModalityMapBody) -> String {
     let best = |modality| known.cells.iter().filter(|cell| cell.best == Some(modality)).count();
     let each = [ModalityBody::Odometry, ModalityBody::Laser, ModalityBody::Landmarks];
     let each = each.map(|modality| format!("{modality} {}", best(modality)));
-    format!("{}; best in {}: {}", known.mode, counted(known.cells.len() as u64, "cell"), each.join(", "))
+    format!(
+        "{}; best in {}: {}",
+        known.fusion_mode,
+        counted(known.cells.len() as u64, "cell"),
+        each.join(", ")
+    )
 }
 
 /// Poses of a file.

@@ -307,7 +307,7 @@ pub(crate) async fn learn(args: &LearnArgs) -> anyhow::Result<ExitCode> {
         let uploaded = match std::fs::read(path) {
             Ok(image) => match maps.upload_view(map, landmark, image, extent).await {
                 Ok(view) => {
-                    if view.outcome == Some(UploadOutcomeBody::Alike) {
+                    if view.outcome == Some(UploadOutcomeBody::NearDuplicate) {
                         let like = format!(
                             "waymark: {name}: not kept, it shows nothing that view {} does not",
                             view.id
@@ -338,7 +338,7 @@ pub(crate) async fn learn(args: &LearnArgs) -> anyhow::Result<ExitCode> {
         learnt.status,
         counted(learnt.views, "view")
     ))
-    .chain(learnt.reasons.iter().map(|r| format!("  {}", reason(r))))
+    .chain(learnt.failed_gates.iter().map(|r| format!("  {}", reason(r))))
     .collect();
     show(&args.server, &learnt, &lines.join("\n"))?;
     Ok(status)

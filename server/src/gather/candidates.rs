@@ -22,7 +22,7 @@ pub(crate) fn candidates(
 ) -> Vec<TrackSummary> {
     let mut made: Vec<(TrackSummary, Option<LandmarkModel>)> =
         tracks.iter().map(|(track, views)| one(track, views, walls, params)).collect();
-    let rivals: Vec<Vec<u32>> = made
+    let similar: Vec<Vec<u32>> = made
         .iter()
         .map(|(a, own)| {
             let others = made.iter().filter(|(b, _)| b.number != a.number);
@@ -37,20 +37,21 @@ pub(crate) fn candidates(
             others.filter(rival).map(|(b, _)| b.number).collect()
         })
         .collect();
-    for ((candidate, _), rivals) in made.iter_mut().zip(rivals) {
-        if !rivals.is_empty() {
-            let detail = "other candidates look or hang like it: the same thing twice, or two of one kind";
-            candidate
-                .reasons
-                .push(json!({ "gate": "rivals", "value": rivals.len(), "limit": 0, "detail": detail }));
-            (candidate.passes, candidate.rivals) = (false, rivals);
+    for ((track, _), similar) in made.iter_mut().zip(similar) {
+        if !similar.is_empty() {
+            let detail =
+                "other tracks look like it or are at its place: the same object twice, or two of one kind";
+            let reason =
+                json!({ "gate": "similar_tracks", "value": similar.len(), "limit": 0, "detail": detail });
+            track.reasons.push(reason);
+            (track.passes, track.similar_tracks) = (false, similar);
         }
     }
     made.into_iter().map(|(candidate, _)| candidate).collect()
 }
 
 fn overlap(a: &TrackSummary, b: &TrackSummary) -> bool {
-    let Some((a, b)) = a.hangs.as_ref().zip(b.hangs.as_ref()) else { return false };
+    let Some((a, b)) = a.place.as_ref().zip(b.place.as_ref()) else { return false };
     let reach = |h: &EstimatedPlace| 0.5 * h.width_m.max(h.height_m);
     (a.x_m - b.x_m).hypot(a.y_m - b.y_m).hypot(a.z_m - b.z_m) < reach(a).max(reach(b))
 }
@@ -83,8 +84,8 @@ fn one(
         reasons.push(json!({ "gate": "known", "value": track.known, "limit": 0, "detail": detail }));
     }
     let sides = views.iter().map(|v| v.cut.corners_px.area_px2().sqrt());
-    let (hangs, not_placed) = match &preview {
-        Ok(preview) => (Some(hangs(preview)), None),
+    let (place, not_placed) = match &preview {
+        Ok(preview) => (Some(estimated_place(preview)), None),
         Err(reason) => (None, Some(reason.clone())),
     };
     let exemplar = model.as_ref().and_then(|m| m.exemplars.first());
@@ -97,15 +98,15 @@ fn one(
         sightings: track.sightings,
         known: track.known,
         views: views.iter().map(|v| v.id).collect(),
-        apart: apart.len(),
-        best: best.or(views.first()).map(|v| v.id),
+        inconsistent_views: apart.len(),
+        best_view: best.or(views.first()).map(|v| v.id),
         side_px: range(sides),
         v_c: v_c(&seen),
-        hangs,
+        place,
         not_placed,
         passes: reasons.is_empty(),
         reasons,
-        rivals: vec![],
+        similar_tracks: vec![],
     };
     (candidate, model)
 }
@@ -123,7 +124,7 @@ fn reasons(model: Option<&LandmarkModel>) -> Vec<Value> {
         .collect()
 }
 
-fn hangs(preview: &placing::Preview) -> EstimatedPlace {
+fn estimated_place(preview: &placing::Preview) -> EstimatedPlace {
     let place = &preview.place;
     EstimatedPlace {
         x_m: place.x_m,

@@ -19,7 +19,7 @@ use vision::model::LandmarkId;
 /// Frames that wait to be followed; beyond that they are dropped.
 pub(crate) const QUEUE: usize = 8;
 
-/// What became of frames and quads.
+/// What became of frames and quads. Stored as JSON when the gathering ends: the other words are of earlier builds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(default)]
 pub(crate) struct Counts {
@@ -28,31 +28,39 @@ pub(crate) struct Counts {
     /// Of these, dropped because others were still being followed.
     pub(crate) dropped: u64,
     /// Frames on another map.
-    pub(crate) elsewhere: u64,
+    #[serde(alias = "elsewhere")]
+    pub(crate) other_map: u64,
     /// Quads that were too small, cut off or blurred to have an icon.
     pub(crate) unusable: u64,
     /// Quads that are not flat on a wall of the map.
     pub(crate) not_on_wall: u64,
     /// Views kept.
     pub(crate) kept: u64,
-    /// Quads of which there is a view like it.
-    pub(crate) alike: u64,
-    /// Quads not yet seen often enough.
-    pub(crate) too_new: u64,
-    /// Quads of candidates that have all the views they may have.
+    /// Quads that repeat a stored view.
+    #[serde(alias = "alike")]
+    pub(crate) near_duplicate: u64,
+    /// Quads not yet observed often enough.
+    #[serde(alias = "too_new")]
+    pub(crate) too_few_observations: u64,
+    /// Quads of tracks that have all the views they may have.
     pub(crate) full: u64,
-    /// Quads of candidates that were decided on.
+    /// Quads of tracks that were decided on.
     pub(crate) decided: u64,
     /// Quads that show a landmark, or may.
-    pub(crate) known: u64,
+    #[serde(alias = "known")]
+    pub(crate) known_landmark: u64,
     /// Quads that are no landmark, where only landmarks are wanted.
-    pub(crate) unwanted: u64,
-    /// Quads that lie where a candidate lies and look different.
-    pub(crate) unlike: u64,
-    /// Quads beyond the number of things that are followed.
-    pub(crate) too_many: u64,
-    /// Views that were not kept because a bound was reached or the disk is full.
-    pub(crate) refused: u64,
+    #[serde(alias = "unwanted")]
+    pub(crate) not_requested: u64,
+    /// Quads at the place of a track that look different.
+    #[serde(alias = "unlike")]
+    pub(crate) appearance_mismatch: u64,
+    /// Quads beyond the number of tracks.
+    #[serde(alias = "too_many")]
+    pub(crate) track_limit: u64,
+    /// Views that were not stored because a bound was reached or the disk is full.
+    #[serde(alias = "refused")]
+    pub(crate) not_stored: u64,
 }
 
 impl Counts {
@@ -60,14 +68,14 @@ impl Counts {
         let count = match outcome {
             // Counted when it is committed.
             TrackOutcome::Keep(_) => return,
-            TrackOutcome::Alike => &mut self.alike,
-            TrackOutcome::TooNew => &mut self.too_new,
+            TrackOutcome::NearDuplicate => &mut self.near_duplicate,
+            TrackOutcome::TooFewObservations => &mut self.too_few_observations,
             TrackOutcome::Full => &mut self.full,
             TrackOutcome::Decided => &mut self.decided,
-            TrackOutcome::Known => &mut self.known,
-            TrackOutcome::Unwanted => &mut self.unwanted,
-            TrackOutcome::Unlike => &mut self.unlike,
-            TrackOutcome::TooMany => &mut self.too_many,
+            TrackOutcome::KnownLandmark => &mut self.known_landmark,
+            TrackOutcome::NotRequested => &mut self.not_requested,
+            TrackOutcome::AppearanceMismatch => &mut self.appearance_mismatch,
+            TrackOutcome::TrackLimit => &mut self.track_limit,
         };
         *count += 1;
     }
@@ -141,7 +149,7 @@ impl FrameTap for Hook {
         let Some(session) = sessions.get(key.robot.as_str()) else { return };
         lock(&session.counts).frames += 1;
         if looked.map.name != session.map {
-            lock(&session.counts).elsewhere += 1;
+            lock(&session.counts).other_map += 1;
             return;
         }
         let camera = key.camera.to_string();

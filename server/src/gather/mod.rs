@@ -55,7 +55,7 @@ impl Gatherer {
         let gatherer =
             Arc::new(Self { store, params: config.params.clone(), sessions: hook.sessions.clone() });
         for row in gatherings::open(gatherer.store.reads()).await? {
-            tracing::info!(gathering = row.id, robot = row.robot, "taken up again");
+            tracing::info!(gathering = row.id, robot = row.robot, "gathering_resumed");
             let tracker = gatherer.resumed(&row).await?;
             gatherer.enter(&row, tracker);
         }
@@ -222,7 +222,7 @@ impl Gatherer {
         match done {
             Ok(()) => counts.kept += 1,
             Err(error) => {
-                counts.refused += 1;
+                counts.not_stored += 1;
                 drop(counts);
                 tracing::debug!(gathering = id, %error, "a view was not kept");
                 // It was deleted, or its map was.

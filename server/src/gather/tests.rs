@@ -77,13 +77,15 @@ async fn a_full_queue_drops_and_counts_and_nobody_waits() {
     hook.offer(&key("r1"), &frame, other);
     assert!(!hook.is_wanted(&key("r2")), "it does not gather");
     let counts = gatherer.counts(id).unwrap();
-    assert_eq!((counts.frames, counts.dropped, counts.elsewhere), (QUEUE as u64 + 4, 3, 1));
+    assert_eq!((counts.frames, counts.dropped, counts.other_map), (QUEUE as u64 + 4, 3, 1));
     // What waits is followed; the same picture again and again is one view.
     drop(hook);
     gatherer.clone().run(offers).await;
     let counts = gatherer.counts(id).unwrap();
     assert!(
-        counts.kept >= 1 && counts.alike >= 5 * counts.kept && counts.too_new >= 2 * counts.kept,
+        counts.kept >= 1
+            && counts.near_duplicate >= 5 * counts.kept
+            && counts.too_few_observations >= 2 * counts.kept,
         "{counts:?}"
     );
     let tracks = gatherings::tracks(gatherer.store.reads(), id).await.unwrap();

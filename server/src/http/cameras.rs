@@ -26,15 +26,15 @@ pub(super) fn router() -> OpenApiRouter<AppState> {
     OpenApiRouter::new().routes(routes!(list)).routes(routes!(calibrate))
 }
 
-fn monitor_shown(watch: &IntrinsicsMonitorState) -> IntrinsicsMonitorBody {
+fn monitor_shown(state: &IntrinsicsMonitorState) -> IntrinsicsMonitorBody {
     IntrinsicsMonitorBody {
-        tries: watch.tries,
-        refused: watch.refused,
-        landmarks: watch.landmarks,
-        reduced_chi2: watch.reduced_chi2,
-        focal_error: watch.focal_error,
-        focal_sigma: watch.focal_sigma,
-        suspicion: watch.suspicion.map(|suspicion| match suspicion {
+        tries: state.tries,
+        refused: state.refused,
+        landmarks: state.landmarks,
+        reduced_chi2: state.reduced_chi2,
+        focal_error: state.focal_error,
+        focal_sigma: state.focal_sigma,
+        suspicion: state.suspicion.map(|suspicion| match suspicion {
             Suspicion::Focal { error, sigma } => IntrinsicsSuspicionBody::Focal { error, sigma },
             Suspicion::Misfit { reduced_chi2 } => IntrinsicsSuspicionBody::Misfit { reduced_chi2 },
             Suspicion::Refused { share } => IntrinsicsSuspicionBody::Refused { share },
@@ -50,7 +50,7 @@ fn camera_shown((name, state): (String, CameraState)) -> Camera {
         height_px: state.image_px[1],
         frames: state.frames,
         views: state.views,
-        watch: monitor_shown(&state.watch),
+        intrinsics_monitor: monitor_shown(&state.watch),
     }
 }
 
@@ -72,26 +72,30 @@ async fn list(
     params(("robot" = String, Path), ("camera" = String, Path)), request_body = CalibrationRequest,
     responses((status = 200, body = CalibrationReport), (status = 404, body = Problem),
     (status = 409, body = Problem, description = "not_determined: too few views, too few orientations, or views that do not fit"),
-    (status = 422, body = Problem, description = "bad_value, out_of_range")))]
+    (status = 422, body = Problem, description = "invalid_value, out_of_range")))]
 async fn calibrate(
     State(app): State<AppState>,
     PathParams((robot, camera)): PathParams<(String, String)>,
     asked: Option<Body<CalibrationRequest>>,
 ) -> Result<Json<CalibrationReport>, ApiError> {
     robots::get(app.store.reads(), &robot).await?;
-    let CalibrationRequest { given, known } =
+    let CalibrationRequest { uploaded_views, constraints } =
         asked.map_or_else(CalibrationRequest::default, |Body(request)| request);
-    if usize::from(known.radial) > vision::camera_calibration::MAX_RADIAL {
-        return Err(ApiError::invalid("out_of_range", "known.radial", "0 to 2 coefficients can be fitted"));
+    if usize::from(constraints.radial) > vision::camera_calibration::MAX_RADIAL {
+        return Err(ApiError::invalid(
+            "out_of_range",
+            "constraints.radial",
+            "0 to 2 coefficients can be fitted",
+        ));
     }
-    let (views, image_px) = match given {
+    let (views, image_px) = match uploaded_views {
         Some(given) => uploaded(&given)?,
         None => app.live.watched().views(&robot, &camera).ok_or_else(|| {
             let detail = "no frame of this camera showed a landmark of known size yet";
             ApiError::new(StatusCode::NOT_FOUND, "unknown_camera", detail).field("camera")
         })?,
     };
-    let known = Knowledge::from(known);
+    let known = Knowledge::from(constraints);
     let size = image_px.map(|s| s as usize);
     let made = app.clone().on_vision_thread(move |_| calibrated(&views, size, &known)).await?;
     made.map(Json).map_err(|error| {
@@ -101,7 +105,9 @@ async fn calibrate(
 
 fn uploaded(given: &UploadedViews) -> Result<(Vec<PlanarView>, [u32; 2]), ApiError> {
     let size = LandmarkSize { width_m: given.size_width_m, height_m: given.size_height_m };
-    for (field, value) in [("given.size_width_m", size.width_m), ("given.size_height_m", size.height_m)] {
+    for (field, value) in
+        [("uploaded_views.size_width_m", size.width_m), ("uploaded_views.size_height_m", size.height_m)]
+    {
         if !(LandmarkSize::MIN_M..=LandmarkSize::MAX_M).contains(&value) {
             return Err(ApiError::invalid("out_of_range", field, format!("{value} is not a side in metres")));
         }
@@ -110,7 +116,7 @@ fn uploaded(given: &UploadedViews) -> Result<(Vec<PlanarView>, [u32; 2]), ApiErr
     let mut views = vec![];
     for (i, view) in given.views.iter().enumerate() {
         let corners = Corners::try_from(view.corners).map_err(|e| {
-            ApiError::invalid("bad_value", format!("given.views[{i}].corners"), e.to_string())
+            ApiError::invalid("invalid_value", format!("uploaded_views.views[{i}].corners"), e.to_string())
         })?;
         views.push(PlanarView::of_quad(&corners, &covariance, size));
     }

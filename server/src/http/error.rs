@@ -93,8 +93,8 @@ impl From<StoreError> for ApiError {
                     "camera" => ("unknown_camera", "camera"),
                     "job" => ("unknown_job", "job"),
                     "gathering" => ("unknown_gathering", "gathering"),
-                    "candidate" => ("unknown_candidate", "candidate"),
-                    "run" => ("unknown_run", "run"),
+                    "track" => ("unknown_track", "track"),
+                    "run" => ("unknown_reference_run", "run"),
                     _ => ("not_found", "path"),
                 };
                 Self::new(StatusCode::NOT_FOUND, code, detail).field(field)

@@ -87,7 +87,7 @@ pub(super) fn json<T: DeserializeOwned>(bytes: &[u8], outer: &str) -> Result<T, 
         };
         let inner = error.inner();
         if inner.is_data() {
-            ApiError::invalid("bad_value", field, inner.to_string())
+            ApiError::invalid("invalid_value", field, inner.to_string())
         } else {
             ApiError::new(StatusCode::BAD_REQUEST, "bad_json", inner.to_string()).field(field)
         }
@@ -147,7 +147,7 @@ pub(super) fn page_limit(query: &PageQuery, max: usize) -> Result<usize, ApiErro
 
 /// The cursor of a list by number; 0 comes before every number.
 pub(super) fn after_number(query: &PageQuery) -> Result<i64, ApiError> {
-    let bad = |_e| ApiError::invalid("bad_value", "cursor", "not one of this list");
+    let bad = |_e| ApiError::invalid("invalid_value", "cursor", "not one of this list");
     query.cursor.as_deref().map_or(Ok(0), |text| text.parse().map_err(bad))
 }
 

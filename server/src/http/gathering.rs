@@ -35,7 +35,7 @@ pub(super) fn router() -> OpenApiRouter<AppState> {
         .routes(routes!(begin, list))
         .routes(routes!(get, delete))
         .routes(routes!(stop))
-        .routes(routes!(list_candidates))
+        .routes(routes!(list_tracks))
         .routes(routes!(discard))
         .routes(routes!(show_icon))
         .routes(routes!(accept))
@@ -45,19 +45,19 @@ fn counts_shown(counts: Counts) -> GatheringCountsBody {
     GatheringCountsBody {
         frames: counts.frames,
         dropped: counts.dropped,
-        elsewhere: counts.elsewhere,
+        other_map: counts.other_map,
         unusable: counts.unusable,
         not_on_wall: counts.not_on_wall,
         kept: counts.kept,
-        alike: counts.alike,
-        too_new: counts.too_new,
+        near_duplicate: counts.near_duplicate,
+        too_few_observations: counts.too_few_observations,
         full: counts.full,
         decided: counts.decided,
-        known: counts.known,
-        unwanted: counts.unwanted,
-        unlike: counts.unlike,
-        too_many: counts.too_many,
-        refused: counts.refused,
+        known_landmark: counts.known_landmark,
+        not_requested: counts.not_requested,
+        appearance_mismatch: counts.appearance_mismatch,
+        track_limit: counts.track_limit,
+        not_stored: counts.not_stored,
     }
 }
 
@@ -159,10 +159,10 @@ async fn delete(
 }
 
 /// What waits for a decision, with all that helps to decide. Also while the robot still drives.
-#[utoipa::path(get, path = "/maps/{map}/gatherings/{gathering}/candidates", tag = "gathering",
+#[utoipa::path(get, path = "/maps/{map}/gatherings/{gathering}/tracks", tag = "gathering",
     params(("map" = String, Path), ("gathering" = i64, Path)),
     responses((status = 200, body = TrackList), (status = 404, body = Problem)))]
-async fn list_candidates(
+async fn list_tracks(
     State(app): State<AppState>,
     PathParams((map, id)): PathParams<(String, i64)>,
 ) -> Result<Json<TrackList>, ApiError> {
@@ -174,12 +174,12 @@ async fn list_candidates(
     }
     let walls = app.store.snapshots().get(&map).map(|map| map.walls.clone()).unwrap_or_default();
     let work = move |app: &super::App| candidates(&tracks, &walls, &app.config.params);
-    Ok(Json(TrackList { candidates: app.on_vision_thread(work).await? }))
+    Ok(Json(TrackList { tracks: app.on_vision_thread(work).await? }))
 }
 
-/// Throws a candidate away. While the gathering goes on, no more views of that thing are kept.
-#[utoipa::path(delete, path = "/maps/{map}/gatherings/{gathering}/candidates/{candidate}", tag = "gathering",
-    params(("map" = String, Path), ("gathering" = i64, Path), ("candidate" = u32, Path)),
+/// Discards a track. While the gathering goes on, no more views of it are kept.
+#[utoipa::path(delete, path = "/maps/{map}/gatherings/{gathering}/tracks/{track}", tag = "gathering",
+    params(("map" = String, Path), ("gathering" = i64, Path), ("track" = u32, Path)),
     responses((status = 204), (status = 404, body = Problem)))]
 async fn discard(
     State(app): State<AppState>,
@@ -189,9 +189,9 @@ async fn discard(
     Ok(StatusCode::NO_CONTENT)
 }
 
-/// The rectified picture of a view of a candidate, as PNG.
-#[utoipa::path(get, path = "/maps/{map}/gatherings/{gathering}/candidates/{candidate}/views/{view}/icon",
-    tag = "gathering", params(("map" = String, Path), ("gathering" = i64, Path), ("candidate" = u32, Path),
+/// The rectified picture of a view of a track, as PNG.
+#[utoipa::path(get, path = "/maps/{map}/gatherings/{gathering}/tracks/{track}/views/{view}/icon",
+    tag = "gathering", params(("map" = String, Path), ("gathering" = i64, Path), ("track" = u32, Path),
     ("view" = i64, Path)), responses((status = 200, content_type = "image/png"), (status = 404, body = Problem)))]
 async fn show_icon(
     State(app): State<AppState>,
@@ -211,32 +211,31 @@ async fn show_icon(
     Ok((headers, png).into_response())
 }
 
-/// Most candidates of one decision.
+/// Most tracks of one decision.
 const MAX_PICKS: usize = 64;
 
-/// Makes landmarks of candidates, or adds views to the landmarks they show; places them; and learns them. All or nothing.
+/// Makes landmarks of tracks, or adds views to the landmarks they show; places them; and learns them. All or nothing.
 #[utoipa::path(post, path = "/maps/{map}/gatherings/{gathering}/accept", tag = "gathering",
     params(("map" = String, Path), ("gathering" = i64, Path)), request_body = AcceptRequest,
     responses((status = 202, body = AcceptanceBody), (status = 200, body = AcceptanceBody, description = "without a lesson"),
-    (status = 404, body = Problem, description = "unknown_gathering, unknown_candidate"),
+    (status = 404, body = Problem, description = "unknown_gathering, unknown_track"),
     (status = 409, body = Problem, description = "exists: the landmark has views of its own; in_use; too_many"),
-    (status = 422, body = Problem, description = "bad_name, bad_value, out_of_range")))]
+    (status = 422, body = Problem, description = "bad_name, invalid_value, out_of_range")))]
 async fn accept(
     State(app): State<AppState>,
     PathParams((map, id)): PathParams<(String, i64)>,
     Body(decision): Body<AcceptRequest>,
 ) -> Result<(StatusCode, Json<AcceptanceBody>), ApiError> {
-    if !(1..=MAX_PICKS).contains(&decision.candidates.len()) {
-        let detail = format!("1 to {MAX_PICKS} candidates at a time");
-        return Err(ApiError::invalid("out_of_range", "candidates", detail));
+    if !(1..=MAX_PICKS).contains(&decision.tracks.len()) {
+        let detail = format!("1 to {MAX_PICKS} tracks at a time");
+        return Err(ApiError::invalid("out_of_range", "tracks", detail));
     }
     let pick = |(i, pick): (usize, AcceptedTrackBody)| {
         let name = pick.name.map(|text| name("name", text)).transpose();
-        let name = name.map_err(|e| e.field(format!("candidates[{i}].name")))?;
-        Ok(Pick { number: pick.candidate, name: name.map(|n| n.to_string()) })
+        let name = name.map_err(|e| e.field(format!("tracks[{i}].name")))?;
+        Ok(Pick { number: pick.track, name: name.map(|n| n.to_string()) })
     };
-    let picks =
-        decision.candidates.into_iter().enumerate().map(pick).collect::<Result<Vec<_>, ApiError>>()?;
+    let picks = decision.tracks.into_iter().enumerate().map(pick).collect::<Result<Vec<_>, ApiError>>()?;
     let limits = &app.config.limits;
     let bounds = accepting::Bounds {
         landmarks: limits.landmarks,

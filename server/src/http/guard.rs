@@ -103,7 +103,7 @@ fn check_origin(method: &Method, headers: &HeaderMap, loopback: bool) -> Result<
     // A name that a stranger's DNS points at 127.0.0.1 must not make this server part of the stranger's site.
     if loopback && !is_loopback_host(host) {
         let detail = "this server listens on loopback and answers only to a loopback host";
-        return Err(ApiError::new(StatusCode::FORBIDDEN, "foreign_host", detail).field("host"));
+        return Err(ApiError::new(StatusCode::FORBIDDEN, "host_not_allowed", detail).field("host"));
     }
     if method.is_safe() {
         return Ok(());
@@ -111,7 +111,7 @@ fn check_origin(method: &Method, headers: &HeaderMap, loopback: bool) -> Result<
     let own = |origin: &str| origin.split_once("://").is_some_and(|(_, rest)| rest == host);
     if text(header::ORIGIN).is_some_and(|origin| !own(origin)) {
         let detail = "changes are not accepted from the pages of another site";
-        return Err(ApiError::new(StatusCode::FORBIDDEN, "foreign_origin", detail).field("origin"));
+        return Err(ApiError::new(StatusCode::FORBIDDEN, "origin_not_allowed", detail).field("origin"));
     }
     Ok(())
 }
@@ -152,7 +152,7 @@ mod tests {
         let own = headers(&[("host", "localhost:8080"), ("origin", "http://localhost:8080")]);
         let foreign = headers(&[("host", "localhost:8080"), ("origin", "https://evil.example")]);
         assert!(check_origin(&Method::POST, &own, true).is_ok());
-        assert_eq!(check_origin(&Method::POST, &foreign, true).unwrap_err().code, "foreign_origin");
+        assert_eq!(check_origin(&Method::POST, &foreign, true).unwrap_err().code, "origin_not_allowed");
         assert!(check_origin(&Method::GET, &foreign, true).is_ok());
         let none = headers(&[("host", "localhost:8080")]);
         assert!(check_origin(&Method::DELETE, &none, true).is_ok());

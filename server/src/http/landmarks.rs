@@ -23,7 +23,7 @@ use protos::api::{
     Landmark, LandmarkHealthBody, LandmarkModelBody, LandmarkPatch, LandmarkStatus, NewLandmark, Page,
     PageQuery, Place, PlaceSigma, Problem, Size,
 };
-use serde_json::json;
+use serde_json::{Map, Value, json};
 use utoipa_axum::{router::OpenApiRouter, routes};
 use vision::{model::LandmarkId, pose::LandmarkSize};
 
@@ -64,11 +64,29 @@ fn health(body: LandmarkHealthBody) -> LandmarkHealth {
     }
 }
 
-fn health_shown(standing: LandmarkHealth) -> LandmarkHealthBody {
-    match standing {
+fn health_shown(health: LandmarkHealth) -> LandmarkHealthBody {
+    match health {
         LandmarkHealth::Sound => LandmarkHealthBody::Sound,
         LandmarkHealth::Flagged => LandmarkHealthBody::Flagged,
         LandmarkHealth::Quarantined => LandmarkHealthBody::Quarantined,
+    }
+}
+
+/// Facts of a stored model: keys of earlier builds become those of now.
+fn facts_shown(facts: Map<String, Value>) -> Map<String, Value> {
+    let key = |key: String| match key.as_str() {
+        "likeness" => "gradient_similarity".to_owned(),
+        "tau" => "threshold".to_owned(),
+        _ => key,
+    };
+    facts.into_iter().map(|(of, fact)| (key(of), fact_shown(fact))).collect()
+}
+
+fn fact_shown(fact: Value) -> Value {
+    match fact {
+        Value::Object(parts) => Value::Object(facts_shown(parts)),
+        Value::Array(items) => items.into_iter().map(fact_shown).collect(),
+        other => other,
     }
 }
 
@@ -80,25 +98,25 @@ fn landmark_shown(mut row: LandmarkRow, quarantined: Option<String>, learning: b
     }
     let status = match (&row.model, learning) {
         (_, true) => LandmarkStatus::Learning,
-        (None, _) => LandmarkStatus::Empty,
+        (None, _) => LandmarkStatus::NotLearnt,
         (Some(model), _) if model.active => LandmarkStatus::Active,
-        _ => LandmarkStatus::Candidate,
+        _ => LandmarkStatus::Inactive,
     };
-    let reasons = row.model.as_ref().map(|m| serde_json::from_str(&m.reasons).unwrap_or_default());
+    let failed_gates = row.model.as_ref().map(|m| serde_json::from_str(&m.reasons).unwrap_or_default());
     let model = row.model.map(|m| LandmarkModelBody {
         views: m.views,
         generated_views: m.generated_views,
         learnt_ms: m.learnt_ms,
-        facts: serde_json::from_str(&m.facts).unwrap_or_default(),
+        facts: serde_json::from_str(&m.facts).map(facts_shown).unwrap_or_default(),
     });
     let Measures { size, place, .. } = row.measures;
     let sigma = place.and_then(|p| p.covariance).map(|c| c.diagonal().map(f64::sqrt));
     Landmark {
-        standing: health_shown(row.standing),
+        health: health_shown(row.standing),
         finding: row.finding.and_then(|f| serde_json::from_str(&f).ok()),
         name: row.name,
         status,
-        reasons: reasons.unwrap_or_default(),
+        failed_gates: failed_gates.unwrap_or_default(),
         views: row.views,
         size: size.map(|s| Size { width_m: s.width_m, height_m: s.height_m }),
         place: place.map(|p| Place {
@@ -133,7 +151,7 @@ fn shown(app: &App, learning: &Learning, map: &str, row: LandmarkRow) -> Landmar
 #[utoipa::path(post, path = "/maps/{map}/landmarks", tag = "landmarks", params(("map" = String, Path)),
     request_body = NewLandmark, responses((status = 201, body = Landmark), (status = 404, body = Problem),
     (status = 409, body = Problem, description = "exists, too_many"),
-    (status = 422, body = Problem, description = "bad_name, bad_value, out_of_range")))]
+    (status = 422, body = Problem, description = "bad_name, invalid_value, out_of_range")))]
 async fn create(
     State(app): State<AppState>,
     PathParams(map): PathParams<String>,
@@ -179,7 +197,7 @@ async fn get(
 #[utoipa::path(patch, path = "/maps/{map}/landmarks/{landmark}", tag = "landmarks",
     params(("map" = String, Path), ("landmark" = String, Path)), request_body = LandmarkPatch,
     responses((status = 200, body = Landmark), (status = 404, body = Problem),
-    (status = 422, body = Problem, description = "out_of_range, bad_value")))]
+    (status = 422, body = Problem, description = "out_of_range, invalid_value")))]
 async fn patch(
     State(app): State<AppState>,
     PathParams((map, landmark)): PathParams<(String, String)>,
@@ -187,7 +205,7 @@ async fn patch(
 ) -> Result<Json<Landmark>, ApiError> {
     let checked = measures(changes.size.flatten(), changes.place.flatten())?;
     let (size, place) = (changes.size.is_some(), changes.place.is_some());
-    let (map_name, standing) = (map.clone(), changes.standing.map(health));
+    let (map_name, health) = (map.clone(), changes.health.map(health));
     let write = app.store.write(move |tx| {
         Box::pin(async move {
             let changed = landmarks::update(tx, &map, &landmark, |old| Measures {
@@ -196,8 +214,8 @@ async fn patch(
                 size_from_views: old.size_from_views && !size,
             })
             .await?;
-            match standing {
-                Some(standing) => landmarks::set_standing(tx, &map, &landmark, standing, None).await,
+            match health {
+                Some(health) => landmarks::set_standing(tx, &map, &landmark, health, None).await,
                 None => Ok(changed),
             }
         })

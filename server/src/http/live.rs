@@ -31,7 +31,7 @@ pub(super) fn router() -> OpenApiRouter<AppState> {
     OpenApiRouter::new()
         .routes(routes!(frame))
         .routes(routes!(answer))
-        .routes(routes!(tracks))
+        .routes(routes!(trajectories))
         .routes(routes!(events))
 }
 
@@ -72,20 +72,20 @@ async fn answer(
 
 /// Where a robot was lately, by source: fused poses, odometry alone, and the truth where a simulator tells it. Oldest
 /// first, at most 2000 of each; empty for a robot that has not moved since the server started.
-#[utoipa::path(get, path = "/robots/{robot}/tracks", tag = "robots", params(("robot" = String, Path)),
+#[utoipa::path(get, path = "/robots/{robot}/trajectories", tag = "robots", params(("robot" = String, Path)),
     responses((status = 200, body = Object, description = "lists `pose`, `odometry`, `truth` of {x_m, y_m, theta_rad}"),
     (status = 404, body = Problem)))]
-async fn tracks(
+async fn trajectories(
     State(app): State<AppState>,
     PathParams(robot): PathParams<String>,
 ) -> Result<Json<TrajectoriesBody>, ApiError> {
     robots::get(app.store.reads(), &robot).await?;
-    let tracks = app.live.tracks(&name("robot", robot)?).unwrap_or_default();
-    let wire = |track: VecDeque<Pose2>| track.iter().map(pose2_wire).collect();
+    let trajectories = app.live.tracks(&name("robot", robot)?).unwrap_or_default();
+    let wire = |poses: VecDeque<Pose2>| poses.iter().map(pose2_wire).collect();
     Ok(Json(TrajectoriesBody {
-        pose: wire(tracks.pose),
-        odometry: wire(tracks.odometry),
-        truth: wire(tracks.truth),
+        pose: wire(trajectories.pose),
+        odometry: wire(trajectories.odometry),
+        truth: wire(trajectories.truth),
     }))
 }
 

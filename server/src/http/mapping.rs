@@ -45,18 +45,18 @@ fn shown(progress: MappingProgress) -> MappingProgressBody {
         },
         scans: progress.scans,
         dropped: progress.dropped,
-        way_m: progress.way_m,
+        distance_m: progress.way_m,
         pose: progress.pose,
         segments: progress.segments,
-        loops: progress.loops,
+        loop_closures: progress.loops,
         reason: progress.reason,
-        not_kept: progress.not_kept,
+        journal_error: progress.not_kept,
     }
 }
 
 /// Begins to make the walls of a map from the scans of a robot. While it lasts, they are mapped and localise nothing. The map
 /// stays as it is until the mapping is finished. The scans are kept on disk until then: after a restart of the server the
-/// mapping goes on by itself (`resuming`), with a robot whose software went on; `not_kept` says if they cannot be.
+/// mapping goes on by itself (`resuming`), with a robot whose software went on; `journal_error` says if they cannot be.
 #[utoipa::path(post, path = "/maps/{map}/mapping", tag = "maps", params(("map" = String, Path)),
     request_body = NewMapping, responses((status = 201, body = MappingProgressBody),
     (status = 404, body = Problem, description = "unknown_map, unknown_robot"),

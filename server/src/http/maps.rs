@@ -93,7 +93,7 @@ fn unknown_parent(error: ApiError) -> ApiError {
 #[utoipa::path(post, path = "/maps", tag = "maps", request_body = NewMap, responses(
     (status = 201, body = Map), (status = 404, body = Problem, description = "unknown_map: the parent"),
     (status = 409, body = Problem, description = "exists, too_many, too_deep"),
-    (status = 422, body = Problem, description = "bad_name, bad_value, out_of_range")))]
+    (status = 422, body = Problem, description = "bad_name, invalid_value, out_of_range")))]
 async fn create(
     State(app): State<AppState>,
     Body(new): Body<NewMap>,
@@ -153,7 +153,7 @@ async fn get(
 #[utoipa::path(patch, path = "/maps/{map}", tag = "maps", params(("map" = String, Path)), request_body = MapPatch,
     responses((status = 200, body = Map), (status = 404, body = Problem),
     (status = 409, body = Problem, description = "cycle: it would lie in itself; too_deep"),
-    (status = 422, body = Problem, description = "out_of_range, bad_value")))]
+    (status = 422, body = Problem, description = "out_of_range, invalid_value")))]
 async fn patch(
     State(app): State<AppState>,
     PathParams(map): PathParams<String>,

@@ -1,4 +1,4 @@
-//! `/maps/{map}/areas`: which modality is best where, as runs have shown; the areas that somebody named; what is fused.
+//! `/maps/{map}/modalities`: which modality is best where, as runs have shown; the areas that somebody named; what is fused.
 
 use super::{
     AppState,
@@ -26,7 +26,7 @@ use std::{f64::consts::FRAC_PI_2, sync::Arc};
 use utoipa_axum::{router::OpenApiRouter, routes};
 
 /// Most cells of one answer.
-const MAX_CELLS_TOLD: usize = 20_000;
+const MAX_CELLS: usize = 20_000;
 
 pub(super) fn router() -> OpenApiRouter<AppState> {
     OpenApiRouter::new().routes(routes!(get, put)).routes(routes!(at))
@@ -39,31 +39,31 @@ fn heading_rad(heading: u8) -> f64 {
 fn mode(fusion: FusionModeBody) -> FusionMode {
     match fusion {
         FusionModeBody::All => FusionMode::All,
-        FusionModeBody::Fuse => FusionMode::Fuse,
-        FusionModeBody::Single => FusionMode::Single,
+        FusionModeBody::NearBest => FusionMode::NearBest,
+        FusionModeBody::Best => FusionMode::Best,
     }
 }
 
 fn mode_shown(mode: FusionMode) -> FusionModeBody {
     match mode {
         FusionMode::All => FusionModeBody::All,
-        FusionMode::Fuse => FusionModeBody::Fuse,
-        FusionMode::Single => FusionModeBody::Single,
+        FusionMode::NearBest => FusionModeBody::NearBest,
+        FusionMode::Best => FusionModeBody::Best,
     }
 }
 
-fn modality(module: Modality) -> ModalityBody {
-    match module {
+fn modality(of: Modality) -> ModalityBody {
+    match of {
         Modality::Odometry => ModalityBody::Odometry,
         Modality::Laser => ModalityBody::Laser,
         Modality::Landmarks => ModalityBody::Landmarks,
     }
 }
 
-fn scope(level: StatsScope) -> StatsScopeBody {
-    match level {
+fn scope(scope: StatsScope) -> StatsScopeBody {
+    match scope {
         StatsScope::Cell => StatsScopeBody::Cell,
-        StatsScope::Around => StatsScopeBody::Around,
+        StatsScope::Neighbourhood => StatsScopeBody::Neighbourhood,
         StatsScope::Area => StatsScopeBody::Area,
         StatsScope::Map => StatsScopeBody::Map,
     }
@@ -71,10 +71,10 @@ fn scope(level: StatsScope) -> StatsScopeBody {
 
 /// What runs have shown, by modality.
 pub(super) fn stats(found: &StatsByModality) -> Vec<ModalityStatsBody> {
-    let one = |(module, evidence): (Modality, &::map::modality_stats::ModalityStats)| {
+    let one = |(of, evidence): (Modality, &::map::modality_stats::ModalityStats)| {
         let figures = evidence.figures();
         ModalityStatsBody {
-            module: modality(module),
+            modality: modality(of),
             mean: figures.mean,
             sigma: figures.sigma,
             availability: figures.availability,
@@ -90,24 +90,28 @@ pub(super) fn stats(found: &StatsByModality) -> Vec<ModalityStatsBody> {
 
 fn used(advice: &ModalityAdvice) -> Vec<ModalityBody> {
     let used = Modality::ALL.into_iter().zip(advice.used);
-    used.filter_map(|(module, used)| used.then_some(modality(module))).collect()
+    used.filter_map(|(of, used)| used.then_some(modality(of))).collect()
 }
 
 fn advice_shown(advice: &ModalityAdvice) -> AdviceBody {
-    let error_model = |module| {
-        let fault = advice.fault(module);
-        ErrorModelBody { module: modality(module), bias: fault.bias.into(), excess: fault.excess.into() }
+    let error_model = |of| {
+        let model = advice.fault(of);
+        ErrorModelBody {
+            modality: modality(of),
+            bias: model.bias.into(),
+            variance_inflation: model.excess.into(),
+        }
     };
     AdviceBody {
         best: advice.best.map(modality),
         used: used(advice),
-        level: scope(advice.level),
-        faults: Modality::ALL.map(error_model).into(),
+        scope: scope(advice.level),
+        error_models: Modality::ALL.map(error_model).into(),
     }
 }
 
 fn area_stats(advice: &ModalityAdvice, found: &StatsByModality) -> AreaStatsBody {
-    AreaStatsBody { told: advice_shown(advice), modules: stats(found) }
+    AreaStatsBody { advice: advice_shown(advice), statistics: stats(found) }
 }
 
 fn cell(cell: &PoseCell, advice: &ModalityAdvice) -> CellBody {
@@ -129,11 +133,11 @@ fn modality_map(areas: &ModalityMap) -> ModalityMapBody {
     let (found, advice) = areas.map();
     let count = areas.cells().count();
     ModalityMapBody {
-        mode: mode_shown(areas.mode()),
+        fusion_mode: mode_shown(areas.mode()),
         areas: named.collect(),
         cell_m: CELL_M,
-        cells: areas.cells().take(MAX_CELLS_TOLD).map(|(at, _, advice)| cell(at, advice)).collect(),
-        left_off: count.saturating_sub(MAX_CELLS_TOLD),
+        cells: areas.cells().take(MAX_CELLS).map(|(at, _, advice)| cell(at, advice)).collect(),
+        omitted_cells: count.saturating_sub(MAX_CELLS),
         map: area_stats(advice, found),
     }
 }
@@ -146,7 +150,7 @@ fn known(app: &AppState, map: &str) -> Result<Arc<ModalityMap>, ApiError> {
 }
 
 /// Which modality is best where, as runs have shown, and what is fused.
-#[utoipa::path(get, path = "/maps/{map}/areas", tag = "maps", params(("map" = String, Path)),
+#[utoipa::path(get, path = "/maps/{map}/modalities", tag = "maps", params(("map" = String, Path)),
     responses((status = 200, body = ModalityMapBody), (status = 404, body = Problem)))]
 async fn get(
     State(app): State<AppState>,
@@ -175,7 +179,7 @@ fn checked(areas: Vec<AreaBody>) -> Result<Vec<NamedArea>, ApiError> {
 }
 
 /// Sets what is fused, and the areas that have names.
-#[utoipa::path(put, path = "/maps/{map}/areas", tag = "maps", params(("map" = String, Path)), request_body = ModalityMapPatch,
+#[utoipa::path(put, path = "/maps/{map}/modalities", tag = "maps", params(("map" = String, Path)), request_body = ModalityMapPatch,
     responses((status = 200, body = ModalityMapBody), (status = 404, body = Problem),
     (status = 422, body = Problem, description = "out_of_range, exists, too_many")))]
 async fn put(
@@ -184,7 +188,7 @@ async fn put(
     Body(change): Body<ModalityMapPatch>,
 ) -> Result<Json<ModalityMapBody>, ApiError> {
     let named = change.areas.map(checked).transpose()?;
-    let fusion = change.mode.map(mode);
+    let fusion = change.fusion_mode.map(mode);
     let name = map.clone();
     let write = app.store.write(move |tx| {
         Box::pin(async move {
@@ -200,7 +204,7 @@ async fn put(
 }
 
 /// What is known where a robot would be: what runs have found there, and what follows.
-#[utoipa::path(get, path = "/maps/{map}/areas/at", tag = "maps", params(("map" = String, Path), ModalityQuery),
+#[utoipa::path(get, path = "/maps/{map}/modalities/at", tag = "maps", params(("map" = String, Path), ModalityQuery),
     responses((status = 200, body = AreaStatsBody), (status = 404, body = Problem),
     (status = 422, body = Problem, description = "out_of_range")))]
 async fn at(

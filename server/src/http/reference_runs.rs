@@ -1,4 +1,4 @@
-//! `/robots/{robot}/run` and `/maps/{map}/runs`: runs whose path is known, to learn which modality to trust where.
+//! `/robots/{robot}/recording` and `/maps/{map}/reference-runs`: runs whose path is known, to learn which modality to trust where.
 
 use super::{
     App, AppState,
@@ -46,7 +46,7 @@ fn refused(error: RecordingError) -> ApiError {
 
 /// Begins to record a run of a robot on its map: odometry, and what landmarks and the laser say. It lies in memory until
 /// the path is told.
-#[utoipa::path(post, path = "/robots/{robot}/run", tag = "robots", params(("robot" = String, Path)),
+#[utoipa::path(post, path = "/robots/{robot}/recording", tag = "robots", params(("robot" = String, Path)),
     responses((status = 201, body = RecordingStatusBody), (status = 404, body = Problem),
     (status = 409, body = Problem, description = "in_use: one is recorded already; too_many")))]
 async fn begin(
@@ -59,7 +59,7 @@ async fn begin(
 }
 
 /// What was recorded so far.
-#[utoipa::path(get, path = "/robots/{robot}/run", tag = "robots", params(("robot" = String, Path)),
+#[utoipa::path(get, path = "/robots/{robot}/recording", tag = "robots", params(("robot" = String, Path)),
     responses((status = 200, body = RecordingStatusBody), (status = 404, body = Problem, description = "unknown_robot, not_recording")))]
 async fn get(
     State(app): State<AppState>,
@@ -71,7 +71,7 @@ async fn get(
 }
 
 /// Gives the recording up.
-#[utoipa::path(delete, path = "/robots/{robot}/run", tag = "robots", params(("robot" = String, Path)),
+#[utoipa::path(delete, path = "/robots/{robot}/recording", tag = "robots", params(("robot" = String, Path)),
     responses((status = 204), (status = 404, body = Problem, description = "unknown_robot, not_recording")))]
 async fn cancel(
     State(app): State<AppState>,
@@ -93,9 +93,9 @@ fn run_shown(row: areas::RunRow) -> ReferenceRunBody {
         id: row.id,
         robot: row.robot,
         created_ms: row.created_ms,
-        way_m: row.way_m,
+        distance_m: row.way_m,
         cells: row.cells.len(),
-        modules: stats(&sums),
+        statistics: stats(&sums),
     }
 }
 
@@ -103,9 +103,9 @@ fn recording_shown(recorded: RecordingStatus) -> RecordingStatusBody {
     RecordingStatusBody {
         map: recorded.map,
         robot: recorded.robot,
-        going: recorded.going,
+        active: recorded.going,
         reason: recorded.reason,
-        way_m: recorded.way_m,
+        distance_m: recorded.way_m,
         span_ns: recorded.span_ns,
         odometry: recorded.odometry,
         landmarks: recorded.landmarks,
@@ -142,7 +142,7 @@ fn reference_of(path: ReferenceTrajectoryBody) -> Result<ReferenceTrajectory, Ap
 /// Ends the recording by telling the path, once what it shows is stored; until then it stays, whatever becomes of the request.
 /// What each modality was off by, and claimed, is kept by square metre and heading,
 /// and robots on this map are fused by it from now on.
-#[utoipa::path(post, path = "/robots/{robot}/run/reference", tag = "robots", params(("robot" = String, Path)),
+#[utoipa::path(post, path = "/robots/{robot}/recording/reference", tag = "robots", params(("robot" = String, Path)),
     request_body = ReferenceTrajectoryBody, responses((status = 201, body = ReferenceRunBody),
     (status = 404, body = Problem, description = "unknown_robot, not_recording, unknown_map"),
     (status = 409, body = Problem, description = "too_many; in_use: it is being learnt from already"),
@@ -187,7 +187,7 @@ async fn reference(
 }
 
 /// The runs that the map's areas have learnt from.
-#[utoipa::path(get, path = "/maps/{map}/runs", tag = "maps", params(("map" = String, Path)),
+#[utoipa::path(get, path = "/maps/{map}/reference-runs", tag = "maps", params(("map" = String, Path)),
     responses((status = 200, body = ReferenceRuns), (status = 404, body = Problem)))]
 async fn list(
     State(app): State<AppState>,
@@ -199,9 +199,9 @@ async fn list(
 }
 
 /// Forgets a run and what it showed.
-#[utoipa::path(delete, path = "/maps/{map}/runs/{run}", tag = "maps",
+#[utoipa::path(delete, path = "/maps/{map}/reference-runs/{run}", tag = "maps",
     params(("map" = String, Path), ("run" = i64, Path)),
-    responses((status = 204), (status = 404, body = Problem, description = "unknown_map, unknown_run")))]
+    responses((status = 204), (status = 404, body = Problem, description = "unknown_map, unknown_reference_run")))]
 async fn forget(
     State(app): State<AppState>,
     PathParams((map, run)): PathParams<(String, i64)>,

@@ -14,7 +14,7 @@ use protos::api::{MissingConditionBody, PoseHypothesisBody, Problem, Relocalisat
 use utoipa_axum::{router::OpenApiRouter, routes};
 
 pub(super) fn router() -> OpenApiRouter<AppState> {
-    OpenApiRouter::new().routes(routes!(hypotheses))
+    OpenApiRouter::new().routes(routes!(relocalisation))
 }
 
 fn shown(PoseHypothesis { mass, pose }: &PoseHypothesis) -> PoseHypothesisBody {
@@ -22,42 +22,42 @@ fn shown(PoseHypothesis { mass, pose }: &PoseHypothesis) -> PoseHypothesisBody {
     PoseHypothesisBody { probability: *mass, x_m, y_m, theta_rad, covariance: row_major(&pose.covariance) }
 }
 
-fn missing(need: MissingCondition) -> MissingConditionBody {
-    match need {
-        MissingCondition::FewerPlaces => MissingConditionBody::FewerPlaces,
-        MissingCondition::AnotherLandmark => MissingConditionBody::AnotherLandmark,
-        MissingCondition::AgreeingSightings => MissingConditionBody::AgreeingSightings,
-        MissingCondition::NoOtherPlace => MissingConditionBody::NoOtherPlace,
+fn missing(condition: MissingCondition) -> MissingConditionBody {
+    match condition {
+        MissingCondition::HigherProbability => MissingConditionBody::HigherProbability,
+        MissingCondition::SecondLandmark => MissingConditionBody::SecondLandmark,
+        MissingCondition::ConsistentObservations => MissingConditionBody::ConsistentObservations,
+        MissingCondition::NoRivalPose => MissingConditionBody::NoRivalPose,
     }
 }
 
 /// Where a robot may be that sees only things which look like several landmarks: places with covariance and probability,
 /// and what is missing before one of them is its pose. The answers to its frames say the same (`hypotheses`).
-#[utoipa::path(get, path = "/robots/{robot}/hypotheses", tag = "robots", params(("robot" = String, Path)),
+#[utoipa::path(get, path = "/robots/{robot}/relocalisation", tag = "robots", params(("robot" = String, Path)),
     responses((status = 200, body = RelocalisationStatus), (status = 404, body = Problem)))]
-async fn hypotheses(
+async fn relocalisation(
     State(app): State<AppState>,
     PathParams(robot): PathParams<String>,
 ) -> Result<Json<RelocalisationStatus>, ApiError> {
     robots::get(app.store.reads(), &robot).await?;
-    let decided_above = GridBeliefParams::default().decided;
+    let min_probability = GridBeliefParams::default().decided;
     let (robot, searches) = (name("robot", robot)?, app.searches.clone());
     // A search may be in work for some milliseconds, on its own thread.
     let asked = tokio::task::spawn_blocking(move || searches.progress(&robot));
     let Some(found) = asked.await.map_err(|e| ApiError::internal(&e))? else {
-        return Ok(Json(RelocalisationStatus { decided_above, ..RelocalisationStatus::default() }));
+        return Ok(Json(RelocalisationStatus { min_probability, ..RelocalisationStatus::default() }));
     };
     let map = app.store.snapshots().get(&found.map);
     let named = |id| map.as_ref().and_then(|map| map.landmarks.get(id)).map(|l| l.name.clone());
     Ok(Json(RelocalisationStatus {
-        searching: true,
+        relocalising: true,
         map_version: Some(found.map_version),
         hypotheses: found.modes.iter().map(shown).collect(),
         entropy_nats: found.entropy_nats,
         sightings: found.sightings,
         landmarks: found.landmarks.iter().filter_map(named).collect(),
-        needed: found.needed.into_iter().map(missing).collect(),
-        decided_above,
+        missing: found.needed.into_iter().map(missing).collect(),
+        min_probability,
         map: Some(found.map),
     }))
 }

@@ -71,7 +71,7 @@ pub(crate) fn router(app: App) -> Router {
         .merge(pages::router())
         .merge(docs)
         .fallback(not_found)
-        .method_not_allowed_fallback(wrong_method)
+        .method_not_allowed_fallback(method_not_allowed)
         .layer(CatchPanicLayer::custom(move |cause: Box<dyn Any + Send>| panicked(&panics, cause.as_ref())))
         .layer(from_fn_with_state(app.clone(), guard::guard))
         .with_state(app)
@@ -81,8 +81,8 @@ async fn not_found() -> ApiError {
     ApiError::new(StatusCode::NOT_FOUND, "not_found", "there is nothing at this path").field("path")
 }
 
-async fn wrong_method() -> ApiError {
-    ApiError::new(StatusCode::METHOD_NOT_ALLOWED, "wrong_method", "this path does not take this method")
+async fn method_not_allowed() -> ApiError {
+    ApiError::new(StatusCode::METHOD_NOT_ALLOWED, "method_not_allowed", "this path does not take this method")
         .field("method")
 }
 

@@ -1,5 +1,7 @@
 //! The routes without a network: requests go straight to the router.
 
+mod earlier_build;
+
 use super::*;
 use crate::{
     config::{Limits, RawConfig},
@@ -29,12 +31,18 @@ struct Service {
 
 impl Service {
     async fn start(limits: Limits) -> Self {
-        let data = tempfile::tempdir().unwrap();
+        let service = Self::on(tempfile::tempdir().unwrap(), limits).await;
+        let store = &service.store;
+        store.write(|tx| Box::pin(maps::create(tx, "hall", DistanceKind::Both, 9))).await.unwrap();
+        store.write(|tx| Box::pin(crate::store::robots::put(tx, "r1", "hall", 9))).await.unwrap();
+        service
+    }
+
+    /// On the database of this directory.
+    async fn on(data: tempfile::TempDir, limits: Limits) -> Self {
         let raw = RawConfig { limits, data: data.path().to_owned(), ..RawConfig::default() };
         let config = Arc::new(crate::config::Config::try_from(raw).unwrap());
         let (store, writer) = Catalogue::open(&config).await.unwrap();
-        store.write(|tx| Box::pin(maps::create(tx, "hall", DistanceKind::Both, 9))).await.unwrap();
-        store.write(|tx| Box::pin(crate::store::robots::put(tx, "r1", "hall", 9))).await.unwrap();
         let (stop, stopping) = watch::channel(false);
         let (jobs, _) = Jobs::start(store.clone(), config.clone(), stopping.clone()).await.unwrap();
         let (hook, offers) = crate::gather::hook();
@@ -159,7 +167,7 @@ async fn a_recorded_drive_outlives_a_client_that_hangs_up() {
     let short = || tokio::time::sleep(Duration::from_micros(200));
     for polls_after_lending in 0..10 {
         let writer = hold_writer(&service.store).await;
-        let asked = service.ask(request("POST", "/api/v1/robots/r1/run/reference", body.clone()));
+        let asked = service.ask(request("POST", "/api/v1/robots/r1/recording/reference", body.clone()));
         let mut asked = Box::pin(asked);
         while !motion.is_lent(&r1) {
             assert!(futures::poll!(asked.as_mut()).is_pending(), "answered without the recording");
@@ -174,10 +182,10 @@ async fn a_recorded_drive_outlives_a_client_that_hangs_up() {
             short().await;
         }
         assert_eq!(motion.recorded(&r1).unwrap().odometry, 20, "after {polls_after_lending} polls");
-        let (_, runs) = service.get("/api/v1/maps/hall/runs").await;
+        let (_, runs) = service.get("/api/v1/maps/hall/reference-runs").await;
         assert_eq!(runs["runs"].as_array().unwrap().len(), 0);
     }
-    let answer = service.ask(request("POST", "/api/v1/robots/r1/run/reference", body)).await;
+    let answer = service.ask(request("POST", "/api/v1/robots/r1/recording/reference", body)).await;
     assert_eq!(answer.status(), StatusCode::CREATED);
     assert!(motion.recorded(&r1).is_none(), "stored once, and over");
 }
@@ -187,7 +195,7 @@ async fn a_drive_whose_run_cannot_be_stored_stays() {
     let service = Service::start(Limits::default()).await;
     let body = driven(&service);
     crate::publication::tests::refuse_runs(&service.store).await;
-    let answer = service.ask(request("POST", "/api/v1/robots/r1/run/reference", body)).await;
+    let answer = service.ask(request("POST", "/api/v1/robots/r1/recording/reference", body)).await;
     assert_eq!(answer.status(), StatusCode::INTERNAL_SERVER_ERROR);
     let r1 = protos::Name::new("r1").unwrap();
     assert_eq!(service.engine.motion.recorded(&r1).unwrap().odometry, 20);
@@ -253,7 +261,11 @@ async fn a_known_path_may_be_as_long_as_it_is_promised() {
             format!("[{ns}, -1234.5678901234567, 0.00012345678901234567, -1.5707963267948966]")
         };
         let poses: Vec<String> = (0..poses).map(pose).collect();
-        request("POST", "/api/v1/robots/r1/run/reference", format!("{{\"poses\": [{}]}}", poses.join(", ")))
+        request(
+            "POST",
+            "/api/v1/robots/r1/recording/reference",
+            format!("{{\"poses\": [{}]}}", poses.join(", ")),
+        )
     };
     // Read to its end: only then it matters that there is no recording.
     let (status, problem) = read(service.ask(path(MAX_REFERENCE)).await).await;

@@ -64,8 +64,8 @@ fn view_shown(row: ViewRow) -> TrainingView {
 fn outcome_shown(outcome: Outcome) -> UploadOutcomeBody {
     match outcome {
         Outcome::New => UploadOutcomeBody::New,
-        Outcome::Same => UploadOutcomeBody::Same,
-        Outcome::Alike => UploadOutcomeBody::Alike,
+        Outcome::Same => UploadOutcomeBody::Duplicate,
+        Outcome::Alike => UploadOutcomeBody::NearDuplicate,
     }
 }
 
@@ -90,7 +90,7 @@ enum LandmarkRegion {
     request_body(content = NewViewForm, content_type = "multipart/form-data"),
     responses((status = 201, body = TrainingView), (status = 200, body = TrainingView), (status = 404, body = Problem),
     (status = 409, body = Problem, description = "too_many"), (status = 413, body = Problem),
-    (status = 422, body = Problem, description = "bad_image, too_large, bad_value, too_small, outside, \
+    (status = 422, body = Problem, description = "bad_image, too_large, invalid_value, too_small, outside, \
      quad_not_found, quad_ambiguous")))]
 async fn add(
     State(app): State<AppState>,
@@ -99,11 +99,13 @@ async fn add(
 ) -> Result<(StatusCode, Json<TrainingView>), ApiError> {
     landmarks::get(app.store.reads(), &map, &landmark).await?;
     let mut form =
-        Form::read(&app, request, &["image", "corners", "whole_image", "capture", "keep_alike"]).await?;
+        Form::read(&app, request, &["image", "corners", "whole_image", "capture", "keep_near_duplicate"])
+            .await?;
     let image = form.needed("image")?;
     let extent = extent(form.optional("corners").as_ref(), form.optional("whole_image").as_ref())?;
     let mut capture = capture(form.optional("capture").as_ref())?;
-    let thinning = (!flag("keep_alike", form.optional("keep_alike").as_ref())?).then(NoveltyParams::default);
+    let thinning = (!flag("keep_near_duplicate", form.optional("keep_near_duplicate").as_ref())?)
+        .then(NoveltyParams::default);
     let max = app.config.limits.views;
     let (new, detected) = app.clone().on_vision_thread(move |app| prepare(app, &image, &extent)).await??;
     if let (Some(capture), Some(quad)) = (&mut capture, detected) {
@@ -135,14 +137,16 @@ fn flag(name: &'static str, part: Option<&Bytes>) -> Result<bool, ApiError> {
     match part.map(|b| &b[..]) {
         None | Some(b"false") => Ok(false),
         Some(b"true") => Ok(true),
-        Some(_) => Err(ApiError::invalid("bad_value", name, "neither `true` nor `false`")),
+        Some(_) => Err(ApiError::invalid("invalid_value", name, "neither `true` nor `false`")),
     }
 }
 
 fn extent(corners: Option<&Bytes>, whole_image: Option<&Bytes>) -> Result<LandmarkRegion, ApiError> {
     let whole = flag("whole_image", whole_image)?;
     match (corners, whole) {
-        (Some(_), true) => Err(ApiError::invalid("bad_value", "whole_image", "not together with corners")),
+        (Some(_), true) => {
+            Err(ApiError::invalid("invalid_value", "whole_image", "not together with corners"))
+        }
         (Some(corners), false) => Ok(LandmarkRegion::Corners(extract::json(corners, "corners")?)),
         (None, true) => Ok(LandmarkRegion::Whole),
         (None, false) => Ok(LandmarkRegion::Detect),
@@ -209,7 +213,7 @@ fn cut(image: &GrayImage, corners: &Corners, p: &Algorithm) -> Result<Icon, ApiE
         let code = match error {
             IconError::TooSmall { .. } => "too_small",
             IconError::Outside { .. } => "outside",
-            _ => "bad_value",
+            _ => "invalid_value",
         };
         ApiError::invalid(code, "corners", error.to_string())
     })

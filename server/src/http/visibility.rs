@@ -50,7 +50,7 @@ fn name_of(map: &MapSnapshot, id: LandmarkId) -> String {
 }
 
 /// The area on the floor from which a landmark is seen, as a GeoJSON feature in map metres: by the map's camera
-/// (`/maps/{map}/sight`), or by another for this question.
+/// (`/maps/{map}/visibility-settings`), or by another for this question.
 #[utoipa::path(get, path = "/maps/{map}/landmarks/{landmark}/visibility", tag = "landmarks",
     params(("map" = String, Path), ("landmark" = String, Path), VisibilitySettingsBody), responses(
     (status = 200, body = Object, description = "GeoJSON `Feature` of a `MultiPolygon`; properties landmark, area_m2, centroid_m, reach_m"),
@@ -100,14 +100,14 @@ fn checked(pose: &PoseBody) -> Result<Pose2Covariance, ApiError> {
 /// Which landmarks a robot may see from an uncertain pose.
 #[utoipa::path(post, path = "/maps/{map}/visible", tag = "maps", params(("map" = String, Path)),
     request_body = VisibleRequest, responses((status = 200, body = VisibleResponse), (status = 404, body = Problem),
-    (status = 422, body = Problem, description = "out_of_range, bad_value")))]
+    (status = 422, body = Problem, description = "out_of_range, invalid_value")))]
 async fn visible(
     State(app): State<AppState>,
     PathParams(map): PathParams<String>,
     Body(from): Body<VisibleRequest>,
 ) -> Result<Json<VisibleResponse>, ApiError> {
     let (map, pose) = (snapshot(&app, &map).await?, checked(&from.pose)?);
-    let settings = other(&from.sight, &map, "sight")?;
+    let settings = other(&from.visibility_settings, &map, "visibility_settings")?;
     app.on_vision_thread(move |_| visible_from(&map, &pose, settings.as_ref())).await?.map(Json)
 }
 
@@ -138,7 +138,7 @@ fn visible_from(
 /// Which landmarks are seen along a path, and where none is. The robot drives forward and pans its camera.
 #[utoipa::path(post, path = "/maps/{map}/coverage", tag = "maps", params(("map" = String, Path)),
     request_body = CoverageRequest, responses((status = 200, body = CoverageResponse), (status = 404, body = Problem),
-    (status = 422, body = Problem, description = "out_of_range, bad_value")))]
+    (status = 422, body = Problem, description = "out_of_range, invalid_value")))]
 async fn along(
     State(app): State<AppState>,
     PathParams(map): PathParams<String>,
@@ -150,7 +150,7 @@ async fn along(
 
 fn covered(map: &MapSnapshot, along: &CoverageRequest) -> Result<CoverageResponse, ApiError> {
     let path: Vec<_> = along.path.iter().map(|p| Point2::new(p[0], p[1])).collect();
-    let settings = other(&along.sight, map, "sight")?;
+    let settings = other(&along.visibility_settings, map, "visibility_settings")?;
     let near = |place: &LandmarkPlace, reach: f64| comes_near(&path, place, reach + STANDOFF_M);
     let made = areas(map, settings.as_ref(), near)?;
     let areas: Vec<_> = made.iter().map(|(id, area)| (*id, &**area)).collect();
@@ -196,7 +196,7 @@ fn aim(map: &MapSnapshot, c: &GazeTarget) -> GazeTargetBody {
 /// zenoh (`rpc/gaze`) and are kept to one landmark until another is clearly better; this question leaves no trace.
 #[utoipa::path(post, path = "/maps/{map}/gaze", tag = "maps", params(("map" = String, Path)),
     request_body = GazeQueryBody, responses((status = 200, body = GazeRankingBody), (status = 404, body = Problem),
-    (status = 422, body = Problem, description = "out_of_range, bad_value")))]
+    (status = 422, body = Problem, description = "out_of_range, invalid_value")))]
 async fn gaze(
     State(app): State<AppState>,
     PathParams(map): PathParams<String>,

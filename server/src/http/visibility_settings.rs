@@ -96,7 +96,7 @@ fn refused(error: &OutOfRange, outer: &str) -> ApiError {
 }
 
 /// The camera for which the areas of a map's landmarks are made, and what counts as seen.
-#[utoipa::path(get, path = "/maps/{map}/sight", tag = "maps", params(("map" = String, Path)), responses(
+#[utoipa::path(get, path = "/maps/{map}/visibility-settings", tag = "maps", params(("map" = String, Path)), responses(
     (status = 200, body = VisibilitySettingsBody), (status = 404, body = Problem)))]
 async fn get(
     State(app): State<AppState>,
@@ -110,9 +110,9 @@ async fn get(
 
 /// Says which camera looks for a map's landmarks; what is absent is that of a usual robot. The areas of all landmarks are
 /// made anew and are those of the map's next version.
-#[utoipa::path(put, path = "/maps/{map}/sight", tag = "maps", params(("map" = String, Path)), request_body = VisibilitySettingsBody,
+#[utoipa::path(put, path = "/maps/{map}/visibility-settings", tag = "maps", params(("map" = String, Path)), request_body = VisibilitySettingsBody,
     responses((status = 200, body = VisibilitySettingsBody), (status = 404, body = Problem),
-    (status = 422, body = Problem, description = "out_of_range, bad_value")))]
+    (status = 422, body = Problem, description = "out_of_range, invalid_value")))]
 async fn put(
     State(app): State<AppState>,
     PathParams(map): PathParams<String>,
@@ -140,12 +140,12 @@ pub(super) fn areas(
     if asked.len() > MAX_MADE {
         let detail =
             format!("{} landmarks are in reach, {MAX_MADE} are looked at for another camera", asked.len());
-        return Err(ApiError::invalid("too_many", "sight", detail));
+        return Err(ApiError::invalid("too_many", "visibility_settings", detail));
     }
     let obstacles: Vec<Obstacle> = map.walls.iter().map(Obstacle::from).collect();
     let one = |(id, place): &(LandmarkId, LandmarkPlace)| {
         let made = visibility(place, &obstacles, &sight.viewer, &sight.seen);
-        Ok((*id, Arc::new(made.map_err(|e| refused(&e, "sight"))?)))
+        Ok((*id, Arc::new(made.map_err(|e| refused(&e, "visibility_settings"))?)))
     };
     asked.iter().map(one).collect()
 }
@@ -161,17 +161,20 @@ mod tests {
     #[test]
     fn absent_numbers_are_those_of_the_map_and_wrong_ones_are_named() {
         let map = MapSnapshot::empty("hall", 1);
-        assert_eq!(other(&VisibilitySettingsBody::default(), &map, "sight").unwrap(), None);
+        assert_eq!(other(&VisibilitySettingsBody::default(), &map, "visibility_settings").unwrap(), None);
         let wide = VisibilitySettingsBody {
             focal_px: Some(900.0),
             tilt_high_rad: Some(1.2),
             ..VisibilitySettingsBody::default()
         };
-        let made = other(&wide, &map, "sight").unwrap().unwrap();
+        let made = other(&wide, &map, "visibility_settings").unwrap().unwrap();
         assert!((made.viewer.focal_px - 900.0).abs() < 1e-9 && (made.viewer.tilt_rad[1] - 1.2).abs() < 1e-9);
         assert_eq!(made.viewer.width_px.to_bits(), map.sight.viewer.width_px.to_bits());
         let wrong = VisibilitySettingsBody { tilt_low_rad: Some(0.4), ..VisibilitySettingsBody::default() };
-        assert_eq!(other(&wrong, &map, "sight").unwrap_err().field.as_deref(), Some("sight.tilt_high_rad"));
+        assert_eq!(
+            other(&wrong, &map, "visibility_settings").unwrap_err().field.as_deref(),
+            Some("visibility_settings.tilt_high_rad")
+        );
         assert_eq!(over(&shown(&made), &VisibilitySettings::default()).unwrap(), made, "there and back");
     }
 

@@ -1,4 +1,4 @@
-//! `/maps/{map}/laser`: the walls, replaced and read as a whole.
+//! `/maps/{map}/walls`: the walls, replaced and read as a whole.
 
 use super::{
     AppState,
@@ -23,7 +23,7 @@ fn checked(index: usize, WallBody { a, b }: &WallBody) -> Result<[f64; 4], ApiEr
 }
 
 /// Replaces the walls.
-#[utoipa::path(put, path = "/maps/{map}/laser", tag = "maps", params(("map" = String, Path)), request_body = WallsBody,
+#[utoipa::path(put, path = "/maps/{map}/walls", tag = "maps", params(("map" = String, Path)), request_body = WallsBody,
     responses((status = 200, body = WallsBody), (status = 404, body = Problem),
     (status = 422, body = Problem, description = "out_of_range, too_many")))]
 async fn put(
@@ -42,7 +42,7 @@ async fn put(
 }
 
 /// The walls.
-#[utoipa::path(get, path = "/maps/{map}/laser", tag = "maps", params(("map" = String, Path)), responses(
+#[utoipa::path(get, path = "/maps/{map}/walls", tag = "maps", params(("map" = String, Path)), responses(
     (status = 200, body = WallsBody), (status = 404, body = Problem)))]
 async fn get(
     State(app): State<AppState>,

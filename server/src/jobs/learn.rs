@@ -292,20 +292,20 @@ async fn commit(
 ) -> Result<(), StoreError> {
     let name = |id: &LandmarkId| names.get(id).cloned().unwrap_or_default();
     let active = learnt.models.iter().filter(|m| m.is_active()).count();
-    let candidates: Vec<_> = learnt.models.iter().filter(|m| !m.is_active()).map(|m| name(&m.id)).collect();
+    let inactive: Vec<_> = learnt.models.iter().filter(|m| !m.is_active()).map(|m| name(&m.id)).collect();
     let failed: Vec<_> =
         learnt.failed.iter().map(|(id, reason)| json!({ "landmark": name(id), "reason": reason })).collect();
     let look_alikes: Vec<_> = learnt
         .look_alikes
         .iter()
         .flat_map(|(id, found)| found.iter().map(move |l| (id, l)))
-        .map(|(id, l)| json!({ "landmark": name(id), "other": name(&l.other), "likeness": l.likeness }))
+        .map(|(id, l)| json!({ "landmark": name(id), "other": name(&l.other), "gradient_similarity": l.gradient_similarity }))
         .collect();
     let result = json!({
         "look_alikes": look_alikes,
         "learnt": learnt.models.len(),
         "active": active,
-        "candidates": candidates,
+        "inactive": inactive,
         "failed": failed,
         "points": learnt.models.iter().map(|m| m.points.len()).sum::<usize>(),
         "refitted": learnt.refitted.len(),
@@ -316,7 +316,10 @@ async fn commit(
     let ended = Ended { state: "done", message, result: Some(result.to_string()) };
     let of = |model: &LandmarkModel| -> Vec<Value> {
         let found = learnt.look_alikes.get(&model.id).map_or(&[][..], Vec::as_slice);
-        found.iter().map(|l| json!({ "landmark": name(&l.other), "likeness": l.likeness })).collect()
+        found
+            .iter()
+            .map(|l| json!({ "landmark": name(&l.other), "gradient_similarity": l.gradient_similarity }))
+            .collect()
     };
     let models = learnt.models.iter().chain(&learnt.refitted);
     let rows: Vec<NewModel> = models.map(|model| row(model, &of(model))).collect();
@@ -346,7 +349,7 @@ fn row(model: &LandmarkModel, look_alikes: &[Value]) -> NewModel {
     let facts = json!({
         "correlation": model.correlation,
         "hausdorff": model.hausdorff,
-        "likeness": model.likeness,
+        "gradient_similarity": model.likeness,
         "look_alikes": look_alikes,
         "saliency": model.saliency,
         "saliency_f": model.saliency_f,

@@ -15,13 +15,14 @@ const MAX_LOOK_ALIKES: usize = 5;
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct LookAlike {
     pub(super) other: LandmarkId,
-    pub(super) likeness: f64,
+    pub(super) gradient_similarity: f64,
 }
 
 /// The landmarks that `model` may be taken for, most alike first. Only where something held its threshold down is there
 /// anything to look for.
 pub(super) fn look_alikes(model: &LandmarkModel, negatives: &Negatives, p: &Params) -> Vec<LookAlike> {
-    let nearest = model.likeness_evidence.nearest_others.first().map_or(f64::INFINITY, |d| f64::from(*d));
+    let nearest =
+        model.gradient_similarity_evidence.nearest_others.first().map_or(f64::INFINITY, |d| f64::from(*d));
     let reach = p.learn.likeness_cap / p.learn.threshold.nearest_share;
     if nearest >= reach {
         return vec![];
@@ -29,10 +30,10 @@ pub(super) fn look_alikes(model: &LandmarkModel, negatives: &Negatives, p: &Para
     let mut found: Vec<LookAlike> = negatives
         .by_owner()
         .filter(|(other, _)| *other != model.id)
-        .map(|(other, icons)| LookAlike { other, likeness: 1.0 - unlikeness_of(model, icons, p) })
-        .filter(|l| 1.0 - l.likeness < reach)
+        .map(|(other, icons)| LookAlike { other, gradient_similarity: 1.0 - unlikeness_of(model, icons, p) })
+        .filter(|l| 1.0 - l.gradient_similarity < reach)
         .collect();
-    found.sort_by(|a, b| b.likeness.total_cmp(&a.likeness).then(a.other.cmp(&b.other)));
+    found.sort_by(|a, b| b.gradient_similarity.total_cmp(&a.gradient_similarity).then(a.other.cmp(&b.other)));
     found.truncate(MAX_LOOK_ALIKES);
     found
 }
@@ -79,7 +80,7 @@ mod tests {
             let found = look_alikes(&refit_thresholds(&models[i], &others, &p), &negatives, &p);
             let named: Vec<LandmarkId> = found.iter().map(|l| l.other).collect();
             assert_eq!(named, expected.map(LandmarkId).into_iter().collect::<Vec<_>>(), "{found:?}");
-            assert!(found.iter().all(|l| l.likeness > 0.5 && l.likeness < 1.0));
+            assert!(found.iter().all(|l| l.gradient_similarity > 0.5 && l.gradient_similarity < 1.0));
         }
     }
 }

@@ -132,7 +132,7 @@ impl Jobs {
         let reporters = Mutex::default();
         let jobs = Arc::new(Self { store, config, reporters, started: Instant::now(), stopping });
         for row in jobs::open(jobs.store.reads()).await? {
-            tracing::info!(job = row.id, attempts = row.attempts, "to be taken up again");
+            tracing::info!(job = row.id, attempts = row.attempts, "job_resumed");
         }
         let pulse = jobs.store.vitals().begin("the task that runs jobs");
         let run = jobs.clone().run();

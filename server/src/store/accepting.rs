@@ -267,13 +267,13 @@ async fn landmark_of(
     if let Some((own, landmark)) = track.landmark.zip(track.landmark_id) {
         return match &pick.name {
             Some(name) if *name != own => {
-                Err(StoreError::InUse(format!("candidate {} shows landmark `{own}`", track.number)))
+                Err(StoreError::InUse(format!("track {} shows landmark `{own}`", track.number)))
             }
             _ => Ok((own, landmark)),
         };
     }
     let name = pick.name.clone().ok_or_else(|| {
-        StoreError::InUse(format!("candidate {} is no landmark yet: it needs a name", track.number))
+        StoreError::InUse(format!("track {} is no landmark yet: it needs a name", track.number))
     })?;
     if let Some((landmark, _)) = taken.get(&name) {
         return Ok((name, *landmark));

@@ -35,18 +35,19 @@ pub(crate) struct Settings {
     pub(crate) named: Vec<NamedArea>,
 }
 
+/// The word of the column, whose CHECK knows the words of earlier builds.
 fn mode_word(mode: FusionMode) -> &'static str {
     match mode {
         FusionMode::All => "all",
-        FusionMode::Fuse => "fuse",
-        FusionMode::Single => "single",
+        FusionMode::NearBest => "fuse",
+        FusionMode::Best => "single",
     }
 }
 
 fn mode_of(word: &str) -> FusionMode {
     match word {
-        "fuse" => FusionMode::Fuse,
-        "single" => FusionMode::Single,
+        "fuse" => FusionMode::NearBest,
+        "single" => FusionMode::Best,
         _ => FusionMode::All,
     }
 }
@@ -188,10 +189,10 @@ mod tests {
         assert_eq!(known(&store).1.cells().count(), 2);
         let hall = NamedArea { name: "hall".into(), corners_m: vec![[0.0, 0.0], [4.0, 0.0], [4.0, 3.0]] };
         let named = vec![hall.clone()];
-        let settings = Settings { mode: FusionMode::Single, named };
+        let settings = Settings { mode: FusionMode::Best, named };
         store.write(|tx| Box::pin(async move { set(tx, "a", |_| settings).await })).await.unwrap();
         let (version, areas) = known(&store);
-        assert_eq!((areas.mode(), areas.named().count(), areas.cells().count()), (FusionMode::Single, 1, 2));
+        assert_eq!((areas.mode(), areas.named().count(), areas.cells().count()), (FusionMode::Best, 1, 2));
         // What has nothing to do with it makes a new version and leaves it as it is.
         store
             .write(|tx| {
@@ -208,7 +209,7 @@ mod tests {
         task.close().await;
         let (store, task) = Catalogue::open(&config).await.unwrap();
         let areas = known(&store).1;
-        assert_eq!((areas.mode(), areas.named().next().unwrap().0), (FusionMode::Single, &hall));
+        assert_eq!((areas.mode(), areas.named().next().unwrap().0), (FusionMode::Best, &hall));
         let id = maps::get(store.reads(), "a").await.unwrap().id;
         let kept = runs(store.reads(), id).await.unwrap();
         assert_eq!((kept.len(), kept[0].id, kept[0].way_m, &kept[0].cells), (1, second, 12.5, &shown(2)));

@@ -251,10 +251,10 @@ pub(crate) async fn add_view(
         .await
         .map_err(at())?;
     if state != "open" {
-        return Err(StoreError::InUse(format!("candidate {} is {state}", track.number)));
+        return Err(StoreError::InUse(format!("track {} is {state}", track.number)));
     }
     let tracks = sqlx::query_scalar(COUNT_TRACKS).bind(id).fetch_one(&mut tx.conn).await.map_err(at())?;
-    within(tracks, bounds.tracks, "candidates of a gathering")?;
+    within(tracks, bounds.tracks, "tracks of a gathering")?;
     sqlx::query(INSERT_VIEW)
         .bind(id)
         .bind(track.number)
@@ -273,7 +273,7 @@ pub(crate) async fn add_view(
         .await
         .map_err(at())?;
     let count = sqlx::query_scalar(COUNT_VIEWS).bind(id).bind(track.number).fetch_one(&mut tx.conn).await;
-    within(count.map_err(at())?, bounds.views, "views of a candidate")?;
+    within(count.map_err(at())?, bounds.views, "views of a track")?;
     let bytes = sqlx::query_scalar(BYTES).bind(id).fetch_one(&mut tx.conn).await.map_err(at())?;
     within(bytes, bounds.bytes, "bytes of a gathering")
 }
@@ -300,7 +300,7 @@ pub(crate) async fn tracks(db: impl SqliteExecutor<'_>, id: i64) -> Result<Vec<T
 pub(crate) async fn track(db: impl SqliteExecutor<'_>, id: i64, number: u32) -> Result<TrackRow, StoreError> {
     let mut all = tracks(db, id).await?.into_iter();
     let found = all.find(|t| t.number == number && t.state == "open");
-    found.ok_or_else(|| unknown("candidate", i64::from(number)))
+    found.ok_or_else(|| unknown("track", i64::from(number)))
 }
 
 /// The views of a track in the order they were kept.
@@ -329,7 +329,7 @@ pub(crate) async fn discard(tx: &mut Tx, map: &str, id: i64, number: u32) -> Res
     get(&mut tx.conn, map, id).await?;
     let done = sqlx::query(DISCARD).bind(id).bind(number).execute(&mut tx.conn).await;
     if done.map_err(StoreError::at("discard track"))?.rows_affected() == 0 {
-        return Err(unknown("candidate", i64::from(number)));
+        return Err(unknown("track", i64::from(number)));
     }
     let dropped = sqlx::query(DROP_VIEWS).bind(id).bind(number).execute(&mut tx.conn).await;
     dropped.map_err(StoreError::at("discard track")).map(drop)

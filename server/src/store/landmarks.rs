@@ -14,7 +14,7 @@ macro_rules! select {
     ($tail:literal) => {
         concat!(
             "SELECT l.id, l.name, l.width_m, l.height_m, l.x_m, l.y_m, l.z_m, l.theta_rad, \
-             l.roll_rad, l.tilt_rad, l.place_covariance, l.size_from_views, l.standing, l.finding, \
+             l.roll_rad, l.tilt_rad, l.place_covariance, l.size_from_views, l.health, l.finding, \
              (SELECT count(*) FROM views v WHERE v.landmark_id = l.id) AS views, \
              m.active, m.reasons, m.facts, m.views AS model_views, m.generated_views, m.learnt_ms \
              FROM landmarks l LEFT JOIN models m ON m.landmark_id = l.id ",
@@ -28,7 +28,7 @@ statements! {
     INSERT = "INSERT INTO landmarks (map_id, name, created_ms) VALUES (?1, ?2, ?3) RETURNING id";
     GET = select!("JOIN maps ON maps.id = l.map_id WHERE maps.name = ?1 AND l.name = ?2");
     PAGE = select!("WHERE l.map_id = ?1 AND l.name > ?2 ORDER BY l.name LIMIT ?3");
-    STANDING = "UPDATE landmarks SET standing = ?2, finding = ?3 WHERE id = ?1";
+    STANDING = "UPDATE landmarks SET health = ?2, finding = ?3 WHERE id = ?1";
     UPDATE = "UPDATE landmarks SET width_m = ?2, height_m = ?3, x_m = ?4, y_m = ?5, z_m = ?6, theta_rad = ?7, \
               roll_rad = ?8, tilt_rad = ?9, place_covariance = ?10, size_from_views = ?11 WHERE id = ?1";
     DELETE = "DELETE FROM landmarks WHERE id = ?1";
@@ -98,7 +98,7 @@ pub(crate) struct LandmarkRow {
     pub(crate) finding: Option<String>,
 }
 
-/// The word for a standing in the database.
+/// The word for a health in the database.
 fn word(standing: LandmarkHealth) -> &'static str {
     match standing {
         LandmarkHealth::Sound => "sound",
@@ -107,7 +107,7 @@ fn word(standing: LandmarkHealth) -> &'static str {
     }
 }
 
-/// The standing behind a word; an unknown one (a file from elsewhere) is the most careful.
+/// The health behind a word; an unknown one (a file from elsewhere) is the most careful.
 pub(super) fn standing_of(word: &str) -> LandmarkHealth {
     match word {
         "sound" => LandmarkHealth::Sound,
@@ -187,7 +187,7 @@ fn landmark_row(row: &SqliteRow) -> Result<LandmarkRow, sqlx::Error> {
         measures: measures(row)?,
         views: row.try_get::<i64, _>("views")? as u64,
         model,
-        standing: standing_of(&row.try_get::<String, _>("standing")?),
+        standing: standing_of(&row.try_get::<String, _>("health")?),
         finding: row.try_get("finding")?,
     })
 }
@@ -274,7 +274,7 @@ pub(crate) async fn set_standing(
         .bind(finding)
         .execute(&mut tx.conn)
         .await
-        .map_err(StoreError::at("set standing"))?;
+        .map_err(StoreError::at("set health"))?;
     maps::bump(tx, map.id).await?;
     Ok(landmark)
 }

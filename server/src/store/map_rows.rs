@@ -10,7 +10,7 @@ statements! {
     NAME = "SELECT name FROM maps WHERE id = ?1";
     MAP_IDS = "SELECT id FROM maps ORDER BY id";
     LANDMARKS = "SELECT id, name, width_m, height_m, x_m, y_m, z_m, theta_rad, roll_rad, tilt_rad, place_covariance, \
-                 size_from_views, standing FROM landmarks WHERE map_id = ?1 ORDER BY id";
+                 size_from_views, health FROM landmarks WHERE map_id = ?1 ORDER BY id";
 }
 
 /// A map without what belongs to it.
@@ -68,7 +68,7 @@ pub(crate) async fn landmarks(conn: &mut SqliteConnection, id: i64) -> Result<Ve
             id: LandmarkId(row.try_get::<i64, _>("id")? as u64),
             name: row.try_get("name")?,
             measures: landmarks::measures(row)?,
-            standing: landmarks::standing_of(row.try_get("standing")?),
+            standing: landmarks::standing_of(row.try_get("health")?),
         })
     };
     rows.iter().map(head).collect::<Result<_, _>>().map_err(at())

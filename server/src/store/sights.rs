@@ -13,13 +13,14 @@ pub(crate) async fn set(tx: &mut Tx, map: &str, sight: &VisibilitySettings) -> R
     let map = maps::get(&mut tx.conn, map).await?;
     let usual = *sight == VisibilitySettings::default();
     let text = (!usual).then(|| serde_json::to_string(sight)).transpose();
-    let text = text.map_err(|e| StoreError::Damaged { what: "sight".to_owned(), reason: e.to_string() })?;
+    let text = text
+        .map_err(|e| StoreError::Damaged { what: "visibility settings".to_owned(), reason: e.to_string() })?;
     sqlx::query(SET)
         .bind(map.id)
         .bind(text)
         .execute(&mut tx.conn)
         .await
-        .map_err(StoreError::at("store sight"))?;
+        .map_err(StoreError::at("store visibility settings"))?;
     maps::bump(tx, map.id).await
 }
 

@@ -47,7 +47,7 @@ pub fn detect_with(
 ) -> Vec<Quad> {
     let mut quads = match p.quads.grouping {
         Grouping::Relaxation => by_relaxation(memory, image, p, trace),
-        Grouping::Hypotheses => by_search(memory, image, p, trace),
+        Grouping::Proposals => by_search(memory, image, p, trace),
     };
     quads.truncate(MAX_QUADS);
     trace.quads(&quads);
@@ -130,7 +130,7 @@ fn searched(
 ) -> (Vec<ScoredQuad>, EdgeMap, Vec<EdgeSegment>) {
     let (edges, segments) = traced_segments(memory, work, p, trace);
     let gradients = Gradients { image: work, gx: edges.gx(), gy: edges.gy() };
-    let seeds = hypotheses(&segments, &gradients, &p.quads.hypotheses);
+    let seeds = hypotheses(&segments, &gradients, &p.quads.proposals);
     trace.seeds(&seeds);
     trace.finished(Stage::Pairs);
     let mut rated = rate(&seeds, &gradients, &p.quads);
@@ -145,7 +145,7 @@ fn searched(
         let segments = straight_segments(&chains(&edges, &p.chains), &edges, &p.segments);
         let segments = untile(segments, (level.width(), level.height()), &p.tiling).kept;
         let gradients = Gradients { image: &level, gx: edges.gx(), gy: edges.gy() };
-        let seeds = hypotheses(&segments, &gradients, &p.quads.hypotheses);
+        let seeds = hypotheses(&segments, &gradients, &p.quads.proposals);
         let coarse = rate(&seeds, &gradients, &p.quads);
         rated.extend(coarse.into_iter().filter_map(|r| r.scaled(scale as f64)));
         memory.give_back(edges);

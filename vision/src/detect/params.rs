@@ -40,7 +40,8 @@ pub enum Grouping {
     Relaxation,
     /// Corner chains with a searched fourth side, checked against the gradient.
     #[default]
-    Hypotheses,
+    #[serde(alias = "hypotheses")]
+    Proposals,
 }
 
 /// What a quad of the search becomes that lies inside another and is no border of the same thing.
@@ -54,7 +55,7 @@ pub enum Nested {
     Quads,
 }
 
-/// Parameters of the last stage.
+/// Parameters of the last stage. Files of parameters may have the words of earlier builds, too.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct QuadParams {
@@ -65,7 +66,8 @@ pub struct QuadParams {
     /// Scales of the search, each half the one before: a coarse one sees through ragged, ornate borders.
     pub scales: usize,
     /// The search.
-    pub hypotheses: ProposalParams,
+    #[serde(alias = "hypotheses")]
+    pub proposals: ProposalParams,
     /// Share of each side that edges must support for the outermost border of a group to be its quad.
     pub min_side_support: f64,
     /// Nested quads above this `IoU` are borders of one thing.
@@ -86,11 +88,19 @@ pub struct QuadParams {
     /// Whether the search moves each side to the line beside it that looks most like a border.
     pub choose_sides: bool,
     /// What makes a side a border; without one, what was learnt with the program.
-    #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "checked::<SIDE_FEATURES, _>")]
-    pub side_model: Option<Network>,
+    #[serde(
+        alias = "side_model",
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "checked::<SIDE_FEATURES, _>"
+    )]
+    pub border_model: Option<Network>,
     /// What makes a quad a thing; without one, what was learnt with the program.
-    #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "checked::<THING_FEATURES, _>")]
-    pub thing_model: Option<Network>,
+    #[serde(
+        alias = "thing_model",
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "checked::<THING_FEATURES, _>"
+    )]
+    pub quad_classifier: Option<Network>,
     /// Smallest probability that a quad of the search is a thing.
     pub min_probability: f64,
     /// A quad that is a thing with at least this probability keeps what contradicts it from being looked at.
@@ -109,7 +119,7 @@ impl Default for QuadParams {
             grouping: Grouping::default(),
             working_side_px: 640,
             scales: 2,
-            hypotheses: ProposalParams::default(),
+            proposals: ProposalParams::default(),
             min_side_support: 0.5,
             nested_iou: 0.6,
             nested: Nested::default(),
@@ -119,8 +129,8 @@ impl Default for QuadParams {
             max_alike: 8,
             min_score: 0.4,
             choose_sides: true,
-            side_model: None,
-            thing_model: None,
+            border_model: None,
+            quad_classifier: None,
             min_probability: 0.65,
             sure_probability: 0.95,
             three_sided: true,
@@ -142,11 +152,11 @@ fn checked<'de, const N: usize, D: Deserializer<'de>>(from: D) -> Result<Option<
 impl QuadParams {
     /// What makes a side a border.
     pub fn side_network(&self) -> &Network {
-        self.side_model.as_ref().unwrap_or_else(|| network_weights::side_model())
+        self.border_model.as_ref().unwrap_or_else(|| network_weights::border_model())
     }
 
     /// What makes a quad a thing.
     pub fn thing_network(&self) -> &Network {
-        self.thing_model.as_ref().unwrap_or_else(|| network_weights::thing_model())
+        self.quad_classifier.as_ref().unwrap_or_else(|| network_weights::quad_classifier())
     }
 }

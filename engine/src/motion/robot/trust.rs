@@ -84,7 +84,7 @@ impl RobotState {
                 self.lost();
                 self.schedule.relocalised(&fix.landmarks);
             }
-            FixOutcome::Applied { .. } | FixOutcome::NotUsed { .. } | FixOutcome::Repeated => {}
+            FixOutcome::Applied { .. } | FixOutcome::ExcludedByMode { .. } | FixOutcome::Repeated => {}
             _ => return,
         }
         match fix.modality {
@@ -112,7 +112,7 @@ impl RobotState {
             ("landmarks", near(self.by_landmarks_m)),
             (GUIDED, near(self.by_guided_m)),
             ("laser", near(self.by_laser_m)),
-            ("hypotheses", self.by_hypotheses),
+            ("relocalisation", self.by_hypotheses),
         ];
         all.into_iter().filter(|(_, rests)| *rests).map(|(word, _)| word.to_owned()).collect()
     }

@@ -75,11 +75,11 @@ fn what_runs_have_shown_is_heeded_from_the_next_message_on() {
     let found: StatsByModality = [sums(0.0), sums(100.0), sums(100.0)];
     let cells = (10..14).map(|x| (PoseCell { x, y: 1, heading: 0 }, found)).collect::<BTreeMap<_, _>>();
     let mut map = MapSnapshot::empty("hall", 2);
-    map.modalities = Arc::new(ModalityMap::new(FusionMode::Single, Vec::new(), [&cells]));
+    map.modalities = Arc::new(ModalityMap::new(FusionMode::Best, Vec::new(), [&cells]));
     motion.snapshots.publish(Arc::new(map));
     motion.odometry_of(&r1, odometry(2, 1.0));
     motion.fixed(&r1, at(2_000_000_000, 1.0), &fix(11.0)).unwrap();
     let log = motion.corrections(&r1);
-    assert_eq!(log.totals["landmarks"], [("not_used", 1), ("started", 1)].into());
+    assert_eq!(log.totals["landmarks"], [("excluded_by_mode", 1), ("started", 1)].into());
     assert!((motion.pose(&r1, "hall", time(2.0)).unwrap().pose.x_m - 11.0).abs() < 1e-9);
 }

@@ -35,11 +35,11 @@ pub(crate) enum Outcome {
     /// Perhaps another landmark.
     Ambiguous,
     /// 1 minus likeness is not below its tau.
-    Likeness,
+    Similarity,
     /// Alike, but too much of it shows something else.
-    Contradiction,
+    Mismatch,
     /// Alike, but hardly by more than the frame.
-    Content,
+    LowContent,
     /// Alike, but neither C^r nor H^r is below 0.8 of its tau.
     Distances,
     /// Not among the candidates of the verdict.
@@ -59,9 +59,9 @@ impl Outcome {
             Self::Corners => "corners",
             Self::Plain => "plain",
             Self::Ambiguous => "ambiguous",
-            Self::Likeness => "likeness",
-            Self::Contradiction => "contradiction",
-            Self::Content => "content",
+            Self::Similarity => "similarity",
+            Self::Mismatch => "mismatch",
+            Self::LowContent => "low_content",
             Self::Distances => "distances",
             Self::NotListed => "not listed",
             Self::NoIcon => "no icon",
@@ -163,10 +163,10 @@ fn outcome(verdict: &RecognitionResult, id: LandmarkId) -> Outcome {
     }
     let Some(own) = verdict.candidates.iter().find(|c| c.landmark == id) else { return Outcome::NotListed };
     match own.refusal {
-        Some(MatchRefusal::Contradiction) => Outcome::Contradiction,
-        Some(MatchRefusal::Content) => Outcome::Content,
+        Some(MatchRefusal::Mismatch) => Outcome::Mismatch,
+        Some(MatchRefusal::LowContent) => Outcome::LowContent,
         Some(MatchRefusal::Correlation | MatchRefusal::Hausdorff) => Outcome::Distances,
-        _ => Outcome::Likeness,
+        _ => Outcome::Similarity,
     }
 }
 
@@ -213,9 +213,9 @@ mod tests {
             (Verdict::Ambiguous(id), Some(MatchRefusal::Plain), Outcome::Plain),
             (Verdict::Ambiguous(id), Some(MatchRefusal::Margin), Outcome::Ambiguous),
             (Verdict::Ambiguous(LandmarkId(4)), Some(MatchRefusal::Plain), Outcome::Ambiguous),
-            (Verdict::Unknown, Some(MatchRefusal::Likeness), Outcome::Likeness),
-            (Verdict::Unknown, Some(MatchRefusal::Contradiction), Outcome::Contradiction),
-            (Verdict::Unknown, Some(MatchRefusal::Content), Outcome::Content),
+            (Verdict::Unknown, Some(MatchRefusal::Similarity), Outcome::Similarity),
+            (Verdict::Unknown, Some(MatchRefusal::Mismatch), Outcome::Mismatch),
+            (Verdict::Unknown, Some(MatchRefusal::LowContent), Outcome::LowContent),
             (Verdict::Unknown, Some(MatchRefusal::Correlation), Outcome::Distances),
         ] {
             assert_eq!(outcome(&verdict(recognition, refusal), id), expected);

@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 use vision::{params::Params, random::Random};
 
 /// What is measured against tau, in the order of [`ViewFigures::ratios`].
-pub(crate) const DISTANCES: [&str; 3] = ["H^r", "C^r", "likeness"];
+pub(crate) const DISTANCES: [&str; 3] = ["H^r", "C^r", "similarity"];
 /// Draws for one view before it is left out.
 const TRIES: u64 = 10;
 
@@ -198,12 +198,12 @@ mod tests {
 
     #[test]
     fn a_curve_sums_up_its_views() {
-        let landmark = || vec![looks(0.5, Outcome::Right, 4), looks(1.5, Outcome::Likeness, 4)];
+        let landmark = || vec![looks(0.5, Outcome::Right, 4), looks(1.5, Outcome::Similarity, 4)];
         let curve = Curve::new("x", &[0.0, 1.0], &[landmark(), landmark()]);
         assert!((curve.crossings[0].at - 0.5).abs() < 1e-12 && !curve.crossings[0].beyond);
         assert!(curve.crossings[1].beyond && (curve.crossings[1].at - 1.0).abs() < 1e-12);
         assert!((curve.half.at - 0.5).abs() < 1e-12 && (curve.most.at - 0.05).abs() < 1e-12);
-        assert_eq!((curve.points[1].outcomes["likeness"], curve.wrong, curve.views), (8, 0, 16));
+        assert_eq!((curve.points[1].outcomes["similarity"], curve.wrong, curve.views), (8, 0, 16));
         assert_eq!(curve.points[0].right_interval, wilson(8, 8));
         let Interval(low, high) = curve.crossings[0].interval.unwrap();
         assert!((low - 0.5).abs() < 1e-12 && (high - 0.5).abs() < 1e-12, "two landmarks alike");

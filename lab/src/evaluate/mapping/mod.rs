@@ -211,11 +211,11 @@ impl Row {
             json!({ "translation_m": m, "translation_std_m": ms, "rotation_deg": deg, "rotation_std_deg": degs })
         };
         json!({
-            "log": self.name, "scans": self.map.path.len(), "key_poses": self.map.key_scans.len(),
+            "log": self.name, "scans": self.map.path.len(), "keyframes": self.map.key_scans.len(),
             "relations": self.relations, "error": errors(&self.found), "odometry_error": errors(&self.odometry),
             "published_scan_matching_m": self.published().map(|p| p.1),
             "published_graph_mapping_m": self.published().map(|p| p.2),
-            "loops": self.map.loops.len(), "loops_refused": self.map.refused,
+            "loop_closures": self.map.loops.len(), "loop_closures_refused": self.map.refused,
             "segments": self.map.segments.len(), "complete": self.complete, "residual_m": self.residual_m,
             "localise_us": self.localised.us, "localised": self.localised.fixed,
             "localised_off_m": self.localised.off_m, "seconds": self.seconds, "recorded_s": self.duration_s, "times_faster_than_recorded": self.faster(),

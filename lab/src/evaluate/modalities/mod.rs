@@ -100,8 +100,8 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let ways: [(&'static str, Arc<ModalityMap>); 4] = [
         ("untaught", untaught),
         ("all, as sure as it proved", areas(FusionMode::All)),
-        ("fuse, nearly the best", areas(FusionMode::Fuse)),
-        ("single, the best alone", areas(FusionMode::Single)),
+        ("near_best, nearly the best", areas(FusionMode::NearBest)),
+        ("best, the best alone", areas(FusionMode::Best)),
     ];
     let judged = drives(args.drives, 16);
     let of_ways: Vec<(&'static str, Vec<Driven>)> = ways

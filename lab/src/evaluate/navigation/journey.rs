@@ -185,7 +185,7 @@ impl Server {
         next.version += 1;
         for change in changes {
             if let Some(info) = next.landmarks.get_mut(&change.landmark) {
-                info.standing = change.standing;
+                info.standing = change.health;
             }
         }
         self.snapshots.publish(Arc::new(next));
@@ -229,7 +229,7 @@ pub(super) fn drive(world: &World, way: Way) -> anyhow::Result<Journey> {
         let shows = journey.score(world, &seen, &facts, guided.as_ref());
         frames_that_show += usize::from(shows);
         if !changes.is_empty() {
-            let of = |standing| changes.iter().filter(|c| c.standing == standing).count();
+            let of = |health| changes.iter().filter(|c| c.health == health).count();
             journey.flagged += of(LandmarkHealth::Flagged);
             journey.quarantined += of(LandmarkHealth::Quarantined);
             server.change(&map, &changes);

@@ -50,7 +50,7 @@ pub(super) struct Record {
     pub(super) corrections: u64,
     pub(super) position_errors_m: Vec<f64>,
     pub(super) odometry_errors_m: Vec<f64>,
-    pub(super) ages_ms: Vec<f64>,
+    pub(super) latencies_ms: Vec<f64>,
 }
 
 /// Lets every robot drive to its end.
@@ -159,7 +159,7 @@ impl Journey {
     }
 
     fn score(&mut self, answer: &Answer, sighting: &SensorReadings) {
-        self.record.ages_ms.push(answer.age_ms);
+        self.record.latencies_ms.push(answer.latency_ms);
         let truth = &sighting.frame.truth;
         self.record.landmark_views += truth
             .landmarks
@@ -240,6 +240,6 @@ impl Record {
         self.corrections += other.corrections;
         self.position_errors_m.extend(other.position_errors_m);
         self.odometry_errors_m.extend(other.odometry_errors_m);
-        self.ages_ms.extend(other.ages_ms);
+        self.latencies_ms.extend(other.latencies_ms);
     }
 }

@@ -89,7 +89,7 @@ pub(super) async fn teach(
         if landmark.status == LandmarkStatus::Active {
             taught.active += 1;
         } else {
-            let reasons: Vec<String> = landmark.reasons.iter().map(ToString::to_string).collect();
+            let reasons: Vec<String> = landmark.failed_gates.iter().map(ToString::to_string).collect();
             screen::complain(&format!("{} is not in use: {}", landmark.name, reasons.join("; ")));
         }
     }

@@ -25,7 +25,7 @@ pub(super) struct Summary {
     /// The same moments, by odometry alone.
     odometry_error_m: Option<Spread>,
     /// Receipt to answer.
-    age_ms: Option<Spread>,
+    latency_ms: Option<Spread>,
 }
 
 /// How a figure is spread.
@@ -63,7 +63,7 @@ pub(super) fn summarise(taught: &Taught, record: &Record) -> Summary {
         corrections: record.corrections,
         position_error_m: Spread::of(&record.position_errors_m),
         odometry_error_m: Spread::of(&record.odometry_errors_m),
-        age_ms: Spread::of(&record.ages_ms),
+        latency_ms: Spread::of(&record.latencies_ms),
     }
 }
 
@@ -89,7 +89,7 @@ impl Summary {
             format!("corrections       {}", self.corrections),
             format!("position error    {}", spread(self.position_error_m, "m", 3)),
             format!("odometry alone    {}", spread(self.odometry_error_m, "m", 3)),
-            format!("receipt to answer {}", spread(self.age_ms, "ms", 1)),
+            format!("receipt to answer {}", spread(self.latency_ms, "ms", 1)),
         ]
         .join("\n")
     }

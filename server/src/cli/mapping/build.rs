@@ -111,18 +111,18 @@ pub(crate) async fn run(args: &Args) -> anyhow::Result<()> {
         std::fs::write(picture, map_svg::draw(&file, &recording.records))
             .with_context(|| picture.display().to_string())?;
     }
-    let way_m: f64 = map.path.windows(2).map(|p| p[0].between(&p[1]).position().norm()).sum();
+    let distance_m: f64 = map.path.windows(2).map(|p| p[0].between(&p[1]).position().norm()).sum();
     let faster = recording.duration_s().map(|d| d / seconds.max(1e-9));
     if args.json {
         let summary = json!({
-            "scans": map.path.len(), "key_poses": map.keys.len(), "way_m": way_m, "segments": map.walls.len(),
-            "loops": map.loops.len(), "loops_refused": map.refused, "seconds": seconds,
+            "scans": map.path.len(), "keyframes": map.keys.len(), "distance_m": distance_m, "segments": map.walls.len(),
+            "loop_closures": map.loops.len(), "loop_closures_refused": map.refused, "seconds": seconds,
             "times_faster_than_recorded": faster,
         });
         screen::say(&summary.to_string());
     } else {
         screen::say(&format!(
-            "{} scans over {way_m:.0} m: {} key poses, {} loops closed, {} refused, {} wall segments; {seconds:.1} s{}",
+            "{} scans over {distance_m:.0} m: {} keyframes, {} loop closures, {} refused, {} wall segments; {seconds:.1} s{}",
             map.path.len(),
             map.keys.len(),
             map.loops.len(),

@@ -53,10 +53,10 @@ async fn every_bound_holds_and_a_refusal_changes_nothing() {
     kept(&store, id, 1, 1, 10).await.unwrap();
     kept(&store, id, 1, 1, 10).await.unwrap();
     kept(&store, id, 1, 2, 10).await.unwrap();
-    at_bound(&kept(&store, id, 1, 3, 1).await, "views of a candidate");
+    at_bound(&kept(&store, id, 1, 3, 1).await, "views of a track");
     at_bound(&kept(&store, id, 2, 4, 21).await, "bytes");
     kept(&store, id, 2, 4, 20).await.unwrap();
-    at_bound(&kept(&store, id, 3, 5, 1).await, "candidates");
+    at_bound(&kept(&store, id, 3, 5, 1).await, "tracks");
     let all = tracks(store.reads(), id).await.unwrap();
     let brief: Vec<_> = all.iter().map(|t| (t.number, t.sightings, t.views)).collect();
     assert_eq!(brief, [(1, 2, 2), (2, 4, 1)], "the same view twice is one view");

@@ -20,55 +20,55 @@ const _: () = assert!(
     "a number of the measurements changed: train the networks again",
 );
 
-/// Weighs the measurements of `side_model`.
-pub(crate) fn side_model() -> &'static Network {
+/// Weighs the measurements of `border_model`.
+pub(crate) fn border_model() -> &'static Network {
     static MODEL: LazyLock<Network> = LazyLock::new(|| Network {
         features: FEATURES,
-        mean: SIDE_MODEL_MEAN.to_vec(),
-        deviation: SIDE_MODEL_DEVIATION.to_vec(),
-        linear: SIDE_MODEL_LINEAR.to_vec(),
-        hidden_in: SIDE_MODEL_HIDDEN_IN.to_vec(),
-        hidden_bias: SIDE_MODEL_HIDDEN_BIAS.to_vec(),
-        hidden_out: SIDE_MODEL_HIDDEN_OUT.to_vec(),
+        mean: BORDER_MODEL_MEAN.to_vec(),
+        deviation: BORDER_MODEL_DEVIATION.to_vec(),
+        linear: BORDER_MODEL_LINEAR.to_vec(),
+        hidden_in: BORDER_MODEL_HIDDEN_IN.to_vec(),
+        hidden_bias: BORDER_MODEL_HIDDEN_BIAS.to_vec(),
+        hidden_out: BORDER_MODEL_HIDDEN_OUT.to_vec(),
         bias: 0.0,
     });
     &MODEL
 }
 
-/// Weighs the measurements of `thing_model`.
-pub(crate) fn thing_model() -> &'static Network {
+/// Weighs the measurements of `quad_classifier`.
+pub(crate) fn quad_classifier() -> &'static Network {
     static MODEL: LazyLock<Network> = LazyLock::new(|| Network {
         features: FEATURES,
-        mean: THING_MODEL_MEAN.to_vec(),
-        deviation: THING_MODEL_DEVIATION.to_vec(),
-        linear: THING_MODEL_LINEAR.to_vec(),
-        hidden_in: THING_MODEL_HIDDEN_IN.to_vec(),
-        hidden_bias: THING_MODEL_HIDDEN_BIAS.to_vec(),
-        hidden_out: THING_MODEL_HIDDEN_OUT.to_vec(),
+        mean: QUAD_CLASSIFIER_MEAN.to_vec(),
+        deviation: QUAD_CLASSIFIER_DEVIATION.to_vec(),
+        linear: QUAD_CLASSIFIER_LINEAR.to_vec(),
+        hidden_in: QUAD_CLASSIFIER_HIDDEN_IN.to_vec(),
+        hidden_bias: QUAD_CLASSIFIER_HIDDEN_BIAS.to_vec(),
+        hidden_out: QUAD_CLASSIFIER_HIDDEN_OUT.to_vec(),
         bias: -1.1525,
     });
     &MODEL
 }
 
-const SIDE_MODEL_MEAN: [f64; 28] = [
+const BORDER_MODEL_MEAN: [f64; 28] = [
     0.8034, 0.8538, 3.6849, 0.7165, 0.5199, 0.767, 0.6752, -0.1555, 0.2895, -0.23, 0.4507, 0.0956, 2.6732,
     2.37, 0.6784, 0.4086, 0.9223, 0.8442, 0.0241, 0.0239, 0.6651, 0.7764, 0.8052, 0.5134, 0.5957, 0.4961,
     1.2457, 0.3939,
 ];
 
-const SIDE_MODEL_DEVIATION: [f64; 28] = [
+const BORDER_MODEL_DEVIATION: [f64; 28] = [
     0.2152, 0.2998, 0.7851, 0.2841, 0.3093, 0.261, 0.2745, 0.4811, 0.4145, 0.58, 0.4315, 0.3622, 1.8914,
     1.7435, 0.4427, 0.5278, 0.217, 0.3124, 0.0802, 0.0797, 0.4567, 0.3803, 0.3412, 0.508, 0.4449, 0.4177,
     1.5815, 0.4582,
 ];
 
-const SIDE_MODEL_LINEAR: [f64; 28] = [
+const BORDER_MODEL_LINEAR: [f64; 28] = [
     0.09, -0.0522, 0.1666, 0.3208, -0.0196, -0.0876, 0.4024, 0.3257, -0.6285, -0.3624, 0.654, 0.0211,
     -0.2012, 0.7274, 0.2715, -0.0503, 0.1917, -0.0095, -0.0642, 0.1924, 0.1494, 0.1964, 0.194, -0.1678,
     0.1386, -0.0925, -0.0414, -0.1924,
 ];
 
-const SIDE_MODEL_HIDDEN_IN: [f64; 448] = [
+const BORDER_MODEL_HIDDEN_IN: [f64; 448] = [
     -0.0423, 0.0909, 0.2701, 0.6431, 0.464, 0.1011, -0.182, 0.3026, 0.0439, 0.4784, -0.2117, -0.0264,
     -0.1681, -0.4952, 0.0568, -0.2886, -0.1091, 0.0582, -0.0763, -0.0475, 0.4331, -0.11, -0.8153, 0.3487,
     -0.1236, -0.0296, -0.3391, 0.2114, -0.1708, 0.1908, -0.1554, 0.637, -0.0035, -0.6326, -0.0412, -0.0563,
@@ -108,17 +108,17 @@ const SIDE_MODEL_HIDDEN_IN: [f64; 448] = [
     -0.1841, -0.0112, -0.238, -0.215, -0.0235, -0.1098, 0.0656, -0.1514, -0.1646, -0.3565, -0.1339,
 ];
 
-const SIDE_MODEL_HIDDEN_BIAS: [f64; 16] = [
+const BORDER_MODEL_HIDDEN_BIAS: [f64; 16] = [
     0.258, -0.2204, -0.9048, 0.7902, -1.0084, 0.002, 0.0346, -1.3646, -0.1736, -1.3614, 0.6213, 0.4427,
     -1.3874, -0.762, 0.7628, 0.9383,
 ];
 
-const SIDE_MODEL_HIDDEN_OUT: [f64; 16] = [
+const BORDER_MODEL_HIDDEN_OUT: [f64; 16] = [
     -1.3978, 1.3322, -1.6414, 1.5067, -1.6804, -1.4875, 1.6665, 1.7524, 1.2206, -1.5279, 1.5582, 1.3289,
     1.5554, -1.3517, 1.4921, -1.4425,
 ];
 
-const THING_MODEL_MEAN: [f64; 94] = [
+const QUAD_CLASSIFIER_MEAN: [f64; 94] = [
     0.9097, 0.9354, 3.5832, 0.6314, 0.4669, 0.7161, 0.6163, -0.0336, 0.1084, -0.1254, 0.4218, -0.0304,
     1.2059, 1.6073, 0.3576, 0.1526, 0.821, 0.6851, 0.0216, 0.0138, 0.5486, 0.7536, 0.7566, 0.3287, 0.4896,
     0.351, 1.0114, 0.1581, 0.7871, 0.7994, 3.0575, 0.3934, 0.2542, 0.5204, 0.4419, -0.1707, 0.0244, -0.4016,
@@ -129,7 +129,7 @@ const THING_MODEL_MEAN: [f64; 94] = [
     0.8546, 0.0764, 0.2381, 0.0066,
 ];
 
-const THING_MODEL_DEVIATION: [f64; 94] = [
+const QUAD_CLASSIFIER_DEVIATION: [f64; 94] = [
     0.1164, 0.1241, 0.7023, 0.2155, 0.2361, 0.2196, 0.2426, 0.1852, 0.1769, 0.5006, 0.3635, 0.1926, 1.1597,
     1.3061, 0.3054, 0.179, 0.2016, 0.2852, 0.0521, 0.0369, 0.3706, 0.248, 0.2346, 0.3298, 0.2894, 0.2387,
     0.9086, 0.2451, 0.2546, 0.3498, 1.0345, 0.2992, 0.2483, 0.3214, 0.3044, 0.3272, 0.1027, 0.5828, 0.3073,
@@ -140,7 +140,7 @@ const THING_MODEL_DEVIATION: [f64; 94] = [
     0.1294, 0.2822, 0.0321,
 ];
 
-const THING_MODEL_LINEAR: [f64; 94] = [
+const QUAD_CLASSIFIER_LINEAR: [f64; 94] = [
     0.0589, 0.026, 0.1319, -0.1094, -0.3267, -0.1594, -0.2623, 0.0996, 0.2531, -0.1952, -0.0173, 0.1187,
     0.1945, 0.2323, 0.2137, 0.0133, 0.0283, -0.0876, 0.0205, -0.0357, -0.1032, -0.1806, -0.0701, 0.0166,
     -0.0358, -0.1907, 0.0886, -0.1174, -0.1616, 0.1421, -0.0091, -0.1634, 0.0558, 0.1234, -0.275, -0.0415,
@@ -151,7 +151,7 @@ const THING_MODEL_LINEAR: [f64; 94] = [
     -0.2154, 0.1525, 0.2707, -0.0754, -0.1704, 0.1027, -0.0139, 0.1722,
 ];
 
-const THING_MODEL_HIDDEN_IN: [f64; 752] = [
+const QUAD_CLASSIFIER_HIDDEN_IN: [f64; 752] = [
     -0.2415, 0.1048, 0.0269, 0.1303, 0.0721, 0.1086, -0.0658, -0.2403, 0.1239, -0.1264, -0.0248, -0.3795,
     -0.1657, -0.203, -0.1946, -0.2796, -0.1358, -0.1423, -0.0661, 0.0647, -0.0236, 0.262, -0.3134, 0.1166,
     0.0689, 0.4105, -0.342, -0.02, 0.1831, -0.0922, 0.3281, 0.238, 0.0565, 0.0661, 0.2755, 0.2618, 0.1817,
@@ -217,6 +217,8 @@ const THING_MODEL_HIDDEN_IN: [f64; 752] = [
     0.1351,
 ];
 
-const THING_MODEL_HIDDEN_BIAS: [f64; 8] = [-0.2193, -0.227, 1.031, -0.3237, -0.168, 0.5115, 0.2019, 0.048];
+const QUAD_CLASSIFIER_HIDDEN_BIAS: [f64; 8] =
+    [-0.2193, -0.227, 1.031, -0.3237, -0.168, 0.5115, 0.2019, 0.048];
 
-const THING_MODEL_HIDDEN_OUT: [f64; 8] = [-1.5238, -1.2408, -1.6863, -1.2241, 1.3535, 1.348, 1.5021, -1.4161];
+const QUAD_CLASSIFIER_HIDDEN_OUT: [f64; 8] =
+    [-1.5238, -1.2408, -1.6863, -1.2241, 1.3535, 1.348, 1.5021, -1.4161];

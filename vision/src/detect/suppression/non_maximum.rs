@@ -105,8 +105,8 @@ pub struct ClassifiedQuad {
 /// way. All that were looked at are returned, at most [`MAX_CLASSIFIED`]. The border that a quad had before stays
 /// among its alternates.
 pub fn snap_sides(rated: Vec<ScoredQuad>, g: &Gradients, p: &QuadParams) -> Vec<ClassifiedQuad> {
-    let side_model = p.side_network();
-    let thing_model = p.thing_network();
+    let border_model = p.side_network();
+    let quad_classifier = p.thing_network();
     let mut classified: Vec<ClassifiedQuad> = Vec::new();
     for quad in different(rated, p) {
         // What is much larger than a thing that it holds may yet take its place.
@@ -121,14 +121,14 @@ pub fn snap_sides(rated: Vec<ScoredQuad>, g: &Gradients, p: &QuadParams) -> Vec<
         if classified.len() >= MAX_CLASSIFIED {
             break;
         }
-        let Some(chosen) = choose_sides(g, quad.corners_px.points(), side_model) else { continue };
+        let Some(chosen) = choose_sides(g, quad.corners_px.points(), border_model) else { continue };
         let moved = moved(&quad, &chosen, g, p).filter(|q| !taken(q));
         let (quad, sides) = match moved {
             Some(moved) => (moved, &chosen.sides),
             None => (quad, &chosen.nearest),
         };
         let features = thing_features(sides, quad.corners_px.points(), quad.score, (g.width(), g.height()));
-        let score = probability(thing_model, &features);
+        let score = probability(quad_classifier, &features);
         classified.push(ClassifiedQuad { quad: Quad { score, ..quad }, features });
     }
     classified

@@ -95,7 +95,7 @@ fn hold(image: &GrayImage) {
     let (rated, edges) = scored_quads(&work, &p, &mut counted);
     assert!(rated.len() <= (MAX_REFITTED + MAX_REFITTED / 2) * p.quads.scales);
     let g = Gradients { image: &work, gx: edges.gx(), gy: edges.gy() };
-    assert!(hypotheses(&counted.segments, &g, &p.quads.hypotheses).len() <= MAX_HYPOTHESES);
+    assert!(hypotheses(&counted.segments, &g, &p.quads.proposals).len() <= MAX_HYPOTHESES);
 }
 
 fn checkerboard(width: usize, height: usize, period: usize) -> GrayImage {

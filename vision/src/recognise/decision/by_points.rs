@@ -130,7 +130,7 @@ fn refusal<'a>(
     }
     // Where the image does not show all of it there is no likeness.
     let is_like = alignment.likeness.is_none_or(|l| 1.0 - l < model.likeness.tau);
-    (has_double(model, p) && !is_like).then_some(MatchRefusal::Likeness)
+    (has_double(model, p) && !is_like).then_some(MatchRefusal::Similarity)
 }
 
 /// Something of the map is nearer to it than what is accepted where nothing is like it: to be told from that by points

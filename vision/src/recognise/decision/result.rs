@@ -11,12 +11,12 @@ pub enum MatchRefusal {
     Correlation,
     /// H^r is not below tau.
     Hausdorff,
-    /// Laid on the learnt icon, the picture is not like it.
-    Likeness,
-    /// It is like it, but too much of it shows something else.
-    Contradiction,
+    /// The gradient similarity after alignment does not reach its threshold.
+    Similarity,
+    /// The mismatch share is too great: it is like the landmark, but too much of it shows something else.
+    Mismatch,
     /// It is like it, but hardly by more than the frame.
-    Content,
+    LowContent,
     /// Accepted by its own thresholds, but another landmark is too close behind.
     Margin,
     /// So many points would agree by chance too often.

@@ -60,10 +60,10 @@ impl VerifiedLandmark {
             DistanceKind::Both if by_points => Some(MatchRefusal::Points),
             DistanceKind::Correlation => (!correlation).then_some(MatchRefusal::Correlation),
             DistanceKind::Hausdorff => (!hausdorff).then_some(MatchRefusal::Hausdorff),
-            DistanceKind::Both if !below(self.near.ratio(kind), share) => Some(MatchRefusal::Likeness),
-            DistanceKind::Both if doubtful && contradicted => Some(MatchRefusal::Contradiction),
+            DistanceKind::Both if !below(self.near.ratio(kind), share) => Some(MatchRefusal::Similarity),
+            DistanceKind::Both if doubtful && contradicted => Some(MatchRefusal::Mismatch),
             DistanceKind::Both if !agrees(p.min_content_likeness, p.min_content) => {
-                Some(MatchRefusal::Content)
+                Some(MatchRefusal::LowContent)
             }
             DistanceKind::Both => (!correlation && !hausdorff && !sure).then_some(MatchRefusal::Correlation),
         }

@@ -280,7 +280,7 @@ fn quads_of_the_floor_go_and_those_of_the_wall_stay() {
     let room = Room { chequered: true, ..room(-0.2, 0.35, 0.3) };
     // As noisy as the segments above. Without calibration one scale of some quieter pictures is missed.
     let image = room.image(2.0);
-    for grouping in [Grouping::Hypotheses, Grouping::Relaxation] {
+    for grouping in [Grouping::Proposals, Grouping::Relaxation] {
         let count = |tiling: TilingParams| {
             let mut p = DetectParams { tiling, ..DetectParams::default() };
             p.quads.grouping = grouping;

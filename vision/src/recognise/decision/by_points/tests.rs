@@ -129,7 +129,7 @@ fn where_something_is_like_it_the_likeness_counts() {
     let double = p.learn.threshold.nearest_share * p.learn.likeness_cap;
     assert_eq!(decided(double + 0.01), (Verdict::Unique(LandmarkId(1)), None));
     assert_eq!(decided(double - 0.01), (Verdict::Unique(LandmarkId(1)), None));
-    assert_eq!(decided(1e-6), (Verdict::Ambiguous(LandmarkId(1)), Some(MatchRefusal::Likeness)));
+    assert_eq!(decided(1e-6), (Verdict::Ambiguous(LandmarkId(1)), Some(MatchRefusal::Similarity)));
 }
 
 #[test]

@@ -46,7 +46,7 @@ fn gates_refuse_at_tau() {
     assert_eq!(both(alike, c, 0.99 * tight * h), None);
     assert_eq!(both(alike, 1.01 * tight * c, f64::NAN), Some(MatchRefusal::Correlation));
     for refused in [Some(least), Some(f64::NAN), None] {
-        assert_eq!(both(refused, 0.0, 0.0), Some(MatchRefusal::Likeness));
+        assert_eq!(both(refused, 0.0, 0.0), Some(MatchRefusal::Similarity));
     }
     // In doubt, what contradicts decides.
     let contradicted = |ratio: f64, share: f64| {
@@ -56,10 +56,10 @@ fn gates_refuse_at_tau() {
         judged.refusal(DistanceKind::Both, 1.0, v)
     };
     assert_eq!(contradicted(0.99, v.max_contradicting), None);
-    assert_eq!(contradicted(0.99, v.max_contradicting + 1e-9), Some(MatchRefusal::Contradiction));
-    assert_eq!(contradicted(0.99, f64::NAN), Some(MatchRefusal::Contradiction));
+    assert_eq!(contradicted(0.99, v.max_contradicting + 1e-9), Some(MatchRefusal::Mismatch));
+    assert_eq!(contradicted(0.99, f64::NAN), Some(MatchRefusal::Mismatch));
     assert_eq!(contradicted(v.doubtful_share - 1e-6, 1.0), None);
-    assert_eq!(contradicted(v.doubtful_share + 1e-6, 1.0), Some(MatchRefusal::Contradiction));
+    assert_eq!(contradicted(v.doubtful_share + 1e-6, 1.0), Some(MatchRefusal::Mismatch));
     // Beyond the frame it must agree; where it does so very well, neither distance is asked.
     let beyond = |likeness: f64, shown: f64, c: f64| {
         let mut judged = judged(c, f64::INFINITY, true);
@@ -69,9 +69,9 @@ fn gates_refuse_at_tau() {
     };
     let (least, enough) = (v.min_content_likeness, v.min_content);
     assert_eq!(beyond(least, enough, 0.0), None);
-    assert_eq!(beyond(least - 1e-9, 20.0, 0.0), Some(MatchRefusal::Content));
-    assert_eq!(beyond(1.0, enough - 1e-9, 0.0), Some(MatchRefusal::Content));
-    assert_eq!(beyond(f64::NAN, 20.0, 0.0), Some(MatchRefusal::Content));
+    assert_eq!(beyond(least - 1e-9, 20.0, 0.0), Some(MatchRefusal::LowContent));
+    assert_eq!(beyond(1.0, enough - 1e-9, 0.0), Some(MatchRefusal::LowContent));
+    assert_eq!(beyond(f64::NAN, 20.0, 0.0), Some(MatchRefusal::LowContent));
     let (sure, well) = (v.sure_content_likeness, v.sure_content);
     assert_eq!(beyond(sure, well, 2.0 * c), None);
     assert_eq!(beyond(sure - 1e-9, well, 2.0 * c), Some(MatchRefusal::Correlation));
@@ -111,11 +111,11 @@ fn a_frame_alone_is_no_landmark() {
         recognise(&image, &quad(oblique()), &set, DistanceKind::Both, &PARAMS)
     };
     assert_eq!(asked(Some(3)).verdict, Verdict::Unique(LandmarkId(9)));
-    for (inside, refusal) in [(None, MatchRefusal::Content), (Some(4), MatchRefusal::Content)] {
+    for (inside, refusal) in [(None, MatchRefusal::LowContent), (Some(4), MatchRefusal::LowContent)] {
         let v = asked(inside);
         assert_eq!(v.verdict, Verdict::Unknown, "{inside:?}");
         let told = v.candidates[0].refusal;
-        assert!(told == Some(refusal) || told == Some(MatchRefusal::Likeness), "{inside:?} {told:?}");
+        assert!(told == Some(refusal) || told == Some(MatchRefusal::Similarity), "{inside:?} {told:?}");
     }
 }
 
@@ -174,7 +174,7 @@ fn a_large_map_asks_for_more() {
     let large = among(10 * v.crowd);
     assert_eq!(
         (large.verdict, large.candidates[0].refusal),
-        (Verdict::Unknown, Some(MatchRefusal::Likeness))
+        (Verdict::Unknown, Some(MatchRefusal::Similarity))
     );
     // What is told is what decided.
     let told = &large.candidates[0];
