@@ -1,4 +1,4 @@
-//! `waymark gather`: let a robot gather views while it drives, look at what it brought home, accept or throw away.
+//! `waymark gather`: lets a robot gather views while it drives, shows its tracks, accepts or discards them.
 
 use super::{
     screen,
@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 /// `waymark gather`.
 #[derive(Debug, clap::Subcommand)]
 pub(crate) enum Command {
-    /// Begin: while the robot drives, views of flat four-sided things are kept. Prints the number of the gathering.
+    /// Start: while the robot drives, views of flat four-sided objects are stored. Prints the number of the gathering.
     Start {
         /// The robot.
         #[arg(long)]
@@ -28,7 +28,7 @@ pub(crate) enum Command {
         #[command(flatten)]
         at: At,
     },
-    /// End; what was gathered waits for a decision.
+    /// Stop; the tracks wait for a decision.
     Stop {
         /// Number of the gathering.
         gathering: i64,
@@ -40,31 +40,31 @@ pub(crate) enum Command {
         #[command(flatten)]
         at: At,
     },
-    /// What waits for a decision: views, place, gates.
+    /// Show the tracks that wait for a decision: views, place, gates.
     Show {
         /// Number of the gathering.
         gathering: i64,
-        /// Write a picture of each candidate here, NUMBER.png.
+        /// Write a picture of each track here, NUMBER.png.
         #[arg(long, value_name = "DIR")]
         pictures: Option<PathBuf>,
         #[command(flatten)]
         at: At,
     },
-    /// Make landmarks of candidates, and learn them.
+    /// Make landmarks of tracks, and learn them.
     Accept {
         /// Number of the gathering.
         gathering: i64,
-        /// NUMBER=NAME of each candidate; NUMBER alone for views of a landmark that is known.
+        /// NUMBER=NAME of each track; NUMBER alone for views of a known landmark.
         #[arg(required = true, value_parser = pick)]
         picks: Vec<AcceptedTrackBody>,
         #[command(flatten)]
         at: At,
     },
-    /// Throw candidates away.
+    /// Discard tracks.
     Discard {
         /// Number of the gathering.
         gathering: i64,
-        /// Numbers of the candidates.
+        /// Numbers of the tracks.
         #[arg(required = true)]
         candidates: Vec<u32>,
         #[command(flatten)]
@@ -90,11 +90,11 @@ fn pick(text: &str) -> Result<AcceptedTrackBody, String> {
 
 fn line(g: &Gathering) -> String {
     let of = g.landmark.as_deref().unwrap_or("whatever is new");
-    let state = if g.open { "goes on" } else { "ended" };
+    let state = if g.open { "open" } else { "ended" };
     format!("{}  {} with {}, of {of}: {}", g.id, state, g.robot, counted(g.counts.kept, "view"))
 }
 
-fn candidate_line(c: &TrackSummary) -> String {
+fn track_line(c: &TrackSummary) -> String {
     let views = counted(c.views.len() as u64, "view");
     let verdict = if c.passes { "passes every gate".to_owned() } else { c.details().join("; ") };
     let known = c.landmark.as_ref().map_or_else(String::new, |name| format!(" of {name}"));
@@ -123,7 +123,7 @@ pub(crate) async fn run(command: &Command) -> anyhow::Result<()> {
             if let Some(folder) = pictures {
                 draw(&maps, (&at.map, *gathering), &found, folder).await?;
             }
-            show(&at.server, &found, &found.iter().map(candidate_line).collect::<Vec<_>>().join("\n"))
+            show(&at.server, &found, &found.iter().map(track_line).collect::<Vec<_>>().join("\n"))
         }
         Command::Accept { gathering, picks, at } => accept(at, *gathering, picks).await,
         Command::Discard { gathering, candidates, at } => {
@@ -131,11 +131,7 @@ pub(crate) async fn run(command: &Command) -> anyhow::Result<()> {
             for candidate in candidates {
                 maps.discard_track(&at.map, *gathering, *candidate).await?;
             }
-            show(
-                &at.server,
-                candidates,
-                &format!("{} thrown away", counted(candidates.len() as u64, "candidate")),
-            )
+            show(&at.server, candidates, &format!("{} discarded", counted(candidates.len() as u64, "track")))
         }
     }
 }
@@ -163,8 +159,8 @@ async fn accept(at: &At, gathering: i64, picks: &[AcceptedTrackBody]) -> anyhow:
     let bar = screen::progress(1000, "learning");
     let job = match accepted.job.clone() {
         Some(job) => {
-            let told = |job: &Job| bar.set_position((job.progress * 1000.0) as u64);
-            maps.wait_for_job(job, LESSON_TIMEOUT, told).await?.message
+            let report = |job: &Job| bar.set_position((job.progress * 1000.0) as u64);
+            maps.wait_for_job(job, LESSON_TIMEOUT, report).await?.message
         }
         None => String::new(),
     };

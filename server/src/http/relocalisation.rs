@@ -8,7 +8,7 @@ use super::{
 };
 use crate::store::robots;
 use axum::{Json, extract::State};
-use engine::search::MissingCondition;
+use engine::relocalise::MissingCondition;
 use map::relocalise::{GridBeliefParams, PoseHypothesis};
 use protos::api::{MissingConditionBody, PoseHypothesisBody, Problem, RelocalisationStatus};
 use utoipa_axum::{router::OpenApiRouter, routes};
@@ -24,10 +24,10 @@ fn shown(PoseHypothesis { mass, pose }: &PoseHypothesis) -> PoseHypothesisBody {
 
 fn missing(need: MissingCondition) -> MissingConditionBody {
     match need {
-        MissingCondition::FewerPlaces => MissingConditionBody::FewerPlaces,
-        MissingCondition::AnotherLandmark => MissingConditionBody::AnotherLandmark,
-        MissingCondition::AgreeingSightings => MissingConditionBody::AgreeingSightings,
-        MissingCondition::NoOtherPlace => MissingConditionBody::NoOtherPlace,
+        MissingCondition::HigherProbability => MissingConditionBody::FewerPlaces,
+        MissingCondition::SecondLandmark => MissingConditionBody::AnotherLandmark,
+        MissingCondition::ConsistentObservations => MissingConditionBody::AgreeingSightings,
+        MissingCondition::NoRivalPose => MissingConditionBody::NoOtherPlace,
     }
 }
 
@@ -52,11 +52,11 @@ async fn hypotheses(
     Ok(Json(RelocalisationStatus {
         searching: true,
         map_version: Some(found.map_version),
-        hypotheses: found.modes.iter().map(shown).collect(),
+        hypotheses: found.hypotheses.iter().map(shown).collect(),
         entropy_nats: found.entropy_nats,
-        sightings: found.sightings,
+        sightings: found.observations,
         landmarks: found.landmarks.iter().filter_map(named).collect(),
-        needed: found.needed.into_iter().map(missing).collect(),
+        needed: found.missing.into_iter().map(missing).collect(),
         decided_above,
         map: Some(found.map),
     }))

@@ -1,4 +1,4 @@
-//! `waymark map build`: from a recording to a map.
+//! `waymark map build`: builds a map from a scan log.
 
 use super::LaserArgs;
 use crate::cli::{clock::Clock, screen};
@@ -38,7 +38,7 @@ impl Upload {
 /// `waymark map build`.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// The recording: a CARMEN log (FLASER or ROBOTLASER1 lines), numbered scans (`i dx dy dtheta r0 r1 ..`), or a
+    /// The scan log: a CARMEN log (FLASER or ROBOTLASER1 lines), numbered scans (`i dx dy dtheta r0 r1 ..`), or a
     /// Waymark recording; `.gz` is unpacked.
     #[arg(value_name = "LOG")]
     recording: PathBuf,
@@ -60,7 +60,7 @@ pub(crate) struct Args {
     upload: Upload,
 }
 
-/// A map and what it cost.
+/// A map and the time that it took.
 #[derive(Debug)]
 pub struct Built {
     /// The map.
@@ -111,18 +111,18 @@ pub(crate) async fn run(args: &Args) -> anyhow::Result<()> {
         std::fs::write(picture, map_svg::draw(&file, &recording.records))
             .with_context(|| picture.display().to_string())?;
     }
-    let way_m: f64 = map.path.windows(2).map(|p| p[0].between(&p[1]).position().norm()).sum();
+    let distance_m: f64 = map.path.windows(2).map(|p| p[0].between(&p[1]).position().norm()).sum();
     let faster = recording.duration_s().map(|d| d / seconds.max(1e-9));
     if args.json {
         let summary = json!({
-            "scans": map.path.len(), "key_poses": map.keys.len(), "way_m": way_m, "segments": map.walls.len(),
+            "scans": map.path.len(), "key_poses": map.keys.len(), "way_m": distance_m, "segments": map.walls.len(),
             "loops": map.loops.len(), "loops_refused": map.refused, "seconds": seconds,
             "times_faster_than_recorded": faster,
         });
         screen::say(&summary.to_string());
     } else {
         screen::say(&format!(
-            "{} scans over {way_m:.0} m: {} key poses, {} loops closed, {} refused, {} wall segments; {seconds:.1} s{}",
+            "{} scans over {distance_m:.0} m: {} key poses, {} loops closed, {} refused, {} wall segments; {seconds:.1} s{}",
             map.path.len(),
             map.keys.len(),
             map.loops.len(),
