@@ -1,6 +1,6 @@
-//! Encoded bytes in, checked grey image out, within limits of bytes and pixels. The only way into the decoders: the
-//! size is read from the header and checked before any pixel is unpacked, and no metadata is looked at. JPEG goes
-//! straight to luma; colours of PNG are weighed the way JPEG weighs them, so both give the same grey.
+//! Decodes images. In: encoded bytes. Out: a checked grey image within limits of bytes and pixels. Nothing else calls the
+//! decoders: the size is read from the header and checked before any pixel is unpacked, and metadata is ignored. JPEG gives
+//! luma directly; the colours of PNG are weighted as JPEG weights them, so that both give the same grey.
 
 use image::{ColorType, ImageDecoder, Limits, codecs::png::PngDecoder};
 use protos::{CheckedFrame, Code, Rejection, convert::Encoding};
@@ -37,7 +37,7 @@ impl ImageLimits {
     pub const UPLOAD: Self = Self { bytes: 16 << 20, pixels: vision::frame::MAX_AREA_PX };
 }
 
-/// The grey image of a frame: of the claimed encoding and the claimed size, or refused.
+/// The grey image of a frame. Errors: over the limits, not of the claimed encoding and size, or not decodable.
 pub fn decode_frame(frame: &CheckedFrame, limits: ImageLimits) -> Result<GrayImage, Rejection> {
     let claimed = (frame.width_px as usize, frame.height_px as usize);
     check_bytes(&frame.image, limits)?;
@@ -49,7 +49,7 @@ pub fn decode_frame(frame: &CheckedFrame, limits: ImageLimits) -> Result<GrayIma
     }
 }
 
-/// The grey image of an uploaded JPEG or PNG file, told apart by its first bytes.
+/// The grey image of an uploaded file, JPEG or PNG by its first bytes. Errors: over the limits, or not decodable.
 pub fn decode_upload(bytes: &[u8], limits: ImageLimits) -> Result<GrayImage, Rejection> {
     check_bytes(bytes, limits)?;
     match sniff(bytes) {
@@ -89,7 +89,7 @@ fn jpeg(bytes: &[u8], claimed: Option<(usize, usize)>, limits: ImageLimits) -> R
     if matches!(decoder.input_colorspace(), Some(ColorSpace::YCbCr | ColorSpace::Luma)) {
         return gray(size, decoder.decode().map_err(|e| bad("JPEG", &e))?);
     }
-    // Rare colour spaces (RGB, CMYK) by way of RGB.
+    // Rare colour spaces (RGB, CMYK) go through RGB.
     decoder.set_options(options.jpeg_set_out_colorspace(ColorSpace::RGB));
     let rgb = decoder.decode().map_err(|e| bad("JPEG", &e))?;
     gray(size, rgb.chunks_exact(3).map(|p| luma(p[0], p[1], p[2])).collect())
@@ -99,7 +99,7 @@ fn png(bytes: &[u8], claimed: Option<(usize, usize)>, limits: ImageLimits) -> Re
     if sniff(bytes) != Some(Encoding::Png) {
         return Err(Rejection::new(Code::WrongEncoding, "image", "claimed as PNG, but it is none"));
     }
-    // Width and height of IHDR, before the decoder reserves anything.
+    // Width and height of IHDR are checked before the decoder allocates anything.
     let word = |at: usize| bytes.get(at..at + 4).and_then(|w| w.try_into().ok()).map(u32::from_be_bytes);
     let (Some(width), Some(height)) = (word(16), word(20)) else {
         return Err(bad("PNG", &"it ends within its header"));
@@ -182,7 +182,7 @@ fn check_claim(size: (usize, usize), claimed: Option<(usize, usize)>) -> Result<
 }
 
 fn bad(kind: &str, error: &dyn std::fmt::Display) -> Rejection {
-    // Some of the decoders' words end with a line break; a refusal is one line everywhere.
+    // Some messages of the decoders end with a line break; a refusal is one line.
     let words = error.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
     Rejection::new(Code::BadImage, "image", format!("{kind} cannot be decoded: {words}"))
 }

@@ -1,5 +1,5 @@
-//! Which quad of a photograph is meant, when nobody says: the only one, or the one that is far larger than any other.
-//! In: the detector's quads. Out: one of them, or those between which a person must choose.
+//! The dominant quad of a photograph: the only one, or the one that is far larger than any other. In: the detector's quads.
+//! Out: one of them, or those between which a person must choose.
 
 use nalgebra::Matrix2;
 use vision::{
@@ -10,58 +10,59 @@ use vision::{
     trace::NoTrace,
 };
 
-/// So many times larger than any other quad is beyond doubt.
-const FAR_LARGER: f64 = 3.0;
-/// A larger photograph is made smaller for the search: the detector is made for robots' cameras, and its time is
-/// bounded by this.
-const SEARCH_MAX_PX: usize = 1_920 * 1_200;
-/// Quads that share more of their union than this show the same thing.
-const SAME_IOU: f64 = 0.5;
+/// A dominant quad has this many times the area of any other.
+const DOMINANT_AREA_RATIO: f64 = 3.0;
+/// A larger photograph is reduced before detection: the detector is made for robots' cameras, and this bounds its time.
+const MAX_DETECT_PX: usize = 1_920 * 1_200;
+/// Quads with a greater intersection over union show the same object.
+const SAME_OBJECT_IOU: f64 = 0.5;
 
-/// A whole quad of a photograph.
+/// A quad of a photograph, wholly in the image.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Whole {
-    /// Its corners.
+pub struct WholeQuad {
+    /// Its corners, px of the photograph.
     pub corners_px: Corners,
-    /// Their covariance by the detector, in the same pixels.
+    /// Their covariances by the detector, px^2.
     pub covariance_px2: [Matrix2<f64>; 4],
 }
 
-/// The quads of a photograph, largest first, in its own pixels: four sides seen, none cut off by the image border.
-pub fn whole_quads(image: &GrayImage, p: &Params) -> Vec<Whole> {
-    let factor = ((image.width() * image.height()) as f64 / SEARCH_MAX_PX as f64).sqrt().ceil() as usize;
+/// The quads of a photograph, largest first, px of the photograph: each with four detected sides, none clipped by the image
+/// border.
+pub fn whole_quads(image: &GrayImage, p: &Params) -> Vec<WholeQuad> {
+    let factor = ((image.width() * image.height()) as f64 / MAX_DETECT_PX as f64).sqrt().ceil() as usize;
     let quads = if factor > 1 {
-        detect(&smaller(image, factor), &p.detect, &mut NoTrace)
+        detect(&reduced(image, factor), &p.detect, &mut NoTrace)
     } else {
         detect(image, &p.detect, &mut NoTrace)
     };
     let whole = |q: &&Quad| q.kind == QuadKind::Full && !q.side_clipped.contains(&true);
-    let mut found: Vec<Whole> =
+    let mut found: Vec<WholeQuad> =
         quads.iter().filter(whole).filter_map(|q| enlarged(q, factor.max(1))).collect();
     found.sort_by(|a, b| b.corners_px.area_px2().total_cmp(&a.corners_px.area_px2()));
     found
 }
 
-/// The one quad that is meant, of quads sorted by falling area.
+/// The dominant one of quads that are sorted by falling area, if there is one.
 pub fn dominant(quads: &[Corners]) -> Option<&Corners> {
     let first = quads.first()?;
-    let rival = quads[1..].iter().find(|q| !inside(q, first) && iou(q.points(), first.points()) < SAME_IOU);
-    rival.is_none_or(|r| first.area_px2() >= FAR_LARGER * r.area_px2()).then_some(first)
+    let rival =
+        quads[1..].iter().find(|q| !inside(q, first) && iou(q.points(), first.points()) < SAME_OBJECT_IOU);
+    rival.is_none_or(|r| first.area_px2() >= DOMINANT_AREA_RATIO * r.area_px2()).then_some(first)
 }
 
-/// The quads that show something else than `taken`.
+/// The quads that do not overlap `taken`.
 pub fn others<'a>(quads: &'a [Corners], taken: &Corners) -> impl Iterator<Item = &'a Corners> {
     let taken = *taken;
     quads.iter().filter(move |q| iou(q.points(), taken.points()) < 1e-3)
 }
 
-/// Every corner of `inner` lies in `outer`: part of the same picture.
+/// Whether every corner of `inner` lies in `outer`: then it is part of the same picture.
 fn inside(inner: &Corners, outer: &Corners) -> bool {
     inner.points().iter().all(|c| vision::geometry::polygon::contains(outer.points(), c, 1.0))
 }
 
-/// Means of `factor` x `factor` pixels; a remainder at the right and the bottom is left out.
-fn smaller(image: &GrayImage, factor: usize) -> GrayImage {
+/// The image reduced by means of `factor` x `factor` pixels; a remainder at the right and the bottom is left out.
+fn reduced(image: &GrayImage, factor: usize) -> GrayImage {
     GrayImage::from_fn(image.width() / factor, image.height() / factor, |u, v| {
         let rows = (v * factor..(v + 1) * factor).map(|row| &image.data()[row * image.width()..]);
         let sum: usize = rows
@@ -71,12 +72,13 @@ fn smaller(image: &GrayImage, factor: usize) -> GrayImage {
     })
 }
 
-/// Pixel centres are at whole numbers: the centre of a block lies between its pixels.
-fn enlarged(quad: &Quad, factor: usize) -> Option<Whole> {
+/// A quad of the reduced image in px of the photograph. Pixel centres are integers, so a block's centre lies between its
+/// pixels.
+fn enlarged(quad: &Quad, factor: usize) -> Option<WholeQuad> {
     let scale = factor as f64;
     let corners_px =
         Corners::new(quad.corners_px.points().map(|c| c.map(|x| (x + 0.5) * scale - 0.5))).ok()?;
-    Some(Whole { corners_px, covariance_px2: quad.corner_covariance_px2.map(|c| c * scale * scale) })
+    Some(WholeQuad { corners_px, covariance_px2: quad.corner_covariance_px2.map(|c| c * scale * scale) })
 }
 
 #[cfg(test)]
@@ -92,10 +94,10 @@ mod tests {
         let large = square(0.0, 300.0);
         assert_eq!(dominant(&[]), None);
         assert_eq!(dominant(&[large]), Some(&large));
-        // Three times the area, and just not.
+        // Three times the area, and slightly less.
         assert_eq!(dominant(&[large, square(400.0, 173.2)]), Some(&large));
         assert_eq!(dominant(&[large, square(400.0, 173.3)]), None);
-        // An inner frame, and nearly the same border, are the same thing.
+        // An inner border, and nearly the same border, belong to the same object.
         let inner = Corners::try_from([[20.0, 20.0], [280.0, 20.0], [280.0, 280.0], [20.0, 280.0]]).unwrap();
         assert_eq!(dominant(&[large, inner, square(10.0, 295.0)]), Some(&large));
         assert_eq!(others(&[large, inner, square(400.0, 50.0)], &large).count(), 1);
@@ -115,8 +117,8 @@ mod tests {
         for (found, true_px) in [(tl.x, 599.5), (tl.y, 499.5), (br.x, 1_799.5), (br.y, 1_699.5)] {
             assert!((found - true_px).abs() < 2.0, "{found} instead of {true_px}");
         }
-        // So are their covariances: two pixels for each.
-        let halves = detect(&smaller(&image, 2), &Params::default().detect, &mut NoTrace);
+        // The covariances are enlarged, too: two pixels for each.
+        let halves = detect(&reduced(&image, 2), &Params::default().detect, &mut NoTrace);
         let half = halves.iter().max_by(|a, b| a.corners_px.area_px2().total_cmp(&b.corners_px.area_px2()));
         let half = half.unwrap().corner_covariance_px2;
         assert!((quads[0].covariance_px2[0] - half[0] * 4.0).norm() < 1e-12);

@@ -1,9 +1,9 @@
-//! Which start of a robot's software (epoch) speaks for the robot. In: liveliness tokens and the epoch of every message,
-//! with the time of receipt. Out: the message is admitted, or refused because another epoch of the robot is live. Knows
-//! no transport; time is passed in.
+//! Decides which epoch of a robot is live. In: liveliness tokens and the epoch of every message, with the time of receipt.
+//! Out: the message is admitted, or refused because another epoch of the robot is live. Knows no transport; time is passed
+//! in.
 //!
 //! An epoch is live while its liveliness token is there, or for [`MESSAGE_LIVE`] after its last message. While one epoch of
-//! a robot is live, every other one is refused. When its token goes, it is over at once, and the next one is admitted.
+//! a robot is live, every other one is refused. When its token goes, the epoch ends at once, and the next one is admitted.
 
 use protos::{Code, Name, Rejection};
 use std::{
@@ -12,34 +12,34 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// An epoch without a liveliness token is live for so long after its last message: the longest wait of a robot that was
-/// started again. Longer than zenoh's lease (2 s), after which the token of a lost link goes.
+/// An epoch without a liveliness token is live for this long after its last message: the longest wait of a restarted robot.
+/// Longer than zenoh's lease (2 s), after which the token of a lost link goes.
 pub const MESSAGE_LIVE: Duration = Duration::from_secs(3);
 /// Liveliness tokens remembered of one robot; more are ignored.
 pub const MAX_TOKENS_PER_ROBOT: usize = 8;
-/// Epochs of one robot whose end is remembered, to tell late messages from a robot that came back.
+/// Epochs of one robot whose end is remembered: late messages of an ended epoch are not a robot that came back.
 pub const MAX_ENDED: usize = 8;
-/// Robots that are followed besides the registered ones; the one longest without a token or message gives way.
+/// Robots beyond the registered ones; a further one replaces the one with the oldest token or message.
 pub const MAX_UNREGISTERED: usize = 1024;
-/// Robots that are followed in all.
-pub const MAX_FOLLOWED: usize = 10_000 + MAX_UNREGISTERED;
-/// A conflict is shown for so long after the last refused message.
+/// Robots in all.
+pub const MAX_TRACKED_ROBOTS: usize = 10_000 + MAX_UNREGISTERED;
+/// A conflict is shown for this long after the last refused message.
 pub const CONFLICT_SHOWN: Duration = Duration::from_secs(10);
-/// A conflict is logged once in so long for each robot.
+/// Shortest time between two log entries about the conflict of a robot.
 pub const CONFLICT_LOGGED: Duration = Duration::from_secs(10);
 
-/// A second epoch speaks under the name of a robot while the first is live.
+/// A second epoch sends under the name of a robot while the first is live.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Conflict {
-    /// The epoch that was refused last.
+    /// The epoch that was last refused.
     pub epoch: u64,
     /// Messages refused since the conflict began.
     pub refused: u64,
-    /// Milliseconds since the last of them.
+    /// Time since the last of them, ms.
     pub last_ms: u64,
 }
 
-/// What is known of a robot's software.
+/// The epochs of a robot now.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Status {
     /// It has a liveliness token, or sent a message within [`MESSAGE_LIVE`].
@@ -57,21 +57,21 @@ struct Refused {
     last: Instant,
 }
 
-/// One robot.
+/// The epochs of one robot.
 #[derive(Debug)]
-struct Owner {
-    /// Tokens that are there; those of older clients name no epoch.
+struct RobotEpochs {
+    /// Present tokens; those of older clients name no epoch.
     tokens: Vec<Option<u64>>,
-    /// The epoch that speaks for the robot, and when it was last heard of.
+    /// The last live epoch, and the time of its last token or message.
     current: Option<(u64, Instant)>,
-    /// Epochs that spoke for it before, and when that ended; the latest last.
+    /// Earlier epochs and when each ended; the latest last.
     ended: VecDeque<(u64, Instant)>,
     refused: Option<Refused>,
     logged: Option<Instant>,
-    heard: Instant,
+    last_heard: Instant,
 }
 
-impl Owner {
+impl RobotEpochs {
     fn new(now: Instant) -> Self {
         Self {
             tokens: Vec::new(),
@@ -79,7 +79,7 @@ impl Owner {
             ended: VecDeque::new(),
             refused: None,
             logged: None,
-            heard: now,
+            last_heard: now,
         }
     }
 
@@ -87,7 +87,7 @@ impl Owner {
         self.tokens.contains(&Some(epoch))
     }
 
-    /// The epoch that speaks for the robot, if it is live.
+    /// The live epoch.
     fn live(&self, now: Instant) -> Option<u64> {
         let (epoch, last) = self.current?;
         let recent = now.saturating_duration_since(last) < MESSAGE_LIVE;
@@ -113,7 +113,7 @@ impl Owner {
         }
     }
 
-    /// Whether a message of this epoch may still be on its way from before the epoch ended.
+    /// Whether a message of this epoch may have been sent before the epoch ended.
     fn is_straggler(&self, epoch: u64, now: Instant) -> bool {
         let late = |(ended, at): &(u64, Instant)| {
             *ended == epoch && now.saturating_duration_since(*at) < MESSAGE_LIVE
@@ -121,7 +121,7 @@ impl Owner {
         !self.has_token(epoch) && self.ended.iter().any(late)
     }
 
-    /// Counts a message that another live epoch keeps out; the count so far, if it is to be logged.
+    /// Counts a message that is refused because of the live epoch; gives the count if it is to be logged.
     fn refuse(&mut self, epoch: u64, now: Instant) -> Option<u64> {
         let shown = |r: &Refused| now.saturating_duration_since(r.last) < CONFLICT_SHOWN;
         let count = self.refused.filter(shown).map_or(0, |r| r.count) + 1;
@@ -136,46 +136,47 @@ impl Owner {
 
 /// The live epochs of all robots.
 #[derive(Debug, Default)]
-pub struct Epochs(Mutex<BTreeMap<Name, Owner>>);
+pub struct Epochs(Mutex<BTreeMap<Name, RobotEpochs>>);
 
 impl Epochs {
     /// Admits a message of a registered robot, or refuses it with [`Code::EpochConflict`] because another epoch is live, or
     /// with [`Code::NotNewer`] because its own ended less than [`MESSAGE_LIVE`] ago.
     pub fn admit(&self, robot: &Name, epoch: u64, now: Instant) -> Result<(), Rejection> {
-        let mut owners = self.lock();
-        if owners.len() >= MAX_FOLLOWED && !owners.contains_key(robot) {
-            // Names that were registered once and are not any more.
-            let oldest = owners.iter().min_by_key(|(_, owner)| owner.heard).map(|(name, _)| name.clone());
-            oldest.map(|name| owners.remove(&name));
+        let mut robots = self.lock();
+        if robots.len() >= MAX_TRACKED_ROBOTS && !robots.contains_key(robot) {
+            // The list can only be full of names that are not registered any more.
+            let oldest =
+                robots.iter().min_by_key(|(_, epochs)| epochs.last_heard).map(|(name, _)| name.clone());
+            oldest.map(|name| robots.remove(&name));
         }
-        let owner = owners.entry(robot.clone()).or_insert_with(|| Owner::new(now));
-        owner.heard = now;
-        if let Some((current, last)) = &mut owner.current
+        let epochs = robots.entry(robot.clone()).or_insert_with(|| RobotEpochs::new(now));
+        epochs.last_heard = now;
+        if let Some((current, last)) = &mut epochs.current
             && *current == epoch
         {
             *last = now;
             return Ok(());
         }
-        let live = owner.live(now);
-        if owner.is_straggler(epoch, now) {
+        let live = epochs.live(now);
+        if epochs.is_straggler(epoch, now) {
             return Err(Rejection::new(Code::NotNewer, "epoch", format!("epoch {epoch} is over")));
         }
         let Some(live) = live else {
-            owner.begin(epoch, now);
+            epochs.begin(epoch, now);
             return Ok(());
         };
-        if let Some(refused) = owner.refuse(epoch, now) {
+        if let Some(refused) = epochs.refuse(epoch, now) {
             tracing::warn!(
                 %robot, live_epoch = live, refused_epoch = epoch, refused,
-                "two programs speak under the name of one robot; messages of the later one are refused"
+                "epoch_conflict: two programs use the name of one robot; messages of the later one are refused"
             );
         }
         let detail = format!("epoch {live} of robot {robot} is live; two programs use the robot's name");
         Err(Rejection::new(Code::EpochConflict, "epoch", detail))
     }
 
-    /// A liveliness token appeared or went; `epoch` is absent in the tokens of older clients. `is_registered` tells which
-    /// robots are, so that others cannot crowd them out. Whether the robot came (`true`) or went (`false`) by that.
+    /// A liveliness token appeared or went; `epoch` is absent in the tokens of older clients. Names that are not registered
+    /// (`is_registered`) never replace registered ones. `Some(true)` if the robot came by that, `Some(false)` if it went.
     pub fn token(
         &self,
         robot: &Name,
@@ -183,73 +184,73 @@ impl Epochs {
         now: Instant,
         is_registered: impl Fn(&Name) -> bool,
     ) -> Option<bool> {
-        let mut owners = self.lock();
-        if !owners.contains_key(robot) {
+        let mut robots = self.lock();
+        if !robots.contains_key(robot) {
             if !appeared {
                 return None;
             }
             if !is_registered(robot) {
-                make_room(&mut owners, is_registered);
+                make_room(&mut robots, is_registered);
             }
         }
-        let owner = owners.entry(robot.clone()).or_insert_with(|| Owner::new(now));
-        owner.heard = now;
-        let before = owner.tokens.len();
+        let epochs = robots.entry(robot.clone()).or_insert_with(|| RobotEpochs::new(now));
+        epochs.last_heard = now;
+        let before = epochs.tokens.len();
         if appeared {
-            if before < MAX_TOKENS_PER_ROBOT && !owner.tokens.contains(&epoch) {
-                owner.tokens.push(epoch);
+            if before < MAX_TOKENS_PER_ROBOT && !epochs.tokens.contains(&epoch) {
+                epochs.tokens.push(epoch);
             }
-            if let Some(epoch) = epoch.filter(|_| owner.live(now).is_none()) {
-                owner.begin(epoch, now);
+            if let Some(epoch) = epoch.filter(|_| epochs.live(now).is_none()) {
+                epochs.begin(epoch, now);
             }
         } else {
-            owner.tokens.retain(|token| *token != epoch);
-            if owner.current.is_some_and(|(current, _)| Some(current) == epoch) {
-                owner.end_current(now);
+            epochs.tokens.retain(|token| *token != epoch);
+            if epochs.current.is_some_and(|(current, _)| Some(current) == epoch) {
+                epochs.end_current(now);
             }
         }
-        match (before, owner.tokens.len()) {
+        match (before, epochs.tokens.len()) {
             (0, 1..) => Some(true),
             (1.., 0) => Some(false),
             _ => None,
         }
     }
 
-    /// The epoch that spoke last for a robot and was not ended since.
+    /// The last live epoch of a robot, if it has not ended.
     pub fn current(&self, robot: &Name) -> Option<u64> {
         self.lock().get(robot)?.current.map(|(epoch, _)| epoch)
     }
 
-    /// What is known of a robot's software now.
+    /// The epochs of a robot now.
     pub fn status(&self, robot: &Name, now: Instant) -> Status {
-        let owners = self.lock();
-        let Some(owner) = owners.get(robot) else { return Status::default() };
-        let epoch = owner.live(now);
-        let conflict = owner.refused.and_then(|r| {
+        let robots = self.lock();
+        let Some(epochs) = robots.get(robot) else { return Status::default() };
+        let epoch = epochs.live(now);
+        let conflict = epochs.refused.and_then(|r| {
             let ago = now.saturating_duration_since(r.last);
             let last_ms = u64::try_from(ago.as_millis()).unwrap_or(u64::MAX);
             (ago < CONFLICT_SHOWN).then_some(Conflict { epoch: r.epoch, refused: r.count, last_ms })
         });
-        Status { alive: epoch.is_some() || !owner.tokens.is_empty(), epoch, conflict }
+        Status { alive: epoch.is_some() || !epochs.tokens.is_empty(), epoch, conflict }
     }
 
-    fn lock(&self) -> MutexGuard<'_, BTreeMap<Name, Owner>> {
+    fn lock(&self) -> MutexGuard<'_, BTreeMap<Name, RobotEpochs>> {
         // No code inside can panic halfway through a change.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-/// Room for one more robot that is not registered.
-fn make_room(owners: &mut BTreeMap<Name, Owner>, is_registered: impl Fn(&Name) -> bool) {
-    if owners.len() < MAX_UNREGISTERED {
+/// Makes room for one more robot that is not registered.
+fn make_room(robots: &mut BTreeMap<Name, RobotEpochs>, is_registered: impl Fn(&Name) -> bool) {
+    if robots.len() < MAX_UNREGISTERED {
         return;
     }
-    let unknown = || owners.iter().filter(|(name, _)| !is_registered(name));
-    if unknown().count() < MAX_UNREGISTERED {
+    let unregistered = || robots.iter().filter(|(name, _)| !is_registered(name));
+    if unregistered().count() < MAX_UNREGISTERED {
         return;
     }
-    let oldest = unknown().min_by_key(|(_, owner)| owner.heard).map(|(name, _)| name.clone());
-    oldest.map(|name| owners.remove(&name));
+    let oldest = unregistered().min_by_key(|(_, epochs)| epochs.last_heard).map(|(name, _)| name.clone());
+    oldest.map(|name| robots.remove(&name));
 }
 
 #[cfg(test)]
@@ -308,7 +309,7 @@ mod tests {
         world.message(7, 0).unwrap();
         assert_eq!(world.message(8, live - 1), Err(Code::EpochConflict));
         assert_eq!(world.message(8, live), Ok(()));
-        assert_eq!(world.status(live).conflict, None, "it is no stranger any more");
+        assert_eq!(world.status(live).conflict, None, "it is the live one now");
         // The first one's late messages are refused, and are no conflict.
         assert_eq!(world.message(7, live + 10), Err(Code::NotNewer));
         assert_eq!(world.status(live + 10).conflict, None);
@@ -321,7 +322,7 @@ mod tests {
         let world = World::new();
         assert_eq!(world.token(Some(7), true, 0), Some(true));
         assert_eq!(world.message(8, 100_000), Err(Code::EpochConflict), "silent, but there");
-        assert_eq!(world.token(Some(8), true, 100_000), None, "the robot was there before");
+        assert_eq!(world.token(Some(8), true, 100_000), None, "the robot was present before");
         assert_eq!(world.message(8, 100_001), Err(Code::EpochConflict));
         assert_eq!(world.token(Some(7), false, 100_002), None);
         assert_eq!(world.epochs.current(&name("r1")), None);
@@ -371,13 +372,13 @@ mod tests {
     #[test]
     fn robots_are_bounded() {
         let world = World::new();
-        for i in 0..MAX_FOLLOWED as u64 + 5 {
+        for i in 0..MAX_TRACKED_ROBOTS as u64 + 5 {
             world.epochs.admit(&name(&format!("robot-{i}")), 1, world.at(i)).unwrap();
         }
-        assert_eq!(world.epochs.lock().len(), MAX_FOLLOWED);
+        assert_eq!(world.epochs.lock().len(), MAX_TRACKED_ROBOTS);
     }
 
-    /// Fault F11: every name was kept for ever. Unregistered names neither grow the list nor crowd out a registered robot.
+    /// Names that are not registered neither grow the list without bound nor replace a registered robot.
     #[test]
     fn names_that_nobody_registered_are_bounded() {
         let world = World::new();

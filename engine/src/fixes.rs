@@ -1,5 +1,5 @@
-//! The robot's pose by the landmarks that a frame shows. In: analysed quads, the map, extrinsics, an optional prior pose. Out: a
-//! fix, or why there is none.
+//! The robot's pose by the landmarks that a frame shows. In: analysed quads, the map, extrinsics, an optional prior pose.
+//! Out: a fix (map frame, m and rad, with covariance), or why there is none.
 
 use super::snapshot::MapSnapshot;
 use map::{
@@ -23,9 +23,9 @@ pub enum NoFix {
     LandmarkNotPlaced,
     /// All of the placed landmarks are quarantined.
     LandmarkQuarantined,
-    /// Where the camera sits on the robot is not known.
+    /// The camera's extrinsics are not known.
     NoExtrinsics,
-    /// All observations were left out as unreliable.
+    /// Every observation was dropped as unreliable.
     WeakObservation,
     /// Several poses are left.
     Ambiguous,
@@ -33,7 +33,7 @@ pub enum NoFix {
     Degenerate,
     /// The re-projection error is above its gate for every pose on the floor.
     GateReprojection,
-    /// The prior pose rules every solution out.
+    /// Every solution was gated by the prior pose.
     GatePrior,
     /// The robot would stand behind the wall.
     GateBehindWall,
@@ -72,21 +72,21 @@ impl From<&FixRefusal> for NoFix {
     }
 }
 
-/// The landmarks that were recognised without doubt, with their poses.
-pub fn unique_landmarks(facts: &FrameAnalysis) -> Vec<(LandmarkId, &LandmarkPose)> {
+/// The landmarks with verdict unique, with their poses (camera frame).
+pub fn unique_landmarks(analysis: &FrameAnalysis) -> Vec<(LandmarkId, &LandmarkPose)> {
     let unique = |q: &QuadAnalysis| match q.recognition.as_ref()?.verdict {
         Verdict::Unique(id) => Some(id),
         Verdict::Unknown | Verdict::Ambiguous(_) => None,
     };
-    facts.quads.iter().filter_map(|q| Some((unique(q)?, q.pose.as_ref().ok()?))).collect()
+    analysis.quads.iter().filter_map(|q| Some((unique(q)?, q.pose.as_ref().ok()?))).collect()
 }
 
-/// Observations of the landmarks that were recognised, posed, and have a place that is trusted; or why there are none.
-pub fn sightings<'a>(
-    facts: &'a FrameAnalysis,
+/// Observations of the landmarks that were recognised, posed, and have a trusted place; or why there are none.
+pub fn landmark_observations<'a>(
+    analysis: &'a FrameAnalysis,
     map: &'a MapSnapshot,
 ) -> Result<Vec<LandmarkObservation<'a>>, NoFix> {
-    let posed = unique_landmarks(facts);
+    let posed = unique_landmarks(analysis);
     if posed.is_empty() {
         return Err(NoFix::NothingRecognised);
     }
@@ -102,24 +102,24 @@ pub fn sightings<'a>(
     if trusted.is_empty() { Err(NoFix::LandmarkQuarantined) } else { Ok(trusted) }
 }
 
-/// The pose of the robot by observations, one or several; or why there is none.
+/// The pose of the robot by observations, one or several; or why there is none. `prior` gates.
 pub fn robot_fixes(
-    sightings: &[LandmarkObservation<'_>],
-    mounting: Option<&CameraExtrinsics>,
+    observations: &[LandmarkObservation<'_>],
+    extrinsics: Option<&CameraExtrinsics>,
     prior: Option<&Pose2Covariance>,
 ) -> Result<FixResult, NoFix> {
-    let Some(mounting) = mounting else { return Err(NoFix::NoExtrinsics) };
-    if sightings.is_empty() {
+    let Some(extrinsics) = extrinsics else { return Err(NoFix::NoExtrinsics) };
+    if observations.is_empty() {
         return Err(NoFix::WeakObservation);
     }
-    robot_pose(sightings, mounting, prior, &LocaliseParams::default()).map_err(|error| {
-        tracing::error!(%error, "checked inputs were refused by localisation");
+    robot_pose(observations, extrinsics, prior, &LocaliseParams::default()).map_err(|error| {
+        tracing::error!(%error, "localisation_refused_checked_input");
         NoFix::Degenerate
     })
 }
 
-/// The one pose that is left, or why there is none.
-pub fn only(fix: &FixResult) -> Result<Fix, NoFix> {
+/// The fix, if there is exactly one; or why there is none.
+pub fn single_fix(fix: &FixResult) -> Result<Fix, NoFix> {
     match fix {
         FixResult::Fixed(fix) => Ok((**fix).clone()),
         FixResult::Ambiguous(_) => Err(NoFix::Ambiguous),
@@ -129,9 +129,9 @@ pub fn only(fix: &FixResult) -> Result<Fix, NoFix> {
 
 /// The one pose of the robot by observations, or why there is none.
 pub fn robot_fix(
-    sightings: &[LandmarkObservation<'_>],
-    mounting: Option<&CameraExtrinsics>,
+    observations: &[LandmarkObservation<'_>],
+    extrinsics: Option<&CameraExtrinsics>,
     prior: Option<&Pose2Covariance>,
 ) -> Result<Fix, NoFix> {
-    only(&robot_fixes(sightings, mounting, prior)?)
+    single_fix(&robot_fixes(observations, extrinsics, prior)?)
 }

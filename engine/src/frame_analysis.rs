@@ -1,5 +1,5 @@
-//! A frame through the pipeline of `vision`, with the times of its stages. In: image, camera, a version of the map. Out: quads
-//! with verdicts and poses of landmarks.
+//! A frame through the pipeline of `vision`, with the times of its stages. In: image, camera, a version of the map. Out:
+//! quads with verdicts and landmark poses.
 
 use super::snapshot::MapSnapshot;
 use protos::v1;
@@ -51,14 +51,14 @@ pub fn analyse_frame(
     times: &mut StageTimes,
 ) -> FrameAnalysis {
     let landmarks = LandmarkDatabase { models: &map.models, sizes: &map.sizes, kind: map.distance };
-    // Taken out while in use: a panic leaves none behind that is half written.
+    // Taken out while in use: a panic leaves no half-written pipeline behind.
     let mut pipeline = PIPELINE.take();
-    let facts = pipeline.analyse(image, camera, landmarks, &map.params, times);
+    let analysis = pipeline.analyse(image, camera, landmarks, &map.params, times);
     PIPELINE.set(pipeline);
-    facts
+    analysis
 }
 
 thread_local! {
-    /// What the pipeline keeps from frame to frame; each worker thread its own.
+    /// Buffers that the pipeline reuses from frame to frame; one pipeline a worker thread.
     static PIPELINE: RefCell<Pipeline> = RefCell::default();
 }

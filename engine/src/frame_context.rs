@@ -1,18 +1,18 @@
-//! What a frame is judged by.
+//! A frame with what its evaluation needs.
 
 use super::snapshot::MapSnapshot;
 use map::{extrinsics::CameraExtrinsics, pose2::Pose2Covariance};
 use vision::{frame::Intrinsics, pipeline::FrameAnalysis};
 
-/// An analysed frame with what is known of its camera and its robot.
+/// An analysed frame with its map, its camera and its robot's own prior pose.
 #[derive(Debug, Clone, Copy)]
 pub struct FrameContext<'a> {
     /// Its quads with verdicts.
-    pub facts: &'a FrameAnalysis,
+    pub analysis: &'a FrameAnalysis,
     /// The map it was compared with.
     pub map: &'a MapSnapshot,
     /// `robot_from_camera`, where it is known.
-    pub mounting: Option<&'a CameraExtrinsics>,
+    pub extrinsics: Option<&'a CameraExtrinsics>,
     /// Intrinsics of the camera, where they are known.
     pub camera: Option<&'a Intrinsics>,
     /// Width and height of the image, px.

@@ -1,4 +1,4 @@
-//! Where frames of robots that gather training views go, besides being answered.
+//! A second consumer of analysed frames: robots that gather training views.
 
 use crate::{slots::SlotKey, snapshot::MapSnapshot};
 use map::pose2::Pose2Covariance;
@@ -6,7 +6,7 @@ use protos::CheckedFrame;
 use std::{fmt::Debug, sync::Arc};
 use vision::{frame::GrayImage, pipeline::QuadAnalysis};
 
-/// What a worker found in a frame.
+/// A frame after its analysis.
 #[derive(Debug)]
 pub struct AnalysedFrame {
     /// The decoded picture.
@@ -15,11 +15,11 @@ pub struct AnalysedFrame {
     pub quads: Vec<QuadAnalysis>,
     /// The version of the map they were recognised against.
     pub map: Arc<MapSnapshot>,
-    /// `map_from_robot` at the frame: as the robot states it, or the fused pose without this frame.
-    pub believed: Option<Pose2Covariance>,
+    /// The robot's pose at the frame, as the robot states it, or the fused pose without this frame (map frame, m and rad).
+    pub map_from_robot: Option<Pose2Covariance>,
 }
 
-/// Takes frames of robots that gather. Called by the workers: it never waits.
+/// Takes frames of robots that gather. Workers call it: an implementation never waits.
 pub trait FrameTap: Debug + Send + Sync {
     /// Whether frames of this camera are wanted.
     fn is_wanted(&self, key: &SlotKey) -> bool;

@@ -1,5 +1,5 @@
-//! Where a robot should look, over one version of its map: `map::gaze` with the landmarks that are learnt, placed and
-//! trusted. Robots that ask keep to one landmark until another is clearly better; pages that ask get the ranking only.
+//! Which landmark a robot's pan-tilt camera shall look at, over one version of its map: `map::gaze` with the landmarks that
+//! are learnt, placed and trusted. A robot keeps one landmark until another is clearly better; a page gets the ranking.
 
 use super::snapshot::MapSnapshot;
 use map::{
@@ -15,25 +15,25 @@ use std::{
 };
 use vision::model::LandmarkId;
 
-/// Robots whose gaze is remembered; the one longest silent gives way.
+/// Robots whose target is remembered; the one with the oldest query is dropped for a new one.
 pub const MAX_ROBOTS: usize = 10_000;
 
-/// What is asked.
+/// A robot's pose and camera, for which gaze targets are ranked.
 #[derive(Debug, Clone)]
 pub struct GazeQuery {
-    /// Where the robot is.
+    /// `map_from_robot`, with covariance.
     pub pose: Pose2Covariance,
-    /// Ranges of its pan-tilt unit, and its focal length.
-    pub viewer: PanTiltCamera,
-    /// Where its camera is and looks.
-    pub head: PanTiltUnit,
-    /// How to choose.
+    /// Image size, focal length, and ranges of the pan-tilt unit.
+    pub camera: PanTiltCamera,
+    /// The pan-tilt unit's place on the robot and its present angles.
+    pub pan_tilt: PanTiltUnit,
+    /// Criterion and limits.
     pub params: GazeParams,
 }
 
-/// Every landmark worth looking at, best first.
-pub fn ranked(map: &MapSnapshot, ask: &GazeQuery) -> Result<Vec<GazeTarget>, OutOfRange> {
-    let targets: Vec<GazeCandidate<'_>> = map
+/// Every landmark that can be looked at, best first. Errors: a query out of range.
+pub fn ranked(map: &MapSnapshot, query: &GazeQuery) -> Result<Vec<GazeTarget>, OutOfRange> {
+    let candidates: Vec<GazeCandidate<'_>> = map
         .models
         .iter()
         .filter_map(|model| {
@@ -43,35 +43,36 @@ pub fn ranked(map: &MapSnapshot, ask: &GazeQuery) -> Result<Vec<GazeTarget>, Out
             Some(GazeCandidate { landmark: model.id, place, visible, saliency, v_c })
         })
         .collect();
-    rank(&ask.pose, &targets, &ask.viewer, &ask.head, &ask.params)
+    rank(&query.pose, &candidates, &query.camera, &query.pan_tilt, &query.params)
 }
 
-/// Which landmark each robot was told to look at.
+/// The gaze target of each robot, with the tick of its last query.
 #[derive(Debug, Default)]
 pub struct GazeControllers(Mutex<BTreeMap<Name, (u64, GazeController)>>);
 
 impl GazeControllers {
-    /// Where a robot should look at its own time `at_ns`; `looked` is what came of the last look.
+    /// The action of a robot at its own time `at_ns`; `outcome` says whether the last target was recognised. Errors: a query
+    /// out of range.
     pub fn choose(
         &self,
         robot: &Name,
         at_ns: i64,
-        looked: Option<(LandmarkId, bool)>,
+        outcome: Option<(LandmarkId, bool)>,
         map: &MapSnapshot,
-        ask: &GazeQuery,
+        query: &GazeQuery,
     ) -> Result<GazeAction, OutOfRange> {
-        let ranked = ranked(map, ask)?;
-        let mut gazes = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let tick = gazes.values().map(|(tick, _)| *tick).max().unwrap_or(0) + 1;
-        if gazes.len() >= MAX_ROBOTS && !gazes.contains_key(robot) {
-            let stalest = gazes.iter().min_by_key(|(_, (tick, _))| *tick).map(|(name, _)| name.clone());
-            stalest.and_then(|name| gazes.remove(&name));
+        let ranked = ranked(map, query)?;
+        let mut controllers = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let tick = controllers.values().map(|(tick, _)| *tick).max().unwrap_or(0) + 1;
+        if controllers.len() >= MAX_ROBOTS && !controllers.contains_key(robot) {
+            let stalest = controllers.iter().min_by_key(|(_, (tick, _))| *tick).map(|(name, _)| name.clone());
+            stalest.and_then(|name| controllers.remove(&name));
         }
-        let (ticked, gaze) = gazes.entry(robot.clone()).or_default();
-        *ticked = tick;
-        if let Some((landmark, recognised)) = looked {
-            gaze.report_outcome(at_ns, landmark, recognised, &ask.params);
+        let (last, controller) = controllers.entry(robot.clone()).or_default();
+        *last = tick;
+        if let Some((landmark, recognised)) = outcome {
+            controller.report_outcome(at_ns, landmark, recognised, &query.params);
         }
-        Ok(gaze.choose(at_ns, &ranked, &ask.pose, &ask.params))
+        Ok(controller.choose(at_ns, &ranked, &query.pose, &query.params))
     }
 }

@@ -1,5 +1,5 @@
-//! A frame arrives: bytes of a robot on the key of a camera. Out: the frame in its slot, or a refusal as the answer to
-//! publish at once. Checks everything but the pixels, and never waits: it runs on the transport's threads.
+//! The intake of frames. In: bytes of a robot on the key of a camera. Out: the frame in its slot, or a refusal as the answer
+//! to publish at once. It checks everything but the pixels, and never waits: it runs on the transport's threads.
 
 use super::slots::{SlotKey, Slots};
 use super::{motion::MotionTracker, snapshot::Snapshots};
@@ -23,14 +23,14 @@ pub struct FrameJob {
     pub frame: CheckedFrame,
     /// The map to recognise against.
     pub map: String,
-    /// When it came.
+    /// Time of receipt.
     pub received: Instant,
     /// Work does not begin later.
     pub deadline: Instant,
     /// The robot's clock is off, or the capture time does not fit the robot's other messages.
     pub clock_suspect: bool,
-    /// The capture time does not fit the robot's other messages, and is not to be used. Instead: what the robot's clock
-    /// showed at receipt, ns.
+    /// Present if the capture time does not fit the robot's other messages and must not be used: what the robot's clock showed
+    /// at receipt, ns.
     pub stamp_instead_ns: Option<i64>,
 }
 
@@ -39,9 +39,9 @@ pub struct FrameJob {
 pub struct Intake {
     /// Where frames wait.
     pub slots: Arc<Slots<FrameJob>>,
-    /// Which robots and maps there are.
+    /// Maps, and the map of each robot.
     pub snapshots: Arc<Snapshots>,
-    /// Which epoch of a robot is live, and its clock.
+    /// The live epoch and the clock of each robot.
     pub motion: Arc<MotionTracker>,
     /// Largest message, in bytes.
     pub frame_bytes: usize,
@@ -99,7 +99,7 @@ impl Intake {
     }
 }
 
-/// There is no such map (any more).
+/// The refusal for a map that does not exist.
 pub fn unknown_map(map: &str) -> Rejection {
     Rejection::new(Code::UnknownMap, "map", format!("there is no map {map}"))
 }
@@ -109,7 +109,7 @@ fn refused(mut echo: v1::Answer, refusal: &Rejection) -> Box<v1::Answer> {
     Box::new(echo)
 }
 
-/// Whether a robot's capture time is further than [`CLOCK_TOLERANCE`] from this machine's clock. Only ever reported.
+/// Whether a capture time is further than [`CLOCK_TOLERANCE`] from this machine's clock. It is reported, and changes nothing.
 fn clock_suspect(captured_ns: i64) -> bool {
     let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     (i128::from(captured_ns) - now.as_nanos() as i128).unsigned_abs() > CLOCK_TOLERANCE.as_nanos()
@@ -178,7 +178,7 @@ mod tests {
         assert_eq!(counts.missing(), 0);
     }
 
-    /// Fault F3: a frame of another epoch used to end the epoch of the robot that drives.
+    /// A frame of another epoch must not end the live epoch of the robot.
     #[test]
     fn a_frame_of_another_epoch_is_refused_while_one_is_live() {
         let intake = intake();
@@ -189,7 +189,7 @@ mod tests {
         intake.receive(key("r1"), frame(6).encode_to_vec().into()).unwrap();
     }
 
-    /// Fault F2: the frame is answered, its capture time is not used.
+    /// Such a frame is answered; its capture time is not used.
     #[test]
     fn a_stray_capture_time_is_marked() {
         let intake = intake();

@@ -1,8 +1,8 @@
-//! Frames in, answers out, away from any transport, file and HTTP: one slot per camera, workers, the snapshot of the map that
-//! they read, and what is known of every robot (`motion`).
+//! The engine. In: frames, odometry and scans of robots. Out: answers and poses. It knows no transport, store or HTTP: one slot a
+//! camera, workers, the snapshots that they read, and the state of each robot (`motion`).
 //!
-//! A frame walks `intake -> slots -> workers -> decode -> frame_analysis -> guided -> judging -> frame_answer -> motion`; its answer goes to whoever gave the
-//! workers an outlet. Nothing here waits for a disk or a network.
+//! The way of a frame: `intake -> slots -> workers -> decode -> frame_analysis -> guided -> landmark_checks -> frame_answer ->
+//! motion`. The workers give answers to an implementation of `Publish`. Only the journal of a mapping is written to disk.
 
 pub mod snapshot;
 pub mod decode;
@@ -10,20 +10,20 @@ pub mod slots;
 pub mod panics;
 pub mod intake;
 pub mod guided;
-pub mod judging;
+pub mod landmark_checks;
 pub mod limits;
 pub mod live;
 pub mod scan_job;
 pub mod motion;
-pub mod doubles;
-pub mod search;
+pub mod ambiguous_observations;
+pub mod relocalise;
 pub mod mapping;
 pub mod cameras;
 pub mod picture;
 pub mod dominant;
 pub mod epochs;
 pub mod gaze;
-pub mod standing;
+pub mod findings;
 pub mod fixes;
 pub mod frame_analysis;
 pub mod frame_answer;

@@ -1,6 +1,6 @@
-//! What pages show: the last frame and answer of each camera, tracks of each robot, and a stream of events. In: what
-//! the bus and the workers saw. Out: copies for readers, who never hold up a worker: a slow reader misses events.
-//! Nothing here is kept on disk, and every collection is bounded.
+//! What pages show: the last frame and answer of each camera, the trajectories of each robot, and a stream of events. In:
+//! frames, answers and poses of the bus and the workers. Out: copies for readers, who never hold up a worker: a slow reader
+//! misses events. Nothing is stored on disk, and every collection is bounded.
 
 use map::pose2::{Pose2, Pose2Covariance};
 use protos::{
@@ -19,27 +19,27 @@ use tokio::sync::broadcast;
 use super::{cameras::CameraRegistry, slots::SlotKey};
 use crate::limits::MAX_ROBOTS;
 
-/// Cameras whose last frame is kept; the one longest without a frame gives way.
+/// Cameras whose last frame is stored; a further one replaces the one with the oldest frame.
 pub const MAX_CAMERAS: usize = 32;
-/// Robots whose tracks are kept; the one longest without a pose gives way.
-pub const MAX_TRACKS: usize = 256;
-/// Points of one track; the oldest give way.
-pub const MAX_TRACK_POINTS: usize = 2000;
+/// Robots with trajectories; a further one replaces the one with the oldest pose.
+pub const MAX_TRAJECTORIES: usize = 256;
+/// Poses of one trajectory: the newest.
+pub const MAX_TRAJECTORY_POSES: usize = 2000;
 /// Events that a reader may be behind before it misses the oldest.
-pub const EVENTS_KEPT: usize = 512;
+pub const MAX_EVENTS: usize = 512;
 
 /// The last frame of a camera, as it came.
 #[derive(Debug, Clone)]
 pub struct LiveFrame {
-    /// How it is packed.
+    /// Encoding of `image`.
     pub encoding: Encoding,
-    /// Width.
+    /// Width, px.
     pub width_px: u32,
-    /// Height.
+    /// Height, px.
     pub height_px: u32,
     /// Encoded image.
     pub image: Bytes,
-    /// What was answered.
+    /// The answer to it.
     pub answer: Arc<v1::Answer>,
 }
 
@@ -61,18 +61,18 @@ impl LiveFrame {
     }
 }
 
-/// Where a robot was, by source; oldest first.
+/// Past poses of a robot by source (map frame), oldest first.
 #[derive(Debug, Clone, Default)]
 pub struct Trajectories {
-    /// Odometry, laid on the map at the robot's first known pose.
+    /// Odometry, put on the map at the robot's first known pose.
     pub odometry: VecDeque<Pose2>,
     /// Fused poses.
     pub pose: VecDeque<Pose2>,
-    /// The truth, where a simulator tells it.
+    /// The truth, from a simulator.
     pub truth: VecDeque<Pose2>,
 }
 
-/// Which track a pose belongs to.
+/// Which trajectory a pose belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TrajectoryKind {
     /// Odometry.
@@ -114,7 +114,7 @@ pub enum LiveEvent {
         #[serde(serialize_with = "trust_word")]
         trust: v1::PoseTrust,
     },
-    /// Odometry, laid on the map.
+    /// Odometry, put on the map.
     Odometry {
         /// Robot.
         robot: Name,
@@ -183,9 +183,9 @@ impl LiveEvent {
 
 #[derive(Debug, Default)]
 struct State {
-    /// With the count of frames at its last frame: the smallest is the stalest.
+    /// Each with the tick of its last frame.
     frames: BTreeMap<SlotKey, (u64, LiveFrame)>,
-    tracks: BTreeMap<Name, (u64, Trajectories)>,
+    trajectories: BTreeMap<Name, (u64, Trajectories)>,
     /// Of each robot's last published pose: the map it is in, and how far it is trusted.
     trust: BTreeMap<Name, (String, v1::PoseTrust)>,
     ticks: u64,
@@ -196,26 +196,26 @@ struct State {
 pub struct LiveHub {
     state: Mutex<State>,
     events: broadcast::Sender<Arc<LiveEvent>>,
-    watched: CameraRegistry,
+    cameras: CameraRegistry,
 }
 
 impl Default for LiveHub {
     fn default() -> Self {
         Self {
             state: Mutex::default(),
-            events: broadcast::channel(EVENTS_KEPT).0,
-            watched: CameraRegistry::default(),
+            events: broadcast::channel(MAX_EVENTS).0,
+            cameras: CameraRegistry::default(),
         }
     }
 }
 
 impl LiveHub {
-    /// What frames say of the cameras they come from.
-    pub fn watched(&self) -> &CameraRegistry {
-        &self.watched
+    /// The cameras by their frames.
+    pub fn camera_registry(&self) -> &CameraRegistry {
+        &self.cameras
     }
 
-    /// Events from now on. A reader more than [`EVENTS_KEPT`] behind is told that it missed some.
+    /// Events from now on. A reader more than [`MAX_EVENTS`] behind is told that it missed some.
     pub fn events(&self) -> broadcast::Receiver<Arc<LiveEvent>> {
         self.events.subscribe()
     }
@@ -232,19 +232,19 @@ impl LiveHub {
         state.frames.keys().filter(|k| k.robot == *robot).map(|k| k.camera.clone()).collect()
     }
 
-    /// Tracks of a robot so far.
-    pub fn tracks(&self, robot: &Name) -> Option<Trajectories> {
-        self.lock().tracks.get(robot).map(|(_, tracks)| tracks.clone())
+    /// Trajectories of a robot.
+    pub fn trajectories(&self, robot: &Name) -> Option<Trajectories> {
+        self.lock().trajectories.get(robot).map(|(_, all)| all.clone())
     }
 
-    /// How far a robot's last published pose is trusted, if that is on this map.
+    /// How far a robot's last published pose is trusted, if that pose is on this map.
     pub fn trust(&self, robot: &Name, map: &str) -> Option<v1::PoseTrust> {
         let state = self.lock();
         state.trust.get(robot).filter(|(on, _)| on == map).map(|(_, trust)| *trust)
     }
 
-    /// Keeps the frame as its camera's last and tells of its answer.
-    pub fn answered(&self, key: &SlotKey, frame: LiveFrame) {
+    /// Stores the frame as its camera's last and sends its answer as an event.
+    pub fn publish_answer(&self, key: &SlotKey, frame: LiveFrame) {
         let answer = frame.answer.clone();
         {
             let mut guard = self.lock();
@@ -252,20 +252,20 @@ impl LiveHub {
             state.ticks += 1;
             state.frames.insert(key.clone(), (state.ticks, frame));
             if state.frames.len() > MAX_CAMERAS {
-                let stalest = state.frames.iter().min_by_key(|(_, (tick, _))| *tick).map(|(k, _)| k.clone());
-                stalest.map(|k| state.frames.remove(&k));
+                let oldest = state.frames.iter().min_by_key(|(_, (tick, _))| *tick).map(|(k, _)| k.clone());
+                oldest.map(|k| state.frames.remove(&k));
             }
         }
-        self.tell(LiveEvent::Answer { robot: key.robot.clone(), camera: key.camera.clone(), answer });
+        self.send(LiveEvent::Answer { robot: key.robot.clone(), camera: key.camera.clone(), answer });
     }
 
-    /// Tells of an answer to a frame that cannot be shown.
-    pub fn refused(&self, key: &SlotKey, answer: Arc<v1::Answer>) {
-        self.tell(LiveEvent::Answer { robot: key.robot.clone(), camera: key.camera.clone(), answer });
+    /// Sends the answer to a refused frame as an event; the frame is not stored.
+    pub fn publish_refusal(&self, key: &SlotKey, answer: Arc<v1::Answer>) {
+        self.send(LiveEvent::Answer { robot: key.robot.clone(), camera: key.camera.clone(), answer });
     }
 
-    /// A fused pose, with the corrections so far, its age, and how far it is trusted.
-    pub fn fused(
+    /// A fused pose, with the corrections so far, its age (ms), and how far it is trusted.
+    pub fn publish_pose(
         &self,
         robot: &Name,
         map: &str,
@@ -274,8 +274,8 @@ impl LiveHub {
         trust: v1::PoseTrust,
     ) {
         self.extend(robot, TrajectoryKind::Pose, pose.pose);
-        self.trusted(robot, map, trust);
-        self.tell(LiveEvent::Pose {
+        self.set_trust(robot, map, trust);
+        self.send(LiveEvent::Pose {
             robot: robot.clone(),
             map: map.to_owned(),
             pose: pose2_wire(&pose.pose),
@@ -286,31 +286,31 @@ impl LiveHub {
         });
     }
 
-    /// Odometry laid on the map.
+    /// Odometry put on the map.
     pub fn odometry(&self, robot: &Name, map: &str, map_from_robot: Pose2) {
         self.extend(robot, TrajectoryKind::Odometry, map_from_robot);
         let pose = pose2_wire(&map_from_robot);
-        self.tell(LiveEvent::Odometry { robot: robot.clone(), map: map.to_owned(), pose });
+        self.send(LiveEvent::Odometry { robot: robot.clone(), map: map.to_owned(), pose });
     }
 
     /// Where a simulated robot really is.
     pub fn truth(&self, robot: &Name, map: &str, map_from_robot: Pose2) {
         self.extend(robot, TrajectoryKind::Truth, map_from_robot);
         let pose = pose2_wire(&map_from_robot);
-        self.tell(LiveEvent::Truth { robot: robot.clone(), map: map.to_owned(), pose });
+        self.send(LiveEvent::Truth { robot: robot.clone(), map: map.to_owned(), pose });
     }
 
     /// A robot came or went.
     pub fn presence(&self, robot: &Name, map: Option<String>, alive: bool) {
-        self.tell(LiveEvent::Presence { robot: robot.clone(), map: map.unwrap_or_default(), alive });
+        self.send(LiveEvent::Presence { robot: robot.clone(), map: map.unwrap_or_default(), alive });
     }
 
     /// A map changed.
     pub fn map_changed(&self, map: String, version: Option<u64>) {
-        self.tell(LiveEvent::MapChanged { map, version });
+        self.send(LiveEvent::MapChanged { map, version });
     }
 
-    fn trusted(&self, robot: &Name, map: &str, trust: v1::PoseTrust) {
+    fn set_trust(&self, robot: &Name, map: &str, trust: v1::PoseTrust) {
         let mut state = self.lock();
         if state.trust.len() < MAX_ROBOTS || state.trust.contains_key(robot) {
             state.trust.insert(robot.clone(), (map.to_owned(), trust));
@@ -321,25 +321,25 @@ impl LiveHub {
         let mut guard = self.lock();
         let state = &mut *guard;
         state.ticks += 1;
-        let (tick, tracks) = state.tracks.entry(robot.clone()).or_default();
+        let (tick, all) = state.trajectories.entry(robot.clone()).or_default();
         *tick = state.ticks;
-        let track = match kind {
-            TrajectoryKind::Odometry => &mut tracks.odometry,
-            TrajectoryKind::Pose => &mut tracks.pose,
-            TrajectoryKind::Truth => &mut tracks.truth,
+        let trajectory = match kind {
+            TrajectoryKind::Odometry => &mut all.odometry,
+            TrajectoryKind::Pose => &mut all.pose,
+            TrajectoryKind::Truth => &mut all.truth,
         };
-        if track.len() == MAX_TRACK_POINTS {
-            track.pop_front();
+        if trajectory.len() == MAX_TRAJECTORY_POSES {
+            trajectory.pop_front();
         }
-        track.push_back(pose);
-        if state.tracks.len() > MAX_TRACKS {
-            let stalest = state.tracks.iter().min_by_key(|(_, (tick, _))| *tick).map(|(k, _)| k.clone());
-            stalest.map(|k| state.tracks.remove(&k));
+        trajectory.push_back(pose);
+        if state.trajectories.len() > MAX_TRAJECTORIES {
+            let oldest = state.trajectories.iter().min_by_key(|(_, (tick, _))| *tick).map(|(k, _)| k.clone());
+            oldest.map(|k| state.trajectories.remove(&k));
         }
     }
 
-    fn tell(&self, event: LiveEvent) {
-        // An error only says that nobody listens.
+    fn send(&self, event: LiveEvent) {
+        // An error means that nobody listens.
         drop(self.events.send(Arc::new(event)));
     }
 

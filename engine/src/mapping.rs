@@ -1,6 +1,6 @@
-//! Maps made while a robot drives: the scans of one robot, each with its odometry, go to `map::slam` on a thread of their
-//! own, by a bounded queue. In: scans in order. Out: progress, and the walls when somebody ends it: whoever does stores
-//! them. Until then the scans are kept in a journal, from which a restart of the server goes on.
+//! Mappings: walls of a map made while a robot drives. In: the scans of one robot in order, each with its odometry. Out:
+//! progress, and the walls once somebody finishes the mapping and stores them. A bounded queue passes scans to `map::slam` on
+//! a thread of its own. A journal stores them, so that a mapping resumes after a restart of the server.
 
 mod journal;
 mod session;
@@ -20,70 +20,69 @@ use std::{
 };
 use tokio::sync::oneshot;
 
-/// Maps that are made at a time.
+/// Mappings at a time.
 pub const MAX_MAPPINGS: usize = 4;
-/// Maps whose last mapping is remembered; of those that are over the first by name gives way.
-pub const MAX_REMEMBERED: usize = 64;
+/// Maps with a stored mapping; a further one replaces the first by name that is over.
+pub const MAX_SESSIONS: usize = 64;
 
-/// Walls: ends in metres, a.x, a.y, b.x, b.y, the free side on the left.
+/// Walls: ends a.x, a.y, b.x, b.y (map frame, m), free side on the left.
 pub type Walls = Vec<[f64; 4]>;
 
-/// How far a mapping has come.
+/// Stage of a mapping.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MappingStage {
-    /// The server was started again: the scans that were kept are mapped once more. New ones wait, as many as there is room
-    /// for.
+    /// The server has restarted: the scans in the journal are mapped once more. New ones wait in the queue.
     Resuming,
-    /// Scans are taken.
+    /// Scans are mapped as they come.
     Mapping,
-    /// Everything is fitted once more; then the walls are stored.
+    /// The pose graph is optimised; then the walls are stored.
     Finishing,
-    /// The walls are those of the map.
+    /// The map has the new walls.
     Done,
     /// See `reason`; the map is as before.
     Failed,
 }
 
-/// A mapping as it stands.
+/// How far a mapping has come.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MappingProgress {
-    /// The map.
+    /// Name of the map.
     pub map: String,
-    /// Whose scans.
+    /// Name of the robot.
     pub robot: String,
-    /// How far it has come.
+    /// Its stage.
     pub stage: MappingStage,
-    /// Scans that were taken.
+    /// Scans that were mapped.
     pub scans: u64,
-    /// Scans that were not: the queue was full, the robot's software was started again, or there were too many.
+    /// Scans that were dropped: the queue was full, a new epoch began, or there were too many.
     pub dropped: u64,
-    /// Way driven, metres.
-    pub way_m: f64,
-    /// Where the robot is in the map so far: x, y, theta; absent before the first scan.
+    /// Distance driven by odometry, m.
+    pub distance_m: f64,
+    /// `map_from_robot`: x, y (m), theta (rad); absent before the first scan.
     pub pose: Option<[f64; 3]>,
     /// Walls, once it is done.
     pub segments: Option<usize>,
-    /// Loops that were closed, once fitted.
-    pub loops: Option<usize>,
+    /// Loop closures, once the pose graph is optimised.
+    pub loop_closures: Option<usize>,
     /// Why it failed.
     pub reason: Option<String>,
-    /// Why further scans are not kept on disk: a restart of the server would lose them. Absent while they are.
-    pub not_kept: Option<String>,
+    /// Why further scans are not in the journal: a restart of the server would lose them. Absent while they are.
+    pub journal_error: Option<String>,
 }
 
-/// Why a mapping cannot begin or end.
+/// Why a mapping cannot start or finish.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum MappingError {
-    /// One is going on.
+    /// The map has an open mapping.
     #[error("this map is being made already")]
-    Going,
-    /// The robot makes another map.
+    AlreadyMapping,
+    /// The robot maps another map.
     #[error("this robot makes another map already")]
     Busy,
     /// Too many at a time.
     #[error("{MAX_MAPPINGS} maps are being made already")]
     TooMany,
-    /// There is none to end.
+    /// There is no open mapping.
     #[error("this map is not being made")]
     None,
     /// The system gives no thread.
@@ -95,42 +94,42 @@ pub enum MappingError {
 #[derive(Debug, Default)]
 pub struct MappingSessions {
     all: Mutex<BTreeMap<String, Session>>,
-    /// Where their scans are kept.
+    /// Folder of the journals.
     dir: OnceLock<PathBuf>,
-    /// Where their panics are counted.
+    /// Counts the panics of mappings.
     panics: OnceLock<Arc<Panics>>,
 }
 
 impl MappingSessions {
-    /// Counts the panics of mappings here from now on.
+    /// Counts the panics of mappings in `panics` from now on.
     pub fn count_in(&self, panics: Arc<Panics>) {
         self.panics.get_or_init(|| panics);
     }
 
-    /// Keeps scans in a folder from now on, and goes on with what is there: with those mappings whose robot still stands on
-    /// the map (`stands`); the others are forgotten.
-    pub fn keep_in(&self, dir: PathBuf, stands: impl Fn(&Name, &Name) -> bool) {
+    /// Writes journals to a folder from now on, and resumes the mappings there whose robot is still on the map (`is_on`); the
+    /// other journals are removed.
+    pub fn resume_in(&self, dir: PathBuf, is_on: impl Fn(&Name, &Name) -> bool) {
         let dir = self.dir.get_or_init(|| dir);
         let mut all = self.lock();
-        for kept in JournalReader::all(dir) {
-            let (map, robot) = (kept.head.map.clone(), kept.head.robot.clone());
-            if !stands(&map, &robot) {
-                tracing::warn!(%map, %robot, "a mapping is forgotten: the robot stands elsewhere now");
+        for journal in JournalReader::all(dir) {
+            let (map, robot) = (journal.head.map.clone(), journal.head.robot.clone());
+            if !is_on(&map, &robot) {
+                tracing::warn!(%map, %robot, "mapping removed: the robot is on another map now");
                 journal::remove(dir, map.as_str());
             } else if all.len() >= MAX_MAPPINGS {
-                tracing::warn!(%map, "a mapping waits for another start: {MAX_MAPPINGS} go on already");
-            } else if let Some(session) = Session::begin(Start::Again(kept), self.panics()) {
-                tracing::info!(%map, %robot, "a mapping goes on");
+                tracing::warn!(%map, "mapping not resumed before the next start: {MAX_MAPPINGS} are open");
+            } else if let Some(session) = Session::begin(Start::Resumed(journal), self.panics()) {
+                tracing::info!(%map, %robot, "mapping_resumed");
                 all.insert(map.to_string(), session);
             }
         }
     }
 
-    /// Begins to make a map with a robot, whose first pose is `origin` on it.
+    /// Starts a mapping with a robot whose first pose is `origin` (map frame).
     pub fn begin(&self, map: &Name, robot: &Name, origin: Pose2) -> Result<MappingProgress, MappingError> {
         let mut all = self.lock();
         if all.get(map.as_str()).is_some_and(Session::is_open) {
-            return Err(MappingError::Going);
+            return Err(MappingError::AlreadyMapping);
         }
         let open = || all.values().filter(|s| s.is_open());
         if open().any(|s| s.takes() && s.robot == *robot) {
@@ -144,7 +143,7 @@ impl MappingSessions {
         let session = Session::begin(Start::New(head, journal), self.panics()).ok_or(MappingError::Thread)?;
         let progress = session.progress();
         all.insert(map.to_string(), session);
-        if all.len() > MAX_REMEMBERED {
+        if all.len() > MAX_SESSIONS {
             let over = all
                 .iter()
                 .find(|(name, s)| !s.is_open() && *name != map.as_str())
@@ -154,7 +153,7 @@ impl MappingSessions {
         Ok(progress)
     }
 
-    /// Takes a scan of a robot that makes its map; gives back any other.
+    /// Takes a scan of a robot with an open mapping; gives back any other scan.
     pub fn offer(&self, robot: &Name, job: ScanJob) -> Option<ScanJob> {
         let mut all = self.lock();
         match all.get_mut(&job.map).filter(|s| s.takes() && s.robot == *robot) {
@@ -166,7 +165,8 @@ impl MappingSessions {
         }
     }
 
-    /// Ends the taking of scans; the walls come when everything is fitted. Tell [`MappingSessions::stored`] what became of them.
+    /// Takes no more scans; the walls come once the pose graph is optimised. Their fate is reported to
+    /// [`MappingSessions::stored`].
     pub fn finish(
         &self,
         map: &str,
@@ -177,32 +177,32 @@ impl MappingSessions {
         Ok((session.progress(), walls))
     }
 
-    /// The walls were stored, so many; or why not.
+    /// The number of walls that were stored, or why they were not.
     pub fn stored(&self, map: &str, stored: Result<usize, String>) {
         if let Some(session) = self.lock().get_mut(map) {
-            // Of what failed the scans stay: the next start goes on with them, unless it is given up.
+            // After a failure the journal stays: the next start resumes the mapping, unless it is cancelled.
             if stored.is_ok() {
-                self.forget(map);
+                self.remove_journal(map);
             }
             session.end(stored);
         }
     }
 
-    /// Gives a mapping up: the map stays as it is. False if there is none.
+    /// Cancels a mapping: the map stays as it is. False if there is none.
     pub fn cancel(&self, map: &str) -> bool {
         let mut all = self.lock();
         let Some(session) = all.remove(map) else { return false };
-        self.forget(map);
+        self.remove_journal(map);
         session.is_open() || session.has_failed()
     }
 
-    /// How far the mapping of a map has come: the one that goes on, or the last.
+    /// Progress of a map's mapping: the open one, or the last.
     pub fn progress(&self, map: &str) -> Option<MappingProgress> {
         self.lock().get(map).map(Session::progress)
     }
 
-    /// What is on disk of a mapping.
-    fn forget(&self, map: &str) {
+    /// Removes a mapping's journal.
+    fn remove_journal(&self, map: &str) {
         if let Some(dir) = self.dir.get() {
             journal::remove(Path::new(dir), map);
         }
@@ -217,7 +217,7 @@ impl MappingSessions {
     }
 }
 
-/// The counters of one mapping, shared with its thread.
+/// The progress of one mapping, shared with its thread.
 type Shared = Arc<Mutex<MappingProgress>>;
 
 #[cfg(test)]

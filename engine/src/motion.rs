@@ -1,15 +1,16 @@
-//! How each robot moves: odometry, scans and fixes by landmarks in, its fused pose on the map out. For pages, odometry
-//! alone is laid on the map at the robot's first known pose. A new epoch of a robot starts afresh; so does another map, unless it is
-//! known how the two lie to each other.
+//! The motion of each robot. In: odometry, scans and fixes by landmarks. Out: its fused pose on the map. For pages, odometry
+//! alone is put on the map at the robot's first known pose. A new epoch of a robot resets its state; so does another map,
+//! unless the two maps are linked.
+//!
 //! Capture times order one robot's own readings. They are never compared with this machine's wall clock, only with the time
-//! that passes between messages (`timebase.rs`): a stray stamp is refused, and a pose says how old it is.
+//! that passes between messages (`timebase.rs`). A stray stamp is refused, and a pose says how old it is.
 
 mod corrections;
 mod frames;
-mod lent;
+mod lent_recording;
 mod messages;
 mod robot;
-mod run;
+mod run_recording;
 mod scans;
 mod timebase;
 
@@ -18,9 +19,10 @@ pub use crate::scan_job::ScanJob;
 pub use corrections::{Correction, Corrections, MAX_CORRECTIONS};
 pub use frames::{FrameFixes, FrameStamp, PriorPose};
 pub use messages::{MAX_ODOMETRY_BYTES, MessageCounts};
-pub use robot::{MAX_SUPPORTERS, RESTS_ON_M};
-pub use run::RunRecording;
-pub use run::{MAX_RECORDINGS, MAX_RUN_FIXES, MAX_RUN_ODOMETRY, RecordingError, RecordingStatus};
+pub use robot::{MAX_SUPPORTING_LANDMARKS, RESTS_ON_M};
+pub use run_recording::{
+    MAX_RECORDINGS, MAX_RUN_FIXES, MAX_RUN_ODOMETRY, RecordingError, RecordingStatus, RunRecording,
+};
 pub use scans::Scans;
 pub use timebase::{
     AHEAD_TOLERANCE, BEHIND_TOLERANCE, CLOCK_SET_AFTER, CLOCK_SET_COUNT, CLOCK_SET_SPREAD, LEADER_SILENT,
@@ -52,12 +54,12 @@ use timebase::Stream;
 /// A fused pose is published, and used, only while the odometry or fix that supports it was captured no longer ago.
 /// Robots that send odometry once a second are within it.
 pub const MAX_POSE_AGE: Duration = Duration::from_secs(2);
-/// The laser's word in counters.
+/// Word of the laser in counters.
 const LASER: &str = "laser";
 
 #[derive(Debug, Default)]
 struct State {
-    /// Each with its own lock: replaying one robot's last seconds holds up no other.
+    /// Each with its own lock: replaying the last seconds of one robot holds up no other robot.
     robots: BTreeMap<Name, Arc<Mutex<RobotState>>>,
     odometry: MessageCounts,
     scans: MessageCounts,
@@ -65,14 +67,14 @@ struct State {
     stamps: MessageCounts,
 }
 
-/// The fused pose of a robot as it is known at some moment.
+/// The fused pose of a robot at one time.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Known {
+pub struct KnownPose {
     /// The map it is in.
     pub map: String,
-    /// The pose.
+    /// The pose (map frame) and what corrected it.
     pub fused: FusedPose,
-    /// Since the capture of the newest odometry that supports it; at most [`MAX_POSE_AGE`].
+    /// Time since the capture of the newest odometry that supports it; at most [`MAX_POSE_AGE`].
     pub age: Duration,
 }
 
@@ -85,12 +87,12 @@ pub struct MotionTracker {
     state: Mutex<State>,
     scans: Scans,
     mappings: MappingSessions,
-    /// Robots whose run is recorded; taken before their own locks.
-    recorded: Mutex<BTreeSet<Name>>,
+    /// Robots with a recording. Locked before the robots' own states.
+    recording_robots: Mutex<BTreeSet<Name>>,
 }
 
 impl MotionTracker {
-    /// Nothing known of any robot yet.
+    /// No robot has moved yet.
     pub fn new(snapshots: Arc<Snapshots>, live: Arc<LiveHub>) -> Self {
         Self {
             snapshots,
@@ -99,28 +101,29 @@ impl MotionTracker {
             state: Mutex::default(),
             scans: Scans::default(),
             mappings: MappingSessions::default(),
-            recorded: Mutex::default(),
+            recording_robots: Mutex::default(),
         }
     }
 
-    /// Which start of each robot's software speaks for it.
+    /// The live epoch of each robot.
     pub fn epochs(&self) -> &Epochs {
         &self.epochs
     }
 
-    /// Odometry of a robot, with the time of receipt; gives its new pose once it has been on the map. A refusal is counted.
+    /// Takes odometry of a robot, with the time of receipt. Gives the pose to publish once the robot has one. A refusal is
+    /// counted.
     pub fn odometry(&self, robot: &Name, message: Bytes, received: Instant) -> Option<v1::RobotPose> {
         let taken = self.checked_odometry(robot, message, received);
-        let (map, odometry, followed) = self.lock().odometry.count("odometry", robot, taken)?;
-        let mut followed = own(&followed);
-        followed.moved(odometry.captured_ns, odometry.odom_from_robot, received);
-        let on_map = followed.on_map(&odometry.odom_from_robot);
-        let told = followed.pose().map(|fused| followed.told(fused, received));
-        drop(followed);
+        let (map, odometry, state) = self.lock().odometry.count("odometry", robot, taken)?;
+        let mut state = lock_robot(&state);
+        state.apply_odometry(odometry.captured_ns, odometry.odom_from_robot, received);
+        let on_map = state.odometry_on_map(&odometry.odom_from_robot);
+        let stated = state.pose().map(|fused| state.state_pose(fused, received));
+        drop(state);
         if let Some(on_map) = on_map {
             self.live.odometry(robot, &map, on_map);
         }
-        self.tell(robot, &map, odometry.epoch, told?)
+        self.announce(robot, &map, odometry.epoch, stated?)
     }
 
     fn checked_odometry(
@@ -132,28 +135,28 @@ impl MotionTracker {
         let (map, odometry) = messages::odometry(&self.snapshots, robot, message)?;
         self.epochs.admit(robot, odometry.epoch, received)?;
         let shared = self.lock().robot(robot)?;
-        let mut followed = own(&shared);
-        followed.odometry.advance(odometry.epoch, odometry.seq)?;
-        followed.belong(odometry.epoch, &map, &self.snapshots);
-        let moved = Some(odometry.odom_from_robot);
-        followed.stamp(&Stream::Odometry, odometry.captured_ns, moved, received)?;
-        drop(followed);
+        let mut state = lock_robot(&shared);
+        state.odometry.advance(odometry.epoch, odometry.seq)?;
+        state.switch_epoch_or_map(odometry.epoch, &map, &self.snapshots);
+        let reading = Some(odometry.odom_from_robot);
+        state.check_stamp(&Stream::Odometry, odometry.captured_ns, reading, received)?;
+        drop(state);
         Ok((map, odometry, shared))
     }
 
-    /// A laser scan, with the time of receipt: checked, counted, and put where [`MotionTracker::laser`] takes it from; that of a
-    /// robot that makes a map, where it is mapped.
+    /// Takes a laser scan, with the time of receipt: checks it, counts it, and queues it for [`MotionTracker::fix_by_scan`],
+    /// or for the mapping if the robot makes a map.
     pub fn scan(&self, robot: &Name, message: Bytes, received: Instant) {
         let taken = self.checked_scan(robot, message, received);
         let Some(Some(job)) = self.lock().scans.count("scan", robot, taken) else { return };
         if self.scans.offer(robot, job)
-            && let Ok(followed) = self.lock().robot(robot)
+            && let Ok(state) = self.lock().robot(robot)
         {
-            own(&followed).log.count(LASER, "superseded");
+            lock_robot(&state).log.count(LASER, "superseded");
         }
     }
 
-    /// The scan to lay on the walls; none if it is mapped.
+    /// The scan to be matched with the walls; `None` if it went to a mapping.
     fn checked_scan(
         &self,
         robot: &Name,
@@ -163,126 +166,125 @@ impl MotionTracker {
         let (map, checked) = messages::scan(&self.snapshots, robot, message)?;
         self.epochs.admit(robot, checked.epoch, received)?;
         let shared = self.lock().robot(robot)?;
-        own(&shared).scans.advance(checked.epoch, checked.seq)?;
+        lock_robot(&shared).scans.advance(checked.epoch, checked.seq)?;
         let (epoch, captured_ns) = (checked.epoch, checked.captured_ns);
         let job =
             ScanJob { map, epoch, captured_ns, odom_from_robot: checked.odom_from_robot, scan: checked.scan };
-        // Mapping goes by the order of scans and does not use their times.
+        // Mapping uses the order of scans, not their times.
         let Some(job) = self.mappings.offer(robot, job) else { return Ok(None) };
-        let mut followed = own(&shared);
-        followed.belong(epoch, &job.map, &self.snapshots);
-        followed.stamp(&Stream::Scan, captured_ns, Some(job.odom_from_robot), received)?;
+        let mut state = lock_robot(&shared);
+        state.switch_epoch_or_map(epoch, &job.map, &self.snapshots);
+        state.check_stamp(&Stream::Scan, captured_ns, Some(job.odom_from_robot), received)?;
         Ok(Some(job))
     }
 
-    /// The scans that wait for the laser's thread.
+    /// The scans that wait for the laser thread.
     pub fn scans(&self) -> &Scans {
         &self.scans
     }
 
-    /// Maps that are being made.
+    /// The mappings.
     pub fn mappings(&self) -> &MappingSessions {
         &self.mappings
     }
 
-    /// Lays a scan on the walls of its map, near the pose that is known without it, and corrects that pose by it; gives the
-    /// new pose if it did. A scan never gives a first pose. Takes about 100 microseconds: for the laser's own thread.
-    pub fn laser(&self, robot: &Name, job: &ScanJob, now: Instant) -> Option<v1::RobotPose> {
+    /// Matches a scan with the walls of its map, near the prior pose without it, and corrects that pose. Gives the pose to
+    /// publish if it was corrected. A scan never gives a first pose. Takes about 100 microseconds: for the laser thread.
+    pub fn fix_by_scan(&self, robot: &Name, job: &ScanJob, now: Instant) -> Option<v1::RobotPose> {
         let map = self.snapshots.get(&job.map)?;
-        let followed = self.followed(robot, &job.map, job.epoch)?;
+        let state = self.robot_state(robot, &job.map, job.epoch)?;
         let prior = {
-            let mut followed = own(&followed);
-            followed.belong(job.epoch, &job.map, &self.snapshots);
-            followed.moved_to(job.captured_ns, job.odom_from_robot, now);
+            let mut state = lock_robot(&state);
+            state.switch_epoch_or_map(job.epoch, &job.map, &self.snapshots);
+            state.apply_odometry_if_newer(job.captured_ns, job.odom_from_robot, now);
             if map.wall_index.is_empty() {
-                followed.log.count(LASER, "no_walls");
+                state.log.count(LASER, "no_walls");
                 return None;
             }
-            let prior = followed.fuser.pose_at(job.captured_ns);
+            let prior = state.fuser.pose_at(job.captured_ns);
             if prior.is_none() {
-                followed.log.count(LASER, "no_pose");
+                state.log.count(LASER, "no_pose");
             }
             prior?
         };
-        let found = laser_fix(&map.wall_index, &job.scan, &prior, &LaserFixParams::default());
-        let followed = self.followed(robot, &job.map, job.epoch)?;
-        let mut followed = own(&followed);
-        followed.belong(job.epoch, &job.map, &self.snapshots);
-        let found =
-            found.inspect_err(|error| tracing::error!(%error, "a prior of ours is out of range")).ok()?;
-        let fix = match found {
-            Ok(found) => found.fix(),
+        let matched = laser_fix(&map.wall_index, &job.scan, &prior, &LaserFixParams::default());
+        let state = self.robot_state(robot, &job.map, job.epoch)?;
+        let mut state = lock_robot(&state);
+        state.switch_epoch_or_map(job.epoch, &job.map, &self.snapshots);
+        let matched = matched.inspect_err(|error| tracing::error!(%error, "prior_pose_out_of_range")).ok()?;
+        let fix = match matched {
+            Ok(matched) => matched.fix(),
             Err(refusal) => {
-                followed.log.count(LASER, corrections::refusal(refusal));
+                state.log.count(LASER, corrections::refusal_word(refusal));
                 return None;
             }
         };
-        let (outcome, fused) = followed.fix(job.captured_ns, (&fix, FixRole::Independent), Vec::new())?;
-        let told = followed.told(fused, now);
-        drop(followed);
+        let (outcome, fused) = state.apply_fix(job.captured_ns, (&fix, FixRole::Independent), Vec::new())?;
+        let stated = state.state_pose(fused, now);
+        drop(state);
         if !matches!(outcome, FixOutcome::Applied { .. }) {
             return None;
         }
-        self.tell(robot, &job.map, job.epoch, told)
+        self.announce(robot, &job.map, job.epoch, stated)
     }
 
-    /// The fused pose of a robot on a map, unless it is older than [`MAX_POSE_AGE`].
+    /// The fused pose of a robot on a map (map frame), unless it is older than [`MAX_POSE_AGE`].
     pub fn pose(&self, robot: &Name, map: &str, now: Instant) -> Option<Pose2Covariance> {
-        self.known(robot, now).filter(|known| known.map == map).map(|known| known.fused.pose)
+        self.known_pose(robot, now).filter(|known| known.map == map).map(|known| known.fused.pose)
     }
 
     /// The fused pose of a robot and its age, unless it is older than [`MAX_POSE_AGE`].
-    pub fn known(&self, robot: &Name, now: Instant) -> Option<Known> {
-        let followed = self.lock().robots.get(robot)?.clone();
-        let followed = own(&followed);
-        let fused = followed.pose()?;
-        let age = followed.age(fused.at_ns, now);
-        (age <= MAX_POSE_AGE).then(|| Known { map: followed.map.clone(), fused, age })
+    pub fn known_pose(&self, robot: &Name, now: Instant) -> Option<KnownPose> {
+        let state = self.lock().robots.get(robot)?.clone();
+        let state = lock_robot(&state);
+        let fused = state.pose()?;
+        let age = state.age(fused.at_ns, now);
+        (age <= MAX_POSE_AGE).then(|| KnownPose { map: state.map.clone(), fused, age })
     }
 
-    /// Every fix of a robot and what became of it; nothing for one that has not been heard of since the start.
+    /// The correction log of a robot; empty for a robot that has sent nothing since the start.
     pub fn corrections(&self, robot: &Name) -> Corrections {
-        let Some(followed) = self.lock().robots.get(robot).cloned() else { return Corrections::default() };
-        let followed = own(&followed);
-        followed.log.read(followed.modalities())
+        let Some(state) = self.lock().robots.get(robot).cloned() else { return Corrections::default() };
+        let state = lock_robot(&state);
+        state.log.read(state.modalities())
     }
 
-    /// Begins to record a run of a robot on a map.
-    pub fn record(&self, robot: &Name, map: &str) -> Result<RecordingStatus, RecordingError> {
-        let mut recorded = self.recorded.lock().unwrap_or_else(PoisonError::into_inner);
-        if recorded.contains(robot) {
-            return Err(RecordingError::Going);
+    /// Starts a recording of a robot on a map.
+    pub fn start_recording(&self, robot: &Name, map: &str) -> Result<RecordingStatus, RecordingError> {
+        let mut recording = self.recording_robots.lock().unwrap_or_else(PoisonError::into_inner);
+        if recording.contains(robot) {
+            return Err(RecordingError::AlreadyRecording);
         }
-        if recorded.len() >= MAX_RECORDINGS {
+        if recording.len() >= MAX_RECORDINGS {
             return Err(RecordingError::TooMany);
         }
-        let followed = self.lock().robot(robot).map_err(|_full| RecordingError::TooMany)?;
-        let mut followed = own(&followed);
-        let run = followed.run.insert(Box::new(RunRecording::new(map)));
-        let told = run.told(robot.as_str());
-        recorded.insert(robot.clone());
-        Ok(told)
+        let state = self.lock().robot(robot).map_err(|_full| RecordingError::TooMany)?;
+        let mut state = lock_robot(&state);
+        let recorded = state.recording.insert(Box::new(RunRecording::new(map)));
+        let status = recorded.status(robot.as_str());
+        recording.insert(robot.clone());
+        Ok(status)
     }
 
-    /// The run of a robot as it is recorded.
-    pub fn recorded(&self, robot: &Name) -> Option<RecordingStatus> {
-        let followed = self.lock().robots.get(robot)?.clone();
-        let followed = own(&followed);
-        Some(followed.run.as_ref()?.told(robot.as_str()))
+    /// Status of a robot's recording.
+    pub fn recording(&self, robot: &Name) -> Option<RecordingStatus> {
+        let state = self.lock().robots.get(robot)?.clone();
+        let state = lock_robot(&state);
+        Some(state.recording.as_ref()?.status(robot.as_str()))
     }
 
-    /// Ends the recording and gives it.
+    /// Ends a robot's recording and gives it.
     pub fn take_recording(&self, robot: &Name) -> Option<Box<RunRecording>> {
-        let mut recorded = self.recorded.lock().unwrap_or_else(PoisonError::into_inner);
-        recorded.remove(robot);
-        let followed = self.lock().robots.get(robot)?.clone();
-        own(&followed).run.take()
+        let mut recording = self.recording_robots.lock().unwrap_or_else(PoisonError::into_inner);
+        recording.remove(robot);
+        let state = self.lock().robots.get(robot)?.clone();
+        lock_robot(&state).recording.take()
     }
 
-    /// The state of a robot that stands on this map, for its live epoch; `None` for any other. What a frame shows of a map
-    /// that its robot does not stand on says nothing about the robot's pose, and must not restart its fusion; no more must
-    /// what was still in work when another epoch began.
-    fn followed(&self, robot: &Name, map: &str, epoch: u64) -> Option<Arc<Mutex<RobotState>>> {
+    /// The state of a robot that is on this map, for its live epoch; `None` for any other. A frame against another map says
+    /// nothing about the robot's pose and must not reset its fusion. Neither must a frame that was in work when another epoch
+    /// began.
+    fn robot_state(&self, robot: &Name, map: &str, epoch: u64) -> Option<Arc<Mutex<RobotState>>> {
         let stands_on = self.snapshots.robot_map(robot.as_str())?;
         if stands_on != map || self.epochs.current(robot).is_some_and(|current| current != epoch) {
             return None;
@@ -290,15 +292,15 @@ impl MotionTracker {
         self.lock().robot(robot).ok()
     }
 
-    /// The pose to publish, unless it is too old.
-    fn tell(&self, robot: &Name, map: &str, epoch: u64, told: StatedPose) -> Option<v1::RobotPose> {
-        let StatedPose { fused, age, modalities, trust } = told;
+    /// Sends a pose to the pages and gives it as the message to publish, unless it is too old.
+    fn announce(&self, robot: &Name, map: &str, epoch: u64, stated: StatedPose) -> Option<v1::RobotPose> {
+        let StatedPose { fused, age, modalities, trust } = stated;
         if age > MAX_POSE_AGE {
-            tracing::debug!(%robot, ?age, "a pose is too old to be published");
+            tracing::debug!(%robot, ?age, "pose_too_old_to_publish");
             return None;
         }
         let age_ms = age.as_secs_f64() * 1e3;
-        self.live.fused(robot, map, &fused.pose, (fused.corrections, age_ms), trust);
+        self.live.publish_pose(robot, map, &fused.pose, (fused.corrections, age_ms), trust);
         Some(v1::RobotPose {
             epoch,
             captured_ns: fused.at_ns,
@@ -312,13 +314,13 @@ impl MotionTracker {
         })
     }
 
-    /// What came in: odometry and scans.
+    /// Counts of odometry messages and of scans.
     pub fn counts(&self) -> (MessageCounts, MessageCounts) {
         let state = self.lock();
         (state.odometry.clone(), state.scans.clone())
     }
 
-    /// What became of the capture times of frames.
+    /// Counts of accepted and refused capture times of frames.
     pub fn frame_stamps(&self) -> MessageCounts {
         self.lock().stamps.clone()
     }
@@ -337,7 +339,7 @@ impl State {
     }
 }
 
-fn own(robot: &Mutex<RobotState>) -> MutexGuard<'_, RobotState> {
+fn lock_robot(robot: &Mutex<RobotState>) -> MutexGuard<'_, RobotState> {
     robot.lock().unwrap_or_else(PoisonError::into_inner)
 }
 

@@ -1,5 +1,5 @@
-//! Panics that were caught, counted by the edge that caught them. An edge is where work of one kind begins: a frame, a
-//! write, a message, a request. What is behind it may be wrong; the process and everybody else's work go on.
+//! Caught panics, counted by the edge that caught them. An edge is where work of one kind begins: a frame, a write, a
+//! message, a request. A panic ends that piece of work; the process and all other work go on.
 
 use std::{
     any::Any,
@@ -21,9 +21,9 @@ pub enum Edge {
     Frame,
     /// A scan on the laser's thread.
     Scan,
-    /// The making of a map.
+    /// A mapping.
     Mapping,
-    /// A message or a question of a robot, on zenoh's thread.
+    /// A message or a query of a robot, on zenoh's thread.
     Message,
     /// A message to a robot, on the thread that sends.
     Delivery,
@@ -72,13 +72,13 @@ impl Edge {
 pub struct Panics([AtomicU64; Edge::ALL.len()]);
 
 impl Panics {
-    /// Counts a panic that was caught and logs it: `what` it met, `follows` says what becomes of that.
+    /// Counts and logs a caught panic. `what` names the work, `follows` says what becomes of it.
     pub fn caught(&self, edge: Edge, cause: &(dyn Any + Send), what: impl Display, follows: &str) {
         self.0[edge as usize].fetch_add(1, Ordering::Relaxed);
-        tracing::error!(edge = edge.name(), panic = text(cause), %what, follows, "a panic was caught");
+        tracing::error!(edge = edge.name(), panic = text(cause), %what, follows, "panic_caught");
     }
 
-    /// Runs `work`. A panic is counted and logged; `None` then.
+    /// Runs `work`. After a panic, which is counted and logged, the result is `None`.
     pub fn catch<T>(
         &self,
         edge: Edge,
@@ -86,13 +86,13 @@ impl Panics {
         follows: &str,
         work: impl FnOnce() -> T,
     ) -> Option<T> {
-        // What is shared behind an edge is changed in single steps under a lock, or replaced as a whole.
+        // Unwind safety: shared state behind an edge is changed in single steps under a lock, or replaced as a whole.
         catch_unwind(AssertUnwindSafe(work))
             .inspect_err(|cause| self.caught(edge, cause.as_ref(), what, follows))
             .ok()
     }
 
-    /// What a task came to that ran elsewhere. A panic of it is counted and logged; the error says so, too.
+    /// The result of a task that ran elsewhere. A panic is counted and logged, and is the error.
     pub fn joined<T>(
         &self,
         edge: Edge,
@@ -120,7 +120,7 @@ impl Panics {
     }
 }
 
-/// A task that did not come to its end, and why.
+/// Why a task has no result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct Ended(&'static str);

@@ -1,5 +1,5 @@
-//! Uploaded pictures: bytes in, grey image out, turned the way a viewer shows it (phones note in the file how they were
-//! held); and grey images back to PNG for pages. Decoding and its limits are [`super::decode`]'s.
+//! Uploaded pictures. In: bytes of a file. Out: a grey image, upright by the orientation that the file states. Also grey
+//! images to PNG, for pages. [`super::decode`] decodes and holds the limits.
 
 use super::decode::{self, ImageLimits};
 use image::{
@@ -11,7 +11,7 @@ use protos::{Code, Rejection, convert::Encoding};
 use std::io::Cursor;
 use vision::frame::GrayImage;
 
-/// The word for what the first bytes say: `png` or `jpeg`.
+/// `png` or `jpeg`, by the first bytes.
 pub fn kind(bytes: &[u8]) -> Option<&'static str> {
     match decode::sniff(bytes)? {
         Encoding::Jpeg => Some("jpeg"),
@@ -20,7 +20,7 @@ pub fn kind(bytes: &[u8]) -> Option<&'static str> {
     }
 }
 
-/// Decodes an uploaded picture and turns it upright.
+/// Decodes an uploaded picture and turns it upright. Errors: those of [`decode::decode_upload`].
 pub fn decode(bytes: &[u8], limits: ImageLimits) -> Result<GrayImage, Rejection> {
     let gray = decode::decode_upload(bytes, limits)?;
     match orientation(bytes) {
@@ -29,7 +29,7 @@ pub fn decode(bytes: &[u8], limits: ImageLimits) -> Result<GrayImage, Rejection>
     }
 }
 
-/// What the file notes of the camera's attitude; PNG notes nothing.
+/// The orientation that a JPEG file states; PNG states none.
 fn orientation(bytes: &[u8]) -> Orientation {
     let read = || JpegDecoder::new(Cursor::new(bytes)).and_then(|mut decoder| decoder.orientation());
     if decode::sniff(bytes) == Some(Encoding::Jpeg) {

@@ -1,17 +1,17 @@
-//! A scan on its way to the map.
+//! A scan that waits to be matched or mapped.
 
 use map::{laser::Scan, pose2::Pose2};
 
-/// A checked scan.
+/// A checked scan with its odometry.
 #[derive(Debug, Clone)]
 pub struct ScanJob {
-    /// The robot's map.
+    /// Name of the robot's map.
     pub map: String,
-    /// Echo of the scan.
+    /// Epoch of the scan.
     pub epoch: u64,
-    /// Robot's clock.
+    /// Capture time by the robot's clock, ns.
     pub captured_ns: i64,
-    /// Odometry of its moment.
+    /// Odometry at capture (odom frame).
     pub odom_from_robot: Pose2,
     /// Bearings and ranges.
     pub scan: Scan,

@@ -1,11 +1,11 @@
-//! For tests: a rendered corridor, two of its posters taught, and a robot that looks at them.
+//! For tests: a rendered corridor, two of its posters taught, and a robot in front of them.
 
 use super::{
+    findings::findings,
     live::LiveHub,
     motion::MotionTracker,
     slots::Slots,
     snapshot::{LandmarkInfo, MapSnapshot, Snapshots},
-    standing::findings,
     workers::Engine,
 };
 use crate::decode::ImageLimits;
@@ -13,7 +13,7 @@ use map::place::{LandmarkPlace, PlaceSigmas};
 use nalgebra::Vector3;
 use sim::{
     building::Building,
-    lesson::{LessonParams, stops},
+    lesson::{self, LessonParams},
     robot::{Robot, RobotParams, SensorReadings},
 };
 use std::{collections::BTreeMap, sync::Arc};
@@ -28,7 +28,7 @@ use vision::{
 /// Name of the map that is taught.
 pub const MAP: &str = "corridor";
 
-/// The corridor with a robot that can look.
+/// The corridor with a robot.
 pub struct Scene {
     building: Arc<Building>,
     robot: Robot,
@@ -36,15 +36,15 @@ pub struct Scene {
 
 impl Scene {
     /// The corridor, not taught yet.
-    #[expect(clippy::new_without_default, reason = "it draws a corridor: that is no default")]
+    #[expect(clippy::new_without_default, reason = "it renders a corridor: that is no default")]
     pub fn new() -> Self {
         let building = Arc::new(Building::corridor(7));
         let robot = Robot::new(building.clone(), &RobotParams::default());
         Self { building, robot }
     }
 
-    /// What the robot sees at stops before the first two posters; another seed gives other stops.
-    pub fn looks(&mut self, seed: u64, views: usize) -> Vec<(String, SensorReadings)> {
+    /// The robot's readings at stops in front of the first two posters, with the poster's name; another seed gives other stops.
+    pub fn stops(&mut self, seed: u64, views: usize) -> Vec<(String, SensorReadings)> {
         let near = LessonParams {
             seed,
             views,
@@ -53,7 +53,7 @@ impl Scene {
             ..LessonParams::default()
         };
         let names: Vec<_> = self.building.posters().take(2).map(|l| l.name.clone()).collect();
-        let stops = stops(&self.building, &near).into_iter().filter(|s| names.contains(&s.landmark));
+        let stops = lesson::stops(&self.building, &near).into_iter().filter(|s| names.contains(&s.landmark));
         stops.map(|stop| (stop.landmark, self.robot.look(&stop.step))).collect()
     }
 
@@ -67,11 +67,11 @@ impl Scene {
         let params = Arc::new(Params::default());
         let mut models = Vec::new();
         let (mut landmarks, mut sizes) = (BTreeMap::new(), BTreeMap::new());
-        for (name, look) in self.looks(1, 1) {
+        for (name, readings) in self.stops(1, 1) {
             let id = LandmarkId(models.len() as u64 + 1);
-            let seen = look.frame.truth.landmark(&name).expect("the scene is made so");
-            let views = synthesis::views(&look.frame.image, &seen.corners_px, 24, &params, id.0);
-            let points = view_points(&look.frame.image, &seen.corners_px);
+            let seen = readings.frame.truth.landmark(&name).expect("the scene is made so");
+            let views = synthesis::views(&readings.frame.image, &seen.corners_px, 24, &params, id.0);
+            let points = view_points(&readings.frame.image, &seen.corners_px);
             let model = learn(id, &views, &[], &params).expect("the scene is made so").with_points(&[points]);
             models.push(Arc::new(model));
             let truth = self.building.landmark(&name).expect("the scene is made so");
@@ -108,8 +108,8 @@ pub fn engine(maps: &[Arc<MapSnapshot>]) -> Engine {
         limits: ImageLimits::FRAME,
         vitals: Arc::default(),
         findings: findings().0,
-        searches: Arc::default(),
-        gather: Arc::new(crate::frame_tap::NoTap),
+        relocalisers: Arc::default(),
+        frame_tap: Arc::new(crate::frame_tap::NoTap),
         search_every_frame: true,
     }
 }

@@ -12,14 +12,14 @@ use std::{
 
 /// Cameras of one robot.
 pub const MAX_CAMERAS_PER_ROBOT: usize = 8;
-/// A slot that saw no frame for so long gives way to a camera of another robot; its order is forgotten then.
+/// A slot without a frame for this long may be replaced by a camera of another robot; its order is forgotten then.
 pub const IDLE_SLOT: Duration = Duration::from_mins(10);
-/// Where a robot has all the cameras it may have, the one longest without a frame gives way to a new one after this time.
+/// A robot with all the cameras that it may have: a new one replaces the one with the oldest frame, if that is this old.
 pub const IDLE_CAMERA: Duration = Duration::from_secs(5);
 /// Epochs of one camera whose last number is remembered besides the present one's.
 pub const PAST_EPOCHS: usize = 8;
 
-/// Whose frame.
+/// A robot and one of its cameras.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub struct SlotKey {
     /// The robot.
@@ -28,7 +28,7 @@ pub struct SlotKey {
     pub camera: Name,
 }
 
-/// How a frame that was taken for work ended.
+/// How the work on a frame ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FrameOutcome {
     /// Answered.
@@ -39,7 +39,7 @@ pub enum FrameOutcome {
     Rejected(Code),
 }
 
-/// What happened to all frames. `received` is the sum of the others at every moment.
+/// Counts of all frames. `received` is the sum of the others at every time.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct FrameCounts {
     /// Every frame that arrived.
@@ -64,15 +64,15 @@ impl FrameCounts {
         self.rejected.values().sum()
     }
 
-    /// `received` less everything that is known of: 0, or frames were lost.
+    /// `received` less the sum of the others: 0, or frames were lost.
     pub fn missing(&self) -> i128 {
         let ended = self.processed + self.superseded + self.expired + self.rejected_total();
         i128::from(self.received) - i128::from(ended + self.waiting + self.in_work)
     }
 }
 
-/// Place of a message in its stream's order, by epoch. Which epoch is live is decided elsewhere
-/// ([`crate::epochs::Epochs`]); one that comes back goes on after its last number.
+/// The last sequence number of a stream in each of its latest epochs. [`crate::epochs::Epochs`] decides which epoch is live;
+/// one that comes back continues after its last number.
 #[derive(Debug, Default)]
 pub struct SequenceTracker {
     last: Option<(u64, u64)>,
@@ -146,8 +146,8 @@ impl<T> Slots<T> {
         Self { state: Mutex::new(state), ready: Condvar::new(), limit: max_slots }
     }
 
-    /// Puts a frame in its slot; the one that waited there is superseded. Refuses what is not newer than the last of
-    /// this camera, and cameras beyond the limit. Never waits for work.
+    /// Puts a frame in its slot; the one that waited there is superseded. Never waits for work. Errors: the frame is not newer
+    /// than the last of its camera, or there are too many cameras.
     pub fn offer(&self, key: SlotKey, order: (u64, u64), job: T, now: Instant) -> Result<(), Rejection> {
         let mut guard = self.lock();
         let state = &mut *guard;
@@ -205,7 +205,7 @@ impl<T> Slots<T> {
         self.lock().next()
     }
 
-    /// Ends the work on the frame last taken from this slot; its next one gets in line, behind the others.
+    /// Ends the work on the frame last taken from this slot; its next frame queues behind the others.
     pub fn finish(&self, key: &SlotKey, outcome: FrameOutcome) {
         let mut guard = self.lock();
         let state = &mut *guard;
@@ -224,12 +224,12 @@ impl<T> Slots<T> {
         }
     }
 
-    /// What happened so far.
+    /// Counts of all frames so far.
     pub fn counts(&self) -> FrameCounts {
         self.lock().counts.clone()
     }
 
-    /// Ends the wait of every worker; what waits is counted as expired.
+    /// Ends the wait of every worker; frames that wait are counted as expired.
     pub fn close(&self) {
         let mut guard = self.lock();
         let state = &mut *guard;
@@ -271,8 +271,8 @@ impl<T> State<T> {
         None
     }
 
-    /// Room for one more slot: at the cost of slots that have been idle for [`IDLE_SLOT`], and of the robot's own camera that
-    /// has been idle longest, [`IDLE_CAMERA`] at least.
+    /// Makes room for one more slot: removes slots that have been idle for [`IDLE_SLOT`], and if need be the robot's camera that
+    /// has been idle longest, for at least [`IDLE_CAMERA`].
     fn make_room(&mut self, key: &SlotKey, max_slots: usize, now: Instant) -> Result<(), Rejection> {
         let of_robot =
             |slots: &BTreeMap<SlotKey, Slot<T>>| slots.keys().filter(|k| k.robot == key.robot).count();
@@ -287,8 +287,8 @@ impl<T> State<T> {
                 free && now.saturating_duration_since(s.touched) >= IDLE_CAMERA
             };
             let own = self.slots.iter().filter(|(k, s)| k.robot == key.robot && idle(s));
-            let stalest = own.min_by_key(|(_, s)| s.touched).map(|(k, _)| k.clone());
-            stalest.map(|k| self.slots.remove(&k));
+            let oldest = own.min_by_key(|(_, s)| s.touched).map(|(k, _)| k.clone());
+            oldest.map(|k| self.slots.remove(&k));
         }
         if of_robot(&self.slots) >= MAX_CAMERAS_PER_ROBOT {
             let detail = format!("a robot has at most {MAX_CAMERAS_PER_ROBOT} cameras at a time");

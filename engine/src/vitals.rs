@@ -1,6 +1,6 @@
 //! Which permanent parts of the server run: the writer, the workers, the outbox and the tasks beside them. Each holds a
-//! [`Pulse`] for as long as it runs. A part that ends before the server is told to stop has failed: the server is not
-//! ready any more, and [`Vitals::failed`] gives the reason to whoever ends the process.
+//! [`Pulse`] while it runs. A part that ends before the server is told to stop has failed. Then the server is not ready any
+//! more, and [`Vitals::failed`] gives the reason to whoever ends the process.
 
 use crate::panics::Panics;
 use std::{
@@ -13,16 +13,16 @@ use std::{
 };
 use tokio::sync::watch;
 
-/// Time between two looks at parts that cannot hold a pulse themselves.
-const LOOK_EVERY: Duration = Duration::from_secs(1);
+/// Time between two probes of the parts that cannot hold a pulse themselves.
+const PROBE_EVERY: Duration = Duration::from_secs(1);
 
-/// A part that ended although nobody told it to.
+/// A part that ended before it was told to.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{part} has ended: {reason}")]
 pub struct Failure {
-    /// Its name.
+    /// Name of the part.
     pub part: String,
-    /// Why, as far as is known.
+    /// The reason, as far as it is known.
     pub reason: String,
 }
 
@@ -46,30 +46,30 @@ impl std::fmt::Debug for Vitals {
 }
 
 impl Vitals {
-    /// Panics that were caught, of all parts.
+    /// Counters of caught panics, of all parts.
     pub fn panics(&self) -> &Arc<Panics> {
         &self.panics
     }
 
-    /// A part begins. It runs until the pulse is dropped.
+    /// Registers a part that begins to run. It runs until the pulse is dropped.
     #[must_use = "the part runs for as long as this is held"]
     pub fn begin(self: &Arc<Self>, part: impl Into<String>) -> Pulse {
-        Pulse { vitals: self.clone(), part: part.into(), told: false }
+        Pulse { vitals: self.clone(), part: part.into(), is_told: false }
     }
 
-    /// A part that says by itself whether it runs. Asked by [`Vitals::failure`] and [`Vitals::watch`].
+    /// Registers a part that says by itself whether it runs. [`Vitals::failure`] and [`Vitals::watch`] probe it.
     pub fn probe(&self, part: &'static str, runs: impl Fn() -> bool + Send + Sync + 'static) {
         self.probes.lock().unwrap_or_else(PoisonError::into_inner).push((part, Box::new(runs)));
     }
 
-    /// A part cannot go on.
+    /// Records that a part cannot go on.
     pub fn fail(&self, part: &str, reason: impl Into<String>) {
         let failure = Failure { part: part.to_owned(), reason: reason.into() };
         if self.stopping.load(Ordering::Acquire) {
-            tracing::debug!(%failure, "while stopping");
+            tracing::debug!(%failure, "part_ended_while_stopping");
             return;
         }
-        tracing::error!(%failure, "the server cannot go on");
+        tracing::error!(%failure, follows = "the server stops", "part_failed");
         self.failure.send_if_modified(|first| {
             let is_first = first.is_none();
             first.get_or_insert(failure);
@@ -103,21 +103,21 @@ impl Vitals {
         }
     }
 
-    /// Looks after the parts that have a probe, for ever.
+    /// Probes the parts that have a probe, until one has failed.
     pub async fn watch(self: Arc<Self>) {
         while self.failure().is_none() {
-            tokio::time::sleep(LOOK_EVERY).await;
+            tokio::time::sleep(PROBE_EVERY).await;
         }
     }
 
-    /// The stored version of a map is not the one that is used, since it cannot be made ready: it stays so until a later
-    /// version can.
+    /// Records that the stored version of a map could not be published: an earlier one stays in use until a later version can
+    /// be.
     pub fn unpublished(&self, map: &str, reason: &str) {
         let mut all = self.unpublished.lock().unwrap_or_else(PoisonError::into_inner);
         all.insert(map.to_owned(), reason.to_owned());
     }
 
-    /// The stored version of a map is used, or the map is gone.
+    /// Records that the stored version of a map is published, or that the map is gone.
     pub fn published(&self, map: &str) {
         self.unpublished.lock().unwrap_or_else(PoisonError::into_inner).remove(map);
     }
@@ -128,24 +128,24 @@ impl Vitals {
     }
 }
 
-/// Held by a part for as long as it runs.
+/// A part holds this while it runs.
 #[derive(Debug)]
 pub struct Pulse {
     vitals: Arc<Vitals>,
     part: String,
-    told: bool,
+    is_told: bool,
 }
 
 impl Pulse {
     /// The part ends because it was told to.
     pub fn end(mut self) {
-        self.told = true;
+        self.is_told = true;
     }
 }
 
 impl Drop for Pulse {
     fn drop(&mut self) {
-        if self.told {
+        if self.is_told {
             return;
         }
         let reason = if std::thread::panicking() { "it panicked" } else { "it stopped by itself" };
@@ -174,7 +174,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn a_part_that_is_told_to_end_is_none() {
+    async fn a_part_that_is_told_to_end_is_no_failure() {
         let vitals = Arc::new(Vitals::default());
         let pulse = vitals.begin("writer");
         pulse.end();
@@ -194,7 +194,7 @@ mod tests {
         tokio::spawn(vitals.clone().watch());
         assert_eq!(vitals.failure(), None);
         runs.store(false, Ordering::Relaxed);
-        let failed = tokio::time::timeout(LOOK_EVERY * 5, vitals.failed()).await;
+        let failed = tokio::time::timeout(PROBE_EVERY * 5, vitals.failed()).await;
         assert_eq!(failed.unwrap().part, "outbox");
     }
 }

@@ -1,23 +1,23 @@
-//! A fixed pool of threads that turns frames into answers: decode, pipeline, robot pose, publish. Vision runs nowhere
-//! else for robots, and never on the async runtime. A panic anywhere in a frame's work is caught, answered as `internal`
-//! and counted; its slot is free again and the worker goes on. A thread that ends untold makes the server fail.
+//! A fixed pool of threads that turns frames into answers: decode, pipeline, robot pose, publish. Vision for robots runs
+//! only here, never on the async runtime. A panic in a frame's work is caught, counted and answered as `internal`; the slot
+//! is free again and the worker goes on. A thread that ends before it is told to makes the server fail.
 
 use super::{
+    ambiguous_observations::ambiguous_observations,
     cameras::CameraSample,
     decode::{ImageLimits, decode_frame},
-    doubles::sighted,
+    findings::{FindingSender, LandmarkFinding},
     frame_analysis::{StageTimes, analyse_frame},
     frame_context::FrameContext,
-    guided::{Guided, guided},
+    guided::{GuidedResult, recognise_guided},
     intake::{FrameJob, unknown_map},
-    judging::{JudgedFrame, LandmarkChecks, judged_expected, judged_frame},
+    landmark_checks::{FrameEvaluation, LandmarkChecks, evaluate_expected_only, evaluate_frame},
     live::{LiveFrame, LiveHub},
     motion::{FrameStamp, MotionTracker, PriorPose},
     panics::Edge,
-    search::{RelocalisationInput, RelocalisationUpdate, Relocalisers},
+    relocalise::{RelocalisationInput, RelocalisationUpdate, Relocalisers},
     slots::{FrameOutcome, SlotKey, Slots},
     snapshot::{MapSnapshot, Snapshots},
-    standing::{FindingSender, LandmarkFinding},
 };
 use crate::frame_tap::{AnalysedFrame, FrameTap};
 use crate::vitals::Vitals;
@@ -26,7 +26,7 @@ use protos::{CheckedFrame, Code, Name, Rejection, convert::geometry::pose2_covar
 use std::{cell::Cell, sync::Arc, thread::JoinHandle, time::Instant};
 use vision::{frame::GrayImage, model::LandmarkId, pipeline::FrameAnalysis};
 
-/// Where answers and poses go. Must not wait.
+/// Takes answers and poses. Never waits.
 pub trait Publish: Send + Sync + 'static {
     /// An answer to a frame.
     fn answer(&self, key: &SlotKey, answer: &v1::Answer);
@@ -34,27 +34,27 @@ pub trait Publish: Send + Sync + 'static {
     fn pose(&self, robot: &Name, pose: &v1::RobotPose);
 }
 
-/// What workers share.
+/// What the workers share.
 #[derive(Debug, Clone)]
 pub struct Engine {
     /// Where frames wait.
     pub slots: Arc<Slots<FrameJob>>,
     /// Maps.
     pub snapshots: Arc<Snapshots>,
-    /// Robots on the move.
+    /// The motion of robots.
     pub motion: Arc<MotionTracker>,
     /// What pages show.
     pub live: Arc<LiveHub>,
-    /// What a frame may cost.
+    /// Largest frame.
     pub limits: ImageLimits,
-    /// Where threads say that they run and panics are counted.
+    /// Pulses of the threads, and counters of panics.
     pub vitals: Arc<Vitals>,
     /// Where findings about landmarks go.
     pub findings: FindingSender,
-    /// Robots that do not know where they are.
-    pub searches: Arc<Relocalisers>,
-    /// Where frames of robots that gather views go.
-    pub gather: Arc<dyn FrameTap>,
+    /// Relocalisations of robots without a pose.
+    pub relocalisers: Arc<Relocalisers>,
+    /// Takes frames of robots that gather views.
+    pub frame_tap: Arc<dyn FrameTap>,
     /// Whether every frame is searched for all landmarks of its map.
     pub search_every_frame: bool,
 }
@@ -76,23 +76,23 @@ impl Workers {
             let name = format!("vision-{i}");
             let pulse = engine.vitals.begin(format!("the worker thread {name}"));
             threads.push(std::thread::Builder::new().name(name).spawn(move || {
-                // Ends with the thread, however that ends.
+                // Dropped with the thread, however that ends.
                 let _pulse = pulse;
                 while let Some((key, job)) = engine.slots.take() {
-                    let outcome = engine.contained(&key, &job, publish.as_ref());
+                    let outcome = engine.answer_frame(&key, &job, publish.as_ref());
                     engine.slots.finish(&key, outcome);
                 }
             })?);
         }
-        let (lasers, publish) = (engine.clone(), publish.clone());
+        let (laser, publish) = (engine.clone(), publish.clone());
         let named = std::thread::Builder::new().name("laser".to_owned());
         let pulse = engine.vitals.begin("the laser thread");
         threads.push(named.spawn(move || {
             let _pulse = pulse;
-            while let Some((robot, job)) = lasers.motion.scans().take() {
+            while let Some((robot, job)) = laser.motion.scans().take() {
                 let what = format_args!("a scan of robot {robot}");
-                lasers.vitals.panics().catch(Edge::Scan, what, "it corrects nothing", || {
-                    if let Some(pose) = lasers.motion.laser(&robot, &job, Instant::now()) {
+                laser.vitals.panics().catch(Edge::Scan, what, "it corrects nothing", || {
+                    if let Some(pose) = laser.motion.fix_by_scan(&robot, &job, Instant::now()) {
                         publish.pose(&robot, &pose);
                     }
                 });
@@ -101,39 +101,40 @@ impl Workers {
         Ok(Self { slots: engine.slots.clone(), motion: engine.motion.clone(), threads })
     }
 
-    /// Ends when every frame in work is answered. Waits: not for an async thread.
+    /// Returns when every frame in work is answered. Waits: not for an async thread.
     pub fn stop(self) {
         self.slots.close();
         self.motion.scans().close();
         for thread in self.threads {
             if thread.join().is_err() {
-                tracing::error!("a worker ended by a panic");
+                tracing::error!("worker_panicked");
             }
         }
     }
 }
 
-/// What came of a frame.
-struct Done {
+/// A frame after its analysis.
+struct AnsweredFrame {
     answer: v1::Answer,
     map: Arc<MapSnapshot>,
-    /// What it says of the robot and the landmarks; absent where it must not count.
-    judged: Option<JudgedFrame>,
-    /// Where a robot that searched is found, and the landmarks that say so.
-    found: Option<(Pose2Covariance, Vec<LandmarkId>)>,
+    /// Its fixes and landmark checks; absent if the frame must not change the robot's pose or the map.
+    evaluation: Option<FrameEvaluation>,
+    /// The pose of a relocalised robot, and the landmarks that it rests on.
+    relocalised: Option<(Pose2Covariance, Vec<LandmarkId>)>,
 }
 
 impl Engine {
-    /// Answers one frame and publishes the answer; never panics. What a frame has come to once it is answered stands,
-    /// whatever happens to the pose and the findings after it.
-    fn contained(&self, key: &SlotKey, job: &FrameJob, publish: &dyn Publish) -> FrameOutcome {
+    /// Answers one frame and publishes the answer; never panics. The outcome of an answered frame stands, whatever happens to
+    /// the pose and the findings after it.
+    fn answer_frame(&self, key: &SlotKey, job: &FrameJob, publish: &dyn Publish) -> FrameOutcome {
         let answered = Cell::new(None);
         let seq = job.frame.seq;
         let what = format_args!("frame {seq} of robot {}, camera {}", key.robot, key.camera);
         let panics = self.vitals.panics();
-        let worked = panics
-            .catch(Edge::Frame, what, "its slot is free again", || self.work(key, job, publish, &answered));
-        if let Some(outcome) = worked.or(answered.get()) {
+        let processed = panics.catch(Edge::Frame, what, "its slot is free again", || {
+            self.process(key, job, publish, &answered)
+        });
+        if let Some(outcome) = processed.or(answered.get()) {
             return outcome;
         }
         let (answer, outcome) = refused(job, &failed());
@@ -141,8 +142,8 @@ impl Engine {
         outcome
     }
 
-    /// Answers one frame; `answered` says what it has come to as soon as the answer is on its way.
-    fn work(
+    /// Answers one frame; `answered` holds the outcome as soon as the answer is published.
+    fn process(
         &self,
         key: &SlotKey,
         job: &FrameJob,
@@ -155,7 +156,7 @@ impl Engine {
         } else {
             self.analyse(key, job)
         };
-        let Done { answer, map, judged, found } = match done {
+        let AnsweredFrame { answer, map, evaluation, relocalised } = match done {
             Ok(done) => done,
             Err(refusal) => {
                 let (answer, outcome) = refused(job, &refusal);
@@ -167,149 +168,153 @@ impl Engine {
         let (frame, outcome) = (&job.frame, FrameOutcome::Processed);
         answered.set(Some(outcome));
         self.reply(key, job, answer, publish);
-        let Some(judged) = judged else { return outcome };
-        let at = moment(frame, &map);
-        if let Some(pose) = self.motion.looked(&key.robot, &key.camera, at, &judged.fixes()) {
+        let Some(evaluation) = evaluation else { return outcome };
+        let at = frame_stamp(frame, &map);
+        if let Some(pose) = self.motion.apply_frame(&key.robot, &key.camera, at, &evaluation.fixes()) {
             publish.pose(&key.robot, &pose);
         }
-        if let Some((pose, landmarks)) = found
-            && let Some(pose) = self.motion.found(&key.robot, moment(frame, &map), &pose, &landmarks)
+        if let Some((pose, landmarks)) = relocalised
+            && let Some(pose) =
+                self.motion.start_from_hypothesis(&key.robot, frame_stamp(frame, &map), &pose, &landmarks)
         {
-            self.searches.end(&key.robot);
+            self.relocalisers.stop(&key.robot);
             publish.pose(&key.robot, &pose);
         }
-        if let Some(LandmarkChecks { grounds, judged, missed }) = judged.seen {
-            let changes = self.motion.judged(&key.robot, moment(frame, &map), &grounds, &judged, &missed);
+        if let Some(LandmarkChecks { prior, observed, missed }) = evaluation.checks {
+            let at = frame_stamp(frame, &map);
+            let changes = self.motion.update_landmark_health(&key.robot, at, &prior, &observed, &missed);
             for change in changes {
                 let name = map.landmarks.get(&change.landmark).map_or("", |l| l.name.as_str());
-                self.findings.tell(LandmarkFinding::new(&map.name, name, &change));
+                self.findings.send(LandmarkFinding::new(&map.name, name, &change));
             }
         }
         outcome
     }
 
     /// Decode, pipeline, robot pose: everything that can fail on a frame's content.
-    fn analyse(&self, key: &SlotKey, job: &FrameJob) -> Result<Done, Rejection> {
+    fn analyse(&self, key: &SlotKey, job: &FrameJob) -> Result<AnsweredFrame, Rejection> {
         let frame = &job.frame;
         #[cfg(test)]
         assert!(key.camera.as_str() != tests::PLANTED, "planted");
-        // One version of the map for the whole answer, whatever is published meanwhile.
+        // The whole answer rests on one version of the map.
         let map = self.snapshots.get(&job.map).ok_or_else(|| unknown_map(&job.map))?;
         let mut times = StageTimes::start();
         let image = decode_frame(frame, self.limits)?;
         times.ended("decode");
-        // A frame may be answered on any map; what follows for the robot and for the map, only on its own.
+        // A frame is answered on any map. It changes the robot's pose and the map only on the robot's own map.
         let on_own_map = self.snapshots.robot_map(key.robot.as_str()).is_some_and(|own| own == map.name);
         let is_live = self.motion.epochs().current(&key.robot).is_none_or(|epoch| epoch == frame.epoch);
         let counts = on_own_map && is_live && job.stamp_instead_ns.is_none();
-        let at = moment(frame, &map);
-        let grounds = counts.then(|| self.motion.grounds(&key.robot, &key.camera, at)).flatten();
-        if let Some((answer, judged)) =
-            self.expected_only(key, frame, (&image, &map), grounds.as_ref(), &mut times)
+        let at = frame_stamp(frame, &map);
+        let prior = counts.then(|| self.motion.prior_pose(&key.robot, &key.camera, at)).flatten();
+        if let Some((answer, evaluation)) =
+            self.expected_only(key, frame, (&image, &map), prior.as_ref(), &mut times)
         {
-            return Ok(Done { answer, map, judged: Some(judged), found: None });
+            return Ok(AnsweredFrame { answer, map, evaluation: Some(evaluation), relocalised: None });
         }
-        let facts = analyse_frame(&image, frame.intrinsics.as_ref(), &map, &mut times);
-        let mut answer = crate::frame_answer::answer(&facts, &map);
-        let view = view(frame, &facts, &map);
-        // The fused pose while nothing contradicts it; without one, what the robot itself believes.
-        let guide = match &grounds {
-            Some(grounds) => grounds.plan.guided.then_some(&grounds.pose),
+        let analysis = analyse_frame(&image, frame.intrinsics.as_ref(), &map, &mut times);
+        let mut answer = crate::frame_answer::answer(&analysis, &map);
+        let context = frame_context(frame, &analysis, &map);
+        // The guide is the fused pose while nothing contradicts it; without one, the robot's own prior.
+        let guide = match &prior {
+            Some(prior) => prior.plan.guided.then_some(&prior.pose),
             None => frame.prior.as_ref().filter(|_| on_own_map),
         };
-        let guided = guide.map_or_else(Guided::default, |pose| guided(&image, &view, pose));
-        let judged = judged_frame(&view, grounds, &guided);
-        crate::frame_answer::fill_fixes(&mut answer, &judged, &guided, &map);
+        let guided =
+            guide.map_or_else(GuidedResult::default, |pose| recognise_guided(&image, &context, pose));
+        let evaluation = evaluate_frame(&context, prior, &guided);
+        crate::frame_answer::fill_fixes(&mut answer, &evaluation, &guided, &map);
         if !counts {
             times.ended("localise");
             answer.timings = times.finish();
             if let Some(captured_ns) = job.stamp_instead_ns.filter(|_| on_own_map && is_live) {
                 let frame = CheckedFrame { captured_ns, ..frame.clone() };
-                let (quads, believed) = (facts.quads, frame.prior);
-                if self.gather.is_wanted(key) {
-                    self.gather.offer(
+                let (quads, map_from_robot) = (analysis.quads, frame.prior);
+                if self.frame_tap.is_wanted(key) {
+                    self.frame_tap.offer(
                         key,
                         &frame,
-                        AnalysedFrame { image, quads, map: map.clone(), believed },
+                        AnalysedFrame { image, quads, map: map.clone(), map_from_robot },
                     );
                 }
             }
-            return Ok(Done { answer, map, judged: None, found: None });
+            return Ok(AnsweredFrame { answer, map, evaluation: None, relocalised: None });
         }
         if let Some(intrinsics) = &frame.intrinsics {
-            let (seen, mounting) = (crate::fixes::unique_landmarks(&facts), frame.mounting.as_ref());
+            let (landmarks, extrinsics) =
+                (crate::fixes::unique_landmarks(&analysis), frame.mounting.as_ref());
             let image_px = [image.width() as u32, image.height() as u32];
-            let fix = judged.fix.as_ref().map_err(|reason| *reason);
-            self.live
-                .watched()
-                .looked(key, &CameraSample { intrinsics, image_px, seen: &seen, map: &map, mounting, fix });
+            let fix = evaluation.fix.as_ref().map_err(|reason| *reason);
+            let sample =
+                CameraSample { intrinsics, image_px, landmarks: &landmarks, map: &map, extrinsics, fix };
+            self.live.camera_registry().record_frame(key, &sample);
         }
-        let searched =
-            self.search(key, frame, (&image, &facts), &map, judged.seen.is_some() || judged.fix.is_ok());
-        let found = searched.and_then(|left| {
-            answer.hypotheses = left.modes.iter().map(hypothesis).collect();
-            left.decided
+        let has_pose = evaluation.checks.is_some() || evaluation.fix.is_ok();
+        let update = self.relocalise(key, frame, (&image, &analysis), &map, has_pose);
+        let relocalised = update.and_then(|update| {
+            answer.hypotheses = update.hypotheses.iter().map(hypothesis).collect();
+            update.pose
         });
         times.ended("localise");
         answer.timings = times.finish();
-        if self.gather.is_wanted(key) {
-            let believed = frame.prior.or(judged.prior);
-            let analysed = AnalysedFrame { image, quads: facts.quads, map: map.clone(), believed };
-            self.gather.offer(key, frame, analysed);
+        if self.frame_tap.is_wanted(key) {
+            let map_from_robot = frame.prior.or(evaluation.prior);
+            let analysed = AnalysedFrame { image, quads: analysis.quads, map: map.clone(), map_from_robot };
+            self.frame_tap.offer(key, frame, analysed);
         }
-        Ok(Done { answer, map, judged: Some(judged), found })
+        Ok(AnsweredFrame { answer, map, evaluation: Some(evaluation), relocalised })
     }
 
-    /// Answers a frame by the landmarks alone that the robot's pose expects, where the schedule asks for no search. `None`
-    /// where it asks for one, or what is found calls for one: nothing, a contradiction, a landmark that is surely in view
-    /// and was not found. Robots that gather are searched for: they want what is on no map.
+    /// Answers a frame by the expected landmarks alone, where the schedule asks for no search of the map. `None` where it asks
+    /// for one, or where the result calls for one: nothing found, a contradiction, or a missing landmark that is surely in
+    /// view. Frames of robots that gather are always searched: they show objects that are on no map.
     fn expected_only(
         &self,
         key: &SlotKey,
         frame: &CheckedFrame,
         (image, map): (&GrayImage, &MapSnapshot),
-        grounds: Option<&PriorPose>,
+        prior: Option<&PriorPose>,
         times: &mut StageTimes,
-    ) -> Option<(v1::Answer, JudgedFrame)> {
-        let is_spared = |g: &&PriorPose| g.plan.guided && g.plan.global.is_none();
-        let grounds = grounds.filter(is_spared).filter(|_| !self.search_every_frame)?;
-        if self.gather.is_wanted(key) {
+    ) -> Option<(v1::Answer, FrameEvaluation)> {
+        let is_spared = |p: &&PriorPose| p.plan.guided && p.plan.global.is_none();
+        let prior = prior.filter(is_spared).filter(|_| !self.search_every_frame)?;
+        if self.frame_tap.is_wanted(key) {
             return None;
         }
         let nothing = FrameAnalysis { quads: Vec::new() };
-        let view = view(frame, &nothing, map);
-        let guided = guided(image, &view, &grounds.pose);
-        let judged = judged_expected(&view, grounds.clone(), &guided);
+        let context = frame_context(frame, &nothing, map);
+        let guided = recognise_guided(image, &context, &prior.pose);
+        let evaluation = evaluate_expected_only(&context, prior.clone(), &guided);
         times.ended("expected");
-        if guided.report.global_reason().is_some() || judged.guided.is_none() {
+        if guided.report.global_reason().is_some() || evaluation.guided.is_none() {
             return None;
         }
         let mut answer = crate::frame_answer::answer(&nothing, map);
         answer.only_expected = true;
-        crate::frame_answer::fill_fixes(&mut answer, &judged, &guided, map);
+        crate::frame_answer::fill_fixes(&mut answer, &evaluation, &guided, map);
         times.ended("localise");
         answer.timings = times.finish();
-        Some((answer, judged))
+        Some((answer, evaluation))
     }
 
-    /// Goes on with the search of a robot that does not know where it is.
-    fn search(
+    /// Continues the relocalisation of a robot without a pose; ends it for a robot with one.
+    fn relocalise(
         &self,
         key: &SlotKey,
         frame: &CheckedFrame,
-        (image, facts): (&GrayImage, &FrameAnalysis),
+        (image, analysis): (&GrayImage, &FrameAnalysis),
         map: &MapSnapshot,
-        is_known: bool,
+        has_pose: bool,
     ) -> Option<RelocalisationUpdate> {
-        let (mounting, camera) = (frame.mounting.as_ref()?, frame.intrinsics.as_ref()?);
+        let (extrinsics, camera) = (frame.mounting.as_ref()?, frame.intrinsics.as_ref()?);
         let odometry = frame.odometry?;
-        if is_known {
-            self.searches.end(&key.robot);
+        if has_pose {
+            self.relocalisers.stop(&key.robot);
             return None;
         }
-        let sighted = sighted(image, facts, map, mounting, camera);
-        let glance = RelocalisationInput { epoch: frame.epoch, map, odometry, sighted: &sighted };
-        self.searches.glance(&key.robot, &glance)
+        let observations = ambiguous_observations(image, analysis, map, extrinsics, camera);
+        let input = RelocalisationInput { epoch: frame.epoch, map, odometry, observations: &observations };
+        self.relocalisers.update(&key.robot, &input)
     }
 
     /// Publishes an answer and shows it on pages.
@@ -322,37 +327,42 @@ impl Engine {
         let answer = Arc::new(answer);
         if answer.rejection.is_none() {
             let (encoding, width_px, height_px) = (frame.encoding, frame.width_px, frame.height_px);
-            self.live.answered(
+            self.live.publish_answer(
                 key,
                 LiveFrame { encoding, width_px, height_px, image: frame.image.clone(), answer },
             );
         } else {
-            self.live.refused(key, answer);
+            self.live.publish_refusal(key, answer);
         }
     }
 }
 
-fn view<'a>(frame: &'a CheckedFrame, facts: &'a FrameAnalysis, map: &'a MapSnapshot) -> FrameContext<'a> {
+fn frame_context<'a>(
+    frame: &'a CheckedFrame,
+    analysis: &'a FrameAnalysis,
+    map: &'a MapSnapshot,
+) -> FrameContext<'a> {
     FrameContext {
-        facts,
+        analysis,
         map,
-        mounting: frame.mounting.as_ref(),
+        extrinsics: frame.mounting.as_ref(),
         camera: frame.intrinsics.as_ref(),
         image_px: [f64::from(frame.width_px), f64::from(frame.height_px)],
         prior: frame.prior.as_ref(),
     }
 }
 
-fn hypothesis(mode: &PoseHypothesis) -> v1::Hypothesis {
-    v1::Hypothesis { probability: mode.mass, map_from_robot: Some(pose2_covariance_wire(&mode.pose)) }
+fn hypothesis(hypothesis: &PoseHypothesis) -> v1::Hypothesis {
+    let map_from_robot = Some(pose2_covariance_wire(&hypothesis.pose));
+    v1::Hypothesis { probability: hypothesis.mass, map_from_robot }
 }
 
-fn moment<'a>(frame: &CheckedFrame, map: &'a MapSnapshot) -> FrameStamp<'a> {
+fn frame_stamp<'a>(frame: &CheckedFrame, map: &'a MapSnapshot) -> FrameStamp<'a> {
     let CheckedFrame { epoch, captured_ns, odometry, .. } = *frame;
     FrameStamp { map: &map.name, epoch, captured_ns, odometry, now: Instant::now() }
 }
 
-/// The answer that says why there is none, and how the frame has ended.
+/// The answer to a refused frame, and the frame's outcome.
 fn refused(job: &FrameJob, refusal: &Rejection) -> (v1::Answer, FrameOutcome) {
     let (status, outcome) = match refusal.code {
         Code::Expired => (v1::Status::Expired, FrameOutcome::Expired),
@@ -362,7 +372,7 @@ fn refused(job: &FrameJob, refusal: &Rejection) -> (v1::Answer, FrameOutcome) {
     (v1::Answer { status: status.into(), rejection, map, ..v1::Answer::default() }, outcome)
 }
 
-/// What a panic is answered with.
+/// The refusal after a panic.
 pub fn failed() -> Rejection {
     Rejection::new(Code::Internal, "frame", "the server failed on this frame; see its log")
 }

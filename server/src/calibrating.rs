@@ -1,5 +1,5 @@
-//! A camera from views of one landmark, for the command line and over HTTP: corners in, a report out. The computation
-//! is `vision::camera_calibration::calibrate`.
+//! Camera calibration from views of one landmark, for the command line and HTTP. In: corners (px) and constraints. Out: a
+//! report. `vision::camera_calibration::calibrate` computes.
 
 use protos::{
     api::{CalibrationConstraintsBody, CalibrationReport, CalibrationViewReport},
@@ -27,9 +27,9 @@ const ROLL_SIGMA_RAD: f64 = 0.0175;
 /// How well a given height is known, metres.
 const HEIGHT_SIGMA_M: f64 = 0.02;
 
-/// What may be said beside the views.
+/// Constraints of a calibration beside the views.
 #[derive(Debug, Clone, PartialEq, clap::Args)]
-pub(crate) struct Knowledge {
+pub(crate) struct CalibrationConstraints {
     /// Radial coefficients (k1, k2) that may be fitted, 0 to 2; only those are that the views ask for.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u8).range(0..=2))]
     pub(crate) radial: u8,
@@ -44,14 +44,14 @@ pub(crate) struct Knowledge {
     pub(crate) unknown_aspect: bool,
 }
 
-impl From<CalibrationConstraintsBody> for Knowledge {
+impl From<CalibrationConstraintsBody> for CalibrationConstraints {
     fn from(body: CalibrationConstraintsBody) -> Self {
         let CalibrationConstraintsBody { radial, zero_roll, height_m, unknown_aspect } = body;
         Self { radial, zero_roll, height_m, unknown_aspect }
     }
 }
 
-impl Knowledge {
+impl CalibrationConstraints {
     fn params(&self) -> CalibrateParams {
         CalibrateParams {
             radial: usize::from(self.radial),
@@ -67,7 +67,7 @@ impl Knowledge {
     }
 }
 
-/// What speaks against a camera that came out.
+/// Warnings about a calibration.
 fn warnings(c: &CameraCalibration, image_px: [usize; 2]) -> Vec<String> {
     let mut all = vec![];
     let chi2 = c.chi2 / c.dof.max(1) as f64;
@@ -85,17 +85,18 @@ fn warnings(c: &CameraCalibration, image_px: [usize; 2]) -> Vec<String> {
     all
 }
 
-/// Calibrates. Not quick for hundreds of views: not for an async thread.
+/// Calibrates a camera. Slow for hundreds of views: not for an async thread.
 pub(crate) fn calibrated(
     views: &[PlanarView],
     image_px: [usize; 2],
-    known: &Knowledge,
+    constraints: &CalibrationConstraints,
 ) -> Result<CalibrationReport, CalibrateError> {
     let mut views = views.to_vec();
     for covariance in views.iter_mut().flat_map(|v| &mut v.covariance_px2) {
         *covariance += nalgebra::Matrix2::identity() * BORDER_SIGMA_PX.powi(2);
     }
-    let RobustCalibration { calibration: c, used } = calibrate_choosing(&views, image_px, &known.params())?;
+    let RobustCalibration { calibration: c, used } =
+        calibrate_choosing(&views, image_px, &constraints.params())?;
     let sigma = |i: usize| c.covariance.map_or(f64::INFINITY, |m| m[(i, i)].sqrt());
     let view = |i: usize| {
         let fit = used.iter().position(|u| *u == i).and_then(|k| c.views.get(k));
@@ -106,7 +107,7 @@ pub(crate) fn calibrated(
         }
     };
     Ok(CalibrationReport {
-        intrinsics: intrinsics_wire(&stated(&c.camera, [sigma(0), sigma(1), sigma(2)])),
+        intrinsics: intrinsics_wire(&with_sigmas(&c.camera, [sigma(0), sigma(1), sigma(2)])),
         fx_sigma_px: sigma(0),
         cx_sigma_px: sigma(1),
         cy_sigma_px: sigma(2),
@@ -120,13 +121,13 @@ pub(crate) fn calibrated(
     })
 }
 
-/// The camera with its standard deviations, the larger of the centre's; none where nothing is known of them. At most
-/// what frames may carry.
-fn stated(camera: &Intrinsics, [fx, cx, cy]: [f64; 3]) -> Intrinsics {
+/// The camera with its standard deviations (the larger one of the centre's), at most those that frames may carry; without
+/// them where they are not finite.
+fn with_sigmas(camera: &Intrinsics, [fx, cx, cy]: [f64; 3]) -> Intrinsics {
     let most = IntrinsicsSigmas::MAX_SHARE * camera.fx_px;
     let sigmas = IntrinsicsSigmas { focal_px: fx.min(most), center_px: cx.max(cy).min(most) };
-    let known = fx.is_finite() && cx.is_finite() && cy.is_finite();
-    Some(sigmas).filter(|_| known).and_then(|s| camera.with_sigmas(s).ok()).unwrap_or(*camera)
+    let is_known = fx.is_finite() && cx.is_finite() && cy.is_finite();
+    Some(sigmas).filter(|_| is_known).and_then(|s| camera.with_sigmas(s).ok()).unwrap_or(*camera)
 }
 
 #[cfg(test)]
@@ -157,8 +158,8 @@ mod tests {
     }
 
     #[test]
-    fn a_camera_that_cannot_quite_be_is_doubted() {
-        let known = Knowledge::from(CalibrationConstraintsBody::default());
+    fn an_implausible_camera_gets_warnings() {
+        let known = CalibrationConstraints::from(CalibrationConstraintsBody::default());
         let good = calibrated(&views(239.5), [640, 480], &known).unwrap();
         assert!(good.warnings.is_empty() && (good.intrinsics.fx_px - 600.0).abs() < 1.0, "{good:?}");
         // What it is known to goes along with it.
@@ -166,8 +167,8 @@ mod tests {
         assert_eq!(good.intrinsics.center_sigma_px, Some(good.cx_sigma_px.max(good.cy_sigma_px)));
         let camera = Intrinsics::new(600.0, 600.0, 320.0, 240.0, Distortion::None).unwrap();
         let most = Some(IntrinsicsSigmas { focal_px: 150.0, center_px: 150.0 });
-        assert_eq!(stated(&camera, [151.0, 1.0, 1e9]).sigmas, most);
-        assert_eq!(stated(&camera, [f64::INFINITY, 1.0, 1.0]).sigmas, None);
+        assert_eq!(with_sigmas(&camera, [151.0, 1.0, 1e9]).sigmas, most);
+        assert_eq!(with_sigmas(&camera, [f64::INFINITY, 1.0, 1.0]).sigmas, None);
         let off = calibrated(&views(420.0), [640, 480], &known).unwrap();
         assert!(off.warnings.iter().any(|d| d.contains("principal point")), "{off:?}");
         let mut bad = views(239.5);

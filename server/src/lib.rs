@@ -1,6 +1,6 @@
 //! The Waymark server and command line: store, bus, engine and HTTP face around the pure crates `vision` and `map`.
 //!
-//! A frame walks `bus -> engine -> vision -> map -> bus`; a lesson walks `http -> store -> jobs -> store -> engine`.
+//! The way of a frame: `bus -> engine -> vision -> map -> bus`; that of a lesson: `http -> store -> jobs -> store -> engine`.
 //! zenoh appears only in `bus`, sqlx only in `store`, axum only in `http`.
 
 pub mod config;

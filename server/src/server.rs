@@ -3,7 +3,7 @@
 use crate::{
     bus::{Bus, BusError, Receivers},
     config::Config,
-    gather::{self, Gatherer, Hook},
+    gather::{self, Gatherer, GatheringTap},
     http::{self, App, Services},
     jobs::Jobs,
     publication::{Catalogue, CatalogueTasks},
@@ -11,12 +11,12 @@ use crate::{
 };
 use engine::{
     decode::ImageLimits,
+    findings::{FindingSender, LandmarkFinding, findings},
     intake::{FrameJob, Intake},
     live::LiveHub,
     motion::MotionTracker,
     slots::Slots,
     snapshot::Snapshots,
-    standing::{FindingSender, LandmarkFinding, findings},
     vitals::{Failure, Pulse, Vitals},
     workers::{Engine, Workers},
 };
@@ -113,18 +113,18 @@ impl Server {
             jobs.renew().await.map_err(|e| StartError::Store(e.to_string()))?;
         }
         let (findings, found) = findings();
-        let (hook, offers) = gather::hook();
-        let (gatherer, gather) = Gatherer::start(store.clone(), &config, &hook, offers)
+        let (tap, offered) = gather::gathering_tap();
+        let (gatherer, gather) = Gatherer::start(store.clone(), &config, &tap, offered)
             .await
             .map_err(|e| StartError::Store(e.to_string()))?;
-        let engine = engine(&config, snapshots.clone(), vitals.clone(), (findings, hook));
-        let stands = |map: &protos::Name, robot: &protos::Name| {
+        let engine = engine(&config, snapshots.clone(), vitals.clone(), (findings, tap));
+        let is_on = |map: &protos::Name, robot: &protos::Name| {
             snapshots.robot_map(robot.as_str()).is_some_and(|on| on == map.as_str())
         };
         engine.motion.mappings().count_in(vitals.panics().clone());
-        engine.motion.mappings().keep_in(config.data.join("mapping"), stands);
-        let pulse = vitals.begin("the task that keeps findings");
-        let findings = tokio::spawn(keep_findings(store.clone(), found, pulse));
+        engine.motion.mappings().resume_in(config.data.join("mapping"), is_on);
+        let pulse = vitals.begin("the task that stores findings");
+        let findings = tokio::spawn(store_findings(store.clone(), found, pulse));
         let (live, slots) = (engine.live.clone(), engine.slots.clone());
         let bus = Bus::open(&config, receivers(&config, &engine)).await?;
         let outbox = bus.outbox().clone();
@@ -151,7 +151,7 @@ fn engine(
     config: &Config,
     snapshots: Arc<Snapshots>,
     vitals: Arc<Vitals>,
-    (findings, gather): (FindingSender, Hook),
+    (findings, frame_tap): (FindingSender, GatheringTap),
 ) -> Engine {
     let live = Arc::new(LiveHub::default());
     Engine {
@@ -162,22 +162,22 @@ fn engine(
         limits: ImageLimits { bytes: config.limits.frame_bytes, pixels: config.limits.frame_pixels },
         vitals,
         findings,
-        searches: Arc::default(),
-        gather: Arc::new(gather),
+        relocalisers: Arc::default(),
+        frame_tap: Arc::new(frame_tap),
         search_every_frame: config.search_every_frame,
     }
 }
 
-/// Writes down what robots find out about landmarks, until no worker is left to find anything.
-async fn keep_findings(store: Catalogue, mut found: Receiver<LandmarkFinding>, pulse: Pulse) {
-    while let Some(LandmarkFinding { map, name, standing, finding, .. }) = found.recv().await {
-        let kept = store.write(move |tx| {
+/// Stores findings about landmarks, until the last worker has stopped.
+async fn store_findings(store: Catalogue, mut found: Receiver<LandmarkFinding>, pulse: Pulse) {
+    while let Some(LandmarkFinding { map, name, health, finding, .. }) = found.recv().await {
+        let stored = store.write(move |tx| {
             Box::pin(async move {
-                landmarks::set_standing(tx, &map, &name, standing, finding.as_deref()).await.map(drop)
+                landmarks::set_health(tx, &map, &name, health, finding.as_deref()).await.map(drop)
             })
         });
-        if let Err(error) = kept.await {
-            tracing::error!(%error, "a finding about a landmark was not kept");
+        if let Err(error) = stored.await {
+            tracing::error!(%error, "landmark_finding_not_stored");
         }
     }
     drop(pulse);
@@ -220,12 +220,12 @@ impl RunningServer {
         // Workers first: what they have in work is still answered over the open bus.
         let workers = tokio::task::spawn_blocking(move || workers.stop());
         if let Err(error) = workers.await {
-            tracing::error!(%error, "stopping the workers");
+            tracing::error!(%error, "worker_stop_failed");
         }
         bus.close().await;
         for (what, task) in [("HTTP", http), ("jobs", jobs), ("findings", findings), ("gathering", gather)] {
             if let Err(error) = task.await {
-                tracing::error!(%error, what, "a task panicked");
+                tracing::error!(%error, what, "task_panicked");
             }
         }
         writer.close().await;

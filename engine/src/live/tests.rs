@@ -15,33 +15,33 @@ fn frame(seq: u64) -> LiveFrame {
 }
 
 #[test]
-fn the_stalest_camera_gives_way() {
+fn the_camera_with_the_oldest_frame_is_replaced() {
     let hub = LiveHub::default();
     for c in 0..MAX_CAMERAS {
-        hub.answered(&key(c), frame(1));
+        hub.publish_answer(&key(c), frame(1));
     }
-    hub.answered(&key(0), frame(2));
+    hub.publish_answer(&key(0), frame(2));
     assert_eq!(hub.cameras(&name("r1")).len(), MAX_CAMERAS);
-    hub.answered(&key(MAX_CAMERAS), frame(1));
+    hub.publish_answer(&key(MAX_CAMERAS), frame(1));
     assert_eq!(hub.cameras(&name("r1")).len(), MAX_CAMERAS);
     assert!(hub.frame(&name("r1"), &name("c1")).is_none());
     assert_eq!(hub.frame(&name("r1"), &name("c0")).unwrap().answer.seq, 2);
 }
 
 #[test]
-fn tracks_are_bounded() {
+fn trajectories_are_bounded() {
     let hub = LiveHub::default();
-    for i in 0..=MAX_TRACK_POINTS {
+    for i in 0..=MAX_TRAJECTORY_POSES {
         hub.truth(&name("r1"), "hall", Pose2::new(i as f64, 0.0, 0.0));
     }
-    let truth = hub.tracks(&name("r1")).unwrap().truth;
-    assert_eq!(truth.len(), MAX_TRACK_POINTS);
+    let truth = hub.trajectories(&name("r1")).unwrap().truth;
+    assert_eq!(truth.len(), MAX_TRAJECTORY_POSES);
     assert!((truth[0].x_m - 1.0).abs() < 1e-12);
-    for r in 0..MAX_TRACKS {
+    for r in 0..MAX_TRAJECTORIES {
         hub.odometry(&name(&format!("robot-{r}")), "hall", Pose2::default());
     }
-    assert!(hub.tracks(&name("r1")).is_none());
-    assert!(hub.tracks(&name("robot-0")).is_some());
+    assert!(hub.trajectories(&name("r1")).is_none());
+    assert!(hub.trajectories(&name("robot-0")).is_some());
 }
 
 #[test]
@@ -56,7 +56,7 @@ fn raw_grey_becomes_png() {
 fn events_read_as_the_page_expects() {
     let hub = LiveHub::default();
     let mut events = hub.events();
-    hub.answered(&key(0), frame(7));
+    hub.publish_answer(&key(0), frame(7));
     hub.odometry(&name("r1"), "hall", Pose2::new(1.0, 2.0, 0.5));
     hub.presence(&name("r1"), Some("hall".into()), true);
     let event = events.try_recv().unwrap();
@@ -70,7 +70,7 @@ fn events_read_as_the_page_expects() {
     assert_eq!(json["pose"]["y_m"], 2.0);
     assert_eq!(events.try_recv().unwrap().kind(), "presence");
     let pose = Pose2Covariance { pose: Pose2::default(), covariance: nalgebra::Matrix3::identity() };
-    hub.fused(&name("r1"), "hall", &pose, (2, 7.5), v1::PoseTrust::Contradicted);
+    hub.publish_pose(&name("r1"), "hall", &pose, (2, 7.5), v1::PoseTrust::Contradicted);
     let json = serde_json::to_value(&*events.try_recv().unwrap()).unwrap();
     assert_eq!((&json["corrections"], &json["age_ms"]), (&2.into(), &7.5.into()));
     assert_eq!(json["trust"], "contradicted");
@@ -82,16 +82,16 @@ fn the_trust_is_that_of_the_last_pose_on_its_map() {
     let pose = Pose2Covariance { pose: Pose2::default(), covariance: nalgebra::Matrix3::identity() };
     assert_eq!(hub.trust(&r1, "hall"), None);
     for trust in [v1::PoseTrust::Supported, v1::PoseTrust::Stale] {
-        hub.fused(&r1, "hall", &pose, (1, 0.0), trust);
+        hub.publish_pose(&r1, "hall", &pose, (1, 0.0), trust);
         assert_eq!(hub.trust(&r1, "hall"), Some(trust));
     }
     // The robot was given another map, and no pose has been published there yet.
     assert_eq!(hub.trust(&r1, "yard"), None);
     for r in 0..MAX_ROBOTS {
-        hub.trusted(&name(&format!("robot-{r}")), "hall", v1::PoseTrust::Supported);
+        hub.set_trust(&name(&format!("robot-{r}")), "hall", v1::PoseTrust::Supported);
     }
     assert_eq!(hub.lock().trust.len(), MAX_ROBOTS);
-    hub.trusted(&r1, "yard", v1::PoseTrust::Unsupported);
+    hub.set_trust(&r1, "yard", v1::PoseTrust::Unsupported);
     assert_eq!(hub.trust(&r1, "yard"), Some(v1::PoseTrust::Unsupported));
 }
 
@@ -99,7 +99,7 @@ fn the_trust_is_that_of_the_last_pose_on_its_map() {
 fn a_slow_reader_misses_events_and_is_told() {
     let hub = LiveHub::default();
     let mut events = hub.events();
-    for _ in 0..=EVENTS_KEPT {
+    for _ in 0..=MAX_EVENTS {
         hub.map_changed("hall".into(), Some(1));
     }
     assert!(matches!(events.try_recv(), Err(broadcast::error::TryRecvError::Lagged(1))));

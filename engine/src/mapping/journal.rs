@@ -1,8 +1,8 @@
-//! The scans of a mapping on disk, so that a restart of the server loses no drive: one file for each map, only ever added
-//! to. In: scans as they were mapped. Out: the same scans at the next start, up to the first record that is not whole.
+//! The journal of a mapping: its scans on disk, so that a restart of the server loses no drive. One append-only file a map. In:
+//! scans as they are mapped. Out: the same scans at the next start, up to the first record that is not whole.
 //!
-//! A record is its length (4 bytes), the first 8 bytes of its SHA-256, and itself: first the head as JSON, then scans as on
-//! the wire, which are checked again when they are read.
+//! A record is its length (4 bytes, little-endian), the first 8 bytes of its SHA-256, and its bytes. The first record is the
+//! header as JSON; the others are scans as on the wire, which are checked again when they are read.
 
 use crate::scan_job::ScanJob;
 use map::pose2::Pose2;
@@ -19,23 +19,23 @@ use std::{
 pub(super) const MAX_BYTES: u64 = 2 << 30;
 /// Largest record: a scan of the most beams that are accepted.
 const MAX_RECORD: u32 = crate::limits::MAX_SCAN_BYTES as u32;
-/// Scans after which the disk is told to keep them, should the power fail.
+/// Scans after which the file is synced, in case of a power cut.
 const SYNC_EVERY: u32 = 50;
-/// Of the length and the digest.
+/// Bytes of the length and the digest.
 const FRAME_BYTES: usize = 12;
-/// How the files end.
+/// Extension of the files.
 const EXTENSION: &str = "scans";
 
-/// Whose scans these are.
+/// The first record: whose scans follow.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct JournalHeader {
-    /// The format.
+    /// Version of the format.
     waymark_mapping: u32,
-    /// The map.
+    /// Name of the map.
     pub map: Name,
-    /// The robot.
+    /// Name of the robot.
     pub robot: Name,
-    /// Its first pose on the map.
+    /// The robot's first pose: x, y (map frame, m), theta (rad).
     pub origin: [f64; 3],
 }
 
@@ -45,7 +45,7 @@ impl JournalHeader {
         Self { waymark_mapping: 1, map: map.clone(), robot: robot.clone(), origin }
     }
 
-    /// If it is possible.
+    /// The first pose, if it is in range.
     pub(super) fn origin(&self) -> Option<Pose2> {
         let [x_m, y_m, theta_rad] = self.origin;
         let origin = Pose2 { x_m, y_m, theta_rad };
@@ -53,7 +53,7 @@ impl JournalHeader {
     }
 }
 
-/// The journal of a mapping that goes on.
+/// The journal of an open mapping.
 #[derive(Debug)]
 pub(super) struct Journal {
     file: File,
@@ -73,7 +73,7 @@ fn framed(record: &[u8]) -> io::Result<Vec<u8>> {
 }
 
 impl Journal {
-    /// A new one, in place of any other of the map.
+    /// A new journal; replaces any other of the map.
     pub(super) fn create(dir: &Path, head: &JournalHeader) -> io::Result<Self> {
         std::fs::create_dir_all(dir)?;
         let file = File::create(path(dir, head.map.as_str()))?;
@@ -118,16 +118,16 @@ impl Journal {
     }
 }
 
-/// Forgets what is kept of a map.
+/// Removes the journal of a map.
 pub(super) fn remove(dir: &Path, map: &str) {
     if let Err(error) = std::fs::remove_file(path(dir, map))
         && error.kind() != io::ErrorKind::NotFound
     {
-        tracing::warn!(map, %error, "the scans of a mapping that is over stay on disk");
+        tracing::warn!(map, %error, "journal_not_removed");
     }
 }
 
-/// What was kept of a mapping: first read, then gone on with.
+/// A journal that is read, and then appended to.
 #[derive(Debug)]
 pub(super) struct JournalReader {
     pub(super) head: JournalHeader,
@@ -138,14 +138,14 @@ pub(super) struct JournalReader {
 }
 
 impl JournalReader {
-    /// All journals of a folder, by map. What is none is left alone and said.
+    /// All journals of a folder, by map. A file that is no journal is left alone and logged.
     pub(super) fn all(dir: &Path) -> Vec<Self> {
         let entries = std::fs::read_dir(dir).into_iter().flatten().flatten();
         let mut paths: Vec<PathBuf> = entries.map(|e| e.path()).collect();
         paths.retain(|p| p.extension().is_some_and(|e| e == EXTENSION));
         paths.sort();
         let read = |p: &PathBuf| {
-            Self::open(p).inspect_err(|error| tracing::warn!(path = %p.display(), %error, "no mapping")).ok()
+            Self::open(p).inspect_err(|error| tracing::warn!(path = %p.display(), %error, "journal unreadable; mapping not resumed, file kept")).ok()
         };
         paths.iter().filter_map(read).collect()
     }
@@ -176,7 +176,7 @@ impl JournalReader {
         Some(ScanJob { map: self.head.map.to_string(), epoch, captured_ns, odom_from_robot, scan })
     }
 
-    /// To be gone on with, after the last whole record.
+    /// The journal for appending after the last whole record.
     pub(super) fn reopened(mut self) -> io::Result<Journal> {
         self.file.set_len(self.whole)?;
         self.file.seek(io::SeekFrom::Start(self.whole))?;
@@ -227,18 +227,21 @@ mod tests {
     }
 
     fn read(dir: &Path) -> (Vec<i64>, Option<Journal>) {
-        let Some(mut kept) = JournalReader::all(dir).pop() else { return (Vec::new(), None) };
-        let scans = std::iter::from_fn(|| kept.next()).map(|job| job.captured_ns).collect();
-        (scans, kept.reopened().ok())
+        let Some(mut reader) = JournalReader::all(dir).pop() else { return (Vec::new(), None) };
+        let scans = std::iter::from_fn(|| reader.next()).map(|job| job.captured_ns).collect();
+        (scans, reader.reopened().ok())
     }
 
     #[test]
-    fn what_was_written_is_read_and_gone_on_with() {
+    fn what_was_written_is_read_and_appended_to() {
         let dir = tempfile::tempdir().unwrap();
         written(dir.path(), 3);
-        let mut kept = JournalReader::all(dir.path()).pop().unwrap();
-        assert_eq!((kept.head.robot.as_str(), kept.head.origin()), ("r1", Some(Pose2::new(1.0, 2.0, 0.5))));
-        let first = kept.next().unwrap();
+        let mut reader = JournalReader::all(dir.path()).pop().unwrap();
+        assert_eq!(
+            (reader.head.robot.as_str(), reader.head.origin()),
+            ("r1", Some(Pose2::new(1.0, 2.0, 0.5)))
+        );
+        let first = reader.next().unwrap();
         assert_eq!((first.epoch, first.odom_from_robot), (7, job(1).odom_from_robot));
         assert!((first.scan.ranges_m()[0] - 3.5).abs() < 1e-9 && first.scan.ranges_m()[1].is_nan());
         let (scans, journal) = read(dir.path());

@@ -27,30 +27,30 @@ pub const QUEUE: usize = 64;
 /// Most scans of one mapping.
 pub const MAX_SCANS: u64 = 100_000;
 
-/// Handles of the progress that the thread itself has: with no more the session is gone.
+/// References to the progress that the thread itself holds. If there are no more, the session was dropped.
 const OWN_HANDLES: usize = 2;
 
-/// What the thread is told.
-enum Order {
+/// What the thread shall do next.
+enum Command {
     Scan(Box<ScanJob>),
     Finish(oneshot::Sender<Result<Walls, String>>),
 }
 
-/// How a mapping begins.
+/// How a mapping starts.
 pub(super) enum Start {
-    /// Anew; with its journal, if scans are kept, or why there is none.
+    /// New, with its journal if there is a folder for journals, or why it cannot be written.
     New(JournalHeader, Option<io::Result<Journal>>),
-    /// With what was kept.
-    Again(JournalReader),
+    /// From a journal.
+    Resumed(JournalReader),
 }
 
-/// A mapping, from its beginning until it is forgotten. Dropping it gives it up.
+/// A mapping, from its start until it is removed. Dropping it cancels it.
 #[derive(Debug)]
 pub(super) struct Session {
     pub(super) robot: Name,
-    /// That of the first scan: another is another odometry.
+    /// Epoch of the first scan: another epoch has another odometry.
     epoch: Option<u64>,
-    orders: Option<SyncSender<Order>>,
+    commands: Option<SyncSender<Command>>,
     progress: Shared,
 }
 
@@ -59,12 +59,12 @@ impl Session {
     pub(super) fn begin(mut start: Start, panics: Arc<Panics>) -> Option<Self> {
         let head = match &start {
             Start::New(head, _) => head.clone(),
-            Start::Again(kept) => kept.head.clone(),
+            Start::Resumed(journal) => journal.head.clone(),
         };
         let origin = head.origin()?;
         let first = match &mut start {
             Start::New(..) => None,
-            Start::Again(kept) => kept.next(),
+            Start::Resumed(journal) => journal.next(),
         };
         let epoch = first.as_ref().map(|job| job.epoch);
         let stage =
@@ -75,71 +75,71 @@ impl Session {
             stage,
             scans: 0,
             dropped: 0,
-            way_m: 0.0,
+            distance_m: 0.0,
             pose: None,
             segments: None,
-            loops: None,
+            loop_closures: None,
             reason: None,
-            not_kept: None,
+            journal_error: None,
         }));
-        let (orders, received) = sync_channel(QUEUE);
+        let (commands, received) = sync_channel(QUEUE);
         let shared = progress.clone();
         let work = move || {
-            // Nothing shared is left half changed: the map so far is this thread's own.
+            // A panic leaves nothing shared half changed: the map so far belongs to this thread.
             let mapper = Mapper::new(shared.clone(), origin);
             let run = || mapper.run(start, first, &received);
-            if panics.catch(Edge::Mapping, "the making of a map", "this mapping has failed", run).is_none() {
+            if panics.catch(Edge::Mapping, "a mapping", "this mapping has failed", run).is_none() {
                 fail(&shared, "the server failed on these scans; see its log");
             }
         };
         let thread = std::thread::Builder::new().name("mapping".into()).spawn(work);
-        thread.inspect_err(|error| tracing::error!(%error, "no thread for a mapping")).ok()?;
-        Some(Self { robot: head.robot, epoch, orders: Some(orders), progress })
+        thread.inspect_err(|error| tracing::error!(%error, "mapping_thread_failed")).ok()?;
+        Some(Self { robot: head.robot, epoch, commands: Some(commands), progress })
     }
 
-    /// Whether it goes on, be it only to be stored.
+    /// Whether it is open: resuming, mapping, or waiting to be stored.
     pub(super) fn is_open(&self) -> bool {
         matches!(
-            own(&self.progress).stage,
+            lock(&self.progress).stage,
             MappingStage::Resuming | MappingStage::Mapping | MappingStage::Finishing
         )
     }
 
     pub(super) fn has_failed(&self) -> bool {
-        own(&self.progress).stage == MappingStage::Failed
+        lock(&self.progress).stage == MappingStage::Failed
     }
 
     /// Whether it takes scans.
     pub(super) fn takes(&self) -> bool {
-        matches!(own(&self.progress).stage, MappingStage::Resuming | MappingStage::Mapping)
+        matches!(lock(&self.progress).stage, MappingStage::Resuming | MappingStage::Mapping)
     }
 
     pub(super) fn progress(&self) -> MappingProgress {
-        own(&self.progress).clone()
+        lock(&self.progress).clone()
     }
 
-    /// Passes a scan on; never waits.
+    /// Queues a scan, or drops and counts it; never waits.
     pub(super) fn offer(&mut self, job: ScanJob) {
-        let same = *self.epoch.get_or_insert(job.epoch) == job.epoch;
-        let room = own(&self.progress).scans < MAX_SCANS;
-        let sent = |orders: &SyncSender<Order>| orders.try_send(Order::Scan(Box::new(job))).is_ok();
-        if !(same && room && self.orders.as_ref().is_some_and(sent)) {
-            own(&self.progress).dropped += 1;
+        let is_same = *self.epoch.get_or_insert(job.epoch) == job.epoch;
+        let has_room = lock(&self.progress).scans < MAX_SCANS;
+        let sent = |commands: &SyncSender<Command>| commands.try_send(Command::Scan(Box::new(job))).is_ok();
+        if !(is_same && has_room && self.commands.as_ref().is_some_and(sent)) {
+            lock(&self.progress).dropped += 1;
         }
     }
 
-    /// Asks for the walls; what waits is mapped before. `None` if the queue is full or the thread gone: ask again.
+    /// Asks for the walls; the scans that wait are mapped first. `None` if the queue is full or the thread has ended.
     pub(super) fn finish(&mut self) -> Option<oneshot::Receiver<Result<Walls, String>>> {
         let (reply, walls) = oneshot::channel();
-        self.orders.as_ref()?.try_send(Order::Finish(reply)).ok()?;
-        self.orders = None;
-        own(&self.progress).stage = MappingStage::Finishing;
+        self.commands.as_ref()?.try_send(Command::Finish(reply)).ok()?;
+        self.commands = None;
+        lock(&self.progress).stage = MappingStage::Finishing;
         Some(walls)
     }
 
-    /// What became of it.
+    /// Records whether the walls were stored.
     pub(super) fn end(&mut self, stored: Result<usize, String>) {
-        let mut progress = own(&self.progress);
+        let mut progress = lock(&self.progress);
         match stored {
             Ok(segments) => (progress.stage, progress.segments) = (MappingStage::Done, Some(segments)),
             Err(reason) => (progress.stage, progress.reason) = (MappingStage::Failed, Some(reason)),
@@ -161,55 +161,55 @@ impl Mapper {
         Self { slam: Slam::new(SlamParams::default()), progress, origin, last: None, journal: None }
     }
 
-    /// Maps what was kept, then scans until it is told to finish, or given up.
-    fn run(mut self, start: Start, first: Option<ScanJob>, orders: &Receiver<Order>) {
+    /// Maps the journal, then scans until the mapping finishes or is cancelled.
+    fn run(mut self, start: Start, first: Option<ScanJob>, commands: &Receiver<Command>) {
         let ready = match start {
             Start::New(_, journal) => {
-                self.keep(journal);
+                self.write_to(journal);
                 Ok(())
             }
-            Start::Again(kept) => self.again(kept, first),
+            Start::Resumed(journal) => self.resume(journal, first),
         };
-        if let Err(reason) = ready.and_then(|()| self.orders(orders)) {
+        if let Err(reason) = ready.and_then(|()| self.obey(commands)) {
             fail(&self.progress, &reason);
         }
     }
 
-    /// Maps the scans that were kept, as long as the session is there.
-    fn again(&mut self, mut kept: JournalReader, first: Option<ScanJob>) -> Result<(), String> {
+    /// Maps the scans of a journal, as long as the session exists.
+    fn resume(&mut self, mut journal: JournalReader, first: Option<ScanJob>) -> Result<(), String> {
         let mut next = first;
         while let Some(job) = next {
             if Arc::strong_count(&self.progress) <= OWN_HANDLES {
                 return Ok(());
             }
             self.add(&job)?;
-            next = kept.next();
+            next = journal.next();
         }
-        self.keep(Some(kept.reopened()));
-        let mut progress = own(&self.progress);
+        self.write_to(Some(journal.reopened()));
+        let mut progress = lock(&self.progress);
         if progress.stage == MappingStage::Resuming {
             progress.stage = MappingStage::Mapping;
         }
         Ok(())
     }
 
-    fn orders(&mut self, orders: &Receiver<Order>) -> Result<(), String> {
-        while let Ok(order) = orders.recv() {
-            match order {
-                Order::Scan(job) => {
-                    let kept = self.journal.as_mut().map(|journal| journal.scan(&job));
-                    if let Some(Err(error)) = kept {
-                        self.keep(Some(Err(error)));
+    fn obey(&mut self, commands: &Receiver<Command>) -> Result<(), String> {
+        while let Ok(command) = commands.recv() {
+            match command {
+                Command::Scan(job) => {
+                    let written = self.journal.as_mut().map(|journal| journal.scan(&job));
+                    if let Some(Err(error)) = written {
+                        self.write_to(Some(Err(error)));
                     }
                     self.add(&job)?;
                 }
-                Order::Finish(reply) => {
+                Command::Finish(reply) => {
                     let slam = std::mem::replace(&mut self.slam, Slam::new(SlamParams::default()));
                     let made = slam.finish().map_err(|error| error.to_string());
                     if let Ok(map) = &made {
-                        own(&self.progress).loops = Some(map.loops.len());
+                        lock(&self.progress).loop_closures = Some(map.loops.len());
                     }
-                    // Nobody waits any more: it was given up.
+                    // An error means that nobody waits: the mapping was cancelled.
                     drop(reply.send(made.map(|map| walls(&map, &self.origin))));
                     break;
                 }
@@ -218,12 +218,12 @@ impl Mapper {
         Ok(())
     }
 
-    /// From now on scans are kept in this journal, or not at all: the mapping goes on without, and says why.
-    fn keep(&mut self, journal: Option<io::Result<Journal>>) {
+    /// Writes scans to this journal from now on. Without a journal the mapping continues, and its progress says why.
+    fn write_to(&mut self, journal: Option<io::Result<Journal>>) {
         self.journal = journal.and_then(|opened| {
             let failed = |error: &io::Error| {
-                tracing::warn!(%error, "the scans of a mapping are not kept");
-                own(&self.progress).not_kept = Some(error.to_string());
+                tracing::warn!(%error, follows = "a restart loses this mapping", "journal_failed");
+                lock(&self.progress).journal_error = Some(error.to_string());
             };
             opened.inspect_err(failed).ok()
         });
@@ -232,16 +232,16 @@ impl Mapper {
     fn add(&mut self, job: &ScanJob) -> Result<(), String> {
         let at = self.slam.add(&job.odom_from_robot, &job.scan).map_err(|error| error.to_string())?;
         let on_map = self.origin.compose(&at);
-        let mut progress = own(&self.progress);
+        let mut progress = lock(&self.progress);
         progress.scans += 1;
         let odom = job.odom_from_robot;
-        progress.way_m += self.last.replace(odom).map_or(0.0, |o| o.between(&odom).position().norm());
+        progress.distance_m += self.last.replace(odom).map_or(0.0, |o| o.between(&odom).position().norm());
         progress.pose = Some([on_map.x_m, on_map.y_m, on_map.theta_rad]);
         Ok(())
     }
 }
 
-/// Of a map whose first pose is `origin`.
+/// The walls in the map frame, for a map whose first pose is `origin`.
 fn walls(map: &SlamMap, origin: &Pose2) -> Walls {
     let ends = |wall: &map::segments::LaserSegment| {
         let (a, b) = (origin.apply(&wall.a), origin.apply(&wall.b));
@@ -251,10 +251,10 @@ fn walls(map: &SlamMap, origin: &Pose2) -> Walls {
 }
 
 fn fail(progress: &Shared, reason: &str) {
-    let mut progress = own(progress);
+    let mut progress = lock(progress);
     (progress.stage, progress.reason) = (MappingStage::Failed, Some(reason.to_owned()));
 }
 
-fn own(progress: &Mutex<MappingProgress>) -> MutexGuard<'_, MappingProgress> {
+fn lock(progress: &Mutex<MappingProgress>) -> MutexGuard<'_, MappingProgress> {
     progress.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -47,7 +47,7 @@ async fn scans_become_the_walls_that_mapping_them_gives() {
     assert!(mappings.offer(&name("r1"), job("hall", 2, Pose2::default(), other)).is_none());
     let so_far = mappings.progress("hall").unwrap();
     assert_eq!((so_far.stage, so_far.scans, so_far.dropped), (MappingStage::Mapping, 60, 1));
-    assert!(so_far.way_m > 10.0 && so_far.pose.is_some());
+    assert!(so_far.distance_m > 10.0 && so_far.pose.is_some());
     let (finishing, walls) = mappings.finish("hall").unwrap();
     assert_eq!(finishing.stage, MappingStage::Finishing);
     let walls = walls.await.unwrap().unwrap();
@@ -73,7 +73,7 @@ fn mappings_are_bounded_and_one_robot_makes_one_map() {
     for i in 0..MAX_MAPPINGS {
         assert_eq!(begin(i, &format!("r{i}")), Ok(MappingStage::Mapping));
     }
-    assert_eq!(begin(0, "other"), Err(MappingError::Going));
+    assert_eq!(begin(0, "other"), Err(MappingError::AlreadyMapping));
     assert_eq!(begin(9, "r0"), Err(MappingError::Busy));
     assert_eq!(begin(9, "other"), Err(MappingError::TooMany));
     assert!(mappings.cancel("m0") && !mappings.cancel("m0"));
@@ -83,14 +83,14 @@ fn mappings_are_bounded_and_one_robot_makes_one_map() {
 #[test]
 fn old_mappings_are_forgotten_at_the_bound() {
     let mappings = MappingSessions::default();
-    for i in 0..=MAX_REMEMBERED {
+    for i in 0..=MAX_SESSIONS {
         let map = format!("m{i:03}");
         mappings.begin(&name(&map), &name("r1"), Pose2::default()).unwrap();
         mappings.stored(&map, Err("planted".into()));
     }
     assert_eq!(mappings.progress("m000"), None);
-    let kept = mappings.progress("m001").unwrap();
-    assert_eq!((kept.stage, kept.reason.as_deref()), (MappingStage::Failed, Some("planted")));
+    let oldest = mappings.progress("m001").unwrap();
+    assert_eq!((oldest.stage, oldest.reason.as_deref()), (MappingStage::Failed, Some("planted")));
 }
 
 #[test]
@@ -115,16 +115,16 @@ fn steps_of(building: &Arc<Building>) -> Vec<sim::drive::Step> {
 }
 
 #[tokio::test]
-async fn a_mapping_goes_on_after_a_restart_as_if_there_had_been_none() {
+async fn a_mapping_resumes_after_a_restart_as_if_there_had_been_none() {
     let (building, dir) = (Arc::new(Building::corridor(7)), tempfile::tempdir().unwrap());
     let (mut slam, origin) = (Slam::new(SlamParams::default()), Pose2::new(3.0, 1.0, 0.5));
     let mut mappings = MappingSessions::default();
-    mappings.keep_in(dir.path().join("mapping"), |_, _| true);
+    mappings.resume_in(dir.path().join("mapping"), |_, _| true);
     mappings.begin(&name("hall"), &name("r1"), origin).unwrap();
     for (i, step) in steps_of(&building).iter().enumerate() {
         if i == 25 {
             mappings = MappingSessions::default();
-            mappings.keep_in(dir.path().join("mapping"), |map, robot| {
+            mappings.resume_in(dir.path().join("mapping"), |map, robot| {
                 (map.as_str(), robot.as_str()) == ("hall", "r1")
             });
         }
@@ -137,9 +137,9 @@ async fn a_mapping_goes_on_after_a_restart_as_if_there_had_been_none() {
     mappings.offer(&name("r1"), job("hall", 6, Pose2::default(), other));
     let so_far = mappings.progress("hall").unwrap();
     assert_eq!(
-        (so_far.stage, so_far.dropped, so_far.not_kept),
+        (so_far.stage, so_far.dropped, so_far.journal_error),
         (MappingStage::Mapping, 1, None),
-        "its epoch is kept"
+        "its epoch is that of the journal"
     );
     let walls = mappings.finish("hall").unwrap().1.await.unwrap().unwrap();
     let expected = slam.finish().unwrap().walls;
@@ -152,30 +152,30 @@ async fn a_mapping_goes_on_after_a_restart_as_if_there_had_been_none() {
     }
     mappings.stored("hall", Ok(walls.len()));
     let again = MappingSessions::default();
-    again.keep_in(dir.path().join("mapping"), |_, _| true);
-    assert_eq!(again.progress("hall"), None, "what is stored is not gone on with");
+    again.resume_in(dir.path().join("mapping"), |_, _| true);
+    assert_eq!(again.progress("hall"), None, "a stored mapping does not resume");
 }
 
 #[test]
-fn what_cannot_be_kept_is_said_and_what_is_given_up_is_removed() {
+fn a_journal_error_is_reported_and_a_cancelled_journal_is_removed() {
     let (building, dir) = (Building::corridor(7), tempfile::tempdir().unwrap());
     let file = dir.path().join("file");
     std::fs::write(&file, "not a folder").unwrap();
     let mappings = MappingSessions::default();
-    mappings.keep_in(file, |_, _| true);
+    mappings.resume_in(file, |_, _| true);
     mappings.begin(&name("hall"), &name("r1"), Pose2::default()).unwrap();
     let seen = scan(&building, &Pose2::new(3.0, 0.0, 0.0), 1);
     mappings.offer(&name("r1"), job("hall", 1, Pose2::default(), seen));
     wait(|| mappings.progress("hall").unwrap().scans == 1);
-    assert!(mappings.progress("hall").unwrap().not_kept.is_some(), "and it goes on");
+    assert!(mappings.progress("hall").unwrap().journal_error.is_some(), "and the mapping continues");
     let folder = dir.path().join("mapping");
     let mappings = MappingSessions::default();
-    mappings.keep_in(folder.clone(), |_, _| true);
+    mappings.resume_in(folder.clone(), |_, _| true);
     mappings.begin(&name("hall"), &name("r1"), Pose2::default()).unwrap();
     mappings.begin(&name("house"), &name("r2"), Pose2::default()).unwrap();
     let files = || std::fs::read_dir(&folder).unwrap().count();
     assert!(files() == 2 && mappings.cancel("hall") && files() == 1);
     let again = MappingSessions::default();
-    again.keep_in(folder.clone(), |_, robot| robot.as_str() != "r2");
-    assert!(again.progress("house").is_none() && files() == 0, "its robot stands elsewhere");
+    again.resume_in(folder.clone(), |_, robot| robot.as_str() != "r2");
+    assert!(again.progress("house").is_none() && files() == 0, "its robot is on another map");
 }

@@ -1,9 +1,9 @@
-//! What became of every fix of a robot: the latest in a bounded log, all of them in counters. In memory only.
+//! What became of each fix of a robot: the latest in a bounded log, all of them in counters. In memory only.
 
 use map::{fuse::FixOutcome, laser_fix::LaserRefusal, localise::FixSource, pose2::Pose2};
 use std::collections::{BTreeMap, VecDeque};
 
-/// Corrections kept for each robot and modality; the oldest give way.
+/// Corrections in the log of each robot and modality: the latest.
 pub const MAX_CORRECTIONS: usize = 200;
 
 /// A fix, what became of it, and by how much it moved the pose.
@@ -18,7 +18,7 @@ pub struct Correction {
     /// `landmarks` (named without the pose), `guided` (landmarks named by the pose), `laser` or `relocalisation`; `map_change`
     /// when the robot came from another map.
     pub modality: &'static str,
-    /// The landmarks it rests on, by name; empty for the laser.
+    /// Names of the landmarks it rests on; empty for the laser.
     pub landmarks: Vec<String>,
     /// `started` (it gave the first pose), `applied`, `gated_out` (it contradicts the pose and was left out), `reset` (the
     /// last of several that contradict the pose and agree with one another: it replaced the pose), `excluded_by_mode` (it
@@ -29,43 +29,43 @@ pub struct Correction {
     /// Squared Mahalanobis distance of the fix from the pose before it, 3 degrees of freedom; for `applied`,
     /// `excluded_by_mode` and `gated_out`.
     pub chi2: Option<f64>,
-    /// By how much it moved the pose, in the robot's frame before it: forwards, metres.
+    /// By how much it moved the pose, in the robot frame before the fix: forwards, m.
     pub along_m: Option<f64>,
-    /// To the left.
+    /// To the left, m.
     pub across_m: Option<f64>,
-    /// Turned to the left.
+    /// Turn to the left, rad.
     pub turn_rad: Option<f64>,
 }
 
 /// The log of one robot.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Log {
+pub(super) struct CorrectionLog {
     latest: BTreeMap<&'static str, VecDeque<(u64, Correction)>>,
     totals: BTreeMap<&'static str, BTreeMap<&'static str, u64>>,
     taken: u64,
 }
 
-/// What the log says, for readers.
+/// The log, for readers.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Corrections {
     /// What the pose rests on now: `odometry`, `landmarks`, `guided`, `laser`, `relocalisation`; empty without a pose.
     pub modalities: Vec<String>,
-    /// For each modality how many fixes came to which end. For the laser also why scans gave no fix: `no_pose` (there is
-    /// none to correct), `no_walls` (the map has none), `few_points`, `poor_match` (it shows something else than the
-    /// map), `gate_prior` (it contradicts the pose), `ambiguous` (several poses fit), `superseded` (a newer one came first).
+    /// For each modality how many fixes had which outcome. For the laser also why scans gave no fix: `no_pose` (there is
+    /// none to correct), `no_walls` (the map has none), `few_points`, `poor_match` (it shows something else than the map),
+    /// `gate_prior` (it contradicts the pose), `ambiguous` (several poses fit), `superseded` (a newer one came first).
     pub totals: BTreeMap<&'static str, BTreeMap<&'static str, u64>>,
     /// The latest 200 of each modality, oldest first; without `repeated` ones, which tell nothing new.
     pub corrections: Vec<Correction>,
 }
 
-impl Log {
-    /// Counts an end.
+impl CorrectionLog {
+    /// Counts an outcome.
     pub(super) fn count(&mut self, modality: &'static str, outcome: &'static str) {
         *self.totals.entry(modality).or_default().entry(outcome).or_default() += 1;
     }
 
-    /// Counts and keeps a correction.
-    pub(super) fn keep(&mut self, correction: Correction) {
+    /// Counts a correction and adds it to the log.
+    pub(super) fn add(&mut self, correction: Correction) {
         self.count(correction.modality, correction.outcome);
         let latest = self.latest.entry(correction.modality).or_default();
         if latest.len() == MAX_CORRECTIONS {
@@ -84,21 +84,21 @@ impl Log {
     }
 }
 
-/// Along, across and turn of a change of pose.
-pub(super) fn moved(before: Option<&Pose2>, after: Option<&Pose2>) -> Option<Pose2> {
+/// The change of a pose, in the robot frame before it.
+pub(super) fn pose_change(before: Option<&Pose2>, after: Option<&Pose2>) -> Option<Pose2> {
     Some(before?.between(after?))
 }
 
-/// The word of a modality.
-pub(super) fn modality(modality: FixSource) -> &'static str {
-    match modality {
+/// The word for a modality.
+pub(super) fn modality_word(source: FixSource) -> &'static str {
+    match source {
         FixSource::Landmarks => "landmarks",
         FixSource::Laser => "laser",
     }
 }
 
-/// The word of an outcome, and its chi2.
-pub(super) fn outcome(outcome: FixOutcome) -> (&'static str, Option<f64>) {
+/// The word for an outcome, and its chi2.
+pub(super) fn outcome_word(outcome: FixOutcome) -> (&'static str, Option<f64>) {
     // JSON has no infinity.
     let finite = |d: f64| d.is_finite().then_some(d);
     match outcome {
@@ -114,8 +114,8 @@ pub(super) fn outcome(outcome: FixOutcome) -> (&'static str, Option<f64>) {
     }
 }
 
-/// The word of a scan's refusal.
-pub(super) fn refusal(refusal: LaserRefusal) -> &'static str {
+/// The word for the reason why a scan gives no fix.
+pub(super) fn refusal_word(refusal: LaserRefusal) -> &'static str {
     match refusal {
         LaserRefusal::FewPoints { .. } => "few_points",
         LaserRefusal::PoorMatch { .. } => "poor_match",
@@ -130,7 +130,7 @@ mod tests {
 
     #[test]
     fn the_log_is_bounded_and_scans_do_not_push_out_landmarks() {
-        let mut log = Log::default();
+        let mut log = CorrectionLog::default();
         let made = |modality, captured_ns| Correction {
             epoch: 1,
             captured_ns,
@@ -143,9 +143,9 @@ mod tests {
             across_m: None,
             turn_rad: None,
         };
-        log.keep(made("landmarks", 0));
+        log.add(made("landmarks", 0));
         for i in 1..=MAX_CORRECTIONS as i64 + 1 {
-            log.keep(made("laser", i));
+            log.add(made("laser", i));
         }
         log.count("laser", "poor_match");
         let read = log.read(vec!["odometry".into()]);

@@ -1,4 +1,4 @@
-//! What robots send of their motion, checked and counted: bytes in, checked messages or refusals out.
+//! Odometry and scan messages of robots: bytes in, checked messages or refusals out, each counted.
 
 use crate::{limits::MAX_SCAN_BYTES, snapshot::Snapshots};
 use protos::{
@@ -12,17 +12,17 @@ use std::collections::BTreeMap;
 /// Largest odometry message, in bytes: it has nine numbers.
 pub const MAX_ODOMETRY_BYTES: usize = 1024;
 
-/// What came in, of one kind.
+/// Counts of one kind of message.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct MessageCounts {
-    /// Taken.
+    /// Accepted messages.
     pub accepted: u64,
-    /// Refused, by code.
+    /// Refused messages, by code.
     pub rejected: BTreeMap<Code, u64>,
 }
 
 impl MessageCounts {
-    /// Counts what became of a message.
+    /// Counts a message as accepted or refused.
     pub(super) fn count<T>(&mut self, kind: &str, robot: &Name, taken: Result<T, Rejection>) -> Option<T> {
         match taken {
             Ok(message) => {
@@ -30,7 +30,7 @@ impl MessageCounts {
                 Some(message)
             }
             Err(rejection) => {
-                tracing::debug!(%robot, kind, %rejection, "refused");
+                tracing::debug!(%robot, kind, %rejection, "message_refused");
                 *self.rejected.entry(rejection.code).or_default() += 1;
                 None
             }

@@ -1,5 +1,5 @@
-//! Laser scans that wait to be laid on the walls: one of each robot, the newest wins, robots in turn. In: checked scans
-//! from the transport's threads, which never wait. Out: work for the laser's own thread.
+//! Laser scans that wait to be matched with the walls: one a robot, the newest wins, robots take turns. In: checked scans
+//! from the transport's threads, which never wait. Out: work for the laser thread.
 
 use crate::scan_job::ScanJob;
 use protos::Name;
@@ -24,7 +24,7 @@ pub struct Scans {
 }
 
 impl Scans {
-    /// Puts a scan in its robot's place; true if another waited there and is superseded.
+    /// Queues a robot's scan; true if it supersedes one that waited.
     pub fn offer(&self, robot: &Name, job: ScanJob) -> bool {
         let mut state = self.lock();
         if state.closed {
@@ -54,7 +54,7 @@ impl Scans {
         }
     }
 
-    /// Ends the wait; what waits is forgotten.
+    /// Ends the wait and drops the scans that wait.
     pub fn close(&self) {
         let mut state = self.lock();
         (state.closed, state.waiting, state.turn) = (true, BTreeMap::new(), VecDeque::new());

@@ -19,10 +19,10 @@ use std::sync::LazyLock;
 use vision::model::LandmarkId;
 
 mod guided;
-mod runs;
+mod recordings;
 mod stamps;
 
-/// A moment of the server's clock.
+/// A time of the server's clock.
 fn time(seconds: f64) -> Instant {
     static START: LazyLock<Instant> = LazyLock::new(Instant::now);
     *START + Duration::from_secs_f64(seconds)
@@ -108,12 +108,12 @@ fn front() -> Name {
 
 impl MotionTracker {
     /// A frame whose landmarks, named without the pose, give this fix.
-    fn fixed(&self, robot: &Name, at: FrameStamp<'_>, fix: &Fix) -> Option<v1::RobotPose> {
-        let known = self.grounds(robot, &front(), at).map(|grounds| grounds.pose);
+    fn apply_fix(&self, robot: &Name, at: FrameStamp<'_>, fix: &Fix) -> Option<v1::RobotPose> {
+        let prior = self.prior_pose(robot, &front(), at).map(|prior| prior.pose);
         let independent = FixResult::Fixed(Box::new(fix.clone()));
         let (independent, chosen) = (Some(&independent), Some(fix));
-        let says = FrameFixes { prior: known.as_ref(), independent, chosen, ..FrameFixes::default() };
-        self.looked(robot, &front(), at, &says)
+        let fixes = FrameFixes { prior: prior.as_ref(), independent, chosen, ..FrameFixes::default() };
+        self.apply_frame(robot, &front(), at, &fixes)
     }
 }
 
@@ -126,36 +126,36 @@ fn at(captured_ns: i64, x_m: f64) -> FrameStamp<'static> {
 fn a_fix_puts_odometry_on_the_map() {
     let (motion, r1) = motion();
     assert!(motion.odometry_of(&r1, odometry(1, 3.0)).is_none(), "no pose before the first fix");
-    assert!(motion.live.tracks(&r1).is_none());
-    let pose = motion.fixed(&r1, at(1_000_000_000, 3.0), &fix(10.0)).unwrap();
+    assert!(motion.live.trajectories(&r1).is_none());
+    let pose = motion.apply_fix(&r1, at(1_000_000_000, 3.0), &fix(10.0)).unwrap();
     assert_eq!((pose.corrections, pose.map.as_str(), pose.epoch), (1, "hall", 1));
     let pose = motion.odometry_of(&r1, odometry(2, 4.0)).unwrap().map_from_robot.unwrap();
     assert!((pose.pose.unwrap().x_m - 11.0).abs() < 1e-9, "{pose:?}");
-    assert!(pose.covariance[0] > 1e-4, "driving makes it less sure");
-    let tracks = motion.live.tracks(&r1).unwrap();
-    assert!((tracks.odometry[0].x_m - 11.0).abs() < 1e-9);
-    assert_eq!((tracks.odometry.len(), tracks.pose.len()), (1, 2));
+    assert!(pose.covariance[0] > 1e-4, "driving increases the covariance");
+    let trajectories = motion.live.trajectories(&r1).unwrap();
+    assert!((trajectories.odometry[0].x_m - 11.0).abs() < 1e-9);
+    assert_eq!((trajectories.odometry.len(), trajectories.pose.len()), (1, 2));
 }
 
 #[test]
 fn a_prior_follows_from_odometry_alone() {
     let (motion, r1) = motion();
-    assert!(motion.grounds(&r1, &front(), at(1_000_000_000, 3.0)).is_none());
-    motion.fixed(&r1, at(1_000_000_000, 3.0), &fix(10.0)).unwrap();
-    let prior = motion.grounds(&r1, &front(), at(1_500_000_000, 3.5)).unwrap().pose;
+    assert!(motion.prior_pose(&r1, &front(), at(1_000_000_000, 3.0)).is_none());
+    motion.apply_fix(&r1, at(1_000_000_000, 3.0), &fix(10.0)).unwrap();
+    let prior = motion.prior_pose(&r1, &front(), at(1_500_000_000, 3.5)).unwrap().pose;
     assert!((prior.pose.x_m - 10.5).abs() < 1e-9);
     let anew = FrameStamp { epoch: 2, ..at(1_600_000_000, 0.0) };
-    assert!(motion.grounds(&r1, &front(), anew).is_none(), "a new epoch has its own odometry");
+    assert!(motion.prior_pose(&r1, &front(), anew).is_none(), "a new epoch has its own odometry");
 }
 
 #[test]
-fn another_map_starts_afresh() {
+fn another_map_resets_the_pose() {
     let (motion, r1) = motion();
-    motion.fixed(&r1, at(1_000_000_000, 3.0), &fix(10.0)).unwrap();
+    motion.apply_fix(&r1, at(1_000_000_000, 3.0), &fix(10.0)).unwrap();
     motion.snapshots.set_robot("r1", Some("cellar"));
     let there = FrameStamp { map: "cellar", ..at(2_000_000_000, 3.0) };
-    assert!(motion.grounds(&r1, &front(), there).is_none());
-    assert!(motion.pose(&r1, "hall", time(2.0)).is_none(), "what was known is gone");
+    assert!(motion.prior_pose(&r1, &front(), there).is_none());
+    assert!(motion.pose(&r1, "hall", time(2.0)).is_none(), "the old pose is gone");
 }
 
 /// Fault F4: this used to restart the fusion on the map that the frame named.
@@ -163,21 +163,21 @@ fn another_map_starts_afresh() {
 fn a_frame_against_another_map_leaves_the_fusion_alone() {
     let (motion, r1) = motion();
     motion.snapshots.publish(Arc::new(MapSnapshot::empty("cellar", 1)));
-    motion.fixed(&r1, at(1_000_000_000, 3.0), &fix(10.0)).unwrap();
+    motion.apply_fix(&r1, at(1_000_000_000, 3.0), &fix(10.0)).unwrap();
     let there = FrameStamp { map: "cellar", ..at(1_500_000_000, 3.0) };
     let plan = FramePlan { guided: true, global: None };
-    let grounds = PriorPose { pose: fix(0.0).pose, supporters: Vec::new(), plan };
-    assert!(motion.grounds(&r1, &front(), there).is_none());
-    assert!(motion.fixed(&r1, there, &fix(0.0)).is_none());
-    assert!(motion.found(&r1, there, &fix(0.0).pose, &[]).is_none());
-    assert!(motion.judged(&r1, there, &grounds, &[], &[]).is_empty());
+    let prior = PriorPose { pose: fix(0.0).pose, supporting_landmarks: Vec::new(), plan };
+    assert!(motion.prior_pose(&r1, &front(), there).is_none());
+    assert!(motion.apply_fix(&r1, there, &fix(0.0)).is_none());
+    assert!(motion.start_from_hypothesis(&r1, there, &fix(0.0).pose, &[]).is_none());
+    assert!(motion.update_landmark_health(&r1, there, &prior, &[], &[]).is_empty());
     let pose = motion.odometry_of(&r1, odometry(2, 4.0)).unwrap();
     assert_eq!((pose.map.as_str(), pose.corrections), ("hall", 1));
     assert!((pose.map_from_robot.unwrap().pose.unwrap().x_m - 11.0).abs() < 1e-9);
 }
 
 #[test]
-fn a_pose_goes_along_to_a_map_that_lies_known() {
+fn a_pose_is_carried_over_to_a_linked_map() {
     let (motion, r1) = motion();
     // The floor above: its origin at (4, 3) of the hall, turned by a quarter.
     let hall_from_floor = Pose2Covariance {
@@ -188,33 +188,30 @@ fn a_pose_goes_along_to_a_map_that_lies_known() {
     motion.snapshots.set_links([("floor".to_owned(), link)].into());
     let on = |map: &'static str| {
         motion.snapshots.set_robot("r1", Some(map));
-        motion.grounds(&r1, &front(), FrameStamp { map, ..at(2_000_000_000, 5.0) })
+        motion.prior_pose(&r1, &front(), FrameStamp { map, ..at(2_000_000_000, 5.0) })
     };
-    motion.fixed(&r1, at(1_000_000_000, 3.0), &fix(10.0)).unwrap();
+    motion.apply_fix(&r1, at(1_000_000_000, 3.0), &fix(10.0)).unwrap();
     motion.odometry_of(&r1, odometry(2, 5.0));
     // (12, 1) in the hall, looking along x.
     let there = on("floor").unwrap().pose;
     assert!((there.pose.x_m + 2.0).abs() < 1e-9 && (there.pose.y_m + 8.0).abs() < 1e-9, "{there:?}");
     assert!((there.pose.theta_rad + std::f64::consts::FRAC_PI_2).abs() < 1e-9);
-    // As unsure as the link lets it be: 10 cm, and 0.1 rad at 8 m.
+    // Its covariance includes the link's: 10 cm, and 0.1 rad at 8 m.
     assert!(there.covariance[(0, 0)] > 0.5 && there.covariance[(0, 0)] < 1.0, "{}", there.covariance);
-    let said = motion.corrections(&r1);
-    assert_eq!(said.modalities, ["odometry"]);
-    let told = motion.odometry_of(&r1, odometry(3, 5.1)).unwrap();
-    assert_eq!((told.map.as_str(), told.trust()), ("floor", v1::PoseTrust::Unsupported));
-    assert_eq!(
-        said.corrections.last().map(|c| (c.modality, c.outcome)),
-        Some(("map_change", "carried_over"))
-    );
-    assert!(on("attic").is_none(), "nothing is known of how it lies");
-    assert!(on("hall").is_none(), "and what was known is gone with it");
+    let log = motion.corrections(&r1);
+    assert_eq!(log.modalities, ["odometry"]);
+    let published = motion.odometry_of(&r1, odometry(3, 5.1)).unwrap();
+    assert_eq!((published.map.as_str(), published.trust()), ("floor", v1::PoseTrust::Unsupported));
+    assert_eq!(log.corrections.last().map(|c| (c.modality, c.outcome)), Some(("map_change", "carried_over")));
+    assert!(on("attic").is_none(), "it has no link");
+    assert!(on("hall").is_none(), "and the pose is lost with it");
 }
 
 #[test]
 fn without_odometry_the_fix_is_the_pose() {
     let (motion, r1) = motion();
     let still = FrameStamp { odometry: None, ..at(1_000_000_000, 0.0) };
-    let pose = motion.fixed(&r1, still, &fix(10.0)).unwrap();
+    let pose = motion.apply_fix(&r1, still, &fix(10.0)).unwrap();
     assert_eq!(pose.modalities, ["landmarks"]);
     assert!((pose.map_from_robot.unwrap().pose.unwrap().x_m - 10.0).abs() < 1e-12);
 }
@@ -236,7 +233,7 @@ fn walled() -> (MotionTracker, Name, Building) {
     (motion, r1, building)
 }
 
-/// What a robot at a pose measures; odometry is 5 m behind.
+/// The scan of a robot at a pose; odometry is 5 m behind.
 fn scan_at(building: &Building, seq: u64, at: &Pose2) -> Bytes {
     let scan = sim::laser::scan(building, at, &LaserParams::default(), seq);
     let mount = scan.robot_from_laser();
@@ -255,35 +252,35 @@ fn scan_at(building: &Building, seq: u64, at: &Pose2) -> Bytes {
     .into()
 }
 
-fn laid(motion: &MotionTracker) -> Option<v1::RobotPose> {
+fn matched(motion: &MotionTracker) -> Option<v1::RobotPose> {
     let (robot, job) = motion.scans().take().unwrap();
-    motion.laser(&robot, &job, time(job.captured_ns as f64 * 1e-9))
+    motion.fix_by_scan(&robot, &job, time(job.captured_ns as f64 * 1e-9))
 }
 
 #[test]
 fn scans_correct_a_pose_and_never_start_one() {
     let (motion, r1, building) = walled();
     motion.scan_of(&r1, scan_at(&building, 1, &Pose2::new(12.0, 0.1, 0.0)));
-    assert!(laid(&motion).is_none());
+    assert!(matched(&motion).is_none());
     assert_eq!(motion.corrections(&r1).totals["laser"], [("no_pose", 1)].into());
     assert!(motion.corrections(&r1).modalities.is_empty());
-    // Landmarks say 8 cm too far to the left, and how little they know.
+    // Landmarks give a pose 8 cm too far to the left, with a large covariance.
     let pose = Pose2Covariance { pose: Pose2::new(12.0, 0.18, 0.0), covariance: Matrix3::identity() * 0.01 };
-    let unsure = Fix { pose, noise: pose.covariance, ..fix(0.0) };
+    let weak = Fix { pose, noise: pose.covariance, ..fix(0.0) };
     let first = FrameStamp { captured_ns: 1_000_000_000, odometry: None, ..at(0, 0.0) };
-    let started = motion.fixed(&r1, first, &unsure).unwrap();
+    let started = motion.apply_fix(&r1, first, &weak).unwrap();
     assert_eq!(started.modalities, ["odometry", "landmarks"]);
     motion.scan_of(&r1, scan_at(&building, 2, &Pose2::new(12.1, 0.1, 0.0)));
     motion.scan_of(&r1, scan_at(&building, 3, &Pose2::new(12.2, 0.1, 0.0)));
-    let pose = laid(&motion).unwrap();
+    let pose = matched(&motion).unwrap();
     assert_eq!((pose.laser_corrections, pose.corrections), (1, 1));
     assert_eq!(pose.modalities, ["odometry", "landmarks", "laser"]);
     let at = pose.map_from_robot.unwrap();
     let y_m = at.pose.unwrap().y_m;
     assert!((y_m - 0.1).abs() < 0.03 && at.covariance[4].sqrt() < 0.03, "{at:?}");
-    // Standing there another scan tells nothing new.
+    // From the same place, another scan gives nothing new.
     motion.scan_of(&r1, scan_at(&building, 4, &Pose2::new(12.2, 0.1, 0.0)));
-    assert!(laid(&motion).is_none());
+    assert!(matched(&motion).is_none());
     let log = motion.corrections(&r1);
     let ends = [("applied", 1), ("no_pose", 1), ("repeated", 1), ("superseded", 1)];
     assert_eq!(log.totals["laser"], ends.into());
@@ -297,7 +294,7 @@ fn scans_correct_a_pose_and_never_start_one() {
 fn after_ten_metres_a_pose_rests_on_odometry_alone() {
     let (motion, r1, _) = walled();
     motion.odometry_of(&r1, odometry(1, 0.0));
-    motion.fixed(&r1, FrameStamp { odometry: None, ..at(1_000_000_000, 0.0) }, &fix(3.0)).unwrap();
+    motion.apply_fix(&r1, FrameStamp { odometry: None, ..at(1_000_000_000, 0.0) }, &fix(3.0)).unwrap();
     let after = |seq, x_m| motion.odometry_of(&r1, odometry(seq, x_m)).unwrap().modalities;
     assert_eq!(after(2, 5.0), ["odometry", "landmarks"]);
     assert_eq!(after(3, RESTS_ON_M), ["odometry", "landmarks"]);
@@ -305,33 +302,33 @@ fn after_ten_metres_a_pose_rests_on_odometry_alone() {
 }
 
 #[test]
-fn scans_that_tell_nothing_are_counted_with_the_reason() {
+fn scans_without_a_fix_are_counted_with_the_reason() {
     let (motion, r1, building) = walled();
-    motion.fixed(&r1, at(1_000_000_000, 7.0), &fix(12.0)).unwrap();
+    motion.apply_fix(&r1, at(1_000_000_000, 7.0), &fix(12.0)).unwrap();
     let counted = || motion.corrections(&r1).totals["laser"].clone();
-    // Where the robot is not.
+    // A scan of another place.
     motion.scan_of(&r1, scan_at(&building, 2, &Pose2::new(1.0, 1.0, 2.0)));
-    assert!(laid(&motion).is_none());
+    assert!(matched(&motion).is_none());
     assert_eq!(counted().values().sum::<u64>(), 1, "{:?}", counted());
     assert!(!counted().contains_key("applied"));
     motion.snapshots.publish(Arc::new(MapSnapshot::empty("hall", 2)));
     motion.scan_of(&r1, scan_at(&building, 3, &Pose2::new(12.0, 1.0, 0.0)));
-    assert!(laid(&motion).is_none());
+    assert!(matched(&motion).is_none());
     assert_eq!(counted()["no_walls"], 1);
 }
 
 #[test]
-fn an_epoch_that_is_over_says_nothing_more() {
+fn an_epoch_that_is_over_changes_nothing() {
     let (motion, r1) = motion();
     motion.epochs().admit(&r1, 1, time(1.0)).unwrap();
-    motion.fixed(&r1, at(1_000_000_000, 3.0), &fix(10.0)).unwrap();
+    motion.apply_fix(&r1, at(1_000_000_000, 3.0), &fix(10.0)).unwrap();
     motion.epochs().token(&r1, (Some(1), true), time(1.1), |_| true);
     motion.epochs().token(&r1, (Some(1), false), time(1.2), |_| true);
     motion.epochs().admit(&r1, 2, time(1.3)).unwrap();
     let anew = FrameStamp { epoch: 2, ..at(2_000_000_000, 0.0) };
-    motion.fixed(&r1, anew, &fix(20.0)).unwrap();
-    // What was still in work of the first.
-    assert!(motion.fixed(&r1, at(3_000_000_000, 4.0), &fix(11.0)).is_none());
+    motion.apply_fix(&r1, anew, &fix(20.0)).unwrap();
+    // A frame of the first epoch that was still in work.
+    assert!(motion.apply_fix(&r1, at(3_000_000_000, 4.0), &fix(11.0)).is_none());
     assert!((motion.pose(&r1, "hall", time(2.0)).unwrap().pose.x_m - 20.0).abs() < 1e-9);
 }
 
@@ -340,7 +337,7 @@ fn an_epoch_that_is_over_says_nothing_more() {
 fn a_forged_message_leaves_the_robot_alone() {
     let (motion, r1) = motion();
     motion.odometry_of(&r1, odometry(1, 3.0));
-    motion.fixed(&r1, at(1_000_000_000, 3.0), &fix(10.0)).unwrap();
+    motion.apply_fix(&r1, at(1_000_000_000, 3.0), &fix(10.0)).unwrap();
     let forged = v1::Odometry {
         epoch: 2,
         seq: 1,

@@ -1,10 +1,9 @@
-//! Whether the time stamp of a message can be believed. In: capture times by the robot's clock, with the times of receipt.
-//! Out: accepted, refused, or the robot's clock was set. Knows no messages; time is passed in.
+//! Checks the time stamps of a robot's messages. In: capture times by the robot's clock, with the times of receipt. Out:
+//! accepted, refused, or the robot's clock was set. Knows no messages; time is passed in.
 //!
-//! The *lead* of a message is its capture time less its time of receipt, each by its own clock. Delay only ever lowers it,
-//! so the largest leads of recent messages are the offset between the clocks, and no message can lead by more: one that does
-//! is stamped wrongly. Clocks are compared within one robot and one start of its software only; how far they are off the
-//! server's does not matter.
+//! The *lead* of a message is its capture time less its time of receipt, each by its own clock. Delay only lowers the lead,
+//! so the largest leads of recent messages are the offset between the clocks. A message that leads by more is stamped
+//! wrongly. Clocks are compared within one robot and one epoch only; their offset to the server's clock does not matter.
 
 use protos::{Code, Name, Rejection};
 use std::{
@@ -12,31 +11,31 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// A message whose lead exceeds the reference by more is refused. Covers a reference that was taken while messages came
-/// late, jitter of timers and drift of clocks.
+/// A message whose lead exceeds the reference by more is refused. Covers a reference by delayed messages, jitter of timers
+/// and drift of clocks.
 pub const AHEAD_TOLERANCE: Duration = Duration::from_millis(200);
-/// A message that is further behind the reference is refused: the fusion cannot replay it
+/// A message further behind the reference is refused: the fusion cannot replay it
 /// (`map::fuse::FuseParams::window_s`).
 pub const BEHIND_TOLERANCE: Duration = Duration::from_secs(2);
-/// So many refused messages in a row, of the stream that leads...
+/// This many refused messages in a row, of the leading stream...
 pub const CLOCK_SET_COUNT: u32 = 5;
 /// ...over at least this time...
 pub const CLOCK_SET_AFTER: Duration = Duration::from_secs(1);
 /// ...whose leads differ by no more than this, mean that the robot's clock was set.
 pub const CLOCK_SET_SPREAD: Duration = Duration::from_millis(500);
-/// The most important stream leads; one that is silent for so long leads no longer.
+/// The stream of the highest rank leads. A stream that is silent for this long does not lead any more.
 pub const LEADER_SILENT: Duration = Duration::from_secs(10);
-/// Leads that the reference is taken from: the latest...
+/// Leads that the reference is computed from: the latest...
 pub const MAX_LEADS: usize = 64;
-/// ...and none older than this, but for the last.
+/// ...and none older than this, except the last.
 const LEAD_AGE_NS: i64 = 30_000_000_000;
-/// Streams of one robot that are told apart; the one longest silent gives way.
+/// Streams of one robot; a further one replaces the one with the oldest message.
 pub const MAX_STREAMS: usize = 16;
 /// The reference is the third largest lead, so that two stray stamps do not move it.
 const STRAYS: usize = 3;
 
-/// What a message is of. The earlier in this order, the less it says about the robot's clock: odometry carries the pose,
-/// and a camera with a clock of its own must not replace its times.
+/// The source of a message. A later variant says more about the robot's clock: odometry carries the pose, and a camera with
+/// a clock of its own must not replace odometry's times.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Stream {
     /// Frames of a camera, without odometry.
@@ -50,8 +49,8 @@ pub(crate) enum Stream {
 }
 
 impl Stream {
-    /// How far a stamp may lie before that of the message before it: two lasers or threads of one robot need not send in
-    /// order. Odometry has one source.
+    /// How far a stamp may lie before that of the previous message: two lasers or threads of one robot need not send in order.
+    /// Odometry has one source.
     fn disorder(&self) -> Duration {
         if *self == Self::Odometry { Duration::ZERO } else { AHEAD_TOLERANCE }
     }
@@ -67,48 +66,49 @@ impl Stream {
     }
 }
 
-/// What a stamp means.
+/// The result of a check.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Stamp {
     /// It is in order.
     Good,
-    /// It is in order, and that of the message before it in its stream, this one, was ahead.
+    /// It is in order. The stamp of the previous message in its stream, which this carries (ns), was ahead.
     GoodAfterStray(i64),
-    /// The robot's clock was set: times go on from here.
+    /// The robot's clock was set: this stamp is the new reference.
     ClockSet,
 }
 
+/// The last messages of a stream.
 #[derive(Debug, Clone, Copy)]
-struct Heard {
+struct StreamState {
     /// Capture time and lead of the last accepted message, ns.
     accepted: Option<(i64, i64)>,
     /// Receipt of the last message, accepted or not, ns.
     last_ns: i64,
 }
 
-/// Messages refused in a row that agree with one another.
+/// Refused messages in a row whose leads agree.
 #[derive(Debug, Clone)]
-struct Row {
+struct RefusedRow {
     stream: Stream,
     count: u32,
     since_ns: i64,
     lead_ns: i64,
 }
 
-/// The clock of one start of a robot's software, as seen from here.
+/// The clock of one epoch of a robot, by the server's clock.
 #[derive(Debug, Default)]
 pub(crate) struct TimeBase {
-    /// Times of receipt count from the first.
+    /// Times of receipt count from the first message.
     origin: Option<Instant>,
     /// Receipt and lead of accepted messages, ns.
     leads: VecDeque<(i64, i64)>,
-    streams: BTreeMap<Stream, Heard>,
-    row: Option<Row>,
+    streams: BTreeMap<Stream, StreamState>,
+    row: Option<RefusedRow>,
 }
 
 impl TimeBase {
-    /// Judges the capture time of a message that is next in its stream.
-    pub(crate) fn judge(
+    /// Checks the capture time of the next message of its stream. Errors: the stamp is ahead of or behind the reference.
+    pub(crate) fn check(
         &mut self,
         stream: &Stream,
         captured_ns: i64,
@@ -116,7 +116,7 @@ impl TimeBase {
     ) -> Result<Stamp, Rejection> {
         let received_ns = self.receipt_ns(received);
         let lead_ns = captured_ns.saturating_sub(received_ns);
-        let last = self.hear(stream, received_ns);
+        let last = self.note_receipt(stream, received_ns);
         let Some(reference_ns) = self.reference_ns() else {
             self.accept(stream, captured_ns, (received_ns, lead_ns));
             return Ok(Stamp::Good);
@@ -132,16 +132,16 @@ impl TimeBase {
         let disorder_ns = nanos(stream.disorder());
         let stray = last.filter(|(before_ns, _)| captured_ns < before_ns.saturating_sub(disorder_ns));
         let refused = refused.or_else(|| {
-            // Captured later and stamped earlier: one of the two is wrong, the one that is further off the reference.
+            // A later message with an earlier stamp: the stamp that is further off the reference is wrong.
             let (_, before_lead_ns) = stray?;
             let before_ahead_ns = before_lead_ns.saturating_sub(reference_ns);
             (before_ahead_ns <= ahead_ns.saturating_neg()).then_some(Code::ClockBehind)
         });
         if let Some(code) = refused {
-            if self.was_set(stream, lead_ns, received_ns) {
+            if self.is_clock_set(stream, lead_ns, received_ns) {
                 self.leads.clear();
-                for heard in self.streams.values_mut() {
-                    heard.accepted = None;
+                for state in self.streams.values_mut() {
+                    state.accepted = None;
                 }
                 self.accept(stream, captured_ns, (received_ns, lead_ns));
                 return Ok(Stamp::ClockSet);
@@ -154,13 +154,13 @@ impl TimeBase {
         Ok(stray.map_or(Stamp::Good, |(before_ns, _)| Stamp::GoodAfterStray(before_ns)))
     }
 
-    /// How long ago something was captured, at least 0; `None` before the first message.
+    /// Time since a capture, at least 0; `None` before the first message.
     pub(crate) fn age(&self, captured_ns: i64, now: Instant) -> Option<Duration> {
         let age_ns = self.robot_ns(now)?.saturating_sub(captured_ns);
         Some(Duration::from_nanos(u64::try_from(age_ns).unwrap_or(0)))
     }
 
-    /// What the robot's clock shows at a moment; `None` before the first message.
+    /// What the robot's clock shows at `at`, ns; `None` before the first message.
     pub(crate) fn robot_ns(&self, at: Instant) -> Option<i64> {
         let since = at.saturating_duration_since(self.origin?);
         Some(self.reference_ns()?.saturating_add(nanos(since)))
@@ -170,23 +170,25 @@ impl TimeBase {
         nanos(received.saturating_duration_since(*self.origin.get_or_insert(received)))
     }
 
-    /// Notes that a stream was heard; its last accepted message.
-    fn hear(&mut self, stream: &Stream, received_ns: i64) -> Option<(i64, i64)> {
+    /// Notes the receipt of a message; gives capture time and lead of the stream's last accepted message.
+    fn note_receipt(&mut self, stream: &Stream, received_ns: i64) -> Option<(i64, i64)> {
         if self.streams.len() >= MAX_STREAMS && !self.streams.contains_key(stream) {
-            let oldest = self.streams.iter().min_by_key(|(_, heard)| heard.last_ns).map(|(s, _)| s.clone());
+            let oldest = self.streams.iter().min_by_key(|(_, state)| state.last_ns).map(|(s, _)| s.clone());
             oldest.map(|stream| self.streams.remove(&stream));
         }
-        let heard =
-            self.streams.entry(stream.clone()).or_insert(Heard { accepted: None, last_ns: received_ns });
-        heard.last_ns = received_ns;
-        heard.accepted
+        let state = self
+            .streams
+            .entry(stream.clone())
+            .or_insert(StreamState { accepted: None, last_ns: received_ns });
+        state.last_ns = received_ns;
+        state.accepted
     }
 
     fn accept(&mut self, stream: &Stream, captured_ns: i64, (received_ns, lead_ns): (i64, i64)) {
-        if let Some(heard) = self.streams.get_mut(stream) {
-            heard.accepted = Some((captured_ns, lead_ns));
+        if let Some(state) = self.streams.get_mut(stream) {
+            state.accepted = Some((captured_ns, lead_ns));
         }
-        // What carries the pose is followed, whatever cameras say; of equals the one that was believed so far.
+        // An accepted message ends a row of refusals of the same or a lower rank.
         if self.row.as_ref().is_some_and(|row| row.stream.rank() <= stream.rank()) {
             self.row = None;
         }
@@ -201,7 +203,7 @@ impl TimeBase {
         }
     }
 
-    /// The lead of a message that was not delayed: of few messages the upper half, of more the third largest lead.
+    /// The lead of a message without delay: the third largest lead, or with few messages the upper median.
     fn reference_ns(&self) -> Option<i64> {
         let mut leads: Vec<i64> = self.leads.iter().map(|(_, lead_ns)| *lead_ns).collect();
         leads.sort_unstable_by(|a, b| b.cmp(a));
@@ -209,20 +211,20 @@ impl TimeBase {
         leads.get(place.checked_sub(1)?).copied()
     }
 
-    /// Whether this refused message is one of a row by which the robot's clock was set.
-    fn was_set(&mut self, stream: &Stream, lead_ns: i64, received_ns: i64) -> bool {
+    /// Whether this refused message completes a row that shows that the robot's clock was set.
+    fn is_clock_set(&mut self, stream: &Stream, lead_ns: i64, received_ns: i64) -> bool {
         let silent_ns = nanos(LEADER_SILENT);
-        let spoken = |heard: &Heard| received_ns - heard.last_ns <= silent_ns;
-        let leader = self.streams.iter().filter(|(_, heard)| spoken(heard)).map(|(s, _)| s.rank()).max();
+        let is_present = |state: &StreamState| received_ns - state.last_ns <= silent_ns;
+        let leader = self.streams.iter().filter(|(_, state)| is_present(state)).map(|(s, _)| s.rank()).max();
         if leader.is_some_and(|rank| stream.rank() < rank) {
             return false;
         }
-        let agrees = |row: &Row| {
+        let agrees = |row: &RefusedRow| {
             row.stream == *stream && (lead_ns.saturating_sub(row.lead_ns)).abs() <= nanos(CLOCK_SET_SPREAD)
         };
         let row = match self.row.take() {
-            Some(row) if agrees(&row) => Row { count: row.count.saturating_add(1), ..row },
-            _ => Row { stream: stream.clone(), count: 1, since_ns: received_ns, lead_ns },
+            Some(row) if agrees(&row) => RefusedRow { count: row.count.saturating_add(1), ..row },
+            _ => RefusedRow { stream: stream.clone(), count: 1, since_ns: received_ns, lead_ns },
         };
         let set = row.count >= CLOCK_SET_COUNT && received_ns - row.since_ns >= nanos(CLOCK_SET_AFTER);
         self.row = Some(row);
@@ -253,16 +255,16 @@ mod tests {
             Self { clock: TimeBase::default(), start: Instant::now() }
         }
 
-        fn judge(&mut self, stream: &Stream, captured_ms: i64, received_ms: u64) -> Result<Stamp, Code> {
+        fn check(&mut self, stream: &Stream, captured_ms: i64, received_ms: u64) -> Result<Stamp, Code> {
             let received = self.start + Duration::from_millis(received_ms);
-            self.clock.judge(stream, captured_ms * 1_000_000, received).map_err(|r| r.code)
+            self.clock.check(stream, captured_ms * 1_000_000, received).map_err(|r| r.code)
         }
 
         /// Ten odometry messages, 100 ms apart, up to a second.
         fn driving() -> Self {
             let mut robot = Self::new();
             for ms in (100..=1000).step_by(100) {
-                assert_eq!(robot.judge(&Stream::Odometry, ms, ms as u64), Ok(Stamp::Good));
+                assert_eq!(robot.check(&Stream::Odometry, ms, ms as u64), Ok(Stamp::Good));
             }
             robot
         }
@@ -273,11 +275,11 @@ mod tests {
         let ahead = AHEAD_TOLERANCE.as_millis() as i64;
         let behind = BEHIND_TOLERANCE.as_millis() as i64;
         let front = camera("front");
-        assert_eq!(Robot::driving().judge(&front, 1100 + ahead, 1100), Ok(Stamp::Good));
-        assert_eq!(Robot::driving().judge(&front, 1101 + ahead, 1100), Err(Code::ClockAhead));
-        assert_eq!(Robot::driving().judge(&front, 1100 - behind, 1100), Ok(Stamp::Good));
-        assert_eq!(Robot::driving().judge(&front, 1099 - behind, 1100), Err(Code::ClockBehind));
-        assert_eq!(Robot::driving().judge(&front, i64::MAX / 1_000_000, 1100), Err(Code::ClockAhead));
+        assert_eq!(Robot::driving().check(&front, 1100 + ahead, 1100), Ok(Stamp::Good));
+        assert_eq!(Robot::driving().check(&front, 1101 + ahead, 1100), Err(Code::ClockAhead));
+        assert_eq!(Robot::driving().check(&front, 1100 - behind, 1100), Ok(Stamp::Good));
+        assert_eq!(Robot::driving().check(&front, 1099 - behind, 1100), Err(Code::ClockBehind));
+        assert_eq!(Robot::driving().check(&front, i64::MAX / 1_000_000, 1100), Err(Code::ClockAhead));
     }
 
     #[test]
@@ -286,21 +288,21 @@ mod tests {
         let ahead = AHEAD_TOLERANCE.as_millis() as i64;
         for (i, received) in (1100..1300).step_by(100).enumerate() {
             let stream = camera(&format!("c{i}"));
-            assert_eq!(robot.judge(&stream, received + ahead, received as u64), Ok(Stamp::Good));
+            assert_eq!(robot.check(&stream, received + ahead, received as u64), Ok(Stamp::Good));
         }
-        assert_eq!(robot.judge(&camera("third"), 1301 + ahead, 1300), Err(Code::ClockAhead));
+        assert_eq!(robot.check(&camera("third"), 1301 + ahead, 1300), Err(Code::ClockAhead));
     }
 
     #[test]
     fn of_two_readings_out_of_order_the_one_further_off_is_wrong() {
         let mut robot = Robot::driving();
-        assert_eq!(robot.judge(&Stream::Odometry, 1250, 1100), Ok(Stamp::Good));
-        assert_eq!(robot.judge(&Stream::Odometry, 1200, 1200), Ok(Stamp::GoodAfterStray(1_250_000_000)));
-        assert_eq!(robot.judge(&Stream::Odometry, 500, 1300), Err(Code::ClockBehind));
-        assert_eq!(robot.judge(&Stream::Odometry, 1400, 1400), Ok(Stamp::Good));
+        assert_eq!(robot.check(&Stream::Odometry, 1250, 1100), Ok(Stamp::Good));
+        assert_eq!(robot.check(&Stream::Odometry, 1200, 1200), Ok(Stamp::GoodAfterStray(1_250_000_000)));
+        assert_eq!(robot.check(&Stream::Odometry, 500, 1300), Err(Code::ClockBehind));
+        assert_eq!(robot.check(&Stream::Odometry, 1400, 1400), Ok(Stamp::Good));
         // Two lasers need not send in order.
-        assert_eq!(robot.judge(&Stream::Scan, 1400, 1400), Ok(Stamp::Good));
-        assert_eq!(robot.judge(&Stream::Scan, 1380, 1400), Ok(Stamp::Good));
+        assert_eq!(robot.check(&Stream::Scan, 1400, 1400), Ok(Stamp::Good));
+        assert_eq!(robot.check(&Stream::Scan, 1380, 1400), Ok(Stamp::Good));
     }
 
     #[test]
@@ -311,9 +313,9 @@ mod tests {
                 .map(|i| {
                     let received = 1100 + u64::from(i) * step_ms;
                     let spread = if i % 2 == 0 { 0 } else { spread_ms };
-                    robot.judge(&Stream::Odometry, received as i64 + 60_000 + spread, received)
+                    robot.check(&Stream::Odometry, received as i64 + 60_000 + spread, received)
                 })
-                .filter(|judged| *judged == Ok(Stamp::ClockSet))
+                .filter(|result| *result == Ok(Stamp::ClockSet))
                 .count()
         };
         let spread = CLOCK_SET_SPREAD.as_millis() as i64;
@@ -330,12 +332,12 @@ mod tests {
         let mut robot = Robot::new();
         let (a, b) = (camera("a"), camera("b"));
         for ms in (0..5000).step_by(200) {
-            assert_eq!(robot.judge(&a, ms, ms as u64), Ok(Stamp::Good));
-            assert_eq!(robot.judge(&b, ms + 10_000, ms as u64), Err(Code::ClockAhead));
+            assert_eq!(robot.check(&a, ms, ms as u64), Ok(Stamp::Good));
+            assert_eq!(robot.check(&b, ms + 10_000, ms as u64), Err(Code::ClockAhead));
         }
         // It is silent: the other goes on.
-        let later = (5000..8000).step_by(200).map(|ms| robot.judge(&b, ms + 10_000, ms as u64));
-        assert_eq!(later.filter(|judged| *judged == Ok(Stamp::ClockSet)).count(), 1);
+        let later = (5000..8000).step_by(200).map(|ms| robot.check(&b, ms + 10_000, ms as u64));
+        assert_eq!(later.filter(|result| *result == Ok(Stamp::ClockSet)).count(), 1);
     }
 
     #[test]
@@ -345,7 +347,7 @@ mod tests {
         let front = camera("front");
         let (mut set, mut ms) = (None, 1200);
         while set.is_none() && ms < 3 * silent {
-            if robot.judge(&front, ms + 60_000, ms as u64) == Ok(Stamp::ClockSet) {
+            if robot.check(&front, ms + 60_000, ms as u64) == Ok(Stamp::ClockSet) {
                 set = Some(ms);
             }
             ms += 200;
@@ -367,11 +369,11 @@ mod tests {
         let mut robot = Robot::new();
         for ms in 0..1000_i64 {
             let stream = camera(&format!("c{}", ms % 50));
-            robot.judge(&stream, ms, ms as u64).unwrap();
+            robot.check(&stream, ms, ms as u64).unwrap();
         }
         assert_eq!((robot.clock.leads.len(), robot.clock.streams.len()), (MAX_LEADS, MAX_STREAMS));
         // Old leads go, but for the last.
-        robot.judge(&camera("c1"), 100_000, 100_000).unwrap();
+        robot.check(&camera("c1"), 100_000, 100_000).unwrap();
         assert_eq!(robot.clock.leads.len(), 1);
     }
 }

@@ -60,14 +60,18 @@ fn epochs_are_remembered_up_to_the_bound() {
 
 /// Fault F3: eight invented cameras kept the robot's own one out for ten minutes.
 #[test]
-fn the_camera_longest_without_a_frame_gives_way() {
+fn the_camera_with_the_oldest_frame_is_replaced() {
     let slots = Slots::new(100);
     let start = Instant::now();
     let offer = |camera: &str, seq, now| slots.offer(key("r1", camera), (1, seq), 0, now).map_err(|r| r.code);
     for c in 0..MAX_CAMERAS_PER_ROBOT {
         offer(&format!("invented-{c}"), 1, start + Duration::from_millis(c as u64)).unwrap();
     }
-    assert_eq!(offer("front", 1, start + IDLE_CAMERA), Err(Code::TooMany), "all have a frame that waits");
+    assert_eq!(
+        offer("front", 1, start + IDLE_CAMERA),
+        Err(Code::TooMany),
+        "every camera has a waiting frame"
+    );
     while let Some((k, _)) = slots.try_take() {
         slots.finish(&k, FrameOutcome::Processed);
     }
@@ -79,9 +83,9 @@ fn the_camera_longest_without_a_frame_gives_way() {
     assert_eq!(
         offer("invented-0", 2, start + IDLE_CAMERA),
         Err(Code::TooMany),
-        "it gave way; the next is not due"
+        "it was replaced; no other is idle for long enough"
     );
-    // Cameras that send go on.
+    // Cameras that send are not replaced.
     assert_eq!(offer("invented-1", 2, start + IDLE_CAMERA), Ok(()));
     assert_eq!(offer("front", 4, start + 2 * IDLE_CAMERA), Ok(()));
     whole(&slots.counts());
@@ -116,7 +120,7 @@ fn cameras_at_the_bounds() {
     assert_eq!(more("r1", "one-too-many", now), Err(Code::TooMany));
     assert_eq!(more("r2", "a", now), Ok(()));
     assert_eq!(more("r3", "a", now), Err(Code::TooMany));
-    // An idle slot gives way, one that holds work does not.
+    // An idle slot is replaced, one with work is not.
     let (k, _) = slots.try_take().unwrap();
     slots.finish(&k, FrameOutcome::Processed);
     assert_eq!(more("r3", "a", now + IDLE_SLOT / 2), Err(Code::TooMany));

@@ -16,21 +16,22 @@ use vision::{
 pub const MAX_LOOK_ALIKES: usize = 512;
 /// Pairs of them that are compared; from then on all count as look-alikes.
 pub const MAX_COMPARED: usize = 20_000;
+
 /// The landmarks that have look-alikes.
 #[derive(Debug, Default)]
 pub struct LookAlikeClasses {
     /// Their models, with lifted thresholds.
     pub models: ModelSet,
     /// The landmarks that look like each, itself included.
-    pub alike: BTreeMap<LandmarkId, Arc<Vec<LandmarkId>>>,
-    /// The parameters without points: icons are asked where points say nothing.
+    pub classes: BTreeMap<LandmarkId, Arc<Vec<LandmarkId>>>,
+    /// The parameters without points: icons decide where points say nothing.
     pub by_icons: Params,
 }
 
 /// Whether a landmark has look-alikes: negatives limit its threshold, or leave none.
 fn has_look_alikes(model: &LandmarkModel) -> bool {
-    let is_held_down = model.is_active() && model.likeness.limited_by == LimitedBy::NearestNegative;
-    is_held_down || model.is_kept_out_by_look_alikes()
+    let is_limited = model.is_active() && model.likeness.limited_by == LimitedBy::NearestNegative;
+    is_limited || model.is_kept_out_by_look_alikes()
 }
 
 /// The look-alike classes of a map: empty where one distance alone decides.
@@ -42,18 +43,18 @@ pub fn look_alike_classes(
     if kind != DistanceKind::Both {
         return LookAlikeClasses::default();
     }
-    let held = learnt.values().map(|l| &l.model).filter(|m| has_look_alikes(m)).take(MAX_LOOK_ALIKES);
+    let limited = learnt.values().map(|l| &l.model).filter(|m| has_look_alikes(m)).take(MAX_LOOK_ALIKES);
     let lifted: Vec<_> =
-        held.map(|model| Arc::new(refit_thresholds(model, &[], p))).filter(|m| m.is_active()).collect();
-    let alike = alike(&lifted, p);
+        limited.map(|model| Arc::new(refit_thresholds(model, &[], p))).filter(|m| m.is_active()).collect();
+    let classes = connected(&lifted, p);
     let mut by_icons = p.clone();
     by_icons.recognise.verdict.points = false;
-    LookAlikeClasses { models: ModelSet::new(lifted, p).unwrap_or_default(), alike, by_icons }
+    LookAlikeClasses { models: ModelSet::new(lifted, p).unwrap_or_default(), classes, by_icons }
 }
 
 /// The connected components of "one accepts the other": nothing that looks like a member is left out, though the ends of a
 /// long chain may differ.
-fn alike(models: &[Arc<LandmarkModel>], p: &Params) -> BTreeMap<LandmarkId, Arc<Vec<LandmarkId>>> {
+fn connected(models: &[Arc<LandmarkModel>], p: &Params) -> BTreeMap<LandmarkId, Arc<Vec<LandmarkId>>> {
     let icons: Vec<Vec<IconFeatures>> = models.iter().map(|m| m.features(&p.recognise)).collect();
     let accepts = |a: usize, b: usize| unlikeness_of(&models[a], &icons[b], p) < models[a].likeness.tau;
     let (mut class, mut compared): (Vec<usize>, usize) = ((0..models.len()).collect(), 0);
@@ -73,11 +74,11 @@ fn alike(models: &[Arc<LandmarkModel>], p: &Params) -> BTreeMap<LandmarkId, Arc<
     for (model, class) in models.iter().zip(class) {
         classes.entry(class).or_default().push(model.id);
     }
-    let mut alike = BTreeMap::new();
-    for all in classes.into_values().map(Arc::new) {
-        alike.extend(all.iter().map(|id| (*id, all.clone())));
+    let mut by_landmark = BTreeMap::new();
+    for members in classes.into_values().map(Arc::new) {
+        by_landmark.extend(members.iter().map(|id| (*id, members.clone())));
     }
-    alike
+    by_landmark
 }
 
 #[cfg(test)]
@@ -105,17 +106,17 @@ mod tests {
     fn twelve_like_doors_are_one_class_and_others_are_their_own() {
         let p = Params::default();
         let whole = Corners::try_from([[-0.5, -0.5], [239.5, -0.5], [239.5, 239.5], [-0.5, 239.5]]).unwrap();
-        let lesson = |id: u64, image: &GrayImage| {
+        let learnt = |id: u64, image: &GrayImage| {
             let mut views = vec![TrainingView::photographed(image, &whole, &p).unwrap()];
             views.extend(synthesis::views(image, &whole, 8, &p, id));
             Arc::new(refit_thresholds(&learn(LandmarkId(id), &views, &[], &p).unwrap(), &[], &p))
         };
-        let mut models: Vec<_> = (0..12).map(|i| lesson(i, &picture(1, i as usize))).collect();
-        models.extend([lesson(20, &picture(5, 0)), lesson(21, &picture(5, 3))]);
-        let alike = alike(&models, &p);
-        let of = |id: u64| alike[&LandmarkId(id)].iter().map(|l| l.0).collect::<Vec<_>>();
+        let mut models: Vec<_> = (0..12).map(|i| learnt(i, &picture(1, i as usize))).collect();
+        models.extend([learnt(20, &picture(5, 0)), learnt(21, &picture(5, 3))]);
+        let classes = connected(&models, &p);
+        let of = |id: u64| classes[&LandmarkId(id)].iter().map(|l| l.0).collect::<Vec<_>>();
         assert_eq!(of(0), (0..12).collect::<Vec<_>>());
-        assert!(Arc::ptr_eq(&alike[&LandmarkId(3)], &alike[&LandmarkId(11)]));
+        assert!(Arc::ptr_eq(&classes[&LandmarkId(3)], &classes[&LandmarkId(11)]));
         assert_eq!(of(20), [20, 21]);
     }
 }

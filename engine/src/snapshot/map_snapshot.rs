@@ -32,23 +32,23 @@ pub struct MapSnapshot {
     pub models: ModelSet,
     /// The landmarks that have look-alikes, with thresholds as if they had none.
     pub look_alikes: Arc<LookAlikeClasses>,
-    /// Every learnt model that reads and fits the parameters, candidates included.
+    /// Every learnt model that can be read and fits the parameters, inactive ones included.
     pub learnt: BTreeMap<LandmarkId, StoredModel>,
     /// Models that are stored but must not be used, and why: damaged, or learnt under other parameters.
     pub unusable_models: BTreeMap<LandmarkId, String>,
-    /// The walls, with the free side on the left.
+    /// The walls: laser segments (map frame, m), free side on the left.
     pub walls: Arc<Vec<LaserSegment>>,
     /// Counts up whenever the walls are replaced.
     pub walls_version: i64,
     /// The walls, made ready for localisation by scans; kept from version to version while the walls are the same.
     pub wall_index: Arc<WallIndex>,
-    /// What reference runs have shown of the modalities, by pose cell.
+    /// Modality statistics of the reference runs, by pose cell.
     pub modalities: Arc<ModalityMap>,
     /// Number of reference runs that `modalities` rests on, and the latest.
-    pub runs: (i64, i64),
-    /// The camera that looks for its landmarks, and what counts as seen.
-    pub sight: VisibilitySettings,
-    /// From where each placed landmark is seen by that camera. Without those that are still computed.
+    pub reference_runs: (i64, i64),
+    /// The camera and the limits that define "visible".
+    pub visibility_settings: VisibilitySettings,
+    /// The visibility area of each placed landmark, without those that are still computed.
     pub visibility: BTreeMap<LandmarkId, Arc<VisibilityMap>>,
     /// What is still computed of this version: until then it is absent, never out of date.
     pub pending: Pending,
@@ -74,8 +74,8 @@ impl MapSnapshot {
             walls_version: 0,
             wall_index: Arc::new(WallIndex::new([])),
             modalities: Arc::default(),
-            runs: (0, 0),
-            sight: VisibilitySettings::default(),
+            reference_runs: (0, 0),
+            visibility_settings: VisibilitySettings::default(),
             visibility: BTreeMap::new(),
             pending: Pending::default(),
             distance: DistanceKind::Both,
@@ -107,15 +107,15 @@ pub struct LandmarkInfo {
     pub name: String,
     /// Width and height, if measured; without it there is no pose.
     pub size: Option<LandmarkSize>,
-    /// Where it hangs, if that and its size are known; without it there is no robot pose.
+    /// Its place, if that and its size are known; without it there is no robot pose.
     pub place: Option<LandmarkPlace>,
-    /// How far it is trusted: what is quarantined corrects no pose.
-    pub standing: LandmarkHealth,
+    /// How far its place is trusted: a quarantined landmark corrects no pose.
+    pub health: LandmarkHealth,
 }
 
 impl LandmarkInfo {
     /// Whether it may correct poses.
     pub fn is_trusted(&self) -> bool {
-        self.standing != LandmarkHealth::Quarantined
+        self.health != LandmarkHealth::Quarantined
     }
 }

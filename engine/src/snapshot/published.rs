@@ -11,7 +11,7 @@ use std::{collections::BTreeMap, sync::Arc};
 use tokio::sync::{broadcast, watch};
 
 /// Changes that a slow listener may lag behind before it loses the oldest.
-const CHANGES_KEPT: usize = 256;
+const MAX_CHANGES: usize = 256;
 
 /// A map got a new version, or is gone.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -42,7 +42,7 @@ impl Default for Snapshots {
     fn default() -> Self {
         Self {
             world: ArcSwap::default(),
-            changes: broadcast::channel(CHANGES_KEPT).0,
+            changes: broadcast::channel(MAX_CHANGES).0,
             published: watch::Sender::default(),
         }
     }
@@ -118,26 +118,26 @@ impl Snapshots {
         });
     }
 
-    /// How maps lie to each other from now on. For the publication, after the commit.
+    /// Replaces the map links. For the publication, after the commit.
     pub fn set_links(&self, links: MapLinks<String>) {
         let links = Arc::new(links);
         self.world.rcu(|world| World { links: links.clone(), ..World::clone(world) });
     }
 
-    /// `to_from_map` of two maps that hang on the same one; nothing for others.
+    /// `to_from_map` (m, rad) of two maps that are linked to the same one; `None` for others.
     pub fn relation(&self, from: &str, to: &str) -> Option<Pose2Covariance> {
         let links = self.world.load().links.clone();
         Some(relation(&links, &from.to_owned(), &to.to_owned()).ok()?.to_from_map)
     }
 
-    /// The current version of `map` once the visibility areas of all its landmarks are known. For one who can wait.
+    /// The current version of `map` as soon as none of its visibility areas is pending. Waits.
     pub async fn with_visibility(&self, map: &str) -> Option<Arc<MapSnapshot>> {
         let mut published = self.published.subscribe();
         loop {
             published.mark_unchanged();
             match self.get(map) {
                 Some(current) if current.pending.visibility => {}
-                known => return known,
+                ready => return ready,
             }
             // An error says that this is gone, and nobody can hold a reference to it then.
             published.changed().await.ok()?;

@@ -5,7 +5,7 @@ use crate::{intake::Intake, scene};
 use protos::prost::Message;
 use std::{sync::Mutex, time::Duration};
 
-/// The analysis of this camera's frames panics.
+/// The analysis of frames of this camera panics.
 pub(super) const PLANTED: &str = "panics";
 
 #[derive(Default)]
@@ -40,16 +40,16 @@ fn hall() -> Engine {
     scene::engine(&[Arc::new(MapSnapshot::empty("hall", 1))])
 }
 
-/// Panics where it is told to.
+/// Panics on answers if it is told to.
 #[derive(Default)]
-struct Breaks {
-    answers: bool,
+struct Panicking {
+    on_answers: bool,
     sent: Sent,
 }
 
-impl Publish for Breaks {
+impl Publish for Panicking {
     fn answer(&self, key: &SlotKey, answer: &v1::Answer) {
-        assert!(!self.answers, "planted");
+        assert!(!self.on_answers, "planted");
         self.sent.answer(key, answer);
     }
 
@@ -66,10 +66,10 @@ fn settled(engine: &Engine) -> crate::slots::FrameCounts {
     }
 }
 
-/// Outside the analysis: where the answer is handed over.
+/// A panic outside of the analysis, where the answer is published.
 #[test]
 fn a_panic_beside_the_analysis_leaves_the_camera_usable() {
-    let (engine, breaks) = (hall(), Arc::new(Breaks { answers: true, ..Breaks::default() }));
+    let (engine, breaks) = (hall(), Arc::new(Panicking { on_answers: true, ..Panicking::default() }));
     let workers = Workers::start(&engine, 1, &breaks).unwrap();
     let intake = intake(&engine, Duration::from_mins(1));
     for seq in 1..=2 {
@@ -83,14 +83,14 @@ fn a_panic_beside_the_analysis_leaves_the_camera_usable() {
     workers.stop();
 }
 
-/// Inside it: answered, once.
+/// A panic inside of the analysis: one answer.
 #[test]
 fn a_panic_of_the_analysis_is_answered_and_counted() {
     let (engine, sent) = (hall(), Sent::default());
     intake(&engine, Duration::from_mins(1)).receive(key(0), message(1, 768)).unwrap();
     let (_, job) = engine.slots.try_take().unwrap();
     let k = SlotKey { robot: key(0).robot, camera: Name::new(PLANTED).unwrap() };
-    let outcome = engine.contained(&k, &job, &sent);
+    let outcome = engine.answer_frame(&k, &job, &sent);
     let answer = sent.0.lock().unwrap().pop().unwrap();
     assert!(sent.0.lock().unwrap().is_empty());
     let code = answer.rejection.map(|r| r.code);
@@ -103,7 +103,7 @@ fn a_thread_that_ends_untold_is_a_failure() {
     let engine = hall();
     let workers = Workers::start(&engine, 1, &Arc::new(Sent::default())).unwrap();
     assert_eq!(engine.vitals.failure(), None);
-    // No frames any more, and nobody has told the server to stop.
+    // No more frames, although the server was not told to stop.
     engine.slots.close();
     let started = Instant::now();
     let failure = loop {
@@ -123,7 +123,7 @@ fn late_work_is_not_begun() {
     intake(&engine, Duration::ZERO).receive(key(0), message(1, 768)).unwrap();
     let (k, job) = engine.slots.try_take().unwrap();
     std::thread::sleep(Duration::from_millis(2));
-    assert_eq!(engine.contained(&k, &job, &sent), FrameOutcome::Expired);
+    assert_eq!(engine.answer_frame(&k, &job, &sent), FrameOutcome::Expired);
     let answer = sent.0.lock().unwrap().pop().unwrap();
     assert_eq!((answer.status(), answer.seq, answer.timings.len()), (v1::Status::Expired, 1, 0));
 }
@@ -134,7 +134,7 @@ fn a_map_that_is_gone_is_a_refusal() {
     intake(&engine, Duration::from_secs(9)).receive(key(0), message(1, 768)).unwrap();
     engine.snapshots.remove_map("hall");
     let (k, job) = engine.slots.try_take().unwrap();
-    assert_eq!(engine.contained(&k, &job, &sent), FrameOutcome::Rejected(Code::UnknownMap));
+    assert_eq!(engine.answer_frame(&k, &job, &sent), FrameOutcome::Rejected(Code::UnknownMap));
 }
 
 /// Far more frames than the pool can take: each is answered or superseded, none is lost, none answered twice.
@@ -167,28 +167,28 @@ fn overload_conserves_frames() {
     assert!(counts.superseded > 0);
 }
 
-/// The scene's robot before the first poster, at the pose that odometry gives, again and again.
-struct Standing {
+/// The scene's robot in front of the first poster, at rest by its odometry.
+struct RestingRobot {
     engine: Engine,
-    looks: Vec<(Arc<MapSnapshot>, sim::robot::SensorReadings)>,
+    stops: Vec<sim::robot::SensorReadings>,
     intrinsics: vision::frame::Intrinsics,
     seq: u64,
 }
 
-impl Standing {
+impl RestingRobot {
     fn new(search_every_frame: bool) -> Self {
         let mut scene = scene::Scene::new();
         let map = scene.taught();
         let engine = Engine { search_every_frame, ..scene::engine(std::slice::from_ref(&map)) };
-        let looks = scene.looks(5, 1).into_iter().map(|(_, seen)| (map.clone(), seen)).collect();
-        Self { engine, looks, intrinsics: scene.intrinsics(), seq: 0 }
+        let stops = scene.stops(5, 1).into_iter().map(|(_, readings)| readings).collect();
+        Self { engine, stops, intrinsics: scene.intrinsics(), seq: 0 }
     }
 
-    /// The next frame shows what is seen before poster `poster`; odometry says that the robot stands where it did.
+    /// The next frame is taken in front of poster `poster`; by odometry the robot has not moved.
     fn frame(&mut self, poster: usize) -> v1::Answer {
         self.seq += 1;
-        let (_, seen) = &self.looks[poster];
-        let odometry = self.looks[0].1.step.odom_from_robot;
+        let readings = &self.stops[poster];
+        let odometry = self.stops[0].step.odom_from_robot;
         let frame = CheckedFrame {
             epoch: 1,
             seq: self.seq,
@@ -196,9 +196,9 @@ impl Standing {
             encoding: protos::convert::Encoding::Gray8,
             width_px: 640,
             height_px: 480,
-            image: seen.frame.image.data().to_vec().into(),
+            image: readings.frame.image.data().to_vec().into(),
             intrinsics: Some(self.intrinsics),
-            mounting: Some(map::extrinsics::CameraExtrinsics::new(seen.step.robot_from_camera).unwrap()),
+            mounting: Some(map::extrinsics::CameraExtrinsics::new(readings.step.robot_from_camera).unwrap()),
             odometry: Some(odometry),
             prior: None,
             deadline_ms: None,
@@ -214,22 +214,22 @@ impl Standing {
             stamp_instead_ns: None,
         };
         let sent = Sent::default();
-        assert_eq!(self.engine.contained(&key(0), &job, &sent), FrameOutcome::Processed);
+        assert_eq!(self.engine.answer_frame(&key(0), &job, &sent), FrameOutcome::Processed);
         sent.0.lock().unwrap().pop().unwrap()
     }
 
     /// Distance of the fused pose from where the frames of a poster were taken, metres.
     fn off_m(&self, poster: usize) -> f64 {
-        let known = self.engine.motion.pose(&key(0).robot, scene::MAP, Instant::now()).unwrap();
-        let truth = self.looks[poster].1.step.map_from_robot;
-        (known.pose.x_m - truth.x_m).hypot(known.pose.y_m - truth.y_m)
+        let fused = self.engine.motion.pose(&key(0).robot, scene::MAP, Instant::now()).unwrap();
+        let truth = self.stops[poster].step.map_from_robot;
+        (fused.pose.x_m - truth.x_m).hypot(fused.pose.y_m - truth.y_m)
     }
 }
 
 #[test]
 fn two_frames_of_three_are_answered_by_expected_landmarks_where_searches_are_spared() {
-    let mut standing = Standing::new(false);
-    let answers: Vec<_> = (0..7).map(|_| standing.frame(0)).collect();
+    let mut robot = RestingRobot::new(false);
+    let answers: Vec<_> = (0..7).map(|_| robot.frame(0)).collect();
     let spared: Vec<bool> = answers.iter().map(|a| a.only_expected).collect();
     assert_eq!(spared, [false, true, true, false, true, true, false]);
     for answer in &answers {
@@ -238,22 +238,22 @@ fn two_frames_of_three_are_answered_by_expected_landmarks_where_searches_are_spa
         let named = answer.quads.iter().any(|q| !q.landmark.is_empty() || !q.guided_landmark.is_empty());
         assert!(named, "{answer:?}");
     }
-    assert!(standing.off_m(0) < 0.1, "{}", standing.off_m(0));
-    let mut every = Standing::new(true);
+    assert!(robot.off_m(0) < 0.1, "{}", robot.off_m(0));
+    let mut every = RestingRobot::new(true);
     assert!((0..4).all(|_| !every.frame(0).only_expected));
 }
 
-/// Nothing that the pose expects is found: the frame is searched at once, and the third that contradicts replaces the pose.
+/// No expected landmark is found: the frame is searched at once, and the third contradiction replaces the pose.
 #[test]
 fn a_robot_that_was_carried_away_is_found_out_although_searches_are_spared() {
-    let mut standing = Standing::new(false);
+    let mut robot = RestingRobot::new(false);
     for _ in 0..3 {
-        standing.frame(0);
+        robot.frame(0);
     }
-    assert!(standing.off_m(1) > 1.0, "the posters hang apart");
+    assert!(robot.off_m(1) > 1.0, "the posters hang apart");
     for _ in 0..3 {
-        let answer = standing.frame(1);
+        let answer = robot.frame(1);
         assert!(!answer.only_expected && answer.map_from_robot.is_some(), "{answer:?}");
     }
-    assert!(standing.off_m(1) < 0.2, "{}", standing.off_m(1));
+    assert!(robot.off_m(1) < 0.2, "{}", robot.off_m(1));
 }

@@ -1,5 +1,4 @@
-//! `robot/{robot}/rpc/gaze`: a robot asks where to look and is answered on the spot, on zenoh's thread: it takes less
-//! than a millisecond.
+//! `robot/{robot}/rpc/gaze`: answers gaze queries of robots on zenoh's thread, in less than a millisecond.
 
 use super::{BusError, Receivers, caught};
 use engine::{gaze::GazeQuery, panics::Edge};
@@ -16,7 +15,7 @@ use zenoh::{
     query::{Query, Queryable},
 };
 
-/// Largest question, in bytes: it has some thirty numbers and a name.
+/// Largest query, in bytes: it has some thirty numbers and a name.
 const MAX_BYTES: usize = 1024;
 
 pub(super) async fn answer_gaze(
@@ -24,15 +23,14 @@ pub(super) async fn answer_gaze(
     keys: &Keys,
     to: &Receivers,
 ) -> Result<Queryable<()>, BusError> {
-    let asked = {
+    let callback = {
         let (keys, to) = (keys.clone(), to.clone());
         move |query: Query| {
             let Ok(Key::Gaze(robot)) = keys.parse(query.key_expr().as_str()) else { return };
             let panics = to.vitals.panics();
-            let advice =
-                panics.catch(Edge::Message, "a question where to look", "it is refused as internal", || {
-                    asked(&to, &robot, &query)
-                });
+            let advice = panics.catch(Edge::Message, "a gaze query", "it is refused as internal", || {
+                advise(&to, &robot, &query)
+            });
             let failed =
                 || Err(Rejection::new(Code::Internal, "message", "the server failed on it; see its log"));
             let advice = advice.unwrap_or_else(failed).unwrap_or_else(|rejection| v1::GazeAdvice {
@@ -40,19 +38,18 @@ pub(super) async fn answer_gaze(
                 ..v1::GazeAdvice::default()
             });
             if let Err(error) = query.reply(query.key_expr().clone(), advice.encode_to_vec()).wait() {
-                tracing::debug!(%robot, %error, "no advice sent");
+                tracing::debug!(%robot, %error, "gaze_advice_not_sent");
             }
         }
     };
     let declared = session
         .declare_queryable(keys.all_gaze())
-        .callback(caught(&to.vitals, "a question where to look", asked))
+        .callback(caught(&to.vitals, "a gaze query", callback))
         .await;
-    declared
-        .map_err(|e| BusError::Declare { action: "answer questions where to look", detail: e.to_string() })
+    declared.map_err(|e| BusError::Declare { action: "answer gaze queries", detail: e.to_string() })
 }
 
-fn asked(to: &Receivers, robot: &Name, query: &Query) -> Result<v1::GazeAdvice, Rejection> {
+fn advise(to: &Receivers, robot: &Name, query: &Query) -> Result<v1::GazeAdvice, Rejection> {
     let name = to.intake.snapshots.robot_map(robot.as_str());
     let name = name.ok_or_else(|| Rejection::new(Code::UnknownRobot, "robot", "not registered"))?;
     let map = to.intake.snapshots.get(&name);
@@ -63,19 +60,19 @@ fn asked(to: &Receivers, robot: &Name, query: &Query) -> Result<v1::GazeAdvice, 
     }
     let wire = v1::GazeRequest::decode(&*bytes);
     let wire = wire.map_err(|e| Rejection::new(Code::BadMessage, "message", e.to_string()))?;
-    let question = CheckedGaze::try_from(wire)?;
-    let pose = question.pose.or_else(|| to.motion.pose(robot, &name, Instant::now())).ok_or_else(|| {
+    let request = CheckedGaze::try_from(wire)?;
+    let pose = request.pose.or_else(|| to.motion.pose(robot, &name, Instant::now())).ok_or_else(|| {
         Rejection::new(Code::Missing, "map_from_robot", "the robot's pose is not known here either")
     })?;
-    let viewer = question.viewer(&map.sight.viewer);
+    let camera = request.viewer(&map.visibility_settings.viewer);
     let number = |text: &str| map.landmarks.iter().find(|(_, l)| l.name == text).map(|(id, _)| *id);
-    let looked = question.looked.and_then(|(text, recognised)| Some((number(&text)?, recognised)));
-    let params = GazeParams { criterion: question.criterion, ..GazeParams::default() };
-    let ask = GazeQuery { pose, viewer, head: question.head, params };
-    let look = to.gazes.choose(robot, question.at_ns, looked, &map, &ask).map_err(|e| refused(&e))?;
+    let outcome = request.looked.and_then(|(text, recognised)| Some((number(&text)?, recognised)));
+    let params = GazeParams { criterion: request.criterion, ..GazeParams::default() };
+    let query = GazeQuery { pose, camera, pan_tilt: request.head, params };
+    let action = to.gazes.choose(robot, request.at_ns, outcome, &map, &query).map_err(|e| refused(&e))?;
     let name_of = |c: &map::gaze::GazeTarget| {
         map.landmarks.get(&c.landmark).map(|l| l.name.clone()).unwrap_or_default()
     };
-    let advice = advice(&look, name_of);
+    let advice = advice(&action, name_of);
     Ok(v1::GazeAdvice { map: map.name.clone(), map_version: map.version, ..advice })
 }

@@ -1,5 +1,5 @@
-//! What comes in: one subscription per kind of message, each with a callback that parses the key, checks and hands
-//! over. A message that is refused costs its sender an answer and us a counter; nothing here waits or panics.
+//! Incoming messages: one subscription for each kind, with a callback that parses the key, checks the message and passes it
+//! on. A refused frame is answered; every refusal is counted. Nothing here waits or panics.
 
 use super::{BusError, Outbox, Receivers, caught};
 use engine::{
@@ -91,8 +91,8 @@ fn token(to: &Receivers, robot: &Name, token: (Option<u64>, bool)) {
 fn frame(keys: &Keys, to: &Receivers, outbox: &Outbox, sample: &Sample) {
     let key = sample.key_expr().as_str();
     let Ok(Key::Frame(robot, camera)) = keys.parse(key) else {
-        // Nobody to answer: the key itself is what is wrong.
-        tracing::debug!(key, "frame on a key that is none");
+        // The key names no camera, so there is nobody to answer.
+        tracing::debug!(key, "frame_key_invalid");
         return to.intake.slots.refuse(protos::Code::BadName);
     };
     let slot = SlotKey { robot, camera };
@@ -101,9 +101,9 @@ fn frame(keys: &Keys, to: &Receivers, outbox: &Outbox, sample: &Sample) {
     let received =
         panics.catch(Edge::Message, "frame", follows, || to.intake.receive(slot.clone(), bytes(sample)));
     if let Err(answer) = received.unwrap_or_else(|| Err(internal(sample))) {
-        tracing::debug!(key, rejection = ?answer.rejection, "frame refused");
+        tracing::debug!(key, rejection = ?answer.rejection, "frame_refused");
         outbox.answer(&slot, &answer);
-        to.live.refused(&slot, answer.into());
+        to.live.publish_refusal(&slot, answer.into());
     }
 }
 

@@ -67,9 +67,9 @@ pub struct Receivers {
     pub motion: Arc<MotionTracker>,
     /// Presence, and refusals for pages.
     pub live: Arc<LiveHub>,
-    /// Which landmark each robot was told to look at.
+    /// The gaze target of each robot.
     pub gazes: Arc<GazeControllers>,
-    /// Where tasks say that they run and panics are counted.
+    /// Pulses of tasks, and counters of panics.
     pub vitals: Arc<Vitals>,
 }
 
@@ -96,10 +96,10 @@ impl Bus {
         let session = router::open(&endpoint, config.limits.robots, config.limits.frame_bytes).await?;
         let keys = Keys::new(&config.fleet);
         let outbox = Outbox::start(session.clone(), keys.clone(), to.vitals.panics().clone())?;
-        let changes = tokio::spawn(tell_changes(
+        let changes = tokio::spawn(forward_map_changes(
             to.clone(),
             outbox.clone(),
-            to.vitals.begin("the task that tells of new maps"),
+            to.vitals.begin("the task that forwards map changes"),
         ));
         let subscribers = inbox::subscribe(&session, &keys, &to, &outbox).await?;
         let queryables = [
@@ -135,13 +135,12 @@ impl Bus {
         }
         self.outbox.drain().await;
         if let Err(error) = self.session.close().await {
-            tracing::warn!(%error, "closing zenoh");
+            tracing::warn!(%error, "zenoh_close_failed");
         }
     }
 }
 
-/// A callback of zenoh's that does not let a panic through: it would end the task that receives from a robot. `kind` says
-/// what is received.
+/// A zenoh callback that catches panics: a panic would end the task that receives from a robot. `kind` names the message.
 fn caught<T>(
     vitals: &Arc<Vitals>,
     kind: &'static str,
@@ -153,8 +152,8 @@ fn caught<T>(
     }
 }
 
-/// Passes map changes on to robots and pages.
-async fn tell_changes(to: Receivers, outbox: Outbox, pulse: Pulse) {
+/// Forwards map changes to robots and pages.
+async fn forward_map_changes(to: Receivers, outbox: Outbox, pulse: Pulse) {
     let mut changes = to.intake.snapshots.changes();
     loop {
         match changes.recv().await {
@@ -165,7 +164,7 @@ async fn tell_changes(to: Receivers, outbox: Outbox, pulse: Pulse) {
                 }
                 to.live.map_changed(change.map, change.version);
             }
-            // Robots that missed one see the version in their next answer, or ask for it.
+            // A robot that missed a change sees the version in its next answer, or asks for it.
             Err(RecvError::Lagged(_)) => {}
             Err(RecvError::Closed) => return pulse.end(),
         }

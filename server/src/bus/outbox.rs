@@ -1,8 +1,8 @@
-//! What goes out: a bounded queue and one thread that puts it on zenoh. A full queue drops the message and counts it.
+//! Outgoing messages: a bounded queue and one thread that puts them on zenoh. A full queue drops the message and counts it.
 //!
-//! Every message is sent with `CongestionControl::Drop`: one subscriber that does not read loses its own messages and delays
-//! nobody else's. Nothing here depends on a message arriving: an answer and a pose are replaced by the next one, and the version
-//! of a map can be asked for at `map/{map}/version`.
+//! Every message is sent with `CongestionControl::Drop`: a subscriber that does not read loses its own messages and delays no
+//! other. No message must arrive: the next answer or pose replaces the last, and `map/{map}/version` answers queries for the
+//! version of a map.
 
 use super::BusError;
 use engine::{
@@ -27,7 +27,7 @@ use zenoh::{
 /// Messages waiting to be sent.
 const QUEUE: usize = 1024;
 
-struct Letter {
+struct OutgoingMessage {
     key: String,
     bytes: Vec<u8>,
     priority: Priority,
@@ -37,7 +37,7 @@ struct Letter {
 #[derive(Clone)]
 pub struct Outbox {
     keys: Keys,
-    queue: Arc<Mutex<Option<SyncSender<Letter>>>>,
+    queue: Arc<Mutex<Option<SyncSender<OutgoingMessage>>>>,
     thread: Arc<Mutex<Option<JoinHandle<()>>>>,
     dropped: Arc<AtomicU64>,
 }
@@ -50,10 +50,10 @@ impl std::fmt::Debug for Outbox {
 
 impl Outbox {
     pub(super) fn start(session: zenoh::Session, keys: Keys, panics: Arc<Panics>) -> Result<Self, BusError> {
-        let (queue, letters) = sync_channel(QUEUE);
+        let (queue, messages) = sync_channel(QUEUE);
         let thread = std::thread::Builder::new()
             .name("outbox".into())
-            .spawn(move || deliver(&session, &letters, &panics))
+            .spawn(move || deliver(&session, &messages, &panics))
             .map_err(|source| BusError::Thread { name: "outbox", source })?;
         Ok(Self {
             keys,
@@ -77,15 +77,15 @@ impl Outbox {
     pub(super) fn send(&self, key: &Key, message: &impl Message) {
         let priority =
             if matches!(key, Key::MapChanged(_)) { Priority::Data } else { Priority::InteractiveHigh };
-        let letter = Letter { key: self.keys.build(key), bytes: message.encode_to_vec(), priority };
+        let message = OutgoingMessage { key: self.keys.build(key), bytes: message.encode_to_vec(), priority };
         let queue = self.queue.lock().unwrap_or_else(PoisonError::into_inner);
-        let sent = queue.as_ref().is_some_and(|queue| queue.try_send(letter).is_ok());
+        let sent = queue.as_ref().is_some_and(|queue| queue.try_send(message).is_ok());
         if !sent {
             self.dropped.fetch_add(1, Ordering::Relaxed);
         }
     }
 
-    /// Takes nothing more, and returns when what was queued is sent.
+    /// Takes no more messages, and returns when the queued ones are sent.
     pub(super) async fn drain(&self) {
         drop(self.queue.lock().unwrap_or_else(PoisonError::into_inner).take());
         let thread = self.thread.lock().unwrap_or_else(PoisonError::into_inner).take();
@@ -106,14 +106,14 @@ impl Publish for Outbox {
     }
 }
 
-fn deliver(session: &zenoh::Session, letters: &Receiver<Letter>, panics: &Panics) {
-    for Letter { key, bytes, priority } in letters {
+fn deliver(session: &zenoh::Session, messages: &Receiver<OutgoingMessage>, panics: &Panics) {
+    for OutgoingMessage { key, bytes, priority } in messages {
         let put = || {
             let put = session.put(key.as_str(), bytes).express(true);
             put.congestion_control(CongestionControl::Drop).priority(priority).wait()
         };
         if let Some(Err(error)) = panics.catch(Edge::Delivery, &key, "the message is lost", put) {
-            tracing::debug!(%error, key, "not sent");
+            tracing::debug!(%error, key, "message_not_sent");
         }
     }
 }

@@ -73,16 +73,16 @@ async fn a_robot_is_localised_by_what_it_was_taught() {
     let robot = running.robot("r1").await;
     let mut poses = robot.poses();
     let (mut fixes, mut seen) = (0, 0);
-    for (name, look) in scene.looks(99, 3) {
-        let step = &look.step;
-        let capture = Capture::gray(&look.frame.image)
+    for (name, readings) in scene.stops(99, 3) {
+        let step = &readings.step;
+        let capture = Capture::gray(&readings.frame.image)
             .with_intrinsics(&scene.intrinsics())
             .with_mounting(&step.robot_from_camera)
             .with_odometry(&step.odom_from_robot);
         let answer = robot.recognise("front", capture, WAIT).await.unwrap();
         assert_eq!((answer.map.as_str(), answer.map_version), (scene::MAP, 3));
         for quad in answer.quads.iter().filter(|q| !q.landmark.is_empty()) {
-            let truth = look.frame.truth.landmark(&quad.landmark).expect("named, but not in the picture");
+            let truth = readings.frame.truth.landmark(&quad.landmark).expect("named, but not in the picture");
             let at = quad.corners.iter().zip(truth.corners_px.points());
             let worst = at.map(|(a, b)| (a.u_px - b.x).hypot(a.v_px - b.y)).fold(0.0, f64::max);
             assert!(worst < 6.0, "{}: corners {worst} px off", quad.landmark);
@@ -151,8 +151,8 @@ async fn every_bad_frame_is_answered_and_the_server_goes_on() {
     let elsewhere = v1::Frame { seq: 104, map: "cellar".into(), ..base.clone() };
     assert_eq!(refused(elsewhere.encode_to_vec()).await, is("unknown_map", "map"));
 
-    let stranger = running.robot("stranger").await;
-    let answer = stranger.recognise("front", plain(), WAIT).await.unwrap();
+    let unknown = running.robot("stranger").await;
+    let answer = unknown.recognise("front", plain(), WAIT).await.unwrap();
     assert_eq!(answer.rejection.unwrap().code, "unknown_robot");
     let last = robot.recognise("front2", plain(), WAIT).await.unwrap();
     assert_eq!(last.status(), v1::Status::NoMatch, "the server goes on");

@@ -1,5 +1,5 @@
-//! `map/{map}/version`: whoever missed a change of a map asks for its version. Answered on zenoh's thread from the snapshots:
-//! one look-up a map.
+//! `map/{map}/version`: answers queries for the version of a map, for robots that missed a change. Runs on zenoh's thread: one
+//! look-up of a snapshot a map.
 
 use super::{BusError, Receivers, caught};
 use protos::{Key, Keys, Name, prost::Message, v1};
@@ -21,10 +21,9 @@ pub(super) async fn answer_versions(
     };
     let declared = session
         .declare_queryable(keys.all_map_versions())
-        .callback(caught(&to.vitals, "a question for versions", answer))
+        .callback(caught(&to.vitals, "a version query", answer))
         .await;
-    declared
-        .map_err(|e| BusError::Declare { action: "answer questions for map versions", detail: e.to_string() })
+    declared.map_err(|e| BusError::Declare { action: "answer version queries", detail: e.to_string() })
 }
 
 fn reply(keys: &Keys, to: &Receivers, query: &Query) {
@@ -37,7 +36,7 @@ fn reply(keys: &Keys, to: &Receivers, query: &Query) {
         }
         let message = v1::MapChanged { map: map.name.clone(), version: map.version };
         if let Err(error) = query.reply(key, message.encode_to_vec()).wait() {
-            tracing::debug!(map = map.name, %error, "no version sent");
+            tracing::debug!(map = map.name, %error, "version_not_sent");
             return;
         }
     }

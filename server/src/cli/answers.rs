@@ -8,18 +8,18 @@ use client::{
     v1::{Answer, QuadAnswer, QuadKind, Verdict},
 };
 
-/// What was recognised in a picture.
+/// What was recognised in a picture, a line for each quad.
 pub(super) fn sentence(name: &str, answer: &Answer) -> String {
     let mut lines = vec![format!("{name}: {}", counted(answer.quads.len() as u64, "quad"))];
-    lines.extend(answer.quads.iter().filter_map(said).map(|line| format!("  {line}")));
+    lines.extend(answer.quads.iter().filter_map(quad_line).map(|line| format!("  {line}")));
     if lines.len() == 1 {
         lines.push("  no landmark recognised".to_owned());
     }
     lines.join("\n")
 }
 
-/// What a quad is; nothing of one that is unknown.
-fn said(quad: &QuadAnswer) -> Option<String> {
+/// The line for a quad; `None` for verdict unknown.
+fn quad_line(quad: &QuadAnswer) -> Option<String> {
     let line = match (named(quad), quad.verdict()) {
         (Some(named), _) => named_line(&named),
         (None, Verdict::Ambiguous) if !quad.doubtful_landmark.is_empty() => {
@@ -31,7 +31,7 @@ fn said(quad: &QuadAnswer) -> Option<String> {
     Some(line + &by_points(quad))
 }
 
-/// One landmark that the picture leaves open for a reason of its own, or several that it fits.
+/// The line for verdict ambiguous: one landmark and why it is not named, or several that the quad fits.
 fn ambiguous_line(quad: &QuadAnswer) -> String {
     let refused = |why: &str| quad.candidates.iter().find(|c| c.refusal == why).map(|c| c.landmark.as_str());
     match (refused("plain"), refused("corners")) {
@@ -55,12 +55,12 @@ fn named_line(named: &NamedLandmark<'_>) -> String {
     }
 }
 
-/// The landmarks that the picture alone may be.
+/// The landmarks that the quad fits by the picture alone.
 fn fitting(quad: &QuadAnswer) -> Vec<&str> {
     quad.candidates.iter().filter(|c| c.ratio < 1.0).map(|c| c.landmark.as_str()).collect()
 }
 
-/// What points say of the first candidate; empty where they did not decide.
+/// The points' evidence for the first candidate; empty where points did not decide.
 fn by_points(quad: &QuadAnswer) -> String {
     quad.points.as_ref().map_or_else(String::new, |points| {
         let alarms = points.log10_false_alarms.round();
@@ -68,7 +68,7 @@ fn by_points(quad: &QuadAnswer) -> String {
     })
 }
 
-/// A robot, its map, and where it is if that is known.
+/// The line for a robot: its map, and its pose if that is known.
 pub(super) fn robot_line(robot: &Robot) -> String {
     let at = robot.pose.as_ref().map_or_else(String::new, |pose| {
         let (x_m, y_m, degrees) = (pose.x_m, pose.y_m, pose.theta_rad.to_degrees());
@@ -156,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn a_robot_is_told_with_its_pose_and_how_far_that_is_trusted() {
+    fn a_robot_is_shown_with_its_pose_and_how_far_that_is_trusted() {
         let robot: Robot = serde_json::from_str(r#"{"name":"r1","map":"hall","alive":true}"#).unwrap();
         assert_eq!(robot_line(&robot), "r1  hall");
         let at = |trust| {

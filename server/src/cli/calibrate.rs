@@ -1,7 +1,7 @@
-//! `waymark calibrate`: a camera's intrinsics from pictures of one flat thing of known shape, no server needed.
+//! `waymark calibrate`: a camera's intrinsics from pictures of one flat object of known shape, no server needed.
 
 use super::{detect, pictures, screen};
-use crate::calibrating::{CORNER_SIGMA_PX, Knowledge, calibrated};
+use crate::calibrating::{CORNER_SIGMA_PX, CalibrationConstraints, calibrated};
 use anyhow::Context as _;
 use engine::dominant::dominant;
 use protos::api::CalibrationReport;
@@ -18,10 +18,10 @@ use vision::{
 /// `waymark calibrate`.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// Pictures by one camera (PNG, JPEG, or folders of them), each of which shows the thing as its largest quad.
+    /// Pictures by one camera (PNG, JPEG, or folders of them), each of which shows the object as its largest quad.
     #[arg(required_unless_present = "corners")]
     images: Vec<PathBuf>,
-    /// Width and height of the thing in metres, such as 0.60x0.84; only their ratio matters for the camera.
+    /// Width and height of the object in metres, such as 0.60x0.84; only their ratio matters for the camera.
     #[arg(long, value_parser = size)]
     size: LandmarkSize,
     /// Corners instead of pictures: JSON `{"width": px, "height": px, "views": [[[x,y],[x,y],[x,y],[x,y]], ...]}`, each
@@ -29,7 +29,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "FILE", conflicts_with = "images")]
     corners: Option<PathBuf>,
     #[command(flatten)]
-    known: Knowledge,
+    constraints: CalibrationConstraints,
     /// The report as JSON.
     #[arg(long)]
     json: bool,
@@ -37,7 +37,7 @@ pub(crate) struct Args {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Given {
+struct CornersFile {
     width: usize,
     height: usize,
     views: Vec<[[f64; 2]; 4]>,
@@ -53,19 +53,19 @@ fn size(text: &str) -> Result<LandmarkSize, String> {
 
 pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let (names, views, image_px) = match &args.corners {
-        Some(file) => given(file, args.size)?,
-        None => found(&args.images, args.size)?,
+        Some(file) => views_of_file(file, args.size)?,
+        None => views_of_images(&args.images, args.size)?,
     };
-    let report = calibrated(&views, image_px, &args.known)?;
+    let report = calibrated(&views, image_px, &args.constraints)?;
     screen::say(&if args.json { serde_json::to_string(&report)? } else { table(&report, &names) });
     Ok(())
 }
 
 type Views = (Vec<String>, Vec<PlanarView>, [usize; 2]);
 
-fn given(file: &Path, size: LandmarkSize) -> anyhow::Result<Views> {
+fn views_of_file(file: &Path, size: LandmarkSize) -> anyhow::Result<Views> {
     let text = std::fs::read(file).with_context(|| format!("cannot read {}", file.display()))?;
-    let given: Given =
+    let given: CornersFile =
         serde_json::from_slice(&text).with_context(|| format!("{} holds no corners", file.display()))?;
     let covariance = [nalgebra::Matrix2::identity() * CORNER_SIGMA_PX.powi(2); 4];
     let mut views = vec![];
@@ -77,7 +77,7 @@ fn given(file: &Path, size: LandmarkSize) -> anyhow::Result<Views> {
 }
 
 /// The largest quad of every picture.
-fn found(images: &[PathBuf], size: LandmarkSize) -> anyhow::Result<Views> {
+fn views_of_images(images: &[PathBuf], size: LandmarkSize) -> anyhow::Result<Views> {
     let (mut names, mut views) = (vec![], vec![]);
     let mut image_px = None;
     for path in detect::files(images)? {
@@ -96,14 +96,14 @@ fn found(images: &[PathBuf], size: LandmarkSize) -> anyhow::Result<Views> {
     Ok((names, views, image_px.context("no pictures")?))
 }
 
-/// The one quad that is meant: whole, and far larger than any other; else the largest.
+/// The dominant whole quad; without one the largest.
 fn largest(quads: &[Quad]) -> Option<&Quad> {
     let mut whole: Vec<&Quad> =
         quads.iter().filter(|q| q.kind == QuadKind::Full && !q.side_clipped.contains(&true)).collect();
     whole.sort_by(|a, b| b.corners_px.area_px2().total_cmp(&a.corners_px.area_px2()));
     let corners: Vec<Corners> = whole.iter().map(|q| q.corners_px).collect();
-    let meant = dominant(&corners).and_then(|c| whole.iter().find(|q| q.corners_px == *c));
-    meant.or(whole.first()).copied()
+    let dominant = dominant(&corners).and_then(|c| whole.iter().find(|q| q.corners_px == *c));
+    dominant.or(whole.first()).copied()
 }
 
 fn table(r: &CalibrationReport, names: &[String]) -> String {

@@ -1,5 +1,5 @@
-//! Time that this thread has worked, by the system's clock of the thread's own processor time: other programs on the
-//! machine do not lengthen it. Where there is no such clock, time passed.
+//! Processor time of this thread, which other programs on the machine do not lengthen. On systems without such a clock, wall
+//! time.
 
 /// Seconds from one moment to a later one on the same thread.
 #[derive(Debug, Clone, Copy)]

@@ -1,4 +1,4 @@
-//! Pictures with lines, dots and words on them, for people who want to see what the program sees. Colours are RGB,
+//! Pictures with lines, dots and words on them, to show a person the stages of the detector. Colours are RGB,
 //! coordinates pixels with (0, 0) the centre of the top-left one. Anything outside is cut off.
 
 use image::{ExtendedColorType, ImageEncoder as _, codecs::png};
@@ -30,7 +30,7 @@ pub const MAGENTA: Colour = [240, 90, 230];
 /// White.
 pub const WHITE: Colour = [255, 255, 255];
 
-/// Many things of a kind, neighbours of different colour.
+/// Colours of a series; neighbours differ.
 pub const SERIES: [Colour; 10] =
     [GREEN, ORANGE, BLUE, YELLOW, MAGENTA, CYAN, RED, [170, 255, 160], [190, 160, 255], [255, 190, 170]];
 
@@ -241,9 +241,9 @@ mod tests {
         {
             let mut p = Picture::black(100, 100);
             p.line([20.0, 20.0], to, 2.0, WHITE);
-            let seen = if to[0] < 0.0 { 28.3 } else { length };
+            let visible = if to[0] < 0.0 { 28.3 } else { length };
             // The ends are round: about a disc of the width more.
-            assert!((ink(&p) - 2.0 * seen - 3.1).abs() < 4.0, "{to:?}: {}", ink(&p));
+            assert!((ink(&p) - 2.0 * visible - 3.1).abs() < 4.0, "{to:?}: {}", ink(&p));
         }
     }
 

@@ -1,4 +1,4 @@
-//! `waymark gather`: let a robot gather views while it drives, look at what it brought home, accept or throw away.
+//! `waymark gather`: lets a robot gather views while it drives, shows its tracks, accepts or discards them.
 
 use super::{
     screen,
@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 /// `waymark gather`.
 #[derive(Debug, clap::Subcommand)]
 pub(crate) enum Command {
-    /// Begin: while the robot drives, views of flat four-sided things are kept. Prints the number of the gathering.
+    /// Start: while the robot drives, views of flat four-sided objects are stored. Prints the number of the gathering.
     Start {
         /// The robot.
         #[arg(long)]
@@ -28,7 +28,7 @@ pub(crate) enum Command {
         #[command(flatten)]
         at: At,
     },
-    /// End; what was gathered waits for a decision.
+    /// Stop; the tracks wait for a decision.
     Stop {
         /// Number of the gathering.
         gathering: i64,
@@ -40,7 +40,7 @@ pub(crate) enum Command {
         #[command(flatten)]
         at: At,
     },
-    /// What waits for a decision: views, place, gates.
+    /// Show the tracks that wait for a decision: views, place, gates.
     Show {
         /// Number of the gathering.
         gathering: i64,
@@ -90,7 +90,7 @@ fn pick(text: &str) -> Result<AcceptedTrackBody, String> {
 
 fn line(g: &Gathering) -> String {
     let of = g.landmark.as_deref().unwrap_or("whatever is new");
-    let state = if g.open { "goes on" } else { "ended" };
+    let state = if g.open { "open" } else { "ended" };
     format!("{}  {} with {}, of {of}: {}", g.id, state, g.robot, counted(g.counts.kept, "view"))
 }
 
@@ -159,8 +159,8 @@ async fn accept(at: &At, gathering: i64, picks: &[AcceptedTrackBody]) -> anyhow:
     let bar = screen::progress(1000, "learning");
     let job = match accepted.job.clone() {
         Some(job) => {
-            let told = |job: &Job| bar.set_position((job.progress * 1000.0) as u64);
-            maps.wait_for_job(job, LESSON_TIMEOUT, told).await?.message
+            let report = |job: &Job| bar.set_position((job.progress * 1000.0) as u64);
+            maps.wait_for_job(job, LESSON_TIMEOUT, report).await?.message
         }
         None => String::new(),
     };

@@ -12,12 +12,12 @@ pub mod mapping;
 pub mod parameters;
 pub mod simulated_errors;
 pub mod pictures;
-mod run;
+mod record;
 pub mod scratch;
 pub mod screen;
 mod serve;
 pub mod stopwatch;
-mod sight;
+mod visibility_settings;
 pub mod survey;
 mod teach;
 
@@ -48,7 +48,7 @@ enum Command {
     ///
     /// Prints the corners of every quad, best first. With --draw, pictures show what each stage made of the image, and
     /// so where a quad was lost: no edges (lower --edge-steps), edges but no segments (lower --min-segment), segments
-    /// but no hypothesis, or a hypothesis that others outdid (see the scores). A picture that cannot be read is one
+    /// but no quad proposal, or a proposal with a lower score than others (see the scores). A picture that cannot be read is one
     /// line on standard error and exit status 1; the others are still done.
     ///
     /// For example:
@@ -56,7 +56,7 @@ enum Command {
     ///   waymark detect photographs/ --json --min-score 0.8 > quads.jsonl
     #[command(verbatim_doc_comment)]
     Detect(detect::Args),
-    /// A camera's focal length, principal point and distortion from pictures of one flat thing; no server needed.
+    /// A camera's focal length, principal point and distortion from pictures of one flat object; no server needed.
     ///
     /// Five to ten pictures of one poster or board from different sides, each of which shows it as its largest quad; at
     /// least three of the sides must differ by more than 15 degrees. Pictures that do not fit the others are left out
@@ -76,7 +76,7 @@ enum Command {
     /// The server finds the one dominant quad in each photograph (or takes the whole picture), learns, and says
     /// whether the landmark is in use or which gate it failed.
     Learn(teach::LearnArgs),
-    /// Let a robot gather views while it drives past, and decide on what it brought home.
+    /// Let a robot gather views while it drives past, then accept or discard its tracks.
     ///
     /// For example:
     ///   waymark gather start --map office --robot r1
@@ -85,14 +85,14 @@ enum Command {
     ///   waymark gather accept --map office 1 3=poster 5=fire-plan
     #[command(subcommand, verbatim_doc_comment)]
     Gather(gather::Command),
-    /// Record a robot's run and tell where it really was, so that the map learns which modality to trust where.
+    /// Record a robot's drive and give its reference trajectory, so that the map learns which modality to trust where.
     ///
     /// For example:
     ///   waymark run start r1
     ///   waymark run learn r1 --path survey.tum
     ///   waymark run mode --map office fuse
     #[command(subcommand, verbatim_doc_comment)]
-    Run(run::Command),
+    Run(record::Command),
     /// Ask a running server what is in photographs.
     Recognise(teach::RecogniseArgs),
 }
@@ -113,7 +113,7 @@ pub fn main() -> ExitCode {
         Command::Robot(command) => run(teach::robot(command)).map(|()| ExitCode::SUCCESS),
         Command::Learn(args) => run(teach::learn(args)),
         Command::Gather(command) => run(gather::run(command)).map(|()| ExitCode::SUCCESS),
-        Command::Run(command) => run(run::run(command)).map(|()| ExitCode::SUCCESS),
+        Command::Run(command) => run(record::run(command)).map(|()| ExitCode::SUCCESS),
         Command::Recognise(args) => run(teach::recognise(args)),
     };
     match done {

@@ -7,7 +7,7 @@ use serde_json::Value;
 use std::path::PathBuf;
 use vision::detect::DetectParams;
 
-/// How quads are looked for.
+/// Parameters of quad detection.
 #[derive(Debug, Clone, Default, clap::Args)]
 #[command(next_help_heading = "Detection parameters")]
 pub struct ParameterArgs {
@@ -33,7 +33,7 @@ pub struct ParameterArgs {
     /// Share of each side that edges must support, 0 to 1: higher for fewer false quads.
     #[arg(long, value_name = "SHARE")]
     min_support: Option<f64>,
-    /// Smallest score of a quad of the search, the probability that it is a thing, 0 to 1: higher for fewer false quads.
+    /// Smallest score of a quad of the search, the probability that it is an object, 0 to 1: higher for fewer false quads.
     #[arg(long, value_name = "SCORE")]
     min_score: Option<f64>,
     /// What a quad inside another becomes: one of its `alternates`, or one of the `quads`.
@@ -69,7 +69,7 @@ impl ParameterArgs {
             .map_err(|error| anyhow::anyhow!("parameter {}: {}", error.path(), error.inner()))
     }
 
-    /// What to call them in a report.
+    /// Their name in a report.
     pub fn name(&self) -> String {
         let file = self.params.as_deref().and_then(std::path::Path::file_stem);
         let file = file.map(|stem| stem.to_string_lossy().into_owned());
@@ -116,7 +116,7 @@ fn two(text: &str) -> Result<[f64; 2], String> {
     numbers.try_into().map_err(|other: Vec<f64>| format!("{} numbers, not two", other.len()))
 }
 
-/// Sets what is at a path of names between dots. The path must be there: a slip of the pen is no new parameter.
+/// Sets what is at a path of names between dots. The path must exist: a typing error must not add a parameter.
 fn put(all: &mut Value, path: &str, value: Value) -> anyhow::Result<()> {
     let mut at = all;
     for name in path.split('.') {

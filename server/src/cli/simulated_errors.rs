@@ -1,5 +1,5 @@
-//! What a simulated robot has wrong of itself: its camera, where that sits, and on a survey where it stands. A covariance
-//! can only be judged where the errors that it states are made.
+//! Errors that a simulated robot makes: in its intrinsics, its extrinsics, and on a survey in its pose. A covariance can only
+//! be evaluated where the errors that it states are made.
 
 use map::{
     check::OutOfRange,
@@ -16,49 +16,53 @@ use vision::{
 /// How well a surveying robot knows its pose: standard deviations of x, y (metres) and heading (radians).
 const SURVEY_SIGMA: [f64; 3] = [0.01, 0.01, 0.002];
 
-/// Of one robot: its camera and the camera's seat are wrong by the same in every picture, its pose by something else each
+/// The errors of one robot: those of intrinsics and extrinsics are the same in every picture, those of the pose are new each
 /// time.
 #[derive(Debug, Clone)]
 pub struct SimulatedRobotErrors {
-    /// What it says of its camera.
+    /// The intrinsics that it states.
     pub camera: Intrinsics,
-    /// None: it has nothing wrong.
+    /// `None`: no errors.
     random: Option<Random>,
-    /// Of the seat: left perturbation (rotation, translation), robot frame.
-    seat: Vector6<f64>,
+    /// Error of the extrinsics: left perturbation (rotation, translation; rad and m), robot frame.
+    extrinsics_error: Vector6<f64>,
 }
 
 impl SimulatedRobotErrors {
-    /// A robot with nothing wrong, which knows that of its camera and claims for the rest what others do.
+    /// A robot without errors. It states exact intrinsics, and the usual covariances for the rest.
     pub fn none(camera: &Intrinsics) -> Self {
-        Self { camera: *camera, random: None, seat: Vector6::zeros() }
+        Self { camera: *camera, random: None, extrinsics_error: Vector6::zeros() }
     }
 
-    /// A robot that is wrong by what it says it may be: a usual calibration's errors, the mounting's default, a survey's.
+    /// A robot with errors as large as it states: those of a usual calibration, of default extrinsics, of a survey.
     pub fn drawn(camera: &Intrinsics, seed: u64) -> Self {
         let mut random = Random::new(seed);
         let sigmas = IntrinsicsSigmas::usual(camera.fx_px);
         let usual = camera.with_sigmas(sigmas).unwrap_or(*camera);
         let e = usual.error_sigmas().map(|s| s * random.normal());
         let (fx_px, fy_px) = (camera.fx_px * (1.0 + e.x), camera.fy_px * (1.0 + e.x));
-        let said = Intrinsics { fx_px, fy_px, cx_px: camera.cx_px + e.y, cy_px: camera.cy_px + e.z, ..usual };
+        let stated =
+            Intrinsics { fx_px, fy_px, cx_px: camera.cx_px + e.y, cy_px: camera.cy_px + e.z, ..usual };
         let (a, t) = (CameraExtrinsics::DEFAULT_ANGLE_SIGMA_RAD, CameraExtrinsics::DEFAULT_POSITION_SIGMA_M);
-        let seat = Vector6::new(a, a, a, t, t, t).map(|s| s * random.normal());
-        Self { camera: said, random: Some(random), seat }
+        let extrinsics_error = Vector6::new(a, a, a, t, t, t).map(|s| s * random.normal());
+        Self { camera: stated, random: Some(random), extrinsics_error }
     }
 
-    /// One or the other.
+    /// Without errors if `exact`.
     pub fn of(camera: &Intrinsics, exact: bool, seed: u64) -> Self {
         if exact { Self::none(camera) } else { Self::drawn(camera, seed) }
     }
 
-    /// Where it says that its camera sits.
-    pub fn mounting(&self, robot_from_camera: &Isometry3<f64>) -> Result<CameraExtrinsics, OutOfRange> {
-        let (turn, shift) = (self.seat.fixed_rows::<3>(0).into(), self.seat.fixed_rows::<3>(3).into());
+    /// The extrinsics that it states.
+    pub fn extrinsics(&self, robot_from_camera: &Isometry3<f64>) -> Result<CameraExtrinsics, OutOfRange> {
+        let (turn, shift) = (
+            self.extrinsics_error.fixed_rows::<3>(0).into(),
+            self.extrinsics_error.fixed_rows::<3>(3).into(),
+        );
         CameraExtrinsics::new(perturbed(robot_from_camera, &turn, &shift))
     }
 
-    /// Where it says that it stands, on a survey.
+    /// The pose that it states on a survey (map frame).
     pub fn surveyed(&mut self, map_from_robot: &Pose2) -> Result<Pose2Covariance, OutOfRange> {
         let sigmas = Vector3::from(SURVEY_SIGMA);
         let error = self.random.as_mut().map_or_else(Vector3::zeros, |r| sigmas.map(|s| s * r.normal()));
@@ -81,7 +85,7 @@ mod tests {
         for seed in 0..n {
             let mut robot = SimulatedRobotErrors::drawn(&camera, u64::from(seed));
             focal += ((robot.camera.fx_px / 500.0 - 1.0) / IntrinsicsSigmas::USUAL_FOCAL_SHARE).powi(2);
-            let angle = robot.mounting(&seat).unwrap().robot_from_camera.rotation.angle();
+            let angle = robot.extrinsics(&seat).unwrap().robot_from_camera.rotation.angle();
             turn += (angle / CameraExtrinsics::DEFAULT_ANGLE_SIGMA_RAD).powi(2);
             let said = robot.surveyed(&at).unwrap();
             let e = said.pose.minus(&at);

@@ -1,8 +1,9 @@
-//! A first drive: a robot that knows its pose maps the walls by laser, looks at every poster from several sides, and
-//! what the detector finds there is hung on the walls. The demo teaches it to a server, an evaluation to itself.
+//! A first drive: a robot with a known pose maps the walls by laser and takes frames of every poster from several sides. In:
+//! stops. Out: walls, and views of each poster with its detected quad. The demo teaches them to a server, an evaluation to
+//! itself.
 //!
-//! What a person adds in the field is the name of the poster and a click on the right quad; here the simulator's truth
-//! stands in for the click. Corners, places and sizes are measured, not taken from the truth.
+//! In the field a person gives the name of the poster and clicks on its quad; here the simulator's truth replaces the click.
+//! Corners, places and sizes are measured, not taken from the truth.
 
 use super::{screen, simulated_errors::SimulatedRobotErrors};
 use map::{
@@ -35,10 +36,10 @@ pub struct SurveyView {
     /// The poster's quad.
     pub quad: Quad,
     /// The frame, and the truth about it.
-    pub sighting: SensorReadings,
+    pub readings: SensorReadings,
     // Pose and extrinsics as the robot states them.
     map_from_robot: Pose2Covariance,
-    mounting: CameraExtrinsics,
+    extrinsics: CameraExtrinsics,
 }
 
 /// What a surveying robot gathered.
@@ -52,22 +53,22 @@ pub struct Survey {
     pub missed: usize,
 }
 
-/// Drives to all stops.
-pub fn survey(mut robot: Robot, stops: &[Stop], mut wrong: SimulatedRobotErrors) -> anyhow::Result<Survey> {
+/// Drives to all stops. Errors: a scan or a pose is out of range.
+pub fn survey(mut robot: Robot, stops: &[Stop], mut errors: SimulatedRobotErrors) -> anyhow::Result<Survey> {
     let progress = screen::progress(stops.len(), "first drive");
     let mut walls = Walls::new(WallParams::default());
     let (mut views, mut missed) = (BTreeMap::<String, Vec<SurveyView>>::new(), 0);
     for stop in stops {
-        let sighting = robot.look(&stop.step);
-        let map_from_robot = wrong.surveyed(&sighting.step.map_from_robot)?;
-        let mounting = wrong.mounting(&sighting.step.robot_from_camera)?;
-        walls.add(&map_from_robot, &lines::segments(&sighting.scan, &LineParams::default()))?;
-        match clicked(&sighting, &stop.landmark) {
+        let readings = robot.look(&stop.step);
+        let map_from_robot = errors.surveyed(&readings.step.map_from_robot)?;
+        let extrinsics = errors.extrinsics(&readings.step.robot_from_camera)?;
+        walls.add(&map_from_robot, &lines::segments(&readings.scan, &LineParams::default()))?;
+        match clicked(&readings, &stop.landmark) {
             Some(quad) => views.entry(stop.landmark.clone()).or_default().push(SurveyView {
                 quad,
-                sighting,
+                readings,
                 map_from_robot,
-                mounting,
+                extrinsics,
             }),
             None => missed += 1,
         }
@@ -78,17 +79,17 @@ pub fn survey(mut robot: Robot, stops: &[Stop], mut wrong: SimulatedRobotErrors)
 }
 
 /// The detected quad that a person would click on.
-fn clicked(sighting: &SensorReadings, name: &str) -> Option<Quad> {
-    let truth = sighting.frame.truth.landmark(name)?;
-    detect(&sighting.frame.image, &DetectParams::default(), &mut NoTrace)
+fn clicked(readings: &SensorReadings, name: &str) -> Option<Quad> {
+    let truth = readings.frame.truth.landmark(name)?;
+    detect(&readings.frame.image, &DetectParams::default(), &mut NoTrace)
         .into_iter()
         .filter(|quad| quad.kind == QuadKind::Full)
         .find(|quad| polygon::iou(quad.corners_px.points(), truth.corners_px.points()) >= IOU_CLICKED)
 }
 
-/// Where the views say that it hangs, and which of them agree on that. The others saw another border of the same thing,
-/// or something else: their icons would not fit the model (method 7, rectangle consistency).
-pub fn hang(
+/// The place of a poster by its views, and the indices of the views that agree with it. The others show another border of the
+/// same object, or another object: their icons would not fit the model (method 7, rectangle consistency).
+pub fn place_on_walls(
     views: &[SurveyView],
     walls: &[LaserSegment],
     camera: &Intrinsics,
@@ -98,14 +99,14 @@ pub fn hang(
         .iter()
         .enumerate()
         .filter_map(|(i, view)| {
-            let look = PosedView {
+            let posed = PosedView {
                 corners: &view.quad.corners_px,
                 covariance_px2: &view.quad.believed_covariance_px2(),
                 camera,
                 map_from_robot: &view.map_from_robot,
-                mounting: &view.mounting,
+                mounting: &view.extrinsics,
             };
-            Some((i, view_on_wall(&look, walls, &p).ok()?))
+            Some((i, view_on_wall(&posed, walls, &p).ok()?))
         })
         .collect();
     let rectangles: Vec<WallRectangle> = on_walls.iter().map(|(_, rectangle)| rectangle.clone()).collect();

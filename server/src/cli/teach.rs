@@ -4,7 +4,7 @@ use super::{
     answers::{robot_line, sentence},
     arg_parsers::{camera, distance, numbers, size},
     mapping, screen,
-    sight::{self, SightArgs},
+    visibility_settings::{self, VisibilityArgs},
 };
 use client::{
     ClientError, LandmarkRegion, MapClient,
@@ -45,11 +45,11 @@ pub(crate) enum MapCommand {
         #[arg(long, value_parser = distance)]
         distance: Option<DistanceKind>,
         #[command(flatten)]
-        found: WhereArgs,
+        location: LocationArgs,
         #[command(flatten)]
         server: ServerArgs,
     },
-    /// Say where a map belongs, and where it lies in another.
+    /// Set where a map belongs, and its link to another map.
     ///
     /// For example, the first floor of a house whose plan is the map `house`, 3.4 m up, turned by 90 degrees:
     ///   waymark map place floor1 --building house --floor 1st --in house --at 12.5,-3,90 --level-m 3.4
@@ -58,20 +58,20 @@ pub(crate) enum MapCommand {
         /// The map.
         name: String,
         #[command(flatten)]
-        found: WhereArgs,
+        location: LocationArgs,
         #[command(flatten)]
         server: ServerArgs,
     },
-    /// Say which camera looks for a map's landmarks, and what counts as seen by it; without options, show that.
+    /// Show or set the visibility settings of a map: the camera and the limits that define "visible".
     ///
-    /// The areas from which landmarks are seen are made for it. For example, a camera 0.8 m up that tilts up to 60 degrees:
+    /// The visibility areas of landmarks follow from them. For example, a camera 0.8 m up that tilts up to 60 degrees:
     ///   waymark map sight office --image 1280x720 --focal-px 900 --camera-height-m 0.8 --tilt-deg -10,60
     #[command(verbatim_doc_comment)]
     Sight {
         /// The map.
         name: String,
         #[command(flatten)]
-        sight: SightArgs,
+        sight: VisibilityArgs,
         #[command(flatten)]
         server: ServerArgs,
     },
@@ -107,9 +107,9 @@ pub(crate) enum MapCommand {
     Export(mapping::import::ExportArgs),
 }
 
-/// Where a map is.
+/// Location of a map.
 #[derive(Debug, Clone, clap::Args)]
-pub(crate) struct WhereArgs {
+pub(crate) struct LocationArgs {
     /// The site it belongs to.
     #[arg(long)]
     site: Option<String>,
@@ -130,9 +130,9 @@ pub(crate) struct WhereArgs {
     level_m: f64,
 }
 
-impl WhereArgs {
-    /// Where the map lies in another, if that is given.
-    fn lies(&self) -> Option<Parent> {
+impl LocationArgs {
+    /// The map link, if it is given.
+    fn link(&self) -> Option<Parent> {
         let (map, [x_m, y_m, degrees]) = self.parent.as_ref().zip(self.at)?;
         let theta_rad = degrees.to_radians();
         Some(Parent { map: map.clone(), x_m, y_m, theta_rad, level_m: self.level_m, covariance: None })
@@ -146,7 +146,7 @@ impl WhereArgs {
             site: self.site.clone(),
             building: self.building.clone(),
             floor: self.floor.clone(),
-            parent: self.lies(),
+            parent: self.link(),
         }
     }
 
@@ -156,7 +156,7 @@ impl WhereArgs {
             site: self.site.clone().map(Some),
             building: self.building.clone().map(Some),
             floor: self.floor.clone().map(Some),
-            parent: self.lies().map(Some),
+            parent: self.link().map(Some),
         }
     }
 }
@@ -230,28 +230,28 @@ pub(crate) struct RecogniseArgs {
 
 pub(crate) async fn map(command: &MapCommand) -> anyhow::Result<()> {
     match command {
-        MapCommand::Create { name, distance, found, server } => {
+        MapCommand::Create { name, distance, location, server } => {
             let maps = MapClient::new(&server.server)?;
-            let map = maps.create_map(&found.new_map(name, *distance)).await?;
+            let map = maps.create_map(&location.new_map(name, *distance)).await?;
             show(server, &map, &format!("map {} created", map.name))
         }
-        MapCommand::Place { name, found, server } => {
-            let map = MapClient::new(&server.server)?.locate_map(name, &found.patch()).await?;
+        MapCommand::Place { name, location, server } => {
+            let map = MapClient::new(&server.server)?.locate_map(name, &location.patch()).await?;
             show(server, &map, &format!("{}  {}", map.name, map.whereabouts()))
         }
         MapCommand::Sight { name, sight, server } => {
-            let found = sight.set(&MapClient::new(&server.server)?, name).await?;
-            show(server, &found, &sight::sentences(name, &found))
+            let settings = sight.set(&MapClient::new(&server.server)?, name).await?;
+            show(server, &settings, &visibility_settings::sentences(name, &settings))
         }
         MapCommand::List { server } => {
             let maps = MapClient::new(&server.server)?.maps().await?;
             let lines: Vec<String> = maps
                 .iter()
                 .map(|m| {
-                    let found = m.whereabouts();
-                    let gap = if found.is_empty() { "" } else { ", " };
+                    let location = m.whereabouts();
+                    let separator = if location.is_empty() { "" } else { ", " };
                     let landmarks = counted(m.landmarks, "landmark");
-                    format!("{}  version {}, {landmarks}{gap}{found}", m.name, m.version)
+                    format!("{}  version {}, {landmarks}{separator}{location}", m.name, m.version)
                 })
                 .collect();
             show(server, &maps, &lines.join("\n"))
@@ -312,7 +312,7 @@ pub(crate) async fn learn(args: &LearnArgs) -> anyhow::Result<ExitCode> {
                             "waymark: {name}: not kept, it shows nothing that view {} does not",
                             view.id
                         );
-                        screen::complain(&like);
+                        screen::complain(&note);
                     }
                     Ok(())
                 }

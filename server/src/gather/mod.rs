@@ -1,15 +1,15 @@
-//! Gathering views while robots drive. The frame path offers what it has looked at and never waits: a bounded queue, and
-//! what does not fit is dropped and counted. One task follows things from frame to frame (`map::tracks`), and what is
-//! worth keeping is committed before it counts as kept.
+//! Gathers training views while robots drive. In: analysed frames by a bounded queue; a frame that does not fit is dropped and
+//! counted. Out: tracks with views in the store. One task follows objects from frame to frame (`map::tracks`) and commits new
+//! views before it counts them.
 //!
-//! It decides on no landmark: that is for a person (`store::accepting`).
+//! A person decides about tracks (`store::track_acceptance`).
 
-mod glimpses;
-mod hook;
-pub(crate) mod candidates;
+mod frame_observations;
+mod frame_tap;
+pub(crate) mod track_summaries;
 
-pub(crate) use hook::Counts;
-pub use hook::{Hook, Offer, Session, hook};
+pub(crate) use frame_tap::GatheringCounts;
+pub use frame_tap::{ActiveGathering, GatheringTap, OfferedFrame, gathering_tap};
 
 use crate::{
     config::Config,
@@ -17,14 +17,14 @@ use crate::{
     publication::Catalogue,
     store::{
         StoreError,
-        accepting::{self, Accepted, Decision, Pick},
-        gatherings::{self, Bounds, GatheringRow, NewGathering},
-        placing::{self, Capture},
+        gatherings::{self, GatheringLimits, GatheringRow, NewGathering},
+        landmark_placement::{self, StoredCapture},
+        track_acceptance::{self, AcceptanceResult, Decision, TrackAcceptance},
         views::NewView,
     },
 };
 use engine::{panics::Edge, picture};
-use hook::{Sessions, lock};
+use frame_tap::{ActiveGatherings, lock};
 use map::tracks::{GatherParams, StoredTrack, TrackOutcome, ViewTracker};
 use protos::convert::Encoding;
 use sha2::{Digest, Sha256};
@@ -36,31 +36,30 @@ use vision::{
     recognise::{RecogniseParams, features},
 };
 
-/// Who gathers, and what is kept.
+/// The active gatherings.
 #[derive(Debug)]
 pub(crate) struct Gatherer {
     store: Catalogue,
     params: Arc<Params>,
-    sessions: Arc<Sessions>,
+    active: Arc<ActiveGatherings>,
 }
 
 impl Gatherer {
-    /// Takes up what a stop or a crash interrupted, and follows what is offered until no worker is left.
+    /// Resumes the open gatherings, and handles offered frames until the last worker has stopped.
     pub(crate) async fn start(
         store: Catalogue,
         config: &Config,
-        hook: &Hook,
-        offers: Receiver<Offer>,
+        tap: &GatheringTap,
+        frames: Receiver<OfferedFrame>,
     ) -> Result<(Arc<Self>, tokio::task::JoinHandle<()>), StoreError> {
-        let gatherer =
-            Arc::new(Self { store, params: config.params.clone(), sessions: hook.sessions.clone() });
+        let gatherer = Arc::new(Self { store, params: config.params.clone(), active: tap.active.clone() });
         for row in gatherings::open(gatherer.store.reads()).await? {
             tracing::info!(gathering = row.id, robot = row.robot, "gathering_resumed");
             let tracker = gatherer.resumed(&row).await?;
             gatherer.enter(&row, tracker);
         }
         let pulse = gatherer.store.vitals().begin("the task that gathers views");
-        let run = gatherer.clone().run(offers);
+        let run = gatherer.clone().run(frames);
         let task = tokio::spawn(async move {
             run.await;
             drop(pulse);
@@ -77,44 +76,44 @@ impl Gatherer {
                 continue;
             }
             let views = gatherings::track_views(self.store.reads(), row.id, track.number).await?;
-            let captures = views.iter().map(|v| (&v.cut.corners_px, v.capture.as_deref()));
-            let kept = StoredTrack {
+            let captures = views.iter().map(|v| (&v.crop.corners_px, v.capture.as_deref()));
+            let stored = StoredTrack {
                 number: track.number,
                 landmark: track.landmark_id.map(|id| LandmarkId(id as u64)),
                 sightings: track.sightings,
                 known: track.known,
-                place: placing::preview(captures, &walls).ok().map(|made| made.place),
+                place: landmark_placement::preview(captures, &walls).ok().map(|preview| preview.place),
             };
             let prepare = |view: gatherings::TrackView| {
-                (view.cut.corners_px, features(view.cut.icon, &self.params.recognise))
+                (view.crop.corners_px, features(view.crop.icon, &self.params.recognise))
             };
-            tracker.resume(kept, views.into_iter().map(prepare));
+            tracker.resume(stored, views.into_iter().map(prepare));
         }
         Ok(tracker)
     }
 
     fn enter(&self, row: &GatheringRow, tracker: ViewTracker) {
-        let session = Arc::new(Session::new(row, tracker));
-        self.sessions.rcu(|sessions| {
-            let mut sessions = BTreeMap::clone(sessions);
-            sessions.insert(row.robot.clone(), session.clone());
-            sessions
+        let gathering = Arc::new(ActiveGathering::new(row, tracker));
+        self.active.rcu(|active| {
+            let mut active = BTreeMap::clone(active);
+            active.insert(row.robot.clone(), gathering.clone());
+            active
         });
     }
 
     fn leave(&self, id: i64) {
-        self.sessions.rcu(|sessions| {
-            let mut sessions = BTreeMap::clone(sessions);
-            sessions.retain(|_, session| session.id != id);
-            sessions
+        self.active.rcu(|active| {
+            let mut active = BTreeMap::clone(active);
+            active.retain(|_, gathering| gathering.id != id);
+            active
         });
     }
 
-    fn session(&self, id: i64) -> Option<Arc<Session>> {
-        self.sessions.load().values().find(|s| s.id == id).cloned()
+    fn active_gathering(&self, id: i64) -> Option<Arc<ActiveGathering>> {
+        self.active.load().values().find(|s| s.id == id).cloned()
     }
 
-    /// Begins. Durable when this returns.
+    /// Starts a gathering. Durable when this returns.
     pub(crate) async fn begin(
         self: &Arc<Self>,
         map: &str,
@@ -123,7 +122,7 @@ impl Gatherer {
         let (gatherer, map) = (self.clone(), map.to_owned());
         let write = self.store.write(move |tx| {
             Box::pin(async move {
-                let row = gatherings::create(tx, &map, &new, Bounds::SERVER).await?;
+                let row = gatherings::create(tx, &map, &new, GatheringLimits::SERVER).await?;
                 let begun = row.clone();
                 tx.after(move || gatherer.enter(&begun, ViewTracker::new(GatherParams::default())));
                 Ok(row)
@@ -132,7 +131,7 @@ impl Gatherer {
         write.await
     }
 
-    /// Ends. What is still in the queue is not kept.
+    /// Ends a gathering. Frames that are still in the queue give no views.
     pub(crate) async fn end(self: &Arc<Self>, map: &str, id: i64) -> Result<GatheringRow, StoreError> {
         let counts =
             self.counts(id).and_then(|c| serde_json::to_string(&c).ok()).unwrap_or_else(|| "{}".into());
@@ -146,7 +145,7 @@ impl Gatherer {
         write.await
     }
 
-    /// Throws everything away that nobody has accepted.
+    /// Deletes a gathering with all tracks that were not accepted.
     pub(crate) async fn delete(self: &Arc<Self>, map: &str, id: i64) -> Result<(), StoreError> {
         let (gatherer, map) = (self.clone(), map.to_owned());
         let write = self.store.write(move |tx| {
@@ -158,23 +157,23 @@ impl Gatherer {
         write.await
     }
 
-    /// Makes landmarks of tracks, and queues their lesson if it is wanted.
+    /// Accepts tracks as landmarks, and queues their lesson if it is wanted.
     pub(crate) async fn accept(
         self: &Arc<Self>,
         (map, id): (&str, i64),
-        picks: Vec<Pick>,
+        tracks: Vec<TrackAcceptance>,
         lesson: bool,
-        bounds: accepting::Bounds,
-    ) -> Result<Accepted, StoreError> {
-        let (map, numbers) = (map.to_owned(), picks.iter().map(|p| p.number).collect::<Vec<_>>());
+        limits: track_acceptance::AcceptanceLimits,
+    ) -> Result<AcceptanceResult, StoreError> {
+        let (map, numbers) = (map.to_owned(), tracks.iter().map(|t| t.number).collect::<Vec<_>>());
         let lesson = lesson.then_some(request::Request::of as fn(&[String]) -> String);
         let gatherer = self.clone();
         let after = Arc::new(move || gatherer.decided(id, numbers.iter().copied()));
-        let decision = Decision { map, gathering: id, picks, lesson, bounds, after };
-        accepting::accept(&self.store, decision).await
+        let decision = Decision { map, gathering: id, tracks, lesson, limits, after };
+        track_acceptance::accept(&self.store, decision).await
     }
 
-    /// Throws a track away.
+    /// Discards a track.
     pub(crate) async fn discard(self: &Arc<Self>, map: &str, id: i64, number: u32) -> Result<(), StoreError> {
         let (gatherer, map) = (self.clone(), map.to_owned());
         let write = self.store.write(move |tx| {
@@ -186,46 +185,48 @@ impl Gatherer {
         write.await
     }
 
-    /// Somebody has decided on these tracks.
+    /// Closes tracks that were accepted or discarded.
     fn decided(&self, id: i64, numbers: impl IntoIterator<Item = u32>) {
-        if let Some(session) = self.session(id) {
-            lock(&session.decided).extend(numbers);
+        if let Some(gathering) = self.active_gathering(id) {
+            lock(&gathering.decided).extend(numbers);
         }
     }
 
-    /// What became of the frames so far; `None` for a gathering that has ended.
-    pub(crate) fn counts(&self, id: i64) -> Option<Counts> {
-        self.session(id).map(|session| *lock(&session.counts))
+    /// Counts of a gathering's frames and quads so far; `None` for one that has ended.
+    pub(crate) fn counts(&self, id: i64) -> Option<GatheringCounts> {
+        self.active_gathering(id).map(|gathering| *lock(&gathering.counts))
     }
 
-    async fn run(self: Arc<Self>, mut offers: Receiver<Offer>) {
-        while let Some(offer) = offers.recv().await {
-            let (session, params) = (offer.session.clone(), self.params.clone());
-            let views = tokio::task::spawn_blocking(move || follow(&offer, &params)).await;
+    async fn run(self: Arc<Self>, mut frames: Receiver<OfferedFrame>) {
+        while let Some(frame) = frames.recv().await {
+            let (gathering, params) = (frame.gathering.clone(), self.params.clone());
+            let views = tokio::task::spawn_blocking(move || new_views(&frame, &params)).await;
             let (panics, what) = (self.store.vitals().panics(), "a frame of a robot that gathers");
-            let Ok(views) = panics.joined(Edge::Gathering, what, "nothing of it is kept", views) else {
+            let Ok(views) = panics.joined(Edge::Gathering, what, "it gives no views", views) else {
                 continue;
             };
-            for (kept, view) in views {
-                self.keep(&session, Box::new(kept), view).await;
+            for (track, view) in views {
+                self.store_view(&gathering, Box::new(track), view).await;
             }
         }
     }
 
-    async fn keep(&self, session: &Session, kept: Box<StoredTrack>, view: NewView) {
-        let id = session.id;
+    async fn store_view(&self, gathering: &ActiveGathering, track: Box<StoredTrack>, view: NewView) {
+        let id = gathering.id;
         let write = self.store.write(move |tx| {
-            Box::pin(async move { gatherings::add_view(tx, id, &kept, &view, Bounds::SERVER).await })
+            Box::pin(
+                async move { gatherings::add_view(tx, id, &track, &view, GatheringLimits::SERVER).await },
+            )
         });
         let done = write.await;
-        let mut counts = lock(&session.counts);
+        let mut counts = lock(&gathering.counts);
         match done {
             Ok(()) => counts.kept += 1,
             Err(error) => {
                 counts.not_stored += 1;
                 drop(counts);
-                tracing::debug!(gathering = id, %error, "a view was not kept");
-                // It was deleted, or its map was.
+                tracing::debug!(gathering = id, %error, "view_not_stored");
+                // The gathering or its map was deleted.
                 if matches!(error, StoreError::NotFound { .. }) {
                     self.leave(id);
                 }
@@ -234,47 +235,51 @@ impl Gatherer {
     }
 }
 
-/// One frame: which of its quads are views to keep, and in which track.
-fn follow(offer: &Offer, params: &Params) -> Vec<(StoredTrack, NewView)> {
-    let (session, frame) = (&offer.session, &offer.frame);
-    let found = glimpses::glimpses(offer, params);
-    let wanted = |id| session.landmark.map_or(session.known, |only| only == id);
-    let mut tracker = lock(&session.tracker);
-    for number in std::mem::take(&mut *lock(&session.decided)) {
+/// The new views of one frame, each with its track.
+fn new_views(offered: &OfferedFrame, params: &Params) -> Vec<(StoredTrack, NewView)> {
+    let (gathering, frame) = (&offered.gathering, &offered.frame);
+    let observed = frame_observations::frame_observations(offered, params);
+    let is_wanted = |id| gathering.landmark.map_or(gathering.known, |only| only == id);
+    let mut tracker = lock(&gathering.tracker);
+    for number in std::mem::take(&mut *lock(&gathering.decided)) {
         tracker.close(number);
     }
-    let at = (frame.captured_ns, offer.camera.as_str());
+    let at = (frame.captured_ns, offered.camera.as_str());
     let recognise: &RecogniseParams = &params.recognise;
-    let outcomes = tracker.update(at, &found.glimpses, wanted, session.landmark.is_none(), recognise);
-    let mut counts = lock(&session.counts);
-    counts.unusable += found.unusable;
-    counts.not_on_wall += found.not_on_wall;
+    let outcomes = tracker.update(at, &observed.quads, is_wanted, gathering.landmark.is_none(), recognise);
+    let mut counts = lock(&gathering.counts);
+    counts.unusable += observed.unusable;
+    counts.not_on_wall += observed.not_on_wall;
     for outcome in &outcomes {
         counts.add(*outcome);
     }
     drop(counts);
     let mut views = vec![];
-    for ((glimpse, corners_px2), outcome) in found.glimpses.iter().zip(&found.corners_px2).zip(outcomes) {
+    for ((quad, corners_px2), outcome) in observed.quads.iter().zip(&observed.corners_px2).zip(outcomes) {
         let TrackOutcome::Keep(number) = outcome else { continue };
         let Some(track) = tracker.tracks().iter().find(|t| t.number == number) else { continue };
-        let kept = StoredTrack {
+        let stored = StoredTrack {
             number,
             landmark: track.landmark,
             sightings: track.sightings,
             known: track.known,
-            place: glimpse.place,
+            place: quad.place,
         };
-        let mut capture = found.capture.clone();
+        let mut capture = observed.capture.clone();
         if let Some(capture) = &mut capture {
-            capture.corners_by_detector(corners_px2);
+            capture.set_detected_corners(corners_px2);
         }
-        views.extend(view(offer, glimpse, capture.as_ref()).map(|view| (kept, view)));
+        views.extend(new_view(offered, quad, capture.as_ref()).map(|view| (stored, view)));
     }
     views
 }
 
-fn view(offer: &Offer, glimpse: &map::tracks::QuadObservation, capture: Option<&Capture>) -> Option<NewView> {
-    let (frame, grey) = (&offer.frame, &offer.looked.image);
+fn new_view(
+    offered: &OfferedFrame,
+    quad: &map::tracks::QuadObservation,
+    capture: Option<&StoredCapture>,
+) -> Option<NewView> {
+    let (frame, grey) = (&offered.frame, &offered.analysed.image);
     let (image, image_kind) = match frame.encoding {
         Encoding::Jpeg => (frame.image.to_vec(), "jpeg"),
         Encoding::Png => (frame.image.to_vec(), "png"),
@@ -285,9 +290,9 @@ fn view(offer: &Offer, glimpse: &map::tracks::QuadObservation, capture: Option<&
         image,
         image_kind,
         size_px: [grey.width(), grey.height()],
-        cut: crate::store::views::Cut { corners_px: glimpse.corners_px, icon: glimpse.icon.icon.clone() },
-        // What else is in the frame may become a landmark itself: it teaches nothing here.
-        strangers: vec![],
+        crop: crate::store::views::QuadCrop { corners_px: quad.corners_px, icon: quad.icon.icon.clone() },
+        // Another quad of the frame may become a landmark itself: it is no distractor here.
+        distractors: vec![],
         capture: capture.and_then(|c| serde_json::to_string(c).ok()),
     })
 }

@@ -1,4 +1,4 @@
-use super::{hook::QUEUE, *};
+use super::{frame_tap::QUEUE, *};
 use crate::{
     publication::tests::config,
     store::{maps, robots},
@@ -29,16 +29,17 @@ fn key(robot: &str) -> SlotKey {
     SlotKey { robot: Name::new(robot).unwrap(), camera: Name::new("front").unwrap() }
 }
 
-/// Frames of a robot that stands before a poster and looks again and again, raw grey.
-fn frames(count: u64) -> Vec<(CheckedFrame, AnalysedFrame)> {
+/// Raw grey frames of a robot at rest in front of a poster.
+fn offered(count: u64) -> Vec<(CheckedFrame, AnalysedFrame)> {
     let mut scene = Scene::new();
-    let (_, seen) = scene.looks(1, 1).remove(0);
-    let image = &seen.frame.image;
+    let (_, readings) = scene.stops(1, 1).remove(0);
+    let image = &readings.frame.image;
     let params = Params::default();
     let map = Arc::new(MapSnapshot::empty(MAP, 1));
     let landmarks = pipeline::LandmarkDatabase { models: &map.models, sizes: &map.sizes, kind: map.distance };
-    let facts = pipeline::Pipeline::default().analyse(image, None, landmarks, &params, &mut NoTrace);
-    let believed = Pose2Covariance { pose: Pose2::new(1.0, 0.0, 0.0), covariance: Matrix3::zeros() };
+    let analysis = pipeline::Pipeline::default().analyse(image, None, landmarks, &params, &mut NoTrace);
+    let map_from_robot =
+        Some(Pose2Covariance { pose: Pose2::new(1.0, 0.0, 0.0), covariance: Matrix3::zeros() });
     (1..=count)
         .map(|seq| {
             let frame = CheckedFrame {
@@ -56,8 +57,8 @@ fn frames(count: u64) -> Vec<(CheckedFrame, AnalysedFrame)> {
                 deadline_ms: None,
                 map: None,
             };
-            let (quads, map) = (facts.quads.clone(), map.clone());
-            (frame, AnalysedFrame { image: image.clone(), quads, map, believed: Some(believed) })
+            let (quads, map) = (analysis.quads.clone(), map.clone());
+            (frame, AnalysedFrame { image: image.clone(), quads, map, map_from_robot })
         })
         .collect()
 }
@@ -66,21 +67,21 @@ fn frames(count: u64) -> Vec<(CheckedFrame, AnalysedFrame)> {
 async fn a_full_queue_drops_and_counts_and_nobody_waits() {
     let dir = tempfile::tempdir().unwrap();
     let (store, _writer) = store(dir.path()).await;
-    let (hook, offers) = hook();
-    let gatherer = Arc::new(Gatherer { store, params: Arc::default(), sessions: hook.sessions.clone() });
+    let (tap, frames) = gathering_tap();
+    let gatherer = Arc::new(Gatherer { store, params: Arc::default(), active: tap.active.clone() });
     let id = gatherer.begin(MAP, new()).await.unwrap().id;
-    for (frame, looked) in frames(QUEUE as u64 + 3) {
-        hook.offer(&key("r1"), &frame, looked);
+    for (frame, analysed) in offered(QUEUE as u64 + 3) {
+        tap.offer(&key("r1"), &frame, analysed);
     }
-    let (frame, looked) = frames(1).remove(0);
-    let other = AnalysedFrame { map: Arc::new(MapSnapshot::empty("cellar", 1)), ..looked };
-    hook.offer(&key("r1"), &frame, other);
-    assert!(!hook.is_wanted(&key("r2")), "it does not gather");
+    let (frame, analysed) = offered(1).remove(0);
+    let other = AnalysedFrame { map: Arc::new(MapSnapshot::empty("cellar", 1)), ..analysed };
+    tap.offer(&key("r1"), &frame, other);
+    assert!(!tap.is_wanted(&key("r2")), "it does not gather");
     let counts = gatherer.counts(id).unwrap();
     assert_eq!((counts.frames, counts.dropped, counts.other_map), (QUEUE as u64 + 4, 3, 1));
-    // What waits is followed; the same picture again and again is one view.
-    drop(hook);
-    gatherer.clone().run(offers).await;
+    // Frames in the queue are handled; the same picture repeated is one view.
+    drop(tap);
+    gatherer.clone().run(frames).await;
     let counts = gatherer.counts(id).unwrap();
     assert!(
         counts.kept >= 1
@@ -91,7 +92,7 @@ async fn a_full_queue_drops_and_counts_and_nobody_waits() {
     let tracks = gatherings::tracks(gatherer.store.reads(), id).await.unwrap();
     assert_eq!(tracks.iter().map(|t| t.views).sum::<u64>(), counts.kept);
     let ended = gatherer.end(MAP, id).await.unwrap();
-    assert_eq!(serde_json::from_str::<Counts>(&ended.counts).unwrap(), counts);
+    assert_eq!(serde_json::from_str::<GatheringCounts>(&ended.counts).unwrap(), counts);
     assert_eq!(gatherer.counts(id), None);
 }
 
@@ -99,25 +100,25 @@ async fn a_full_queue_drops_and_counts_and_nobody_waits() {
 async fn a_restart_goes_on_where_it_stopped() {
     let dir = tempfile::tempdir().unwrap();
     let (first, writer) = store(dir.path()).await;
-    let (hook_, offers) = hook();
-    let (gatherer, task) = Gatherer::start(first, &config(dir.path()), &hook_, offers).await.unwrap();
+    let (first_tap, frames) = gathering_tap();
+    let (gatherer, task) = Gatherer::start(first, &config(dir.path()), &first_tap, frames).await.unwrap();
     let id = gatherer.begin(MAP, new()).await.unwrap().id;
-    for (frame, looked) in frames(QUEUE as u64) {
-        hook_.offer(&key("r1"), &frame, looked);
+    for (frame, analysed) in offered(QUEUE as u64) {
+        first_tap.offer(&key("r1"), &frame, analysed);
     }
-    drop(hook_);
+    drop(first_tap);
     task.await.unwrap();
-    let kept = gatherer.counts(id).unwrap().kept;
+    let stored = gatherer.counts(id).unwrap().kept;
     drop(gatherer);
     writer.close().await;
 
     let (store, _writer) = Catalogue::open(&config(dir.path())).await.unwrap();
-    let (hook, offers) = hook();
-    let (gatherer, _task) = Gatherer::start(store, &config(dir.path()), &hook, offers).await.unwrap();
-    let session = gatherer.session(id).unwrap();
-    let views = lock(&session.tracker).tracks().iter().map(|t| t.views() as u64).sum::<u64>();
-    assert!(kept >= 1 && views == kept);
+    let (tap, frames) = gathering_tap();
+    let (gatherer, _task) = Gatherer::start(store, &config(dir.path()), &tap, frames).await.unwrap();
+    let gathering = gatherer.active_gathering(id).unwrap();
+    let views = lock(&gathering.tracker).tracks().iter().map(|t| t.views() as u64).sum::<u64>();
+    assert!(stored >= 1 && views == stored);
     gatherer.decided(id, [1]);
     gatherer.delete(MAP, id).await.unwrap();
-    assert!(gatherer.session(id).is_none());
+    assert!(gatherer.active_gathering(id).is_none());
 }

@@ -6,7 +6,7 @@ use super::{
     extract::{Body, PathParams},
 };
 use crate::{
-    calibrating::{CORNER_SIGMA_PX, Knowledge, calibrated},
+    calibrating::{CORNER_SIGMA_PX, CalibrationConstraints, calibrated},
     store::robots,
 };
 use axum::{Json, extract::State, http::StatusCode};
@@ -50,7 +50,7 @@ fn camera_shown((name, state): (String, CameraState)) -> Camera {
         height_px: state.image_px[1],
         frames: state.frames,
         views: state.views,
-        intrinsics_monitor: monitor_shown(&state.watch),
+        intrinsics_monitor: monitor_shown(&state.monitor),
     }
 }
 
@@ -62,7 +62,7 @@ async fn list(
     PathParams(robot): PathParams<String>,
 ) -> Result<Json<Cameras>, ApiError> {
     robots::get(app.store.reads(), &robot).await?;
-    let cameras = app.live.watched().of_robot(&robot).into_iter().map(camera_shown).collect();
+    let cameras = app.live.camera_registry().of_robot(&robot).into_iter().map(camera_shown).collect();
     Ok(Json(Cameras { cameras }))
 }
 
@@ -90,12 +90,12 @@ async fn calibrate(
     }
     let (views, image_px) = match uploaded_views {
         Some(given) => uploaded(&given)?,
-        None => app.live.watched().views(&robot, &camera).ok_or_else(|| {
+        None => app.live.camera_registry().views(&robot, &camera).ok_or_else(|| {
             let detail = "no frame of this camera showed a landmark of known size yet";
             ApiError::new(StatusCode::NOT_FOUND, "unknown_camera", detail).field("camera")
         })?,
     };
-    let known = Knowledge::from(constraints);
+    let known = CalibrationConstraints::from(constraints);
     let size = image_px.map(|s| s as usize);
     let made = app.clone().on_vision_thread(move |_| calibrated(&views, size, &known)).await?;
     made.map(Json).map_err(|error| {

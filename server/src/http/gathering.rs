@@ -9,11 +9,11 @@ use super::{
     views::placement_shown,
 };
 use crate::{
-    gather::{Counts, candidates::candidates},
+    gather::{GatheringCounts, track_summaries::track_summaries},
     store::{
-        accepting::{self, Pick},
         gatherings::{self, GatheringRow, NewGathering},
         landmarks, maps,
+        track_acceptance::{self, TrackAcceptance},
     },
 };
 use axum::{
@@ -41,7 +41,7 @@ pub(super) fn router() -> OpenApiRouter<AppState> {
         .routes(routes!(accept))
 }
 
-fn counts_shown(counts: Counts) -> GatheringCountsBody {
+fn counts_shown(counts: GatheringCounts) -> GatheringCountsBody {
     GatheringCountsBody {
         frames: counts.frames,
         dropped: counts.dropped,
@@ -173,7 +173,7 @@ async fn list_tracks(
         tracks.push((track, views));
     }
     let walls = app.store.snapshots().get(&map).map(|map| map.walls.clone()).unwrap_or_default();
-    let work = move |app: &super::App| candidates(&tracks, &walls, &app.config.params);
+    let work = move |app: &super::App| track_summaries(&tracks, &walls, &app.config.params);
     Ok(Json(TrackList { tracks: app.on_vision_thread(work).await? }))
 }
 
@@ -203,7 +203,7 @@ async fn show_icon(
         ApiError::new(StatusCode::NOT_FOUND, "unknown_view", format!("there is no view `{view}`"))
             .field("view")
     };
-    let icon = views.into_iter().find(|v| v.id == view).ok_or_else(unknown)?.cut.icon;
+    let icon = views.into_iter().find(|v| v.id == view).ok_or_else(unknown)?.crop.icon;
     let grey: Vec<u8> = icon.pixels.iter().map(|g| *g as u8).collect();
     let png = picture::png(icon.size, icon.size, &grey).map_err(|e| ApiError::internal(&e))?;
     let headers =
@@ -233,11 +233,11 @@ async fn accept(
     let pick = |(i, pick): (usize, AcceptedTrackBody)| {
         let name = pick.name.map(|text| name("name", text)).transpose();
         let name = name.map_err(|e| e.field(format!("tracks[{i}].name")))?;
-        Ok(Pick { number: pick.track, name: name.map(|n| n.to_string()) })
+        Ok(TrackAcceptance { number: pick.track, name: name.map(|n| n.to_string()) })
     };
     let picks = decision.tracks.into_iter().enumerate().map(pick).collect::<Result<Vec<_>, ApiError>>()?;
     let limits = &app.config.limits;
-    let bounds = accepting::Bounds {
+    let bounds = track_acceptance::AcceptanceLimits {
         landmarks: limits.landmarks,
         views: limits.views,
         jobs: (limits.jobs, limits.jobs_kept),

@@ -9,7 +9,7 @@ use super::{
 use crate::{
     jobs::Learning,
     store::{
-        landmarks::{self, LandmarkRow, Measures},
+        landmarks::{self, LandmarkGeometry, LandmarkRow},
         maps,
     },
 };
@@ -32,7 +32,7 @@ pub(super) fn router() -> OpenApiRouter<AppState> {
 }
 
 /// Size and place, checked. Either may be missing.
-fn measures(size: Option<Size>, place: Option<Place>) -> Result<Measures, ApiError> {
+fn geometry(size: Option<Size>, place: Option<Place>) -> Result<LandmarkGeometry, ApiError> {
     let size = size.map(|s| LandmarkSize { width_m: s.width_m, height_m: s.height_m });
     // A place is checked with some size, a size at some place: each has its own ranges.
     let stand_in = LandmarkSize { width_m: 1.0, height_m: 1.0 };
@@ -53,7 +53,7 @@ fn measures(size: Option<Size>, place: Option<Place>) -> Result<Measures, ApiErr
         tilt_rad: p.tilt_rad,
         covariance: None,
     });
-    Ok(Measures { size, place, size_from_views: false })
+    Ok(LandmarkGeometry { size, place, size_from_views: false })
 }
 
 fn health(body: LandmarkHealthBody) -> LandmarkHealth {
@@ -109,10 +109,10 @@ fn landmark_shown(mut row: LandmarkRow, quarantined: Option<String>, learning: b
         learnt_ms: m.learnt_ms,
         facts: serde_json::from_str(&m.facts).map(facts_shown).unwrap_or_default(),
     });
-    let Measures { size, place, .. } = row.measures;
+    let LandmarkGeometry { size, place, .. } = row.geometry;
     let sigma = place.and_then(|p| p.covariance).map(|c| c.diagonal().map(f64::sqrt));
     Landmark {
-        health: health_shown(row.standing),
+        health: health_shown(row.health),
         finding: row.finding.and_then(|f| serde_json::from_str(&f).ok()),
         name: row.name,
         status,
@@ -157,10 +157,10 @@ async fn create(
     PathParams(map): PathParams<String>,
     Body(new): Body<NewLandmark>,
 ) -> Result<(StatusCode, Json<Landmark>), ApiError> {
-    let (name, measures) = (name("name", new.name)?, measures(new.size, new.place)?);
+    let (name, geometry) = (name("name", new.name)?, geometry(new.size, new.place)?);
     let max = app.config.limits.landmarks;
     let write = app.store.write(move |tx| {
-        Box::pin(async move { landmarks::create(tx, &map, name.as_str(), measures, max).await })
+        Box::pin(async move { landmarks::create(tx, &map, name.as_str(), geometry, max).await })
     });
     Ok((StatusCode::CREATED, Json(landmark_shown(write.await?, None, false))))
 }
@@ -203,19 +203,19 @@ async fn patch(
     PathParams((map, landmark)): PathParams<(String, String)>,
     Body(changes): Body<LandmarkPatch>,
 ) -> Result<Json<Landmark>, ApiError> {
-    let checked = measures(changes.size.flatten(), changes.place.flatten())?;
+    let checked = geometry(changes.size.flatten(), changes.place.flatten())?;
     let (size, place) = (changes.size.is_some(), changes.place.is_some());
     let (map_name, health) = (map.clone(), changes.health.map(health));
     let write = app.store.write(move |tx| {
         Box::pin(async move {
-            let changed = landmarks::update(tx, &map, &landmark, |old| Measures {
+            let changed = landmarks::update(tx, &map, &landmark, |old| LandmarkGeometry {
                 size: if size { checked.size } else { old.size },
                 place: if place { checked.place } else { old.place },
                 size_from_views: old.size_from_views && !size,
             })
             .await?;
-            match health {
-                Some(health) => landmarks::set_standing(tx, &map, &landmark, health, None).await,
+            match standing {
+                Some(standing) => landmarks::set_health(tx, &map, &landmark, standing, None).await,
                 None => Ok(changed),
             }
         })

@@ -6,7 +6,7 @@ use super::{
     extract::{Body, PathParams},
 };
 use crate::{
-    jobs::{Progress, request},
+    jobs::{JobProgress, request},
     store::{
         StoreError,
         jobs::{self, JobRow},
@@ -37,7 +37,7 @@ pub(super) fn router() -> OpenApiRouter<AppState> {
 }
 
 /// A job as it stands.
-pub(super) fn job_shown(row: JobRow, progress: Option<&Progress>) -> Job {
+pub(super) fn job_shown(row: JobRow, progress: Option<&JobProgress>) -> Job {
     let state = match row.state.as_str() {
         "done" => JobState::Done,
         "failed" => JobState::Failed,

@@ -80,8 +80,8 @@ async fn trajectories(
     PathParams(robot): PathParams<String>,
 ) -> Result<Json<TrajectoriesBody>, ApiError> {
     robots::get(app.store.reads(), &robot).await?;
-    let trajectories = app.live.tracks(&name("robot", robot)?).unwrap_or_default();
-    let wire = |poses: VecDeque<Pose2>| poses.iter().map(pose2_wire).collect();
+    let tracks = app.live.trajectories(&name("robot", robot)?).unwrap_or_default();
+    let wire = |track: VecDeque<Pose2>| track.iter().map(pose2_wire).collect();
     Ok(Json(TrajectoriesBody {
         pose: wire(trajectories.pose),
         odometry: wire(trajectories.odometry),

@@ -5,7 +5,7 @@ use super::{
     error::ApiError,
     extract::{Body, PathParams, name},
 };
-use crate::store::{laser, maps, robots};
+use crate::store::{maps, robots, walls};
 use axum::{Json, extract::State, http::StatusCode};
 use engine::{
     mapping::{MappingError, MappingProgress, MappingStage, Walls},
@@ -24,7 +24,7 @@ pub(super) fn router() -> OpenApiRouter<AppState> {
 
 fn refused(error: MappingError) -> ApiError {
     let (status, code) = match error {
-        MappingError::Going | MappingError::Busy => (StatusCode::CONFLICT, "in_use"),
+        MappingError::AlreadyMapping | MappingError::Busy => (StatusCode::CONFLICT, "in_use"),
         MappingError::TooMany => (StatusCode::CONFLICT, "too_many"),
         MappingError::None => (StatusCode::NOT_FOUND, "not_mapping"),
         MappingError::Thread => (StatusCode::SERVICE_UNAVAILABLE, "no_thread"),
@@ -45,12 +45,12 @@ fn shown(progress: MappingProgress) -> MappingProgressBody {
         },
         scans: progress.scans,
         dropped: progress.dropped,
-        distance_m: progress.way_m,
+        distance_m: progress.distance_m,
         pose: progress.pose,
         segments: progress.segments,
-        loop_closures: progress.loops,
+        loop_closures: progress.loop_closures,
         reason: progress.reason,
-        journal_error: progress.not_kept,
+        journal_error: progress.journal_error,
     }
 }
 
@@ -150,7 +150,7 @@ async fn store(
         return Err(error.to_string());
     }
     let map = map.to_owned();
-    let write = app.store.write(move |tx| Box::pin(async move { laser::replace(tx, &map, &walls).await }));
+    let write = app.store.write(move |tx| Box::pin(async move { walls::replace(tx, &map, &walls).await }));
     write.await.map_err(|error| error.to_string())?;
     Ok(count)
 }

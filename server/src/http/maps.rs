@@ -7,8 +7,8 @@ use super::{
     extract::{Body, PathParams, QueryParams, after_name, name, page_limit},
 };
 use crate::store::{
+    map_locations::{self, MapLocation},
     maps::{self, MapRow},
-    sites::{self, Whereabouts},
 };
 use axum::{Json, extract::State, http::StatusCode};
 use map::{
@@ -57,7 +57,7 @@ fn parent_shown(link: &MapLink<String>) -> Parent {
 }
 
 /// A map and where it is.
-fn map_shown(row: MapRow, found: Whereabouts) -> Map {
+fn map_shown(row: MapRow, found: MapLocation) -> Map {
     Map {
         name: row.name,
         version: row.version,
@@ -99,7 +99,7 @@ async fn create(
     Body(new): Body<NewMap>,
 ) -> Result<(StatusCode, Json<Map>), ApiError> {
     let (name, distance, max) = (name("name", new.name)?, new.distance.into(), app.config.limits.maps);
-    let found = Whereabouts {
+    let found = MapLocation {
         site: word("site", new.site)?,
         building: word("building", new.building)?,
         floor: word("floor", new.floor)?,
@@ -108,7 +108,7 @@ async fn create(
     let write = app.store.write(move |tx| {
         Box::pin(async move {
             let row = maps::create(tx, name.as_str(), distance, max).await?;
-            let found = sites::set(tx, name.as_str(), |_| found).await?;
+            let found = map_locations::set(tx, name.as_str(), |_| found).await?;
             Ok((row, found))
         })
     });
@@ -124,7 +124,7 @@ async fn list(
 ) -> Result<Json<Page<Map>>, ApiError> {
     let limit = page_limit(&query, app.config.limits.page)?;
     let rows = maps::page(app.store.reads(), &after_name(&query), limit + 1).await?;
-    let known = sites::all(app.store.reads()).await?;
+    let known = map_locations::all(app.store.reads()).await?;
     let found = |name: &str| known.get(name).cloned().unwrap_or_default();
     Ok(Json(page(
         rows,
@@ -145,7 +145,7 @@ async fn get(
     PathParams(map): PathParams<String>,
 ) -> Result<Json<Map>, ApiError> {
     let row = maps::get(app.store.reads(), &map).await?;
-    let found = sites::all(app.store.reads()).await?.remove(&map).unwrap_or_default();
+    let found = map_locations::all(app.store.reads()).await?.remove(&map).unwrap_or_default();
     Ok(Json(map_shown(row, found)))
 }
 
@@ -166,7 +166,7 @@ async fn patch(
     maps::get(app.store.reads(), &map).await?;
     let write = app.store.write(move |tx| {
         Box::pin(async move {
-            let found = sites::set(tx, &map, |old| Whereabouts {
+            let found = map_locations::set(tx, &map, |old| MapLocation {
                 site: site.unwrap_or(old.site),
                 building: building.unwrap_or(old.building),
                 floor: floor.unwrap_or(old.floor),
@@ -210,7 +210,7 @@ async fn transform(
     maps::get(app.store.reads(), &map).await?;
     maps::get(app.store.reads(), &query.to).await.map_err(|e| ApiError::from(e).field("to"))?;
     let links: std::collections::BTreeMap<String, MapLink<String>> =
-        sites::links(&sites::all(app.store.reads()).await?);
+        map_locations::links(&map_locations::all(app.store.reads()).await?);
     let found = relation(&links, &map, &query.to)
         .map_err(|e| ApiError::from(crate::store::StoreError::from(e)).field("to"))?;
     let pose = match (query.x_m, query.y_m, query.theta_rad) {

@@ -35,7 +35,7 @@ pub(crate) use router::router;
 
 use crate::{config::Config, gather::Gatherer, jobs::Jobs, publication::Catalogue};
 use axum::http::StatusCode;
-use engine::{live::LiveHub, motion::MotionTracker, panics::Edge, search::Relocalisers, workers::Engine};
+use engine::{live::LiveHub, motion::MotionTracker, panics::Edge, relocalise::Relocalisers, workers::Engine};
 use error::ApiError;
 use std::{sync::Arc, time::Duration};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, SemaphorePermit, watch};
@@ -86,7 +86,7 @@ impl App {
         let streams = Arc::new(Semaphore::new(config.limits.streams));
         let uploads = Semaphore::new(config.limits.uploads);
         let (live, motion) = (engine.live.clone(), engine.motion.clone());
-        let searches = engine.searches.clone();
+        let searches = engine.relocalisers.clone();
         Self { config, store, jobs, gatherer, live, motion, searches, stopping, vision, streams, uploads }
     }
 

@@ -6,8 +6,8 @@ use super::{
     extract::{Body, PathParams, QueryParams},
 };
 use crate::store::{
-    areas::{self, Settings},
     maps,
+    modality_stats::{self, ModalitySettings},
 };
 use axum::{Json, extract::State};
 use map::{
@@ -192,11 +192,11 @@ async fn put(
     let name = map.clone();
     let write = app.store.write(move |tx| {
         Box::pin(async move {
-            let new = |old: Settings| Settings {
+            let new = |old: ModalitySettings| ModalitySettings {
                 mode: fusion.unwrap_or(old.mode),
                 named: named.unwrap_or(old.named),
             };
-            areas::set(tx, &name, new).await
+            modality_stats::set(tx, &name, new).await
         })
     });
     write.await?;

@@ -6,7 +6,7 @@ use super::{
     extract::{BodyUpTo, PathParams, name},
     modalities::stats,
 };
-use crate::store::{areas, maps, robots};
+use crate::store::{maps, modality_stats, robots};
 use axum::{Json, extract::State, http::StatusCode};
 use engine::motion::{RecordingError, RecordingStatus};
 use map::{
@@ -37,7 +37,7 @@ pub(super) fn router() -> OpenApiRouter<AppState> {
 
 fn refused(error: RecordingError) -> ApiError {
     let (status, code) = match error {
-        RecordingError::Going | RecordingError::Lent => (StatusCode::CONFLICT, "in_use"),
+        RecordingError::AlreadyRecording | RecordingError::Lent => (StatusCode::CONFLICT, "in_use"),
         RecordingError::TooMany => (StatusCode::CONFLICT, "too_many"),
         RecordingError::None => (StatusCode::NOT_FOUND, "not_recording"),
     };
@@ -54,7 +54,7 @@ async fn begin(
     PathParams(robot): PathParams<String>,
 ) -> Result<(StatusCode, Json<RecordingStatusBody>), ApiError> {
     let row = robots::get(app.store.reads(), &robot).await?;
-    let begun = app.motion.record(&name("robot", robot)?, &row.map).map_err(refused)?;
+    let begun = app.motion.start_recording(&name("robot", robot)?, &row.map).map_err(refused)?;
     Ok((StatusCode::CREATED, Json(recording_shown(begun))))
 }
 
@@ -66,7 +66,7 @@ async fn get(
     PathParams(robot): PathParams<String>,
 ) -> Result<Json<RecordingStatusBody>, ApiError> {
     robots::get(app.store.reads(), &robot).await?;
-    let recorded = app.motion.recorded(&name("robot", robot)?);
+    let recorded = app.motion.recording(&name("robot", robot)?);
     recorded.map(recording_shown).map(Json).ok_or_else(|| refused(RecordingError::None))
 }
 
@@ -82,7 +82,7 @@ async fn cancel(
     given_up.map(|_run| StatusCode::NO_CONTENT).ok_or_else(|| refused(RecordingError::None))
 }
 
-fn run_shown(row: areas::RunRow) -> ReferenceRunBody {
+fn run_shown(row: modality_stats::ReferenceRunRow) -> ReferenceRunBody {
     let mut sums = StatsByModality::default();
     for found in row.cells.values() {
         for (sum, more) in sums.iter_mut().zip(found) {
@@ -103,9 +103,9 @@ fn recording_shown(recorded: RecordingStatus) -> RecordingStatusBody {
     RecordingStatusBody {
         map: recorded.map,
         robot: recorded.robot,
-        active: recorded.going,
+        active: recorded.active,
         reason: recorded.reason,
-        distance_m: recorded.way_m,
+        distance_m: recorded.distance_m,
         span_ns: recorded.span_ns,
         odometry: recorded.odometry,
         landmarks: recorded.landmarks,
@@ -158,7 +158,7 @@ async fn reference(
     let (motion, whose) = (app.motion.clone(), robot.to_string());
     let work = move |_: &App| {
         let mut lent = motion.lend_recording(&robot)?;
-        let learnt = learn_modality_stats(&lent.recording.against(&known), &FuseParams::default());
+        let learnt = learn_modality_stats(&lent.recording.with_reference(&known), &FuseParams::default());
         Ok((lent, learnt))
     };
     let (lent, learnt) = app.clone().on_vision_thread(work).await?.map_err(refused)?;
@@ -173,14 +173,14 @@ async fn reference(
     let (on, way_m, cells) = (map.clone(), learnt.way_m, learnt.cells);
     let write = app.store.write(move |tx| {
         Box::pin(async move {
-            let id = areas::add(tx, &on, &whose, way_m, &cells).await?;
-            tx.after(move || lent.learnt());
+            let id = modality_stats::add(tx, &on, &whose, way_m, &cells).await?;
+            tx.after(move || lent.finish());
             Ok(id)
         })
     });
     let id = write.await?;
     let map = maps::get(app.store.reads(), &map).await?;
-    let runs = areas::runs(app.store.reads(), map.id).await?;
+    let runs = modality_stats::runs(app.store.reads(), map.id).await?;
     let row = runs.into_iter().find(|run| run.id == id);
     let row = row.ok_or_else(|| refused(RecordingError::None))?;
     Ok((StatusCode::CREATED, Json(run_shown(row))))
@@ -194,7 +194,7 @@ async fn list(
     PathParams(map): PathParams<String>,
 ) -> Result<Json<ReferenceRuns>, ApiError> {
     let map = maps::get(app.store.reads(), &map).await?;
-    let runs = areas::runs(app.store.reads(), map.id).await?;
+    let runs = modality_stats::runs(app.store.reads(), map.id).await?;
     Ok(Json(ReferenceRuns { runs: runs.into_iter().map(run_shown).collect() }))
 }
 
@@ -206,6 +206,6 @@ async fn forget(
     State(app): State<AppState>,
     PathParams((map, run)): PathParams<(String, i64)>,
 ) -> Result<StatusCode, ApiError> {
-    app.store.write(move |tx| Box::pin(async move { areas::forget(tx, &map, run).await })).await?;
+    app.store.write(move |tx| Box::pin(async move { modality_stats::delete(tx, &map, run).await })).await?;
     Ok(StatusCode::NO_CONTENT)
 }

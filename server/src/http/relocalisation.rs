@@ -8,7 +8,7 @@ use super::{
 };
 use crate::store::robots;
 use axum::{Json, extract::State};
-use engine::search::MissingCondition;
+use engine::relocalise::MissingCondition;
 use map::relocalise::{GridBeliefParams, PoseHypothesis};
 use protos::api::{MissingConditionBody, PoseHypothesisBody, Problem, RelocalisationStatus};
 use utoipa_axum::{router::OpenApiRouter, routes};
@@ -22,8 +22,8 @@ fn shown(PoseHypothesis { mass, pose }: &PoseHypothesis) -> PoseHypothesisBody {
     PoseHypothesisBody { probability: *mass, x_m, y_m, theta_rad, covariance: row_major(&pose.covariance) }
 }
 
-fn missing(condition: MissingCondition) -> MissingConditionBody {
-    match condition {
+fn missing(need: MissingCondition) -> MissingConditionBody {
+    match need {
         MissingCondition::HigherProbability => MissingConditionBody::HigherProbability,
         MissingCondition::SecondLandmark => MissingConditionBody::SecondLandmark,
         MissingCondition::ConsistentObservations => MissingConditionBody::ConsistentObservations,
@@ -52,11 +52,11 @@ async fn relocalisation(
     Ok(Json(RelocalisationStatus {
         relocalising: true,
         map_version: Some(found.map_version),
-        hypotheses: found.modes.iter().map(shown).collect(),
+        hypotheses: found.hypotheses.iter().map(shown).collect(),
         entropy_nats: found.entropy_nats,
-        sightings: found.sightings,
+        sightings: found.observations,
         landmarks: found.landmarks.iter().filter_map(named).collect(),
-        missing: found.needed.into_iter().map(missing).collect(),
+        missing: found.missing.into_iter().map(missing).collect(),
         min_probability,
         map: Some(found.map),
     }))

@@ -33,7 +33,7 @@ fn robot_shown(row: RobotRow, motion: &MotionTracker, live: &LiveHub) -> Robot {
     let now = Instant::now();
     let robot = Name::new(row.name.as_str()).ok();
     let status = robot.as_ref().map(|robot| motion.epochs().status(robot, now)).unwrap_or_default();
-    let known = robot.as_ref().and_then(|robot| motion.known(robot, now));
+    let known = robot.as_ref().and_then(|robot| motion.known_pose(robot, now));
     let pose = known.filter(|known| known.map == row.map).map(|Known { fused, age, .. }| {
         let Pose2 { x_m, y_m, theta_rad } = fused.pose.pose;
         let covariance = row_major(&fused.pose.covariance);

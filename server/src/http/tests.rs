@@ -45,11 +45,11 @@ impl Service {
         let (store, writer) = Catalogue::open(&config).await.unwrap();
         let (stop, stopping) = watch::channel(false);
         let (jobs, _) = Jobs::start(store.clone(), config.clone(), stopping.clone()).await.unwrap();
-        let (hook, offers) = crate::gather::hook();
-        let (gatherer, _) = Gatherer::start(store.clone(), &config, &hook, offers).await.unwrap();
+        let (tap, frames) = crate::gather::gathering_tap();
+        let (gatherer, _) = Gatherer::start(store.clone(), &config, &tap, frames).await.unwrap();
         let hall = Arc::new(MapSnapshot::empty("hall", 1));
         let engine =
-            Engine { vitals: store.vitals().clone(), gather: Arc::new(hook), ..scene::engine(&[hall]) };
+            Engine { vitals: store.vitals().clone(), frame_tap: Arc::new(tap), ..scene::engine(&[hall]) };
         let app = App::new(config, store.clone(), Services { jobs, gatherer }, &engine, stopping);
         Self { router: router(app), store, engine, _writer: writer, _stop: stop, _data: data }
     }
@@ -121,7 +121,7 @@ async fn a_writer_that_has_ended_makes_the_server_not_ready() {
 fn driven(service: &Service) -> String {
     use protos::{Name, prost::Message, v1};
     let r1 = Name::new("r1").unwrap();
-    service.engine.motion.record(&r1, "hall").unwrap();
+    service.engine.motion.start_recording(&r1, "hall").unwrap();
     let begun = std::time::Instant::now();
     for seq in 1..=20_u64 {
         let captured_ns = seq as i64 * 100_000_000;
@@ -131,7 +131,7 @@ fn driven(service: &Service) -> String {
         let odometry = v1::Odometry { epoch: 1, seq, captured_ns, odom_from_robot };
         service.engine.motion.odometry(&r1, odometry.encode_to_vec().into(), received);
     }
-    assert_eq!(service.engine.motion.recorded(&r1).unwrap().odometry, 20);
+    assert_eq!(service.engine.motion.recording(&r1).unwrap().odometry, 20);
     let poses: Vec<_> =
         (1..=20).map(|i| (i * 100_000_000_i64, f64::from(i as i32) * 0.1, 0.0, 0.0)).collect();
     serde_json::json!({ "poses": poses }).to_string()
@@ -181,13 +181,13 @@ async fn a_recorded_drive_outlives_a_client_that_hangs_up() {
         while motion.is_lent(&r1) {
             short().await;
         }
-        assert_eq!(motion.recorded(&r1).unwrap().odometry, 20, "after {polls_after_lending} polls");
+        assert_eq!(motion.recording(&r1).unwrap().odometry, 20, "after {polls_after_lending} polls");
         let (_, runs) = service.get("/api/v1/maps/hall/reference-runs").await;
         assert_eq!(runs["runs"].as_array().unwrap().len(), 0);
     }
     let answer = service.ask(request("POST", "/api/v1/robots/r1/recording/reference", body)).await;
     assert_eq!(answer.status(), StatusCode::CREATED);
-    assert!(motion.recorded(&r1).is_none(), "stored once, and over");
+    assert!(motion.recording(&r1).is_none(), "stored once, and over");
 }
 
 #[tokio::test]
@@ -198,7 +198,7 @@ async fn a_drive_whose_run_cannot_be_stored_stays() {
     let answer = service.ask(request("POST", "/api/v1/robots/r1/recording/reference", body)).await;
     assert_eq!(answer.status(), StatusCode::INTERNAL_SERVER_ERROR);
     let r1 = protos::Name::new("r1").unwrap();
-    assert_eq!(service.engine.motion.recorded(&r1).unwrap().odometry, 20);
+    assert_eq!(service.engine.motion.recording(&r1).unwrap().odometry, 20);
     assert!(service.engine.motion.lend_recording(&r1).is_ok());
 }
 
@@ -286,7 +286,7 @@ fn framed(service: &Service, seconds: u64, (landmark, x_m): (u64, f64)) {
     let odometry = Pose2::new(seconds as f64 * 0.1, 0.0, 0.0);
     let captured_ns = seconds as i64 * 1_000_000_000;
     let at = FrameStamp { map: "hall", epoch: 1, captured_ns, odometry: Some(odometry), now: Instant::now() };
-    let prior = service.engine.motion.grounds(&r1, &front, at).map(|grounds| grounds.pose);
+    let prior = service.engine.motion.prior_pose(&r1, &front, at).map(|prior| prior.pose);
     let covariance = nalgebra::Matrix3::identity() * 1e-4;
     let fix = FixResult::Fixed(Box::new(Fix {
         modality: FixSource::Landmarks,
@@ -299,7 +299,7 @@ fn framed(service: &Service, seconds: u64, (landmark, x_m): (u64, f64)) {
         dof: 5,
     }));
     let says = FrameFixes { prior: prior.as_ref(), independent: Some(&fix), ..FrameFixes::default() };
-    service.engine.motion.looked(&r1, &front, at, &says);
+    service.engine.motion.apply_frame(&r1, &front, at, &says);
 }
 
 #[tokio::test]

@@ -8,10 +8,10 @@ use super::{
     upload::{FORM_OVERHEAD, Form},
 };
 use crate::store::{
+    landmark_placement::{PlacementReport, StoredCapture},
     landmarks, maps,
-    placing::{Capture, Placing},
     teaching::{self, Teaching},
-    views::{self, Cut, NewView, Outcome, ViewRow},
+    views::{self, NewView, QuadCrop, UploadOutcome, ViewRow},
 };
 use axum::{
     Json,
@@ -61,16 +61,18 @@ fn view_shown(row: ViewRow) -> TrainingView {
     }
 }
 
-fn outcome_shown(outcome: Outcome) -> UploadOutcomeBody {
+fn outcome_shown(outcome: UploadOutcome) -> UploadOutcomeBody {
     match outcome {
-        Outcome::New => UploadOutcomeBody::New,
-        Outcome::Same => UploadOutcomeBody::Duplicate,
-        Outcome::Alike => UploadOutcomeBody::NearDuplicate,
+        UploadOutcome::New => UploadOutcomeBody::New,
+        UploadOutcome::Duplicate => UploadOutcomeBody::Duplicate,
+        UploadOutcome::NearDuplicate => UploadOutcomeBody::NearDuplicate,
     }
 }
 
 /// What came of placing a landmark by its views.
-pub(super) fn placement_shown(Placing { placed, views_used, reason }: Placing) -> PlacementReportBody {
+pub(super) fn placement_shown(
+    PlacementReport { placed, views_used, reason }: PlacementReport,
+) -> PlacementReportBody {
     PlacementReportBody { placed, views_used, reason }
 }
 
@@ -104,30 +106,29 @@ async fn add(
     let image = form.needed("image")?;
     let extent = extent(form.optional("corners").as_ref(), form.optional("whole_image").as_ref())?;
     let mut capture = capture(form.optional("capture").as_ref())?;
-    let thinning = (!flag("keep_near_duplicate", form.optional("keep_near_duplicate").as_ref())?)
-        .then(NoveltyParams::default);
+    let novelty = (!flag("keep_near_duplicate", form.optional("keep_near_duplicate").as_ref())?).then(NoveltyParams::default);
     let max = app.config.limits.views;
     let (new, detected) = app.clone().on_vision_thread(move |app| prepare(app, &image, &extent)).await??;
     if let (Some(capture), Some(quad)) = (&mut capture, detected) {
-        capture.corners_by_detector(&quad.covariance_px2);
+        capture.set_detected_corners(&quad.covariance_px2);
     }
     let capture =
         capture.map(|c| serde_json::to_string(&c)).transpose().map_err(|e| ApiError::internal(&e))?;
-    let teaching = Teaching { map, landmark, view: NewView { capture, ..new }, max, thinning };
+    let teaching = Teaching { map, landmark, view: NewView { capture, ..new }, max, novelty };
     let (row, outcome, placing) = teaching::add(&app.store, teaching).await?;
     let view = TrainingView {
         placing: placing.map(placement_shown),
         outcome: Some(outcome_shown(outcome)),
         ..view_shown(row)
     };
-    let status = if outcome == Outcome::New { StatusCode::CREATED } else { StatusCode::OK };
+    let status = if outcome == UploadOutcome::New { StatusCode::CREATED } else { StatusCode::OK };
     Ok((status, Json(view)))
 }
 
 /// How the picture was taken, checked.
-fn capture(bytes: Option<&Bytes>) -> Result<Option<Capture>, ApiError> {
+fn capture(bytes: Option<&Bytes>) -> Result<Option<StoredCapture>, ApiError> {
     let Some(bytes) = bytes else { return Ok(None) };
-    let capture = Capture::from(extract::json::<CaptureMetadata>(bytes, "capture")?);
+    let capture = StoredCapture::from(extract::json::<CaptureMetadata>(bytes, "capture")?);
     capture.check().map_err(|r| r.inside("capture"))?;
     Ok(Some(capture))
 }
@@ -154,7 +155,7 @@ fn extent(corners: Option<&Bytes>, whole_image: Option<&Bytes>) -> Result<Landma
 }
 
 /// Other quads of one picture that are kept as strangers.
-const MAX_STRANGERS: usize = 20;
+const MAX_DISTRACTORS: usize = 20;
 
 /// The view, and the quad that was taken for it where nobody said.
 fn prepare(app: &App, bytes: &Bytes, extent: &LandmarkRegion) -> Result<(NewView, Option<Whole>), ApiError> {
@@ -170,15 +171,15 @@ fn prepare(app: &App, bytes: &Bytes, extent: &LandmarkRegion) -> Result<(NewView
     let meant = |q: &&Whole| matches!(extent, LandmarkRegion::Detect) && q.corners_px == corners_px;
     let detected = quads.iter().find(meant).copied();
     let icon = cut(&image, &corners_px, p)?;
-    let stranger =
-        |corners: &Corners| Some(Cut { corners_px: *corners, icon: icon_of(&image, corners, p).ok()? });
+    let distractor =
+        |corners: &Corners| Some(QuadCrop { corners_px: *corners, icon: icon_of(&image, corners, p).ok()? });
     let view = NewView {
         image: bytes.to_vec(),
         image_sha256: Sha256::digest(bytes).into(),
         image_kind: picture::kind(bytes).unwrap_or_default(),
         size_px: [image.width(), image.height()],
-        cut: Cut { corners_px, icon },
-        strangers: others(&corners, &corners_px).filter_map(stranger).take(MAX_STRANGERS).collect(),
+        crop: QuadCrop { corners_px, icon },
+        distractors: others(&corners, &corners_px).filter_map(distractor).take(MAX_DISTRACTORS).collect(),
         capture: None,
     };
     Ok((view, detected))

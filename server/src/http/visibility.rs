@@ -204,8 +204,8 @@ async fn gaze(
 ) -> Result<Json<GazeRankingBody>, ApiError> {
     let (map, pose) = (snapshot(&app, &map).await?, checked(&question.pose)?);
     let params = GazeParams { criterion: question.criterion, ..GazeParams::default() };
-    let viewer = question.viewer.unwrap_or_else(|| map.sight.viewer.clone());
-    let ask = GazeQuery { pose, viewer, head: question.head, params };
+    let viewer = question.viewer.unwrap_or_else(|| map.visibility_settings.viewer.clone());
+    let ask = GazeQuery { pose, camera: viewer, pan_tilt: question.head, params };
     let found = ranked(&map, &ask).map_err(|e| out_of_range(&e, "question"))?;
     Ok(Json(GazeRankingBody {
         map_version: map.version,

@@ -6,7 +6,7 @@ use super::{
     error::ApiError,
     extract::{Body, PathParams},
 };
-use crate::store::{maps, sights};
+use crate::store::{maps, visibility_settings};
 use axum::{Json, extract::State, http::StatusCode};
 use engine::snapshot::MapSnapshot;
 use map::{
@@ -73,8 +73,8 @@ pub(super) fn other(
     map: &MapSnapshot,
     outer: &str,
 ) -> Result<Option<VisibilitySettings>, ApiError> {
-    let made = over(body, &map.sight).map_err(|e| refused(&e, outer))?;
-    Ok((made != map.sight).then_some(made))
+    let made = over(body, &map.visibility_settings).map_err(|e| refused(&e, outer))?;
+    Ok((made != map.visibility_settings).then_some(made))
 }
 
 /// The field as it is called here.
@@ -105,7 +105,7 @@ async fn get(
     maps::get(app.store.reads(), &map).await?;
     let gone = || ApiError::new(StatusCode::NOT_FOUND, "unknown_map", "no such map").field("map");
     let snapshot = app.store.snapshots().get(&map).ok_or_else(gone)?;
-    Ok(Json(shown(&snapshot.sight)))
+    Ok(Json(shown(&snapshot.visibility_settings)))
 }
 
 /// Says which camera looks for a map's landmarks; what is absent is that of a usual robot. The areas of all landmarks are
@@ -120,7 +120,9 @@ async fn put(
 ) -> Result<Json<VisibilitySettingsBody>, ApiError> {
     let sight = over(&fields, &VisibilitySettings::default()).map_err(|e| refused(&e, ""))?;
     let stored = shown(&sight);
-    app.store.write(move |tx| Box::pin(async move { sights::set(tx, &map, &sight).await })).await?;
+    app.store
+        .write(move |tx| Box::pin(async move { visibility_settings::set(tx, &map, &sight).await }))
+        .await?;
     Ok(Json(stored))
 }
 
@@ -169,7 +171,7 @@ mod tests {
         };
         let made = other(&wide, &map, "visibility_settings").unwrap().unwrap();
         assert!((made.viewer.focal_px - 900.0).abs() < 1e-9 && (made.viewer.tilt_rad[1] - 1.2).abs() < 1e-9);
-        assert_eq!(made.viewer.width_px.to_bits(), map.sight.viewer.width_px.to_bits());
+        assert_eq!(made.viewer.width_px.to_bits(), map.visibility_settings.viewer.width_px.to_bits());
         let wrong = VisibilitySettingsBody { tilt_low_rad: Some(0.4), ..VisibilitySettingsBody::default() };
         assert_eq!(
             other(&wrong, &map, "visibility_settings").unwrap_err().field.as_deref(),

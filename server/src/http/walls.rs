@@ -5,7 +5,7 @@ use super::{
     error::{ApiError, out_of_range},
     extract::{Body, PathParams},
 };
-use crate::store::{laser, maps};
+use crate::store::{maps, walls};
 use axum::{Json, extract::State};
 use protos::api::{Problem, WallBody, WallsBody};
 use utoipa_axum::{router::OpenApiRouter, routes};
@@ -37,7 +37,7 @@ async fn put(
     }
     let ends =
         walls.segments.iter().enumerate().map(|(i, s)| checked(i, s)).collect::<Result<Vec<_>, _>>()?;
-    app.store.write(move |tx| Box::pin(async move { laser::replace(tx, &map, &ends).await })).await?;
+    app.store.write(move |tx| Box::pin(async move { walls::replace(tx, &map, &ends).await })).await?;
     Ok(Json(walls))
 }
 
@@ -49,7 +49,7 @@ async fn get(
     PathParams(map): PathParams<String>,
 ) -> Result<Json<WallsBody>, ApiError> {
     let map = maps::get(app.store.reads(), &map).await?;
-    let stored = laser::all_of(app.store.reads(), map.id).await?;
+    let stored = walls::all_of(app.store.reads(), map.id).await?;
     let segments = stored.into_iter().map(|[ax, ay, bx, by]| WallBody { a: [ax, ay], b: [bx, by] }).collect();
     Ok(Json(WallsBody { segments }))
 }

@@ -1,14 +1,13 @@
-//! A lesson: views -> icons -> models, for some landmarks of a map or for all, then one commit with everything, the
-//! new snapshot, and only then "done". The work itself runs on threads of its own, off the runtime; each decodes one
-//! stored picture at a time.
+//! A lesson: learns models of some or all landmarks of a map. In: stored training views. Out: models, thresholds and the end
+//! of the job in one commit. The work runs on threads of its own, off the runtime; each decodes one stored picture at a time.
 //!
-//! Negatives are worked out once for all landmarks. Landmarks that are not in the lesson keep their models and get the
-//! new icons added to what they must be told from.
+//! Negatives are collected once for all landmarks. Landmarks that are not in the lesson keep their models and get the new
+//! icons as further negatives.
 
 use super::{
-    JobError, Reporter,
+    JobError, ProgressReporter,
     look_alikes::{LookAlike, look_alikes},
-    negatives::{Negatives, each, real_strangers, spread},
+    negatives::{Negatives, each, spread, untaught_distractors},
     pictures::{Pictures, point_views},
     points,
     request::Request,
@@ -24,7 +23,7 @@ use crate::{
         maps::{self, MapRow},
         models::{self, NewModel},
         now_ms,
-        views::{self, Cut, Digest, Lesson},
+        views::{self, Digest, QuadCrop, TrainingViewRow},
     },
 };
 use engine::{panics::Edge, snapshot::MapSnapshot};
@@ -51,13 +50,13 @@ impl Request {
         serde_json::to_string(self).unwrap_or_default()
     }
 
-    /// Our own text; an unreadable one (a row from elsewhere) means everything.
+    /// Reads a stored request; an unreadable one (a row of another program) means every landmark.
     pub(crate) fn from_json(text: &str) -> Self {
         serde_json::from_str(text).unwrap_or_default()
     }
 }
 
-/// Everything a lesson rests on, read at its start.
+/// Everything that a lesson rests on, read at its start.
 struct Material {
     pictures: Pictures,
     params: Arc<Params>,
@@ -65,11 +64,11 @@ struct Material {
     generated_views: Option<usize>,
     snapshot: Arc<MapSnapshot>,
     targets: Vec<LandmarkId>,
-    lessons: BTreeMap<LandmarkId, Vec<Lesson>>,
-    strangers: Vec<vision::icon::Icon>,
+    views: BTreeMap<LandmarkId, Vec<TrainingViewRow>>,
+    distractors: Vec<vision::icon::Icon>,
 }
 
-/// What came of it.
+/// The result of a lesson.
 struct Learnt {
     models: Vec<LandmarkModel>,
     refitted: Vec<LandmarkModel>,
@@ -82,7 +81,7 @@ pub(super) async fn run(
     store: &Catalogue,
     config: &Arc<Config>,
     row: &JobRow,
-    reporter: &Arc<Reporter>,
+    reporter: &Arc<ProgressReporter>,
 ) -> Result<(), JobError> {
     let started = Instant::now();
     let request = Request::from_json(&row.request);
@@ -90,7 +89,7 @@ pub(super) async fn run(
         return points::run(store, config, row, request.landmarks.unwrap_or_default(), reporter).await;
     }
     let map = maps::get(store.reads(), &row.map).await?;
-    let material = gather(store, config, &map, &request).await?;
+    let material = read_material(store, config, &map, &request).await?;
     let names: BTreeMap<LandmarkId, String> =
         material.snapshot.landmarks.iter().map(|(id, l)| (*id, l.name.clone())).collect();
     let work = {
@@ -104,12 +103,12 @@ pub(super) async fn run(
         .map_err(|e| JobError::Failed(format!("the lesson broke off: {e}")))??;
     reporter.report(0.99, "storing");
     match commit(store, map, row.id, learnt, &names, started).await {
-        Err(StoreError::Changed) => Err(JobError::Unwanted),
+        Err(StoreError::Changed) => Err(JobError::Cancelled),
         done => Ok(done?),
     }
 }
 
-async fn gather(
+async fn read_material(
     store: &Catalogue,
     config: &Arc<Config>,
     map: &MapRow,
@@ -120,13 +119,13 @@ async fn gather(
         .get(&map.name)
         .ok_or_else(|| StoreError::NotFound { what: "map", name: map.name.clone() })?;
     let all = views::of_map(store.reads(), map.id).await?;
-    let strangers: Vec<(Digest, Cut)> = views::strangers(store.reads(), map.id).await?;
-    let strangers = real_strangers(strangers, &all);
-    let mut lessons: BTreeMap<LandmarkId, Vec<Lesson>> = BTreeMap::new();
-    for lesson in all {
-        lessons.entry(lesson.landmark).or_default().push(lesson);
+    let distractors: Vec<(Digest, QuadCrop)> = views::distractors(store.reads(), map.id).await?;
+    let distractors = untaught_distractors(distractors, &all);
+    let mut views: BTreeMap<LandmarkId, Vec<TrainingViewRow>> = BTreeMap::new();
+    for view in all {
+        views.entry(view.landmark).or_default().push(view);
     }
-    let targets = targets(&snapshot, &lessons, request)?;
+    let targets = targets(&snapshot, &views, request)?;
     Ok(Material {
         pictures: Pictures::new(store, config),
         params: config.params.clone(),
@@ -134,18 +133,18 @@ async fn gather(
         generated_views: request.generated_views,
         snapshot,
         targets,
-        lessons,
-        strangers,
+        views,
+        distractors,
     })
 }
 
 fn targets(
     snapshot: &MapSnapshot,
-    lessons: &BTreeMap<LandmarkId, Vec<Lesson>>,
+    views: &BTreeMap<LandmarkId, Vec<TrainingViewRow>>,
     request: &Request,
 ) -> Result<Vec<LandmarkId>, JobError> {
     let Some(names) = &request.landmarks else {
-        let all: Vec<_> = lessons.keys().copied().collect();
+        let all: Vec<_> = views.keys().copied().collect();
         return if all.is_empty() {
             Err(JobError::Failed("no landmark of this map has views".into()))
         } else {
@@ -156,7 +155,7 @@ fn targets(
         let found = snapshot.landmarks.iter().find(|(_, l)| l.name == *name);
         let (id, _) =
             found.ok_or_else(|| JobError::Failed(format!("there is no landmark `{name}` any more")))?;
-        if lessons.contains_key(id) {
+        if views.contains_key(id) {
             Ok(*id)
         } else {
             Err(JobError::Failed(format!("landmark `{name}` has no views")))
@@ -168,10 +167,11 @@ fn targets(
     Ok(ids)
 }
 
-/// Three passes over landmarks, each spread over the threads: views with their points, negatives, models.
-fn compute(m: &Material, reporter: &Reporter) -> Result<Learnt, JobError> {
-    let sights = each_of(&m.targets, m.workers, reporter, (0.0, 0.3, "views"), |id| sights(m, *id))?;
-    let (views, points): (Vec<_>, Vec<_>) = sights.into_iter().map(|s| (s.views, s.points)).unzip();
+/// Three passes over the landmarks, each over all threads: views with their points, negatives, models.
+fn compute(m: &Material, reporter: &ProgressReporter) -> Result<Learnt, JobError> {
+    let inputs = each_of(&m.targets, m.workers, reporter, (0.0, 0.3, "views"), |id| learning_input(m, *id))?;
+    let (views, points): (Vec<_>, Vec<_>) =
+        inputs.into_iter().map(|input| (input.views, input.points)).unzip();
     let of_targets = || m.targets.iter().copied();
     let views: BTreeMap<LandmarkId, Vec<TrainingView>> = of_targets().zip(views).collect();
     let points: BTreeMap<LandmarkId, Vec<Vec<TaughtPoint>>> = of_targets().zip(points).collect();
@@ -181,18 +181,17 @@ fn compute(m: &Material, reporter: &Reporter) -> Result<Learnt, JobError> {
         let (before, after) = negatives.others(*id);
         let model = learn(*id, &views[id], before, p).map_err(|e| e.to_string())?;
         let model = model.with_points_if_used(p, || points[id].clone());
-        Ok::<_, String>(negatives.with_strangers(&add_negatives(&model, after, p), p))
+        Ok::<_, String>(negatives.with_distractors(&add_negatives(&model, after, p), p))
     })?;
-    let bystanders: Vec<LandmarkId> =
+    let others: Vec<LandmarkId> =
         m.snapshot.learnt.keys().filter(|id| !views.contains_key(id)).copied().collect();
-    // A landmark that is learnt again is added a second time. Its older icons stay: a threshold may only get stricter
-    // by this, and learning the whole map starts afresh.
-    let refitted =
-        each_of(&bystanders, m.workers, reporter, (0.9, 0.99, "thresholds of the others"), |id| {
-            m.targets.iter().fold(LandmarkModel::clone(&m.snapshot.learnt[id].model), |model, target| {
-                add_negatives(&model, negatives.of(*target), p)
-            })
-        })?;
+    // A landmark that is learnt again is added a second time, and its older icons stay: thresholds only become stricter.
+    // Learning the whole map resets them.
+    let refitted = each_of(&others, m.workers, reporter, (0.9, 0.99, "thresholds of the others"), |id| {
+        m.targets.iter().fold(LandmarkModel::clone(&m.snapshot.learnt[id].model), |model, target| {
+            add_negatives(&model, negatives.of(*target), p)
+        })
+    })?;
     let models: Vec<&LandmarkModel> = learnt.iter().flatten().chain(&refitted).collect();
     let found = each_of(&models, m.workers, reporter, (0.99, 0.99, "look-alikes"), |model| {
         look_alikes(model, &negatives, p)
@@ -209,21 +208,21 @@ fn compute(m: &Material, reporter: &Reporter) -> Result<Learnt, JobError> {
 }
 
 /// What a landmark is learnt from.
-struct Sights {
+struct LearningInput {
     /// Its photographs and what is generated from them.
     views: Vec<TrainingView>,
     /// Points of its photographs, of at most [`MAX_POINT_VIEWS`] evenly chosen ones.
     points: Vec<Vec<TaughtPoint>>,
 }
 
-fn sights(m: &Material, id: LandmarkId) -> Sights {
-    let lessons = m.lessons.get(&id).map_or(&[][..], Vec::as_slice);
-    let lessons = &lessons[..lessons.len().min(MAX_VIEWS)];
-    let mut views: Vec<TrainingView> = lessons
+fn learning_input(m: &Material, id: LandmarkId) -> LearningInput {
+    let stored = m.views.get(&id).map_or(&[][..], Vec::as_slice);
+    let stored = &stored[..stored.len().min(MAX_VIEWS)];
+    let mut views: Vec<TrainingView> = stored
         .iter()
         .map(|l| TrainingView {
-            icon: l.cut.icon.clone(),
-            corners_px: l.cut.corners_px,
+            icon: l.crop.icon.clone(),
+            corners_px: l.crop.corners_px,
             image_size_px: l.size_px,
             exact: None,
             generated: false,
@@ -236,31 +235,31 @@ fn sights(m: &Material, id: LandmarkId) -> Sights {
     };
     let wanted = wanted.min(MAX_VIEWS - photographs);
     let uses_points = m.params.recognise.verdict.points;
-    let with_points: Vec<i64> = point_views(lessons).filter(|_| uses_points).map(|l| l.view).collect();
+    let with_points: Vec<i64> = point_views(stored).filter(|_| uses_points).map(|l| l.view).collect();
     let mut points = Vec::with_capacity(with_points.len());
-    for (index, lesson) in lessons.iter().enumerate() {
+    for (index, view) in stored.iter().enumerate() {
         let count = (wanted + photographs - 1 - index) / photographs;
-        let gives_points = with_points.contains(&lesson.view);
+        let gives_points = with_points.contains(&view.view);
         if count == 0 && !gives_points {
             continue;
         }
-        let Some(image) = m.pictures.of(lesson) else { continue };
+        let Some(image) = m.pictures.of(view) else { continue };
         if gives_points {
-            points.push(view_points(&image, &lesson.cut.corners_px));
+            points.push(view_points(&image, &view.crop.corners_px));
         }
         // The number of the view is the seed: the same lesson gives the same model.
-        let seed = lesson.view as u64;
-        views.extend(synthesis::views(&image, &lesson.cut.corners_px, count, &m.params, seed));
+        let seed = view.view as u64;
+        views.extend(synthesis::views(&image, &view.crop.corners_px, count, &m.params, seed));
     }
-    Sights { views, points }
+    LearningInput { views, points }
 }
 
 fn collect_negatives(
     m: &Material,
     views: &BTreeMap<LandmarkId, Vec<TrainingView>>,
-    reporter: &Reporter,
+    reporter: &ProgressReporter,
 ) -> Result<Negatives, JobError> {
-    let all: Vec<LandmarkId> = m.lessons.keys().copied().collect();
+    let all: Vec<LandmarkId> = m.views.keys().copied().collect();
     let count = each(all.len());
     let icons =
         each_of(&all, m.workers, reporter, (0.3, 0.4, "icons of the others"), |id| -> Vec<IconFeatures> {
@@ -268,8 +267,8 @@ fn collect_negatives(
             if let Some(views) = views.get(id) {
                 return spread(views, count).map(|v| prepare(&v.icon)).collect();
             }
-            // Not in the lesson: its photographs and, where those are few, what its model remembers.
-            let photographs = spread(&m.lessons[id], count).map(|l| prepare(&l.cut.icon));
+            // Not in the lesson: its photographs and, where those are few, the exemplars of its model.
+            let photographs = spread(&m.views[id], count).map(|l| prepare(&l.crop.icon));
             let learnt =
                 m.snapshot.learnt.get(id).into_iter().flat_map(|l| l.model.features(&m.params.recognise));
             photographs.chain(learnt).take(count).collect()
@@ -278,7 +277,8 @@ fn collect_negatives(
     for (id, icons) in all.into_iter().zip(icons) {
         negatives.add(id, icons);
     }
-    negatives.set_strangers(m.strangers.iter().map(|s| features(s.clone(), &m.params.recognise)).collect());
+    negatives
+        .set_distractors(m.distractors.iter().map(|s| features(s.clone(), &m.params.recognise)).collect());
     Ok(negatives)
 }
 
@@ -325,12 +325,12 @@ async fn commit(
     let rows: Vec<NewModel> = models.map(|model| row(model, &of(model))).collect();
     let write = store.write(move |tx| {
         Box::pin(async move {
-            let map = maps::still(tx, map).await?;
+            let map = maps::recheck(tx, map).await?;
             for row in &rows {
                 models::put(tx, map.id, row).await?;
             }
             maps::bump(tx, map.id).await?;
-            // It was cancelled before it began: nothing of it is stored.
+            // A job that was cancelled stores nothing.
             if jobs::end(tx, job, &ended).await? { Ok(()) } else { Err(StoreError::Changed) }
         })
     });

@@ -1,5 +1,5 @@
-//! Landmarks that may be taken for one another: found before they go live, each pair by name. Telling them apart is
-//! what thresholds are for; this says where those had to be drawn tight, so that a person can look.
+//! Look-alikes among the models of a map, by pairs. In: a model and the icons of the other landmarks. Out: the landmarks whose
+//! icons limit its threshold, so that a person can check them.
 
 use super::negatives::Negatives;
 use vision::{
@@ -8,18 +8,17 @@ use vision::{
     params::Params,
 };
 
-/// Look-alikes of one landmark that are named, most alike first.
+/// Look-alikes of one landmark that are named: the most similar.
 const MAX_LOOK_ALIKES: usize = 5;
 
-/// Another landmark that is like one of the map: nearer than what is accepted where nothing is like it.
+/// A landmark whose icons are nearer to a model than the threshold that the model would have without look-alikes.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct LookAlike {
     pub(super) other: LandmarkId,
     pub(super) gradient_similarity: f64,
 }
 
-/// The landmarks that `model` may be taken for, most alike first. Only where something held its threshold down is there
-/// anything to look for.
+/// The landmarks that look like `model`, most similar first; none if no negative limits its threshold.
 pub(super) fn look_alikes(model: &LandmarkModel, negatives: &Negatives, p: &Params) -> Vec<LookAlike> {
     let nearest =
         model.gradient_similarity_evidence.nearest_others.first().map_or(f64::INFINITY, |d| f64::from(*d));
@@ -63,13 +62,13 @@ mod tests {
     fn pairs_are_named_and_others_are_not() {
         let p = Params::default();
         let whole = Corners::try_from([[-0.5, -0.5], [239.5, -0.5], [239.5, 239.5], [-0.5, 239.5]]).unwrap();
-        let lesson = |id: u64, image: &GrayImage| {
+        let learnt = |id: u64, image: &GrayImage| {
             let mut views = vec![TrainingView::photographed(image, &whole, &p).unwrap()];
             views.extend(synthesis::views(image, &whole, 20, &p, id));
             learn(LandmarkId(id), &views, &[], &p).unwrap()
         };
         let models =
-            [lesson(1, &picture(1, false)), lesson(2, &picture(1, true)), lesson(3, &picture(5, false))];
+            [learnt(1, &picture(1, false)), learnt(2, &picture(1, true)), learnt(3, &picture(5, false))];
         let mut negatives = Negatives::default();
         for model in &models {
             negatives.add(model.id, model.features(&p.recognise));

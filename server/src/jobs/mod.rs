@@ -1,8 +1,8 @@
-//! Long work: accepted with 202, kept as a row so that a crash only delays it, one at a time, with progress that can
-//! be watched and a flag that stops it. What a job does is in its own file; here is only its life.
+//! The life of jobs: long work that is accepted with 202 and stored as a row, so that a crash only delays it. One job runs at
+//! a time, with progress that can be watched and a flag that cancels it. What a job does is in its own file.
 //!
-//! The next job is the first open row whose turn it is, whoever queued it and whatever became of them. A job that was
-//! interrupted by the end of the process is begun again after a pause, and given up as failed after [`MAX_ATTEMPTS`].
+//! The next job is the first open row whose pause is over. A job that the end of the process interrupted starts again after a
+//! pause, and fails after [`MAX_ATTEMPTS`].
 
 pub(crate) mod learn;
 mod negatives;
@@ -30,44 +30,44 @@ use std::{
 };
 use tokio::sync::watch;
 
-/// How far an open job is.
+/// Progress of an open job.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(crate) struct Progress {
-    /// 0 to 1.
+pub(crate) struct JobProgress {
+    /// Share of the work that is done, 0 to 1.
     pub(crate) share: f64,
     /// What is being done, for a person.
     pub(crate) message: String,
-    /// Running, not waiting any more.
+    /// The job runs; it does not wait any more.
     pub(crate) running: bool,
 }
 
-/// Where work reports its progress and learns that it is no longer wanted.
+/// A job reports its progress here, and reads whether it is cancelled.
 #[derive(Debug)]
-pub(crate) struct Reporter {
-    progress: watch::Sender<Progress>,
+pub(crate) struct ProgressReporter {
+    progress: watch::Sender<JobProgress>,
     cancelled: AtomicBool,
     stopping: watch::Receiver<bool>,
 }
 
-impl Reporter {
-    /// Says how far it is.
+impl ProgressReporter {
+    /// Reports progress.
     pub(crate) fn report(&self, share: f64, message: impl Into<String>) {
         let message = message.into();
-        self.progress.send_replace(Progress { share: share.clamp(0.0, 1.0), message, running: true });
+        self.progress.send_replace(JobProgress { share: share.clamp(0.0, 1.0), message, running: true });
     }
 
-    /// The work is to be given up, between two steps.
-    pub(crate) fn unwanted(&self) -> bool {
+    /// Whether the job shall stop, between two steps: it was cancelled, or the server stops.
+    pub(crate) fn is_cancelled(&self) -> bool {
         self.cancelled.load(Ordering::Relaxed) || *self.stopping.borrow()
     }
 }
 
-/// Why a job did not get done.
+/// Why a job was not done.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum JobError {
-    /// Somebody asked for it, or the server stops.
-    #[error("given up")]
-    Unwanted,
+    /// It was cancelled, or the server stops.
+    #[error("cancelled")]
+    Cancelled,
     /// It cannot be done; the text is for a person.
     #[error("{0}")]
     Failed(String),
@@ -76,27 +76,27 @@ pub(crate) enum JobError {
     Store(#[from] StoreError),
 }
 
-/// How often a job is begun that ends the process each time.
+/// How often a job starts that ends the process each time.
 const MAX_ATTEMPTS: u32 = 5;
-/// The server has run so long before a job that was interrupted once is begun again; twice as long for each further time.
-/// So the server can be used, and the job cancelled, although the job ends the process each time.
+/// The server runs for this long before a job that was interrupted once starts again; twice as long for each further time.
+/// So the server can be used, and the job cancelled, even if the job ends the process each time.
 const PAUSE: Duration = Duration::from_secs(1);
-/// Until the table is read again after it could not be read or written.
+/// Pause after a failed read or write of the table.
 const RETRY: Duration = Duration::from_secs(5);
 
-/// Of open jobs only: those that run or are watched.
+/// Reporters of open jobs that run or are watched.
 #[derive(Debug, Default)]
-struct Reporters {
-    of: BTreeMap<i64, Arc<Reporter>>,
+struct ProgressReporters {
+    of: BTreeMap<i64, Arc<ProgressReporter>>,
     running: Option<i64>,
 }
 
-/// The jobs that wait or run. Which those are is known from the table alone.
+/// The open jobs. The table alone says which those are.
 #[derive(Debug)]
 pub(crate) struct Jobs {
     store: Catalogue,
     config: Arc<Config>,
-    reporters: Mutex<Reporters>,
+    reporters: Mutex<ProgressReporters>,
     started: Instant,
     stopping: watch::Receiver<bool>,
 }
@@ -123,7 +123,7 @@ enum Next {
 }
 
 impl Jobs {
-    /// Takes up what a stop or a crash interrupted, then what is queued.
+    /// Resumes interrupted jobs, then runs queued ones.
     pub(crate) async fn start(
         store: Catalogue,
         config: Arc<Config>,
@@ -143,7 +143,7 @@ impl Jobs {
         Ok((jobs, task))
     }
 
-    /// Accepts a lesson. Durable when this returns, and begun with whether or not the caller is still there.
+    /// Accepts a lesson. Durable when this returns; it runs whether or not the caller still waits.
     pub(crate) async fn submit(&self, map: &str, request: &request::Request) -> Result<JobRow, StoreError> {
         let limits = (self.config.limits.jobs, self.config.limits.jobs_kept);
         let (map, text) = (map.to_owned(), request.to_json());
@@ -154,17 +154,17 @@ impl Jobs {
     }
 
     /// How far a job is that runs or is watched; `None` for any other.
-    pub(crate) fn progress(&self, id: i64) -> Option<Progress> {
+    pub(crate) fn progress(&self, id: i64) -> Option<JobProgress> {
         self.lock().of.get(&id).map(|reporter| reporter.progress.borrow().clone())
     }
 
-    /// Progress of an open job, from its queue to its end; `None` once it has ended.
-    pub(crate) async fn watch(&self, id: i64) -> Result<Option<watch::Receiver<Progress>>, StoreError> {
+    /// JobProgress of an open job, from its queue to its end; `None` once it has ended.
+    pub(crate) async fn watch(&self, id: i64) -> Result<Option<watch::Receiver<JobProgress>>, StoreError> {
         if !is_open(&jobs::get(self.store.reads(), id).await?) {
             return Ok(None);
         }
         let watched = self.reporter(id).progress.subscribe();
-        // It may have ended in between: then nobody else would take the reporter away.
+        // If it ended in between, nobody else removes the reporter.
         if !is_open(&jobs::get(self.store.reads(), id).await?) {
             self.leave(id);
         }
@@ -180,7 +180,7 @@ impl Jobs {
         let write = self.store.write(move |tx| {
             Box::pin(async move {
                 if jobs::end(tx, id, &cancelled()).await? {
-                    // Its turn may have come meanwhile: then it finds its row ended and stores nothing.
+                    // It may have started meanwhile: then it finds its row ended and stores nothing.
                     tx.after(move || {
                         if !jobs.stop_running(id) {
                             jobs.leave(id);
@@ -207,15 +207,15 @@ impl Jobs {
         Ok(learning)
     }
 
-    fn lock(&self) -> std::sync::MutexGuard<'_, Reporters> {
+    fn lock(&self) -> std::sync::MutexGuard<'_, ProgressReporters> {
         // Every change is one insertion or removal: nothing can be left half done.
         self.reporters.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn reporter(&self, id: i64) -> Arc<Reporter> {
+    fn reporter(&self, id: i64) -> Arc<ProgressReporter> {
         let new = || {
-            Arc::new(Reporter {
-                progress: watch::Sender::new(Progress::default()),
+            Arc::new(ProgressReporter {
+                progress: watch::Sender::new(JobProgress::default()),
                 cancelled: AtomicBool::new(false),
                 stopping: self.stopping.clone(),
             })
@@ -223,7 +223,7 @@ impl Jobs {
         self.lock().of.entry(id).or_insert_with(new).clone()
     }
 
-    /// Tells the job that runs to stop. False if this one does not run.
+    /// Cancels a running job. False if this one does not run.
     fn stop_running(&self, id: i64) -> bool {
         let reporters = self.lock();
         let running = reporters.running.filter(|running| *running == id);
@@ -232,7 +232,7 @@ impl Jobs {
     }
 
     fn leave(&self, id: i64) {
-        // Whoever watches is told by the end of the channel, with the last reporter.
+        // The end of the channel tells the watchers, once the last reporter is dropped.
         let mut reporters = self.lock();
         reporters.of.remove(&id);
         reporters.running.take_if(|running| *running == id);
@@ -251,7 +251,7 @@ impl Jobs {
                 Err(error) => Err(error),
             };
             let pause = done.unwrap_or_else(|error| {
-                tracing::error!(error = &error as &dyn std::error::Error, "jobs wait");
+                tracing::error!(error = &error as &dyn std::error::Error, "jobs_table_failed");
                 RETRY
             });
             if pause.is_zero() {
@@ -272,7 +272,7 @@ impl Jobs {
         for row in jobs::open(self.store.reads()).await? {
             let pause = match row.attempts {
                 1..MAX_ATTEMPTS => PAUSE * (1 << (row.attempts - 1)),
-                // New, or to be given up.
+                // New, or out of attempts.
                 _ => Duration::ZERO,
             };
             let rest = pause.saturating_sub(up);
@@ -293,7 +293,7 @@ impl Jobs {
                 "given up: the server ended {} times while it worked on this job; see its log",
                 row.attempts
             );
-            tracing::error!(job = id, message, "job failed");
+            tracing::error!(job = id, message, "job_failed");
             return self.end(id, Ended { state: "failed", message, result: None }).await;
         }
         reporter.report(0.0, "started");
@@ -301,17 +301,17 @@ impl Jobs {
             return Ok(());
         }
         let ended = match learn::run(&self.store, &self.config, row, &reporter).await {
-            // The row was ended together with the models.
+            // The row has ended together with the models.
             Ok(()) => return Ok(()),
-            // Taken up again at the next start.
-            Err(JobError::Unwanted) if !reporter.cancelled.load(Ordering::Relaxed) => {
+            // It resumes at the next start.
+            Err(JobError::Cancelled) if !reporter.cancelled.load(Ordering::Relaxed) => {
                 let write = self.store.write(move |tx| Box::pin(async move { jobs::put_back(tx, id).await }));
                 return write.await;
             }
-            Err(JobError::Unwanted) => cancelled(),
+            Err(JobError::Cancelled) => cancelled(),
             Err(JobError::Failed(message)) => Ended { state: "failed", message, result: None },
             Err(JobError::Store(error)) => {
-                tracing::error!(job = id, error = &error as &dyn std::error::Error, "job failed");
+                tracing::error!(job = id, error = &error as &dyn std::error::Error, "job_failed");
                 Ended { state: "failed", message: error.to_string(), result: None }
             }
         };

@@ -1,7 +1,7 @@
-//! What a landmark must be told from: icons of every other landmark, evenly chosen, and strangers seen in the
-//! pictures. Worked out once for a whole lesson; they lie by landmark, so that each landmark's own are one gap.
+//! Negatives of a lesson: icons of every other landmark, evenly chosen, and distractors of the pictures. They are collected
+//! once for the whole lesson, ordered by landmark, so that the icons of one landmark are one range.
 
-use crate::store::views::{Cut, Digest, Lesson};
+use crate::store::views::{Digest, QuadCrop, TrainingViewRow};
 use std::ops::Range;
 use vision::{
     geometry::{Corners, polygon::intersection_area},
@@ -19,7 +19,7 @@ const EACH_MIN: usize = 3;
 /// Icons of one landmark at most, however few landmarks there are.
 const EACH_MAX: usize = 30;
 
-/// Share of the smaller quad from which on two quads of a picture are about the same thing.
+/// Share of the smaller quad above which two quads of a picture show the same object.
 const OVERLAP: f64 = 0.25;
 
 /// How many icons of each landmark stand for it.
@@ -38,7 +38,7 @@ pub(super) fn spread<T>(items: &[T], count: usize) -> impl Iterator<Item = &T> {
 pub(super) struct Negatives {
     icons: Vec<IconFeatures>,
     owners: Vec<(LandmarkId, Range<usize>)>,
-    strangers: Vec<IconFeatures>,
+    distractors: Vec<IconFeatures>,
 }
 
 impl Negatives {
@@ -50,8 +50,8 @@ impl Negatives {
     }
 
     /// Sets the icons of no landmark.
-    pub(super) fn set_strangers(&mut self, strangers: Vec<IconFeatures>) {
-        self.strangers = strangers;
+    pub(super) fn set_distractors(&mut self, distractors: Vec<IconFeatures>) {
+        self.distractors = distractors;
     }
 
     /// The icons of `landmark`.
@@ -75,30 +75,33 @@ impl Negatives {
         }
     }
 
-    /// `model` with the strangers among what it must be told from, but for those that are as near as its own views
-    /// are to each other: those are the landmark itself, in the background of another landmark's picture.
-    pub(super) fn with_strangers(&self, model: &LandmarkModel, p: &Params) -> LandmarkModel {
+    /// `model` with the distractors as negatives, except those that are as near as its own views are to one another: those show
+    /// the landmark itself, in the background of another landmark's picture.
+    pub(super) fn with_distractors(&self, model: &LandmarkModel, p: &Params) -> LandmarkModel {
         let own = &model.correlation_evidence.own;
         let near = own.get(own.len() / 2).map_or(0.0, |d| f64::from(*d));
-        let strangers: Vec<IconFeatures> = self
-            .strangers
+        let distractors: Vec<IconFeatures> = self
+            .distractors
             .iter()
             .filter(|s| model.distances(s, &p.recognise).correlation > near)
             .cloned()
             .collect();
-        add_negatives(model, &strangers, p)
+        add_negatives(model, &distractors, p)
     }
 }
 
-/// Strangers that no landmark was taught at, in the picture they were seen in.
-pub(super) fn real_strangers(strangers: Vec<(Digest, Cut)>, lessons: &[Lesson]) -> Vec<Icon> {
+/// Distractors that do not overlap a training view of the same picture.
+pub(super) fn untaught_distractors(
+    distractors: Vec<(Digest, QuadCrop)>,
+    views: &[TrainingViewRow],
+) -> Vec<Icon> {
     let taught = |digest: &Digest, corners: &Corners| {
-        lessons.iter().any(|l| l.image_sha256 == *digest && overlaps(&l.cut.corners_px, corners))
+        views.iter().any(|l| l.image_sha256 == *digest && overlaps(&l.crop.corners_px, corners))
     };
-    strangers
+    distractors
         .into_iter()
-        .filter(|(digest, cut)| !taught(digest, &cut.corners_px))
-        .map(|(_, cut)| cut.icon)
+        .filter(|(digest, crop)| !taught(digest, &crop.corners_px))
+        .map(|(_, crop)| crop.icon)
         .collect()
 }
 

@@ -1,12 +1,12 @@
-//! Points for models that were stored before landmarks had any. At the start one job for each such map is queued; it takes
-//! the points of the stored photographs and adds them to the models, which stay as they are otherwise: nothing that was
-//! recognised before is lost by it. Until then, and for a landmark that fails, the model without points stays in use.
+//! Points for models that were stored without any. At the start, one job for each such map is queued. It takes points from the
+//! stored photographs and adds them to the models, which stay as they are otherwise. Until then, and for a landmark that fails,
+//! the model without points stays in use.
 //!
-//! A model is asked for once: the mark is set in the transaction that queues the job, and stays whatever becomes of it. A
+//! A model gets such a job once: the mark is set in the transaction that queues the job, and stays whatever the job does. A
 //! lesson of the landmark gives it points at any time.
 
 use super::{
-    JobError, Jobs, Reporter,
+    JobError, Jobs, ProgressReporter,
     pictures::{Pictures, points_of},
     request::Request,
     spread_work::each_of,
@@ -19,7 +19,7 @@ use crate::{
         jobs::{self, Ended, JobRow},
         maps,
         models::{self, ModelDigest},
-        views::{self, Lesson},
+        views::{self, TrainingViewRow},
     },
 };
 use engine::{panics::Edge, snapshot::MapSnapshot};
@@ -36,7 +36,7 @@ struct Target {
     name: String,
     was: ModelDigest,
     model: Arc<LandmarkModel>,
-    lessons: Vec<Lesson>,
+    views: Vec<TrainingViewRow>,
 }
 
 /// The same model with points, as bytes.
@@ -109,7 +109,7 @@ pub(super) async fn run(
     config: &Arc<Config>,
     row: &JobRow,
     names: Vec<String>,
-    reporter: &Arc<Reporter>,
+    reporter: &Arc<ProgressReporter>,
 ) -> Result<(), JobError> {
     let started = Instant::now();
     let map = maps::get(store.reads(), &row.map).await?;
@@ -149,44 +149,43 @@ pub(super) async fn run(
     let job = row.id;
     let write = store.write(move |tx| {
         Box::pin(async move {
-            let map = maps::still(tx, map).await?;
+            let map = maps::recheck(tx, map).await?;
             for m in &models {
                 models::replace(tx, m.landmark, (m.was, &m.bytes), m.points).await?;
             }
             maps::bump(tx, map.id).await?;
-            // It was cancelled before it began: nothing of it is stored.
+            // A job that was cancelled stores nothing.
             if jobs::end(tx, job, &ended).await? { Ok(()) } else { Err(StoreError::Changed) }
         })
     });
     match write.await {
-        Err(StoreError::Changed) => Err(JobError::Unwanted),
+        Err(StoreError::Changed) => Err(JobError::Cancelled),
         done => Ok(done?),
     }
 }
 
 /// Those of `names` that still have a model without points.
-fn targets(map: &MapSnapshot, lessons: Vec<Lesson>, names: &BTreeSet<String>) -> Vec<Target> {
-    let mut of: BTreeMap<LandmarkId, Vec<Lesson>> = BTreeMap::new();
-    for lesson in lessons {
-        let of = of.entry(lesson.landmark).or_default();
+fn targets(map: &MapSnapshot, all: Vec<TrainingViewRow>, names: &BTreeSet<String>) -> Vec<Target> {
+    let mut of: BTreeMap<LandmarkId, Vec<TrainingViewRow>> = BTreeMap::new();
+    for view in all {
+        let of = of.entry(view.landmark).or_default();
         if of.len() < MAX_VIEWS {
-            of.push(lesson);
+            of.push(view);
         }
     }
     let target = |(id, info): (&LandmarkId, &engine::snapshot::LandmarkInfo)| {
         let learnt = map.learnt.get(id).filter(|l| !l.model.knows_points && names.contains(&info.name))?;
-        let lessons = of.remove(id).unwrap_or_default();
-        Some(Target { name: info.name.clone(), was: learnt.digest, model: learnt.model.clone(), lessons })
+        let views = of.remove(id).unwrap_or_default();
+        Some(Target { name: info.name.clone(), was: learnt.digest, model: learnt.model.clone(), views })
     };
     map.landmarks.iter().filter_map(target).collect()
 }
 
 /// The model with points, or the landmark and why it has none.
 fn with_points(target: &Target, pictures: &Pictures) -> Result<WithPoints, Value> {
-    let points = points_of(&target.lessons, pictures);
+    let points = points_of(&target.views, pictures);
     if points.is_empty() {
-        let reason =
-            if target.lessons.is_empty() { "it has no views" } else { "no picture of it can be read" };
+        let reason = if target.views.is_empty() { "it has no views" } else { "no picture of it can be read" };
         return Err(json!({ "landmark": target.name, "reason": reason }));
     }
     let model = LandmarkModel::clone(&target.model).with_points(&points);

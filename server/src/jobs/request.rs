@@ -1,4 +1,4 @@
-//! What a lesson was asked to do; stored with its job.
+//! The request of a lesson, stored with its job.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,17 +1,17 @@
-//! Work on many items over several threads, with progress, until nobody wants it any more.
+//! Work on many items over several threads, with progress, until the job is done or cancelled.
 
-use super::{JobError, Reporter};
+use super::{JobError, ProgressReporter};
 use std::sync::{
     Mutex, PoisonError,
     atomic::{AtomicUsize, Ordering},
 };
 
-/// `work` on every item, over `threads` threads, results in the order of the items. Progress goes from and to the
+/// `work` on every item, over `threads` threads, results in the order of the items. JobProgress goes from and to the
 /// given shares.
 pub(super) fn each_of<T: Sync, R: Send>(
     items: &[T],
     threads: usize,
-    reporter: &Reporter,
+    reporter: &ProgressReporter,
     (from, to, what): (f64, f64, &str),
     work: impl Fn(&T) -> R + Sync,
 ) -> Result<Vec<R>, JobError> {
@@ -20,7 +20,7 @@ pub(super) fn each_of<T: Sync, R: Send>(
     std::thread::scope(|scope| {
         for _ in 0..threads.min(items.len()) {
             scope.spawn(|| {
-                while !reporter.unwanted() {
+                while !reporter.is_cancelled() {
                     let index = next.fetch_add(1, Ordering::Relaxed);
                     let Some(item) = items.get(index) else { return };
                     let result = work(item);
@@ -32,8 +32,8 @@ pub(super) fn each_of<T: Sync, R: Send>(
             });
         }
     });
-    if reporter.unwanted() {
-        return Err(JobError::Unwanted);
+    if reporter.is_cancelled() {
+        return Err(JobError::Cancelled);
     }
     let mut results = results.into_inner().unwrap_or_else(PoisonError::into_inner);
     results.sort_unstable_by_key(|(index, _)| *index);

@@ -1,11 +1,13 @@
-//! From rows to the next version of a map. What has not changed is taken over from the version before: walls by their version
-//! number, models by their digests, visibility areas by place, walls and camera. A damaged or outdated model is named and left
-//! out, never matched.
+//! Builds the next version of a map from rows. What has not changed is taken over from the version before: walls by their
+//! version number, models by their digests, visibility areas by place, walls and camera. A damaged or outdated model is named
+//! and left out, never matched.
 
 use crate::store::{
-    StoreError, areas, laser,
+    StoreError,
     map_rows::{self, MapHead},
+    modality_stats,
     models::{self, ModelDigest},
+    walls,
 };
 use engine::{
     panics::{Edge, Panics},
@@ -34,19 +36,19 @@ pub(super) async fn snapshot(
     let before = snapshots.get(&head.name);
     let before = before.as_deref();
     let info = |l: map_rows::LandmarkHead| {
-        let (size, place) = (l.measures.size, l.measures.landmark_place());
-        (l.id, LandmarkInfo { name: l.name, size, place, standing: l.standing })
+        let (size, place) = (l.geometry.size, l.geometry.landmark_place());
+        (l.id, LandmarkInfo { name: l.name, size, place, health: l.health })
     };
     let landmarks: BTreeMap<_, _> =
         map_rows::landmarks(&mut *conn, id).await?.into_iter().map(info).collect();
-    let (walls, wall_index) = walls(&mut *conn, id, &head, before, panics).await?;
-    let (modalities, runs) = modalities(&mut *conn, id, before).await?;
+    let (walls, wall_index) = walls_and_index(&mut *conn, id, &head, before, panics).await?;
+    let (modalities, reference_runs) = modalities(&mut *conn, id, before).await?;
     #[cfg(test)]
     tests::planted(&head.name);
     let (learnt, unusable_models) = models(conn, id, before, params, panics).await?;
     for (id, reason) in &unusable_models {
         let landmark = landmarks.get(id).map_or("", |l: &LandmarkInfo| l.name.as_str());
-        tracing::warn!(map = head.name, landmark, reason, "model not used");
+        tracing::warn!(map = head.name, landmark, reason, "model_not_used");
     }
     let same_models = before.filter(|before| digests(&before.learnt).eq(digests(&learnt)));
     let models = match same_models {
@@ -70,8 +72,8 @@ pub(super) async fn snapshot(
         walls_version: head.walls_version,
         wall_index,
         modalities,
-        runs,
-        sight: head.sight,
+        reference_runs,
+        visibility_settings: head.visibility_settings,
         visibility,
         pending: Pending { visibility: visibility_pending, look_alikes: look_alikes_pending },
         distance: head.distance,
@@ -81,8 +83,8 @@ pub(super) async fn snapshot(
 
 type Walls = (Arc<Vec<LaserSegment>>, Arc<WallIndex>);
 
-/// The walls and their index, which is made off the runtime.
-async fn walls(
+/// The walls and their index, which is built off the runtime.
+async fn walls_and_index(
     conn: &mut SqliteConnection,
     id: i64,
     head: &MapHead,
@@ -92,7 +94,7 @@ async fn walls(
     if let Some(before) = before.filter(|before| before.walls_version == head.walls_version) {
         return Ok((before.walls.clone(), before.wall_index.clone()));
     }
-    let ends = laser::all_of(conn, id).await?;
+    let ends = walls::all_of(conn, id).await?;
     let walls: Arc<Vec<_>> = Arc::new(ends.iter().filter_map(|e| LaserSegment::by_hand(e).ok()).collect());
     let indexed = walls.clone();
     let made = tokio::task::spawn_blocking(move || WallIndex::new(indexed.iter())).await;
@@ -100,26 +102,26 @@ async fn walls(
     Ok((walls, Arc::new(made.unwrap_or_else(|_ended| WallIndex::new([])))))
 }
 
-/// What reference runs have shown of the modalities, and the runs that this rests on.
+/// The modality statistics, and count and latest number of the reference runs that they rest on.
 async fn modalities(
     conn: &mut SqliteConnection,
     id: i64,
     before: Option<&MapSnapshot>,
 ) -> Result<(Arc<ModalityMap>, (i64, i64)), StoreError> {
-    let settings = areas::settings(&mut *conn, id).await?;
-    let numbers = areas::run_numbers(&mut *conn, id).await?;
+    let settings = modality_stats::settings(&mut *conn, id).await?;
+    let numbers = modality_stats::run_numbers(&mut *conn, id).await?;
     let is_same = |before: &&MapSnapshot| {
-        let known = &before.modalities;
-        before.runs == numbers
-            && known.mode() == settings.mode
-            && known.named().map(|(a, ..)| a).eq(&settings.named)
+        let old = &before.modalities;
+        before.reference_runs == numbers
+            && old.mode() == settings.mode
+            && old.named().map(|(a, ..)| a).eq(&settings.named)
     };
     if let Some(before) = before.filter(is_same) {
         return Ok((before.modalities.clone(), numbers));
     }
-    let runs = areas::runs(conn, id).await?;
-    let areas = ModalityMap::new(settings.mode, settings.named, runs.iter().map(|run| &run.cells));
-    Ok((Arc::new(areas), numbers))
+    let runs = modality_stats::runs(conn, id).await?;
+    let modalities = ModalityMap::new(settings.mode, settings.named, runs.iter().map(|run| &run.cells));
+    Ok((Arc::new(modalities), numbers))
 }
 
 /// Digest of every learnt model.
@@ -148,7 +150,9 @@ fn visibility(
     head: &MapHead,
     before: Option<&MapSnapshot>,
 ) -> (Visibility, bool) {
-    let before = before.filter(|b| b.walls_version == head.walls_version && b.sight == head.sight);
+    let before = before.filter(|b| {
+        b.walls_version == head.walls_version && b.visibility_settings == head.visibility_settings
+    });
     let (mut known, mut is_pending) = (Visibility::new(), false);
     for (id, info) in landmarks.iter().filter(|(_, info)| info.place.is_some()) {
         let same = before.filter(|b| b.landmarks.get(id).is_some_and(|was| was.place == info.place));
@@ -222,7 +226,7 @@ pub(super) mod tests {
     use std::cell::RefCell;
 
     thread_local! {
-        /// Where the loading of a map panics on this thread: the name of a map, or what is read of it.
+        /// Where building a snapshot panics on this thread: the name of a map, or what is read of it.
         static PLANTED: RefCell<Option<String>> = const { RefCell::new(None) };
     }
 

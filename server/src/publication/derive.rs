@@ -1,6 +1,6 @@
-//! Data derived from a version of a map, computed off the runtime and outside the writer: visibility areas, then look-alike
-//! classes. Each is published as soon as it is known, as the same version of the map with more in it. A version that is replaced
-//! meanwhile takes over what still holds.
+//! Derives data from a version of a map, off the runtime and outside of the writer: visibility areas, then look-alike classes.
+//! Each is published as soon as it is computed, as the same version of the map with more data. If a newer version replaces it
+//! meanwhile, that version takes over what still holds.
 
 use super::{build::digests, visibility_areas};
 use engine::{
@@ -14,7 +14,7 @@ use tokio::sync::{Notify, watch};
 /// Name of the task among the parts of the server.
 const PART: &str = "the task that derives data of maps";
 
-/// What was computed last, by map: most of it holds for the next version.
+/// The last derived version of each map: most of its data holds for the next version.
 type Last = BTreeMap<String, Arc<MapSnapshot>>;
 
 /// Derives whenever it is woken, until told to stop.
@@ -63,7 +63,7 @@ async fn derived(map: Arc<MapSnapshot>, before: Option<Arc<MapSnapshot>>, vitals
         let made =
             tokio::task::spawn_blocking(move || visibility_areas::areas(&map, before.as_deref())).await;
         let made =
-            panics.joined(Edge::Publication, "visibility areas", "those that are missing stay so", made);
+            panics.joined(Edge::Publication, "visibility areas", "those of this version are absent", made);
         if let Ok(areas) = made {
             next.visibility = areas;
         }
@@ -71,7 +71,7 @@ async fn derived(map: Arc<MapSnapshot>, before: Option<Arc<MapSnapshot>>, vitals
         return next;
     }
     let made = tokio::task::spawn_blocking(move || look_alikes(&map, before.as_deref())).await;
-    let follows = "lost robots are found by unique landmarks only, and a pose names none";
+    let follows = "robots relocalise by unique landmarks only, and a pose names none";
     let made = panics.joined(Edge::Publication, "look-alike classes", follows, made);
     if let Ok(classes) = made {
         next.look_alikes = classes;

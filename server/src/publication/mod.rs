@@ -1,5 +1,5 @@
-//! From committed rows to what the workers read. In: changes from the store's writer. Out: the next version of a map in
-//! [`Snapshots`], and after it what is derived from that version.
+//! Publication: makes committed rows the snapshots that the workers read. In: changes from the store's writer. Out: the next
+//! version of a map in [`Snapshots`], and after it the data derived from that version.
 //!
 //! The order is commit -> [`build`] -> publish -> acknowledge; only what has changed is read again. Visibility areas and
 //! look-alike classes take longer: [`derive`] computes them outside the writer and publishes the same version once more. Until
@@ -19,7 +19,7 @@ use publisher::Publisher;
 use std::{ops::Deref, sync::Arc};
 use tokio::{sync::watch, task::JoinHandle};
 
-/// The open store and what is published of it. Cheap to clone.
+/// The open store and its published snapshots. Cheap to clone.
 #[derive(Debug, Clone)]
 pub(crate) struct Catalogue {
     store: Store,
@@ -34,7 +34,7 @@ impl Deref for Catalogue {
     }
 }
 
-/// What must be awaited for the store to be closed in good order.
+/// Awaited so that the store is closed in good order.
 #[derive(Debug)]
 pub(crate) struct CatalogueTasks {
     writer: WriterTask,
@@ -54,7 +54,7 @@ impl CatalogueTasks {
         self.writer.close().await;
         self.stop.send_replace(true);
         if let Err(error) = self.deriver.await {
-            tracing::error!(%error, "the task that derives data of maps panicked");
+            tracing::error!(%error, "deriver_panicked");
         }
     }
 }

@@ -1,10 +1,10 @@
-//! Makes the current version of a map the one that is used.
+//! Publishes the stored version of a map after each commit.
 //!
-//! A map that cannot be made ready ends nothing: its previous version stays in use, at the start none, the map is named in
-//! the log and at `/readyz`, and the next write to it tries again.
+//! A map that cannot be published stops nothing: its previous version stays in use (none at the start), the log and `/readyz`
+//! name the map, and the next write to it tries again.
 
 use super::build;
-use crate::store::{Change, OnCommit, StoreError, map_rows, robots, sites};
+use crate::store::{CommittedChange, OnCommit, StoreError, map_locations, map_rows, robots};
 use engine::{panics::Edge, snapshot::Snapshots, vitals::Vitals};
 use futures::{FutureExt, future::BoxFuture};
 use sqlx::SqliteConnection;
@@ -21,7 +21,7 @@ pub(super) struct Publisher {
     snapshots: Arc<Snapshots>,
     params: Arc<Params>,
     vitals: Arc<Vitals>,
-    /// Told when a version has data to derive.
+    /// Notified when a version has data to derive.
     pub(super) derive: Arc<Notify>,
 }
 
@@ -50,13 +50,13 @@ impl Publisher {
     }
 
     async fn links(&self, conn: &mut SqliteConnection) -> Result<(), StoreError> {
-        self.snapshots.set_links(sites::links(&sites::all(conn).await?));
+        self.snapshots.set_links(map_locations::links(&map_locations::all(conn).await?));
         Ok(())
     }
 
-    /// `NotPublished` if the map cannot be made ready; any other error means that the database cannot be read.
+    /// Publishes a map. Errors: `NotPublished` if it cannot be built; any other means that the database cannot be read.
     async fn map(&self, conn: &mut SqliteConnection, id: i64) -> Result<(), StoreError> {
-        // What a panic leaves behind is thrown away: the snapshot is whole or there is none.
+        // Unwind safety: a panic drops the unfinished snapshot.
         let panics = self.vitals.panics();
         let made = build::snapshot(&mut *conn, id, &self.snapshots, &self.params, panics);
         let reason = match AssertUnwindSafe(made).catch_unwind().await {
@@ -75,7 +75,7 @@ impl Publisher {
                 tracing::error!(
                     map = id,
                     error = &error as &dyn std::error::Error,
-                    "a map cannot be made ready"
+                    "map_build_failed"
                 );
                 error.to_string()
             }
@@ -86,7 +86,7 @@ impl Publisher {
             }
         };
         let name = map_rows::name(conn, id).await?;
-        tracing::error!(map = name, reason, "the stored version of this map is not in use");
+        tracing::error!(map = name, reason, follows = "its previous version stays in use", "map_not_published");
         self.vitals.unpublished(&name, &reason);
         Err(StoreError::NotPublished { map: name })
     }
@@ -100,19 +100,19 @@ impl OnCommit for Publisher {
     fn committed<'c>(
         &'c self,
         conn: &'c mut SqliteConnection,
-        change: Change,
+        change: CommittedChange,
     ) -> BoxFuture<'c, Result<(), StoreError>> {
         Box::pin(async move {
             match change {
-                Change::Map(id) => self.map(conn, id).await?,
-                Change::MapRemoved(name) => {
+                CommittedChange::Map(id) => self.map(conn, id).await?,
+                CommittedChange::MapRemoved(name) => {
                     self.snapshots.remove_map(&name);
                     self.vitals.published(&name);
                 }
-                Change::Links => self.links(conn).await?,
-                Change::Robot { name, map } => self.snapshots.set_robot(&name, map.as_deref()),
+                CommittedChange::Links => self.links(conn).await?,
+                CommittedChange::Robot { name, map } => self.snapshots.set_robot(&name, map.as_deref()),
                 // The writer tells the jobs itself.
-                Change::Jobs => {}
+                CommittedChange::Jobs => {}
             }
             Ok(())
         })

@@ -3,7 +3,7 @@
 use super::{build::tests as planting, *};
 use crate::{
     config::RawConfig,
-    store::{StoreError, WRITER, jobs, landmarks, laser, maps, models, robots},
+    store::{StoreError, WRITER, jobs, landmarks, maps, models, robots, walls},
 };
 use engine::panics::Edge;
 use tokio::sync::oneshot;
@@ -20,9 +20,9 @@ async fn what_is_acknowledged_is_published_and_survives() {
     let (store, task) = Catalogue::open(&config).await.unwrap();
     store.write(|tx| Box::pin(maps::create(tx, "a", DistanceKind::Both, 2))).await.unwrap();
     assert_eq!(store.snapshots().get("a").unwrap().version, 1);
-    let new = landmarks::Measures {
+    let new = landmarks::LandmarkGeometry {
         size: Some(vision::pose::LandmarkSize { width_m: 0.5, height_m: 0.7 }),
-        place: Some(landmarks::Place {
+        place: Some(landmarks::StoredPlace {
             x_m: 1.0,
             y_m: 2.0,
             z_m: 1.5,
@@ -34,7 +34,7 @@ async fn what_is_acknowledged_is_published_and_survives() {
         size_from_views: false,
     };
     let made = store.write(move |tx| Box::pin(landmarks::create(tx, "a", "p1", new, 5))).await.unwrap();
-    store.write(|tx| Box::pin(laser::replace(tx, "a", &[[0.0, 0.0, 4.0, 0.0]]))).await.unwrap();
+    store.write(|tx| Box::pin(walls::replace(tx, "a", &[[0.0, 0.0, 4.0, 0.0]]))).await.unwrap();
     store.write(|tx| Box::pin(robots::put(tx, "r1", "a", 5))).await.unwrap();
     let snapshot = store.snapshots().get("a").unwrap();
     assert_eq!((snapshot.version, snapshot.landmarks.len(), snapshot.walls.len()), (3, 1, 1));
@@ -49,7 +49,7 @@ async fn what_is_acknowledged_is_published_and_survives() {
     let (store, _task) = Catalogue::open(&config).await.unwrap();
     assert_eq!(store.snapshots().get("a").unwrap().version, 3);
     assert_eq!(store.snapshots().robot_map("r1").as_deref(), Some("a"));
-    assert_eq!(landmarks::get(store.reads(), "a", "p1").await.unwrap().measures, new);
+    assert_eq!(landmarks::get(store.reads(), "a", "p1").await.unwrap().geometry, new);
 }
 
 #[tokio::test]
@@ -60,7 +60,7 @@ async fn a_failed_write_changes_nothing() {
     let half = store
         .write(|tx| {
             Box::pin(async move {
-                landmarks::create(tx, "a", "p1", landmarks::Measures::default(), 5).await?;
+                landmarks::create(tx, "a", "p1", landmarks::LandmarkGeometry::default(), 5).await?;
                 Err::<(), _>(StoreError::InUse("on purpose".into()))
             })
         })
@@ -157,7 +157,7 @@ async fn damaged_and_outdated_models_are_named_and_not_used() {
     let (store, task) = Catalogue::open(&config).await.unwrap();
     store.write(|tx| Box::pin(maps::create(tx, "a", DistanceKind::Both, 2))).await.unwrap();
     for name in ["sound", "damaged"] {
-        let none = landmarks::Measures::default();
+        let none = landmarks::LandmarkGeometry::default();
         let made = store.write(move |tx| Box::pin(landmarks::create(tx, "a", name, none, 5))).await.unwrap();
         store_model(&store, made.id, &config.params).await;
     }
@@ -166,7 +166,7 @@ async fn damaged_and_outdated_models_are_named_and_not_used() {
     let damage = "UPDATE models SET model = CAST(substr(model, 1, 500) || x'00ff' || substr(model, 503) AS BLOB) WHERE landmark_id = 2";
     let write = store.write(move |tx| {
         Box::pin(async move {
-            sqlx::query(damage).execute(tx.conn()).await.map(drop).map_err(StoreError::at("damage"))
+            sqlx::query(damage).execute(tx.conn()).await.map(drop).map_err(StoreError::during("damage"))
         })
     });
     write.await.unwrap();
@@ -283,7 +283,7 @@ async fn a_map_that_cannot_be_made_ready_keeps_its_version_and_stops_nothing() {
         store.write(move |tx| Box::pin(maps::create(tx, map, DistanceKind::Both, 2))).await.unwrap();
     }
     let wall =
-        |map: &'static str| store.write(move |tx| Box::pin(laser::replace(tx, map, &[[0.0, 0.0, 4.0, 0.0]])));
+        |map: &'static str| store.write(move |tx| Box::pin(walls::replace(tx, map, &[[0.0, 0.0, 4.0, 0.0]])));
     planting::plant(Some("a"));
     let refused = wall("a").await;
     assert!(matches!(&refused, Err(StoreError::NotPublished { map }) if map == "a"), "{refused:?}");
@@ -319,7 +319,7 @@ async fn a_model_that_cannot_be_read_is_quarantined_and_the_others_are_used() {
     let (store, task) = Catalogue::open(&config).await.unwrap();
     store.write(|tx| Box::pin(maps::create(tx, "a", DistanceKind::Both, 2))).await.unwrap();
     for name in ["sound", "bad"] {
-        let none = landmarks::Measures::default();
+        let none = landmarks::LandmarkGeometry::default();
         let made = store.write(move |tx| Box::pin(landmarks::create(tx, "a", name, none, 5))).await.unwrap();
         store_model(&store, made.id, &config.params).await;
     }
@@ -338,7 +338,7 @@ pub(crate) async fn refuse_runs(store: &Catalogue) {
     let trigger = "CREATE TRIGGER refuse BEFORE INSERT ON runs BEGIN SELECT RAISE(ABORT, 'planted'); END";
     let write = store.write(move |tx| {
         Box::pin(async move {
-            sqlx::raw_sql(trigger).execute(tx.conn()).await.map(drop).map_err(StoreError::at("plant"))
+            sqlx::raw_sql(trigger).execute(tx.conn()).await.map(drop).map_err(StoreError::during("plant"))
         })
     });
     write.await.unwrap();

@@ -1,5 +1,5 @@
-//! Visibility areas of a map's landmarks; taken over from a snapshot before where neither the camera, the landmark's place nor
-//! an obstacle within its reach has changed.
+//! Visibility areas of a map's landmarks. An area of an earlier snapshot is taken over where neither the camera, the landmark's
+//! place nor an obstacle within its reach has changed.
 
 use engine::snapshot::MapSnapshot;
 use map::{
@@ -11,7 +11,7 @@ use vision::model::LandmarkId;
 
 type Areas = BTreeMap<LandmarkId, Arc<VisibilityMap>>;
 
-/// The areas of all placed landmarks of `map`: those that it has, and those that it lacks.
+/// The visibility areas of all placed landmarks of `map`: those that it has, and new ones for the others.
 pub(super) fn areas(map: &MapSnapshot, before: Option<&MapSnapshot>) -> Areas {
     let is_missing = |id: &LandmarkId| !map.visibility.contains_key(id);
     let places: Vec<_> = map
@@ -22,28 +22,29 @@ pub(super) fn areas(map: &MapSnapshot, before: Option<&MapSnapshot>) -> Areas {
         .collect();
     let obstacles: Vec<Obstacle> = map.walls.iter().map(Obstacle::from).collect();
     let mut areas = map.visibility.clone();
-    areas.extend(all(&places, &obstacles, &map.sight, before));
+    areas.extend(all(&places, &obstacles, &map.visibility_settings, before));
     areas
 }
 
 fn all(
     places: &[(LandmarkId, LandmarkPlace)],
     obstacles: &[Obstacle],
-    sight: &VisibilitySettings,
+    settings: &VisibilitySettings,
     before: Option<&MapSnapshot>,
 ) -> Areas {
-    let before = before.filter(|before| before.sight == *sight);
-    let kept = |id: &LandmarkId, place: &LandmarkPlace| {
+    let before = before.filter(|before| before.visibility_settings == *settings);
+    let unchanged = |id: &LandmarkId, place: &LandmarkPlace| {
         let before = before?;
         let area = before.visibility.get(id)?;
         let same = before.landmarks.get(id)?.place.as_ref() == Some(place)
-            && within_reach(place, obstacles, &sight.viewer, &sight.seen) == area.obstacles();
+            && within_reach(place, obstacles, &settings.viewer, &settings.seen) == area.obstacles();
         same.then(|| area.clone())
     };
     let one = |(id, place): &(LandmarkId, LandmarkPlace)| {
-        let made = || visibility(place, obstacles, &sight.viewer, &sight.seen).map(Arc::new);
-        let area = kept(id, place).map_or_else(made, Ok);
-        let area = area.inspect_err(|error| tracing::error!(%error, landmark = id.0, "no visibility area"));
+        let made = || visibility(place, obstacles, &settings.viewer, &settings.seen).map(Arc::new);
+        let area = unchanged(id, place).map_or_else(made, Ok);
+        let area =
+            area.inspect_err(|error| tracing::error!(%error, landmark = id.0, "visibility_area_failed"));
         Some((*id, area.ok()?))
     };
     places.iter().filter_map(one).collect()

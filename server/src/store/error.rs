@@ -3,10 +3,10 @@
 /// Why a read or a write did not happen. Nothing was changed, except with [`StoreError::NotPublished`].
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum StoreError {
-    /// There is no such thing.
+    /// It does not exist.
     #[error("there is no {what} `{name}`")]
     NotFound {
-        /// Kind of thing.
+        /// Kind of the object.
         what: &'static str,
         /// The name asked for.
         name: String,
@@ -14,7 +14,7 @@ pub(crate) enum StoreError {
     /// The name is taken.
     #[error("{what} `{name}` exists already")]
     Exists {
-        /// Kind of thing.
+        /// Kind of the object.
         what: &'static str,
         /// The name.
         name: String,
@@ -30,7 +30,7 @@ pub(crate) enum StoreError {
     /// Something else rests on it.
     #[error("{0}")]
     InUse(String),
-    /// Maps cannot lie like that.
+    /// The map links are impossible.
     #[error(transparent)]
     Frames(#[from] map::map_links::MapLinkError),
     /// The disk is full; reading goes on.
@@ -39,22 +39,22 @@ pub(crate) enum StoreError {
     /// The write panicked: it was rolled back.
     #[error("the server failed on this write; nothing was changed")]
     Panicked,
-    /// The write is on the disk, but the map cannot be made ready with it: its previous version stays in use.
+    /// The write is on the disk, but the map cannot be published with it: its previous version stays in use.
     #[error("the change is stored, but map `{map}` cannot be made ready with it; see the server's log")]
     NotPublished {
         /// Name of the map.
         map: String,
     },
-    /// What a prepared write rested on has changed: prepare it again.
+    /// What a prepared write rests on has changed: it must be prepared again.
     #[error("it changed meanwhile")]
     Changed,
-    /// What a write rests on changed each time that it was prepared.
+    /// What a write rests on changed after each preparation.
     #[error("others change the same things at this moment; try again")]
     Busy,
     /// The writer has stopped: after an I/O error nothing may be written any more.
-    #[error("the store does not take writes any more")]
+    #[error("storage failed; the server stops: check the disk, then restart it")]
     Closed,
-    /// A stored row cannot be read as what it should be.
+    /// A stored row cannot be read.
     #[error("{what} is damaged: {reason}")]
     Damaged {
         /// Which row.
@@ -62,7 +62,7 @@ pub(crate) enum StoreError {
         /// What is wrong.
         reason: String,
     },
-    /// Anything else the database says, with the operation that met it.
+    /// Any other error of the database, with the operation that met it.
     #[error("{operation} failed")]
     Database {
         /// The operation.
@@ -85,14 +85,14 @@ fn primary_code(error: &sqlx::Error) -> Option<i32> {
 
 impl StoreError {
     /// Names the operation. For `map_err`.
-    pub(crate) fn at(operation: &'static str) -> impl FnOnce(sqlx::Error) -> Self {
+    pub(crate) fn during(operation: &'static str) -> impl FnOnce(sqlx::Error) -> Self {
         move |source| match primary_code(&source) {
             Some(SQLITE_FULL) => Self::Full,
             _ => Self::Database { operation, source },
         }
     }
 
-    /// Like [`StoreError::at`], for an insertion whose only unique constraint is the name.
+    /// Like [`StoreError::during`], for an insertion whose only unique constraint is the name.
     pub(crate) fn inserting(
         operation: &'static str,
         what: &'static str,
@@ -102,12 +102,12 @@ impl StoreError {
             sqlx::Error::Database(e) if e.is_unique_violation() => {
                 Self::Exists { what, name: name.to_owned() }
             }
-            _ => Self::at(operation)(source),
+            _ => Self::during(operation)(source),
         }
     }
 
-    /// The state on disk is unknown after this: an fsync that failed cannot be tried again, since the pages are then
-    /// marked clean. The only safe way on is to stop and to open again from disk.
+    /// Whether the state on disk is unknown after this. A failed fsync cannot be repeated, since it marks the pages clean. The
+    /// only safe way is to stop, and to open the file again.
     pub(crate) fn is_fatal(&self) -> bool {
         match self {
             Self::Database { source, .. } => {

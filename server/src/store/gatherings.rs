@@ -1,10 +1,10 @@
-//! What robots gather while they drive: who gathers for what, the tracks they brought home, and the views of each, until
-//! somebody decides on them (`accepting.rs`).
+//! Gatherings: which robot gathers views of what, its tracks, and the views of each track, until a person accepts or
+//! discards them (`track_acceptance.rs`).
 
 use super::{
     StoreError, Tx, landmarks, maps, now_ms, robots,
     statements::statements,
-    views::{self, Cut, NewView},
+    views::{self, NewView, QuadCrop},
     within,
 };
 use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
@@ -50,9 +50,9 @@ statements! {
     DROP_VIEWS = "DELETE FROM track_views WHERE gathering_id = ?1 AND track = ?2";
 }
 
-/// How much may be gathered.
+/// Bounds of gatherings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Bounds {
+pub(crate) struct GatheringLimits {
     /// Robots that gather at a time.
     pub(crate) open: usize,
     /// Gatherings of one map, ended ones included.
@@ -65,8 +65,8 @@ pub(crate) struct Bounds {
     pub(crate) bytes: usize,
 }
 
-impl Bounds {
-    /// Those of the server.
+impl GatheringLimits {
+    /// The bounds of the server.
     pub(crate) const SERVER: Self =
         Self { open: 32, of_map: 100, tracks: 64, views: map::tracks::MAX_TRACK_VIEWS, bytes: 256 << 20 };
 }
@@ -112,12 +112,12 @@ fn gathering_row(row: &SqliteRow) -> Result<GatheringRow, sqlx::Error> {
     })
 }
 
-/// One thing that was followed.
+/// A track: an object followed across frames.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct TrackRow {
     pub(crate) number: u32,
     pub(crate) landmark_id: Option<i64>,
-    /// Name of the landmark whose views these are.
+    /// Name of the landmark that the track shows.
     pub(crate) landmark: Option<String>,
     /// open, accepted, discarded.
     pub(crate) state: String,
@@ -132,8 +132,8 @@ pub(crate) struct TrackView {
     pub(crate) id: i64,
     pub(crate) image_sha256: views::Digest,
     pub(crate) size_px: [usize; 2],
-    pub(crate) cut: Cut,
-    /// JSON of a `placing::Capture`.
+    pub(crate) crop: QuadCrop,
+    /// JSON of a `landmark_placement::StoredCapture`.
     pub(crate) capture: Option<String>,
 }
 
@@ -141,12 +141,12 @@ fn unknown(what: &'static str, number: i64) -> StoreError {
     StoreError::NotFound { what, name: number.to_string() }
 }
 
-/// Begins to gather with a robot that stands on the map.
+/// Starts a gathering with a robot that is on the map.
 pub(crate) async fn create(
     tx: &mut Tx,
     map: &str,
     new: &NewGathering,
-    bounds: Bounds,
+    limits: GatheringLimits,
 ) -> Result<GatheringRow, StoreError> {
     let map = maps::get(&mut tx.conn, map).await?;
     let robot = robots::get(&mut tx.conn, &new.robot).await?;
@@ -171,16 +171,17 @@ pub(crate) async fn create(
             other => other,
         })?;
     let count = |sql| sqlx::query_scalar(sql);
-    let open = count(COUNT_OPEN).fetch_one(&mut tx.conn).await.map_err(StoreError::at("count gatherings"))?;
-    within(open, bounds.open, "robots that gather at a time")?;
+    let open =
+        count(COUNT_OPEN).fetch_one(&mut tx.conn).await.map_err(StoreError::during("count gatherings"))?;
+    within(open, limits.open, "robots that gather at a time")?;
     let of_map = count(COUNT).bind(map.id).fetch_one(&mut tx.conn).await;
-    within(of_map.map_err(StoreError::at("count gatherings"))?, bounds.of_map, "gatherings of a map")?;
+    within(of_map.map_err(StoreError::during("count gatherings"))?, limits.of_map, "gatherings of a map")?;
     get(&mut tx.conn, &map.name, id).await
 }
 
 /// One gathering of a map.
 pub(crate) async fn get(db: impl SqliteExecutor<'_>, map: &str, id: i64) -> Result<GatheringRow, StoreError> {
-    let at = || StoreError::at("read gathering");
+    let at = || StoreError::during("read gathering");
     let row = sqlx::query(GET).bind(map).bind(id).fetch_optional(db).await.map_err(at())?;
     gathering_row(&row.ok_or_else(|| unknown("gathering", id))?).map_err(at())
 }
@@ -192,19 +193,19 @@ pub(crate) async fn page(
     after: i64,
     limit: usize,
 ) -> Result<Vec<GatheringRow>, StoreError> {
-    let at = || StoreError::at("list gatherings");
+    let at = || StoreError::during("list gatherings");
     let rows = sqlx::query(PAGE).bind(map_id).bind(after).bind(limit as i64).fetch_all(db).await;
     rows.map_err(at())?.iter().map(gathering_row).collect::<Result<_, _>>().map_err(at())
 }
 
-/// Those that go on, for the start of the server.
+/// Open gatherings, for the start of the server.
 pub(crate) async fn open(db: impl SqliteExecutor<'_>) -> Result<Vec<GatheringRow>, StoreError> {
-    let at = || StoreError::at("list gatherings");
+    let at = || StoreError::during("list gatherings");
     let rows = sqlx::query(OPEN).fetch_all(db).await.map_err(at())?;
     rows.iter().map(gathering_row).collect::<Result<_, _>>().map_err(at())
 }
 
-/// Ends a gathering; its tracks wait for a decision. What is offered later is refused. One that has ended stays as it is.
+/// Ends a gathering; its tracks wait for a decision, and later views are refused. One that has ended stays as it is.
 pub(crate) async fn end(tx: &mut Tx, map: &str, id: i64, counts: &str) -> Result<GatheringRow, StoreError> {
     let row = get(&mut tx.conn, map, id).await?;
     if !row.open {
@@ -216,26 +217,30 @@ pub(crate) async fn end(tx: &mut Tx, map: &str, id: i64, counts: &str) -> Result
         .bind(now_ms())
         .execute(&mut tx.conn)
         .await
-        .map_err(StoreError::at("end gathering"))?;
+        .map_err(StoreError::during("end gathering"))?;
     get(&mut tx.conn, map, id).await
 }
 
-/// Throws a gathering away with all that nobody has accepted.
+/// Deletes a gathering with all tracks that were not accepted.
 pub(crate) async fn delete(tx: &mut Tx, map: &str, id: i64) -> Result<(), StoreError> {
     get(&mut tx.conn, map, id).await?;
-    sqlx::query(DELETE).bind(id).execute(&mut tx.conn).await.map_err(StoreError::at("delete gathering"))?;
+    sqlx::query(DELETE)
+        .bind(id)
+        .execute(&mut tx.conn)
+        .await
+        .map_err(StoreError::during("delete gathering"))?;
     Ok(())
 }
 
-/// Keeps a view. `InUse` when the gathering has ended.
+/// Stores a view of a track. Errors: `InUse` if the gathering has ended, `Limit` at a bound.
 pub(crate) async fn add_view(
     tx: &mut Tx,
     id: i64,
     track: &map::tracks::StoredTrack,
     new: &NewView,
-    bounds: Bounds,
+    limits: GatheringLimits,
 ) -> Result<(), StoreError> {
-    let at = || StoreError::at("keep view");
+    let at = || StoreError::during("store view of a track");
     let open: Option<bool> =
         sqlx::query_scalar(IS_OPEN).bind(id).fetch_optional(&mut tx.conn).await.map_err(at())?;
     if !open.ok_or_else(|| unknown("gathering", id))? {
@@ -254,7 +259,7 @@ pub(crate) async fn add_view(
         return Err(StoreError::InUse(format!("track {} is {state}", track.number)));
     }
     let tracks = sqlx::query_scalar(COUNT_TRACKS).bind(id).fetch_one(&mut tx.conn).await.map_err(at())?;
-    within(tracks, bounds.tracks, "tracks of a gathering")?;
+    within(tracks, limits.tracks, "tracks of a gathering")?;
     sqlx::query(INSERT_VIEW)
         .bind(id)
         .bind(track.number)
@@ -263,24 +268,24 @@ pub(crate) async fn add_view(
         .bind(&new.image)
         .bind(new.size_px[0] as i64)
         .bind(new.size_px[1] as i64)
-        .bind(views::corners_bytes(&new.cut.corners_px))
-        .bind(new.cut.icon.size as i64)
-        .bind(views::icon_bytes(&new.cut.icon))
-        .bind(new.cut.icon.source_scale)
+        .bind(views::corners_bytes(&new.crop.corners_px))
+        .bind(new.crop.icon.size as i64)
+        .bind(views::icon_bytes(&new.crop.icon))
+        .bind(new.crop.icon.source_scale)
         .bind(now_ms())
         .bind(&new.capture)
         .execute(&mut tx.conn)
         .await
         .map_err(at())?;
     let count = sqlx::query_scalar(COUNT_VIEWS).bind(id).bind(track.number).fetch_one(&mut tx.conn).await;
-    within(count.map_err(at())?, bounds.views, "views of a track")?;
+    within(count.map_err(at())?, limits.views, "views of a track")?;
     let bytes = sqlx::query_scalar(BYTES).bind(id).fetch_one(&mut tx.conn).await.map_err(at())?;
-    within(bytes, bounds.bytes, "bytes of a gathering")
+    within(bytes, limits.bytes, "bytes of a gathering")
 }
 
 /// The tracks of a gathering by number, decided ones included.
 pub(crate) async fn tracks(db: impl SqliteExecutor<'_>, id: i64) -> Result<Vec<TrackRow>, StoreError> {
-    let at = || StoreError::at("list tracks");
+    let at = || StoreError::during("list tracks");
     let rows = sqlx::query(TRACKS).bind(id).fetch_all(db).await.map_err(at())?;
     let track = |row: &SqliteRow| {
         Ok(TrackRow {
@@ -303,13 +308,13 @@ pub(crate) async fn track(db: impl SqliteExecutor<'_>, id: i64, number: u32) -> 
     found.ok_or_else(|| unknown("track", i64::from(number)))
 }
 
-/// The views of a track in the order they were kept.
+/// The views of a track, oldest first.
 pub(crate) async fn track_views(
     db: impl SqliteExecutor<'_>,
     id: i64,
     number: u32,
 ) -> Result<Vec<TrackView>, StoreError> {
-    let at = || StoreError::at("read views of a track");
+    let at = || StoreError::during("read views of a track");
     let rows = sqlx::query(VIEWS).bind(id).bind(number).fetch_all(db).await.map_err(at())?;
     let view = |row: &SqliteRow| {
         let pixels = |column: &str| row.try_get::<i64, _>(column).map(|s| s as usize).map_err(at());
@@ -317,22 +322,22 @@ pub(crate) async fn track_views(
             id: row.try_get("id").map_err(at())?,
             image_sha256: views::digest_of(row)?,
             size_px: [pixels("width_px")?, pixels("height_px")?],
-            cut: views::cut_of(row)?,
+            crop: views::crop_of(row)?,
             capture: row.try_get("capture").map_err(at())?,
         })
     };
     rows.iter().map(view).collect()
 }
 
-/// Throws a track away.
+/// Discards a track: deletes its views.
 pub(crate) async fn discard(tx: &mut Tx, map: &str, id: i64, number: u32) -> Result<(), StoreError> {
     get(&mut tx.conn, map, id).await?;
     let done = sqlx::query(DISCARD).bind(id).bind(number).execute(&mut tx.conn).await;
-    if done.map_err(StoreError::at("discard track"))?.rows_affected() == 0 {
+    if done.map_err(StoreError::during("discard track"))?.rows_affected() == 0 {
         return Err(unknown("track", i64::from(number)));
     }
     let dropped = sqlx::query(DROP_VIEWS).bind(id).bind(number).execute(&mut tx.conn).await;
-    dropped.map_err(StoreError::at("discard track")).map(drop)
+    dropped.map_err(StoreError::during("discard track")).map(drop)
 }
 
 #[cfg(test)]

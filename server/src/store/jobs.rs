@@ -1,6 +1,6 @@
-//! Jobs as rows: what was accepted survives a crash and is run again.
+//! Jobs as rows: an accepted job survives a crash and is run again.
 
-use super::{Change, StoreError, Tx, maps, now_ms, statements::statements, within};
+use super::{CommittedChange, StoreError, Tx, maps, now_ms, statements::statements, within};
 use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 
 statements! {
@@ -14,7 +14,7 @@ statements! {
     PUT_BACK = "UPDATE jobs SET state = 'queued', attempts = attempts - 1 WHERE id = ?1 AND state = 'running'";
     END = "UPDATE jobs SET state = ?2, message = ?3, result = ?4, ended_ms = ?5 \
            WHERE id = ?1 AND state IN ('queued', 'running')";
-    FORGET = "DELETE FROM jobs WHERE ended_ms IS NOT NULL AND id NOT IN \
+    DELETE_OLD = "DELETE FROM jobs WHERE ended_ms IS NOT NULL AND id NOT IN \
               (SELECT id FROM jobs WHERE ended_ms IS NOT NULL ORDER BY id DESC LIMIT ?1)";
 }
 
@@ -59,20 +59,20 @@ fn job_row(row: &SqliteRow) -> Result<JobRow, sqlx::Error> {
     })
 }
 
-/// Queues a job and forgets the oldest finished ones beyond `kept`.
+/// Queues a job and deletes the oldest finished ones beyond `retained`. Errors: more than `max` open jobs.
 pub(crate) async fn create(
     tx: &mut Tx,
     kind: &'static str,
     map: &str,
     request: &str,
-    (max, kept): (usize, usize),
+    (max, retained): (usize, usize),
 ) -> Result<JobRow, StoreError> {
     maps::get(&mut tx.conn, map).await?;
-    sqlx::query(FORGET)
-        .bind(kept as i64)
+    sqlx::query(DELETE_OLD)
+        .bind(retained as i64)
         .execute(&mut tx.conn)
         .await
-        .map_err(StoreError::at("forget jobs"))?;
+        .map_err(StoreError::during("delete old jobs"))?;
     let id = sqlx::query_scalar(INSERT)
         .bind(kind)
         .bind(map)
@@ -80,11 +80,13 @@ pub(crate) async fn create(
         .bind(now_ms())
         .fetch_one(&mut tx.conn)
         .await;
-    let id = id.map_err(StoreError::at("queue job"))?;
-    let open =
-        sqlx::query_scalar(COUNT_OPEN).fetch_one(&mut tx.conn).await.map_err(StoreError::at("count jobs"))?;
+    let id = id.map_err(StoreError::during("queue job"))?;
+    let open = sqlx::query_scalar(COUNT_OPEN)
+        .fetch_one(&mut tx.conn)
+        .await
+        .map_err(StoreError::during("count jobs"))?;
     within(open, max, "jobs waiting or running")?;
-    tx.changed(Change::Jobs);
+    tx.changed(CommittedChange::Jobs);
     Ok(JobRow {
         id,
         kind: kind.to_owned(),
@@ -99,27 +101,27 @@ pub(crate) async fn create(
 
 /// One job.
 pub(crate) async fn get(db: impl SqliteExecutor<'_>, id: i64) -> Result<JobRow, StoreError> {
-    let row = sqlx::query(GET).bind(id).fetch_optional(db).await.map_err(StoreError::at("read job"))?;
+    let row = sqlx::query(GET).bind(id).fetch_optional(db).await.map_err(StoreError::during("read job"))?;
     let row = row.ok_or_else(|| StoreError::NotFound { what: "job", name: id.to_string() })?;
-    job_row(&row).map_err(StoreError::at("read job"))
+    job_row(&row).map_err(StoreError::during("read job"))
 }
 
 /// Jobs not ended, oldest first.
 pub(crate) async fn open(db: impl SqliteExecutor<'_>) -> Result<Vec<JobRow>, StoreError> {
-    let rows = sqlx::query(OPEN).fetch_all(db).await.map_err(StoreError::at("list jobs"))?;
-    rows.iter().map(job_row).collect::<Result<_, _>>().map_err(StoreError::at("list jobs"))
+    let rows = sqlx::query(OPEN).fetch_all(db).await.map_err(StoreError::during("list jobs"))?;
+    rows.iter().map(job_row).collect::<Result<_, _>>().map_err(StoreError::during("list jobs"))
 }
 
 /// Begins with an open job and counts the attempt. False when it has ended meanwhile.
 pub(crate) async fn begin(tx: &mut Tx, id: i64) -> Result<bool, StoreError> {
     let done = sqlx::query(BEGIN).bind(id).execute(&mut tx.conn).await;
-    Ok(done.map_err(StoreError::at("begin job"))?.rows_affected() == 1)
+    Ok(done.map_err(StoreError::during("begin job"))?.rows_affected() == 1)
 }
 
-/// A job that was begun waits again, as if it had not been: the server stops.
+/// Puts a running job back into the queue without an attempt, because the server stops.
 pub(crate) async fn put_back(tx: &mut Tx, id: i64) -> Result<(), StoreError> {
     let done = sqlx::query(PUT_BACK).bind(id).execute(&mut tx.conn).await;
-    done.map_err(StoreError::at("put job back")).map(drop)
+    done.map_err(StoreError::during("put job back")).map(drop)
 }
 
 /// Ends a job. False when it had ended already; then nothing changed.
@@ -132,6 +134,6 @@ pub(crate) async fn end(tx: &mut Tx, id: i64, ended: &Ended) -> Result<bool, Sto
         .bind(now_ms())
         .execute(&mut tx.conn)
         .await
-        .map_err(StoreError::at("end job"))?;
+        .map_err(StoreError::during("end job"))?;
     Ok(done.rows_affected() == 1)
 }

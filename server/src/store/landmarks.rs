@@ -28,38 +28,38 @@ statements! {
     INSERT = "INSERT INTO landmarks (map_id, name, created_ms) VALUES (?1, ?2, ?3) RETURNING id";
     GET = select!("JOIN maps ON maps.id = l.map_id WHERE maps.name = ?1 AND l.name = ?2");
     PAGE = select!("WHERE l.map_id = ?1 AND l.name > ?2 ORDER BY l.name LIMIT ?3");
-    STANDING = "UPDATE landmarks SET health = ?2, finding = ?3 WHERE id = ?1";
+    SET_HEALTH = "UPDATE landmarks SET health = ?2, finding = ?3 WHERE id = ?1";
     UPDATE = "UPDATE landmarks SET width_m = ?2, height_m = ?3, x_m = ?4, y_m = ?5, z_m = ?6, theta_rad = ?7, \
               roll_rad = ?8, tilt_rad = ?9, place_covariance = ?10, size_from_views = ?11 WHERE id = ?1";
     DELETE = "DELETE FROM landmarks WHERE id = ?1";
 }
 
-/// Centre of a landmark in the map and the direction of its outward normal.
+/// The place of a landmark, as it is stored: centre (map frame, m) and direction of the outward normal (rad).
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Place {
+pub(crate) struct StoredPlace {
     pub(crate) x_m: f64,
     pub(crate) y_m: f64,
     pub(crate) z_m: f64,
     pub(crate) theta_rad: f64,
-    /// Turn about the normal.
+    /// Turn about the normal, rad.
     pub(crate) roll_rad: f64,
-    /// Turn of the normal downwards.
+    /// Turn of the normal downwards, rad.
     pub(crate) tilt_rad: f64,
-    /// Over (x, y, theta, z, width, height); `None` for a place by hand.
+    /// Over (x, y, theta, z, width, height), m and rad; `None` for a place by hand.
     pub(crate) covariance: Option<Matrix6<f64>>,
 }
 
-/// What of a landmark can be set by hand, or is found from its views.
+/// Size and place of a landmark, set by hand or found from its views.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(crate) struct Measures {
+pub(crate) struct LandmarkGeometry {
     pub(crate) size: Option<LandmarkSize>,
-    pub(crate) place: Option<Place>,
-    /// The size was found with the place.
+    pub(crate) place: Option<StoredPlace>,
+    /// The size was found with the place, from views.
     pub(crate) size_from_views: bool,
 }
 
-impl Measures {
-    /// The place with its covariance. `None` without a size, or where numbers of a file from elsewhere are out of range.
+impl LandmarkGeometry {
+    /// The place with its covariance. `None` without a size, or where stored numbers are out of range.
     pub(crate) fn landmark_place(&self) -> Option<LandmarkPlace> {
         let (size, place) = self.size.zip(self.place)?;
         let centre = Vector3::new(place.x_m, place.y_m, place.z_m);
@@ -71,14 +71,14 @@ impl Measures {
     }
 }
 
-/// What was learnt, in brief.
+/// Summary of a model.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct ModelSummary {
-    /// Fit to be matched.
+    /// The model passed all quality gates.
     pub(crate) active: bool,
-    /// JSON list of what keeps it from being active.
+    /// JSON list of the failed quality gates.
     pub(crate) reasons: String,
-    /// JSON object: thresholds and figures of the learning.
+    /// JSON object: thresholds and figures of the model.
     pub(crate) facts: String,
     pub(crate) views: u64,
     pub(crate) generated_views: u64,
@@ -90,25 +90,25 @@ pub(crate) struct ModelSummary {
 pub(crate) struct LandmarkRow {
     pub(crate) id: i64,
     pub(crate) name: String,
-    pub(crate) measures: Measures,
+    pub(crate) geometry: LandmarkGeometry,
     pub(crate) views: u64,
     pub(crate) model: Option<ModelSummary>,
-    pub(crate) standing: LandmarkHealth,
-    /// JSON: what speaks against it.
+    pub(crate) health: LandmarkHealth,
+    /// JSON: the finding that led to this health.
     pub(crate) finding: Option<String>,
 }
 
-/// The word for a health in the database.
-fn word(standing: LandmarkHealth) -> &'static str {
-    match standing {
+/// The word for a landmark's health in the database.
+fn health_word(health: LandmarkHealth) -> &'static str {
+    match health {
         LandmarkHealth::Sound => "sound",
         LandmarkHealth::Flagged => "flagged",
         LandmarkHealth::Quarantined => "quarantined",
     }
 }
 
-/// The health behind a word; an unknown one (a file from elsewhere) is the most careful.
-pub(super) fn standing_of(word: &str) -> LandmarkHealth {
+/// The health for a word; an unknown word (a file of another program) means quarantined.
+pub(super) fn health_of(word: &str) -> LandmarkHealth {
     match word {
         "sound" => LandmarkHealth::Sound,
         "flagged" => LandmarkHealth::Flagged,
@@ -116,16 +116,16 @@ pub(super) fn standing_of(word: &str) -> LandmarkHealth {
     }
 }
 
-pub(super) fn measures(row: &SqliteRow) -> Result<Measures, sqlx::Error> {
+pub(super) fn geometry(row: &SqliteRow) -> Result<LandmarkGeometry, sqlx::Error> {
     let real = |column: &str| row.try_get::<Option<f64>, _>(column);
     let size = real("width_m")?.zip(real("height_m")?);
     let (xy, zt) = (real("x_m")?.zip(real("y_m")?), real("z_m")?.zip(real("theta_rad")?));
     let (roll_rad, tilt_rad) = (real("roll_rad")?.unwrap_or(0.0), real("tilt_rad")?.unwrap_or(0.0));
     let covariance: Option<Vec<u8>> = row.try_get("place_covariance")?;
     let covariance = covariance.as_deref().and_then(covariance_of);
-    Ok(Measures {
+    Ok(LandmarkGeometry {
         size: size.map(|(width_m, height_m)| LandmarkSize { width_m, height_m }),
-        place: xy.zip(zt).map(|((x_m, y_m), (z_m, theta_rad))| Place {
+        place: xy.zip(zt).map(|((x_m, y_m), (z_m, theta_rad))| StoredPlace {
             x_m,
             y_m,
             z_m,
@@ -148,8 +148,8 @@ fn covariance_bytes(covariance: &Matrix6<f64>) -> Vec<u8> {
     covariance.transpose().iter().flat_map(|v| v.to_le_bytes()).collect()
 }
 
-async fn set(tx: &mut Tx, id: i64, measures: &Measures) -> Result<(), StoreError> {
-    let (size, place) = (measures.size, measures.place);
+async fn set_geometry(tx: &mut Tx, id: i64, geometry: &LandmarkGeometry) -> Result<(), StoreError> {
+    let (size, place) = (geometry.size, geometry.place);
     sqlx::query(UPDATE)
         .bind(id)
         .bind(size.map(|s| s.width_m))
@@ -161,10 +161,10 @@ async fn set(tx: &mut Tx, id: i64, measures: &Measures) -> Result<(), StoreError
         .bind(place.map(|p| p.roll_rad))
         .bind(place.map(|p| p.tilt_rad))
         .bind(place.and_then(|p| p.covariance).map(|c| covariance_bytes(&c)))
-        .bind(size.map(|_| measures.size_from_views))
+        .bind(size.map(|_| geometry.size_from_views))
         .execute(&mut tx.conn)
         .await
-        .map_err(StoreError::at("measure landmark"))?;
+        .map_err(StoreError::during("measure landmark"))?;
     Ok(())
 }
 
@@ -184,10 +184,10 @@ fn landmark_row(row: &SqliteRow) -> Result<LandmarkRow, sqlx::Error> {
     Ok(LandmarkRow {
         id: row.try_get("id")?,
         name: row.try_get("name")?,
-        measures: measures(row)?,
+        geometry: geometry(row)?,
         views: row.try_get::<i64, _>("views")? as u64,
         model,
-        standing: standing_of(&row.try_get::<String, _>("health")?),
+        health: health_of(&row.try_get::<String, _>("health")?),
         finding: row.try_get("finding")?,
     })
 }
@@ -198,7 +198,7 @@ pub(crate) async fn create(
     tx: &mut Tx,
     map: &str,
     name: &str,
-    measures: Measures,
+    geometry: LandmarkGeometry,
     max: usize,
 ) -> Result<LandmarkRow, StoreError> {
     let map = maps::get(&mut tx.conn, map).await?;
@@ -213,17 +213,17 @@ pub(crate) async fn create(
         .bind(map.id)
         .fetch_one(&mut tx.conn)
         .await
-        .map_err(StoreError::at("count landmarks"))?;
+        .map_err(StoreError::during("count landmarks"))?;
     within(count, max, "landmarks in a map")?;
-    set(tx, id, &measures).await?;
+    set_geometry(tx, id, &geometry).await?;
     maps::bump(tx, map.id).await?;
     Ok(LandmarkRow {
         id,
         name: name.to_owned(),
-        measures,
+        geometry,
         views: 0,
         model: None,
-        standing: LandmarkHealth::Sound,
+        health: LandmarkHealth::Sound,
         finding: None,
     })
 }
@@ -239,9 +239,9 @@ pub(crate) async fn get(
         .bind(name)
         .fetch_optional(db)
         .await
-        .map_err(StoreError::at("read landmark"))?;
+        .map_err(StoreError::during("read landmark"))?;
     let row = row.ok_or_else(|| StoreError::NotFound { what: "landmark", name: name.to_owned() })?;
-    landmark_row(&row).map_err(StoreError::at("read landmark"))
+    landmark_row(&row).map_err(StoreError::during("read landmark"))
 }
 
 /// Landmarks of a map with names after `after`, in order.
@@ -252,52 +252,51 @@ pub(crate) async fn page(
     limit: usize,
 ) -> Result<Vec<LandmarkRow>, StoreError> {
     let rows = sqlx::query(PAGE).bind(map_id).bind(after).bind(limit as i64).fetch_all(db).await;
-    let rows = rows.map_err(StoreError::at("list landmarks"))?;
-    rows.iter().map(landmark_row).collect::<Result<_, _>>().map_err(StoreError::at("list landmarks"))
+    let rows = rows.map_err(StoreError::during("list landmarks"))?;
+    rows.iter().map(landmark_row).collect::<Result<_, _>>().map_err(StoreError::during("list landmarks"))
 }
 
-/// Sets how far a landmark is trusted, and why; by a person, or by what robots found. A place or size that is set anew
-/// is trusted again by [`update`].
-pub(crate) async fn set_standing(
+/// Sets a landmark's health and its finding, by a person or by robots. A new place or size makes it sound again ([`update`]).
+pub(crate) async fn set_health(
     tx: &mut Tx,
     map: &str,
     name: &str,
-    standing: LandmarkHealth,
+    health: LandmarkHealth,
     finding: Option<&str>,
 ) -> Result<LandmarkRow, StoreError> {
     let map = maps::get(&mut tx.conn, map).await?;
     let mut landmark = get(&mut tx.conn, &map.name, name).await?;
-    (landmark.standing, landmark.finding) = (standing, finding.map(str::to_owned));
-    sqlx::query(STANDING)
+    (landmark.health, landmark.finding) = (health, finding.map(str::to_owned));
+    sqlx::query(SET_HEALTH)
         .bind(landmark.id)
-        .bind(word(standing))
+        .bind(health_word(health))
         .bind(finding)
         .execute(&mut tx.conn)
         .await
-        .map_err(StoreError::at("set health"))?;
+        .map_err(StoreError::during("set landmark health"))?;
     maps::bump(tx, map.id).await?;
     Ok(landmark)
 }
 
-/// Sets size and place. `change` gets the present values and returns the new ones or why not.
+/// Sets size and place. `change` gets the present geometry and returns the new one.
 pub(crate) async fn update(
     tx: &mut Tx,
     map: &str,
     name: &str,
-    change: impl FnOnce(Measures) -> Measures + Send,
+    change: impl FnOnce(LandmarkGeometry) -> LandmarkGeometry + Send,
 ) -> Result<LandmarkRow, StoreError> {
     let map = maps::get(&mut tx.conn, map).await?;
     let mut landmark = get(&mut tx.conn, &map.name, name).await?;
-    let old = landmark.measures;
-    landmark.measures = change(old);
-    if landmark.measures != old && landmark.standing != LandmarkHealth::Sound {
-        // What was found out was about another place.
+    let old = landmark.geometry;
+    landmark.geometry = change(old);
+    if landmark.geometry != old && landmark.health != LandmarkHealth::Sound {
+        // The finding was about another place.
         landmark = LandmarkRow {
-            measures: landmark.measures,
-            ..set_standing(tx, &map.name, name, LandmarkHealth::Sound, None).await?
+            geometry: landmark.geometry,
+            ..set_health(tx, &map.name, name, LandmarkHealth::Sound, None).await?
         };
     }
-    set(tx, landmark.id, &landmark.measures).await?;
+    set_geometry(tx, landmark.id, &landmark.geometry).await?;
     maps::bump(tx, map.id).await?;
     Ok(landmark)
 }
@@ -310,6 +309,6 @@ pub(crate) async fn delete(tx: &mut Tx, map: &str, name: &str) -> Result<(), Sto
         .bind(landmark.id)
         .execute(&mut tx.conn)
         .await
-        .map_err(StoreError::at("delete landmark"))?;
+        .map_err(StoreError::during("delete landmark"))?;
     maps::bump(tx, map.id).await
 }

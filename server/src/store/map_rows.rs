@@ -1,6 +1,6 @@
-//! What a version of a map is made of, row by row: the map itself and its landmarks.
+//! The rows that a version of a map is made of: the map itself and its landmarks.
 
-use super::{StoreError, landmarks, maps, sights, statements::statements};
+use super::{StoreError, landmarks, maps, statements::statements, visibility_settings};
 use map::{landmark_health::LandmarkHealth, visibility::VisibilitySettings};
 use sqlx::{Row, SqliteConnection};
 use vision::{model::LandmarkId, recognise::DistanceKind};
@@ -20,7 +20,7 @@ pub(crate) struct MapHead {
     pub(crate) version: u64,
     pub(crate) distance: DistanceKind,
     /// Camera and limits of its visibility areas.
-    pub(crate) sight: VisibilitySettings,
+    pub(crate) visibility_settings: VisibilitySettings,
     /// Counts up whenever the walls are replaced.
     pub(crate) walls_version: i64,
 }
@@ -30,30 +30,37 @@ pub(crate) struct MapHead {
 pub(crate) struct LandmarkHead {
     pub(crate) id: LandmarkId,
     pub(crate) name: String,
-    pub(crate) measures: landmarks::Measures,
-    pub(crate) standing: LandmarkHealth,
+    pub(crate) geometry: landmarks::LandmarkGeometry,
+    pub(crate) health: LandmarkHealth,
 }
 
 /// Numbers of all maps.
 pub(crate) async fn ids(conn: &mut SqliteConnection) -> Result<Vec<i64>, StoreError> {
-    sqlx::query_scalar(MAP_IDS).fetch_all(conn).await.map_err(StoreError::at("list maps"))
+    sqlx::query_scalar(MAP_IDS).fetch_all(conn).await.map_err(StoreError::during("list maps"))
 }
 
 /// The name of a map.
 pub(crate) async fn name(conn: &mut SqliteConnection, id: i64) -> Result<String, StoreError> {
-    sqlx::query_scalar(NAME).bind(id).fetch_one(conn).await.map_err(StoreError::at("read the name of a map"))
+    sqlx::query_scalar(NAME)
+        .bind(id)
+        .fetch_one(conn)
+        .await
+        .map_err(StoreError::during("read the name of a map"))
 }
 
 /// The map with this number; `None` if it is gone.
 pub(crate) async fn head(conn: &mut SqliteConnection, id: i64) -> Result<Option<MapHead>, StoreError> {
-    let at = || StoreError::at("read map");
+    let at = || StoreError::during("read map");
     let row = sqlx::query(MAP).bind(id).fetch_optional(conn).await.map_err(at())?;
     let Some(row) = row else { return Ok(None) };
     let name: String = row.try_get("name").map_err(at())?;
     Ok(Some(MapHead {
         version: row.try_get::<i64, _>("version").map_err(at())? as u64,
         distance: maps::distance_of(&row.try_get::<String, _>("distance").map_err(at())?),
-        sight: sights::read(&name, row.try_get::<Option<&str>, _>("sight").map_err(at())?),
+        visibility_settings: visibility_settings::read(
+            &name,
+            row.try_get::<Option<&str>, _>("sight").map_err(at())?,
+        ),
         walls_version: row.try_get("walls_version").map_err(at())?,
         name,
     }))
@@ -61,14 +68,14 @@ pub(crate) async fn head(conn: &mut SqliteConnection, id: i64) -> Result<Option<
 
 /// Its landmarks by rising number.
 pub(crate) async fn landmarks(conn: &mut SqliteConnection, id: i64) -> Result<Vec<LandmarkHead>, StoreError> {
-    let at = || StoreError::at("read landmarks of a map");
+    let at = || StoreError::during("read landmarks of a map");
     let rows = sqlx::query(LANDMARKS).bind(id).fetch_all(conn).await.map_err(at())?;
     let head = |row: &sqlx::sqlite::SqliteRow| {
         Ok(LandmarkHead {
             id: LandmarkId(row.try_get::<i64, _>("id")? as u64),
             name: row.try_get("name")?,
-            measures: landmarks::measures(row)?,
-            standing: landmarks::standing_of(row.try_get("health")?),
+            geometry: landmarks::geometry(row)?,
+            health: landmarks::health_of(row.try_get("health")?),
         })
     };
     rows.iter().map(head).collect::<Result<_, _>>().map_err(at())

@@ -1,6 +1,6 @@
 //! Maps: named, versioned, with the distance that decides.
 
-use super::{Change, StoreError, Tx, now_ms, statements::statements, within};
+use super::{CommittedChange, StoreError, Tx, now_ms, statements::statements, within};
 use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 use vision::recognise::DistanceKind;
 
@@ -71,17 +71,17 @@ pub(crate) async fn create(
         .await
         .map_err(StoreError::inserting("create map", "map", name))?;
     let count =
-        sqlx::query_scalar(COUNT).fetch_one(&mut tx.conn).await.map_err(StoreError::at("count maps"))?;
+        sqlx::query_scalar(COUNT).fetch_one(&mut tx.conn).await.map_err(StoreError::during("count maps"))?;
     within(count, max, "maps")?;
-    tx.changed(Change::Map(id));
+    tx.changed(CommittedChange::Map(id));
     Ok(MapRow { id, name: name.to_owned(), version: 1, distance, landmarks: 0 })
 }
 
 /// One map by name.
 pub(crate) async fn get(db: impl SqliteExecutor<'_>, name: &str) -> Result<MapRow, StoreError> {
-    let row = sqlx::query(GET).bind(name).fetch_optional(db).await.map_err(StoreError::at("read map"))?;
+    let row = sqlx::query(GET).bind(name).fetch_optional(db).await.map_err(StoreError::during("read map"))?;
     let row = row.ok_or_else(|| StoreError::NotFound { what: "map", name: name.to_owned() })?;
-    map_row(&row).map_err(StoreError::at("read map"))
+    map_row(&row).map_err(StoreError::during("read map"))
 }
 
 /// The same inside a write.
@@ -96,31 +96,35 @@ pub(crate) async fn page(
     limit: usize,
 ) -> Result<Vec<MapRow>, StoreError> {
     let rows = sqlx::query(PAGE).bind(after).bind(limit as i64).fetch_all(db).await;
-    let rows = rows.map_err(StoreError::at("list maps"))?;
-    rows.iter().map(map_row).collect::<Result<_, _>>().map_err(StoreError::at("list maps"))
+    let rows = rows.map_err(StoreError::during("list maps"))?;
+    rows.iter().map(map_row).collect::<Result<_, _>>().map_err(StoreError::during("list maps"))
 }
 
-/// The same map, if it was not deleted meanwhile, nor replaced by another of the same name.
-pub(crate) async fn still(tx: &mut Tx, map: MapRow) -> Result<MapRow, StoreError> {
+/// Checks that a map was not deleted meanwhile, nor replaced by another of the same name; gives its present row.
+pub(crate) async fn recheck(tx: &mut Tx, map: MapRow) -> Result<MapRow, StoreError> {
     let now = get(&mut tx.conn, &map.name).await?;
     if now.id == map.id { Ok(now) } else { Err(StoreError::NotFound { what: "map", name: map.name }) }
 }
 
 /// The map's content has changed: a new version, published after the commit.
 pub(crate) async fn bump(tx: &mut Tx, id: i64) -> Result<(), StoreError> {
-    sqlx::query(BUMP).bind(id).execute(&mut tx.conn).await.map_err(StoreError::at("count map version"))?;
-    tx.changed(Change::Map(id));
+    sqlx::query(BUMP)
+        .bind(id)
+        .execute(&mut tx.conn)
+        .await
+        .map_err(StoreError::during("count map version"))?;
+    tx.changed(CommittedChange::Map(id));
     Ok(())
 }
 
-/// Deletes a map and all that is in it. Refused while a robot stands on it, or another map lies in it.
+/// Deletes a map and all that is in it. Errors: `InUse` while a robot is on it, or another map is linked to it.
 pub(crate) async fn delete(tx: &mut Tx, name: &str) -> Result<(), StoreError> {
     let map = get(&mut tx.conn, name).await?;
     let robot: Option<String> = sqlx::query_scalar(ROBOT_ON)
         .bind(map.id)
         .fetch_optional(&mut tx.conn)
         .await
-        .map_err(StoreError::at("look for robots"))?;
+        .map_err(StoreError::during("look for robots"))?;
     if let Some(robot) = robot {
         return Err(StoreError::InUse(format!("robot `{robot}` stands on map `{name}`")));
     }
@@ -128,12 +132,12 @@ pub(crate) async fn delete(tx: &mut Tx, name: &str) -> Result<(), StoreError> {
         .bind(map.id)
         .fetch_optional(&mut tx.conn)
         .await
-        .map_err(StoreError::at("look for maps in it"))?;
+        .map_err(StoreError::during("look for maps in it"))?;
     if let Some(inner) = inner {
         return Err(StoreError::InUse(format!("map `{inner}` lies in map `{name}`")));
     }
-    sqlx::query(DELETE).bind(map.id).execute(&mut tx.conn).await.map_err(StoreError::at("delete map"))?;
-    tx.changed(Change::MapRemoved(map.name));
-    tx.changed(Change::Links);
+    sqlx::query(DELETE).bind(map.id).execute(&mut tx.conn).await.map_err(StoreError::during("delete map"))?;
+    tx.changed(CommittedChange::MapRemoved(map.name));
+    tx.changed(CommittedChange::Links);
     Ok(())
 }

@@ -1,8 +1,8 @@
 //! Everything durable, in one SQLite file: maps, landmarks, views, models, walls, robots, jobs.
 //!
 //! One task owns the only connection that writes ([`writer`]); reads take a separate, read-only pool. Every SQL text
-//! is a constant of its file and is prepared by a test against the migrated schema. What a commit makes visible is told to
-//! one listener ([`on_commit`]), which the store knows by its trait alone.
+//! is a constant of its file and is prepared by a test against the migrated schema. One listener learns of every commit
+//! ([`on_commit`]); the store knows it by its trait alone.
 
 mod error;
 mod migrations;
@@ -12,22 +12,22 @@ mod statements;
 pub(crate) mod map_rows;
 pub(crate) mod on_commit;
 pub(crate) mod maps;
-pub(crate) mod sites;
+pub(crate) mod map_locations;
 pub(crate) mod landmarks;
 pub(crate) mod views;
 pub(crate) mod models;
-pub(crate) mod laser;
-pub(crate) mod placing;
+pub(crate) mod walls;
+pub(crate) mod landmark_placement;
 pub(crate) mod teaching;
 pub(crate) mod gatherings;
-pub(crate) mod accepting;
-pub(crate) mod areas;
-pub(crate) mod sights;
+pub(crate) mod track_acceptance;
+pub(crate) mod modality_stats;
+pub(crate) mod visibility_settings;
 pub(crate) mod robots;
 pub(crate) mod jobs;
 
 pub(crate) use error::StoreError;
-pub(crate) use on_commit::{Change, OnCommit};
+pub(crate) use on_commit::{CommittedChange, OnCommit};
 pub(crate) use open::OpenError;
 pub(crate) use writer::{PART as WRITER, Tx};
 
@@ -49,7 +49,7 @@ pub(crate) struct Store {
     turn: Arc<Mutex<()>>,
 }
 
-/// What must be awaited for the file to be closed in good order.
+/// Awaited so that the file is closed in good order.
 #[derive(Debug)]
 pub(crate) struct WriterTask {
     task: tokio::task::JoinHandle<()>,
@@ -114,12 +114,12 @@ impl Store {
         answer.map_err(|_gone| StoreError::Closed)?
     }
 
-    /// The turn to prepare a write from what is stored: one at a time, so that they do not undo each other's work.
+    /// The turn to prepare a write from stored data: one at a time, so that no preparation makes another obsolete.
     async fn preparing(&self) -> MutexGuard<'_, ()> {
         self.turn.lock().await
     }
 
-    /// Returns when a job was queued since the last time. For one who waits.
+    /// Returns when a job was queued since the last call.
     pub(crate) async fn job_queued(&self) {
         self.jobs.notified().await;
     }

@@ -1,4 +1,4 @@
-//! Learnt models as bytes with their digest. What they mean is not known here.
+//! Models as bytes with their digest. The store does not interpret them.
 
 use super::{StoreError, Tx, landmarks::ModelSummary, statements::statements};
 use sha2::{Digest as _, Sha256};
@@ -18,7 +18,7 @@ statements! {
                WHERE l.map_id = ?1 ORDER BY m.landmark_id";
     REPLACE = "UPDATE models SET model = ?3, sha256 = ?4, facts = json_set(facts, '$.points', ?5) \
                WHERE landmark_id = ?1 AND sha256 = ?2";
-    POINTS_NOT_ASKED = "SELECT m.landmark_id FROM models m JOIN landmarks l ON l.id = m.landmark_id \
+    WITHOUT_POINTS_JOB = "SELECT m.landmark_id FROM models m JOIN landmarks l ON l.id = m.landmark_id \
                         WHERE l.map_id = ?1 AND m.points_asked = 0 \
                         AND EXISTS (SELECT 1 FROM views v WHERE v.landmark_id = m.landmark_id)";
     ASK_POINTS = "UPDATE models SET points_asked = 1 WHERE landmark_id = ?1";
@@ -58,7 +58,7 @@ pub(crate) async fn put(tx: &mut Tx, map_id: i64, new: &NewModel) -> Result<bool
         .bind(map_id)
         .execute(&mut tx.conn)
         .await
-        .map_err(StoreError::at("store model"))?;
+        .map_err(StoreError::during("store model"))?;
     Ok(done.rows_affected() == 1)
 }
 
@@ -78,7 +78,7 @@ pub(crate) async fn replace(
         .bind(points as i64)
         .execute(&mut tx.conn)
         .await
-        .map_err(StoreError::at("replace model"))?;
+        .map_err(StoreError::during("replace model"))?;
     Ok(done.rows_affected() == 1)
 }
 
@@ -87,8 +87,8 @@ pub(crate) async fn points_not_asked(
     db: impl SqliteExecutor<'_>,
     map_id: i64,
 ) -> Result<BTreeSet<LandmarkId>, StoreError> {
-    let ids = sqlx::query_scalar::<_, i64>(POINTS_NOT_ASKED).bind(map_id).fetch_all(db).await;
-    let ids = ids.map_err(StoreError::at("list models without points"))?;
+    let ids = sqlx::query_scalar::<_, i64>(WITHOUT_POINTS_JOB).bind(map_id).fetch_all(db).await;
+    let ids = ids.map_err(StoreError::during("list models without points"))?;
     Ok(ids.into_iter().map(|id| LandmarkId(id as u64)).collect())
 }
 
@@ -96,7 +96,7 @@ pub(crate) async fn points_not_asked(
 pub(crate) async fn ask_points(tx: &mut Tx, landmarks: &[LandmarkId]) -> Result<(), StoreError> {
     for landmark in landmarks {
         let done = sqlx::query(ASK_POINTS).bind(landmark.0 as i64).execute(&mut tx.conn).await;
-        done.map_err(StoreError::at("ask for points"))?;
+        done.map_err(StoreError::during("ask for points"))?;
     }
     Ok(())
 }
@@ -106,7 +106,7 @@ pub(crate) async fn digests(
     db: impl SqliteExecutor<'_>,
     map_id: i64,
 ) -> Result<Vec<(LandmarkId, ModelDigest)>, StoreError> {
-    let at = || StoreError::at("list models");
+    let at = || StoreError::during("list models");
     let rows = sqlx::query(DIGESTS).bind(map_id).fetch_all(db).await.map_err(at())?;
     let pair = |row: &SqliteRow| {
         let id: i64 = row.try_get("landmark_id").map_err(at())?;
@@ -120,6 +120,6 @@ pub(crate) async fn digests(
 /// The bytes of a landmark's model.
 pub(crate) async fn get(db: impl SqliteExecutor<'_>, landmark: LandmarkId) -> Result<Vec<u8>, StoreError> {
     let bytes = sqlx::query_scalar(GET).bind(landmark.0 as i64).fetch_optional(db).await;
-    let bytes = bytes.map_err(StoreError::at("read model"))?;
+    let bytes = bytes.map_err(StoreError::during("read model"))?;
     bytes.ok_or_else(|| StoreError::NotFound { what: "model of landmark", name: landmark.0.to_string() })
 }

@@ -1,4 +1,4 @@
-//! How the rest of the program learns of what was committed.
+//! How the rest of the program learns what was committed.
 
 use super::error::StoreError;
 use futures::future::BoxFuture;
@@ -6,16 +6,16 @@ use sqlx::SqliteConnection;
 
 /// What a committed write makes visible.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum Change {
+pub(crate) enum CommittedChange {
     /// The map with this number has a new version.
     Map(i64),
     /// The map is gone.
     MapRemoved(String),
-    /// How maps lie to each other.
+    /// The map links have changed.
     Links,
     /// A job is queued.
     Jobs,
-    /// The robot stands on this map, or is gone.
+    /// The robot is on this map, or is gone.
     Robot {
         /// Its name.
         name: String,
@@ -24,8 +24,8 @@ pub(crate) enum Change {
     },
 }
 
-/// Makes committed data visible. Called by the writer between commit and acknowledgement, so it is short: what takes long is
-/// computed afterwards. `NotPublished` is told to the caller of the write; any other error stops the store.
+/// Makes committed data visible. The writer calls it between commit and acknowledgement, so it is short: long computations
+/// come later. `NotPublished` is an answer to the caller of the write; any other error stops the store.
 pub(crate) trait OnCommit: Send + Sync + std::fmt::Debug {
     /// The store is open: everything in it is new.
     fn opened<'c>(&'c self, conn: &'c mut SqliteConnection) -> BoxFuture<'c, Result<(), StoreError>>;
@@ -34,6 +34,6 @@ pub(crate) trait OnCommit: Send + Sync + std::fmt::Debug {
     fn committed<'c>(
         &'c self,
         conn: &'c mut SqliteConnection,
-        change: Change,
+        change: CommittedChange,
     ) -> BoxFuture<'c, Result<(), StoreError>>;
 }

@@ -1,5 +1,5 @@
-//! Opens the file: one writer connection and a read-only pool, with settings that survive a power cut, each of them
-//! read back. Refuses a SQLite with the write-ahead-log corruption bug, a damaged file and a second server.
+//! Opens the database: one writer connection and a read-only pool, with settings that survive a power cut. Each setting is
+//! read back. Errors: a SQLite with the write-ahead-log corruption bug, a damaged file, a second server.
 
 use sqlx::{
     ConnectOptions, Row, SqliteConnection, SqlitePool,
@@ -24,7 +24,7 @@ pub(crate) const FILE: &str = "waymark.sqlite";
 /// File name of the lock in the data directory.
 const LOCK: &str = "lock";
 
-/// What each connection must say of itself. Name, value.
+/// Settings that each connection must have: name and value.
 const PRAGMAS: [(&str, &str); 7] = [
     ("journal_mode", "wal"),
     // 2 = FULL: a commit is on the disk before it is acknowledged.
@@ -54,7 +54,7 @@ pub(crate) enum OpenError {
     /// The compiled-in SQLite is too old.
     #[error("SQLite {0} can corrupt a database; at least {a}.{b}.{c} is needed", a = SQLITE_MIN.0, b = SQLITE_MIN.1, c = SQLITE_MIN.2)]
     Version(String),
-    /// A setting did not take.
+    /// A setting has another value than needed.
     #[error("the database says {pragma} = {actual}, {expected} is needed")]
     Pragma {
         /// Name of the setting.
@@ -138,7 +138,7 @@ async fn check_pragmas(conn: &mut SqliteConnection) -> Result<(), OpenError> {
     for (pragma, expected) in PRAGMAS {
         let sql = sqlx::AssertSqlSafe(format!("PRAGMA {pragma}"));
         let row = sqlx::query(sql).fetch_one(&mut *conn).await.map_err(OpenError::Open)?;
-        // Some answer with a number, some with a word; SQLite itself makes either a text.
+        // Some pragmas answer with a number, some with a word; SQLite converts either to text.
         let actual: String = row.try_get_unchecked(0).map_err(OpenError::Open)?;
         if actual != expected {
             return Err(OpenError::Pragma { pragma, expected, actual });

@@ -1,6 +1,6 @@
-//! Robots and the map each stands on.
+//! Robots, and the map of each.
 
-use super::{Change, StoreError, Tx, maps, now_ms, statements::statements, within};
+use super::{CommittedChange, StoreError, Tx, maps, now_ms, statements::statements, within};
 use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 
 statements! {
@@ -29,19 +29,22 @@ fn robot_row(row: &SqliteRow) -> Result<RobotRow, sqlx::Error> {
 pub(crate) async fn put(tx: &mut Tx, name: &str, map: &str, max: usize) -> Result<RobotRow, StoreError> {
     let map = maps::get(&mut tx.conn, map).await?;
     let put = sqlx::query(PUT).bind(name).bind(map.id).bind(now_ms()).execute(&mut tx.conn).await;
-    put.map_err(StoreError::at("register robot"))?;
-    let count =
-        sqlx::query_scalar(COUNT).fetch_one(&mut tx.conn).await.map_err(StoreError::at("count robots"))?;
+    put.map_err(StoreError::during("register robot"))?;
+    let count = sqlx::query_scalar(COUNT)
+        .fetch_one(&mut tx.conn)
+        .await
+        .map_err(StoreError::during("count robots"))?;
     within(count, max, "robots")?;
-    tx.changed(Change::Robot { name: name.to_owned(), map: Some(map.name.clone()) });
+    tx.changed(CommittedChange::Robot { name: name.to_owned(), map: Some(map.name.clone()) });
     Ok(RobotRow { name: name.to_owned(), map: map.name })
 }
 
 /// One robot.
 pub(crate) async fn get(db: impl SqliteExecutor<'_>, name: &str) -> Result<RobotRow, StoreError> {
-    let row = sqlx::query(GET).bind(name).fetch_optional(db).await.map_err(StoreError::at("read robot"))?;
+    let row =
+        sqlx::query(GET).bind(name).fetch_optional(db).await.map_err(StoreError::during("read robot"))?;
     let row = row.ok_or_else(|| StoreError::NotFound { what: "robot", name: name.to_owned() })?;
-    robot_row(&row).map_err(StoreError::at("read robot"))
+    robot_row(&row).map_err(StoreError::during("read robot"))
 }
 
 /// Robots with names after `after`, in order.
@@ -51,14 +54,14 @@ pub(crate) async fn page(
     limit: usize,
 ) -> Result<Vec<RobotRow>, StoreError> {
     let rows = sqlx::query(PAGE).bind(after).bind(limit as i64).fetch_all(db).await;
-    let rows = rows.map_err(StoreError::at("list robots"))?;
-    rows.iter().map(robot_row).collect::<Result<_, _>>().map_err(StoreError::at("list robots"))
+    let rows = rows.map_err(StoreError::during("list robots"))?;
+    rows.iter().map(robot_row).collect::<Result<_, _>>().map_err(StoreError::during("list robots"))
 }
 
-/// Forgets a robot.
+/// Deletes a robot.
 pub(crate) async fn delete(tx: &mut Tx, name: &str) -> Result<(), StoreError> {
     get(&mut tx.conn, name).await?;
-    sqlx::query(DELETE).bind(name).execute(&mut tx.conn).await.map_err(StoreError::at("delete robot"))?;
-    tx.changed(Change::Robot { name: name.to_owned(), map: None });
+    sqlx::query(DELETE).bind(name).execute(&mut tx.conn).await.map_err(StoreError::during("delete robot"))?;
+    tx.changed(CommittedChange::Robot { name: name.to_owned(), map: None });
     Ok(())
 }

@@ -1,15 +1,15 @@
-//! Views that are added to landmarks. Whether a view says something new and where it places its landmark is computed
-//! before the write, from what is stored. Inside the transaction only a stamp of all that it rests on is compared; if
-//! that has changed, everything is computed once more. Whoever prepares a write waits for the one before
-//! ([`Store::preparing`]), so that this happens only when something else than teaching changes the map meanwhile.
+//! Adds training views to landmarks. Novelty and placement of a view are computed before the write, from what is stored. The
+//! transaction compares a stamp of all that they rest on; if that has changed, everything is computed once more. Writes are
+//! prepared one at a time ([`Store::preparing`]), so only another kind of edit of the map causes a repetition.
 
 use super::{
     Store, StoreError, Tx,
-    landmarks::{self, Measures},
-    laser, maps,
-    placing::{self, Made, Placing},
+    landmark_placement::{self, PlacementOutcome, PlacementReport},
+    landmarks::{self, LandmarkGeometry},
+    maps,
     statements::statements,
-    views::{self, Cut, NewView, Outcome, ViewRow},
+    views::{self, NewView, QuadCrop, UploadOutcome, ViewRow},
+    walls,
 };
 use engine::panics::Edge;
 use map::segments::LaserSegment;
@@ -27,8 +27,8 @@ statements! {
 /// How often a write is prepared before its caller is told to try again.
 pub(super) const ATTEMPTS: usize = 5;
 
-/// What a landmark's place and the novelty of its views rest on. Views are never changed and their numbers never used
-/// again, so count and last number tell any set of views of a landmark from all before it.
+/// What a landmark's place and the novelty of its views rest on (optimistic locking). Views never change and their numbers
+/// are never used again, so count and last number identify a set of views.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Stamp {
     map: i64,
@@ -36,7 +36,7 @@ pub(super) struct Stamp {
     landmark: i64,
     views: i64,
     last_view: i64,
-    pub(super) measures: Measures,
+    pub(super) geometry: LandmarkGeometry,
 }
 
 impl Stamp {
@@ -52,7 +52,7 @@ pub(super) async fn stamp(
     map: &str,
     landmark: &str,
 ) -> Result<Option<Stamp>, StoreError> {
-    let at = || StoreError::at("read what a view rests on");
+    let at = || StoreError::during("read what a view rests on");
     let Some(row) = sqlx::query(STAMP).bind(map).bind(landmark).fetch_optional(db).await.map_err(at())?
     else {
         return Ok(None);
@@ -64,13 +64,13 @@ pub(super) async fn stamp(
         landmark: number("landmark")?,
         views: number("views")?,
         last_view: number("last_view")?,
-        measures: landmarks::measures(&row).map_err(at())?,
+        geometry: landmarks::geometry(&row).map_err(at())?,
     }))
 }
 
-/// The walls of a map, as places rest on them.
-pub(super) async fn walls(store: &Store, map: i64) -> Result<Vec<LaserSegment>, StoreError> {
-    Ok(laser::all_of(store.reads(), map)
+/// The walls of a map (map frame).
+pub(super) async fn wall_segments(store: &Store, map: i64) -> Result<Vec<LaserSegment>, StoreError> {
+    Ok(walls::all_of(store.reads(), map)
         .await?
         .iter()
         .filter_map(|ends| LaserSegment::by_hand(ends).ok())
@@ -99,17 +99,17 @@ pub(crate) struct Teaching {
     pub(crate) view: NewView,
     /// Most views of a landmark.
     pub(crate) max: usize,
-    /// What counts as saying nothing new; without it every view is stored.
-    pub(crate) thinning: Option<NoveltyParams>,
+    /// What counts as a near-duplicate; without it every view is stored.
+    pub(crate) novelty: Option<NoveltyParams>,
 }
 
-/// What was computed for a view, and from what.
+/// What was computed for a view, and the stamp that it rests on.
 struct Prepared {
     stamp: Stamp,
-    /// Number of the stored view that is so much like the new one that both would teach the same.
-    alike: Option<i64>,
-    /// The landmark's place with the new view, if that has a capture.
-    made: Option<Made>,
+    /// Number of the stored view that the new one is a near-duplicate of.
+    near_duplicate: Option<i64>,
+    /// The landmark's placement with the new view, if that has a capture.
+    placement: Option<PlacementOutcome>,
 }
 
 /// Stores a view, unless it is there already or is a near-duplicate of one; then gives that one. A view with a capture
@@ -117,7 +117,7 @@ struct Prepared {
 pub(crate) async fn add(
     store: &Store,
     teaching: Teaching,
-) -> Result<(ViewRow, Outcome, Option<Placing>), StoreError> {
+) -> Result<(ViewRow, UploadOutcome, Option<PlacementReport>), StoreError> {
     let teaching = Arc::new(teaching);
     let _turn = store.preparing().await;
     for _ in 0..ATTEMPTS {
@@ -132,36 +132,43 @@ pub(crate) async fn add(
 }
 
 async fn prepare(store: &Store, teaching: &Arc<Teaching>) -> Result<Prepared, StoreError> {
-    let Teaching { map, landmark, view, thinning, .. } = &**teaching;
-    // The stamp first: whatever changes after it is noticed inside the write.
+    let Teaching { map, landmark, view, novelty, .. } = &**teaching;
+    // The stamp is read first, so that the write notices whatever changes after it.
     let Some(stamp) = stamp(store.reads(), map, landmark).await? else {
         maps::get(store.reads(), map).await?;
         return Err(StoreError::NotFound { what: "landmark", name: landmark.clone() });
     };
-    let stored = match thinning {
-        Some(_) => views::cuts(store.reads(), stamp.landmark).await?,
+    let stored = match novelty {
+        Some(_) => views::crops(store.reads(), stamp.landmark).await?,
         None => Vec::new(),
     };
     let (mut captures, mut on) = (Vec::new(), Vec::new());
     if let Some(capture) = &view.capture {
-        captures = placing::captures(store.reads(), stamp.landmark).await?;
-        captures.insert(0, (view.cut.corners_px, capture.clone()));
-        on = walls(store, stamp.map).await?;
+        captures = landmark_placement::captures(store.reads(), stamp.landmark).await?;
+        captures.insert(0, (view.crop.corners_px, capture.clone()));
+        on = wall_segments(store, stamp.map).await?;
     }
     let teaching = teaching.clone();
     let work = move || Prepared {
-        alike: teaching.thinning.as_ref().and_then(|p| alike(&teaching.view.cut, &stored, p)),
-        made: teaching.view.capture.is_some().then(|| placing::made(&captures, &on, &stamp.measures)),
+        near_duplicate: teaching
+            .novelty
+            .as_ref()
+            .and_then(|p| near_duplicate(&teaching.view.crop, &stored, p)),
+        placement: teaching
+            .view
+            .capture
+            .is_some()
+            .then(|| landmark_placement::place_landmark(&captures, &on, &stamp.geometry)),
         stamp,
     };
     computed(store, "a view", work).await
 }
 
-/// The stored view that the new one adds nothing to.
-fn alike(new: &Cut, stored: &[(i64, Cut)], p: &NoveltyParams) -> Option<i64> {
-    let digest = |cut: &Cut| ViewSummary::new(&cut.corners_px, &cut.icon);
-    let digests: Vec<ViewSummary> = stored.iter().map(|(_, cut)| digest(cut)).collect();
-    let (index, novelty) = most_alike(&digest(new), &digests, p)?;
+/// Number of the stored view that the new one is a near-duplicate of.
+fn near_duplicate(new: &QuadCrop, stored: &[(i64, QuadCrop)], p: &NoveltyParams) -> Option<i64> {
+    let summary = |crop: &QuadCrop| ViewSummary::new(&crop.corners_px, &crop.icon);
+    let summaries: Vec<ViewSummary> = stored.iter().map(|(_, crop)| summary(crop)).collect();
+    let (index, novelty) = most_alike(&summary(new), &summaries, p)?;
     (novelty < 1.0).then(|| stored[index].0)
 }
 
@@ -169,24 +176,24 @@ async fn write(
     tx: &mut Tx,
     new: &Teaching,
     prepared: Prepared,
-) -> Result<(ViewRow, Outcome, Option<Placing>), StoreError> {
+) -> Result<(ViewRow, UploadOutcome, Option<PlacementReport>), StoreError> {
     let Teaching { map, landmark, view, max, .. } = new;
     if stamp(&mut tx.conn, map, landmark).await?.as_ref() != Some(&prepared.stamp) {
         return Err(StoreError::Changed);
     }
     let number = prepared.stamp.landmark;
     if let Some(row) = views::same(tx, number, view).await? {
-        return Ok((row, Outcome::Same, None));
+        return Ok((row, UploadOutcome::Duplicate, None));
     }
-    if let Some(id) = prepared.alike {
-        return Ok((views::get(&mut tx.conn, id).await?, Outcome::Alike, None));
+    if let Some(id) = prepared.near_duplicate {
+        return Ok((views::get(&mut tx.conn, id).await?, UploadOutcome::NearDuplicate, None));
     }
     let row = views::add(tx, (prepared.stamp.map, number), view, *max).await?;
-    let placing = match prepared.made {
-        Some(made) => Some(placing::put(tx, map, landmark, made).await?),
+    let placement = match prepared.placement {
+        Some(outcome) => Some(landmark_placement::put(tx, map, landmark, outcome).await?),
         None => None,
     };
-    Ok((row, Outcome::New, placing))
+    Ok((row, UploadOutcome::New, placement))
 }
 
 #[cfg(test)]
@@ -195,8 +202,8 @@ mod tests {
     use crate::{
         publication::{Catalogue, tests::config},
         store::{
-            accepting::tests::{decision, gathered},
-            placing::tests::seen_from,
+            landmark_placement::tests::seen_from,
+            track_acceptance::tests::{decision, gathered},
         },
     };
     use vision::recognise::DistanceKind;
@@ -204,20 +211,20 @@ mod tests {
     async fn store(dir: &std::path::Path) -> (Catalogue, crate::publication::CatalogueTasks) {
         let (store, task) = Catalogue::open(&config(dir)).await.unwrap();
         store.write(|tx| Box::pin(maps::create(tx, "a", DistanceKind::Both, 2))).await.unwrap();
-        let none = Measures::default();
+        let none = LandmarkGeometry::default();
         store.write(move |tx| Box::pin(landmarks::create(tx, "a", "p1", none, 5))).await.unwrap();
         wall(&store).await;
         (store, task)
     }
 
     async fn wall(store: &Catalogue) {
-        store.write(|tx| Box::pin(laser::replace(tx, "a", &[[0.0, 0.0, 6.0, 0.0]]))).await.unwrap();
+        store.write(|tx| Box::pin(walls::replace(tx, "a", &[[0.0, 0.0, 6.0, 0.0]]))).await.unwrap();
     }
 
     fn teaching(number: u8) -> Teaching {
         let (map, landmark) = ("a".to_owned(), "p1".to_owned());
         let view = seen_from(1.0 + f64::from(number) * 0.4, number, 0.0);
-        Teaching { map, landmark, view, max: 9, thinning: None }
+        Teaching { map, landmark, view, max: 9, novelty: None }
     }
 
     /// Prepares a view, lets `meanwhile` happen, and writes: was it refused, so that it is prepared again?
@@ -227,8 +234,8 @@ mod tests {
         meanwhile().await;
         let written = store.write(move |tx| Box::pin(async move { write(tx, &teaching, prepared).await }));
         match written.await {
-            Ok((_, outcome, placing)) => {
-                assert!(outcome == Outcome::New && placing.unwrap().placed);
+            Ok((_, outcome, placement)) => {
+                assert!(outcome == UploadOutcome::New && placement.unwrap().placed);
                 false
             }
             Err(StoreError::Changed) => true,
@@ -251,7 +258,7 @@ mod tests {
         assert!(refused(&store, 2, deleted).await, "a view less");
         // Another landmark is no matter.
         let beside = async || {
-            let none = Measures::default();
+            let none = LandmarkGeometry::default();
             store.write(move |tx| Box::pin(landmarks::create(tx, "a", "p2", none, 5))).await.unwrap();
         };
         assert!(!refused(&store, 2, beside).await);
@@ -266,14 +273,15 @@ mod tests {
         for view in [2, 5] {
             add(&store, teaching(view)).await.unwrap();
         }
-        let accepted = crate::store::accepting::accept(&store, decision("a", id, "new")).await.unwrap();
-        let placing = &accepted.landmarks["new"].1;
-        assert_eq!((placing.placed, placing.views_used), (true, 3), "{placing:?}");
+        let accepted =
+            crate::store::track_acceptance::accept(&store, decision("a", id, "new")).await.unwrap();
+        let placement = &accepted.landmarks["new"].1;
+        assert_eq!((placement.placed, placement.views_used), (true, 3), "{placement:?}");
         let row = landmarks::get(store.reads(), "a", "new").await.unwrap();
-        let on = walls(&store, 1).await.unwrap();
-        let captures = placing::captures(store.reads(), row.id).await.unwrap();
-        let again = placing::made(&captures, &on, &Measures::default());
-        assert_eq!(again, Made::Placed(Box::new(row.measures), 3));
+        let on = wall_segments(&store, 1).await.unwrap();
+        let captures = landmark_placement::captures(store.reads(), row.id).await.unwrap();
+        let again = landmark_placement::place_landmark(&captures, &on, &LandmarkGeometry::default());
+        assert_eq!(again, PlacementOutcome::Placed(Box::new(row.geometry), 3));
     }
 
     #[tokio::test]

@@ -1,4 +1,4 @@
-//! Views of landmarks with their pictures, and the strangers seen beside them.
+//! Training views of landmarks with their pictures, and the distractors beside the landmarks in those pictures.
 
 use super::{StoreError, Tx, landmarks, now_ms, statements::statements, within};
 use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
@@ -18,26 +18,26 @@ statements! {
             JOIN maps m ON m.id = l.map_id WHERE m.name = ?1 AND l.name = ?2 AND v.id = ?3";
     DELETE = "DELETE FROM views WHERE id = ?1 AND landmark_id = ?2";
     GET = "SELECT id, image_kind, width_px, height_px, corners_px, created_ms FROM views WHERE id = ?1";
-    CUTS = "SELECT id, corners_px, icon_side, icon, icon_scale FROM views WHERE landmark_id = ?1 ORDER BY id";
+    CROPS = "SELECT id, corners_px, icon_side, icon, icon_scale FROM views WHERE landmark_id = ?1 ORDER BY id";
     OF_MAP = "SELECT v.id, v.landmark_id, v.image_sha256, v.width_px, v.height_px, v.corners_px, v.icon_side, v.icon, \
               v.icon_scale FROM views v JOIN landmarks l ON l.id = v.landmark_id WHERE l.map_id = ?1 ORDER BY v.id";
     IMAGE = "SELECT image FROM views WHERE id = ?1";
-    COUNT_STRANGERS = "SELECT count(*) FROM strangers WHERE map_id = ?1";
-    INSERT_STRANGER = "INSERT INTO strangers (map_id, image_sha256, corners_px, icon_side, icon, icon_scale) \
+    COUNT_DISTRACTORS = "SELECT count(*) FROM strangers WHERE map_id = ?1";
+    INSERT_DISTRACTOR = "INSERT INTO strangers (map_id, image_sha256, corners_px, icon_side, icon, icon_scale) \
                        VALUES (?1, ?2, ?3, ?4, ?5, ?6) ON CONFLICT DO NOTHING";
-    STRANGERS = "SELECT image_sha256, corners_px, icon_side, icon, icon_scale FROM strangers \
+    DISTRACTORS = "SELECT image_sha256, corners_px, icon_side, icon, icon_scale FROM strangers \
                  WHERE map_id = ?1 ORDER BY id";
 }
 
-/// Strangers kept of one map; later ones are not stored.
-pub(crate) const MAX_STRANGERS: usize = 1_000;
+/// Distractors of one map; further ones are not stored.
+pub(crate) const MAX_DISTRACTORS: usize = 1_000;
 
-/// Names a picture.
+/// SHA-256 of a picture.
 pub(crate) type Digest = [u8; 32];
 
-/// A quad cut out of a picture.
+/// A quad of a picture: its corners (px) and its icon.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Cut {
+pub(crate) struct QuadCrop {
     pub(crate) corners_px: Corners,
     pub(crate) icon: Icon,
 }
@@ -47,13 +47,13 @@ pub(crate) struct Cut {
 pub(crate) struct NewView {
     pub(crate) image: Vec<u8>,
     pub(crate) image_sha256: Digest,
-    /// png or jpeg.
+    /// `png` or `jpeg`.
     pub(crate) image_kind: &'static str,
     pub(crate) size_px: [usize; 2],
-    pub(crate) cut: Cut,
-    /// Other quads of the picture.
-    pub(crate) strangers: Vec<Cut>,
-    /// How it was taken: JSON of a checked `placing::Capture`.
+    pub(crate) crop: QuadCrop,
+    /// Quads of the picture that do not overlap the landmark.
+    pub(crate) distractors: Vec<QuadCrop>,
+    /// How it was taken: JSON of a checked `landmark_placement::StoredCapture`.
     pub(crate) capture: Option<String>,
 }
 
@@ -67,14 +67,14 @@ pub(crate) struct ViewRow {
     pub(crate) created_ms: i64,
 }
 
-/// A view as learning needs it.
+/// A training view without its picture, as learning needs it.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Lesson {
+pub(crate) struct TrainingViewRow {
     pub(crate) view: i64,
     pub(crate) landmark: LandmarkId,
     pub(crate) image_sha256: Digest,
     pub(crate) size_px: [usize; 2],
-    pub(crate) cut: Cut,
+    pub(crate) crop: QuadCrop,
 }
 
 pub(super) fn corners_bytes(corners: &Corners) -> Vec<u8> {
@@ -98,17 +98,17 @@ fn damaged(what: &str) -> impl Fn(String) -> StoreError {
 
 /// The corners of a view.
 pub(super) fn corners_in(row: &SqliteRow) -> Result<Corners, StoreError> {
-    let bytes: &[u8] = row.try_get("corners_px").map_err(StoreError::at("read corners"))?;
+    let bytes: &[u8] = row.try_get("corners_px").map_err(StoreError::during("read corners"))?;
     let corners = corners_of(bytes).ok_or_else(|| damaged("corners")("not four points".into()))?;
     Corners::try_from(corners).map_err(|e| damaged("corners")(e.to_string()))
 }
 
-pub(super) fn cut_of(row: &SqliteRow) -> Result<Cut, StoreError> {
-    Ok(Cut { corners_px: corners_in(row)?, icon: icon_of(row)? })
+pub(super) fn crop_of(row: &SqliteRow) -> Result<QuadCrop, StoreError> {
+    Ok(QuadCrop { corners_px: corners_in(row)?, icon: icon_of(row)? })
 }
 
 fn icon_of(row: &SqliteRow) -> Result<Icon, StoreError> {
-    let at = || StoreError::at("read icon");
+    let at = || StoreError::during("read icon");
     let side: i64 = row.try_get("icon_side").map_err(at())?;
     let bytes: &[u8] = row.try_get("icon").map_err(at())?;
     let scale = row.try_get("icon_scale").map_err(at())?;
@@ -117,12 +117,12 @@ fn icon_of(row: &SqliteRow) -> Result<Icon, StoreError> {
 }
 
 pub(super) fn digest_of(row: &SqliteRow) -> Result<Digest, StoreError> {
-    let bytes: &[u8] = row.try_get("image_sha256").map_err(StoreError::at("read digest"))?;
+    let bytes: &[u8] = row.try_get("image_sha256").map_err(StoreError::during("read digest"))?;
     bytes.try_into().map_err(|_length| damaged("digest")("not 32 bytes".into()))
 }
 
 fn view_row(row: &SqliteRow) -> Result<ViewRow, StoreError> {
-    let at = || StoreError::at("read view");
+    let at = || StoreError::during("read view");
     let corners: &[u8] = row.try_get("corners_px").map_err(at())?;
     Ok(ViewRow {
         id: row.try_get("id").map_err(at())?,
@@ -133,47 +133,52 @@ fn view_row(row: &SqliteRow) -> Result<ViewRow, StoreError> {
     })
 }
 
-/// What became of an upload.
+/// What became of an uploaded view.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Outcome {
+pub(crate) enum UploadOutcome {
     /// Stored.
     New,
-    /// The same quad of the same picture is there already.
-    Same,
-    /// Not stored: the view shows nothing that this one does not. A lesson would gain nothing by it.
-    Alike,
+    /// A duplicate: the same quad of the same picture is stored already.
+    Duplicate,
+    /// A near-duplicate of a stored view: not stored, since learning would gain nothing by it.
+    NearDuplicate,
 }
 
 /// The view of a landmark that shows the same quad of the same picture.
 pub(super) async fn same(tx: &mut Tx, landmark: i64, new: &NewView) -> Result<Option<ViewRow>, StoreError> {
-    let corners = corners_bytes(&new.cut.corners_px);
+    let corners = corners_bytes(&new.crop.corners_px);
     let same = sqlx::query(SAME).bind(landmark).bind(&new.image_sha256[..]).bind(&corners);
-    let row = same.fetch_optional(&mut tx.conn).await.map_err(StoreError::at("look for view"))?;
+    let row = same.fetch_optional(&mut tx.conn).await.map_err(StoreError::during("look for view"))?;
     row.as_ref().map(view_row).transpose()
 }
 
 /// One view.
 pub(super) async fn get(db: impl SqliteExecutor<'_>, view: i64) -> Result<ViewRow, StoreError> {
-    let row = sqlx::query(GET).bind(view).fetch_optional(db).await.map_err(StoreError::at("read view"))?;
+    let row =
+        sqlx::query(GET).bind(view).fetch_optional(db).await.map_err(StoreError::during("read view"))?;
     view_row(&row.ok_or_else(|| StoreError::NotFound { what: "view", name: view.to_string() })?)
 }
 
-/// What the views of a landmark show, by number.
-pub(super) async fn cuts(db: impl SqliteExecutor<'_>, landmark: i64) -> Result<Vec<(i64, Cut)>, StoreError> {
-    let rows = sqlx::query(CUTS).bind(landmark).fetch_all(db).await;
-    let rows = rows.map_err(StoreError::at("read views"))?;
-    let cut = |row: &SqliteRow| Ok((row.try_get("id").map_err(StoreError::at("read views"))?, cut_of(row)?));
-    rows.iter().map(cut).collect()
+/// The crops of a landmark's views, by number.
+pub(super) async fn crops(
+    db: impl SqliteExecutor<'_>,
+    landmark: i64,
+) -> Result<Vec<(i64, QuadCrop)>, StoreError> {
+    let rows = sqlx::query(CROPS).bind(landmark).fetch_all(db).await;
+    let rows = rows.map_err(StoreError::during("read views"))?;
+    let crop =
+        |row: &SqliteRow| Ok((row.try_get("id").map_err(StoreError::during("read views"))?, crop_of(row)?));
+    rows.iter().map(crop).collect()
 }
 
-/// Stores a view of a landmark (numbers of map and landmark) that is not there yet, at most `max`.
+/// Stores a new view of a landmark (numbers of map and landmark). Errors: more than `max` views.
 pub(super) async fn add(
     tx: &mut Tx,
     (map, landmark): (i64, i64),
     new: &NewView,
     max: usize,
 ) -> Result<ViewRow, StoreError> {
-    let corners = corners_bytes(&new.cut.corners_px);
+    let corners = corners_bytes(&new.crop.corners_px);
     let created_ms = now_ms();
     let id = sqlx::query_scalar(INSERT)
         .bind(landmark)
@@ -183,43 +188,43 @@ pub(super) async fn add(
         .bind(new.size_px[0] as i64)
         .bind(new.size_px[1] as i64)
         .bind(&corners)
-        .bind(new.cut.icon.size as i64)
-        .bind(icon_bytes(&new.cut.icon))
-        .bind(new.cut.icon.source_scale)
+        .bind(new.crop.icon.size as i64)
+        .bind(icon_bytes(&new.crop.icon))
+        .bind(new.crop.icon.source_scale)
         .bind(created_ms)
         .bind(&new.capture)
         .fetch_one(&mut tx.conn)
         .await
-        .map_err(StoreError::at("store view"))?;
+        .map_err(StoreError::during("store view"))?;
     let count = sqlx::query_scalar(COUNT).bind(landmark).fetch_one(&mut tx.conn).await;
-    within(count.map_err(StoreError::at("count views"))?, max, "views of a landmark")?;
-    add_strangers(tx, map, new).await?;
+    within(count.map_err(StoreError::during("count views"))?, max, "views of a landmark")?;
+    add_distractors(tx, map, new).await?;
     Ok(ViewRow {
         id,
         image_kind: new.image_kind.to_owned(),
         size_px: new.size_px.map(|s| s as u32),
-        corners_px: new.cut.corners_px.into(),
+        corners_px: new.crop.corners_px.into(),
         created_ms,
     })
 }
 
-async fn add_strangers(tx: &mut Tx, map_id: i64, new: &NewView) -> Result<(), StoreError> {
-    let count: i64 = sqlx::query_scalar(COUNT_STRANGERS)
+async fn add_distractors(tx: &mut Tx, map_id: i64, new: &NewView) -> Result<(), StoreError> {
+    let count: i64 = sqlx::query_scalar(COUNT_DISTRACTORS)
         .bind(map_id)
         .fetch_one(&mut tx.conn)
         .await
-        .map_err(StoreError::at("count strangers"))?;
-    for stranger in new.strangers.iter().take(MAX_STRANGERS.saturating_sub(count as usize)) {
-        sqlx::query(INSERT_STRANGER)
+        .map_err(StoreError::during("count distractors"))?;
+    for distractor in new.distractors.iter().take(MAX_DISTRACTORS.saturating_sub(count as usize)) {
+        sqlx::query(INSERT_DISTRACTOR)
             .bind(map_id)
             .bind(&new.image_sha256[..])
-            .bind(corners_bytes(&stranger.corners_px))
-            .bind(stranger.icon.size as i64)
-            .bind(icon_bytes(&stranger.icon))
-            .bind(stranger.icon.source_scale)
+            .bind(corners_bytes(&distractor.corners_px))
+            .bind(distractor.icon.size as i64)
+            .bind(icon_bytes(&distractor.icon))
+            .bind(distractor.icon.source_scale)
             .execute(&mut tx.conn)
             .await
-            .map_err(StoreError::at("store stranger"))?;
+            .map_err(StoreError::during("store distractor"))?;
     }
     Ok(())
 }
@@ -232,7 +237,7 @@ pub(crate) async fn page(
     limit: usize,
 ) -> Result<Vec<ViewRow>, StoreError> {
     let rows = sqlx::query(PAGE).bind(landmark_id).bind(after).bind(limit as i64).fetch_all(db).await;
-    rows.map_err(StoreError::at("list views"))?.iter().map(view_row).collect()
+    rows.map_err(StoreError::during("list views"))?.iter().map(view_row).collect()
 }
 
 /// The icon of a view.
@@ -243,7 +248,7 @@ pub(crate) async fn icon(
     view: i64,
 ) -> Result<Icon, StoreError> {
     let row = sqlx::query(ICON).bind(map).bind(landmark).bind(view).fetch_optional(db).await;
-    let row = row.map_err(StoreError::at("read icon"))?;
+    let row = row.map_err(StoreError::during("read icon"))?;
     icon_of(&row.ok_or_else(|| StoreError::NotFound { what: "view", name: view.to_string() })?)
 }
 
@@ -251,45 +256,51 @@ pub(crate) async fn icon(
 pub(crate) async fn delete(tx: &mut Tx, map: &str, landmark: &str, view: i64) -> Result<(), StoreError> {
     let landmark = landmarks::get(&mut tx.conn, map, landmark).await?;
     let done = sqlx::query(DELETE).bind(view).bind(landmark.id).execute(&mut tx.conn).await;
-    match done.map_err(StoreError::at("delete view"))?.rows_affected() {
+    match done.map_err(StoreError::during("delete view"))?.rows_affected() {
         0 => Err(StoreError::NotFound { what: "view", name: view.to_string() }),
         _ => Ok(()),
     }
 }
 
 /// Every view of a map, without pictures.
-pub(crate) async fn of_map(db: impl SqliteExecutor<'_>, map_id: i64) -> Result<Vec<Lesson>, StoreError> {
-    let at = || StoreError::at("read views");
+pub(crate) async fn of_map(
+    db: impl SqliteExecutor<'_>,
+    map_id: i64,
+) -> Result<Vec<TrainingViewRow>, StoreError> {
+    let at = || StoreError::during("read views");
     let rows = sqlx::query(OF_MAP).bind(map_id).fetch_all(db).await.map_err(at())?;
-    let lesson = |row: &SqliteRow| {
+    let view = |row: &SqliteRow| {
         let pixels = |column: &str| row.try_get::<i64, _>(column).map(|s| s as usize).map_err(at());
-        Ok(Lesson {
+        Ok(TrainingViewRow {
             view: row.try_get("id").map_err(at())?,
             landmark: LandmarkId(row.try_get::<i64, _>("landmark_id").map_err(at())? as u64),
             image_sha256: digest_of(row)?,
             size_px: [pixels("width_px")?, pixels("height_px")?],
-            cut: cut_of(row)?,
+            crop: crop_of(row)?,
         })
     };
-    rows.iter().map(lesson).collect()
+    rows.iter().map(view).collect()
 }
 
-/// The picture of a view, as it came.
+/// The picture of a view, as it was uploaded.
 pub(crate) async fn image(db: impl SqliteExecutor<'_>, view: i64) -> Result<Vec<u8>, StoreError> {
     let image = sqlx::query_scalar(IMAGE)
         .bind(view)
         .fetch_optional(db)
         .await
-        .map_err(StoreError::at("read picture"))?;
+        .map_err(StoreError::during("read picture"))?;
     image.ok_or_else(|| StoreError::NotFound { what: "view", name: view.to_string() })
 }
 
-/// The strangers of a map, each with the picture it was seen in.
-pub(crate) async fn strangers(
+/// The distractors of a map, each with the digest of its picture.
+pub(crate) async fn distractors(
     db: impl SqliteExecutor<'_>,
     map_id: i64,
-) -> Result<Vec<(Digest, Cut)>, StoreError> {
-    let rows =
-        sqlx::query(STRANGERS).bind(map_id).fetch_all(db).await.map_err(StoreError::at("read strangers"))?;
-    rows.iter().map(|row| Ok((digest_of(row)?, cut_of(row)?))).collect()
+) -> Result<Vec<(Digest, QuadCrop)>, StoreError> {
+    let rows = sqlx::query(DISTRACTORS)
+        .bind(map_id)
+        .fetch_all(db)
+        .await
+        .map_err(StoreError::during("read distractors"))?;
+    rows.iter().map(|row| Ok((digest_of(row)?, crop_of(row)?))).collect()
 }

@@ -1,15 +1,15 @@
-//! The only connection that writes, owned by one task. A write is a closure run inside BEGIN IMMEDIATE; the order is
-//! always commit -> publish the snapshot -> acknowledge, so nothing is matched or confirmed that a crash could undo.
+//! The only connection that writes, owned by one task. A write is a closure that runs inside BEGIN IMMEDIATE. The order is
+//! commit -> publish the snapshot -> acknowledge, so a crash undoes nothing that was matched or acknowledged.
 //!
-//! A write whose caller has gone away before it began is left out. Once it has begun it runs to its end, here and not in
-//! the caller's task, and with it what must follow the commit ([`Tx::after`]).
+//! A write whose caller drops it before its transaction begins is skipped. After that it runs to its end in this task, with
+//! what must follow the commit ([`Tx::after`]).
 //!
-//! A panic inside a write is caught and rolled back. A panic while a map is made ready after the commit leaves the map's
-//! previous version in use; the next write to that map tries again.
+//! A panic inside a write is caught and rolled back. After a panic in the publication, the map's previous version stays in
+//! use, and the next write to that map tries again.
 
 use super::{
     error::StoreError,
-    on_commit::{Change, OnCommit},
+    on_commit::{CommittedChange, OnCommit},
 };
 use engine::{
     panics::Edge,
@@ -31,7 +31,7 @@ type After = Box<dyn FnOnce() + Send>;
 pub(crate) struct Tx {
     /// The writer's connection, inside a transaction.
     pub(super) conn: SqliteConnection,
-    changes: Vec<Change>,
+    changes: Vec<CommittedChange>,
     after: Vec<After>,
 }
 
@@ -49,14 +49,14 @@ impl Tx {
     }
 
     /// To be published after the commit.
-    pub(super) fn changed(&mut self, change: Change) {
+    pub(super) fn changed(&mut self, change: CommittedChange) {
         if !self.changes.contains(&change) {
             self.changes.push(change);
         }
     }
 
-    /// What must follow the commit, before the acknowledgement, whether or not the caller is still there. Not run if the
-    /// transaction is rolled back.
+    /// Runs `then` after the commit and before the acknowledgement, whether or not the caller still waits. It does not run if
+    /// the transaction is rolled back.
     pub(crate) fn after(&mut self, then: impl FnOnce() + Send + 'static) {
         self.after.push(Box::new(then));
     }
@@ -64,15 +64,15 @@ impl Tx {
 
 type Acknowledge = Box<dyn FnOnce(Result<(), StoreError>) + Send>;
 
-/// What a closure came to. `acknowledge` holds its value or error until the transaction has ended.
-struct Outcome {
+/// The outcome of a write's closure. `acknowledge` holds its value or error until the transaction has ended.
+struct WriteOutcome {
     keep: bool,
     fatal: bool,
     panic: Option<Box<dyn Any + Send>>,
     acknowledge: Acknowledge,
 }
 
-type Run = Box<dyn for<'t> FnOnce(&'t mut Tx) -> BoxFuture<'t, Outcome> + Send>;
+type Run = Box<dyn for<'t> FnOnce(&'t mut Tx) -> BoxFuture<'t, WriteOutcome> + Send>;
 
 /// A write on its way to the writer.
 pub(super) struct Command {
@@ -89,7 +89,7 @@ where
     let (reply, answer) = oneshot::channel();
     let run: Run = Box::new(move |tx| {
         Box::pin(async move {
-            // What the closure has changed is in the transaction, which is rolled back.
+            // Unwind safety: the closure's changes are in the transaction, which is rolled back.
             let ended = AssertUnwindSafe(async move { write(tx).await }).catch_unwind().await;
             let (result, panic) = match ended {
                 Ok(result) => (result, None),
@@ -97,10 +97,10 @@ where
             };
             let (keep, fatal) = (result.is_ok(), result.as_ref().is_err_and(StoreError::is_fatal));
             let acknowledge: Acknowledge = Box::new(move |ended| {
-                // The caller may be gone; the write stands all the same.
+                // An error means that the caller is gone; the write stands.
                 drop(reply.send(result.and_then(|value| ended.map(|()| value))));
             });
-            Outcome { keep, fatal, panic, acknowledge }
+            WriteOutcome { keep, fatal, panic, acknowledge }
         })
     });
     (Command { run, caller: Arc::downgrade(caller) }, answer)
@@ -112,7 +112,7 @@ pub(super) struct Writer {
     commands: mpsc::Receiver<Command>,
     on_commit: Arc<dyn OnCommit>,
     vitals: Arc<Vitals>,
-    /// Told of every job that is queued.
+    /// Notified of every queued job.
     jobs: Arc<Notify>,
 }
 
@@ -148,7 +148,7 @@ impl Writer {
             if let Err(error) = self.one(command).await {
                 tracing::error!(
                     error = &error as &dyn std::error::Error,
-                    "the store has failed; no more writes"
+                    "store_failed: no more writes"
                 );
                 self.vitals.fail(PART, error.to_string());
                 return;
@@ -163,7 +163,7 @@ impl Writer {
 
     async fn one(&mut self, command: Command) -> Result<(), StoreError> {
         if command.caller.strong_count() == 0 {
-            tracing::debug!("a write is left out: its caller has gone");
+            tracing::debug!("write_skipped: its caller has gone");
             return Ok(());
         }
         self.tx.changes.clear();
@@ -175,7 +175,7 @@ impl Writer {
             self.vitals.panics().caught(Edge::Write, cause.as_ref(), "a write", follows);
         }
         if !outcome.keep {
-            // SQLite has already rolled back by itself after some errors (a full disk); then this one says so.
+            // After some errors (a full disk) SQLite has already rolled back, and this returns an error.
             let rolled_back = self.execute("ROLLBACK", "roll back").await;
             (outcome.acknowledge)(Ok(()));
             return match rolled_back {
@@ -206,9 +206,9 @@ impl Writer {
         }
         match published {
             Ok(()) => (outcome.acknowledge)(Ok(())),
-            // Durable, not visible, and said so; the map can be made ready by a later write.
+            // Durable, but not visible: the caller gets this error, and a later write may publish the map.
             Err(error @ StoreError::NotPublished { .. }) => (outcome.acknowledge)(Err(error)),
-            // Durable and not visible: not acknowledged, and the next start shows it.
+            // Durable, but not visible until the next start: not acknowledged.
             Err(error) => {
                 (outcome.acknowledge)(Err(StoreError::Closed));
                 return Err(error);
@@ -217,11 +217,11 @@ impl Writer {
         Ok(())
     }
 
-    /// Makes everything visible that the write has changed.
+    /// Publishes everything that the write has changed.
     async fn publish(&mut self) -> Result<(), StoreError> {
         let mut done = Ok(());
         for change in std::mem::take(&mut self.tx.changes) {
-            if change == Change::Jobs {
+            if change == CommittedChange::Jobs {
                 self.jobs.notify_one();
                 continue;
             }
@@ -234,7 +234,7 @@ impl Writer {
     }
 
     async fn execute(&mut self, sql: &'static str, operation: &'static str) -> Result<(), StoreError> {
-        sqlx::raw_sql(sql).execute(&mut self.tx.conn).await.map_err(StoreError::at(operation))?;
+        sqlx::raw_sql(sql).execute(&mut self.tx.conn).await.map_err(StoreError::during(operation))?;
         Ok(())
     }
 }

@@ -1,6 +1,6 @@
-//! What a robot's pose rests on, how far it is trusted, and how it is told.
+//! What a robot's pose rests on, and how far it is trusted.
 
-use super::{GUIDED, MAX_SUPPORTERS, RESTS_ON_M, RobotState, schedule};
+use super::{GUIDED, MAX_SUPPORTING_LANDMARKS, RESTS_ON_M, RobotState, schedule};
 use map::{
     fuse::{FixOutcome, FixRole, FusedPose},
     guided::{FramePlan, MAX_CAMERAS, Trust},
@@ -10,11 +10,11 @@ use map::{
 use protos::{Name, v1::PoseTrust};
 use std::time::{Duration, Instant};
 
-/// A pose as it is told.
+/// A pose as it is published.
 #[derive(Debug)]
 pub(in crate::motion) struct StatedPose {
     pub(in crate::motion) fused: FusedPose,
-    /// Since it was captured.
+    /// Time since its capture.
     pub(in crate::motion) age: Duration,
     /// What it rests on.
     pub(in crate::motion) modalities: Vec<String>,
@@ -22,28 +22,28 @@ pub(in crate::motion) struct StatedPose {
 }
 
 impl RobotState {
-    /// The pose has proved wrong, or is unknown: nothing rests on it any more.
-    pub(super) fn lost(&mut self) {
-        (self.by_landmarks_m, self.by_guided_m, self.by_laser_m) = (None, None, None);
-        self.by_hypotheses = false;
-        self.supporters.clear();
-        let cleared = self.watch.clear();
-        self.found.extend(cleared);
+    /// The pose was wrong or is unknown: forgets its support, and withdraws the health changes that rest on it.
+    pub(super) fn invalidate_pose(&mut self) {
+        (self.landmarks_at_m, self.guided_at_m, self.laser_at_m) = (None, None, None);
+        self.from_hypothesis = false;
+        self.supporting_landmarks.clear();
+        let cleared = self.health_monitor.clear();
+        self.pending_changes.extend(cleared);
     }
 
-    /// The same, and odometry so far means nothing any more.
-    pub(super) fn unknown(&mut self) {
-        self.lost();
+    /// The same, and odometry so far is invalid: restarts the schedule.
+    pub(super) fn invalidate_odometry(&mut self) {
+        self.invalidate_pose();
         (self.schedule, self.at_last_frame) = (schedule(), None);
     }
 
-    /// What to do with a camera's next frame, taken near this pose.
+    /// The plan for a camera's next frame near this pose.
     pub(in crate::motion) fn plan(&mut self, camera: &Name, pose: &Pose2Covariance) -> FramePlan {
         let camera = self.camera_number(camera);
         self.schedule.plan(camera, Some(pose))
     }
 
-    /// The camera's number in the schedule; of too many cameras one that it does not count.
+    /// The camera's number in the schedule; `u32::MAX` for cameras beyond the bound.
     pub(in crate::motion) fn camera_number(&mut self, camera: &Name) -> u32 {
         if let Some(number) = self.cameras.iter().position(|known| known == camera) {
             return number as u32;
@@ -62,10 +62,10 @@ impl RobotState {
         before.between(&now)
     }
 
-    /// A pose as it is told at this moment.
-    pub(in crate::motion) fn told(&self, fused: FusedPose, now: Instant) -> StatedPose {
+    /// The pose as it is published now.
+    pub(in crate::motion) fn state_pose(&self, fused: FusedPose, now: Instant) -> StatedPose {
         let trust = match self.schedule.trust() {
-            // A pose that came along from another map, which no frame has been compared with yet.
+            // `NoPose`: the pose was carried over from another map, and no frame has checked it yet.
             Trust::NoPose | Trust::Unsupported => PoseTrust::Unsupported,
             Trust::Supported => PoseTrust::Supported,
             Trust::Stale => PoseTrust::Stale,
@@ -76,43 +76,42 @@ impl RobotState {
         StatedPose { fused, age: self.age(fused.at_ns, now), modalities, trust }
     }
 
-    /// Keeps what the pose rests on; of landmarks the latest.
-    pub(super) fn rests_on(&mut self, outcome: FixOutcome, fix: &Fix, role: FixRole) {
+    /// Records that the pose rests on this fix; of landmarks the latest.
+    pub(super) fn record_support(&mut self, outcome: FixOutcome, fix: &Fix, role: FixRole) {
         match outcome {
-            FixOutcome::Started => self.lost(),
+            FixOutcome::Started => self.invalidate_pose(),
             FixOutcome::Reset => {
-                self.lost();
+                self.invalidate_pose();
                 self.schedule.relocalised(&fix.landmarks);
             }
             FixOutcome::Applied { .. } | FixOutcome::ExcludedByMode { .. } | FixOutcome::Repeated => {}
             _ => return,
         }
         match fix.modality {
-            FixSource::Laser => self.by_laser_m = Some(self.way_m),
-            // The pose does not rest on what was named by it, in the sense that it could be judged by it.
-            FixSource::Landmarks if role == FixRole::Guided => self.by_guided_m = Some(self.way_m),
+            FixSource::Laser => self.laser_at_m = Some(self.distance_m),
+            // A landmark that the pose named cannot support the pose: it never becomes a supporting landmark.
+            FixSource::Landmarks if role == FixRole::Guided => self.guided_at_m = Some(self.distance_m),
             FixSource::Landmarks => {
-                self.by_landmarks_m = Some(self.way_m);
-                self.by_hypotheses = false;
-                self.supporters.retain(|id| !fix.landmarks.contains(id));
-                self.supporters.extend(&fix.landmarks);
-                let gone = self.supporters.len().saturating_sub(MAX_SUPPORTERS);
-                self.supporters.drain(..gone);
+                self.landmarks_at_m = Some(self.distance_m);
+                self.from_hypothesis = false;
+                self.supporting_landmarks.retain(|id| !fix.landmarks.contains(id));
+                self.supporting_landmarks.extend(&fix.landmarks);
+                let excess = self.supporting_landmarks.len().saturating_sub(MAX_SUPPORTING_LANDMARKS);
+                self.supporting_landmarks.drain(..excess);
             }
         }
     }
 
     /// What the pose rests on now; nothing without a pose.
     pub(in crate::motion) fn modalities(&self) -> Vec<String> {
-        let near = |at_m: Option<f64>| at_m.is_some_and(|at_m| self.way_m - at_m <= RESTS_ON_M);
-        let moves = self.newest.is_some();
-        let posed = self.fuser.pose().is_some();
+        let is_recent = |at_m: Option<f64>| at_m.is_some_and(|at_m| self.distance_m - at_m <= RESTS_ON_M);
+        let (has_odometry, has_pose) = (self.newest.is_some(), self.fuser.pose().is_some());
         let all = [
-            ("odometry", moves && posed),
-            ("landmarks", near(self.by_landmarks_m)),
-            (GUIDED, near(self.by_guided_m)),
-            ("laser", near(self.by_laser_m)),
-            ("relocalisation", self.by_hypotheses),
+            ("odometry", has_odometry && has_pose),
+            ("landmarks", is_recent(self.landmarks_at_m)),
+            (GUIDED, is_recent(self.guided_at_m)),
+            ("laser", is_recent(self.laser_at_m)),
+            ("relocalisation", self.from_hypothesis),
         ];
         all.into_iter().filter(|(_, rests)| *rests).map(|(word, _)| word.to_owned()).collect()
     }

@@ -1,4 +1,4 @@
-//! What landmarks that were named by the pose may do to it, and how far a pose is trusted.
+//! What guided fixes may do to a pose, and how far a pose is trusted.
 
 use super::*;
 use v1::PoseTrust;
@@ -12,7 +12,7 @@ fn of(landmark: LandmarkId, x_m: f64) -> Fix {
     fix
 }
 
-/// A robot at x = 7 m more than its odometry says.
+/// A robot at x = 7 m more than its odometry fixes.
 struct Robot {
     motion: MotionTracker,
     r1: Name,
@@ -31,22 +31,22 @@ impl Robot {
         let x_m = 0.5 * self.seconds as f64;
         self.motion.odometry_of(&self.r1, odometry(self.seconds, x_m));
         let at = at(self.seconds as i64 * 1_000_000_000, x_m);
-        let known = self.motion.grounds(&self.r1, &front(), at).map(|grounds| grounds.pose);
+        let prior = self.motion.prior_pose(&self.r1, &front(), at).map(|prior| prior.pose);
         let fixed = independent.map(|fix| FixResult::Fixed(Box::new(fix.clone())));
-        let says = FrameFixes {
-            prior: known.as_ref(),
+        let fixes = FrameFixes {
+            prior: prior.as_ref(),
             independent: fixed.as_ref(),
             chosen: independent,
             guided,
             missed: &[],
             only_expected: false,
         };
-        self.motion.looked(&self.r1, &front(), at, &says)
+        self.motion.apply_frame(&self.r1, &front(), at, &fixes)
     }
 
     fn plan(&self) -> bool {
         let at = at(self.seconds as i64 * 1_000_000_000, 0.5 * self.seconds as f64);
-        self.motion.grounds(&self.r1, &front(), at).unwrap().plan.guided
+        self.motion.prior_pose(&self.r1, &front(), at).unwrap().plan.guided
     }
 
     fn total(&self, modality: &str, outcome: &str) -> u64 {
@@ -72,13 +72,13 @@ fn a_guided_fix_corrects_a_supported_pose_and_is_no_support() {
         (pose.trust(), pose.modalities.as_slice()),
         (PoseTrust::Supported, &["odometry".into(), "landmarks".into()][..])
     );
-    // Odometry says 8.0.
+    // Odometry fixes 8.0.
     let pose = robot.frame(None, Some(&of(DOOR, 8.02))).unwrap();
     let x_m = pose.map_from_robot.unwrap().pose.unwrap().x_m;
     assert!(x_m > 8.003 && x_m < 8.02, "{x_m}");
     assert_eq!(pose.modalities, ["odometry", "landmarks", "guided"]);
     assert_eq!((robot.total("guided", "applied"), robot.total("landmarks", "started")), (1, 1));
-    // 30 frames, or 10 m, on nothing has supported it but what it was asked for.
+    // After 30 frames, or 10 m, only guided fixes have agreed with it.
     let mut last = None;
     for _ in 0..40 {
         let x_m = 7.0 + 0.5 * (robot.seconds + 1) as f64;
@@ -90,7 +90,7 @@ fn a_guided_fix_corrects_a_supported_pose_and_is_no_support() {
 }
 
 #[test]
-fn while_a_landmark_contradicts_the_pose_nothing_guided_is_asked_for_or_used() {
+fn while_a_landmark_contradicts_the_pose_nothing_guided_is_searched_for_or_used() {
     let mut robot = Robot::new();
     robot.frame(Some(&of(POSTER, 7.5)), None).unwrap();
     assert!(robot.plan());
@@ -98,7 +98,7 @@ fn while_a_landmark_contradicts_the_pose_nothing_guided_is_asked_for_or_used() {
     let pose = robot.frame(Some(&of(LandmarkId(9), 11.0)), Some(&of(DOOR, 8.0))).unwrap();
     assert_eq!((pose.trust(), robot.total("guided", "applied")), (PoseTrust::Contradicted, 0));
     assert!(!robot.plan());
-    // Another landmark agrees with the first: it is the pose that was wrong.
+    // Another landmark agrees with the first: the pose was wrong.
     for x_m in [11.5, 12.0, 12.5] {
         robot.frame(Some(&of(LandmarkId(10), x_m)), None);
     }

@@ -49,7 +49,7 @@ impl Drive {
         last
     }
 
-    /// A frame without odometry is received at second `s` with stamp `stamp_s`, and judged.
+    /// Receives a frame without odometry at second `s` with stamp `stamp_s`, and checks the stamp.
     fn frame(&mut self, s: f64, stamp_s: f64, camera: &str) -> Result<(), i64> {
         self.seq += 1;
         let wire = v1::Frame {
@@ -73,7 +73,7 @@ impl Drive {
             return None;
         }
         let at = FrameStamp { odometry: None, now: time(s + 0.04), ..at(ns(stamp_s), 0.0) };
-        self.motion.fixed(&self.r1, at, &fix(s + 7.0))
+        self.motion.apply_fix(&self.r1, at, &fix(s + 7.0))
     }
 
     /// How far the pose at second `s` is off, and its standard deviation along x.
@@ -137,7 +137,7 @@ fn one_stray_stamp_of_slow_odometry_is_no_jump() {
     };
     send(1, 1.0);
     let there = FrameStamp { odometry: None, ..at(ns(1.0), 0.0) };
-    motion.fixed(&r1, there, &fix(10.0)).unwrap();
+    motion.apply_fix(&r1, there, &fix(10.0)).unwrap();
     send(2, 2.0).unwrap();
     send(3, 2.05).unwrap();
     let pose = send(4, 4.0).unwrap();
@@ -150,7 +150,7 @@ fn one_stray_stamp_of_a_frame_changes_nothing() {
         let mut drive = Drive::new();
         drive.on(2.0, 3.0).unwrap();
         let refused = drive.frame(3.0, 3.0 + off_s, "front");
-        // A second behind it may have been delayed; the fix by it contradicts the pose of its time and is left out.
+        // A stamp one second behind may be a delay. Its fix contradicts the pose of that time and is gated.
         assert_eq!(refused.is_err(), !(-2.0..=0.2).contains(&off_s), "{off_s}");
         if let Err(instead_ns) = refused {
             assert!((instead_ns - ns(3.0)).abs() < 1_000_000, "{off_s}: {instead_ns}");
@@ -160,7 +160,7 @@ fn one_stray_stamp_of_a_frame_changes_nothing() {
         drive.on(3.0, 4.0).unwrap();
         let (error, sigma) = drive.error(4.0);
         assert!(error <= sigma.max(0.03), "{off_s}: {error} m off, sigma {sigma} m");
-        // It waits for odometry of its time.
+        // The fix waits for odometry of its time.
         drive.fix(4.1, 4.1);
         let corrections = drive.on(4.0, 4.5).unwrap().corrections;
         assert!(corrections >= 2, "{off_s}");
@@ -186,7 +186,7 @@ fn one_stray_stamp_of_a_scan_changes_nothing() {
             motion.scan(&r1, wire.encode_to_vec().into(), time(s));
             if motion.counts().1.accepted > before {
                 let (robot, job) = motion.scans().take().unwrap();
-                motion.laser(&robot, &job, time(s));
+                motion.fix_by_scan(&robot, &job, time(s));
             }
         };
         let mut seq = 0;
@@ -204,7 +204,7 @@ fn one_stray_stamp_of_a_scan_changes_nothing() {
         on(0, 10);
         let pose = Pose2Covariance { pose: truth(0.9), covariance: Matrix3::identity() * 1e-4 };
         let first = FrameStamp { odometry: None, ..at(ns(0.9), 0.0) };
-        motion.fixed(&r1, first, &Fix { pose, ..fix(0.0) }).unwrap();
+        motion.apply_fix(&r1, first, &Fix { pose, ..fix(0.0) }).unwrap();
         on(10, 26);
         let next = on(26, 27).expect("a pose after the stray scan");
         assert_eq!(next.captured_ns, ns(2.6), "{off_s}");
@@ -221,7 +221,7 @@ fn one_stray_stamp_of_a_scan_changes_nothing() {
 }
 
 #[test]
-fn a_clock_that_was_set_is_followed_after_a_second() {
+fn a_clock_that_was_set_is_accepted_after_a_second() {
     for off_s in [HOUR, -HOUR, 5.0] {
         let mut drive = Drive::new();
         drive.on(2.0, 3.0).unwrap();
@@ -230,11 +230,11 @@ fn a_clock_that_was_set_is_followed_after_a_second() {
         assert_eq!(pose.captured_ns, ns(4.5 + off_s));
         assert!(pose.age_ms < 1.0, "{}", pose.age_ms);
         drive.is_right(4.5);
-        // The cameras go by the same clock.
+        // The cameras have the same clock.
         drive.frame(4.5, 4.5 + off_s, "front").unwrap();
         let captured_ns = ns(4.5 + off_s);
         let at = FrameStamp { captured_ns, odometry: None, now: time(4.5), ..at(0, 0.0) };
-        assert_eq!(drive.motion.fixed(&drive.r1, at, &fix(11.5)).unwrap().corrections, 2);
+        assert_eq!(drive.motion.apply_fix(&drive.r1, at, &fix(11.5)).unwrap().corrections, 2);
         let refused: u64 = drive.refused().values().sum();
         assert_eq!(refused, RATE, "{off_s}");
     }
@@ -254,7 +254,7 @@ fn odometry_that_jumped_with_the_clock_loses_the_pose() {
     assert_eq!(drive.motion.pose(&drive.r1, "hall", time(4.5)), None);
 }
 
-/// Two clocks in one robot: odometry wins, whatever came first.
+/// Two clocks in one robot: odometry wins, whichever came first.
 #[test]
 fn a_camera_by_another_clock_is_never_fused() {
     let mut drive = Drive::new();
@@ -288,14 +288,14 @@ fn a_robot_that_falls_silent_has_no_pose_after_the_named_time() {
     let pose = drive.on(2.0, 3.0).unwrap();
     assert!(pose.age_ms.abs() < 1.0, "{}", pose.age_ms);
     let max_s = MAX_POSE_AGE.as_secs_f64();
-    let known = drive.motion.known(&drive.r1, time(3.0 + max_s - 0.01)).unwrap();
+    let known = drive.motion.known_pose(&drive.r1, time(3.0 + max_s - 0.01)).unwrap();
     assert!((known.age.as_secs_f64() - max_s + 0.01).abs() < 1e-3);
-    assert_eq!(drive.motion.known(&drive.r1, time(3.0 + max_s + 0.01)), None);
+    assert_eq!(drive.motion.known_pose(&drive.r1, time(3.0 + max_s + 0.01)), None);
     assert_eq!(drive.motion.pose(&drive.r1, "hall", time(3.0 + max_s + 0.01)), None);
-    // A frame that took too long says where the robot was, not where it is.
+    // A frame that took too long gives a past pose, not the present one.
     drive.frame(3.0, 3.0, "front").unwrap();
     let late = FrameStamp { odometry: None, now: time(3.0 + max_s + 0.01), ..at(ns(3.0), 0.0) };
-    assert!(drive.motion.fixed(&drive.r1, late, &fix(10.0)).is_none());
+    assert!(drive.motion.apply_fix(&drive.r1, late, &fix(10.0)).is_none());
     // Odometry carries the pose on.
     assert!(drive.odometry(8.0, 0.0).is_some());
     drive.is_right(8.0);
@@ -307,9 +307,9 @@ fn odometry_once_a_second_has_a_pose_all_the_time() {
     let mut drive = Drive { motion, r1, seq: 0 };
     drive.odometry(1.0, 0.0);
     let there = FrameStamp { odometry: None, ..at(ns(1.0), 0.0) };
-    drive.motion.fixed(&drive.r1, there, &fix(8.0)).unwrap();
+    drive.motion.apply_fix(&drive.r1, there, &fix(8.0)).unwrap();
     for i in 2..20 {
-        assert!(drive.motion.known(&drive.r1, time(f64::from(i) - 0.001)).is_some());
+        assert!(drive.motion.known_pose(&drive.r1, time(f64::from(i) - 0.001)).is_some());
         assert!(drive.odometry(f64::from(i), 0.0).is_some());
     }
 }

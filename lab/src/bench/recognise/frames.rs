@@ -138,7 +138,7 @@ impl Timed<'_> {
         let clock = Clock::start();
         let guided = self.guide.look(i, frame, &scenes.camera);
         let ms = clock.ms();
-        self.guided.put(i, guided.sightings.iter().filter_map(|s| index(s.landmark)).collect(), ms);
+        self.guided.put(i, guided.observations.iter().filter_map(|s| index(s.landmark)).collect(), ms);
         facts.quads.len()
     }
 

@@ -4,7 +4,7 @@
 use super::scenes::{Scenes, number};
 use engine::{
     frame_context::FrameContext,
-    guided::{Guided, guided},
+    guided::{GuidedResult, recognise_guided},
     snapshot::{LandmarkInfo, MapSnapshot},
 };
 use map::{
@@ -96,17 +96,17 @@ impl Guide {
     }
 
     /// What the pose adds to frame `i`, of which nothing was detected.
-    pub(super) fn look(&self, i: usize, frame: &GrayImage, camera: &Intrinsics) -> Guided {
+    pub(super) fn look(&self, i: usize, frame: &GrayImage, camera: &Intrinsics) -> GuidedResult {
         let (pose, mounting) = &self.poses[i];
         let nothing = FrameAnalysis { quads: Vec::new() };
         let view = FrameContext {
-            facts: &nothing,
+            analysis: &nothing,
             map: &self.map,
-            mounting: Some(mounting),
+            extrinsics: Some(mounting),
             camera: Some(camera),
             image_px: [frame.width() as f64, frame.height() as f64],
             prior: None,
         };
-        guided(frame, &view, pose)
+        recognise_guided(frame, &view, pose)
     }
 }

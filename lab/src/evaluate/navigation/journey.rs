@@ -1,5 +1,5 @@
 //! One drive, with the code of the server's workers: scans and frames through `engine/motion.rs`, landmarks judged by
-//! `engine/judging.rs`, what that finds put into the map. No transport, no threads; the scan of a moment comes before its
+//! `engine/landmark_checks.rs`, what that finds put into the map. No transport, no threads; the scan of a moment comes before its
 //! frame. All of it is compared with the truth. The robot is told nothing of where it starts.
 
 use super::{
@@ -10,8 +10,8 @@ use super::{
 use engine::{
     frame_analysis::{StageTimes, analyse_frame},
     frame_context::FrameContext,
-    guided::{Guided, guided},
-    judging::{LandmarkChecks, judged_frame},
+    guided::{GuidedResult, recognise_guided},
+    landmark_checks::{LandmarkChecks, evaluate_frame},
     live::LiveHub,
     motion::{Corrections, FrameStamp as At, MotionTracker},
     scan_job::ScanJob,
@@ -144,7 +144,7 @@ impl Server {
 
     fn scan(&self, seen: &SensorReadings, odom_from_robot: Pose2, captured_ns: i64) {
         let scan = seen.scan.clone();
-        self.motion.laser(
+        self.motion.fix_by_scan(
             &self.robot,
             &ScanJob { map: MAP.to_owned(), epoch: EPOCH, captured_ns, odom_from_robot, scan },
             self.now,
@@ -155,28 +155,30 @@ impl Server {
     fn frame(
         &self,
         map: &MapSnapshot,
-        facts: &FrameAnalysis,
+        analysis: &FrameAnalysis,
         (seen, odom_from_robot): (&SensorReadings, Pose2),
         (wrong, captured_ns): (&SimulatedRobotErrors, i64),
-    ) -> (Vec<HealthChange>, Option<Guided>) {
+    ) -> (Vec<HealthChange>, Option<GuidedResult>) {
         let at = At { map: MAP, epoch: EPOCH, captured_ns, odometry: Some(odom_from_robot), now: self.now };
-        let mounting = wrong.mounting(&seen.step.robot_from_camera).ok();
+        let extrinsics = wrong.extrinsics(&seen.step.robot_from_camera).ok();
         let image = &seen.frame.image;
-        let view = FrameContext {
-            facts,
+        let frame = FrameContext {
+            analysis,
             map,
-            mounting: mounting.as_ref(),
+            extrinsics: extrinsics.as_ref(),
             camera: Some(&wrong.camera),
             image_px: [image.width() as f64, image.height() as f64],
             prior: None,
         };
-        let grounds = self.motion.grounds(&self.robot, &self.camera, at);
-        let guide = grounds.as_ref().filter(|g| g.plan.guided).map(|g| g.pose);
-        let guided = guide.map(|pose| guided(image, &view, &pose));
-        let judged = judged_frame(&view, grounds, guided.as_ref().unwrap_or(&Guided::default()));
-        self.motion.looked(&self.robot, &self.camera, at, &judged.fixes());
-        let found = |s: LandmarkChecks| self.motion.judged(&self.robot, at, &s.grounds, &s.judged, &s.missed);
-        (judged.seen.map_or_else(Vec::new, found), guided)
+        let prior = self.motion.prior_pose(&self.robot, &self.camera, at);
+        let guide = prior.as_ref().filter(|p| p.plan.guided).map(|p| p.pose);
+        let guided = guide.map(|pose| recognise_guided(image, &frame, &pose));
+        let evaluation = evaluate_frame(&frame, prior, guided.as_ref().unwrap_or(&GuidedResult::default()));
+        self.motion.apply_frame(&self.robot, &self.camera, at, &evaluation.fixes());
+        let changes = |c: LandmarkChecks| {
+            self.motion.update_landmark_health(&self.robot, at, &c.prior, &c.observed, &c.missed)
+        };
+        (evaluation.checks.map_or_else(Vec::new, changes), guided)
     }
 
     /// As the store does.
@@ -185,7 +187,7 @@ impl Server {
         next.version += 1;
         for change in changes {
             if let Some(info) = next.landmarks.get_mut(&change.landmark) {
-                info.standing = change.health;
+                info.health = change.health;
             }
         }
         self.snapshots.publish(Arc::new(next));
@@ -223,10 +225,11 @@ pub(super) fn drive(world: &World, way: Way) -> anyhow::Result<Journey> {
             server.scan(&seen, odom_from_robot, captured_ns);
         }
         let map = server.map()?;
-        let facts = analyse_frame(&seen.frame.image, Some(&wrong.camera), &map, &mut StageTimes::start());
-        let (changes, guided) = server.frame(&map, &facts, (&seen, odom_from_robot), (&wrong, captured_ns));
+        let analysis = analyse_frame(&seen.frame.image, Some(&wrong.camera), &map, &mut StageTimes::start());
+        let (changes, guided) =
+            server.frame(&map, &analysis, (&seen, odom_from_robot), (&wrong, captured_ns));
         let misled = journey.guided_false;
-        let shows = journey.score(world, &seen, &facts, guided.as_ref());
+        let shows = journey.score(world, &seen, &analysis, guided.as_ref());
         frames_that_show += usize::from(shows);
         if !changes.is_empty() {
             let of = |health| changes.iter().filter(|c| c.health == health).count();
@@ -259,8 +262,8 @@ impl Journey {
         &mut self,
         world: &World,
         seen: &SensorReadings,
-        facts: &FrameAnalysis,
-        guided: Option<&Guided>,
+        analysis: &FrameAnalysis,
+        guided: Option<&GuidedResult>,
     ) -> bool {
         let truth = &seen.frame.truth;
         let is_there = |id: LandmarkId, found: &Corners| {
@@ -268,7 +271,7 @@ impl Journey {
             view.is_some_and(|v| polygon::iou(found.points(), v.corners_px.points()) >= IOU_TRUE)
         };
         let mut global = Vec::new();
-        for quad in &facts.quads {
+        for quad in &analysis.quads {
             let Some(Verdict::Unique(id)) = quad.recognition.as_ref().map(|v| v.verdict) else {
                 continue;
             };
@@ -293,16 +296,16 @@ impl Journey {
             }
         }
         let mut with_pose = global.clone();
-        for sighting in guided.iter().flat_map(|guided| &guided.sightings) {
-            if is_there(sighting.landmark, &sighting.corners_px) {
-                with_pose.push(world.name(sighting.landmark));
-                if let Some(view) = truth.landmark(world.name(sighting.landmark)) {
-                    let group = match (sighting.quad, view.state) {
+        for observation in guided.iter().flat_map(|guided| &guided.observations) {
+            if is_there(observation.landmark, &observation.corners_px) {
+                with_pose.push(world.name(observation.landmark));
+                if let Some(view) = truth.landmark(world.name(observation.landmark)) {
+                    let group = match (observation.quad, view.state) {
                         (Some(_), _) => "detected, named by the pose",
                         (None, ViewState::Truncated) => "asked for, cut",
                         (None, _) => "asked for, not cut",
                     };
-                    let corners = (sighting.corners_px, sighting.covariance_px2);
+                    let corners = (observation.corners_px, observation.covariance_px2);
                     self.corners.entry(group).or_default().extend(off(&corners, view));
                 }
             } else {

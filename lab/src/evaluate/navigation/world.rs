@@ -13,7 +13,7 @@ use map::{
 use server::cli::{
     screen,
     simulated_errors::SimulatedRobotErrors,
-    survey::{SurveyView as Look, hang, survey},
+    survey::{SurveyView as Look, place_on_walls, survey},
 };
 use sim::{
     building::Building,
@@ -108,7 +108,7 @@ impl World {
         }
         let found: Vec<(&String, &Vec<Look>)> = survey.views.iter().collect();
         let lessons: Vec<Lesson> = of_each(&found, "views", |i, (name, looks)| {
-            let (mut place, agreed) = hang(looks, &survey.walls, &camera)?;
+            let (mut place, agreed) = place_on_walls(looks, &survey.walls, &camera)?;
             if true_lessons {
                 place = true_place(&building, name)?;
             }
@@ -117,7 +117,7 @@ impl World {
             let each = views.iter().step_by(views.len().div_ceil(NEGATIVES).max(1));
             let icons = each.map(|v| features(v.icon.clone(), &p.recognise)).collect();
             let photographs: Vec<_> =
-                looks.iter().map(|l| (&l.sighting.frame.image, &l.quad.corners_px)).collect();
+                looks.iter().map(|l| (&l.readings.frame.image, &l.quad.corners_px)).collect();
             let points = points_of(&photographs);
             Some(Lesson { name: (*name).clone(), place, views, icons, points })
         })
@@ -144,7 +144,7 @@ impl World {
 }
 
 fn views(looks: &[&Look], seed: u64, p: &Params) -> Vec<TrainingView> {
-    let image = |look: &Look| look.sighting.frame.image.clone();
+    let image = |look: &Look| look.readings.frame.image.clone();
     let photographed =
         looks.iter().filter_map(|l| TrainingView::photographed(&image(l), &l.quad.corners_px, p).ok());
     let mut views: Vec<TrainingView> = photographed.collect();
@@ -210,7 +210,7 @@ fn snapshot(
 
 fn take_true_corners(name: &str, looks: &mut [Look]) {
     for look in looks {
-        if let Some(truth) = look.sighting.frame.truth.landmark(name) {
+        if let Some(truth) = look.readings.frame.truth.landmark(name) {
             look.quad.corners_px = truth.corners_px;
         }
     }

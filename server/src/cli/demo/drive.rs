@@ -1,4 +1,4 @@
-//! The demo's second part: robots drive, send frames and odometry over zenoh, and are told where they are.
+//! The demo's second part: robots drive, send frames and odometry over zenoh, and receive their poses.
 
 use super::{Args, MAP};
 use crate::{
@@ -35,7 +35,7 @@ const FAR_END_M: f64 = 1e3;
 /// The pose that a frame led to follows its answer within this time.
 const POSE_WAIT: Duration = Duration::from_millis(20);
 
-/// What all robots lived through.
+/// Figures of all drives.
 #[derive(Debug, Default)]
 pub(super) struct Record {
     pub(super) robots: usize,
@@ -53,7 +53,7 @@ pub(super) struct Record {
     pub(super) latencies_ms: Vec<f64>,
 }
 
-/// Lets every robot drive to its end.
+/// Drives every robot to the end of its route.
 pub(super) async fn drive(
     building: &Arc<Building>,
     server: &RunningServer,
@@ -123,26 +123,26 @@ impl Journey {
         let mut next = Instant::now();
         loop {
             // Rendering is heavy: off the runtime.
-            let (seen, back) = tokio::task::spawn_blocking(move || {
-                let seen = robot.next();
-                (seen, robot)
+            let (next_readings, back) = tokio::task::spawn_blocking(move || {
+                let readings = robot.next();
+                (readings, robot)
             })
             .await?;
             robot = back;
-            let Some(sighting) = seen else { break };
+            let Some(readings) = next_readings else { break };
             tokio::time::sleep_until(next).await;
             next = Instant::now().max(next) + self.period;
-            let step = &sighting.step;
+            let step = &readings.step;
             self.live.truth(&self.robot, MAP, step.map_from_robot);
             self.client.publish_odometry(&step.odom_from_robot).await?;
-            let capture = Capture::encoded(pictures::jpeg(&sighting.frame.image)?)?
+            let capture = Capture::encoded(pictures::jpeg(&readings.frame.image)?)?
                 .with_intrinsics(&camera)
                 .with_mounting(&step.robot_from_camera)
                 .with_odometry(&step.odom_from_robot);
             self.record.frames += 1;
             let Ok(answer) = self.client.recognise(CAMERA, capture, ANSWER_TIMEOUT).await else { continue };
             self.record.answers += 1;
-            self.score(&answer, &sighting);
+            self.score(&answer, &readings);
             // The odometry brought one pose, a fix may bring a second: the last one counts.
             tokio::time::sleep(POSE_WAIT).await;
             let mut last = None;
@@ -158,9 +158,9 @@ impl Journey {
         Ok(self.record)
     }
 
-    fn score(&mut self, answer: &Answer, sighting: &SensorReadings) {
+    fn score(&mut self, answer: &Answer, readings: &SensorReadings) {
         self.record.latencies_ms.push(answer.latency_ms);
-        let truth = &sighting.frame.truth;
+        let truth = &readings.frame.truth;
         self.record.landmark_views += truth
             .landmarks
             .iter()

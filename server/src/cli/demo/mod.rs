@@ -1,9 +1,9 @@
 //! `waymark demo`: a server, a simulated corridor, a first drive that teaches, then robots that are localised.
-//! Everything goes the way it goes outside: lessons over HTTP, frames over zenoh. Only the building is simulated.
+//! Everything works as with real robots: lessons over HTTP, frames over zenoh. Only the building is simulated.
 
 mod drive;
-mod lesson;
 mod summary;
+mod teaching;
 
 use super::{scratch, screen};
 use crate::{
@@ -66,9 +66,9 @@ pub(crate) async fn run(args: &Args) -> anyhow::Result<ExitCode> {
     screen::complain(&format!("Waymark demo. Watch it at {url}"));
 
     let building = Arc::new(Building::corridor(args.seed));
-    let taught = lesson::teach(&building, &server, args.seed).await?;
+    let taught = teaching::teach(&building, &server, args.seed).await?;
     screen::complain(&format!(
-        "First drive: {} walls, {} of {} landmarks in use, learnt from {} views; in {} looks the poster was not found, \
+        "First drive: {} walls, {} of {} landmarks in use, learnt from {} views; in {} frames the poster was not found, \
          {} views did not agree with the others.",
         taught.walls,
         taught.active,

@@ -1,6 +1,6 @@
-//! What the demo's drives came to.
+//! The figures of the demo's drives.
 
-use super::{drive::Record, lesson::Taught};
+use super::{drive::Record, teaching::Taught};
 use serde::Serialize;
 
 /// Figures of one demo.

@@ -1,4 +1,4 @@
-//! One picture for every stage of the detector, and an overview of all. What the stages gave comes in, pictures go out.
+//! One picture for every stage of the detector, and an overview of all. In: the recorded stages. Out: pictures.
 
 use super::record::Record;
 use crate::cli::drawing::{BLUE, CYAN, Colour, GREEN, MAGENTA, ORANGE, Picture, RED, SERIES, WHITE, YELLOW};
@@ -13,8 +13,8 @@ const PANEL_WIDTH_PX: usize = 640;
 const MAX_FACTOR: usize = 8;
 /// Brightness of the image under the drawing.
 const UNDER: f32 = 0.55;
-/// Most hypotheses that are drawn, the best supported.
-const MAX_SEEDS: usize = 150;
+/// Quad proposals that are drawn: the best supported.
+const MAX_PROPOSALS: usize = 150;
 /// Columns of the overview.
 const COLUMNS: usize = 3;
 
@@ -131,7 +131,7 @@ fn segments(record: &Record, factor: usize) -> Picture {
     picture.with_legend(&words)
 }
 
-/// The paper's matched pairs, or the hypotheses of the search.
+/// The paper's matched pairs, or the quad proposals.
 fn pairs(record: &Record, factor: usize) -> Picture {
     let mut picture = under(record, factor, UNDER);
     for segment in &record.segments {
@@ -149,21 +149,21 @@ fn pairs(record: &Record, factor: usize) -> Picture {
     }
     let mut seeds: Vec<_> = record.seeds.iter().collect();
     seeds.sort_by(|a, b| b.fit.total_cmp(&a.fit));
-    seeds.truncate(MAX_SEEDS);
+    seeds.truncate(MAX_PROPOSALS);
     for seed in seeds.iter().rev() {
         for i in 0..4 {
             let (from, to) = (on(&seed.corners_px[i], factor), on(&seed.corners_px[(i + 1) % 4], factor));
-            let seen = seed.sides[i].is_some();
+            let has_segment = seed.sides[i].is_some();
             picture.line(
                 from,
                 to,
-                if seen { 1.2 } else { 0.8 },
-                if seen { support_colour(seed.fit) } else { CYAN },
+                if has_segment { 1.2 } else { 0.8 },
+                if has_segment { support_colour(seed.fit) } else { CYAN },
             );
         }
     }
     if record.pairs.is_empty() {
-        let count = format!("hypotheses: {}, the best {}", record.seeds.len(), seeds.len());
+        let count = format!("proposals: {}, the best {}", record.seeds.len(), seeds.len());
         let half = support_colour(0.5);
         picture.with_legend(&[
             (&count, WHITE),
@@ -183,7 +183,7 @@ fn support_colour(support: f64) -> Colour {
     std::array::from_fn(|i| (f64::from(ORANGE[i]) * (1.0 - t) + f64::from(GREEN[i]) * t) as u8)
 }
 
-/// Quads with their alternates and scores; the side that was not seen of a set of three is broken.
+/// Quads with their alternates and scores; the missing side of a three-sided set is a broken line.
 fn quads(record: &Record, factor: usize) -> Picture {
     let mut picture = under(record, factor, UNDER);
     let scale = factor as f64 / record.factor as f64;

@@ -29,7 +29,7 @@ pub(crate) struct Args {
     /// top-left pixel.
     #[arg(long)]
     json: bool,
-    /// Write pictures of every stage (edges, chains, segments, pairs or hypotheses, quads) and an overview here.
+    /// Write pictures of every stage (edges, chains, segments, pairs or proposals, quads) and an overview here.
     #[arg(long, value_name = "DIR")]
     draw: Option<PathBuf>,
     /// Print all parameters as JSON, as a file for --params, and end if there are no images.
@@ -54,7 +54,7 @@ struct QuadLine {
     kind: vision::detect::QuadKind,
     score: f64,
     side_support: [f64; 4],
-    /// Inner borders of the same thing, outermost first.
+    /// Inner borders of the same object, outermost first.
     alternates: Vec<[[f64; 2]; 4]>,
 }
 
@@ -99,7 +99,7 @@ pub(crate) fn files(named: &[PathBuf]) -> anyhow::Result<Vec<PathBuf>> {
         let mut inside = entries.map(|e| e.map(|e| e.path())).collect::<Result<Vec<_>, _>>()?;
         inside.retain(|p| pictures::is_picture(p));
         inside.sort();
-        // Without pictures it stays: that it is none is said when it is read.
+        // A folder without pictures stays in the list: reading it gives the error.
         if inside.is_empty() {
             inside.push(path.clone());
         }

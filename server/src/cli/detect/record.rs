@@ -1,4 +1,4 @@
-//! Everything that the detector reports on its way, kept for drawing.
+//! Everything that the detector reports, recorded for drawing.
 
 use vision::{
     detect::{
@@ -30,7 +30,7 @@ pub(crate) struct Record {
 }
 
 impl Record {
-    /// Detects once more and keeps everything.
+    /// Detects once more and records everything.
     pub(crate) fn of(image: &GrayImage, params: &DetectParams) -> Self {
         let mut record = Self {
             work: image.clone(),

@@ -1,4 +1,4 @@
-//! `waymark map build`: from a recording to a map.
+//! `waymark map build`: builds a map from a scan log.
 
 use super::LaserArgs;
 use crate::cli::{clock::Clock, screen};
@@ -38,7 +38,7 @@ impl Upload {
 /// `waymark map build`.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// The recording: a CARMEN log (FLASER or ROBOTLASER1 lines), numbered scans (`i dx dy dtheta r0 r1 ..`), or a
+    /// The scan log: a CARMEN log (FLASER or ROBOTLASER1 lines), numbered scans (`i dx dy dtheta r0 r1 ..`), or a
     /// Waymark recording; `.gz` is unpacked.
     #[arg(value_name = "LOG")]
     recording: PathBuf,
@@ -60,7 +60,7 @@ pub(crate) struct Args {
     upload: Upload,
 }
 
-/// A map and what it cost.
+/// A map and the time that it took.
 #[derive(Debug)]
 pub struct Built {
     /// The map.

@@ -5,7 +5,7 @@ use crate::{
     store::{
         landmarks,
         teaching::{self, Teaching},
-        views::{Cut, NewView},
+        views::{NewView, QuadCrop},
     },
 };
 use engine::picture;
@@ -39,18 +39,18 @@ fn corners() -> Corners {
 /// Adds a view whose stored picture is `bytes`.
 async fn teach(store: &Catalogue, landmark: &str, image: &GrayImage, bytes: Vec<u8>) {
     let photographed = TrainingView::photographed(image, &corners(), &Params::default()).unwrap();
-    let cut = Cut { corners_px: corners(), icon: photographed.icon };
+    let crop = QuadCrop { corners_px: corners(), icon: photographed.icon };
     let view = NewView {
         image_sha256: Sha256::digest(&bytes).into(),
         image: bytes,
         image_kind: "png",
         size_px: [image.width(), image.height()],
-        cut,
-        strangers: vec![],
+        crop,
+        distractors: vec![],
         capture: None,
     };
     let (map, landmark) = ("a".to_owned(), landmark.to_owned());
-    teaching::add(store, Teaching { map, landmark, view, max: 9, thinning: None }).await.unwrap();
+    teaching::add(store, Teaching { map, landmark, view, max: 9, novelty: None }).await.unwrap();
 }
 
 fn png(image: &GrayImage) -> Vec<u8> {
@@ -63,7 +63,7 @@ async fn earlier(config: &Config) -> (Catalogue, CatalogueTasks) {
     let (store, task) = Catalogue::open(config).await.unwrap();
     store.write(|tx| Box::pin(maps::create(tx, "a", DistanceKind::Both, 2))).await.unwrap();
     for (seed, name) in [(1, "whole"), (2, "damaged")] {
-        let none = landmarks::Measures::default();
+        let none = landmarks::LandmarkGeometry::default();
         let made = store.write(move |tx| Box::pin(landmarks::create(tx, "a", name, none, 5))).await.unwrap();
         let image = photograph(seed);
         let bytes = if name == "whole" { png(&image) } else { b"no picture".to_vec() };

@@ -1,14 +1,14 @@
 //! Derived data: when it is there, and what is computed.
 
 use super::super::{tests::config, *};
-use crate::store::{landmarks, laser, maps};
+use crate::store::{landmarks, maps, walls};
 use vision::recognise::DistanceKind;
 
 /// A map with a wall and two landmarks 40 m apart, so that neither's area reaches the other.
 async fn two_placed(store: &Store) -> [vision::model::LandmarkId; 2] {
     store.write(|tx| Box::pin(maps::create(tx, "a", DistanceKind::Both, 2))).await.unwrap();
     store
-        .write(|tx| Box::pin(async { laser::replace(tx, "a", &[[0.0, -0.1, 60.0, -0.1]]).await }))
+        .write(|tx| Box::pin(async { walls::replace(tx, "a", &[[0.0, -0.1, 60.0, -0.1]]).await }))
         .await
         .unwrap();
     let mut ids = [vision::model::LandmarkId(0); 2];
@@ -20,11 +20,11 @@ async fn two_placed(store: &Store) -> [vision::model::LandmarkId; 2] {
     ids
 }
 
-fn placed_at(x_m: f64) -> landmarks::Measures {
+fn placed_at(x_m: f64) -> landmarks::LandmarkGeometry {
     let (z_m, theta_rad) = (1.5, std::f64::consts::FRAC_PI_2);
-    landmarks::Measures {
+    landmarks::LandmarkGeometry {
         size: Some(vision::pose::LandmarkSize { width_m: 0.5, height_m: 0.7 }),
-        place: Some(landmarks::Place {
+        place: Some(landmarks::StoredPlace {
             x_m,
             y_m: 0.0,
             z_m,

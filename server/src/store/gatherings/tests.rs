@@ -1,13 +1,15 @@
 use super::*;
 use crate::{
     publication::{Catalogue, CatalogueTasks, tests::config},
-    store::{accepting, landmarks::Measures, maps},
+    store::{landmarks::LandmarkGeometry, maps, track_acceptance},
 };
 use map::tracks::StoredTrack;
 use vision::{geometry::Corners, icon::Icon, recognise::DistanceKind};
 
-const BOUNDS: Bounds = Bounds { open: 2, of_map: 3, tracks: 2, views: 2, bytes: 40 };
-const LIMITS: accepting::Bounds = accepting::Bounds { landmarks: 2, views: 3, jobs: (1, 5) };
+const GATHERING_LIMITS: GatheringLimits =
+    GatheringLimits { open: 2, of_map: 3, tracks: 2, views: 2, bytes: 40 };
+const ACCEPTANCE_LIMITS: track_acceptance::AcceptanceLimits =
+    track_acceptance::AcceptanceLimits { landmarks: 2, views: 3, jobs: (1, 5) };
 
 async fn store(dir: &std::path::Path) -> (Catalogue, CatalogueTasks) {
     let (store, task) = Catalogue::open(&config(dir)).await.unwrap();
@@ -20,7 +22,7 @@ async fn store(dir: &std::path::Path) -> (Catalogue, CatalogueTasks) {
 
 async fn begun(store: &Catalogue, robot: &str) -> Result<GatheringRow, StoreError> {
     let new = NewGathering { robot: robot.to_owned(), landmark: None, known: false };
-    store.write(move |tx| Box::pin(async move { create(tx, "a", &new, BOUNDS).await })).await
+    store.write(move |tx| Box::pin(async move { create(tx, "a", &new, GATHERING_LIMITS).await })).await
 }
 
 async fn kept(store: &Catalogue, id: i64, number: u32, picture: u8, bytes: usize) -> Result<(), StoreError> {
@@ -31,11 +33,16 @@ async fn kept(store: &Catalogue, id: i64, number: u32, picture: u8, bytes: usize
         image_sha256: [picture; 32],
         image_kind: "jpeg",
         size_px: [640, 480],
-        cut: Cut { corners_px: corners, icon: Icon::new(20, vec![f32::from(picture); 400], 1.0).unwrap() },
-        strangers: vec![],
+        crop: QuadCrop {
+            corners_px: corners,
+            icon: Icon::new(20, vec![f32::from(picture); 400], 1.0).unwrap(),
+        },
+        distractors: vec![],
         capture: None,
     };
-    store.write(move |tx| Box::pin(async move { add_view(tx, id, &track, &new, BOUNDS).await })).await
+    store
+        .write(move |tx| Box::pin(async move { add_view(tx, id, &track, &new, GATHERING_LIMITS).await }))
+        .await
 }
 
 fn at_bound<T: std::fmt::Debug>(result: &Result<T, StoreError>, what: &str) {
@@ -80,16 +87,17 @@ async fn every_bound_holds_and_a_refusal_changes_nothing() {
 async fn accepted(
     store: &Catalogue,
     id: i64,
-    picks: &[(u32, &str)],
-) -> Result<accepting::Accepted, StoreError> {
-    let picks: Vec<_> = picks
+    tracks: &[(u32, &str)],
+) -> Result<track_acceptance::AcceptanceResult, StoreError> {
+    let tracks: Vec<_> = tracks
         .iter()
-        .map(|(n, name)| accepting::Pick { number: *n, name: Some((*name).to_owned()) })
+        .map(|(n, name)| track_acceptance::TrackAcceptance { number: *n, name: Some((*name).to_owned()) })
         .collect();
     let lesson = Some(crate::jobs::request::Request::of as fn(&[String]) -> String);
     let (map, after) = ("a".to_owned(), std::sync::Arc::new(|| ()));
-    let decision = accepting::Decision { map, gathering: id, picks, lesson, bounds: LIMITS, after };
-    accepting::accept(store, decision).await
+    let decision =
+        track_acceptance::Decision { map, gathering: id, tracks, lesson, limits: ACCEPTANCE_LIMITS, after };
+    track_acceptance::accept(store, decision).await
 }
 
 #[tokio::test]
@@ -100,13 +108,16 @@ async fn an_acceptance_is_whole_or_nothing() {
     kept(&store, id, 1, 1, 10).await.unwrap();
     kept(&store, id, 1, 2, 10).await.unwrap();
     kept(&store, id, 2, 3, 10).await.unwrap();
-    store.write(|tx| Box::pin(landmarks::create(tx, "a", "taken", Measures::default(), 5))).await.unwrap();
+    store
+        .write(|tx| Box::pin(landmarks::create(tx, "a", "taken", LandmarkGeometry::default(), 5)))
+        .await
+        .unwrap();
     let landmarks = async || store.snapshots().get("a").unwrap().landmarks.len();
     // The second is not there; a new landmark is one too many; the job is one too many: nothing of the first stays.
     assert!(matches!(accepted(&store, id, &[(1, "x"), (7, "y")]).await, Err(StoreError::NotFound { .. })));
     at_bound(&accepted(&store, id, &[(1, "x"), (2, "y")]).await, "landmarks");
     assert_eq!((landmarks().await, track_views(store.reads(), id, 1).await.unwrap().len()), (1, 2));
-    // Two candidates of one thing, and a landmark that has no views yet.
+    // Two tracks of one object, and a landmark that has no views yet.
     let made = accepted(&store, id, &[(1, "taken"), (2, "taken")]).await.unwrap();
     assert_eq!(made.landmarks["taken"].0, 3);
     let job = made.job.unwrap();

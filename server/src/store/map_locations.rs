@@ -1,6 +1,6 @@
-//! Where maps belong (site, building, floor: words for people) and how they lie to each other (for poses).
+//! Locations of maps: site, building and floor as words for people, and map links for poses.
 
-use super::{Change, StoreError, Tx, maps, statements::statements};
+use super::{CommittedChange, StoreError, Tx, maps, statements::statements};
 use map::{
     map_links::{self, MapLink, MapLinks},
     pose2::{Pose2, Pose2Covariance},
@@ -15,13 +15,13 @@ statements! {
     SET = "UPDATE maps SET site = ?2, building = ?3, floor = ?4, parent_id = ?5, parent_from_map = ?6 WHERE id = ?1";
 }
 
-/// Where a map is.
+/// Location of a map.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(crate) struct Whereabouts {
+pub(crate) struct MapLocation {
     pub(crate) site: Option<String>,
     pub(crate) building: Option<String>,
     pub(crate) floor: Option<String>,
-    /// Where it lies in another.
+    /// Its link to another map.
     pub(crate) link: Option<MapLink<String>>,
 }
 
@@ -38,59 +38,59 @@ fn link_of(parent: String, bytes: &[u8]) -> Option<MapLink<String>> {
     let covariance = (covariance.len() == 9).then(|| Matrix3::from_row_slice(covariance))?;
     let pose = Pose2 { x_m: *x_m, y_m: *y_m, theta_rad: *theta_rad };
     let link = MapLink { parent, parent_from_map: Pose2Covariance { pose, covariance }, level_m: *level_m };
-    // Out of range (a file from elsewhere) counts as not known.
+    // A link out of range (a file of another program) counts as none.
     link.check().is_ok().then_some(link)
 }
 
-/// Of every map, by name.
-pub(crate) async fn all(db: impl SqliteExecutor<'_>) -> Result<BTreeMap<String, Whereabouts>, StoreError> {
-    let rows = sqlx::query(EACH).fetch_all(db).await.map_err(StoreError::at("list whereabouts"))?;
+/// The location of every map, by name.
+pub(crate) async fn all(db: impl SqliteExecutor<'_>) -> Result<BTreeMap<String, MapLocation>, StoreError> {
+    let rows = sqlx::query(EACH).fetch_all(db).await.map_err(StoreError::during("list map locations"))?;
     let one = |row: &SqliteRow| {
         let parent: Option<String> = row.try_get("parent")?;
         let bytes: Option<Vec<u8>> = row.try_get("parent_from_map")?;
-        let found = Whereabouts {
+        let location = MapLocation {
             site: row.try_get("site")?,
             building: row.try_get("building")?,
             floor: row.try_get("floor")?,
             link: parent.zip(bytes).and_then(|(parent, bytes)| link_of(parent, &bytes)),
         };
-        Ok((row.try_get("name")?, found))
+        Ok((row.try_get("name")?, location))
     };
-    rows.iter().map(one).collect::<Result<_, sqlx::Error>>().map_err(StoreError::at("list whereabouts"))
+    rows.iter().map(one).collect::<Result<_, sqlx::Error>>().map_err(StoreError::during("list map locations"))
 }
 
-/// How maps lie to each other.
-pub(crate) fn links(all: &BTreeMap<String, Whereabouts>) -> MapLinks<String> {
-    all.iter().filter_map(|(map, found)| Some((map.clone(), found.link.clone()?))).collect()
+/// The map links of all maps.
+pub(crate) fn links(all: &BTreeMap<String, MapLocation>) -> MapLinks<String> {
+    all.iter().filter_map(|(map, location)| Some((map.clone(), location.link.clone()?))).collect()
 }
 
-/// Says where a map is. `change` gets what is known and returns what shall be. Refused when a map would lie in itself.
+/// Sets the location of a map. `change` gets the present one and returns the new one. Errors: the links would form a cycle.
 pub(crate) async fn set(
     tx: &mut Tx,
     map: &str,
-    change: impl FnOnce(Whereabouts) -> Whereabouts + Send,
-) -> Result<Whereabouts, StoreError> {
+    change: impl FnOnce(MapLocation) -> MapLocation + Send,
+) -> Result<MapLocation, StoreError> {
     let row = maps::get(&mut tx.conn, map).await?;
-    let mut known = all(&mut tx.conn).await?;
-    let found = change(known.remove(map).unwrap_or_default());
-    let parent = match &found.link {
+    let mut locations = all(&mut tx.conn).await?;
+    let location = change(locations.remove(map).unwrap_or_default());
+    let parent = match &location.link {
         Some(link) => Some(maps::get(&mut tx.conn, &link.parent).await?.id),
         None => None,
     };
-    known.insert(map.to_owned(), found.clone());
-    map_links::check_all(&links(&known))?;
+    locations.insert(map.to_owned(), location.clone());
+    map_links::check_all(&links(&locations))?;
     sqlx::query(SET)
         .bind(row.id)
-        .bind(&found.site)
-        .bind(&found.building)
-        .bind(&found.floor)
+        .bind(&location.site)
+        .bind(&location.building)
+        .bind(&location.floor)
         .bind(parent)
-        .bind(found.link.as_ref().map(bytes_of))
+        .bind(location.link.as_ref().map(bytes_of))
         .execute(&mut tx.conn)
         .await
-        .map_err(StoreError::at("place map"))?;
-    tx.changed(Change::Links);
-    Ok(found)
+        .map_err(StoreError::during("locate map"))?;
+    tx.changed(CommittedChange::Links);
+    Ok(location)
 }
 
 #[cfg(test)]
@@ -100,40 +100,40 @@ mod tests {
     use nalgebra::Vector3;
     use vision::recognise::DistanceKind;
 
-    fn lies_in(parent: &str) -> Whereabouts {
+    fn linked_to(parent: &str) -> MapLocation {
         let covariance = Matrix3::from_diagonal(&Vector3::new(1e-2, 2e-2, 3e-4));
         let pose = Pose2::new(1.5, -2.0, 0.7);
         let parent_from_map = Pose2Covariance { pose, covariance };
         let link = MapLink { parent: parent.to_owned(), parent_from_map, level_m: 3.4 };
         let word = |text: &str| Some(text.to_owned());
-        Whereabouts { site: word("Works"), building: word("B 2"), floor: word("1st"), link: Some(link) }
+        MapLocation { site: word("Works"), building: word("B 2"), floor: word("1st"), link: Some(link) }
     }
 
     async fn put(
         store: &Catalogue,
         map: &'static str,
-        found: Whereabouts,
-    ) -> Result<Whereabouts, StoreError> {
-        store.write(move |tx| Box::pin(async move { set(tx, map, |_| found).await })).await
+        location: MapLocation,
+    ) -> Result<MapLocation, StoreError> {
+        store.write(move |tx| Box::pin(async move { set(tx, map, |_| location).await })).await
     }
 
     #[tokio::test]
-    async fn whereabouts_survive_and_no_map_lies_in_itself() {
+    async fn locations_survive_and_no_map_is_linked_to_itself() {
         let dir = tempfile::tempdir().unwrap();
         let config = crate::publication::tests::config(dir.path());
         let (store, task) = Catalogue::open(&config).await.unwrap();
         for map in ["a", "b", "c"] {
             store.write(move |tx| Box::pin(maps::create(tx, map, DistanceKind::Both, 3))).await.unwrap();
         }
-        put(&store, "b", lies_in("a")).await.unwrap();
-        put(&store, "c", lies_in("b")).await.unwrap();
+        put(&store, "b", linked_to("a")).await.unwrap();
+        put(&store, "c", linked_to("b")).await.unwrap();
         assert!(store.snapshots().relation("c", "a").is_some(), "published with the commit");
         assert!(matches!(
-            put(&store, "a", lies_in("c")).await,
+            put(&store, "a", linked_to("c")).await,
             Err(StoreError::Frames(map_links::MapLinkError::Cycle))
         ));
         assert!(matches!(
-            put(&store, "a", lies_in("z")).await,
+            put(&store, "a", linked_to("z")).await,
             Err(StoreError::NotFound { what: "map", .. })
         ));
         let refused = store.write(|tx| Box::pin(maps::delete(tx, "b"))).await;
@@ -145,9 +145,9 @@ mod tests {
         let (store, _task) = Catalogue::open(&config).await.unwrap();
         assert!(store.snapshots().relation("c", "a").is_some(), "and at the start");
         let known = all(store.reads()).await.unwrap();
-        assert_eq!(known["b"], lies_in("a"));
-        assert_eq!(known["a"], Whereabouts::default());
-        put(&store, "c", Whereabouts::default()).await.unwrap();
+        assert_eq!(known["b"], linked_to("a"));
+        assert_eq!(known["a"], MapLocation::default());
+        put(&store, "c", MapLocation::default()).await.unwrap();
         assert!(
             store.snapshots().relation("c", "a").is_none() && store.snapshots().relation("b", "a").is_some()
         );

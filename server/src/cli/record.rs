@@ -1,4 +1,5 @@
-//! `waymark run`: record a robot's run, tell where it really was, and so teach the map which modality to trust where.
+//! `waymark run`: records a robot's drive and gives its reference trajectory, so that the map learns which modality to trust
+//! where.
 
 use super::teach::{ServerArgs, counted, show};
 use anyhow::{Context as _, bail};
@@ -15,28 +16,28 @@ use std::path::PathBuf;
 /// `waymark run`.
 #[derive(Debug, clap::Subcommand)]
 pub(crate) enum Command {
-    /// Begin to record a run: what odometry, landmarks and the laser say. It lies in the server's memory.
+    /// Start a recording of odometry and of fixes by landmarks and laser, in the server's memory.
     Start {
         /// The robot.
         robot: String,
         #[command(flatten)]
         server: ServerArgs,
     },
-    /// What was recorded so far.
+    /// Show the recording's status.
     Status {
         /// The robot.
         robot: String,
         #[command(flatten)]
         server: ServerArgs,
     },
-    /// Give the recording up.
+    /// Cancel the recording.
     Cancel {
         /// The robot.
         robot: String,
         #[command(flatten)]
         server: ServerArgs,
     },
-    /// End the recording by telling where the robot really was: the map learns from it.
+    /// End the recording with the robot's reference trajectory: the map learns from it.
     Learn {
         /// The robot.
         robot: String,
@@ -53,7 +54,7 @@ pub(crate) enum Command {
         #[command(flatten)]
         server: ServerArgs,
     },
-    /// List the runs that a map has learnt from.
+    /// List the reference runs of a map.
     List {
         /// The map.
         #[arg(long)]
@@ -61,7 +62,7 @@ pub(crate) enum Command {
         #[command(flatten)]
         server: ServerArgs,
     },
-    /// Forget a run and what it showed.
+    /// Delete a reference run with its statistics.
     Forget {
         /// Number of the run.
         run: i64,
@@ -71,7 +72,7 @@ pub(crate) enum Command {
         #[command(flatten)]
         server: ServerArgs,
     },
-    /// Say what is fused where runs have told what is best, or ask.
+    /// Show or set the fusion mode of a map.
     Mode {
         /// The map.
         #[arg(long)]
@@ -98,14 +99,14 @@ pub(crate) async fn run(command: &Command) -> anyhow::Result<()> {
         }
         Command::Cancel { robot, server } => {
             MapClient::new(server.address())?.cancel_recording(robot).await?;
-            show(server, robot, "given up")
+            show(server, robot, "cancelled")
         }
         Command::Learn { robot, path, sigma_m, sigma_rad, server } => {
             let text =
                 std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
             let poses = poses(&text).with_context(|| path.display().to_string())?;
-            let known = ReferenceTrajectoryBody { poses, sigma_m: *sigma_m, sigma_rad: *sigma_rad };
-            let learnt = MapClient::new(server.address())?.finish_recording(robot, &known).await?;
+            let reference = ReferenceTrajectoryBody { poses, sigma_m: *sigma_m, sigma_rad: *sigma_rad };
+            let learnt = MapClient::new(server.address())?.finish_recording(robot, &reference).await?;
             show(server, &learnt, &learnt_lines(&learnt))
         }
         Command::List { map, server } => {
@@ -114,7 +115,7 @@ pub(crate) async fn run(command: &Command) -> anyhow::Result<()> {
         }
         Command::Forget { run, map, server } => {
             MapClient::new(server.address())?.delete_reference_run(map, *run).await?;
-            show(server, run, "forgotten")
+            show(server, run, "deleted")
         }
         Command::Mode { map, mode, server } => {
             let maps = MapClient::new(server.address())?;
@@ -133,7 +134,7 @@ pub(crate) async fn run(command: &Command) -> anyhow::Result<()> {
 fn recorded_line(r: &RecordingStatusBody) -> String {
     let state = match &r.reason {
         Some(reason) => format!("ended ({reason})"),
-        None => "goes on".to_owned(),
+        None => "active".to_owned(),
     };
     let [landmarks, laser] =
         [(r.landmarks, "landmark"), (r.laser, "scan")].map(|(n, what)| counted(n as u64, what));

@@ -1,9 +1,9 @@
-//! Places of landmarks from their views: those that say where the robot stood, on the walls of the map or under a ceiling
-//! of given height (method 11). A place by hand is never replaced.
+//! Placement of landmarks by their views (method 11). In: views with a capture, and the walls of the map or a ceiling of given
+//! height. Out: a place with covariance, or why there is none. A place by hand is never replaced.
 
 use super::{
     StoreError, Tx,
-    landmarks::{self, Measures, Place},
+    landmarks::{self, LandmarkGeometry, StoredPlace},
     statements::statements,
     views,
 };
@@ -33,42 +33,42 @@ statements! {
                 ORDER BY id DESC LIMIT 256";
 }
 
-/// Views that a place rests on at most, the newest; the number in `CAPTURES`.
+/// Views that a placement uses: the newest; the number in `CAPTURES`.
 const MAX_CAPTURES: usize = 256;
 /// Standard deviation of a taught corner, per coordinate, where nothing is known of it.
 const CORNER_SIGMA_PX: f64 = 1.0;
-/// Of a ceiling's height as it is given.
+/// Standard deviation of a given ceiling height.
 const CEILING_SIGMA_M: f64 = 0.02;
 
-/// Corners and capture of a view that was taken with a known pose.
+/// Corners (px) and capture (JSON) of a view.
 pub(super) type Captured = (Corners, String);
 
-/// How a picture was taken.
+/// How a picture was taken, as it is stored.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Capture {
+pub(crate) struct StoredCapture {
     intrinsics: v1::Intrinsics,
     map_from_robot: v1::Pose2Covariance,
     robot_from_camera: v1::Pose3,
     /// The landmark is under a ceiling so high, not on a wall.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     ceiling_height_m: Option<f64>,
-    /// Covariance of each corner by the noise of its edges: (uu, uv, vv), TL TR BR BL. What borders are off by besides is
-    /// added whenever it is used.
+    /// Covariance of each corner by the noise of its edges, px^2: (uu, uv, vv), TL TR BR BL. The error of borders is added
+    /// whenever it is used.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     corner_covariance_px2: Option<[[f64; 3]; 4]>,
 }
 
-/// The same, checked.
-struct Taken {
+/// A capture with checked values.
+struct CheckedCapture {
     camera: Intrinsics,
     map_from_robot: Pose2Covariance,
-    mounting: CameraExtrinsics,
+    extrinsics: CameraExtrinsics,
     ceiling: Option<Ceiling>,
     corners_px2: [Matrix2<f64>; 4],
 }
 
-impl From<CaptureMetadata> for Capture {
+impl From<CaptureMetadata> for StoredCapture {
     fn from(body: CaptureMetadata) -> Self {
         Self {
             intrinsics: body.intrinsics,
@@ -80,8 +80,8 @@ impl From<CaptureMetadata> for Capture {
     }
 }
 
-impl Capture {
-    /// Of a robot's own frame: everything is checked already.
+impl StoredCapture {
+    /// The capture of a robot's frame, whose values are checked already.
     pub(crate) fn of_robot(
         camera: &Intrinsics,
         map_from_robot: &Pose2Covariance,
@@ -96,26 +96,26 @@ impl Capture {
         }
     }
 
-    /// The corners were found by the detector, with these covariances.
-    pub(crate) fn corners_by_detector(&mut self, covariance_px2: &[Matrix2<f64>; 4]) {
+    /// Sets the covariances that the detector gave the corners, px^2.
+    pub(crate) fn set_detected_corners(&mut self, covariance_px2: &[Matrix2<f64>; 4]) {
         self.corner_covariance_px2 = Some(covariance_px2.map(|c| [c.m11, c.m12, c.m22]));
     }
 
-    /// What is wrong with it, by field.
+    /// Errors: a value is out of range; the rejection names its field.
     pub(crate) fn check(&self) -> Result<(), Rejection> {
-        self.taken().map(|_| ())
+        self.checked().map(|_| ())
     }
 
-    fn taken(&self) -> Result<Taken, Rejection> {
+    fn checked(&self) -> Result<CheckedCapture, Rejection> {
         let ceiling = self.ceiling_height_m.map(|height_m| Ceiling { height_m, sigma_m: CEILING_SIGMA_M });
         if let Some(Err(e)) = ceiling.map(|c| c.check()) {
             return Err(Rejection::new(protos::Code::OutOfRange, "ceiling_height_m", e.to_string()));
         }
-        Ok(Taken {
+        Ok(CheckedCapture {
             camera: geometry::intrinsics(&self.intrinsics).map_err(|r| r.inside("intrinsics"))?,
             map_from_robot: geometry::pose2_covariance(&self.map_from_robot)
                 .map_err(|r| r.inside("map_from_robot"))?,
-            mounting: geometry::mounting(&self.robot_from_camera)
+            extrinsics: geometry::mounting(&self.robot_from_camera)
                 .map_err(|r| r.inside("robot_from_camera"))?,
             ceiling,
             corners_px2: self.corners_px2()?,
@@ -123,8 +123,8 @@ impl Capture {
     }
 }
 
-impl Capture {
-    /// As far as it can be believed.
+impl StoredCapture {
+    /// Covariances of the corners with the error of borders, px^2; a default where none are stated.
     fn corners_px2(&self) -> Result<[Matrix2<f64>; 4], Rejection> {
         let Some(stated) = &self.corner_covariance_px2 else {
             return Ok([Matrix2::identity() * CORNER_SIGMA_PX.powi(2); 4]);
@@ -147,161 +147,175 @@ impl Capture {
     }
 }
 
-/// What came of placing.
+/// Whether a landmark was placed, and why not.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Placing {
+pub(crate) struct PlacementReport {
     /// The landmark has a place by its views now.
     pub(crate) placed: bool,
     /// Views with a robot pose that the place rests on.
     pub(crate) views_used: usize,
-    /// Why not: `by_hand` (a place by hand stays), or what is wrong with the views, with the residual.
+    /// Why it was not: `by_hand` (a place by hand stays), or what is wrong with the views, with the residual.
     pub(crate) reason: Option<String>,
 }
 
-/// What the views of a landmark say of its place; computed, not stored yet.
+/// The placement of a landmark by its views, not stored yet.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Made {
+pub(super) enum PlacementOutcome {
     /// The place by hand stays.
     ByHand,
-    /// They do not place it, and why.
-    Not(String),
-    /// Place and size, and how many views they rest on.
-    Placed(Box<Measures>, usize),
+    /// The views give no place, and why.
+    NotPlaced(String),
+    /// StoredPlace and size, and how many views they rest on.
+    Placed(Box<LandmarkGeometry>, usize),
 }
 
-/// Views of a landmark that say how they were taken, the newest first: as many as its place may rest on.
+/// The views of a landmark with a capture, newest first: at most [`MAX_CAPTURES`].
 pub(super) async fn captures(
     db: impl SqliteExecutor<'_>,
     landmark: i64,
 ) -> Result<Vec<Captured>, StoreError> {
     let rows = sqlx::query(CAPTURES).bind(landmark).fetch_all(db).await;
-    let rows = rows.map_err(StoreError::at("read captures"))?;
+    let rows = rows.map_err(StoreError::during("read captures"))?;
     let captured = |row: &SqliteRow| {
-        Ok((views::corners_in(row)?, row.try_get("capture").map_err(StoreError::at("read captures"))?))
+        Ok((views::corners_in(row)?, row.try_get("capture").map_err(StoreError::during("read captures"))?))
     };
     rows.iter().map(captured).collect()
 }
 
-/// Places a landmark, that is measured as `now`, by views that say where the robot stood, the newest first.
-pub(super) fn made(captures: &[Captured], walls: &[LaserSegment], now: &Measures) -> Made {
+/// Places a landmark with the present geometry `now` by its views with a capture, newest first.
+pub(super) fn place_landmark(
+    captures: &[Captured],
+    walls: &[LaserSegment],
+    now: &LandmarkGeometry,
+) -> PlacementOutcome {
     if now.place.is_some_and(|place| place.covariance.is_none()) {
-        return Made::ByHand;
+        return PlacementOutcome::ByHand;
     }
-    // What an older or newer program stored and this one does not understand is left out.
+    // A capture that another version of the program stored, and this one cannot read, is left out.
     let taken = |(corners, capture): &Captured| {
-        Some((*corners, serde_json::from_str::<Capture>(capture).ok()?.taken().ok()?))
+        Some((*corners, serde_json::from_str::<StoredCapture>(capture).ok()?.checked().ok()?))
     };
-    let looks: Vec<(Corners, Taken)> = captures.iter().take(MAX_CAPTURES).filter_map(taken).collect();
-    match placed(&looks, walls) {
+    let views: Vec<(Corners, CheckedCapture)> =
+        captures.iter().take(MAX_CAPTURES).filter_map(taken).collect();
+    match placed(&views, walls) {
         Ok(made) => {
             let by_hand = now.size.filter(|_| !now.size_from_views);
-            Made::Placed(Box::new(measures(&made.place, by_hand)), made.used.len())
+            PlacementOutcome::Placed(Box::new(geometry_of(&made.place, by_hand)), made.used.len())
         }
-        Err(error) => Made::Not(error.to_string()),
+        Err(error) => PlacementOutcome::NotPlaced(error.to_string()),
     }
 }
 
-/// Stores a place that was computed.
-pub(super) async fn put(tx: &mut Tx, map: &str, landmark: &str, made: Made) -> Result<Placing, StoreError> {
-    let not = |reason: String| Placing { placed: false, views_used: 0, reason: Some(reason) };
-    Ok(match made {
-        Made::ByHand => not("by_hand".to_owned()),
-        Made::Not(reason) => not(reason),
-        Made::Placed(measures, views_used) => {
-            landmarks::update(tx, map, landmark, move |_| *measures).await?;
-            Placing { placed: true, views_used, reason: None }
+/// Stores a computed placement.
+pub(super) async fn put(
+    tx: &mut Tx,
+    map: &str,
+    landmark: &str,
+    outcome: PlacementOutcome,
+) -> Result<PlacementReport, StoreError> {
+    let not = |reason: String| PlacementReport { placed: false, views_used: 0, reason: Some(reason) };
+    Ok(match outcome {
+        PlacementOutcome::ByHand => not("by_hand".to_owned()),
+        PlacementOutcome::NotPlaced(reason) => not(reason),
+        PlacementOutcome::Placed(geometry, views_used) => {
+            landmarks::update(tx, map, landmark, move |_| *geometry).await?;
+            PlacementReport { placed: true, views_used, reason: None }
         }
     })
 }
 
-/// Where a thing hangs by its views, without storing anything.
+/// The placement of a track by its views, without storing anything.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Preview {
+pub(crate) struct PlacementPreview {
     pub(crate) place: LandmarkPlace,
-    /// Which of the views given do not agree with it: they saw another border of the same thing, or something else.
-    pub(crate) apart: Vec<usize>,
-    /// How far off the normal the camera looked in the others, radians.
+    /// Indices of views that do not agree with the place: they show another border of the same object, or another object.
+    pub(crate) inconsistent: Vec<usize>,
+    /// Angles between the landmark's normal and the direction to the camera in the other views, rad.
     pub(crate) angles_rad: Vec<f64>,
 }
 
-/// Places a thing by views: corners and the JSON of the capture. A view without a capture agrees with everything.
+/// Places a track by its views: corners (px) and the JSON of the capture. A view without a capture agrees with any place.
 pub(crate) fn preview<'a>(
     views: impl Iterator<Item = (&'a Corners, Option<&'a str>)>,
     walls: &[LaserSegment],
-) -> Result<Preview, String> {
-    let taken = |text: &str| serde_json::from_str::<Capture>(text).ok()?.taken().ok();
-    let (numbers, looks): (Vec<usize>, Vec<(Corners, Taken)>) = views
+) -> Result<PlacementPreview, String> {
+    let taken = |text: &str| serde_json::from_str::<StoredCapture>(text).ok()?.checked().ok();
+    let (numbers, used): (Vec<usize>, Vec<(Corners, CheckedCapture)>) = views
         .enumerate()
         .filter_map(|(i, (corners, capture))| Some((i, (*corners, taken(capture?)?))))
         .unzip();
-    let made = placed(&looks, walls).map_err(|error| error.to_string())?;
+    let made = placed(&used, walls).map_err(|error| error.to_string())?;
     let pose = made.place.map_from_landmark();
     let (normal, centre) = (pose.rotation * Vector3::x(), pose.translation.vector);
     let angle = |i: &usize| {
-        let (_, taken) = &looks[*i];
-        let camera = taken.map_from_robot.pose.to_isometry3() * taken.mounting.robot_from_camera;
+        let (_, taken) = &used[*i];
+        let camera = taken.map_from_robot.pose.to_isometry3() * taken.extrinsics.robot_from_camera;
         normal.angle(&(camera.translation.vector - centre))
     };
-    Ok(Preview {
+    Ok(PlacementPreview {
         place: made.place,
-        apart: (0..looks.len()).filter(|i| !made.used.contains(i)).map(|i| numbers[i]).collect(),
+        inconsistent: (0..used.len()).filter(|i| !made.used.contains(i)).map(|i| numbers[i]).collect(),
         angles_rad: made.used.iter().map(angle).collect(),
     })
 }
 
-fn view((corners, taken): &(Corners, Taken)) -> PosedView<'_> {
+fn view((corners, taken): &(Corners, CheckedCapture)) -> PosedView<'_> {
     PosedView {
         corners,
         covariance_px2: &taken.corners_px2,
         camera: &taken.camera,
         map_from_robot: &taken.map_from_robot,
-        mounting: &taken.mounting,
+        mounting: &taken.extrinsics,
     }
 }
 
-/// `used` are indices of `looks`.
-fn placed(looks: &[(Corners, Taken)], walls: &[LaserSegment]) -> Result<Placement, PlacementError> {
+/// A placement by walls, or by the ceiling that the first view states. `used` are indices of `views`.
+fn placed(views: &[(Corners, CheckedCapture)], walls: &[LaserSegment]) -> Result<Placement, PlacementError> {
     let p = PlacementParams::default();
-    // The last view says what it hangs on.
-    let ceiling = looks.first().and_then(|(_, taken)| taken.ceiling);
+    // The newest view decides between wall and ceiling.
+    let ceiling = views.first().and_then(|(_, taken)| taken.ceiling);
     let mut why = PlacementError::NoView;
     if let Some(ceiling) = ceiling {
-        let (mut seen, mut from) = (vec![], vec![]);
-        for (i, look) in looks.iter().enumerate() {
-            match view_on_ceiling(&view(look), &ceiling, &p) {
+        let (mut rectangles, mut from) = (vec![], vec![]);
+        for (i, posed) in views.iter().enumerate() {
+            match view_on_ceiling(&view(posed), &ceiling, &p) {
                 Ok(view) => {
-                    seen.push(view);
+                    rectangles.push(view);
                     from.push(i);
                 }
                 Err(error) => why = error,
             }
         }
-        return if seen.is_empty() {
+        return if rectangles.is_empty() {
             Err(why)
         } else {
-            Ok(named(&ceiling_placement(&seen, &ceiling, &p)?, &from))
+            Ok(with_indices(&ceiling_placement(&rectangles, &ceiling, &p)?, &from))
         };
     }
-    let (mut seen, mut from) = (vec![], vec![]);
-    for (i, look) in looks.iter().enumerate() {
-        match view_on_wall(&view(look), walls, &p) {
+    let (mut rectangles, mut from) = (vec![], vec![]);
+    for (i, posed) in views.iter().enumerate() {
+        match view_on_wall(&view(posed), walls, &p) {
             Ok(view) => {
-                seen.push(view);
+                rectangles.push(view);
                 from.push(i);
             }
             Err(error) => why = error,
         }
     }
-    if seen.is_empty() { Err(why) } else { Ok(named(&placement(&seen, walls, &p)?, &from)) }
+    if rectangles.is_empty() {
+        Err(why)
+    } else {
+        Ok(with_indices(&placement(&rectangles, walls, &p)?, &from))
+    }
 }
 
-/// `used` by the numbers that views had before the unfit ones were left out.
-fn named(made: &Placement, from: &[usize]) -> Placement {
+/// The placement with `used` as indices of all views, before unfit ones were left out.
+fn with_indices(made: &Placement, from: &[usize]) -> Placement {
     Placement { used: made.used.iter().filter_map(|i| from.get(*i).copied()).collect(), place: made.place }
 }
 
-/// A size by hand stays, and is as sure as a tape.
-fn measures(place: &LandmarkPlace, by_hand: Option<LandmarkSize>) -> Measures {
+/// Geometry by views. A size by hand stays, with the covariance of a size by hand.
+fn geometry_of(place: &LandmarkPlace, by_hand: Option<LandmarkSize>) -> LandmarkGeometry {
     let mut covariance = place.covariance;
     if by_hand.is_some() {
         let variance = PlaceSigmas::default().size_m.powi(2);
@@ -311,9 +325,9 @@ fn measures(place: &LandmarkPlace, by_hand: Option<LandmarkSize>) -> Measures {
             covariance[(k, k)] = variance;
         }
     }
-    Measures {
+    LandmarkGeometry {
         size: Some(by_hand.unwrap_or(place.size)),
-        place: Some(Place {
+        place: Some(StoredPlace {
             x_m: place.x_m,
             y_m: place.y_m,
             z_m: place.z_m,

@@ -2,9 +2,10 @@ use super::*;
 use crate::{
     publication::Catalogue,
     store::{
-        laser, maps,
+        maps,
         teaching::{self, Teaching},
         views::NewView,
+        walls,
     },
 };
 use map::{extrinsics::pan_tilt, pose2::Pose2};
@@ -41,7 +42,7 @@ pub(in crate::store) fn seen_from(x: f64, number: u8, shift_px: f64) -> NewView 
     let mut px = corner_points(&SIZE).map(|p| pixel(&seen, &p, &camera).unwrap());
     px[1].y += shift_px;
     let spread = Matrix3::from_diagonal(&Vector3::new(1e-4, 1e-4, 1e-5));
-    let capture = Capture {
+    let capture = StoredCapture {
         intrinsics: geometry::intrinsics_wire(&camera),
         map_from_robot: geometry::pose2_covariance_wire(&Pose2Covariance { pose: robot, covariance: spread }),
         robot_from_camera: geometry::pose3_wire(&mounting),
@@ -54,18 +55,18 @@ pub(in crate::store) fn seen_from(x: f64, number: u8, shift_px: f64) -> NewView 
         image_sha256: [number; 32],
         image_kind: "png",
         size_px: [640, 480],
-        cut: views::Cut {
+        crop: views::QuadCrop {
             corners_px: Corners::new(px).unwrap(),
             icon: Icon::new(20, vec![7.0; 400], 1.0).unwrap(),
         },
-        strangers: vec![],
+        distractors: vec![],
         capture: Some(serde_json::to_string(&capture).unwrap()),
     }
 }
 
-async fn taught(store: &Catalogue, view: NewView) -> Placing {
+async fn taught(store: &Catalogue, view: NewView) -> PlacementReport {
     let (map, landmark) = ("a".to_owned(), "p1".to_owned());
-    let teaching = Teaching { map, landmark, view, max: 100, thinning: None };
+    let teaching = Teaching { map, landmark, view, max: 100, novelty: None };
     teaching::add(store, teaching).await.unwrap().2.unwrap()
 }
 
@@ -75,27 +76,29 @@ async fn a_taught_landmark_is_placed_on_its_wall_and_a_place_by_hand_stays() {
     let config = crate::publication::tests::config(dir.path());
     let (store, _task) = Catalogue::open(&config).await.unwrap();
     store.write(|tx| Box::pin(maps::create(tx, "a", DistanceKind::Both, 2))).await.unwrap();
-    let made =
-        store.write(|tx| Box::pin(landmarks::create(tx, "a", "p1", Measures::default(), 5))).await.unwrap();
+    let made = store
+        .write(|tx| Box::pin(landmarks::create(tx, "a", "p1", LandmarkGeometry::default(), 5)))
+        .await
+        .unwrap();
     let none = taught(&store, seen_from(1.0, 1, 0.0)).await;
     assert!(!none.placed && none.reason.as_ref().is_some_and(|r| r.contains("no wall")), "{none:?}");
-    store.write(|tx| Box::pin(laser::replace(tx, "a", &[[0.0, 0.0, 6.0, 0.0]]))).await.unwrap();
+    store.write(|tx| Box::pin(walls::replace(tx, "a", &[[0.0, 0.0, 6.0, 0.0]]))).await.unwrap();
     let placed = taught(&store, seen_from(3.2, 2, 0.0)).await;
-    assert_eq!(placed, Placing { placed: true, views_used: 2, reason: None });
+    assert_eq!(placed, PlacementReport { placed: true, views_used: 2, reason: None });
     let of =
         |store: &Catalogue| store.snapshots().get("a").unwrap().landmarks[&LandmarkId(made.id as u64)].place;
     let place = of(&store).unwrap();
     assert!((place.x_m - 2.0).abs() < 1e-6 && place.y_m.abs() < 1e-6 && (place.z_m - 1.5).abs() < 1e-6);
     assert!((place.size.width_m - 0.6).abs() < 1e-6);
-    // Its covariance, not a tape's: one look at 1 px is worth less across the wall than the wall itself.
+    // Its covariance follows from the views: across the wall, corners at 1 px give less than the wall itself.
     let hand = PlaceSigmas::default();
-    let row = landmarks::get(store.reads(), "a", "p1").await.unwrap().measures;
+    let row = landmarks::get(store.reads(), "a", "p1").await.unwrap().geometry;
     assert!(row.size_from_views && row.place.unwrap().covariance.is_some());
     assert!((place.covariance[(0, 0)].sqrt() - hand.position_m).abs() > 1e-6);
     // A view that is no rectangle on that wall is said to be so when there is no other.
     let by_hand = store.write(|tx| {
-        Box::pin(landmarks::update(tx, "a", "p1", |old| Measures {
-            place: old.place.map(|p| Place { x_m: 2.5, covariance: None, ..p }),
+        Box::pin(landmarks::update(tx, "a", "p1", |old| LandmarkGeometry {
+            place: old.place.map(|p| StoredPlace { x_m: 2.5, covariance: None, ..p }),
             ..old
         }))
     });
@@ -109,11 +112,11 @@ async fn a_taught_landmark_is_placed_on_its_wall_and_a_place_by_hand_stays() {
 fn what_is_not_on_the_wall_is_refused_with_the_residual() {
     let wall = LaserSegment::by_hand(&[0.0, 0.0, 6.0, 0.0]).unwrap();
     let new = seen_from(1.0, 1, 60.0);
-    let capture: Capture = serde_json::from_str(new.capture.as_deref().unwrap()).unwrap();
-    let refused = placed(&[(new.cut.corners_px, capture.taken().unwrap())], &[wall]).unwrap_err();
+    let capture: StoredCapture = serde_json::from_str(new.capture.as_deref().unwrap()).unwrap();
+    let refused = placed(&[(new.crop.corners_px, capture.checked().unwrap())], &[wall]).unwrap_err();
     assert!(matches!(refused, PlacementError::NotOnWall { rms_m, .. } if rms_m > 0.05), "{refused:?}");
     assert!(refused.to_string().contains("not on this wall"));
-    let high = Capture { ceiling_height_m: Some(101.0), ..capture };
+    let high = StoredCapture { ceiling_height_m: Some(101.0), ..capture };
     assert_eq!(high.check().unwrap_err().field, "ceiling_height_m");
 }
 
@@ -121,20 +124,20 @@ fn what_is_not_on_the_wall_is_refused_with_the_residual() {
 fn corners_are_worth_what_is_known_of_them_and_no_more_than_borders_are() {
     let wall = LaserSegment::by_hand(&[0.0, 0.0, 6.0, 0.0]).unwrap();
     let new = seen_from(1.0, 1, 0.0);
-    let silent: Capture = serde_json::from_str(new.capture.as_deref().unwrap()).unwrap();
-    let with = |corner| Capture { corner_covariance_px2: Some([corner; 4]), ..silent.clone() };
-    let width = |capture: &Capture| {
-        let made = placed(&[(new.cut.corners_px, capture.taken().unwrap())], std::slice::from_ref(&wall));
+    let silent: StoredCapture = serde_json::from_str(new.capture.as_deref().unwrap()).unwrap();
+    let with = |corner| StoredCapture { corner_covariance_px2: Some([corner; 4]), ..silent.clone() };
+    let width = |capture: &StoredCapture| {
+        let made = placed(&[(new.crop.corners_px, capture.checked().unwrap())], std::slice::from_ref(&wall));
         made.unwrap().place.covariance[(4, 4)]
     };
     let by_detector = {
         let mut capture = silent.clone();
-        capture.corners_by_detector(&[Matrix2::identity() * 0.04; 4]);
-        // It comes back from the store as it went in.
-        serde_json::from_str::<Capture>(&serde_json::to_string(&capture).unwrap()).unwrap()
+        capture.set_detected_corners(&[Matrix2::identity() * 0.04; 4]);
+        // It survives the JSON of the store.
+        serde_json::from_str::<StoredCapture>(&serde_json::to_string(&capture).unwrap()).unwrap()
     };
     // The width is all corners', so its variance goes with theirs: 1 px; 0.2 px and what borders are off by.
-    let camera = width(&Capture {
+    let camera = width(&StoredCapture {
         intrinsics: v1::Intrinsics {
             focal_sigma_px: Some(0.0),
             center_sigma_px: Some(0.0),
@@ -143,10 +146,10 @@ fn corners_are_worth_what_is_known_of_them_and_no_more_than_borders_are() {
         ..silent.clone()
     });
     assert!(width(&by_detector) < width(&silent) && camera < width(&silent));
-    assert_eq!(by_detector.taken().unwrap().corners_px2[3], Matrix2::identity() * 0.13);
-    assert_eq!(silent.taken().unwrap().corners_px2[0], Matrix2::identity());
-    // Whoever states nothing but certainty is not believed.
-    assert_eq!(with([0.0; 3]).taken().unwrap().corners_px2[0], Matrix2::identity() * 0.09);
+    assert_eq!(by_detector.checked().unwrap().corners_px2[3], Matrix2::identity() * 0.13);
+    assert_eq!(silent.checked().unwrap().corners_px2[0], Matrix2::identity());
+    // A stated covariance of zero is replaced by the error of borders.
+    assert_eq!(with([0.0; 3]).checked().unwrap().corners_px2[0], Matrix2::identity() * 0.09);
     assert!(with([1e8, 0.0, 1e8]).check().is_ok());
     for bad in [[1.1e8, 0.0, 1.0], [1.0, 1.1, 1.0], [-0.1, 0.0, -0.1], [1.0, f64::NAN, 1.0]] {
         assert_eq!(with(bad).check().unwrap_err().field, "corner_covariance_px2[0]");

@@ -1,12 +1,12 @@
-//! What robots find out about landmarks, on its way to whoever keeps the map: moved, missing, in place again. The store
-//! commits it, then the new version of the map is what every frame sees.
+//! Findings about landmarks (moved, missing, in place again) on their way to whoever stores the map. The store commits a
+//! finding; every frame after that sees the new version of the map.
 
 use map::landmark_health::{Finding, HealthChange, LandmarkHealth};
 use serde_json::json;
 use tokio::sync::mpsc::{Receiver, Sender, channel, error::TrySendError};
 use vision::model::LandmarkId;
 
-/// Findings that wait for the store; beyond that they are dropped, and found again.
+/// Findings that wait for the store. More are dropped: later frames give them again.
 const QUEUE: usize = 256;
 
 /// A finding about a landmark of a map.
@@ -18,14 +18,14 @@ pub struct LandmarkFinding {
     pub landmark: LandmarkId,
     /// Its name.
     pub name: String,
-    /// How far to trust it from now on.
-    pub standing: LandmarkHealth,
-    /// JSON: why; none for a sound one.
+    /// Its health from now on.
+    pub health: LandmarkHealth,
+    /// The reason, as JSON; `None` for a sound landmark.
     pub finding: Option<String>,
 }
 
 impl LandmarkFinding {
-    /// Of what a robot's watch says.
+    /// The finding for a change of health that a robot's frames led to.
     pub fn new(map: &str, name: &str, change: &HealthChange) -> Self {
         let finding = change.finding.map(|finding| match finding {
             Finding::Moved { observed_place: at, offset_m, sightings } => json!({
@@ -40,37 +40,39 @@ impl LandmarkFinding {
             map: map.to_owned(),
             landmark: change.landmark,
             name: name.to_owned(),
-            standing: change.health,
+            health: change.health,
             finding: finding.map(|f| f.to_string()),
         }
     }
 }
 
-/// Takes findings from workers, who never wait.
+/// Takes findings from workers. Never waits.
 #[derive(Debug, Clone)]
 pub struct FindingSender(Sender<LandmarkFinding>);
 
-/// Both ends.
+/// A queue of findings: both ends.
 pub fn findings() -> (FindingSender, Receiver<LandmarkFinding>) {
     let (sender, receiver) = channel(QUEUE);
     (FindingSender(sender), receiver)
 }
 
 impl FindingSender {
-    /// Passes one on.
-    pub fn tell(&self, found: LandmarkFinding) {
-        let is_quarantined = found.standing == LandmarkHealth::Quarantined;
-        let follows = is_quarantined.then_some("excluded from fixes until a person decides");
-        tracing::warn!(
-            map = found.map,
-            landmark = found.name,
-            health = ?found.standing,
-            finding = found.finding,
-            follows,
-            "landmark_health_changed"
-        );
+    /// Queues a finding, or drops it if the queue is full.
+    pub fn send(&self, found: LandmarkFinding) {
+        let LandmarkFinding { map, name, health, finding, .. } = &found;
+        let follows = match health {
+            LandmarkHealth::Quarantined => "excluded from fixes until a person decides",
+            LandmarkHealth::Flagged => "used for fixes as before; a person should check its place",
+            LandmarkHealth::Sound => "used for fixes",
+        };
+        tracing::warn!(map, landmark = name, ?health, finding, follows, "landmark_health_changed");
         if let Err(TrySendError::Full(found)) = self.0.try_send(found) {
-            tracing::warn!(landmark = found.name, "too many findings at once: this one is dropped");
+            tracing::warn!(
+                map = found.map,
+                landmark = found.name,
+                follows = "a later frame gives it again",
+                "landmark_finding_dropped"
+            );
         }
     }
 }

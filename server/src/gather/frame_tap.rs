@@ -1,4 +1,5 @@
-//! The frame path's end of gathering: what a worker offers, to whom, and what is counted on the way. Never waits.
+//! The gatherings' side of the workers' frame tap. In: analysed frames of robots that gather. Out: the same, queued and
+//! counted. Never waits.
 
 use crate::store::gatherings::GatheringRow;
 use arc_swap::ArcSwap;
@@ -16,57 +17,57 @@ use std::{
 use tokio::sync::mpsc::{Receiver, Sender, channel, error::TrySendError};
 use vision::model::LandmarkId;
 
-/// Frames that wait to be followed; beyond that they are dropped.
+/// Frames that wait; further ones are dropped.
 pub(crate) const QUEUE: usize = 8;
 
-/// What became of frames and quads. Stored as JSON when the gathering ends: the other words are of earlier builds.
+/// Counts of a gathering's frames and quads, stored as JSON when it ends; the aliases are words of earlier builds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(default)]
-pub(crate) struct Counts {
+pub(crate) struct GatheringCounts {
     /// Frames offered.
     pub(crate) frames: u64,
-    /// Of these, dropped because others were still being followed.
+    /// Of these, dropped because the queue was full.
     pub(crate) dropped: u64,
     /// Frames on another map.
     #[serde(alias = "elsewhere")]
     pub(crate) other_map: u64,
-    /// Quads that were too small, cut off or blurred to have an icon.
+    /// Quads that were too small, clipped or blurred to have an icon.
     pub(crate) unusable: u64,
     /// Quads that are not flat on a wall of the map.
     pub(crate) not_on_wall: u64,
-    /// Views kept.
+    /// Views that were stored.
     pub(crate) kept: u64,
-    /// Quads that repeat a stored view.
+    /// Quads that are near-duplicates of a view.
     #[serde(alias = "alike")]
     pub(crate) near_duplicate: u64,
-    /// Quads not yet observed often enough.
+    /// Quads with too few observations so far.
     #[serde(alias = "too_new")]
     pub(crate) too_few_observations: u64,
-    /// Quads of tracks that have all the views they may have.
+    /// Quads of tracks with all the views that they may have.
     pub(crate) full: u64,
-    /// Quads of tracks that were decided on.
+    /// Quads of tracks that were accepted or discarded.
     pub(crate) decided: u64,
-    /// Quads that show a landmark, or may.
+    /// Quads that show a landmark, or may show one.
     #[serde(alias = "known")]
     pub(crate) known_landmark: u64,
-    /// Quads that are no landmark, where only landmarks are wanted.
+    /// Quads that show no landmark, where only landmarks are wanted.
     #[serde(alias = "unwanted")]
     pub(crate) not_requested: u64,
-    /// Quads at the place of a track that look different.
+    /// Quads at the place of a track with another appearance.
     #[serde(alias = "unlike")]
     pub(crate) appearance_mismatch: u64,
     /// Quads beyond the number of tracks.
     #[serde(alias = "too_many")]
     pub(crate) track_limit: u64,
-    /// Views that were not stored because a bound was reached or the disk is full.
+    /// Views that were not stored because a bound was reached or the disk was full.
     #[serde(alias = "refused")]
     pub(crate) not_stored: u64,
 }
 
-impl Counts {
+impl GatheringCounts {
     pub(super) fn add(&mut self, outcome: TrackOutcome) {
         let count = match outcome {
-            // Counted when it is committed.
+            // Counted after the commit.
             TrackOutcome::Keep(_) => return,
             TrackOutcome::NearDuplicate => &mut self.near_duplicate,
             TrackOutcome::TooFewObservations => &mut self.too_few_observations,
@@ -83,24 +84,24 @@ impl Counts {
 
 /// A robot that gathers.
 #[derive(Debug)]
-pub struct Session {
+pub struct ActiveGathering {
     pub(super) id: i64,
     map: String,
     pub(super) landmark: Option<LandmarkId>,
     pub(super) known: bool,
-    /// Short holds only: workers count here.
-    pub(super) counts: Mutex<Counts>,
+    /// Workers count here: held briefly only.
+    pub(super) counts: Mutex<GatheringCounts>,
     pub(super) tracker: Mutex<ViewTracker>,
-    /// Tracks that somebody has decided on since the last frame. Short holds only: the writer tells of them here.
+    /// Tracks that were accepted or discarded since the last frame. The writer adds them here: held briefly only.
     pub(super) decided: Mutex<Vec<u32>>,
 }
 
 pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    // What is inside is whole after every step of ours.
+    // The value is whole after every step under the lock.
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-impl Session {
+impl ActiveGathering {
     pub(super) fn new(row: &GatheringRow, tracker: ViewTracker) -> Self {
         Self {
             id: row.id,
@@ -114,48 +115,48 @@ impl Session {
     }
 }
 
-/// By robot.
-pub(super) type Sessions = ArcSwap<BTreeMap<String, Arc<Session>>>;
+/// The active gatherings by robot.
+pub(super) type ActiveGatherings = ArcSwap<BTreeMap<String, Arc<ActiveGathering>>>;
 
-/// A frame to follow things in.
+/// A frame of a robot that gathers.
 #[derive(Debug)]
-pub struct Offer {
-    pub(super) session: Arc<Session>,
+pub struct OfferedFrame {
+    pub(super) gathering: Arc<ActiveGathering>,
     pub(super) camera: String,
     pub(super) frame: CheckedFrame,
-    pub(super) looked: AnalysedFrame,
+    pub(super) analysed: AnalysedFrame,
 }
 
-/// The end that workers hold.
+/// The tap that workers hold.
 #[derive(Debug, Clone)]
-pub struct Hook {
-    pub(super) sessions: Arc<Sessions>,
-    offers: Sender<Offer>,
+pub struct GatheringTap {
+    pub(super) active: Arc<ActiveGatherings>,
+    frames: Sender<OfferedFrame>,
 }
 
-/// Both ends, nobody gathering yet.
-pub fn hook() -> (Hook, Receiver<Offer>) {
-    let (offers, received) = channel(QUEUE);
-    (Hook { sessions: Arc::default(), offers }, received)
+/// The tap and the queue behind it; no robot gathers yet.
+pub fn gathering_tap() -> (GatheringTap, Receiver<OfferedFrame>) {
+    let (frames, received) = channel(QUEUE);
+    (GatheringTap { active: Arc::default(), frames }, received)
 }
 
-impl FrameTap for Hook {
+impl FrameTap for GatheringTap {
     fn is_wanted(&self, key: &SlotKey) -> bool {
-        self.sessions.load().contains_key(key.robot.as_str())
+        self.active.load().contains_key(key.robot.as_str())
     }
 
-    fn offer(&self, key: &SlotKey, frame: &CheckedFrame, looked: AnalysedFrame) {
-        let sessions = self.sessions.load();
-        let Some(session) = sessions.get(key.robot.as_str()) else { return };
-        lock(&session.counts).frames += 1;
-        if looked.map.name != session.map {
-            lock(&session.counts).other_map += 1;
+    fn offer(&self, key: &SlotKey, frame: &CheckedFrame, analysed: AnalysedFrame) {
+        let active = self.active.load();
+        let Some(gathering) = active.get(key.robot.as_str()) else { return };
+        lock(&gathering.counts).frames += 1;
+        if analysed.map.name != gathering.map {
+            lock(&gathering.counts).other_map += 1;
             return;
         }
         let camera = key.camera.to_string();
-        let offer = Offer { session: session.clone(), camera, frame: frame.clone(), looked };
-        if let Err(TrySendError::Full(offer)) = self.offers.try_send(offer) {
-            lock(&offer.session.counts).dropped += 1;
+        let offered = OfferedFrame { gathering: gathering.clone(), camera, frame: frame.clone(), analysed };
+        if let Err(TrySendError::Full(offered)) = self.frames.try_send(offered) {
+            lock(&offered.gathering.counts).dropped += 1;
         }
     }
 }

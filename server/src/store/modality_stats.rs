@@ -1,11 +1,11 @@
-//! What runs have shown of a map's modalities, the areas that somebody named, and what is fused.
+//! Modality statistics of a map's reference runs, the areas that people named, and the fusion mode.
 
 use super::{StoreError, Tx, maps, now_ms, statements::statements, within};
 use map::modality_stats::{FusionMode, MAX_AREAS, NamedArea, PoseCell, StatsByModality};
 use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 use std::collections::BTreeMap;
 
-/// Most runs kept of a map.
+/// Reference runs of a map.
 pub(crate) const MAX_RUNS: usize = 200;
 
 statements! {
@@ -18,9 +18,9 @@ statements! {
     DELETE = "DELETE FROM runs WHERE map_id = ?1 AND id = ?2";
 }
 
-/// A run and what it showed.
+/// A reference run with its modality statistics by pose cell.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct RunRow {
+pub(crate) struct ReferenceRunRow {
     pub(crate) id: i64,
     pub(crate) robot: String,
     pub(crate) created_ms: i64,
@@ -28,9 +28,9 @@ pub(crate) struct RunRow {
     pub(crate) cells: BTreeMap<PoseCell, StatsByModality>,
 }
 
-/// What administrators set.
+/// The settings of a map: fusion mode and named areas.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(crate) struct Settings {
+pub(crate) struct ModalitySettings {
     pub(crate) mode: FusionMode,
     pub(crate) named: Vec<NamedArea>,
 }
@@ -57,17 +57,19 @@ fn json<T: serde::Serialize>(what: &'static str, value: &T) -> Result<String, St
     serde_json::to_string(value).map_err(damaged)
 }
 
-/// Cells of a run; those that cannot be (a file from elsewhere) are left out.
+/// Modality statistics of a run; cells out of range (a file of another program) are left out.
 fn cells_of(text: &str) -> BTreeMap<PoseCell, StatsByModality> {
     let read: Vec<(PoseCell, StatsByModality)> = serde_json::from_str(text).unwrap_or_else(|error| {
-        tracing::warn!(%error, "what a run showed cannot be read and is not used");
+        tracing::warn!(%error, "run_statistics_unreadable: not used");
         Vec::new()
     });
-    read.into_iter().filter(|(_, found)| found.iter().all(|evidence| evidence.check().is_ok())).collect()
+    read.into_iter()
+        .filter(|(_, by_modality)| by_modality.iter().all(|stats| stats.check().is_ok()))
+        .collect()
 }
 
-fn run_row(row: &SqliteRow) -> Result<RunRow, sqlx::Error> {
-    Ok(RunRow {
+fn run_row(row: &SqliteRow) -> Result<ReferenceRunRow, sqlx::Error> {
+    Ok(ReferenceRunRow {
         id: row.try_get("id")?,
         robot: row.try_get("robot")?,
         created_ms: row.try_get("created_ms")?,
@@ -76,21 +78,24 @@ fn run_row(row: &SqliteRow) -> Result<RunRow, sqlx::Error> {
     })
 }
 
-/// What is set for a map.
-pub(crate) async fn settings(db: impl SqliteExecutor<'_>, map_id: i64) -> Result<Settings, StoreError> {
-    let at = || StoreError::at("read areas");
+/// The settings of a map.
+pub(crate) async fn settings(
+    db: impl SqliteExecutor<'_>,
+    map_id: i64,
+) -> Result<ModalitySettings, StoreError> {
+    let at = || StoreError::during("read areas");
     let row = sqlx::query(SETTINGS).bind(map_id).fetch_one(db).await.map_err(at())?;
     let mode = mode_of(&row.try_get::<String, _>("fusion").map_err(at())?);
     let named: String = row.try_get("areas").map_err(at())?;
     let named: Vec<NamedArea> = serde_json::from_str(&named).unwrap_or_default();
-    Ok(Settings { mode, named: named.into_iter().filter(|area| area.check().is_ok()).collect() })
+    Ok(ModalitySettings { mode, named: named.into_iter().filter(|area| area.check().is_ok()).collect() })
 }
 
-/// Sets it; `change` gets what is set.
+/// Changes the settings of a map; `change` gets the present ones.
 pub(crate) async fn set(
     tx: &mut Tx,
     map: &str,
-    change: impl FnOnce(Settings) -> Settings + Send,
+    change: impl FnOnce(ModalitySettings) -> ModalitySettings + Send,
 ) -> Result<(), StoreError> {
     let map = maps::get(&mut tx.conn, map).await?;
     let new = change(settings(&mut tx.conn, map.id).await?);
@@ -101,17 +106,20 @@ pub(crate) async fn set(
         .bind(json("areas", &new.named)?)
         .execute(&mut tx.conn)
         .await
-        .map_err(StoreError::at("store areas"))?;
+        .map_err(StoreError::during("store areas"))?;
     maps::bump(tx, map.id).await
 }
 
 /// The runs of a map, oldest first.
-pub(crate) async fn runs(db: impl SqliteExecutor<'_>, map_id: i64) -> Result<Vec<RunRow>, StoreError> {
-    let rows = sqlx::query(RUNS).bind(map_id).fetch_all(db).await.map_err(StoreError::at("read runs"))?;
-    rows.iter().map(run_row).collect::<Result<_, _>>().map_err(StoreError::at("read runs"))
+pub(crate) async fn runs(
+    db: impl SqliteExecutor<'_>,
+    map_id: i64,
+) -> Result<Vec<ReferenceRunRow>, StoreError> {
+    let rows = sqlx::query(RUNS).bind(map_id).fetch_all(db).await.map_err(StoreError::during("read runs"))?;
+    rows.iter().map(run_row).collect::<Result<_, _>>().map_err(StoreError::during("read runs"))
 }
 
-/// Keeps a run; its number.
+/// Stores a reference run; gives its number.
 pub(crate) async fn add(
     tx: &mut Tx,
     map: &str,
@@ -129,29 +137,29 @@ pub(crate) async fn add(
         .bind(cells)
         .fetch_one(&mut tx.conn)
         .await
-        .map_err(StoreError::at("store run"))?;
+        .map_err(StoreError::during("store run"))?;
     let count = sqlx::query_scalar(COUNT).bind(map.id).fetch_one(&mut tx.conn).await;
-    within(count.map_err(StoreError::at("count runs"))?, MAX_RUNS, "runs")?;
+    within(count.map_err(StoreError::during("count runs"))?, MAX_RUNS, "runs")?;
     maps::bump(tx, map.id).await?;
     Ok(id)
 }
 
-/// Forgets a run and what it showed.
-pub(crate) async fn forget(tx: &mut Tx, map: &str, id: i64) -> Result<(), StoreError> {
+/// Deletes a reference run with its statistics.
+pub(crate) async fn delete(tx: &mut Tx, map: &str, id: i64) -> Result<(), StoreError> {
     let map = maps::get(&mut tx.conn, map).await?;
-    let gone = sqlx::query(DELETE).bind(map.id).bind(id).execute(&mut tx.conn).await;
-    if gone.map_err(StoreError::at("forget run"))?.rows_affected() == 0 {
+    let deleted = sqlx::query(DELETE).bind(map.id).bind(id).execute(&mut tx.conn).await;
+    if deleted.map_err(StoreError::during("delete run"))?.rows_affected() == 0 {
         return Err(StoreError::NotFound { what: "run", name: id.to_string() });
     }
     maps::bump(tx, map.id).await
 }
 
-/// Number of the runs of a map, and the latest: numbers are never used twice.
+/// Count and latest number of a map's reference runs. Numbers are never used again.
 pub(crate) async fn run_numbers(
     conn: &mut sqlx::SqliteConnection,
     map_id: i64,
 ) -> Result<(i64, i64), StoreError> {
-    let at = || StoreError::at("count runs");
+    let at = || StoreError::during("count runs");
     let count: i64 = sqlx::query_scalar(COUNT).bind(map_id).fetch_one(&mut *conn).await.map_err(at())?;
     let latest: i64 = sqlx::query_scalar(LATEST).bind(map_id).fetch_one(&mut *conn).await.map_err(at())?;
     Ok((count, latest))
@@ -165,12 +173,12 @@ mod tests {
     use std::sync::Arc;
     use vision::recognise::DistanceKind;
 
-    fn shown(x: i32) -> BTreeMap<PoseCell, StatsByModality> {
+    fn statistics(x: i32) -> BTreeMap<PoseCell, StatsByModality> {
         [(PoseCell { x, y: -2, heading: 3 }, StatsByModality::default())].into()
     }
 
     async fn put(store: &Catalogue, x: i32) -> Result<i64, StoreError> {
-        store.write(move |tx| Box::pin(async move { add(tx, "a", "r1", 12.5, &shown(x)).await })).await
+        store.write(move |tx| Box::pin(async move { add(tx, "a", "r1", 12.5, &statistics(x)).await })).await
     }
 
     fn known(store: &Catalogue) -> (u64, Arc<ModalityMap>) {
@@ -189,22 +197,22 @@ mod tests {
         assert_eq!(known(&store).1.cells().count(), 2);
         let hall = NamedArea { name: "hall".into(), corners_m: vec![[0.0, 0.0], [4.0, 0.0], [4.0, 3.0]] };
         let named = vec![hall.clone()];
-        let settings = Settings { mode: FusionMode::Best, named };
+        let settings = ModalitySettings { mode: FusionMode::Best, named };
         store.write(|tx| Box::pin(async move { set(tx, "a", |_| settings).await })).await.unwrap();
         let (version, areas) = known(&store);
         assert_eq!((areas.mode(), areas.named().count(), areas.cells().count()), (FusionMode::Best, 1, 2));
-        // What has nothing to do with it makes a new version and leaves it as it is.
+        // An unrelated edit makes a new version and keeps the same statistics.
         store
             .write(|tx| {
-                Box::pin(async { crate::store::laser::replace(tx, "a", &[[0.0, 0.0, 1.0, 0.0]]).await })
+                Box::pin(async { crate::store::walls::replace(tx, "a", &[[0.0, 0.0, 1.0, 0.0]]).await })
             })
             .await
             .unwrap();
         let after = known(&store);
         assert!(after.0 > version && Arc::ptr_eq(&after.1, &areas));
-        store.write(move |tx| Box::pin(async move { forget(tx, "a", first).await })).await.unwrap();
+        store.write(move |tx| Box::pin(async move { delete(tx, "a", first).await })).await.unwrap();
         assert_eq!(known(&store).1.cells().map(|(cell, ..)| cell.x).collect::<Vec<_>>(), [2]);
-        let again = store.write(move |tx| Box::pin(async move { forget(tx, "a", first).await })).await;
+        let again = store.write(move |tx| Box::pin(async move { delete(tx, "a", first).await })).await;
         assert!(matches!(again, Err(StoreError::NotFound { what: "run", .. })));
         task.close().await;
         let (store, task) = Catalogue::open(&config).await.unwrap();
@@ -212,7 +220,10 @@ mod tests {
         assert_eq!((areas.mode(), areas.named().next().unwrap().0), (FusionMode::Best, &hall));
         let id = maps::get(store.reads(), "a").await.unwrap().id;
         let kept = runs(store.reads(), id).await.unwrap();
-        assert_eq!((kept.len(), kept[0].id, kept[0].way_m, &kept[0].cells), (1, second, 12.5, &shown(2)));
+        assert_eq!(
+            (kept.len(), kept[0].id, kept[0].way_m, &kept[0].cells),
+            (1, second, 12.5, &statistics(2))
+        );
         task.close().await;
     }
 

@@ -1,4 +1,4 @@
-//! The demo's first part: what the surveying robot saw (`cli/survey.rs`) is taught to the server over HTTP.
+//! The demo's first part: teaches the server over HTTP what the surveying robot measured (`cli/survey.rs`).
 
 use super::MAP;
 use crate::{
@@ -6,7 +6,7 @@ use crate::{
     cli::{
         pictures, screen,
         simulated_errors::SimulatedRobotErrors,
-        survey::{hang, survey},
+        survey::{place_on_walls, survey},
     },
 };
 use client::{
@@ -30,13 +30,13 @@ pub(super) struct Taught {
     pub(super) landmarks: usize,
     pub(super) active: usize,
     pub(super) views: usize,
-    /// Looks at a poster in which the detector did not find it.
+    /// Frames of a poster in which the detector did not find it.
     pub(super) views_missed: usize,
     /// Views whose rectangle on the wall disagrees with the others'.
     pub(super) views_left_out: usize,
 }
 
-/// Maps, looks, places, teaches.
+/// Surveys the building, and uploads walls, landmarks and views.
 pub(super) async fn teach(
     building: &Arc<Building>,
     server: &RunningServer,
@@ -57,8 +57,8 @@ pub(super) async fn teach(
     let progress = screen::progress(survey.views.values().map(Vec::len).sum(), "teaching");
     for (name, views) in &survey.views {
         taught.landmarks += 1;
-        let Some((place, agreed)) = hang(views, &survey.walls, &camera) else {
-            screen::complain(&format!("{name} does not hang on a wall that the laser saw; it is left out"));
+        let Some((place, agreed)) = place_on_walls(views, &survey.walls, &camera) else {
+            screen::complain(&format!("{name} is on no wall of the laser's; it is left out"));
             continue;
         };
         let size = Size { width_m: place.size.width_m, height_m: place.size.height_m };
@@ -72,9 +72,9 @@ pub(super) async fn teach(
         maps.add_landmark(MAP, name, Some(size), Some(place)).await?;
         taught.views_left_out += views.len() - agreed.len();
         for view in agreed.iter().map(|&i| &views[i]) {
-            let extent = LandmarkRegion::Corners(view.quad.corners_px.into());
-            let jpeg = pictures::jpeg(&view.sighting.frame.image)?;
-            maps.upload_view(MAP, name, jpeg, extent).await?;
+            let region = LandmarkRegion::Corners(view.quad.corners_px.into());
+            let jpeg = pictures::jpeg(&view.readings.frame.image)?;
+            maps.upload_view(MAP, name, jpeg, region).await?;
             taught.views += 1;
             progress.inc(1);
         }

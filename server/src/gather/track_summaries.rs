@@ -1,9 +1,9 @@
-//! What a person needs to decide on a track: how many views, from how far apart, where it hangs, which gates of learning
-//! its views would pass or fail, and with which other candidates it may be one thing.
+//! Summaries of tracks, for a person's decision. In: tracks with their views, and the walls. Out: number and spread of the
+//! views, the place, the quality gates that a model of them would fail, and similar tracks.
 
 use crate::store::{
     gatherings::{TrackRow, TrackView},
-    placing,
+    landmark_placement,
 };
 use map::segments::LaserSegment;
 use protos::api::{EstimatedPlace, TrackSummary};
@@ -14,37 +14,38 @@ use vision::{
     params::Params,
 };
 
-/// The candidates with all that can be said of them. Works on every picture: not for an async thread.
-pub(crate) fn candidates(
+/// The summary of each track. It learns a model of each: not for an async thread.
+pub(crate) fn track_summaries(
     tracks: &[(TrackRow, Vec<TrackView>)],
     walls: &[LaserSegment],
     params: &Params,
 ) -> Vec<TrackSummary> {
     let mut made: Vec<(TrackSummary, Option<LandmarkModel>)> =
-        tracks.iter().map(|(track, views)| one(track, views, walls, params)).collect();
-    let similar: Vec<Vec<u32>> = made
+        tracks.iter().map(|(track, views)| summary(track, views, walls, params)).collect();
+    let rivals: Vec<Vec<u32>> = made
         .iter()
         .map(|(a, own)| {
             let others = made.iter().filter(|(b, _)| b.number != a.number);
             let rival = |(b, other): &&(TrackSummary, Option<LandmarkModel>)| {
-                // As near as is accepted where nothing else is like it.
-                let near = |x: &LandmarkModel, y: &LandmarkModel| {
+                // The threshold that a landmark without look-alikes would have.
+                let is_near = |x: &LandmarkModel, y: &LandmarkModel| {
                     unlikeness_of(x, &y.features(&params.recognise), params) < params.learn.likeness_cap
                 };
-                let alike = own.as_ref().zip(other.as_ref()).is_some_and(|(x, y)| near(x, y) || near(y, x));
-                alike || overlap(a, b)
+                let looks_alike =
+                    own.as_ref().zip(other.as_ref()).is_some_and(|(x, y)| is_near(x, y) || is_near(y, x));
+                looks_alike || overlap(a, b)
             };
             others.filter(rival).map(|(b, _)| b.number).collect()
         })
         .collect();
-    for ((track, _), similar) in made.iter_mut().zip(similar) {
-        if !similar.is_empty() {
+    for ((candidate, _), rivals) in made.iter_mut().zip(rivals) {
+        if !rivals.is_empty() {
             let detail =
-                "other tracks look like it or are at its place: the same object twice, or two of one kind";
-            let reason =
-                json!({ "gate": "similar_tracks", "value": similar.len(), "limit": 0, "detail": detail });
-            track.reasons.push(reason);
-            (track.passes, track.similar_tracks) = (false, similar);
+                "other tracks have its appearance or its place: one object twice, or two look-alikes";
+            candidate
+                .reasons
+                .push(json!({ "gate": "similar_tracks", "value": rivals.len(), "limit": 0, "detail": detail }));
+            (candidate.passes, candidate.similar_tracks) = (false, rivals);
         }
     }
     made.into_iter().map(|(candidate, _)| candidate).collect()
@@ -56,21 +57,22 @@ fn overlap(a: &TrackSummary, b: &TrackSummary) -> bool {
     (a.x_m - b.x_m).hypot(a.y_m - b.y_m).hypot(a.z_m - b.z_m) < reach(a).max(reach(b))
 }
 
-fn one(
+fn summary(
     track: &TrackRow,
     all: &[TrackView],
     walls: &[LaserSegment],
     params: &Params,
 ) -> (TrackSummary, Option<LandmarkModel>) {
-    let preview = placing::preview(all.iter().map(|v| (&v.cut.corners_px, v.capture.as_deref())), walls);
-    let apart = preview.as_ref().map_or(&[][..], |p| &p.apart);
+    let preview =
+        landmark_placement::preview(all.iter().map(|v| (&v.crop.corners_px, v.capture.as_deref())), walls);
+    let inconsistent = preview.as_ref().map_or(&[][..], |p| &p.inconsistent);
     let views: Vec<&TrackView> =
-        all.iter().enumerate().filter(|(i, _)| !apart.contains(i)).map(|(_, v)| v).collect();
+        all.iter().enumerate().filter(|(i, _)| !inconsistent.contains(i)).map(|(_, v)| v).collect();
     let taught: Vec<TrainingView> = views
         .iter()
         .map(|v| TrainingView {
-            icon: v.cut.icon.clone(),
-            corners_px: v.cut.corners_px,
+            icon: v.crop.icon.clone(),
+            corners_px: v.crop.corners_px,
             image_size_px: v.size_px,
             exact: None,
             generated: false,
@@ -79,29 +81,28 @@ fn one(
     let model = learn(LandmarkId(0), &taught, &[], params).ok();
     let mut reasons = reasons(model.as_ref());
     if track.landmark.is_none() && track.known > 0 {
-        let detail =
-            format!("in {} sightings it was taken for a landmark of the map, or nearly", track.known);
+        let detail = format!("in {} observations it matched a landmark of the map, or nearly", track.known);
         reasons.push(json!({ "gate": "known", "value": track.known, "limit": 0, "detail": detail }));
     }
-    let sides = views.iter().map(|v| v.cut.corners_px.area_px2().sqrt());
+    let sides = views.iter().map(|v| v.crop.corners_px.area_px2().sqrt());
     let (place, not_placed) = match &preview {
         Ok(preview) => (Some(estimated_place(preview)), None),
         Err(reason) => (None, Some(reason.clone())),
     };
     let exemplar = model.as_ref().and_then(|m| m.exemplars.first());
-    let best = exemplar.and_then(|e| views.iter().find(|v| v.cut.icon.pixels == e.icon().pixels));
-    let seen: Vec<_> =
-        views.iter().map(|v| (*v.cut.corners_px.points(), v.size_px.map(|side| side as f64))).collect();
+    let best = exemplar.and_then(|e| views.iter().find(|v| v.crop.icon.pixels == e.icon().pixels));
+    let corners: Vec<_> =
+        views.iter().map(|v| (*v.crop.corners_px.points(), v.size_px.map(|side| side as f64))).collect();
     let candidate = TrackSummary {
         number: track.number,
         landmark: track.landmark.clone(),
         sightings: track.sightings,
         known: track.known,
         views: views.iter().map(|v| v.id).collect(),
-        inconsistent_views: apart.len(),
+        inconsistent_views: inconsistent.len(),
         best_view: best.or(views.first()).map(|v| v.id),
         side_px: range(sides),
-        v_c: v_c(&seen),
+        v_c: v_c(&corners),
         place,
         not_placed,
         passes: reasons.is_empty(),
@@ -111,7 +112,7 @@ fn one(
     (candidate, model)
 }
 
-/// Gates as the lesson will see them. Where views are few, the lesson generates more: their number is no reason.
+/// The failed quality gates. The gate on the number of views is left out: a lesson generates views where there are few.
 fn reasons(model: Option<&LandmarkModel>) -> Vec<Value> {
     let Some(model) = model else {
         return vec![json!({ "gate": "views", "value": 0, "limit": 1, "detail": "no views" })];
@@ -124,7 +125,7 @@ fn reasons(model: Option<&LandmarkModel>) -> Vec<Value> {
         .collect()
 }
 
-fn estimated_place(preview: &placing::Preview) -> EstimatedPlace {
+fn estimated_place(preview: &landmark_placement::PlacementPreview) -> EstimatedPlace {
     let place = &preview.place;
     EstimatedPlace {
         x_m: place.x_m,
@@ -138,7 +139,7 @@ fn estimated_place(preview: &placing::Preview) -> EstimatedPlace {
     }
 }
 
-/// Least and most; zeros of nothing.
+/// Least and greatest value; zeros if there is none.
 fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
     values
         .fold(None, |r: Option<[f64; 2]>, v| Some(r.map_or([v, v], |[a, b]| [a.min(v), b.max(v)])))

@@ -1,5 +1,5 @@
-//! A run that is recorded to learn from: the odometry and the fixes of one robot, in memory, until somebody says where it
-//! really was, gives it up, or the server stops. In: what the robot's fusion gets. Out: the same, in order of capture.
+//! A recording: the odometry and the fixes of one robot during a drive, in memory, until somebody gives its reference
+//! trajectory, cancels it, or the server stops. In: what the robot's fusion gets. Out: the same, in order of capture.
 
 use map::{
     localise::{Fix, FixSource},
@@ -8,37 +8,36 @@ use map::{
 };
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Runs recorded at a time.
+/// Recordings at a time.
 pub const MAX_RECORDINGS: usize = 8;
-/// Fixes of one run; each takes about 3 kB.
+/// Fixes of one recording; each takes about 3 kB.
 pub const MAX_RUN_FIXES: usize = 20_000;
-/// Readings of odometry of one run.
+/// Odometry readings of one recording.
 pub const MAX_RUN_ODOMETRY: usize = 200_000;
-/// A reading is kept after this motion...
+/// A reading is added after this motion...
 const STEP_M: f64 = 0.01;
 /// ...or this turn.
 const STEP_RAD: f64 = 0.01;
 
 static NEXT: AtomicU64 = AtomicU64::new(0);
 
-/// A run as it is recorded.
+/// Status of a recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecordingStatus {
-    /// The map.
-    /// Name of the map that the robot stood on.
+    /// Name of the map that the robot was on.
     pub map: String,
-    /// Whose run.
+    /// Name of the robot.
     pub robot: String,
-    /// False once it is full, or the robot's software was started again, or it went to another map, or its odometry
-    /// jumped: what was recorded until then can be learnt from.
-    pub going: bool,
-    /// Why it goes on no longer.
+    /// False once it is full, a new epoch began, the robot went to another map, its odometry jumped, or its clock was set.
+    /// What was recorded until then can be learnt from.
+    pub active: bool,
+    /// Why it is not active any more.
     pub reason: Option<String>,
-    /// Way driven by odometry, metres.
-    pub way_m: f64,
+    /// Distance driven by odometry, m.
+    pub distance_m: f64,
     /// Time of the first and the last reading of odometry, ns of the robot's clock; absent before the first.
     pub span_ns: Option<[i64; 2]>,
-    /// Readings of odometry that were kept.
+    /// Odometry readings in it.
     pub odometry: usize,
     /// Fixes by landmarks.
     pub landmarks: usize,
@@ -46,12 +45,12 @@ pub struct RecordingStatus {
     pub laser: usize,
 }
 
-/// Why a run cannot be recorded.
+/// Why a recording cannot start or be learnt from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum RecordingError {
-    /// One is being recorded.
+    /// The robot has a recording.
     #[error("a run of this robot is being recorded already")]
-    Going,
+    AlreadyRecording,
     /// Too many at a time.
     #[error("{MAX_RECORDINGS} runs are being recorded already")]
     TooMany,
@@ -63,20 +62,20 @@ pub enum RecordingError {
     None,
 }
 
-/// What is kept of a run.
+/// A recording.
 #[derive(Debug, Clone)]
 pub struct RunRecording {
-    /// Tells it from any other since the start.
+    /// Unique since the start of the server.
     pub(super) number: u64,
     /// It is being learnt from.
     pub(super) lent: bool,
-    /// Name of the map that the robot stood on.
+    /// Name of the map that the robot was on.
     pub map: String,
-    /// Times rise.
+    /// Capture time (ns) and reading (odom frame); times rise.
     pub(super) odometry: Vec<(i64, Pose2)>,
     fixes: Vec<(i64, Fix)>,
     ended: Option<&'static str>,
-    way_m: f64,
+    distance_m: f64,
 }
 
 impl RunRecording {
@@ -89,17 +88,17 @@ impl RunRecording {
             odometry: Vec::new(),
             fixes: Vec::new(),
             ended: None,
-            way_m: 0.0,
+            distance_m: 0.0,
         }
     }
 
-    /// Goes on no longer; the first reason stays.
+    /// Ends it; the first reason stays.
     pub(super) fn end(&mut self, reason: &'static str) {
         self.ended.get_or_insert(reason);
     }
 
-    /// A reading of odometry, if it is newer and tells of a motion.
-    pub(super) fn moved(&mut self, at_ns: i64, odom_from_robot: Pose2) {
+    /// Adds an odometry reading if it is newer and the robot has moved.
+    pub(super) fn add_odometry(&mut self, at_ns: i64, odom_from_robot: Pose2) {
         let Some((last_ns, last)) = self.odometry.last() else {
             if self.ended.is_none() {
                 self.odometry.push((at_ns, odom_from_robot));
@@ -107,20 +106,20 @@ impl RunRecording {
             return;
         };
         let motion = last.between(&odom_from_robot);
-        let still = motion.position().norm() < STEP_M && motion.theta_rad.abs() < STEP_RAD;
-        if self.ended.is_some() || at_ns <= *last_ns || still {
+        let is_still = motion.position().norm() < STEP_M && motion.theta_rad.abs() < STEP_RAD;
+        if self.ended.is_some() || at_ns <= *last_ns || is_still {
             return;
         }
         if self.odometry.len() == MAX_RUN_ODOMETRY {
             self.end("full");
             return;
         }
-        self.way_m += motion.position().norm();
+        self.distance_m += motion.position().norm();
         self.odometry.push((at_ns, odom_from_robot));
     }
 
-    /// A fix that said something new, whatever became of it.
-    pub(super) fn fix(&mut self, at_ns: i64, fix: &Fix) {
+    /// Adds a fix, whatever became of it.
+    pub(super) fn add_fix(&mut self, at_ns: i64, fix: &Fix) {
         if self.ended.is_some() {
             return;
         }
@@ -131,25 +130,25 @@ impl RunRecording {
         self.fixes.push((at_ns, fix.clone()));
     }
 
-    /// Its odometry and its fixes, each in order of capture, beside where the robot really was.
-    pub fn against<'a>(&'a mut self, reference: &'a ReferenceTrajectory) -> ReferenceRun<'a> {
+    /// Odometry and fixes, each in order of capture, with the reference trajectory.
+    pub fn with_reference<'a>(&'a mut self, reference: &'a ReferenceTrajectory) -> ReferenceRun<'a> {
         self.fixes.sort_by_key(|(at_ns, _)| *at_ns);
         ReferenceRun { odometry: &self.odometry, fixes: &self.fixes, reference }
     }
 
-    pub(super) fn told(&self, robot: &str) -> RecordingStatus {
-        let of = |modality| self.fixes.iter().filter(|(_, fix)| fix.modality == modality).count();
+    pub(super) fn status(&self, robot: &str) -> RecordingStatus {
+        let fixes_by = |modality| self.fixes.iter().filter(|(_, fix)| fix.modality == modality).count();
         let span_ns = self.odometry.first().zip(self.odometry.last()).map(|(a, b)| [a.0, b.0]);
         RecordingStatus {
             map: self.map.clone(),
             robot: robot.to_owned(),
-            going: self.ended.is_none(),
+            active: self.ended.is_none(),
             reason: self.ended.map(str::to_owned),
-            way_m: self.way_m,
+            distance_m: self.distance_m,
             span_ns,
             odometry: self.odometry.len(),
-            landmarks: of(FixSource::Landmarks),
-            laser: of(FixSource::Laser),
+            landmarks: fixes_by(FixSource::Landmarks),
+            laser: fixes_by(FixSource::Laser),
         }
     }
 }
@@ -175,26 +174,32 @@ mod tests {
     }
 
     #[test]
-    fn what_tells_nothing_new_is_not_kept_and_the_order_is_that_of_capture() {
+    fn a_recording_drops_what_is_not_new_and_is_in_order_of_capture() {
         let mut run = RunRecording::new("hall");
         for (at_ns, x_m) in [(10, 0.0), (20, 0.005), (30, 0.02), (25, 0.5), (40, 0.04)] {
-            run.moved(at_ns, Pose2::new(x_m, 0.0, 0.0));
+            run.add_odometry(at_ns, Pose2::new(x_m, 0.0, 0.0));
         }
         assert_eq!(run.odometry.iter().map(|(t, _)| *t).collect::<Vec<_>>(), [10, 30, 40]);
-        run.fix(35, &fix(FixSource::Laser));
-        run.fix(12, &fix(FixSource::Landmarks));
-        let path =
+        run.add_fix(35, &fix(FixSource::Laser));
+        run.add_fix(12, &fix(FixSource::Landmarks));
+        let reference =
             ReferenceTrajectory::new(vec![(0, Pose2::default()), (1, Pose2::default())], 0.0, 0.0).unwrap();
-        assert_eq!(run.against(&path).fixes.iter().map(|(t, _)| *t).collect::<Vec<_>>(), [12, 35]);
-        let told = run.told("r1");
-        assert!((told.way_m - 0.04).abs() < 1e-12);
-        assert_eq!((told.span_ns, told.odometry, told.landmarks, told.laser), (Some([10, 40]), 3, 1, 1));
+        assert_eq!(
+            run.with_reference(&reference).fixes.iter().map(|(t, _)| *t).collect::<Vec<_>>(),
+            [12, 35]
+        );
+        let status = run.status("r1");
+        assert!((status.distance_m - 0.04).abs() < 1e-12);
+        assert_eq!(
+            (status.span_ns, status.odometry, status.landmarks, status.laser),
+            (Some([10, 40]), 3, 1, 1)
+        );
         run.end("odometry jumped");
         run.end("full");
-        run.moved(50, Pose2::new(9.0, 0.0, 0.0));
-        run.fix(50, &fix(FixSource::Laser));
-        let after = run.told("r1");
-        assert_eq!((after.going, after.reason.as_deref()), (false, Some("odometry jumped")));
+        run.add_odometry(50, Pose2::new(9.0, 0.0, 0.0));
+        run.add_fix(50, &fix(FixSource::Laser));
+        let after = run.status("r1");
+        assert_eq!((after.active, after.reason.as_deref()), (false, Some("odometry jumped")));
         assert_eq!((after.odometry, after.laser), (3, 1));
     }
 
@@ -202,12 +207,12 @@ mod tests {
     fn a_recording_is_bounded() {
         let mut run = RunRecording::new("hall");
         for i in 0..=MAX_RUN_FIXES as i64 {
-            run.fix(i, &fix(FixSource::Laser));
+            run.add_fix(i, &fix(FixSource::Laser));
         }
         assert_eq!((run.fixes.len(), run.ended), (MAX_RUN_FIXES, Some("full")));
         let mut run = RunRecording::new("hall");
         for i in 0..=MAX_RUN_ODOMETRY as i64 {
-            run.moved(i, Pose2::new(0.02 * i as f64, 0.0, 0.0));
+            run.add_odometry(i, Pose2::new(0.02 * i as f64, 0.0, 0.0));
         }
         assert_eq!((run.odometry.len(), run.ended), (MAX_RUN_ODOMETRY, Some("full")));
     }

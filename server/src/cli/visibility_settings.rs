@@ -1,11 +1,11 @@
-//! `waymark map sight`: the camera that looks for a map's landmarks, with angles in degrees, as people have them.
+//! `waymark map sight`: the visibility settings of a map, with angles in degrees.
 
 use super::arg_parsers::numbers;
 use client::{MapClient, api::VisibilitySettingsBody};
 
-/// A camera, and what counts as seen. What is not given stays as it is.
+/// A camera and the limits that define "visible". Options that are absent change nothing.
 #[derive(Debug, Clone, clap::Args)]
-pub(crate) struct SightArgs {
+pub(crate) struct VisibilityArgs {
     /// Image size, pixels.
     #[arg(long, value_name = "WxH", value_parser = image)]
     image: Option<[f64; 2]>,
@@ -30,10 +30,10 @@ pub(crate) struct SightArgs {
     /// Largest share of the image that a landmark may take.
     #[arg(long)]
     max_fill: Option<f64>,
-    /// How far before its wall a landmark is taken to hang.
+    /// Distance of a landmark from its wall.
     #[arg(long)]
     standoff_m: Option<f64>,
-    /// Begin with the camera of a usual robot instead of the one that is set.
+    /// Start from the default settings instead of the present ones.
     #[arg(long)]
     usual: bool,
 }
@@ -46,8 +46,8 @@ fn angles(text: &str) -> Result<[f64; 2], String> {
     numbers(text, ',').ok_or_else(|| "two numbers: lowest,highest in degrees".to_owned())
 }
 
-impl SightArgs {
-    /// The settings with what is given in place of what they have.
+impl VisibilityArgs {
+    /// `settings`, with the given options in their place.
     fn over(&self, settings: &VisibilitySettingsBody) -> VisibilitySettingsBody {
         let pair = |pair: Option<[f64; 2]>, i: usize| pair.map(|p| p[i]);
         let rad = |degrees: Option<f64>| degrees.map(f64::to_radians);
@@ -67,7 +67,7 @@ impl SightArgs {
         }
     }
 
-    /// Sets what is given, if anything is, and gives what holds then.
+    /// Sets the given options, if there are any, and gives the settings after that.
     pub(super) async fn set(&self, maps: &MapClient, map: &str) -> anyhow::Result<VisibilitySettingsBody> {
         let now = maps.visibility_settings(map).await?;
         let none = VisibilitySettingsBody::default();
@@ -79,13 +79,13 @@ impl SightArgs {
     }
 }
 
-/// A setting for people.
+/// The settings as sentences.
 pub(super) fn sentences(map: &str, settings: &VisibilitySettingsBody) -> String {
     let number = Option::unwrap_or_default;
     let degrees = |angle: Option<f64>| number(angle).to_degrees();
     format!(
         "{map}: camera {} x {} px, focal length {} px, {} m up, tilts {:.1} to {:.1}, pans {:.1} to {:.1} degrees\n\
-         seen: sides from {} px, at most {:.0} % of the image, up to {:.1} degrees oblique, {} m off the wall",
+         visible: sides from {} px, at most {:.0} % of the image, up to {:.1} degrees oblique, {} m off the wall",
         number(settings.width_px),
         number(settings.height_px),
         number(settings.focal_px),
@@ -107,7 +107,7 @@ mod tests {
 
     #[test]
     fn what_is_given_goes_in_radians() {
-        let args = SightArgs {
+        let args = VisibilityArgs {
             image: image("1280x720").ok(),
             focal_px: None,
             camera_height_m: None,
