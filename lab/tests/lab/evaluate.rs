@@ -130,8 +130,8 @@ fn close(report: &Value, key: &str, expected: f64) {
 fn detection_figures_are_what_a_recount_gives() {
     let folder = TempDir::new().expect("a temporary directory");
     let building = Arc::new(Building::corridor(6));
-    let looks = scenes::looks(&building, &LessonParams { views: 1, ..LessonParams::default() });
-    let mut set = scenes::write_set(folder.path(), &building, &looks, &[], 20.0);
+    let views = scenes::views(&building, &LessonParams { views: 1, ..LessonParams::default() });
+    let mut set = scenes::write_set(folder.path(), &building, &views, &[], 20.0);
     // Labels that differ from the truth, so that some are missed and some quads are false.
     for (image, share) in set.images.iter_mut().zip([0.1, 0.4, 0.6]) {
         for quad in &mut image.quads {
@@ -164,8 +164,8 @@ fn detection_figures_are_what_a_recount_gives() {
 fn labels_decide_what_is_found_and_what_is_false() {
     let folder = TempDir::new().expect("a temporary directory");
     let building = Arc::new(Building::corridor(6));
-    let looks = scenes::looks(&building, &LessonParams { views: 1, ..LessonParams::default() });
-    let mut set = scenes::write_set(folder.path(), &building, &looks[..3], &[], 20.0);
+    let views = scenes::views(&building, &LessonParams { views: 1, ..LessonParams::default() });
+    let mut set = scenes::write_set(folder.path(), &building, &views[..3], &[], 20.0);
     // Without any label everything found is false; where labels are not complete nothing can be false.
     for image in &mut set.images {
         image.quads.clear();
@@ -280,9 +280,9 @@ fn recognition_names_the_taught_and_no_distractor() {
     let params = CorridorParams { posters: 10, first_poster: 500, ..CorridorParams::default() };
     let building = Arc::new(Building::corridor_with(&params, 8));
     let taught: Vec<String> = building.posters().take(6).map(|p| p.name.clone()).collect();
-    let looks =
+    let views =
         LessonParams { views: 2, max_view_angle_rad: 0.7, distance_m: [1.3, 2.6], ..LessonParams::default() };
-    let set = scenes::write_set(folder.path(), &building, &scenes::looks(&building, &looks), &taught, 40.0);
+    let set = scenes::write_set(folder.path(), &building, &scenes::views(&building, &views), &taught, 40.0);
     let quads = || set.images.iter().flat_map(|i| &i.quads);
     let known = quads().filter(|q| q.landmark.is_some()).count() as u64;
     let distractors = quads().filter(|q| q.landmark.is_none()).count() as u64;
