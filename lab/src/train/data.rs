@@ -10,7 +10,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use vision::{
     detect::{
         DetectParams, Quad,
-        border_model::choose_sides::rivals,
+        border_model::choose_sides::side_candidates,
         edge_support::gradients::Gradients,
         pyramid, scored_quads,
         suppression::non_maximum::{snap_sides, suppress_overlaps},
@@ -160,7 +160,7 @@ fn sides(g: &Gradients, found: &[Quad], label: &Corners, group: usize, weight: f
     let start = quad.corners_px.points();
     let label = aligned(label, start);
     let mut all = Vec::new();
-    for (side, lines) in rivals(g, start).iter().enumerate() {
+    for (side, lines) in side_candidates(g, start).iter().enumerate() {
         let off = |ends: &[Point2<f64>; 2]| {
             let along = ends[1] - ends[0];
             let beside = |p: &Point2<f64>| along.perp(&(p - ends[0])).abs() / along.norm();

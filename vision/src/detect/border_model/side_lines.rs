@@ -4,7 +4,7 @@
 pub(crate) const MAX_LINES: usize = 24;
 /// Share of the samples that a line needs.
 const MIN_SUPPORT: f64 = 0.4;
-/// Slopes tried to each side of the supposed direction.
+/// Slopes tried to each side of the proposed direction.
 const SLOPES: usize = 8;
 /// Slopes tried in all.
 const ALL_SLOPES: usize = 2 * SLOPES + 1;
@@ -80,7 +80,7 @@ pub(crate) fn find(
 /// One vote of each peak for every slope, at the offset that goes with it. Two bins lie before `first_px`.
 #[inline(always)]
 fn vote(peaks: &[Peak], first_px: f32, bins: usize, unit: f32) -> Vec<Votes> {
-    /// Bits behind the point of a bin.
+    /// Fractional bits of a bin in fixed point.
     const BITS: u32 = 16;
     let fixed = |x: f32| (x * (1 << BITS) as f32) as i32;
     let mut votes = vec![[0; ALL_SLOPES]; bins];
@@ -90,7 +90,7 @@ fn vote(peaks: &[Peak], first_px: f32, bins: usize, unit: f32) -> Vec<Votes> {
         let mut at = fixed(p.offset_px + 2.5 - first_px).saturating_add(step.saturating_mul(SLOPES as i32));
         #[expect(clippy::needless_range_loop, reason = "an index of what lies in another list")]
         for slope in 0..ALL_SLOPES {
-            // What is negative becomes very large. The outermost bins have no votes of their own.
+            // Negative values wrap to very large ones. The outermost bins have no votes of their own.
             let bin = (at >> BITS) as usize;
             if bin >= 1 && bin < bins - 1 {
                 votes[bin][slope] |= 1 << p.row;
@@ -102,7 +102,7 @@ fn vote(peaks: &[Peak], first_px: f32, bins: usize, unit: f32) -> Vec<Votes> {
 }
 
 /// For every offset the most votes of any slope, those of the neighbouring offsets with them, and the slope: lines of
-/// neighbouring slopes are one. Among equals the slope nearest to none, of two such the lesser.
+/// neighbouring slopes are one. Ties go to the slope nearest to 0, then to the lesser.
 #[inline(always)]
 fn best_slopes(votes: &[Votes]) -> Vec<(u32, usize)> {
     const NONE: Votes = [0; ALL_SLOPES];
@@ -113,7 +113,7 @@ fn best_slopes(votes: &[Votes]) -> Vec<(u32, usize)> {
     (0..votes.len())
         .map(|bin| {
             let counts = around(bin);
-            // Twice the distance from no slope, and which of both.
+            // Twice the distance from slope 0, and the sign.
             let order = |j: usize| 2 * j.abs_diff(SLOPES) + usize::from(j > SLOPES);
             let keys = (0..ALL_SLOPES).map(|j| (counts[j], std::cmp::Reverse(order(j)), j));
             keys.max().map_or((0, SLOPES), |(count, _, j)| (count, j))
@@ -121,7 +121,7 @@ fn best_slopes(votes: &[Votes]) -> Vec<(u32, usize)> {
         .collect()
 }
 
-/// Least squares on the edge points near a line (offset, slope), in rounds of closer ones.
+/// Least squares on the edge points near a line (offset, slope), in rounds of narrowing distance.
 #[inline(always)]
 fn fit(peaks: &[Peak], rows: usize, mut line: (f64, f64)) -> Option<SideLine> {
     const NEAR_PX: [f64; 4] = [1.6, 1.6, 1.3, 1.1];
