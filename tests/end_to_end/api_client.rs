@@ -182,7 +182,10 @@ async fn visibility_follows_the_settings_of_the_map() {
     let pose = PoseBody { x_m: 5.0, y_m: 1.5, theta_rad: -FRAC_PI_2, covariance: None };
     let request = VisibleRequest { pose, sight: own };
     let visible = maps.visible("hall", &request).await.expect("visible").landmarks;
-    assert!(visible.len() == 1 && visible[0].landmark == "poster" && visible[0].margin_m > 0.0, "{visible:?}");
+    assert!(
+        visible.len() == 1 && visible[0].landmark == "poster" && visible[0].margin_m > 0.0,
+        "{visible:?}"
+    );
     let path = CoverageRequest::new(vec![[0.5, 1.5], [9.5, 1.5]]);
     let coverage = maps.coverage("hall", &path).await.expect("coverage");
     assert!((coverage.length_m - 9.0).abs() < 1e-9 && (0.0..1.0).contains(&coverage.share), "{coverage:?}");

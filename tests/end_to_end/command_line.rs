@@ -15,6 +15,7 @@ use std::{
 use tempfile::TempDir;
 use tests::{
     command::{Run, check_help, check_refused, program, waymark},
+    documents::check_command_lines,
     scenes,
 };
 use vision::geometry::{Corners, polygon};
@@ -320,6 +321,11 @@ fn parameters_are_shown_applied_and_checked() {
 #[test]
 fn every_command_explains_its_options() {
     check_help(program(), &OPTIONS, LONGEST);
+}
+
+#[test]
+fn commands_in_the_documents_exist() {
+    check_command_lines(program(), "waymark", 20, LONGEST);
 }
 
 #[test]

@@ -75,8 +75,10 @@ async fn posters_with_one_picture_correct_a_known_pose() {
         let sigmas = Vector3::new(0.1, 0.1, 0.017);
         let covariance = Matrix3::from_diagonal(&sigmas.component_mul(&sigmas));
         let believed = Pose2Covariance { pose: *at, covariance };
-        let answer =
-            client.recognise("front", capture(&readings).with_prior(&believed), SOON).await.expect("an answer");
+        let answer = client
+            .recognise("front", capture(&readings).with_prior(&believed), SOON)
+            .await
+            .expect("an answer");
         let named = score(&answer, &readings);
         (right, wrong) = (right + named.0, wrong + named.1);
         if let Some(pose) = &answer.guided_map_from_robot {

@@ -1,10 +1,7 @@
 //! Claim: files, tests, types and constants named in documents exist, and so do the sections cited in comments.
 
-use std::{
-    collections::BTreeSet,
-    fs,
-    path::{Path, PathBuf},
-};
+use std::{collections::BTreeSet, fs, path::PathBuf};
+use tests::documents::{documents, markdown, root};
 
 /// Ends of the paths that are checked.
 const ENDINGS: [&str; 4] = [".rs", ".md", ".sql", ".proto"];
@@ -25,27 +22,6 @@ const FOLDERS: [&str; 12] = [
     "vision",
     "fuzz/fuzz_targets",
 ];
-
-fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
-}
-
-/// The Markdown files of a folder, by name.
-fn markdown(folder: &str) -> Vec<PathBuf> {
-    let entries = fs::read_dir(root().join(folder)).expect("a folder of documents");
-    let mut found: Vec<PathBuf> = entries.map(|e| e.expect("an entry of a folder").path()).collect();
-    found.retain(|path| path.extension().is_some_and(|e| e == "md"));
-    found.sort();
-    found
-}
-
-/// README.md, docs/*.md and docs/method/*.md.
-fn documents() -> Vec<PathBuf> {
-    let mut found = vec![root().join("README.md")];
-    found.extend(markdown("docs"));
-    found.extend(markdown("docs/method"));
-    found
-}
 
 /// The pages of the method in one text.
 fn method() -> String {

@@ -43,9 +43,9 @@ pub fn waymark<A: AsRef<OsStr>>(args: impl IntoIterator<Item = A>, longest: Dura
     run(program(), args, longest)
 }
 
-/// Checks that the help of every command (`COMMAND` or `COMMAND SUBCOMMAND`, with the options it must name) exists,
-/// and that `--help` of every command works.
-pub fn check_help(program: &Path, options: &[(&str, &[&str])], longest: Duration) {
+/// The help texts of a program by command (`COMMAND` or `COMMAND SUBCOMMAND`; empty for the program itself). Checks
+/// that `--help` of every command works.
+pub fn helps(program: &Path, longest: Duration) -> BTreeMap<String, String> {
     let (mut open, mut helps) = (vec![String::new()], BTreeMap::new());
     while let Some(command) = open.pop() {
         let run = run(program, command.split_whitespace().chain(["--help"]), longest);
@@ -53,6 +53,12 @@ pub fn check_help(program: &Path, options: &[(&str, &[&str])], longest: Duration
         open.extend(listed(&run.stdout).iter().map(|name| format!("{command} {name}").trim().to_owned()));
         helps.insert(command, run.stdout);
     }
+    helps
+}
+
+/// Checks that the help of every command exists and names its options.
+pub fn check_help(program: &Path, options: &[(&str, &[&str])], longest: Duration) {
+    let helps = helps(program, longest);
     for (command, options) in options {
         let help = helps.get(*command).unwrap_or_else(|| panic!("`{command}` is not listed: {helps:#?}"));
         for option in *options {

@@ -3,6 +3,7 @@
 
 mod child;
 pub mod command;
+pub mod documents;
 pub mod pictures;
 pub mod robots;
 pub mod scenes;

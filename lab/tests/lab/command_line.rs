@@ -5,7 +5,10 @@ use crate::{LONGEST, PROGRAM, lab};
 use serde_json::Value;
 use std::{ffi::OsString, path::Path};
 use tempfile::TempDir;
-use tests::command::{check_help, check_refused};
+use tests::{
+    command::{check_help, check_refused},
+    documents::check_command_lines,
+};
 
 /// Options that each command must name in its help.
 const OPTIONS: [(&str, &[&str]); 22] = [
@@ -111,6 +114,11 @@ const OPTIONS: [(&str, &[&str]); 22] = [
 #[test]
 fn every_command_explains_its_options() {
     check_help(Path::new(PROGRAM), &OPTIONS, LONGEST);
+}
+
+#[test]
+fn commands_in_the_documents_exist() {
+    check_command_lines(Path::new(PROGRAM), "waymark-lab", 30, LONGEST);
 }
 
 #[test]

@@ -46,7 +46,8 @@ fn excerpt(museum: &Path) -> (TempDir, usize) {
         let quads = image["quads"].as_array().expect("quads");
         !quads.is_empty() && quads.iter().all(|q| q["landmark"].is_null())
     };
-    let plain = all.clone().filter(|i| i["stratum"] == "plain").filter(|i| !has_distractor(i)).take(PHOTOGRAPHS);
+    let plain =
+        all.clone().filter(|i| i["stratum"] == "plain").filter(|i| !has_distractor(i)).take(PHOTOGRAPHS);
     let images: Vec<Value> = plain.chain(all.filter(has_distractor).take(DISTRACTORS)).cloned().collect();
     assert_eq!(images.len(), PHOTOGRAPHS + DISTRACTORS, "the set has become smaller");
     let quads: Vec<&Value> = images.iter().flat_map(|i| i["quads"].as_array().expect("quads")).collect();
