@@ -116,12 +116,13 @@ fn legend(svg: &mut String, view: &MapView, height: f64) {
     let v = height - 12.0;
     let end = BORDER_PX + bar * view.scale;
     put(svg, &format!(r#"<path d="M{BORDER_PX} {v}H{end:.1}" stroke="black" stroke-width="3"/>"#));
-    let words =
-        [("black", format!("{bar} m; walls")), ("#1f77b4", "path".into()), ("#d62728", "loop closures".into())];
+    let words = [
+        ("black", format!("{bar} m; walls")),
+        ("#1f77b4", "path".into()),
+        ("#d62728", "loop closures".into()),
+    ];
     let mut u = end + 10.0;
-    for (colour, word) in
-        words.into_iter().chain([("#2ca02c", "the log's own poses, if any".to_owned())])
-    {
+    for (colour, word) in words.into_iter().chain([("#2ca02c", "the log's own poses, if any".to_owned())]) {
         put(svg, &format!(r#"<rect x="{u:.1}" y="{:.1}" width="16" height="4" fill="{colour}"/>"#, v - 4.0));
         text(svg, (u + 20.0, v + 2.0), "start", &word);
         u += 40.0 + 8.0 * word.len() as f64;

@@ -63,7 +63,11 @@ impl Walls {
 
     /// Adds the segments (robot frame) of one scan taken at `map_from_robot`. At [`MAX_WALLS`] the oldest of the
     /// candidates with fewest observations is dropped.
-    pub fn add(&mut self, map_from_robot: &Pose2Covariance, segments: &[LaserSegment]) -> Result<(), OutOfRange> {
+    pub fn add(
+        &mut self,
+        map_from_robot: &Pose2Covariance,
+        segments: &[LaserSegment],
+    ) -> Result<(), OutOfRange> {
         map_from_robot.check()?;
         for segment in segments {
             let mut segment = segment.transformed(map_from_robot);

@@ -98,7 +98,8 @@ impl Gaze {
         let robot = Point2::from(map_from_robot.position());
         let camera_in_landmark =
             l.map_from_landmark.inverse() * Point3::new(robot.x, robot.y, l.map_from_landmark.translation.z);
-        let (distance, angle) = (camera_in_landmark.coords.norm(), camera_in_landmark.y.abs().atan2(camera_in_landmark.x));
+        let (distance, angle) =
+            (camera_in_landmark.coords.norm(), camera_in_landmark.y.abs().atan2(camera_in_landmark.x));
         let face = l.map_from_landmark * Point3::new(0.03, 0.0, 0.0);
         let fits = (self.p.distance_m[0]..=self.p.distance_m[1]).contains(&distance)
             && angle <= self.p.max_view_angle_rad

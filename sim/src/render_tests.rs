@@ -264,7 +264,9 @@ fn shares_agree_with_rays_cast_by_brute_force() {
                     hidden += usize::from(share > 0.1);
                 }
                 None => {
-                    assert!(visible[i] < 1.0 || l.corners_map().iter().any(|c| (pose.inverse() * c).z < 0.01));
+                    assert!(
+                        visible[i] < 1.0 || l.corners_map().iter().any(|c| (pose.inverse() * c).z < 0.01)
+                    );
                 }
             }
         }

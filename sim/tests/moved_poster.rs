@@ -100,7 +100,12 @@ impl Robot {
     }
 
     /// Processes one frame.
-    fn frame(&mut self, at_ns: i64, step: &Step, observations: &[LandmarkObservation<'_>]) -> Vec<HealthChange> {
+    fn frame(
+        &mut self,
+        at_ns: i64,
+        step: &Step,
+        observations: &[LandmarkObservation<'_>],
+    ) -> Vec<HealthChange> {
         let mounting = CameraExtrinsics::new(step.robot_from_camera).expect("in range");
         self.fuser.apply_odometry(at_ns, step.odom_from_robot).expect("in range");
         let used: Vec<_> = observations

@@ -48,7 +48,11 @@ pub(crate) fn write_corridor(folder: &Path, params: &ViewsParams) -> anyhow::Res
 }
 
 /// Renders scenes likewise, with `pictures` beside generated ones.
-pub(crate) fn write_scenes(folder: &Path, params: &ScenesParams, pictures: Vec<Texture>) -> anyhow::Result<()> {
+pub(crate) fn write_scenes(
+    folder: &Path,
+    params: &ScenesParams,
+    pictures: Vec<Texture>,
+) -> anyhow::Result<()> {
     write(folder, Scenes::new(params, pictures).map(|s| (s.image, s.entry)), Scenes::data_set)
 }
 

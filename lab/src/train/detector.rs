@@ -237,7 +237,9 @@ fn write_networks(args: &DetectorArgs, [border_model, classifier]: [Network; 2])
         let [(_, border_model), (_, classifier)] = &models;
         write(
             path,
-            &serde_json::to_string(&json!({"quads": {"side_model": border_model, "thing_model": classifier}}))?,
+            &serde_json::to_string(
+                &json!({"quads": {"side_model": border_model, "thing_model": classifier}}),
+            )?,
         )?;
     }
     if let Some(path) = &args.rust {

@@ -23,7 +23,7 @@ pub use report::{Decision, FramePlan, FrameReport, GlobalReason, GuidedReport, T
 
 use crate::{
     fuse::FuseParams,
-    guided::schedule::agreement::{PoseAgreement, is_uncertain, agreement},
+    guided::schedule::agreement::{PoseAgreement, agreement, is_uncertain},
     localise::{Fix, FixResult},
     pose2::{Pose2, Pose2Covariance},
 };

@@ -31,7 +31,13 @@ struct Matched {
     residual: f64,
 }
 
-fn matched(walls: &WallIndex, cloud: &Cloud, pose: &Pose2, radius_m: f64, p: &LaserFixParams) -> Vec<Matched> {
+fn matched(
+    walls: &WallIndex,
+    cloud: &Cloud,
+    pose: &Pose2,
+    radius_m: f64,
+    p: &LaserFixParams,
+) -> Vec<Matched> {
     let (s, c) = pose.theta_rad.sin_cos();
     let cos_turn = p.max_turn_rad.cos();
     let outlier2 = (p.outlier_m * radius_m / p.end_radius_m).powi(2);
@@ -83,7 +89,8 @@ pub(super) fn descend(
     let squares: f64 = points.iter().map(|m| m.weight * m.residual * m.residual).sum();
     let variance = (squares / weights.max(1e-9)).max(p.sigma_m * p.sigma_m);
     let scale = 1.0 / (p.correlated.max(1.0) * variance);
-    let information = points.iter().fold(Matrix3::zeros(), |h, m| h + m.j * m.j.transpose() * (scale * m.weight));
+    let information =
+        points.iter().fold(Matrix3::zeros(), |h, m| h + m.j * m.j.transpose() * (scale * m.weight));
     let spread = spread(&information)?;
     let [floor_m, floor_rad] = p.floor.map(|sigma| sigma * sigma);
     let floor = Matrix3::from_diagonal(&Vector3::new(floor_m, floor_m, floor_rad));

@@ -75,7 +75,8 @@ impl<'a> Planar<'a> {
             corner_points(&s.place.size).map(in_map)
         };
         let camera_from_robot = mounting.robot_from_camera.inverse();
-        let stated = observations.first().map(|s| &s.predicted.measured.camera).filter(|c| c.sigmas.is_some());
+        let stated =
+            observations.first().map(|s| &s.predicted.measured.camera).filter(|c| c.sigmas.is_some());
         let camera = stated.map(Intrinsics::error_sigmas);
         let corners_m = observations.iter().map(corners).collect();
         Self { observations, mounting, camera_from_robot, camera, corners_m }
@@ -109,7 +110,8 @@ impl<'a> Planar<'a> {
     /// Keys and covariances of the nuisance parameters: each landmark, the extrinsics, then the intrinsics unless
     /// exact.
     pub(super) fn nuisances(&self) -> Vec<(NuisanceKey, Matrix6<f64>)> {
-        let places = self.observations.iter().map(|s| (NuisanceKey::Landmark(s.landmark), s.place.covariance));
+        let places =
+            self.observations.iter().map(|s| (NuisanceKey::Landmark(s.landmark), s.place.covariance));
         let camera = self.camera.map(|sigmas| {
             let mut covariance = Matrix6::zeros();
             covariance.fixed_view_mut::<3, 3>(0, 0).set_diagonal(&sigmas.component_mul(&sigmas));
@@ -120,7 +122,9 @@ impl<'a> Planar<'a> {
 
     /// `camera_from_landmark` of observation `i` for a robot pose.
     pub(super) fn camera_from_landmark(&self, i: usize, pose: &Pose2) -> Isometry3<f64> {
-        self.camera_from_robot * pose.to_isometry3().inverse() * self.observations[i].place.map_from_landmark()
+        self.camera_from_robot
+            * pose.to_isometry3().inverse()
+            * self.observations[i].place.map_from_landmark()
     }
 
     /// Robot pose on the floor for a `camera_from_landmark` of observation `i`, and the pose in space.
@@ -165,7 +169,8 @@ impl<'a> Planar<'a> {
         let blocks = n + 1 + usize::from(self.camera.is_some());
         let mut by_nuisance = DMatrix::zeros(8 * n, 6 * blocks);
         for (i, observation) in self.observations.iter().enumerate() {
-            let predicted = corners(pose, observation.place, self.mounting, &observation.predicted.measured.camera)?;
+            let predicted =
+                corners(pose, observation.place, self.mounting, &observation.predicted.measured.camera)?;
             by_nuisance.view_mut((8 * i, 6 * i), (8, 6)).copy_from(&predicted.place);
             by_nuisance.view_mut((8 * i, 6 * n), (8, 6)).copy_from(&predicted.mounting);
             if self.camera.is_some() {

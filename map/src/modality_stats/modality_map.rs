@@ -65,7 +65,8 @@ impl ModalityMap {
         }
         made.elsewhere = made.advice_from(&[(StatsScope::Map, made.map)]);
         made.cells = cells.iter().map(|(cell, found)| (*cell, (*found, ModalityAdvice::default()))).collect();
-        let advice_of_cells: Vec<ModalityAdvice> = cells.keys().map(|cell| made.advice_of_cell(cell)).collect();
+        let advice_of_cells: Vec<ModalityAdvice> =
+            cells.keys().map(|cell| made.advice_of_cell(cell)).collect();
         for ((_, advice), advice_of_cells) in made.cells.values_mut().zip(advice_of_cells) {
             *advice = advice_of_cells;
         }

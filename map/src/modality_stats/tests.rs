@@ -282,7 +282,9 @@ fn runs_add_up_in_any_order() {
     assert_eq!(read.len(), runs[0].len());
     for ((cell, read), (other, original)) in read.iter().zip(&runs[0]) {
         assert_eq!((cell, read[1].fixes, read[1].visits), (other, original[1].fixes, original[1].visits));
-        assert!((read[1].normalised[1] - original[1].normalised[1]).abs() <= 1e-12 * original[1].normalised[1]);
+        assert!(
+            (read[1].normalised[1] - original[1].normalised[1]).abs() <= 1e-12 * original[1].normalised[1]
+        );
     }
 }
 

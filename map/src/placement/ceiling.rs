@@ -116,7 +116,10 @@ fn corners_of(q: &Vector5) -> SVector<f64, 8> {
 }
 
 /// Weighted least squares over the rectangle, with the gain from intersections to rectangle.
-fn rectangle(intersections: &SVector<f64, 8>, weight: &SMatrix<f64, 8, 8>) -> Option<(Vector5, SMatrix<f64, 5, 8>)> {
+fn rectangle(
+    intersections: &SVector<f64, 8>,
+    weight: &SMatrix<f64, 8, 8>,
+) -> Option<(Vector5, SMatrix<f64, 5, 8>)> {
     /// Steps: the problem is linear but for the direction, whose start is good.
     const STEPS: usize = 8;
     let at = |i: usize| Vector2::new(intersections[2 * i], intersections[2 * i + 1]);

@@ -204,7 +204,8 @@ fn draw_with(
             made.inspect_err(|_| assert!(stated.sigmas.is_some())).ok()
         })
         .collect();
-    let Ok(Placement { place, .. }) = placement(&views_on_wall, &[wall()], &PlacementParams::default()) else {
+    let Ok(Placement { place, .. }) = placement(&views_on_wall, &[wall()], &PlacementParams::default())
+    else {
         return draw_with(stated, views, random);
     };
     let error = Vector6::new(

@@ -154,7 +154,9 @@ fn rectangle(
 ) -> Option<(SVector<f64, 5>, SMatrix<f64, 5, 8>)> {
     /// Steps: the problem is linear but for the roll.
     const STEPS: usize = 5;
-    let mean = |k: usize| (intersections[k] + intersections[k + 2] + intersections[k + 4] + intersections[k + 6]) / 4.0;
+    let mean = |k: usize| {
+        (intersections[k] + intersections[k + 2] + intersections[k + 4] + intersections[k + 6]) / 4.0
+    };
     let width = 0.5 * (intersections[2] - intersections[0] + intersections[4] - intersections[6]);
     let height = 0.5 * (intersections[1] - intersections[7] + intersections[3] - intersections[5]);
     let mut q = SVector::<f64, 5>::from([mean(0), mean(1), width, height, 0.0]);

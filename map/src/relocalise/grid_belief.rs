@@ -64,7 +64,10 @@ impl GridBelief {
     }
 
     /// Update where the relative pose depends on the landmark: another size or height gives another distance.
-    pub fn update_associations(&mut self, hypotheses: &[AssociationHypothesis<'_>]) -> Result<(), OutOfRange> {
+    pub fn update_associations(
+        &mut self,
+        hypotheses: &[AssociationHypothesis<'_>],
+    ) -> Result<(), OutOfRange> {
         check::within("members", hypotheses.len() as f64, 0.0, MAX_MEMBERS as f64)?;
         let reach_m = self.p.clutter_reach_m;
         let evenly = self.p.clutter / (PI * reach_m * reach_m * TAU);
@@ -119,7 +122,11 @@ impl GridBelief {
             let (dx, dy) = (place.x_m - pose.x_m, place.y_m - pose.y_m);
             let bearing = wrap_rad(dy.atan2(dx) - pose.theta_rad);
             let is_covered = (bearings_rad[0]..=bearings_rad[1]).contains(&bearing);
-            if is_covered && visible.contains(&Point2::new(pose.x_m, pose.y_m)) { 1.0 - detection } else { 1.0 }
+            if is_covered && visible.contains(&Point2::new(pose.x_m, pose.y_m)) {
+                1.0 - detection
+            } else {
+                1.0
+            }
         });
     }
 

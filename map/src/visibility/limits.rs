@@ -134,7 +134,7 @@ impl Limits {
         (distance * distance - self.rise_m.powi(2)).max(0.0).sqrt()
     }
 
-        // Behind and below a landmark tilted by 20 to 40 degrees the apparent height is not monotonic at very oblique
+    // Behind and below a landmark tilted by 20 to 40 degrees the apparent height is not monotonic at very oblique
     // views: it dips by at most 12 %. Such a dip is not cut out.
     /// The part of a range in which it is high enough.
     fn high_within_m(&self, cosine: f64, (near, far): (f64, f64)) -> Option<(f64, f64)> {

@@ -28,7 +28,8 @@ fn corners_are_where_geometry_puts_them() {
         assert!((found - Point2::from(expected)).norm() < 1e-9, "{found} {expected:?}");
     }
     // Turned by 60 degrees it is half as wide, and its height grows on the near side.
-    let rendered = render(&Conditions { size_px: 100.0, yaw_rad: 60f64.to_radians(), ..Conditions::default() });
+    let rendered =
+        render(&Conditions { size_px: 100.0, yaw_rad: 60f64.to_radians(), ..Conditions::default() });
     let [a, b, c, d] = rendered.corners.points();
     assert!(((b - a).x - 50.0).abs() < 1.0, "{}", (b - a).x);
     assert!((d - a).norm() > 105.0 && (c - b).norm() < 95.0);
@@ -75,7 +76,8 @@ fn the_cut_equals_that_part_of_the_whole_image() {
 #[test]
 fn noise_follows_the_draw_and_a_picture_outside_is_none() {
     let poster = poster(1);
-    let render = |draw| exhibit(&poster, &plaster(1), &Conditions::realistic(4), Extent::Around, draw).unwrap();
+    let render =
+        |draw| exhibit(&poster, &plaster(1), &Conditions::realistic(4), Extent::Around, draw).unwrap();
     assert_eq!(render(1), render(1));
     assert_ne!(render(1), render(2));
     assert_ne!(Conditions::realistic(1), Conditions::realistic(2));

@@ -5,8 +5,8 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use super::paint::{Light, Plane, Rect};
 use super::objects::SceneObject;
+use super::paint::{Light, Plane, Rect};
 
 /// Most draws of a camera that is inside the room.
 const TRIES: usize = 60;

@@ -83,7 +83,8 @@ impl Asked {
         Report {
             landmarks: models.len(),
             own_ms: median(&mut own.iter().map(|(_, (ms, _))| *ms).collect::<Vec<_>>()).unwrap_or(0.0),
-            distractor_ms: median(&mut distractors.iter().map(|(ms, _)| *ms).collect::<Vec<_>>()).unwrap_or(0.0),
+            distractor_ms: median(&mut distractors.iter().map(|(ms, _)| *ms).collect::<Vec<_>>())
+                .unwrap_or(0.0),
             asked: self.own.len(),
             right: own.iter().filter(|(id, (_, r))| unique(r) == Some(*id)).count(),
             wrong: own.iter().filter(|(id, (_, r))| unique(r).is_some_and(|u| u != *id)).count(),

@@ -129,7 +129,8 @@ fn grids(files: &[PathBuf], name: &str) -> anyhow::Result<Vec<Set>> {
             .cloned()
             .collect();
         let Some(image_px) = size(&pictures) else { continue };
-        let views = all.into_iter().map(|corners| PlanarView::of_points(grid(rows, columns), corners, SIGMA_PX));
+        let views =
+            all.into_iter().map(|corners| PlanarView::of_points(grid(rows, columns), corners, SIGMA_PX));
         let corners = outermost(&grid(rows, columns));
         let name = format!("{name}/{family} {columns}x{rows}");
         sets.push(Set { name, image_px, views: views.collect(), corners, stated: vec![] });

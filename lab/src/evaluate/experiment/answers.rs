@@ -3,11 +3,11 @@
 
 use super::{
     Common,
+    distractors::{Distractor, distractors},
     lesson::{Class, Taught, noisy},
-    view_outcome::quad,
     mixed, of_each,
     pictures::{self, Picture, generated},
-    distractors::{Distractor, distractors},
+    view_outcome::quad,
 };
 use sim::{
     exhibit::{Conditions, Extent, Shadow, exhibit},
@@ -94,7 +94,8 @@ fn quad_of(class: &Class, distractors: &[Distractor], draw: u64, p: &Params) -> 
         let (id, picture) = class.active().nth(n)?;
         (&picture.texture, Some(id))
     } else {
-        let of: Vec<&Distractor> = distractors.iter().filter(|s| s.hard == (chosen < MATED + LOOK_ALIKES)).collect();
+        let of: Vec<&Distractor> =
+            distractors.iter().filter(|s| s.hard == (chosen < MATED + LOOK_ALIKES)).collect();
         (&of.get(pick(&mut random, of.len()))?.texture, None)
     };
     let (rendered, corners) = (0..TRIES).find_map(|n| view(class, texture, mixed(&[draw, n])))?;

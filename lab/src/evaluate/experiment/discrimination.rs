@@ -1,14 +1,13 @@
-//! `waymark-lab evaluate discrimination` (E3, E4, the paper's Fig. 11; E11, E14): share of distractors accepted as
-//! a landmark, per pair by the paper's thresholds and per quad by the whole decision, and landmarks missed at the
-//! same thresholds.
+//! `waymark-lab evaluate discrimination` (E3, E4, the paper's Fig. 11; E11, E14): share of distractors accepted, per
+//! pair by the paper's thresholds and per quad by the whole decision, and landmarks missed at the same thresholds.
 
 use super::{
     Common, Setting,
     distance_histograms::{DistanceHistograms, Pairs},
-    lesson::{Class, noisy},
-    view_outcome::{Outcome, detected, quad, score_view},
-    mixed, of_each, pictures, say,
     distractors::{Distractor, distractors},
+    lesson::{Class, noisy},
+    mixed, of_each, pictures, say,
+    view_outcome::{Outcome, detected, quad, score_view},
     write_plot,
 };
 use crate::evaluate::statistics::{Interval, upper_bound, wilson};
@@ -126,7 +125,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         reports.push(report);
     }
     write_plot(args.common.plot.as_deref(), || {
-        let histograms: Vec<&DistanceHistograms> = reports.iter().take(1).flat_map(|r| &r.histograms).collect();
+        let histograms: Vec<_> = reports.iter().take(1).flat_map(|r| &r.histograms).collect();
         super::distance_histograms::svg(&histograms)
     })
 }
@@ -224,7 +223,8 @@ fn own_distances(class: &Class, common: &Common, p: &Params) -> Vec<[f64; 2]> {
     let Some((id, picture)) = class.active().next() else { return vec![] };
     let numbers: Vec<u64> = (0..HISTOGRAM_VIEWS).collect();
     let distances = |n: u64| {
-        let (rendered, corners) = rendered_view(class, &picture.texture, mixed(&[common.seed, 4, n]), common)?;
+        let (rendered, corners) =
+            rendered_view(class, &picture.texture, mixed(&[common.seed, 4, n]), common)?;
         let model = class.models.get(id)?;
         let corners = corners.or_else(|| detected(&rendered, p).first().map(|q| q.corners_px))?;
         let icon = vision::icon::icon(&rendered.image, &corners, &p.icon).ok()?;
@@ -300,7 +300,9 @@ fn taken(
     name: impl Fn(LandmarkId) -> String,
 ) -> Vec<Taken> {
     let mut all = Vec::new();
-    for (number, (distractor, of_one)) in distractors.iter().zip(views).enumerate().filter(|(_, (s, _))| !s.hard) {
+    for (number, (distractor, of_one)) in
+        distractors.iter().zip(views).enumerate().filter(|(_, (s, _))| !s.hard)
+    {
         let mut views = BTreeMap::new();
         for view in sights {
             if let Verdict::Unique(id) = view.recognition {
@@ -371,7 +373,8 @@ mod tests {
     fn strata_count_quads_and_textures() {
         let texture = Arc::new(sim::posters::poster_of_size(1, 8, 1.0));
         let distractor = |stratum, hard| Distractor { stratum, hard, texture: texture.clone() };
-        let distractors = [distractor("posters", false), distractor("posters", false), distractor("tones", true)];
+        let distractors =
+            [distractor("posters", false), distractor("posters", false), distractor("tones", true)];
         let view = |recognition| DistractorView { recognition, distances: None, below: [0; 2], pairs: 0 };
         let unique = || view(Verdict::Unique(LandmarkId(1)));
         let unknown = || view(Verdict::Unknown);

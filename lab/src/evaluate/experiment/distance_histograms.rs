@@ -181,7 +181,8 @@ mod tests {
 
     #[test]
     fn both_thresholds_have_their_errors() {
-        let histograms = DistanceHistograms::new("x", vec![1.0, 2.0, 3.0, 4.0], vec![8.0, 9.0, 10.0, 9.5], 3.0);
+        let histograms =
+            DistanceHistograms::new("x", vec![1.0, 2.0, 3.0, 4.0], vec![8.0, 9.0, 10.0, 9.5], 3.0);
         assert_eq!((histograms.false_positives[0], histograms.false_negatives[0]), (Some(0.0), Some(0.5)));
         let tau = histograms.tau[1].expect("the means are apart");
         assert!(tau > 2.5 && tau < 9.1);

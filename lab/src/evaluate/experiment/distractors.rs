@@ -40,7 +40,8 @@ pub(crate) fn distractors(
         let texture = generated(common.part, common.seed, FIRST_POSTER + i).texture;
         Distractor { stratum: "posters", hard: false, texture }
     });
-    let picture = |p: &Picture| Distractor { stratum: "photographs", hard: false, texture: p.texture.clone() };
+    let picture =
+        |p: &Picture| Distractor { stratum: "photographs", hard: false, texture: p.texture.clone() };
     all.extend(photographs.iter().map(picture));
     let rooms: Vec<u64> = (0..u64::from(posters / 10).max(1)).collect();
     all.extend(
@@ -48,9 +49,11 @@ pub(crate) fn distractors(
     );
     let taught: Vec<_> = class.active().take(LOOK_ALIKES).collect();
     all.extend(
-        of_each(&taught, "look-alikes", |_, (id, picture)| look_alikes(picture, mixed(&[common.seed, 8, id.0])))
-            .into_iter()
-            .flatten(),
+        of_each(&taught, "look-alikes", |_, (id, picture)| {
+            look_alikes(picture, mixed(&[common.seed, 8, id.0]))
+        })
+        .into_iter()
+        .flatten(),
     );
     let pairs = taught.windows(2).map(|pair| Distractor {
         stratum: "halves of two landmarks",

@@ -4,10 +4,10 @@
 use super::{
     Common, Setting,
     lesson::{Class, noisy},
-    view_outcome::quad,
     mixed, of_each,
     pictures::{Picture, generated},
     say,
+    view_outcome::quad,
 };
 use crate::evaluate::statistics::{Interval, upper_bound, wilson};
 use serde::Serialize;
@@ -135,7 +135,9 @@ fn count(
         let Some(rendered) = exhibit(&picture.texture, &class.wall, &conditions, Extent::Around, draw) else {
             continue;
         };
-        let Some(corners) = noisy(&rendered.corners, args.common.corner_noise_px, &mut random) else { continue };
+        let Some(corners) = noisy(&rendered.corners, args.common.corner_noise_px, &mut random) else {
+            continue;
+        };
         counts.views += 1;
         match recognise(&rendered.image, &quad(corners), &class.models, DistanceKind::Both, p).verdict {
             Verdict::Unique(id) if is(id, own) => counts.right += 1,

@@ -4,8 +4,8 @@
 use super::{
     Common,
     lesson::{Class, noisy},
-    view_outcome::{Outcome, ViewFigures, score_view},
     mixed, of_each,
+    view_outcome::{Outcome, ViewFigures, score_view},
 };
 use crate::evaluate::statistics::{Interval, bootstrap, quantile, wilson};
 use serde::Serialize;

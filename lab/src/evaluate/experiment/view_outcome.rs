@@ -138,7 +138,13 @@ pub(crate) fn score_view(
 }
 
 /// H^r and C^r of the icon at `corners` to landmark `id`, over tau.
-fn paper_ratios(class: &Class, id: LandmarkId, rendered: &Exhibit, corners: &Corners, p: &Params) -> [f64; 3] {
+fn paper_ratios(
+    class: &Class,
+    id: LandmarkId,
+    rendered: &Exhibit,
+    corners: &Corners,
+    p: &Params,
+) -> [f64; 3] {
     let far = [f64::INFINITY; 3];
     let (Ok(icon), Some(model)) = (icon(&rendered.image, corners, &p.icon), class.models.get(id)) else {
         return far;

@@ -38,7 +38,8 @@ impl Relations {
         let mut pairs: Vec<(usize, usize)> = known.windows(2).map(|w| (w[0].0, w[1].0)).collect();
         let mut distance_m = vec![0.0];
         for w in known.windows(2) {
-            distance_m.push(distance_m[distance_m.len() - 1] + (w[1].1.position() - w[0].1.position()).norm());
+            distance_m
+                .push(distance_m[distance_m.len() - 1] + (w[1].1.position() - w[0].1.position()).norm());
         }
         let mut revisits = Vec::new();
         for a in 0..known.len() {

@@ -83,7 +83,8 @@ impl Drive {
     pub(super) fn new(world: &World, seed: u64, back: bool) -> Self {
         let mut random = Random::new(seed);
         let systematic = SYSTEMATIC.map(|s| s * random.normal());
-        let true_places: Vec<LandmarkPlace> = world.posters.iter().map(|place| drawn(place, &mut random)).collect();
+        let true_places: Vec<LandmarkPlace> =
+            world.posters.iter().map(|place| drawn(place, &mut random)).collect();
         let laser = LaserParams::default();
         let count = (LENGTH_M / STEP_M) as usize;
         let (mut steps, mut odometry): (Vec<Step>, Pose2) = (Vec::with_capacity(count), Pose2::default());

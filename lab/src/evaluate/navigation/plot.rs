@@ -112,7 +112,9 @@ impl Plan {
         let title = format!("one drive, {corrections} corrections (dots); posters green");
         text(svg, (0.5 * WIDTH_PX, 20.0), "middle", &title);
         for (i, (colour, words)) in
-            [(TRUE, "true trajectory"), (ODOMETRY, "odometry alone"), (CORRECTED, "corrected")].iter().enumerate()
+            [(TRUE, "true trajectory"), (ODOMETRY, "odometry alone"), (CORRECTED, "corrected")]
+                .iter()
+                .enumerate()
         {
             let x = LEFT_PX + 150.0 * i as f64;
             put(svg, &format!(r#"<rect x="{x:.0}" y="32" width="24" height="4" fill="{colour}"/>"#));

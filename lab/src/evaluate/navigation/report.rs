@@ -241,7 +241,10 @@ impl Report {
             ),
             format!("  frames          {}", self.frames),
             format!("  recognitions    {} of {} full views of active landmarks", self.recognised, self.shown),
-            format!("  false matches   {}, {} more by guided recognition", self.false_matches, self.guided_false),
+            format!(
+                "  false matches   {}, {} more by guided recognition",
+                self.false_matches, self.guided_false
+            ),
             format!(
                 "  by landmarks    {} corrections, {} more gated out; {} by guided names",
                 self.corrections, self.gated, self.guided_corrections

@@ -188,7 +188,8 @@ fn on_walls(
 ) -> Option<Result<LandmarkPlace, PlacementError>> {
     let covariance = [Matrix2::identity() * SIGMA_PX * SIGMA_PX; 4];
     let p = PlacementParams::default();
-    let views: Option<Vec<SimulatedView>> = (0..views).map(|_| simulated_view(room, object, random)).collect();
+    let views: Option<Vec<SimulatedView>> =
+        (0..views).map(|_| simulated_view(room, object, random)).collect();
     let (mut on_plane, mut why) = (vec![], None);
     for view in views? {
         match view_on_wall(&view.posed(&covariance), &room.walls, &p) {
@@ -210,7 +211,8 @@ fn on_ceiling(
 ) -> Option<Result<LandmarkPlace, PlacementError>> {
     let covariance = [Matrix2::identity() * SIGMA_PX * SIGMA_PX; 4];
     let p = PlacementParams::default();
-    let views: Option<Vec<SimulatedView>> = (0..views).map(|_| simulated_view(room, object, random)).collect();
+    let views: Option<Vec<SimulatedView>> =
+        (0..views).map(|_| simulated_view(room, object, random)).collect();
     let on_plane: Result<Vec<_>, _> =
         views?.iter().map(|view| view_on_ceiling(&view.posed(&covariance), &room.ceiling, &p)).collect();
     Some(on_plane.and_then(|on_plane| ceiling_placement(&on_plane, &room.ceiling, &p)).map(|made| made.place))

@@ -76,7 +76,8 @@ fn observe(
     (real, camera): (&CameraExtrinsics, &StatedCamera),
     random: &mut Random,
 ) -> Option<LandmarkPose> {
-    let view = real.robot_from_camera.inverse() * robot.to_isometry3().inverse() * true_place.map_from_landmark();
+    let view =
+        real.robot_from_camera.inverse() * robot.to_isometry3().inverse() * true_place.map_from_landmark();
     camera.observe(&view, (true_place.size, SIZE), SIGMA_PX, random)
 }
 
@@ -220,10 +221,14 @@ fn drive(cameras: Cameras, random: &mut Random) -> Drive {
             let Ok(believed) = mounted(if places[l].y_m > 0.0 { 0.6 } else { -0.6 }) else { return made };
             let real = with_error(&believed, &error);
             if let Some(observed) = observe(&truth, &true_places[l], (&real, &camera), random) {
-                let observation =
-                    LandmarkObservation { landmark: LandmarkId(l as u64), seen: &observed, place: &places[l] };
+                let observation = LandmarkObservation {
+                    landmark: LandmarkId(l as u64),
+                    seen: &observed,
+                    place: &places[l],
+                };
                 let prior = fuser.pose_at(at);
-                let answer = robot_pose(&[observation], &believed, prior.as_ref(), &LocaliseParams::default());
+                let answer =
+                    robot_pose(&[observation], &believed, prior.as_ref(), &LocaliseParams::default());
                 if let Ok(FixResult::Fixed(fix)) = answer {
                     // The outcome is ignored; it shows in the pose.
                     if fuser.apply_fix(at, &fix).is_err() {

@@ -8,11 +8,11 @@ mod scene;
 mod single;
 
 use super::experiment::say;
-use stated_camera::Cameras;
 use joint::{Drives, Joint};
 use peers::{Beside, Errors};
 use serde::Serialize;
 use single::{Cell, Cost, Exact, Row};
+use stated_camera::Cameras;
 use std::path::PathBuf;
 
 /// `waymark-lab evaluate pose`.
@@ -111,7 +111,8 @@ fn table(r: &Report) -> Vec<String> {
         ));
     }
     lines.push(
-        "  consistency: mean NEES, 6 degrees of freedom, of the draws that are not flagged as ambiguous".into(),
+        "  consistency: mean NEES, 6 degrees of freedom, of the draws that are not flagged as ambiguous"
+            .into(),
     );
     for c in &r.cells {
         let inside = if c.inside_95 {

@@ -69,7 +69,8 @@ fn corridor(random: &mut Random) -> (f64, f64, u64) {
             };
             let (turn, shift) = (wrong.fixed_rows::<3>(0).into(), wrong.fixed_rows::<3>(3).into());
             let mounted = perturbed(&believed.robot_from_camera, &turn, &shift);
-            let view = mounted.inverse() * truth.to_isometry3().inverse() * true_places[l].map_from_landmark();
+            let view =
+                mounted.inverse() * truth.to_isometry3().inverse() * true_places[l].map_from_landmark();
             let points = corner_points(&true_places[l].size).map(|p| {
                 let noise = Vector2::new(random.normal(), random.normal()) * SIGMA_PX;
                 pixel(&view, &p, &camera).map_or(Point2::new(-1e3, 0.0), |px| px + noise)

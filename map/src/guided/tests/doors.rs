@@ -277,7 +277,10 @@ fn frames_to_recover(spacing_m: f64, off_m: f64, seed: u64) -> (usize, usize) {
                 assert_ne!(frame.trust, Trust::Supported, "doors support nothing");
                 assert!(drive.error_m() > 0.5, "only the poster can correct it");
                 let covariance = drive.fuser.pose().unwrap().pose.covariance;
-                assert!(covariance[(0, 0)] >= 0.0025, "doors must not make a wrong pose more certain: {covariance}");
+                assert!(
+                    covariance[(0, 0)] >= 0.0025,
+                    "doors must not make a wrong pose more certain: {covariance}"
+                );
             }
         } else {
             assert_eq!(frame.wrong, 0);

@@ -160,10 +160,7 @@ fn an_established_pose_is_contradicted_within_three_frames_and_replaced_by_two_w
     assert!(found.unwrap() <= 3, "{found:?}");
     assert_eq!(drive.schedule.trust(), Trust::Contradicted);
     let at = prior(Pose2::default(), 0.03, 0.5);
-    assert!(
-        !drive.schedule.plan(0, Some(&at)).guided,
-        "no guided recognition with a contradicted pose"
-    );
+    assert!(!drive.schedule.plan(0, Some(&at)).guided, "no guided recognition with a contradicted pose");
     assert_eq!(drive.until_replaced(7, 2.0, &[], 15), None);
     assert!(drive.until_replaced(7, 2.0, &[], 30).is_some(), "stale support protects nothing");
     // Missing it at its place is no second witness.

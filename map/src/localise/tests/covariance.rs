@@ -2,7 +2,9 @@
 
 use crate::localise::{
     fix::{FixResult, NuisanceKey},
-    tests::{camera, draw, fix_of, fixed, observe, mounting, moved, nees, off, place, robot, observe_by, stated},
+    tests::{
+        camera, draw, fix_of, fixed, mounting, moved, nees, observe, observe_by, off, place, robot, stated,
+    },
 };
 use nalgebra::Matrix3;
 use vision::{model::LandmarkId, pose::reprojection::perturbed, random::Random};

@@ -4,7 +4,7 @@ use crate::{
     extrinsics::CameraExtrinsics,
     localise::{
         planar::Planar,
-        tests::{SIZE, camera, observe, mounting, moved, off, place, robot, observe_by, observation, stated},
+        tests::{SIZE, camera, mounting, moved, observation, observe, observe_by, off, place, robot, stated},
     },
     place::LandmarkPlace,
     pose2::Pose2,

@@ -113,7 +113,8 @@ fn the_covariance_is_consistent() {
                     let stood = believed.pose.plus(&e);
                     let noise =
                         |p: Point2<f64>, r: &mut Random| p + Vector2::new(r.normal(), r.normal()) * 0.5;
-                    let points = projected(&taken_by, &true_place, &stood, &real).map(|p| noise(p, &mut random));
+                    let points =
+                        projected(&taken_by, &true_place, &stood, &real).map(|p| noise(p, &mut random));
                     view_of(points, &believed).unwrap()
                 })
                 .collect();

@@ -45,8 +45,10 @@ pub(super) fn verify_loop(
     let l = &p.loops;
     let sure = belief.sigma_m <= l.sure_m;
     let limit_m = keys[new].path_m - 0.5 * l.min_way_m;
-    let old_scans: Vec<(Pose2, &Cloud)> =
-        around(keys, old, l.old_m).filter(|k| k.path_m <= limit_m).map(|k| in_frame_of(keys, old, k)).collect();
+    let old_scans: Vec<(Pose2, &Cloud)> = around(keys, old, l.old_m)
+        .filter(|k| k.path_m <= limit_m)
+        .map(|k| in_frame_of(keys, old, k))
+        .collect();
     let query = if sure {
         keys[new].cloud.clone()
     } else {
