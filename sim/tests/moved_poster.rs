@@ -184,7 +184,7 @@ fn drive(seed: u64, length_m: f64, moved: usize, hidden: bool) -> DriveFigures {
         .collect();
     let params = DriveParams { seed, legs: 3, ..DriveParams::default() };
     let (mut robot, moved) = (Robot::new(seed), LandmarkId(moved as u64));
-    let mut run = Run {
+    let mut run = DriveFigures {
         fixes_until_flagged: None,
         quarantined: false,
         wrongly_flagged: 0,

@@ -170,7 +170,7 @@ async fn a_near_duplicate_view_is_answered_and_not_stored() {
     let outcomes: Vec<_> = [&first, &same, &near_duplicate, &other].iter().map(|v| v.outcome).collect();
     let expected =
         [UploadOutcomeBody::New, UploadOutcomeBody::Same, UploadOutcomeBody::Alike, UploadOutcomeBody::New];
-    assert_eq!(said, expected.map(Some));
+    assert_eq!(outcomes, expected.map(Some));
     assert!(near_duplicate.id == first.id && same.id == first.id && other.id != first.id);
     assert_eq!(maps.landmark("hall", "p1").await.expect("landmark").views, 2);
     inside.server.stop().await;

@@ -132,7 +132,7 @@ impl<'a> Task<'a> {
 
 fn train(tasks: Vec<Task>, p: &TrainParams) -> Result<Network, TrainError> {
     check(&tasks, p)?;
-    let tasks: Vec<Task> = tasks.into_iter().filter(Task::tells).collect();
+    let tasks: Vec<Task> = tasks.into_iter().filter(Task::has_both_kinds).collect();
     let Some(width) = tasks.first().and_then(|t| t.features.first()).map(|f| f.len()) else {
         return Err(TrainError::NothingToLearn);
     };
@@ -184,7 +184,7 @@ fn check(tasks: &[Task], p: &TrainParams) -> Result<(), TrainError> {
             return Err(TrainError::Malformed(i));
         }
     }
-    if tasks.iter().any(Task::tells) { Ok(()) } else { Err(TrainError::NothingToLearn) }
+    if tasks.iter().any(Task::has_both_kinds) { Ok(()) } else { Err(TrainError::NothingToLearn) }
 }
 
 /// Mean and standard deviation of every measurement over all candidates.

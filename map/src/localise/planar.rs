@@ -75,8 +75,7 @@ impl<'a> Planar<'a> {
             corner_points(&s.place.size).map(in_map)
         };
         let camera_from_robot = mounting.robot_from_camera.inverse();
-        let stated =
-            observations.first().map(|s| &s.predicted.measured.camera).filter(|c| c.sigmas.is_some());
+        let stated = observations.first().map(|s| &s.seen.measured.camera).filter(|c| c.sigmas.is_some());
         let camera = stated.map(Intrinsics::error_sigmas);
         let corners_m = observations.iter().map(corners).collect();
         Self { observations, mounting, camera_from_robot, camera, corners_m }
@@ -149,7 +148,7 @@ impl<'a> Planar<'a> {
         let camera_from_map = self.camera_from_robot * map_from_robot.inverse();
         let turn = camera_from_map.rotation.to_rotation_matrix().into_inner();
         for (i, (observation, corners)) in self.observations.iter().zip(&self.corners_m).enumerate() {
-            let measured = &observation.predicted.measured;
+            let measured = &observation.seen.measured;
             for (c, (point, px)) in corners.iter().zip(measured.corners_px.points()).enumerate() {
                 let row = 8 * i + 2 * c;
                 let predicted = project(&camera_from_map, point, &measured.camera)?;
@@ -170,11 +169,11 @@ impl<'a> Planar<'a> {
         let mut by_nuisance = DMatrix::zeros(8 * n, 6 * blocks);
         for (i, observation) in self.observations.iter().enumerate() {
             let predicted =
-                corners(pose, observation.place, self.mounting, &observation.predicted.measured.camera)?;
+                corners(pose, observation.place, self.mounting, &observation.seen.measured.camera)?;
             by_nuisance.view_mut((8 * i, 6 * i), (8, 6)).copy_from(&predicted.place);
             by_nuisance.view_mut((8 * i, 6 * n), (8, 6)).copy_from(&predicted.mounting);
             if self.camera.is_some() {
-                for (c, by_camera) in observation.predicted.measured.by_camera.iter().enumerate() {
+                for (c, by_camera) in observation.seen.measured.by_camera.iter().enumerate() {
                     // The residual is measured minus predicted, so the derivative of the measured corner changes its
                     // sign.
                     by_nuisance.view_mut((8 * i + 2 * c, 6 * (n + 1)), (2, 3)).copy_from(&-by_camera);
@@ -201,7 +200,7 @@ impl<'a> Planar<'a> {
         let n = self.observations.len();
         let mut s = DMatrix::zeros(8 * n, 8 * n);
         for (i, observation) in self.observations.iter().enumerate() {
-            for (c, covariance) in observation.predicted.measured.covariance_px2.iter().enumerate() {
+            for (c, covariance) in observation.seen.measured.covariance_px2.iter().enumerate() {
                 s.view_mut((8 * i + 2 * c, 8 * i + 2 * c), (2, 2)).copy_from(covariance);
             }
         }

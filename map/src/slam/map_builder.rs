@@ -57,7 +57,7 @@ pub struct Slam {
     path: Vec<PoseConstraint>,
     closures: LoopCloser,
     placed: Vec<Placed>,
-    tracker: ScanMatcher,
+    matcher: ScanMatcher,
 }
 
 /// A finished map.
@@ -84,7 +84,7 @@ impl Slam {
             path: Vec::new(),
             closures: LoopCloser::default(),
             placed: Vec::new(),
-            tracker: ScanMatcher::default(),
+            matcher: ScanMatcher::default(),
         }
     }
 
@@ -112,7 +112,7 @@ impl Slam {
             });
             self.push_key(pose, odom_from_robot, cloud, scan, path_m);
             if self.closures.detect(&mut self.keys, &self.path, &self.params)? {
-                self.matcher.relaid(&self.keys, &self.params);
+                self.matcher.rebuild(&self.keys, &self.params);
             }
             return Ok(self.keys[last + 1].pose);
         }

@@ -304,12 +304,12 @@ fn taken(
         distractors.iter().zip(views).enumerate().filter(|(_, (s, _))| !s.hard)
     {
         let mut views = BTreeMap::new();
-        for view in sights {
+        for view in of_one {
             if let Verdict::Unique(id) = view.recognition {
                 *views.entry(id).or_insert(0) += 1;
             }
         }
-        let of = sights.len();
+        let of = of_one.len();
         let stratum = distractor.stratum;
         all.extend(views.into_iter().map(|(id, views)| Taken {
             stratum,

@@ -54,7 +54,7 @@ fn hidden_units_learn_what_a_linear_model_cannot() {
 fn slopes_are_those_of_the_loss() {
     let data = rivals(3, 7);
     let one = LabelledExample { group: 0, weight: 1.0, features: vec![0.3, -0.8], is_one: true };
-    let tasks = [Task::choice(&data[0], 1.0), Task::telling(&one)];
+    let tasks = [Task::choice(&data[0], 1.0), Task::labelled(&one)];
     let mut net = Weights::new(2, &TrainParams { hidden: 3, ..quick() });
     let loss = |net: &Weights, t: &Task| {
         let outputs: Vec<f64> = t.features.iter().map(|x| net.output(x, &net.activity(x))).collect();

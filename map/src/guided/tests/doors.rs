@@ -298,7 +298,7 @@ fn frames_to_recover(spacing_m: f64, off_m: f64, seed: u64) -> (usize, usize) {
 fn a_prior_wrong_by_two_metres_is_never_supported_and_is_replaced() {
     for (seed, spacing_m) in [(41, 2.0), (42, 1.5), (43, 1.3)] {
         for off_m in [2.0, -2.0] {
-            let (doubted, replaced) = found_out(spacing_m, off_m, seed);
+            let (doubted, replaced) = frames_to_recover(spacing_m, off_m, seed);
             assert!(doubted <= 3 && replaced <= 3, "{spacing_m} {off_m}: {doubted} {replaced}");
         }
     }

@@ -71,7 +71,7 @@ pub(super) fn verify_loop(
         return None;
     }
     // Joined scans have the error of the path between them.
-    let floor = if sure { [0.0, 0.0] } else { [l.distance_m, l.way_rad] };
+    let floor = if sure { [0.0, 0.0] } else { [l.way_m, l.way_rad] };
     let information = with_floor(&aligned.information, floor);
     let measured = Pose2Covariance { pose: aligned.pose, covariance: spread(&information) };
     let d2 = measured.distance2(&belief.old_from_new)?;
