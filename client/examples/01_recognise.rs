@@ -1,4 +1,4 @@
-//! A robot in thirty lines: send photographs over zenoh, print what the server saw in each.
+//! A robot in thirty lines: send photographs over zenoh, print the quads and names of each answer.
 //!
 //! ```text
 //! waymark serve                                      # in another terminal, with a map that has been taught
@@ -16,7 +16,7 @@ struct Arguments {
     /// The server's zenoh endpoint.
     #[arg(long, default_value = "tcp/127.0.0.1:7447")]
     endpoint: String,
-    /// Fleet, as the server is set.
+    /// Fleet, as in the server's settings.
     #[arg(long, default_value = "default")]
     fleet: String,
     /// The robot's name; `PUT /api/v1/robots/ROBOT {"map": ...}` makes it known.
@@ -40,14 +40,14 @@ async fn main() -> Result<(), anyhow::Error> {
     for (i, path) in arguments.images.iter().enumerate() {
         let image = std::fs::read(path)
             .map_err(|error| ClientError::File { path: path.display().to_string(), error })?;
-        // With `.with_intrinsics(..)` come poses of landmarks, with `.with_mounting(..)` the robot's own.
+        // `.with_intrinsics(..)` gives poses of landmarks, `.with_mounting(..)` also the robot's own.
         let capture = Capture::encoded(image)?;
         let answer = robot.recognise("camera", capture, Duration::from_secs(30)).await?;
         println!("[{}/{count}] {}: {}", i + 1, path.display(), sentence(&answer));
         for named in named_landmarks(&answer) {
             let at = named.quad.corners.iter().map(|c| format!("({:.0}, {:.0})", c.u_px, c.v_px));
             let at = at.collect::<Vec<_>>().join(" ");
-            // What the pose named starts none: `answer.map_from_robot` rests on the others alone.
+            // A guided name starts no pose: `answer.map_from_robot` rests on global names alone.
             let how = match named.sighting {
                 v1::Sighting::Guided => ", named by the pose known before,".to_owned(),
                 _ => format!(" with confidence {:.2}", named.quad.confidence),

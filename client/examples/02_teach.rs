@@ -4,8 +4,8 @@
 //! waymark serve                                      # in another terminal
 //! cargo run -p client --example 02_teach -- --map hall poster.jpg door.jpg --try wall.jpg
 //! ```
-//! The name of a landmark is the name of its file. With `--cropped` the whole image is the landmark; else the server
-//! looks for the one dominant quad in it and refuses when there are several.
+//! The name of a landmark is the name of its file. With `--cropped` the whole image is the landmark; otherwise the
+//! server searches the dominant quad and refuses the image if there are several.
 #![expect(clippy::print_stdout, reason = "an example shows its results")]
 
 use anyhow::Context;
@@ -25,7 +25,7 @@ struct Arguments {
     /// The server's HTTP address.
     #[arg(long, default_value = "http://127.0.0.1:8080")]
     server: String,
-    /// Map to teach; made if it is not there.
+    /// Map to teach; created if it does not exist.
     #[arg(long, default_value = "hall")]
     map: String,
     /// The whole image is the landmark.
@@ -37,7 +37,7 @@ struct Arguments {
     /// Views to generate by warping each photograph.
     #[arg(long, default_value_t = 24)]
     generated: u32,
-    /// Robot that shall use this map.
+    /// Robot to assign to this map.
     #[arg(long)]
     robot: Option<String>,
     /// Photographs to recognise afterwards.
@@ -55,10 +55,10 @@ async fn main() -> Result<(), anyhow::Error> {
     let map = arguments.map.as_str();
     match server.create_map(&NewMap::new(map)).await {
         Ok(_) => println!("map {map}: new"),
-        // Somebody's map of that name stays and is added to: say so.
+        // An existing map of that name is extended: say so.
         Err(ClientError::Refused { status: 409, .. }) => {
             let there = server.map(map).await?;
-            println!("map {map}: there already with {} landmarks, adding to it", there.landmarks);
+            println!("map {map}: exists with {} landmarks, adding to it", there.landmarks);
         }
         Err(error) => return Err(error.into()),
     }
@@ -76,7 +76,7 @@ async fn main() -> Result<(), anyhow::Error> {
         names.push(name);
     }
 
-    // 2. One job learns them all, so that their thresholds see each other.
+    // 2. One job learns all landmarks, so that each is a negative of the others.
     let job = server.learn(map, Some(&names), Some(arguments.generated)).await?;
     let report = |job: &Job| {
         println!("learning: {:3.0} % {}", 100.0 * job.progress, job.message);
@@ -91,12 +91,12 @@ async fn main() -> Result<(), anyhow::Error> {
         println!("robot {robot} now uses map {map}");
     }
 
-    // 3. Other photographs. What is not certain is not named.
+    // 3. Other photographs. Uncertain quads get no name.
     for path in &arguments.tries {
         let answer = server.recognise(map, read(path)?, None).await.context(path.display().to_string())?;
-        let seen: Vec<_> =
+        let names: Vec<_> =
             answer.quads.iter().map(|q| q.landmark.as_str()).filter(|n| !n.is_empty()).collect();
-        println!("{}: {} quads, recognised {seen:?}", path.display(), answer.quads.len());
+        println!("{}: {} quads, recognised {names:?}", path.display(), answer.quads.len());
     }
     Ok(())
 }

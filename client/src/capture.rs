@@ -1,5 +1,5 @@
 //! One image with its capture data, before it is numbered and sent. Reads the size of JPEG and PNG from their
-//! headers; decodes nothing.
+//! headers, without decoding.
 
 use crate::ClientError;
 use map::pose2::{Pose2, Pose2Covariance};
@@ -177,13 +177,13 @@ mod tests {
     }
 
     #[test]
-    fn every_cut_of_a_header_is_refused() {
+    fn every_truncated_header_is_refused() {
         let whole = jpeg();
         for cut in 0..whole.len() - 1 {
             assert!(Capture::encoded(whole[..cut].to_vec()).is_err(), "{cut}");
         }
         assert!(Capture::encoded(b"GIF89a".to_vec()).is_err());
-        // A segment of length 0 cannot hold the walk for ever.
+        // A segment of length 0 does not loop forever.
         let mut stuck = vec![0xFF, 0xD8];
         stuck.extend([0xFF, 0xE0, 0, 0].repeat(1000));
         assert!(Capture::encoded(stuck).is_err());

@@ -1,11 +1,11 @@
-//! What can go wrong on the robot's or the teacher's side. Every message says what to do next.
+//! Errors of the client. Every message says what to do next.
 
 use std::time::Duration;
 
 /// A failure of the client.
 #[derive(Debug, thiserror::Error)]
 pub enum ClientError {
-    /// A name that is none.
+    /// A text that is no valid name.
     #[error("{field} {text:?}: {error}")]
     Name {
         /// Which name: `fleet`, `robot`, `camera`.
@@ -20,17 +20,17 @@ pub enum ClientError {
         "timeout, or no server reachable at {endpoint}: is `waymark serve` running, is this its zenoh endpoint? ({detail})"
     )]
     Unreachable {
-        /// Where we looked.
+        /// The endpoint that was tried.
         endpoint: String,
-        /// What the transport said.
+        /// The transport's message.
         detail: String,
     },
     /// The transport refused an action on an open session.
     #[error("zenoh could not {action}: {detail}")]
     Transport {
-        /// What was tried.
+        /// The action.
         action: &'static str,
-        /// What it said.
+        /// The transport's message.
         detail: String,
     },
     /// No answer came in time.
@@ -45,7 +45,7 @@ pub enum ClientError {
         /// The server.
         endpoint: String,
     },
-    /// A newer frame of the same camera took this one's place; its own answer tells more.
+    /// A newer frame of the same camera replaced this one.
     #[error(
         "frame {seq} was superseded by a newer one of the same camera: send the next when the last is answered"
     )]
@@ -78,7 +78,7 @@ pub enum ClientError {
         /// More, by code, such as the `quads` that were found: [`protos::api::Problem::more`].
         more: serde_json::Map<String, serde_json::Value>,
     },
-    /// The answer is not what this version of the client understands.
+    /// The answer does not fit this version of the client.
     #[error("{url} answered something unexpected ({detail}): are client and server of the same version?")]
     Unexpected {
         /// Address asked.

@@ -2,9 +2,8 @@
 //!
 //! [`RobotClient`] is the robot's side: frames, odometry and scans go out, answers and poses come back, over zenoh.
 //! [`MapClient`] is the teacher's side over HTTP: it has a method for every operation of the API, with the types of
-//! [`api`].
-//! [`named_landmarks`] tells which landmarks an answer names, and whether the picture alone or a known pose named each.
-//! Neither decides anything: no vision runs here. `examples/` shows both, numbered in reading order.
+//! [`api`]. [`named_landmarks`] lists the landmarks that an answer names, each global or guided. No vision runs in
+//! the client. `examples/` shows both sides, numbered in reading order.
 
 pub mod capture;
 pub mod error;

@@ -9,9 +9,8 @@ use vision::geometry::Corners;
 pub struct NamedLandmark<'a> {
     /// Name of the landmark.
     pub name: &'a str,
-    /// [`Sighting::Global`]: the picture alone names it; it may start a pose. [`Sighting::Guided`]: the pose known
-    /// before names it; it may correct that pose, and says nothing to a program that does not know where the robot
-    /// is.
+    /// [`Sighting::Global`]: named by the picture alone; it may start a pose. [`Sighting::Guided`]: named with the
+    /// prior pose; it may correct that pose, and means nothing without it.
     pub sighting: Sighting,
     /// Position in the image, and pose.
     pub quad: &'a QuadAnswer,
@@ -24,10 +23,10 @@ impl NamedLandmark<'_> {
     }
 }
 
-/// The landmark that a quad is, and how it was named; none for a quad without a name.
+/// The landmark of a quad, and how it was named; `None` for a quad without a name.
 ///
-/// A server from before guided recognition does not say how: what it names is global. A name of a kind that is not
-/// known here is none.
+/// A server without guided recognition does not state the kind: its names are global. A name of an unknown kind is
+/// ignored.
 pub fn named(quad: &QuadAnswer) -> Option<NamedLandmark<'_>> {
     let sighting = Sighting::try_from(quad.sighting).ok()?;
     let (name, sighting) = match sighting {
@@ -43,8 +42,8 @@ pub fn named_landmarks(answer: &Answer) -> impl Iterator<Item = NamedLandmark<'_
     answer.quads.iter().filter_map(named)
 }
 
-/// Corners of a quad of an answer (pixels of the frame sent, clockwise from top left); `None` where they are not
-/// those of a convex quad.
+/// Corners of a quad of an answer (px of the frame sent, clockwise from the top left); `None` if they form no
+/// convex quad.
 pub fn quad_corners(quad: &QuadAnswer) -> Option<Corners> {
     let points: Vec<[f64; 2]> = quad.corners.iter().map(|p| [p.u_px, p.v_px]).collect();
     Corners::try_from(<[[f64; 2]; 4]>::try_from(points).ok()?).ok()
@@ -66,7 +65,7 @@ mod tests {
     }
 
     #[test]
-    fn each_name_comes_with_how_it_was_given() {
+    fn each_name_has_its_kind() {
         let expected = QuadAnswer { kind: QuadKind::Expected.into(), ..guided("window", Verdict::Unknown) };
         let nameless = QuadAnswer { verdict: Verdict::Unknown.into(), ..QuadAnswer::default() };
         let quads = vec![guided("door-3", Verdict::Ambiguous), nameless, global("poster"), expected];
@@ -84,13 +83,13 @@ mod tests {
     }
 
     #[test]
-    fn what_a_server_names_that_does_not_say_how_is_global() {
+    fn a_name_without_a_kind_is_global() {
         let old = QuadAnswer { sighting: Sighting::Unspecified.into(), ..global("poster") };
         assert_eq!(named(&old).map(|n| (n.name, n.sighting)), Some(("poster", Sighting::Global)));
     }
 
     #[test]
-    fn a_name_of_an_unknown_kind_is_none() {
+    fn a_name_of_an_unknown_kind_is_ignored() {
         let new = QuadAnswer { sighting: 7, ..global("poster") };
         assert_eq!(named(&new), None);
     }

@@ -18,7 +18,7 @@ use zenoh::{
     sample::Sample,
 };
 
-/// Answers and poses kept for a slow reader; it misses the oldest beyond.
+/// Answers and poses buffered for a slow reader; beyond, it misses the oldest.
 pub const INBOX: usize = 64;
 
 /// Behaviour when the link is full.
@@ -44,9 +44,9 @@ pub struct RobotOptions {
     pub delivery: Delivery,
     /// Longest time to find the server.
     pub timeout: Duration,
-    /// The epoch of a session before, for a program that was started again while odometry went on; drawn at random if
-    /// absent. Only for a server that was started again too: to one that went on, numbers that begin anew are stale.
-    /// Two programs must not use one robot's name at a time: the later one is refused with `epoch_conflict`.
+    /// Epoch of an earlier session, for a program that restarts while odometry goes on; random if absent. It works
+    /// only if the server restarted, too: a running server drops sequence numbers that begin anew as stale. Two
+    /// programs must not use one robot's name at a time: the later one is refused with `epoch_conflict`.
     pub epoch: Option<u64>,
 }
 
@@ -84,13 +84,13 @@ pub struct RobotClient {
     next_seq: AtomicU64,
     answers: broadcast::Sender<CameraAnswer>,
     poses: broadcast::Sender<v1::RobotPose>,
-    // Declared as long as they live.
+    // Held: dropping them ends subscription and token.
     _subscribers: [Subscriber<()>; 2],
     _alive: LivelinessToken,
 }
 
 impl RobotClient {
-    /// Connects, subscribes to the robot's answers and poses, and shows it alive.
+    /// Connects, subscribes to the robot's answers and poses, and declares its liveliness token.
     pub async fn connect(options: &RobotOptions) -> Result<Self, ClientError> {
         let fleet = name("fleet", &options.fleet)?;
         let robot = name("robot", &options.robot)?;
@@ -111,7 +111,7 @@ impl RobotClient {
         let to_poses = {
             let poses = poses.clone();
             move |sample: Sample| {
-                // The pose of another epoch is that of another program under this robot's name.
+                // A pose of another epoch belongs to another program under this robot's name.
                 if let Ok(pose) = v1::RobotPose::decode(&*sample.payload().to_bytes())
                     && pose.epoch == epoch
                 {
@@ -133,7 +133,7 @@ impl RobotClient {
                 .map_err(subscribe)?,
         ];
         let alive = session.liveliness().declare_token(keys.build(&Key::Alive(robot.clone(), Some(epoch))));
-        let alive = alive.await.map_err(fault("show the robot alive"))?;
+        let alive = alive.await.map_err(fault("declare the liveliness token"))?;
         Ok(Self {
             session,
             keys,
@@ -149,7 +149,7 @@ impl RobotClient {
         })
     }
 
-    /// This start of the robot's software, drawn at random at [`Self::connect`] unless the options name it.
+    /// Epoch of this start of the robot's software; random at [`Self::connect`] unless the options state it.
     pub fn epoch(&self) -> u64 {
         self.epoch
     }
@@ -206,7 +206,7 @@ impl RobotClient {
         self.poses.subscribe()
     }
 
-    /// Sends odometry of this moment.
+    /// Sends odometry with the present time.
     pub async fn publish_odometry(&self, odom_from_robot: &Pose2) -> Result<u64, ClientError> {
         self.publish_odometry_at(crate::capture::now_ns(), odom_from_robot).await
     }
@@ -250,22 +250,22 @@ impl RobotClient {
     ) -> Result<v1::GazeAdvice, ClientError> {
         let key = self.keys.build(&Key::Gaze(self.robot.clone()));
         let asked = self.session.get(key).payload(request.encode_to_vec()).timeout(wait);
-        let replies = asked.await.map_err(fault("ask where to look"))?;
-        let reply = replies.recv_async().await.map_err(|e| fault("hear where to look")(e))?;
+        let replies = asked.await.map_err(fault("ask for gaze advice"))?;
+        let reply = replies.recv_async().await.map_err(|e| fault("receive gaze advice")(e))?;
         let sample = reply
             .result()
-            .map_err(|e| ClientError::Transport { action: "hear where to look", detail: e.to_string() })?;
+            .map_err(|e| ClientError::Transport { action: "receive gaze advice", detail: e.to_string() })?;
         v1::GazeAdvice::decode(&*sample.payload().to_bytes())
-            .map_err(|e| ClientError::Transport { action: "read where to look", detail: e.to_string() })
+            .map_err(|e| ClientError::Transport { action: "read gaze advice", detail: e.to_string() })
     }
 
-    /// The present version of a map; `None` if the server has no such map. For a program that keeps something derived
-    /// from a map: `MapChanged` events may be lost on a full link, this cannot.
+    /// The present version of a map; `None` if the server has no such map. For programs that store data derived
+    /// from a map: `MapChanged` events may be lost on a full link.
     pub async fn map_version(&self, map: &str, wait: Duration) -> Result<Option<u64>, ClientError> {
         let key = self.keys.build(&Key::MapVersion(name("map", map)?));
         let replies = self.session.get(key).timeout(wait).await.map_err(fault("ask for a map's version"))?;
         let Ok(reply) = replies.recv_async().await else { return Ok(None) };
-        let hear = "hear a map's version";
+        let hear = "receive a map's version";
         let sample =
             reply.result().map_err(|e| ClientError::Transport { action: hear, detail: e.to_string() })?;
         v1::MapChanged::decode(&*sample.payload().to_bytes())
@@ -318,7 +318,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn bad_names_are_told_before_connecting() {
+    async fn invalid_names_are_refused_before_connecting() {
         let error =
             RobotClient::connect(&RobotOptions::new("tcp/127.0.0.1:1", "Site 1", "r1")).await.err().unwrap();
         assert!(matches!(error, ClientError::Name { field: "fleet", .. }), "{error}");

@@ -30,7 +30,7 @@ pub(crate) async fn open(
 
 fn config(endpoint: &str, delivery: Delivery, timeout: Duration) -> zenoh::Result<zenoh::Config> {
     // Both waits in microseconds. A frame larger than one batch needs the longer wait, or most of them are dropped
-    // silently on a slow link; and a blocked evaluation must not have its session closed under it.
+    // silently on a slow link; and a session whose sender waits must not be closed.
     let (drop_us, close_us) = match delivery {
         Delivery::Latest => (50_000, 5_000_000),
         Delivery::Every => (50_000, 60_000_000),
@@ -62,7 +62,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_settings_are_understood() {
+    fn zenoh_accepts_the_settings() {
         for delivery in [Delivery::Latest, Delivery::Every] {
             let config = config("tcp/127.0.0.1:7447", delivery, Duration::from_secs(1)).unwrap();
             assert_eq!(config.get_json("scouting/delay").unwrap(), "0");
@@ -74,15 +74,15 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn one_thread_is_an_error_not_a_panic() {
+    async fn a_runtime_of_one_thread_is_an_error_not_a_panic() {
         let error =
             open("tcp/127.0.0.1:7447", Delivery::Latest, Duration::from_millis(10)).await.unwrap_err();
         assert!(error.to_string().contains("multi_thread"), "{error}");
     }
 
     #[tokio::test(flavor = "multi_thread")]
-    async fn nobody_there_says_what_to_do() {
-        // A port that was free a moment ago: nobody listens.
+    async fn an_unreachable_server_gives_advice() {
+        // A port that was just free: nobody listens.
         let free = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
         let endpoint = format!("tcp/{free}");
         let error = open(&endpoint, Delivery::Latest, Duration::from_millis(300)).await.unwrap_err();

@@ -1,5 +1,5 @@
-//! Drawing of a laser map, as SVG: what the scans saw, the walls, the path, odometry alone, the loops, and the truth
-//! where there is one.
+//! Drawing of a laser map, as SVG: scan points, walls, path, odometry alone, loop closures, and the truth if the
+//! log has it.
 
 use crate::{
     scan_log::LogEntry,
@@ -101,13 +101,13 @@ fn points(svg: &mut String, view: &MapView, map: &MapFile, records: &[LogEntry])
     }
 }
 
-/// The truth, laid on the path at its first pose.
+/// The truth, moved so that its first pose is that of the path.
 fn truth(svg: &mut String, view: &MapView, map: &MapFile, records: &[LogEntry]) {
     let mut known = records.iter().zip(&map.path).filter_map(|(r, p)| Some((r.truth?, p))).peekable();
     let Some((first, at)) = known.peek() else { return };
     let map_from_truth = Pose2::new(at[0], at[1], at[2]).compose(&first.inverse());
-    let laid = known.map(|(t, _)| map_from_truth.compose(&t)).map(|p| [p.x_m, p.y_m]);
-    view.line(svg, laid, "#2ca02c", 1.0);
+    let aligned = known.map(|(t, _)| map_from_truth.compose(&t)).map(|p| [p.x_m, p.y_m]);
+    view.line(svg, aligned, "#2ca02c", 1.0);
 }
 
 fn legend(svg: &mut String, view: &MapView, height: f64) {
@@ -116,12 +116,13 @@ fn legend(svg: &mut String, view: &MapView, height: f64) {
     let v = height - 12.0;
     let end = BORDER_PX + bar * view.scale;
     put(svg, &format!(r#"<path d="M{BORDER_PX} {v}H{end:.1}" stroke="black" stroke-width="3"/>"#));
-    let words =
-        [("black", format!("{bar} m; walls")), ("#1f77b4", "path".into()), ("#d62728", "loops".into())];
+    let words = [
+        ("black", format!("{bar} m; walls")),
+        ("#1f77b4", "path".into()),
+        ("#d62728", "loop closures".into()),
+    ];
     let mut u = end + 10.0;
-    for (colour, word) in
-        words.into_iter().chain([("#2ca02c", "the log's own poses, where it has them".to_owned())])
-    {
+    for (colour, word) in words.into_iter().chain([("#2ca02c", "the log's own poses, if any".to_owned())]) {
         put(svg, &format!(r#"<rect x="{u:.1}" y="{:.1}" width="16" height="4" fill="{colour}"/>"#, v - 4.0));
         text(svg, (u + 20.0, v + 2.0), "start", &word);
         u += 40.0 + 8.0 * word.len() as f64;

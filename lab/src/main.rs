@@ -1,4 +1,4 @@
-//! The `waymark-lab` command line: what is known of Waymark's quality and speed, and how its weights were trained.
+//! The `waymark-lab` command line: evaluation, benchmarks and training of Waymark.
 //!
 //! Not part of the product: `server` does not depend on this crate.
 
@@ -10,7 +10,7 @@ use clap::{Parser, Subcommand};
 use server::cli::screen;
 use std::process::ExitCode;
 
-/// Experiments on labelled pictures and simulated buildings, benchmarks beside peers, and training.
+/// Experiments on labelled pictures and in simulated buildings, benchmarks beside peers, and training.
 #[derive(Debug, Parser)]
 #[command(name = "waymark-lab", version, propagate_version = true)]
 struct Cli {
@@ -26,12 +26,12 @@ enum Command {
     /// The paper's experiments on labelled pictures: tables for people, JSON for programs.
     #[command(subcommand)]
     Evaluate(evaluate::Command),
-    /// What each stage of the pipeline costs on this machine.
+    /// Time of each stage of the pipeline on this machine.
     ///
-    /// Without more words: a whole frame, recognition and poses included, on rendered frames of a corridor.
+    /// Without a subcommand: a whole frame, recognition and poses included, on rendered frames of a corridor.
     /// `waymark-lab bench detect`: from frame to quads beside OpenCV on the same pictures.
     Bench(bench::Args),
-    /// Fit parameters of detector and confidence to pictures whose truth is known.
+    /// Fit parameters of detector and confidence to labelled or rendered pictures.
     #[command(subcommand)]
     Train(train::Command),
 }

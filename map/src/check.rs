@@ -45,7 +45,7 @@ pub(crate) fn covariance<const N: usize>(
     if is_positive_semidefinite(m) { Ok(()) } else { Err(OutOfRange { field, value: m.trace() }) }
 }
 
-/// Elimination on the correlation matrix, so that metres and radians weigh alike.
+/// Elimination on the correlation matrix, so that metres and radians have equal weight.
 fn is_positive_semidefinite<const N: usize>(m: &SMatrix<f64, N, N>) -> bool {
     const TOLERANCE: f64 = 1e-9;
     let sd: [f64; N] = std::array::from_fn(|i| m[(i, i)].sqrt());
@@ -81,7 +81,7 @@ mod tests {
     use nalgebra::{Matrix2, Matrix3};
 
     #[test]
-    fn range_ends_are_inside_and_nan_is_not() {
+    fn range_ends_are_accepted_and_nan_is_not() {
         assert!(within("x_m", 2.0, -2.0, 2.0).is_ok());
         assert!(within("x_m", -2.0, -2.0, 2.0).is_ok());
         assert_eq!(within("x_m", 2.1, -2.0, 2.0), Err(OutOfRange { field: "x_m", value: 2.1 }));
@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn covariances_are_told_from_other_matrices() {
+    fn only_covariances_are_accepted() {
         let ok = |m: &Matrix2<f64>| covariance("c", m).is_ok();
         assert!(ok(&Matrix2::new(1.0, 0.5, 0.5, 1.0)));
         assert!(ok(&Matrix2::new(1e-9, 0.0, 0.0, 1e6)));

@@ -87,13 +87,13 @@ mod tests {
         assert!((left - Vector3::y()).norm() < 1e-12);
         let up = pan_tilt(0.0, 0.3, Vector3::zeros()).rotation * Vector3::z();
         assert!((up - Vector3::new(0.3_f64.cos(), 0.0, 0.3_f64.sin())).norm() < 1e-12);
-        // Tilt is about the panned axis: the picture stays level.
+        // Tilt is about the panned axis: the image stays level.
         let right = pan_tilt(0.7, 0.3, Vector3::zeros()).rotation * Vector3::x();
         assert!(right.z.abs() < 1e-12);
     }
 
     #[test]
-    fn impossible_mountings_are_refused() {
+    fn impossible_extrinsics_are_refused() {
         let at = |x| pan_tilt(0.0, 0.0, Vector3::new(x, 0.0, 1.0));
         assert!(CameraExtrinsics::new(at(MAX_MOUNTING_M)).is_ok());
         assert_eq!(CameraExtrinsics::new(at(10.01)).unwrap_err().field, "robot_from_camera.translation");

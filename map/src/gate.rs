@@ -2,7 +2,7 @@
 
 /// 99 % quantile with 3 degrees of freedom: the gate of a planar pose (method 13.6, 15).
 pub const CHI2_3_99: f64 = 11.345;
-/// 99.9 % quantile with 3 degrees of freedom: beyond it a landmark is seen elsewhere.
+/// 99.9 % quantile with 3 degrees of freedom: beyond it a landmark is observed elsewhere.
 pub const CHI2_3_999: f64 = 16.266;
 /// 99.9 % quantile with 2 degrees of freedom: the search gate of one corner.
 pub const CHI2_2_999: f64 = 13.816;

@@ -1,8 +1,8 @@
-//! Gaze control: the landmark that is most useful to look at from an uncertain pose, with the pan and tilt that
+//! Gaze control: the landmark that is the most useful target from an uncertain pose, with the pan and tilt that
 //! centre it (method 14).
 //!
-//! In: the robot's pose, candidates with their visibility areas, the pan-tilt unit. Out: the candidates that can be
-//! looked at with their utility, best first, or the action to look ahead or sweep. [`GazeController`] keeps its
+//! In: the robot's pose, candidates with their visibility areas, the pan-tilt unit. Out: the targets within the
+//! unit's range with their utility, best first, or the action to point ahead or sweep. [`GazeController`] keeps its
 //! target until another one is clearly better or observations fail.
 
 mod information;
@@ -75,7 +75,7 @@ impl Default for GazeParams {
     }
 }
 
-/// A landmark that may be looked at.
+/// A possible gaze target.
 #[derive(Debug, Clone, Copy)]
 pub struct GazeCandidate<'a> {
     /// Number of the landmark.
@@ -122,7 +122,7 @@ impl PanTiltUnit {
     }
 }
 
-/// A landmark that can be looked at, with pan and tilt.
+/// A possible target within the unit's range, with pan and tilt.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GazeTarget {
     /// Number of the landmark.
@@ -148,11 +148,11 @@ pub struct GazeTarget {
 /// What to do with the camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum GazeAction {
-    /// Look at this landmark.
+    /// Point at this landmark.
     Landmark(GazeTarget),
-    /// No landmark is visible: look along the path.
+    /// No landmark is visible: point along the path.
     Ahead,
-    /// No landmark is visible and the pose is uncertain: look around.
+    /// No landmark is visible and the pose is uncertain: sweep.
     Sweep,
 }
 
@@ -263,9 +263,9 @@ impl GazeController {
             let (x, y) = (pose.covariance[(0, 0)], pose.covariance[(1, 1)]);
             return if (x + y).sqrt() > p.lost_m { GazeAction::Sweep } else { GazeAction::Ahead };
         };
-        let kept = ranked.iter().find(|c| Some(c.landmark) == self.current);
-        let chosen = match kept {
-            Some(kept) if worth(best) <= p.switch_ratio * worth(kept) => kept,
+        let present = ranked.iter().find(|c| Some(c.landmark) == self.current);
+        let chosen = match present {
+            Some(present) if worth(best) <= p.switch_ratio * worth(present) => present,
             _ => best,
         };
         if self.current != Some(chosen.landmark) {

@@ -1,5 +1,5 @@
-//! Guided recognition, the metric side: where a known pose expects landmarks in an image, which observation is which
-//! landmark, and when the whole map must be searched all the same.
+//! Guided recognition, the metric side: predicts landmarks in an image from a known pose, assigns observations to
+//! them, and decides when the whole map must be searched as well.
 //!
 //! Three stages, one file each:
 //!

@@ -65,7 +65,7 @@ impl Scan {
         self.bearing_step_rad
     }
 
-    /// Ranges from here on are beams without a return, metres.
+    /// Ranges of at least this are beams without a return, metres.
     pub fn max_range_m(&self) -> f64 {
         self.max_range_m
     }
@@ -98,7 +98,7 @@ mod tests {
     use std::f64::consts::FRAC_PI_2;
 
     #[test]
-    fn beams_become_points_and_misses_do_not() {
+    fn beams_with_a_return_become_points() {
         let ranges = vec![2.0, f32::NAN, 9.0, 0.0, -1.0];
         let scan = Scan::new(Pose2::default(), -FRAC_PI_2, FRAC_PI_2, 8.0, ranges).unwrap();
         assert!((scan.point(0).unwrap() - Point2::new(0.0, -2.0)).norm() < 1e-12);
@@ -106,7 +106,7 @@ mod tests {
     }
 
     #[test]
-    fn bounds_are_held() {
+    fn values_out_of_range_are_refused() {
         let scan = |step, max, n| Scan::new(Pose2::default(), 0.0, step, max, vec![1.0; n]);
         assert!(scan(TAU / MAX_BEAMS as f64, MAX_RANGE_M, MAX_BEAMS).is_ok());
         assert_eq!(scan(1e-4, 8.0, MAX_BEAMS + 1), Err(ScanError::Beams(MAX_BEAMS + 1)));

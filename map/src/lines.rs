@@ -18,7 +18,7 @@ pub struct LineParams {
     pub range_sigma_m: f64,
     /// A jump in range of at least this breaks the run, metres.
     pub jump_m: f64,
-    /// Added to the jump, as a multiple of `range * bearing step`: a wall seen at a grazing angle is one run.
+    /// Added to the jump, as a multiple of `range * bearing step`: a wall at a grazing angle is one run.
     pub jump_steps: f64,
     /// A point farther than this from the chord splits the run, metres.
     pub split_m: f64,

@@ -19,7 +19,7 @@ pub use fix::{
     AmbiguityResolvedBy, Fix, FixRefusal, FixResult, FixSource, LandmarkObservation, Nuisance, NuisanceKey,
 };
 pub use params::LocaliseParams;
-pub use robot_pose::{MAX_SIGHTINGS, robot_pose};
+pub use robot_pose::{MAX_OBSERVATIONS, robot_pose};
 
 #[cfg(test)]
 mod tests;

@@ -2,7 +2,7 @@
 //! expressed in the frame of another.
 //!
 //! In: one link for each map. Out: the transform between two maps with covariance, or why there is none. The path
-//! goes up to the nearest common ancestor and down again. Links above it are left out: they move both maps alike.
+//! goes up to the nearest common ancestor and down again. Links above it are left out: they move both maps equally.
 
 use crate::{
     check::{self, OutOfRange},
@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn what_both_share_makes_nothing_less_sure() {
+    fn links_above_the_common_ancestor_add_no_uncertainty() {
         let sure = links();
         let mut vague = links();
         vague.insert(1, link(0, [100.0, 50.0, 0.6], 50.0, 0.0));
@@ -169,14 +169,14 @@ mod tests {
         assert!(same(&2, &3) && !same(&2, &4) && !same(&1, &0));
     }
 
-    /// Against many draws of the links.
+    /// Monte Carlo over draws of the links.
     #[test]
     fn the_covariance_is_that_of_drawn_links() {
         let links = links();
-        let told = relation(&links, &2, &3).unwrap().to_from_map;
+        let computed = relation(&links, &2, &3).unwrap().to_from_map;
         let mut state = 1_u64;
         let mut unit = move || {
-            // The sum of twelve even numbers is nearly normal.
+            // The sum of twelve uniform numbers is nearly normal.
             (0..12).fold(-6.0, |sum, _| {
                 state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
                 sum + (state >> 11) as f64 / (1_u64 << 53) as f64
@@ -192,14 +192,14 @@ mod tests {
                 let p = link.parent_from_map.pose;
                 link.parent_from_map.pose = Pose2::new(p.x_m + d.x, p.y_m + d.y, p.theta_rad + d.z);
             }
-            let off = relation(&drawn, &2, &3).unwrap().to_from_map.pose.minus(&told.pose);
+            let off = relation(&drawn, &2, &3).unwrap().to_from_map.pose.minus(&computed.pose);
             sum += off * off.transpose();
         }
         let drawn = sum / f64::from(draws);
         assert!(
-            (drawn - told.covariance).norm() < 0.05 * told.covariance.norm(),
+            (drawn - computed.covariance).norm() < 0.05 * computed.covariance.norm(),
             "{drawn} {}",
-            told.covariance
+            computed.covariance
         );
     }
 

@@ -127,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn a_viewer_below_sees_a_ceiling_right() {
+    fn a_ceiling_landmark_has_its_right_viewed_from_below() {
         // The top points north; a viewer below who looks up with the feet to the south has east on the left.
         let mut place =
             LandmarkPlace::by_hand(Vector3::new(0.0, 0.0, 2.5), FRAC_PI_2, SIZE, PlaceSigmas::default())
@@ -156,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn bounds_are_held_and_named() {
+    fn values_out_of_range_are_refused_with_their_field() {
         let made = |z, w, sigma| {
             let size = LandmarkSize { width_m: w, height_m: 0.5 };
             let sigmas = PlaceSigmas { position_m: sigma, ..PlaceSigmas::default() };

@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_a_pose_is_refused() {
+    fn invalid_poses_are_refused() {
         assert_eq!(Pose2::new(f64::NAN, 0.0, 0.0).check().unwrap_err().field, "x_m");
         assert_eq!(Pose2::new(0.0, MAX_COORDINATE_M * 1.01, 0.0).check().unwrap_err().field, "y_m");
         assert!(Pose2::new(0.0, MAX_COORDINATE_M, 0.0).check().is_ok());
@@ -213,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn distance_counts_both_covariances() {
+    fn distance2_uses_both_covariances() {
         let at = |x| Pose2Covariance { pose: Pose2::new(x, 0.0, 0.0), covariance: Matrix3::identity() * 0.5 };
         assert!((at(0.0).distance2(&at(3.0)).unwrap() - 9.0).abs() < 1e-12);
         let sure = Pose2Covariance { pose: Pose2::default(), covariance: Matrix3::zeros() };

@@ -1,4 +1,4 @@
-//! Cells of a map: squares of the floor, each with one of four headings.
+//! Pose cells: square metres of the floor, each with one of four headings.
 
 use crate::{
     check::{self, MAX_COORDINATE_M, OutOfRange},

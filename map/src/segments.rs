@@ -13,8 +13,8 @@ pub const MIN_SEGMENT_M: f64 = 0.01;
 /// Standard deviation of a wall given by hand, across it, metres.
 const BY_HAND_SIGMA_M: f64 = 0.01;
 
-/// A straight piece of wall. `a` to `b` runs so that the free side, from which it was seen, is on the left: the two
-/// faces of a wall are two segments. The ends lie on the line `cos(alpha) x + sin(alpha) y = rho`, rho >= 0.
+/// A straight piece of wall. `a` to `b` runs so that the free side, from which it was measured, is on the left: the
+/// two faces of a wall are two segments. The ends lie on the line `cos(alpha) x + sin(alpha) y = rho`, rho >= 0.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LaserSegment {
     /// First end, metres, map or robot frame.
@@ -27,7 +27,7 @@ pub struct LaserSegment {
     pub rho_m: f64,
     /// Covariance of (alpha, rho): rad^2, rad m, m^2.
     pub covariance: Matrix2<f64>,
-    /// How many scans saw it.
+    /// Number of scans that measured it.
     pub hits: u32,
 }
 
@@ -132,16 +132,16 @@ mod tests {
     }
 
     #[test]
-    fn ends_lie_on_the_line_wherever_it_is_seen_from() {
+    fn ends_lie_on_the_line_in_every_frame() {
         for pose in [Pose2::new(0.3, 0.2, 1.0), Pose2::new(-9.0, 4.0, -2.5), Pose2::new(-2.9, -0.1, 0.0)] {
-            let seen = wall().transformed(&Pose2Covariance { pose, covariance: Matrix3::zeros() });
-            assert!(seen.rho_m >= 0.0);
-            for (p, original) in [(seen.a, wall().a), (seen.b, wall().b)] {
-                let n = Vector2::new(seen.alpha_rad.cos(), seen.alpha_rad.sin());
-                assert!((n.dot(&p.coords) - seen.rho_m).abs() < 1e-12);
+            let moved = wall().transformed(&Pose2Covariance { pose, covariance: Matrix3::zeros() });
+            assert!(moved.rho_m >= 0.0);
+            for (p, original) in [(moved.a, wall().a), (moved.b, wall().b)] {
+                let n = Vector2::new(moved.alpha_rad.cos(), moved.alpha_rad.sin());
+                assert!((n.dot(&p.coords) - moved.rho_m).abs() < 1e-12);
                 assert!((p - pose.apply(&original)).norm() < 1e-12);
             }
-            assert!((seen.length_m() - wall().length_m()).abs() < 1e-12);
+            assert!((moved.length_m() - wall().length_m()).abs() < 1e-12);
         }
     }
 

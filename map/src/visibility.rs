@@ -4,8 +4,8 @@
 //! In: the landmark's place, walls and other obstacles, the camera. Out: a multipolygon on the floor with area and
 //! centroid, and tests of points and uncertain poses.
 //!
-//! Seen from the landmark's centre the area is a range of distances in every direction: whatever is visible from a
-//! point is visible from everywhere between it and the landmark, except from too near. Penumbrae and limits are
+//! About the landmark's centre the area is a range of distances in every direction: whatever is visible from a
+//! point is visible from everywhere between it and the landmark, except if it is too near. Penumbrae and limits are
 //! therefore bounds over direction (`envelope`), a quarter of all directions at a time, and no polygons are
 //! intersected.
 

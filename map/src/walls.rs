@@ -11,7 +11,7 @@ use crate::{
 use nalgebra::{Matrix2, Point2, Vector2};
 use serde::{Deserialize, Serialize};
 
-/// Most walls kept, confirmed or not.
+/// Most walls stored, confirmed or not.
 pub const MAX_WALLS: usize = 4096;
 
 /// Parameters of the wall map.
@@ -61,11 +61,15 @@ impl Walls {
         &self.segments
     }
 
-    /// Adds the segments (robot frame) of one scan taken at `map_from_robot`. At [`MAX_WALLS`] the least seen, oldest
-    /// candidate makes room.
-    pub fn add(&mut self, map_from_robot: &Pose2Covariance, seen: &[LaserSegment]) -> Result<(), OutOfRange> {
+    /// Adds the segments (robot frame) of one scan taken at `map_from_robot`. At [`MAX_WALLS`] the oldest of the
+    /// candidates with fewest observations is dropped.
+    pub fn add(
+        &mut self,
+        map_from_robot: &Pose2Covariance,
+        segments: &[LaserSegment],
+    ) -> Result<(), OutOfRange> {
         map_from_robot.check()?;
-        for segment in seen {
+        for segment in segments {
             let mut segment = segment.transformed(map_from_robot);
             segment.hits = 1;
             self.insert(segment);
@@ -73,19 +77,19 @@ impl Walls {
         Ok(())
     }
 
-    fn insert(&mut self, seen: LaserSegment) {
+    fn insert(&mut self, segment: LaserSegment) {
         let nearest = (0..self.segments.len())
-            .filter_map(|i| Some((i, self.distance2(&self.segments[i], &seen)?)))
+            .filter_map(|i| Some((i, self.distance2(&self.segments[i], &segment)?)))
             .min_by(|a, b| a.1.total_cmp(&b.1));
         let Some((i, _)) = nearest else {
             if self.segments.len() >= MAX_WALLS {
                 let least = (0..self.segments.len()).min_by_key(|&i| self.segments[i].hits).unwrap_or(0);
                 self.segments.remove(least);
             }
-            self.segments.push(seen);
+            self.segments.push(segment);
             return;
         };
-        self.segments[i] = fused(&self.segments[i], &seen);
+        self.segments[i] = fused(&self.segments[i], &segment);
         // The longer wall may now reach another one.
         while let Some(j) = (0..self.segments.len())
             .find(|&j| j != i && self.distance2(&self.segments[i], &self.segments[j]).is_some())
@@ -99,14 +103,15 @@ impl Walls {
         }
     }
 
-    /// Squared Mahalanobis distance of the lines if both are one wall's: same face, near enough along it, in the gate.
-    fn distance2(&self, wall: &LaserSegment, seen: &LaserSegment) -> Option<f64> {
+    /// Squared Mahalanobis distance of the lines if both are one wall's: same face, near enough along it, in the
+    /// gate.
+    fn distance2(&self, wall: &LaserSegment, segment: &LaserSegment) -> Option<f64> {
         let p = &self.params;
-        let (d, s) = difference(wall, seen);
+        let (d, s) = difference(wall, segment);
         let rough = Matrix2::new(p.rough_rad.powi(2), 0.0, 0.0, p.rough_m.powi(2));
-        let same_face = wall.facing().dot(&seen.facing()) > 0.5;
-        let (overlap_m, gap_m) = along(wall, seen);
-        let near = gap_m <= p.gap_m || overlap_m >= p.overlap * wall.length_m().min(seen.length_m());
+        let same_face = wall.facing().dot(&segment.facing()) > 0.5;
+        let (overlap_m, gap_m) = along(wall, segment);
+        let near = gap_m <= p.gap_m || overlap_m >= p.overlap * wall.length_m().min(segment.length_m());
         let d2 = (s + rough).cholesky().map(|c| d.dot(&c.solve(&d)))?;
         (same_face && near && d2 <= p.gate_chi2).then_some(d2)
     }
@@ -148,7 +153,7 @@ fn fused(a: &LaserSegment, b: &LaserSegment) -> LaserSegment {
     let (Some(ia), Some(ib)) = (ca.try_inverse(), cb.try_inverse()) else { return a.clone() };
     // Departs from method 17.6, a filter over robot and lines, which knows what they share.
     // Covariance intersection, weighted by hits: observations share the robot's pose error by an unknown amount,
-    // so their number must not shrink the covariance (method 11.5 meets the same by inflation).
+    // so their number must not shrink the covariance (method 11.5 solves the same by inflation).
     let share = f64::from(a.hits) / (f64::from(a.hits) + f64::from(b.hits));
     let Some(covariance) = (ia * share + ib * (1.0 - share)).try_inverse() else { return a.clone() };
     let line = la + covariance * ib * (1.0 - share) * d;
@@ -187,8 +192,8 @@ mod tests {
         Pose2Covariance { pose: Pose2::new(x, y, theta), covariance: Matrix3::from_diagonal(&v) }
     }
 
-    /// A wall of the map as the robot sees it.
-    fn seen(from: &Pose2Covariance, a: [f64; 2], b: [f64; 2]) -> LaserSegment {
+    /// A wall of the map as a segment in the robot frame.
+    fn segment(from: &Pose2Covariance, a: [f64; 2], b: [f64; 2]) -> LaserSegment {
         let inverse = from.pose.inverse();
         let covariance = Matrix2::new(1e-6, 0.0, 0.0, 1e-5);
         LaserSegment::from_ends(inverse.apply(&Point2::from(a)), inverse.apply(&Point2::from(b)), covariance)
@@ -196,13 +201,13 @@ mod tests {
     }
 
     #[test]
-    fn a_wall_seen_in_pieces_is_one_wall() {
+    fn pieces_of_a_wall_are_merged() {
         let mut walls = Walls::default();
         for i in 0..6 {
             let robot = at(f64::from(i), 0.0, 0.3 * f64::from(i));
             let x = f64::from(i);
             // North wall, free side to the south: it runs from east to west.
-            walls.add(&robot, &[seen(&robot, [x + 1.5, 2.0], [x - 1.0, 2.0])]).unwrap();
+            walls.add(&robot, &[segment(&robot, [x + 1.5, 2.0], [x - 1.0, 2.0])]).unwrap();
         }
         let all: Vec<_> = walls.segments().collect();
         assert_eq!(all.len(), 1);
@@ -213,14 +218,14 @@ mod tests {
     }
 
     #[test]
-    fn a_third_sighting_joins_two_walls_and_two_are_not_enough() {
+    fn a_third_observation_joins_two_walls_and_two_are_not_enough() {
         let mut walls = Walls::default();
         let robot = at(0.0, 0.0, 0.0);
         walls
-            .add(&robot, &[seen(&robot, [1.0, 2.0], [0.0, 2.0]), seen(&robot, [4.0, 2.0], [3.0, 2.0])])
+            .add(&robot, &[segment(&robot, [1.0, 2.0], [0.0, 2.0]), segment(&robot, [4.0, 2.0], [3.0, 2.0])])
             .unwrap();
         assert_eq!((walls.candidates().len(), walls.segments().count()), (2, 0));
-        walls.add(&robot, &[seen(&robot, [3.5, 2.0], [0.5, 2.0])]).unwrap();
+        walls.add(&robot, &[segment(&robot, [3.5, 2.0], [0.5, 2.0])]).unwrap();
         assert_eq!((walls.candidates().len(), walls.segments().count()), (1, 1));
         assert!((walls.candidates()[0].length_m() - 4.0).abs() < 1e-9);
     }
@@ -230,26 +235,26 @@ mod tests {
         let mut walls = Walls::default();
         let (south, north) = (at(0.0, 0.0, 0.0), at(0.0, 4.0, 1.0));
         for _ in 0..3 {
-            walls.add(&south, &[seen(&south, [1.0, 2.0], [-1.0, 2.0])]).unwrap();
-            walls.add(&north, &[seen(&north, [-1.0, 2.01], [1.0, 2.01])]).unwrap();
+            walls.add(&south, &[segment(&south, [1.0, 2.0], [-1.0, 2.0])]).unwrap();
+            walls.add(&north, &[segment(&north, [-1.0, 2.01], [1.0, 2.01])]).unwrap();
             // The same wall behind a door 0.9 m wide.
-            walls.add(&south, &[seen(&south, [3.0, 2.0], [1.9, 2.0])]).unwrap();
+            walls.add(&south, &[segment(&south, [3.0, 2.0], [1.9, 2.0])]).unwrap();
             // A parallel wall 15 cm further.
-            walls.add(&south, &[seen(&south, [1.0, 2.15], [-1.0, 2.15])]).unwrap();
+            walls.add(&south, &[segment(&south, [1.0, 2.15], [-1.0, 2.15])]).unwrap();
         }
         assert_eq!(walls.segments().count(), 4);
     }
 
     #[test]
-    fn a_robot_that_stands_still_learns_nothing_new() {
+    fn repeated_observations_of_a_standing_robot_add_nothing() {
         let mut walls = Walls::default();
         let robot = at(0.0, 0.0, 0.0);
-        let one = seen(&robot, [1.0, 2.0], [-1.0, 2.0]).transformed(&robot).covariance;
+        let one = segment(&robot, [1.0, 2.0], [-1.0, 2.0]).transformed(&robot).covariance;
         for _ in 0..50 {
-            walls.add(&robot, &[seen(&robot, [1.0, 2.0], [-1.0, 2.0])]).unwrap();
+            walls.add(&robot, &[segment(&robot, [1.0, 2.0], [-1.0, 2.0])]).unwrap();
         }
-        let kept = walls.candidates()[0].covariance;
-        assert!((kept - one).norm() < 1e-9, "{kept} {one}");
+        let stored = walls.candidates()[0].covariance;
+        assert!((stored - one).norm() < 1e-9, "{stored} {one}");
     }
 
     #[test]
@@ -260,16 +265,16 @@ mod tests {
             let y = 2.0 + i as f64;
             let hits = if i < 5 { 3 } else { 1 };
             for _ in 0..hits {
-                walls.add(&robot, &[seen(&robot, [1.0, y], [-1.0, y])]).unwrap();
+                walls.add(&robot, &[segment(&robot, [1.0, y], [-1.0, y])]).unwrap();
             }
         }
         assert_eq!(walls.candidates().len(), MAX_WALLS);
-        assert_eq!(walls.segments().count(), 5, "what was seen often stays");
+        assert_eq!(walls.segments().count(), 5, "walls with many observations stay");
         assert!(walls.add(&at(f64::NAN, 0.0, 0.0), &[]).is_err());
     }
 
     #[test]
-    fn noisy_sightings_stay_within_their_covariance() {
+    fn noisy_observations_stay_within_their_covariance() {
         // Oracle: Monte Carlo over robot poses; the line's error against its claimed covariance.
         let mut random = vision::random::Random::new(4);
         let (mut sum, draws) = (0.0, 300);
@@ -279,7 +284,7 @@ mod tests {
                 let believed = at(f64::from(i), 0.0, 0.0);
                 let e = Vector3::new(0.01 * random.normal(), 0.01 * random.normal(), 0.002 * random.normal());
                 let truth = Pose2Covariance { pose: believed.pose.plus(&e), ..believed };
-                walls.add(&believed, &[seen(&truth, [4.0, 2.0], [-1.0, 2.0])]).unwrap();
+                walls.add(&believed, &[segment(&truth, [4.0, 2.0], [-1.0, 2.0])]).unwrap();
             }
             let wall = &walls.candidates()[0];
             let e = Vector2::new(wrap_rad(wall.alpha_rad - 0.5 * PI), wall.rho_m - 2.0);

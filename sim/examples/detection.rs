@@ -1,4 +1,4 @@
-//! How well `vision` finds the landmarks of a drive, against exact truth:
+//! Detection of the landmarks of a drive by `vision`, against exact truth:
 //! `cargo run -p sim --example detection -- [SEED] [FRAMES] [DIRECTORY]`. With a directory, writes the five frames
 //! with the largest corner error.
 
@@ -13,7 +13,7 @@ use vision::geometry::polygon::iou;
 use vision::trace::NoTrace;
 use vision::{detect::QuadKind, geometry::Corners};
 
-/// Root mean square distance of the corners, whichever is named first.
+/// Root mean square distance of the corners, for the best start corner.
 fn corner_error_px(found: &Corners, truth: &Corners) -> f64 {
     let error = |shift: usize| {
         let turned = found.rotated(shift);
@@ -32,13 +32,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut params = RobotParams::default();
     params.drive.rate_hz = 2.0;
     let robot = Robot::new(building, &params);
-    let (mut total, mut errors, mut strangers, mut images) = (0, vec![], 0, 0);
-    for sighting in robot.take(frames) {
-        let found = detect(&sighting.frame.image, &DetectParams::default(), &mut NoTrace);
+    let (mut total, mut errors, mut other_quads, mut images) = (0, vec![], 0, 0);
+    for readings in robot.take(frames) {
+        let found = detect(&readings.frame.image, &DetectParams::default(), &mut NoTrace);
         let found: Vec<_> = found.into_iter().filter(|q| q.kind == QuadKind::Full).collect();
         images += 1;
-        let landmarks = &sighting.frame.truth.landmarks;
-        strangers += found
+        let landmarks = &readings.frame.truth.landmarks;
+        other_quads += found
             .iter()
             .filter(|q| landmarks.iter().all(|l| iou(q.corners_px.points(), l.corners_px.points()) < 0.3))
             .count();
@@ -54,14 +54,14 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             });
             let error = best.filter(|c| iou(c.points(), l.corners_px.points()) > 0.7);
             let error = error.map_or(f64::INFINITY, |c| corner_error_px(c, &l.corners_px));
-            errors.push((error, sighting.clone(), l.clone()));
+            errors.push((error, readings.clone(), l.clone()));
         }
     }
     errors.sort_by(|a, b| a.0.total_cmp(&b.0));
     let hits = errors.iter().filter(|e| e.0.is_finite()).count();
     let at = |share: f64| errors.get((share * hits as f64) as usize).map_or(f64::NAN, |e| e.0);
     eprintln!(
-        "{images} images, {total} posters, {hits} found; corner error median {:.2} px, 90 % {:.2} px; {strangers} other quads",
+        "{images} images, {total} posters, {hits} found; corner error median {:.2} px, 90 % {:.2} px; {other_quads} other quads",
         at(0.5),
         at(0.9)
     );
@@ -75,15 +75,15 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         );
     }
     if let Some(directory) = directory {
-        for (i, (_, sighting, _)) in errors.iter().rev().take(5).enumerate() {
-            save(sighting, &format!("{directory}/worst-{i}.png"))?;
+        for (i, (_, readings, _)) in errors.iter().rev().take(5).enumerate() {
+            save(readings, &format!("{directory}/worst-{i}.png"))?;
         }
     }
     Ok(())
 }
 
-fn save(sighting: &SensorReadings, path: &str) -> Result<(), Box<dyn std::error::Error>> {
-    let image = &sighting.frame.image;
+fn save(readings: &SensorReadings, path: &str) -> Result<(), Box<dyn std::error::Error>> {
+    let image = &readings.frame.image;
     let size = (image.width() as u32, image.height() as u32);
     Ok(image::save_buffer(path, image.data(), size.0, size.1, image::ExtendedColorType::L8)?)
 }

@@ -1,4 +1,4 @@
-//! Writes pictures of the corridor and a sheet of posters as PNG, to be looked at:
+//! Writes pictures of the corridor and a sheet of posters as PNG files:
 //! `cargo run -p sim --example pictures -- DIRECTORY [SEED]`.
 
 use std::time::Instant;
@@ -25,12 +25,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let rendered = renderer.render(&building, &(robot * camera), &SensorParams::default(), i);
         let took = start.elapsed();
         save(&rendered.image, &format!("{directory}/corridor-{i}.png"))?;
-        let seen = rendered
+        let states = rendered
             .truth
             .landmarks
             .iter()
             .map(|l| format!("{} {:?} {:.2}", l.name, l.state, l.occluded_share));
-        eprintln!("{i}: {took:.1?}  {}", seen.collect::<Vec<_>>().join(", "));
+        eprintln!("{i}: {took:.1?}  {}", states.collect::<Vec<_>>().join(", "));
     }
     let (columns, width, height) = (12, 110, 154);
     let posters: Vec<_> = (0..48).map(|i| poster_of_size(seed * 1000 + i, 100, 1.4)).collect();

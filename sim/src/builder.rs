@@ -1,4 +1,4 @@
-//! Builds a building: walls, floors, ceilings, objects on walls, lamps; lights it at the end.
+//! Builds a building: walls, floors, ceilings, objects on walls, lamps; then computes the light.
 
 use crate::{
     building::{Building, LandmarkKind, LandmarkTruth, MAX_SURFACES, Surface},
@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 /// An object to hang on a wall.
 #[derive(Debug, Clone)]
-pub(crate) struct Thing {
+pub(crate) struct WallObject {
     pub(crate) name: String,
     pub(crate) kind: Option<LandmarkKind>,
     pub(crate) size_m: [f64; 2],
@@ -47,7 +47,7 @@ impl Builder {
     ) -> WallSegment {
         let wall = WallSegment { a_m: a_m.into(), b_m: b_m.into() };
         let (name, size) = (format!("wall-{}", self.walls.len()), [wall.length_m(), self.height_m]);
-        let thing = Thing {
+        let object = WallObject {
             name,
             kind: None,
             size_m: size,
@@ -55,7 +55,7 @@ impl Builder {
             stand_off_m: 0.0,
             texture: texture.clone(),
         };
-        self.hang(&wall, 0.5 * wall.length_m(), &thing);
+        self.hang(&wall, 0.5 * wall.length_m(), &object);
         if let Some(surface) = self.surfaces.last_mut() {
             surface.texture_m = [texture_m, texture_m];
         }
@@ -64,14 +64,14 @@ impl Builder {
     }
 
     /// Hangs an object with its centre `along_m` from the wall's end a.
-    pub(crate) fn hang(&mut self, wall: &WallSegment, along_m: f64, thing: &Thing) {
+    pub(crate) fn hang(&mut self, wall: &WallSegment, along_m: f64, object: &WallObject) {
         let n = wall.normal();
-        let foot = wall.a_m + wall.direction() * along_m + n * thing.stand_off_m;
+        let foot = wall.a_m + wall.direction() * along_m + n * object.stand_off_m;
         let map_from_surface = Isometry3::from_parts(
-            Translation3::new(foot.x, foot.y, thing.centre_z_m),
+            Translation3::new(foot.x, foot.y, object.centre_z_m),
             UnitQuaternion::from_axis_angle(&Vector3::z_axis(), n.y.atan2(n.x)),
         );
-        self.add(map_from_surface, thing, false);
+        self.add(map_from_surface, object, false);
     }
 
     /// Adds a floor (normal up) or a ceiling (normal down) from corner to opposite corner.
@@ -85,7 +85,7 @@ impl Builder {
     ) {
         let size_m = [high[1] - low[1], high[0] - low[0]];
         let centre = Vector3::new(f64::midpoint(low[0], high[0]), f64::midpoint(low[1], high[1]), z_m);
-        let thing = Thing {
+        let object = WallObject {
             name: name.into(),
             kind: None,
             size_m,
@@ -93,7 +93,7 @@ impl Builder {
             stand_off_m: 0.0,
             texture: texture.0.clone(),
         };
-        self.add(lying(centre, up), &thing, false);
+        self.add(lying(centre, up), &object, false);
         if let Some(surface) = self.surfaces.last_mut() {
             surface.texture_m = [texture.1, texture.1];
         }
@@ -102,7 +102,7 @@ impl Builder {
     /// Adds a lamp just below the ceiling, centred at (x, y), `size_m` along y and x.
     pub(crate) fn lamp(&mut self, centre_m: [f64; 2], size_m: [f64; 2], power: f64, texture: &Arc<Texture>) {
         let centre = Vector3::new(centre_m[0], centre_m[1], self.height_m - 0.01);
-        let thing = Thing {
+        let object = WallObject {
             name: format!("lamp-{}", self.lamps.len()),
             kind: Some(LandmarkKind::Lamp),
             size_m,
@@ -110,17 +110,17 @@ impl Builder {
             stand_off_m: 0.0,
             texture: texture.clone(),
         };
-        self.add(lying(centre, false), &thing, true);
+        self.add(lying(centre, false), &object, true);
         self.lamps.push(Lamp { position_m: centre.into(), power });
     }
 
-    fn add(&mut self, map_from_surface: Isometry3<f64>, thing: &Thing, glows: bool) {
+    fn add(&mut self, map_from_surface: Isometry3<f64>, object: &WallObject, glows: bool) {
         if self.surfaces.len() >= MAX_SURFACES {
             return;
         }
-        let [width_m, height_m] = thing.size_m;
-        let landmark = thing.kind.map(|kind| {
-            let name = thing.name.clone();
+        let [width_m, height_m] = object.size_m;
+        let landmark = object.kind.map(|kind| {
+            let name = object.name.clone();
             self.landmarks.push(LandmarkTruth {
                 name,
                 kind,
@@ -131,19 +131,19 @@ impl Builder {
             self.landmarks.len() - 1
         });
         self.surfaces.push(Surface {
-            name: thing.name.clone(),
+            name: object.name.clone(),
             map_from_surface,
             width_m,
             height_m,
-            texture: thing.texture.clone(),
-            texture_m: thing.size_m,
+            texture: object.texture.clone(),
+            texture_m: object.size_m,
             landmark,
             glows,
             light: LightMap::uniform(1.0),
         });
     }
 
-    /// Lights everything and closes the building.
+    /// Computes the light and returns the building.
     pub(crate) fn finish(self) -> Building {
         let mut surfaces = self.surfaces;
         let lighting = Lighting::new(self.lamps);
@@ -163,7 +163,7 @@ fn lying(centre_m: Vector3<f64>, up: bool) -> Isometry3<f64> {
     Isometry3::from_parts(centre_m.into(), UnitQuaternion::from_rotation_matrix(&rotation))
 }
 
-/// Mean light over the surfaces that do not shine, after normalisation: white plaster stays below saturation.
+/// Mean light over the surfaces that are no lamps, after normalisation: keeps white plaster below saturation.
 const MEAN_LIGHT: f32 = 0.9;
 
 /// Scales all light so that its mean over the area of lit surfaces is [`MEAN_LIGHT`]. Without lamps all stays 1.
@@ -195,7 +195,7 @@ pub(crate) mod tests {
     pub(crate) fn one_rectangle(width_m: f64, height_m: f64, texture: Texture) -> Building {
         let mut builder = Builder::new(4.0);
         let wall = WallSegment { a_m: Point2::new(0.0, 5.0), b_m: Point2::new(0.0, -5.0) };
-        let thing = Thing {
+        let object = WallObject {
             name: "poster-0".into(),
             kind: Some(LandmarkKind::Poster),
             size_m: [width_m, height_m],
@@ -203,15 +203,15 @@ pub(crate) mod tests {
             stand_off_m: 0.0,
             texture: Arc::new(texture),
         };
-        builder.hang(&wall, 5.0, &thing);
+        builder.hang(&wall, 5.0, &object);
         builder.finish()
     }
 
     #[test]
-    fn frames_are_those_of_the_method() {
+    fn coordinate_frames_are_those_of_the_method() {
         let mut builder = Builder::new(3.0);
         let texture = Arc::new(Texture::new(1, 1, vec![100], Edge::Repeat));
-        // A room on the left of a -> b: the wall y = 2 seen from below.
+        // A room on the left of a -> b: the wall y = 2, viewed from smaller y.
         let wall = builder.wall([4.0, 2.0], [0.0, 2.0], &texture, 1.0);
         assert!((wall.normal() - Vector2::new(0.0, -1.0)).norm() < 1e-12);
         builder.level("floor", [[0.0, 0.0], [4.0, 2.0]], 0.0, true, (&texture, 1.0));
@@ -227,14 +227,14 @@ pub(crate) mod tests {
         for (i, z) in [(1, 0.0), (2, 3.0)] {
             let c = corners(i);
             assert!(c.iter().all(|p| (p.z - z).abs() < 1e-12));
-            // Clockwise from the top-left as seen from the room: the normal points into it.
+            // Clockwise from the top-left, viewed from the room: the normal points into it.
             let outward = (c[3] - c[0]).cross(&(c[1] - c[0]));
             assert!(outward.z * if i == 1 { 1.0 } else { -1.0 } > 7.9);
         }
     }
 
     #[test]
-    fn walls_hide_and_keep_clear() {
+    fn walls_block_sight_and_limit_clearance() {
         let building = Building::corridor(1);
         let (a, b) = (Point2::new(2.0, 0.0), Point2::new(20.0, 0.3));
         assert!(building.in_sight(&a, &b));

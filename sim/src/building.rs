@@ -1,5 +1,5 @@
 //! A building: flat textured rectangles in the map frame, walls as lines for the laser, and the exact truth about its
-//! landmarks. Read only; `builder` makes it, `corridor` decides what hangs where.
+//! landmarks. Read only; `builder` makes it, `corridor` lays it out.
 
 pub use crate::wall::WallSegment;
 
@@ -59,12 +59,12 @@ pub fn rectangle(width_m: f64, height_m: f64) -> [Point3<f64>; 4] {
     [Point3::new(0.0, -w, h), Point3::new(0.0, w, h), Point3::new(0.0, w, -h), Point3::new(0.0, -w, -h)]
 }
 
-/// A textured rectangle, seen from its outward side only. Its frame is that of a landmark.
+/// A textured rectangle, visible from its outward side only. Its frame is that of a landmark.
 #[derive(Debug, Clone)]
 pub struct Surface {
     /// Name of the surface; the landmark's name if it is one.
     pub name: String,
-    /// Surface frame: x outward normal, y right, z up as a viewer in front sees it.
+    /// Surface frame: x outward normal, y right, z up for a viewer in front.
     pub map_from_surface: Isometry3<f64>,
     /// Extent along y, metres.
     pub width_m: f64,

@@ -36,7 +36,7 @@ impl Camera {
             _ => (0..width_px * height_px)
                 .map(|i| {
                     let px = Point2::new((i % width_px) as f64, (i / width_px) as f64);
-                    // At the edge of a fisheye no pinhole has the ray: the pixel itself stands in for it.
+                    // At the edge of a fisheye a pinhole has no such ray; use the pixel itself.
                     let straight = intrinsics.undistort(&px).unwrap_or(px);
                     [straight.x as f32, straight.y as f32]
                 })
@@ -82,7 +82,7 @@ impl Camera {
         Matrix3::new(fx, 0.0, -k.cx_px * fx, 0.0, fy, -k.cy_px * fy, 0.0, 0.0, 1.0)
     }
 
-    /// Where a pinhole with the same K would see what this camera sees at a pixel.
+    /// Pixel at which a pinhole with the same K has the ray of this camera's pixel.
     #[inline]
     pub(crate) fn undistorted(&self, pixel: usize) -> [f32; 2] {
         match self.table.get(pixel) {

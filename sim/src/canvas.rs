@@ -1,11 +1,11 @@
 //! Drawing for the texture generators: flat fills, discs, polygons, noise and block letters on a grey canvas.
 //! Units are canvas widths (x 0 to 1, y 0 to height/width), so that a drawing does not depend on its resolution;
-//! greys run from 0 to 1. It has only what the posters need.
+//! greys run from 0 to 1. It has what the posters need.
 
 use crate::font;
 use crate::texture::{Edge, Texture};
 
-/// Most rectangles that a drawing remembers.
+/// Most rectangles that a drawing lists.
 const MAX_PARTS: usize = 256;
 
 /// A grey drawing under way.
@@ -58,7 +58,7 @@ impl Canvas {
         Self { width, height, grey: vec![grey; width * height], parts: vec![] }
     }
 
-    /// A drawing that goes on from a picture.
+    /// A canvas with the content of a picture.
     pub(crate) fn of(picture: &Texture) -> Self {
         let grey = picture.data().iter().map(|g| f32::from(*g) / 255.0).collect();
         Self { width: picture.width(), height: picture.height(), grey, parts: vec![] }
@@ -83,14 +83,14 @@ impl Canvas {
         Texture::new(self.width, self.height, data, edge).with_parts(parts)
     }
 
-    /// Notes that the area is a rectangle to be seen, unless enough are known.
+    /// Lists the area as a visible rectangle, up to [`MAX_PARTS`].
     pub(crate) fn note(&mut self, area: Area) {
         if self.parts.len() < MAX_PARTS {
             self.parts.push(area);
         }
     }
 
-    /// Sets every texel with its centre in `area` to `f(x, y, what is there)`.
+    /// Sets every texel with its centre in `area` to `f(x, y, present grey)`.
     pub(crate) fn paint(&mut self, area: Area, mut f: impl FnMut(f32, f32, f32) -> f32) {
         let unit = self.width as f32;
         let range = |low: f32, high: f32, size: usize| {
@@ -105,7 +105,7 @@ impl Canvas {
         }
     }
 
-    /// Paints `grey` where the signed distance `d(x, y)` (negative inside) says so, with soft edges of one texel.
+    /// Paints `grey` where the signed distance `d(x, y)` is negative, with soft edges of one texel.
     pub(crate) fn shape(&mut self, area: Area, grey: f32, d: impl Fn(f32, f32) -> f32) {
         let unit = self.width as f32;
         self.paint(area, |x, y, under| under + (0.5 - d(x, y) * unit).clamp(0.0, 1.0) * (grey - under));
@@ -157,13 +157,13 @@ impl Canvas {
         });
     }
 
-    /// Clouds: `octaves` of value noise, `cells` lattice cells per canvas width at the coarsest, blended over what is
-    /// there with the given strength. Repeats with the canvas when that is square.
+    /// Clouds: `octaves` of value noise, `cells` lattice cells per canvas width at the coarsest, blended over the
+    /// canvas with `strength` (0 to 1). Repeats with the canvas when that is square.
     pub(crate) fn clouds(&mut self, area: Area, noise: &Noise, strength: f32) {
         self.paint(area, |x, y, under| under + strength * (noise.at(x, y) - 0.5));
     }
 
-    /// Block letters, `height` tall, top left corner at (x, y); unknown letters are blank. Gives the width.
+    /// Block letters, `height` tall, top left corner at (x, y); unknown letters are blank. Returns the width.
     pub(crate) fn text(&mut self, [x, y]: [f32; 2], height: f32, text: &str, grey: f32) -> f32 {
         let dot = height / font::ROWS as f32;
         for (i, letter) in text.chars().enumerate() {

@@ -7,14 +7,14 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-use crate::builder::{Builder, Thing};
+use crate::builder::{Builder, WallObject};
 use crate::building::{Building, LandmarkKind};
 use crate::posters::poster;
 use crate::texture::Texture;
 use crate::wall::WallSegment;
 use crate::{seed, surfaces};
 
-/// How far a poster stands off its wall.
+/// Distance of a poster's face from its wall.
 pub const POSTER_STAND_OFF_M: f64 = 0.005;
 /// Most posters in a corridor.
 pub const MAX_POSTERS: usize = 64;
@@ -37,9 +37,9 @@ pub struct CorridorParams {
     pub poster_size_m: [f64; 2],
     /// First poster's picture; landmark `poster-i` shows poster `first_poster + i`.
     pub first_poster: u64,
-    /// How many different pictures there are: poster `i` looks like poster `i - pictures`; 0: all differ.
+    /// Number of different pictures: poster `i` shows the picture of poster `i - pictures`; 0: all differ.
     pub pictures: usize,
-    /// The last so many posters show a picture of their own all the same.
+    /// Number of last posters that show a picture of their own in any case.
     pub unique_posters: usize,
     /// Whether a column stands at the right wall.
     pub column: bool,
@@ -69,7 +69,7 @@ impl Building {
         Self::corridor_with(&CorridorParams { first_poster, ..CorridorParams::default() }, seed)
     }
 
-    /// A corridor after one's own taste; sizes are clamped to their ranges.
+    /// A corridor with these parameters, clamped to their ranges.
     pub fn corridor_with(params: &CorridorParams, seed: u64) -> Self {
         let p = clamped(params);
         let mut site = Site::new(&p, seed);
@@ -174,7 +174,7 @@ impl<'a> Site<'a> {
             let shares = self.p.pictures > 0 && i + self.p.unique_posters < self.p.posters;
             let number = if shares { i % self.p.pictures } else { i };
             let texture = Arc::new(poster(self.p.first_poster.wrapping_add(number as u64)));
-            let thing = Thing {
+            let object = WallObject {
                 name: format!("poster-{i}"),
                 kind: Some(LandmarkKind::Poster),
                 size_m: self.p.poster_size_m,
@@ -185,35 +185,35 @@ impl<'a> Site<'a> {
             if i < on_sides {
                 let jitter = self.rng.random_range(-0.12..0.12);
                 let x = 3.5 + usable * ((i as f64 + 0.5 + jitter) / on_sides as f64);
-                self.put(i % 2, x, &thing, true);
+                self.put(i % 2, x, &object, true);
             } else {
                 let wall = self.ends[(i - on_sides) % 2];
                 let along = 0.5 * wall.length_m() + self.rng.random_range(-0.3..0.3);
-                self.builder.hang(&wall, along, &thing);
+                self.builder.hang(&wall, along, &object);
             }
         }
     }
 
-    /// Doors and windows wherever there is room, about every 3 m a side.
+    /// Doors and windows at free places, about every 3 m on each side.
     fn fittings(&mut self) {
         for side in 0..2 {
             let mut x = 1.3 + self.rng.random_range(0.0..1.0);
             while x < self.p.length_m - 1.0 {
                 let is_window = self.sides[side].left && self.rng.random_bool(0.35);
-                let thing = self.fitting(is_window);
+                let object = self.fitting(is_window);
                 let step =
-                    if self.put(side, x, &thing, false) { self.rng.random_range(2.2..3.4) } else { 0.4 };
+                    if self.put(side, x, &object, false) { self.rng.random_range(2.2..3.4) } else { 0.4 };
                 x += step;
             }
         }
     }
 
-    fn fitting(&mut self, is_window: bool) -> Thing {
+    fn fitting(&mut self, is_window: bool) -> WallObject {
         let seed = seed::mix(self.seed ^ self.fittings << 32);
         let number = self.fittings;
         self.fittings += 1;
         if is_window {
-            Thing {
+            WallObject {
                 name: format!("window-{number}"),
                 kind: Some(LandmarkKind::Window),
                 size_m: [1.1, 1.1],
@@ -222,7 +222,7 @@ impl<'a> Site<'a> {
                 texture: Arc::new(surfaces::window(seed)),
             }
         } else {
-            Thing {
+            WallObject {
                 name: format!("door-{number}"),
                 kind: Some(LandmarkKind::Door),
                 size_m: [0.95, 2.1],
@@ -233,15 +233,15 @@ impl<'a> Site<'a> {
         }
     }
 
-    /// Hangs a thing with its centre at `x_m` if nothing is there yet (or in any case, when it `must`).
-    fn put(&mut self, side: usize, x_m: f64, thing: &Thing, must: bool) -> bool {
+    /// Hangs an object with its centre at `x_m` if the place is free; with `must` at the nearest free place.
+    fn put(&mut self, side: usize, x_m: f64, object: &WallObject, must: bool) -> bool {
         let Side { wall: Some(wall), left, taken } = &mut self.sides[side] else { return false };
-        let half = 0.5 * thing.size_m[0] + 0.2;
+        let half = 0.5 * object.size_m[0] + 0.2;
         let mut span = [x_m - half, x_m + half];
         let clash =
             |s: &[f64; 2], taken: &[[f64; 2]]| taken.iter().find(|t| s[0] < t[1] && t[0] < s[1]).copied();
         if let Some(other) = clash(&span, taken) {
-            // A poster moves beyond what is there (the column); a fitting is left out.
+            // A poster moves past an obstacle (the column); a fitting is left out.
             span = [other[1], other[1] + 2.0 * half];
             if !must || clash(&span, taken).is_some() {
                 return false;
@@ -253,7 +253,7 @@ impl<'a> Site<'a> {
         taken.push(span);
         let x = f64::midpoint(span[0], span[1]);
         let along = if *left { self.p.length_m - x } else { x };
-        self.builder.hang(&wall.clone(), along, thing);
+        self.builder.hang(&wall.clone(), along, object);
         true
     }
 
@@ -262,7 +262,7 @@ impl<'a> Site<'a> {
         let walls: Vec<_> =
             self.sides.iter().filter_map(|s| s.wall).chain(self.ends.iter().copied()).collect();
         for (i, wall) in walls.iter().enumerate() {
-            let thing = Thing {
+            let object = WallObject {
                 name: format!("baseboard-{i}"),
                 kind: None,
                 size_m: [wall.length_m(), 0.1],
@@ -270,7 +270,7 @@ impl<'a> Site<'a> {
                 stand_off_m: 0.01,
                 texture: texture.clone(),
             };
-            self.builder.hang(wall, 0.5 * wall.length_m(), &thing);
+            self.builder.hang(wall, 0.5 * wall.length_m(), &object);
         }
     }
 }
@@ -319,7 +319,7 @@ mod tests {
     }
 
     #[test]
-    fn odd_wishes_are_clamped() {
+    fn parameters_out_of_range_are_clamped() {
         let p =
             CorridorParams { length_m: f64::NAN, posters: 1000, width_m: 1e9, ..CorridorParams::default() };
         let building = Building::corridor_with(&p, 3);

@@ -141,7 +141,7 @@ impl Drive {
         Pose2 { theta_rad: self.heading_rad, ..self.course() }
     }
 
-    /// Where the path is here, and where it leads in the present direction.
+    /// Pose on the path here, with the heading of the present direction.
     fn course(&self) -> Pose2 {
         let d = self.path[1] - self.path[0];
         let length = d.norm().max(1e-9);
@@ -269,7 +269,7 @@ mod tests {
     }
 
     #[test]
-    fn every_poster_is_looked_at() {
+    fn the_camera_is_aimed_at_every_poster() {
         let building = corridor();
         let p = DriveParams { legs: 2, ..DriveParams::default() };
         let steps: Vec<Step> = Drive::new(building.clone(), &p).collect();
@@ -286,7 +286,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wild_drive_is_tamed() {
+    fn drive_parameters_are_clamped() {
         let p =
             DriveParams { rate_hz: f64::NAN, speed_mps: -1.0, weave_length_m: 0.0, ..DriveParams::default() };
         assert!(Drive::new(corridor(), &p).take(1000).count() > 10);

@@ -1,6 +1,6 @@
-//! One picture on a plastered wall, seen by a camera under conditions that are set one by one: for experiments that
-//! vary a single condition (method 18). In: conditions and a seed. Out: an image and the exact corners; equal input
-//! gives equal bytes.
+//! One picture on a plastered wall, rendered under conditions that are set one by one, for experiments that vary a
+//! single condition (method 18). In: conditions and a seed. Out: an image and the exact corners; equal input gives
+//! equal bytes.
 
 mod conditions;
 
@@ -18,11 +18,11 @@ use vision::{frame::GrayImage, geometry::Corners};
 pub const IMAGE_PX: [usize; 2] = [640, 480];
 /// Its focal length, in pixels.
 const FOCAL_PX: f64 = 600.0;
-/// Steepest view that is drawn: beyond, the picture is a line.
+/// Largest view angle that is drawn; beyond it the picture is a line.
 pub const MAX_ANGLE_RAD: f64 = 1.53;
 /// Smallest and largest apparent size.
 pub const SIZES_PX: [f64; 2] = [8.0, 440.0];
-/// What white paper sends back in good light, as a share of the sensor's range.
+/// Brightness of white paper in good light, as a share of the sensor's range.
 const WHITE: f64 = 0.9;
 /// The wall's plaster repeats after as many sides of the picture.
 const PLASTER_SIDES: f64 = 2.8;
@@ -31,16 +31,16 @@ const PENUMBRA: f64 = 0.03;
 /// Samples along a pixel's side where the picture's border or a cover's edge crosses it.
 const EDGE_SAMPLES: usize = 3;
 
-/// How much of the camera's image is made.
+/// Part of the camera's image that is rendered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Extent {
     /// The whole image.
     Whole,
-    /// The picture with a third of its larger side around it: enough to recognise it by its corners, and quicker.
+    /// The picture with a third of its larger side around it: enough for recognition by given corners, and faster.
     Around,
 }
 
-/// What the camera sees.
+/// A rendered image with its truth.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Exhibit {
     /// The rendered image.
@@ -50,7 +50,7 @@ pub struct Exhibit {
 }
 
 /// The picture on the wall (a texture that repeats, such as [`crate::surfaces::plaster`]) under `conditions`; noise
-/// follows from `draw`. `None` where the picture does not lie within the camera's image, or is no quad there.
+/// follows from `draw`. `None` if the picture does not lie within the camera's image, or is no quad there.
 pub fn exhibit(
     picture: &Texture,
     wall: &Texture,
@@ -69,7 +69,7 @@ pub fn exhibit(
     Some(Exhibit { image, corners: local })
 }
 
-/// Where a picture of area 1 is seen.
+/// Corners (px) of a picture of area 1.
 fn corners(picture: &Texture, c: &Conditions) -> Option<Corners> {
     let angle = |a: f64| if a.is_finite() { a.clamp(-MAX_ANGLE_RAD, MAX_ANGLE_RAD) } else { 0.0 };
     let aspect = picture.width() as f64 / picture.height() as f64;
@@ -111,7 +111,7 @@ fn frame(corners: &Corners, extent: Extent) -> (nalgebra::Vector2<f64>, [usize; 
     }
 }
 
-/// Everything that sends light to the camera.
+/// Picture, wall and light sources in front of the camera.
 struct Stage<'a> {
     picture: &'a Texture,
     wall: &'a Texture,
@@ -153,7 +153,7 @@ impl<'a> Stage<'a> {
         let (right, down) = (self.unit(u + 1.0, v), self.unit(u, v + 1.0));
         let [du, dv] = [right, down].map(|p| [p[0] - here[0], p[1] - here[1]]);
         let reach = [0, 1].map(|i| 0.5 * (du[i].abs() + dv[i].abs()));
-        // How far an edge is in units of the pixel's reach: the picture's border, and the cover's.
+        // Distances to the picture's border and to the cover's edge, in units of the pixel's extent.
         let crosses = |half: f64| {
             let off = [0, 1].map(|i| ((here[i] - 0.5).abs() - half) / reach[i].max(1e-12));
             off[0].max(off[1]).abs() < 1.0
@@ -167,7 +167,7 @@ impl<'a> Stage<'a> {
         samples.sum::<f32>() / (n * n) as f32
     }
 
-    /// Light from one place of the plane.
+    /// Light from one point of the plane.
     fn at(&self, [s, t]: [f64; 2], du: [f64; 2], dv: [f64; 2]) -> f32 {
         let (x, y) = (s - 0.5, t - 0.5);
         let lit = (WHITE * self.lit(x, y)) as f32;

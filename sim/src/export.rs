@@ -25,10 +25,10 @@ pub struct DataSet {
     /// Pictures of which the whole is a landmark.
     #[serde(default)]
     pub teach: Vec<TeachEntry>,
-    /// Names of one and the same picture.
+    /// Groups of names of one picture.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub same: Vec<[String; 2]>,
-    /// Pictures to be judged.
+    /// Pictures to be evaluated.
     pub images: Vec<ImageEntry>,
 }
 
@@ -58,7 +58,7 @@ pub struct TeachEntry {
     pub landmark: String,
 }
 
-/// How much of a quad an image holds.
+/// How much of a quad is visible in an image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum QuadState {
@@ -71,14 +71,14 @@ pub enum QuadState {
     Occluded,
 }
 
-/// A quad that is in an image.
+/// A labelled quad of an image.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct QuadEntry {
     /// TL, TR, BR, BL in pixels.
     pub corners: Corners,
     /// Name of the landmark; `None` for a distractor.
     pub landmark: Option<String>,
-    /// How much of it is there.
+    /// How much of it is visible.
     #[serde(default)]
     pub state: QuadState,
     /// Whether a detector must find it. One that is not counted is neither missed nor false.
@@ -104,10 +104,10 @@ pub struct ImageEntry {
     pub stratum: Option<String>,
     /// The quads.
     pub quads: Vec<QuadEntry>,
-    /// Other real four-sided things, which are neither missed nor false: parts of the quads, whole walls.
+    /// Other real quads, neither missed nor false: parts of the quads, whole walls.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub others: Vec<Corners>,
-    /// Whether no other real quad is there.
+    /// Whether the image has no other real quad.
     pub quads_complete: bool,
     /// True camera pose: rows of the 3 x 4 matrix `map_from_camera`.
     pub map_from_camera: [[f64; 4]; 3],
@@ -134,7 +134,7 @@ pub struct Labels<'a> {
 }
 
 impl CameraEntry {
-    /// Of a simulated camera. Distortion has no place in the format.
+    /// The entry of a simulated camera. The format has no distortion.
     pub fn new(camera: &Camera) -> Self {
         let k = camera.intrinsics();
         let (width, height) = (camera.width_px(), camera.height_px());
@@ -241,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn a_portable_grey_map_is_header_and_pixels() {
+    fn pgm_is_header_and_pixels() {
         let image = GrayImage::from_fn(3, 2, |u, v| (10 * v + u) as u8);
         assert_eq!(pgm(&image), b"P5\n3 2\n255\n\x00\x01\x02\x0a\x0b\x0c");
     }

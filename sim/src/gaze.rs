@@ -1,5 +1,5 @@
 //! Ideal gaze controller on ground-truth poses; not `map::gaze`. The camera is aimed at the poster with the best
-//! view, as fast as the pan-tilt unit turns, else ahead.
+//! view, at the speed of the pan-tilt unit, otherwise ahead.
 
 use map::extrinsics::pan_tilt;
 use map::pose2::{Pose2, wrap_rad};
@@ -68,7 +68,7 @@ impl Gaze {
         mounting(self.pan_rad, self.tilt_rad, self.p.camera_height_m)
     }
 
-    /// Turns towards the best poster for `dt_s` seconds, or at once when `None`; gives its name.
+    /// Turns towards the best poster for `dt_s` seconds, or at once if `None`; returns its name.
     pub(crate) fn follow(
         &mut self,
         building: &Building,
@@ -96,9 +96,10 @@ impl Gaze {
         }
         let (pan, _) = aim(map_from_robot, self.p.camera_height_m, l);
         let robot = Point2::from(map_from_robot.position());
-        let seen =
+        let camera_in_landmark =
             l.map_from_landmark.inverse() * Point3::new(robot.x, robot.y, l.map_from_landmark.translation.z);
-        let (distance, angle) = (seen.coords.norm(), seen.y.abs().atan2(seen.x));
+        let (distance, angle) =
+            (camera_in_landmark.coords.norm(), camera_in_landmark.y.abs().atan2(camera_in_landmark.x));
         let face = l.map_from_landmark * Point3::new(0.03, 0.0, 0.0);
         let fits = (self.p.distance_m[0]..=self.p.distance_m[1]).contains(&distance)
             && angle <= self.p.max_view_angle_rad
@@ -138,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    fn the_pan_unit_is_no_faster_than_it_is() {
+    fn the_pan_tilt_unit_keeps_its_speed() {
         let building = Building::corridor(3);
         let landmark = building.landmark("poster-0").unwrap();
         let robot = Pose2::new(landmark.map_from_landmark.translation.x, 0.0, 0.0);

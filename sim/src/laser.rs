@@ -46,7 +46,7 @@ pub fn scan(building: &Building, map_from_robot: &Pose2, params: &LaserParams, s
     scan_among(building.walls(), map_from_robot, params, seed)
 }
 
-/// As [`scan`], among given walls.
+/// As [`scan`], with the given walls.
 pub fn scan_among(walls: &[WallSegment], map_from_robot: &Pose2, params: &LaserParams, seed: u64) -> Scan {
     let p = params;
     let within = |x: f64, low: f64, high: f64| if x.is_finite() { x.clamp(low, high) } else { low };
@@ -119,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn parameters_are_held_in_their_bounds() {
+    fn parameters_are_clamped() {
         let building = Building::corridor(2);
         let beams = |beams, field_rad| {
             let p = LaserParams { beams, field_rad, max_range_m: f64::NAN, ..quiet() };

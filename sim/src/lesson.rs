@@ -14,10 +14,10 @@ use crate::seed;
 
 /// Most stops per landmark.
 pub const MAX_VIEWS: usize = 500;
-/// Tries per stop before it is given up.
+/// Most draws of a stop.
 const TRIES: usize = 200;
 
-/// How to look at each landmark.
+/// Viewpoints of each landmark.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LessonParams {
@@ -35,7 +35,7 @@ pub struct LessonParams {
     pub clearance_m: f64,
     /// Height of the camera.
     pub camera_height_m: f64,
-    /// Largest error of aiming, to either side.
+    /// Largest error of aiming to either side, radians.
     pub aim_error_rad: f64,
 }
 
@@ -59,11 +59,11 @@ impl Default for LessonParams {
 pub struct Stop {
     /// Name of the landmark.
     pub landmark: String,
-    /// The robot at the stop: odometry equals truth, as a mapping robot is localised by its laser.
+    /// The step of the robot at the stop: odometry equals truth, as for a robot that a laser localises.
     pub step: Step,
 }
 
-/// Stops before all posters (and doors and windows), in the building's order; fewer where there is no room. Views go
+/// Stops before all posters (and doors and windows), in the building's order; fewer if there is no room. Views go
 /// from one side to the other, one per equal share of the angles.
 pub fn stops(building: &Building, params: &LessonParams) -> Vec<Stop> {
     let mut all = vec![];
@@ -93,7 +93,7 @@ pub fn stops(building: &Building, params: &LessonParams) -> Vec<Stop> {
     all
 }
 
-/// A place on the floor at a share (0 to 1) of the angles and of the distances, when a robot fits there.
+/// The point of the floor at a share (0 to 1) of the angles and of the distances; `None` if the robot does not fit.
 fn viewpoint(
     building: &Building,
     l: &LandmarkTruth,
@@ -110,7 +110,7 @@ fn viewpoint(
 }
 
 fn stop(l: &LandmarkTruth, place: Point2<f64>, p: &LessonParams, wobble: [f64; 2], index: u64) -> Stop {
-    // The robot faces along the wall, as it would on its way.
+    // The robot faces along the wall, as on a drive.
     let normal = l.map_from_landmark.rotation * nalgebra::Vector3::x();
     let map_from_robot = Pose2::new(place.x, place.y, normal.y.atan2(normal.x) + std::f64::consts::FRAC_PI_2);
     let (pan, tilt) = aim(&map_from_robot, p.camera_height_m, l);
@@ -137,7 +137,7 @@ mod tests {
     use std::sync::Arc;
 
     #[test]
-    fn every_poster_is_seen_whole_from_many_sides() {
+    fn every_poster_is_wholly_visible_from_many_viewpoints() {
         let building = Arc::new(Building::corridor(4));
         let params = LessonParams { views: 4, ..LessonParams::default() };
         let stops = stops(&building, &params);
@@ -149,20 +149,20 @@ mod tests {
                 .filter_map(|s| robot.look(&s.step).frame.truth.landmark(&s.landmark).cloned())
                 .filter(|v| v.state == ViewState::Full)
                 .collect();
-            assert!(views.len() >= 3, "{} is seen {} times", poster.name, views.len());
+            assert!(views.len() >= 3, "{} is visible {} times", poster.name, views.len());
             assert!(views.iter().all(|v| v.view_angle_rad < 1.2 && v.min_side_px() > 25.0));
         }
     }
 
     #[test]
-    fn no_room_no_stop() {
+    fn without_room_there_is_no_stop() {
         let building = Building::corridor(4);
         let cramped = LessonParams { clearance_m: 3.0, ..LessonParams::default() };
         assert!(stops(&building, &cramped).is_empty());
     }
 
     #[test]
-    fn views_are_held_in_their_bound() {
+    fn the_number_of_views_is_clamped() {
         let building = Building::corridor(4);
         let one = |views| {
             let p = LessonParams {

@@ -13,21 +13,22 @@
 //! // A lesson: stops before every poster, from several viewpoints.
 //! let mut teacher = Robot::new(building.clone(), &RobotParams::default());
 //! let stops = sim::lesson::stops(&building, &sim::lesson::LessonParams { views: 2, ..Default::default() });
-//! let sighting = teacher.look(&stops[0].step);
-//! let view = sighting.frame.truth.landmark(&stops[0].landmark).expect("the stop looks at its landmark");
+//! let readings = teacher.look(&stops[0].step);
+//! let view = readings.frame.truth.landmark(&stops[0].landmark).expect("the stop shows its landmark");
 //! assert!(view.min_side_px() > 40.0); // view.corners_px are TL, TR, BR, BL
 //!
-//! // A drive: true pose, odometry, picture, scan, five times a second. Other seeds and starts: other robots.
-//! let params = RobotParams { drive: DriveParams { seed: 3, start_m: 4.0, ..Default::default() }, ..Default::default() };
-//! for sighting in Robot::new(building, &params).take(3) {
-//!     let camera = sighting.step.map_from_robot.to_isometry3() * sighting.step.robot_from_camera;
-//!     assert_eq!(camera, sighting.frame.truth.map_from_camera);
-//!     assert_eq!((sighting.frame.image.width(), sighting.scan.ranges_m().len()), (640, 361));
+//! // A drive: true pose, odometry, picture, scan, five times a second. Other seeds and starts: other robots. let
+//! params = RobotParams { drive: DriveParams { seed: 3, start_m: 4.0, ..Default::default() }, ..Default::default()
+//! }; for readings in Robot::new(building, &params).take(3) {
+//!     let camera = readings.step.map_from_robot.to_isometry3() * readings.step.robot_from_camera;
+//!     assert_eq!(camera, readings.frame.truth.map_from_camera);
+//!     assert_eq!((readings.frame.image.width(), readings.scan.ranges_m().len()), (640, 361));
 //! }
 //! ```
 //!
-//! Frames and corner order are those of method 0.2; surfaces and landmarks have x outward, y the viewer's right, z up.
-//! Modules stand in reading order: what is drawn, where it hangs, how a camera sees it, other sensors, robots.
+//! Coordinate frames and corner order are those of method 0.2; surfaces and landmarks have x outward, y the
+//! viewer's right, z up. Modules are in reading order: textures, building, camera and rendering, other sensors,
+//! robots, sets.
 
 pub(crate) mod seed;
 pub mod font;

@@ -13,7 +13,7 @@ const DIFFUSE: f64 = 0.5;
 /// A lamp that shines downwards.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Lamp {
-    /// Where, in the map frame.
+    /// Position, map frame.
     pub(crate) position_m: Point3<f64>,
     /// Strength; 1 is usual.
     pub(crate) power: f64,
@@ -97,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn the_baked_grid_meets_the_formula_at_its_points() {
+    fn the_baked_grid_equals_the_formula_at_its_points() {
         let lighting = Lighting::new(vec![Lamp { position_m: Point3::new(1.0, 0.5, 2.0), power: 1.0 }]);
         let map = lighting.bake(&Isometry3::identity(), 1.0, 1.0);
         let p = Point3::new(0.0, -0.125, 0.375);

@@ -1,4 +1,4 @@
-//! Look-alikes: pairs of pictures that are nearly equal, such as two printings of a poster, two doors of a corridor,
+//! Look-alikes: pairs of pictures that are nearly equal, such as two editions of a poster, two doors of a corridor,
 //! a mirror image. In: a picture and a kind of change. Out: the pair.
 
 use rand::RngExt;
@@ -18,11 +18,11 @@ use crate::{
 pub enum LookAlikeKind {
     /// Another line of letters in a band over the lower part: 12 % of the area.
     Text,
-    /// One of 5 x 5 blocks shows something else.
+    /// One of 5 x 5 blocks is replaced.
     Block,
-    /// A quarter of the area shows something else.
+    /// A quarter of the area is replaced.
     Quarter,
-    /// The left half is that of the other, the right half is not.
+    /// The right half is replaced.
     Half,
     /// The same drawing printed in other tones.
     Tone,
@@ -37,7 +37,7 @@ impl LookAlikeKind {
     pub const ALL: [Self; 7] =
         [Self::Text, Self::Block, Self::Quarter, Self::Half, Self::Tone, Self::Mirrored, Self::Doors];
 
-    /// A word for tables.
+    /// Name for tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::Text => "text",
@@ -51,7 +51,8 @@ impl LookAlikeKind {
     }
 }
 
-/// Two pictures that differ by `change`: `picture` (for doors another; for text with a line of letters) and its double.
+/// Two pictures that differ by `change`: `picture` (for doors a door; for text with a line of letters) and its
+/// look-alike.
 pub fn lookalikes(picture: &Texture, change: LookAlikeKind, draw: u64) -> [Texture; 2] {
     let mut rng = seed::stream(draw, 0x6c6f_6f6b);
     match change {
@@ -109,7 +110,7 @@ fn replaced(picture: &Texture, [left, top, right, bottom]: [f32; 4], rng: &mut C
     mapped(picture, |s, t, grey| if inside(s, t) { other.grey_at(s, t) } else { grey })
 }
 
-/// Every texel anew from its place (0 to 1, right and down) and grey (0 to 1).
+/// A texture of `f(s, t, grey)`: position 0 to 1, right and down; grey 0 to 1.
 fn mapped(picture: &Texture, f: impl Fn(f32, f32, f32) -> f32) -> Texture {
     let (width, height) = (picture.width(), picture.height());
     let texel = |i: usize| {
@@ -119,7 +120,7 @@ fn mapped(picture: &Texture, f: impl Fn(f32, f32, f32) -> f32) -> Texture {
     Texture::new(width, height, (0..width * height).map(texel).collect(), Edge::Clamp)
 }
 
-/// Every texel from another place.
+/// A texture with every texel taken from another position.
 fn mapped_from(picture: &Texture, from: impl Fn(usize, usize) -> (usize, usize)) -> Texture {
     let (width, height) = (picture.width(), picture.height());
     let texel = |i: usize| {
@@ -135,7 +136,8 @@ pub fn halves(left: &Texture, right: &Texture) -> Texture {
     mapped(left, |s, t, grey| if s < 0.5 { grey } else { other.grey_at(s, t) })
 }
 
-/// The rectangle that covers a picture less its outer part, as a share of its sides: a quad found too far in or out.
+/// The rectangle that covers a picture less its outer part, as a share of its sides: as for a quad detected too far
+/// inside.
 pub fn part(picture: &Texture, [left, top, right, bottom]: [f32; 4]) -> Texture {
     let canvas = Canvas::of(picture);
     let area =
@@ -156,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn every_change_is_as_large_as_it_says() {
+    fn every_change_has_its_stated_area() {
         let picture = poster(7);
         for (change, low, high) in [
             (LookAlikeKind::Text, 0.01, 0.12),
@@ -180,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn halves_and_parts_come_from_where_they_say() {
+    fn halves_and_parts_have_the_stated_texels() {
         let [dark, light] = [20_u8, 220].map(|g| Texture::new(40, 40, vec![g; 1600], Edge::Clamp));
         let both = halves(&dark, &light);
         assert!(both.data()[5] == 20 && both.data()[35] == 220);

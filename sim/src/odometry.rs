@@ -7,14 +7,14 @@ use serde::{Deserialize, Serialize};
 
 use crate::seed;
 
-/// How odometry goes wrong. The default leaves the true path by more than a metre in 25 m: without landmarks the robot
-/// would hit the left wall (method 18, E10).
+/// Errors of odometry. By default it drifts by more than a metre in 25 m: without landmarks the robot would hit the
+/// left wall (method 18, E10).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct OdometryParams {
     /// Measured length / true length - 1.
     pub scale_error: f64,
-    /// Turn that is measured but not made, per metre; negative: the robot believes it turns right, so it turns left.
+    /// Measured turn without a true one, rad per metre; negative: a robot that corrects it turns left.
     pub heading_bias_rad_per_m: f64,
     /// Standard deviation of the length after one metre.
     pub length_sigma_m: f64,
@@ -63,7 +63,7 @@ impl Odometry {
         Self { params, rng: seed::stream(seed, 50), odom_from_robot: start }
     }
 
-    /// Where odometry believes the robot is.
+    /// The pose by odometry.
     pub fn pose(&self) -> Pose2 {
         self.odom_from_robot
     }
@@ -126,7 +126,7 @@ mod tests {
     }
 
     #[test]
-    fn a_robot_that_stands_does_not_drift() {
+    fn a_standing_robot_does_not_drift() {
         let mut odometry = Odometry::new(OdometryParams::default(), Pose2::new(1.0, 2.0, 0.3), 4);
         for _ in 0..100 {
             odometry.advance(&Pose2::default());

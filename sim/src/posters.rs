@@ -54,12 +54,12 @@ fn draw(canvas: &mut Canvas, rng: &mut ChaCha8Rng) {
         area.part(0.06, 1.0 - title_height + 0.02, 0.94, 0.97)
     };
     letters(canvas, title, grey, rng);
-    // Once more, over what reached beyond the area.
+    // The border again, over motifs that reached beyond the area.
     border(canvas, &mut border_rng);
     canvas.clouds(canvas.area(), &Noise::new(rng.random(), 60, 2), 0.03);
 }
 
-/// Draws the border and gives the area within.
+/// Draws the border and returns the area within.
 fn border(canvas: &mut Canvas, rng: &mut ChaCha8Rng) -> Area {
     let all = canvas.area();
     match rng.random_range(0..5) {
@@ -301,17 +301,17 @@ mod tests {
     #[test]
     fn three_hundred_posters_differ() {
         let icons: Vec<_> = (0..300).map(icon).collect();
-        let (mut highest, mut alike, mut pairs) = (-1.0_f32, 0, 0);
+        let (mut highest, mut similar, mut pairs) = (-1.0_f32, 0, 0);
         for (i, a) in icons.iter().enumerate() {
             for b in &icons[..i] {
                 let zncc: f32 = a.iter().zip(b).map(|(x, y)| x * y).sum();
                 highest = highest.max(zncc);
                 pairs += 1;
-                alike += usize::from(zncc > 0.75);
+                similar += usize::from(zncc > 0.75);
             }
         }
         assert!(highest < 0.95, "two posters correlate by {highest}");
-        assert!(alike * 1000 < pairs, "{alike} of {pairs} pairs above 0.75");
+        assert!(similar * 1000 < pairs, "{similar} of {pairs} pairs above 0.75");
     }
 
     #[test]
@@ -328,7 +328,7 @@ mod tests {
     }
 
     #[test]
-    fn any_size_is_clamped() {
+    fn sizes_are_clamped() {
         assert_eq!(poster_of_size(1, 0, f32::NAN).width(), 8);
         assert_eq!(poster_of_size(1, usize::MAX, 0.0).width(), MAX_POSTER_WIDTH_TEXELS);
     }

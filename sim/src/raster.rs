@@ -1,6 +1,5 @@
-//! Which surface is seen at which pixel, and how much of the pixel it fills: a depth buffer for pixels inside one
-//! surface, 64 samples for those on an edge. Edges come out where they are to about a hundredth of a pixel.
-//! Does not shade: `render` does.
+//! Rasterisation: the surfaces visible in each pixel and their shares. A depth buffer for pixels inside one
+//! surface, 64 samples for those on an edge; edges are accurate to about a hundredth of a pixel. `render` shades.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -14,7 +13,7 @@ const END: u32 = u32::MAX;
 /// Samples per pixel on an edge; a Hammersley set, so that each row and each column of the pixel has 64 steps.
 pub(crate) const SAMPLES: usize = 64;
 
-/// A surface as one camera sees it: linear functions of the undistorted pixel (u, v, 1).
+/// A surface in one camera's view: linear functions of the undistorted pixel (u, v, 1).
 #[derive(Debug, Clone)]
 pub(crate) struct View {
     /// Index of the surface.
@@ -75,7 +74,7 @@ struct Fragment {
     mask: u64,
 }
 
-/// Buffers of one camera, used again for every frame.
+/// Buffers of one camera, reused for every frame.
 #[derive(Debug, Clone)]
 pub(crate) struct Raster {
     depth: Vec<f32>,
@@ -84,7 +83,7 @@ pub(crate) struct Raster {
     fragments: Vec<Fragment>,
     offsets: [[f32; 2]; SAMPLES],
     pub(crate) views: Vec<View>,
-    /// Pixels that each view covers, in front or not, and those where it is seen.
+    /// Pixels that each view covers, hidden or not, and those where it is visible.
     pub(crate) covered_px: Vec<f64>,
     pub(crate) visible_px: Vec<f64>,
 }
@@ -107,7 +106,7 @@ impl Raster {
         }
     }
 
-    /// Finds what every pixel sees.
+    /// Finds the views in every pixel.
     pub(crate) fn draw(
         &mut self,
         surfaces: &[Surface],
@@ -190,8 +189,7 @@ impl Raster {
         mask
     }
 
-    /// Gives the views seen in a pixel with the share of each, to `f(view number, share)`. Shares sum to 1 where
-    /// something is behind everything.
+    /// Calls `f(view number, share)` for every view visible in a pixel. Shares sum to 1 if the pixel is covered.
     pub(crate) fn resolve(&mut self, pixel: usize, camera: &Camera, mut f: impl FnMut(usize, f32)) {
         let owner = self.owner[pixel];
         if self.first[pixel] == END {
@@ -208,7 +206,7 @@ impl Raster {
             let mut best = (NOTHING, 0.0);
             let mut offer = |number: u16| {
                 let depth = at(&self.views[usize::from(number)].w, at_sample);
-                // Nearest first; of equals the one that was built last, as it lies on the other.
+                // Nearest first; of equals the one added last, which lies on the other.
                 if depth > best.1 || (depth >= best.1 && number > best.0) {
                     best = (number, depth);
                 }
@@ -235,7 +233,7 @@ impl Raster {
     }
 }
 
-/// How many samples see which view; more than eight views in a pixel are dropped.
+/// Samples by view; views beyond eight in a pixel are dropped.
 #[derive(Default)]
 struct Shares {
     counts: [(u16, u32); 8],

@@ -1,5 +1,5 @@
-//! The camera's view of a building: visibility, textures filtered over each pixel's footprint, light, sensor; and the
-//! exact truth about what is in the picture. Same building, camera, pose, parameters and seed: same bytes.
+//! The camera's view of a building: visibility, textures filtered over each pixel's footprint, light, sensor; and
+//! the exact truth of the picture. Same building, camera, pose, parameters and seed: same bytes.
 
 use nalgebra::Isometry3;
 use vision::frame::GrayImage;
@@ -11,7 +11,7 @@ use crate::sensor::{self, SensorParams};
 use crate::texture::Footprint;
 use crate::truth::{self, FrameTruth};
 
-/// A picture and what it truly shows.
+/// A picture with its truth.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rendered {
     /// The rendered image.
@@ -20,7 +20,7 @@ pub struct Rendered {
     pub truth: FrameTruth,
 }
 
-/// Renders for one camera; keeps its buffers from frame to frame, nothing else.
+/// Renders for one camera; it keeps buffers from frame to frame and no other state.
 #[derive(Debug, Clone)]
 pub struct Renderer {
     camera: Camera,
@@ -72,13 +72,13 @@ impl Renderer {
                 areas[landmark] = [self.raster.covered_px[i], self.raster.visible_px[i]];
             }
         }
-        let look = |(l, areas)| truth::look(l, &self.camera, map_from_camera, areas);
-        let landmarks = building.landmarks().iter().zip(areas).filter_map(look).collect();
+        let view = |(l, areas)| truth::landmark_view(l, &self.camera, map_from_camera, areas);
+        let landmarks = building.landmarks().iter().zip(areas).filter_map(view).collect();
         FrameTruth { map_from_camera: *map_from_camera, landmarks }
     }
 }
 
-/// A view with what it needs to be coloured.
+/// A view with its texture and light.
 struct Shader<'a> {
     view: View,
     surface: &'a Surface,

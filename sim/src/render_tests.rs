@@ -1,5 +1,5 @@
 //! The renderer against independent computations: projection by hand, an edge fitted in the picture, rays cast at
-//! single pixels, a texture seen frontally.
+//! single pixels, a frontal texture.
 
 use nalgebra::{Isometry3, Matrix3, Point2, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use vision::frame::{Distortion, GrayImage, Intrinsics};
@@ -226,7 +226,7 @@ fn shares_agree_with_rays_cast_by_brute_force() {
     for (x, y, heading) in [(13.5, -0.6, -0.2), (3.0, 0.2, 0.1), (22.5, -0.7, 3.1), (16.2, -0.8, -0.3)] {
         let pose = camera_at(x, y, 1.2, heading);
         let frame = renderer.render(&building, &pose, &SensorParams::ideal(), 0);
-        let (mut covered, mut seen) =
+        let (mut covered, mut visible) =
             (vec![0.0; building.landmarks().len()], vec![0.0; building.landmarks().len()]);
         for (v, u) in (0..480).flat_map(|v| (0..640).map(move |u| (v, u))) {
             // Jittered within its quarter of the pixel: upright edges must not meet a lattice.
@@ -241,10 +241,10 @@ fn shares_agree_with_rays_cast_by_brute_force() {
             for (surface, _) in hits {
                 surface.landmark.into_iter().for_each(|l| covered[l] += 0.25);
             }
-            nearest.and_then(|n| n.0.landmark).into_iter().for_each(|l| seen[l] += 0.25);
+            nearest.and_then(|n| n.0.landmark).into_iter().for_each(|l| visible[l] += 0.25);
         }
         for (i, l) in building.landmarks().iter().enumerate().filter(|(i, _)| covered[*i] > 60.0) {
-            let share = 1.0 - seen[i] / covered[i];
+            let share = 1.0 - visible[i] / covered[i];
             match frame.truth.landmark(&l.name) {
                 Some(view) => {
                     let tolerance = 0.02 + 0.3 / f64::sqrt(covered[i]);
@@ -255,21 +255,23 @@ fn shares_agree_with_rays_cast_by_brute_force() {
                         view.occluded_share
                     );
                     assert!(
-                        (view.visible_px2 - seen[i]).abs() < 3.0 + 0.03 * seen[i],
+                        (view.visible_px2 - visible[i]).abs() < 3.0 + 0.03 * visible[i],
                         "{}: {} {}",
                         l.name,
                         view.visible_px2,
-                        seen[i]
+                        visible[i]
                     );
                     hidden += usize::from(share > 0.1);
                 }
                 None => {
-                    assert!(seen[i] < 1.0 || l.corners_map().iter().any(|c| (pose.inverse() * c).z < 0.01));
+                    assert!(
+                        visible[i] < 1.0 || l.corners_map().iter().any(|c| (pose.inverse() * c).z < 0.01)
+                    );
                 }
             }
         }
     }
-    assert!(hidden > 0, "nothing was hidden: the test shows nothing");
+    assert!(hidden > 0, "nothing was hidden: the test is void");
 }
 
 #[test]
@@ -319,7 +321,7 @@ fn a_mirrored_world_gives_a_mirrored_picture() {
 }
 
 #[test]
-fn behind_is_not_seen() {
+fn surfaces_behind_the_camera_are_invisible() {
     let building = one_rectangle(0.6, 0.84, white());
     let mut renderer = Renderer::new(golden_camera());
     let from_behind = renderer.render(&building, &camera_at(-3.0, 0.0, 1.0, 0.0), &SensorParams::ideal(), 0);

@@ -1,5 +1,5 @@
-//! A robot in a building: its drive with the readings of camera and laser at every step. Noise follows from the
-//! robot's seed and the step, not from the order of the calls.
+//! A robot in a building: its drive with the readings of camera and laser at every step. Noise depends on the
+//! robot's seed and the step, not on the order of calls.
 
 use std::sync::Arc;
 
@@ -24,7 +24,7 @@ pub struct RobotParams {
     pub sensor: SensorParams,
     /// Parameters of the laser.
     pub laser: LaserParams,
-    /// Exposure time, seconds: with the angular speed it makes the motion blur; 0 for none.
+    /// Exposure time, seconds; motion blur follows from it and the angular speed. 0: none.
     pub exposure_s: f64,
 }
 
@@ -115,7 +115,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn same_seed_same_bytes_and_others_differ() {
+    fn equal_seeds_give_equal_bytes_and_others_differ() {
         let building = Arc::new(Building::corridor(5));
         let run = |seed, start_m| {
             let drive = DriveParams { seed, start_m, ..DriveParams::default() };

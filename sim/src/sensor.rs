@@ -9,7 +9,7 @@ use crate::seed;
 /// Widest blur, standard deviation or length.
 pub const MAX_BLUR_PX: f64 = 30.0;
 
-/// How the sensor sees. The default is a decent camera in a lit corridor.
+/// Parameters of an image sensor. The default is a decent camera in a lit corridor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SensorParams {
@@ -162,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_has_the_variance_that_was_asked_for() {
+    fn noise_has_its_variance() {
         for (level, shot) in [(60.0, 0.0), (150.0, 0.05)] {
             let p = SensorParams { read_noise: 2.0, shot_noise: shot, ..SensorParams::ideal() };
             let image = expose(&mut vec![level; 200 * 200], 200, &p, 5);

@@ -1,11 +1,11 @@
-//! A grey picture that can be looked at from any distance and angle: a pyramid of halved levels, sampled over the
-//! area that a pixel covers on the surface (trilinear, several taps along the longer axis of that area).
-//! Knows nothing of cameras or metres: coordinates run from 0 to 1 across the picture, s right and t down.
+//! A grey picture for rendering from any distance and angle: a pyramid of halved levels, sampled over the area that
+//! a pixel covers on the surface (trilinear, several taps along the longer axis of that area). Coordinates run from
+//! 0 to 1 across the picture, s right and t down.
 
 /// What lies beyond the border of a texture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Edge {
-    /// The outermost texel goes on for ever.
+    /// The outermost texel is repeated.
     Clamp,
     /// The texture repeats, as tiles do.
     Repeat,
@@ -13,7 +13,7 @@ pub enum Edge {
 
 /// Most taps along the longer axis of a pixel's footprint.
 const MAX_TAPS: f32 = 16.0;
-/// A footprint less elongated than this counts as round: one tap, and no axis that rounding could turn.
+/// A footprint less elongated than this counts as round and takes one tap: its axis would depend on rounding.
 const ROUND: f32 = 1.15;
 /// From sqrt(2) texels on, the next level is the nearer one.
 const NEXT_LEVEL: f32 = 0.414;
@@ -43,8 +43,8 @@ pub struct Footprint {
 }
 
 impl Texture {
-    /// Builds the pyramid of a row-major picture of `width * height` bytes. A missing or surplus byte is made up
-    /// with black or dropped, an empty side becomes one texel: generated pictures only.
+    /// Builds the pyramid of a row-major picture of `width * height` bytes. Missing bytes are black, surplus ones
+    /// are dropped, an empty side becomes one texel: for generated pictures.
     pub fn new(width: usize, height: usize, mut data: Vec<u8>, edge: Edge) -> Self {
         let (width, height) = (width.max(1), height.max(1));
         data.resize(width * height, 0);
@@ -61,8 +61,8 @@ impl Texture {
         Self { parts, ..self }
     }
 
-    /// Rectangles drawn in it (frames, panes, panels, patches), left, top, right, bottom from 0 to 1: real four-sided
-    /// things within the picture. Something drawn later may cover one.
+    /// Rectangles drawn in it (frames, panes, panels, patches), left, top, right, bottom from 0 to 1: real quads
+    /// within the picture. Later shapes may cover one.
     pub fn parts(&self) -> &[[f32; 4]] {
         &self.parts
     }

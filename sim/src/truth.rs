@@ -7,19 +7,19 @@ use vision::geometry::Corners;
 use crate::building::{LandmarkKind, LandmarkTruth};
 use crate::camera::Camera;
 
-/// Nearest depth at which a corner counts as before the camera.
+/// Least depth at which a corner counts as in front of the camera.
 const NEAR_M: f64 = 0.01;
 /// Hidden share from which a landmark counts as occluded.
 pub const OCCLUDED_SHARE: f64 = 0.02;
 
-/// How much of a landmark a picture holds.
+/// How much of a landmark a picture shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ViewState {
     /// The whole landmark is visible.
     Full,
     /// The image border cuts it.
     Truncated,
-    /// It is within the image, but something stands before it.
+    /// It is within the image, but partly hidden.
     Occluded,
 }
 
@@ -34,9 +34,9 @@ pub struct LandmarkView {
     pub corners_px: Corners,
     /// Full, truncated or occluded.
     pub state: ViewState,
-    /// Share of what lies within the image that something else hides, 0 to 1.
+    /// Hidden share of the part within the image, 0 to 1.
     pub occluded_share: f64,
-    /// Area in which it is seen.
+    /// Visible area, px^2.
     pub visible_px2: f64,
     /// Angle between its normal and the direction to the camera, 0 frontal.
     pub view_angle_rad: f64,
@@ -55,24 +55,25 @@ impl LandmarkView {
     }
 }
 
-/// What a picture truly shows.
+/// The truth of a picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FrameTruth {
     /// Pose of the camera.
     pub map_from_camera: Isometry3<f64>,
-    /// Landmarks of which something is seen and whose corners all lie before the camera, in the building's order.
+    /// Landmarks of which a part is visible and whose corners all lie in front of the camera, in the building's
+    /// order.
     pub landmarks: Vec<LandmarkView>,
 }
 
 impl FrameTruth {
-    /// The view of a landmark, if it is seen.
+    /// The view of a landmark, if it is visible.
     pub fn landmark(&self, name: &str) -> Option<&LandmarkView> {
         self.landmarks.iter().find(|l| l.name == name)
     }
 }
 
-/// The truth about one landmark; `None` when it is not seen at all or partly behind the camera.
-pub(crate) fn look(
+/// The truth of one landmark; `None` if it is invisible or partly behind the camera.
+pub(crate) fn landmark_view(
     landmark: &LandmarkTruth,
     camera: &Camera,
     map_from_camera: &Isometry3<f64>,

@@ -1,6 +1,6 @@
-//! The rendered set for detection: corridors of all proportions seen by hand-held cameras, with exact truth. In: a
-//! seed. Out: images with their entries; the same parameters give the same bytes. The entries mark which quads count;
-//! nothing is written or evaluated here.
+//! The rendered set for detection: corridors of all proportions by hand-held cameras, with exact truth. In: a seed.
+//! Out: images with their entries; the same parameters give the same bytes. The entries mark which quads count.
+//! Writes no files.
 
 use std::f64::consts::TAU;
 
@@ -24,26 +24,26 @@ use crate::sensor::SensorParams;
 pub const MAX_VIEWS: usize = 10_000;
 /// Views from one building before the next is built.
 const VIEWS_PER_BUILDING: usize = 20;
-/// Tries for a view that holds its target before the last one is taken as it is.
+/// Most draws of a view that shows its target; then the last one is taken.
 const TRIES: usize = 2000;
 /// Room between the camera and any wall.
 const CLEARANCE_M: f64 = 0.2;
 /// Nearest depth of a corner that is projected.
 const NEAR_M: f64 = 0.05;
-/// Other real things are listed from this side on: smaller ones no detector reports.
+/// Shortest side of other quads that are listed; no detector reports smaller ones.
 const MIN_OTHER_SIDE_PX: f64 = 6.0;
 
-/// What the set holds and what of it counts.
+/// Contents of the set, and which quads count.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ViewsParams {
-    /// Buildings, places, sensors and noise follow from it.
+    /// Seed of buildings, viewpoints, sensors and noise.
     pub seed: u64,
     /// Pictures, at most [`MAX_VIEWS`].
     pub views: usize,
-    /// A quad counts when each of its sides is at least this long.
+    /// A quad counts if each of its sides is at least this long.
     pub min_side_px: f64,
-    /// And when it is seen at most this obliquely.
+    /// And if its view angle is at most this.
     pub max_view_angle_rad: f64,
 }
 
@@ -58,7 +58,7 @@ impl Default for ViewsParams {
 pub struct LabelledView {
     /// The image, 640 x 480 px.
     pub image: GrayImage,
-    /// Its quads and other real things.
+    /// Its labelled quads and other real quads.
     pub entry: ImageEntry,
 }
 
@@ -79,7 +79,7 @@ impl Views {
         Self { params, next: 0, building, renderer: Renderer::new(Camera::vga()) }
     }
 
-    /// The set that these entries make.
+    /// The data set of these entries.
     pub fn data_set(images: Vec<ImageEntry>) -> DataSet {
         DataSet {
             name: "corridor".into(),
@@ -171,7 +171,7 @@ fn pose(building: &Building, camera: &Camera, p: &ViewsParams, rng: &mut ChaCha8
     last
 }
 
-/// Somewhere before the target, looking roughly at it, the horizon not quite level.
+/// A pose in front of the target, aimed roughly at it, with a small roll.
 fn stand(
     building: &Building,
     target: &LandmarkTruth,
@@ -225,8 +225,8 @@ fn counts(quad: &QuadEntry, p: &ViewsParams) -> bool {
         && quad.view_angle_rad <= p.max_view_angle_rad
 }
 
-/// Walls, levels, baseboards as a whole, and the rectangles drawn on doors, windows, lamps and posters, wherever all
-/// corners lie before the camera. Floor tiles and ceiling panels are not listed: a pattern is no thing.
+/// Walls, levels, baseboards as a whole, and the rectangles drawn on doors, windows, lamps and posters, if all
+/// corners lie in front of the camera. Floor tiles and ceiling panels are not listed: a pattern is no object.
 fn others(building: &Building, camera: &Camera, map_from_camera: &Isometry3<f64>) -> Vec<Corners> {
     let mut found = vec![];
     for surface in building.surfaces() {
@@ -235,7 +235,7 @@ fn others(building: &Building, camera: &Camera, map_from_camera: &Isometry3<f64>
             continue;
         }
         let mut add = |part: [f64; 4]| {
-            let seen = project(&corners_map(surface, part), camera, map_from_camera);
+            let projected = project(&corners_map(surface, part), camera, map_from_camera);
             let meets = |c: &Corners| {
                 let p = c.points();
                 let range = |f: fn(&Point2<f64>) -> f64| {
@@ -244,7 +244,7 @@ fn others(building: &Building, camera: &Camera, map_from_camera: &Isometry3<f64>
                 let (u, v) = (range(|p| p.x), range(|p| p.y));
                 u.1 > 0.0 && v.1 > 0.0 && u.0 < camera.width_px() as f64 && v.0 < camera.height_px() as f64
             };
-            found.extend(seen.filter(|c| c.min_side_px() >= MIN_OTHER_SIDE_PX && meets(c)));
+            found.extend(projected.filter(|c| c.min_side_px() >= MIN_OTHER_SIDE_PX && meets(c)));
         };
         if surface.landmark.is_none() {
             add([0.0, 0.0, 1.0, 1.0]);
@@ -262,11 +262,11 @@ fn corners_map(s: &Surface, [x0, y0, x1, y1]: [f64; 4]) -> [Point3<f64>; 4] {
 }
 
 fn project(corners: &[Point3<f64>; 4], camera: &Camera, map_from_camera: &Isometry3<f64>) -> Option<Corners> {
-    let seen = corners.map(|c| map_from_camera.inverse_transform_point(&c));
-    if seen.iter().any(|c| c.z < NEAR_M) {
+    let in_camera = corners.map(|c| map_from_camera.inverse_transform_point(&c));
+    if in_camera.iter().any(|c| c.z < NEAR_M) {
         return None;
     }
-    Corners::new(seen.map(|c| camera.intrinsics().project(&c.coords))).ok()
+    Corners::new(in_camera.map(|c| camera.intrinsics().project(&c.coords))).ok()
 }
 
 fn within(p: &Point2<f64>, camera: &Camera) -> bool {
@@ -283,7 +283,7 @@ mod tests {
     }
 
     #[test]
-    fn nearly_every_view_holds_something_that_counts() {
+    fn nearly_every_view_has_a_quad_that_counts() {
         let all = views(3, 2 * VIEWS_PER_BUILDING + 1);
         assert_eq!(all.len(), 2 * VIEWS_PER_BUILDING + 1);
         let p = ViewsParams::default();
@@ -296,7 +296,7 @@ mod tests {
                 && quad.view_angle_rad.to_degrees() <= 70.0 + 1e-9;
             assert_eq!(quad.counted, must, "{quad:?}");
         }
-        // All sorts of quads that do not count are there too.
+        // There are quads that do not count, too.
         for state in [QuadState::Full, QuadState::Truncated] {
             let spared = |q: &&QuadEntry| !q.counted && q.state == state;
             assert!(all.iter().flat_map(|v| &v.entry.quads).any(|q| spared(&q)), "{state:?}");
@@ -339,7 +339,7 @@ mod tests {
     }
 
     #[test]
-    fn views_are_held_in_their_bound() {
+    fn the_number_of_views_is_clamped() {
         let count = |views| Views::new(&ViewsParams { views, ..ViewsParams::default() }).size_hint().0;
         assert_eq!((count(MAX_VIEWS), count(MAX_VIEWS + 1)), (MAX_VIEWS, MAX_VIEWS));
     }

@@ -1,6 +1,6 @@
-//! A poster was moved by a metre and the map does not know: it is found out, no other is blamed, and the pose stays
-//! good. Corners come from the exact truth with noise, motion from drifting odometry; the way of a frame is the
-//! server's.
+//! Claim: a poster that was moved by a metre is flagged and quarantined, no other landmark is, and the pose stays
+//! good. Corners are the exact truth with noise, motion is drifting odometry; a frame is processed as in the
+//! server.
 
 use std::{collections::BTreeMap, sync::Arc};
 
@@ -32,16 +32,16 @@ use vision::{
 
 const CORNER_SIGMA_PX: f64 = 0.5;
 
-/// What a run came to.
+/// Figures of a drive.
 #[derive(Debug)]
-struct Run {
-    /// Fixes that hold the poster, from when two others had corrected the pose, until it was flagged.
-    sightings_until_flagged: Option<u32>,
+struct DriveFigures {
+    /// Fixes with the poster from when two others had corrected the pose until it was flagged.
+    fixes_until_flagged: Option<u32>,
     quarantined: bool,
-    blamed_others: usize,
+    wrongly_flagged: usize,
     worst_error_m: f64,
-    /// What the error stays under for 95 % of the way, and its worst once two landmarks have corrected the pose.
-    usual_error_m: f64,
+    /// 95 % quantile of the position error, and its maximum once two landmarks have corrected the pose.
+    p95_error_m: f64,
     settled_error_m: f64,
     with_two_others: bool,
 }
@@ -65,8 +65,8 @@ impl Robot {
         }
     }
 
-    /// The corners of a landmark of the building in the picture, with noise; none when it is not seen well.
-    fn look(
+    /// The corners of a landmark in the image, with noise; `None` if it is not well visible.
+    fn corners_of(
         &mut self,
         step: &Step,
         building: &Building,
@@ -75,12 +75,12 @@ impl Robot {
         let size = LandmarkSize { width_m: truth.width_m, height_m: truth.height_m };
         let map_from_camera = step.map_from_camera();
         let eye = Point2::from(map_from_camera.translation.vector.xy());
-        let seen = truth.map_from_landmark.inverse()
+        let camera_in_landmark = truth.map_from_landmark.inverse()
             * Point3::new(eye.x, eye.y, truth.map_from_landmark.translation.z);
         let face = truth.map_from_landmark * Point3::new(0.03, 0.0, 0.0);
-        if seen.x < 0.3
-            || seen.y.abs() > 3.0 * seen.x
-            || seen.coords.norm() > 5.0
+        if camera_in_landmark.x < 0.3
+            || camera_in_landmark.y.abs() > 3.0 * camera_in_landmark.x
+            || camera_in_landmark.coords.norm() > 5.0
             || !building.in_sight(&eye, &face.xy())
         {
             return None;
@@ -99,11 +99,16 @@ impl Robot {
         landmark_pose(&Corners::new(points).ok()?, &claimed, size, &camera).ok()
     }
 
-    /// The way of one frame.
-    fn frame(&mut self, at_ns: i64, step: &Step, sightings: &[LandmarkObservation<'_>]) -> Vec<HealthChange> {
+    /// Processes one frame.
+    fn frame(
+        &mut self,
+        at_ns: i64,
+        step: &Step,
+        observations: &[LandmarkObservation<'_>],
+    ) -> Vec<HealthChange> {
         let mounting = CameraExtrinsics::new(step.robot_from_camera).expect("in range");
         self.fuser.apply_odometry(at_ns, step.odom_from_robot).expect("in range");
-        let used: Vec<_> = sightings
+        let used: Vec<_> = observations
             .iter()
             .filter(|s| self.healths.get(&s.landmark) != Some(&LandmarkHealth::Quarantined))
             .copied()
@@ -113,34 +118,34 @@ impl Robot {
             return Vec::new();
         };
         let p = HealthParams::default();
-        let judged: Vec<PlaceCheck> = used
+        let checks: Vec<PlaceCheck> = used
             .iter()
             .map(|s| check_place(s, &mounting, &prior, &self.supporters, &p).expect("in range"))
             .collect();
-        let kept = drop_unreliable(&used, &judged);
-        let reset = self.fuse(at_ns, &kept, &mounting, Some(&prior));
+        let used_for_fix = drop_unreliable(&used, &checks);
+        let reset = self.fuse(at_ns, &used_for_fix, &mounting, Some(&prior));
         if reset {
             return self.watch.clear();
         }
         let healths = &self.healths;
         let now = |id| healths.get(&id).copied().unwrap_or_default();
-        self.watch.frame(Point2::from(prior.pose.position()), &judged, &[], now)
+        self.watch.frame(Point2::from(prior.pose.position()), &checks, &[], now)
     }
 
     fn fuse(
         &mut self,
         at_ns: i64,
-        sightings: &[LandmarkObservation<'_>],
+        observations: &[LandmarkObservation<'_>],
         mounting: &CameraExtrinsics,
         prior: Option<&map::pose2::Pose2Covariance>,
     ) -> bool {
-        if sightings.is_empty() {
+        if observations.is_empty() {
             return false;
         }
         let p = LocaliseParams::default();
-        let mut fix = robot_pose(sightings, mounting, None, &p).expect("in range");
+        let mut fix = robot_pose(observations, mounting, None, &p).expect("in range");
         if let (FixResult::Ambiguous(_), Some(prior)) = (&fix, prior) {
-            fix = robot_pose(sightings, mounting, Some(prior), &p).expect("in range");
+            fix = robot_pose(observations, mounting, Some(prior), &p).expect("in range");
         }
         let FixResult::Fixed(fix) = fix else { return false };
         let outcome = self.fuser.apply_fix(at_ns, &fix).expect("in range");
@@ -158,9 +163,9 @@ impl Robot {
     }
 }
 
-/// Drives three times through a corridor with four posters, of which the map has one a metre off along its wall. With
-/// `hidden` that one cannot be seen at all.
-fn drive(seed: u64, length_m: f64, moved: usize, hidden: bool) -> Run {
+/// Drives three times through a corridor with four posters; the map has one of them a metre off along its wall.
+/// With `hidden` that one is never visible.
+fn drive(seed: u64, length_m: f64, moved: usize, hidden: bool) -> DriveFigures {
     let params = CorridorParams { length_m, posters: 4, ..CorridorParams::default() };
     let building = Arc::new(Building::corridor_with(&params, seed));
     let truths: Vec<_> = building.posters().cloned().collect();
@@ -179,25 +184,25 @@ fn drive(seed: u64, length_m: f64, moved: usize, hidden: bool) -> Run {
         .collect();
     let params = DriveParams { seed, legs: 3, ..DriveParams::default() };
     let (mut robot, moved) = (Robot::new(seed), LandmarkId(moved as u64));
-    let mut run = Run {
-        sightings_until_flagged: None,
+    let mut run = DriveFigures {
+        fixes_until_flagged: None,
         quarantined: false,
-        blamed_others: 0,
+        wrongly_flagged: 0,
         worst_error_m: 0.0,
-        usual_error_m: 0.0,
+        p95_error_m: 0.0,
         settled_error_m: 0.0,
         with_two_others: false,
     };
-    let (mut sightings_so_far, mut errors) = (0, Vec::new());
+    let (mut fixes_so_far, mut errors) = (0, Vec::new());
     for step in Drive::new(building.clone(), &params) {
         let at_ns = (step.time_s * 1e9) as i64;
         let seen: Vec<_> = truths
             .iter()
             .enumerate()
             .filter(|(i, _)| !hidden || LandmarkId(*i as u64) != moved)
-            .filter_map(|(i, truth)| Some((i, robot.look(&step, &building, truth)?)))
+            .filter_map(|(i, truth)| Some((i, robot.corners_of(&step, &building, truth)?)))
             .collect();
-        let sightings: Vec<_> = seen
+        let observations: Vec<_> = seen
             .iter()
             .map(|(i, seen)| LandmarkObservation {
                 landmark: LandmarkId(*i as u64),
@@ -206,14 +211,14 @@ fn drive(seed: u64, length_m: f64, moved: usize, hidden: bool) -> Run {
             })
             .collect();
         let others = robot.supporters.iter().filter(|id| **id != moved).count();
-        let holds = sightings.iter().any(|s| s.landmark == moved);
-        sightings_so_far += u32::from(holds && others >= 2 && run.sightings_until_flagged.is_none());
-        for change in robot.frame(at_ns, &step, &sightings) {
+        let holds = observations.iter().any(|s| s.landmark == moved);
+        fixes_so_far += u32::from(holds && others >= 2 && run.fixes_until_flagged.is_none());
+        for change in robot.frame(at_ns, &step, &observations) {
             robot.healths.insert(change.landmark, change.health);
             if change.landmark != moved {
-                run.blamed_others += usize::from(change.health != LandmarkHealth::Sound);
-            } else if change.health >= LandmarkHealth::Flagged && run.sightings_until_flagged.is_none() {
-                run.sightings_until_flagged = Some(sightings_so_far);
+                run.wrongly_flagged += usize::from(change.health != LandmarkHealth::Sound);
+            } else if change.health >= LandmarkHealth::Flagged && run.fixes_until_flagged.is_none() {
+                run.fixes_until_flagged = Some(fixes_so_far);
                 run.with_two_others = others >= 2;
             }
         }
@@ -228,43 +233,43 @@ fn drive(seed: u64, length_m: f64, moved: usize, hidden: bool) -> Run {
         }
     }
     errors.sort_by(f64::total_cmp);
-    run.usual_error_m = errors[errors.len() * 95 / 100];
+    run.p95_error_m = errors[errors.len() * 95 / 100];
     run
 }
 
 #[test]
-fn a_moved_poster_is_found_out_and_does_no_harm() {
+fn a_moved_poster_is_quarantined_and_the_pose_stays_good() {
     for seed in 0..6 {
         for moved in [1, 2] {
             let run = drive(seed, 12.0, moved, false);
             println!("{seed} {moved} {run:?}");
-            // Before two others were seen it may be any of them: then it is flagged as soon as the third agrees.
-            assert!(run.sightings_until_flagged.expect("flagged") <= 5, "{seed} {moved}: {run:?}");
+            // Until two others are observed it may be any of them; it is flagged once the third agrees.
+            assert!(run.fixes_until_flagged.expect("flagged") <= 5, "{seed} {moved}: {run:?}");
             assert!(run.quarantined, "{seed} {moved}: {run:?}");
-            assert_eq!(run.blamed_others, 0, "{seed} {moved}: {run:?}");
-            assert!(run.usual_error_m < 0.10, "{seed} {moved}: {run:?}");
+            assert_eq!(run.wrongly_flagged, 0, "{seed} {moved}: {run:?}");
+            assert!(run.p95_error_m < 0.10, "{seed} {moved}: {run:?}");
             assert!(run.worst_error_m < 0.20, "{seed} {moved}: {run:?}");
         }
     }
 }
 
 #[test]
-fn it_costs_no_more_than_a_poster_that_is_not_there() {
-    // Over 25 m with four posters the next one is so far that odometry drifts, moved poster or none.
+fn a_moved_poster_costs_no_more_than_an_absent_one() {
+    // Over 25 m with four posters odometry drifts far between posters in either case.
     for seed in 0..4 {
         let (moved, absent) = (drive(seed, 25.0, 1, false), drive(seed, 25.0, 1, true));
         println!("{seed} {moved:?}\n  {absent:?}");
-        assert!(moved.quarantined && moved.blamed_others == 0, "{moved:?}");
+        assert!(moved.quarantined && moved.wrongly_flagged == 0, "{moved:?}");
         assert!(moved.worst_error_m < absent.worst_error_m + 0.05, "{moved:?} {absent:?}");
     }
 }
 
 #[test]
-fn where_nothing_moved_nobody_is_blamed() {
+fn without_a_moved_poster_none_is_flagged() {
     for seed in 0..4 {
         let run = drive(seed, 25.0, usize::MAX, false);
         println!("{seed} {run:?}");
-        assert_eq!((run.blamed_others, run.sightings_until_flagged), (0, None), "{run:?}");
+        assert_eq!((run.wrongly_flagged, run.fixes_until_flagged), (0, None), "{run:?}");
         assert!(run.worst_error_m < 0.30, "{run:?}");
     }
 }

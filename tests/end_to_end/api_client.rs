@@ -1,5 +1,5 @@
-//! Claim: the client can do everything that the HTTP interface can: each operation of the OpenAPI document has a method, and
-//! the methods of each resource work against a real server.
+//! Claim: the client covers the HTTP interface: each operation of the OpenAPI document has a method, and the
+//! methods of each resource work against a real server.
 
 use client::{
     Capture, ClientError, LandmarkRegion, MapClient, NewView,
@@ -30,7 +30,7 @@ use tests::{
     robots::{call, connect},
 };
 
-/// Without a client method, each with the reason. There is none.
+/// Operations without a client method, each with the reason.
 const WITHOUT_METHOD: [&str; 0] = [];
 
 #[tokio::test(flavor = "multi_thread")]
@@ -73,7 +73,7 @@ async fn hall(maps: &MapClient) {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn maps_come_back_with_what_was_said_of_them() {
+async fn maps_are_stored_with_all_their_fields() {
     let inside = Inside::start(Limits::default()).await;
     let maps = inside.maps();
     assert_eq!(maps.health().await.expect("health").status, "ok");
@@ -120,7 +120,7 @@ async fn landmarks_are_placed_patched_taught_and_learnt() {
     assert_eq!(maps.update_landmark("hall", "sign", &forget).await.expect("patched").place, None);
     maps.delete_landmark("hall", "sign").await.expect("deleted");
 
-    // Views, with all that may be said of one.
+    // Views, with all capture data.
     let first =
         maps.upload_view("hall", "poster", picture(1), LandmarkRegion::WholeImage).await.expect("view");
     let camera = vision::frame::Intrinsics::new(200.0, 200.0, 80.0, 60.0, vision::frame::Distortion::None);
@@ -167,7 +167,7 @@ async fn landmarks_are_placed_patched_taught_and_learnt() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn what_is_seen_is_told_for_the_camera_that_is_set() {
+async fn visibility_follows_the_settings_of_the_map() {
     let inside = Inside::start(Limits::default()).await;
     let maps = inside.maps();
     hall(&maps).await;
@@ -185,14 +185,17 @@ async fn what_is_seen_is_told_for_the_camera_that_is_set() {
     assert!(near.properties.reach_m < far.properties.reach_m && !far.geometry.coordinates.is_empty());
     let pose = PoseBody { x_m: 5.0, y_m: 1.5, theta_rad: -FRAC_PI_2, covariance: None };
     let request = VisibleRequest { pose, visibility_settings: own };
-    let seen = maps.visible("hall", &request).await.expect("visible").landmarks;
-    assert!(seen.len() == 1 && seen[0].landmark == "poster" && seen[0].margin_m > 0.0, "{seen:?}");
+    let visible = maps.visible("hall", &request).await.expect("visible").landmarks;
+    assert!(
+        visible.len() == 1 && visible[0].landmark == "poster" && visible[0].margin_m > 0.0,
+        "{visible:?}"
+    );
     let path = CoverageRequest::new(vec![[0.5, 1.5], [9.5, 1.5]]);
     let coverage = maps.coverage("hall", &path).await.expect("coverage");
     assert!((coverage.length_m - 9.0).abs() < 1e-9 && (0.0..1.0).contains(&coverage.share), "{coverage:?}");
     let query = GazeQueryBody { pose, ..GazeQueryBody::default() };
     let ranking = maps.gaze_ranking("hall", &query).await.expect("ranking");
-    // What has no model is not worth looking at.
+    // A landmark without a model is no gaze target.
     assert_eq!(
         (ranking.map_version, ranking.ranked.len()),
         (maps.map("hall").await.expect("map").version, 0)
@@ -201,7 +204,7 @@ async fn what_is_seen_is_told_for_the_camera_that_is_set() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_robot_is_followed_from_its_first_frame_to_its_end() {
+async fn a_robot_is_observable_from_its_first_frame_to_its_deletion() {
     let inside = Inside::start(Limits::default()).await;
     let maps = inside.maps();
     hall(&maps).await;
@@ -210,16 +213,16 @@ async fn a_robot_is_followed_from_its_first_frame_to_its_end() {
     let robot = connect(&inside.server.zenoh_endpoint, "r1").await;
     let capture = Capture::encoded(picture(1)).expect("a picture").with_odometry(&Pose2::default());
     let answer = robot.recognise("front", capture, SOON).await.expect("an answer");
-    let told = async {
+    let event = async {
         loop {
             match live.next().await.expect("an event").expect("the stream goes on") {
-                LiveEventBody::Answer(told) => return told,
+                LiveEventBody::Answer(answer) => return answer,
                 other => assert!(!matches!(other, LiveEventBody::Missed(_)), "{other:?}"),
             }
         }
     };
-    let told = tokio::time::timeout(SOON, told).await.expect("in time");
-    assert_eq!((told.robot.as_str(), told.camera.as_str(), told.answer.seq), ("r1", "front", answer.seq));
+    let event = tokio::time::timeout(SOON, event).await.expect("in time");
+    assert_eq!((event.robot.as_str(), event.camera.as_str(), event.answer.seq), ("r1", "front", answer.seq));
 
     let frame = maps.camera_frame("r1", "front").await.expect("a frame");
     assert_eq!((frame.seq, frame.media_type.as_str(), frame.image), (answer.seq, "image/png", picture(1)));
@@ -244,7 +247,7 @@ async fn a_robot_is_followed_from_its_first_frame_to_its_end() {
     inside.server.stop().await;
 }
 
-/// A rectangle of 0.6 m by 0.8 m, 2 m away and turned, as a camera of 500 px sees it.
+/// A rectangle of 0.6 m by 0.8 m, 2 m away and turned, in the image of a camera of 500 px.
 fn uploaded_views() -> UploadedViews {
     let view = |(pitch, yaw): (f64, f64)| {
         let turned = Rotation3::from_euler_angles(pitch, yaw, 0.0);
@@ -266,7 +269,7 @@ async fn drives_are_recorded_mapped_and_gathered() {
     hall(&maps).await;
     maps.put_robot("r1", "hall").await.expect("robot");
 
-    // A drive of 1 m whose path is known.
+    // A drive of 1 m with a known path.
     assert!(maps.start_recording("r1").await.expect("begun").active);
     let robot = connect(&inside.server.zenoh_endpoint, "r1").await;
     let mut poses = Vec::new();
@@ -287,7 +290,7 @@ async fn drives_are_recorded_mapped_and_gathered() {
     maps.cancel_recording("r1").await.expect("given up");
     assert_eq!(code(maps.recording("r1").await), "not_recording");
 
-    // What is fused, by modality and place.
+    // Fusion mode, and statistics by modality and place.
     let door = AreaBody { name: "door".into(), corners_m: vec![[0.0, 0.0], [2.0, 0.0], [2.0, 2.0]] };
     let patch = ModalityMapPatch { fusion_mode: Some(FusionModeBody::Best), areas: Some(vec![door]) };
     let set = maps.set_modalities("hall", &patch).await.expect("set");
@@ -299,7 +302,7 @@ async fn drives_are_recorded_mapped_and_gathered() {
     maps.delete_reference_run("hall", run.id).await.expect("deleted");
     assert_eq!(maps.reference_runs("hall").await.expect("runs"), []);
 
-    // A mapping, given up; and one that has seen no wall.
+    // A mapping that is cancelled, and one without any wall.
     let new = NewMapping { robot: "r1".into(), origin: [1.0, 2.0, 0.0] };
     assert_eq!(maps.start_mapping("hall", &new).await.expect("begun").stage, MappingStageBody::Mapping);
     maps.cancel_mapping("hall").await.expect("given up");
@@ -311,7 +314,7 @@ async fn drives_are_recorded_mapped_and_gathered() {
     eventually("nothing to store", failed).await;
     assert_eq!(maps.walls("hall").await.expect("walls"), walls());
 
-    // A gathering that found nothing.
+    // A gathering without tracks.
     let new = NewGatheringBody { robot: "r1".into(), ..NewGatheringBody::default() };
     let gathering = maps.start_gathering("hall", &new).await.expect("begun");
     assert!(maps.gathering("hall", gathering.id).await.expect("gathering").open);
@@ -328,7 +331,7 @@ async fn drives_are_recorded_mapped_and_gathered() {
     inside.server.stop().await;
 }
 
-/// The document is JSON for readers of other languages; see the client's table for this one's.
+/// Every `$ref` of the OpenAPI document resolves; programs in other languages rely on it.
 #[tokio::test(flavor = "multi_thread")]
 async fn every_reference_of_the_document_leads_to_a_schema() {
     fn references<'a>(value: &'a Value, found: &mut BTreeSet<&'a str>) {

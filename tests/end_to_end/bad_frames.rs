@@ -1,5 +1,5 @@
-//! Claim: a frame that cannot be used gets a `rejected` answer with a stable code and the field at fault, whatever is
-//! wrong with it; the server goes on, answers the next good frame, and every frame is accounted for.
+//! Claim: an invalid frame gets a `rejected` answer with a stable code and the field at fault; the server answers
+//! the next good frame, and every frame is counted.
 
 use client::{
     Delivery, RobotClient, RobotOptions,
@@ -34,7 +34,7 @@ fn camera() -> v1::Intrinsics {
 
 type Spoil = fn(&mut v1::Frame);
 
-/// What is wrong, and what must be said of it.
+/// A defect, and the code and field of its refusal.
 const ROWS: &[(Spoil, &str, &str)] = &[
     // Not an image.
     (|f| f.image = b"no image at all".to_vec().into(), "wrong_encoding", "image"),
@@ -56,7 +56,7 @@ const ROWS: &[(Spoil, &str, &str)] = &[
         "size_mismatch",
         "image",
     ),
-    // Numbers that are none.
+    // Numbers that are not finite or out of range.
     (
         |f| f.intrinsics = Some(v1::Intrinsics { fx_px: f64::NAN, ..camera() }),
         "not_finite",
@@ -77,7 +77,7 @@ const ROWS: &[(Spoil, &str, &str)] = &[
         "not_finite",
         "odometry.x_m",
     ),
-    // Things that do not exist, or are over.
+    // Unknown maps, values out of range, old numbers.
     (|f| f.map = "nowhere".into(), "unknown_map", "map"),
     (|f| f.map = "No/Name".into(), "bad_name", "map"),
     (|f| f.deadline_ms = 600_001, "out_of_range", "deadline_ms"),
@@ -109,7 +109,7 @@ fn refusal(answer: &v1::Answer) -> (String, String) {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn bad_frames_are_refused_by_name_and_the_server_goes_on() {
+async fn invalid_frames_are_refused_with_code_and_field() {
     let inside = Inside::start(Limits { frame_bytes: 100_000, ..Limits::default() }).await;
     inside.maps().create_map(&NewMap::new("hall")).await.expect("map");
     inside.maps().put_robot("r1", "hall").await.expect("robot");
@@ -134,7 +134,7 @@ async fn bad_frames_are_refused_by_name_and_the_server_goes_on() {
     assert_eq!(refusal(&next(&mut answers).await), ("bad_message".into(), "frame".into()));
     send(vec![0; 100_001]).await;
     assert_eq!(refusal(&next(&mut answers).await), ("too_large".into(), "frame".into()));
-    // A new start of the robot is another epoch: it waits until the live one ends.
+    // A restart of the robot's program is another epoch: refused until the live one ends.
     send(v1::Frame { epoch: 10, ..good(1) }.encode_to_vec()).await;
     assert_eq!(refusal(&next(&mut answers).await), ("epoch_conflict".into(), "epoch".into()));
     send(good(1_000).encode_to_vec()).await;
@@ -149,14 +149,14 @@ async fn bad_frames_are_refused_by_name_and_the_server_goes_on() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_robot_that_nobody_registered_is_told_so() {
+async fn an_unregistered_robot_is_refused() {
     let inside = Inside::start(Limits::default()).await;
     inside.maps().create_map(&NewMap::new("hall")).await.expect("map");
-    let robot = connect(&inside, "stranger").await;
+    let robot = connect(&inside, "unregistered").await;
     let mut answers = robot.answers();
     robot.publish_raw_frame(CAMERA, good(1).encode_to_vec()).await.expect("sent");
     assert_eq!(refusal(&next(&mut answers).await), ("unknown_robot".into(), "robot".into()));
-    inside.maps().put_robot("stranger", "hall").await.expect("robot");
+    inside.maps().put_robot("unregistered", "hall").await.expect("robot");
     robot.publish_raw_frame(CAMERA, good(2).encode_to_vec()).await.expect("sent");
     assert_eq!(next(&mut answers).await.status(), Status::NoMatch);
     robot.close().await.expect("closed");

@@ -1,5 +1,5 @@
-//! Claim: `waymark detect` prints one JSON line for every picture it can read and one error line for every other; every
-//! command explains its options, and an option that does not exist is refused.
+//! Claim: `waymark detect` prints one JSON line for every picture it can read and one error line for every other;
+//! every command explains its options, and an option that does not exist is refused.
 
 use image::{DynamicImage, ExtendedColorType, ImageFormat, Luma, RgbImage, codecs::jpeg::JpegEncoder};
 use serde_json::Value;
@@ -15,6 +15,7 @@ use std::{
 use tempfile::TempDir;
 use tests::{
     command::{Run, check_help, check_refused, program, waymark},
+    documents::check_command_lines,
     scenes,
 };
 use vision::geometry::{Corners, polygon};
@@ -116,7 +117,7 @@ fn detect(paths: &[PathBuf]) -> Run {
     waymark(args.chain(paths.iter().map(OsString::from)), LONGEST)
 }
 
-/// A bright rectangle on grey: something to find in every format.
+/// A bright rectangle on grey, to be detected in every format.
 fn card(width: u32, height: u32) -> RgbImage {
     RgbImage::from_fn(width, height, |u, v| {
         let inside = u > width / 4 && u < 3 * width / 4 && v > height / 4 && v < 3 * height / 4;
@@ -153,7 +154,7 @@ fn write_pictures(folder: &Path) -> BTreeMap<PathBuf, (u64, u64)> {
     sizes
 }
 
-/// Files that are no pictures or are damaged, and one that is not there.
+/// Files that are no pictures or are damaged, and a missing one.
 fn write_bad(folder: &Path) -> Vec<PathBuf> {
     let read = |name: &str| fs::read(folder.join(name)).expect("written before");
     let (png, jpeg) = (read("rgb.png"), read("rgb.jpeg"));
@@ -197,7 +198,7 @@ fn check_line(line: &Value, (width, height): (u64, u64)) {
 }
 
 #[test]
-fn detect_reads_every_kind_of_picture_and_names_every_other_file() {
+fn detect_reads_every_format_and_names_every_other_file() {
     let folder = TempDir::new().expect("a temporary directory");
     let sizes = write_pictures(folder.path());
     let bad = write_bad(folder.path());
@@ -242,17 +243,17 @@ fn detect_finds_a_rendered_poster() {
     let folder = TempDir::new().expect("a temporary directory");
     let building = Arc::new(Building::corridor(5));
     let params = LessonParams { views: 1, max_view_angle_rad: 0.6, ..LessonParams::default() };
-    let looks = scenes::looks(&building, &params);
+    let views = scenes::views(&building, &params);
     let (mut paths, mut truths) = (Vec::new(), Vec::new());
-    for (number, (poster, seen)) in looks.iter().enumerate() {
-        let Some(view) = seen.frame.truth.landmark(poster).filter(|v| v.state == ViewState::Full) else {
+    for (number, (poster, readings)) in views.iter().enumerate() {
+        let Some(view) = readings.frame.truth.landmark(poster).filter(|v| v.state == ViewState::Full) else {
             continue;
         };
         paths.push(folder.path().join(format!("{number}.png")));
-        fs::write(&paths[truths.len()], scenes::png(&seen.frame.image)).expect("a picture");
+        fs::write(&paths[truths.len()], scenes::png(&readings.frame.image)).expect("a picture");
         truths.push(view.corners_px);
     }
-    assert!(truths.len() >= 3, "too few whole posters to look at");
+    assert!(truths.len() >= 3, "too few whole posters");
     let run = detect(&paths);
     assert_eq!(run.status, 0, "{run:?}");
     for (line, truth) in run.json_lines().iter().zip(&truths) {
@@ -307,7 +308,7 @@ fn every_stage_is_drawn_for_every_picture_of_a_folder() {
 }
 
 #[test]
-fn parameters_are_shown_taken_and_checked() {
+fn parameters_are_shown_applied_and_checked() {
     let shown = waymark(["detect", "--show-params", "--scales", "1", "--set", "edges.high=9"], LONGEST);
     let all: Value = serde_json::from_str(&shown.stdout).expect("JSON");
     assert_eq!((&all["quads"]["scales"], &all["edges"]["high"]), (&1.into(), &9.0.into()), "{all}");
@@ -323,7 +324,12 @@ fn every_command_explains_its_options() {
 }
 
 #[test]
-fn what_does_not_exist_is_refused() {
+fn commands_in_the_documents_exist() {
+    check_command_lines(program(), "waymark", 20, LONGEST);
+}
+
+#[test]
+fn unknown_commands_and_options_are_refused() {
     let wrong = [
         "detect --jason a.png",
         "detect",

@@ -1,5 +1,5 @@
-//! Claim: the demo, with nothing prepared, ends well: its robot is recognised nowhere wrongly and is localised better
-//! than by its odometry.
+//! Claim: the demo runs without preparation: no landmark is named wrongly, and its robot is localised better than
+//! by odometry alone.
 
 use serde_json::Value;
 use std::time::Duration;
@@ -16,7 +16,7 @@ fn a_robot_of_the_demo_is_localised() {
     let args = "demo --robots 1 --legs 1 --rate-hz 1 --seed 2 --json --http 127.0.0.1:0";
     let run = waymark(args.split(' '), LONGEST);
     assert_eq!(run.status, 0, "{run:?}");
-    assert_eq!(run.stdout.lines().count(), 1, "results and nothing else: {run:?}");
+    assert_eq!(run.stdout.lines().count(), 1, "results only: {run:?}");
     let summary = run.last_json();
     let of = |pointer| number(&summary, pointer);
     assert!(of("/frames") >= 30.0 && of("/answers") <= of("/frames"), "{summary}");

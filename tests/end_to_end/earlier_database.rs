@@ -1,5 +1,5 @@
-//! Claim: a database of an earlier build opens, and what it was taught is recognised without a new lesson; its models get
-//! points from the stored views by one job, once.
+//! Claim: a database of an earlier build opens, and its landmarks are recognised without a new lesson; one job adds
+//! points to its models from the stored views, once.
 
 use client::{
     MapClient,
@@ -17,7 +17,7 @@ fn fixture(name: &str) -> Vec<u8> {
     fs::read(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-/// Icons decide alone: no model needs points.
+/// Only icons decide: no model needs points.
 const BY_ICONS: [(&str, &str); 1] = [("WAYMARK_ALGORITHM__RECOGNISE__VERDICT__POINTS", "false")];
 
 /// A data directory with the database of the build.
@@ -30,19 +30,19 @@ fn earlier() -> TempDir {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_database_of_2026_11_22_recognises_what_it_was_taught() {
+async fn a_database_of_2026_11_22_recognises_its_landmarks() {
     let data = earlier();
     let server = Child::start_with(data.path(), &BY_ICONS);
     let maps = server.maps();
     let all = maps.maps().await.expect("maps");
     assert_eq!(all.len(), 1, "{all:?}");
     let map = all[0].name.as_str();
-    assert_eq!(active(&maps, map).await, POSTERS, "a stored model is not used");
+    assert_eq!(active(&maps, map).await, POSTERS, "a stored model is inactive");
     let answer = recognise(&maps, map).await;
     let named: Vec<&str> =
         answer.quads.iter().map(|q| q.landmark.as_str()).filter(|name| !name.is_empty()).collect();
     assert_eq!((answer.status(), named.as_slice()), (v1::Status::Matched, &["poster-0"][..]));
-    assert!(maps.job(2).await.is_err(), "nothing is learnt again where points do not decide");
+    assert!(maps.job(2).await.is_err(), "a lesson although points do not decide");
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -52,10 +52,10 @@ async fn models_of_2026_11_22_get_points_once_where_points_decide() {
     let maps = server.maps();
     let all = maps.maps().await.expect("maps");
     let map = all[0].name.as_str();
-    assert_eq!(active(&maps, map).await, POSTERS, "a stored model is not used");
+    assert_eq!(active(&maps, map).await, POSTERS, "a stored model is inactive");
 
     // The fixture has one job, that of its lesson.
-    let job = maps.job(2).await.expect("the job that takes points");
+    let job = maps.job(2).await.expect("the job that adds points");
     let job = maps.wait_for_job(job, 6 * SOON, |_| {}).await.expect("points");
     assert_eq!((job.kind.as_str(), job.state), ("learn", JobState::Done), "{job:?}");
     let result = job.result.expect("a result");
@@ -75,11 +75,11 @@ async fn models_of_2026_11_22_get_points_once_where_points_decide() {
     let agreeing = points.agreement().filter(|part| *part == v1::PartAgreement::Agrees).count();
     assert!(points.agreement.len() == 25 && agreeing >= 5, "{points:?}");
 
-    // At the next start there is nothing left to do.
+    // The next start has no such job.
     server.kill();
     let server = Child::start(data.path());
     let maps = server.maps();
-    assert!(maps.job(3).await.is_err(), "points are taken a second time");
+    assert!(maps.job(3).await.is_err(), "points are added a second time");
     assert!(recognise(&maps, map).await.quads.iter().any(|q| q.points.is_some()));
 }
 

@@ -1,6 +1,6 @@
-//! Claim: a robot that drives past posters nobody taught brings their views home; a person accepts them over HTTP, and
-//! from then on they are recognised and placed, never one for another, at least as often as when each was taught by a
-//! photograph. Views of a landmark that is known are added only where it was recognised, and only when asked for.
+//! Claim: a robot gathers views of untaught posters that it passes; a person accepts their tracks over HTTP; from
+//! then on they are recognised and placed, never one as another, about as often as posters taught by a photograph
+//! each. Views of a known landmark are added only if it was recognised, and only on request.
 
 mod figures;
 
@@ -27,7 +27,7 @@ use tests::{
 
 const MAP: &str = "corridor";
 
-/// A map with walls and a robot on it, nothing taught.
+/// A map with walls and a robot, without landmarks.
 async fn walls(inside: &Inside, building: &Building) -> RobotClient {
     inside.maps().create_map(&NewMap::new(MAP)).await.expect("map");
     let walls: Vec<_> = building
@@ -56,12 +56,12 @@ fn robot(building: &Arc<Building>, seed: u64, legs: u32, reverse: bool) -> Robot
     Robot::new(building.clone(), &RobotParams { drive, ..RobotParams::default() })
 }
 
-/// What the laser says of the pose: 1 cm and 2 mrad off, other at every step.
-fn believed(seen: &SensorReadings) -> Pose2Covariance {
-    let phase = seen.step.index as f64;
+/// The robot's own pose by its laser: 1 cm and 2 mrad off, in another direction at every step.
+fn prior(readings: &SensorReadings) -> Pose2Covariance {
+    let phase = readings.step.index as f64;
     let off = Vector3::new(0.014 * phase.sin(), 0.014 * (2.3 * phase).sin(), 0.0028 * (3.7 * phase).sin());
     let covariance = Matrix3::from_diagonal(&Vector3::new(1e-4, 1e-4, 4e-6));
-    let t = seen.step.map_from_robot;
+    let t = readings.step.map_from_robot;
     let pose = Pose2::new(t.x_m + off.x, t.y_m + off.y, t.theta_rad + off.z);
     Pose2Covariance::new(pose, covariance).expect("in range")
 }
@@ -72,20 +72,20 @@ async fn drive(client: &RobotClient, mut robot: Robot, localised: bool) -> Vec<(
     let mut answered = Vec::new();
     let began = tokio::time::Instant::now();
     for step in steps.iter().step_by(2) {
-        let seen = robot.look(step);
-        // In real time: the server believes no clock that runs faster, and gathering forgets by it.
+        let readings = robot.look(step);
+        // In real time: the server rejects faster clocks, and gathering ends tracks by time.
         tokio::time::sleep_until(began + Duration::from_secs_f64(step.time_s - steps[0].time_s)).await;
-        let mut capture = Capture::encoded(jpeg(&seen.frame.image))
+        let mut capture = Capture::encoded(jpeg(&readings.frame.image))
             .expect("a picture")
             .with_intrinsics(sim::camera::Camera::vga().intrinsics())
-            .with_mounting(&seen.step.robot_from_camera)
-            .with_odometry(&seen.step.odom_from_robot)
+            .with_mounting(&readings.step.robot_from_camera)
+            .with_odometry(&readings.step.odom_from_robot)
             .with_deadline_ms(60_000);
         if localised {
-            capture = capture.with_prior(&believed(&seen));
+            capture = capture.with_prior(&prior(&readings));
         }
         let answer = client.recognise("front", capture, SOON).await.expect("an answer");
-        answered.push((seen, answer));
+        answered.push((readings, answer));
     }
     answered
 }
@@ -94,7 +94,7 @@ fn list<'a>(value: &'a Value, name: &str) -> &'a [Value] {
     value[name].as_array().map_or(&[], Vec::as_slice)
 }
 
-/// The poster that hangs where a track does: what a person sees in the picture.
+/// The poster at the estimated place of a track, as a person would read it from the picture.
 fn poster_of(building: &Building, track: &Value) -> Option<String> {
     let at = |field: &str| track["place"][field].as_f64();
     let (x, y, width) = (at("x_m")?, at("y_m")?, at("width_m")?);
@@ -116,7 +116,7 @@ async fn lesson(inside: &Inside, job: &Value) -> Value {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn posters_that_nobody_taught_are_gathered_accepted_and_recognised() {
+async fn untaught_posters_are_gathered_accepted_and_recognised() {
     let building = Arc::new(Building::corridor(11));
     let (gathered, inside, client) = {
         let inside = Inside::start(Limits::default()).await;
@@ -124,7 +124,7 @@ async fn posters_that_nobody_taught_are_gathered_accepted_and_recognised() {
         gather_all(&inside, &client, &building).await;
         let gathering = begun(&inside, json!({ "robot": "r1", "known": true })).await;
         let second = drive(&client, robot(&building, 5, 1, true), false).await;
-        known_ones_are_themselves(&inside, &building, &gathering).await;
+        known_landmarks_keep_their_names(&inside, &building, &gathering).await;
         (figures(&second), inside, client)
     };
     let photographed = photographed(&building).await;
@@ -184,13 +184,13 @@ async fn gather_all(inside: &Inside, client: &RobotClient, building: &Arc<Buildi
     assert_eq!(std::fs::read_dir(folder.path()).expect("pictures").count(), count);
     let listed = waymark(["gather", "list", "--map", MAP, "--server", &url], SOON);
     assert!(listed.stdout.contains("ended with r1, of whatever is new"), "{listed:?}");
-    // A picture of each can be seen.
+    // Each has a picture.
     let first = &list(&waiting, "tracks")[0];
     let icon =
         format!("{}/api/v1{path}/tracks/{}/views/{}/icon", inside.url(), first["number"], first["best_view"]);
     let picture = Client::new().get(icon).send().await.expect("an answer");
     assert_eq!(picture.headers()["content-type"], "image/png");
-    // Nothing is taken if one of the decisions cannot be.
+    // Nothing is accepted if one of the decisions is invalid.
     let mut bad = picks.clone();
     bad.push(json!({ "track": 9999, "name": "nothing" }));
     let (status, problem) =
@@ -208,12 +208,12 @@ async fn gather_all(inside: &Inside, client: &RobotClient, building: &Arc<Buildi
         let place = landmark.place.expect("placed");
         assert!((place.x_m - truth.x).hypot(place.y_m - truth.y) < 0.05, "{landmark:?}");
     }
-    // Accepted ones do not wait any more, nor can they be accepted twice.
+    // Accepted tracks leave the list and cannot be accepted twice.
     let again = json!({ "tracks": [picks[0]] });
     assert_eq!(call(inside, Method::POST, &format!("{path}/accept"), Some(again)).await.0, 404);
 }
 
-/// What one photograph of each poster, seen straight on, teaches: the same second drive.
+/// The same second drive after teaching one frontal photograph of each poster.
 async fn photographed(building: &Arc<Building>) -> Figures {
     let inside = Inside::start(Limits::default()).await;
     let client = walls(&inside, building).await;
@@ -226,12 +226,12 @@ async fn photographed(building: &Arc<Building>) -> Figures {
     };
     let mut teacher = Robot::new(building.clone(), &RobotParams::default());
     for stop in stops(building, &frontal) {
-        let seen = teacher.look(&stop.step);
-        let corners = seen.frame.truth.landmark(&stop.landmark).expect("aimed at").corners_px;
+        let readings = teacher.look(&stop.step);
+        let corners = readings.frame.truth.landmark(&stop.landmark).expect("aimed at").corners_px;
         let maps = inside.maps();
         maps.add_landmark(MAP, &stop.landmark, None, None).await.expect("landmark");
         let extent = LandmarkRegion::Corners(corners.into());
-        maps.upload_view(MAP, &stop.landmark, jpeg(&seen.frame.image), extent).await.expect("view");
+        maps.upload_view(MAP, &stop.landmark, jpeg(&readings.frame.image), extent).await.expect("view");
     }
     let job = inside.maps().learn(MAP, None, None).await.expect("job");
     inside.maps().wait_for_job(job, 3 * SOON, |_| {}).await.expect("the lesson ends");
@@ -248,8 +248,8 @@ async fn begun(inside: &Inside, body: Value) -> String {
     format!("{path}/{}", gathering["id"])
 }
 
-/// What was gathered while every landmark was known: views of each in its own track, none of them as something new.
-async fn known_ones_are_themselves(inside: &Inside, building: &Building, path: &str) {
+/// Tracks of a drive on which every landmark is known: each view in the track of its landmark, none as new.
+async fn known_landmarks_keep_their_names(inside: &Inside, building: &Building, path: &str) {
     let (_, stopped) = call(inside, Method::POST, &format!("{path}/stop"), None).await;
     let (_, waiting) = call(inside, Method::GET, &format!("{path}/tracks"), None).await;
     let all = list(&waiting, "tracks");
@@ -271,7 +271,7 @@ async fn known_ones_are_themselves(inside: &Inside, building: &Building, path: &
     assert_eq!(call(inside, Method::DELETE, path, None).await.0, 204);
 }
 
-/// Views of one landmark alone, then a lesson of it alone.
+/// Views of one landmark only, then a lesson of it alone.
 async fn more_of_one(inside: &Inside, client: &RobotClient, building: &Arc<Building>) {
     let before = inside.maps().landmark(MAP, "poster-0").await.expect("a landmark").views;
     let path = begun(inside, json!({ "robot": "r1", "landmark": "poster-0" })).await;
@@ -279,14 +279,14 @@ async fn more_of_one(inside: &Inside, client: &RobotClient, building: &Arc<Build
         .into_iter()
         .filter(|s| s.landmark == "poster-0" || s.landmark == "poster-1")
         .collect();
-    let mut looking = Robot::new(building.clone(), &RobotParams::default());
+    let mut robot_at_stops = Robot::new(building.clone(), &RobotParams::default());
     for stop in near {
-        let seen = looking.look(&stop.step);
-        let capture = Capture::encoded(jpeg(&seen.frame.image))
+        let readings = robot_at_stops.look(&stop.step);
+        let capture = Capture::encoded(jpeg(&readings.frame.image))
             .expect("a picture")
             .with_intrinsics(sim::camera::Camera::vga().intrinsics())
-            .with_mounting(&seen.step.robot_from_camera)
-            .with_prior(&believed(&seen))
+            .with_mounting(&readings.step.robot_from_camera)
+            .with_prior(&prior(&readings))
             .with_deadline_ms(60_000);
         client.recognise("front", capture, SOON).await.expect("an answer");
     }
@@ -294,8 +294,8 @@ async fn more_of_one(inside: &Inside, client: &RobotClient, building: &Arc<Build
     let (_, waiting) = call(inside, Method::GET, &format!("{path}/tracks"), None).await;
     let [one] = list(&waiting, "tracks") else { panic!("{waiting} {stopped}") };
     assert_eq!(one["landmark"], "poster-0");
-    let kept = list(one, "views").len() as u64;
-    assert!((4..=10).contains(&kept), "{stopped}");
+    let stored = list(one, "views").len() as u64;
+    assert!((4..=10).contains(&stored), "{stopped}");
     let other = json!({ "tracks": [{ "track": one["number"], "name": "poster-1" }] });
     let (status, problem) = call(inside, Method::POST, &format!("{path}/accept"), Some(other)).await;
     assert_eq!((status, &problem["code"]), (StatusCode::CONFLICT, &json!("in_use")), "{problem}");
@@ -304,11 +304,11 @@ async fn more_of_one(inside: &Inside, client: &RobotClient, building: &Arc<Build
     let result = lesson(inside, &accepted["job"]).await;
     let others = inside.maps().landmarks(MAP).await.expect("landmarks").len() - 1;
     assert_eq!((&result["learnt"], &result["refitted"]), (&json!(1), &json!(others)), "{result}");
-    assert_eq!(inside.maps().landmark(MAP, "poster-0").await.expect("a landmark").views, before + kept);
+    assert_eq!(inside.maps().landmark(MAP, "poster-0").await.expect("a landmark").views, before + stored);
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn bad_wishes_are_refused_with_a_reason_and_ends_are_final() {
+async fn invalid_requests_are_refused_and_ended_gatherings_stay_ended() {
     let inside = Inside::start(Limits::default()).await;
     let building = Building::corridor(11);
     let client = walls(&inside, &building).await;
@@ -343,7 +343,7 @@ async fn bad_wishes_are_refused_with_a_reason_and_ends_are_final() {
     let (_, stopped) = call(&inside, Method::POST, &format!("{path}/stop"), None).await;
     let (_, again) = call(&inside, Method::POST, &format!("{path}/stop"), None).await;
     assert_eq!((&stopped, stopped["open"].as_bool()), (&again, Some(false)));
-    // It may gather again now; a list shows both; what is deleted is gone.
+    // A new gathering may start; the list has both; a deleted one is gone.
     let (status, two) = call(&inside, Method::POST, &all, Some(json!({ "robot": "r1" }))).await;
     assert_eq!(status, StatusCode::CREATED);
     let (_, page) = call(&inside, Method::GET, &all, None).await;

@@ -1,4 +1,5 @@
-//! Claim: what was accepted is done although its client goes away at once, and what was not does not block anything.
+//! Claim: an accepted request is completed although its client disconnects at once, and one that was not accepted
+//! blocks nothing.
 
 use client::{
     LandmarkRegion,
@@ -9,11 +10,11 @@ use server::config::Limits;
 use tests::{Inside, eventually, pictures};
 use tokio::{io::AsyncWriteExt, net::TcpStream};
 
-/// More than may be open at once, so that jobs which nobody runs would stop all learning.
+/// More than the limit of open jobs, so that jobs that nobody runs would block all lessons.
 const REQUESTS: u64 = 20;
 
 #[tokio::test(flavor = "multi_thread")]
-async fn no_job_stays_behind_when_clients_hang_up() {
+async fn no_job_stays_open_when_clients_disconnect() {
     let inside = Inside::start(Limits { jobs: 4, ..Limits::default() }).await;
     let maps = inside.maps();
     maps.create_map(&NewMap::new("hall")).await.expect("map");
@@ -24,7 +25,7 @@ async fn no_job_stays_behind_when_clients_hang_up() {
         let path = "/api/v1/maps/hall/landmarks/p1/learn";
         let head = format!("POST {path} HTTP/1.1\r\nHost: localhost\r\nContent-Length: 0\r\n\r\n");
         stream.write_all(head.as_bytes()).await.expect("sent");
-        // At once, and ever later: somewhere in between the job is committed and not yet answered.
+        // Disconnects at once, then ever later: at some delay the job is committed but not yet answered.
         tokio::time::sleep(std::time::Duration::from_micros(250 * i)).await;
         drop(stream);
     }

@@ -1,5 +1,5 @@
-//! Claim: bad input over HTTP gets a status, a stable code and the field at fault; nothing stored changes; bounds hold
-//! at the bound and refuse beyond it.
+//! Claim: bad input over HTTP gets a status, a stable code and the field at fault; no stored data changes; limits
+//! accept their bound and refuse more.
 
 use client::{LandmarkRegion, api::NewMap};
 use reqwest::{
@@ -12,7 +12,7 @@ use server::config::Limits;
 use std::time::Duration;
 use tests::{Inside, pictures};
 
-/// Method, path, body, and what must come of it: status, code, field.
+/// Method, path, body, and the expected status, code and field.
 type Row<'a> = (&'a str, &'a str, &'a str, u16, &'a str, &'a str);
 
 const ROWS: &[Row<'_>] = &[
@@ -114,7 +114,7 @@ const ROWS: &[Row<'_>] = &[
         "bad_json",
         "segments[0].a",
     ),
-    // Things that do not exist.
+    // Unknown resources.
     ("GET", "/maps/nowhere", "", 404, "unknown_map", "map"),
     ("DELETE", "/maps/nowhere", "", 404, "unknown_map", "map"),
     ("GET", "/maps/nowhere/landmarks/p1", "", 404, "unknown_map", "map"),
@@ -140,7 +140,7 @@ const ROWS: &[Row<'_>] = &[
     ("POST", "/maps/hall/learn", r#"{"landmarks": []}"#, 422, "out_of_range", "landmarks"),
     ("POST", "/maps/hall/learn", r#"{"generated_views": 101}"#, 422, "out_of_range", "generated_views"),
     ("POST", "/maps/nowhere/learn", "{}", 404, "unknown_map", "map"),
-    // What something else rests on.
+    // A map in use.
     ("DELETE", "/maps/hall", "", 409, "in_use", ""),
 ];
 
@@ -182,7 +182,7 @@ async fn refusal(response: reqwest::Response) -> (u16, String, String) {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn bad_requests_are_named_and_change_nothing() {
+async fn invalid_requests_are_refused_and_change_nothing() {
     let (inside, http, base) = prepared().await;
     let before = inside.maps().map("hall").await.expect("map");
     for (method, path, body, status, code, field) in ROWS {
@@ -200,7 +200,7 @@ async fn bad_requests_are_named_and_change_nothing() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn bad_uploads_are_named() {
+async fn invalid_uploads_are_refused() {
     let (inside, http, base) = prepared().await;
     let url = format!("{base}/maps/hall/landmarks/p1/views");
     let picture = pictures::picture(1);
@@ -238,7 +238,7 @@ async fn bad_uploads_are_named() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn bounds_hold_at_the_bound() {
+async fn limits_accept_their_bound_and_refuse_more() {
     let (inside, http, base) = prepared().await;
     let maps = inside.maps();
     let post = |path: &str, body: Value| http.post(format!("{base}{path}")).json(&body).send();
@@ -265,7 +265,7 @@ async fn bounds_hold_at_the_bound() {
     assert_eq!(four, (422, "too_many".into(), "segments".into()));
 
     for seed in [1, 2, 2] {
-        // The third is the second again: no new view.
+        // The third is a duplicate of the second: no new view.
         maps.upload_view("hall", "p1", pictures::picture(seed), LandmarkRegion::WholeImage)
             .await
             .expect("view");

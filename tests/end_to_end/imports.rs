@@ -1,7 +1,7 @@
 //! Claim: imports go one way. No file of a crate imports, over any number of others, itself.
 //!
-//! Read from the sources: `use` statements and paths that begin with `crate` or `super`, tests left out. A module and the
-//! modules inside it are one thing here: a parent may gather what its children offer, and children may use its types.
+//! Read from the sources: `use` statements and paths that begin with `crate` or `super`, without tests. A module
+//! and the modules inside it count as one: a parent may re-export its children, and children may use its types.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -9,7 +9,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// Crates whose imports are looked at.
+/// Crates that are checked.
 const CRATES: [&str; 9] = ["vision", "map", "formats", "protos", "sim", "client", "engine", "server", "lab"];
 
 /// A module by its path in the crate: `["recognise", "alignment"]`.
@@ -113,15 +113,15 @@ fn is_inside(a: &Module, b: &Module) -> bool {
 
 /// All modules that can be reached from one.
 fn reached(from: &Module, imports: &BTreeMap<Module, BTreeSet<Module>>) -> BTreeSet<Module> {
-    let (mut seen, mut open) = (BTreeSet::new(), vec![from.clone()]);
+    let (mut visited, mut open) = (BTreeSet::new(), vec![from.clone()]);
     while let Some(module) = open.pop() {
         for next in imports.get(&module).into_iter().flatten() {
-            if seen.insert(next.clone()) {
+            if visited.insert(next.clone()) {
                 open.push(next.clone());
             }
         }
     }
-    seen
+    visited
 }
 
 fn cycles(modules: &BTreeMap<Module, String>) -> Vec<BTreeSet<Module>> {
@@ -157,7 +157,7 @@ fn imports_go_one_way() {
 }
 
 #[test]
-fn a_circle_is_found_and_a_parent_is_none() {
+fn a_cycle_is_found_and_a_parent_is_none() {
     let module = |text: &str| text.split('/').map(str::to_owned).collect::<Module>();
     let crate_of =
         |sources: &[(&str, &str)]| sources.iter().map(|(m, s)| (module(m), (*s).to_owned())).collect();

@@ -1,7 +1,7 @@
-//! Claim: a robot that sees a single landmark and has odometry and a laser is localised on a map with walls: across a
-//! corridor by centimetres however far it drives, in a room in all directions. A scan alone starts nothing, the first
-//! frames that show a unique landmark do, and every correction can be read. From a run whose path is told the server learns
-//! what to trust where.
+//! Claim: a robot with odometry, a laser and a single landmark is localised on a map with walls: across a corridor
+//! within centimetres over any distance, in a room in all directions. Scans alone give no first pose; the first
+//! frames with a unique landmark do; every correction can be read. From a reference run the server learns modality
+//! statistics.
 
 use client::{Capture, Delivery, RobotClient, RobotOptions, api::NewMap, v1};
 use map::pose2::Pose2;
@@ -23,7 +23,7 @@ use tests::{
     robots::{MAP, call, jpeg, put_walls, scan_message, teach},
 };
 
-/// Frames that show the landmark until there is a pose.
+/// Most frames with the landmark until there is a pose.
 const FIRST_FIX_FRAMES: usize = 3;
 
 struct Run {
@@ -34,7 +34,7 @@ struct Run {
     poses: tokio::sync::broadcast::Receiver<v1::RobotPose>,
     scans: u64,
     last: Option<v1::RobotPose>,
-    /// Where the robot really was at every scan, by its clock.
+    /// True pose at every scan, by the robot's clock.
     path: Vec<(i64, Pose2)>,
 }
 
@@ -63,13 +63,13 @@ impl Run {
         log
     }
 
-    /// Sends a scan and waits until the server has done with it.
-    async fn scan(&mut self, seen: &SensorReadings) {
+    /// Sends a scan and waits until the server has processed it.
+    async fn scan(&mut self, readings: &SensorReadings) {
         let captured_ns = now_ns();
-        self.path.push((captured_ns, seen.step.map_from_robot));
-        self.client.publish_scan(scan_message(seen, captured_ns)).await.expect("sent");
+        self.path.push((captured_ns, readings.step.map_from_robot));
+        self.client.publish_scan(scan_message(readings, captured_ns)).await.expect("sent");
         self.scans += 1;
-        eventually("the scan is dealt with", || async {
+        eventually("the scan is processed", || async {
             let log = self.corrections().await;
             let ends = log["totals"]["laser"].as_object()?;
             (ends.values().filter_map(Value::as_u64).sum::<u64>() == self.scans).then_some(())
@@ -78,18 +78,18 @@ impl Run {
     }
 
     /// Sends a frame; whether the landmark was named in it, and whether it gave a pose.
-    async fn frame(&mut self, seen: &SensorReadings) -> [bool; 2] {
-        let capture = Capture::encoded(jpeg(&seen.frame.image))
+    async fn frame(&mut self, readings: &SensorReadings) -> [bool; 2] {
+        let capture = Capture::encoded(jpeg(&readings.frame.image))
             .expect("a picture")
             .with_intrinsics(sim::camera::Camera::vga().intrinsics())
-            .with_mounting(&seen.step.robot_from_camera)
-            .with_odometry(&seen.step.odom_from_robot)
+            .with_mounting(&readings.step.robot_from_camera)
+            .with_odometry(&readings.step.odom_from_robot)
             .with_deadline_ms(60_000);
         let answer = self.client.recognise("front", capture, SOON).await.expect("an answer");
         [answer.quads.iter().any(|q| q.landmark == "poster-0"), answer.map_from_robot.is_some()]
     }
 
-    /// The pose after an odometry message, of this moment.
+    /// The pose after an odometry message with the present time.
     async fn pose(&mut self, step: &Step) -> Option<v1::RobotPose> {
         let before = now_ns();
         self.client.publish_odometry(&step.odom_from_robot).await.expect("sent");
@@ -110,14 +110,14 @@ fn now_ns() -> i64 {
     SystemTime::now().duration_since(UNIX_EPOCH).expect("after 1970").as_nanos() as i64
 }
 
-/// Of a pose on the wire: error along x, y and in the heading, each in metres or radians.
+/// Error of a pose on the wire: x, y (m), heading (rad).
 fn errors(pose: &v1::RobotPose, truth: &Pose2) -> [f64; 3] {
     let at = pose.map_from_robot.as_ref().and_then(|p| p.pose).expect("a pose");
     let e = Pose2::new(at.x_m, at.y_m, at.theta_rad).minus(truth);
     [e.x, e.y, e.z]
 }
 
-/// Drives; at each step a scan, and a frame where the camera looks at the landmark. Errors after the first fix.
+/// Drives; sends a scan at each step, and a frame if the camera is aimed at the landmark. Errors after the first fix.
 async fn drive(run: &mut Run, every: usize) -> Vec<[f64; 3]> {
     let mut steps = Vec::new();
     while let Some(step) = run.robot.drive_mut().next() {
@@ -125,18 +125,18 @@ async fn drive(run: &mut Run, every: usize) -> Vec<[f64; 3]> {
     }
     let (mut shown, mut errors_after) = (0, Vec::new());
     for step in steps.iter().step_by(every) {
-        let seen = run.robot.look(step);
-        run.scan(&seen).await;
-        let looks = step.target.as_deref() == Some("poster-0");
+        let readings = run.robot.look(step);
+        run.scan(&readings).await;
+        let is_aimed = step.target.as_deref() == Some("poster-0");
         if run.last.is_none() {
             let log = run.corrections().await;
-            assert_eq!(log["totals"]["laser"]["applied"], Value::Null, "a scan started something: {log}");
+            assert_eq!(log["totals"]["laser"]["applied"], Value::Null, "a scan gave a first pose: {log}");
         }
-        if looks {
-            let [named, posed] = run.frame(&seen).await;
+        if is_aimed {
+            let [named, posed] = run.frame(&readings).await;
             shown += usize::from(named);
             if posed && run.last.is_none() {
-                // The answer goes out before the pose is taken.
+                // The answer is sent before the pose is updated.
                 let started = || async {
                     (run.corrections().await["totals"]["landmarks"]["started"] == 1).then_some(())
                 };
@@ -159,7 +159,7 @@ fn rms(errors: &[[f64; 3]], of: usize) -> f64 {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn in_a_corridor_the_laser_keeps_a_robot_off_the_walls() {
+async fn in_a_corridor_the_laser_bounds_the_error_across() {
     let params = CorridorParams { posters: 1, column: false, ..CorridorParams::default() };
     let drive_params = DriveParams { start_m: 9.0, ..DriveParams::default() };
     let mut run = Run::start(&params, drive_params).await;
@@ -187,14 +187,14 @@ async fn in_a_corridor_the_laser_keeps_a_robot_off_the_walls() {
     run.inside.server.stop().await;
 }
 
-/// The run was recorded; told where the robot really was, the server knows which modality is best where.
+/// Finishes the recording with a reference trajectory; the server learns modality statistics.
 async fn learnt_from(run: &Run) {
     let ask = async |method, path: &str, body| call(&run.inside, method, path, body).await;
     let (status, problem) = ask(Method::POST, "/robots/r1/recording", None).await;
     assert_eq!((status, &problem["code"]), (StatusCode::CONFLICT, &"in_use".into()));
     let (_, recorded) = ask(Method::GET, "/robots/r1/recording", None).await;
     assert!(recorded["laser"].as_u64() > Some(40) && recorded["landmarks"].as_u64() > Some(0), "{recorded}");
-    let told = "/robots/r1/recording/reference";
+    let reference = "/robots/r1/recording/reference";
     let poses = |shift_ns: i64| {
         let pose = |(t, p): &(i64, Pose2)| json!([t + shift_ns, p.x_m, p.y_m, p.theta_rad]);
         json!({ "poses": run.path.iter().map(pose).collect::<Vec<_>>() })
@@ -205,11 +205,11 @@ async fn learnt_from(run: &Run) {
         (poses(1 << 50), "no_overlap", "poses"),
     ];
     for (body, code, field) in refusals {
-        let (status, problem) = ask(Method::POST, told, Some(body)).await;
+        let (status, problem) = ask(Method::POST, reference, Some(body)).await;
         assert_eq!(status, StatusCode::UNPROCESSABLE_ENTITY, "{problem}");
         assert_eq!((&problem["code"], &problem["field"]), (&code.into(), &field.into()));
     }
-    let (status, learnt) = ask(Method::POST, told, Some(poses(0))).await;
+    let (status, learnt) = ask(Method::POST, reference, Some(poses(0))).await;
     assert_eq!(status, StatusCode::CREATED, "{learnt}");
     assert!(learnt["distance_m"].as_f64() > Some(5.0) && learnt["cells"].as_u64() > Some(5), "{learnt}");
     let laser = &learnt["statistics"][1];
@@ -240,7 +240,7 @@ async fn learnt_from(run: &Run) {
     let (_, known) = ask(Method::GET, &modalities, None).await;
     assert_eq!(known["cells"], json!([]));
     assert_eq!(ask(Method::GET, "/robots/r1/recording", None).await.1["code"], "not_recording");
-    // A robot that is forgotten leaves no recording behind.
+    // Deleting a robot deletes its recording.
     assert_eq!(ask(Method::POST, "/robots/r1/recording", None).await.0, StatusCode::CREATED);
     assert_eq!(ask(Method::DELETE, "/robots/r1", None).await.0, StatusCode::NO_CONTENT);
     assert_eq!(ask(Method::PUT, "/robots/r1", Some(json!({ "map": MAP }))).await.0, StatusCode::OK);
@@ -248,7 +248,7 @@ async fn learnt_from(run: &Run) {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn in_a_room_the_laser_tells_everything_once_a_landmark_told_where() {
+async fn in_a_room_the_laser_bounds_all_errors_after_a_first_fix() {
     let params = CorridorParams { posters: 1, length_m: 9.0, width_m: 5.0, ..CorridorParams::default() };
     let mut run = Run::start(&params, DriveParams { legs: 2, ..DriveParams::default() }).await;
     let errors = drive(&mut run, 2).await;

@@ -1,5 +1,5 @@
-//! Claim: a robot that drives and sends scans over zenoh makes the walls of a map, the same that `waymark map build` makes of
-//! a recording of them; they are stored when it is finished, and not before.
+//! Claim: a driving robot that sends scans over zenoh makes the walls of a map, the same as `waymark map build`
+//! from a scan log of them; they are stored when the mapping is finished, not before.
 
 use client::{Delivery, RobotClient, RobotOptions, api::NewMap};
 use reqwest::{Method, StatusCode};
@@ -19,7 +19,7 @@ use tests::{
     robots::{MAP, call, scan_of},
 };
 
-/// Scans that are on their way at a time: fewer than the server's queue holds.
+/// Unprocessed scans at a time: fewer than the server's queue holds.
 const AHEAD: u64 = 20;
 
 fn drive(building: &Arc<Building>) -> Vec<Step> {
@@ -33,19 +33,19 @@ fn walls_of_file(building: &Building, steps: &[Step]) -> Vec<[f64; 4]> {
     let (log, out) = (folder.path().join("drive.jsonl"), folder.path().join("map.json"));
     let mut text = String::new();
     for (i, step) in steps.iter().enumerate() {
-        let seen = scan(building, &step.map_from_robot, &LaserParams::default(), i as u64);
+        let measured = scan(building, &step.map_from_robot, &LaserParams::default(), i as u64);
         if i == 0 {
-            let mount = seen.robot_from_laser();
+            let mount = measured.robot_from_laser();
             let head = json!({
                 "waymark_recording": 1, "robot_from_laser": [mount.x_m, mount.y_m, mount.theta_rad],
-                "first_bearing_rad": seen.bearing_rad(0), "bearing_step_rad": seen.bearing_step_rad(),
-                "max_range_m": seen.max_range_m(),
+                "first_bearing_rad": measured.bearing_rad(0), "bearing_step_rad": measured.bearing_step_rad(),
+                "max_range_m": measured.max_range_m(),
             });
             writeln!(text, "{head}").expect("in memory");
         }
         let odom = &step.odom_from_robot;
         let odom = [odom.x_m, odom.y_m, odom.theta_rad];
-        let line = json!({ "t_s": step.time_s, "odom": odom, "ranges_m": seen.ranges_m() });
+        let line = json!({ "t_s": step.time_s, "odom": odom, "ranges_m": measured.ranges_m() });
         writeln!(text, "{line}").expect("in memory");
     }
     std::fs::write(&log, text).expect("a recording");
@@ -69,7 +69,7 @@ async fn mapping(inside: &Inside) -> Value {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_drive_over_zenoh_gives_the_walls_that_its_recording_gives() {
+async fn a_drive_over_zenoh_gives_the_walls_of_its_scan_log() {
     let inside = Inside::start(Limits::default()).await;
     let params = CorridorParams { length_m: 12.0, posters: 0, ..CorridorParams::default() };
     let building = Arc::new(Building::corridor_with(&params, 4));
@@ -88,8 +88,8 @@ async fn a_drive_over_zenoh_gives_the_walls_that_its_recording_gives() {
     let client = RobotClient::connect(&options).await.expect("connected");
     let steps = drive(&building);
     for (i, step) in steps.iter().enumerate() {
-        let seen = scan(&building, &step.map_from_robot, &LaserParams::default(), i as u64);
-        client.publish_scan(scan_of(&seen, &step.odom_from_robot, i as i64)).await.expect("sent");
+        let measured = scan(&building, &step.map_from_robot, &LaserParams::default(), i as u64);
+        client.publish_scan(scan_of(&measured, &step.odom_from_robot, i as i64)).await.expect("sent");
         let due = (i as u64 + 1).saturating_sub(AHEAD);
         eventually("mapped", || async {
             (mapping(&inside).await["scans"].as_u64() >= Some(due)).then_some(())
@@ -118,7 +118,7 @@ async fn a_drive_over_zenoh_gives_the_walls_that_its_recording_gives() {
     inside.server.stop().await;
 }
 
-/// What cannot be begun or ended, and giving up.
+/// Refused starts and ends, and cancelling.
 async fn refusals(inside: &Inside, path: &str) {
     for (method, path, body, status, code) in [
         (Method::GET, path.to_owned(), None, 404, "not_mapping"),
@@ -136,7 +136,7 @@ async fn refusals(inside: &Inside, path: &str) {
         let (got, problem) = call(inside, method, &path, body).await;
         assert_eq!((got.as_u16(), &problem["code"]), (status, &json!(code)), "{problem}");
     }
-    // Given up, or without any wall seen: the map stays as it is.
+    // Cancelled, or without any wall: the map does not change.
     call(inside, Method::POST, path, Some(json!({ "robot": "r1" }))).await;
     assert_eq!(call(inside, Method::DELETE, path, None).await.0, StatusCode::NO_CONTENT);
     call(inside, Method::POST, path, Some(json!({ "robot": "r1" }))).await;
@@ -147,7 +147,7 @@ async fn refusals(inside: &Inside, path: &str) {
     assert!(progress["reason"].as_str().is_some_and(|r| r.contains("no wall")), "{progress}");
 }
 
-/// A request about the mapping of a server that can be killed.
+/// A request about the mapping to a server that can be killed.
 async fn ask(server: &Child, method: Method, path: &str, body: Option<Value>) -> Value {
     let request = reqwest::Client::new().request(method, format!("{}/api/v1/maps/{MAP}/{path}", server.url));
     let request = match body {
@@ -167,7 +167,7 @@ async fn connected(server: &Child, epoch: u64) -> RobotClient {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_server_that_is_killed_in_mid_drive_goes_on_with_the_map() {
+async fn a_mapping_continues_after_the_server_is_killed() {
     let data = tempfile::tempdir().expect("a folder");
     let mut server = Child::start(data.path());
     let params = CorridorParams { length_m: 12.0, posters: 0, ..CorridorParams::default() };
@@ -184,8 +184,8 @@ async fn a_server_that_is_killed_in_mid_drive_goes_on_with_the_map() {
             server = Child::start(data.path());
             client = connected(&server, 77).await;
         }
-        let seen = scan(&building, &step.map_from_robot, &LaserParams::default(), i as u64);
-        client.publish_scan(scan_of(&seen, &step.odom_from_robot, i as i64)).await.expect("sent");
+        let measured = scan(&building, &step.map_from_robot, &LaserParams::default(), i as u64);
+        client.publish_scan(scan_of(&measured, &step.odom_from_robot, i as i64)).await.expect("sent");
         let taken = || async {
             (ask(&server, Method::GET, "mapping", None).await["scans"].as_u64() > Some(i as u64))
                 .then_some(())
@@ -204,8 +204,8 @@ async fn a_server_that_is_killed_in_mid_drive_goes_on_with_the_map() {
     let off =
         live.iter().flatten().zip(file.iter().flatten()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     assert!(off < 1e-6, "{off} m");
-    let kept = std::fs::read_dir(data.path().join("mapping")).expect("the folder").count();
-    assert_eq!(kept, 0, "nothing is left of what is stored");
+    let left = std::fs::read_dir(data.path().join("mapping")).expect("the folder").count();
+    assert_eq!(left, 0, "the journal of a stored map is deleted");
     client.close().await.expect("closed");
     server.kill();
 }

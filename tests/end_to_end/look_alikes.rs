@@ -1,5 +1,5 @@
-//! Claim: a robot that starts nobody knows where and sees only things that all look the same is told where it may be, never
-//! that it is at one of them, until one place is left; then it is there, and its pose says which of them it sees.
+//! Claim: a robot with an unknown start pose that observes only look-alikes gets several pose hypotheses and no
+//! pose until one is left; then it has that pose, and guided recognition names the landmarks.
 
 use client::{Capture, Delivery, RobotClient, RobotOptions, api::NewMap, named_landmarks, v1};
 use map::pose2::{Pose2, wrap_rad};
@@ -20,14 +20,14 @@ use tests::{
 use vision::geometry::polygon::iou;
 
 /// Three posters with the same picture, left, right and left.
-const ALIKE: [&str; 3] = ["poster-0", "poster-1", "poster-2"];
+const LOOK_ALIKES: [&str; 3] = ["poster-0", "poster-1", "poster-2"];
 
-async fn ask(client: &RobotClient, seen: &SensorReadings) -> v1::Answer {
-    let capture = Capture::encoded(jpeg(&seen.frame.image))
+async fn ask(client: &RobotClient, readings: &SensorReadings) -> v1::Answer {
+    let capture = Capture::encoded(jpeg(&readings.frame.image))
         .expect("a picture")
         .with_intrinsics(sim::camera::Camera::vga().intrinsics())
-        .with_mounting(&seen.step.robot_from_camera)
-        .with_odometry(&seen.step.odom_from_robot)
+        .with_mounting(&readings.step.robot_from_camera)
+        .with_odometry(&readings.step.odom_from_robot)
         .with_deadline_ms(60_000);
     client.recognise("front", capture, SOON).await.expect("an answer")
 }
@@ -38,26 +38,26 @@ fn off(pose: &v1::Pose2Covariance, truth: &Pose2) -> (f64, f64) {
     ((at.x_m - truth.x_m).hypot(at.y_m - truth.y_m), wrap_rad(at.theta_rad - truth.theta_rad).abs())
 }
 
-/// The page and the API are told the same as the robot, and what is still missing.
-async fn told_over_http(inside: &Inside, answer: &v1::Answer) {
+/// The API has the same hypotheses as the robot's answer, and what is missing for a pose.
+async fn check_hypotheses_over_http(inside: &Inside, answer: &v1::Answer) {
     let (_, found) = call(inside, Method::GET, "/robots/r1/relocalisation", None).await;
     assert_eq!((&found["relocalising"], &found["map"]), (&true.into(), &MAP.into()), "{found}");
     assert_eq!(found["missing"][0], "higher_probability", "{found}");
     let all = found["hypotheses"].as_array().expect("a list");
     assert_eq!(all.len(), answer.hypotheses.len(), "{found}");
-    for (told, sent) in all.iter().zip(&answer.hypotheses) {
+    for (shown, sent) in all.iter().zip(&answer.hypotheses) {
         let pose = sent.map_from_robot.as_ref().expect("a pose");
         let same =
-            |told: &serde_json::Value, sent: f64| told.as_f64().is_some_and(|v| (v - sent).abs() < 1e-9);
-        assert!(same(&told["probability"], sent.probability), "{found}");
-        assert!(same(&told["x_m"], pose.pose.expect("a pose").x_m), "{found}");
-        assert!(same(&told["covariance"][4], pose.covariance[4]), "{found}");
+            |shown: &serde_json::Value, sent: f64| shown.as_f64().is_some_and(|v| (v - sent).abs() < 1e-9);
+        assert!(same(&shown["probability"], sent.probability), "{found}");
+        assert!(same(&shown["x_m"], pose.pose.expect("a pose").x_m), "{found}");
+        assert!(same(&shown["covariance"][4], pose.covariance[4]), "{found}");
     }
     assert!(found["entropy_nats"].as_f64().is_some_and(|e| e > 0.5), "{found}");
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn twelve_like_doors_are_twelve_places_and_never_one_too_early() {
+async fn twelve_equal_doors_give_no_wrong_pose() {
     let params = CorridorParams {
         length_m: 40.0,
         posters: 12,
@@ -92,7 +92,7 @@ async fn twelve_like_doors_are_twelve_places_and_never_one_too_early() {
         };
         several += usize::from(answer.hypotheses.len() >= 2 && answer.hypotheses.iter().any(true_one));
         if let Ok(pose) = poses.try_recv() {
-            // Never a wrong one, though they hang nearly evenly: if any, at the end, where the pattern ends.
+            // The doors are nearly evenly spaced; a pose, if any, comes at the end of the row, and is right.
             let (m, rad) = off(pose.map_from_robot.as_ref().expect("a pose"), &step.map_from_robot);
             assert!(m < 0.8 && rad < 0.3, "{m} m, {rad} rad off");
             break;
@@ -103,39 +103,39 @@ async fn twelve_like_doors_are_twelve_places_and_never_one_too_early() {
     inside.server.stop().await;
 }
 
-/// From there on the pose says which of them each one is; the API says that it was the pose.
-async fn named_by_pose(inside: &Inside, client: &RobotClient, looks: impl Iterator<Item = SensorReadings>) {
+/// From then on guided recognition names each of them; the API shows these fixes as guided.
+async fn named_by_pose(inside: &Inside, client: &RobotClient, drive: impl Iterator<Item = SensorReadings>) {
     let mut poses = client.poses();
     let (mut right, mut trust) = (0, Vec::new());
-    for seen in looks {
-        let answer = ask(client, &seen).await;
+    for readings in drive {
+        let answer = ask(client, &readings).await;
         for named in named_landmarks(&answer) {
             assert!(named.is_guided(), "nothing here is unique: {named:?}");
-            let truth = seen.frame.truth.landmark(named.name).expect("a landmark in view");
+            let truth = readings.frame.truth.landmark(named.name).expect("a landmark in view");
             let corners: Vec<_> = named.quad.corners.iter().map(|c| Point2::new(c.u_px, c.v_px)).collect();
             assert!(iou(&corners, truth.corners_px.points()) > 0.5, "{named:?} is not there");
             right += 1;
         }
         trust.extend(std::iter::from_fn(|| poses.try_recv().ok()).map(|pose| pose.trust()));
     }
-    assert!(right >= 3, "{right} named by pose");
+    assert!(right >= 3, "{right} guided names");
     assert!(trust.iter().all(|t| [v1::PoseTrust::Supported, v1::PoseTrust::Stale].contains(t)), "{trust:?}");
     let logged = || async {
         let (_, log) = call(inside, Method::GET, "/robots/r1/corrections", None).await;
         log["totals"]["guided"]["applied"].as_u64().is_some_and(|n| n > 0).then_some(log)
     };
     let log = eventually("logged as guided", logged).await;
-    assert_eq!(log["totals"]["landmarks"], serde_json::Value::Null, "none of them was named alone: {log}");
+    assert_eq!(log["totals"]["landmarks"], serde_json::Value::Null, "none has a global name: {log}");
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn among_look_alikes_there_are_hypotheses_and_no_pose_until_one_is_left() {
+async fn look_alikes_give_hypotheses_and_no_pose_until_one_is_left() {
     let params = CorridorParams { posters: 3, pictures: 1, column: false, ..CorridorParams::default() };
     let building = Arc::new(Building::corridor_with(&params, 3));
     let inside = Inside::start(Limits::default()).await;
     inside.maps().create_map(&NewMap::new(MAP)).await.expect("map");
     put_walls(&inside, &building).await;
-    teach(&inside, &building, &ALIKE, 6).await;
+    teach(&inside, &building, &LOOK_ALIKES, 6).await;
     inside.maps().put_robot("r1", MAP).await.expect("robot");
     let options = RobotOptions {
         delivery: Delivery::Every,
@@ -149,7 +149,7 @@ async fn among_look_alikes_there_are_hypotheses_and_no_pose_until_one_is_left() 
         steps.push(step);
     }
     let mut poses = client.poses();
-    let (mut several, mut told, mut left) = (0, false, None);
+    let (mut several, mut checked, mut left) = (0, false, None);
     let mut ahead = steps.iter().step_by(2);
     for step in ahead.by_ref() {
         let answer = ask(&client, &robot.look(step)).await;
@@ -159,12 +159,12 @@ async fn among_look_alikes_there_are_hypotheses_and_no_pose_until_one_is_left() 
             m < 0.8 && rad < 0.5
         };
         several += usize::from(answer.hypotheses.len() >= 2 && answer.hypotheses.iter().any(true_one));
-        if several == 1 && !told {
-            told = true;
-            told_over_http(&inside, &answer).await;
+        if several == 1 && !checked {
+            checked = true;
+            check_hypotheses_over_http(&inside, &answer).await;
         }
         if answer.hypotheses.first().is_some_and(|h| h.probability > 0.95) {
-            // Sure enough, but of a pose only where two different ones say so.
+            // A pose needs observations of two different landmarks.
             if let Ok(Ok(pose)) =
                 tokio::time::timeout(std::time::Duration::from_millis(300), poses.recv()).await
             {
@@ -172,7 +172,7 @@ async fn among_look_alikes_there_are_hypotheses_and_no_pose_until_one_is_left() 
                 break;
             }
         }
-        assert!(poses.try_recv().is_err(), "a pose while several places are left");
+        assert!(poses.try_recv().is_err(), "a pose while several hypotheses are left");
     }
     assert!(several >= 2, "{several} frames with several hypotheses, the true one among them");
     let (step, pose) = left.expect("one is left in the end");

@@ -1,6 +1,6 @@
-//! Claim: the map knows from where its landmarks are seen, tells robots where to look, and finds out that a poster was
-//! moved: it is flagged within five sightings, then quarantined, no other is blamed, and it corrects no pose any more
-//! until somebody decides.
+//! Claim: a poster that was moved is flagged within five observations, then quarantined; no other landmark is
+//! flagged, and it corrects no pose until a person decides. The map has visibility areas of its landmarks and gives
+//! gaze advice.
 
 use client::{
     Capture, Delivery, LandmarkRegion, RobotClient, RobotOptions,
@@ -23,7 +23,7 @@ use tests::{
 };
 
 const MAP: &str = "corridor";
-/// On a side wall; others are passed before it.
+/// On a side wall; the robot passes others before it.
 const MOVED: &str = "poster-3";
 
 async fn teach(inside: &Inside, building: &Arc<Building>) {
@@ -39,7 +39,7 @@ async fn teach(inside: &Inside, building: &Arc<Building>) {
     for poster in building.posters() {
         let mut centre = poster.map_from_landmark.translation.vector;
         if poster.name == MOVED {
-            // Somebody has hung it a metre further since.
+            // It was moved by a metre since.
             centre += poster.map_from_landmark * nalgebra::Vector3::y();
         }
         let outward = poster.map_from_landmark.rotation * nalgebra::Vector3::x();
@@ -55,13 +55,13 @@ async fn teach(inside: &Inside, building: &Arc<Building>) {
     }
     let mut robot = Robot::new(building.clone(), &RobotParams::default());
     for stop in stops(building, &LessonParams { seed: 1, views: 6, ..LessonParams::default() }) {
-        let seen = robot.look(&stop.step);
-        let Some(view) = seen.frame.truth.landmark(&stop.landmark).filter(|v| v.state == ViewState::Full)
+        let readings = robot.look(&stop.step);
+        let Some(view) = readings.frame.truth.landmark(&stop.landmark).filter(|v| v.state == ViewState::Full)
         else {
             continue;
         };
         let corners = LandmarkRegion::Corners(view.corners_px.into());
-        maps.upload_view(MAP, &stop.landmark, jpeg(&seen.frame.image), corners).await.expect("view");
+        maps.upload_view(MAP, &stop.landmark, jpeg(&readings.frame.image), corners).await.expect("view");
     }
     let job = maps.learn(MAP, None, None).await.expect("job");
     maps.wait_for_job(job, 3 * SOON, |_| {}).await.expect("the lesson ends");
@@ -82,25 +82,25 @@ async fn healths(inside: &Inside) -> Vec<(String, String)> {
 async fn health(inside: &Inside) -> String {
     let all = healths(inside).await;
     for (name, health) in &all {
-        assert!(name == MOVED || health == "sound", "{name} is blamed: {all:?}");
+        assert!(name == MOVED || health == "sound", "{name} is not sound: {all:?}");
     }
     all.into_iter().find(|(name, _)| name == MOVED).expect("the poster").1
 }
 
-/// Sends what was seen, with everything a robot knows.
-async fn ask(robot: &RobotClient, seen: &SensorReadings) -> v1::Answer {
+/// Sends a frame with intrinsics, extrinsics and odometry.
+async fn ask(robot: &RobotClient, readings: &SensorReadings) -> v1::Answer {
     let camera = sim::camera::Camera::vga();
-    let capture = Capture::encoded(jpeg(&seen.frame.image))
+    let capture = Capture::encoded(jpeg(&readings.frame.image))
         .expect("a picture")
         .with_intrinsics(camera.intrinsics())
-        .with_mounting(&seen.step.robot_from_camera)
-        .with_odometry(&seen.step.odom_from_robot)
+        .with_mounting(&readings.step.robot_from_camera)
+        .with_odometry(&readings.step.odom_from_robot)
         .with_deadline_ms(60_000);
     robot.recognise("front", capture, SOON).await.expect("an answer")
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_moved_poster_is_found_out_and_where_to_look_is_told() {
+async fn a_moved_poster_is_quarantined_and_gaze_advice_is_given() {
     let inside = Inside::start(Limits::default()).await;
     let building = Arc::new(Building::corridor(3));
     teach(&inside, &building).await;
@@ -112,7 +112,7 @@ async fn a_moved_poster_is_found_out_and_where_to_look_is_told() {
     let client = RobotClient::connect(&options).await.expect("connected");
     gaze(&inside, &client, &building).await;
     let mut robot = Robot::new(building.clone(), &RobotParams::default());
-    let (mut sightings, mut flagged_after) = (0, None);
+    let (mut observations, mut flagged_after) = (0, None);
     let mut others = std::collections::BTreeSet::new();
     let mut used_after_quarantine = 0;
     let mut steps = Vec::new();
@@ -120,18 +120,18 @@ async fn a_moved_poster_is_found_out_and_where_to_look_is_told() {
         steps.push(step);
     }
     for step in steps.iter().step_by(2) {
-        let seen = robot.look(step);
+        let readings = robot.look(step);
         let before = health(&inside).await;
-        let answer = ask(&client, &seen).await;
+        let answer = ask(&client, &readings).await;
         let named = answer
             .quads
             .iter()
             .any(|q| q.verdict() == Verdict::Unique && q.landmark == MOVED && q.pose.is_some());
-        // By one other alone it could be either: it is counted from when the pose rests on two.
-        sightings += u32::from(named && flagged_after.is_none() && others.len() >= 2);
+        // With one other landmark either could have moved: counted from when two others support the pose.
+        observations += u32::from(named && flagged_after.is_none() && others.len() >= 2);
         others.extend(answer.pose_landmarks.iter().filter(|l| *l != MOVED).cloned());
         if flagged_after.is_none() && health(&inside).await != "sound" {
-            flagged_after = Some(sightings);
+            flagged_after = Some(observations);
         }
         if before == "quarantined" {
             used_after_quarantine += usize::from(answer.pose_landmarks.iter().any(|l| l == MOVED));
@@ -146,14 +146,14 @@ async fn a_moved_poster_is_found_out_and_where_to_look_is_told() {
     inside.server.stop().await;
 }
 
-/// What the administrator reads and does.
+/// The finding over HTTP, and a person's decision.
 async fn decision(inside: &Inside, building: &Building) {
     let path = format!("/maps/{MAP}/landmarks/{MOVED}");
     let (_, landmark) = call(inside, Method::GET, &path, None).await;
     assert_eq!(landmark["finding"]["kind"], "moved", "{landmark}");
     let offset_m = landmark["finding"]["offset_m"].as_f64().expect("as promised");
     assert!((offset_m - 1.0).abs() < 0.25, "{landmark}");
-    // Put at the place where it really hangs it is trusted again.
+    // At its true place it is sound again.
     let truth = building.landmark(MOVED).expect("the poster");
     let (at, out) =
         (truth.map_from_landmark.translation.vector, truth.map_from_landmark * nalgebra::Vector3::x());
@@ -175,15 +175,15 @@ async fn areas_and_coverage(inside: &Inside, building: &Building) {
     let (status, area) = call(inside, Method::GET, &path, None).await;
     assert_eq!((status, &area["geometry"]["type"]), (StatusCode::OK, &json!("MultiPolygon")));
     assert!(area["properties"]["area_m2"].as_f64().expect("as promised") > 1.0, "{area}");
-    // Straight before it, 1.6 m from the wall, in the corridor; and behind its wall.
+    // In front of it, 1.6 m from the wall; and behind its wall.
     let at = |ahead: f64| poster.map_from_landmark * nalgebra::Point3::new(ahead, 0.0, 0.0);
     for (ahead, expected) in [(1.6, true), (-1.6, false)] {
         let pose = json!({ "x_m": at(ahead).x, "y_m": at(ahead).y, "theta_rad": 0.0 });
-        let (_, seen) =
+        let (_, visible) =
             call(inside, Method::POST, &format!("/maps/{MAP}/visible"), Some(json!({ "pose": pose }))).await;
         let names: Vec<_> =
-            seen["landmarks"].as_array().expect("as promised").iter().map(|l| &l["landmark"]).collect();
-        assert_eq!(names.contains(&&json!("poster-0")), expected, "{seen}");
+            visible["landmarks"].as_array().expect("as promised").iter().map(|l| &l["landmark"]).collect();
+        assert_eq!(names.contains(&&json!("poster-0")), expected, "{visible}");
     }
     let walk = json!({ "path": [[1.2, 0.0], [23.8, 0.0]], "step_m": 0.2 });
     let (status, cover) = call(inside, Method::POST, &format!("/maps/{MAP}/coverage"), Some(walk)).await;
@@ -232,15 +232,15 @@ async fn gaze(inside: &Inside, client: &RobotClient, building: &Building) {
         }),
         ..v1::GazeRequest::default()
     };
-    let told = client.gaze(&request, SOON).await.expect("advice");
+    let advised = client.gaze(&request, SOON).await.expect("advice");
     assert_eq!(
-        (told.action(), told.landmark.as_str(), told.map.as_str()),
+        (advised.action(), advised.landmark.as_str(), advised.map.as_str()),
         (GazeAction::Landmark, "poster-0", MAP)
     );
-    assert!((told.pan_rad - best["pan_rad"].as_f64().expect("as promised")).abs() < 1e-9);
+    assert!((advised.pan_rad - best["pan_rad"].as_f64().expect("as promised")).abs() < 1e-9);
     let to = poster.map_from_landmark.translation.vector;
     let bearing = (to.y - at.y).atan2(to.x - at.x);
-    assert!((told.pan_rad - bearing).abs() < 0.01, "{} for {bearing}", told.pan_rad);
+    assert!((advised.pan_rad - bearing).abs() < 0.01, "{} for {bearing}", advised.pan_rad);
     let nothing_known = client.gaze(&v1::GazeRequest::default(), SOON).await.expect("advice");
     assert_eq!(nothing_known.rejection.expect("refused").field, "map_from_robot");
 }

@@ -1,5 +1,5 @@
-//! Claim: killing the server at any moment and starting it again loses nothing that was acknowledged, repeats nothing,
-//! and leaves a database in order (the server checks that at each start and would refuse).
+//! Claim: killing and restarting the server at any time loses no acknowledged change, repeats none, and leaves a
+//! consistent database (the server checks it at each start).
 
 use client::{
     ClientError, LandmarkRegion, MapClient,
@@ -19,7 +19,7 @@ use tests::{Child, eventually, pictures};
 const KILLS: u64 = 20;
 const MAP: &str = "hall";
 
-/// What the server has confirmed.
+/// Changes that the server has confirmed.
 #[derive(Debug, Default, Clone)]
 struct Journal {
     /// Landmarks with the numbers of their confirmed views.
@@ -62,7 +62,7 @@ async fn views_of(server: &Child, landmark: &str) -> Vec<i64> {
     page["items"].as_array().expect("items").iter().map(|v| v["id"].as_i64().expect("a number")).collect()
 }
 
-/// Everything confirmed is there, once, and nothing is there that was never asked for.
+/// Every confirmed change is stored once, and nothing else is stored.
 async fn check(server: &Child, journal: &Journal, attempted: u64) {
     let maps = server.maps();
     let there: Vec<String> =
@@ -86,7 +86,7 @@ async fn check(server: &Child, journal: &Journal, attempted: u64) {
     assert!(maps.map(MAP).await.expect("map").version >= journal.version, "the version went back");
 }
 
-/// Whether enough was confirmed since the last kill for the next one to mean something, however slow the machine is.
+/// Whether enough was confirmed since the last kill for the next one to be a test, on a machine of any speed.
 fn is_enough(kill: u64, before: &Journal, now: &Journal) -> bool {
     let has_job = kill % 4 != 3 || now.jobs.len() > before.jobs.len();
     has_job && now.landmarks.len() >= before.landmarks.len() + 2
@@ -108,7 +108,7 @@ async fn nothing_acknowledged_is_lost_by_a_kill() {
             is_enough(kill, &confirmed, &journal.lock().expect("journal")).then_some(())
         })
         .await;
-        // The kills are spread over everything that teaching does.
+        // The kills are spread over all steps of teaching.
         tokio::time::sleep(Duration::from_millis(37 * kill % 100)).await;
         server.kill();
         for teacher in teachers {
@@ -124,7 +124,7 @@ async fn nothing_acknowledged_is_lost_by_a_kill() {
         journal.landmarks.len() as u64 > KILLS && journal.jobs.len() > 3,
         "too little was taught: {journal:?}"
     );
-    // Jobs that a kill interrupted were resumed: every accepted lesson ends, and its landmark has a model.
+    // Interrupted jobs were resumed: every accepted lesson ends, and its landmark has a model.
     for (job, name) in &journal.jobs {
         let maps = server.maps();
         let state = eventually("the job ends", || async {

@@ -1,6 +1,5 @@
-//! Claim: a site of several maps keeps its order: each says where it belongs and where it lies in another, a pose on one
-//! floor can be said in the frame of another, no map lies in itself; and the plan of a building as GeoJSON becomes the
-//! walls of a map on a running server, by the command line.
+//! Claim: maps have locations and links: a pose on one floor can be transformed to another map, links have no
+//! cycles; and the command line imports a building plan in GeoJSON as the walls of a map on a running server.
 
 use client::{
     LandmarkRegion, MapClient,
@@ -49,7 +48,7 @@ async fn house(url: &str) {
     }
 }
 
-/// Each is named and changes nothing.
+/// Each has its code and field and changes nothing.
 async fn refusals(url: &str) {
     for (method, path, body, status, code, field) in [
         (Method::GET, "/maps/upper/transform?to=elsewhere", None, 409, "not_related", "to"),
@@ -110,7 +109,7 @@ async fn refusals(url: &str) {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn maps_lie_in_maps_and_poses_go_between_them() {
+async fn poses_are_transformed_between_linked_maps() {
     let inside = Inside::start(Limits::default()).await;
     let url = inside.url();
     house(&url).await;
@@ -127,7 +126,8 @@ async fn maps_lie_in_maps_and_poses_go_between_them() {
     );
     assert!((number(&found["level_m"]) - 3.0).abs() < 1e-9);
     assert_eq!(found["via"], json!(["upper", "house", "ground"]));
-    // Both floors' links make it unsure (the ground's is a tape's), and a metre away the turn does, too.
+    // Both floors' links add uncertainty (the ground's by the default for a tape), and over a metre the turn does,
+    // too.
     let variance = number(&found["pose"]["covariance"][0]);
     assert!((variance - (0.01 + 0.0025 + 0.0001 + 0.0087 * 0.0087)).abs() < 1e-6, "{found}");
     let back = maps
@@ -136,7 +136,7 @@ async fn maps_lie_in_maps_and_poses_go_between_them() {
         .expect("the way back");
     assert!((back.to_from_map.theta_rad + std::f64::consts::FRAC_PI_2).abs() < 1e-9);
     refusals(&url).await;
-    // What is not named stays, null forgets; then the house may go.
+    // Absent fields do not change, null deletes; then the house may be deleted.
     let (_, upper) =
         call(&url, Method::PATCH, "/maps/upper", Some(json!({ "site": "x".repeat(64), "parent": null })))
             .await;
@@ -165,17 +165,17 @@ async fn a_near_duplicate_view_is_answered_and_not_stored() {
         |right: f64| LandmarkRegion::Corners([[20.0, 20.0], [right, 20.0], [right, 140.0], [20.0, 140.0]]);
     let first = maps.upload_view("hall", "p1", picture(0), corners(180.0)).await.expect("view");
     let same = maps.upload_view("hall", "p1", picture(0), corners(180.0)).await.expect("view");
-    let alike = maps.upload_view("hall", "p1", picture(2), corners(180.5)).await.expect("view");
+    let near_duplicate = maps.upload_view("hall", "p1", picture(2), corners(180.5)).await.expect("view");
     let other = maps.upload_view("hall", "p1", picture(0), corners(150.0)).await.expect("view");
-    let said: Vec<_> = [&first, &same, &alike, &other].iter().map(|v| v.outcome).collect();
+    let outcomes: Vec<_> = [&first, &same, &near_duplicate, &other].iter().map(|v| v.outcome).collect();
     let expected = [
         UploadOutcomeBody::New,
         UploadOutcomeBody::Duplicate,
         UploadOutcomeBody::NearDuplicate,
         UploadOutcomeBody::New,
     ];
-    assert_eq!(said, expected.map(Some));
-    assert!(alike.id == first.id && same.id == first.id && other.id != first.id);
+    assert_eq!(outcomes, expected.map(Some));
+    assert!(near_duplicate.id == first.id && same.id == first.id && other.id != first.id);
     assert_eq!(maps.landmark("hall", "p1").await.expect("landmark").views, 2);
     inside.server.stop().await;
 }
@@ -207,7 +207,7 @@ async fn a_plan_becomes_the_walls_of_a_map_on_a_server() {
     let walls = server.maps().walls("hall").await.expect("walls");
     assert_eq!(walls.segments.len(), 9, "{walls:?}");
     assert_eq!(walls.segments[0], WallBody { a: [0.0, 0.0], b: [12.0, 0.0] }, "{walls:?}");
-    // A landmark on a wall of the plan is seen from inside the hall, not through the column.
+    // A landmark on a wall of the plan is visible from inside the hall, not through the column.
     let (_, made) = call(
         &server.url,
         Method::POST,
@@ -218,16 +218,16 @@ async fn a_plan_becomes_the_walls_of_a_map_on_a_server() {
     )
     .await;
     assert_eq!(made["name"], "poster", "{made}");
-    for (x, y, seen) in [(5.5, 3.6, true), (5.5, 1.5, false), (5.5, 6.5, false)] {
+    for (x, y, is_visible) in [(5.5, 3.6, true), (5.5, 1.5, false), (5.5, 6.5, false)] {
         let pose = json!({ "pose": { "x_m": x, "y_m": y, "theta_rad": 0 } });
         let (_, visible) = call(&server.url, Method::POST, "/maps/hall/visible", Some(pose)).await;
         assert_eq!(
             visible["landmarks"].as_array().is_some_and(|l| !l.is_empty()),
-            seen,
+            is_visible,
             "{x} {y}: {visible}"
         );
     }
-    // What is no plan is refused and changes nothing.
+    // An invalid plan is refused and changes nothing.
     let bad = data.path().join("bad.geojson");
     fs::write(&bad, r#"{"type":"Polygon","coordinates":[[[0,0],[1,0],[1,1]]]}"#).expect("written");
     let refused = waymark(

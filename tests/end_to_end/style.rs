@@ -1,4 +1,4 @@
-//! Claim: code and documents keep what of docs/STYLE.md a program can check.
+//! Claim: code and documents keep the rules of docs/STYLE.md that a program can check.
 
 use std::{
     fs,
@@ -12,7 +12,7 @@ const CRATES: [&str; 10] =
 const MAX_FILE_LINES: usize = 400;
 /// Files that a program writes.
 const GENERATED: [&str; 1] = ["protos/src/generated.rs"];
-/// Names that tell how a thing is looked at or believed, not what it is.
+/// Names that say how something is perceived or believed, not what it is.
 const AMBIGUOUS: [&str; 15] = [
     "Seen", "Look", "Looked", "Glance", "Glimpse", "Told", "Laid", "Grounds", "Found", "Left", "Eye", "Kept",
     "Judged", "Doubles", "Sighted",
@@ -20,7 +20,7 @@ const AMBIGUOUS: [&str; 15] = [
 /// Longest cell of a table and longest line of prose, in characters.
 const MAX_CELL: usize = 300;
 const MAX_LINE: usize = 120;
-/// What belongs to docs/results, if anywhere.
+/// Words of history, which belongs to docs/results.
 const HISTORY: [&str; 5] = ["not kept", "builds before", "the stop before", "asked were", "(issue"];
 
 fn root() -> PathBuf {

@@ -1,5 +1,6 @@
-//! Claim: posters taught over HTTP from a first round through a building are recognised over zenoh from other places,
-//! never one for another, and tell where the robot is; in another building with other posters nothing is recognised.
+//! Claim: posters taught over HTTP from a first round through a building are recognised over zenoh from other
+//! viewpoints, never one as another, and give the robot's pose; in another building with other posters nothing is
+//! recognised.
 
 use client::{
     Capture, Delivery, LandmarkRegion, RobotClient, RobotOptions,
@@ -19,15 +20,15 @@ use vision::geometry::polygon::iou;
 
 const MAP: &str = "corridor";
 
-/// Pictures of every poster, from places that `seed` chooses.
+/// Readings in front of every poster, from viewpoints drawn from `seed`.
 fn round(building: &Arc<Building>, seed: u64, views: usize) -> Vec<(Stop, SensorReadings)> {
     let mut robot = Robot::new(building.clone(), &RobotParams::default());
     let stops = stops(building, &LessonParams { seed, views, ..LessonParams::default() });
     stops
         .into_iter()
         .map(|stop| {
-            let seen = robot.look(&stop.step);
-            (stop, seen)
+            let readings = robot.look(&stop.step);
+            (stop, readings)
         })
         .collect()
 }
@@ -48,13 +49,13 @@ async fn teach(inside: &Inside, building: &Arc<Building>) {
         let size = Size { width_m: poster.width_m, height_m: poster.height_m };
         maps.add_landmark(MAP, &poster.name, Some(size), Some(place)).await.expect("landmark");
     }
-    for (stop, seen) in round(building, 1, 8) {
-        let Some(view) = seen.frame.truth.landmark(&stop.landmark).filter(|v| v.state == ViewState::Full)
+    for (stop, readings) in round(building, 1, 8) {
+        let Some(view) = readings.frame.truth.landmark(&stop.landmark).filter(|v| v.state == ViewState::Full)
         else {
             continue;
         };
         let corners = LandmarkRegion::Corners(view.corners_px.into());
-        maps.upload_view(MAP, &stop.landmark, jpeg(&seen.frame.image), corners).await.expect("view");
+        maps.upload_view(MAP, &stop.landmark, jpeg(&readings.frame.image), corners).await.expect("view");
     }
     let job = maps.learn(MAP, None, None).await.expect("job");
     let job = maps.wait_for_job(job, 3 * SOON, |_| {}).await.expect("the lesson ends");
@@ -63,13 +64,13 @@ async fn teach(inside: &Inside, building: &Arc<Building>) {
     assert!(active >= 5, "{active} of {} active: {:?}", landmarks.len(), job.result);
 }
 
-/// Sends what was seen, with everything a robot knows, and returns the answer.
-async fn ask(robot: &RobotClient, seen: &SensorReadings) -> v1::Answer {
+/// Sends a frame with intrinsics, extrinsics and odometry; returns the answer.
+async fn ask(robot: &RobotClient, readings: &SensorReadings) -> v1::Answer {
     let camera = sim::camera::Camera::vga();
-    let capture = Capture::encoded(jpeg(&seen.frame.image))
+    let capture = Capture::encoded(jpeg(&readings.frame.image))
         .expect("a picture")
         .with_intrinsics(camera.intrinsics())
-        .with_mounting(&seen.step.robot_from_camera)
+        .with_mounting(&readings.step.robot_from_camera)
         .with_deadline_ms(60_000);
     robot.recognise("front", capture, SOON).await.expect("an answer")
 }
@@ -92,14 +93,14 @@ async fn posters_taught_over_http_are_recognised_over_zenoh() {
     let robot = connect(&inside).await;
 
     let (mut asked, mut right, mut wrong, mut errors_m) = (0, 0, Vec::new(), Vec::new());
-    for (stop, seen) in round(&building, 2, 4) {
-        let answer = ask(&robot, &seen).await;
-        let truth = &seen.frame.truth;
+    for (stop, readings) in round(&building, 2, 4) {
+        let answer = ask(&robot, &readings).await;
+        let truth = &readings.frame.truth;
         asked += usize::from(truth.landmark(&stop.landmark).is_some_and(|v| v.state == ViewState::Full));
         for quad in answer.quads.iter().filter(|q| q.verdict() == Verdict::Unique) {
             let corners: Vec<_> =
                 quad.corners.iter().map(|c| nalgebra::Point2::new(c.u_px, c.v_px)).collect();
-            // Which landmark of the building truly is there.
+            // The landmark of the building that is there by the truth.
             let there = truth.landmarks.iter().find(|l| iou(&corners, l.corners_px.points()) > 0.5);
             match there {
                 Some(l) if l.name == quad.landmark => right += usize::from(l.name == stop.landmark),
@@ -107,12 +108,12 @@ async fn posters_taught_over_http_are_recognised_over_zenoh() {
             }
         }
         if let Some(found) = answer.map_from_robot.as_ref().and_then(|p| p.pose.as_ref()) {
-            let truth = seen.step.map_from_robot;
+            let truth = readings.step.map_from_robot;
             errors_m.push((found.x_m - truth.x_m).hypot(found.y_m - truth.y_m));
             assert!(!answer.pose_landmarks.is_empty());
         }
     }
-    assert!(wrong.is_empty(), "taken for another: {wrong:?}");
+    assert!(wrong.is_empty(), "named as another: {wrong:?}");
     assert!(asked >= 15, "only {asked} pictures with a whole poster");
     assert!(10 * right >= 7 * asked, "{right} of {asked} recognised");
     assert!(2 * errors_m.len() >= right, "{} poses from {right} recognitions", errors_m.len());
@@ -121,8 +122,8 @@ async fn posters_taught_over_http_are_recognised_over_zenoh() {
     assert!(median < 0.15 && worst < 1.0, "position error: median {median} m, worst {worst} m");
 
     let elsewhere = Arc::new(Building::corridor(12));
-    for (_, seen) in round(&elsewhere, 3, 4) {
-        let answer = ask(&robot, &seen).await;
+    for (_, readings) in round(&elsewhere, 3, 4) {
+        let answer = ask(&robot, &readings).await;
         let matched: Vec<_> = answer.quads.iter().filter(|q| q.verdict() == Verdict::Unique).collect();
         assert!(matched.is_empty(), "recognised in another building: {matched:?}");
         assert!(answer.map_from_robot.is_none());

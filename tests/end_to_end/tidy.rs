@@ -1,16 +1,13 @@
-//! What the documents name is there: files, tests, types and constants. What comments cite of the method is there, too.
+//! Claim: files, tests, types and constants named in documents exist, and so do the sections cited in comments.
 
-use std::{
-    collections::BTreeSet,
-    fs,
-    path::{Path, PathBuf},
-};
+use std::{collections::BTreeSet, fs, path::PathBuf};
+use tests::documents::{documents, markdown, root};
 
-/// Ends of the paths that are looked at.
+/// Ends of the paths that are checked.
 const ENDINGS: [&str; 4] = [".rs", ".md", ".sql", ".proto"];
 /// End of the path of a document.
 const DOCUMENT: &str = ".md";
-/// Folders with code and text of this project; those that are not there are passed over.
+/// Folders with code and text of this project; missing ones are skipped.
 const FOLDERS: [&str; 12] = [
     "client",
     "engine",
@@ -25,27 +22,6 @@ const FOLDERS: [&str; 12] = [
     "vision",
     "fuzz/fuzz_targets",
 ];
-
-fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
-}
-
-/// The Markdown files of a folder, by name.
-fn markdown(folder: &str) -> Vec<PathBuf> {
-    let entries = fs::read_dir(root().join(folder)).expect("a folder of documents");
-    let mut found: Vec<PathBuf> = entries.map(|e| e.expect("an entry of a folder").path()).collect();
-    found.retain(|path| path.extension().is_some_and(|e| e == "md"));
-    found.sort();
-    found
-}
-
-/// README.md, docs/*.md and docs/method/*.md.
-fn documents() -> Vec<PathBuf> {
-    let mut found = vec![root().join("README.md")];
-    found.extend(markdown("docs"));
-    found.extend(markdown("docs/method"));
-    found
-}
 
 /// The pages of the method in one text.
 fn method() -> String {
@@ -83,12 +59,12 @@ fn declared<'a>(sources: &'a str, keyword: &str) -> BTreeSet<&'a str> {
     sources.split(keyword).skip(1).filter_map(name).collect()
 }
 
-/// What stands between single backticks, by line.
+/// Texts between single backticks, by line.
 fn quoted(text: &str) -> impl Iterator<Item = &str> {
     text.lines().filter(|line| !line.starts_with("```")).flat_map(|line| line.split('`').skip(1).step_by(2))
 }
 
-/// Paths with a folder between single backticks; one name alone may stand for many files, `*` does.
+/// Paths with a folder between single backticks. A file name alone may mean several files, and `*` does.
 fn paths(text: &str) -> BTreeSet<&str> {
     let is_path = |word: &&str| {
         word.contains('/') && !word.contains([' ', '*']) && ENDINGS.iter().any(|end| word.ends_with(end))
@@ -97,7 +73,7 @@ fn paths(text: &str) -> BTreeSet<&str> {
 }
 
 #[test]
-fn paths_are_told_from_other_words() {
+fn paths_are_distinguished_from_other_words() {
     let text = "`map/src/lines.rs` and `a::b`, `x.rs`, `docs/*.md`, map/src/no.rs\n`sim/a.md` `b c/d.rs`";
     assert_eq!(paths(text).into_iter().collect::<Vec<_>>(), ["map/src/lines.rs", "sim/a.md"]);
 }
@@ -158,7 +134,7 @@ fn parameters_and_constants_named_in_the_method_exist() {
     assert!(named > 100, "only {named} names found: the pages are no longer read");
 }
 
-/// What pages and their tables define: section numbers of headings, labels of rows (`A10`, `E9`).
+/// Section numbers of headings and labels of table rows (`A10`, `E9`).
 fn sections(method: &str) -> BTreeSet<&str> {
     let headings = method.lines().filter_map(|line| line.trim_start_matches('#').strip_prefix(' '));
     let numbers = headings.filter_map(|title| title.split(' ').next()).filter(|word| is_number(word));
@@ -200,8 +176,8 @@ fn bare(word: &str) -> &str {
     word.trim_end_matches([')', '`', '"', ']', ',', '.', ':', ';'])
 }
 
-/// What comments cite of the method, with the number of the line: `method 3.6`, `method 17.1 to 17.3`, `section 6.3`,
-/// the labels `A10` and `E9`, and documents by their path.
+/// Citations of the method in comments, with the number of the line: `method 3.6`, `method 17.1 to 17.3`, `section
+/// 6.3`, the labels `A10` and `E9`, and documents by their path.
 fn citations(text: &str) -> Vec<(usize, &str)> {
     let words = comment_words(text);
     let trimmed = |i: usize| words.get(i).map(|(line, word)| (*line, bare(word)));
@@ -231,7 +207,7 @@ fn citations(text: &str) -> Vec<(usize, &str)> {
 }
 
 #[test]
-fn citations_are_told_from_other_words() {
+fn citations_are_distinguished_from_other_words() {
     let text = [
         "/// Departs from method 3.6, 13.4: see the",
         "/// method",

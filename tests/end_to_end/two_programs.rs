@@ -1,6 +1,6 @@
-//! Claim: while a program speaks for a robot, another one under the same name is refused with a code of its own and shown
-//! by the API; the first goes on undisturbed. When it ends, the next is admitted: at once if it left in order, and within
-//! the named time if it was killed.
+//! Claim: while a program runs under a robot's name, another one under the same name is refused with its own code
+//! and shown by the API; the first is not affected. When the first ends, the next is admitted: at once after an
+//! orderly end, within the stated time after a kill.
 
 use client::{Capture, RobotClient, api::NewMap, v1};
 use engine::epochs::MESSAGE_LIVE;
@@ -24,7 +24,7 @@ async fn started() -> Inside {
     inside
 }
 
-/// Fault F3. Before, the first frame of the second program locked the first one out for good (`not_newer`, `epoch`).
+/// A frame of the second program must not lock out the first one.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_second_program_is_refused_until_the_first_ends() {
     let inside = started().await;
@@ -38,14 +38,14 @@ async fn a_second_program_is_refused_until_the_first_ends() {
     for _ in 0..3 {
         let answer = ask(&second).await;
         assert_eq!((answer.status(), code(&answer)), (v1::Status::Rejected, "epoch_conflict"), "{answer:?}");
-        assert_eq!(ask(&first).await.status(), v1::Status::NoMatch, "the first goes on");
+        assert_eq!(ask(&first).await.status(), v1::Status::NoMatch, "the first is still served");
     }
     let shown = maps.robot("r1").await.expect("the robot");
     assert_eq!((shown.alive, shown.epoch), (true, Some(first.epoch())));
     let conflict = shown.conflict.expect("a conflict");
     assert_eq!((conflict.epoch, conflict.refused), (second.epoch(), 3));
 
-    // Silent but connected it is still the robot.
+    // A silent but connected program keeps the name.
     tokio::time::sleep(MESSAGE_LIVE + Duration::from_millis(200)).await;
     assert_eq!(code(&ask(&second).await), "epoch_conflict");
 
@@ -60,9 +60,9 @@ async fn a_second_program_is_refused_until_the_first_ends() {
     inside.server.stop().await;
 }
 
-/// A program that is gone without a word: its session is dropped, as the system does with one that is killed.
+/// The session is dropped without an orderly end, as of a killed program.
 #[tokio::test(flavor = "multi_thread")]
-async fn a_robot_that_is_started_again_waits_no_longer_than_the_named_time() {
+async fn a_restarted_robot_waits_no_longer_than_the_stated_time() {
     let inside = started().await;
     let endpoint = &inside.server.zenoh_endpoint;
     for _ in 0..3 {
@@ -76,9 +76,9 @@ async fn a_robot_that_is_started_again_waits_no_longer_than_the_named_time() {
     inside.server.stop().await;
 }
 
-/// Eight made-up cameras of the robot itself do not keep its real one out.
+/// Eight invented camera names of the robot do not block its real camera.
 #[tokio::test(flavor = "multi_thread")]
-async fn a_camera_is_served_after_made_up_ones() {
+async fn a_camera_is_served_after_invented_ones() {
     let inside = started().await;
     let robot = connect(&inside.server.zenoh_endpoint, "r1").await;
     let send = async |camera: &str| {

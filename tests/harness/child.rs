@@ -12,9 +12,9 @@ use std::{
 #[derive(Debug)]
 pub struct Child {
     process: std::process::Child,
-    /// Base of its HTTP addresses, without a slash at the end.
+    /// Base URL, without a slash at the end.
     pub url: String,
-    /// Where robots connect.
+    /// Its zenoh endpoint.
     pub zenoh: String,
 }
 
@@ -46,7 +46,7 @@ impl Child {
         Self { process, url, zenoh }
     }
 
-    /// A client of it.
+    /// A client of this server.
     pub fn maps(&self) -> MapClient {
         MapClient::new(&self.url).expect("a client")
     }
@@ -66,7 +66,7 @@ impl Drop for Child {
     }
 }
 
-/// The program, built as the tests are: cargo does not build another package's program for a test by itself.
+/// The program, built with the profile of the tests: cargo does not build another package's program for a test.
 pub(crate) fn program() -> &'static Path {
     static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
     PROGRAM.get_or_init(|| {

@@ -1,4 +1,4 @@
-//! One run of the real program: arguments in, status and what it printed out. A run that does not end is killed.
+//! One run of the real program: arguments in, status and output out. A run that does not end is killed.
 
 use serde_json::Value;
 use std::{
@@ -11,7 +11,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// What a run came to.
+/// Result of a run.
 #[derive(Debug)]
 pub struct Run {
     /// Exit status.
@@ -43,9 +43,9 @@ pub fn waymark<A: AsRef<OsStr>>(args: impl IntoIterator<Item = A>, longest: Dura
     run(program(), args, longest)
 }
 
-/// Checks that the help of every command (`COMMAND` or `COMMAND SUBCOMMAND`, with the options it must name) exists, and that
-/// `--help` of every command works.
-pub fn check_help(program: &Path, options: &[(&str, &[&str])], longest: Duration) {
+/// The help texts of a program by command (`COMMAND` or `COMMAND SUBCOMMAND`; empty for the program itself). Checks
+/// that `--help` of every command works.
+pub fn helps(program: &Path, longest: Duration) -> BTreeMap<String, String> {
     let (mut open, mut helps) = (vec![String::new()], BTreeMap::new());
     while let Some(command) = open.pop() {
         let run = run(program, command.split_whitespace().chain(["--help"]), longest);
@@ -53,6 +53,12 @@ pub fn check_help(program: &Path, options: &[(&str, &[&str])], longest: Duration
         open.extend(listed(&run.stdout).iter().map(|name| format!("{command} {name}").trim().to_owned()));
         helps.insert(command, run.stdout);
     }
+    helps
+}
+
+/// Checks that the help of every command exists and names its options.
+pub fn check_help(program: &Path, options: &[(&str, &[&str])], longest: Duration) {
+    let helps = helps(program, longest);
     for (command, options) in options {
         let help = helps.get(*command).unwrap_or_else(|| panic!("`{command}` is not listed: {helps:#?}"));
         for option in *options {
@@ -89,7 +95,7 @@ pub fn program() -> &'static Path {
 pub fn run<A: AsRef<OsStr>>(program: &Path, args: impl IntoIterator<Item = A>, longest: Duration) -> Run {
     let mut command = Command::new(program);
     command.args(args).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
-    // Only the program's own settings: what the tests' caller has set must not change a claim.
+    // Removes settings of the tests' caller, which must not change a claim.
     for name in ["WAYMARK_LOG", "WAYMARK_SERVER", "WAYMARK_CONFIG", "WAYMARK_DATA"] {
         command.env_remove(name);
     }
@@ -115,7 +121,7 @@ pub fn run<A: AsRef<OsStr>>(program: &Path, args: impl IntoIterator<Item = A>, l
     }
 }
 
-/// Reads to the end beside the run: a full pipe would hold it up.
+/// Reads to the end in a thread: a full pipe would block the program.
 fn drain(mut pipe: impl Read + Send + 'static) -> thread::JoinHandle<String> {
     thread::spawn(move || {
         let mut text = String::new();

@@ -1,8 +1,9 @@
-//! Waymark as a box for the end-to-end tests: the real program as a child process that can be killed, a server inside
-//! the test where that is enough, pictures to send. What is claimed is in `end_to_end/`, one file a claim.
+//! Harness of the end-to-end tests: the real program as a child process that can be killed, a server inside the
+//! test process, pictures to send. The claims are in `end_to_end/`, one a file.
 
 mod child;
 pub mod command;
+pub mod documents;
 pub mod pictures;
 pub mod robots;
 pub mod scenes;
@@ -17,7 +18,7 @@ use server::{
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
-/// Longest wait for something that should happen at once: long, because machines that check are busy.
+/// Longest wait for something that should happen at once: long, for busy machines.
 pub const SOON: Duration = Duration::from_mins(1);
 
 /// A server inside the test, on free ports, with its own data directory.
@@ -44,18 +45,18 @@ impl Inside {
         Self { server, _data: data }
     }
 
-    /// Base of its addresses, without a slash at the end.
+    /// Base URL, without a slash at the end.
     pub fn url(&self) -> String {
         format!("http://{}", self.server.http_addr)
     }
 
-    /// A client of it.
+    /// A client of this server.
     pub fn maps(&self) -> MapClient {
         MapClient::new(&self.url()).expect("a client")
     }
 }
 
-/// Asks again until `ready` says something, at most [`SOON`].
+/// Polls until `ready` returns a value, at most [`SOON`].
 pub async fn eventually<T, F: Future<Output = Option<T>>>(what: &str, mut ready: impl FnMut() -> F) -> T {
     let started = Instant::now();
     loop {

@@ -6,7 +6,7 @@ use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 pub fn blocks(seed: u64, width: usize, height: usize) -> Vec<u8> {
     let block = 12;
     let level = |x: usize, y: usize| {
-        // splitmix64 of the block's place.
+        // splitmix64 of the block's index.
         let mut z =
             seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(((x / block) * 1_009 + y / block) as u64);
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

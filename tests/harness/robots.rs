@@ -1,4 +1,4 @@
-//! A simulated robot against a server: its building as a map, its landmarks taught, what it measures as messages.
+//! A simulated robot against a server: its building as a map, its landmarks taught, its readings as messages.
 
 use crate::{Inside, SOON, eventually};
 use client::{
@@ -76,11 +76,11 @@ pub async fn teach(inside: &Inside, building: &Arc<Building>, names: &[&str], vi
         if !names.contains(&stop.landmark.as_str()) {
             continue;
         }
-        let seen = robot.look(&stop.step);
-        let view = seen.frame.truth.landmark(&stop.landmark).filter(|v| v.state == ViewState::Full);
+        let readings = robot.look(&stop.step);
+        let view = readings.frame.truth.landmark(&stop.landmark).filter(|v| v.state == ViewState::Full);
         if let Some(view) = view {
             let corners = LandmarkRegion::Corners(view.corners_px.into());
-            let view = maps.upload_view(MAP, &stop.landmark, jpeg(&seen.frame.image), corners).await;
+            let view = maps.upload_view(MAP, &stop.landmark, jpeg(&readings.frame.image), corners).await;
             view.expect("view");
         }
     }
@@ -88,19 +88,19 @@ pub async fn teach(inside: &Inside, building: &Arc<Building>, names: &[&str], vi
     maps.wait_for_job(job, 3 * SOON, |_| {}).await.expect("the lesson ends");
 }
 
-/// Connects as a robot; what it sends is never dropped on the way.
+/// Connects as a robot; its messages are not dropped on a full link.
 pub async fn connect(endpoint: &str, robot: &str) -> RobotClient {
     let options = RobotOptions { delivery: Delivery::Every, ..RobotOptions::new(endpoint, "default", robot) };
     RobotClient::connect(&options).await.expect("connected")
 }
 
-/// What was seen, with everything a robot knows.
-pub fn capture(seen: &SensorReadings) -> Capture {
-    Capture::encoded(jpeg(&seen.frame.image))
+/// A frame with intrinsics, extrinsics and odometry.
+pub fn capture(readings: &SensorReadings) -> Capture {
+    Capture::encoded(jpeg(&readings.frame.image))
         .expect("a picture")
         .with_intrinsics(sim::camera::Camera::vga().intrinsics())
-        .with_mounting(&seen.step.robot_from_camera)
-        .with_odometry(&seen.step.odom_from_robot)
+        .with_mounting(&readings.step.robot_from_camera)
+        .with_odometry(&readings.step.odom_from_robot)
         .with_deadline_ms(60_000)
 }
 
@@ -115,28 +115,28 @@ pub async fn find_itself(
     let near = LessonParams { seed: 9, views: 12, ..LessonParams::default() };
     let stops: Vec<_> = stops(building, &near).into_iter().filter(|s| s.landmark == "poster-0").collect();
     for stop in &stops {
-        let seen = robot.look(&stop.step);
-        let answer = client.recognise("front", capture(&seen), SOON).await.expect("an answer");
+        let readings = robot.look(&stop.step);
+        let answer = client.recognise("front", capture(&readings), SOON).await.expect("an answer");
         if answer.map_from_robot.is_some() {
             let started = || async {
                 let path = format!("/robots/{name}/corrections");
                 let (_, log) = call(inside, Method::GET, &path, None).await;
                 (log["totals"]["landmarks"]["started"] == 1).then_some(())
             };
-            // The answer goes out before the pose is taken.
+            // The answer is sent before the pose is updated.
             eventually("started", started).await;
-            return seen;
+            return readings;
         }
     }
     panic!("none of {} views gave a pose", stops.len());
 }
 
-/// What the laser measured, as a message.
-pub fn scan_message(seen: &SensorReadings, captured_ns: i64) -> v1::Scan {
-    scan_of(&seen.scan, &seen.step.odom_from_robot, captured_ns)
+/// The scan of the readings, as a message.
+pub fn scan_message(readings: &SensorReadings, captured_ns: i64) -> v1::Scan {
+    scan_of(&readings.scan, &readings.step.odom_from_robot, captured_ns)
 }
 
-/// A scan with the odometry of its moment, as a message.
+/// A scan with odometry of the same time, as a message.
 pub fn scan_of(scan: &Scan, odom_from_robot: &Pose2, captured_ns: i64) -> v1::Scan {
     let pose = |p: &Pose2| v1::Pose2 { x_m: p.x_m, y_m: p.y_m, theta_rad: p.theta_rad };
     v1::Scan {

@@ -16,31 +16,31 @@ pub fn png(image: &GrayImage) -> Vec<u8> {
     pictures::png(image.width(), image.height(), image.data())
 }
 
-/// Looks at every poster from `views` places, each with the poster's name.
-pub fn looks(building: &Arc<Building>, params: &LessonParams) -> Vec<(String, SensorReadings)> {
+/// Readings in front of every poster from `views` viewpoints, each with the poster's name.
+pub fn views(building: &Arc<Building>, params: &LessonParams) -> Vec<(String, SensorReadings)> {
     let mut robot = Robot::new(building.clone(), &RobotParams::default());
-    let look = |stop: sim::lesson::Stop| {
-        let seen = robot.look(&stop.step);
-        (stop.landmark, seen)
+    let measure = |stop: sim::lesson::Stop| {
+        let readings = robot.look(&stop.step);
+        (stop.landmark, readings)
     };
-    stops(building, params).into_iter().map(look).collect()
+    stops(building, params).into_iter().map(measure).collect()
 }
 
-/// Writes `truth.json`, the pictures, and the posters of `taught` as pictures to teach from. Quads with a side shorter
-/// than `min_side_px` are not labelled.
+/// Writes `truth.json`, the pictures, and the posters of `taught` as pictures to teach from. Quads with a side
+/// shorter than `min_side_px` are not labelled.
 pub fn write_set(
     folder: &Path,
     building: &Building,
-    looks: &[(String, SensorReadings)],
+    views: &[(String, SensorReadings)],
     taught: &[String],
     min_side_px: f64,
 ) -> DataSet {
     let labels = Labels { taught, min_side_px, complete: true };
     let mut images = Vec::new();
-    for (number, (_, seen)) in looks.iter().enumerate() {
+    for (number, (_, readings)) in views.iter().enumerate() {
         let file = format!("frame-{number:02}.png");
-        fs::write(folder.join(&file), png(&seen.frame.image)).expect("picture");
-        images.push(ImageEntry::new(&file, Some("rendered"), &seen.frame.truth, &labels));
+        fs::write(folder.join(&file), png(&readings.frame.image)).expect("picture");
+        images.push(ImageEntry::new(&file, Some("rendered"), &readings.frame.truth, &labels));
     }
     let mut teach = Vec::new();
     for name in taught {

@@ -1,5 +1,5 @@
-//! A quad in, its rectified square picture out (method 4). Grey levels of the source are averaged over each icon
-//! cell. Corner order decides which way is up; nothing here guesses it.
+//! A quad in, its rectified square picture, the icon, out (method 4). Grey levels of the source are averaged over
+//! each icon cell. The corner order defines the orientation.
 
 use crate::{
     frame::GrayImage,
@@ -65,7 +65,7 @@ pub enum IconError {
     TooSmall {
         /// Shortest side of the quad.
         min_side_px: f64,
-        /// What the parameters ask for.
+        /// Side required by the parameters.
         required_px: f64,
     },
     /// Too much of the quad lies outside the image.
@@ -79,7 +79,7 @@ pub enum IconError {
     Degenerate,
 }
 
-/// An icon as it arrives, before its fields are checked.
+/// A deserialised icon before its fields are checked.
 #[derive(Deserialize)]
 struct UncheckedIcon {
     size: usize,
@@ -95,7 +95,7 @@ impl TryFrom<UncheckedIcon> for Icon {
 }
 
 impl Icon {
-    /// Checks an icon that comes from outside: `pixels` row-major, `size * size` grey levels in [0, 255].
+    /// Checks an icon from external data: `pixels` row-major, `size * size` grey levels in [0, 255].
     pub fn new(size: usize, pixels: Vec<f32>, source_scale: f64) -> Result<Self, IconError> {
         if !(MIN_ICON_SIZE..=MAX_ICON_SIZE).contains(&size) {
             return Err(IconError::Size { size });
@@ -241,7 +241,7 @@ fn row_span(points: &[Point2<f64>; 4], v: f64, width: usize) -> Option<(usize, u
 /// Departs from method 4: it takes one sample, and only in cells without any pixel centre. Between one and two source
 /// pixels a cell, averaging the one or two centres that happen to fall in is noisier than sampling.
 const SAMPLES: usize = 2;
-/// What a bilinear sample stands for, in pixels: it weighs what lies within one pixel to either side.
+/// Width that a bilinear sample covers, in pixels: its kernel reaches one pixel to either side.
 const SAMPLE_PX: f64 = 1.5;
 /// Most samples along each axis of a cell.
 const MAX_SAMPLES: usize = 4;
@@ -279,7 +279,7 @@ pub(crate) fn sample_row(
     });
 }
 
-/// Cells worked out abreast.
+/// Cells computed at a time, vectorised.
 const ABREAST: usize = 16;
 
 #[expect(

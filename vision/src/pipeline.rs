@@ -1,6 +1,7 @@
-//! The whole method on one page. In: an image, the landmarks of a map, perhaps a camera. Out: quads, verdicts, poses.
+//! The recognition pipeline: an image, the landmarks of a map and optionally a camera in; quads, verdicts and poses
+//! out.
 //!
-//! No arithmetic here, and no stage calls an earlier one. The map crate computes where the robot is.
+//! Calls the stages in order. The map crate computes the robot's pose.
 
 use crate::{
     detect::{
@@ -58,7 +59,7 @@ pub struct FrameAnalysis {
 pub struct QuadAnalysis {
     /// The quad as detected.
     pub quad: Quad,
-    /// What recognition says; `None` if it was not asked (three-sided, or beyond [`MAX_RECOGNISED_QUADS`]).
+    /// The verdict; `None` for quads that were not compared (three-sided, or beyond [`MAX_RECOGNISED_QUADS`]).
     pub recognition: Option<RecognitionResult>,
     /// The landmark in the camera frame, or why not.
     pub pose: Result<LandmarkPose, PoseUnavailable>,
@@ -81,15 +82,15 @@ pub enum PoseUnavailable {
     Pose(#[from] PoseError),
 }
 
-/// The method with the memory of earlier frames: fresh planes cost more than a tenth of the time to segments. One a
-/// thread. The memory never changes a result.
+/// The pipeline with memory reused from frame to frame: fresh planes cost more than a tenth of the time to
+/// segments. One a thread. Results do not depend on the memory.
 #[derive(Debug, Default)]
 pub struct Pipeline {
     buffers: DetectBuffers,
 }
 
 impl Pipeline {
-    /// Image in, facts out: quads, verdicts, poses.
+    /// Quads, verdicts and poses of an image.
     pub fn analyse(
         &mut self,
         image: &GrayImage,
@@ -136,7 +137,7 @@ pub fn analyse_quads(
 }
 
 /// Which of the landmarks a single quad may be, by its picture alone, and their common border in the image; `None`
-/// for the border where it is none of them. For landmarks that look alike, which no frame names by itself.
+/// for the border where it is none of them. For look-alikes, which a single frame cannot identify.
 pub fn recognise_quad(
     image: &GrayImage,
     quad: &Quad,
@@ -149,8 +150,8 @@ pub fn recognise_quad(
     (verdict, border)
 }
 
-/// Where an alternate border was recognised, it becomes the corners of the quad: readers of the result must not take
-/// the wall round a poster for the poster.
+/// Where an alternate border was recognised, it becomes the corners of the quad: the outer border may be the wall
+/// round a poster.
 fn turn_to_recognised(quad: &mut Quad, verdict: &mut RecognitionResult) {
     if verdict.verdict == Verdict::Unknown || verdict.border == 0 {
         return;
@@ -172,10 +173,10 @@ fn pose(
     let Some(RecognitionResult { verdict: Verdict::Unique(landmark), .. }) = verdict else {
         return Err(PoseUnavailable::NotUnique);
     };
-    let seen = verdict.and_then(|v| matched_border(quad, v, p)).ok_or(PoseUnavailable::NotUnique)?;
+    let border = verdict.and_then(|v| matched_border(quad, v, p)).ok_or(PoseUnavailable::NotUnique)?;
     let camera = camera.ok_or(PoseUnavailable::NoCamera)?;
     let size = sizes.get(landmark).ok_or(PoseUnavailable::NoSize(*landmark))?;
-    Ok(landmark_pose(&seen.corners_px, &seen.covariance_px2, *size, camera)?)
+    Ok(landmark_pose(&border.corners_px, &border.covariance_px2, *size, camera)?)
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! A small seeded source of random numbers for generated views: the same seed gives the same views on every machine.
 //! Not for secrets.
 
-/// `SplitMix64` (Steele, Lea, Flood 2014): one 64-bit word of state, every seed is a good one.
+/// `SplitMix64` (Steele, Lea, Flood 2014): one 64-bit word of state, every seed is valid.
 #[derive(Debug, Clone)]
 pub struct Random {
     state: u64,

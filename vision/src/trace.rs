@@ -1,5 +1,5 @@
 //! An optional record of every stage, for pictures and timings. The pipeline hands each stage's output to a `Trace`;
-//! with [`NoTrace`] that costs nothing. The clock and all drawing live with whoever implements the trait.
+//! with [`NoTrace`] that costs nothing. Implementations measure time and draw.
 
 use crate::detect::{
     edges::edge_map::EdgeMap,
@@ -18,7 +18,7 @@ pub enum Stage {
     Chains,
     /// Recursive segmentation.
     Segments,
-    /// Similarity and the first relaxation, or the hypotheses of the search.
+    /// Similarity and the first relaxation, or the quad proposals.
     Pairs,
     /// Second relaxation, border choice, sub-pixel corners.
     Quads,
@@ -54,7 +54,7 @@ impl Stage {
     }
 }
 
-/// Told of each stage as it ends. Every method has an empty default.
+/// Receives the output of each stage. Every method has an empty default.
 pub trait Trace {
     /// `stage` has just ended.
     fn finished(&mut self, _stage: Stage) {}
@@ -68,7 +68,7 @@ pub trait Trace {
     fn tiling(&mut self, _removed: &[EdgeSegment]) {}
     /// The matched pairs of opposite sides.
     fn pairs(&mut self, _pairs: &[SegmentPair]) {}
-    /// The search's hypotheses that edges support, on the finest scale, in place of pairs.
+    /// The quad proposals that edges support, on the finest scale, in place of pairs.
     fn seeds(&mut self, _seeds: &[QuadSeed]) {}
     /// The quads.
     fn quads(&mut self, _quads: &[Quad]) {}

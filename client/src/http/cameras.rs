@@ -21,7 +21,7 @@ operations! {
 /// The last answered frame of a camera.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CameraFrame {
-    /// Number of the frame, as its answer has it.
+    /// Sequence number of the frame, as in its answer.
     pub seq: u64,
     /// `image/jpeg` or `image/png`.
     pub media_type: String,
@@ -36,8 +36,8 @@ impl MapClient {
         Ok(found.cameras)
     }
 
-    /// Calibrates a camera, from uploaded corners or from the views kept of its own frames. Nothing is changed at the
-    /// server: a robot sends its intrinsics with its frames.
+    /// Calibrates a camera, from uploaded corners or from stored views of its own frames. The server's state does
+    /// not change: a robot sends its intrinsics with its frames.
     pub async fn calibrate_camera(
         &self,
         robot: &str,

@@ -1,13 +1,13 @@
-//! Server-sent events. In: the parts of a body as they come. Out: events, each with its name and data.
+//! Server-sent events. In: the parts of a body. Out: events, each with its name and data.
 
 use super::map_client::reason;
 use crate::ClientError;
 use reqwest::{RequestBuilder, Response};
 use std::time::Duration;
 
-/// A stream may last so long.
+/// Longest duration of a stream.
 const STREAM_TIMEOUT: Duration = Duration::from_hours(24 * 365);
-/// The server says something every 15 s; a stream that is silent for longer than this has ended.
+/// The server sends something every 15 s; a stream without data for longer than this has ended.
 const SILENCE: Duration = Duration::from_mins(1);
 /// Largest event.
 const MAX_EVENT_BYTES: usize = 4 << 20;
@@ -26,18 +26,18 @@ pub(super) struct Events {
     parser: Parser,
 }
 
-/// A request whose answer goes on.
+/// A request whose answer is a stream.
 pub(super) fn endless(request: RequestBuilder) -> RequestBuilder {
     request.timeout(STREAM_TIMEOUT)
 }
 
 impl Events {
-    /// Of an answer whose status is checked.
+    /// The events of an answer whose status is checked.
     pub(super) fn new(response: Response) -> Self {
         Self { response, parser: Parser::default() }
     }
 
-    /// Where they come from.
+    /// URL of the stream.
     pub(super) fn url(&self) -> String {
         self.response.url().to_string()
     }
@@ -75,7 +75,7 @@ impl Parser {
         self.buffer.extend(part.iter().filter(|byte| **byte != b'\r'));
     }
 
-    /// The next whole event; comments are passed over.
+    /// The next whole event; comments are skipped.
     fn next(&mut self) -> Option<Event> {
         loop {
             let end = self.buffer.windows(2).position(|two| two == b"\n\n")?;
@@ -99,7 +99,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn events_are_whole_wherever_the_body_is_cut() {
+    fn events_are_whole_for_every_cut_of_the_body() {
         let body = b":\n\nevent: pose\ndata: {\"a\": 1}\n\n: still here\n\ndata: x\r\ndata: y\r\n\r\nevent: cut\ndata: ";
         for cut in 0..body.len() {
             let mut parser = Parser::default();
@@ -108,8 +108,8 @@ mod tests {
                 parser.push(part);
                 events.extend(std::iter::from_fn(|| parser.next()));
             }
-            let told: Vec<_> = events.iter().map(|e| (e.name.as_str(), e.data.as_str())).collect();
-            assert_eq!(told, [("pose", r#"{"a": 1}"#), ("message", "x\ny")], "cut at {cut}");
+            let parsed: Vec<_> = events.iter().map(|e| (e.name.as_str(), e.data.as_str())).collect();
+            assert_eq!(parsed, [("pose", r#"{"a": 1}"#), ("message", "x\ny")], "cut at {cut}");
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Training views gathered by a robot that drives past, and a person's decision on them.
+//! Gatherings: training views that a robot collects while it drives, and a person's decision on their tracks.
 
 use super::{map_client::MapClient, operation::operations};
 use crate::ClientError;
@@ -17,7 +17,8 @@ operations! {
 }
 
 impl MapClient {
-    /// Begins to gather views with a robot: of one landmark, or of whatever is new (and of known landmarks, too).
+    /// Begins to gather views with a robot: of one landmark, or of new objects (with an option of known landmarks,
+    /// too).
     pub async fn start_gathering(&self, map: &str, new: &NewGatheringBody) -> Result<Gathering, ClientError> {
         self.send(self.ask(&START, &[&map])?.json(new)).await
     }
@@ -32,12 +33,12 @@ impl MapClient {
         self.send(self.ask(&GET, &[&map, &gathering])?).await
     }
 
-    /// Ends a gathering; what was gathered waits for a decision.
+    /// Ends a gathering; its tracks wait for a decision.
     pub async fn stop_gathering(&self, map: &str, gathering: i64) -> Result<Gathering, ClientError> {
         self.send(self.ask(&STOP, &[&map, &gathering])?).await
     }
 
-    /// Ends a gathering and throws away all that nobody has accepted.
+    /// Ends a gathering and deletes all tracks that nobody has accepted.
     pub async fn delete_gathering(&self, map: &str, gathering: i64) -> Result<(), ClientError> {
         self.done(self.ask(&DELETE, &[&map, &gathering])?).await
     }
@@ -48,7 +49,7 @@ impl MapClient {
         Ok(found.tracks)
     }
 
-    /// Throws a track away. While the gathering goes on, no more views of that object are kept.
+    /// Deletes a track. While the gathering lasts, no more views of that object are stored.
     pub async fn discard_track(&self, map: &str, gathering: i64, track: u32) -> Result<(), ClientError> {
         self.done(self.ask(&DISCARD, &[&map, &gathering, &track])?).await
     }
@@ -64,7 +65,7 @@ impl MapClient {
         self.bytes(self.ask(&ICON, &[&map, &gathering, &track, &view])?).await
     }
 
-    /// Makes landmarks of tracks, or adds views to the landmarks they show. All or nothing.
+    /// Creates landmarks from tracks, or adds views to the landmarks that they show; all or none.
     pub async fn accept_tracks(
         &self,
         map: &str,

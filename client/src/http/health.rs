@@ -1,4 +1,4 @@
-//! Whether the server can do its work, and what runs there.
+//! Health, readiness and version of the server.
 
 use super::{map_client::MapClient, operation::operations};
 use crate::ClientError;
@@ -11,17 +11,17 @@ operations! {
 }
 
 impl MapClient {
-    /// The process lives.
+    /// Whether the process answers.
     pub async fn health(&self) -> Result<Health, ClientError> {
         self.send(self.ask(&HEALTH, &[])?).await
     }
 
-    /// Every part of the server runs and the database answers; else refused with 503.
+    /// Whether every part of the server runs and the database answers; an error with status 503 otherwise.
     pub async fn readiness(&self) -> Result<Readiness, ClientError> {
         self.send(self.ask(&READINESS, &[])?).await
     }
 
-    /// What runs there.
+    /// Version of the server.
     pub async fn version(&self) -> Result<Version, ClientError> {
         self.send(self.ask(&VERSION, &[])?).await
     }

@@ -38,7 +38,7 @@ impl MapClient {
         self.send(self.ask(&GET, &[&map, &landmark])?).await
     }
 
-    /// Sets or forgets size and place; sets how far it is trusted.
+    /// Sets or deletes size and place; sets landmark health.
     pub async fn update_landmark(
         &self,
         map: &str,
@@ -53,7 +53,7 @@ impl MapClient {
         self.done(self.ask(&DELETE, &[&map, &landmark])?).await
     }
 
-    /// The floor area from which a landmark is seen, by the map's camera with these settings instead of its own.
+    /// The visibility area of a landmark, with these settings instead of the map's.
     pub async fn visibility_area(
         &self,
         map: &str,

@@ -17,7 +17,7 @@ operations! {
     EVENTS: GET "/jobs/{job}/events" => job_events,
 }
 
-/// How often a job is asked for.
+/// Period of polling a job.
 const JOB_POLL: Duration = Duration::from_millis(200);
 
 /// A job with each change, the last one with its end.
@@ -28,7 +28,7 @@ impl JobEvents {
     /// The job after its next change; `None` when it has ended, or the server stops.
     pub async fn next(&mut self) -> Result<Option<Job>, ClientError> {
         while let Some(event) = self.0.next().await? {
-            // A newer server may tell more.
+            // A newer server may send other events.
             if event.name == "job" {
                 let job = serde_json::from_str(&event.data);
                 let url = self.0.url();
@@ -66,12 +66,12 @@ impl MapClient {
         self.send(self.ask(&LEARN_LANDMARK, &[&map, &landmark])?.json(&lesson)).await
     }
 
-    /// A job as it stands.
+    /// The present state of a job.
     pub async fn job(&self, job: i64) -> Result<Job, ClientError> {
         self.send(self.ask(&GET, &[&job])?).await
     }
 
-    /// Asks a job to stop. One that has ended stays as it is.
+    /// Asks a job to stop. No effect on a job that has ended.
     pub async fn cancel_job(&self, job: i64) -> Result<Job, ClientError> {
         self.send(self.ask(&CANCEL, &[&job])?).await
     }
@@ -82,7 +82,7 @@ impl MapClient {
         Ok(JobEvents(Events::new(response)))
     }
 
-    /// Waits until a job is done, telling `progress` of every state seen.
+    /// Waits until a job is done; calls `progress` with every state received.
     pub async fn wait_for_job(
         &self,
         job: Job,

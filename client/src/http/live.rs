@@ -12,7 +12,7 @@ operations! {
     EVENTS: GET "/maps/{map}/live" => live_events,
 }
 
-/// Answers, poses and changes of a map from now on. A reader that is too slow misses events, and is told how many.
+/// Answers, poses and changes of a map from now on. A reader that is too slow misses events and gets their number.
 #[derive(Debug)]
 pub struct LiveEvents(Events);
 
@@ -25,7 +25,7 @@ impl LiveEvents {
                 url: self.0.url(),
                 detail: format!("event {}: {e}", event.name),
             };
-            // A newer server may tell more.
+            // A newer server may send other events.
             if let Some(known) = read.map_err(unexpected)? {
                 return Ok(Some(known));
             }

@@ -1,4 +1,4 @@
-//! A connection to the server's HTTP interface: requests of operations, answers read, refusals as errors.
+//! A connection to the server's HTTP interface: sends requests, reads answers, turns refusals into errors.
 
 use super::operation::{Operation, PathValue, path_of, query_of};
 use crate::ClientError;
@@ -20,7 +20,7 @@ pub struct MapClient {
 impl MapClient {
     /// A client of the server at `base`, such as `http://127.0.0.1:8080`. Nothing is sent yet.
     pub fn new(base: &str) -> Result<Self, ClientError> {
-        // Straight to the server: a proxy of the environment has no business between a robot and its map.
+        // Ignores proxies of the environment: the server is in the robot's own network.
         let http = reqwest::Client::builder().no_proxy().timeout(REQUEST_TIMEOUT).build();
         let http = http.map_err(|e| ClientError::Http { url: base.to_owned(), detail: e.to_string() })?;
         Ok(Self { http, base: base.trim_end_matches('/').to_owned() })
@@ -73,12 +73,12 @@ impl MapClient {
         serde_json::from_slice(&bytes).map_err(|e| ClientError::Unexpected { url, detail: e.to_string() })
     }
 
-    /// Sends; the answer says nothing.
+    /// Sends; the answer is empty.
     pub(super) async fn done(&self, request: RequestBuilder) -> Result<(), ClientError> {
         self.checked(request).await.map(drop)
     }
 
-    /// Sends, and takes the answer as it is.
+    /// Sends, and returns the raw body of the answer.
     pub(super) async fn bytes(&self, request: RequestBuilder) -> Result<Vec<u8>, ClientError> {
         whole(self.checked(request).await?).await
     }
@@ -112,7 +112,7 @@ pub(super) async fn whole(response: Response) -> Result<Vec<u8>, ClientError> {
     Ok(bytes.to_vec())
 }
 
-/// An error with its causes: the outer one alone says little.
+/// An error with its causes, which the outer message lacks.
 pub(super) fn reason(error: &reqwest::Error) -> String {
     let mut text = error.to_string();
     let mut cause = std::error::Error::source(error);
@@ -137,7 +137,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn nobody_there_says_what_to_do() {
+    async fn an_unreachable_server_gives_advice() {
         let free = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
         let error = MapClient::new(&format!("http://{free}")).unwrap().maps().await.unwrap_err();
         let text = error.to_string();

@@ -1,4 +1,4 @@
-//! The walls of a map made by a robot that drives.
+//! Mapping: the walls of a map from the scans of a driving robot.
 
 use super::{map_client::MapClient, operation::operations};
 use crate::ClientError;
@@ -21,12 +21,12 @@ impl MapClient {
         self.send(self.ask(&START, &[&map])?.json(new)).await
     }
 
-    /// The mapping that goes on, or the last since the server started.
+    /// The present mapping, or the last one since the server started.
     pub async fn mapping(&self, map: &str) -> Result<MappingProgressBody, ClientError> {
         self.send(self.ask(&GET, &[&map])?).await
     }
 
-    /// Gives a mapping up, or forgets one that failed: the map stays as it is.
+    /// Cancels a mapping, or deletes one that failed; the map does not change.
     pub async fn cancel_mapping(&self, map: &str) -> Result<(), ClientError> {
         self.done(self.ask(&CANCEL, &[&map])?).await
     }

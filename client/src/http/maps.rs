@@ -1,4 +1,4 @@
-//! Maps, where they are, and how they lie to each other.
+//! Maps, their locations (site, building, floor), and map links.
 
 use super::{map_client::MapClient, operation::operations};
 use crate::ClientError;
@@ -29,7 +29,7 @@ impl MapClient {
         self.send(self.ask(&GET, &[&map])?).await
     }
 
-    /// Sets where a map is: site, building, floor, parent.
+    /// Sets the location of a map: site, building, floor, parent.
     pub async fn locate_map(&self, map: &str, patch: &MapPatch) -> Result<Map, ClientError> {
         self.send(self.ask(&LOCATE, &[&map])?.json(patch)).await
     }
@@ -39,7 +39,7 @@ impl MapClient {
         self.done(self.ask(&DELETE, &[&map])?).await
     }
 
-    /// How a map lies in another, and a pose of it in that other map.
+    /// The transform from a map to another one, and a pose converted by it.
     pub async fn transform(
         &self,
         map: &str,

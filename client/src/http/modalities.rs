@@ -1,4 +1,4 @@
-//! Which modality is best where, and what is fused.
+//! Modality statistics and fusion mode of a map.
 
 use super::{map_client::MapClient, operation::operations};
 use crate::ClientError;
@@ -11,12 +11,12 @@ operations! {
 }
 
 impl MapClient {
-    /// Which modality is best where, as reference runs have shown, and what is fused.
+    /// Modality statistics by pose cell from reference runs, and the fusion mode.
     pub async fn modalities(&self, map: &str) -> Result<ModalityMapBody, ClientError> {
         self.send(self.ask(&GET, &[&map])?).await
     }
 
-    /// Sets what is fused, and the areas that have names; absent fields stay.
+    /// Sets the fusion mode and the named areas; absent fields do not change.
     pub async fn set_modalities(
         &self,
         map: &str,
@@ -25,7 +25,7 @@ impl MapClient {
         self.send(self.ask(&SET, &[&map])?.json(patch)).await
     }
 
-    /// What is known where a robot would be.
+    /// Modality statistics at a pose.
     pub async fn modalities_at(
         &self,
         map: &str,

@@ -14,22 +14,22 @@ operations! {
 }
 
 impl MapClient {
-    /// Begins to record a run of a robot, in the server's memory.
+    /// Begins a recording of a robot, in the server's memory.
     pub async fn start_recording(&self, robot: &str) -> Result<RecordingStatusBody, ClientError> {
         self.send(self.ask(&START, &[&robot])?).await
     }
 
-    /// What was recorded so far.
+    /// Status of the recording.
     pub async fn recording(&self, robot: &str) -> Result<RecordingStatusBody, ClientError> {
         self.send(self.ask(&GET, &[&robot])?).await
     }
 
-    /// Gives the recording up.
+    /// Cancels the recording.
     pub async fn cancel_recording(&self, robot: &str) -> Result<(), ClientError> {
         self.done(self.ask(&CANCEL, &[&robot])?).await
     }
 
-    /// Ends the recording by telling where the robot really was; the map learns from it.
+    /// Ends the recording with a reference trajectory; the map learns modality statistics from it.
     pub async fn finish_recording(
         &self,
         robot: &str,
@@ -38,13 +38,13 @@ impl MapClient {
         self.send(self.ask(&FINISH, &[&robot])?.json(trajectory)).await
     }
 
-    /// The runs that a map has learnt from, oldest first.
+    /// The reference runs of a map, oldest first.
     pub async fn reference_runs(&self, map: &str) -> Result<Vec<ReferenceRunBody>, ClientError> {
         let found: ReferenceRuns = self.send(self.ask(&LIST, &[&map])?).await?;
         Ok(found.runs)
     }
 
-    /// Deletes a run and what it showed.
+    /// Deletes a reference run with its statistics.
     pub async fn delete_reference_run(&self, map: &str, run: i64) -> Result<(), ClientError> {
         self.done(self.ask(&DELETE, &[&map, &run])?).await
     }

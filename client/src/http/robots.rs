@@ -1,4 +1,4 @@
-//! Robots: where each is, what its pose rests on, where it may be, where it was.
+//! Robots: pose, corrections, relocalisation, trajectories.
 
 use super::{map_client::MapClient, operation::operations};
 use crate::ClientError;
@@ -36,17 +36,17 @@ impl MapClient {
         self.done(self.ask(&DELETE, &[&robot])?).await
     }
 
-    /// What a robot's pose rests on, and what became of its fixes.
+    /// Support of a robot's pose, and the outcomes of its fixes.
     pub async fn corrections(&self, robot: &str) -> Result<CorrectionsBody, ClientError> {
         self.send(self.ask(&CORRECTIONS, &[&robot])?).await
     }
 
-    /// Where a robot may be while nothing that it sees is unique.
+    /// Pose hypotheses of a robot that observes nothing unique.
     pub async fn relocalisation(&self, robot: &str) -> Result<RelocalisationStatus, ClientError> {
         self.send(self.ask(&RELOCALISATION, &[&robot])?).await
     }
 
-    /// Where a robot was lately, by source.
+    /// Recent trajectories of a robot, by source.
     pub async fn trajectories(&self, robot: &str) -> Result<TrajectoriesBody, ClientError> {
         self.send(self.ask(&TRAJECTORIES, &[&robot])?).await
     }

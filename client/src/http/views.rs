@@ -13,10 +13,10 @@ operations! {
     ICON: GET "/maps/{map}/landmarks/{landmark}/views/{view}/icon" => view_icon,
 }
 
-/// What part of an uploaded image is the landmark.
+/// The part of an uploaded image that shows the landmark.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum LandmarkRegion {
-    /// The server looks for the one dominant quad.
+    /// The dominant quad, which the server detects.
     Detect,
     /// The whole image is the landmark, cut out beforehand.
     WholeImage,
@@ -24,21 +24,21 @@ pub enum LandmarkRegion {
     Corners([[f64; 2]; 4]),
 }
 
-/// A training view to be.
+/// A training view to upload.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NewView {
     /// The photograph, JPEG or PNG.
     pub image: Vec<u8>,
-    /// Where the landmark is in it.
+    /// The landmark in the photograph.
     pub region: LandmarkRegion,
     /// How the photograph was taken; with it the server places the landmark, unless it was placed by hand.
     pub capture: Option<CaptureMetadata>,
-    /// Store it even if a stored view shows the landmark from the same side, as large and in the same light.
+    /// Store it even if it is a near-duplicate of a stored view.
     pub keep_near_duplicate: bool,
 }
 
 impl NewView {
-    /// A photograph of which nothing else is known.
+    /// A photograph without further data.
     pub fn new(image: Vec<u8>, region: LandmarkRegion) -> Self {
         Self { image, region, capture: None, keep_near_duplicate: false }
     }
@@ -56,7 +56,7 @@ impl MapClient {
         self.upload_view_with(map, landmark, NewView::new(image, region)).await
     }
 
-    /// Adds a view with all that is known of it.
+    /// Adds a view with its capture data.
     pub async fn upload_view_with(
         &self,
         map: &str,
@@ -88,7 +88,7 @@ impl MapClient {
         self.done(self.ask(&DELETE, &[&map, &landmark, &view])?).await
     }
 
-    /// The rectified picture that is learnt from, PNG.
+    /// The icon of a view, PNG.
     pub async fn view_icon(&self, map: &str, landmark: &str, view: i64) -> Result<Vec<u8>, ClientError> {
         self.bytes(self.ask(&ICON, &[&map, &landmark, &view])?).await
     }

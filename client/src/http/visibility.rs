@@ -1,4 +1,4 @@
-//! What is seen from a pose and along a path, and where to look.
+//! Landmarks visible from a pose and along a path, and gaze.
 
 use super::{map_client::MapClient, operation::operations};
 use crate::ClientError;
@@ -13,12 +13,12 @@ operations! {
 }
 
 impl MapClient {
-    /// Which landmarks a robot may see from an uncertain pose.
+    /// Landmarks that may be visible from an uncertain pose.
     pub async fn visible(&self, map: &str, request: &VisibleRequest) -> Result<VisibleResponse, ClientError> {
         self.send(self.ask(&VISIBLE, &[&map])?.json(request)).await
     }
 
-    /// Which landmarks are seen along a path, and where none is.
+    /// Landmarks that are visible along a path, and the parts without any.
     pub async fn coverage(
         &self,
         map: &str,
@@ -27,8 +27,8 @@ impl MapClient {
         self.send(self.ask(&COVERAGE, &[&map])?.json(request)).await
     }
 
-    /// Which landmarks are worth looking at from a pose, with pan and tilt. It leaves no trace; a robot that turns its
-    /// camera asks with [`crate::RobotClient::gaze`].
+    /// Ranks landmarks as gaze targets from a pose, with pan and tilt. The server's state does not change; a robot
+    /// that turns its camera uses [`crate::RobotClient::gaze`].
     pub async fn gaze_ranking(
         &self,
         map: &str,

@@ -1,4 +1,4 @@
-//! The camera that looks for a map's landmarks, and what counts as seen.
+//! The visibility settings of a map: camera, and limits that define "visible".
 
 use super::{map_client::MapClient, operation::operations};
 use crate::ClientError;

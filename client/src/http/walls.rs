@@ -10,7 +10,7 @@ operations! {
 }
 
 impl MapClient {
-    /// Replaces the walls; what is stored.
+    /// Replaces the walls; returns those stored.
     pub async fn set_walls(&self, map: &str, walls: &WallsBody) -> Result<WallsBody, ClientError> {
         self.send(self.ask(&SET, &[&map])?.json(walls)).await
     }

@@ -1,5 +1,5 @@
-//! CARMEN logs: `FLASER` and `ROBOTLASER1` lines; all others are left aside. In: lines. Out: scans with the pose of the
-//! laser by odometry (or as somebody corrected it), which is also taken for the robot's.
+//! CARMEN logs: `FLASER` and `ROBOTLASER1` lines; all others are ignored. In: lines. Out: scans with the laser's
+//! pose (by odometry, or corrected), which is also taken as the robot's.
 
 use super::{
     entry::{LaserDefaults, LogEntry},
@@ -36,7 +36,8 @@ fn flaser(words: &mut LineTokens<'_>, laser: &LaserDefaults) -> Result<LogEntry,
     Ok(LogEntry { odom: pose, truth: Some(pose), time_s, scan })
 }
 
-/// `ROBOTLASER1 type start fan step max accuracy mode n ranges.. m remissions.. laser(x y theta) robot(x y theta) ..`.
+/// `ROBOTLASER1 type start fan step max accuracy mode n ranges.. m remissions.. laser(x y theta) robot(x y theta)
+/// ..`.
 fn robotlaser(words: &mut LineTokens<'_>) -> Result<LogEntry, BadLine> {
     words.number("laser type")?;
     let start = words.number("start angle")?;

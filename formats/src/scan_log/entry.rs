@@ -1,13 +1,13 @@
-//! What a scan log holds: scans with odometry, and the truth where it is known.
+//! Entries of a scan log: scans with odometry, and the truth if it is known.
 
 use map::{laser::Scan, pose2::Pose2};
 
-/// Two entries farther apart in time are a pause or a clock set anew: not counted as recorded time.
+/// A larger gap between entries is a pause or a changed clock, and does not count as recorded time.
 const MAX_PAUSE_S: f64 = 60.0;
-/// A log by which the robot was faster than this on the whole has wrong times.
+/// A log with a higher mean speed has wrong times.
 const MAX_SPEED_MPS: f64 = 5.0;
 
-/// What is known of the laser where the log itself does not say it (CARMEN `FLASER` lines, numbered scans).
+/// Laser parameters for logs that do not state them (CARMEN `FLASER` lines, numbered scans).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LaserDefaults {
     /// Ranges from here on are "no return", metres.
@@ -27,7 +27,7 @@ impl Default for LaserDefaults {
 pub struct LogEntry {
     /// `odom_from_robot`, metres and radians.
     pub odom: Pose2,
-    /// `map_from_robot` where the log has it: exact, or corrected by somebody.
+    /// `map_from_robot` if the log has it: exact, or corrected.
     pub truth: Option<Pose2>,
     /// Time of the scan, seconds, by the clock of the log.
     pub time_s: Option<f64>,
@@ -43,8 +43,8 @@ pub struct ScanLog {
 }
 
 impl ScanLog {
-    /// Recorded time without pauses, seconds. `None` where entries have no times, or where the times are wrong: some logs
-    /// have times by which the robot would have been faster than 5 m/s on the whole.
+    /// Recorded time without pauses, seconds. `None` if entries have no times, or wrong ones: a mean speed over 5
+    /// m/s.
     pub fn duration_s(&self) -> Option<f64> {
         let times: Option<Vec<f64>> = self.records.iter().map(|r| r.time_s).collect();
         let steps = |t: &[f64]| Some((t[1] - t[0]).abs()).filter(|d| *d <= MAX_PAUSE_S);

@@ -1,4 +1,4 @@
-//! Logs of laser scans with odometry, from files: CARMEN, numbered scans, and the project's own recordings.
+//! Logs of laser scans with odometry, from files: CARMEN, numbered scans, and the project's own format.
 
 mod carmen;
 mod entry;

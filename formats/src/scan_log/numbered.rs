@@ -1,5 +1,5 @@
-//! Numbered scans, the form of the Intel recording with raw odometry: `i dx dy dtheta r0 r1 ..`, the odometry from scan
-//! i to scan i + 1 in the robot's frame, then the ranges over the fan, right to left.
+//! Numbered scans, the form of the Intel recording with raw odometry: `i dx dy dtheta r0 r1 ..`, the odometry from
+//! scan i to scan i + 1 in the robot's frame, then the ranges over the fan, right to left.
 
 use super::{
     entry::{LaserDefaults, LogEntry},
@@ -10,11 +10,11 @@ use map::{
     pose2::Pose2,
 };
 
-/// A recording so far: where odometry is.
+/// State of reading: number of scans, and odometry.
 #[derive(Debug, Default)]
 pub(super) struct Numbered {
     odom: Pose2,
-    seen: usize,
+    scans: usize,
 }
 
 impl Numbered {
@@ -27,8 +27,8 @@ impl Numbered {
     ) -> Result<LogEntry, BadLine> {
         let mut words = LineTokens::new(line, text);
         let index = words.count("scan number", usize::MAX)?;
-        if index != self.seen {
-            return Err(words.bad("scan number", format!("{index} where {} follows", self.seen)));
+        if index != self.scans {
+            return Err(words.bad("scan number", format!("{index} where {} follows", self.scans)));
         }
         let motion = words.pose("odometry increment")?;
         let n = text.split_whitespace().count().saturating_sub(4);
@@ -44,7 +44,7 @@ impl Numbered {
         let odom = self.odom;
         let next = odom.compose(&motion);
         next.check().map_err(|e| words.bad("odometry", e.to_string()))?;
-        (self.odom, self.seen) = (next, self.seen + 1);
+        (self.odom, self.scans) = (next, self.scans + 1);
         Ok(LogEntry { odom, truth: None, time_s: None, scan })
     }
 }

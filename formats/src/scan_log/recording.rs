@@ -1,6 +1,7 @@
-//! The project's own recordings: JSON lines. The first line tells of the laser, each other of one scan:
+//! The project's own scan logs: JSON lines. The first line describes the laser, each other one scan:
 //! `{"waymark_recording":1,"robot_from_laser":[x,y,theta],"first_bearing_rad":..,"bearing_step_rad":..,"max_range_m":..}`
-//! `{"t_s":12.5,"odom":[x,y,theta],"ranges_m":[..],"truth":[x,y,theta]}` (`null` in ranges: no return; truth if known).
+//! `{"t_s":12.5,"odom":[x,y,theta],"ranges_m":[..],"truth":[x,y,theta]}` (`null` in ranges: no return; truth if
+//! known).
 
 use super::{entry::LogEntry, text::BadLine};
 use map::{laser::Scan, pose2::Pose2};
@@ -29,7 +30,7 @@ struct Line {
     truth: Option<[f64; 3]>,
 }
 
-/// A recording whose head has been read.
+/// A log whose head has been read.
 #[derive(Debug)]
 pub(super) struct Recording(Head);
 

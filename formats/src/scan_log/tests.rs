@@ -26,7 +26,7 @@ fn bad(text: &str) -> (usize, String) {
 }
 
 #[test]
-fn times_by_which_a_robot_would_have_flown_are_none() {
+fn times_with_impossible_speeds_are_ignored() {
     let recording = |way_m: f64, time_s: f64| {
         let line = |x: f64, t: f64| format!("FLASER 3 1.0 2.0 3.0 {x} 0 0 {x} 0 0 {t} host {t}\n");
         reading("a.log", &(line(0.0, 10.0) + &line(way_m, 10.0 + time_s))).unwrap()
@@ -38,7 +38,7 @@ fn times_by_which_a_robot_would_have_flown_are_none() {
 }
 
 #[test]
-fn a_carmen_log_is_read_packed_or_not() {
+fn a_carmen_log_is_read_plain_and_compressed() {
     let text = "# a comment\nPARAM x 1\nODOM 0 0 0 0 0 0 1.0 host 1.0\nFLASER 3 1.0 2.0 81.8 1 2 0.5 1 2 0.5 10.0 host 10.0\nFLASER 2 1 2 1.5 2 0.5 1 2 0.5 12.5 host 12.5\n";
     for name in ["a.log", "a.log.gz"] {
         let recording = reading(name, text).unwrap();
@@ -80,7 +80,7 @@ fn errors_name_line_and_field() {
 }
 
 #[test]
-fn the_own_format_and_numbered_scans() {
+fn the_own_format_and_numbered_scans_are_read() {
     let head = r#"{"waymark_recording":1,"robot_from_laser":[0.2,0,0],"first_bearing_rad":-1,"bearing_step_rad":1,"max_range_m":9}"#;
     let line = r#"{"t_s":3.5,"odom":[1,2,0.1],"ranges_m":[1,null,2],"truth":[4,5,0.2]}"#;
     let record = reading("a.jsonl", &format!("{head}\n{line}\n")).unwrap().records[0].clone();

@@ -1,4 +1,4 @@
-//! Files of walls of every kind, told by the extension of their names.
+//! Files of walls of every format, chosen by the extension of their names.
 
 use super::{
     geojson::{self, GeoJsonError},
@@ -37,7 +37,7 @@ pub enum WallFileError {
     /// More walls than are read.
     #[error("more than {MAX_WALLS} segments")]
     TooMany,
-    /// A wall that cannot be.
+    /// A wall out of range.
     #[error("segment {index}: {source}")]
     Segment {
         /// From 0.
@@ -48,7 +48,7 @@ pub enum WallFileError {
     /// The cells of a grid to write.
     #[error("resolution {0} m: 0.005 to 1")]
     Resolution(f64),
-    /// A file to write of a kind that is not known.
+    /// A file to write with an unknown extension.
     #[error("`.{0}` is none of .yaml, .txt, .json")]
     Extension(String),
 }
@@ -57,8 +57,8 @@ fn extension(path: &Path) -> String {
     path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default()
 }
 
-/// Reads the walls of `.yaml` (`map_server`), `.json` (map file), `.geojson`, or else of a vector map. Walls of a grid
-/// shorter than `min_length_m` are left out.
+/// Reads the walls of `.yaml` (`map_server`), `.json` (map file), `.geojson`, or else of a vector map. Walls of a
+/// grid shorter than `min_length_m` are left out.
 pub fn read(path: &Path, min_length_m: f64) -> Result<MapFile, WallFileError> {
     let of = |segments| MapFile { segments, ..MapFile::default() };
     let map = match extension(path).as_str() {

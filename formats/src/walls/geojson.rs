@@ -1,5 +1,5 @@
-//! Walls from a GeoJSON file in map metres: lines are walls as drawn, polygons are rooms, whose walls face inwards, and
-//! their holes (columns, blocks), whose walls face outwards. Points, and properties of any kind, are passed over.
+//! Walls from a GeoJSON file in map metres: lines are walls as drawn; polygons are rooms, with the free side
+//! inside; their holes are columns or blocks, with the free side outside. Points and properties are ignored.
 
 use super::map_file::{MAX_WALLS, Wall};
 use serde::Deserialize;
@@ -9,7 +9,7 @@ pub(super) const MAX_BYTES: u64 = 64 << 20;
 
 type Position = Vec<f64>;
 
-/// What of GeoJSON (RFC 7946) can hold walls. Members that are not named are ignored, as the format asks for.
+/// The parts of GeoJSON (RFC 7946) that can hold walls. Unknown members are ignored, as the RFC demands.
 #[derive(Debug, Deserialize)]
 #[serde(tag = "type")]
 enum Object {
@@ -59,7 +59,7 @@ pub enum GeoJsonError {
         /// Which, from 0.
         line: usize,
     },
-    /// Longitudes and latitudes are no metres.
+    /// A coordinate reference system, such as degrees instead of metres.
     #[error("a coordinate reference system other than map metres (`crs`) is not understood")]
     Crs,
     /// Too many.
@@ -121,7 +121,7 @@ fn add(walls: &mut Vec<Wall>, number: usize, line: &Line) -> Result<(), GeoJsonE
         if points.len() < 4 || first != last || !(area.abs() > 0.0 && area.is_finite()) {
             return Err(GeoJsonError::Ring { line: number });
         }
-        // The free side is left of a to b, whichever way round the file has the ring.
+        // The free side is left of a to b, whatever the orientation of the ring.
         if (area > 0.0) != free_inside {
             points.reverse();
         }
@@ -148,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn rooms_face_inwards_and_columns_outwards_whichever_way_round() {
+    fn free_sides_of_rings_do_not_depend_on_their_orientation() {
         let room = "[[0,0],[4,0],[4,3],[0,3],[0,0]]";
         let turned = "[[0,0],[0,3],[4,3],[4,0],[0,0]]";
         let column = "[[1,1],[2,1],[2,2],[1,1]]";
@@ -172,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_and_collections_are_read_and_the_rest_passed_over() {
+    fn lines_and_collections_are_read_and_the_rest_is_ignored() {
         let text = r#"{"type":"FeatureCollection","name":"plan","features":[
             {"type":"Feature","properties":{"kind":"wall"},"geometry":{"type":"LineString","coordinates":[[0,0],[5,0,2.5],[5,1]]}},
             {"type":"Feature","properties":null,"geometry":null},
@@ -187,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_named() {
+    fn errors_name_line_and_position() {
         let bad = |text: &str| walls(text).unwrap_err();
         assert!(matches!(bad("{"), GeoJsonError::Format(_)));
         assert!(matches!(bad(r#"{"type":"Walls"}"#), GeoJsonError::Format(_)));

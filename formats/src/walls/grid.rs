@@ -27,14 +27,14 @@ pub enum GridError {
     Picture(String, String),
 }
 
-/// What a cell is.
+/// State of a cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CellState {
     /// An obstacle.
     Occupied,
     /// Free floor.
     Free,
-    /// Never seen.
+    /// Unknown.
     Unknown,
 }
 
@@ -66,7 +66,7 @@ impl OccupancyGrid {
         [p.x, p.y]
     }
 
-    /// Draws walls: occupied along them, free where the free sides reach without crossing one, unknown elsewhere.
+    /// Draws walls: occupied along them, free where a free side reaches without crossing a wall, unknown elsewhere.
     pub fn of_walls(walls: &[Wall], resolution_m: f64) -> Result<Self, GridError> {
         let ends = || walls.iter().flat_map(|w| [w.a, w.b]);
         if walls.is_empty() {

@@ -32,10 +32,10 @@ pub struct Wall {
     pub a: [f64; 2],
     /// Second end, metres.
     pub b: [f64; 2],
-    /// Covariance of (alpha, rho): rad^2, rad m, m^2; absent where nobody knows.
+    /// Covariance of (alpha, rho): rad^2, rad m, m^2; absent if unknown.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub covariance: Option<[f64; 3]>,
-    /// How many key scans saw it.
+    /// Number of keyframes that observed it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub hits: Option<u32>,
 }
@@ -48,7 +48,7 @@ impl Wall {
         Self { a: [s.a.x, s.a.y], b: [s.b.x, s.b.y], covariance, hits: Some(s.hits) }
     }
 
-    /// A wall between two points (metres), how exactly unknown.
+    /// A wall between two points (metres), without covariance.
     pub fn between(a: [f64; 2], b: [f64; 2]) -> Self {
         Self { a, b, covariance: None, hits: None }
     }
@@ -58,7 +58,7 @@ impl Wall {
         (self.b[0] - self.a[0]).hypot(self.b[1] - self.a[1])
     }
 
-    /// The wall as a checked segment of the map; 1 cm and half a degree where no covariance is known.
+    /// The wall as a checked segment of the map; without covariance 1 cm and half a degree.
     pub fn segment(&self) -> Result<LaserSegment, map::check::OutOfRange> {
         let [aa, ar, rr] = self.covariance.unwrap_or([7.6e-5, 0.0, 1e-4]);
         let covariance = Matrix2::new(aa, ar, ar, rr);
@@ -74,13 +74,13 @@ pub struct MapFile {
     pub segments: Vec<Wall>,
     /// `map_from_robot` of every scan: x, y, theta.
     pub path: Vec<[f64; 3]>,
-    /// Key poses: number of the scan.
+    /// Keyframes: number of the scan.
     pub key_scans: Vec<usize>,
-    /// Standard deviations of the key poses: x, y, theta.
+    /// Standard deviations of the keyframes' poses: x, y (m), theta (rad).
     pub key_sigmas: Vec<[f64; 3]>,
-    /// Loops: numbers of both scans.
+    /// Loop closures: numbers of both scans.
     pub loops: Vec<[usize; 2]>,
-    /// Loops that looked right and were refused.
+    /// Number of loop closures that verification refused.
     pub refused: usize,
 }
 

@@ -7,10 +7,10 @@ use super::{
 };
 use nalgebra::{Matrix2, Point2, Vector2};
 
-/// A corner of the border farther than this from the chord cuts it, in cells: a stair of cells is a straight wall.
+/// Distance from the chord at which a corner cuts the border, in cells: a stair of cells is a straight wall.
 const CUT_CELLS: f64 = 1.2;
 
-/// Width of the band that smoothing leaves.
+/// Width of the band of unknown cells that smoothing leaves.
 const SOFT_CELLS: usize = 2;
 /// East, north, west, south.
 const STEPS: [(i64, i64); 4] = [(1, 0), (0, 1), (-1, 0), (0, -1)];
@@ -57,7 +57,7 @@ impl Border {
         let mut chain = vec![point(at)];
         let width = self.width as i64;
         loop {
-            // To the left first: cells that touch at a corner are one wall, and the border stays on its side.
+            // Left first: cells that touch at a corner are one wall.
             let next = [1, 0, 3, 2]
                 .map(|turn| (heading + turn) % 4)
                 .into_iter()
@@ -73,12 +73,13 @@ impl Border {
     }
 }
 
-/// The walls between free and occupied cells, the free side on the left; pieces shorter than `min_length_m` are left out.
+/// The walls between free and occupied cells, the free side on the left; pieces shorter than `min_length_m` are
+/// left out.
 pub(super) fn walls(grid: &OccupancyGrid, min_length_m: f64) -> Vec<Wall> {
     let grid = &hardened(grid);
     let mut border = Border::of(grid);
     let mut walls = Vec::new();
-    // Ends of open chains first; what is left are closed ones.
+    // Ends of open chains first; the rest are closed chains.
     for open in [true, false] {
         for at in 0..border.leaving.len() {
             let is_end = border.leaving[at].count_ones() > border.arriving[at].count_ones();
@@ -114,7 +115,7 @@ fn pieces(chain: &[Point2<f64>]) -> Vec<(usize, usize)> {
     done
 }
 
-/// The line through the middles of the edges; both ends on it.
+/// The fitted line through the middles of the edges; both ends on it.
 fn fitted(corners: &[Point2<f64>]) -> Option<[Point2<f64>; 2]> {
     let (first, last) = (corners.first()?, corners.last()?);
     let middles: Vec<Vector2<f64>> = corners.windows(2).map(|p| 0.5 * (p[0].coords + p[1].coords)).collect();
@@ -129,7 +130,7 @@ fn fitted(corners: &[Point2<f64>]) -> Option<[Point2<f64>; 2]> {
     Some([foot(first), foot(last)])
 }
 
-/// Pictures that were smoothed have a band of unknown cells between free and occupied ones: free cells grow into it.
+/// Grows free cells into the band of unknown cells that smoothed pictures have along occupied ones.
 fn hardened(grid: &OccupancyGrid) -> OccupancyGrid {
     let mut grid = grid.clone();
     for _ in 0..SOFT_CELLS {

@@ -6,7 +6,7 @@ use std::path::Path;
 /// Largest picture file.
 const MAX_FILE_BYTES: u64 = 512 << 20;
 
-/// Grey levels, top row first; `None` where the picture is transparent.
+/// Grey levels, top row first; `None`: transparent.
 #[derive(Debug, PartialEq)]
 pub(super) struct Grey {
     pub(super) width: usize,

@@ -49,7 +49,7 @@ pub(super) fn write(grid: &OccupancyGrid, yaml: &Path) -> std::io::Result<()> {
     Ok(())
 }
 
-/// The `name: value` lines of a YAML file; no more of YAML is needed or read.
+/// The `name: value` lines of a YAML file; other YAML is ignored.
 struct Fields(BTreeMap<String, String>);
 
 impl Fields {

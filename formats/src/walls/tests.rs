@@ -31,7 +31,7 @@ fn a_grid_becomes_its_walls_and_back() {
 }
 
 #[test]
-fn a_smoothed_grid_has_its_walls_too() {
+fn a_smoothed_grid_gives_its_walls() {
     // Free, a cell in between, a wall two cells thick, unknown behind.
     let row = [
         CellState::Free,
@@ -62,7 +62,7 @@ fn a_slanted_wall_of_a_grid_is_one_wall() {
 }
 
 #[test]
-fn what_is_no_grid_is_refused_by_name() {
+fn an_invalid_grid_is_refused_with_its_field() {
     let folder = tempfile::tempdir().unwrap();
     let yaml = folder.path().join("m.yaml");
     std::fs::write(folder.path().join("m.pgm"), b"P5\n# made by hand\n2 2\n255\n\x00\xfe\xcd\x00").unwrap();

@@ -1,4 +1,5 @@
-//! `waymark-lab bench detect`: from frame to segments and to quads beside OpenCV, on the same pictures in one run.
+//! `waymark-lab bench detect`: processor time from frame to segments and to quads, beside OpenCV on the same
+//! pictures.
 
 use super::{
     frames::Frames,
@@ -18,14 +19,13 @@ use vision::{
     trace::{NoTrace, Stage, Trace},
 };
 
-/// Our own times by these names.
+/// Names of Waymark's times.
 const EDGES: &str = "edges";
 const SEGMENTS: &str = "frame to segments";
 const QUADS: &str = "frame to quads";
 const PAPER: &str = "frame to quads, the paper's grouping";
 
-/// What is compared with which peer, and what is aimed at (performance anchors P1 to P3, and the floor of the issue on
-/// detection).
+/// Waymark's operation, the peer's, and the largest ratio aimed at, if any.
 const RATIOS: [(&str, &str, Option<f64>); 5] = [
     (QUADS, "LSD", Some(0.25)),
     (QUADS, "ArUco", Some(0.6)),
@@ -45,7 +45,7 @@ pub(crate) struct Args {
     /// Pictures in all, evenly from each set.
     #[arg(long, default_value_t = 24, value_parser = clap::value_parser!(u32).range(1..=1000))]
     count: u32,
-    /// Times that each picture is done by everybody.
+    /// Rounds: each program processes each picture once a round.
     #[arg(long, default_value_t = 7, value_parser = clap::value_parser!(u32).range(1..=1000))]
     rounds: u32,
     /// Leave OpenCV out.
@@ -54,17 +54,17 @@ pub(crate) struct Args {
     /// The Python that has OpenCV.
     #[arg(long, default_value = "python3", value_name = "PROGRAM")]
     python: PathBuf,
-    /// Rendered frames follow from it.
+    /// Seed of the rendered frames.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// End with one JSON object instead of a table.
+    /// Print one JSON object instead of a table.
     #[arg(long)]
     json: bool,
     #[command(flatten)]
     parameters: ParameterArgs,
 }
 
-/// Processor time of one thread, ms: the middle over the pictures of each picture's median and of its least.
+/// Processor time of one thread, ms: median over the pictures of each picture's median and of its least.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 struct Cost {
     median_ms: f64,
@@ -81,7 +81,7 @@ struct Report {
     ours: BTreeMap<String, Cost>,
     peers: BTreeMap<String, Cost>,
     opencv: Option<String>,
-    /// Of the medians: ours over the peer's.
+    /// Ratios of the medians: Waymark over the peer.
     ratios: Vec<Ratio>,
     /// Frame to quads by stage.
     stages_ms: BTreeMap<&'static str, f64>,
@@ -93,7 +93,7 @@ struct Ratio {
     peer: String,
     #[serde(rename = "ratio")]
     value: f64,
-    /// What it must not exceed, where that is said.
+    /// Largest ratio aimed at, if any.
     limit: Option<f64>,
 }
 
@@ -193,7 +193,7 @@ fn peers(args: &Args, frames: &[GrayImage], folder: &std::path::Path) -> Option<
     }
 }
 
-/// Everything of ours on one picture, each once to warm up and once timed. Gives the number of quads.
+/// Times Waymark's operations on one picture, each after a warm-up run. Returns the number of quads.
 fn time_ours(
     frame: &GrayImage,
     params: &DetectParams,
@@ -207,12 +207,12 @@ fn time_ours(
         work();
         ours.add(name, i, clock.ms());
     };
-    let mut kept = edge_map::EdgeMap::default();
-    timed(EDGES, &mut || edge_map::edges_into(black_box(frame), &params.edges, &mut kept));
+    let mut edge_map = edge_map::EdgeMap::default();
+    timed(EDGES, &mut || edge_map::edges_into(black_box(frame), &params.edges, &mut edge_map));
     timed(SEGMENTS, &mut || {
-        edge_map::edges_into(black_box(frame), &params.edges, &mut kept);
-        let chained = chains::chains(&kept, &params.chains);
-        black_box(edge_segments::segments(&chained, &kept, &params.segments));
+        edge_map::edges_into(black_box(frame), &params.edges, &mut edge_map);
+        let chained = chains::chains(&edge_map, &params.chains);
+        black_box(edge_segments::segments(&chained, &edge_map, &params.segments));
     });
     let mut memory = DetectBuffers::default();
     let mut found = 0;
@@ -291,7 +291,7 @@ mod tests {
     }
 
     #[test]
-    fn ratios_are_of_those_that_were_timed() {
+    fn ratios_need_both_times() {
         let cost = |median_ms| Cost { median_ms, least_ms: 1.0 };
         let ours = BTreeMap::from([(QUADS.to_owned(), cost(2.0))]);
         let theirs = BTreeMap::from([("LSD".to_owned(), cost(16.0)), ("Canny".to_owned(), cost(1.0))]);

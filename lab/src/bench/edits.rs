@@ -1,5 +1,5 @@
-//! What one change of a large map costs: a landmark moved, a landmark quarantined, and a lesson, over HTTP, until the server has
-//! acknowledged it. What the server still computes after that is waited for and reported apart.
+//! Latency of one change of a large map over HTTP, until the server acknowledges it: a landmark moved, a landmark
+//! quarantined, a lesson. Derived data that follows later is timed apart.
 
 use super::recognise::landmarks::models;
 use crate::evaluate::statistics::quantile;
@@ -25,11 +25,11 @@ use std::{
 use vision::{frame::GrayImage, model::LandmarkModel, params::Params};
 
 const MAP: &str = "large";
-/// Widest poster that is taught, in pixels: what is measured does not depend on it.
+/// Width of a taught poster, in pixels; latencies do not depend on it.
 const POSTER_PX: usize = 240;
 /// One poster in so many is on the map twice, so that the map has look-alikes.
 const LOOK_ALIKE_EVERY: usize = 20;
-/// Posters that are learnt as a server would; the others share their thresholds.
+/// Posters with a lesson of their own; the others use their thresholds.
 const TAUGHT: usize = 20;
 /// Number of the first poster.
 const FIRST_POSTER: u64 = 40_000;
@@ -58,7 +58,7 @@ pub(super) struct Args {
     /// Changes of each kind.
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(3..=1000))]
     changes: u32,
-    /// One JSON object instead of the table.
+    /// Print one JSON object instead of the table.
     #[arg(long)]
     json: bool,
 }
@@ -215,7 +215,7 @@ fn picture(number: usize) -> GrayImage {
     GrayImage::from_fn(texture.width(), texture.height(), |u, v| texture.data()[v * texture.width() + u])
 }
 
-/// Where landmark `i` hangs: rows of walls along x, all facing y.
+/// Place of landmark `i`: rows of walls along x, all facing y.
 fn place(i: usize, shift_m: f64) -> Place {
     let (row, column) = (i / ROW_LANDMARKS, i % ROW_LANDMARKS);
     let (x_m, y_m) = (SPACING_M * column as f64 + shift_m, ROW_M * row as f64);
@@ -230,7 +230,7 @@ impl Large {
         Ok(())
     }
 
-    /// Waits until the server tells from where the landmark is seen.
+    /// Waits until the server has the landmark's visibility area.
     async fn visible(&self, landmark: &str) -> anyhow::Result<()> {
         let url = format!("{}/api/v1/maps/{MAP}/landmarks/{landmark}/visibility", self.base);
         let answer = self.http.get(&url).send().await?;

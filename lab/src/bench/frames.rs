@@ -10,12 +10,12 @@ use vision::frame::GrayImage;
 
 const WIDTH: u32 = 640;
 const HEIGHT: u32 = 480;
-/// Sets that are taken when they are there: indoor scenes by three cameras.
+/// Sets that are used if present: indoor scenes by three cameras.
 const SETS: [&str; 3] = ["corridor-loop-rtabmap", "museum-walk-estense", "exit-signs"];
-/// Where the data lies beside the project, if nothing else is said.
+/// Default folder of the open sets, relative to the project.
 const DATA: &str = "../shared/data";
 
-/// Pictures with where they are from.
+/// Pictures, and where they come from.
 pub(super) struct Frames {
     pub(super) from: String,
     pub(super) frames: Vec<GrayImage>,
@@ -92,7 +92,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn even_choice_has_no_end_missing_and_no_item_twice() {
+    fn evenly_takes_both_ends_and_no_item_twice() {
         let items: Vec<usize> = (0..10).collect();
         assert_eq!(evenly(&items, 2).copied().collect::<Vec<_>>(), [2, 7]);
         assert_eq!(evenly(&items, 10).copied().collect::<Vec<_>>(), items);
@@ -101,7 +101,7 @@ mod tests {
     }
 
     #[test]
-    fn any_shape_becomes_vga_with_its_middle_in_the_middle() {
+    fn any_shape_becomes_vga_about_its_centre() {
         for (w, h) in [(1280, 720), (360, 640), (512, 384), (640, 480), (3, 1000)] {
             let bright_middle = GrayImage::from_fn(w, h, |u, v| {
                 if u.abs_diff(w / 2) * 4 < w && v.abs_diff(h / 2) * 4 < h { 250 } else { 10 }

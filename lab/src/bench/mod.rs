@@ -1,4 +1,4 @@
-//! `waymark-lab bench`: speed on this machine. Nothing is asserted; figures are for people and for docs/BENCHMARKS.md.
+//! `waymark-lab bench`: speed on this machine. It asserts nothing; the figures go to docs/BENCHMARKS.md.
 
 mod pipeline;
 mod frames;
@@ -23,22 +23,24 @@ pub(crate) struct Args {
 enum What {
     /// From frame to segments and to quads, one core, 640 x 480, beside OpenCV's segment and marker detectors.
     ///
-    /// Every picture is done in turn by Waymark and by OpenCV (through python3, one thread), once to warm up and once
-    /// timed, several rounds. Times are of the processor, not of the clock, so other work on the machine matters
-    /// little; ratios are of one run. Without OpenCV our own times are printed.
+    /// Waymark and OpenCV (through python3, one thread) process every picture in turn, once to warm up and once
+    /// timed, in several rounds. Times are processor time, so other work on the machine matters little; ratios are
+    /// of one run. Without OpenCV only Waymark's times are printed.
     Detect(detect::Args),
-    /// From quad to verdict among many landmarks, whole frames beside OpenCV's SIFT, memory, the short list, and a lesson.
+    /// From quad to verdict among many landmarks, whole frames beside OpenCV's SIFT, memory, the short list, and a
+    /// lesson.
     ///
-    /// Posters are drawn by the simulator. Some are taught as a server would, from generated views; the rest of a map
-    /// get icons and points of their own and thresholds of those. Frames are rendered in a corridor whose posters are among
-    /// the landmarks; each is searched as a whole, and by a known pose for the landmarks that this expects. SIFT (through
-    /// python3, one thread, one index over 1000 landmarks, votes, a homography by RANSAC) is given the same pictures. Times
-    /// are of the processor.
+    /// Posters are drawn by the simulator. The first are taught as a server teaches them, from generated views; the
+    /// others have icons and points of their own and the thresholds of the first. Frames are rendered in a corridor
+    /// whose posters are among the landmarks; each is recognised globally, and guided by a known pose. SIFT
+    /// (through python3, one thread, one index over 1000 landmarks, votes, a homography by RANSAC) gets the same
+    /// pictures. Times are processor time.
     Recognise(recognise::Args),
     /// One change of a large map over HTTP: a landmark moved or quarantined, a lesson.
     ///
-    /// A server in this program is taught a map of posters (one in twenty of them twice) with many wall segments; then
-    /// single landmarks are changed and taught again. Times are of the clock, until the server has acknowledged the change.
+    /// A server in this program is taught a map of posters (one in twenty of them twice) with many wall segments;
+    /// then single landmarks are changed and taught again. Times are of the clock, until the server has
+    /// acknowledged the change.
     Edits(edits::Args),
 }
 

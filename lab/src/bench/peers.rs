@@ -1,5 +1,5 @@
-//! OpenCV beside us: a Python program that is told which picture is next and answers with a line of JSON, the times of
-//! its detectors for one. Whatever is wrong with it (no Python, no OpenCV, no answer) is a reason to do without, never a
+//! OpenCV as peer: a Python program that reads the number of a picture and answers with a line of JSON, for example
+//! the times of its detectors. A missing Python or OpenCV, or no answer, is a reason to run without it, never a
 //! failure.
 
 use serde::{Deserialize, de::DeserializeOwned};
@@ -13,14 +13,14 @@ use std::{
 };
 use vision::frame::GrayImage;
 
-/// What runs over there.
+/// The Python program.
 const PROGRAM: &str = include_str!("../../peers/detectors.py");
-/// How to get what it needs.
+/// How to install what it needs.
 pub(super) const HINT: &str = "python3 -m pip install opencv-contrib-python-headless";
-/// Longest wait for a line, of the imports and of preparing the pictures too.
+/// Longest wait for a line; imports and preparing the pictures count too.
 const ANSWER: Duration = Duration::from_mins(10);
 
-/// The first line, and what it says where something is missing.
+/// The first line if all is there.
 #[derive(Deserialize)]
 struct Greeting {
     version: String,
@@ -31,7 +31,7 @@ struct Missing {
     missing: String,
 }
 
-/// A running Python program that answers line by line. It ends with this value.
+/// A running Python program that answers line by line. Dropping this value ends it.
 #[derive(Debug)]
 pub(crate) struct Python {
     child: Child,
@@ -40,7 +40,7 @@ pub(crate) struct Python {
 }
 
 impl Python {
-    /// Starts `program` with arguments; also its first line. The error says why there is none.
+    /// Starts `program` with arguments and returns its first line, parsed. The error is the reason, for people.
     pub(crate) fn start<T: DeserializeOwned>(
         python: &Path,
         program: &str,
@@ -74,7 +74,7 @@ impl Python {
         Ok((running, greeting))
     }
 
-    /// Says a line and waits for the answer.
+    /// Writes a line and waits for the answer.
     pub(crate) fn ask<T: DeserializeOwned>(&mut self, question: &str) -> Result<T, String> {
         writeln!(self.stdin, "{question}").map_err(|error| error.to_string())?;
         let line = self.line()?;
@@ -108,7 +108,7 @@ pub(super) struct Peers {
 }
 
 impl Peers {
-    /// Starts `python` with the frames, which are written to `folder` for it. The error says why there is none.
+    /// Writes the frames to `folder` and starts `python` on them. The error is the reason, for people.
     pub(super) fn start(python: &Path, frames: &[GrayImage], folder: &Path) -> Result<Self, String> {
         let files = written(frames, folder, "frame")?;
         let (python, Greeting { version }) = Python::start(python, PROGRAM, &files)?;
@@ -123,7 +123,7 @@ impl Peers {
 
 impl Drop for Python {
     fn drop(&mut self) {
-        // It may have ended by itself; then there is nothing to end.
+        // Fails if it has ended by itself.
         self.child.kill().ok();
         self.child.wait().ok();
     }
@@ -134,7 +134,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_wrong_is_said() {
+    fn a_peer_that_does_not_run_gives_a_reason() {
         let folder = tempfile::tempdir().unwrap();
         let start = |program: &str| Peers::start(Path::new(program), &[], folder.path()).map(|_| ());
         assert!(start("no-such-python-anywhere").unwrap_err().contains("no-such-python-anywhere"));

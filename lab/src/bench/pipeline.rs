@@ -1,5 +1,5 @@
-//! `waymark-lab bench`: what each stage of the pipeline costs on this machine, one core, on rendered frames of the
-//! corridor. Nothing is asserted; the figures are for people and for docs/BENCHMARKS.md.
+//! `waymark-lab bench`: time of each stage of the pipeline on this machine, one core, on rendered frames of the
+//! corridor. It asserts nothing; the figures go to docs/BENCHMARKS.md.
 
 use crate::evaluate::statistics;
 use serde::Serialize;
@@ -37,13 +37,13 @@ pub(super) struct PipelineArgs {
     /// Landmarks in the map; those of the corridor and other posters.
     #[arg(long, default_value_t = 50, value_parser = clap::value_parser!(u32).range(6..=2000))]
     landmarks: u32,
-    /// Times that each frame is done; the fastest counts.
+    /// Rounds over the frames; the fastest of each frame counts.
     #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
     rounds: u32,
-    /// The frames and posters follow from it.
+    /// Seed of frames and posters.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// End with one JSON object instead of a table.
+    /// Print one JSON object instead of a table.
     #[arg(long)]
     json: bool,
 }

@@ -1,5 +1,5 @@
-//! `waymark-lab bench recognise`: from quad to verdict among few and many landmarks; whole frames, searched globally and by a
-//! known pose, beside OpenCV's SIFT; what a landmark takes; what the short list of icons loses; a lesson.
+//! `waymark-lab bench recognise`: from quad to verdict among few and many landmarks; whole frames, global and
+//! guided, beside OpenCV's SIFT; memory a landmark; recall of the short list; a lesson.
 
 pub(super) mod landmarks;
 mod queries;
@@ -19,7 +19,7 @@ use vision::{
     params::Params,
 };
 
-/// Landmarks that SIFT gets, and those that a lesson's landmark must be told from.
+/// Landmarks of SIFT's index, and negatives of the lesson.
 const MAP: usize = 1000;
 
 /// `waymark-lab bench recognise`.
@@ -28,19 +28,20 @@ pub(crate) struct Args {
     /// Sizes of the maps.
     #[arg(long, value_delimiter = ',', default_values_t = [100, 1000, 10_000], value_parser = clap::value_parser!(u32).range(1..=100_000))]
     landmarks: Vec<u32>,
-    /// Landmarks that are taught as a server would; the others of a map get icons and points, and thresholds of these.
+    /// Landmarks that are taught as a server teaches them; the others have icons and points of their own and the
+    /// thresholds of these.
     #[arg(long, default_value_t = 60, value_parser = clap::value_parser!(u32).range(24..=1000))]
     taught: u32,
-    /// Quads of landmarks, and as many of none, that are timed.
+    /// Quads of landmarks that are timed, and as many of distractors.
     #[arg(long, default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     quads: u32,
-    /// Quads of landmarks for which the short list of the largest map is compared with looking at the right one.
+    /// Quads of landmarks on which the recall of the short list in the largest map is measured.
     #[arg(long, default_value_t = 2000, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     recall_quads: u32,
     /// Rendered frames, 640 x 480; 0 leaves them out.
     #[arg(long, default_value_t = 48, value_parser = clap::value_parser!(u32).range(0..=1000))]
     frames: u32,
-    /// Times that each quad and each frame is done; the fastest counts.
+    /// Rounds over quads and frames; the fastest of each counts.
     #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
     rounds: u32,
     /// Views of the lesson.
@@ -52,15 +53,15 @@ pub(crate) struct Args {
     /// The Python that has OpenCV.
     #[arg(long, default_value = "python3", value_name = "PROGRAM")]
     python: PathBuf,
-    /// Posters, corridor, views and noise follow from it.
+    /// Seed of posters, corridor, views and noise.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// End with one JSON object instead of a table.
+    /// Print one JSON object instead of a table.
     #[arg(long)]
     json: bool,
 }
 
-/// Threads for preparing; what is timed runs on one.
+/// Threads that prepare; timed work runs on one.
 fn threads() -> usize {
     std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
 }
@@ -77,13 +78,13 @@ struct Report {
     lesson: lesson::Report,
 }
 
-/// What a landmark takes, kB, mean over the largest map.
+/// Memory of a landmark, kB, mean over the largest map.
 #[derive(Debug, Serialize)]
 struct Landmark {
     memory_kb: f64,
     /// Its parts.
     parts_kb: BTreeMap<&'static str, f64>,
-    /// As the server stores it.
+    /// Stored form of the model.
     stored_kb: f64,
     points: f64,
 }
@@ -104,7 +105,7 @@ impl Landmark {
 
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let p = Params::default();
-    // Posters of other numbers than those that are landmarks are strangers.
+    // Posters with other numbers than the landmarks' are distractors.
     let first = args.seed.wrapping_mul(1_000_003);
     let mut sizes: Vec<usize> = args.landmarks.iter().map(|n| *n as usize).collect();
     sizes.sort_unstable();
@@ -136,7 +137,7 @@ fn first_of(models: &[Arc<LandmarkModel>], count: usize, p: &Params) -> anyhow::
     Ok(ModelSet::new(models.iter().take(count).cloned().collect(), p)?)
 }
 
-/// The fastest of `rounds` times of `work`, ms of processor time, and what it gave.
+/// The fastest of `rounds` runs of `work`, ms of processor time, and its result.
 fn fastest<T>(rounds: usize, mut work: impl FnMut() -> T) -> (f64, T) {
     let mut timed = || {
         let clock = Clock::start();
@@ -159,8 +160,8 @@ fn table(r: &Report) -> String {
     lines.push("one quad, from the picture to the verdict".into());
     for q in &r.quads {
         lines.push(format!(
-            "  {:>6} landmarks  own {:.3} ms, stranger {:.3} ms; {} of {} right, {} wrong, {} of {} strangers taken",
-            q.landmarks, q.own_ms, q.stranger_ms, q.right, q.asked, q.wrong, q.strangers_accepted, q.asked
+            "  {:>6} landmarks  own {:.3} ms, distractor {:.3} ms; {} of {} right, {} wrong, {} of {} distractors taken",
+            q.landmarks, q.own_ms, q.distractor_ms, q.right, q.asked, q.wrong, q.distractors_accepted, q.asked
         ));
         let steps: Vec<String> = q.steps_ms.iter().map(|(step, ms)| format!("{step} {ms:.3}")).collect();
         lines.push(format!("                    mean of both: {}", steps.join(", ")));

@@ -1,4 +1,4 @@
-//! Axes, curves and bars of the evaluations' pictures, as SVG. What is drawn is each evaluation's own business.
+//! Axes, curves and bars of the evaluations' plots, as SVG.
 
 use std::fmt::Write as _;
 
@@ -26,7 +26,7 @@ impl Panel {
         Self { x0: LEFT + STEP * i as f64, title, x_name, x, log, y: [0.0, 1.0] }
     }
 
-    /// Where a point is drawn; beyond the axes, on them.
+    /// Position of a point, SVG px; clamped to the axes.
     pub(crate) fn at(&self, x: f64, y: f64) -> (f64, f64) {
         let f = |x: f64| if self.log { x.max(1e-9).log10() } else { x };
         let share = ((f(x) - f(self.x[0])) / (f(self.x[1]) - f(self.x[0]))).clamp(0.0, 1.0);

@@ -1,4 +1,5 @@
-//! `waymark-lab evaluate`: the paper's experiments on labelled pictures. Tables for people, one JSON object for programs.
+//! `waymark-lab evaluate`: the paper's experiments on labelled pictures. Tables for people, one JSON object for
+//! programs.
 
 pub(crate) mod chart;
 pub(crate) mod experiment;
@@ -21,84 +22,85 @@ pub(crate) mod visibility;
 pub(crate) enum Command {
     /// Quads against labelled corners: recall at IoU 0.7 and 0.85, false quads, corner error, time.
     ///
-    /// A set is a folder in the evaluation format (docs/EVALUATION.md), or `corridor` or `scenes`: rendered pictures with
-    /// exact truth, for which no data is needed. Figures come with 95 % confidence intervals, for all quads and by class, stratum,
-    /// size and angle of view.
+    /// A set is a folder in the evaluation format (docs/EVALUATION.md), or `corridor` or `scenes`: rendered
+    /// pictures with exact truth, for which no data is needed. Figures come with 95 % confidence intervals, for all
+    /// quads and by class, stratum, size and angle of view.
     ///
-    /// For example, what the search gains over the paper's grouping, and where it fails:
+    /// For example, the default detector beside the paper's grouping, with its worst pictures:
     ///   waymark-lab evaluate detection corridor --compare relaxation --plot recall.svg --worst 20 --draw worst
     #[command(verbatim_doc_comment)]
     Detection(Box<detection::Args>),
-    /// Teach a server from the set's pictures, then have it recognise the others over zenoh.
+    /// Teach a server from the set's pictures; it then recognises the others over zenoh.
     ///
     /// Starts a server of its own in a temporary folder. A landmark taught from one picture is learnt from views
     /// generated from it (warped, dimmed, blurred).
     Recognition(recognition::Args),
-    /// How obliquely a landmark may be seen: H^r, C^r and likeness over their thresholds, and the decision, by angle.
+    /// Recognition over the view angle: H^r, C^r and gradient similarity over their thresholds, and the decision.
     ///
-    /// Landmarks are rendered posters (and photographs, with --photographs), taught as a robot would teach them. Every
-    /// view has its own noise, blur, light and compression; only the angle is set. For example:
+    /// Landmarks are rendered posters (and photographs, with --photographs), taught as a robot would teach them.
+    /// Every view has its own noise, blur, light and compression; only the angle is set. For example:
     ///   waymark-lab evaluate viewpoint --plot viewpoint.svg
     ///   waymark-lab evaluate viewpoint --photographs museum-paintings --taught photograph --detector
     #[command(verbatim_doc_comment)]
     Viewpoint(experiment::viewpoint::Args),
-    /// How small a landmark may be seen: the same by apparent size, from 300 px down to 28.
+    /// Recognition over the apparent size, from 300 px down to 28.
     Scale(experiment::scale::Args),
-    /// Too dark, too bright, light from the side, a shadow's edge across: the same by each of them.
+    /// Recognition over illumination: darker, brighter, light from the side, a shadow's edge.
     Illumination(experiment::illumination::Args),
-    /// How much of a landmark may be hidden in its middle: the same by share of its area.
+    /// Recognition over the share of a landmark's area that is hidden in its middle.
     Occlusion(experiment::occlusion::Args),
-    /// How seldom a stranger is taken for a landmark: per pair by the paper's thresholds, per quad by the decision.
+    /// False acceptance of distractors: per pair by the paper's thresholds, per quad by the decision.
     ///
-    /// Strangers are posters that are not taught, photographs, doors, windows and tiles, and, as strata of their own,
-    /// look-alikes of landmarks made on purpose. Bounds are exact, by quads and by textures. For example:
-    ///   waymark-lab evaluate discrimination --landmarks 50,300 --views 40 --plot humps.svg
+    /// Distractors are posters that are not taught, photographs, doors, windows and tiles, and, as strata of their
+    /// own, look-alikes of landmarks made on purpose. Bounds are exact, by quads and by textures. For example:
+    ///   waymark-lab evaluate discrimination --landmarks 50,300 --views 40 --plot distances.svg
     #[command(verbatim_doc_comment)]
     Discrimination(experiment::discrimination::Args),
-    /// Pictures that are nearly the same (another text, one block changed, mirrored, two doors): told apart, refused as
-    /// ambiguous, or confused.
-    Lookalikes(experiment::doubles::Args),
-    /// Laser maps from recordings: error of relative poses, odometry alone and published figures beside it, walls, time.
+    /// Pairs of pictures that are nearly the same (another text, one block changed, mirrored, two doors):
+    /// distinguished, refused as ambiguous, or confused.
+    Lookalikes(experiment::look_alikes::Args),
+    /// Laser maps from scan logs: error of relative poses beside odometry alone and published figures, walls, time.
     ///
     /// For example:
     ///   waymark-lab evaluate mapping laser-carmen-corrected laser-intel-raw-odometry --draw maps --plot mapping.svg
     #[command(verbatim_doc_comment)]
     Mapping(mapping::Args),
-    /// Whether confidences keep their word: reliability diagram and expected calibration error.
+    /// Calibration of confidences: reliability diagram and expected calibration error.
     Confidence(experiment::confidence::Args),
-    /// Auto-calibration of a camera from views of one quad: error of the focal length by the number of views (Fig. 17).
+    /// Auto-calibration of a camera from views of one quad: error of the focal length by the number of views (Fig.
+    /// 17).
     ///
     /// Synthetic views with the constraints C1, C1+C2, C1+C3 and all, linear and refined; and real boards, their
     /// outermost quad against all their points and against what the set states. For example:
     ///   waymark-lab evaluate calibration calib-zhang calib-opencv-chessboard --plot calibration.svg
     #[command(verbatim_doc_comment)]
     Calibration(calibration::Args),
-    /// How good poses of landmarks and robots are, and whether their covariances keep their word.
+    /// Accuracy of landmark and robot poses, and consistency of their covariances.
     ///
-    /// The table of method 13.3, NEES over twelve cells of distance, angle and noise, flips of the planar ambiguity, OpenCV
-    /// on the same corners, several landmarks in one frame, simulated drives, cost.
+    /// The table of method 13.3, NEES over twelve cells of distance, angle and noise, flips of the planar
+    /// ambiguity, OpenCV on the same corners, several landmarks in one frame, simulated drives, cost.
     Pose(pose::Args),
     /// Landmarks placed on walls and ceilings from known robot poses, against the truth.
     ///
-    /// Generated rooms with everything uncertain drawn anew, rendered corridors with the detector's corners, and things
-    /// that hang on no wall.
+    /// Generated rooms with everything uncertain drawn anew, rendered corridors with the detector's corners, and
+    /// objects that hang on no wall.
     Placement(placement::Args),
-    /// Robots drive through the paper's corridor: how far off they are along it, with odometry alone beside it.
+    /// Robots drive through the paper's corridor: pose errors, beside those of odometry alone.
     ///
-    /// 25 m, four posters taught by a first drive, a start that nobody tells. Everything is rendered, nothing is needed.
+    /// 25 m, four posters taught by a first drive, unknown start poses. Everything is rendered; no data is needed.
     /// For example:
     ///   waymark-lab evaluate navigation --plot corridor.svg
     #[command(verbatim_doc_comment)]
     Navigation(navigation::Args),
-    /// Which modality to trust where: learnt from runs whose path is known, then driven with, mode by mode.
+    /// Modality statistics: learnt from reference runs, then used in every fusion mode.
     ///
-    /// A way of 55 m through a corridor (the laser tells nothing along it), a hall (the floor pushes odometry aside, no
+    /// A path of 55 m through a corridor (the laser does not constrain x), a hall (the floor disturbs odometry, no
     /// posters) and a workshop (its walls were moved after they were mapped). For example:
     ///   waymark-lab evaluate modalities --plot modalities.svg
     #[command(verbatim_doc_comment)]
     Modalities(modalities::Args),
-    /// From where landmarks are seen: closed-form areas against brute force on random maps, their sizes against counting,
-    /// and what they and the choice where to look cost.
+    /// Visibility areas in closed form against brute force on random maps, their sizes against counting, and the
+    /// time of areas and of gaze selection.
     Visibility(visibility::Args),
 }
 
@@ -112,7 +114,7 @@ pub(crate) fn run(command: &Command) -> anyhow::Result<()> {
         Command::Illumination(args) => experiment::illumination::run(args),
         Command::Occlusion(args) => experiment::occlusion::run(args),
         Command::Discrimination(args) => experiment::discrimination::run(args),
-        Command::Lookalikes(args) => experiment::doubles::run(args),
+        Command::Lookalikes(args) => experiment::look_alikes::run(args),
         Command::Confidence(args) => experiment::confidence::run(args),
         Command::Calibration(args) => calibration::run(args),
         Command::Pose(args) => pose::run(args),

@@ -1,6 +1,6 @@
-//! `waymark-lab evaluate placement`: landmarks placed on walls and ceilings from views of known robot poses, against the truth
-//! (method 11): in generated rooms with corners of known noise, in the rendered corridor with corners that the detector
-//! finds, and things that hang on no wall.
+//! `waymark-lab evaluate placement`: landmarks placed on walls and ceilings from views of known robot poses,
+//! compared with the truth (method 11): generated rooms with corners of known noise, the rendered corridor with
+//! detected corners, and objects that hang on no wall.
 
 mod rendered;
 mod rooms;
@@ -22,13 +22,13 @@ pub(crate) struct Args {
     /// Views of each landmark that are fused.
     #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u32).range(2..=64))]
     views: u32,
-    /// Rendered corridors whose posters and lamps are looked at with the detector; 0 for none.
+    /// Rendered corridors with posters and lamps in which the detector finds the corners; 0 for none.
     #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(0..=1_000))]
     corridors: u32,
-    /// Everything drawn follows from it.
+    /// Seed of all that is drawn.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// One JSON object instead of tables.
+    /// Print one JSON object instead of tables.
     #[arg(long)]
     json: bool,
 }
@@ -58,7 +58,7 @@ impl Outcome {
         Self { error, sigma: made.covariance.diagonal().map(f64::sqrt), nees }
     }
 
-    /// Every number within three standard deviations, and within a micrometre where there is no doubt.
+    /// Every number within three standard deviations, or within a micrometre if it has none.
     fn is_within_three_sigma(&self) -> bool {
         (0..6).all(|k| self.error[k].abs() <= 3.0 * self.sigma[k] + 1e-6)
     }
@@ -126,12 +126,12 @@ impl Summary {
     }
 }
 
-/// Things that hang on no wall.
+/// Objects that hang on no wall.
 #[derive(Debug, Clone, Serialize)]
 struct Strays {
     what: String,
     shown: usize,
-    /// Refused with the residual; the others were placed on the wall behind.
+    /// Refused by the residual; the others were placed on the wall behind.
     refused: usize,
     /// Of the refusals as "not on this wall": median residual, metres, and median roll, degrees.
     rms_m: f64,
@@ -146,9 +146,9 @@ struct Report {
 }
 
 pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
-    let (mut summaries, strays) = rooms::judged(args.rooms as usize, args.views as usize, args.seed);
+    let (mut summaries, strays) = rooms::evaluated(args.rooms as usize, args.views as usize, args.seed);
     if args.corridors > 0 {
-        summaries.extend(rendered::judged(args.corridors as usize, args.views as usize, args.seed));
+        summaries.extend(rendered::evaluated(args.corridors as usize, args.views as usize, args.seed));
     }
     let report = Report { seed: args.seed, summaries, strays };
     say(args.json, &report, || {

@@ -1,5 +1,6 @@
-//! `waymark-lab evaluate recognition`: a server of its own is taught from a labelled set over HTTP, then recognises the
-//! other pictures sent over zenoh. Right, wrong and missed identities, strangers refused and accepted, time.
+//! `waymark-lab evaluate recognition`: teaches a server of its own from a labelled set over HTTP, then sends the
+//! other pictures over zenoh. Counts right, wrong and missed names and distractors refused and accepted; measures
+//! time.
 
 use super::{
     statistics::median,
@@ -23,11 +24,11 @@ use vision::{
     recognise::DistanceKind,
 };
 
-/// An answer belongs to a labelled quad from this overlap on, or when it lies inside it (an inner border).
+/// An answer belongs to a labelled quad from this overlap on, or if it lies inside it (an inner border).
 const IOU_SAME: f64 = 0.5;
 const INNER_SHARE: f64 = 0.9;
 const MAP: &str = "evaluation";
-/// As the settings have it.
+/// Default of the settings.
 const FLEET: &str = "default";
 const ROBOT: &str = "evaluation";
 const CAMERA: &str = "photographs";
@@ -39,28 +40,28 @@ const ANSWER_TIMEOUT: Duration = Duration::from_mins(1);
 pub(crate) struct Args {
     /// Folder in the evaluation format (with a truth.json that has `teach`).
     set: PathBuf,
-    /// Generated views for each taught picture; left out, the server chooses.
+    /// Generated views for each taught picture; default: the server's choice.
     #[arg(long)]
     generated_views: Option<u32>,
     /// The distance that decides: both, correlation or hausdorff.
     #[arg(long, value_parser = server::cli::arg_parsers::distance)]
     distance: Option<DistanceKind>,
-    /// End with one JSON object instead of a table.
+    /// Print one JSON object instead of a table.
     #[arg(long)]
     json: bool,
-    /// Name every labelled quad that was not answered rightly, with the nearest candidates.
+    /// Name every labelled quad with a wrong or no name, with its nearest match candidates.
     #[arg(long)]
     misses: bool,
 }
 
-/// What became of the labelled quads of one group.
+/// Outcomes of the labelled quads of one group.
 #[derive(Debug, Default, Clone, Serialize)]
 struct Tally {
     right: usize,
     wrong: usize,
     missed: usize,
-    strangers_refused: usize,
-    strangers_accepted: usize,
+    distractors_refused: usize,
+    distractors_accepted: usize,
 }
 
 /// The figures of one set.
@@ -68,7 +69,7 @@ struct Tally {
 struct Report {
     set: String,
     taught: usize,
-    /// Landmarks whose model passed its gates and is in use.
+    /// Landmarks with an active model.
     active: usize,
     learn_s: f64,
     images: usize,
@@ -76,10 +77,10 @@ struct Report {
     tally: Tally,
     /// Median time from receipt to answer.
     ms_per_image: f64,
-    /// Unique answers on things that nobody labelled.
+    /// Unique answers where nothing is labelled.
     unlabelled_accepted: usize,
     unreadable: usize,
-    /// Crops that fill their picture: they have no border to detect.
+    /// Crops that fill their picture and so have no border to detect; left out.
     crops_left_out: usize,
     by_stratum: BTreeMap<String, Tally>,
 }
@@ -197,7 +198,7 @@ fn score(truth: &Truth, image: &TruthImage, answer: &Answer, args: &Args, report
             unique.iter().copied().filter(|q| belongs(&labelled.corners, q)).collect();
         let names: Vec<&str> = named.iter().map(|q| q.landmark.as_str()).collect();
         let tally = count(truth, labelled.landmark.as_deref(), &names);
-        if args.misses && tally.right + tally.strangers_refused == 0 {
+        if args.misses && tally.right + tally.distractors_refused == 0 {
             explain(image, labelled.landmark.as_deref(), &labelled.corners, answer);
         }
         report.tally.add(&tally);
@@ -208,7 +209,7 @@ fn score(truth: &Truth, image: &TruthImage, answer: &Answer, args: &Args, report
             report.unlabelled_accepted += 1;
             if args.misses {
                 screen::complain(&format!(
-                    "{}: {} seen where nothing is labelled",
+                    "{}: {} named where nothing is labelled",
                     image.file, quad.landmark
                 ));
             }
@@ -220,8 +221,8 @@ fn score(truth: &Truth, image: &TruthImage, answer: &Answer, args: &Args, report
 fn count(truth: &Truth, landmark: Option<&str>, names: &[&str]) -> Tally {
     let mut tally = Tally::default();
     match landmark {
-        None if names.is_empty() => tally.strangers_refused = 1,
-        None => tally.strangers_accepted = 1,
+        None if names.is_empty() => tally.distractors_refused = 1,
+        None => tally.distractors_accepted = 1,
         Some(_) if names.is_empty() => tally.missed = 1,
         Some(landmark) if names.iter().all(|name| truth.same_landmark(name, landmark)) => tally.right = 1,
         Some(_) => tally.wrong = 1,
@@ -234,14 +235,14 @@ impl Tally {
         self.right += other.right;
         self.wrong += other.wrong;
         self.missed += other.missed;
-        self.strangers_refused += other.strangers_refused;
-        self.strangers_accepted += other.strangers_accepted;
+        self.distractors_refused += other.distractors_refused;
+        self.distractors_accepted += other.distractors_accepted;
     }
 
     fn line(&self) -> String {
         format!(
-            "right {}, wrong {}, missed {}; strangers refused {}, accepted {}",
-            self.right, self.wrong, self.missed, self.strangers_refused, self.strangers_accepted
+            "right {}, wrong {}, missed {}; distractors refused {}, accepted {}",
+            self.right, self.wrong, self.missed, self.distractors_refused, self.distractors_accepted
         )
     }
 }
@@ -249,9 +250,9 @@ impl Tally {
 fn explain(image: &TruthImage, landmark: Option<&str>, labelled: &Corners, answer: &Answer) {
     let near = answer.quads.iter().filter(|q| belongs(labelled, q));
     let mut text = format!("{} is {landmark:?}:", image.file);
-    let mut seen = false;
+    let mut is_named = false;
     for quad in near {
-        seen = true;
+        is_named = true;
         let candidates: Vec<String> = quad
             .candidates
             .iter()
@@ -265,7 +266,7 @@ fn explain(image: &TruthImage, landmark: Option<&str>, labelled: &Corners, answe
             .collect();
         text.push_str(&[" [", quad.verdict().as_str_name(), " ", &candidates.join("; "), "]"].concat());
     }
-    if !seen {
+    if !is_named {
         text += " no quad there";
     }
     screen::complain(&text);

@@ -1,5 +1,5 @@
-//! The rendered sets: pictures of `sim` with exact truth, written as a folder in the evaluation format, so that they
-//! are evaluated, looked at and kept like any other set.
+//! The rendered sets: pictures of `sim` with exact truth, written as a folder in the evaluation format, so that
+//! they are used like any other set.
 
 use anyhow::Context as _;
 use image::{ExtendedColorType, ImageEncoder as _, codecs::png};
@@ -13,15 +13,15 @@ use sim::{
 use std::path::{Path, PathBuf};
 use vision::{detect::pyramid, frame::GrayImage};
 
-/// Name by which the rendered corridor is asked for in place of a folder.
+/// Argument that names the rendered corridor instead of a folder.
 const CORRIDOR: &str = "corridor";
-/// The same of the rendered scenes.
+/// Argument that names the rendered scenes.
 const SCENES: &str = "scenes";
 /// Pictures that hang in scenes are reduced to about this many pixels a side.
 const HUNG_SIDE_PX: usize = 256;
 
-/// The folder that a set is in. Where `corridor` or `scenes` is asked for in place of one, as many views are rendered:
-/// into `keep`, or into a folder that lasts as long as the second value.
+/// The folder of a set. For `corridor` or `scenes` views are rendered: into `keep`, or into a temporary folder that
+/// lasts as long as the second value.
 pub(crate) fn folder(
     set: &Path,
     keep: Option<&Path>,
@@ -42,18 +42,22 @@ pub(crate) fn folder(
     Ok((folder, scratch))
 }
 
-/// Renders the corridor's views into `folder`, which is made if it is not there.
+/// Renders the corridor's views into `folder`, which is created if it is missing.
 pub(crate) fn write_corridor(folder: &Path, params: &ViewsParams) -> anyhow::Result<()> {
     write(folder, Views::new(params).map(|v| (v.image, v.entry)), Views::data_set)
 }
 
-/// Renders scenes likewise; the pictures hang in them beside generated ones.
-pub(crate) fn write_scenes(folder: &Path, params: &ScenesParams, hung: Vec<Texture>) -> anyhow::Result<()> {
-    write(folder, Scenes::new(params, hung).map(|s| (s.image, s.entry)), Scenes::data_set)
+/// Renders scenes likewise, with `pictures` beside generated ones.
+pub(crate) fn write_scenes(
+    folder: &Path,
+    params: &ScenesParams,
+    pictures: Vec<Texture>,
+) -> anyhow::Result<()> {
+    write(folder, Scenes::new(params, pictures).map(|s| (s.image, s.entry)), Scenes::data_set)
 }
 
 /// The pictures of a folder, by name, to hang in scenes.
-pub(crate) fn hung(folder: &Path) -> anyhow::Result<Vec<Texture>> {
+pub(crate) fn pictures(folder: &Path) -> anyhow::Result<Vec<Texture>> {
     let entries = std::fs::read_dir(folder).with_context(|| format!("cannot read {}", folder.display()))?;
     let mut paths: Vec<PathBuf> = entries.filter_map(|e| e.ok().map(|e| e.path())).collect();
     paths.retain(|path| pictures::is_picture(path));
@@ -86,7 +90,7 @@ fn write(
         .with_context(|| format!("cannot write {}", path.display()))
 }
 
-/// A grey image as PNG, packed quickly: noise does not get smaller.
+/// A grey image as PNG, with fast compression: noise does not compress.
 fn png(image: &GrayImage) -> Result<Vec<u8>, image::ImageError> {
     let mut out = Vec::new();
     png::PngEncoder::new_with_quality(&mut out, png::CompressionType::Fast, png::FilterType::Sub)

@@ -1,7 +1,6 @@
-//! Reviewed lists: quads in a set's pictures that the set does not label, each looked at and written down: real
-//! four-sided things (signs, switches, windows), and false ones. An evaluation counts quads on real ones apart from the
-//! other false ones; the networks of the search learn from both. The lists are in `lab/reviewed`, one file a set,
-//! named after it.
+//! Reviewed lists: quads in a set's pictures that the set does not label, each judged by a person: real ones
+//! (signs, switches, windows), and false ones. An evaluation counts detections on real ones apart from other false
+//! ones; the detector's networks learn from both. The lists are in `lab/reviewed`, one file a set, named after it.
 
 use anyhow::Context as _;
 use serde::Deserialize;
@@ -18,15 +17,15 @@ const BUILT_IN: [(&str, &str); 6] = [
     ("signs-misc", include_str!("../../reviewed/signs-misc.json")),
 ];
 
-/// A quad that was looked at.
+/// A quad that a person judged.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Thing {
+pub(crate) struct ReviewedQuad {
     /// Clockwise on screen, pixels of the picture.
     pub(crate) corners: Corners,
     /// What it is.
     pub(crate) what: String,
-    /// Whether it is a thing, or lines that meet by chance.
+    /// Whether it is an object, or lines that meet by chance.
     #[serde(default = "yes")]
     pub(crate) real: bool,
 }
@@ -35,19 +34,19 @@ fn yes() -> bool {
     true
 }
 
-/// Things by file of the set.
+/// Quads by file of the set.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Reviewed(BTreeMap<String, Vec<Thing>>);
+pub(crate) struct Reviewed(BTreeMap<String, Vec<ReviewedQuad>>);
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct List {
     set: String,
-    images: BTreeMap<String, Vec<Thing>>,
+    images: BTreeMap<String, Vec<ReviewedQuad>>,
 }
 
 impl Reviewed {
-    /// The list in `file`; without one the list that comes with the program, if there is any for the set.
+    /// The list in `file`; by default the list that comes with the program, empty if there is none for the set.
     pub(crate) fn of(set: &str, file: Option<&Path>) -> anyhow::Result<Self> {
         if let Some(path) = file {
             let text =
@@ -67,13 +66,13 @@ impl Reviewed {
         Ok(Self(list.images))
     }
 
-    /// Every picture with what was looked at, by name.
-    pub(crate) fn pictures(&self) -> impl Iterator<Item = (&str, &[Thing])> {
-        self.0.iter().map(|(file, things)| (file.as_str(), things.as_slice()))
+    /// Every picture with its reviewed quads, by name.
+    pub(crate) fn pictures(&self) -> impl Iterator<Item = (&str, &[ReviewedQuad])> {
+        self.0.iter().map(|(file, quads)| (file.as_str(), quads.as_slice()))
     }
 
-    /// Quads that were looked at in one picture.
-    pub(crate) fn things(&self, file: &str) -> &[Thing] {
+    /// Reviewed quads of one picture.
+    pub(crate) fn quads(&self, file: &str) -> &[ReviewedQuad] {
         self.0.get(file).map_or(&[], Vec::as_slice)
     }
 }
@@ -86,22 +85,22 @@ mod tests {
     fn lists_that_come_with_the_program_are_sound() {
         for (name, _) in BUILT_IN {
             let list = Reviewed::of(name, None).unwrap();
-            for (file, things) in &list.0 {
-                assert!(!things.is_empty(), "{file}");
-                assert!(things.iter().all(|t| t.what.len() > 3), "{file}: says what each is");
+            for (file, quads) in &list.0 {
+                assert!(!quads.is_empty(), "{file}");
+                assert!(quads.iter().all(|t| t.what.len() > 3), "{file}: names each quad");
             }
             assert!(list.0.values().flatten().any(|t| t.real), "{name}");
         }
         let walk = Reviewed::of("museum-walk-estense", None).unwrap();
-        assert!(walk.pictures().flat_map(|p| p.1).any(|t| !t.real), "false ones are read as such");
-        assert!(Reviewed::of("no-such-set", None).unwrap().things("a.jpg").is_empty());
+        assert!(walk.pictures().flat_map(|p| p.1).any(|t| !t.real), "has false ones");
+        assert!(Reviewed::of("no-such-set", None).unwrap().quads("a.jpg").is_empty());
     }
 
     #[test]
     fn a_list_is_of_one_set() {
         let text =
             r#"{"set": "a", "images": {"x.jpg": [{"corners": [[0,0],[9,0],[9,9],[0,9]], "what": "label"}]}}"#;
-        assert_eq!(Reviewed::parse("a", text).unwrap().things("x.jpg").len(), 1);
+        assert_eq!(Reviewed::parse("a", text).unwrap().quads("x.jpg").len(), 1);
         assert!(Reviewed::parse("b", text).is_err());
         assert!(Reviewed::parse("a", &text.replace("[9,9]", "[-9,-9]")).is_err(), "no quad");
     }

@@ -40,8 +40,8 @@ pub(crate) fn wilson(hits: usize, of: usize) -> Interval {
     Interval((centre - half).max(0.0), (centre + half).min(1.0))
 }
 
-/// Exact one-sided upper bound at 95 % (Clopper and Pearson) of a share of which `hits` of `of` were seen: the share at
-/// which as few hits would be seen in one case of twenty. 1 where nothing was tried.
+/// Exact one-sided upper bound at 95 % (Clopper and Pearson) of a share of which `hits` of `of` trials are hits: the share at
+/// which as few hits occur in one case of twenty. 1 where nothing was tried.
 pub(crate) fn upper_bound(hits: usize, of: usize) -> f64 {
     if hits >= of {
         return 1.0;

@@ -1,6 +1,6 @@
-//! The evaluation format: a folder with `truth.json` and pictures (see docs/EVALUATION.md). Read once, checked here.
+//! The evaluation format: a folder with `truth.json` and pictures (see docs/EVALUATION.md), read and checked.
 
-use super::reviewed::{Reviewed, Thing};
+use super::reviewed::{Reviewed, ReviewedQuad};
 use serde::Deserialize;
 use std::{
     collections::BTreeMap,
@@ -19,7 +19,7 @@ pub(crate) enum TruthError {
     Corners { path: PathBuf, file: String, source: CornersError },
 }
 
-/// How much of a labelled quad can be seen.
+/// How much of a labelled quad is visible.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum QuadState {
@@ -42,16 +42,16 @@ impl QuadState {
 /// One labelled quad.
 #[derive(Debug, Clone)]
 pub(crate) struct TruthQuad {
-    /// The start corner may be any where the set's own notes say so.
+    /// From the landmark's own top-left; any start corner if the set's notes say so.
     pub(crate) corners: Corners,
-    /// `None`: a stranger, not among those taught.
+    /// `None`: a distractor.
     pub(crate) landmark: Option<String>,
     pub(crate) state: QuadState,
-    /// What it is, where the set says so.
+    /// Class of the object, if the set states it.
     pub(crate) class: Option<String>,
-    /// A detector must find it; else it is neither missed nor false.
+    /// A detector must find it; otherwise it is neither missed nor false.
     pub(crate) counted: bool,
-    /// Between its normal and the direction to the camera, where the set says so.
+    /// Between its normal and the direction to the camera, if the set states it.
     pub(crate) view_angle_rad: Option<f64>,
 }
 
@@ -69,7 +69,7 @@ pub(crate) struct TruthImage {
     pub(crate) file: String,
     pub(crate) stratum: String,
     pub(crate) quads: Vec<TruthQuad>,
-    /// Other real four-sided things, neither missed nor false.
+    /// Other real quads, neither missed nor false.
     pub(crate) others: Vec<Corners>,
     /// No other real quad is in the picture.
     pub(crate) quads_complete: bool,
@@ -110,20 +110,20 @@ impl Truth {
         Ok(Self { name: raw.name, images, teach, same })
     }
 
-    /// The same with what a reviewed list knows besides.
-    pub(crate) fn with_things(mut self, list: &Reviewed) -> Self {
+    /// The same with the quads of a reviewed list.
+    pub(crate) fn with_reviewed(mut self, list: &Reviewed) -> Self {
         for image in &mut self.images {
-            for thing in list.things(&image.file) {
-                if thing.real { &mut image.others } else { &mut image.false_quads }.push(thing.corners);
+            for quad in list.quads(&image.file) {
+                if quad.real { &mut image.others } else { &mut image.false_quads }.push(quad.corners);
             }
         }
         self
     }
 
-    /// The pictures of a reviewed list in `folder`, with what was looked at in them and nothing else.
+    /// The pictures of a reviewed list in `folder`, with its quads alone.
     pub(crate) fn of_reviewed(name: &str, folder: &Path, list: &Reviewed) -> Self {
-        let image = |(file, things): (&str, &[Thing])| {
-            let of = |real: bool| things.iter().filter(move |t| t.real == real).map(|t| t.corners);
+        let image = |(file, quads): (&str, &[ReviewedQuad])| {
+            let of = |real: bool| quads.iter().filter(move |t| t.real == real).map(|t| t.corners);
             let quad = |corners: Corners| TruthQuad {
                 corners,
                 landmark: None,

@@ -1,5 +1,6 @@
-//! `waymark-lab evaluate visibility`: the closed-form areas against brute force, their sizes against counting, and what they
-//! and the choice where to look cost; of landmarks on walls, and of tilted ones. Needs neither server nor data.
+//! `waymark-lab evaluate visibility`: visibility areas in closed form against brute force, their sizes against
+//! counting, and the time of areas and of gaze selection; for landmarks on walls and for tilted ones. Needs neither
+//! server nor data.
 
 use map::{
     gaze::{GazeCandidate, GazeParams, PanTiltUnit, rank},
@@ -12,14 +13,14 @@ use server::cli::{clock::Clock, screen};
 use std::{f64::consts::FRAC_PI_2, path::PathBuf};
 use vision::{model::LandmarkId, pose::LandmarkSize, random::Random};
 
-/// Landmarks of the hall in which the choice where to look is timed.
+/// Landmarks of the hall in which gaze selection is timed.
 const HALL: usize = 1000;
 
 /// `waymark-lab evaluate visibility`.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// Random maps: a landmark on its wall among a dozen obstacles; and as many with it under a ceiling, on the floor or
-    /// leaning.
+    /// Random maps: a landmark on its wall among a dozen obstacles; and as many with it under a ceiling, on the
+    /// floor or leaning.
     #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     maps: u32,
     /// Points compared, over all maps of a kind.
@@ -42,15 +43,15 @@ struct Plan {
     viewer: PanTiltCamera,
 }
 
-/// What was counted over maps of one kind.
+/// Counts over maps of one kind.
 #[derive(Debug, Default, serde::Serialize)]
 struct Compared {
     maps: u32,
-    /// Of them seen from nowhere: an obstacle cuts the landmark, or it is out of reach.
+    /// Maps with an empty area: an obstacle cuts the landmark, or it is out of reach.
     empty: u32,
     points: u32,
-    /// From which brute force sees the landmark.
-    seen: u32,
+    /// Points from which the landmark is visible by brute force.
+    visible: u32,
     differ: u32,
     agreement: f64,
     /// Sum of areas over the sum counted on grids, less 1.
@@ -66,7 +67,7 @@ struct Figures {
     upright: Compared,
     /// Under ceilings, on floors, leaning.
     tilted: Compared,
-    /// Median and worst milliseconds for the choice where to look among a thousand landmarks.
+    /// Median and worst milliseconds of gaze selection among a thousand landmarks.
     gaze_ms: [f64; 2],
     gaze_in_sight: usize,
 }
@@ -107,10 +108,10 @@ fn compared(args: &Args, plan: Planner, (drawn, place): (&mut String, u32)) -> a
         let reach = 1.05 * map.reach_m();
         for _ in 0..share {
             let q = at + Vector2::new(random.range(-reach, reach), random.range(-reach, reach));
-            let seen = pointwise::sees(&plan.place, &plan.obstacles, &plan.viewer, &p, &q);
+            let visible = pointwise::sees(&plan.place, &plan.obstacles, &plan.viewer, &p, &q);
             let inside = map.polygons().iter().any(|polygon| polygon.contains(&q));
-            figures.seen += u32::from(seen);
-            figures.differ += u32::from(seen != inside);
+            figures.visible += u32::from(visible);
+            figures.differ += u32::from(visible != inside);
         }
         counted += counted_m2(&plan, &p, map.reach_m());
         area += map.area_m2();
@@ -131,8 +132,8 @@ fn show(f: &Figures, json: bool) -> anyhow::Result<()> {
     }
     for (kind, c) in [("on walls", &f.upright), ("tilted", &f.tilted)] {
         let [ms, worst] = c.ms_per_landmark;
-        screen::say(&format!("maps, {kind:<9}           {} ({} seen from nowhere)", c.maps, c.empty));
-        screen::say(&format!("points                    {} ({} from which it is seen)", c.points, c.seen));
+        screen::say(&format!("maps, {kind:<9}           {} ({} with an empty area)", c.maps, c.empty));
+        screen::say(&format!("points                    {} ({} inside by brute force)", c.points, c.visible));
         let agree = 100.0 * c.agreement;
         screen::say(&format!("polygons, brute force     {} differ, {agree:.3} % agree", c.differ));
         screen::say(&format!("areas against counting    {:+.3} %", 100.0 * c.area_error));
@@ -140,7 +141,7 @@ fn show(f: &Figures, json: bool) -> anyhow::Result<()> {
     }
     let [gaze, slowest] = f.gaze_ms;
     screen::say(&format!(
-        "where to look, of {HALL}    {gaze:.3} ms, at most {slowest:.3} ({} in sight)",
+        "gaze selection, {HALL}    {gaze:.3} ms, at most {slowest:.3} ({} in sight)",
         f.gaze_in_sight
     ));
     Ok(())
@@ -179,7 +180,8 @@ fn plan(random: &mut Random) -> anyhow::Result<Plan> {
     Ok(Plan { place, obstacles, viewer })
 }
 
-/// The same with the landmark under the ceiling, on the floor or leaning, off its wall, and a camera that looks there.
+/// The same with the landmark under the ceiling, on the floor or leaning, off its wall, and a camera that can be
+/// aimed at it.
 fn tilted_plan(random: &mut Random) -> anyhow::Result<Plan> {
     let mut made = plan(random)?;
     let tilt_rad = match random.next_u64() % 4 {
@@ -208,7 +210,8 @@ fn counted_m2(plan: &Plan, p: &VisibilityParams, reach_m: f64) -> f64 {
     (0..SIDE * SIDE).filter(sees).count() as f64 * cell * cell
 }
 
-/// A hall with a thousand landmarks in rows: milliseconds of a choice, and how many landmarks were in sight.
+/// A hall with a thousand landmarks in rows: median and worst milliseconds of gaze selection, and landmarks in its
+/// result.
 fn gaze_ms(seed: u64) -> anyhow::Result<([f64; 2], usize)> {
     let (viewer, p) = (PanTiltCamera::default(), VisibilityParams::default());
     let size = LandmarkSize { width_m: 0.6, height_m: 0.84 };

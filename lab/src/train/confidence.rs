@@ -1,5 +1,5 @@
-//! `waymark-lab train confidence`: the weights of the confidence from answers whose truth is known. Answers in, a source file
-//! out; the regression is `vision`'s, the answers are those of `waymark-lab evaluate confidence`, of another set.
+//! `waymark-lab train confidence`: fits the weights of the confidence to answers whose truth is known: those of
+//! `waymark-lab evaluate confidence`, on another set. Answers in, a source file out.
 
 use super::confidence_fit::{Answer, fit};
 use super::provenance::Provenance;
@@ -94,7 +94,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn weights_are_written_as_they_are() {
+    fn the_source_has_the_weights_exactly() {
         let from = Provenance::of_this_run(&[]).unwrap();
         let text = source(&[(DistanceKind::Both, [-1.5, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 6.25])], &from);
         let constant =

@@ -1,19 +1,19 @@
-//! Answers whose truth is known in, the weights of the confidence out: logistic regression with a small ridge, in which
-//! no measure may speak for an answer the worse it is. Gathering answers, and judging what came of it, is the caller's.
+//! Answers whose truth is known in, the weights of the confidence out: logistic regression with a small ridge, in
+//! which no measure may raise the confidence of an answer by being worse.
 
 use nalgebra::{SMatrix, SVector};
 use vision::recognise::decision::{confidence::chance, measures::MEASURES};
 
 /// Newton's steps; a few are enough, as the loss is convex.
 const STEPS: usize = 50;
-/// Longest step of a weight: with few wrong answers the first steps would run away.
+/// Longest step of a weight: with few wrong answers the first steps would diverge.
 const LONGEST: f64 = 4.0;
-/// What a weight's square costs, in answers. Keeps weights finite where right and wrong are separable.
+/// Penalty of a weight's square, in answers. Keeps weights finite if right and wrong are separable.
 const RIDGE: f64 = 0.05;
-/// One for each measure, and one of no measure, the last.
+/// One for each measure, and the bias, the last.
 pub(crate) const WEIGHTS: usize = MEASURES + 1;
 
-/// One answer: what it rests on, and whether it was right.
+/// One answer: its measures, and whether it was right.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Answer {
     /// See [`vision::recognise::decision::measures::measures`].
@@ -22,7 +22,7 @@ pub(crate) struct Answer {
     pub(crate) is_right: bool,
 }
 
-/// Why nothing could be learnt.
+/// Why there is no fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum ConfidenceError {
     /// All answers are right, or all wrong.
@@ -38,7 +38,7 @@ pub(crate) enum ConfidenceError {
     Malformed(usize),
 }
 
-/// The weights under which the answers are likeliest, with four digits after the point: what is written is what is used.
+/// Maximum-likelihood weights, rounded to four digits after the point, as they are written.
 pub(crate) fn fit(answers: &[Answer]) -> Result<[f64; WEIGHTS], ConfidenceError> {
     if let Some(i) = answers.iter().position(|a| a.measures.iter().any(|m| !m.is_finite())) {
         return Err(ConfidenceError::Malformed(i));
@@ -47,7 +47,7 @@ pub(crate) fn fit(answers: &[Answer]) -> Result<[f64; WEIGHTS], ConfidenceError>
     if right == 0 || right == answers.len() {
         return Err(ConfidenceError::OneClass { right, answers: answers.len() });
     }
-    // Measures that would speak for an answer the worse they are have no say, and the others are fitted anew.
+    // Measures with a weight of the wrong sign get 0, and the others are fitted again.
     let mut free = [true; WEIGHTS];
     loop {
         let weights = newton(answers, free);
@@ -93,8 +93,8 @@ mod tests {
     use super::*;
     use vision::random::Random;
 
-    /// Answers that are right as often as a logistic curve of the first and third measure says; the fifth measure speaks
-    /// the wrong way round.
+    /// Answers whose chance of being right is a logistic curve of the first and third measure; the fifth has the
+    /// wrong sign.
     fn answers(count: usize) -> (Vec<Answer>, [f64; WEIGHTS]) {
         let mut weights = [0.0; WEIGHTS];
         (weights[0], weights[2], weights[4], weights[MEASURES]) = (-5.0, -3.0, 1.0, 4.0);
@@ -107,23 +107,23 @@ mod tests {
     }
 
     #[test]
-    fn the_curve_that_answers_follow_is_found() {
+    fn the_true_logistic_curve_is_recovered() {
         let (answers, truth) = answers(40_000);
         let found = fit(&answers).unwrap();
         assert!((found[0] - truth[0]).abs() < 0.3 && (found[2] - truth[2]).abs() < 0.3, "{found:?}");
-        assert!(found[4].abs() < 1e-12, "a measure that is good for an answer when it is bad has no say");
+        assert!(found[4].abs() < 1e-12, "a measure of the wrong sign has weight 0");
         assert!(
             (found[MEASURES] - truth[MEASURES] - 0.5).abs() < 0.3,
-            "the mean of what has no say: {found:?}"
+            "the mean goes into the bias: {found:?}"
         );
-        // Calibrated: mean chance is the share right.
+        // Calibrated: the mean confidence is the share right.
         let mean = answers.iter().map(|a| chance(&found, &a.measures)).sum::<f64>() / answers.len() as f64;
         let share = answers.iter().filter(|a| a.is_right).count() as f64 / answers.len() as f64;
         assert!((mean - share).abs() < 1e-3, "{mean} {share}");
     }
 
     #[test]
-    fn nothing_to_learn_is_said() {
+    fn answers_of_one_kind_are_refused() {
         let answer = |is_right, m| Answer { measures: [m; MEASURES], is_right };
         assert_eq!(fit(&[]), Err(ConfidenceError::OneClass { right: 0, answers: 0 }));
         assert_eq!(fit(&[answer(true, 0.5)]), Err(ConfidenceError::OneClass { right: 1, answers: 1 }));

@@ -1,6 +1,7 @@
-//! Weights of the cues from labelled photographs (method 2): pairs of segments that lie on opposite sides of a labelled
-//! quad against all others that pass the gates. Logistic regression with no weight below zero, both classes weighing
-//! the same; every photograph is judged by a fit without its fifth of the photographs. Reads no files.
+//! Weights of the cues from labelled photographs (method 2): pairs of segments that lie on opposite sides of a
+//! labelled quad against all others that pass the gates. Logistic regression with weights of at least zero, both
+//! classes with the same total weight. Every photograph is scored by a fit without its fifth of the photographs.
+//! Reads no files.
 
 use nalgebra::Point2;
 use vision::{
@@ -17,9 +18,9 @@ pub(crate) const MAX_PAIRS_FITTED: usize = 1_000_000;
 pub(crate) const MIN_PAIRS_OF_A_KIND: usize = 20;
 /// Parts of the cross-validation.
 pub(crate) const FOLDS: usize = 5;
-/// Share of the true pairs whose score the smallest score lets through.
-pub(crate) const KEPT_SHARE: f64 = 0.95;
-/// Weight of the squared coefficients, so that cues that say the same share what they say.
+/// Share of the true pairs that score above `min_score`.
+pub(crate) const RECALL_SHARE: f64 = 0.95;
+/// Weight of the squared coefficients; correlated cues then share their weight.
 const RIDGE: f64 = 1e-4;
 /// Rounds over all coefficients.
 const MAX_ROUNDS: usize = 200;
@@ -40,12 +41,12 @@ pub(crate) enum CueFitError {
     /// More pairs than [`MAX_PAIRS_FITTED`].
     #[error("{0} pairs, {MAX_PAIRS_FITTED} at most")]
     TooMany(usize),
-    /// No cue tells the two kinds apart.
-    #[error("no cue tells opposite sides from other pairs")]
+    /// No cue separates the two kinds.
+    #[error("no cue separates opposite sides from other pairs")]
     NothingTells,
 }
 
-/// A candidate pair that labels judged.
+/// A candidate pair with its label.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct LabelledPair {
     /// c1 to c6.
@@ -56,7 +57,8 @@ pub(crate) struct LabelledPair {
     pub(crate) photograph: usize,
 }
 
-/// Parameters of [`vision::detect::relaxation::similarity::pairs`] that keep every pair that passes the gates, whatever its score.
+/// Parameters of [`vision::detect::relaxation::similarity::pairs`] that keep every pair that passes the gates,
+/// whatever its score.
 pub(crate) fn ungraded(p: &SimilarityParams) -> SimilarityParams {
     SimilarityParams {
         min_score: 0.0,
@@ -65,23 +67,23 @@ pub(crate) fn ungraded(p: &SimilarityParams) -> SimilarityParams {
     }
 }
 
-/// Judges candidate pairs by labelled quads. A pair along another border of a labelled thing (`IoU` of half with it), or
-/// along one of `others` (real quads that nobody asks for), is left out, as neither answer would be fair.
-pub(crate) fn judge(
+/// Labels candidate pairs by labelled quads. A pair along another border of a labelled object (`IoU` of half with
+/// it), or along one of `others` (real quads that do not count), is left out: it is neither.
+pub(crate) fn label_pairs(
     segments: &[EdgeSegment],
     pairs: &[SegmentPair],
     labelled: &[Corners],
     others: &[Corners],
     photograph: usize,
 ) -> Vec<LabelledPair> {
-    let judged = |pair: &SegmentPair| {
+    let labelled = |pair: &SegmentPair| {
         let (k, l) = (&segments[pair.k], &segments[pair.l]);
         let opposite = labelled.iter().any(|q| opposite_sides(k, l, q.points()));
         let near = |q: &Corners| polygon::iou(&pair.quad_px, q.points()) >= 0.5;
         let fair = opposite || !labelled.iter().chain(others).any(near);
         fair.then_some(LabelledPair { cues: pair.cues, opposite, photograph })
     };
-    pairs.iter().filter_map(judged).collect()
+    pairs.iter().filter_map(labelled).collect()
 }
 
 /// Whether two segments lie on opposite sides of a quad.
@@ -89,8 +91,8 @@ fn opposite_sides(k: &EdgeSegment, l: &EdgeSegment, corners: &[Point2<f64>; 4]) 
     (0..4).any(|i| on_side(k, corners, i) && on_side(l, corners, (i + 2) % 4))
 }
 
-/// Whether a segment covers most of a side: ends near its line, by 2 % of the quad's size or 3 px, and at least 60 % of
-/// its length.
+/// Whether a segment covers most of a side: ends near its line, by 2 % of the quad's size or 3 px, and at least 60
+/// % of its length.
 fn on_side(s: &EdgeSegment, corners: &[Point2<f64>; 4], side: usize) -> bool {
     let (from, to) = (corners[side], corners[(side + 1) % 4]);
     let (along, length) = ((to - from).normalize(), (to - from).norm());
@@ -100,22 +102,22 @@ fn on_side(s: &EdgeSegment, corners: &[Point2<f64>; 4], side: usize) -> bool {
     near(&s.p_px) && near(&s.q_px) && (at(&s.p_px) - at(&s.q_px)).abs() >= 0.6 * length
 }
 
-/// What a fit found.
+/// A fit with its figures.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct FittedSimilarity {
     /// Weights of the cues; they sum to 1.
     pub(crate) weights: [f64; 6],
-    /// Smallest score: [`KEPT_SHARE`] of the pairs of opposite sides lie above it.
+    /// Smallest score: [`RECALL_SHARE`] of the pairs of opposite sides lie above it.
     pub(crate) min_score: f64,
     /// Pairs of opposite sides, and others.
     pub(crate) counts: [usize; 2],
     /// Mean cues of both.
     pub(crate) mean_cues: [[f64; 6]; 2],
-    /// How often a pair of opposite sides scores above another pair, with the weights given at the start.
+    /// Share of comparisons in which a pair of opposite sides scores above another pair, with the previous weights.
     pub(crate) order_before: f64,
     /// The same with fitted weights, each pair scored by a fit without its part of the photographs.
     pub(crate) order_after: f64,
-    /// Share of the other pairs above the smallest score that keeps [`KEPT_SHARE`], before and (held out) after.
+    /// Share of the other pairs above the smallest score that keeps [`RECALL_SHARE`], before and (held out) after.
     pub(crate) passing: [f64; 2],
 }
 
@@ -211,11 +213,11 @@ fn weights(pairs: &[LabelledPair]) -> Result<[f64; 6], CueFitError> {
     }
 }
 
-/// The score that [`KEPT_SHARE`] of the pairs of opposite sides exceed.
+/// The score that [`RECALL_SHARE`] of the pairs of opposite sides exceed.
 fn keeping(scored: &[(f64, bool)]) -> f64 {
     let mut scores: Vec<f64> = scored.iter().filter(|s| s.1).map(|s| s.0).collect();
     scores.sort_by(f64::total_cmp);
-    let at = ((1.0 - KEPT_SHARE) * scores.len() as f64) as usize;
+    let at = ((1.0 - RECALL_SHARE) * scores.len() as f64) as usize;
     scores.get(at).map_or(0.0, |s| s - 1e-9)
 }
 
@@ -229,7 +231,7 @@ fn passing(scored: &[(f64, bool)]) -> f64 {
     passed as f64 / all.max(1) as f64
 }
 
-/// Probability that a pair of opposite sides scores above another pair, ties counting half (area under the curve).
+/// Area under the ROC curve: probability that a pair of opposite sides scores above another pair, ties counting half.
 fn order(scored: &[(f64, bool)]) -> f64 {
     let mut sorted = scored.to_vec();
     sorted.sort_by(|a, b| a.0.total_cmp(&b.0));

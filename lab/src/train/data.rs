@@ -1,4 +1,4 @@
-//! What the networks of the search learn from: the detector runs over labelled pictures, and its lines and quads are
+//! Training data of the detector's networks: the detector runs over labelled pictures, and its lines and quads are
 //! compared with the labels.
 
 use super::network_training::{ChoiceExample, LabelledExample};
@@ -10,7 +10,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use vision::{
     detect::{
         DetectParams, Quad,
-        border_model::choose_sides::rivals,
+        border_model::choose_sides::side_candidates,
         edge_support::gradients::Gradients,
         pyramid, scored_quads,
         suppression::non_maximum::{snap_sides, suppress_overlaps},
@@ -22,33 +22,33 @@ use vision::{
     trace::NoTrace,
 };
 
-/// A found quad belongs to a labelled one from this overlap on, as far as its sides are concerned.
-const SAME_THING: f64 = 0.5;
-/// A side of which no line is this near to the label teaches nothing, px of the working image.
+/// A detected quad's sides are compared with a labelled quad from this overlap on.
+const SAME_OBJECT: f64 = 0.5;
+/// A side without a line this near to the label is left out, px of the working image.
 const MAX_OFF_PX: f64 = 4.0;
-/// From this overlap with a label on a quad is a thing; with a label that does not count, from the second.
-const THING: [f64; 2] = [0.6, 0.75];
-/// Below this overlap with all labels it is none.
-const NO_THING: f64 = 0.5;
-/// An inner border covers at least this share of its label: neither the one nor the other.
+/// Overlap with a label from which a quad is an object; the second for labels that do not count.
+const OBJECT: [f64; 2] = [0.6, 0.75];
+/// Below this overlap with all labels a quad is no object.
+const NO_OBJECT: f64 = 0.5;
+/// An inner border covers at least this share of its label; it is neither object nor none.
 const INNER_AREA: f64 = 0.25;
 const INNER_TOLERANCE_PX: f64 = 4.0;
-/// Every quad that is told is at least so likely a thing.
+/// Least probability of the quad classifier while gathering: all quads are examples.
 const SURE: f64 = 0.0;
 
 /// A labelled set, and in which part of the data each of its images is.
 #[derive(Debug)]
 pub(super) struct Set {
     pub(super) truth: Truth,
-    /// How many times its labels count.
+    /// Weight of its labels.
     pub(super) weight: f64,
     /// Of each image.
     parts: Vec<usize>,
 }
 
 impl Set {
-    /// Deals the images to so many parts of about the same size. Images that show one landmark stay together, where
-    /// landmarks are taught; elsewhere each image stands for itself.
+    /// Deals the images to `parts` parts of about the same size. If landmarks are taught, images of one landmark
+    /// stay in one part.
     pub(super) fn new(truth: Truth, weight: f64, parts: usize) -> Self {
         let parts = if truth.teach.is_empty() {
             (0..truth.images.len()).map(|i| i % parts.max(1)).collect()
@@ -58,7 +58,7 @@ impl Set {
         Self { truth, weight, parts }
     }
 
-    /// The images to learn from or to be judged by, with their part.
+    /// The images with their part.
     pub(super) fn images(&self) -> impl Iterator<Item = (&TruthImage, usize)> {
         self.truth.images.iter().zip(self.parts.iter().copied()).filter(|(image, _)| !image.whole_image)
     }
@@ -89,12 +89,12 @@ fn dealt(images: &[TruthImage], parts: usize) -> Vec<usize> {
     group.iter().map(|g| part.get(g).copied().unwrap_or(0)).collect()
 }
 
-/// All that is to be learnt from. Groups are the parts of the data.
+/// Examples of both networks. Groups are the parts of the data.
 #[derive(Debug, Default)]
 pub(super) struct Data {
     pub(super) images: usize,
     pub(super) sides: Vec<ChoiceExample>,
-    pub(super) things: Vec<LabelledExample>,
+    pub(super) quads: Vec<LabelledExample>,
 }
 
 impl Data {
@@ -102,7 +102,7 @@ impl Data {
     pub(super) fn gather(sets: &[Set], params: &DetectParams, min_side_px: f64) -> anyhow::Result<Self> {
         let mut data = Self::default();
         let mut params = params.clone();
-        // The first by rank hides what contradicts it, thing or not: what is told apart later has little in common.
+        // Non-maximum suppression by rank runs first, as in the detector; the examples left overlap little.
         params.quads.sure_probability = SURE;
         for set in sets {
             let progress = screen::progress(set.images().count(), "searching");
@@ -139,8 +139,8 @@ impl Data {
         }
         for classified in snap_sides(rated, &g, &params.quads) {
             let Some(corners) = classified.quad.corners_px.scaled(factor as f64) else { continue };
-            let Some(is_one) = is_thing(&corners, image) else { continue };
-            self.things.push(LabelledExample {
+            let Some(is_one) = is_object(&corners, image) else { continue };
+            self.quads.push(LabelledExample {
                 group,
                 weight,
                 features: classified.features.to_vec(),
@@ -156,11 +156,11 @@ impl Data {
 fn sides(g: &Gradients, found: &[Quad], label: &Corners, group: usize, weight: f64) -> Vec<ChoiceExample> {
     let overlap = |q: &Quad| polygon::iou(label.points(), q.corners_px.points());
     let best = found.iter().map(|q| (overlap(q), q)).reduce(|a, b| if b.0 > a.0 { b } else { a });
-    let Some((_, quad)) = best.filter(|b| b.0 > SAME_THING) else { return vec![] };
+    let Some((_, quad)) = best.filter(|b| b.0 > SAME_OBJECT) else { return vec![] };
     let start = quad.corners_px.points();
     let label = aligned(label, start);
     let mut all = Vec::new();
-    for (side, lines) in rivals(g, start).iter().enumerate() {
+    for (side, lines) in side_candidates(g, start).iter().enumerate() {
         let off = |ends: &[Point2<f64>; 2]| {
             let along = ends[1] - ends[0];
             let beside = |p: &Point2<f64>| along.perp(&(p - ends[0])).abs() / along.norm();
@@ -175,7 +175,7 @@ fn sides(g: &Gradients, found: &[Quad], label: &Corners, group: usize, weight: f
     all
 }
 
-/// The label's corners, named from the one that fits best.
+/// The label's corners, in the cyclic order that fits best.
 fn aligned(label: &Corners, to: &[Point2<f64>; 4]) -> [Point2<f64>; 4] {
     let gap =
         |shift: usize| label.rotated(shift).points().iter().zip(to).map(|(a, b)| (a - b).norm()).sum::<f64>();
@@ -183,11 +183,11 @@ fn aligned(label: &Corners, to: &[Point2<f64>; 4]) -> [Point2<f64>; 4] {
     *label.rotated(shift).points()
 }
 
-/// Whether a found quad is a labelled thing; none where the labels do not say: loosely on a label, off the labels of an
-/// incomplete picture, on another real thing that is no border of a label.
-fn is_thing(found: &Corners, image: &TruthImage) -> Option<bool> {
+/// Whether a detected quad is a labelled object; `None` if the labels do not say: it overlaps a label loosely, lies
+/// off the labels of an incomplete picture, or on another real quad that is no border of a label.
+fn is_object(found: &Corners, image: &TruthImage) -> Option<bool> {
     let overlap = |o: &Corners| polygon::iou(o.points(), found.points());
-    if image.false_quads.iter().any(|q| overlap(q) >= THING[0]) {
+    if image.false_quads.iter().any(|q| overlap(q) >= OBJECT[0]) {
         return Some(false);
     }
     let border = |o: &Corners| {
@@ -199,14 +199,14 @@ fn is_thing(found: &Corners, image: &TruthImage) -> Option<bool> {
     let others = image.others.iter().map(|o| (overlap(o), if border(o) { 1 } else { 2 }, o));
     let (best, kind) =
         labels.chain(others).fold((0.0, 0), |best, x| if x.0 > best.0 { (x.0, x.1) } else { best });
-    if best >= THING[kind.min(1)] {
+    if best >= OBJECT[kind.min(1)] {
         return (kind < 2).then_some(true);
     }
     let inner = |o: &Corners| {
         polygon::relation(o.points(), found.points(), INNER_TOLERANCE_PX) == Relation::Contains
             && found.area_px2() > INNER_AREA * o.area_px2()
     };
-    let unclear = best >= NO_THING || !image.quads_complete || image.quads.iter().any(|q| inner(&q.corners));
+    let unclear = best >= NO_OBJECT || !image.quads_complete || image.quads.iter().any(|q| inner(&q.corners));
     (!unclear).then_some(false)
 }
 
@@ -236,28 +236,28 @@ mod tests {
     }
 
     #[test]
-    fn things_are_told_from_labels() {
-        let of = |x, size| is_thing(&card(x, size), &image(true, true));
+    fn labels_decide_what_is_an_object() {
+        let of = |x, size| is_object(&card(x, size), &image(true, true));
         assert_eq!((of(5.0, 100.0), of(200.0, 50.0)), (Some(true), Some(false)));
         // Half on the label, and an inner border.
         assert_eq!((of(29.0, 100.0), of(20.0, 60.0)), (None, None));
-        // A detail is none; of another thing beside the labels nothing is said.
+        // A detail is none; another real quad beside the labels has no label.
         assert_eq!((of(20.0, 30.0), of(300.0, 99.0)), (Some(false), None));
-        // A listed inner border is one, and what is known to be false is not.
+        // A listed inner border is one, a listed false quad is not.
         let mut bordered = image(true, true);
         bordered
             .others
             .push(Corners::try_from([[9.0, 9.0], [91.0, 9.0], [91.0, 91.0], [9.0, 91.0]]).unwrap());
         let inner = Corners::try_from([[12.0, 12.0], [89.0, 12.0], [89.0, 89.0], [12.0, 89.0]]).unwrap();
-        assert_eq!((is_thing(&inner, &image(true, true)), is_thing(&inner, &bordered)), (None, Some(true)));
-        assert_eq!(is_thing(&card(602.0, 100.0), &image(true, false)), Some(false));
-        // Loosely on what does not count: not said. Off an incomplete picture's labels: not said.
-        assert_eq!(is_thing(&card(20.0, 100.0), &image(false, true)), None);
-        assert_eq!(is_thing(&card(200.0, 50.0), &image(true, false)), None);
+        assert_eq!((is_object(&inner, &image(true, true)), is_object(&inner, &bordered)), (None, Some(true)));
+        assert_eq!(is_object(&card(602.0, 100.0), &image(true, false)), Some(false));
+        // No label: loosely on a quad that does not count, and off the labels of an incomplete picture.
+        assert_eq!(is_object(&card(20.0, 100.0), &image(false, true)), None);
+        assert_eq!(is_object(&card(200.0, 50.0), &image(true, false)), None);
     }
 
     #[test]
-    fn no_landmark_is_in_two_parts_and_parts_are_alike() {
+    fn no_landmark_is_in_two_parts_and_parts_are_of_equal_size() {
         let shows = |names: &[&str]| {
             let mut shown = image(true, true);
             let quad = shown.quads[0].clone();
@@ -278,7 +278,7 @@ mod tests {
     }
 
     #[test]
-    fn a_label_is_named_from_the_corner_that_fits() {
+    fn a_labels_corners_start_where_they_fit() {
         let (label, found) = (card(0.0, 100.0), card(1.0, 100.0));
         assert_eq!(aligned(&label.rotated(3), found.points()), *label.points());
     }

@@ -1,9 +1,8 @@
-//! Trains the small networks of the search from labelled pictures: measurements with what is right in, weights out.
-//! Reads no images. Same data, same seed: same weights.
-//! What comes out is for `Network`: which measurements go in is the caller's matter.
+//! Trains the detector's small networks: labelled measurements in, a `Network` out. Same data, same seed: same
+//! weights. The caller decides which measurements go in.
 //!
-//! Two tasks: of some rivals the right one (the share of its exponential is its chance, as in a conditional logit), and
-//! of every example whether it is one (logistic). All data at every step, Adam, weights kept small by a ridge.
+//! Two tasks: the right one of several candidates (conditional logit), and whether an example is one (logistic).
+//! Full batches, Adam, weights kept small by a ridge.
 
 use vision::{
     detect::border_model::{
@@ -13,36 +12,37 @@ use vision::{
     random::Random,
 };
 
-/// Scaled measurements beyond this many deviations count as this far, as in [`Network::output`].
+/// Scaled measurements are clipped at this many deviations, as in [`Network::output`].
 const CLIP: f64 = 4.0;
-/// Decay of Adam's mean of slopes and of their squares, and what keeps its quotient finite.
+/// Adam: decay of the means of the gradient and of its square, and the term that keeps the quotient finite.
 const ADAM: [f64; 3] = [0.9, 0.99, 1e-8];
-/// Deviations of the first weights into and out of the hidden units, the former over the root of their number.
+/// Standard deviations of the initial weights into and out of the hidden units, the former over the root of their
+/// number.
 const FIRST: [f64; 2] = [0.6, 0.3];
-/// A measurement that varies less tells nothing: it is scaled by 1.
+/// A measurement that varies less is scaled by 1.
 const MIN_DEVIATION: f64 = 1e-9;
 /// Most steps of a training.
 pub(crate) const MAX_STEPS: usize = 100_000;
 
-/// Candidates of which one or more are right.
+/// Candidates of which at least one is right.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ChoiceExample {
-    /// Which part of the data they are in: for whoever holds parts out.
+    /// Part of the data, for holding parts out.
     pub(crate) group: usize,
-    /// How many times these rivals count, above 0.
+    /// Weight of these candidates, above 0.
     pub(crate) weight: f64,
     /// Each candidate's measurements.
     pub(crate) features: Vec<Vec<f64>>,
-    /// How far each candidate is from what is right.
+    /// Distance of each candidate from the truth.
     pub(crate) off: Vec<f64>,
 }
 
-/// One candidate that is right or is not.
+/// One labelled candidate.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct LabelledExample {
     /// As for [`ChoiceExample`].
     pub(crate) group: usize,
-    /// How many times it counts, above 0.
+    /// Weight, above 0.
     pub(crate) weight: f64,
     /// Its measurements.
     pub(crate) features: Vec<f64>,
@@ -50,7 +50,7 @@ pub(crate) struct LabelledExample {
     pub(crate) is_one: bool,
 }
 
-/// How to train.
+/// Settings of a training.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct TrainParams {
     /// Hidden units, at most [`MAX_HIDDEN`]; 0 for a linear model.
@@ -61,9 +61,9 @@ pub(crate) struct TrainParams {
     pub(crate) rate: f64,
     /// Half of it weighs the squares of all weights but biases, against the sum of the losses.
     pub(crate) ridge: f64,
-    /// A rival that is off by so much more than the best one should have 1/e of its chance. Above 0.
+    /// Additional distance at which a candidate's target probability is 1/e of the best one's. Above 0.
     pub(crate) reach: f64,
-    /// The hidden units' first weights follow from it.
+    /// Seed of the hidden units' initial weights.
     pub(crate) seed: u64,
 }
 
@@ -76,7 +76,7 @@ impl Default for TrainParams {
 /// Why there is no network.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub(crate) enum TrainError {
-    /// No set of rivals has a right and a wrong one, or all examples are alike.
+    /// No set of candidates has a right and a wrong one, or all examples have one label.
     #[error("nothing to learn from: right ones and wrong ones are needed")]
     NothingToLearn,
     /// Numbers of measurements differ, or one is not finite.
@@ -87,7 +87,7 @@ pub(crate) enum TrainError {
     Range(&'static str),
 }
 
-/// A network that gives the right one of some rivals the greatest output.
+/// A network that gives the right one of several candidates the greatest output.
 pub(crate) fn train_choice(rivals: &[ChoiceExample], p: &TrainParams) -> Result<Network, TrainError> {
     if p.reach.is_nan() || p.reach <= 0.0 {
         return Err(TrainError::Range("reach"));
@@ -101,10 +101,10 @@ pub(crate) fn train_classifier(examples: &[LabelledExample], p: &TrainParams) ->
     if !both {
         return Err(TrainError::NothingToLearn);
     }
-    train(examples.iter().map(Task::telling).collect(), p)
+    train(examples.iter().map(Task::labelled).collect(), p)
 }
 
-/// Measurements with the chance that each should have; one alone has its chance against an output of 0.
+/// Measurements with their target probabilities; a single one is compared with an output of 0.
 struct Task<'a> {
     weight: f64,
     features: Vec<&'a [f64]>,
@@ -122,20 +122,20 @@ impl<'a> Task<'a> {
         Self { weight: r.weight, features, wanted, alone: false }
     }
 
-    fn telling(e: &'a LabelledExample) -> Self {
+    fn labelled(e: &'a LabelledExample) -> Self {
         let wanted = vec![f64::from(e.is_one)];
         Self { weight: e.weight, features: vec![&e.features], wanted, alone: true }
     }
 
-    /// Whether there is something to choose.
-    fn tells(&self) -> bool {
+    /// Whether it has a right and a wrong answer.
+    fn has_both_kinds(&self) -> bool {
         self.alone || self.wanted.len() > 1
     }
 }
 
 fn train(tasks: Vec<Task>, p: &TrainParams) -> Result<Network, TrainError> {
     check(&tasks, p)?;
-    let tasks: Vec<Task> = tasks.into_iter().filter(Task::tells).collect();
+    let tasks: Vec<Task> = tasks.into_iter().filter(Task::has_both_kinds).collect();
     let Some(width) = tasks.first().and_then(|t| t.features.first()).map(|f| f.len()) else {
         return Err(TrainError::NothingToLearn);
     };
@@ -157,7 +157,7 @@ fn train(tasks: Vec<Task>, p: &TrainParams) -> Result<Network, TrainError> {
         for (task, features) in tasks.iter().zip(&scaled) {
             net.add_slope(task, features, &mut slope);
         }
-        // The last third of the way ever shorter steps.
+        // Steps shrink over the last third.
         let left = (3.0 * (p.steps - step + 1) as f64 / p.steps as f64).min(1.0);
         let fade = |decay: f64| 1.0 - decay.powi(step.min(100_000) as i32);
         for ((weight, moment), slope) in net.values.iter_mut().zip(&mut moments).zip(&slope) {
@@ -187,7 +187,7 @@ fn check(tasks: &[Task], p: &TrainParams) -> Result<(), TrainError> {
             return Err(TrainError::Malformed(i));
         }
     }
-    if tasks.iter().any(Task::tells) { Ok(()) } else { Err(TrainError::NothingToLearn) }
+    if tasks.iter().any(Task::has_both_kinds) { Ok(()) } else { Err(TrainError::NothingToLearn) }
 }
 
 /// Mean and standard deviation of every measurement over all candidates.
@@ -223,7 +223,7 @@ impl Weights {
         Self { width, hidden: p.hidden, values }
     }
 
-    /// Start of a hidden unit's row.
+    /// Index of the first weight of a hidden unit's row.
     fn unit(&self, k: usize) -> usize {
         self.width + k * (self.width + 2)
     }

@@ -1,13 +1,12 @@
-//! Makes a network's probability mean what it says: of examples that it was not trained on, those told with one half
-//! should be one in two. Outputs with what is right in, a straight line for the output out (Platt's scaling). The order
-//! of examples does not change, so it tells no better than before.
+//! Calibrates a network's probability on examples that it was not trained on (Platt scaling). Outputs with labels
+//! in, a linear function of the output out. The order of examples does not change.
 
 use super::network_training::{LabelledExample, TrainError};
 use vision::detect::border_model::network::Network;
 
 /// Newton's steps; a few are enough, as the loss is convex.
 const STEPS: usize = 60;
-/// Added to the curvature: outputs that are all alike have no slope.
+/// Added to the curvature: equal outputs have no slope.
 const RIDGE: f64 = 1e-6;
 /// Longest step of either number.
 const LONGEST: f64 = 1.0;
@@ -15,14 +14,14 @@ const LONGEST: f64 = 1.0;
 /// The calibrated output is `factor * output + offset`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PlattScaling {
-    /// Above 0; below 1 for a network that is too sure.
+    /// Above 0; below 1 for an overconfident network.
     pub(crate) factor: f64,
-    /// Logarithm of odds at an output of 0.
+    /// Log odds at an output of 0.
     pub(crate) offset: f64,
 }
 
 impl PlattScaling {
-    /// The line under which held-out examples are likeliest, each counted by its weight. Outputs and examples in pairs.
+    /// Maximum-likelihood fit to held-out examples, each counted by its weight. `outputs` and `examples` correspond.
     pub(crate) fn fit(outputs: &[f64], examples: &[LabelledExample]) -> Result<Self, TrainError> {
         let pairs = || outputs.iter().zip(examples);
         if let Some(i) = pairs().position(|(o, e)| !o.is_finite() || !e.weight.is_finite() || e.weight <= 0.0)
@@ -34,7 +33,7 @@ impl PlattScaling {
         if ones <= 0.0 || others <= 0.0 {
             return Err(TrainError::NothingToLearn);
         }
-        // Platt's targets: as if one more of either kind had been seen.
+        // Platt's targets: as with one more example of either kind.
         let wanted = [1.0 / (others + 2.0), (ones + 1.0) / (ones + 2.0)];
         let mut line = Self { factor: 1.0, offset: 0.0 };
         for _ in 0..STEPS {
@@ -63,7 +62,7 @@ impl PlattScaling {
         self.factor * output + self.offset
     }
 
-    /// A network with this output: the same hidden units, weighed anew.
+    /// A network with this output: the same hidden units with scaled output weights.
     #[must_use]
     pub(crate) fn applied(&self, mut network: Network) -> Network {
         let weights = network.linear.iter_mut().chain(&mut network.hidden_out);
@@ -83,7 +82,7 @@ mod tests {
         LabelledExample { group: 0, weight: 1.0, features: vec![], is_one }
     }
 
-    /// Outputs four times as sure as they should be, and shifted.
+    /// Outputs with four times the true log odds, and shifted.
     fn overconfident(n: usize) -> (Vec<f64>, Vec<LabelledExample>) {
         let mut random = Random::new(7);
         let draw = |_| {
@@ -95,16 +94,16 @@ mod tests {
     }
 
     #[test]
-    fn what_was_too_sure_is_as_sure_as_it_should_be() {
+    fn overconfident_outputs_are_calibrated() {
         let (outputs, examples) = overconfident(20_000);
         let line = PlattScaling::fit(&outputs, &examples).unwrap();
         assert!((line.factor - 0.25).abs() < 0.01 && (line.offset + 0.75).abs() < 0.06, "{line:?}");
-        // One in two, where one half is said.
+        // About half of the examples with probability one half.
         let near = |o: &f64| (1.0 / (1.0 + (-line.of(*o)).exp()) - 0.5).abs() < 0.05;
-        let told: Vec<bool> =
+        let near_half: Vec<bool> =
             outputs.iter().zip(&examples).filter(|p| near(p.0)).map(|p| p.1.is_one).collect();
-        let share = told.iter().filter(|is_one| **is_one).count() as f64 / told.len() as f64;
-        assert!((share - 0.5).abs() < 0.06, "{share} of {}", told.len());
+        let share = near_half.iter().filter(|is_one| **is_one).count() as f64 / near_half.len() as f64;
+        assert!((share - 0.5).abs() < 0.06, "{share} of {}", near_half.len());
     }
 
     #[test]
@@ -125,18 +124,18 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_made_of_nothing() {
+    fn uninformative_outputs_are_refused_or_give_the_share() {
         let both = [example(true), example(false)];
         assert_eq!(PlattScaling::fit(&[1.0], &[example(true)]), Err(TrainError::NothingToLearn));
         assert_eq!(PlattScaling::fit(&[], &[]), Err(TrainError::NothingToLearn));
         assert_eq!(PlattScaling::fit(&[0.0, f64::NAN], &both), Err(TrainError::Malformed(1)));
-        // Told the wrong way round: no line upwards.
+        // Outputs of the wrong sign: no positive factor.
         let many: Vec<LabelledExample> = (0..100).map(|i| example(i % 2 == 0)).collect();
         let outputs: Vec<f64> =
             (0..100).map(|i| if i % 2 == 0 { -2.0 } else { 2.0 } + f64::from(i % 7)).collect();
         assert_eq!(PlattScaling::fit(&outputs, &many), Err(TrainError::NothingToLearn));
-        // All alike: finite, and only as sure as their share.
-        let alike = PlattScaling::fit(&[1.0; 100], &many).unwrap();
-        assert!(alike.of(1.0).abs() < 0.05, "{alike:?}");
+        // Equal outputs: finite, and the probability is the share.
+        let scaling = PlattScaling::fit(&[1.0; 100], &many).unwrap();
+        assert!(scaling.of(1.0).abs() < 0.05, "{scaling:?}");
     }
 }

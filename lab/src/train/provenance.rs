@@ -1,5 +1,5 @@
-//! Where learnt weights come from: the command as it was run, the commit, and a digest of every folder of pictures. Written at
-//! the head of the generated source, so that nobody has to believe it.
+//! Provenance of learnt weights: the command as it was run, the commit, and a digest of every folder of pictures.
+//! Written at the head of the generated source, so that the weights can be reproduced.
 
 use sha2::{Digest as _, Sha256};
 use std::{
@@ -9,7 +9,7 @@ use std::{
     process::Command,
 };
 
-/// What a run of the training rests on.
+/// Inputs of a run of the training.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Provenance {
     /// The command line without the path of the program.
@@ -116,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn the_head_says_what_was_run_on_what() {
+    fn the_head_has_command_commit_and_digests() {
         let command =
             ["train", "detector", "a-long-name-of-a-set-of-pictures", "--seed", "7"].map(str::to_owned);
         let sets = vec![("museum".to_owned(), "ab12".to_owned())];

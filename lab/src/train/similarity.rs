@@ -1,6 +1,6 @@
 //! `waymark-lab train similarity`: the weights of the six cues (method 2) from labelled pictures.
 
-use super::cue_fit::{FOLDS, FittedSimilarity, LabelledPair, fit, judge, ungraded};
+use super::cue_fit::{FOLDS, FittedSimilarity, LabelledPair, fit, label_pairs, ungraded};
 use crate::evaluate::{rendered, truth::Truth};
 use anyhow::{Context as _, bail};
 use serde_json::json;
@@ -88,7 +88,7 @@ fn judged(args: &SimilarityArgs, params: &DetectParams) -> anyhow::Result<Vec<La
             let found = segments(&chains(&map, &params.chains), &map, &params.segments);
             let candidates = similarity::pairs(&found, &image, &keep_all);
             let quads: Vec<Corners> = picture.quads.iter().map(|q| q.corners).collect();
-            pairs.extend(judge(&found, &candidates, &quads, &picture.others, position));
+            pairs.extend(label_pairs(&found, &candidates, &quads, &picture.others, position));
         }
         progress.finish_and_clear();
     }

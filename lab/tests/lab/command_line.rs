@@ -1,11 +1,14 @@
-//! Claim: every command of `waymark-lab` explains its options, one that does not exist is refused, and speed is measured
-//! without data and without Python.
+//! Claim: every command of `waymark-lab` explains its options, one that does not exist is refused, and speed is
+//! measured without data and without Python.
 
 use crate::{LONGEST, PROGRAM, lab};
 use serde_json::Value;
 use std::{ffi::OsString, path::Path};
 use tempfile::TempDir;
-use tests::command::{check_help, check_refused};
+use tests::{
+    command::{check_help, check_refused},
+    documents::check_command_lines,
+};
 
 /// Options that each command must name in its help.
 const OPTIONS: [(&str, &[&str]); 22] = [
@@ -52,7 +55,7 @@ const OPTIONS: [(&str, &[&str]); 22] = [
     ("evaluate scale", &["--landmarks", "--views", "--detector", "--plot"]),
     ("evaluate illumination", &["--landmarks", "--views", "--detector", "--plot"]),
     ("evaluate occlusion", &["--landmarks", "--views", "--detector", "--plot"]),
-    ("evaluate discrimination", &["--landmarks", "--strangers", "--views", "--own-views", "--plot"]),
+    ("evaluate discrimination", &["--landmarks", "--distractors", "--views", "--own-views", "--plot"]),
     ("evaluate lookalikes", &["--pairs", "--views", "--photographs"]),
     ("evaluate confidence", &["--quads", "--set", "--plot", "--json"]),
     (
@@ -68,7 +71,7 @@ const OPTIONS: [(&str, &[&str]); 22] = [
     ("evaluate visibility", &["--maps", "--points", "--seed", "--plot", "--json"]),
     ("train confidence", &["--quads", "--set", "--photographs", "--rust"]),
     (
-        "train search",
+        "train detector",
         &[
             "--scenes",
             "--pictures",
@@ -114,7 +117,12 @@ fn every_command_explains_its_options() {
 }
 
 #[test]
-fn what_does_not_exist_is_refused() {
+fn commands_in_the_documents_exist() {
+    check_command_lines(Path::new(PROGRAM), "waymark-lab", 30, LONGEST);
+}
+
+#[test]
+fn unknown_commands_and_values_are_refused() {
     for line in ["evaluate", "evaluate recognition --distance near .", "train", "serve"] {
         check_refused(Path::new(PROGRAM), line, LONGEST);
     }

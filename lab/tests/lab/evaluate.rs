@@ -1,5 +1,5 @@
-//! Claim: the figures of `waymark-lab evaluate` are what a recount by other means gives, and a folder without truth is
-//! refused by name.
+//! Claim: the figures of `waymark-lab evaluate` are what a recount by other means gives, and a folder without truth
+//! is refused by name.
 
 use crate::{LONGEST, lab};
 use serde_json::Value;
@@ -130,9 +130,9 @@ fn close(report: &Value, key: &str, expected: f64) {
 fn detection_figures_are_what_a_recount_gives() {
     let folder = TempDir::new().expect("a temporary directory");
     let building = Arc::new(Building::corridor(6));
-    let looks = scenes::looks(&building, &LessonParams { views: 1, ..LessonParams::default() });
-    let mut set = scenes::write_set(folder.path(), &building, &looks, &[], 20.0);
-    // Labels beside the truth, so that not everything is found and not everything found is true.
+    let views = scenes::views(&building, &LessonParams { views: 1, ..LessonParams::default() });
+    let mut set = scenes::write_set(folder.path(), &building, &views, &[], 20.0);
+    // Labels that differ from the truth, so that some are missed and some quads are false.
     for (image, share) in set.images.iter_mut().zip([0.1, 0.4, 0.6]) {
         for quad in &mut image.quads {
             let corners: Quad = quad.corners.into();
@@ -149,7 +149,7 @@ fn detection_figures_are_what_a_recount_gives() {
     let sums = recount(&set, &detected(folder.path(), &set));
     let [found_70, found_85] = sums.found;
     let telling = sums.quads > found_70 && found_70 > found_85 && found_85 > 0 && sums.false_quads > 0;
-    assert!(telling, "some figures are not put to the test: {sums:?}");
+    assert!(telling, "some figures are trivial: {sums:?}");
     assert_eq!(report["images"].as_u64(), Some(set.images.len() as u64), "{report}");
     assert_eq!(report["quads"].as_u64(), Some(sums.quads as u64), "{report}");
     close(&report, "recall_70", sums.found[0] as f64 / sums.quads as f64);
@@ -164,8 +164,8 @@ fn detection_figures_are_what_a_recount_gives() {
 fn labels_decide_what_is_found_and_what_is_false() {
     let folder = TempDir::new().expect("a temporary directory");
     let building = Arc::new(Building::corridor(6));
-    let looks = scenes::looks(&building, &LessonParams { views: 1, ..LessonParams::default() });
-    let mut set = scenes::write_set(folder.path(), &building, &looks[..3], &[], 20.0);
+    let views = scenes::views(&building, &LessonParams { views: 1, ..LessonParams::default() });
+    let mut set = scenes::write_set(folder.path(), &building, &views[..3], &[], 20.0);
     // Without any label everything found is false; where labels are not complete nothing can be false.
     for image in &mut set.images {
         image.quads.clear();
@@ -175,19 +175,19 @@ fn labels_decide_what_is_found_and_what_is_false() {
     let report = evaluate("detection", folder.path()).last_json();
     let found = detected(folder.path(), &set);
     let false_quads = found[0].len() + found[1].len();
-    assert!(false_quads > 0, "nothing found: the case tests nothing");
+    assert!(false_quads > 0, "nothing is detected: the case tests nothing");
     close(&report, "false_per_image", false_quads as f64 / 2.0);
     assert_eq!((report["quads"].as_u64(), report["images"].as_u64()), (Some(0), Some(3)), "{report}");
     assert!(report["corner_error_px"].is_null(), "{report}");
 }
 
 #[test]
-fn the_rendered_corridor_is_a_set_like_any_other() {
+fn a_rendered_set_gives_the_same_figures_from_its_folder() {
     let folder = TempDir::new().expect("a temporary directory");
-    let kept = folder.path().join("views");
+    let folder_of_views = folder.path().join("views");
     let mut args: Vec<OsString> =
         ["evaluate", "detection", "corridor", "--views", "4", "--json", "--keep"].map(Into::into).into();
-    args.push(kept.clone().into());
+    args.push(folder_of_views.clone().into());
     let (plot, worst) = (folder.path().join("plot.svg"), folder.path().join("worst"));
     args.extend(["--compare", "relaxation", "--worst", "2", "--plot"].map(Into::into));
     args.extend([plot.clone().into(), "--draw".into(), worst.clone().into()]);
@@ -202,11 +202,11 @@ fn the_rendered_corridor_is_a_set_like_any_other() {
             |p: std::io::Result<fs::DirEntry>| image::open(p.expect("an entry").path()).expect("a picture");
         assert_eq!(pictures.map(open).filter(|p| p.width() >= 640 && p.height() > 480).count(), 2);
     }
-    let from_folder = evaluate("detection", &kept).last_json();
+    let from_folder = evaluate("detection", &folder_of_views).last_json();
     for key in ["set", "images", "quads", "recall_70", "recall_85", "false_per_image", "corner_error_px"] {
         assert_eq!(rendered[key], from_folder[key], "{key}");
     }
-    let text = fs::read_to_string(kept.join("truth.json")).expect("truth.json");
+    let text = fs::read_to_string(folder_of_views.join("truth.json")).expect("truth.json");
     let set: DataSet = serde_json::from_str(&text).expect("the evaluation format");
     let counted = set.images.iter().flat_map(|i| &i.quads).filter(|q| q.counted).count();
     assert_eq!(rendered["quads"].as_u64(), Some(counted as u64), "{rendered}");
@@ -214,12 +214,12 @@ fn the_rendered_corridor_is_a_set_like_any_other() {
 }
 
 #[test]
-fn fitted_networks_are_parameters_that_can_be_evaluated() {
+fn trained_networks_are_parameters_that_can_be_evaluated() {
     let folder = TempDir::new().expect("a temporary directory");
     let (networks, source) = (folder.path().join("networks.json"), folder.path().join("learnt.rs"));
     let mut args: Vec<OsString> = [
         "train",
-        "search",
+        "detector",
         "corridor",
         "--views",
         "8",
@@ -240,7 +240,7 @@ fn fitted_networks_are_parameters_that_can_be_evaluated() {
     let report = run.last_json();
     assert!(report["images"].as_u64().is_some_and(|n| (12..=16).contains(&n)), "{report}");
     assert!(report["sides"].as_u64().is_some_and(|n| n > 12), "{report}");
-    assert!(report["things"].as_u64().is_some_and(|n| n > 4), "{report}");
+    assert!(report["objects"].as_u64().is_some_and(|n| n > 4), "{report}");
     assert_eq!(report["results"].as_array().map(Vec::len), Some(3), "{report}");
     let sets = report["detection"].as_array().expect("figures of detection");
     let named = |name: &str| sets.iter().any(|s| s["set"] == name && s["quads"].as_u64() > Some(0));
@@ -275,19 +275,19 @@ fn a_folder_that_is_no_data_set_is_refused_by_name() {
 }
 
 #[test]
-fn recognition_names_the_taught_and_no_stranger() {
+fn recognition_names_the_taught_and_no_distractor() {
     let folder = TempDir::new().expect("a temporary directory");
     let params = CorridorParams { posters: 10, first_poster: 500, ..CorridorParams::default() };
     let building = Arc::new(Building::corridor_with(&params, 8));
     let taught: Vec<String> = building.posters().take(6).map(|p| p.name.clone()).collect();
-    let looks =
+    let views =
         LessonParams { views: 2, max_view_angle_rad: 0.7, distance_m: [1.3, 2.6], ..LessonParams::default() };
-    let set = scenes::write_set(folder.path(), &building, &scenes::looks(&building, &looks), &taught, 40.0);
+    let set = scenes::write_set(folder.path(), &building, &scenes::views(&building, &views), &taught, 40.0);
     let quads = || set.images.iter().flat_map(|i| &i.quads);
     let known = quads().filter(|q| q.landmark.is_some()).count() as u64;
-    let strangers = quads().filter(|q| q.landmark.is_none()).count() as u64;
+    let distractors = quads().filter(|q| q.landmark.is_none()).count() as u64;
     let posters = quads().filter(|q| q.landmark.is_none() && q.kind == LandmarkKind::Poster).count();
-    assert!(known >= 8 && posters >= 4, "{known} known, {posters} strange posters: too few");
+    assert!(known >= 8 && posters >= 4, "{known} known, {posters} unknown posters: too few");
 
     let run = evaluate("recognition", folder.path());
     assert_eq!((run.status, run.stdout.lines().count()), (0, 1), "{run:?}");
@@ -295,18 +295,18 @@ fn recognition_names_the_taught_and_no_stranger() {
     let count = |key: &str| report[key].as_u64().unwrap_or_else(|| panic!("{key} of {report}"));
     assert_eq!((count("taught"), count("images")), (6, set.images.len() as u64), "{report}");
     assert_eq!(
-        (count("wrong"), count("strangers_accepted"), count("unlabelled_accepted")),
+        (count("wrong"), count("distractors_accepted"), count("unlabelled_accepted")),
         (0, 0, 0),
         "{report}"
     );
     assert_eq!(count("right") + count("missed"), known, "{report}");
-    assert_eq!(count("strangers_refused"), strangers, "{report}");
+    assert_eq!(count("distractors_refused"), distractors, "{report}");
     assert!(3 * count("right") >= known, "{report}");
     assert!(report["ms_per_image"].as_f64().is_some_and(|ms| ms > 0.0), "{report}");
 }
 
 #[test]
-fn robots_find_their_way_from_a_start_that_nobody_tells() {
+fn robots_are_localised_from_an_unknown_start() {
     let folder = TempDir::new().expect("a temporary directory");
     let plot = folder.path().join("drive.svg");
     let mut args: Vec<OsString> = [
@@ -331,9 +331,9 @@ fn robots_find_their_way_from_a_start_that_nobody_tells() {
     let whole = ["/drives", "/never_fixed", "/false_matches"].map(number);
     assert_eq!(whole.map(|x| x as i64), [2, 0, 0], "{report}");
     assert!(number("/corrections") >= 6.0 && number("/recognised") >= 6.0, "{report}");
-    // Odometry alone drifts; the corrected pose does not.
+    // Odometry alone drifts; the fused pose does not.
     assert!(number("/along_m/p95") < 0.15, "{report}");
     assert!(number("/along_m/median") < 0.5 * number("/odometry_along_m/median"), "{report}");
     let svg = fs::read_to_string(plot).expect("the plot");
-    assert_eq!(svg.matches("<polyline").count(), 4, "three tracks and an error");
+    assert_eq!(svg.matches("<polyline").count(), 4, "three trajectories and an error");
 }

@@ -1,4 +1,4 @@
-//! The laboratory's program as a box: what it prints is recounted by other means.
+//! Tests of the program `waymark-lab` from outside: its figures are recounted by other means.
 
 mod command_line;
 mod evaluate;
@@ -10,7 +10,7 @@ use tests::command::Run;
 
 /// The program.
 const PROGRAM: &str = env!("CARGO_BIN_EXE_waymark-lab");
-/// Longest run: machines that check are busy.
+/// Longest run, on a busy machine.
 const LONGEST: Duration = Duration::from_mins(4);
 
 /// Runs `waymark-lab` with these arguments.

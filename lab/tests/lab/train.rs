@@ -1,4 +1,5 @@
-//! Claim: `waymark-lab train similarity` writes weights that the detector takes, and refuses sets it cannot learn from.
+//! Claim: `waymark-lab train similarity` writes weights that the detector takes, and refuses sets it cannot learn
+//! from.
 
 use crate::lab;
 use serde_json::{Value, json};
@@ -6,7 +7,7 @@ use std::{ffi::OsString, fs};
 use tempfile::TempDir;
 
 #[test]
-fn fitted_similarity_tells_pairs_apart_and_is_a_parameter_file() {
+fn fitted_similarity_separates_pairs_and_is_a_parameter_file() {
     let folder = TempDir::new().expect("a temporary directory");
     let weights = folder.path().join("weights.json");
     let mut args: Vec<OsString> =
@@ -16,13 +17,13 @@ fn fitted_similarity_tells_pairs_apart_and_is_a_parameter_file() {
     let report = run.last_json();
     let number = |path: &str| report.pointer(path).and_then(Value::as_f64).expect("a number");
     assert!(number("/pairs/opposite") >= 20.0 && number("/pairs/others") >= 20.0, "{report}");
-    // Better than a coin, on views that were held out.
+    // Far above chance, on held-out views.
     assert!(number("/fitted/order_held_out") > 0.9, "{report}");
-    let kept: Value = serde_json::from_slice(&fs::read(&weights).expect("the weights")).expect("JSON");
-    assert_eq!(kept["similarity"]["weights"], report["fitted"]["weights"]);
+    let written: Value = serde_json::from_slice(&fs::read(&weights).expect("the weights")).expect("JSON");
+    assert_eq!(written["similarity"]["weights"], report["fitted"]["weights"]);
     let sum: f64 =
-        kept["similarity"]["weights"].as_array().expect("weights").iter().filter_map(Value::as_f64).sum();
-    assert!((sum - 1.0).abs() < 1e-6, "{kept}");
+        written["similarity"]["weights"].as_array().expect("weights").iter().filter_map(Value::as_f64).sum();
+    assert!((sum - 1.0).abs() < 1e-6, "{written}");
     let mut args: Vec<OsString> =
         ["evaluate", "detection", "corridor", "--views=2", "--grouping=relaxation", "--params"]
             .map(Into::into)

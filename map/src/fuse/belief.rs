@@ -53,9 +53,9 @@ pub(super) struct Belief {
 }
 
 impl Belief {
-    /// A pose, the odometry errors, and zeros for `lasting` nuisance parameters.
-    pub(super) fn new(at: &Pose2Covariance, odometry: &SystematicOdometryError, lasting: usize) -> Self {
-        let n = ROBOT + BLOCK * lasting;
+    /// A pose, the odometry errors, and zeros for `count` nuisance parameters.
+    pub(super) fn new(at: &Pose2Covariance, odometry: &SystematicOdometryError, count: usize) -> Self {
+        let n = ROBOT + BLOCK * count;
         let mut covariance = DMatrix::zeros(n, n);
         covariance.view_mut((0, 0), (POSE, POSE)).copy_from(&at.covariance);
         covariance.view_mut((POSE, POSE), (2, 2)).copy_from(&odometry.covariance);

@@ -233,8 +233,8 @@ impl Fuser {
         let mut outcome = None;
         while self.applied < self.events.len() {
             match apply(&mut self.now, &mut self.now_ns, &self.events, self.applied, &self.rules) {
-                Step::Judged(judged) if self.applied == place => outcome = Some(judged),
-                Step::Judged(_) | Step::Moved => {}
+                Step::Fixed(result) if self.applied == place => outcome = Some(result),
+                Step::Fixed(_) | Step::Moved => {}
                 Step::Waits => break,
             }
             self.applied += 1;

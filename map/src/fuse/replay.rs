@@ -22,7 +22,7 @@ pub(super) enum Step {
     /// Odometry moved the filter.
     Moved,
     /// A fix was applied or refused.
-    Judged(FixOutcome),
+    Fixed(FixOutcome),
     /// A fix waits for odometry.
     Waits,
 }
@@ -46,10 +46,10 @@ pub(super) fn apply(
             let odometry_follows = events[i..].iter().any(|(_, e)| matches!(e, Event::Odometry(_)));
             if filter.odometry().is_none() && odometry_follows {
                 // The motion from here to the first odometry is unknown.
-                return Step::Judged(FixOutcome::TooOld);
+                return Step::Fixed(FixOutcome::TooOld);
             }
             match reach(filter, filter_ns, &events[i + 1..], *at_ns, rules) {
-                Some(()) => Step::Judged(filter.correct(fix, *role, rules)),
+                Some(()) => Step::Fixed(filter.correct(fix, *role, rules)),
                 None => Step::Waits,
             }
         }

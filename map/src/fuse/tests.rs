@@ -1,4 +1,4 @@
-//! Batch least squares, simulated drives with drawn places and mounting, late arrivals, contradictions, bounds.
+//! Batch least squares, simulated drives with drawn places and extrinsics, late arrivals, contradictions, bounds.
 
 mod corridor_drive;
 mod laser_drive;
@@ -25,7 +25,7 @@ pub(super) fn fix(landmark: u64, pose: Pose2, noise_m: f64, place_m: f64) -> Fix
     let p = place_m * place_m;
     let covariance = Matrix6::from_diagonal(&Vector6::new(p, p, 1e-4 * p, p, 1e-6, 1e-6));
     let mut jacobian = Matrix3x6::zeros();
-    // The place moves the fix with it; turned about the landmark, 3 m ahead.
+    // An error of the place moves the fix with it, and turns it about the landmark, 3 m ahead.
     jacobian.fixed_view_mut::<2, 2>(0, 0).fill_with_identity();
     jacobian[(1, 2)] = -3.0;
     jacobian[(2, 2)] = 1.0;
@@ -141,7 +141,7 @@ fn equals_batch_least_squares() {
 }
 
 #[test]
-fn a_hundred_fixes_know_no_more_than_the_map() {
+fn a_hundred_fixes_do_not_undercut_the_covariance_of_the_place() {
     let mut fuser = Fuser::new(eager());
     drive(&mut fuser, 0.0);
     for _ in 0..100 {
@@ -185,7 +185,7 @@ fn drive_at_random(random: &mut Random) -> f64 {
 }
 
 #[test]
-fn the_fused_covariance_is_honest() {
+fn the_fused_covariance_is_consistent() {
     let mut random = Random::new(2);
     let n = 150;
     let mean = (0..n).map(|_| drive_at_random(&mut random)).sum::<f64>() / f64::from(n);
@@ -194,7 +194,7 @@ fn the_fused_covariance_is_honest() {
 }
 
 #[test]
-fn an_outlier_is_left_out_and_a_kidnapped_robot_is_found() {
+fn an_outlier_is_gated_out_and_a_kidnapped_robot_recovers() {
     let mut fuser = Fuser::new(FuseParams::default());
     drive(&mut fuser, 0.0);
     fuser.apply_fix(0, &fix(1, Pose2::default(), 0.05, 0.01)).unwrap();
@@ -204,13 +204,13 @@ fn an_outlier_is_left_out_and_a_kidnapped_robot_is_found() {
     assert!(matches!(outcome, FixOutcome::GatedOut { in_a_row: 1, .. }), "{outcome:?}");
     let after = fuser.pose().unwrap();
     assert_eq!((after.pose, after.corrections, after.contradictions), (before.pose, 1, 1));
-    // The same wrong landmark for ever does not win...
+    // A single wrong landmark never replaces the pose...
     for i in 1..20 {
         fuser.apply_odometry(i * SECOND / 10, Pose2::new(i as f64 * 0.1, 0.0, 0.0)).unwrap();
         let outcome = fuser.apply_fix(i * SECOND / 10, &away(i, 2)).unwrap();
         assert!(matches!(outcome, FixOutcome::GatedOut { .. }), "{outcome:?}");
     }
-    // ...a second that agrees does.
+    // ...a second one that agrees with it does.
     fuser.apply_odometry(2 * SECOND, Pose2::new(2.0, 0.0, 0.0)).unwrap();
     assert_eq!(fuser.apply_fix(2 * SECOND, &away(20, 3)).unwrap(), FixOutcome::Reset);
     let found = fuser.pose().unwrap();
@@ -229,14 +229,14 @@ fn contradictions_that_disagree_do_not_add_up() {
         let outcome = fuser.apply_fix(i * SECOND / 10, &wild).unwrap();
         assert!(matches!(outcome, FixOutcome::GatedOut { in_a_row: 1, .. }), "{outcome:?}");
     }
-    // One good fix clears the doubt.
+    // One agreeing fix clears the count.
     let good = fix(1, Pose2::new(2.9, 0.0, 0.0), 0.05, 0.01);
     assert!(matches!(fuser.apply_fix(29 * SECOND / 10, &good).unwrap(), FixOutcome::Applied { .. }));
     assert_eq!(fuser.pose().unwrap().contradictions, 0);
 }
 
 #[test]
-fn a_robot_that_stands_learns_nothing_from_the_same_view() {
+fn repeated_fixes_of_a_standing_robot_add_nothing() {
     let mut fuser = Fuser::new(FuseParams::default());
     drive(&mut fuser, 0.0);
     let view = fix(1, Pose2::default(), 0.05, 0.0);
@@ -253,7 +253,7 @@ fn a_robot_that_stands_learns_nothing_from_the_same_view() {
 }
 
 #[test]
-fn numbers_that_are_none_are_refused() {
+fn invalid_numbers_are_refused() {
     let mut fuser = Fuser::new(FuseParams::default());
     assert_eq!(fuser.apply_odometry(0, Pose2::new(f64::NAN, 0.0, 0.0)).unwrap_err().field, "x_m");
     drive(&mut fuser, 0.0);
@@ -268,7 +268,7 @@ fn numbers_that_are_none_are_refused() {
     bad.pose.pose.x_m = f64::NAN;
     assert_eq!(fuser.apply_fix(0, &bad).unwrap_err().field, "x_m");
     assert_eq!(fuser.pose(), None);
-    // Any time is a time.
+    // Any time is accepted.
     let mut odd = Fuser::new(FuseParams::default());
     for t in [i64::MIN, i64::MAX, 0, -1, i64::MAX - 1] {
         odd.apply_odometry(t, Pose2::default()).unwrap();
@@ -277,7 +277,7 @@ fn numbers_that_are_none_are_refused() {
 }
 
 #[test]
-fn what_is_not_known_stays_so_whatever_runs_have_shown() {
+fn undetermined_directions_stay_undetermined_under_error_models() {
     use super::error_correction;
     use crate::modality_stats::{ErrorModel, Modality, ModalityAdvice};
     let mut seen = fix(1, Pose2::new(1.0, 2.0, 0.3), 0.05, 0.02);
@@ -287,15 +287,15 @@ fn what_is_not_known_stays_so_whatever_runs_have_shown() {
     advice.faults[Modality::Landmarks as usize] =
         ErrorModel { bias: Vector3::new(0.0, 0.1, 0.0), excess: Vector3::new(2.0, 2.0, 2.0) };
     let at = Pose2::default();
-    let trusted = error_correction::fix(&seen, &at, &advice);
-    assert!((trusted.pose.pose.y_m - 1.9).abs() < 1e-12);
-    let [lasting] = &trusted.nuisances[..] else { panic!("{trusted:?}") };
+    let corrected = error_correction::fix(&seen, &at, &advice);
+    assert!((corrected.pose.pose.y_m - 1.9).abs() < 1e-12);
+    let [lasting] = &corrected.nuisances[..] else { panic!("{corrected:?}") };
     let spread = lasting.jacobian * lasting.covariance * lasting.jacobian.transpose();
-    // What it did not know is in no error that lasts: learning one would make it known.
+    // An undetermined direction is in no nuisance parameter: estimating that would determine it.
     assert!(spread[(0, 0)] < 1.0 && spread[(1, 1)] > 2.0 * 0.0025, "{spread}");
-    assert!(trusted.pose.covariance[(1, 1)] > 4.9 * seen.pose.covariance[(1, 1)], "{trusted:?}");
-    let total = trusted.noise + spread;
-    assert!((total - trusted.pose.covariance).norm() < 1e-6, "{total} {}", trusted.pose.covariance);
-    let untouched = error_correction::fix(&seen, &at, &ModalityAdvice::default());
-    assert_eq!(*untouched, seen);
+    assert!(corrected.pose.covariance[(1, 1)] > 4.9 * seen.pose.covariance[(1, 1)], "{corrected:?}");
+    let total = corrected.noise + spread;
+    assert!((total - corrected.pose.covariance).norm() < 1e-6, "{total} {}", corrected.pose.covariance);
+    let unchanged = error_correction::fix(&seen, &at, &ModalityAdvice::default());
+    assert_eq!(*unchanged, seen);
 }

@@ -10,7 +10,7 @@ use crate::{
 use nalgebra::{Matrix3, SMatrix};
 use vision::frame::{Distortion, Intrinsics};
 
-/// Expected gain, nats. `None` where the landmark is not in front of the camera.
+/// Expected gain, nats. `None` if the landmark is not in front of the camera.
 pub(super) fn gain_nats(
     pose: &Pose2Covariance,
     place: &LandmarkPlace,

@@ -28,7 +28,7 @@ fn viewer() -> PanTiltCamera {
     PanTiltCamera { pan_rad: [-PI, PI], ..PanTiltCamera::default() }
 }
 
-fn seen(place: &LandmarkPlace) -> VisibilityMap {
+fn area(place: &LandmarkPlace) -> VisibilityMap {
     visibility(place, &[], &viewer(), &VisibilityParams::default()).unwrap()
 }
 
@@ -41,10 +41,10 @@ const SURE: [f64; 3] = [0.01, 0.01, 0.005];
 
 fn ranked(
     pose: &Pose2Covariance,
-    things: &[(LandmarkPlace, VisibilityMap, f64, f64)],
+    candidates: &[(LandmarkPlace, VisibilityMap, f64, f64)],
     p: &GazeParams,
 ) -> Vec<GazeTarget> {
-    let targets: Vec<_> = things
+    let targets: Vec<_> = candidates
         .iter()
         .enumerate()
         .map(|(i, (place, visible, saliency, v_c))| GazeCandidate {
@@ -59,15 +59,15 @@ fn ranked(
 }
 
 fn two(saliency: [f64; 2]) -> Vec<(LandmarkPlace, VisibilityMap, f64, f64)> {
-    [0.0, 3.0].iter().zip(saliency).map(|(x, s)| (poster(*x), seen(&poster(*x)), s, 1.0)).collect()
+    [0.0, 3.0].iter().zip(saliency).map(|(x, s)| (poster(*x), area(&poster(*x)), s, 1.0)).collect()
 }
 
 #[test]
-fn the_choice_flips_where_the_product_says() {
+fn the_choice_flips_where_the_products_are_equal() {
     // By hand: on y = 3.2 the nearest boundary is the far disc, tangent to the wall: of diameter D, centre (x, D/2).
     // With saliencies 1 and 0.8 the choice flips where (R - |q - c0|) = 0.8 (R - |q - c1|).
     let p = GazeParams { full_margin_m: 10.0, ..GazeParams::default() };
-    let things = two([1.0, 0.8]);
+    let candidates = two([1.0, 0.8]);
     let r = 0.5 * 512.0 * 0.6 / 75.0;
     let worth = |x: f64, centre: f64| r - (x - centre).hypot(3.2 - r);
     let (mut low, mut high) = (1.0, 3.0);
@@ -75,39 +75,39 @@ fn the_choice_flips_where_the_product_says() {
         let middle = 0.5 * (low + high);
         if worth(middle, 0.0) > 0.8 * worth(middle, 3.0) { low = middle } else { high = middle }
     }
-    assert!(worth(low, 0.0) > 0.1, "both are seen there");
+    assert!(worth(low, 0.0) > 0.1, "both are visible there");
     for (x, expected) in [(low - 0.02, 0), (low + 0.02, 1)] {
-        let ranked = ranked(&at(x, 3.2, 0.0, [1e-4, 1e-4, 1e-3]), &things, &p);
+        let ranked = ranked(&at(x, 3.2, 0.0, [1e-4, 1e-4, 1e-3]), &candidates, &p);
         assert_eq!(ranked.len(), 2);
         assert_eq!(ranked[0].landmark, LandmarkId(expected), "{x} of {low}");
     }
 }
 
 #[test]
-fn each_factor_counts() {
+fn each_factor_of_the_product_has_an_effect() {
     let p = GazeParams::default();
-    let things = two([1.0, 1.0]);
+    let candidates = two([1.0, 1.0]);
     let middle = at(1.5, 2.0, 0.0, SURE);
-    let equal = ranked(&middle, &things, &p);
+    let equal = ranked(&middle, &candidates, &p);
     assert_eq!(equal[0].landmark, LandmarkId(0), "equal ones by number");
     assert!((equal[0].utility - equal[1].utility).abs() < 1e-9);
     let expected = equal[0].probability * equal[0].margin_m.min(1.0) * 0.5;
     assert!((equal[0].utility - expected).abs() < 1e-12);
-    let mut wider = things.clone();
+    let mut wider = candidates.clone();
     wider[1].3 = 2.0;
-    assert_eq!(ranked(&middle, &wider, &p)[0].landmark, LandmarkId(1), "seen from further apart");
-    let half_lost = ranked(&at(1.5, 2.0, 0.0, [2.0, 2.0, 0.1]), &things, &p);
+    assert_eq!(ranked(&middle, &wider, &p)[0].landmark, LandmarkId(1), "observed from further apart");
+    let half_lost = ranked(&at(1.5, 2.0, 0.0, [2.0, 2.0, 0.1]), &candidates, &p);
     assert!(half_lost.iter().all(|c| c.probability < 0.9));
 }
 
 #[test]
-fn the_landmark_comes_to_the_axis() {
+fn pan_and_tilt_centre_the_landmark() {
     let p = GazeParams::default();
     let head = PanTiltUnit { camera_m: [0.2, -0.1, 1.1], ..PanTiltUnit::default() };
     for (x, y, theta) in [(0.5, 2.5, 0.3), (-1.0, 1.8, -2.0), (0.0, 3.0, 3.0)] {
         let pose = at(x, y, theta, SURE);
         let place = poster(0.0);
-        let map = seen(&place);
+        let map = area(&place);
         let target =
             GazeCandidate { landmark: LandmarkId(1), place: &place, visible: &map, saliency: 1.0, v_c: 1.0 };
         let found = rank(&pose, &[target], &viewer(), &head, &p).unwrap()[0];
@@ -120,7 +120,7 @@ fn the_landmark_comes_to_the_axis() {
 }
 
 #[test]
-fn a_sign_under_the_ceiling_is_looked_at_from_where_it_is_seen() {
+fn a_sign_under_the_ceiling_is_a_target_inside_its_area() {
     let mut sign = poster(0.0);
     (sign.z_m, sign.tilt_rad) = (2.5, FRAC_PI_2);
     let viewer = PanTiltCamera { tilt_rad: [-0.3, 1.0], ..viewer() };
@@ -146,9 +146,9 @@ fn a_sign_under_the_ceiling_is_looked_at_from_where_it_is_seen() {
 }
 
 #[test]
-fn what_the_unit_cannot_reach_is_not_offered() {
+fn targets_out_of_the_units_range_are_left_out() {
     let place = poster(0.0);
-    let map = seen(&place);
+    let map = area(&place);
     let target =
         GazeCandidate { landmark: LandmarkId(1), place: &place, visible: &map, saliency: 1.0, v_c: 1.0 };
     let ask = |viewer: &PanTiltCamera| {
@@ -178,8 +178,8 @@ fn the_gain_is_that_of_a_real_fix() {
             covariance: Matrix3::new(0.04, 0.01, 0.0, 0.01, 0.09, 0.002, 0.0, 0.002, 0.01),
         };
         let head = PanTiltUnit::default();
-        let things = [(place, seen(&place), 1.0, 1.0)];
-        let found = ranked(&pose, &things, &GazeParams::default())[0];
+        let candidates = [(place, area(&place), 1.0, 1.0)];
+        let found = ranked(&pose, &candidates, &GazeParams::default())[0];
         let mounting =
             CameraExtrinsics::new(pan_tilt(found.pan_rad, found.tilt_rad, Vector3::from(head.camera_m)))
                 .unwrap();
@@ -187,9 +187,9 @@ fn the_gain_is_that_of_a_real_fix() {
             mounting.robot_from_camera.inverse() * robot.to_isometry3().inverse() * place.map_from_landmark();
         let corners = corner_points(&SIZE).map(|c| pixel(&camera_from_landmark, &c, &camera).unwrap());
         let claimed = [Matrix2::identity() * 0.25; 4];
-        let seen = landmark_pose(&Corners::new(corners).unwrap(), &claimed, SIZE, &camera).unwrap();
-        let sighting = LandmarkObservation { landmark: LandmarkId(1), seen: &seen, place: &place };
-        let fix = robot_pose(&[sighting], &mounting, Some(&pose), &LocaliseParams::default()).unwrap();
+        let observed = landmark_pose(&Corners::new(corners).unwrap(), &claimed, SIZE, &camera).unwrap();
+        let observation = LandmarkObservation { landmark: LandmarkId(1), seen: &observed, place: &place };
+        let fix = robot_pose(&[observation], &mounting, Some(&pose), &LocaliseParams::default()).unwrap();
         let FixResult::Fixed(fix) = fix else { panic!("{fix:?}") };
         let after = pose.covariance.try_inverse().unwrap() + fix.pose.covariance.try_inverse().unwrap();
         let expected = 0.5 * (pose.covariance.determinant() * after.determinant()).ln();
@@ -204,31 +204,31 @@ fn information_prefers_the_oblique_view() {
     let straight =
         LandmarkPlace::by_hand(Vector3::new(2.4, 0.0, 1.5), PI, SIZE, PlaceSigmas::default()).unwrap();
     let turned = LandmarkPlace { theta_rad: PI - 0.8, ..straight };
-    let things = [(straight, seen(&straight), 1.0, 1.0), (turned, seen(&turned), 1.0, 1.0)];
-    let found = ranked(&at(0.0, 0.0, 0.0, [0.1, 0.1, 0.1]), &things, &p);
+    let candidates = [(straight, area(&straight), 1.0, 1.0), (turned, area(&turned), 1.0, 1.0)];
+    let found = ranked(&at(0.0, 0.0, 0.0, [0.1, 0.1, 0.1]), &candidates, &p);
     assert_eq!(found[0].landmark, LandmarkId(1), "{found:?}");
     assert!(found[0].gain_nats > found[1].gain_nats + 0.3);
     // By the product they are equal but for the margin.
-    let product = ranked(&at(0.0, 0.0, 0.0, SURE), &things, &GazeParams::default());
+    let product = ranked(&at(0.0, 0.0, 0.0, SURE), &candidates, &GazeParams::default());
     assert_eq!(product[0].landmark, LandmarkId(0));
 }
 
 #[test]
-fn looking_far_aside_costs() {
+fn a_large_turn_lowers_the_utility() {
     let p = GazeParams { criterion: Criterion::Information, ..GazeParams::default() };
     let (left, right) = (poster(-1.2), poster(1.2));
     let targets = [
         GazeCandidate {
             landmark: LandmarkId(0),
             place: &left,
-            visible: &seen(&left),
+            visible: &area(&left),
             saliency: 1.0,
             v_c: 1.0,
         },
         GazeCandidate {
             landmark: LandmarkId(1),
             place: &right,
-            visible: &seen(&right),
+            visible: &area(&right),
             saliency: 1.0,
             v_c: 1.0,
         },
@@ -237,36 +237,36 @@ fn looking_far_aside_costs() {
     for (pan_rad, expected) in [(0.4, 1), (-0.4, 0)] {
         let head = PanTiltUnit { pan_rad, ..PanTiltUnit::default() };
         let found = rank(&pose, &targets, &viewer(), &head, &p).unwrap();
-        assert_eq!(found[0].landmark, LandmarkId(expected), "the one it already looks at");
+        assert_eq!(found[0].landmark, LandmarkId(expected), "the present target");
     }
 }
 
 #[test]
-fn it_stays_until_another_is_clearly_better() {
+fn the_target_stays_until_another_is_clearly_better() {
     let p = GazeParams { full_margin_m: 10.0, ..GazeParams::default() };
-    let things = two([1.0, 1.0]);
+    let candidates = two([1.0, 1.0]);
     let mut gaze = GazeController::default();
-    let mut look = |x: f64| {
+    let mut target_at = |x: f64| {
         let pose = at(x, 3.2, 0.0, SURE);
-        match gaze.choose(0, &ranked(&pose, &things, &p), &pose, &p) {
+        match gaze.choose(0, &ranked(&pose, &candidates, &p), &pose, &p) {
             GazeAction::Landmark(choice) => (choice.landmark.0, choice.utility),
             other => panic!("{other:?}"),
         }
     };
-    assert_eq!(look(1.0).0, 0);
-    assert_eq!(look(1.51).0, 0, "the other is better, but not clearly");
-    assert_eq!(look(2.0).0, 1);
-    assert_eq!(look(1.49).0, 1, "and back");
+    assert_eq!(target_at(1.0).0, 0);
+    assert_eq!(target_at(1.51).0, 0, "the other is better, but not clearly");
+    assert_eq!(target_at(2.0).0, 1);
+    assert_eq!(target_at(1.49).0, 1, "and back");
 }
 
 #[test]
-fn failures_make_it_look_elsewhere_for_a_while() {
+fn failures_damp_a_target_for_a_while() {
     let p = GazeParams::default();
-    let things = two([1.0, 0.7]);
+    let candidates = two([1.0, 0.7]);
     let pose = at(1.5, 2.0, 0.0, SURE);
-    let ranked = ranked(&pose, &things, &p);
+    let ranked = ranked(&pose, &candidates, &p);
     let mut gaze = GazeController::default();
-    let chosen = |look: GazeAction| match look {
+    let chosen = |action: GazeAction| match action {
         GazeAction::Landmark(choice) => choice.landmark.0,
         other => panic!("{other:?}"),
     };
@@ -287,7 +287,7 @@ fn failures_make_it_look_elsewhere_for_a_while() {
 }
 
 #[test]
-fn with_nothing_in_sight_it_looks_ahead_or_about() {
+fn without_targets_it_points_ahead_or_sweeps() {
     let p = GazeParams::default();
     let mut gaze = GazeController::default();
     assert_eq!(gaze.choose(0, &[], &at(0.0, 0.0, 0.0, SURE), &p), GazeAction::Ahead);
@@ -295,7 +295,7 @@ fn with_nothing_in_sight_it_looks_ahead_or_about() {
 }
 
 #[test]
-fn bounds_are_held_and_named() {
+fn values_out_of_range_are_refused_with_their_field() {
     let ask =
         |head: PanTiltUnit| rank(&at(0.0, 0.0, 0.0, SURE), &[], &viewer(), &head, &GazeParams::default());
     assert_eq!(

@@ -1,7 +1,8 @@
-//! Which observation of an image is which expected landmark: individual gates, then joint compatibility (JCBB, Neira
-//! and Tardos 2001) under one error of pose, extrinsics and intrinsics that all observations share.
+//! Data association of the observations of an image with expected landmarks: individual gates, then joint
+//! compatibility (JCBB, Neira and Tardos 2001) under one error of pose, extrinsics and intrinsics that all
+//! observations share.
 //!
-//! In: [`Expectations`] and observations, each with the landmarks it may be, all members of its look-alike class
+//! In: [`Expectations`] and observations, each with its candidate landmarks, all members of its look-alike class
 //! included. Out: for each observation one landmark, several, or none. One is given only if every assignment whose
 //! score comes within [`AssociateParams::margin_nats`] of the best gives it.
 //!
@@ -73,7 +74,7 @@ pub fn associate(
     Ok(Assignment { observations: answers, distance2: best.distance2, dof, nodes, is_exhausted })
 }
 
-/// What the hypotheses within the margin of the best say of one row.
+/// The association of one row by the hypotheses within the margin of the best.
 fn answer(r: usize, row: &Row, found: &Outcome, expectations: &Expectations, gates: &Gates) -> Association {
     let number = |pairing: usize| expectations.landmarks[row.pairings[pairing].expected].landmark;
     let best = found.best.chosen.get(r).copied().flatten();

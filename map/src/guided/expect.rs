@@ -1,11 +1,12 @@
-//! Where a prior pose expects landmarks in an image, with the covariance of every corner and what is in view of each.
+//! Predicts landmarks in an image from a prior pose, with the covariance of every corner and the visible part of
+//! each.
 //!
 //! In: prior pose with covariance, camera, landmarks with their places, obstacles. Out: [`Expectations`], by landmark
 //! number. Corners are in the pixels of the image as it comes, lens distortion included.
 //!
-//! The covariance is first order in pose, place, extrinsics and intrinsics, plus what is not linear in the pose: the
-//! second moment of the linearisation error over fixed draws of the pose. Errors of prior and map are taken as
-//! independent, which is cautious where the prior rests on the same landmarks.
+//! The covariance is first order in pose, place, extrinsics and intrinsics, plus the error of linearisation in the
+//! pose: the second moment of the linearisation error over fixed draws of the pose. Errors of prior and map are
+//! taken as independent, which is cautious where the prior rests on the same landmarks.
 
 mod params;
 mod view;
@@ -31,7 +32,7 @@ use std::collections::BTreeSet;
 use vision::{frame::MAX_SIDE_PX, geometry::polygon};
 
 /// Where each landmark is expected in the image from a prior pose. Landmarks behind the camera, outside of the image,
-/// seen from behind, or farther than [`ExpectParams::max_range_m`] are left out; of two with one number the first
+/// viewed from behind, or farther than [`ExpectParams::max_range_m`] are left out; of two with one number the first
 /// counts.
 ///
 /// Landmarks with a corner behind the camera plane, or where the lens cannot be modelled, are left out, too: their
@@ -60,8 +61,8 @@ pub fn expect(
     };
     // Stable: of two with the same number and area the first stays first.
     expected.sort_by(|a, b| in_image_px2(b).total_cmp(&in_image_px2(a)).then(a.landmark.cmp(&b.landmark)));
-    let mut seen = BTreeSet::new();
-    expected.retain(|e| seen.insert(e.landmark));
+    let mut numbers = BTreeSet::new();
+    expected.retain(|e| numbers.insert(e.landmark));
     expected.truncate(MAX_EXPECTED);
     expected.sort_by_key(|e| e.landmark);
     Ok(Expectations {

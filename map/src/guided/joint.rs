@@ -35,7 +35,7 @@ pub(super) struct CommonError {
     covariance: CommonMatrix,
 }
 
-/// The common error after one more observation, and how well that fitted.
+/// The common error after one more observation, and the fit of that observation.
 pub(super) struct Updated {
     pub error: CommonError,
     /// Squared Mahalanobis distance of this innovation given those before.
@@ -49,9 +49,9 @@ impl CommonError {
         Self { mean: CommonVector::zeros(), covariance: *covariance }
     }
 
-    /// Conditions on observed corners with covariance `own` of what is not common: an iterated extended Kalman
-    /// update, so that a neighbour of the right landmark is not ruled out by linearisation alone. `None` when it does
-    /// not settle, the covariance is singular, or a number is not finite.
+    /// Conditions on observed corners with covariance `own` of the errors that are not shared: an iterated extended
+    /// Kalman update, so that a neighbour of the right landmark is not ruled out by linearisation alone. `None` if
+    /// it does not converge, the covariance is singular, or a number is not finite.
     pub(super) fn update(
         &self,
         predicted: &impl Prediction,

@@ -7,12 +7,12 @@
 //!
 //! Only fixes from landmarks that were recognised in the whole map, without the pose, support a pose. Guided
 //! observations support nothing: in a row of identical doors they fit a pose that is wrong by one door as well as the
-//! right one. So they correct only a pose that has had support; otherwise they would make a wrong pose surer.
+//! right one. So they correct only a pose that has had support; otherwise they would make a wrong pose more certain.
 //!
 //! A pose with no support yet is replaced after [`ScheduleParams::unsupported_reset_fixes`] contradicting fixes that
 //! agree with one another. A pose that [`ScheduleParams::established_landmarks`] different landmarks support needs
 //! [`ScheduleParams::reset_fixes`] and two witnesses: two contradicting landmarks, or one and an expected landmark
-//! that is missing. One landmark that was moved must not carry robots along.
+//! that is missing. One landmark that was moved must not move robots.
 
 mod params;
 mod report;
@@ -23,7 +23,7 @@ pub use report::{Decision, FramePlan, FrameReport, GlobalReason, GuidedReport, T
 
 use crate::{
     fuse::FuseParams,
-    guided::schedule::agreement::{PoseAgreement, is_uncertain, judge},
+    guided::schedule::agreement::{PoseAgreement, agreement, is_uncertain},
     localise::{Fix, FixResult},
     pose2::{Pose2, Pose2Covariance},
 };
@@ -51,7 +51,7 @@ pub struct Schedule {
     params: ScheduleParams,
     noise: FuseParams,
     has_pose: bool,
-    /// Some global fix has agreed with this pose.
+    /// A global fix has agreed with this pose.
     was_supported: bool,
     /// The last frame replaced the pose.
     was_replaced: bool,
@@ -65,7 +65,7 @@ pub struct Schedule {
 }
 
 impl Schedule {
-    /// Nothing known yet. `noise` says what odometry errs by between frames.
+    /// A schedule without knowledge. `noise` is the noise model of odometry between frames.
     pub fn new(params: ScheduleParams, noise: FuseParams) -> Self {
         Self { params, noise, ..Self::default() }
     }
@@ -98,8 +98,8 @@ impl Schedule {
         self.supported(landmarks);
     }
 
-    /// What to do with the next frame of a camera, taken near `prior`. Cameras are numbered by the caller; of more than
-    /// [`MAX_CAMERAS`] the others are searched every time.
+    /// What to do with the next frame of a camera, taken near `prior`. Cameras are numbered by the caller; of more
+    /// than [`MAX_CAMERAS`] the others are searched every time.
     pub fn plan(&self, camera: u32, prior: Option<&Pose2Covariance>) -> FramePlan {
         let p = &self.params;
         let Some(prior) = prior else {
@@ -122,7 +122,7 @@ impl Schedule {
         FramePlan { guided: true, global }
     }
 
-    /// Takes a frame to its end.
+    /// Ends a frame.
     pub fn finish(&mut self, frame: &FrameReport<'_>) -> Decision {
         self.carry(&frame.motion);
         self.count_search(frame.camera, frame.searched);
@@ -132,7 +132,7 @@ impl Schedule {
         };
         self.has_pose = true;
         let Some(global) = frame.global else { return Decision::Keep };
-        match judge(global, prior, &self.params) {
+        match agreement(global, prior, &self.params) {
             PoseAgreement::Agrees(fix) => {
                 self.supported(&fix.landmarks);
                 Decision::Use

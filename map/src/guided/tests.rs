@@ -73,7 +73,7 @@ fn draw3(covariance: &Matrix3<f64>, random: &mut Random) -> Vector3<f64> {
     covariance.cholesky().unwrap().l() * Vector3::from_fn(|_, _| random.normal())
 }
 
-/// The place as it really is, when the map has `place`.
+/// A true place, drawn from the covariance of the map's `place`.
 fn drawn_place(place: &LandmarkPlace, random: &mut Random) -> LandmarkPlace {
     let e = draw6(&place.covariance, random);
     let size = LandmarkSize { width_m: place.size.width_m + e[4], height_m: place.size.height_m + e[5] };
@@ -81,7 +81,7 @@ fn drawn_place(place: &LandmarkPlace, random: &mut Random) -> LandmarkPlace {
     LandmarkPlace { x_m, y_m, z_m, theta_rad: place.theta_rad + e[2], size, ..*place }
 }
 
-/// The extrinsics as they really are.
+/// True extrinsics, drawn from the covariance of the stated ones.
 fn drawn_mounting(mounting: &CameraExtrinsics, random: &mut Random) -> CameraExtrinsics {
     let e = draw6(&mounting.covariance, random);
     let (turn, shift) = (e.fixed_rows::<3>(0).into(), e.fixed_rows::<3>(3).into());
@@ -115,8 +115,8 @@ fn is_inside(px: &Point2<f64>) -> bool {
     px.x >= -0.5 && px.y >= -0.5 && px.x <= IMAGE_PX[0] - 0.5 && px.y <= IMAGE_PX[1] - 0.5
 }
 
-/// What a frame shows of the real places: all that are in full view, with noise.
-fn seen(
+/// Corners of all true places in full view, with noise.
+fn full_views(
     pose: &Pose2,
     places: &BTreeMap<LandmarkId, LandmarkPlace>,
     mounting: &CameraExtrinsics,
@@ -135,7 +135,7 @@ fn seen(
     made
 }
 
-/// An observation of a door may be any door; the poster is itself.
+/// An observation of a door has all doors as candidates; that of the poster only the poster.
 fn observation(landmark: LandmarkId, corners: Corners) -> Observation {
     let candidate = |landmark, picture_nats| Candidate { landmark, picture_nats, prior_nats: 0.0 };
     let candidates = if landmark == POSTER {

@@ -40,35 +40,35 @@ pub struct MountedCamera<'a> {
 /// uncertainty of the pose; by number.
 pub fn expected(
     pose: &Pose2Covariance,
-    eye: &MountedCamera<'_>,
+    camera: &MountedCamera<'_>,
     landmarks: &[ExpectedLandmark<'_>],
     p: &HealthParams,
 ) -> Vec<LandmarkId> {
-    let draws = PoseDraws::new(pose, eye.mounting.robot_from_camera.translation.vector.xy());
+    let draws = PoseDraws::new(pose, camera.mounting.robot_from_camera.translation.vector.xy());
     let expected = landmarks.iter().filter(|l| {
         l.visible.probability(&draws) >= p.expected_probability
-            && l.place.incidence_rad(&camera_at(&draws.mean(), eye)) <= p.expected_incidence_rad
-            && draws.poses().all(|at| is_inside(&at, eye, l.place, p))
+            && l.place.incidence_rad(&camera_at(&draws.mean(), camera)) <= p.expected_incidence_rad
+            && draws.poses().all(|at| is_inside(&at, camera, l.place, p))
     });
     expected.map(|l| l.landmark).collect()
 }
 
-fn camera_at(on_floor: &Point2<f64>, eye: &MountedCamera<'_>) -> Point3<f64> {
-    Point3::new(on_floor.x, on_floor.y, eye.mounting.robot_from_camera.translation.z)
+fn camera_at(on_floor: &Point2<f64>, camera: &MountedCamera<'_>) -> Point3<f64> {
+    Point3::new(on_floor.x, on_floor.y, camera.mounting.robot_from_camera.translation.z)
 }
 
 fn is_inside(
     at: &crate::pose2::Pose2,
-    eye: &MountedCamera<'_>,
+    camera: &MountedCamera<'_>,
     place: &LandmarkPlace,
     p: &HealthParams,
 ) -> bool {
-    let map_from_camera = at.to_isometry3() * eye.mounting.robot_from_camera;
+    let map_from_camera = at.to_isometry3() * camera.mounting.robot_from_camera;
     let camera_from_landmark = map_from_camera.inverse() * place.map_from_landmark();
     let inside =
         |value: f64, side: f64| value >= p.image_margin * side && value <= (1.0 - p.image_margin) * side;
     corner_points(&place.size).iter().all(|corner| {
-        pixel(&camera_from_landmark, corner, eye.camera)
-            .is_some_and(|px| inside(px.x, eye.image_px[0]) && inside(px.y, eye.image_px[1]))
+        pixel(&camera_from_landmark, corner, camera.camera)
+            .is_some_and(|px| inside(px.x, camera.image_px[0]) && inside(px.y, camera.image_px[1]))
     })
 }

@@ -12,7 +12,7 @@ use nalgebra::Point2;
 use std::collections::BTreeMap;
 use vision::model::LandmarkId;
 
-/// Most landmarks that one robot keeps evidence on; those unseen for longest are dropped first.
+/// Most landmarks that one robot keeps evidence on; those unobserved for longest are dropped first.
 pub const MAX_WATCHED: usize = 1024;
 
 #[derive(Debug, Clone, Default)]
@@ -28,10 +28,10 @@ pub(super) struct LandmarkEvidence {
     misses: u32,
     in_place: u32,
     /// Robot position at the last observation and at the last miss.
-    seen_from: Option<Point2<f64>>,
+    observed_from: Option<Point2<f64>>,
     missed_from: Option<Point2<f64>>,
     /// The health last reported.
-    told: LandmarkHealth,
+    reported: LandmarkHealth,
     touched: u64,
 }
 
@@ -54,7 +54,7 @@ impl HealthMonitor {
     pub fn clear(&mut self) -> Vec<HealthChange> {
         let cleared = std::mem::take(&mut self.landmarks);
         let raised =
-            cleared.into_iter().filter(|(_, e)| e.told == LandmarkHealth::Flagged && e.elsewhere > 0);
+            cleared.into_iter().filter(|(_, e)| e.reported == LandmarkHealth::Flagged && e.elsewhere > 0);
         raised
             .map(|(landmark, _)| HealthChange { landmark, health: LandmarkHealth::Sound, finding: None })
             .collect()
@@ -65,16 +65,16 @@ impl HealthMonitor {
     pub fn frame(
         &mut self,
         from: Point2<f64>,
-        judged: &[PlaceCheck],
+        checks: &[PlaceCheck],
         missed: &[LandmarkId],
         health: impl Fn(LandmarkId) -> LandmarkHealth,
     ) -> Vec<HealthChange> {
         self.frames += 1;
-        for judged in judged {
-            self.sighting(from, judged);
+        for check in checks {
+            self.observation(from, check);
         }
         let agreeing = |id: LandmarkId| {
-            judged.iter().any(|j| j.landmark != id && matches!(j.verdict, PlaceVerdict::InPlace { .. }))
+            checks.iter().any(|j| j.landmark != id && matches!(j.verdict, PlaceVerdict::InPlace { .. }))
         };
         for (id, evidence) in &mut self.landmarks {
             evidence.confirmed |= evidence.elsewhere > 0 && agreeing(*id);
@@ -88,20 +88,20 @@ impl HealthMonitor {
         ids.filter_map(|(id, evidence)| evidence.change(*id, health(*id), p)).collect()
     }
 
-    fn sighting(&mut self, from: Point2<f64>, judged: &PlaceCheck) {
+    fn observation(&mut self, from: Point2<f64>, check: &PlaceCheck) {
         let p = &self.params;
-        let evidence = self.landmarks.entry(judged.landmark).or_default();
+        let evidence = self.landmarks.entry(check.landmark).or_default();
         evidence.touched = self.frames;
         // An observation elsewhere ends a row of misses, too.
         evidence.misses = 0;
-        let new = evidence.seen_from.is_none_or(|last| (last - from).norm() >= p.sighting_move_m);
-        match judged.verdict {
+        let new = evidence.observed_from.is_none_or(|last| (last - from).norm() >= p.sighting_move_m);
+        match check.verdict {
             PlaceVerdict::Undecided | PlaceVerdict::Unsure => {}
             _ if !new => {}
             PlaceVerdict::InPlace { .. } => {
                 (evidence.elsewhere, evidence.confirmed) = (0, false);
                 evidence.in_place = evidence.in_place.saturating_add(1);
-                evidence.seen_from = Some(from);
+                evidence.observed_from = Some(from);
             }
             PlaceVerdict::Elsewhere { apparent, by_m, supporters, .. } => {
                 let same = evidence
@@ -114,7 +114,7 @@ impl HealthMonitor {
                 evidence.firm = supporters >= p.supporters;
                 evidence.elsewhere = evidence.elsewhere.saturating_add(1);
                 evidence.in_place = 0;
-                evidence.seen_from = Some(from);
+                evidence.observed_from = Some(from);
             }
         }
     }
@@ -157,7 +157,7 @@ impl LandmarkEvidence {
         let sure = (self.elsewhere >= p.quarantine_sightings && self.confirmed)
             || self.misses >= p.quarantine_misses;
         let Some(finding) = moved.or(missing) else {
-            self.told = LandmarkHealth::Sound;
+            self.reported = LandmarkHealth::Sound;
             let clear = now == LandmarkHealth::Flagged && self.in_place >= p.clear_sightings;
             // Reported again only after as many observations, in case the report was lost.
             self.in_place = if clear { 0 } else { self.in_place };
@@ -165,8 +165,8 @@ impl LandmarkEvidence {
         };
         let health = if sure { LandmarkHealth::Quarantined } else { LandmarkHealth::Flagged };
         // Only a person ends a quarantine; a report is not repeated.
-        let news = health > now && health != self.told;
-        self.told = health;
+        let news = health > now && health != self.reported;
+        self.reported = health;
         news.then_some(HealthChange { landmark, health, finding: Some(finding) })
     }
 }

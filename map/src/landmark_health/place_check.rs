@@ -19,7 +19,7 @@ pub enum PlaceVerdict {
         /// Squared Mahalanobis distance of its own fix to the pose, 3 degrees of freedom.
         distance2: f64,
     },
-    /// The landmark is elsewhere, or another one that looks the same was observed.
+    /// The landmark is elsewhere, or a look-alike was observed.
     Elsewhere {
         /// The same distance; infinite where no floor pose fits.
         distance2: f64,
@@ -48,22 +48,22 @@ pub struct PlaceCheck {
 
 /// Checks an observed landmark by the robot's pose without it. `supporters` are the landmarks that support the pose.
 pub fn check_place(
-    sighting: &LandmarkObservation<'_>,
+    observation: &LandmarkObservation<'_>,
     mounting: &CameraExtrinsics,
     pose: &Pose2Covariance,
     supporters: &[LandmarkId],
     p: &HealthParams,
 ) -> Result<PlaceCheck, OutOfRange> {
-    let landmark = sighting.landmark;
+    let landmark = observation.landmark;
     let others = supporters.iter().collect::<BTreeSet<_>>().into_iter().filter(|id| **id != landmark).count();
     if others == 0 {
         return Ok(PlaceCheck { landmark, verdict: PlaceVerdict::Undecided });
     }
-    let alone = robot_pose(std::slice::from_ref(sighting), mounting, None, &LocaliseParams::default())?;
+    let alone = robot_pose(std::slice::from_ref(observation), mounting, None, &LocaliseParams::default())?;
     let fixes = match &alone {
         FixResult::Fixed(fix) => std::slice::from_ref(&**fix),
         FixResult::Ambiguous(fixes) => fixes.as_slice(),
-        // Another height or size: the corners fit no robot on this floor.
+        // Another height or size: no floor pose fits the corners.
         FixResult::Refused(FixRefusal::Room { .. } | FixRefusal::Side) => &[],
         FixResult::Refused(_) => return Ok(PlaceCheck { landmark, verdict: PlaceVerdict::Undecided }),
     };
@@ -72,15 +72,15 @@ pub fn check_place(
     let distance2 = nearest.map_or(f64::INFINITY, |(distance2, _)| distance2);
     let verdict = if distance2 <= p.moved_chi2 {
         // A displacement of this much must be detectable in every direction.
-        let told = p.told_m / p.moved_chi2.sqrt();
+        let detectable_m = p.told_m / p.moved_chi2.sqrt();
         let both = nearest.map_or(0.0, |(_, fix)| spread_m(&(fix.covariance + pose.covariance)));
-        if both > told && spread_m(&pose.covariance) < told {
+        if both > detectable_m && spread_m(&pose.covariance) < detectable_m {
             PlaceVerdict::Unsure
         } else {
             PlaceVerdict::InPlace { distance2 }
         }
     } else {
-        let (apparent, by_m) = apparent(sighting, mounting, pose);
+        let (apparent, by_m) = apparent(observation, mounting, pose);
         PlaceVerdict::Elsewhere { distance2, apparent, by_m, supporters: others }
     };
     Ok(PlaceCheck { landmark, verdict })
@@ -100,13 +100,13 @@ fn spread_m(covariance: &Matrix3<f64>) -> f64 {
 
 /// Observed place of a landmark from a pose: the solution of its plane that is nearer to its place.
 fn apparent(
-    sighting: &LandmarkObservation<'_>,
+    observation: &LandmarkObservation<'_>,
     mounting: &CameraExtrinsics,
     pose: &Pose2Covariance,
 ) -> (Pose2, f64) {
     let map_from_camera = pose.pose.to_isometry3() * mounting.robot_from_camera;
-    let place = sighting.place.map_from_landmark();
-    let solutions = std::iter::once(&sighting.seen.best).chain(sighting.seen.second.as_ref());
+    let place = observation.place.map_from_landmark();
+    let solutions = std::iter::once(&observation.seen.best).chain(observation.seen.second.as_ref());
     let there = solutions.map(|s| map_from_camera * s.camera_from_landmark);
     let nearest = there.min_by(|a, b| {
         let off = |t: &nalgebra::Isometry3<f64>| t.rotation.angle_to(&place.rotation);
@@ -117,17 +117,17 @@ fn apparent(
     (Pose2::new(t.x, t.y, normal.y.atan2(normal.x)), (t - place.translation.vector).norm())
 }
 
-/// The observations of one frame that may correct the pose: without unsure ones, and without those observed elsewhere
-/// unless no other is left. Then they stay and the fusion decides, since the pose may be wrong.
+/// The observations of one frame that may correct the pose: without unsure ones, and without those observed
+/// elsewhere, unless no other is left. Then they stay and the fusion decides, since the pose may be wrong.
 pub fn drop_unreliable<'a>(
-    sightings: &[LandmarkObservation<'a>],
-    judged: &[PlaceCheck],
+    observations: &[LandmarkObservation<'a>],
+    checks: &[PlaceCheck],
 ) -> Vec<LandmarkObservation<'a>> {
     let is = |s: &LandmarkObservation<'_>, kind: fn(&PlaceVerdict) -> bool| {
-        judged.iter().any(|j| j.landmark == s.landmark && kind(&j.verdict))
+        checks.iter().any(|j| j.landmark == s.landmark && kind(&j.verdict))
     };
-    let sure = sightings.iter().filter(|s| !is(s, |v| matches!(v, PlaceVerdict::Unsure))).copied();
-    let (elsewhere, kept): (Vec<_>, Vec<_>) =
+    let sure = observations.iter().filter(|s| !is(s, |v| matches!(v, PlaceVerdict::Unsure))).copied();
+    let (elsewhere, in_place): (Vec<_>, Vec<_>) =
         sure.partition(|s| is(s, |v| matches!(v, PlaceVerdict::Elsewhere { .. })));
-    if kept.is_empty() { elsewhere } else { kept }
+    if in_place.is_empty() { elsewhere } else { in_place }
 }

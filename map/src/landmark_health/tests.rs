@@ -45,7 +45,7 @@ fn robot() -> Pose2Covariance {
     Pose2Covariance { pose: Pose2::new(1.2, 0.5, 0.0), covariance }
 }
 
-fn look(place: &LandmarkPlace) -> LandmarkPose {
+fn observe(place: &LandmarkPlace) -> LandmarkPose {
     let camera_from_landmark = mounting().robot_from_camera.inverse()
         * robot().pose.to_isometry3().inverse()
         * place.map_from_landmark();
@@ -53,22 +53,22 @@ fn look(place: &LandmarkPlace) -> LandmarkPose {
     landmark_pose(&Corners::new(px).unwrap(), &[Matrix2::identity() * 0.25; 4], SIZE, &camera()).unwrap()
 }
 
-fn judged(mapped: &LandmarkPlace, real: &LandmarkPlace, supporters: &[u64]) -> PlaceVerdict {
-    let seen = look(real);
-    let sighting = LandmarkObservation { landmark: LandmarkId(1), seen: &seen, place: mapped };
+fn verdict(mapped: &LandmarkPlace, real: &LandmarkPlace, supporters: &[u64]) -> PlaceVerdict {
+    let seen = observe(real);
+    let observation = LandmarkObservation { landmark: LandmarkId(1), seen: &seen, place: mapped };
     let supporters: Vec<_> = supporters.iter().map(|id| LandmarkId(*id)).collect();
-    check_place(&sighting, &mounting(), &robot(), &supporters, &HealthParams::default()).unwrap().verdict
+    check_place(&observation, &mounting(), &robot(), &supporters, &HealthParams::default()).unwrap().verdict
 }
 
 #[test]
-fn what_hangs_in_place_is_in_place_and_what_was_moved_is_not() {
+fn only_a_moved_landmark_is_observed_elsewhere() {
     let place = poster(0.0, 1.5);
     assert!(
-        matches!(judged(&place, &place, &[2, 3]), PlaceVerdict::InPlace { distance2 } if distance2 < 1.0)
+        matches!(verdict(&place, &place, &[2, 3]), PlaceVerdict::InPlace { distance2 } if distance2 < 1.0)
     );
     // Moved by a metre along the wall, and by 30 cm upwards.
     for (real, by) in [(poster(1.0, 1.5), 1.0), (poster(0.0, 1.8), 0.3)] {
-        let PlaceVerdict::Elsewhere { apparent, by_m, .. } = judged(&place, &real, &[2, 3]) else {
+        let PlaceVerdict::Elsewhere { apparent, by_m, .. } = verdict(&place, &real, &[2, 3]) else {
             panic!("{by}")
         };
         assert!((by_m - by).abs() < 0.05, "{by_m} for {by}");
@@ -77,45 +77,45 @@ fn what_hangs_in_place_is_in_place_and_what_was_moved_is_not() {
 }
 
 #[test]
-fn from_afar_it_is_unsure() {
+fn a_distant_observation_is_unsure() {
     // Straight ahead at 6 m, heading known to half a degree: a shift along the wall is half hidden in the heading.
     let place = LandmarkPlace { x_m: 7.2, ..poster(0.5, 1.5) };
     let sure =
         Pose2Covariance { covariance: Matrix3::from_diagonal(&Vector3::new(1e-4, 1e-4, 1e-4)), ..robot() };
     let unsure =
         Pose2Covariance { covariance: Matrix3::from_diagonal(&Vector3::new(0.2, 0.2, 1e-2)), ..robot() };
-    let seen = look(&place);
-    let sighting = LandmarkObservation { landmark: LandmarkId(1), seen: &seen, place: &place };
+    let seen = observe(&place);
+    let observation = LandmarkObservation { landmark: LandmarkId(1), seen: &seen, place: &place };
     let by = |pose| {
         let others = [LandmarkId(2), LandmarkId(3)];
-        check_place(&sighting, &mounting(), pose, &others, &HealthParams::default()).unwrap()
+        check_place(&observation, &mounting(), pose, &others, &HealthParams::default()).unwrap()
     };
     assert_eq!(by(&sure).verdict, PlaceVerdict::Unsure);
-    assert!(drop_unreliable(&[sighting], &[by(&sure)]).is_empty(), "the pose does without it");
+    assert!(drop_unreliable(&[observation], &[by(&sure)]).is_empty(), "the pose is certain without it");
     assert!(matches!(by(&unsure).verdict, PlaceVerdict::InPlace { .. }), "this pose needs it");
 }
 
 #[test]
-fn nobody_judges_by_itself() {
+fn a_pose_without_other_supporters_decides_nothing() {
     let (place, real) = (poster(0.0, 1.5), poster(1.0, 1.5));
     for supporters in [&[][..], &[1], &[1, 1]] {
-        assert_eq!(judged(&place, &real, supporters), PlaceVerdict::Undecided, "{supporters:?}");
+        assert_eq!(verdict(&place, &real, supporters), PlaceVerdict::Undecided, "{supporters:?}");
     }
 }
 
 #[test]
-fn the_others_of_a_frame_go_on_correcting() {
-    let (place, seen) = (poster(0.0, 1.5), look(&poster(0.0, 1.5)));
-    let sightings =
+fn other_landmarks_of_the_frame_still_correct() {
+    let (place, seen) = (poster(0.0, 1.5), observe(&poster(0.0, 1.5)));
+    let observations =
         [1, 2].map(|id| LandmarkObservation { landmark: LandmarkId(id), seen: &seen, place: &place });
     let verdict =
         PlaceVerdict::Elsewhere { distance2: 100.0, apparent: Pose2::default(), by_m: 1.0, supporters: 2 };
     let moved = |id| PlaceCheck { landmark: LandmarkId(id), verdict };
-    let left = |judged: &[PlaceCheck]| {
-        drop_unreliable(&sightings, judged).iter().map(|s| s.landmark.0).collect::<Vec<_>>()
+    let left = |checks: &[PlaceCheck]| {
+        drop_unreliable(&observations, checks).iter().map(|s| s.landmark.0).collect::<Vec<_>>()
     };
     assert_eq!(left(&[moved(1)]), [2]);
-    assert_eq!(left(&[moved(1), moved(2)]), [1, 2], "then the pose is in doubt, not the wall");
+    assert_eq!(left(&[moved(1), moved(2)]), [1, 2], "then the pose may be wrong, not the places");
 }
 
 fn elsewhere(id: u64, y: f64) -> PlaceCheck {
@@ -128,7 +128,7 @@ fn in_place(id: u64) -> PlaceCheck {
     PlaceCheck { landmark: LandmarkId(id), verdict: PlaceVerdict::InPlace { distance2: 1.0 } }
 }
 
-/// A map that does what it is told.
+/// A map that applies all changes.
 #[derive(Default)]
 struct Administration {
     healths: BTreeMap<LandmarkId, LandmarkHealth>,
@@ -136,11 +136,11 @@ struct Administration {
 }
 
 impl Administration {
-    fn frame(&mut self, watch: &mut HealthMonitor, x: f64, judged: &[PlaceCheck], missed: &[u64]) {
+    fn frame(&mut self, monitor: &mut HealthMonitor, x: f64, checks: &[PlaceCheck], missed: &[u64]) {
         let missed: Vec<_> = missed.iter().map(|id| LandmarkId(*id)).collect();
         let healths = self.healths.clone();
         let now = |id| healths.get(&id).copied().unwrap_or_default();
-        for change in watch.frame(Point2::new(x, 0.0), judged, &missed, now) {
+        for change in monitor.frame(Point2::new(x, 0.0), checks, &missed, now) {
             self.healths.insert(change.landmark, change.health);
             self.log.push((change.landmark.0, change.health));
         }
@@ -149,23 +149,23 @@ impl Administration {
 
 #[test]
 fn a_moved_landmark_is_flagged_then_quarantined_once_another_agrees() {
-    let (mut watch, mut admin) = (HealthMonitor::new(HealthParams::default()), Administration::default());
+    let (mut monitor, mut admin) = (HealthMonitor::new(HealthParams::default()), Administration::default());
     for k in 0..20 {
-        admin.frame(&mut watch, 0.1 * f64::from(k), &[elsewhere(1, 1.0)], &[]);
+        admin.frame(&mut monitor, 0.1 * f64::from(k), &[elsewhere(1, 1.0)], &[]);
         let expected: &[_] = if k < 2 { &[] } else { &[(1, LandmarkHealth::Flagged)] };
-        assert_eq!(admin.log, expected, "after {} sightings", k + 1);
+        assert_eq!(admin.log, expected, "after {} observations", k + 1);
     }
-    admin.frame(&mut watch, 3.0, &[in_place(2)], &[]);
+    admin.frame(&mut monitor, 3.0, &[in_place(2)], &[]);
     assert_eq!(admin.log, [(1, LandmarkHealth::Flagged), (1, LandmarkHealth::Quarantined)]);
-    // What is in quarantine is for a person, however often it is seen in place again.
+    // Only a person ends a quarantine, however often it is observed in place again.
     for k in 0..9 {
-        admin.frame(&mut watch, 4.0 + f64::from(k), &[in_place(1)], &[]);
+        admin.frame(&mut monitor, 4.0 + f64::from(k), &[in_place(1)], &[]);
     }
     assert_eq!(admin.log.len(), 2);
 }
 
 #[test]
-fn of_two_that_disagree_a_third_decides() {
+fn a_third_landmark_decides_between_two_that_disagree() {
     let one = |id, y| {
         let PlaceVerdict::Elsewhere { distance2, apparent, by_m, .. } = elsewhere(id, y).verdict else {
             panic!()
@@ -173,93 +173,93 @@ fn of_two_that_disagree_a_third_decides() {
         let verdict = PlaceVerdict::Elsewhere { distance2, apparent, by_m, supporters: 1 };
         PlaceCheck { landmark: LandmarkId(id), verdict }
     };
-    let (mut watch, mut admin) = (HealthMonitor::new(HealthParams::default()), Administration::default());
+    let (mut monitor, mut admin) = (HealthMonitor::new(HealthParams::default()), Administration::default());
     for k in 0..9 {
-        admin.frame(&mut watch, 0.1 * f64::from(k), &[one(1, 1.0)], &[]);
+        admin.frame(&mut monitor, 0.1 * f64::from(k), &[one(1, 1.0)], &[]);
     }
-    assert_eq!(admin.log, [], "the one that the pose rests on may have moved");
-    admin.frame(&mut watch, 3.0, &[in_place(3)], &[]);
+    assert_eq!(admin.log, [], "the supporting landmark may have moved");
+    admin.frame(&mut monitor, 3.0, &[in_place(3)], &[]);
     assert_eq!(admin.log, [(1, LandmarkHealth::Quarantined)]);
 }
 
 #[test]
-fn a_robot_that_stands_still_has_seen_it_once() {
-    let (mut watch, mut admin) = (HealthMonitor::new(HealthParams::default()), Administration::default());
+fn a_standing_robot_counts_one_observation() {
+    let (mut monitor, mut admin) = (HealthMonitor::new(HealthParams::default()), Administration::default());
     for _ in 0..50 {
-        admin.frame(&mut watch, 1.0, &[elsewhere(1, 1.0), in_place(2)], &[3]);
+        admin.frame(&mut monitor, 1.0, &[elsewhere(1, 1.0), in_place(2)], &[3]);
     }
     assert_eq!(admin.log, []);
 }
 
 #[test]
-fn sightings_here_and_there_do_not_add_up() {
-    let (mut watch, mut admin) = (HealthMonitor::new(HealthParams::default()), Administration::default());
+fn observations_of_different_places_do_not_add_up() {
+    let (mut monitor, mut admin) = (HealthMonitor::new(HealthParams::default()), Administration::default());
     for k in 0..20 {
         let at = 3.0 * f64::from(k % 3);
-        admin.frame(&mut watch, 0.1 * f64::from(k), &[elsewhere(1, at), in_place(2)], &[]);
+        admin.frame(&mut monitor, 0.1 * f64::from(k), &[elsewhere(1, at), in_place(2)], &[]);
     }
     for k in 0..20 {
         let judged = if k % 2 == 0 { elsewhere(4, 1.0) } else { in_place(4) };
-        admin.frame(&mut watch, 5.0 + 0.1 * f64::from(k), &[judged], &[]);
+        admin.frame(&mut monitor, 5.0 + 0.1 * f64::from(k), &[judged], &[]);
     }
     assert_eq!(admin.log, []);
 }
 
 #[test]
-fn a_flag_is_cleared_by_sightings_in_place() {
-    let (mut watch, mut admin) = (HealthMonitor::new(HealthParams::default()), Administration::default());
+fn a_flag_is_cleared_by_observations_in_place() {
+    let (mut monitor, mut admin) = (HealthMonitor::new(HealthParams::default()), Administration::default());
     for k in 0..3 {
-        admin.frame(&mut watch, 0.1 * f64::from(k), &[elsewhere(1, 1.0)], &[]);
+        admin.frame(&mut monitor, 0.1 * f64::from(k), &[elsewhere(1, 1.0)], &[]);
     }
     for k in 0..3 {
         assert_eq!(admin.log.len(), 1);
-        admin.frame(&mut watch, 1.0 + 0.1 * f64::from(k), &[in_place(1)], &[]);
+        admin.frame(&mut monitor, 1.0 + 0.1 * f64::from(k), &[in_place(1)], &[]);
     }
     assert_eq!(admin.log, [(1, LandmarkHealth::Flagged), (1, LandmarkHealth::Sound)]);
 }
 
 #[test]
-fn what_is_never_seen_where_it_should_be_is_missing() {
-    let (mut watch, mut admin) = (HealthMonitor::new(HealthParams::default()), Administration::default());
+fn a_landmark_that_is_never_observed_is_missing() {
+    let (mut monitor, mut admin) = (HealthMonitor::new(HealthParams::default()), Administration::default());
     for k in 0..20 {
-        admin.frame(&mut watch, 0.3 * f64::from(k), &[], &[7]);
+        admin.frame(&mut monitor, 0.3 * f64::from(k), &[], &[7]);
         let expected = usize::from(k >= 5) + usize::from(k >= 19);
-        assert_eq!(admin.log.len(), expected, "after {} looks", k + 1);
+        assert_eq!(admin.log.len(), expected, "after {} frames", k + 1);
     }
     assert_eq!(admin.log, [(7, LandmarkHealth::Flagged), (7, LandmarkHealth::Quarantined)]);
-    let (mut watch, mut admin) = (HealthMonitor::new(HealthParams::default()), Administration::default());
+    let (mut monitor, mut admin) = (HealthMonitor::new(HealthParams::default()), Administration::default());
     for k in 0..40 {
         let judged = if k % 5 == 4 { vec![in_place(7)] } else { vec![] };
         let missed: &[u64] = if judged.is_empty() { &[7] } else { &[] };
-        admin.frame(&mut watch, 0.3 * f64::from(k), &judged, missed);
+        admin.frame(&mut monitor, 0.3 * f64::from(k), &judged, missed);
     }
-    assert_eq!(admin.log, [], "seen now and then");
+    assert_eq!(admin.log, [], "observed now and then");
 }
 
 #[test]
-fn a_pose_that_proved_wrong_has_condemned_nobody() {
-    let (mut watch, mut admin) = (HealthMonitor::new(HealthParams::default()), Administration::default());
+fn flags_by_a_wrong_pose_are_cleared() {
+    let (mut monitor, mut admin) = (HealthMonitor::new(HealthParams::default()), Administration::default());
     for k in 0..9 {
         let judged = [elsewhere(1, 1.0), elsewhere(2, 5.0)];
-        admin.frame(&mut watch, 0.1 * f64::from(k), &judged, &[]);
+        admin.frame(&mut monitor, 0.1 * f64::from(k), &judged, &[]);
     }
     assert!(admin.log.iter().all(|(_, s)| *s == LandmarkHealth::Flagged), "{:?}", admin.log);
-    let cleared: Vec<_> = watch.clear().iter().map(|c| (c.landmark.0, c.health)).collect();
+    let cleared: Vec<_> = monitor.clear().iter().map(|c| (c.landmark.0, c.health)).collect();
     assert_eq!(cleared, [(1, LandmarkHealth::Sound), (2, LandmarkHealth::Sound)]);
 }
 
 #[test]
 fn evidence_is_bounded() {
-    let mut watch = HealthMonitor::new(HealthParams::default());
+    let mut monitor = HealthMonitor::new(HealthParams::default());
     for id in 0..=MAX_WATCHED as u64 {
-        watch.frame(Point2::origin(), &[in_place(id)], &[], |_| LandmarkHealth::Sound);
+        monitor.frame(Point2::origin(), &[in_place(id)], &[], |_| LandmarkHealth::Sound);
     }
-    assert_eq!(watch.landmarks.len(), MAX_WATCHED);
-    assert!(!watch.landmarks.contains_key(&LandmarkId(0)), "the longest unseen went");
+    assert_eq!(monitor.landmarks.len(), MAX_WATCHED);
+    assert!(!monitor.landmarks.contains_key(&LandmarkId(0)), "the one unobserved for longest was dropped");
 }
 
 #[test]
-fn only_what_is_surely_in_the_picture_is_expected() {
+fn only_landmarks_surely_in_the_image_are_expected() {
     let p = HealthParams::default();
     let (mounting, camera) = (mounting(), camera());
     let eye = MountedCamera { mounting: &mounting, camera: &camera, image_px: [640.0, 480.0] };
@@ -274,9 +274,9 @@ fn only_what_is_surely_in_the_picture_is_expected() {
     let place = poster(0.5, 1.5);
     assert!(expects(&robot(), &place, &[]));
     let turned = Pose2Covariance { pose: Pose2::new(1.2, 0.5, 0.5), ..robot() };
-    assert!(!expects(&turned, &place, &[]), "out of the picture");
+    assert!(!expects(&turned, &place, &[]), "out of the image");
     let unsure = Pose2Covariance { covariance: Matrix3::identity() * 0.04, ..robot() };
-    assert!(!expects(&unsure, &place, &[]), "perhaps out of the picture");
+    assert!(!expects(&unsure, &place, &[]), "perhaps out of the image");
     let column =
         crate::visibility::Obstacle { a: Point2::new(2.5, 0.4), b: Point2::new(2.5, 0.6), height_m: None };
     assert!(!expects(&robot(), &place, &[column]), "hidden");

@@ -31,7 +31,13 @@ struct Matched {
     residual: f64,
 }
 
-fn matched(walls: &WallIndex, seen: &Cloud, pose: &Pose2, radius_m: f64, p: &LaserFixParams) -> Vec<Matched> {
+fn matched(
+    walls: &WallIndex,
+    cloud: &Cloud,
+    pose: &Pose2,
+    radius_m: f64,
+    p: &LaserFixParams,
+) -> Vec<Matched> {
     let (s, c) = pose.theta_rad.sin_cos();
     let cos_turn = p.max_turn_rad.cos();
     let outlier2 = (p.outlier_m * radius_m / p.end_radius_m).powi(2);
@@ -49,20 +55,20 @@ fn matched(walls: &WallIndex, seen: &Cloud, pose: &Pose2, radius_m: f64, p: &Las
         let along_m = wall.along.dot(&(at - wall.a)) - 0.5 * wall.length_m;
         Some(Matched { wall: i, j, along_m, weight, residual })
     };
-    seen.points.iter().filter_map(one).collect()
+    cloud.points.iter().filter_map(one).collect()
 }
 
 /// Gauss-Newton from one start.
 pub(super) fn descend(
     walls: &WallIndex,
-    seen: &Cloud,
+    cloud: &Cloud,
     start: &Pose2,
     p: &LaserFixParams,
 ) -> Option<LaserFix> {
     let (mut pose, mut radius_m) = (*start, p.start_radius_m);
     for step in 0..p.iterations.max(1) {
         let (mut h, mut g) = (Matrix3::from_diagonal_element(1e-6), Vector3::zeros());
-        let points = matched(walls, seen, &pose, radius_m, p);
+        let points = matched(walls, cloud, &pose, radius_m, p);
         for m in &points {
             h += m.j * m.j.transpose() * m.weight;
             g += m.j * (m.weight * m.residual);
@@ -78,13 +84,14 @@ pub(super) fn descend(
         }
     }
     pose.check().ok()?;
-    let points = matched(walls, seen, &pose, p.end_radius_m, p);
+    let points = matched(walls, cloud, &pose, p.end_radius_m, p);
     let weights: f64 = points.iter().map(|m| m.weight).sum();
     let squares: f64 = points.iter().map(|m| m.weight * m.residual * m.residual).sum();
     let variance = (squares / weights.max(1e-9)).max(p.sigma_m * p.sigma_m);
     let scale = 1.0 / (p.correlated.max(1.0) * variance);
-    let told = points.iter().fold(Matrix3::zeros(), |h, m| h + m.j * m.j.transpose() * (scale * m.weight));
-    let spread = spread(&told)?;
+    let information =
+        points.iter().fold(Matrix3::zeros(), |h, m| h + m.j * m.j.transpose() * (scale * m.weight));
+    let spread = spread(&information)?;
     let [floor_m, floor_rad] = p.floor.map(|sigma| sigma * sigma);
     let floor = Matrix3::from_diagonal(&Vector3::new(floor_m, floor_m, floor_rad));
     let mut parts = by_walls(walls, &points, &(spread * scale));
@@ -96,7 +103,7 @@ pub(super) fn descend(
     }
     let covariance = noise + floor + all(&parts);
     parts.truncate(NAMED_WALLS);
-    let (count, flat) = (points.len(), seen.points.len());
+    let (count, flat) = (points.len(), cloud.points.len());
     let pose = Pose2Covariance { pose, covariance };
     pose.check().ok()?;
     let matched = count as f64 / flat.max(1) as f64;

@@ -27,15 +27,15 @@ pub fn laser_fix(
     prior.check()?;
     check::within("params.end_radius_m", p.end_radius_m, 1e-3, 1.0)?;
     check::within("params.start_radius_m", p.start_radius_m, p.end_radius_m, 1.0)?;
-    let mut seen = cloud(scan, &p.cloud);
-    seen.points.retain(|q| q.normal.is_some());
-    let stride = seen.points.len().div_ceil(MAX_POINTS).max(1);
-    seen.points = seen.points.into_iter().step_by(stride).collect();
-    if seen.points.len() < p.min_points || walls.is_empty() {
-        return Ok(Err(LaserRefusal::FewPoints { points: seen.points.len() }));
+    let mut points_of_scan = cloud(scan, &p.cloud);
+    points_of_scan.points.retain(|q| q.normal.is_some());
+    let stride = points_of_scan.points.len().div_ceil(MAX_POINTS).max(1);
+    points_of_scan.points = points_of_scan.points.into_iter().step_by(stride).collect();
+    if points_of_scan.points.len() < p.min_points || walls.is_empty() {
+        return Ok(Err(LaserRefusal::FewPoints { points: points_of_scan.points.len() }));
     }
     let mut found: Vec<LaserFix> =
-        starts(prior, p).iter().filter_map(|start| descend(walls, &seen, start, p)).collect();
+        starts(prior, p).iter().filter_map(|start| descend(walls, &points_of_scan, start, p)).collect();
     // Most points first, then the smallest residual; stable, so the prior's own start wins ties.
     found.sort_by(|a, b| b.points.cmp(&a.points).then(a.rms_m.total_cmp(&b.rms_m)));
     let Some(best) = found.first() else {

@@ -30,12 +30,12 @@ fn fix(
 }
 
 #[test]
-fn the_pose_is_found_within_what_it_claims() {
+fn the_covariance_of_the_pose_is_consistent() {
     let (mut worst, mut sum, mut n) = (0.0_f64, 0.0, 0);
     for seed in 0..200 {
         let mut random = Random::new(seed);
         let at = Pose2::new(random.range(0.7, 1.4), random.range(3.0, 13.0), random.range(-3.0, 3.0));
-        // Each draw has another map, wrong by what it says.
+        // Each draw has another map, with errors by its covariance.
         let off = |w: &[f64; 4], random: &mut Random| {
             let d = Vector2::new(w[2] - w[0], w[3] - w[1]).normalize();
             let e = 0.005 * random.normal();
@@ -50,7 +50,7 @@ fn the_pose_is_found_within_what_it_claims() {
         };
         let e = found.pose.pose.minus(&at);
         sum += e.dot(&found.pose.covariance.cholesky().unwrap().solve(&e));
-        // Across the corridor and in the heading it is sure.
+        // Across the corridor and in the heading it is determined.
         worst = worst.max(e.x.abs()).max(e.z.abs());
         n += 1;
     }
@@ -61,7 +61,7 @@ fn the_pose_is_found_within_what_it_claims() {
 }
 
 #[test]
-fn along_a_bare_corridor_nothing_is_claimed() {
+fn along_a_bare_corridor_the_pose_is_undetermined() {
     let walls = vec![[-60.0, -1.0, 60.0, -1.0], [-60.0, 1.0, 60.0, 1.0]];
     let mut random = Random::new(1);
     let at = Pose2::new(3.0, 0.2, 0.1);
@@ -70,13 +70,13 @@ fn along_a_bare_corridor_nothing_is_claimed() {
     let c = found.pose.covariance;
     assert!(c[(0, 0)].sqrt() > 50.0, "{c}");
     assert!(c[(1, 1)].sqrt() < 0.02 && c[(2, 2)].sqrt() < 0.01, "{c}");
-    // Where nothing is known the prior's value stays: fusing it changes nothing.
+    // Undetermined coordinates have the prior's value: fusing them changes nothing.
     assert!((found.pose.pose.x_m - believed.pose.x_m).abs() < 0.05);
     assert!((found.pose.pose.y_m - 0.2).abs() < 0.02);
 }
 
 #[test]
-fn what_is_not_the_map_is_refused() {
+fn a_scan_of_another_place_is_refused() {
     let mut random = Random::new(2);
     let at = Pose2::new(3.0, 2.0, 0.3);
     let room = rectangle([0.0, 0.0, 6.0, 4.0]);
@@ -95,28 +95,28 @@ fn what_is_not_the_map_is_refused() {
     );
     // No walls, no returns.
     let empty = WallIndex::new(&[]);
-    let seen = scan(&room, &at, 0.01, 12.0, &mut random);
-    assert!(matches!(laser_fix(&empty, &seen, &near, &p).unwrap(), Err(LaserRefusal::FewPoints { .. })));
+    let measured = scan(&room, &at, 0.01, 12.0, &mut random);
+    assert!(matches!(laser_fix(&empty, &measured, &near, &p).unwrap(), Err(LaserRefusal::FewPoints { .. })));
     let blind = Scan::new(Pose2::default(), 0.0, 0.01, 10.0, vec![f32::NAN; 300]).unwrap();
     assert_eq!(laser_fix(&index, &blind, &near, &p).unwrap(), Err(LaserRefusal::FewPoints { points: 0 }));
     let nan = Pose2Covariance { covariance: Matrix3::repeat(f64::NAN), ..near };
-    assert_eq!(laser_fix(&index, &seen, &nan, &p).unwrap_err().field, "covariance");
+    assert_eq!(laser_fix(&index, &measured, &nan, &p).unwrap_err().field, "covariance");
 }
 
 #[test]
-fn a_prior_that_is_sure_and_wrong_is_contradicted() {
+fn an_overconfident_wrong_prior_is_contradicted() {
     let mut random = Random::new(4);
     let room = rectangle([0.0, 0.0, 6.0, 4.0]);
     let at = Pose2::new(3.0, 2.0, 0.3);
-    // Off by 0.3 m, said to be within 2 cm.
+    // Off by 0.3 m, stated within 2 cm.
     let wrong = prior(&at.plus(&Vector3::new(0.3, 0.0, 0.0)), 0.02, 0.01, &mut random);
     let found = fix(&room, &at, &wrong, &mut random);
     assert!(matches!(found, Err(LaserRefusal::GatePrior { .. })), "{found:?}");
 }
 
 #[test]
-fn two_places_that_fit_are_none() {
-    // Niches every 1.2 m, all the same; the prior covers two of them.
+fn two_matching_poses_are_ambiguous() {
+    // Identical niches every 1.2 m; the prior covers two of them.
     let mut walls = vec![[-20.0, -1.0, 20.0, -1.0]];
     for i in -16..16 {
         let x = 1.2 * f64::from(i);
@@ -132,14 +132,14 @@ fn two_places_that_fit_are_none() {
     };
     let found = fix(&walls, &at, &wide, &mut random);
     assert_eq!(found, Err(LaserRefusal::Ambiguous));
-    // A narrow prior settles it.
+    // A narrow prior resolves it.
     let sure = prior(&at, 0.05, 0.01, &mut random);
     let found = fix(&walls, &at, &sure, &mut random).unwrap();
     assert!((found.pose.pose.x_m - 0.3).abs() < 0.03, "{found:?}");
 }
 
 #[test]
-fn fused_along_a_corridor_the_doubt_stays_and_across_it_goes() {
+fn fusion_reduces_the_uncertainty_across_a_corridor_only() {
     use crate::fuse::{FixOutcome, FuseParams, Fuser};
     let walls = vec![[-60.0, -1.0, 60.0, -1.0], [-60.0, 1.0, 60.0, 1.0]];
     let mut random = Random::new(6);

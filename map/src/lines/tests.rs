@@ -33,12 +33,12 @@ const ROOM: [[f64; 4]; 5] = [
 ];
 
 #[test]
-fn a_room_comes_out_as_its_walls() {
+fn a_room_gives_its_walls() {
     let mut random = Random::new(1);
     let pose = Pose2::new(0.3, 0.1, 0.2);
     let found = segments(&scan(&ROOM, &pose, 721, 0.01, &mut random), &LineParams::default());
     let back = Pose2Covariance { pose, covariance: Matrix3::zeros() };
-    let mut seen = [0; 5];
+    let mut pieces = [0; 5];
     for s in &found {
         let s = s.transformed(&back);
         // Both ends lie on one wall.
@@ -47,14 +47,14 @@ fn a_room_comes_out_as_its_walls() {
             [s.a, s.b].iter().all(|p| e.perp(&(p - o)).abs() < 0.03)
         };
         let wall = ROOM.iter().position(|w| on(*w)).unwrap_or_else(|| panic!("{s:?} is on no wall"));
-        seen[wall] += 1;
+        pieces[wall] += 1;
         assert!(s.facing().dot(&(Point2::new(pose.x_m, pose.y_m) - s.a)) > 0.0, "free side");
     }
     // The pillar hides the middle of the far walls: they come in up to two pieces. The wall behind is out of the fan
     // but for its ends.
     assert!(
-        seen[0] == 1 && seen[4] == 1 && (1..=2).contains(&seen[1]) && (1..=2).contains(&seen[2]),
-        "{seen:?}"
+        pieces[0] == 1 && pieces[4] == 1 && (1..=2).contains(&pieces[1]) && (1..=2).contains(&pieces[2]),
+        "{pieces:?}"
     );
 }
 
@@ -117,7 +117,7 @@ fn covariance_agrees_with_monte_carlo() {
 }
 
 #[test]
-fn merging_compares_lines_where_they_meet() {
+fn merging_compares_lines_in_common_coordinates() {
     // Two pieces of one noisy wall, far apart along it, have covariances that only fit in common coordinates.
     let mut random = Random::new(5);
     let mut merged = 0;
@@ -142,7 +142,7 @@ fn merging_compares_lines_where_they_meet() {
 }
 
 #[test]
-fn nothing_straight_gives_nothing() {
+fn points_without_lines_give_nothing() {
     let p = LineParams::default();
     let of = |ranges: Vec<f32>| {
         let n = ranges.len();

@@ -90,10 +90,10 @@ pub struct Fix {
 /// Why recognised landmarks gave no pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum FixRefusal {
-    /// No upright robot on the floor sees the corners there: camera height, tilt or the landmark's place is wrong.
-    // Departs from method 13.6, which gates |z|, |roll| and |pitch| of the pose in space. These are the same residuals,
-    // weighted by the information of the corners, which is small from afar and large from near.
-    /// Re-projection error above the gate for every floor pose: camera height, tilt or the landmark's place is wrong.
+    // Departs from method 13.6, which gates |z|, |roll| and |pitch| of the pose in space. These are the same
+    // residuals, weighted by the information of the corners, which is small from afar and large from near.
+    /// Re-projection error above the gate for every floor pose: camera height, tilt or the landmark's place is
+    /// wrong.
     Room {
         /// Weighted squared residual of the best solution.
         chi2: f64,

@@ -71,18 +71,18 @@ pub struct FocalEvidence {
 
 /// The evidence of one fix. `None` where the numbers carry no information.
 pub fn focal_evidence(
-    sightings: &[LandmarkObservation<'_>],
+    observations: &[LandmarkObservation<'_>],
     mounting: &CameraExtrinsics,
     pose: &Pose2,
 ) -> Option<FocalEvidence> {
     // Without the stated uncertainty of the intrinsics: it would absorb the error that is estimated here.
-    let problem = Planar::new(sightings, mounting).exact_camera();
+    let problem = Planar::new(observations, mounting).exact_camera();
     let at = problem.linearise(pose)?;
     let weight = problem.weight(&at)?;
     // A longer focal length moves a corner away from the principal point.
     let mut by_focal = DVector::zeros(at.residual.len());
-    for (i, sighting) in sightings.iter().enumerate() {
-        let m = &sighting.seen.measured;
+    for (i, observation) in observations.iter().enumerate() {
+        let m = &observation.seen.measured;
         for (c, p) in m.corners_px.points().iter().enumerate() {
             let row = 8 * i + 2 * c;
             by_focal[row] = p.x - m.camera.cx_px - at.residual[row];
@@ -121,7 +121,7 @@ pub enum Suspicion {
     },
 }
 
-/// What the fixes of a camera say of its intrinsics.
+/// Residual statistics of a camera's fixes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct IntrinsicsMonitorState {
     /// Fixes and refusals counted.
@@ -142,7 +142,7 @@ pub struct IntrinsicsMonitorState {
 
 #[derive(Debug, Clone, Copy, Default)]
 struct OfLandmark {
-    looks: f64,
+    observations: f64,
     gradient: f64,
     information: f64,
 }
@@ -185,7 +185,7 @@ impl IntrinsicsMonitor {
             return;
         }
         let sum = self.landmarks.entry(*landmark).or_default();
-        sum.looks += 1.0;
+        sum.observations += 1.0;
         sum.gradient += evidence.gradient;
         sum.information += evidence.information;
     }
@@ -215,7 +215,7 @@ impl IntrinsicsMonitor {
     fn focal(&self) -> Option<(f64, f64)> {
         let (mut gradient, mut information) = (0.0, 0.0);
         for sum in self.landmarks.values() {
-            let share = (self.params.looks_a_landmark / sum.looks).min(1.0);
+            let share = (self.params.looks_a_landmark / sum.observations).min(1.0);
             gradient += sum.gradient * share;
             information += sum.information * share;
         }
@@ -264,9 +264,9 @@ mod tests {
 
     const SIZE: LandmarkSize = LandmarkSize { width_m: 0.6, height_m: 0.84 };
 
-    /// A robot that looks at six posters from many places, through a camera whose focal length is `true_px` but said to
-    /// be 600: the watch at the end. Places and mounting are wrong by as much as they claim.
-    fn watched(true_px: f64, looks: usize, seed: u64) -> IntrinsicsMonitorState {
+    /// State after a robot has observed six posters from many viewpoints by a camera of focal length `true_px`,
+    /// stated as 600. Places and extrinsics have errors by their covariances.
+    fn monitored(true_px: f64, frames: usize, seed: u64) -> IntrinsicsMonitorState {
         let mut random = Random::new(seed);
         let said = Intrinsics::new(600.0, 600.0, 320.0, 240.0, Distortion::None).unwrap();
         // A stated uncertainty does not switch the monitor off.
@@ -276,7 +276,7 @@ mod tests {
         let e = believed.covariance.map_diagonal(f64::sqrt).map(|s| s * random.normal());
         let (turn, shift) = (e.fixed_rows::<3>(0).into(), e.fixed_rows::<3>(3).into());
         let mounted = perturbed(&believed.robot_from_camera, &turn, &shift);
-        let mut watch = IntrinsicsMonitor::default();
+        let mut monitor = IntrinsicsMonitor::default();
         let places: Vec<(LandmarkPlace, LandmarkPlace)> = (0..6)
             .map(|i| {
                 let centre = Vector3::new(4.0 * f64::from(i), 0.0, 1.5);
@@ -284,43 +284,43 @@ mod tests {
                 let e: Vector6<f64> = place.covariance.map_diagonal(f64::sqrt).map(|s| s * random.normal());
                 let size = LandmarkSize { width_m: 0.6 + e[4], height_m: 0.84 + e[5] };
                 let (x_m, y_m, z_m) = (place.x_m + e[0], place.y_m + e[1], place.z_m + e[3]);
-                let hung = LandmarkPlace { x_m, y_m, z_m, theta_rad: 1.6 + e[2], size, ..place };
-                (place, hung)
+                let true_place = LandmarkPlace { x_m, y_m, z_m, theta_rad: 1.6 + e[2], size, ..place };
+                (place, true_place)
             })
             .collect();
-        for look in 0..looks {
-            let (place, hung) = &places[look % 6];
+        for frame in 0..frames {
+            let (place, true_place) = &places[frame % 6];
             let (d, psi) = (random.range(1.5, 4.0), random.range(-60.0, 60.0).to_radians());
             let a = place.theta_rad + psi;
             let truth =
                 Pose2::new(place.x_m + d * a.cos(), place.y_m + d * a.sin(), a + std::f64::consts::PI);
-            let view = mounted.inverse() * truth.to_isometry3().inverse() * hung.map_from_landmark();
-            let points = corner_points(&hung.size).map(|p| {
+            let view = mounted.inverse() * truth.to_isometry3().inverse() * true_place.map_from_landmark();
+            let points = corner_points(&true_place.size).map(|p| {
                 pixel(&view, &p, &real).unwrap() + Vector2::new(random.normal(), random.normal()) * 0.5
             });
             let claimed = [Matrix2::identity() * 0.25; 4];
             let seen = landmark_pose(&Corners::new(points).unwrap(), &claimed, SIZE, &said).unwrap();
-            let sightings =
-                [LandmarkObservation { landmark: LandmarkId(look as u64 % 6), seen: &seen, place }];
-            match robot_pose(&sightings, &believed, None, &LocaliseParams::default()).unwrap() {
+            let observations =
+                [LandmarkObservation { landmark: LandmarkId(frame as u64 % 6), seen: &seen, place }];
+            match robot_pose(&observations, &believed, None, &LocaliseParams::default()).unwrap() {
                 FixResult::Fixed(fix) => {
-                    watch.add_fix(&fix, focal_evidence(&sightings, &believed, &fix.pose.pose));
+                    monitor.add_fix(&fix, focal_evidence(&observations, &believed, &fix.pose.pose));
                 }
-                FixResult::Refused(FixRefusal::Room { .. }) => watch.add_refusal(),
+                FixResult::Refused(FixRefusal::Room { .. }) => monitor.add_refusal(),
                 FixResult::Ambiguous(_) | FixResult::Refused(_) => {}
             }
         }
-        watch.state()
+        monitor.state()
     }
 
     #[test]
-    fn a_right_camera_is_left_in_peace_and_a_wrong_one_is_flagged() {
+    fn only_wrong_intrinsics_are_suspected() {
         for seed in 0..20 {
-            let right = watched(600.0, 120, seed);
+            let right = monitored(600.0, 120, seed);
             assert_eq!(right.suspicion, None, "{seed}: {right:?}");
             assert!(right.focal_error.unwrap().abs() < 4.0 * right.focal_sigma.unwrap(), "{right:?}");
             for share in [0.92, 1.08] {
-                let state = watched(600.0 * share, 120, seed);
+                let state = monitored(600.0 * share, 120, seed);
                 assert!(state.suspicion.is_some(), "{seed} {share}: {state:?}");
                 if let Some(Suspicion::Focal { error, sigma }) = state.suspicion {
                     assert!((error - (share - 1.0)).abs() < 6.0 * sigma + 0.02, "{state:?}");
@@ -328,19 +328,19 @@ mod tests {
             }
         }
         // A camera of half the focal length gives no pose at all.
-        let state = watched(300.0, 60, 1);
+        let state = monitored(300.0, 60, 1);
         assert!(state.suspicion.is_some(), "{state:?}");
     }
 
     #[test]
-    fn nothing_is_said_before_enough_was_seen() {
-        assert_eq!(watched(660.0, 10, 3).suspicion, None);
-        let mut watch = IntrinsicsMonitor::default();
+    fn nothing_is_suspected_before_enough_observations() {
+        assert_eq!(monitored(660.0, 10, 3).suspicion, None);
+        let mut monitor = IntrinsicsMonitor::default();
         for _ in 0..19 {
-            watch.add_refusal();
+            monitor.add_refusal();
         }
-        assert_eq!(watch.state().suspicion, None);
-        watch.add_refusal();
-        assert_eq!(watch.state().suspicion, Some(Suspicion::Refused { share: 1.0 }));
+        assert_eq!(monitor.state().suspicion, None);
+        monitor.add_refusal();
+        assert_eq!(monitor.state().suspicion, Some(Suspicion::Refused { share: 1.0 }));
     }
 }

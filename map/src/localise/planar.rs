@@ -41,7 +41,7 @@ impl PoseLinearisation {
 pub(super) struct Descended {
     pub pose: Pose2,
     /// Residuals at `pose`.
-    pub look: PoseLinearisation,
+    pub linearisation: PoseLinearisation,
     pub chi2: f64,
 }
 
@@ -57,17 +57,17 @@ pub(super) struct FullLinearisation {
 
 /// The least-squares problem of one frame.
 pub(super) struct Planar<'a> {
-    sightings: &'a [LandmarkObservation<'a>],
+    observations: &'a [LandmarkObservation<'a>],
     mounting: &'a CameraExtrinsics,
     camera_from_robot: Isometry3<f64>,
-    /// Standard deviations of the camera's intrinsics, where they are stated; all observations are by one camera.
+    /// Standard deviations of the camera's intrinsics, if they are stated; all observations are by one camera.
     camera: Option<Vector3<f64>>,
     /// Corners of each landmark, map frame.
     corners_m: Vec<[Vector3<f64>; 4]>,
 }
 
 impl<'a> Planar<'a> {
-    pub(super) fn new(sightings: &'a [LandmarkObservation<'a>], mounting: &'a CameraExtrinsics) -> Self {
+    pub(super) fn new(observations: &'a [LandmarkObservation<'a>], mounting: &'a CameraExtrinsics) -> Self {
         let corners = |s: &LandmarkObservation<'_>| {
             let map_from_landmark = s.place.map_from_landmark();
             let in_map =
@@ -75,10 +75,10 @@ impl<'a> Planar<'a> {
             corner_points(&s.place.size).map(in_map)
         };
         let camera_from_robot = mounting.robot_from_camera.inverse();
-        let stated = sightings.first().map(|s| &s.seen.measured.camera).filter(|c| c.sigmas.is_some());
+        let stated = observations.first().map(|s| &s.seen.measured.camera).filter(|c| c.sigmas.is_some());
         let camera = stated.map(Intrinsics::error_sigmas);
-        let corners_m = sightings.iter().map(corners).collect();
-        Self { sightings, mounting, camera_from_robot, camera, corners_m }
+        let corners_m = observations.iter().map(corners).collect();
+        Self { observations, mounting, camera_from_robot, camera, corners_m }
     }
 
     /// The same problem with exact intrinsics.
@@ -88,14 +88,14 @@ impl<'a> Planar<'a> {
 
     /// Degrees of freedom of the residual.
     pub(super) fn dof(&self) -> usize {
-        8 * self.sightings.len() - 3
+        8 * self.observations.len() - 3
     }
 
     /// Whether the camera is in front of every landmark's wall.
-    pub(super) fn sees_fronts(&self, pose: &Pose2) -> bool {
+    pub(super) fn is_in_front(&self, pose: &Pose2) -> bool {
         let camera = pose.to_isometry3() * self.mounting.robot_from_camera.translation.vector;
         let position = camera + pose.to_isometry3().translation.vector;
-        self.sightings.iter().all(|s| {
+        self.observations.iter().all(|s| {
             let place = s.place.map_from_landmark();
             (place.rotation * Vector3::x()).dot(&(position - place.translation.vector)) > 0.0
         })
@@ -103,13 +103,14 @@ impl<'a> Planar<'a> {
 
     /// Centre of the landmarks on the floor; the robot is turned about it.
     pub(super) fn pivot(&self) -> Point2<f64> {
-        centre(self.sightings.iter().map(|s| s.place))
+        centre(self.observations.iter().map(|s| s.place))
     }
 
     /// Keys and covariances of the nuisance parameters: each landmark, the extrinsics, then the intrinsics unless
     /// exact.
     pub(super) fn nuisances(&self) -> Vec<(NuisanceKey, Matrix6<f64>)> {
-        let places = self.sightings.iter().map(|s| (NuisanceKey::Landmark(s.landmark), s.place.covariance));
+        let places =
+            self.observations.iter().map(|s| (NuisanceKey::Landmark(s.landmark), s.place.covariance));
         let camera = self.camera.map(|sigmas| {
             let mut covariance = Matrix6::zeros();
             covariance.fixed_view_mut::<3, 3>(0, 0).set_diagonal(&sigmas.component_mul(&sigmas));
@@ -120,16 +121,18 @@ impl<'a> Planar<'a> {
 
     /// `camera_from_landmark` of observation `i` for a robot pose.
     pub(super) fn camera_from_landmark(&self, i: usize, pose: &Pose2) -> Isometry3<f64> {
-        self.camera_from_robot * pose.to_isometry3().inverse() * self.sightings[i].place.map_from_landmark()
+        self.camera_from_robot
+            * pose.to_isometry3().inverse()
+            * self.observations[i].place.map_from_landmark()
     }
 
     /// Robot pose on the floor for a `camera_from_landmark` of observation `i`, and the pose in space.
-    pub(super) fn robot_from_sighting(
+    pub(super) fn robot_from_observation(
         &self,
         i: usize,
         camera_from_landmark: &Isometry3<f64>,
     ) -> (Pose2, Isometry3<f64>) {
-        let map_from_robot = self.sightings[i].place.map_from_landmark()
+        let map_from_robot = self.observations[i].place.map_from_landmark()
             * camera_from_landmark.inverse()
             * self.mounting.robot_from_camera.inverse();
         let r = map_from_robot.rotation.to_rotation_matrix();
@@ -139,19 +142,19 @@ impl<'a> Planar<'a> {
 
     /// Residuals and their derivative by the pose; `None` when a corner is behind the camera.
     pub(super) fn pose_linearisation(&self, pose: &Pose2) -> Option<PoseLinearisation> {
-        let rows = 8 * self.sightings.len();
+        let rows = 8 * self.observations.len();
         let mut made = PoseLinearisation { residual: DVector::zeros(rows), by_pose: DMatrix::zeros(rows, 3) };
         let map_from_robot = pose.to_isometry3();
         let camera_from_map = self.camera_from_robot * map_from_robot.inverse();
         let turn = camera_from_map.rotation.to_rotation_matrix().into_inner();
-        for (i, (sighting, corners)) in self.sightings.iter().zip(&self.corners_m).enumerate() {
-            let measured = &sighting.seen.measured;
+        for (i, (observation, corners)) in self.observations.iter().zip(&self.corners_m).enumerate() {
+            let measured = &observation.seen.measured;
             for (c, (point, px)) in corners.iter().zip(measured.corners_px.points()).enumerate() {
                 let row = 8 * i + 2 * c;
-                let seen = project(&camera_from_map, point, &measured.camera)?;
-                made.residual.fixed_rows_mut::<2>(row).copy_from(&(px - seen.px));
+                let predicted = project(&camera_from_map, point, &measured.camera)?;
+                made.residual.fixed_rows_mut::<2>(row).copy_from(&(px - predicted.px));
                 let from_robot = point - map_from_robot.translation.vector;
-                let by_pose = seen.by_point * point_by_pose(&turn, &from_robot);
+                let by_pose = predicted.by_point * point_by_pose(&turn, &from_robot);
                 made.by_pose.view_mut((row, 0), (2, 3)).copy_from(&by_pose);
             }
         }
@@ -160,16 +163,17 @@ impl<'a> Planar<'a> {
 
     /// Residuals and all derivatives; `None` when a corner is behind the camera.
     pub(super) fn linearise(&self, pose: &Pose2) -> Option<FullLinearisation> {
-        let n = self.sightings.len();
+        let n = self.observations.len();
         let PoseLinearisation { residual, by_pose } = self.pose_linearisation(pose)?;
         let blocks = n + 1 + usize::from(self.camera.is_some());
         let mut by_nuisance = DMatrix::zeros(8 * n, 6 * blocks);
-        for (i, sighting) in self.sightings.iter().enumerate() {
-            let seen = corners(pose, sighting.place, self.mounting, &sighting.seen.measured.camera)?;
-            by_nuisance.view_mut((8 * i, 6 * i), (8, 6)).copy_from(&seen.place);
-            by_nuisance.view_mut((8 * i, 6 * n), (8, 6)).copy_from(&seen.mounting);
+        for (i, observation) in self.observations.iter().enumerate() {
+            let predicted =
+                corners(pose, observation.place, self.mounting, &observation.seen.measured.camera)?;
+            by_nuisance.view_mut((8 * i, 6 * i), (8, 6)).copy_from(&predicted.place);
+            by_nuisance.view_mut((8 * i, 6 * n), (8, 6)).copy_from(&predicted.mounting);
             if self.camera.is_some() {
-                for (c, by_camera) in sighting.seen.measured.by_camera.iter().enumerate() {
+                for (c, by_camera) in observation.seen.measured.by_camera.iter().enumerate() {
                     // The residual is measured minus predicted, so the derivative of the measured corner changes its
                     // sign.
                     by_nuisance.view_mut((8 * i + 2 * c, 6 * (n + 1)), (2, 3)).copy_from(&-by_camera);
@@ -181,7 +185,7 @@ impl<'a> Planar<'a> {
 
     /// Inverse covariance of the residual: corners plus nuisance parameters.
     pub(super) fn weight(&self, at: &FullLinearisation) -> Option<DMatrix<f64>> {
-        let n = self.sightings.len();
+        let n = self.observations.len();
         let mut s = self.corner_covariance();
         for (k, (_, covariance)) in self.nuisances().iter().enumerate() {
             let j = at.by_nuisance.columns(6 * k, 6);
@@ -193,10 +197,10 @@ impl<'a> Planar<'a> {
 
     /// Block-diagonal covariance of the corners.
     pub(super) fn corner_covariance(&self) -> DMatrix<f64> {
-        let n = self.sightings.len();
+        let n = self.observations.len();
         let mut s = DMatrix::zeros(8 * n, 8 * n);
-        for (i, sighting) in self.sightings.iter().enumerate() {
-            for (c, covariance) in sighting.seen.measured.covariance_px2.iter().enumerate() {
+        for (i, observation) in self.observations.iter().enumerate() {
+            for (c, covariance) in observation.seen.measured.covariance_px2.iter().enumerate() {
                 s.view_mut((8 * i + 2 * c, 8 * i + 2 * c), (2, 2)).copy_from(covariance);
             }
         }
@@ -212,14 +216,14 @@ impl<'a> Planar<'a> {
         steps: usize,
     ) -> Option<Descended> {
         let at = |pose: Pose2| {
-            let look = self.pose_linearisation(&pose)?;
-            let chi2 = look.chi2(weight);
-            chi2.is_finite().then_some(Descended { pose, look, chi2 })
+            let linearisation = self.pose_linearisation(&pose)?;
+            let chi2 = linearisation.chi2(weight);
+            chi2.is_finite().then_some(Descended { pose, linearisation, chi2 })
         };
         let (mut here, mut damping) = (at(start)?, 1e-6);
         for _ in 0..steps {
-            let jw = here.look.by_pose.transpose() * weight;
-            let (h, g) = (&jw * &here.look.by_pose, &jw * &here.look.residual);
+            let jw = here.linearisation.by_pose.transpose() * weight;
+            let (h, g) = (&jw * &here.linearisation.by_pose, &jw * &here.linearisation.residual);
             let mut h = Matrix3::from_iterator(h.iter().copied());
             let mut g = Vector3::from_iterator(g.iter().copied());
             if !turn {

@@ -1,9 +1,9 @@
 //! Mean and covariance of the robot's pose around a minimum, by quadrature over the heading.
 //!
-//! Seen from the front, a plane determines its direction poorly and not quadratically. The covariance at the minimum
-//! is then several times too small (mean NEES 10 instead of 3 at 6 m, by the Monte Carlo test of this module). The
-//! robot is turned around the landmarks in steps, its position refitted at each; the weighted samples give the first
-//! two moments.
+//! From the front, a plane determines its direction poorly, and chi2 is not quadratic in it. The covariance at the
+//! minimum is then several times too small (mean NEES 10 instead of 3 at 6 m, by the Monte Carlo test of this
+//! module). The robot is turned around the landmarks in steps, its position refitted at each; the weighted samples
+//! give the first two moments.
 //!
 //! Departs from method 13.6, which takes the covariance to first order.
 
@@ -85,8 +85,8 @@ pub(super) fn turned(pose: &Pose2, pivot: &Point2<f64>, by_rad: f64) -> Pose2 {
     Pose2::new(pivot.x + c * d.x - s * d.y, pivot.y + s * d.x + c * d.y, pose.theta_rad + by_rad)
 }
 
-fn sample(Descended { pose, look, chi2 }: Descended, weight: &DMatrix<f64>) -> Option<Sample> {
-    let j = look.by_pose.columns(0, 2);
+fn sample(Descended { pose, linearisation, chi2 }: Descended, weight: &DMatrix<f64>) -> Option<Sample> {
+    let j = linearisation.by_pose.columns(0, 2);
     let h = j.transpose() * weight * j;
     let position = Matrix2::new(h[(0, 0)], h[(0, 1)], h[(1, 0)], h[(1, 1)]).cholesky()?.inverse();
     Some(Sample { pose, chi2, position })

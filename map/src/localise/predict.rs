@@ -39,16 +39,16 @@ pub(crate) fn corners(
     let sides = map_from_landmark.rotation.to_rotation_matrix().into_inner();
     let mut made = Predicted { pose: SMatrix::zeros(), place: SMatrix::zeros(), mounting: SMatrix::zeros() };
     for (c, point) in corner_points(&place.size).iter().enumerate() {
-        let seen = project(&camera_from_landmark, point, camera)?;
+        let projected = project(&camera_from_landmark, point, camera)?;
         let arm = map_from_landmark.rotation * point;
         let from_robot = arm + map_from_landmark.translation.vector - map_from_robot.translation.vector;
-        let by_pose = seen.by_point * point_by_pose(&turn, &from_robot);
+        let by_pose = projected.by_point * point_by_pose(&turn, &from_robot);
         made.pose.fixed_rows_mut::<2>(2 * c).copy_from(&by_pose);
-        let by_place = seen.by_point * turn * point_by_place(&arm, &sides, point, &place.size);
+        let by_place = projected.by_point * turn * point_by_place(&arm, &sides, point, &place.size);
         made.place.fixed_rows_mut::<2>(2 * c).copy_from(&by_place);
         let from_camera = map_from_robot.inverse_transform_vector(&from_robot)
             - mounting.robot_from_camera.translation.vector;
-        let by_mounting = seen.by_point * point_by_mounting(&robot_turn, &from_camera);
+        let by_mounting = projected.by_point * point_by_mounting(&robot_turn, &from_camera);
         made.mounting.fixed_rows_mut::<2>(2 * c).copy_from(&by_mounting);
     }
     Some(made)

@@ -12,29 +12,29 @@ use crate::{
 };
 
 /// Most observations used in one fix; of more, those with the largest image.
-pub const MAX_SIGHTINGS: usize = 8;
+pub const MAX_OBSERVATIONS: usize = 8;
 
 /// The robot's pose from the landmarks of one frame. Errors name an input that is out of range.
 pub fn robot_pose(
-    sightings: &[LandmarkObservation<'_>],
+    observations: &[LandmarkObservation<'_>],
     mounting: &CameraExtrinsics,
     prior: Option<&Pose2Covariance>,
     p: &LocaliseParams,
 ) -> Result<FixResult, OutOfRange> {
-    check::within("sightings", sightings.len() as f64, 1.0, f64::MAX)?;
+    check::within("observations", observations.len() as f64, 1.0, f64::MAX)?;
     mounting.check()?;
-    for sighting in sightings {
-        sighting.place.check()?;
+    for observation in observations {
+        observation.place.check()?;
     }
     if let Some(prior) = prior {
         prior.check()?;
     }
-    let mut used = sightings.to_vec();
+    let mut used = observations.to_vec();
     // Largest first; stable, so equal ones stay in order.
     used.sort_by(|a, b| {
         let area = |s: &LandmarkObservation<'_>| s.seen.measured.corners_px.area_px2();
         area(b).total_cmp(&area(a))
     });
-    used.truncate(MAX_SIGHTINGS);
+    used.truncate(MAX_OBSERVATIONS);
     Ok(solve(&used, mounting, prior, p))
 }

@@ -28,18 +28,18 @@ struct Minimum {
 }
 
 pub(super) fn solve(
-    sightings: &[LandmarkObservation<'_>],
+    observations: &[LandmarkObservation<'_>],
     mounting: &CameraExtrinsics,
     prior: Option<&Pose2Covariance>,
     p: &LocaliseParams,
 ) -> FixResult {
-    let problem = Planar::new(sightings, mounting);
-    let mut found = minima(&problem, sightings);
+    let problem = Planar::new(observations, mounting);
+    let mut found = minima(&problem, observations);
     let Some(best) = found.first() else { return FixResult::Refused(FixRefusal::Degenerate) };
     let limit = p.max_reduced_chi2 * problem.dof() as f64;
     if best.chi2 > limit {
         let chi2 = best.chi2;
-        return FixResult::Refused(match sightings.len() {
+        return FixResult::Refused(match observations.len() {
             1 => FixRefusal::Room { chi2, limit },
             _ => FixRefusal::Disagree { chi2, limit },
         });
@@ -51,7 +51,7 @@ pub(super) fn solve(
     merge(&problem, &mut found, p.merge_chi2 * scale);
     let decided_by = if several { AmbiguityResolvedBy::Image } else { AmbiguityResolvedBy::Single };
     let mut fixes: Vec<Fix> =
-        found.iter().filter_map(|m| fix(&problem, sightings, m, scale, decided_by)).collect();
+        found.iter().filter_map(|m| fix(&problem, observations, m, scale, decided_by)).collect();
     match (prior, fixes.len()) {
         (_, 0) => FixResult::Refused(FixRefusal::Degenerate),
         (None, 1) => FixResult::Fixed(Box::new(fixes.swap_remove(0))),
@@ -61,22 +61,22 @@ pub(super) fn solve(
 }
 
 /// Every minimum reachable from the solutions of each observation and their mirror images, by rising chi2. Minima
-/// from which a landmark would show its back are left out.
-fn minima(problem: &Planar<'_>, sightings: &[LandmarkObservation<'_>]) -> Vec<Minimum> {
+/// behind a landmark's wall are left out.
+fn minima(problem: &Planar<'_>, observations: &[LandmarkObservation<'_>]) -> Vec<Minimum> {
     let mut found: Vec<Minimum> = Vec::new();
-    for (i, sighting) in sightings.iter().enumerate() {
-        let solutions = [Some(&sighting.seen.best), sighting.seen.second.as_ref()];
+    for (i, observation) in observations.iter().enumerate() {
+        let solutions = [Some(&observation.seen.best), observation.seen.second.as_ref()];
         for solution in solutions.into_iter().flatten() {
-            let (start, _) = problem.robot_from_sighting(i, &solution.camera_from_landmark);
+            let (start, _) = problem.robot_from_observation(i, &solution.camera_from_landmark);
             add(problem, &mut found, start);
         }
     }
     // Mirror images of each minimum, one landmark at a time.
     let seeds: Vec<Pose2> = found.iter().map(|m| m.pose).collect();
     for pose in seeds {
-        for i in 0..sightings.len() {
+        for i in 0..observations.len() {
             let other = mirrored(&problem.camera_from_landmark(i, &pose));
-            let (start, _) = problem.robot_from_sighting(i, &other);
+            let (start, _) = problem.robot_from_observation(i, &other);
             add(problem, &mut found, start);
         }
     }
@@ -97,9 +97,9 @@ fn add(problem: &Planar<'_>, found: &mut Vec<Minimum>, start: Pose2) {
         }
     }
     let Some(weight) = weight_at(&pose) else { return };
-    let Some(look) = problem.pose_linearisation(&pose) else { return };
-    let chi2 = look.chi2(&weight);
-    if chi2.is_finite() && problem.sees_fronts(&pose) {
+    let Some(linearisation) = problem.pose_linearisation(&pose) else { return };
+    let chi2 = linearisation.chi2(&weight);
+    if chi2.is_finite() && problem.is_in_front(&pose) {
         found.push(Minimum { pose, weight, chi2, limit_rad: (f64::NEG_INFINITY, f64::INFINITY) });
     }
 }
@@ -116,10 +116,10 @@ fn mirrored(camera_from_landmark: &Isometry3<f64>) -> Isometry3<f64> {
 
 /// Drops minima that a low barrier separates from a better one; sets the borders between the others.
 fn merge(problem: &Planar<'_>, found: &mut Vec<Minimum>, barrier: f64) {
-    let mut kept: Vec<Minimum> = Vec::new();
+    let mut distinct: Vec<Minimum> = Vec::new();
     for mut minimum in found.drain(..) {
         let mut alone = true;
-        for other in &mut kept {
+        for other in &mut distinct {
             let (top_rad, rise) = pass(problem, other, &minimum);
             if rise < barrier {
                 alone = false;
@@ -130,10 +130,10 @@ fn merge(problem: &Planar<'_>, found: &mut Vec<Minimum>, barrier: f64) {
             narrow(&mut minimum.limit_rad, back_rad);
         }
         if alone {
-            kept.push(minimum);
+            distinct.push(minimum);
         }
     }
-    *found = kept;
+    *found = distinct;
 }
 
 fn narrow(limit_rad: &mut (f64, f64), border_rad: f64) {
@@ -192,7 +192,7 @@ fn by_prior(mut fixes: Vec<Fix>, prior: &Pose2Covariance, scale: f64, p: &Locali
 /// Moments around one minimum, split into independent noise and shared nuisance parameters.
 fn fix(
     problem: &Planar<'_>,
-    sightings: &[LandmarkObservation<'_>],
+    observations: &[LandmarkObservation<'_>],
     minimum: &Minimum,
     scale: f64,
     decided_by: AmbiguityResolvedBy,
@@ -221,7 +221,7 @@ fn fix(
     }
     let total = 0.5 * (total + total.transpose());
     let pose = Pose2Covariance::new(mean, total).ok()?;
-    let landmarks = sightings.iter().map(|s| s.landmark).collect();
+    let landmarks = observations.iter().map(|s| s.landmark).collect();
     Some(Fix {
         modality: FixSource::Landmarks,
         pose,
@@ -244,6 +244,6 @@ fn local_covariance(problem: &Planar<'_>, pose: &Pose2, weight: &DMatrix<f64>) -
 /// The nearest positive semidefinite matrix.
 fn positive_part(m: &Matrix3<f64>) -> Matrix3<f64> {
     let eigen = (0.5 * (m + m.transpose())).symmetric_eigen();
-    let kept = Matrix3::from_diagonal(&eigen.eigenvalues.map(|v| v.max(0.0)));
-    eigen.eigenvectors * kept * eigen.eigenvectors.transpose()
+    let distinct = Matrix3::from_diagonal(&eigen.eigenvalues.map(|v| v.max(0.0)));
+    eigen.eigenvectors * distinct * eigen.eigenvectors.transpose()
 }

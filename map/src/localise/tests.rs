@@ -1,4 +1,5 @@
-//! Exact poses, derivatives against differences, honest covariance by Monte Carlo, the planar ambiguity, refusals.
+//! Exact poses, derivatives against differences, consistent covariance by Monte Carlo, the planar ambiguity,
+//! refusals.
 
 mod derivatives;
 mod covariance;
@@ -8,7 +9,7 @@ use crate::{
     localise::{
         fix::{AmbiguityResolvedBy, Fix, FixRefusal, FixResult, LandmarkObservation},
         params::LocaliseParams,
-        robot_pose::{MAX_SIGHTINGS, robot_pose},
+        robot_pose::{MAX_OBSERVATIONS, robot_pose},
     },
     place::{LandmarkPlace, PlaceSigmas},
     pose2::{Pose2, Pose2Covariance},
@@ -45,8 +46,8 @@ pub(super) fn robot(place: &LandmarkPlace, d_m: f64, psi_deg: f64) -> Pose2 {
     Pose2::new(place.x_m + d_m * a.cos(), place.y_m + d_m * a.sin(), a + std::f64::consts::PI)
 }
 
-/// What a camera sees of a landmark; `None` when a corner is behind it.
-pub(super) fn look(
+/// The pose of a landmark measured by the camera; `None` if a corner is behind it.
+pub(super) fn observe(
     robot: &Pose2,
     place: &LandmarkPlace,
     robot_from_camera: &Isometry3<f64>,
@@ -55,11 +56,11 @@ pub(super) fn look(
 ) -> Option<LandmarkPose> {
     let camera_from_landmark =
         robot_from_camera.inverse() * robot.to_isometry3().inverse() * place.map_from_landmark();
-    seen_by(&camera(), &camera(), &camera_from_landmark, place.size, sigma_px, random)
+    observe_by(&camera(), &camera(), &camera_from_landmark, place.size, sigma_px, random)
 }
 
-/// What the `real` camera sees, taken for one that is as `stated`.
-pub(super) fn seen_by(
+/// The pose measured by the `real` camera with the `stated` intrinsics.
+pub(super) fn observe_by(
     real: &Intrinsics,
     stated: &Intrinsics,
     camera_from_landmark: &Isometry3<f64>,
@@ -81,14 +82,14 @@ pub(super) fn stated() -> Intrinsics {
     camera().with_sigmas(IntrinsicsSigmas { focal_px: 7.0, center_px: 4.0 }).unwrap()
 }
 
-/// The camera off by (share of the focal length, cx, cy).
+/// The camera with errors (share of the focal length, cx, cy).
 pub(super) fn off(e: &Vector3<f64>) -> Intrinsics {
     let (k, share) = (camera(), 1.0 + e.x);
     let (fx_px, fy_px) = (k.fx_px * share, k.fy_px * share);
     Intrinsics { fx_px, fy_px, cx_px: k.cx_px + e.y, cy_px: k.cy_px + e.z, ..k }
 }
 
-pub(super) fn sighting<'a>(
+pub(super) fn observation<'a>(
     id: u64,
     seen: &'a LandmarkPose,
     place: &'a LandmarkPlace,
@@ -124,7 +125,7 @@ pub(super) fn fix_of(
     place: &LandmarkPlace,
     prior: Option<&Pose2Covariance>,
 ) -> FixResult {
-    robot_pose(&[sighting(1, seen, place)], &mounting(), prior, &LocaliseParams::default()).unwrap()
+    robot_pose(&[observation(1, seen, place)], &mounting(), prior, &LocaliseParams::default()).unwrap()
 }
 
 pub(super) fn nees(fix: &Fix, truth: &Pose2) -> f64 {
@@ -137,7 +138,7 @@ fn exact_corners_give_the_exact_pose() {
     let mut random = Random::new(1);
     for (d, psi) in [(1.5, 30.0), (3.0, -50.0), (5.0, 70.0), (2.0, 0.0), (4.0, -20.0)] {
         let truth = robot(&place(), d, psi);
-        let seen = look(&truth, &place(), &mounting().robot_from_camera, 0.0, &mut random).unwrap();
+        let seen = observe(&truth, &place(), &mounting().robot_from_camera, 0.0, &mut random).unwrap();
         let fix = fixed(fix_of(&seen, &place(), None));
         // The mean of the posterior differs from its peak by the curvature of the problem.
         let sigma = fix.pose.covariance.diagonal().map(f64::sqrt);
@@ -148,11 +149,11 @@ fn exact_corners_give_the_exact_pose() {
     }
 }
 
-/// From afar and aslant the two solutions fit alike: the case that only a prior decides.
+/// A distant oblique view whose two solutions fit equally: only a prior decides.
 fn undecided(random: &mut Random) -> (Pose2, LandmarkPose) {
     let truth = robot(&place(), 6.0, 20.0);
     loop {
-        let seen = look(&truth, &place(), &mounting().robot_from_camera, 1.5, random).unwrap();
+        let seen = observe(&truth, &place(), &mounting().robot_from_camera, 1.5, random).unwrap();
         if matches!(fix_of(&seen, &place(), None), FixResult::Ambiguous(_)) {
             return (truth, seen);
         }
@@ -160,7 +161,7 @@ fn undecided(random: &mut Random) -> (Pose2, LandmarkPose) {
 }
 
 #[test]
-fn the_prior_decides_or_nobody_does() {
+fn an_ambiguity_is_resolved_by_the_prior_only() {
     let mut random = Random::new(6);
     for _ in 0..20 {
         let (truth, seen) = undecided(&mut random);
@@ -175,7 +176,7 @@ fn the_prior_decides_or_nobody_does() {
             }
             other => panic!("{other:?}"),
         }
-        // A prior that knows nothing decides nothing.
+        // A wide prior decides nothing.
         let vague = fix_of(&seen, &place(), Some(&around(truth, 50.0, 3.0)));
         assert!(matches!(vague, FixResult::Ambiguous(_)), "{vague:?}");
         // A prior elsewhere refuses both.
@@ -186,18 +187,18 @@ fn the_prior_decides_or_nobody_does() {
 }
 
 #[test]
-fn a_second_landmark_sharpens_the_fix_and_ends_the_doubt() {
+fn a_second_landmark_reduces_the_covariance_and_resolves_the_ambiguity() {
     let mut random = Random::new(8);
     let first = place();
     let second = LandmarkPlace { x_m: first.x_m + 0.8, y_m: first.y_m - 1.1, z_m: 1.8, ..first };
     let truth = robot(&first, 6.0, 20.0);
     let sight = |place: &LandmarkPlace, random: &mut Random| {
-        look(&truth, place, &mounting().robot_from_camera, 1.0, random).unwrap()
+        observe(&truth, place, &mounting().robot_from_camera, 1.0, random).unwrap()
     };
     let (mut sum, mut sharper) = (0.0, 0);
     for _ in 0..50 {
         let (a, b) = (sight(&first, &mut random), sight(&second, &mut random));
-        let both = [sighting(1, &a, &first), sighting(2, &b, &second)];
+        let both = [observation(1, &a, &first), observation(2, &b, &second)];
         let fix = fixed(robot_pose(&both, &mounting(), None, &LocaliseParams::default()).unwrap());
         assert_eq!(fix.dof, 13);
         sum += nees(&fix, &truth);
@@ -217,35 +218,35 @@ fn a_second_landmark_sharpens_the_fix_and_ends_the_doubt() {
 }
 
 #[test]
-fn what_cannot_be_is_refused() {
+fn contradictory_landmarks_and_places_are_refused() {
     let mut random = Random::new(9);
     let truth = robot(&place(), 2.5, 30.0);
-    let seen = look(&truth, &place(), &mounting().robot_from_camera, 0.5, &mut random).unwrap();
-    // The map says half a metre higher: no robot on the floor sees it there.
+    let seen = observe(&truth, &place(), &mounting().robot_from_camera, 0.5, &mut random).unwrap();
+    // Its place is half a metre too high: no floor pose fits.
     let raised = LandmarkPlace { z_m: 2.0, ..place() };
     let answer = fix_of(&seen, &raised, None);
     assert!(matches!(answer, FixResult::Refused(FixRefusal::Room { .. })), "{answer:?}");
     // Of two landmarks one was moved by a metre.
     let other = LandmarkPlace { x_m: place().x_m + 0.9, y_m: place().y_m - 0.6, ..place() };
-    let b = look(&truth, &other, &mounting().robot_from_camera, 0.5, &mut random).unwrap();
+    let b = observe(&truth, &other, &mounting().robot_from_camera, 0.5, &mut random).unwrap();
     let claimed = LandmarkPlace { x_m: other.x_m + 0.8, y_m: other.y_m - 0.6, ..other };
     let home = place();
-    let both = [sighting(1, &seen, &home), sighting(2, &b, &claimed)];
+    let both = [observation(1, &seen, &home), observation(2, &b, &claimed)];
     let answer = robot_pose(&both, &mounting(), None, &LocaliseParams::default()).unwrap();
     assert!(matches!(answer, FixResult::Refused(FixRefusal::Disagree { .. })), "{answer:?}");
 }
 
 #[test]
-fn numbers_that_are_none_are_named() {
+fn invalid_numbers_are_refused_with_their_field() {
     let mut random = Random::new(10);
     let truth = robot(&place(), 2.5, 30.0);
-    let seen = look(&truth, &place(), &mounting().robot_from_camera, 0.5, &mut random).unwrap();
+    let seen = observe(&truth, &place(), &mounting().robot_from_camera, 0.5, &mut random).unwrap();
     let p = LocaliseParams::default();
-    assert_eq!(robot_pose(&[], &mounting(), None, &p).unwrap_err().field, "sightings");
+    assert_eq!(robot_pose(&[], &mounting(), None, &p).unwrap_err().field, "observations");
     let home = place();
     let nowhere = LandmarkPlace { y_m: f64::NAN, ..place() };
     let with = |place: &LandmarkPlace, mounting: &CameraExtrinsics, prior: Option<&Pose2Covariance>| {
-        robot_pose(&[sighting(1, &seen, place)], mounting, prior, &p).unwrap_err().field
+        robot_pose(&[observation(1, &seen, place)], mounting, prior, &p).unwrap_err().field
     };
     assert_eq!(with(&nowhere, &mounting(), None), "y_m");
     let mut loose = mounting();
@@ -253,20 +254,20 @@ fn numbers_that_are_none_are_named() {
     assert_eq!(with(&home, &loose, None), "robot_from_camera.translation");
     let prior = Pose2Covariance { pose: truth, covariance: -Matrix3::identity() };
     assert_eq!(with(&home, &mounting(), Some(&prior)), "covariance");
-    // More sightings than are used.
-    let many = vec![sighting(1, &seen, &home); MAX_SIGHTINGS + 3];
+    // More observations than are used.
+    let many = vec![observation(1, &seen, &home); MAX_OBSERVATIONS + 3];
     match robot_pose(&many, &mounting(), None, &p).unwrap() {
-        FixResult::Fixed(fix) => assert_eq!(fix.landmarks.len(), MAX_SIGHTINGS),
+        FixResult::Fixed(fix) => assert_eq!(fix.landmarks.len(), MAX_OBSERVATIONS),
         other => panic!("{other:?}"),
     }
 }
 
 #[test]
-fn the_map_may_be_turned_and_shifted() {
+fn the_fix_moves_with_the_map_frame() {
     // Symmetry: the same world in another map frame.
     let mut random = Random::new(11);
     let truth = robot(&place(), 3.0, 35.0);
-    let seen = look(&truth, &place(), &mounting().robot_from_camera, 0.5, &mut random).unwrap();
+    let seen = observe(&truth, &place(), &mounting().robot_from_camera, 0.5, &mut random).unwrap();
     let fix = fixed(fix_of(&seen, &place(), None));
     let shift = Pose2::new(-7.0, 11.0, 2.5);
     let at = shift.compose(&Pose2::new(place().x_m, place().y_m, place().theta_rad));

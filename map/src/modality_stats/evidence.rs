@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 /// A place with fewer measurements takes the statistics of its parent.
 pub const MIN_MEASUREMENTS: u64 = 30;
-/// Fewer passages than this do not tell a bias from chance: the errors of one passage are correlated.
+/// With fewer passages a bias cannot be distinguished from chance: the errors of one passage are correlated.
 pub const MIN_VISITS: u64 = 3;
 /// Radians of heading that weigh as much as one metre (method 15, matrix W).
 const METRE_RAD: f64 = 0.1;

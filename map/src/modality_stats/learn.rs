@@ -114,7 +114,7 @@ fn positions(run: &ReferenceRun<'_>, p: &FuseParams, learnt: &mut RunStats) -> V
     let (mut before, mut since_ns): (Option<Pose2>, i64) = (None, 0);
     let mut fixes = run.fixes.iter().peekable();
     for (at_ns, odometry) in run.odometry {
-        let mut told = |walkers: &mut [Walker; 2], until_ns: i64, way_m: f64| {
+        let mut apply_fixes = |walkers: &mut [Walker; 2], until_ns: i64, way_m: f64| {
             while let Some((t, fix)) = fixes.next_if(|(t, _)| *t < until_ns) {
                 for walker in walkers.iter_mut().filter(|w| w.modality == fix.modality) {
                     // Fixes out of range were refused before; a refusal here only leaves the fix out.
@@ -124,7 +124,7 @@ fn positions(run: &ReferenceRun<'_>, p: &FuseParams, learnt: &mut RunStats) -> V
                 }
             }
         };
-        told(&mut walkers, *at_ns, way_m);
+        apply_fixes(&mut walkers, *at_ns, way_m);
         for walker in &mut walkers {
             walker.fuser.apply_odometry(*at_ns, *odometry).ok();
         }

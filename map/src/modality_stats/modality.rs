@@ -37,7 +37,6 @@ impl From<FixSource> for Modality {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FusionMode {
-    /// Everything, each as sure as it proved to be.
     // Departs from method 15, which has the other two: see docs/EVALUATION.md, "Modalities by area".
     /// All modalities, each with its learnt error model.
     #[default]

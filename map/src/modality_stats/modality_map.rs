@@ -12,7 +12,7 @@ use crate::{
 };
 use std::collections::BTreeMap;
 
-/// `Fuse` uses a modality if its score is at most this many times the best one's.
+/// [`FusionMode::Fuse`] uses a modality if its score is at most this many times the best one's.
 const FUSED_SCORE: f64 = 2.0;
 
 /// The statistics of all reference runs of a map.
@@ -63,11 +63,12 @@ impl ModalityMap {
                 pools[usize::from(cell.heading)].add(found);
             }
         }
-        made.elsewhere = made.judge(&[(StatsScope::Map, made.map)]);
+        made.elsewhere = made.advice_from(&[(StatsScope::Map, made.map)]);
         made.cells = cells.iter().map(|(cell, found)| (*cell, (*found, ModalityAdvice::default()))).collect();
-        let told: Vec<ModalityAdvice> = cells.keys().map(|cell| made.judged(cell)).collect();
-        for ((_, advice), told) in made.cells.values_mut().zip(told) {
-            *advice = told;
+        let advice_of_cells: Vec<ModalityAdvice> =
+            cells.keys().map(|cell| made.advice_of_cell(cell)).collect();
+        for ((_, advice), advice_of_cells) in made.cells.values_mut().zip(advice_of_cells) {
+            *advice = advice_of_cells;
         }
         made
     }
@@ -83,7 +84,7 @@ impl ModalityMap {
             return self.elsewhere;
         }
         let cell = PoseCell::of(at);
-        self.cells.get(&cell).map_or_else(|| self.judged(&cell), |(_, advice)| *advice)
+        self.cells.get(&cell).map_or_else(|| self.advice_of_cell(&cell), |(_, advice)| *advice)
     }
 
     /// Every cell with measurements, its statistics, and the advice there.
@@ -95,10 +96,10 @@ impl ModalityMap {
     /// measurements.
     pub fn named(&self) -> impl Iterator<Item = (&NamedArea, [(StatsByModality, ModalityAdvice); 4])> {
         self.named.iter().map(|(area, by_heading)| {
-            let told = |pool: &Pool| {
-                (pool.found, self.judge(&[(StatsScope::Area, *pool), (StatsScope::Map, self.map)]))
+            let advice_of_cells = |pool: &Pool| {
+                (pool.found, self.advice_from(&[(StatsScope::Area, *pool), (StatsScope::Map, self.map)]))
             };
-            (area, std::array::from_fn(|k| told(&by_heading[k])))
+            (area, std::array::from_fn(|k| advice_of_cells(&by_heading[k])))
         })
     }
 
@@ -107,8 +108,8 @@ impl ModalityMap {
         (&self.map.found, &self.elsewhere)
     }
 
-    /// Advice from the first of the scopes with enough measurements.
-    fn judged(&self, cell: &PoseCell) -> ModalityAdvice {
+    /// Advice for a cell: from the cell, its neighbours, its named area or the map.
+    fn advice_of_cell(&self, cell: &PoseCell) -> ModalityAdvice {
         let (mut alone, mut around) = (Pool::default(), Pool::default());
         for (dx, dy) in (-1..=1).flat_map(|dx| (-1..=1).map(move |dy| (dx, dy))) {
             let near = PoseCell { x: cell.x.saturating_add(dx), y: cell.y.saturating_add(dy), ..*cell };
@@ -118,20 +119,20 @@ impl ModalityMap {
                 alone.add(found);
             }
         }
-        let mut levels = vec![(StatsScope::Cell, alone), (StatsScope::Neighbourhood, around)];
+        let mut scopes = vec![(StatsScope::Cell, alone), (StatsScope::Neighbourhood, around)];
         let named = self.named.iter().find(|(area, _)| area.contains(cell.middle_m()));
-        levels.extend(named.map(|(_, by_heading)| (StatsScope::Area, by_heading[usize::from(cell.heading)])));
-        levels.push((StatsScope::Map, self.map));
-        self.judge(&levels)
+        scopes.extend(named.map(|(_, by_heading)| (StatsScope::Area, by_heading[usize::from(cell.heading)])));
+        scopes.push((StatsScope::Map, self.map));
+        self.advice_from(&scopes)
     }
 
-    /// Advice from the first of the levels that know enough.
-    fn judge(&self, levels: &[(StatsScope, Pool)]) -> ModalityAdvice {
+    /// Advice from the first of the scopes with enough measurements.
+    fn advice_from(&self, scopes: &[(StatsScope, Pool)]) -> ModalityAdvice {
         let mut advice = ModalityAdvice::default();
         for module in Modality::ALL {
             let enough =
                 |(_, pool): &&(StatsScope, Pool)| pool.found[module.index()].fixes() >= MIN_MEASUREMENTS;
-            if let Some((level, pool)) = levels.iter().find(enough) {
+            if let Some((level, pool)) = scopes.iter().find(enough) {
                 // Robot-aligned biases differ from place to place: over the whole map only the variance is inflated.
                 let cells = if *level == StatsScope::Map { None } else { Some(pool.cells) };
                 advice.faults[module.index()] = pool.found[module.index()].fault(cells);
@@ -139,7 +140,7 @@ impl ModalityMap {
         }
         // Whole-map statistics never exclude a modality.
         // Departs from method 15, where cells inherit all from their parents.
-        let ranked = levels
+        let ranked = scopes
             .iter()
             .filter(|(level, _)| *level != StatsScope::Map)
             .find(|(_, pool)| pool.found[Modality::Odometry.index()].available() >= MIN_MEASUREMENTS);

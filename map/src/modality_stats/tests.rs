@@ -1,4 +1,4 @@
-//! Sums by hand, a corridor whose faults are known, levels and modes, bounds.
+//! Sums by hand, a corridor with known error models, scopes and fusion modes, limits.
 
 use crate::{
     fuse::{FuseParams, Fuser},
@@ -21,7 +21,7 @@ use vision::{model::LandmarkId, random::Random};
 
 const SECOND: i64 = 1_000_000_000;
 
-/// A fix with `sigma` along, across, heading; along x, as walls and not the robot have it.
+/// A fix with `sigma` along, across, heading; in map axes, not the robot's.
 fn fix(modality: FixSource, at: Pose2, sigma: [f64; 3]) -> Fix {
     let turn = map_from_aligned(if at.theta_rad.abs() > 1.5 { std::f64::consts::PI } else { 0.0 });
     let covariance = turn * Matrix3::from_diagonal(&Vector3::from(sigma).map(|s| s * s)) * turn.transpose();
@@ -44,11 +44,11 @@ struct Recorded {
     reference: Vec<(i64, Pose2)>,
 }
 
-/// Sigma of the laser along a corridor: nothing known.
-const LOST: f64 = 100.0;
+/// Sigma of the laser along a corridor: undetermined.
+const UNDETERMINED: f64 = 100.0;
 
-/// 12 m along y = 2.5, there or back. Odometry measures 4 % too much, 12 % between x = 4 and 8; a wall that was moved
-/// puts the laser 0.2 m to the south everywhere, sigma 2 cm; landmarks (sigma 5 cm) are seen below x = 4 only.
+/// 12 m along y = 2.5, there or back. Odometry measures 4 % too much, 12 % between x = 4 and 8. A moved wall shifts
+/// the laser fix 0.2 m to the south everywhere, sigma 2 cm. Landmarks (sigma 5 cm) are observed below x = 4 only.
 fn drive(random: &mut Random, back: bool) -> Recorded {
     let (start, step) = if back { (12.0, -0.05) } else { (0.0, 0.05) };
     let heading = if back { std::f64::consts::PI } else { 0.0 };
@@ -65,10 +65,10 @@ fn drive(random: &mut Random, back: bool) -> Recorded {
         made.reference.push((at, truth));
         let noise = Vector3::new(random.normal(), random.normal(), random.normal());
         let laser = noise.component_mul(&Vector3::new(0.0, 0.02, 0.005));
-        // Laid where odometry says, as far as the walls leave it open.
+        // At the pose by odometry, where the walls do not determine it.
         let along = Pose2::new(start, 2.5, heading).compose(&odometry).x_m;
         let seen = Pose2::new(along, 2.5 - 0.2 + laser.y, heading + laser.z);
-        made.fixes.push((at, fix(FixSource::Laser, seen, [LOST, 0.02, 0.005])));
+        made.fixes.push((at, fix(FixSource::Laser, seen, [UNDETERMINED, 0.02, 0.005])));
         if truth.x_m < 4.0 {
             let noise = Vector3::new(random.normal(), random.normal(), random.normal());
             let e = noise.component_mul(&Vector3::new(0.05, 0.05, 0.01));
@@ -106,7 +106,7 @@ fn cells_are_squares_by_heading() {
 }
 
 #[test]
-fn areas_hold_their_points_and_are_checked() {
+fn areas_contain_their_points_and_are_checked() {
     // An L.
     let corners_m = vec![[0.0, 0.0], [4.0, 0.0], [4.0, 1.0], [1.0, 1.0], [1.0, 3.0], [0.0, 3.0]];
     let area = NamedArea { name: "hall".into(), corners_m };
@@ -133,7 +133,7 @@ fn the_score_by_hand() {
     evidence.step(0.5, Some(&Vector3::new(0.3, -0.4, 0.1)));
     evidence.step(0.5, None);
     evidence.step(0.5, None);
-    // Squares 0.25 and 0.25 + 0.01 / 0.01, mean 0.75; half of the way available.
+    // Squares 0.25 and 0.25 + 0.01 / 0.01, mean 0.75; available on half of the path.
     assert!((evidence.score() - 1.5).abs() < 1e-12, "{}", evidence.score());
     let figures = evidence.figures();
     assert!((figures.mean[0] - 0.3).abs() < 1e-12 && figures.mean[1].abs() < 1e-12);
@@ -142,7 +142,7 @@ fn the_score_by_hand() {
 }
 
 #[test]
-fn a_bias_wants_several_passages_and_honest_ones_have_none() {
+fn a_bias_needs_several_passages_and_right_covariances_give_none() {
     let mut random = Random::new(5);
     let variances = Vector3::new(0.01, 0.04, 1e-4);
     let visit = |offset: f64, n: u32, random: &mut Random| {
@@ -154,7 +154,7 @@ fn a_bias_wants_several_passages_and_honest_ones_have_none() {
         evidence.end_visit();
         evidence
     };
-    // One passage tells no bias, only that it was worse than claimed.
+    // One passage gives no bias, only variance inflation.
     let once = visit(1.0, 100, &mut random);
     assert_eq!(once.fault(Some(1)).bias, Vector3::zeros());
     assert!(once.fault(Some(1)).excess.y > 15.0, "{:?}", once.fault(Some(1)));
@@ -166,22 +166,22 @@ fn a_bias_wants_several_passages_and_honest_ones_have_none() {
     let fault = several.fault(Some(1));
     assert!((fault.bias.y - 1.0).abs() < 0.1 && fault.excess.y < 0.5, "{fault:?}");
     assert_eq!(several.fault(None).bias, Vector3::zeros());
-    // Honest measurements: what is found is a few percent, by chance.
+    // Measurements with right covariances: an inflation of a few percent, by chance.
     let mut honest = ModalityStats::default();
     for _ in 0..40 {
         honest.add(&visit(0.0, 30, &mut random));
     }
     let fault = honest.fault(Some(1));
     assert!(fault.excess.max() < 0.15 && fault.bias.y.abs() < 0.03, "{fault:?}");
-    // Too few measurements say nothing.
+    // Too few measurements give nothing.
     assert_eq!(visit(5.0, MIN_MEASUREMENTS as u32 - 1, &mut random).fault(Some(1)), ErrorModel::default());
 }
 
 #[test]
-fn a_corridor_tells_who_is_best_where_and_how_each_errs() {
+fn a_corridor_gives_the_best_modality_and_error_models_by_cell() {
     let runs = runs();
     let areas = ModalityMap::new(FusionMode::NearBest, Vec::new(), &runs);
-    // Landmarks where they are seen; the laser knows nothing along, and is 0.2 m off across.
+    // Landmarks where they are observed; the laser is undetermined along and 0.2 m off across.
     let near = areas.advice(&Pose2::new(2.5, 2.5, 0.0));
     assert_eq!((near.best, near.level), (Some(Modality::Landmarks), StatsScope::Cell));
     assert!(near.uses(FixSource::Landmarks) && !near.uses(FixSource::Laser), "{near:?}");
@@ -192,7 +192,7 @@ fn a_corridor_tells_who_is_best_where_and_how_each_errs() {
             assert!((fault.bias.y - sign * 0.2).abs() < 0.01, "{x} {heading}: {fault:?}");
             assert!(fault.excess.y < 1.0 && fault.excess.x < 1e-9, "{x} {heading}: {fault:?}");
         }
-        // The floor: known as a bias, not as noise.
+        // The floor: learnt as a bias, not as noise.
         let bumpy = *areas.advice(&Pose2::new(6.5, 2.5, heading)).fault(Modality::Odometry);
         assert!((bumpy.bias.x - 0.12).abs() < 0.01, "{bumpy:?}");
         let even = *areas.advice(&Pose2::new(10.5, 2.5, heading)).fault(Modality::Odometry);
@@ -201,7 +201,7 @@ fn a_corridor_tells_who_is_best_where_and_how_each_errs() {
     let honest = areas.advice(&Pose2::new(2.5, 2.5, 0.0));
     let landmarks = honest.fault(Modality::Landmarks);
     assert!(landmarks.bias.norm() < 0.03 && landmarks.excess.max() < 0.6, "{landmarks:?}");
-    // Where nobody was: a bias of elsewhere is none here, but the laser is not as sure as it says.
+    // In cells without runs: no bias from elsewhere, but an inflated variance of the laser.
     let away = areas.advice(&Pose2::new(40.5, 2.5, 0.0));
     assert_eq!((away.best, away.used), (None, [true; 3]));
     let fault = away.fault(Modality::Laser);
@@ -209,7 +209,7 @@ fn a_corridor_tells_who_is_best_where_and_how_each_errs() {
 }
 
 #[test]
-fn modes_choose_and_nothing_known_means_everything() {
+fn modes_choose_modalities_and_without_statistics_all_are_used() {
     let runs = runs();
     let at = Pose2::new(2.5, 2.5, 0.0);
     let used = |mode| ModalityMap::new(mode, Vec::new(), &runs).advice(&at).used;
@@ -220,7 +220,7 @@ fn modes_choose_and_nothing_known_means_everything() {
 }
 
 #[test]
-fn neighbours_speak_for_a_cell_that_was_hardly_driven_through() {
+fn a_cell_with_few_measurements_takes_its_neighbours_statistics() {
     let mut runs = runs();
     for run in &mut runs {
         run.remove(&PoseCell { x: 10, y: 2, heading: 0 });
@@ -239,9 +239,9 @@ fn neighbours_speak_for_a_cell_that_was_hardly_driven_through() {
 }
 
 #[test]
-fn a_named_area_speaks_for_cells_that_were_hardly_driven_through() {
+fn a_cell_with_few_measurements_takes_its_named_areas_statistics() {
     let mut runs = runs();
-    // One cell was passed once, too seldom to speak for itself.
+    // One cell was passed once, too few measurements of its own.
     let cell = PoseCell { x: 2, y: 2, heading: 0 };
     let mut once = learnt(&drive(&mut Random::new(9), false)).cells;
     once.retain(|c, _| *c == cell);
@@ -256,7 +256,7 @@ fn a_named_area_speaks_for_cells_that_were_hardly_driven_through() {
     let areas = ModalityMap::new(FusionMode::NearBest, vec![west], &runs);
     let advice = areas.advice(&at);
     assert_eq!((advice.best, advice.level), (Some(Modality::Landmarks), StatsScope::Area));
-    // The same in a cell of the area that nobody ever drove through, and not outside.
+    // The same in a cell of the area without runs, and not outside.
     assert_eq!(areas.advice(&Pose2::new(2.5, 4.5, 0.0)).best, Some(Modality::Landmarks));
     assert_eq!(areas.advice(&Pose2::new(2.5, 5.5, 0.0)).best, None);
     let (area, by_heading) = areas.named().next().unwrap();
@@ -280,9 +280,11 @@ fn runs_add_up_in_any_order() {
     let text = serde_json::to_string(&runs[0].iter().collect::<Vec<_>>()).unwrap();
     let read: Vec<(PoseCell, StatsByModality)> = serde_json::from_str(&text).unwrap();
     assert_eq!(read.len(), runs[0].len());
-    for ((cell, read), (other, kept)) in read.iter().zip(&runs[0]) {
-        assert_eq!((cell, read[1].fixes, read[1].visits), (other, kept[1].fixes, kept[1].visits));
-        assert!((read[1].normalised[1] - kept[1].normalised[1]).abs() <= 1e-12 * kept[1].normalised[1]);
+    for ((cell, read), (other, original)) in read.iter().zip(&runs[0]) {
+        assert_eq!((cell, read[1].fixes, read[1].visits), (other, original[1].fixes, original[1].visits));
+        assert!(
+            (read[1].normalised[1] - original[1].normalised[1]).abs() <= 1e-12 * original[1].normalised[1]
+        );
     }
 }
 
@@ -312,8 +314,8 @@ fn a_reference_is_checked_and_has_gaps() {
 }
 
 #[test]
-fn cells_of_a_run_are_bounded_and_strange_runs_teach_nothing() {
-    // A diagonal through more cells than a run may tell of.
+fn cells_of_a_run_are_bounded_and_a_run_without_overlap_is_empty() {
+    // A diagonal through more cells than a run may have.
     let n = MAX_CELLS as i64 + 10;
     let at =
         |i: i64| (i * SECOND / 10, Pose2::new(i as f64 + 0.5, i as f64 + 0.5, std::f64::consts::FRAC_PI_4));
@@ -340,8 +342,8 @@ fn cells_of_a_run_are_bounded_and_strange_runs_teach_nothing() {
     assert_eq!(none, RunStats::default());
 }
 
-/// Drives the corridor with what was learnt; mean squared error over the way past the landmarks, and the pose's last
-/// normalised squared error.
+/// Drives the corridor with these statistics; mean squared error past the landmarks, and the last normalised
+/// squared error.
 fn driven(random: &mut Random, areas: &ModalityMap) -> (f64, f64) {
     let made = drive(random, true);
     let mut fuser = Fuser::new(FuseParams::default());
@@ -364,7 +366,7 @@ fn driven(random: &mut Random, areas: &ModalityMap) -> (f64, f64) {
 }
 
 #[test]
-fn what_was_learnt_makes_drives_better() {
+fn learnt_statistics_reduce_the_error_of_drives() {
     let runs = runs();
     let mut random = Random::new(77);
     let untaught = driven(&mut random, &ModalityMap::default());

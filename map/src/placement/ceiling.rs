@@ -65,10 +65,10 @@ pub fn view_on_ceiling(
     p: &PlacementParams,
 ) -> Result<CeilingRectangle, PlacementError> {
     ceiling.check()?;
-    let sighting = checked(view)?;
-    let hits = [0, 1, 2, 3].map(|i| rays::ceiling_hit(&sighting, i, ceiling.height_m));
+    let checked = checked(view)?;
+    let hits = [0, 1, 2, 3].map(|i| rays::ceiling_hit(&checked, i, ceiling.height_m));
     let [Some(a), Some(b), Some(c), Some(d)] = hits else { return Err(PlacementError::NoWall) };
-    fit(&sighting, &[a, b, c, d], p)
+    fit(&checked, &[a, b, c, d], p)
 }
 
 fn fit(
@@ -76,10 +76,10 @@ fn fit(
     hits: &[Hit; 4],
     p: &PlacementParams,
 ) -> Result<CeilingRectangle, PlacementError> {
-    let mut seen = SVector::<f64, 8>::zeros();
+    let mut intersections = SVector::<f64, 8>::zeros();
     let mut by = SMatrix::<f64, 8, { rays::INPUTS }>::zeros();
     for (i, hit) in hits.iter().enumerate() {
-        seen.fixed_rows_mut::<2>(2 * i).copy_from(&hit.point.xy());
+        intersections.fixed_rows_mut::<2>(2 * i).copy_from(&hit.point.xy());
         by.fixed_rows_mut::<2>(2 * i).copy_from(&hit.by.fixed_rows::<2>(0));
     }
     let independent = new_in_each_view(view, &by);
@@ -88,8 +88,8 @@ fn fit(
         .cholesky()
         .ok_or(PoseError::Degenerate)?
         .inverse();
-    let (q, gain) = rectangle(&seen, &weight).ok_or(PoseError::Degenerate)?;
-    let rms_m = ((seen - corners_of(&q)).norm_squared() / 4.0).sqrt();
+    let (q, gain) = rectangle(&intersections, &weight).ok_or(PoseError::Degenerate)?;
+    let rms_m = ((intersections - corners_of(&q)).norm_squared() / 4.0).sqrt();
     let possible = |v: f64| (LandmarkSize::MIN_M..=LandmarkSize::MAX_M).contains(&v);
     if rms_m > p.max_rms_m || !possible(q[3]) || !possible(q[4]) {
         return Err(PlacementError::NotOnCeiling { rms_m });
@@ -116,10 +116,13 @@ fn corners_of(q: &Vector5) -> SVector<f64, 8> {
 }
 
 /// Weighted least squares over the rectangle, with the gain from intersections to rectangle.
-fn rectangle(seen: &SVector<f64, 8>, weight: &SMatrix<f64, 8, 8>) -> Option<(Vector5, SMatrix<f64, 5, 8>)> {
+fn rectangle(
+    intersections: &SVector<f64, 8>,
+    weight: &SMatrix<f64, 8, 8>,
+) -> Option<(Vector5, SMatrix<f64, 5, 8>)> {
     /// Steps: the problem is linear but for the direction, whose start is good.
     const STEPS: usize = 8;
-    let at = |i: usize| Vector2::new(seen[2 * i], seen[2 * i + 1]);
+    let at = |i: usize| Vector2::new(intersections[2 * i], intersections[2 * i + 1]);
     let centre = (at(0) + at(1) + at(2) + at(3)) * 0.25;
     let (up, right) = ((at(0) + at(1) - at(2) - at(3)) * 0.5, (at(1) + at(2) - at(0) - at(3)) * 0.5);
     // A mirrored quad cannot be a view from below.
@@ -142,7 +145,7 @@ fn rectangle(seen: &SVector<f64, 8>, weight: &SMatrix<f64, 8, 8>) -> Option<(Vec
         }
         let inverse = (j.transpose() * weight * j).cholesky()?.inverse();
         gain = inverse * j.transpose() * weight;
-        q += gain * (seen - corners_of(&q));
+        q += gain * (intersections - corners_of(&q));
     }
     q[2] = wrap_rad(q[2]);
     q.iter().all(|v| v.is_finite()).then_some((q, gain))

@@ -108,7 +108,8 @@ pub(super) fn new_in_each_view(view: &CheckedView<'_>, by: &SMatrix<f64, 8, INPU
 }
 
 /// Derivative of the intersections by the intrinsics' errors, each of one standard deviation. They have no part in
-/// the weights: the misfit of one view must not correct the camera, since it shows that an object is not on the wall.
+/// the weights: a residual of one view must not correct the camera, since it shows that an object is not on the
+/// wall.
 pub(super) fn by_camera(view: &CheckedView<'_>, by: &SMatrix<f64, 8, INPUTS>) -> SMatrix<f64, 8, 3> {
     let corners = view.by_camera.iter().enumerate();
     // An error of the intrinsics moves the ray through the measured corner.

@@ -1,4 +1,5 @@
-//! A synthetic room: derivatives against differences, honest covariance by Monte Carlo, the wall choice, refusals.
+//! A synthetic room: derivatives against differences, consistent covariance by Monte Carlo, the choice of the wall,
+//! refusals.
 
 use crate::{
     extrinsics::{CameraExtrinsics, pan_tilt},
@@ -41,7 +42,7 @@ fn wall() -> LaserSegment {
 }
 
 /// The landmark `along_m` from the wall's first end, centre 1.5 m high.
-fn hung(wall: &LaserSegment, along_m: f64) -> LandmarkPlace {
+fn place_on(wall: &LaserSegment, along_m: f64) -> LandmarkPlace {
     let at = wall.a + wall.direction() * along_m;
     let f = wall.facing();
     LandmarkPlace {
@@ -85,15 +86,15 @@ fn covariances() -> [Matrix2<f64>; 4] {
     [Matrix2::identity() * SIGMA_PX * SIGMA_PX; 4]
 }
 
-fn look(
+fn view_of(
     points: [Point2<f64>; 4],
     robot: &Pose2Covariance,
     walls: &[LaserSegment],
 ) -> Result<WallRectangle, PlacementError> {
-    look_with(&camera(), points, robot, walls)
+    view_with(&camera(), points, robot, walls)
 }
 
-fn look_with(
+fn view_with(
     camera: &Intrinsics,
     points: [Point2<f64>; 4],
     robot: &Pose2Covariance,
@@ -111,13 +112,13 @@ fn look_with(
 
 #[test]
 fn exact_views_give_the_exact_place() {
-    let truth = hung(&wall(), 2.0);
+    let truth = place_on(&wall(), 2.0);
     let walls = [wall()];
     let views: Vec<_> = [(2.0, 30.0), (3.0, -40.0), (2.5, 0.0)]
         .iter()
         .map(|(d, psi)| {
             let robot = robot(&truth, *d, *psi);
-            look(project(&truth, &robot.pose, &mounting()), &robot, &walls).unwrap()
+            view_of(project(&truth, &robot.pose, &mounting()), &robot, &walls).unwrap()
         })
         .collect();
     for used in [&views[..1], &views[..]] {
@@ -133,7 +134,7 @@ fn exact_views_give_the_exact_place() {
 
 #[test]
 fn derivatives_are_the_finite_differences() {
-    let truth = hung(&wall(), 2.0);
+    let truth = place_on(&wall(), 2.0);
     let (base, base_robot) = (mounting(), robot(&truth, 2.5, 35.0));
     let points = project(&truth, &base_robot.pose, &base);
     let (theta, r) = rays::plane(&wall());
@@ -173,7 +174,7 @@ fn draw(views: &[(f64, f64)], random: &mut Random) -> (Vector6<f64>, LandmarkPla
     draw_with(&camera(), views, random)
 }
 
-/// The same with a camera that is wrong by what it says of itself.
+/// The same with a camera that has errors by its stated covariance.
 fn draw_with(
     stated: &Intrinsics,
     views: &[(f64, f64)],
@@ -185,25 +186,26 @@ fn draw_with(
     let w = wall();
     let l = w.covariance.cholesky().unwrap().l() * Vector2::new(random.normal(), random.normal());
     let truth_wall = LaserSegment::on_line((w.alpha_rad + l.x, w.rho_m + l.y), (w.a, w.b), w.covariance, 1);
-    let truth = hung(&truth_wall, 2.0);
+    let truth = place_on(&truth_wall, 2.0);
     let m = mounting();
     let e = m.covariance.map_diagonal(f64::sqrt).map(|s| s * random.normal());
     let (turn, shift) = (e.fixed_rows::<3>(0).into(), e.fixed_rows::<3>(3).into());
     let mounted =
         CameraExtrinsics { robot_from_camera: perturbed(&m.robot_from_camera, &turn, &shift), ..m.clone() };
-    let seen: Vec<_> = views
+    let views_on_wall: Vec<_> = views
         .iter()
         .filter_map(|(d, psi)| {
             let believed = robot(&truth, *d, *psi);
             let e = believed.covariance.map_diagonal(f64::sqrt).map(|s| s * random.normal());
             let points = projected(&real, &truth, &believed.pose.plus(&e), &mounted)
                 .map(|p| p + Vector2::new(random.normal(), random.normal()) * SIGMA_PX);
-            // A camera that is far off makes no rectangles.
-            let made = look_with(stated, points, &believed, &[wall()]);
+            // Large errors of the camera give no rectangles.
+            let made = view_with(stated, points, &believed, &[wall()]);
             made.inspect_err(|_| assert!(stated.sigmas.is_some())).ok()
         })
         .collect();
-    let Ok(Placement { place, .. }) = placement(&seen, &[wall()], &PlacementParams::default()) else {
+    let Ok(Placement { place, .. }) = placement(&views_on_wall, &[wall()], &PlacementParams::default())
+    else {
         return draw_with(stated, views, random);
     };
     let error = Vector6::new(
@@ -218,7 +220,7 @@ fn draw_with(
 }
 
 #[test]
-fn the_covariance_of_one_view_is_honest() {
+fn the_covariance_of_one_view_is_consistent() {
     let mut random = Random::new(1);
     let (mut sum, mut inside, n) = (0.0, 0, 1000);
     for _ in 0..n {
@@ -234,7 +236,7 @@ fn the_covariance_of_one_view_is_honest() {
 }
 
 #[test]
-fn several_views_are_sharper_and_not_overconfident() {
+fn several_views_reduce_the_covariance_without_overconfidence() {
     let mut random = Random::new(2);
     let views = [(2.5, 35.0), (2.0, -30.0), (3.0, 10.0), (2.2, 50.0)];
     let (mut sum, mut n) = (0.0, 0.0);
@@ -250,7 +252,7 @@ fn several_views_are_sharper_and_not_overconfident() {
 }
 
 #[test]
-fn what_the_camera_has_wrong_is_wrong_in_all_views() {
+fn errors_of_intrinsics_are_shared_by_all_views() {
     // Oracle: a camera drawn anew in each draw and the same in all its views. 1 % and 3 px.
     let stated = camera().with_sigmas(IntrinsicsSigmas { focal_px: 7.0, center_px: 3.0 }).unwrap();
     let views = [(2.5, 35.0), (2.0, -30.0), (3.0, 10.0), (2.2, 50.0)];
@@ -260,7 +262,7 @@ fn what_the_camera_has_wrong_is_wrong_in_all_views() {
         for _ in 0..n {
             let (e, place) = draw_with(&stated, views, &mut random);
             sum += e.dot(&place.covariance.cholesky().unwrap().solve(&e));
-            // As if it were exact.
+            // With intrinsics stated as exact.
             let bare = draw(views, &mut Random::new(4)).1.covariance;
             by_none += e.dot(&bare.cholesky().unwrap().solve(&e));
         }
@@ -276,11 +278,11 @@ fn what_the_camera_has_wrong_is_wrong_in_all_views() {
 
 #[test]
 fn a_view_that_disagrees_is_left_out() {
-    let truth = hung(&wall(), 2.0);
-    let moved = hung(&wall(), 2.6);
+    let truth = place_on(&wall(), 2.0);
+    let moved = place_on(&wall(), 2.6);
     let of = |place: &LandmarkPlace, d, psi| {
         let robot = robot(place, d, psi);
-        look(project(place, &robot.pose, &mounting()), &robot, &[wall()]).unwrap()
+        view_of(project(place, &robot.pose, &mounting()), &robot, &[wall()]).unwrap()
     };
     let views = [of(&moved, 2.0, 20.0), of(&truth, 2.0, 20.0), of(&truth, 2.5, -30.0), of(&truth, 3.0, 0.0)];
     let made = placement(&views, &[wall()], &PlacementParams::default()).unwrap();
@@ -292,7 +294,7 @@ fn a_view_that_disagrees_is_left_out() {
 
 #[test]
 fn the_nearest_wall_that_is_met_counts() {
-    let truth = hung(&wall(), 2.0);
+    let truth = place_on(&wall(), 2.0);
     let robot = robot(&truth, 2.5, 20.0);
     let points = project(&truth, &robot.pose, &mounting());
     let shifted = |d: f64, from: f64, to: f64| {
@@ -301,14 +303,14 @@ fn the_nearest_wall_that_is_met_counts() {
         LaserSegment::from_ends(w.a + f * d + t * from, w.a + f * d + t * to, w.covariance).unwrap()
     };
     let (behind, before) = (shifted(-1.0, -2.0, 7.0), shifted(0.8, 0.0, 5.0));
-    let on = |walls: &[LaserSegment]| look(points, &robot, walls).map(|v| v.wall);
+    let on = |walls: &[LaserSegment]| view_of(points, &robot, walls).map(|v| v.wall);
     assert_eq!(on(&[behind.clone(), wall()]), Ok(1));
     assert_eq!(on(&[wall(), behind]), Ok(0));
     assert_eq!(on(&[wall(), before]), Ok(1), "a board before the wall");
     // A pillar that hides half of it.
     let half = shifted(0.5, 0.5, 1.8);
     assert_eq!(on(&[wall(), half]), Err(PlacementError::Straddles));
-    // The back of a wall is none.
+    // The back of a wall does not count.
     let back = LaserSegment::from_ends(wall().b, wall().a, wall().covariance).unwrap();
     assert_eq!(on(&[back]), Err(PlacementError::NoWall));
     assert_eq!(on(&[]), Err(PlacementError::NoWall));
@@ -317,25 +319,25 @@ fn the_nearest_wall_that_is_met_counts() {
 
 #[test]
 fn an_open_door_is_not_on_the_wall() {
-    let mut open = hung(&wall(), 2.0);
+    let mut open = place_on(&wall(), 2.0);
     open.theta_rad += 0.9;
-    let robot = robot(&hung(&wall(), 2.0), 2.5, 20.0);
-    let refused = look(project(&open, &robot.pose, &mounting()), &robot, &[wall()]);
+    let robot = robot(&place_on(&wall(), 2.0), 2.5, 20.0);
+    let refused = view_of(project(&open, &robot.pose, &mounting()), &robot, &[wall()]);
     assert!(matches!(refused, Err(PlacementError::NotOnWall { .. })), "{refused:?}");
-    let mut askew = hung(&wall(), 2.0);
+    let mut askew = place_on(&wall(), 2.0);
     askew.roll_rad = 0.15;
-    let refused = look(project(&askew, &robot.pose, &mounting()), &robot, &[wall()]);
+    let refused = view_of(project(&askew, &robot.pose, &mounting()), &robot, &[wall()]);
     assert!(matches!(refused, Err(PlacementError::NotOnWall { .. })), "{refused:?}");
 }
 
 #[test]
-fn grazing_rays_and_bad_numbers_are_refused() {
-    let truth = hung(&wall(), 2.0);
+fn grazing_rays_and_invalid_numbers_are_refused() {
+    let truth = place_on(&wall(), 2.0);
     let grazing = robot(&truth, 3.0, 82.0);
     let points = project(&truth, &grazing.pose, &mounting());
-    assert_eq!(look(points, &grazing, &[wall()]), Err(PlacementError::NoWall));
+    assert_eq!(view_of(points, &grazing, &[wall()]), Err(PlacementError::NoWall));
     let mut nowhere = robot(&truth, 2.0, 0.0);
     let points = project(&truth, &nowhere.pose, &mounting());
     nowhere.pose.x_m = f64::NAN;
-    assert!(matches!(look(points, &nowhere, &[wall()]), Err(PlacementError::OutOfRange(_))));
+    assert!(matches!(view_of(points, &nowhere, &[wall()]), Err(PlacementError::OutOfRange(_))));
 }

@@ -41,15 +41,15 @@ pub fn view_on_wall(
     walls: &[LaserSegment],
     p: &PlacementParams,
 ) -> Result<WallRectangle, PlacementError> {
-    let sighting = checked(view)?;
-    let (wall, hits) = nearest(&sighting, walls, p)?;
-    fit(&sighting, wall, rays::plane(&walls[wall]).0, &hits, p)
+    let checked = checked(view)?;
+    let (wall, hits) = nearest(&checked, walls, p)?;
+    fit(&checked, wall, rays::plane(&walls[wall]).0, &hits, p)
 }
 
 /// The nearest wall that all four rays meet. Refused when the quad reaches beyond the end of a wall to one behind it:
 /// a place on the wrong wall would be off by their distance.
 fn nearest(
-    sighting: &CheckedView<'_>,
+    checked: &CheckedView<'_>,
     walls: &[LaserSegment],
     p: &PlacementParams,
 ) -> Result<(usize, [Hit; 4]), PlacementError> {
@@ -58,7 +58,7 @@ fn nearest(
     for (i, wall) in walls.iter().enumerate() {
         let plane = rays::plane(wall);
         let found = [0, 1, 2, 3]
-            .map(|c| rays::hit(sighting, c, plane).filter(|h| rays::is_on(wall, &h.point, p.margin_m)));
+            .map(|c| rays::hit(checked, c, plane).filter(|h| rays::is_on(wall, &h.point, p.margin_m)));
         match found {
             [Some(a), Some(b), Some(c), Some(d)] => {
                 let near = [&a, &b, &c, &d].iter().map(|h| h.distance_m).fold(f64::INFINITY, f64::min);
@@ -97,11 +97,11 @@ fn fit(
     // Coordinates on the wall: along it towards the viewer's right, and up.
     let side = Vector2::new(-theta.sin(), theta.cos());
     let facing = Vector2::new(theta.cos(), theta.sin());
-    let mut seen = SVector::<f64, 8>::zeros();
+    let mut intersections = SVector::<f64, 8>::zeros();
     let mut by = SMatrix::<f64, 8, INPUTS>::zeros();
     for (i, hit) in hits.iter().enumerate() {
         let xy = hit.point.xy();
-        (seen[2 * i], seen[2 * i + 1]) = (side.dot(&xy), hit.point.z);
+        (intersections[2 * i], intersections[2 * i + 1]) = (side.dot(&xy), hit.point.z);
         let mut row = side.transpose() * hit.by.fixed_rows::<2>(0);
         // The axis turns with the wall.
         row[WALL] -= facing.dot(&xy);
@@ -114,8 +114,8 @@ fn fit(
         .cholesky()
         .ok_or(PoseError::Degenerate)?
         .inverse();
-    let (q, gain) = rectangle(&seen, &weight, p.roll_sigma_rad).ok_or(PoseError::Degenerate)?;
-    let rms_m = ((seen - corners_of(&q)).norm_squared() / 4.0).sqrt();
+    let (q, gain) = rectangle(&intersections, &weight, p.roll_sigma_rad).ok_or(PoseError::Degenerate)?;
+    let rms_m = ((intersections - corners_of(&q)).norm_squared() / 4.0).sqrt();
     let possible = |v: f64| (LandmarkSize::MIN_M..=LandmarkSize::MAX_M).contains(&v);
     if rms_m > p.max_rms_m || q[4].abs() > p.max_roll_rad || !possible(q[2]) || !possible(q[3]) {
         return Err(PlacementError::NotOnWall { rms_m, roll_rad: q[4] });
@@ -148,15 +148,17 @@ fn corners_of(q: &SVector<f64, 5>) -> SVector<f64, 8> {
 /// Weighted least squares over the rectangle, with a prior on its roll; with the gain from intersections to
 /// rectangle.
 fn rectangle(
-    seen: &SVector<f64, 8>,
+    intersections: &SVector<f64, 8>,
     weight: &SMatrix<f64, 8, 8>,
     roll_sigma_rad: f64,
 ) -> Option<(SVector<f64, 5>, SMatrix<f64, 5, 8>)> {
     /// Steps: the problem is linear but for the roll.
     const STEPS: usize = 5;
-    let mean = |k: usize| (seen[k] + seen[k + 2] + seen[k + 4] + seen[k + 6]) / 4.0;
-    let width = 0.5 * (seen[2] - seen[0] + seen[4] - seen[6]);
-    let height = 0.5 * (seen[1] - seen[7] + seen[3] - seen[5]);
+    let mean = |k: usize| {
+        (intersections[k] + intersections[k + 2] + intersections[k + 4] + intersections[k + 6]) / 4.0
+    };
+    let width = 0.5 * (intersections[2] - intersections[0] + intersections[4] - intersections[6]);
+    let height = 0.5 * (intersections[1] - intersections[7] + intersections[3] - intersections[5]);
     let mut q = SVector::<f64, 5>::from([mean(0), mean(1), width, height, 0.0]);
     let mut gain = SMatrix::<f64, 5, 8>::zeros();
     for _ in 0..STEPS {
@@ -176,7 +178,7 @@ fn rectangle(
         h[(4, 4)] += level;
         let inverse = h.cholesky()?.inverse();
         gain = inverse * j.transpose() * weight;
-        let mut g = j.transpose() * weight * (seen - corners_of(&q));
+        let mut g = j.transpose() * weight * (intersections - corners_of(&q));
         g[4] -= level * q[4];
         q += inverse * g;
     }

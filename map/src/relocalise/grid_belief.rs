@@ -56,20 +56,23 @@ impl GridBelief {
         glimpse: &RelativeObservation,
         members: &[PossibleLandmark<'_>],
     ) -> Result<(), OutOfRange> {
-        let readings: Vec<AssociationHypothesis<'_>> = members
+        let hypotheses: Vec<AssociationHypothesis<'_>> = members
             .iter()
             .map(|member| AssociationHypothesis { glimpse: *glimpse, member: *member })
             .collect();
-        self.update_associations(&readings)
+        self.update_associations(&hypotheses)
     }
 
     /// Update where the relative pose depends on the landmark: another size or height gives another distance.
-    pub fn update_associations(&mut self, readings: &[AssociationHypothesis<'_>]) -> Result<(), OutOfRange> {
-        check::within("members", readings.len() as f64, 0.0, MAX_MEMBERS as f64)?;
+    pub fn update_associations(
+        &mut self,
+        hypotheses: &[AssociationHypothesis<'_>],
+    ) -> Result<(), OutOfRange> {
+        check::within("members", hypotheses.len() as f64, 0.0, MAX_MEMBERS as f64)?;
         let reach_m = self.p.clutter_reach_m;
         let evenly = self.p.clutter / (PI * reach_m * reach_m * TAU);
         let mut likelihood = self.grid.like(evenly);
-        for AssociationHypothesis { glimpse, member } in readings {
+        for AssociationHypothesis { glimpse, member } in hypotheses {
             glimpse.robot_from_landmark.check()?;
             check::covariance("covariance", &glimpse.covariance)?;
             member.place.check()?;
@@ -118,8 +121,12 @@ impl GridBelief {
         self.grid.weigh(|_, pose| {
             let (dx, dy) = (place.x_m - pose.x_m, place.y_m - pose.y_m);
             let bearing = wrap_rad(dy.atan2(dx) - pose.theta_rad);
-            let looked = (bearings_rad[0]..=bearings_rad[1]).contains(&bearing);
-            if looked && visible.contains(&Point2::new(pose.x_m, pose.y_m)) { 1.0 - detection } else { 1.0 }
+            let is_covered = (bearings_rad[0]..=bearings_rad[1]).contains(&bearing);
+            if is_covered && visible.contains(&Point2::new(pose.x_m, pose.y_m)) {
+                1.0 - detection
+            } else {
+                1.0
+            }
         });
     }
 

@@ -27,7 +27,7 @@ fn beside() -> RelativeObservation {
     RelativeObservation { robot_from_landmark: Pose2::new(0.0, 1.0, -FRAC_PI_2), covariance }
 }
 
-/// A corridor one cell wide, 20 m long, along which the robot looks east; doors that all look the same on its left.
+/// A corridor one cell wide, 20 m long, the robot heading east, with identical doors on its left.
 const DOORS: [f64; 3] = [2.1, 6.1, 14.1];
 
 fn corridor(p: &GridBeliefParams) -> GridBelief {
@@ -52,13 +52,13 @@ impl ByHand {
         Self([0.01; 100])
     }
 
-    fn saw(&mut self) {
-        // Variances of the glimpse and of a cell: 0.01 + 0.04 / 12, and of a heading: 0.01 + (10 deg)^2 / 12.
+    fn observe(&mut self) {
+        // Variances of the observation and of a cell: 0.01 + 0.04 / 12, and of a heading: 0.01 + (10 deg)^2 / 12.
         let (v, t) = (0.01 + 0.04 / 12.0, 0.01 + (TAU / 36.0).powi(2) / 12.0);
         let peak = 1.0 / ((TAU * v) * (TAU * t).sqrt());
         for (i, belief) in self.0.iter_mut().enumerate() {
             let x = 0.2 * (i as f64 + 0.5);
-            // Beyond 4.5 standard deviations of the position a sighting is cut off.
+            // Beyond 4.5 standard deviations of the position an observation is cut off.
             let reach = 4.5 * (2.0 * v).sqrt();
             let doors = DOORS.map(|door| {
                 let off = door - x;
@@ -101,7 +101,7 @@ fn three_doors_by_hand() {
     };
     compare(&belief, &by_hand, "at first");
     belief.update(&beside(), &members(&places, 0.1)).unwrap();
-    by_hand.saw();
+    by_hand.observe();
     compare(&belief, &by_hand, "one door");
     let modes = belief.modes();
     assert_eq!(modes.len(), 3, "{modes:?}");
@@ -109,13 +109,13 @@ fn three_doors_by_hand() {
         assert!((mode.mass - 1.0 / 3.0).abs() < 0.01, "{modes:?}");
     }
     assert_eq!(belief.resolved(), None);
-    // 4 m on there is a door again: only the second is 4 m behind another.
+    // After 4 m there is a door again: only the second is 4 m behind another.
     belief.predict(&Pose2::new(4.0, 0.0, 0.0)).unwrap();
     by_hand.moved(20);
     compare(&belief, &by_hand, "4 m on");
     assert_eq!(belief.resolved(), None);
     belief.update(&beside(), &members(&places, 0.1)).unwrap();
-    by_hand.saw();
+    by_hand.observe();
     compare(&belief, &by_hand, "the second door");
     let mode = belief.resolved().unwrap();
     assert!(
@@ -159,7 +159,7 @@ fn motion_spreads_by_its_variance() {
 }
 
 #[test]
-fn a_robot_that_was_carried_away_is_found_again() {
+fn a_kidnapped_robot_is_localised_again() {
     let p = sharp();
     let mut belief = corridor(&p);
     let unique = [door(4.1, 1.1, -FRAC_PI_2)];
@@ -169,20 +169,20 @@ fn a_robot_that_was_carried_away_is_found_again() {
     }
     assert!((belief.resolved().unwrap().pose.pose.x_m - 4.1).abs() < 0.05);
     let other = [door(16.1, 1.1, -FRAC_PI_2)];
-    let mut looks = 0;
+    let mut observations = 0;
     while belief.resolved().is_none_or(|m| (m.pose.pose.x_m - 16.1).abs() > 0.1) {
         belief.update(&beside(), &members(&other, 0.1)).unwrap();
         belief.predict(&Pose2::default()).unwrap();
-        looks += 1;
-        assert!(looks <= 3, "{:?}", belief.modes());
+        observations += 1;
+        assert!(observations <= 3, "{:?}", belief.modes());
     }
 }
 
 #[test]
-fn what_should_have_been_seen_speaks_against_a_place() {
+fn a_missed_landmark_lowers_the_probability_of_a_pose() {
     let p = sharp();
     let mut belief = corridor(&p);
-    // The robot may be at either of two doors; at one of them a poster would be in sight.
+    // The robot may be at either of two doors; from one of them a poster is visible.
     let places = [door(4.1, 1.1, -FRAC_PI_2), door(14.1, 1.1, -FRAC_PI_2)];
     belief.update(&beside(), &members(&places, 0.1)).unwrap();
     let poster = {
@@ -195,16 +195,16 @@ fn what_should_have_been_seen_speaks_against_a_place() {
     }
     let modes = belief.modes();
     assert!((modes[0].pose.pose.x_m - 4.1).abs() < 0.1, "{modes:?}");
-    // 0.2 of it is left by each miss: 1 to 0.04.
+    // Each miss leaves 0.2 of its probability: 1 to 0.04.
     assert!((modes[0].mass / modes[1].mass - 25.0).abs() < 1.0, "{modes:?}");
     let mut aside = corridor(&p);
     aside.update(&beside(), &members(&places, 0.1)).unwrap();
     aside.update_missed(&poster, &visible, [0.5, 1.5]);
-    assert!((aside.modes()[0].mass - 0.5).abs() < 0.01, "the camera looked elsewhere");
+    assert!((aside.modes()[0].mass - 0.5).abs() < 0.01, "the camera did not cover its bearing");
 }
 
 #[test]
-fn from_where_it_cannot_be_seen_it_was_not() {
+fn a_landmark_is_not_observed_from_outside_its_area() {
     let p = sharp();
     let mut belief = corridor(&p);
     let places = [door(4.1, 1.1, -FRAC_PI_2), door(14.1, 1.1, -FRAC_PI_2)];
@@ -224,7 +224,7 @@ fn from_where_it_cannot_be_seen_it_was_not() {
 }
 
 #[test]
-fn bounds_are_held_and_named() {
+fn values_out_of_range_are_refused_with_their_field() {
     let new = |side: f64, p: &GridBeliefParams| {
         GridBelief::new([Point2::origin(), Point2::new(side, side)], |_| 1.0, p)
             .map(|_| ())
@@ -241,7 +241,7 @@ fn bounds_are_held_and_named() {
     assert!(belief.predict(&Pose2::new(f64::NAN, 0.0, 0.0)).is_err());
     let places = vec![door(1.0, 1.0, 0.0); MAX_MEMBERS + 1];
     assert_eq!(belief.update(&beside(), &members(&places, 0.1)).unwrap_err().field, "members");
-    // Driven out of the map, it may be anywhere again.
+    // After leaving the grid, the belief is the prior again.
     belief.predict(&Pose2::new(500.0, 0.0, 0.0)).unwrap();
     assert!(belief.entropy_nats() > 4.0);
 }

@@ -87,7 +87,7 @@ pub(crate) fn align(
         done = Some((sums.clone(), scale));
         if let Some(prior) = prior {
             // Without the correction, noise of the normals would hold the pose at the guess against the prior.
-            h = sums.told() * scale + prior.information;
+            h = sums.determined() * scale + prior.information;
             g += prior.information * pose.minus(&prior.pose);
         }
         // Slight damping keeps the pose where it is not determined.
@@ -104,7 +104,7 @@ pub(crate) fn align(
     }
     let (sums, scale) = done?;
     let flat = scan.points.iter().filter(|q| q.normal.is_some()).count();
-    let information = with_floor(&(sums.told() * scale), [p.floor_m, p.floor_rad]);
+    let information = with_floor(&(sums.determined() * scale), [p.floor_m, p.floor_rad]);
     let finite = pose.check().is_ok() && information.iter().all(|v| v.is_finite());
     finite.then(|| IcpResult {
         pose,
@@ -127,9 +127,9 @@ struct Sums {
 }
 
 impl Sums {
-    /// The information without the part by noise of the normals: walls of a bare corridor seem to face slightly along
-    /// it.
-    fn told(&self) -> Matrix3<f64> {
+    /// The information without the part by noise of the normals: by that noise walls of a bare corridor face
+    /// slightly along it.
+    fn determined(&self) -> Matrix3<f64> {
         // Metres and radians have equal weight at the mean distance of the points.
         let arm = (self.h[(2, 2)] / (self.h[(0, 0)] + self.h[(1, 1)]).max(1e-12)).sqrt().clamp(0.1, 100.0);
         let unit = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, 1.0 / arm));

@@ -57,7 +57,7 @@ pub struct Slam {
     path: Vec<PoseConstraint>,
     closures: LoopCloser,
     placed: Vec<Placed>,
-    tracker: ScanMatcher,
+    matcher: ScanMatcher,
 }
 
 /// A finished map.
@@ -84,7 +84,7 @@ impl Slam {
             path: Vec::new(),
             closures: LoopCloser::default(),
             placed: Vec::new(),
-            tracker: ScanMatcher::default(),
+            matcher: ScanMatcher::default(),
         }
     }
 
@@ -95,29 +95,29 @@ impl Slam {
             return Err(SlamError::TooMany);
         }
         let cloud = cloud(scan, &self.params.cloud);
-        let seen = self.tracker.track(&self.keys, odom_from_robot, &cloud, &self.params);
+        let placement = self.matcher.track(&self.keys, odom_from_robot, &cloud, &self.params);
         let Some(last) = self.keys.len().checked_sub(1) else {
             self.push_key(Pose2::default(), odom_from_robot, cloud, scan, 0.0);
             return Ok(Pose2::default());
         };
-        if seen.is_new && self.keys.len() < MAX_KEYS {
-            let path_m = self.keys[last].path_m + seen.key_from_robot.pose.position().norm();
-            let pose = self.keys[last].pose.compose(&seen.key_from_robot.pose);
+        if placement.is_new && self.keys.len() < MAX_KEYS {
+            let path_m = self.keys[last].path_m + placement.key_from_robot.pose.position().norm();
+            let pose = self.keys[last].pose.compose(&placement.key_from_robot.pose);
             self.path.push(PoseConstraint {
                 from: last,
                 to: last + 1,
-                measured: seen.key_from_robot.pose,
-                information: inverse(&seen.key_from_robot.covariance),
+                measured: placement.key_from_robot.pose,
+                information: inverse(&placement.key_from_robot.covariance),
                 doubt_chi2: None,
             });
             self.push_key(pose, odom_from_robot, cloud, scan, path_m);
             if self.closures.detect(&mut self.keys, &self.path, &self.params)? {
-                self.tracker.relaid(&self.keys, &self.params);
+                self.matcher.rebuild(&self.keys, &self.params);
             }
             return Ok(self.keys[last + 1].pose);
         }
-        self.placed.push(Placed { key: last, key_from_robot: seen.key_from_robot.pose });
-        Ok(self.keys[last].pose.compose(&seen.key_from_robot.pose))
+        self.placed.push(Placed { key: last, key_from_robot: placement.key_from_robot.pose });
+        Ok(self.keys[last].pose.compose(&placement.key_from_robot.pose))
     }
 
     /// Number of scans added.
@@ -129,7 +129,7 @@ impl Slam {
         let lines = lines::segments(scan, &self.params.lines);
         self.placed.push(Placed { key: self.keys.len(), key_from_robot: Pose2::default() });
         self.keys.push(Keyframe { pose, odom: *odom, cloud, lines, path_m });
-        self.tracker.start(&self.keys, &self.params);
+        self.matcher.start(&self.keys, &self.params);
     }
 
     /// Runs the final fit and collects the walls.

@@ -46,14 +46,14 @@ impl ScanMatcher {
     /// Rebuilds the recent map around a new keyframe.
     pub(super) fn start(&mut self, keys: &[Keyframe], p: &SlamParams) {
         let Some(key) = keys.last() else { return };
-        self.relaid(keys, p);
+        self.rebuild(keys, p);
         self.last = Pose2::default();
         (self.spread, self.by_odometry) = (Matrix3::zeros(), Matrix3::zeros());
         self.odom = key.odom;
     }
 
     /// Rebuilds the recent map after the keyframes have moved.
-    pub(super) fn relaid(&mut self, keys: &[Keyframe], p: &SlamParams) {
+    pub(super) fn rebuild(&mut self, keys: &[Keyframe], p: &SlamParams) {
         let Some(key) = keys.last() else { return };
         let first = keys.len().saturating_sub(p.recent_keys.max(1));
         let near = || {

@@ -58,7 +58,7 @@ fn a_ring_is_closed_where_odometry_alone_is_metres_off() {
 }
 
 #[test]
-fn the_same_recording_gives_the_same_map() {
+fn the_same_scans_give_the_same_map() {
     let path: Vec<Pose2> = around(1).into_iter().take(120).collect();
     let odom = odometry(&path, 0.005, &mut Random::new(2));
     let (a, b) = (build(&ring(), &path, &odom, 3), build(&ring(), &path, &odom, 3));
@@ -66,7 +66,7 @@ fn the_same_recording_gives_the_same_map() {
     assert_eq!(a.walls, b.walls);
 }
 
-/// Two rooms that are the same to the last pillar, 14 m apart, joined by a corridor.
+/// Two identical rooms, 14 m apart, joined by a corridor.
 fn twins() -> (Walls, Vec<Pose2>) {
     let mut walls = Vec::new();
     for x in [0.0, 20.0] {
@@ -89,22 +89,22 @@ fn twins() -> (Walls, Vec<Pose2>) {
 }
 
 #[test]
-fn the_twin_of_a_room_is_not_the_room() {
+fn identical_rooms_are_not_closed_as_a_loop() {
     let (walls, path) = twins();
     let odom = odometry(&path, 0.004, &mut Random::new(11));
     let map = build(&walls, &path, &odom, 12);
     assert!(worst_m(&map.path, &path) < 0.5, "{}", worst_m(&map.path, &path));
     for l in &map.loops {
         let (old, new) = (path[map.keys[l.old].0], path[map.keys[l.new].0]);
-        assert!((old.position() - new.position()).norm() < 3.0, "the rooms were laid on each other: {l:?}");
+        assert!((old.position() - new.position()).norm() < 3.0, "a loop between the two rooms: {l:?}");
     }
 }
 
 #[test]
-fn a_bare_corridor_is_as_long_as_odometry_says_and_says_so() {
+fn the_length_of_a_bare_corridor_has_the_uncertainty_of_odometry() {
     let walls = vec![[-50.0, -1.0, 90.0, -1.0], [-50.0, 1.0, 90.0, 1.0]];
     let path: Vec<Pose2> = (0..80).map(|i| Pose2::new(0.25 * f64::from(i), 0.0, 0.0)).collect();
-    // Odometry runs short, and is turned 0.1 rad off at the end.
+    // Odometry measures too little, and is turned by 0.1 rad at the end.
     let odom: Vec<Pose2> =
         (0..80).map(|i| Pose2::new(0.985 * 0.25 * f64::from(i), 0.0, 0.1 * f64::from(i) / 80.0)).collect();
     let map = build(&walls, &path, &odom, 4);
@@ -119,7 +119,7 @@ fn a_bare_corridor_is_as_long_as_odometry_says_and_says_so() {
 }
 
 #[test]
-fn bounds_and_bad_numbers() {
+fn limits_and_invalid_numbers() {
     let mut slam = Slam::new(SlamParams::default());
     let blind = Scan::new(Pose2::default(), 0.0, 0.1, 10.0, vec![f32::NAN; 20]).unwrap();
     assert!(matches!(slam.add(&Pose2::new(f64::NAN, 0.0, 0.0), &blind), Err(SlamError::OutOfRange(_))));
@@ -127,7 +127,7 @@ fn bounds_and_bad_numbers() {
     for i in 0..30 {
         slam.add(&Pose2::new(0.3 * f64::from(i), 0.0, 0.0), &blind).unwrap();
     }
-    // A jump of odometry to the end of the world.
+    // A huge jump of odometry.
     slam.add(&Pose2::new(9e4, -9e4, 3.0), &blind).unwrap();
     let map = slam.finish().unwrap();
     assert_eq!((map.path.len(), map.walls.len()), (31, 0));
@@ -137,7 +137,7 @@ fn bounds_and_bad_numbers() {
 }
 
 #[test]
-fn parameters_round_trip_and_refuse_unknown_names() {
+fn parameters_round_trip_and_unknown_names_are_refused() {
     let text = serde_json::to_string(&SlamParams::default()).unwrap();
     assert_eq!(serde_json::from_str::<SlamParams>(&text).unwrap(), SlamParams::default());
     assert!(serde_json::from_str::<SlamParams>(r#"{"loops":{"min_weigth":0.1}}"#).is_err());

@@ -27,7 +27,7 @@ pub(crate) fn scan(walls: &Walls, at: &Pose2, sigma_m: f64, max_m: f64, random: 
     Scan::new(Pose2::default(), -90.0 * step, step, max_m, ranges.collect()).unwrap()
 }
 
-/// The walls as a frozen map whose lines are as sure as `sigma_m` and `sigma_rad`.
+/// The walls as a finished map with the covariance of `sigma_m` and `sigma_rad`.
 pub(crate) fn segments(walls: &Walls, sigma_m: f64, sigma_rad: f64) -> Vec<LaserSegment> {
     let covariance = Matrix2::new(sigma_rad * sigma_rad, 0.0, 0.0, sigma_m * sigma_m);
     let one = |[ax, ay, bx, by]: &[f64; 4]| {
@@ -58,7 +58,7 @@ pub(crate) fn ring() -> Walls {
     walls
 }
 
-/// Once around the ring and some way on, in steps of a quarter of a metre.
+/// Around the ring and a little further, in steps of a quarter of a metre.
 pub(crate) fn around(rounds: usize) -> Vec<Pose2> {
     let corners = [[1.0, 1.0], [23.0, 1.0], [23.0, 15.0], [1.0, 15.0]];
     let mut poses = Vec::new();

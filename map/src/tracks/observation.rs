@@ -1,13 +1,13 @@
-//! What one frame shows of a quad, and what the tracker did with it.
+//! A quad of a frame, and its outcome in the tracker.
 
 use crate::place::LandmarkPlace;
 use serde::{Deserialize, Serialize};
 use vision::{geometry::Corners, model::LandmarkId, recognise::IconFeatures};
 
-/// What recognition says of a quad.
+/// The identity of a quad by recognition.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Identity {
-    /// No landmark of the map, nor nearly one.
+    /// A distractor: no landmark of the map, nor nearly one.
     Stranger,
     /// This landmark, uniquely.
     Landmark(LandmarkId),
@@ -24,19 +24,19 @@ pub struct QuadObservation {
     pub icon: IconFeatures,
     /// Place on the walls, if known.
     pub place: Option<LandmarkPlace>,
-    /// What recognition says of it.
+    /// Its identity by recognition.
     pub identity: Identity,
 }
 
-/// What the tracker did with a quad.
+/// Outcome of a quad.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum TrackOutcome {
-    /// The view is to be kept in the track of this number.
+    /// The view is to be stored in the track of this number.
     Keep(u32),
     /// Followed; the track has a near-duplicate of the view.
     NearDuplicate,
-    /// Followed; not observed often enough yet to be kept.
+    /// Followed; not observed often enough yet to be stored.
     TooFewObservations,
     /// The track has [`super::MAX_TRACK_VIEWS`] views.
     Full,

@@ -7,9 +7,9 @@ use vision::learn::near_duplicates::NoveltyParams;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct GatherParams {
-    /// Observations of an unknown object before its first view is kept: most single observations are noise.
+    /// Observations of an unknown object before its first view is stored: most single observations are noise.
     pub min_sightings: u32,
-    /// A track without kept views is forgotten when it was not observed for this long, seconds.
+    /// A track without stored views is dropped if it was not observed for this long, seconds.
     pub memory_s: f64,
     /// By the image alone an object is followed over gaps of at most this long, seconds.
     pub gap_s: f64,
@@ -21,8 +21,8 @@ pub struct GatherParams {
     pub size_ratio: f64,
     /// By place: largest angle between the normals, radians.
     pub normal_rad: f64,
-    /// Largest C^r to the icons of the track: the upper limit of the C^r threshold where nothing else is known
-    /// (`vision::learn::model::LearnParams`).
+    /// Largest C^r to the icons of the track: the default upper limit of the C^r threshold
+    /// (`vision::learn::params::LearnParams`).
     pub max_correlation: f64,
     /// From half of [`super::MAX_TRACK_VIEWS`] on a view must be farther from the others by this factor.
     pub late_novelty: f64,

@@ -1,4 +1,4 @@
-//! One object followed from frame to frame, with the views kept of it.
+//! One object followed from frame to frame, with its stored views.
 
 use crate::{place::LandmarkPlace, pose2::wrap_rad, tracks::params::GatherParams};
 use std::collections::VecDeque;
@@ -9,10 +9,11 @@ use vision::{
     recognise::{IconFeatures, RecogniseParams, features::correlation::correlation},
 };
 
-/// Most views kept of a track.
+/// Most views stored of a track.
 pub const MAX_TRACK_VIEWS: usize = 40;
-/// Icons of a track that a new observation is compared with: the last one, and this many spread over the kept views.
-pub(super) const LOOKS_KEPT: usize = 4;
+/// Icons of a track that a new observation is compared with: the last one, and this many spread over the stored
+/// views.
+pub(super) const MAX_ICONS: usize = 4;
 
 /// One object that is followed.
 #[derive(Debug, Clone)]
@@ -27,7 +28,7 @@ pub struct Track {
     pub known: u32,
     pub(super) closed: bool,
     pub(super) views: Vec<ViewSummary>,
-    pub(super) looks: VecDeque<IconFeatures>,
+    pub(super) icons: VecDeque<IconFeatures>,
     /// Last known place on the walls.
     pub(super) place: Option<LandmarkPlace>,
     pub(super) last: Option<Last>,
@@ -50,33 +51,33 @@ impl Track {
             known: 0,
             closed: false,
             views: vec![],
-            looks: VecDeque::new(),
+            icons: VecDeque::new(),
             place: None,
             last: None,
         }
     }
 
-    /// Number of kept views.
+    /// Number of stored views.
     pub fn views(&self) -> usize {
         self.views.len()
     }
 
     /// C^r to the nearest of its icons.
     pub(super) fn distance(&self, icon: &IconFeatures, p: &RecogniseParams) -> f64 {
-        let icons = self.looks.iter().chain(self.last.as_ref().map(|l| &l.icon));
+        let icons = self.icons.iter().chain(self.last.as_ref().map(|l| &l.icon));
         icons
             .map(|own| correlation(&icon.buckets, &own.buckets, &p.correlation))
             .fold(f64::INFINITY, f64::min)
     }
 
-    pub(super) fn keep(&mut self, digest: ViewSummary, icon: &IconFeatures) {
-        self.views.push(digest);
+    pub(super) fn keep(&mut self, summary: ViewSummary, icon: &IconFeatures) {
+        self.views.push(summary);
         // The first views, later one at regular intervals.
-        if self.looks.len() < LOOKS_KEPT {
-            self.looks.push_back(icon.clone());
-        } else if self.views.len().is_multiple_of(MAX_TRACK_VIEWS / LOOKS_KEPT) {
-            self.looks.pop_front();
-            self.looks.push_back(icon.clone());
+        if self.icons.len() < MAX_ICONS {
+            self.icons.push_back(icon.clone());
+        } else if self.views.len().is_multiple_of(MAX_TRACK_VIEWS / MAX_ICONS) {
+            self.icons.pop_front();
+            self.icons.push_back(icon.clone());
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Assigns the quads of each frame to tracks and decides which views to keep.
+//! Assigns the quads of each frame to tracks and decides which views to store.
 
 use crate::tracks::{
     observation::{Identity, QuadObservation, TrackOutcome},
@@ -29,10 +29,10 @@ impl ViewTracker {
         Self { p, tracks: vec![], numbers: 0 }
     }
 
-    /// Resumes a stored track from its views in order. It is found again by its place only, unless it is a
+    /// Resumes a stored track from its views in order. It is followed again by its place only, unless it is a
     /// landmark's. A number that is in use is ignored.
-    pub fn resume(&mut self, kept: StoredTrack, views: impl IntoIterator<Item = (Corners, IconFeatures)>) {
-        let StoredTrack { number, landmark, sightings, known, place } = kept;
+    pub fn resume(&mut self, stored: StoredTrack, views: impl IntoIterator<Item = (Corners, IconFeatures)>) {
+        let StoredTrack { number, landmark, sightings, known, place } = stored;
         if self.tracks.iter().any(|t| t.number == number) {
             return;
         }
@@ -49,7 +49,7 @@ impl ViewTracker {
         &self.tracks
     }
 
-    /// Marks a track as decided by a person: no more views of the object are kept.
+    /// Marks a track as decided by a person: no more views of the object are stored.
     pub fn close(&mut self, number: u32) {
         for track in self.tracks.iter_mut().filter(|t| t.number == number) {
             track.closed = true;
@@ -62,31 +62,31 @@ impl ViewTracker {
     }
 
     /// Adds the quads of one frame of `camera` and gives the outcome of each. `wanted`: landmarks whose views are
-    /// requested; `strangers`: whether views of unknown objects are.
+    /// requested; `distractors`: whether views of unknown objects are.
     pub fn update(
         &mut self,
         (at_ns, camera): (i64, &str),
-        glimpses: &[QuadObservation],
+        quads: &[QuadObservation],
         wanted: impl Fn(LandmarkId) -> bool,
-        strangers: bool,
+        distractors: bool,
         p: &RecogniseParams,
     ) -> Vec<TrackOutcome> {
         self.clear_out(at_ns);
         let mut taken = vec![false; self.tracks.len()];
-        let places = self.assigned(at_ns, camera, glimpses, &mut taken, p);
-        glimpses
+        let places = self.assigned(at_ns, camera, quads, &mut taken, p);
+        quads
             .iter()
             .zip(places)
-            .map(|(glimpse, place)| {
-                let at = match (glimpse.identity, place) {
+            .map(|(quad, place)| {
+                let at = match (quad.identity, place) {
                     (Identity::Landmark(id), _) if wanted(id) => self.of_landmark(id),
-                    (Identity::Stranger, _) if !strangers => Err(TrackOutcome::NotRequested),
+                    (Identity::Stranger, _) if !distractors => Err(TrackOutcome::NotRequested),
                     (Identity::Stranger, Place::Nowhere) => self.begun(None),
                     (_, Place::Track(i)) => Ok(i),
                     (Identity::Stranger, Place::Occupied) => Err(TrackOutcome::AppearanceMismatch),
                     _ => Err(TrackOutcome::KnownLandmark),
                 };
-                at.map_or_else(|outcome| outcome, |i| self.taken(i, at_ns, camera, glimpse))
+                at.map_or_else(|outcome| outcome, |i| self.taken(i, at_ns, camera, quad))
             })
             .collect()
     }
@@ -96,18 +96,18 @@ impl ViewTracker {
         &self,
         at_ns: i64,
         camera: &str,
-        glimpses: &[QuadObservation],
+        quads: &[QuadObservation],
         taken: &mut [bool],
         p: &RecogniseParams,
     ) -> Vec<Place> {
-        let mut places = vec![Place::Nowhere; glimpses.len()];
+        let mut places = vec![Place::Nowhere; quads.len()];
         let mut pairs = vec![];
-        for (g, glimpse) in glimpses.iter().enumerate() {
+        for (g, quad) in quads.iter().enumerate() {
             for (t, track) in self.tracks.iter().enumerate().filter(|(_, t)| t.landmark.is_none()) {
-                if !self.lies_there(track, at_ns, camera, glimpse) {
+                if !self.lies_there(track, at_ns, camera, quad) {
                     continue;
                 }
-                let distance = track.distance(&glimpse.icon, p);
+                let distance = track.distance(&quad.icon, p);
                 if distance <= self.p.max_correlation {
                     pairs.push((distance, g, t));
                 } else {
@@ -126,8 +126,8 @@ impl ViewTracker {
         places
     }
 
-    fn lies_there(&self, track: &Track, at_ns: i64, camera: &str, glimpse: &QuadObservation) -> bool {
-        if let (Some(a), Some(b)) = (&track.place, &glimpse.place) {
+    fn lies_there(&self, track: &Track, at_ns: i64, camera: &str, quad: &QuadObservation) -> bool {
+        if let (Some(a), Some(b)) = (&track.place, &quad.place) {
             return same_place(a, b, &self.p);
         }
         // A resumed track has no last frame: appearance alone does not locate it.
@@ -135,7 +135,7 @@ impl ViewTracker {
         let gap_s = at_ns.saturating_sub(last.at_ns) as f64 * 1e-9;
         last.camera == camera
             && (0.0..=self.p.gap_s).contains(&gap_s)
-            && iou(last.corners_px.points(), glimpse.corners_px.points()) >= self.p.min_iou
+            && iou(last.corners_px.points(), quad.corners_px.points()) >= self.p.min_iou
     }
 
     fn of_landmark(&mut self, id: LandmarkId) -> Result<usize, TrackOutcome> {
@@ -154,20 +154,20 @@ impl ViewTracker {
         Ok(self.tracks.len() - 1)
     }
 
-    fn taken(&mut self, i: usize, at_ns: i64, camera: &str, glimpse: &QuadObservation) -> TrackOutcome {
+    fn taken(&mut self, i: usize, at_ns: i64, camera: &str, quad: &QuadObservation) -> TrackOutcome {
         let Some(track) = self.tracks.get_mut(i) else { return TrackOutcome::AppearanceMismatch };
         track.sightings = track.sightings.saturating_add(1);
         track.last = Some(Last {
             at_ns,
             camera: camera.to_owned(),
-            corners_px: glimpse.corners_px,
-            icon: glimpse.icon.clone(),
+            corners_px: quad.corners_px,
+            icon: quad.icon.clone(),
         });
-        track.place = glimpse.place.or(track.place);
+        track.place = quad.place.or(track.place);
         if track.closed {
             return TrackOutcome::Decided;
         }
-        if track.landmark.is_none() && glimpse.identity != Identity::Stranger {
+        if track.landmark.is_none() && quad.identity != Identity::Stranger {
             track.known = track.known.saturating_add(1);
             return TrackOutcome::KnownLandmark;
         }
@@ -177,13 +177,13 @@ impl ViewTracker {
         if track.views.len() >= MAX_TRACK_VIEWS {
             return TrackOutcome::Full;
         }
-        let digest = ViewSummary::new(&glimpse.corners_px, &glimpse.icon.icon);
+        let summary = ViewSummary::new(&quad.corners_px, &quad.icon.icon);
         let late = track.views.len() >= MAX_TRACK_VIEWS / 2;
         let needed = if late { self.p.late_novelty } else { 1.0 };
-        match most_alike(&digest, &track.views, &self.p.thinning) {
+        match most_alike(&summary, &track.views, &self.p.thinning) {
             Some((_, novelty)) if novelty < needed => TrackOutcome::NearDuplicate,
             _ => {
-                track.keep(digest, &glimpse.icon);
+                track.keep(summary, &quad.icon);
                 TrackOutcome::Keep(track.number)
             }
         }

@@ -34,10 +34,6 @@ pub struct VisibilityMap {
     obstacles: Vec<Obstacle>,
 }
 
-/// The visibility map of a landmark among `obstacles`: `O(M log M)` in those within reach.
-///
-/// A landmark that an obstacle cuts is seen from nowhere; neither is one that the camera cannot show large enough, or
-/// whole. Its roll counts for nothing.
 // Departs from method 12: no polygon Booleans, see the module `visibility`; the area is the same. Free space is not an
 // input, since walls hide what they enclose. Every condition applies to the landmark moved off its wall, not only
 // occlusion: a difference of 5 cm.

@@ -31,7 +31,7 @@ pub struct CoverageGap {
     pub to_m: f64,
 }
 
-/// What is seen along a path.
+/// Visible landmarks and gaps along a path.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Coverage {
     /// Length of the path, metres.
@@ -45,8 +45,8 @@ pub struct Coverage {
 impl Coverage {
     /// Share of the samples with a visible landmark, 0 to 1.
     pub fn share(&self) -> f64 {
-        let seen = self.steps.iter().filter(|s| !s.landmarks.is_empty()).count();
-        seen as f64 / self.steps.len().max(1) as f64
+        let covered = self.steps.iter().filter(|s| !s.landmarks.is_empty()).count();
+        covered as f64 / self.steps.len().max(1) as f64
     }
 }
 
@@ -72,20 +72,20 @@ pub fn coverage(
         let heading = (leg[1].y - leg[0].y).atan2(leg[1].x - leg[0].x);
         while next <= before + length && length > 0.0 {
             let position = leg[0] + (leg[1] - leg[0]) * ((next - before) / length);
-            steps.push(seen(next, position, Some(heading), maps));
+            steps.push(sample(next, position, Some(heading), maps));
             next += step_m;
         }
         before += length;
     }
     let heading = path.windows(2).rev().map(|w| w[1] - w[0]).find(|d| d.norm() > 0.0).map(|d| d.y.atan2(d.x));
     if let Some(end) = path.last() {
-        steps.push(seen(length_m, *end, heading, maps));
+        steps.push(sample(length_m, *end, heading, maps));
     }
     let gaps = gaps(&steps);
     Ok(Coverage { length_m, steps, gaps })
 }
 
-fn seen(
+fn sample(
     along_m: f64,
     position: Point2<f64>,
     heading_rad: Option<f64>,

@@ -90,7 +90,7 @@ impl Envelope {
         &self.0
     }
 
-    /// Its value at a slope; where two pieces end, the larger. None where nothing bounds.
+    /// Its value at a slope; at the common end of two pieces, the larger. `None` without a bound.
     pub(super) fn at(&self, slope: f64) -> Option<f64> {
         let next = self.0.partition_point(|p| p.from <= slope);
         let before = self.0[..next].iter().rev().take(2);
@@ -159,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_covered_vanishes_and_gaps_stay() {
+    fn covered_pieces_vanish_and_gaps_stay() {
         let e = Envelope::upper(vec![
             piece(0.0, 0.5, 1.0, 1.0),
             piece(0.1, 0.2, 0.5, 0.5),
@@ -177,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_too_steep_is_cut_off() {
+    fn pieces_beyond_the_largest_slope_are_cut() {
         let p = piece(-3.0, 0.5, 0.0, 3.5);
         assert!((p.from + 1.0).abs() < 1e-15 && (p.at(0.0) - 3.0).abs() < 1e-12);
         assert_eq!(Piece::through((1.0, 1.0), (2.0, 1.0)), None);

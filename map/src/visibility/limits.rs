@@ -19,8 +19,8 @@ const GOLDEN: f64 = 0.618_033_988_749_895;
 
 /// The conditions of one landmark for one camera.
 ///
-/// The camera is at (r cos d, r sin d, -rise) from the landmark's middle, direction d from its normal on the floor. The
-/// normal is n = (cos t, 0, -sin t), its height runs along u = (sin t, 0, cos t), its width along (0, 1, 0).
+/// The camera is at (r cos d, r sin d, -rise) from the landmark's middle, direction d from its normal on the floor.
+/// The normal is n = (cos t, 0, -sin t), its height runs along u = (sin t, 0, cos t), its width along (0, 1, 0).
 // Departs from method 12.1 to 12.3: these are its conditions in space. For a landmark at the camera's height, on a
 // wall, they are those of the plan view; high up on a wall the plan view takes the landmark for nearer and less
 // oblique than it is.
@@ -41,7 +41,7 @@ pub(super) struct Limits {
 
 /// Nearest and farthest distance on the floor at which the unit can tilt towards the landmark's centre, metres.
 fn tilt_range_m(rise_m: f64, [low, high]: [f64; 2]) -> Option<(f64, f64)> {
-    // Looking down at a landmark is looking up at its mirror image.
+    // A view down at a landmark is a view up at its mirror image.
     let (rise, low, high) = if rise_m < 0.0 { (-rise_m, -high, -low) } else { (rise_m, low, high) };
     if rise < 1e-9 {
         return (low <= 0.0 && high >= 0.0).then_some((0.0, f64::INFINITY));
@@ -78,7 +78,7 @@ impl Limits {
         self.wide_m.min(self.high_m).min(self.tilt_m.1)
     }
 
-    /// Range of distances in a direction at which a camera sees the landmark, metres.
+    /// Range of distances in a direction at which the landmark is visible, metres.
     pub(super) fn span_m(&self, direction_rad: f64) -> Option<(f64, f64)> {
         let (sine, cosine) = direction_rad.sin_cos();
         let (near, far) = self.upright_m(cosine)?;
@@ -125,7 +125,7 @@ impl Limits {
         let (sin_tilt, cos_tilt) = self.tilt;
         let LandmarkSize { width_m, height_m } = self.size;
         let by_width = (width_m * cosine.abs() + height_m * (sin_tilt * sine).abs()) / self.room[0];
-        // height / D + width |rise sin d| / D^2 = room.
+        // height / D + width |rise sin d| / D^2 = height of the image that may be filled.
         let height = height_m * cos_tilt.hypot(sin_tilt * cosine);
         let lying = width_m * (self.rise_m * sine).abs();
         let by_height =
@@ -134,7 +134,6 @@ impl Limits {
         (distance * distance - self.rise_m.powi(2)).max(0.0).sqrt()
     }
 
-    /// The part of a span in which it is high enough.
     // Behind and below a landmark tilted by 20 to 40 degrees the apparent height is not monotonic at very oblique
     // views: it dips by at most 12 %. Such a dip is not cut out.
     /// The part of a range in which it is high enough.
@@ -160,10 +159,10 @@ impl Limits {
 
     /// Distance within a range at which the height appears largest.
     fn highest_m(&self, cosine: f64, (mut near, mut far): (f64, f64)) -> f64 {
-        let looks = |r: f64| self.height_m2(cosine, r) / (r * r + self.rise_m.powi(2)).powi(2);
+        let apparent = |r: f64| self.height_m2(cosine, r) / (r * r + self.rise_m.powi(2)).powi(2);
         for _ in 0..HALVINGS {
             let part = GOLDEN * (far - near);
-            if looks(far - part) >= looks(near + part) {
+            if apparent(far - part) >= apparent(near + part) {
                 far = near + part;
             } else {
                 near = far - part;
@@ -196,7 +195,7 @@ mod tests {
         assert!((near - 1.0 / 0.5_f64.tan()).abs() < 1e-12 && far.is_infinite());
         let (near, far) = tilt_range_m(-1.0, [-0.5, -0.1]).unwrap();
         assert!((near - 1.0 / 0.5_f64.tan()).abs() < 1e-12 && (far - 1.0 / 0.1_f64.tan()).abs() < 1e-12);
-        assert_eq!(tilt_range_m(1.0, [-0.5, -0.1]), None, "it hangs above, the unit looks down");
+        assert_eq!(tilt_range_m(1.0, [-0.5, -0.1]), None, "it is above, the unit tilts down");
         assert_eq!(tilt_range_m(0.0, [0.1, 0.2]), None);
         assert_eq!(tilt_range_m(0.0, [-0.1, 0.2]), Some((0.0, f64::INFINITY)));
     }
@@ -222,8 +221,8 @@ mod tests {
     }
 
     #[test]
-    fn high_on_a_wall_one_must_step_back() {
-        // By hand: 1 m above the camera it is seen by less than 75 degrees from r > 1 / tan 75 on, straight ahead.
+    fn high_on_a_wall_it_is_visible_from_a_distance_only() {
+        // By hand: 1 m above the camera the view angle is below 75 degrees from r > 1 / tan 75 on, straight ahead.
         let limits = limits(0.0, 2.2);
         let (near, far) = limits.span_m(0.0).unwrap();
         let fits: f64 = 0.6 / (0.9 * 480.0 / 512.0);

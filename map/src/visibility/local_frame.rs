@@ -32,7 +32,7 @@ impl LocalFrame {
     }
 }
 
-/// A landmark as it is looked at: moved along its normal by the standoff.
+/// The landmark moved along its normal by the standoff.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Moved {
     /// Of its middle above the floor.

@@ -111,8 +111,8 @@ pub(super) fn outline(frame: &LocalFrame, quarters: &[Quarter; 4]) -> Vec<Polygo
     closed(runs).into_iter().filter_map(|(run, round)| run.polygon(frame, round)).collect()
 }
 
-/// The last run goes on with the first where both reach the direction at which directions begin; one that meets itself
-/// there goes all round.
+/// The last run goes on with the first where both reach the direction at which directions begin; one that meets
+/// itself there goes all round.
 fn closed(mut runs: Vec<Run>) -> Vec<(Run, bool)> {
     let begins = runs.first().is_some_and(|r| r.from <= -MAX_SLOPE + SAME);
     let ends = runs.last().is_some_and(|r| r.to >= direction(3, MAX_SLOPE) - SAME);
@@ -157,7 +157,7 @@ impl Strip<'_> {
     /// Adds it to the last run if that ends where this begins.
     fn join(self, runs: &mut Vec<Run>) {
         let Self { quarter, outer, inner, from, to } = self;
-        // Room is left where the inner bound has the larger inverse.
+        // The strip is open where the inner bound has the larger inverse.
         let room = |slope: f64| inner.map_or(f64::INFINITY, |i| i.at(slope) - outer.at(slope));
         let (first, last) = (room(from), room(to));
         if first <= 0.0 && last <= 0.0 {

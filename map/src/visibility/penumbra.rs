@@ -81,11 +81,11 @@ fn straight(from: Vector2<f64>, along: Vector2<f64>, times: f64) -> Option<Piece
     if first >= last {
         return None;
     }
-    let seen = |t: f64| {
+    let projected = |t: f64| {
         let v = from + along * t;
         if t.is_finite() { (v.y / v.x, 1.0 / v.x) } else { (along.y / along.x, 0.0) }
     };
-    Piece::through(seen(first), seen(last))
+    Piece::through(projected(first), projected(last))
 }
 
 #[cfg(test)]
@@ -93,7 +93,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_touches_the_footprint() {
+    fn segments_that_touch_the_footprint() {
         let flat = Footprint { half_depth_m: 0.0, half_width_m: 0.3 };
         let deep = Footprint { half_depth_m: 0.2, half_width_m: 0.3 };
         let touch = |f: &Footprint, ax, ay, bx, by| f.touches(&Point2::new(ax, ay), &Point2::new(bx, by));

@@ -5,7 +5,8 @@ use super::{Obstacle, PanTiltCamera, VisibilityParams};
 use crate::place::LandmarkPlace;
 use nalgebra::{Point2, Point3, Vector3};
 
-/// Whether a camera at `q` sees the whole landmark, large enough, not too obliquely, with no obstacle between.
+/// Whether the whole landmark is visible for a camera at `q`: large enough, not too oblique, without an obstacle
+/// between.
 pub fn sees(
     place: &LandmarkPlace,
     obstacles: &[Obstacle],

@@ -58,7 +58,7 @@ mod tests {
     use crate::visibility::quarter_turn::turned_back;
 
     #[test]
-    fn each_quarter_looks_along_its_axis() {
+    fn each_quarter_is_bounded_about_its_axis() {
         for quarter in 0..4 {
             let angle = quarter as f64 * FRAC_PI_2 + 0.3;
             let p = Point2::new(2.0 * angle.cos(), 2.0 * angle.sin());

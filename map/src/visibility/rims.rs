@@ -26,15 +26,15 @@ pub(super) struct Rims {
     pub open: Vec<(f64, f64)>,
 }
 
-/// What is allowed in one direction.
+/// The allowed range of distances in one direction.
 #[derive(Clone, Copy)]
-struct Look {
+struct Span {
     slope: f64,
     near_m: f64,
     far_m: f64,
 }
 
-impl Look {
+impl Span {
     /// A point at this distance, as (slope, inverse).
     fn point(&self, distance_m: f64) -> (f64, f64) {
         (self.slope, self.slope.hypot(1.0) / distance_m)
@@ -59,14 +59,14 @@ pub(super) fn rims(limits: &Limits, ahead_rad: f64) -> Rims {
 }
 
 impl Follower<'_> {
-    fn look(&self, slope: f64) -> Option<Look> {
+    fn span(&self, slope: f64) -> Option<Span> {
         let (near_m, far_m) = self.limits.span_m(self.ahead_rad + slope.atan())?;
         let near_m = near_m.max(MIN_NEAR_M);
-        (near_m < far_m).then_some(Look { slope, near_m, far_m })
+        (near_m < far_m).then_some(Span { slope, near_m, far_m })
     }
 
     fn between(&mut self, from: f64, to: f64, depth: u32) {
-        match (self.look(from), self.look(to)) {
+        match (self.span(from), self.span(to)) {
             (Some(a), Some(b)) => self.follow(a, b, depth),
             (Some(a), None) => self.follow(a, self.edge(a, to), depth),
             (None, Some(b)) => self.follow(self.edge(b, from), b, depth),
@@ -74,28 +74,28 @@ impl Follower<'_> {
         }
     }
 
-    /// The last direction in which something is seen, on the way to one in which nothing is.
-    fn edge(&self, mut seen: Look, mut unseen: f64) -> Look {
+    /// The last direction with an allowed range, between one with and one without.
+    fn edge(&self, mut visible: Span, mut hidden: f64) -> Span {
         for _ in 0..EDGE_HALVINGS {
-            let middle = 0.5 * (seen.slope + unseen);
-            match self.look(middle) {
-                Some(look) => seen = look,
-                None => unseen = middle,
+            let middle = 0.5 * (visible.slope + hidden);
+            match self.span(middle) {
+                Some(span) => visible = span,
+                None => hidden = middle,
             }
         }
-        seen
+        visible
     }
 
-    fn follow(&mut self, a: Look, b: Look, depth: u32) {
+    fn follow(&mut self, a: Span, b: Span, depth: u32) {
         let slope = 0.5 * (a.slope + b.slope);
-        let Some(middle) = self.look(slope) else {
+        let Some(middle) = self.span(slope) else {
             if let Some(less) = depth.checked_sub(1) {
                 self.between(a.slope, slope, less);
                 self.between(slope, b.slope, less);
             }
             return;
         };
-        let leaves = |of: fn(&Look) -> f64| {
+        let leaves = |of: fn(&Span) -> f64| {
             let chord = 0.5 * (a.point(of(&a)).1 + b.point(of(&b)).1);
             (middle.slope.hypot(1.0) / chord - of(&middle)).abs() > MAX_SAGITTA_M
         };
@@ -106,7 +106,7 @@ impl Follower<'_> {
         }
         self.made.far.extend(Piece::through(a.point(a.far_m), b.point(b.far_m)));
         self.made.near.extend(Piece::through(a.point(a.near_m), b.point(b.near_m)));
-        #[expect(clippy::float_cmp, reason = "the end of one look is the very beginning of the next")]
+        #[expect(clippy::float_cmp, reason = "the end of one span is the very beginning of the next")]
         match self.made.open.last_mut() {
             Some(last) if last.1 == a.slope => last.1 = b.slope,
             _ => self.made.open.push((a.slope, b.slope)),
@@ -128,7 +128,7 @@ mod tests {
         for tilt_rad in [0.0, 0.5, 1.1, FRAC_PI_2, -0.8] {
             let moved = Moved { height_m: 1.2 + 1.3_f64.copysign(tilt_rad), tilt_rad, size };
             let limits = Limits::new(&moved, &viewer, &VisibilityParams::default()).unwrap();
-            let mut seen = 0;
+            let mut visible = 0;
             for quarter in 0..4 {
                 let ahead = f64::from(quarter) * FRAC_PI_2;
                 let rims = rims(&limits, ahead);
@@ -139,13 +139,13 @@ mod tests {
                     let open = rims.open.iter().any(|(from, to)| (*from..=*to).contains(&slope));
                     assert_eq!(open, span.is_some(), "{tilt_rad} {quarter} {slope}");
                     let Some((nearest, furthest)) = span else { continue };
-                    seen += 1;
+                    visible += 1;
                     let distance = |e: &Envelope| slope.hypot(1.0) / e.at(slope).unwrap();
                     assert!((distance(&far) - furthest).abs() < 2.0 * MAX_SAGITTA_M, "{tilt_rad} {slope}");
                     assert!((distance(&near) - nearest).abs() < 2.0 * MAX_SAGITTA_M, "{tilt_rad} {slope}");
                 }
             }
-            assert!(seen > 100, "{tilt_rad}: {seen}");
+            assert!(visible > 100, "{tilt_rad}: {visible}");
         }
     }
 }

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_PI_2;
 use vision::pose::LandmarkSize;
 
-/// The camera that should see landmarks.
+/// The camera from which landmarks are to be visible.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct PanTiltCamera {

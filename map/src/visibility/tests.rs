@@ -46,7 +46,7 @@ fn wall(ax: f64, ay: f64, bx: f64, by: f64) -> Obstacle {
     Obstacle { a: Point2::new(ax, ay), b: Point2::new(bx, by), height_m: None }
 }
 
-fn seen_among(obstacles: &[Obstacle]) -> VisibilityMap {
+fn area_among(obstacles: &[Obstacle]) -> VisibilityMap {
     visibility(&poster(), obstacles, &PanTiltCamera::default(), &VisibilityParams::default()).unwrap()
 }
 
@@ -59,10 +59,10 @@ fn ceiling_sign(obstacles: &[Obstacle]) -> VisibilityMap {
 }
 
 #[test]
-fn a_sign_under_the_ceiling_is_seen_from_a_ring() {
+fn a_sign_under_the_ceiling_is_visible_from_a_ring() {
     let map = ceiling_sign(&[]);
     // By hand: the unit reaches it from rise / tan 1 on; towards the top of the sign its height is foreshortened,
-    // 512 * 0.6 * rise / (r^2 + rise^2) = 75. It is taken to hang 5 cm below the ceiling.
+    // 512 * 0.6 * rise / (r^2 + rise^2) = 75. The standoff moves it 5 cm below the ceiling.
     let rise: f64 = 1.25;
     let (near, far) = (rise / 1.0_f64.tan(), (512.0 * 0.6 / 75.0 * rise - rise * rise).sqrt());
     for quarter in 0..4 {
@@ -85,13 +85,13 @@ fn a_sign_under_the_ceiling_is_seen_from_a_ring() {
 
 #[test]
 fn a_wall_cuts_the_ring_under_the_ceiling() {
-    // Behind a long wall beside the sign nothing is seen; before it what was seen is.
+    // A long wall beside the sign cuts off the area behind it and leaves that in front of it.
     let wall = |x: f64| Obstacle { a: Point2::new(x, -9.0), b: Point2::new(x, 9.0), height_m: None };
     let map = ceiling_sign(&[wall(5.5)]);
     assert!(map.contains(&Point2::new(5.45, 3.0)) && !map.contains(&Point2::new(5.55, 3.0)));
     assert!(map.contains(&Point2::new(2.4, 3.0)));
     assert_eq!(map.polygons().len(), 1);
-    assert!(!map.polygons()[0].hole.is_empty(), "all round it all the same");
+    assert!(!map.polygons()[0].hole.is_empty(), "still all round it");
     let through = ceiling_sign(&[wall(3.9)]);
     assert!(through.area_m2() <= 0.0, "a wall cuts the sign itself");
     let beyond = ceiling_sign(&[wall(3.3), wall(4.7)]);
@@ -100,8 +100,8 @@ fn a_wall_cuts_the_ring_under_the_ceiling() {
 
 #[test]
 fn the_open_area_is_two_discs_and_a_cone() {
-    // By hand: alone on its wall a poster as wide as high is seen in the disc tangent to the wall, cut by the cone,
-    // less the discs of what does not fit. Polar about the centre: r from max(0, ...) to D cos(psi).
+    // By hand: alone on its wall a poster as wide as high is visible in the disc tangent to the wall, cut by the
+    // cone, less the discs where it does not fit. Polar about the centre: r from max(0, ...) to D cos(psi).
     let landmark = place(0.0, 0.0, 1.2, 0.0, (0.6, 0.6));
     let viewer = PanTiltCamera { height_px: 640.0, ..PanTiltCamera::default() };
     let p = VisibilityParams { standoff_m: 0.001, ..VisibilityParams::default() };
@@ -124,7 +124,7 @@ fn the_open_area_is_two_discs_and_a_cone() {
 fn a_pillar_casts_its_full_penumbra() {
     // By hand: the landmark is 0.6 m wide at x = 0.05; a pillar 0.2 m wide at x = 0.85 hides some part of it from x =
     // 2.45 within |y| < 0.1 + 2 (0.1 + 0.3), by the crossing tangents.
-    let map = seen_among(&[wall(0.85, -0.1, 0.85, 0.1)]);
+    let map = area_among(&[wall(0.85, -0.1, 0.85, 0.1)]);
     let edge = 0.1 + 2.0 * 0.4;
     for side in [-1.0, 1.0] {
         assert!(!map.contains(&Point2::new(2.45, side * (edge - 1e-6))));
@@ -135,54 +135,54 @@ fn a_pillar_casts_its_full_penumbra() {
 }
 
 #[test]
-fn what_stands_aside_behind_or_is_low_hides_nothing() {
-    let open = seen_among(&[]).area_m2();
+fn obstacles_beside_behind_or_low_hide_nothing() {
+    let open = area_among(&[]).area_m2();
     let own_wall = wall(0.0, -9.0, 0.0, 9.0);
     let low = Obstacle { height_m: Some(1.0), ..wall(1.5, -0.5, 1.5, 0.5) };
     for o in [own_wall, wall(-1.0, -1.0, -1.0, 1.0), wall(6.0, -5.0, 6.0, 5.0), low] {
-        assert!((seen_among(&[o]).area_m2() - open).abs() < 1e-9, "{o:?}");
+        assert!((area_among(&[o]).area_m2() - open).abs() < 1e-9, "{o:?}");
     }
     let high = Obstacle { height_m: Some(1.1), ..low };
-    assert!(seen_among(&[high]).area_m2() < 0.8 * open);
+    assert!(area_among(&[high]).area_m2() < 0.8 * open);
 }
 
 #[test]
-fn what_cuts_the_landmark_hides_it_all() {
+fn an_obstacle_that_cuts_the_landmark_hides_it() {
     for o in [wall(-1.0, 0.1, 2.0, 0.1), wall(0.05, -0.2, 0.05, 0.2), wall(-0.1, -0.1, 0.3, 0.5)] {
-        let map = seen_among(&[o]);
+        let map = area_among(&[o]);
         assert!(map.polygons().is_empty() && map.centroid().is_none(), "{o:?}");
         assert!(map.area_m2() <= 0.0 && !map.contains(&Point2::new(2.0, 0.0)));
         assert!(map.margin_m(&Point2::new(2.0, 0.0)).is_infinite());
     }
-    assert!(!seen_among(&[wall(-1.0, 0.31, 2.0, 0.31)]).polygons().is_empty(), "beside it");
+    assert!(!area_among(&[wall(-1.0, 0.31, 2.0, 0.31)]).polygons().is_empty(), "beside it");
 }
 
 #[test]
 fn at_the_end_of_a_wall_the_corner_hides_one_side() {
     // The wall turns towards the viewer right beside the landmark.
-    let map = seen_among(&[wall(0.0, -4.0, 0.0, 0.31), wall(0.0, 0.31, 4.0, 0.31)]);
+    let map = area_among(&[wall(0.0, -4.0, 0.0, 0.31), wall(0.0, 0.31, 4.0, 0.31)]);
     assert!(!map.contains(&Point2::new(2.0, 0.5)));
     assert!(map.contains(&Point2::new(2.0, -0.5)) && map.contains(&Point2::new(2.0, 0.29)));
 }
 
 #[test]
-fn a_camera_between_or_behind_walls_sees_nothing() {
+fn between_and_behind_walls_nothing_is_visible() {
     let room = [wall(3.0, -3.0, 3.0, 3.0), wall(3.1, 3.0, 3.1, -3.0)];
-    let map = seen_among(&room);
+    let map = area_among(&room);
     assert!(map.contains(&Point2::new(2.9, 0.0)));
     assert!(!map.contains(&Point2::new(3.05, 0.0)) && !map.contains(&Point2::new(3.3, 0.0)));
     assert!(!map.contains(&Point2::new(-2.0, 0.0)), "behind its own wall");
 }
 
 #[test]
-fn it_moves_with_the_map() {
+fn the_area_moves_with_the_map_frame() {
     let p = VisibilityParams::default();
-    let seen = |seed| {
+    let scene = |seed| {
         let (landmark, obstacles, viewer) = random_map(seed);
         let map = visibility(&landmark, &obstacles, &viewer, &p).unwrap();
         (map.area_m2() > 1.0).then_some((landmark, obstacles, viewer, map))
     };
-    let (landmark, obstacles, viewer, here) = (0..40).find_map(seen).unwrap();
+    let (landmark, obstacles, viewer, here) = (0..40).find_map(scene).unwrap();
     let by = Pose2::new(12.0, -7.0, 2.0);
     let moved: Vec<_> = obstacles
         .iter()
@@ -202,7 +202,7 @@ fn it_moves_with_the_map() {
 
 #[test]
 fn margin_is_the_distance_to_the_boundary() {
-    let map = seen_among(&[wall(3.0, -9.0, 3.0, 9.0)]);
+    let map = area_among(&[wall(3.0, -9.0, 3.0, 9.0)]);
     assert!((map.margin_m(&Point2::new(2.8, 0.0)) - 0.2).abs() < 1e-9);
     assert!((map.margin_m(&Point2::new(3.2, 0.0)) + 0.2).abs() < 1e-9);
 }
@@ -210,7 +210,7 @@ fn margin_is_the_distance_to_the_boundary() {
 #[test]
 fn probability_is_the_share_of_the_gaussian_inside() {
     // Oracle: the normal distribution across one straight edge.
-    let map = seen_among(&[wall(3.0, -9.0, 3.0, 9.0)]);
+    let map = area_among(&[wall(3.0, -9.0, 3.0, 9.0)]);
     let at = |x: f64, sigma: f64| {
         let covariance = Matrix3::from_diagonal(&Vector3::new(sigma * sigma, 1e-6, 1e-4));
         let pose = Pose2Covariance { pose: Pose2::new(x, 0.0, 3.0), covariance };
@@ -230,8 +230,8 @@ fn probability_is_the_share_of_the_gaussian_inside() {
 }
 
 #[test]
-fn a_camera_that_cannot_pan_there_does_not_see_it() {
-    let map = seen_among(&[]);
+fn beyond_the_pan_range_a_landmark_is_invisible() {
+    let map = area_among(&[]);
     let chance = |theta: f64| {
         let covariance = Matrix3::from_diagonal(&Vector3::new(1e-6, 1e-6, 1e-4));
         let pose = Pose2Covariance { pose: Pose2::new(2.5, 0.0, theta), covariance };
@@ -244,7 +244,7 @@ fn a_camera_that_cannot_pan_there_does_not_see_it() {
 
 #[test]
 fn coverage_names_landmarks_and_gaps() {
-    let (a, b) = (seen_among(&[]), {
+    let (a, b) = (area_among(&[]), {
         let far = place(20.0, 0.0, 1.5, 0.0, (0.6, 0.84));
         visibility(
             &far,
@@ -278,7 +278,7 @@ fn coverage_names_landmarks_and_gaps() {
 }
 
 #[test]
-fn bounds_are_held_and_named() {
+fn values_out_of_range_are_refused_with_their_field() {
     let with = |viewer: PanTiltCamera, p: VisibilityParams| {
         visibility(&poster(), &[], &viewer, &p).map(|_| ()).map_err(|e| e.field)
     };
@@ -290,12 +290,12 @@ fn bounds_are_held_and_named() {
     assert_eq!(with(v(), VisibilityParams { max_incidence_rad: 1.5, ..p() }), Err("max_incidence_rad"));
     assert_eq!(with(v(), VisibilityParams { standoff_m: 0.0, ..p() }), Err("standoff_m"));
     let nowhere = with(PanTiltCamera { tilt_rad: [-0.3, -0.2], ..v() }, p());
-    assert_eq!(nowhere, Ok(()), "seen from nowhere is an answer");
+    assert_eq!(nowhere, Ok(()), "an empty area is a result");
 }
 
 #[test]
 fn as_geojson() {
-    let feature = seen_among(&[wall(3.0, -9.0, 3.0, 9.0)]).feature("poster-1");
+    let feature = area_among(&[wall(3.0, -9.0, 3.0, 9.0)]).feature("poster-1");
     assert_eq!((feature.kind, feature.geometry.kind), ("Feature", "MultiPolygon"));
     let ring = &feature.geometry.coordinates[0][0];
     assert_eq!(ring.first(), ring.last());
@@ -312,7 +312,7 @@ fn only_the_nearest_obstacles_count_beyond_the_bound() {
     let p = VisibilityParams::default();
     assert!(within_reach(&poster(), &many, &PanTiltCamera::default(), &p).contains(&far));
     many.push(wall(1.0, 2.0, 1.0, 2.1));
-    let kept = within_reach(&poster(), &many, &PanTiltCamera::default(), &p);
-    assert_eq!(kept.len(), MAX_OBSTACLES);
-    assert!(!kept.contains(&far));
+    let within_limit = within_reach(&poster(), &many, &PanTiltCamera::default(), &p);
+    assert_eq!(within_limit.len(), MAX_OBSTACLES);
+    assert!(!within_limit.contains(&far));
 }

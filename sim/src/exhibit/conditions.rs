@@ -15,7 +15,7 @@ pub struct Shadow {
     pub offset: f64,
 }
 
-/// How the picture is seen.
+/// Viewpoint, light, cover, sensor and compression.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Conditions {
@@ -26,9 +26,9 @@ pub struct Conditions {
     pub pitch_rad: f64,
     /// Roll of the camera.
     pub roll_rad: f64,
-    /// Square root of the area that the picture would have seen from the front at the same distance, in pixels.
+    /// Square root of the area that the picture would have from the front at the same distance, in pixels.
     pub size_px: f64,
-    /// The picture's centre from the image's, in pixels.
+    /// Offset of the picture's centre from the image's, in pixels.
     pub aim_px: [f64; 2],
     /// Share of the light that is lost from the bright side of the picture to the other, 0 to 1.
     pub side_light: f64,
@@ -36,15 +36,15 @@ pub struct Conditions {
     pub side_light_rad: f64,
     /// A shadow on wall and picture.
     pub shadow: Option<Shadow>,
-    /// Share of the picture's area that something stands before, a plain rectangle in its middle, 0 to 1.
+    /// Share of the picture's area that a plain rectangle in its middle hides, 0 to 1.
     pub cover: f64,
     /// Its brightness, 0 to 255.
     pub cover_grey: f64,
-    /// Exposure, lens, noise.
+    /// Exposure, lens and noise of the sensor.
     pub sensor: SensorParams,
-    /// Quality of the JPEG that the image was sent as, 1 to 100; `None`: not compressed.
+    /// Quality of JPEG compression, 1 to 100; `None`: none.
     pub jpeg: Option<u8>,
-    /// How bright the wall is, as a share of its plaster's own brightness.
+    /// Brightness of the wall, as a share of its plaster's own.
     pub wall: f64,
 }
 
@@ -69,8 +69,8 @@ impl Default for Conditions {
 }
 
 impl Conditions {
-    /// What a robot's camera makes of any view: a little off the level, a little blur, noise and compression, light
-    /// not quite that of the lesson. Every draw is another.
+    /// Typical conditions of a robot's camera: slightly tilted, with some blur, noise and compression, and light
+    /// that differs a little from that of the lesson. Another `draw` gives other conditions.
     pub fn realistic(draw: u64) -> Self {
         let mut rng = seed::stream(draw, 0x6578_6869);
         let mut within = |low: f64, high: f64| rng.random_range(low..=high);

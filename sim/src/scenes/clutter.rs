@@ -1,6 +1,6 @@
 //! Distractors of a scene: the surfaces of the room with their patterns and joints, columns, rails, radiators,
 //! shelves, pipes, patches of light, people. Whole walls, floors and columns are not listed: their lines meet by
-//! chance. Objects with four sides of their own (cupboards, plates, lamps) are listed as neither missed nor false.
+//! chance. Objects that are quads (cupboards, plates, lamps) are listed as neither missed nor false.
 
 use nalgebra::Vector3;
 use rand::RngExt;
@@ -12,7 +12,7 @@ use super::stage::{Stage, spread};
 use crate::canvas::Noise;
 use crate::seed;
 
-/// How a surface looks: its grey, roughness, and pattern.
+/// Grey, roughness and pattern of a surface.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Finish {
     pub(super) grey: f32,
@@ -20,7 +20,7 @@ pub(super) struct Finish {
     pattern: Pattern,
 }
 
-/// Joints and the like; sizes in metres, then how much the joint differs.
+/// Joints and the like: sizes in metres, then the difference in grey of the joint.
 #[derive(Debug, Clone, Copy)]
 enum Pattern {
     Plain,
@@ -70,7 +70,7 @@ impl Finish {
         Self { grey: stage.grey(0.5, 0.97), rough: 0.02, pattern }
     }
 
-    /// Paints a rectangle of a plane with it, and `over` metres beyond.
+    /// Paints a rectangle of a plane, and `over` metres beyond it.
     pub(super) fn paint(&self, stage: &mut Stage, plane: &Plane, rect: Rect, over: f64) {
         let noise = Noise::new(stage.rng.random(), 3, 4);
         let key: u64 = stage.rng.random();
@@ -169,7 +169,7 @@ pub(super) fn strips(stage: &mut Stage, plane: &Plane, [x0, y0, x1, y1]: Rect, w
     }
 }
 
-/// Radiators, shelves, plates, patches of light where nothing hangs.
+/// Radiators, shelves, plates, patches of light at free places.
 pub(super) fn fittings(stage: &mut Stage, plane: &Plane, all: Rect, taken: &[Rect], wall: f32) {
     let tries = stage.rng.random_range(0..=4);
     for _ in 0..tries {
@@ -250,7 +250,7 @@ fn plate(stage: &mut Stage, plane: &Plane, rect: Rect, wall: f32) {
 fn letters(stage: &mut Stage, plane: &Plane, rect: Rect, wall: f32) {
     let (w, h) = (rect[2] - rect[0], rect[3] - rect[1]);
     let sheet = pictures::sheet(&mut stage.rng, h / w, wall);
-    // Only the type is painted: the ground is the wall itself.
+    // Only the letters are painted: the ground is the wall itself.
     let ground = (wall * 255.0 + 0.5).floor() / 255.0;
     let type_of = spread(rect, &sheet, [0.0, 1.0]);
     stage.painter.tint(plane, &corners(rect), |at, f| type_of(at, f) - ground);
@@ -326,7 +326,7 @@ pub(super) fn lamps(stage: &mut Stage, plane: &Plane, [width, _, deep]: [f64; 3]
     }
 }
 
-/// Something round or a person between the camera and the wall.
+/// A round object or a person between the camera and the wall.
 pub(super) fn occluder(stage: &mut Stage, room: &Room, planes: &[Plane; 6]) {
     let depth = stage.between(0.15, 0.6) * room.size_m[2].min(3.0);
     let plane = planes[0].raised(depth);

@@ -1,9 +1,9 @@
-//! The rendered set for training: rooms photographed from everywhere, with framed pictures, posters, doors, windows,
-//! signs and boards on their walls, and with whatever else makes lines there. Seed in, pictures with exact truth out;
-//! the same parameters and pictures give the same bytes. Writes no files and trains nothing.
+//! The rendered set for training: rooms from all viewpoints, with framed pictures, posters, doors, windows, signs
+//! and boards on their walls, and with clutter that makes lines. Seed in, pictures with exact truth out; the same
+//! parameters and pictures give the same bytes. Writes no files.
 //!
-//! Unlike `views`, rooms vary widely and are not realistic. Planes are painted over each other without ray casting, so
-//! shadows are painted, too.
+//! Unlike `views`, rooms vary widely and are not realistic. Planes are painted over each other without ray casting,
+//! so shadows are painted, too.
 
 mod clutter;
 pub(crate) mod compression;
@@ -11,7 +11,7 @@ mod paint;
 mod pictures;
 mod room;
 mod stage;
-mod things;
+mod objects;
 
 use nalgebra::{Point2, Vector3};
 use rand::RngExt;
@@ -30,26 +30,26 @@ use stage::{Listed, Stage};
 
 /// Most scenes of a set.
 pub const MAX_SCENES: usize = 10_000;
-/// Most pictures that are hung besides the generated ones; what is beyond is not used.
+/// Most given pictures that are hung beside generated ones; further ones are not used.
 pub const MAX_PICTURES: usize = 2_000;
 /// Width of every picture.
 const WIDTH_PX: usize = 640;
 /// A quad of which more is hidden does not count.
 const MAX_HIDDEN: f64 = 0.02;
-/// Other things are listed from this side on.
+/// Shortest side of other quads that are listed.
 const MIN_OTHER_SIDE_PX: f64 = 6.0;
 
-/// What the set holds and what of it counts.
+/// Contents of the set, and which quads count.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ScenesParams {
-    /// Everything follows from it.
+    /// Seed of the whole set.
     pub seed: u64,
     /// Pictures, at most [`MAX_SCENES`].
     pub scenes: usize,
-    /// A quad counts when each of its sides is at least this long.
+    /// A quad counts if each of its sides is at least this long.
     pub min_side_px: f64,
-    /// And when it is seen at most this obliquely.
+    /// And if its view angle is at most this.
     pub max_view_angle_rad: f64,
 }
 
@@ -69,7 +69,7 @@ impl Default for ScenesParams {
 pub struct LabelledScene {
     /// 640 wide, 360 to 480 high.
     pub image: GrayImage,
-    /// Its quads and other real things.
+    /// Its labelled quads and other real quads.
     pub entry: ImageEntry,
 }
 
@@ -89,7 +89,7 @@ impl Scenes {
         Self { params, pictures, next: 0 }
     }
 
-    /// The set that these entries make.
+    /// The data set of these entries.
     pub fn data_set(images: Vec<ImageEntry>) -> DataSet {
         let (name, sizes_m) = ("scenes".into(), BTreeMap::new());
         DataSet { name, camera: None, sizes_m, teach: vec![], same: vec![], images }
@@ -125,7 +125,7 @@ impl Scenes {
         }
     }
 
-    /// None for a quad that is wholly out of the picture.
+    /// `None` for a quad wholly outside the picture.
     fn quad(&self, stage: &Stage, listed: &Listed) -> Option<QuadEntry> {
         let size = [stage.painter.width, stage.painter.height];
         let inside = listed.corners.points().iter().filter(|p| within(p, size)).count();
@@ -189,10 +189,10 @@ fn draw(stage: &mut Stage, room: &Room, view: &View) {
         let (finish, rect) = (if i == 0 { main } else { other }, [0.0, 0.0, sizes[i], high]);
         finish.paint(stage, &planes[i], rect, if i == 0 { 0.05 } else { 0.0 });
         clutter::strips(stage, &planes[i], rect, finish.grey);
-        let taken: Vec<Rect> = wall.things.iter().map(|t| t.1).collect();
+        let taken: Vec<Rect> = wall.objects.iter().map(|t| t.1).collect();
         clutter::fittings(stage, &planes[i], rect, &taken, finish.grey);
-        for (thing, rect) in &wall.things {
-            things::paint(stage, &planes[i], *rect, *thing, finish.grey);
+        for (object, rect) in &wall.objects {
+            objects::paint(stage, &planes[i], *rect, *object, finish.grey);
         }
     }
     let (floor, ceiling) = (Finish::floor(stage), Finish::ceiling(stage));
@@ -212,7 +212,7 @@ fn draw(stage: &mut Stage, room: &Room, view: &View) {
     }
 }
 
-/// Even light, or light from one side, with spots on the wall at times.
+/// Even light, or light from one side, sometimes with spots on the wall.
 fn light(stage: &mut Stage, width: f64) -> Light {
     let mut base = stage.grey(0.55, 1.05);
     let mut slope = [0.0; 2];
@@ -254,10 +254,10 @@ fn hanging_sign(stage: &mut Stage, room: &Room, view: &View, light: &Light, wall
     for x in [0.15 * w, 0.85 * w] {
         stage.rect(&plane, [x - 0.006, -place.y, x + 0.006, 0.0], 0.3);
     }
-    things::paint(stage, &plane, [0.0, 0.0, w, h], things::Thing::Sign, wall);
+    objects::paint(stage, &plane, [0.0, 0.0, w, h], objects::SceneObject::Sign, wall);
 }
 
-/// Lens, sensor, and what cameras do to pictures.
+/// Lens, sensor and processing of the camera.
 fn develop(stage: &mut Stage) -> GrayImage {
     let width = stage.painter.width;
     let dark = stage.chance(0.2);

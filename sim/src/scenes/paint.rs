@@ -1,25 +1,24 @@
-//! Flat shapes in space onto a picture of light, one over the other: a shape of a plane in, its pixels filled to the
-//! share that it covers out. Edges lie where they are projected to. There is no depth buffer: what is painted
-//! later is in front.
+//! Paints flat shapes in space onto a picture of light, one over the other. Pixels are filled by the share that the
+//! projected shape covers. There is no depth buffer: later shapes are in front.
 
 use nalgebra::{Matrix3, Point2, Vector3};
 use vision::geometry::Corners;
 
 use crate::texture::Footprint;
 
-/// Nothing nearer to the camera is painted or projected.
+/// Points nearer to the camera are neither painted nor projected.
 const NEAR_M: f64 = 0.05;
 /// Light of full white, in grey levels at exposure 1.
 const WHITE: f32 = 255.0;
 
-/// How bright a plane is: light that changes evenly over it, and round spots.
+/// Light on a plane: linear over it, and round spots.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Light {
-    /// At the origin.
+    /// Light at the origin.
     pub(crate) base: f32,
     /// Change per metre to the right and down.
     pub(crate) slope: [f32; 2],
-    /// Where, radius, and by how much brighter.
+    /// Centre, radius, and added light of each spot.
     pub(crate) spots: Vec<([f32; 2], f32, f32)>,
 }
 
@@ -54,7 +53,7 @@ impl Plane {
         self.right.cross(&self.down).dot(&self.origin) > 1e-6
     }
 
-    /// The plane moved by so much towards who looks at it.
+    /// The plane moved by `by_m` towards its front.
     pub(crate) fn raised(&self, by_m: f64) -> Self {
         Self { origin: self.origin - self.right.cross(&self.down) * by_m, ..self.clone() }
     }
@@ -79,13 +78,13 @@ pub(crate) fn part([x0, y0, x1, y1]: Rect, [a, b, c, d]: [f64; 4]) -> Rect {
     [x0 + a * w, y0 + b * h, x0 + c * w, y0 + d * h]
 }
 
-/// The picture under way.
+/// A picture during painting.
 pub(crate) struct Painter {
     pub(crate) light: Vec<f32>,
     pub(crate) width: usize,
     pub(crate) height: usize,
     pub(crate) focal_px: f64,
-    /// Of which layer each pixel was last covered.
+    /// The layer that last covered each pixel.
     layers: Vec<u16>,
     layer: u16,
 }
@@ -96,13 +95,13 @@ impl Painter {
         Self { light: vec![110.0; n], width, height, focal_px, layers: vec![0; n], layer: 0 }
     }
 
-    /// What is painted from now on is in front of all before: it hides it.
+    /// Begins a layer that hides all before.
     pub(crate) fn next_layer(&mut self) -> u16 {
         self.layer = self.layer.saturating_add(1);
         self.layer
     }
 
-    /// The layer under way.
+    /// The present layer.
     pub(crate) fn layer(&self) -> u16 {
         self.layer
     }
@@ -114,7 +113,7 @@ impl Painter {
         (p.z > NEAR_M).then(|| Point2::new(centre[0] + scale * p.x, centre[1] + scale * p.y))
     }
 
-    /// Corners of a rectangle of a plane, if all are in front of the camera and it is seen from its front.
+    /// Corners of a rectangle of a plane, if all are in front of the camera and it faces the camera.
     pub(crate) fn corners(&self, plane: &Plane, rect: Rect) -> Option<Corners> {
         let [a, b, c, d] = corners(rect).map(|p| self.project(&plane.at(p)));
         Corners::new([a?, b?, c?, d?]).ok()
@@ -124,20 +123,20 @@ impl Painter {
     pub(crate) fn hidden_share(&self, quad: &Corners, layer: u16) -> f64 {
         const STEPS: usize = 24;
         let [a, b, c, d] = quad.points().map(|p| p.coords);
-        let (mut seen, mut hidden) = (0, 0);
+        let (mut inside, mut hidden) = (0, 0);
         for (i, j) in (0..STEPS).flat_map(|i| (0..STEPS).map(move |j| (i, j))) {
             let (s, t) = ((i as f64 + 0.5) / STEPS as f64, (j as f64 + 0.5) / STEPS as f64);
             let p = (a * (1.0 - s) + b * s) * (1.0 - t) + (d * (1.0 - s) + c * s) * t;
             let (u, v) = (p.x.round(), p.y.round());
             if u >= 0.0 && v >= 0.0 && u < self.width as f64 && v < self.height as f64 {
-                seen += 1;
+                inside += 1;
                 hidden += usize::from(self.layers[v as usize * self.width + u as usize] > layer);
             }
         }
-        f64::from(hidden as u32) / f64::from((seen as u32).max(1))
+        f64::from(hidden as u32) / f64::from((inside as u32).max(1))
     }
 
-    /// Fills a convex polygon of a plane with what `ink` says of each place: reflectance, 0 to 1.
+    /// Fills a convex polygon of a plane with `ink(point)`: reflectance, 0 to 1.
     pub(crate) fn paint(
         &mut self,
         plane: &Plane,
@@ -145,16 +144,16 @@ impl Painter {
         ink: impl Fn([f32; 2], &Footprint) -> f32,
     ) {
         let layer = self.layer;
-        self.cover(plane, polygon, |light, seen, share, at, footprint| {
+        self.cover(plane, polygon, |light, covered_by, share, at, footprint| {
             let grey = WHITE * plane.light.at(at) * ink(at, footprint);
             *light += share * (grey - *light);
             if share > 0.5 {
-                *seen = layer;
+                *covered_by = layer;
             }
         });
     }
 
-    /// The same for what shines by itself.
+    /// The same for a surface that emits light.
     pub(crate) fn glow(
         &mut self,
         plane: &Plane,
@@ -162,15 +161,15 @@ impl Painter {
         ink: impl Fn([f32; 2], &Footprint) -> f32,
     ) {
         let layer = self.layer;
-        self.cover(plane, polygon, |light, seen, share, at, footprint| {
+        self.cover(plane, polygon, |light, covered_by, share, at, footprint| {
             *light += share * (WHITE * ink(at, footprint) - *light);
             if share > 0.5 {
-                *seen = layer;
+                *covered_by = layer;
             }
         });
     }
 
-    /// Adds what `ink` says to the reflectance of what is there.
+    /// Adds `ink(point)` to the present reflectance.
     pub(crate) fn tint(
         &mut self,
         plane: &Plane,
@@ -214,9 +213,9 @@ impl Painter {
         polygon: &[[f64; 2]],
         mut f: impl FnMut(&mut f32, &mut u16, f32, [f32; 2], &Footprint),
     ) {
-        let seen = clipped(plane, polygon);
+        let visible = clipped(plane, polygon);
         let points: Vec<[f64; 2]> =
-            seen.iter().filter_map(|p| self.project(&plane.at(*p))).map(|p| [p.x, p.y]).collect();
+            visible.iter().filter_map(|p| self.project(&plane.at(*p))).map(|p| [p.x, p.y]).collect();
         let (Some(lines), Some(inverse)) = (inward(&points), self.plane_from_pixel(plane)) else { return };
         let range = |i: usize, size: usize| {
             let low = points.iter().map(|p| p[i]).fold(f64::INFINITY, f64::min) - 1.0;
@@ -256,22 +255,22 @@ impl Painter {
 /// The part of a polygon of a plane that is in front of the camera.
 fn clipped(plane: &Plane, polygon: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let depth = |p: &[f64; 2]| plane.at(*p).z - 2.0 * NEAR_M;
-    let mut kept = Vec::with_capacity(polygon.len() + 1);
+    let mut in_front = Vec::with_capacity(polygon.len() + 1);
     for (i, p) in polygon.iter().enumerate() {
         let q = &polygon[(i + 1) % polygon.len()];
         let (a, b) = (depth(p), depth(q));
         if a >= 0.0 {
-            kept.push(*p);
+            in_front.push(*p);
         }
         if (a >= 0.0) != (b >= 0.0) {
             let k = a / (a - b);
-            kept.push([p[0] + k * (q[0] - p[0]), p[1] + k * (q[1] - p[1])]);
+            in_front.push([p[0] + k * (q[0] - p[0]), p[1] + k * (q[1] - p[1])]);
         }
     }
-    kept
+    in_front
 }
 
-/// Lines of a convex polygon's sides, `a x + b y + c` the distance inwards; none for what has no area.
+/// Lines of a convex polygon's sides, `a x + b y + c` the distance inwards; `None` without area.
 fn inward(points: &[[f64; 2]]) -> Option<Vec<[f64; 3]>> {
     let next = |i: usize| points[(i + 1) % points.len()];
     let area: f64 = (0..points.len()).map(|i| points[i][0] * next(i)[1] - next(i)[0] * points[i][1]).sum();
@@ -299,15 +298,15 @@ mod tests {
     }
 
     #[test]
-    fn a_filled_rectangle_has_its_area_and_lies_where_it_is_projected() {
+    fn a_filled_rectangle_has_its_projected_area_and_corners() {
         let mut painter = Painter::new(101, 81, 100.0);
         painter.light.fill(0.0);
         let rect = [-0.203, -0.151, 0.304, 0.107];
         painter.fill(&wall(1.0), &corners(rect), 1.0);
         let sum: f64 = painter.light.iter().map(|l| f64::from(*l) / 255.0).sum();
         assert!((sum - 50.7 * 25.8).abs() < 0.01, "{sum}");
-        let seen = painter.corners(&wall(1.0), rect).unwrap();
-        let (tl, br) = (seen.points()[0], seen.points()[2]);
+        let projected = painter.corners(&wall(1.0), rect).unwrap();
+        let (tl, br) = (projected.points()[0], projected.points()[2]);
         assert!((tl - Point2::new(50.0 - 20.3, 40.0 - 15.1)).norm() < 1e-9);
         assert!((br - Point2::new(50.0 + 30.4, 40.0 + 10.7)).norm() < 1e-9);
         let column: f64 = (0..101).map(|u| f64::from(painter.light[40 * 101 + u]) / 255.0).sum();
@@ -315,7 +314,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_behind_the_camera_is_cut_off() {
+    fn parts_behind_the_camera_are_cut_off() {
         let mut painter = Painter::new(64, 48, 50.0);
         // A floor that reaches behind the camera.
         let floor = Plane {
@@ -346,7 +345,7 @@ mod tests {
     }
 
     #[test]
-    fn shapes_without_area_or_with_wild_numbers_paint_nothing() {
+    fn shapes_without_area_or_with_huge_numbers_paint_nothing() {
         let mut painter = Painter::new(16, 16, 20.0);
         let before = painter.light.clone();
         for shape in [vec![], vec![[0.0, 0.0]], vec![[0.0; 2]; 4], vec![[f64::NAN, 0.0]; 4]] {

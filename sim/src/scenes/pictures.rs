@@ -1,4 +1,4 @@
-//! What hangs in frames and on boards: generated paintings, prints, photographs, papers and signs. A generator in, a
+//! Content of frames and boards: generated paintings, prints, photographs, papers and signs. A generator in, a
 //! texture out. Posters with letters and a border are `posters`'.
 
 use rand::RngExt;
@@ -42,7 +42,7 @@ pub(super) fn picture(rng: &mut ChaCha8Rng, aspect: f64) -> Texture {
         4 => still_life(&mut canvas, rng),
         5 => mondrian(&mut canvas, rng),
         6 => photograph(&mut canvas, rng),
-        // Hardly anything.
+        // Nearly blank.
         _ => strokes(&mut canvas, rng, 2, 0.1),
     }
     let grain = Noise::new(rng.random(), rng.random_range(20..90), 2);

@@ -1,5 +1,5 @@
-//! A scene under way: the painter, the random numbers, and what is to be listed. Things and clutter are painted onto
-//! it.
+//! A scene during painting: the painter, the random numbers, and the listed quads. Objects and clutter are painted
+//! onto it.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -10,7 +10,7 @@ use super::pictures;
 use crate::building::LandmarkKind;
 use crate::texture::{Footprint, Texture};
 
-/// A thing to be found.
+/// A labelled quad that a detector must find.
 #[derive(Debug, Clone)]
 pub(super) struct Listed {
     pub(super) corners: Corners,
@@ -20,7 +20,7 @@ pub(super) struct Listed {
     pub(super) distance_m: f64,
 }
 
-/// The scene under way.
+/// A scene during painting.
 pub(super) struct Stage<'a> {
     pub(super) painter: Painter,
     pub(super) rng: ChaCha8Rng,
@@ -44,7 +44,7 @@ impl<'a> Stage<'a> {
         low + (high - low) * self.rng.random::<f32>()
     }
 
-    /// One time in so many.
+    /// True with probability `share`.
     pub(super) fn chance(&mut self, share: f64) -> bool {
         self.rng.random_bool(share)
     }
@@ -57,17 +57,17 @@ impl<'a> Stage<'a> {
         (grey + signed).clamp(0.02, 0.97)
     }
 
-    /// Lists a thing that must be found.
+    /// Lists an object that a detector must find.
     pub(super) fn list(&mut self, plane: &Plane, rect: Rect, kind: LandmarkKind) {
-        let Some(seen) = self.painter.corners(plane, rect) else { return };
+        let Some(corners) = self.painter.corners(plane, rect) else { return };
         let centre = plane.at([0.5 * (rect[0] + rect[2]), 0.5 * (rect[1] + rect[3])]);
         let normal = plane.right.cross(&plane.down);
         let (distance_m, layer) = (centre.norm(), self.painter.layer());
         let view_angle_rad = (normal.dot(&centre) / distance_m).clamp(-1.0, 1.0).acos();
-        self.quads.push(Listed { corners: seen, kind, layer, view_angle_rad, distance_m });
+        self.quads.push(Listed { corners, kind, layer, view_angle_rad, distance_m });
     }
 
-    /// Lists what is neither missed nor false.
+    /// Lists a quad that is neither missed nor false.
     pub(super) fn other(&mut self, plane: &Plane, rect: Rect) {
         self.others.extend(self.painter.corners(plane, rect));
     }
@@ -91,12 +91,12 @@ impl<'a> Stage<'a> {
         self.painter.paint(plane, &corners(rect), spread(rect, texture, [low, high]));
     }
 
-    /// The same, shining by itself.
+    /// The same, emitting light.
     pub(super) fn shining(&mut self, plane: &Plane, rect: Rect, texture: &Texture, [low, high]: [f32; 2]) {
         self.painter.glow(plane, &corners(rect), spread(rect, texture, [low, high]));
     }
 
-    /// The shadow of a thing that stands off the wall: below it and to one side, soft.
+    /// The soft shadow of an object in front of the wall: below it and to one side.
     pub(super) fn cast_shadow(&mut self, plane: &Plane, [x0, y0, x1, y1]: Rect) {
         let reach = 0.5 * ((x1 - x0) + (y1 - y0));
         for _ in 0..self.rng.random_range(1..=2) {

@@ -18,7 +18,7 @@ fn grey(image: &GrayImage, p: Point2<f64>) -> f64 {
     (at(0, 0) * (1.0 - a) + at(1, 0) * a) * (1.0 - b) + (at(0, 1) * (1.0 - a) + at(1, 1) * a) * b
 }
 
-/// How far beside a side the greatest step of the mean grey is, and how great it is.
+/// Distance from a side of the greatest step of the mean grey, and its height.
 fn greatest_step(image: &GrayImage, from: Point2<f64>, to: Point2<f64>) -> (f64, f64) {
     let along = to - from;
     let normal = Vector2::new(-along.y, along.x).normalize();
@@ -47,8 +47,8 @@ fn truth_is_where_the_edges_are() {
             }
         }
     }
-    // The others are frames whose inner edges are stronger, shadows, and sills and lamp boxes that touch. By chance it
-    // would be five of thirteen.
+    // The others are frames with stronger inner edges, shadows, and touching sills and lamp boxes. The chance level
+    // is five of thirteen.
     assert!(sides > 100 && right * 100 >= sides * 75, "{right} of {sides}");
 }
 
@@ -64,7 +64,7 @@ fn the_same_seed_gives_the_same_bytes() {
 }
 
 #[test]
-fn all_sorts_of_things_are_there_and_only_whole_ones_count() {
+fn all_kinds_of_objects_occur_and_only_whole_ones_count() {
     let all = scenes(3, 120);
     let quads = || all.iter().flat_map(|s| &s.entry.quads);
     let kinds = [
@@ -87,7 +87,7 @@ fn all_sorts_of_things_are_there_and_only_whole_ones_count() {
         assert!(quad.corners.min_side_px() >= p.min_side_px && quad.view_angle_rad <= p.max_view_angle_rad);
     }
     let with = all.iter().filter(|s| s.entry.quads.iter().any(|q| q.counted)).count();
-    assert!(with > 80, "{with} scenes of 120 hold something that counts");
+    assert!(with > 80, "{with} scenes of 120 have a quad that counts");
     // Neither black nor white.
     for scene in &all {
         let mean =
@@ -97,7 +97,7 @@ fn all_sorts_of_things_are_there_and_only_whole_ones_count() {
 }
 
 #[test]
-fn inner_borders_are_listed_within_their_things() {
+fn inner_borders_are_listed_within_their_objects() {
     let within = |scene: &LabelledScene| {
         let quads = &scene.entry.quads;
         let inside = |o: &vision::geometry::Corners| {
@@ -113,13 +113,13 @@ fn inner_borders_are_listed_within_their_things() {
 }
 
 #[test]
-fn scenes_and_pictures_are_held_in_their_bounds() {
+fn numbers_of_scenes_and_pictures_are_clamped() {
     let count =
         |scenes| Scenes::new(&ScenesParams { scenes, ..ScenesParams::default() }, vec![]).size_hint().0;
     assert_eq!((count(MAX_SCENES), count(MAX_SCENES + 1)), (MAX_SCENES, MAX_SCENES));
     let white = Texture::new(1, 1, vec![255], Edge::Clamp);
-    let hung = |n: usize| Scenes::new(&ScenesParams::default(), vec![white.clone(); n]).pictures.len();
-    assert_eq!((hung(MAX_PICTURES), hung(MAX_PICTURES + 1)), (MAX_PICTURES, MAX_PICTURES));
+    let pictures = |n: usize| Scenes::new(&ScenesParams::default(), vec![white.clone(); n]).pictures.len();
+    assert_eq!((pictures(MAX_PICTURES), pictures(MAX_PICTURES + 1)), (MAX_PICTURES, MAX_PICTURES));
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! What a drive past posters gave, counted against the truth.
+//! Names on a drive past posters, counted against the truth.
 
 use client::v1::{self, Verdict};
 use nalgebra::Point2;
@@ -8,12 +8,12 @@ use sim::{
 };
 use vision::geometry::polygon::iou;
 
-/// Posters with a shorter side in the picture are counted by themselves...
+/// Posters with a shorter side are counted apart ...
 const LARGE_PX: f64 = 60.0;
 /// ... and below this not at all: they have no icon.
 const MIN_SIDE_PX: f64 = 38.0;
 
-/// What a drive gave.
+/// Counts of a drive.
 #[derive(Debug, Default)]
 pub(super) struct Figures {
     /// Posters wholly in a picture, large and small, and those of them that were recognised.
@@ -26,8 +26,8 @@ pub(super) struct Figures {
 
 pub(super) fn figures(drive: &[(SensorReadings, v1::Answer)]) -> Figures {
     let mut f = Figures::default();
-    for (seen, answer) in drive {
-        let truth = &seen.frame.truth;
+    for (readings, answer) in drive {
+        let truth = &readings.frame.truth;
         let whole = |l: &&LandmarkView| l.name.starts_with("poster") && l.state == ViewState::Full;
         let size = |l: &LandmarkView| usize::from(l.min_side_px() < LARGE_PX);
         let shown = truth.landmarks.iter().filter(whole).filter(|l| l.min_side_px() >= MIN_SIDE_PX);
@@ -45,7 +45,7 @@ pub(super) fn figures(drive: &[(SensorReadings, v1::Answer)]) -> Figures {
             }
         }
         if let Some(pose) = answer.map_from_robot.as_ref().and_then(|p| p.pose.as_ref()) {
-            let t = seen.step.map_from_robot;
+            let t = readings.step.map_from_robot;
             f.poses += 1;
             f.worst_m = f.worst_m.max((pose.x_m - t.x_m).hypot(pose.y_m - t.y_m));
         }

@@ -1,8 +1,8 @@
 //! Scores recognition on real photographs: `score_recognition DIR [PARAMS [KIND [STRANGERS...]]]`, where DIR holds a
 //! `truth.json` in the evaluation format, PARAMS is JSON such as `{"icon":{"size":50}}` and KIND one of `hausdorff`,
 //! `correlation`, `both` (default); with `VERBOSE` set every quad is printed. Further arguments are folders of images that
-//! hold no landmark: what the detector finds there, and quads at random places, are all strangers. Every landmark is taught
-//! from its one photograph and views generated from it. Each quad is looked for among all landmarks; then, as a stranger,
+//! hold no landmark: what the detector finds there, and quads at random places, are all distractors. Every landmark is taught
+//! from its one photograph and views generated from it. Each quad is looked for among all landmarks; then, as a distractor,
 //! among the half that does not hold it. Odd photographs, by the number in their name, may be tuned on; even ones are for
 //! the report: every figure has both columns.
 #![expect(clippy::disallowed_methods, clippy::disallowed_types, reason = "a program with files and a clock")]
@@ -69,10 +69,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         let start = Instant::now();
         let score = labelled(&queries, &everything, &same, (kind, verbose), &p);
         let ms = start.elapsed().as_secs_f64() * 1e3 / queries.len() as f64;
-        let (strangers, strangers_accepted) = strangers(&queries, &halves, &same, (kind, verbose), &p);
+        let (distractors, distractors_accepted) = distractors(&queries, &halves, &same, (kind, verbose), &p);
         println!(
-            "{kind:?}, {}: right {} wrong {} missed {} ambiguous {} ({:.3}) | strangers: refused {} accepted {} | of {strangers} \
-             strangers to a half {strangers_accepted} accepted | {ms:.1} ms a quad",
+            "{kind:?}, {}: right {} wrong {} missed {} ambiguous {} ({:.3}) | distractors: refused {} accepted {} | of {distractors} \
+             distractors to a half {distractors_accepted} accepted | {ms:.1} ms a quad",
             name,
             score.right,
             score.wrong,
@@ -87,7 +87,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let fifty = model_set(&taught, |id| id % 6 == 0, &p)?;
     for folder in arguments.iter().skip(4) {
         for models in [&fifty, &everything] {
-            strangers_in(Path::new(folder), models, kind, &p)?;
+            distractors_in(Path::new(folder), models, kind, &p)?;
         }
     }
     Ok(())
@@ -128,30 +128,30 @@ fn labelled(
     score
 }
 
-/// The same quads as strangers, each against the half of the landmarks that does not hold it: asked and accepted.
-fn strangers(
+/// The same quads as distractors, each against the half of the landmarks that does not hold it: asked and accepted.
+fn distractors(
     queries: &[&Query],
     halves: &[ModelSet; 2],
     same: &impl Fn(u64) -> u64,
     (kind, verbose): (DistanceKind, bool),
     p: &Params,
 ) -> (usize, usize) {
-    let (mut strangers, mut strangers_accepted) = (0, 0);
+    let (mut distractors, mut distractors_accepted) = (0, 0);
     for q in queries {
         for (parity, half) in halves.iter().enumerate() {
             if q.landmark.is_some_and(|l| same(l) % 2 == parity as u64) {
                 continue;
             }
-            strangers += 1;
+            distractors += 1;
             let v = recognise(&q.image, &q.quad, half, kind, p);
             let accepted = matches!(v.verdict, Verdict::Unique(_));
-            strangers_accepted += usize::from(accepted);
+            distractors_accepted += usize::from(accepted);
             if verbose && accepted {
                 println!("HALF {kind:?} {} {:?} accepted {:?}", q.file, q.landmark, v.candidates[0]);
             }
         }
     }
-    (strangers, strangers_accepted)
+    (distractors, distractors_accepted)
 }
 
 /// Time of each step of recognition.
@@ -308,7 +308,7 @@ fn normalised_square(found: &Corners, truth: &Corners, covariance: &[Matrix2<f64
 }
 
 /// What the detector finds in every image in `folder`, and quads at random places of it: how many are taken for a landmark.
-fn strangers_in(
+fn distractors_in(
     folder: &Path,
     models: &ModelSet,
     kind: DistanceKind,

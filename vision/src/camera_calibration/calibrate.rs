@@ -21,23 +21,23 @@ use nalgebra::{Isometry3, Matrix3, Point2, SMatrix, Vector3};
 /// Focal lengths tried where the linear solution fails, in image widths.
 const STARTS: [f64; 5] = [0.4, 0.7, 1.1, 1.8, 3.0];
 
-/// Why there is no camera.
+/// Why no camera was found.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum CalibrateError {
     /// A number of the parameters or the image's size is out of range.
     #[error("{field} = {value} is out of range")]
     OutOfRange {
-        /// Which.
+        /// Name of the field.
         field: &'static str,
-        /// What it was.
+        /// Its value.
         value: f64,
     },
     /// Too few or too many views.
-    #[error("{given} views given, {least} to {MAX_VIEWS} wanted")]
+    #[error("{given} views given, {least} to {MAX_VIEWS} are needed")]
     Views {
-        /// How many there are.
+        /// Views given.
         given: usize,
-        /// How many are wanted at least.
+        /// Fewest views.
         least: usize,
     },
     /// A view's lists are of different lengths, too short or too long, or a number in them is impossible.
@@ -48,19 +48,19 @@ pub enum CalibrateError {
         /// What is wrong.
         reason: &'static str,
     },
-    /// The views look at the plane from too few sides (method 16.4).
+    /// Too few different orientations of the plane (method 16.4).
     #[error(
-        "the views show {orientations} orientations of the plane that differ by more than {step_deg:.0} degrees, {wanted} are wanted"
+        "the views show {orientations} orientations of the plane that differ by more than {step_deg:.0} degrees, {wanted} are needed"
     )]
     Orientations {
-        /// How many differ.
+        /// Different orientations found.
         orientations: usize,
-        /// How many are wanted.
+        /// Different orientations needed.
         wanted: usize,
-        /// What counts as different.
+        /// Smallest angle between two different orientations.
         step_deg: f64,
     },
-    /// No camera sees the plane like this, or any does.
+    /// No camera fits the views, or every camera does: the linear system is degenerate.
     #[error(
         "the views do not determine a camera (sigma3 / sigma4 = {sigma_ratio:.3}, sigma3 / sigma1 = {sigma_share:.1e})"
     )]
@@ -70,7 +70,7 @@ pub enum CalibrateError {
         /// Second smallest over greatest.
         sigma_share: f64,
     },
-    /// The views are not of one plane of this shape.
+    /// The residuals are too large: the views are not of one plane of this shape.
     #[error(
         "the views do not fit one plane of this shape: rms {rms_px:.2} px, view {worst} the worst with {worst_px:.2} px"
     )]
@@ -79,10 +79,10 @@ pub enum CalibrateError {
         rms_px: f64,
         /// The view that fits worst.
         worst: usize,
-        /// Its own.
+        /// Its root mean square residual.
         worst_px: f64,
     },
-    /// What comes out is no camera.
+    /// The solution is not a possible camera.
     #[error(transparent)]
     Camera(#[from] FrameError),
 }
@@ -92,23 +92,24 @@ pub enum CalibrateError {
 pub struct CameraCalibration {
     /// The camera.
     pub camera: Intrinsics,
-    /// Over (fx, cx, cy, k1, k2, fy / fx), px and 1; rows of what was not fitted are zero. `None` without refinement.
+    /// Covariance over (fx, cx, cy, k1, k2, fy / fx), px and 1; rows of numbers that were not fitted are zero.
+    /// `None` without refinement.
     pub covariance: Option<SMatrix<f64, 6, 6>>,
-    /// The start (method 16.2): focal length by the linear solution, where there was one.
+    /// Focal length of the linear solution (method 16.2), where there was one, pixels.
     pub linear_fx_px: Option<f64>,
-    /// Height over width of the plane over what the views claim: 1 where the aspect is known.
+    /// Height over width of the plane, divided by the ratio that the views state: 1 where the aspect is known.
     pub aspect_ratio: f64,
-    /// Height of the camera over the plane's origin, where it was constant or known.
+    /// Height of the camera over the plane's origin, metres, where it was constant or known.
     pub height_m: Option<f64>,
-    /// Each view.
+    /// The fit of each view.
     pub views: Vec<ViewFit>,
     /// Root mean square residual per coordinate, pixels.
     pub rms_px: f64,
     /// Weighted squared residual and its degrees of freedom.
     pub chi2: f64,
-    /// See `chi2`.
+    /// Degrees of freedom of `chi2`.
     pub dof: usize,
-    /// Different orientations of the plane.
+    /// Number of different orientations of the plane.
     pub orientations: usize,
     /// Second smallest over smallest singular value of the linear system.
     pub sigma_ratio: f64,
@@ -121,7 +122,7 @@ impl CameraCalibration {
     }
 }
 
-/// The camera behind `views` of one flat thing, in an image of `image_size_px` (width, height).
+/// The camera behind `views` of one flat object, in an image of `image_size_px` (width, height).
 pub fn calibrate(
     views: &[PlanarView],
     image_size_px: [usize; 2],
@@ -132,14 +133,15 @@ pub fn calibrate(
     let mut homographies = Vec::with_capacity(views.len());
     for (view, v) in views.iter().enumerate() {
         // Known pixel aspect: v is divided by it, and the camera has square pixels.
-        let seen: Vec<_> = v.seen_px.iter().map(|q| Point2::new(q.x, q.y / p.pixel_aspect)).collect();
-        let h = Homography::fit(&v.plane_m, &seen);
+        let seen_px_square: Vec<_> =
+            v.seen_px.iter().map(|q| Point2::new(q.x, q.y / p.pixel_aspect)).collect();
+        let h = Homography::fit(&v.plane_m, &seen_px_square);
         let h = h.map_err(|_horizon| CalibrateError::View { view, reason: "its points are degenerate" })?;
         // z up becomes v down: from the front the orientation changes.
         if h.matrix().determinant() >= 0.0 {
             return Err(CalibrateError::View {
                 view,
-                reason: "it is seen from behind: its points run the other way round",
+                reason: "its points run counter-clockwise: the plane is seen from behind",
             });
         }
         homographies.push(*h.matrix());
@@ -166,9 +168,9 @@ pub fn calibrate(
             best = Some(state);
         }
     }
-    let seen_from =
+    let linear_poses =
         best.as_ref().map_or_else(|| poses(&homographies, &guess(1.0)), |state| Some(state.poses.clone()));
-    let orientations = seen_from.map_or(0, |poses| orientations(&poses, p.orientation_step_rad));
+    let orientations = linear_poses.map_or(0, |poses| orientations(&poses, p.orientation_step_rad));
     if orientations < p.min_orientations {
         let step_deg = p.orientation_step_rad.to_degrees();
         return Err(CalibrateError::Orientations { orientations, wanted: p.min_orientations, step_deg });
@@ -179,7 +181,7 @@ pub fn calibrate(
     finished(&state, made, linear.map(|l| l.alpha), (orientations, sigma_ratio), p)
 }
 
-/// The linear solution; an unknown constant height is searched.
+/// The linear solution.
 fn start(
     homographies: &[Matrix3<f64>],
     square: [f64; 2],
@@ -197,7 +199,7 @@ fn start(
     }
 }
 
-/// All poses for a camera, then the least squares if asked for, every view in the better of its two minima.
+/// The poses for a camera, then the least squares if requested, every view in the better of its two minima.
 fn settled(
     problem: &Problem,
     camera: &LinearCamera,
@@ -222,19 +224,19 @@ fn poses(homographies: &[Matrix3<f64>], camera: &LinearCamera) -> Option<Vec<Iso
     homographies.iter().map(|h| crate::pose::linear::pose_of_columns(&(inverse * h))).collect()
 }
 
-/// How many of the poses' normals differ from all others counted by more than `step_rad`: counted greedily, in order.
+/// Number of plane normals that differ by more than `step_rad` from all counted before, in order.
 fn orientations(poses: &[Isometry3<f64>], step_rad: f64) -> usize {
-    let mut kept: Vec<Vector3<f64>> = Vec::new();
+    let mut counted: Vec<Vector3<f64>> = Vec::new();
     for pose in poses {
         let normal = pose.rotation * Vector3::x();
-        if kept.iter().all(|k| k.angle(&normal) > step_rad) {
-            kept.push(normal);
+        if counted.iter().all(|k| k.angle(&normal) > step_rad) {
+            counted.push(normal);
         }
     }
-    kept.len()
+    counted.len()
 }
 
-/// Everything finite and in range.
+/// Checks that every number is finite and in range.
 fn check(views: &[PlanarView], image_size_px: [usize; 2], p: &CalibrateParams) -> Result<(), CalibrateError> {
     let within = |field, value: f64, low: f64, high: f64| {
         let good = (low..=high).contains(&value);
@@ -266,7 +268,7 @@ fn check(views: &[PlanarView], image_size_px: [usize; 2], p: &CalibrateParams) -
         let refuse = |reason| Err(CalibrateError::View { view, reason });
         let n = v.plane_m.len();
         if n != v.seen_px.len() || n != v.covariance_px2.len() || !(4..=MAX_POINTS).contains(&n) {
-            return refuse("its lists have not the same length of 4 to 4096");
+            return refuse("its lists differ in length, or the length is not 4 to 4096");
         }
         let far = |q: &Point2<f64>, limit: f64| !(q.x.abs() <= limit && q.y.abs() <= limit);
         if v.plane_m.iter().any(|q| far(q, LandmarkSize::MAX_M)) {
@@ -282,7 +284,7 @@ fn check(views: &[PlanarView], image_size_px: [usize; 2], p: &CalibrateParams) -
     Ok(())
 }
 
-/// Puts the answer together.
+/// The result, or [`CalibrateError::Misfit`].
 fn finished(
     state: &State,
     made: Summary,

@@ -1,10 +1,11 @@
-//! The camera with all poses as numbers, and a point's pixel with its derivatives by them.
+//! Parameter vector of the camera and all poses; the projection of a point with its derivatives.
 
 use crate::pose::reprojection::{MIN_DEPTH_M, perturbed};
 use nalgebra::{Isometry3, Matrix2, Matrix2x3, Point2, SMatrix, Vector2, Vector3, Vector6};
 
-/// Numbers that all views share, by place: focal length, `fy / fx`, principal point, radial coefficients, logarithm of
-/// the plane's height over width against what the views claim, height of the camera over the plane's origin.
+/// Number of parameters that all views share, in order: focal length, `fy / fx`, principal point, radial
+/// coefficients, log of the plane's height over width divided by the stated ratio, height of the camera over the
+/// plane's origin.
 pub(crate) const CAMERA: usize = 8;
 
 pub(crate) const ALPHA: usize = 0;
@@ -23,7 +24,7 @@ pub(crate) const POSTER: usize = 6;
 
 pub(crate) const HEIGHT: usize = 7;
 
-/// What is sought.
+/// The unknowns.
 #[derive(Debug, Clone)]
 pub(crate) struct State {
     pub camera: [f64; CAMERA],
@@ -57,7 +58,7 @@ pub(crate) fn view_chi2(view: &[Point], pose: &Isometry3<f64>, state: &State) ->
     if sum.is_nan() { f64::INFINITY } else { sum }
 }
 
-/// A plane's point in the camera frame, and the arm by which a turn moves it.
+/// A point of the plane in the camera frame, and its lever arm for rotations.
 fn placed(point: &Point, pose: &Isometry3<f64>, poster: f64) -> (Vector3<f64>, Vector3<f64>) {
     let arm = pose.rotation * Vector3::new(0.0, point.plane.x, point.plane.y * poster.exp());
     (arm, arm + pose.translation.vector)
@@ -72,7 +73,7 @@ pub(crate) fn pixel(point: &Point, pose: &Isometry3<f64>, c: &[f64; CAMERA]) -> 
     (p.z > MIN_DEPTH_M).then_some(made)
 }
 
-pub(crate) fn seen(point: &Point, pose: &Isometry3<f64>, c: &[f64; CAMERA]) -> Option<ProjectedPoint> {
+pub(crate) fn projected(point: &Point, pose: &Isometry3<f64>, c: &[f64; CAMERA]) -> Option<ProjectedPoint> {
     let px = pixel(point, pose, c)?;
     let (arm, p) = placed(point, pose, c[POSTER]);
     let inverse = 1.0 / p.z;

@@ -1,11 +1,11 @@
-//! Least squares of the reprojection over the camera and all poses at once (Zhang; method 16.3.3), with what is known
-//! beforehand as further residuals. Every view has its own six numbers, eliminated view by view.
+//! Least squares of the reprojection over the camera and all poses at once (Zhang; method 16.3.3), with priors as
+//! further residuals. Every view has six pose parameters, eliminated view by view.
 
 use crate::{
     camera_calibration::{
         camera_model::{
-            ALPHA, CAMERA, HEIGHT, K1, K2, PIXEL_ASPECT, POSTER, Point, State, U0, V0, moved, pixel, seen,
-            view_chi2,
+            ALPHA, CAMERA, HEIGHT, K1, K2, PIXEL_ASPECT, POSTER, Point, State, U0, V0, moved, pixel,
+            projected, view_chi2,
         },
         normal_equations::{Normal, Shared, SharedVector},
         params::{CalibrateParams, CameraHeight},
@@ -19,7 +19,7 @@ use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, Vector2, Vector3, Vector6};
 const MAX_STEPS: usize = 100;
 /// Relative step below which a descent ends.
 const STEP_TOLERANCE: f64 = 1e-12;
-/// Times that views are tried in their other minimum.
+/// Rounds in which every view is tried in its other minimum.
 const FLIPS: usize = 3;
 
 /// How one view fits.
@@ -33,7 +33,7 @@ pub struct ViewFit {
     pub rms_px: f64,
 }
 
-/// What came out.
+/// Residuals and covariance of the solution.
 pub(crate) struct Summary {
     pub covariance: Option<Matrix6<f64>>,
     pub views: Vec<ViewFit>,
@@ -45,9 +45,9 @@ pub(crate) struct Summary {
 /// The whole least-squares problem.
 pub(crate) struct Problem {
     views: Vec<Vec<Point>>,
-    /// Which of the shared numbers are fitted.
+    /// Which of the shared parameters are fitted.
     free: [bool; CAMERA],
-    /// Information of the shared numbers from elsewhere and the values it holds them at.
+    /// Prior of the shared parameters: information and mean.
     prior: SharedVector,
     at: SharedVector,
     roll_weight: f64,
@@ -77,7 +77,7 @@ impl Problem {
         }
         let height_weight = match p.height {
             CameraHeight::Free => 0.0,
-            // One height for all views, known to sigma: as a number of its own it would be held twice.
+            // One height for all views, known to sigma: as a free parameter it would be constrained twice.
             CameraHeight::Known { height_m, sigma_m } => {
                 at[HEIGHT] = height_m;
                 1.0 / sigma_m
@@ -104,7 +104,7 @@ impl Problem {
         (0..CAMERA).map(|k| self.prior[k] * (state.camera[k] - self.at[k]).powi(2)).sum()
     }
 
-    /// Of the roll and the height of one view.
+    /// Squared residual of the priors on roll and height of one view.
     fn known_chi2(&self, pose: &Isometry3<f64>, state: &State) -> f64 {
         let up = pose.rotation * Vector3::z();
         let height = -up.dot(&pose.translation.vector);
@@ -115,7 +115,7 @@ impl Problem {
         if self.free[HEIGHT] { state.camera[HEIGHT] } else { self.at[HEIGHT] }
     }
 
-    /// The plane's height over width by the homographies, where it is not known: the start of what is refined.
+    /// Start value of the plane's height over width, from the homographies, where it is not known.
     pub(crate) fn fit_poster(&self, state: &mut State, homographies: &[Matrix3<f64>]) {
         if !self.free[POSTER] {
             return;
@@ -135,12 +135,12 @@ impl Problem {
         ratios.sort_by(f64::total_cmp);
         state.camera[POSTER] = ratios.get(ratios.len() / 2).copied().unwrap_or(0.0);
         for pose in &mut state.poses {
-            // Eq. (2) had the wrong scale for one of its columns: the distance by the other alone.
+            // One column of Eq. (2) had the wrong scale: the distance follows from the other alone.
             pose.translation.vector *= (0.5 * state.camera[POSTER]).exp();
         }
     }
 
-    /// The mean height, where it is constant and not known.
+    /// Sets the height to the mean over the views, where it is constant and not known.
     pub(crate) fn fit_height(&self, state: &mut State) {
         let height = |pose: &Isometry3<f64>| -(pose.rotation * Vector3::z()).dot(&pose.translation.vector);
         let n = state.poses.len().max(1) as f64;
@@ -159,7 +159,7 @@ impl Problem {
         Some(state)
     }
 
-    /// One pose, the camera held.
+    /// Optimises one pose with the camera fixed.
     fn descend_view(&self, i: usize, start: Isometry3<f64>, state: &State) -> Option<(Isometry3<f64>, f64)> {
         let cost_of = |pose: &Isometry3<f64>| view_chi2(&self.views[i], pose, state);
         let (mut pose, mut damping) = (start, 1e-4);
@@ -170,7 +170,7 @@ impl Problem {
         for _ in 0..MAX_STEPS {
             let (mut h, mut g) = (Matrix6::zeros(), Vector6::zeros());
             for point in &self.views[i] {
-                let seen = seen(point, &pose, &state.camera)?;
+                let seen = projected(point, &pose, &state.camera)?;
                 let j = point.weight * seen.by_pose;
                 h += j.transpose() * j;
                 g += j.transpose() * (point.weight * (point.seen - seen.px));
@@ -194,7 +194,7 @@ impl Problem {
         Some((pose, cost))
     }
 
-    /// Everything at once, then each view in its other minimum, until nothing gets better.
+    /// Optimises all parameters, then tries each view in its other minimum, until chi2 no longer falls.
     pub(crate) fn descend(&self, state: State) -> Option<State> {
         let mut state = self.descend_all(state)?;
         for _ in 0..FLIPS {
@@ -224,7 +224,7 @@ impl Problem {
         Some(state)
     }
 
-    /// Levenberg-Marquardt over the shared numbers and all poses.
+    /// Levenberg-Marquardt over the shared parameters and all poses.
     fn descend_all(&self, start: State) -> Option<State> {
         let (mut state, mut damping) = (start, 1e-4);
         let mut cost = self.chi2(&state);
@@ -271,7 +271,7 @@ impl Problem {
         for (view, pose) in self.views.iter().zip(&state.poses) {
             let mut own = (Matrix6::zeros(), SMatrix::<f64, CAMERA, 6>::zeros(), Vector6::zeros());
             for point in view {
-                let seen = seen(point, pose, &state.camera)?;
+                let seen = projected(point, pose, &state.camera)?;
                 let (jp, js) = (point.weight * seen.by_pose, point.weight * seen.by_shared);
                 let r: Vector2<f64> = point.weight * (point.seen - seen.px);
                 own.0 += jp.transpose() * jp;
@@ -286,7 +286,7 @@ impl Problem {
         Some(made)
     }
 
-    /// Roll and height of one view.
+    /// Adds the priors on roll and height of one view.
     fn add_known(
         &self,
         pose: &Isometry3<f64>,
@@ -313,7 +313,7 @@ impl Problem {
         made.shared_g += by_shared * r;
     }
 
-    /// Residuals and covariance at the end.
+    /// Residuals and covariance of the solution.
     pub(crate) fn summary(&self, state: &State, refined: bool) -> Option<Summary> {
         let (mut views, mut squares, mut count) = (vec![], 0.0, 0);
         for (view, pose) in self.views.iter().zip(&state.poses) {
@@ -349,7 +349,7 @@ mod tests {
     use super::*;
     use crate::camera_calibration::calibrate::tests::scene;
 
-    /// Oracle: the residuals themselves, differenced by every number.
+    /// Oracle: central differences of the residuals by every parameter.
     #[test]
     fn gradients_are_the_finite_differences() {
         let p = CalibrateParams {

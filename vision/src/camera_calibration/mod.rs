@@ -1,4 +1,4 @@
-//! Views of a flat thing in, the intrinsics of the camera out (method 16).
+//! Views of a flat object in, the intrinsics of the camera out (method 16).
 
 pub mod params;
 pub mod views;

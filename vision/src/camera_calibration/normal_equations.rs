@@ -1,4 +1,4 @@
-//! Normal equations of the camera and all poses; each view's six numbers are eliminated view by view.
+//! Normal equations of the camera and all poses; each view's six pose parameters are eliminated (Schur complement).
 
 use crate::camera_calibration::camera_model::CAMERA;
 use nalgebra::{Matrix6, SMatrix, SVector, Vector6};
@@ -7,16 +7,16 @@ pub(crate) type Shared = SMatrix<f64, CAMERA, CAMERA>;
 
 pub(crate) type SharedVector = SVector<f64, CAMERA>;
 
-/// Normal equations with the views' blocks apart.
+/// Normal equations with one block a view.
 pub(crate) struct Normal {
     pub(crate) shared: Shared,
     pub(crate) shared_g: SharedVector,
-    /// Per view: its own block, the block with the shared numbers, its gradient.
+    /// Per view: its own block, the block with the shared parameters, its gradient.
     pub(crate) views: Vec<(Matrix6<f64>, SMatrix<f64, CAMERA, 6>, Vector6<f64>)>,
 }
 
 impl Normal {
-    /// The shared block with the poses eliminated, and its gradient; numbers that are not free held.
+    /// The shared block with the poses eliminated, and its gradient; parameters that are not free are fixed.
     fn reduced(&self, free: [bool; CAMERA], damping: f64) -> Option<(Shared, SharedVector)> {
         let (mut a, mut g) = (self.shared, self.shared_g);
         for k in 0..CAMERA {
@@ -41,7 +41,7 @@ impl Normal {
         damping: f64,
     ) -> Option<(SharedVector, Vec<Vector6<f64>>)> {
         let (a, g) = self.reduced(free, damping)?;
-        // The numbers differ by many orders of magnitude: solved on a unit diagonal.
+        // The parameters differ by many orders of magnitude: solved with the diagonal scaled to 1.
         let scale = a.diagonal().map(|v| 1.0 / v.max(f64::MIN_POSITIVE).sqrt());
         let scaled = Shared::from_fn(|i, j| a[(i, j)] * scale[i] * scale[j]);
         let step = scaled.cholesky()?.solve(&g.component_mul(&scale)).component_mul(&scale);
@@ -53,7 +53,7 @@ impl Normal {
         finite.then_some((step, steps))
     }
 
-    /// Of the free numbers; zero elsewhere.
+    /// Covariance of the free parameters; zero elsewhere.
     pub(crate) fn covariance(&self, free: [bool; CAMERA]) -> Option<Shared> {
         let (a, _) = self.reduced(free, 0.0)?;
         let scale = a.diagonal().map(|v| 1.0 / v.max(f64::MIN_POSITIVE).sqrt());

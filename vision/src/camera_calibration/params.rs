@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Most radial coefficients that are fitted.
+/// Most radial coefficients that can be fitted.
 pub const MAX_RADIAL: usize = 2;
 
 /// What is known of the camera's height over the plane's origin, which stays the same when a robot drives on a floor
@@ -22,31 +22,32 @@ pub enum CameraHeight {
     },
     /// It is the same in all views, and is found with the camera.
     Constant {
-        /// How much it varies: standard deviation.
+        /// Standard deviation of its variation, metres.
         sigma_m: f64,
     },
 }
 
-/// Knobs of calibration.
+/// Parameters of the calibration.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct CalibrateParams {
     /// Height of a pixel's focal length over its width, `fy / fx`; 1 for nearly every sensor.
     pub pixel_aspect: f64,
-    /// Fit `fy / fx` as well, from `pixel_aspect` on.
+    /// Fit `fy / fx` as well, starting at `pixel_aspect`.
     pub free_pixel_aspect: bool,
-    /// The ratio of the plane's sides is known. If not, it is found; heights (C3) are then of no use to the start.
+    /// The ratio of the plane's sides is known. If not, it is fitted; the linear solution then ignores heights (C3).
     pub known_aspect: bool,
-    /// The camera does not roll (C2): standard deviation of the roll, radians. Zero: nothing is known of it.
+    /// The camera does not roll (C2): standard deviation of the roll, radians. Zero: no prior.
     pub roll_sigma_rad: f64,
     /// The camera's height (C3).
     pub height: CameraHeight,
-    /// Fit the reprojection of all views (Zhang); without it the linear solution stands, and has no covariance.
+    /// Fit the reprojection of all views (Zhang); without it the result is the linear solution, which has no
+    /// covariance.
     pub refine: bool,
     /// Radial coefficients (k1, k2) that are fitted, 0 to [`MAX_RADIAL`].
     pub radial: usize,
-    /// Standard deviation of the principal point from the image's centre, as a share of its width: what is known of
-    /// any camera. Zero: nothing is. It matters where views hardly determine the principal point.
+    /// Standard deviation of the principal point from the image's centre, as a share of its width. Zero: no prior.
+    /// It matters where the views hardly determine the principal point.
     pub centre_sigma: f64,
     /// Fewest different orientations (method 16.4).
     pub min_orientations: usize,

@@ -1,4 +1,4 @@
-//! Calibration that drops outlier views (a share may show something else) and selects the number of radial
+//! Calibration that drops outlier views (some may show another object) and selects the number of radial
 //! coefficients by an F test on the residuals.
 
 use crate::camera_calibration::{
@@ -7,14 +7,14 @@ use crate::camera_calibration::{
     views::PlanarView,
 };
 
-/// A coefficient is taken when it lowers chi2 by this many times the chi2 of a degree of freedom (F test; a useless one
-/// gets there once in a thousand).
+/// A coefficient is fitted if it lowers chi2 by this many times the reduced chi2 (F test with a false-positive rate
+/// of 0.001).
 pub const LENS_GAIN: f64 = 12.0;
-/// A view is left out when without it chi2 a degree of freedom falls below this share,
+/// A view is dropped if the reduced chi2 without it is below this share of the one with it,
 pub const OUTLIER_SHARE: f64 = 0.6;
-/// and some view's residual exceeds this, pixels.
+/// and the residual of some view exceeds this, pixels.
 pub const OUTLIER_PX: f64 = 1.0;
-/// Views that are tried for being the one that does not fit.
+/// Views tried as outliers, those of the largest residuals.
 const SUSPECTS: usize = 8;
 /// No limit on residuals.
 const MAX_RMS_PX: f64 = 1e4;
@@ -28,8 +28,8 @@ pub struct RobustCalibration {
     pub used: Vec<usize>,
 }
 
-/// As [`calibrate`], but views that do not fit are left out, as long as more than half are left, and of the radial
-/// coefficients, up to `p.radial`, only those are fitted that the views ask for.
+/// As [`calibrate`], but drops outlier views while more than half are left, and fits only those of the `p.radial`
+/// radial coefficients that pass the F test.
 pub fn calibrate_choosing(
     views: &[PlanarView],
     image_size_px: [usize; 2],
@@ -55,7 +55,7 @@ pub fn calibrate_choosing(
     best
 }
 
-/// Leaves out one view after the other: of the worst few the one without which the others fit best.
+/// Drops one view after the other: of the worst few the one without which the others fit best.
 fn fitting(
     views: &[PlanarView],
     image_size_px: [usize; 2],
@@ -63,7 +63,7 @@ fn fitting(
 ) -> Result<RobustCalibration, CalibrateError> {
     let of = |used: &[usize]| {
         let chosen: Vec<PlanarView> = used.iter().map(|&i| views[i].clone()).collect();
-        // Residuals are needed of what does not fit, too.
+        // Views that do not fit need residuals, too.
         calibrate(&chosen, image_size_px, &CalibrateParams { max_rms_px: MAX_RMS_PX, ..p.clone() })
     };
     let mut used: Vec<usize> = (0..views.len()).collect();
@@ -85,7 +85,7 @@ fn fitting(
         }
         (used, found) = best;
     }
-    // With the limit that was asked for.
+    // With the limit of the caller.
     let chosen: Vec<PlanarView> = used.iter().map(|&i| views[i].clone()).collect();
     calibrate(&chosen, image_size_px, p).map(|calibration| RobustCalibration { calibration, used })
 }

@@ -1,4 +1,4 @@
-//! Views of a flat thing of known shape: points of its plane and the pixels they are seen at.
+//! Views of a flat object of known shape: points of its plane and their pixels.
 
 use crate::{
     geometry::corners::Corners,
@@ -15,12 +15,12 @@ pub const MAX_POINTS: usize = 4096;
 /// Fewest views.
 pub const MIN_VIEWS: usize = 2;
 
-/// One view of the flat thing.
+/// One view of the flat object.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlanarView {
     /// Points in the plane: y (the viewer's right) and z (up), metres.
     pub plane_m: Vec<Point2<f64>>,
-    /// Where they are seen, pixels.
+    /// Their image points, pixels.
     pub seen_px: Vec<Point2<f64>>,
     /// Covariance of each.
     pub covariance_px2: Vec<Matrix2<f64>>,

@@ -6,7 +6,7 @@ use crate::{
         edge_support::gradients::Gradients,
         edges::edge_map::EdgeMap,
         params::{DetectParams, Grouping, Nested},
-        proposals::{quad_proposals::hypotheses, three_sided::leftover},
+        proposals::{quad_proposals::proposals, three_sided::leftover},
         pyramid::{reduce, working_factor},
         quad::Quad,
         refine::{
@@ -38,7 +38,7 @@ pub fn detect(image: &GrayImage, p: &DetectParams, trace: &mut impl Trace) -> Ve
     detect_with(&mut DetectBuffers::default(), image, p, trace)
 }
 
-/// [`detect`] in the memory of earlier images.
+/// [`detect`], reusing the memory of earlier images.
 pub fn detect_with(
     memory: &mut DetectBuffers,
     image: &GrayImage,
@@ -47,7 +47,7 @@ pub fn detect_with(
 ) -> Vec<Quad> {
     let mut quads = match p.quads.grouping {
         Grouping::Relaxation => by_relaxation(memory, image, p, trace),
-        Grouping::Proposals => by_search(memory, image, p, trace),
+        Grouping::Proposals => by_proposals(memory, image, p, trace),
     };
     quads.truncate(MAX_QUADS);
     trace.quads(&quads);
@@ -55,7 +55,7 @@ pub fn detect_with(
     quads
 }
 
-/// The paper's way: pairs by similarity, both relaxations, sets of three sides.
+/// The paper's grouping: pairs by similarity, both relaxations, sets of three sides.
 fn by_relaxation(
     memory: &mut DetectBuffers,
     image: &GrayImage,
@@ -74,8 +74,8 @@ fn by_relaxation(
     quads
 }
 
-/// The search, on one scale or several. Coordinates of the trace are those of the working scale.
-fn by_search(
+/// The default detector, on one scale or several. Coordinates of the trace are those of the working scale.
+fn by_proposals(
     memory: &mut DetectBuffers,
     image: &GrayImage,
     p: &DetectParams,
@@ -84,7 +84,7 @@ fn by_search(
     let factor = working_factor(image, p.quads.working_side_px);
     let reduced = (factor > 1).then(|| reduce(image, factor));
     let work = reduced.as_ref().unwrap_or(image);
-    let (rated, edges, segments) = searched(memory, work, p, trace);
+    let (rated, edges, segments) = proposed(memory, work, p, trace);
     let gradients = Gradients { image: work, gx: edges.gx(), gy: edges.gy() };
     let found: Vec<Quad> = if p.quads.choose_sides {
         suppress_non_maxima(snap_sides(rated, &gradients, &p.quads), &p.quads)
@@ -100,7 +100,7 @@ fn by_search(
     let mut quads: Vec<Quad> = quads.into_iter().map(|q| refit_corners(q, &gradients, &p.quads)).collect();
     if p.quads.three_sided {
         let open = leftover(&segments, &quads, &gradients, p);
-        // They never take the place of a full quad.
+        // Three-sided quads never replace a full quad.
         quads.truncate(MAX_QUADS);
         let room = MAX_QUADS - quads.len();
         quads.extend(open.into_iter().take(room));
@@ -111,18 +111,19 @@ fn by_search(
     at_full_size(quads, image, factor, p, memory)
 }
 
-/// Everything the search proposes on the scales of an image, rated, not yet chosen from; and the finest edge map.
+/// All proposals of the default detector on all scales of an image, rated, before suppression; and the finest edge
+/// map.
 pub fn scored_quads(
     work: &GrayImage,
     p: &DetectParams,
     trace: &mut impl Trace,
 ) -> (Vec<ScoredQuad>, EdgeMap) {
-    let (rated, edges, _) = searched(&mut DetectBuffers::default(), work, p, trace);
+    let (rated, edges, _) = proposed(&mut DetectBuffers::default(), work, p, trace);
     (rated, edges)
 }
 
 /// The same with the finest segments.
-fn searched(
+fn proposed(
     memory: &mut DetectBuffers,
     work: &GrayImage,
     p: &DetectParams,
@@ -130,7 +131,7 @@ fn searched(
 ) -> (Vec<ScoredQuad>, EdgeMap, Vec<EdgeSegment>) {
     let (edges, segments) = traced_segments(memory, work, p, trace);
     let gradients = Gradients { image: work, gx: edges.gx(), gy: edges.gy() };
-    let seeds = hypotheses(&segments, &gradients, &p.quads.proposals);
+    let seeds = proposals(&segments, &gradients, &p.quads.proposals);
     trace.seeds(&seeds);
     trace.finished(Stage::Pairs);
     let mut rated = rate(&seeds, &gradients, &p.quads);
@@ -145,7 +146,7 @@ fn searched(
         let segments = straight_segments(&chains(&edges, &p.chains), &edges, &p.segments);
         let segments = untile(segments, (level.width(), level.height()), &p.tiling).kept;
         let gradients = Gradients { image: &level, gx: edges.gx(), gy: edges.gy() };
-        let seeds = hypotheses(&segments, &gradients, &p.quads.proposals);
+        let seeds = proposals(&segments, &gradients, &p.quads.proposals);
         let coarse = rate(&seeds, &gradients, &p.quads);
         rated.extend(coarse.into_iter().filter_map(|r| r.scaled(scale as f64)));
         memory.give_back(edges);

@@ -1,12 +1,12 @@
-//! Edge maps whose memory is used again from image to image.
+//! Edge maps whose memory is reused from image to image.
 
 use crate::{
     detect::edges::edge_map::{self, EdgeMap, EdgeParams},
     frame::GrayImage,
 };
 
-/// Memory of earlier images, for whoever works on many: fresh planes cost more than a tenth of the time to segments.
-/// It never changes a result.
+/// Memory of earlier images, for callers with many images: fresh planes cost more than a tenth of the time to
+/// segments. Results do not depend on it.
 #[derive(Debug, Default)]
 pub struct DetectBuffers {
     pub(crate) maps: Vec<EdgeMap>,
@@ -21,12 +21,12 @@ impl DetectBuffers {
     }
 
     pub(crate) fn give_back(&mut self, map: EdgeMap) {
-        // One map a scale; the search gives the finest back last and asks for it first.
+        // One map a scale; the default detector returns the finest last and takes it first.
         if self.maps.len() < MAX_SCALES {
             self.maps.push(map);
         }
     }
 }
 
-/// Most scales of the search.
+/// Most scales of the default detector.
 pub const MAX_SCALES: usize = 4;

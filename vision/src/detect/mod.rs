@@ -1,4 +1,4 @@
-//! From grey image to quads (method 1 to 3). The folders stand in the order of the data.
+//! From grey image to quads (method 1 to 3). The modules are listed in the order of the data flow.
 
 pub mod quad;
 pub mod params;

@@ -2,7 +2,7 @@
 
 use crate::detect::{
     border_model::{
-        network::Network, network_weights, quad_classifier::THING_FEATURES, side_features::SIDE_FEATURES,
+        network::Network, network_weights, quad_classifier::QUAD_FEATURES, side_features::SIDE_FEATURES,
     },
     edges::edge_map::EdgeParams,
     proposals::quad_proposals::ProposalParams,
@@ -36,7 +36,7 @@ pub struct DetectParams {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Grouping {
-    /// The paper's: two relaxations and sets of three sides.
+    /// Of the paper: two relaxations and sets of three sides.
     Relaxation,
     /// Corner chains with a searched fourth side, checked against the gradient.
     #[default]
@@ -44,11 +44,11 @@ pub enum Grouping {
     Proposals,
 }
 
-/// What a quad of the search becomes that lies inside another and is no border of the same thing.
+/// What becomes of a quad inside another that is not a border of the same object, with the default detector.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Nested {
-    /// An alternate of the outer one, unless that is the more doubtful of the two or holds several things.
+    /// An alternate of the outer one, unless that is less probable or contains several objects.
     #[default]
     Alternates,
     /// A quad of its own.
@@ -59,57 +59,59 @@ pub enum Nested {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct QuadParams {
-    /// The paper's grouping or the search.
+    /// The paper's grouping or the default detector.
     pub grouping: Grouping,
-    /// The search works on an image reduced by a whole factor to about this longer side; 0 for full size.
+    /// The default detector works on an image reduced by a whole factor to about this longer side, pixels; 0 for
+    /// full size.
     pub working_side_px: usize,
-    /// Scales of the search, each half the one before: a coarse one sees through ragged, ornate borders.
+    /// Scales of the default detector, each half the one before: ragged, ornate borders are straight at a coarse
+    /// scale.
     pub scales: usize,
-    /// The search.
+    /// Quad proposals of the default detector.
     #[serde(alias = "hypotheses")]
     pub proposals: ProposalParams,
     /// Share of each side that edges must support for the outermost border of a group to be its quad.
     pub min_side_support: f64,
-    /// Nested quads above this `IoU` are borders of one thing.
+    /// Nested quads above this `IoU` are borders of one object.
     pub nested_iou: f64,
-    /// What other nested quads become, for the search.
+    /// What other nested quads become, for the default detector.
     pub nested: Nested,
-    /// How far from a rough side its edge points are looked for.
+    /// How far from a rough side its edge points are searched, pixels.
     pub refit_reach_px: f64,
     /// Smallest step height of an edge point, grey levels.
     pub min_step: f64,
     /// Most seeds of a scale that are refitted, at most
     /// [`MAX_REFITTED`](crate::detect::refine::rating::MAX_REFITTED); half as many small ones come on top.
     pub max_refitted: usize,
-    /// Most borders of one thing that are rated on a scale.
+    /// Most borders of one object that are rated on a scale.
     pub max_alike: usize,
-    /// Smallest score of a quad of the search.
+    /// Smallest score of a quad of the default detector.
     pub min_score: f64,
-    /// Whether the search moves each side to the line beside it that looks most like a border.
+    /// Whether the default detector moves each side to the line beside it that looks most like a border.
     pub choose_sides: bool,
-    /// What makes a side a border; without one, what was learnt with the program.
+    /// Network that scores the lines of a side; the built-in weights if absent.
     #[serde(
         alias = "side_model",
         skip_serializing_if = "Option::is_none",
         deserialize_with = "checked::<SIDE_FEATURES, _>"
     )]
     pub border_model: Option<Network>,
-    /// What makes a quad a thing; without one, what was learnt with the program.
+    /// Network of the quad classifier; the built-in weights if absent.
     #[serde(
         alias = "thing_model",
         skip_serializing_if = "Option::is_none",
-        deserialize_with = "checked::<THING_FEATURES, _>"
+        deserialize_with = "checked::<QUAD_FEATURES, _>"
     )]
     pub quad_classifier: Option<Network>,
-    /// Smallest probability that a quad of the search is a thing.
+    /// Smallest probability that a quad of the default detector is an object.
     pub min_probability: f64,
-    /// A quad that is a thing with at least this probability keeps what contradicts it from being looked at.
+    /// A quad with at least this probability suppresses conflicting quads before they are classified.
     pub sure_probability: f64,
     /// Whether to report sets of three sides.
     pub three_sided: bool,
     /// Smallest c5 of a set of three sides.
     pub min_three_sided_closing: f64,
-    /// Smallest score of a set of three sides of the search.
+    /// Smallest score of a set of three sides of the default detector.
     pub min_three_sided_score: f64,
 }
 
@@ -140,7 +142,7 @@ impl Default for QuadParams {
     }
 }
 
-/// A network for `N` measurements, checked where it comes in.
+/// A network for `N` features, checked when it is read.
 fn checked<'de, const N: usize, D: Deserializer<'de>>(from: D) -> Result<Option<Network>, D::Error> {
     let network = Option::<Network>::deserialize(from)?;
     if let Some(network) = &network {
@@ -150,12 +152,12 @@ fn checked<'de, const N: usize, D: Deserializer<'de>>(from: D) -> Result<Option<
 }
 
 impl QuadParams {
-    /// What makes a side a border.
+    /// The network that scores the lines of a side.
     pub fn side_network(&self) -> &Network {
         self.border_model.as_ref().unwrap_or_else(|| network_weights::border_model())
     }
 
-    /// What makes a quad a thing.
+    /// The network of the quad classifier.
     pub fn thing_network(&self) -> &Network {
         self.quad_classifier.as_ref().unwrap_or_else(|| network_weights::quad_classifier())
     }

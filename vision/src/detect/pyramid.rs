@@ -1,8 +1,8 @@
-//! Smaller copies of an image, by averaging whole blocks, and quads carried between scales. A large image is searched
-//! at a working scale: sides of quads are long, so nothing is lost but time. Finds nothing itself.
+//! Smaller copies of an image, by averaging whole blocks, and quads mapped between scales. Quads of a large image
+//! are detected at a working scale: their sides are long enough there.
 //!
-//! Departs from method 1, which works at full size: time is bounded, and ornate frames are lines only when seen
-//! coarsely.
+//! Departs from method 1, which works at full size: time is bounded, and ornate frames are straight at a coarse
+//! scale only.
 
 use crate::{detect::quad::Quad, frame::GrayImage, geometry::corners::Corners};
 use nalgebra::Point2;
@@ -13,8 +13,8 @@ pub fn working_factor(image: &GrayImage, side_px: usize) -> usize {
     (longest + side_px / 2).checked_div(side_px).unwrap_or(1).max(1)
 }
 
-/// Averages blocks of `factor` x `factor` pixels; a rest at the right and lower border is left out. An image smaller
-/// than a block stays as it is.
+/// Averages blocks of `factor` x `factor` pixels; incomplete blocks at the right and lower border are dropped. An
+/// image smaller than a block stays as it is.
 pub fn reduce(image: &GrayImage, factor: usize) -> GrayImage {
     let factor = factor.max(1);
     let (width, height) = (image.width() / factor, image.height() / factor);
@@ -22,7 +22,7 @@ pub fn reduce(image: &GrayImage, factor: usize) -> GrayImage {
         return image.clone();
     }
     let count = (factor * factor) as u32;
-    // Down the columns first, all abreast; then only one row of sums is left to be cut into blocks.
+    // Columns are summed first, vectorised; then one row of sums is split into blocks.
     let mut columns = vec![0_u16; width * factor];
     let mut sums = vec![0_u32; width];
     let mut data = Vec::with_capacity(width * height);
@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn a_point_keeps_its_place() {
+    fn a_point_maps_to_the_same_place_at_every_scale() {
         // Left edge of the image: -0.5 on every scale.
         let p = enlarge(&Point2::new(-0.5, 0.0), 2.0);
         assert!((p - Point2::new(-0.5, 0.5)).norm() < 1e-12);

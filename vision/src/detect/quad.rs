@@ -1,10 +1,10 @@
-//! The quad: four corners of something flat, seen in perspective (method 3.4 to 3.6).
+//! The quad: four corners of a flat object in perspective (method 3.4 to 3.6).
 
 use crate::geometry::corners::Corners;
 use nalgebra::Matrix2;
 use serde::{Deserialize, Serialize};
 
-/// How many sides were seen.
+/// How many sides were found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum QuadKind {
@@ -14,9 +14,9 @@ pub enum QuadKind {
     ThreeSided,
 }
 
-/// What a border that was found in a picture is off by besides the noise of its edges, per coordinate: another edge
-/// of the frame, a shadow, a side that bends. The covariance of the corners knows nothing of it: where that says 0.04
-/// px, corners of rendered posters are 0.2 to 0.4 px off, whatever their size (docs/EVALUATION.md, "Navigation").
+/// Standard deviation per coordinate of a border beyond the noise of its edges: another edge of the frame, a
+/// shadow, a bent side. The corner covariance does not include it: at a stated 0.04 px, corners of rendered posters
+/// are 0.2 to 0.4 px off, whatever their size (docs/EVALUATION.md, "Navigation").
 pub const BORDER_SIGMA_PX: f64 = 0.3;
 
 /// A detected quad.
@@ -30,19 +30,19 @@ pub struct Quad {
     pub side_support: [f64; 4],
     /// Whether each side runs into the image border.
     pub side_clipped: [bool; 4],
-    /// How sure the detector is, 0 to 1.
+    /// Detection score, 0 to 1.
     pub score: f64,
     /// Four sides or three.
     pub kind: QuadKind,
-    /// A second way to name the top-left corner is nearly as upright: recognition tries all four rotations.
+    /// A second choice of the top-left corner is nearly as upright: recognition tries all four rotations.
     pub upright_ambiguous: bool,
-    /// Other borders of the same thing (mat, canvas, inner frame) and what hangs inside (a poster on a door), nested in
+    /// Other borders of the same object (mat, canvas, inner frame) and objects inside (a poster on a door), nested in
     /// `corners_px`, outermost first.
     pub alternates: Vec<Corners>,
 }
 
 impl Quad {
-    /// Covariance of each corner as far as it can be believed: of the fitted edges, and [`BORDER_SIGMA_PX`].
+    /// Covariance of each corner: of the fitted edges plus [`BORDER_SIGMA_PX`] squared, px^2.
     pub fn believed_covariance_px2(&self) -> [Matrix2<f64>; 4] {
         self.corner_covariance_px2.map(|c| c + Matrix2::identity() * BORDER_SIGMA_PX.powi(2))
     }

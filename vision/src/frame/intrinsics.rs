@@ -1,4 +1,4 @@
-//! Intrinsics of a camera: focal length, principal point, lens, and how surely they are known.
+//! Intrinsics of a camera: focal length, principal point, lens distortion, and their standard deviations.
 
 use crate::frame::{image::FrameError, lens::Distortion};
 use nalgebra::{Matrix2, Matrix3, Point2, Vector3};
@@ -16,16 +16,16 @@ pub struct IntrinsicsSigmas {
 }
 
 impl IntrinsicsSigmas {
-    /// Of a camera about which nothing is said, as a share of the focal length. Calibrations state 0.1 to 0.5 %, and
+    /// Default for the focal length, as a share of it. Calibrations state 0.1 to 0.5 %, and
     /// two of them of the same pictures differ by as much as 0.6 %: docs/EVALUATION.md, "Cameras".
     pub const USUAL_FOCAL_SHARE: f64 = 0.005;
-    /// Of its principal point, as a share of the focal length: 2 px at 640 x 480. What is wrong with it is mostly the
-    /// same as a turn of the camera, and so in whatever the mounting was found with.
+    /// Default for the principal point, as a share of the focal length: 2 px at 640 x 480. Its error acts mostly
+    /// like a rotation of the camera, and so is part of the calibrated extrinsics.
     pub const USUAL_CENTER_SHARE: f64 = 0.003;
-    /// Largest accepted, as a share of the focal length: beyond it first order says nothing.
+    /// Largest accepted, as a share of the focal length: beyond it the first-order model does not hold.
     pub const MAX_SHARE: f64 = 0.25;
 
-    /// Of a camera of this focal length about which nothing is said.
+    /// Defaults for a camera of this focal length.
     pub fn usual(focal_px: f64) -> Self {
         let (focal, center) = (Self::USUAL_FOCAL_SHARE * focal_px, Self::USUAL_CENTER_SHARE * focal_px);
         Self { focal_px: focal, center_px: center }
@@ -46,7 +46,7 @@ pub struct Intrinsics {
     /// Lens distortion.
     #[serde(default)]
     pub distortion: Distortion,
-    /// How surely the rest is known; none: not stated, and taken as exact.
+    /// Standard deviations of the rest; none: not stated, and taken as exact.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sigmas: Option<IntrinsicsSigmas>,
 }
@@ -89,8 +89,8 @@ impl Intrinsics {
         self.pixel(&self.distortion.distort(&straight).point)
     }
 
-    /// The pixel where an undistorted pinhole with the same K would see what this camera sees at `px`. `None` where the
-    /// lens cannot be undone: see [`Distortion::undistort`].
+    /// The pixel where an undistorted pinhole with the same K would see what this camera sees at `px`. `None` where
+    /// the distortion is not invertible: see [`Distortion::undistort`].
     pub fn undistort(&self, px: &Point2<f64>) -> Option<Point2<f64>> {
         if self.distortion == Distortion::None {
             return Some(*px);
@@ -98,7 +98,7 @@ impl Intrinsics {
         Some(self.pixel(&self.distortion.undistort(&self.normalised(px))?))
     }
 
-    /// As [`Intrinsics::undistort`], with the derivative by `px`: what turns the covariance of a corner.
+    /// As [`Intrinsics::undistort`], with the derivative by `px`, for the covariance of a corner.
     pub fn undistort_with(&self, px: &Point2<f64>) -> Option<(Point2<f64>, Matrix2<f64>)> {
         if self.distortion == Distortion::None {
             return Some((*px, Matrix2::identity()));

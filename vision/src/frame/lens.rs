@@ -1,5 +1,5 @@
 //! Lens models of OpenCV and ROS on normalised coordinates (x / z, y / z): distortion, its inverse and both
-//! derivatives. A lens that cannot be undone at a point gives `None`.
+//! derivatives. A distortion that is not invertible at a point gives `None`.
 
 use nalgebra::{Matrix2, Point2, Vector2};
 use serde::{Deserialize, Serialize};
@@ -7,13 +7,13 @@ use serde::{Deserialize, Serialize};
 /// Widest ray, from the axis, that a pinhole picture is made of: 85 degrees. A fisheye sees more; there is no pinhole
 /// pixel for that.
 pub const MAX_RAY_RAD: f64 = 85.0 * std::f64::consts::PI / 180.0;
-/// Most Newton steps of undoing a lens.
+/// Most Newton steps of the inverse.
 const MAX_STEPS: usize = 30;
 /// A step below this (normalised) ends it: 1e-10 px at a focal length of 1000 px.
 const STEP_TOLERANCE: f64 = 1e-13;
-/// Largest error of bending the result again, normalised: 1e-6 px at a focal length of 1000 px.
+/// Largest round-trip error of the inverse, normalised: 1e-6 px at a focal length of 1000 px.
 const ROUND_TRIP: f64 = 1e-9;
-/// Points of the way out from the axis at which a lens must not fold.
+/// Points between the axis and the result at which the Jacobian is checked for folds.
 const WAY_POINTS: usize = 16;
 
 /// Lens distortion, in OpenCV's and ROS's coefficient order. Applied to normalised coordinates.
@@ -31,12 +31,12 @@ pub enum Distortion {
     Equidistant([f64; 4]),
 }
 
-/// A point behind the lens, and how it moves.
+/// A distorted point with its derivative.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DistortedPoint {
-    /// Normalised, as the lens shows it.
+    /// The distorted point, normalised.
     pub point: Point2<f64>,
-    /// By the straight point.
+    /// Derivative by the undistorted point.
     pub by_straight: Matrix2<f64>,
 }
 
@@ -51,7 +51,7 @@ impl Distortion {
         }
     }
 
-    /// Where the lens shows the straight point `p`, with the derivative.
+    /// The distorted point of the undistorted point `p`, with the derivative.
     pub fn distort(&self, p: &Point2<f64>) -> DistortedPoint {
         match *self {
             Self::None => DistortedPoint { point: *p, by_straight: Matrix2::identity() },
@@ -63,9 +63,8 @@ impl Distortion {
         }
     }
 
-    /// The straight point that the lens shows at `bent`. `None` where there is none, beyond [`MAX_RAY_RAD`], and
-    /// where the lens folds between the axis and it: there the polynomial describes no lens, and another point looks
-    /// the same.
+    /// The undistorted point of `bent`. `None` where there is none, beyond [`MAX_RAY_RAD`], and where the model
+    /// folds between the axis and the point: there the inverse is not unique.
     pub fn undistort(&self, bent: &Point2<f64>) -> Option<Point2<f64>> {
         let start = match *self {
             Self::None => return Some(*bent),
@@ -77,7 +76,7 @@ impl Distortion {
             let at = self.distort(&p);
             let error = bent - at.point;
             let step = at.by_straight.try_inverse()? * error;
-            // Halved until it helps: far out the polynomial is steep.
+            // The step is halved until the residual falls: far out the polynomial is steep.
             let next = (0..8).map(|i| p + step * 0.5_f64.powi(i)).find(|next| {
                 let left = (bent - self.distort(next).point).norm();
                 left < error.norm() || left < ROUND_TRIP
@@ -92,7 +91,7 @@ impl Distortion {
         (found && self.is_unfolded(&p)).then_some(p)
     }
 
-    /// Whether nearby straight points keep their order all the way from the axis to `p`.
+    /// Whether the Jacobian stays positive from the axis to `p`.
     fn is_unfolded(&self, p: &Point2<f64>) -> bool {
         (1..=WAY_POINTS).all(|i| {
             let at = self.distort(&Point2::from(p.coords * (i as f64 / WAY_POINTS as f64))).by_straight;
@@ -219,7 +218,7 @@ mod tests {
 
     /// `cv2.projectPoints(points, 0, 0, I, k)` of OpenCV 5.0.0, and `cv2.fisheye.projectPoints` for the fisheye.
     #[test]
-    fn bends_as_opencv_does() {
+    fn distortion_agrees_with_opencv() {
         let points = [[0.3, -0.2], [-0.5, 0.35], [0.02, 0.7], [0.0, 0.0]];
         let golden =
             [(PLUMB_BOB, OPENCV_PLUMB_BOB), (RATIONAL, OPENCV_RATIONAL), (EQUIDISTANT, OPENCV_EQUIDISTANT)];
@@ -245,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lens_that_folds_is_not_undone() {
+    fn a_folding_distortion_is_not_inverted() {
         // r (1 - 0.5 r2) has its greatest value 0.544 at r = 0.816: beyond, no straight point; a steep fifth power
         // brings the picture back further out, which is another branch.
         let folding = Distortion::PlumbBob([-0.5, 0.0, 0.0, 0.0, 0.0]);
@@ -272,7 +271,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn straight_points_come_back(x in -0.7..0.7_f64, y in -0.6..0.6_f64, model in 0_usize..4) {
+        fn undistort_inverts_distort(x in -0.7..0.7_f64, y in -0.6..0.6_f64, model in 0_usize..4) {
             let lens = [Distortion::None, PLUMB_BOB, RATIONAL, EQUIDISTANT][model];
             let p = Point2::new(x, y);
             let back = lens.undistort(&lens.distort(&p).point).unwrap();
@@ -280,7 +279,7 @@ mod tests {
         }
 
         #[test]
-        fn any_lens_gives_a_round_trip_or_nothing(
+        fn any_distortion_gives_a_round_trip_or_none(
             k in proptest::array::uniform8(-5.0..5.0_f64), x in -3.0..3.0_f64, y in -3.0..3.0_f64, model in 0_usize..3,
         ) {
             let lens = [

@@ -1,5 +1,5 @@
-//! What enters the pipeline: a grey image and, when known, the camera's intrinsics. Both are checked here, once; every
-//! later stage may rely on it.
+//! What enters the pipeline: a grey image and, when known, the camera's intrinsics. Both are checked here, once;
+//! every later stage may rely on it.
 
 mod image;
 mod lens;
@@ -16,7 +16,7 @@ mod tests {
     use nalgebra::{Point2, Vector3};
 
     #[test]
-    fn refuses_what_is_not_an_image() {
+    fn invalid_images_are_refused() {
         assert_eq!(GrayImage::new(0, 4, vec![]), Err(FrameError::Size { width: 0, height: 4 }));
         assert!(GrayImage::new(MAX_SIDE_PX, 1, vec![0; MAX_SIDE_PX]).is_ok());
         assert!(matches!(
@@ -27,7 +27,7 @@ mod tests {
     }
 
     #[test]
-    fn refuses_cameras_that_cannot_be() {
+    fn invalid_intrinsics_are_refused() {
         assert!(matches!(
             Intrinsics::new(f64::NAN, 500.0, 0.0, 0.0, Distortion::None),
             Err(FrameError::Intrinsics { field: "fx_px", .. })
@@ -79,8 +79,8 @@ mod tests {
     }
 
     #[test]
-    fn a_short_side_is_hardly_bent() {
-        // What the search for quads must bear: how far a vertical side at the right edge of the image leaves its chord.
+    fn a_short_side_stays_nearly_straight() {
+        // How far a vertical side at the right edge of the image leaves its chord; detection must tolerate it.
         let lens = Distortion::PlumbBob([-0.28, 0.09, 0.0, 0.0, 0.0]);
         let camera = Intrinsics::new(520.0, 520.0, 319.5, 239.5, lens).unwrap();
         let middle = camera.undistort(&Point2::new(619.5, 239.5)).unwrap();

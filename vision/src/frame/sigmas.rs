@@ -1,5 +1,5 @@
-//! Standard deviations of intrinsics, and how wrong intrinsics move a pixel. First order: one share of the focal
-//! length for fx and fy, and the principal point. Errors of the lens coefficients are not modelled.
+//! Standard deviations of intrinsics, and the derivative of a pixel by their errors. First order: one share of the
+//! focal length for fx and fy, and the principal point. Errors of the lens coefficients are not modelled.
 
 use crate::frame::{
     image::FrameError,
@@ -8,7 +8,7 @@ use crate::frame::{
 use nalgebra::{Matrix2, Matrix2x3, Point2, Vector3};
 
 impl Intrinsics {
-    /// The same camera, known so surely. Both finite, 0 to [`IntrinsicsSigmas::MAX_SHARE`] of fx.
+    /// The same camera with these standard deviations. Both finite, 0 to [`IntrinsicsSigmas::MAX_SHARE`] of fx.
     pub fn with_sigmas(self, sigmas: IntrinsicsSigmas) -> Result<Self, FrameError> {
         for (field, value) in [("focal_sigma_px", sigmas.focal_px), ("center_sigma_px", sigmas.center_px)] {
             if !(0.0..=IntrinsicsSigmas::MAX_SHARE * self.fx_px).contains(&value) {
@@ -25,9 +25,9 @@ impl Intrinsics {
             .map_or_else(Vector3::zeros, |s| Vector3::new(s.focal_px / self.fx_px, s.center_px, s.center_px))
     }
 
-    /// How the undistorted pixel `straight_px` (see [`Intrinsics::undistort`]) of a given raw pixel would move if the
-    /// camera's (share of the focal length, cx, cy) were more; still written as a pixel of this pinhole. `None` where
-    /// the lens cannot be undone.
+    /// Derivative of the undistorted pixel `straight_px` (see [`Intrinsics::undistort`]) of a given raw pixel by
+    /// errors of (share of the focal length, cx, cy), in pixels of this pinhole. `None` where the distortion is not
+    /// invertible.
     pub fn straight_by_errors(&self, straight_px: &Point2<f64>) -> Option<Matrix2x3<f64>> {
         let bent = self.distortion.distort(&self.normalised(straight_px));
         let focal = Matrix2::new(self.fx_px, 0.0, 0.0, self.fy_px);
@@ -60,7 +60,7 @@ mod tests {
                 let (share, cx_px, cy_px) = (1.0 + d.x, camera.cx_px + d.y, camera.cy_px + d.z);
                 let (fx_px, fy_px) = (camera.fx_px * share, camera.fy_px * share);
                 let other = Intrinsics { fx_px, fy_px, cx_px, cy_px, ..camera };
-                // Where the other camera says the ray goes, as a pixel of this one's pinhole.
+                // The ray of the other camera, as a pixel of this one's pinhole.
                 camera.pixel(&other.normalised(&other.undistort(&raw).unwrap()))
             };
             for (k, h) in [1e-6, 1e-3, 1e-3].into_iter().enumerate() {

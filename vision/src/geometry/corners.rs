@@ -14,9 +14,8 @@ pub enum CornersError {
     NotConvex,
 }
 
-/// Four corners in pixels: top-left, top-right, bottom-right, bottom-left as a viewer in front sees them, hence
-/// clockwise on screen (u right, v down). Strictly convex. Everything in Waymark that has corners has them in this
-/// order.
+/// Four corners in pixels: top-left, top-right, bottom-right, bottom-left seen from the front, hence clockwise on
+/// screen (u right, v down). Strictly convex. All corners in Waymark have this order.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "[[f64; 2]; 4]", into = "[[f64; 2]; 4]")]
 pub struct Corners([Point2<f64>; 4]);
@@ -110,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn corners_are_checked() {
+    fn invalid_corners_are_refused() {
         assert!(Corners::try_from(square()).is_ok());
         let mut counter_clockwise = square();
         counter_clockwise.reverse();
@@ -136,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn four_rotations_come_back() {
+    fn four_rotations_give_the_same_corners() {
         let corners = Corners::try_from(square()).unwrap();
         assert_eq!(corners.rotated(1).rotated(3), corners);
         assert!(corners.rotated(2).lean_rad() > 3.0);

@@ -55,8 +55,8 @@ impl Homography {
         }
     }
 
-    /// The map that takes `from[i]` nearly to `to[i]` for four points or more: least squares of the algebraic error on
-    /// normalised points. A start for something better; four points it meets exactly.
+    /// The map that takes `from[i]` nearly to `to[i]` for four points or more: least squares of the algebraic error
+    /// on normalised points. A start value for refinement; exact for four points.
     pub fn fit(from: &[Point2<f64>], to: &[Point2<f64>]) -> Result<Self, HomographyError> {
         if let (&[a, b, c, d], &[p, q, r, s]) = (from, to) {
             return Self::from_points(&[a, b, c, d], &[p, q, r, s]);
@@ -179,18 +179,18 @@ mod tests {
     }
 
     #[test]
-    fn many_points_of_one_plane_give_its_map() {
+    fn many_points_of_a_plane_give_its_homography() {
         let truth =
             Homography::from_matrix(Matrix3::new(0.9, 0.1, 30.0, -0.2, 1.1, 12.0, 3e-4, -2e-4, 1.0)).unwrap();
         let grid: Vec<_> =
             (0..30).map(|i| Point2::new(f64::from(i % 6) * 40.0, f64::from(i / 6) * 30.0)).collect();
-        let seen: Vec<_> = grid.iter().map(|p| truth.apply(p)).collect();
-        let fitted = Homography::fit(&grid, &seen).unwrap();
+        let mapped: Vec<_> = grid.iter().map(|p| truth.apply(p)).collect();
+        let fitted = Homography::fit(&grid, &mapped).unwrap();
         assert!((fitted.matrix() - truth.matrix()).norm() < 1e-9);
         // Four points: the exact map; fewer or unequal lists: none.
-        assert_eq!(Homography::fit(&grid[..3], &seen[..3]), Err(HomographyError::Degenerate));
-        assert_eq!(Homography::fit(&grid[..5], &seen[..6]), Err(HomographyError::Degenerate));
-        assert_eq!(Homography::fit(&grid[..6], &seen[..6]), Err(HomographyError::Degenerate), "one row");
+        assert_eq!(Homography::fit(&grid[..3], &mapped[..3]), Err(HomographyError::Degenerate));
+        assert_eq!(Homography::fit(&grid[..5], &mapped[..6]), Err(HomographyError::Degenerate));
+        assert_eq!(Homography::fit(&grid[..6], &mapped[..6]), Err(HomographyError::Degenerate), "one row");
     }
 
     #[test]
@@ -227,7 +227,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn corners_come_back(corners in convex(), size in 20_usize..200) {
+        fn corners_are_mapped_exactly(corners in convex(), size in 20_usize..200) {
             let image_from_icon = Homography::square_to_quad(size, &corners).unwrap();
             let icon_from_image = image_from_icon.inverse().unwrap();
             let (low, high) = (-0.5, size as f64 - 0.5);

@@ -1,10 +1,10 @@
-//! Between which pixels a coordinate lies, for linear interpolation many at a time.
+//! The pixels around a coordinate, for vectorised linear interpolation.
 
-/// At and above it a 32-bit number has no fraction.
+/// At and above this value an f32 has no fractional bits.
 const WHOLE: f32 = 8_388_608.0;
 
-/// The pixel before `u`, as an index and as a number: `u - number` is in [0, 1]. A whole `u` may give the pixel before
-/// it, too; interpolation comes to the same. For `u` from 0 to 2^22; pixel 0 for what is no number.
+/// The pixel before `u`, as an index and as a number: `u - number` is in [0, 1]. A whole `u` may give the pixel
+/// before it, too; interpolation gives the same value. For `u` from 0 to 2^22; pixel 0 for NaN.
 ///
 /// A cast would first have to look for numbers that fit nowhere, which takes longer than all the rest.
 #[expect(

@@ -1,7 +1,7 @@
 //! Image lines in normal form, and the total-least-squares line of a set of points.
 //!
 //! Points go in one by one into [`LineSums`]; sums of two sets add up, so pieces of an edge are joined and refitted
-//! without touching their points again. Nothing here knows about edges or images.
+//! without their points.
 
 use nalgebra::{Point2, Vector2};
 
@@ -62,7 +62,7 @@ impl Line {
         ))
     }
 
-    /// The same line seen from the other side.
+    /// The same line with the opposite normal.
     #[must_use]
     pub fn flipped(&self) -> Self {
         Self { normal: -self.normal, rho_px: -self.rho_px }
@@ -121,7 +121,7 @@ impl LineSums {
         let (mean, half) = (f64::midpoint(sxx, syy), 0.5 * (sxx - syy));
         let radius = (half * half + sxy * sxy).sqrt();
         let spread_px2 = mean + radius;
-        // Sums of squares cancel: what is left below this is rounding, not spread.
+        // Sums of squares cancel: a spread below this is rounding.
         if !spread_px2.is_finite() || spread_px2 <= 1e-12 * (self.xx + self.yy) + f64::MIN_POSITIVE {
             return None;
         }
@@ -157,7 +157,7 @@ impl std::ops::Add for LineSums {
 
 impl std::ops::Sub for LineSums {
     type Output = Self;
-    /// Takes out a part of the set.
+    /// The sums without those of a part of the set.
     fn sub(self, o: Self) -> Self {
         Self {
             n: self.n - o.n,
@@ -180,7 +180,7 @@ impl FromIterator<Point2<f64>> for LineSums {
 }
 
 impl LineFit {
-    /// Least standard deviation of an edge point across its line, px: residuals of short pieces flatter.
+    /// Least standard deviation of an edge point across its line, px: residuals of short pieces underestimate it.
     pub const MIN_SIGMA_PX: f64 = 0.2;
 
     /// Variance of one point across the line, px^2, never below [`Self::MIN_SIGMA_PX`] squared.

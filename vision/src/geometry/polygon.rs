@@ -1,5 +1,5 @@
-//! Convex polygons as slices of vertices: area, intersection, overlap and the relations that the constraint tables
-//! ask for. Vertices run clockwise on screen (u right, v down), as in [`crate::geometry::corners::Corners`]; for the
+//! Convex polygons as slices of vertices: area, intersection, overlap and the relations used by the constraint
+//! tables. Vertices run clockwise on screen (u right, v down), as in [`crate::geometry::corners::Corners`]; for the
 //! measures the other direction works as well. Does not handle concave or self-crossing polygons.
 
 use nalgebra::{Point2, Vector2};
@@ -26,14 +26,14 @@ pub fn intersection_area(a: &[Point2<f64>], b: &[Point2<f64>]) -> f64 {
         part[..a.len()].copy_from_slice(a);
         let mut n = a.len();
         for side in edges(b) {
-            let mut kept = 0;
+            let mut vertices = 0;
             cut(&part[..n], side, signed_area(b).signum(), |p| {
-                // Rounding can bend a polygon inwards; a corner too many is of no size.
-                if let Some(place) = next.get_mut(kept) {
-                    (*place, kept) = (p, kept + 1);
+                // Rounding can make a polygon concave; a surplus corner is dropped, its area is negligible.
+                if let Some(place) = next.get_mut(vertices) {
+                    (*place, vertices) = (p, vertices + 1);
                 }
             });
-            (part, next, n) = (next, part, kept);
+            (part, next, n) = (next, part, vertices);
         }
         return area(&part[..n]);
     }
@@ -46,10 +46,10 @@ pub fn intersection_area(a: &[Point2<f64>], b: &[Point2<f64>]) -> f64 {
     area(&part)
 }
 
-/// Polygons with so many vertices in all are cut in memory of fixed size.
+/// Polygons with up to this many vertices in all are clipped in memory of fixed size.
 const SMALL: usize = 12;
 
-/// Gives the vertices of what of a polygon lies within the line of a side of another that turns this way.
+/// The vertices of the part of a polygon inside the line of a side of another of this orientation.
 #[inline]
 fn cut(
     polygon: &[Point2<f64>],
@@ -133,7 +133,7 @@ pub fn relation(a: &[Point2<f64>], b: &[Point2<f64>], tolerance_px: f64) -> Rela
     }
 }
 
-/// Whether the normal of an edge of `a` separates the polygons, overlap of twice the tolerance forgiven.
+/// Whether the normal of an edge of `a` separates the polygons, up to an overlap of twice the tolerance.
 fn separated(a: &[Point2<f64>], b: &[Point2<f64>], tolerance_px: f64) -> bool {
     let turn = signed_area(a).signum();
     edges(a).any(|(p, q)| {
@@ -173,8 +173,8 @@ mod tests {
         [[u, v], [u + width, v], [u + width, v + height], [u, v + height]].map(Point2::from)
     }
 
-    /// Share of cell centres of a fine grid that a predicate accepts, times the grid's area: an oracle that shares
-    /// nothing with clipping.
+    /// Share of cell centres of a fine grid that a predicate accepts, times the grid's area: an oracle independent
+    /// of clipping.
     fn grid_area(low: f64, high: f64, inside: impl Fn(&Point2<f64>) -> bool) -> f64 {
         let n = 500;
         let cell = (high - low) / f64::from(n);
@@ -205,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn polygons_of_many_sides_are_cut_as_well() {
+    fn polygons_of_many_sides_are_clipped() {
         let round = |u: f64, sides: u32| -> Vec<Point2<f64>> {
             let angles = (0..sides).map(|i| std::f64::consts::TAU * f64::from(i) / f64::from(sides));
             angles.map(|a| Point2::new(u + 30.0 * a.cos(), 30.0 * a.sin())).collect()
@@ -265,7 +265,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(40))]
         #[test]
-        fn clipping_agrees_with_counting(a in quad(), b in quad()) {
+        fn clipping_agrees_with_grid_counting(a in quad(), b in quad()) {
             prop_assert!(is_convex(&a) && is_convex(&b));
             let counted = grid_area(-65.0, 65.0, |p| ray_inside(&a, p) && ray_inside(&b, p));
             prop_assert!((intersection_area(&a, &b) - counted).abs() < 0.01 * area(&a).max(area(&b)) + 4.0);
@@ -276,7 +276,7 @@ mod tests {
         }
 
         #[test]
-        fn containing_agrees_with_rays(a in quad(), u in -60.0..60.0_f64, v in -60.0..60.0_f64) {
+        fn containment_agrees_with_ray_casting(a in quad(), u in -60.0..60.0_f64, v in -60.0..60.0_f64) {
             let p = Point2::new(u, v);
             prop_assert_eq!(contains(&a, &p, 0.0), ray_inside(&a, &p));
         }

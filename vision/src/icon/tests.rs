@@ -64,7 +64,7 @@ fn ramp_equals_supersampling_within_a_grey_level() {
 }
 
 #[test]
-fn texture_is_kept_at_every_scale() {
+fn texture_equals_supersampling_at_every_scale() {
     let image = textured(500, 500);
     let p = IconParams { min_side_ratio: 0.0, ..IconParams::default() };
     for side in [45.0, 80.0, 150.0, 400.0] {
@@ -107,7 +107,7 @@ fn rotated_equals_the_icon_of_rotated_corners() {
 }
 
 #[test]
-fn bounds_are_kept() {
+fn sizes_and_shares_outside_the_limits_are_refused() {
     let image = textured(100, 100);
     let p = IconParams::default();
     let square = |a: f64, side: f64| corners([[a, a], [a + side, a], [a + side, a + side], [a, a + side]]);
@@ -123,7 +123,7 @@ fn bounds_are_kept() {
 }
 
 #[test]
-fn foreign_icons_are_checked() {
+fn icons_from_external_data_are_checked() {
     assert!(Icon::new(20, vec![0.0; 400], 1.0).is_ok());
     assert_eq!(Icon::new(19, vec![0.0; 361], 1.0), Err(IconError::Size { size: 19 }));
     assert_eq!(Icon::new(20, vec![0.0; 399], 1.0), Err(IconError::Malformed { field: "pixels" }));

@@ -1,13 +1,14 @@
-//! Gates at the end of modelling (method 9): is the landmark salient, stable, and seen from far enough apart?
+//! Gates at the end of modelling (method 9): is the landmark salient, stable, and observed from sufficiently
+//! different viewpoints?
 //!
-//! In: the training icons, their points and the corners they were cut from. Out: numbers with their limits. Whether a
-//! failed gate keeps a landmark back is said in [`crate::model::landmark_model::ModelStatus`].
+//! In: the training icons, their points and the corners they were cut from. Out: numbers with their limits. The
+//! consequence of a failed gate is defined by [`crate::model::landmark_model::ModelStatus`].
 
 use crate::recognise::features::descriptor::PointSet;
 use nalgebra::{Matrix3, Point2, Vector2};
 use serde::{Deserialize, Serialize};
 
-/// Grey-level deviation that every icon is brought to before saliency.
+/// Grey-level standard deviation to which every icon is normalised before saliency.
 const NORMAL_DEVIATION: f64 = 50.0;
 /// Value of `v_c` where the homography's last element all but vanishes, and its upper bound.
 pub const V_C_CAP: f64 = 10.0;
@@ -20,19 +21,19 @@ pub struct GateParams {
     pub min_views: usize,
     /// Least saliency F.
     pub min_saliency_f: f64,
-    /// The same where at most one view was photographed; else the limit lies between, by the share of photographed
-    /// ones. Generated views are flat and registered by construction, so F only has to tell texture from a blank
-    /// panel (1.1), while their corner noise and light are harsher than a robot's own.
+    /// The same where at most one view was photographed; otherwise interpolated by the share of photographed views.
+    /// Generated views are flat and registered by construction, so F only has to distinguish texture from a blank
+    /// panel (1.1), while their corner noise and light vary more than in a robot's own views.
     pub min_saliency_f_generated: f64,
-    /// Fewest stable points, where one of the paper's distances decides alone.
+    /// Fewest stable points, where neither of the paper's distances has a threshold.
     pub min_stable_points: usize,
     /// Least visibility confidence `v_c`.
     pub min_v_c: f64,
-    /// How far a stable point may move, in icon pixels.
+    /// Largest displacement of a stable point, in icon pixels.
     pub stable_within_px: f64,
-    /// Largest descriptor distance at which it still is the same point.
+    /// Largest descriptor distance of a stable point.
     pub stable_within_nu: f64,
-    /// Share of the training icons in which it must come back.
+    /// Share of the training icons in which a stable point must be found again.
     pub stable_share: f64,
 }
 
@@ -51,8 +52,9 @@ impl Default for GateParams {
     }
 }
 
-/// `F = V_s / (V_t + 1)`: spatial variance of the mean icon over the variance of each pixel between icons, every icon
-/// brought to mean 0 and deviation 50 first. Large for a textured plane seen alike, near 0 for a blank or mixed one.
+/// `F = V_s / (V_t + 1)`: spatial variance of the mean icon over the variance of each pixel between icons, every
+/// icon normalised to mean 0 and standard deviation 50 first. Large for a textured plane with consistent views,
+/// near 0 for a blank or inconsistent one.
 pub fn saliency_f(icons: &[&[f32]]) -> f64 {
     let Some(pixels) = icons.first().map(|i| i.len()).filter(|p| *p > 0) else { return 0.0 };
     let n = icons.len() as f64;
@@ -70,12 +72,12 @@ pub fn saliency_f(icons: &[&[f32]]) -> f64 {
     spatial / (temporal + 1.0)
 }
 
-/// `sal = min(1, n_stable / 20) F / (F + 6)` in [0, 1): one number for choosing where to look (method 14).
+/// `sal = min(1, n_stable / 20) F / (F + 6)` in [0, 1): one number for the choice of gaze (method 14).
 pub fn saliency(f: f64, stable_points: usize) -> f64 {
     (stable_points as f64 / 20.0).min(1.0) * f / (f + 6.0)
 }
 
-/// Points of icon `reference` that come back in at least the given share of the icons, itself included: within
+/// Points of icon `reference` that are found in at least the given share of the icons, itself included: within
 /// `stable_within_px` and with a descriptor distance below `stable_within_nu`.
 pub fn stable_points(reference: usize, icons: &[&PointSet], p: &GateParams) -> usize {
     let Some(points) = icons.get(reference) else { return 0 };
@@ -161,7 +163,7 @@ mod tests {
 
     /// Corners of the golden poster (0.60 x 0.84 m) for a level camera (f = 700, 640 x 480) 0.3 m below its centre,
     /// at `bearing_deg` and `distance_m` in plan view, turned towards it.
-    fn seen_from(bearing_deg: f64, distance_m: f64) -> ([Point2<f64>; 4], [f64; 2]) {
+    fn view_from(bearing_deg: f64, distance_m: f64) -> ([Point2<f64>; 4], [f64; 2]) {
         let bearing = bearing_deg.to_radians();
         let centre = Vector3::new(distance_m * bearing.cos(), distance_m * bearing.sin(), -0.3);
         // Camera z looks back at the poster's axis, y down, x to the right.
@@ -180,8 +182,8 @@ mod tests {
 
     /// Golden values of method 9.
     #[test]
-    fn golden_v_c() {
-        let v = |views: &[(f64, f64)]| v_c(&views.iter().map(|(b, d)| seen_from(*b, *d)).collect::<Vec<_>>());
+    fn v_c_of_the_golden_views() {
+        let v = |views: &[(f64, f64)]| v_c(&views.iter().map(|(b, d)| view_from(*b, *d)).collect::<Vec<_>>());
         assert!(v(&[(0.0, 3.0)]).abs() < 1e-12);
         assert!(v(&[(20.0, 3.0), (20.0, 3.0)]).abs() < 1e-9);
         assert!((v(&[(30.0, 3.0), (-30.0, 3.0)]) - 0.66).abs() < 5e-3, "{}", v(&[(30.0, 3.0), (-30.0, 3.0)]));
@@ -194,7 +196,7 @@ mod tests {
     /// In-plane turn by `a` about the image centre: ||R - I|| = sqrt(8) sin(a / 2).
     #[test]
     fn v_c_of_a_turn_in_the_plane() {
-        let (corners, size) = seen_from(0.0, 3.0);
+        let (corners, size) = view_from(0.0, 3.0);
         let centre = Vector2::new(319.5, 239.5);
         let turned =
             corners.map(|c| Point2::from(nalgebra::Rotation2::new(0.4) * (c.coords - centre) + centre));
@@ -263,7 +265,7 @@ mod tests {
     }
 
     #[test]
-    fn points_are_stable_where_they_come_back() {
+    fn points_found_in_enough_icons_are_stable() {
         // Of five icons: the first point comes back in all, the second in 3 of 5 (the limit), the third in 2, the
         // fourth at the right place with another texture, the fifth just too far away.
         let reference = points(&[

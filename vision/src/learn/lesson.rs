@@ -1,12 +1,12 @@
-//! Views of one landmark in, its model out (method 7 to 9 on one page). `threshold_fit` sets the thresholds. The caller
-//! collects views, stores models and names look-alikes.
+//! Trains a landmark model: views of one landmark in, its model out (method 7 to 9). `threshold_fit` sets the
+//! thresholds. The caller collects views, stores models and reports look-alikes.
 
 use crate::{
     icon::Icon,
     learn::{
         gates::{saliency, saliency_f, stable_points, v_c},
         pca::{exemplars, modes},
-        threshold_fit::{Templates, ready, refit_thresholds},
+        threshold_fit::{Templates, prepared, refit_thresholds},
         training_view::TrainingView,
     },
     model::{
@@ -22,7 +22,7 @@ use crate::{
     },
 };
 
-/// Why nothing could be learnt.
+/// Why no model could be trained.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum LearnError {
     /// No view.
@@ -31,26 +31,26 @@ pub enum LearnError {
     /// Too many views.
     #[error("views: {found} given, at most {MAX_VIEWS} allowed")]
     TooManyViews {
-        /// How many.
+        /// Number of views given.
         found: usize,
     },
     /// A view's icon has another size than the parameters say.
     #[error("views: icon {index} is {found} px wide, the parameters say {expected}")]
     IconSize {
-        /// Which view.
+        /// Index of the view.
         index: usize,
         /// Its icon's side in pixels.
         found: usize,
-        /// The side the parameters ask for.
+        /// The icon side of the parameters.
         expected: usize,
     },
-    /// A view's icon holds numbers that are no grey levels, or the components do not converge.
+    /// A view's icon contains values that are not grey levels, or the components do not converge.
     #[error("views: the icons have no principal components")]
     NoComponents,
 }
 
-/// Learns a landmark. `negatives` are icons of everything it must be told from: other landmarks, and quads that are
-/// no landmark. Without any, the absolute caps of [`crate::learn::params::LearnParams`] stand in for them.
+/// Trains the model of a landmark. `negatives` are icons of other landmarks and of quads that are not landmarks.
+/// Without any, the absolute caps of [`crate::learn::params::LearnParams`] apply.
 pub fn learn(
     id: LandmarkId,
     views: &[TrainingView],
@@ -62,13 +62,14 @@ pub fn learn(
     let pixels: Vec<&[f32]> = icons.iter().map(|i| i.icon.pixels.as_slice()).collect();
     let components = modes(&pixels).ok_or(LearnError::NoComponents)?;
     let chosen: Vec<usize> = exemplars(&components).iter().map(|e| e.index).collect();
-    // An exemplar's own corners would be wrong by as much as a detector's: what is laid on it would be as well.
+    // An exemplar cut along detected corners would pass their error on to every picture aligned with it.
     let exemplar = |i: usize| {
         views[i].exact.as_ref().map_or_else(|| icons[i].clone(), |e| features(whole(e), &p.recognise))
     };
-    let kept: Vec<IconFeatures> = chosen.iter().map(|i| exemplar(*i)).collect();
-    let own = own_distances(&icons, (&chosen, &kept), exemplar, p).ok_or(LearnError::NoComponents)?;
-    let kept: Vec<Exemplar> = kept.iter().map(|k| Exemplar::new(&k.icon)).collect();
+    let exemplar_features: Vec<IconFeatures> = chosen.iter().map(|i| exemplar(*i)).collect();
+    let own =
+        own_distances(&icons, (&chosen, &exemplar_features), exemplar, p).ok_or(LearnError::NoComponents)?;
+    let exemplars: Vec<Exemplar> = exemplar_features.iter().map(|k| Exemplar::new(&k.icon)).collect();
 
     let saliency_f = saliency_f(&pixels);
     let points: Vec<_> = icons.iter().map(|i| &i.points).collect();
@@ -92,40 +93,40 @@ pub fn learn(
         },
         likeness: Threshold::NEVER,
         likeness_evidence: DistanceSamples {
-            own: rising(own_unlikeness(&icons, (&chosen, &kept), p).into_iter()),
+            own: rising(own_unlikeness(&icons, (&chosen, &exemplars), p).into_iter()),
             ..DistanceSamples::default()
         },
         saliency_f,
         stable_points,
         saliency: saliency(saliency_f, stable_points),
-        v_c: v_c(&seen_at(views, true)),
-        photographed_v_c: v_c(&seen_at(views, false)),
+        v_c: v_c(&corners_and_sizes(views, true)),
+        photographed_v_c: v_c(&corners_and_sizes(views, false)),
         status: ModelStatus::Candidate(vec![]),
         points: vec![],
         knows_points: false,
-        exemplars: kept,
+        exemplars,
     };
     Ok(refit_thresholds(&model, negatives, p))
 }
 
-/// Own icons that are laid on the exemplars, evenly chosen: only their median counts.
-const MAX_OWN_LAID: usize = 9;
+/// Own icons that are aligned with the exemplars, evenly chosen: only their median is used.
+const MAX_OWN_ALIGNED: usize = 9;
 
-/// 1 minus the likeness of the landmark's own icons that are no exemplars, laid on those.
+/// 1 minus the likeness of the landmark's own icons that are not exemplars, aligned with the exemplars.
 fn own_unlikeness(
     icons: &[IconFeatures],
     (chosen, exemplars): (&[usize], &[Exemplar]),
     p: &Params,
 ) -> Vec<f64> {
-    let ready = ready(exemplars, p);
-    let templates = Templates::new(&ready, p);
+    let prepared = prepared(exemplars, p);
+    let templates = Templates::new(&prepared, p);
     let others: Vec<_> = icons.iter().enumerate().filter(|(i, _)| !chosen.contains(i)).collect();
-    let every = others.len().div_ceil(MAX_OWN_LAID).max(1);
+    let every = others.len().div_ceil(MAX_OWN_ALIGNED).max(1);
     others.into_iter().step_by(every).map(|(_, icon)| templates.unlikeness(icon, -1.0)).collect()
 }
 
-/// Distances (C^r, H^r) of the landmark's own icons, none to a model that holds the icon itself (A19): by folds with
-/// many views, otherwise of the icons that are no exemplars. `None` if a fold has no components.
+/// Held-out distances (C^r, H^r) of the landmark's own icons, none to a model with the icon itself (A19): by folds
+/// with many views, otherwise of the icons that are not exemplars. `None` if a fold has no components.
 fn own_distances(
     icons: &[IconFeatures],
     (chosen, kept): (&[usize], &[IconFeatures]),
@@ -152,7 +153,7 @@ fn own_distances(
     Some(own)
 }
 
-/// The icon in whole grey levels, so that a model in memory and the same model stored agree bit for bit.
+/// The icon rounded to whole grey levels, so that a model in memory and the stored model are equal bit for bit.
 fn whole(icon: &Icon) -> Icon {
     let pixels = icon.pixels.iter().map(|g| g.round().clamp(0.0, 255.0)).collect();
     Icon { pixels, ..*icon }
@@ -165,7 +166,7 @@ fn rising(distances: impl Iterator<Item = f64>) -> Vec<f32> {
 }
 
 /// Corners and image sizes of all views, or of the photographed ones.
-fn seen_at(views: &[TrainingView], generated: bool) -> Vec<([nalgebra::Point2<f64>; 4], [f64; 2])> {
+fn corners_and_sizes(views: &[TrainingView], generated: bool) -> Vec<([nalgebra::Point2<f64>; 4], [f64; 2])> {
     let of_interest = views.iter().filter(|v| generated || !v.generated);
     of_interest.map(|v| (*v.corners_px.points(), v.image_size_px.map(|s| s as f64))).collect()
 }

@@ -1,8 +1,8 @@
-//! Which views of one object add something to those kept (method 7.1): another side, size, light or appearance.
-//! Near-duplicates add nothing and crowd out the rest.
+//! Rejects near-duplicate views of an object (method 7.1): a new view must differ from the kept ones in viewing
+//! direction, size, light or appearance.
 //!
-//! In: corners and icons. Out: how far two views are apart; 1 where they just differ. Whether they show the same
-//! object is not asked.
+//! In: corners and icons. Out: the novelty of a view; 1 where it reaches a limit. The views are assumed to show the
+//! same object.
 
 use crate::{
     geometry::corners::Corners,
@@ -12,21 +12,21 @@ use crate::{
 use nalgebra::{Point2, Vector2};
 use serde::{Deserialize, Serialize};
 
-/// How far two views must be apart, each in its own way.
+/// Smallest differences between two views.
 ///
-/// Departs from method 7.1 (0.2 m and 5 degrees apart): photographs do not say from where they were taken, so the
-/// limits are set on what such a step changes in the picture.
+/// Departs from method 7.1 (0.2 m and 5 degrees apart): the poses of photographs are unknown, so the limits are on
+/// the effect of such a step in the image.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct NoveltyParams {
-    /// Another side: how far a corner moves when both quads are brought to area 1. 5 degrees move it by 0.02 at 45
-    /// degrees off the normal.
+    /// Viewing direction: displacement of a corner with both quads normalised to area 1. 5 degrees move it by 0.02
+    /// at 45 degrees off the normal.
     pub shape: f64,
-    /// Nearer or farther: ratio of the quads' sides. 0.2 m change them by 1.1 at 2 m.
+    /// Size: ratio of the quads' sides. 0.2 m change them by 1.1 at 2 m.
     pub scale: f64,
-    /// Another light: difference of the icons' mean or deviation, grey levels.
+    /// Light: difference of the icons' mean or standard deviation, grey levels.
     pub light_grey: f64,
-    /// Otherwise: 1 minus the likeness of the icons' signatures.
+    /// Appearance: 1 minus the likeness of the icons' signatures.
     pub appearance: f64,
 }
 
@@ -36,7 +36,7 @@ impl Default for NoveltyParams {
     }
 }
 
-/// What is kept of a view to compare others with.
+/// Summary of a view for comparison.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ViewSummary {
     /// Corners about their centroid, at area 1.
@@ -48,7 +48,7 @@ pub struct ViewSummary {
 }
 
 impl ViewSummary {
-    /// Of a quad and its icon.
+    /// The summary of a quad and its icon.
     pub fn new(corners_px: &Corners, icon: &Icon) -> Self {
         let points = corners_px.points();
         let centre = points.iter().fold(Vector2::zeros(), |sum, p: &Point2<f64>| sum + p.coords * 0.25);
@@ -70,11 +70,11 @@ impl ViewSummary {
         self.side_px
     }
 
-    /// How far two views are apart, symmetric: 0 for the same, 1 where one of the limits is just reached.
+    /// Difference of two views, symmetric: 0 for equal views, 1 where one of the limits is just reached.
     pub fn novelty(&self, other: &Self, p: &NoveltyParams) -> f64 {
         let moved = self.shape.iter().zip(&other.shape).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
         let unlike = 1.0 - f64::from(likeness(self.signature.values(), other.signature.values()));
-        // Two blank icons have no signatures; they are alike.
+        // Two blank icons have no signatures; they count as equal.
         let both_blank = [self, other].iter().all(|v| v.signature.values().iter().all(|s| *s == 0));
         let parts = [
             moved / p.shape,
@@ -87,7 +87,7 @@ impl ViewSummary {
     }
 }
 
-/// The kept view that is most like `new`, and how far apart they are; the first of equals. `None` when nothing is kept.
+/// Index of the kept view most similar to `new`, and its novelty; the first of equals. `None` when `kept` is empty.
 pub fn most_alike<'a>(
     new: &ViewSummary,
     kept: impl IntoIterator<Item = &'a ViewSummary>,
@@ -103,8 +103,8 @@ mod tests {
     use crate::{frame::GrayImage, geometry::homography::Homography, icon::icon, params::Params};
     use nalgebra::{Rotation3, Vector3};
 
-    /// A poster of 0.6 m x 0.84 m seen by a camera of 500 px from `distance_m`, `angle_rad` off its normal.
-    fn seen(distance_m: f64, angle_rad: f64, gain: f64) -> ViewSummary {
+    /// A poster of 0.6 m x 0.84 m in the view of a camera of 500 px from `distance_m`, `angle_rad` off its normal.
+    fn summary(distance_m: f64, angle_rad: f64, gain: f64) -> ViewSummary {
         let turn = Rotation3::from_axis_angle(&Vector3::y_axis(), angle_rad);
         let corners = [[-0.3, -0.42], [0.3, -0.42], [0.3, 0.42], [-0.3, 0.42]].map(|[x, y]| {
             let p = turn * Vector3::new(x, y, 0.0) + Vector3::new(0.0, 0.0, distance_m);
@@ -121,9 +121,9 @@ mod tests {
     }
 
     #[test]
-    fn the_limits_are_those_of_the_method() {
+    fn steps_of_the_method_are_at_the_limits() {
         let p = NoveltyParams::default();
-        let from = |d, degrees: f64| seen(d, degrees.to_radians(), 1.0);
+        let from = |d, degrees: f64| summary(d, degrees.to_radians(), 1.0);
         let at = from(2.0, 45.0);
         // Half the method's step is a near-duplicate, twice the step is a view of its own, in each way.
         for (other, is_new) in [
@@ -131,8 +131,8 @@ mod tests {
             (from(2.4, 45.0), true),
             (from(2.0, 47.0), false),
             (from(2.0, 55.0), true),
-            (seen(2.0, 45.0_f64.to_radians(), 1.04), false),
-            (seen(2.0, 45.0_f64.to_radians(), 1.3), true),
+            (summary(2.0, 45.0_f64.to_radians(), 1.04), false),
+            (summary(2.0, 45.0_f64.to_radians(), 1.3), true),
         ] {
             assert_eq!(at.novelty(&other, &p) >= 1.0, is_new, "{}", at.novelty(&other, &p));
             assert!((at.novelty(&other, &p) - other.novelty(&at, &p)).abs() < 1e-12);
@@ -141,19 +141,19 @@ mod tests {
     }
 
     #[test]
-    fn the_most_alike_is_found() {
+    fn the_most_similar_view_is_found() {
         let p = NoveltyParams::default();
-        let kept = [seen(2.0, 0.0, 1.0), seen(3.0, 0.0, 1.0), seen(3.0, 0.9, 1.0)];
-        assert_eq!(most_alike(&seen(2.9, 0.0, 1.0), &kept, &p).unwrap().0, 1);
+        let kept = [summary(2.0, 0.0, 1.0), summary(3.0, 0.0, 1.0), summary(3.0, 0.9, 1.0)];
+        assert_eq!(most_alike(&summary(2.9, 0.0, 1.0), &kept, &p).unwrap().0, 1);
         assert_eq!(most_alike(&kept[0], [], &p), None);
     }
 
     #[test]
-    fn blank_icons_are_alike_and_nothing_is_infinite() {
+    fn blank_icons_are_equal_and_novelty_is_finite() {
         let square = [[0.0, 0.0], [90.0, 0.0], [90.0, 90.0], [0.0, 90.0]].map(|[x, y]| Point2::new(x, y));
         let square = Corners::new(square);
         let blank = ViewSummary::new(&square.unwrap(), &Icon::new(75, vec![90.0; 5625], 1.0).unwrap());
         assert!(blank.novelty(&blank, &NoveltyParams::default()) < 1e-12);
-        assert!(seen(2.0, 0.3, 1.0).novelty(&blank, &NoveltyParams::default()).is_finite());
+        assert!(summary(2.0, 0.3, 1.0).novelty(&blank, &NoveltyParams::default()).is_finite());
     }
 }

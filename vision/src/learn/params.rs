@@ -9,18 +9,19 @@ use serde::{Deserialize, Serialize};
 pub struct LearnParams {
     /// Choice of tau.
     pub threshold: ThresholdParams,
-    /// tau of C^r is never larger. Measured with the cap of H^r on 287 paintings, each taught alone from one
+    /// tau of C^r is never larger. Measured with the cap of H^r on 287 paintings, each trained alone from one
     /// photograph, without negatives, and 2281 quads of other photographs (2102 of them cut at random): of 654 000
-    /// comparisons with the wrong painting both distances accepted 3, all of one look-alike; of 162 taught paintings
-    /// 150 were accepted.
+    /// comparisons with the wrong painting both distances accepted 3, all of one look-alike; of 162 trained
+    /// paintings 150 were accepted.
     pub correlation_cap: f64,
     /// tau of H^r is never larger. Measured as above.
     pub hausdorff_cap: f64,
-    /// The distance of slopes after alignment (1 minus their likeness) is accepted below this, whatever the others are
-    /// like. Chosen on 107 photographs of taught paintings; with the thresholds learnt from the others, none of 732
-    /// quads of other buildings was accepted.
+    /// The distance of slopes after alignment (1 minus their likeness) is accepted below this at most, whatever the
+    /// negatives are. Chosen on 107 photographs of trained paintings; with thresholds fitted to the negatives, none
+    /// of 732 quads of other buildings was accepted.
     pub likeness_cap: f64,
-    /// From this many views on, own distances are measured by folds; below, by leaving the exemplars out.
+    /// From this many views on, own distances are measured by cross-validation; below, on the icons that are not
+    /// exemplars.
     pub min_views_for_folds: usize,
     /// Number of folds.
     pub folds: usize,
@@ -45,7 +46,7 @@ impl Default for LearnParams {
     }
 }
 
-/// Ranges that views are drawn from.
+/// Ranges of the generated views.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SynthesisParams {
@@ -55,11 +56,11 @@ pub struct SynthesisParams {
     pub max_pitch_rad: f64,
     /// Largest roll of the camera.
     pub max_roll_rad: f64,
-    /// Apparent size (square root of the frontal area) from, in pixels.
+    /// Smallest apparent size (square root of the frontal area), in pixels.
     pub min_size_px: f64,
-    /// Apparent size to, in pixels.
+    /// Largest apparent size, in pixels.
     pub max_size_px: f64,
-    /// Standard deviation of the corners per coordinate: the detector's.
+    /// Standard deviation of the corners per coordinate, as of the detector.
     pub corner_noise_px: f64,
     /// Contrast factor is drawn from 1 / `max_gain` to `max_gain`.
     pub max_gain: f64,
@@ -71,7 +72,7 @@ pub struct SynthesisParams {
     pub max_blur_px: f64,
     /// Largest standard deviation of the noise, in grey levels.
     pub max_noise: f64,
-    /// Largest share of the landmark that something stands before; 0 for none.
+    /// Largest occluded share of the landmark; 0 for none.
     pub max_occluded_share: f64,
 }
 

@@ -1,14 +1,13 @@
-//! Principal components of icons, and the icons that stand for them (method 7.2, 7.3).
+//! Principal components of icons, and the exemplars nearest to them (method 7.2, 7.3).
 //!
 //! In: the raw icons of one landmark. Out: mean, the two leading modes, and which icons lie nearest to these three.
-//! Everything goes through the N x N Gram matrix of the centred icons, never the S^2 x S^2 covariance. It knows
-//! nothing of distances or thresholds.
+//! Everything goes through the N x N Gram matrix of the centred icons, never the S^2 x S^2 covariance.
 
 use nalgebra::{DMatrix, SymmetricEigen};
 
 /// Leading modes kept beside the mean.
 pub const MODES: usize = 2;
-/// A mode below this share of the total variance carries nothing.
+/// Modes below this share of the total variance are dropped.
 const MIN_SHARE: f64 = 1e-6;
 /// Total variance per pixel, in grey levels squared, below which all icons are the same.
 const MIN_VARIANCE: f64 = 1e-6;
@@ -32,7 +31,7 @@ pub struct Modes {
     coordinates: Vec<Vec<f64>>,
 }
 
-/// What an exemplar stands for.
+/// Which component an exemplar represents.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
     /// Nearest to the mean icon.
@@ -46,12 +45,12 @@ pub enum Role {
     },
 }
 
-/// A training icon chosen to stand for the landmark.
+/// A training icon chosen to represent the landmark.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Exemplar {
     /// Index of the icon in the training set.
     pub index: usize,
-    /// What it stands for.
+    /// The component that it represents.
     pub role: Role,
 }
 
@@ -102,7 +101,7 @@ pub fn modes(icons: &[&[f32]]) -> Option<Modes> {
     Some(result)
 }
 
-/// The icons that stand for mean and modes: nearest to the mean; then, for each mode, the largest cosine with it, of
+/// The exemplars of mean and modes: nearest to the mean; then, for each mode, the largest cosine with it, of
 /// those not chosen before. Ties go to the lowest index. Between one and three.
 pub fn exemplars(modes: &Modes) -> Vec<Exemplar> {
     let nearest =
@@ -251,7 +250,7 @@ mod tests {
         // Every icon lies exactly on the mode, so the cosine ties at 1 up to rounding; the sign must be the icon's.
         let Role::Mode { mode: 0, positive } = chosen[1].role else { panic!("{chosen:?}") };
         assert_eq!(positive, found.coordinates[0][chosen[1].index] > 0.0);
-        assert_eq!(chosen.len(), 2, "the second mode carries nothing");
+        assert_eq!(chosen.len(), 2, "the second mode has no variance");
     }
 
     #[test]

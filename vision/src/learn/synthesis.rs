@@ -1,11 +1,11 @@
 //! Generated views of one landmark from a single photograph.
 //!
-//! In: a photograph, the landmark's corners in it, a seed. Out: views as a real camera would have given them: seen
-//! from other places, at other sizes, in other light, blurred, noisy, cut out along corners as inexact as the
-//! detector's. The same seed gives the same views, bit for bit.
+//! In: a photograph, the landmark's corners in it, a seed. Out: simulated camera views: other viewpoints, sizes and
+//! light, blurred, noisy, cut out along corners as inexact as the detector's. The same seed gives the same views,
+//! bit for bit.
 //!
-//! What they cannot show: whether the thing is flat, reflections, its real surroundings, other states of the light.
-//! Distances measured on them are therefore smaller than real ones, and a model learnt from them says so
+//! Not simulated: relief, reflections, the real surroundings, other illumination. Distances measured on generated
+//! views are therefore smaller than real ones; a model records how many of its views were generated
 //! ([`crate::model::landmark_model::LandmarkModel::generated_views`]).
 
 use crate::{
@@ -22,13 +22,13 @@ use nalgebra::{Matrix3, Point2, Vector3};
 const CAMERA_SIZE_PX: [usize; 2] = [640, 480];
 /// Focal length of the generated camera, in pixels.
 const FOCAL_PX: f64 = 600.0;
-/// Draws before a view is given up: some poses are too small to learn from or leave the image.
+/// Attempts for one view: some poses are too small for an icon or leave the image.
 const MAX_DRAWS: usize = 30;
 /// Pixels rendered around the landmark.
 const BORDER_PX: f64 = 12.0;
 
-/// `count` generated views of the landmark at `corners` of `photograph`; fewer where the icon stage refuses what was
-/// drawn, none where the corners cannot be used at all.
+/// `count` generated views of the landmark at `corners` of `photograph`; fewer where the icon stage refuses a drawn
+/// view, none where the corners are unusable.
 pub fn views(
     photograph: &GrayImage,
     corners: &Corners,
@@ -63,7 +63,7 @@ fn view(texture: &Texture, aspect: f64, p: &Params, random: &mut Random) -> Opti
     })
 }
 
-/// Where the camera stands: angles of the line of sight to the normal, roll, apparent size, where it aims.
+/// The camera's pose: angles of the line of sight to the normal, roll, apparent size, image position.
 struct Pose {
     yaw_rad: f64,
     pitch_rad: f64,
@@ -129,7 +129,7 @@ fn photograph(
     let shift = nalgebra::Vector2::new((low.x - BORDER_PX).floor(), (low.y - BORDER_PX).floor());
     let size = [(high.x - shift.x + BORDER_PX) as usize, (high.y - shift.y + BORDER_PX) as usize];
     let view_from_unit: Matrix3<f64> = quad_from_unit(&corners.points().map(|c| c - shift));
-    let mut picture = texture.seen(&view_from_unit, size, random.range(60.0, 230.0) as f32)?;
+    let mut picture = texture.rendered(&view_from_unit, size, random.range(60.0, 230.0) as f32)?;
     occlude(&mut picture, size, &view_from_unit, s, random)?;
     blur(&mut picture, size, random.range(0.0, s.max_blur_px));
     let gain = random.range(-s.max_gain.ln(), s.max_gain.ln()).exp();
@@ -155,7 +155,7 @@ fn photograph(
     Some((GrayImage::new(size[0], size[1], data).ok()?, shift))
 }
 
-/// A plain strip from one side, over up to the given share of the landmark.
+/// A uniform strip from one side, over up to the given share of the landmark.
 fn occlude(
     picture: &mut [f32],
     size: [usize; 2],
@@ -179,7 +179,7 @@ fn occlude(
     Some(())
 }
 
-/// Separable Gaussian, ends replicated. Below 0.2 px it changes nothing that counts.
+/// Separable Gaussian, border replicated. Skipped below 0.2 px.
 fn blur(picture: &mut [f32], size: [usize; 2], sigma_px: f64) {
     if sigma_px < 0.2 {
         return;
@@ -246,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn the_seed_decides() {
+    fn views_depend_on_the_seed_only() {
         let p = Params::default();
         let poster = poster(1);
         let first = views(&poster, &whole(), 4, &p, 7);
@@ -279,7 +279,7 @@ mod tests {
     }
 
     #[test]
-    fn without_disturbance_the_icon_is_the_photograph() {
+    fn without_disturbance_the_icon_equals_the_photographed_one() {
         let mut p = Params::default();
         p.learn.synthesis = SynthesisParams {
             max_yaw_rad: 0.0,
@@ -315,7 +315,7 @@ mod tests {
     }
 
     #[test]
-    fn a_useless_quad_gives_no_views() {
+    fn an_unusable_quad_gives_no_views() {
         let sliver = Corners::try_from([[0.0, 0.0], [300.0, 0.0], [300.0, 1e-3], [0.0, 1e-3]]).unwrap();
         // Stretched to 1:5 at most, it still is a plane of one colour: views exist, but nothing to learn from.
         for v in views(&poster(5), &sliver, 2, &Params::default(), 1) {

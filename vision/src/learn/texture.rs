@@ -1,4 +1,4 @@
-//! A landmark's face taken from one photograph, to be rendered from elsewhere.
+//! The texture of a landmark from one photograph, for rendering other views.
 //!
 //! In: a photograph and the landmark's corners in it. Out: a square texture with some surroundings and two coarser
 //! levels, and small pictures of it under a homography, filtered to their scale. [`crate::learn::synthesis`] adds
@@ -13,7 +13,7 @@ use nalgebra::{Matrix3, Point2, Vector3};
 
 /// Texels along the landmark's side at the finest level: more than the largest generated view shows.
 const SIDE: usize = 256;
-/// Surroundings kept on each side, as a share of the landmark's side: corner noise and blur look beyond the border.
+/// Surroundings kept on each side, as a share of the landmark's side: corner noise and blur reach beyond the border.
 const MARGIN: f64 = 0.125;
 /// Levels, each half as fine as the last.
 const LEVELS: usize = 3;
@@ -21,7 +21,7 @@ const LEVELS: usize = 3;
 const MAX_SAMPLES: usize = 4;
 /// Texels that one bilinear sample may stand for.
 const TEXELS_PER_SAMPLE: f64 = 1.5;
-/// Pixels worked out abreast.
+/// Pixels computed at a time, vectorised.
 const ABREAST: usize = 16;
 /// How far before the last texel samples end, in texels.
 const LAST: f32 = 1e-3;
@@ -40,7 +40,7 @@ struct Level {
 }
 
 impl Texture {
-    /// Lifts the landmark off `photograph`. `None` if the corners make no invertible homography.
+    /// Rectifies the landmark from `photograph`. `None` if the corners make no invertible homography.
     pub(crate) fn lift(photograph: &GrayImage, corners: &Corners) -> Option<Self> {
         let photograph_from_unit = quad_from_unit(corners.points());
         photograph_from_unit.try_inverse()?;
@@ -56,7 +56,7 @@ impl Texture {
                 for (da, db) in grid(n) {
                     let a = (column as f64 + da) * texel - MARGIN;
                     let b = (row as f64 + db) * texel - MARGIN;
-                    if let Some(g) = look(photograph, &photograph_from_unit, a, b) {
+                    if let Some(g) = sample_grey(photograph, &photograph_from_unit, a, b) {
                         grey += g;
                         cover += 1.0;
                     }
@@ -72,9 +72,9 @@ impl Texture {
         Some(Self { levels })
     }
 
-    /// The landmark seen under `view_from_unit` (unit square to pixels of the small picture), before a wall of grey
-    /// `wall`. Row-major, `width * height`.
-    pub(crate) fn seen(
+    /// The landmark rendered under `view_from_unit` (unit square to pixels of the small picture), before a wall of
+    /// grey `wall`. Row-major, `width * height`.
+    pub(crate) fn rendered(
         &self,
         view_from_unit: &Matrix3<f64>,
         size: [usize; 2],
@@ -128,7 +128,7 @@ impl Level {
         Matrix3::new(scale, 0.0, shift, 0.0, scale, shift, 0.0, 0.0, 1.0)
     }
 
-    /// Adds what a row of pixels shows from `start` on, one to the right each: grey levels bilinearly, and the wall
+    /// Adds a row of pixels beginning at `start`, one to the right each: grey levels bilinearly, and the wall
     /// where nothing covers it; only wall beyond the margin.
     #[expect(
         clippy::inline_always,
@@ -165,7 +165,7 @@ impl Level {
 }
 
 /// Grey of the photograph at landmark coordinates, `None` outside it or behind the camera.
-fn look(photograph: &GrayImage, photograph_from_unit: &Matrix3<f64>, a: f64, b: f64) -> Option<f32> {
+fn sample_grey(photograph: &GrayImage, photograph_from_unit: &Matrix3<f64>, a: f64, b: f64) -> Option<f32> {
     let p = photograph_from_unit * Vector3::new(a, b, 1.0);
     let (u, v) = (p.x / p.z, p.y / p.z);
     let inside =
@@ -196,15 +196,15 @@ mod tests {
         128.0 + 60.0 * (u * 0.05).sin() + 50.0 * (v * 0.04 + 1.0).cos()
     }
 
-    /// Oracle: the waves at the place that exact geometry gives.
+    /// Oracle: the waves at the exactly projected point.
     #[test]
-    fn a_slanted_landmark_is_seen_from_elsewhere() {
+    fn another_view_equals_the_exact_projection() {
         let photograph = GrayImage::from_fn(500, 400, |u, v| waves(u as f64, v as f64).round() as u8);
         let from = corners([[60.0, 50.0], [430.0, 80.0], [410.0, 350.0], [80.0, 330.0]]);
         let texture = Texture::lift(&photograph, &from).unwrap();
         let to = corners([[12.0, 10.0], [130.0, 25.0], [125.0, 120.0], [15.0, 145.0]]);
         let view_from_unit = quad_from_unit(to.points());
-        let picture = texture.seen(&view_from_unit, [150, 160], 90.0).unwrap();
+        let picture = texture.rendered(&view_from_unit, [150, 160], 90.0).unwrap();
         let photograph_from_view = quad_from_unit(from.points()) * view_from_unit.try_inverse().unwrap();
         for (u, v) in [(40, 40), (70, 80), (110, 100), (20, 100), (120, 40)] {
             let p = at(&photograph_from_view, f64::from(u), f64::from(v));
@@ -214,24 +214,24 @@ mod tests {
     }
 
     #[test]
-    fn beyond_the_photograph_stands_the_wall() {
+    fn the_wall_fills_pixels_outside_the_photograph() {
         let photograph = GrayImage::from_fn(200, 200, |_, _| 200);
         let whole = corners([[-0.5, -0.5], [199.5, -0.5], [199.5, 199.5], [-0.5, 199.5]]);
         let texture = Texture::lift(&photograph, &whole).unwrap();
         let to = corners([[19.5, 19.5], [119.5, 19.5], [119.5, 119.5], [19.5, 119.5]]);
-        let picture = texture.seen(&quad_from_unit(to.points()), [140, 140], 70.0).unwrap();
+        let picture = texture.rendered(&quad_from_unit(to.points()), [140, 140], 70.0).unwrap();
         let at = |u: usize, v: usize| picture[v * 140 + u];
         assert!((at(10, 70) - 70.0).abs() < 0.5 && (at(70, 130) - 70.0).abs() < 0.5);
         assert!((at(70, 70) - 200.0).abs() < 0.5);
     }
 
     #[test]
-    fn fine_stripes_average_out_at_a_distance() {
+    fn fine_stripes_are_averaged_at_a_distance() {
         let photograph = GrayImage::from_fn(512, 512, |u, _| if u % 4 < 2 { 40 } else { 200 });
         let whole = corners([[-0.5, -0.5], [511.5, -0.5], [511.5, 511.5], [-0.5, 511.5]]);
         let texture = Texture::lift(&photograph, &whole).unwrap();
         let to = corners([[5.0, 5.0], [37.0, 5.0], [37.0, 37.0], [5.0, 37.0]]);
-        let picture = texture.seen(&quad_from_unit(to.points()), [42, 42], 0.0).unwrap();
+        let picture = texture.rendered(&quad_from_unit(to.points()), [42, 42], 0.0).unwrap();
         for u in 10..32 {
             assert!((picture[20 * 42 + u] - 120.0).abs() < 8.0, "column {u}: {}", picture[20 * 42 + u]);
         }

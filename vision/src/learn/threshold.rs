@@ -1,7 +1,7 @@
 //! The threshold tau of one landmark (method 8).
 //!
-//! In: distances of the landmark's own icons and of everything else. Out: tau with its error rates, where the
-//! weighted cost of false positives and false negatives is least.
+//! In: distances of the landmark's own icons and of the negatives. Out: the tau of least weighted cost of false
+//! positives and false negatives, with its error rates.
 
 use crate::model::threshold::{LimitedBy, Threshold, ThresholdError};
 use serde::{Deserialize, Serialize};
@@ -18,7 +18,7 @@ const COST_TIE: f64 = 1e-9;
 pub struct ThresholdParams {
     /// Cost of a false positive in false negatives (lambda / mu); the paper's 6.
     pub false_positive_weight: f64,
-    /// tau stays below this share of the smallest distance of anything else while there are no false positives.
+    /// tau stays below this share of the smallest negative distance while there are no false positives.
     pub nearest_share: f64,
 }
 
@@ -52,7 +52,7 @@ pub fn minimise(positives: &[f64], negatives: &[f64], weight: f64) -> Result<f64
     all.retain(|(d, _)| d.is_finite());
     all.sort_by(|a, b| a.0.total_cmp(&b.0));
 
-    // tau = 0: nothing accepted, every own icon missed. An interval must be strictly cheaper to replace it.
+    // tau = 0: nothing accepted, every own icon missed. Only a strictly lower cost replaces it.
     let (mut best_tau, mut best_cost) = (0.0, 1.0);
     let (mut below_positive, mut below_negative) = (0.0, 0.0);
     for (i, (d, own)) in all.iter().enumerate() {
@@ -73,12 +73,12 @@ pub fn minimise(positives: &[f64], negatives: &[f64], weight: f64) -> Result<f64
     if best_tau > 0.0 { Ok(best_tau) } else { Err(ThresholdError::Overlap) }
 }
 
-/// tau for use: [`minimise`], then held below `nearest_share` of the nearest negative where the optimum has no false
-/// positive, and below `cap` always. With fewer than [`FEW_NEGATIVES`] the cap counts as one more of them: what the
-/// landmark must be told from has hardly been seen yet, and something as near as the cap may exist.
-// Departs from method 8 twice. There n- = 0 gives no threshold; here the cap, measured on real strangers, stands in.
-// There small sets use the crossing of two normal curves; H^r has infinite values and both classes have long tails
-// towards each other, where the fitted curves promise more than they hold, so [`gaussian`] is only for reports.
+/// The tau in use: [`minimise`], then limited to `nearest_share` of the nearest negative where the optimum has no
+/// false positive, and below `cap` always. With fewer than [`FEW_NEGATIVES`] the cap counts as one more of them:
+/// the sample of negatives is small, and a distractor as near as the cap may exist.
+// Departs from method 8 twice. There n- = 0 gives no threshold; here the cap, measured on real distractors,
+// replaces it. There small sets use the crossing of two normal curves; H^r has infinite values and both classes
+// have long tails towards each other, where the fitted curves underestimate the errors.
 pub fn threshold(
     positives: &[f64],
     negatives: &[f64],
@@ -106,7 +106,7 @@ pub fn threshold(
     })
 }
 
-/// The other end of the interval that begins at the largest distance.
+/// The upper end of the interval that begins at the largest distance.
 fn beyond(largest: f64) -> f64 {
     1.2 * largest + f64::MIN_POSITIVE
 }
@@ -129,7 +129,7 @@ mod tests {
 
     /// Golden values of method 8.
     #[test]
-    fn golden_toy() {
+    fn golden_example() {
         let tau = minimise(&OWN, &OTHERS, 6.0).unwrap();
         assert!((tau - 2.75).abs() < 1e-12);
         assert!((cost(tau, &OWN, &OTHERS, 6.0) - 0.4).abs() < 1e-12);
@@ -141,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn degenerate_cases_are_typed() {
+    fn degenerate_input_gives_typed_errors() {
         assert_eq!(minimise(&[], &OTHERS, 6.0), Err(ThresholdError::NoPositive));
         assert_eq!(minimise(&OWN, &[], 6.0), Err(ThresholdError::NoNegative));
         assert_eq!(minimise(&[f64::NAN], &OTHERS, 6.0), Err(ThresholdError::NotADistance));
@@ -153,18 +153,18 @@ mod tests {
     }
 
     #[test]
-    fn the_cap_stands_in_for_missing_negatives() {
+    fn the_cap_replaces_missing_negatives() {
         let p = ThresholdParams::default();
         // Half way between the largest own distance and the cap.
         let alone = threshold(&OWN, &[], 7.0, &p).unwrap();
         assert!((alone.tau - 6.3).abs() < 1e-12 && alone.limited_by == LimitedBy::NearestNegative);
         assert!((threshold(&OWN, &[], 10.0, &p).unwrap().tau - 8.0).abs() < 1e-12);
         assert_eq!(alone.negatives, 0);
-        // Own distances beyond the cap are given up.
+        // Own distances beyond the cap are false negatives.
         let short = threshold(&OWN, &[], 3.0, &p).unwrap();
         assert!((short.tau - 2.7).abs() < 1e-12 && (short.false_negative_rate - 0.4).abs() < 1e-12);
         assert_eq!(threshold(&[5.0], &[], 3.0, &p), Err(ThresholdError::Overlap));
-        // With enough negatives it is only a bound.
+        // With enough negatives the cap is only a bound.
         let few = threshold(&OWN, &[14.0; FEW_NEGATIVES - 1], 8.0, &p).unwrap();
         let many = threshold(&OWN, &[14.0; FEW_NEGATIVES], 8.0, &p).unwrap();
         assert!((few.tau - 7.0).abs() < 1e-12 && (many.tau - 8.0).abs() < 1e-12);
@@ -186,7 +186,7 @@ mod tests {
     proptest! {
         /// Oracle: the cost at every interval, counted anew (O(n^2)).
         #[test]
-        fn nothing_is_cheaper(own in distances(30), others in distances(30), weight in 0.5f64..8.0) {
+        fn no_interval_has_a_lower_cost(own in distances(30), others in distances(30), weight in 0.5f64..8.0) {
             let mut all: Vec<f64> = own.iter().chain(&others).copied().collect();
             all.sort_by(f64::total_cmp);
             all.push(20.0);
@@ -195,7 +195,7 @@ mod tests {
             match minimise(&own, &others, weight) {
                 Ok(tau) => {
                     prop_assert!(cost(tau, &own, &others, weight) <= least + 1e-9);
-                    // Leftmost: everything to the left is dearer.
+                    // Leftmost: every interval to the left costs more.
                     for t in candidates.iter().filter(|t| **t < tau - 1e-9) {
                         prop_assert!(cost(*t, &own, &others, weight) > least + 1e-10);
                     }
@@ -208,7 +208,7 @@ mod tests {
         }
 
         #[test]
-        fn more_negatives_never_loosen_a_clean_tau(own in distances(20), extra in 0.0f64..12.0) {
+        fn more_negatives_never_raise_tau(own in distances(20), extra in 0.0f64..12.0) {
             let p = ThresholdParams::default();
             if let (Ok(before), Ok(after)) =
                 (threshold(&own, &[11.0, 12.0], 100.0, &p), threshold(&own, &[11.0, 12.0, extra], 100.0, &p))

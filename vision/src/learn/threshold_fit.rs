@@ -25,8 +25,8 @@ use crate::{
     },
 };
 
-/// The same model with tau fitted to its own distances and to `negatives`, forgetting earlier ones. Cheap: the own
-/// distances are kept in the model.
+/// The same model with tau fitted to its own distances and to `negatives` only. Cheap: the own distances are stored
+/// in the model.
 #[must_use]
 pub fn refit_thresholds(model: &LandmarkModel, negatives: &[IconFeatures], p: &Params) -> LandmarkModel {
     let mut model = model.clone();
@@ -37,13 +37,13 @@ pub fn refit_thresholds(model: &LandmarkModel, negatives: &[IconFeatures], p: &P
     add_negatives(&model, negatives, p)
 }
 
-/// The same model with `negatives` added to those it was fitted to: one new landmark costs one comparison with its
-/// icons, not with everybody's.
+/// The same model with `negatives` added to those it was fitted to: a new landmark costs one comparison with its
+/// icons only.
 #[must_use]
 pub fn add_negatives(model: &LandmarkModel, negatives: &[IconFeatures], p: &Params) -> LandmarkModel {
     let mut model = model.clone();
-    let ready = ready(&model.exemplars, p);
-    let templates = Templates::new(&ready, p);
+    let prepared = prepared(&model.exemplars, p);
+    let templates = Templates::new(&prepared, p);
     let exemplars = if negatives.is_empty() { Vec::new() } else { model.features(&p.recognise) };
     for negative in negatives {
         let d = distances(&exemplars, negative, &p.recognise);
@@ -67,7 +67,7 @@ pub fn add_negatives(model: &LandmarkModel, negatives: &[IconFeatures], p: &Para
 }
 
 impl DistanceSamples {
-    /// Counts a distance of something else, and keeps it if it is among the nearest.
+    /// Counts a negative distance, and stores it if it is among the nearest.
     pub(crate) fn add(&mut self, distance: f64) {
         self.others += 1;
         let distance = distance as f32;
@@ -79,7 +79,8 @@ impl DistanceSamples {
     }
 }
 
-/// tau from the evidence. Distances that were only counted lie beyond the farthest one kept, so tau stays below it.
+/// tau from the samples. Distances that were only counted are larger than the farthest one stored, so tau stays
+/// below it.
 pub(crate) fn fitted(evidence: &DistanceSamples, cap: f64, p: &Params) -> Result<Threshold, ThresholdError> {
     let own: Vec<f64> = evidence.own.iter().map(|d| f64::from(*d)).collect();
     let mut others: Vec<f64> = evidence.nearest_others.iter().map(|d| f64::from(*d)).collect();
@@ -89,48 +90,48 @@ pub(crate) fn fitted(evidence: &DistanceSamples, cap: f64, p: &Params) -> Result
     threshold(&own, &others, cap, &p.learn.threshold)
 }
 
-/// The smallest 1 minus likeness of `icons` to the model's exemplars, one laid on the other: what tau of the likeness
-/// is held by. Infinite where nothing is like it. For naming look-alikes.
+/// The smallest 1 minus likeness of `icons` to the model's exemplars after alignment, the quantity that limits tau
+/// of the likeness. Infinite where no signature is similar. For reports of look-alikes.
 pub fn unlikeness_of(model: &LandmarkModel, icons: &[IconFeatures], p: &Params) -> f64 {
-    let ready = ready(&model.exemplars, p);
-    let templates = Templates::new(&ready, p);
+    let prepared = prepared(&model.exemplars, p);
+    let templates = Templates::new(&prepared, p);
     icons.iter().map(|icon| templates.unlikeness(icon, MIN_SIGNATURE)).fold(f64::INFINITY, f64::min)
 }
 
-/// Negatives whose signatures are less alike are not laid on the exemplars: they count as infinitely far.
+/// Negatives whose signatures are less similar are not aligned with the exemplars: their distance counts as infinite.
 const MIN_SIGNATURE: f32 = 0.45;
 
-/// An exemplar on which icons can be laid.
-pub(crate) struct Ready<'a> {
+/// An exemplar prepared for alignment.
+pub(crate) struct PreparedExemplar<'a> {
     signature: &'a Signature,
     icon: Icon,
     coarse: Vec<f32>,
 }
 
-/// Makes exemplars ready.
-pub(crate) fn ready<'a>(exemplars: &'a [Exemplar], p: &Params) -> Vec<Ready<'a>> {
+/// Prepares exemplars for alignment.
+pub(crate) fn prepared<'a>(exemplars: &'a [Exemplar], p: &Params) -> Vec<PreparedExemplar<'a>> {
     let of = |e: &'a Exemplar| {
         let (icon, coarse) = e.template(&p.recognise.verdict.align);
-        Ready { signature: &e.signature, icon, coarse }
+        PreparedExemplar { signature: &e.signature, icon, coarse }
     };
     exemplars.iter().map(of).collect()
 }
 
-/// Exemplars on which icons are laid.
+/// Exemplars with the aligner.
 pub(crate) struct Templates<'a> {
-    each: Vec<(&'a Ready<'a>, Template<'a>)>,
+    each: Vec<(&'a PreparedExemplar<'a>, Template<'a>)>,
     lattices: SamplingGrids,
     p: &'a Params,
 }
 
 impl<'a> Templates<'a> {
-    pub(crate) fn new(exemplars: &'a [Ready<'a>], p: &'a Params) -> Self {
+    pub(crate) fn new(exemplars: &'a [PreparedExemplar<'a>], p: &'a Params) -> Self {
         let each = exemplars.iter().map(|e| (e, Template::new(&e.icon, &e.coarse))).collect();
         Self { each, lattices: SamplingGrids::new(p.icon.size, &p.recognise.correlation), p }
     }
 
-    /// The smallest 1 minus likeness of `icon` to the exemplars after alignment, of those whose signatures are alike
-    /// enough.
+    /// The smallest 1 minus likeness of `icon` to the exemplars after alignment, of those whose signatures are
+    /// similar enough.
     pub(crate) fn unlikeness(&self, icon: &IconFeatures, min_signature: f32) -> f64 {
         let (c, a) = (&self.p.recognise.correlation, &self.p.recognise.verdict.align);
         let aligner = Aligner::new(&self.lattices, a);
@@ -141,18 +142,19 @@ impl<'a> Templates<'a> {
                 continue;
             }
             let around = around.get_or_insert_with(|| Surroundings::of_icon(&icon.icon, a));
-            let laid = around.as_ref().and_then(|s| aligner.align(s, template));
-            let laid = laid.as_ref().map_or(&icon.icon, |l| &l.icon);
-            least = least.min(1.0 - likeness(laid, &exemplar.icon, c));
+            let aligned = around.as_ref().and_then(|s| aligner.align(s, template));
+            let aligned = aligned.as_ref().map_or(&icon.icon, |l| &l.icon);
+            least = least.min(1.0 - likeness(aligned, &exemplar.icon, c));
         }
         least
     }
 }
 
-/// tau of the likeness: the cap, or a share of the nearest of everything else. None where the greater part of the
-/// landmark's own views would be refused.
-// Departs from method 8: own distances have no say in tau but that. Those of generated views, or of one robot's drive,
-// are far smaller than another day's (reflections, dust, another camera); what is safe is said by the others alone.
+/// tau of the likeness: the cap, or a share of the nearest negative. An error where most of the landmark's own
+/// views would be refused.
+// Departs from method 8: own distances influence tau in no other way. Those of generated views, or of one robot's
+// drive, are far smaller than those of another day (reflections, dust, another camera); the safe limit follows from
+// the negatives alone.
 fn fitted_likeness(evidence: &DistanceSamples, p: &Params) -> Result<Threshold, ThresholdError> {
     let mut own: Vec<f64> = evidence.own.iter().map(|d| f64::from(*d)).collect();
     own.sort_by(f64::total_cmp);
@@ -179,10 +181,11 @@ fn fitted_likeness(evidence: &DistanceSamples, p: &Params) -> Result<Threshold, 
     })
 }
 
-/// Method 9: what the model fails, if anything.
-// Departs from method 9: stable points, and a threshold for each of the paper's distances, are asked only where neither
-// distance has one; what it shows beyond its frame is asked besides. The likeness decides, and one of the two must agree; a picture of few points is told well enough by
-// the other. Where a map's kind is one of the paper's, too few stable points keep a landmark out (recognise/retrieval/nearest.rs).
+/// The quality gates of method 9.
+// Departs from method 9: stable points, and a threshold for each of the paper's distances, are required only where
+// neither distance has one; content beyond the frame is required in addition. The likeness decides, and one of the
+// two must agree; for a picture of few points the other distance suffices. Where a map's kind is one of the
+// paper's, landmarks with too few stable points are excluded (recognise/retrieval/nearest.rs).
 fn status(model: &LandmarkModel, missing: [Option<Gate>; 3], p: &Params) -> ModelStatus {
     let g = &p.learn.gates;
     let photographed = model.views - model.generated_views;

@@ -1,4 +1,4 @@
-//! A view of a landmark to learn from: a photograph and the corners in it in, the rectified picture out.
+//! A training view of a landmark: a photograph and the corners in it in, the rectified picture out.
 
 use crate::{
     frame::GrayImage,
@@ -7,15 +7,14 @@ use crate::{
     params::Params,
 };
 
-/// One sighting of a landmark, to learn from.
+/// One training view of a landmark.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrainingView {
     /// The rectified picture, cut out along corners as inexact as the detector's.
     pub icon: Icon,
-    /// The same along its true corners, where those are known: of a generated view. What is laid on it is as exact as
-    /// they.
+    /// The same along its true corners, known for generated views: alignment with it is free of corner noise.
     pub exact: Option<Icon>,
-    /// Where it was in the image.
+    /// Its corners in the image.
     pub corners_px: Corners,
     /// Width and height of that image.
     pub image_size_px: [usize; 2],

@@ -1,5 +1,5 @@
-//! An icon as a model keeps it: whole grey levels as bytes, shared by the copies of the model. Features are computed on
-//! demand; those for the paper's distances are kept from then on.
+//! An icon of a model: whole grey levels as bytes, shared by the copies of the model. Features are computed on
+//! demand; those for the paper's distances are cached.
 
 use crate::{
     icon::Icon,
@@ -23,13 +23,13 @@ pub struct Exemplar {
     size: usize,
     source_scale: f64,
     pixels: Arc<[u8]>,
-    /// For the short list.
+    /// Signature for the short list.
     pub(crate) signature: Signature,
     buckets: Arc<OnceLock<Buckets>>,
     points: Arc<OnceLock<PointSet>>,
 }
 
-/// What was worked out from it does not count.
+/// Cached features are not compared.
 impl PartialEq for Exemplar {
     fn eq(&self, other: &Self) -> bool {
         let scales = self.source_scale.to_bits() == other.source_scale.to_bits();
@@ -38,7 +38,7 @@ impl PartialEq for Exemplar {
 }
 
 impl Exemplar {
-    /// Keeps `icon`, whose grey levels are whole numbers.
+    /// Stores `icon`, whose grey levels are whole numbers.
     pub fn new(icon: &Icon) -> Self {
         let pixels = icon.pixels.iter().map(|g| g.round() as u8).collect();
         let (buckets, points) = (Arc::default(), Arc::default());
@@ -67,24 +67,24 @@ impl Exemplar {
         &self.pixels
     }
 
-    /// The icon, and what the coarse look of alignment compares of it.
+    /// The icon and its coarse level for alignment.
     pub(crate) fn template(&self, p: &AlignParams) -> (Icon, Vec<f32>) {
         let icon = self.icon();
         let coarse = coarse(&icon, p);
         (icon, coarse)
     }
 
-    /// All that is asked of it.
+    /// All features.
     pub fn features(&self, p: &RecogniseParams) -> IconFeatures {
         features(self.icon(), p)
     }
 
-    /// Its buckets for C^r; kept. A model is asked under the parameters that it was learnt with.
+    /// Its buckets for C^r; cached. `p` must be the parameters of training.
     pub(crate) fn buckets(&self, p: &RecogniseParams) -> &Buckets {
         self.buckets.get_or_init(|| Buckets::new(&self.icon(), &p.correlation))
     }
 
-    /// Its points for H^r; kept.
+    /// Its points for H^r; cached.
     pub(crate) fn points(&self, p: &RecogniseParams) -> &PointSet {
         self.points.get_or_init(|| {
             let icon = self.icon();
@@ -92,7 +92,7 @@ impl Exemplar {
         })
     }
 
-    /// Memory that it takes, in bytes, by what it is for.
+    /// Its memory by purpose, bytes.
     pub(crate) fn memory_parts(&self) -> [(&'static str, usize); 4] {
         let buckets = self.buckets.get().map_or(0, |b| size_of_val(b.values()));
         [

@@ -1,7 +1,7 @@
-//! The number that names a landmark.
+//! The identifier of a landmark.
 
 use serde::{Deserialize, Serialize};
 
-/// Number that names a landmark inside one map. The server keeps the readable name.
+/// Identifier of a landmark inside one map. The server stores the readable name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct LandmarkId(pub u64);

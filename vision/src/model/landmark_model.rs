@@ -30,36 +30,36 @@ pub struct Distances {
     pub hausdorff: f64,
 }
 
-/// Distances that a threshold was fitted to, as 32-bit floats: kept, so that tau can be fitted again when other
-/// landmarks come and go.
+/// Distances that a threshold was fitted to, as 32-bit floats: stored, so that tau can be fitted again when other
+/// landmarks are added or removed.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct DistanceSamples {
     /// Held-out distances of the landmark's own views, rising.
     pub own: Vec<f32>,
-    /// The smallest distances of everything else, rising; at most [`DistanceSamples::MAX_NEAREST`].
+    /// The smallest negative distances, rising; at most [`DistanceSamples::MAX_NEAREST`].
     pub nearest_others: Vec<f32>,
-    /// How many other distances there were (n-).
+    /// Number of negative distances (n-).
     pub others: usize,
 }
 
 impl DistanceSamples {
-    /// Other distances kept; the rest are only counted.
+    /// Most negative distances stored; the rest are only counted.
     pub const MAX_NEAREST: usize = 64;
 }
 
 /// The learnt appearance of one landmark.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LandmarkModel {
-    /// Whose it is.
+    /// The landmark.
     pub id: LandmarkId,
-    /// [`Params::distance_hash`] of the parameters it was learnt under. Its thresholds mean nothing under others.
+    /// [`Params::distance_hash`] of the parameters it was learnt under. Its thresholds are invalid under others.
     pub params_hash: u64,
     /// Views it was learnt from (`N_l`).
     pub views: usize,
-    /// How many of them were generated. Where that is all but one, whether the landmark is flat and how it looks in
-    /// another light was never seen: `v_c` and saliency then say what the model is prepared for, not what was observed.
+    /// How many of them were generated. Where that is all but one, `v_c` and saliency describe the generated
+    /// variation, not observed variation.
     pub generated_views: usize,
-    /// One to three icons that stand for the mean and the leading modes, grey levels whole numbers.
+    /// One to three exemplars of the mean and the leading modes, grey levels whole numbers.
     pub exemplars: Vec<Exemplar>,
     /// Variance along the leading modes, falling; squared grey levels summed over the icon.
     pub eigenvalues: Vec<f64>,
@@ -71,20 +71,19 @@ pub struct LandmarkModel {
     pub hausdorff: Threshold,
     /// tau of 1 minus the likeness after alignment.
     pub likeness: Threshold,
-    /// What tau of C^r was fitted to.
+    /// Distances that tau of C^r was fitted to.
     pub correlation_evidence: DistanceSamples,
-    /// What tau of H^r was fitted to.
+    /// Distances that tau of H^r was fitted to.
     pub hausdorff_evidence: DistanceSamples,
-    /// What tau of the likeness was fitted to; those that are nothing like it by their signature count as infinitely
-    /// far.
+    /// Values of 1 minus likeness that tau was fitted to; infinite for negatives with dissimilar signatures.
     pub likeness_evidence: DistanceSamples,
     /// Saliency F (method 9).
     pub saliency_f: f64,
-    /// Points of the first exemplar that come back in the other views.
+    /// Points of the first exemplar that are found in the other views.
     pub stable_points: usize,
     /// F and stable points in one number, 0 to 1.
     pub saliency: f64,
-    /// Visibility confidence: how far apart the views are. Over all views, generated ones included.
+    /// Visibility confidence `v_c`: the spread of the viewpoints. Over all views, generated ones included.
     pub v_c: f64,
     /// The same over photographed views only; 0 with fewer than two.
     pub photographed_v_c: f64,
@@ -93,7 +92,7 @@ pub struct LandmarkModel {
     /// Points of up to three photographed views (`points/`). Empty where none were given, and in models that were
     /// stored before there were any: see [`LandmarkModel::knows_points`].
     pub points: Vec<TaughtPoint>,
-    /// Points were looked for, even if none were found.
+    /// Whether points were extracted, even if none were found.
     pub knows_points: bool,
 }
 
@@ -107,13 +106,13 @@ impl LandmarkModel {
         self
     }
 
-    /// The same model, with points where the settings decide by them; `views` is only called then.
+    /// The same model with points, if the settings use points for decisions; `views` is called only then.
     #[must_use]
     pub fn with_points_if_used(self, p: &Params, views: impl FnOnce() -> Vec<Vec<TaughtPoint>>) -> Self {
         if p.recognise.verdict.points { self.with_points(&views()) } else { self }
     }
 
-    /// Whether it has so many points that its icons never name it.
+    /// Whether it has so many points that its icons never identify it.
     pub fn is_named_by_points(&self, p: &Params) -> bool {
         p.recognise.verdict.points && self.points.len() > p.recognise.verdict.max_icon_points
     }
@@ -123,12 +122,12 @@ impl LandmarkModel {
         distances(&self.features(p), icon, p)
     }
 
-    /// The exemplars with all that is asked of them.
+    /// The features of all exemplars.
     pub fn features(&self, p: &RecogniseParams) -> Vec<IconFeatures> {
         self.exemplars.iter().map(|e| e.features(p)).collect()
     }
 
-    /// Memory that it takes, in bytes, by what it is for.
+    /// Its memory by purpose, bytes.
     pub fn memory_parts(&self) -> Vec<(&'static str, usize)> {
         let evidence = [&self.correlation_evidence, &self.hausdorff_evidence, &self.likeness_evidence];
         let distances: usize = evidence.iter().map(|e| e.own.len() + e.nearest_others.len()).sum();
@@ -146,14 +145,14 @@ impl LandmarkModel {
         self.status == ModelStatus::Active
     }
 
-    /// Not in use, as a distance does not tell it from others, whatever other gates it fails.
+    /// Not in use because a distance does not separate it from others, whatever other gates it fails.
     pub fn overlaps_others(&self) -> bool {
         let ModelStatus::Candidate(failures) = &self.status else { return false };
         let overlap = ThresholdError::Overlap;
         failures.iter().any(|f| f.gate.threshold_error() == Some(overlap))
     }
 
-    /// Not in use for no other reason than that other landmarks look like it.
+    /// Not in use only because other landmarks are look-alikes of it.
     pub fn is_kept_out_by_look_alikes(&self) -> bool {
         let ModelStatus::Candidate(failures) = &self.status else { return false };
         !failures.is_empty() && failures.iter().all(|f| f.gate.threshold_error().is_some())
@@ -175,7 +174,7 @@ pub(crate) fn distances(exemplars: &[IconFeatures], icon: &IconFeatures, p: &Rec
 pub enum ModelStatus {
     /// Passed every gate: fit for recognition and pose.
     Active,
-    /// Failed these gates: kept, may collect more views, is not used.
+    /// Failed these gates: stored, may collect more views, is not used.
     Candidate(Vec<GateFailure>),
 }
 
@@ -189,7 +188,7 @@ pub enum Gate {
     Saliency,
     /// Stable points: where neither of the paper's distances has a threshold.
     StablePoints,
-    /// What it shows beyond its frame.
+    /// Content beyond its frame.
     Content,
     /// Visibility confidence `v_c`.
     VisibilityConfidence,
@@ -202,7 +201,7 @@ pub enum Gate {
 }
 
 impl Gate {
-    /// Why a distance has no threshold, if that is what failed.
+    /// Why a distance has no threshold, if this gate is a missing threshold.
     fn threshold_error(self) -> Option<ThresholdError> {
         match self {
             Self::LikenessThreshold(error)
@@ -222,9 +221,9 @@ impl Gate {
 pub struct GateFailure {
     /// Which gate.
     pub gate: Gate,
-    /// What was measured.
+    /// The measured value.
     pub value: f64,
-    /// What it must reach.
+    /// The limit.
     pub limit: f64,
 }
 
@@ -237,10 +236,13 @@ impl std::fmt::Display for GateFailure {
             Gate::StablePoints => write!(f, "{value:.0} stable points, at least {limit:.0} needed"),
             Gate::Content => write!(
                 f,
-                "beyond its frame it shows {value:.1} of 21 parts, at least {limit} needed: any blank board looks like it"
+                "content beyond its frame in {value:.1} of 21 parts, at least {limit} needed: a blank board would look like it"
             ),
             Gate::VisibilityConfidence => {
-                write!(f, "visibility confidence {value:.3}, at least {limit} needed: views from elsewhere")
+                write!(
+                    f,
+                    "visibility confidence {value:.3}, at least {limit} needed: add views from other viewpoints"
+                )
             }
             Gate::CorrelationThreshold(reason) => write!(f, "no threshold for the correlation: {reason}"),
             Gate::HausdorffThreshold(reason) => write!(f, "no threshold for the point distance: {reason}"),

@@ -1,6 +1,6 @@
-//! A model as bytes, and back. Little-endian, versioned, with a digest at the end: what was stored under other
-//! parameters, by a later version or damaged on the way is refused by name. What follows from the icons
-//! (Harris points, buckets) is not stored.
+//! A model as bytes, and back. Little-endian, versioned, with a digest at the end. Bytes stored under other
+//! parameters, by a later version or damaged are refused with a typed error. Features derived from the icons
+//! (Harris points, buckets) are not stored.
 
 use crate::{
     icon::{Icon, MAX_ICON_SIZE},
@@ -38,7 +38,7 @@ pub enum StoredModelError {
     /// The digest does not match: the bytes were damaged.
     #[error("stored model is damaged")]
     Damaged,
-    /// Learnt under other parameters, so its thresholds mean nothing here.
+    /// Trained under other parameters: its thresholds are invalid here.
     #[error("learnt under parameters {found:016x}, in use are {expected:016x}")]
     Params {
         /// Hash stored with the model.
@@ -121,7 +121,7 @@ impl LandmarkModel {
     }
 }
 
-/// Walks through bytes; every step is checked.
+/// Reads bytes in order; every read is checked.
 struct Reader<'a> {
     rest: &'a [u8],
 }
@@ -186,8 +186,8 @@ impl Reader<'_> {
         let others = u64::from_le_bytes(self.take("others")?);
         let own = self.distances("own", MAX_VIEWS)?;
         let nearest_others = self.distances("nearest_others", DistanceSamples::MAX_NEAREST)?;
-        let kept = nearest_others.len() as u64;
-        if others > MAX_OTHERS || kept != others.min(DistanceSamples::MAX_NEAREST as u64) {
+        let stored = nearest_others.len() as u64;
+        if others > MAX_OTHERS || stored != others.min(DistanceSamples::MAX_NEAREST as u64) {
             return Err(StoredModelError::Malformed { field: "others" });
         }
         Ok(DistanceSamples { own, nearest_others, others: others as usize })
@@ -245,7 +245,7 @@ impl Reader<'_> {
     }
 }
 
-/// FNV-1a, 64 bits: tells damage, not malice.
+/// FNV-1a, 64 bits: detects damage, not tampering.
 pub(crate) fn digest(bytes: &[u8]) -> u64 {
     bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
         (hash ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3)

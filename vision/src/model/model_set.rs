@@ -19,7 +19,7 @@ pub const MAX_LANDMARKS: usize = 100_000;
 /// Why models do not make a set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum ModelSetError {
-    /// Learnt under other parameters: its thresholds mean nothing here.
+    /// Trained under other parameters: its thresholds are invalid here.
     #[error("landmark {} was learnt under parameters {found:016x}, in use are {expected:016x}", id.0)]
     ForeignParams {
         /// The landmark.
@@ -50,11 +50,11 @@ pub struct ModelSet {
     /// Not recognised; see [`ModelSet::with_rivals`].
     rivals: Vec<Arc<LandmarkModel>>,
     params_hash: u64,
-    /// Signatures of all exemplars, one after the other: looking through them is reading memory once.
+    /// Signatures of all exemplars, contiguous: the scan reads memory once.
     signatures: Vec<[i8; SIGNATURE_BYTES]>,
-    /// Whose each signature is: index of the model and of its exemplar.
+    /// Owner of each signature: index of the model and of its exemplar.
     owners: Vec<(u32, u8)>,
-    /// Where pictures are compared with the exemplars that they are laid on.
+    /// Sampling grids for alignment with the exemplars.
     lattices: Arc<SamplingGrids>,
     /// The points of all models, then of all rivals.
     points: Arc<PointIndex>,
@@ -68,9 +68,9 @@ pub const MAX_SHORT_LIST: usize = 64;
 pub struct Listed {
     /// Index of the model in [`ModelSet::iter`].
     pub model: usize,
-    /// Index of the exemplar that is most alike.
+    /// Index of the most similar exemplar.
     pub exemplar: usize,
-    /// How alike the signatures are, -1 to 1.
+    /// Likeness of the signatures, -1 to 1.
     pub likeness: f32,
 }
 
@@ -80,16 +80,16 @@ impl ModelSet {
         Self::with_rivals(models, Vec::new(), p)
     }
 
-    /// Of `all` landmarks those in use; as rivals those that are not, because a distance does not tell them from
-    /// others.
+    /// Of `all` landmarks those in use; as rivals those that are not, because a distance does not separate them
+    /// from others.
     pub fn in_use(all: impl Iterator<Item = Arc<LandmarkModel>>, p: &Params) -> Result<Self, ModelSetError> {
         let (active, others): (Vec<_>, Vec<_>) = all.partition(|m| m.is_active());
         let rivals = others.into_iter().filter(|m| m.overlaps_others()).collect();
         Self::with_rivals(active, rivals, p)
     }
 
-    /// `models` beside `rivals`: landmarks of the map that are not recognised, because others look like them, but that may be
-    /// what is seen. Where the points of a rival are there, too, no landmark is named.
+    /// `models` beside `rivals`: landmarks of the map that are not recognised, because others look like them, but
+    /// that may be visible. Where the points of a rival agree, too, no landmark is identified.
     pub fn with_rivals(
         mut models: Vec<Arc<LandmarkModel>>,
         mut rivals: Vec<Arc<LandmarkModel>>,
@@ -213,7 +213,7 @@ impl ModelSet {
         &self.points
     }
 
-    /// For laying pictures on exemplars.
+    /// Sampling grids for alignment.
     pub(crate) fn lattices(&self) -> &SamplingGrids {
         &self.lattices
     }
@@ -223,7 +223,7 @@ impl ModelSet {
         self.memory_parts().values().sum()
     }
 
-    /// The same by what it is for.
+    /// The same by purpose.
     pub fn memory_parts(&self) -> BTreeMap<&'static str, usize> {
         let mut parts: BTreeMap<&'static str, usize> = BTreeMap::new();
         for model in self.models.iter().chain(&self.rivals) {
@@ -256,13 +256,13 @@ mod tests {
             landmark_model::{Gate, GateFailure, ModelStatus},
             threshold::ThresholdError,
         },
-        recognise::fixture::lessons,
+        recognise::fixture::trained_models,
     };
 
     #[test]
-    fn the_short_list_is_that_of_comparing_everything() {
+    fn the_short_list_equals_a_full_comparison() {
         let p = Params::default();
-        let set = ModelSet::new(lessons(6, &p), &p).unwrap();
+        let set = ModelSet::new(trained_models(6, &p), &p).unwrap();
         for asked in set.iter().flat_map(|m| m.exemplars.iter()) {
             // Oracle: every exemplar of every model, sorted.
             let mut all: Vec<(f32, usize)> = set
@@ -290,9 +290,9 @@ mod tests {
     }
 
     #[test]
-    fn a_short_list_is_bounded() {
+    fn the_short_list_is_bounded() {
         let p = Params::default();
-        let one = Arc::clone(&lessons(1, &p)[0]);
+        let one = Arc::clone(&trained_models(1, &p)[0]);
         let many = |count: u64| {
             let named = |id| Arc::new(LandmarkModel { id: LandmarkId(id), ..(*one).clone() });
             ModelSet::new((0..count).map(named).collect(), &p).unwrap()
@@ -306,7 +306,7 @@ mod tests {
     #[test]
     fn sets_are_checked_and_ordered() {
         let p = Params::default();
-        let mut models = lessons(3, &p);
+        let mut models = trained_models(3, &p);
         let ids = |set: &ModelSet| set.iter().map(|m| m.id.0).collect::<Vec<_>>();
         models.reverse();
         let set = ModelSet::new(models.clone(), &p).unwrap();
@@ -324,17 +324,17 @@ mod tests {
         let twice = ModelSet::new(vec![Arc::clone(&models[1]); 2], &p);
         assert_eq!(twice.unwrap_err(), ModelSetError::Duplicate { id: LandmarkId(2) });
         let [a, b, c] = [0, 1, 2].map(|i| Arc::clone(&models[i]));
-        let mut kept_out = (*b).clone();
+        let mut inactive = (*b).clone();
         let fails = |gate| GateFailure { gate, value: 0.0, limit: 0.0 };
-        let rivals = |kept_out: &LandmarkModel| {
-            let all = [a.clone(), Arc::new(kept_out.clone())];
+        let rivals = |inactive: &LandmarkModel| {
+            let all = [a.clone(), Arc::new(inactive.clone())];
             ModelSet::in_use(all.into_iter(), &p).unwrap().rivals.len()
         };
-        kept_out.status = ModelStatus::Candidate(vec![fails(Gate::Saliency)]);
-        assert_eq!(rivals(&kept_out), 0, "nothing looks like it");
+        inactive.status = ModelStatus::Candidate(vec![fails(Gate::Saliency)]);
+        assert_eq!(rivals(&inactive), 0, "no look-alikes");
         let overlap = fails(Gate::LikenessThreshold(ThresholdError::Overlap));
-        kept_out.status = ModelStatus::Candidate(vec![fails(Gate::Saliency), overlap]);
-        assert_eq!(rivals(&kept_out), 1);
+        inactive.status = ModelStatus::Candidate(vec![fails(Gate::Saliency), overlap]);
+        assert_eq!(rivals(&inactive), 1);
         let with_rival = ModelSet::with_rivals(vec![a], vec![b.clone()], &p).unwrap();
         assert_eq!((ids(&with_rival), with_rival.len()), (vec![3], 1), "a rival is not in use");
         let both = ModelSet::with_rivals(vec![b.clone(), c], vec![b], &p);

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// What held tau where it is.
+/// What limits tau.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LimitedBy {
@@ -28,12 +28,12 @@ pub struct Threshold {
     pub positives: usize,
     /// Other distances used (n-). Below 300 a rate of 1 % is not measurable.
     pub negatives: usize,
-    /// What held tau.
+    /// What limits tau.
     pub limited_by: LimitedBy,
 }
 
 impl Threshold {
-    /// Accepts nothing: what a landmark gets for which there is no threshold.
+    /// Accepts nothing: for a landmark without a threshold.
     pub const NEVER: Threshold = Threshold {
         tau: 0.0,
         false_positive_rate: 0.0,
@@ -51,8 +51,8 @@ pub enum ThresholdError {
     /// No distance of the landmark's own icons.
     #[error("the landmark has no held-out view to measure its own distances")]
     NoPositive,
-    /// No distance of anything else.
-    #[error("there is nothing to tell the landmark from")]
+    /// No negative distance.
+    #[error("there are no negatives to separate the landmark from")]
     NoNegative,
     /// A distance is NaN or negative.
     #[error("a distance is not a number, or is negative")]

@@ -1,4 +1,4 @@
-//! The identity of the distances: the settings that a stored threshold was learnt under. An explicit list of numbers is
+//! The hash of the settings that define the distances, stored with every threshold. An explicit list of numbers is
 //! hashed: renaming a field changes nothing, changing a number does.
 
 use crate::params::Params;
@@ -8,8 +8,8 @@ use crate::params::Params;
 const VERSION: u64 = 1;
 
 impl Params {
-    /// Names the settings that define the distances: icon, points, descriptor, ranks, alignment. A threshold learnt
-    /// under one hash means nothing under another. FNV-1a, 64 bits, of a version and of the numbers, each group
+    /// Names the settings that define the distances: icon, points, descriptor, ranks, alignment. A threshold is
+    /// valid only under the hash of its training. FNV-1a, 64 bits, of a version and of the numbers, each group
     /// preceded by its length.
     pub fn distance_hash(&self) -> u64 {
         let groups = self.distance_numbers();
@@ -20,8 +20,8 @@ impl Params {
         fnv1a(std::iter::once(VERSION).chain(words).flat_map(u64::to_le_bytes))
     }
 
-    /// Whether a threshold stored under `hash` holds for these settings: their own hash, or the one that builds before
-    /// 2026-11-23 wrote for the same settings.
+    /// Whether a threshold stored under `hash` holds for these settings: their own hash, or the one that builds
+    /// before 2026-11-23 wrote for the same settings.
     pub fn has_distance_hash(&self, hash: u64) -> bool {
         hash == self.distance_hash() || hash == self.distance_hash_of_text()
     }
@@ -105,10 +105,10 @@ fn fnv1a(bytes: impl Iterator<Item = u8>) -> u64 {
 mod tests {
     use super::*;
 
-    /// Of the default settings. A change here puts every stored model of every installation out of use: it needs a
+    /// Hash of the default settings. A change here invalidates every stored model of every installation: it needs a
     /// raised [`VERSION`] and a migration.
     const DEFAULT: u64 = 0xc207_d0a0_41ff_bfb9;
-    /// What the builds before 2026-11-23 stored for the default settings.
+    /// The hash that builds before 2026-11-23 stored for the default settings.
     const DEFAULT_OF_TEXT: u64 = 0xe31b_6db6_d7dd_08be;
 
     #[test]
@@ -121,7 +121,7 @@ mod tests {
 
     /// Every number of the six stages changes the hash, and nothing else does.
     #[test]
-    fn every_number_counts_and_no_other() {
+    fn the_hash_covers_exactly_the_numbers_of_the_distances() {
         let default = Params::default();
         let json = serde_json::to_value(&default).unwrap();
         let mut paths = Vec::new();
@@ -131,7 +131,11 @@ mod tests {
             path.starts_with("/icon/") || stages.iter().any(|s| path.starts_with(&format!("/recognise/{s}/")))
         };
         let counted: usize = default.distance_numbers().iter().map(Vec::len).sum();
-        assert_eq!(paths.iter().filter(|path| of_distances(path)).count(), counted, "a number is left out");
+        assert_eq!(
+            paths.iter().filter(|path| of_distances(path)).count(),
+            counted,
+            "a number is missing from the hash"
+        );
         for path in &paths {
             let mut changed = json.clone();
             let number = changed.pointer_mut(path).unwrap();

@@ -1,4 +1,4 @@
-//! The whole method on drawn posters: poses, refusals, borders, bounds.
+//! The pipeline on drawn posters: poses, refusals, borders, bounds.
 
 use super::*;
 use crate::{
@@ -40,12 +40,12 @@ fn whole() -> Corners {
 
 fn models() -> ModelSet {
     let p = Params::default();
-    let lesson = |seed| {
+    let trained = |seed| {
         let views = synthesis::views(&poster(seed), &whole(), 20, &p, seed);
         let points = view_points(&poster(seed), &whole());
         Arc::new(learn(LandmarkId(seed), &views, &[], &p).unwrap().with_points(&[points]))
     };
-    ModelSet::new(vec![lesson(1), lesson(2)], &p).unwrap()
+    ModelSet::new(vec![trained(1), trained(2)], &p).unwrap()
 }
 
 fn camera() -> Intrinsics {
@@ -69,7 +69,7 @@ fn scene(seed: u64) -> (GrayImage, Quad) {
     let unit = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(Point2::from);
     let image_from_unit = Homography::from_points(&unit, &corners).unwrap();
     let texture = Texture::lift(&poster(seed), &whole()).unwrap();
-    let picture = texture.seen(image_from_unit.matrix(), [640, 480], 150.0).unwrap();
+    let picture = texture.rendered(image_from_unit.matrix(), [640, 480], 150.0).unwrap();
     let quad = Quad {
         corners_px: Corners::new(corners).unwrap(),
         corner_covariance_px2: [Matrix2::identity() * 0.04; 4],
@@ -104,9 +104,10 @@ fn a_known_landmark_gives_its_pose() {
     assert_pose(&facts);
 }
 
-/// From pixels alone: the poster is found, named and placed to a few centimetres, with every stage told of.
+/// From pixels alone: the poster is detected, identified and located to a few centimetres, and every stage is
+/// reported.
 #[test]
-fn the_whole_method() {
+fn the_pipeline_identifies_and_locates_a_landmark_from_pixels() {
     #[derive(Default)]
     struct Stages(Vec<Stage>);
     impl Trace for Stages {
@@ -131,7 +132,7 @@ fn the_whole_method() {
 }
 
 #[test]
-fn corners_that_start_elsewhere_are_turned_back() {
+fn rotated_corners_are_returned_in_the_landmarks_order() {
     let (image, mut quad) = scene(1);
     quad.corners_px = quad.corners_px.rotated(3);
     quad.corner_covariance_px2 = std::array::from_fn(|i| Matrix2::identity() * (0.04 + 0.01 * i as f64));
@@ -142,12 +143,12 @@ fn corners_that_start_elsewhere_are_turned_back() {
     let border = BORDER_SIGMA_PX.powi(2);
     assert!(
         (seen.covariance_px2[0][(0, 0)] - 0.05 - border).abs() < 1e-12,
-        "covariances turn with their corners"
+        "covariances are rotated with their corners"
     );
 }
 
 #[test]
-fn an_inner_border_counts_as_its_own_corners() {
+fn a_recognised_inner_border_becomes_the_corners() {
     let (image, mut quad) = scene(1);
     let outer = quad
         .corners_px
@@ -161,9 +162,9 @@ fn an_inner_border_counts_as_its_own_corners() {
     assert_pose(&facts);
 }
 
-/// A mat inside the frame was detected, the frame was taught: the identity holds, and so must the distance.
+/// A mat inside the frame was detected, the frame was taught: identity and distance must be right.
 #[test]
-fn another_border_than_the_taught_one_gives_the_same_pose() {
+fn a_detected_inner_border_gives_the_pose_of_the_taught_one() {
     let (image, mut quad) = scene(1);
     let centre = quad.corners_px.points().iter().fold(nalgebra::Vector2::zeros(), |m, c| m + c.coords * 0.25);
     let inner = quad.corners_px.points().map(|c| Point2::from(centre + (c.coords - centre) * 0.95));
@@ -172,26 +173,29 @@ fn another_border_than_the_taught_one_gives_the_same_pose() {
     assert_eq!(facts.recognition.as_ref().unwrap().verdict, Verdict::Unique(LandmarkId(1)));
     let pose = facts.pose.unwrap();
     let error = pose.best.camera_from_landmark.inverse() * camera_from_landmark();
-    // As detected it would stand 5 % farther away: 10 cm.
+    // With the detected border the landmark would be 5 % farther away: 10 cm.
     assert!(error.translation.vector.norm() < 0.03, "{error:?}");
     let sigma_m = pose.best.covariance[(5, 5)].sqrt();
-    assert!(sigma_m > 3e-3, "an aligned corner is not as sure as a detected one: {sigma_m} m");
+    assert!(
+        sigma_m > 3e-3,
+        "an aligned corner has a larger standard deviation than a detected one: {sigma_m} m"
+    );
 }
 
 #[test]
-fn no_pose_without_its_reasons() {
+fn a_missing_pose_has_a_reason() {
     let (image, quad) = scene(1);
     assert_eq!(facts(&image, quad.clone(), None).pose, Err(PoseUnavailable::NoCamera));
     let (other, other_quad) = scene(2);
     assert_eq!(facts(&other, other_quad, Some(&camera())).pose, Err(PoseUnavailable::NoSize(LandmarkId(2))));
-    let (stranger, stranger_quad) = scene(3);
-    assert_eq!(facts(&stranger, stranger_quad, Some(&camera())).pose, Err(PoseUnavailable::NotUnique));
+    let (distractor, distractor_quad) = scene(3);
+    assert_eq!(facts(&distractor, distractor_quad, Some(&camera())).pose, Err(PoseUnavailable::NotUnique));
     let three_sided = facts(&image, Quad { kind: QuadKind::ThreeSided, ..quad }, Some(&camera()));
     assert_eq!((three_sided.recognition, three_sided.pose), (None, Err(PoseUnavailable::NotUnique)));
 }
 
 #[test]
-fn only_so_many_quads_are_asked() {
+fn the_number_of_recognised_quads_is_bounded() {
     let (image, quad) = scene(1);
     let mut quads = vec![Quad { kind: QuadKind::ThreeSided, ..quad.clone() }];
     quads.resize(MAX_RECOGNISED_QUADS + 2, quad);

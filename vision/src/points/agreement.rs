@@ -1,5 +1,5 @@
-//! A landmark's points with their expected places in, whether the patch looks like each of them there out. No
-//! keypoint need be found in the patch: the descriptor is taken where the homography puts it.
+//! A landmark's points and the homography in, the agreement of the patch with each of them out. No keypoint is
+//! required in the patch: the descriptor is computed at the projected position.
 
 use crate::{
     geometry::homography::Homography,
@@ -13,7 +13,7 @@ use fearless_simd::{Level, dispatch};
 use nalgebra::Point2;
 use serde::{Deserialize, Serialize};
 
-/// What the patch shows where a landmark's point should be.
+/// Comparison of the patch with a landmark's point at its projected position.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Check {
     /// Index of the landmark's point.
@@ -22,8 +22,8 @@ pub struct Check {
     pub distance: u32,
     /// Mean gradient of the patch there, in grey levels a pixel of the octave.
     pub gradient: f32,
-    /// Share of the other places, in the patch and on the landmark, that look as much alike or more, 0 to 1: what
-    /// chance would do at this point of these two pictures.
+    /// Share of other positions, in the patch and on the landmark, with a descriptor at least as similar, 0 to 1:
+    /// the empirical probability of agreement by chance at this point.
     pub by_chance: f32,
     /// Distance of the landmark's point to the most similar plain structure.
     pub plain: u32,
@@ -31,28 +31,28 @@ pub struct Check {
 
 /// Largest descriptor distance of an agreeing point...
 const AGREEING: f32 = 90.0;
-/// ... as a share of the point's distance to plain structures, too: a frame must not pass for a picture...
+/// ... also as a share of the point's distance to plain structures: a frame must not count as a picture...
 const AGREEING_PLAIN: f32 = 0.7;
 /// ... and nearer than all but this share of other places.
 pub const AGREEING_BY_CHANCE: f32 = 0.05;
-/// Below this gradient the patch shows nothing that could agree or disagree.
+/// Below this gradient the patch has no texture that could agree or disagree.
 const SILENT_GRADIENT: f32 = 0.5;
-/// A point disagrees when this share of other places looks as much alike, or more.
+/// A point disagrees when this share of other positions is at least as similar.
 const DISAGREEING_BY_CHANCE: f32 = 0.2;
 
 impl Check {
-    /// The patch looks like the landmark here, as it would hardly do by chance.
+    /// The patch agrees with the landmark here, beyond chance.
     pub fn agrees(&self) -> bool {
         let most = AGREEING.min(AGREEING_PLAIN * self.plain as f32);
         !self.is_silent() && self.distance as f32 <= most && self.by_chance <= AGREEING_BY_CHANCE
     }
 
-    /// The patch shows nothing here.
+    /// The patch has no texture here.
     pub fn is_silent(&self) -> bool {
         self.gradient < SILENT_GRADIENT
     }
 
-    /// The patch shows something else here.
+    /// The patch has another texture here.
     pub fn disagrees(&self) -> bool {
         !self.is_silent() && self.by_chance >= DISAGREEING_BY_CHANCE
     }
@@ -61,11 +61,11 @@ impl Check {
 /// Cells along a side of the table.
 pub const TABLE: usize = 5;
 
-/// What a part of the landmark says.
+/// Agreement of a part of the landmark.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Part {
-    /// Nothing: no points there, hidden by something plain, or out of the image.
+    /// No statement: no points there, hidden by an untextured occluder, or outside the image.
     #[default]
     Silent,
     /// The picture is the taught one.
@@ -74,7 +74,7 @@ pub enum Part {
     Disagrees,
 }
 
-/// What the parts of a landmark say, rows from the top, in its own upright orientation.
+/// Agreement of the parts of a landmark, rows from the top, in its own upright orientation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Agreement(pub [[Part; TABLE]; TABLE]);
 
@@ -100,7 +100,7 @@ impl Agreement {
         }))
     }
 
-    /// Parts that say `part`.
+    /// Number of parts with the value `part`.
     pub fn count(&self, part: Part) -> usize {
         self.0.iter().flatten().filter(|p| **p == part).count()
     }
@@ -129,8 +129,8 @@ impl Agreement {
     }
 }
 
-/// Looks at every point of `taught` that the patch shows at its scale. `turned` quarters were applied to the patch's
-/// points before `seen_from_taught` was found.
+/// Compares every point of `taught` that the patch contains at its scale. `turned` quarters were applied to the
+/// patch's points before `seen_from_taught` was found.
 pub fn checks(
     seen: &SeenPatch,
     turned: usize,
@@ -177,7 +177,7 @@ pub fn checks(
     found
 }
 
-/// Compares every point with every other place.
+/// Compares every point with every other position.
 #[expect(
     clippy::inline_always,
     reason = "an instruction set holds only in what is inlined where it was chosen"
@@ -186,23 +186,23 @@ pub fn checks(
 fn compare_elsewhere(found: &mut [Check], shown: &[Descriptor], taught: &[Point]) {
     for i in 0..found.len() {
         let (own, at) = (taught[found[i].taught], taught[found[i].taught].at);
-        let (mut asked, mut alike) = (0_u32, 0_u32);
+        let (mut asked, mut as_similar) = (0_u32, 0_u32);
         for (j, descriptor) in shown.iter().enumerate() {
             let other = &taught[found[j].taught];
             if (other.at[0] - at[0]).abs() < ELSEWHERE && (other.at[1] - at[1]).abs() < ELSEWHERE {
                 continue;
             }
             asked += 2;
-            alike += u32::from(own.descriptor.distance(descriptor) <= found[i].distance);
-            alike += u32::from(other.descriptor.distance(&shown[i]) <= found[i].distance);
+            as_similar += u32::from(own.descriptor.distance(descriptor) <= found[i].distance);
+            as_similar += u32::from(other.descriptor.distance(&shown[i]) <= found[i].distance);
         }
         if asked > 0 {
-            found[i].by_chance = alike as f32 / asked as f32;
+            found[i].by_chance = as_similar as f32 / asked as f32;
         }
     }
 }
 
-/// Places further apart than this along an axis, in landmark units, show different things.
+/// Positions further apart than this along an axis, in landmark units, count as different.
 const ELSEWHERE: f32 = 0.1;
 
 /// How far around a point the patch must reach, in its scales.
@@ -227,7 +227,7 @@ fn local_scale(map: &Homography, at: &Point2<f64>) -> f64 {
 /// Octave and level whose smoothing is that of a keypoint of `sigma` patch pixels.
 fn level_of(seen: &SeenPatch, sigma: f32) -> Option<(usize, usize)> {
     let steps = (SCALES as f32 * (sigma / BASE_SIGMA as f32).log2()).round() as i32;
-    // Finer than the patch shows.
+    // Finer than the resolution of the patch.
     if steps < 0 {
         return None;
     }

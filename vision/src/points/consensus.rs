@@ -13,7 +13,7 @@ use nalgebra::{Matrix3, Point2};
 
 /// Matches that pairs are drawn from, the best first.
 pub const MAX_PAIRED: usize = 30;
-/// Pairs closer than this along an axis, in landmark units, say nothing of its scale.
+/// Pairs closer than this along an axis, in landmark units, do not determine its scale.
 const MIN_BASE: f32 = 0.1;
 /// Largest residual of a match with a hypothesis, in landmark units.
 const ROUGH: f64 = 0.06;
@@ -26,16 +26,16 @@ const MIN_HOMOGRAPHY: usize = 8;
 const MAX_REFITTED: usize = 4;
 /// Bounds of the area of the landmark in the patch's quad.
 const AREA: [f64; 2] = [0.25, 4.0];
-/// Matches of one place count once: places nearer than this are one, in landmark units.
+/// Matches closer than this, in landmark units, count once.
 const APART: f32 = 0.025;
 
-/// A place on the landmark, and where the patch shows it.
+/// A position on the landmark and its position in the patch.
 type Pair = (Point2<f64>, Point2<f64>);
 
-/// The matches that agree.
+/// The homography with its inliers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Consensus {
-    /// The patch's landmark coordinates of the landmark's.
+    /// Maps landmark coordinates to the patch's landmark coordinates.
     pub seen_from_taught: Homography,
     /// Indices into the matches.
     pub inliers: Vec<usize>,
@@ -181,7 +181,7 @@ fn affine(from: &[Point2<f64>], to: &[Point2<f64>]) -> Option<Homography> {
     Homography::from_matrix(Matrix3::new(x[0], x[1], x[2], y[0], y[1], y[2], 0.0, 0.0, 1.0))
 }
 
-/// Whether the landmark's corners stay a convex quad of the same orientation and about the same size.
+/// Whether the mapped corners of the landmark are a convex quad of the same orientation and about the same size.
 fn is_sane(map: &Homography) -> bool {
     let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(Point2::from);
     if corners.iter().any(|c| map.denominator(c) <= 0.0) {
@@ -196,7 +196,7 @@ fn is_sane(map: &Homography) -> bool {
     convex && (AREA[0]..=AREA[1]).contains(&area)
 }
 
-/// How many of `inliers` lie at different places of the landmark.
+/// How many of `inliers` lie at different positions on the landmark.
 pub fn distinct(inliers: &[usize], taught: &[Point], matches: &[Match]) -> usize {
     let mut places: Vec<[f32; 2]> = Vec::with_capacity(inliers.len());
     for i in inliers {

@@ -25,7 +25,7 @@ const CELL_SIGMAS: f32 = 3.0;
 /// Samples along a cell, and along a side of the window of `CELLS + 1` cells.
 const PER_CELL: usize = 4;
 const SAMPLES: usize = PER_CELL * (CELLS + 1);
-/// The same, for whole vectors: what is beyond weighs nothing.
+/// The same, padded to whole vectors with weight 0.
 const PADDED: usize = 32;
 /// Values of a unit histogram above which its bits are set.
 const THRESHOLDS: [f32; 2] = [0.055, 0.12];
@@ -64,7 +64,7 @@ impl Descriptor {
             let cells = &self.0[half * HALF_WORDS..][..HALF_WORDS];
             for cell in 0..CELLS * CELLS {
                 let (column, row) = (cell % CELLS, cell / CELLS);
-                // Where the cell goes to: the inverse of where each comes from.
+                // The destination of the cell: the inverse of the source map.
                 let (column, row) = match shift {
                     1 => (row, last - column),
                     2 => (last - column, last - row),
@@ -80,12 +80,12 @@ impl Descriptor {
     }
 }
 
-/// Where a descriptor is taken from.
+/// The window of a descriptor.
 #[derive(Debug, Clone, Copy)]
 pub struct Window {
     /// Centre in patch pixels.
     pub x: f32,
-    /// See `x`.
+    /// Centre row in patch pixels.
     pub y: f32,
     /// Scale in patch pixels.
     pub sigma: f32,

@@ -8,7 +8,7 @@ use crate::points::{
 };
 use fearless_simd::{Level, dispatch};
 
-/// Words that are looked at for a point.
+/// Words that are searched for a point.
 const PROBES: usize = 6;
 /// Steps of a place in a landmark unit.
 const PLACES: f32 = 255.0;
@@ -76,15 +76,15 @@ impl PointIndex {
         self.entries.is_empty()
     }
 
-    /// Memory that it takes, in bytes.
+    /// Its memory, bytes.
     pub fn memory_bytes(&self) -> usize {
         self.entries.len() * size_of::<Entry>() + self.starts.len() * size_of::<u32>()
     }
 
     /// The `count` models with most votes of `points`, most first, of equal ones the lower index; those with less
-    /// than `least` are left out. Each with its votes: a point votes for the landmarks of its nearest neighbours, by
-    /// how much nearer they are than the next landmark's, so that what many landmarks show counts for little, but
-    /// never for nothing: more landmarks than that may have the same picture.
+    /// than `least` are left out. Each with its votes: a point votes for the landmarks of its nearest neighbours,
+    /// weighted by how much nearer they are than the next landmark's: texture of many landmarks has little weight,
+    /// but not zero, since more landmarks may have the same picture.
     pub fn vote(&self, points: &[Point], count: usize, least: u32) -> Vec<(usize, u32)> {
         if self.is_empty() {
             return Vec::new();

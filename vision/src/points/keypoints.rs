@@ -6,9 +6,9 @@ use fearless_simd::{Level, dispatch};
 
 /// Smoothing of the first level of an octave, in its pixels.
 pub const BASE_SIGMA: f64 = 1.15;
-/// What smoothing a patch is taken to have from its sampling, in pixels.
+/// Assumed smoothing of a patch by its sampling, in pixels.
 const SAMPLING_SIGMA: f64 = 0.5;
-/// Scales of an octave at which extrema are looked for.
+/// Scales of an octave at which extrema are searched.
 pub const SCALES: usize = 3;
 /// Smoothed levels of an octave.
 const LEVELS: usize = SCALES + 3;
@@ -20,7 +20,7 @@ const MAX_OCTAVES: usize = 4;
 const MIN_RESPONSE: f32 = 0.25;
 /// Largest ratio of the principal curvatures: beyond it the point is an edge.
 const MAX_EDGE_RATIO: f32 = 10.0;
-/// Pixels along the border of an octave where no extremum is looked for.
+/// Pixels along the border of an octave without extrema.
 const BORDER_PX: usize = 3;
 
 /// A keypoint of a patch.

@@ -1,10 +1,10 @@
-//! Points of a patch and of a landmark in, tentative matches out: mutual nearest neighbours within a gate of place and
-//! scale, clearly nearer than the next neighbour elsewhere.
+//! Points of a patch and of a landmark in, tentative matches out: mutual nearest neighbours within a gate of place
+//! and scale, clearly nearer than the next neighbour elsewhere.
 
 use crate::points::point::Point;
 use fearless_simd::{Level, dispatch};
 
-/// How matches are found.
+/// Gates of a match.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MatchGate {
     /// Largest difference of place along an axis, in landmark units.
@@ -17,7 +17,7 @@ pub struct MatchGate {
     pub ratio: f32,
 }
 
-/// Neighbours nearer to each other than this, in landmark units, are taken for the same place.
+/// Neighbours nearer to each other than this, in landmark units, count as the same position.
 const SAME_PLACE: f32 = 0.04;
 
 /// A tentative match.

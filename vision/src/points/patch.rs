@@ -16,7 +16,7 @@ pub const MARGIN: f64 = 0.25;
 /// A quad is magnified by at most this factor before the next smaller patch is taken.
 const MAX_MAGNIFICATION: f64 = 1.25;
 
-/// What a bilinear sample stands for, in the image's pixels: it weighs what lies within one pixel to either side.
+/// Width that a bilinear sample covers, in pixels of the image.
 const SAMPLE_PX: f64 = 2.0;
 
 /// A rectified patch.
@@ -32,15 +32,15 @@ pub struct Patch {
     image_size_px: [f64; 2],
 }
 
-/// The side of the quad in the patch that suits how large it is seen.
+/// The side of the quad in the patch for its size in the image.
 pub fn inner_px(corners_px: &Corners) -> usize {
-    let seen_px = corners_px.area_px2().max(0.0).sqrt() * MAX_MAGNIFICATION;
-    INNER_PX.into_iter().find(|inner| *inner as f64 <= seen_px).unwrap_or(INNER_PX[INNER_PX.len() - 1])
+    let wanted_px = corners_px.area_px2().max(0.0).sqrt() * MAX_MAGNIFICATION;
+    INNER_PX.into_iter().find(|inner| *inner as f64 <= wanted_px).unwrap_or(INNER_PX[INNER_PX.len() - 1])
 }
 
 impl Patch {
-    /// Rectifies what `corners_px` enclose to `inner` x `inner` pixels, with [`MARGIN`] around. What lies outside of
-    /// the image repeats its border. `None` where the corners are degenerate or the margin reaches the horizon.
+    /// Rectifies the quad `corners_px` to `inner` x `inner` pixels, with [`MARGIN`] around. Outside the image its
+    /// border is repeated. `None` where the corners are degenerate or the margin reaches the horizon.
     pub fn new(image: &GrayImage, corners_px: &Corners, inner: usize) -> Option<Self> {
         let margin = (inner as f64 * MARGIN).round() as usize;
         let side = inner + 2 * margin;
@@ -83,7 +83,7 @@ impl Patch {
         (self.to_image.denominator(&point) > 0.0).then(|| self.to_image.apply(&point))
     }
 
-    /// Whether the image shows the patch within `reach` patch pixels of (x, y).
+    /// Whether the patch within `reach` patch pixels of (x, y) lies inside the image.
     pub fn is_seen(&self, x: f32, y: f32, reach: f32) -> bool {
         let (x, y, reach) = (f64::from(x), f64::from(y), f64::from(reach));
         [[-reach, -reach], [reach, -reach], [reach, reach], [-reach, reach]].iter().all(|[dx, dy]| {
@@ -96,5 +96,5 @@ impl Patch {
     }
 }
 
-/// A patch whose depths differ by more reaches too near to the horizon.
+/// Smallest ratio of depths in a patch: below it the patch is too near to the horizon.
 const MIN_DEPTH_RATIO: f64 = 0.05;

@@ -13,11 +13,11 @@ pub struct Point {
     pub at: [f32; 2],
     /// Scale in landmark units.
     pub sigma: f32,
-    /// What it looks like.
+    /// Its descriptor.
     pub descriptor: Descriptor,
 }
 
-/// A patch with everything that is asked of it.
+/// A patch with its scale space and points.
 #[derive(Debug, Clone)]
 pub struct SeenPatch {
     /// The patch.
@@ -29,7 +29,7 @@ pub struct SeenPatch {
 }
 
 impl SeenPatch {
-    /// Works out the points of `patch`.
+    /// Computes the points of `patch`.
     pub fn new(patch: Patch, most: usize) -> Self {
         let space = ScaleSpace::new(&patch);
         let found = keypoints(&patch, &space, most);

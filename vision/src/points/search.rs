@@ -14,37 +14,36 @@ use crate::{
     },
 };
 
-/// Landmarks for which a homography is looked for.
+/// Landmarks for which a homography is estimated.
 const MAX_HYPOTHESES: usize = 8;
 /// Homographies that are verified.
 const MAX_VERIFIED: usize = 3;
-/// Least weight of votes of a landmark that is looked at: see [`PointIndex::vote`].
+/// Least weight of votes of a landmark: see [`PointIndex::vote`].
 const MIN_VOTES: u32 = 4;
-/// Landmarks with less than this share of the most votes are left out: what looks like the landmark that is there gets
-/// about as many.
+/// Landmarks with less than this share of the most votes are dropped: a look-alike gets about as many.
 const MIN_VOTES_SHARE: f64 = 0.2;
-/// Once a landmark is beyond doubt, others are verified if at least this share of their matches agrees on the
-/// homography: a look-alike agrees with most, an accident with a few.
+/// After a certain landmark, others are verified only if at least this share of their matches agrees on the
+/// homography: most matches of a look-alike agree, few of a chance match.
 const MIN_RIVAL_SHARE: f64 = 0.25;
-/// log10 of the false alarms in one comparison from which on a landmark is beyond doubt.
+/// log10 of the false alarms in one comparison below which a landmark is certain.
 const LOG10_SURE: f64 = -12.0;
 /// Borders of a quad that get a patch of their own: those that overlap all earlier ones by less than this.
 const SAME_BORDER_IOU: f64 = 0.6;
 /// Most borders of a quad.
 const MAX_BORDERS: usize = 2;
 
-/// A landmark that points speak for.
+/// A landmark with point evidence.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LandmarkPoints {
     /// Index of the model.
     pub model: usize,
     /// Which border of the quad: 0 for its corners, i for alternate i - 1.
     pub border: usize,
-    /// What speaks for it.
+    /// Its point evidence.
     pub evidence: PointEvidence,
 }
 
-/// The landmarks that points speak for in `quad`, the most improbable coincidence first; each once.
+/// The landmarks with point evidence in `quad`, by rising number of false alarms; each once.
 pub fn search<'a>(
     image: &GrayImage,
     quad: &Quad,

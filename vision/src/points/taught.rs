@@ -1,4 +1,4 @@
-//! Views of a landmark in, the points that are kept of it out.
+//! Views of a landmark in, its stored points out.
 
 use crate::{
     frame::GrayImage,
@@ -17,26 +17,26 @@ use std::sync::LazyLock;
 pub const MAX_LANDMARK_POINTS: usize = 240;
 /// Most views that points are taken from.
 pub const MAX_POINT_VIEWS: usize = 3;
-/// Points of a view that are looked at.
+/// Most points of a view.
 const MAX_VIEW_POINTS: usize = 400;
-/// A point that is as near as this to a plain structure is not kept.
+/// Points nearer than this to a plain structure are dropped.
 const MIN_PLAIN_DISTANCE: u32 = 46;
-/// Points of one place and scale whose descriptors are nearer than this say the same.
+/// Points of one position and scale whose descriptors are nearer than this are duplicates.
 const SAME_DISTANCE: u32 = 40;
-/// Places nearer than this, in landmark units, are one.
+/// Positions nearer than this, in landmark units, are the same.
 const SAME_PLACE: f32 = 0.02;
 /// Steps of the stored scale in a factor of 2.
 const SCALE_STEPS: f32 = 24.0;
-/// What each stored scale stands for, in landmark units.
+/// The scale of each stored step, in landmark units.
 static SCALES: LazyLock<[f32; 256]> =
     LazyLock::new(|| std::array::from_fn(|step| (-(step as f32) / SCALE_STEPS).exp2()));
 /// Bytes of a stored point.
 pub(crate) const POINT_BYTES: usize = 8 * WORDS + 6;
 
-/// A landmark's point as it is kept: quantised, so that memory and store agree bit for bit.
+/// A landmark's point as stored: quantised, so that memory and database agree bit for bit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TaughtPoint {
-    /// What it looks like.
+    /// Its descriptor.
     pub descriptor: Descriptor,
     /// Place in landmark coordinates, in 65535ths.
     at: [u16; 2],
@@ -76,7 +76,7 @@ impl TaughtPoint {
         self.word
     }
 
-    /// Its scale as it is kept.
+    /// Its stored scale step.
     pub(crate) fn scale_step(&self) -> u8 {
         self.sigma
     }
@@ -101,7 +101,7 @@ impl TaughtPoint {
     }
 }
 
-/// The points of one photographed view: those on the landmark that are no plain structures, strongest first. Empty
+/// The points of one photographed view: those on the landmark that are not plain structures, strongest first. Empty
 /// where the corners are degenerate.
 pub fn view_points(image: &GrayImage, corners_px: &Corners) -> Vec<TaughtPoint> {
     let Some(patch) = Patch::new(image, corners_px, inner_px(corners_px).min(INNER_PX[0])) else {
@@ -114,22 +114,22 @@ pub fn view_points(image: &GrayImage, corners_px: &Corners) -> Vec<TaughtPoint> 
 }
 
 /// The points of a landmark from those of its photographed views: of up to [`MAX_POINT_VIEWS`] views, evenly chosen,
-/// each with what the ones before do not show. At most [`MAX_LANDMARK_POINTS`].
+/// each without duplicates of the earlier ones. At most [`MAX_LANDMARK_POINTS`].
 pub fn landmark_points(views: &[Vec<TaughtPoint>]) -> Vec<TaughtPoint> {
     let chosen = views.len().min(MAX_POINT_VIEWS);
-    let mut kept: Vec<TaughtPoint> = Vec::new();
+    let mut points: Vec<TaughtPoint> = Vec::new();
     for i in 0..chosen {
         let view = &views[i * views.len() / chosen];
-        let room = (MAX_LANDMARK_POINTS - kept.len()) / (chosen - i);
-        let known = kept.len();
-        let is_new = |p: &&TaughtPoint| !kept[..known].iter().any(|k| says_the_same(k, p));
+        let room = (MAX_LANDMARK_POINTS - points.len()) / (chosen - i);
+        let known = points.len();
+        let is_new = |p: &&TaughtPoint| !points[..known].iter().any(|k| is_duplicate(k, p));
         let new: Vec<TaughtPoint> = view.iter().filter(is_new).take(room).copied().collect();
-        kept.extend(new);
+        points.extend(new);
     }
-    kept
+    points
 }
 
-fn says_the_same(a: &TaughtPoint, b: &TaughtPoint) -> bool {
+fn is_duplicate(a: &TaughtPoint, b: &TaughtPoint) -> bool {
     let (p, q) = (a.point(), b.point());
     (p.at[0] - q.at[0]).abs() < SAME_PLACE
         && (p.at[1] - q.at[1]).abs() < SAME_PLACE

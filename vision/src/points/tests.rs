@@ -21,7 +21,7 @@ fn taught(seed: u64) -> Vec<TaughtPoint> {
     landmark_points(&[view_points(&poster(seed), &whole())])
 }
 
-/// The corners moved by a few pixels, as a prediction is wrong.
+/// The corners moved by a few pixels, as errors of a prediction.
 fn predicted() -> Corners {
     let off = [[3.0, -2.0], [-3.0, 2.0], [2.0, 3.0], [-2.0, -3.0]];
     let moved: Vec<Point2<f64>> =
@@ -30,7 +30,7 @@ fn predicted() -> Corners {
 }
 
 #[test]
-fn a_landmark_is_verified_where_it_is_expected_and_no_other() {
+fn only_the_expected_landmark_is_verified() {
     let image = photograph(&poster(1), &oblique(), 0.8, 20.0);
     let found = verify_at(&image, &taught(1), &predicted()).unwrap();
     assert!(found.log10_nfa < -15.0 && found.inliers >= 10, "{found:?}");
@@ -45,7 +45,7 @@ fn a_landmark_is_verified_where_it_is_expected_and_no_other() {
 }
 
 #[test]
-fn a_replaced_part_disagrees_and_a_covered_one_is_silent() {
+fn a_replaced_part_disagrees_and_a_covered_part_is_silent() {
     let image = photograph(&poster(1), &oblique(), 1.0, 0.0);
     let other = photograph(&poster(5), &oblique(), 1.0, 0.0);
     let part = |u: usize, v: usize| u > 210 && v > 200;
@@ -75,14 +75,14 @@ fn votes_find_the_landmark() {
 }
 
 #[test]
-fn points_are_bounded_and_stored_bit_for_bit() {
+fn the_number_of_points_is_bounded_and_stored_points_are_exact() {
     let views: Vec<Vec<TaughtPoint>> = (1..7).map(|seed| view_points(&poster(seed), &whole())).collect();
-    let kept = landmark_points(&views);
-    assert!(kept.len() <= MAX_LANDMARK_POINTS && kept.len() > 100, "{}", kept.len());
-    // The same view again says nothing new.
+    let points = landmark_points(&views);
+    assert!(points.len() <= MAX_LANDMARK_POINTS && points.len() > 100, "{}", points.len());
+    // A repeated view adds no points.
     let twice = landmark_points(&[views[0].clone(), views[0].clone()]);
     assert!(twice.len() <= views[0].len());
-    for point in kept {
+    for point in points {
         let mut bytes = Vec::new();
         point.write(&mut bytes);
         assert_eq!(TaughtPoint::read(bytes.as_slice().try_into().unwrap()), point);
@@ -92,7 +92,7 @@ fn points_are_bounded_and_stored_bit_for_bit() {
 }
 
 #[test]
-fn a_turn_of_the_patch_turns_its_descriptors() {
+fn rotated_descriptors_equal_those_of_the_rotated_patch() {
     let n = 160;
     let picture = poster(3);
     let upright = GrayImage::from_fn(n, n, |u, v| picture.at(u, v));
@@ -110,7 +110,7 @@ fn a_turn_of_the_patch_turns_its_descriptors() {
                 near.map(|e| e.descriptor.distance(&point.descriptor)).min().is_some_and(|d| d < 40),
             );
         }
-        // Octaves drop every second pixel from one side, so that coarse points are not found alike.
+        // Octaves drop every second pixel from one side, so that coarse points differ.
         assert!(together > 30, "turn {turn}: {together} of 60");
     }
 }
@@ -133,7 +133,7 @@ fn edges_and_right_angles_are_plain_and_textures_are_not() {
 }
 
 #[test]
-fn binomial_tails() {
+fn binomial_tails_by_hand() {
     // By hand: 1 - 0.9^3; 3 * 0.01 * 0.9 + 0.001.
     assert!((log10_tail(3, 1, 0.1) - 0.271_f64.log10()).abs() < 1e-12);
     assert!((log10_tail(3, 2, 0.1) - 0.028_f64.log10()).abs() < 1e-12);

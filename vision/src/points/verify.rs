@@ -1,6 +1,6 @@
-//! Whether a patch shows a landmark: matches, homography, and then every other point of the landmark where the
-//! homography puts it. The search for the homography uses up the evidence of the points that it was found by; the
-//! others were not asked before, so that their agreement counts at its full improbability.
+//! Verification of a landmark in a patch: matches, homography, then the agreement of the landmark's other points at
+//! their projected positions. The points that determined the homography are not independent evidence; the others
+//! are held out, so their agreement counts in full.
 
 use crate::{
     detect::quad::BORDER_SIGMA_PX,
@@ -21,15 +21,15 @@ use nalgebra::{Matrix2, Point2, SMatrix};
 
 /// Most points of a patch.
 pub const MAX_PATCH_POINTS: usize = 250;
-/// Matches in a global search: the detected border may be another one than the taught.
+/// Gates of matches in a global search: the detected border may differ from the taught one.
 pub const GLOBAL_GATE: MatchGate = MatchGate { place: 0.3, scale: 1.6, distance: 90, ratio: 0.9 };
-/// Matches where the landmark is expected.
+/// Gates of matches at an expected landmark.
 pub const GUIDED_GATE: MatchGate = MatchGate { place: 0.15, scale: 1.4, distance: 90, ratio: 0.95 };
 /// A match agrees with a homography by chance with this probability.
 const CHANCE_OF_MATCH: f64 = 0.01;
-/// log10 of the tail of the matches from which on a homography is verified at all.
+/// Largest log10 tail probability of the matches at which a homography is verified.
 const MIN_LOG10_MATCHES: f64 = -5.0;
-/// log10 of how many independent homographies a search tries.
+/// log10 of the number of independent homographies that a search tries.
 const LOG10_HOMOGRAPHIES: f64 = 14.0;
 /// Points nearer than this along both axes, in landmark units, are one piece of evidence.
 const APART: f32 = 0.04;
@@ -53,19 +53,19 @@ impl Target {
     }
 }
 
-/// What the points say of a landmark in a patch.
+/// Point evidence for a landmark in a patch.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PointEvidence {
     /// Tentative matches at different places.
     pub matches: usize,
     /// Those of them that agree on the homography.
     pub inliers: usize,
-    /// Further points of the landmark that the patch shows, at different places.
+    /// Held-out points of the landmark inside the patch, at different places.
     pub checked: usize,
-    /// Those of them that look as taught.
+    /// Those of them that agree.
     pub agreeing: usize,
-    /// log10 of the expected number of such coincidences in one comparison of a patch with something else: 0 at most. A
-    /// caller that compares with N landmarks adds log10 N.
+    /// log10 of the number of false alarms (expected such coincidences in one comparison with an unrelated patch):
+    /// 0 at most. A caller that compares with N landmarks adds log10 N.
     pub log10_nfa: f64,
     /// Quarters by which the patch was turned.
     pub turned: usize,
@@ -80,7 +80,7 @@ pub struct PointEvidence {
 }
 
 impl PointEvidence {
-    /// The landmark's border, wherever the detector found one.
+    /// The landmark's border, independent of the detected one.
     pub fn border(&self) -> SeenBorder {
         let (corners_px, covariance_px2) = (self.corners_px, self.corner_covariance_px2);
         SeenBorder { corners_px, covariance_px2, found_by: self.found_by }
@@ -147,7 +147,7 @@ pub(crate) fn verified(seen: &SeenPatch, hypothesis: &Hypothesis, target: &Targe
     })
 }
 
-/// Places that were not `used` yet and show something, how many of them agree, and the mean number of points of a place
+/// Places that were not `used` yet and have texture, how many of them agree, and the mean number of points of a place
 /// (several views of a landmark differ): a place agrees if any of its points does.
 fn held_out(checks: &[Check], target: &Target, used: &[[f32; 2]]) -> (usize, usize, f64) {
     let near = |a: &[f32; 2], b: &[f32; 2]| (a[0] - b[0]).abs() < APART && (a[1] - b[1]).abs() < APART;
@@ -168,8 +168,8 @@ fn held_out(checks: &[Check], target: &Target, used: &[[f32; 2]]) -> (usize, usi
     (places.len(), agreeing, f64::from(points) / places.len().max(1) as f64)
 }
 
-/// Corners of the taught border in the image, with covariances that follow from the residuals of the inliers, and from
-/// what the taught border itself is off by.
+/// Corners of the taught border in the image, with covariances from the residuals of the inliers and from the
+/// uncertainty of the taught border.
 fn corners(
     seen: &SeenPatch,
     turned: usize,
@@ -222,8 +222,8 @@ fn corners(
     Some((corners, std::array::from_fn(of)))
 }
 
-/// The evidence for ONE landmark, whose corners are expected at `predicted_px` (TL first), whatever was detected
-/// there and also where the image shows only a part of it. `None`: no homography that would be worth a look.
+/// The evidence for one landmark, whose corners are expected at `predicted_px` (TL first), without a detected quad;
+/// the landmark may be partly outside the image. `None`: no homography with enough matches.
 pub fn verify_at(image: &GrayImage, taught: &[TaughtPoint], predicted_px: &Corners) -> Option<PointEvidence> {
     let patch = Patch::new(image, predicted_px, inner_px(predicted_px))?;
     let seen = SeenPatch::new(patch, MAX_PATCH_POINTS);

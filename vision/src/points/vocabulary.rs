@@ -19,7 +19,7 @@ const ROOTS: usize = 64;
 const LEAVES: usize = 32;
 /// Number of words.
 pub const VOCABULARY: usize = ROOTS * LEAVES;
-/// Roots below which words are looked for.
+/// Roots below which words are searched.
 const BRANCHES: usize = 3;
 /// Side of a generated texture, and how many there are.
 const SIDE: usize = 240;
@@ -105,8 +105,8 @@ fn tree() -> Tree {
     Tree { roots, leaves }
 }
 
-/// `count` medoids, fewer of fewer descriptors, by a few rounds of assignment; in each the new medoid is the bitwise majority
-/// of those assigned.
+/// `count` medoids, fewer of fewer descriptors, by a few rounds of assignment; in each the new medoid is the
+/// bitwise majority of those assigned.
 #[expect(clippy::inline_always, reason = "as above")]
 #[inline(always)]
 fn medoids(all: &[Descriptor], count: usize) -> Vec<Descriptor> {

@@ -1,8 +1,8 @@
 //! Pose of a landmark in the camera frame from its four corners (method 13.1 to 13.5).
 //!
-//! In: corners with covariance, the landmark's size, a calibrated camera. Out: the best pose with its covariance, the
-//! other minimum of the reprojection error where there is one, and whether the two can be told apart.
-//! Decides nothing about the robot: that takes the map (`map::localise`).
+//! In: corners with covariance, the landmark's size, a calibrated camera. Out: the best pose with its covariance,
+//! the other minimum of the reprojection error where there is one, and whether the two are ambiguous. The robot's
+//! pose is computed by `map::localise`.
 
 use crate::{
     frame::Intrinsics,
@@ -23,9 +23,9 @@ pub struct LandmarkPose {
     pub best: PoseSolution,
     /// The other local minimum, where there is one.
     pub second: Option<PoseSolution>,
-    /// The second cannot be told from the first by its error (ratio below 2): only a prior can decide.
+    /// The reprojection errors of both do not decide (ratio below [`AMBIGUOUS_RATIO`]): a prior is needed.
     pub ambiguous: bool,
-    /// The corners behind it: localisation fits the robot's pose directly to them.
+    /// The corners used: localisation fits the robot's pose directly to them.
     pub measured: PoseMeasurement,
 }
 
@@ -37,11 +37,11 @@ pub const AMBIGUOUS_RATIO: f64 = 2.0;
 /// a false one of 1 has ratio 2.4. For two minima whose predictions lie D sigma apart the false one wins by more than
 /// T with probability Q((T + D^2) / 2D) <= Q(sqrt T), at any D: 3e-5 for T = 16.
 pub const AMBIGUOUS_CHI2: f64 = 16.0;
-/// Two minima nearer than this are one.
+/// Two minima nearer than this are the same.
 const SAME_POSE_RAD: f64 = 1e-4;
 
-/// Pose of a landmark of known `size` from its `corners` (pixels, distorted as seen, in the landmark's own order) with
-/// their covariances. Eq. (2), nearest rotation, then least squares from it and from its mirror image.
+/// Pose of a landmark of known `size` from its `corners` (pixels, distorted as seen, in the landmark's own order)
+/// with their covariances. Eq. (2), nearest rotation, then least squares from it and from its mirror image.
 pub fn landmark_pose(
     corners: &Corners,
     covariance_px2: &[Matrix2<f64>; 4],

@@ -15,7 +15,7 @@ pub fn linear_pose(measured: &PoseMeasurement) -> Option<Isometry3<f64>> {
     pose_of_columns(Homography::from_points(&plane, &rays).ok()?.matrix())
 }
 
-/// The pose behind `B = K^-1 H`, H from the plane's (y, z, 1), positive over its points.
+/// The pose of `B = K^-1 H`, with H mapping the plane's (y, z, 1), positive over its points.
 pub(crate) fn pose_of_columns(b: &Matrix3<f64>) -> Option<Isometry3<f64>> {
     let (b1, b2, b3) = (b.column(0), b.column(1), b.column(2));
     let scale = (b1.norm() * b2.norm()).sqrt();
@@ -38,7 +38,7 @@ fn nearest_rotation(raw: &Matrix3<f64>) -> Option<Rotation3<f64>> {
     Some(Rotation3::from_matrix_unchecked(u * signs * v_t))
 }
 
-/// The viewer is on the front side: `r1 . T < 0`.
+/// The camera is on the front side: `r1 . T < 0`.
 pub(crate) fn faces_camera(pose: &Isometry3<f64>) -> bool {
     (pose.rotation * nalgebra::Vector3::x()).dot(&pose.translation.vector) < 0.0
 }

@@ -1,4 +1,4 @@
-//! Corners of a landmark in, the same free of lens distortion out, checked: what a pose is computed from.
+//! Corners of a landmark in; checked, undistorted corners out: the measurement that a pose is computed from.
 
 use crate::{
     frame::{Distortion, FrameError, Intrinsics},
@@ -22,7 +22,7 @@ impl LandmarkSize {
     pub const MAX_M: f64 = 100.0;
 }
 
-/// What a pose was computed from, free of lens distortion.
+/// The undistorted measurement of a pose.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PoseMeasurement {
     /// Corners as a pinhole with the same K would see them, in the landmark's order.
@@ -31,7 +31,7 @@ pub struct PoseMeasurement {
     pub covariance_px2: [Matrix2<f64>; 4],
     /// The pinhole.
     pub camera: Intrinsics,
-    /// How each corner would move if the camera's (share of the focal length, cx, cy) were more.
+    /// Derivative of each corner by errors of the camera's (share of the focal length, cx, cy).
     pub by_camera: [Matrix2x3<f64>; 4],
     /// The size that was assumed.
     pub size: LandmarkSize,
@@ -54,7 +54,7 @@ pub enum PoseError {
     Size {
         /// `width_m` or `height_m`.
         field: &'static str,
-        /// What it was.
+        /// Its value.
         value: f64,
     },
     /// The intrinsics are impossible.
@@ -73,15 +73,15 @@ pub enum PoseError {
         /// Its index, TL TR BR BL.
         corner: usize,
     },
-    /// The distortion cannot be undone at a corner, or undoing it folds the quad.
-    #[error("lens distortion cannot be undone at the corners")]
+    /// The distortion is not invertible at a corner, or the undistorted corners are not a quad.
+    #[error("the lens distortion is not invertible at the corners")]
     Distortion,
     /// The corners do not determine a pose in front of the camera.
     #[error("the corners do not determine a pose")]
     Degenerate,
 }
 
-/// Checks everything and takes the lens distortion out.
+/// Checks the input and undistorts the corners.
 pub(crate) fn measured(
     corners: &Corners,
     covariance_px2: &[Matrix2<f64>; 4],
@@ -98,7 +98,7 @@ pub(crate) fn measured(
     Ok(PoseMeasurement { corners_px, covariance_px2, camera, by_camera, size })
 }
 
-/// Corners free of lens distortion.
+/// Undistorted corners.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UndistortedCorners {
     /// As a pinhole with the same K would see them.

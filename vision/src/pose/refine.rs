@@ -11,8 +11,8 @@ use nalgebra::{Isometry3, Matrix2, Matrix3, Matrix6, SMatrix, Vector2, Vector6};
 pub struct PoseSolution {
     /// Maps landmark coordinates to camera coordinates.
     pub camera_from_landmark: Isometry3<f64>,
-    /// Covariance of the left perturbation (rotation vector rad, translation m), in that order, camera frame: corners,
-    /// and the camera's own errors where they are stated.
+    /// Covariance of the left perturbation (rotation vector rad, translation m), in that order, camera frame:
+    /// corners, and the camera's own errors where they are stated.
     pub covariance: Matrix6<f64>,
     /// Root mean square reprojection error per coordinate, in pixels.
     pub reprojection_rms_px: f64,
@@ -25,7 +25,7 @@ pub(crate) const MAX_STEPS: usize = 60;
 /// A step below this (radians, and metres per metre of distance) ends the descent.
 const STEP_TOLERANCE: f64 = 1e-12;
 
-/// chi2 with two degrees of freedom that one honest pose in twenty exceeds.
+/// 95 % quantile of chi2 with two degrees of freedom.
 pub(crate) const CHI2_2_95: f64 = 5.991;
 
 /// Corners whitened by their covariance: `weights[i]` has `W^T W = covariance^-1`.
@@ -67,7 +67,7 @@ impl<'a> Problem<'a> {
         Some((h, g))
     }
 
-    /// What the camera's own errors add to the covariance of a minimum, to first order. `None` where none are stated.
+    /// Covariance of a minimum due to errors of the intrinsics, to first order. `None` where none are stated.
     pub(crate) fn spread_by_camera(&self, pose: &Isometry3<f64>) -> Option<Matrix6<f64>> {
         self.measured.camera.sigmas?;
         let (h, _) = self.normal_equations(pose)?;
@@ -117,17 +117,18 @@ impl<'a> Problem<'a> {
 
     /// The solution at a minimum, with `(J^T S^-1 J)^-1` scaled by max(1, chi2 / 5.99). `None` when it is not
     /// determined.
-    // Departs from method 13.5 (max(1, chi2 / 2)): with 2 degrees of freedom that factor exceeds 1 in 37 % of honest
-    // draws and makes the mean NEES 5.1 instead of 6, outside the band that honesty asks for. Scaling from the 95 %
-    // quantile on still answers corners that are worse than they claim.
+    // Departs from method 13.5 (max(1, chi2 / 2)): with 2 degrees of freedom that factor exceeds 1 in 37 % of
+    // consistent draws and makes the mean NEES 5.1 instead of 6, outside the consistency band. Scaling from the 95
+    // % quantile on still corrects corners with understated covariances.
     pub(crate) fn solution(&self, camera_from_landmark: Isometry3<f64>) -> Option<PoseSolution> {
         let (h, _) = self.normal_equations(&camera_from_landmark)?;
         let chi2 = self.chi2(&camera_from_landmark);
         let covariance = h.cholesky()?.inverse() * (chi2 / CHI2_2_95).max(1.0);
         let mut squares = 0.0;
-        for (point, seen) in corner_points(&self.measured.size).iter().zip(self.measured.corners_px.points())
+        for (point, corner) in
+            corner_points(&self.measured.size).iter().zip(self.measured.corners_px.points())
         {
-            squares += (seen - pixel(&camera_from_landmark, point, &self.measured.camera)?).norm_squared();
+            squares += (corner - pixel(&camera_from_landmark, point, &self.measured.camera)?).norm_squared();
         }
         let finite = chi2.is_finite() && covariance.iter().all(|v| v.is_finite());
         finite.then(|| PoseSolution {

@@ -7,10 +7,10 @@ use nalgebra::{Isometry3, Matrix2x3, Matrix3, Point2, SMatrix, Vector3};
 /// Corners nearer to the camera plane than this are not projected, metres.
 pub const MIN_DEPTH_M: f64 = 1e-6;
 
-/// A projected point and how it moves.
+/// A projected point with its derivatives.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Projected {
-    /// Where the pinhole sees it.
+    /// Its pixel.
     pub px: Point2<f64>,
     /// Derivative by the point in camera coordinates.
     pub by_point: Matrix2x3<f64>,
@@ -113,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_behind_the_camera_is_seen() {
+    fn points_behind_the_camera_are_not_projected() {
         let at = |z| pixel(&Isometry3::translation(0.0, 0.0, z), &Vector3::zeros(), &camera());
         assert!(at(2e-6).is_some());
         assert!(at(MIN_DEPTH_M).is_none());

@@ -1,8 +1,9 @@
 //! Second moment of a pose around a minimum, by quadrature over the direction of the landmark's normal.
 //!
-//! Near the front view the corners hardly tell the direction, and chi2 is far from quadratic in it: the covariance at
-//! the minimum is several times too small (measured: mean NEES 10 to 15 instead of 6 at 6 m). Here the normal goes over
-//! a grid, roll and position are refitted at each point. Where the direction is well known nothing is done.
+//! Near the front view the corners hardly determine the direction, and chi2 is far from quadratic in it: the
+//! covariance at the minimum is several times too small (measured: mean NEES 10 to 15 instead of 6 at 6 m). Here
+//! the normal goes over a grid, roll and position are refitted at each point. Skipped where the direction is well
+//! determined.
 
 use crate::pose::{refine::Problem, reprojection::perturbed};
 use nalgebra::{Isometry3, Matrix2, Matrix4, Matrix6, SMatrix, Vector3, Vector6};
@@ -11,7 +12,7 @@ use nalgebra::{Isometry3, Matrix2, Matrix4, Matrix6, SMatrix, Vector3, Vector6};
 const LINEAR_RAD: f64 = 0.012;
 /// Step of the grid, in standard deviations.
 const STEP_SIGMA: f64 = 0.8;
-/// A direction is left when chi2 has risen by this.
+/// Rise of chi2 at which the grid ends in a direction.
 const RISE_CHI2: f64 = 25.0;
 /// Most steps in each direction.
 const MAX_STEPS: usize = 24;
@@ -31,8 +32,8 @@ struct Sum<'a> {
     moment: Matrix6<f64>,
 }
 
-/// Second moment about the minimum `at` of covariance `linear`; `rival` is another solution that cannot be told from
-/// this one: its side is left to it. `scale` divides chi2.
+/// Second moment about the minimum `at` of covariance `linear`; `rival` is the other solution of an ambiguous pair:
+/// the grid excludes its side. `scale` divides chi2.
 pub(crate) fn second_moment(
     problem: &Problem<'_>,
     at: &Isometry3<f64>,
@@ -98,7 +99,7 @@ impl Sum<'_> {
         }
     }
 
-    /// Turned by `turn`; then roll about the normal and position are refitted, the normal held.
+    /// The pose turned by `turn`, with roll about the normal and position refitted, the normal fixed.
     fn refit(&self, from: &Isometry3<f64>, turn: &Vector3<f64>) -> Option<Isometry3<f64>> {
         let mut pose = perturbed(from, turn, &Vector3::zeros());
         for _ in 0..REFITS {
@@ -134,7 +135,7 @@ impl Sum<'_> {
     }
 }
 
-/// Directions that leave the normal: roll about it, and the position.
+/// Directions that preserve the normal: roll about it, and the position.
 fn free(pose: &Isometry3<f64>) -> SMatrix<f64, 6, 4> {
     let mut m = SMatrix::<f64, 6, 4>::zeros();
     m.fixed_view_mut::<3, 1>(0, 0).copy_from(&(pose.rotation * Vector3::x()));

@@ -67,7 +67,7 @@ pub(crate) fn poster(seed: u64) -> GrayImage {
     })
 }
 
-/// All of a poster.
+/// The corners of a whole poster.
 pub(crate) fn whole() -> Corners {
     let high = POSTER_PX as f64 - 0.5;
     Corners::try_from([[-0.5, -0.5], [high, -0.5], [high, high], [-0.5, high]]).unwrap()
@@ -89,7 +89,7 @@ pub(crate) fn photograph(poster: &GrayImage, corners: &Corners, gain: f64, offse
     })
 }
 
-/// Seen from the left.
+/// Corners of a view from the left.
 pub(crate) fn oblique() -> Corners {
     Corners::try_from([[90.0, 80.0], [280.0, 110.0], [285.0, 300.0], [95.0, 330.0]]).unwrap()
 }
@@ -108,7 +108,7 @@ pub(crate) fn quad(corners_px: Corners) -> Quad {
 }
 
 /// Poster `seed`, learnt as landmark `id` from itself and generated views.
-pub(crate) fn lesson(id: u64, seed: u64, p: &Params) -> LandmarkModel {
+pub(crate) fn trained_model(id: u64, seed: u64, p: &Params) -> LandmarkModel {
     let image = poster(seed);
     let mut all = vec![TrainingView::photographed(&image, &whole(), p).unwrap()];
     all.extend(views(&image, &whole(), 12, p, seed));
@@ -116,8 +116,8 @@ pub(crate) fn lesson(id: u64, seed: u64, p: &Params) -> LandmarkModel {
 }
 
 /// Posters 1 to `count` as landmarks 1 to `count`, thresholds fitted against each other.
-pub(crate) fn lessons(count: u64, p: &Params) -> Vec<Arc<LandmarkModel>> {
-    let models: Vec<LandmarkModel> = (1..=count).map(|i| lesson(i, i, p)).collect();
+pub(crate) fn trained_models(count: u64, p: &Params) -> Vec<Arc<LandmarkModel>> {
+    let models: Vec<LandmarkModel> = (1..=count).map(|i| trained_model(i, i, p)).collect();
     models
         .iter()
         .map(|m| {
@@ -129,5 +129,5 @@ pub(crate) fn lessons(count: u64, p: &Params) -> Vec<Arc<LandmarkModel>> {
 }
 
 pub(crate) fn model_set(count: u64, p: &Params) -> ModelSet {
-    ModelSet::new(lessons(count, p), p).unwrap()
+    ModelSet::new(trained_models(count, p), p).unwrap()
 }

@@ -1,4 +1,4 @@
-//! From icon to verdict (method 5, 6, 10). The folders stand in the order of the data.
+//! From icon to verdict (method 5, 6, 10). The modules are listed in the order of the data flow.
 
 pub mod distance_kind;
 pub mod params;

@@ -34,42 +34,42 @@ pub struct VerdictParams {
     pub margin: f64,
     /// Candidates below this ratio are verified by alignment; 0 turns verification off.
     pub verify_reach: f64,
-    /// After alignment a distance is accepted below this share of tau: the corners were moved to please the landmark.
+    /// After alignment a distance is accepted below this share of tau, because alignment favours the template.
     pub verified_share: f64,
-    /// Landmarks on the short list, of which the picture is laid on each.
+    /// Length of the short list; the picture is aligned with each.
     pub short_list: usize,
-    /// Landmarks of the short list whose signature is less alike are not looked at, -1 to 1.
+    /// Smallest likeness of a signature on the short list, -1 to 1.
     pub min_signature: f32,
-    /// Nor those that are further behind the first one.
+    /// Largest difference of that likeness to the first one's.
     pub signature_gap: f32,
-    /// Landmarks up to which tau of the likeness holds as it is.
+    /// Number of landmarks up to which tau of the likeness is used unchanged.
     pub crowd: usize,
-    /// From there on tau shrinks by this share with every factor of e: the more landmarks, the nearer the nearest of
-    /// them is to any stranger. On 732 quads of other buildings among 267 landmarks, strangers within a ratio grow by
-    /// e with 0.08 of ratio.
+    /// Beyond it tau shrinks by this share with every factor of e: the more landmarks, the nearer the nearest one
+    /// is to any distractor. On 732 quads of other buildings among 267 landmarks, the number of distractors below a
+    /// ratio grows by e with 0.08 of ratio.
     pub crowd_share: f64,
     /// A landmark whose likeness uses more than this share of its tau...
     pub doubtful_share: f64,
-    /// ... is refused where more than this share of the picture shows something else, 0 to 1.
+    /// ... is refused where more than this share of the buckets contradicts, 0 to 1.
     pub max_contradicting: f64,
     /// Beyond the frame the picture must be at least this much like the learnt one, -1 to 1...
     pub min_content_likeness: f64,
-    /// ... in what amounts to at least so many buckets. A landmark that shows less is not used.
+    /// ... in at least this many buckets. A landmark with less content is not used.
     pub min_content: f64,
     /// From this likeness beyond the frame on...
     pub sure_content_likeness: f64,
-    /// ... in so many buckets, none of the paper's distances need agree: saturation moves them far.
+    /// ... in this many buckets, neither of the paper's distances is required: saturation changes them strongly.
     pub sure_content: f64,
     /// Landmarks that are verified at most.
     pub max_verified: usize,
-    /// Whether points decide where icons would (`both`); what they say nothing of is left to the icons. See
+    /// Whether points decide before the icons (`both`); quads without point evidence are left to the icons. See
     /// `docs/method/25-recognition-by-points.md`.
     pub points: bool,
-    /// Landmarks with more points than this are never accepted by their icons: their points would have said so. One
-    /// with fewer that its icon speaks for is ambiguous, with
-    /// [`Plain`](crate::recognise::decision::result::MatchRefusal::Plain): the robot's pose may name it.
+    /// Landmarks with more points than this are never accepted by their icons alone. One with fewer, whose icon
+    /// agrees, is ambiguous, with [`Plain`](crate::recognise::decision::result::MatchRefusal::Plain): the robot's
+    /// pose may identify it.
     pub max_icon_points: usize,
-    /// How corners are moved.
+    /// Parameters of the alignment.
     pub align: AlignParams,
 }
 
@@ -98,12 +98,12 @@ impl Default for VerdictParams {
     }
 }
 
-/// What is left of tau in the largest map.
+/// Smallest share of tau, in the largest maps.
 pub(crate) const LEAST_TAU_SHARE: f64 = 0.5;
 
 impl VerdictParams {
-    /// The share of tau of the likeness that holds among `landmarks`: as many strangers are accepted by a large map
-    /// as by one of `crowd` landmarks.
+    /// The share of tau of the likeness that holds among `landmarks`: as many distractors are accepted by a large
+    /// map as by one of `crowd` landmarks.
     pub fn tau_share(&self, landmarks: usize) -> f64 {
         let crowds = landmarks.max(1) as f64 / self.crowd.max(1) as f64;
         (1.0 - self.crowd_share * crowds.ln().max(0.0)).clamp(LEAST_TAU_SHARE, 1.0)

@@ -5,13 +5,13 @@
 pub enum RecogniseStep {
     /// Patches, points, votes, homographies, verification.
     Points,
-    /// Icons of every border and rotation, with what the short list needs of them.
+    /// Icons and signatures of every border and rotation.
     Icons,
-    /// The landmarks that it may be: by signatures, or by one of the paper's distances.
+    /// Retrieval of the nearest landmarks: by signatures, or by one of the paper's distances.
     ShortList,
-    /// The picture laid on the learnt icons, and how alike they are there.
+    /// Alignment with the learnt icons, and the likeness there.
     Alignment,
-    /// Distances where the picture came to lie.
+    /// The paper's distances after alignment.
     Distances,
     /// Thresholds, margin, probabilities.
     Decision,
@@ -31,13 +31,13 @@ impl RecogniseStep {
     }
 }
 
-/// Is told of every step. A step may end several times for one quad.
+/// Receives the end of every step. A step may end several times for one quad.
 pub trait StepListener {
     /// `step` has just ended.
     fn finished(&mut self, step: RecogniseStep);
 }
 
-/// Nobody.
+/// Ignores every step.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct NoListener;
 

@@ -1,5 +1,5 @@
-//! Whole frames of a corridor whose posters are among the landmarks: who is named, and how long that takes, in maps of
-//! several sizes, without and with a known pose, and by SIFT with one index over all landmarks of one of these maps.
+//! Whole frames of a corridor whose posters are among the landmarks: names and processor time in maps of several
+//! sizes, global and guided, and of SIFT with one index over all landmarks of one of these maps.
 
 use super::{
     super::peers::{HINT, Python, written},
@@ -22,16 +22,16 @@ use vision::{
     trace::{NoTrace, Stage, Trace},
 };
 
-/// What runs over there.
+/// The Python program.
 const PROGRAM: &str = include_str!("../../../peers/sift.py");
 
-/// What somebody made of the frames.
+/// Names that one method gave on all frames.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Named {
     /// Of the visible posters.
     pub(super) right: usize,
     pub(super) missed: usize,
-    /// Names of what is not in the frame.
+    /// Names of landmarks that are not in the frame.
     pub(super) wrong: usize,
     /// Processor time a frame, median of each frame's least.
     pub(super) frame_ms: f64,
@@ -41,16 +41,16 @@ pub(super) struct Named {
 #[derive(Debug, Serialize)]
 pub(super) struct InMap {
     pub(super) landmarks: usize,
-    /// The whole map is searched.
+    /// Global recognition in the whole map.
     pub(super) global: Named,
     /// The two parts of that, medians.
     pub(super) detection_ms: f64,
     pub(super) recognition_ms: f64,
-    /// Only landmarks that a known pose expects are looked for, where they are expected.
+    /// Guided recognition by a known pose.
     pub(super) guided: Named,
 }
 
-/// Frames by both.
+/// Frames by Waymark and by SIFT.
 #[derive(Debug, Serialize)]
 pub(super) struct Report {
     pub(super) frames: usize,
@@ -60,7 +60,7 @@ pub(super) struct Report {
     /// Among [`MAP`] landmarks.
     pub(super) sift: Option<Named>,
     pub(super) opencv: Option<String>,
-    /// Our times in the map of as many landmarks over SIFT's.
+    /// Waymark's times over SIFT's, in the map of as many landmarks.
     pub(super) global_ratio: Option<f64>,
     pub(super) guided_ratio: Option<f64>,
 }
@@ -93,7 +93,7 @@ impl Trace for Split {
     }
 }
 
-/// What became of each frame, and its least times.
+/// Names and least time of each frame.
 struct Tally {
     accepted: Vec<Vec<usize>>,
     ms: Vec<f64>,
@@ -111,7 +111,7 @@ impl Tally {
     }
 }
 
-/// One map with what it has come to.
+/// One map with its tallies.
 struct Timed<'a> {
     models: &'a ModelSet,
     guide: Guide,
@@ -120,7 +120,7 @@ struct Timed<'a> {
 }
 
 impl Timed<'_> {
-    /// Does one frame both ways; the quads that were detected.
+    /// Recognises one frame both ways; returns the number of detected quads.
     fn frame(&mut self, i: usize, scenes: &Scenes, memory: &mut DetectBuffers, p: &Params) -> usize {
         let frame = &scenes.frames[i];
         let sizes = BTreeMap::new();
@@ -136,7 +136,7 @@ impl Timed<'_> {
         let named = facts.quads.iter().filter_map(|q| q.recognition.as_ref()).filter_map(unique).collect();
         self.global.put(i, named, ms);
         let clock = Clock::start();
-        let guided = self.guide.look(i, frame, &scenes.camera);
+        let guided = self.guide.recognise(i, frame, &scenes.camera);
         let ms = clock.ms();
         self.guided.put(i, guided.observations.iter().filter_map(|s| index(s.landmark)).collect(), ms);
         facts.quads.len()
@@ -155,7 +155,7 @@ impl Timed<'_> {
     }
 }
 
-/// All on the same frames, in turn.
+/// Runs all methods in turn on the same frames.
 pub(super) fn run(
     args: &Args,
     first: u64,
@@ -265,7 +265,7 @@ mod tests {
     use std::sync::Arc;
 
     #[test]
-    fn names_are_counted() {
+    fn right_missed_and_wrong_names_are_counted() {
         let scenes = Scenes {
             frames: vec![],
             steps: vec![],
@@ -274,13 +274,13 @@ mod tests {
             wanted: vec![vec![1, 2], vec![], vec![3]],
             present: vec![vec![1, 2, 5], vec![], vec![3]],
         };
-        // The first names one of two, one that is cut by the border, and one that is not there.
+        // The first frame names one of two, one cut by the border, and one that is not there.
         let named = scenes.named(&[vec![2, 5, 9], vec![4], vec![3]], &[1.0, 5.0, 3.0]);
         assert_eq!(named, Named { right: 2, missed: 1, wrong: 2, frame_ms: 3.0 });
     }
 
     #[test]
-    fn posters_have_numbers() {
+    fn a_posters_name_gives_its_number() {
         assert_eq!((number("poster-12"), number("door-3")), (Some(12), None));
     }
 }

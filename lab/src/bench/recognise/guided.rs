@@ -1,5 +1,5 @@
-//! Frames of a robot whose pose is known: what the server then does instead of searching the whole map. The corridor's
-//! posters hang where they do; the other landmarks hang in other parts of a large building.
+//! Guided recognition on frames of a robot whose pose is known. The corridor's posters have their places; the other
+//! landmarks hang in other parts of a large building.
 
 use super::scenes::{Scenes, number};
 use engine::{
@@ -39,7 +39,7 @@ pub(super) struct Guide {
 }
 
 impl Guide {
-    /// Poses are off by as much as they are believed to be; `seed` says how.
+    /// Poses have errors by the stated standard deviations, drawn from `seed`.
     pub(super) fn new(scenes: &Scenes, models: &ModelSet, seed: u64) -> anyhow::Result<Self> {
         let size = LandmarkSize { width_m: 0.6, height_m: 0.84 };
         let walls = scenes.building.walls().iter();
@@ -50,7 +50,7 @@ impl Guide {
         let mut map = MapSnapshot::empty("bench", 1);
         (map.walls, map.models) = (std::sync::Arc::new(walls), models.clone());
         let sigmas = PlaceSigmas::default();
-        let mut hang = |id: LandmarkId, place: LandmarkPlace| {
+        let mut place_landmark = |id: LandmarkId, place: LandmarkPlace| {
             let (size, name) = (Some(place.size), id.0.to_string());
             map.landmarks
                 .insert(id, LandmarkInfo { name, size, place: Some(place), ..LandmarkInfo::default() });
@@ -75,7 +75,7 @@ impl Guide {
                 let at = Vector3::new(along as f64, ELSEWHERE_M * part as f64, 1.5);
                 LandmarkPlace::by_hand(at, std::f64::consts::FRAC_PI_2, size, sigmas)?
             };
-            hang(model.id, place);
+            place_landmark(model.id, place);
         }
         let sight = VisibilitySettings::default();
         for (id, place) in posters.iter().filter(|(id, _)| models.get(**id).is_some()) {
@@ -95,8 +95,8 @@ impl Guide {
         Ok(Self { map, poses })
     }
 
-    /// What the pose adds to frame `i`, of which nothing was detected.
-    pub(super) fn look(&self, i: usize, frame: &GrayImage, camera: &Intrinsics) -> GuidedResult {
+    /// Guided recognition of frame `i` without detected quads.
+    pub(super) fn recognise(&self, i: usize, frame: &GrayImage, camera: &Intrinsics) -> GuidedResult {
         let (pose, mounting) = &self.poses[i];
         let nothing = FrameAnalysis { quads: Vec::new() };
         let view = FrameContext {

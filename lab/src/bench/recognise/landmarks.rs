@@ -1,5 +1,5 @@
-//! Landmarks of the benchmark's maps: the first few learnt as a server would, against each other; the rest, of which
-//! there may be thousands, by three icons and their own points each and the thresholds of one of the first.
+//! Landmarks of the benchmark's maps: the first few learnt by a lesson against each other; each of the others, up
+//! to thousands, with three icons and points of its own and the thresholds of one of the first.
 
 use server::cli::screen;
 use sim::posters;
@@ -17,13 +17,13 @@ use vision::{
 
 /// Width of the posters' pictures, in pixels; also what SIFT learns from.
 const WIDTH: usize = 200;
-/// Width of the pictures of landmarks beyond the first [`LARGE`]: drawing takes longer than all else.
+/// Width of the pictures of landmarks beyond the first [`LARGE`]: drawing would take longer than all else.
 const SMALL_WIDTH: usize = 120;
 /// Landmarks with large pictures.
 const LARGE: usize = 1000;
 /// Generated views of a lesson, besides the poster itself.
 const VIEWS: usize = 20;
-/// How far the corners of the other icons lie beside the poster's, as a share of its width.
+/// Offset of the corners of the other icons from the poster's, as a share of its width.
 const BESIDE: f64 = 0.02;
 
 /// The picture of landmark `index`.
@@ -33,13 +33,13 @@ pub(super) fn picture(first: u64, index: usize) -> Result<GrayImage, FrameError>
     GrayImage::new(texture.width(), texture.height(), texture.data().to_vec())
 }
 
-/// All of a picture.
+/// Corners of a whole picture.
 pub(super) fn whole(image: &GrayImage) -> anyhow::Result<Corners> {
     let (right, bottom) = (image.width() as f64 - 0.5, image.height() as f64 - 0.5);
     Ok(Corners::try_from([[-0.5, -0.5], [right, -0.5], [right, bottom], [-0.5, bottom]])?)
 }
 
-/// `count` models with the ids 1 to `count`, of which `taught` are learnt; `threads` work.
+/// `count` models with the ids 1 to `count`, of which `taught` are learnt, on `threads` threads.
 pub(in crate::bench) fn models(
     first: u64,
     count: usize,
@@ -70,7 +70,7 @@ fn lesson(first: u64, index: usize, p: &Params) -> anyhow::Result<LandmarkModel>
     with_points(model, first, index, p)
 }
 
-/// The model with the points of its poster, where they are used.
+/// The model with the points of its poster, if points are used.
 fn with_points(model: LandmarkModel, first: u64, index: usize, p: &Params) -> anyhow::Result<LandmarkModel> {
     let image = picture(first, index)?;
     let corners = whole(&image)?;
@@ -86,7 +86,7 @@ pub(super) fn views(first: u64, index: usize, count: usize, p: &Params) -> anyho
     Ok(views)
 }
 
-/// Three icons of the poster: as it is, and cut a little beside.
+/// Three icons of the poster: cut exactly, and with two small offsets.
 fn icons(first: u64, index: usize, p: &Params) -> anyhow::Result<Vec<Exemplar>> {
     let image = picture(first, index)?;
     let corners = whole(&image)?;
@@ -100,7 +100,7 @@ fn icons(first: u64, index: usize, p: &Params) -> anyhow::Result<Vec<Exemplar>> 
             *point += (middle - *point).normalize() * share * beside;
         }
         let mut icon = icon(&image, &Corners::new(inset)?, &p.icon)?;
-        // As a lesson keeps them.
+        // As a lesson stores them.
         icon.pixels.iter_mut().for_each(|g| *g = g.round());
         all.push(Exemplar::new(&icon));
     }

@@ -1,4 +1,4 @@
-//! A lesson: one landmark from many views, to be told from all others of a map.
+//! A lesson: one landmark from many views, against the icons of all others of a map.
 
 use super::{
     Args, fastest,
@@ -16,14 +16,14 @@ use vision::{
 /// The poster that is learnt: no landmark of the maps.
 const POSTER: usize = 2_000_000;
 
-/// What it took.
+/// Time and sizes of the lesson.
 #[derive(Debug, Serialize)]
 pub(super) struct Report {
     pub(super) views: usize,
     pub(super) others: usize,
     /// Icons of the others, three each as in the server.
     pub(super) negatives: usize,
-    /// Views are cut and negatives are at hand; the points of one photograph are taken where they are used.
+    /// Time with views cut and negatives at hand; extracting the points of one photograph counts, if points are used.
     pub(super) ms: f64,
     pub(super) active: bool,
 }

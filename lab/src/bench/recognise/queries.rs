@@ -1,5 +1,5 @@
-//! Pictures of single quads with their corners as a detector would give them: a poster seen from somewhere, in some
-//! light, with noise. What is drawn is what the benchmark asks; nothing here recognises.
+//! Pictures of single quads with their corners as a detector would give them: a poster under a random viewpoint,
+//! light and noise.
 
 use super::landmarks::{picture, whole};
 use nalgebra::{Matrix2, Point2};
@@ -14,9 +14,9 @@ use vision::{
 const SIDE_PX: usize = 300;
 /// Shortest and longest height of a poster in them.
 const HEIGHT_PX: [f64; 2] = [90.0, 250.0];
-/// Steepest angle it is seen at, to either side.
+/// Largest view angle, to either side.
 const MAX_ANGLE_RAD: f64 = 1.0;
-/// Corners are found within about so much, evenly, along each axis.
+/// Largest error of a corner along each axis, evenly spread.
 const CORNER_PX: f64 = 1.5;
 /// Largest noise of a pixel, in grey levels, evenly spread.
 const NOISE: f64 = 8.0;
@@ -28,11 +28,11 @@ pub(super) struct Query {
     pub(super) quad: Quad,
 }
 
-/// Poster `index` as `seed` says.
+/// Poster `index` under conditions drawn from `seed`.
 pub(super) fn query(first: u64, index: usize, seed: u64) -> anyhow::Result<Query> {
     let poster = picture(first, index)?;
     let mut random = Random::new(seed ^ (index as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15));
-    let corners = seen(&mut random)?;
+    let corners = projected_corners(&mut random)?;
     let poster_from_image = Homography::from_points(corners.points(), whole(&poster)?.points())?;
     let (gain, offset) = (random.range(0.5, 1.4), random.range(-30.0, 30.0));
     let wall: f64 = random.range(60.0, 220.0);
@@ -50,8 +50,8 @@ pub(super) fn query(first: u64, index: usize, seed: u64) -> anyhow::Result<Query
     Ok(Query { image, quad: quad(Corners::new(found)?) })
 }
 
-/// Corners of a poster of 5 : 7 in the middle of the picture, seen from the side.
-fn seen(random: &mut Random) -> anyhow::Result<Corners> {
+/// Corners (px) of a poster of 5 : 7 in the middle of the picture, from a random view angle.
+fn projected_corners(random: &mut Random) -> anyhow::Result<Corners> {
     let height = HEIGHT_PX[0] * (HEIGHT_PX[1] / HEIGHT_PX[0]).powf(random.range(0.0, 1.0));
     let width = height / 1.4;
     let (sin, cos) = f64::sin_cos(MAX_ANGLE_RAD * random.range(-1.0, 1.0));

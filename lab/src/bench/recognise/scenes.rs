@@ -14,18 +14,18 @@ use vision::frame::{GrayImage, Intrinsics};
 
 /// Posters in the corridor: the first landmarks.
 pub(super) const POSTERS: usize = 24;
-/// A poster counts as visible when each side is at least this long, and it is seen at most this obliquely.
+/// A poster counts as visible when each side is at least this long and the view angle is at most this.
 const MIN_SIDE_PX: f64 = 40.0;
 const MAX_ANGLE_RAD: f64 = 1.22;
 
 /// Frames with the numbers of the landmarks in them, from 0.
 pub(super) struct Scenes {
     pub(super) frames: Vec<GrayImage>,
-    /// Where the robot stood.
+    /// True poses of the robot.
     pub(super) steps: Vec<Step>,
     pub(super) building: Arc<Building>,
     pub(super) camera: Intrinsics,
-    /// Wholly visible and large enough to be asked for.
+    /// Wholly visible and large enough: naming one is expected.
     pub(super) wanted: Vec<Vec<usize>>,
     /// In view at all: naming one is no error.
     pub(super) present: Vec<Vec<usize>>,

@@ -1,4 +1,4 @@
-//! Single quads: from the picture to the verdict in maps of several sizes, step by step; and what the short list loses.
+//! Single quads: from the picture to the verdict in maps of several sizes, by step; and recall of the short list.
 
 use super::{
     Args, fastest,
@@ -16,40 +16,40 @@ use vision::{
     recognise::{DistanceKind, RecogniseStep, StepListener, Verdict, recognise, recognise_watched},
 };
 
-/// Strangers are posters from this number on.
-const STRANGERS: usize = 1_000_000;
+/// Distractors are posters from this number on.
+const DISTRACTORS: usize = 1_000_000;
 
-/// What one quad costs in one map.
+/// Times and verdicts of single quads in one map.
 #[derive(Debug, Serialize)]
 pub(super) struct Report {
     pub(super) landmarks: usize,
     /// Medians over the quads.
     pub(super) own_ms: f64,
-    pub(super) stranger_ms: f64,
-    /// Quads of landmarks, and as many of none.
+    pub(super) distractor_ms: f64,
+    /// Quads of landmarks, and as many of distractors.
     pub(super) asked: usize,
     pub(super) right: usize,
     pub(super) wrong: usize,
-    pub(super) strangers_accepted: usize,
+    pub(super) distractors_accepted: usize,
     /// Means over all quads, by step.
     pub(super) steps_ms: BTreeMap<&'static str, f64>,
 }
 
-/// What the short list loses.
+/// Recall of the short list.
 #[derive(Debug, Serialize)]
 pub(super) struct Recall {
     pub(super) short_list: usize,
     pub(super) landmarks: usize,
-    /// Quads whose landmark accepts them when it is alone.
+    /// Quads that are accepted when their landmark is the only one.
     pub(super) accepted: usize,
-    /// Those of them that are not on the list.
+    /// Of these, quads whose landmark is not on the list.
     pub(super) lost: usize,
 }
 
-/// Quads of known landmarks, and of none.
+/// Quads of landmarks and of distractors.
 pub(super) struct Asked {
     own: Vec<(u64, Query)>,
-    strangers: Vec<Query>,
+    distractors: Vec<Query>,
 }
 
 impl Asked {
@@ -59,10 +59,10 @@ impl Asked {
         let own = |i: usize| {
             Ok((1 + (i % landmarks) as u64, query(first, i % landmarks, args.seed.wrapping_add(i as u64))?))
         };
-        let stranger = |i: usize| query(first, STRANGERS + i, args.seed);
+        let distractor = |i: usize| query(first, DISTRACTORS + i, args.seed);
         Ok(Self {
             own: each_of(n, threads(), "quads", own)?,
-            strangers: each_of(n, threads(), "quads", stranger)?,
+            distractors: each_of(n, threads(), "quads", distractor)?,
         })
     }
 
@@ -72,22 +72,23 @@ impl Asked {
             fastest(rounds, || recognise(&q.image, &q.quad, models, DistanceKind::default(), p).verdict)
         };
         let own: Vec<(u64, (f64, Verdict))> = self.own.iter().map(|(id, q)| (*id, ask(q))).collect();
-        let strangers: Vec<(f64, Verdict)> = self.strangers.iter().map(ask).collect();
+        let distractors: Vec<(f64, Verdict)> = self.distractors.iter().map(ask).collect();
         let unique = |r: &Verdict| if let Verdict::Unique(id) = r { Some(id.0) } else { None };
         let mut steps = StepClock { last: Clock::start(), ms: BTreeMap::new() };
-        for q in self.own.iter().map(|(_, q)| q).chain(&self.strangers) {
+        for q in self.own.iter().map(|(_, q)| q).chain(&self.distractors) {
             steps.last = Clock::start();
             recognise_watched(&q.image, &q.quad, models, DistanceKind::default(), p, &mut steps);
         }
-        let asked = self.own.len() + self.strangers.len();
+        let asked = self.own.len() + self.distractors.len();
         Report {
             landmarks: models.len(),
             own_ms: median(&mut own.iter().map(|(_, (ms, _))| *ms).collect::<Vec<_>>()).unwrap_or(0.0),
-            stranger_ms: median(&mut strangers.iter().map(|(ms, _)| *ms).collect::<Vec<_>>()).unwrap_or(0.0),
+            distractor_ms: median(&mut distractors.iter().map(|(ms, _)| *ms).collect::<Vec<_>>())
+                .unwrap_or(0.0),
             asked: self.own.len(),
             right: own.iter().filter(|(id, (_, r))| unique(r) == Some(*id)).count(),
             wrong: own.iter().filter(|(id, (_, r))| unique(r).is_some_and(|u| u != *id)).count(),
-            strangers_accepted: strangers.iter().filter(|(_, r)| unique(r).is_some()).count(),
+            distractors_accepted: distractors.iter().filter(|(_, r)| unique(r).is_some()).count(),
             steps_ms: steps.ms.into_iter().map(|(step, ms)| (step, ms / asked as f64)).collect(),
         }
     }
@@ -106,7 +107,7 @@ impl StepListener for StepClock {
     }
 }
 
-/// Of quads that their landmark accepts when it is the only one: how many do not have it on the short list of `models`.
+/// Of quads that are accepted when their landmark is the only one: those without it on the short list of `models`.
 pub(super) fn recall(args: &Args, first: u64, models: &ModelSet, p: &Params) -> anyhow::Result<Recall> {
     let all: Vec<&Arc<LandmarkModel>> = models.iter().collect();
     let n = args.recall_quads as usize;

@@ -1,5 +1,5 @@
-//! `waymark-lab evaluate calibration`: auto-calibration of cameras from views of one quad (method 16; E9, Fig. 17): the error
-//! of the focal length over the number of views, on synthetic views and on real boards with a calibration of their own.
+//! `waymark-lab evaluate calibration`: auto-calibration from views of one quad (method 16; E9, Fig. 17). Error of
+//! the focal length over the number of views, on synthetic views and on real boards with a reference calibration.
 
 mod real;
 mod sets;
@@ -22,8 +22,8 @@ const HIGHEST_PERCENT: f64 = 3.0;
 /// `waymark-lab evaluate calibration`.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// Folders with real views of a board: Zhang's Model.txt and data*.txt, OpenCV's yml with corners, or photographs of
-    /// a chessboard beside a yml that says its size (then python3 with OpenCV finds the corners).
+    /// Folders with real views of a board: Zhang's Model.txt and data*.txt, OpenCV's yml with corners, or
+    /// photographs of a chessboard beside a yml that says its size (then python3 with OpenCV finds the corners).
     sets: Vec<PathBuf>,
     /// Numbers of views of the synthetic curves.
     #[arg(long, value_delimiter = ',', default_value = "5,10,15,20,30,40,50", value_parser = views)]
@@ -34,13 +34,13 @@ pub(crate) struct Args {
     /// Standard deviations of the corners, per coordinate.
     #[arg(long, value_name = "PX", value_delimiter = ',', default_value = "0.3,0.5", value_parser = noise)]
     corner_noise_px: Vec<f64>,
-    /// Views and noise follow from it.
+    /// Seed of views and noise.
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// The Python that has OpenCV.
     #[arg(long, default_value = "python3")]
     python: PathBuf,
-    /// One JSON object instead of tables.
+    /// Print one JSON object instead of tables.
     #[arg(long)]
     json: bool,
     /// Write the curves as an SVG picture.
@@ -75,7 +75,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let (mut sets, mut skipped) = (vec![], vec![]);
     for folder in &args.sets {
         let (found, why) = sets::read(folder, &args.python)?;
-        sets.extend(found.iter().map(|set| real::judged(set, args.seed)));
+        sets.extend(found.iter().map(|set| real::evaluated(set, args.seed)));
         skipped.extend(why);
     }
     let report = Report { seed: args.seed, curves, sets, skipped };

@@ -1,5 +1,5 @@
-//! Auto-calibration from one quad of a real board (its four outermost points) against the calibration from all its
-//! points and against what the set states: pinhole against pinhole, lens against lens.
+//! Auto-calibration from one quad of a real board (its four outermost points), compared with the calibration from
+//! all its points and with the calibration that the set states: pinhole with pinhole, lens with lens.
 
 use super::sets::{Set, Stated};
 use crate::evaluate::{experiment::mixed, statistics::median};
@@ -14,7 +14,7 @@ const CENTRE_SIGMA: f64 = 0.1;
 /// Subsets of views drawn for each point of the curve.
 const SUBSETS: usize = 40;
 
-/// What came out of one calibration.
+/// Result of one calibration.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct CalibrationFigures {
     fx_px: f64,
@@ -46,11 +46,11 @@ pub(super) struct RealSet {
     /// From the outermost quad: pinhole, and with one.
     quad_pinhole: Result<CalibrationFigures, String>,
     quad_lens: Result<CalibrationFigures, String>,
-    /// The quad with a lens, against all points with one, over the number of views.
+    /// The quad with a lens against all points with a lens, over the number of views.
     pub(super) by_views: Vec<OfViews>,
 }
 
-pub(super) fn judged(set: &Set, seed: u64) -> RealSet {
+pub(super) fn evaluated(set: &Set, seed: u64) -> RealSet {
     let quads = set.quads();
     let of = |views: &[PlanarView], radial| run(views, set.image_px, radial);
     let all_lens = of(&set.views, 2);
@@ -58,7 +58,7 @@ pub(super) fn judged(set: &Set, seed: u64) -> RealSet {
         Ok(reference) => curve(&quads, set.image_px, reference.camera.fx_px, seed),
         Err(_) => vec![],
     };
-    let told = |result: Result<CameraCalibration, CalibrateError>| {
+    let figures = |result: Result<CameraCalibration, CalibrateError>| {
         result.map(|c| found(&c)).map_err(|error| error.to_string())
     };
     RealSet {
@@ -66,10 +66,10 @@ pub(super) fn judged(set: &Set, seed: u64) -> RealSet {
         views: set.views.len(),
         points: set.views.first().map_or(0, |v| v.plane_m.len()),
         stated: set.stated.clone(),
-        all_pinhole: told(of(&set.views, 0)),
-        all_lens: told(all_lens),
-        quad_pinhole: told(of(&quads, 0)),
-        quad_lens: told(of(&quads, 1)),
+        all_pinhole: figures(of(&set.views, 0)),
+        all_lens: figures(all_lens),
+        quad_pinhole: figures(of(&quads, 0)),
+        quad_lens: figures(of(&quads, 1)),
         by_views,
     }
 }
@@ -143,7 +143,7 @@ impl RealSet {
         lines
     }
 
-    /// Against all points and against what is stated of the same kind of camera, in percent.
+    /// Difference from all points and from the stated calibration of the same camera model, in percent.
     fn against(&self, fx_px: f64, lens: bool) -> String {
         let all = if lens { &self.all_lens } else { &self.all_pinhole };
         let off = |reference: f64| 100.0 * (fx_px / reference - 1.0);
@@ -174,7 +174,7 @@ mod tests {
     use nalgebra::Point2;
 
     #[test]
-    fn a_board_without_noise_is_met_by_its_quad() {
+    fn a_board_without_noise_is_calibrated_exactly_by_its_quad() {
         // Oracle: synthetic views of a 2 x 2 board that is the poster's quad alone: all points are the quad.
         let mut random = Random::new(5);
         let camera = vision::frame::Intrinsics {
@@ -190,11 +190,11 @@ mod tests {
         assert_eq!(views[0].plane_m[0], Point2::new(-0.42, 0.595));
         let stated = vec![Stated { file: "own".into(), fx_px: 808.0, lens: false }];
         let set = Set { name: "board".into(), image_px: [1280, 960], views, corners: [0, 1, 2, 3], stated };
-        let judged = judged(&set, 1);
-        let found = judged.quad_pinhole.as_ref().unwrap();
+        let board = evaluated(&set, 1);
+        let found = board.quad_pinhole.as_ref().unwrap();
         assert!((found.fx_px - 800.0).abs() < 0.01, "{found:?}");
-        assert!(judged.by_views.iter().all(|p| p.median < 1e-3), "{:?}", judged.by_views);
-        let lines = judged.lines().join("\n");
+        assert!(board.by_views.iter().all(|p| p.median < 1e-3), "{:?}", board.by_views);
+        let lines = board.lines().join("\n");
         assert!(
             lines.contains("-0.99 % of own (808.0)") && lines.contains("+0.00 % of all points"),
             "{lines}"

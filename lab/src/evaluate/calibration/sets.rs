@@ -1,6 +1,6 @@
-//! Real views of flat things with many points, in the formats that calibration sets come in, and each set's own
-//! calibration: `Model.txt` with `data*.txt` (Zhang), OpenCV's `corners` in yml files, and photographs of a chessboard,
-//! whose inner corners OpenCV finds where Python has it.
+//! Real views of calibration boards, in the formats of public sets, with each set's own calibration: `Model.txt`
+//! with `data*.txt` (Zhang), OpenCV's `corners` in yml files, and photographs of a chessboard, whose inner corners
+//! OpenCV finds, if Python has it.
 
 use crate::bench::Python;
 use anyhow::Context as _;
@@ -15,9 +15,9 @@ use vision::camera_calibration::PlanarView;
 
 /// Finds the inner corners of a chessboard in pictures.
 const PROGRAM: &str = include_str!("../../../peers/chessboard.py");
-/// Standard deviation that is claimed for corners of such sets.
+/// Standard deviation that is assumed for corners of such sets.
 pub(super) const SIGMA_PX: f64 = 0.2;
-/// Side of a square where a set does not say: only the scale follows from it.
+/// Side of a square if the set does not state it; only the scale depends on it.
 const SQUARE_M: f64 = 0.025;
 
 /// A focal length that a set states.
@@ -51,7 +51,7 @@ impl Set {
     }
 }
 
-/// All boards of a folder. The second list says what could not be used and why.
+/// All boards of a folder. The second list names what could not be used, and why.
 pub(super) fn read(folder: &Path, python: &Path) -> anyhow::Result<(Vec<Set>, Vec<String>)> {
     let mut files: Vec<PathBuf> = std::fs::read_dir(folder)
         .with_context(|| format!("cannot read {}", folder.display()))?
@@ -86,16 +86,16 @@ fn points(numbers: &[f64]) -> Vec<Point2<f64>> {
     numbers.chunks_exact(2).map(|p| Point2::new(p[0], p[1])).collect()
 }
 
-/// Squares in inches, and where each picture shows them.
+/// Zhang's format: corners of the squares in inches, and their pixels in each picture.
 fn zhang(folder: &Path, files: &[PathBuf], name: String, stated: Vec<Stated>) -> anyhow::Result<Set> {
     const INCH_M: f64 = 0.0254;
     let model: Vec<_> =
         points(&numbers(&text(&folder.join("Model.txt"))?)).iter().map(|p| p * INCH_M).collect();
     let mut views = vec![];
     for path in files.iter().filter(|p| stem(p).starts_with("data") && is(p, "txt")) {
-        let seen = points(&numbers(&text(path)?));
-        anyhow::ensure!(seen.len() == model.len(), "{}: not one pixel a point", path.display());
-        views.push(PlanarView::of_points(model.clone(), seen, SIGMA_PX));
+        let observed = points(&numbers(&text(path)?));
+        anyhow::ensure!(observed.len() == model.len(), "{}: not one pixel a point", path.display());
+        views.push(PlanarView::of_points(model.clone(), observed, SIGMA_PX));
     }
     let image_px = size(files).context("no picture says how large the images are")?;
     // The model's second coordinate runs down the board.
@@ -109,16 +109,16 @@ fn zhang(folder: &Path, files: &[PathBuf], name: String, stated: Vec<Stated>) ->
 /// The pixels of one picture of a board.
 type Board = Vec<Point2<f64>>;
 
-/// Corners of boards, by the shape of the board and what the file's name begins with.
+/// Boards by the beginning of the file's name and the numbers of rows and columns.
 fn grids(files: &[PathBuf], name: &str) -> anyhow::Result<Vec<Set>> {
     let mut boards: BTreeMap<(String, usize, usize), Vec<Board>> = BTreeMap::new();
     for path in files.iter().filter(|p| is(p, "yml") || is(p, "yaml") || is(p, "dat")) {
-        let Some((rows, columns, seen)) = matrix(&text(path)?, "corners") else { continue };
+        let Some((rows, columns, values)) = matrix(&text(path)?, "corners") else { continue };
         let family: String = stem(path).chars().take_while(|c| !c.is_ascii_digit()).collect();
         let family = if stem(path).starts_with("m-") { stem(path).chars().take(3).collect() } else { family };
-        let seen = points(&seen);
-        if seen.len() == rows * columns {
-            boards.entry((family, rows, columns)).or_default().push(seen);
+        let corners = points(&values);
+        if corners.len() == rows * columns {
+            boards.entry((family, rows, columns)).or_default().push(corners);
         }
     }
     let mut sets = vec![];
@@ -129,7 +129,8 @@ fn grids(files: &[PathBuf], name: &str) -> anyhow::Result<Vec<Set>> {
             .cloned()
             .collect();
         let Some(image_px) = size(&pictures) else { continue };
-        let views = all.into_iter().map(|seen| PlanarView::of_points(grid(rows, columns), seen, SIGMA_PX));
+        let views =
+            all.into_iter().map(|corners| PlanarView::of_points(grid(rows, columns), corners, SIGMA_PX));
         let corners = outermost(&grid(rows, columns));
         let name = format!("{name}/{family} {columns}x{rows}");
         sets.push(Set { name, image_px, views: views.collect(), corners, stated: vec![] });
@@ -141,11 +142,11 @@ fn family_root(family: &str) -> &str {
     family.split('_').next().unwrap_or(family)
 }
 
-/// Photographs of a chessboard, its size by the set's own files.
+/// Photographs of a chessboard whose size one of the set's files states.
 fn photographed(files: &[PathBuf], name: &str, python: &Path) -> Result<Set, String> {
     #[derive(Deserialize)]
     struct Greeting {
-        #[expect(dead_code, reason = "that it is there says that OpenCV is")]
+        #[expect(dead_code, reason = "its presence says that OpenCV is there")]
         version: String,
     }
     #[derive(Deserialize)]
@@ -164,9 +165,9 @@ fn photographed(files: &[PathBuf], name: &str, python: &Path) -> Result<Set, Str
     let mut views = vec![];
     for i in 0..photographs.len() {
         let Found { corners } = python.ask(&format!("{i} {columns} {rows}"))?;
-        let seen: Vec<Point2<f64>> = corners.unwrap_or_default().into_iter().map(Point2::from).collect();
-        if seen.len() == rows * columns {
-            views.push(PlanarView::of_points(grid(rows, columns), seen, SIGMA_PX));
+        let observed: Vec<Point2<f64>> = corners.unwrap_or_default().into_iter().map(Point2::from).collect();
+        if observed.len() == rows * columns {
+            views.push(PlanarView::of_points(grid(rows, columns), observed, SIGMA_PX));
         }
     }
     let corners = outermost(&grid(rows, columns));
@@ -239,7 +240,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_formats_are_read() {
+    fn every_format_is_read() {
         let yml = "%YAML:1.0\ncorners: !!opencv-matrix\n   rows: 1\n   cols: 2\n   dt: \"2f\"\n   data: [ 3.5e+01, 2.,\n 7.,\n  8. ]\n";
         assert_eq!(matrix(yml, "corners"), Some((1, 2, vec![35.0, 2.0, 7.0, 8.0])));
         assert_eq!(matrix(yml, "camera_matrix"), None);

@@ -1,5 +1,5 @@
-//! Views of a poster by a level camera on a robot, as the method's own trial has them (16.5), and the error of the
-//! focal length over the number of views (E9, Fig. 17).
+//! Synthetic views of a poster by a level camera on a robot, as in method 16.5, and the error of the focal length
+//! over the number of views (E9, Fig. 17).
 
 use crate::evaluate::{
     experiment::{mixed, of_each},
@@ -23,23 +23,23 @@ pub(super) const IMAGE_PX: [usize; 2] = [1280, 960];
 const ALPHA_PX: f64 = 900.0;
 /// Standard deviation of the true principal point about the image's centre.
 const CENTRE_SIGMA_PX: f64 = 20.0;
-/// Camera below the poster's centre, and how well C3 knows it.
+/// Height of the camera over the poster's centre, and the standard deviation that C3 states.
 const HEIGHT_M: f64 = -0.3;
 const HEIGHT_SIGMA_M: f64 = 0.01;
-/// How well C2 knows that there is no roll.
+/// Standard deviation of zero roll that C2 states.
 const ROLL_SIGMA_RAD: f64 = 0.01;
-/// Views are drawn again until they can be calibrated from, at most so often.
+/// Most draws of a set of views that is refused.
 const REDRAWS: usize = 20;
 
 /// One point of a curve.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct Point {
     pub(super) views: usize,
-    /// Error of the focal length as a share: of the trials the middle one, root mean square, 95 %.
+    /// Relative error of the focal length over the trials: median, root mean square, 95 % quantile.
     pub(super) median: f64,
     pub(super) rms: f64,
     pub(super) p95: f64,
-    /// Draws of views that were refused (too few orientations) and drawn again.
+    /// Sets of views that were refused (too few orientations) and drawn again.
     pub(super) refused: usize,
 }
 
@@ -72,7 +72,7 @@ fn params(zero_roll: bool, known_height: bool, refine: bool) -> CalibrateParams 
 
 /// All curves at one corner noise: four linear, four refined.
 pub(super) fn curves(views: &[usize], trials: usize, noise_px: f64, seed: u64) -> Vec<Curve> {
-    // A set of views serves all curves, so that they differ by the method alone.
+    // All curves use the same views, so that they differ by the method alone.
     let points: Vec<Vec<(Point, usize)>> = views
         .iter()
         .map(|&n| {
@@ -100,7 +100,7 @@ fn point(views: usize, curve: usize, errors: &[Vec<Option<f64>>]) -> Point {
     Point { views, median: median(&mut all).unwrap_or(f64::NAN), rms, p95, refused: errors.len() - all.len() }
 }
 
-/// Relative error of the focal length by each way, on the same views. `None` where it was refused.
+/// Relative error of the focal length by each method, on the same views; `None`: refused.
 fn trial_errors(n: usize, noise_px: f64, seed: u64) -> Vec<Option<f64>> {
     let mut random = Random::new(seed);
     let (mut u0, mut v0) = (0.5 * (IMAGE_PX[0] as f64 - 1.0), 0.5 * (IMAGE_PX[1] as f64 - 1.0));

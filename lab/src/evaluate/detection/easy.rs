@@ -16,7 +16,7 @@ const CORNER_SHARE: f64 = 0.1;
 /// Distances from a side at which grey levels are read, in pixels: past the blur of the edge itself.
 const BESIDE_PX: [f64; 3] = [2.0, 3.0, 4.0];
 
-/// Whether a detector must find it, and it is large and differs from what is around it along all four sides.
+/// Whether the quad counts, is large, and has contrast along all four sides.
 pub(super) fn is_easy(image: &GrayImage, quad: &TruthQuad) -> bool {
     quad.counts() && quad.corners.min_side_px() > MIN_SIDE_PX && contrast(image, &quad.corners) > MIN_CONTRAST
 }
@@ -71,12 +71,12 @@ mod tests {
     }
 
     #[test]
-    fn easy_is_large_whole_and_told_from_the_wall_on_all_sides() {
+    fn easy_is_large_whole_and_has_contrast_on_all_sides() {
         let whole = label(corners(39.5, 29.5, 80.0, 100.0));
         assert!((contrast(&card(90, 120), &whole.corners) - 30.0).abs() < 1e-9);
         assert!(is_easy(&card(99, 120), &whole));
         assert!(!is_easy(&card(101, 120), &whole), "too faint");
-        assert!(!is_easy(&card(90, 95), &whole), "the lower side cannot be seen");
+        assert!(!is_easy(&card(90, 95), &whole), "the lower side has no contrast");
         let small = label(corners(39.5, 29.5, 59.0, 100.0));
         let narrow = GrayImage::from_fn(200, 180, |u, v| match (u, v) {
             (40..99, 30..130) => 20,

@@ -1,6 +1,6 @@
-//! `waymark-lab evaluate detection`: the detector against labelled pictures. Recall at two overlaps, false quads, corner
-//! error, time; by class, stratum, size and angle, with confidence intervals; as a table, JSON, a plot and pictures of
-//! the worst. The detector runs on one thread, pictures one after the other.
+//! `waymark-lab evaluate detection`: the detector against labelled pictures. Recall at two overlaps, false quads,
+//! corner error, time; by class, stratum, size and angle, with confidence intervals; as a table, JSON, a plot and
+//! pictures of the worst. The detector runs on one thread, pictures one after the other.
 
 pub(crate) mod score;
 mod easy;
@@ -31,7 +31,8 @@ pub(crate) struct Args {
     /// Leave out labelled quads with a side shorter than this, in pixels.
     #[arg(long, default_value_t = 0.0)]
     min_side_px: f64,
-    /// Evaluate these parameters too: a file as for --params, `relaxation` for the paper's grouping, or one change as for
+    /// Also evaluate these parameters: a file as for --params, `relaxation` for the paper's grouping, or one change
+    /// as for
     /// --set. May be repeated.
     #[arg(long, value_name = "FILE|relaxation|PATH=VALUE")]
     compare: Vec<PathBuf>,
@@ -50,17 +51,17 @@ pub(crate) struct Args {
     /// Name every labelled quad that was missed and every false one.
     #[arg(long)]
     misses: bool,
-    /// Real things that the set does not label, looked at one by one: false quads on them are counted apart. Without
-    /// this the list that comes with the program, if it knows the set.
+    /// List of real quads that the set does not label, reviewed by a person: false quads on them are counted apart.
+    /// Default: the list that comes with the program, if there is one for the set.
     #[arg(long, value_name = "FILE")]
     reviewed: Option<PathBuf>,
-    /// Keep the rendered pictures in this folder: a set like any other.
+    /// Write the rendered pictures to this folder, as a set like any other.
     #[arg(long, value_name = "DIR")]
     keep: Option<PathBuf>,
     /// Rendered views of the corridor, or scenes.
     #[arg(long, default_value_t = 300, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     views: u32,
-    /// The rendered views follow from it.
+    /// Seed of the rendered views.
     #[arg(long, default_value_t = 1)]
     seed: u64,
     #[command(flatten)]
@@ -134,8 +135,8 @@ fn evaluate(truth: &Truth, reviewed: &Reviewed, args: &Args, named: &Named) -> R
                 continue;
             }
         };
-        let things = reviewed.things(&image.file);
-        let score = score::score(image, &gray, &named.params, args.min_side_px, things);
+        let reviewed_quads = reviewed.quads(&image.file);
+        let score = score::score(image, &gray, &named.params, args.min_side_px, reviewed_quads);
         if args.misses {
             name_misses(&score);
         }

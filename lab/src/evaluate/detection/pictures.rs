@@ -1,4 +1,4 @@
-//! The worst pictures, with what is labelled and what was found drawn on them.
+//! The worst pictures, with labelled and detected quads drawn on them.
 
 use super::{
     report::worst,

@@ -1,4 +1,4 @@
-//! The report as one SVG picture: recall over the overlap asked for, recall over the shortest side, corner errors.
+//! The report as one SVG picture: recall over the overlap required, recall over the shortest side, corner errors.
 
 use super::{
     report::Report,
@@ -10,7 +10,7 @@ use crate::evaluate::{
     truth::QuadState,
 };
 
-/// Sides are grouped so that each point stands for as many quads, but at most so many points.
+/// Most points of the curve over sides; each stands for about as many quads.
 const SIDE_POINTS: usize = 8;
 const ERRORS_PX: [f64; 2] = [0.05, 50.0];
 const SIDES_PX: [f64; 2] = [10.0, 1000.0];
@@ -86,7 +86,7 @@ mod tests {
     };
 
     #[test]
-    fn curves_are_those_of_the_scores() {
+    fn curves_follow_from_the_scores() {
         let labels = [label(0.6, 20.0, 0.0), label(0.8, 40.0, 2.0), label(0.9, 80.0, 1.0)];
         let labels: Vec<&LabelScore> = labels.iter().collect();
         let recall = recall_over_iou(&labels);
@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn one_colour_a_report_and_no_open_element() {
+    fn every_report_has_its_colour_and_every_element_is_closed() {
         let report =
             |name: &str| Report::new("a<b", name, vec![image("a", vec![label(0.9, 50.0, 1.0)], &[])], 0, 0);
         let svg = svg(&[report("default"), report("relaxation")]);

@@ -8,7 +8,7 @@ use crate::evaluate::{
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// Share of the values below the upper figure that goes with a median.
+/// Quantile that is given beside a median.
 const MOST: f64 = 0.9;
 /// Lower ends of the groups by shortest side, px.
 const SIDES_PX: [u32; 6] = [0, 20, 30, 50, 100, 200];
@@ -24,11 +24,11 @@ pub(crate) struct Group {
     /// By Wilson's score.
     pub(crate) recall_70_interval: Interval,
     pub(crate) recall_85_interval: Interval,
-    /// Not found, but an alternate of some detected quad overlaps by 0.7.
+    /// Missed, but an alternate of some detected quad overlaps by 0.7.
     pub(crate) missed_but_alternate: usize,
     /// Median over found quads (`IoU` 0.7) of the mean distance of their four corners; `null` when none is found.
     pub(crate) corner_error_px: Option<f64>,
-    /// What 90 % of them do not exceed.
+    /// 90 % quantile of them.
     pub(crate) corner_error_90_px: Option<f64>,
     /// By resampling images, as for everything below.
     pub(crate) corner_error_interval: Option<Interval>,
@@ -64,7 +64,7 @@ pub(crate) struct Report {
     pub(crate) all: Group,
     #[serde(flatten)]
     pub(crate) images: ImageFigures,
-    /// Those that are easy to see; `null` where there is none.
+    /// Quads that are easy to see; `null` if there is none.
     pub(crate) easy: Option<Group>,
     pub(crate) by_state: BTreeMap<String, Group>,
     pub(crate) by_class: BTreeMap<String, Group>,
@@ -185,7 +185,7 @@ impl Group {
             return None;
         }
         let hits = |least: f64| picked.iter().filter(|l| l.iou >= least).count();
-        // Only images that have something to say are drawn from.
+        // Only images with a picked label are resampled.
         let errors: Vec<Vec<f64>> = scores
             .iter()
             .map(|s| s.labels.iter().filter(|l| pick(l)).filter_map(|l| l.corner_error_px).collect())
@@ -309,7 +309,7 @@ pub(super) mod tests {
         assert_eq!(r.by_view_angle.len(), 1);
         assert_eq!(r.by_class["poster"].quads, 4);
         assert_eq!(r.easy.as_ref().map(|easy| easy.quads), Some(1));
-        // One missed is worse than one loose and one false less a reviewed one.
+        // A missed quad is worse than a loose one and a false one together; reviewed ones do not count.
         assert_eq!(r.worst.len(), 1);
         assert_eq!((r.worst[0].file.as_str(), r.worst[0].false_quads, r.worst[0].loose), ("a", 1, 1));
     }

@@ -1,8 +1,8 @@
-//! One picture: what the detector found against what is labelled. No sums over pictures here.
+//! One picture: detected quads compared with labelled ones.
 
 use super::easy::is_easy;
 use crate::evaluate::{
-    reviewed::Thing,
+    reviewed::ReviewedQuad,
     truth::{QuadState, TruthImage, TruthQuad},
 };
 use server::cli::clock::Clock;
@@ -16,7 +16,7 @@ use vision::{
 /// Overlap from which a detected quad belongs to a labelled one at all.
 const IOU_SAME: f64 = 0.5;
 /// A detection inside a labelled quad by this share of its area, and covering at least [`INNER_AREA`] of it, is an
-/// inner border of the same thing (mat, canvas).
+/// inner border of the same object (mat, canvas).
 const INNER_SHARE: f64 = 0.97;
 const INNER_AREA: f64 = 0.25;
 
@@ -32,13 +32,13 @@ pub(crate) struct LabelScore {
     pub(crate) class: String,
     pub(crate) stratum: String,
     pub(crate) min_side_px: f64,
-    /// Where the set says so.
+    /// If the set states it.
     pub(crate) view_angle_rad: Option<f64>,
     /// With the detected quad that overlaps most.
     pub(crate) iou: f64,
     /// Mean distance of its four corners from that one's, when found.
     pub(crate) corner_error_px: Option<f64>,
-    /// Not found, but an alternate of some detected quad would be it.
+    /// Not found, but an alternate of some detected quad overlaps enough.
     pub(crate) is_alternate: bool,
     /// See [`is_easy`].
     pub(crate) is_easy: bool,
@@ -48,7 +48,7 @@ pub(crate) struct LabelScore {
 #[derive(Debug, Clone)]
 pub(crate) struct FalseQuad {
     pub(crate) corners: Corners,
-    /// What the reviewed list says is there.
+    /// Name in the reviewed list, if it is on it.
     pub(crate) reviewed: Option<String>,
 }
 
@@ -66,7 +66,7 @@ pub(crate) struct ImageScore {
 }
 
 impl ImageScore {
-    /// How bad it is: missed and false quads first, then loose and inexact ones.
+    /// Order of the worst images: missed and false quads first, then loose and inexact ones.
     pub(crate) fn badness(&self) -> f64 {
         let label = |l: &LabelScore| match l.corner_error_px {
             None => 1.0,
@@ -93,7 +93,7 @@ pub(crate) fn score(
     gray: &GrayImage,
     params: &DetectParams,
     min_side_px: f64,
-    reviewed: &[Thing],
+    reviewed: &[ReviewedQuad],
 ) -> ImageScore {
     let clock = Clock::start();
     let mut found = detect(gray, params, &mut NoTrace);
@@ -119,7 +119,7 @@ fn label(labelled: &TruthQuad, (image, gray): (&TruthImage, &GrayImage), found: 
     let is_it = |border: &Corners| polygon::iou(labelled.corners.points(), border.points()) >= FOUND;
     let (iou, nearest) = best(&labelled.corners, found);
     let error = nearest.map(|quad| corner_error_px(&labelled.corners, &quad.corners_px));
-    let by_name = if labelled.landmark.is_some() { "landmark" } else { "stranger" };
+    let by_name = if labelled.landmark.is_some() { "landmark" } else { "distractor" };
     LabelScore {
         corners: labelled.corners,
         state: labelled.state,
@@ -142,7 +142,7 @@ fn best<'a>(labelled: &Corners, found: &'a [Quad]) -> (f64, Option<&'a Quad>) {
         .fold((0.0, None), |best, next| if next.0 > best.0 { next } else { best })
 }
 
-/// Whether it is a labelled quad, an inner border of one, or another thing that the set lists.
+/// Whether it is a labelled quad, an inner border of one, or another real quad that the set lists.
 fn is_real(found: &Corners, image: &TruthImage) -> bool {
     let area_px2 = found.area_px2();
     let same = |o: &Corners| polygon::iou(o.points(), found.points()) >= IOU_SAME;
@@ -153,7 +153,7 @@ fn is_real(found: &Corners, image: &TruthImage) -> bool {
     image.quads.iter().any(|l| same(&l.corners) || inner(&l.corners)) || image.others.iter().any(same)
 }
 
-fn named(found: &Corners, reviewed: &[Thing]) -> FalseQuad {
+fn named(found: &Corners, reviewed: &[ReviewedQuad]) -> FalseQuad {
     let there = reviewed
         .iter()
         .filter(|t| t.real)
@@ -213,12 +213,12 @@ pub(super) mod tests {
         corners(x, y, w, h)
     }
 
-    fn scored(image: &TruthImage, min_side_px: f64, reviewed: &[Thing]) -> ImageScore {
+    fn scored(image: &TruthImage, min_side_px: f64, reviewed: &[ReviewedQuad]) -> ImageScore {
         score(image, &cards(), &DetectParams::default(), min_side_px, reviewed)
     }
 
     #[test]
-    fn found_missed_and_false() {
+    fn quads_are_found_missed_or_false() {
         let s = scored(&image(vec![labelled(at(BRIGHT), true)], vec![]), 0.0, &[]);
         assert_eq!((s.labels.len(), s.missed(), s.false_left()), (1, 0, 1));
         assert!(s.labels[0].corner_error_px.unwrap() < 0.5 && s.labels[0].iou > 0.98);
@@ -228,7 +228,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn what_does_not_count_is_neither_missed_nor_false() {
+    fn uncounted_labels_are_neither_missed_nor_false() {
         for (quads, others) in [
             (vec![labelled(at(BRIGHT), false), labelled(at(DARK), false)], vec![]),
             (vec![], vec![at(BRIGHT), at(DARK)]),
@@ -242,8 +242,8 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn reviewed_things_are_counted_apart() {
-        let mut list = [Thing { corners: at(DARK), what: "switch".into(), real: true }];
+    fn reviewed_quads_are_counted_apart() {
+        let mut list = [ReviewedQuad { corners: at(DARK), what: "switch".into(), real: true }];
         let s = scored(&image(vec![labelled(at(BRIGHT), true)], vec![]), 0.0, &list);
         assert_eq!((s.false_quads.as_ref().unwrap().len(), s.false_left()), (1, 0));
         assert_eq!(s.false_quads.unwrap()[0].reviewed.as_deref(), Some("switch"));

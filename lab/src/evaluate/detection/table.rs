@@ -26,7 +26,7 @@ pub(crate) fn table(r: &Report) -> String {
     lines.extend(r.easy.iter().map(|group| row(&easy, group)));
     let mut add = |title: &str, groups: &mut dyn Iterator<Item = (&String, &Group)>| {
         let groups: Vec<(&String, &Group)> = groups.collect();
-        // One group says no more than all do.
+        // A single group repeats the line of all.
         if groups.len() > 1 {
             lines.push(format!("  {title}"));
             lines.extend(groups.into_iter().map(|(name, group)| row(&format!("  {name}"), group)));
@@ -36,7 +36,7 @@ pub(crate) fn table(r: &Report) -> String {
     add("by stratum", &mut r.by_stratum.iter());
     add("by shortest side", &mut r.by_shortest_side.iter().map(|(n, g)| (n, g)));
     add("by angle of view", &mut r.by_view_angle.iter().map(|(n, g)| (n, g)));
-    add("by what can be seen", &mut r.by_state.iter());
+    add("by visible part", &mut r.by_state.iter());
     if r.all.missed_but_alternate > 0 {
         let easy = r.easy.as_ref().map_or(0, |easy| easy.missed_but_alternate);
         let all = r.all.missed_but_alternate;
@@ -97,7 +97,7 @@ fn images(i: &ImageFigures) -> Vec<String> {
     let mut lines = vec![format!("  false quads an image       {all}{count}")];
     if i.reviewed_quads > 0 {
         lines.push(format!(
-            "    without reviewed things  {}: {} are on them",
+            "    without reviewed quads  {}: {} are on them",
             figure(i.false_per_image_reviewed, i.false_per_image_reviewed_interval),
             i.reviewed_quads
         ));
@@ -130,7 +130,7 @@ mod tests {
             "1.25",
             "20 to 30 px",
             "1.000 (0.000-2.000): 2 in 2 images",
-            "without reviewed things  0.500",
+            "without reviewed quads  0.500",
             "could not be read: 2",
             "worst: bad.png 1 missed, 0 loose, 1 false, corners off by up to 1.2 px",
         ] {

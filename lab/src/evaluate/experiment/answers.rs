@@ -1,13 +1,13 @@
-//! Answers of all sorts with their truth: what a confidence is fitted to and judged by. Maps of several sizes, landmarks
-//! under conditions from easy to hopeless, strangers, and a few look-alikes, in stated shares.
+//! Answers with their truth, to which a confidence is fitted and on which it is evaluated: maps of several sizes,
+//! landmarks under conditions from easy to hopeless, distractors, and a few look-alikes, in stated shares.
 
 use super::{
     Common,
+    distractors::{Distractor, distractors},
     lesson::{Class, Taught, noisy},
-    look::quad,
     mixed, of_each,
     pictures::{self, Picture, generated},
-    strangers::{Stranger, strangers},
+    view_outcome::quad,
 };
 use sim::{
     exhibit::{Conditions, Extent, Shadow, exhibit},
@@ -28,12 +28,12 @@ use vision::{
 
 /// Landmarks of the maps, and how they are taught.
 const MAPS: [(usize, Taught); 3] = [(12, Taught::Views), (40, Taught::Photograph), (100, Taught::Views)];
-/// Posters among the strangers of each map.
-const STRANGERS: u32 = 60;
-/// Shares of the quads: landmarks, and look-alikes; the rest are ordinary strangers.
+/// Posters among the distractors of each map.
+const DISTRACTORS: u32 = 60;
+/// Shares of the quads that are landmarks, and look-alikes; the rest are other distractors.
 pub(crate) const MATED: f64 = 0.6;
-pub(crate) const DOUBLES: f64 = 0.01;
-/// Views that are drawn until one lies in the image.
+pub(crate) const LOOK_ALIKES: f64 = 0.01;
+/// Most draws of a view that does not lie in the image.
 const TRIES: u64 = 10;
 
 /// One answer that names a landmark.
@@ -44,7 +44,7 @@ pub(crate) struct Named {
     pub(crate) is_right: bool,
 }
 
-/// Answers of one distance, and how many quads there were.
+/// Answers by one distance, and the number of quads.
 #[derive(Debug, Default)]
 pub(crate) struct Answers {
     pub(crate) quads: usize,
@@ -69,12 +69,12 @@ pub(crate) fn answers(common: &Common, quads: u32, p: &Params) -> anyhow::Result
         let seed = mixed(&[common.seed, 20, m as u64]);
         let class = Class::new(pictures, how, seed, p)?;
         anyhow::ensure!(!class.models.is_empty(), "no landmark passed its gates");
-        let strangers = strangers(&class, &unknown, STRANGERS, common);
+        let distractors = distractors(&class, &unknown, DISTRACTORS, common);
         let numbers: Vec<u64> = (0..u64::from(quads).div_ceil(MAPS.len() as u64)).collect();
-        let seen =
-            of_each(&numbers, "answers", |_, n| quad_of(&class, &strangers, mixed(&[seed, 21, *n]), p));
-        for seen in seen.into_iter().flatten() {
-            for (answers, named) in all.iter_mut().zip(seen) {
+        let by_quad =
+            of_each(&numbers, "answers", |_, n| quad_of(&class, &distractors, mixed(&[seed, 21, *n]), p));
+        for by_kind in by_quad.into_iter().flatten() {
+            for (answers, named) in all.iter_mut().zip(by_kind) {
                 answers.quads += 1;
                 answers.named.extend(named);
             }
@@ -83,8 +83,8 @@ pub(crate) fn answers(common: &Common, quads: u32, p: &Params) -> anyhow::Result
     Ok(all)
 }
 
-/// One quad and what each distance says of it.
-fn quad_of(class: &Class, strangers: &[Stranger], draw: u64, p: &Params) -> Option<[Option<Named>; 3]> {
+/// Answers to one quad, by distance.
+fn quad_of(class: &Class, distractors: &[Distractor], draw: u64, p: &Params) -> Option<[Option<Named>; 3]> {
     let mut random = Random::new(draw);
     let chosen = random.unit();
     let pick =
@@ -94,25 +94,26 @@ fn quad_of(class: &Class, strangers: &[Stranger], draw: u64, p: &Params) -> Opti
         let (id, picture) = class.active().nth(n)?;
         (&picture.texture, Some(id))
     } else {
-        let of: Vec<&Stranger> = strangers.iter().filter(|s| s.hard == (chosen < MATED + DOUBLES)).collect();
+        let of: Vec<&Distractor> =
+            distractors.iter().filter(|s| s.hard == (chosen < MATED + LOOK_ALIKES)).collect();
         (&of.get(pick(&mut random, of.len()))?.texture, None)
     };
-    let (seen, corners) = (0..TRIES).find_map(|n| view(class, texture, mixed(&[draw, n])))?;
-    Some(KINDS.map(|kind| named(&recognise(&seen.image, &quad(corners), &class.models, kind, p), id)))
+    let (rendered, corners) = (0..TRIES).find_map(|n| view(class, texture, mixed(&[draw, n])))?;
+    Some(KINDS.map(|kind| named(&recognise(&rendered.image, &quad(corners), &class.models, kind, p), id)))
 }
 
 fn view(class: &Class, texture: &Texture, draw: u64) -> Option<(sim::exhibit::Exhibit, Corners)> {
     let mut random = Random::new(draw);
     let conditions = hard(draw, &mut random);
-    let seen = exhibit(texture, &class.wall, &conditions, Extent::Around, draw)?;
-    let mut corners = noisy(&seen.corners, random.range(0.3, 2.0), &mut random)?;
-    // Now and then another border than the taught one was found.
+    let rendered = exhibit(texture, &class.wall, &conditions, Extent::Around, draw)?;
+    let mut corners = noisy(&rendered.corners, random.range(0.3, 2.0), &mut random)?;
+    // Sometimes the detector finds another border than the taught one.
     if random.unit() < 0.15 {
         let by = random.range(0.88, 1.1);
         let centre = corners.points().iter().fold(nalgebra::Vector2::zeros(), |m, c| m + c.coords * 0.25);
         corners = Corners::new(corners.points().map(|c| (centre + by * (c.coords - centre)).into())).ok()?;
     }
-    Some((seen, corners))
+    Some((rendered, corners))
 }
 
 /// Conditions from easy to hopeless.
@@ -139,7 +140,7 @@ fn hard(draw: u64, random: &mut Random) -> Conditions {
     c
 }
 
-/// What a verdict names, if anything, and whether that is right.
+/// The name that a verdict gives, if any, with its truth.
 fn named(verdict: &RecognitionResult, truth: Option<LandmarkId>) -> Option<Named> {
     let Verdict::Unique(id) = verdict.verdict else { return None };
     let best = verdict.candidates.iter().position(|c| c.landmark == id)?;

@@ -1,8 +1,9 @@
-//! `waymark-lab evaluate confidence`: does a confidence keep its word? Of answers with 0.9, nine in ten should be right.
+//! `waymark-lab evaluate confidence`: calibration of confidences. Of answers with confidence 0.9, nine in ten
+//! should be right.
 
 use super::{
     Common,
-    answers::{Answers, DOUBLES, MATED, Named, answers},
+    answers::{Answers, LOOK_ALIKES, MATED, Named, answers},
     say, write_plot,
 };
 use crate::evaluate::{
@@ -14,7 +15,7 @@ use vision::{params::Params, recognise::DistanceKind};
 
 /// Bins of equal mass.
 const BINS: usize = 15;
-/// Answers from here on are sure.
+/// Answers with at least this confidence are reported apart.
 const SURE: f64 = 0.99;
 
 /// `waymark-lab evaluate confidence`.
@@ -37,7 +38,7 @@ pub(crate) struct Bin {
     right_interval: Interval,
 }
 
-/// How well one distance's confidence keeps its word.
+/// Calibration of one distance's confidence.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct Reliability {
     distance: &'static str,
@@ -74,14 +75,14 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         seed: args.common.seed,
         quads: found[0].quads,
         mated: MATED,
-        lookalikes: DOUBLES,
+        lookalikes: LOOK_ALIKES,
         results: reliabilities(&found),
     };
     write_plot(args.common.plot.as_deref(), || svg(&report.results))?;
     say(args.common.json, &report, || table(&report))
 }
 
-/// Of all answers that name a landmark, by distance.
+/// Calibration over all answers that name a landmark, by distance.
 pub(crate) fn reliabilities(found: &[Answers; 3]) -> Vec<Reliability> {
     super::answers::KINDS
         .iter()
@@ -149,7 +150,7 @@ pub(crate) fn line(r: &Reliability) -> String {
 
 fn table(report: &Report) -> Vec<String> {
     let mut lines = vec![format!(
-        "confidence: set {}, seed {}, {} quads ({:.0} % landmarks, {:.0} % look-alikes, the rest strangers)",
+        "confidence: set {}, seed {}, {} quads ({:.0} % landmarks, {:.0} % look-alikes, the rest distractors)",
         report.set,
         report.seed,
         report.quads,
@@ -195,8 +196,8 @@ mod tests {
     }
 
     #[test]
-    fn the_error_by_hand() {
-        // Fifteen pairs: of each one right, with confidences 0.5 and, in the last bin, 0.9.
+    fn the_calibration_error_by_hand() {
+        // Fifteen pairs, each with one right answer; confidences 0.5 and, in the last bin, 0.9.
         let mut all: Vec<Named> = (0..28).map(|i| named(0.5, i % 2 == 0)).collect();
         all.extend([named(0.9, true), named(0.9, false)]);
         let r = reliability(DistanceKind::Both, &all);

@@ -1,6 +1,7 @@
-//! Two classes of distances, taken for normal, in; the threshold where their weighted densities cross out (method 8).
+//! Two classes of distances in, modelled as normal; the threshold where their weighted densities cross out (method
+//! 8).
 
-/// Mean and standard deviation of a class of distances, taken for normal.
+/// Normal model of a class of distances.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Gaussian {
     /// Mean.
@@ -20,8 +21,8 @@ impl Gaussian {
     }
 }
 
-/// Where the weighted densities cross between the means: for small sets (n+ < 30 or n- < 300). `None` when the own
-/// distances are not the smaller ones or the curves do not cross there.
+/// Where the weighted densities cross between the means: for small sets (n+ < 30 or n- < 300). `None` if the mean
+/// of `own` is not the smaller one or the curves do not cross there.
 pub(crate) fn crossing(own: Gaussian, others: Gaussian, weight: f64) -> Option<f64> {
     let (m1, s1, m0, s0) = (own.mean, own.deviation, others.mean, others.deviation);
     let a = 0.5 / (s0 * s0) - 0.5 / (s1 * s1);

@@ -1,4 +1,5 @@
-//! `waymark-lab evaluate illumination` (E7, the paper's Fig. 13 left): too dark, too bright, light from the side, shadows.
+//! `waymark-lab evaluate illumination` (E7, the paper's Fig. 13 left): too dark, too bright, light from the side,
+//! shadows.
 
 use super::{
     Common, Setting, curves,
@@ -15,7 +16,7 @@ const SHADOW_OFFSET: f64 = 0.3;
 /// `waymark-lab evaluate illumination`.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// Landmarks in the map, all of which are looked at.
+    /// Landmarks in the map; views are of all of them.
     #[arg(long, default_value_t = 25, value_parser = clap::value_parser!(u32).range(2..=1000))]
     landmarks: u32,
     /// Views of each landmark at each value of each condition.

@@ -1,5 +1,5 @@
-//! Teaches a map of pictures as the server does: views of each, negatives from all others, gates. Pictures in, the
-//! models of those that passed out. What is measured with them is the experiments' business.
+//! Teaches a map of pictures as the server does: views of each, negatives from all others, quality gates. Pictures
+//! in, the models of those that passed out.
 
 use super::{mixed, of_each, pictures::Picture};
 use serde::Serialize;
@@ -20,13 +20,13 @@ use vision::{
     recognise::{IconFeatures, features},
 };
 
-/// Views of each landmark, as the server wants them.
+/// Views of each landmark, as in the server.
 const VIEWS: usize = 30;
-/// Of all landmarks together as many icons, about, are what each must be told from (`server/src/jobs/negatives.rs`).
+/// Negatives, about, taken evenly from the icons of all landmarks (`server/src/jobs/negatives.rs`).
 const NEGATIVES: usize = 2000;
 /// Widest angle that views are gathered from.
 const MAX_YAW_RAD: f64 = 60.0 / 360.0 * std::f64::consts::TAU;
-/// Draws for a view before a picture is given up.
+/// Most draws for a view of a picture.
 const TRIES: u64 = 20;
 
 /// How landmarks are taught.
@@ -55,27 +55,26 @@ pub(crate) fn taught(text: &str) -> Result<Taught, String> {
     }
 }
 
-/// What a landmark is learnt from: views, and the points of its photographs.
+/// Training data of a landmark: views, and the points of its photographs.
 #[derive(Default)]
-struct Sights {
+struct TrainingData {
     views: Vec<TrainingView>,
     points: Vec<Vec<TaughtPoint>>,
 }
 
-/// The points of a landmark's photographs, as a lesson of the server takes them (`server/src/jobs/learn.rs`): of a few,
-/// evenly chosen.
+/// Points of a few photographs, evenly chosen, as in a lesson of the server (`server/src/jobs/learn.rs`).
 pub(crate) fn points_of<'a>(photographs: &[(&'a GrayImage, &'a Corners)]) -> Vec<Vec<TaughtPoint>> {
     let chosen = photographs.len().min(MAX_POINT_VIEWS);
     let of = |i: usize| photographs[i * photographs.len() / chosen];
     (0..chosen).map(of).map(|(image, corners)| view_points(image, corners)).collect()
 }
 
-/// The landmarks of a map and what they were made of.
+/// The landmarks of a map and the pictures that they were taught from.
 pub(crate) struct Class {
-    /// Landmark `LandmarkId(i)` is picture i; those that a gate kept out are not in `models`.
+    /// Landmark `LandmarkId(i)` is picture i; those that failed a quality gate are not in `models`.
     pub(crate) landmarks: Vec<Picture>,
     pub(crate) models: ModelSet,
-    /// Pictures that a gate kept out, or that could not be learnt.
+    /// Pictures that failed a quality gate or could not be learnt.
     pub(crate) candidates: Vec<usize>,
     pub(crate) wall: Texture,
 }
@@ -92,12 +91,12 @@ impl Class {
             }
         });
         let each = (NEGATIVES / pictures.len().max(1)).clamp(3, VIEWS);
-        let icons: Vec<Vec<IconFeatures>> = of_each(&sights, "icons", |_, Sights { views, .. }| {
+        let icons: Vec<Vec<IconFeatures>> = of_each(&sights, "icons", |_, TrainingData { views, .. }| {
             let count = each.min(views.len());
             let chosen = (0..count).map(|i| &views[i * views.len() / count]);
             chosen.map(|v| features(v.icon.clone(), &p.recognise)).collect()
         });
-        let models = of_each(&sights, "learning", |i, Sights { views, points }| {
+        let models = of_each(&sights, "learning", |i, TrainingData { views, points }| {
             let alone = learn(LandmarkId(i as u64), views, &[], p).ok()?;
             let alone = alone.with_points_if_used(p, || points.clone());
             let others = icons.iter().enumerate().filter(|(other, _)| *other != i).map(|(_, icons)| icons);
@@ -114,7 +113,7 @@ impl Class {
         Ok(Self { landmarks: pictures, models, candidates, wall })
     }
 
-    /// Pictures that are landmarks in use.
+    /// Pictures that are active landmarks.
     pub(crate) fn active(&self) -> impl Iterator<Item = (LandmarkId, &Picture)> {
         self.models.iter().map(|m| (m.id, &self.landmarks[m.id.0 as usize]))
     }
@@ -127,24 +126,24 @@ impl Class {
 }
 
 /// Views as a robot would gather them by driving past.
-fn gathered(picture: &Picture, wall: &Texture, draw: impl Fn(u64) -> u64, p: &Params) -> Sights {
+fn gathered(picture: &Picture, wall: &Texture, draw: impl Fn(u64) -> u64, p: &Params) -> TrainingData {
     let view = |n: u64| {
         let (noise, mut random) = (draw(2 * n), Random::new(draw(2 * n + 1)));
         let mut conditions = Conditions::realistic(noise);
         conditions.yaw_rad = random.range(-MAX_YAW_RAD, MAX_YAW_RAD);
-        let seen = exhibit(&picture.texture, wall, &conditions, Extent::Around, noise)?;
-        let corners = noisy(&seen.corners, 1.0, &mut random)?;
-        let view = TrainingView::photographed(&seen.image, &corners, p).ok()?;
-        Some((view, seen.image, corners))
+        let rendered = exhibit(&picture.texture, wall, &conditions, Extent::Around, noise)?;
+        let corners = noisy(&rendered.corners, 1.0, &mut random)?;
+        let view = TrainingView::photographed(&rendered.image, &corners, p).ok()?;
+        Some((view, rendered.image, corners))
     };
     let all: Vec<_> = (0..TRIES * VIEWS as u64).filter_map(view).take(VIEWS).collect();
     let photographs: Vec<_> = all.iter().map(|(_, image, corners)| (image, corners)).collect();
     let points = points_of(&photographs);
-    Sights { views: all.into_iter().map(|(view, _, _)| view).collect(), points }
+    TrainingData { views: all.into_iter().map(|(view, _, _)| view).collect(), points }
 }
 
-/// One view nearly from the front, and what is generated from it.
-fn from_one(picture: &Picture, wall: &Texture, draw: impl Fn(u64) -> u64, p: &Params) -> Sights {
+/// One view nearly from the front, and views generated from it.
+fn from_one(picture: &Picture, wall: &Texture, draw: impl Fn(u64) -> u64, p: &Params) -> TrainingData {
     let one = |n: u64| {
         let (noise, mut random) = (draw(2 * n), Random::new(draw(2 * n + 1)));
         let conditions = Conditions {
@@ -152,17 +151,17 @@ fn from_one(picture: &Picture, wall: &Texture, draw: impl Fn(u64) -> u64, p: &Pa
             size_px: random.range(200.0, 280.0),
             ..Conditions::realistic(noise)
         };
-        let seen = exhibit(&picture.texture, wall, &conditions, Extent::Around, noise)?;
-        let corners = noisy(&seen.corners, 1.0, &mut random)?;
-        let view = TrainingView::photographed(&seen.image, &corners, p).ok()?;
-        let generated = synthesis::views(&seen.image, &corners, VIEWS, p, noise);
-        let points = points_of(&[(&seen.image, &corners)]);
-        Some(Sights { views: std::iter::once(view).chain(generated).collect(), points })
+        let rendered = exhibit(&picture.texture, wall, &conditions, Extent::Around, noise)?;
+        let corners = noisy(&rendered.corners, 1.0, &mut random)?;
+        let view = TrainingView::photographed(&rendered.image, &corners, p).ok()?;
+        let generated = synthesis::views(&rendered.image, &corners, VIEWS, p, noise);
+        let points = points_of(&[(&rendered.image, &corners)]);
+        Some(TrainingData { views: std::iter::once(view).chain(generated).collect(), points })
     };
     (0..TRIES).find_map(one).unwrap_or_default()
 }
 
-/// Corners as a detector would give them, each coordinate off by a normal draw.
+/// Corners with normal noise of `sigma_px` on each coordinate, like those of a detector.
 pub(crate) fn noisy(corners: &Corners, sigma_px: f64, random: &mut Random) -> Option<Corners> {
     let off = corners
         .points()

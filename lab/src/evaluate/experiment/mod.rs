@@ -1,20 +1,20 @@
-//! What the experiments on recognition (method 18, E2 to E8, E11, E14) have in common: their arguments, textures of
-//! three disjoint sets, a lesson, and how one view is judged. They run in this program, without a server, from a seed.
+//! Common parts of the experiments on recognition (method 18, E2 to E8, E11, E14): arguments, textures of three
+//! disjoint sets, a lesson, the outcome of a view. They run in this program, without a server, from a seed.
 
 pub(crate) mod pictures;
 pub(crate) mod lesson;
-pub(crate) mod look;
+pub(crate) mod view_outcome;
 pub(crate) mod sweep;
 pub(crate) mod curves;
 pub(crate) mod viewpoint;
 pub(crate) mod scale;
 pub(crate) mod illumination;
 pub(crate) mod occlusion;
-pub(crate) mod strangers;
+pub(crate) mod distractors;
 mod gaussian;
-pub(crate) mod humps;
+pub(crate) mod distance_histograms;
 pub(crate) mod discrimination;
-pub(crate) mod doubles;
+pub(crate) mod look_alikes;
 pub(crate) mod answers;
 pub(crate) mod confidence;
 
@@ -34,18 +34,18 @@ use vision::params::Params;
 /// Arguments of every experiment.
 #[derive(Debug, Clone, clap::Args)]
 pub(crate) struct Common {
-    /// The textures: tune, calibrate or test, three disjoint sets. Look at test for a report only.
+    /// The set of textures: tune, calibrate or test, which are disjoint. Use test for reports only.
     #[arg(long = "set", default_value = "test", value_parser = pictures::part)]
     pub(crate) part: Part,
-    /// A folder of pictures to use beside generated posters, or one with a truth.json of which the taught pictures are
-    /// used. May be repeated.
+    /// A folder of pictures to use beside generated posters, or one with a truth.json of which the taught pictures
+    /// are used. May be repeated.
     #[arg(long, value_name = "DIR")]
     pub(crate) photographs: Vec<PathBuf>,
     /// How landmarks are taught: `views`, each from 30 rendered views as a robot would gather them, or `photograph`,
     /// each from one view and 30 generated from it.
     #[arg(long, default_value = "views", value_parser = lesson::taught)]
     taught: Taught,
-    /// Views, noise and the choice of posters follow from it.
+    /// Seed of views, noise and the choice of posters.
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Standard deviation of the corners per coordinate, where the true ones are given.
@@ -54,7 +54,7 @@ pub(crate) struct Common {
     /// Let the detector find the quad in the whole image, instead of giving the true corners.
     #[arg(long)]
     pub(crate) detector: bool,
-    /// One JSON object instead of a table.
+    /// Print one JSON object instead of a table.
     #[arg(long)]
     pub(crate) json: bool,
     /// Write the curves or histograms as an SVG picture.
@@ -70,7 +70,7 @@ fn noise(text: &str) -> Result<f64, String> {
     if (0.0..=MAX_NOISE_PX).contains(&px) { Ok(px) } else { Err(format!("not within 0 to {MAX_NOISE_PX}")) }
 }
 
-/// What every report says of how it came about.
+/// Set-up of an experiment, part of every report.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct Setting {
     experiment: &'static str,
@@ -78,10 +78,10 @@ pub(crate) struct Setting {
     taught: &'static str,
     corners: String,
     seed: u64,
-    /// Landmarks in the map (N), of which as many are photographs.
+    /// Landmarks in the map (N), and how many of them are photographs.
     landmarks: usize,
     photographs: usize,
-    /// Taught, but a gate kept them out.
+    /// Taught, but failed a quality gate.
     candidates: Vec<String>,
     /// Mean bytes of a model as it is stored.
     bytes_per_model: usize,
@@ -124,7 +124,7 @@ impl Setting {
                 self.corners
             ),
             format!(
-                "  {} more were taught but a gate kept them out; {} bytes a model; parameters {}",
+                "  {} more were taught but failed a quality gate; {} bytes a model; parameters {}",
                 self.candidates.len(),
                 self.bytes_per_model,
                 self.params_hash
@@ -133,7 +133,7 @@ impl Setting {
     }
 }
 
-/// Says the report: a table, or JSON.
+/// Prints the report: a table, or JSON.
 pub(crate) fn say(
     json: bool,
     report: &impl Serialize,
@@ -143,7 +143,7 @@ pub(crate) fn say(
     Ok(())
 }
 
-/// Writes the plot, if one is asked for.
+/// Writes the plot if `path` is given.
 pub(crate) fn write_plot(path: Option<&Path>, svg: impl FnOnce() -> String) -> anyhow::Result<()> {
     use anyhow::Context as _;
     let Some(path) = path else { return Ok(()) };
@@ -157,7 +157,7 @@ pub(crate) fn mixed(parts: &[u64]) -> u64 {
     })
 }
 
-/// `work` on every item, over all processors, results in the order of the items, with a bar of progress.
+/// `work` on every item, over all processors, with a progress bar; results in the order of the items.
 pub(crate) fn of_each<T: Sync, R: Send>(
     items: &[T],
     what: &'static str,

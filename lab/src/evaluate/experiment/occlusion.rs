@@ -1,4 +1,5 @@
-//! `waymark-lab evaluate occlusion` (E8, the paper's Fig. 13 right): how much of a landmark may be hidden in its middle.
+//! `waymark-lab evaluate occlusion` (E8, the paper's Fig. 13 right): recognition over the share of a landmark that
+//! is hidden in its middle.
 
 use super::{
     Common, Setting, curves,
@@ -11,7 +12,7 @@ use vision::params::Params;
 /// `waymark-lab evaluate occlusion`.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// Landmarks in the map, all of which are looked at.
+    /// Landmarks in the map; views are of all of them.
     #[arg(long, default_value_t = 25, value_parser = clap::value_parser!(u32).range(2..=1000))]
     landmarks: u32,
     /// Views of each landmark at each share.

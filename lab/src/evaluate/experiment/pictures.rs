@@ -1,6 +1,6 @@
-//! The textures of the experiments: generated posters and, where folders are given, photographs, in three disjoint sets.
-//! A poster belongs to the set of its number modulo 3, a photograph to that of its file's bytes (docs/EVALUATION.md):
-//! no choice is made by looking.
+//! The textures of the experiments: generated posters and, where folders are given, photographs, in three disjoint
+//! sets. A poster belongs to the set of its number modulo 3, a photograph to that of its file's bytes
+//! (docs/EVALUATION.md): nobody chooses by eye.
 
 use crate::evaluate::truth::Truth;
 use anyhow::Context as _;
@@ -15,11 +15,11 @@ use std::{
 };
 use vision::{detect::pyramid, frame::GrayImage};
 
-/// Most pictures read from one folder.
+/// Largest number of pictures read from one folder.
 const MAX_PHOTOGRAPHS: usize = 2000;
 /// Photographs are reduced to about this many pixels a side: as fine as generated posters.
 const SIDE_PX: usize = 640;
-/// Numbers of posters of one seed: far from the next seed's, and from the posters of tests and demos.
+/// Numbers of posters of one seed: disjoint from the next seed's, and from the posters of tests and demos.
 const POSTERS_PER_SEED: u64 = 100_000;
 
 /// One of the three sets.
@@ -49,7 +49,7 @@ pub(crate) fn part(text: &str) -> Result<Part, String> {
     all.into_iter().find(|p| p.name() == text).ok_or_else(|| "one of: tune, calibrate, test".to_owned())
 }
 
-/// A texture with where it comes from.
+/// A texture with its origin.
 #[derive(Debug, Clone)]
 pub(crate) struct Picture {
     pub(crate) name: String,
@@ -64,7 +64,7 @@ pub(crate) fn generated(part: Part, seed: u64, index: usize) -> Picture {
     Picture { name: format!("poster {number}"), texture: Arc::new(poster(number)), photograph: false }
 }
 
-/// The photographs of a set from all folders, by name, two of one thing (`same`) only once.
+/// The photographs of a set from all folders, by name; of several of one landmark (`same`) only the first.
 pub(crate) fn photographs(folders: &[PathBuf], part: Part) -> anyhow::Result<Vec<Picture>> {
     let mut found = Vec::new();
     for folder in folders {
@@ -81,8 +81,7 @@ pub(crate) fn photographs(folders: &[PathBuf], part: Part) -> anyhow::Result<Vec
     Ok(found)
 }
 
-/// What a set of pictures that are needed is made of: photographs as far as they reach for `share` of them, and posters
-/// from number `first` on.
+/// `count` pictures: photographs for up to `share` of them, then generated posters.
 pub(crate) fn mixed(
     photographs: &[Picture],
     share: f64,
@@ -99,13 +98,13 @@ pub(crate) fn mixed(
 fn files(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
     let mut paths: Vec<PathBuf> = if folder.join("truth.json").is_file() {
         let truth = Truth::read(folder)?;
-        let mut kept: Vec<(PathBuf, String)> = Vec::new();
+        let mut distinct: Vec<(PathBuf, String)> = Vec::new();
         for (path, name) in &truth.teach {
-            if !kept.iter().any(|(_, k)| truth.same_landmark(k, name)) {
-                kept.push((path.clone(), name.clone()));
+            if !distinct.iter().any(|(_, k)| truth.same_landmark(k, name)) {
+                distinct.push((path.clone(), name.clone()));
             }
         }
-        kept.into_iter().map(|(path, _)| path).collect()
+        distinct.into_iter().map(|(path, _)| path).collect()
     } else {
         let entries =
             std::fs::read_dir(folder).with_context(|| format!("cannot read {}", folder.display()))?;
@@ -135,7 +134,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn sets_are_disjoint_and_seeds_are_other_posters() {
+    fn sets_are_disjoint_and_other_seeds_give_other_posters() {
         assert_eq!(fnv(b"foobar"), 0x8594_4171_f739_67e8); // from the authors' tables
         let number = |part, seed, index| -> u64 {
             let name = generated(part, seed, index).name;

@@ -1,4 +1,4 @@
-//! `waymark-lab evaluate scale` (E5, the paper's Fig. 12 left): how small a landmark may be seen.
+//! `waymark-lab evaluate scale` (E5, the paper's Fig. 12 left): recognition over the apparent size of a landmark.
 
 use super::{
     Common, Setting, curves,
@@ -17,7 +17,7 @@ const SIZES_PX: [f64; 21] = [
 /// `waymark-lab evaluate scale`.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// Landmarks in the map, all of which are looked at.
+    /// Landmarks in the map; views are of all of them.
     #[arg(long, default_value_t = 25, value_parser = clap::value_parser!(u32).range(2..=1000))]
     landmarks: u32,
     /// Views of each landmark at each size.
@@ -35,7 +35,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         values: SIZES_PX.to_vec(),
         set: |c, px, random| {
             c.size_px = px;
-            // Seen nearly from the front: what is measured is the size.
+            // Nearly from the front, so that only the size varies much.
             c.yaw_rad = random.range(-0.3, 0.3);
         },
     };

@@ -1,11 +1,11 @@
-//! One condition is changed step by step, all others vary as on a robot: what becomes of D/tau, and where it crosses 1.
-//! Views in, a curve with intervals out. Tables and pictures of curves are `curves`'.
+//! D/tau over one condition that is changed step by step while all others vary as on a robot, and where it crosses
+//! 1. Views in, a curve with intervals out; `curves` prints and plots it.
 
 use super::{
     Common,
     lesson::{Class, noisy},
-    look::{Outcome, ViewFigures, look},
     mixed, of_each,
+    view_outcome::{Outcome, ViewFigures, score_view},
 };
 use crate::evaluate::statistics::{Interval, bootstrap, quantile, wilson};
 use serde::Serialize;
@@ -13,16 +13,16 @@ use sim::exhibit::{Conditions, Extent, exhibit};
 use std::collections::BTreeMap;
 use vision::{params::Params, random::Random};
 
-/// What is measured against tau, in the order of [`ViewFigures::ratios`].
+/// Names of the ratios, in the order of [`ViewFigures::ratios`].
 pub(crate) const DISTANCES: [&str; 3] = ["H^r", "C^r", "similarity"];
-/// Draws for one view before it is left out.
+/// Most draws for one view.
 const TRIES: u64 = 10;
 
 /// A condition and the values it takes, the easiest first.
 pub(crate) struct Axis {
     pub(crate) name: &'static str,
     pub(crate) values: Vec<f64>,
-    /// Sets the condition; the random numbers are for what goes with it (which side, where).
+    /// Sets the condition; `random` draws what goes with it (side, position).
     pub(crate) set: fn(&mut Conditions, f64, &mut Random),
 }
 
@@ -31,7 +31,7 @@ pub(crate) struct Axis {
 pub(crate) struct Point {
     pub(crate) value: f64,
     pub(crate) views: usize,
-    /// Median and 90 % quantile of D/tau, by distance; none where infinite.
+    /// Median and 90 % quantile of D/tau, by distance; `None`: infinite.
     pub(crate) median: [Option<f64>; 3],
     pub(crate) ninety: [Option<f64>; 3],
     /// Share below 1, by distance.
@@ -39,16 +39,16 @@ pub(crate) struct Point {
     /// Rightly recognised by the whole decision.
     pub(crate) right: f64,
     pub(crate) right_interval: Interval,
-    /// Views by what became of them.
+    /// Views by outcome.
     pub(crate) outcomes: BTreeMap<&'static str, usize>,
 }
 
-/// Where something happens, with a 95 % interval over landmarks. Beyond the last value it is the last value.
+/// Value at which a curve crosses a level, with a 95 % interval over landmarks; at most the last value.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub(crate) struct Crossing {
     pub(crate) at: f64,
     pub(crate) interval: Option<Interval>,
-    /// It does not happen up to the last value.
+    /// The curve does not cross up to the last value.
     pub(crate) beyond: bool,
 }
 
@@ -69,7 +69,7 @@ pub(crate) struct Curve {
 /// Views of one landmark, by value.
 type Views = Vec<Vec<ViewFigures>>;
 
-/// Looks at every landmark `views` times at every value.
+/// Recognises every landmark in `views` views at every value.
 pub(crate) fn sweep(
     class: &Class,
     axis: &Axis,
@@ -94,9 +94,9 @@ pub(crate) fn sweep(
                         conditions.aim_px = [0.0; 2];
                     }
                     let extent = if common.detector { Extent::Whole } else { Extent::Around };
-                    let seen = exhibit(&picture.texture, &class.wall, &conditions, extent, noise)?;
-                    let corners = noisy(&seen.corners, common.corner_noise_px, &mut random)?;
-                    Some(look(class, *id, &seen, (!common.detector).then_some(&corners), p))
+                    let rendered = exhibit(&picture.texture, &class.wall, &conditions, extent, noise)?;
+                    let corners = noisy(&rendered.corners, common.corner_noise_px, &mut random)?;
+                    Some(score_view(class, *id, &rendered, (!common.detector).then_some(&corners), p))
                 })
             };
             (0..views).filter_map(one).collect::<Vec<ViewFigures>>()
@@ -127,9 +127,9 @@ impl Curve {
         let missed = |l: &[&Views], i: usize| 1.0 - right(&at(l, i));
         let crossings = [0, 1, 2].map(|d| crossing(&median(d), 1.0));
         let (half, most) = (crossing(&missed, 0.5), crossing(&missed, 0.05));
-        let looks = || by_landmark.iter().flatten().flatten();
-        let wrong = looks().filter(|l| l.outcome == Outcome::Wrong).count();
-        let views = looks().count();
+        let all_views = || by_landmark.iter().flatten().flatten();
+        let wrong = all_views().filter(|l| l.outcome == Outcome::Wrong).count();
+        let views = all_views().count();
         Self { name, points, crossings, half, most, wrong, views }
     }
 }
@@ -138,38 +138,38 @@ fn at<'a>(landmarks: &[&'a Views], value: usize) -> Vec<&'a ViewFigures> {
     landmarks.iter().filter_map(|l| l.get(value)).flatten().collect()
 }
 
-fn middle(looks: &[&ViewFigures], distance: usize, share: f64) -> f64 {
-    let mut ratios: Vec<f64> = looks.iter().map(|l| l.ratios[distance]).collect();
+fn middle(views: &[&ViewFigures], distance: usize, share: f64) -> f64 {
+    let mut ratios: Vec<f64> = views.iter().map(|l| l.ratios[distance]).collect();
     quantile(&mut ratios, share).unwrap_or(f64::INFINITY)
 }
 
-fn right(looks: &[&ViewFigures]) -> f64 {
-    looks.iter().filter(|l| l.outcome == Outcome::Right).count() as f64 / looks.len().max(1) as f64
+fn right(views: &[&ViewFigures]) -> f64 {
+    views.iter().filter(|l| l.outcome == Outcome::Right).count() as f64 / views.len().max(1) as f64
 }
 
-fn point(value: f64, looks: &[&ViewFigures]) -> Point {
-    let finite = |share: f64| [0, 1, 2].map(|d| Some(middle(looks, d, share)).filter(|x| x.is_finite()));
+fn point(value: f64, views: &[&ViewFigures]) -> Point {
+    let finite = |share: f64| [0, 1, 2].map(|d| Some(middle(views, d, share)).filter(|x| x.is_finite()));
     let below =
-        |d: usize| looks.iter().filter(|l| l.ratios[d] < 1.0).count() as f64 / looks.len().max(1) as f64;
-    let hits = looks.iter().filter(|l| l.outcome == Outcome::Right).count();
+        |d: usize| views.iter().filter(|l| l.ratios[d] < 1.0).count() as f64 / views.len().max(1) as f64;
+    let hits = views.iter().filter(|l| l.outcome == Outcome::Right).count();
     let mut outcomes = BTreeMap::new();
-    for look in looks {
-        *outcomes.entry(look.outcome.name()).or_insert(0) += 1;
+    for view in views {
+        *outcomes.entry(view.outcome.name()).or_insert(0) += 1;
     }
     Point {
         value,
-        views: looks.len(),
+        views: views.len(),
         median: finite(0.5),
         ninety: finite(0.9),
         below: [0, 1, 2].map(below),
-        right: right(looks),
-        right_interval: wilson(hits, looks.len()),
+        right: right(views),
+        right_interval: wilson(hits, views.len()),
         outcomes,
     }
 }
 
-/// Where heights first reach `level`, between two values by a straight line; `None` if they never do. From an infinite
-/// height nothing is read: the crossing is then half way.
+/// Value at which `heights` first reach `level`, linear between two values, half way from an infinite height;
+/// `None` if they never do.
 pub(crate) fn cross(values: &[f64], heights: &[f64], level: f64) -> Option<f64> {
     let first = heights.iter().position(|h| *h >= level || h.is_nan())?;
     let Some(before) = first.checked_sub(1) else { return values.first().copied() };
@@ -182,7 +182,7 @@ pub(crate) fn cross(values: &[f64], heights: &[f64], level: f64) -> Option<f64> 
 mod tests {
     use super::*;
 
-    fn looks(ratio: f64, outcome: Outcome, count: usize) -> Vec<ViewFigures> {
+    fn views(ratio: f64, outcome: Outcome, count: usize) -> Vec<ViewFigures> {
         vec![ViewFigures { ratios: [ratio, 0.5 * ratio, ratio], outcome }; count]
     }
 
@@ -198,7 +198,7 @@ mod tests {
 
     #[test]
     fn a_curve_sums_up_its_views() {
-        let landmark = || vec![looks(0.5, Outcome::Right, 4), looks(1.5, Outcome::Similarity, 4)];
+        let landmark = || vec![views(0.5, Outcome::Right, 4), views(1.5, Outcome::Similarity, 4)];
         let curve = Curve::new("x", &[0.0, 1.0], &[landmark(), landmark()]);
         assert!((curve.crossings[0].at - 0.5).abs() < 1e-12 && !curve.crossings[0].beyond);
         assert!(curve.crossings[1].beyond && (curve.crossings[1].at - 1.0).abs() < 1e-12);
@@ -206,6 +206,6 @@ mod tests {
         assert_eq!((curve.points[1].outcomes["similarity"], curve.wrong, curve.views), (8, 0, 16));
         assert_eq!(curve.points[0].right_interval, wilson(8, 8));
         let Interval(low, high) = curve.crossings[0].interval.unwrap();
-        assert!((low - 0.5).abs() < 1e-12 && (high - 0.5).abs() < 1e-12, "two landmarks alike");
+        assert!((low - 0.5).abs() < 1e-12 && (high - 0.5).abs() < 1e-12, "two equal landmarks");
     }
 }

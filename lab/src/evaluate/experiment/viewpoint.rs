@@ -1,4 +1,4 @@
-//! `waymark-lab evaluate viewpoint` (E6, the paper's Fig. 12 right): how obliquely a landmark may be seen.
+//! `waymark-lab evaluate viewpoint` (E6, the paper's Fig. 12 right): recognition over the view angle of a landmark.
 
 use super::{
     Common, Setting, curves,
@@ -12,14 +12,14 @@ use vision::params::Params;
 /// `waymark-lab evaluate viewpoint`.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// Landmarks in the map, all of which are looked at.
+    /// Landmarks in the map; views are of all of them.
     #[arg(long, default_value_t = 25, value_parser = clap::value_parser!(u32).range(2..=1000))]
     landmarks: u32,
     /// Views of each landmark at each angle.
     #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=1000))]
     views: u32,
-    /// Side of the landmark (square root of its area) as it would be seen from the front at the same distance. At 300 a
-    /// poster of 5 : 7 seen at 80 degrees is 44 px wide.
+    /// Side of the landmark (square root of its area) as it would appear from the front at the same distance. At
+    /// 300 a poster of 5 : 7 at 80 degrees is 44 px wide.
     #[arg(long, value_name = "PX", default_value_t = 300, value_parser = clap::value_parser!(u32).range(20..=400))]
     size_px: u32,
     #[command(flatten)]
@@ -42,7 +42,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     curves::show(&setting, &[curve], args.common.json, args.common.plot.as_deref())
 }
 
-/// A map of as many landmarks: half of them photographs, as far as there are any.
+/// A map of `landmarks` landmarks, up to half of them photographs.
 pub(crate) fn class(common: &Common, landmarks: u32, p: &Params) -> anyhow::Result<Class> {
     let photographs = pictures::photographs(&common.photographs, common.part)?;
     let pictures = pictures::mixed(&photographs, 0.5, landmarks as usize, |i| {
@@ -65,7 +65,7 @@ mod tests {
     }
 
     #[test]
-    fn a_small_run_repeats_and_knows_the_front_from_the_edge() {
+    fn a_small_run_repeats_and_frontal_views_are_better_than_oblique_ones() {
         let args = Line::parse_from(["x", "--set=tune", "--landmarks=4", "--views=2"]).args;
         let p = Params::default();
         let run = |seed: u64| {

@@ -1,4 +1,4 @@
-//! Localisation of single scans in the finished map: what it costs, how often it answers, how far it is off.
+//! Localisation of single scans in the finished map: processor time, share of scans with an answer, error.
 
 use crate::evaluate::statistics;
 use formats::scan_log::LogEntry;
@@ -12,12 +12,12 @@ use server::cli::clock::Clock;
 
 /// Most scans tried, evenly taken.
 const MAX_TRIED: usize = 300;
-/// How far the prior is from the map's own pose: x, y, theta.
+/// Offset of the prior from the map's own pose: x, y (m), theta (rad).
 const OFF: [f64; 3] = [0.08, -0.06, 0.03];
-/// And how far it says it may be.
+/// Standard deviations of the prior: x, y (m), theta (rad).
 const SIGMA: [f64; 3] = [0.1, 0.1, 0.03];
 
-/// What came of it.
+/// Figures of all tried scans.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Localised {
     /// Median processor time of one, microseconds.
@@ -28,7 +28,7 @@ pub(super) struct Localised {
     pub(super) off_m: f64,
 }
 
-/// Tries scans with a prior that is off.
+/// Localises scans with a prior that has an offset.
 pub(super) fn localise(map: &SlamMap, records: &[LogEntry]) -> anyhow::Result<Localised> {
     let walls = WallIndex::new(&map.walls);
     let covariance = Matrix3::from_diagonal(&Vector3::from(SIGMA).map(|s| s * s));
@@ -41,7 +41,7 @@ pub(super) fn localise(map: &SlamMap, records: &[LogEntry]) -> anyhow::Result<Lo
         times.push(clock.ms() * 1e3);
         tried += 1;
         let Ok(fix) = found else { continue };
-        // As a filter would: along a bare corridor the prior stays.
+        // Fused as in a filter: along a bare corridor the prior decides.
         let sum = (prior.covariance + fix.pose.covariance).try_inverse().unwrap_or_else(Matrix3::zeros);
         let fused = prior.pose.plus(&(prior.covariance * sum * fix.pose.pose.minus(&prior.pose)));
         off.push((fused.position() - pose.position()).norm());

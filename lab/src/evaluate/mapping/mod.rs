@@ -1,4 +1,5 @@
-//! `waymark-lab evaluate mapping`: recordings mapped, and the path compared with what is known of the truth.
+//! `waymark-lab evaluate mapping`: maps built from scan logs, and their paths compared with the known relations of
+//! the truth.
 
 mod localise;
 mod odometry;
@@ -29,9 +30,10 @@ use std::{
     sync::Arc,
 };
 
-/// Figures of others on the same recordings: mean and standard deviation of the relative poses' translation error, by
-/// scan matching and by graph mapping (Kuemmerle et al. 2009, "On measuring the accuracy of SLAM algorithms", table of
-/// translational errors; their relations were picked by hand, ours are those of the log's corrected poses).
+/// Figures of others on the same recordings: mean and standard deviation of the relative poses' translation error,
+/// by scan matching and by graph mapping (Kuemmerle et al. 2009, "On measuring the accuracy of SLAM algorithms",
+/// table of translational errors; their relations were picked by hand, ours are those of the log's corrected
+/// poses).
 const PUBLISHED: [(&str, [f64; 2], [f64; 2]); 5] = [
     ("intel", [0.220, 0.296], [0.031, 0.026]),
     ("aces", [0.173, 0.614], [0.044, 0.044]),
@@ -39,20 +41,21 @@ const PUBLISHED: [(&str, [f64; 2], [f64; 2]); 5] = [
     ("csail", [0.106, 0.325], [0.004, 0.009]),
     ("freiburg-079", [0.258, 0.427], [0.056, 0.042]),
 ];
-/// The set whose odometry is the robot's own.
+/// The files of the set with the robot's own odometry.
 const NUMBERED: [&str; 2] = ["intel-scans.txt.gz", "reference-poses.txt"];
 
 /// `waymark-lab evaluate mapping`.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// Recordings as for `waymark map build`, or folders of them. Poses in a log are taken for the truth and odometry is
-    /// made from them with noise. Numbered scans keep their odometry; the truth is `reference-poses.txt` beside them
-    /// (lines `scan x y theta`). Without any: a simulated corridor with exact truth.
+    /// Scan logs as for `waymark map build`, or folders of them. Poses in a log are taken as the truth, and
+    /// odometry is made from them with noise. Numbered scans keep their odometry; the truth is
+    /// `reference-poses.txt` beside them (lines `scan x y theta`). Without any: a simulated corridor with exact
+    /// truth.
     logs: Vec<PathBuf>,
     #[command(flatten)]
     laser: LaserArgs,
-    /// Errors of the odometry made for a log, times this: by default 5 % of the way, 1.1 deg per root metre, 5 % of the
-    /// turn, and 0.23 deg per metre to one side.
+    /// Errors of the odometry made for a log, times this: by default 5 % of the way, 1.1 deg per root metre, 5 % of
+    /// the turn, and 0.23 deg per metre to one side.
     #[arg(long, default_value_t = 1.0)]
     odometry_noise: f64,
     /// Seed of that noise.
@@ -67,10 +70,10 @@ pub(crate) struct Args {
     /// Draw every map into this folder, as SVG.
     #[arg(long, value_name = "DIR")]
     draw: Option<PathBuf>,
-    /// Write an SVG picture: how many relations are how far off, by log.
+    /// Write an SVG picture: distribution of the errors of relations, by log.
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
-    /// One JSON object per log instead of the table.
+    /// Print one JSON object per log instead of the table.
     #[arg(long)]
     json: bool,
 }
@@ -124,7 +127,7 @@ fn logs(path: &Path) -> anyhow::Result<Vec<PathBuf>> {
     let entries: Result<Vec<PathBuf>, _> =
         std::fs::read_dir(path).with_context(name)?.map(|e| e.map(|e| e.path())).collect();
     let mut found: Vec<PathBuf> = entries.with_context(name)?.into_iter().filter(is_log).collect();
-    anyhow::ensure!(!found.is_empty(), "{}: no recordings", name());
+    anyhow::ensure!(!found.is_empty(), "{}: no scan logs", name());
     found.sort();
     Ok(found)
 }
@@ -172,7 +175,7 @@ fn simulated(seed: u64) -> ScanLog {
 fn row(args: &Args, name: &str, recording: &ScanLog) -> anyhow::Result<Row> {
     let records = &recording.records;
     let relations = Relations::of(records);
-    anyhow::ensure!(!relations.is_empty(), "{name}: nothing to compare with");
+    anyhow::ensure!(!relations.is_empty(), "{name}: no known relations to compare with");
     let built = build::build(records, |i| records[i].odom, build::params(args.params.as_ref())?)?;
     let odometry: Vec<Pose2> = records.iter().map(|r| r.odom).collect();
     let map = MapFile::of(&built.map);

@@ -4,7 +4,7 @@ use formats::scan_log::LogEntry;
 use map::pose2::Pose2;
 use vision::random::Random;
 
-/// How odometry goes wrong.
+/// Noise of odometry.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Noise {
     /// Standard deviation along the motion, share of the way.
@@ -15,7 +15,7 @@ pub(super) struct Noise {
     rad_per_root_m: f64,
     /// Of the heading, share of the turn.
     turn: f64,
-    /// To one side, always.
+    /// Systematic turn to one side, rad per metre.
     bias_rad_per_m: f64,
 }
 

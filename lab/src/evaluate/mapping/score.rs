@@ -1,18 +1,18 @@
-//! How far a path is from the truth, by relative poses (Kuemmerle et al. 2009), and how well walls explain scans.
+//! Error of a path by relative poses (Kuemmerle et al. 2009), and share of scan points on walls.
 
 use formats::scan_log::{LineTokens, LogEntry, ReadError, lines};
 use map::{pose2::Pose2, slam::SlamMap};
 use std::path::Path;
 
-/// Poses this near to each other, though far apart along the way, are one place: their relation is compared too.
+/// Poses within this distance of each other and far apart along the path: their relation is compared too.
 const NEAR_M: f64 = 3.0;
-/// What is far apart along the way.
+/// Distance along the path that counts as far apart.
 const FAR_M: f64 = 10.0;
 /// Most such relations of one log; evenly taken.
-const MAX_MEETINGS: usize = 20_000;
+const MAX_REVISITS: usize = 20_000;
 /// A point on a wall is not farther from it than this.
 const ON_WALL_M: f64 = 0.1;
-/// Points farther than this from the robot are not asked for.
+/// Points farther than this from the robot are ignored.
 const MAX_POINT_M: f64 = 10.0;
 
 /// Puts the poses of a reference file (lines `scan x y theta`) into the records.
@@ -28,7 +28,7 @@ pub(super) fn reference(path: &Path, records: &mut [LogEntry]) -> Result<(), Rea
     })
 }
 
-/// Pairs of scans whose relative pose is known: each known pose with the next, and places met again.
+/// Pairs of scans whose relative pose is known: each known pose with the next, and revisited places.
 pub(super) struct Relations(Vec<(usize, usize)>);
 
 impl Relations {
@@ -36,21 +36,22 @@ impl Relations {
         let known: Vec<(usize, Pose2)> =
             records.iter().enumerate().filter_map(|(i, r)| Some((i, r.truth?))).collect();
         let mut pairs: Vec<(usize, usize)> = known.windows(2).map(|w| (w[0].0, w[1].0)).collect();
-        let mut way = vec![0.0];
+        let mut distance_m = vec![0.0];
         for w in known.windows(2) {
-            way.push(way[way.len() - 1] + (w[1].1.position() - w[0].1.position()).norm());
+            distance_m
+                .push(distance_m[distance_m.len() - 1] + (w[1].1.position() - w[0].1.position()).norm());
         }
-        let mut met = Vec::new();
+        let mut revisits = Vec::new();
         for a in 0..known.len() {
             for b in a + 1..known.len() {
                 let near = (known[a].1.position() - known[b].1.position()).norm() < NEAR_M;
-                if near && way[b] - way[a] > FAR_M {
-                    met.push((known[a].0, known[b].0));
+                if near && distance_m[b] - distance_m[a] > FAR_M {
+                    revisits.push((known[a].0, known[b].0));
                 }
             }
         }
-        let stride = met.len().div_ceil(MAX_MEETINGS).max(1);
-        pairs.extend(met.into_iter().step_by(stride));
+        let stride = revisits.len().div_ceil(MAX_REVISITS).max(1);
+        pairs.extend(revisits.into_iter().step_by(stride));
         Self(pairs)
     }
 

@@ -7,15 +7,15 @@ fn records(truth: &[Pose2]) -> Vec<LogEntry> {
 }
 
 #[test]
-fn relations_are_neighbours_and_places_met_again() {
-    // Out 12 m and back: scans 0 and 24 stand at the same place.
+fn relations_are_neighbours_and_revisited_places() {
+    // Out 12 m and back: scans 0 and 24 are at the same place.
     let out = (0..=12).map(|i| Pose2::new(f64::from(i), 0.0, 0.0));
     let back = (0..12).rev().map(|i| Pose2::new(f64::from(i), 0.5, std::f64::consts::PI));
     let truth: Vec<Pose2> = out.chain(back).collect();
     let records = records(&truth);
     let relations = Relations::of(&records);
     assert!(relations.len() > 24);
-    // The frame of the path does not matter, its shape does.
+    // The coordinate frame of the path does not matter, only its shape.
     let moved: Vec<Pose2> = truth.iter().map(|t| Pose2::new(5.0, -3.0, 2.0).compose(t)).collect();
     assert!(relations.errors(&records, &moved).translation_m()[0] < 1e-9);
     let mut bent = truth.clone();
@@ -23,13 +23,13 @@ fn relations_are_neighbours_and_places_met_again() {
         p.y_m += 1.0;
     }
     let [mean, std] = relations.errors(&records, &bent).translation_m();
-    // One of 24 neighbours and every meeting is 1 m off.
+    // One of 24 neighbours and every revisit is 1 m off.
     let off = (relations.len() - 24 + 1) as f64 / relations.len() as f64;
     assert!((mean - off).abs() < 1e-9 && (std - (off * (1.0 - off)).sqrt()).abs() < 1e-9, "{mean} {std}");
 }
 
 #[test]
-fn made_odometry_is_the_truth_with_its_noise() {
+fn made_odometry_is_the_truth_with_the_stated_noise() {
     let truth: Vec<Pose2> = (0..4000).map(|i| Pose2::new(0.5 * f64::from(i % 2000), 0.0, 0.0)).collect();
     let mut still = records(&truth[..2000]);
     odometry::make(&mut still, Noise::times(0.0), 1);

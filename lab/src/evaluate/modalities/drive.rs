@@ -1,4 +1,4 @@
-//! A drive along the way: where the robot is, what odometry, camera and laser measure, and what fusing it gives.
+//! A simulated drive: true poses, measurements of odometry, camera and laser, and the fused pose.
 
 use super::world::World;
 use map::{
@@ -31,29 +31,29 @@ const LENGTH_M: f64 = 52.0;
 const START_M: f64 = 1.5;
 const WEAVE_M: f64 = 0.15;
 const CORNER_SIGMA_PX: f64 = 0.5;
-/// Standard deviations of what one robot's odometry always gets wrong: scale, turn per metre.
-const LASTING: [f64; 2] = [0.015, 0.004];
-/// What the hall's floor does to odometry, a metre: measured too long, and pushed aside towards -y.
+/// Standard deviations of a robot's systematic odometry error: scale (share), drift (rad/m).
+const SYSTEMATIC: [f64; 2] = [0.015, 0.004];
+/// Error of odometry per metre on the hall's floor: too long, and a slip towards -y.
 const FLOOR: [f64; 2] = [0.06, 0.03];
 
-/// What is measured at one moment.
+/// Measurements at one time.
 struct Step {
     at_ns: i64,
     truth: Pose2,
     odometry: Pose2,
     scan: Scan,
-    /// Posters in the picture, by number.
-    seen: Vec<(usize, LandmarkPose)>,
+    /// Observed posters: number, pose in the camera frame.
+    observed: Vec<(usize, LandmarkPose)>,
 }
 
-/// A drive with everything that is measured on it.
+/// A drive with all its measurements.
 pub(super) struct Drive {
     steps: Vec<Step>,
     mounting: CameraExtrinsics,
     seed: u64,
 }
 
-/// Where the robot was, and how far off it was thought to be.
+/// Error of the fused pose at one place.
 pub(super) struct Moment {
     pub(super) zone: &'static str,
     pub(super) x_m: f64,
@@ -65,7 +65,7 @@ pub(super) struct Moment {
 pub(super) struct Driven {
     /// From the first fix on.
     pub(super) moments: Vec<Moment>,
-    /// All that fixes said, by time.
+    /// All fixes, by time.
     pub(super) fixes: Vec<(i64, Fix)>,
 }
 
@@ -73,7 +73,7 @@ fn camera() -> Intrinsics {
     Intrinsics::new(500.0, 500.0, 320.0, 240.0, Distortion::None).expect("in range")
 }
 
-/// Two cameras, half to the left and half to the right.
+/// robot_from_camera of a camera with this pan: one of two looks half left, one half right.
 fn mounting(pan: f64) -> Isometry3<f64> {
     pan_tilt(pan, 0.0, Vector3::new(0.1, 0.0, 1.3))
 }
@@ -82,22 +82,23 @@ impl Drive {
     /// Draws a drive; `back` from the far end.
     pub(super) fn new(world: &World, seed: u64, back: bool) -> Self {
         let mut random = Random::new(seed);
-        let lasting = LASTING.map(|s| s * random.normal());
-        let hung: Vec<LandmarkPlace> = world.posters.iter().map(|place| drawn(place, &mut random)).collect();
+        let systematic = SYSTEMATIC.map(|s| s * random.normal());
+        let true_places: Vec<LandmarkPlace> =
+            world.posters.iter().map(|place| drawn(place, &mut random)).collect();
         let laser = LaserParams::default();
         let count = (LENGTH_M / STEP_M) as usize;
         let (mut steps, mut odometry): (Vec<Step>, Pose2) = (Vec::with_capacity(count), Pose2::default());
         for i in 0..=count {
             let truth = way(i as f64 * STEP_M, back);
             if let Some(before) = steps.last() {
-                odometry = odometry.compose(&measured(&before.truth, &truth, lasting, &mut random));
+                odometry = odometry.compose(&measured(&before.truth, &truth, systematic, &mut random));
             }
             steps.push(Step {
                 at_ns: i as i64 * STEP_NS,
                 truth,
                 odometry,
                 scan: scan_among(&world.walls, &truth, &laser, seed.wrapping_add(i as u64)),
-                seen: looked(&truth, world, &hung, &mut random),
+                observed: observations(&truth, world, &true_places, &mut random),
             });
         }
         Self { steps, mounting: CameraExtrinsics::new(mounting(0.0)).expect("in range"), seed }
@@ -108,8 +109,8 @@ impl Drive {
         self.steps.iter().map(|step| (step.at_ns, step.odometry)).collect()
     }
 
-    /// The path as somebody who measures it tells it.
-    pub(super) fn told(&self, [sigma_m, sigma_rad]: [f64; 2]) -> Vec<(i64, Pose2)> {
+    /// The path as a reference trajectory with noise.
+    pub(super) fn reference(&self, [sigma_m, sigma_rad]: [f64; 2]) -> Vec<(i64, Pose2)> {
         let mut random = Random::new(!self.seed);
         let mut noisy = |truth: &Pose2| {
             let e = Vector3::new(random.normal(), random.normal(), random.normal());
@@ -119,9 +120,9 @@ impl Drive {
     }
 }
 
-/// Where the robot is after some way.
-fn way(way_m: f64, back: bool) -> Pose2 {
-    let x = START_M + if back { LENGTH_M - way_m } else { way_m };
+/// True pose after `distance_m`; with `back`, of a drive from the far end.
+fn way(distance_m: f64, back: bool) -> Pose2 {
+    let x = START_M + if back { LENGTH_M - distance_m } else { distance_m };
     let phase = x * 2.0 * PI / 9.0;
     let slope = WEAVE_M * phase.cos() * 2.0 * PI / 9.0;
     Pose2::new(x, WEAVE_M * phase.sin(), slope.atan() + if back { PI } else { 0.0 })
@@ -135,23 +136,23 @@ fn measured(from: &Pose2, to: &Pose2, [scale, turn]: [f64; 2], random: &mut Rand
     let length_m = motion.position().norm();
     let hall = World::zone(from.x_m).name == "hall";
     let [long, aside] = if hall { FLOOR } else { [0.0; 2] };
-    // It slides towards -y and odometry does not see it: measured, the robot is further towards +y than it is.
+    // The slip towards -y is not measured: by odometry the robot is further towards +y than it is.
     let aside = from.theta_rad.cos().signum() * aside * length_m;
-    let lasting = Vector3::new((scale + long) * length_m, aside, turn * length_m);
-    motion.plus(&(noise + lasting))
+    let systematic = Vector3::new((scale + long) * length_m, aside, turn * length_m);
+    motion.plus(&(noise + systematic))
 }
 
-/// A poster as it really hangs.
+/// The true place of a poster, drawn from its covariance.
 fn drawn(place: &LandmarkPlace, random: &mut Random) -> LandmarkPlace {
     let e = place.covariance.map_diagonal(f64::sqrt).map(|s| s * random.normal());
     LandmarkPlace { x_m: place.x_m + e[0], y_m: place.y_m + e[1], z_m: place.z_m + e[3], ..*place }
 }
 
-/// The posters ahead, in the camera that is turned to their wall.
-fn looked(
+/// Observations of the posters ahead, by the camera that is turned to their wall.
+fn observations(
     truth: &Pose2,
     world: &World,
-    hung: &[LandmarkPlace],
+    true_places: &[LandmarkPlace],
     random: &mut Random,
 ) -> Vec<(usize, LandmarkPose)> {
     let camera = camera();
@@ -171,11 +172,11 @@ fn looked(
             }
         }
         let claimed = [Matrix2::identity() * CORNER_SIGMA_PX * CORNER_SIGMA_PX; 4];
-        let seen =
+        let observed =
             landmark_pose(&Corners::new(points).ok()?, &claimed, world.posters[number].size, &camera).ok()?;
-        Some((number, seen))
+        Some((number, observed))
     };
-    hung.iter().enumerate().filter_map(one).collect()
+    true_places.iter().enumerate().filter_map(one).collect()
 }
 
 /// The pan of the camera that looks to the side of a poster.
@@ -190,17 +191,17 @@ pub(super) fn follow(world: &World, drive: &Drive, areas: &Arc<ModalityMap>) -> 
     let mut driven = Driven { moments: Vec::new(), fixes: Vec::new() };
     for step in &drive.steps {
         fuser.apply_odometry(step.at_ns, step.odometry).ok();
-        let mut found: Vec<Fix> = Vec::new();
+        let mut fixes: Vec<Fix> = Vec::new();
         if let Some(prior) = fuser.pose_at(step.at_ns) {
-            let laid = laser_fix(&world.index, &step.scan, &prior, &LaserFixParams::default());
-            found.extend(laid.ok().and_then(Result::ok).map(|laid| laid.fix()));
+            let result = laser_fix(&world.index, &step.scan, &prior, &LaserFixParams::default());
+            fixes.extend(result.ok().and_then(Result::ok).map(|aligned| aligned.fix()));
         }
-        found.extend(
-            step.seen
+        fixes.extend(
+            step.observed
                 .iter()
-                .filter_map(|seen| by_poster(world, drive, step, seen, fuser.pose_at(step.at_ns))),
+                .filter_map(|observed| by_poster(world, drive, step, observed, fuser.pose_at(step.at_ns))),
         );
-        for fix in found {
+        for fix in fixes {
             let outcome = fuser.apply_fix(step.at_ns, &fix);
             if !matches!(outcome, Ok(map::fuse::FixOutcome::Repeated)) {
                 driven.fixes.push((step.at_ns, fix));
@@ -223,16 +224,16 @@ fn by_poster(
     world: &World,
     drive: &Drive,
     step: &Step,
-    (number, seen): &(usize, LandmarkPose),
+    (number, observed): &(usize, LandmarkPose),
     prior: Option<Pose2Covariance>,
 ) -> Option<Fix> {
     let place = &world.posters[*number];
     let side = step.truth.inverse().apply(&Point2::new(place.x_m, place.y_m)).y;
     let mounting =
         CameraExtrinsics { robot_from_camera: mounting(pan_to(side)), covariance: drive.mounting.covariance };
-    let sighting = LandmarkObservation { landmark: LandmarkId(*number as u64), seen, place };
+    let observation = LandmarkObservation { landmark: LandmarkId(*number as u64), seen: observed, place };
     let ask = |prior: Option<&Pose2Covariance>| {
-        robot_pose(&[sighting], &mounting, prior, &LocaliseParams::default())
+        robot_pose(&[observation], &mounting, prior, &LocaliseParams::default())
     };
     let fix = match ask(None).ok()? {
         FixResult::Ambiguous(_) => ask(prior.as_ref()).ok()?,

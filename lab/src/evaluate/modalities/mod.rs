@@ -1,6 +1,6 @@
-//! `waymark-lab evaluate modalities` (method 15): what it is worth to know which modality is best where. Robots drive a way on
-//! which each modality fails somewhere; a first few drives, whose path is told, teach; the others are judged, untaught and
-//! in every mode. Corners and ranges are drawn, nothing is rendered.
+//! `waymark-lab evaluate modalities` (method 15): gain by modality statistics. Robots drive a path on which each
+//! modality fails somewhere. The first drives are reference runs; the others are evaluated without statistics and
+//! in every fusion mode. Corners and ranges are drawn, nothing is rendered.
 
 mod drive;
 mod plot;
@@ -19,30 +19,30 @@ use serde::Serialize;
 use std::{path::PathBuf, sync::Arc};
 use world::{World, ZONES};
 
-/// Standard deviations of the paths that are told.
+/// Standard deviations of the reference trajectories: m, rad.
 const PATH_SIGMA: [f64; 2] = [0.01, 0.003];
 
 /// `waymark-lab evaluate modalities`.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// Runs that teach, half of them from either end.
+    /// Reference runs, half of them from either end.
     #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=100))]
     runs: u32,
-    /// Drives that are judged.
+    /// Drives that are evaluated.
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=1000))]
     drives: u32,
-    /// All noise follows from it.
+    /// Seed of all noise.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// One JSON object instead of a table.
+    /// Print one JSON object instead of a table.
     #[arg(long)]
     json: bool,
-    /// Draw the way from above with the best modality of every place, and the errors along it, as an SVG picture.
+    /// Write an SVG picture: the path from above with the best modality of every pose cell, and the errors along it.
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
 }
 
-/// One way of fusing, in one part of the way.
+/// One fusion mode in one part of the path.
 #[derive(Debug, Clone, Serialize)]
 struct Row {
     way: &'static str,
@@ -61,7 +61,7 @@ struct Report {
     seed: u64,
     runs: usize,
     drives: usize,
-    /// Square metres and headings that were judged, and in how many of them each modality is best.
+    /// Pose cells with statistics, and in how many of them each modality is best.
     cells: usize,
     best: [usize; 3],
     rows: Vec<Row>,
@@ -72,7 +72,7 @@ impl Report {
         let [odometry, laser, landmarks] = self.best;
         let mut lines = vec![
             format!(
-                "{} runs teach, {} drives are judged; of {} cells odometry is best in {odometry}, the laser in {laser}, landmarks in {landmarks}",
+                "{} reference runs, {} drives; of {} pose cells odometry is best in {odometry}, the laser in {laser}, landmarks in {landmarks}",
                 self.runs, self.drives, self.cells
             ),
             format!("{:24} {:10} {:>9} {:>9} {:>9} {:>7}", "", "", "median m", "95 % m", "worst m", "NEES"),
@@ -99,14 +99,14 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let areas = |mode| Arc::new(ModalityMap::new(mode, Vec::new(), &learnt));
     let ways: [(&'static str, Arc<ModalityMap>); 4] = [
         ("untaught", untaught),
-        ("all, as sure as it proved", areas(FusionMode::All)),
-        ("near_best, nearly the best", areas(FusionMode::NearBest)),
-        ("best, the best alone", areas(FusionMode::Best)),
+        ("all, with error models", areas(FusionMode::All)),
+        ("near_best", areas(FusionMode::NearBest)),
+        ("best", areas(FusionMode::Best)),
     ];
-    let judged = drives(args.drives, 16);
+    let evaluated = drives(args.drives, 16);
     let of_ways: Vec<(&'static str, Vec<Driven>)> = ways
         .iter()
-        .map(|(way, areas)| (*way, of_each(&judged, "drives", |_, drive| follow(&world, drive, areas))))
+        .map(|(way, areas)| (*way, of_each(&evaluated, "drives", |_, drive| follow(&world, drive, areas))))
         .collect();
     let rows = of_ways.iter().flat_map(|(way, driven)| rows(way, driven)).collect();
     let all = &ways[1].1;
@@ -116,7 +116,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         experiment: "modalities",
         seed: args.seed,
         runs: teaching.len(),
-        drives: judged.len(),
+        drives: evaluated.len(),
         cells: best.iter().sum(),
         best,
         rows,
@@ -125,14 +125,14 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     write_plot(args.plot.as_deref(), || plot::svg(&world, all, &of_ways))
 }
 
-/// What a run whose path is told shows.
+/// Statistics of a reference run.
 fn taught(
     world: &World,
     drive: &Drive,
 ) -> std::collections::BTreeMap<map::modality_stats::PoseCell, map::modality_stats::StatsByModality> {
     let driven = follow(world, drive, &Arc::default());
     let [sigma_m, sigma_rad] = PATH_SIGMA;
-    let path = ReferenceTrajectory::new(drive.told(PATH_SIGMA), sigma_m, sigma_rad)
+    let path = ReferenceTrajectory::new(drive.reference(PATH_SIGMA), sigma_m, sigma_rad)
         .expect("a drive has poses in order");
     let run = ReferenceRun { odometry: &drive.odometry(), fixes: &driven.fixes, reference: &path };
     learn_modality_stats(&run, &FuseParams::default()).cells
@@ -165,7 +165,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_runs_show_makes_the_pose_better_where_a_modality_fails() {
+    fn statistics_of_runs_improve_the_pose_where_a_modality_fails() {
         let world = World::new();
         let cells: Vec<_> = (0..6).map(|i| taught(&world, &Drive::new(&world, 50 + i, i % 2 == 1))).collect();
         let p95 = |mode: Option<FusionMode>| {

@@ -1,4 +1,4 @@
-//! The way from above with the best modality of every cell, and below it the 95 % of the errors along the way.
+//! The path from above with the best modality of every pose cell; below it the 95 % quantile of the errors along it.
 
 use super::{drive::Driven, world::World};
 use crate::evaluate::{chart::COLOURS, statistics::quantile};
@@ -14,7 +14,7 @@ const ERROR_PX: f64 = 220.0;
 /// The error at the top of the lower panel.
 const MOST_M: f64 = 0.5;
 
-fn colour(module: Modality) -> &'static str {
+fn colour(modality: Modality) -> &'static str {
     match module {
         Modality::Odometry => COLOURS[0],
         Modality::Laser => COLOURS[3],
@@ -47,7 +47,7 @@ pub(super) fn svg(world: &World, areas: &ModalityMap, ways: &[(&'static str, Vec
         let Some(best) = advice.best else { continue };
         let [x, y] = cell.middle_m();
         let (u, v) = at(x, y);
-        // The side that the robot drives towards.
+        // A triangle that points along the heading.
         let (s, c) = (f64::from(cell.heading) * std::f64::consts::FRAC_PI_2).sin_cos();
         let half = 0.5 * CELL_M * SCALE;
         let corner = |a: f64, b: f64| (u + half * (a * c - b * s), v - half * (a * s + b * c));
@@ -76,7 +76,7 @@ pub(super) fn svg(world: &World, areas: &ModalityMap, ways: &[(&'static str, Vec
     svg
 }
 
-/// 95 % of the errors of every metre.
+/// 95 % quantile of the errors in every metre.
 fn errors(svg: &mut String, ways: &[(&'static str, Vec<Driven>)], top: f64) {
     let height = |error: f64| top + ERROR_PX * (1.0 - (error / MOST_M).min(1.0));
     for i in 0..=5 {
@@ -85,7 +85,7 @@ fn errors(svg: &mut String, ways: &[(&'static str, Vec<Driven>)], top: f64) {
         put(svg, &format!(r##"<path d="M{LEFT_PX} {v:.1}H{right}" stroke="#ddd"/>"##));
         text(svg, (LEFT_PX - 6.0, v + 4.0), "end", &format!("{error:.1}"));
     }
-    text(svg, (LEFT_PX, top - 8.0), "start", "95 % of the errors of the position, metres, by x");
+    text(svg, (LEFT_PX, top - 8.0), "start", "95 % quantile of the position error, m, over x");
     for (k, (way, driven)) in ways.iter().enumerate() {
         let mut path = String::new();
         for x in 0..55 {

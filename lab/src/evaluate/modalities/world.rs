@@ -1,5 +1,5 @@
-//! The way: a corridor, a hall, a workshop, one after the other along x, with openings between. The map's walls are those
-//! of before the workshop's were moved.
+//! The building: a corridor, a hall and a workshop along x, with openings between. The map has the walls of before
+//! the workshop's were moved.
 
 use map::{
     laser_fix::WallIndex,
@@ -11,10 +11,10 @@ use sim::building::WallSegment;
 use std::f64::consts::FRAC_PI_2;
 use vision::pose::LandmarkSize;
 
-/// A part of the way.
+/// A part of the building.
 pub(super) struct Zone {
     pub(super) name: &'static str,
-    /// From, to.
+    /// From, to, along x (m).
     pub(super) x_m: [f64; 2],
     /// Distance of its side walls from the middle.
     half_width_m: f64,
@@ -35,11 +35,11 @@ const SIZE: LandmarkSize = LandmarkSize { width_m: 0.6, height_m: 0.84 };
 const POSTER_HEIGHT_M: f64 = 1.5;
 
 pub(super) struct World {
-    /// As they stand.
+    /// True walls.
     pub(super) walls: Vec<WallSegment>,
-    /// As the map has them.
+    /// Walls of the map.
     pub(super) index: WallIndex,
-    /// As the map has them, with its uncertainty.
+    /// Walls of the map with covariance.
     pub(super) posters: Vec<LandmarkPlace>,
 }
 
@@ -50,8 +50,8 @@ impl World {
         let segments: Vec<LaserSegment> =
             mapped.iter().filter_map(|w| LaserSegment::from_ends(w.a_m, w.b_m, covariance).ok()).collect();
         // Four in the corridor, none in the hall, two in the workshop.
-        let hung = [(4.0, 1.2), (10.0, -1.2), (16.0, 1.2), (22.0, -1.2), (45.0, -2.5), (51.0, 2.5)];
-        let posters = hung
+        let places = [(4.0, 1.2), (10.0, -1.2), (16.0, 1.2), (22.0, -1.2), (45.0, -2.5), (51.0, 2.5)];
+        let posters = places
             .iter()
             .filter_map(|&(x, y): &(f64, f64)| {
                 let theta = if y > 0.0 { -FRAC_PI_2 } else { FRAC_PI_2 };
@@ -67,7 +67,7 @@ impl World {
         Self { walls, index: WallIndex::new(&segments), posters }
     }
 
-    /// The zone of a point.
+    /// The zone at `x_m`.
     pub(super) fn zone(x_m: f64) -> &'static Zone {
         ZONES.iter().find(|zone| x_m < zone.x_m[1]).unwrap_or(&ZONES[ZONES.len() - 1])
     }
@@ -82,7 +82,7 @@ fn walls(moved_m: f64) -> Vec<WallSegment> {
         let dy = if zone.name == "workshop" { moved_m } else { 0.0 };
         walls.extend([wall([x0, dy - h], [x1, dy - h]), wall([x1, dy + h], [x0, dy + h])]);
         if zone.name == "hall" {
-            // Pillars and niches: the laser knows where it is.
+            // Pillars and niches constrain the laser along x.
             for (x, y) in [(29.0, 2.4), (33.5, -2.6), (37.0, 2.2), (31.0, -2.9)] {
                 walls.extend([
                     wall([x, y + 0.4], [x, y]),

@@ -1,6 +1,6 @@
-//! One drive, with the code of the server's workers: scans and frames through `engine/motion.rs`, landmarks judged by
-//! `engine/landmark_checks.rs`, what that finds put into the map. No transport, no threads; the scan of a moment comes before its
-//! frame. All of it is compared with the truth. The robot is told nothing of where it starts.
+//! One drive, with the code of the server's workers: scans and frames through the engine's motion tracker,
+//! landmarks checked, changes of landmark health put into the map. No transport, no threads; at equal times the
+//! scan comes before the frame. Compared with the truth; the start pose is unknown to the robot.
 
 use super::{
     super::experiment::mixed,
@@ -39,24 +39,24 @@ use vision::{
     seen_border::FoundBy,
 };
 
-/// A recognition is true when its quad overlaps the landmark's true outline by this much.
+/// A name is right if its quad overlaps the landmark's true outline by this much.
 const IOU_TRUE: f64 = 0.5;
-/// A frame shows a landmark when all of it is seen, no side shorter than this...
+/// A frame shows a landmark if all of it is visible and no side is shorter than this...
 const MIN_SIDE_PX: f64 = 38.0;
-/// ... and no more obliquely: the paper's limit of recognition.
+/// ... at up to this view angle, the paper's limit of recognition.
 const MAX_VIEW_ANGLE_RAD: f64 = 1.309;
-/// What is cut or hidden counts where at least this share of it is seen.
+/// A cut or hidden landmark counts if at least this share of it is visible.
 const MIN_SHARE: f64 = 0.25;
-/// Farther than any corridor: the simulator starts the robot at its end.
+/// Start beyond any corridor: the simulator clamps it to the end.
 const FAR_END_M: f64 = 1e3;
 /// One run of the robot's software.
 const EPOCH: u64 = 1;
 
-/// Where a robot was, and where it was thought to be.
+/// True and estimated poses at one time.
 pub(super) struct Moment {
     pub(super) time_s: f64,
     pub(super) truth: Pose2,
-    /// Odometry alone, told the true start.
+    /// Odometry alone, from the true start.
     pub(super) odometry: Pose2,
     /// None before the first fix.
     pub(super) fused: Option<Pose2Covariance>,
@@ -68,41 +68,41 @@ pub(super) struct Moment {
 #[derive(Default)]
 pub(super) struct Journey {
     pub(super) moments: Vec<Moment>,
-    /// Times that a taught landmark was shown, and how often it was rightly named.
+    /// Full views of taught landmarks, and how many were rightly named.
     pub(super) shown: usize,
     pub(super) recognised: usize,
-    /// Names given to something else.
+    /// Wrong names by the picture alone.
     pub(super) false_matches: usize,
-    /// Names given to something else by the pose.
+    /// Wrong names by guided recognition.
     pub(super) guided_false: usize,
-    /// Corners of what was rightly named: how far off each is, px, and its squared Mahalanobis distance.
+    /// Corners of rightly named landmarks: error (px) and squared Mahalanobis distance.
     pub(super) corners: BTreeMap<&'static str, Vec<(f64, f64)>>,
-    /// How often what was shown of each kind was rightly named.
+    /// Counts of right names by kind and state of the landmark.
     pub(super) named: BTreeMap<(&'static str, &'static str), Named>,
     /// Frames that showed a landmark up to the first fix, itself included; none if there never was one.
     pub(super) frames_to_fix: Option<usize>,
-    /// What became of fixes and scans.
+    /// Outcomes of fixes and scans.
     pub(super) log: Corrections,
-    /// Times that a landmark was said to have moved or to be missing; nothing in the corridor changes.
+    /// Landmarks wrongly flagged and quarantined; nothing in the corridor changes.
     pub(super) flagged: usize,
     pub(super) quarantined: usize,
-    /// What became of it after it was kidnapped.
+    /// Outcome of kidnapping the robot, if it was.
     pub(super) kidnapped: Option<KidnapOutcome>,
 }
 
-/// Sightings of taught landmarks of one kind.
+/// Views of taught landmarks of one kind.
 #[derive(Debug, Clone, Copy, Default, serde::Serialize)]
 pub(super) struct Named {
     pub(super) shown: usize,
     /// Rightly named by the picture alone.
     pub(super) global: usize,
-    /// Shown while the robot's pose was known and nothing contradicted it.
+    /// Shown while the robot's pose was known and not contradicted.
     pub(super) shown_to_pose: usize,
-    /// Of these rightly named by the picture alone or with the pose.
+    /// Of these, rightly named by the picture alone or with the pose.
     pub(super) guided: usize,
 }
 
-/// How robots drive.
+/// Settings of a drive.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Way {
     pub(super) seed: u64,
@@ -111,9 +111,9 @@ pub(super) struct Way {
     pub(super) rate_hz: f64,
     /// They have a laser.
     pub(super) laser: bool,
-    /// Their cameras, and where those sit, are exactly what they say.
+    /// Intrinsics and extrinsics of the cameras are exact.
     pub(super) exact: bool,
-    /// How far they are kidnapped forwards; 0: not at all.
+    /// Distance that the robot is carried forwards, m; 0: none.
     pub(super) kidnap_m: f64,
 }
 
@@ -123,7 +123,7 @@ struct Server {
     motion: MotionTracker,
     robot: Name,
     camera: Name,
-    /// The drive goes by its own time: here none passes.
+    /// Constant: no time of the computer passes in a drive.
     now: Instant,
 }
 
@@ -151,7 +151,7 @@ impl Server {
         );
     }
 
-    /// What a frame does to the robot's pose; what it finds out about landmarks.
+    /// Applies a frame to the robot's pose; returns changes of landmark health and guided names.
     fn frame(
         &self,
         map: &MapSnapshot,
@@ -242,7 +242,7 @@ pub(super) fn drive(world: &World, way: Way) -> anyhow::Result<Journey> {
             journey.frames_to_fix = Some(frames_that_show);
         }
         let misled = journey.guided_false - misled;
-        kidnap.looked(seen.step.time_s, (shows, misled), (fused.as_ref(), &seen.step.map_from_robot));
+        kidnap.count_frame(seen.step.time_s, (shows, misled), (fused.as_ref(), &seen.step.map_from_robot));
         journey.moments.push(Moment {
             time_s: seen.step.time_s,
             truth: seen.step.map_from_robot,
@@ -257,7 +257,7 @@ pub(super) fn drive(world: &World, way: Way) -> anyhow::Result<Journey> {
 }
 
 impl Journey {
-    /// Counts what the frame shows and what was named in it; whether it shows a landmark in use at all.
+    /// Counts what the frame shows and the names in it; true if it shows an active landmark.
     fn score(
         &mut self,
         world: &World,
@@ -275,7 +275,7 @@ impl Journey {
             let Some(Verdict::Unique(id)) = quad.recognition.as_ref().map(|v| v.verdict) else {
                 continue;
             };
-            // Where the picture was found to lie: the quad itself may be a border around it.
+            // The border that matched; the quad itself may be one around it.
             let found = quad.recognition.as_ref().and_then(|v| v.aligned_px).unwrap_or(quad.quad.corners_px);
             if is_there(id, &found) {
                 global.push(world.name(id));
@@ -302,8 +302,8 @@ impl Journey {
                 if let Some(view) = truth.landmark(world.name(observation.landmark)) {
                     let group = match (observation.quad, view.state) {
                         (Some(_), _) => "detected, named by the pose",
-                        (None, ViewState::Truncated) => "asked for, cut",
-                        (None, _) => "asked for, not cut",
+                        (None, ViewState::Truncated) => "expected, cut",
+                        (None, _) => "expected, not cut",
                     };
                     let corners = (observation.corners_px, observation.covariance_px2);
                     self.corners.entry(group).or_default().extend(off(&corners, view));
@@ -336,7 +336,7 @@ impl Journey {
     }
 }
 
-/// For each corner: how far off it is, px, and its squared Mahalanobis distance.
+/// For each corner: error (px) and squared Mahalanobis distance.
 fn off((corners_px, covariance_px2): &(Corners, [Matrix2<f64>; 4]), truth: &LandmarkView) -> Vec<(f64, f64)> {
     let pairs = corners_px.points().iter().zip(truth.corners_px.points()).zip(covariance_px2);
     pairs

@@ -1,22 +1,22 @@
-//! A kidnapped robot: it is carried forwards while its odometry stands still, so that its pose is wrong and believed. In: the
-//! true odometry. Out: odometry that misses the way; counts until the pose is right again or given up.
+//! A kidnapped robot: it is carried forwards while its odometry stands still, so that its fused pose is wrong. True
+//! odometry in; odometry without the displacement out, and counts until the pose is right again or given up.
 
 use map::pose2::{Pose2, Pose2Covariance};
 use serde::Serialize;
 
-/// Robots are kidnapped once they have had a pose for so long.
+/// Robots are kidnapped this long after their first pose.
 const AFTER_S: f64 = 8.0;
-/// The pose is right again from this error on.
+/// Error below which the pose is right again.
 const RIGHT_M: f64 = 0.3;
 
-/// What became of a kidnapped robot.
+/// Outcome for a kidnapped robot.
 #[derive(Debug, Clone, Default, Serialize)]
 pub(super) struct KidnapOutcome {
-    /// Frames since that showed a landmark in use in full view, the one that found it out included.
+    /// Frames that showed an active landmark in full view, up to the one that ended the wrong pose.
     pub(super) frames: usize,
-    /// The pose was given up, or is right.
+    /// The pose was given up or is right again.
     pub(super) is_found_out: bool,
-    /// Names that the wrong pose gave to something else.
+    /// Wrong names by guided recognition with the wrong pose.
     pub(super) misled: usize,
 }
 
@@ -25,18 +25,18 @@ pub(super) struct KidnapOutcome {
 pub(super) struct Kidnap {
     by_m: f64,
     first_fix_s: Option<f64>,
-    /// What odometry missed: where it says the robot is, from where it would say so.
+    /// Displacement that odometry missed: reported pose from the pose it would report.
     missed: Option<Pose2>,
     pub(super) outcome: Option<KidnapOutcome>,
 }
 
 impl Kidnap {
-    /// By `by_m` forwards; by 0 never.
+    /// Carried `by_m` forwards; 0: never.
     pub(super) fn new(by_m: f64) -> Self {
         Self { by_m, first_fix_s: None, missed: None, outcome: None }
     }
 
-    /// What odometry says at `time_s` where it would say `odom_from_robot`.
+    /// Reported odometry at `time_s` for true odometry `odom_from_robot`.
     pub(super) fn odometry(&mut self, time_s: f64, odom_from_robot: Pose2) -> Pose2 {
         let is_due = self.first_fix_s.is_some_and(|first| time_s >= first + AFTER_S);
         if self.by_m != 0.0 && self.missed.is_none() && is_due {
@@ -47,9 +47,9 @@ impl Kidnap {
         self.missed.map_or(odom_from_robot, |missed| missed.compose(&odom_from_robot))
     }
 
-    /// Counts a frame at `time_s`: whether it `shows` a landmark in use, the names by the pose that were wrong, the pose
-    /// after it.
-    pub(super) fn looked(
+    /// Counts a frame at `time_s`: whether it shows an active landmark, wrong names by the pose, and fused and true
+    /// pose after it.
+    pub(super) fn count_frame(
         &mut self,
         time_s: f64,
         (shows, misled): (bool, usize),
@@ -74,19 +74,19 @@ mod tests {
     }
 
     #[test]
-    fn odometry_misses_the_way_and_frames_count_until_the_pose_is_right() {
+    fn odometry_misses_the_displacement_and_frames_count_until_the_pose_is_right() {
         let mut kidnap = Kidnap::new(2.0);
         let heading = std::f64::consts::FRAC_PI_2;
         assert_eq!(kidnap.odometry(0.0, Pose2::new(1.0, 1.0, heading)), Pose2::new(1.0, 1.0, heading));
-        kidnap.looked(0.0, (true, 0), (Some(&at(0.0)), &Pose2::new(0.0, 0.0, 0.0)));
+        kidnap.count_frame(0.0, (true, 0), (Some(&at(0.0)), &Pose2::new(0.0, 0.0, 0.0)));
         assert!(kidnap.outcome.is_none());
         let moved = kidnap.odometry(9.0, Pose2::new(1.0, 5.0, heading));
         assert!((moved.x_m - 1.0).abs() < 1e-12 && (moved.y_m - 3.0).abs() < 1e-12, "{moved:?}");
         let truth = Pose2::new(2.0, 0.0, 0.0);
-        kidnap.looked(9.0, (false, 0), (Some(&at(0.0)), &truth));
-        kidnap.looked(9.5, (true, 1), (Some(&at(0.0)), &truth));
-        kidnap.looked(10.0, (true, 0), (Some(&at(1.9)), &truth));
-        kidnap.looked(10.5, (true, 1), (Some(&at(0.0)), &truth));
+        kidnap.count_frame(9.0, (false, 0), (Some(&at(0.0)), &truth));
+        kidnap.count_frame(9.5, (true, 1), (Some(&at(0.0)), &truth));
+        kidnap.count_frame(10.0, (true, 0), (Some(&at(1.9)), &truth));
+        kidnap.count_frame(10.5, (true, 1), (Some(&at(0.0)), &truth));
         let outcome = kidnap.outcome.as_ref().unwrap();
         assert_eq!((outcome.frames, outcome.misled, outcome.is_found_out), (2, 1, true));
         let later = kidnap.odometry(11.0, Pose2::new(1.0, 6.0, heading));
@@ -96,7 +96,7 @@ mod tests {
     #[test]
     fn a_robot_that_is_not_kidnapped_keeps_its_odometry() {
         let mut kidnap = Kidnap::new(0.0);
-        kidnap.looked(0.0, (true, 0), (Some(&at(0.0)), &Pose2::new(0.0, 0.0, 0.0)));
+        kidnap.count_frame(0.0, (true, 0), (Some(&at(0.0)), &Pose2::new(0.0, 0.0, 0.0)));
         assert_eq!(kidnap.odometry(99.0, Pose2::new(3.0, 0.0, 0.0)), Pose2::new(3.0, 0.0, 0.0));
         assert!(kidnap.outcome.is_none());
     }

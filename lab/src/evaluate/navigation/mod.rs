@@ -1,7 +1,7 @@
-//! `waymark-lab evaluate navigation` (method 18, E10 and E12): the paper's corridor, 25 m long with four posters. A first drive
-//! teaches, then robots drive through it, each from a start that nobody tells, and are localised by landmarks, odometry and
-//! a laser that the corridor tells nothing along it. It runs in this program, with the code that the server runs, without
-//! a server, from a seed.
+//! `waymark-lab evaluate navigation` (method 18, E10 and E12): the paper's corridor, 25 m long with four posters. A
+//! first drive teaches; then robots drive through it, each from an unknown start pose, localised by landmarks,
+//! odometry and a laser, which does not constrain the pose along the corridor. It runs in this program, with the
+//! code that the server runs, without a server, from a seed.
 
 mod journey;
 mod kidnap;
@@ -25,10 +25,10 @@ pub(crate) struct Args {
     /// Posters in the corridor: alternately left and right, the last two at its ends.
     #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=64))]
     posters: u32,
-    /// How many different pictures the posters show; the others look the same. 0: all differ.
+    /// Number of different pictures on the posters, repeated in turn. 0: all differ.
     #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=64))]
     pictures: u32,
-    /// The last so many posters show a picture of their own all the same.
+    /// With --pictures: number of last posters that show a picture of their own.
     #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=64))]
     unique: u32,
     /// Icons decide, not points (`algorithm.recognise.verdict.points = false`).
@@ -37,8 +37,8 @@ pub(crate) struct Args {
     /// Teach doors and windows, too.
     #[arg(long)]
     fittings: bool,
-    /// Teach by the truth: the corners of every photograph and the places of landmarks are exact. Only so can the corners of
-    /// what is named be judged.
+    /// Teach exact corners of photographs and exact places of landmarks. Needed to compare the errors of named
+    /// corners with their covariances.
     #[arg(long)]
     true_lessons: bool,
     /// Photographs that the first drive takes of each landmark.
@@ -50,25 +50,25 @@ pub(crate) struct Args {
     /// Frames a second.
     #[arg(long, default_value_t = 5.0, value_parser = rate)]
     rate_hz: f64,
-    /// Building, lesson, drives and all noise follow from it.
+    /// Seed of building, lesson, drives and all noise.
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Robots without a laser.
     #[arg(long)]
     no_laser: bool,
-    /// Robots whose cameras and their seats, and a survey whose poses, are wrong by the standard deviations that come with
-    /// them; else they are exactly what they are said to be. Only so can covariances be judged.
+    /// Draw errors of intrinsics, extrinsics and survey poses by their stated standard deviations; otherwise they
+    /// are exact. Needed to evaluate covariances.
     #[arg(long)]
     own_errors: bool,
-    /// Kidnap every robot: carry it so far forwards, while its odometry stands still, once it has had a pose for 8 s. The report
-    /// says how soon the wrong pose is found out.
+    /// Kidnap every robot: carry it so far forwards, while its odometry stands still, 8 s after its first pose. The
+    /// report says after how many frames the wrong pose is detected.
     #[arg(long, value_name = "M", default_value_t = 0.0, value_parser = kidnap, allow_negative_numbers = true)]
     kidnap_m: f64,
-    /// One JSON object instead of a table.
+    /// Print one JSON object instead of a table.
     #[arg(long)]
     json: bool,
-    /// Draw the first drive from above (true track, odometry, corrected), and its error over time with the band of three
-    /// standard deviations, as an SVG picture.
+    /// Write an SVG picture of the first drive: trajectories from above (true, odometry, corrected), and the error
+    /// over time with the band of three standard deviations.
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
 }

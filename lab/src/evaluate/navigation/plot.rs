@@ -1,5 +1,5 @@
-//! The paper's Fig. 15 and the error over time: the corridor from above with the true track, odometry and the corrected
-//! pose; below it the error along the corridor with the band of three standard deviations.
+//! The paper's Fig. 15 and the error over time: the corridor from above with the trajectories by truth, by odometry
+//! and corrected; below it the error along the corridor with the band of three standard deviations.
 
 use super::{
     journey::{Journey, Moment},
@@ -91,7 +91,7 @@ impl Plan {
                     r#"<path d="M{x1:.1} {y1:.1}L{x2:.1} {y2:.1}" stroke="{colour}" stroke-width="6"/>"#
                 ),
             );
-            // Its name stands behind the wall.
+            // Its name is written behind the wall.
             let behind =
                 Pose2::new(place.x_m, place.y_m, place.theta_rad).compose(&Pose2::new(-0.5, 0.0, 0.0));
             let (u, v) = self.at(behind.x_m, behind.y_m);
@@ -100,9 +100,9 @@ impl Plan {
         let truth = |m: &Moment| Some(m.truth);
         let odometry = |m: &Moment| Some(m.odometry);
         let fused = |m: &Moment| m.fused.map(|f| f.pose);
-        self.track(svg, journey, &odometry, ODOMETRY);
-        self.track(svg, journey, &truth, TRUE);
-        self.track(svg, journey, &fused, CORRECTED);
+        self.trajectory(svg, journey, &odometry, ODOMETRY);
+        self.trajectory(svg, journey, &truth, TRUE);
+        self.trajectory(svg, journey, &fused, CORRECTED);
         let corrections = journey.moments.iter().filter(|m| m.corrected).count();
         for moment in journey.moments.iter().filter(|m| m.corrected) {
             let Some(pose) = fused(moment) else { continue };
@@ -112,7 +112,9 @@ impl Plan {
         let title = format!("one drive, {corrections} corrections (dots); posters green");
         text(svg, (0.5 * WIDTH_PX, 20.0), "middle", &title);
         for (i, (colour, words)) in
-            [(TRUE, "true track"), (ODOMETRY, "odometry alone"), (CORRECTED, "corrected")].iter().enumerate()
+            [(TRUE, "true trajectory"), (ODOMETRY, "odometry alone"), (CORRECTED, "corrected")]
+                .iter()
+                .enumerate()
         {
             let x = LEFT_PX + 150.0 * i as f64;
             put(svg, &format!(r#"<rect x="{x:.0}" y="32" width="24" height="4" fill="{colour}"/>"#));
@@ -120,7 +122,7 @@ impl Plan {
         }
     }
 
-    fn track(
+    fn trajectory(
         &self,
         svg: &mut String,
         journey: &Journey,
@@ -155,7 +157,7 @@ fn errors(svg: &mut String, journey: &Journey, top_px: f64) {
         })
         .collect();
     let end_s = journey.moments.last().map_or(1.0, |m| m.time_s.max(1.0));
-    // The band before the second landmark may be wide: what is asked is to be seen.
+    // The band before the second fix may be wide; it must not set the scale.
     let limit_m = 0.15;
     let at = |t: f64, e: f64| {
         let u = LEFT_PX + t / end_s * (WIDTH_PX - 2.0 * LEFT_PX);

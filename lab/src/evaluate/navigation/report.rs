@@ -1,4 +1,4 @@
-//! All drives as figures: errors along and across the corridor, how honest the covariance is, what was seen.
+//! Figures of all drives: errors along and across the corridor, consistency of the covariance, names.
 
 use super::{
     journey::{Journey, Moment, Named, of},
@@ -35,7 +35,7 @@ impl Errors {
     }
 }
 
-/// Sightings of one kind of landmark in one state.
+/// Names of one kind of landmark in one state.
 #[derive(Debug, Serialize)]
 struct Row {
     kind: &'static str,
@@ -73,7 +73,8 @@ struct CornerErrors {
     corners: usize,
     median_px: f64,
     p90_px: f64,
-    /// Squared Mahalanobis distance of a corner: mean (2 expected), median (1.39 expected); share of corners within 95 %.
+    /// Squared Mahalanobis distance of a corner: mean (2 expected), median (1.39 expected); share of corners within
+    /// 95 %.
     nees: f64,
     median_square: f64,
     within_95: f64,
@@ -115,14 +116,14 @@ fn corner_errors(journeys: &[Journey]) -> Vec<CornerErrors> {
     all.into_iter().filter_map(|(named, corners)| CornerErrors::of(named, &corners)).collect()
 }
 
-/// What is said of all drives. Along is the map's x axis.
+/// Figures of all drives. Along is the map's x axis.
 #[derive(Debug, Serialize)]
 pub(super) struct Report {
     experiment: &'static str,
     seed: u64,
     length_m: f64,
     posters: usize,
-    /// Landmarks that were learnt and placed, and those of them in use.
+    /// Landmarks that were learnt and placed, and how many of them are active.
     taught: usize,
     landmarks: usize,
     /// Of the landmarks' places against the truth.
@@ -132,25 +133,25 @@ pub(super) struct Report {
     shown: usize,
     recognised: usize,
     false_matches: usize,
-    /// Names given to something else by the pose.
+    /// Wrong names by guided recognition.
     guided_false: usize,
-    /// Of taught landmarks with sides of 38 px and more of which a quarter is seen, in use or not.
+    /// Of taught landmarks with sides of 38 px and more of which a quarter is visible, active or not.
     named: Vec<Row>,
     corners: Vec<CornerErrors>,
     /// The robots had one.
     laser: bool,
-    /// By landmarks, and those that the filter did not believe.
+    /// Fixes by landmarks: applied, and gated out by the filter.
     corrections: u64,
     gated: u64,
-    /// By landmarks that were named by the pose.
+    /// By landmarks that guided recognition named.
     guided_corrections: u64,
-    /// By scans, and what became of the others.
+    /// Applied fixes by scans, and the outcomes of the others.
     laser_corrections: u64,
     laser_others: BTreeMap<&'static str, u64>,
     /// Landmarks wrongly said to have moved or to be missing.
     flagged: usize,
     quarantined: usize,
-    /// Drives that never were fixed.
+    /// Drives without any fix.
     never_fixed: usize,
     /// Frames that showed a landmark up to the first fix, in the worst drive.
     frames_to_fix_worst: Option<usize>,
@@ -158,17 +159,17 @@ pub(super) struct Report {
     along_m: Option<Errors>,
     across_m: Option<Errors>,
     heading_rad: Option<Errors>,
-    /// Odometry alone, which was told the true start; all frames.
+    /// Odometry alone from the true start; all frames.
     odometry_along_m: Option<Errors>,
     odometry_across_m: Option<Errors>,
     /// Mean normalised squared error of the fused pose, 3 expected, and the share of frames within its 95 %.
     nees: f64,
     nees_within_95: f64,
-    /// Mean squared error over the claimed variance along, across and of the heading: 1 expected of each.
+    /// Mean squared error over the stated variance: along, across, heading; 1 expected of each.
     nees_each: [f64; 3],
-    /// Poses and the survey are what they are said to be.
+    /// Intrinsics, extrinsics and survey poses are exact.
     exact: bool,
-    /// What became of each robot that was kidnapped.
+    /// Outcomes of the kidnapped robots.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     kidnapped: Vec<KidnapOutcome>,
 }
@@ -235,14 +236,17 @@ impl Report {
         let words = |e: &Option<Errors>| Errors::in_words(e.as_ref());
         let mut lines = vec![
             format!(
-                "navigation: corridor of {} m, {} posters; {} landmarks taught, {} in use; {} drives, seed {}",
+                "navigation: corridor of {} m, {} posters; {} landmarks taught, {} active; {} drives, seed {}",
                 self.length_m, self.posters, self.taught, self.landmarks, self.drives, self.seed
             ),
             format!("  frames          {}", self.frames),
-            format!("  recognitions    {} of {} full views of landmarks in use", self.recognised, self.shown),
-            format!("  false matches   {}, {} more by the pose", self.false_matches, self.guided_false),
+            format!("  recognitions    {} of {} full views of active landmarks", self.recognised, self.shown),
             format!(
-                "  by landmarks    {} corrections, {} more not believed by the filter; {} by guided ones",
+                "  false matches   {}, {} more by guided recognition",
+                self.false_matches, self.guided_false
+            ),
+            format!(
+                "  by landmarks    {} corrections, {} more gated out; {} by guided names",
                 self.corrections, self.gated, self.guided_corrections
             ),
             if self.laser {
@@ -252,7 +256,7 @@ impl Report {
                 "  by the laser    the robots have none".to_owned()
             },
             format!(
-                "  wrongly judged  {} times flagged, {} quarantined; nothing was moved",
+                "  wrong health    {} times flagged, {} quarantined; nothing was moved",
                 self.flagged, self.quarantined
             ),
             format!(
@@ -277,13 +281,13 @@ impl Report {
                 self.nees_each[0], self.nees_each[1], self.nees_each[2]
             ),
             if self.exact {
-                "  Cameras, their seats and the survey's poses are exact, and claimed with the usual doubt."
+                "  Intrinsics, extrinsics and survey poses are exact, and stated with the usual covariances."
                     .to_owned()
             } else {
-                "  Cameras, their seats and the survey's poses are wrong by what they are claimed to."
+                "  Intrinsics, extrinsics and survey poses have errors by their stated covariances."
                     .to_owned()
             },
-            "  Errors from the first fix on; odometry alone was told the true start.".to_owned(),
+            "  Errors from the first fix on; odometry alone starts at the true pose.".to_owned(),
             "  named rightly                      by the picture    with a known pose".to_owned(),
         ];
         lines.extend(self.named.iter().map(Row::in_words));
@@ -307,14 +311,14 @@ impl Report {
         let frames: Vec<String> = found.iter().map(|c| c.frames.to_string()).collect();
         let misled: usize = self.kidnapped.iter().map(|c| c.misled).sum();
         Some(format!(
-            "  kidnapped       found out after {} frames that show a landmark in use, {} never; {misled} wrong names by the pose until then",
+            "  kidnapped       detected after {} frames that show an active landmark, {} never; {misled} wrong names by the pose until then",
             frames.join(", "),
             left.len()
         ))
     }
 }
 
-/// Squared error by the covariance that was claimed.
+/// Squared error normalised by the stated covariance.
 fn nees(moment: &Moment, fused: &Pose2Covariance) -> Option<f64> {
     let error = fused.pose.minus(&moment.truth);
     Some(error.dot(&(fused.covariance.try_inverse()? * error)))

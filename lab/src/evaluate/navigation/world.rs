@@ -1,5 +1,4 @@
-//! The corridor and what a first drive taught of it: walls, places and models, as a server would hold them, here in
-//! memory.
+//! The corridor and its map from a first drive: walls, places and models, as in a server, in memory.
 
 use crate::evaluate::experiment::{lesson::points_of, mixed, of_each};
 use anyhow::Context as _;
@@ -13,7 +12,7 @@ use map::{
 use server::cli::{
     screen,
     simulated_errors::SimulatedRobotErrors,
-    survey::{SurveyView as Look, place_on_walls, survey},
+    survey::{SurveyView, place_on_walls, survey},
 };
 use sim::{
     building::Building,
@@ -31,9 +30,9 @@ use vision::{
     recognise::{DistanceKind, IconFeatures, features},
 };
 
-/// Views each landmark is learnt from: what the first drive did not photograph is generated.
+/// Views of each landmark; those that the first drive did not photograph are generated.
 const VIEWS: usize = 30;
-/// Icons of each landmark that the others must be told from.
+/// Icons of each landmark that are negatives of the others.
 const NEGATIVES: usize = 10;
 
 /// Name of its map.
@@ -46,9 +45,9 @@ pub(super) struct Course {
     pub(super) length_m: f64,
     /// Posters that hang there.
     pub(super) posters: usize,
-    /// How many different pictures they show; 0: all differ.
+    /// Number of different pictures; 0: all differ.
     pub(super) pictures: usize,
-    /// The last so many have a picture of their own all the same.
+    /// Number of last posters with a picture of their own.
     pub(super) unique: usize,
     /// Points decide.
     pub(super) points: bool,
@@ -58,7 +57,7 @@ pub(super) struct Course {
     pub(super) true_lessons: bool,
     /// Photographs of each landmark.
     pub(super) views: usize,
-    /// The surveying robot's pose, camera and its seat are exactly what they are said to be.
+    /// Pose, intrinsics and extrinsics of the surveying robot are exact.
     pub(super) exact: bool,
     pub(super) seed: u64,
 }
@@ -104,20 +103,20 @@ impl World {
         let stops = stops(&building, &lesson);
         let mut survey = survey(robot, &stops, wrong)?;
         if true_lessons {
-            survey.views.iter_mut().for_each(|(name, looks)| take_true_corners(name, looks));
+            survey.views.iter_mut().for_each(|(name, views_of_one)| take_true_corners(name, views_of_one));
         }
-        let found: Vec<(&String, &Vec<Look>)> = survey.views.iter().collect();
-        let lessons: Vec<Lesson> = of_each(&found, "views", |i, (name, looks)| {
-            let (mut place, agreed) = place_on_walls(looks, &survey.walls, &camera)?;
+        let found: Vec<(&String, &Vec<SurveyView>)> = survey.views.iter().collect();
+        let lessons: Vec<Lesson> = of_each(&found, "views", |i, (name, views_of_one)| {
+            let (mut place, agreed) = place_on_walls(views_of_one, &survey.walls, &camera)?;
             if true_lessons {
                 place = true_place(&building, name)?;
             }
-            let looks: Vec<&Look> = agreed.iter().map(|&i| &looks[i]).collect();
-            let views = views(&looks, mixed(&[seed, 12, i as u64]), &p);
+            let views_of_one: Vec<&SurveyView> = agreed.iter().map(|&i| &views_of_one[i]).collect();
+            let views = views(&views_of_one, mixed(&[seed, 12, i as u64]), &p);
             let each = views.iter().step_by(views.len().div_ceil(NEGATIVES).max(1));
             let icons = each.map(|v| features(v.icon.clone(), &p.recognise)).collect();
             let photographs: Vec<_> =
-                looks.iter().map(|l| (&l.readings.frame.image, &l.quad.corners_px)).collect();
+                views_of_one.iter().map(|l| (&l.readings.frame.image, &l.quad.corners_px)).collect();
             let points = points_of(&photographs);
             Some(Lesson { name: (*name).clone(), place, views, icons, points })
         })
@@ -132,7 +131,7 @@ impl World {
             Some(add_negatives(&alone, &others, &p))
         });
         let map = snapshot(&lessons, &survey.walls, models, p)?;
-        anyhow::ensure!(!map.models.is_empty(), "nothing passed the gates of learning; try another --seed");
+        anyhow::ensure!(!map.models.is_empty(), "no landmark passed the quality gates; try another --seed");
         let place_errors_m = lessons.iter().map(|l| place_error_m(&building, l)).collect::<Result<_, _>>()?;
         Ok(Self { building, map, course, place_errors_m })
     }
@@ -143,28 +142,28 @@ impl World {
     }
 }
 
-fn views(looks: &[&Look], seed: u64, p: &Params) -> Vec<TrainingView> {
-    let image = |look: &Look| look.readings.frame.image.clone();
+fn views(views_of_one: &[&SurveyView], seed: u64, p: &Params) -> Vec<TrainingView> {
+    let image = |view: &SurveyView| view.readings.frame.image.clone();
     let photographed =
-        looks.iter().filter_map(|l| TrainingView::photographed(&image(l), &l.quad.corners_px, p).ok());
+        views_of_one.iter().filter_map(|l| TrainingView::photographed(&image(l), &l.quad.corners_px, p).ok());
     let mut views: Vec<TrainingView> = photographed.collect();
     let wanted = VIEWS.saturating_sub(views.len());
-    for (i, look) in looks.iter().enumerate() {
-        let count = (wanted + looks.len() - 1 - i) / looks.len();
+    for (i, view) in views_of_one.iter().enumerate() {
+        let count = (wanted + views_of_one.len() - 1 - i) / views_of_one.len();
         let seed = mixed(&[seed, i as u64]);
-        views.extend(synthesis::views(&image(look), &look.quad.corners_px, count, p, seed));
+        views.extend(synthesis::views(&image(view), &view.quad.corners_px, count, p, seed));
     }
     views
 }
 
-/// Says of those that did not pass the gates why not.
+/// Prints why landmarks are inactive or could not be learnt.
 fn complain(lessons: &[Lesson], models: &[Option<LandmarkModel>]) {
     for (lesson, model) in lessons.iter().zip(models) {
         match model.as_ref().map(|m| &m.status) {
             Some(ModelStatus::Active) => {}
             Some(ModelStatus::Candidate(failures)) => {
                 let reasons: Vec<String> = failures.iter().map(ToString::to_string).collect();
-                screen::complain(&format!("{} is not in use: {}", lesson.name, reasons.join("; ")));
+                screen::complain(&format!("{} is inactive: {}", lesson.name, reasons.join("; ")));
             }
             None => screen::complain(&format!("{} could not be learnt", lesson.name)),
         }
@@ -184,7 +183,7 @@ fn snapshot(
         .map(|model| (model.id, StoredModel { digest: [0; 32], model: Arc::new(model) }))
         .collect();
     let models = ModelSet::in_use(learnt.values().map(|l| l.model.clone()), &params)?;
-    let doubles = Arc::new(look_alike_classes(&learnt, DistanceKind::Both, &params));
+    let look_alikes = Arc::new(look_alike_classes(&learnt, DistanceKind::Both, &params));
     let numbered = || lessons.iter().enumerate().map(|(i, l)| (LandmarkId(i as u64), l));
     let sizes: BTreeMap<LandmarkId, LandmarkSize> = numbered().map(|(id, l)| (id, l.place.size)).collect();
     let landmarks: BTreeMap<LandmarkId, LandmarkInfo> = numbered()
@@ -193,7 +192,7 @@ fn snapshot(
             (id, LandmarkInfo { name: l.name.clone(), size, place, ..LandmarkInfo::default() })
         })
         .collect();
-    // Where each should be seen from, so that it can be missed: as the store makes it.
+    // Visibility areas, as in the publication, so that a landmark can be missed.
     let obstacles: Vec<Obstacle> = walls.iter().map(Obstacle::from).collect();
     let area = |l: &Lesson| {
         visibility(&l.place, &obstacles, &PanTiltCamera::default(), &VisibilityParams::default())
@@ -203,15 +202,15 @@ fn snapshot(
     let walls = walls.to_vec();
     let mut map = MapSnapshot::empty(MAP, 1);
     (map.landmarks, map.sizes, map.models, map.learnt) = (landmarks, sizes, models, learnt);
-    (map.look_alikes, map.visibility, map.params) = (doubles, visibility, params);
+    (map.look_alikes, map.visibility, map.params) = (look_alikes, visibility, params);
     (map.walls, map.wall_index) = (Arc::new(walls), wall_index);
     Ok(map)
 }
 
-fn take_true_corners(name: &str, looks: &mut [Look]) {
-    for look in looks {
-        if let Some(truth) = look.readings.frame.truth.landmark(name) {
-            look.quad.corners_px = truth.corners_px;
+fn take_true_corners(name: &str, views_of_one: &mut [SurveyView]) {
+    for view in views_of_one {
+        if let Some(truth) = view.readings.frame.truth.landmark(name) {
+            view.quad.corners_px = truth.corners_px;
         }
     }
 }

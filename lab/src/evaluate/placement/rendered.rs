@@ -1,5 +1,5 @@
-//! The simulator's corridor, rendered: posters on walls and lamps under the ceiling, with the corners and covariances
-//! that the detector gives, from robot poses of known uncertainty.
+//! The simulator's corridor, rendered: posters on walls and lamps under the ceiling, with corners and covariances
+//! by the detector, from robot poses of known covariance.
 
 use super::{Outcome, Summary};
 use crate::evaluate::experiment::{mixed, of_each};
@@ -28,32 +28,32 @@ use vision::{
     trace::NoTrace,
 };
 
-/// Height of the corridor's ceiling, as somebody measured it.
+/// Measured height of the corridor's ceiling.
 const CEILING: Ceiling = Ceiling { height_m: 2.7, sigma_m: 0.01 };
 /// Standard deviation of the robot's pose: metres and radians.
 const ROBOT_SIGMA: [f64; 3] = [0.02, 0.02, 0.005];
-/// A found quad is the landmark when it overlaps it by this.
+/// A detected quad is the landmark if it overlaps it by this much.
 const SAME_IOU: f64 = 0.8;
-/// Looks that are tried for each view wanted.
+/// Frames rendered for each view wanted.
 const TRIES: usize = 4;
-/// Smallest side of a landmark that counts as seen.
+/// Shortest side of a landmark that counts as visible.
 const MIN_SIDE_PX: f64 = 30.0;
 
-enum Seen {
+enum PlacedView {
     Wall(WallRectangle),
     Ceiling(CeilingRectangle),
 }
 
-pub(super) fn judged(corridors: usize, views: usize, seed: u64) -> Vec<Summary> {
+pub(super) fn evaluated(corridors: usize, views: usize, seed: u64) -> Vec<Summary> {
     let mut tasks: Vec<(u64, LandmarkTruth)> = vec![];
     for corridor in 0..corridors as u64 {
         let building = Building::corridor(mixed(&[seed, corridor]));
         let wanted = |l: &&LandmarkTruth| matches!(l.kind, LandmarkKind::Poster | LandmarkKind::Lamp);
         tasks.extend(building.landmarks().iter().filter(wanted).map(|l| (corridor, l.clone())));
     }
-    let placed = of_each(&tasks, "placements", |i, (corridor, thing)| {
+    let placed = of_each(&tasks, "placements", |i, (corridor, object)| {
         let building = Building::corridor(mixed(&[seed, *corridor]));
-        place(&building, thing, views, mixed(&[seed, *corridor, i as u64]))
+        place(&building, object, views, mixed(&[seed, *corridor, i as u64]))
     });
     [
         ("rendered corridor, posters, detector", LandmarkKind::Poster),
@@ -69,7 +69,7 @@ pub(super) fn judged(corridors: usize, views: usize, seed: u64) -> Vec<Summary> 
     .collect()
 }
 
-fn place(building: &Building, thing: &LandmarkTruth, views: usize, seed: u64) -> Option<Outcome> {
+fn place(building: &Building, object: &LandmarkTruth, views: usize, seed: u64) -> Option<Outcome> {
     let p = PlacementParams::default();
     let walls: Vec<LaserSegment> = building
         .walls()
@@ -80,34 +80,34 @@ fn place(building: &Building, thing: &LandmarkTruth, views: usize, seed: u64) ->
     let mut random = Random::new(seed);
     let (mut on_walls, mut on_ceiling) = (vec![], vec![]);
     for _ in 0..views * TRIES {
-        match look(building, &mut renderer, thing, &walls, &mut random) {
-            Some(Seen::Wall(view)) => on_walls.push(view),
-            Some(Seen::Ceiling(view)) => on_ceiling.push(view),
+        match view(building, &mut renderer, object, &walls, &mut random) {
+            Some(PlacedView::Wall(view)) => on_walls.push(view),
+            Some(PlacedView::Ceiling(view)) => on_ceiling.push(view),
             None => {}
         }
         if on_walls.len().max(on_ceiling.len()) == views {
             break;
         }
     }
-    let made = if thing.kind == LandmarkKind::Lamp {
+    let made = if object.kind == LandmarkKind::Lamp {
         ceiling_placement(&on_ceiling, &CEILING, &p)
     } else {
         placement(&on_walls, &walls, &p)
     };
-    made.ok().map(|made| Outcome::of(&made.place, &truth(thing)))
+    made.ok().map(|made| Outcome::of(&made.place, &truth(object)))
 }
 
-/// One rendered frame with the detector's quad of the thing.
-fn look(
+/// One rendered frame with the detector's quad of the object.
+fn view(
     building: &Building,
     renderer: &mut Renderer,
-    thing: &LandmarkTruth,
+    object: &LandmarkTruth,
     walls: &[LaserSegment],
     random: &mut Random,
-) -> Option<Seen> {
-    let at = thing.map_from_landmark.translation.vector;
-    let normal = thing.map_from_landmark.rotation * Vector3::x();
-    let is_up = thing.kind == LandmarkKind::Lamp;
+) -> Option<PlacedView> {
+    let at = object.map_from_landmark.translation.vector;
+    let normal = object.map_from_landmark.rotation * Vector3::x();
+    let is_up = object.kind == LandmarkKind::Lamp;
     let (d, psi) = (random.range(1.2, 3.0), random.range(-0.9, 0.9));
     let a = if is_up { random.range(-PI, PI) } else { normal.y.atan2(normal.x) + psi };
     let (x, y) = (at.x + d * a.cos(), at.y + d * a.sin());
@@ -126,15 +126,15 @@ fn look(
         &SensorParams::default(),
         random.next_u64(),
     );
-    let seen = rendered.truth.landmark(&thing.name).filter(|l| l.min_side_px() > MIN_SIDE_PX)?;
+    let truth = rendered.truth.landmark(&object.name).filter(|l| l.min_side_px() > MIN_SIDE_PX)?;
     let quads = detect(&rendered.image, &DetectParams::default(), &mut NoTrace);
     let quad: &Quad =
-        quads.iter().find(|q| iou(q.corners_px.points(), seen.corners_px.points()) > SAME_IOU)?;
-    // As recognition would: the landmark's own top-left first.
+        quads.iter().find(|q| iou(q.corners_px.points(), truth.corners_px.points()) > SAME_IOU)?;
+    // As in recognition: the landmark's own top-left corner first.
     let turn = (0..4).min_by(|&a, &b| {
         let off = |k: usize| {
             let p = quad.corners_px.rotated(k);
-            p.points().iter().zip(seen.corners_px.points()).map(|(p, q)| (p - q).norm()).sum::<f64>()
+            p.points().iter().zip(truth.corners_px.points()).map(|(p, q)| (p - q).norm()).sum::<f64>()
         };
         off(a).total_cmp(&off(b))
     })?;
@@ -153,17 +153,17 @@ fn look(
     };
     let p = PlacementParams::default();
     if is_up {
-        map::placement::view_on_ceiling(&view, &CEILING, &p).ok().map(Seen::Ceiling)
+        map::placement::view_on_ceiling(&view, &CEILING, &p).ok().map(PlacedView::Ceiling)
     } else {
-        map::placement::view_on_wall(&view, walls, &p).ok().map(Seen::Wall)
+        map::placement::view_on_wall(&view, walls, &p).ok().map(PlacedView::Wall)
     }
 }
 
-fn truth(thing: &LandmarkTruth) -> LandmarkPlace {
-    let (at, turn) = (thing.map_from_landmark.translation.vector, thing.map_from_landmark.rotation);
+fn truth(object: &LandmarkTruth) -> LandmarkPlace {
+    let (at, turn) = (object.map_from_landmark.translation.vector, object.map_from_landmark.rotation);
     let normal = turn * Vector3::x();
     let up = turn * Vector3::z();
-    let is_up = thing.kind == LandmarkKind::Lamp;
+    let is_up = object.kind == LandmarkKind::Lamp;
     LandmarkPlace {
         x_m: at.x,
         y_m: at.y,
@@ -171,7 +171,7 @@ fn truth(thing: &LandmarkTruth) -> LandmarkPlace {
         theta_rad: if is_up { up.y.atan2(up.x) } else { normal.y.atan2(normal.x) },
         roll_rad: 0.0,
         tilt_rad: if is_up { FRAC_PI_2 } else { 0.0 },
-        size: LandmarkSize { width_m: thing.width_m, height_m: thing.height_m },
+        size: LandmarkSize { width_m: object.width_m, height_m: object.height_m },
         covariance: Matrix6::zeros(),
     }
 }

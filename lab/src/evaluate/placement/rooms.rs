@@ -1,5 +1,5 @@
-//! Rectangular rooms with a poster on a wall and a lamp under the ceiling: everything that is uncertain (corners, robot
-//! pose, mounting, wall, ceiling) is drawn from what is claimed of it.
+//! Rectangular rooms with a poster on a wall and a lamp under the ceiling: all that is uncertain (corners, robot
+//! pose, extrinsics, wall, ceiling) is drawn from its stated covariance.
 
 use super::{Outcome, Strays, Summary};
 use crate::evaluate::statistics::median;
@@ -41,10 +41,10 @@ const ROBOT_SIGMA: [f64; 3] = [0.02, 0.02, 0.005];
 const WALL_SIGMA: [f64; 2] = [0.002, 0.01];
 /// Of the ceiling's height.
 const CEILING_SIGMA_M: f64 = 0.01;
-/// Tries to see the thing wholly.
+/// Most draws of a robot pose from which the object is wholly visible.
 const MAX_TRIES: usize = 200;
 
-/// A room as it is believed and as it is, with the errors of what stays the same in all views.
+/// A room, measured and true, with the errors that all views share.
 struct Room {
     size: [f64; 2],
     walls: Vec<LaserSegment>,
@@ -64,7 +64,7 @@ fn room(random: &mut Random) -> Option<Room> {
         let (turn, shift) = (WALL_SIGMA[0] * random.normal(), WALL_SIGMA[1] * random.normal());
         let d = (b - a) / length;
         let n = Vector2::new(-d.y, d.x);
-        // The wall as it is: turned about its middle and shifted.
+        // The true wall: turned about its middle and shifted.
         let middle = nalgebra::center(&a, &b);
         let turned = |p: &Point2<f64>| p + n * (shift + turn * d.dot(&(p - middle)));
         let normal = if n.dot(&middle.coords) < 0.0 { -n } else { n };
@@ -86,7 +86,7 @@ fn mounting(pan: f64, tilt: f64) -> Option<CameraExtrinsics> {
     CameraExtrinsics::new(pan_tilt(pan, tilt, Vector3::new(0.1, 0.02, 1.2))).ok()
 }
 
-/// A poster on a random wall, by the walls as they are.
+/// A poster on a random wall, by the true walls.
 fn poster(room: &Room, random: &mut Random) -> LandmarkPlace {
     let wall = &room.true_walls[(random.unit() * 4.0) as usize % 4];
     let size = LandmarkSize { width_m: random.range(0.3, 1.0), height_m: random.range(0.3, 1.2) };
@@ -118,15 +118,15 @@ fn lamp(room: &Room, random: &mut Random) -> LandmarkPlace {
     }
 }
 
-/// What one look gives: corners, the believed robot, the believed mounting.
-struct Look {
+/// One view: corners, measured robot pose, stated extrinsics.
+struct SimulatedView {
     corners: Corners,
     robot: Pose2Covariance,
     mounting: CameraExtrinsics,
 }
 
-impl Look {
-    fn view<'a>(&'a self, covariance: &'a [Matrix2<f64>; 4]) -> PosedView<'a> {
+impl SimulatedView {
+    fn posed<'a>(&'a self, covariance: &'a [Matrix2<f64>; 4]) -> PosedView<'a> {
         PosedView {
             corners: &self.corners,
             covariance_px2: covariance,
@@ -137,17 +137,17 @@ impl Look {
     }
 }
 
-/// Somebody looks at a thing from 1 to 3.5 m, the camera aimed at it, until it is wholly in the image.
-fn look(room: &Room, thing: &LandmarkPlace, random: &mut Random) -> Option<Look> {
+/// A view of the object from 1 to 3.5 m, the camera aimed at it; drawn again until it is wholly in the image.
+fn simulated_view(room: &Room, object: &LandmarkPlace, random: &mut Random) -> Option<SimulatedView> {
     let covariance = Matrix3::from_diagonal(&Vector3::from(ROBOT_SIGMA.map(|s| s * s)));
     for _ in 0..MAX_TRIES {
         let (d, psi) = (random.range(1.0, 3.5), random.range(-60.0, 60.0).to_radians());
-        let a = if thing.tilt_rad > 0.0 { random.range(-PI, PI) } else { thing.theta_rad + psi };
-        let (x, y) = (thing.x_m + d * a.cos(), thing.y_m + d * a.sin());
+        let a = if object.tilt_rad > 0.0 { random.range(-PI, PI) } else { object.theta_rad + psi };
+        let (x, y) = (object.x_m + d * a.cos(), object.y_m + d * a.sin());
         if !(0.3..room.size[0] - 0.3).contains(&x) || !(0.3..room.size[1] - 0.3).contains(&y) {
             continue;
         }
-        let tilt = (thing.z_m - 1.2).atan2(d) + random.range(-0.1, 0.1);
+        let tilt = (object.z_m - 1.2).atan2(d) + random.range(-0.1, 0.1);
         let pan = random.range(-0.5, 0.5);
         let believed = Pose2::new(x, y, a + PI - pan + random.range(-0.2, 0.2));
         let mounting = mounting(pan, tilt)?;
@@ -160,13 +160,13 @@ fn look(room: &Room, thing: &LandmarkPlace, random: &mut Random) -> Option<Look>
             &m.fixed_rows::<3>(3).into(),
         );
         let camera_from_landmark =
-            real.inverse() * truth.to_isometry3().inverse() * thing.map_from_landmark();
+            real.inverse() * truth.to_isometry3().inverse() * object.map_from_landmark();
         // From its front side only.
         let normal = camera_from_landmark.rotation * Vector3::x();
         if normal.dot(&camera_from_landmark.translation.vector) >= 0.0 {
             continue;
         }
-        let points = corner_points(&thing.size).map(|p| {
+        let points = corner_points(&object.size).map(|p| {
             let noise = Vector2::new(random.normal(), random.normal()) * SIGMA_PX;
             pixel(&camera_from_landmark, &p, &CAMERA).map(|px| px + noise)
         });
@@ -174,7 +174,7 @@ fn look(room: &Room, thing: &LandmarkPlace, random: &mut Random) -> Option<Look>
         let inside = |p: &Point2<f64>| (0.0..639.0).contains(&p.x) && (0.0..479.0).contains(&p.y);
         if let (true, Ok(corners)) = ([p, q, r, s].iter().all(inside), Corners::new([p, q, r, s])) {
             let robot = Pose2Covariance { pose: believed, covariance };
-            return Some(Look { corners, robot, mounting });
+            return Some(SimulatedView { corners, robot, mounting });
         }
     }
     None
@@ -182,42 +182,44 @@ fn look(room: &Room, thing: &LandmarkPlace, random: &mut Random) -> Option<Look>
 
 fn on_walls(
     room: &Room,
-    thing: &LandmarkPlace,
+    object: &LandmarkPlace,
     views: usize,
     random: &mut Random,
 ) -> Option<Result<LandmarkPlace, PlacementError>> {
     let covariance = [Matrix2::identity() * SIGMA_PX * SIGMA_PX; 4];
     let p = PlacementParams::default();
-    let looks: Option<Vec<Look>> = (0..views).map(|_| look(room, thing, random)).collect();
-    let (mut seen, mut why) = (vec![], None);
-    for look in looks? {
-        match view_on_wall(&look.view(&covariance), &room.walls, &p) {
-            Ok(view) => seen.push(view),
+    let views: Option<Vec<SimulatedView>> =
+        (0..views).map(|_| simulated_view(room, object, random)).collect();
+    let (mut on_plane, mut why) = (vec![], None);
+    for view in views? {
+        match view_on_wall(&view.posed(&covariance), &room.walls, &p) {
+            Ok(view) => on_plane.push(view),
             Err(error) => why = Some(error),
         }
     }
     Some(match why {
-        Some(why) if seen.is_empty() => Err(why),
-        _ => placement(&seen, &room.walls, &p).map(|made| made.place),
+        Some(why) if on_plane.is_empty() => Err(why),
+        _ => placement(&on_plane, &room.walls, &p).map(|made| made.place),
     })
 }
 
 fn on_ceiling(
     room: &Room,
-    thing: &LandmarkPlace,
+    object: &LandmarkPlace,
     views: usize,
     random: &mut Random,
 ) -> Option<Result<LandmarkPlace, PlacementError>> {
     let covariance = [Matrix2::identity() * SIGMA_PX * SIGMA_PX; 4];
     let p = PlacementParams::default();
-    let looks: Option<Vec<Look>> = (0..views).map(|_| look(room, thing, random)).collect();
-    let seen: Result<Vec<_>, _> =
-        looks?.iter().map(|look| view_on_ceiling(&look.view(&covariance), &room.ceiling, &p)).collect();
-    Some(seen.and_then(|seen| ceiling_placement(&seen, &room.ceiling, &p)).map(|made| made.place))
+    let views: Option<Vec<SimulatedView>> =
+        (0..views).map(|_| simulated_view(room, object, random)).collect();
+    let on_plane: Result<Vec<_>, _> =
+        views?.iter().map(|view| view_on_ceiling(&view.posed(&covariance), &room.ceiling, &p)).collect();
+    Some(on_plane.and_then(|on_plane| ceiling_placement(&on_plane, &room.ceiling, &p)).map(|made| made.place))
 }
 
-/// Places by one and by several views, on walls and ceilings; and strays.
-pub(super) fn judged(rooms: usize, views: usize, seed: u64) -> (Vec<Summary>, Vec<Strays>) {
+/// Summaries of places by one and by several views, on walls and ceilings; and objects on no wall.
+pub(super) fn evaluated(rooms: usize, views: usize, seed: u64) -> (Vec<Summary>, Vec<Strays>) {
     let mut random = Random::new(seed);
     let mut summaries = vec![];
     for (what, ceiling, n) in [
@@ -229,12 +231,12 @@ pub(super) fn judged(rooms: usize, views: usize, seed: u64) -> (Vec<Summary>, Ve
         let (mut outcomes, mut refused) = (vec![], 0);
         for _ in 0..4 * rooms {
             let Some(room) = room(&mut random) else { continue };
-            let thing = if ceiling { lamp(&room, &mut random) } else { poster(&room, &mut random) };
+            let object = if ceiling { lamp(&room, &mut random) } else { poster(&room, &mut random) };
             let place = if ceiling { on_ceiling } else { on_walls };
-            match place(&room, &thing, n, &mut random) {
-                Some(Ok(made)) => outcomes.push(Outcome::of(&made, &thing)),
+            match place(&room, &object, n, &mut random) {
+                Some(Ok(made)) => outcomes.push(Outcome::of(&made, &object)),
                 Some(Err(_)) => refused += 1,
-                // Nowhere to see it wholly from.
+                // No pose from which it is wholly visible.
                 None => {}
             }
         }
@@ -243,19 +245,19 @@ pub(super) fn judged(rooms: usize, views: usize, seed: u64) -> (Vec<Summary>, Ve
     (summaries, strays(rooms, &mut random))
 }
 
-/// Doors ajar and boards that lean or hang askew, seen once.
+/// Doors ajar and boards that lean or hang askew, on_plane once.
 fn strays(rooms: usize, random: &mut Random) -> Vec<Strays> {
     type Change = fn(&mut LandmarkPlace, f64);
-    let open: Change = |thing, angle| {
+    let open: Change = |object, angle| {
         // Hinged at its left side.
-        let half = 0.5 * thing.size.width_m;
+        let half = 0.5 * object.size.width_m;
         let side = |t: f64| Vector2::new(-t.sin(), t.cos());
-        let hinge = Vector2::new(thing.x_m, thing.y_m) - side(thing.theta_rad) * half;
-        thing.theta_rad += angle;
-        let centre = hinge + side(thing.theta_rad) * half;
-        (thing.x_m, thing.y_m) = (centre.x, centre.y);
+        let hinge = Vector2::new(object.x_m, object.y_m) - side(object.theta_rad) * half;
+        object.theta_rad += angle;
+        let centre = hinge + side(object.theta_rad) * half;
+        (object.x_m, object.y_m) = (centre.x, centre.y);
     };
-    let askew: Change = |thing, angle| thing.roll_rad = angle;
+    let askew: Change = |object, angle| object.roll_rad = angle;
     let mut all = vec![];
     for (what, change, angle_deg) in [
         ("opened by 10 degrees", open, 10.0_f64),
@@ -268,9 +270,9 @@ fn strays(rooms: usize, random: &mut Random) -> Vec<Strays> {
         let (mut residuals, mut rolls) = (vec![], vec![]);
         for _ in 0..rooms {
             let Some(room) = room(random) else { continue };
-            let mut thing = poster(&room, random);
-            change(&mut thing, angle_deg.to_radians());
-            match on_walls(&room, &thing, 1, random) {
+            let mut object = poster(&room, random);
+            change(&mut object, angle_deg.to_radians());
+            match on_walls(&room, &object, 1, random) {
                 Some(Ok(_)) => made.shown += 1,
                 Some(Err(error)) => {
                     (made.shown, made.refused) = (made.shown + 1, made.refused + 1);
@@ -295,7 +297,7 @@ mod tests {
 
     #[test]
     fn places_are_within_three_sigma_and_open_doors_are_not_placed() {
-        let (summaries, strays) = judged(40, 4, 3);
+        let (summaries, strays) = evaluated(40, 4, 3);
         for s in &summaries {
             assert!(s.placed > 80 && s.within_3_sigma > 0.985, "{s:?}");
             assert!((2.0..7.5).contains(&s.nees), "{s:?}");

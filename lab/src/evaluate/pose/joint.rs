@@ -1,7 +1,7 @@
 //! The robot's pose on the floor from one, two or three landmarks at once, and fused over drives (method 13.6, 15).
 
 use super::{
-    eye::{Cameras, StatedCamera},
+    camera::{Cameras, StatedCamera},
     single::{Cost, cost_of},
 };
 use map::{
@@ -38,7 +38,7 @@ pub(super) struct Joint {
     pub(super) cameras: Cameras,
     pub(super) landmarks: usize,
     pub(super) frames: usize,
-    /// Frames that gave one pose; the others were ambiguous and say so.
+    /// Frames with one pose; the others were reported as ambiguous.
     pub(super) fixed: usize,
     /// Of the fixes: root mean square error of the position (m) and of the heading (degrees).
     pub(super) rms_m: f64,
@@ -49,7 +49,7 @@ pub(super) struct Joint {
     pub(super) cost: Cost,
 }
 
-/// A place as it truly is, drawn from what is believed of it.
+/// A true place, drawn from the covariance of the map's.
 fn drawn(place: &LandmarkPlace, random: &mut Random) -> LandmarkPlace {
     let e: Vector6<f64> = place.covariance.map_diagonal(f64::sqrt).map(|s| s * random.normal());
     let size = LandmarkSize { width_m: place.size.width_m + e[4], height_m: place.size.height_m + e[5] };
@@ -57,8 +57,8 @@ fn drawn(place: &LandmarkPlace, random: &mut Random) -> LandmarkPlace {
     LandmarkPlace { x_m, y_m, z_m, theta_rad: place.theta_rad + e[2], size, ..*place }
 }
 
-/// A mounting as it truly is: the believed one moved by an error.
-fn moved(believed: &CameraExtrinsics, error: &Vector6<f64>) -> CameraExtrinsics {
+/// True extrinsics: the stated ones moved by an error.
+fn with_error(believed: &CameraExtrinsics, error: &Vector6<f64>) -> CameraExtrinsics {
     let (turn, shift) = (error.fixed_rows::<3>(0).into(), error.fixed_rows::<3>(3).into());
     CameraExtrinsics {
         robot_from_camera: perturbed(&believed.robot_from_camera, &turn, &shift),
@@ -70,14 +70,15 @@ fn mounting_error(covariance: &Matrix6<f64>, random: &mut Random) -> Vector6<f64
     covariance.map_diagonal(f64::sqrt).map(|s| s * random.normal())
 }
 
-fn look(
+fn observe(
     robot: &Pose2,
-    hung: &LandmarkPlace,
-    (real, eye): (&CameraExtrinsics, &StatedCamera),
+    true_place: &LandmarkPlace,
+    (real, camera): (&CameraExtrinsics, &StatedCamera),
     random: &mut Random,
 ) -> Option<LandmarkPose> {
-    let view = real.robot_from_camera.inverse() * robot.to_isometry3().inverse() * hung.map_from_landmark();
-    eye.look(&view, (hung.size, SIZE), SIGMA_PX, random)
+    let view =
+        real.robot_from_camera.inverse() * robot.to_isometry3().inverse() * true_place.map_from_landmark();
+    camera.observe(&view, (true_place.size, SIZE), SIGMA_PX, random)
 }
 
 fn mean_nees(fix: &map::pose2::Pose2Covariance, truth: &Pose2) -> f64 {
@@ -85,7 +86,7 @@ fn mean_nees(fix: &map::pose2::Pose2Covariance, truth: &Pose2) -> f64 {
     fix.covariance.cholesky().map_or(f64::INFINITY, |c| e.dot(&c.solve(&e)))
 }
 
-/// Posters beside one another on a wall, seen from 3 to 5 m.
+/// Fixes by posters beside one another on a wall, from 3 to 5 m.
 pub(super) fn joint(landmarks: usize, frames: usize, cameras: Cameras, seed: u64) -> Joint {
     let mut random = Random::new(seed);
     let places: Vec<LandmarkPlace> = (0..landmarks)
@@ -102,21 +103,21 @@ pub(super) fn joint(landmarks: usize, frames: usize, cameras: Cameras, seed: u64
         let Ok(believed) = CameraExtrinsics::new(pan_tilt(0.0, 0.0, Vector3::new(0.1, 0.0, 1.3))) else {
             break;
         };
-        let real = moved(&believed, &mounting_error(&believed.covariance, &mut random));
-        let hung: Vec<LandmarkPlace> = places.iter().map(|p| drawn(p, &mut random)).collect();
-        let eye = StatedCamera::drawn(&CAMERA, cameras, &mut random);
-        let seen: Option<Vec<LandmarkPose>> =
-            hung.iter().map(|h| look(&truth, h, (&real, &eye), &mut random)).collect();
-        let Some(seen) = seen else { continue };
+        let real = with_error(&believed, &mounting_error(&believed.covariance, &mut random));
+        let true_places: Vec<LandmarkPlace> = places.iter().map(|p| drawn(p, &mut random)).collect();
+        let camera = StatedCamera::drawn(&CAMERA, cameras, &mut random);
+        let observed: Option<Vec<LandmarkPose>> =
+            true_places.iter().map(|h| observe(&truth, h, (&real, &camera), &mut random)).collect();
+        let Some(observed) = observed else { continue };
         tried += 1;
-        let sightings: Vec<LandmarkObservation<'_>> = seen
+        let observations: Vec<LandmarkObservation<'_>> = observed
             .iter()
             .zip(&places)
             .enumerate()
             .map(|(i, (seen, place))| LandmarkObservation { landmark: LandmarkId(i as u64), seen, place })
             .collect();
         let started = Instant::now();
-        let answer = robot_pose(&sightings, &believed, None, &LocaliseParams::default());
+        let answer = robot_pose(&observations, &believed, None, &LocaliseParams::default());
         times.push(started.elapsed().as_secs_f64() * 1e6);
         if let Ok(FixResult::Fixed(fix)) = answer {
             let e = fix.pose.pose.minus(&truth);
@@ -140,7 +141,7 @@ pub(super) fn joint(landmarks: usize, frames: usize, cameras: Cameras, seed: u64
     }
 }
 
-/// Drives through a corridor with everything uncertain drawn anew.
+/// Drives through a corridor; all that is uncertain is drawn anew for each.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct Drives {
     pub(super) cameras: Cameras,
@@ -185,7 +186,7 @@ struct Drive {
     corrections: u64,
 }
 
-/// 25 m; four posters, alternately left and right, seen from 1 to 4 m ahead.
+/// 25 m; four posters, alternately left and right, observed from 1 to 4 m ahead.
 fn drive(cameras: Cameras, random: &mut Random) -> Drive {
     let mut made = Drive { nees: f64::INFINITY, squares: 0.0, steps: 0.0, corrections: 0 };
     let places: Vec<LandmarkPlace> = (0..4)
@@ -195,11 +196,11 @@ fn drive(cameras: Cameras, random: &mut Random) -> Drive {
             LandmarkPlace::by_hand(centre, theta, SIZE, PlaceSigmas::default()).ok()
         })
         .collect();
-    let hung: Vec<LandmarkPlace> = places.iter().map(|p| drawn(p, random)).collect();
+    let true_places: Vec<LandmarkPlace> = places.iter().map(|p| drawn(p, random)).collect();
     let mounted = |pan| CameraExtrinsics::new(pan_tilt(pan, 0.0, Vector3::new(0.1, 0.0, 1.3)));
     let Ok(base) = mounted(0.0) else { return made };
     let error = mounting_error(&base.covariance, random);
-    let eye = StatedCamera::drawn(&CAMERA, cameras, random);
+    let camera = StatedCamera::drawn(&CAMERA, cameras, random);
     let params = FuseParams::default();
     let mut fuser = Fuser::new(params.clone());
     let (mut truth, mut odom) = (Pose2::new(1.0, 0.1, 0.0), Pose2::default());
@@ -208,7 +209,7 @@ fn drive(cameras: Cameras, random: &mut Random) -> Drive {
         let noise = params.motion_noise(&motion).map_diagonal(f64::sqrt);
         let slip = noise.map(|s| s * random.normal());
         (truth, odom) = (truth.compose(&motion.plus(&slip)), odom.compose(&motion));
-        // A robot that keeps to the middle: the turn is commanded, measured and made.
+        // The robot keeps to the middle: the commanded turn is measured, with noise.
         let steer = Pose2::new(0.0, 0.0, -0.1 * truth.y_m - 0.3 * truth.theta_rad);
         (truth, odom) = (truth.compose(&steer), odom.compose(&steer));
         let at = i * 200_000_000;
@@ -218,14 +219,18 @@ fn drive(cameras: Cameras, random: &mut Random) -> Drive {
         let ahead = (0..4).find(|&l: &usize| (1.0..4.0).contains(&(places[l].x_m - truth.x_m)));
         if let Some(l) = ahead.filter(|_| i % 3 == 0) {
             let Ok(believed) = mounted(if places[l].y_m > 0.0 { 0.6 } else { -0.6 }) else { return made };
-            let real = moved(&believed, &error);
-            if let Some(seen) = look(&truth, &hung[l], (&real, &eye), random) {
-                let sighting =
-                    LandmarkObservation { landmark: LandmarkId(l as u64), seen: &seen, place: &places[l] };
+            let real = with_error(&believed, &error);
+            if let Some(observed) = observe(&truth, &true_places[l], (&real, &camera), random) {
+                let observation = LandmarkObservation {
+                    landmark: LandmarkId(l as u64),
+                    seen: &observed,
+                    place: &places[l],
+                };
                 let prior = fuser.pose_at(at);
-                let answer = robot_pose(&[sighting], &believed, prior.as_ref(), &LocaliseParams::default());
+                let answer =
+                    robot_pose(&[observation], &believed, prior.as_ref(), &LocaliseParams::default());
                 if let Ok(FixResult::Fixed(fix)) = answer {
-                    // Whatever it makes of the fix shows in the pose.
+                    // The outcome is ignored; it shows in the pose.
                     if fuser.apply_fix(at, &fix).is_err() {
                         return made;
                     }
@@ -249,7 +254,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn more_landmarks_and_drives_are_honest() {
+    fn covariances_of_fixes_and_of_drives_are_consistent() {
         let [one, three] = [1, 3].map(|n| joint(n, 120, Cameras::Exact, 5));
         assert!(three.rms_m < one.rms_m && three.fixed > 100, "{one:?} {three:?}");
         assert!((1.5..4.2).contains(&three.nees), "{three:?}");
@@ -258,9 +263,9 @@ mod tests {
     }
 
     #[test]
-    fn a_camera_that_says_how_wrong_it_may_be_is_honest_and_one_that_does_not_is_not() {
+    fn stated_sigmas_of_intrinsics_keep_covariances_consistent() {
         let of = |cameras| joint(3, 150, cameras, 6).nees;
-        let (told, untold) = (of(Cameras::WrongTold), of(Cameras::WrongUntold));
-        assert!((2.2..3.9).contains(&told) && untold > 1.3 * told, "{told} {untold}");
+        let (stated, unstated) = (of(Cameras::WithSigmas), of(Cameras::WithoutSigmas));
+        assert!((2.2..3.9).contains(&stated) && unstated > 1.3 * stated, "{stated} {unstated}");
     }
 }

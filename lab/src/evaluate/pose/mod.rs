@@ -1,18 +1,18 @@
-//! `waymark-lab evaluate pose`: how good poses are and whether their covariances tell the truth (method 13.3 to 13.6): the
+//! `waymark-lab evaluate pose`: accuracy of poses and consistency of their covariances (method 13.3 to 13.6): the
 //! table of 13.3, NEES, flips of the planar ambiguity, OpenCV on the same corners, several landmarks, drives, cost.
 
-mod eye;
+mod stated_camera;
 mod joint;
 mod peers;
 mod scene;
 mod single;
 
 use super::experiment::say;
-use eye::Cameras;
 use joint::{Drives, Joint};
 use peers::{Beside, Errors};
 use serde::Serialize;
 use single::{Cell, Cost, Exact, Row};
+use stated_camera::Cameras;
 use std::path::PathBuf;
 
 /// `waymark-lab evaluate pose`.
@@ -24,16 +24,16 @@ pub(crate) struct Args {
     /// Simulated drives for the fused pose.
     #[arg(long, default_value_t = 50, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     drives: u32,
-    /// All noise follows from it.
+    /// Seed of all noise.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Do without OpenCV.
+    /// Leave OpenCV out.
     #[arg(long)]
     no_peers: bool,
     /// The Python that has OpenCV.
     #[arg(long, default_value = "python3")]
     python: PathBuf,
-    /// One JSON object instead of tables.
+    /// Print one JSON object instead of tables.
     #[arg(long)]
     json: bool,
 }
@@ -50,20 +50,20 @@ struct Report {
     opencv: Result<Beside, String>,
     joint: Vec<Joint>,
     fused: Drives,
-    /// The same with cameras that are wrong by as much as a usual calibration is.
+    /// The same with intrinsics that have the errors of a usual calibration.
     camera: Vec<Joint>,
     camera_fused: Vec<Drives>,
     /// Microseconds.
     cost: Cost,
 }
 
-const WRONG: [Cameras; 2] = [Cameras::WrongUntold, Cameras::WrongTold];
+const WRONG: [Cameras; 2] = [Cameras::WithoutSigmas, Cameras::WithSigmas];
 
 pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let draws = args.draws as usize;
     let cells = single::cells(draws, args.seed);
     let opencv = if args.no_peers {
-        Err("not asked for".to_owned())
+        Err("--no-peers".to_owned())
     } else {
         peers::beside(&args.python, draws, args.seed)
     };
@@ -111,7 +111,8 @@ fn table(r: &Report) -> Vec<String> {
         ));
     }
     lines.push(
-        "  honesty: mean NEES, 6 degrees of freedom, of the draws that are not flagged as ambiguous".into(),
+        "  consistency: mean NEES, 6 degrees of freedom, of the draws that are not flagged as ambiguous"
+            .into(),
     );
     for c in &r.cells {
         let inside = if c.inside_95 {
@@ -138,15 +139,15 @@ fn table(r: &Report) -> Vec<String> {
     lines
 }
 
-/// Poses of robots, and what a pose costs.
+/// Poses of robots, and the time of a pose.
 fn robots(r: &Report) -> Vec<String> {
     let mut lines: Vec<String> = r.joint.iter().map(joint_line).collect();
     lines.push(drives_line(&r.fused));
     for (cameras, words) in WRONG.into_iter().zip([
-        "and it is not said (focal length 0.5 %, principal point 0.3 % of it)",
-        "and it is said, as the server does of each camera that says nothing else",
+        "none stated (focal length 0.5 %, principal point 0.3 % of it)",
+        "stated by their sigmas, the server's default for cameras",
     ]) {
-        lines.push(format!("  cameras are wrong by a usual calibration's errors, {words}"));
+        lines.push(format!("  intrinsics have the errors of a usual calibration, {words}"));
         lines.extend(r.camera.iter().filter(|j| j.cameras == cameras).map(joint_line));
         lines.extend(r.camera_fused.iter().filter(|f| f.cameras == cameras).map(drives_line));
     }
@@ -201,12 +202,12 @@ fn opencv(beside: &Result<Beside, String>) -> Vec<String> {
     };
     vec![
         format!(
-            "  beside OpenCV {} (IPPE + refineLM), same {} corners, {} flagged by us",
+            "  beside OpenCV {} (IPPE + refineLM), same {} corners, {} flagged by Waymark",
             b.version, b.draws, b.flagged
         ),
-        line("all draws, ours", &b.ours),
+        line("all draws, Waymark", &b.ours),
         line("all draws, OpenCV", &b.theirs),
-        line("draws that we do not flag, ours", &b.ours_unflagged),
+        line("draws that we do not flag, Waymark", &b.ours_unflagged),
         line("draws that we do not flag, OpenCV", &b.theirs_unflagged),
         format!(
             "    the same solution: at most {:.1e} m apart; OpenCV through Python {:.0} us a pose",

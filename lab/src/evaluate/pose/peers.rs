@@ -1,5 +1,5 @@
-//! The same corners through OpenCV's `solvePnP` with IPPE, both solutions refined by `solvePnPRefineLM`, the better by
-//! its residual taken.
+//! The same corners through OpenCV's `solvePnP` with IPPE, both solutions refined by `solvePnPRefineLM`, the better
+//! by its residual taken.
 
 use super::single::{draws, nearer_to_mirror};
 use crate::{bench::Python, evaluate::statistics::median};
@@ -9,7 +9,7 @@ use std::path::Path;
 
 const PROGRAM: &str = include_str!("../../../peers/poses.py");
 
-/// How well poses meet the truth.
+/// Errors of poses against the truth.
 #[derive(Debug, Clone, Default, Serialize)]
 pub(super) struct Errors {
     /// Of the position: root mean square and median, metres.
@@ -22,7 +22,7 @@ pub(super) struct Errors {
     pub(super) flips: usize,
 }
 
-/// Both on the same corners.
+/// Errors of Waymark and OpenCV on the same corners.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct Beside {
     pub(super) version: String,
@@ -31,12 +31,12 @@ pub(super) struct Beside {
     /// On all draws.
     pub(super) ours: Errors,
     pub(super) theirs: Errors,
-    /// On the draws that we do not flag as ambiguous.
+    /// On the draws that Waymark does not flag as ambiguous.
     pub(super) ours_unflagged: Errors,
     pub(super) theirs_unflagged: Errors,
-    /// Largest difference between ours and theirs where both took the same solution, metres.
+    /// Largest difference between Waymark's and OpenCV's poses where both took the same solution, metres.
     pub(super) apart_m: f64,
-    /// Microseconds a pose over there, Python included.
+    /// Microseconds of a pose by OpenCV, Python included.
     pub(super) their_us: f64,
 }
 
@@ -87,7 +87,7 @@ pub(super) fn beside(python: &Path, n: usize, seed: u64) -> Result<Beside, Strin
     })
 }
 
-/// Their plane has x right, y up, z towards the viewer; ours x towards the viewer, y right, z up.
+/// OpenCV's plane has x right, y up, z towards the viewer; Waymark's x towards the viewer, y right, z up.
 fn ours_of(pose: &[[f64; 3]; 2]) -> Isometry3<f64> {
     let turn = Rotation3::from_scaled_axis(Vector3::from(pose[0]));
     let theirs_from_ours = Matrix3::new(0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0);
@@ -115,13 +115,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn without_a_python_there_is_a_reason() {
+    fn a_missing_python_gives_a_reason() {
         assert!(beside(Path::new("no-such-python-anywhere"), 2, 1).unwrap_err().contains("no-such-python"));
     }
 
     #[test]
-    fn their_axes_become_ours() {
-        // Frontal at 3 m in their axes: turned by pi about x (y up to v down), z towards the viewer.
+    fn opencvs_axes_become_waymarks() {
+        // Frontal at 3 m in OpenCV's axes: turned by pi about x (y up to v down), z towards the viewer.
         let pose = ours_of(&[[std::f64::consts::PI, 0.0, 0.0], [0.0, 0.0, 3.0]]);
         let normal = pose.rotation * Vector3::x();
         assert!((normal + Vector3::z()).norm() < 1e-9, "{normal}");

@@ -30,7 +30,7 @@ pub(super) fn view(d_m: f64, psi_deg: f64) -> Isometry3<f64> {
     Isometry3::from_parts((-(rotation * centre)).into(), rotation)
 }
 
-pub(super) fn seen(pose: &Isometry3<f64>) -> [Point2<f64>; 4] {
+pub(super) fn projected(pose: &Isometry3<f64>) -> [Point2<f64>; 4] {
     corner_points(&SIZE).map(|p| CAMERA.project(&(pose.rotation * p + pose.translation.vector)))
 }
 

@@ -1,6 +1,7 @@
-//! One landmark: the table of method 13.3, exactness, honesty of the covariance, flips of the planar ambiguity, cost.
+//! One landmark: the table of method 13.3, exactness, consistency of the covariance, flips of the planar ambiguity,
+//! time.
 
-use super::scene::{CAMERA, SIZE, in_plan, isotropic, noisy, seen, view};
+use super::scene::{CAMERA, SIZE, in_plan, isotropic, noisy, projected, view};
 use nalgebra::{Isometry3, Matrix3, SMatrix, UnitQuaternion, Vector3, Vector6};
 use serde::Serialize;
 use std::time::Instant;
@@ -10,8 +11,8 @@ use vision::{
     random::Random,
 };
 
-/// Rows of the table: distance, azimuth; the method's sigma along the normal, along the wall, of the heading (degrees):
-/// refined, linear.
+/// Rows of the table: distance, azimuth; the method's sigma along the normal, along the wall, of the heading
+/// (degrees): refined, linear.
 const ROWS: [(f64, f64, [f64; 3], [f64; 3]); 5] = [
     (2.0, 0.0, [0.006, 0.020, 0.56], [0.006, 0.024, 0.65]),
     (4.0, 0.0, [0.022, 0.158, 2.25], [0.026, 0.176, 2.51]),
@@ -33,7 +34,7 @@ pub(super) struct Row {
     pub(super) azimuth_deg: f64,
     pub(super) refined: [f64; 3],
     pub(super) linear: [f64; 3],
-    /// What the covariance says, to first order at the true pose.
+    /// Standard deviations by the covariance, to first order at the true pose.
     pub(super) analytic: [f64; 3],
     pub(super) method_refined: [f64; 3],
     pub(super) method_linear: [f64; 3],
@@ -49,7 +50,7 @@ fn row(d: f64, psi: f64, method_refined: [f64; 3], method_linear: [f64; 3], rand
     let origin = in_plan(&truth);
     let mut errors: [Vec<Vector3<f64>>; 2] = [vec![], vec![]];
     for _ in 0..ROW_DRAWS {
-        let found = noisy(&seen(&truth), ROW_SIGMA_PX, random)
+        let found = noisy(&projected(&truth), ROW_SIGMA_PX, random)
             .and_then(|corners| landmark_pose(&corners, &isotropic(ROW_SIGMA_PX), SIZE, &CAMERA).ok());
         let Some(found) = found else { continue };
         errors[0].push(in_plan(&found.best.camera_from_landmark) - origin);
@@ -90,7 +91,7 @@ fn analytic(truth: &Isometry3<f64>) -> [f64; 3] {
     let (mut j, mut g) = (SMatrix::<f64, 8, 6>::zeros(), SMatrix::<f64, 3, 6>::zeros());
     for k in 0..6 {
         let (up, down) = (step(k, h), step(k, -h));
-        for (i, (a, b)) in seen(&up).iter().zip(seen(&down)).enumerate() {
+        for (i, (a, b)) in projected(&up).iter().zip(projected(&down)).enumerate() {
             let d = (a - b) / (2.0 * h);
             (j[(2 * i, k)], j[(2 * i + 1, k)]) = (d.x, d.y);
         }
@@ -102,13 +103,14 @@ fn analytic(truth: &Isometry3<f64>) -> [f64; 3] {
     [s.x, s.y, s.z.to_degrees()]
 }
 
-/// Honesty in one cell.
+/// Consistency in one cell.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct Cell {
     pub(super) distance_m: f64,
     pub(super) azimuth_deg: f64,
     pub(super) sigma_px: f64,
-    /// Mean of the squared Mahalanobis distance of the truth, 6 degrees of freedom, over the draws that were not flagged.
+    /// Mean of the squared Mahalanobis distance of the truth, 6 degrees of freedom, over the draws that were not
+    /// flagged.
     pub(super) nees: f64,
     pub(super) unflagged: usize,
     pub(super) draws: usize,
@@ -136,7 +138,7 @@ fn cell(d: f64, psi: f64, sigma_px: f64, draws: usize, random: &mut Random) -> C
     let truth = view(d, psi);
     let (mut sum, mut n, mut flips) = (0.0, 0_usize, 0);
     for _ in 0..draws {
-        let found = noisy(&seen(&truth), sigma_px, random)
+        let found = noisy(&projected(&truth), sigma_px, random)
             .and_then(|corners| landmark_pose(&corners, &isotropic(sigma_px), SIZE, &CAMERA).ok());
         let Some(found) = found.filter(|f| !f.ambiguous) else { continue };
         let value = nees(&truth, &found.best);
@@ -193,7 +195,7 @@ pub(super) fn exact(seed: u64) -> Exact {
         let turn = Vector3::new(random.range(-0.2, 0.2), random.range(-0.2, 0.2), random.range(-0.3, 0.3));
         let swing = UnitQuaternion::from_scaled_axis(turn);
         let truth = Isometry3::from_parts((swing * base.translation.vector).into(), swing * base.rotation);
-        let points = seen(&truth);
+        let points = projected(&truth);
         let inside = points.iter().all(|p| (0.0..640.0).contains(&p.x) && (0.0..480.0).contains(&p.y));
         let found = Corners::new(points)
             .ok()
@@ -230,7 +232,7 @@ pub(super) fn cost(seed: u64) -> Cost {
     let mut times = vec![];
     for i in 0..2_000 {
         let truth = view(2.0 + f64::from(i % 3) * 2.0, [10.0, 45.0][i as usize % 2]);
-        let Some(corners) = noisy(&seen(&truth), 0.5, &mut random) else { continue };
+        let Some(corners) = noisy(&projected(&truth), 0.5, &mut random) else { continue };
         let started = Instant::now();
         let found = landmark_pose(&corners, &isotropic(0.5), SIZE, &CAMERA);
         times.push(started.elapsed().as_secs_f64() * 1e6);
@@ -248,7 +250,7 @@ pub(super) fn draws(n: usize, seed: u64) -> Vec<(Isometry3<f64>, Corners, Landma
             for psi in [10.0, 45.0] {
                 let truth = view(d, psi);
                 all.extend((0..n).filter_map(|_| {
-                    let corners = noisy(&seen(&truth), sigma_px, &mut random)?;
+                    let corners = noisy(&projected(&truth), sigma_px, &mut random)?;
                     let found = landmark_pose(&corners, &isotropic(sigma_px), SIZE, &CAMERA).ok()?;
                     Some((truth, corners, found))
                 }));

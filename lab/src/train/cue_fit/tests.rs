@@ -1,4 +1,4 @@
-//! The fit of the weights by its oracle, judging by labels, refusals.
+//! The fit of the weights against an oracle, labels of pairs, refusals.
 
 use super::*;
 use nalgebra::Vector2;
@@ -47,8 +47,8 @@ fn render(outer: [[f64; 2]; 4], inner: [[f64; 2]; 4]) -> GrayImage {
     })
 }
 
-/// Pairs whose first two cues tell, three times as much the first, the others being noise.
-fn judged(count: usize, seed: u64) -> Vec<LabelledPair> {
+/// Pairs whose first two cues are informative, the first three times as much; the others are noise.
+fn labelled_pairs(count: usize, seed: u64) -> Vec<LabelledPair> {
     let mut random = Random::new(seed);
     (0..count)
         .map(|i| {
@@ -61,8 +61,8 @@ fn judged(count: usize, seed: u64) -> Vec<LabelledPair> {
 }
 
 #[test]
-fn weights_that_made_the_data_come_back() {
-    let fitted = fit(&judged(20_000, 1), &SimilarityParams::default()).unwrap();
+fn the_true_weights_are_recovered() {
+    let fitted = fit(&labelled_pairs(20_000, 1), &SimilarityParams::default()).unwrap();
     assert!((fitted.weights[0] - 0.75).abs() < 0.03, "{fitted:?}");
     assert!((fitted.weights[1] - 0.25).abs() < 0.03);
     assert!(fitted.weights[2..].iter().all(|w| (0.0..0.03).contains(w)));
@@ -74,7 +74,7 @@ fn weights_that_made_the_data_come_back() {
 #[test]
 fn the_fit_is_the_minimum() {
     // Oracle: the balanced loss itself, on a grid of small moves about the fit.
-    let pairs = judged(3000, 2);
+    let pairs = labelled_pairs(3000, 2);
     let found = weights(&pairs).unwrap();
     let n = pairs.iter().filter(|s| s.opposite).count() as f64;
     let loss = |direction: &[f64; 6], scale: f64, offset: f64| {
@@ -116,8 +116,8 @@ fn order_and_threshold_by_hand() {
 }
 
 #[test]
-fn too_little_and_too_much_are_refused() {
-    let pairs = judged(400, 3);
+fn too_few_and_too_many_pairs_are_refused() {
+    let pairs = labelled_pairs(400, 3);
     let p = SimilarityParams::default();
     let few: Vec<LabelledPair> = pairs
         .iter()
@@ -137,7 +137,7 @@ fn too_little_and_too_much_are_refused() {
 }
 
 #[test]
-fn pairs_are_judged_by_the_labels() {
+fn pairs_are_labelled_by_quads() {
     let outer = [[50.0, 40.0], [250.0, 40.0], [250.0, 190.0], [50.0, 190.0]];
     let inner = [[80.0, 70.0], [220.0, 70.0], [220.0, 160.0], [80.0, 160.0]];
     let mut segments = sides(outer, 1.0);
@@ -147,25 +147,25 @@ fn pairs_are_judged_by_the_labels() {
     let image = render(outer, inner);
     let found = pairs(&segments, &image, &ungraded(&SimilarityParams::default()));
     let labels = [Corners::try_from(outer).unwrap()];
-    let judged = judge(&segments, &found, &labels, &[], 3);
-    assert!(judged.iter().all(|j| j.photograph == 3));
-    assert_eq!(judged.iter().filter(|j| j.opposite).count(), 2);
-    let of = |pair: &SegmentPair| judge(&segments, std::slice::from_ref(pair), &labels, &[], 0);
+    let labelled_pairs = label_pairs(&segments, &found, &labels, &[], 3);
+    assert!(labelled_pairs.iter().all(|j| j.photograph == 3));
+    assert_eq!(labelled_pairs.iter().filter(|j| j.opposite).count(), 2);
+    let of = |pair: &SegmentPair| label_pairs(&segments, std::slice::from_ref(pair), &labels, &[], 0);
     for pair in &found {
         match (pair.k, pair.l) {
             (0, 2) | (1, 3) => assert!(of(pair)[0].opposite),
             // Outer top and inner bottom overlap the label by more than half, as does the whole of the inner border's
-            // height by width; nobody can say.
+            // height by width; so it has no label.
             (0, 6) | (2, 4) => assert!(of(pair).is_empty()),
             (2, 8) => assert!(of(pair).iter().all(|j| !j.opposite)),
             _ => {}
         }
     }
     // Without labels all are other pairs, unless a known quad explains them.
-    assert!(judge_all(&segments, &found, &[]).iter().all(|j| !j.opposite));
-    assert!(judge_all(&segments, &found, &labels).len() < found.len());
+    assert!(label_all(&segments, &found, &[]).iter().all(|j| !j.opposite));
+    assert!(label_all(&segments, &found, &labels).len() < found.len());
 }
 
-fn judge_all(segments: &[EdgeSegment], pairs: &[SegmentPair], others: &[Corners]) -> Vec<LabelledPair> {
-    judge(segments, pairs, &[], others, 0)
+fn label_all(segments: &[EdgeSegment], pairs: &[SegmentPair], others: &[Corners]) -> Vec<LabelledPair> {
+    label_pairs(segments, pairs, &[], others, 0)
 }

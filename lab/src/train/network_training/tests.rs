@@ -4,7 +4,7 @@ fn quick() -> TrainParams {
     TrainParams { hidden: 6, steps: 600, ridge: 0.1, reach: 0.05, ..TrainParams::default() }
 }
 
-/// Of six candidates the one nearest to the middle is right, which no linear model sees.
+/// Of six candidates the one nearest to the middle is right, which no linear model can express.
 fn rivals(count: usize, seed: u64) -> Vec<ChoiceExample> {
     let mut random = Random::new(seed);
     (0..count)
@@ -39,10 +39,10 @@ fn right_share(net: &Network, examples: &[LabelledExample]) -> f64 {
 }
 
 #[test]
-fn hidden_units_learn_what_lines_cannot() {
-    let (seen, new) = (rivals(300, 1), rivals(200, 2));
+fn hidden_units_learn_what_a_linear_model_cannot() {
+    let (train_set, new) = (rivals(300, 1), rivals(200, 2));
     let share = |hidden| {
-        let net = train_choice(&seen, &TrainParams { hidden, ..quick() }).unwrap();
+        let net = train_choice(&train_set, &TrainParams { hidden, ..quick() }).unwrap();
         assert_eq!(net.check(2), Ok(()));
         new.iter().filter(|r| chosen(&net, r)).count()
     };
@@ -54,7 +54,7 @@ fn hidden_units_learn_what_lines_cannot() {
 fn slopes_are_those_of_the_loss() {
     let data = rivals(3, 7);
     let one = LabelledExample { group: 0, weight: 1.0, features: vec![0.3, -0.8], is_one: true };
-    let tasks = [Task::choice(&data[0], 1.0), Task::telling(&one)];
+    let tasks = [Task::choice(&data[0], 1.0), Task::labelled(&one)];
     let mut net = Weights::new(2, &TrainParams { hidden: 3, ..quick() });
     let loss = |net: &Weights, t: &Task| {
         let outputs: Vec<f64> = t.features.iter().map(|x| net.output(x, &net.activity(x))).collect();
@@ -69,20 +69,20 @@ fn slopes_are_those_of_the_loss() {
         let mut slope = vec![0.0; net.values.len()];
         net.add_slope(task, &features, &mut slope);
         for (i, slope) in slope.iter().enumerate() {
-            let kept = net.values[i];
+            let value = net.values[i];
             let mut at = |x: f64| {
                 net.values[i] = x;
                 loss(&net, task)
             };
-            let difference = (at(kept + 1e-5) - at(kept - 1e-5)) / 2e-5;
-            net.values[i] = kept;
+            let difference = (at(value + 1e-5) - at(value - 1e-5)) / 2e-5;
+            net.values[i] = value;
             assert!((difference - slope).abs() < 1e-6, "{i}: {difference} {slope}");
         }
     }
 }
 
 #[test]
-fn the_network_says_what_was_trained() {
+fn the_network_computes_the_trained_function() {
     let net = Weights::new(3, &TrainParams { hidden: 4, ..quick() });
     let x = [0.5, -1.5, 3.0];
     let wanted = net.output(&x, &net.activity(&x));
@@ -91,7 +91,7 @@ fn the_network_says_what_was_trained() {
 }
 
 #[test]
-fn odds_are_told_and_repeat() {
+fn odds_are_learnt_and_repeat() {
     let data = examples(300, 3, |_| false);
     let net = train_classifier(&data, &quick()).unwrap();
     assert!(right_share(&net, &examples(300, 4, |_| false)) > 0.95);
@@ -100,7 +100,7 @@ fn odds_are_told_and_repeat() {
 }
 
 #[test]
-fn what_is_further_off_is_wanted_less() {
+fn a_farther_candidate_is_less_probable() {
     let r = |off: &[f64]| ChoiceExample {
         group: 0,
         weight: 1.0,
@@ -116,7 +116,7 @@ fn what_is_further_off_is_wanted_less() {
 }
 
 #[test]
-fn a_weight_of_two_is_two_of_them() {
+fn a_weight_of_two_counts_twice() {
     let mut data = examples(40, 8, |_| false);
     let doubled: Vec<LabelledExample> = data.iter().chain(&data[..10]).cloned().collect();
     data[..10].iter_mut().for_each(|e| e.weight = 2.0);
@@ -129,7 +129,7 @@ fn a_weight_of_two_is_two_of_them() {
 }
 
 #[test]
-fn what_cannot_be_trained_is_refused() {
+fn invalid_examples_and_parameters_are_refused() {
     let good = examples(10, 6, |_| false);
     let with = |p: TrainParams| train_classifier(&good, &p).unwrap_err();
     assert_eq!(with(TrainParams { hidden: MAX_HIDDEN + 1, ..quick() }), TrainError::Range("hidden"));

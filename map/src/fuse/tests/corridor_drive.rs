@@ -1,4 +1,5 @@
-//! The paper's corridor in small (method 18, E10): camera, fix and fusion together, everything uncertain drawn anew.
+//! The paper's corridor in small (method 18, E10): camera, fix and fusion together; all that is uncertain is drawn
+//! anew.
 
 use crate::{
     extrinsics::{CameraExtrinsics, pan_tilt},
@@ -23,8 +24,8 @@ use vision::{
 const SIZE: LandmarkSize = LandmarkSize { width_m: 0.6, height_m: 0.84 };
 const SIGMA_PX: f64 = 0.5;
 
-/// 25 m along x; posters on the walls at y = 1.2 and -1.2, seen from 1 to 4 m ahead by a camera turned to that wall.
-/// Mean squared error along the corridor after the first fix, NEES at the end, corrections.
+/// 25 m along x; posters on the walls at y = 1.2 and -1.2, observed from 1 to 4 m ahead by a camera turned to that
+/// wall. Mean squared error along the corridor after the first fix, NEES at the end, corrections.
 fn corridor(random: &mut Random) -> (f64, f64, u64) {
     let camera = Intrinsics::new(500.0, 500.0, 320.0, 240.0, Distortion::None).unwrap();
     let places: Vec<LandmarkPlace> = (0..4)
@@ -34,7 +35,7 @@ fn corridor(random: &mut Random) -> (f64, f64, u64) {
             LandmarkPlace::by_hand(centre, theta, SIZE, PlaceSigmas::default()).unwrap()
         })
         .collect();
-    let hung: Vec<LandmarkPlace> = places
+    let true_places: Vec<LandmarkPlace> = places
         .iter()
         .map(|p| {
             let e = p.covariance.map_diagonal(f64::sqrt).map(|s| s * random.normal());
@@ -54,7 +55,7 @@ fn corridor(random: &mut Random) -> (f64, f64, u64) {
         let noise = params.motion_noise(&motion).map_diagonal(f64::sqrt);
         let drawn = noise.map(|s| s * random.normal());
         (truth, odom) = (truth.compose(&motion.plus(&drawn)), odom.compose(&motion));
-        // A robot that keeps to the middle: the turn is commanded, measured and made.
+        // The robot keeps to the middle: the commanded turn is measured, with noise.
         let steer = Pose2::new(0.0, 0.0, -0.1 * truth.y_m - 0.3 * truth.theta_rad);
         (truth, odom) = (truth.compose(&steer), odom.compose(&steer));
         let at = i * 200_000_000;
@@ -68,8 +69,9 @@ fn corridor(random: &mut Random) -> (f64, f64, u64) {
             };
             let (turn, shift) = (wrong.fixed_rows::<3>(0).into(), wrong.fixed_rows::<3>(3).into());
             let mounted = perturbed(&believed.robot_from_camera, &turn, &shift);
-            let view = mounted.inverse() * truth.to_isometry3().inverse() * hung[l].map_from_landmark();
-            let points = corner_points(&hung[l].size).map(|p| {
+            let view =
+                mounted.inverse() * truth.to_isometry3().inverse() * true_places[l].map_from_landmark();
+            let points = corner_points(&true_places[l].size).map(|p| {
                 let noise = Vector2::new(random.normal(), random.normal()) * SIGMA_PX;
                 pixel(&view, &p, &camera).map_or(Point2::new(-1e3, 0.0), |px| px + noise)
             });
@@ -79,10 +81,10 @@ fn corridor(random: &mut Random) -> (f64, f64, u64) {
             }
             let claimed = [Matrix2::identity() * SIGMA_PX * SIGMA_PX; 4];
             let seen = landmark_pose(&Corners::new(points).unwrap(), &claimed, SIZE, &camera).unwrap();
-            let sighting =
+            let observation =
                 LandmarkObservation { landmark: LandmarkId(l as u64), seen: &seen, place: &places[l] };
             let prior = fuser.pose_at(at);
-            let answer = robot_pose(&[sighting], &believed, prior.as_ref(), &LocaliseParams::default());
+            let answer = robot_pose(&[observation], &believed, prior.as_ref(), &LocaliseParams::default());
             if let FixResult::Fixed(fix) = answer.unwrap() {
                 fuser.apply_fix(at, &fix).unwrap();
             }
@@ -99,7 +101,7 @@ fn corridor(random: &mut Random) -> (f64, f64, u64) {
 }
 
 #[test]
-fn the_corridor_is_driven_within_a_hand() {
+fn the_error_along_the_corridor_is_below_twenty_centimetres() {
     let mut random = Random::new(1);
     let (mut squares, mut nees, drives) = (0.0, 0.0, 60);
     for _ in 0..drives {

@@ -1,5 +1,5 @@
-//! Landmarks and scans together: drives along a corridor whose walls are not quite where the map says, a long
-//! standstill, and what a scan may not do.
+//! Landmarks and scans together: drives along a corridor with errors in the map's walls, a long standstill, and the
+//! limits of what a scan may do.
 
 use super::fix;
 use crate::{
@@ -27,7 +27,7 @@ fn corridor() -> Walls {
     walls
 }
 
-/// The map of walls, each wrong by what it says.
+/// The map of walls, each with an error by its covariance.
 fn mapped(walls: &Walls, random: &mut Random) -> WallIndex {
     let off = |w: &[f64; 4], random: &mut Random| {
         let d = Vector2::new(w[2] - w[0], w[3] - w[1]).normalize();
@@ -38,7 +38,7 @@ fn mapped(walls: &Walls, random: &mut Random) -> WallIndex {
     WallIndex::new(&segments(&map, WALL_M, 1e-4))
 }
 
-/// What the laser says at a time; given the fuser's own pose as the prior, as the server does.
+/// Applies the scan of a time, with the fuser's own pose as the prior, as in the server.
 fn laser(fuser: &mut Fuser, at: i64, map: &WallIndex, seen: &Scan, p: &LaserFixParams) -> Option<FixOutcome> {
     let prior = fuser.pose_at(at)?;
     let found = laser_fix(map, seen, &prior, p).unwrap().ok()?;
@@ -53,7 +53,7 @@ struct Driven {
     scans: u64,
 }
 
-/// A landmark every 7 m, seen three times; scans at every step if there are parameters for them.
+/// A landmark every 7 m, observed three times; scans at every step if there are parameters for them.
 fn drive(random: &mut Random, scans: Option<&LaserFixParams>) -> Driven {
     let p = FuseParams::default();
     let walls = corridor();
@@ -97,9 +97,9 @@ fn drive(random: &mut Random, scans: Option<&LaserFixParams>) -> Driven {
 }
 
 #[test]
-fn with_the_laser_the_pose_is_sharper_and_still_honest() {
-    // The simulated ranges err each for itself; by default points are taken to err together, as those of real lasers
-    // do.
+fn scans_make_the_pose_more_certain_and_keep_it_consistent() {
+    // The simulated ranges have independent errors; by default errors of points count as shared, as with real
+    // lasers.
     let exact = LaserFixParams { correlated: 1.0, floor: [0.0; 2], ..LaserFixParams::default() };
     let careful = LaserFixParams::default();
     let mut random = Random::new(3);
@@ -122,7 +122,7 @@ fn with_the_laser_the_pose_is_sharper_and_still_honest() {
 }
 
 #[test]
-fn a_long_standstill_makes_nobody_surer() {
+fn a_long_standstill_does_not_shrink_the_covariance() {
     let (mut random, p) = (Random::new(8), LaserFixParams::default());
     let walls = rectangle([0.0, 0.0, 6.0, 4.0]);
     let map = mapped(&walls, &mut random);
@@ -135,7 +135,7 @@ fn a_long_standstill_makes_nobody_surer() {
     let both = Fix { landmarks: vec![LandmarkId(1), LandmarkId(2)], ..fix(2, at, 0.04, 0.02) };
     fuser.apply_fix(0, &both).unwrap();
     let once = fuser.pose().unwrap();
-    // Half a minute: scans between looks at one landmark, at another and at both do not make them new.
+    // Half a minute: scans between observations of one landmark, of another and of both do not make these new.
     for i in 1..300 {
         let now = i * SECOND / 10;
         fuser.apply_odometry(now, Pose2::default()).unwrap();
@@ -153,7 +153,7 @@ fn a_long_standstill_makes_nobody_surer() {
 }
 
 #[test]
-fn however_often_it_is_passed_a_wall_is_no_surer_than_the_map_says() {
+fn passing_a_wall_often_does_not_undercut_its_covariance() {
     let (mut random, p) = (Random::new(9), LaserFixParams::default());
     let walls = rectangle([0.0, 0.0, 4.0, 4.0]);
     let map = mapped(&walls, &mut random);
@@ -162,7 +162,7 @@ fn however_often_it_is_passed_a_wall_is_no_surer_than_the_map_says() {
     fuser.apply_fix(0, &fix(1, Pose2::new(2.0, 2.0, 0.0), 0.04, 0.02)).unwrap();
     let mut odom = Pose2::default();
     for i in 1..400 {
-        // To and fro on the spot, by exact odometry.
+        // Back and forth in place, by exact odometry.
         let step = if i % 2 == 0 { 0.06 } else { -0.06 };
         odom = odom.compose(&Pose2::new(step, 0.0, 0.0));
         fuser.apply_odometry(i * SECOND / 10, odom).unwrap();
@@ -171,13 +171,13 @@ fn however_often_it_is_passed_a_wall_is_no_surer_than_the_map_says() {
     }
     let fused = fuser.pose().unwrap();
     assert!(fused.laser_corrections > 300, "{}", fused.laser_corrections);
-    // One wall across, seen for ever: its own error stays.
+    // One wall across, observed all the time: its own error stays.
     let sigma = fused.pose.covariance[(0, 0)].sqrt();
     assert!((0.7 * WALL_M..1.5 * WALL_M).contains(&sigma), "{sigma}");
 }
 
 #[test]
-fn a_scan_starts_nothing_and_keeps_out_no_landmark() {
+fn a_scan_starts_no_pose_and_blocks_no_landmark() {
     let mut fuser = Fuser::new(FuseParams::default());
     let by_scan = |pose| Fix {
         modality: FixSource::Laser,
@@ -188,7 +188,7 @@ fn a_scan_starts_nothing_and_keeps_out_no_landmark() {
     fuser.apply_odometry(0, Pose2::default()).unwrap();
     assert_eq!(fuser.apply_fix(0, &by_scan(Pose2::default())).unwrap(), FixOutcome::NoPose);
     assert_eq!(fuser.pose(), None);
-    // A pose that is wrong, and scans that are laid where it says: two landmarks that agree win all the same.
+    // A wrong pose, and scans matched around it: two landmarks that agree replace it anyway.
     fuser.apply_fix(0, &fix(1, Pose2::default(), 0.05, 0.01)).unwrap();
     for i in 1..=6_i64 {
         let (now, x) = (i * SECOND / 10, i as f64 * 0.1);

@@ -1,4 +1,4 @@
-//! What odometry gets wrong, jumps of odometry, and readings with wrong times.
+//! Systematic errors and jumps of odometry, and readings with wrong times.
 
 use crate::{
     fuse::{
@@ -13,8 +13,8 @@ use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 use vision::random::Random;
 
 #[test]
-fn odometry_learns_its_own_errors() {
-    // 24 drives past a landmark every 6 m, by a robot whose odometry is off by a scale and a turn of its own.
+fn systematic_odometry_errors_are_estimated() {
+    // 24 drives past a landmark every 6 m, by a robot with a systematic scale and drift of odometry.
     let p = FuseParams::default();
     let mut random = Random::new(5);
     let (mut before, mut after, mut nees, drives) = (0.0, 0.0, 0.0, 24);
@@ -47,12 +47,12 @@ fn odometry_learns_its_own_errors() {
         assert!(known.covariance[(0, 0)] < 0.15 * p.scale_sigma.powi(2), "{}", known.covariance);
     }
     assert!(after < 0.35 * before, "{after} m before the fourth landmark, {before} m before the second");
-    // The drives have none of the noise that the filter allows for: surer than it claims, but no less.
+    // The drives lack the noise that the filter assumes: errors are smaller than stated, never larger.
     assert!(nees / f64::from(drives) < 2.6, "{nees}");
 }
 
 #[test]
-fn what_odometry_learnt_outlives_a_jump() {
+fn estimated_odometry_errors_survive_a_jump() {
     let mut fuser = Fuser::new(FuseParams::default());
     assert_eq!(fuser.odometry_errors(), None);
     drive(&mut fuser, 1.0);
@@ -91,7 +91,7 @@ fn jumps_of_odometry_lose_the_pose_and_steps_of_the_clock_do_not() {
         fuser.apply_fix(11 * SECOND / 10, &fix(1, Pose2::default(), 0.05, 0.01)).unwrap(),
         FixOutcome::Started
     );
-    // A clock that was wrong by an hour is set, back and forth: the pose goes on by odometry.
+    // A clock that is set by an hour, back and forth: the pose continues by odometry.
     let mut set = Fuser::new(FuseParams::default());
     drive(&mut set, 1.0);
     set.apply_fix(SECOND, &fix(1, Pose2::default(), 0.05, 0.01)).unwrap();
@@ -104,12 +104,12 @@ fn jumps_of_odometry_lose_the_pose_and_steps_of_the_clock_do_not() {
         assert!(pose.pose.covariance[(0, 0)] > started.pose.covariance[(0, 0)]);
     }
     assert_eq!(set.apply_odometry(3 * SECOND, Pose2::new(4.0, 0.0, 0.0)).unwrap(), OdometryOutcome::Moved);
-    // So far a robot cannot have come meanwhile: it is another odometry frame.
+    // Too far for the time between: it is another odometry frame.
     assert_eq!(set.set_clock(SECOND, Pose2::new(40.0, 0.0, 0.0), 1.0).unwrap(), OdometryOutcome::Jumped);
     assert_eq!(set.pose(), None);
 }
 
-/// Fault F2: one reading more than 10 s behind used to lose the pose.
+/// One reading more than 10 s late must not lose the pose.
 #[test]
 fn one_reading_far_behind_loses_nothing() {
     let mut fuser = Fuser::new(FuseParams::default());
@@ -124,13 +124,13 @@ fn one_reading_far_behind_loses_nothing() {
 }
 
 #[test]
-fn a_reading_that_is_retracted_was_never_there() {
+fn a_retracted_reading_has_no_effect() {
     let mut with = Fuser::new(FuseParams::default());
     drive(&mut with, 1.0);
     with.apply_fix(SECOND, &fix(1, Pose2::default(), 0.05, 0.01)).unwrap();
     let mut without = with.clone();
     with.apply_odometry(13 * SECOND / 10, Pose2::new(1.05, 0.0, 0.0)).unwrap();
-    // It waits for odometry of its time, or is judged by the stray reading.
+    // It waits for odometry of its time, or is applied by the stray reading.
     let late = fix(2, Pose2::new(0.2, 0.0, 0.0), 0.05, 0.01);
     with.apply_fix(12 * SECOND / 10, &late).unwrap();
     without.apply_fix(12 * SECOND / 10, &late).unwrap();

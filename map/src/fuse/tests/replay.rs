@@ -11,7 +11,7 @@ use crate::{
 };
 
 #[test]
-fn a_late_fix_changes_the_past_as_if_it_had_been_in_time() {
+fn a_late_fix_has_the_same_effect_as_one_in_time() {
     let run = |late: bool| {
         let mut fuser = Fuser::new(eager());
         drive(&mut fuser, 0.0);
@@ -56,14 +56,14 @@ fn odometry_out_of_order_is_put_in_order() {
 }
 
 #[test]
-fn what_is_too_old_is_refused_at_the_bound() {
+fn events_older_than_the_window_are_refused() {
     let mut fuser = Fuser::new(eager());
     drive(&mut fuser, 5.0);
     let f = fix(1, Pose2::new(3.0, 0.0, 0.0), 0.05, 0.01);
     assert_eq!(fuser.apply_fix(29 * SECOND / 10 - 1, &f).unwrap(), FixOutcome::TooOld);
     assert_eq!(fuser.apply_fix(3 * SECOND, &f).unwrap(), FixOutcome::Started);
     assert!((fuser.pose().unwrap().pose.pose.x_m - 5.0).abs() < 1e-9);
-    // A fix before the first odometry can never be placed.
+    // A fix before the first odometry is always refused.
     let mut empty = Fuser::new(eager());
     assert_eq!(empty.apply_fix(-5, &f).unwrap(), FixOutcome::Waiting);
     drive(&mut empty, 0.0);

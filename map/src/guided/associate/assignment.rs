@@ -1,8 +1,8 @@
-//! Which observation is which landmark.
+//! The result of data association.
 
 use vision::model::LandmarkId;
 
-/// Why an observation is no expected landmark.
+/// Why an observation is not associated.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum NotAssociated {
     /// None of its candidates is expected in view.
@@ -22,13 +22,13 @@ pub enum NotAssociated {
 }
 
 impl NotAssociated {
-    /// Whether it speaks against the prior pose.
+    /// Whether it contradicts the prior pose.
     pub fn is_contradiction(&self) -> bool {
         matches!(self, Self::OutsideGates { .. } | Self::Incompatible)
     }
 }
 
-/// Which landmark an observation is.
+/// The association of one observation.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Association {
     /// It is this landmark.
@@ -38,14 +38,14 @@ pub enum Association {
         /// Squared Mahalanobis distance to its prediction, 8 degrees of freedom.
         distance2: f64,
     },
-    /// One of several, or one or none: the scores are too close.
+    /// Ambiguous: the scores are too close.
     Ambiguous {
         /// The landmarks it may be, by number.
         landmarks: Vec<LandmarkId>,
         /// Whether it may also be none of them.
         or_none: bool,
     },
-    /// None that is expected.
+    /// No expected landmark.
     None(NotAssociated),
 }
 
@@ -58,7 +58,7 @@ pub struct Assignment {
     pub distance2: f64,
     /// Its degrees of freedom: 8 for each observation that it gives a landmark.
     pub dof: usize,
-    /// Partial assignments that were looked at, at most [`super::MAX_NODES`].
+    /// Partial assignments that were visited, at most [`super::MAX_NODES`].
     pub nodes: usize,
     /// Whether the search ended at [`super::MAX_NODES`].
     pub is_exhausted: bool,
@@ -73,7 +73,7 @@ impl Assignment {
         })
     }
 
-    /// How many observations speak against the prior pose.
+    /// Number of observations that contradict the prior pose.
     pub fn contradictions(&self) -> usize {
         let against = |a: &&Association| matches!(a, Association::None(why) if why.is_contradiction());
         self.observations.iter().filter(against).count()

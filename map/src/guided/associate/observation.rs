@@ -8,7 +8,7 @@ use vision::{geometry::Corners, model::LandmarkId};
 pub const MAX_OBSERVATIONS: usize = 32;
 /// Most candidates of one observation; a longer list is refused. As many as a look-alike class may have.
 pub const MAX_CANDIDATES: usize = 512;
-/// Largest evidence that is told from larger, nats.
+/// Largest evidence, nats; larger values are clamped.
 const MAX_EVIDENCE_NATS: f64 = 1e6;
 
 /// A landmark that an observation may be.
@@ -16,8 +16,8 @@ const MAX_EVIDENCE_NATS: f64 = 1e6;
 pub struct Candidate {
     /// Number of the landmark.
     pub landmark: LandmarkId,
-    /// Picture evidence, nats: ln of p(picture, if it is this landmark) over p(picture, if it is none). Members of one
-    /// look-alike class get the same value: what differs between them is not evidence.
+    /// Picture evidence, nats: ln of p(picture, if it is this landmark) over p(picture, if it is none). Members of
+    /// one look-alike class get the same value: what differs between them is not evidence.
     pub picture_nats: f64,
     /// Prior odds besides the predicted corners, nats; 0 where nothing is known.
     pub prior_nats: f64,

@@ -25,11 +25,11 @@ pub(super) struct Pairing {
     /// Index among the expectations.
     pub(super) expected: usize,
     pub(super) observed: CornerVector,
-    /// Covariance of what is not common.
+    /// Covariance of the errors that are not shared.
     pub(super) own: CornerMatrix,
     /// Picture evidence and prior odds over the density of a quad that is no landmark.
     pub(super) weight: f64,
-    /// By itself: squared distance, score, and a bound of the score after any others.
+    /// Alone: squared distance, score, and a bound of the score after any others.
     pub(super) distance2: f64,
     pub(super) score: f64,
     pub(super) bound: f64,
@@ -43,7 +43,8 @@ pub(super) struct Row {
     pub(super) pairings: Vec<Pairing>,
 }
 
-/// Squared distances within which a pairing, or `count` of them together, is accepted, and within which it is a rival.
+/// Squared distances within which a pairing, or `count` of them together, is accepted, and within which it is a
+/// rival.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Gates {
     pub(super) z: f64,
@@ -55,13 +56,13 @@ impl Gates {
         if count == 0 { 0.0 } else { chi2_quantile(8 * count, self.z) }
     }
 
-    /// A rival just outside of the gate is as likely as what is just inside.
+    /// Wider: a rival just outside of the gate is as likely as a pairing just inside.
     pub(super) fn rival(&self, count: usize) -> f64 {
         self.accept(count) + 2.0 * self.margin_nats
     }
 }
 
-/// What an observation may be by itself, best score first; at least one of them within the gate.
+/// The pairings of one observation alone, best score first; at least one is within the gate.
 pub(super) fn pairings(
     expectations: &Expectations,
     observed: &Observation,

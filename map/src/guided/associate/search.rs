@@ -7,7 +7,7 @@ use crate::guided::{
     joint::CommonError,
 };
 
-/// Most partial assignments that are looked at; when there are more, no observation is unique.
+/// Most partial assignments that are visited; if there are more, no observation is unique.
 pub const MAX_NODES: usize = 1024;
 
 /// An assignment of all rows.
@@ -21,9 +21,9 @@ pub(super) struct Hypothesis {
     pub distance2: f64,
 }
 
-/// What the search found.
+/// Result of the search.
 pub(super) struct Outcome {
-    /// Best of those within the joint gate; that none is assigned is always one of them.
+    /// The best within the joint gate; the empty assignment is always within it.
     pub best: Hypothesis,
     /// All within the wider gate of rivals that score within the margin of the best, the best among them.
     pub rivals: Vec<Hypothesis>,

@@ -38,7 +38,7 @@ pub struct Expected {
     /// Share of its face that obstacles leave free, 0 to 1.
     pub unoccluded_share: f64,
     /// Whether it is in full view wherever within [`super::ExpectParams::sure_sigmas`] the robot is: not finding it
-    /// speaks against the prior, or against the landmark.
+    /// is evidence against the prior, or against the landmark.
     pub is_sure: bool,
     /// Whether obstacles hide it from everywhere within its uncertainty: then nothing in the image can be it.
     pub(in crate::guided) is_hidden: bool,
@@ -57,7 +57,7 @@ pub struct Expectations {
     pub(in crate::guided) common: CommonMatrix,
     /// Width and height of the image, px.
     pub(in crate::guided) image_px: [f64; 2],
-    /// What the errors are errors of.
+    /// The prior pose and the camera that the errors refer to.
     pub(super) pose: Pose2,
     pub(super) mounting: CameraExtrinsics,
     pub(super) intrinsics: Intrinsics,

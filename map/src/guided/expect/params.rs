@@ -1,8 +1,8 @@
-//! Limits of what is expected.
+//! Limits of expectations.
 
 use serde::{Deserialize, Serialize};
 
-/// Limits of what is expected.
+/// Limits of expectations.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ExpectParams {

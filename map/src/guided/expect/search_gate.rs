@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix2, Point2, Vector2};
 
-/// Where to look for one corner: an ellipse in the image.
+/// The search gate of one corner: an ellipse in the image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SearchGate {
     /// Predicted corner, px.

@@ -34,7 +34,7 @@ impl<'a> CameraView<'a> {
     }
 }
 
-/// What of a landmark is in view from the prior pose.
+/// Visibility of a landmark from the prior pose.
 #[derive(Debug, Clone, PartialEq)]
 pub enum InView {
     /// The whole landmark is in view.
@@ -70,7 +70,7 @@ pub enum InView {
 }
 
 impl InView {
-    /// Whether the image is worth looking at there: in view as a whole, or cut by the border.
+    /// Whether the landmark is searched: in view as a whole, or cut by the border.
     pub fn is_searchable(&self) -> bool {
         matches!(self, Self::Full | Self::Cut { .. })
     }

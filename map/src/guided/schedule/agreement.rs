@@ -6,7 +6,7 @@ use crate::{
     pose2::Pose2Covariance,
 };
 
-/// What a global fix says of the pose.
+/// Agreement of a global fix with the pose.
 pub(super) enum PoseAgreement<'a> {
     Agrees(&'a Fix),
     /// All of its solutions.
@@ -14,7 +14,7 @@ pub(super) enum PoseAgreement<'a> {
     Silent,
 }
 
-pub(super) fn judge<'a>(
+pub(super) fn agreement<'a>(
     global: &'a FixResult,
     prior: &Pose2Covariance,
     p: &ScheduleParams,

@@ -1,4 +1,4 @@
-//! What goes into the schedule and what comes out of it, frame by frame.
+//! Inputs and outputs of the schedule, frame by frame.
 
 use crate::{
     localise::{Fix, FixResult},
@@ -52,10 +52,10 @@ pub struct FramePlan {
     pub global: Option<GlobalReason>,
 }
 
-/// What guided recognition of a frame found.
+/// Result of guided recognition of a frame.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct GuidedReport {
-    /// Observations that speak against the pose ([`crate::guided::Assignment::contradictions`]).
+    /// Observations that contradict the pose ([`crate::guided::Assignment::contradictions`]).
     pub contradictions: usize,
     /// Whether a landmark that is surely in view was not found (as in [`FrameReport::missed`]).
     pub missed: bool,
@@ -74,7 +74,7 @@ impl GuidedReport {
     }
 }
 
-/// What became of a frame.
+/// Result of a frame.
 #[derive(Debug, Clone, Copy)]
 pub struct FrameReport<'a> {
     /// The camera, as in [`super::Schedule::plan`].
@@ -95,7 +95,7 @@ pub struct FrameReport<'a> {
 /// How the global fix of a frame goes to the fuser.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Decision {
-    /// Nothing global was seen, or it says nothing of the pose.
+    /// No global fix, or one without information on the pose.
     Keep,
     /// The global fix agrees with the pose, or starts one: it goes to the fuser as `FixRole::Independent`.
     Use,

@@ -15,8 +15,8 @@ fn by_default(e: &Expectations, observations: &[Observation]) -> Assignment {
     super::super::associate(e, observations, &AssociateParams::default()).unwrap()
 }
 
-/// Joint squared distance of pairings by the stacked covariance, linearised at the prior; and with the logarithm of its
-/// determinant.
+/// Joint squared distance of pairings by the stacked covariance, linearised at the prior; and with the logarithm of
+/// its determinant.
 fn stacked(e: &Expectations, pairs: &[(&Observation, LandmarkId)]) -> (f64, f64) {
     let n = 8 * pairs.len();
     let (mut by_common, mut own) = (DMatrix::zeros(n, joint::COMMON), DMatrix::zeros(n, n));
@@ -44,11 +44,11 @@ fn the_joint_distance_is_that_of_the_stacked_covariance() {
     let places = corridor(2.0);
     let mut random = Random::new(5);
     for x in [3.0, 9.0, 15.0] {
-        // So sure that the derivative at the prior is exact enough for both.
+        // So certain that the derivative at the prior is exact enough for both.
         let at = prior(Pose2::new(x, 0.0, 0.0), 0.005, 0.05);
         let truth = at.pose.plus(&draw3(&at.covariance, &mut random));
         let e = expectations(&at, &places);
-        let shown = seen(&truth, &places, &mounting(), &mut random);
+        let shown = full_views(&truth, &places, &mounting(), &mut random);
         let observations: Vec<_> = shown.iter().map(|(id, c)| observation(*id, *c)).collect();
         let made = by_default(&e, &observations);
         assert!(observations.len() >= 2 && made.unique().count() == observations.len(), "{made:?}");
@@ -61,9 +61,9 @@ fn the_joint_distance_is_that_of_the_stacked_covariance() {
 
 #[test]
 fn the_bounded_search_finds_the_best_of_all_assignments() {
-    // Doors closer than the pose is sure: several candidates for each observation. Oracle: all assignments of three
-    // observations to doors by the stacked covariance, the densest first; all distances are short beside the range, so
-    // that the derivative at the prior serves.
+    // Doors closer than the uncertainty of the pose: several candidates for each observation. Oracle: all
+    // assignments of three observations to doors by the stacked covariance, the densest first; all distances are
+    // short beside the range, so that the derivative at the prior serves.
     let places: BTreeMap<_, _> =
         (1..=5).map(|i| (LandmarkId(i), on_wall(3.0 + 0.12 * i as f64, 1.0, 0.9, 2.0))).collect();
     let mut random = Random::new(8);
@@ -73,7 +73,7 @@ fn the_bounded_search_finds_the_best_of_all_assignments() {
         let truth = at.pose.plus(&draw3(&at.covariance, &mut random));
         let e = expectations(&at, &places);
         let shown: Vec<_> =
-            seen(&truth, &places, &mounting(), &mut random).into_iter().skip(1).take(3).collect();
+            full_views(&truth, &places, &mounting(), &mut random).into_iter().skip(1).take(3).collect();
         let observations: Vec<_> = shown.iter().map(|(id, c)| observation(*id, *c)).collect();
         let made = by_default(&e, &observations);
         let ids: Vec<LandmarkId> = e.landmarks.iter().map(|l| l.landmark).collect();
@@ -108,15 +108,15 @@ fn the_bounded_search_finds_the_best_of_all_assignments() {
 }
 
 #[test]
-fn two_look_alikes_in_one_gate_are_ambiguous_and_a_neighbour_tells_them_apart() {
-    // Two doors 1.1 m apart, a pose known to 0.6 m along the wall: one door may be either.
+fn two_look_alikes_in_one_gate_are_ambiguous_and_a_neighbour_resolves_them() {
+    // Two doors 1.1 m apart, a pose with 0.6 m along the wall: one observation may be either.
     let places: BTreeMap<_, _> =
         [(LandmarkId(1), on_wall(3.0, 1.0, 0.9, 2.0)), (LandmarkId(2), on_wall(4.1, 1.0, 0.9, 2.0))].into();
     let mut at = prior(Pose2::new(1.5, 0.0, 0.0), 0.05, 0.5);
     at.covariance[(0, 0)] = 0.36;
     let mut random = Random::new(2);
     let truth = at.pose.plus(&Vector3::new(0.5, 0.0, 0.0));
-    let shown = seen(&truth, &places, &mounting(), &mut random);
+    let shown = full_views(&truth, &places, &mounting(), &mut random);
     let e = expectations(&at, &places);
     let one = [observation(shown[0].0, shown[0].1)];
     let both = Association::Ambiguous { landmarks: vec![LandmarkId(1), LandmarkId(2)], or_none: false };
@@ -134,12 +134,12 @@ fn two_look_alikes_in_one_gate_are_ambiguous_and_a_neighbour_tells_them_apart() 
 }
 
 #[test]
-fn prior_odds_count_but_never_instead_of_the_picture() {
+fn prior_odds_do_not_replace_picture_evidence() {
     let places: BTreeMap<_, _> =
         [(LandmarkId(1), on_wall(3.0, 1.0, 0.9, 2.0)), (LandmarkId(2), on_wall(4.1, 1.0, 0.9, 2.0))].into();
     let mut random = Random::new(4);
     let truth = Pose2::new(2.0, 0.0, 0.0);
-    let shown = seen(&truth, &places, &mounting(), &mut random);
+    let shown = full_views(&truth, &places, &mounting(), &mut random);
     let e = expectations(&prior(truth, 0.02, 0.3), &places);
     let with = |picture_nats: f64, prior_nats: f64| {
         let mut made = observation(shown[0].0, shown[0].1);
@@ -149,7 +149,7 @@ fn prior_odds_count_but_never_instead_of_the_picture() {
         by_default(&e, &[made]).observations[0].clone()
     };
     assert!(matches!(with(8.0, 0.0), Association::Unique { landmark: LandmarkId(1), .. }));
-    // Just where it is expected, with whatever odds: the picture says too little.
+    // At its predicted corners, with any odds: too little picture evidence.
     let weak = Association::None(NotAssociated::WeakEvidence { picture_nats: 4.0 });
     assert_eq!(with(4.0, 0.0), weak);
     assert_eq!(with(4.0, 1e6), weak);
@@ -169,15 +169,15 @@ fn prior_odds_count_but_never_instead_of_the_picture() {
 }
 
 #[test]
-fn what_does_not_fit_is_told_why() {
+fn unassociated_observations_have_their_reason() {
     let places = corridor(2.0);
     let mut random = Random::new(6);
     let truth = Pose2::new(6.0, 0.0, 0.0);
     let e = expectations(&prior(truth, 0.03, 0.5), &places);
-    let shown = seen(&truth, &places, &mounting(), &mut random);
+    let shown = full_views(&truth, &places, &mounting(), &mut random);
     let mut good: Vec<_> = shown.iter().map(|(id, c)| observation(*id, *c)).collect();
-    // A door that stands 0.7 m beside where the map has it.
-    let off = seen(&truth.plus(&Vector3::new(0.7, 0.0, 0.0)), &places, &mounting(), &mut random);
+    // A door 0.7 m beside its place in the map.
+    let off = full_views(&truth.plus(&Vector3::new(0.7, 0.0, 0.0)), &places, &mounting(), &mut random);
     good[0] = observation(off[0].0, off[0].1);
     // One that is not expected.
     let far = LandmarkId(1);
@@ -195,7 +195,7 @@ fn what_does_not_fit_is_told_why() {
     assert_eq!(made.observations.last(), Some(&Association::None(NotAssociated::NotExpected)));
     assert_eq!(made.contradictions(), 1);
     assert!(made.observations[1..good.len() - 1].iter().all(|a| matches!(a, Association::Unique { .. })));
-    // The same quad twice: either may be the door, and neither is.
+    // The same quad twice: either may be the door, so neither is unique.
     let doubled = vec![good[1].clone(), good[1].clone()];
     for a in by_default(&e, &doubled).observations {
         assert!(matches!(a, Association::Ambiguous { or_none: true, .. }), "{a:?}");
@@ -203,7 +203,7 @@ fn what_does_not_fit_is_told_why() {
 }
 
 #[test]
-fn jointly_incompatible_observations_are_not_both_taken() {
+fn jointly_incompatible_observations_are_not_both_assigned() {
     // Each fits a pose error along the wall, in opposite directions.
     let places: BTreeMap<_, _> =
         [(LandmarkId(1), on_wall(3.0, 1.0, 0.9, 2.0)), (POSTER, on_wall(5.0, 1.5, 0.6, 0.84))].into();
@@ -212,7 +212,7 @@ fn jointly_incompatible_observations_are_not_both_taken() {
     at.covariance[(0, 0)] = 0.04;
     let e = expectations(&at, &places);
     let from = |dx: f64, id: LandmarkId, random: &mut Random| {
-        let shown = seen(&at.pose.plus(&Vector3::new(dx, 0.0, 0.0)), &places, &mounting(), random);
+        let shown = full_views(&at.pose.plus(&Vector3::new(dx, 0.0, 0.0)), &places, &mounting(), random);
         let (id, corners) = *shown.iter().find(|s| s.0 == id).unwrap();
         observation(id, corners)
     };
@@ -238,7 +238,7 @@ fn order_of_observations_candidates_and_landmarks_changes_nothing() {
             1.5,
         );
         let truth = at.pose.plus(&draw3(&at.covariance, &mut random));
-        let mut observations: Vec<_> = seen(&truth, &places, &mounting(), &mut random)
+        let mut observations: Vec<_> = full_views(&truth, &places, &mounting(), &mut random)
             .into_iter()
             .map(|(id, c)| observation(id, c))
             .collect();
@@ -263,12 +263,12 @@ fn order_of_observations_candidates_and_landmarks_changes_nothing() {
 }
 
 #[test]
-fn extreme_input_is_refused_or_answered_and_lists_are_bounded() {
+fn extreme_input_gives_an_error_or_a_result_and_lists_are_bounded() {
     let places = corridor(2.0);
     let mut random = Random::new(13);
     let truth = Pose2::new(6.0, 0.0, 0.0);
     let e = expectations(&prior(truth, 0.03, 0.5), &places);
-    let shown = seen(&truth, &places, &mounting(), &mut random);
+    let shown = full_views(&truth, &places, &mounting(), &mut random);
     let one = observation(shown[0].0, shown[0].1);
     let p = AssociateParams::default();
     let refused = |o: Observation| match super::super::associate(&e, &[o], &p).unwrap_err() {
@@ -310,7 +310,7 @@ fn the_search_stops_at_its_bound_and_then_nothing_is_unique() {
     let mut random = Random::new(14);
     let truth = Pose2::new(1.5, 0.0, 0.0);
     let e = expectations(&prior(truth, 0.1, 1.0), &places);
-    let observations: Vec<_> = seen(&truth, &places, &mounting(), &mut random)
+    let observations: Vec<_> = full_views(&truth, &places, &mounting(), &mut random)
         .into_iter()
         .map(|(id, c)| observation(id, c))
         .collect();

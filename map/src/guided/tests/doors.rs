@@ -1,5 +1,5 @@
-//! Twelve identical doors in a row, the whole way from image to fused pose: used where the pose is right, no support
-//! for one that is wrong.
+//! Twelve identical doors in a row, from image to fused pose: doors correct a right pose and do not support a wrong
+//! one.
 
 mod fix_role;
 
@@ -11,7 +11,7 @@ use crate::{
 use vision::pose::landmark_pose;
 
 const SECOND: i64 = 1_000_000_000;
-/// Way of the robot between two frames.
+/// Distance between two frames.
 const STEP_M: f64 = 0.2;
 
 /// Doors 1 to 12 and the poster behind them; two more posters before the first door.
@@ -26,13 +26,13 @@ fn is_door(landmark: LandmarkId) -> bool {
     landmark.0 <= DOORS
 }
 
-/// What one frame did.
+/// Result of one frame.
 struct Frame {
     trust: Trust,
     decision: Decision,
     /// A poster was in full view.
     shows_poster: bool,
-    /// Unique guided observations that are what they are, and that are not.
+    /// Right and wrong unique guided observations.
     right: usize,
     wrong: usize,
     nodes: usize,
@@ -44,7 +44,7 @@ struct Drive {
     real_mounting: CameraExtrinsics,
     truth: Pose2,
     odometry: Pose2,
-    /// Of each metre driven, so much is measured.
+    /// Measured over true distance.
     measured: f64,
     now_ns: i64,
     fuser: Fuser,
@@ -53,7 +53,7 @@ struct Drive {
 }
 
 impl Drive {
-    /// A robot at `x_m`, whose pose is said to be `off_m` further on, to 5 cm and 1 degree.
+    /// A robot at `x_m` with a pose that is `off_m` too far, with 5 cm and 1 degree.
     fn new(spacing_m: f64, x_m: f64, off_m: f64, seed: u64) -> Self {
         let (map, mut random) = (house(spacing_m), Random::new(seed));
         let real = map.iter().map(|(id, place)| (*id, drawn_place(place, &mut random))).collect();
@@ -85,15 +85,15 @@ impl Drive {
             landmark_pose(c, &claimed, self.map[id].size, &camera()).map(|pose| (*id, pose)).ok()
         };
         let poses: Vec<_> = shown.iter().filter_map(of).collect();
-        let sightings: Vec<_> = poses
+        let observations: Vec<_> = poses
             .iter()
             .map(|(id, seen)| LandmarkObservation { landmark: *id, seen, place: &self.map[id] })
             .collect();
-        let all = (!sightings.is_empty()).then_some(sightings)?;
+        let all = (!observations.is_empty()).then_some(observations)?;
         Some(robot_pose(&all, &mounting(), prior, &LocaliseParams::default()).unwrap())
     }
 
-    /// One frame further on, as an engine does it.
+    /// Processes the next frame, as in the engine.
     fn frame(&mut self) -> Frame {
         let motion = Pose2::new(STEP_M * self.measured, 0.0, 0.0);
         self.truth = self.truth.compose(&Pose2::new(STEP_M, 0.0, 0.0));
@@ -102,7 +102,7 @@ impl Drive {
         self.fuser.apply_odometry(self.now_ns, self.odometry).unwrap();
         let before = self.fuser.pose_at(self.now_ns);
         let plan = self.schedule.plan(0, before.as_ref());
-        let shown = seen(&self.truth, &self.real, &self.real_mounting, &mut self.random);
+        let shown = full_views(&self.truth, &self.real, &self.real_mounting, &mut self.random);
         let mut made = Frame {
             trust: Trust::NoPose,
             decision: Decision::Keep,
@@ -182,7 +182,7 @@ impl Drive {
     }
 }
 
-/// A door may be any door, a poster is itself.
+/// A door has all doors as candidates, a poster only itself.
 fn any_of(landmark: LandmarkId, corners: Corners) -> Observation {
     let mut made = observation(landmark, corners);
     if !is_door(landmark) {
@@ -192,7 +192,7 @@ fn any_of(landmark: LandmarkId, corners: Corners) -> Observation {
 }
 
 #[test]
-fn with_a_known_pose_identical_doors_are_told_apart() {
+fn with_a_known_pose_identical_doors_are_named_rightly() {
     let mut random = Random::new(21);
     for (spacing_m, sigma_m, sigma_deg) in
         [(2.0, 0.05, 1.0), (2.0, 0.15, 1.5), (1.2, 0.05, 1.0), (1.2, 0.1, 2.0)]
@@ -211,7 +211,7 @@ fn with_a_known_pose_identical_doors_are_told_apart() {
             let real = places.iter().map(|(id, place)| (*id, drawn_place(place, &mut random))).collect();
             let seat = drawn_mounting(&mounting(), &mut random);
             let shown: Vec<_> =
-                seen(&truth, &real, &seat, &mut random).into_iter().filter(|s| is_door(s.0)).collect();
+                full_views(&truth, &real, &seat, &mut random).into_iter().filter(|s| is_door(s.0)).collect();
             let observations: Vec<_> = shown.iter().map(|(id, c)| observation(*id, *c)).collect();
             let e = expectations(&at, &places);
             let made = super::super::associate(&e, &observations, &AssociateParams::default()).unwrap();
@@ -219,7 +219,7 @@ fn with_a_known_pose_identical_doors_are_told_apart() {
             right += made.unique().filter(|(i, id)| *id == shown[*i].0).count();
             wrong += made.unique().filter(|(i, id)| *id != shown[*i].0).count();
             nodes = nodes.max(made.nodes);
-            // The joint distance of right assignments is chi2 where corners err by what they state and no more.
+            // The joint distance of right assignments is chi2 if corners have their stated errors only.
             let exact = AssociateParams { model_sigma_px: 0.0, ..AssociateParams::default() };
             let made = super::super::associate(&e, &observations, &exact).unwrap();
             if made.unique().count() == shown.len() {
@@ -238,9 +238,9 @@ fn with_a_known_pose_identical_doors_are_told_apart() {
 }
 
 #[test]
-fn a_robot_that_knows_where_it_is_uses_every_door() {
+fn a_robot_with_a_right_pose_uses_every_door() {
     let mut drive = Drive::new(2.0, -6.0, 0.0, 31);
-    // Wheels that are worn by 3 %: 0.7 m on the way along the doors.
+    // A scale error of 3 %: 0.7 m along the doors.
     drive.measured = 0.97;
     let (mut right, mut worst_m, mut frames) = (0, 0.0_f64, 0);
     while drive.truth.x_m < 24.0 {
@@ -259,8 +259,8 @@ fn a_robot_that_knows_where_it_is_uses_every_door() {
 }
 
 /// Drives with a pose that is wrong by `off_m` from between the doors until the poster has been in view for a while.
-/// Frames that show the poster until the pose is found out, and until it is right again.
-fn found_out(spacing_m: f64, off_m: f64, seed: u64) -> (usize, usize) {
+/// Frames with the poster until the pose is contradicted, and until it is right again.
+fn frames_to_recover(spacing_m: f64, off_m: f64, seed: u64) -> (usize, usize) {
     let mut drive = Drive::new(spacing_m, 2.5 * spacing_m, off_m, seed);
     let (mut shown, mut doubted, mut replaced, mut misled) = (0, None, None, 0);
     while drive.truth.x_m < 13.0 * spacing_m {
@@ -274,10 +274,13 @@ fn found_out(spacing_m: f64, off_m: f64, seed: u64) -> (usize, usize) {
             if matches!(frame.decision, Decision::Replace(_)) {
                 replaced = Some(shown);
             } else {
-                assert_ne!(frame.trust, Trust::Supported, "doors confirm nothing");
-                assert!(drive.error_m() > 0.5, "nothing but the poster tells");
+                assert_ne!(frame.trust, Trust::Supported, "doors support nothing");
+                assert!(drive.error_m() > 0.5, "only the poster can correct it");
                 let covariance = drive.fuser.pose().unwrap().pose.covariance;
-                assert!(covariance[(0, 0)] >= 0.0025, "doors make a wrong pose no surer: {covariance}");
+                assert!(
+                    covariance[(0, 0)] >= 0.0025,
+                    "doors must not make a wrong pose more certain: {covariance}"
+                );
             }
         } else {
             assert_eq!(frame.wrong, 0);
@@ -285,32 +288,32 @@ fn found_out(spacing_m: f64, off_m: f64, seed: u64) -> (usize, usize) {
     }
     let error_m = drive.error_m();
     println!(
-        "doors every {spacing_m} m, wrong by {off_m} m: {misled} doors taken for others; found out after {doubted:?}, replaced after {replaced:?} frames with the poster; {error_m:.3} m at the end"
+        "doors every {spacing_m} m, wrong by {off_m} m: {misled} wrong doors; contradicted after {doubted:?}, replaced after {replaced:?} frames with the poster; {error_m:.3} m at the end"
     );
     assert!(error_m < 0.15, "{error_m}");
     (doubted.unwrap(), replaced.unwrap())
 }
 
 #[test]
-fn a_prior_that_is_wrong_by_two_metres_is_never_confirmed_and_found_out() {
+fn a_prior_wrong_by_two_metres_is_never_supported_and_is_replaced() {
     for (seed, spacing_m) in [(41, 2.0), (42, 1.5), (43, 1.3)] {
         for off_m in [2.0, -2.0] {
-            let (doubted, replaced) = found_out(spacing_m, off_m, seed);
+            let (doubted, replaced) = frames_to_recover(spacing_m, off_m, seed);
             assert!(doubted <= 3 && replaced <= 3, "{spacing_m} {off_m}: {doubted} {replaced}");
         }
     }
 }
 
 #[test]
-fn a_kidnapped_robot_is_found_out_within_three_frames_that_show_a_poster() {
+fn a_kidnapped_robot_is_contradicted_within_three_frames_with_a_poster() {
     for by_m in [2.0, -2.0, 4.0] {
         let mut drive = Drive::new(2.0, -6.0, 0.0, 51);
-        // Two posters establish the pose, the doors keep it.
+        // Two posters establish the pose, the doors correct it.
         while drive.truth.x_m < 14.0 {
             drive.frame();
         }
         assert!(drive.error_m() < 0.15);
-        // Lifted along the corridor by whole spacings: odometry and doors do not notice.
+        // Carried along the corridor by whole spacings: odometry and doors fit as before.
         drive.truth = drive.truth.compose(&Pose2::new(by_m, 0.0, 0.0));
         let (mut shown, mut doubted, mut replaced) = (0, None, None);
         while drive.truth.x_m < 26.0 && replaced.is_none() {
@@ -324,7 +327,7 @@ fn a_kidnapped_robot_is_found_out_within_three_frames_that_show_a_poster() {
                 replaced = Some(shown);
             }
         }
-        println!("lifted by {by_m} m: found out after {doubted:?}, replaced after {replaced:?} frames");
+        println!("carried by {by_m} m: contradicted after {doubted:?}, replaced after {replaced:?} frames");
         assert!(doubted.is_some_and(|n| n <= 3), "{by_m}: {doubted:?}");
         assert!(replaced.is_some_and(|n| n <= 5), "{by_m}: {replaced:?}");
         for _ in 0..3 {
@@ -335,12 +338,12 @@ fn a_kidnapped_robot_is_found_out_within_three_frames_that_show_a_poster() {
 }
 
 #[test]
-fn an_established_pose_that_one_landmark_contradicts_is_doubted_and_doors_stop_to_correct_it() {
+fn a_contradicted_pose_is_no_longer_corrected_by_doors() {
     let mut drive = Drive::new(2.0, -6.0, 0.0, 52);
     while drive.truth.x_m < 2.0 {
         drive.frame();
     }
-    // Lifted by ten spacings, to before the last poster: nothing else that is unique is in view, or was expected to be.
+    // Carried by ten spacings, in front of the last poster: no other unique landmark is in view or expected.
     drive.truth = drive.truth.compose(&Pose2::new(20.0, 0.0, 0.0));
     let (mut shown, mut doubted) = (0, None);
     for _ in 0..14 {

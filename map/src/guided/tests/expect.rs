@@ -36,7 +36,7 @@ fn ahead(x_m: f64, y_m: f64, side_m: f64) -> LandmarkPlace {
 }
 
 #[test]
-fn a_frontal_square_is_where_the_pinhole_sees_it() {
+fn a_frontal_square_has_its_pinhole_corners() {
     let at = prior(Pose2::default(), 0.01, 0.1);
     let made = expected_by(&at, &level(0.0), &camera(), &ahead(4.0, 0.0, 1.0), &[]).unwrap();
     // 512 px * 0.5 m / 4 m = 64 px on either side of the principal point.
@@ -78,7 +78,7 @@ fn mean_nees(sigma_m: f64, sigma_deg: f64, range_m: f64, camera: &Intrinsics, ra
     let place = on_wall(6.0, 1.3, 0.7, 0.9);
     let (mut sum, draws) = (0.0, 400);
     for _ in 0..draws {
-        // Somewhere before it, looking at it.
+        // A pose in front of it, aimed at it.
         let azimuth = random.range(-1.0, 1.0);
         let (x, y) = (6.0 + range_m * azimuth.sin(), WALL_M - range_m * azimuth.cos());
         let believed = Pose2::new(x, y, (WALL_M - y).atan2(6.0 - x) - 60.0_f64.to_radians());
@@ -104,7 +104,7 @@ fn mean_nees(sigma_m: f64, sigma_deg: f64, range_m: f64, camera: &Intrinsics, ra
 }
 
 #[test]
-fn the_covariance_is_honest_near_and_far_sure_and_unsure() {
+fn the_covariance_is_consistent_at_all_ranges_and_priors() {
     let mut random = Random::new(7);
     for lens in [camera(), lens_camera()] {
         for (sigma_m, sigma_deg, range_m) in [
@@ -117,7 +117,7 @@ fn the_covariance_is_honest_near_and_far_sure_and_unsure() {
         ] {
             let mean = mean_nees(sigma_m, sigma_deg, range_m, &lens, &mut random);
             println!("{sigma_m} m, {sigma_deg} deg at {range_m} m: mean NEES {mean:.2} of 8");
-            // Standard deviation of the mean of 400 draws: 0.2. What is not linear adds caution, never confidence.
+            // Standard deviation of the mean of 400 draws: 0.2. Non-linearity makes it larger, never smaller.
             assert!((5.5..8.6).contains(&mean), "{sigma_m} {sigma_deg} {range_m}: {mean}");
         }
     }
@@ -159,7 +159,7 @@ fn derivatives_are_the_finite_differences() {
 }
 
 #[test]
-fn what_is_in_view_is_told() {
+fn visibility_of_landmarks_is_reported() {
     let at = prior(Pose2::default(), 0.01, 0.1);
     let of = |place: &LandmarkPlace, obstacles: &[Obstacle]| {
         expected_by(&at, &level(0.0), &camera(), place, obstacles)
@@ -190,7 +190,8 @@ fn what_is_in_view_is_told() {
     let hidden = of(&ahead(4.0, 0.0, 1.0), &[wall]).unwrap();
     assert_eq!(hidden.view, InView::Occluded { unoccluded_share: 0.0 });
     assert!(hidden.is_hidden && !hidden.is_sure);
-    // A wall that ends where the line of sight to the middle runs: two columns of three are free, and it is not sure.
+    // A wall that ends where the line of sight to the middle runs: two columns of three are free, and it is not
+    // surely in view.
     let beside = Obstacle { a: Point2::new(2.0, 0.02), b: Point2::new(2.0, 2.0), height_m: None };
     let partly = of(&ahead(4.0, 0.0, 1.0), &[beside]).unwrap();
     assert_eq!(partly.view, InView::Full);
@@ -203,12 +204,12 @@ fn what_is_in_view_is_told() {
 #[test]
 fn inside_its_visibility_area_no_line_of_sight_is_tested() {
     let place = ahead(4.0, 0.0, 1.0);
-    let (viewer, seen) =
+    let (viewer, limits) =
         (PanTiltCamera { camera_height_m: 1.0, ..PanTiltCamera::default() }, VisibilityParams::default());
-    let area = visibility(&place, &[], &viewer, &seen).unwrap();
+    let area = visibility(&place, &[], &viewer, &limits).unwrap();
     let (seat, camera) = (level(0.0), camera());
     let view = CameraView { mounting: &seat, intrinsics: &camera, image_px: IMAGE_PX };
-    // An obstacle that the area does not know of: the area decides where it has the robot inside, lines elsewhere.
+    // An obstacle that the area does not contain: the area decides inside of it, sight lines elsewhere.
     let wall = [Obstacle { a: Point2::new(2.0, -2.0), b: Point2::new(2.0, 2.0), height_m: None }];
     let at = prior(Pose2::default(), 0.01, 0.1);
     let share = |visible| {
@@ -221,7 +222,7 @@ fn inside_its_visibility_area_no_line_of_sight_is_tested() {
 }
 
 #[test]
-fn bad_input_is_refused_by_name_and_extreme_input_gives_a_list() {
+fn invalid_input_is_refused_with_its_field_and_extreme_input_gives_a_list() {
     let places = corridor(2.0);
     let (seat, camera) = (mounting(), camera());
     let view = CameraView { mounting: &seat, intrinsics: &camera, image_px: IMAGE_PX };

@@ -1,4 +1,4 @@
-//! The schedule by itself: when to search, what supports, what replaces.
+//! The schedule alone: searches, support, replacement.
 
 use super::*;
 use crate::{
@@ -23,7 +23,7 @@ fn fixed(landmark: u64, x_m: f64) -> FixResult {
     FixResult::Fixed(Box::new(fix(landmark, x_m)))
 }
 
-/// A robot that drives 0.1 m a frame; the pose is where it says.
+/// A robot that drives 0.1 m a frame, with an exact pose.
 struct Drive {
     schedule: Schedule,
     x_m: f64,
@@ -120,7 +120,7 @@ fn every_third_frame_is_searched_every_second_without_support_and_all_when_it_is
 }
 
 #[test]
-fn an_uncertain_pose_and_what_guided_recognition_misses_ask_for_a_search() {
+fn an_uncertain_pose_and_guided_misses_cause_a_search() {
     let schedule = Schedule::default();
     let reason =
         |sigma_m, sigma_deg| schedule.plan(0, Some(&prior(Pose2::default(), sigma_m, sigma_deg))).global;
@@ -134,7 +134,7 @@ fn an_uncertain_pose_and_what_guided_recognition_misses_ask_for_a_search() {
 }
 
 #[test]
-fn an_unsupported_pose_yields_to_one_landmark_within_three_frames() {
+fn an_unsupported_pose_is_replaced_by_one_landmark_within_three_frames() {
     // Whatever the phase of the interval.
     for before in 0..4 {
         let mut drive = Drive::new();
@@ -146,7 +146,7 @@ fn an_unsupported_pose_yields_to_one_landmark_within_three_frames() {
 }
 
 #[test]
-fn an_established_pose_is_doubted_within_three_frames_and_yields_to_two_witnesses() {
+fn an_established_pose_is_contradicted_within_three_frames_and_replaced_by_two_witnesses() {
     let established = || {
         let mut drive = Drive::new();
         drive.run(3, Some((1, 0.0)));
@@ -154,19 +154,16 @@ fn an_established_pose_is_doubted_within_three_frames_and_yields_to_two_witnesse
         assert_eq!(drive.schedule.trust(), Trust::Supported);
         drive
     };
-    // One landmark that was moved: doubted, and kept until the support is stale.
+    // One landmark that was moved: the pose is contradicted, and stays until its support is stale.
     let mut drive = established();
     let found = (1..=10).find(|_| matches!(drive.frame(Some((7, 2.0)), &[]).1, Decision::Doubt { .. }));
     assert!(found.unwrap() <= 3, "{found:?}");
     assert_eq!(drive.schedule.trust(), Trust::Contradicted);
     let at = prior(Pose2::default(), 0.03, 0.5);
-    assert!(
-        !drive.schedule.plan(0, Some(&at)).guided,
-        "no guided recognition by a pose that is contradicted"
-    );
+    assert!(!drive.schedule.plan(0, Some(&at)).guided, "no guided recognition with a contradicted pose");
     assert_eq!(drive.until_replaced(7, 2.0, &[], 15), None);
-    assert!(drive.until_replaced(7, 2.0, &[], 30).is_some(), "support that is stale protects nothing");
-    // It is missed where it was; that is no second witness.
+    assert!(drive.until_replaced(7, 2.0, &[], 30).is_some(), "stale support protects nothing");
+    // Missing it at its place is no second witness.
     let mut drive = established();
     assert_eq!(drive.until_replaced(7, 2.0, &[7], 15), None);
     // A second landmark, or another that is missed, is.
@@ -176,7 +173,7 @@ fn an_established_pose_is_doubted_within_three_frames_and_yields_to_two_witnesse
     let mut drive = established();
     let frames = drive.until_replaced(7, 2.0, &[1], 10).unwrap();
     assert!(frames <= 5, "{frames}");
-    // Agreement ends the doubt.
+    // Agreement ends the contradiction.
     let mut drive = established();
     drive.run(3, Some((7, 2.0)));
     assert_eq!(drive.schedule.trust(), Trust::Contradicted);
@@ -205,7 +202,7 @@ fn contradictions_that_disagree_do_not_add_up_and_ambiguous_fixes_replace_nothin
         };
         assert_eq!(schedule.finish(&report), Decision::Doubt { in_a_row: 0 });
     }
-    // One of the solutions agrees: it says nothing.
+    // One of the solutions agrees: no contradiction.
     let one_agrees = FixResult::Ambiguous(vec![fix(7, 0.0), fix(7, 4.0)]);
     let report = FrameReport {
         camera: 0,
@@ -236,7 +233,7 @@ fn a_fix_that_a_prior_decided_supports_nothing() {
 }
 
 #[test]
-fn memory_is_bounded_and_extreme_numbers_do_no_harm() {
+fn memory_is_bounded_and_extreme_numbers_are_tolerated() {
     let mut schedule = Schedule::default();
     let at = prior(Pose2::default(), 0.03, 0.5);
     for id in 0..100 {
@@ -287,12 +284,12 @@ fn guided_fixes_correct_only_a_pose_that_has_had_support() {
     assert_eq!((drive.schedule.trust(), drive.schedule.guided_corrects()), (Trust::Unsupported, false));
     drive.run(2, Some((1, 0.0)));
     assert!(drive.schedule.guided_corrects());
-    // For as long as nothing contradicts it, however long ago that was.
+    // While nothing contradicts it, however old the support is.
     drive.run(300, None);
     assert_eq!((drive.schedule.trust(), drive.schedule.guided_corrects()), (Trust::Stale, true));
     assert!(matches!(drive.frame(Some((7, 2.0)), &[]).1, Decision::Doubt { in_a_row: 1 }));
     assert!(!drive.schedule.guided_corrects());
-    // Not in the frame that replaces it: that was looked at by the pose before.
+    // Not in the frame that replaces it: its guided recognition used the old pose.
     assert!(matches!(drive.frame(Some((7, 2.0)), &[]).1, Decision::Replace(_)));
     assert!(!drive.schedule.guided_corrects());
     drive.frame(None, &[]);
@@ -304,7 +301,7 @@ fn guided_fixes_correct_only_a_pose_that_has_had_support() {
 }
 
 #[test]
-fn every_camera_is_searched_and_their_number_is_bounded() {
+fn every_camera_has_its_interval_and_their_number_is_bounded() {
     let at = prior(Pose2::default(), 0.03, 0.5);
     let mut schedule = Schedule::default();
     let mut searched = [0; 2];

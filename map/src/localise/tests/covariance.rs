@@ -2,14 +2,16 @@
 
 use crate::localise::{
     fix::{FixResult, NuisanceKey},
-    tests::{camera, draw, fix_of, fixed, look, mounting, moved, nees, off, place, robot, seen_by, stated},
+    tests::{
+        camera, draw, fix_of, fixed, mounting, moved, nees, observe, observe_by, off, place, robot, stated,
+    },
 };
 use nalgebra::Matrix3;
 use vision::{model::LandmarkId, pose::reprojection::perturbed, random::Random};
 
 #[test]
-fn covariance_is_honest_in_twelve_cells() {
-    // reliability: distance x obliquity x noise. Place, mounting and corners are drawn anew each time.
+fn covariance_is_consistent_in_twelve_cells() {
+    // Distance x view angle x noise. Place, extrinsics and corners are drawn anew each time.
     let mut random = Random::new(3);
     let (mut outside, mut wild, mut all) = (0, 0, 0);
     for sigma_px in [0.3, 0.8] {
@@ -18,12 +20,12 @@ fn covariance_is_honest_in_twelve_cells() {
                 let (mut sum, mut n) = (0.0, 0);
                 for _ in 0..200 {
                     let truth = robot(&place(), d, psi);
-                    let hung = moved(&place(), &draw(&place().covariance, &mut random));
+                    let true_place = moved(&place(), &draw(&place().covariance, &mut random));
                     let m = mounting();
                     let e = draw(&m.covariance, &mut random);
                     let (turn, shift) = (e.fixed_rows::<3>(0).into(), e.fixed_rows::<3>(3).into());
                     let mounted = perturbed(&m.robot_from_camera, &turn, &shift);
-                    let seen = look(&truth, &hung, &mounted, sigma_px, &mut random).unwrap();
+                    let seen = observe(&truth, &true_place, &mounted, sigma_px, &mut random).unwrap();
                     if let FixResult::Fixed(fix) = fix_of(&seen, &place(), None) {
                         let value = nees(&fix, &truth);
                         wild += usize::from(value > 30.0);
@@ -43,24 +45,24 @@ fn covariance_is_honest_in_twelve_cells() {
 }
 
 #[test]
-fn what_the_camera_has_wrong_is_in_the_covariance_and_lasts() {
-    // Oracle: a camera drawn anew each time, with places, mounting and corners.
+fn errors_of_intrinsics_are_in_the_covariance_and_shared() {
+    // Oracle: a camera drawn anew each time, with places, extrinsics and corners.
     let mut random = Random::new(13);
     for (d, psi) in [(2.0, 45.0), (4.0, 30.0), (3.0, 10.0)] {
         let (mut sum, mut as_exact, mut n) = (0.0, 0.0, 0.0);
         for _ in 0..250 {
             let mut truth = robot(&place(), d, psi);
             truth.theta_rad += 0.2;
-            let hung = moved(&place(), &draw(&place().covariance, &mut random));
+            let true_place = moved(&place(), &draw(&place().covariance, &mut random));
             let m = mounting();
             let e = draw(&m.covariance, &mut random);
             let (turn, shift) = (e.fixed_rows::<3>(0).into(), e.fixed_rows::<3>(3).into());
             let mounted = perturbed(&m.robot_from_camera, &turn, &shift);
-            let view = mounted.inverse() * truth.to_isometry3().inverse() * hung.map_from_landmark();
+            let view = mounted.inverse() * truth.to_isometry3().inverse() * true_place.map_from_landmark();
             let real = off(&stated().error_sigmas().map(|s| s * random.normal()));
             let seed = random.clone();
-            let seen = seen_by(&real, &stated(), &view, hung.size, 0.4, &mut random).unwrap();
-            let bare = seen_by(&real, &camera(), &view, hung.size, 0.4, &mut seed.clone()).unwrap();
+            let seen = observe_by(&real, &stated(), &view, true_place.size, 0.4, &mut random).unwrap();
+            let bare = observe_by(&real, &camera(), &view, true_place.size, 0.4, &mut seed.clone()).unwrap();
             let (FixResult::Fixed(fix), FixResult::Fixed(exact)) =
                 (fix_of(&seen, &place(), None), fix_of(&bare, &place(), None))
             else {
@@ -79,12 +81,12 @@ fn what_the_camera_has_wrong_is_in_the_covariance_and_lasts() {
 }
 
 #[test]
-fn seen_from_the_front_it_is_careful_rather_than_sure() {
+fn from_the_front_the_covariance_is_conservative() {
     let mut random = Random::new(5);
     let truth = robot(&place(), 6.0, 0.0);
     let (mut sum, mut n, mut heading) = (0.0, 0.0, 0.0);
     for _ in 0..200 {
-        let seen = look(&truth, &place(), &mounting().robot_from_camera, 0.5, &mut random).unwrap();
+        let seen = observe(&truth, &place(), &mounting().robot_from_camera, 0.5, &mut random).unwrap();
         if let FixResult::Fixed(fix) = fix_of(&seen, &place(), None) {
             (sum, n) = (sum + nees(&fix, &truth), n + 1.0);
             heading += fix.pose.covariance[(2, 2)].sqrt();
@@ -100,7 +102,7 @@ fn parts_of_the_covariance_add_up() {
     let mut random = Random::new(12);
     for psi in [0.0, 15.0, 50.0] {
         let truth = robot(&place(), 4.0, psi);
-        let seen = look(&truth, &place(), &mounting().robot_from_camera, 0.5, &mut random).unwrap();
+        let seen = observe(&truth, &place(), &mounting().robot_from_camera, 0.5, &mut random).unwrap();
         let fix = fixed(fix_of(&seen, &place(), None));
         let mut sum = fix.noise;
         for n in &fix.nuisances {

@@ -4,7 +4,7 @@ use crate::{
     extrinsics::CameraExtrinsics,
     localise::{
         planar::Planar,
-        tests::{SIZE, camera, look, mounting, moved, off, place, robot, seen_by, sighting, stated},
+        tests::{SIZE, camera, mounting, moved, observation, observe, observe_by, off, place, robot, stated},
     },
     place::LandmarkPlace,
     pose2::Pose2,
@@ -21,10 +21,10 @@ fn derivatives_are_the_finite_differences() {
     let truth = robot(&place(), 3.0, 25.0);
     let mut tilted = place();
     tilted.roll_rad = 0.05;
-    let seen = look(&truth, &tilted, &mounting().robot_from_camera, 0.5, &mut random).unwrap();
+    let seen = observe(&truth, &tilted, &mounting().robot_from_camera, 0.5, &mut random).unwrap();
     let residual = |pose: &Pose2, place: &LandmarkPlace, mounting: &CameraExtrinsics| {
-        let sightings = [sighting(1, &seen, place)];
-        Planar::new(&sightings, mounting).linearise(pose).unwrap()
+        let observations = [observation(1, &seen, place)];
+        Planar::new(&observations, mounting).linearise(pose).unwrap()
     };
     let at = residual(&truth, &tilted, &mounting());
     let h = 1e-6;
@@ -33,7 +33,7 @@ fn derivatives_are_the_finite_differences() {
         d[k] = h;
         let up = residual(&truth.plus(&d), &tilted, &mounting()).residual;
         let down = residual(&truth.plus(&-d), &tilted, &mounting()).residual;
-        // The residual is seen minus predicted.
+        // The residual is measured minus predicted.
         assert!(((down - up) / (2.0 * h) - at.by_pose.column(k)).norm() < 1e-4, "pose {k}");
     }
     for k in 0..6 {
@@ -59,14 +59,14 @@ fn derivatives_by_the_camera_are_the_finite_differences() {
     let truth = robot(&place(), 3.0, 25.0);
     let view =
         mounting().robot_from_camera.inverse() * truth.to_isometry3().inverse() * place().map_from_landmark();
-    let seen = seen_by(&camera(), &stated(), &view, SIZE, 0.0, &mut random).unwrap();
+    let seen = observe_by(&camera(), &stated(), &view, SIZE, 0.0, &mut random).unwrap();
     let (home, mounting) = (place(), mounting());
-    let sightings = [sighting(1, &seen, &home)];
-    let at = Planar::new(&sightings, &mounting).linearise(&truth).unwrap();
+    let observations = [observation(1, &seen, &home)];
+    let at = Planar::new(&observations, &mounting).linearise(&truth).unwrap();
     for (k, h) in [1e-6, 1e-3, 1e-3].into_iter().enumerate() {
         let mut d = Vector3::zeros();
         d[k] = h;
-        // What is predicted, by another camera: the corners that it sees.
+        // Predicted corners by another camera.
         let predicted = |d: Vector3<f64>| corner_points(&SIZE).map(|p| pixel(&view, &p, &off(&d)).unwrap());
         for (c, (up, down)) in predicted(d).iter().zip(predicted(-d)).enumerate() {
             let numeric = (up - down) / (2.0 * h);

@@ -1,4 +1,4 @@
-//! Exact places, an honest covariance, refusals.
+//! Exact places, a consistent covariance, refusals.
 
 use super::*;
 use crate::{
@@ -58,12 +58,12 @@ fn projected(
     corner_points(&place.size).map(|p| pixel(&camera_from_landmark, &p, camera).unwrap())
 }
 
-/// As it is said to be: focal length to 0.8 %, principal point to 3 px.
+/// Stated intrinsics: focal length to 0.8 %, principal point to 3 px.
 fn stated() -> Intrinsics {
     camera().with_sigmas(IntrinsicsSigmas { focal_px: 4.0, center_px: 3.0 }).unwrap()
 }
 
-fn look(points: [Point2<f64>; 4], robot: &Pose2Covariance) -> Result<CeilingRectangle, PlacementError> {
+fn view_of(points: [Point2<f64>; 4], robot: &Pose2Covariance) -> Result<CeilingRectangle, PlacementError> {
     let view = PosedView {
         corners: &Corners::new(points).unwrap(),
         covariance_px2: &[Matrix2::identity() * 0.25; 4],
@@ -79,7 +79,7 @@ fn exact_views_give_the_exact_place() {
     let views: Vec<_> = [0.0, 1.0, -2.0]
         .map(|direction| {
             let robot = robot(direction);
-            look(project(&truth(2.6), &robot.pose, &mounting()), &robot).unwrap()
+            view_of(project(&truth(2.6), &robot.pose, &mounting()), &robot).unwrap()
         })
         .into();
     let made = ceiling_placement(&views, &CEILING, &PlacementParams::default()).unwrap();
@@ -89,13 +89,13 @@ fn exact_views_give_the_exact_place() {
 }
 
 #[test]
-fn the_covariance_is_honest() {
-    // Oracle: Monte Carlo with corners, robot, mounting, camera and ceiling drawn anew.
+fn the_covariance_is_consistent() {
+    // Oracle: Monte Carlo with corners, robot, extrinsics, camera and ceiling drawn anew.
     let mut random = Random::new(7);
     for directions in [vec![0.4], vec![0.4, 2.0, -1.5]] {
         let (mut sum, mut n, mut beyond) = (0.0, 0.0, 0);
         for _ in 0..400 {
-            let hung = truth(2.6 + 0.01 * random.normal());
+            let true_place = truth(2.6 + 0.01 * random.normal());
             let m = mounting();
             let e = m.covariance.map_diagonal(f64::sqrt).map(|s| s * random.normal());
             let (turn, shift) = (e.fixed_rows::<3>(0).into(), e.fixed_rows::<3>(3).into());
@@ -113,12 +113,13 @@ fn the_covariance_is_honest() {
                     let stood = believed.pose.plus(&e);
                     let noise =
                         |p: Point2<f64>, r: &mut Random| p + Vector2::new(r.normal(), r.normal()) * 0.5;
-                    let points = projected(&taken_by, &hung, &stood, &real).map(|p| noise(p, &mut random));
-                    look(points, &believed).unwrap()
+                    let points =
+                        projected(&taken_by, &true_place, &stood, &real).map(|p| noise(p, &mut random));
+                    view_of(points, &believed).unwrap()
                 })
                 .collect();
             let made = ceiling_placement(&views, &CEILING, &PlacementParams::default()).unwrap();
-            let e = error_of(&made.place, &hung);
+            let e = error_of(&made.place, &true_place);
             let value = e.dot(&made.place.covariance.cholesky().unwrap().solve(&e));
             (sum, n) = (sum + value, n + 1.0);
             beyond += usize::from((0..6).any(|k| e[k].powi(2) > 9.0 * made.place.covariance[(k, k)]));
@@ -131,11 +132,11 @@ fn the_covariance_is_honest() {
 }
 
 #[test]
-fn what_is_not_up_there_is_refused() {
+fn an_object_not_under_the_ceiling_is_refused() {
     let robot = robot(0.4);
-    // A poster on a wall, seen by the same camera.
+    // A poster on a wall, viewed by the same camera.
     let wall = LandmarkPlace { tilt_rad: 0.0, theta_rad: 0.4 + std::f64::consts::PI, z_m: 2.2, ..truth(2.6) };
-    let refused = look(project(&wall, &robot.pose, &mounting()), &robot);
+    let refused = view_of(project(&wall, &robot.pose, &mounting()), &robot);
     assert!(
         matches!(refused, Err(PlacementError::NotOnCeiling { .. } | PlacementError::NoWall)),
         "{refused:?}"

@@ -6,7 +6,7 @@ use crate::slam::{
 use vision::random::Random;
 
 #[test]
-fn branch_and_bound_finds_what_trying_everything_finds() {
+fn branch_and_bound_equals_exhaustive_search() {
     let mut random = Random::new(1);
     let p = CorrelativeParams { cell_m: 0.1, sigma_m: 0.15, turn_rad: 0.05 };
     for (x, y, theta) in [(5.0, 1.0, 0.1), (23.0, 8.0, 1.6), (12.0, 15.2, 3.0)] {
@@ -30,7 +30,7 @@ fn branch_and_bound_finds_what_trying_everything_finds() {
 }
 
 #[test]
-fn a_window_without_anything_gives_nothing() {
+fn a_window_without_surfaces_gives_nothing() {
     let p = CorrelativeParams::default();
     let field = LikelihoodField::new(std::iter::empty(), &Point2::origin(), 10.0, 1.0, &p);
     let window = PoseWindow { middle: Pose2::default(), reach_m: 0.5, reach_rad: 0.1, pull: 0.0 };

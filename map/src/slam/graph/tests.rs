@@ -127,7 +127,7 @@ fn the_covariance_is_that_of_many_draws() {
 }
 
 #[test]
-fn a_false_loop_is_outvoted() {
+fn a_false_loop_loses_its_weight() {
     let mut random = Random::new(5);
     let truth = poses(30, &mut random);
     let mut edges = graph(&truth, 0.02, &mut random);
@@ -153,7 +153,7 @@ fn a_false_loop_is_outvoted() {
 }
 
 #[test]
-fn what_cannot_be_fitted_is_refused() {
+fn unsolvable_graphs_are_refused() {
     let edge = |from, to| PoseConstraint {
         from,
         to,

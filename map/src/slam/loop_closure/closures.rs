@@ -22,9 +22,9 @@ const MAX_WAITING: usize = 64;
 /// A closed loop.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LoopClosure {
-    /// Index of the keyframe met again.
+    /// Index of the earlier keyframe.
     pub old: usize,
-    /// Index of the keyframe that met it.
+    /// Index of the later keyframe, which revisits it.
     pub new: usize,
     /// Relative pose of the new keyframe, with covariance.
     pub old_from_new: Pose2Covariance,

@@ -12,7 +12,7 @@ pub(super) const MAX_REACH_RAD: f64 = 0.9;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LoopParams {
-    /// A place is met again only after this distance along the path, metres.
+    /// A place counts as revisited only after this distance along the path, metres.
     pub min_way_m: f64,
     /// Poses nearer than this, plus their uncertainty, may observe the same walls, metres.
     pub near_m: f64,

@@ -45,13 +45,15 @@ pub(super) fn verify_loop(
     let l = &p.loops;
     let sure = belief.sigma_m <= l.sure_m;
     let limit_m = keys[new].path_m - 0.5 * l.min_way_m;
-    let old_scans: Vec<(Pose2, &Cloud)> =
-        around(keys, old, l.old_m).filter(|k| k.path_m <= limit_m).map(|k| seen_from(keys, old, k)).collect();
+    let old_scans: Vec<(Pose2, &Cloud)> = around(keys, old, l.old_m)
+        .filter(|k| k.path_m <= limit_m)
+        .map(|k| in_frame_of(keys, old, k))
+        .collect();
     let query = if sure {
         keys[new].cloud.clone()
     } else {
         let way = around(keys, new, l.new_m);
-        joined(way.map(|k| seen_from(keys, new, k)))
+        joined(way.map(|k| in_frame_of(keys, new, k)))
     };
     let guess = if belief.sigma_m > SURE_M {
         search(&old_scans, &query, belief, p)?
@@ -106,12 +108,12 @@ fn search(old_scans: &[(Pose2, &Cloud)], query: &Cloud, belief: &LoopPrior, p: &
 }
 
 /// Keyframes within a distance along the path of one of them, before and after.
-fn around(keys: &[Keyframe], i: usize, way_m: f64) -> impl Iterator<Item = &Keyframe> {
+fn around(keys: &[Keyframe], i: usize, distance_m: f64) -> impl Iterator<Item = &Keyframe> {
     let here = keys[i].path_m;
-    keys.iter().filter(move |k| (k.path_m - here).abs() <= way_m)
+    keys.iter().filter(move |k| (k.path_m - here).abs() <= distance_m)
 }
 
-fn seen_from<'a>(keys: &[Keyframe], i: usize, key: &'a Keyframe) -> (Pose2, &'a Cloud) {
+fn in_frame_of<'a>(keys: &[Keyframe], i: usize, key: &'a Keyframe) -> (Pose2, &'a Cloud) {
     (keys[i].pose.between(&key.pose), &key.cloud)
 }
 

@@ -15,7 +15,7 @@ use nalgebra::{Point2, Rotation2, Vector2};
 use std::f64::consts::FRAC_PI_2;
 
 /// The same scene with the landmark under the ceiling, on the floor or leaning, at any height, and a camera that
-/// looks there.
+/// can be tilted to it.
 fn random_tilted_map(seed: u64) -> (LandmarkPlace, Vec<Obstacle>, PanTiltCamera) {
     let (mut landmark, mut obstacles, mut viewer) = random_map(seed);
     let mut dice = Dice::new(5000 + seed);
@@ -27,7 +27,7 @@ fn random_tilted_map(seed: u64) -> (LandmarkPlace, Vec<Obstacle>, PanTiltCamera)
     let rise = dice.within(-0.3, 2.5);
     landmark.z_m = viewer.camera_height_m + rise.copysign(rise * landmark.tilt_rad);
     viewer.tilt_rad = [dice.within(-1.5, -0.6), dice.within(0.6, 1.5)];
-    // Its own wall would cut what leans out of it.
+    // Its own wall would cut a leaning landmark.
     obstacles.pop();
     (landmark, obstacles, viewer)
 }
@@ -70,10 +70,10 @@ pub(super) fn random_map(seed: u64) -> (LandmarkPlace, Vec<Obstacle>, PanTiltCam
 
 type Scene = fn(u64) -> (LandmarkPlace, Vec<Obstacle>, PanTiltCamera);
 
-/// How many of 200 points each of so many maps were compared, how many differ, from how many it is seen.
+/// Over 200 points of each map: points compared, points that differ, points from which it is visible.
 fn compared_with_brute_force(scene: Scene, seeds: u64) -> (u32, u32, u32) {
     let p = VisibilityParams::default();
-    let (mut looked, mut differ, mut seen) = (0, 0, 0);
+    let (mut compared, mut differ, mut visible) = (0, 0, 0);
     for seed in 0..seeds {
         let (landmark, obstacles, viewer) = scene(seed);
         let map = visibility(&landmark, &obstacles, &viewer, &p).unwrap();
@@ -85,27 +85,27 @@ fn compared_with_brute_force(scene: Scene, seeds: u64) -> (u32, u32, u32) {
             let expected = pointwise::sees(&landmark, &obstacles, &viewer, &p, &q);
             let by_polygon = map.polygons().iter().any(|polygon| polygon.contains(&q));
             assert_eq!(by_polygon, map.contains(&q), "{seed} {q}: polygon and bounds");
-            looked += 1;
+            compared += 1;
             differ += u32::from(by_polygon != expected);
-            seen += u32::from(expected);
+            visible += u32::from(expected);
         }
     }
-    (looked, differ, seen)
+    (compared, differ, visible)
 }
 
 #[test]
 fn polygons_agree_with_brute_force() {
-    // Oracle: every condition at every point by itself. The whole comparison is `waymark-lab evaluate visibility`.
-    let (looked, differ, seen) = compared_with_brute_force(random_map, 40);
-    assert!(seen > 500, "{seen} of {looked}");
-    assert!(differ <= 1, "{differ} of {looked}");
+    // Oracle: every condition at every point separately. The whole comparison is `waymark-lab evaluate visibility`.
+    let (compared, differ, visible) = compared_with_brute_force(random_map, 40);
+    assert!(visible > 500, "{visible} of {compared}");
+    assert!(differ <= 1, "{differ} of {compared}");
 }
 
 #[test]
 fn tilted_polygons_agree_with_brute_force() {
-    let (looked, differ, seen) = compared_with_brute_force(random_tilted_map, 120);
-    assert!(seen > 1000, "{seen} of {looked}");
-    assert!(differ <= 2, "{differ} of {looked}");
+    let (compared, differ, visible) = compared_with_brute_force(random_tilted_map, 120);
+    assert!(visible > 1000, "{visible} of {compared}");
+    assert!(differ <= 2, "{differ} of {compared}");
 }
 
 /// The area over that counted on grids, of 12 maps.
@@ -119,11 +119,11 @@ fn area_over_counted(scene: Scene) -> f64 {
         let centre = Point2::new(landmark.x_m, landmark.y_m);
         let cell = 2.0 * reach / f64::from(side);
         let at = |i: i32| (f64::from(i) + 0.5) * cell - reach;
-        let seen = (0..side * side).filter(|i| {
+        let visible = (0..side * side).filter(|i| {
             let q = centre + Vector2::new(at(i / side), at(i % side));
             pointwise::sees(&landmark, &obstacles, &viewer, &p, &q)
         });
-        expected += seen.count() as f64 * cell * cell;
+        expected += visible.count() as f64 * cell * cell;
         got += map.area_m2();
         let parts: f64 = map.polygons().iter().map(Polygon::area_m2).sum();
         assert!((parts - map.area_m2()).abs() < 1e-9);

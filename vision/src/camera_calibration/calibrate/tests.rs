@@ -1,4 +1,4 @@
-//! Exact views give the exact camera, the accuracy asked for, honest covariance, OpenCV's answer, refusals.
+//! Exact views give the exact camera; accuracy with noise; consistent covariance; agreement with OpenCV; refusals.
 
 use super::*;
 use crate::{
@@ -93,7 +93,7 @@ fn exact_views_give_the_exact_camera() {
             }
         }
     }
-    // Pixels that are not square, known to be so.
+    // Pixels that are not square, the ratio known.
     let tall = Intrinsics { fy_px: 990.0, ..camera() };
     let views = views_of(&tall, 6, 0.0, &mut random);
     let p = CalibrateParams { pixel_aspect: 1.1, ..CalibrateParams::default() };
@@ -101,7 +101,7 @@ fn exact_views_give_the_exact_camera() {
 }
 
 #[test]
-fn what_is_unknown_is_found_as_well() {
+fn unknown_pixel_aspect_and_plane_aspect_are_estimated() {
     let mut random = Random::new(2);
     let base = CalibrateParams::default();
     let tall = Intrinsics { fy_px: 990.0, ..camera() };
@@ -114,7 +114,7 @@ fn what_is_unknown_is_found_as_well() {
     let found = calibrate(&views, IMAGE, &p).unwrap();
     assert!((found.height_m.unwrap() - HEIGHT_M).abs() < 1e-7 && worst(&found.camera, &camera()) < 1e-8);
 
-    // The plane's height is not 1.19 m but claimed to be 0.84.
+    // The plane is 1.19 m high; the views state 0.84 m.
     for point in views.iter_mut().flat_map(|v| &mut v.plane_m) {
         point.y *= 0.84 / 1.19;
     }
@@ -122,7 +122,7 @@ fn what_is_unknown_is_found_as_well() {
     let found = calibrate(&views, IMAGE, &p).unwrap();
     assert!(worst(&found.camera, &camera()) < 1e-7, "{:?}", found.camera);
     assert!((found.aspect_ratio - 1.19 / 0.84).abs() < 1e-7);
-    // Taken at its word it does not fit, or gives another camera.
+    // With the stated aspect held fixed the views do not fit, or give another camera.
     let wrong = calibrate(&views, IMAGE, &base);
     assert!(wrong.is_err() || worst(&wrong.unwrap().camera, &camera()) > 0.02);
 
@@ -161,7 +161,7 @@ fn rms(all: &[f64]) -> f64 {
 }
 
 #[test]
-fn ten_views_are_as_good_as_asked() {
+fn ten_views_reach_the_required_accuracy() {
     // Issue: median 0.4 % at 0.3 px, 0.6 % at 0.5 px, 10 views.
     let p = CalibrateParams::default();
     for (sigma_px, asked) in [(0.3, 0.004), (0.5, 0.006)] {
@@ -171,7 +171,7 @@ fn ten_views_are_as_good_as_asked() {
 }
 
 #[test]
-fn more_constraints_do_no_harm() {
+fn constraints_lower_the_error_of_the_linear_solution() {
     // Method 16.5: at 5 views C2 and C3 lower the RMS of the linear solution; unscaled they raise it.
     let rms_of =
         |p: &CalibrateParams| rms(&errors(5, 0.5, &CalibrateParams { refine: false, ..p.clone() }, 5));
@@ -181,29 +181,29 @@ fn more_constraints_do_no_harm() {
 }
 
 #[test]
-fn covariance_is_honest() {
+fn errors_agree_with_the_covariance() {
     let mut random = Random::new(9);
     for (n, p) in [(6, 0), (10, 0), (6, 3)].map(|(n, i)| (n, constraint_sets()[i].clone())) {
-        let (mut sum, mut kept) = (0.0, 0.0);
+        let (mut sum, mut calibrated) = (0.0, 0.0);
         for _ in 0..200 {
             let Ok(found) = calibrate(&views_of(&camera(), n, 0.5, &mut random), IMAGE, &p) else { continue };
             let c = found.covariance.unwrap().fixed_view::<3, 3>(0, 0).into_owned();
             let (a, b) = (&found.camera, camera());
             let e = Vector3::new(a.fx_px - b.fx_px, a.cx_px - b.cx_px, a.cy_px - b.cy_px);
             sum += e.dot(&c.cholesky().unwrap().solve(&e));
-            kept += 1.0;
+            calibrated += 1.0;
         }
         // Mean of chi2 with 3 degrees of freedom over 200 draws: 99 % within 2.57 to 3.46. Where roll and height are
-        // held far better than claimed (they are exact here), it may be less.
-        let mean = sum / kept;
-        assert!((2.2..3.6).contains(&mean) && kept > 150.0, "{n} {p:?}: {mean} of {kept}");
+        // known much better than stated (they are exact here), the mean may be lower.
+        let mean = sum / calibrated;
+        assert!((2.2..3.6).contains(&mean) && calibrated > 150.0, "{n} {p:?}: {mean} of {calibrated}");
     }
 }
 
 #[test]
-fn views_that_repeat_each_other_are_refused() {
+fn views_of_one_orientation_are_refused() {
     let p = CalibrateParams::default();
-    let look = |turn: [f64; 3], shift: [f64; 3]| {
+    let view = |turn: [f64; 3], shift: [f64; 3]| {
         // Front view: x out of the poster towards the camera.
         let front = Matrix3::new(0.0, 1.0, 0.0, 0.0, 0.0, -1.0, -1.0, 0.0, 0.0);
         let rotation = Rotation3::from_scaled_axis(Vector3::from(turn)).into_inner() * front;
@@ -212,26 +212,26 @@ fn views_that_repeat_each_other_are_refused() {
     };
     let shifts = [[0.0, 0.0, 2.0], [0.2, 0.1, 2.5], [-0.4, 0.1, 3.0], [0.1, -0.1, 1.8], [0.3, 0.2, 3.4]];
     for turn in [[0.0, 0.6, 0.0], [0.0; 3]] {
-        let views = shifts.map(|s| look(turn, s));
+        let views = shifts.map(|s| view(turn, s));
         let refused = calibrate(&views, IMAGE, &p);
         assert!(
             matches!(refused, Err(CalibrateError::Orientations { orientations: 1, wanted: 3, .. })),
             "{refused:?}"
         );
-        // The linear system says so as well.
+        // The linear system is degenerate, too.
         let h: Vec<_> =
             views.iter().map(|v| *Homography::fit(&v.plane_m, &v.seen_px).unwrap().matrix()).collect();
         let (_, [_, share]) = start(&h, IMAGE.map(|s| s as f64), &p);
         assert!(share < 1e-6, "{share}");
     }
     let turns = [[0.0, 0.6, 0.0], [0.5, 0.0, 0.0], [0.0, -0.7, 0.1], [-0.4, 0.3, 0.0], [0.0, 0.1, 0.0]];
-    let views: Vec<_> = turns.iter().zip(shifts).map(|(t, s)| look(*t, s)).collect();
+    let views: Vec<_> = turns.iter().zip(shifts).map(|(t, s)| view(*t, s)).collect();
     let found = calibrate(&views, IMAGE, &p).unwrap();
     assert!(found.orientations >= 4 && worst(&found.camera, &camera()) < 1e-8);
 }
 
 #[test]
-fn a_view_of_something_else_is_named() {
+fn the_view_of_another_object_is_reported_as_the_worst() {
     let mut random = Random::new(3);
     let mut views = views_of(&camera(), 8, 0.2, &mut random);
     let p = CalibrateParams { max_rms_px: 1.0, ..CalibrateParams::default() };
@@ -243,13 +243,13 @@ fn a_view_of_something_else_is_named() {
 }
 
 #[test]
-fn strangers_are_left_out_and_lenses_found_where_there_are_some() {
+fn outlier_views_are_dropped_and_distortion_is_fitted_where_present() {
     let mut random = Random::new(8);
     let p = CalibrateParams { radial: 2, ..CalibrateParams::default() };
     let mut views = views_of(&camera(), 12, 0.3, &mut random);
     let found = calibrate_choosing(&views, IMAGE, &p).unwrap();
     assert_eq!((found.used.len(), found.calibration.camera.distortion), (12, Distortion::None));
-    // Two quads of other shapes among them.
+    // Two of the quads have other shapes.
     for (i, stretch) in [(3, 1.6), (9, 0.5)] {
         let middle = views[i].seen_px.iter().fold(Vector2::zeros(), |m, q| m + q.coords * 0.25);
         for q in &mut views[i].seen_px {
@@ -266,7 +266,7 @@ fn strangers_are_left_out_and_lenses_found_where_there_are_some() {
 }
 
 #[test]
-fn bad_input_is_refused_by_name() {
+fn bad_input_is_refused_with_its_field() {
     let views = views_of(&camera(), 4, 0.2, &mut Random::new(6));
     let p = CalibrateParams::default();
     let with = |change: &dyn Fn(&mut PlanarView)| {

@@ -1,6 +1,6 @@
-//! Snaps every side of a quad to the line beside it that is most likely its border. A shadow under a frame, the inner
-//! edge of a mat and the edge of the picture next to it all look like sides. A small network weighs the measurements
-//! of each line. In: corners. Out: corners on the likeliest lines, with their measurements.
+//! Snaps every side of a quad to the line beside it that is most likely its border. A shadow under a frame, the
+//! inner edge of a mat and the edge of the picture next to it all look like sides. A small network scores the
+//! features of each line. In: corners. Out: corners on the likeliest lines, with their measurements.
 //!
 //! Departs from method 3.6, which refits a side on the nearest edge only. See docs/method/24-default-detector.md.
 
@@ -15,10 +15,10 @@ use crate::detect::{
 };
 use nalgebra::Point2;
 
-/// How often every side is chosen again with the others as chosen before.
+/// Rounds in which every side is chosen given the other three.
 const ROUNDS: usize = 2;
 
-/// A line beside a side with its measurements.
+/// A line beside a side with its features.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SideCandidate {
     /// Its ends, beside the ends of the side.
@@ -32,14 +32,14 @@ pub struct SideCandidate {
 pub struct SnappedSides {
     /// Corners in the order of the sides.
     pub corners_px: [Point2<f64>; 4],
-    /// What was measured of each side's line; all 0 for a side without a line.
+    /// Features of each side's line; all 0 for a side without a line.
     pub sides: [SideMeasurement; 4],
-    /// The same of the lines nearest to the sides as they were.
+    /// The same of the lines nearest to the sides before the choice.
     pub nearest: [SideMeasurement; 4],
 }
 
-/// Moves every side of a quad, clockwise on screen, to the line beside it that looks most like the border of a thing.
-/// None if no side has a line, or if what comes out has no corners.
+/// Moves every side of a quad, clockwise on screen, to the line beside it that looks most like the border of an
+/// object. None if no side has a line, or if the chosen lines do not meet in corners.
 pub fn choose_sides(g: &Gradients, corners: &[Point2<f64>; 4], model: &Network) -> Option<SnappedSides> {
     let sides = Sides::new(g, corners);
     let known: [Vec<([f64; BAND_FEATURES], LogGreyLevels)>; 4] =
@@ -73,9 +73,9 @@ pub fn choose_sides(g: &Gradients, corners: &[Point2<f64>; 4], model: &Network) 
     Some(SnappedSides { corners_px: meet_all(&sides.ends(&chosen))?, sides: measure(&met, &chosen), nearest })
 }
 
-/// The lines beside every side with their measurements, the corners made with the lines nearest to the other sides:
-/// what a model is fitted on.
-pub fn rivals(g: &Gradients, corners: &[Point2<f64>; 4]) -> [Vec<SideCandidate>; 4] {
+/// The lines beside every side with their features, the corners made with the lines nearest to the other sides:
+/// training data of the model.
+pub fn side_candidates(g: &Gradients, corners: &[Point2<f64>; 4]) -> [Vec<SideCandidate>; 4] {
     let sides = Sides::new(g, corners);
     let met = sides.met(&std::array::from_fn(|i| sides.nearest(i)));
     std::array::from_fn(|i| {
@@ -115,12 +115,12 @@ mod tests {
     }
 
     #[test]
-    fn nothing_to_choose_from_is_none() {
+    fn a_side_without_lines_is_none() {
         let image = render(200, 200, 128, &[]);
         let map = edges(&image, &EdgeParams::default());
         let g = Gradients { image: &image, gx: map.gx(), gy: map.gy() };
         let quad = [[50.0, 50.0], [150.0, 50.0], [150.0, 150.0], [50.0, 150.0]].map(Point2::from);
         assert!(choose_sides(&g, &quad, QuadParams::default().side_network()).is_none());
-        assert!(rivals(&g, &quad).iter().all(Vec::is_empty));
+        assert!(side_candidates(&g, &quad).iter().all(Vec::is_empty));
     }
 }

@@ -1,4 +1,4 @@
-//! Small networks that move the sides of a quad to its border and tell whether it is an object.
+//! Small networks that move the sides of a quad to its border and classify whether it is an object.
 
 pub mod feature_constants;
 pub mod network;

@@ -1,22 +1,25 @@
-//! A small network: one layer of hidden units beside a linear path, one output. Measurements in, a number out.
+//! A small network: one hidden layer beside a linear path, one output. Features in, a number out.
 //! `choose_sides` and `quad_classifier` use it. Training is in the laboratory (`lab/src/train`).
 
 use super::feature_constants::{CLIP_DEVIATIONS, FeatureDigest};
 use serde::{Deserialize, Serialize};
 
-/// The weights. With `n` measurements and `h` hidden units: `output = bias + linear . x + hidden_out .
-/// tanh(hidden_bias + hidden_in x)`, with `x` the measurements scaled by `mean` and `deviation` and clipped to 4
+/// Scaled features are clipped to this many standard deviations.
+const CLIP: f64 = 4.0;
+
+/// The weights. With `n` features and `h` hidden units: `output = bias + linear . x + hidden_out .
+/// tanh(hidden_bias + hidden_in x)`, with `x` the features scaled by `mean` and `deviation` and clipped to 4
 /// deviations.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Network {
     /// The measurements that the weights were fitted to.
     pub features: FeatureDigest,
-    /// Mean of each measurement, `n`.
+    /// Mean of each feature, `n`.
     pub mean: Vec<f64>,
-    /// Standard deviation of each measurement, `n`.
+    /// Standard deviation of each feature, `n`.
     pub deviation: Vec<f64>,
-    /// Weight of each scaled measurement, `n`.
+    /// Weight of each scaled feature, `n`.
     pub linear: Vec<f64>,
     /// Weights of the hidden units, `h` rows of `n`.
     pub hidden_in: Vec<f64>,
@@ -24,11 +27,11 @@ pub struct Network {
     pub hidden_bias: Vec<f64>,
     /// Weights of the hidden units' outputs, `h`.
     pub hidden_out: Vec<f64>,
-    /// Output where all else is 0.
+    /// Bias of the output.
     pub bias: f64,
 }
 
-/// Why weights are no network for some number of measurements.
+/// Why weights are not those of a network with some number of features.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum NetworkError {
     /// A list of weights has the wrong length.
@@ -38,7 +41,7 @@ pub enum NetworkError {
         field: &'static str,
         /// Numbers in it.
         actual: usize,
-        /// Numbers that it should have.
+        /// Numbers expected.
         expected: usize,
     },
     /// More hidden units than [`MAX_HIDDEN`].
@@ -57,7 +60,7 @@ pub enum NetworkError {
 pub const MAX_HIDDEN: usize = 64;
 
 impl Network {
-    /// Checks that this is a network for `n` measurements of those that this program makes.
+    /// Checks that this is a network for `n` features.
     pub fn check(&self, n: usize) -> Result<(), NetworkError> {
         if self.features != FeatureDigest::OF_THIS_PROGRAM {
             return Err(NetworkError::Features(self.features));
@@ -88,7 +91,7 @@ impl Network {
         if self.bias.is_finite() { Ok(()) } else { Err(NetworkError::Range("bias")) }
     }
 
-    /// The output for some measurements. Lists of differing lengths are read to the end of the shorter.
+    /// The output for some features. Only the first `min(features, weights)` are used where the lengths differ.
     pub fn output(&self, measurements: &[f64]) -> f64 {
         let scaled: Vec<f64> = measurements
             .iter()
@@ -105,7 +108,7 @@ impl Network {
     }
 }
 
-/// Sum of the products, in a few sums abreast.
+/// Dot product, in several partial sums.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     let n = a.len().min(b.len());
     let ((a, a_rest), (b, b_rest)) = (a[..n].as_chunks::<4>(), b[..n].as_chunks::<4>());
@@ -143,12 +146,12 @@ mod tests {
         // x = [2, 0.5] after scaling.
         let wanted = 0.25 + 0.5 * 2.0 - 0.5 + 3.0 * (2.6_f64).tanh() + (-1.0_f64).tanh();
         assert!((n.output(&[5.0, 0.5]) - wanted).abs() < 1e-12);
-        // Clipped: far is as far as 4 deviations.
+        // Clipped at 4 deviations.
         assert!((n.output(&[1e9, 0.0]) - n.output(&[9.0, 0.0])).abs() < 1e-12);
     }
 
     #[test]
-    fn what_is_no_network_is_refused() {
+    fn inconsistent_weights_are_refused() {
         assert!(network().check(3).is_err());
         let other = FeatureDigest(1);
         assert_eq!(Network { features: other, ..network() }.check(2), Err(NetworkError::Features(other)));

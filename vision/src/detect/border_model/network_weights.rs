@@ -2,7 +2,7 @@
 //! one machine, and `cargo fmt` puts it in form:
 //!
 //! ```text
-//! waymark-lab train search museum-paintings exit-signs corridor museum-walk-estense corridor-loop-rtabmap \
+//! waymark-lab train detector museum-paintings exit-signs corridor museum-walk-estense corridor-loop-rtabmap \
 //!   corridor-multifloor doors-bbox signs-misc --pictures poster-textures-estense \
 //!   --weight museum-paintings=6 --weight scenes=0.5 --rust vision/src/detect/border_model/network_weights.rs
 //! ```

@@ -1,8 +1,9 @@
 //! The probability that a quad is the border of a flat object, not lines that happen to meet: joints of tiles, a wall
-//! between two corners, strokes inside a picture. In: the measurements of its four sides. Out: a probability.
+//! between two corners, strokes inside a picture. In: the features of its four sides. Out: a probability.
 //! The weights were fitted on labelled photographs and renderings.
 //!
-//! Departs from method 3.6, whose score (similarity times support) says how well a quad is seen, not what it is.
+//! Departs from method 3.6, whose score (similarity times support) measures edge support, not whether the quad is
+//! an object.
 
 use crate::detect::border_model::{
     network::Network,
@@ -10,23 +11,23 @@ use crate::detect::border_model::{
 };
 use nalgebra::Point2;
 
-/// Number of measurements: mean, smallest and largest of each measurement of a side, and ten of the whole.
-pub const THING_FEATURES: usize = 3 * SIDE_FEATURES + WHOLE_FEATURES;
-/// Measurements of the quad as a whole.
+/// Number of features: mean, smallest and largest of each feature of a side, and ten of the quad as a whole.
+pub const QUAD_FEATURES: usize = 3 * SIDE_FEATURES + WHOLE_FEATURES;
+/// Features of the quad as a whole.
 const WHOLE_FEATURES: usize = 10;
 
-/// The measurements of a quad in an image of some width and height: mean, smallest and largest of each measurement of
-/// a side; its support score; log of its mean side in pixels; how much the sides differ in the tone of the wall, just
-/// outside and just inside; how alike their steps are, 0 to 1; sine of the sharpest corner; of opposite sides the log
-/// of the length ratio, of the pair that differs less and of the other; how far corners lie outside the image, in
-/// mean sides.
-pub fn thing_features(
+/// The features of a quad in an image of some width and height: mean, smallest and largest of each feature of a
+/// side; its support score; log of its mean side in pixels; how much the sides differ in the tone of the wall, just
+/// outside and just inside; how similar their steps are, 0 to 1; sine of the sharpest corner; of opposite sides the
+/// log of the length ratio, of the pair that differs less and of the other; how far corners lie outside the image,
+/// in mean sides.
+pub fn quad_features(
     sides: &[SideMeasurement; 4],
     corners_px: &[Point2<f64>; 4],
     score: f64,
     size_px: (usize, usize),
-) -> [f64; THING_FEATURES] {
-    let mut features = [0.0; THING_FEATURES];
+) -> [f64; QUAD_FEATURES] {
+    let mut features = [0.0; QUAD_FEATURES];
     for i in 0..SIDE_FEATURES {
         let values = sides.map(|s| s.features[i]);
         features[i] = values.iter().sum::<f64>() / 4.0;
@@ -72,8 +73,8 @@ fn of_the_whole(
     ]
 }
 
-/// Probability that a quad of such measurements is the border of a thing, 0 to 1.
-pub fn probability(model: &Network, features: &[f64; THING_FEATURES]) -> f64 {
+/// Probability that a quad with these features is the border of an object, 0 to 1.
+pub fn probability(model: &Network, features: &[f64; QUAD_FEATURES]) -> f64 {
     1.0 / (1.0 + (-model.output(features)).exp())
 }
 
@@ -84,13 +85,13 @@ mod tests {
 
     const SQUARE: [[f64; 2]; 4] = [[10.0, 10.0], [110.0, 10.0], [110.0, 110.0], [10.0, 110.0]];
 
-    fn features(tones: [LogGreyLevels; 4], corners: [[f64; 2]; 4]) -> [f64; THING_FEATURES] {
+    fn features(tones: [LogGreyLevels; 4], corners: [[f64; 2]; 4]) -> [f64; QUAD_FEATURES] {
         let values = [1.0, 3.0, -2.0, 6.0];
         let sides = std::array::from_fn(|i| SideMeasurement {
             features: [values[i]; SIDE_FEATURES],
             tones: tones[i],
         });
-        thing_features(&sides, &corners.map(Point2::from), 0.7, (200, 150))
+        quad_features(&sides, &corners.map(Point2::from), 0.7, (200, 150))
     }
 
     fn whole(tones: [LogGreyLevels; 4], corners: [[f64; 2]; 4]) -> [f64; WHOLE_FEATURES] {
@@ -102,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn the_measurements_are_mean_least_and_most_of_the_sides() {
+    fn features_are_mean_minimum_and_maximum_over_the_sides() {
         let features = features([LogGreyLevels::default(); 4], SQUARE);
         for (from, wanted) in [(0, 2.0), (SIDE_FEATURES, -2.0), (2 * SIDE_FEATURES, 6.0)] {
             assert!(close(&features[from..from + SIDE_FEATURES], &[wanted; SIDE_FEATURES]));
@@ -120,36 +121,36 @@ mod tests {
     }
 
     #[test]
-    fn the_shape_is_measured_the_same_from_any_corner() {
+    fn shape_features_do_not_depend_on_the_first_corner() {
         // 10 px beyond the right border, 1 px beyond the lower one.
         let corners = [[100.0, 50.0], [209.0, 20.0], [209.0, 150.0], [100.0, 110.0]];
-        let mut seen: Vec<[f64; WHOLE_FEATURES]> = Vec::new();
+        let mut features_from: Vec<[f64; WHOLE_FEATURES]> = Vec::new();
         for first in 0..4 {
-            seen.push(whole(
+            features_from.push(whole(
                 [LogGreyLevels::default(); 4],
                 std::array::from_fn(|i| corners[(i + first) % 4]),
             ));
         }
-        assert!(seen.iter().all(|s| close(s, &seen[0])), "{seen:?}");
+        assert!(features_from.iter().all(|s| close(s, &features_from[0])), "{features_from:?}");
         let [upper, lower] = [30.0_f64, 40.0].map(|rise| rise.hypot(109.0));
         let mean_side = (60.0 + 130.0 + upper + lower) / 4.0;
         let wanted = [109.0 / lower, (lower / upper).ln(), (130.0_f64 / 60.0).ln(), 10.0 / mean_side];
-        assert!(close(&seen[0][6..], &wanted), "{:?} {wanted:?}", &seen[0][6..]);
+        assert!(close(&features_from[0][6..], &wanted), "{:?} {wanted:?}", &features_from[0][6..]);
     }
 
     #[test]
-    fn odds_of_three_to_one_are_three_quarters() {
+    fn log_odds_of_three_give_probability_three_quarters() {
         let model = Network {
             features: FeatureDigest::OF_THIS_PROGRAM,
-            mean: vec![0.0; THING_FEATURES],
-            deviation: vec![1.0; THING_FEATURES],
-            linear: vec![0.0; THING_FEATURES],
+            mean: vec![0.0; QUAD_FEATURES],
+            deviation: vec![1.0; QUAD_FEATURES],
+            linear: vec![0.0; QUAD_FEATURES],
             hidden_in: Vec::new(),
             hidden_bias: Vec::new(),
             hidden_out: Vec::new(),
             bias: 3.0_f64.ln(),
         };
-        assert!((probability(&model, &[0.5; THING_FEATURES]) - 0.75).abs() < 1e-12);
+        assert!((probability(&model, &[0.5; QUAD_FEATURES]) - 0.75).abs() < 1e-12);
     }
 
     /// Files of parameters of earlier builds.
@@ -173,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn a_network_for_other_measurements_is_refused_by_name() {
+    fn a_network_of_another_input_size_is_refused() {
         let wrong = r#"{"quad_classifier": {"features": "DIGEST", "mean": [0], "deviation": [1], "linear": [0],
             "hidden_in": [],
             "hidden_bias": [], "hidden_out": [], "bias": 0}}"#;

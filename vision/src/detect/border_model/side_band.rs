@@ -1,5 +1,5 @@
-//! The band of image around a supposed side, unrolled, with the lines in it that edges support. In: two points. Out:
-//! what is measured along each line. `side_lines` finds the lines, `choose_sides` picks the border.
+//! The image band around a proposed side, resampled, with the lines in it that edges support. In: two points. Out:
+//! statistics along each line. `side_lines` finds the lines, `choose_sides` picks the border.
 
 use crate::detect::{
     border_model::{
@@ -17,7 +17,22 @@ use crate::detect::{
 use fearless_simd::{Level, dispatch};
 use nalgebra::{Point2, Vector2};
 
-/// A number for each row; rows that a band does not have are 0.
+/// Most samples along a side: the samples of a line are the bits of a 64-bit word.
+pub const MAX_BAND_SAMPLES: usize = 48;
+/// Fewest samples along a side.
+const MIN_BAND_SAMPLES: usize = 12;
+/// Half the width of a band, as a share of the quad's extent across the side.
+const REACH_SHARE: f64 = 0.25;
+/// Half the width of a band, smallest and largest.
+const REACH_PX: (f64, f64) = (6.0, 128.0);
+/// Share of the side left out at both ends: near a corner the other side's gradient mixes in.
+const CORNER_SHARE: f64 = 0.06;
+/// Smallest step height of an edge, grey levels.
+pub const MIN_STEP: f32 = 4.0;
+/// Smallest step heights of the edges that [`AlongLine::edges_outside`] counts.
+const STEPS_OUTSIDE: [f32; 2] = [MIN_STEP, 2.0 * MIN_STEP];
+
+/// A number for each row; unused rows are 0.
 type Rows = [i32; MAX_BAND_SAMPLES];
 
 /// The image around a side, a row for each sample along it, a column for each pixel across, from inside outwards.
@@ -36,7 +51,7 @@ pub struct Band {
     /// Derivative along the normal; 0 outside the image.
     step: Vec<f32>,
     level: Vec<u8>,
-    /// How many pixels of the row before a column are not plain; a column more than there are.
+    /// Prefix sums: how many pixels of the row before a column are textured; one column more than the band has.
     rough: Vec<u16>,
     /// Outermost column of each row with an edge along the side of at least each of [`STEPS_OUTSIDE`]; -1 without.
     outermost: [Rows; 2],
@@ -45,8 +60,8 @@ pub struct Band {
 }
 
 impl Band {
-    /// Unrolls the band of the side from `from` to `to`, of a quad walked clockwise on screen that reaches `extent_px`
-    /// across the side, and finds its lines. None for a side shorter than 4 px.
+    /// Resamples the band of the side from `from` to `to`, of a quad walked clockwise on screen that reaches
+    /// `extent_px` across the side, and finds its lines. None for a side shorter than 4 px.
     pub fn new(g: &Gradients, from: &Point2<f64>, to: &Point2<f64>, extent_px: f64) -> Option<Self> {
         let length_px = (to - from).norm();
         if !(length_px >= MIN_SIDE_PX && length_px.is_finite() && extent_px.is_finite()) {
@@ -87,17 +102,17 @@ impl Band {
         let mut peaks = Vec::new();
         for row in 0..self.rows {
             square.fill(0.0);
-            self.unroll(g, row, &mut square);
-            self.look_through(row, &square);
+            self.resample(g, row, &mut square);
+            self.summarise(row, &square);
             self.peaks(row, &square, &mut peaks);
         }
         self.lines = side_lines::find(&peaks, self.rows, (self.first_px, self.columns), self.length_px);
     }
 
-    /// Reads the pixels of a row. What lies outside the image stays 0.
+    /// Samples the pixels of a row. Pixels outside the image stay 0.
     #[expect(clippy::inline_always, reason = "as above")]
     #[inline(always)]
-    fn unroll(&mut self, g: &Gradients, row: usize, square: &mut [f32]) {
+    fn resample(&mut self, g: &Gradients, row: usize, square: &mut [f32]) {
         let (width, height) = (g.width(), g.height());
         let [nx, ny]: [f32; 2] = self.normal.cast().into();
         let across = Fixed::step(&self.normal);
@@ -117,10 +132,10 @@ impl Band {
         (self.inside[0][row], self.inside[1][row]) = (first as i32, end as i32);
     }
 
-    /// Sums up where a row is rough, and where its last edges are.
+    /// Prefix sums of texture of a row, and the outermost edges.
     #[expect(clippy::inline_always, reason = "as above")]
     #[inline(always)]
-    fn look_through(&mut self, row: usize, square: &[f32]) {
+    fn summarise(&mut self, row: usize, square: &[f32]) {
         let step = &self.step[row * self.columns..(row + 1) * self.columns];
         let rough = &mut self.rough[row * (self.columns + 1)..(row + 1) * (self.columns + 1)];
         let mut sum = 0;
@@ -155,7 +170,7 @@ impl Band {
         }
     }
 
-    /// Where along the side a row lies, 0 to 1.
+    /// Position of a row along the side, 0 to 1.
     fn along(&self, row: usize) -> f64 {
         CORNER_SHARE + (1.0 - 2.0 * CORNER_SHARE) * (row as f64 + 0.5) / self.rows as f64
     }
@@ -172,7 +187,7 @@ impl Band {
         ]
     }
 
-    /// What is to be measured along one of its lines.
+    /// The statistics along one of its lines.
     pub fn along_line(&self, line: &SideLine) -> AlongLine<'_> {
         let mut column = [0; MAX_BAND_SAMPLES];
         for (row, column) in column.iter_mut().enumerate().take(self.rows) {
@@ -189,10 +204,10 @@ fn along_side(step: f32, square: f32) -> bool {
     step * step >= MIN_COS * MIN_COS * square
 }
 
-/// Bits behind the point of a column.
+/// Fractional bits of a column in fixed point.
 const BITS: u32 = 16;
 
-/// A place between columns in fixed point; far outside any band at most.
+/// A column position in fixed point, clamped far outside any band.
 #[inline]
 fn columns(x: f64) -> i32 {
     const FARTHEST: f64 = 8192.0;
@@ -203,7 +218,7 @@ fn columns(x: f64) -> i32 {
 #[derive(Debug, Clone)]
 pub struct AlongLine<'a> {
     band: &'a Band,
-    /// Where it crosses each row, by [`columns`].
+    /// Its column in each row, see [`columns`].
     column: Rows,
 }
 
@@ -219,33 +234,34 @@ impl AlongLine<'_> {
         })
     }
 
-    /// Number of pixels of a strip in the image, and how many of them are not plain.
+    /// Number of pixels of a strip in the image, and how many of them are textured.
     pub fn rough(&self, range_px: (f64, f64)) -> (usize, usize) {
         let stride = self.band.columns + 1;
         self.strip(range_px).filter(|(_, columns)| !columns.is_empty()).fold(
             (0, 0),
-            |(seen, rough), (row, columns)| {
+            |(in_image, rough), (row, columns)| {
                 let sums = &self.band.rough[row * stride..(row + 1) * stride];
-                (seen + columns.len(), rough + usize::from(sums[columns.end] - sums[columns.start]))
+                (in_image + columns.len(), rough + usize::from(sums[columns.end] - sums[columns.start]))
             },
         )
     }
 
-    /// Calls `pixel` with the step and the grey level of every pixel of a strip in the image, and gives their number.
+    /// Calls `pixel` with the step and the grey level of every pixel of a strip in the image; returns their number.
     #[inline]
     pub fn pixels(&self, range_px: (f64, f64), mut pixel: impl FnMut(f32, u8)) -> usize {
-        let mut seen = 0;
+        let mut in_image = 0;
         for (row, columns) in self.strip(range_px) {
-            seen += columns.len();
+            in_image += columns.len();
             let start = row * self.band.columns;
             for i in start + columns.start..start + columns.end {
                 pixel(self.band.step[i], self.band.level[i]);
             }
         }
-        seen
+        in_image
     }
 
-    /// Share of the samples with an edge along the side further out than `beyond_px`: weak ones, and stronger ones.
+    /// Share of the samples with an edge along the side further out than `beyond_px`, for both thresholds of
+    /// [`STEPS_OUTSIDE`].
     pub fn edges_outside(&self, beyond_px: f64) -> [f64; 2] {
         let from = columns(beyond_px) + (1 << BITS) - 1;
         self.band.outermost.each_ref().map(|outermost| {
@@ -275,8 +291,8 @@ mod tests {
     }
 
     #[test]
-    fn lines_beside_a_side_are_found_where_they_are() {
-        // A frame with an inner border 12 px in, and something 20 px above; slightly slanted.
+    fn lines_beside_a_side_are_found_at_their_offsets() {
+        // A frame with an inner border 12 px in, and a line 20 px above; slightly slanted.
         let frame = [[50.0, 80.2], [250.0, 84.2], [250.0, 200.0], [50.0, 200.0]];
         let inner = [[62.0, 92.2], [238.0, 96.2], [238.0, 188.0], [62.0, 188.0]];
         let above = [[0.0, 10.0], [300.0, 10.0], [300.0, 64.2], [0.0, 58.2]];
@@ -295,43 +311,43 @@ mod tests {
     }
 
     #[test]
-    fn bands_and_their_lines_are_bounded() {
+    fn the_size_of_bands_and_the_number_of_lines_are_bounded() {
         let stripes = GrayImage::from_fn(600, 600, |_, v| if v / 5 % 2 == 0 { 40 } else { 220 });
         let band_ = band(&stripes, [20.0, 300.0], [580.0, 300.0], 1e6).unwrap();
         assert_eq!(band_.lines.len(), MAX_LINES);
         assert!(band_.lines.iter().all(|l| l.offset_px.abs() <= REACH_PX.1 + 1.0));
         assert!(band(&stripes, [20.0, 300.0], [23.0, 300.0], 100.0).is_none());
         assert!(band(&stripes, [20.0, 300.0], [f64::NAN, 300.0], 100.0).is_none());
-        // Wholly outside the image there is nothing.
+        // No band wholly outside the image.
         assert!(band(&stripes, [-300.0, -300.0], [-200.0, -300.0], 100.0).unwrap().lines.is_empty());
     }
 
     #[test]
-    fn strips_are_what_lies_between_two_offsets() {
-        // Grey levels that tell the row of the image; the side runs along row 50, out of the quad is up.
+    fn strips_contain_the_rows_between_two_offsets() {
+        // Grey levels equal the row of the image; the side runs along row 50, the outside of the quad is up.
         let image = GrayImage::from_fn(300, 200, |_, v| v as u8);
         let band = band(&image, [50.0, 50.0], [250.0, 50.0], 80.0).unwrap();
         let line = SideLine { offset_px: 0.25, slope_px: 0.0, support: 1.0, sign: 1.0, step: 1.0 };
         let levels = |range| {
             let mut all = std::collections::BTreeSet::new();
-            let seen = band.along_line(&line).pixels(range, |_, level| {
+            let in_image = band.along_line(&line).pixels(range, |_, level| {
                 all.insert(level);
             });
-            assert_eq!(seen, band.along_line(&line).rough(range).0);
-            (seen / MAX_BAND_SAMPLES, all.into_iter().collect::<Vec<_>>())
+            assert_eq!(in_image, band.along_line(&line).rough(range).0);
+            (in_image / MAX_BAND_SAMPLES, all.into_iter().collect::<Vec<_>>())
         };
         // From 1.25 to 4.25 above row 50: rows 48, 47 and 46.
         assert_eq!(levels((1.0, 4.0)), (3, vec![46, 47, 48]));
         assert_eq!(levels((-2.25, -0.25)), (3, vec![50, 51, 52]));
         assert_eq!(levels((4.0, 1.0)), (0, vec![]));
-        // No further than the band is wide: a quarter of 80 px to each side.
+        // At most the width of the band: a quarter of 80 px to each side.
         assert_eq!(levels((18.0, 1e9)), (2, vec![30, 31]));
     }
 
     #[test]
-    fn strips_end_at_the_border_of_the_image() {
+    fn strips_are_clipped_at_the_image_border() {
         let image = GrayImage::from_fn(300, 200, |u, v| if v < 25 { 0 } else { (u / 2 % 2 * 200) as u8 });
-        // Rows 191 to 199 lie further in, and then nothing.
+        // Rows 191 to 199 lie further in; then the image ends.
         let low = band(&image, [50.0, 190.0], [250.0, 190.0], 200.0).unwrap();
         let band = band(&image, [50.0, 28.0], [250.0, 28.0], 200.0).unwrap();
         let line = SideLine { offset_px: 0.0, slope_px: 0.0, support: 1.0, sign: 1.0, step: 1.0 };
@@ -339,8 +355,8 @@ mod tests {
         let along = band.along_line(&line);
         // Rows 27 to 0 of the image lie further out, however wide the strip.
         assert_eq!(along.rough((0.5, 40.0)).0, 28 * MAX_BAND_SAMPLES);
-        let (seen, rough) = along.rough((-20.0, -3.0));
-        assert_eq!((seen, rough), (18 * MAX_BAND_SAMPLES, 18 * MAX_BAND_SAMPLES));
+        let (in_image, rough) = along.rough((-20.0, -3.0));
+        assert_eq!((in_image, rough), (18 * MAX_BAND_SAMPLES, 18 * MAX_BAND_SAMPLES));
         assert_eq!(along.rough((18.0, 40.0)).1, 0);
         assert!(along.edges_outside(18.0).iter().all(|share| *share <= 0.0));
         assert!(along.edges_outside(-18.0).iter().all(|share| *share >= 1.0));

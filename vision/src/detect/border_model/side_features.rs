@@ -1,4 +1,4 @@
-//! The lines beside the sides of a quad in, 28 measurements of each out: of the band beside the line, and of the two
+//! The lines beside the sides of a quad in, 28 features of each out: of the band beside the line, and of the two
 //! corners that it makes with the neighbouring sides.
 
 use crate::detect::{
@@ -16,32 +16,32 @@ use crate::detect::{
 };
 use nalgebra::{Point2, Vector2};
 
-/// Measurements of a line that rest on its band alone.
+/// Features of a line from its band alone.
 pub(crate) const BAND_FEATURES: usize = 20;
-/// Measurements of the two corners it makes.
+/// Features of the two corners it makes.
 pub(crate) const CORNER_FEATURES: usize = 8;
-/// Number of measurements of a line.
+/// Number of features of a line.
 pub const SIDE_FEATURES: usize = BAND_FEATURES + CORNER_FEATURES;
-/// What was measured of the line of a side.
+/// Features of the line of a side.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct SideMeasurement {
     /// Of the band beside the line, then of its two corners: see `Sides::band_features` and `Sides::corner_features`.
     pub features: [f64; SIDE_FEATURES],
-    /// What can be compared between sides only.
+    /// Tones, compared between the sides only.
     pub tones: LogGreyLevels,
 }
 
 /// Tones beside a line: logs of grey levels, 8 added.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct LogGreyLevels {
-    /// Some way outside, where the wall is.
+    /// Further outside, on the wall.
     pub wall: f64,
     /// Just outside.
     pub outside: f64,
     /// Just inside.
     pub inside: f64,
-    /// Log of the step in grey levels, 2 added, positive where it is brighter on the one side; times how alike its
-    /// signs are.
+    /// Log of the step in grey levels, 2 added, positive where it is brighter outside; times the agreement of its
+    /// signs.
     pub step: f64,
 }
 
@@ -54,10 +54,10 @@ pub(crate) fn joined(band: &[f64; BAND_FEATURES], corners: &[f64; CORNER_FEATURE
 
 /// The ends of the line chosen for each side.
 pub(crate) type Ends = [[Point2<f64>; 2]; 4];
-/// The sides that each side meets, with what they usually do: the one before it and the one after it.
+/// The sides that each side meets, the one before it and the one after it, with their mean steps.
 pub(crate) type Met = [[Option<Neighbour>; 2]; 4];
 
-/// A side as seen from one that it meets.
+/// A side relative to one that it meets.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Neighbour {
     ends: [Point2<f64>; 2],
@@ -121,7 +121,7 @@ impl<'a> Sides<'a> {
         })
     }
 
-    /// 0 support, 1 how alike the signs of its steps are, 2 log of the step; roughness of the strips beside it: 3 just
+    /// 0 support, 1 agreement of the signs of its steps, 2 log of the step; roughness of the strips beside it: 3 just
     /// outside, 4 further outside, 5 and 6 the same inside; log ratio of grey just outside to the wall further out, 7
     /// signed and 8 absolute, 9 and 10 the same of just inside; 11 log of blur; 12 weight of the heaviest line
     /// further out and 13 further in, 14 largest support further out, 15 number of lines further out; share of
@@ -179,8 +179,8 @@ impl<'a> Sides<'a> {
         (features, tones)
     }
 
-    /// What the two neighbouring sides do at the corners with a line, as a share of what they do along their own
-    /// length: at the border of a thing they are there just before the corner and gone just after. Of the two: 0
+    /// Steps of the two neighbouring sides at the corners with a line, as a share of their steps along their own
+    /// length: at the border of an object they exist just before the corner and not just after. Of the two: 0
     /// smallest and 1 mean step inwards, 2 smallest support inwards, 3 largest step outwards, 4 largest and 5 mean
     /// support outwards, 6 largest difference of the inward step from the side's own, 7 mean step outwards.
     pub(crate) fn corner_features(
@@ -191,10 +191,10 @@ impl<'a> Sides<'a> {
     ) -> [f64; CORNER_FEATURES] {
         let own = self.line_ends(side, line);
         let section = INWARD_SECTION.of(self.extent_px[side]);
-        let look = |neighbour: &Option<Neighbour>, before: bool| {
+        let at_corner = |neighbour: &Option<Neighbour>, before: bool| {
             let Neighbour { ends, along, usual } = (*neighbour)?;
             let corner = meet(&own, &ends)?;
-            // Along the neighbour away from the corner, into the quad; both ways it is walked as its side is.
+            // Along the neighbour away from the corner, into the quad, in the direction of its side.
             let between = |a: f64, b: f64| {
                 let (p, q) = if before { (-b, -a) } else { (a, b) };
                 step_along(
@@ -217,7 +217,7 @@ impl<'a> Sides<'a> {
                 (inner.0 - usual).abs() / DIFFERENCE_SCALE,
             ])
         };
-        let [Some(a), Some(b)] = [look(&met[0], true), look(&met[1], false)] else {
+        let [Some(a), Some(b)] = [at_corner(&met[0], true), at_corner(&met[1], false)] else {
             return [0.0; CORNER_FEATURES];
         };
         [
@@ -233,20 +233,23 @@ impl<'a> Sides<'a> {
     }
 }
 
-/// Share of a strip that is not plain.
+/// Share of a strip that is textured.
 fn roughness(along: &AlongLine, range_px: (f64, f64)) -> f64 {
-    let (seen, rough) = along.rough(range_px);
-    if seen > MIN_STRIP_PIXELS { rough as f64 / seen as f64 } else { 0.0 }
+    let (in_image, rough) = along.rough(range_px);
+    if in_image > MIN_STRIP_PIXELS { rough as f64 / in_image as f64 } else { 0.0 }
 }
+
+/// Strips of fewer pixels in the image are ignored.
+const MIN_CELLS: usize = 20;
 
 /// Median grey level of a strip.
 fn level(along: &AlongLine, range_px: (f64, f64)) -> Option<f64> {
     let mut counts = [0_u32; 256];
-    let seen = along.pixels(range_px, |_, level| counts[usize::from(level)] += 1);
-    if seen <= MIN_STRIP_PIXELS {
+    let in_image = along.pixels(range_px, |_, level| counts[usize::from(level)] += 1);
+    if in_image <= MIN_STRIP_PIXELS {
         return None;
     }
-    let mut left = seen as u32 / 2;
+    let mut left = in_image as u32 / 2;
     counts
         .iter()
         .position(|n| {
@@ -264,16 +267,16 @@ fn level(along: &AlongLine, range_px: (f64, f64)) -> Option<f64> {
 fn blur(along: &AlongLine) -> f64 {
     let mean = |range| {
         let mut sum = 0.0;
-        let seen = along.pixels(range, |step, _| sum += f64::from(step.abs()));
-        if seen > 0 { sum / seen as f64 } else { 0.0 }
+        let in_image = along.pixels(range, |step, _| sum += f64::from(step.abs()));
+        if in_image > 0 { sum / in_image as f64 } else { 0.0 }
     };
     let [on, from, to] = BLUR_PX;
     let beside = mean((from, to)) + mean((-to, -from));
     ((beside + BLUR_OFFSET) / (mean((-on, on)) + BLUR_OFFSET)).ln()
 }
 
-/// How much the strip of some width inside a line looks like a shadow on the wall outside: plain, and darker by about
-/// [`SHADOW_RATIO`].
+/// How much the strip of some width inside a line looks like a shadow on the wall outside: uniform, at about 0.6 of
+/// its grey level.
 fn shadow(along: &AlongLine, width_px: f64) -> f64 {
     if width_px < MIN_SHADOW_PX {
         return 0.0;
@@ -287,7 +290,7 @@ fn shadow(along: &AlongLine, width_px: f64) -> f64 {
     (1.0 - roughness(along, between)) * (1.0 - (ratio - usual).abs() / spread).max(0.0)
 }
 
-/// Mean signed step across the way from `p` to `q`, the strongest within a pixel that follows it, and the share of
+/// Mean signed step across the line from `p` to `q`, the strongest within a pixel that follows it, and the share of
 /// samples that have one. Samples outside the image count 0.
 fn step_along(g: &Gradients, p: &Point2<f64>, q: &Point2<f64>, samples: usize) -> (f64, f64) {
     let Some(along) = (q - p).try_normalize(1e-6) else { return (0.0, 0.0) };

@@ -1,7 +1,7 @@
 //! The straight lines among the edge points of a band. In: points. Out: lines, the best supported first.
 
 use super::feature_constants::{
-    FIT_REACH_PX, MAX_LINES, MIN_LINE_POINTS, MIN_SUPPORT, NEAR_LINE_PX, SAME_LINE_PX, SLOPE_STEP, SLOPES,
+    FIT_REACH_PX, MAX_LINES, MIN_LINE_POINTS, MIN_SUPPORT, NEAR_LINE_PX, proposed SLOPE_STEP, SLOPES,
     SUPPRESSED_BINS,
 };
 
@@ -79,7 +79,7 @@ pub(crate) fn find(
 /// One vote of each peak for every slope, at the offset that goes with it. Two bins lie before `first_px`.
 #[inline(always)]
 fn vote(peaks: &[Peak], first_px: f32, bins: usize, unit: f32) -> Vec<Votes> {
-    /// Bits behind the point of a bin.
+    /// Fractional bits of a bin in fixed point.
     const BITS: u32 = 16;
     let fixed = |x: f32| (x * (1 << BITS) as f32) as i32;
     let mut votes = vec![[0; ALL_SLOPES]; bins];
@@ -89,7 +89,7 @@ fn vote(peaks: &[Peak], first_px: f32, bins: usize, unit: f32) -> Vec<Votes> {
         let mut at = fixed(p.offset_px + 2.5 - first_px).saturating_add(step.saturating_mul(SLOPES as i32));
         #[expect(clippy::needless_range_loop, reason = "an index of what lies in another list")]
         for slope in 0..ALL_SLOPES {
-            // What is negative becomes very large. The outermost bins have no votes of their own.
+            // Negative values wrap to very large ones. The outermost bins have no votes of their own.
             let bin = (at >> BITS) as usize;
             if bin >= 1 && bin < bins - 1 {
                 votes[bin][slope] |= 1 << p.row;
@@ -101,7 +101,7 @@ fn vote(peaks: &[Peak], first_px: f32, bins: usize, unit: f32) -> Vec<Votes> {
 }
 
 /// For every offset the most votes of any slope, those of the neighbouring offsets with them, and the slope: lines of
-/// neighbouring slopes are one. Among equals the slope nearest to none, of two such the lesser.
+/// neighbouring slopes are one. Ties go to the slope nearest to 0, then to the lesser.
 #[inline(always)]
 fn best_slopes(votes: &[Votes]) -> Vec<(u32, usize)> {
     const NONE: Votes = [0; ALL_SLOPES];
@@ -112,7 +112,7 @@ fn best_slopes(votes: &[Votes]) -> Vec<(u32, usize)> {
     (0..votes.len())
         .map(|bin| {
             let counts = around(bin);
-            // Twice the distance from no slope, and which of both.
+            // Twice the distance from slope 0, and the sign.
             let order = |j: usize| 2 * j.abs_diff(SLOPES) + usize::from(j > SLOPES);
             let keys = (0..ALL_SLOPES).map(|j| (counts[j], std::cmp::Reverse(order(j)), j));
             keys.max().map_or((0, SLOPES), |(count, _, j)| (count, j))
@@ -120,7 +120,7 @@ fn best_slopes(votes: &[Votes]) -> Vec<(u32, usize)> {
         .collect()
 }
 
-/// Least squares on the edge points near a line (offset, slope), in rounds of closer ones.
+/// Least squares on the edge points near a line (offset, slope), in rounds of narrowing distance.
 #[inline(always)]
 fn fit(peaks: &[Peak], rows: usize, mut line: (f64, f64)) -> Option<SideLine> {
     let (offset, slope) = (line.0 as f32, line.1 as f32);

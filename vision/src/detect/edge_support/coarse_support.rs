@@ -1,5 +1,5 @@
-//! Coarse edge support of a quad proposal: the share of each side that an edge follows, and whether it is the same
-//! step all round. In: corners and gradient planes. Out: a number that ranks proposals. `side_support` measures
+//! Coarse edge support of a quad proposal: the share of each side that an edge follows, and whether all four have
+//! the same step. In: corners and gradient planes. Out: a number that ranks proposals. `side_support` measures
 //! exactly.
 
 use crate::detect::edge_support::{
@@ -11,19 +11,19 @@ use nalgebra::{Point2, Vector2};
 
 /// Samples along a side.
 const SAMPLES: usize = 24;
-/// Offsets across the side at which its edge is looked for, in pixels, the likeliest first.
+/// Offsets across the side at which its edge is searched, in pixels, the likeliest first.
 const OFFSETS: [i64; 5] = [0, -1, 1, -2, 2];
-/// What sides whose steps cancel out leave of a seed's rank.
-const UNLIKE: f64 = 0.4;
+/// Factor on the rank of a seed whose sides' steps cancel out.
+const MIXED_POLARITY: f64 = 0.4;
 
-/// What was seen along a side.
-struct SideLook {
+/// Edge support and polarity of a side.
+struct SidePolarity {
     support: f64,
     /// Mean sign of the steps over all samples in the image, -1 to 1; positive where it is brighter outside.
     sign: f64,
 }
 
-/// Support of the worst side times how alike the steps of the four sides are, both 0 to 1; none if a side has less
+/// Support of the worst side times the agreement of the four sides' polarities, both 0 to 1; none if a side has less
 /// support than `least`. `first` is the side to begin with.
 pub fn fit_of(
     g: &Gradients,
@@ -34,15 +34,21 @@ pub fn fit_of(
 ) -> Option<f64> {
     let (mut worst, mut sign) = (1.0_f64, 0.0_f64);
     for i in (0..4).map(|i| (i + first) % 4) {
-        let side = look(g, &corners_px[i], &corners_px[(i + 1) % 4], min_step as f32, least)?;
+        let side = along_side(g, &corners_px[i], &corners_px[(i + 1) % 4], min_step as f32, least)?;
         worst = worst.min(side.support);
         sign += side.sign;
     }
-    Some(worst * (UNLIKE + (1.0 - UNLIKE) * 0.25 * sign.abs()))
+    Some(worst * (MIXED_POLARITY + (1.0 - MIXED_POLARITY) * 0.25 * sign.abs()))
 }
 
-/// Looks along one side; none with less support than `least`.
-fn look(g: &Gradients, from: &Point2<f64>, to: &Point2<f64>, min_step: f32, least: f64) -> Option<SideLook> {
+/// Measures one side; none with less support than `least`.
+fn along_side(
+    g: &Gradients,
+    from: &Point2<f64>,
+    to: &Point2<f64>,
+    min_step: f32,
+    least: f64,
+) -> Option<SidePolarity> {
     let side = to - from;
     let length = side.norm();
     if length.is_nan() || length < 1.0 {
@@ -53,23 +59,23 @@ fn look(g: &Gradients, from: &Point2<f64>, to: &Point2<f64>, min_step: f32, leas
     let stride = side * ((1.0 - 2.0 * CORNER_SHARE) / SAMPLES as f64);
     let (start, stride) = (Fixed::point(&(from + side * share_along(0, SAMPLES))), Fixed::step(&stride));
     let most_missed = ((1.0 - least) * SAMPLES as f64).max(0.0) as usize;
-    let (mut seen, mut with, mut sign) = (0_usize, 0_usize, 0.0_f64);
+    let (mut in_image, mut with, mut sign) = (0_usize, 0_usize, 0.0_f64);
     for i in scattered(SAMPLES) {
         let foot = start.on(stride, i as i64);
         let step = |offset: &i64| g.step_following(foot.on(across, *offset), normal);
         if step(&0).is_none() {
             continue;
         }
-        seen += 1;
+        in_image += 1;
         if let Some(step) = OFFSETS.iter().filter_map(step).find(|s| s.abs() >= min_step) {
             with += 1;
             sign += f64::from(step.signum());
-        } else if seen - with > most_missed {
+        } else if in_image - with > most_missed {
             return None;
         }
     }
-    let support = with as f64 / seen.max(1) as f64;
-    (seen > 0 && support >= least).then(|| SideLook { support, sign: sign / seen as f64 })
+    let support = with as f64 / in_image.max(1) as f64;
+    (in_image > 0 && support >= least).then(|| SidePolarity { support, sign: sign / in_image as f64 })
 }
 
 #[cfg(test)]
@@ -98,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn the_same_step_all_round_is_worth_most() {
+    fn equal_polarity_of_all_sides_ranks_highest() {
         let dark = fit(&render(200, 160, 200, &[(CARD, 60)]), 0.0).unwrap();
         let bright = fit(&render(200, 160, 60, &[(CARD, 200)]), 0.0).unwrap();
         assert!(dark > 0.95 && bright > 0.95, "{dark} {bright}");
@@ -113,7 +119,7 @@ mod tests {
         let image = render(200, 160, 200, &[(CARD, 60)]);
         assert!(fit(&image, 2.0).is_some_and(|f| f > 0.9));
         assert_eq!(fit(&image, 8.0), None);
-        // Outside the image nothing is seen.
+        // No support outside the image.
         assert_eq!(fit(&image, 500.0), None);
     }
 }

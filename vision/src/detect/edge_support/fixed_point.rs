@@ -1,11 +1,11 @@
-//! Points of an image in fixed point, for loops over thousands of pixels along lines: a step is an addition, the
+//! Points of an image in fixed point, for loops over thousands of pixels along lines: advancing is an addition, the
 //! pixel of a point a shift. In: coordinates. Out: indices of pixels.
 
 use nalgebra::{Point2, Vector2};
 
-/// Bits behind the point.
+/// Fractional bits.
 const BITS: u32 = 32;
-/// Coordinates are held to this, far outside every image, so that no sum of them overflows.
+/// Coordinates are clamped to this, far outside every image, so that no sum of them overflows.
 const FARTHEST_PX: f64 = 1e6;
 
 /// A point of an image or a step in it.
@@ -16,9 +16,9 @@ pub(crate) struct Fixed {
 }
 
 impl Fixed {
-    /// A point, pixel centres at integers. What is no number becomes 0.
+    /// A point, pixel centres at integers. NaN becomes 0.
     pub(crate) fn point(p: &Point2<f64>) -> Self {
-        // Half a pixel on, so that cutting rounds to the nearest.
+        // Half a pixel added, so that truncation rounds to the nearest.
         Self::new(p.x + 0.5, p.y + 0.5)
     }
 
@@ -44,7 +44,7 @@ impl Fixed {
     /// The index of the pixel around the point in an image of this width and height; none outside.
     #[inline]
     pub(crate) fn pixel(self, width: usize, height: usize) -> Option<usize> {
-        // What is negative becomes very large.
+        // Negative values wrap to very large ones.
         let (u, v) = ((self.u >> BITS) as usize, (self.v >> BITS) as usize);
         (u < width && v < height).then(|| v * width + u)
     }

@@ -1,4 +1,4 @@
-//! How well edges support a supposed side of a quad.
+//! How well edges support a proposed side of a quad.
 
 pub(crate) mod fixed_point;
 pub mod gradients;

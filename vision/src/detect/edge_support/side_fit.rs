@@ -22,7 +22,7 @@ pub struct FittedLine {
     pub normal: Vector2<f64>,
     /// Signed distance from the origin.
     pub rho_px: f64,
-    /// Point of the line where its offset is known best.
+    /// Point of the line where the variance of its offset is smallest.
     centre_px: Point2<f64>,
     variance_px2: f64,
     slope_variance: f64,
@@ -48,23 +48,24 @@ pub(crate) struct OffsetFit {
 /// Least squares with three rounds of trimming: texture near a side throws points far off its line.
 pub(crate) fn fit(points: &[EdgePoint], length: f64) -> Option<OffsetFit> {
     const MIN_POINTS: usize = 5;
-    let mut kept: Vec<EdgePoint> = points.to_vec();
+    let mut inliers: Vec<EdgePoint> = points.to_vec();
     let mut result = None;
     for round in 0..4 {
-        if kept.len() < MIN_POINTS {
+        if inliers.len() < MIN_POINTS {
             return result;
         }
-        let n = kept.len() as f64;
-        let mean = kept.iter().map(|p| p.along_px).sum::<f64>() / n;
-        let offset = kept.iter().map(|p| p.offset_px).sum::<f64>() / n;
-        let spread: f64 = kept.iter().map(|p| (p.along_px - mean).powi(2)).sum();
-        // Points in one place cannot give a direction.
+        let n = inliers.len() as f64;
+        let mean = inliers.iter().map(|p| p.along_px).sum::<f64>() / n;
+        let offset = inliers.iter().map(|p| p.offset_px).sum::<f64>() / n;
+        let spread: f64 = inliers.iter().map(|p| (p.along_px - mean).powi(2)).sum();
+        // Coincident points determine no direction.
         if spread < n * (0.05 * length).powi(2) {
             return result;
         }
-        let slope = kept.iter().map(|p| (p.along_px - mean) * (p.offset_px - offset)).sum::<f64>() / spread;
+        let slope =
+            inliers.iter().map(|p| (p.along_px - mean) * (p.offset_px - offset)).sum::<f64>() / spread;
         let residual = |p: &EdgePoint| p.offset_px - offset - slope * (p.along_px - mean);
-        let sum: f64 = kept.iter().map(|p| residual(p).powi(2)).sum();
+        let sum: f64 = inliers.iter().map(|p| residual(p).powi(2)).sum();
         let sigma = (sum / (n - 2.0)).sqrt().max(MIN_SIGMA_PX);
         result = Some(OffsetFit {
             mean_along_px: mean,
@@ -74,14 +75,14 @@ pub(crate) fn fit(points: &[EdgePoint], length: f64) -> Option<OffsetFit> {
             slope_variance: sigma * sigma / spread,
         });
         let limit = (2.0 * sigma).max(0.5);
-        let before = kept.len();
+        let before = inliers.len();
         if round == 0 {
-            // The first line may lean on outliers: judge every point by it again.
-            kept = points.iter().filter(|p| residual(p).abs() <= limit).copied().collect();
+            // The first line may be pulled by outliers: every point is tested again.
+            inliers = points.iter().filter(|p| residual(p).abs() <= limit).copied().collect();
         } else {
-            kept.retain(|p| residual(p).abs() <= limit);
+            inliers.retain(|p| residual(p).abs() <= limit);
         }
-        if round > 0 && kept.len() == before {
+        if round > 0 && inliers.len() == before {
             break;
         }
     }

@@ -14,22 +14,22 @@ pub const MAX_SAMPLES: usize = 96;
 const MIN_SAMPLES: usize = 12;
 /// Share of a side left out at both ends: near a corner the other side's gradient mixes in.
 pub(crate) const CORNER_SHARE: f64 = 0.04;
-/// How a side is searched.
+/// How the edge of a side is searched.
 #[derive(Debug, Clone, Copy)]
 pub struct EdgeProbeParams {
-    /// How far from the supposed side its edge may lie.
+    /// How far from the proposed side its edge may lie.
     pub reach_px: f64,
     /// Smallest step height of an edge point, in grey levels.
     pub min_step: f64,
     /// Most samples along a side; [`MAX_SAMPLES`] for the best line.
     pub samples: usize,
-    /// Read the gradient between pixels, for the best line, or at the nearest, which is quicker.
+    /// Interpolate the gradient between pixels, for the best line, or take the nearest pixel, which is faster.
     pub between_pixels: bool,
-    /// Support of a side below which nothing else is asked of it; 0 for all there is to know.
+    /// Support below which the measurement of a side stops early; 0 measures all samples.
     pub least_support: f64,
 }
 
-/// What was found along a side.
+/// Edge support of a side.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SideSupport {
     /// Share of the samples inside the image that have an edge along the side, 0 to 1.
@@ -38,7 +38,7 @@ pub struct SideSupport {
     pub agreement: f64,
     /// Mean step height over all samples, in grey levels, unsupported samples counting 0.
     pub strength: f64,
-    /// The refitted line, if there were points enough.
+    /// The refitted line, if there were enough points.
     pub line: Option<FittedLine>,
 }
 
@@ -46,7 +46,7 @@ impl SideSupport {
     pub(crate) const NONE: Self = Self { support: 0.0, agreement: 0.0, strength: 0.0, line: None };
 }
 
-/// The edge points along the way from one point to another.
+/// The edge points along a side.
 #[derive(Debug, Clone)]
 pub(crate) struct SidePoints {
     from: Point2<f64>,
@@ -54,18 +54,18 @@ pub(crate) struct SidePoints {
     normal: Vector2<f64>,
     length_px: f64,
     /// Number of samples inside the image.
-    seen: usize,
+    in_image: usize,
     points: Vec<EdgePoint>,
 }
 
-/// Looks for an edge along the way from `from` to `to`.
+/// Measures the edge support of the side from `from` to `to`.
 pub fn measure(g: &Gradients, from: &Point2<f64>, to: &Point2<f64>, search: EdgeProbeParams) -> SideSupport {
     let found = SidePoints::new(g, from, to, EdgeProbeParams { least_support: 0.0, ..search });
     found.map_or(SideSupport::NONE, |s| s.evidence())
 }
 
 impl SidePoints {
-    /// Looks for edge points along the way from `from` to `to`. None once the support cannot reach what is asked for.
+    /// Collects the edge points from `from` to `to`. None as soon as `search.least_support` cannot be reached.
     pub(crate) fn new(
         g: &Gradients,
         from: &Point2<f64>,
@@ -81,50 +81,60 @@ impl SidePoints {
         let normal = Vector2::new(direction.y, -direction.x);
         let count =
             ((length_px / 2.0) as usize).clamp(MIN_SAMPLES, search.samples.clamp(MIN_SAMPLES, MAX_SAMPLES));
-        let mut looked =
-            Self { from: *from, direction, normal, length_px, seen: 0, points: Vec::with_capacity(count) };
+        let mut points_of_side = Self {
+            from: *from,
+            direction,
+            normal,
+            length_px,
+            in_image: 0,
+            points: Vec::with_capacity(count),
+        };
         let across = Across::new(&normal, search);
         let most_missed = (1.0 - search.least_support) * count as f64;
         for i in scattered(count) {
             let along_px = share_along(i, count) * length_px;
             let (inside, found) = across.strongest(g, &(from + direction * along_px));
-            looked.seen += usize::from(inside);
-            looked.points.extend(found.map(|(offset_px, step)| EdgePoint { along_px, offset_px, step }));
-            if (looked.seen - looked.points.len()) as f64 > most_missed {
+            points_of_side.in_image += usize::from(inside);
+            points_of_side.points.extend(found.map(|(offset_px, step)| EdgePoint {
+                along_px,
+                offset_px,
+                step,
+            }));
+            if (points_of_side.in_image - points_of_side.points.len()) as f64 > most_missed {
                 return None;
             }
         }
-        Some(looked)
+        Some(points_of_side)
     }
 
-    /// What the points say of the side.
+    /// Support, polarity, strength and line of the side.
     pub(crate) fn evidence(&self) -> SideSupport {
-        if self.seen == 0 || self.points.is_empty() {
+        if self.in_image == 0 || self.points.is_empty() {
             return SideSupport::NONE;
         }
         let n = self.points.len();
         let positive = self.points.iter().filter(|p| p.step > 0.0).count();
         SideSupport {
-            support: n as f64 / self.seen as f64,
+            support: n as f64 / self.in_image as f64,
             agreement: positive.max(n - positive) as f64 / n as f64,
-            strength: self.points.iter().map(|p| p.step.abs()).sum::<f64>() / self.seen as f64,
+            strength: self.points.iter().map(|p| p.step.abs()).sum::<f64>() / self.in_image as f64,
             line: fit(&self.points, self.length_px)
                 .map(|f| f.line(&self.from, &self.direction, &self.normal)),
         }
     }
 }
 
-/// The numbers below `count`, each once, far from one another one after the other: a bad side shows before all of its
-/// samples are taken.
+/// The numbers below `count`, each once, successive ones far apart: a bad side is recognised before all samples are
+/// taken.
 pub(crate) fn scattered(count: usize) -> impl Iterator<Item = usize> {
-    // Two primes whose product is above every count: one of them is no factor.
+    // Two primes whose product is above every count: at least one does not divide it.
     let stride = if count.is_multiple_of(STRIDES[0]) { STRIDES[1] } else { STRIDES[0] };
     (0..count).map(move |i| i * stride % count)
 }
 
 const STRIDES: [usize; 2] = [7, 17];
 
-/// Where along a side a sample lies, 0 to 1.
+/// Position of a sample along a side, 0 to 1.
 pub(crate) fn share_along(sample: usize, count: usize) -> f64 {
     CORNER_SHARE + (1.0 - 2.0 * CORNER_SHARE) * (sample as f64 + 0.5) / count as f64
 }
@@ -160,12 +170,12 @@ pub fn run_end(g: &Gradients, from: &Point2<f64>, to: &Point2<f64>, min_step: f6
     to + direction * (2 * end) as f64
 }
 
-/// Most pixels looked at to each side of a foot.
+/// Most pixels searched to each side of a foot.
 const MAX_REACH_PX: usize = 16;
-/// Pixels across a side at most: one more at both ends, to tell whether the strongest is a peak.
+/// Most pixels across a side: one more at both ends, to check that the strongest is a peak.
 const MAX_ACROSS: usize = 2 * MAX_REACH_PX + 3;
 
-/// The look across a side for its edge.
+/// The search across a side for its edge.
 struct Across {
     normal: Vector2<f64>,
     facing: [f32; 2],
@@ -202,7 +212,7 @@ impl Across {
         }
     }
 
-    /// [`Self::strongest`] among the gradients at steps of a pixel; none outside the image, where nothing is known.
+    /// [`Self::strongest`] among the gradients at steps of a pixel; none outside the image.
     #[inline]
     fn among(&self, gradient: impl Fn(usize) -> Option<[f32; 2]>) -> (bool, Option<(f64, f64)>) {
         let mut steps = [f32::NAN; MAX_ACROSS];
@@ -225,7 +235,7 @@ impl Across {
         }
         let known = |step: f32| if step.is_nan() { best.abs() } else { step * best.signum() };
         let (a, b, c) = (known(steps[at - 1]), best.abs(), known(steps[at + 1]));
-        // At the end of the reach a still rising gradient belongs to another edge.
+        // A gradient that still rises at the end of the reach belongs to another edge.
         let peak = a <= b && c <= b;
         let bend = a - 2.0 * b + c;
         let shift = if bend < 0.0 { (0.5 * (a - c) / bend).clamp(-0.5, 0.5) } else { 0.0 };
@@ -254,7 +264,7 @@ mod tests {
     };
 
     #[test]
-    fn every_sample_is_looked_at_once() {
+    fn every_sample_is_visited_once() {
         for count in MIN_SAMPLES..=MAX_SAMPLES {
             let mut all: Vec<usize> = scattered(count).collect();
             all.sort_unstable();
@@ -269,7 +279,7 @@ mod tests {
         let map = edges(&image, &EdgeParams::default());
         let g = Gradients { image: &image, gx: map.gx(), gy: map.gy() };
         let (from, to) = (Point2::from(quad[0]), Point2::from(quad[1]));
-        // The supposed side is a pixel and a half off.
+        // The proposed side is a pixel and a half off.
         let shift = Vector2::new(0.0, 1.5);
         let found = measure(&g, &(from + shift), &(to + shift), FULL);
         assert!(found.support > 0.95 && found.agreement > 0.99 && found.strength > 100.0, "{found:?}");
@@ -280,7 +290,7 @@ mod tests {
         }
         // Out of a polygon that is walked clockwise: upwards here.
         assert!(line.normal.y < -0.9);
-        // Beside the quad there is nothing.
+        // No edge beside the quad.
         let away = Vector2::new(0.0, -20.0);
         assert!(measure(&g, &(from + away), &(to + away), FULL).support < 0.05);
         // The run from the middle of the side ends at its corner.
@@ -295,7 +305,7 @@ mod tests {
         let g = Gradients { image: &image, gx: map.gx(), gy: map.gy() };
         let found = measure(&g, &Point2::new(10.0, 39.5), &Point2::new(110.0, 39.5), FULL);
         assert!((found.support - 0.5).abs() < 0.06, "{found:?}");
-        // Whoever asks for more than there is gets nothing, and for less the same.
+        // A higher required support gives none, a lower one the same result.
         let (from, to) = (Point2::new(10.0, 39.5), Point2::new(110.0, 39.5));
         let asked =
             |least_support| SidePoints::new(&g, &from, &to, EdgeProbeParams { least_support, ..FULL });

@@ -1,10 +1,10 @@
 //! Grey image in, the two gradient planes out (method 1.1): the recursive filter of Canny and Deriche.
 //!
-//! Departs from method 1.1 in the form, not in the result: instead of a causal plus an anticausal recursion for each of
-//! smoothing and derivative, one causal recursion after one anticausal, `C = 1 / ((1 - q z^-1)^2 (1 - q z)^2)`, along
-//! rows and columns. Of it smoothing is `s1 C[n-1] + s0 C[n] + s1 C[n+1]` and the derivative `d (C[n+1] - C[n-1])`, so
-//! both gradients are 3x3 stencils of one plane: half the arithmetic, a third of the memory. Rows are filtered
-//! [`LANES`] at a time, columns all at once; no thresholds here.
+//! Departs from method 1.1 in the form, not in the result: instead of a causal plus an anticausal recursion for
+//! each of smoothing and derivative, one causal recursion after one anticausal, `C = 1 / ((1 - q z^-1)^2 (1 - q
+//! z)^2)`, along rows and columns. Of it smoothing is `s1 C[n-1] + s0 C[n] + s1 C[n+1]` and the derivative `d
+//! (C[n+1] - C[n-1])`, so both gradients are 3x3 stencils of one plane: half the arithmetic, a third of the memory.
+//! Rows are filtered [`LANES`] at a time, columns all at once; no thresholds here.
 
 #![expect(
     clippy::inline_always,
@@ -27,8 +27,8 @@ struct Deriche {
     feedback: [f32; 2],
     /// Response of one recursion to a constant 1.
     steady: f32,
-    /// What the second recursion has one and two samples beyond the end, for a deviation of 1 from the steady state
-    /// in the last and last but one sample of the first.
+    /// Start values of the second recursion one and two samples beyond the end, for a deviation of 1 from the
+    /// steady state in the last and last but one sample of the first.
     beyond: [[f32; 2]; 2],
     /// s1 / s0.
     side: f32,
@@ -110,7 +110,8 @@ impl Deriche {
         }
     }
 
-    /// Rows -2 and -1 of the second recursion, from the first row of the image and rows 0 and 1 of the first recursion.
+    /// Rows -2 and -1 of the second recursion, from the first row of the image and rows 0 and 1 of the first
+    /// recursion.
     fn above(&self, first: &[f32], g: [&[f32]; 2], out: [&mut [f32]; 2]) {
         let [far, near] = out;
         for (u, x) in first.iter().enumerate() {
@@ -150,7 +151,7 @@ pub(crate) fn vectors<S: Simd>(n: usize) -> impl Iterator<Item = usize> {
     (0..n / S::f32s::LEN).map(|i| i * S::f32s::LEN)
 }
 
-/// What whole vectors leave of a row of `n`.
+/// The samples of a row of `n` after the whole vectors.
 #[inline(always)]
 pub(crate) fn rest<S: Simd>(n: usize) -> std::ops::Range<usize> {
     n / S::f32s::LEN * S::f32s::LEN..n
@@ -161,7 +162,7 @@ pub(crate) fn load<S: Simd>(s: S, row: &[f32], u: usize) -> S::f32s {
     S::f32s::from_slice(s, &row[u..u + S::f32s::LEN])
 }
 
-/// Working memory of the filter, kept from image to image.
+/// Working memory of the filter, reused from image to image.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct FilterMemory {
     lines: Vec<Column>,
@@ -178,7 +179,7 @@ pub(crate) struct FilterMemory {
 /// The two gradient planes being filled, row-major.
 pub(crate) type Planes<'a> = [&'a mut [f32]; 2];
 
-/// Who looks at gradient rows while they are fresh.
+/// Receives the gradient rows while they are in the cache.
 pub(crate) trait GradientRows<S: Simd> {
     /// Row `v` is done; `planes` hold all rows up to it.
     fn row(&mut self, s: S, v: usize, planes: [&[f32]; 2]);
@@ -228,7 +229,7 @@ fn upwards<S: Simd>(s: S, image: &GrayImage, filter: &Deriche, memory: &mut Filt
     let mut bottom = height;
     while bottom > 0 {
         let top = bottom.saturating_sub(LANES);
-        // Lanes past the bottom repeat the last row; nobody reads them.
+        // Lanes past the bottom repeat the last row; they are not read.
         filter.along_rows(s, &std::array::from_fn(|i| row((top + i).min(bottom - 1))), lines);
         store_rows(s, lines, rows);
         if bottom == height {

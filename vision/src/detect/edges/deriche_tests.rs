@@ -83,7 +83,7 @@ fn separable(image: &GrayImage, alpha: f64) -> (Vec<f64>, Vec<f64>) {
 }
 
 #[test]
-fn memory_of_another_image_leaves_no_trace() {
+fn reused_memory_does_not_change_the_planes() {
     let image = |n: usize| GrayImage::from_fn(20 + 3 * n, 50 - 7 * n, |u, v| (u * n * 31 + v * 17) as u8);
     let mut memory = FilterMemory::default();
     for n in [0, 3, 1, 2] {
@@ -97,7 +97,7 @@ fn memory_of_another_image_leaves_no_trace() {
     }
 }
 
-/// Every level of instructions that this processor has, the plainest first.
+/// Every instruction set level of this processor, the lowest first.
 fn levels() -> Vec<Level> {
     let best = Level::new();
     #[cfg(target_arch = "x86_64")]

@@ -1,6 +1,6 @@
 //! Grey image in, edge map out (method 1.1, 1.2): gradient, non-maximum suppression, hysteresis, thinning.
 //!
-//! The map keeps the gradient planes: later stages look along a hypothesised side for edges too weak for the mask.
+//! The map keeps the gradient planes: later stages search along a proposed side for edges too weak for the mask.
 //! No chaining here. Filter and suppression run on the widest vectors the processor has; results do not depend on it.
 
 use crate::{
@@ -35,17 +35,17 @@ pub struct EdgeParams {
 
 impl Default for EdgeParams {
     fn default() -> Self {
-        // Thresholds that rise with the noise are for noisy cameras: a picture that fills the image with texture looks
-        // like noise, so they stay off. Factors of 2.5 and 6 leave almost no edge pixel to noise.
+        // Thresholds that rise with the noise are for noisy cameras: a picture that fills the image with texture
+        // looks like noise, so they stay off. Factors of 2.5 and 6 leave almost no edge pixel to noise.
         Self { alpha: 1.0, low: 6.0, high: 15.0, noise_factors: [0.0, 0.0] }
     }
 }
 
-/// Mark of a pixel that becomes an edge pixel if it hangs together with one.
+/// Mark of a pixel that becomes an edge pixel if it is connected to one.
 const WEAK: u8 = 2;
 
-/// Edge pixels with the gradient of the whole image. Planes are row-major, `width * height` long. The memory used on
-/// the way stays with the map, for [`edges_into`].
+/// Edge pixels with the gradient of the whole image. Planes are row-major, `width * height` long. The working
+/// memory stays with the map, for [`edges_into`].
 #[derive(Debug, Clone, Default)]
 pub struct EdgeMap {
     width: usize,
@@ -106,9 +106,10 @@ impl EdgeMap {
     /// Sub-pixel position of the edge through edge pixel `at` (row-major index, off the border): the vertex of a
     /// parabola along the gradient, at most half a step away.
     ///
-    /// Departs from method 1.2, where the parabola goes through the magnitudes m: here it goes through `1 / sqrt(m)`.
-    /// The filter answers a step by `(1 + a |x|) exp(-a |x|)`, which is more pointed than a parabola: that pulled
-    /// positions to the middle of the pixel, by up to 0.05 px and along a diagonal side everywhere alike.
+    /// Departs from method 1.2, where the parabola goes through the magnitudes m: here it goes through `1 /
+    /// sqrt(m)`. The filter answers a step by `(1 + a |x|) exp(-a |x|)`, which is more pointed than a parabola:
+    /// that pulled positions to the middle of the pixel, by up to 0.05 px, and by the same amount everywhere along
+    /// a diagonal side.
     pub fn position_px(&self, at: usize) -> Point2<f64> {
         let (behind, ahead, step) = self.along_gradient(at);
         // Roots, and numerator and denominator times all three.
@@ -197,8 +198,8 @@ impl EdgeMap {
         thin(&mut self.marks, width, strength, &mut self.pixels, &mut self.stack);
     }
 
-    /// Standard deviation of each gradient component in the smoothest parts of the image: the magnitude of noise alone
-    /// has a Rayleigh distribution, whose lower quartile stands 0.7585 sigma high.
+    /// Standard deviation of each gradient component in the smoothest parts of the image: the magnitude of noise
+    /// alone has a Rayleigh distribution, whose lower quartile stands 0.7585 sigma high.
     fn noise(&self) -> f32 {
         // A prime stride meets every column.
         let mut sample: Vec<f32> =
@@ -208,7 +209,7 @@ impl EdgeMap {
         *quartile / 0.7585
     }
 
-    /// Marks and lists the candidates that hang together, over all eight neighbours, with one of at least `high`.
+    /// Marks and lists the candidates that are 8-connected to one of at least `high`.
     fn hysteresis(&mut self, candidates: &[Maximum], high: f32) {
         let Self { marks, pixels, stack, width, .. } = self;
         let width = *width;

@@ -1,5 +1,6 @@
-//! Gradient rows in, the pixels out whose magnitude no neighbour along the gradient exceeds (method 1.2). Sees each row
-//! while it is in the cache; keeps the magnitudes of three rows. Thresholds for whole edges are not applied here.
+//! Gradient rows in, the pixels out whose magnitude no neighbour along the gradient exceeds (method 1.2). Sees each
+//! row while it is in the cache; keeps the magnitudes of three rows. Thresholds for whole edges are not applied
+//! here.
 
 #![expect(
     clippy::inline_always,
@@ -9,7 +10,7 @@
 use crate::detect::edges::deriche::{GradientRows, load, rest, vectors};
 use fearless_simd::{Select, Simd, prelude::*};
 
-/// Rim of the image in which no edge is reported: the filter sees a continued border there, not the world.
+/// Rim of the image in which no edge is reported: the filter runs over the continued border there.
 pub(crate) const BORDER_PX: usize = 2;
 /// Relative difference below which two neighbouring magnitudes are a tie, won by the darker pixel.
 const TIE: f32 = 1e-4;
@@ -23,7 +24,7 @@ pub(crate) struct Maximum {
     pub(crate) magnitude: f32,
 }
 
-/// What is found, and the memory for finding it, kept from image to image.
+/// The maxima, with working memory reused from image to image.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Maxima {
     /// Row-major, none within [`BORDER_PX`] of the rim.
@@ -35,7 +36,7 @@ pub(crate) struct Maxima {
 }
 
 impl Maxima {
-    /// Forgets what was found; from now on for an image of this size, pixels of at least `low`.
+    /// Clears the maxima and prepares for an image of this size, pixels of at least `low`.
     pub(crate) fn restart(&mut self, width: usize, height: usize, low: f32) {
         self.found.clear();
         for row in &mut self.ring {
@@ -113,7 +114,8 @@ impl Scan<'_> {
         }
     }
 
-    /// Which pixels of one vector are maxima of at least `low`, one bit each. Magnitudes stand out by one on each side.
+    /// Which pixels of one vector are maxima of at least `low`, one bit each. Magnitudes stand out by one on each
+    /// side.
     #[inline(always)]
     fn among<S: Simd>(&self, s: S, low: f32) -> u64 {
         let m = |row: usize, u: usize| load(s, self.magnitudes[row], u);

@@ -1,7 +1,7 @@
 //! Edge mask in, the same mask one pixel wide out (method 1.2), and the number of branches that meet in a pixel.
 //!
-//! Both look only at the ring of eight neighbours, coded as one byte; the answers for all 256 codes are tables made at
-//! compile time.
+//! Both look only at the ring of eight neighbours, coded as one byte; the answers for all 256 codes are tables made
+//! at compile time.
 
 /// Mark of an edge pixel; all others have mark 0.
 pub(crate) const EDGE: u8 = 1;
@@ -75,8 +75,8 @@ const RINGS: [u8; 512] = {
     table
 };
 
-/// Ring code of pixel `at`: which neighbours have bit [`EDGE`] in a row-major plane. The pixel must lie off the border
-/// by two rows. For planes at rest: reading four marks at once stalls when one of them was just written.
+/// Ring code of pixel `at`: which neighbours have bit [`EDGE`] in a row-major plane. The pixel must lie off the
+/// border by two rows. For planes at rest: reading four marks at once stalls when one of them was just written.
 #[inline]
 pub(crate) fn ring_code(marks: &[u8], width: usize, at: usize) -> usize {
     // Three neighbouring marks, their bits side by side.
@@ -97,8 +97,9 @@ pub(crate) fn changing_ring_code(marks: &[u8], width: usize, at: usize) -> usize
         | (bit(below[1], 4) | bit(below[0], 5) | bit(level[0], 6) | bit(above[0], 7))
 }
 
-/// Clears staircase corners in `marks` and `pixels` (row-major, none within two rows of the border) alike. Of two
-/// corners that touch, the weaker goes: which one must not depend on how the image lies. `corners` is scratch.
+/// Clears staircase corners in both `marks` and `pixels` (row-major, none within two rows of the border). Of two
+/// corners that touch, the weaker is removed: the choice must not depend on the orientation of the image. `corners`
+/// is scratch.
 pub(crate) fn thin(
     marks: &mut [u8],
     width: usize,
@@ -128,15 +129,15 @@ pub(crate) fn thin(
     keep(pixels, |at| marks[at] == EDGE);
 }
 
-/// Keeps the pixels that pass. Unlike `retain` without a branch on the outcome, which nobody can predict here.
+/// Keeps the pixels that pass. Unlike `retain`, without a branch on the outcome, which is unpredictable here.
 pub(crate) fn keep(pixels: &mut Vec<u32>, mut passes: impl FnMut(usize) -> bool) {
-    let mut kept = 0;
+    let mut count = 0;
     for i in 0..pixels.len() {
         let at = pixels[i];
-        pixels[kept] = at;
-        kept += usize::from(passes(at as usize));
+        pixels[count] = at;
+        count += usize::from(passes(at as usize));
     }
-    pixels.truncate(kept);
+    pixels.truncate(count);
 }
 
 #[cfg(test)]

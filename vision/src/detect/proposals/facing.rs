@@ -11,13 +11,13 @@ use nalgebra::Point2;
 pub const MAX_PARTNERS: usize = 12;
 /// The shorter of two segments is at least this share of the longer.
 const MIN_RATIO: f64 = 0.6;
-/// Sine of the largest angle between them: 20 degrees, for a quad seen aslant.
+/// Sine of the largest angle between them: 20 degrees, for a quad seen obliquely.
 const MAX_SIN: f64 = 0.35;
-/// Cosine of the smallest angle between a segment and the way across from its end: 45 degrees.
+/// Cosine of the smallest angle between a segment and the connection of the ends: 45 degrees.
 const MAX_LEAN: f64 = 0.7;
-/// The way across is at least so many pixels, and at most so many: a longer side would be a segment.
+/// Smallest and largest length of a connection: a longer side would be a segment.
 const ACROSS_PX: [f64; 2] = [12.0, 60.0];
-/// Of the two ways across the shorter is at least this share of the longer.
+/// Of the two connections the shorter is at least this share of the longer.
 const MIN_ACROSS_RATIO: f64 = 0.5;
 
 /// A segment across from another one.
@@ -27,7 +27,8 @@ pub struct Partner {
     pub other: usize,
     /// First end of the one, its other end, that of the other across from it, and across from the first.
     pub corners_px: [Point2<f64>; 4],
-    /// How far the two are from being opposite sides of a rectangle whose inside is brighter or darker all round, from
+    /// How far the two are from being opposite sides of a rectangle whose inside is brighter or darker all round,
+    /// from
     /// 0.
     pub slack: f64,
 }
@@ -47,9 +48,9 @@ fn partner(segments: &[EdgeSegment], a: usize, b: usize) -> Option<Partner> {
     if ratio < MIN_RATIO || first.normal.perp(&second.normal).abs() > MAX_SIN {
         return None;
     }
-    // The brighter side is on the right: two sides of one thing run against each other.
-    let alike = first.normal.dot(&second.normal) < 0.0;
-    let (start, stop) = if alike { (second.q_px, second.p_px) } else { (second.p_px, second.q_px) };
+    // The brighter side is on the right: two sides of one object run in opposite directions.
+    let same_polarity = first.normal.dot(&second.normal) < 0.0;
+    let (start, stop) = if same_polarity { (second.q_px, second.p_px) } else { (second.p_px, second.q_px) };
     let across = [start - first.p_px, stop - first.q_px];
     let [s, t] = across.map(|way| way.norm());
     if s.max(t) > ACROSS_PX[1] || s.min(t) < (MIN_ACROSS_RATIO * s.max(t)).max(ACROSS_PX[0]) {
@@ -57,7 +58,7 @@ fn partner(segments: &[EdgeSegment], a: usize, b: usize) -> Option<Partner> {
     }
     let along = (first.q_px - first.p_px) / first.length_px;
     let lean = (along.dot(&across[0]) / s).abs().max((along.dot(&across[1]) / t).abs());
-    let slack = 0.2 * (1.0 - ratio) + 0.2 * lean + if alike { 0.0 } else { 0.1 };
+    let slack = 0.2 * (1.0 - ratio) + 0.2 * lean + if same_polarity { 0.0 } else { 0.1 };
     (lean <= MAX_LEAN).then_some(Partner {
         other: b,
         corners_px: [first.p_px, first.q_px, stop, start],
@@ -71,14 +72,14 @@ mod tests {
     use crate::detect::tests::fixtures::segment;
 
     #[test]
-    fn opposite_sides_face_each_other_and_others_do_not() {
+    fn only_opposite_sides_are_partners() {
         let side = segment([20.0, 20.0], [60.0, 20.0]);
         let one = |p: [f64; 2], q: [f64; 2]| partners(&[side.clone(), segment(p, q)], 0, &[1]);
         let found = one([60.0, 50.0], [20.0, 50.0]);
         let wanted = [[20.0, 20.0], [60.0, 20.0], [60.0, 50.0], [20.0, 50.0]].map(Point2::from);
         assert!(found.len() == 1 && found[0].other == 1 && found[0].slack < 1e-9, "{found:?}");
         assert!(found[0].corners_px.iter().zip(wanted).all(|(a, b)| (a - b).norm() < 1e-9), "{found:?}");
-        // Bright outside at one side, inside at the other: the same corners, for what they are worth.
+        // Bright outside at one side, inside at the other: the same corners at a worse slack.
         let odd = one([20.0, 50.0], [60.0, 50.0]);
         assert!(odd[0].corners_px == found[0].corners_px && odd[0].slack > 0.05, "{odd:?}");
         for (p, q) in [
@@ -94,7 +95,7 @@ mod tests {
     }
 
     #[test]
-    fn partners_are_bounded_the_best_first() {
+    fn the_number_of_partners_is_bounded_and_the_best_stay() {
         let segments: Vec<_> =
             (0..40).map(|i| f64::from(i) * 3.0).map(|y| segment([80.0 + 0.1 * y, y], [20.0, y])).collect();
         let others: Vec<usize> = (0..40).filter(|i| *i != 20).collect();

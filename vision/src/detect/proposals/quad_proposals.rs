@@ -1,9 +1,9 @@
 //! Quad proposals, the default instead of the paper's two relaxations. Segments that meet in corners are followed
-//! round: four in a circle, or three with the fourth side looked for in the gradient planes, or two that face each
+//! round: four in a circle, or three with the fourth side searched in the gradient planes, or two that face each
 //! other. Edges must support all four sides. In: segments. Out: proposals; `suppression` decides which become quads.
 //!
-//! Departs from method 3.3, 3.4: there a segment takes part in one pair and a pair in one quad, and a side that the
-//! segments miss loses the quad. What it gains: docs/method/24-default-detector.md.
+//! Departs from method 3.3, 3.4: there a segment takes part in one pair and a pair in one quad, and one side
+//! without a segment loses the quad. Measurements: docs/method/24-default-detector.md.
 
 use crate::detect::{
     edge_support::{coarse_support::fit_of, gradients::Gradients, side_support::run_end},
@@ -20,12 +20,12 @@ use serde::{Deserialize, Serialize};
 pub const MAX_SEARCHED_SEGMENTS: usize = 400;
 /// Most corners kept at one end of a segment, the tightest first.
 pub const MAX_CORNERS_PER_END: usize = 8;
-/// Most hypotheses that are checked against the gradient, the tightest first.
-pub const MAX_HYPOTHESES: usize = 6000;
-/// Most hypotheses in memory: whenever there are so many, only the tightest [`MAX_HYPOTHESES`] stay.
-pub const MAX_COLLECTED: usize = 4 * MAX_HYPOTHESES;
+/// Most proposals that are checked against the gradient, the tightest first.
+pub const MAX_PROPOSALS: usize = 6000;
+/// Most proposals in memory: at this number only the tightest [`MAX_PROPOSALS`] stay.
+pub const MAX_COLLECTED: usize = 4 * MAX_PROPOSALS;
 
-/// How hypotheses are formed and checked.
+/// How proposals are formed and checked.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ProposalParams {
@@ -37,11 +37,11 @@ pub struct ProposalParams {
     pub max_gap_px: f64,
     /// A segment may run past the corner by this share of its length.
     pub max_overshoot: f64,
-    /// Smallest support of any side in the first, coarse look at the gradient.
+    /// Smallest coarse support of any side, 0 to 1.
     pub min_support: f64,
     /// Smallest step height of an edge point, grey levels.
     pub min_step: f64,
-    /// Whether a fourth side that no segment gives is looked for.
+    /// Whether a fourth side without a segment is searched.
     pub complete: bool,
     /// Whether two segments that face each other make a quad, their ends its corners.
     pub facing: bool,
@@ -62,7 +62,7 @@ impl Default for ProposalParams {
     }
 }
 
-/// A corner seen from one of its segments.
+/// A corner at the end of one of its segments.
 #[derive(Debug, Clone, Copy)]
 struct Corner {
     other: usize,
@@ -76,8 +76,8 @@ struct Corner {
 /// Corners at both ends of every segment, tightest first.
 type CornerTable = Vec<[Vec<Corner>; 2]>;
 
-/// Seeds of quads whose sides the gradient supports, best first.
-pub fn hypotheses(segments: &[EdgeSegment], g: &Gradients, p: &ProposalParams) -> Vec<QuadSeed> {
+/// Proposals whose sides the gradient supports, best first.
+pub fn proposals(segments: &[EdgeSegment], g: &Gradients, p: &ProposalParams) -> Vec<QuadSeed> {
     let order = longest(segments);
     let table = corners(segments, &order, p);
     let mut found = Tightest::default();
@@ -107,7 +107,7 @@ pub fn hypotheses(segments: &[EdgeSegment], g: &Gradients, p: &ProposalParams) -
         .collect()
 }
 
-/// Hypotheses with their looseness, in bounded memory.
+/// Proposals with their looseness, in bounded memory.
 #[derive(Debug, Default)]
 struct Tightest {
     found: Vec<(f64, QuadSeed)>,
@@ -121,13 +121,13 @@ impl Tightest {
         }
     }
 
-    /// Of equally tight ones those that came first stay first, so it does not matter when this is done.
+    /// Equally tight proposals keep their order, so the result does not depend on when this is called.
     fn prune(&mut self) {
         self.found.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.sides.cmp(&y.1.sides)));
-        self.found.truncate(MAX_HYPOTHESES);
+        self.found.truncate(MAX_PROPOSALS);
     }
 
-    /// At most [`MAX_HYPOTHESES`], the tightest first.
+    /// At most [`MAX_PROPOSALS`], the tightest first.
     fn in_order(mut self) -> impl Iterator<Item = QuadSeed> {
         self.prune();
         self.found.into_iter().map(|(_, seed)| seed)
@@ -200,8 +200,8 @@ fn chains_from(table: &CornerTable, a: usize, a_end: usize, mut found: impl FnMu
     }
 }
 
-/// Adds the quads that a fourth segment closes. Each comes once: its smallest index leads, and of both ways round
-/// the one with the smaller second index.
+/// Adds the quads that a fourth segment closes. Each is added once: its smallest index first, in the direction with
+/// the smaller second index.
 fn closed(table: &CornerTable, chain: &Chain, found: &mut Tightest) {
     let (a, b, c) = (chain.a, chain.ab.other, chain.bc.other);
     for cd in &table[c][1 - chain.bc.other_end] {
@@ -300,37 +300,37 @@ mod tests {
     };
 
     #[test]
-    fn collected_hypotheses_are_bounded_and_the_tightest_stay() {
+    fn the_number_of_proposals_is_bounded_and_the_tightest_stay() {
         let seed = |i: usize| QuadSeed {
             sides: [Some(i % 3), None, None, None],
             corners_px: [Point2::new(i as f64, 0.0); 4],
             similarity: 1.0,
             fit: 0.0,
         };
-        // Many equally tight ones, which only their sides and their order tell apart.
+        // Many equally tight proposals, which differ in sides and order only.
         let looseness = |i: usize| (i * 7919 % 1000) as f64;
         let count = 3 * MAX_COLLECTED + 5;
-        let (mut kept, mut all) = (Tightest::default(), Vec::new());
+        let (mut tightest, mut all) = (Tightest::default(), Vec::new());
         for i in 0..count {
-            kept.add(looseness(i), seed(i));
-            assert!(kept.found.len() < MAX_COLLECTED);
+            tightest.add(looseness(i), seed(i));
+            assert!(tightest.found.len() < MAX_COLLECTED);
             all.push((looseness(i), i % 3, i));
         }
         all.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        let expected: Vec<usize> = all.iter().take(MAX_HYPOTHESES).map(|x| x.2).collect();
-        let order: Vec<usize> = kept.in_order().map(|s| s.corners_px[0].x as usize).collect();
+        let expected: Vec<usize> = all.iter().take(MAX_PROPOSALS).map(|x| x.2).collect();
+        let order: Vec<usize> = tightest.in_order().map(|s| s.corners_px[0].x as usize).collect();
         assert_eq!(order, expected);
     }
 
     #[test]
-    fn a_sign_with_two_sides_too_short_for_segments_is_a_seed() {
+    fn a_sign_with_two_sides_too_short_for_segments_is_proposed() {
         let sign = [[300.0, 200.0], [360.0, 206.0], [358.0, 228.0], [298.0, 222.0]];
         let image = render(640, 480, 90, &[(sign, 180)]);
         let map = edges(&image, &EdgeParams::default());
         let g = Gradients { image: &image, gx: map.gx(), gy: map.gy() };
         let found = segments(&chains(&map, &ChainParams::default()), &map, &SegmentParams::default());
         assert_eq!(found.len(), 2, "{found:?}");
-        let seeds = |facing| hypotheses(&found, &g, &ProposalParams { facing, ..Default::default() });
+        let seeds = |facing| proposals(&found, &g, &ProposalParams { facing, ..Default::default() });
         let overlap = polygon::iou(&sign.map(Point2::from), &seeds(true)[0].corners_px);
         assert!(overlap > 0.8, "{overlap}");
         assert!(seeds(false).is_empty());

@@ -1,4 +1,4 @@
-//! A quad proposal: four sides, some of them without a segment, and their corners; which are plausible, which overlap.
+//! A quad proposal: four sides, some of them without a segment, and their corners; tests of plausibility and overlap.
 
 use crate::{detect::segments::edge_segments::EdgeSegment, geometry::polygon};
 use nalgebra::Point2;
@@ -6,14 +6,14 @@ use nalgebra::Point2;
 /// How far outside the image a corner may lie.
 pub const CORNER_MARGIN_PX: f64 = 20.0;
 
-/// Four segments taken for the sides of one quad.
+/// Four segments proposed as the sides of one quad.
 #[derive(Debug, Clone, PartialEq)]
 pub struct QuadSeed {
     /// Segments in clockwise order; side i runs from corner i to corner i+1. None for a side that no segment gave.
     pub sides: [Option<usize>; 4],
     /// Intersections of the supporting lines, clockwise on screen.
     pub corners_px: [Point2<f64>; 4],
-    /// Mean similarity of the pairs behind it, 0 to 1.
+    /// Mean similarity of its pairs, 0 to 1.
     pub similarity: f64,
     /// How well the two pairs fit each other (s^2 of method 3.4), 0 to 1.
     pub fit: f64,
@@ -40,7 +40,7 @@ pub(crate) fn overlap_exceeds(a: &[Point2<f64>; 4], b: &[Point2<f64>; 4], thresh
     Extent::new(a).overlaps(&Extent::new(b), threshold)
 }
 
-/// A quad with its area and the box around it, which often tell that it hardly overlaps another.
+/// A quad with its area and bounding box, a quick test for little overlap.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Extent {
     corners_px: [Point2<f64>; 4],

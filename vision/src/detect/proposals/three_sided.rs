@@ -1,9 +1,9 @@
-//! Sets of three sides for the search (method 3.5): segments that no chosen quad explains in, three-sided quads out.
-//! Doors whose lower end nobody sees, posters behind a person, posters cut by the image border. Claims little: three
+//! Sets of three sides of the default detector (method 3.5): segments that no chosen quad explains in, three-sided
+//! quads out. Doors whose lower end is not visible, posters behind a person, posters cut by the image border. Three
 //! sides must meet in two corners, have the same polarity, and edges along most of their length.
 //!
-//! Departs from method 3.5: pairs and closing segments come from corners, as in the search, not from the relaxations,
-//! and the free ends are where the edges along the outer sides end, not where their segments do.
+//! Departs from method 3.5: pairs and closing segments come from corners, as in the default detector, not from the
+//! relaxations, and the free ends are where the edges along the outer sides end, not where their segments do.
 
 use crate::{
     detect::{
@@ -177,7 +177,8 @@ fn open_set(
         sides.reverse();
     }
     let centre = corners_px.iter().fold(Vector2::zeros(), |sum, c| sum + c.coords * 0.25);
-    // Which side of its line the middle of the set lies on, seen from the brighter side: the same for all three.
+    // The side of each line on which the middle of the set lies, relative to the brighter side: the same for all
+    // three.
     let bright = |i: usize| segments[sides[i]].normal.dot(&centre) > segments[sides[i]].rho_px;
     let fits =
         bright(0) == bright(1) && bright(1) == bright(2) && plausible(&corners_px, (g.width(), g.height()));
@@ -252,7 +253,7 @@ fn three_sided(set: &OpenSet, g: &Gradients, p: &DetectParams) -> Option<Quad> {
 }
 
 /// A visible end moved onto its refitted line, with its covariance: across from the line, along from the search for
-/// the end. It tells where the edge ends, not where the thing does.
+/// the end. It is the end of the visible edge, not of the object.
 fn foot(line: &FittedLine, end: &Point2<f64>) -> (Point2<f64>, Matrix2<f64>) {
     let at = end + line.normal * (line.rho_px - line.normal.dot(&end.coords));
     let along = Vector2::new(-line.normal.y, line.normal.x);

@@ -1,5 +1,5 @@
 //! Sub-pixel corners (method 3.6): a rough quad and the gradient planes in, corners with covariance, side support and
-//! clipping out. Also the rule that names the top-left corner. Does not choose between quads.
+//! clipping out. Also the rule for the top-left corner. Does not select quads.
 
 use crate::{
     detect::edge_support::{
@@ -13,9 +13,9 @@ use nalgebra::{Matrix2, Point2, Vector2};
 
 /// A side that ends this close to the image border counts as clipped.
 const CLIP_PX: f64 = 2.0;
-/// Standard deviation of a side that no edge points could place.
+/// Standard deviation of a side without edge points.
 const UNFITTED_SIGMA_PX: f64 = 2.0;
-/// Two names for the top-left corner closer than this are both tried in recognition (method 4).
+/// If a second choice of the top-left corner is within this angle, recognition tries all rotations (method 4).
 pub const UPRIGHT_MARGIN_DEG: f64 = 15.0;
 
 /// A quad after refitting.
@@ -25,11 +25,11 @@ pub struct RefinedQuad {
     pub corners_px: Corners,
     /// Covariance of each corner, px^2.
     pub covariance_px2: [Matrix2<f64>; 4],
-    /// What the gradient says about each side, TL-TR first.
+    /// Edge support of each side, TL-TR first.
     pub sides: [SideSupport; 4],
     /// Whether each side runs into the image border.
     pub clipped: [bool; 4],
-    /// A second naming of the corners is nearly as upright.
+    /// A second choice of the top-left corner is nearly as upright.
     pub upright_ambiguous: bool,
 }
 
@@ -45,8 +45,8 @@ impl RefinedQuad {
     }
 }
 
-/// Refits the four sides on the edge points near them and intersects. `corners_px` is clockwise on screen. None when
-/// what comes out is no convex quad, a corner left its place by more than `search.reach_px` times four, or a side has
+/// Refits the four sides on the edge points near them and intersects. `corners_px` is clockwise on screen. None
+/// when the result is not a convex quad, a corner moved by more than `search.reach_px` times four, or a side has
 /// less support than `search.least_support`.
 pub fn refine(g: &Gradients, corners_px: &[Point2<f64>; 4], search: EdgeProbeParams) -> Option<RefinedQuad> {
     let mut points = [const { None }; 4];
@@ -72,7 +72,7 @@ pub fn refine(g: &Gradients, corners_px: &[Point2<f64>; 4], search: EdgeProbePar
     name_corners(g, &refined, &covariance, sides)
 }
 
-/// Turns everything so that index 0 is the top-left corner.
+/// Rotates all lists so that index 0 is the top-left corner.
 fn name_corners(
     g: &Gradients,
     clockwise: &[Point2<f64>; 4],
@@ -102,13 +102,13 @@ fn near_border(g: &Gradients, p: &Point2<f64>) -> bool {
     p.x < CLIP_PX || p.y < CLIP_PX || p.x > width - 1.0 - CLIP_PX || p.y > height - 1.0 - CLIP_PX
 }
 
-/// Whether the second most upright naming leans at most 15 degrees more than the given, most upright one.
+/// Whether the second most upright choice leans at most 15 degrees more than the given, most upright one.
 pub fn upright_ambiguous(corners: &Corners) -> bool {
     let best = corners.lean_rad();
     (1..4).any(|shift| corners.rotated(shift).lean_rad() - best < UPRIGHT_MARGIN_DEG.to_radians())
 }
 
-/// A side's line, with or without edge points behind it.
+/// A side's line, fitted to edge points or not.
 enum Line {
     Fitted(FittedLine),
     Given { normal: Vector2<f64>, rho_px: f64 },
@@ -153,7 +153,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn covariance_of_a_corner_agrees_with_counting() {
+    fn corner_covariance_agrees_with_sampling() {
         // Two lines at 60 degrees with offsets of known variance: the corner's spread over a grid of disturbances.
         let (sa, sb) = (0.2_f64, 0.5_f64);
         let na = Vector2::new(0.0, 1.0);
@@ -180,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn upright_is_doubted_near_forty_five_degrees() {
+    fn orientation_is_ambiguous_near_forty_five_degrees() {
         let turned = |degrees: f64| {
             let (s, c) = degrees.to_radians().sin_cos();
             let points = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]

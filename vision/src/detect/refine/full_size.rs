@@ -1,6 +1,6 @@
-//! Refits sides in the image as it came: a large image is searched at a working scale, where a fraction of a pixel is
-//! several times as much. In: quads in coordinates of the full image. Out: the same quads with sharper corners, none
-//! dropped.
+//! Refits sides at full resolution: quads of a large image are detected at a working scale, where localisation is
+//! several times coarser. In: quads in coordinates of the full image. Out: the same quads with refined corners,
+//! none dropped.
 
 use crate::{
     detect::{
@@ -15,14 +15,14 @@ use crate::{
 };
 use nalgebra::Vector2;
 
-/// Sides are looked for within this many pixels of the working scale.
+/// Search distance of sides, in pixels of the working scale.
 const REACH_WORKING_PX: f64 = 1.0;
 /// Pixels around a quad that its gradients need: the filter forgets within ten.
 const MARGIN_PX: usize = 12;
 /// Cut-outs of all quads together are at most this many images large; the best quads come first.
 const MAX_CUT_SHARE: usize = 2;
 
-/// Refits the full quads of an image that was searched at a scale `factor` times smaller.
+/// Refits the four-sided quads of an image whose working scale was `factor` times smaller.
 pub(crate) fn at_full_size(
     quads: Vec<Quad>,
     image: &GrayImage,
@@ -69,8 +69,8 @@ struct Window {
 }
 
 impl Window {
-    /// The box around the corners, wider by `margin` on all sides, as far as the image goes. Where it meets the image's
-    /// border, so does the quad: nothing else is near enough to be taken for clipped.
+    /// The bounding box of the corners, wider by `margin` on all sides, clipped to the image. It touches the image
+    /// border only where the quad is near it, so no other quad is taken for clipped.
     fn around(corners: &Corners, margin: usize, image: &GrayImage) -> Self {
         let span = |at: fn(&nalgebra::Point2<f64>) -> f64, size: usize| {
             let values = corners.points().map(|c| at(&c));
@@ -97,7 +97,7 @@ impl Window {
         GrayImage::new(self.width, self.height, data).unwrap_or_else(|_| image.clone())
     }
 
-    /// The corners by this window's place: `sign` 1 for the whole image's coordinates, -1 for the window's.
+    /// The corners shifted by the window's origin: `sign` 1 to image coordinates, -1 to window coordinates.
     fn moved(&self, corners: &Corners, sign: f64) -> Option<Corners> {
         let shift = Vector2::new(self.left as f64, self.top as f64) * sign;
         Corners::new(corners.points().map(|c| c + shift)).ok()
@@ -121,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn corners_of_a_large_image_are_as_sharp_as_those_of_a_small_one() {
+    fn corners_of_a_large_image_are_refined_at_full_size() {
         // A little noise, the same on every run.
         let mut image = render(1280, 960, 140, &[(QUAD, 80)]);
         let mut state = 1_u32;
@@ -137,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn only_so_much_is_cut_out() {
+    fn the_total_area_of_windows_is_bounded() {
         let image = render(1280, 960, 140, &[(QUAD, 80)]);
         let p = DetectParams::default();
         let found = detect(&image, &p, &mut NoTrace);
@@ -156,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn windows_stay_in_the_image() {
+    fn windows_are_clipped_to_the_image() {
         let image = GrayImage::from_fn(50, 40, |u, v| (u + 3 * v) as u8);
         let corners = |points: [[f64; 2]; 4]| Corners::new(points.map(Point2::from)).expect("convex");
         let all =

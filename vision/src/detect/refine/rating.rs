@@ -19,12 +19,12 @@ const SAME_CORNER_PX: f64 = 2.0;
 /// Smallest side of a quad.
 const MIN_SIDE_PX: f64 = 15.0;
 
-/// A refitted quad with what its score rests on.
+/// A refitted quad with its rank.
 #[derive(Debug, Clone)]
 pub struct ScoredQuad {
     /// Corners, support and score.
     pub quad: Quad,
-    /// Which of two contradicting quads goes first: its score, and its size.
+    /// Order of two conflicting quads: score and size.
     pub rank: f64,
 }
 
@@ -35,8 +35,8 @@ impl ScoredQuad {
     }
 }
 
-/// Refits the seeds, best first, and drops those whose sides the gradient does not support. A share of the places is
-/// kept for small seeds: the large ones of a full wall would take them all.
+/// Refits the seeds, best first, and drops those whose sides the gradient does not support. A share is reserved for
+/// small seeds: large ones on a crowded wall would take every place.
 pub fn rate(seeds: &[QuadSeed], g: &Gradients, p: &QuadParams) -> Vec<ScoredQuad> {
     let mut order: Vec<(f64, &QuadSeed)> = seeds.iter().map(|s| (s.fit * size(&s.corners_px), s)).collect();
     order.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -55,8 +55,8 @@ pub fn rate(seeds: &[QuadSeed], g: &Gradients, p: &QuadParams) -> Vec<ScoredQuad
             continue;
         }
         let extent = Extent::new(&seed.corners_px);
-        let alike = extents.iter().filter(|r| extent.overlaps(r, ALIKE_IOU)).take(p.max_alike);
-        if alike.count() >= p.max_alike {
+        let same_object = extents.iter().filter(|r| extent.overlaps(r, SAME_OBJECT_IOU)).take(p.max_alike);
+        if same_object.count() >= p.max_alike {
             continue;
         }
         left[class] -= 1;
@@ -73,12 +73,12 @@ pub fn rate(seeds: &[QuadSeed], g: &Gradients, p: &QuadParams) -> Vec<ScoredQuad
     rated
 }
 
-/// Seeds with a shorter way round are small.
+/// Seeds with a shorter perimeter are small.
 const SMALL_PERIMETER_PX: f64 = 240.0;
-/// Rated quads that overlap a seed by more are borders of the same thing.
-const ALIKE_IOU: f64 = 0.6;
+/// Rated quads that overlap a seed by more are borders of the same object.
+const SAME_OBJECT_IOU: f64 = 0.6;
 
-/// How a side is searched while quads are compared.
+/// Edge search of a side while quads are rated.
 pub(crate) fn rating_search(p: &QuadParams, reach_px: f64) -> EdgeProbeParams {
     EdgeProbeParams {
         reach_px,
@@ -115,7 +115,7 @@ fn size(corners: &[Point2<f64>; 4]) -> f64 {
     (0..4).map(|i| (corners[(i + 1) % 4] - corners[i]).norm()).sum::<f64>().sqrt()
 }
 
-/// Whether two quads have the same corners, however they are named.
+/// Whether two quads have the same corners, whichever comes first.
 pub(crate) fn same(a: &[Point2<f64>; 4], b: &[Point2<f64>; 4]) -> bool {
     let near = |p: &Point2<f64>, q: &Point2<f64>| (p - q).norm_squared() < SAME_CORNER_PX * SAME_CORNER_PX;
     (0..4).any(|shift| (0..4).all(|i| near(&a[i], &b[(i + shift) % 4])))
@@ -143,7 +143,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn refitted_seeds_are_bounded() {
+    fn the_number_of_refitted_seeds_is_bounded() {
         let (image, map, seeds) = squares(16);
         let g = Gradients { image: &image, gx: map.gx(), gy: map.gy() };
         let rated =

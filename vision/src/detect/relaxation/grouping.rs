@@ -15,7 +15,7 @@ use crate::{
 };
 use nalgebra::Point2;
 
-/// Most matched pairs that the second pass looks at, the best first.
+/// Most matched pairs of the second pass, the best first.
 pub const MAX_MATCHED_PAIRS: usize = 150;
 /// Most candidate quads of the second pass, the best first.
 pub const MAX_QUAD_CANDIDATES: usize = 600;
@@ -27,8 +27,8 @@ struct Match {
     bias: f64,
 }
 
-/// Relaxes and returns the matches that both sides chose. `compatible` is asked once for every two matches without a
-/// common item.
+/// Relaxes and returns the matches that both sides chose. `compatible` is called once for every two matches without
+/// a common item.
 fn solve(
     items: usize,
     matches: &[Match],
@@ -41,7 +41,7 @@ fn solve(
         rows[m.j].push(Label { item: m.i, start: m.start, bias: m.bias });
     }
     let mut problem = Problem::new(&rows);
-    // A match that a full row left out takes no part.
+    // Matches dropped by a full row are ignored.
     let variables: Vec<Option<[usize; 2]>> =
         matches.iter().map(|m| Some([problem.variable(m.i, m.j)?, problem.variable(m.j, m.i)?])).collect();
     for (a, m) in matches.iter().enumerate() {
@@ -60,9 +60,9 @@ fn solve(
     }
     let start = problem.start().to_vec();
     let chosen = relax(&problem, start, p).chosen;
-    let kept = mutual(&chosen);
-    let is_kept = |m: &Match| kept.contains(&(m.i.min(m.j), m.i.max(m.j)));
-    matches.iter().enumerate().filter(|(_, m)| is_kept(m)).map(|(i, _)| i).collect()
+    let mutual_matches = mutual(&chosen);
+    let is_mutual = |m: &Match| mutual_matches.contains(&(m.i.min(m.j), m.i.max(m.j)));
+    matches.iter().enumerate().filter(|(_, m)| is_mutual(m)).map(|(i, _)| i).collect()
 }
 
 /// Pass 1: the pairs of opposite sides that survive uniqueness and convexity, as indices into `pairs`, ascending.

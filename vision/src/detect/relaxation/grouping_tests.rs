@@ -42,12 +42,12 @@ fn assert_same(found: &[[Point2<f64>; 4]], wanted: &[Quadrangle]) {
 }
 
 #[test]
-fn nested_and_neighbouring_quads_come_out() {
+fn nested_and_neighbouring_quads_are_found() {
     assert_same(&grouped(&QUADS, |s| s), &QUADS);
 }
 
 #[test]
-fn order_mirror_and_quarter_turn_change_nothing() {
+fn quads_do_not_depend_on_order_mirror_and_quarter_turn() {
     assert_same(&grouped(&QUADS, |s| s.into_iter().rev().collect()), &QUADS);
     let interleaved = |s: Vec<EdgeSegment>| (0..16).map(|i| s[i * 7 % 16].clone()).collect();
     assert_same(&grouped(&QUADS, interleaved), &QUADS);

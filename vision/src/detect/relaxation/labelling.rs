@@ -82,7 +82,7 @@ pub struct Problem {
     links: Vec<Vec<(u32, f64)>>,
 }
 
-/// What the relaxation ended with.
+/// Result of the relaxation.
 #[derive(Debug, Clone)]
 pub struct Solution {
     /// The item each row chose; none where the null label won.
@@ -123,8 +123,8 @@ impl Problem {
         self.row(row).find(|i| self.items[*i] == Some(item))
     }
 
-    /// Sets the symmetric entry `Q_ab = Q_ba`. Entries inside one row are ignored: there Q is zero by definition. Call
-    /// once per pair.
+    /// Sets the symmetric entry `Q_ab = Q_ba`. Entries inside one row are ignored: there Q is zero by definition.
+    /// Call once per pair.
     pub fn link(&mut self, a: usize, b: usize, weight: f64) {
         if self.row_of[a] != self.row_of[b] {
             self.links[a].push((b as u32, weight));

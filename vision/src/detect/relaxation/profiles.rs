@@ -1,5 +1,5 @@
 //! Grey profiles across segments and their correlation, cue c6 of method 2: outside a quad the background is uniform,
-//! and just inside two opposite borders the texture is alike. Profiles are sampled on demand and kept.
+//! and just inside two opposite borders the texture is similar. Profiles are sampled on demand and cached.
 
 use crate::{detect::segments::edge_segments::EdgeSegment, frame::GrayImage};
 use nalgebra::{Point2, Vector2};
@@ -18,12 +18,12 @@ pub(crate) struct Profiles<'a> {
     segments: &'a [EdgeSegment],
     image: &'a GrayImage,
     /// Per segment and half width: the profile along the segment's normal.
-    kept: Vec<Vec<(usize, Vec<f64>)>>,
+    cached: Vec<Vec<(usize, Vec<f64>)>>,
 }
 
 impl<'a> Profiles<'a> {
     pub(crate) fn new(segments: &'a [EdgeSegment], image: &'a GrayImage) -> Self {
-        Self { segments, image, kept: vec![Vec::new(); segments.len()] }
+        Self { segments, image, cached: vec![Vec::new(); segments.len()] }
     }
 
     /// ZNCC of the profiles of `k` and `l`, both read from outside to inside, -1 to 1; 0 when one is flat.
@@ -46,11 +46,11 @@ impl<'a> Profiles<'a> {
     }
 
     fn along_normal(&mut self, k: usize, half_width: usize) -> Vec<f64> {
-        if let Some((_, profile)) = self.kept[k].iter().find(|(width, _)| *width == half_width) {
+        if let Some((_, profile)) = self.cached[k].iter().find(|(width, _)| *width == half_width) {
             return profile.clone();
         }
         let profile = sample(self.image, &self.segments[k], half_width);
-        self.kept[k].push((half_width, profile.clone()));
+        self.cached[k].push((half_width, profile.clone()));
         profile
     }
 }

@@ -1,5 +1,6 @@
 //! Segments in, scored candidate pairs of opposite sides out (method 2). Cheap gates come first and keep the set
-//! sparse; the third-segment search and the grey profiles see only what is left. Does not decide: relaxation does.
+//! sparse; the third-segment search and the grey profiles run on the remaining pairs only. The decision is that of
+//! the relaxation.
 
 use crate::{
     detect::{
@@ -13,9 +14,9 @@ use crate::{
 use nalgebra::{Point2, Vector2};
 use serde::{Deserialize, Serialize};
 
-/// Most segments looked at, the longest first.
+/// Most segments paired, the longest first.
 pub const MAX_PAIRED_SEGMENTS: usize = 500;
-/// Most pairs whose third segment is looked for. Photographs stay below; stripes, each as like as the next, do not.
+/// Most pairs whose third segment is searched. Photographs stay below; stripes, all equally similar, do not.
 pub const MAX_ROUGH_PAIRS: usize = 20_000;
 /// Most pairs handed on, the best first.
 pub const MAX_PAIRS: usize = 1200;
@@ -53,8 +54,8 @@ pub struct SimilarityParams {
 
 /// Weights by `waymark-lab train similarity` on photographs of paintings and rendered corridors.
 ///
-/// Departs from method 2, which asks for this fit: opposite sides of a quad are told by their lengths and a third side,
-/// hardly by the profiles across them. Figures: docs/results/2026-11-22.md.
+/// Departs from method 2, which asks for this fit: lengths and the third side discriminate opposite sides of a
+/// quad, profiles hardly. Figures: docs/results/2026-11-22.md.
 const FITTED_WEIGHTS: [f64; 6] = [0.41, 0.0, 0.17, 0.03, 0.32, 0.07];
 
 impl Default for SimilarityParams {
@@ -93,7 +94,7 @@ pub struct SegmentPair {
     pub closing: [Option<(usize, f64)>; 2],
 }
 
-/// What the cheap gates let through.
+/// A pair that passed the cheap gates.
 struct Rough {
     k: usize,
     l: usize,
@@ -107,26 +108,26 @@ struct Rough {
 /// Candidate pairs, best first; ties by index. At most [`MAX_PAIRS`], at most `p.max_candidates` a segment.
 pub fn pairs(segments: &[EdgeSegment], image: &GrayImage, p: &SimilarityParams) -> Vec<SegmentPair> {
     let rough = shortlist(rough_pairs(segments, p));
-    // A segment's hopeless candidates must not cost a profile each: three times what it may keep is looked at.
+    // Bounds the profiles of a segment's weak candidates: three times as many are scored as may be kept.
     let per_segment = p.max_candidates.min(MAX_ROW_CANDIDATES);
-    let mut looked = vec![0_usize; segments.len()];
+    let mut scored = vec![0_usize; segments.len()];
     let mut profiles = Profiles::new(segments, image);
     let mut pairs = Vec::new();
     for r in &rough {
-        if looked[r.k] >= 3 * per_segment || looked[r.l] >= 3 * per_segment {
+        if scored[r.k] >= 3 * per_segment || scored[r.l] >= 3 * per_segment {
             continue;
         }
         let Some(pair) = score(r, segments, &mut profiles, p) else { continue };
-        looked[r.k] += 1;
-        looked[r.l] += 1;
+        scored[r.k] += 1;
+        scored[r.l] += 1;
         pairs.push(pair);
     }
     pairs.sort_by(|a, b| b.score.total_cmp(&a.score).then((a.k, a.l).cmp(&(b.k, b.l))));
-    let mut kept = vec![0_usize; segments.len()];
+    let mut per_segment_kept = vec![0_usize; segments.len()];
     pairs.retain(|pair| {
-        let keep = kept[pair.k] < per_segment && kept[pair.l] < per_segment;
-        kept[pair.k] += usize::from(keep);
-        kept[pair.l] += usize::from(keep);
+        let keep = per_segment_kept[pair.k] < per_segment && per_segment_kept[pair.l] < per_segment;
+        per_segment_kept[pair.k] += usize::from(keep);
+        per_segment_kept[pair.l] += usize::from(keep);
         keep
     });
     pairs.truncate(MAX_PAIRS);
@@ -193,7 +194,7 @@ fn shape(
     Some((cues, quad_px, 0.5 * h))
 }
 
-/// Adds the two dear cues; nothing when no third segment closes the pair or the similarity stays too low.
+/// Adds the two expensive cues; none when no third segment closes the pair or the similarity stays too low.
 fn score(
     r: &Rough,
     segments: &[EdgeSegment],

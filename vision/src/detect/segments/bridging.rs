@@ -1,7 +1,7 @@
 //! Runs of edge pixels in, runs joined over small gaps and straight through junctions out (method 1.2).
 //!
-//! Departs from method 1.2, where chains stop at junctions: a side that another edge touches would fall in pieces. The
-//! two runs of a junction that agree in tangent and polarity are joined, the others end there.
+//! Departs from method 1.2, where chains stop at junctions: a side that another edge touches would break into
+//! pieces. The two runs of a junction that agree in tangent and polarity are joined, the others end there.
 
 use crate::detect::edges::edge_map::EdgeMap;
 use nalgebra::Vector2;

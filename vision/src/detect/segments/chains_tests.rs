@@ -55,7 +55,7 @@ fn gaps_are_bridged_when_the_ends_agree() {
 }
 
 #[test]
-fn corners_stay_inside_chains_and_short_chains_go() {
+fn chains_contain_corners_and_short_chains_are_dropped() {
     let image = polygon((80, 60), &rectangle((40.0, 30.0), (40.0, 25.0), 0.3), (180.0, 60.0), 2.0, 2);
     let p = ChainParams::default();
     let all = found(&image, &p);
@@ -68,7 +68,7 @@ fn corners_stay_inside_chains_and_short_chains_go() {
 }
 
 #[test]
-fn endless_edges_are_cut_at_the_bound() {
+fn long_edges_are_split_at_the_bound() {
     // A ramp-like comb: one edge winds through the whole image.
     let image = GrayImage::from_fn(600, 400, |u, v| {
         let tooth = (u / 12) % 2 == 0;
@@ -121,7 +121,7 @@ fn scene() -> GrayImage {
 }
 
 #[test]
-fn flips_turns_shifts_and_contrast_change_no_chain() {
+fn chains_do_not_depend_on_flips_turns_shifts_and_contrast() {
     let image = scene();
     let p = ChainParams::default();
     let all = found(&image, &p);

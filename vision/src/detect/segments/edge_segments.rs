@@ -61,11 +61,11 @@ pub fn segments(chains: &[EdgeChain], edges: &EdgeMap, p: &SegmentParams) -> Vec
         fragments_of(chain, index, p, &mut line, &mut fragments);
     }
     let min_length_px = p.min_length_px(edges.width());
-    let mut kept = join(fragments, p);
-    kept.retain(|f| f.length_px() >= min_length_px);
-    kept.sort_by(|a, b| b.length_px().total_cmp(&a.length_px()));
-    kept.truncate(p.max_segments.min(MAX_SEGMENTS));
-    kept.iter().map(|f| segment(f, edges)).collect()
+    let mut joined = join(fragments, p);
+    joined.retain(|f| f.length_px() >= min_length_px);
+    joined.sort_by(|a, b| b.length_px().total_cmp(&a.length_px()));
+    joined.truncate(p.max_segments.min(MAX_SEGMENTS));
+    joined.iter().map(|f| segment(f, edges)).collect()
 }
 
 fn fragments_of(

@@ -103,7 +103,7 @@ fn a_side_broken_by_clutter_is_joined() {
 }
 
 #[test]
-fn short_segments_go_and_small_images_keep_short_ones() {
+fn the_shortest_length_depends_on_the_image_width() {
     let p = SegmentParams::default();
     for (width, expected) in [(100, 12.0), (320, 12.8), (640, 25.0), (4000, 25.0)] {
         assert!((p.min_length_px(width) - expected).abs() < 0.61, "{width}: {}", p.min_length_px(width));
@@ -148,7 +148,7 @@ fn same_up_to(a: &[EdgeSegment], b: &[EdgeSegment], map: impl Fn(&Point2<f64>) -
 }
 
 #[test]
-fn flips_turns_shifts_and_contrast_change_nothing() {
+fn segments_do_not_depend_on_flips_turns_shifts_and_contrast() {
     let corners = rectangle((81.0, 62.0), (90.0, 50.0), 0.35);
     let image = polygon((160, 120), &corners, (170.0, 90.0), 0.0, 9);
     let all = found(&image);
@@ -179,7 +179,7 @@ fn checkerboards_of_every_period_pass() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
     #[test]
-    fn any_image_is_survived(
+    fn any_image_gives_valid_segments(
         width in 1_usize..70, height in 1_usize..70, seed: u64, levels in 1_u32..256,
     ) {
         let mut noise = Noise(seed);
@@ -192,7 +192,7 @@ proptest! {
     }
 
     #[test]
-    fn any_parameters_are_survived(alpha: f32, low: f32, high: f32, split_px: f64, share: f64, gap: u32) {
+    fn any_parameters_give_valid_segments(alpha: f32, low: f32, high: f32, split_px: f64, share: f64, gap: u32) {
         let image = polygon((64, 48), &rectangle((30.0, 22.0), (30.0, 20.0), 0.4), (200.0, 60.0), 6.0, 1);
         let edges = edges(&image, &EdgeParams { alpha, low, high, noise_factors: [0.0; 2] });
         let chain_params = ChainParams { max_gap_px: gap, min_points: 0, ..ChainParams::default() };

@@ -1,5 +1,5 @@
 //! Straight fragments in, fragments of one line joined out (method 1.3): corners, junctions and clutter break sides
-//! that the next stages want whole.
+//! into fragments.
 
 use crate::geometry::line::{LineFit, LineSums};
 use nalgebra::{Point2, Vector2};
@@ -174,8 +174,8 @@ impl Round {
         let rest = order.split_off(order.len().min(MAX_FRAGMENTS));
         // Bright sides agree, so the end of one meets the start of the other.
         let place = |i: &usize| Place { p: self.fragments[*i].p, q: self.fragments[*i].q, index: *i };
-        let grids = |kept: &dyn Fn(usize) -> bool| {
-            let places: Vec<Place> = order.iter().filter(|i| kept(**i)).map(place).collect();
+        let grids = |is_member: &dyn Fn(usize) -> bool| {
+            let places: Vec<Place> = order.iter().filter(|i| is_member(**i)).map(place).collect();
             [Grid::new(&places, |at| at.q), Grid::new(&places, |at| at.p)]
         };
         let (all, fresh) = (grids(&|_| true), grids(&|i| self.fresh[i]));

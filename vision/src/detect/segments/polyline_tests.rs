@@ -53,7 +53,7 @@ fn splits_that_were_not_needed_are_merged() {
 }
 
 #[test]
-fn degenerate_chains_are_no_trouble() {
+fn degenerate_chains_give_no_pieces() {
     let same = [Point2::new(3.0, 3.0); 7];
     for closed in [false, true] {
         assert!(polyline(&[], closed, T).pieces.is_empty());

@@ -93,12 +93,12 @@ mod tests {
     }
 
     #[test]
-    fn a_small_quad_inside_is_another_thing() {
+    fn a_small_quad_inside_is_another_object() {
         assert_eq!(canonical(vec![nested(0.0, 0.9), nested(60.0, 0.9)], 0.6, 0.6, 4.0).len(), 2);
     }
 
     #[test]
-    fn alternates_are_bounded() {
+    fn the_number_of_alternates_is_bounded() {
         let many = (0..MAX_ALTERNATES + 4).map(|i| nested(i as f64, 0.9)).collect();
         let quads = canonical(many, 0.6, 0.6, 4.0);
         assert_eq!(quads.len(), 1);

@@ -10,20 +10,20 @@ use crate::{
     geometry::polygon::{self, Relation},
 };
 
-/// Most alternates a quad has after it took in what lies inside: as many further borders as recognition tries. What
-/// does not fit stays a quad.
+/// Most alternates of a quad including inner quads: the number of further borders that recognition tries. Inner
+/// quads beyond it stay quads.
 pub const MAX_WITH_NESTED: usize = 5;
 /// Two disjoint quads inside that score at least this share of the outer one make it a container: a window round
 /// its panes, a wall panel round its pictures.
 const CONTENT_SCORE_SHARE: f64 = 0.65;
-/// A quad may score this much less than what lies inside and still take it in: probabilities near 1 differ by chance.
+/// A quad may score this much less than an inner one and still absorb it: probabilities near 1 differ by chance.
 const SCORE_SLACK: f64 = 0.1;
 
-/// Makes every quad inside a better one an alternate of it, outermost first. A quad that scores clearly less than the
-/// one inside takes nothing in, nor does a container. Output order: by descending score, then by corners.
+/// Makes every quad inside a better one an alternate of it, outermost first. A quad that scores clearly less than
+/// the one inside absorbs nothing, nor does a container. Output order: by descending score, then by corners.
 pub fn absorb(mut quads: Vec<Quad>, tolerance_px: f64) -> Vec<Quad> {
     quads.sort_by(|a, b| b.corners_px.area_px2().total_cmp(&a.corners_px.area_px2()).then(by_corners(a, b)));
-    let mut kept: Vec<Quad> = Vec::new();
+    let mut result: Vec<Quad> = Vec::new();
     while !quads.is_empty() {
         // The largest of those left; only a smaller one can lie inside.
         let mut outer = quads.remove(0);
@@ -55,10 +55,10 @@ pub fn absorb(mut quads: Vec<Quad>, tolerance_px: f64) -> Vec<Quad> {
             quads.retain(|_| !taken.next().unwrap_or(false));
             outer.alternates.sort_by(|a, b| b.area_px2().total_cmp(&a.area_px2()));
         }
-        kept.push(outer);
+        result.push(outer);
     }
-    kept.sort_by(|a, b| b.score.total_cmp(&a.score).then(by_corners(a, b)));
-    kept
+    result.sort_by(|a, b| b.score.total_cmp(&a.score).then(by_corners(a, b)));
+    result
 }
 
 fn relation(a: &Quad, b: &Quad, tolerance_px: f64) -> Relation {
@@ -101,16 +101,16 @@ mod tests {
     }
 
     #[test]
-    fn a_doubtful_outer_quad_takes_nothing_in() {
+    fn a_less_probable_outer_quad_absorbs_nothing() {
         assert_eq!(absorb(vec![quad(DOOR, 0.79), quad(POSTER, 0.9)], 4.0).len(), 2);
     }
 
     #[test]
-    fn a_container_takes_nothing_in() {
+    fn a_container_absorbs_nothing() {
         let below = [60.0, 200.0, 140.0, 300.0];
         let quads = |score| vec![quad(DOOR, 1.0), quad(POSTER, 0.9), quad(below, score)];
         assert_eq!(absorb(quads(0.66), 4.0).len(), 3);
-        // One of the two is not worth much: the other is the only content.
+        // One of the two scores low: the other is the only content.
         assert_eq!(absorb(quads(0.64), 4.0).len(), 1);
     }
 
@@ -133,7 +133,7 @@ mod tests {
         assert_eq!(nest(MAX_WITH_NESTED + 1).len(), 1);
         let over = nest(MAX_WITH_NESTED + 2);
         assert_eq!(over.iter().map(|q| q.alternates.len()).max(), Some(MAX_WITH_NESTED));
-        // What does not fit is not lost.
+        // Inner quads beyond the bound stay quads.
         assert_eq!(over.len(), 2);
     }
 }

@@ -5,7 +5,7 @@ use crate::{
     detect::{
         border_model::{
             choose_sides::{SnappedSides, choose_sides},
-            quad_classifier::{THING_FEATURES, probability, thing_features},
+            quad_classifier::{QUAD_FEATURES, probability, quad_features},
         },
         edge_support::gradients::Gradients,
         params::QuadParams,
@@ -49,18 +49,18 @@ impl Facing {
 /// Lines closer than this count as the same side.
 const SHARED_SIDE_PX: f64 = 4.0;
 
-/// Keeps the quads that contradict no better one: that cross none and share an edge with none.
+/// Keeps the quads that conflict with no better one: that cross none and share an edge with none.
 ///
-/// Departs from method 3.4: its table of compatible quads is kept (disjoint and nested may stay, crossing may not), but
-/// quads are taken greedily by rank instead of by relaxation over pairs.
+/// Departs from method 3.4: its table of compatible quads is kept (disjoint and nested may stay, crossing may
+/// not), but quads are taken greedily by rank instead of by relaxation over pairs.
 pub fn suppress_overlaps(rated: Vec<ScoredQuad>, p: &QuadParams) -> Vec<Quad> {
-    let mut kept: Vec<Quad> = Vec::new();
+    let mut result: Vec<Quad> = Vec::new();
     for quad in different(rated, p) {
-        if !kept.iter().any(|k| contradict(k.corners_px.points(), quad.corners_px.points())) {
-            kept.push(quad);
+        if !result.iter().any(|k| conflict(k.corners_px.points(), quad.corners_px.points())) {
+            result.push(quad);
         }
     }
-    kept
+    result
 }
 
 /// The quads by rank, each once, at most [`MAX_RATED`].
@@ -81,9 +81,9 @@ fn different(mut rated: Vec<ScoredQuad>, p: &QuadParams) -> Vec<Quad> {
     different
 }
 
-/// Whether two quads cannot both be there: they cross, or one edge would belong to both. Two borders of one thing
-/// differ on all four sides.
-fn contradict(a: &[Point2<f64>; 4], b: &[Point2<f64>; 4]) -> bool {
+/// Whether two quads conflict: they cross, or one edge would belong to both. Two borders of one object differ on
+/// all four sides.
+fn conflict(a: &[Point2<f64>; 4], b: &[Point2<f64>; 4]) -> bool {
     match polygon::relation(a, b, SHARED_SIDE_PX) {
         Relation::Disjoint => false,
         Relation::Crossing => true,
@@ -91,29 +91,30 @@ fn contradict(a: &[Point2<f64>; 4], b: &[Point2<f64>; 4]) -> bool {
     }
 }
 
-/// A quad with its sides where they look most like a border, and what its score rests on.
+/// A quad with its sides moved to the likeliest border, and the features of its score.
 #[derive(Debug, Clone)]
 pub struct ClassifiedQuad {
-    /// The quad; its score is the thing model's probability.
+    /// The quad; its score is the probability of the quad classifier.
     pub quad: Quad,
-    /// See [`thing_features`].
-    pub features: [f64; THING_FEATURES],
+    /// See [`quad_features`].
+    pub features: [f64; QUAD_FEATURES],
 }
 
-/// Moves the sides of the rated quads, by rank, to the lines that look most like borders, and tells how likely they
-/// are things. A quad that contradicts one of at least `sure_probability` is passed over; nothing else stands in its
-/// way. All that were looked at are returned, at most [`MAX_CLASSIFIED`]. The border that a quad had before stays
-/// among its alternates.
+/// Moves the sides of the rated quads, by rank, to the lines that look most like borders, and classifies them as
+/// objects. A quad that conflicts with one of at least `sure_probability` is skipped. All classified quads are
+/// returned, at most [`MAX_CLASSIFIED`]. The previous border of a quad stays among its alternates.
 pub fn snap_sides(rated: Vec<ScoredQuad>, g: &Gradients, p: &QuadParams) -> Vec<ClassifiedQuad> {
     let border_model = p.side_network();
-    let quad_classifier = p.thing_network();
+    let classifier = p.thing_network();
     let mut classified: Vec<ClassifiedQuad> = Vec::new();
     for quad in different(rated, p) {
-        // What is much larger than a thing that it holds may yet take its place.
+        // A quad much larger than an object that it contains may still replace it.
         let taken = |q: &Quad| {
             let corners = q.corners_px.points();
-            let things = classified.iter().filter(|s| s.quad.score >= p.sure_probability);
-            things.map(|s| s.quad.corners_px.points()).any(|k| against(k, corners) && !is_part(k, corners))
+            let objects = classified.iter().filter(|s| s.quad.score >= p.sure_probability);
+            objects
+                .map(|s| s.quad.corners_px.points())
+                .any(|k| conflict_or_same(k, corners) && !is_part(k, corners))
         };
         if taken(&quad) {
             continue;
@@ -127,8 +128,8 @@ pub fn snap_sides(rated: Vec<ScoredQuad>, g: &Gradients, p: &QuadParams) -> Vec<
             Some(moved) => (moved, &chosen.sides),
             None => (quad, &chosen.nearest),
         };
-        let features = thing_features(sides, quad.corners_px.points(), quad.score, (g.width(), g.height()));
-        let score = probability(quad_classifier, &features);
+        let features = quad_features(sides, quad.corners_px.points(), quad.score, (g.width(), g.height()));
+        let score = probability(classifier, &features);
         classified.push(ClassifiedQuad { quad: Quad { score, ..quad }, features });
     }
     classified
@@ -137,30 +138,30 @@ pub fn snap_sides(rated: Vec<ScoredQuad>, g: &Gradients, p: &QuadParams) -> Vec<
 /// Non-maximum suppression by probability; above `sure_probability` by rank. Exception: a quad replaces the quads
 /// that it conflicts with if all of them are parts of it (a window and its panes) and none is clearly better.
 pub fn suppress_non_maxima(mut classified: Vec<ClassifiedQuad>, p: &QuadParams) -> Vec<Quad> {
-    let mut kept: Vec<Quad> = Vec::new();
+    let mut result: Vec<Quad> = Vec::new();
     let likely = |s: &ClassifiedQuad| s.quad.score.min(p.sure_probability);
     classified.retain(|s| s.quad.score >= p.min_probability);
     classified.sort_by(|a, b| likely(b).total_cmp(&likely(a)));
     for quad in classified.into_iter().map(|s| s.quad) {
         let corners = quad.corners_px.points();
-        let rivals = |k: &Quad| against(k.corners_px.points(), corners);
+        let conflicts = |k: &Quad| conflict_or_same(k.corners_px.points(), corners);
         let worst = |q: &Quad| q.side_support.iter().copied().fold(1.0, f64::min);
         let gives_way = |k: &Quad| {
             k.score <= quad.score + PART_SLACK
                 && worst(k) <= worst(&quad) + SUPPORT_SLACK
                 && is_part(k.corners_px.points(), corners)
         };
-        if kept.iter().filter(|k| rivals(k)).all(gives_way) {
-            kept.retain(|k| !rivals(k));
-            kept.push(quad);
+        if result.iter().filter(|k| conflicts(k)).all(gives_way) {
+            result.retain(|k| !conflicts(k));
+            result.push(quad);
         }
     }
-    kept
+    result
 }
 
-/// Whether two quads are one, or cannot both be there.
-fn against(a: &[Point2<f64>; 4], b: &[Point2<f64>; 4]) -> bool {
-    overlap_exceeds(a, b, SAME_IOU) || contradict(a, b)
+/// Whether two quads are the same or conflict.
+fn conflict_or_same(a: &[Point2<f64>; 4], b: &[Point2<f64>; 4]) -> bool {
+    overlap_exceeds(a, b, SAME_IOU) || conflict(a, b)
 }
 
 /// Whether `part` is cut from `whole` by a line across, as a pane from its window: three sides are the same, and the
@@ -175,17 +176,17 @@ fn is_part(part: &[Point2<f64>; 4], whole: &[Point2<f64>; 4]) -> bool {
 const PART_SLACK: f64 = 0.02;
 /// Its worst side may have this much more support: one that runs over a gap between two panes is no side.
 const SUPPORT_SLACK: f64 = 0.06;
-/// Largest share of a whole that a part is; more is the same thing.
+/// Largest area of a part as a share of the whole; above it they are the same object.
 const MAX_PART: f64 = 0.6;
 
 /// Most quads whose sides are moved.
 pub const MAX_CLASSIFIED: usize = 80;
-/// Quads that overlap by more than this are one.
+/// Quads that overlap by more than this are the same.
 const SAME_IOU: f64 = 0.8;
-/// A quad whose sides moved is still the same thing if both overlap by this much.
+/// A quad whose sides moved is still the same object if both overlap by this much.
 const MOVED_IOU: f64 = 0.4;
 
-/// The quad with its sides where they look most like a border; none if that is no well supported quad.
+/// The quad with its sides where they look most like a border; none if that is not a well supported quad.
 fn moved(quad: &Quad, chosen: &SnappedSides, g: &Gradients, p: &QuadParams) -> Option<Quad> {
     let before = quad.corners_px.points();
     let search = rating_search(p, p.refit_reach_px);
@@ -217,10 +218,10 @@ mod tests {
     use nalgebra::Matrix2;
 
     #[test]
-    fn compared_and_settled_quads_are_bounded() {
+    fn the_numbers_of_compared_and_classified_quads_are_bounded() {
         let (image, map, seeds) = squares(14);
         let g = Gradients { image: &image, gx: map.gx(), gy: map.gy() };
-        // Nothing is a thing, so nothing stands in anybody's way.
+        // No quad is an object, so none suppresses another.
         let p = QuadParams { max_refitted: usize::MAX, sure_probability: 2.0, ..QuadParams::default() };
         let rated = rate(&seeds, &g, &p);
         assert!(rated.len() > MAX_RATED && MAX_RATED > MAX_CLASSIFIED);
@@ -230,7 +231,7 @@ mod tests {
         assert_eq!(snap_sides(rated[..MAX_CLASSIFIED - 1].to_vec(), &g, &p).len(), MAX_CLASSIFIED - 1);
     }
 
-    fn thing([left, top, right, bottom]: [f64; 4], score: f64, support: f64) -> ClassifiedQuad {
+    fn classified_quad([left, top, right, bottom]: [f64; 4], score: f64, support: f64) -> ClassifiedQuad {
         let corners = [[left, top], [right, top], [right, bottom], [left, bottom]];
         let quad = Quad {
             corners_px: Corners::try_from(corners).unwrap(),
@@ -242,7 +243,7 @@ mod tests {
             upright_ambiguous: false,
             alternates: Vec::new(),
         };
-        ClassifiedQuad { quad, features: [0.0; THING_FEATURES] }
+        ClassifiedQuad { quad, features: [0.0; QUAD_FEATURES] }
     }
 
     fn params() -> QuadParams {
@@ -252,42 +253,49 @@ mod tests {
     const WINDOW: [f64; 4] = [20.0, 20.0, 120.0, 160.0];
 
     #[test]
-    fn a_window_takes_the_place_of_its_panes() {
-        let panes =
-            || vec![thing([20.0, 20.0, 120.0, 90.0], 0.99, 1.0), thing([20.0, 90.0, 120.0, 160.0], 0.9, 1.0)];
-        let kept = |whole: ClassifiedQuad| {
+    fn a_window_replaces_its_panes() {
+        let panes = || {
+            vec![
+                classified_quad([20.0, 20.0, 120.0, 90.0], 0.99, 1.0),
+                classified_quad([20.0, 90.0, 120.0, 160.0], 0.9, 1.0),
+            ]
+        };
+        let result = |whole: ClassifiedQuad| {
             let mut all = panes();
             all.push(whole);
             suppress_non_maxima(all, &params())
         };
-        let found = kept(thing(WINDOW, 0.98, 0.95));
+        let found = result(classified_quad(WINDOW, 0.98, 0.95));
         assert_eq!(found.len(), 1);
         assert!(found[0].corners_px.area_px2() > 13_900.0, "{found:?}");
         // Not when it is less likely, when a side runs over a gap, or when it reaches further than the panes.
         for whole in [
-            thing(WINDOW, 0.9, 1.0),
-            thing(WINDOW, 0.98, 0.85),
-            thing([0.0, 20.0, 120.0, 180.0], 0.98, 1.0),
-            thing(WINDOW, 0.4, 1.0),
+            classified_quad(WINDOW, 0.9, 1.0),
+            classified_quad(WINDOW, 0.98, 0.85),
+            classified_quad([0.0, 20.0, 120.0, 180.0], 0.98, 1.0),
+            classified_quad(WINDOW, 0.4, 1.0),
         ] {
-            assert_eq!(kept(whole).len(), 2);
+            assert_eq!(result(whole).len(), 2);
         }
-        // What is hardly larger than what is there is the same thing seen differently.
-        let same = vec![thing(WINDOW, 0.985, 1.0), thing([20.0, 20.0, 120.0, 210.0], 0.99, 1.0)];
+        // A quad hardly larger than an existing one is the same object.
+        let same =
+            vec![classified_quad(WINDOW, 0.985, 1.0), classified_quad([20.0, 20.0, 120.0, 210.0], 0.99, 1.0)];
         assert!(suppress_non_maxima(same, &params())[0].corners_px.area_px2() < 14_100.0);
     }
 
     #[test]
-    fn of_what_contradicts_the_likeliest_stays() {
+    fn of_conflicting_quads_the_most_probable_stays() {
         let beside = [60.0, 0.0, 160.0, 140.0];
         let left = |first: f64, second: f64| {
-            let found =
-                suppress_non_maxima(vec![thing(WINDOW, first, 1.0), thing(beside, second, 1.0)], &params());
+            let found = suppress_non_maxima(
+                vec![classified_quad(WINDOW, first, 1.0), classified_quad(beside, second, 1.0)],
+                &params(),
+            );
             found.iter().map(|q| q.corners_px.points()[0].x).collect::<Vec<_>>()
         };
         assert_eq!(left(0.9, 0.95), [60.0]);
         assert_eq!(left(0.95, 0.9), [20.0]);
-        // Of two that are sure the one that is seen better, which comes first.
+        // Of two with a sure probability the one of higher rank, which comes first.
         assert_eq!(left(0.985, 0.99), [20.0]);
         assert!(left(0.4, 0.45).is_empty());
     }

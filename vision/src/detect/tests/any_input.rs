@@ -1,5 +1,5 @@
-//! No panic, no work beyond the stated bounds and no disagreement between threads, whatever the image. Work is counted
-//! by what each stage hands on, not timed.
+//! No panic, no work beyond the stated bounds and no disagreement between threads, whatever the image. Work is
+//! counted by the outputs of each stage, not timed.
 
 use crate::{
     detect::{
@@ -8,7 +8,7 @@ use crate::{
         edge_support::gradients::Gradients,
         edges::edge_map::{EdgeMap, MAX_EDGE_POINTS},
         params::{DetectParams, Grouping},
-        proposals::quad_proposals::{MAX_HYPOTHESES, hypotheses},
+        proposals::quad_proposals::{MAX_PROPOSALS, proposals},
         pyramid,
         quad::Quad,
         refine::rating::MAX_REFITTED,
@@ -25,7 +25,7 @@ use crate::{
     trace::{NoTrace, Trace},
 };
 
-/// Holds every stage to its bound.
+/// Checks the bound of every stage.
 #[derive(Default)]
 struct Counted {
     area: usize,
@@ -74,15 +74,15 @@ fn check(quad: &Quad) {
 fn both() -> [DetectParams; 2] {
     let mut paper = DetectParams::default();
     paper.quads.grouping = Grouping::Relaxation;
-    // The search with everything on.
+    // The default detector with every option on.
     let mut search = DetectParams::default();
     search.tiling.remove = true;
     search.quads.scales = MAX_SCALES;
     [search, paper]
 }
 
-/// Detects both ways and holds every stage to its bound.
-fn hold(image: &GrayImage) {
+/// Detects with both groupings and checks the bound of every stage.
+fn check_bounds(image: &GrayImage) {
     for p in both() {
         let mut counted = Counted { area: image.width() * image.height(), ..Counted::default() };
         let quads = detect(image, &p, &mut counted);
@@ -95,7 +95,7 @@ fn hold(image: &GrayImage) {
     let (rated, edges) = scored_quads(&work, &p, &mut counted);
     assert!(rated.len() <= (MAX_REFITTED + MAX_REFITTED / 2) * p.quads.scales);
     let g = Gradients { image: &work, gx: edges.gx(), gy: edges.gy() };
-    assert!(hypotheses(&counted.segments, &g, &p.quads.proposals).len() <= MAX_HYPOTHESES);
+    assert!(proposals(&counted.segments, &g, &p.quads.proposals).len() <= MAX_PROPOSALS);
 }
 
 fn checkerboard(width: usize, height: usize, period: usize) -> GrayImage {
@@ -130,7 +130,7 @@ fn rectangles(width: usize, height: usize, count: usize, seed: u64) -> GrayImage
 #[test]
 fn checkerboards_of_every_period() {
     for period in 1..=64 {
-        hold(&checkerboard(320, 240, period));
+        check_bounds(&checkerboard(320, 240, period));
     }
 }
 
@@ -139,8 +139,8 @@ fn stripes_of_every_period() {
     for period in 1..=32 {
         let stripes =
             GrayImage::from_fn(320, 240, |u, _| if (u / period).is_multiple_of(2) { 30 } else { 220 });
-        hold(&stripes);
-        hold(&crate::detect::tests::rendering::quarter_turned(&stripes));
+        check_bounds(&stripes);
+        check_bounds(&crate::detect::tests::rendering::quarter_turned(&stripes));
     }
 }
 
@@ -148,12 +148,12 @@ fn stripes_of_every_period() {
 fn flat_and_graded_images_have_no_quads() {
     for level in [0, 1, 127, 255] {
         let image = GrayImage::from_fn(200, 150, |_, _| level);
-        hold(&image);
+        check_bounds(&image);
         assert!(both().iter().all(|p| detect(&image, p, &mut NoTrace).is_empty()));
     }
     // Slopes of up to a grey level a pixel, and the wrapped ones beyond.
     for slope in [1, 2, 3, 5, 9, 50, 128] {
-        hold(&GrayImage::from_fn(200, 150, |u, v| ((u + 2 * v) * slope / 4) as u8));
+        check_bounds(&GrayImage::from_fn(200, 150, |u, v| ((u + 2 * v) * slope / 4) as u8));
     }
     let gentle = GrayImage::from_fn(200, 150, |u, v| (u / 2 + v / 3) as u8);
     assert!(both().iter().all(|p| detect(&gentle, p, &mut NoTrace).is_empty()));
@@ -162,14 +162,14 @@ fn flat_and_graded_images_have_no_quads() {
 #[test]
 fn noise_of_every_grain() {
     for grain in [1, 2, 3, 5, 8, 13, 21, 34] {
-        hold(&noise(300, 220, grain, grain as u64));
+        check_bounds(&noise(300, 220, grain, grain as u64));
     }
 }
 
 #[test]
 fn rectangles_upon_rectangles() {
     for seed in 0..12 {
-        hold(&rectangles(330, 250, 10 + 40 * seed, seed as u64));
+        check_bounds(&rectangles(330, 250, 10 + 40 * seed, seed as u64));
     }
 }
 
@@ -177,13 +177,13 @@ fn rectangles_upon_rectangles() {
 fn images_of_every_small_size_and_of_one_pixel_across() {
     for width in 1..=9 {
         for height in 1..=9 {
-            hold(&noise(width, height, 1, 3));
+            check_bounds(&noise(width, height, 1, 3));
         }
     }
     for length in [10, 300, MAX_SIDE_PX] {
         for across in [1, 2, 3, 5] {
-            hold(&noise(length, across, 2, 4));
-            hold(&noise(across, length, 2, 5));
+            check_bounds(&noise(length, across, 2, 4));
+            check_bounds(&noise(across, length, 2, 5));
         }
     }
 }
@@ -192,8 +192,8 @@ fn images_of_every_small_size_and_of_one_pixel_across() {
 fn images_of_the_maximum_area() {
     let side = 4096;
     assert_eq!(side * side, MAX_AREA_PX);
-    hold(&noise(side, side, 40, 6));
-    hold(&checkerboard(MAX_SIDE_PX, MAX_AREA_PX / MAX_SIDE_PX, 7));
+    check_bounds(&noise(side, side, 40, 6));
+    check_bounds(&checkerboard(MAX_SIDE_PX, MAX_AREA_PX / MAX_SIDE_PX, 7));
 }
 
 #[test]

@@ -15,11 +15,11 @@ use crate::{
 use nalgebra::Point2;
 use proptest::prelude::*;
 
-/// Where a pixel goes, given the image's width and height.
+/// Maps a pixel, given the image's width and height.
 type Mapping = fn([f64; 2], f64, f64) -> [f64; 2];
 type Scene = Vec<([[f64; 2]; 4], u8)>;
 
-/// Two pictures apart, one slanted, one with a mat.
+/// Two separate pictures, one slanted, one with a mat.
 fn scene() -> Scene {
     let slanted = [[60.0, 60.0], [250.0, 85.0], [240.0, 300.0], [70.0, 330.0]];
     let framed = [[330.0, 100.0], [520.0, 90.0], [530.0, 360.0], [325.0, 350.0]];
@@ -161,7 +161,7 @@ fn the_same_image_gives_the_same_quads_bit_for_bit() {
 }
 
 #[test]
-fn memory_of_earlier_images_changes_nothing() {
+fn reused_memory_does_not_change_the_quads() {
     let image = |seed| render(600 - 40 * seed as usize, 420, seed, &scene());
     let mut memory = DetectBuffers::default();
     for p in [DetectParams::default(), paper()] {
@@ -175,7 +175,7 @@ fn memory_of_earlier_images_changes_nothing() {
 }
 
 #[test]
-fn a_side_that_nobody_sees_is_found_by_the_search_only() {
+fn a_side_without_a_segment_is_found_by_the_default_detector_only() {
     // The right side fades into the wall: 4 grey levels, below the low threshold of the edges.
     let quad = [[100.0, 80.0], [400.0, 80.0], [400.0, 330.0], [100.0, 330.0]];
     let plain = render(500, 420, 200, &[(quad, 100)]);
@@ -192,7 +192,7 @@ fn a_side_that_nobody_sees_is_found_by_the_search_only() {
 }
 
 #[test]
-fn many_quads_are_cut_at_the_limit() {
+fn the_number_of_quads_is_bounded() {
     let mut quads = Vec::new();
     for row in 0..10 {
         for column in 0..10 {

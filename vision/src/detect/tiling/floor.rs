@@ -21,8 +21,8 @@ pub(crate) struct FloorLine {
 }
 
 impl FloorLine {
-    /// Distance of the line's middle across a direction. The direction is the family's: a short line's own would throw
-    /// its offset far off.
+    /// Distance of the line's middle across a direction. The direction is the family's: a short line's own would
+    /// throw its offset far off.
     pub(crate) fn offset_along(&self, direction_rad: f64) -> f64 {
         let (sin, cos) = direction_rad.sin_cos();
         cos * self.middle.y - sin * self.middle.x
@@ -40,7 +40,7 @@ pub(crate) struct Floor {
 /// Rows of the horizon that are tried, as shares of the image height, and their number.
 const HORIZON_RANGE: [f64; 2] = [0.05, 0.75];
 const HORIZON_ROWS: usize = 141;
-/// Most of them that are looked at, and how many rows apart they are at least.
+/// Most rows that are examined, and their smallest distance in rows.
 const MAX_HORIZONS: usize = 8;
 const HORIZON_GAP_ROWS: usize = 5;
 /// Bins of the accumulator of meeting points along a row, one image width each way beside the image included.
@@ -49,7 +49,7 @@ const MEETING_BINS: usize = 120;
 const MEETING_RANGE_DEG: [f64; 2] = [4.0, 80.0];
 
 impl Floor {
-    /// The floors that the image may show: one with a camera that makes sense, several without any.
+    /// The possible floors of the image: one with a plausible camera, several without a camera.
     pub(crate) fn possible(
         segments: &[EdgeSegment],
         image_size: (usize, usize),
@@ -85,7 +85,7 @@ impl Floor {
         horizons(segments, width, height).into_iter().map(floor).collect()
     }
 
-    /// Whether right angles on the floor are right angles here.
+    /// Whether right angles on the floor are preserved.
     pub(crate) fn square(&self) -> bool {
         self.square
     }
@@ -126,7 +126,7 @@ impl Floor {
         (at.coords.norm() < p.max_distance).then_some(at)
     }
 
-    /// Direction in which something plumb runs through a pixel.
+    /// Image direction of gravity at a pixel.
     fn gravity_at(&self, px: &Point2<f64>) -> Vector2<f64> {
         let (sin, cos) = self.tilt_rad.sin_cos();
         Vector2::new(

@@ -1,4 +1,4 @@
-//! Sets apart the segments of a regularly patterned floor (method 1.5). Joints of tiles make corners and parallels,
+//! Removes the segments of a regularly patterned floor (method 1.5). Joints of tiles make corners and parallels,
 //! hence quads that are no landmarks. They are evenly spaced on the floor; direction alone does not tell, since
 //! posters and floors share vanishing points. In: segments, not the image. Out: segments that stay and those removed.
 

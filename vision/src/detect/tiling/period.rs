@@ -9,8 +9,8 @@ const MAX_PERIODS: usize = 2000;
 const OVERSAMPLING: f64 = 6.0;
 /// Largest expected number of patterns by chance among as many lines anywhere.
 ///
-/// Departs from method 1.5, which asks for concentration and five lines alone: five lines anywhere repeat at one of the
-/// many periods tried more often than one would think.
+/// Departs from method 1.5, which asks for concentration and five lines alone: five random lines often repeat at
+/// one of the many periods tried.
 const MAX_CHANCE: f64 = 0.05;
 
 /// Evenly spaced places on a line: `phase + i * period`.

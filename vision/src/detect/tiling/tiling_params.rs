@@ -10,13 +10,13 @@ use serde::{Deserialize, Serialize};
 pub struct TilingParams {
     /// Whether tiling is removed.
     pub remove: bool,
-    /// Where the floor is. Without it the horizon is looked for in the image, and the camera is taken for a usual one.
+    /// Where the floor is. Without it the horizon is estimated from the image, with a typical focal length.
     pub floor: Option<FloorView>,
     /// An end at most this far below the horizon is not on the floor, as far as can be told.
     pub horizon_gap_px: f64,
-    /// What is farther away along the floor is left alone.
+    /// Farther segments on the floor are not removed.
     pub max_distance: f64,
-    /// Segments this close to the direction of gravity are left alone: sides of posters and doors. Degrees.
+    /// Segments this close to the direction of gravity are not removed: sides of posters and doors. Degrees.
     pub gravity_deg: f64,
     /// Lines of a family differ from its direction by at most this, degrees.
     pub family_deg: f64,

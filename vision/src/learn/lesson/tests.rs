@@ -1,4 +1,4 @@
-//! Lessons on drawn posters, thresholds against others, gates, and models stored and read back.
+//! Training on drawn posters, thresholds against others, gates, and stored models read back.
 
 use super::*;
 use crate::{
@@ -45,14 +45,14 @@ fn lesson(seed: u64, count: usize, negatives: &[IconFeatures]) -> LandmarkModel 
     learn(LandmarkId(seed), &views, negatives, &p).unwrap()
 }
 
-/// The exemplars as negatives of others.
+/// The exemplars, for use as negatives of other landmarks.
 fn icons(model: &LandmarkModel) -> Vec<IconFeatures> {
     model.features(&Params::default().recognise)
 }
 
-/// End to end at N = 50: every landmark is taught from one picture, then fresh views are compared with all.
+/// End to end at N = 50: every landmark is trained from one picture, then new views are compared with all.
 #[test]
-fn fifty_landmarks_know_themselves_and_refuse_the_others() {
+fn fifty_landmarks_accept_their_own_views_and_no_others() {
     let p = Params::default();
     let alone: Vec<LandmarkModel> = (0..50).map(|seed| lesson(seed, 20, &[])).collect();
     let models: Vec<LandmarkModel> = (0..50)
@@ -81,24 +81,24 @@ fn fifty_landmarks_know_themselves_and_refuse_the_others() {
     }
     assert!(own >= 170, "{own} of 200 fresh views accepted");
     assert_eq!(wrong, 0, "of 9800 comparisons with other landmarks");
-    // Strangers: posters that nobody taught.
+    // Distractors: posters without a model.
     for seed in 500..560 {
         for view in synthesis::views(&poster(seed), &whole(), 1, &p, seed) {
             let icon = features(view.icon, &p.recognise);
-            assert!(models.iter().all(|m| !accepts(m, &icon)), "stranger {seed}");
+            assert!(models.iter().all(|m| !accepts(m, &icon)), "distractor {seed}");
         }
     }
 }
 
 #[test]
-fn likeness_is_held_by_the_nearest_of_the_others() {
+fn tau_of_the_likeness_is_limited_by_the_nearest_negative() {
     let p = Params::default();
     let alone = lesson(3, 20, &[]);
     assert!((alone.likeness.tau - p.learn.likeness_cap).abs() < 1e-12);
     assert_eq!((alone.likeness.limited_by, alone.likeness.negatives), (LimitedBy::AbsoluteCap, 0));
-    // What is nothing like it changes nothing, a look-alike much: itself under a stain, here.
-    let stranger = icons(&lesson(4, 20, &[])).remove(0);
-    let far = add_negatives(&alone, &[stranger], &p);
+    // A dissimilar negative leaves tau as it is; a look-alike (the landmark under a stain) lowers it.
+    let distractor = icons(&lesson(4, 20, &[])).remove(0);
+    let far = add_negatives(&alone, &[distractor], &p);
     assert!((far.likeness.tau - p.learn.likeness_cap).abs() < 1e-12 && far.likeness.negatives == 1);
     let mut stained = poster(3);
     stained = GrayImage::from_fn(300, 400, |u, v| {
@@ -108,14 +108,16 @@ fn likeness_is_held_by_the_nearest_of_the_others() {
     let near = add_negatives(&alone, &[features(view.icon, &p.recognise)], &p);
     assert_eq!(near.likeness.limited_by, LimitedBy::NearestNegative);
     assert!(near.likeness.tau < 0.9 * p.learn.likeness_cap, "{:?}", near.likeness);
-    // Itself: nothing can tell them apart, and so it is not used.
+    // An identical negative: no threshold separates them, so the landmark is not used.
     let twin = add_negatives(&alone, &icons(&alone), &p);
-    let ModelStatus::Candidate(failures) = &twin.status else { panic!("told from itself?") };
+    let ModelStatus::Candidate(failures) = &twin.status else {
+        panic!("an identical negative must leave no threshold")
+    };
     assert!(failures.iter().any(|f| f.gate == Gate::LikenessThreshold(ThresholdError::Overlap)));
 }
 
 #[test]
-fn a_model_tells_what_it_was_learnt_from() {
+fn a_model_records_its_training_data() {
     let p = Params::default();
     let mut views = synthesis::views(&poster(1), &whole(), 24, &p, 1);
     views.push(TrainingView::photographed(&poster(1), &whole(), &p).unwrap());
@@ -129,16 +131,16 @@ fn a_model_tells_what_it_was_learnt_from() {
 }
 
 #[test]
-fn one_of_the_papers_distances_is_enough() {
+fn a_threshold_of_one_distance_suffices() {
     let p = Params::default();
     let model = lesson(3, 20, &[]);
     assert!(model.is_active(), "{:?}", model.status);
-    // Without points H^r knows nothing, C^r still does.
+    // Without points H^r has no threshold, C^r still has one.
     let mut pointless = model.clone();
     (pointless.stable_points, pointless.hausdorff_evidence.own) = (0, vec![f32::INFINITY; 5]);
     let pointless = refit_thresholds(&pointless, &[], &p);
     assert!(pointless.is_active() && pointless.hausdorff.tau.abs() < 1e-12, "{:?}", pointless.status);
-    // Without either it is not used, and all of it is told.
+    // Without either the landmark is not used, and every failed gate is reported.
     let mut neither = pointless;
     neither.correlation_evidence.own = vec![1.9; 5];
     let ModelStatus::Candidate(failures) = refit_thresholds(&neither, &[], &p).status else {
@@ -151,19 +153,19 @@ fn one_of_the_papers_distances_is_enough() {
 }
 
 #[test]
-fn look_alikes_are_near_and_strangers_infinitely_far() {
+fn unlikeness_is_small_for_look_alikes_and_infinite_for_distractors() {
     let p = Params::default();
     let model = lesson(3, 20, &[]);
     let twin = icons(&lesson(3, 6, &[]));
-    let stranger = icons(&lesson(4, 6, &[]));
+    let distractor = icons(&lesson(4, 6, &[]));
     assert!(unlikeness_of(&model, &twin, &p) < 0.3);
-    assert!(unlikeness_of(&model, &stranger, &p) > p.learn.likeness_cap);
+    assert!(unlikeness_of(&model, &distractor, &p) > p.learn.likeness_cap);
     assert!(unlikeness_of(&model, &[], &p).is_infinite());
 }
 
-/// What looks like a landmark is told by its icons, all of them, however many points it has.
+/// Look-alikes are found by all icons of a landmark, however many points it has.
 #[test]
-fn points_take_nothing_from_the_icons() {
+fn thresholds_of_the_icons_do_not_depend_on_points() {
     let p = Params::default();
     let model = lesson(3, 20, &[]);
     let points = view_points(&poster(3), &whole());
@@ -183,14 +185,14 @@ fn folds_measure_every_view() {
 }
 
 #[test]
-fn what_fails_a_gate_stays_a_candidate_with_its_number() {
+fn a_failed_gate_is_reported_with_value_and_limit() {
     let p = Params::default();
     let blank = GrayImage::from_fn(300, 400, |u, _| 120 + (u / 60) as u8);
     let views = synthesis::views(&blank, &whole(), 20, &p, 1);
     let model = learn(LandmarkId(1), &views, &[], &p).unwrap();
     let ModelStatus::Candidate(failures) = &model.status else { panic!("a blank panel is no landmark") };
     let gates: Vec<Gate> = failures.iter().map(|f| f.gate).collect();
-    // One of the paper's distances tells it from nothing, so that the gates of both are not asked.
+    // One of the paper's distances has a threshold, so the gates of both are not applied.
     let overlap = Gate::LikenessThreshold(ThresholdError::Overlap);
     assert_eq!(gates, [Gate::Saliency, Gate::Content, overlap]);
     assert!(model.hausdorff.tau.abs() < 1e-12, "accepts nothing");
@@ -204,7 +206,7 @@ fn what_fails_a_gate_stays_a_candidate_with_its_number() {
 }
 
 #[test]
-fn impossible_lessons_are_refused() {
+fn invalid_training_input_is_refused() {
     let p = Params::default();
     assert_eq!(learn(LandmarkId(1), &[], &[], &p), Err(LearnError::NoView));
     let view = TrainingView::photographed(&poster(1), &whole(), &p).unwrap();
@@ -222,7 +224,7 @@ fn impossible_lessons_are_refused() {
 
 /// Oracle: all negatives at once.
 #[test]
-fn negatives_may_come_one_after_the_other() {
+fn negatives_may_be_added_one_by_one() {
     let p = Params::default();
     let others: Vec<IconFeatures> = (10..22).flat_map(|seed| icons(&lesson(seed, 6, &[]))).collect();
     let model = lesson(3, 20, &others);
@@ -236,7 +238,7 @@ fn negatives_may_come_one_after_the_other() {
 }
 
 #[test]
-fn counted_negatives_hold_tau_below_those_kept() {
+fn tau_stays_below_the_farthest_stored_negative() {
     let mut evidence = DistanceSamples { own: vec![0.1, 0.2, 0.9], ..DistanceSamples::default() };
     for i in 0..200 {
         evidence.add(0.3 + f64::from(i % 100) * 1e-3);
@@ -253,7 +255,7 @@ fn counted_negatives_hold_tau_below_those_kept() {
         },
         ..Params::default()
     };
-    // With false positives all but free, tau would go to 0.5; what was only counted keeps it below.
+    // With almost free false positives tau would be 0.5; the negatives that were only counted keep it lower.
     let held = fitted(&evidence, 0.5, &cheap).unwrap();
     assert!(held.tau <= f64::from(evidence.nearest_others[63]), "{}", held.tau);
     assert_eq!(held.limited_by, LimitedBy::AbsoluteCap);
@@ -271,7 +273,7 @@ fn a_stored_model_is_the_same_bit_for_bit() {
     let mut other = p.clone();
     other.recognise.correlation.rank += 1;
     assert!(matches!(LandmarkModel::from_bytes(&bytes, &other), Err(StoredModelError::Params { .. })));
-    // A model of the version before points loads, and says that it knows none.
+    // A model of the version before points loads, and reports that it has none.
     let mut older = bytes[..bytes.len() - 8 - 3].to_vec();
     older[4] = 2;
     older.extend(crate::model::model_bytes::digest(&older).to_le_bytes());
@@ -300,9 +302,9 @@ fn a_stored_model_is_the_same_bit_for_bit() {
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(400))]
-    /// Bytes that pass the digest and still are nonsense: typed error or a model, never a panic.
+    /// Invalid bytes with a valid digest: typed error or a model, never a panic.
     #[test]
-    fn forged_bytes_never_panic(
+    fn bytes_with_a_valid_digest_never_panic(
         edits in proptest::collection::vec((6usize..400, any::<u8>()), 1..6),
         cut in 0usize..300,
         seal in any::<bool>(),

@@ -1,4 +1,4 @@
-//! Goldens of method 13.3 and 21, exact poses, honest covariance, no unflagged flip, refusals.
+//! Goldens of method 13.3 and 21, exact poses, consistent covariance, no unflagged flip, refusals.
 
 use super::*;
 use crate::{
@@ -31,7 +31,7 @@ fn view(d_m: f64, psi_deg: f64) -> Isometry3<f64> {
     Isometry3::from_parts((-(rotation * centre)).into(), rotation)
 }
 
-fn seen(pose: &Isometry3<f64>, camera: &Intrinsics) -> [Point2<f64>; 4] {
+fn projected(pose: &Isometry3<f64>, camera: &Intrinsics) -> [Point2<f64>; 4] {
     corner_points(&SIZE).map(|p| camera.project(&(pose.rotation * p + pose.translation.vector)))
 }
 
@@ -93,21 +93,21 @@ fn exact_corners_give_exact_poses() {
         let base = view(d, psi);
         let swing = UnitQuaternion::from_scaled_axis(turn);
         let truth = Isometry3::from_parts((swing * base.translation.vector).into(), swing * base.rotation);
-        let points = seen(&truth, &camera);
+        let points = projected(&truth, &camera);
         if points.iter().any(|p| !(0.0..640.0).contains(&p.x) || !(0.0..480.0).contains(&p.y)) {
             continue;
         }
         tried += 1;
         let found = landmark_pose(&Corners::new(points).unwrap(), &isotropic(0.5), SIZE, &camera).unwrap();
         let pose = found.best.camera_from_landmark;
-        // Undoing the distortion stops at about 1e-8 px.
+        // The undistortion converges to about 1e-8 px.
         assert!(pose.rotation.angle_to(&truth.rotation) < 1e-6, "{d} {psi} {distortion:?}");
         assert!((pose.translation.vector - truth.translation.vector).norm() < 1e-6, "{d} {psi}");
     }
 }
 
 #[test]
-fn the_table_of_method_13_3() {
+fn errors_agree_with_the_table_of_method_13_3() {
     // d, psi; refined sigma of (normal, along wall, heading in degrees); linear only.
     let table = [
         (2.0, 0.0, [0.006, 0.020, 0.56], [0.006, 0.024, 0.65]),
@@ -124,7 +124,7 @@ fn the_table_of_method_13_3() {
         let mut sums = [Vector3::zeros(); 4];
         let draws = 2000;
         for _ in 0..draws {
-            let corners = noisy(&seen(&truth, &camera()), 0.5, &mut random);
+            let corners = noisy(&projected(&truth, &camera()), 0.5, &mut random);
             let found = landmark_pose(&corners, &isotropic(0.5), SIZE, &camera()).unwrap();
             for (i, pose) in
                 [found.best.camera_from_landmark, linear_pose(&found.measured).unwrap()].iter().enumerate()
@@ -146,8 +146,8 @@ fn the_table_of_method_13_3() {
 }
 
 #[test]
-fn covariance_is_honest_in_twelve_cells_and_no_flip_is_unflagged() {
-    // reliability: distance x obliquity x noise, 200 runs each; mean NEES of 6 degrees of freedom within its bands.
+fn covariance_is_consistent_in_twelve_cells_and_every_flip_is_flagged() {
+    // Distance x obliquity x noise, 200 runs each; mean NEES of 6 degrees of freedom within its bands.
     let mut random = Random::new(4);
     let (mut outside, mut flips, mut flagged) = (0, 0, 0);
     for sigma_px in [0.3, 0.8] {
@@ -157,7 +157,7 @@ fn covariance_is_honest_in_twelve_cells_and_no_flip_is_unflagged() {
                 let mirrored_truth = mirrored(&truth);
                 let (mut sum, mut n) = (0.0, 0.0);
                 for _ in 0..200 {
-                    let corners = noisy(&seen(&truth, &camera()), sigma_px, &mut random);
+                    let corners = noisy(&projected(&truth, &camera()), sigma_px, &mut random);
                     let found = landmark_pose(&corners, &isotropic(sigma_px), SIZE, &camera()).unwrap();
                     if found.ambiguous {
                         flagged += 1;
@@ -182,13 +182,13 @@ fn covariance_is_honest_in_twelve_cells_and_no_flip_is_unflagged() {
 }
 
 #[test]
-fn seen_from_the_front_the_covariance_is_the_spread_of_the_draws() {
+fn the_covariance_of_a_front_view_equals_the_sample_covariance() {
     // The linear covariance at the minimum gives a mean NEES of 12 here.
     let truth = view(6.0, 0.0);
     let mut random = Random::new(5);
     let (mut sum, mut n) = (0.0, 0.0);
     for _ in 0..400 {
-        let corners = noisy(&seen(&truth, &camera()), 0.5, &mut random);
+        let corners = noisy(&projected(&truth, &camera()), 0.5, &mut random);
         let found = landmark_pose(&corners, &isotropic(0.5), SIZE, &camera()).unwrap();
         if !found.ambiguous {
             (sum, n) = (sum + nees(&truth, &found.best), n + 1.0);
@@ -198,7 +198,7 @@ fn seen_from_the_front_the_covariance_is_the_spread_of_the_draws() {
 }
 
 #[test]
-fn what_the_camera_has_wrong_is_in_the_covariance() {
+fn errors_of_the_intrinsics_are_in_the_covariance() {
     // Oracle: a camera drawn anew each time, 1 % and 4 px off, with and without a lens.
     let mut random = Random::new(6);
     for (lens, psi) in
@@ -216,7 +216,7 @@ fn what_the_camera_has_wrong_is_in_the_covariance() {
             let e = stated.error_sigmas().map(|s| s * random.normal());
             let (fx_px, fy_px) = (bare.fx_px * (1.0 + e.x), bare.fy_px * (1.0 + e.x));
             let real = Intrinsics { fx_px, fy_px, cx_px: bare.cx_px + e.y, cy_px: bare.cy_px + e.z, ..bare };
-            let corners = noisy(&seen(&truth, &real), 0.3, &mut random);
+            let corners = noisy(&projected(&truth, &real), 0.3, &mut random);
             let pose = |camera| landmark_pose(&corners, &isotropic(0.3), SIZE, camera).unwrap().best;
             sum += nees(&truth, &pose(&stated));
             as_exact += nees(&truth, &pose(&bare));
@@ -231,9 +231,9 @@ fn what_the_camera_has_wrong_is_in_the_covariance() {
 }
 
 #[test]
-fn the_size_scales_the_pose() {
+fn a_pose_scales_with_the_landmarks_size() {
     // Symmetry: a landmark twice as large at twice the distance looks the same.
-    let corners = Corners::new(seen(&view(3.0, 35.0), &camera())).unwrap();
+    let corners = Corners::new(projected(&view(3.0, 35.0), &camera())).unwrap();
     let double = LandmarkSize { width_m: 2.0 * SIZE.width_m, height_m: 2.0 * SIZE.height_m };
     let near = landmark_pose(&corners, &isotropic(0.5), SIZE, &camera()).unwrap().best;
     let far = landmark_pose(&corners, &isotropic(0.5), double, &camera()).unwrap().best;
@@ -244,8 +244,8 @@ fn the_size_scales_the_pose() {
 }
 
 #[test]
-fn unusable_input_is_refused_by_name() {
-    let corners = Corners::new(seen(&view(3.0, 20.0), &camera())).unwrap();
+fn unusable_input_is_refused_with_a_typed_error() {
+    let corners = Corners::new(projected(&view(3.0, 20.0), &camera())).unwrap();
     let pose = |s: [Matrix2<f64>; 4], size, camera: &Intrinsics| landmark_pose(&corners, &s, size, camera);
     let with = |w| pose(isotropic(0.5), LandmarkSize { width_m: w, height_m: 0.8 }, &camera()).map(|_| ());
     assert_eq!(with(LandmarkSize::MIN_M), Ok(()));

@@ -1,6 +1,6 @@
-//! Template alignment: moves the corners of a quad until its picture agrees with a learnt icon. A true match fits far
-//! better afterwards, a false one hardly does; the corners get sharper for the pose. Beyond the method (its sections
-//! 4 and 6.3 name it as an option). It decides nothing itself.
+//! Template alignment: moves the corners of a quad until its picture agrees with a learnt icon. A true match fits
+//! far better afterwards, a false one hardly does; the corners get more accurate for the pose. Beyond the method
+//! (its sections 4 and 6.3 name it as an option). `decision` applies the thresholds.
 //!
 //! Three levels, coarse to fine. The first rejects most candidates cheaply: sides only, at a third of the icon's
 //! resolution. The second moves all corners; the third gives the last tenths of a pixel.
@@ -25,31 +25,30 @@ use fearless_simd::{Level, dispatch};
 use nalgebra::{Matrix2, Point2, Vector2};
 use std::cell::OnceCell;
 
-/// Pixels along the icon's border that are not compared: beyond it lies another wall than the one learnt, and smoothing
-/// brings some of it in.
+/// Pixels along the icon's border that are not compared: smoothing mixes in the wall outside, which differs from
+/// that of training.
 const SECOND_BORDER_PX: usize = 2;
-/// The same of the coarse look, in its pixels.
+/// The same of the coarse level, in its pixels.
 const COARSE_BORDER_PX: usize = 1;
 
 /// Least standard deviation of an aligned corner, in icon pixels.
 const LEAST_SIGMA_ICON_PX: f64 = 0.1;
 
-/// A step of less than this is the last of its look, in pixels of that look: the next one goes on from there, the
-/// last one gives the corners.
+/// A level ends with a step below this, in pixels of that level.
 const SETTLED_PX: [f64; LEVELS] = [0.08, 0.08, 0.02];
 
-/// A picture laid on a template.
+/// A picture aligned with a template.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Alignment {
-    /// Where the template's corners are in the image.
+    /// The template's corners in the image.
     pub corners_px: Corners,
-    /// Their covariances, px^2, as far as the two pictures tell.
+    /// Their covariances, px^2, from the residuals of the alignment.
     pub covariance_px2: [Matrix2<f64>; 4],
-    /// What they enclose, cut from the rectified surroundings.
+    /// The icon of these corners, cut from the rectified surroundings.
     pub icon: Icon,
 }
 
-/// A learnt icon on which pictures are laid; what a fine look needs is worked out when it is first taken.
+/// A learnt icon as the template of alignments; the fine levels are computed on first use.
 #[derive(Debug)]
 pub struct Template<'a> {
     icon: &'a Icon,
@@ -59,13 +58,13 @@ pub struct Template<'a> {
 }
 
 impl<'a> Template<'a> {
-    /// Takes the icon as it is, and what [`coarse()`](crate::recognise::alignment::surroundings::coarse) makes of it.
+    /// A template of the icon and its [`coarse()`](crate::recognise::alignment::surroundings::coarse) level.
     pub fn new(icon: &'a Icon, coarse: &'a [f32]) -> Self {
         Self { icon, coarse, second: OnceCell::new(), last: OnceCell::new() }
     }
 }
 
-/// Where a picture lies after the coarse look.
+/// The alignment after the coarse level.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CoarseAlignment {
     corners: [Point2<f64>; 4],
@@ -73,7 +72,7 @@ pub struct CoarseAlignment {
     pub alike: f64,
 }
 
-/// Where icons of one size are compared at each look. Worked out once, for any number of pictures.
+/// Sampling grids of all levels for icons of one size. Computed once, for any number of pictures.
 #[derive(Debug, Clone, Default)]
 pub struct SamplingGrids {
     size: usize,
@@ -97,7 +96,7 @@ impl SamplingGrids {
     }
 }
 
-/// How icons are laid on each other.
+/// Aligns pictures with templates.
 #[derive(Debug, Clone, Copy)]
 pub struct Aligner<'a> {
     on: &'a SamplingGrids,
@@ -105,17 +104,17 @@ pub struct Aligner<'a> {
 }
 
 impl<'a> Aligner<'a> {
-    /// Compares on `on`.
+    /// An aligner on the grids `on`.
     pub fn new(on: &'a SamplingGrids, p: &'a AlignParams) -> Self {
         Self { on, p }
     }
 
-    /// Aligns the picture with `template`. `None` when it shows something else or does not determine the corners.
+    /// Aligns the picture with `template`. `None` when it does not match or does not determine the corners.
     pub fn align(&self, around: &Surroundings<'_>, template: &Template<'_>) -> Option<Alignment> {
         self.align_fine(around, template, &self.align_coarse(around, template)?)
     }
 
-    /// The coarse level. `None` when the picture shows something else.
+    /// The coarse level. `None` when the picture does not match.
     pub fn align_coarse(
         &self,
         around: &Surroundings<'_>,
@@ -164,7 +163,7 @@ impl<'a> Aligner<'a> {
         Some(Alignment { corners_px, covariance_px2, icon: Icon { size, pixels, source_scale: 1.0 } })
     }
 
-    /// The second look, at surroundings that were smoothed whole.
+    /// The second level, on smoothed surroundings.
     fn second(
         &self,
         around: &Surroundings<'_>,
@@ -181,8 +180,9 @@ impl<'a> Aligner<'a> {
         })
     }
 
-    /// The last look smooths after cutting, as the template was: the wall around must not bleed in, and so all of the
-    /// icon counts. Its slopes are the picture's own: the template's would pull where one of the two is softer.
+    /// The last level smooths after cutting, as the template was: the wall around does not mix in, so the border of
+    /// the icon is compared, too. The gradients are those of the picture: those of the template bias the step where
+    /// one of the two is blurred more.
     fn last(
         &self,
         around: &Surroundings<'_>,
@@ -200,7 +200,7 @@ impl<'a> Aligner<'a> {
             let own = Goal::<8>::with_slopes_of(lattice, levels, &first);
             let mut first = Some(first);
             let see = |map: &SquareMap, seen: &mut [f32]| {
-                // Settling begins where the slopes were taken.
+                // The iteration begins at the position of the gradients.
                 let cut = first.take().unwrap_or_else(|| cut(map));
                 for (seen, at) in seen.iter_mut().zip(&lattice.at) {
                     *seen = cut[*at as usize];
@@ -210,7 +210,7 @@ impl<'a> Aligner<'a> {
         })
     }
 
-    /// At an icon of `size`.
+    /// The limits for an icon of `size`.
     fn limits(&self, level: usize, size: usize) -> Limits {
         let (shift_px, steps) = (self.p.max_shift * size as f64, self.p.steps.min(align_params::MAX_STEPS));
         Limits { shift_px, steps, settled_px: SETTLED_PX[level] }
@@ -233,7 +233,7 @@ fn in_image(corners_px: &Corners, size: usize, covariances: Option<[Matrix2<f64>
     })
 }
 
-/// Every pixel of an icon whose corners lie where `map` says.
+/// All pixels of the icon under `map`.
 #[expect(
     clippy::inline_always,
     reason = "an instruction set holds only in what is inlined where it was chosen"
@@ -269,19 +269,19 @@ mod tests {
         icon(image, corners, &IconParams::default()).unwrap()
     }
 
-    /// Lays what `around` shows on `template`.
+    /// Aligns `around` with `template`.
     fn aligned(around: &Surroundings<'_>, template: &Icon) -> Option<Alignment> {
         let (on, p) = (SamplingGrids::new(75, &CorrelationParams::default()), AlignParams::default());
         Aligner::new(&on, &p).align(around, &Template::new(template, &coarse(template, &p)))
     }
 
-    fn laid(image: &GrayImage, corners: &Corners, template: &Icon) -> Option<Alignment> {
+    fn aligned_in_image(image: &GrayImage, corners: &Corners, template: &Icon) -> Option<Alignment> {
         let icon = cut(image, corners);
         aligned(&Surroundings::new(image, corners, &icon, &AlignParams::default()).unwrap(), template)
     }
 
     #[test]
-    fn displaced_corners_come_back() {
+    fn displaced_corners_are_recovered() {
         let template = cut(&photograph(&poster(1), &oblique(), 1.0, 0.0), &oblique());
         let image = photograph(&poster(1), &oblique(), 0.7, 40.0);
         // Up to 8 px of 200: 3 icon pixels of 75.
@@ -293,7 +293,8 @@ mod tests {
                 i += 2;
                 Point2::new(q.x + offset[i - 2], q.y + offset[i - 1])
             });
-            let found = laid(&image, &Corners::new(wrong).unwrap(), &template).unwrap().corners_px;
+            let found =
+                aligned_in_image(&image, &Corners::new(wrong).unwrap(), &template).unwrap().corners_px;
             for (a, b) in found.points().iter().zip(oblique().points()) {
                 // An icon pixel is 2.7 px here.
                 assert!((a - b).norm() < 0.7, "{offset:?}: {a} for {b}");
@@ -302,27 +303,27 @@ mod tests {
     }
 
     #[test]
-    fn an_icon_alone_is_laid_on_another() {
+    fn an_icon_without_its_image_is_aligned() {
         let image = photograph(&poster(1), &oblique(), 1.0, 0.0);
         let all = cut(&image, &oblique());
         let inset =
             oblique().points().map(|q| Point2::new(0.94 * q.x + 0.06 * 185.0, 0.94 * q.y + 0.06 * 205.0));
         let template = cut(&image, &Corners::new(inset).unwrap());
         let around = Surroundings::of_icon(&all, &AlignParams::default()).unwrap();
-        let laid = aligned(&around, &template).unwrap();
+        let aligned_in_image = aligned(&around, &template).unwrap();
         let icon_from_image = Homography::square_to_quad(75, &oblique()).unwrap().inverse().unwrap();
-        for (found, wanted) in laid.corners_px.points().iter().zip(inset) {
+        for (found, wanted) in aligned_in_image.corners_px.points().iter().zip(inset) {
             let wanted = icon_from_image.apply(&wanted);
             assert!((found - wanted).norm() < 0.4, "{found} for {wanted}");
         }
-        // Of something else it is given up.
+        // Another picture is rejected.
         let other = cut(&photograph(&poster(2), &oblique(), 1.0, 0.0), &oblique());
         let around = Surroundings::of_icon(&other, &AlignParams::default()).unwrap();
         assert!(aligned(&around, &template).is_none());
     }
 
     #[test]
-    fn a_covered_part_has_no_say() {
+    fn a_covered_part_does_not_move_the_corners() {
         let image = photograph(&poster(2), &oblique(), 1.0, 0.0);
         let template = cut(&image, &oblique());
         let covered = GrayImage::from_fn(400, 400, |u, v| {
@@ -333,14 +334,14 @@ mod tests {
             }
         });
         let wrong = Corners::new(oblique().points().map(|q| Point2::new(q.x + 4.0, q.y - 3.0))).unwrap();
-        let found = laid(&covered, &wrong, &template).unwrap().corners_px;
+        let found = aligned_in_image(&covered, &wrong, &template).unwrap().corners_px;
         for (a, b) in found.points().iter().zip(oblique().points()) {
             assert!((a - b).norm() < 0.8, "{a} for {b}");
         }
     }
 
     #[test]
-    fn corners_never_move_further_than_allowed() {
+    fn the_displacement_of_corners_is_bounded() {
         let image = photograph(&poster(1), &oblique(), 1.0, 0.0);
         let template = cut(&image, &oblique());
         // 20 % of a side of at most 252 px, both coordinates.
@@ -348,19 +349,19 @@ mod tests {
         let mut moved = 0;
         for off_px in [3.0, 6.0, 12.0, 25.0, 50.0, 100.0] {
             let start = Corners::new(oblique().points().map(|q| Point2::new(q.x + off_px, q.y))).unwrap();
-            let Some(found) = laid(&image, &start, &template) else { continue };
+            let Some(found) = aligned_in_image(&image, &start, &template) else { continue };
             moved += 1;
             for (a, b) in found.corners_px.points().iter().zip(start.points()) {
                 assert!((a - b).norm() <= limit_px, "{off_px}: {a} from {b}");
             }
         }
-        assert!(moved >= 2, "only {moved} were aligned: nothing was checked");
+        assert!(moved >= 2, "only {moved} were aligned: the bound was not tested");
         let flat = GrayImage::from_fn(400, 400, |_, _| 99);
-        assert!(laid(&flat, &oblique(), &cut(&image, &oblique())).is_none());
+        assert!(aligned_in_image(&flat, &oblique(), &cut(&image, &oblique())).is_none());
     }
 
     #[test]
-    fn other_sizes_are_not_compared() {
+    fn icons_of_other_sizes_are_refused() {
         let image = photograph(&poster(1), &oblique(), 1.0, 0.0);
         let (whole, p) = (cut(&image, &oblique()), AlignParams::default());
         let small = icon(&image, &oblique(), &IconParams { size: 60, ..IconParams::default() }).unwrap();

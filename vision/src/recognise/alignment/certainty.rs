@@ -1,14 +1,15 @@
-//! How surely the corners of a picture that was laid on an icon are known: from the normal equations of the last
-//! step, and from how much the buckets disagree about it.
+//! Covariance of aligned corners, from the normal equations of the last step and the scatter of the buckets'
+//! gradients.
 //!
-//! Neighbouring pixels of a smoothed picture err together, so that residuals of pixels say too much. Buckets are nearly
-//! independent: the spread of their gradients gives the scale, the normal equations give the shape.
+//! Errors of neighbouring pixels of a smoothed picture are correlated, so residuals of pixels would understate the
+//! covariance. Buckets are nearly independent: the spread of their gradients gives the scale, the normal equations
+//! give the shape.
 
 use nalgebra::{Const, DimMin, Matrix2, SMatrix, SVector};
 
-/// Share of the mean diagonal element that is added to each: what no bucket ties down stays finite.
+/// Share of the mean diagonal element that is added to each: keeps undetermined directions finite.
 const LEAST_DAMPING: f64 = 1e-3;
-/// What is left of eight coordinates at least when the buckets' own pull is taken away.
+/// Smallest number of degrees of freedom after subtracting the leverage of the buckets.
 const LEAST_FREE: f64 = 1.0;
 /// Fewest buckets beyond the corners' coordinates.
 const MIN_SPARE: usize = 2;
@@ -29,7 +30,7 @@ where
     let damping = LEAST_DAMPING * normal.trace() / D as f64;
     let inverse = (normal + SMatrix::<f64, D, D>::identity() * damping).try_inverse()?;
     let spread: f64 = buckets.iter().map(|(_, g)| (g.transpose() * inverse * g)[0]).sum();
-    // Each bucket has pulled the corners its way: so much of its own disagreement is gone.
+    // Leverage: each bucket moved the corners and so lowered its own residual.
     let lost: f64 = buckets.iter().map(|(own, _)| (inverse * own * inverse * own).trace()).sum();
     let scale = spread / (D as f64 - lost).max(LEAST_FREE);
     let of = |i: usize| {
@@ -52,9 +53,9 @@ mod tests {
         (0..25).map(|_| root * SVector::from_fn(|_, _| noise * normal())).collect()
     }
 
-    /// The squared errors of corners that solve disturbed equations are what is said of them.
+    /// The squared errors of corners from disturbed equations agree with their covariance.
     #[test]
-    fn errors_are_as_large_as_said() {
+    fn errors_agree_with_the_covariance() {
         let mut dice = Dice::new(3);
         let each = SMatrix::<f64, 8, 8>::from_fn(|i, j| if i == j { 2.0 + i as f64 } else { 0.3 });
         let normal = each * 25.0;
@@ -63,7 +64,7 @@ mod tests {
             let mut own = gradients(&each, 0.7, &mut dice);
             let total: SVector<f64, 8> = own.iter().sum();
             let error = normal.try_inverse().unwrap() * total;
-            // Where the corners settle the gradients add up to nothing.
+            // At the minimum the gradients sum to zero.
             for g in &mut own {
                 *g -= each * error;
             }
@@ -79,7 +80,7 @@ mod tests {
     }
 
     #[test]
-    fn too_few_buckets_say_nothing() {
+    fn too_few_buckets_give_no_covariance() {
         let mut dice = Dice::new(4);
         let each = SMatrix::<f64, 8, 8>::identity();
         let own: Vec<_> = gradients(&each, 1.0, &mut dice).into_iter().map(|g| (each, g)).collect();

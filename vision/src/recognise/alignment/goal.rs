@@ -1,5 +1,5 @@
-//! What a picture shall look like, bucket by bucket, and how that changes with its corners: a template's grey levels of
-//! mean 0 and norm 1, and their slopes. The template stays where it is; moving is `settle`'s.
+//! The target of an alignment, bucket by bucket: a template's grey levels of mean 0 and norm 1, and their
+//! derivatives by the corners. `settle` moves the corners.
 
 #![expect(
     clippy::inline_always,
@@ -15,34 +15,34 @@ use nalgebra::{SMatrix, SVector};
 /// A template on a lattice, with `D` ways to move: 4 for the sides, 8 for the coordinates of the corners.
 #[derive(Debug, Clone)]
 pub(crate) struct Goal<const D: usize> {
-    /// Grey levels, zeros for padding and for buckets with nothing to see.
+    /// Grey levels, zeros for padding and for flat buckets.
     pub(crate) values: Vec<f32>,
-    /// Buckets in which there is something to see, with what does not change from step to step.
+    /// Buckets that are not flat, with the products that do not change from step to step.
     pub(crate) buckets: Vec<Bucket<D>>,
-    /// Change of the grey levels with each way to move, likewise.
+    /// Derivatives of the grey levels by each parameter, likewise.
     pub(crate) slopes: [Vec<f32>; D],
 }
 
 #[derive(Debug, Clone)]
 pub(crate) struct Bucket<const D: usize> {
     pub(crate) cells: GridBucket,
-    /// Products of the slopes.
+    /// Products of the derivatives.
     pub(crate) normal: SMatrix<f64, D, D>,
-    /// Of the slopes with the template's grey levels.
+    /// Products of the derivatives with the template's grey levels.
     pub(crate) level: SVector<f64, D>,
 }
 
 /// A picture's grey levels on a lattice, of mean 0 and norm 1 in every bucket.
 #[derive(Debug, Clone)]
 pub(crate) struct Levels {
-    /// Zeros for padding and for buckets with nothing to see.
+    /// Grey levels; zeros for padding and for flat buckets.
     values: Vec<f32>,
-    /// Buckets in which there is something to see, and what their grey levels were divided by.
+    /// Buckets that are not flat, and the norms that their grey levels were divided by.
     buckets: Vec<(GridBucket, f32)>,
 }
 
 impl Levels {
-    /// Of the smoothed icon `smooth`. A bucket whose grey levels deviate by less than `min_deviation` says nothing.
+    /// Of the smoothed icon `smooth`. A bucket with a standard deviation below `min_deviation` is flat and ignored.
     #[inline(always)]
     pub(crate) fn new(lattice: &SamplingGrid, smooth: &[f32], min_deviation: f32) -> Self {
         let mut values: Vec<f32> = lattice.at.iter().map(|at| smooth[*at as usize]).collect();
@@ -56,9 +56,9 @@ impl Levels {
     }
 }
 
-/// How points move with the corners: left, right, top, bottom side along their normals, or x and y of TL, TR, BR, BL.
-/// The derivative of the homography, exact at the square itself. In: slopes along x and along y of [`LANES`] pixels at
-/// `s` and `t` of the way across and down. Out: their change with each way to move.
+/// Derivatives of points by the corners: left, right, top, bottom side along their normals, or x and y of TL, TR,
+/// BR, BL. The derivative of the homography, exact at the square itself. In: slopes along x and along y of
+/// [`LANES`] pixels at `s` and `t` of the way across and down. Out: their change with each way to move.
 #[inline(always)]
 fn moved<const D: usize>([gx, gy]: [[f32; LANES]; 2], s: [f32; LANES], t: [f32; LANES]) -> [[f32; LANES]; D] {
     let mut ways = [[0.0; LANES]; D];
@@ -82,15 +82,15 @@ fn moved<const D: usize>([gx, gy]: [[f32; LANES]; 2], s: [f32; LANES], t: [f32; 
 }
 
 impl<const D: usize> Goal<D> {
-    /// Of the smoothed icon `smooth`. A bucket whose grey levels deviate by less than `min_deviation` says nothing.
+    /// Of the smoothed icon `smooth`. A bucket with a standard deviation below `min_deviation` is flat and ignored.
     #[inline(always)]
     pub(crate) fn new(lattice: &SamplingGrid, smooth: &[f32], min_deviation: f32) -> Self {
         let levels = Levels::new(lattice, smooth, min_deviation);
         Self::with_slopes(lattice, &levels, &levels, smooth)
     }
 
-    /// `levels` with the slopes of `smooth`, the picture itself as it lies now, instead of the template's: those would
-    /// pull where one of the two is softer.
+    /// `levels` with the gradients of `smooth`, the picture at its present position, instead of the template's:
+    /// those bias the step where one of the two is blurred more.
     #[inline(always)]
     pub(crate) fn with_slopes_of(lattice: &SamplingGrid, levels: &Levels, smooth: &[f32]) -> Self {
         Self::with_slopes(lattice, levels, &Levels::new(lattice, smooth, 0.0), smooth)
@@ -140,7 +140,7 @@ fn add_slopes<const D: usize>(
     for slope in slopes {
         let slope = &mut slope[part.clone()];
         let mean = dot(slope, real) / cells.count as f32;
-        // What only scales the grey levels is lost when they are normalised.
+        // Normalisation removes the component that only scales the grey levels.
         let along = dot(slope, values);
         for ((s, v), r) in slope.iter_mut().zip(values).zip(real) {
             *s -= mean * r + along * v;
@@ -149,7 +149,7 @@ fn add_slopes<const D: usize>(
 }
 
 impl<const D: usize> Bucket<D> {
-    /// Works out the products.
+    /// Computes the products.
     #[inline(always)]
     fn new(cells: GridBucket, values: &[f32], slopes: &[Vec<f32>; D]) -> Self {
         let part = cells.start..cells.end;
@@ -259,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn flat_buckets_say_nothing() {
+    fn flat_buckets_are_ignored() {
         let lattice = SamplingGrid::new(75, 5, 0, Pattern::All);
         let pixels: Vec<f32> =
             (0..75 * 75).map(|i| if i % 75 < 15 { waves(i % 75, i / 75) } else { 80.0 }).collect();

@@ -1,5 +1,4 @@
-//! Where an icon is compared, bucket by bucket, and reading a picture there under a homography. No picture is made
-//! here, and nothing is decided.
+//! The pixels at which icons are compared, bucket by bucket, and sampling of a picture there under a homography.
 
 #![expect(
     clippy::inline_always,
@@ -9,7 +8,7 @@
 use crate::{geometry::interpolate::cell, recognise::features::separable::LANES};
 use nalgebra::Point2;
 
-/// Fewest points of a bucket that says anything.
+/// Fewest points of a bucket that is used.
 const MIN_POINTS: usize = 9;
 /// Buckets along a side are as many as leave each this many points along its side.
 const MIN_POINTS_ALONG: usize = 5;
@@ -123,7 +122,7 @@ pub(crate) struct PaddedIcon<'a> {
     pub(crate) margin: usize,
 }
 
-/// Where the pixels of an icon lie: the map from its square to a quad, rows of a 3 x 3 matrix.
+/// The homography from the square of an icon to a quad, rows of a 3 x 3 matrix.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct SquareMap([f64; 9]);
 
@@ -153,7 +152,7 @@ impl SquareMap {
         Some(Self([r0[0], r0[1], r0[2], r1[0], r1[1], r1[2], r2[0], r2[1], r2[2]]))
     }
 
-    /// Where a point of the icon lies.
+    /// The image of a point of the icon.
     pub(crate) fn apply(&self, p: &Point2<f64>) -> Point2<f64> {
         let m = &self.0;
         let scale = 1.0 / (m[6] * p.x + m[7] * p.y + m[8]);
@@ -172,7 +171,7 @@ pub(crate) fn sample(picture: PaddedIcon<'_>, map: &SquareMap, x: &[f32], y: &[f
         let (mut at, mut dx, mut dy) = ([0_u32; LANES], [0.0_f32; LANES], [0.0_f32; LANES]);
         for i in 0..LANES {
             let scale = 1.0 / (m[6] * x[i] + m[7] * y[i] + m[8]);
-            // A NaN is no place: it ends as pixel 0, and its grey level as NaN.
+            // NaN coordinates read pixel 0, and the grey level becomes NaN.
             let u = ((m[0] * x[i] + m[1] * y[i] + m[2]) * scale + offset).clamp(0.0, last);
             let v = ((m[3] * x[i] + m[4] * y[i] + m[5]) * scale + offset).clamp(0.0, last);
             let ((column, left), (row, above)) = (cell(u), cell(v));

@@ -1,5 +1,5 @@
-//! Moving a quad's corners until its picture is as near to a goal as it gets: damped least squares over normalised
-//! buckets, each weighted by how well it correlates already, so that covered parts have no say.
+//! Iterative alignment of a quad's corners: damped least squares over normalised buckets, each weighted by its
+//! correlation, so that covered parts have little influence.
 
 #![expect(
     clippy::inline_always,
@@ -13,38 +13,38 @@ use crate::recognise::alignment::{
 };
 use nalgebra::{Const, DimMin, Matrix2, Point2, SMatrix, SVector, Vector2};
 
-/// A step that brings nothing is not tried again, shorter, if it was less than so many times [`Limits::settled_px`].
+/// A rejected step is not retried with more damping if it was shorter than this many times [`Limits::settled_px`].
 const HARDLY_WRONG: f64 = 5.0;
 /// Share of the mean diagonal element that is added to each.
 const LEAST_DAMPING: f64 = 1e-3;
-/// A step that brings nothing although it is held back by more is given up.
+/// Damping at which a rejected step ends the iteration.
 const MOST_DAMPING: f64 = 1.0;
 
-/// Where an icon's corners came to lie, and how alike the pictures are there.
+/// Result of the iteration: the corners and the similarity there.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Settled {
     pub(crate) corners: [Point2<f64>; 4],
     /// Mean squared correlation of the buckets.
     pub(crate) alike: f64,
-    /// How surely the corners are known, in squared pixels of the icon, where all eight coordinates moved.
+    /// Covariances of the corners, in squared pixels of the icon, where all eight coordinates moved.
     pub(crate) covariances: Option<[Matrix2<f64>; 4]>,
 }
 
-/// How far and how often corners may move.
+/// Limits of the displacement and the number of steps.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Limits {
-    /// From their own corner of the square, in pixels of the icon, along either axis.
+    /// Largest displacement from the corner of the square, in pixels of the icon, along either axis.
     pub(crate) shift_px: f64,
     pub(crate) steps: usize,
     /// A step of less than this, in pixels of the icon, is the last.
     pub(crate) settled_px: f64,
 }
 
-/// Moves the corners of the icon from `start` on; `see` reads the picture at the lattice's points under a map. `None`
-/// when nothing says where.
+/// Moves the corners of the icon, beginning at `start`; `see` samples the picture at the grid's points under a map.
+/// `None` when the buckets do not determine the corners.
 ///
-/// Levenberg-Marquardt: a step that brings nothing is taken back and tried again, shorter. Inverse compositional (Baker
-/// and Matthews 2004): the goal's slopes are worked out once, not at every step.
+/// Levenberg-Marquardt: a rejected step is retried with more damping. Inverse compositional (Baker and Matthews
+/// 2004): the derivatives of the goal are computed once, not at every step.
 #[inline(always)]
 pub(crate) fn settle<const D: usize>(
     goal: &Goal<D>,
@@ -63,7 +63,7 @@ where
     let (mut corners, mut here) = (start, Equations::new(goal, lattice, &mut see, &map, -1.0, &mut seen));
     for _ in 0..limits.steps {
         let step = corner_moves(&here.step(damping)?);
-        // The template was moved in thought: the picture moves by the inverse, before what it moved already.
+        // Inverse composition: the map is composed with the inverse of the template's step.
         let moved: [Point2<f64>; 4] = std::array::from_fn(|i| map.apply(&(square[i] + step[i])));
         let shift = moved.iter().zip(&square).map(|(m, s)| (m - s).amax()).fold(0.0, f64::max);
         let next = (shift <= limits.shift_px).then(|| SquareMap::new(lattice.size, &moved)).flatten();
@@ -97,22 +97,22 @@ fn corner_moves<const D: usize>(step: &SVector<f64, D>) -> [Vector2<f64>; 4] {
     }
 }
 
-/// What one bucket adds to the equations.
-struct Said<const D: usize> {
+/// Contribution of one bucket to the normal equations.
+struct BucketTerm<const D: usize> {
     /// Its index.
     bucket: usize,
     weight: f64,
-    /// What it adds to the right side.
+    /// Contribution to the right-hand side.
     gradient: SVector<f64, D>,
 }
 
-/// Normal equations of the moves, and how alike picture and template are.
+/// Normal equations of the parameters, and the similarity of picture and template.
 struct Equations<const D: usize> {
     normal: SMatrix<f64, D, D>,
     right: SVector<f64, D>,
-    /// What each bucket says.
-    said: Vec<Said<D>>,
-    /// What the moves make greater: a bucket that is covered in part has far less say than one that is not.
+    /// Contribution of each bucket.
+    said: Vec<BucketTerm<D>>,
+    /// The objective, weighted correlation: a partly covered bucket has far less weight than an uncovered one.
     likeness: f64,
     /// Squared correlations of the buckets, added up.
     alike: f64,
@@ -122,7 +122,7 @@ impl<const D: usize> Equations<D>
 where
     Const<D>: DimMin<Const<D>, Output = Const<D>>,
 {
-    /// How alike the picture is at `map`, and how to move on from there, if it is more alike than `least`.
+    /// The similarity at `map`, and the normal equations there if it exceeds `least`.
     #[inline(always)]
     fn new(
         goal: &Goal<D>,
@@ -140,7 +140,7 @@ where
             alike: 0.0,
         };
         see(map, seen);
-        let mut looked = Vec::with_capacity(goal.buckets.len());
+        let mut weighted = Vec::with_capacity(goal.buckets.len());
         for (i, bucket) in goal.buckets.iter().enumerate() {
             let part = bucket.cells.start..bucket.cells.end;
             let (seen, real) = (&seen[part.clone()], &lattice.real[part.clone()]);
@@ -155,29 +155,29 @@ where
                 let weight = correlation * correlation * correlation;
                 sum.likeness += weight * correlation;
                 sum.alike += correlation * correlation;
-                looked.push((i, norm, weight));
+                weighted.push((i, norm, weight));
             }
         }
         if sum.likeness <= least {
             return sum;
         }
-        for (i, norm, weight) in looked {
+        for (i, norm, weight) in weighted {
             let bucket = &goal.buckets[i];
             let part = bucket.cells.start..bucket.cells.end;
             sum.normal += bucket.normal * weight;
             let mut gradient = SVector::zeros();
             for d in 0..D {
-                // Slopes have mean 0: what is subtracted from the grey levels does not matter.
+                // Slopes have mean 0: the mean of the grey levels cancels.
                 let level = f64::from(dot(&goal.slopes[d][part.clone()], &seen[part.clone()]) / norm);
                 gradient[d] = weight * (bucket.level[d] - level);
             }
             sum.right += gradient;
-            sum.said.push(Said { bucket: i, weight, gradient });
+            sum.said.push(BucketTerm { bucket: i, weight, gradient });
         }
         sum
     }
 
-    /// Solves the normal equations. Damping keeps still what nothing ties down.
+    /// Solves the normal equations. Damping keeps undetermined parameters at zero.
     fn step(&self, damping: f64) -> Option<SVector<f64, D>> {
         let mut normal = self.normal;
         let damping = damping * normal.trace() / D as f64;

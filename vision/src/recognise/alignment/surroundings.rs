@@ -1,5 +1,5 @@
-//! The surroundings of a quad, rectified, in which its corners may move: once in thirds of the icon's resolution for
-//! the coarse look, once in full for the fine ones, each only when it is asked for.
+//! The surroundings of a quad, rectified, in which its corners may move: at a third of the icon's resolution for
+//! the coarse level, at full resolution for the fine ones, each computed on first use.
 
 use crate::{
     frame::GrayImage,
@@ -13,7 +13,7 @@ use crate::{
 use nalgebra::{Matrix3, Point2};
 use std::cell::OnceCell;
 
-/// Icon pixels along the side of a pixel of the coarse look.
+/// Icon pixels along the side of a pixel of the coarse level.
 const COARSE: usize = 3;
 
 /// Side of the coarse picture of an icon.
@@ -21,7 +21,7 @@ pub(crate) fn coarse_size(size: usize) -> usize {
     size / COARSE
 }
 
-/// The icon in thirds of its resolution, smoothed for the coarse look.
+/// The icon at a third of its resolution, smoothed for the coarse level.
 pub fn coarse(icon: &Icon, p: &AlignParams) -> Vec<f32> {
     let size = coarse_size(icon.size);
     blurred(&thirds(icon), size, coarse_sigma(icon.size, p))
@@ -43,12 +43,12 @@ fn thirds(icon: &Icon) -> Vec<f32> {
     (0..size * size).map(mean).collect()
 }
 
-/// Where the pixels around an icon come from.
+/// Source of the pixels around an icon.
 #[derive(Debug)]
 enum Around<'a> {
     /// The image that the icon was cut from.
     Image(&'a GrayImage),
-    /// The image is gone: the icon's border pixels are repeated.
+    /// No image: the icon's border pixels are repeated.
     Nothing,
 }
 
@@ -62,7 +62,7 @@ pub struct Surroundings<'a> {
     margins: [usize; 2],
     coarse: OnceCell<Vec<f32>>,
     full: OnceCell<Vec<f32>>,
-    /// The second look's picture.
+    /// The picture of the second level.
     smooth: OnceCell<Vec<f32>>,
 }
 
@@ -77,7 +77,7 @@ impl<'a> Surroundings<'a> {
         wide.iter().all(|c| all.image_from_icon.denominator(c) > 0.0).then_some(all)
     }
 
-    /// An icon alone, its border pixels repeated around it: for icons whose image is gone.
+    /// An icon alone, its border pixels repeated around it: for icons without their image.
     pub fn of_icon(icon: &'a Icon, p: &AlignParams) -> Option<Self> {
         Self::with(Homography::from_matrix(Matrix3::identity())?, icon, Around::Nothing, p)
     }
@@ -101,7 +101,7 @@ impl<'a> Surroundings<'a> {
         })
     }
 
-    /// The picture of the coarse look.
+    /// The picture of the coarse level.
     pub(crate) fn coarse(&self, p: &AlignParams) -> PaddedIcon<'_> {
         let size = coarse_size(self.icon.size);
         let (margin, width) = (self.margins[0], size + 2 * self.margins[0]);
@@ -116,7 +116,7 @@ impl<'a> Surroundings<'a> {
         PaddedIcon { pixels, width, margin }
     }
 
-    /// The picture as it is.
+    /// The picture, not smoothed.
     pub(crate) fn full(&self) -> PaddedIcon<'_> {
         let (size, margin) = (self.icon.size, self.margins[1]);
         let map = Some(&self.image_from_icon);

@@ -1,11 +1,10 @@
-//! The decision by points: landmarks that points speak for in, the verdict out, or `None` where points say nothing
-//! and the icons are asked. Corners are those of the homography, sharpened by alignment the picture on the learnt
+//! The decision by points: landmarks with point evidence in, the verdict out, or `None` where no landmark has
+//! enough evidence and the icons decide. Corners are those of the homography, refined by alignment with the learnt
 //! icon.
 //!
-//! False alarms are counted against things that have nothing in common with the landmark. Against its look-alikes two
-//! more conditions stand: no other landmark whose points are there may go uncontradicted, and where something of the
-//! map is so like the landmark that its icon would be taken for it, the likeness must be within the threshold that
-//! this left.
+//! The number of false alarms is computed for unrelated pictures. Against look-alikes two more conditions hold:
+//! every other landmark with point evidence must be contradicted, and where a landmark of the map lowered the
+//! likeness threshold, the likeness must pass that threshold.
 
 use crate::{
     detect::quad::Quad,
@@ -27,11 +26,11 @@ use crate::{
     seen_border::is_same_border,
 };
 
-/// log10 of the false alarms that a comparison of a quad with a whole map may have, expected.
+/// log10 of the largest expected number of false alarms in the comparison of a quad with a map.
 pub const LOG10_EPSILON: f64 = -5.0;
 /// log10 of the comparisons of a quad with one landmark: four turns.
 const LOG10_TURNS: f64 = 0.6;
-/// A landmark with so many connected parts of 25 that show something else is in doubt.
+/// A landmark with this many connected mismatched parts of 25 is doubtful.
 pub const DOUBTFUL_PARTS: usize = 5;
 
 /// log10 of the expected false alarms of `evidence` in a map of `landmarks`.
@@ -39,7 +38,7 @@ pub fn log10_false_alarms(evidence: &PointEvidence, landmarks: usize) -> f64 {
     evidence.log10_nfa + LOG10_TURNS + (landmarks.max(1) as f64).log10()
 }
 
-/// What points say of `quad`. `None` if they speak for no landmark.
+/// The verdict on `quad` by points. `None` without point evidence for any landmark.
 pub(crate) fn by_points(
     image: &GrayImage,
     quad: &Quad,
@@ -60,7 +59,7 @@ pub(crate) fn by_points(
     let (border, corners_px) = nearest_border(quad, &evidence);
     let is_detected = is_same_border(&corners_px, &evidence.corners_px, p);
     let alignment = align_to_icon(image, &mut evidence, Some(&corners_px), (model, models), p);
-    // The homography's corners stand unless the detector found the same.
+    // The homography's corners are used unless the detector found the same border.
     let is_located = is_detected || is_well_known(&evidence);
     let others = found.iter().skip(1).chain(&rivals);
     let refusal =
@@ -96,18 +95,18 @@ pub(crate) fn by_points(
     })
 }
 
-/// A landmark of which a corner is known worse than this share of its size is not told, standard deviations: what is
-/// seen of it does not say where the rest is.
+/// Largest standard deviation of a corner as a share of the landmark's size: beyond it the visible part does not
+/// determine the corners, and the landmark is not identified.
 const MAX_CORNER_SIGMA_SHARE: f64 = 0.1;
 
-/// Whether the points tell where the landmark's corners are.
+/// Whether the points determine the landmark's corners.
 pub(crate) fn is_well_known(evidence: &PointEvidence) -> bool {
     let limit_px2 = MAX_CORNER_SIGMA_SHARE.powi(2) * evidence.corners_px.area_px2();
     evidence.corner_covariance_px2.iter().all(|c| c.symmetric_eigenvalues().max() <= limit_px2)
 }
 
-/// Why `best`, which is `model` and was aligned with its icon, is not named among `landmarks` although its points are
-/// there, while points speak for `others`, too.
+/// The refusal of `best` (landmark `model`, aligned with its icon) among `landmarks`, given the point evidence for
+/// `others`.
 fn refusal<'a>(
     best: &LandmarkPoints,
     mut others: impl Iterator<Item = &'a LandmarkPoints>,
@@ -118,8 +117,8 @@ fn refusal<'a>(
     if is_doubtful(&best.evidence, alignment) {
         return Some(MatchRefusal::Disagreement);
     }
-    // Its share of the best one's exponent says how much was taught of a rival, not whether it hangs there: a look-alike
-    // that was taught with fewer points agrees wherever it has any.
+    // The ratio of the exponents depends on the number of taught points, not on presence: a look-alike taught with
+    // fewer points agrees wherever it has any.
     let alarms = |f: &LandmarkPoints| log10_false_alarms(&f.evidence, landmarks);
     let is_rival = |f: &LandmarkPoints| {
         let accepted = alarms(f) <= LOG10_EPSILON;
@@ -128,30 +127,30 @@ fn refusal<'a>(
     if others.any(is_rival) {
         return Some(MatchRefusal::Margin);
     }
-    // Where the image does not show all of it there is no likeness.
-    let is_like = alignment.likeness.is_none_or(|l| 1.0 - l < model.likeness.tau);
-    (has_double(model, p) && !is_like).then_some(MatchRefusal::Similarity)
+    // No likeness where part of the landmark is outside the image.
+    let is_within_threshold = alignment.likeness.is_none_or(|l| 1.0 - l < model.likeness.tau);
+    (has_look_alike(model, p) && !is_within_threshold).then_some(MatchRefusal::Similarity)
 }
 
-/// Something of the map is nearer to it than what is accepted where nothing is like it: to be told from that by points
-/// alone is not certain.
-fn has_double(model: &LandmarkModel, p: &Params) -> bool {
+/// Whether a look-alike in the map lowered tau of the likeness below its cap: points alone may not separate the
+/// two.
+fn has_look_alike(model: &LandmarkModel, p: &Params) -> bool {
     model.likeness.tau < p.learn.threshold.nearest_share * p.learn.likeness_cap
 }
 
-/// Whether a connected part of the landmark shows something else: by its icon where it was aligned with that, as the
-/// icon covers every part; else by its points.
+/// Whether a connected part of the landmark mismatches: by its icon where aligned, as the icon covers every part;
+/// otherwise by its points.
 pub(crate) fn is_doubtful(evidence: &PointEvidence, alignment: &IconAlignment) -> bool {
     alignment.has_mismatch.unwrap_or_else(|| evidence.agreement.largest_disagreement() >= DOUBTFUL_PARTS)
 }
 
-/// A connected part of it shows something else by its points.
+/// Whether a connected part of it mismatches by its points.
 fn is_contradicted(found: &LandmarkPoints) -> bool {
     is_doubtful(&found.evidence, &IconAlignment::NONE)
 }
 
-/// Which border of `quad` lies nearest to where the landmark's is: 0 for its corners, i for alternate i - 1; and its
-/// corners, the landmark's top-left first.
+/// The border of `quad` nearest to the landmark's: 0 for its corners, i for alternate i - 1; and its corners, the
+/// landmark's top-left first.
 fn nearest_border(quad: &Quad, evidence: &PointEvidence) -> (usize, Corners) {
     let turned =
         std::iter::once(&quad.corners_px).chain(&quad.alternates).map(|c| c.rotated(evidence.turned));
@@ -160,8 +159,8 @@ fn nearest_border(quad: &Quad, evidence: &PointEvidence) -> (usize, Corners) {
     nearest.unwrap_or((0, quad.corners_px.rotated(evidence.turned)))
 }
 
-/// Chance that the identity is right: false alarms are as rare as they are computed to be only if the model of chance
-/// holds, so that the exponent is discounted.
+/// Probability that the identity is right. The exponent is discounted, because the computed false-alarm rate holds
+/// only under the chance model.
 fn confidence(log10_false_alarms: f64) -> f64 {
     const DISCOUNT: f64 = 0.35;
     1.0 - 10.0_f64.powf(DISCOUNT * log10_false_alarms.min(0.0))

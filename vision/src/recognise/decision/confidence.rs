@@ -1,5 +1,5 @@
-//! Accepted landmarks in, the paper's probabilities and entropies out (method 10), and the chance that an identity is
-//! right, learnt from data. Which landmarks are accepted is the verdict's business.
+//! Accepted landmarks in, the paper's probabilities and entropies out (method 10), and the calibrated confidence of
+//! an identity. `verdict` decides which landmarks are accepted.
 
 use crate::recognise::{
     decision::{
@@ -25,9 +25,9 @@ pub fn probability(is_accepted: bool, accepted: usize) -> f64 {
     if is_accepted { 1.0 / accepted.max(1) as f64 } else { 0.0 }
 }
 
-/// Chance that the identity of candidate `best` is right: a logistic curve over [`measures`], fitted to answers whose
-/// truth is known (`waymark-lab train confidence`), by the distance that decides. It never rises with any measure.
-/// How well it keeps its word is in docs/EVALUATION.md. 0 without such a candidate.
+/// Probability that the identity of candidate `best` is right: a logistic model over [`measures`], fitted to
+/// labelled answers (`waymark-lab train confidence`), one per deciding distance. It never rises with any measure.
+/// Calibration: docs/EVALUATION.md. 0 without such a candidate.
 pub fn confidence(candidates: &[MatchCandidate], best: usize, landmarks: usize, kind: DistanceKind) -> f64 {
     let weights = match kind {
         DistanceKind::Both => &confidence_weights::BOTH,
@@ -37,7 +37,7 @@ pub fn confidence(candidates: &[MatchCandidate], best: usize, landmarks: usize, 
     measures(candidates, best, landmarks).map_or(0.0, |m| chance(weights, &m))
 }
 
-/// The logistic curve: the last weight is that of no measure.
+/// The logistic model: the last weight is the intercept.
 pub fn chance(weights: &[f64; MEASURES + 1], measures: &[f64; MEASURES]) -> f64 {
     let odds = weights[MEASURES] + weights.iter().zip(measures).map(|(w, m)| w * m).sum::<f64>();
     1.0 / (1.0 + (-odds).exp())
@@ -49,7 +49,7 @@ mod tests {
     use crate::model::landmark_id::LandmarkId;
 
     #[test]
-    fn golden_table() {
+    fn entropies_equal_the_papers_table() {
         for (n, k, paper, norm) in [
             (4, 2, 0.8614, 0.5693),
             (4, 4, 0.7227, 0.1386),
@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn confidence_never_rises_with_what_speaks_against() {
+    fn confidence_never_rises_with_a_measure() {
         for kind in [DistanceKind::Both, DistanceKind::Correlation, DistanceKind::Hausdorff] {
             let of = |ratio: f64, next: f64, c: f64, h: f64, n: usize| {
                 confidence(&[candidate(ratio, c, h), candidate(next, 1.0, 30.0)], 0, n, kind)

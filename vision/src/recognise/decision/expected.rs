@@ -1,8 +1,8 @@
-//! One landmark, asked for where its corners are expected, whatever was detected there.
+//! Verification of one landmark at its expected corners, without a detected quad.
 //!
 //! In: an image, the landmark's model, its expected corners. Out: [`ExpectedLandmark`]: its corners with covariance
-//! and how much the picture speaks for it, or nothing. Points find it also where the image border cuts it or
-//! something hides a part of it; where they say nothing it is laid on its icon, and must be in view as a whole.
+//! and its evidence, or `None`. Points verify it also where the image border cuts it or a part is hidden; without
+//! point evidence the picture is aligned with its icon, and the landmark must be entirely visible.
 
 use crate::{
     detect::quad::{Quad, QuadKind},
@@ -24,10 +24,10 @@ use crate::{
 };
 use nalgebra::{Matrix2, Point2};
 
-/// log10 of the false alarms that asking for one landmark at one place may have, expected.
+/// log10 of the largest expected number of false alarms for one landmark at one place.
 pub const LOG10_EPSILON_EXPECTED: f64 = -4.0;
-/// Evidence of a landmark that passes every gate of its icon, nats: of the quads of strangers less than one in a
-/// thousand does (`docs/EVALUATION.md`).
+/// Evidence of a landmark that passes every gate of its icon, nats: fewer than one in a thousand quads of
+/// distractors pass (`docs/EVALUATION.md`).
 pub const ACCEPTED_NATS: f64 = 6.9;
 
 /// A landmark found where it was expected.
@@ -37,23 +37,23 @@ pub struct ExpectedLandmark {
     pub corners_px: Corners,
     /// Their covariances, px^2.
     pub covariance_px2: [Matrix2<f64>; 4],
-    /// ln of how much likelier the picture is with the landmark there than without.
+    /// Log likelihood ratio of presence against absence, nats.
     pub picture_nats: f64,
-    /// What points say of it, where they decided.
+    /// Its point evidence, where points decided.
     pub points: Option<PointEvidence>,
 }
 
-/// What points say of an expected landmark.
-enum Said {
-    /// It is there.
+/// Outcome of the points for an expected landmark.
+enum PointOutcome {
+    /// Verified.
     Found(Box<ExpectedLandmark>),
-    /// Its points are there while a part of it shows something else.
+    /// Points agree, but a part mismatches.
     Doubtful,
-    /// Nothing.
+    /// No evidence.
     Silent,
 }
 
-/// Looks for landmark `id` of `models` at `expected_px`. `None`: the picture does not show it there, or it is in doubt.
+/// Verifies landmark `id` of `models` at `expected_px`. `None`: not verified, or doubtful.
 pub fn expected(
     image: &GrayImage,
     expected_px: &Corners,
@@ -63,9 +63,9 @@ pub fn expected(
 ) -> Option<ExpectedLandmark> {
     let is_whole = expected_px.points().iter().all(|c| is_inside(image, c));
     match by_points(image, expected_px, (id, is_whole), models, p) {
-        Said::Found(found) => Some(*found),
-        Said::Doubtful => None,
-        Said::Silent => is_whole.then(|| by_icon(image, expected_px, id, models, p)).flatten(),
+        PointOutcome::Found(found) => Some(*found),
+        PointOutcome::Doubtful => None,
+        PointOutcome::Silent => is_whole.then(|| by_icon(image, expected_px, id, models, p)).flatten(),
     }
 }
 
@@ -75,9 +75,13 @@ fn by_points(
     (id, is_whole): (LandmarkId, bool),
     models: &ModelSet,
     p: &Params,
-) -> Said {
-    let Some(model) = models.get(id).filter(|model| !model.points.is_empty()) else { return Said::Silent };
-    let Some(mut evidence) = verify_at(image, &model.points, expected_px) else { return Said::Silent };
+) -> PointOutcome {
+    let Some(model) = models.get(id).filter(|model| !model.points.is_empty()) else {
+        return PointOutcome::Silent;
+    };
+    let Some(mut evidence) = verify_at(image, &model.points, expected_px) else {
+        return PointOutcome::Silent;
+    };
     let are_there = evidence.log10_nfa <= LOG10_EPSILON_EXPECTED;
     let alignment = if is_whole && are_there {
         align_to_icon(image, &mut evidence, None, (model, models), p)
@@ -85,15 +89,15 @@ fn by_points(
         IconAlignment::NONE
     };
     if is_doubtful(&evidence, &alignment) {
-        return Said::Doubtful;
+        return PointOutcome::Doubtful;
     }
     if !are_there {
-        return Said::Silent;
+        return PointOutcome::Silent;
     }
     if !is_well_known(&evidence) {
-        return Said::Silent;
+        return PointOutcome::Silent;
     }
-    Said::Found(Box::new(ExpectedLandmark {
+    PointOutcome::Found(Box::new(ExpectedLandmark {
         corners_px: evidence.corners_px,
         covariance_px2: evidence.corner_covariance_px2,
         picture_nats: -evidence.log10_nfa * std::f64::consts::LN_10,
@@ -108,7 +112,7 @@ fn by_icon(
     models: &ModelSet,
     p: &Params,
 ) -> Option<ExpectedLandmark> {
-    // Points had their say.
+    // Landmarks with enough points are decided by points alone.
     let mut by_icons = p.clone();
     by_icons.recognise.verdict.points = false;
     let verdict = recognise(image, &as_quad(expected_px), &models.only(id)?, DistanceKind::Both, &by_icons);
@@ -123,7 +127,7 @@ fn is_inside(image: &GrayImage, c: &Point2<f64>) -> bool {
     c.x >= 0.0 && c.y >= 0.0 && c.x <= image.width() as f64 - 1.0 && c.y <= image.height() as f64 - 1.0
 }
 
-/// Expected corners as if they had been detected.
+/// A quad with the expected corners.
 fn as_quad(corners_px: &Corners) -> Quad {
     Quad {
         corners_px: *corners_px,

@@ -8,8 +8,9 @@ use crate::{
 };
 use nalgebra::Matrix2;
 
-/// The landmark's border: as detected, or, where another border of the same thing was taught than the one detected, as
-/// aligned. An alternate border has no covariances of its own: the quad's stand in, both were found by the same edges.
+/// The landmark's border: as detected, or, where another border of the same object was taught than the one
+/// detected, as aligned. An alternate border has no covariances of its own: those of the quad are used, both follow
+/// from similar edges.
 pub fn matched_border(quad: &Quad, verdict: &RecognitionResult, p: &Params) -> Option<SeenBorder> {
     let detected_px = match verdict.border {
         0 => &quad.corners_px,

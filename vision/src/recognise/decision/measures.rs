@@ -1,19 +1,19 @@
-//! Match candidates in, the measures that the confidence of an identity rests on out.
+//! Match candidates in, the features of the confidence model out.
 
 use crate::recognise::decision::result::MatchCandidate;
 
-/// Distances are measured up to here, as no distance is as bad as a large one.
+/// Distances are capped here.
 pub(crate) const FAR: f64 = 2.0;
 
-/// H^r is counted in units of this.
+/// H^r is divided by this.
 const HAUSDORFF_UNIT: f64 = 10.0;
 
-/// Numbers that a confidence rests on.
+/// Number of measures.
 pub const MEASURES: usize = 7;
 
-/// What a verdict knows for and against its candidate `best`, each the worse the larger, all within 0 to 2: D/tau and
-/// its square, the share of it in the next best's and its square, C^r, H^r, and how many landmarks there were to err
-/// with. `None` if there is no such candidate.
+/// Measures of candidate `best`, each the worse the larger, all within 0 to 2: D/tau and its square, the share of
+/// it in the next best's and its square, C^r, H^r, and the number of landmarks. `None` if there is no such
+/// candidate.
 pub fn measures(candidates: &[MatchCandidate], best: usize, landmarks: usize) -> Option<[f64; MEASURES]> {
     let answer = candidates.get(best)?;
     let others = candidates.iter().enumerate().filter(|(i, _)| *i != best);
@@ -21,7 +21,7 @@ pub fn measures(candidates: &[MatchCandidate], best: usize, landmarks: usize) ->
     let alone = candidates.len() < 2;
     let margin = if alone { 0.0 } else { answer.ratio / next };
     let within = |x: f64| if x.is_finite() { x.clamp(0.0, FAR) } else { FAR };
-    // A next best that is infinitely far is no reason for doubt, unless so is the answer.
+    // An infinitely far runner-up is no reason for doubt, unless the best is infinitely far, too.
     let margin = if next.is_finite() || alone { margin } else { 0.0 };
     let (ratio, margin) = (within(answer.ratio), within(margin));
     Some([

@@ -3,7 +3,7 @@
 use crate::{geometry::corners::Corners, model::landmark_id::LandmarkId, points::verify::PointEvidence};
 use serde::{Deserialize, Serialize};
 
-/// Why a candidate was refused although it was looked at.
+/// Why a candidate was refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum MatchRefusal {
@@ -11,21 +11,21 @@ pub enum MatchRefusal {
     Correlation,
     /// H^r is not below tau.
     Hausdorff,
-    /// The gradient similarity after alignment does not reach its threshold.
+    /// Aligned with similarity after alignment does too dissimilar.
     Similarity,
-    /// The mismatch share is too great: it is like the landmark, but too much of it shows something else.
+    /// Similar, but too many parts mismatch.
     Mismatch,
-    /// It is like it, but hardly by more than the frame.
+    /// Similar, but hardly beyond the frame.
     LowContent,
     /// Accepted by its own thresholds, but another landmark is too close behind.
     Margin,
-    /// So many points would agree by chance too often.
+    /// The point evidence has too many expected false alarms.
     Points,
-    /// Its points are there, but a connected part of it shows something else: perhaps not the landmark that was taught.
+    /// Its points agree, but a connected part mismatches: perhaps not the taught landmark.
     Disagreement,
-    /// Its points agree, but do not tell where its corners are.
+    /// Its points agree, but do not determine its corners.
     Corners,
-    /// Its icon alone speaks for it, where points decide: too little to name it without the robot's pose.
+    /// Only its icon agrees, where points decide: not enough to identify it without the robot's pose.
     Plain,
 }
 
@@ -34,15 +34,15 @@ pub enum MatchRefusal {
 pub struct MatchCandidate {
     /// The landmark.
     pub landmark: LandmarkId,
-    /// C^r in [0, 2] (method 6.1): to the nearest exemplar, or, where the likeness refuses already, where the quad was
-    /// found, to the exemplar nearest by its signature.
+    /// C^r in [0, 2] (method 6.1): to the nearest exemplar, or, where the likeness refuses already, at the detected
+    /// corners to the exemplar nearest by its signature.
     pub correlation: f64,
-    /// H^r in icon pixels times descriptor distance (method 6.2); infinite with too few points, and where another gate
-    /// refuses already.
+    /// H^r in icon pixels times descriptor distance (method 6.2); infinite with too few points, and where another
+    /// gate refuses first.
     pub hausdorff: f64,
-    /// How alike the picture and the learnt icon are, one laid on the other, -1 to 1; 0 where a glance told them to
-    /// be different things and nothing was accepted; `None` where the map's distances decide alone, and where points
-    /// name a landmark at the border that was detected.
+    /// Likeness of the picture to the learnt icon after alignment, -1 to 1; 0 where the coarse level rejected it
+    /// and nothing was accepted; `None` where the map's distances decide alone, and where points identify a
+    /// landmark at the detected border.
     pub likeness: Option<f64>,
     /// The deciding distance of the map's [`DistanceKind`](crate::recognise::distance_kind::DistanceKind).
     pub distance: f64,
@@ -63,11 +63,11 @@ pub enum Verdict {
     Unknown,
     /// Exactly this landmark: fit for a pose.
     Unique(LandmarkId),
-    /// Several fit; this one is nearest. Never enough for a pose by itself.
+    /// Several match; this one is nearest. Never used for a pose by itself.
     Ambiguous(LandmarkId),
 }
 
-/// What recognition says of one icon.
+/// The result of recognising one quad.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecognitionResult {
     /// The answer.
@@ -78,18 +78,18 @@ pub struct RecognitionResult {
     pub entropy_m: f64,
     /// 1 - ln K / ln(N+1), in (0, 1].
     pub entropy_norm: f64,
-    /// Chance that the identity is right, 0 to 1, learnt from data (`confidence.rs`); 0 unless `Unique`.
+    /// Probability that the identity is right, 0 to 1 (`confidence.rs`); 0 unless `Unique`.
     pub confidence: f64,
     /// Which of the four corner rotations matched: corner `rotation` of the quad is the landmark's top-left.
     pub rotation: usize,
     /// Which border matched: 0 for the quad's corners, i for alternate i - 1.
     pub border: usize,
-    /// The landmark's corners after its picture was laid on the learnt one, its top-left first; `None` when it was
-    /// accepted where it stood. They differ from the quad's where another border of the same thing was taught.
+    /// The landmark's corners after alignment, its top-left first; `None` when it was accepted at the detected
+    /// corners. They differ from the quad's where another border of the same object was taught.
     pub aligned_px: Option<Corners>,
     /// Landmarks compared (N).
     pub landmarks: usize,
-    /// What points say of the first candidate, where they decided.
+    /// Point evidence for the first candidate, where points decided.
     pub points: Option<Box<PointEvidence>>,
 }
 

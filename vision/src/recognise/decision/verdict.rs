@@ -24,7 +24,7 @@ use crate::{
     },
 };
 
-/// Recognises what `quad` encloses. Models learnt under other parameters than `p` never match.
+/// Recognises the landmark in `quad`. Models learnt under other parameters than `p` never match.
 pub fn recognise(
     image: &GrayImage,
     quad: &Quad,
@@ -35,7 +35,7 @@ pub fn recognise(
     recognise_watched(image, quad, models, kind, p, &mut NoListener)
 }
 
-/// The same, and `watch` is told of every step.
+/// The same, reporting every step to `watch`.
 pub fn recognise_watched(
     image: &GrayImage,
     quad: &Quad,

@@ -1,5 +1,5 @@
 //! Two icons in, bucketed correlation C^r out (method 6.1). Buckets are normalised once for each icon, so that a
-//! comparison is 25 dot products.
+//! comparison is 25 dot products at the default parameters.
 
 use crate::{icon::Icon, recognise::features::separable::LANES};
 use serde::{Deserialize, Serialize};
@@ -125,7 +125,7 @@ pub(crate) fn ranked(correlations: &mut [f32], rank: usize) -> f64 {
 }
 
 /// C^r when it is at most `limit`, else `None`; `None` also for icons cut differently. Counts buckets instead of
-/// ranking them, and gives up as soon as the rest cannot reach the rank: unrelated icons cost half the dot products.
+/// ranking them, and stops as soon as the rest cannot reach the rank: unrelated icons cost half the dot products.
 pub(crate) fn correlation_within(a: &Buckets, b: &Buckets, rank: usize, limit: f64) -> Option<f64> {
     if a.per_side != b.per_side || a.stride != b.stride {
         return None;
@@ -145,8 +145,8 @@ pub(crate) fn correlation_within(a: &Buckets, b: &Buckets, rank: usize, limit: f
     Some(ranked(&mut all[..total], rank)).filter(|d| *d <= limit)
 }
 
-/// C^r of two icons by their buckets, in [0, 2]: 0 for the same picture under any gain and offset. Icons cut
-/// differently are as different as can be: 2.
+/// C^r of two icons by their buckets, in [0, 2]: 0 for the same picture under any gain and offset. Icons of
+/// different sizes or bucket numbers have the largest distance: 2.
 pub fn correlation(a: &Buckets, b: &Buckets, p: &CorrelationParams) -> f64 {
     bucket_correlations(a, b).map_or(2.0, |mut all| ranked(&mut all, p.rank()))
 }
@@ -166,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn invariant_to_gain_and_offset_and_opposite_to_the_negative() {
+    fn invariant_to_gain_and_offset_and_largest_for_the_negative() {
         let p = CorrelationParams::default();
         let plain = made(75, texture);
         assert!(correlation(&plain, &plain, &p) < 1e-6);
@@ -177,20 +177,20 @@ mod tests {
 
     #[test]
     fn rank_counts_buckets() {
-        // n buckets alike, the others negated: C^r is 0 while rank <= n and 2 beyond.
+        // n equal buckets, the others negated: C^r is 0 while rank <= n and 2 beyond.
         let plain = made(75, texture);
-        for alike in [1, 11, 12, 13, 24] {
+        for equal in [1, 11, 12, 13, 24] {
             let mixed =
                 made(
                     75,
                     |x, y| {
-                        if (y / 15) * 5 + x / 15 < alike { texture(x, y) } else { 150.0 - texture(x, y) }
+                        if (y / 15) * 5 + x / 15 < equal { texture(x, y) } else { 150.0 - texture(x, y) }
                     },
                 );
             for rank in [1, 11, 12, 13, 25] {
                 let p = CorrelationParams { rank, ..CorrelationParams::default() };
-                let expected = if rank <= alike { 0.0 } else { 2.0 };
-                assert!((correlation(&plain, &mixed, &p) - expected).abs() < 1e-5, "{alike} {rank}");
+                let expected = if rank <= equal { 0.0 } else { 2.0 };
+                assert!((correlation(&plain, &mixed, &p) - expected).abs() < 1e-5, "{equal} {rank}");
             }
         }
     }
@@ -230,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn icons_of_other_sizes_are_worst() {
+    fn icons_of_other_sizes_have_the_largest_distance() {
         assert!(
             (correlation(&made(75, texture), &made(50, texture), &CorrelationParams::default()) - 2.0).abs()
                 < 1e-9

@@ -1,5 +1,5 @@
 //! Harris points in, described points out (method 5): seven steered derivatives divided by the gradient, invariant to
-//! rotation and to I -> a I + b, whitened by the covariance that one point shows from view to view.
+//! rotation and to I -> a I + b, whitened by its covariance between views of one point.
 
 use crate::{icon::Icon, recognise::features::harris::HarrisPoint};
 use serde::{Deserialize, Serialize};
@@ -43,7 +43,7 @@ pub struct PointSet {
     responses: Vec<f32>,
 }
 
-/// Why a point set from outside is refused.
+/// Why a point set from external data is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("point set field {field} is malformed")]
 pub struct PointSetError {

@@ -1,4 +1,4 @@
-//! Icon in, sub-pixel Harris points out (method 5). Describing them is the next file's work.
+//! Icon in, sub-pixel Harris points out (method 5).
 
 use crate::{icon::Icon, recognise::features::separable::filtered};
 use serde::{Deserialize, Serialize};
@@ -30,8 +30,8 @@ pub struct HarrisParams {
     pub max_points: usize,
     /// The strongest this many of each of 5 x 5 parts of the icon are kept.
     ///
-    /// Departs from method 5, which keeps the strongest above 1e-3 of the peak wherever they are: a label, a lamp or a
-    /// passer-by with strong contrast then takes most points and hides the landmark's own.
+    /// Departs from method 5, which keeps the strongest above 1e-3 of the peak wherever they are: a label, a lamp
+    /// or a passer-by with strong contrast would then take most of the points.
     pub max_points_per_part: usize,
 }
 

@@ -1,5 +1,5 @@
-//! Two point sets in, partial Hausdorff distance H^r out (method 6.2): how far the k best matched points are from
-//! their likeness, place and texture multiplied.
+//! Two point sets in, partial Hausdorff distance H^r out (method 6.2): the k-th smallest distance of a point to its
+//! nearest match, position distance times descriptor distance.
 
 use crate::recognise::features::descriptor::PointSet;
 use serde::{Deserialize, Serialize};
@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct HausdorffParams {
-    /// Share r of the smaller set that must have a likeness in the other.
+    /// Share r of the smaller set that must have a match in the other.
     pub inlier_fraction: f64,
     /// With fewer points in either set the distance is infinite: a tiny k makes false matches.
     pub min_points: usize,
@@ -74,7 +74,7 @@ mod tests {
     }
 
     #[test]
-    fn golden_toy() {
+    fn golden_example() {
         let a = set(&[[0.0, 0.0], [10.0, 0.0], [0.0, 10.0], [10.0, 10.0]], 0.0);
         let b = set(&[[1.0, 0.0], [10.0, 2.0], [0.0, 13.0], [40.0, 40.0], [11.0, 10.0]], 1.0);
         for (inlier_fraction, expected) in [(0.25, 1.0), (0.5, 1.0), (0.75, 2.0), (1.0, 3.0)] {

@@ -1,4 +1,4 @@
-//! Icon in, everything that both distances need out (method 5, 6).
+//! Icon in, the features of both distances out (method 5, 6).
 
 use crate::{
     icon::Icon,
@@ -14,8 +14,8 @@ use crate::{
     },
 };
 
-/// An icon with everything that both distances need, worked out once. Depends on icon, points, descriptor and bucket
-/// parameters only; never stored, since it follows from the icon.
+/// An icon with the features of both distances, computed once. Depends on icon, points, descriptor and bucket
+/// parameters only; not stored, since it follows from the icon.
 #[derive(Debug, Clone, PartialEq)]
 pub struct IconFeatures {
     /// The icon.
@@ -24,9 +24,9 @@ pub struct IconFeatures {
     pub buckets: Buckets,
     /// Described points for H^r.
     pub points: PointSet,
-    /// For the short list.
+    /// Signature for the short list.
     pub signature: Signature,
-    /// For the coarse look of alignment.
+    /// Coarse level for alignment.
     pub coarse: Vec<f32>,
 }
 
@@ -42,7 +42,7 @@ impl IconFeatures {
     }
 }
 
-/// Works out buckets, points and descriptors of `icon`.
+/// Computes buckets, points and descriptors of `icon`.
 pub fn features(icon: Icon, p: &RecogniseParams) -> IconFeatures {
     let points = descriptor::describe(&icon, &harris::harris(&icon, &p.harris), &p.descriptor);
     IconFeatures {

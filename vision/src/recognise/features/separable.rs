@@ -1,5 +1,5 @@
 //! A square picture and two kernels in, the picture correlated with one along its rows and with the other along its
-//! columns out; the border is replicated. Which kernels is the caller's choice.
+//! columns out; the border is replicated.
 
 use fearless_simd::{Level, dispatch};
 
@@ -11,12 +11,12 @@ pub(crate) fn filtered(pixels: &[f32], size: usize, across: &[f32], down: &[f32]
     dispatch!(Level::new(), _s => columns(&rows(pixels, size, across), size, down))
 }
 
-/// Rows are as long as whole vectors from here on: what is beyond `size` means nothing.
+/// Row length padded to whole vectors; values beyond `size` are unused.
 fn stride(size: usize) -> usize {
     size.next_multiple_of(LANES)
 }
 
-/// Vectors that are summed abreast: sums of one wait for each other.
+/// Vectors summed at a time, to hide the latency of dependent sums.
 const ABREAST: usize = 4;
 
 /// Correlates every row with `kernel`; rows of [`stride`].
@@ -57,7 +57,8 @@ fn columns(image: &[f32], size: usize, kernel: &[f32]) -> Vec<f32> {
     out
 }
 
-/// Fills a line of whole vectors with the sums of the parts of `source` that begin at `offsets`, each times its weight.
+/// Fills a line of whole vectors with the sums of the parts of `source` that begin at `offsets`, each times its
+/// weight.
 #[expect(clippy::inline_always, reason = "as above")]
 #[inline(always)]
 fn weighted(source: &[f32], offsets: &[usize], weights: &[f32], line: &mut [f32]) {

@@ -1,6 +1,6 @@
-//! Icon in, signature out: the directions of its grey-level slopes on a coarse grid, in a few hundred bytes. The inner
-//! product of two signatures says which landmarks an icon may be, even where its border was found a little beside the
-//! one learnt. It decides nothing: what it puts on the short list is compared and verified by later stages.
+//! Icon in, signature out: the directions of its grey-level slopes on a coarse grid, in a few hundred bytes. The
+//! inner product of two signatures ranks the landmarks for the short list, also where the detected border is a
+//! little beside the learnt one. Later stages verify the short list.
 //!
 //! Beyond the method (its section 6.3 asks for a global descriptor where there are many landmarks).
 
@@ -10,15 +10,15 @@ use crate::icon::Icon;
 pub const GRID: usize = 15;
 /// Numbers of a signature: two for each cell, padded with zeros for vector units.
 pub const SIGNATURE_BYTES: usize = 464;
-/// Slopes below this share of the grid's own contrast count less and less: their direction is noise.
+/// Slopes below this share of the grid's own contrast are down-weighted: their direction is noise.
 const WEAK_SLOPE: f32 = 0.02;
 /// An icon whose cells vary by less, in grey levels, has no signature.
 const MIN_DEVIATION: f32 = 1.0;
 /// A signature's length in steps of its numbers.
 const LENGTH: f32 = 480.0;
 
-/// The signature of an icon: whole numbers, of Euclidean length 480 as nearly as rounding lets it; all zeros for a flat
-/// icon.
+/// The signature of an icon: whole numbers, of Euclidean length 480 as nearly as rounding lets it; all zeros for a
+/// flat icon.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Signature([i8; SIGNATURE_BYTES]);
 
@@ -46,7 +46,7 @@ impl Signature {
     }
 }
 
-/// How alike two signatures are: the cosine between them, -1 to 1 but for rounding; 0 with a flat icon.
+/// Likeness of two signatures: the cosine between them, -1 to 1 but for rounding; 0 with a flat icon.
 #[expect(
     clippy::inline_always,
     reason = "an instruction set holds only in what is inlined where it was chosen"
@@ -57,7 +57,7 @@ pub fn likeness(a: &[i8; SIGNATURE_BYTES], b: &[i8; SIGNATURE_BYTES]) -> f32 {
     dot as f32 / (LENGTH * LENGTH)
 }
 
-/// Means over the cells, of mean 0 and norm 1 together; all zeros when there is nothing to see.
+/// Means over the cells, of mean 0 and norm 1 together; all zeros for a flat icon.
 fn cells(icon: &Icon) -> [f32; GRID * GRID] {
     let mut cells = [0.0_f32; GRID * GRID];
     if icon.size < GRID {
@@ -72,9 +72,9 @@ fn cells(icon: &Icon) -> [f32; GRID * GRID] {
     }
     let mean = cells.iter().sum::<f32>() / cells.len() as f32;
     let square: f32 = cells.iter().map(|c| (c - mean) * (c - mean)).sum();
-    let seen = square.is_finite() && square / cells.len() as f32 >= MIN_DEVIATION * MIN_DEVIATION;
-    let scale = if seen { 1.0 / square.sqrt() } else { 0.0 };
-    cells.map(|c| if seen { (c - mean) * scale } else { 0.0 })
+    let has_contrast = square.is_finite() && square / cells.len() as f32 >= MIN_DEVIATION * MIN_DEVIATION;
+    let scale = if has_contrast { 1.0 / square.sqrt() } else { 0.0 };
+    cells.map(|c| if has_contrast { (c - mean) * scale } else { 0.0 })
 }
 
 #[cfg(test)]
@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn gain_offset_and_size_change_nothing() {
+    fn signatures_are_invariant_to_gain_offset_and_size() {
         let icon = made(75, waves);
         assert!((between(&icon, &icon) - 1.0).abs() < 0.02);
         assert!(between(&icon, &made(75, |x, y| 0.4 * waves(x, y) + 80.0)) > 0.98);
@@ -105,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn a_border_beside_the_one_learnt_is_still_near() {
+    fn a_shifted_border_has_a_similar_signature() {
         let icon = made(75, waves);
         let inset = made(75, |x, y| waves(0.05 + 0.9 * x, 0.03 + 0.94 * y));
         let other = made(75, |x, y| waves(y, 1.0 - x));
@@ -114,14 +114,14 @@ mod tests {
     }
 
     #[test]
-    fn flat_and_broken_icons_are_like_nothing() {
+    fn flat_and_invalid_icons_have_likeness_zero() {
         for flat in [made(75, |_, _| 99.0), made(10, waves), made(75, |_, _| f64::NAN)] {
             assert_eq!(Signature::new(&flat).values(), &[0; SIGNATURE_BYTES]);
         }
     }
 
     #[test]
-    fn every_number_is_in_its_place() {
+    fn every_component_has_its_cell() {
         // A step from dark to bright in the middle: slopes along x only, in the columns beside it.
         let icon = made(75, |x, _| if x < 7.0 / 15.0 { 20.0 } else { 200.0 });
         for (i, [gx, gy]) in Signature::new(&icon).values().as_chunks::<2>().0.iter().enumerate() {

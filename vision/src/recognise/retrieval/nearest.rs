@@ -1,5 +1,5 @@
-//! Readings of one quad (borders times rotations) and a set of landmarks in, the nearest landmarks out, by the smallest
-//! distance over readings and exemplars (method 7.5). `decision` decides.
+//! Readings of one quad (borders times rotations) and a set of landmarks in, the nearest landmarks out, by the
+//! smallest distance over readings and exemplars (method 7.5). `decision` decides.
 
 use crate::{
     detect::quad::Quad,
@@ -24,10 +24,10 @@ use crate::{
 };
 use std::{cell::OnceCell, sync::Arc};
 
-/// Most borders of one quad that are looked at, the outermost first.
+/// Most borders of one quad, the outermost first.
 pub const MAX_BORDERS: usize = 6;
 
-/// One way to read a quad: which border, which corner is top-left.
+/// One reading of a quad: a border and a choice of the top-left corner.
 #[derive(Debug, Clone)]
 pub(crate) struct QuadReading {
     /// 0 for the quad's corners, i for alternate i - 1.
@@ -36,7 +36,7 @@ pub(crate) struct QuadReading {
     pub(crate) rotation: usize,
     /// The corners in that order.
     pub(crate) corners_px: Corners,
-    /// What they enclose.
+    /// The icon of these corners.
     pub(crate) icon: Icon,
     /// The icon's signature.
     pub(crate) signature: Signature,
@@ -51,19 +51,20 @@ impl QuadReading {
         Self { border, rotation, corners_px, icon, signature, buckets, points }
     }
 
-    /// The icon's buckets. Worked out when first asked for.
+    /// The icon's buckets, computed on first use.
     pub(crate) fn buckets(&self, p: &Params) -> &Buckets {
         self.buckets.get_or_init(|| Buckets::new(&self.icon, &p.recognise.correlation))
     }
 
-    /// The icon's points. Worked out when first asked for: most quads are out of reach by C^r alone.
+    /// The icon's points, computed on first use: most quads are rejected by C^r alone.
     pub(crate) fn points(&self, p: &Params) -> &PointSet {
         let r = &p.recognise;
         self.points.get_or_init(|| describe(&self.icon, &harris(&self.icon, &r.harris), &r.descriptor))
     }
 }
 
-/// Every reading of `quad` whose icon can be cut: all borders, and all four rotations where upright is unsure.
+/// Every reading of `quad` whose icon can be cut: all borders, and all four rotations where the orientation is
+/// ambiguous.
 pub(crate) fn quad_readings(image: &GrayImage, quad: &Quad, p: &Params) -> Vec<QuadReading> {
     let borders = std::iter::once(&quad.corners_px).chain(&quad.alternates).take(MAX_BORDERS);
     let rotations = if quad.upright_ambiguous { 4 } else { 1 };
@@ -88,9 +89,9 @@ pub(crate) struct NearLandmark {
     pub(crate) exemplar: usize,
     pub(crate) correlation: f64,
     pub(crate) hausdorff: f64,
-    /// Likeness after alignment, once it was measured.
+    /// Likeness after alignment, if aligned.
     pub(crate) likeness: Option<f64>,
-    /// How alike the signatures are; 0 where they were not compared.
+    /// Likeness of the signatures; 0 where they were not compared.
     pub(crate) signature: f32,
 }
 
@@ -123,7 +124,7 @@ fn ratio(distance: f64, tau: f64) -> f64 {
 }
 
 /// The `count` landmarks whose signatures are most like one of the readings', best first, each with its best reading;
-/// of equal ones the lower id. Distances are left at their worst.
+/// of equal ones the lower id. Distances are initialised to their largest values.
 pub(crate) fn short_list(readings: &[QuadReading], models: &ModelSet, count: usize) -> Vec<NearLandmark> {
     let mut found: Vec<(usize, Listed)> = Vec::new();
     for (i, reading) in readings.iter().enumerate() {
@@ -149,10 +150,10 @@ pub(crate) fn short_list(readings: &[QuadReading], models: &ModelSet, count: usi
     near
 }
 
-/// C^r of icons that have nothing in common.
+/// Largest C^r.
 const WORST_CORRELATION: f64 = 2.0;
 
-/// C^r where the quad was found, to the exemplar that is nearest by its signature.
+/// C^r at the detected corners, to the exemplar nearest by its signature.
 pub(crate) fn correlation_as_found(near: &NearLandmark, readings: &[QuadReading], p: &Params) -> f64 {
     let (Some(reading), Some(exemplar)) =
         (readings.get(near.reading), near.model.exemplars.get(near.exemplar))
@@ -164,8 +165,9 @@ pub(crate) fn correlation_as_found(near: &NearLandmark, readings: &[QuadReading]
     correlation_within(reading.buckets(p), &buckets, rank, WORST_CORRELATION).unwrap_or(WORST_CORRELATION)
 }
 
-/// The `count` landmarks of least ratio by one of the paper's distances, and every one with a ratio below 1, rising; of
-/// equal ones the lower id. Where C^r decides and nothing comes within `verify_reach`, H^r is left infinite.
+/// The `count` landmarks of least ratio by one of the paper's distances, and every one with a ratio below 1,
+/// rising; of equal ones the lower id. Where C^r decides and nothing comes within `verify_reach`, H^r is left
+/// infinite.
 pub(crate) fn nearest(
     readings: &[QuadReading],
     models: &ModelSet,
@@ -175,9 +177,9 @@ pub(crate) fn nearest(
 ) -> Vec<NearLandmark> {
     let mut found: Vec<NearLandmark> = Vec::new();
     let mut ratios: Vec<f64> = Vec::new();
-    // What is further than the worst of the best `count` so far cannot be among them.
+    // A landmark farther than the worst of the best `count` so far is skipped.
     let mut reach = f64::INFINITY;
-    // The paper's gate of its own distances: points that come back.
+    // The paper's gate for its own distances: stable points.
     let stable = p.learn.gates.min_stable_points;
     for model in models.iter().filter(|m| m.stable_points >= stable) {
         let near = match kind {

@@ -1,39 +1,39 @@
-//! Two icons of the same thing, one laid on the other, in; how well they agree beyond their frames out.
+//! Two aligned icons in, their similarity beyond the frame out.
 //!
-//! A frame is what lies alike along a whole side: moulding, mat, the edge of a panel. Many pictures share one, and so
-//! does every blank board; a likeness that rests on it says nothing of which landmark it is. Here the frame is taken
-//! away, and only what the learnt icon shows besides counts. Beyond the method; thresholds are the verdict's.
+//! A frame is uniform along a whole side: moulding, mat, the edge of a panel. Many pictures and blank boards share
+//! one, so similarity of the frame does not identify a landmark. The frame is subtracted, and only the remaining
+//! content of the learnt icon counts. Beyond the method; the thresholds are in `VerdictParams`.
 
 use crate::recognise::{
     features::correlation::CorrelationParams,
     verification::gradient_similarity::{Bucket, Smoothed, compare},
 };
 
-/// How well two icons agree beyond their frames.
+/// Similarity of two icons beyond the frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Content {
-    /// Mean correlation of the slopes over the buckets, each weighed by the share of the learnt icon's slopes that its
-    /// frame does not explain, where both show something; -1 to 1.
+    /// Mean correlation of the slopes over the buckets, each weighted by the share of the learnt icon's slopes that
+    /// its frame does not explain, where both have texture; -1 to 1.
     pub likeness: f64,
-    /// Sum of those weights, in buckets: what the likeness rests on. At most the number of buckets but the corners.
+    /// Sum of those weights, in buckets. At most the number of buckets without the corners.
     pub shown: f64,
 }
 
 impl Content {
-    /// Nothing beyond a frame.
+    /// No content beyond the frame.
     pub const NONE: Self = Self { likeness: 0.0, shown: 0.0 };
 }
 
-/// A bucket of the learnt icon shows something with slopes of this, in squared grey levels...
+/// A bucket of the learnt icon has texture with slopes of this, in squared grey levels...
 const SHOWS: f32 = 15.0;
 /// ... to which noise and grain may add that much.
 const GRAIN: f32 = 30.0;
-/// A bucket of the picture shows something with slopes of this share of its mean, and this much: what is covered by
-/// something plain has no say.
-const SEEN_SHARE: f32 = 0.08;
-const SEEN: f32 = 10.0;
+/// A bucket of the picture has texture with slopes of this share of its mean, and this much: buckets under an
+/// untextured cover are ignored.
+const TEXTURED_SHARE: f32 = 0.08;
+const TEXTURED: f32 = 10.0;
 
-/// Compares `picture`, laid on `learnt`, with it.
+/// Compares `picture`, aligned with `learnt`, with it.
 pub fn content(picture: &Smoothed, learnt: &Smoothed, p: &CorrelationParams) -> Content {
     let side = p.per_side();
     let (Some(whole), Some(beyond)) =
@@ -44,8 +44,8 @@ pub fn content(picture: &Smoothed, learnt: &Smoothed, p: &CorrelationParams) -> 
     let mean = whole.iter().map(|b| b.power).sum::<f32>() / whole.len() as f32;
     let (mut agreement, mut shown) = (0.0, 0.0);
     for (i, (whole, beyond)) in whole.iter().zip(&beyond).enumerate() {
-        let seen = whole.power > SEEN.max(SEEN_SHARE * mean);
-        if seen && !is_corner(i, side) {
+        let textured = whole.power > TEXTURED.max(TEXTURED_SHARE * mean);
+        if textured && !is_corner(i, side) {
             let weight = weight(whole, beyond);
             agreement += weight * f64::from(beyond.correlation);
             shown += weight;
@@ -54,14 +54,14 @@ pub fn content(picture: &Smoothed, learnt: &Smoothed, p: &CorrelationParams) -> 
     if shown > 0.0 { Content { likeness: agreement / shown, shown } } else { Content::NONE }
 }
 
-/// What `icon` shows beyond its frame, in buckets: [`Content::shown`] of the icon and itself.
+/// Content of `icon` beyond its frame, in buckets: [`Content::shown`] of the icon and itself.
 pub fn shown(icon: &Smoothed, p: &CorrelationParams) -> f64 {
     content(icon, icon, p).shown
 }
 
 /// The share of the learnt icon's slopes in a bucket that its frame does not explain, 0 to 1.
 fn weight(whole: &Bucket, beyond: &Bucket) -> f64 {
-    // Written so that a NaN counts for nothing.
+    // Written so that a NaN gets weight 0.
     if whole.other_power > SHOWS {
         f64::from((beyond.other_power / (whole.other_power + GRAIN)).clamp(0.0, 1.0))
     } else {
@@ -69,13 +69,14 @@ fn weight(whole: &Bucket, beyond: &Bucket) -> f64 {
     }
 }
 
-/// Where two sides of a frame meet, neither side's mean explains it.
+/// Corner buckets, where two sides of the frame meet: neither side's mean explains them.
 fn is_corner(bucket: usize, side: usize) -> bool {
     let end = |i: usize| i == 0 || i + 1 == side;
     end(bucket % side) && end(bucket / side)
 }
 
-/// The icon less its frame: of every pixel the mean of those nearest to the same side, and equally near, is taken.
+/// The icon without its frame: from every pixel the mean of the pixels at the same distance from the same side is
+/// subtracted.
 fn without_frame(icon: &Smoothed) -> Smoothed {
     let size = icon.size();
     let mut sums = vec![[(0.0_f32, 0.0_f32); 4]; size.div_ceil(2)];
@@ -125,12 +126,12 @@ mod tests {
     }
 
     #[test]
-    fn the_same_frame_is_not_the_same_picture() {
+    fn pictures_in_the_same_frame_are_dissimilar() {
         let p = CorrelationParams::default();
         let (one, other) = (framed(waves), framed(|x, y| waves(y - 0.3, x + 5.0)));
         let same = content(&one, &one, &p);
         assert!(same.likeness > 0.98 && (3.0..12.0).contains(&same.shown), "{same:?}");
-        // By all of their slopes they are alike, the frame outweighs what it holds.
+        // By all slopes they are similar: the frame outweighs the content.
         let whole = crate::recognise::verification::gradient_similarity::between(&one, &other, &p).likeness;
         assert!(whole > 0.5, "{whole}");
         let beyond = content(&other, &one, &p);
@@ -138,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    fn an_empty_frame_shows_nothing() {
+    fn an_empty_frame_has_no_content() {
         let p = CorrelationParams::default();
         let empty = framed(|_, _| 180.0);
         assert!(shown(&empty, &p) < 0.5, "{}", shown(&empty, &p));
@@ -146,14 +147,14 @@ mod tests {
         let wide = made(|x, y| if x.min(1.0 - x) < 0.08 || y.min(1.0 - y) < 0.15 { 30.0 } else { 200.0 });
         assert!(shown(&wide, &p) < 1.0, "{}", shown(&wide, &p));
         assert!(shown(&made(waves), &p) > 15.0, "{}", shown(&made(waves), &p));
-        // Where the picture is covered by something plain, it has no say; what is left agrees.
+        // Buckets under an untextured cover are ignored; the others agree.
         let covered = made(|x, y| if y > 0.6 { 128.0 } else { waves(x, y) });
         let left = content(&covered, &made(waves), &p);
         assert!(left.likeness > 0.7 && (10.0..16.0).contains(&left.shown), "{left:?}");
     }
 
     #[test]
-    fn light_changes_nothing_and_nonsense_counts_for_nothing() {
+    fn content_is_invariant_to_light_and_zero_for_invalid_icons() {
         let p = CorrelationParams::default();
         let learnt = framed(waves);
         let dimmed = framed(|x, y| 0.5 * waves(x, y) + 20.0);

@@ -1,9 +1,8 @@
-//! Two icons of the same thing, one laid on the other, in; how alike their pictures are out. Slopes are compared,
-//! bucket by bucket: unlike grey levels they do not agree by chance where two pictures are dark below and bright
-//! above, and a bucket without any says nothing for either.
+//! Two aligned icons in, their gradient similarity out. Slopes are compared bucket by bucket: unlike grey levels,
+//! they are not correlated by common shading, and buckets without texture do not count.
 //!
-//! Beyond the method: its distances compare icons where they were found; this one is for icons after alignment
-//! (`aligner.rs`), where it tells landmarks from look-alikes far better (docs/EVALUATION.md).
+//! Beyond the method: its distances compare icons at the detected corners; this one is for icons after alignment
+//! (`aligner.rs`), where it separates landmarks from look-alikes far better (docs/EVALUATION.md).
 
 use crate::{
     icon::Icon,
@@ -13,10 +12,10 @@ use fearless_simd::{Level, dispatch};
 
 /// Variance that noise adds to a difference of two grey levels, squared grey levels.
 const NOISE: f32 = 4.0;
-/// Pixels along the icon's border that are not compared: alignment is least sure of them.
+/// Pixels along the icon's border that are not compared: alignment is least accurate there.
 const BORDER_PX: usize = 3;
 
-/// An icon ready to be compared: smoothed.
+/// A smoothed icon for comparison.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Smoothed {
     size: usize,
@@ -29,7 +28,7 @@ impl Smoothed {
         Self { size: icon.size, pixels: dispatch!(Level::new(), _s => smoothed(icon)) }
     }
 
-    /// Of pixels that are smooth already, `size` by `size` of them.
+    /// Of `size` by `size` pixels that are already smoothed.
     pub(crate) fn of(size: usize, pixels: Vec<f32>) -> Self {
         debug_assert_eq!(pixels.len(), size * size);
         Self { size, pixels }
@@ -40,19 +39,19 @@ impl Smoothed {
         self.size
     }
 
-    /// Row by row.
+    /// Its pixels, row by row.
     pub(crate) fn pixels(&self) -> &[f32] {
         &self.pixels
     }
 }
 
-/// How two icons compare.
+/// Similarity of two icons.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct IconComparison {
     /// Mean over the buckets of the correlation of their slopes, -1 to 1; 0 where both are flat, or cut differently.
     pub likeness: f64,
-    /// Share of the buckets in which both show something, and not the same, 0 to 1. What stands plain before a picture
-    /// shows nothing; another picture in its place does.
+    /// Share of the buckets in which both have texture that differs, 0 to 1. An untextured occluder does not
+    /// contradict; another picture does.
     pub contradicting: f64,
 }
 
@@ -62,12 +61,12 @@ pub(crate) const CONTRADICTS: f32 = 0.3;
 const SHOWS_SHARE: f32 = 0.1;
 const SHOWS_LEAST: f32 = 10.0;
 
-/// Compares two icons of the same thing.
+/// Compares two aligned icons.
 pub fn alike(a: &Icon, b: &Icon, p: &CorrelationParams) -> IconComparison {
     between(&Smoothed::new(a), &Smoothed::new(b), p)
 }
 
-/// How alike two icons are, see [`IconComparison::likeness`].
+/// Gradient similarity, see [`IconComparison::likeness`].
 pub fn likeness(a: &Icon, b: &Icon, p: &CorrelationParams) -> f64 {
     alike(a, b, p).likeness
 }
@@ -86,7 +85,7 @@ pub fn between(a: &Smoothed, b: &Smoothed, p: &CorrelationParams) -> IconCompari
     }
 }
 
-/// Whether slopes of the mean square `power` show something, in an icon where it is `mean`.
+/// Whether slopes of the mean square `power` are texture, in an icon with the mean `mean`.
 pub(crate) fn shows(power: f32, mean: f32) -> bool {
     power > (SHOWS_SHARE * mean).max(SHOWS_LEAST)
 }
@@ -96,7 +95,7 @@ pub(crate) fn shows(power: f32, mean: f32) -> bool {
 pub(crate) struct Bucket {
     /// Correlation of the slopes, -1 to 1.
     pub(crate) correlation: f32,
-    /// Mean square of the slopes of the one and of the other, in squared grey levels, less what noise adds.
+    /// Mean square of the slopes of both, in squared grey levels, less the noise.
     pub(crate) power: f32,
     pub(crate) other_power: f32,
 }
@@ -106,8 +105,7 @@ pub(crate) fn compare(a: &Smoothed, b: &Smoothed, p: &CorrelationParams) -> Opti
     Some(cells(a, b, p.per_side())?.iter().map(Cell::bucket).collect())
 }
 
-/// What a cell of two icons adds up to: products of slopes, squares of the one's and the other's with what noise
-/// adds, and pixels.
+/// Sums over a cell of two icons: products of slopes, squares of each with noise, and pixels.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Cell {
     products: f32,
@@ -205,7 +203,7 @@ mod tests {
     use crate::recognise::fixture::{drawn_icon as made, waves};
 
     #[test]
-    fn same_pictures_are_alike_under_any_light() {
+    fn likeness_is_high_for_equal_pictures_under_any_light() {
         let p = CorrelationParams::default();
         let icon = made(waves);
         assert!(likeness(&icon, &icon, &p) > 0.95);
@@ -219,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn a_covered_part_costs_its_share() {
+    fn a_covered_part_lowers_the_likeness_by_its_share() {
         let p = CorrelationParams::default();
         let (icon, whole) = (made(waves), likeness(&made(waves), &made(waves), &p));
         // A flat label over the two lower rows of buckets.
@@ -229,20 +227,20 @@ mod tests {
     }
 
     #[test]
-    fn another_picture_contradicts_and_a_plain_cover_does_not() {
+    fn another_picture_contradicts_and_an_untextured_cover_does_not() {
         let p = CorrelationParams::default();
         let icon = made(waves);
         let with = |lower: fn(f64, f64) -> f64| {
             let other = made(|x, y| if y > 0.6 { lower(x, y) } else { waves(x, y) });
-            let seen = alike(&icon, &other, &p);
-            assert!(alike(&other, &icon, &p) == seen, "{seen:?}");
-            seen.contradicting
+            let comparison = alike(&icon, &other, &p);
+            assert!(alike(&other, &icon, &p) == comparison, "{comparison:?}");
+            comparison.contradicting
         };
         assert!(with(waves) < 1e-9);
-        // But for its edge.
+        // Except for its edge.
         let plain = with(|_, _| 230.0);
         assert!(plain <= 0.2, "{plain}");
-        // Ten of 25 buckets show something else.
+        // Ten of 25 buckets show another picture.
         let replaced = with(|x, y| waves(y - 0.4, x + 3.0));
         assert!((0.24..=0.4).contains(&replaced), "{replaced}");
         // In half the light, too.
@@ -251,7 +249,7 @@ mod tests {
     }
 
     #[test]
-    fn what_only_shades_alike_is_not_alike() {
+    fn equal_shading_alone_is_not_similar() {
         let p = CorrelationParams::default();
         let shade = |x: f64, y: f64| 60.0 + 90.0 * y + 20.0 * x;
         let one = made(|x, y| shade(x, y) + 0.1 * waves(x, y));
@@ -265,13 +263,13 @@ mod tests {
             };
             crate::recognise::features::correlation::correlation(&f(&one).buckets, &f(&two).buckets, &p)
         };
-        assert!(by_grey < 0.5, "C^r takes them for one: {by_grey}");
+        assert!(by_grey < 0.5, "C^r accepts the pair: {by_grey}");
         assert!(likeness(&one, &two, &p) < 0.55, "{}", likeness(&one, &two, &p));
         assert!(likeness(&one, &one, &p) > 0.7, "{}", likeness(&one, &one, &p));
     }
 
     #[test]
-    fn nothing_to_see_is_like_nothing() {
+    fn icons_without_texture_have_likeness_zero() {
         let p = CorrelationParams::default();
         let flat = made(|_, _| 80.0);
         assert!(likeness(&flat, &made(waves), &p).abs() < 1e-9);

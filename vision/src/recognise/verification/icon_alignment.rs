@@ -1,6 +1,6 @@
-//! Template alignment of a landmark that points speak for. In: the image, the evidence with the corners of the
-//! homography, the landmark. Out: the aligned corners in the evidence, the likeness there, and whether a part shows
-//! something else.
+//! Template alignment of a landmark with point evidence. In: the image, the evidence with the corners of the
+//! homography, the landmark. Out: the aligned corners in the evidence, the likeness there, and whether a part
+//! mismatches.
 
 use crate::{
     frame::GrayImage,
@@ -23,22 +23,22 @@ use crate::{
     seen_border::FoundBy,
 };
 
-/// Alignment is believed from this likeness on if it moved no corner of the homography further than...
+/// Alignment is accepted from this likeness on if it moved no corner of the homography further than...
 const MIN_LIKENESS: f64 = 0.4;
 /// ... so many icon pixels, or...
 const MAX_MOVED_ICON_PX: f64 = 4.0;
 /// ... so many squared standard deviations: 99.99 % of a corner in the plane.
 const MAX_SQUARE: f64 = 18.4;
-/// From this likeness on alignment is believed wherever it moved the corners: the covariance of points that lie at
+/// From this likeness on alignment is accepted at any displacement: the covariance of points that lie at
 /// one end of a landmark is too small at its other end.
 const SURE_LIKENESS: f64 = 0.65;
 
-/// How the picture in the image, aligned with a learnt icon, compares with it.
+/// Comparison of the picture with a learnt icon after alignment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct IconAlignment {
-    /// Likeness after alignment, -1 to 1. `None` where the image does not show all of the landmark.
+    /// Likeness after alignment, -1 to 1. `None` where part of the landmark is outside the image.
     pub(crate) likeness: Option<f64>,
-    /// Whether a connected part shows something else. `None` unless the alignment is believed.
+    /// Whether a connected part mismatches. `None` unless the alignment is accepted.
     pub(crate) has_mismatch: Option<bool>,
 }
 
@@ -59,28 +59,28 @@ pub(crate) fn align_to_icon(
 ) -> IconAlignment {
     let mut first = None;
     for start_px in std::iter::once(&evidence.corners_px.clone()).chain(detected_px) {
-        let Some((laid, learnt)) = aligned(image, start_px, (model, models), p) else { continue };
-        let seen = Smoothed::new(&laid.icon);
-        let alike = between(&seen, &learnt, &p.recognise.correlation).likeness;
-        first = first.or(Some(alike));
-        let is_possible = alike >= MIN_LIKENESS && may_be_at(evidence, &laid.corners_px, p);
-        if !is_possible && alike < SURE_LIKENESS {
+        let Some((alignment, learnt)) = aligned(image, start_px, (model, models), p) else { continue };
+        let picture = Smoothed::new(&alignment.icon);
+        let similarity = between(&picture, &learnt, &p.recognise.correlation).likeness;
+        first = first.or(Some(similarity));
+        let is_possible = similarity >= MIN_LIKENESS && may_be_at(evidence, &alignment.corners_px, p);
+        if !is_possible && similarity < SURE_LIKENESS {
             continue;
         }
-        evidence.corners_px = laid.corners_px;
-        evidence.corner_covariance_px2 = laid.covariance_px2;
+        evidence.corners_px = alignment.corners_px;
+        evidence.corner_covariance_px2 = alignment.covariance_px2;
         evidence.found_by = FoundBy::Alignment;
-        let mismatches = MismatchMap::new(&seen, &learnt);
+        let mismatches = MismatchMap::new(&picture, &learnt);
         let has_mismatch = mismatches.as_ref().map(MismatchMap::has_mismatched_part);
         if let Some(mismatches) = mismatches.filter(|_| has_mismatch == Some(true)) {
             evidence.agreement = mismatches.marked(evidence.agreement);
         }
-        return IconAlignment { likeness: Some(alike), has_mismatch };
+        return IconAlignment { likeness: Some(similarity), has_mismatch };
     }
     IconAlignment { likeness: first, has_mismatch: None }
 }
 
-/// Whether the points leave it open that the landmark's corners are `corners_px`.
+/// Whether `corners_px` are consistent with the covariance of the points.
 fn may_be_at(evidence: &PointEvidence, corners_px: &Corners, p: &Params) -> bool {
     let icon_px = evidence.corners_px.area_px2().sqrt() / p.icon.size as f64;
     let pairs = evidence.corners_px.points().iter().zip(corners_px.points());
@@ -101,10 +101,11 @@ fn aligned(
     let align = &p.recognise.verdict.align;
     let icon = rectify(image, start_px, &p.icon).ok()?;
     let signature = Signature::new(&icon);
-    let alike = |i: usize| likeness(model.exemplars[i].signature.values(), signature.values());
-    let nearest = (0..model.exemplars.len()).max_by(|a, b| alike(*a).total_cmp(&alike(*b)))?;
+    let similarity = |i: usize| likeness(model.exemplars[i].signature.values(), signature.values());
+    let nearest = (0..model.exemplars.len()).max_by(|a, b| similarity(*a).total_cmp(&similarity(*b)))?;
     let (learnt, coarse) = model.exemplars[nearest].template(align);
     let around = Surroundings::new(image, start_px, &icon, align)?;
-    let laid = Aligner::new(models.lattices(), align).align(&around, &Template::new(&learnt, &coarse))?;
-    Some((laid, Smoothed::new(&learnt)))
+    let alignment =
+        Aligner::new(models.lattices(), align).align(&around, &Template::new(&learnt, &coarse))?;
+    Some((alignment, Smoothed::new(&learnt)))
 }

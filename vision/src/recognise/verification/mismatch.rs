@@ -1,5 +1,5 @@
-//! Which parts of a landmark show something else. In: the picture in the image, aligned with the learnt icon, and
-//! that icon. Out: a map of mismatches. A plain occluder, which shows nothing itself, is no mismatch.
+//! Mismatched parts of a landmark. In: the picture in the image, aligned with the learnt icon, and
+//! that icon. Out: a map of mismatches. An untextured occluder is not a mismatch.
 
 use crate::{
     points::agreement::{Agreement, Part, TABLE},
@@ -12,17 +12,17 @@ const CELLS: usize = 2 * TABLE;
 const WINDOWS: usize = CELLS - 1;
 /// Side of a block of windows, a quarter of the picture...
 const BLOCK: usize = 4;
-/// ... that shows something else if at least so many of its windows do. Chosen on the set `tune`; what it finds and
-/// costs is in docs/EVALUATION.md, "Recognition with points".
+/// ... that mismatches if at least this many of its windows do. Chosen on the set `tune`; detection and false-alarm
+/// rates are in docs/EVALUATION.md, "Recognition with points".
 const MIN_DIFFERING: usize = 9;
-/// With more cells of the block that show nothing where the icon does, it is occluded: only the edge of the occluder
+/// With more untextured cells where the icon has texture, the block is occluded: only the edge of the occluder
 /// differs.
 const MAX_HIDDEN: usize = 4;
 
-/// Where the icon shows nothing, the picture shows something else with slopes of more than this share of its mean.
+/// Where the icon has no texture, the picture mismatches with slopes of more than this share of its mean.
 const APPEARS_SHARE: f32 = 0.5;
 
-/// Which windows of a picture show something else than the learnt icon, and which cells nothing.
+/// The mismatched windows and the untextured cells of a picture.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct MismatchMap {
     is_mismatch: [[bool; WINDOWS]; WINDOWS],
@@ -30,9 +30,9 @@ pub(crate) struct MismatchMap {
 }
 
 impl MismatchMap {
-    /// Compares `seen`, aligned with `learnt`, with it. `None` where the icons are cut differently.
-    pub(crate) fn new(seen: &Smoothed, learnt: &Smoothed) -> Option<Self> {
-        let cells = cells(seen, learnt, CELLS)?;
+    /// Compares `picture`, aligned with `learnt`, with it. `None` where the icons are cut differently.
+    pub(crate) fn new(picture: &Smoothed, learnt: &Smoothed) -> Option<Self> {
+        let cells = cells(picture, learnt, CELLS)?;
         let of_two = |i: usize| {
             let first = i / WINDOWS * CELLS + i % WINDOWS;
             [1, CELLS, CELLS + 1].iter().fold(cells[first], |sum, next| sum + cells[first + next]).bucket()
@@ -60,15 +60,15 @@ impl MismatchMap {
         blocks.filter(is_visible).map(|at| count(&self.is_mismatch, at, BLOCK)).max().unwrap_or(0)
     }
 
-    /// Whether a connected part shows something else.
+    /// Whether a connected part mismatches.
     pub(crate) fn has_mismatched_part(&self) -> bool {
         self.largest_block() >= MIN_DIFFERING
     }
 
     /// The table of the points with the mismatched parts marked.
-    pub(crate) fn marked(&self, said: Agreement) -> Agreement {
+    pub(crate) fn marked(&self, by_points: Agreement) -> Agreement {
         let differs = |x: usize, y: usize| self.is_mismatch[2 * y][2 * x];
-        let part = |x: usize, y: usize| if differs(x, y) { Part::Disagrees } else { said.0[y][x] };
+        let part = |x: usize, y: usize| if differs(x, y) { Part::Disagrees } else { by_points.0[y][x] };
         Agreement(std::array::from_fn(|y| std::array::from_fn(|x| part(x, y))))
     }
 }
@@ -92,12 +92,12 @@ mod tests {
     }
 
     fn with(part: impl Fn(f64, f64) -> Option<f64>) -> MismatchMap {
-        let seen = made(|x, y| part(x, y).unwrap_or(taught(x, y)));
-        MismatchMap::new(&seen, &made(taught)).unwrap()
+        let picture = made(|x, y| part(x, y).unwrap_or(taught(x, y)));
+        MismatchMap::new(&picture, &made(taught)).unwrap()
     }
 
     #[test]
-    fn a_replaced_quarter_is_found_wherever_it_is_and_named() {
+    fn a_replaced_quarter_is_located() {
         for (left, top) in [(0.0, 0.0), (0.5, 0.0), (0.0, 0.5), (0.5, 0.5), (0.2, 0.3)] {
             let is_in = |x: f64, y: f64| x >= left && x < left + 0.5 && y >= top && y < top + 0.5;
             let mismatches = with(|x, y| is_in(x, y).then(|| other(x, y)));
@@ -118,10 +118,10 @@ mod tests {
 
     /// Half of the icon is a plain margin.
     #[test]
-    fn what_appears_where_the_icon_shows_nothing_is_something_else() {
+    fn texture_on_a_plain_part_of_the_icon_is_a_mismatch() {
         let half = |x: f64, y: f64| if x < 0.5 { taught(x, y) } else { 120.0 };
-        let differs = |seen: &dyn Fn(f64, f64) -> f64| {
-            MismatchMap::new(&made(seen), &made(half)).unwrap().has_mismatched_part()
+        let differs = |picture: &dyn Fn(f64, f64) -> f64| {
+            MismatchMap::new(&made(picture), &made(half)).unwrap().has_mismatched_part()
         };
         assert!(differs(&|x, y| if x > 0.5 && y > 0.5 { other(x, y) } else { half(x, y) }));
         assert!(!differs(&half));
@@ -130,14 +130,14 @@ mod tests {
     }
 
     #[test]
-    fn the_taught_picture_differs_nowhere_in_any_light() {
+    fn the_taught_picture_has_no_mismatch_under_any_light() {
         assert_eq!(with(|_, _| None).largest_block(), 0);
         assert_eq!(with(|x, y| Some(0.4 * taught(x, y) + 60.0 + 30.0 * x)).largest_block(), 0);
     }
 
-    /// What hides a part shows an edge round it, and nothing else.
+    /// The occluder has a visible edge and no texture.
     #[test]
-    fn a_plain_board_before_it_is_not_something_else() {
+    fn an_untextured_occluder_is_not_a_mismatch() {
         for side in [0.3, 0.45, 0.6] {
             let is_hidden = |x: f64, y: f64| (x - 0.5).abs() < 0.5 * side && (y - 0.5).abs() < 0.5 * side;
             assert!(!with(|x, y| is_hidden(x, y).then_some(70.0)).has_mismatched_part(), "{side}");
@@ -145,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_of_other_letters_is_too_little() {
+    fn one_line_of_other_text_is_below_the_limit() {
         let mismatches = with(|x, y| (y > 0.82 && y < 0.95).then(|| other(x, y)));
         assert!(!mismatches.has_mismatched_part() && mismatches.largest_block() > 0, "{mismatches:?}");
     }

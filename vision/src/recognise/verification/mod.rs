@@ -1,4 +1,4 @@
-//! Nearest landmarks in, what template alignment says of each out.
+//! Nearest landmarks in, each verified by template alignment out.
 
 pub mod gradient_similarity;
 pub mod content;

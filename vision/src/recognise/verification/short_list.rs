@@ -1,5 +1,5 @@
-//! Nearest landmarks in, the same after template alignment out: sharper evidence than a distance where the quad was
-//! found. Thresholds are only read; `decision` decides.
+//! Nearest landmarks in, the same after template alignment out: stronger evidence than a distance at the detected
+//! corners. `decision` decides.
 
 use crate::{
     frame::GrayImage,
@@ -32,19 +32,20 @@ use crate::{
 /// A near landmark, with or without alignment.
 pub(crate) struct VerifiedLandmark {
     pub(crate) near: NearLandmark,
-    /// Where alignment moved the corners, if the distances are those after it.
+    /// The aligned corners, if the distances are those after alignment.
     pub(crate) moved: Option<Corners>,
     /// Share of the buckets that contradict after alignment, 0 to 1.
     pub(crate) contradicting: f64,
-    /// How well they agree beyond their frames; nothing unless the likeness is within reach.
+    /// Content beyond the frame; [`Content::NONE`] unless the likeness is within reach.
     pub(crate) content: Content,
 }
 
 impl VerifiedLandmark {
     /// The first gate that refuses it.
-    /// `share` of the likeness's tau is what a map of this size leaves.
+    /// `share` scales tau of the likeness for the size of the map.
     pub(crate) fn refusal(&self, kind: DistanceKind, share: f64, p: &VerdictParams) -> Option<MatchRefusal> {
-        // Alignment favours the template, so its limit is stricter, except for `Both`: its tau was learnt after alignment.
+        // Alignment favours the template, so its limit is stricter, except for `Both`: its tau was learnt after
+        // alignment.
         let limit = if self.moved.is_some() { p.verified_share } else { 1.0 };
         // Written so that a NaN refuses.
         let below = |ratio: f64, limit: f64| ratio < limit;
@@ -70,8 +71,8 @@ impl VerifiedLandmark {
     }
 }
 
-/// Lays the quad's picture on the exemplar of each landmark of the short list, and compares it there; the distances are
-/// those of the picture where it came to lie. What a glance tells to be something else gets no further look.
+/// Aligns the quad's picture with the exemplar of each landmark of the short list; the distances are those after
+/// alignment. Landmarks rejected at the coarse level are not aligned further.
 pub(crate) fn verify_short_list(
     image: &GrayImage,
     readings: &[QuadReading],
@@ -95,15 +96,15 @@ pub(crate) fn verify_short_list(
             .get_or_insert_with(|| Surroundings::new(image, &reading.corners_px, &reading.icon, &v.align));
         let (learnt, coarse) = exemplar.template(&v.align);
         let template = Template::new(&learnt, &coarse);
-        let Some(laid) = around.as_ref().and_then(|s| aligner.align(s, &template)) else { continue };
-        let (seen, learnt) = (Smoothed::new(&laid.icon), Smoothed::new(&learnt));
-        let alike = between(&seen, &learnt, c);
-        (near.likeness, *contradicting) = (Some(alike.likeness), alike.contradicting);
-        *moved = Some(laid.corners_px);
+        let Some(alignment) = around.as_ref().and_then(|s| aligner.align(s, &template)) else { continue };
+        let (picture, learnt) = (Smoothed::new(&alignment.icon), Smoothed::new(&learnt));
+        let similarity = between(&picture, &learnt, c);
+        (near.likeness, *contradicting) = (Some(similarity.likeness), similarity.contradicting);
+        *moved = Some(alignment.corners_px);
         if near.ratio(DistanceKind::Both) < 1.0 {
-            *beyond = content(&seen, &learnt, c);
+            *beyond = content(&picture, &learnt, c);
             watch.finished(RecogniseStep::Alignment);
-            (near.correlation, near.hausdorff) = distances(&laid.icon, &near.model, p);
+            (near.correlation, near.hausdorff) = distances(&alignment.icon, &near.model, p);
             watch.finished(RecogniseStep::Distances);
         }
     }
@@ -112,14 +113,15 @@ pub(crate) fn verify_short_list(
     }
     found.sort_by(|a, b| a.near.ratio(DistanceKind::Both).total_cmp(&b.near.ratio(DistanceKind::Both)));
     watch.finished(RecogniseStep::Alignment);
-    for judged in found.iter_mut().take(MAX_CANDIDATES).filter(|j| j.near.ratio(DistanceKind::Both) >= 1.0) {
-        judged.near.correlation = correlation_as_found(&judged.near, readings, p);
+    for candidate in found.iter_mut().take(MAX_CANDIDATES).filter(|j| j.near.ratio(DistanceKind::Both) >= 1.0)
+    {
+        candidate.near.correlation = correlation_as_found(&candidate.near, readings, p);
     }
     watch.finished(RecogniseStep::Distances);
 }
 
-/// Gives those that were not laid on anything the likeness of the picture where it was found: an accepted landmark's
-/// margin is over them, too.
+/// Sets the likeness at the detected corners for landmarks that were not aligned: the margin of an accepted
+/// landmark includes them.
 fn compare_as_found(readings: &[QuadReading], found: &mut [VerifiedLandmark], c: &CorrelationParams) {
     let mut smoothed: Vec<Option<Smoothed>> = vec![None; readings.len()];
     for VerifiedLandmark { near, .. } in found.iter_mut().filter(|j| j.moved.is_none()) {
@@ -129,7 +131,7 @@ fn compare_as_found(readings: &[QuadReading], found: &mut [VerifiedLandmark], c:
     }
 }
 
-/// Lays the quad's picture on each candidate within reach, nearest first, and keeps what the better fit says.
+/// Aligns the quad's picture with each candidate within reach, nearest first, and keeps the better of both results.
 pub(crate) fn verify(
     image: &GrayImage,
     readings: &[QuadReading],
@@ -140,24 +142,26 @@ pub(crate) fn verify(
 ) {
     let v = &p.recognise.verdict;
     let aligner = Aligner::new(on, &v.align);
-    for judged in found.iter_mut().filter(|j| j.near.ratio(kind) < v.verify_reach).take(v.max_verified) {
-        let reading = &readings[judged.near.reading];
-        let Some((icon, corners_px)) = laid_on(image, reading, &judged.near, &aligner, p) else { continue };
-        let (correlation, hausdorff) = distances(&icon, &judged.near.model, p);
-        let near = NearLandmark { correlation, hausdorff, ..judged.near.clone() };
+    for candidate in found.iter_mut().filter(|j| j.near.ratio(kind) < v.verify_reach).take(v.max_verified) {
+        let reading = &readings[candidate.near.reading];
+        let Some((icon, corners_px)) = aligned_with(image, reading, &candidate.near, &aligner, p) else {
+            continue;
+        };
+        let (correlation, hausdorff) = distances(&icon, &candidate.near.model, p);
+        let near = NearLandmark { correlation, hausdorff, ..candidate.near.clone() };
         let moved =
             VerifiedLandmark { near, moved: Some(corners_px), contradicting: 0.0, content: Content::NONE };
-        // What was accepted where it stood is not lost by a move that fits worse.
-        let lost = judged.refusal(kind, 1.0, v).is_none() && moved.refusal(kind, 1.0, v).is_some();
-        if moved.near.ratio(kind) < judged.near.ratio(kind) && !lost {
-            *judged = moved;
+        // A landmark accepted at the detected corners is not lost by a worse alignment.
+        let lost = candidate.refusal(kind, 1.0, v).is_none() && moved.refusal(kind, 1.0, v).is_some();
+        if moved.near.ratio(kind) < candidate.near.ratio(kind) && !lost {
+            *candidate = moved;
         }
     }
     found.sort_by(|a, b| a.near.ratio(kind).total_cmp(&b.near.ratio(kind)));
 }
 
-/// C^r and H^r of an icon to the nearest of a model's exemplars. Of a landmark that is named by points alone they
-/// would say nothing: H^r is left infinite.
+/// C^r and H^r of an icon to the nearest of a model's exemplars. For a landmark that only points identify, H^r is
+/// not computed and stays infinite.
 fn distances(icon: &Icon, model: &LandmarkModel, p: &Params) -> (f64, f64) {
     let c = &p.recognise.correlation;
     let own = Buckets::new(icon, c);
@@ -171,7 +175,7 @@ fn distances(icon: &Icon, model: &LandmarkModel, p: &Params) -> (f64, f64) {
 }
 
 /// The quad's picture after its corners were moved to fit the nearest exemplar, and those corners.
-fn laid_on(
+fn aligned_with(
     image: &GrayImage,
     reading: &QuadReading,
     near: &NearLandmark,

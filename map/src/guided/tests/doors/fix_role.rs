@@ -3,12 +3,12 @@
 use super::*;
 
 #[test]
-fn a_guided_fix_starts_nothing_and_ends_no_doubt() {
+fn a_guided_fix_starts_no_pose_and_ends_no_contradiction() {
     let drive = Drive::new(2.0, 4.0, 0.0, 61);
     let mut random = Random::new(3);
     let at = |x: f64, random: &mut Random| {
         let shown: Vec<_> =
-            seen(&Pose2::new(x, 0.0, 0.0), &drive.map, &mounting(), random).into_iter().collect();
+            full_views(&Pose2::new(x, 0.0, 0.0), &drive.map, &mounting(), random).into_iter().collect();
         let Some(FixResult::Fixed(fix)) = drive.fix(&shown, None) else { panic!("{shown:?}") };
         *fix
     };
@@ -43,7 +43,7 @@ fn a_guided_fix_starts_nothing_and_ends_no_doubt() {
         FixOutcome::Applied { .. }
     ));
     assert_eq!(fuser.pose().unwrap().contradictions, 0);
-    // One that replaces needs no row, is applied late like any other, and starts a pose as well.
+    // A replacing fix needs no earlier contradictions, may be late, and starts a pose, too.
     assert_eq!(fuser.apply_fix_as(SECOND / 10, &away, FixRole::Replacing).unwrap(), FixOutcome::Reset);
     assert!((fuser.pose().unwrap().pose.pose.x_m - 8.1).abs() < 0.2, "{:?}", fuser.pose());
     let mut empty = Fuser::new(FuseParams::default());

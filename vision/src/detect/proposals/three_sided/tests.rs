@@ -12,12 +12,12 @@ use crate::{
 };
 
 type Quadrangle = [[f64; 2]; 4];
-/// Where a point goes, given the largest coordinates.
+/// Maps a point, given the largest coordinates.
 type Mapping = fn(&Point2<f64>, f64, f64) -> [f64; 2];
 
 const DOOR: Quadrangle = [[150.0, 60.0], [260.0, 70.0], [260.0, 360.0], [150.0, 380.0]];
 
-/// A door whose lower end is lost in a dark floor as dark as itself.
+/// A door before a floor as dark as itself: its lower end is not visible.
 fn door() -> GrayImage {
     let floor = [[-10.0, 330.0], [510.0, 330.0], [510.0, 430.0], [-10.0, 430.0]];
     render(500, 420, 200, &[(DOOR, 90), (floor, 90)])
@@ -49,7 +49,7 @@ fn a_door_without_a_visible_lower_end_is_three_sided() {
     assert!(off(&set, [150.0, 330.0]) < 5.0 && off(&set, [260.0, 330.0]) < 5.0, "{set:#?}");
     assert!(set.side_support[0] > 0.9 && set.side_support[1] > 0.9 && set.side_support[3] > 0.9);
     assert!((0.5..=1.0).contains(&set.score) && set.side_clipped == [false; 4]);
-    // Corners are known well, visible ends along their sides are not.
+    // The covariance is small at corners and large along the sides at the free ends.
     let deviation = |i: usize, j: usize| set.corner_covariance_px2[i][(j, j)].sqrt();
     for i in [0, 1] {
         assert!(deviation(i, 0) < 0.5 && deviation(i, 1) < 0.5, "{set:#?}");
@@ -60,9 +60,9 @@ fn a_door_without_a_visible_lower_end_is_three_sided() {
 }
 
 #[test]
-fn a_poster_behind_something_is_three_sided() {
+fn a_partly_hidden_poster_is_three_sided() {
     let poster = [[120.0, 100.0], [330.0, 100.0], [330.0, 260.0], [120.0, 260.0]];
-    // Somebody stands before its right side, from floor to ceiling and as dark as the poster.
+    // A person hides its right side, from floor to ceiling and as dark as the poster.
     let person = [[270.0, -10.0], [345.0, -10.0], [385.0, 430.0], [230.0, 430.0]];
     let set = one_set(&render(500, 420, 200, &[(poster, 80), (person, 80)]));
     assert!(off(&set, poster[0]) < 0.5 && off(&set, poster[3]) < 0.5, "{set:#?}");
@@ -84,7 +84,7 @@ fn a_poster_cut_by_the_image_border_is_clipped() {
 }
 
 #[test]
-fn whole_quads_leave_nothing_over() {
+fn complete_quads_leave_no_three_sided_set() {
     let quads = [
         ([[60.0, 60.0], [250.0, 85.0], [240.0, 300.0], [70.0, 330.0]], 70),
         ([[330.0, 100.0], [440.0, 90.0], [450.0, 360.0], [325.0, 350.0]], 40),
@@ -95,14 +95,14 @@ fn whole_quads_leave_nothing_over() {
 }
 
 #[test]
-fn a_parameter_switches_it_off() {
+fn the_parameter_disables_three_sided_sets() {
     let mut p = DetectParams::default();
     p.quads.three_sided = false;
     assert!(detect(&door(), &p, &mut NoTrace).is_empty());
 }
 
 #[test]
-fn mixed_polarity_is_no_set() {
+fn mixed_polarity_gives_no_set() {
     // A corner of shadow and a bright strip: the third side is bright where the others are dark.
     let mut segments = vec![
         segment([50.0, 200.0], [50.0, 50.0]),
@@ -135,7 +135,7 @@ fn flips_turns_and_inversion_keep_the_set() {
     for (changed, map) in cases {
         let set = one_set(&changed);
         for c in base.corners_px.points() {
-            // Ends are looked for in steps of 2 px from where the segment ends.
+            // Free ends are searched in steps of 2 px from the end of the segment.
             assert!(off(&set, map(c, w, h)) < 2.5, "{base:#?} {set:#?}");
         }
         assert!((set.score - base.score).abs() < 0.03);
@@ -143,7 +143,7 @@ fn flips_turns_and_inversion_keep_the_set() {
 }
 
 #[test]
-fn work_is_bounded() {
+fn the_number_of_measured_sets_is_bounded() {
     // A comb: every tooth could be a side of many sets.
     let mut segments: Vec<EdgeSegment> = Vec::new();
     for i in 0..MAX_LEFT_SEGMENTS + 30 {

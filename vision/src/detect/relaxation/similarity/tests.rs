@@ -58,7 +58,7 @@ fn third_segment_cue_by_hand() {
 }
 
 #[test]
-fn gates_refuse() {
+fn pairs_outside_the_gates_are_dropped() {
     let image = render(220, 200, 200, &[(SQUARE, 60)]);
     let count = |segments: &[EdgeSegment]| pairs(segments, &image, &SimilarityParams::default()).len();
     // No third segment.
@@ -85,7 +85,7 @@ fn gates_refuse() {
 }
 
 #[test]
-fn a_quarter_turn_changes_nothing() {
+fn scores_do_not_change_under_a_quarter_turn() {
     let corners = [[60.0, 50.0], [160.0, 42.0], [150.0, 150.0], [52.0, 120.0]];
     // A turn by 90 degrees clockwise on screen of a 220 x 200 image.
     let turned = corners.map(|[u, v]: [f64; 2]| [199.0 - v, u]);
@@ -131,7 +131,7 @@ fn clipped_segments_count_less_by_length() {
 }
 
 #[test]
-fn candidates_are_bounded() {
+fn the_number_of_candidates_is_bounded() {
     // A fan of parallels: every one could pair with every other.
     let p = SimilarityParams::default();
     let mut segments: Vec<_> = (0..MAX_PAIRED_SEGMENTS + 50)
@@ -147,7 +147,7 @@ fn candidates_are_bounded() {
 }
 
 #[test]
-fn stripes_are_cut_at_the_shortlist() {
+fn the_shortlist_bounds_the_pairs_of_stripes() {
     let stripes = |n: usize| -> Vec<EdgeSegment> {
         (0..n).map(|i| segment([i as f64 * 20.0, 0.0], [i as f64 * 20.0, 3000.0])).collect()
     };

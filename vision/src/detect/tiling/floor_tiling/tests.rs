@@ -123,7 +123,7 @@ fn uncalibrated() -> TilingParams {
     TilingParams { remove: true, ..TilingParams::default() }
 }
 
-/// Rooms with what the posters' sides and the floor give before and after.
+/// Rooms of different tilt, turn and tile size.
 fn rooms() -> Vec<Room> {
     [(0.0, 0.4, 0.3), (0.0, 0.7, 0.33), (-0.2, 0.35, 0.3), (-0.12, 0.9, 0.4), (-0.25, 0.6, 0.5)]
         .map(|(tilt, turn, tile)| room(tilt, turn, tile))
@@ -131,7 +131,7 @@ fn rooms() -> Vec<Room> {
 }
 
 #[test]
-fn tiles_go_and_posters_stay() {
+fn tiles_are_removed_and_posters_stay() {
     for room in rooms() {
         for p in [calibrated(&room), uncalibrated()] {
             let all = room.segments();
@@ -153,7 +153,7 @@ fn tiles_go_and_posters_stay() {
 }
 
 #[test]
-fn the_order_is_kept_and_nothing_is_lost() {
+fn segments_keep_their_order_and_number() {
     let all = room(-0.2, 0.35, 0.3).segments();
     let untiled = untile(all.clone(), SIZE, &uncalibrated());
     let (mut kept, mut removed) = (untiled.kept.iter().peekable(), untiled.removed.iter().peekable());
@@ -165,7 +165,7 @@ fn the_order_is_kept_and_nothing_is_lost() {
 }
 
 #[test]
-fn off_by_default_and_without_a_sensible_camera() {
+fn nothing_is_removed_by_default_or_with_an_implausible_camera() {
     let scene = room(-0.2, 0.35, 0.3);
     let all = scene.segments();
     let still = |p: &TilingParams| assert_eq!(untile(all.clone(), SIZE, p).kept, all);
@@ -186,7 +186,7 @@ fn off_by_default_and_without_a_sensible_camera() {
 }
 
 #[test]
-fn a_room_without_tiling_loses_nothing() {
+fn nothing_is_removed_in_a_room_without_tiling() {
     for turn in [0.0, 0.4, 0.9] {
         let plain = room(-0.15, turn, 0.0);
         let all = plain.segments();
@@ -213,7 +213,7 @@ fn clutter(seed: u64) -> Vec<EdgeSegment> {
 }
 
 #[test]
-fn random_clutter_raises_no_alarm() {
+fn random_clutter_gives_no_pattern() {
     let scene = room(-0.15, 0.0, 0.3);
     for p in [calibrated(&scene), uncalibrated()] {
         let alarms = (0..300).filter(|s| !untile(clutter(*s), SIZE, &p).removed.is_empty()).count();
@@ -241,7 +241,7 @@ fn periods_are_found_at_a_centimetre_of_noise() {
 }
 
 #[test]
-fn a_mirrored_floor_loses_the_mirrored_lines() {
+fn a_mirrored_image_removes_the_mirrored_lines() {
     let scene = room(-0.2, 0.35, 0.3);
     let mirror = |s: &EdgeSegment| {
         let at = |p: &Point2<f64>| [SIZE.0 as f64 - 1.0 - p.x, p.y];
@@ -258,7 +258,7 @@ fn a_mirrored_floor_loses_the_mirrored_lines() {
 }
 
 #[test]
-fn a_reduced_image_loses_the_same_lines() {
+fn a_reduced_image_removes_the_same_lines() {
     let scene = room(-0.2, 0.35, 0.3);
     let halved = |s: &EdgeSegment| {
         let at = |p: &Point2<f64>| [0.5 * (p.x + 0.5) - 0.5, 0.5 * (p.y + 0.5) - 0.5];
@@ -272,7 +272,7 @@ fn a_reduced_image_loses_the_same_lines() {
 }
 
 #[test]
-fn quads_of_the_floor_go_and_those_of_the_wall_stay() {
+fn quads_of_the_floor_are_removed_and_those_of_the_wall_stay() {
     use crate::{
         detect::{detector::detect, params::Grouping},
         trace::NoTrace,

@@ -8,7 +8,7 @@ use crate::{
     },
     recognise::{
         features::harris::blurred,
-        fixture::{Dice, lesson, oblique, photograph, poster, quad, whole},
+        fixture::{Dice, oblique, photograph, poster, quad, trained_model, whole},
     },
 };
 use nalgebra::{Matrix2, Point2, Vector2};
@@ -18,10 +18,10 @@ fn taught(seed: u64) -> Vec<TaughtPoint> {
     view_points(&poster(seed), &whole())
 }
 
-/// Landmarks with the points that are given for each.
+/// Landmarks with the given points.
 fn models(all: &[(u64, Vec<TaughtPoint>)], p: &Params) -> ModelSet {
     let model = |(i, (seed, points)): (usize, &(u64, Vec<TaughtPoint>))| {
-        Arc::new(lesson(i as u64 + 1, *seed, p).with_points(std::slice::from_ref(points)))
+        Arc::new(trained_model(i as u64 + 1, *seed, p).with_points(std::slice::from_ref(points)))
     };
     ModelSet::new(all.iter().enumerate().map(model).collect(), p).unwrap()
 }
@@ -31,7 +31,7 @@ fn six(p: &Params) -> ModelSet {
 }
 
 #[test]
-fn a_double_that_was_taught_with_few_points_is_a_rival() {
+fn a_look_alike_taught_with_few_points_is_a_rival() {
     let p = Params::default();
     let image = photograph(&poster(1), &oblique(), 0.8, 20.0);
     let few = taught(1).into_iter().step_by(3).collect();
@@ -49,7 +49,7 @@ fn a_double_that_was_taught_with_few_points_is_a_rival() {
 }
 
 #[test]
-fn twelve_of_one_picture_are_ambiguous() {
+fn twelve_landmarks_of_one_picture_are_ambiguous() {
     let p = Params::default();
     let image = photograph(&poster(2), &oblique(), 0.9, 10.0);
     let set = models(&vec![(2, taught(2)); 12], &p);
@@ -58,12 +58,12 @@ fn twelve_of_one_picture_are_ambiguous() {
     assert!(verdict.candidates.iter().filter(|c| c.ratio < 1.0).count() >= 2, "{verdict:?}");
 }
 
-/// Of two of one picture the one in use is not named for both.
+/// Of two landmarks with one picture the active one is not identified.
 #[test]
-fn what_look_alikes_keep_out_of_use_is_a_rival() {
+fn an_inactive_look_alike_is_a_rival() {
     let p = Params::default();
     let image = photograph(&poster(1), &oblique(), 0.8, 20.0);
-    let model = |id: u64, seed: u64| Arc::new(lesson(id, seed, &p).with_points(&[taught(seed)]));
+    let model = |id: u64, seed: u64| Arc::new(trained_model(id, seed, &p).with_points(&[taught(seed)]));
     let decided = |rival: u64| {
         let set = ModelSet::with_rivals(vec![model(1, 1), model(2, 2)], vec![model(3, rival)], &p).unwrap();
         by_points(&image, &quad(oblique()), &set, &p).unwrap()
@@ -72,13 +72,13 @@ fn what_look_alikes_keep_out_of_use_is_a_rival() {
     assert_eq!(verdict.verdict, Verdict::Ambiguous(LandmarkId(1)));
     assert_eq!((verdict.candidates[0].refusal, verdict.landmarks), (Some(MatchRefusal::Margin), 2));
     assert_eq!(decided(3).verdict, Verdict::Unique(LandmarkId(1)));
-    // What is not in use is never named, though it alone is there.
+    // An inactive landmark is never identified, even if only it is visible.
     let set = ModelSet::with_rivals(vec![model(2, 2)], vec![model(3, 1)], &p).unwrap();
     assert_eq!(by_points(&image, &quad(oblique()), &set, &p), None);
 }
 
 #[test]
-fn a_landmark_of_which_a_quarter_is_another_picture_is_doubtful() {
+fn a_landmark_with_a_replaced_quarter_is_doubtful() {
     let p = Params::default();
     let (first, other) = (poster(1), poster(5));
     let decided = |left: usize, top: usize| {
@@ -95,7 +95,7 @@ fn a_landmark_of_which_a_quarter_is_another_picture_is_doubtful() {
         let place = format!("{left} {top}: {table:?}");
         assert_eq!(recognition, Verdict::Ambiguous(LandmarkId(1)), "{place}");
         assert_eq!(refusal, Some(MatchRefusal::Disagreement), "{place}");
-        // The parts that lie in it as a whole.
+        // The parts that lie entirely in the replaced quarter.
         let [x, y] = [left, top].map(|from| if from == 0 { 0..2 } else { 3..5 });
         let named = table.0[y].iter().flat_map(|row| &row[x.clone()]).filter(|p| **p == Part::Disagrees);
         assert!(named.count() >= 2, "{place}");
@@ -116,24 +116,24 @@ fn a_picture_with_a_part_in_common_is_no_rival() {
 }
 
 #[test]
-fn where_something_is_like_it_the_likeness_counts() {
+fn with_a_look_alike_in_the_map_the_likeness_must_pass() {
     let p = Params::default();
     let image = photograph(&poster(1), &oblique(), 0.8, 20.0);
     let decided = |tau: f64| {
-        let mut model = lesson(1, 1, &p).with_points(&[taught(1)]);
+        let mut model = trained_model(1, 1, &p).with_points(&[taught(1)]);
         model.likeness.tau = tau;
         let set = ModelSet::new(vec![Arc::new(model)], &p).unwrap();
         let verdict = by_points(&image, &quad(oblique()), &set, &p).unwrap();
         (verdict.verdict, verdict.candidates[0].refusal)
     };
-    let double = p.learn.threshold.nearest_share * p.learn.likeness_cap;
-    assert_eq!(decided(double + 0.01), (Verdict::Unique(LandmarkId(1)), None));
-    assert_eq!(decided(double - 0.01), (Verdict::Unique(LandmarkId(1)), None));
+    let capped = p.learn.threshold.nearest_share * p.learn.likeness_cap;
+    assert_eq!(decided(capped + 0.01), (Verdict::Unique(LandmarkId(1)), None));
+    assert_eq!(decided(capped - 0.01), (Verdict::Unique(LandmarkId(1)), None));
     assert_eq!(decided(1e-6), (Verdict::Ambiguous(LandmarkId(1)), Some(MatchRefusal::Similarity)));
 }
 
 #[test]
-fn the_border_of_the_landmark_is_told_from_the_wall_round_it() {
+fn the_landmarks_border_is_chosen_over_the_wall_panel() {
     let p = Params::default();
     let image = photograph(&poster(1), &oblique(), 0.8, 20.0);
     let wall = Corners::try_from([[20.0, 10.0], [380.0, 20.0], [385.0, 390.0], [15.0, 385.0]]).unwrap();
@@ -142,10 +142,10 @@ fn the_border_of_the_landmark_is_told_from_the_wall_round_it() {
     assert_eq!(by_points(&image, &nested, &six(&p), &p).unwrap().border, 1);
 }
 
-/// Only the upper left of the landmark has points, the rest is hidden, and another border was detected: who it is is
-/// clear, where its lower right corner is is not.
+/// Only the upper left of the landmark has points, the rest is hidden, and another border was detected: the
+/// identity is certain, the lower right corner is undetermined.
 #[test]
-fn a_landmark_whose_corners_are_not_told_is_not_named() {
+fn a_landmark_with_undetermined_corners_is_not_identified() {
     let p = Params::default();
     let asked = |share: f32| {
         let points: Vec<_> =
@@ -171,7 +171,7 @@ fn a_landmark_whose_corners_are_not_told_is_not_named() {
 /// images: squared errors are what their covariances say without the 0.3 px of the taught border, which is exact
 /// here.
 #[test]
-fn corners_are_as_good_as_their_covariance_says() {
+fn corner_errors_agree_with_their_covariance() {
     let p = Params::default();
     let models = six(&p);
     let mut dice = Dice::new(7);

@@ -13,7 +13,7 @@ use crate::{
             correlation::correlation,
             icon_features::{IconFeatures, features},
         },
-        fixture::{Dice, lesson, lessons, model_set, oblique, photograph, poster, quad, whole},
+        fixture::{Dice, model_set, oblique, photograph, poster, quad, trained_model, trained_models, whole},
         retrieval::nearest,
     },
 };
@@ -25,7 +25,7 @@ mod gates;
 
 const KINDS: [DistanceKind; 3] = [DistanceKind::Hausdorff, DistanceKind::Correlation, DistanceKind::Both];
 
-/// The icons decide.
+/// Parameters with which the icons decide.
 static PARAMS: LazyLock<Params> = LazyLock::new(|| {
     let mut p = Params::default();
     p.recognise.verdict.points = false;
@@ -34,7 +34,7 @@ static PARAMS: LazyLock<Params> = LazyLock::new(|| {
 static SIX: LazyLock<ModelSet> = LazyLock::new(|| model_set(6, &PARAMS));
 
 #[test]
-fn each_poster_is_recognised_and_strangers_are_not() {
+fn each_poster_is_recognised_and_distractors_are_unknown() {
     for seed in 1..=6 {
         let image = photograph(&poster(seed), &oblique(), 0.8, 20.0);
         for kind in KINDS {
@@ -57,7 +57,7 @@ fn each_poster_is_recognised_and_strangers_are_not() {
 }
 
 #[test]
-fn any_naming_of_the_corners_is_found_when_upright_is_unsure() {
+fn all_corner_rotations_are_recognised_when_the_orientation_is_ambiguous() {
     let image = photograph(&poster(3), &oblique(), 1.0, 0.0);
     for turn in 0..4 {
         let mut q = quad(oblique().rotated(turn));
@@ -74,16 +74,16 @@ fn any_naming_of_the_corners_is_found_when_upright_is_unsure() {
 }
 
 #[test]
-fn an_inner_border_is_found() {
+fn an_inner_border_is_recognised() {
     let image = photograph(&poster(2), &oblique(), 1.0, 0.0);
-    // Too far out for alignment to get from one to the other.
+    // Too far apart for alignment to bridge.
     let outer = [[4.0, 4.0], [390.0, 10.0], [385.0, 380.0], [8.0, 395.0]];
     let mut q = quad(Corners::try_from(outer).unwrap());
     assert_eq!(recognise(&image, &q, &SIX, DistanceKind::Both, &PARAMS).verdict, Verdict::Unknown);
     q.alternates = vec![oblique()];
     let v = recognise(&image, &q, &SIX, DistanceKind::Both, &PARAMS);
     assert_eq!((v.verdict, v.border), (Verdict::Unique(LandmarkId(2)), 1));
-    // Borders beyond the limit are not looked at.
+    // Borders beyond the limit are ignored.
     let mut many = vec![q.corners_px; nearest::MAX_BORDERS - 2];
     many.push(oblique());
     q.alternates = many;
@@ -95,7 +95,7 @@ fn an_inner_border_is_found() {
 }
 
 #[test]
-fn a_third_may_be_covered() {
+fn a_landmark_covered_by_a_third_is_recognised() {
     let image = photograph(&poster(5), &oblique(), 1.0, 0.0);
     let covered = GrayImage::from_fn(400, 400, |u, v| {
         let inside = (120..260).contains(&u) && (170..260).contains(&v);
@@ -107,7 +107,7 @@ fn a_third_may_be_covered() {
 
 #[test]
 fn look_alikes_are_ambiguous() {
-    let mut models = lessons(4, &PARAMS);
+    let mut models = trained_models(4, &PARAMS);
     let mut twin = (*models[1]).clone();
     twin.id = LandmarkId(9);
     models.push(Arc::new(twin));
@@ -125,7 +125,7 @@ fn look_alikes_are_ambiguous() {
 }
 
 #[test]
-fn nothing_to_compare_is_unknown() {
+fn without_comparable_landmarks_the_verdict_is_unknown() {
     let image = photograph(&poster(1), &oblique(), 1.0, 0.0);
     let empty = ModelSet::default();
     assert_eq!(recognise(&image, &quad(oblique()), &empty, DistanceKind::Both, &PARAMS).landmarks, 0);
@@ -141,29 +141,29 @@ fn nothing_to_compare_is_unknown() {
 
 #[test]
 fn the_only_landmark_needs_no_margin() {
-    let set = ModelSet::new(vec![Arc::new(lesson(7, 4, &PARAMS))], &PARAMS).unwrap();
+    let set = ModelSet::new(vec![Arc::new(trained_model(7, 4, &PARAMS))], &PARAMS).unwrap();
     let image = photograph(&poster(4), &oblique(), 1.0, 0.0);
     let v = recognise(&image, &quad(oblique()), &set, DistanceKind::Both, &PARAMS);
     assert_eq!(v.verdict, Verdict::Unique(LandmarkId(7)), "{:?}", v.candidates);
 }
 
 #[test]
-fn nearest_equals_comparing_everything() {
+fn nearest_equals_a_full_comparison() {
     // Oracle: C^r and H^r of every reading with every exemplar, sorted.
     let image = photograph(&poster(4), &oblique(), 0.9, 5.0);
     let mut q = quad(oblique());
     q.upright_ambiguous = true;
-    let seen = quad_readings(&image, &q, &PARAMS);
-    assert_eq!(seen.len(), 4);
+    let read = quad_readings(&image, &q, &PARAMS);
+    assert_eq!(read.len(), 4);
     for kind in [DistanceKind::Hausdorff, DistanceKind::Correlation] {
         let mut expected: Vec<(f64, LandmarkId)> = SIX
             .iter()
             .map(|m| {
-                let seen: Vec<IconFeatures> =
-                    seen.iter().map(|s| features(s.icon.clone(), &PARAMS.recognise)).collect();
+                let read: Vec<IconFeatures> =
+                    read.iter().map(|s| features(s.icon.clone(), &PARAMS.recognise)).collect();
                 let learnt = m.features(&PARAMS.recognise);
                 let least = |d: &dyn Fn(&IconFeatures, &IconFeatures) -> f64| {
-                    let pairs = seen.iter().flat_map(|s| learnt.iter().map(move |e| (s, e)));
+                    let pairs = read.iter().flat_map(|s| learnt.iter().map(move |e| (s, e)));
                     pairs.map(|(a, b)| d(a, b)).fold(f64::INFINITY, f64::min)
                 };
                 let r = &PARAMS.recognise;
@@ -180,7 +180,7 @@ fn nearest_equals_comparing_everything() {
             .collect();
         expected.sort_by(|a, b| a.0.total_cmp(&b.0));
         for count in 1..=5 {
-            let found = nearest(&seen, &SIX, kind, count, &PARAMS);
+            let found = nearest(&read, &SIX, kind, count, &PARAMS);
             assert_eq!(found.len(), count);
             for (near, (ratio, id)) in found.iter().zip(&expected) {
                 assert!((near.ratio(kind) - ratio).abs() < 1e-6);

@@ -124,7 +124,7 @@ fn cold_start_whitens_by_the_measured_deviations() {
 }
 
 #[test]
-fn foreign_point_sets_are_checked() {
+fn point_sets_from_external_data_are_checked() {
     let good = PointSet::new(vec![[1.0, 2.0]], vec![[0.0; 7]], vec![3.0]);
     assert_eq!(good.unwrap().len(), 1);
     let field = |set: Result<PointSet, PointSetError>| set.unwrap_err().field;

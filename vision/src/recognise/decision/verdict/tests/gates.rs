@@ -6,7 +6,7 @@ use super::*;
 fn gates_refuse_at_tau() {
     let model = SIX.get(LandmarkId(1)).unwrap();
     let anywhere = Corners::try_from([[0.0, 0.0], [90.0, 0.0], [90.0, 90.0], [0.0, 90.0]]).unwrap();
-    let judged = |correlation: f64, hausdorff: f64, moved: bool| VerifiedLandmark {
+    let verified_landmark = |correlation: f64, hausdorff: f64, moved: bool| VerifiedLandmark {
         near: NearLandmark {
             model: Arc::clone(model),
             reading: 0,
@@ -22,7 +22,7 @@ fn gates_refuse_at_tau() {
     };
     let (c, h, v) = (model.correlation.tau, model.hausdorff.tau, &PARAMS.recognise.verdict);
     let tight = v.verified_share;
-    let alone = |kind, c, h, moved| judged(c, h, moved).refusal(kind, 1.0, v);
+    let alone = |kind, c, h, moved| verified_landmark(c, h, moved).refusal(kind, 1.0, v);
     assert_eq!(alone(DistanceKind::Correlation, 0.99 * c, f64::NAN, false), None);
     assert_eq!(alone(DistanceKind::Correlation, c, 0.0, false), Some(MatchRefusal::Correlation));
     assert_eq!(alone(DistanceKind::Correlation, 0.99 * tight * c, h, true), None);
@@ -37,9 +37,9 @@ fn gates_refuse_at_tau() {
     // Both: the likeness, and one of the two.
     let least = 1.0 - model.likeness.tau;
     let both = |likeness: Option<f64>, c, h| {
-        let mut judged = judged(c, h, true);
-        judged.near.likeness = likeness;
-        judged.refusal(DistanceKind::Both, 1.0, v)
+        let mut verified_landmark = verified_landmark(c, h, true);
+        verified_landmark.near.likeness = likeness;
+        verified_landmark.refusal(DistanceKind::Both, 1.0, v)
     };
     let alike = Some(least + 1e-6);
     assert_eq!(both(alike, 0.99 * tight * c, f64::INFINITY), None);
@@ -48,24 +48,24 @@ fn gates_refuse_at_tau() {
     for refused in [Some(least), Some(f64::NAN), None] {
         assert_eq!(both(refused, 0.0, 0.0), Some(MatchRefusal::Similarity));
     }
-    // In doubt, what contradicts decides.
+    // Near the threshold, contradicting buckets decide.
     let contradicted = |ratio: f64, share: f64| {
-        let mut judged = judged(0.0, 0.0, true);
-        judged.near.likeness = Some(1.0 - ratio * model.likeness.tau);
-        judged.contradicting = share;
-        judged.refusal(DistanceKind::Both, 1.0, v)
+        let mut verified_landmark = verified_landmark(0.0, 0.0, true);
+        verified_landmark.near.likeness = Some(1.0 - ratio * model.likeness.tau);
+        verified_landmark.contradicting = share;
+        verified_landmark.refusal(DistanceKind::Both, 1.0, v)
     };
     assert_eq!(contradicted(0.99, v.max_contradicting), None);
     assert_eq!(contradicted(0.99, v.max_contradicting + 1e-9), Some(MatchRefusal::Mismatch));
     assert_eq!(contradicted(0.99, f64::NAN), Some(MatchRefusal::Mismatch));
     assert_eq!(contradicted(v.doubtful_share - 1e-6, 1.0), None);
     assert_eq!(contradicted(v.doubtful_share + 1e-6, 1.0), Some(MatchRefusal::Mismatch));
-    // Beyond the frame it must agree; where it does so very well, neither distance is asked.
+    // Content beyond the frame must agree; where it agrees very well, neither distance is required.
     let beyond = |likeness: f64, shown: f64, c: f64| {
-        let mut judged = judged(c, f64::INFINITY, true);
-        judged.near.likeness = alike;
-        judged.content = Content { likeness, shown };
-        judged.refusal(DistanceKind::Both, 1.0, v)
+        let mut verified_landmark = verified_landmark(c, f64::INFINITY, true);
+        verified_landmark.near.likeness = alike;
+        verified_landmark.content = Content { likeness, shown };
+        verified_landmark.refusal(DistanceKind::Both, 1.0, v)
     };
     let (least, enough) = (v.min_content_likeness, v.min_content);
     assert_eq!(beyond(least, enough, 0.0), None);
@@ -78,10 +78,10 @@ fn gates_refuse_at_tau() {
     assert_eq!(beyond(sure, well - 1e-9, 2.0 * c), Some(MatchRefusal::Correlation));
 }
 
-/// What the gate on content lets through by a hair.
+/// Content just above the gate.
 const JUST_ENOUGH: Content = Content { likeness: 0.45, shown: 1.5 };
 
-/// A dark frame, a mat, and something within: nothing, or a poster.
+/// A dark frame and a mat, empty or with a poster inside.
 fn framed(inside: Option<u64>) -> GrayImage {
     let picture = inside.map(poster);
     GrayImage::from_fn(240, 240, |u, v| match u.min(239 - u).min(v).min(239 - v) {
@@ -92,18 +92,18 @@ fn framed(inside: Option<u64>) -> GrayImage {
 }
 
 #[test]
-fn a_frame_alone_is_no_landmark() {
-    let lesson = |image: &GrayImage| {
+fn a_frame_without_content_is_not_accepted() {
+    let trained = |image: &GrayImage| {
         let mut all = vec![TrainingView::photographed(image, &whole(), &PARAMS).unwrap()];
         all.extend(views(image, &whole(), 20, &PARAMS, 5));
         learn(LandmarkId(9), &all, &[], &PARAMS).unwrap()
     };
     // A blank panel is not learnt, whatever its frame.
-    let blank = lesson(&framed(None));
+    let blank = trained(&framed(None));
     let ModelStatus::Candidate(failures) = &blank.status else { panic!("{:?}", blank.status) };
     assert!(failures.iter().any(|f| f.gate == Gate::Content), "{failures:?}");
-    // A picture in that frame is, and is told from the empty frame and from another picture in it.
-    let taught = lesson(&framed(Some(3)));
+    // A picture in that frame is a landmark, distinct from the empty frame and from another picture in it.
+    let taught = trained(&framed(Some(3)));
     assert!(taught.is_active(), "{:?}", taught.status);
     let set = ModelSet::new(vec![Arc::new(taught)], &PARAMS).unwrap();
     let asked = |inside: Option<u64>| {
@@ -114,15 +114,18 @@ fn a_frame_alone_is_no_landmark() {
     for (inside, refusal) in [(None, MatchRefusal::LowContent), (Some(4), MatchRefusal::LowContent)] {
         let v = asked(inside);
         assert_eq!(v.verdict, Verdict::Unknown, "{inside:?}");
-        let told = v.candidates[0].refusal;
-        assert!(told == Some(refusal) || told == Some(MatchRefusal::Similarity), "{inside:?} {told:?}");
+        let reported = v.candidates[0].refusal;
+        assert!(
+            reported == Some(refusal) || reported == Some(MatchRefusal::Similarity),
+            "{inside:?} {reported:?}"
+        );
     }
 }
 
 #[test]
 fn the_margin_is_over_the_nearest_other() {
-    let models = lessons(2, &PARAMS);
-    let judged = |i: usize, c: f64, h: f64, l: f64| VerifiedLandmark {
+    let models = trained_models(2, &PARAMS);
+    let verified_landmark = |i: usize, c: f64, h: f64, l: f64| VerifiedLandmark {
         near: NearLandmark {
             model: Arc::clone(&models[i]),
             reading: 0,
@@ -136,18 +139,18 @@ fn the_margin_is_over_the_nearest_other() {
         contradicting: 0.0,
         content: JUST_ENOUGH,
     };
-    let found = [judged(0, 0.4, 0.1, 0.3), judged(1, 0.5, 1.0, 1.5)];
+    let found = [verified_landmark(0, 0.4, 0.1, 0.3), verified_landmark(1, 0.5, 1.0, 1.5)];
     assert!((margin(&found, 0, DistanceKind::Correlation) - 0.8).abs() < 1e-9);
     assert!((margin(&found, 0, DistanceKind::Hausdorff) - 0.1).abs() < 1e-9);
     assert!((margin(&found, 0, DistanceKind::Both) - 0.2).abs() < 1e-9);
     assert!(margin(&found[..1], 0, DistanceKind::Both).abs() < 1e-12);
-    // A runner-up without points says nothing.
-    let found = [judged(0, 0.4, 0.1, 0.3), judged(1, 0.5, f64::INFINITY, 1.5)];
+    // A runner-up without points does not count.
+    let found = [verified_landmark(0, 0.4, 0.1, 0.3), verified_landmark(1, 0.5, f64::INFINITY, 1.5)];
     assert!((margin(&found, 0, DistanceKind::Hausdorff) - 1.0).abs() < 1e-12);
 }
 
 #[test]
-fn a_large_map_asks_for_more() {
+fn tau_shrinks_in_large_maps() {
     let v = &PARAMS.recognise.verdict;
     let exact = |n: usize, share: f64| assert!((v.tau_share(n) - share).abs() < 1e-12, "{n}");
     exact(0, 1.0);
@@ -157,7 +160,7 @@ fn a_large_map_asks_for_more() {
     assert!(v.tau_share(v.crowd + 1) < 1.0);
 
     let image = photograph(&poster(2), &oblique(), 1.0, 0.0);
-    let seen = quad_readings(&image, &quad(oblique()), &PARAMS);
+    let read = quad_readings(&image, &quad(oblique()), &PARAMS);
     let model = SIX.get(LandmarkId(2)).unwrap();
     let near = NearLandmark {
         model: Arc::clone(model),
@@ -169,21 +172,21 @@ fn a_large_map_asks_for_more() {
         signature: 1.0,
     };
     let found = [VerifiedLandmark { near, moved: Some(oblique()), contradicting: 0.0, content: JUST_ENOUGH }];
-    let among = |n: usize| decide(&found, &seen, DistanceKind::Both, n, v);
+    let among = |n: usize| decide(&found, &read, DistanceKind::Both, n, v);
     assert_eq!(among(v.crowd).verdict, Verdict::Unique(LandmarkId(2)));
     let large = among(10 * v.crowd);
     assert_eq!(
         (large.verdict, large.candidates[0].refusal),
         (Verdict::Unknown, Some(MatchRefusal::Similarity))
     );
-    // What is told is what decided.
-    let told = &large.candidates[0];
-    assert!(told.ratio > 1.0 && (told.distance / told.tau - told.ratio).abs() < 1e-9);
+    // What is reported is what decided.
+    let reported = &large.candidates[0];
+    assert!(reported.ratio > 1.0 && (reported.distance / reported.tau - reported.ratio).abs() < 1e-9);
 }
 
-/// The same picture that names a landmark where icons decide leaves it open where points do and say nothing.
+/// A picture that identifies a landmark where icons decide does not where points decide and give no evidence.
 #[test]
-fn where_points_decide_an_icon_alone_names_nothing() {
+fn where_points_decide_icons_alone_do_not_identify() {
     let image = photograph(&poster(1), &oblique(), 0.8, 20.0);
     let v = recognise(&image, &quad(oblique()), &SIX, DistanceKind::Both, &Params::default());
     assert_eq!(v.verdict, Verdict::Ambiguous(LandmarkId(1)));
@@ -193,7 +196,7 @@ fn where_points_decide_an_icon_alone_names_nothing() {
 }
 
 #[test]
-fn few_points_keep_a_landmark_from_the_papers_distances_only() {
+fn landmarks_with_few_points_are_excluded_from_the_papers_distances_only() {
     let image = photograph(&poster(1), &oblique(), 1.0, 0.0);
     let mut few = (**SIX.get(LandmarkId(1)).unwrap()).clone();
     few.stable_points = PARAMS.learn.gates.min_stable_points - 1;

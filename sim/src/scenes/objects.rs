@@ -1,5 +1,5 @@
-//! Things that must be found: framed pictures, posters, doors, windows, signs, boards. Each is painted onto a rectangle
-//! of a plane and listed; its inner borders and parts are listed as neither missed nor false.
+//! Objects that a detector must find: framed pictures, posters, doors, windows, signs, boards. Each is painted onto
+//! a rectangle of a plane and listed; its inner borders and parts are listed as neither missed nor false.
 
 use rand::RngExt;
 
@@ -8,9 +8,9 @@ use super::pictures;
 use super::stage::Stage;
 use crate::building::LandmarkKind;
 
-/// What hangs or stands on a wall.
+/// Kind of an object on a wall.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Thing {
+pub(super) enum SceneObject {
     Picture,
     Poster,
     Door,
@@ -19,15 +19,15 @@ pub(super) enum Thing {
     Board,
 }
 
-/// Paints a thing on a wall of a grey, and lists it.
-pub(super) fn paint(stage: &mut Stage, plane: &Plane, rect: Rect, thing: Thing, wall: f32) {
-    match thing {
-        Thing::Picture => picture(stage, plane, rect, wall),
-        Thing::Poster => poster(stage, plane, rect, wall),
-        Thing::Door => door(stage, plane, rect, wall),
-        Thing::Window => window(stage, plane, rect, wall),
-        Thing::Sign => sign(stage, plane, rect, wall),
-        Thing::Board => board(stage, plane, rect, wall),
+/// Paints an object on a wall of the grey `wall`, and lists it.
+pub(super) fn paint(stage: &mut Stage, plane: &Plane, rect: Rect, object: SceneObject, wall: f32) {
+    match object {
+        SceneObject::Picture => picture(stage, plane, rect, wall),
+        SceneObject::Poster => poster(stage, plane, rect, wall),
+        SceneObject::Door => door(stage, plane, rect, wall),
+        SceneObject::Window => window(stage, plane, rect, wall),
+        SceneObject::Sign => sign(stage, plane, rect, wall),
+        SceneObject::Board => board(stage, plane, rect, wall),
     }
 }
 
@@ -80,7 +80,7 @@ fn tones(stage: &mut Stage) -> [f32; 2] {
     [low, high]
 }
 
-/// Bands from the outside in, each lit from one side; gives what they leave.
+/// Bands from the outside in, each lit from one side; returns the rectangle within.
 fn frame(stage: &mut Stage, plane: &Plane, rect: Rect, width: f64, grey: f32) -> Rect {
     let bands = stage.rng.random_range(1..=4);
     let lit = [0; 4].map(|_| stage.grey(0.8, 1.2));
@@ -113,7 +113,7 @@ fn inner_shadow(stage: &mut Stage, plane: &Plane, [x0, y0, x1, y1]: Rect) {
     stage.painter.shade(plane, &corners(side), soft, factor);
 }
 
-/// A slanted bright strip, as glass has it.
+/// A slanted bright strip, as on glass.
 fn reflection(stage: &mut Stage, plane: &Plane, rect: Rect) {
     let (left, wide, slant) = (stage.between(0.1, 0.5), stage.between(0.05, 0.25), stage.between(0.0, 0.2));
     let [x0, y0, x1, y1] = part(rect, [left, 0.02, left + wide, 0.98]);
@@ -219,7 +219,7 @@ fn panels(stage: &mut Stage, plane: &Plane, leaf: Rect, kind: u32, tone: f32) {
     }
 }
 
-/// A frame with panes, bars between them, and what is outside; at times a sill or a grating.
+/// A frame with panes, bars between them, and what is outside; sometimes a sill or a grating.
 fn window(stage: &mut Stage, plane: &Plane, rect: Rect, wall: f32) {
     let grey = stage.other_than(wall, 0.04);
     if stage.chance(0.3) {
@@ -257,7 +257,7 @@ fn window(stage: &mut Stage, plane: &Plane, rect: Rect, wall: f32) {
     stage.list(plane, rect, LandmarkKind::Window);
 }
 
-/// A sign: lit from within, a clear plate nearly of the wall's grey, or a painted one; at times under a lamp box.
+/// A sign: lit from within, a clear plate nearly of the wall's grey, or a painted one; sometimes under a lamp box.
 pub(super) fn sign(stage: &mut Stage, plane: &Plane, rect: Rect, wall: f32) {
     let aspect = (rect[3] - rect[1]) / (rect[2] - rect[0]);
     let style = stage.rng.random_range(0..4);

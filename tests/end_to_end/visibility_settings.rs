@@ -1,6 +1,6 @@
-//! Claim: from where landmarks are seen is told for the camera that looks: each map has its own, set over HTTP or by the
-//! command line with errors that name the field, kept over a restart; one question may ask for another. A sign under the
-//! ceiling is seen by a camera that looks up, and by no other.
+//! Claim: visibility follows the visibility settings: each map has its own, set over HTTP or by the command line
+//! with errors that name the field, stored over a restart; a single request may state others. A sign under the
+//! ceiling is visible only to a camera that can be tilted up.
 
 use client::api::NewMap;
 use reqwest::{Client, Method, StatusCode};
@@ -47,7 +47,7 @@ async fn area(server: &Child, landmark: &str, query: &str) -> f64 {
     found["properties"]["area_m2"].as_f64().expect("an area")
 }
 
-async fn seen_from(server: &Child, settings: Value) -> Vec<String> {
+async fn visible_from(server: &Child, settings: Value) -> Vec<String> {
     let body = json!({ "pose": { "x_m": 5, "y_m": 3, "theta_rad": 0 }, "visibility_settings": settings });
     let (status, found) = call(server, Method::POST, "/visible", Some(body)).await;
     assert_eq!(status, StatusCode::OK, "{found}");
@@ -89,15 +89,15 @@ async fn refusals(server: &Child) {
     assert_eq!(status, StatusCode::UNPROCESSABLE_ENTITY);
 }
 
-/// Another camera for one question, without a new version.
+/// Other settings for one request, without a new version.
 async fn one_question(server: &Child) {
-    assert!(area(server, "sign", "").await <= 0.0, "the usual camera does not look up so far");
+    assert!(area(server, "sign", "").await <= 0.0, "the default camera cannot be tilted up so far");
     let usual = area(server, "poster", "").await;
     assert!(area(server, "poster", "?focal_px=900").await > 1.5 * usual);
     let up = json!({ "tilt_high_rad": 1.2 });
     assert!(area(server, "sign", "?tilt_high_rad=1.2").await > 5.0);
-    assert_eq!(seen_from(server, json!({})).await, ["poster"]);
-    assert_eq!(seen_from(server, up.clone()).await, ["poster", "sign"]);
+    assert_eq!(visible_from(server, json!({})).await, ["poster"]);
+    assert_eq!(visible_from(server, up.clone()).await, ["poster", "sign"]);
     let path = json!({ "path": [[5, 2.6], [5, 3.2]], "visibility_settings": up });
     let (status, along) = call(server, Method::POST, "/coverage", Some(path)).await;
     assert_eq!(status, StatusCode::OK, "{along}");
@@ -105,7 +105,7 @@ async fn one_question(server: &Child) {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn areas_are_those_of_the_camera_that_looks() {
+async fn visibility_areas_follow_the_settings() {
     let data = tempfile::tempdir().expect("a directory");
     let server = Child::start(data.path());
     hall(&server).await;
@@ -118,16 +118,16 @@ async fn areas_are_those_of_the_camera_that_looks() {
     let run = waymark(command, Duration::from_secs(30));
     assert!(run.status == 0 && run.stdout.contains("tilts -10.0 to 70.0"), "{run:?}");
     assert_eq!(get(&server, "").await["version"], version + 1);
-    assert_eq!(seen_from(&server, json!({})).await, ["poster", "sign"]);
+    assert_eq!(visible_from(&server, json!({})).await, ["poster", "sign"]);
     let gaze = json!({ "pose": { "x_m": 5, "y_m": 3, "theta_rad": 0 } });
     let (status, ranked) = call(&server, Method::POST, "/gaze", Some(gaze)).await;
-    assert_eq!(status, StatusCode::OK, "nothing is learnt, but the question is answered: {ranked}");
+    assert_eq!(status, StatusCode::OK, "no model, but the request is answered: {ranked}");
     let set = get(&server, "/visibility-settings").await;
-    assert_eq!(set["width_px"], usual["width_px"], "what is not given stays");
+    assert_eq!(set["width_px"], usual["width_px"], "absent options do not change");
     server.kill();
     let server = Child::start(data.path());
     assert_eq!(get(&server, "/visibility-settings").await, set);
-    assert!(area(&server, "sign", "").await > 5.0, "and the areas are made for it at the start");
+    assert!(area(&server, "sign", "").await > 5.0, "areas by the stored settings after the restart");
     let run = waymark(["map", "sight", "hall", "--usual", "--server", &server.url], Duration::from_secs(30));
     assert_eq!(run.status, 0, "{run:?}");
     assert_eq!(get(&server, "/visibility-settings").await, usual);

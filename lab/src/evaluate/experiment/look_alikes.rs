@@ -1,13 +1,13 @@
-//! `waymark-lab evaluate lookalikes`: pictures that are nearly the same. With one of a pair taught, is the other taken for
-//! it; with both taught, are they told apart, refused as ambiguous, or confused?
+//! `waymark-lab evaluate lookalikes`: pairs of pictures that are nearly the same. With one taught: is the other
+//! accepted as it? With both taught: are they distinguished, refused as ambiguous, or confused?
 
 use super::{
     Common, Setting,
     lesson::{Class, noisy},
-    look::quad,
     mixed, of_each,
     pictures::{Picture, generated},
     say,
+    view_outcome::quad,
 };
 use crate::evaluate::statistics::{Interval, upper_bound, wilson};
 use serde::Serialize;
@@ -36,17 +36,17 @@ pub(crate) struct Args {
     common: Common,
 }
 
-/// What became of the pairs of one kind.
+/// Results of the pairs of one kind.
 #[derive(Debug, Clone, Serialize)]
 struct Kind {
     change: &'static str,
     pairs: usize,
-    /// Only one of each pair was taught: views of the other.
+    /// One of each pair is taught: views of the other.
     alone: Counts,
-    /// Both were: pictures that a gate kept out, and views of those in use.
-    kept_out: usize,
+    /// Both are taught: pictures that failed a quality gate, and views of the active ones.
+    inactive: usize,
     both: Counts,
-    /// Exact upper 95 % bound of the share taken for the double, with one taught and with both.
+    /// Exact upper 95 % bound of the share accepted as the look-alike, with one taught and with both.
     alone_bound: f64,
     both_bound: f64,
     right_interval: Interval,
@@ -56,7 +56,7 @@ struct Kind {
 struct Counts {
     views: usize,
     right: usize,
-    double: usize,
+    look_alike: usize,
     other: usize,
     ambiguous: usize,
     unknown: usize,
@@ -69,7 +69,7 @@ struct Report {
     kinds: Vec<Kind>,
 }
 
-/// A picture of a pair: even ones and their successors are doubles of each other.
+/// A pair of pictures that look alike.
 struct Pair {
     change: LookAlikeKind,
     pictures: [Picture; 2],
@@ -88,7 +88,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let both: Vec<Picture> = pairs.iter().flat_map(|pair| pair.pictures.clone()).collect();
     let both = Class::new(both, args.common.taught, args.common.seed, &p)?;
     let counted = of_each(&pairs, "look-alikes", |i, pair| {
-        // The double of landmark i, with only that taught.
+        // The look-alike of landmark i, with only i taught.
         let one = count(&alone, &pair.pictures[1], [None, Some(i)], args, &p);
         let of = |side: usize| {
             let own = 2 * i + side;
@@ -108,7 +108,7 @@ fn pairs(photographs: &[Picture], args: &Args) -> Vec<Pair> {
     of_each(&numbers, "drawing", |_, i| {
         let (seed, part) = (args.common.seed, args.common.part);
         let change = LookAlikeKind::ALL[i % LookAlikeKind::ALL.len()];
-        // Every other picture is a photograph, as long as there are any.
+        // Every other picture is a photograph while there are any.
         let photograph = photographs.get(i / 2).filter(|_| i % 2 == 0).cloned();
         let picture = photograph.unwrap_or_else(|| generated(part, seed, *i));
         let textures = lookalikes(&picture.texture, change, mixed(&[seed, 9, *i as u64]));
@@ -117,11 +117,11 @@ fn pairs(photographs: &[Picture], args: &Args) -> Vec<Pair> {
     })
 }
 
-/// Views of a picture in a class where `own` and its `double` may be landmarks.
+/// Views of a picture in a class with the landmarks `own` and its `look_alike`, if given.
 fn count(
     class: &Class,
     picture: &Picture,
-    [own, double]: [Option<usize>; 2],
+    [own, look_alike]: [Option<usize>; 2],
     args: &Args,
     p: &Params,
 ) -> Counts {
@@ -129,17 +129,19 @@ fn count(
     let is = |id: LandmarkId, index: Option<usize>| index.is_some_and(|i| id.0 == i as u64);
     for v in 0..args.views {
         let key = own.map_or(u64::MAX, |o| o as u64);
-        let draw = mixed(&[args.common.seed, 10, key, double.unwrap_or(0) as u64, u64::from(v)]);
+        let draw = mixed(&[args.common.seed, 10, key, look_alike.unwrap_or(0) as u64, u64::from(v)]);
         let mut random = Random::new(draw);
         let conditions = Conditions { yaw_rad: random.range(-0.9, 0.9), ..Conditions::realistic(draw) };
-        let Some(seen) = exhibit(&picture.texture, &class.wall, &conditions, Extent::Around, draw) else {
+        let Some(rendered) = exhibit(&picture.texture, &class.wall, &conditions, Extent::Around, draw) else {
             continue;
         };
-        let Some(corners) = noisy(&seen.corners, args.common.corner_noise_px, &mut random) else { continue };
+        let Some(corners) = noisy(&rendered.corners, args.common.corner_noise_px, &mut random) else {
+            continue;
+        };
         counts.views += 1;
-        match recognise(&seen.image, &quad(corners), &class.models, DistanceKind::Both, p).verdict {
+        match recognise(&rendered.image, &quad(corners), &class.models, DistanceKind::Both, p).verdict {
             Verdict::Unique(id) if is(id, own) => counts.right += 1,
-            Verdict::Unique(id) if is(id, double) => counts.double += 1,
+            Verdict::Unique(id) if is(id, look_alike) => counts.look_alike += 1,
             Verdict::Unique(_) => counts.other += 1,
             Verdict::Ambiguous(_) => counts.ambiguous += 1,
             Verdict::Unknown => counts.unknown += 1,
@@ -152,7 +154,7 @@ impl Counts {
     fn add(&mut self, o: &Self) {
         self.views += o.views;
         self.right += o.right;
-        self.double += o.double;
+        self.look_alike += o.look_alike;
         self.other += o.other;
         self.ambiguous += o.ambiguous;
         self.unknown += o.unknown;
@@ -160,21 +162,21 @@ impl Counts {
 }
 
 fn kind(change: LookAlikeKind, pairs: &[Pair], counted: &[(Counts, [Option<Counts>; 2])]) -> Kind {
-    let (mut alone, mut both, mut kept_out, mut count) = (Counts::default(), Counts::default(), 0, 0);
+    let (mut alone, mut both, mut inactive, mut count) = (Counts::default(), Counts::default(), 0, 0);
     for (_, (one, two)) in pairs.iter().zip(counted).filter(|(pair, _)| pair.change == change) {
         count += 1;
         alone.add(one);
-        kept_out += two.iter().filter(|t| t.is_none()).count();
+        inactive += two.iter().filter(|t| t.is_none()).count();
         two.iter().flatten().for_each(|t| both.add(t));
     }
     Kind {
         change: change.name(),
         pairs: count,
-        alone_bound: upper_bound(alone.double, alone.views),
-        both_bound: upper_bound(both.double + both.other, both.views),
+        alone_bound: upper_bound(alone.look_alike, alone.views),
+        both_bound: upper_bound(both.look_alike + both.other, both.views),
         right_interval: wilson(both.right, both.views),
         alone,
-        kept_out,
+        inactive,
         both,
     }
 }
@@ -183,11 +185,11 @@ fn table(r: &Report) -> Vec<String> {
     let mut lines = r.setting.lines();
     lines.push(format!(
         "  {:<12} {:>5} | {:<46} | {}",
-        "", "pairs", "one taught, the other seen", "both taught"
+        "", "pairs", "one taught, views of the other", "both taught"
     ));
     lines.push(format!(
         "  {:<12} {:>5} | {:>5} {:>6} {:>9} {:>7} {:>9}      | {:>8} {:>5} {:>6} {:>21} {:>6} {:>9} {:>9} {:>7}",
-        "", "", "views", "taken", "at most", "unsure", "refused", "kept out", "views", "right", "", "wrong", "at most", "ambiguous", "unknown"
+        "", "", "views", "taken", "at most", "unsure", "refused", "inactive", "views", "right", "", "wrong", "at most", "ambiguous", "unknown"
     ));
     for k in &r.kinds {
         let (a, b) = (&k.alone, &k.both);
@@ -197,16 +199,16 @@ fn table(r: &Report) -> Vec<String> {
             k.change,
             k.pairs,
             a.views,
-            a.double + a.other,
+            a.look_alike + a.other,
             k.alone_bound,
             a.ambiguous,
             a.unknown,
-            k.kept_out,
+            k.inactive,
             b.views,
             b.right,
             k.right_interval.0,
             k.right_interval.1,
-            b.double + b.other,
+            b.look_alike + b.other,
             k.both_bound,
             b.ambiguous,
             b.unknown
@@ -226,7 +228,7 @@ mod tests {
     fn kinds_add_up_their_pairs() {
         let picture = || generated(super::super::pictures::Part::Tune, 1, 0);
         let pair = |change| Pair { change, pictures: [picture(), picture()] };
-        let counts = |right, double| Counts { views: 4, right, double, ..Counts::default() };
+        let counts = |right, look_alike| Counts { views: 4, right, look_alike, ..Counts::default() };
         let pairs = [pair(LookAlikeKind::Text), pair(LookAlikeKind::Doors), pair(LookAlikeKind::Text)];
         let counted = [
             (counts(0, 1), [Some(counts(4, 0)), None]),
@@ -234,8 +236,8 @@ mod tests {
             (counts(0, 0), [Some(counts(3, 1)), Some(counts(2, 0))]),
         ];
         let text = kind(LookAlikeKind::Text, &pairs, &counted);
-        assert_eq!((text.pairs, text.alone.double, text.kept_out), (2, 1, 1));
-        assert_eq!((text.both.views, text.both.right, text.both.double), (12, 9, 1));
+        assert_eq!((text.pairs, text.alone.look_alike, text.inactive), (2, 1, 1));
+        assert_eq!((text.both.views, text.both.right, text.both.look_alike), (12, 9, 1));
         assert!((text.both_bound - upper_bound(1, 12)).abs() < 1e-12);
     }
 }

@@ -1,4 +1,4 @@
-//! The camera that looks and what is said of it: the same, or off by the errors of a usual calibration.
+//! True and stated intrinsics of a camera: equal, or apart by the errors of a usual calibration.
 
 use nalgebra::{Isometry3, Point2, Vector2};
 use serde::Serialize;
@@ -12,26 +12,26 @@ use vision::{
     random::Random,
 };
 
-/// What is wrong with cameras.
+/// Errors of stated intrinsics.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum Cameras {
-    /// Nothing, and so it is said.
+    /// None, and none are stated.
     Exact,
-    /// What is wrong with a usual one, and it is said that nothing is.
-    WrongUntold,
-    /// What is wrong with a usual one, and so it is said.
-    WrongTold,
+    /// Errors of a usual calibration, but none are stated.
+    WithoutSigmas,
+    /// Errors of a usual calibration, with their standard deviations stated.
+    WithSigmas,
 }
 
-/// One of them.
+/// A camera with true and stated intrinsics.
 pub(super) struct StatedCamera {
     real: Intrinsics,
     stated: Intrinsics,
 }
 
 impl StatedCamera {
-    /// A camera like `base` with errors of its own.
+    /// A camera with the stated intrinsics `base` and drawn errors.
     pub(super) fn drawn(base: &Intrinsics, cameras: Cameras, random: &mut Random) -> Self {
         let usual = base.with_sigmas(IntrinsicsSigmas::usual(base.fx_px)).unwrap_or(*base);
         if cameras == Cameras::Exact {
@@ -40,11 +40,11 @@ impl StatedCamera {
         let e = usual.error_sigmas().map(|s| s * random.normal());
         let (fx_px, fy_px) = (base.fx_px * (1.0 + e.x), base.fy_px * (1.0 + e.x));
         let real = Intrinsics { fx_px, fy_px, cx_px: base.cx_px + e.y, cy_px: base.cy_px + e.z, ..*base };
-        Self { real, stated: if cameras == Cameras::WrongTold { usual } else { *base } }
+        Self { real, stated: if cameras == Cameras::WithSigmas { usual } else { *base } }
     }
 
-    /// A thing of `size` that is taken to be of `believed` size; `None` where not all of it is in the picture.
-    pub(super) fn look(
+    /// Pose of an object of `size` for which `believed` is assumed; `None` if it is not wholly in the image.
+    pub(super) fn observe(
         &self,
         camera_from_landmark: &Isometry3<f64>,
         (size, believed): (LandmarkSize, LandmarkSize),

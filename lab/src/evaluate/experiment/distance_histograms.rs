@@ -1,5 +1,5 @@
-//! The two humps of the paper's Fig. 11: distances of a landmark's own views and of everything else, with normal curves,
-//! both thresholds of method 8 and what each costs. Distances in, figures and the picture out.
+//! Distances of a landmark's own views and of all else, as two histograms with normal curves (the paper's Fig. 11),
+//! both thresholds of method 8 and their errors. Distances in, figures and the picture out.
 
 use super::gaussian::{Gaussian, crossing};
 use crate::evaluate::{
@@ -10,12 +10,12 @@ use serde::Serialize;
 
 /// A wrong acceptance costs as much as so many misses (method 8).
 const COST: f64 = 6.0;
-/// Steps of the sum that the overlap is.
+/// Steps of the sum that approximates the overlap.
 const STEPS: usize = 2000;
 /// Bars of a histogram.
 const BARS: usize = 40;
 
-/// How often a distance alone errs.
+/// Errors of a distance alone.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct Pairs {
     false_positives: usize,
@@ -48,16 +48,17 @@ impl Pairs {
 
 /// Own and other distances of one landmark.
 #[derive(Debug, Clone, Serialize)]
-pub(crate) struct Humps {
+pub(crate) struct DistanceHistograms {
     distance: &'static str,
     own_views: usize,
     other_quads: usize,
-    /// Mean and standard deviation of each class, finite distances only.
+    /// Mean and standard deviation of own and other distances, finite ones only.
     own_normal: Option<[f64; 2]>,
     other_normal: Option<[f64; 2]>,
     /// Area under both normal curves.
     overlap: Option<f64>,
-    /// tau as learnt, and where the weighted normal curves cross, with the shares of others below and own not below.
+    /// tau as learnt, and where the weighted normal curves cross; for each the share of others below and of own not
+    /// below.
     tau: [Option<f64>; 2],
     false_positives: [Option<f64>; 2],
     false_negatives: [Option<f64>; 2],
@@ -67,7 +68,7 @@ pub(crate) struct Humps {
     others: Vec<f64>,
 }
 
-impl Humps {
+impl DistanceHistograms {
     pub(crate) fn new(distance: &'static str, own: Vec<f64>, others: Vec<f64>, tau: f64) -> Self {
         let fits = Gaussian::fit(&own).zip(Gaussian::fit(&others));
         let taus = [Some(tau), fits.and_then(|(own, others)| crossing(own, others, COST))];
@@ -125,10 +126,10 @@ fn overlap(a: Gaussian, b: Gaussian) -> f64 {
 }
 
 /// One panel for each: histograms as densities, normal curves, tau.
-pub(crate) fn svg(humps: &[&Humps]) -> String {
-    let words: Vec<(&str, String)> = humps.iter().map(|h| (COLOURS[0], h.line())).collect();
-    picture(humps.len().max(3), &words, |svg| {
-        for (i, h) in humps.iter().enumerate() {
+pub(crate) fn svg(histograms: &[&DistanceHistograms]) -> String {
+    let words: Vec<(&str, String)> = histograms.iter().map(|h| (COLOURS[0], h.line())).collect();
+    picture(histograms.len().max(3), &words, |svg| {
+        for (i, h) in histograms.iter().enumerate() {
             let finite = || h.own.iter().chain(&h.others).copied().filter(|d| d.is_finite());
             let high = finite().fold(f64::MIN_POSITIVE, f64::max);
             let bars = |all: &[f64]| {
@@ -171,7 +172,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn curves_overlap_as_in_the_tables() {
+    fn overlap_of_two_normal_curves_as_in_the_tables() {
         // Two unit normals two apart share 2 Phi(-1).
         let g = |mean| Gaussian { mean, deviation: 1.0 };
         assert!((overlap(g(0.0), g(2.0)) - 0.317_311).abs() < 1e-5);
@@ -179,12 +180,13 @@ mod tests {
     }
 
     #[test]
-    fn both_thresholds_say_what_they_cost() {
-        let humps = Humps::new("x", vec![1.0, 2.0, 3.0, 4.0], vec![8.0, 9.0, 10.0, 9.5], 3.0);
-        assert_eq!((humps.false_positives[0], humps.false_negatives[0]), (Some(0.0), Some(0.5)));
-        let tau = humps.tau[1].expect("the means are apart");
+    fn both_thresholds_have_their_errors() {
+        let histograms =
+            DistanceHistograms::new("x", vec![1.0, 2.0, 3.0, 4.0], vec![8.0, 9.0, 10.0, 9.5], 3.0);
+        assert_eq!((histograms.false_positives[0], histograms.false_negatives[0]), (Some(0.0), Some(0.5)));
+        let tau = histograms.tau[1].expect("the means are apart");
         assert!(tau > 2.5 && tau < 9.1);
-        let svg = svg(&[&humps]);
+        let svg = svg(&[&histograms]);
         assert!(svg.contains("<polyline") && !svg.contains("NaN"));
         assert!(Pairs::new(0, 2_995, 1, 4).line().contains("at most 1.00e-3"));
     }

@@ -1,5 +1,5 @@
-//! One view of one picture against the landmarks of a map: the paper's distances over their thresholds, and what the
-//! whole decision says and why.
+//! One view of one picture against the landmarks of a map: the paper's distances over their thresholds, and the
+//! outcome of the whole decision.
 
 use super::lesson::Class;
 use nalgebra::Matrix2;
@@ -15,36 +15,36 @@ use vision::{
     trace::NoTrace,
 };
 
-/// A detected quad is the picture's from this overlap on, or when it lies inside it.
+/// A detected quad belongs to the picture from this overlap on, or if this share of it lies inside.
 const IOU_SAME: f64 = 0.5;
 const INNER_SHARE: f64 = 0.9;
 
-/// What became of a view of a taught picture.
+/// Outcome of a view of a taught picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Outcome {
     Right,
     /// Another landmark was named.
     Wrong,
-    /// Its points are there, but a connected part of it shows something else: its name, with a doubt.
+    /// Doubtful: its points are there, but a connected part shows something else.
     Doubtful,
-    /// Its points agree, but do not tell where its corners are.
+    /// Its points agree, but do not determine its corners.
     Corners,
-    /// Its icon alone speaks for it: the robot's pose may name it.
+    /// Only its icon matches; guided recognition may name it.
     Plain,
-    /// Perhaps another landmark.
+    /// Ambiguous with another landmark.
     Ambiguous,
-    /// 1 minus likeness is not below its tau.
+    /// 1 minus gradient similarity is not below its threshold.
     Similarity,
-    /// Alike, but too much of it shows something else.
+    /// Similar, but the mismatch share is too large.
     Mismatch,
-    /// Alike, but hardly by more than the frame.
+    /// Similar, but hardly in more than its frame.
     LowContent,
-    /// Alike, but neither C^r nor H^r is below 0.8 of its tau.
+    /// Similar, but neither C^r nor H^r is below 0.8 of its threshold.
     Distances,
-    /// Not among the candidates of the verdict.
+    /// Not among the match candidates.
     NotListed,
-    /// No icon was cut: too small, or cut off.
+    /// No icon: the quad is too small, or leaves the image.
     NoIcon,
     /// No quad was found there.
     NotDetected,
@@ -70,15 +70,16 @@ impl Outcome {
     }
 }
 
-/// One view, judged.
+/// Figures of one view.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ViewFigures {
-    /// H^r / tau, C^r / tau where the corners were given, and (1 - likeness) / tau after alignment; infinite without.
+    /// H^r / tau, C^r / tau where the corners were given, and (1 - gradient similarity) / tau after alignment;
+    /// infinite without.
     pub(crate) ratios: [f64; 3],
     pub(crate) outcome: Outcome,
 }
 
-/// A quad of given corners.
+/// A quad with given corners.
 pub(crate) fn quad(corners_px: Corners) -> Quad {
     Quad {
         corners_px,
@@ -93,9 +94,9 @@ pub(crate) fn quad(corners_px: Corners) -> Quad {
 }
 
 /// The picture's quads among those that the detector finds, the best overlap first.
-pub(crate) fn detected(seen: &Exhibit, p: &Params) -> Vec<Quad> {
-    let truth = seen.corners.points();
-    let mut found: Vec<(f64, Quad)> = detect(&seen.image, &p.detect, &mut NoTrace)
+pub(crate) fn detected(rendered: &Exhibit, p: &Params) -> Vec<Quad> {
+    let truth = rendered.corners.points();
+    let mut found: Vec<(f64, Quad)> = detect(&rendered.image, &p.detect, &mut NoTrace)
         .into_iter()
         .map(|q| (polygon::iou(truth, q.corners_px.points()), q))
         .filter(|(iou, q)| {
@@ -107,27 +108,27 @@ pub(crate) fn detected(seen: &Exhibit, p: &Params) -> Vec<Quad> {
     found.into_iter().map(|(_, q)| q).collect()
 }
 
-/// Judges a view of landmark `id`, whose quad is at `corners`, or wherever the detector finds one.
-pub(crate) fn look(
+/// Recognises a view of landmark `id` in the quad at `corners`, or in those that the detector finds.
+pub(crate) fn score_view(
     class: &Class,
     id: LandmarkId,
-    seen: &Exhibit,
+    rendered: &Exhibit,
     corners: Option<&Corners>,
     p: &Params,
 ) -> ViewFigures {
-    let quads = corners.map_or_else(|| detected(seen, p), |c| vec![quad(*c)]);
+    let quads = corners.map_or_else(|| detected(rendered, p), |c| vec![quad(*c)]);
     let verdicts: Vec<RecognitionResult> =
-        quads.iter().map(|q| recognise(&seen.image, q, &class.models, DistanceKind::Both, p)).collect();
+        quads.iter().map(|q| recognise(&rendered.image, q, &class.models, DistanceKind::Both, p)).collect();
     let mut ratios = [f64::INFINITY; 3];
     if let Some(at) = quads.first().map(|q| q.corners_px) {
-        ratios = paper_ratios(class, id, seen, &at, p);
+        ratios = paper_ratios(class, id, rendered, &at, p);
     }
     let own = |v: &RecognitionResult| v.candidates.iter().find(|c| c.landmark == id).map(|c| c.ratio);
     ratios[2] = verdicts.iter().filter_map(own).fold(f64::INFINITY, f64::min);
     let outcome = verdicts.iter().map(|v| outcome(v, id)).min().unwrap_or(Outcome::NotDetected);
-    // A wrong name on any of its quads is wrong, whatever the others say.
+    // One wrong name makes the view wrong, whatever the other quads say.
     let wrong = verdicts.iter().any(|v| self::outcome(v, id) == Outcome::Wrong);
-    let too_small = quads.first().is_some_and(|q| icon(&seen.image, &q.corners_px, &p.icon).is_err());
+    let too_small = quads.first().is_some_and(|q| icon(&rendered.image, &q.corners_px, &p.icon).is_err());
     let outcome = match outcome {
         _ if wrong => Outcome::Wrong,
         Outcome::NotListed if too_small => Outcome::NoIcon,
@@ -137,9 +138,15 @@ pub(crate) fn look(
 }
 
 /// H^r and C^r of the icon at `corners` to landmark `id`, over tau.
-fn paper_ratios(class: &Class, id: LandmarkId, seen: &Exhibit, corners: &Corners, p: &Params) -> [f64; 3] {
+fn paper_ratios(
+    class: &Class,
+    id: LandmarkId,
+    rendered: &Exhibit,
+    corners: &Corners,
+    p: &Params,
+) -> [f64; 3] {
     let far = [f64::INFINITY; 3];
-    let (Ok(icon), Some(model)) = (icon(&seen.image, corners, &p.icon), class.models.get(id)) else {
+    let (Ok(icon), Some(model)) = (icon(&rendered.image, corners, &p.icon), class.models.get(id)) else {
         return far;
     };
     let d = model.distances(&features(icon, &p.recognise), &p.recognise);
@@ -202,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn the_outcome_names_the_gate() {
+    fn the_outcome_names_the_failed_gate() {
         let id = LandmarkId(3);
         for (recognition, refusal, expected) in [
             (Verdict::Unique(id), None, Outcome::Right),

@@ -1,5 +1,5 @@
-//! `waymark-lab train search`: the two networks of the search from labelled pictures. Labels in, parameters out; the training
-//! is `vision`'s, what they are worth on pictures held out is `held_out`'s.
+//! `waymark-lab train detector`: trains border model and quad classifier from labelled pictures. Labels in,
+//! parameters out; `held_out` has the figures on held-out pictures.
 
 use super::network_training::{ChoiceExample, LabelledExample, TrainParams, train_choice, train_classifier};
 use super::{
@@ -17,19 +17,19 @@ use sim::{scenes::ScenesParams, views::ViewsParams};
 use std::path::{Path, PathBuf};
 use vision::detect::{DetectParams, border_model::network::Network};
 
-/// `waymark-lab train search`.
+/// `waymark-lab train detector`.
 #[derive(Debug, clap::Args)]
-pub(crate) struct SearchArgs {
+pub(crate) struct DetectorArgs {
     /// Folders in the evaluation format, folders with a reviewed list (see docs/EVALUATION.md), or `corridor` for
     /// rendered views, besides the rendered scenes.
     sets: Vec<PathBuf>,
     /// Rendered scenes to learn from; 0 for none.
     #[arg(long, default_value_t = 600, value_parser = clap::value_parser!(u32).range(0..=10_000))]
     scenes: u32,
-    /// A folder of pictures that hang in the scenes beside generated ones.
+    /// A folder of pictures to hang in the scenes beside generated ones.
     #[arg(long, value_name = "DIR")]
     pictures: Option<PathBuf>,
-    /// How many times the labels of a set count; 1 where nothing is said. May be repeated.
+    /// Weight of the labels of a set; default 1. May be repeated.
     #[arg(long, value_name = "SET=TIMES", value_parser = named_weight)]
     weight: Vec<(String, f64)>,
     /// Sides of labelled quads with a shorter side than this, in pixels of the working image, are not learnt from.
@@ -38,34 +38,35 @@ pub(crate) struct SearchArgs {
     /// Parts that the images are dealt to; each is held out once.
     #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u32).range(2..=1000))]
     folds: u32,
-    /// Hidden units of the network of sides, and of the network of things.
-    #[arg(long, default_values_t = [16, 8], num_args = 2, value_names = ["SIDES", "THINGS"])]
+    /// Hidden units of the border model, and of the quad classifier.
+    #[arg(long, default_values_t = [16, 8], num_args = 2, value_names = ["BORDER", "QUADS"])]
     hidden: Vec<usize>,
-    /// How much their weights are kept small.
-    #[arg(long, default_values_t = [5.0, 10.0], num_args = 2, value_names = ["SIDES", "THINGS"])]
+    /// Ridge that keeps their weights small.
+    #[arg(long, default_values_t = [5.0, 10.0], num_args = 2, value_names = ["BORDER", "QUADS"])]
     ridge: Vec<f64>,
     /// Steps of their training.
-    #[arg(long, default_values_t = [500, 400], num_args = 2, value_names = ["SIDES", "THINGS"])]
+    #[arg(long, default_values_t = [500, 400], num_args = 2, value_names = ["BORDER", "QUADS"])]
     steps: Vec<usize>,
     /// Write the networks as parameters here, for --params.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Write the networks as the source file `vision/src/detect/border_model/network_weights.rs` here; run `cargo fmt` after.
+    /// Write the networks as the source file `vision/src/detect/border_model/network_weights.rs` here; run `cargo
+    /// fmt` after.
     #[arg(long, value_name = "FILE")]
     rust: Option<PathBuf>,
     /// Rendered views to learn from, where `corridor` is among the sets.
     #[arg(long, default_value_t = 500, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     views: u32,
-    /// The rendered pictures and the first weights follow from it.
+    /// Seed of the rendered pictures and of the initial weights.
     #[arg(long, default_value_t = 2)]
     seed: u64,
-    /// Seed of the rendered pictures that the networks are judged by: another than --seed.
+    /// Seed of the rendered pictures for evaluation: another than --seed.
     #[arg(long, default_value_t = 1)]
     held_out_seed: u64,
-    /// Rendered pictures of either sort that the networks are judged by; 0 for none.
+    /// Rendered pictures of either kind for evaluation; 0 for none.
     #[arg(long, default_value_t = 300, value_parser = clap::value_parser!(u32).range(0..=10_000))]
     held_out_views: u32,
-    /// One JSON object instead of a table.
+    /// Print one JSON object instead of a table.
     #[arg(long)]
     json: bool,
     #[command(flatten)]
@@ -83,21 +84,21 @@ struct Report {
     images: usize,
     sides: usize,
     lines: usize,
-    things: usize,
-    no_things: usize,
-    /// What held-out outputs of the network of things were multiplied by.
+    objects: usize,
+    no_objects: usize,
+    /// Factor of Platt scaling of the quad classifier.
     calibration: f64,
     results: Vec<Line>,
     detection: Vec<HeldOutFigures>,
 }
 
-/// The name under which rendered pictures are asked for.
+/// Names of rendered sets.
 const CORRIDOR: &str = "corridor";
 const SCENES: &str = "scenes";
 
 /// Runs it.
-pub(super) fn run(args: &SearchArgs) -> anyhow::Result<()> {
-    anyhow::ensure!(args.seed != args.held_out_seed, "--held-out-seed: what was trained on judges nothing");
+pub(super) fn run(args: &DetectorArgs) -> anyhow::Result<()> {
+    anyhow::ensure!(args.seed != args.held_out_seed, "--held-out-seed: must differ from --seed");
     let params = args.parameters.parameters()?;
     let (sets, _keep) = sets(args)?;
     anyhow::ensure!(!sets.is_empty(), "no sets, and --scenes 0: nothing to learn from");
@@ -112,7 +113,7 @@ pub(super) fn run(args: &SearchArgs) -> anyhow::Result<()> {
     let present = [params.quads.side_network().clone(), params.quads.thing_network().clone()];
     let data = Data::gather(&sets, &params, args.min_side_px)?;
     let in_use = held_out::line("in use", &data, &data, &present, &params);
-    // Every part is judged by networks that saw nothing of it.
+    // Every part is evaluated by networks from which it was held out.
     let mut parts = Vec::new();
     for part in 0..args.folds as usize {
         parts.push(fit.networks(&data.sides, Some(part))?);
@@ -136,20 +137,20 @@ pub(super) fn run(args: &SearchArgs) -> anyhow::Result<()> {
         images: data.images,
         sides: data.sides.len(),
         lines: data.sides.iter().map(|r| r.off.len()).sum(),
-        things: all.data.things.iter().filter(|e| e.is_one).count(),
-        no_things: all.data.things.iter().filter(|e| !e.is_one).count(),
+        objects: all.data.quads.iter().filter(|e| e.is_one).count(),
+        no_objects: all.data.quads.iter().filter(|e| !e.is_one).count(),
         calibration: calibration.factor,
         results,
         detection,
     };
-    keep(args, final_networks)?;
+    write_networks(args, final_networks)?;
     screen::say(&if args.json { serde_json::to_string(&report)? } else { table(&report, args.folds) });
     Ok(())
 }
 
 /// The sets to learn from, and the folders of those that were rendered.
-fn sets(args: &SearchArgs) -> anyhow::Result<(Vec<Set>, Vec<scratch::Folder>)> {
-    let (mut sets, mut keep) = (Vec::new(), Vec::new());
+fn sets(args: &DetectorArgs) -> anyhow::Result<(Vec<Set>, Vec<scratch::Folder>)> {
+    let (mut sets, mut folders) = (Vec::new(), Vec::new());
     let mut add = |truth: Truth| {
         let named = args.weight.iter().find(|(name, _)| *name == truth.name);
         sets.push(Set::new(truth, named.map_or(1.0, |(_, times)| *times), args.folds as usize));
@@ -157,37 +158,37 @@ fn sets(args: &SearchArgs) -> anyhow::Result<(Vec<Set>, Vec<scratch::Folder>)> {
     for set in &args.sets {
         let views = ViewsParams { seed: args.seed, views: args.views as usize, ..ViewsParams::default() };
         let (folder, rendered) = rendered::folder(set, None, &views)?;
-        keep.extend(rendered);
+        folders.extend(rendered);
         let name = folder.file_name().map_or(String::new(), |n| n.to_string_lossy().into_owned());
         let list = Reviewed::of(&name, None)?;
-        // A set that says nothing itself is known by what was looked at.
+        // A folder without truth.json has a reviewed list.
         let unlabelled = !folder.join("truth.json").exists() && list.pictures().next().is_some();
         add(if unlabelled {
             Truth::of_reviewed(&name, &folder, &list)
         } else {
-            Truth::read(&folder)?.with_things(&list)
+            Truth::read(&folder)?.with_reviewed(&list)
         });
     }
     if args.scenes > 0 {
         let folder = scratch::Folder::new("scenes")?;
         let params =
             ScenesParams { seed: args.seed, scenes: args.scenes as usize, ..ScenesParams::default() };
-        let hung = args.pictures.as_deref().map(rendered::hung).transpose()?.unwrap_or_default();
-        rendered::write_scenes(folder.path(), &params, hung)?;
+        let pictures = args.pictures.as_deref().map(rendered::pictures).transpose()?.unwrap_or_default();
+        rendered::write_scenes(folder.path(), &params, pictures)?;
         add(Truth::read(folder.path())?);
-        keep.push(folder);
+        folders.push(folder);
     }
-    Ok((sets, keep))
+    Ok((sets, folders))
 }
 
-/// Rendered pictures of another seed, judged by the final networks.
+/// Figures of the final networks on rendered pictures of another seed.
 fn others(
-    args: &SearchArgs,
+    args: &DetectorArgs,
     sets: &[Set],
     networks: &[Network; 2],
     params: &DetectParams,
 ) -> anyhow::Result<Vec<HeldOutFigures>> {
-    let mut judged = Vec::new();
+    let mut evaluated = Vec::new();
     for name in [CORRIDOR, SCENES].into_iter().filter(|name| sets.iter().any(|s| s.truth.name == *name)) {
         if args.held_out_views == 0 {
             continue;
@@ -200,9 +201,9 @@ fn others(
         let (folder, _keep) = rendered::folder(Path::new(name), None, &views)?;
         let set = Set::new(Truth::read(&folder)?, 1.0, 1);
         let title = format!("{name}, seed {}", args.held_out_seed);
-        judged.push(held_out::judged(&title, &set, std::slice::from_ref(networks), params)?);
+        evaluated.push(held_out::evaluated(&title, &set, std::slice::from_ref(networks), params)?);
     }
-    Ok(judged)
+    Ok(evaluated)
 }
 
 /// What networks are fitted with.
@@ -214,29 +215,31 @@ struct Fit<'a> {
 }
 
 impl Fit<'_> {
-    /// Networks of sides and of things from all but one part of the data. Things are told by their sides as the new
-    /// network of sides places them.
+    /// Both networks from all but one part of the data. The classifier sees quads as the new border model places
+    /// them.
     fn networks(&self, sides: &[ChoiceExample], without: Option<usize>) -> anyhow::Result<held_out::Part> {
         let learnt: Vec<ChoiceExample> = sides.iter().filter(|r| Some(r.group) != without).cloned().collect();
-        let side = train_choice(&learnt, &self.how[0]).context("the network of sides")?;
+        let border_model = train_choice(&learnt, &self.how[0]).context("the border model")?;
         let mut params = self.params.clone();
-        params.quads.border_model = Some(side.clone());
+        params.quads.border_model = Some(border_model.clone());
         let data = Data::gather(self.sets, &params, self.min_side_px)?;
         let learnt: Vec<LabelledExample> =
-            data.things.iter().filter(|e| Some(e.group) != without).cloned().collect();
-        let thing = train_classifier(&learnt, &self.how[1]).context("the network of things")?;
-        Ok(held_out::Part { unseen: without, networks: [side, thing], data })
+            data.quads.iter().filter(|e| Some(e.group) != without).cloned().collect();
+        let classifier = train_classifier(&learnt, &self.how[1]).context("the quad classifier")?;
+        Ok(held_out::Part { held_out: without, networks: [border_model, classifier], data })
     }
 }
 
-/// Writes the networks where they are wanted.
-fn keep(args: &SearchArgs, [side, thing]: [Network; 2]) -> anyhow::Result<()> {
-    let models = [("border_model", side), ("quad_classifier", thing)];
+/// Writes the networks to --out and --rust.
+fn write_networks(args: &DetectorArgs, [border_model, classifier]: [Network; 2]) -> anyhow::Result<()> {
+    let models = [("border_model", border_model), ("quad_classifier", classifier)];
     if let Some(path) = &args.out {
-        let [side, thing] = &models;
+        let [(_, border_model), (_, classifier)] = &models;
         write(
             path,
-            &serde_json::to_string(&json!({"quads": {"border_model": side.1, "quad_classifier": thing.1}}))?,
+            &serde_json::to_string(
+                &json!({"quads": {"border_model": border_model, "quad_classifier": classifier}}),
+            )?,
         )?;
     }
     if let Some(path) = &args.rust {
@@ -253,21 +256,21 @@ fn write(path: &Path, text: &str) -> anyhow::Result<()> {
 fn table(r: &Report, folds: u32) -> String {
     let mut lines = vec![
         format!(
-            "{} images: {} sides with {} lines beside them; {} quads that are things, {} that are not",
-            r.images, r.sides, r.lines, r.things, r.no_things
+            "{} images: {} sides with {} lines beside them; {} quads on objects, {} false",
+            r.images, r.sides, r.lines, r.objects, r.no_objects
         ),
         format!(
-            "  {:<18} sides right    off, px   things kept   false an image   ({folds} folds)",
+            "  {:<18} sides right    off, px  objects kept   false an image   ({folds} folds)",
             "networks"
         ),
     ];
     lines.extend(r.results.iter().map(|l| {
         format!(
             "  {:<18} {:11.3} {:10.2} {:13.3} {:16.3}",
-            l.network, l.sides_right, l.side_off_px, l.things_kept, l.false_per_image
+            l.network, l.sides_right, l.side_off_px, l.objects_kept, l.false_per_image
         )
     }));
-    lines.push(format!("  held-out odds of things were scaled by {:.2}", r.calibration));
+    lines.push(format!("  log odds of the classifier were scaled by {:.2}", r.calibration));
     lines.push(format!(
         "  {:<34} quads  recall 0.7   0.85  false an image  corner, px",
         "detection, held out"
@@ -289,8 +292,8 @@ mod tests {
     #[test]
     fn weights_are_checked() {
         assert_eq!(named_weight("museum=3"), Ok(("museum".into(), 3.0)));
-        for wrong in ["museum", "museum=", "museum=0", "museum=inf"] {
-            assert!(named_weight(wrong).is_err(), "{wrong}");
+        for text in ["museum", "museum=", "museum=0", "museum=inf"] {
+            assert!(named_weight(text).is_err(), "{text}");
         }
     }
 }
