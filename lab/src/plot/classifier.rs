@@ -1,0 +1,69 @@
+//! The quad classifier and non-maximum suppression: what was classified, with its probability.
+
+use super::{
+    panels::{explained, on, row, titled},
+    scene::{Rendered, SceneArgs},
+};
+use server::cli::drawing::{BLUE, Colour, GREEN, Picture, RED, WHITE, YELLOW};
+use vision::{
+    detect::{
+        DetectParams, Quad,
+        detector::scored_quads,
+        edge_support::gradients::Gradients,
+        suppression::non_maximum::{snap_sides, suppress_non_maxima},
+    },
+    frame::GrayImage,
+    trace::NoTrace,
+};
+
+/// A room with framed pictures in which all three outcomes are seen.
+const SEED: u64 = 1;
+/// Brightness of the image under the drawing.
+const UNDER: f32 = 0.5;
+
+pub(crate) fn draw(args: &SceneArgs) -> anyhow::Result<Picture> {
+    let work = args.image(Rendered::Room, SEED)?;
+    let p = DetectParams::default();
+    let (scored, edges) = scored_quads(&work, &p, &mut NoTrace);
+    let gradients = Gradients { image: &work, gx: edges.gx(), gy: edges.gy() };
+    let classified = snap_sides(scored.clone(), &gradients, &p.quads);
+    let kept = suppress_non_maxima(classified.clone(), &p.quads);
+    let is_likely = |q: &Quad| q.score >= p.quads.min_probability;
+    let is_kept = |q: &Quad| kept.iter().any(|k| k.corners_px == q.corners_px);
+    let quads: Vec<&Quad> = classified.iter().map(|c| &c.quad).collect();
+    let rejected: Vec<&Quad> = quads.iter().copied().filter(|q| !is_likely(q)).collect();
+    let suppressed: Vec<&Quad> =
+        quads.iter().copied().filter(|q| is_likely(q) && !is_kept(q)).collect();
+
+    let mut left = Picture::of(&work, UNDER);
+    outlines(&mut left, &rejected, RED, 1.4);
+    let mut right = Picture::of(&work, UNDER);
+    outlines(&mut right, &suppressed, BLUE, 1.2);
+    outlines(&mut right, &kept.iter().collect::<Vec<_>>(), GREEN, 2.4);
+    Ok(both(&left, &right, [scored.len(), rejected.len(), suppressed.len(), kept.len()], &work))
+}
+
+fn both(left: &Picture, right: &Picture, counts: [usize; 4], _work: &GrayImage) -> Picture {
+    let [scored, rejected, suppressed, kept] = counts;
+    let left = titled(left, &format!("rejected by the classifier: {rejected} of {scored} proposals"), WHITE);
+    let right = titled(right, "taken for objects", WHITE);
+    explained(
+        row(&[left, right]),
+        &[&[
+            ("below 65 %", RED),
+            (&format!("kept: {kept}"), GREEN),
+            (&format!("suppressed by a better one: {suppressed}"), BLUE),
+            ("numbers: probability in %", YELLOW),
+        ]],
+    )
+}
+
+fn outlines(picture: &mut Picture, quads: &[&Quad], colour: Colour, width_px: f64) {
+    for quad in quads {
+        picture.quad(&quad.corners_px, width_px, colour);
+    }
+    for quad in quads {
+        let [x, y] = on(quad.corners_px.points()[0].into(), 1).map(|c| (c + 5.0).max(0.0) as usize);
+        picture.text([x, y], 2, &format!("{:.0}", 100.0 * quad.score), YELLOW);
+    }
+}
