@@ -12,7 +12,6 @@ use vision::{
         edge_support::gradients::Gradients,
         suppression::non_maximum::{snap_sides, suppress_non_maxima},
     },
-    frame::GrayImage,
     trace::NoTrace,
 };
 
@@ -32,18 +31,17 @@ pub(crate) fn draw(args: &SceneArgs) -> anyhow::Result<Picture> {
     let is_kept = |q: &Quad| kept.iter().any(|k| k.corners_px == q.corners_px);
     let quads: Vec<&Quad> = classified.iter().map(|c| &c.quad).collect();
     let rejected: Vec<&Quad> = quads.iter().copied().filter(|q| !is_likely(q)).collect();
-    let suppressed: Vec<&Quad> =
-        quads.iter().copied().filter(|q| is_likely(q) && !is_kept(q)).collect();
+    let suppressed: Vec<&Quad> = quads.iter().copied().filter(|q| is_likely(q) && !is_kept(q)).collect();
 
     let mut left = Picture::of(&work, UNDER);
     outlines(&mut left, &rejected, RED, 1.4);
     let mut right = Picture::of(&work, UNDER);
     outlines(&mut right, &suppressed, BLUE, 1.2);
     outlines(&mut right, &kept.iter().collect::<Vec<_>>(), GREEN, 2.4);
-    Ok(both(&left, &right, [scored.len(), rejected.len(), suppressed.len(), kept.len()], &work))
+    Ok(both(&left, &right, [scored.len(), rejected.len(), suppressed.len(), kept.len()]))
 }
 
-fn both(left: &Picture, right: &Picture, counts: [usize; 4], _work: &GrayImage) -> Picture {
+fn both(left: &Picture, right: &Picture, counts: [usize; 4]) -> Picture {
     let [scored, rejected, suppressed, kept] = counts;
     let left = titled(left, &format!("rejected by the classifier: {rejected} of {scored} proposals"), WHITE);
     let right = titled(right, "taken for objects", WHITE);

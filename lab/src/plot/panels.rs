@@ -93,3 +93,15 @@ pub(crate) fn scale(at: f64, [low, middle, high]: [Colour; 3]) -> Colour {
     let (from, to, share) = if at < 0.5 { (low, middle, 2.0 * at) } else { (middle, high, 2.0 * at - 1.0) };
     std::array::from_fn(|i| (f64::from(from[i]) * (1.0 - share) + f64::from(to[i]) * share).round() as u8)
 }
+
+/// An ellipse with its axes along those of the picture.
+pub(crate) fn ring(picture: &mut Picture, centre: [f64; 2], half: [f64; 2], width_px: f64, colour: Colour) {
+    let steps = (2.0 * half[0].max(half[1])).clamp(12.0, 90.0) as usize;
+    let at = |i: usize| {
+        let (sin, cos) = (std::f64::consts::TAU * i as f64 / steps as f64).sin_cos();
+        [centre[0] + half[0] * cos, centre[1] + half[1] * sin]
+    };
+    for i in 0..steps {
+        picture.line(at(i), at(i + 1), width_px, colour);
+    }
+}

@@ -2,9 +2,14 @@
 
 use super::Target;
 use anyhow::Context as _;
+use nalgebra::Vector3;
 use server::cli::pictures;
 use sim::{
+    building::Building,
+    camera::Camera,
+    render::Renderer,
     scenes::{Scenes, ScenesParams},
+    sensor::SensorParams,
     views::{Views, ViewsParams},
 };
 use std::path::PathBuf;
@@ -34,6 +39,8 @@ pub(crate) struct SceneArgs {
 pub(crate) enum Rendered {
     /// A corridor with posters, doors and a tiled floor.
     Corridor,
+    /// The same, with the camera turned down.
+    Floor,
     /// A room with framed pictures, posters, windows and signs.
     Room,
 }
@@ -48,6 +55,7 @@ impl SceneArgs {
                 let params = ViewsParams { seed, views: 1, ..ViewsParams::default() };
                 Views::new(&params).next().context("no view was rendered")?.image
             }
+            (None, Rendered::Floor) => floor(seed),
             (None, Rendered::Room) => {
                 let params = ScenesParams { seed, scenes: 1, ..ScenesParams::default() };
                 Scenes::new(&params, vec![]).next().context("no scene was rendered")?.image
@@ -56,4 +64,14 @@ impl SceneArgs {
         let factor = working_factor(&image, DetectParams::default().quads.working_side_px);
         Ok(if factor > 1 { reduce(&image, factor) } else { image })
     }
+}
+
+/// Along the corridor from 1.2 m above the floor, the camera turned down.
+fn floor(seed: u64) -> GrayImage {
+    let camera = map::extrinsics::pan_tilt(0.3, -0.3, Vector3::new(0.0, 0.0, 1.2));
+    let map_from_robot = map::pose2::Pose2::new(2.0, -0.3, 0.0).to_isometry3();
+    let building = Building::corridor(seed);
+    Renderer::new(Camera::vga())
+        .render(&building, &(map_from_robot * camera), &SensorParams::default(), seed)
+        .image
 }

@@ -8,7 +8,7 @@ use tempfile::TempDir;
 use tests::command::{check_help, check_refused};
 
 /// Options that each command must name in its help.
-const OPTIONS: [(&str, &[&str]); 22] = [
+const OPTIONS: [(&str, &[&str]); 25] = [
     (
         "evaluate navigation",
         &["--drives", "--posters", "--length-m", "--rate-hz", "--seed", "--json", "--plot"],
@@ -85,6 +85,9 @@ const OPTIONS: [(&str, &[&str]); 22] = [
         ],
     ),
     ("train similarity", &["--out", "--json", "--without", "--views", "--seed", "<SETS>"]),
+    ("plot tiling", &["--out", "--image", "--seed"]),
+    ("plot icon", &["--out", "--image", "--seed"]),
+    ("plot expected", &["--out", "--seed"]),
     ("bench", &["--frames", "--landmarks", "--rounds", "--seed", "--json"]),
     (
         "bench detect",
@@ -115,7 +118,7 @@ fn every_command_explains_its_options() {
 
 #[test]
 fn what_does_not_exist_is_refused() {
-    for line in ["evaluate", "evaluate recognition --distance near .", "train", "serve"] {
+    for line in ["evaluate", "evaluate recognition --distance near .", "train", "plot icon", "serve"] {
         check_refused(Path::new(PROGRAM), line, LONGEST);
     }
 }

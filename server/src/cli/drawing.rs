@@ -234,8 +234,12 @@ impl Picture {
 
     fn write(&self, path: &Path, packed: png::CompressionType, by: png::FilterType) -> anyhow::Result<()> {
         let mut out = Vec::new();
-        png::PngEncoder::new_with_quality(&mut out, packed, by)
-            .write_image(&self.rgb, self.width as u32, self.height as u32, ExtendedColorType::Rgb8)?;
+        png::PngEncoder::new_with_quality(&mut out, packed, by).write_image(
+            &self.rgb,
+            self.width as u32,
+            self.height as u32,
+            ExtendedColorType::Rgb8,
+        )?;
         anyhow::Context::with_context(std::fs::write(path, out), || {
             format!("cannot write {}", path.display())
         })
