@@ -25,8 +25,10 @@ use vision::{
 /// How far each corner is moved before alignment, as shares of the mean side: as an edge of a frame, a shadow or a mat
 /// that was taken for the border moves them.
 const OFF: [[f64; 2]; 4] = [[0.07, -0.05], [0.09, 0.04], [-0.06, 0.08], [0.03, -0.09]];
-/// Enlargement of the icons.
+/// Enlargement of the image.
 const FACTOR: usize = 2;
+/// Enlargement of the icons.
+const ICON_FACTOR: usize = 3;
 
 pub(crate) fn draw(args: &LandmarkArgs) -> anyhow::Result<Picture> {
     let p = Params::default();
@@ -51,17 +53,14 @@ pub(crate) fn draw(args: &LandmarkArgs) -> anyhow::Result<Picture> {
         .context("the alignment was given up: the picture shows something else")?;
 
     let alike = |icon: &Icon| likeness(icon, &learnt, &p.recognise.correlation);
+    let pair = |icon: &Icon, words: &str, colour| {
+        let apart = difference(icon, &learnt);
+        row(&[titled(&drawn(icon, ICON_FACTOR), words, colour), titled(&apart, "difference", colour)])
+    };
     let icons = column(&[
-        row(&[
-            titled(&drawn(&learnt, FACTOR), "exemplar", WHITE),
-            titled(&drawn(&before, FACTOR), "before", RED),
-            titled(&drawn(&after.icon, FACTOR), "after", GREEN),
-        ]),
-        row(&[
-            Picture::black(p.icon.size * FACTOR, 1),
-            titled(&difference(&before, &learnt), "difference", RED),
-            titled(&difference(&after.icon, &learnt), "difference", GREEN),
-        ]),
+        titled(&drawn(&learnt, ICON_FACTOR), "exemplar", WHITE),
+        pair(&before, "before", RED),
+        pair(&after.icon, "after", GREEN),
     ]);
     let farthest = |c: &Corners| c.furthest_px(&seen.corners);
     let before_words =
@@ -71,8 +70,10 @@ pub(crate) fn draw(args: &LandmarkArgs) -> anyhow::Result<Picture> {
     Ok(explained(
         row(&[titled(&quads(&seen, &before_px, &after), "the quad in the image", WHITE), icons]),
         &[
-            &[(&before_words, RED)],
-            &[(&after_words, GREEN), ("white: true corners", WHITE), ("yellow: moves", YELLOW)],
+            (&before_words, RED),
+            (&after_words, GREEN),
+            ("white: true corners", WHITE),
+            ("yellow: how far they moved", YELLOW),
         ],
     ))
 }
@@ -108,5 +109,5 @@ fn difference(a: &Icon, b: &Icon) -> Picture {
     };
     let apart: Vec<f32> =
         normal(a).iter().zip(normal(b)).map(|(x, y)| ((x - y).abs() * 100.0).min(255.0)).collect();
-    Picture::of(&gray(a.size, &apart), 1.0).enlarged(FACTOR)
+    Picture::of(&gray(a.size, &apart), 1.0).enlarged(ICON_FACTOR)
 }

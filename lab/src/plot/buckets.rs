@@ -35,13 +35,13 @@ pub(crate) fn draw(args: &LandmarkArgs) -> anyhow::Result<Picture> {
     ];
     Ok(explained(
         column(&rows),
-        &[&[
+        &[
             ("numbers: correlation in %", YELLOW),
             ("100", GREEN),
             ("0", [150, 150, 150]),
             ("-100", RED),
-            ("rank: the one that counts for Cr", WHITE),
-        ]],
+            ("framed: the one that counts for Cr", WHITE),
+        ],
     ))
 }
 
@@ -64,7 +64,7 @@ fn compared(
     Ok(row(&[
         titled(&drawn(&own.icon, FACTOR), title, WHITE),
         titled(&drawn(&learnt.icon, FACTOR), "exemplar", WHITE),
-        titled(&map(&grey, p, rank), &format!("grey levels: Cr {distance:.2}"), WHITE),
+        titled(&map(&grey, p, rank), &format!("grey: Cr {distance:.2}"), WHITE),
         titled(&map(&gradient, p, None), &format!("gradients: {likeness:.2}"), WHITE),
     ]))
 }
@@ -87,7 +87,7 @@ fn map(values: &[f32], p: &Params, marked: Option<usize>) -> Picture {
         for (u, v) in (0..cell - 1).flat_map(|v| (0..cell - 1).map(move |u| (u, v))) {
             picture.blend((left + u) as i64, (top + v) as i64, colour, 1.0);
         }
-        let words = format!("{:.0}", 100.0 * value);
+        let words = ((100.0 * value).round() as i32).to_string();
         let x = left + (cell - 12 * words.len().min(3)) / 2;
         picture.text([x, top + cell / 2 - 7], 2, &words, YELLOW);
         if marked == Some(i) {

@@ -39,7 +39,7 @@ pub(crate) fn draw(args: &LandmarkArgs) -> anyhow::Result<Picture> {
         })
         .collect();
     let top = row(&[
-        titled(&plane(&modes, &chosen), "views by mode 1 (across) and 2 (up)", WHITE),
+        titled(&plane(&modes, &chosen), "modes 1 (across), 2 (up)", WHITE),
         column(&[
             means(&modes, &p),
             stand_ins(&taught.model.exemplars.iter().map(|e| e.icon()).collect::<Vec<_>>()),
@@ -51,12 +51,12 @@ pub(crate) fn draw(args: &LandmarkArgs) -> anyhow::Result<Picture> {
         titled(&sheet(&taught.views, &chosen), "the training views: a photograph and generated ones", WHITE);
     Ok(explained(
         column(&[top, views]),
-        &[&[
+        &[
             ("exemplar of the mean", COLOURS[0]),
             ("of mode 1", COLOURS[1]),
             ("of mode 2", COLOURS[2]),
             (&share, YELLOW),
-        ]],
+        ],
     ))
 }
 

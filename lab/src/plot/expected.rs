@@ -111,10 +111,11 @@ pub(crate) fn draw(args: &ExpectedArgs) -> anyhow::Result<Picture> {
     let found = words.first().map_or("nothing was found where it is expected", String::as_str);
     let expected = format!("expected from the known pose: {}, with gates", expectations.len());
     Ok(explained(
-        row(&[titled(&whole, "the frame", WHITE), titled(&near, "the landmark that was asked for", WHITE)]),
+        row(&[titled(&whole, "the frame", WHITE), titled(&near, "the one asked for", WHITE)]),
         &[
-            &[(&expected, BLUE), (&format!("named by the picture alone: {}", named.len()), GREEN)],
-            &[(&format!("cut by the image border, {found}"), ORANGE)],
+            (&expected, BLUE),
+            (&format!("named by the picture alone: {}", named.len()), GREEN),
+            (&format!("cut by the image border, {found}"), ORANGE),
         ],
     ))
 }

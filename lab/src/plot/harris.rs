@@ -58,8 +58,10 @@ pub(crate) fn draw(args: &LandmarkArgs) -> anyhow::Result<Picture> {
     Ok(explained(
         picture,
         &[
-            &[("left: icon of the quad, right: exemplar", WHITE), ("Harris points", ORANGE)],
-            &[(&counted, GREEN), (&distance, CYAN)],
+            ("left: icon of the quad, right: exemplar", WHITE),
+            ("Harris points", ORANGE),
+            (&counted, GREEN),
+            (&distance, CYAN),
         ],
     ))
 }

@@ -21,7 +21,7 @@ pub(crate) fn draw(args: &LandmarkArgs) -> anyhow::Result<Picture> {
     let cut_out = icon(&seen.image, &seen.corners, &p.icon)?;
     let nearest = taught.nearest(&features(cut_out.clone(), &p.recognise), &p);
 
-    let box_px = around(&seen.corners, 24.0, &seen.image);
+    let box_px = around(&seen.corners, 34.0, &seen.image);
     let mut left = Picture::of(&cut(&seen.image, box_px), 0.9);
     let place = |at: &Point2<f64>| [at.x - box_px[0] as f64, at.y - box_px[1] as f64];
     let buckets = p.recognise.correlation.per_side();
@@ -52,18 +52,13 @@ pub(crate) fn draw(args: &LandmarkArgs) -> anyhow::Result<Picture> {
         middle.line([0.0, at], [last, at], 0.8, CYAN);
     }
     let pictures = [
-        titled(&left, "quad in the image", WHITE),
+        titled(&left, "in the image", WHITE),
         titled(&middle, "its icon", WHITE),
         titled(&drawn(&nearest, FACTOR), "nearest exemplar", WHITE),
     ];
     let size = format!("icon: {0} x {0} grey levels, enlarged {FACTOR} times", p.icon.size);
     Ok(explained(
         row(&pictures),
-        &[&[
-            ("quad", GREEN),
-            ("the corners say which way is up", ORANGE),
-            ("buckets", CYAN),
-            (&size, YELLOW),
-        ]],
+        &[("quad", GREEN), ("the corners say which way is up", ORANGE), ("buckets", CYAN), (&size, YELLOW)],
     ))
 }

@@ -166,7 +166,7 @@ pub(crate) fn plain() -> Conditions {
             shot_noise: 0.012,
             ..sim::sensor::SensorParams::ideal()
         },
-        wall: 0.8,
+        wall: 0.9,
         ..Conditions::default()
     }
 }
@@ -178,9 +178,9 @@ pub(crate) fn oblique() -> Conditions {
         yaw_rad: -0.55,
         pitch_rad: 0.08,
         roll_rad: 0.03,
-        size_px: 190.0,
+        size_px: 210.0,
         side_light: 0.35,
-        sensor: sim::sensor::SensorParams { exposure: 0.85, ..base.sensor.clone() },
+        sensor: sim::sensor::SensorParams { exposure: 1.15, ..base.sensor.clone() },
         ..base
     }
 }

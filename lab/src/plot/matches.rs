@@ -4,7 +4,7 @@
 use super::{
     icon::SEED,
     landmark::{LandmarkArgs, oblique},
-    panels::{GAP_PX, column, explained, gray, on, ring, titled},
+    panels::{GAP_PX, column, explained, gray, on, ring, row, titled},
 };
 use anyhow::Context as _;
 use server::cli::drawing::{Colour, GREEN, Picture, RED, WHITE, YELLOW};
@@ -51,9 +51,13 @@ pub(crate) fn draw(args: &LandmarkArgs) -> anyhow::Result<Picture> {
             titled(&bottom, "taught points where the homography puts them in the frame", WHITE),
         ]),
         &[
-            &[(&lines[0], GREEN), (&lines[1], RED)],
-            &[("below: looks as taught", GREEN), ("like something else", RED), ("undecided", SILENT)],
-            &[(&lines[2], YELLOW), (&lines[3], YELLOW)],
+            (&lines[0], GREEN),
+            (&lines[1], RED),
+            ("below: looks as taught", GREEN),
+            ("like something else", RED),
+            ("undecided", SILENT),
+            (&lines[2], YELLOW),
+            (&lines[3], YELLOW),
         ],
     ))
 }
@@ -80,16 +84,13 @@ impl<'a> SideBySide<'a> {
             let patch = self.patches[i];
             Picture::of(&gray(patch.side, &patch.pixels), 0.7).enlarged(self.factors[i])
         });
-        let mut picture = Picture::black(2 * SIDE_PX + GAP_PX, left.height().max(right.height()));
-        picture.paste(&left, [0, 0]);
-        picture.paste(&right, [SIDE_PX + GAP_PX, 0]);
-        picture
+        row(&[left, right])
     }
 
     /// A place on the landmark, in the left or the right patch.
     fn at(&self, i: usize, at: [f64; 2]) -> [f64; 2] {
         let [x, y] = on(self.patches[i].to_patch(at), self.factors[i]);
-        [x + (i * (SIDE_PX + GAP_PX)) as f64, y]
+        [x + (i * (self.patches[0].side * self.factors[0] + GAP_PX)) as f64, y]
     }
 
     fn matches(&self, found: &Hypothesis, seen: &[Point], taught: &[Point]) -> Picture {

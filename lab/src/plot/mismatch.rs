@@ -45,8 +45,11 @@ pub(crate) fn draw(args: &LandmarkArgs) -> anyhow::Result<Picture> {
     Ok(explained(
         column(&rows),
         &[
-            &[("dot: middle of a window,", WHITE), ("it shows something else", RED), ("or not", GREEN)],
-            &[("blue: a cell shows nothing where the exemplar does", BLUE), (&least, YELLOW)],
+            ("dot: middle of a window,", WHITE),
+            ("it shows something else", RED),
+            ("or not", GREEN),
+            ("blue: a cell shows nothing where the exemplar does", BLUE),
+            (&least, YELLOW),
         ],
     ))
 }

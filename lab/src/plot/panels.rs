@@ -15,7 +15,8 @@ pub(crate) type Words<'a> = (&'a str, Colour);
 
 /// A picture with a line of words above it.
 pub(crate) fn titled(picture: &Picture, words: &str, colour: Colour) -> Picture {
-    let mut out = Picture::black(picture.width(), picture.height() + LINE_PX);
+    let width = picture.width().max(2 + width_px(words));
+    let mut out = Picture::black(width, picture.height() + LINE_PX);
     out.text([2, 4], DOT_PX, words, colour);
     out.paste(picture, [0, LINE_PX]);
     out
@@ -47,9 +48,27 @@ pub(crate) fn column(pictures: &[Picture]) -> Picture {
     out
 }
 
-/// Lines of words below a picture.
-pub(crate) fn explained(picture: Picture, lines: &[&[Words<'_>]]) -> Picture {
+/// Words below a picture, as many of them in a line as there is room for.
+pub(crate) fn explained(picture: Picture, words: &[Words<'_>]) -> Picture {
+    let room = picture.width() / width_px("-");
+    let (mut lines, mut taken): (Vec<Vec<Words<'_>>>, usize) = (vec![vec![]], 0);
+    for word in words {
+        let needed = word.0.chars().count() + 2;
+        if taken > 0 && taken + needed > room {
+            lines.push(vec![]);
+            taken = 0;
+        }
+        taken += needed;
+        if let Some(line) = lines.last_mut() {
+            line.push(*word);
+        }
+    }
     lines.iter().fold(picture, |picture, line| picture.with_legend(line))
+}
+
+/// Width of words as they are written above a picture.
+fn width_px(words: &str) -> usize {
+    words.chars().count() * (sim::font::COLUMNS + 1) * DOT_PX
 }
 
 /// A part of an image: left, top, width, height, cut at its border.

@@ -62,15 +62,15 @@ pub(crate) fn draw(args: &LandmarkArgs) -> anyhow::Result<Picture> {
         }
     }
     let [kept, plain, outside] = counts;
-    let side = format!("patch: {0} x {0} px, circles as large as the scale", patch.patch.side);
+    let side = format!("patch of {0} x {0} px, circles: scale", patch.patch.side);
     Ok(explained(
         row(&[titled(&left, "photograph", WHITE), titled(&right, &side, WHITE)]),
         &[
-            &[("quad", CYAN), ("patch with its margin", WHITE), (&format!("taught: {kept}"), GREEN)],
-            &[
-                (&format!("like a plain structure: {plain}"), ORANGE),
-                (&format!("outside of the quad: {outside}"), BLUE),
-            ],
+            ("quad", CYAN),
+            ("patch with its margin", WHITE),
+            (&format!("taught: {kept}"), GREEN),
+            (&format!("like a plain structure: {plain}"), ORANGE),
+            (&format!("outside of the quad: {outside}"), BLUE),
         ],
     ))
 }
