@@ -4,6 +4,7 @@
 
 mod bench;
 mod evaluate;
+mod plot;
 mod train;
 
 use clap::{Parser, Subcommand};
@@ -34,6 +35,9 @@ enum Command {
     /// Fit parameters of detector and confidence to labelled or rendered pictures.
     #[command(subcommand)]
     Train(train::Command),
+    /// A picture of every stage of the method, drawn from what the program itself works out there.
+    #[command(subcommand)]
+    Plot(plot::Command),
 }
 
 fn main() -> ExitCode {
@@ -43,6 +47,7 @@ fn main() -> ExitCode {
         Command::Evaluate(command) => evaluate::run(command),
         Command::Bench(args) => bench::run(args),
         Command::Train(command) => train::run(command),
+        Command::Plot(command) => plot::run(command),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

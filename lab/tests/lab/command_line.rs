@@ -11,7 +11,7 @@ use tests::{
 };
 
 /// Options that each command must name in its help.
-const OPTIONS: [(&str, &[&str]); 22] = [
+const OPTIONS: [(&str, &[&str]); 25] = [
     (
         "evaluate navigation",
         &["--drives", "--posters", "--length-m", "--rate-hz", "--seed", "--json", "--plot"],
@@ -88,6 +88,9 @@ const OPTIONS: [(&str, &[&str]); 22] = [
         ],
     ),
     ("train similarity", &["--out", "--json", "--without", "--views", "--seed", "<SETS>"]),
+    ("plot tiling", &["--out", "--image", "--seed"]),
+    ("plot icon", &["--out", "--image", "--seed"]),
+    ("plot expected", &["--out", "--seed"]),
     ("bench", &["--frames", "--landmarks", "--rounds", "--seed", "--json"]),
     (
         "bench detect",
@@ -123,7 +126,7 @@ fn commands_in_the_documents_exist() {
 
 #[test]
 fn unknown_commands_and_values_are_refused() {
-    for line in ["evaluate", "evaluate recognition --distance near .", "train", "serve"] {
+    for line in ["evaluate", "evaluate recognition --distance near .", "train", "plot icon", "serve"] {
         check_refused(Path::new(PROGRAM), line, LONGEST);
     }
 }

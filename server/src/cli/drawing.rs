@@ -214,11 +214,32 @@ impl Picture {
         out
     }
 
-    /// Writes it as a PNG file.
+    /// The same with each of red, green and blue on one of `levels`: files of it are far smaller.
+    #[must_use]
+    pub fn posterised(&self, levels: u8) -> Self {
+        let steps = f64::from(levels.max(2) - 1);
+        let of = |c: &u8| ((f64::from(*c) * steps / 255.0).round() * 255.0 / steps).round() as u8;
+        Self { rgb: self.rgb.iter().map(of).collect(), ..*self }
+    }
+
+    /// Writes it as a PNG file, quickly.
     pub fn save(&self, path: &Path) -> anyhow::Result<()> {
+        self.write(path, png::CompressionType::Fast, png::FilterType::Sub)
+    }
+
+    /// Writes it as a PNG file, as small as may be.
+    pub fn save_small(&self, path: &Path) -> anyhow::Result<()> {
+        self.write(path, png::CompressionType::Best, png::FilterType::NoFilter)
+    }
+
+    fn write(&self, path: &Path, packed: png::CompressionType, by: png::FilterType) -> anyhow::Result<()> {
         let mut out = Vec::new();
-        png::PngEncoder::new_with_quality(&mut out, png::CompressionType::Fast, png::FilterType::Sub)
-            .write_image(&self.rgb, self.width as u32, self.height as u32, ExtendedColorType::Rgb8)?;
+        png::PngEncoder::new_with_quality(&mut out, packed, by).write_image(
+            &self.rgb,
+            self.width as u32,
+            self.height as u32,
+            ExtendedColorType::Rgb8,
+        )?;
         anyhow::Context::with_context(std::fs::write(path, out), || {
             format!("cannot write {}", path.display())
         })

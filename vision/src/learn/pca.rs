@@ -101,6 +101,13 @@ pub fn modes(icons: &[&[f32]]) -> Option<Modes> {
     Some(result)
 }
 
+impl Modes {
+    /// Coordinate of each icon on each kept mode, mode by mode.
+    pub fn coordinates(&self) -> &[Vec<f64>] {
+        &self.coordinates
+    }
+}
+
 /// The exemplars of mean and modes: nearest to the mean; then, for each mode, the largest cosine with it, of
 /// those not chosen before. Ties go to the lowest index. Between one and three.
 pub fn exemplars(modes: &Modes) -> Vec<Exemplar> {

@@ -44,6 +44,11 @@ pub struct Target {
 }
 
 impl Target {
+    /// The points.
+    pub fn points(&self) -> &[Point] {
+        &self.points
+    }
+
     /// Unpacks `taught`.
     pub fn new(taught: &[TaughtPoint]) -> Self {
         Self {
@@ -89,14 +94,25 @@ impl PointEvidence {
 
 /// A homography that has yet to be verified.
 #[derive(Debug, Clone)]
-pub(crate) struct Hypothesis {
-    pub(crate) turned: usize,
-    pub(crate) matches: Vec<Match>,
-    pub(crate) consensus: Consensus,
+pub struct Hypothesis {
+    /// Quarters by which the patch was turned.
+    pub turned: usize,
+    /// Tentative matches.
+    pub matches: Vec<Match>,
+    /// Those of them that agree.
+    pub consensus: Consensus,
     /// Matches at different places.
-    pub(crate) distinct: usize,
+    pub distinct: usize,
     /// log10 of the tail of the inliers.
-    pub(crate) log10_matches: f64,
+    pub log10_matches: f64,
+}
+
+impl Hypothesis {
+    /// Every point of the target, looked at where the homography puts it in `seen`.
+    pub fn checks(&self, seen: &SeenPatch, target: &Target) -> Vec<Check> {
+        let map = &self.consensus.seen_from_taught;
+        checks(seen, self.turned, map, &target.points, &target.plain)
+    }
 }
 
 /// The homography that matches of `points` (of a patch, turned by `turned` quarters) with the target agree on.
@@ -123,10 +139,9 @@ pub(crate) fn hypothesis(
 }
 
 /// The evidence for `hypothesis` in `seen`. `None` where its corners are no quad in the image.
-pub(crate) fn verified(seen: &SeenPatch, hypothesis: &Hypothesis, target: &Target) -> Option<PointEvidence> {
+pub fn verified(seen: &SeenPatch, hypothesis: &Hypothesis, target: &Target) -> Option<PointEvidence> {
     let Hypothesis { turned, matches, consensus, distinct, log10_matches } = hypothesis;
-    let map = &consensus.seen_from_taught;
-    let checks = checks(seen, *turned, map, &target.points, &target.plain);
+    let checks = hypothesis.checks(seen, target);
     let used: Vec<[f32; 2]> =
         consensus.inliers.iter().map(|i| target.points[matches[*i].taught].at).collect();
     let (checked, agreeing, variants) = held_out(&checks, target, &used);
@@ -232,7 +247,7 @@ pub fn verify_at(image: &GrayImage, taught: &[TaughtPoint], predicted_px: &Corne
     verified(&seen, &found, &target)
 }
 
-/// [`hypothesis`] in a global search.
-pub(crate) fn global_hypothesis(points: &[Point], turned: usize, target: &Target) -> Option<Hypothesis> {
+/// The homography in a search of the whole map.
+pub fn global_hypothesis(points: &[Point], turned: usize, target: &Target) -> Option<Hypothesis> {
     hypothesis(points, turned, target, &GLOBAL_GATE, MIN_LOG10_MATCHES)
 }

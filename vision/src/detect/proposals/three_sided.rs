@@ -81,7 +81,7 @@ pub fn leftover(segments: &[EdgeSegment], quads: &[Quad], g: &Gradients, p: &Det
 }
 
 /// Indices of the longest segments that neither lie along a border of a chosen quad nor inside one, ascending.
-fn unexplained(segments: &[EdgeSegment], quads: &[Quad]) -> Vec<usize> {
+pub fn unexplained(segments: &[EdgeSegment], quads: &[Quad]) -> Vec<usize> {
     let borders: Vec<&[Point2<f64>; 4]> = quads
         .iter()
         .flat_map(|q| std::iter::once(&q.corners_px).chain(&q.alternates))

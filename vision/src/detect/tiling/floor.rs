@@ -21,6 +21,13 @@ pub(crate) struct FloorLine {
 }
 
 impl FloorLine {
+    /// Its ends, to the right and ahead of the camera's foot.
+    pub(crate) fn ends(&self) -> [Point2<f64>; 2] {
+        let (sin, cos) = self.direction_rad.sin_cos();
+        let half = Vector2::new(cos, sin) * (0.5 * self.length);
+        [self.middle - half, self.middle + half]
+    }
+
     /// Distance of the line's middle across a direction. The direction is the family's: a short line's own would
     /// throw its offset far off.
     pub(crate) fn offset_along(&self, direction_rad: f64) -> f64 {
@@ -85,6 +92,11 @@ impl Floor {
         horizons(segments, width, height).into_iter().map(floor).collect()
     }
 
+    /// Row of the horizon below the optical axis.
+    pub(crate) fn horizon_px(&self) -> f64 {
+        self.camera.cy_px + self.camera.fy_px * self.tilt_rad.tan()
+    }
+
     /// Whether right angles on the floor are preserved.
     pub(crate) fn square(&self) -> bool {
         self.square
@@ -114,8 +126,7 @@ impl Floor {
     /// Where the ray of a pixel meets the floor: to the right and ahead of the camera's foot.
     fn point(&self, px: &Point2<f64>, p: &TilingParams) -> Option<Point2<f64>> {
         let (sin, cos) = self.tilt_rad.sin_cos();
-        let horizon_px = self.camera.cy_px + self.camera.fy_px * self.tilt_rad.tan();
-        let below_px = px.y - horizon_px - p.horizon_gap_px;
+        let below_px = px.y - self.horizon_px() - p.horizon_gap_px;
         if below_px.is_nan() || below_px <= 0.0 {
             return None;
         }

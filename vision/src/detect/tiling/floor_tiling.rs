@@ -27,29 +27,57 @@ const BIN_DEG: f64 = 2.0;
 
 /// Sets the lines of regular patterns on the floor apart. Leaves everything in `kept` when `p.remove` is off.
 pub fn untile(segments: Vec<EdgeSegment>, image_size: (usize, usize), p: &TilingParams) -> Untiled {
-    let floors = if p.remove { Floor::possible(&segments, image_size, p) } else { Vec::new() };
-    // Of several floors the one with most of a pattern, the first of equals.
-    let mut best = (0, Vec::new());
-    for floor in &floors {
-        let lines: Vec<FloorLine> =
-            segments.iter().enumerate().filter_map(|(i, s)| floor.line(i, s, p)).collect();
-        let mut tiling = vec![false; segments.len()];
-        for direction_rad in families(&lines, floor.square()) {
-            for line in pattern(&lines, direction_rad, p) {
-                tiling[line] = true;
-            }
-        }
-        let count = tiling.iter().filter(|t| **t).count();
-        if count > best.0 {
-            best = (count, tiling);
-        }
-    }
+    let is_tiling = if p.remove {
+        patterned_floor(&segments, image_size, p).map_or_else(Vec::new, |(_, reading)| reading.is_tiling)
+    } else {
+        Vec::new()
+    };
     let mut untiled = Untiled::default();
     for (i, segment) in segments.into_iter().enumerate() {
-        let gone = best.1.get(i).copied().unwrap_or(false);
+        let gone = is_tiling.get(i).copied().unwrap_or(false);
         if gone { &mut untiled.removed } else { &mut untiled.kept }.push(segment);
     }
     untiled
+}
+
+/// The segments of an image on one of the floors that it may show.
+pub(crate) struct FloorReading {
+    pub(crate) lines: Vec<FloorLine>,
+    pub(crate) families: Vec<Family>,
+    /// Of each segment, whether it is part of a pattern.
+    pub(crate) is_tiling: Vec<bool>,
+}
+
+impl FloorReading {
+    fn new(floor: &Floor, segments: &[EdgeSegment], p: &TilingParams) -> Self {
+        let lines: Vec<FloorLine> =
+            segments.iter().enumerate().filter_map(|(i, s)| floor.line(i, s, p)).collect();
+        let directions = families(&lines, floor.square()).into_iter();
+        let families: Vec<Family> = directions.filter_map(|d| Family::new(&lines, d, p)).collect();
+        let mut is_tiling = vec![false; segments.len()];
+        for line in families.iter().flat_map(|f| &f.pattern) {
+            is_tiling[lines[*line].segment] = true;
+        }
+        Self { lines, families, is_tiling }
+    }
+}
+
+/// Of the floors that the image may show the one with most of a pattern, the first of equals; none without any.
+pub(crate) fn patterned_floor(
+    segments: &[EdgeSegment],
+    image_size: (usize, usize),
+    p: &TilingParams,
+) -> Option<(Floor, FloorReading)> {
+    let mut best: Option<(Floor, FloorReading)> = None;
+    let mut most = 0;
+    for floor in Floor::possible(segments, image_size, p) {
+        let reading = FloorReading::new(&floor, segments, p);
+        let count = reading.is_tiling.iter().filter(|t| **t).count();
+        if count > most {
+            (most, best) = (count, Some((floor, reading)));
+        }
+    }
+    best
 }
 
 /// Directions of the two families, [0, pi). On a floor of known scale they are at right angles; otherwise the second
@@ -91,31 +119,55 @@ fn peak(lines: &[FloorLine], turn_deg: usize, allowed: impl Fn(f64) -> bool) -> 
     best.map(middle)
 }
 
-/// Segments of the evenly spaced lines among those that run along a direction; empty unless there are enough.
-fn pattern(lines: &[FloorLine], direction_rad: f64, p: &TilingParams) -> Vec<usize> {
-    let off = |line: &FloorLine, from: f64| {
-        let turn = (line.direction_rad - from).rem_euclid(std::f64::consts::PI);
-        if turn > std::f64::consts::FRAC_PI_2 { turn - std::f64::consts::PI } else { turn }
-    };
-    let tolerance_rad = p.family_deg.to_radians();
-    let members = |from: f64, reach_rad: f64| lines.iter().filter(move |l| off(l, from).abs() <= reach_rad);
-    // The bin is coarse: the direction is the members' mean, from the members of that mean.
-    let mut direction_rad = direction_rad;
-    for _ in 0..3 {
-        let reach = tolerance_rad + (0.5 * BIN_DEG).to_radians();
-        let (mut turn, mut weight) = (0.0, 0.0);
-        for line in members(direction_rad, reach) {
-            turn += line.length * off(line, direction_rad);
-            weight += line.length;
+/// Lines of the floor that run along one direction, and the evenly spaced ones among them.
+pub(crate) struct Family {
+    /// The members' mean direction on the floor.
+    pub(crate) direction_rad: f64,
+    /// Indices of its lines.
+    pub(crate) members: Vec<usize>,
+    /// Offset and length of each member.
+    pub(crate) offsets: Vec<(f64, f64)>,
+    pub(crate) lattice: Option<Lattice>,
+    /// Indices of the lines that are evenly spaced; empty unless there are enough.
+    pub(crate) pattern: Vec<usize>,
+}
+
+impl Family {
+    /// The family along a direction that is known to within a bin of the accumulator; none without a member.
+    fn new(lines: &[FloorLine], direction_rad: f64, p: &TilingParams) -> Option<Self> {
+        let off = |line: &FloorLine, from: f64| {
+            let turn = (line.direction_rad - from).rem_euclid(std::f64::consts::PI);
+            if turn > std::f64::consts::FRAC_PI_2 { turn - std::f64::consts::PI } else { turn }
+        };
+        let tolerance_rad = p.family_deg.to_radians();
+        let members = |from: f64, reach_rad: f64| {
+            (0..lines.len()).filter(move |i| off(&lines[*i], from).abs() <= reach_rad)
+        };
+        // The bin is coarse: the direction is the members' mean, from the members of that mean.
+        let mut direction_rad = direction_rad;
+        for _ in 0..3 {
+            let reach = tolerance_rad + (0.5 * BIN_DEG).to_radians();
+            let (mut turn, mut weight) = (0.0, 0.0);
+            for line in members(direction_rad, reach).map(|i| &lines[i]) {
+                turn += line.length * off(line, direction_rad);
+                weight += line.length;
+            }
+            if weight <= 0.0 {
+                return None;
+            }
+            direction_rad += turn / weight;
         }
-        if weight <= 0.0 {
-            return Vec::new();
-        }
-        direction_rad += turn / weight;
+        let members: Vec<usize> = members(direction_rad, tolerance_rad).collect();
+        let offset = |i: &usize| (lines[*i].offset_along(direction_rad), lines[*i].length);
+        let offsets: Vec<(f64, f64)> = members.iter().map(offset).collect();
+        let lattice = Lattice::find(&offsets, p);
+        let pattern = lattice.map_or_else(Vec::new, |lattice| pattern(&lattice, &members, &offsets, p));
+        Some(Self { direction_rad, members, offsets, lattice, pattern })
     }
-    let family: Vec<&FloorLine> = members(direction_rad, tolerance_rad).collect();
-    let offsets: Vec<(f64, f64)> = family.iter().map(|l| (l.offset_along(direction_rad), l.length)).collect();
-    let Some(lattice) = Lattice::find(&offsets, p) else { return Vec::new() };
+}
+
+/// The members at places of the lattice; empty unless they lie at enough different ones.
+fn pattern(lattice: &Lattice, members: &[usize], offsets: &[(f64, f64)], p: &TilingParams) -> Vec<usize> {
     let fits = |offset: f64| lattice.residual(offset) < p.max_residual;
     let mut places: Vec<i64> = offsets.iter().filter(|o| fits(o.0)).map(|o| lattice.index(o.0)).collect();
     places.sort_unstable();
@@ -123,7 +175,7 @@ fn pattern(lines: &[FloorLine], direction_rad: f64, p: &TilingParams) -> Vec<usi
     if places.len() < p.min_lines {
         return Vec::new();
     }
-    family.iter().zip(&offsets).filter(|(_, o)| fits(o.0)).map(|(l, _)| l.segment).collect()
+    members.iter().zip(offsets).filter(|(_, o)| fits(o.0)).map(|(i, _)| *i).collect()
 }
 
 #[cfg(test)]

@@ -13,19 +13,19 @@ const OVERSAMPLING: f64 = 6.0;
 /// one of the many periods tried.
 const MAX_CHANCE: f64 = 0.05;
 
-/// Evenly spaced places on a line: `phase + i * period`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Lattice {
-    period: f64,
-    phase: f64,
+/// The periods that are tried for some offsets: even in 1 / period.
+struct Trials {
+    /// The first and the last 1 / period.
+    range: [f64; 2],
+    count: usize,
+    /// Least offset: phases are counted from it.
+    low: f64,
+    /// Least concentration of a pattern.
+    enough: f64,
 }
 
-impl Lattice {
-    /// The largest period at which the offsets (with weights) repeat: fractions of a period repeat as well.
-    ///
-    /// Departs from method 1.5, which steps the period by 5 mm: that jumps over the narrow peaks of small tiles on a
-    /// wide floor. Steps here are even in 1 / period and as fine as the spread of the lines asks for.
-    pub(crate) fn find(offsets: &[(f64, f64)], p: &TilingParams) -> Option<Self> {
+impl Trials {
+    fn new(offsets: &[(f64, f64)], p: &TilingParams) -> Option<Self> {
         let (low, high) =
             offsets.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), o| (l.min(o.0), h.max(o.0)));
         let span = high - low;
@@ -45,7 +45,42 @@ impl Lattice {
         // Chance that n phases anywhere concentrate to R is about exp(-n R^2).
         let lines = effective(offsets, p.max_residual * shortest);
         let enough = ((beats.max(1.0) / MAX_CHANCE).ln() / lines).sqrt().max(p.min_regularity);
-        let frequency = |i: usize| first + (last - first) * i as f64 / count as f64;
+        Some(Self { range: [first, last], count, low, enough })
+    }
+
+    fn frequency(&self, i: usize) -> f64 {
+        let [first, last] = self.range;
+        first + (last - first) * i as f64 / self.count as f64
+    }
+}
+
+/// The concentration of the offsets at every period that is tried, as (period, concentration), and the least
+/// concentration of a pattern; nothing where none is tried.
+pub(crate) fn concentrations(offsets: &[(f64, f64)], p: &TilingParams) -> (Vec<(f64, f64)>, f64) {
+    let Some(trials) = Trials::new(offsets, p) else { return (Vec::new(), f64::INFINITY) };
+    let at = |i: usize| {
+        let frequency = trials.frequency(i);
+        (frequency.recip(), concentration(offsets, trials.low, frequency).0)
+    };
+    ((0..=trials.count).map(at).collect(), trials.enough)
+}
+
+/// Evenly spaced places on a line: `phase + i * period`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Lattice {
+    period: f64,
+    phase: f64,
+}
+
+impl Lattice {
+    /// The largest period at which the offsets (with weights) repeat: fractions of a period repeat as well.
+    ///
+    /// Departs from method 1.5, which steps the period by 5 mm: that jumps over the narrow peaks of small tiles on a
+    /// wide floor. Steps here are even in 1 / period and as fine as the spread of the lines asks for.
+    pub(crate) fn find(offsets: &[(f64, f64)], p: &TilingParams) -> Option<Self> {
+        let trials = Trials::new(offsets, p)?;
+        let Trials { range: [first, last], count, low, enough } = trials;
+        let frequency = |i: usize| trials.frequency(i);
         let mut before = concentration(offsets, low, frequency(0)).0;
         let mut here = concentration(offsets, low, frequency(1)).0;
         for i in 1..count {
@@ -73,9 +108,12 @@ impl Lattice {
         (places - places.round()).abs()
     }
 
-    #[cfg(test)]
     pub(crate) fn period(&self) -> f64 {
         self.period
+    }
+
+    pub(crate) fn phase(&self) -> f64 {
+        self.phase
     }
 }
 

@@ -40,8 +40,28 @@ pub fn hausdorff(a: &PointSet, b: &PointSet, p: &HausdorffParams) -> f64 {
     f64::from(squared).sqrt()
 }
 
+/// A point's nearest counterpart in another set.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Counterpart {
+    /// Its index in the other set.
+    pub index: usize,
+    /// Product of their distance in the icon and of their descriptors.
+    pub distance: f64,
+}
+
+/// The nearest counterpart in `b` of each point of `a`: of these distances, [`hausdorff`] takes the k-th smallest.
+/// Empty where `b` has no point.
+pub fn counterparts(a: &PointSet, b: &PointSet) -> Vec<Counterpart> {
+    let nearest = |i: usize| {
+        let squares = (0..b.len()).map(|j| (j, product_squared(a, i, b, j)));
+        let (index, squared) = squares.min_by(|x, y| x.1.total_cmp(&y.1))?;
+        Some(Counterpart { index, distance: f64::from(squared).sqrt() })
+    };
+    (0..a.len()).filter_map(nearest).collect()
+}
+
 /// k = ceil(r n), at least 1 and at most n.
-fn rank(n: usize, inlier_fraction: f64) -> usize {
+pub fn rank(n: usize, inlier_fraction: f64) -> usize {
     // 0.4 * 10 is 4.000000000000001 in doubles: take rounding off before rounding up.
     ((inlier_fraction * n as f64 - 1e-9).ceil() as usize).clamp(1, n)
 }

@@ -85,6 +85,13 @@ pub fn between(a: &Smoothed, b: &Smoothed, p: &CorrelationParams) -> IconCompari
     }
 }
 
+/// The gradient correlation of every bucket pair, row by row: [`IconComparison::likeness`] is their mean. `None` where
+/// the icons are cut differently, or too small.
+pub fn bucket_similarities(a: &Icon, b: &Icon, p: &CorrelationParams) -> Option<Vec<f32>> {
+    let buckets = compare(&Smoothed::new(a), &Smoothed::new(b), p)?;
+    Some(buckets.iter().map(|b| b.correlation).collect())
+}
+
 /// Whether slopes of the mean square `power` are texture, in an icon with the mean `mean`.
 pub(crate) fn shows(power: f32, mean: f32) -> bool {
     power > (SHOWS_SHARE * mean).max(SHOWS_LEAST)

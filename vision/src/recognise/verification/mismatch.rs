@@ -7,14 +7,14 @@ use crate::{
 };
 
 /// Cells along a side. Windows of two by two overlap by half: each is as large as a part of the table.
-const CELLS: usize = 2 * TABLE;
+pub const CELLS: usize = 2 * TABLE;
 /// Windows along a side.
-const WINDOWS: usize = CELLS - 1;
+pub const WINDOWS: usize = CELLS - 1;
 /// Side of a block of windows, a quarter of the picture...
 const BLOCK: usize = 4;
 /// ... that mismatches if at least this many of its windows do. Chosen on the set `tune`; detection and false-alarm
 /// rates are in docs/EVALUATION.md, "Recognition with points".
-const MIN_DIFFERING: usize = 9;
+pub const MIN_DIFFERING: usize = 9;
 /// With more untextured cells where the icon has texture, the block is occluded: only the edge of the occluder
 /// differs.
 const MAX_HIDDEN: usize = 4;
@@ -24,14 +24,14 @@ const APPEARS_SHARE: f32 = 0.5;
 
 /// The mismatched windows and the untextured cells of a picture.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct MismatchMap {
+pub struct MismatchMap {
     is_mismatch: [[bool; WINDOWS]; WINDOWS],
     is_hidden: [[bool; CELLS]; CELLS],
 }
 
 impl MismatchMap {
     /// Compares `picture`, aligned with `learnt`, with it. `None` where the icons are cut differently.
-    pub(crate) fn new(picture: &Smoothed, learnt: &Smoothed) -> Option<Self> {
+    pub fn new(picture: &Smoothed, learnt: &Smoothed) -> Option<Self> {
         let cells = cells(picture, learnt, CELLS)?;
         let of_two = |i: usize| {
             let first = i / WINDOWS * CELLS + i % WINDOWS;
@@ -52,8 +52,18 @@ impl MismatchMap {
         Some(Self { is_mismatch: std::array::from_fn(row), is_hidden: std::array::from_fn(cell_row) })
     }
 
+    /// Whether the window shows something else, by row and column: window i begins with cell i.
+    pub fn is_mismatch(&self) -> &[[bool; WINDOWS]; WINDOWS] {
+        &self.is_mismatch
+    }
+
+    /// Whether the cell shows nothing where the icon does, by row and column.
+    pub fn is_hidden(&self) -> &[[bool; CELLS]; CELLS] {
+        &self.is_hidden
+    }
+
     /// The largest number of mismatches in a block, over the blocks that are not occluded.
-    fn largest_block(&self) -> usize {
+    pub fn largest_block(&self) -> usize {
         let starts = || 0..=WINDOWS - BLOCK;
         let blocks = starts().flat_map(|y| starts().map(move |x| (x, y)));
         let is_visible = |(x, y): &(usize, usize)| count(&self.is_hidden, (*x, *y), BLOCK + 1) <= MAX_HIDDEN;
@@ -61,7 +71,7 @@ impl MismatchMap {
     }
 
     /// Whether a connected part mismatches.
-    pub(crate) fn has_mismatched_part(&self) -> bool {
+    pub fn has_mismatched_part(&self) -> bool {
         self.largest_block() >= MIN_DIFFERING
     }
 

@@ -2,6 +2,6 @@
 
 pub mod gradient_similarity;
 pub mod content;
-pub(crate) mod mismatch;
+pub mod mismatch;
 pub(crate) mod icon_alignment;
 pub(crate) mod short_list;
