@@ -3,6 +3,17 @@
 //! docs/method are made with these commands, and a test draws them again (`lab/tests/lab/plot.rs`).
 
 mod classifier;
+mod map_fusion;
+mod map_gaze;
+mod map_guided;
+mod map_health;
+mod map_laser;
+mod map_localisation;
+mod map_placement;
+mod map_plan;
+mod map_relocalisation;
+mod map_scene;
+mod map_stages;
 pub(crate) mod panels;
 mod scene;
 
@@ -22,6 +33,8 @@ pub(crate) enum Command {
     ///   waymark-lab plot classifier --image corridor.jpg --out mine.png
     #[command(verbatim_doc_comment)]
     Classifier(SceneArgs),
+    #[command(flatten)]
+    Map(map_stages::Command),
 }
 
 /// Where a picture goes.
@@ -46,5 +59,6 @@ const LEVELS: u8 = 24;
 pub(crate) fn run(command: &Command) -> anyhow::Result<()> {
     match command {
         Command::Classifier(args) => args.target.write(&classifier::draw(args)?),
+        Command::Map(command) => map_stages::run(command),
     }
 }

@@ -15,7 +15,7 @@ use vision::{
 /// What is wrong with cameras.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub(super) enum Cameras {
+pub(crate) enum Cameras {
     /// Nothing, and so it is said.
     Exact,
     /// What is wrong with a usual one, and it is said that nothing is.
@@ -25,14 +25,14 @@ pub(super) enum Cameras {
 }
 
 /// One of them.
-pub(super) struct StatedCamera {
+pub(crate) struct StatedCamera {
     real: Intrinsics,
     stated: Intrinsics,
 }
 
 impl StatedCamera {
     /// A camera like `base` with errors of its own.
-    pub(super) fn drawn(base: &Intrinsics, cameras: Cameras, random: &mut Random) -> Self {
+    pub(crate) fn drawn(base: &Intrinsics, cameras: Cameras, random: &mut Random) -> Self {
         let usual = base.with_sigmas(IntrinsicsSigmas::usual(base.fx_px)).unwrap_or(*base);
         if cameras == Cameras::Exact {
             return Self { real: *base, stated: *base };
@@ -44,7 +44,7 @@ impl StatedCamera {
     }
 
     /// A thing of `size` that is taken to be of `believed` size; `None` where not all of it is in the picture.
-    pub(super) fn look(
+    pub(crate) fn look(
         &self,
         camera_from_landmark: &Isometry3<f64>,
         (size, believed): (LandmarkSize, LandmarkSize),

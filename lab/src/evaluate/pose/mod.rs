@@ -1,8 +1,8 @@
 //! `waymark-lab evaluate pose`: how good poses are and whether their covariances tell the truth (method 13.3 to 13.6): the
 //! table of 13.3, NEES, flips of the planar ambiguity, OpenCV on the same corners, several landmarks, drives, cost.
 
-mod eye;
-mod joint;
+pub(crate) mod eye;
+pub(crate) mod joint;
 mod peers;
 mod scene;
 mod single;
