@@ -227,7 +227,7 @@ fn whole(svg: &mut String, drive: &Drive) {
 }
 
 fn late(svg: &mut String, late: &LateFix) {
-    title(svg, (720.0, 26.0), "A fix that comes late is replayed at its time (driving to the left)");
+    title(svg, (720.0, 26.0), "A late fix is replayed at its time (drive to the left)");
     let points = late.truth.iter().chain(late.before.iter().map(|p| &p.pose));
     let middle = |k: fn(&Pose2) -> f64| {
         let (low, high) =

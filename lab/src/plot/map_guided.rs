@@ -115,7 +115,7 @@ impl Scene {
 /// The picture.
 pub(super) fn svg() -> anyhow::Result<String> {
     let scene = Scene::new()?;
-    page([1140.0, 600.0], |svg| {
+    page([1140.0, 620.0], |svg| {
         for (i, case) in CASES.iter().enumerate() {
             let left = 30.0 + 368.0 * i as f64;
             title(svg, (left, 26.0), case.title);
@@ -125,7 +125,7 @@ pub(super) fn svg() -> anyhow::Result<String> {
         }
         legend(
             svg,
-            (30.0, 540.0),
+            (30.0, 550.0),
             &[
                 (Sign::Dashed, ODOMETRY, "expected corners"),
                 (Sign::Ellipse, ODOMETRY, "search gates of its corners, 99.9 % (right: of one door)"),
@@ -134,13 +134,14 @@ pub(super) fn svg() -> anyhow::Result<String> {
         );
         legend(
             svg,
-            (450.0, 540.0),
+            (450.0, 550.0),
             &[
                 (Sign::Line, LANDMARK, "detected quad that is one landmark"),
                 (Sign::Line, AMBIGUOUS, "detected quad that may be several"),
                 (Sign::Ellipse, ESTIMATE, "prior pose, 95 %"),
             ],
         );
+        legend(svg, (770.0, 550.0), &[(Sign::Line, FAINT, "in the image, but not detected here")]);
         Ok(())
     })
 }

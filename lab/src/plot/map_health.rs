@@ -33,7 +33,7 @@ const NAMES: [&str; 6] = ["A", "B", "C", "D", "E", "F"];
 const MOVED: usize = 2;
 const MOVED_BY_M: f64 = 0.7;
 const GONE: usize = 4;
-const WALL_M: f64 = 2.8;
+const WALL_M: f64 = 3.3;
 const STEP_M: f64 = 0.1;
 const STEPS: i64 = 110;
 const STEP_NS: i64 = 200_000_000;
@@ -200,18 +200,18 @@ fn word(verdict: &PlaceVerdict) -> Word {
 /// Where the floor plan begins and how large it is: the rows below share its x.
 const LEFT_PX: f64 = 110.0;
 const SCALE: f64 = 78.0;
-const ROWS_PX: f64 = 400.0;
+const ROWS_PX: f64 = 450.0;
 const ROW_PX: f64 = 34.0;
 
 /// The picture.
 pub(super) fn svg() -> anyhow::Result<String> {
     let drive = Drive::new()?;
-    page([1120.0, 700.0], |svg| {
+    page([1120.0, 730.0], |svg| {
         from_above(svg, &drive);
         evidence(svg, &drive);
         legend(
             svg,
-            (LEFT_PX, 635.0),
+            (LEFT_PX, 668.0),
             &[
                 (Sign::Dot, LANDMARK, "seen in place"),
                 (Sign::Dot, ESTIMATE, "seen elsewhere"),
@@ -220,7 +220,7 @@ pub(super) fn svg() -> anyhow::Result<String> {
         );
         legend(
             svg,
-            (620.0, 635.0),
+            (620.0, 668.0),
             &[
                 (Sign::Dot, MISSED, "should be in the image, and is not"),
                 (Sign::Landmark, FAINT, "place by the map of what no longer hangs there"),
@@ -232,11 +232,11 @@ pub(super) fn svg() -> anyhow::Result<String> {
 }
 
 fn plan() -> Plan {
-    Plan::new((LEFT_PX, 60.0), [[0.0, -0.7], [12.4, 3.2]], SCALE)
+    Plan::new((LEFT_PX, 60.0), [[0.0, -0.4], [12.4, 3.7]], SCALE)
 }
 
 fn from_above(svg: &mut String, drive: &Drive) {
-    title(svg, (LEFT_PX, 26.0), "A robot drives along a wall; C was moved, E was taken down");
+    title(svg, (LEFT_PX, 26.0), "A robot drives along a wall and looks at it; C was moved, E was taken down");
     let plan = plan();
     let wall = [Point2::new(0.0, WALL_M), Point2::new(12.4, WALL_M)];
     plan.line(svg, wall, &format!(r#"stroke="{WALL}" stroke-width="2.5""#));
@@ -260,7 +260,23 @@ fn from_above(svg: &mut String, drive: &Drive) {
         &format!(r#"stroke="{TRUTH}" stroke-width="1.5""#),
     );
     plan.robot(svg, &drive.path[0], TRUTH);
+    // The last change of each landmark.
+    for id in drive.changes.iter().map(|(_, c)| c.landmark).collect::<BTreeSet<_>>() {
+        let Some((x_m, change)) = drive.changes.iter().rfind(|(_, c)| c.landmark == id) else { continue };
+        let health = format!("{:?}", change.standing).to_lowercase();
+        view(svg, &plan, *x_m, &format!("{} {health}", NAMES[change.landmark.0 as usize]));
+    }
     plan.scale_bar(svg, 1.0);
+}
+
+/// The robot where something changed, and what its camera covers.
+fn view(svg: &mut String, plan: &Plan, x_m: f64, words: &str) {
+    let wide_m = WALL_M * 0.5 * IMAGE_PX[0] / CAMERA.fx_px;
+    let edge = |side: f64| Point2::new(x_m + side * wide_m, WALL_M);
+    let at = Point2::new(x_m, 0.0);
+    plan.line(svg, [edge(-1.0), at, edge(1.0)], &format!(r#"stroke="{FAINT}" stroke-dasharray="4 3""#));
+    plan.robot(svg, &Pose2::new(x_m, 0.0, 0.0), TRUTH);
+    plan.label(svg, &at, ("middle", [0.0, 22.0]), words);
 }
 
 /// A row for each landmark, a mark for each frame that says something of it.
@@ -287,10 +303,7 @@ fn evidence(svg: &mut String, drive: &Drive) {
         let changes = drive.changes.iter().filter(|(_, c)| c.landmark.0 == i as u64);
         for (k, (x_m, change)) in changes.enumerate() {
             let (u, _) = plan.at(&Point2::new(*x_m, 0.0));
-            put(
-                svg,
-                &format!(r#"<path d="M{u:.1} {:.1}v22" stroke="black" stroke-width="2"/>"#, v - 11.0),
-            );
+            put(svg, &format!(r#"<path d="M{u:.1} {:.1}v22" stroke="black" stroke-width="2"/>"#, v - 11.0));
             // A flag and the quarantine that follows it are near each other.
             let (anchor, aside) = if k == 0 { ("end", -5.0) } else { ("start", 5.0) };
             text(svg, (u + aside, v - 8.0), anchor, &told(change));

@@ -21,9 +21,9 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use vision::{model::LandmarkId, pose::LandmarkPose, random::Random};
 
 /// Distance (m) and azimuth from the normal (degrees) of the robots.
-const SPOTS: [(f64, f64); 5] = [(2.2, 0.0), (4.4, 0.0), (3.4, 38.0), (3.0, -32.0), (4.6, -56.0)];
+const SPOTS: [(f64, f64); 5] = [(2.2, 0.0), (4.4, 0.0), (3.4, 38.0), (3.8, -25.0), (4.3, -50.0)];
 /// Frames of each robot beside the one whose ellipse is drawn.
-const FRAMES: usize = 40;
+const FRAMES: usize = 30;
 /// Factor on errors of fixes in the picture.
 const ENLARGED: f64 = 2.0;
 const SEED: u64 = 7;
@@ -60,6 +60,8 @@ fn drawn_fix(robot: &Pose2, places: &[LandmarkPlace], random: &mut Random) -> an
 pub(super) fn svg() -> anyhow::Result<String> {
     let first = poster(0.0, 0.0, -FRAC_PI_2)?;
     let second = poster(BESIDE_M, 0.0, -FRAC_PI_2)?;
+    let others =
+        format!("fixes of {FRAMES} other frames, all errors drawn anew, twice as far from the truth");
     page([1200.0, 480.0], |svg| {
         title(svg, (20.0, 26.0), "One landmark");
         spots(svg, 20.0, &[first])?;
@@ -73,8 +75,12 @@ pub(super) fn svg() -> anyhow::Result<String> {
             &[
                 (Sign::Landmark, LANDMARK, "landmark on its wall"),
                 (Sign::Cross, TRUTH, "true pose of a robot"),
-                (Sign::Ellipse, ESTIMATE, "95 % ellipse of one fix, twice as large; words: its standard deviations"),
-                (Sign::Dot, ESTIMATE, "fixes of 40 other frames, all errors drawn anew, twice as far from the truth"),
+                (
+                    Sign::Ellipse,
+                    ESTIMATE,
+                    "95 % ellipse of one fix, twice as large; words: its standard deviations",
+                ),
+                (Sign::Dot, ESTIMATE, &others),
             ],
         );
         legend(
@@ -173,6 +179,6 @@ fn verdict(svg: &mut String, both: &[Fix], chosen: &Fix, prior: &Pose2Covariance
     let number = 1 + both.iter().position(|f| f.pose.pose == chosen.pose.pose).unwrap_or(0);
     let distances: Vec<String> =
         both.iter().map(|f| format!("{:.1}", f.pose.distance2(prior).unwrap_or(f64::INFINITY))).collect();
-    let words = format!("squared distance to the prior {}: it is {number}", distances.join(" and "));
+    let words = format!("squared distances to the prior {}: solution {number}", distances.join(" and "));
     text(svg, (820.0, 368.0), "start", &words);
 }

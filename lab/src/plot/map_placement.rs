@@ -109,11 +109,7 @@ pub(super) fn svg() -> anyhow::Result<String> {
             svg,
             (40.0, 425.0),
             &[
-                (
-                    Sign::Robot,
-                    COLOUR[0],
-                    "robots where they say they are (to 2 cm), rays of the corners",
-                ),
+                (Sign::Robot, COLOUR[0], "robots where they say they are (to 2 cm), rays of the corners"),
                 (Sign::Line, COLOUR[0], "rectangle that one view gives; ellipse: its centre"),
                 (
                     Sign::Dashed,

@@ -168,11 +168,7 @@ pub(super) fn svg() -> anyhow::Result<String> {
                 (Sign::Robot, ESTIMATE, "hypothesis with its share of the belief"),
             ],
         );
-        legend(
-            svg,
-            (700.0, top),
-            &[(Sign::Dot, ODOMETRY, "belief over the position: the darker the more")],
-        );
+        legend(svg, (700.0, top), &[(Sign::Dot, ODOMETRY, "belief over the position: the darker the more")]);
         Ok(())
     })
 }

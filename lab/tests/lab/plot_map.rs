@@ -29,7 +29,8 @@ fn docs() -> PathBuf {
 /// The first line in which two pictures differ.
 fn difference(committed: &str, drawn: &str) -> Option<String> {
     let mut pairs = committed.lines().zip(drawn.lines()).enumerate();
-    let line = pairs.find(|(_, (a, b))| a != b).map(|(i, (a, b))| format!("line {}: {a}\nis now: {b}", i + 1));
+    let line =
+        pairs.find(|(_, (a, b))| a != b).map(|(i, (a, b))| format!("line {}: {a}\nis now: {b}", i + 1));
     let lengths = || format!("{} lines are now {}", committed.lines().count(), drawn.lines().count());
     line.or_else(|| (committed != drawn).then(lengths))
 }
