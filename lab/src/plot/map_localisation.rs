@@ -132,8 +132,8 @@ fn spots(svg: &mut String, left_px: f64, places: &[LandmarkPlace]) -> anyhow::Re
         plan.dots(svg, others.iter().map(|f| enlarged(&f.pose.pose).position().into()), (1.2, ESTIMATE));
         plan.cross(svg, &truth.position().into(), TRUTH);
         let sigma = |k: usize| fix.pose.covariance[(k, k)];
-        let (across_m, heading) = ((sigma(0) + sigma(1)).sqrt(), sigma(2).sqrt().to_degrees());
-        let words = format!("{:.2} m, {heading:.1} deg", across_m);
+        let (position_m, heading) = ((sigma(0) + sigma(1)).sqrt(), sigma(2).sqrt().to_degrees());
+        let words = format!("{position_m:.2} m, {heading:.1} deg");
         plan.label(svg, &truth.position().into(), ("middle", [0.0, 30.0]), &words);
     }
     Ok(())

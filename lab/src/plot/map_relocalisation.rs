@@ -149,7 +149,10 @@ pub(super) fn svg() -> anyhow::Result<String> {
     let height = 70.0 + PANEL_PX * search.panels.len() as f64;
     page([1100.0, height], |svg| {
         for (i, panel) in search.panels.iter().enumerate() {
-            draw(svg, panel, &search, 24.0 + PANEL_PX * i as f64);
+            let plan = draw(svg, panel, &search, 24.0 + PANEL_PX * i as f64);
+            if i + 1 == search.panels.len() {
+                plan.scale_bar(svg, 1.0);
+            }
         }
         let top = 40.0 + PANEL_PX * search.panels.len() as f64;
         legend(
@@ -175,7 +178,7 @@ pub(super) fn svg() -> anyhow::Result<String> {
 
 const PANEL_PX: f64 = 172.0;
 
-fn draw(svg: &mut String, panel: &Panel, search: &Search, top: f64) {
+fn draw(svg: &mut String, panel: &Panel, search: &Search, top: f64) -> Plan {
     let plan = Plan::new((40.0, top + 14.0), [[0.0, 0.0], [LENGTH_M, WIDTH_M]], 51.0);
     let count = panel.hypotheses.len();
     let several = if count == 1 { "hypothesis" } else { "hypotheses" };
@@ -200,9 +203,7 @@ fn draw(svg: &mut String, panel: &Panel, search: &Search, top: f64) {
     // Beside the hypothesis that has found it, not under it.
     let below = Point2::new(panel.truth.x_m, 0.25);
     plan.robot(svg, &Pose2::new(below.x, below.y, panel.truth.theta_rad), TRUTH);
-    if std::ptr::eq(panel, &raw const search.panels[search.panels.len() - 1]) {
-        plan.scale_bar(svg, 1.0);
-    }
+    plan
 }
 
 /// The belief as squares: one path for each shade.
