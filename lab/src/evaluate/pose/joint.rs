@@ -50,7 +50,7 @@ pub(super) struct Joint {
 }
 
 /// A true place, drawn from the covariance of the map's.
-fn drawn(place: &LandmarkPlace, random: &mut Random) -> LandmarkPlace {
+pub(crate) fn drawn(place: &LandmarkPlace, random: &mut Random) -> LandmarkPlace {
     let e: Vector6<f64> = place.covariance.map_diagonal(f64::sqrt).map(|s| s * random.normal());
     let size = LandmarkSize { width_m: place.size.width_m + e[4], height_m: place.size.height_m + e[5] };
     let (x_m, y_m, z_m) = (place.x_m + e[0], place.y_m + e[1], place.z_m + e[3]);
@@ -58,7 +58,7 @@ fn drawn(place: &LandmarkPlace, random: &mut Random) -> LandmarkPlace {
 }
 
 /// True extrinsics: the stated ones moved by an error.
-fn with_error(believed: &CameraExtrinsics, error: &Vector6<f64>) -> CameraExtrinsics {
+pub(crate) fn with_error(believed: &CameraExtrinsics, error: &Vector6<f64>) -> CameraExtrinsics {
     let (turn, shift) = (error.fixed_rows::<3>(0).into(), error.fixed_rows::<3>(3).into());
     CameraExtrinsics {
         robot_from_camera: perturbed(&believed.robot_from_camera, &turn, &shift),
@@ -66,7 +66,7 @@ fn with_error(believed: &CameraExtrinsics, error: &Vector6<f64>) -> CameraExtrin
     }
 }
 
-fn mounting_error(covariance: &Matrix6<f64>, random: &mut Random) -> Vector6<f64> {
+pub(crate) fn mounting_error(covariance: &Matrix6<f64>, random: &mut Random) -> Vector6<f64> {
     covariance.map_diagonal(f64::sqrt).map(|s| s * random.normal())
 }
 

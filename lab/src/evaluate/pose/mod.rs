@@ -1,8 +1,8 @@
 //! `waymark-lab evaluate pose`: accuracy of poses and consistency of their covariances (method 13.3 to 13.6): the
 //! table of 13.3, NEES, flips of the planar ambiguity, OpenCV on the same corners, several landmarks, drives, cost.
 
-mod stated_camera;
-mod joint;
+pub(crate) mod stated_camera;
+pub(crate) mod joint;
 mod peers;
 mod scene;
 mod single;

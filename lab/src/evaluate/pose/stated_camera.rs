@@ -15,7 +15,7 @@ use vision::{
 /// Errors of stated intrinsics.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub(super) enum Cameras {
+pub(crate) enum Cameras {
     /// None, and none are stated.
     Exact,
     /// Errors of a usual calibration, but none are stated.
@@ -25,14 +25,14 @@ pub(super) enum Cameras {
 }
 
 /// A camera with true and stated intrinsics.
-pub(super) struct StatedCamera {
+pub(crate) struct StatedCamera {
     real: Intrinsics,
     stated: Intrinsics,
 }
 
 impl StatedCamera {
     /// A camera with the stated intrinsics `base` and drawn errors.
-    pub(super) fn drawn(base: &Intrinsics, cameras: Cameras, random: &mut Random) -> Self {
+    pub(crate) fn drawn(base: &Intrinsics, cameras: Cameras, random: &mut Random) -> Self {
         let usual = base.with_sigmas(IntrinsicsSigmas::usual(base.fx_px)).unwrap_or(*base);
         if cameras == Cameras::Exact {
             return Self { real: *base, stated: *base };
@@ -44,7 +44,7 @@ impl StatedCamera {
     }
 
     /// Pose of an object of `size` for which `believed` is assumed; `None` if it is not wholly in the image.
-    pub(super) fn observe(
+    pub(crate) fn observe(
         &self,
         camera_from_landmark: &Isometry3<f64>,
         (size, believed): (LandmarkSize, LandmarkSize),
