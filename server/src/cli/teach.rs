@@ -312,7 +312,7 @@ pub(crate) async fn learn(args: &LearnArgs) -> anyhow::Result<ExitCode> {
                             "waymark: {name}: not kept, it shows nothing that view {} does not",
                             view.id
                         );
-                        screen::complain(&note);
+                        screen::complain(&like);
                     }
                     Ok(())
                 }

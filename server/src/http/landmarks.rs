@@ -44,7 +44,7 @@ fn geometry(size: Option<Size>, place: Option<Place>) -> Result<LandmarkGeometry
         let outer = if matches!(e.field, "width_m" | "height_m") { "size" } else { "place" };
         out_of_range(&e, outer)
     })?;
-    let place = place.map(|p| landmarks::Place {
+    let place = place.map(|p| landmarks::StoredPlace {
         x_m: p.x_m,
         y_m: p.y_m,
         z_m: p.z_m,
@@ -214,8 +214,8 @@ async fn patch(
                 size_from_views: old.size_from_views && !size,
             })
             .await?;
-            match standing {
-                Some(standing) => landmarks::set_health(tx, &map, &landmark, standing, None).await,
+            match health {
+                Some(health) => landmarks::set_health(tx, &map, &landmark, health, None).await,
                 None => Ok(changed),
             }
         })

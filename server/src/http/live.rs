@@ -80,7 +80,7 @@ async fn trajectories(
     PathParams(robot): PathParams<String>,
 ) -> Result<Json<TrajectoriesBody>, ApiError> {
     robots::get(app.store.reads(), &robot).await?;
-    let tracks = app.live.trajectories(&name("robot", robot)?).unwrap_or_default();
+    let trajectories = app.live.trajectories(&name("robot", robot)?).unwrap_or_default();
     let wire = |track: VecDeque<Pose2>| track.iter().map(pose2_wire).collect();
     Ok(Json(TrajectoriesBody {
         pose: wire(trajectories.pose),

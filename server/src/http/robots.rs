@@ -11,7 +11,7 @@ use axum::{Json, extract::State, http::StatusCode};
 use engine::{
     epochs::Conflict,
     live::LiveHub,
-    motion::{Correction, Corrections, Known, MotionTracker},
+    motion::{Correction, Corrections, KnownPose, MotionTracker},
 };
 use map::pose2::Pose2;
 use protos::{
@@ -34,7 +34,7 @@ fn robot_shown(row: RobotRow, motion: &MotionTracker, live: &LiveHub) -> Robot {
     let robot = Name::new(row.name.as_str()).ok();
     let status = robot.as_ref().map(|robot| motion.epochs().status(robot, now)).unwrap_or_default();
     let known = robot.as_ref().and_then(|robot| motion.known_pose(robot, now));
-    let pose = known.filter(|known| known.map == row.map).map(|Known { fused, age, .. }| {
+    let pose = known.filter(|known| known.map == row.map).map(|KnownPose { fused, age, .. }| {
         let Pose2 { x_m, y_m, theta_rad } = fused.pose.pose;
         let covariance = row_major(&fused.pose.covariance);
         let trust = robot.and_then(|robot| live.trust(&robot, &row.map)).unwrap_or_default().into();

@@ -21,7 +21,7 @@ use axum::{
     response::{IntoResponse, Response},
 };
 use engine::{
-    dominant::{Whole, dominant, others, whole_quads},
+    dominant::{WholeQuad, dominant, others, whole_quads},
     picture,
 };
 use protos::api::{
@@ -158,7 +158,7 @@ fn extent(corners: Option<&Bytes>, whole_image: Option<&Bytes>) -> Result<Landma
 const MAX_DISTRACTORS: usize = 20;
 
 /// The view, and the quad that was taken for it where nobody said.
-fn prepare(app: &App, bytes: &Bytes, extent: &LandmarkRegion) -> Result<(NewView, Option<Whole>), ApiError> {
+fn prepare(app: &App, bytes: &Bytes, extent: &LandmarkRegion) -> Result<(NewView, Option<WholeQuad>), ApiError> {
     let image = picture::decode(bytes, app.config.limits.upload())?;
     let p = &app.config.params;
     let quads = if matches!(extent, LandmarkRegion::Whole) { Vec::new() } else { whole_quads(&image, p) };
@@ -168,7 +168,7 @@ fn prepare(app: &App, bytes: &Bytes, extent: &LandmarkRegion) -> Result<(NewView
         LandmarkRegion::Whole => whole(&image)?,
         LandmarkRegion::Detect => found(&corners)?,
     };
-    let meant = |q: &&Whole| matches!(extent, LandmarkRegion::Detect) && q.corners_px == corners_px;
+    let meant = |q: &&WholeQuad| matches!(extent, LandmarkRegion::Detect) && q.corners_px == corners_px;
     let detected = quads.iter().find(meant).copied();
     let icon = cut(&image, &corners_px, p)?;
     let distractor =

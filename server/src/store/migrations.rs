@@ -28,7 +28,7 @@ const FILES: &[(&str, &str)] = files![
 ];
 
 /// The steps in order.
-pub(super) fn migrator() -> Migrator {
+pub(crate) fn migrator() -> Migrator {
     let step = |(name, sql): &(&'static str, &'static str)| {
         let (number, words) = name.split_once('_').unwrap_or((name, ""));
         // A name without a number is found by the test below.

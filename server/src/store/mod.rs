@@ -5,7 +5,7 @@
 //! ([`on_commit`]); the store knows it by its trait alone.
 
 mod error;
-mod migrations;
+pub(crate) mod migrations;
 mod open;
 mod writer;
 mod statements;

@@ -31,7 +31,7 @@ INSERT INTO runs (id, map_id, robot, created_ms, way_m, cells) VALUES (1, 1, 'r1
 async fn leave_behind(data: &Path) {
     let options = SqliteConnectOptions::new().filename(data.join("waymark.sqlite")).create_if_missing(true);
     let mut file = options.connect().await.unwrap();
-    let all = sqlx::migrate!("../migrations");
+    let all = crate::store::migrations::migrator();
     let earlier = all.iter().filter(|m| m.version <= LAST_MIGRATION).cloned().collect();
     Migrator::with_migrations(earlier).run(&mut file).await.unwrap();
     sqlx::raw_sql(ROWS).execute(&mut file).await.unwrap();

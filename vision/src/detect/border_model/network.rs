@@ -4,9 +4,6 @@
 use super::feature_constants::{CLIP_DEVIATIONS, FeatureDigest};
 use serde::{Deserialize, Serialize};
 
-/// Scaled features are clipped to this many standard deviations.
-const CLIP: f64 = 4.0;
-
 /// The weights. With `n` features and `h` hidden units: `output = bias + linear . x + hidden_out .
 /// tanh(hidden_bias + hidden_in x)`, with `x` the features scaled by `mean` and `deviation` and clipped to 4
 /// deviations.

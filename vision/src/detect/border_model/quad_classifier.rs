@@ -165,7 +165,7 @@ mod tests {
         let words = |grouping: &str, proposals: &str, border: &str, classifier: &str| {
             let mut all = serde_json::json!({ "grouping": grouping, proposals: { "min_support": 0.25 } });
             all[border] = network(SIDE_FEATURES);
-            all[classifier] = network(THING_FEATURES);
+            all[classifier] = network(QUAD_FEATURES);
             serde_json::from_value::<QuadParams>(all).unwrap()
         };
         let now = words("proposals", "proposals", "border_model", "quad_classifier");

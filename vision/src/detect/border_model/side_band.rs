@@ -17,21 +17,6 @@ use crate::detect::{
 use fearless_simd::{Level, dispatch};
 use nalgebra::{Point2, Vector2};
 
-/// Most samples along a side: the samples of a line are the bits of a 64-bit word.
-pub const MAX_BAND_SAMPLES: usize = 48;
-/// Fewest samples along a side.
-const MIN_BAND_SAMPLES: usize = 12;
-/// Half the width of a band, as a share of the quad's extent across the side.
-const REACH_SHARE: f64 = 0.25;
-/// Half the width of a band, smallest and largest.
-const REACH_PX: (f64, f64) = (6.0, 128.0);
-/// Share of the side left out at both ends: near a corner the other side's gradient mixes in.
-const CORNER_SHARE: f64 = 0.06;
-/// Smallest step height of an edge, grey levels.
-pub const MIN_STEP: f32 = 4.0;
-/// Smallest step heights of the edges that [`AlongLine::edges_outside`] counts.
-const STEPS_OUTSIDE: [f32; 2] = [MIN_STEP, 2.0 * MIN_STEP];
-
 /// A number for each row; unused rows are 0.
 type Rows = [i32; MAX_BAND_SAMPLES];
 
@@ -277,7 +262,7 @@ mod tests {
     use super::*;
     use crate::{
         detect::{
-            border_model::side_lines::MAX_LINES,
+            border_model::feature_constants::MAX_LINES,
             edges::edge_map::{EdgeParams, edges},
             tests::fixtures::render,
         },

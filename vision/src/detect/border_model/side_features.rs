@@ -239,9 +239,6 @@ fn roughness(along: &AlongLine, range_px: (f64, f64)) -> f64 {
     if in_image > MIN_STRIP_PIXELS { rough as f64 / in_image as f64 } else { 0.0 }
 }
 
-/// Strips of fewer pixels in the image are ignored.
-const MIN_CELLS: usize = 20;
-
 /// Median grey level of a strip.
 fn level(along: &AlongLine, range_px: (f64, f64)) -> Option<f64> {
     let mut counts = [0_u32; 256];

@@ -1,8 +1,8 @@
 //! The straight lines among the edge points of a band. In: points. Out: lines, the best supported first.
 
 use super::feature_constants::{
-    FIT_REACH_PX, MAX_LINES, MIN_LINE_POINTS, MIN_SUPPORT, NEAR_LINE_PX, proposed SLOPE_STEP, SLOPES,
-    SUPPRESSED_BINS,
+    FIT_REACH_PX, MAX_LINES, MIN_LINE_POINTS, MIN_SUPPORT, NEAR_LINE_PX, SAME_LINE_PX, SLOPE_STEP,
+    SLOPES, SUPPRESSED_BINS,
 };
 
 /// Slopes tried in all.
