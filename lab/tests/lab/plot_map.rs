@@ -48,7 +48,8 @@ fn the_pictures_of_the_method_are_what_is_drawn_now() {
         let drawn = fs::read_to_string(out).expect("what was drawn");
         assert!(drawn.len() <= MAX_BYTES, "{name} has {} bytes", drawn.len());
         if let Some(difference) = difference(&committed, &drawn) {
-            panic!("docs/pictures/method/{name}, {difference}\nIf that is meant: waymark-lab plot {stage}");
+            let path = format!("docs/pictures/method/{name}");
+            panic!("{path}, {difference}\nIf that is meant: waymark-lab plot {stage} --out {path}");
         }
         let page = fs::read_to_string(docs().join("method").join(page)).expect("a page");
         let command = format!("`waymark-lab plot {stage} --out {name}`");
