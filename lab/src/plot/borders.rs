@@ -10,7 +10,7 @@ use server::cli::drawing::{Colour, GREEN, Picture, WHITE, YELLOW};
 use vision::{
     detect::{
         DetectParams,
-        border_model::choose_sides::{SideCandidate, SnappedSides, choose_sides, rivals},
+        border_model::choose_sides::{SideCandidate, SnappedSides, choose_sides, side_candidates},
         detector::scored_quads,
         edge_support::gradients::Gradients,
         suppression::non_maximum::{snap_sides, suppress_non_maxima},
@@ -84,7 +84,7 @@ fn moved_most(work: &GrayImage) -> Option<Moved> {
         let off = before.iter().zip(&after.corners_px).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
         let share = off / quad.corners_px.area_px2().sqrt();
         if is_kept && best.as_ref().is_none_or(|(most, _)| share > *most) {
-            let candidates = rivals(&gradients, &before)
+            let candidates = side_candidates(&gradients, &before)
                 .map(|side| side.into_iter().map(|c| (c.clone(), model.output(&c.features))).collect());
             best = Some((share, Moved { before, after, candidates }));
         }

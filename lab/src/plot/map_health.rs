@@ -167,7 +167,7 @@ impl Robot {
         let health = self.health.clone();
         let now = |id: LandmarkId| health.get(&id).copied().unwrap_or_default();
         for change in self.monitor.frame(from, &checks, &missed, now) {
-            self.health.insert(change.landmark, change.standing);
+            self.health.insert(change.landmark, change.health);
             drive.changes.push((truth.x_m, change));
         }
         let said = checks.iter().map(|c| (c.landmark, word(&c.verdict)));
@@ -263,7 +263,7 @@ fn from_above(svg: &mut String, drive: &Drive) {
     // The last change of each landmark.
     for id in drive.changes.iter().map(|(_, c)| c.landmark).collect::<BTreeSet<_>>() {
         let Some((x_m, change)) = drive.changes.iter().rfind(|(_, c)| c.landmark == id) else { continue };
-        let health = format!("{:?}", change.standing).to_lowercase();
+        let health = format!("{:?}", change.health).to_lowercase();
         view(svg, &plan, *x_m, &format!("{} {health}", NAMES[change.landmark.0 as usize]));
     }
     plan.scale_bar(svg, 1.0);
@@ -312,16 +312,16 @@ fn evidence(svg: &mut String, drive: &Drive) {
 }
 
 fn told(change: &HealthChange) -> String {
-    let health = match change.standing {
+    let health = match change.health {
         LandmarkHealth::Sound => "sound",
         LandmarkHealth::Flagged => "flagged",
         LandmarkHealth::Quarantined => "quarantined",
     };
     match change.finding {
-        Some(Finding::Moved { by_m, sightings, .. }) => {
-            format!("{health}: {sightings} times seen {by_m:.2} m away")
+        Some(Finding::Moved { offset_m, sightings, .. }) => {
+            format!("{health}: {sightings} times seen {offset_m:.2} m away")
         }
-        Some(Finding::Missing { looks }) => format!("{health}: missed {looks} times"),
+        Some(Finding::Missing { missed_frames }) => format!("{health}: missed {missed_frames} times"),
         None => health.to_owned(),
     }
 }

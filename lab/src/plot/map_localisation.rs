@@ -7,7 +7,7 @@ use super::{
 };
 use crate::evaluate::{
     chart::COLOURS,
-    pose::joint::{drawn, mounting_error, moved},
+    pose::joint::{drawn, mounting_error, with_error},
 };
 use anyhow::Context as _;
 use formats::svg::text;
@@ -42,7 +42,7 @@ fn robot(place: &LandmarkPlace, (d_m, psi_deg): (f64, f64)) -> Pose2 {
 fn drawn_fix(robot: &Pose2, places: &[LandmarkPlace], random: &mut Random) -> anyhow::Result<Option<Fix>> {
     let mean = places.iter().map(|p| centre(p).coords).sum::<Vector3<f64>>() / places.len() as f64;
     let mounting = aimed(robot, &Point3::from(mean))?;
-    let real = moved(&mounting, &mounting_error(&mounting.covariance, random));
+    let real = with_error(&mounting, &mounting_error(&mounting.covariance, random));
     let seen: Option<Vec<LandmarkPose>> =
         places.iter().map(|p| look(robot, &real, &drawn(p, random), SIGMA_PX, random)).collect();
     let seen = seen.context("in the image")?;

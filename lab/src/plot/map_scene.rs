@@ -1,6 +1,6 @@
 //! What the pictures of the map's stages are made of: a camera, posters, looks at them.
 
-use crate::evaluate::pose::eye::{Cameras, StatedCamera};
+use crate::evaluate::pose::stated_camera::{Cameras, StatedCamera};
 use anyhow::Context as _;
 use map::{
     extrinsics::{CameraExtrinsics, pan_tilt},
@@ -61,7 +61,7 @@ pub(super) fn look(
     let camera_from_landmark =
         mounting.robot_from_camera.inverse() * robot.to_isometry3().inverse() * place.map_from_landmark();
     let camera = StatedCamera::drawn(&CAMERA, Cameras::Exact, random);
-    camera.look(&camera_from_landmark, (place.size, place.size), sigma_px, random)
+    camera.observe(&camera_from_landmark, (place.size, place.size), sigma_px, random)
 }
 
 /// A pose with independent standard deviations of x, y (m) and heading (rad).

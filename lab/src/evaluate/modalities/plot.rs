@@ -15,7 +15,7 @@ const ERROR_PX: f64 = 220.0;
 const MOST_M: f64 = 0.5;
 
 fn colour(modality: Modality) -> &'static str {
-    match module {
+    match modality {
         Modality::Odometry => COLOURS[0],
         Modality::Laser => COLOURS[3],
         Modality::Landmarks => COLOURS[4],

@@ -1,7 +1,7 @@
 //! The robot's pose on the floor from one, two or three landmarks at once, and fused over drives (method 13.6, 15).
 
 use super::{
-    camera::{Cameras, StatedCamera},
+    stated_camera::{Cameras, StatedCamera},
     single::{Cost, cost_of},
 };
 use map::{
