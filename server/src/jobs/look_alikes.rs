@@ -21,8 +21,7 @@ pub(super) struct LookAlike {
 /// The landmarks that `model` may be taken for, most alike first. Only where something held its threshold down is there
 /// anything to look for.
 pub(super) fn look_alikes(model: &LandmarkModel, negatives: &Negatives, p: &Params) -> Vec<LookAlike> {
-    let nearest =
-        model.gradient_similarity_evidence.nearest_others.first().map_or(f64::INFINITY, |d| f64::from(*d));
+    let nearest = model.likeness_evidence.nearest_others.first().map_or(f64::INFINITY, |d| f64::from(*d));
     let reach = p.learn.likeness_cap / p.learn.threshold.nearest_share;
     if nearest >= reach {
         return vec![];
