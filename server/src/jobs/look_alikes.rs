@@ -20,8 +20,7 @@ pub(super) struct LookAlike {
 
 /// The landmarks that look like `model`, most similar first; none if no negative limits its threshold.
 pub(super) fn look_alikes(model: &LandmarkModel, negatives: &Negatives, p: &Params) -> Vec<LookAlike> {
-    let nearest =
-        model.likeness_evidence.nearest_others.first().map_or(f64::INFINITY, |d| f64::from(*d));
+    let nearest = model.likeness_evidence.nearest_others.first().map_or(f64::INFINITY, |d| f64::from(*d));
     let reach = p.learn.likeness_cap / p.learn.threshold.nearest_share;
     if nearest >= reach {
         return vec![];
