@@ -158,7 +158,7 @@ fn another_map_resets_the_pose() {
     assert!(motion.pose(&r1, "hall", time(2.0)).is_none(), "the old pose is gone");
 }
 
-/// Fault F4: this used to restart the fusion on the map that the frame named.
+/// Such a frame must not reset the fusion to the map that it names.
 #[test]
 fn a_frame_against_another_map_leaves_the_fusion_alone() {
     let (motion, r1) = motion();
@@ -332,7 +332,7 @@ fn an_epoch_that_is_over_changes_nothing() {
     assert!((motion.pose(&r1, "hall", time(2.0)).unwrap().pose.x_m - 20.0).abs() < 1e-9);
 }
 
-/// Fault F3: one message of another epoch used to reset the fusion, and the robot's own messages were refused from then on.
+/// One message of another epoch must not reset the fusion, nor get the robot's own messages refused.
 #[test]
 fn a_forged_message_leaves_the_robot_alone() {
     let (motion, r1) = motion();

@@ -58,7 +58,7 @@ fn epochs_are_remembered_up_to_the_bound() {
     assert!(order.advance(0, 5).is_ok(), "the oldest of {PAST_EPOCHS} is forgotten");
 }
 
-/// Fault F3: eight invented cameras kept the robot's own one out for ten minutes.
+/// Cameras with invented names must not keep the robot's own one out.
 #[test]
 fn the_camera_with_the_oldest_frame_is_replaced() {
     let slots = Slots::new(100);

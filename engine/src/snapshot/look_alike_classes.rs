@@ -1,5 +1,5 @@
-//! Classes of landmarks that look alike. Thresholds that tell landmarks from one another refuse what fits several; here
-//! they are fitted again without negatives, so that a quad may match every landmark of its class. In: all learnt models.
+//! Look-alike classes. Thresholds fitted with negatives refuse a quad that fits several landmarks. Here thresholds are fitted
+//! again without negatives, so that a quad may match every landmark of its class. In: all learnt models.
 //! Out: models with lifted thresholds and the class of each. For relocalisation and for guided recognition; matching by
 //! these models is never a recognition.
 
@@ -12,7 +12,7 @@ use vision::{
     recognise::{DistanceKind, IconFeatures},
 };
 
-/// Most landmarks with look-alikes; what is beyond is left out.
+/// Landmarks with look-alikes; further ones are left out.
 pub const MAX_LOOK_ALIKES: usize = 512;
 /// Pairs of them that are compared; from then on all count as look-alikes.
 pub const MAX_COMPARED: usize = 20_000;

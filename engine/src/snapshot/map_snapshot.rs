@@ -40,7 +40,7 @@ pub struct MapSnapshot {
     pub walls: Arc<Vec<LaserSegment>>,
     /// Counts up whenever the walls are replaced.
     pub walls_version: i64,
-    /// The walls, made ready for localisation by scans; kept from version to version while the walls are the same.
+    /// Index of the walls, for scan matching; later versions share it until the walls change.
     pub wall_index: Arc<WallIndex>,
     /// Modality statistics of the reference runs, by pose cell.
     pub modalities: Arc<ModalityMap>,

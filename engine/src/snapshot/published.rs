@@ -139,14 +139,14 @@ impl Snapshots {
                 Some(current) if current.pending.visibility => {}
                 ready => return ready,
             }
-            // An error says that this is gone, and nobody can hold a reference to it then.
+            // Not reached: an error means that `self` was dropped.
             published.changed().await.ok()?;
         }
     }
 
     fn announce(&self, change: MapChange) {
         self.published.send_modify(|count| *count += 1);
-        // An error only says that nobody listens.
+        // An error means that nobody listens.
         drop(self.changes.send(change));
     }
 }

@@ -158,7 +158,11 @@ fn extent(corners: Option<&Bytes>, whole_image: Option<&Bytes>) -> Result<Landma
 const MAX_DISTRACTORS: usize = 20;
 
 /// The view, and the quad that was taken for it where nobody said.
-fn prepare(app: &App, bytes: &Bytes, extent: &LandmarkRegion) -> Result<(NewView, Option<WholeQuad>), ApiError> {
+fn prepare(
+    app: &App,
+    bytes: &Bytes,
+    extent: &LandmarkRegion,
+) -> Result<(NewView, Option<WholeQuad>), ApiError> {
     let image = picture::decode(bytes, app.config.limits.upload())?;
     let p = &app.config.params;
     let quads = if matches!(extent, LandmarkRegion::Whole) { Vec::new() } else { whole_quads(&image, p) };

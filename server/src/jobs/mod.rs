@@ -158,7 +158,7 @@ impl Jobs {
         self.lock().of.get(&id).map(|reporter| reporter.progress.borrow().clone())
     }
 
-    /// JobProgress of an open job, from its queue to its end; `None` once it has ended.
+    /// Progress of an open job, from its queue to its end; `None` once it has ended.
     pub(crate) async fn watch(&self, id: i64) -> Result<Option<watch::Receiver<JobProgress>>, StoreError> {
         if !is_open(&jobs::get(self.store.reads(), id).await?) {
             return Ok(None);

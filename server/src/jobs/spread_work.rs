@@ -6,7 +6,7 @@ use std::sync::{
     atomic::{AtomicUsize, Ordering},
 };
 
-/// `work` on every item, over `threads` threads, results in the order of the items. JobProgress goes from and to the
+/// `work` on every item, over `threads` threads, results in the order of the items. Progress goes from and to the
 /// given shares.
 pub(super) fn each_of<T: Sync, R: Send>(
     items: &[T],

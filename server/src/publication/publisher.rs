@@ -72,11 +72,7 @@ impl Publisher {
             }
             Ok(Err(error)) if error.is_fatal() => return Err(error),
             Ok(Err(error)) => {
-                tracing::error!(
-                    map = id,
-                    error = &error as &dyn std::error::Error,
-                    "map_build_failed"
-                );
+                tracing::error!(map = id, error = &error as &dyn std::error::Error, "map_build_failed");
                 error.to_string()
             }
             Err(cause) => {
@@ -86,7 +82,12 @@ impl Publisher {
             }
         };
         let name = map_rows::name(conn, id).await?;
-        tracing::error!(map = name, reason, follows = "its previous version stays in use", "map_not_published");
+        tracing::error!(
+            map = name,
+            reason,
+            follows = "its previous version stays in use",
+            "map_not_published"
+        );
         self.vitals.unpublished(&name, &reason);
         Err(StoreError::NotPublished { map: name })
     }

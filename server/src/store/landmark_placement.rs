@@ -165,7 +165,7 @@ pub(super) enum PlacementOutcome {
     ByHand,
     /// The views give no place, and why.
     NotPlaced(String),
-    /// StoredPlace and size, and how many views they rest on.
+    /// Place and size, and the number of views that they rest on.
     Placed(Box<LandmarkGeometry>, usize),
 }
 

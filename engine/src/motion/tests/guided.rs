@@ -12,7 +12,7 @@ fn of(landmark: LandmarkId, x_m: f64) -> Fix {
     fix
 }
 
-/// A robot at x = 7 m more than its odometry fixes.
+/// A robot whose x is 7 m more than its odometry says.
 struct Robot {
     motion: MotionTracker,
     r1: Name,
@@ -72,7 +72,7 @@ fn a_guided_fix_corrects_a_supported_pose_and_is_no_support() {
         (pose.trust(), pose.modalities.as_slice()),
         (PoseTrust::Supported, &["odometry".into(), "landmarks".into()][..])
     );
-    // Odometry fixes 8.0.
+    // Odometry alone gives 8.0.
     let pose = robot.frame(None, Some(&of(DOOR, 8.02))).unwrap();
     let x_m = pose.map_from_robot.unwrap().pose.unwrap().x_m;
     assert!(x_m > 8.003 && x_m < 8.02, "{x_m}");

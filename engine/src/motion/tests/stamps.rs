@@ -97,7 +97,7 @@ fn ns(seconds: f64) -> i64 {
     (seconds * 1e9).round() as i64
 }
 
-/// Fault F2: one message an hour ahead used to hold the pose at its place for an hour.
+/// A message an hour ahead must not hold the pose at its place for an hour.
 #[test]
 fn one_stray_stamp_of_odometry_changes_nothing() {
     for (off_s, code) in [
