@@ -52,6 +52,27 @@ async fn what_is_acknowledged_is_published_and_survives() {
     assert_eq!(landmarks::get(store.reads(), "a", "p1").await.unwrap().geometry, new);
 }
 
+/// Another connection, such as that of a backup program, keeps SQLite from emptying the log when the writer's closes.
+#[tokio::test]
+async fn after_a_clean_stop_the_file_alone_holds_everything() {
+    use sqlx::{ConnectOptions as _, sqlite::SqliteConnectOptions};
+    let (dir, copied) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let (store, task) = Catalogue::open(&config(dir.path())).await.unwrap();
+    store.write(|tx| Box::pin(maps::create(tx, "a", DistanceKind::Both, 2))).await.unwrap();
+    let file = dir.path().join("waymark.sqlite");
+    let mut other = SqliteConnectOptions::new().filename(&file).read_only(true).connect().await.unwrap();
+    sqlx::query("SELECT name FROM maps").fetch_all(&mut other).await.unwrap();
+    store.write(|tx| Box::pin(walls::replace(tx, "a", &[[0.0, 0.0, 4.0, 0.0]]))).await.unwrap();
+    task.close().await;
+    let log = std::fs::metadata(dir.path().join("waymark.sqlite-wal"));
+    assert!(log.is_err() || log.is_ok_and(|log| log.len() == 0), "the log holds data");
+    std::fs::copy(&file, copied.path().join("waymark.sqlite")).unwrap();
+    let (store, _task) = Catalogue::open(&config(copied.path())).await.unwrap();
+    let map = store.snapshots().get("a").unwrap();
+    assert_eq!((map.version, map.walls.len()), (2, 1));
+    drop(other);
+}
+
 #[tokio::test]
 async fn a_failed_write_changes_nothing() {
     let dir = tempfile::tempdir().unwrap();

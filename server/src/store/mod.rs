@@ -68,7 +68,7 @@ impl WriterTask {
 
     /// Takes no more writes, finishes those that wait, and leaves one complete file behind.
     pub(crate) async fn close(self) {
-        // The last connection to close empties the write-ahead log; that must be the one that may write.
+        // Readers first: the writer's last checkpoint needs a database that nobody reads.
         self.reads.close().await;
         if self.close.send(()).is_err() {
             tracing::debug!("the writer had ended already");

@@ -146,18 +146,17 @@ impl Writer {
             };
             let Some(command) = command else { break };
             if let Err(error) = self.one(command).await {
-                tracing::error!(
-                    error = &error as &dyn std::error::Error,
-                    "store_failed: no more writes"
-                );
+                tracing::error!(error = &error as &dyn std::error::Error, "store_failed: no more writes");
                 self.vitals.fail(PART, error.to_string());
                 return;
             }
         }
         pulse.end();
-        // Leaves the write-ahead log empty and the file complete in itself.
+        if let Err(error) = checkpoint(&mut self.tx.conn).await {
+            tracing::warn!(%error, follows = "the write-ahead log holds data: copy it with the file", "checkpoint_failed");
+        }
         if let Err(error) = sqlx::Connection::close(self.tx.conn).await {
-            tracing::warn!(%error, "closing the store");
+            tracing::warn!(%error, "store_close_failed");
         }
     }
 
@@ -236,5 +235,20 @@ impl Writer {
     async fn execute(&mut self, sql: &'static str, operation: &'static str) -> Result<(), StoreError> {
         sqlx::raw_sql(sql).execute(&mut self.tx.conn).await.map_err(StoreError::during(operation))?;
         Ok(())
+    }
+}
+
+/// Moves the write-ahead log into the file and empties it, so that the file alone is complete. Closing the connection does
+/// that only if it is the last one of the file, and another program or a slow reader may hold one. Errors: somebody still
+/// reads, or the database refuses.
+async fn checkpoint(conn: &mut SqliteConnection) -> Result<(), StoreError> {
+    let busy: i64 = sqlx::query_scalar("PRAGMA wal_checkpoint(TRUNCATE)")
+        .fetch_one(conn)
+        .await
+        .map_err(StoreError::during("checkpoint"))?;
+    if busy == 0 {
+        Ok(())
+    } else {
+        Err(StoreError::InUse("another connection reads the database".to_owned()))
     }
 }
