@@ -156,13 +156,12 @@ fn visibility(
     let (mut known, mut is_pending) = (Visibility::new(), false);
     for (id, info) in landmarks.iter().filter(|(_, info)| info.place.is_some()) {
         let same = before.filter(|b| b.landmarks.get(id).is_some_and(|was| was.place == info.place));
-        match same.map(|b| (b.visibility.get(id), b.pending.visibility)) {
-            Some((Some(area), _)) => {
+        match same.and_then(|b| b.visibility.get(id)) {
+            Some(area) => {
                 known.insert(*id, area.clone());
             }
-            // It has none: it could not be computed.
-            Some((None, false)) => {}
-            Some((None, true)) | None => is_pending = true,
+            // Not computed yet, or the computation failed: this version tries again.
+            None => is_pending = true,
         }
     }
     (known, is_pending)

@@ -26,7 +26,7 @@ pub(super) async fn run(
 ) {
     let pulse = vitals.begin(PART);
     let mut last = Last::new();
-    // Versions of which something could not be derived: not tried again, and still pending, so nothing rests on it.
+    // Versions whose classes could not be derived: they stay pending, and the next version tries again.
     let mut failed: BTreeMap<String, u64> = BTreeMap::new();
     loop {
         tokio::select! {
@@ -54,14 +54,19 @@ pub(super) async fn run(
     pulse.end();
 }
 
-/// `map` with one more kind of derived data. Areas that fail are left out. Look-alike classes that fail stay pending: while
-/// nobody knows what looks alike, a known pose names nothing.
+/// `map` with one more kind of derived data. The next version tries again what fails. Until then, areas that fail are left
+/// out, since whoever waits for areas would wait for ever. Look-alike classes that fail stay pending: without them a known
+/// pose names nothing.
 async fn derived(map: Arc<MapSnapshot>, before: Option<Arc<MapSnapshot>>, vitals: &Vitals) -> MapSnapshot {
     let mut next = MapSnapshot::clone(&map);
     let panics = vitals.panics();
     if map.pending.visibility {
-        let made =
-            tokio::task::spawn_blocking(move || visibility_areas::areas(&map, before.as_deref())).await;
+        let work = move || {
+            #[cfg(test)]
+            planting::planted(&map.name, "visibility areas");
+            visibility_areas::areas(&map, before.as_deref())
+        };
+        let made = tokio::task::spawn_blocking(work).await;
         let made =
             panics.joined(Edge::Publication, "visibility areas", "those of this version are absent", made);
         if let Ok(areas) = made {
@@ -70,7 +75,12 @@ async fn derived(map: Arc<MapSnapshot>, before: Option<Arc<MapSnapshot>>, vitals
         next.pending.visibility = false;
         return next;
     }
-    let made = tokio::task::spawn_blocking(move || look_alikes(&map, before.as_deref())).await;
+    let work = move || {
+        #[cfg(test)]
+        planting::planted(&map.name, "look-alike classes");
+        look_alikes(&map, before.as_deref())
+    };
+    let made = tokio::task::spawn_blocking(work).await;
     let follows = "robots relocalise by unique landmarks only, and a pose names none";
     let made = panics.joined(Edge::Publication, "look-alike classes", follows, made);
     if let Ok(classes) = made {
@@ -87,6 +97,29 @@ fn look_alikes(map: &MapSnapshot, before: Option<&MapSnapshot>) -> Arc<LookAlike
     match before.filter(is_same) {
         Some(before) => before.look_alikes.clone(),
         None => Arc::new(look_alike_classes(&map.learnt, map.distance, &map.params)),
+    }
+}
+
+#[cfg(test)]
+pub(super) mod planting {
+    use std::sync::{Mutex, PoisonError};
+
+    /// Derivations that panic: name of the map, and what is derived. Tests that plant use maps of their own names.
+    static PLANTED: Mutex<Vec<(&str, &str)>> = Mutex::new(Vec::new());
+
+    /// Plants a panic.
+    pub(super) fn plant(map: &'static str, what: &'static str) {
+        PLANTED.lock().unwrap_or_else(PoisonError::into_inner).push((map, what));
+    }
+
+    /// Takes all panics of a map away.
+    pub(super) fn clear(map: &str) {
+        PLANTED.lock().unwrap_or_else(PoisonError::into_inner).retain(|(planted, _)| *planted != map);
+    }
+
+    pub(super) fn planted(map: &str, what: &str) {
+        let is_planted = PLANTED.lock().unwrap_or_else(PoisonError::into_inner).contains(&(map, what));
+        assert!(!is_planted, "planted: {what}");
     }
 }
 

@@ -2,19 +2,20 @@
 
 use super::super::{tests::config, *};
 use crate::store::{landmarks, maps, walls};
+use engine::snapshot::MapSnapshot;
 use vision::recognise::DistanceKind;
 
 /// A map with a wall and two landmarks 40 m apart, so that neither's area reaches the other.
-async fn two_placed(store: &Store) -> [vision::model::LandmarkId; 2] {
-    store.write(|tx| Box::pin(maps::create(tx, "a", DistanceKind::Both, 2))).await.unwrap();
+async fn two_placed(store: &Store, map: &'static str) -> [vision::model::LandmarkId; 2] {
+    store.write(move |tx| Box::pin(maps::create(tx, map, DistanceKind::Both, 2))).await.unwrap();
     store
-        .write(|tx| Box::pin(async { walls::replace(tx, "a", &[[0.0, -0.1, 60.0, -0.1]]).await }))
+        .write(move |tx| Box::pin(async move { walls::replace(tx, map, &[[0.0, -0.1, 60.0, -0.1]]).await }))
         .await
         .unwrap();
     let mut ids = [vision::model::LandmarkId(0); 2];
     for (id, (name, x_m)) in ids.iter_mut().zip([("p1", 5.0), ("p2", 45.0)]) {
         let new = placed_at(x_m);
-        let row = store.write(move |tx| Box::pin(landmarks::create(tx, "a", name, new, 5))).await.unwrap();
+        let row = store.write(move |tx| Box::pin(landmarks::create(tx, map, name, new, 5))).await.unwrap();
         id.0 = row.id as u64;
     }
     ids
@@ -46,7 +47,7 @@ async fn an_edit_computes_only_what_it_changed_and_not_in_the_writer() {
     let wake = publisher.derive.clone();
     // Nothing derives yet: what the writer publishes is all there is.
     let (store, _task) = Store::open(&config, Arc::new(publisher), vitals.clone()).await.unwrap();
-    let [p1, p2] = two_placed(&store).await;
+    let [p1, p2] = two_placed(&store, "a").await;
     let map = snapshots.get("a").unwrap();
     assert!(map.pending.visibility && map.visibility.is_empty());
 
@@ -72,4 +73,60 @@ async fn an_edit_computes_only_what_it_changed_and_not_in_the_writer() {
     let derived = snapshots.with_visibility("a").await.unwrap();
     assert!(derived.version == after.version && derived.visibility.contains_key(&p1));
     assert!(Arc::ptr_eq(&derived.visibility[&p2], &before.visibility[&p2]));
+}
+
+/// Adds a landmark, which makes a new version of the map.
+async fn add_landmark(store: &Store, map: &'static str, name: &'static str) {
+    let none = landmarks::LandmarkGeometry::default();
+    store.write(move |tx| Box::pin(landmarks::create(tx, map, name, none, 9))).await.unwrap();
+}
+
+/// The present version of `map`, once `is_ready` holds of it.
+async fn once(snapshots: &Snapshots, map: &str, is_ready: impl Fn(&MapSnapshot) -> bool) -> Arc<MapSnapshot> {
+    let waited = async {
+        loop {
+            if let Some(current) = snapshots.get(map).filter(|current| is_ready(current)) {
+                return current;
+            }
+            tokio::time::sleep(std::time::Duration::from_millis(2)).await;
+        }
+    };
+    tokio::time::timeout(std::time::Duration::from_secs(20), waited).await.expect("derived in time")
+}
+
+#[tokio::test]
+async fn look_alike_classes_that_fail_stay_pending_until_the_next_version() {
+    const MAP: &str = "classes-fail";
+    let dir = tempfile::tempdir().unwrap();
+    derive::planting::plant(MAP, "look-alike classes");
+    let (store, _task) = Catalogue::open(&config(dir.path())).await.unwrap();
+    two_placed(&store, MAP).await;
+    let panics = || store.vitals().panics().at(engine::panics::Edge::Publication);
+    let failed = once(store.snapshots(), MAP, |map| !map.pending.visibility && panics() > 0).await;
+    assert!(failed.pending.look_alikes && failed.look_alikes.classes.is_empty(), "a pose names nothing");
+    assert_eq!(failed.visibility.len(), 2, "the areas do not depend on the classes");
+    tokio::time::sleep(std::time::Duration::from_millis(50)).await;
+    assert!(panics() <= 4, "each of the four versions is tried once: {}", panics());
+    derive::planting::clear(MAP);
+    add_landmark(&store, MAP, "p3").await;
+    let next = once(store.snapshots(), MAP, |map| !map.pending.any()).await;
+    assert!(next.version > failed.version);
+    assert_eq!(store.vitals().failure(), None);
+}
+
+#[tokio::test]
+async fn visibility_areas_that_fail_are_absent_until_the_next_version() {
+    const MAP: &str = "areas-fail";
+    let dir = tempfile::tempdir().unwrap();
+    let (store, _task) = Catalogue::open(&config(dir.path())).await.unwrap();
+    derive::planting::plant(MAP, "visibility areas");
+    let ids = two_placed(&store, MAP).await;
+    // Whoever waits for areas gets an answer, without any.
+    let failed = store.snapshots().with_visibility(MAP).await.unwrap();
+    assert!(failed.visibility.is_empty() && failed.version == store.snapshots().get(MAP).unwrap().version);
+    derive::planting::clear(MAP);
+    add_landmark(&store, MAP, "p3").await;
+    let next = store.snapshots().with_visibility(MAP).await.unwrap();
+    assert!(next.version > failed.version && ids.iter().all(|id| next.visibility.contains_key(id)));
+    assert_eq!(store.vitals().failure(), None);
 }
