@@ -319,44 +319,4 @@ fn zenoh_address(endpoint: &str) -> Result<SocketAddr, ConfigError> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use std::collections::BTreeSet;
-
-    /// Paths of all keys, such as `limits.maps`. `algorithm` is one key: the method's pages list its parameters.
-    fn keys(settings: &serde_json::Value, prefix: &str) -> BTreeSet<String> {
-        let entries = settings.as_object().into_iter().flatten();
-        let nested = |(name, value): (&String, &serde_json::Value)| {
-            let path = format!("{prefix}{name}");
-            if value.is_object() && path != "algorithm" {
-                keys(value, &format!("{path}."))
-            } else {
-                BTreeSet::from([path])
-            }
-        };
-        entries.flat_map(nested).collect()
-    }
-
-    #[test]
-    fn the_example_file_names_every_setting_with_its_default() {
-        let example = || Figment::from(Toml::string(include_str!("../config.example.toml")));
-        let read: RawConfig = example().extract().unwrap();
-        assert_eq!(read, RawConfig::default());
-        let named: serde_json::Value = example().extract().unwrap();
-        let all = serde_json::to_value(RawConfig::default()).unwrap();
-        assert_eq!(keys(&named, ""), keys(&all, ""));
-        assert!(keys(&all, "").len() > 30, "the settings are no longer read");
-    }
-
-    #[test]
-    fn plain_text_beyond_loopback_is_refused() {
-        for (http, zenoh, ok) in [
-            ("127.0.0.1:0", "tcp/[::1]:7447", true),
-            ("127.9.9.9:80", "tcp/127.0.0.1:0", true),
-            ("0.0.0.0:8080", "tcp/127.0.0.1:7447", false),
-            ("[::]:8080", "tcp/127.0.0.1:7447", false),
-            ("127.0.0.1:8080", "tcp/0.0.0.0:7447", false),
-            ("127.0.0.1:8080", "tcp/192.168.1.4:7447", false),
-        ] {
-            let raw = RawConfig { http: http.into(), zenoh: zenoh.into(), ..RawConfig::default() };
-            assert_eq!(Config::try_from(raw.clone()).is_ok(), ok, "{http} {zenoh}");
+mod tests;

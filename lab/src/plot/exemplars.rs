@@ -42,7 +42,7 @@ pub(crate) fn draw(args: &LandmarkArgs) -> anyhow::Result<Picture> {
         titled(&plane(&modes, &chosen), "modes 1 (across), 2 (up)", WHITE),
         column(&[
             means(&modes, &p),
-            stand_ins(&taught.model.exemplars.iter().map(|e| e.icon()).collect::<Vec<_>>()),
+            stand_ins(&taught.model.exemplars.iter().map(vision::model::Exemplar::icon).collect::<Vec<_>>()),
         ]),
     ]);
     let explained_share = 100.0 * modes.eigenvalues.iter().sum::<f64>() / modes.total_variance.max(1e-9);

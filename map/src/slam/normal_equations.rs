@@ -167,8 +167,11 @@ mod tests {
     use rand::{RngExt as _, SeedableRng as _};
     use rand_chacha::ChaCha8Rng;
 
+    /// A block with its row and column.
+    type Entry = (usize, usize, Matrix3<f64>);
+
     /// A chain with chords, and the same matrix as a dense one.
-    fn system(blocks: usize) -> (BlockPattern, Vec<(usize, usize, Matrix3<f64>)>, DMatrix<f64>) {
+    fn system(blocks: usize) -> (BlockPattern, Vec<Entry>, DMatrix<f64>) {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
         let mut pairs: Vec<(usize, usize)> = (1..blocks).map(|i| (i - 1, i)).collect();
         pairs.extend((0..blocks / 4).map(|i| (i, blocks - 1 - i)));
@@ -196,7 +199,9 @@ mod tests {
     fn solutions_are_those_of_the_dense_matrix() {
         let (pattern, entries, mut dense) = system(24);
         let mut matrix = pattern.zeros();
-        entries.iter().for_each(|(row, column, block)| matrix.add(*row, *column, block));
+        for (row, column, block) in &entries {
+            matrix.add(*row, *column, block);
+        }
         matrix.change_diagonal(|d| d * 1.5 + 0.1);
         for i in 0..dense.nrows() {
             dense[(i, i)] = dense[(i, i)] * 1.5 + 0.1;

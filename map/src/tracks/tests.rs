@@ -65,11 +65,13 @@ fn objects_are_followed_by_their_place_over_any_gap() {
     let back: Vec<_> = two(150.0).into_iter().rev().collect();
     assert_eq!(update(&mut tracker, 300, &back), [TrackOutcome::Keep(2), TrackOutcome::Keep(1)]);
     // Another object is there now: neither joined nor a new track.
-    assert_eq!(update(&mut tracker, 301, &[quad(3, 0.0, 190.0, Some(1.0))]),
+    assert_eq!(
+        update(&mut tracker, 301, &[quad(3, 0.0, 190.0, Some(1.0))]),
         [TrackOutcome::AppearanceMismatch]
     );
     // The same picture elsewhere is another object; so is one of another size at the same place.
-    assert_eq!(update(&mut tracker, 302, &[quad(1, 0.0, 190.0, Some(4.0))]),
+    assert_eq!(
+        update(&mut tracker, 302, &[quad(1, 0.0, 190.0, Some(4.0))]),
         [TrackOutcome::TooFewObservations]
     );
     let mut larger = quad(2, 0.0, 190.0, Some(2.0));
@@ -108,7 +110,8 @@ fn views_of_doubtful_identity_are_not_stored() {
     let with = |identity, width_px| [QuadObservation { identity, ..quad(1, 0.0, width_px, Some(1.0)) }];
     for step in 0..5 {
         let width_px = 100.0 + 20.0 * step as f64;
-        assert_eq!(update(&mut tracker, step, &with(Identity::Doubtful, width_px)),
+        assert_eq!(
+            update(&mut tracker, step, &with(Identity::Doubtful, width_px)),
             [TrackOutcome::KnownLandmark]
         );
         let unwanted = with(Identity::Landmark(LandmarkId(8)), width_px);
@@ -186,7 +189,8 @@ fn old_tracks_without_views_are_dropped_and_stored_ones_resumed() {
     assert_eq!((resumed.tracks().len(), resumed.tracks()[0].views()), (1, 2));
     assert_eq!(update(&mut resumed, 200, &[quad(1, 0.0, 101.0, Some(1.0))]), [TrackOutcome::NearDuplicate]);
     assert_eq!(update(&mut resumed, 201, &[quad(1, 0.0, 240.0, Some(1.0))]), [TrackOutcome::Keep(4)]);
-    assert_eq!(update(&mut resumed, 202, &[quad(5, 0.0, 240.0, Some(8.0))]),
+    assert_eq!(
+        update(&mut resumed, 202, &[quad(5, 0.0, 240.0, Some(8.0))]),
         [TrackOutcome::TooFewObservations]
     );
     resumed.number_after(8);

@@ -42,9 +42,9 @@ pub(crate) fn track_summaries(
         if !rivals.is_empty() {
             let detail =
                 "other tracks have its appearance or its place: one object twice, or two look-alikes";
-            candidate
-                .reasons
-                .push(json!({ "gate": "similar_tracks", "value": rivals.len(), "limit": 0, "detail": detail }));
+            candidate.reasons.push(
+                json!({ "gate": "similar_tracks", "value": rivals.len(), "limit": 0, "detail": detail }),
+            );
             (candidate.passes, candidate.similar_tracks) = (false, rivals);
         }
     }

@@ -1,7 +1,7 @@
 //! Errors as `application/problem+json` (RFC 9457): a stable `code`, the `field` at fault, a sentence. What a 5xx was
 //! caused by is logged, never sent.
 
-use crate::store::StoreError;
+use crate::store::{StoreError, kind::Kind};
 use axum::{
     http::{HeaderValue, StatusCode, header},
     response::{IntoResponse, Response},
@@ -86,16 +86,16 @@ impl From<StoreError> for ApiError {
         match error {
             StoreError::NotFound { what, .. } => {
                 let (code, field) = match what {
-                    "map" => ("unknown_map", "map"),
-                    "landmark" => ("unknown_landmark", "landmark"),
-                    "view" => ("unknown_view", "view"),
-                    "robot" => ("unknown_robot", "robot"),
-                    "camera" => ("unknown_camera", "camera"),
-                    "job" => ("unknown_job", "job"),
-                    "gathering" => ("unknown_gathering", "gathering"),
-                    "track" => ("unknown_track", "track"),
-                    "run" => ("unknown_reference_run", "run"),
-                    _ => ("not_found", "path"),
+                    Kind::Map => ("unknown_map", "map"),
+                    Kind::Landmark => ("unknown_landmark", "landmark"),
+                    Kind::View => ("unknown_view", "view"),
+                    Kind::Robot => ("unknown_robot", "robot"),
+                    Kind::Camera => ("unknown_camera", "camera"),
+                    Kind::Job => ("unknown_job", "job"),
+                    Kind::Gathering => ("unknown_gathering", "gathering"),
+                    Kind::Track => ("unknown_track", "track"),
+                    Kind::ReferenceRun => ("unknown_reference_run", "run"),
+                    Kind::Model => ("not_found", "path"),
                 };
                 Self::new(StatusCode::NOT_FOUND, code, detail).field(field)
             }

@@ -5,6 +5,7 @@ use super::{
     error::ApiError,
     extract::{PathParams, name},
 };
+use crate::store::kind::Kind;
 use crate::store::{StoreError, maps, robots};
 use axum::{
     Json,
@@ -40,7 +41,7 @@ async fn last(app: &AppState, robot: String, camera: String) -> Result<LiveFrame
     robots::get(app.store.reads(), &robot).await?;
     let (robot, camera) = (name("robot", robot)?, name("camera", camera)?);
     let frame = app.live.frame(&robot, &camera);
-    Ok(frame.ok_or_else(|| StoreError::NotFound { what: "camera", name: camera.into() })?)
+    Ok(frame.ok_or_else(|| StoreError::NotFound { what: Kind::Camera, name: camera.into() })?)
 }
 
 /// The last answered frame of a camera, as a picture.

@@ -5,6 +5,7 @@ use super::{
     error::ApiError,
     extract::{Body, PathParams, QueryParams},
 };
+use crate::store::kind::Kind;
 use crate::store::{
     maps,
     modality_stats::{self, ModalitySettings},
@@ -145,7 +146,7 @@ fn modality_map(areas: &ModalityMap) -> ModalityMapBody {
 fn known(app: &AppState, map: &str) -> Result<Arc<ModalityMap>, ApiError> {
     let found = app.store.snapshots().get(map);
     let found =
-        found.ok_or_else(|| crate::store::StoreError::NotFound { what: "map", name: map.to_owned() })?;
+        found.ok_or_else(|| crate::store::StoreError::NotFound { what: Kind::Map, name: map.to_owned() })?;
     Ok(found.modalities.clone())
 }
 

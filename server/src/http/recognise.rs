@@ -7,6 +7,7 @@ use super::{
     upload::{FORM_OVERHEAD, Form},
 };
 use crate::store::StoreError;
+use crate::store::kind::Kind;
 use axum::{
     Json,
     extract::{DefaultBodyLimit, Request, State},
@@ -35,7 +36,7 @@ async fn recognise(
     request: Request,
 ) -> Result<Json<v1::Answer>, ApiError> {
     let snapshot = app.store.snapshots().get(&map);
-    let snapshot = snapshot.ok_or_else(|| StoreError::NotFound { what: "map", name: map })?;
+    let snapshot = snapshot.ok_or_else(|| StoreError::NotFound { what: Kind::Map, name: map })?;
     let mut form = Form::read(&app, request, &["image", "intrinsics"]).await?;
     let bytes = form.needed("image")?;
     let camera = match form.optional("intrinsics") {

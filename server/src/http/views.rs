@@ -106,7 +106,8 @@ async fn add(
     let image = form.needed("image")?;
     let extent = extent(form.optional("corners").as_ref(), form.optional("whole_image").as_ref())?;
     let mut capture = capture(form.optional("capture").as_ref())?;
-    let novelty = (!flag("keep_near_duplicate", form.optional("keep_near_duplicate").as_ref())?).then(NoveltyParams::default);
+    let novelty = (!flag("keep_near_duplicate", form.optional("keep_near_duplicate").as_ref())?)
+        .then(NoveltyParams::default);
     let max = app.config.limits.views;
     let (new, detected) = app.clone().on_vision_thread(move |app| prepare(app, &image, &extent)).await??;
     if let (Some(capture), Some(quad)) = (&mut capture, detected) {

@@ -13,6 +13,7 @@ use super::{
     request::Request,
     spread_work::each_of,
 };
+use crate::store::kind::Kind;
 use crate::{
     config::Config,
     publication::Catalogue,
@@ -117,7 +118,7 @@ async fn read_material(
     let snapshot = store
         .snapshots()
         .get(&map.name)
-        .ok_or_else(|| StoreError::NotFound { what: "map", name: map.name.clone() })?;
+        .ok_or_else(|| StoreError::NotFound { what: Kind::Map, name: map.name.clone() })?;
     let all = views::of_map(store.reads(), map.id).await?;
     let distractors: Vec<(Digest, QuadCrop)> = views::distractors(store.reads(), map.id).await?;
     let distractors = untaught_distractors(distractors, &all);

@@ -11,6 +11,7 @@ use super::{
     request::Request,
     spread_work::each_of,
 };
+use crate::store::kind::Kind;
 use crate::{
     config::Config,
     publication::Catalogue,
@@ -114,7 +115,8 @@ pub(super) async fn run(
     let started = Instant::now();
     let map = maps::get(store.reads(), &row.map).await?;
     let snapshot = store.snapshots().get(&map.name);
-    let snapshot = snapshot.ok_or_else(|| StoreError::NotFound { what: "map", name: map.name.clone() })?;
+    let snapshot =
+        snapshot.ok_or_else(|| StoreError::NotFound { what: Kind::Map, name: map.name.clone() })?;
     let names: BTreeSet<String> = names.into_iter().collect();
     let targets = targets(&snapshot, views::of_map(store.reads(), map.id).await?, &names);
     let (pictures, workers) = (Pictures::new(store, config), config.workers);

@@ -1,6 +1,7 @@
 //! The store and its publication as a whole, on fresh databases.
 
 use super::{build::tests as planting, *};
+use crate::store::kind::Kind;
 use crate::{
     config::RawConfig,
     store::{StoreError, WRITER, jobs, landmarks, maps, models, robots, walls},
@@ -98,7 +99,7 @@ async fn names_are_unique_and_bounds_hold() {
     let create =
         |name: &'static str| store.write(move |tx| Box::pin(maps::create(tx, name, DistanceKind::Both, 2)));
     create("a").await.unwrap();
-    assert!(matches!(create("a").await, Err(StoreError::Exists { what: "map", .. })));
+    assert!(matches!(create("a").await, Err(StoreError::Exists { what: Kind::Map, .. })));
     create("b").await.unwrap();
     assert!(matches!(create("c").await, Err(StoreError::Limit { max: 2, .. })));
     store.write(|tx| Box::pin(robots::put(tx, "r1", "b", 1))).await.unwrap();

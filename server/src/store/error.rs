@@ -1,5 +1,7 @@
 //! What can go wrong with the store, sorted by what the caller can do about it.
 
+use super::kind::Kind;
+
 /// Why a read or a write did not happen. Nothing was changed, except with [`StoreError::NotPublished`].
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum StoreError {
@@ -7,7 +9,7 @@ pub(crate) enum StoreError {
     #[error("there is no {what} `{name}`")]
     NotFound {
         /// Kind of the object.
-        what: &'static str,
+        what: Kind,
         /// The name asked for.
         name: String,
     },
@@ -15,7 +17,7 @@ pub(crate) enum StoreError {
     #[error("{what} `{name}` exists already")]
     Exists {
         /// Kind of the object.
-        what: &'static str,
+        what: Kind,
         /// The name.
         name: String,
     },
@@ -95,7 +97,7 @@ impl StoreError {
     /// Like [`StoreError::during`], for an insertion whose only unique constraint is the name.
     pub(crate) fn inserting(
         operation: &'static str,
-        what: &'static str,
+        what: Kind,
         name: &str,
     ) -> impl FnOnce(sqlx::Error) -> Self {
         move |source| match &source {

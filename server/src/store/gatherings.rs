@@ -2,7 +2,9 @@
 //! discards them (`track_acceptance.rs`).
 
 use super::{
-    StoreError, Tx, landmarks, maps, now_ms, robots,
+    StoreError, Tx,
+    kind::Kind,
+    landmarks, maps, now_ms, robots,
     statements::statements,
     views::{self, NewView, QuadCrop},
     within,
@@ -137,7 +139,7 @@ pub(crate) struct TrackView {
     pub(crate) capture: Option<String>,
 }
 
-fn unknown(what: &'static str, number: i64) -> StoreError {
+fn unknown(what: Kind, number: i64) -> StoreError {
     StoreError::NotFound { what, name: number.to_string() }
 }
 
@@ -165,7 +167,7 @@ pub(crate) async fn create(
         .bind(now_ms())
         .fetch_one(&mut tx.conn)
         .await
-        .map_err(StoreError::inserting("begin gathering", "gathering", &robot.name))
+        .map_err(StoreError::inserting("begin gathering", Kind::Gathering, &robot.name))
         .map_err(|error| match error {
             StoreError::Exists { name, .. } => StoreError::InUse(format!("robot `{name}` gathers already")),
             other => other,
@@ -183,7 +185,7 @@ pub(crate) async fn create(
 pub(crate) async fn get(db: impl SqliteExecutor<'_>, map: &str, id: i64) -> Result<GatheringRow, StoreError> {
     let at = || StoreError::during("read gathering");
     let row = sqlx::query(GET).bind(map).bind(id).fetch_optional(db).await.map_err(at())?;
-    gathering_row(&row.ok_or_else(|| unknown("gathering", id))?).map_err(at())
+    gathering_row(&row.ok_or_else(|| unknown(Kind::Gathering, id))?).map_err(at())
 }
 
 /// Gatherings of a map with numbers above `after`, in order.
@@ -243,7 +245,7 @@ pub(crate) async fn add_view(
     let at = || StoreError::during("store view of a track");
     let open: Option<bool> =
         sqlx::query_scalar(IS_OPEN).bind(id).fetch_optional(&mut tx.conn).await.map_err(at())?;
-    if !open.ok_or_else(|| unknown("gathering", id))? {
+    if !open.ok_or_else(|| unknown(Kind::Gathering, id))? {
         return Err(StoreError::InUse(format!("gathering {id} has ended")));
     }
     let state: String = sqlx::query_scalar(PUT_TRACK)
@@ -305,7 +307,7 @@ pub(crate) async fn tracks(db: impl SqliteExecutor<'_>, id: i64) -> Result<Vec<T
 pub(crate) async fn track(db: impl SqliteExecutor<'_>, id: i64, number: u32) -> Result<TrackRow, StoreError> {
     let mut all = tracks(db, id).await?.into_iter();
     let found = all.find(|t| t.number == number && t.state == "open");
-    found.ok_or_else(|| unknown("track", i64::from(number)))
+    found.ok_or_else(|| unknown(Kind::Track, i64::from(number)))
 }
 
 /// The views of a track, oldest first.
@@ -334,7 +336,7 @@ pub(crate) async fn discard(tx: &mut Tx, map: &str, id: i64, number: u32) -> Res
     get(&mut tx.conn, map, id).await?;
     let done = sqlx::query(DISCARD).bind(id).bind(number).execute(&mut tx.conn).await;
     if done.map_err(StoreError::during("discard track"))?.rows_affected() == 0 {
-        return Err(unknown("track", i64::from(number)));
+        return Err(unknown(Kind::Track, i64::from(number)));
     }
     let dropped = sqlx::query(DROP_VIEWS).bind(id).bind(number).execute(&mut tx.conn).await;
     dropped.map_err(StoreError::during("discard track")).map(drop)

@@ -1,6 +1,6 @@
 //! Jobs as rows: an accepted job survives a crash and is run again.
 
-use super::{CommittedChange, StoreError, Tx, maps, now_ms, statements::statements, within};
+use super::{CommittedChange, StoreError, Tx, kind::Kind, maps, now_ms, statements::statements, within};
 use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 
 statements! {
@@ -102,7 +102,7 @@ pub(crate) async fn create(
 /// One job.
 pub(crate) async fn get(db: impl SqliteExecutor<'_>, id: i64) -> Result<JobRow, StoreError> {
     let row = sqlx::query(GET).bind(id).fetch_optional(db).await.map_err(StoreError::during("read job"))?;
-    let row = row.ok_or_else(|| StoreError::NotFound { what: "job", name: id.to_string() })?;
+    let row = row.ok_or_else(|| StoreError::NotFound { what: Kind::Job, name: id.to_string() })?;
     job_row(&row).map_err(StoreError::during("read job"))
 }
 

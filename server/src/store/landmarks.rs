@@ -1,6 +1,6 @@
 //! Landmarks of a map: name, size, place, and a summary of what was learnt.
 
-use super::{StoreError, Tx, maps, now_ms, statements::statements, within};
+use super::{StoreError, Tx, kind::Kind, maps, now_ms, statements::statements, within};
 use map::{
     landmark_health::LandmarkHealth,
     place::{LandmarkPlace, PlaceSigmas},
@@ -208,7 +208,7 @@ pub(crate) async fn create(
         .bind(now_ms())
         .fetch_one(&mut tx.conn)
         .await
-        .map_err(StoreError::inserting("create landmark", "landmark", name))?;
+        .map_err(StoreError::inserting("create landmark", Kind::Landmark, name))?;
     let count = sqlx::query_scalar(COUNT)
         .bind(map.id)
         .fetch_one(&mut tx.conn)
@@ -240,7 +240,7 @@ pub(crate) async fn get(
         .fetch_optional(db)
         .await
         .map_err(StoreError::during("read landmark"))?;
-    let row = row.ok_or_else(|| StoreError::NotFound { what: "landmark", name: name.to_owned() })?;
+    let row = row.ok_or_else(|| StoreError::NotFound { what: Kind::Landmark, name: name.to_owned() })?;
     landmark_row(&row).map_err(StoreError::during("read landmark"))
 }
 

@@ -97,6 +97,7 @@ pub(crate) async fn set(
 mod tests {
     use super::*;
     use crate::publication::Catalogue;
+    use crate::store::kind::Kind;
     use nalgebra::Vector3;
     use vision::recognise::DistanceKind;
 
@@ -134,7 +135,7 @@ mod tests {
         ));
         assert!(matches!(
             put(&store, "a", linked_to("z")).await,
-            Err(StoreError::NotFound { what: "map", .. })
+            Err(StoreError::NotFound { what: Kind::Map, .. })
         ));
         let refused = store.write(|tx| Box::pin(maps::delete(tx, "b"))).await;
         assert!(

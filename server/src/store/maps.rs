@@ -1,6 +1,6 @@
 //! Maps: named, versioned, with the distance that decides.
 
-use super::{CommittedChange, StoreError, Tx, now_ms, statements::statements, within};
+use super::{CommittedChange, StoreError, Tx, kind::Kind, now_ms, statements::statements, within};
 use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 use vision::recognise::DistanceKind;
 
@@ -69,7 +69,7 @@ pub(crate) async fn create(
         .bind(now_ms())
         .fetch_one(&mut tx.conn)
         .await
-        .map_err(StoreError::inserting("create map", "map", name))?;
+        .map_err(StoreError::inserting("create map", Kind::Map, name))?;
     let count =
         sqlx::query_scalar(COUNT).fetch_one(&mut tx.conn).await.map_err(StoreError::during("count maps"))?;
     within(count, max, "maps")?;
@@ -80,7 +80,7 @@ pub(crate) async fn create(
 /// One map by name.
 pub(crate) async fn get(db: impl SqliteExecutor<'_>, name: &str) -> Result<MapRow, StoreError> {
     let row = sqlx::query(GET).bind(name).fetch_optional(db).await.map_err(StoreError::during("read map"))?;
-    let row = row.ok_or_else(|| StoreError::NotFound { what: "map", name: name.to_owned() })?;
+    let row = row.ok_or_else(|| StoreError::NotFound { what: Kind::Map, name: name.to_owned() })?;
     map_row(&row).map_err(StoreError::during("read map"))
 }
 
@@ -103,7 +103,7 @@ pub(crate) async fn page(
 /// Checks that a map was not deleted meanwhile, nor replaced by another of the same name; gives its present row.
 pub(crate) async fn recheck(tx: &mut Tx, map: MapRow) -> Result<MapRow, StoreError> {
     let now = get(&mut tx.conn, &map.name).await?;
-    if now.id == map.id { Ok(now) } else { Err(StoreError::NotFound { what: "map", name: map.name }) }
+    if now.id == map.id { Ok(now) } else { Err(StoreError::NotFound { what: Kind::Map, name: map.name }) }
 }
 
 /// The map's content has changed: a new version, published after the commit.

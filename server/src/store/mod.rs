@@ -5,6 +5,7 @@
 //! ([`on_commit`]); the store knows it by its trait alone.
 
 mod error;
+pub(crate) mod kind;
 pub(crate) mod migrations;
 mod open;
 mod writer;

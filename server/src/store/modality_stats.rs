@@ -1,6 +1,6 @@
 //! Modality statistics of a map's reference runs, the areas that people named, and the fusion mode.
 
-use super::{StoreError, Tx, maps, now_ms, statements::statements, within};
+use super::{StoreError, Tx, kind::Kind, maps, now_ms, statements::statements, within};
 use map::modality_stats::{FusionMode, MAX_AREAS, NamedArea, PoseCell, StatsByModality};
 use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 use std::collections::BTreeMap;
@@ -149,7 +149,7 @@ pub(crate) async fn delete(tx: &mut Tx, map: &str, id: i64) -> Result<(), StoreE
     let map = maps::get(&mut tx.conn, map).await?;
     let deleted = sqlx::query(DELETE).bind(map.id).bind(id).execute(&mut tx.conn).await;
     if deleted.map_err(StoreError::during("delete run"))?.rows_affected() == 0 {
-        return Err(StoreError::NotFound { what: "run", name: id.to_string() });
+        return Err(StoreError::NotFound { what: Kind::ReferenceRun, name: id.to_string() });
     }
     maps::bump(tx, map.id).await
 }
@@ -213,7 +213,7 @@ mod tests {
         store.write(move |tx| Box::pin(async move { delete(tx, "a", first).await })).await.unwrap();
         assert_eq!(known(&store).1.cells().map(|(cell, ..)| cell.x).collect::<Vec<_>>(), [2]);
         let again = store.write(move |tx| Box::pin(async move { delete(tx, "a", first).await })).await;
-        assert!(matches!(again, Err(StoreError::NotFound { what: "run", .. })));
+        assert!(matches!(again, Err(StoreError::NotFound { what: Kind::ReferenceRun, .. })));
         task.close().await;
         let (store, task) = Catalogue::open(&config).await.unwrap();
         let areas = known(&store).1;

@@ -1,6 +1,6 @@
 //! Models as bytes with their digest. The store does not interpret them.
 
-use super::{StoreError, Tx, landmarks::ModelSummary, statements::statements};
+use super::{StoreError, Tx, kind::Kind, landmarks::ModelSummary, statements::statements};
 use sha2::{Digest as _, Sha256};
 use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 use std::collections::BTreeSet;
@@ -121,5 +121,5 @@ pub(crate) async fn digests(
 pub(crate) async fn get(db: impl SqliteExecutor<'_>, landmark: LandmarkId) -> Result<Vec<u8>, StoreError> {
     let bytes = sqlx::query_scalar(GET).bind(landmark.0 as i64).fetch_optional(db).await;
     let bytes = bytes.map_err(StoreError::during("read model"))?;
-    bytes.ok_or_else(|| StoreError::NotFound { what: "model of landmark", name: landmark.0.to_string() })
+    bytes.ok_or_else(|| StoreError::NotFound { what: Kind::Model, name: landmark.0.to_string() })
 }

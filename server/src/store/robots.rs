@@ -1,6 +1,6 @@
 //! Robots, and the map of each.
 
-use super::{CommittedChange, StoreError, Tx, maps, now_ms, statements::statements, within};
+use super::{CommittedChange, StoreError, Tx, kind::Kind, maps, now_ms, statements::statements, within};
 use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 
 statements! {
@@ -43,7 +43,7 @@ pub(crate) async fn put(tx: &mut Tx, name: &str, map: &str, max: usize) -> Resul
 pub(crate) async fn get(db: impl SqliteExecutor<'_>, name: &str) -> Result<RobotRow, StoreError> {
     let row =
         sqlx::query(GET).bind(name).fetch_optional(db).await.map_err(StoreError::during("read robot"))?;
-    let row = row.ok_or_else(|| StoreError::NotFound { what: "robot", name: name.to_owned() })?;
+    let row = row.ok_or_else(|| StoreError::NotFound { what: Kind::Robot, name: name.to_owned() })?;
     robot_row(&row).map_err(StoreError::during("read robot"))
 }
 

@@ -4,6 +4,7 @@
 
 use super::{
     Store, StoreError, Tx,
+    kind::Kind,
     landmark_placement::{self, PlacementOutcome, PlacementReport},
     landmarks::{self, LandmarkGeometry},
     maps,
@@ -136,7 +137,7 @@ async fn prepare(store: &Store, teaching: &Arc<Teaching>) -> Result<Prepared, St
     // The stamp is read first, so that the write notices whatever changes after it.
     let Some(stamp) = stamp(store.reads(), map, landmark).await? else {
         maps::get(store.reads(), map).await?;
-        return Err(StoreError::NotFound { what: "landmark", name: landmark.clone() });
+        return Err(StoreError::NotFound { what: Kind::Landmark, name: landmark.clone() });
     };
     let stored = match novelty {
         Some(_) => views::crops(store.reads(), stamp.landmark).await?,

@@ -6,6 +6,7 @@ use super::{
     Store, StoreError, Tx,
     gatherings::{self, TrackView},
     jobs::{self, JobRow},
+    kind::Kind,
     landmark_placement::{self, PlacementOutcome, PlacementReport},
     landmarks::{self, LandmarkGeometry},
     maps,
@@ -280,7 +281,7 @@ async fn landmark_of(
     }
     match landmarks::get(&mut tx.conn, map, &name).await {
         Ok(row) if row.views == 0 => Ok((name, row.id)),
-        Ok(_) => Err(StoreError::Exists { what: "landmark", name }),
+        Ok(_) => Err(StoreError::Exists { what: Kind::Landmark, name }),
         Err(StoreError::NotFound { .. }) => {
             let made = landmarks::create(tx, map, &name, LandmarkGeometry::default(), max).await?;
             Ok((name, made.id))

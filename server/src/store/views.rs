@@ -1,6 +1,6 @@
 //! Training views of landmarks with their pictures, and the distractors beside the landmarks in those pictures.
 
-use super::{StoreError, Tx, landmarks, now_ms, statements::statements, within};
+use super::{StoreError, Tx, kind::Kind, landmarks, now_ms, statements::statements, within};
 use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 use vision::{geometry::Corners, icon::Icon, model::LandmarkId};
 
@@ -156,7 +156,7 @@ pub(super) async fn same(tx: &mut Tx, landmark: i64, new: &NewView) -> Result<Op
 pub(super) async fn get(db: impl SqliteExecutor<'_>, view: i64) -> Result<ViewRow, StoreError> {
     let row =
         sqlx::query(GET).bind(view).fetch_optional(db).await.map_err(StoreError::during("read view"))?;
-    view_row(&row.ok_or_else(|| StoreError::NotFound { what: "view", name: view.to_string() })?)
+    view_row(&row.ok_or_else(|| StoreError::NotFound { what: Kind::View, name: view.to_string() })?)
 }
 
 /// The crops of a landmark's views, by number.
@@ -249,7 +249,7 @@ pub(crate) async fn icon(
 ) -> Result<Icon, StoreError> {
     let row = sqlx::query(ICON).bind(map).bind(landmark).bind(view).fetch_optional(db).await;
     let row = row.map_err(StoreError::during("read icon"))?;
-    icon_of(&row.ok_or_else(|| StoreError::NotFound { what: "view", name: view.to_string() })?)
+    icon_of(&row.ok_or_else(|| StoreError::NotFound { what: Kind::View, name: view.to_string() })?)
 }
 
 /// Deletes a view. What was learnt from it stays until the landmark is learnt again.
@@ -257,7 +257,7 @@ pub(crate) async fn delete(tx: &mut Tx, map: &str, landmark: &str, view: i64) ->
     let landmark = landmarks::get(&mut tx.conn, map, landmark).await?;
     let done = sqlx::query(DELETE).bind(view).bind(landmark.id).execute(&mut tx.conn).await;
     match done.map_err(StoreError::during("delete view"))?.rows_affected() {
-        0 => Err(StoreError::NotFound { what: "view", name: view.to_string() }),
+        0 => Err(StoreError::NotFound { what: Kind::View, name: view.to_string() }),
         _ => Ok(()),
     }
 }
@@ -289,7 +289,7 @@ pub(crate) async fn image(db: impl SqliteExecutor<'_>, view: i64) -> Result<Vec<
         .fetch_optional(db)
         .await
         .map_err(StoreError::during("read picture"))?;
-    image.ok_or_else(|| StoreError::NotFound { what: "view", name: view.to_string() })
+    image.ok_or_else(|| StoreError::NotFound { what: Kind::View, name: view.to_string() })
 }
 
 /// The distractors of a map, each with the digest of its picture.

@@ -1,6 +1,6 @@
 //! The walls of a map (laser segments in the map frame): replaced as a whole, read as a whole.
 
-use super::{StoreError, Tx, maps, statements::statements};
+use super::{StoreError, Tx, kind::Kind, maps, statements::statements};
 use sqlx::{Row, SqliteExecutor};
 
 statements! {
@@ -38,7 +38,7 @@ pub(crate) async fn replace(tx: &mut Tx, map: &str, segments: &[Ends]) -> Result
 pub(super) async fn version(db: impl SqliteExecutor<'_>, map_id: i64) -> Result<i64, StoreError> {
     let version = sqlx::query_scalar(VERSION).bind(map_id).fetch_optional(db).await;
     let version = version.map_err(StoreError::during("read the version of walls"))?;
-    version.ok_or_else(|| StoreError::NotFound { what: "map", name: map_id.to_string() })
+    version.ok_or_else(|| StoreError::NotFound { what: Kind::Map, name: map_id.to_string() })
 }
 
 /// The walls of a map, in the order they were given.

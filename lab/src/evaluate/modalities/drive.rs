@@ -73,7 +73,7 @@ fn camera() -> Intrinsics {
     Intrinsics::new(500.0, 500.0, 320.0, 240.0, Distortion::None).expect("in range")
 }
 
-/// robot_from_camera of a camera with this pan: one of two looks half left, one half right.
+/// `robot_from_camera` of a camera with this pan: one of two looks half left, one half right.
 fn mounting(pan: f64) -> Isometry3<f64> {
     pan_tilt(pan, 0.0, Vector3::new(0.1, 0.0, 1.3))
 }

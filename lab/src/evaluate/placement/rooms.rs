@@ -245,7 +245,7 @@ pub(super) fn evaluated(rooms: usize, views: usize, seed: u64) -> (Vec<Summary>,
     (summaries, strays(rooms, &mut random))
 }
 
-/// Doors ajar and boards that lean or hang askew, on_plane once.
+/// Doors ajar and boards that lean or hang askew, observed once.
 fn strays(rooms: usize, random: &mut Random) -> Vec<Strays> {
     type Change = fn(&mut LandmarkPlace, f64);
     let open: Change = |object, angle| {

@@ -1,8 +1,8 @@
 //! The robot's pose on the floor from one, two or three landmarks at once, and fused over drives (method 13.6, 15).
 
 use super::{
-    stated_camera::{Cameras, StatedCamera},
     single::{Cost, cost_of},
+    stated_camera::{Cameras, StatedCamera},
 };
 use map::{
     extrinsics::{CameraExtrinsics, pan_tilt},

@@ -1,8 +1,8 @@
 //! The straight lines among the edge points of a band. In: points. Out: lines, the best supported first.
 
 use super::feature_constants::{
-    FIT_REACH_PX, MAX_LINES, MIN_LINE_POINTS, MIN_SUPPORT, NEAR_LINE_PX, SAME_LINE_PX, SLOPE_STEP,
-    SLOPES, SUPPRESSED_BINS,
+    FIT_REACH_PX, MAX_LINES, MIN_LINE_POINTS, MIN_SUPPORT, NEAR_LINE_PX, SAME_LINE_PX, SLOPE_STEP, SLOPES,
+    SUPPRESSED_BINS,
 };
 
 /// Slopes tried in all.
@@ -121,6 +121,10 @@ fn best_slopes(votes: &[Votes]) -> Vec<(u32, usize)> {
 }
 
 /// Least squares on the edge points near a line (offset, slope), in rounds of narrowing distance.
+#[expect(
+    clippy::inline_always,
+    reason = "an instruction set holds only in what is inlined where it was chosen"
+)]
 #[inline(always)]
 fn fit(peaks: &[Peak], rows: usize, mut line: (f64, f64)) -> Option<SideLine> {
     let (offset, slope) = (line.0 as f32, line.1 as f32);
