@@ -7,11 +7,11 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum MatchRefusal {
-    /// C^r is not below tau.
+    /// C^r is not below its threshold.
     Correlation,
-    /// H^r is not below tau.
+    /// H^r is not below its threshold.
     Hausdorff,
-    /// Aligned with similarity after alignment does too dissimilar.
+    /// Too dissimilar after alignment: the gradient similarity is below its threshold.
     Similarity,
     /// Similar, but too many parts mismatch.
     Mismatch,
