@@ -84,6 +84,11 @@ impl MessageKind {
     pub fn of(name: TypeName<'_>) -> Option<Self> {
         Self::ALL.iter().copied().find(|kind| kind.name() == name)
     }
+
+    /// Whether the message itself has a field of type `uint8[]`, which publishers since Lyrical send as a buffer.
+    pub fn has_bytes(self) -> bool {
+        matches!(self, Self::Image | Self::CompressedImage)
+    }
 }
 
 impl<'a> AnyMessage<'a> {

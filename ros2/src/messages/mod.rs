@@ -66,3 +66,18 @@ pub trait Message<'a>: Value<'a> {
         writer.finish()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lists_take_at_most_twice_the_memory_of_their_bytes() {
+        fn check<'a, T: Value<'a>>() {
+            assert!(size_of::<T>() <= 2 * T::MIN_BYTES, "{} over {}", size_of::<T>(), T::MIN_BYTES);
+        }
+        check::<TransformStamped<'_>>();
+        check::<Detection2D<'_>>();
+        check::<ObjectHypothesisWithPose<'_>>();
+    }
+}
