@@ -8,7 +8,7 @@ const ENDINGS: [&str; 4] = [".rs", ".md", ".sql", ".proto"];
 /// End of the path of a document.
 const DOCUMENT: &str = ".md";
 /// Folders with code and text of this project; missing ones are skipped.
-const FOLDERS: [&str; 12] = [
+const FOLDERS: [&str; 13] = [
     "client",
     "engine",
     "formats",
@@ -16,6 +16,7 @@ const FOLDERS: [&str; 12] = [
     "map",
     "migrations",
     "protos",
+    "ros2",
     "server",
     "sim",
     "tests",
