@@ -1,7 +1,7 @@
 //! Claim: walls explain at least nine tenths of the wall cells of every real and simulated grid map of the data sets,
 //! and lie where the grid has walls. Skipped, with the reason, where the maps are not.
 
-use formats::walls::{self, MIN_EXPLAINED};
+use formats::walls::{self, ImportOptions, MIN_EXPLAINED};
 use std::{io::Write as _, path::PathBuf};
 
 /// Share of the walls' length that must lie on wall cells.
@@ -30,7 +30,8 @@ fn walls_explain_every_grid_map() {
     let mut failed = vec![];
     for path in maps() {
         let name = path.file_stem().expect("a name").to_string_lossy().into_owned();
-        let imported = walls::import(&path, 0.3).unwrap_or_else(|e| panic!("{name}: {e}"));
+        let imported =
+            walls::import(&path, &ImportOptions::default()).unwrap_or_else(|e| panic!("{name}: {e}"));
         let report = imported.report.grid.expect("a grid");
         if report.share_explained() < MIN_EXPLAINED || report.length_on_wall_cells < MIN_ON_WALL_CELLS {
             failed.push(format!("{name}: {report:?}"));

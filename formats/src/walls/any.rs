@@ -2,6 +2,7 @@
 
 use super::{
     evidence::Evidence,
+    floor_plan::{self, PlanError},
     geojson::{self, GeoJsonError},
     grid::{GridError, OccupancyGrid},
     map_file::{MAX_WALLS, MapFile, MapFileError, Wall},
@@ -12,7 +13,7 @@ use super::{
 };
 use crate::scan_log::ReadError;
 use map::check::OutOfRange;
-use std::path::Path;
+use std::{io::Read as _, path::Path};
 
 /// Sides of a cell of a written grid, metres.
 const RESOLUTION_M: std::ops::RangeInclusive<f64> = 0.005..=1.0;
@@ -35,6 +36,9 @@ pub enum WallFileError {
     /// A GeoJSON file.
     #[error(transparent)]
     GeoJson(#[from] GeoJsonError),
+    /// A floor plan.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
     /// A vector map.
     #[error(transparent)]
     Vector(#[from] ReadError),
@@ -58,6 +62,21 @@ pub enum WallFileError {
     /// A file to write of a kind that is not known.
     #[error("`.{0}` is none of .yaml, .txt, .json, .geojson")]
     Extension(String),
+}
+
+/// What a file itself does not say.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ImportOptions {
+    /// Walls of a grid shorter than this are left out, metres, but for those that alone explain some cells.
+    pub min_length_m: f64,
+    /// Metres of a unit of an SVG floor plan; without it the plan's physical size counts.
+    pub metres_per_unit: Option<f64>,
+}
+
+impl Default for ImportOptions {
+    fn default() -> Self {
+        Self { min_length_m: 0.3, metres_per_unit: None }
+    }
 }
 
 /// A file that was read: its walls, and what of the file became of them.
@@ -100,24 +119,27 @@ fn extension(path: &Path) -> String {
     path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default()
 }
 
-/// Reads the walls of `.yaml` (`map_server`; or its `.pgm` or `.png`), `.json` (map file), `.geojson`, or else of a
-/// vector map. Walls of a grid shorter than `min_length_m` are left out, but for those that alone explain some cells.
-pub fn import(path: &Path, min_length_m: f64) -> Result<Imported, WallFileError> {
+/// The text of a file of at most `max` bytes.
+fn text(path: &Path, max: u64) -> Result<String, WallFileError> {
+    let mut text = String::new();
+    std::fs::File::open(path)?.take(max + 1).read_to_string(&mut text)?;
+    if text.len() as u64 > max { Err(WallFileError::TooLarge(max)) } else { Ok(text) }
+}
+
+/// Reads the walls of `.yaml` (`map_server`; or its `.pgm` or `.png`), `.json` (map file), `.geojson`, `.svg` (floor
+/// plan), or else of a vector map.
+pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, WallFileError> {
     let of = |segments| Imported::of(MapFile { segments, ..MapFile::default() });
     let of_grid = |yaml: &Path| -> Result<Imported, WallFileError> {
         let (grid, underlay) = ros_grid::read(yaml)?;
-        Ok(Imported::of_grid(grid, underlay, min_length_m))
+        Ok(Imported::of_grid(grid, underlay, options.min_length_m))
     };
     let imported = match extension(path).as_str() {
         "yaml" | "yml" => of_grid(path)?,
         "pgm" | "png" => of_grid(&ros_grid::yaml_beside(path).ok_or(WallFileError::OnlyPicture)?)?,
         "json" => Imported::of(MapFile::read(path)?),
-        "geojson" => {
-            if std::fs::metadata(path)?.len() > geojson::MAX_BYTES {
-                return Err(WallFileError::TooLarge(geojson::MAX_BYTES));
-            }
-            of(geojson::walls(&std::fs::read_to_string(path)?)?)
-        }
+        "geojson" => of(geojson::walls(&text(path, geojson::MAX_BYTES)?)?),
+        "svg" => of(floor_plan::walls(&text(path, floor_plan::MAX_BYTES)?, options.metres_per_unit)?),
         _ => of(vector_map::read(path)?),
     };
     if imported.map.segments.len() > MAX_WALLS {
@@ -129,9 +151,9 @@ pub fn import(path: &Path, min_length_m: f64) -> Result<Imported, WallFileError>
     Ok(imported)
 }
 
-/// Reads the walls of a file, as [`import`] does.
-pub fn read(path: &Path, min_length_m: f64) -> Result<MapFile, WallFileError> {
-    Ok(import(path, min_length_m)?.map)
+/// Reads the walls of a file that says everything itself, as [`import`] does.
+pub fn read(path: &Path) -> Result<MapFile, WallFileError> {
+    Ok(import(path, &ImportOptions { min_length_m: 0.0, ..ImportOptions::default() })?.map)
 }
 
 /// Writes a map as `.yaml` (with a `.pgm` beside it, cells of `resolution_m`), `.txt` (vector map), `.geojson` or
@@ -146,5 +168,44 @@ pub fn write(map: &MapFile, path: &Path, resolution_m: f64) -> Result<(), WallFi
         "geojson" => Ok(std::fs::write(path, geojson::text(&map.segments))?),
         "txt" => Ok(std::fs::write(path, vector_map::text(&map.segments))?),
         other => Err(WallFileError::Extension(other.to_owned())),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_is_read_up_to_its_bound() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("plan.svg");
+        std::fs::write(&path, "0123456789").unwrap();
+        assert_eq!(text(&path, 10).unwrap(), "0123456789");
+        assert!(matches!(text(&path, 9), Err(WallFileError::TooLarge(9))));
+    }
+
+    #[test]
+    fn walls_go_through_every_kind_of_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let map = MapFile { segments: vec![Wall::between([0.0, 0.5], [4.0, 0.5])], ..MapFile::default() };
+        for name in ["m.json", "m.txt", "m.geojson"] {
+            let path = folder.path().join(name);
+            write(&map, &path, 0.05).unwrap();
+            assert_eq!(read(&path).unwrap(), map, "{name}");
+        }
+        let plan = folder.path().join("m.svg");
+        std::fs::write(
+            &plan,
+            r#"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 8 2"><path stroke="red" d="M0 1H8"/></svg>"#,
+        )
+        .unwrap();
+        let options = ImportOptions { metres_per_unit: Some(0.5), ..ImportOptions::default() };
+        let imported = import(&plan, &options).unwrap();
+        assert_eq!((imported.map.segments[0], imported.report.segments), (map.segments[0], 2));
+        assert!((imported.report.length_m - 8.0).abs() < 1e-9);
+        assert!(imported.picture().is_none() && imported.underlay.is_none());
+        let refused = read(&plan).unwrap_err().to_string();
+        assert!(refused.contains("the plan has no scale"), "{refused}");
+        assert!(matches!(write(&map, &plan, 0.05), Err(WallFileError::Extension(_))));
     }
 }

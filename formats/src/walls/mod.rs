@@ -1,8 +1,10 @@
-//! Walls from and to files of other programs: ROS occupancy grids, vector maps, GeoJSON, and the project's map file.
+//! Walls from and to files of other programs: ROS occupancy grids, vector maps, GeoJSON, and the project's map file; and
+//! from SVG floor plans.
 
 mod any;
 mod border;
 mod evidence;
+mod floor_plan;
 mod geojson;
 mod grid;
 mod map_file;
@@ -13,7 +15,8 @@ mod ros_grid;
 mod ros_yaml;
 mod vector_map;
 
-pub use any::{Imported, WallFileError, import, read, write};
+pub use any::{ImportOptions, Imported, WallFileError, import, read, write};
+pub use floor_plan::PlanError;
 pub use geojson::GeoJsonError;
 pub use grid::{CellState, GridError, OccupancyGrid};
 pub use map_file::{MAX_WALLS, MapFile, MapFileError, Wall};

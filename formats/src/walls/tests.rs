@@ -1,5 +1,5 @@
 use super::{
-    any::{WallFileError, import},
+    any::{ImportOptions, WallFileError, import},
     evidence::Evidence,
     grid::{CellState, OccupancyGrid},
     map_file::Wall,
@@ -106,15 +106,15 @@ fn a_picture_is_read_by_the_yaml_beside_it() {
     let folder = tempfile::tempdir().unwrap();
     let picture = folder.path().join("m.pgm");
     std::fs::write(&picture, b"P5 2 2 255\n\x00\xfe\xcd\x00").unwrap();
-    let alone = import(&picture, 0.3).unwrap_err();
+    let alone = import(&picture, &ImportOptions::default()).unwrap_err();
     assert!(matches!(alone, WallFileError::OnlyPicture), "{alone}");
     assert!(alone.to_string().contains("this is the picture; give its .yaml"), "{alone}");
     std::fs::copy(&picture, folder.path().join("n.yaml")).unwrap();
-    let named_so = import(&folder.path().join("n.yaml"), 0.3).unwrap_err().to_string();
+    let named_so = import(&folder.path().join("n.yaml"), &ImportOptions::default()).unwrap_err().to_string();
     assert!(named_so.contains("this is the picture"), "{named_so}");
     let text = "image: m.pgm\nresolution: 0.1\norigin: [0, 0, 0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n";
     std::fs::write(folder.path().join("m.yaml"), text).unwrap();
-    let report = import(&picture, 0.3).unwrap().report.grid.unwrap();
+    let report = import(&picture, &ImportOptions::default()).unwrap().report.grid.unwrap();
     assert_eq!((report.occupied, report.free, report.unknown, report.grey), (2, 1, 1, 0));
 }
 
