@@ -121,9 +121,12 @@ fn extension(path: &Path) -> String {
 
 /// The text of a file of at most `max` bytes.
 fn text(path: &Path, max: u64) -> Result<String, WallFileError> {
-    let mut text = String::new();
-    std::fs::File::open(path)?.take(max + 1).read_to_string(&mut text)?;
-    if text.len() as u64 > max { Err(WallFileError::TooLarge(max)) } else { Ok(text) }
+    let mut bytes = Vec::new();
+    std::fs::File::open(path)?.take(max + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > max {
+        return Err(WallFileError::TooLarge(max));
+    }
+    Ok(String::from_utf8(bytes).map_err(|e| std::io::Error::new(std::io::ErrorKind::InvalidData, e))?)
 }
 
 /// Reads the walls of `.yaml` (`map_server`; or its `.pgm` or `.png`), `.json` (map file), `.geojson`, `.svg` (floor
@@ -182,6 +185,10 @@ mod tests {
         std::fs::write(&path, "0123456789").unwrap();
         assert_eq!(text(&path, 10).unwrap(), "0123456789");
         assert!(matches!(text(&path, 9), Err(WallFileError::TooLarge(9))));
+        std::fs::write(&path, "a\u{e4}").unwrap();
+        assert!(matches!(text(&path, 1), Err(WallFileError::TooLarge(1))), "cut within a letter");
+        std::fs::write(&path, [0xff]).unwrap();
+        assert!(matches!(text(&path, 9), Err(WallFileError::Io(_))));
     }
 
     #[test]

@@ -89,8 +89,8 @@ fn scale(root: roxmltree::Node, tree: &Tree, metres_per_unit: Option<f64>) -> Re
         return is_sized.then(|| INCH_M / f64::from(DPI)).ok_or(PlanError::NoScale);
     };
     let view_box = root.attribute("viewBox").unwrap_or_default();
-    let numbers: Vec<f64> =
-        view_box.split([' ', ',']).filter(|t| !t.is_empty()).filter_map(|t| t.trim().parse().ok()).collect();
+    let tokens = view_box.split(|c: char| c == ',' || c.is_whitespace()).filter(|t| !t.is_empty());
+    let numbers: Vec<f64> = tokens.filter_map(|t| t.parse().ok()).collect();
     let [_, _, width, height] = numbers[..] else { return Ok(metres) };
     // The smaller one: the drawing is fitted into the page, not stretched.
     let (across, along) = (f64::from(tree.size().width()) / width, f64::from(tree.size().height()) / height);
@@ -137,14 +137,14 @@ impl Page {
                     start = self.point(p);
                     at = start;
                 }
-                PathSegment::LineTo(p) => self.add_curve(walls, &mut at, &[self.point(p)])?,
+                PathSegment::LineTo(p) => add_curve(walls, &mut at, &[self.point(p)])?,
                 PathSegment::QuadTo(p, q) => {
-                    self.add_curve(walls, &mut at, &[self.point(p), self.point(q)])?;
+                    add_curve(walls, &mut at, &[self.point(p), self.point(q)])?;
                 }
                 PathSegment::CubicTo(p, q, r) => {
-                    self.add_curve(walls, &mut at, &[self.point(p), self.point(q), self.point(r)])?;
+                    add_curve(walls, &mut at, &[self.point(p), self.point(q), self.point(r)])?;
                 }
-                PathSegment::Close => self.add_curve(walls, &mut at, &[start])?,
+                PathSegment::Close => add_curve(walls, &mut at, &[start])?,
             }
         }
         Ok(())
@@ -153,37 +153,32 @@ impl Page {
     fn point(&self, p: Point) -> [f64; 2] {
         [f64::from(p.x) * self.metres_per_px, (self.height_px - f64::from(p.y)) * self.metres_per_px]
     }
+}
 
-    /// Adds the chords of a Bezier curve from `at` through its other control points.
-    fn add_curve(
-        &self,
-        walls: &mut Vec<Wall>,
-        at: &mut [f64; 2],
-        others: &[[f64; 2]],
-    ) -> Result<(), PlanError> {
-        let mut controls = vec![*at];
-        controls.extend(others);
-        // Second differences bound how far n chords lie from the curve: degree (degree - 1) / 8 n^2 times the largest.
-        let degree = others.len() as f64;
-        let bend = controls
-            .windows(3)
-            .map(|p| [0, 1].map(|k| p[0][k] - 2.0 * p[1][k] + p[2][k]))
-            .map(|d| d[0].hypot(d[1]))
-            .fold(0.0, f64::max);
-        let chords = (degree * (degree - 1.0) / 8.0 * bend / FLAT_M).sqrt().ceil().clamp(1.0, MAX_CHORDS);
-        for k in 1..=chords as usize {
-            let to = bezier(&controls, k as f64 / chords);
-            if (to[0] - at[0]).hypot(to[1] - at[1]) < map::segments::MIN_SEGMENT_M {
-                continue;
-            }
-            if walls.len() + 2 > MAX_WALLS {
-                return Err(PlanError::TooMany);
-            }
-            walls.extend([Wall::between(*at, to), Wall::between(to, *at)]);
-            *at = to;
+/// Adds the chords of a Bezier curve from `at` through its other control points.
+fn add_curve(walls: &mut Vec<Wall>, at: &mut [f64; 2], others: &[[f64; 2]]) -> Result<(), PlanError> {
+    let mut controls = vec![*at];
+    controls.extend(others);
+    // Second differences bound how far n chords lie from the curve: degree (degree - 1) / 8 n^2 times the largest.
+    let degree = others.len() as f64;
+    let bend = controls
+        .windows(3)
+        .map(|p| [0, 1].map(|k| p[0][k] - 2.0 * p[1][k] + p[2][k]))
+        .map(|d| d[0].hypot(d[1]))
+        .fold(0.0, f64::max);
+    let chords = (degree * (degree - 1.0) / 8.0 * bend / FLAT_M).sqrt().ceil().clamp(1.0, MAX_CHORDS);
+    for k in 1..=chords as usize {
+        let to = bezier(&controls, k as f64 / chords);
+        if (to[0] - at[0]).hypot(to[1] - at[1]) < map::segments::MIN_SEGMENT_M {
+            continue;
         }
-        Ok(())
+        if walls.len() + 2 > MAX_WALLS {
+            return Err(PlanError::TooMany);
+        }
+        walls.extend([Wall::between(*at, to), Wall::between(to, *at)]);
+        *at = to;
     }
+    Ok(())
 }
 
 /// The point of a Bezier curve at `s` (0 to 1), by de Casteljau.
@@ -270,8 +265,8 @@ mod tests {
 
     #[test]
     fn what_is_not_drawn_is_no_wall() {
-        let hidden = r##"<g display="none"><rect width="9" height="9"/></g><rect visibility="hidden" width="9" height="9"/>
-            <defs><rect width="9" height="9"/></defs><text>9</text><image href="/etc/hostname" width="9" height="9"/>"##;
+        let hidden = r#"<g display="none"><rect width="9" height="9"/></g><rect visibility="hidden" width="9" height="9"/>
+            <defs><rect width="9" height="9"/></defs><text>9</text><image href="/etc/hostname" width="9" height="9"/>"#;
         let text = page(r#"viewBox="0 0 40 40""#, hidden);
         assert_eq!(walls(&text, Some(1.0)).unwrap_err(), PlanError::NoLines);
     }
@@ -286,7 +281,7 @@ mod tests {
         }
         // Two walls for each of n - 1 lines.
         let long = |points: usize| {
-            let points: String = (0..points).map(|i| format!("{i},{} ", i % 2)).collect();
+            let points = (0..points).map(|i| format!("{i},{}", i % 2)).collect::<Vec<_>>().join(" ");
             page(r#"viewBox="0 0 40 40""#, &format!(r#"<polyline points="{points}"/>"#))
         };
         assert_eq!(walls(&long(MAX_WALLS / 2 + 1), Some(1.0)).unwrap().len(), MAX_WALLS);

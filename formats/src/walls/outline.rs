@@ -10,6 +10,7 @@ use super::{
     grid::OccupancyGrid,
     map_file::Wall,
 };
+use map::segments::MIN_SEGMENT_M;
 use nalgebra::{Matrix2, Point2, Vector2};
 
 /// The border may leave the chord of a piece by this much, metres, and at least so many cells: a stair of cells is a
@@ -37,6 +38,8 @@ pub(super) fn walls(grid: &OccupancyGrid, evidence: &Evidence, min_length_m: f64
             }
         }
     }
+    // Cells may be smaller than the shortest wall of a map.
+    found.retain(|[a, b]: &Line| (b - a).norm() * grid.resolution_m >= MIN_SEGMENT_M);
     let found = needed(grid, evidence, found, min_length_m / grid.resolution_m);
     found.into_iter().map(|[a, b]| Wall::between(grid.to_map(a.x, a.y), grid.to_map(b.x, b.y))).collect()
 }

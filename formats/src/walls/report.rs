@@ -73,7 +73,7 @@ impl GridReport {
         (share < MIN_EXPLAINED).then(|| {
             let missed = self.wall_cells - self.wall_cells_explained;
             format!(
-                "Walls explain {:.0} % of the grid's wall cells, less than {:.0} %: look at the {missed} red cells of the picture before you use this map.",
+                "Walls explain {:.0} % of the grid's wall cells, less than {:.0} %: look at the {missed} others, red in the picture, before you use this map.",
                 100.0 * share,
                 100.0 * MIN_EXPLAINED
             )
@@ -227,7 +227,7 @@ mod tests {
         assert!((report.length_on_wall_cells - 1.0).abs() < 1e-9);
         let warning = report.warning().unwrap();
         assert!(
-            warning.contains("29 % of the grid's wall cells, less than 90 %: look at the 57 red"),
+            warning.contains("29 % of the grid's wall cells, less than 90 %: look at the 57 others"),
             "{warning}"
         );
         let beside = [Wall::between([1.0, 5.0], [2.0, 5.0])];

@@ -147,3 +147,11 @@ fn a_leg_of_a_table_is_kept_and_a_notch_beside_a_wall_is_not() {
     let speck = [&plain[..], &plain, &notch, &plain, &plain];
     assert_eq!(walls_of(&drawn(&speck, 0.05), 0.3), []);
 }
+
+#[test]
+fn cells_of_a_millimetre_give_no_wall_that_a_map_refuses() {
+    let speck = "....................";
+    let leg = ".........####.......";
+    let walls = walls_of(&drawn(&[speck, leg, leg, leg, leg, speck], 0.001), 0.3);
+    assert!(walls.iter().all(|w| w.segment().is_ok()), "{walls:?}");
+}
