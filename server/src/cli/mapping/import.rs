@@ -76,7 +76,8 @@ pub(crate) async fn import(args: &ImportArgs) -> anyhow::Result<()> {
     }
     screen::say(&if args.json { summary(report).to_string() } else { sentence(report) });
     if let Some(warning) = report.grid.as_ref().and_then(GridReport::warning) {
-        screen::complain(&warning);
+        let hint = if args.picture.is_none() { " --picture FILE draws it." } else { "" };
+        screen::complain(&format!("{warning}{hint}"));
     }
     args.upload.send(map).await
 }
