@@ -1,11 +1,21 @@
+<<<<<<< HEAD
 //! Walls from a GeoJSON file in map metres: lines are walls as drawn; polygons are rooms, with the free side
 //! inside; their holes are columns or blocks, with the free side outside. Points and properties are ignored.
+||||||| d529745
+//! Walls from a GeoJSON file in map metres: lines are walls as drawn, polygons are rooms, whose walls face inwards, and
+//! their holes (columns, blocks), whose walls face outwards. Points, and properties of any kind, are passed over.
+=======
+//! Walls from and to a GeoJSON file in map metres: lines are walls as drawn, polygons are rooms, whose walls face
+//! inwards, and their holes (columns, blocks), whose walls face outwards. Points, and properties of any kind, are
+//! passed over.
+>>>>>>> h-formats
 
 use super::map_file::{MAX_WALLS, Wall};
-use serde::Deserialize;
+use geojson::{Feature, FeatureCollection, GeoJson, Geometry, GeometryValue, JsonObject, Position};
 
 /// Largest file.
 pub(super) const MAX_BYTES: u64 = 64 << 20;
+<<<<<<< HEAD
 
 type Position = Vec<f64>;
 
@@ -38,6 +48,45 @@ enum Geometry {
     Polygon { coordinates: Vec<Vec<Position>> },
     MultiPolygon { coordinates: Vec<Vec<Vec<Position>>> },
 }
+||||||| d529745
+
+type Position = Vec<f64>;
+
+/// What of GeoJSON (RFC 7946) can hold walls. Members that are not named are ignored, as the format asks for.
+#[derive(Debug, Deserialize)]
+#[serde(tag = "type")]
+enum Object {
+    FeatureCollection {
+        features: Vec<Feature>,
+    },
+    Feature {
+        geometry: Option<Geometry>,
+    },
+    #[serde(untagged)]
+    Geometry(Geometry),
+}
+
+#[derive(Debug, Deserialize)]
+struct Feature {
+    geometry: Option<Geometry>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(tag = "type")]
+enum Geometry {
+    Point {},
+    MultiPoint {},
+    LineString { coordinates: Vec<Position> },
+    MultiLineString { coordinates: Vec<Vec<Position>> },
+    Polygon { coordinates: Vec<Vec<Position>> },
+    MultiPolygon { coordinates: Vec<Vec<Vec<Position>>> },
+}
+=======
+/// Deepest collection of geometries in one another.
+const MAX_DEPTH: usize = 8;
+/// The member that says in which frame the coordinates of a written file are.
+const FRAME: (&str, &str) = ("waymark:frame", "map metres");
+>>>>>>> h-formats
 
 /// Why a file has no walls.
 #[derive(Debug, thiserror::Error, PartialEq)]
@@ -62,6 +111,9 @@ pub enum GeoJsonError {
     /// A coordinate reference system, such as degrees instead of metres.
     #[error("a coordinate reference system other than map metres (`crs`) is not understood")]
     Crs,
+    /// Collections in collections.
+    #[error("geometry collections more than {MAX_DEPTH} deep")]
+    TooDeep,
     /// Too many.
     #[error("more than {MAX_WALLS} segments")]
     TooMany,
@@ -76,42 +128,67 @@ struct Line {
 
 /// The walls of a file's text.
 pub(super) fn walls(text: &str) -> Result<Vec<Wall>, GeoJsonError> {
-    let value: serde_json::Value =
-        serde_json::from_str(text).map_err(|e| GeoJsonError::Format(e.to_string()))?;
-    if value.get("crs").is_some_and(|crs| !crs.is_null()) {
+    let file: GeoJson = text.parse().map_err(|e: geojson::Error| GeoJsonError::Format(e.to_string()))?;
+    let (geometries, members): (Vec<Geometry>, Option<JsonObject>) = match file {
+        GeoJson::FeatureCollection(all) => {
+            (all.features.into_iter().filter_map(|f| f.geometry).collect(), all.foreign_members)
+        }
+        GeoJson::Feature(one) => (one.geometry.into_iter().collect(), one.foreign_members),
+        GeoJson::Geometry(geometry) => {
+            let members = geometry.foreign_members.clone();
+            (vec![geometry], members)
+        }
+    };
+    if members.is_some_and(|m| m.get("crs").is_some_and(|crs| !crs.is_null())) {
         return Err(GeoJsonError::Crs);
     }
-    let object: Object = serde_json::from_value(value).map_err(|e| GeoJsonError::Format(e.to_string()))?;
-    let geometries = match object {
-        Object::FeatureCollection { features } => features.into_iter().filter_map(|f| f.geometry).collect(),
-        Object::Feature { geometry } => geometry.into_iter().collect(),
-        Object::Geometry(geometry) => vec![geometry],
-    };
+    let mut lines = vec![];
+    for geometry in geometries {
+        add_lines(&mut lines, geometry.value, 0)?;
+    }
     let mut walls = vec![];
-    for (number, line) in geometries.into_iter().flat_map(lines).enumerate() {
-        add(&mut walls, number, &line)?;
+    for (number, line) in lines.iter().enumerate() {
+        add(&mut walls, number, line)?;
     }
     Ok(walls)
 }
 
-fn lines(geometry: Geometry) -> Vec<Line> {
+/// A file of the walls, one line each, free side on the left.
+pub(super) fn text(walls: &[Wall]) -> String {
+    let feature = |wall: &Wall| Feature {
+        geometry: Some(GeometryValue::new_line_string([wall.a, wall.b]).into()),
+        ..Feature::default()
+    };
+    let members = [(FRAME.0.to_owned(), FRAME.1.into())].into_iter().collect();
+    let features = walls.iter().map(feature).collect();
+    FeatureCollection { bbox: None, features, foreign_members: Some(members) }.to_string()
+}
+
+fn add_lines(lines: &mut Vec<Line>, geometry: GeometryValue, depth: usize) -> Result<(), GeoJsonError> {
     let open = |points| Line { points, free_inside: None };
     let room = |rings: Vec<Vec<Position>>| {
         rings.into_iter().enumerate().map(|(i, points)| Line { points, free_inside: Some(i == 0) })
     };
     match geometry {
-        Geometry::Point {} | Geometry::MultiPoint {} => vec![],
-        Geometry::LineString { coordinates } => vec![open(coordinates)],
-        Geometry::MultiLineString { coordinates } => coordinates.into_iter().map(open).collect(),
-        Geometry::Polygon { coordinates } => room(coordinates).collect(),
-        Geometry::MultiPolygon { coordinates } => coordinates.into_iter().flat_map(room).collect(),
+        GeometryValue::Point { .. } | GeometryValue::MultiPoint { .. } => {}
+        GeometryValue::LineString { coordinates } => lines.push(open(coordinates)),
+        GeometryValue::MultiLineString { coordinates } => lines.extend(coordinates.into_iter().map(open)),
+        GeometryValue::Polygon { coordinates } => lines.extend(room(coordinates)),
+        GeometryValue::MultiPolygon { coordinates } => lines.extend(coordinates.into_iter().flat_map(room)),
+        GeometryValue::GeometryCollection { .. } if depth >= MAX_DEPTH => return Err(GeoJsonError::TooDeep),
+        GeometryValue::GeometryCollection { geometries } => {
+            for geometry in geometries {
+                add_lines(lines, geometry.value, depth + 1)?;
+            }
+        }
     }
+    Ok(())
 }
 
 fn add(walls: &mut Vec<Wall>, number: usize, line: &Line) -> Result<(), GeoJsonError> {
-    let point = |(position, p): (usize, &Position)| match p[..] {
+    let point = |(position, p): (usize, &Position)| match p.as_slice() {
         // A height may follow.
-        [x, y, ..] if x.is_finite() && y.is_finite() => Ok([x, y]),
+        [x, y, ..] if x.is_finite() && y.is_finite() => Ok([*x, *y]),
         _ => Err(GeoJsonError::Position { line: number, position }),
     };
     let mut points = line.points.iter().enumerate().map(point).collect::<Result<Vec<[f64; 2]>, _>>()?;
@@ -187,7 +264,44 @@ mod tests {
     }
 
     #[test]
+<<<<<<< HEAD
     fn errors_name_line_and_position() {
+||||||| d529745
+    fn what_is_wrong_is_named() {
+=======
+    fn walls_come_back_as_they_were_written() {
+        let all = [Wall::between([0.1, -2.0], [1.0 / 3.0, 7e-3]), Wall::between([5.0, 1.0], [4.0, 1.0])];
+        let text = text(&all);
+        assert!(text.contains(r#""waymark:frame":"map metres""#), "{text}");
+        assert_eq!(walls(&text).unwrap(), all);
+        assert_eq!(walls(&super::text(&[])).unwrap(), []);
+    }
+
+    #[test]
+    fn collections_are_read_to_a_depth() {
+        let nested = |depth: usize| {
+            let line = r#"{"type":"LineString","coordinates":[[0,0],[1,0]]}"#.to_owned();
+            (0..depth).fold(line, |g, _| format!(r#"{{"type":"GeometryCollection","geometries":[{g}]}}"#))
+        };
+        assert_eq!(ends(&nested(MAX_DEPTH)), [[[0.0, 0.0], [1.0, 0.0]]]);
+        assert_eq!(walls(&nested(MAX_DEPTH + 1)).unwrap_err(), GeoJsonError::TooDeep);
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn no_text_is_a_panic(at in 0..200_usize, byte in 0_u8..128, cut in 0..200_usize) {
+            let mut bytes = text(&[Wall::between([0.0, 0.0], [1.0, 2.0])]).into_bytes();
+            let at = at % bytes.len();
+            bytes[at] = byte;
+            bytes.truncate(bytes.len() - cut % bytes.len());
+            // An answer, whichever.
+            walls(std::str::from_utf8(&bytes).expect("ASCII")).ok();
+        }
+    }
+
+    #[test]
+    fn what_is_wrong_is_named() {
+>>>>>>> h-formats
         let bad = |text: &str| walls(text).unwrap_err();
         assert!(matches!(bad("{"), GeoJsonError::Format(_)));
         assert!(matches!(bad(r#"{"type":"Walls"}"#), GeoJsonError::Format(_)));

@@ -11,9 +11,12 @@ const BORDER_M: f64 = 1.0;
 /// Why a grid cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum GridError {
-    /// The YAML file: name and reason.
-    #[error("{0}: {1}")]
-    Yaml(String, String),
+    /// The YAML file itself.
+    #[error("{problem}")]
+    Yaml {
+        /// Why it cannot be used.
+        problem: String,
+    },
     /// A field of it.
     #[error("{field}: {problem}")]
     Field {
@@ -22,9 +25,14 @@ pub enum GridError {
         /// What is wrong.
         problem: String,
     },
-    /// The picture: name and reason.
-    #[error("{0}: {1}")]
-    Picture(String, String),
+    /// The picture.
+    #[error("{name}: {problem}")]
+    Picture {
+        /// Its file.
+        name: String,
+        /// Why it cannot be used.
+        problem: String,
+    },
 }
 
 /// State of a cell.
@@ -34,9 +42,20 @@ pub enum CellState {
     Occupied,
     /// Free floor.
     Free,
+<<<<<<< HEAD
     /// Unknown.
+||||||| d529745
+    /// Never seen.
+=======
+    /// Never seen, or neither occupied nor free by the thresholds.
+>>>>>>> h-formats
     Unknown,
 }
+
+/// Probabilities are kept as whole multiples of one over this.
+const STEPS: f64 = 254.0;
+/// The level of a cell without a probability.
+const NO_PROBABILITY: u8 = 255;
 
 /// A grid; cell (0, 0) is the lower left one.
 #[derive(Debug, Clone, PartialEq)]
@@ -51,13 +70,33 @@ pub struct OccupancyGrid {
     pub origin: Pose2,
     /// Row by row, the lowest first.
     pub cells: Vec<CellState>,
+    /// Probability of an obstacle of every cell, in [`STEPS`].
+    pub(super) levels: Vec<u8>,
 }
 
 impl OccupancyGrid {
     /// The cell in column `x` of row `y`; unknown outside.
     pub fn at(&self, x: i64, y: i64) -> CellState {
-        let inside = x >= 0 && y >= 0 && x < self.width as i64 && y < self.height as i64;
-        if inside { self.cells[y as usize * self.width + x as usize] } else { CellState::Unknown }
+        if self.inside(x, y) { self.cells[y as usize * self.width + x as usize] } else { CellState::Unknown }
+    }
+
+    /// An empty grid of the given size, to be filled by [`push`](Self::push).
+    pub(super) fn empty((width, height): (usize, usize), resolution_m: f64, origin: Pose2) -> Self {
+        let (cells, levels) = (Vec::with_capacity(width * height), Vec::with_capacity(width * height));
+        Self { width, height, resolution_m, origin, cells, levels }
+    }
+
+    /// Adds the next cell of the lowest row that is not full.
+    pub(super) fn push(&mut self, state: CellState, probability: Option<f64>) {
+        self.cells.push(state);
+        self.levels.push(probability.map_or(NO_PROBABILITY, |p| (p.clamp(0.0, 1.0) * STEPS).round() as u8));
+    }
+
+    /// Probability of an obstacle in column `x` of row `y`, to 1/254, as the picture has it, whatever the thresholds;
+    /// `None` outside and where the picture says nothing.
+    pub fn probability(&self, x: i64, y: i64) -> Option<f64> {
+        let level = self.inside(x, y).then(|| self.levels[y as usize * self.width + x as usize]);
+        level.filter(|l| *l != NO_PROBABILITY).map(|l| f64::from(l) / STEPS)
     }
 
     /// Map coordinates (metres) of a point in cells.
@@ -66,7 +105,19 @@ impl OccupancyGrid {
         [p.x, p.y]
     }
 
+<<<<<<< HEAD
     /// Draws walls: occupied along them, free where a free side reaches without crossing a wall, unknown elsewhere.
+||||||| d529745
+    /// Draws walls: occupied along them, free where the free sides reach without crossing one, unknown elsewhere.
+=======
+    /// Cells of a point in map coordinates (metres); the inverse of [`to_map`](Self::to_map).
+    pub(super) fn to_cells(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let p = self.origin.inverse().apply(&nalgebra::Point2::new(x, y));
+        [p.x / self.resolution_m, p.y / self.resolution_m]
+    }
+
+    /// Draws walls: occupied along them, free where the free sides reach without crossing one, unknown elsewhere.
+>>>>>>> h-formats
     pub fn of_walls(walls: &[Wall], resolution_m: f64) -> Result<Self, GridError> {
         let ends = || walls.iter().flat_map(|w| [w.a, w.b]);
         if walls.is_empty() {
@@ -82,7 +133,8 @@ impl OccupancyGrid {
         }
         let origin = Pose2::new(low[0], low[1], 0.0);
         let cells = vec![CellState::Unknown; size[0] * size[1]];
-        let mut grid = Self { width: size[0], height: size[1], resolution_m, origin, cells };
+        let levels = vec![NO_PROBABILITY; cells.len()];
+        let mut grid = Self { width: size[0], height: size[1], resolution_m, origin, cells, levels };
         let cell = |p: [f64; 2]| [0, 1].map(|k| ((p[k] - low[k]) / resolution_m).floor() as i64);
         let mut open = Vec::new();
         for wall in walls {
@@ -115,7 +167,13 @@ impl OccupancyGrid {
 
     pub(super) fn set(&mut self, x: i64, y: i64, cell: CellState) {
         if self.inside(x, y) {
-            self.cells[y as usize * self.width + x as usize] = cell;
+            let at = y as usize * self.width + x as usize;
+            self.cells[at] = cell;
+            self.levels[at] = match cell {
+                CellState::Occupied => STEPS as u8,
+                CellState::Free => 0,
+                CellState::Unknown => NO_PROBABILITY,
+            };
         }
     }
 }

@@ -1,15 +1,37 @@
-//! From an occupancy grid to straight walls: the border between occupied and free cells is followed, cut where it
-//! bends, and every piece is fitted with a line.
+//! From an occupancy grid to straight walls: the border of the free floor is followed, cut where it bends, and every
+//! piece with walls behind it is fitted with a line.
+//!
+//! In: a grid. Out: walls in map metres, the free side on their left. Borders between free and unknown cells are walls
+//! where they close a gap in one; elsewhere they are where the laser's sight ended.
 
 use super::{
-    grid::{CellState, OccupancyGrid},
+    border::{self, BorderEdge},
+    evidence::{Evidence, for_cells_beside, reach_cells},
+    grid::OccupancyGrid,
     map_file::Wall,
 };
+use map::segments::MIN_SEGMENT_M;
 use nalgebra::{Matrix2, Point2, Vector2};
 
+<<<<<<< HEAD
 /// Distance from the chord at which a corner cuts the border, in cells: a stair of cells is a straight wall.
+||||||| d529745
+/// A corner of the border farther than this from the chord cuts it, in cells: a stair of cells is a straight wall.
+=======
+/// The border may leave the chord of a piece by this much, metres, and at least so many cells: a stair of cells is a
+/// straight wall.
+const CUT_M: f64 = 0.08;
+>>>>>>> h-formats
 const CUT_CELLS: f64 = 1.2;
+/// Longest part of a border that is cut in one go: the time of cutting may grow with its square.
+const MAX_CHAIN: usize = 1 << 13;
+/// Longest part of a wall without any wall cell, metres.
+const GAP_M: f64 = 0.5;
+/// A short piece is kept if it alone explains so many wall cells; fewer are noise of the mapping. Chosen on the maps
+/// willow-2010 and willow-full of `maps-ros-grid`: 1 gives a fifth more walls, 8 loses legs of tables.
+const MIN_EXPLAINED_CELLS: usize = 3;
 
+<<<<<<< HEAD
 /// Width of the band of unknown cells that smoothing leaves.
 const SOFT_CELLS: usize = 2;
 /// East, north, west, south.
@@ -90,31 +112,129 @@ pub(super) fn walls(grid: &OccupancyGrid, min_length_m: f64) -> Vec<Wall> {
                     let wall = Wall::between(grid.to_map(a.x, a.y), grid.to_map(b.x, b.y));
                     ((b - a).norm() * grid.resolution_m >= min_length_m).then_some(wall)
                 }));
+||||||| d529745
+/// Width of the band that smoothing leaves.
+const SOFT_CELLS: usize = 2;
+/// East, north, west, south.
+const STEPS: [(i64, i64); 4] = [(1, 0), (0, 1), (-1, 0), (0, -1)];
+
+/// Directed edges between cells, the free side on the left: at every corner a bit for each direction that leaves it.
+struct Border {
+    width: usize,
+    leaving: Vec<u8>,
+    arriving: Vec<u8>,
+}
+
+impl Border {
+    fn of(grid: &OccupancyGrid) -> Self {
+        let (width, height) = (grid.width + 1, grid.height + 1);
+        let mut border = Self { width, leaving: vec![0; width * height], arriving: vec![0; width * height] };
+        for y in 0..grid.height as i64 {
+            for x in 0..grid.width as i64 {
+                if grid.at(x, y) != CellState::Occupied {
+                    continue;
+                }
+                // Free to the north, west, south, east: along that side with the free cell on the left.
+                let sides = [
+                    ((0, 1), (x, y + 1), 0),
+                    ((-1, 0), (x, y), 1),
+                    ((0, -1), (x + 1, y), 2),
+                    ((1, 0), (x + 1, y + 1), 3),
+                ];
+                for ((dx, dy), (cx, cy), direction) in sides {
+                    if grid.at(x + dx, y + dy) == CellState::Free {
+                        let (sx, sy) = STEPS[direction];
+                        border.leaving[cy as usize * width + cx as usize] |= 1 << direction;
+                        border.arriving[(cy + sy) as usize * width + (cx + sx) as usize] |= 1 << direction;
+                    }
+                }
+            }
+        }
+        border
+    }
+
+    /// Takes the chain of edges that starts at a corner.
+    fn chain(&mut self, start: usize) -> Vec<Point2<f64>> {
+        let point = |at: usize| Point2::new((at % self.width) as f64, (at / self.width) as f64);
+        let (mut at, mut heading) = (start, 0);
+        let mut chain = vec![point(at)];
+        let width = self.width as i64;
+        loop {
+            // To the left first: cells that touch at a corner are one wall, and the border stays on its side.
+            let next = [1, 0, 3, 2]
+                .map(|turn| (heading + turn) % 4)
+                .into_iter()
+                .find(|d| self.leaving[at] & (1 << d) != 0);
+            let Some(direction) = next else { break };
+            self.leaving[at] &= !(1 << direction);
+            let (dx, dy) = STEPS[direction];
+            at = (at as i64 + dx + dy * width) as usize;
+            heading = direction;
+            chain.push(Point2::new((at % self.width) as f64, (at / self.width) as f64));
+        }
+        chain
+    }
+}
+
+/// The walls between free and occupied cells, the free side on the left; pieces shorter than `min_length_m` are left out.
+pub(super) fn walls(grid: &OccupancyGrid, min_length_m: f64) -> Vec<Wall> {
+    let grid = &hardened(grid);
+    let mut border = Border::of(grid);
+    let mut walls = Vec::new();
+    // Ends of open chains first; what is left are closed ones.
+    for open in [true, false] {
+        for at in 0..border.leaving.len() {
+            let is_end = border.leaving[at].count_ones() > border.arriving[at].count_ones();
+            while border.leaving[at] != 0 && (is_end || !open) {
+                let chain = border.chain(at);
+                walls.extend(pieces(&chain).into_iter().filter_map(|(i, j)| {
+                    let [a, b] = fitted(&chain[i..=j])?;
+                    let wall = Wall::between(grid.to_map(a.x, a.y), grid.to_map(b.x, b.y));
+                    ((b - a).norm() * grid.resolution_m >= min_length_m).then_some(wall)
+                }));
+=======
+/// The walls of a grid. Pieces shorter than `min_length_m` are left out unless they explain wall cells that no
+/// longer one does.
+pub(super) fn walls(grid: &OccupancyGrid, evidence: &Evidence, min_length_m: f64) -> Vec<Wall> {
+    let cut = (CUT_M / grid.resolution_m).max(CUT_CELLS);
+    let gap = (GAP_M / grid.resolution_m).ceil() as usize;
+    let mut found = Vec::new();
+    for chain in border::chains(grid, evidence) {
+        for part in chain.chunks(MAX_CHAIN) {
+            for (i, j) in pieces(part, cut) {
+                found.extend(with_walls(&part[i..=j], gap).filter_map(fitted));
+>>>>>>> h-formats
             }
         }
     }
-    walls
+    // Cells may be smaller than the shortest wall of a map.
+    found.retain(|[a, b]: &Line| (b - a).norm() * grid.resolution_m >= MIN_SEGMENT_M);
+    let found = needed(grid, evidence, found, min_length_m / grid.resolution_m);
+    found.into_iter().map(|[a, b]| Wall::between(grid.to_map(a.x, a.y), grid.to_map(b.x, b.y))).collect()
 }
 
-/// Index ranges whose corners lie near their chord.
-fn pieces(chain: &[Point2<f64>]) -> Vec<(usize, usize)> {
+type Line = [Point2<f64>; 2];
+
+/// Index ranges of edges that lie near their chord.
+fn pieces(chain: &[BorderEdge], cut: f64) -> Vec<(usize, usize)> {
     let (mut done, mut open) = (Vec::new(), vec![(0, chain.len() - 1)]);
     while let Some((i, j)) = open.pop() {
-        let chord = chain[j] - chain[i];
+        let chord = chain[j].middle - chain[i].middle;
         let length = chord.norm();
         let off = |k: usize| {
-            let d = chain[k] - chain[i];
-            if length > 0.0 { (chord.perp(&d) / length).abs() } else { d.norm() }
+            let d = chain[k].middle - chain[i].middle;
+            if length > 1.0 { (chord.perp(&d) / length).abs() } else { d.norm() }
         };
         let farthest = (i + 1..j).max_by(|a, b| off(*a).total_cmp(&off(*b)));
         match farthest {
-            Some(k) if off(k) > CUT_CELLS => open.extend([(k, j), (i, k)]),
+            Some(k) if off(k) > cut => open.extend([(k, j), (i, k)]),
             _ => done.push((i, j)),
         }
     }
     done
 }
 
+<<<<<<< HEAD
 /// The fitted line through the middles of the edges; both ends on it.
 fn fitted(corners: &[Point2<f64>]) -> Option<[Point2<f64>; 2]> {
     let (first, last) = (corners.first()?, corners.last()?);
@@ -142,7 +262,80 @@ fn hardened(grid: &OccupancyGrid) -> OccupancyGrid {
                     grid.set(x, y, CellState::Free);
                 }
             }
+||||||| d529745
+/// The line through the middles of the edges; both ends on it.
+fn fitted(corners: &[Point2<f64>]) -> Option<[Point2<f64>; 2]> {
+    let (first, last) = (corners.first()?, corners.last()?);
+    let middles: Vec<Vector2<f64>> = corners.windows(2).map(|p| 0.5 * (p[0].coords + p[1].coords)).collect();
+    if middles.len() < 2 || (last - first).norm() < 1e-9 {
+        return None;
+    }
+    let centre = middles.iter().sum::<Vector2<f64>>() / middles.len() as f64;
+    let scatter: Matrix2<f64> = middles.iter().map(|m| (m - centre) * (m - centre).transpose()).sum();
+    let angle = 0.5 * (2.0 * scatter[(0, 1)]).atan2(scatter[(0, 0)] - scatter[(1, 1)]);
+    let along = Vector2::new(angle.cos(), angle.sin());
+    let foot = |p: &Point2<f64>| Point2::from(centre + along * along.dot(&(p.coords - centre)));
+    Some([foot(first), foot(last)])
+}
+
+/// Pictures that were smoothed have a band of unknown cells between free and occupied ones: free cells grow into it.
+fn hardened(grid: &OccupancyGrid) -> OccupancyGrid {
+    let mut grid = grid.clone();
+    for _ in 0..SOFT_CELLS {
+        let before = grid.clone();
+        for y in 0..grid.height as i64 {
+            for x in 0..grid.width as i64 {
+                let beside = [(1, 0), (-1, 0), (0, 1), (0, -1)].map(|(dx, dy)| before.at(x + dx, y + dy));
+                if before.at(x, y) == CellState::Unknown && beside.contains(&CellState::Free) {
+                    grid.set(x, y, CellState::Free);
+                }
+            }
+=======
+/// The parts of a piece that have walls behind them, gaps of up to `gap` edges included.
+fn with_walls(piece: &[BorderEdge], gap: usize) -> impl Iterator<Item = &[BorderEdge]> {
+    let mut runs: Vec<(usize, usize)> = Vec::new();
+    for at in (0..piece.len()).filter(|at| piece[*at].has_wall) {
+        match runs.last_mut() {
+            Some((_, end)) if at - *end <= gap + 1 => *end = at,
+            _ => runs.push((at, at)),
+>>>>>>> h-formats
         }
     }
-    grid
+    runs.into_iter().map(|(i, j)| &piece[i..=j])
+}
+
+/// The line through the faces of the wall's cells; both ends on it, half an edge beyond the outermost middles.
+fn fitted(edges: &[BorderEdge]) -> Option<Line> {
+    let faces: Vec<Vector2<f64>> = edges.iter().filter(|e| e.has_wall).map(|e| e.middle.coords).collect();
+    let (first, last) = (faces.first()?, faces.last()?);
+    let centre = faces.iter().sum::<Vector2<f64>>() / faces.len() as f64;
+    let scatter: Matrix2<f64> = faces.iter().map(|m| (m - centre) * (m - centre).transpose()).sum();
+    let angle = 0.5 * (2.0 * scatter[(0, 1)]).atan2(scatter[(0, 0)] - scatter[(1, 1)]);
+    let mut along = Vector2::new(angle.cos(), angle.sin());
+    let way = along.dot(&(last - first));
+    if way.abs() < 1e-9 {
+        return None;
+    }
+    along *= way.signum();
+    let foot =
+        |p: &Vector2<f64>, beyond: f64| Point2::from(centre + along * (along.dot(&(p - centre)) + beyond));
+    Some([foot(first, -0.5), foot(last, 0.5)])
+}
+
+/// The lines of at least `min_length` cells, and of the others those that explain what longer ones do not.
+fn needed(grid: &OccupancyGrid, evidence: &Evidence, mut lines: Vec<Line>, min_length: f64) -> Vec<Line> {
+    let length = |[a, b]: &Line| (b - a).norm();
+    lines.sort_by(|a, b| length(b).total_cmp(&length(a)));
+    let size = (grid.width, grid.height);
+    let reach = reach_cells(grid.resolution_m);
+    let mut is_open = evidence.is_reachable.clone();
+    lines.retain(|line| {
+        let mut cells = 0;
+        for_cells_beside(size, line.map(|p| [p.x, p.y]), reach, |at| {
+            cells += usize::from(is_open[at]);
+            is_open[at] = false;
+        });
+        cells >= MIN_EXPLAINED_CELLS || length(line) >= min_length
+    });
+    lines
 }

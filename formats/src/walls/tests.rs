@@ -1,10 +1,29 @@
 use super::{
+    any::{ImportOptions, WallFileError, import},
+    evidence::Evidence,
     grid::{CellState, OccupancyGrid},
     map_file::Wall,
-    outline::walls as walls_of,
-    ros_grid,
+    outline, ros_grid,
 };
 use map::pose2::Pose2;
+
+fn walls_of(grid: &OccupancyGrid, min_length_m: f64) -> Vec<Wall> {
+    outline::walls(grid, &Evidence::of(grid), min_length_m)
+}
+
+/// A grid from rows of text, the top row first: `#` occupied, `+` grey, `.` free, anything else unknown.
+fn drawn(rows: &[&str], resolution_m: f64) -> OccupancyGrid {
+    let mut grid = OccupancyGrid::empty((rows[0].len(), rows.len()), resolution_m, Pose2::default());
+    for cell in rows.iter().rev().flat_map(|row| row.bytes()) {
+        match cell {
+            b'#' => grid.push(CellState::Occupied, Some(1.0)),
+            b'+' => grid.push(CellState::Unknown, Some(0.4)),
+            b'.' => grid.push(CellState::Free, Some(0.0)),
+            _ => grid.push(CellState::Unknown, Some(0.196)),
+        }
+    }
+    grid
+}
 
 #[test]
 fn a_grid_becomes_its_walls_and_back() {
@@ -17,8 +36,10 @@ fn a_grid_becomes_its_walls_and_back() {
     let folder = tempfile::tempdir().unwrap();
     let yaml = folder.path().join("room.yaml");
     ros_grid::write(&grid, &yaml).unwrap();
-    let again = ros_grid::read(&yaml).unwrap();
-    assert_eq!(again, grid);
+    let (again, underlay) = ros_grid::read(&yaml).unwrap();
+    assert_eq!(again.cells, grid.cells);
+    assert_eq!((again.width, again.height, again.origin), (grid.width, grid.height, grid.origin));
+    assert_eq!((underlay.width, underlay.height, underlay.origin), (grid.width, grid.height, grid.origin));
     let walls = walls_of(&again, 0.3);
     assert_eq!(walls.len(), 4, "{walls:?}");
     for w in &walls {
@@ -33,16 +54,7 @@ fn a_grid_becomes_its_walls_and_back() {
 #[test]
 fn a_smoothed_grid_gives_its_walls() {
     // Free, a cell in between, a wall two cells thick, unknown behind.
-    let row = [
-        CellState::Free,
-        CellState::Free,
-        CellState::Unknown,
-        CellState::Occupied,
-        CellState::Occupied,
-        CellState::Unknown,
-    ];
-    let cells: Vec<CellState> = (0..40).flat_map(|_| row).collect();
-    let grid = OccupancyGrid { width: 6, height: 40, resolution_m: 0.05, origin: Pose2::default(), cells };
+    let grid = drawn(&["..?##?"; 40], 0.05);
     let walls = walls_of(&grid, 0.3);
     assert_eq!(walls.len(), 1, "{walls:?}");
     assert!([walls[0].a, walls[0].b].iter().all(|p| (p[0] - 0.15).abs() < 1e-9), "{walls:?}");
@@ -69,16 +81,17 @@ fn an_invalid_grid_is_refused_with_its_field() {
     std::fs::write(folder.path().join("short.pgm"), b"P5\n9 9\n255\n\x00").unwrap();
     let good = "image: m.pgm\nresolution: 0.05\norigin: [1, 2, 0.5]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n";
     std::fs::write(&yaml, good).unwrap();
-    let grid = ros_grid::read(&yaml).unwrap();
+    let (grid, underlay) = ros_grid::read(&yaml).unwrap();
     // The top row of the picture is the upper row of the map.
     assert_eq!(grid.cells, [CellState::Unknown, CellState::Occupied, CellState::Occupied, CellState::Free]);
     assert_eq!(grid.origin, Pose2::new(1.0, 2.0, 0.5));
+    assert_eq!((underlay.width, underlay.resolution_m, underlay.origin), (2, 0.05, grid.origin));
     for (from, to, field) in [
         ("resolution: 0.05", "resolution: 0", "resolution"),
         ("origin: [1, 2, 0.5]", "origin: [1, 2]", "origin"),
         ("negate: 0\n", "", "negate"),
         ("free_thresh: 0.196", "free_thresh: low", "free_thresh"),
-        ("m.pgm", "m.pgm\nmode: raw", "mode"),
+        ("m.pgm", "m.pgm\nmode: rows", "mode"),
         ("m.pgm", "short.pgm", "fewer pixels"),
         ("m.pgm", "none.pgm", "none.pgm"),
     ] {
@@ -86,4 +99,59 @@ fn an_invalid_grid_is_refused_with_its_field() {
         let error = ros_grid::read(&yaml).unwrap_err().to_string();
         assert!(error.contains(field), "{error}");
     }
+}
+
+#[test]
+fn a_picture_is_read_by_the_yaml_beside_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let picture = folder.path().join("m.pgm");
+    std::fs::write(&picture, b"P5 2 2 255\n\x00\xfe\xcd\x00").unwrap();
+    let alone = import(&picture, &ImportOptions::default()).unwrap_err();
+    assert!(matches!(alone, WallFileError::OnlyPicture), "{alone}");
+    assert!(alone.to_string().contains("this is the picture; give its .yaml"), "{alone}");
+    std::fs::copy(&picture, folder.path().join("n.yaml")).unwrap();
+    let named_so = import(&folder.path().join("n.yaml"), &ImportOptions::default()).unwrap_err().to_string();
+    assert!(named_so.contains("this is the picture"), "{named_so}");
+    let text = "image: m.pgm\nresolution: 0.1\norigin: [0, 0, 0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n";
+    std::fs::write(folder.path().join("m.yaml"), text).unwrap();
+    let report = import(&picture, &ImportOptions::default()).unwrap().report.grid.unwrap();
+    assert_eq!((report.occupied, report.free, report.unknown, report.grey), (2, 1, 1, 0));
+}
+
+#[test]
+fn grey_cells_and_gaps_belong_to_a_wall_and_far_unknown_does_not() {
+    // Half of the wall was seen seldom, three cells of it never; right of it the laser saw nothing for two metres.
+    let long = format!("{}{}{}{}", "#".repeat(20), " ".repeat(3), "+".repeat(20), " ".repeat(60));
+    let (free, unknown) = (".".repeat(long.len()), " ".repeat(long.len()));
+    let grid = drawn(&[&unknown, &unknown, &long, &free, &free, &unknown], 0.05);
+    let walls = walls_of(&grid, 0.3);
+    assert_eq!(walls.len(), 1, "{walls:?}");
+    // The free side is below, so the wall runs from right to left.
+    let Wall { a, b, .. } = walls[0];
+    assert!((a[0] - 43.0 * 0.05).abs() < 1e-9 && b[0].abs() < 1e-9, "{walls:?}");
+    assert!((a[1] - 0.15).abs() < 1e-9 && (b[1] - 0.15).abs() < 1e-9, "{walls:?}");
+}
+
+#[test]
+fn a_leg_of_a_table_is_kept_and_a_notch_beside_a_wall_is_not() {
+    let plain = ".".repeat(60);
+    let wall = "#".repeat(60);
+    let notch = format!("{}##{}", ".".repeat(30), ".".repeat(28));
+    let leg = format!("{}##{}", ".".repeat(10), ".".repeat(48));
+    let rows = [&wall[..], &notch, &plain, &plain, &plain, &plain, &plain, &plain, &leg, &leg, &plain];
+    let walls = walls_of(&drawn(&rows, 0.05), 0.3);
+    let shortest = |w: &&Wall| w.length_m() < 0.3;
+    assert!(walls.iter().filter(shortest).all(|w| w.a[1] < 0.2), "{walls:?}");
+    assert!(walls.iter().any(|w| shortest(&w)), "{walls:?}");
+    // One or two cells are noise.
+    let speck = [&plain[..], &plain, &notch, &plain, &plain];
+    assert_eq!(walls_of(&drawn(&speck, 0.05), 0.3), []);
+}
+
+#[test]
+fn cells_of_a_millimetre_give_no_wall_that_a_map_refuses() {
+    let speck = "....................";
+    let leg = ".........####.......";
+    let walls = walls_of(&drawn(&[speck, leg, leg, leg, leg, speck], 0.001), 0.3);
+    assert!(walls.iter().all(|w| w.segment().is_ok()), "{walls:?}");
 }

@@ -3,6 +3,7 @@
 
 pub(crate) mod chart;
 pub(crate) mod experiment;
+pub(crate) mod grids;
 pub(crate) mod navigation;
 pub(crate) mod rendered;
 pub(crate) mod reviewed;
@@ -65,7 +66,13 @@ pub(crate) enum Command {
     ///   waymark-lab evaluate mapping laser-carmen-corrected laser-intel-raw-odometry --draw maps --plot mapping.svg
     #[command(verbatim_doc_comment)]
     Mapping(mapping::Args),
-    /// Calibration of confidences: reliability diagram and expected calibration error.
+    /// Occupancy grids imported: share of their wall cells that walls explain, and of walls that lie on wall cells.
+    ///
+    /// For example:
+    ///   waymark-lab evaluate grids maps-ros-grid --draw grids
+    #[command(verbatim_doc_comment)]
+    Grids(grids::Args),
+    /// Whether of confidences: reliability diagram and expected calibration error.
     Confidence(experiment::confidence::Args),
     /// Auto-calibration of a camera from views of one quad: error of the focal length by the number of views (Fig.
     /// 17).
@@ -121,6 +128,7 @@ pub(crate) fn run(command: &Command) -> anyhow::Result<()> {
         Command::Placement(args) => placement::run(args),
         Command::Navigation(args) => navigation::run(args),
         Command::Mapping(args) => mapping::run(args),
+        Command::Grids(args) => grids::run(args),
         Command::Modalities(args) => modalities::run(args),
         Command::Visibility(args) => visibility::run(args),
     }

@@ -68,6 +68,7 @@ const OPTIONS: [(&str, &[&str]); 25] = [
         "evaluate mapping",
         &["--odometry-noise", "--seed", "--duration-s", "--params", "--draw", "--plot", "--json", "[LOGS]"],
     ),
+    ("evaluate grids", &["--min-length-m", "--draw", "--json", "<MAPS>"]),
     ("evaluate visibility", &["--maps", "--points", "--seed", "--plot", "--json"]),
     ("train confidence", &["--quads", "--set", "--photographs", "--rust"]),
     (
