@@ -1,4 +1,4 @@
-//! Files of walls of every format, chosen by the extension of their names.
+//! Files of walls of every kind, told by the extension of their names.
 
 use super::{
     evidence::Evidence,
@@ -48,7 +48,7 @@ pub enum WallFileError {
     /// More walls than are read.
     #[error("more than {MAX_WALLS} segments")]
     TooMany,
-    /// A wall out of range.
+    /// A wall that cannot be.
     #[error("segment {index}: {source}")]
     Segment {
         /// From 0.
@@ -59,16 +59,8 @@ pub enum WallFileError {
     /// The cells of a grid to write.
     #[error("resolution {0} m: 0.005 to 1")]
     Resolution(f64),
-<<<<<<< HEAD
-    /// A file to write with an unknown extension.
-    #[error("`.{0}` is none of .yaml, .txt, .json")]
-||||||| d529745
-    /// A file to write of a kind that is not known.
-    #[error("`.{0}` is none of .yaml, .txt, .json")]
-=======
     /// A file to write of a kind that is not known.
     #[error("`.{0}` is none of .yaml, .txt, .json, .geojson")]
->>>>>>> h-formats
     Extension(String),
 }
 
@@ -127,50 +119,12 @@ fn extension(path: &Path) -> String {
     path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default()
 }
 
-<<<<<<< HEAD
-/// Reads the walls of `.yaml` (`map_server`), `.json` (map file), `.geojson`, or else of a vector map. Walls of a
-/// grid shorter than `min_length_m` are left out.
-pub fn read(path: &Path, min_length_m: f64) -> Result<MapFile, WallFileError> {
-    let of = |segments| MapFile { segments, ..MapFile::default() };
-    let map = match extension(path).as_str() {
-        "yaml" | "yml" => of(outline::walls(&ros_grid::read(path)?, min_length_m)),
-        "json" => MapFile::read(path)?,
-        "geojson" => {
-            if std::fs::metadata(path)?.len() > geojson::MAX_BYTES {
-                return Err(WallFileError::TooLarge(geojson::MAX_BYTES));
-            }
-            of(geojson::walls(&std::fs::read_to_string(path)?)?)
-        }
-        _ => of(vector_map::read(path)?),
-    };
-    if map.segments.len() > MAX_WALLS {
-        return Err(WallFileError::TooMany);
-||||||| d529745
-/// Reads the walls of `.yaml` (`map_server`), `.json` (map file), `.geojson`, or else of a vector map. Walls of a grid
-/// shorter than `min_length_m` are left out.
-pub fn read(path: &Path, min_length_m: f64) -> Result<MapFile, WallFileError> {
-    let of = |segments| MapFile { segments, ..MapFile::default() };
-    let map = match extension(path).as_str() {
-        "yaml" | "yml" => of(outline::walls(&ros_grid::read(path)?, min_length_m)),
-        "json" => MapFile::read(path)?,
-        "geojson" => {
-            if std::fs::metadata(path)?.len() > geojson::MAX_BYTES {
-                return Err(WallFileError::TooLarge(geojson::MAX_BYTES));
-            }
-            of(geojson::walls(&std::fs::read_to_string(path)?)?)
-        }
-        _ => of(vector_map::read(path)?),
-    };
-    if map.segments.len() > MAX_WALLS {
-        return Err(WallFileError::TooMany);
-=======
 /// The text of a file of at most `max` bytes.
 fn text(path: &Path, max: u64) -> Result<String, WallFileError> {
     let mut bytes = Vec::new();
     std::fs::File::open(path)?.take(max + 1).read_to_end(&mut bytes)?;
     if bytes.len() as u64 > max {
         return Err(WallFileError::TooLarge(max));
->>>>>>> h-formats
     }
     Ok(String::from_utf8(bytes).map_err(|e| std::io::Error::new(std::io::ErrorKind::InvalidData, e))?)
 }

@@ -1,92 +1,16 @@
-<<<<<<< HEAD
-//! Walls from a GeoJSON file in map metres: lines are walls as drawn; polygons are rooms, with the free side
-//! inside; their holes are columns or blocks, with the free side outside. Points and properties are ignored.
-||||||| d529745
-//! Walls from a GeoJSON file in map metres: lines are walls as drawn, polygons are rooms, whose walls face inwards, and
-//! their holes (columns, blocks), whose walls face outwards. Points, and properties of any kind, are passed over.
-=======
 //! Walls from and to a GeoJSON file in map metres: lines are walls as drawn, polygons are rooms, whose walls face
 //! inwards, and their holes (columns, blocks), whose walls face outwards. Points, and properties of any kind, are
 //! passed over.
->>>>>>> h-formats
 
 use super::map_file::{MAX_WALLS, Wall};
 use geojson::{Feature, FeatureCollection, GeoJson, Geometry, GeometryValue, JsonObject, Position};
 
 /// Largest file.
 pub(super) const MAX_BYTES: u64 = 64 << 20;
-<<<<<<< HEAD
-
-type Position = Vec<f64>;
-
-/// The parts of GeoJSON (RFC 7946) that can hold walls. Unknown members are ignored, as the RFC demands.
-#[derive(Debug, Deserialize)]
-#[serde(tag = "type")]
-enum Object {
-    FeatureCollection {
-        features: Vec<Feature>,
-    },
-    Feature {
-        geometry: Option<Geometry>,
-    },
-    #[serde(untagged)]
-    Geometry(Geometry),
-}
-
-#[derive(Debug, Deserialize)]
-struct Feature {
-    geometry: Option<Geometry>,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(tag = "type")]
-enum Geometry {
-    Point {},
-    MultiPoint {},
-    LineString { coordinates: Vec<Position> },
-    MultiLineString { coordinates: Vec<Vec<Position>> },
-    Polygon { coordinates: Vec<Vec<Position>> },
-    MultiPolygon { coordinates: Vec<Vec<Vec<Position>>> },
-}
-||||||| d529745
-
-type Position = Vec<f64>;
-
-/// What of GeoJSON (RFC 7946) can hold walls. Members that are not named are ignored, as the format asks for.
-#[derive(Debug, Deserialize)]
-#[serde(tag = "type")]
-enum Object {
-    FeatureCollection {
-        features: Vec<Feature>,
-    },
-    Feature {
-        geometry: Option<Geometry>,
-    },
-    #[serde(untagged)]
-    Geometry(Geometry),
-}
-
-#[derive(Debug, Deserialize)]
-struct Feature {
-    geometry: Option<Geometry>,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(tag = "type")]
-enum Geometry {
-    Point {},
-    MultiPoint {},
-    LineString { coordinates: Vec<Position> },
-    MultiLineString { coordinates: Vec<Vec<Position>> },
-    Polygon { coordinates: Vec<Vec<Position>> },
-    MultiPolygon { coordinates: Vec<Vec<Vec<Position>>> },
-}
-=======
 /// Deepest collection of geometries in one another.
 const MAX_DEPTH: usize = 8;
 /// The member that says in which frame the coordinates of a written file are.
 const FRAME: (&str, &str) = ("waymark:frame", "map metres");
->>>>>>> h-formats
 
 /// Why a file has no walls.
 #[derive(Debug, thiserror::Error, PartialEq)]
@@ -108,7 +32,7 @@ pub enum GeoJsonError {
         /// Which, from 0.
         line: usize,
     },
-    /// A coordinate reference system, such as degrees instead of metres.
+    /// Longitudes and latitudes are no metres.
     #[error("a coordinate reference system other than map metres (`crs`) is not understood")]
     Crs,
     /// Collections in collections.
@@ -198,7 +122,7 @@ fn add(walls: &mut Vec<Wall>, number: usize, line: &Line) -> Result<(), GeoJsonE
         if points.len() < 4 || first != last || !(area.abs() > 0.0 && area.is_finite()) {
             return Err(GeoJsonError::Ring { line: number });
         }
-        // The free side is left of a to b, whatever the orientation of the ring.
+        // The free side is left of a to b, whichever way round the file has the ring.
         if (area > 0.0) != free_inside {
             points.reverse();
         }
@@ -225,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn free_sides_of_rings_do_not_depend_on_their_orientation() {
+    fn rooms_face_inwards_and_columns_outwards_whichever_way_round() {
         let room = "[[0,0],[4,0],[4,3],[0,3],[0,0]]";
         let turned = "[[0,0],[0,3],[4,3],[4,0],[0,0]]";
         let column = "[[1,1],[2,1],[2,2],[1,1]]";
@@ -249,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_and_collections_are_read_and_the_rest_is_ignored() {
+    fn lines_and_collections_are_read_and_the_rest_passed_over() {
         let text = r#"{"type":"FeatureCollection","name":"plan","features":[
             {"type":"Feature","properties":{"kind":"wall"},"geometry":{"type":"LineString","coordinates":[[0,0],[5,0,2.5],[5,1]]}},
             {"type":"Feature","properties":null,"geometry":null},
@@ -264,11 +188,6 @@ mod tests {
     }
 
     #[test]
-<<<<<<< HEAD
-    fn errors_name_line_and_position() {
-||||||| d529745
-    fn what_is_wrong_is_named() {
-=======
     fn walls_come_back_as_they_were_written() {
         let all = [Wall::between([0.1, -2.0], [1.0 / 3.0, 7e-3]), Wall::between([5.0, 1.0], [4.0, 1.0])];
         let text = text(&all);
@@ -301,7 +220,6 @@ mod tests {
 
     #[test]
     fn what_is_wrong_is_named() {
->>>>>>> h-formats
         let bad = |text: &str| walls(text).unwrap_err();
         assert!(matches!(bad("{"), GeoJsonError::Format(_)));
         assert!(matches!(bad(r#"{"type":"Walls"}"#), GeoJsonError::Format(_)));

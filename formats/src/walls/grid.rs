@@ -35,20 +35,14 @@ pub enum GridError {
     },
 }
 
-/// State of a cell.
+/// What a cell is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CellState {
     /// An obstacle.
     Occupied,
     /// Free floor.
     Free,
-<<<<<<< HEAD
-    /// Unknown.
-||||||| d529745
-    /// Never seen.
-=======
     /// Never seen, or neither occupied nor free by the thresholds.
->>>>>>> h-formats
     Unknown,
 }
 
@@ -105,11 +99,6 @@ impl OccupancyGrid {
         [p.x, p.y]
     }
 
-<<<<<<< HEAD
-    /// Draws walls: occupied along them, free where a free side reaches without crossing a wall, unknown elsewhere.
-||||||| d529745
-    /// Draws walls: occupied along them, free where the free sides reach without crossing one, unknown elsewhere.
-=======
     /// Cells of a point in map coordinates (metres); the inverse of [`to_map`](Self::to_map).
     pub(super) fn to_cells(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let p = self.origin.inverse().apply(&nalgebra::Point2::new(x, y));
@@ -117,7 +106,6 @@ impl OccupancyGrid {
     }
 
     /// Draws walls: occupied along them, free where the free sides reach without crossing one, unknown elsewhere.
->>>>>>> h-formats
     pub fn of_walls(walls: &[Wall], resolution_m: f64) -> Result<Self, GridError> {
         let ends = || walls.iter().flat_map(|w| [w.a, w.b]);
         if walls.is_empty() {

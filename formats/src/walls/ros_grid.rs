@@ -121,17 +121,9 @@ pub(super) fn write(grid: &OccupancyGrid, yaml: &Path) -> std::io::Result<()> {
     Ok(())
 }
 
-<<<<<<< HEAD
-/// The `name: value` lines of a YAML file; other YAML is ignored.
-struct Fields(BTreeMap<String, String>);
-||||||| d529745
-/// The `name: value` lines of a YAML file; no more of YAML is needed or read.
-struct Fields(BTreeMap<String, String>);
-=======
 #[cfg(test)]
 mod tests {
     use super::*;
->>>>>>> h-formats
 
     fn meta(mode: GridMode, is_negated: bool) -> GridMeta {
         GridMeta {

@@ -52,7 +52,7 @@ fn a_grid_becomes_its_walls_and_back() {
 }
 
 #[test]
-fn a_smoothed_grid_gives_its_walls() {
+fn a_smoothed_grid_has_its_walls_too() {
     // Free, a cell in between, a wall two cells thick, unknown behind.
     let grid = drawn(&["..?##?"; 40], 0.05);
     let walls = walls_of(&grid, 0.3);
@@ -74,7 +74,7 @@ fn a_slanted_wall_of_a_grid_is_one_wall() {
 }
 
 #[test]
-fn an_invalid_grid_is_refused_with_its_field() {
+fn what_is_no_grid_is_refused_by_name() {
     let folder = tempfile::tempdir().unwrap();
     let yaml = folder.path().join("m.yaml");
     std::fs::write(folder.path().join("m.pgm"), b"P5\n# made by hand\n2 2\n255\n\x00\xfe\xcd\x00").unwrap();

@@ -22,7 +22,7 @@ const STAGES: [&str; 13] = [
     "expected",
 ];
 /// Fewest colours of a picture that shows something: grey levels, and lines with smooth edges.
-const MIN_COLOURS: usize = 60;
+const MIN_COLOURS: usize = 40;
 /// Widths that are legible in a page without being enlarged or reduced much.
 const WIDTHS_PX: std::ops::RangeInclusive<u32> = 640..=1320;
 /// Largest file.
