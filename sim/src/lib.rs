@@ -17,9 +17,9 @@
 //! let view = readings.frame.truth.landmark(&stops[0].landmark).expect("the stop shows its landmark");
 //! assert!(view.min_side_px() > 40.0); // view.corners_px are TL, TR, BR, BL
 //!
-//! // A drive: true pose, odometry, picture, scan, five times a second. Other seeds and starts: other robots. let
-//! params = RobotParams { drive: DriveParams { seed: 3, start_m: 4.0, ..Default::default() }, ..Default::default()
-//! }; for readings in Robot::new(building, &params).take(3) {
+//! // A drive: true pose, odometry, picture, scan, five times a second. Other seeds and starts: other robots.
+//! let params = RobotParams { drive: DriveParams { seed: 3, start_m: 4.0, ..Default::default() }, ..Default::default() };
+//! for readings in Robot::new(building, &params).take(3) {
 //!     let camera = readings.step.map_from_robot.to_isometry3() * readings.step.robot_from_camera;
 //!     assert_eq!(camera, readings.frame.truth.map_from_camera);
 //!     assert_eq!((readings.frame.image.width(), readings.scan.ranges_m().len()), (640, 361));

@@ -67,7 +67,7 @@ const OPTIONS: [(&str, &[&str]); 29] = [
     ("gather list", &["--map", "--server", "--json"]),
     ("gather show", &["--pictures", "--map", "--server", "<GATHERING>"]),
     ("gather accept", &["--map", "--server", "<GATHERING>", "<PICKS>"]),
-    ("gather discard", &["--map", "--server", "<GATHERING>", "<CANDIDATES>"]),
+    ("gather discard", &["--map", "--server", "<GATHERING>", "<TRACKS>"]),
     ("run start", &["--server", "--json", "<ROBOT>"]),
     ("run status", &["--server", "--json", "<ROBOT>"]),
     ("run cancel", &["--server", "<ROBOT>"]),

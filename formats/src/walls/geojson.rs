@@ -173,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_and_collections_are_read_and_the_rest_passed_over() {
+    fn lines_and_collections_are_read_and_the_rest_is_ignored() {
         let text = r#"{"type":"FeatureCollection","name":"plan","features":[
             {"type":"Feature","properties":{"kind":"wall"},"geometry":{"type":"LineString","coordinates":[[0,0],[5,0,2.5],[5,1]]}},
             {"type":"Feature","properties":null,"geometry":null},
@@ -219,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_named() {
+    fn errors_name_line_and_position() {
         let bad = |text: &str| walls(text).unwrap_err();
         assert!(matches!(bad("{"), GeoJsonError::Format(_)));
         assert!(matches!(bad(r#"{"type":"Walls"}"#), GeoJsonError::Format(_)));

@@ -206,7 +206,10 @@ impl Token {
             key.extend(part.chars().map(|c| if c == '/' { '%' } else { c }));
         }
         if let Some(backends) = self.endpoint.as_ref().and_then(|endpoint| endpoint.backends.as_ref()) {
-            check(backends, "backends")?;
+            // It ends with a colon, so an empty one is read and written as it is.
+            if !backends.is_empty() {
+                check(backends, "backends")?;
+            }
             key.push('/');
             key.push_str(BACKENDS);
             key.extend(backends.chars().map(|c| if c == '/' { '%' } else { c }));
