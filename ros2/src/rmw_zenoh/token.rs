@@ -170,6 +170,7 @@ impl Token {
                 backends: parts[ENDPOINT_PARTS..]
                     .iter()
                     .find_map(|part| part.strip_prefix(BACKENDS))
+                    .filter(|backends| !backends.is_empty())
                     .map(demangled),
             })
         };
@@ -206,10 +207,7 @@ impl Token {
             key.extend(part.chars().map(|c| if c == '/' { '%' } else { c }));
         }
         if let Some(backends) = self.endpoint.as_ref().and_then(|endpoint| endpoint.backends.as_ref()) {
-            // It ends with a colon, so an empty one is read and written as it is.
-            if !backends.is_empty() {
-                check(backends, "backends")?;
-            }
+            check(backends, "backends")?;
             key.push('/');
             key.push_str(BACKENDS);
             key.extend(backends.chars().map(|c| if c == '/' { '%' } else { c }));
