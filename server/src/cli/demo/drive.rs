@@ -11,6 +11,7 @@ use client::{
     v1::Answer,
 };
 use map::pose2::Pose2;
+use nalgebra::Point2;
 use protos::Name;
 use sim::{
     building::Building,
@@ -161,6 +162,7 @@ impl Journey {
     fn score(&mut self, answer: &Answer, readings: &SensorReadings) {
         self.record.latencies_ms.push(answer.latency_ms);
         let truth = &readings.frame.truth;
+        let size_px = [readings.frame.image.width(), readings.frame.image.height()];
         self.record.landmark_views += truth
             .landmarks
             .iter()
@@ -169,7 +171,7 @@ impl Journey {
             })
             .count();
         for named in named_landmarks(answer) {
-            let is_true = is_true(named.name, named.quad, truth);
+            let is_true = is_true(named.name, named.quad, truth, size_px);
             self.record.count(named.is_guided(), is_true);
             if !is_true {
                 let by_pose = if named.is_guided() { " by pose" } else { "" };
@@ -210,9 +212,26 @@ impl Journey {
     }
 }
 
-fn is_true(name: &str, quad: &client::v1::QuadAnswer, truth: &FrameTruth) -> bool {
-    let Some(landmark) = truth.landmark(name) else { return false };
-    quad_corners(quad).is_some_and(|c| polygon::iou(c.points(), landmark.corners_px.points()) >= IOU_TRUE)
+/// Whether a named quad lies where the landmark is, in an image of this size.
+fn is_true(name: &str, quad: &client::v1::QuadAnswer, truth: &FrameTruth, size_px: [usize; 2]) -> bool {
+    let (Some(landmark), Some(quad)) = (truth.landmark(name), quad_corners(quad)) else { return false };
+    let is_cut = landmark.state == ViewState::Truncated;
+    overlaps(quad.points(), landmark.corners_px.points(), is_cut.then_some(size_px))
+}
+
+/// Whether a quad overlaps the true outline. One that the border of an image of `size_px` cuts counts as far as it is
+/// visible: the quad then ends at the border.
+fn overlaps(found: &[Point2<f64>], real: &[Point2<f64>], size_px: Option<[usize; 2]>) -> bool {
+    if polygon::iou(found, real) >= IOU_TRUE {
+        return true;
+    }
+    let Some([right, bottom]) = size_px.map(|size| size.map(|px| px as f64 - 0.5)) else { return false };
+    let image = [[-0.5, -0.5], [right, -0.5], [right, bottom], [-0.5, bottom]].map(Point2::from);
+    let visible_px2 = |polygon: &[Point2<f64>]| polygon::intersection_area(polygon, &image);
+    let is_inside = visible_px2(found) > 0.999 * polygon::area(found);
+    let common_px2 = polygon::intersection_area(found, real);
+    let either_px2 = visible_px2(found) + visible_px2(real) - common_px2;
+    is_inside && common_px2 >= IOU_TRUE * either_px2
 }
 
 impl Record {
@@ -241,5 +260,23 @@ impl Record {
         self.position_errors_m.extend(other.position_errors_m);
         self.odometry_errors_m.extend(other.odometry_errors_m);
         self.latencies_ms.extend(other.latencies_ms);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_landmark_that_the_border_cuts_is_found_as_far_as_it_is_visible() {
+        let points = |corners: [[f64; 2]; 4]| corners.map(Point2::from);
+        // Half of it lies left of the image.
+        let real = points([[-60.0, 160.0], [60.0, 165.0], [60.0, 300.0], [-60.0, 305.0]]);
+        let visible = points([[0.0, 164.0], [58.0, 166.0], [55.0, 298.0], [0.0, 299.0]]);
+        let size_px = Some([640, 480]);
+        assert!(overlaps(&visible, &real, size_px) && !overlaps(&visible, &real, None));
+        let elsewhere = points([[20.0, 290.0], [120.0, 290.0], [120.0, 400.0], [20.0, 400.0]]);
+        let a_part = points([[0.0, 170.0], [20.0, 170.0], [20.0, 200.0], [0.0, 200.0]]);
+        assert!(!overlaps(&elsewhere, &real, size_px) && !overlaps(&a_part, &real, size_px));
     }
 }
