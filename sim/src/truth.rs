@@ -2,7 +2,7 @@
 //! come from the depth buffer.
 
 use nalgebra::{Isometry3, Point2, Point3};
-use vision::geometry::Corners;
+use vision::geometry::{Corners, polygon};
 
 use crate::building::{LandmarkKind, LandmarkTruth};
 use crate::camera::Camera;
@@ -52,6 +52,23 @@ impl LandmarkView {
     /// Length of its shortest side.
     pub fn min_side_px(&self) -> f64 {
         self.sides_px.iter().copied().fold(f64::INFINITY, f64::min)
+    }
+
+    /// Intersection over union of its outline and a quad, 0 to 1. If the border of an image of `size_px` (width, height)
+    /// cuts it, the parts inside count: the quad then ends near the border. What of the quad lies outside is taken to
+    /// overlap there, so the overlap inside is never overestimated.
+    pub fn visible_iou(&self, quad: &Corners, size_px: [usize; 2]) -> f64 {
+        let (found, real) = (quad.points(), self.corners_px.points());
+        let whole = polygon::iou(found, real);
+        if self.state != ViewState::Truncated {
+            return whole;
+        }
+        let [right, bottom] = size_px.map(|px| px as f64 - 0.5);
+        let image = [[-0.5, -0.5], [right, -0.5], [right, bottom], [-0.5, bottom]].map(Point2::from);
+        let inside_px2 = |polygon: &[Point2<f64>]| polygon::intersection_area(polygon, &image);
+        let outside_px2 = polygon::area(found) - inside_px2(found);
+        let common_px2 = polygon::intersection_area(found, real) - outside_px2;
+        whole.max(common_px2 / (inside_px2(found) + inside_px2(real) - common_px2))
     }
 }
 
@@ -116,4 +133,35 @@ pub(crate) fn landmark_view(
         sides_px: std::array::from_fn(|i| (corners_px[(i + 1) % 4] - corners_px[i]).norm()),
         camera_from_landmark,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_landmark_that_the_border_cuts_is_overlapped_by_its_visible_part() {
+        let quad = |corners: [[f64; 2]; 4]| Corners::try_from(corners).unwrap();
+        // A poster of the demo, half of it left of the image, and what was found of it.
+        let cut = LandmarkView {
+            name: "poster".into(),
+            kind: LandmarkKind::Poster,
+            corners_px: quad([[-51.3, 155.7], [65.7, 168.4], [60.0, 302.3], [-60.6, 304.5]]),
+            state: ViewState::Truncated,
+            occluded_share: 0.0,
+            visible_px2: 8758.0,
+            view_angle_rad: 0.1,
+            distance_m: 3.6,
+            sides_px: [118.0, 134.0, 121.0, 149.0],
+            camera_from_landmark: Isometry3::identity(),
+        };
+        let size_px = [640, 480];
+        let visible = quad([[0.0, 165.9], [60.5, 172.2], [55.2, 298.5], [-5.4, 298.6]]);
+        assert!(cut.visible_iou(&visible, size_px) > 0.8);
+        let full = LandmarkView { state: ViewState::Full, ..cut.clone() };
+        assert!(full.visible_iou(&visible, size_px) < 0.5);
+        let elsewhere = quad([[20.0, 290.0], [120.0, 290.0], [120.0, 400.0], [20.0, 400.0]]);
+        let a_part = quad([[0.0, 170.0], [20.0, 170.0], [20.0, 200.0], [0.0, 200.0]]);
+        assert!(cut.visible_iou(&elsewhere, size_px) < 0.1 && cut.visible_iou(&a_part, size_px) < 0.1);
+    }
 }

@@ -11,7 +11,6 @@ use client::{
     v1::Answer,
 };
 use map::pose2::Pose2;
-use nalgebra::Point2;
 use protos::Name;
 use sim::{
     building::Building,
@@ -21,10 +20,9 @@ use sim::{
 };
 use std::{sync::Arc, time::Duration};
 use tokio::time::Instant;
-use vision::geometry::polygon;
 
 const CAMERA: &str = "front";
-/// A recognition is true when its quad overlaps the landmark's true outline by this much.
+/// A recognition is true when its quad overlaps what is visible of the landmark by this much.
 const IOU_TRUE: f64 = 0.5;
 /// Views smaller than this are not counted as ones that should be recognised.
 const MIN_SIDE_PX: f64 = 30.0;
@@ -212,27 +210,9 @@ impl Journey {
     }
 }
 
-/// Whether a named quad lies where the landmark is, in an image of this size.
 fn is_true(name: &str, quad: &client::v1::QuadAnswer, truth: &FrameTruth, size_px: [usize; 2]) -> bool {
     let (Some(landmark), Some(quad)) = (truth.landmark(name), quad_corners(quad)) else { return false };
-    let is_cut = landmark.state == ViewState::Truncated;
-    overlaps(quad.points(), landmark.corners_px.points(), is_cut.then_some(size_px))
-}
-
-/// Whether a quad overlaps the true outline. One that the border of an image of `size_px` cuts counts as far as it is
-/// visible: the quad then ends at the border.
-fn overlaps(found: &[Point2<f64>], real: &[Point2<f64>], size_px: Option<[usize; 2]>) -> bool {
-    if polygon::iou(found, real) >= IOU_TRUE {
-        return true;
-    }
-    let Some([right, bottom]) = size_px.map(|size| size.map(|px| px as f64 - 0.5)) else { return false };
-    let image = [[-0.5, -0.5], [right, -0.5], [right, bottom], [-0.5, bottom]].map(Point2::from);
-    let visible_px2 = |polygon: &[Point2<f64>]| polygon::intersection_area(polygon, &image);
-    // What of the quad lies outside of the image counts as overlapping there: the overlap inside is at least the rest.
-    let outside_px2 = polygon::area(found) - visible_px2(found);
-    let common_px2 = polygon::intersection_area(found, real) - outside_px2;
-    let either_px2 = visible_px2(found) + visible_px2(real) - common_px2;
-    common_px2 >= IOU_TRUE * either_px2
+    landmark.visible_iou(&quad, size_px) >= IOU_TRUE
 }
 
 impl Record {
@@ -261,23 +241,5 @@ impl Record {
         self.position_errors_m.extend(other.position_errors_m);
         self.odometry_errors_m.extend(other.odometry_errors_m);
         self.latencies_ms.extend(other.latencies_ms);
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_landmark_that_the_border_cuts_is_found_as_far_as_it_is_visible() {
-        let points = |corners: [[f64; 2]; 4]| corners.map(Point2::from);
-        // A poster of the demo, half of it left of the image, and what was found of it.
-        let real = points([[-51.3, 155.7], [65.7, 168.4], [60.0, 302.3], [-60.6, 304.5]]);
-        let visible = points([[0.0, 165.9], [60.5, 172.2], [55.2, 298.5], [-5.4, 298.6]]);
-        let size_px = Some([640, 480]);
-        assert!(overlaps(&visible, &real, size_px) && !overlaps(&visible, &real, None));
-        let elsewhere = points([[20.0, 290.0], [120.0, 290.0], [120.0, 400.0], [20.0, 400.0]]);
-        let a_part = points([[0.0, 170.0], [20.0, 170.0], [20.0, 200.0], [0.0, 200.0]]);
-        assert!(!overlaps(&elsewhere, &real, size_px) && !overlaps(&a_part, &real, size_px));
     }
 }
