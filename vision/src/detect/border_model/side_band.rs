@@ -246,7 +246,7 @@ impl AlongLine<'_> {
     }
 
     /// Share of the samples with an edge along the side further out than `beyond_px`, for both thresholds of
-    /// [`STEPS_OUTSIDE`].
+    /// `STEPS_OUTSIDE`.
     pub fn edges_outside(&self, beyond_px: f64) -> [f64; 2] {
         let from = columns(beyond_px) + (1 << BITS) - 1;
         self.band.outermost.each_ref().map(|outermost| {
