@@ -3,6 +3,7 @@
 
 mod derivatives;
 mod covariance;
+mod camera_pose;
 
 use crate::{
     extrinsics::{CameraExtrinsics, pan_tilt},

@@ -1,0 +1,109 @@
+//! The pose of a camera held in a hand: exact corners, honest covariance, the planar ambiguity, refusals.
+
+use super::*;
+use crate::localise::camera_pose::{CameraPose, CameraPoseRefusal, camera_pose};
+use nalgebra::UnitQuaternion;
+
+/// A camera at `d_m` and azimuth `psi_deg` from the landmark's normal, 1.6 m high, tilted and rolled as hands do.
+fn held(place: &LandmarkPlace, d_m: f64, psi_deg: f64) -> Isometry3<f64> {
+    let robot = robot(place, d_m, psi_deg).to_isometry3();
+    let roll = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 0.04);
+    robot * pan_tilt(0.1, -0.08, Vector3::new(0.0, 0.0, 1.6)) * roll
+}
+
+fn photograph(
+    place: &LandmarkPlace,
+    map_from_camera: &Isometry3<f64>,
+    sigma_px: f64,
+    random: &mut Random,
+) -> LandmarkPose {
+    let camera_from_landmark = map_from_camera.inverse() * place.map_from_landmark();
+    observe_by(&camera(), &camera(), &camera_from_landmark, place.size, sigma_px, random).unwrap()
+}
+
+fn seen<'a>(number: u64, seen: &'a LandmarkPose, place: &'a LandmarkPlace) -> LandmarkObservation<'a> {
+    LandmarkObservation { landmark: LandmarkId(number), seen, place }
+}
+
+fn error(found: &CameraPose, truth: &Isometry3<f64>) -> Vector6<f64> {
+    let rotation = (found.map_from_camera.rotation * truth.rotation.inverse()).scaled_axis();
+    let position = found.map_from_camera.translation.vector - truth.translation.vector;
+    Vector6::from_iterator(rotation.iter().chain(position.iter()).copied())
+}
+
+#[test]
+fn exact_corners_give_the_exact_pose_of_a_camera_in_a_hand() {
+    let (place, mut random) = (place(), Random::new(7));
+    for psi_deg in [-50.0, -20.0, 35.0, 60.0] {
+        let truth = held(&place, 1.5, psi_deg);
+        let pose = photograph(&place, &truth, 0.0, &mut random);
+        let found = camera_pose(&[seen(1, &pose, &place)]).unwrap().unwrap();
+        assert!(error(&found, &truth).norm() < 1e-6, "{psi_deg}: {found:?}");
+        assert_eq!(found.landmarks, [LandmarkId(1)]);
+    }
+}
+
+#[test]
+fn the_covariance_of_a_camera_in_a_hand_is_that_of_its_errors() {
+    let (place, mut random) = (place(), Random::new(11));
+    let (mut nees, mut count) = (0.0, 0);
+    for trial in 0..600 {
+        // The real place and size differ from the stated ones by their stated errors.
+        let sigma = place.covariance.diagonal().map(f64::sqrt);
+        let e = sigma.map(|s| s * random.normal());
+        let mut real = place;
+        (real.x_m, real.y_m, real.theta_rad, real.z_m) =
+            (real.x_m + e[0], real.y_m + e[1], real.theta_rad + e[2], real.z_m + e[3]);
+        (real.size.width_m, real.size.height_m) = (real.size.width_m + e[4], real.size.height_m + e[5]);
+        let truth = held(&place, 1.2 + f64::from(trial % 4) * 0.4, 30.0 + f64::from(trial % 3) * 10.0);
+        let pose = photograph(&real, &truth, 0.5, &mut random);
+        let Ok(found) = camera_pose(&[seen(1, &pose, &place)]).unwrap() else { continue };
+        let error = error(&found, &truth);
+        nees += error.dot(&found.covariance.cholesky().unwrap().solve(&error));
+        count += 1;
+    }
+    // 6 where the covariance is right; the mean of 500 has a standard deviation of 0.15.
+    let mean = nees / f64::from(count);
+    assert!(count > 500 && (5.0..7.2).contains(&mean), "mean {mean} of {count}");
+}
+
+#[test]
+fn an_ambiguous_photograph_gives_no_pose_unless_another_landmark_decides() {
+    let (place, mut random) = (place(), Random::new(3));
+    let mut beside = place;
+    beside.x_m += 1.2 * place.theta_rad.sin();
+    beside.y_m -= 1.2 * place.theta_rad.cos();
+    let (mut refused, mut decided) = (0, 0);
+    for _ in 0..60 {
+        let truth = held(&place, 8.0, 12.0);
+        let (a, b) =
+            (photograph(&place, &truth, 0.5, &mut random), photograph(&beside, &truth, 0.5, &mut random));
+        if !a.ambiguous {
+            continue;
+        }
+        refused += usize::from(
+            camera_pose(&[seen(1, &a, &place)]).unwrap() == Err(CameraPoseRefusal::Ambiguous),
+        );
+        if let Ok(found) = camera_pose(&[seen(1, &a, &place), seen(2, &b, &beside)]).unwrap() {
+            decided += 1;
+            assert!(error(&found, &truth).rows(3, 3).norm() < 1.0, "{found:?}");
+            assert_eq!(found.landmarks.len(), 2);
+        }
+    }
+    assert!(refused > 20, "{refused} refused, {decided} decided");
+}
+
+#[test]
+fn landmarks_that_contradict_one_another_and_impossible_heights_give_no_pose() {
+    let (place, mut random) = (place(), Random::new(5));
+    let truth = held(&place, 1.5, 40.0);
+    let pose = photograph(&place, &truth, 0.3, &mut random);
+    let mut elsewhere = place;
+    elsewhere.x_m += 0.8;
+    let both = [seen(1, &pose, &place), seen(2, &pose, &elsewhere)];
+    assert_eq!(camera_pose(&both).unwrap(), Err(CameraPoseRefusal::Disagree));
+    let mut low = place;
+    low.z_m -= 3.0;
+    assert_eq!(camera_pose(&[seen(1, &pose, &low)]).unwrap(), Err(CameraPoseRefusal::Height));
+    assert_eq!(camera_pose(&[]).unwrap_err().field, "observations");
+}
