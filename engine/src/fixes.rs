@@ -4,7 +4,10 @@
 use super::snapshot::MapSnapshot;
 use map::{
     extrinsics::CameraExtrinsics,
-    localise::{Fix, FixRefusal, FixResult, LandmarkObservation, LocaliseParams, robot_pose},
+    localise::{
+        CameraPose, CameraPoseRefusal, Fix, FixRefusal, FixResult, LandmarkObservation, LocaliseParams,
+        camera_pose, robot_pose,
+    },
     pose2::Pose2Covariance,
 };
 use vision::{
@@ -39,6 +42,8 @@ pub enum NoFix {
     GateBehindWall,
     /// The landmarks contradict one another.
     GateInconsistent,
+    /// The camera would be below the floor or far above it.
+    GateCameraHeight,
 }
 
 impl NoFix {
@@ -56,6 +61,7 @@ impl NoFix {
             Self::GatePrior => "gate_prior",
             Self::GateBehindWall => "gate_behind_wall",
             Self::GateInconsistent => "gate_inconsistent",
+            Self::GateCameraHeight => "gate_camera_height",
         }
     }
 }
@@ -68,6 +74,16 @@ impl From<&FixRefusal> for NoFix {
             FixRefusal::Side => Self::GateBehindWall,
             FixRefusal::Disagree { .. } => Self::GateInconsistent,
             FixRefusal::Degenerate => Self::Degenerate,
+        }
+    }
+}
+
+impl From<CameraPoseRefusal> for NoFix {
+    fn from(refusal: CameraPoseRefusal) -> Self {
+        match refusal {
+            CameraPoseRefusal::Ambiguous => Self::Ambiguous,
+            CameraPoseRefusal::Height => Self::GateCameraHeight,
+            CameraPoseRefusal::Disagree => Self::GateInconsistent,
         }
     }
 }
@@ -134,4 +150,13 @@ pub fn robot_fix(
     prior: Option<&Pose2Covariance>,
 ) -> Result<Fix, NoFix> {
     single_fix(&robot_fixes(observations, extrinsics, prior)?)
+}
+
+/// Where a photograph was taken, by the landmarks that it shows, or why that is not known.
+pub fn photograph_pose(analysis: &FrameAnalysis, map: &MapSnapshot) -> Result<CameraPose, NoFix> {
+    let found = camera_pose(&landmark_observations(analysis, map)?).map_err(|error| {
+        tracing::error!(%error, "localisation_refused_checked_input");
+        NoFix::Degenerate
+    })?;
+    found.map_err(NoFix::from)
 }

@@ -2,14 +2,16 @@
 //! give one. What is not known is an absent field, never zero.
 
 use super::{
+    fixes::photograph_pose,
     frame_analysis::{StageTimes, analyse_frame},
     guided::{GuidedObservation, GuidedResult},
     landmark_checks::FrameEvaluation,
     snapshot::MapSnapshot,
 };
+use map::localise::CameraPose;
 use protos::{
     convert::{
-        geometry::pose2_covariance_wire,
+        geometry::{pose2_covariance_wire, pose3_wire},
         result::{corners, fill_pose, fill_verdict, kind, points},
     },
     v1,
@@ -26,6 +28,12 @@ pub fn answer_to_photograph(image: &GrayImage, camera: Option<&Intrinsics>, map:
     let (started, mut times) = (Instant::now(), StageTimes::start());
     let analysis = analyse_frame(image, camera, map, &mut times);
     let mut answer = answer(&analysis, map);
+    if camera.is_some() {
+        match photograph_pose(&analysis, map) {
+            Ok(pose) => answer.camera_pose = Some(camera_pose_wire(&pose, map)),
+            Err(reason) => reason.as_str().clone_into(&mut answer.camera_pose_refusal),
+        }
+    }
     answer.timings = times.finish();
     answer.latency_ms = started.elapsed().as_secs_f64() * 1e3;
     answer
@@ -77,6 +85,14 @@ fn quad(analysis: &QuadAnalysis, map: &MapSnapshot) -> v1::QuadAnswer {
     quad
 }
 
+fn camera_pose_wire(pose: &CameraPose, map: &MapSnapshot) -> v1::CameraPose {
+    v1::CameraPose {
+        map_from_camera: Some(pose3_wire(&pose.map_from_camera)),
+        covariance: pose.covariance.transpose().as_slice().to_vec(),
+        landmarks: pose.landmarks.iter().map(|id| name(map, *id)).collect(),
+    }
+}
+
 fn name(map: &MapSnapshot, id: LandmarkId) -> String {
     map.landmarks.get(&id).map_or_else(|| format!("#{}", id.0), |info| info.name.clone())
 }
@@ -121,3 +137,6 @@ pub fn fill_fixes(
         Err(reason) => reason.as_str().clone_into(&mut answer.pose_refusal),
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -201,6 +201,21 @@ pub struct LandmarkPose {
     #[prost(double, tag = "3")]
     pub reprojection_rms_px: f64,
 }
+/// Where a photograph was taken. Nothing is assumed of how the camera was held.
+#[derive(::serde::Serialize, ::serde::Deserialize)]
+#[serde(default)]
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct CameraPose {
+    /// Camera coordinates (x right, y down, z forward) to those of the map.
+    #[prost(message, optional, tag = "1")]
+    pub map_from_camera: ::core::option::Option<Pose3>,
+    /// Over (rotation vector, position), map frame; 36 numbers.
+    #[prost(double, repeated, tag = "2")]
+    pub covariance: ::prost::alloc::vec::Vec<f64>,
+    /// The landmark that gives the pose, then those that agree with it.
+    #[prost(string, repeated, tag = "3")]
+    pub landmarks: ::prost::alloc::vec::Vec<::prost::alloc::string::String>,
+}
 #[derive(::serde::Serialize, ::serde::Deserialize)]
 #[serde(default)]
 #[derive(Clone, PartialEq, ::prost::Message)]
@@ -336,6 +351,13 @@ pub struct Answer {
     /// picture alone. Never set unless the server is told to spare searches (its setting `search_every_frame`).
     #[prost(bool, tag = "18")]
     pub only_expected: bool,
+    /// Only for a photograph that came with intrinsics and without a robot: where it was taken.
+    #[prost(message, optional, tag = "20")]
+    pub camera_pose: ::core::option::Option<CameraPose>,
+    /// Why recognised landmarks gave no pose of the camera: empty, landmark_not_placed, landmark_quarantined, ambiguous,
+    /// gate_camera_height (below the floor or more than 5 m above it), gate_inconsistent, degenerate.
+    #[prost(string, tag = "21")]
+    pub camera_pose_refusal: ::prost::alloc::string::String,
 }
 /// robot/{robot}/odometry : odom_from_robot
 #[derive(::serde::Serialize, ::serde::Deserialize)]

@@ -4,7 +4,7 @@
 use std::{fs, path::Path};
 
 /// Messages that also travel as JSON over HTTP.
-const JSON: [&str; 17] = [
+const JSON: [&str; 18] = [
     "Hypothesis",
     "Pose3",
     "Pose2",
@@ -14,6 +14,7 @@ const JSON: [&str; 17] = [
     "Candidate",
     "PointEvidence",
     "LandmarkPose",
+    "CameraPose",
     "QuadAnswer",
     "StageTime",
     "Answer",

@@ -243,7 +243,8 @@ fn write_networks(args: &DetectorArgs, [border_model, classifier]: [Network; 2])
         )?;
     }
     if let Some(path) = &args.rust {
-        let from = Provenance::of_this_run(&args.sets)?;
+        let folders: Vec<PathBuf> = args.sets.iter().chain(&args.pictures).cloned().collect();
+        let from = Provenance::of_this_run(&folders)?;
         write(path, &source::source(&models, &from))?;
     }
     Ok(())

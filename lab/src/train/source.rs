@@ -36,7 +36,7 @@ pub(super) fn source(models: &[(&str, Network); 2], from: &Provenance) -> String
         text,
         "const FEATURES: FeatureDigest = FeatureDigest(0x{});\nconst _: () = assert!(\n    \
          FEATURES.is(FeatureDigest::OF_THIS_PROGRAM),\n    \
-         \"a number of the measurements changed: train the networks again\"\n);",
+         \"a number of the measurements changed: train the networks again\",\n);",
         grouped(models[0].1.features)
     )
     .ok();

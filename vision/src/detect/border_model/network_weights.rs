@@ -1,13 +1,21 @@
-//! The weights of the networks of the default detector. Not for editing: this command writes the file, byte for byte on
-//! one machine, and `cargo fmt` puts it in form:
+//! The weights of the networks of the default detector. Not for editing: this command writes the file, byte for byte
+//! on one machine, and `cargo fmt` puts it in form:
 //!
 //! ```text
 //! waymark-lab train detector museum-paintings exit-signs corridor museum-walk-estense corridor-loop-rtabmap \
-//!   corridor-multifloor doors-bbox signs-misc --pictures poster-textures-estense \
-//!   --weight museum-paintings=6 --weight scenes=0.5 --rust vision/src/detect/border_model/network_weights.rs
+//!   corridor-multifloor doors-bbox signs-misc --pictures poster-textures-estense --weight museum-paintings=6 \
+//!   --weight scenes=0.5 --rust vision/src/detect/border_model/network_weights.rs
 //! ```
 //!
-//! Commit: not recorded. The sets are those of `data/SETS.toml`; whether their content was the same then is not recorded.
+//! Commit: 1c0af82281252074387786fd06575e0077e739af.
+//! Set `museum-paintings`: SHA-256 aed4ef353e8c21191479c377e43d2252ac612819dc40440f287131f8477ed826 (`data/digest.py`).
+//! Set `exit-signs`: SHA-256 f0d9681c83f43f2c60217485fb2660f23434ee051681283cd93b05bd7838639a (`data/digest.py`).
+//! Set `museum-walk-estense`: SHA-256 fb7db64fe577d10ed7fc9ce97c5a356261d4e71ff3c33a69e29e0e7549f29e44 (`data/digest.py`).
+//! Set `corridor-loop-rtabmap`: SHA-256 888649258fb0351e2d92e03dfcb81eb74e1f2edcfba733c1c5f7da29d78c74eb (`data/digest.py`).
+//! Set `corridor-multifloor`: SHA-256 d18603a5630e04e41ff1ad71b05a6ff2422d6abe24c7a9c085588ee8a3b5f593 (`data/digest.py`).
+//! Set `doors-bbox`: SHA-256 b12c401603d2b5817de36bacb3b8bb616bdc1e1703821e46938b7dbf49895abd (`data/digest.py`).
+//! Set `signs-misc`: SHA-256 ddc2600f0e622e3ceaf97c808fdb5c692413d3c8357a68cff38a1ca939d0d56e (`data/digest.py`).
+//! Set `poster-textures-estense`: SHA-256 2dd71596d72a6067fb4af2dcff989228685186ce49ef944e4883f80f193fc050 (`data/digest.py`).
 #![allow(clippy::approx_constant, reason = "weights that happen to be near one")]
 
 use super::{feature_constants::FeatureDigest, network::Network};
