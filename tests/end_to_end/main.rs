@@ -8,6 +8,7 @@ mod demo;
 mod earlier_database;
 mod gathered_drive;
 mod guided;
+mod guides;
 mod hang_ups;
 mod http_contract;
 mod imports;

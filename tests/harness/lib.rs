@@ -4,6 +4,8 @@
 mod child;
 pub mod command;
 pub mod documents;
+pub mod guide_files;
+pub mod guides;
 pub mod pictures;
 pub mod robots;
 pub mod scenes;

@@ -1,0 +1,82 @@
+//! Every command of every guide is run, in order, with the files that the guide names.
+
+use serde_json::Value;
+use std::process::Command;
+use tests::{documents::markdown, guide_files, guides};
+
+/// Guides whose commands need a robot beside them, and the test that runs them.
+const ELSEWHERE: [(&str, &str); 0] = [];
+
+fn run(name: &str) {
+    let guide = markdown("docs/guides").into_iter().find(|g| g.file_stem().is_some_and(|s| s == name));
+    let folder = tempfile::tempdir().expect("a folder");
+    guide_files::write(folder.path());
+    guides::run(&guide.expect("a guide"), folder.path(), &mut |_, _| ());
+}
+
+#[test]
+fn first_pose_leads_to_the_pose_of_a_photograph() {
+    let guide = markdown("docs/guides").into_iter().find(|g| g.ends_with("first-pose.md")).expect("a guide");
+    let folder = tempfile::tempdir().expect("a folder");
+    guide_files::write(folder.path());
+    let mut answer = None;
+    guides::run(&guide, folder.path(), &mut |command, guide| {
+        if command.starts_with("waymark recognise") {
+            let json = Command::new(tests::command::program())
+                .args(["recognise", "here.jpg", "--camera", "camera.json", "--json", "--server"])
+                .arg(guide.url().expect("the guide's server"))
+                .current_dir(folder.path())
+                .output()
+                .expect("the program");
+            answer = Some(serde_json::from_slice::<Value>(&json.stdout).expect("JSON"));
+        }
+    });
+    let answer = answer.expect("the guide asks where a photograph was taken");
+    let pose = &answer["camera_pose"]["map_from_camera"];
+    let truth = guide_files::map_from_camera("here.jpg").translation;
+    let found = ["x_m", "y_m", "z_m"].map(|k| pose[k].as_f64().unwrap_or_else(|| panic!("no pose: {answer}")));
+    let off = (0..3).map(|i| (found[i] - truth.vector[i]).powi(2)).sum::<f64>().sqrt();
+    assert!(off < 0.15, "{found:?}, truth {truth}: off by {off} m");
+}
+
+#[test]
+fn the_commands_of_teach_a_map_work() {
+    run("teach-a-map");
+}
+
+#[test]
+fn the_commands_of_import_a_map_work() {
+    run("import-a-map");
+}
+
+#[test]
+fn the_commands_of_troubleshooting_work() {
+    run("troubleshooting");
+}
+
+#[test]
+fn the_commands_of_calibrate_a_camera_work() {
+    run("calibrate-a-camera");
+}
+
+#[test]
+fn the_commands_of_connect_a_robot_work() {
+    run("connect-a-robot");
+}
+
+#[test]
+fn the_commands_of_deploy_work() {
+    run("deploy");
+}
+
+#[test]
+fn every_guide_is_run_by_a_test() {
+    let source = include_str!("guides.rs");
+    for guide in markdown("docs/guides") {
+        let name = guide.file_stem().expect("a name").to_string_lossy().into_owned();
+        let here = source.contains(&format!("run(\"{name}\")")) || source.contains(&format!("\"{name}.md\""));
+        let elsewhere = ELSEWHERE.iter().find(|(guide, _)| *guide == name);
+        let elsewhere = elsewhere.is_some_and(|(_, test)| tests::documents::root().join(test).exists());
+        assert!(here || elsewhere, "no test runs the commands of docs/guides/{name}.md");
+    }
+}
