@@ -194,6 +194,9 @@ pub struct NewLandmark {
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct LandmarkPatch {
+    /// Another name, `[a-z0-9_-]{1,64}`, unique in the map. Everything that belongs to the landmark stays with it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
     /// Width and height.
     #[serde(
         default,
