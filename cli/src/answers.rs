@@ -3,7 +3,7 @@
 use super::screen::counted;
 use client::{
     NamedLandmark,
-    api::{PoseTrust, Robot},
+    api::{PoseTrust, RobotPose},
     named,
     v1::{Answer, QuadAnswer, QuadKind, Verdict},
 };
@@ -68,17 +68,14 @@ fn by_points(quad: &QuadAnswer) -> String {
     })
 }
 
-/// The line for a robot: its map, and its pose if that is known.
-pub(super) fn robot_line(robot: &Robot) -> String {
-    let at = robot.pose.as_ref().map_or_else(String::new, |pose| {
-        let (x_m, y_m, degrees) = (pose.x_m, pose.y_m, pose.theta_rad.to_degrees());
-        format!(", at {x_m:.2}, {y_m:.2} m, {degrees:.0} degrees: {}", trust(pose.trust))
-    });
-    format!("{}  {}{at}", robot.name, robot.map)
+/// Where a robot is.
+pub(super) fn pose_line(pose: &RobotPose) -> String {
+    let (x_m, y_m, degrees) = (pose.x_m, pose.y_m, pose.theta_rad.to_degrees());
+    format!("{x_m:.2}, {y_m:.2} m, {degrees:.0} deg")
 }
 
 /// How far a pose is trusted.
-fn trust(trust: PoseTrust) -> &'static str {
+pub(super) fn trust(trust: PoseTrust) -> &'static str {
     match trust {
         PoseTrust::Unspecified => "not checked by a landmark yet",
         PoseTrust::Unsupported => "not confirmed yet",
@@ -91,10 +88,7 @@ fn trust(trust: PoseTrust) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use client::{
-        api::RobotPose,
-        v1::{Candidate, PointEvidence, Sighting},
-    };
+    use client::v1::{Candidate, PointEvidence, Sighting};
 
     fn of(quad: &QuadAnswer) -> String {
         sentence("a.jpg", &Answer { quads: vec![quad.clone()], ..Answer::default() })
@@ -156,20 +150,10 @@ mod tests {
     }
 
     #[test]
-    fn a_robot_is_shown_with_its_pose_and_how_far_that_is_trusted() {
-        let robot: Robot = serde_json::from_str(r#"{"name":"r1","map":"hall","alive":true}"#).unwrap();
-        assert_eq!(robot_line(&robot), "r1  hall");
-        let at = |trust| {
-            let pose = RobotPose {
-                x_m: 1.5,
-                y_m: -2.0,
-                theta_rad: std::f64::consts::FRAC_PI_2,
-                trust,
-                ..RobotPose::default()
-            };
-            robot_line(&Robot { pose: Some(pose), ..robot.clone() })
-        };
-        assert_eq!(at(PoseTrust::Supported), "r1  hall, at 1.50, -2.00 m, 90 degrees: landmarks agree");
-        assert!(at(PoseTrust::Contradicted).ends_with(": contradicted by the last landmark"));
+    fn a_pose_is_told_in_metres_and_degrees() {
+        let pose =
+            RobotPose { x_m: 1.5, y_m: -2.0, theta_rad: std::f64::consts::FRAC_PI_2, ..RobotPose::default() };
+        assert_eq!(pose_line(&pose), "1.50, -2.00 m, 90 deg");
+        assert_eq!(trust(PoseTrust::Contradicted), "contradicted by the last landmark");
     }
 }

@@ -21,6 +21,22 @@ pub(super) fn size(text: &str) -> Result<Size, String> {
     }
 }
 
+/// A height above the floor: 0 to 10 m.
+pub(super) fn height_m(text: &str) -> Result<f64, String> {
+    let height: Option<f64> = text.trim().parse().ok();
+    height
+        .filter(|h| (0.0..=10.0).contains(h))
+        .ok_or_else(|| "a height above the floor: 0 to 10 m".to_owned())
+}
+
+/// Four corners `x,y,x,y,x,y,x,y`, pixels.
+pub(super) fn corners(text: &str) -> Result<[[f64; 2]; 4], String> {
+    let numbers: Option<[f64; 8]> = numbers(text, ',');
+    numbers.map(|n| [[n[0], n[1]], [n[2], n[3]], [n[4], n[5]], [n[6], n[7]]]).ok_or_else(|| {
+        "eight numbers: x,y of top-left, top-right, bottom-right, bottom-left in pixels".to_owned()
+    })
+}
+
 /// A pinhole camera `fx,fy,cx,cy` in pixels, with standard deviations of focal length and centre where there are six.
 pub(super) fn camera(text: &str) -> Result<Intrinsics, String> {
     let (pinhole, sigmas) = match (numbers(text, ','), numbers(text, ',')) {
@@ -56,6 +72,14 @@ mod tests {
             size("0.6").is_err() && size("0x1").is_err() && size("axb").is_err() && size("infx1").is_err()
         );
         assert!(camera("500,500,320,240").is_ok());
+        assert!(
+            height_m("1.5").is_ok()
+                && height_m("-3").is_err()
+                && height_m("10.1").is_err()
+                && height_m("x").is_err()
+        );
+        assert!(corners("1,2,3,4,5,6,7,8").is_ok_and(|c| c[3][0] > 6.9 && c[3][0] < 7.1));
+        assert!(corners("1,2,3,4,5,6,7").is_err());
         assert!(camera("500,500,320").is_err() && camera("-1,500,320,240").is_err());
         let known = camera("500,500,320,240,2.5,1").unwrap();
         assert_eq!(known.sigmas, Some(IntrinsicsSigmas { focal_px: 2.5, center_px: 1.0 }));

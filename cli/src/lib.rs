@@ -3,32 +3,42 @@
 
 mod answers;
 pub mod arg_parsers;
-mod calibrate;
+mod camera;
 pub mod clock;
 mod demo;
 mod detect;
 pub mod drawing;
-mod gather;
-pub mod mapping;
+mod explain;
+mod failure;
+mod gathering;
+mod job;
+mod landmark;
+pub mod map;
+mod names;
 pub mod parameters;
-pub mod simulated_errors;
 pub mod pictures;
-mod record;
+mod recognise;
+mod robot;
+mod run;
 pub mod scratch;
 pub mod screen;
 mod serve;
+mod server_status;
+mod session;
+mod shell;
+pub mod simulated_errors;
 pub mod stopwatch;
-mod visibility_settings;
 pub mod survey;
-mod teach;
+mod view;
 
-use clap::{Parser, Subcommand};
-use std::{io::IsTerminal as _, process::ExitCode};
+use clap::{CommandFactory as _, Parser, Subcommand};
+use failure::{EXIT_STATUSES, Failure};
+use std::process::ExitCode;
 
 /// Maps and landmarks for fleets of robots: teach the pictures and doors of a building once, and every robot that
 /// sends camera frames learns where it is.
 #[derive(Debug, Parser)]
-#[command(name = "waymark", version, propagate_version = true)]
+#[command(name = "waymark", version, propagate_version = true, after_help = EXIT_STATUSES)]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -45,85 +55,126 @@ enum Command {
     /// address. Ends with a summary; exit status 1 if there was a false match.
     Demo(demo::Args),
     Serve(serve::Serve),
+    /// Whether a server does its work.
+    Server(server_status::Args),
+    /// Maps: create, list, show, locate, delete; walls from laser logs, grids and plans.
+    Map(map::Args),
+    /// Landmarks: teach, list, show, place, size, rename, delete, accept.
+    Landmark(landmark::Args),
+    /// Training views of a landmark: list, show, delete.
+    View(view::Args),
+    /// Robots that may send frames: add, list, show, remove.
+    Robot(robot::Args),
+    /// Cameras of robots: list, last frame; and calibration from pictures.
+    Camera(camera::Args),
+    /// Let a robot gather training views while it drives past.
+    ///
+    /// For example:
+    ///   waymark gathering start r1 --map office
+    ///   waymark gathering stop 1
+    ///   waymark gathering show 1 --pictures tracks
+    ///   waymark landmark accept 1 3=poster 5=fire-plan
+    #[command(verbatim_doc_comment)]
+    Gathering(gathering::Args),
+    /// Record a robot's run and give its reference trajectory, so that the map learns which modality to trust where.
+    ///
+    /// For example:
+    ///   waymark run start r1
+    ///   waymark run learn r1 survey.tum
+    ///   waymark map fusion office best
+    #[command(verbatim_doc_comment)]
+    Run(run::Args),
+    /// Jobs of a server: show, wait, cancel.
+    Job(job::Args),
+    /// What a server recognises in photographs.
+    ///
+    /// For example:
+    ///   waymark recognise hall1.jpg hall2.jpg --map office
+    #[command(verbatim_doc_comment)]
+    Recognise(recognise::Args),
     /// The quads of pictures; no server needed.
     ///
     /// Prints the corners of every quad, best first. With --draw, pictures show what each stage made of the image, and
     /// so where a quad was lost: no edges (lower --edge-steps), edges but no segments (lower --min-segment), segments
-    /// but no quad proposal, or a proposal with a lower score than others (see the scores). A picture that cannot be read is one
-    /// line on standard error and exit status 1; the others are still done.
+    /// but no quad proposal, or a proposal with a lower score than others (see the scores). A picture that cannot be read
+    /// is one line on standard error and exit status 1; the others are still done.
     ///
     /// For example:
     ///   waymark detect hall.jpg --draw stages
     ///   waymark detect photographs/ --json --min-score 0.8 > quads.jsonl
     #[command(verbatim_doc_comment)]
     Detect(detect::Args),
-    /// A camera's focal length, principal point and distortion from pictures of one flat object; no server needed.
+    /// Completions for a shell, on standard output.
     ///
-    /// Five to ten pictures of one poster or board from different sides, each of which shows it as its largest quad; at
-    /// least three of the sides must differ by more than 15 degrees. Pictures that do not fit the others are left out
-    /// and named. For example:
-    ///   waymark calibrate pictures/ --size 0.60x0.84
-    ///   waymark calibrate --corners corners.json --size 1x1 --radial 0 --json
+    /// For example:
+    ///   waymark completions bash > waymark.bash
     #[command(verbatim_doc_comment)]
-    Calibrate(calibrate::Args),
-    /// Maps: of a running server, and of walls built from laser recordings or other programs' files.
-    #[command(subcommand)]
-    Map(teach::MapCommand),
-    /// Make robots known to a running server.
-    #[command(subcommand)]
-    Robot(teach::RobotCommand),
-    /// Teach a landmark to a running server from photographs.
-    ///
-    /// The server finds the one dominant quad in each photograph (or takes the whole picture), learns, and says
-    /// whether the landmark is in use or which gate it failed.
-    Learn(teach::LearnArgs),
-    /// Let a robot gather views while it drives past, then accept or discard its tracks.
+    Completions(shell::CompletionArgs),
+    /// Manual pages, into a folder.
     ///
     /// For example:
-    ///   waymark gather start --map office --robot r1
-    ///   waymark gather stop --map office 1
-    ///   waymark gather show --map office 1 --pictures candidates
-    ///   waymark gather accept --map office 1 3=poster 5=fire-plan
-    #[command(subcommand, verbatim_doc_comment)]
-    Gather(gather::Command),
-    /// Record a robot's drive and give its reference trajectory, so that the map learns which modality to trust where.
-    ///
-    /// For example:
-    ///   waymark run start r1
-    ///   waymark run learn r1 --path survey.tum
-    ///   waymark run mode --map office fuse
-    #[command(subcommand, verbatim_doc_comment)]
-    Run(record::Command),
-    /// Ask a running server what is in photographs.
-    Recognise(teach::RecogniseArgs),
+    ///   waymark man /usr/local/share/man/man1
+    #[command(verbatim_doc_comment)]
+    Man(shell::ManArgs),
 }
 
 /// Runs the program.
 pub fn main() -> ExitCode {
-    let cli = Cli::parse();
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) if error.use_stderr() && wants_json() => return report(&wrong_use(&error)),
+        Err(error) => error.exit(),
+    };
     // A running server logs what it does; the other commands print results.
     let default =
         if matches!(cli.command, Command::Serve(_)) { "info,zenoh=warn" } else { "warn,zenoh=error" };
     start_log(cli.log.as_deref(), default);
-    let done = match &cli.command {
+    let done = |()| ExitCode::SUCCESS;
+    let result = match &cli.command {
         Command::Demo(args) => run(demo::run(args)),
-        Command::Serve(serve) => run(serve.clone().run()).map(|()| ExitCode::SUCCESS),
+        Command::Serve(serve) => run(serve.clone().run()).map(done),
+        Command::Server(args) => run(server_status::run(args)).map(done),
+        Command::Map(args) => run(map::run(args)).map(done),
+        Command::Landmark(args) => run(landmark::run(args)).map(done),
+        Command::View(args) => run(view::run(args)).map(done),
+        Command::Robot(args) => run(robot::run(args)).map(done),
+        Command::Camera(args) => run(camera::run(args)).map(done),
+        Command::Gathering(args) => run(gathering::run(args)).map(done),
+        Command::Run(args) => run(run::run(args)).map(done),
+        Command::Job(args) => run(job::run(args)).map(done),
+        Command::Recognise(args) => run(recognise::run(args)).map(done),
         Command::Detect(args) => detect::run(args),
-        Command::Calibrate(args) => calibrate::run(args).map(|()| ExitCode::SUCCESS),
-        Command::Map(command) => run(teach::map(command)).map(|()| ExitCode::SUCCESS),
-        Command::Robot(command) => run(teach::robot(command)).map(|()| ExitCode::SUCCESS),
-        Command::Learn(args) => run(teach::learn(args)),
-        Command::Gather(command) => run(gather::run(command)).map(|()| ExitCode::SUCCESS),
-        Command::Run(command) => run(record::run(command)).map(|()| ExitCode::SUCCESS),
-        Command::Recognise(args) => run(teach::recognise(args)),
-    };
-    match done {
-        Ok(code) => code,
-        Err(error) => {
-            screen::complain(&format!("waymark: {error:#}"));
-            ExitCode::FAILURE
+        Command::Completions(args) => {
+            shell::completions(args, Cli::command());
+            Ok(ExitCode::SUCCESS)
         }
+        Command::Man(args) => shell::man(args, Cli::command()).map(done),
+    };
+    result.unwrap_or_else(|error| report(&Failure::of(&error)))
+}
+
+/// Reports a failure on standard error: as JSON where results are JSON.
+fn report(failure: &Failure) -> ExitCode {
+    if wants_json() {
+        screen::complain(&failure.to_json().to_string());
+    } else {
+        screen::complain(&format!("waymark: {failure}"));
     }
+    failure.class.exit_code()
+}
+
+/// Also known before the command line is parsed, and where it cannot be.
+fn wants_json() -> bool {
+    std::env::args_os().any(|arg| arg == "--json")
+}
+
+/// What clap says of a wrong command line, as a failure: its first line without the label.
+fn wrong_use(error: &clap::Error) -> Failure {
+    let text = error.to_string();
+    let mut lines = text.lines().filter(|line| !line.trim().is_empty());
+    let first = lines.next().unwrap_or_default();
+    let sentence = first.strip_prefix("error: ").unwrap_or(first).to_owned();
+    Failure::usage(sentence).advise(lines.map(str::trim).collect::<Vec<_>>().join("\n"))
 }
 
 fn run<T>(work: impl Future<Output = anyhow::Result<T>>) -> anyhow::Result<T> {
@@ -136,6 +187,24 @@ pub fn start_log(filter: Option<&str>, default: &str) {
     tracing_subscriber::fmt()
         .with_env_filter(filter)
         .with_writer(std::io::stderr)
-        .with_ansi(std::io::stderr().is_terminal())
+        .with_ansi(screen::has_colour(&std::io::stderr()))
         .init();
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_definition_of_the_command_line_holds() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn a_wrong_command_line_is_a_failure_of_use() {
+        let error = Cli::try_parse_from(["waymark", "landmark", "sho"]).unwrap_err();
+        let failure = wrong_use(&error);
+        assert!(failure.sentence.contains("'sho'") && failure.advice.contains("show"), "{failure:?}");
+        assert_eq!(failure.to_json()["error"]["exit_status"], 2);
+    }
 }

@@ -8,7 +8,7 @@ mod score;
 use crate::evaluate::chart;
 use anyhow::Context as _;
 use cli::{
-    mapping::{LaserArgs, build},
+    map::{LaserArgs, build},
     screen,
 };
 use formats::{

@@ -1,9 +1,12 @@
 //! `waymark map build`: builds a map from a scan log.
 
-use super::LaserArgs;
-use crate::{clock::Clock, screen};
+use super::{LaserArgs, import};
+use crate::{
+    clock::Clock,
+    screen,
+    session::{Consent, ServerArgs},
+};
 use anyhow::Context as _;
-use client::{MapClient, api::WallsBody};
 use formats::{
     map_svg,
     scan_log::{self, LogEntry},
@@ -13,26 +16,16 @@ use map::slam::{Slam, SlamMap, SlamParams};
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Where walls go on a server.
+/// Where the walls go on a server.
 #[derive(Debug, Clone, clap::Args)]
-pub(crate) struct Upload {
-    /// Replace the walls of --map on the server at this address.
-    #[arg(long, value_name = "URL", requires = "map")]
-    pub(crate) server: Option<String>,
-    /// The map on the server; made with `waymark map create`.
-    #[arg(long, value_name = "NAME")]
-    pub(crate) map: Option<String>,
-}
-
-impl Upload {
-    /// Sends the walls, if a server is named.
-    pub(crate) async fn send(&self, map: &MapFile) -> anyhow::Result<()> {
-        let (Some(server), Some(name)) = (&self.server, &self.map) else { return Ok(()) };
-        let walls: WallsBody = map.segments.iter().map(|s| [s.a, s.b]).collect();
-        MapClient::new(server)?.set_walls(name, &walls).await.context("upload")?;
-        screen::complain(&format!("{} segments are the walls of {name} now", walls.segments.len()));
-        Ok(())
-    }
+struct Upload {
+    /// Replace the walls of this map of the server; made with `waymark map create`.
+    #[arg(long, value_name = "MAP")]
+    into: Option<String>,
+    #[command(flatten)]
+    consent: Consent,
+    #[command(flatten)]
+    server: ServerArgs,
 }
 
 /// `waymark map build`.
@@ -53,9 +46,6 @@ pub(crate) struct Args {
     /// Parameters as a JSON file; what it does not name keeps its default.
     #[arg(long, value_name = "FILE")]
     params: Option<PathBuf>,
-    /// Print the summary as JSON.
-    #[arg(long)]
-    json: bool,
     #[command(flatten)]
     upload: Upload,
 }
@@ -113,23 +103,30 @@ pub(crate) async fn run(args: &Args) -> anyhow::Result<()> {
     }
     let distance_m: f64 = map.path.windows(2).map(|p| p[0].between(&p[1]).position().norm()).sum();
     let faster = recording.duration_s().map(|d| d / seconds.max(1e-9));
-    if args.json {
-        let summary = json!({
-            "scans": map.path.len(), "keyframes": map.keys.len(), "distance_m": distance_m, "segments": map.walls.len(),
-            "loop_closures": map.loops.len(), "loop_closures_refused": map.refused, "seconds": seconds,
-            "times_faster_than_recorded": faster,
-        });
-        screen::say(&summary.to_string());
-    } else {
-        screen::say(&format!(
-            "{} scans over {distance_m:.0} m: {} keyframes, {} loop closures, {} refused, {} wall segments; {seconds:.1} s{}",
-            map.path.len(),
-            map.keys.len(),
-            map.loops.len(),
-            map.refused,
-            map.walls.len(),
-            faster.map_or_else(String::new, |f| format!(", {f:.0} times faster than recorded")),
-        ));
-    }
-    args.upload.send(&file).await
+    let session = args.upload.server.session()?;
+    let difference = match &args.upload.into {
+        None => None,
+        Some(name) => {
+            let replacing = import::Replacing::With(args.upload.consent);
+            let done = import::replace(&session, name, &import::body(&file), replacing).await;
+            Some(session.explained(done).await?)
+        }
+    };
+    let summary = json!({
+        "scans": map.path.len(), "keyframes": map.keys.len(), "distance_m": distance_m, "segments": map.walls.len(),
+        "loops": map.loops.len(), "loops_refused": map.refused, "seconds": seconds,
+        "times_faster_than_recorded": faster, "map": args.upload.into, "difference": difference,
+    });
+    let uploaded = args.upload.into.as_ref().zip(difference);
+    let uploaded = uploaded.map_or_else(String::new, |(name, difference)| format!("\n{name}: {difference}"));
+    let text = format!(
+        "{} scans over {distance_m:.0} m: {} keyframes, {} loop closures, {} refused, {} wall segments; {seconds:.1} s{}{uploaded}",
+        map.path.len(),
+        map.keys.len(),
+        map.loops.len(),
+        map.refused,
+        map.walls.len(),
+        faster.map_or_else(String::new, |f| format!(", {f:.0} times faster than recorded")),
+    );
+    session.show(&summary, &text)
 }

@@ -1,11 +1,11 @@
-//! `waymark map sight`: the visibility settings of a map, with angles in degrees.
+//! `waymark map visibility`: the visibility settings of a map, with angles in degrees.
 
-use super::arg_parsers::numbers;
+use crate::arg_parsers::{height_m, numbers};
 use client::{MapClient, api::VisibilitySettingsBody};
 
 /// A camera and the limits that define "visible". Options that are absent change nothing.
 #[derive(Debug, Clone, clap::Args)]
-pub(crate) struct VisibilityArgs {
+pub(super) struct VisibilityArgs {
     /// Image size, pixels.
     #[arg(long, value_name = "WxH", value_parser = image)]
     image: Option<[f64; 2]>,
@@ -13,7 +13,7 @@ pub(crate) struct VisibilityArgs {
     #[arg(long)]
     focal_px: Option<f64>,
     /// Height of the camera above the floor.
-    #[arg(long)]
+    #[arg(long, value_name = "METRES", value_parser = height_m)]
     camera_height_m: Option<f64>,
     /// Lowest and highest tilt, up positive.
     #[arg(long, value_name = "LOW,HIGH", value_parser = angles, allow_hyphen_values = true)]
@@ -35,7 +35,7 @@ pub(crate) struct VisibilityArgs {
     standoff_m: Option<f64>,
     /// Start from the default settings instead of the present ones.
     #[arg(long)]
-    usual: bool,
+    defaults: bool,
 }
 
 fn image(text: &str) -> Result<[f64; 2], String> {
@@ -71,10 +71,10 @@ impl VisibilityArgs {
     pub(super) async fn set(&self, maps: &MapClient, map: &str) -> anyhow::Result<VisibilitySettingsBody> {
         let now = maps.visibility_settings(map).await?;
         let none = VisibilitySettingsBody::default();
-        if self.over(&none) == none && !self.usual {
+        if self.over(&none) == none && !self.defaults {
             return Ok(now);
         }
-        let all = self.over(if self.usual { &none } else { &now });
+        let all = self.over(if self.defaults { &none } else { &now });
         Ok(maps.set_visibility_settings(map, &all).await?)
     }
 }
@@ -117,7 +117,7 @@ mod tests {
             min_side_px: None,
             max_fill: None,
             standoff_m: None,
-            usual: false,
+            defaults: false,
         };
         let now = VisibilitySettingsBody {
             width_px: Some(640.0),

@@ -1,6 +1,6 @@
-//! `waymark calibrate`: a camera's intrinsics from pictures of one flat object of known shape, no server needed.
+//! `waymark camera calibrate`: a camera's intrinsics from pictures of one flat object of known shape, no server needed.
 
-use super::{detect, pictures, screen};
+use crate::{detect, pictures, screen};
 use anyhow::Context as _;
 use engine::dominant::dominant;
 use protos::api::CalibrationReport;
@@ -15,7 +15,7 @@ use vision::{
     trace::NoTrace,
 };
 
-/// `waymark calibrate`.
+/// `waymark camera calibrate`.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// Pictures by one camera (PNG, JPEG, or folders of them), each of which shows the object as its largest quad.

@@ -1,0 +1,62 @@
+//! `waymark landmark size`, `rename`, `health`, `delete`.
+
+use super::{
+    show::{self, size_text},
+    teach::check_size,
+};
+use crate::{
+    screen::counted,
+    session::{Consent, Session},
+};
+use client::api::{LandmarkHealthBody, LandmarkPatch, Size};
+use serde_json::json;
+
+pub(super) async fn size(
+    session: &Session,
+    map: &str,
+    name: &str,
+    size: Size,
+    consent: Consent,
+) -> anyhow::Result<()> {
+    check_size(size, consent)?;
+    let before = session.maps().landmark(map, name).await?.size;
+    let patch = LandmarkPatch { size: Some(Some(size)), ..LandmarkPatch::default() };
+    let landmark = session.maps().update_landmark(map, name, &patch).await?;
+    session.show(&landmark, &format!("{name}: size {} -> {}", size_text(before), size_text(landmark.size)))
+}
+
+pub(super) async fn rename(session: &Session, map: &str, name: &str, new_name: &str) -> anyhow::Result<()> {
+    let patch = LandmarkPatch { name: Some(new_name.to_owned()), ..LandmarkPatch::default() };
+    let landmark = session.maps().update_landmark(map, name, &patch).await?;
+    session.show(&landmark, &format!("{name} is {new_name} now"))
+}
+
+pub(super) async fn health(
+    session: &Session,
+    map: &str,
+    name: &str,
+    health: LandmarkHealthBody,
+) -> anyhow::Result<()> {
+    let patch = LandmarkPatch { health: Some(health), ..LandmarkPatch::default() };
+    let landmark = session.maps().update_landmark(map, name, &patch).await?;
+    session.show(&landmark, &show::text(&landmark))
+}
+
+pub(super) async fn delete(
+    session: &Session,
+    map: &str,
+    names: &[String],
+    consent: Consent,
+) -> anyhow::Result<()> {
+    let mut views = 0;
+    for name in names {
+        views += session.maps().landmark(map, name).await?.views;
+    }
+    let list = names.join(", ");
+    consent
+        .ask(&format!("Delete {list} with {}? This cannot be undone.", counted(views, "training view")))?;
+    for name in names {
+        session.maps().delete_landmark(map, name).await?;
+    }
+    session.show(&json!({ "deleted": names }), &format!("{list}: deleted"))
+}

@@ -1,0 +1,157 @@
+//! `waymark landmark list` and `show`.
+
+use super::reasons;
+use crate::{
+    screen::{Table, counted},
+    session::Session,
+};
+use client::api::{FindingBody, Landmark, LandmarkHealthBody, LandmarkStatus, Place, Size};
+
+pub(super) async fn list(session: &Session, map: &str) -> anyhow::Result<()> {
+    let all = session.maps().landmarks(map).await?;
+    let table = |all: &[Landmark]| {
+        Table::of(["landmark", "state", "views", "size", "place", "health", "not in use because"], all, |l| {
+            [
+                l.name.clone(),
+                l.status.to_string(),
+                l.views.to_string(),
+                size_text(l.size),
+                place_text(l.place.as_ref()),
+                health_word(l.health).to_owned(),
+                reasons::lines(l).first().cloned().unwrap_or_default(),
+            ]
+        })
+    };
+    let empty =
+        format!("{map} has no landmark yet. Teach one: waymark landmark teach NAME PHOTO... --map {map}");
+    session.list(&all, table, &empty)
+}
+
+pub(super) async fn one(session: &Session, map: &str, name: &str) -> anyhow::Result<()> {
+    let landmark = session.maps().landmark(map, name).await?;
+    session.show(&landmark, &text(&landmark))?;
+    for line in next(&landmark) {
+        session.note(&format!("  {line}"));
+    }
+    Ok(())
+}
+
+/// State, views, size, place and health, and why it is not in use.
+pub(super) fn text(landmark: &Landmark) -> String {
+    let reasons = reasons::lines(landmark).into_iter().map(|line| format!("  not in use: {line}"));
+    std::iter::once(facts(landmark)).chain(reasons).collect::<Vec<_>>().join("\n")
+}
+
+/// State, views, size, place and health in lines.
+pub(super) fn facts(landmark: &Landmark) -> String {
+    let mut lines = vec![
+        format!("{}: {}, {}", landmark.name, state(landmark), counted(landmark.views, "training view")),
+        format!("  size    {}", size_text(landmark.size)),
+        format!("  place   {}", place_text(landmark.place.as_ref())),
+        format!("  health  {}", health_text(landmark)),
+    ];
+    if let Some(model) = &landmark.model {
+        lines.push(format!(
+            "  learnt  from {} and {}",
+            counted(model.views, "photograph"),
+            counted(model.generated_views, "generated view")
+        ));
+    }
+    lines.join("\n")
+}
+
+/// How far it is trusted, and what robots found.
+fn health_text(landmark: &Landmark) -> String {
+    let word = health_word(landmark.health);
+    match &landmark.finding {
+        None => word.to_owned(),
+        Some(FindingBody::Moved { offset_m, sightings, .. }) => {
+            format!("{word}: observed {offset_m:.2} m away, {}", counted(u64::from(*sightings), "time"))
+        }
+        Some(FindingBody::Missing { missed_frames }) => {
+            format!("{word}: not found in {} in a row", counted(u64::from(*missed_frames), "frame"))
+        }
+    }
+}
+
+fn state(landmark: &Landmark) -> &'static str {
+    match landmark.status {
+        LandmarkStatus::NotLearnt => "not learnt yet",
+        LandmarkStatus::Learning => "being learnt",
+        LandmarkStatus::Active => "active",
+        LandmarkStatus::Inactive => "not in use",
+    }
+}
+
+/// What would make it more useful.
+pub(super) fn next(landmark: &Landmark) -> Vec<String> {
+    let name = &landmark.name;
+    let mut lines = Vec::new();
+    if landmark.status == LandmarkStatus::NotLearnt {
+        lines.push(format!("Photographs: waymark landmark teach {name} PHOTO..."));
+    }
+    match (landmark.size, landmark.place) {
+        (None, _) => lines.push(format!("For poses it needs a size: waymark landmark size {name} 0.60x0.84")),
+        (_, None) => lines.push(format!(
+            "For poses it needs a place: waymark landmark place {name} --wall N --at METRES --height METRES"
+        )),
+        _ => {}
+    }
+    lines
+}
+
+pub(super) fn size_text(size: Option<Size>) -> String {
+    size.map_or_else(|| "-".to_owned(), |s| format!("{} x {} m", s.width_m, s.height_m))
+}
+
+pub(super) fn place_text(place: Option<&Place>) -> String {
+    place.map_or_else(
+        || "-".to_owned(),
+        |p| {
+            let degrees = p.theta_rad.to_degrees();
+            format!("{:.2}, {:.2} m, {:.2} m up, facing {degrees:.0} deg", p.x_m, p.y_m, p.z_m)
+        },
+    )
+}
+
+fn health_word(health: LandmarkHealthBody) -> &'static str {
+    match health {
+        LandmarkHealthBody::Sound => "sound",
+        LandmarkHealthBody::Flagged => "flagged",
+        LandmarkHealthBody::Quarantined => "quarantined",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn landmark() -> Landmark {
+        serde_json::from_str(
+            r#"{"name":"poster","status":"inactive","views":2,"size":{"width_m":0.6,"height_m":0.84},"place":null,
+                "model":null,"health":"flagged","finding":{"kind":"missing","missed_frames":6},"failed_gates":[
+                {"gate":"looks_like","sentence":"It looks like `first` (97 %).","advice":"Delete one.",
+                 "look_alike":{"landmark":"first","gradient_similarity":0.97}}]}"#,
+        )
+        .unwrap()
+    }
+
+    #[test]
+    fn a_landmark_is_shown_with_what_it_lacks_and_why_it_is_not_in_use() {
+        let lines = text(&landmark());
+        assert!(lines.starts_with("poster: not in use, 2 training views\n  size    0.6 x 0.84 m"), "{lines}");
+        assert!(lines.contains("flagged: not found in 6 frames in a row"), "{lines}");
+        assert!(lines.ends_with("not in use: It looks like `first` (97 %). Delete one."), "{lines}");
+        assert_eq!(text(&landmark()).matches("not in use:").count(), 1);
+    }
+
+    #[test]
+    fn what_is_needed_for_poses_is_named_with_its_command() {
+        let named = |landmark: &Landmark| next(landmark).join("\n");
+        assert!(named(&landmark()).contains("waymark landmark place poster"));
+        let sizeless = Landmark { size: None, ..landmark() };
+        assert!(named(&sizeless).contains("waymark landmark size poster"));
+        let placed = Landmark { place: Some(Place::default()), ..landmark() };
+        assert!(next(&placed).is_empty());
+    }
+}

@@ -1,0 +1,238 @@
+//! `waymark landmark teach`: photographs to a landmark that is in use, or to the reason why it is not.
+
+use super::{
+    quad_choice::{self, picked},
+    reasons::in_use,
+    show,
+};
+use crate::{
+    arg_parsers::{corners, size},
+    failure::{Class, Failure},
+    names::name,
+    screen,
+    session::{Consent, Session},
+};
+use client::{
+    ClientError, LandmarkRegion, NewView,
+    api::{Landmark, LandmarkPatch, Size, TrainingView, UploadOutcomeBody},
+};
+use std::path::{Path, PathBuf};
+
+/// Sides of a landmark that nobody is asked about, metres.
+const USUAL_SIDE_M: std::ops::RangeInclusive<f64> = 0.02..=20.0;
+
+/// `waymark landmark teach`.
+#[derive(Debug, clap::Args)]
+pub(super) struct TeachArgs {
+    /// The landmark; made if it does not exist.
+    #[arg(value_parser = name)]
+    landmark: String,
+    /// Photographs of it, PNG or JPEG.
+    #[arg(required = true, value_name = "PHOTO")]
+    photographs: Vec<PathBuf>,
+    /// Its width and height in metres, such as 0.60x0.84; without it there is recognition but no pose.
+    #[arg(long, value_parser = size)]
+    size: Option<Size>,
+    /// The whole picture is the landmark (a scan, a cut-out).
+    #[arg(long, conflicts_with_all = ["pick", "corners"])]
+    whole_image: bool,
+    /// The framed object to take where a photograph shows several: 1 is the leftmost.
+    #[arg(long, value_name = "N", conflicts_with = "corners")]
+    pick: Option<usize>,
+    /// Its corners in one photograph, pixels: top-left, top-right, bottom-right, bottom-left.
+    #[arg(long, value_name = "X,Y,X,Y,X,Y,X,Y", value_parser = corners)]
+    corners: Option<[[f64; 2]; 4]>,
+    /// Warped, dimmed and blurred views made of each photograph; left out, the server chooses by the number of
+    /// photographs. A landmark learnt from generated views is recognised less surely than one seen from many sides.
+    #[arg(long)]
+    generated_views: Option<u32>,
+    #[command(flatten)]
+    consent: Consent,
+}
+
+pub(super) async fn run(session: &Session, map: &str, args: &TeachArgs) -> anyhow::Result<()> {
+    if let Some(size) = args.size {
+        check_size(size, args.consent)?;
+    }
+    if args.photographs.len() > 1 && (args.pick.is_some() || args.corners.is_some()) {
+        return Err(Failure::usage("--pick and --corners are for one photograph at a time.").into());
+    }
+    let existing = existing(session, map, &args.landmark).await?;
+    // A landmark that exists gets its size once a photograph was taken.
+    let failures = upload_all(session, map, args, args.size.filter(|_| existing.is_none())).await?;
+    if let (Some(landmark), Some(size)) = (&existing, args.size) {
+        resize(session, map, landmark, size).await?;
+    }
+    let learnt = learn(session, map, args).await?;
+    session.show(&learnt, &show::facts(&learnt))?;
+    in_use(&learnt)?;
+    if !failures.is_empty() {
+        let (count, all) = (failures.len(), args.photographs.len());
+        let sentence = format!("{count} of {all} photographs could not be used; the others were learnt.");
+        return Err(Failure::of_several(sentence, "photographs_refused", &failures).into());
+    }
+    for line in show::next(&learnt) {
+        session.note(&format!("  {line}"));
+    }
+    Ok(())
+}
+
+/// Sizes that are hardly meant in metres are asked about.
+pub(super) fn check_size(size: Size, consent: Consent) -> anyhow::Result<()> {
+    if USUAL_SIDE_M.contains(&size.width_m) && USUAL_SIDE_M.contains(&size.height_m) {
+        return Ok(());
+    }
+    let (w, h) = (size.width_m, size.height_m);
+    consent.ask(&format!("{w} m x {h} m: sizes are in metres, usual sides 0.02 to 20. Is this meant?"))
+}
+
+async fn existing(session: &Session, map: &str, name: &str) -> anyhow::Result<Option<Landmark>> {
+    match session.maps().landmark(map, name).await {
+        Ok(landmark) => Ok(Some(landmark)),
+        Err(ClientError::Refused { status: 404, code, .. }) if code == "unknown_landmark" => Ok(None),
+        Err(error) => Err(error.into()),
+    }
+}
+
+/// A size given again replaces the other one, and says so.
+async fn resize(session: &Session, map: &str, landmark: &Landmark, size: Size) -> anyhow::Result<()> {
+    if landmark.size == Some(size) {
+        return Ok(());
+    }
+    let patch = LandmarkPatch { size: Some(Some(size)), ..LandmarkPatch::default() };
+    session.maps().update_landmark(map, &landmark.name, &patch).await?;
+    let (before, after) = (show::size_text(landmark.size), show::size_text(Some(size)));
+    session.note(&format!("{}: size {before} -> {after}", landmark.name));
+    Ok(())
+}
+
+/// Sends all photographs and gives the failures of those that could not be used. An error if none could be: then nothing
+/// was made.
+async fn upload_all(
+    session: &Session,
+    map: &str,
+    args: &TeachArgs,
+    new_size: Option<Size>,
+) -> anyhow::Result<Vec<Failure>> {
+    let progress = screen::progress(args.photographs.len(), "uploading");
+    let (mut used, mut failures) = (0, Vec::new());
+    for path in &args.photographs {
+        match upload(session, map, args, (path, new_size)).await {
+            Ok(view) => {
+                used += 1;
+                let name = path.display();
+                match view.outcome {
+                    Some(UploadOutcomeBody::NearDuplicate) => {
+                        session.note(&format!(
+                            "{name}: not kept, it shows nothing that view {} does not",
+                            view.id
+                        ));
+                    }
+                    Some(UploadOutcomeBody::Duplicate) => {
+                        session.note(&format!("{name}: not kept, it is view {} already", view.id));
+                    }
+                    Some(UploadOutcomeBody::New) | None => {}
+                }
+            }
+            Err(failure) => failures.push(failure),
+        }
+        progress.inc(1);
+    }
+    progress.finish_and_clear();
+    let is_of_photograph = |f: &Failure| matches!(f.class, Class::Refused | Class::Usage);
+    if let Some(other) = failures.iter().position(|f| !is_of_photograph(f)) {
+        return Err(failures.swap_remove(other).into());
+    }
+    match (used, failures.len()) {
+        (0, 1) => Err(failures.swap_remove(0).into()),
+        (0, _) => {
+            let sentence = format!("No photograph could be used; {} was not taught.", args.landmark);
+            Err(Failure::of_several(sentence, "photographs_refused", &failures).into())
+        }
+        _ => Ok(failures),
+    }
+}
+
+/// Sends one photograph; the landmark is made with it if it does not exist.
+async fn upload(
+    session: &Session,
+    map: &str,
+    args: &TeachArgs,
+    (path, new_size): (&Path, Option<Size>),
+) -> Result<TrainingView, Failure> {
+    let image = std::fs::read(path)
+        .map_err(|error| Failure::new(Class::Usage, "unreadable", format!("{}: {error}", path.display())))?;
+    let region = match (args.whole_image, args.corners) {
+        (true, _) => LandmarkRegion::WholeImage,
+        (false, Some(corners)) => LandmarkRegion::Corners(corners),
+        (false, None) => LandmarkRegion::Detect,
+    };
+    let send = |region| {
+        let view = NewView::new(image.clone(), region).or_make_landmark(new_size);
+        session.maps().upload_view_with(map, &args.landmark, view)
+    };
+    let error = match send(region).await {
+        Ok(view) => return Ok(view),
+        Err(error) => error,
+    };
+    let Some(quads) = quad_choice::quads(&error) else { return Err(photograph_failure(&error, path)) };
+    let Some(number) = args.pick else { return Err(quad_choice::refusal(path, &quads)) };
+    let corners = LandmarkRegion::Corners(picked(&quads, number)?);
+    send(corners).await.map_err(|error| photograph_failure(&error, path))
+}
+
+/// A refusal with the photograph that it is about, and what helps.
+fn photograph_failure(error: &ClientError, path: &Path) -> Failure {
+    let failure = Failure::of_client(error);
+    let name = path.display();
+    match (failure.code.as_str(), failure.class) {
+        ("quad_not_found", _) => Failure {
+            sentence: format!("{name}: No four edges found."),
+            advice: "If the file is the picture itself, add --whole-image; else show all four sides, or give --corners.\n\
+                     `waymark detect PHOTO --draw stages` shows where they were lost."
+                .to_owned(),
+            ..failure
+        },
+        (_, Class::Refused | Class::Usage) => {
+            Failure { sentence: format!("{name}: {}", failure.sentence), ..failure }
+        }
+        _ => failure,
+    }
+}
+
+async fn learn(session: &Session, map: &str, args: &TeachArgs) -> anyhow::Result<Landmark> {
+    let names = std::slice::from_ref(&args.landmark);
+    let job = session.maps().learn(map, Some(names), args.generated_views).await?;
+    session.finished(job, "learning").await?;
+    Ok(session.maps().landmark(map, &args.landmark).await?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refused(code: &str) -> ClientError {
+        let (code, field, detail) = (code.to_owned(), String::new(), "so it is".to_owned());
+        ClientError::Refused { status: 422, code, field, detail, more: serde_json::Map::new() }
+    }
+
+    #[test]
+    fn a_photograph_without_edges_is_answered_with_the_ways_out() {
+        let failure = photograph_failure(&refused("quad_not_found"), Path::new("scan.png"));
+        assert_eq!((failure.class, failure.code.as_str()), (Class::Refused, "quad_not_found"));
+        assert!(failure.sentence.starts_with("scan.png: No four edges found"), "{failure}");
+        assert!(
+            failure.advice.contains("--whole-image") && failure.advice.contains("--corners"),
+            "{failure}"
+        );
+        let other = photograph_failure(&refused("bad_image"), Path::new("a.jpg"));
+        assert_eq!(other.sentence, "a.jpg: so it is");
+    }
+
+    #[test]
+    fn a_size_in_centimetres_needs_consent() {
+        let ask = |width_m, height_m, yes| check_size(Size { width_m, height_m }, Consent::given(yes));
+        assert!(ask(0.6, 0.84, false).is_ok() && ask(0.02, 20.0, false).is_ok());
+        assert!(ask(60.0, 84.0, true).is_ok());
+    }
+}

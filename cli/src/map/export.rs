@@ -1,0 +1,53 @@
+//! `waymark map export`: the walls of a map as another program's file.
+
+use crate::{screen::counted, session::ServerArgs};
+use anyhow::Context as _;
+use formats::walls::{self, MapFile};
+use serde_json::json;
+use std::path::PathBuf;
+
+/// `waymark map export`.
+#[derive(Debug, clap::Args)]
+pub(crate) struct ExportArgs {
+    /// The map.
+    map: String,
+    #[command(flatten)]
+    target: TargetArgs,
+    #[command(flatten)]
+    server: ServerArgs,
+}
+
+/// A file that walls are written to.
+#[derive(Debug, Clone, clap::Args)]
+pub(super) struct TargetArgs {
+    /// Where to: NAME.yaml (and NAME.pgm beside it) for `map_server`, NAME.txt for a vector map, NAME.geojson,
+    /// NAME.json for a map file.
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// Side of a cell of the grid, metres.
+    #[arg(long, default_value_t = 0.05)]
+    resolution_m: f64,
+}
+
+impl TargetArgs {
+    /// Writes the file.
+    pub(super) fn write(&self, map: &MapFile) -> anyhow::Result<()> {
+        walls::write(map, &self.out, self.resolution_m).context("--out")
+    }
+
+    /// Where to, for people.
+    pub(super) fn name(&self) -> String {
+        self.out.display().to_string()
+    }
+}
+
+pub(super) async fn run(args: &ExportArgs) -> anyhow::Result<()> {
+    let session = args.server.session()?;
+    let stored = session.explained(session.maps().walls(&args.map).await.map_err(Into::into)).await?;
+    let map: MapFile =
+        serde_json::from_value(serde_json::to_value(stored)?).context("the walls of the server")?;
+    args.target.write(&map)?;
+    let (count, name) = (map.segments.len(), args.target.name());
+    let text = format!("{} in {name}", counted(count as u64, "segment"));
+    session.show(&json!({ "segments": count, "file": name }), &text)
+}

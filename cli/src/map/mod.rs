@@ -1,0 +1,243 @@
+//! `waymark map`: maps of a server, and their walls from laser logs, grids and plans.
+
+pub mod build;
+mod convert;
+mod difference;
+mod export;
+mod fusion;
+mod import;
+mod location;
+mod visibility;
+mod walls;
+
+use super::{
+    arg_parsers::distance,
+    names::name,
+    screen::{Table, counted},
+    session::{Consent, ServerArgs, Session},
+};
+use client::api::{LandmarkStatus, Map};
+use formats::scan_log::LaserDefaults;
+use vision::recognise::DistanceKind;
+
+/// `waymark map`.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum Verb {
+    /// Make a map.
+    Create {
+        /// Lower-case letters, digits, `_` and `-`, up to 64.
+        #[arg(value_name = "MAP", value_parser = name)]
+        map: String,
+        /// The distance that decides in this map.
+        #[arg(long, value_parser = distance)]
+        distance: Option<DistanceKind>,
+        #[command(flatten)]
+        location: location::LocationArgs,
+        #[command(flatten)]
+        server: ServerArgs,
+    },
+    /// List the maps.
+    List {
+        #[command(flatten)]
+        server: ServerArgs,
+    },
+    /// One map: version, landmarks by state, walls, where it lies.
+    Show {
+        /// The map.
+        map: String,
+        #[command(flatten)]
+        server: ServerArgs,
+    },
+    /// Set where a map belongs, and its link to another map.
+    ///
+    /// For example, the first floor of a house whose plan is the map `house`, 3.4 m up, turned by 90 degrees:
+    ///   waymark map locate floor1 --building house --floor 1st --in house --at 12.5,-3,90 --level-m 3.4
+    #[command(verbatim_doc_comment)]
+    Locate {
+        /// The map.
+        map: String,
+        #[command(flatten)]
+        location: location::LocationArgs,
+        #[command(flatten)]
+        server: ServerArgs,
+    },
+    /// Show or set the visibility settings of a map: the camera and the limits that define "visible".
+    ///
+    /// The visibility areas of landmarks follow from them. For example, a camera 0.8 m up that tilts up to 60 degrees:
+    ///   waymark map visibility office --image 1280x720 --focal-px 900 --camera-height-m 0.8 --tilt-deg -10,60
+    #[command(verbatim_doc_comment)]
+    Visibility {
+        /// The map.
+        map: String,
+        #[command(flatten)]
+        visibility: visibility::VisibilityArgs,
+        #[command(flatten)]
+        server: ServerArgs,
+    },
+    /// Show or set the fusion mode of a map: which modalities are fused where reference runs have shown the best one.
+    Fusion(fusion::FusionArgs),
+    /// Delete a map with its landmarks, walls and runs. This cannot be undone.
+    Delete {
+        /// The map.
+        map: String,
+        #[command(flatten)]
+        consent: Consent,
+        #[command(flatten)]
+        server: ServerArgs,
+    },
+    /// Set a map's walls from a ROS occupancy grid, a floor plan, a vector map or a map file.
+    ///
+    /// If the map has walls, the difference is shown first and you are asked. For example:
+    ///   waymark map import office floor.yaml --dry-run
+    ///   waymark map import office plan.geojson --yes
+    #[command(verbatim_doc_comment)]
+    Import(import::ImportArgs),
+    /// List a map's walls with their numbers, for `waymark landmark place --wall`.
+    ///
+    /// For example:
+    ///   waymark map walls office --draw walls.svg
+    #[command(verbatim_doc_comment)]
+    Walls(walls::WallsArgs),
+    /// Write a map's walls as a ROS occupancy grid, a vector map or a map file.
+    Export(export::ExportArgs),
+    /// Turn a file of walls into another kind of file; no server needed.
+    ///
+    /// For example:
+    ///   waymark map convert floor.yaml --out floor.json --draw floor.svg
+    #[command(verbatim_doc_comment)]
+    Convert(convert::ConvertArgs),
+    /// Build walls from a laser log: scans are matched, loops closed, walls drawn. No server needed without --into.
+    ///
+    /// The first pose is the origin of the map. Standard output says how many loops were closed and refused: a picture
+    /// (--draw) shows where. Poses in a CARMEN log are taken for odometry; in a corrected log they are nearly right
+    /// already.
+    ///
+    /// For example:
+    ///   waymark map build hall.log.gz --out hall.json --draw hall.svg
+    ///   waymark map build hall.jsonl --into hall
+    ///
+    /// A Waymark scan log is JSON lines: a head, then one scan a line (`null`: no return; `t_s` and `truth` if known).
+    ///   `{"waymark_recording":1,"robot_from_laser":[0.2,0,0],"first_bearing_rad":-1.57,"bearing_step_rad":0.0087,"max_range_m":30}`
+    ///   `{"t_s":12.5,"odom":[1.0,0.2,0.05],"ranges_m":[1.93,null,2.01]}`
+    #[command(verbatim_doc_comment)]
+    Build(build::Args),
+}
+
+/// What is known of the laser where a log does not say it.
+#[derive(Debug, Clone, Copy, clap::Args)]
+pub struct LaserArgs {
+    /// Ranges from here on are "no return", metres.
+    #[arg(long, default_value_t = LaserDefaults::default().max_range_m)]
+    max_range_m: f64,
+    /// Angle of the fan, degrees, where the log gives none (CARMEN FLASER, numbered scans).
+    #[arg(long, default_value_t = LaserDefaults::default().field_deg)]
+    field_deg: f64,
+}
+
+impl LaserArgs {
+    /// The values for reading logs.
+    pub fn defaults(&self) -> LaserDefaults {
+        LaserDefaults { max_range_m: self.max_range_m, field_deg: self.field_deg }
+    }
+}
+
+/// Runs the command.
+pub(crate) async fn run(args: &Args) -> anyhow::Result<()> {
+    match &args.verb {
+        Verb::Convert(args) => convert::run(args),
+        Verb::Build(args) => build::run(args).await,
+        Verb::Import(args) => import::run(args).await,
+        Verb::Export(args) => export::run(args).await,
+        Verb::Fusion(args) => fusion::run(args).await,
+        Verb::Walls(args) => walls::run(args).await,
+        Verb::Create { server, .. }
+        | Verb::List { server }
+        | Verb::Show { server, .. }
+        | Verb::Locate { server, .. }
+        | Verb::Visibility { server, .. }
+        | Verb::Delete { server, .. } => {
+            let session = server.session()?;
+            session.explained(on_server(&session, &args.verb).await).await
+        }
+    }
+}
+
+async fn on_server(session: &Session, verb: &Verb) -> anyhow::Result<()> {
+    let maps = session.maps();
+    match verb {
+        Verb::Create { map, distance, location, .. } => {
+            let made = maps.create_map(&location.new_map(map, *distance)).await?;
+            session.show(&made, &format!("map {map} created"))?;
+            session.note(&format!(
+                "  Teach it a landmark: waymark landmark teach NAME PHOTO... --size 0.60x0.84 --map {map}"
+            ));
+            Ok(())
+        }
+        Verb::Locate { map, location, .. } => {
+            let map = maps.locate_map(map, &location.patch()).await?;
+            session.show(&map, &format!("{}: {}", map.name, map.whereabouts()))
+        }
+        Verb::Visibility { map, visibility, .. } => {
+            let settings = visibility.set(maps, map).await?;
+            session.show(&settings, &visibility::sentences(map, &settings))
+        }
+        Verb::Delete { map, consent, .. } => {
+            let found = maps.map(map).await?;
+            let landmarks = counted(found.landmarks, "landmark");
+            consent.ask(&format!("Delete the map {map} with {landmarks}? This cannot be undone."))?;
+            maps.delete_map(map).await?;
+            session.show(&serde_json::json!({ "deleted": map }), &format!("map {map} deleted"))
+        }
+        Verb::Show { map, .. } => show(session, map).await,
+        _ => list(session).await,
+    }
+}
+
+async fn list(session: &Session) -> anyhow::Result<()> {
+    let all = session.maps().maps().await?;
+    let table = |all: &[Map]| {
+        Table::of(["map", "version", "landmarks", "where"], all, |m| {
+            [m.name.clone(), m.version.to_string(), m.landmarks.to_string(), m.whereabouts()]
+        })
+    };
+    session.list(&all, table, "There is no map yet. Make one: waymark map create NAME")
+}
+
+async fn show(session: &Session, name: &str) -> anyhow::Result<()> {
+    let maps = session.maps();
+    let map = maps.map(name).await?;
+    let walls = maps.walls(name).await?;
+    let landmarks = maps.landmarks(name).await?;
+    let length_m: f64 = walls.segments.iter().map(|w| (w.b[0] - w.a[0]).hypot(w.b[1] - w.a[1])).sum();
+    let active = landmarks.iter().filter(|l| l.status == LandmarkStatus::Active);
+    let placed = active.clone().filter(|l| l.place.is_some() && l.size.is_some()).count();
+    let active = active.count();
+    if session.is_json() {
+        let walls = serde_json::json!({ "segments": walls.segments.len(), "length_m": length_m });
+        let counts =
+            serde_json::json!({ "all": landmarks.len(), "active": active, "active_and_placed": placed });
+        return session.show(&serde_json::json!({ "map": map, "walls": walls, "landmarks": counts }), "");
+    }
+    let place = map.whereabouts();
+    let text = [
+        format!(
+            "map {name}, version {}{}",
+            map.version,
+            if place.is_empty() { place } else { format!(", {place}") }
+        ),
+        format!("  landmarks  {}, {active} active, {placed} of these with size and place", landmarks.len()),
+        format!("  walls      {}, {length_m:.1} m", counted(walls.segments.len() as u64, "segment")),
+        format!("  distance   {:?}", map.distance).to_lowercase(),
+    ];
+    session.show(&map, &text.join("\n"))?;
+    if active > placed {
+        session.note("  A landmark gives poses once it has size and place: waymark landmark place --help");
+    }
+    Ok(())
+}

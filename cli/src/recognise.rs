@@ -1,0 +1,63 @@
+//! `waymark recognise`: what is in photographs.
+
+use super::{
+    answers::sentence,
+    arg_parsers::camera,
+    failure::{Class, Failure},
+    session::{MapArgs, Session},
+};
+use std::path::{Path, PathBuf};
+use vision::frame::Intrinsics;
+
+/// `waymark recognise`.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
+    /// Photographs, PNG or JPEG.
+    #[arg(required = true, value_name = "PHOTO")]
+    photographs: Vec<PathBuf>,
+    /// Camera for poses: fx,fy,cx,cy in pixels; and its standard deviations, where known: of the focal length, of the
+    /// principal point.
+    #[arg(long, value_parser = camera)]
+    camera: Option<Intrinsics>,
+    #[command(flatten)]
+    map: MapArgs,
+}
+
+/// Runs the command.
+pub(crate) async fn run(args: &Args) -> anyhow::Result<()> {
+    let session = args.map.session()?;
+    let map = session.explained(session.map().await).await?;
+    let mut failures = Vec::new();
+    for path in &args.photographs {
+        match photograph(&session, map, args, path).await {
+            Ok(()) => {}
+            Err(failure) if matches!(failure.class, Class::Refused | Class::Usage) => failures.push(failure),
+            Err(failure) => return Err(failure.into()),
+        }
+    }
+    match failures.len() {
+        0 => Ok(()),
+        1 => Err(failures.swap_remove(0).into()),
+        count => {
+            let sentence = format!("{count} of {} photographs could not be used.", args.photographs.len());
+            Err(Failure::of_several(sentence, "photographs_refused", &failures).into())
+        }
+    }
+}
+
+async fn photograph(session: &Session, map: &str, args: &Args, path: &Path) -> Result<(), Failure> {
+    let name = path.display().to_string();
+    let image = std::fs::read(path)
+        .map_err(|error| Failure::new(Class::Usage, "unreadable", format!("{name}: {error}")))?;
+    let answer = session.maps().recognise(map, image, args.camera.as_ref()).await;
+    let answer = session.explained(answer.map_err(Into::into)).await.map_err(|error| {
+        let failure = Failure::of(&error);
+        match failure.class {
+            Class::Refused | Class::Usage => {
+                Failure { sentence: format!("{name}: {}", failure.sentence), ..failure }
+            }
+            _ => failure,
+        }
+    })?;
+    session.show(&answer, &sentence(&name, &answer)).map_err(|error| Failure::of(&error))
+}

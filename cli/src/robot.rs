@@ -1,0 +1,114 @@
+//! `waymark robot`: which robots may send frames, on which map each drives, how each is.
+
+use super::{
+    answers::{pose_line, trust},
+    names::name,
+    screen::Table,
+    session::{Consent, ServerArgs, Session},
+};
+use client::api::Robot;
+
+/// `waymark robot`.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
+    #[command(subcommand)]
+    verb: Verb,
+    #[command(flatten)]
+    server: ServerArgs,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum Verb {
+    /// Make a robot known, or give it another map. Frames of unknown robots are refused.
+    Add {
+        /// Lower-case letters, digits, `_` and `-`, up to 64.
+        #[arg(value_parser = name)]
+        robot: String,
+        /// The map it drives on.
+        #[arg(long)]
+        map: String,
+    },
+    /// List the robots: the map of each, whether it is connected, where it is and how far that is trusted.
+    List,
+    /// One robot: connection, pose, and what that rests on.
+    Show {
+        /// The robot.
+        robot: String,
+    },
+    /// Remove a robot; its frames are refused from now on.
+    Remove {
+        /// The robot.
+        robot: String,
+        #[command(flatten)]
+        consent: Consent,
+    },
+}
+
+/// Runs the command.
+pub(crate) async fn run(args: &Args) -> anyhow::Result<()> {
+    let session = args.server.session()?;
+    let done = on_server(&session, &args.verb).await;
+    session.explained(done).await
+}
+
+async fn on_server(session: &Session, verb: &Verb) -> anyhow::Result<()> {
+    let maps = session.maps();
+    match verb {
+        Verb::Add { robot, map } => {
+            let known = maps.put_robot(robot, map).await?;
+            session.show(&known, &format!("robot {robot} drives on {map}"))
+        }
+        Verb::List => {
+            let all = maps.robots().await?;
+            let table = |all: &[Robot]| {
+                Table::of(["robot", "map", "connected", "pose", "trust"], all, |r| {
+                    let pose = r.pose.as_ref();
+                    [
+                        r.name.clone(),
+                        r.map.clone(),
+                        if r.alive { "yes" } else { "no" }.to_owned(),
+                        pose.map_or_else(|| "-".to_owned(), pose_line),
+                        pose.map_or_else(|| "-".to_owned(), |p| trust(p.trust).to_owned()),
+                    ]
+                })
+            };
+            session.list(
+                &all,
+                table,
+                "There is no robot yet. Make one known: waymark robot add NAME --map MAP",
+            )
+        }
+        Verb::Show { robot } => show(session, robot).await,
+        Verb::Remove { robot, consent } => {
+            maps.robot(robot).await?;
+            consent.ask(&format!("Remove the robot {robot}? Its frames are refused from then on."))?;
+            maps.delete_robot(robot).await?;
+            session.show(&serde_json::json!({ "removed": robot }), &format!("robot {robot} removed"))
+        }
+    }
+}
+
+async fn show(session: &Session, name: &str) -> anyhow::Result<()> {
+    let robot = session.maps().robot(name).await?;
+    let corrections = session.maps().corrections(name).await?;
+    if session.is_json() {
+        return session.show(&serde_json::json!({ "robot": robot, "corrections": corrections }), "");
+    }
+    let mut lines = vec![
+        format!("{name} on {}: {}", robot.map, if robot.alive { "connected" } else { "not connected" }),
+        match &robot.pose {
+            Some(pose) => format!("  pose   {}: {}", pose_line(pose), trust(pose.trust)),
+            None => "  pose   unknown".to_owned(),
+        },
+    ];
+    if let Some(conflict) = robot.conflict {
+        lines.push(format!(
+            "  A second program uses this name: {} messages refused, the last {} ms ago.",
+            conflict.refused, conflict.last_ms
+        ));
+    }
+    if !corrections.modalities.is_empty() {
+        lines.push(format!("  rests on {}", corrections.modalities.join(", ")));
+    }
+    session.show(&robot, &lines.join("\n"))
+}
