@@ -7,6 +7,8 @@ use client::{
     named,
     v1::{Answer, QuadAnswer, QuadKind, Verdict},
 };
+use nalgebra::Vector3;
+use protos::convert::geometry::pose3;
 
 /// What was recognised in a picture, a line for each quad.
 pub(super) fn sentence(name: &str, answer: &Answer) -> String {
@@ -15,7 +17,44 @@ pub(super) fn sentence(name: &str, answer: &Answer) -> String {
     if lines.len() == 1 {
         lines.push("  no landmark recognised".to_owned());
     }
+    lines.extend(standpoint(answer).map(|line| format!("  {line}")));
     lines.join("\n")
+}
+
+/// Where a photograph was taken, or why landmarks with a pose do not say it.
+fn standpoint(answer: &Answer) -> Option<String> {
+    let Some(found) = &answer.camera_pose else {
+        let reason = no_standpoint(&answer.camera_pose_refusal)?;
+        return Some(format!("no pose of the camera ({}): {reason}", answer.camera_pose_refusal));
+    };
+    let pose = pose3(found.map_from_camera.as_ref()?).ok()?;
+    let (at, ahead) = (pose.translation.vector, pose.rotation * Vector3::z());
+    let sigma = |k: usize| found.covariance.get(7 * k).map_or(f64::NAN, |variance| variance.sqrt());
+    Some(format!(
+        "taken at {:.2}, {:.2} m (+- {:.2}, {:.2}), {:.2} m above the floor, looking to {:.0} degrees (+- {:.1}), by {}",
+        at.x,
+        at.y,
+        sigma(3),
+        sigma(4),
+        at.z,
+        ahead.y.atan2(ahead.x).to_degrees(),
+        sigma(2).to_degrees(),
+        found.landmarks.join(", ")
+    ))
+}
+
+fn no_standpoint(refusal: &str) -> Option<&'static str> {
+    Some(match refusal {
+        "" => return None,
+        "landmark_not_placed" => "say where the landmark hangs: waymark landmark place",
+        "landmark_quarantined" => "the landmark was found moved or missing; place it again",
+        "ambiguous" => "two poses fit; photograph from more to the side, or closer",
+        "gate_camera_height" => {
+            "the camera would be below the floor or 5 m above it; check size, place and height of the landmark"
+        }
+        "gate_inconsistent" => "the landmarks contradict one another; check their sizes and places",
+        _ => "the corners do not determine it",
+    })
 }
 
 /// The line for a quad; `None` for verdict unknown.
@@ -88,10 +127,29 @@ pub(super) fn trust(trust: PoseTrust) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use client::v1::{Candidate, PointEvidence, Sighting};
+    use client::v1::{CameraPose, Candidate, PointEvidence, Pose3, Sighting};
 
     fn of(quad: &QuadAnswer) -> String {
         sentence("a.jpg", &Answer { quads: vec![quad.clone()], ..Answer::default() })
+    }
+
+    #[test]
+    fn a_photograph_says_where_it_was_taken_or_why_that_is_not_known() {
+        let mut answer = Answer { camera_pose_refusal: "ambiguous".into(), ..Answer::default() };
+        assert!(
+            sentence("a.jpg", &answer)
+                .ends_with("(ambiguous): two poses fit; photograph from more to the side, or closer")
+        );
+        let q = std::f64::consts::FRAC_1_SQRT_2;
+        let mut covariance = vec![0.0; 36];
+        (covariance[14], covariance[21], covariance[28]) = (3.046e-4, 0.0004, 0.0009);
+        // The camera looks along y: x right is the map's x, y down is its -z.
+        let pose = Pose3 { qx: -q, qw: q, x_m: 1.0, y_m: -2.0, z_m: 1.5, ..Pose3::default() };
+        answer.camera_pose_refusal.clear();
+        answer.camera_pose =
+            Some(CameraPose { map_from_camera: Some(pose), covariance, landmarks: vec!["door".into()] });
+        let line = "taken at 1.00, -2.00 m (+- 0.02, 0.03), 1.50 m above the floor, looking to 90 degrees (+- 1.0), by door";
+        assert!(sentence("a.jpg", &answer).ends_with(line), "{}", sentence("a.jpg", &answer));
     }
 
     #[test]

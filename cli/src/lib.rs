@@ -4,6 +4,7 @@
 mod answers;
 pub mod arg_parsers;
 mod camera;
+mod camera_arg;
 pub mod clock;
 mod demo;
 mod detect;

@@ -2,7 +2,7 @@
 
 use super::{
     answers::sentence,
-    arg_parsers::camera,
+    camera_arg::camera,
     failure::{Class, Failure},
     session::{MapArgs, Session},
 };
@@ -15,9 +15,9 @@ pub(crate) struct Args {
     /// Photographs, PNG or JPEG.
     #[arg(required = true, value_name = "PHOTO")]
     photographs: Vec<PathBuf>,
-    /// Camera for poses: fx,fy,cx,cy in pixels; and its standard deviations, where known: of the focal length, of the
-    /// principal point.
-    #[arg(long, value_parser = camera)]
+    /// Camera for poses: the file that `waymark camera calibrate --json` wrote, or fx,fy,cx,cy in pixels; and its
+    /// standard deviations, where known: of the focal length, of the principal point.
+    #[arg(long, value_name = "FILE|FX,FY,CX,CY", value_parser = camera)]
     camera: Option<Intrinsics>,
     #[command(flatten)]
     map: MapArgs,

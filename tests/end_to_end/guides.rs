@@ -34,7 +34,8 @@ fn first_pose_leads_to_the_pose_of_a_photograph() {
     let answer = answer.expect("the guide asks where a photograph was taken");
     let pose = &answer["camera_pose"]["map_from_camera"];
     let truth = guide_files::map_from_camera("here.jpg").translation;
-    let found = ["x_m", "y_m", "z_m"].map(|k| pose[k].as_f64().unwrap_or_else(|| panic!("no pose: {answer}")));
+    let found =
+        ["x_m", "y_m", "z_m"].map(|k| pose[k].as_f64().unwrap_or_else(|| panic!("no pose: {answer}")));
     let off = (0..3).map(|i| (found[i] - truth.vector[i]).powi(2)).sum::<f64>().sqrt();
     assert!(off < 0.15, "{found:?}, truth {truth}: off by {off} m");
 }

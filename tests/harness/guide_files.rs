@@ -100,12 +100,7 @@ fn pose(building: &Building, standpoint: &Standpoint) -> Isometry3<f64> {
     pan_tilt(heading, up + standpoint.turned[1].to_radians(), Vector3::new(x, y, standpoint.height_m))
 }
 
-fn photograph(
-    renderer: &mut Renderer,
-    building: &Building,
-    standpoint: &Standpoint,
-    seed: u64,
-) -> GrayImage {
+fn photograph(renderer: &mut Renderer, building: &Building, standpoint: &Standpoint, seed: u64) -> GrayImage {
     renderer.render(building, &pose(building, standpoint), &SensorParams::default(), seed).image
 }
 
@@ -160,10 +155,8 @@ fn floor_plans(folder: &Path, building: &Building) {
     );
     fs::write(folder.join("floor.yaml"), yaml).expect("a grid");
     let walls = building.walls();
-    let lines: Vec<String> = walls
-        .iter()
-        .map(|w| format!("[[{}, {}], [{}, {}]]", w.a.x, w.a.y, w.b.x, w.b.y))
-        .collect();
+    let lines: Vec<String> =
+        walls.iter().map(|w| format!("[[{}, {}], [{}, {}]]", w.a_m.x, w.a_m.y, w.b_m.x, w.b_m.y)).collect();
     let geojson = format!(
         "{{\"type\": \"FeatureCollection\", \"features\": [{{\"type\": \"Feature\", \"properties\": {{}}, \
          \"geometry\": {{\"type\": \"MultiLineString\", \"coordinates\": [{}]}}}}]}}\n",

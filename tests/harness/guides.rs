@@ -19,7 +19,18 @@ use std::{
 
 /// Programs that a guide may name for other machines.
 pub const ELSEWHERE: [&str; 12] = [
-    "ros2", "sudo", "systemctl", "ssh", "source", "export", "cp", "zenohd", "apt", "docker", "colcon", "pip",
+    "ros2",
+    "sudo",
+    "systemctl",
+    "ssh",
+    "source",
+    "export",
+    "cp",
+    "zenohd",
+    "apt",
+    "docker",
+    "colcon",
+    "pip",
 ];
 
 /// A block of a guide.

@@ -2,7 +2,8 @@
 
 use super::show;
 use crate::{
-    arg_parsers::{camera, height_m, numbers},
+    arg_parsers::{height_m, numbers},
+    camera_arg::camera,
     failure::{Class, Failure},
     session::Session,
 };
@@ -47,8 +48,8 @@ pub(super) struct PlaceArgs {
     /// A photograph of it from a known place; it is also stored as a training view.
     #[arg(long, value_name = "FILE", requires_all = ["camera", "from", "camera_height"])]
     photo: Option<PathBuf>,
-    /// The camera of the photograph: fx,fy,cx,cy in pixels, of a level, undistorted picture.
-    #[arg(long, value_parser = camera)]
+    /// The camera of the photograph: the file that `waymark camera calibrate --json` wrote, or fx,fy,cx,cy in pixels.
+    #[arg(long, value_name = "FILE|FX,FY,CX,CY", value_parser = camera)]
     camera: Option<Intrinsics>,
     /// Where the camera stood and looked: x,y in metres, direction in degrees.
     #[arg(long, value_name = "X,Y,DEG", value_parser = standpoint, allow_hyphen_values = true)]
