@@ -22,7 +22,7 @@ function tell() {
   const judged = areas.cells.filter((cell) => cell.best).length;
   byId("modality-hint").textContent = areas.cells.length
     ? `${areas.cells.length} squares and headings driven through, ${judged} often enough to be judged.`
-    : "No run has been learnt from. Record one with `waymark run start ROBOT`, then tell its path with `waymark run learn`.";
+    : "No run has been learnt from. Record one with `waymark run start ROBOT`, then give its reference trajectory with `waymark run learn ROBOT FILE`.";
 }
 
 // Reads what is known of a map, if the layer is shown.

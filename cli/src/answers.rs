@@ -67,7 +67,7 @@ fn quad_line(quad: &QuadAnswer) -> Option<String> {
         (None, Verdict::Ambiguous) => ambiguous_line(quad),
         _ => return None,
     };
-    Some(line + &by_points(quad))
+    Some(line + &by_points(quad) + &pose_text(quad))
 }
 
 /// The line for verdict ambiguous: one landmark and why it is not named, or several that the quad fits.
@@ -97,6 +97,17 @@ fn named_line(named: &NamedLandmark<'_>) -> String {
 /// The landmarks that the quad fits by the picture alone.
 fn fitting(quad: &QuadAnswer) -> Vec<&str> {
     quad.candidates.iter().filter(|c| c.ratio < 1.0).map(|c| c.landmark.as_str()).collect()
+}
+
+/// Distance of a landmark with a pose, or that its size is missing for one; nothing where no camera was given.
+fn pose_text(quad: &QuadAnswer) -> String {
+    match quad.pose.as_ref().and_then(|pose| pose.camera_from_landmark.as_ref()) {
+        Some(p) => format!(", {:.2} m away", p.x_m.hypot(p.y_m).hypot(p.z_m)),
+        None if quad.pose_refusal == "no_size" => {
+            format!(", no pose: its size is not known (waymark landmark size {} WxH)", quad.landmark)
+        }
+        None => String::new(),
+    }
 }
 
 /// The points' evidence for the first candidate; empty where points did not decide.
@@ -165,6 +176,9 @@ mod tests {
         };
         let evidence = ", 34 of 40 matches agree, 1e-21 false alarms expected";
         assert_eq!(of(&quad), format!("a.jpg: 1 quad\n  door with confidence 0.98{evidence}"));
+        quad.pose_refusal = "no_size".into();
+        assert!(of(&quad).ends_with("no pose: its size is not known (waymark landmark size door WxH)"));
+        quad.pose_refusal.clear();
         quad.set_verdict(Verdict::Ambiguous);
         (quad.doubtful_landmark, quad.landmark) = ("door".into(), String::new());
         assert_eq!(

@@ -26,7 +26,7 @@ pub(crate) enum Class {
 }
 
 /// What `--help` says of exit statuses.
-pub(crate) const EXIT_STATUSES: &str = "Exit status: 0 done, 1 failed, 2 wrong use, 3 not found, 4 conflict, \
+pub(crate) const EXIT_STATUSES: &str = "Exit status: 0 done, 1 failed, 2 wrong use, 3 not found, 4 conflict,\n\
     5 refused by a check (a photograph or a model that fails a gate), 6 no server answers.";
 
 impl Class {

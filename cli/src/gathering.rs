@@ -40,7 +40,7 @@ enum Verb {
     },
     /// List the gatherings of a map.
     List,
-    /// The tracks that wait for a decision: views, place, gates.
+    /// Show the tracks that wait for a decision: views, place, gates.
     Show {
         /// Number of the gathering.
         gathering: i64,

@@ -17,7 +17,7 @@ pub(crate) struct Args {
 
 #[derive(Debug, clap::Subcommand)]
 enum Verb {
-    /// A job as it stands.
+    /// Show a job as it stands.
     Show {
         /// Number of the job.
         job: i64,
@@ -66,4 +66,23 @@ fn line(job: &Job) -> String {
         100.0 * job.progress,
         job.message
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_job_is_shown_with_state_and_progress() {
+        let job = Job {
+            id: 7,
+            kind: "learn".into(),
+            map: "office".into(),
+            state: JobState::Running,
+            progress: 0.25,
+            message: "poster".into(),
+            result: None,
+        };
+        assert_eq!(line(&job), "7  learn on office: running, 25 %, poster");
+    }
 }

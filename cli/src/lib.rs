@@ -56,7 +56,7 @@ enum Command {
     /// address. Ends with a summary; exit status 1 if there was a false match.
     Demo(demo::Args),
     Serve(serve::Serve),
-    /// Whether a server does its work.
+    /// Whether a server does its work: status.
     Server(server_status::Args),
     /// Maps: create, list, show, locate, delete; walls from laser logs, grids and plans.
     Map(map::Args),
@@ -68,7 +68,7 @@ enum Command {
     Robot(robot::Args),
     /// Cameras of robots: list, last frame; and calibration from pictures.
     Camera(camera::Args),
-    /// Let a robot gather training views while it drives past.
+    /// Let a robot gather training views while it drives past
     ///
     /// For example:
     ///   waymark gathering start r1 --map office
@@ -77,7 +77,7 @@ enum Command {
     ///   waymark landmark accept 1 3=poster 5=fire-plan
     #[command(verbatim_doc_comment)]
     Gathering(gathering::Args),
-    /// Record a robot's run and give its reference trajectory, so that the map learns which modality to trust where.
+    /// Record a robot's run against a reference trajectory: the map learns which modality to trust where
     ///
     /// For example:
     ///   waymark run start r1
@@ -87,13 +87,13 @@ enum Command {
     Run(run::Args),
     /// Jobs of a server: show, wait, cancel.
     Job(job::Args),
-    /// What a server recognises in photographs.
+    /// What a server recognises in photographs
     ///
     /// For example:
     ///   waymark recognise hall1.jpg hall2.jpg --map office
     #[command(verbatim_doc_comment)]
     Recognise(recognise::Args),
-    /// The quads of pictures; no server needed.
+    /// The quads of pictures; no server needed
     ///
     /// Prints the corners of every quad, best first. With --draw, pictures show what each stage made of the image, and
     /// so where a quad was lost: no edges (lower --edge-steps), edges but no segments (lower --min-segment), segments
@@ -105,13 +105,13 @@ enum Command {
     ///   waymark detect photographs/ --json --min-score 0.8 > quads.jsonl
     #[command(verbatim_doc_comment)]
     Detect(detect::Args),
-    /// Completions for a shell, on standard output.
+    /// Completions for a shell, on standard output
     ///
     /// For example:
     ///   waymark completions bash > waymark.bash
     #[command(verbatim_doc_comment)]
     Completions(shell::CompletionArgs),
-    /// Manual pages, into a folder.
+    /// Manual pages, into a folder
     ///
     /// For example:
     ///   waymark man /usr/local/share/man/man1

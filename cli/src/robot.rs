@@ -6,7 +6,7 @@ use super::{
     screen::Table,
     session::{Consent, ServerArgs, Session},
 };
-use client::api::Robot;
+use client::api::{CorrectionsBody, Robot};
 
 /// `waymark robot`.
 #[derive(Debug, clap::Args)]
@@ -30,7 +30,7 @@ enum Verb {
     },
     /// List the robots: the map of each, whether it is connected, where it is and how far that is trusted.
     List,
-    /// One robot: connection, pose, and what that rests on.
+    /// Show a robot: connection, pose, and what that rests on.
     Show {
         /// The robot.
         robot: String,
@@ -94,6 +94,12 @@ async fn show(session: &Session, name: &str) -> anyhow::Result<()> {
     if session.is_json() {
         return session.show(&serde_json::json!({ "robot": robot, "corrections": corrections }), "");
     }
+    session.show(&robot, &text(&robot, &corrections))
+}
+
+/// Connection, pose, conflict and what the pose rests on, in lines.
+fn text(robot: &Robot, corrections: &CorrectionsBody) -> String {
+    let name = &robot.name;
     let mut lines = vec![
         format!("{name} on {}: {}", robot.map, if robot.alive { "connected" } else { "not connected" }),
         match &robot.pose {
@@ -101,7 +107,7 @@ async fn show(session: &Session, name: &str) -> anyhow::Result<()> {
             None => "  pose   unknown".to_owned(),
         },
     ];
-    if let Some(conflict) = robot.conflict {
+    if let Some(conflict) = &robot.conflict {
         lines.push(format!(
             "  A second program uses this name: {} messages refused, the last {} ms ago.",
             conflict.refused, conflict.last_ms
@@ -110,5 +116,25 @@ async fn show(session: &Session, name: &str) -> anyhow::Result<()> {
     if !corrections.modalities.is_empty() {
         lines.push(format!("  rests on {}", corrections.modalities.join(", ")));
     }
-    session.show(&robot, &lines.join("\n"))
+    lines.join("\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use client::api::{EpochConflictBody, RobotPose};
+
+    #[test]
+    fn a_robot_is_shown_with_its_pose_and_a_second_program_of_its_name() {
+        let robot: Robot = serde_json::from_str(r#"{"name":"r1","map":"hall","alive":false}"#).unwrap();
+        let nothing = CorrectionsBody::default();
+        assert_eq!(text(&robot, &nothing), "r1 on hall: not connected\n  pose   unknown");
+        let conflict = Some(EpochConflictBody { epoch: 1, refused: 3, last_ms: 20 });
+        let pose = Some(RobotPose { x_m: 1.5, ..RobotPose::default() });
+        let robot = Robot { alive: true, conflict, pose, ..robot };
+        let rests = CorrectionsBody { modalities: vec!["laser".into()], ..nothing };
+        let lines = text(&robot, &rests);
+        assert!(lines.starts_with("r1 on hall: connected\n  pose   1.50, 0.00 m, 0 deg"), "{lines}");
+        assert!(lines.contains("3 messages refused") && lines.ends_with("rests on laser"), "{lines}");
+    }
 }

@@ -2,7 +2,10 @@
 
 use comfy_table::{ContentArrangement, presets};
 use indicatif::{ProgressBar, ProgressStyle};
-use std::io::{IsTerminal, Write as _};
+use std::{
+    ffi::OsStr,
+    io::{IsTerminal, Write as _},
+};
 
 /// Escape sequences of terminals.
 const BOLD: &str = "\x1b[1m";
@@ -23,7 +26,11 @@ pub fn complain(line: &str) {
 
 /// Whether text on a stream may have colours: a terminal, and nobody asked for none (<https://no-color.org>).
 pub fn has_colour(stream: &impl IsTerminal) -> bool {
-    stream.is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty())
+    may_colour(stream.is_terminal(), std::env::var_os("NO_COLOR").as_deref())
+}
+
+fn may_colour(is_terminal: bool, no_color: Option<&OsStr>) -> bool {
+    is_terminal && no_color.is_none_or(OsStr::is_empty)
 }
 
 /// A progress bar of `steps`, on a terminal only.
@@ -92,6 +99,12 @@ impl Table {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn colours_are_for_terminals_and_for_those_who_want_them() {
+        assert!(may_colour(true, None) && may_colour(true, Some(OsStr::new(""))));
+        assert!(!may_colour(true, Some(OsStr::new("1"))) && !may_colour(false, None));
+    }
 
     #[test]
     fn a_table_is_aligned_for_people_and_tabbed_for_programs() {

@@ -5,7 +5,10 @@ use super::{
     screen::counted,
     session::{ServerArgs, Session},
 };
-use client::ClientError;
+use client::{
+    ClientError,
+    api::{Readiness, Version},
+};
 use serde_json::json;
 
 /// `waymark server`.
@@ -44,30 +47,70 @@ async fn status(session: &Session) -> anyhow::Result<()> {
         Err(error) => return Err(error.into()),
     };
     let (all, robots) = (maps.maps().await?, maps.robots().await?);
-    let landmarks: u64 = all.iter().map(|m| m.landmarks).sum();
-    let connected = robots.iter().filter(|r| r.alive).count();
+    let counts = Counts {
+        maps: all.len() as u64,
+        landmarks: all.iter().map(|m| m.landmarks).sum(),
+        robots: robots.len() as u64,
+        connected: robots.iter().filter(|r| r.alive).count(),
+    };
+    let shown = json!({ "version": version, "readiness": readiness, "maps": counts.maps, "landmarks": counts.landmarks,
+        "robots": counts.robots, "robots_connected": counts.connected });
+    session.show(&shown, &text(&version, &readiness, &counts))?;
+    if readiness.maps_not_in_use.is_empty() {
+        return Ok(());
+    }
+    Err(Failure::new(Class::Failed, "degraded", "The server is degraded: not every map is in use.").into())
+}
+
+/// What is on a server.
+struct Counts {
+    maps: u64,
+    landmarks: u64,
+    robots: u64,
+    connected: usize,
+}
+
+fn text(version: &Version, readiness: &Readiness, counts: &Counts) -> String {
     let mut lines = vec![
         format!(
             "{} {} (HTTP {}, zenoh {}): {}",
             version.name, version.version, version.api, version.protocol, readiness.status
         ),
-        format!("  {} with {}", counted(all.len() as u64, "map"), counted(landmarks, "landmark")),
-        format!("  {}, {connected} connected", counted(robots.len() as u64, "robot")),
+        format!("  {} with {}", counted(counts.maps, "map"), counted(counts.landmarks, "landmark")),
+        format!("  {}, {} connected", counted(counts.robots, "robot"), counts.connected),
     ];
-    lines.extend(
-        readiness.maps_not_in_use.iter().map(|(map, why)| format!("  map {map} is not in use: {why}")),
-    );
-    lines.extend(
-        readiness
-            .panics
-            .iter()
-            .map(|(at, n)| format!("  {n} faults of the program caught in {at}: see its log")),
-    );
-    let shown = json!({ "version": version, "readiness": readiness, "maps": all.len(), "landmarks": landmarks,
-        "robots": robots.len(), "robots_connected": connected });
-    session.show(&shown, &lines.join("\n"))?;
-    if readiness.maps_not_in_use.is_empty() {
-        return Ok(());
+    let unused = readiness.maps_not_in_use.iter();
+    lines.extend(unused.map(|(map, why)| format!("  map {map} is not in use: {why}")));
+    let panics = readiness.panics.iter();
+    lines.extend(panics.map(|(at, n)| format!("  {n} faults of the program caught in {at}: see its log")));
+    lines.join("\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_status_names_maps_that_are_not_in_use_and_faults() {
+        let version = |text: &str| text.to_owned();
+        let version = Version {
+            name: version("waymark"),
+            version: version("0.1.0"),
+            api: version("v1"),
+            protocol: version("1"),
+        };
+        let readiness = Readiness {
+            status: "degraded".into(),
+            maps_not_in_use: [("office".to_owned(), "damaged".to_owned())].into(),
+            panics: [("a frame".to_owned(), 2)].into(),
+        };
+        let counts = Counts { maps: 1, landmarks: 2, robots: 0, connected: 0 };
+        let lines = text(&version, &readiness, &counts);
+        assert!(
+            lines.starts_with("waymark 0.1.0 (HTTP v1, zenoh 1): degraded\n  1 map with 2 landmarks"),
+            "{lines}"
+        );
+        assert!(lines.contains("map office is not in use: damaged"), "{lines}");
+        assert!(lines.contains("2 faults of the program caught in a frame"), "{lines}");
     }
-    Err(Failure::new(Class::Failed, "degraded", "The server is degraded: not every map is in use.").into())
 }

@@ -13,6 +13,8 @@ use std::{
     time::Duration,
 };
 
+/// Heading in `--help` of the options that every command has.
+const HEADING: &str = "Server";
 /// Longest wait for a job.
 const JOB_TIMEOUT: Duration = Duration::from_hours(2);
 /// Steps of the progress bar of a job.
@@ -26,12 +28,13 @@ pub(crate) struct ServerArgs {
         long,
         global = true,
         env = "WAYMARK_SERVER",
+        help_heading = HEADING,
         value_name = "URL",
         default_value = "http://127.0.0.1:8080"
     )]
     server: String,
     /// Print results and errors as JSON.
-    #[arg(long, global = true)]
+    #[arg(long, global = true, help_heading = HEADING)]
     json: bool,
 }
 
@@ -39,7 +42,7 @@ pub(crate) struct ServerArgs {
 #[derive(Debug, Clone, clap::Args)]
 pub(crate) struct MapArgs {
     /// The map [default: the only one of the server].
-    #[arg(long, global = true, env = "WAYMARK_MAP", value_name = "MAP")]
+    #[arg(long, global = true, env = "WAYMARK_MAP", help_heading = HEADING, value_name = "MAP")]
     map: Option<String>,
     #[command(flatten)]
     server: ServerArgs,

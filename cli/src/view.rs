@@ -60,7 +60,7 @@ async fn on_map(session: &Session, verb: &Verb) -> anyhow::Result<()> {
             let all = maps.views(map, landmark).await?;
             let table = |all: &[TrainingView]| {
                 Table::of(["view", "picture", "kind", "corners (TL TR BR BL), px"], all, |v| {
-                    let corners = v.corners.map(|[x, y]| format!("{x:.1},{y:.1}")).join(" ");
+                    let corners = corners_text(&v.corners);
                     let size = format!("{} x {} px", v.width_px, v.height_px);
                     [v.id.to_string(), size, v.image_kind.clone(), corners]
                 })
@@ -92,5 +92,23 @@ async fn on_map(session: &Session, verb: &Verb) -> anyhow::Result<()> {
             ));
             Ok(())
         }
+    }
+}
+
+/// Corners as `--corners` takes them, to a tenth of a pixel.
+fn corners_text(corners: &[[f64; 2]; 4]) -> String {
+    corners.map(|[x, y]| format!("{x:.1},{y:.1}")).join(",")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn corners_are_shown_as_they_are_given() {
+        let corners = [[1.0, 2.0], [30.25, 2.0], [30.0, 40.0], [1.0, 40.0]];
+        let text = corners_text(&corners);
+        assert_eq!(text, "1.0,2.0,30.2,2.0,30.0,40.0,1.0,40.0");
+        assert!(crate::arg_parsers::corners(&text).is_ok());
     }
 }

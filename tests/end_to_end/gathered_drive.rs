@@ -177,13 +177,13 @@ async fn gather_all(inside: &Inside, client: &RobotClient, building: &Arc<Buildi
     let pictures = folder.path().to_str().expect("text");
     let number = gathering["id"].to_string();
     let url = inside.url();
-    let show = ["gather", "show", &number, "--map", MAP, "--server", &url, "--pictures", pictures];
+    let show = ["gathering", "show", &number, "--map", MAP, "--server", &url, "--pictures", pictures];
     let shown = waymark(show, SOON);
     let count = list(&waiting, "tracks").len();
     assert_eq!((shown.status, shown.stdout.lines().count()), (0, count), "{shown:?}");
     assert_eq!(std::fs::read_dir(folder.path()).expect("pictures").count(), count);
-    let listed = waymark(["gather", "list", "--map", MAP, "--server", &url], SOON);
-    assert!(listed.stdout.contains("ended with r1, of whatever is new"), "{listed:?}");
+    let listed = waymark(["gathering", "list", "--map", MAP, "--server", &url], SOON);
+    assert!(listed.stdout.contains("\tr1\twhatever is new\tended\t"), "{listed:?}");
     // Each has a picture.
     let first = &list(&waiting, "tracks")[0];
     let icon =

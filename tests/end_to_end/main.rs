@@ -1,10 +1,12 @@
 //! End-to-end claims, one file each, against a real server.
 
+mod administration;
 mod api_client;
 mod bad_frames;
 mod clocks;
 mod command_line;
 mod demo;
+mod detect_command;
 mod earlier_database;
 mod gathered_drive;
 mod guided;

@@ -200,10 +200,10 @@ async fn a_plan_becomes_the_walls_of_a_map_on_a_server() {
     run(&["map", "create", "house", "--site", "Works", "--server", &server.url]);
     run(&["map", "create", "hall", "--server", &server.url]);
     let at = ["--in", "house", "--at", "-2,3,90", "--level-m", "3.4", "--floor", "1st"];
-    run(&[&["map", "place", "hall", "--server", &server.url][..], &at].concat());
+    run(&[&["map", "locate", "hall", "--server", &server.url][..], &at].concat());
     let listed = run(&["map", "list", "--server", &server.url]);
     assert!(listed.contains("1st, in house at -2.00, 3.00 m") && listed.contains("Works"), "{listed}");
-    run(&["map", "import", plan, "--server", &server.url, "--map", "hall"]);
+    run(&["map", "import", "hall", plan, "--server", &server.url]);
     let walls = server.maps().walls("hall").await.expect("walls");
     assert_eq!(walls.segments.len(), 9, "{walls:?}");
     assert_eq!(walls.segments[0], WallBody { a: [0.0, 0.0], b: [12.0, 0.0] }, "{walls:?}");
@@ -231,7 +231,7 @@ async fn a_plan_becomes_the_walls_of_a_map_on_a_server() {
     let bad = data.path().join("bad.geojson");
     fs::write(&bad, r#"{"type":"Polygon","coordinates":[[[0,0],[1,0],[1,1]]]}"#).expect("written");
     let refused = waymark(
-        ["map", "import", bad.to_str().expect("text"), "--server", &server.url, "--map", "hall"],
+        ["map", "import", "hall", bad.to_str().expect("text"), "--server", &server.url],
         Duration::from_secs(30),
     );
     assert!(refused.status == 1 && refused.stderr.contains("ring"), "{refused:?}");

@@ -114,7 +114,7 @@ async fn visibility_areas_follow_the_settings() {
     refusals(&server).await;
     one_question(&server).await;
     let version = get(&server, "").await["version"].as_u64().expect("a number");
-    let command = ["map", "sight", "hall", "--tilt-deg", "-10,70", "--server", &server.url];
+    let command = ["map", "visibility", "hall", "--tilt-deg", "-10,70", "--server", &server.url];
     let run = waymark(command, Duration::from_secs(30));
     assert!(run.status == 0 && run.stdout.contains("tilts -10.0 to 70.0"), "{run:?}");
     assert_eq!(get(&server, "").await["version"], version + 1);
@@ -128,7 +128,10 @@ async fn visibility_areas_follow_the_settings() {
     let server = Child::start(data.path());
     assert_eq!(get(&server, "/visibility-settings").await, set);
     assert!(area(&server, "sign", "").await > 5.0, "areas by the stored settings after the restart");
-    let run = waymark(["map", "sight", "hall", "--usual", "--server", &server.url], Duration::from_secs(30));
+    let run = waymark(
+        ["map", "visibility", "hall", "--defaults", "--server", &server.url],
+        Duration::from_secs(30),
+    );
     assert_eq!(run.status, 0, "{run:?}");
     assert_eq!(get(&server, "/visibility-settings").await, usual);
     server.kill();

@@ -8,7 +8,7 @@ use super::{
     session::{ServerArgs, Session},
 };
 use anyhow::Context as _;
-use client::api::Camera;
+use client::api::{Camera, IntrinsicsMonitorBody, IntrinsicsSuspicionBody};
 use std::path::PathBuf;
 
 /// `waymark camera`.
@@ -20,7 +20,7 @@ pub(crate) struct Args {
 
 #[derive(Debug, clap::Subcommand)]
 enum Verb {
-    /// A camera's focal length, principal point and distortion from pictures of one flat object; no server needed.
+    /// A camera's focal length, principal point and distortion from pictures of one flat object; no server needed
     ///
     /// Five to ten pictures of one poster or board from different sides, each of which shows it as its largest quad; at
     /// least three of the sides must differ by more than 15 degrees. Pictures that do not fit the others are left out
@@ -76,14 +76,30 @@ async fn list(session: &Session, robot: &str) -> anyhow::Result<()> {
                 format!("{} x {} px", c.width_px, c.height_px),
                 format!("{:.1} px", c.intrinsics.fx_px),
                 c.frames.to_string(),
-                c.intrinsics_monitor.suspicion.map_or_else(
-                    || format!("fit, by {}", counted(u64::from(c.intrinsics_monitor.tries), "fix")),
-                    |s| format!("{s:?}").to_lowercase(),
-                ),
+                monitor_text(&c.intrinsics_monitor),
             ]
         })
     };
     session.list(&all, table, &format!("{robot} has sent no frame with intrinsics yet."))
+}
+
+/// Whether the intrinsics fit what was seen.
+fn monitor_text(monitor: &IntrinsicsMonitorBody) -> String {
+    match monitor.suspicion {
+        None => format!("no doubt, by {}", counted(u64::from(monitor.tries), "frame")),
+        Some(IntrinsicsSuspicionBody::Focal { error, sigma }) => {
+            format!("focal length off by {:+.1} +- {:.1} %: calibrate", 100.0 * error, 100.0 * sigma)
+        }
+        Some(IntrinsicsSuspicionBody::Misfit { reduced_chi2 }) => {
+            format!("corners fit {:.1} times worse than they should: calibrate", reduced_chi2.sqrt())
+        }
+        Some(IntrinsicsSuspicionBody::Refused { share }) => {
+            format!(
+                "{:.0} % of the frames fit no robot on the floor: check camera and mounting",
+                100.0 * share
+            )
+        }
+    }
 }
 
 async fn frame(session: &Session, robot: &str, camera: Option<&str>, out: &PathBuf) -> anyhow::Result<()> {
@@ -105,5 +121,29 @@ async fn only(session: &Session, robot: &str) -> anyhow::Result<String> {
             Err(Failure::new(Class::NotFound, "no_camera", format!("{robot} has sent no frame yet.")).into())
         }
         _ => Err(Failure::usage(format!("Which camera? {robot} has {}.", names.join(", "))).into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_suspicion_is_shown_with_its_number() {
+        let monitor = IntrinsicsMonitorBody {
+            tries: 12,
+            refused: 0,
+            landmarks: 2,
+            reduced_chi2: None,
+            focal_error: None,
+            focal_sigma: None,
+            suspicion: None,
+        };
+        assert_eq!(monitor_text(&monitor), "no doubt, by 12 frames");
+        let with = |suspicion| monitor_text(&IntrinsicsMonitorBody { suspicion: Some(suspicion), ..monitor });
+        let focal = with(IntrinsicsSuspicionBody::Focal { error: -0.05, sigma: 0.01 });
+        assert_eq!(focal, "focal length off by -5.0 +- 1.0 %: calibrate");
+        assert!(with(IntrinsicsSuspicionBody::Misfit { reduced_chi2: 9.0 }).contains("3.0 times"));
+        assert!(with(IntrinsicsSuspicionBody::Refused { share: 0.9 }).contains("90 %"));
     }
 }

@@ -2,6 +2,7 @@
 
 mod accept;
 mod edit;
+mod photograph;
 mod place;
 mod quad_choice;
 mod reasons;
@@ -28,12 +29,12 @@ pub(crate) struct Args {
 enum Verb {
     /// List the landmarks of a map: state, size, place, quality.
     List,
-    /// One landmark: what it was learnt from, where it is, why it is not in use, what to do.
+    /// Show a landmark: what it was learnt from, where it is, why it is not in use, what to do.
     Show {
         /// The landmark.
         landmark: String,
     },
-    /// Teach a landmark from photographs.
+    /// Teach a landmark from photographs
     ///
     /// The server finds the one framed object in each photograph, learns it, and says whether the landmark is in use or
     /// which check it failed. Where a photograph shows several, they are numbered in a picture beside it: take one with
@@ -45,8 +46,7 @@ enum Verb {
     ///   waymark landmark teach poster hall.jpg --pick 2
     #[command(verbatim_doc_comment)]
     Teach(teach::TeachArgs),
-    /// Say where a landmark hangs: on a wall by tape measure, at a place of the map, or by a photograph from a known
-    /// place.
+    /// Set the place of a landmark: on a wall by tape measure, by coordinates, or by a photograph from a known place
     ///
     /// By tape measure: `waymark map walls MAP --draw walls.svg` numbers the walls; stand before the wall, measure from its
     /// left end to the middle of the landmark, and from the floor to its middle. For example:
@@ -89,7 +89,7 @@ enum Verb {
         #[command(flatten)]
         consent: Consent,
     },
-    /// Make landmarks of tracks that a robot has gathered, and learn them.
+    /// Make landmarks of tracks that a robot has gathered, and learn them
     ///
     /// For example, tracks 3 and 5 of gathering 1:
     ///   waymark landmark accept 1 3=poster 5=fire-plan

@@ -1,13 +1,12 @@
 //! `waymark landmark place`: where a landmark hangs, by tape measure, by coordinates, or by a photograph.
 
-use super::show;
+use super::{photograph::Photograph, show};
 use crate::{
     arg_parsers::{height_m, numbers},
     camera_arg::camera,
     failure::{Class, Failure},
     session::Session,
 };
-use anyhow::Context as _;
 use client::{
     LandmarkRegion, NewView,
     api::{CaptureMetadata, Landmark, LandmarkPatch, Place, WallBody},
@@ -48,6 +47,9 @@ pub(super) struct PlaceArgs {
     /// A photograph of it from a known place; it is also stored as a training view.
     #[arg(long, value_name = "FILE", requires_all = ["camera", "from", "camera_height"])]
     photo: Option<PathBuf>,
+    /// The framed object to take where the photograph shows several: 1 is the leftmost.
+    #[arg(long, value_name = "N", requires = "photo")]
+    pick: Option<usize>,
     /// The camera of the photograph: the file that `waymark camera calibrate --json` wrote, or fx,fy,cx,cy in pixels.
     #[arg(long, value_name = "FILE|FX,FY,CX,CY", value_parser = camera)]
     camera: Option<Intrinsics>,
@@ -153,13 +155,10 @@ async fn by_photograph(session: &Session, map: &str, args: &PlaceArgs) -> anyhow
     else {
         return Err(Failure::usage("--photo needs --camera, --from and --camera-height.").into());
     };
-    let image = std::fs::read(path).with_context(|| path.display().to_string())?;
-    let view = NewView {
-        capture: Some(capture(camera, from, args.from_sigma, height_m, args.camera_tilt)),
-        keep_near_duplicate: true,
-        ..NewView::new(image, LandmarkRegion::Detect)
-    };
-    let view = session.maps().upload_view_with(map, &args.landmark, view).await?;
+    let photograph = Photograph { path, region: LandmarkRegion::Detect, pick: args.pick };
+    let capture = capture(camera, from, args.from_sigma, height_m, args.camera_tilt);
+    let view = |view| NewView { capture: Some(capture.clone()), keep_near_duplicate: true, ..view };
+    let view = photograph.send(session, (map, &args.landmark), view).await?;
     match view.placing {
         Some(report) if report.placed => Ok(session.maps().landmark(map, &args.landmark).await?),
         report => {

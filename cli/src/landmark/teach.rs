@@ -13,7 +13,7 @@ use crate::{
     session::{Consent, Session},
 };
 use client::{
-    ClientError, LandmarkRegion, NewView,
+    ClientError, LandmarkRegion,
     api::{Landmark, LandmarkPatch, Size, TrainingView, UploadOutcomeBody},
 };
 use std::path::{Path, PathBuf};
@@ -160,44 +160,13 @@ async fn upload(
     args: &TeachArgs,
     (path, new_size): (&Path, Option<Size>),
 ) -> Result<TrainingView, Failure> {
-    let image = std::fs::read(path)
-        .map_err(|error| Failure::new(Class::Usage, "unreadable", format!("{}: {error}", path.display())))?;
     let region = match (args.whole_image, args.corners) {
         (true, _) => LandmarkRegion::WholeImage,
         (false, Some(corners)) => LandmarkRegion::Corners(corners),
         (false, None) => LandmarkRegion::Detect,
     };
-    let send = |region| {
-        let view = NewView::new(image.clone(), region).or_make_landmark(new_size);
-        session.maps().upload_view_with(map, &args.landmark, view)
-    };
-    let error = match send(region).await {
-        Ok(view) => return Ok(view),
-        Err(error) => error,
-    };
-    let Some(quads) = quad_choice::quads(&error) else { return Err(photograph_failure(&error, path)) };
-    let Some(number) = args.pick else { return Err(quad_choice::refusal(path, &quads)) };
-    let corners = LandmarkRegion::Corners(picked(&quads, number)?);
-    send(corners).await.map_err(|error| photograph_failure(&error, path))
-}
-
-/// A refusal with the photograph that it is about, and what helps.
-fn photograph_failure(error: &ClientError, path: &Path) -> Failure {
-    let failure = Failure::of_client(error);
-    let name = path.display();
-    match (failure.code.as_str(), failure.class) {
-        ("quad_not_found", _) => Failure {
-            sentence: format!("{name}: No four edges found."),
-            advice: "If the file is the picture itself, add --whole-image; else show all four sides, or give --corners.\n\
-                     `waymark detect PHOTO --draw stages` shows where they were lost."
-                .to_owned(),
-            ..failure
-        },
-        (_, Class::Refused | Class::Usage) => {
-            Failure { sentence: format!("{name}: {}", failure.sentence), ..failure }
-        }
-        _ => failure,
-    }
+    let photograph = Photograph { path, region, pick: args.pick };
+    photograph.send(session, (map, &args.landmark), |view| view.or_make_landmark(new_size)).await
 }
 
 async fn learn(session: &Session, map: &str, args: &TeachArgs) -> anyhow::Result<Landmark> {
@@ -210,24 +179,6 @@ async fn learn(session: &Session, map: &str, args: &TeachArgs) -> anyhow::Result
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn refused(code: &str) -> ClientError {
-        let (code, field, detail) = (code.to_owned(), String::new(), "so it is".to_owned());
-        ClientError::Refused { status: 422, code, field, detail, more: serde_json::Map::new() }
-    }
-
-    #[test]
-    fn a_photograph_without_edges_is_answered_with_the_ways_out() {
-        let failure = photograph_failure(&refused("quad_not_found"), Path::new("scan.png"));
-        assert_eq!((failure.class, failure.code.as_str()), (Class::Refused, "quad_not_found"));
-        assert!(failure.sentence.starts_with("scan.png: No four edges found"), "{failure}");
-        assert!(
-            failure.advice.contains("--whole-image") && failure.advice.contains("--corners"),
-            "{failure}"
-        );
-        let other = photograph_failure(&refused("bad_image"), Path::new("a.jpg"));
-        assert_eq!(other.sentence, "a.jpg: so it is");
-    }
 
     #[test]
     fn a_size_in_centimetres_needs_consent() {

@@ -51,3 +51,19 @@ fn sentence(known: &ModalityMapBody) -> String {
         each.join(", ")
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_word_is_a_mode() {
+        for (word, expected) in [
+            ("all", FusionModeBody::All),
+            ("near_best", FusionModeBody::NearBest),
+            ("best", FusionModeBody::Best),
+        ] {
+            assert_eq!((mode(word), expected.to_string().as_str()), (expected, word));
+        }
+    }
+}

@@ -61,3 +61,26 @@ impl LocationArgs {
 fn origin(text: &str) -> Result<[f64; 3], String> {
     numbers(text, ',').ok_or_else(|| "three numbers: x,y in metres, direction in degrees".to_owned())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_not_given_stays() {
+        let args = LocationArgs {
+            site: None,
+            building: Some("house".into()),
+            floor: None,
+            parent: Some("plan".into()),
+            at: origin("1,2,90").ok(),
+            level_m: 3.4,
+        };
+        let patch = args.patch();
+        assert_eq!((patch.site, patch.building), (None, Some(Some("house".into()))));
+        let link = patch.parent.flatten().unwrap();
+        assert!((link.theta_rad - std::f64::consts::FRAC_PI_2).abs() < 1e-12, "{link:?}");
+        assert_eq!((link.map.as_str(), args.new_map("a", None).name.as_str()), ("plan", "a"));
+        assert!(origin("1,2").is_err());
+    }
+}

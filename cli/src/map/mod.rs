@@ -47,14 +47,14 @@ enum Verb {
         #[command(flatten)]
         server: ServerArgs,
     },
-    /// One map: version, landmarks by state, walls, where it lies.
+    /// Show a map: version, landmarks by state, walls, where it lies.
     Show {
         /// The map.
         map: String,
         #[command(flatten)]
         server: ServerArgs,
     },
-    /// Set where a map belongs, and its link to another map.
+    /// Set where a map belongs, and its link to another map
     ///
     /// For example, the first floor of a house whose plan is the map `house`, 3.4 m up, turned by 90 degrees:
     ///   waymark map locate floor1 --building house --floor 1st --in house --at 12.5,-3,90 --level-m 3.4
@@ -67,7 +67,7 @@ enum Verb {
         #[command(flatten)]
         server: ServerArgs,
     },
-    /// Show or set the visibility settings of a map: the camera and the limits that define "visible".
+    /// Show or set the visibility settings of a map: the camera and the limits that define "visible"
     ///
     /// The visibility areas of landmarks follow from them. For example, a camera 0.8 m up that tilts up to 60 degrees:
     ///   waymark map visibility office --image 1280x720 --focal-px 900 --camera-height-m 0.8 --tilt-deg -10,60
@@ -91,14 +91,14 @@ enum Verb {
         #[command(flatten)]
         server: ServerArgs,
     },
-    /// Set a map's walls from a ROS occupancy grid, a floor plan, a vector map or a map file.
+    /// Set a map's walls from a ROS occupancy grid, a floor plan, a vector map or a map file
     ///
     /// If the map has walls, the difference is shown first and you are asked. For example:
     ///   waymark map import office floor.yaml --dry-run
     ///   waymark map import office plan.geojson --yes
     #[command(verbatim_doc_comment)]
     Import(import::ImportArgs),
-    /// List a map's walls with their numbers, for `waymark landmark place --wall`.
+    /// List a map's walls with their numbers, for `waymark landmark place --wall`
     ///
     /// For example:
     ///   waymark map walls office --draw walls.svg
@@ -106,13 +106,13 @@ enum Verb {
     Walls(walls::WallsArgs),
     /// Write a map's walls as a ROS occupancy grid, a vector map or a map file.
     Export(export::ExportArgs),
-    /// Turn a file of walls into another kind of file; no server needed.
+    /// Turn a file of walls into another kind of file; no server needed
     ///
     /// For example:
     ///   waymark map convert floor.yaml --out floor.json --draw floor.svg
     #[command(verbatim_doc_comment)]
     Convert(convert::ConvertArgs),
-    /// Build walls from a laser log: scans are matched, loops closed, walls drawn. No server needed without --into.
+    /// Build walls from a laser log: scans are matched, loops closed, walls drawn. No server needed without --into
     ///
     /// The first pose is the origin of the map. Standard output says how many loops were closed and refused: a picture
     /// (--draw) shows where. Poses in a CARMEN log are taken for odometry; in a corrected log they are nearly right

@@ -4,6 +4,7 @@
 mod trajectory;
 
 use super::{
+    failure::{Class, Failure},
     screen::{Table, counted},
     session::{Consent, MapArgs, Session},
 };
@@ -53,6 +54,11 @@ enum Verb {
     },
     /// List the reference runs of a map.
     List,
+    /// Show a reference run: how well each modality did.
+    Show {
+        /// Number of the run.
+        run: i64,
+    },
     /// Delete a reference run with its statistics. This cannot be undone.
     Delete {
         /// Number of the run.
@@ -104,6 +110,13 @@ async fn on_server(session: &Session, verb: &Verb) -> anyhow::Result<()> {
                 "The map has learnt from no run yet. Record one: waymark run start ROBOT",
             )
         }
+        Verb::Show { run } => {
+            let all = maps.reference_runs(session.map().await?).await?;
+            let found = all.iter().find(|r| r.id == *run).ok_or_else(|| {
+                Failure::new(Class::NotFound, "unknown_reference_run", format!("There is no run {run}."))
+            })?;
+            session.show(found, &run_lines(found))
+        }
         Verb::Delete { run, consent } => {
             let map = session.map().await?;
             consent.ask(&format!(
@@ -147,4 +160,41 @@ fn run_lines(run: &ReferenceRunBody) -> String {
         )
     }));
     lines.join("\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_recording_is_shown_with_its_state() {
+        let recording = RecordingStatusBody {
+            map: "office".into(),
+            robot: "r1".into(),
+            active: true,
+            reason: None,
+            distance_m: 12.34,
+            span_ns: None,
+            odometry: 9,
+            landmarks: 1,
+            laser: 2,
+        };
+        assert_eq!(recorded_line(&recording), "r1 on office: active, 12.3 m, fixes by 1 landmark, 2 scans");
+        let ended = RecordingStatusBody { reason: Some("full".into()), ..recording };
+        assert!(recorded_line(&ended).contains("ended (full)"));
+    }
+
+    #[test]
+    fn a_run_without_statistics_is_one_line() {
+        let robot = "r1".to_owned();
+        let run =
+            ReferenceRunBody { id: 3, robot, created_ms: 0, distance_m: 40.0, cells: 1, statistics: vec![] };
+        assert_eq!(run_lines(&run), "run 3 of r1: 40.0 m, 1 pose cell");
+    }
+
+    #[test]
+    fn a_trajectory_that_cannot_be_read_names_its_file() {
+        let error = reference(Path::new("none.tum"), None, None).unwrap_err();
+        assert!(format!("{error:#}").contains("none.tum"));
+    }
 }
