@@ -211,6 +211,16 @@ function drawArea(c, px, ink) {
   c.globalAlpha = 1;
 }
 
+const whyNot = (landmark) => landmark.failed_gates.map((gate) => `${gate.sentence} ${gate.advice}`).join(" ");
+
+// Landmarks that are not in use, and why: also those without a place, which the map does not show.
+function listNotInUse() {
+  const rows = state.landmarks.filter((l) => l.failed_gates.length).map((l) => row([l.name, whyNot(l)]));
+  byId("not-in-use").hidden = !rows.length;
+  byId("not-in-use-count").textContent = rows.length;
+  byId("not-in-use-rows").replaceChildren(...rows);
+}
+
 async function choose(landmark) {
   state.chosen = landmark?.name ?? null;
   state.area = null;
@@ -227,6 +237,7 @@ async function choose(landmark) {
 
 function factsOf(landmark) {
   const finding = landmark.finding;
+  if (landmark.failed_gates.length) return `${landmark.name}: ${whyNot(landmark)}`;
   if (landmark.health === "sound" || !finding) return `${landmark.name}: ${landmark.health === "sound" ? landmark.status : landmark.health}`;
   const why = finding.kind === "moved" ? `appears ${finding.offset_m.toFixed(2)} m from its place, ${finding.sightings} times` : `not seen where it should be, ${finding.missed_frames} times`;
   return `${landmark.name}: ${landmark.health}, ${why}`;
@@ -333,6 +344,7 @@ async function loadMap(name) {
   ]);
   await loadTrajectories(name);
   Object.assign(state, { map: name, walls: walls.segments, landmarks: landmarks.items, dirty: true });
+  listNotInUse();
   if (state.chosen) choose(state.landmarks.find((l) => l.name === state.chosen));
   const active = state.landmarks.filter((l) => l.status === "active").length;
   const where = [map.site, map.building, map.floor].filter(Boolean).join(" / ");

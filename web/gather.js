@@ -99,7 +99,7 @@ function rowOf(track) {
   cell(track.side_px.map((s) => s.toFixed(0)).join(" to ") + " px");
   cell(place ? `${place.x_m.toFixed(2)}, ${place.y_m.toFixed(2)} m; ${place.width_m.toFixed(2)} x ${place.height_m.toFixed(2)} m` : track.not_placed);
   const verdict = document.createElement("span");
-  verdict.textContent = track.passes ? "passes" : track.reasons.map((r) => r.detail).join("; ");
+  verdict.textContent = track.passes ? "passes" : track.failed_gates.map((g) => `${g.sentence} ${g.advice}`).join(" ");
   verdict.className = "reasons";
   cell(verdict);
   const name = document.createElement("input");

@@ -7,6 +7,7 @@ pub mod config;
 pub mod bus;
 mod store;
 mod publication;
+mod failed_gates;
 mod jobs;
 pub mod gather;
 mod calibrating;

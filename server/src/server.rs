@@ -170,9 +170,10 @@ fn engine(
 
 /// Stores findings about landmarks, until the last worker has stopped.
 async fn store_findings(store: Catalogue, mut found: Receiver<LandmarkFinding>, pulse: Pulse) {
-    while let Some(LandmarkFinding { map, name, health, finding, .. }) = found.recv().await {
+    while let Some(LandmarkFinding { map, landmark, health, finding, .. }) = found.recv().await {
         let stored = store.write(move |tx| {
             Box::pin(async move {
+                let name = landmarks::name_of(tx, &map, landmark).await?;
                 landmarks::set_health(tx, &map, &name, health, finding.as_deref()).await.map(drop)
             })
         });

@@ -101,6 +101,24 @@ async fn maps_are_stored_with_all_their_fields() {
     inside.server.stop().await;
 }
 
+/// Renames `sign` to `exit`; makes landmark `made` with a view, and deletes it.
+async fn rename_and_make(maps: &MapClient) {
+    let renamed = LandmarkPatch { name: Some("exit".into()), ..LandmarkPatch::default() };
+    assert_eq!(maps.update_landmark("hall", "sign", &renamed).await.expect("renamed").name, "exit");
+    let taken = LandmarkPatch { name: Some("poster".into()), ..LandmarkPatch::default() };
+    assert_eq!(code(maps.update_landmark("hall", "exit", &taken).await), "exists");
+    // A landmark is made with its first view.
+    let size = Size { width_m: 0.5, height_m: 0.5 };
+    let new = || NewView::new(picture(7), LandmarkRegion::WholeImage);
+    assert_eq!(code(maps.upload_view_with("hall", "made", new()).await), "unknown_landmark");
+    maps.upload_view_with("hall", "made", new().or_make_landmark(Some(size))).await.expect("made");
+    let other = Size { width_m: 50.0, ..size };
+    let again = maps.upload_view_with("hall", "made", new().or_make_landmark(Some(other))).await;
+    assert_eq!(code(again), "size_differs");
+    assert_eq!(maps.landmark("hall", "made").await.expect("landmark").size, Some(size));
+    maps.delete_landmark("hall", "made").await.expect("deleted");
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn landmarks_are_placed_patched_taught_and_learnt() {
     let inside = Inside::start(Limits::default()).await;
@@ -118,7 +136,8 @@ async fn landmarks_are_placed_patched_taught_and_learnt() {
     assert_eq!((sign.place, sign.health, sign.size), (Some(place), LandmarkHealthBody::Quarantined, None));
     let forget = LandmarkPatch { place: Some(None), ..LandmarkPatch::default() };
     assert_eq!(maps.update_landmark("hall", "sign", &forget).await.expect("patched").place, None);
-    maps.delete_landmark("hall", "sign").await.expect("deleted");
+    rename_and_make(&maps).await;
+    maps.delete_landmark("hall", "exit").await.expect("deleted");
 
     // Views, with all capture data.
     let first =

@@ -165,7 +165,7 @@ async fn gather_all(inside: &Inside, client: &RobotClient, building: &Arc<Buildi
             track["side_px"],
             track["v_c"],
             track["passes"],
-            track["reasons"]
+            track["failed_gates"]
         );
         let Some(name) = poster else { continue };
         taken.insert(name.clone(), track.clone());

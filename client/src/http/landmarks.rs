@@ -38,7 +38,7 @@ impl MapClient {
         self.send(self.ask(&GET, &[&map, &landmark])?).await
     }
 
-    /// Sets or deletes size and place; sets landmark health.
+    /// Renames a landmark; sets or deletes size and place; sets landmark health.
     pub async fn update_landmark(
         &self,
         map: &str,

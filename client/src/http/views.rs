@@ -2,7 +2,7 @@
 
 use super::{map_client::MapClient, operation::operations};
 use crate::ClientError;
-use protos::api::{CaptureMetadata, TrainingView};
+use protos::api::{CaptureMetadata, Size, TrainingView};
 use reqwest::multipart::{Form, Part};
 use serde_json::json;
 
@@ -35,12 +35,22 @@ pub struct NewView {
     pub capture: Option<CaptureMetadata>,
     /// Store it even if it is a near-duplicate of a stored view.
     pub keep_near_duplicate: bool,
+    /// Make the landmark if it does not exist, together with this view or not at all.
+    pub make_landmark: bool,
+    /// Size of the landmark. Refused with `size_differs` if it has another one by hand.
+    pub size: Option<Size>,
 }
 
 impl NewView {
     /// A photograph without further data.
     pub fn new(image: Vec<u8>, region: LandmarkRegion) -> Self {
-        Self { image, region, capture: None, keep_near_duplicate: false }
+        Self { image, region, capture: None, keep_near_duplicate: false, make_landmark: false, size: None }
+    }
+
+    /// Makes the landmark if it does not exist, of this size. Nothing is made if the view is refused.
+    #[must_use]
+    pub fn or_make_landmark(self, size: Option<Size>) -> Self {
+        Self { make_landmark: true, size, ..self }
     }
 }
 
@@ -74,6 +84,12 @@ impl MapClient {
         }
         if new.keep_near_duplicate {
             form = form.text("keep_near_duplicate", "true");
+        }
+        if new.make_landmark {
+            form = form.text("create", "true");
+        }
+        if let Some(Size { width_m, height_m }) = new.size {
+            form = form.text("width_m", width_m.to_string()).text("height_m", height_m.to_string());
         }
         self.send(self.ask(&UPLOAD, &[&map, &landmark])?.multipart(form)).await
     }

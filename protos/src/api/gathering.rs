@@ -1,8 +1,7 @@
 //! `/maps/{map}/gatherings`: training views gathered by a robot that drives past, and a person's decision on them.
 
-use super::{learning::Job, views::PlacementReportBody};
+use super::{failed_gates::FailedGate, learning::Job, views::PlacementReportBody};
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
 
 /// Who gathers what.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -130,9 +129,8 @@ pub struct TrackSummary {
     pub not_placed: Option<String>,
     /// Whether a lesson of these views would pass every gate, look-alikes apart, and nothing else speaks against it.
     pub passes: bool,
-    /// What does not pass: `gate`, `value`, `limit`, `detail`.
-    #[cfg_attr(feature = "openapi", schema(value_type = Vec<Object>))]
-    pub reasons: Vec<Value>,
+    /// What speaks against it.
+    pub failed_gates: Vec<FailedGate>,
     /// Other tracks that look alike or are at the same place: perhaps the same thing twice, or two of one kind.
     pub similar_tracks: Vec<u32>,
 }
@@ -140,7 +138,7 @@ pub struct TrackSummary {
 impl TrackSummary {
     /// What speaks against it, in words.
     pub fn details(&self) -> Vec<String> {
-        self.reasons.iter().map(|r| r["detail"].as_str().unwrap_or_default().to_owned()).collect()
+        self.failed_gates.iter().map(ToString::to_string).collect()
     }
 
     /// Where it is, in words.

@@ -1,5 +1,6 @@
 //! `/maps/{map}/landmarks`: landmarks with size, place, model and health.
 
+use super::failed_gates::FailedGate;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::fmt;
@@ -157,8 +158,8 @@ pub struct Landmark {
     pub name: String,
     /// How far it has come.
     pub status: LandmarkStatus,
-    /// The quality gates that its model fails, each with `gate`, `value`, `limit` and `detail`; empty unless it is inactive.
-    pub failed_gates: Vec<Value>,
+    /// Why it is not matched; empty unless it is inactive.
+    pub failed_gates: Vec<FailedGate>,
     /// Real views stored.
     pub views: u64,
     /// Width and height, if measured.
@@ -194,6 +195,9 @@ pub struct NewLandmark {
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct LandmarkPatch {
+    /// Another name, `[a-z0-9_-]{1,64}`, unique in the map. Everything that belongs to the landmark stays with it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
     /// Width and height.
     #[serde(
         default,

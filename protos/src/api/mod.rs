@@ -8,6 +8,7 @@
 //! more. With the feature `openapi` every type has a schema; the server makes its OpenAPI document of them.
 
 pub mod cameras;
+pub mod failed_gates;
 pub mod gathering;
 pub mod health;
 pub mod landmarks;
@@ -30,6 +31,7 @@ pub mod visibility_settings;
 pub mod walls;
 
 pub use cameras::*;
+pub use failed_gates::*;
 pub use gathering::*;
 pub use health::*;
 pub use landmarks::*;

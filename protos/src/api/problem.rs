@@ -22,7 +22,8 @@ pub struct Problem {
     /// A sentence for a person.
     pub detail: String,
     /// More, by code: `quads` with `quad_not_found` and `quad_ambiguous`; `may_be_done` (true) with `timeout` and
-    /// `not_published`, if the change that was asked for may have been made; `part` with `part_ended`.
+    /// `not_published`, if the change that was asked for may have been made; `part` with `part_ended`; `stored` and `given`
+    /// with `size_differs`.
     #[serde(flatten)]
     pub more: Map<String, Value>,
 }

@@ -90,4 +90,10 @@ pub struct NewViewForm {
     pub capture: Option<String>,
     /// `true`: stored even if a stored view shows it from the same side, as large and in the same light.
     pub keep_near_duplicate: Option<String>,
+    /// `true`: makes the landmark if there is none of this name, together with this view or not at all.
+    pub create: Option<String>,
+    /// Width of the landmark, 0.01 to 100, together with `height_m`. Refused if the landmark has another size by hand.
+    pub width_m: Option<String>,
+    /// Height of the landmark, 0.01 to 100.
+    pub height_m: Option<String>,
 }

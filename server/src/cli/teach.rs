@@ -338,7 +338,7 @@ pub(crate) async fn learn(args: &LearnArgs) -> anyhow::Result<ExitCode> {
         learnt.status,
         counted(learnt.views, "view")
     ))
-    .chain(learnt.failed_gates.iter().map(|r| format!("  {}", reason(r))))
+    .chain(learnt.failed_gates.iter().map(|r| format!("  {r}")))
     .collect();
     show(&args.server, &learnt, &lines.join("\n"))?;
     Ok(status)
@@ -346,10 +346,6 @@ pub(crate) async fn learn(args: &LearnArgs) -> anyhow::Result<ExitCode> {
 
 pub(super) fn counted(count: u64, what: &str) -> String {
     if count == 1 { format!("1 {what}") } else { format!("{count} {what}s") }
-}
-
-fn reason(value: &serde_json::Value) -> String {
-    value.as_str().map_or_else(|| value.to_string(), ToOwned::to_owned)
 }
 
 pub(crate) async fn recognise(args: &RecogniseArgs) -> anyhow::Result<ExitCode> {

@@ -1,16 +1,18 @@
 //! Summaries of tracks, for a person's decision. In: tracks with their views, and the walls. Out: number and spread of the
 //! views, the place, the quality gates that a model of them would fail, and similar tracks.
 
-use crate::store::{
-    gatherings::{TrackRow, TrackView},
-    landmark_placement,
+use crate::{
+    failed_gates::{self, Evidence},
+    store::{
+        gatherings::{TrackRow, TrackView},
+        landmark_placement,
+    },
 };
 use map::segments::LaserSegment;
-use protos::api::{EstimatedPlace, TrackSummary};
-use serde_json::{Value, json};
+use protos::api::{EstimatedPlace, FailedGate, TrackSummary};
 use vision::{
     learn::{TrainingView, gates::v_c, learn, unlikeness_of},
-    model::{Gate, LandmarkId, LandmarkModel, ModelStatus},
+    model::{Gate, GateFailure, LandmarkId, LandmarkModel, ModelStatus},
     params::Params,
 };
 
@@ -40,11 +42,7 @@ pub(crate) fn track_summaries(
         .collect();
     for ((candidate, _), rivals) in made.iter_mut().zip(rivals) {
         if !rivals.is_empty() {
-            let detail =
-                "other tracks have its appearance or its place: one object twice, or two look-alikes";
-            candidate.reasons.push(
-                json!({ "gate": "similar_tracks", "value": rivals.len(), "limit": 0, "detail": detail }),
-            );
+            candidate.failed_gates.push(failed_gates::similar_tracks(&rivals));
             (candidate.passes, candidate.similar_tracks) = (false, rivals);
         }
     }
@@ -79,16 +77,15 @@ fn summary(
         })
         .collect();
     let model = learn(LandmarkId(0), &taught, &[], params).ok();
-    let mut reasons = reasons(model.as_ref());
-    if track.landmark.is_none() && track.known > 0 {
-        let detail = format!("in {} observations it matched a landmark of the map, or nearly", track.known);
-        reasons.push(json!({ "gate": "known", "value": track.known, "limit": 0, "detail": detail }));
-    }
     let sides = views.iter().map(|v| v.crop.corners_px.area_px2().sqrt());
     let (place, not_placed) = match &preview {
         Ok(preview) => (Some(estimated_place(preview)), None),
         Err(reason) => (None, Some(reason.clone())),
     };
+    let mut failed = failed(model.as_ref(), place.as_ref());
+    if track.landmark.is_none() && track.known > 0 {
+        failed.push(failed_gates::known_landmark(track.known));
+    }
     let exemplar = model.as_ref().and_then(|m| m.exemplars.first());
     let best = exemplar.and_then(|e| views.iter().find(|v| v.crop.icon.pixels == e.icon().pixels));
     let corners: Vec<_> =
@@ -105,24 +102,20 @@ fn summary(
         v_c: v_c(&corners),
         place,
         not_placed,
-        passes: reasons.is_empty(),
-        reasons,
+        passes: failed.is_empty(),
+        failed_gates: failed,
         similar_tracks: vec![],
     };
     (candidate, model)
 }
 
 /// The failed quality gates. The gate on the number of views is left out: a lesson generates views where there are few.
-fn reasons(model: Option<&LandmarkModel>) -> Vec<Value> {
-    let Some(model) = model else {
-        return vec![json!({ "gate": "views", "value": 0, "limit": 1, "detail": "no views" })];
-    };
+fn failed(model: Option<&LandmarkModel>, place: Option<&EstimatedPlace>) -> Vec<FailedGate> {
+    let Some(model) = model else { return vec![failed_gates::no_views()] };
     let ModelStatus::Candidate(failures) = &model.status else { return vec![] };
-    failures
-        .iter()
-        .filter(|f| f.gate != Gate::Views)
-        .map(|f| json!({ "gate": f.gate, "value": f.value, "limit": f.limit, "detail": f.to_string() }))
-        .collect()
+    let measured: Vec<GateFailure> = failures.iter().filter(|f| f.gate != Gate::Views).copied().collect();
+    let about = Evidence { angle_rad: place.map(|p| p.angle_rad), ..Evidence::default() };
+    failed_gates::in_words(&measured, &about)
 }
 
 fn estimated_place(preview: &landmark_placement::PlacementPreview) -> EstimatedPlace {

@@ -8,7 +8,8 @@ use axum::{
 };
 use map::{check::OutOfRange, map_links::MapLinkError};
 use protos::api::Problem;
-use serde_json::Value;
+use serde_json::{Value, json};
+use vision::pose::LandmarkSize;
 
 /// The media type of errors.
 pub(crate) const PROBLEM_JSON: &str = "application/problem+json";
@@ -101,6 +102,13 @@ impl From<StoreError> for ApiError {
             }
             StoreError::Exists { .. } => Self::new(StatusCode::CONFLICT, "exists", detail).field("name"),
             StoreError::Limit { .. } => Self::new(StatusCode::CONFLICT, "too_many", detail),
+            StoreError::SizeDiffers { stored, given, .. } => {
+                let size = |s: LandmarkSize| json!({ "width_m": s.width_m, "height_m": s.height_m });
+                Self::new(StatusCode::CONFLICT, "size_differs", detail)
+                    .field("width_m")
+                    .with("stored", size(stored))
+                    .with("given", size(given))
+            }
             StoreError::InUse(_) => Self::new(StatusCode::CONFLICT, "in_use", detail),
             StoreError::Frames(error) => {
                 let code = match error {

@@ -7,6 +7,7 @@ use super::{
     extract::{Body, PathParams, QueryParams, after_name, name, page_limit},
 };
 use crate::{
+    failed_gates::{self, Evidence, StoredLookAlike},
     jobs::Learning,
     store::{
         landmarks::{self, LandmarkGeometry, LandmarkRow},
@@ -14,14 +15,15 @@ use crate::{
     },
 };
 use axum::{Json, extract::State, http::StatusCode};
+use engine::snapshot::MapSnapshot;
 use map::{
     landmark_health::LandmarkHealth,
     place::{LandmarkPlace, PlaceSigmas},
 };
 use nalgebra::Vector3;
 use protos::api::{
-    Landmark, LandmarkHealthBody, LandmarkModelBody, LandmarkPatch, LandmarkStatus, NewLandmark, Page,
-    PageQuery, Place, PlaceSigma, Problem, Size,
+    FailedGate, Landmark, LandmarkHealthBody, LandmarkModelBody, LandmarkPatch, LandmarkStatus,
+    LookAlikeBody, NewLandmark, Page, PageQuery, Place, PlaceSigma, Problem, Size,
 };
 use serde_json::{Map, Value, json};
 use utoipa_axum::{router::OpenApiRouter, routes};
@@ -54,6 +56,15 @@ fn geometry(size: Option<Size>, place: Option<Place>) -> Result<LandmarkGeometry
         covariance: None,
     });
     Ok(LandmarkGeometry { size, place, size_from_views: false })
+}
+
+/// A size within its ranges. Errors: `out_of_range`, with the side.
+pub(super) fn checked_size(size: Size) -> Result<LandmarkSize, ApiError> {
+    let sized = LandmarkSize { width_m: size.width_m, height_m: size.height_m };
+    match LandmarkPlace::by_hand(Vector3::zeros(), 0.0, sized, PlaceSigmas::default()) {
+        Ok(_) => Ok(sized),
+        Err(e) => Err(ApiError::invalid("out_of_range", e.field, e.to_string())),
+    }
 }
 
 fn health(body: LandmarkHealthBody) -> LandmarkHealth {
@@ -90,25 +101,50 @@ fn fact_shown(fact: Value) -> Value {
     }
 }
 
-/// A landmark. `quarantined`: why its stored model is out of use. `learning`: whether a job has it in work.
-fn landmark_shown(mut row: LandmarkRow, quarantined: Option<String>, learning: bool) -> Landmark {
-    if let (Some(model), Some(reason)) = (&mut row.model, quarantined) {
-        model.active = false;
-        model.reasons = json!([{ "gate": "stored_model", "detail": reason }]).to_string();
-    }
-    let status = match (&row.model, learning) {
-        (_, true) => LandmarkStatus::Learning,
-        (None, _) => LandmarkStatus::NotLearnt,
-        (Some(model), _) if model.active => LandmarkStatus::Active,
-        _ => LandmarkStatus::Inactive,
-    };
-    let failed_gates = row.model.as_ref().map(|m| serde_json::from_str(&m.reasons).unwrap_or_default());
-    let model = row.model.map(|m| LandmarkModelBody {
-        views: m.views,
-        generated_views: m.generated_views,
-        learnt_ms: m.learnt_ms,
-        facts: serde_json::from_str(&m.facts).map(facts_shown).unwrap_or_default(),
+/// What is said of a landmark besides its row.
+#[derive(Default)]
+struct Context<'a> {
+    /// Why its stored model is out of use.
+    unusable: Option<String>,
+    /// A job has it in work.
+    learning: bool,
+    /// The version of the map that is in use.
+    snapshot: Option<&'a MapSnapshot>,
+}
+
+/// The stored look-alikes of a model under their present names, without those that are gone.
+fn look_alikes_shown(stored: &mut Value, snapshot: Option<&MapSnapshot>) -> Vec<LookAlikeBody> {
+    let name_of = |id: LandmarkId| snapshot?.landmarks.get(&id).map(|l| l.name.clone());
+    let read: Vec<StoredLookAlike> = serde_json::from_value(stored.take()).unwrap_or_default();
+    let shown: Vec<_> = read.into_iter().filter_map(|l| l.shown(name_of)).collect();
+    *stored = json!(shown);
+    shown
+}
+
+fn landmark_shown(row: LandmarkRow, context: &Context<'_>) -> Landmark {
+    let (mut failed_gates, mut is_active) = (Vec::<FailedGate>::new(), false);
+    let model = row.model.map(|m| {
+        let mut facts: Map<String, Value> =
+            serde_json::from_str(&m.facts).map(facts_shown).unwrap_or_default();
+        let look_alikes = facts.get_mut("look_alikes").map(|l| look_alikes_shown(l, context.snapshot));
+        is_active = m.active && context.unusable.is_none();
+        failed_gates = match &context.unusable {
+            Some(reason) => vec![failed_gates::stored_model(reason)],
+            None => {
+                let look_alike = look_alikes.into_iter().flatten().next();
+                let about = Evidence { look_alike, ..Evidence::default() };
+                failed_gates::in_words(&failed_gates::from_stored(&m.reasons), &about)
+            }
+        };
+        let (views, generated_views) = (m.views, m.generated_views);
+        LandmarkModelBody { views, generated_views, learnt_ms: m.learnt_ms, facts }
     });
+    let status = match &model {
+        _ if context.learning => LandmarkStatus::Learning,
+        None => LandmarkStatus::NotLearnt,
+        Some(_) if is_active => LandmarkStatus::Active,
+        Some(_) => LandmarkStatus::Inactive,
+    };
     let LandmarkGeometry { size, place, .. } = row.geometry;
     let sigma = place.and_then(|p| p.covariance).map(|c| c.diagonal().map(f64::sqrt));
     Landmark {
@@ -116,7 +152,7 @@ fn landmark_shown(mut row: LandmarkRow, quarantined: Option<String>, learning: b
         finding: row.finding.and_then(|f| serde_json::from_str(&f).ok()),
         name: row.name,
         status,
-        failed_gates: failed_gates.unwrap_or_default(),
+        failed_gates,
         views: row.views,
         size: size.map(|s| Size { width_m: s.width_m, height_m: s.height_m }),
         place: place.map(|p| Place {
@@ -142,9 +178,10 @@ fn landmark_shown(mut row: LandmarkRow, quarantined: Option<String>, learning: b
 /// The landmark with what only the running server knows: a model out of use, a job at work.
 fn shown(app: &App, learning: &Learning, map: &str, row: LandmarkRow) -> Landmark {
     let snapshot = app.store.snapshots().get(map);
-    let quarantined = snapshot.and_then(|s| s.unusable_models.get(&LandmarkId(row.id as u64)).cloned());
+    let snapshot = snapshot.as_deref();
+    let unusable = snapshot.and_then(|s| s.unusable_models.get(&LandmarkId(row.id as u64)).cloned());
     let learning = learning.has(&row.name) && row.views > 0;
-    landmark_shown(row, quarantined, learning)
+    landmark_shown(row, &Context { unusable, learning, snapshot })
 }
 
 /// Creates a landmark without views.
@@ -162,7 +199,7 @@ async fn create(
     let write = app.store.write(move |tx| {
         Box::pin(async move { landmarks::create(tx, &map, name.as_str(), geometry, max).await })
     });
-    Ok((StatusCode::CREATED, Json(landmark_shown(write.await?, None, false))))
+    Ok((StatusCode::CREATED, Json(landmark_shown(write.await?, &Context::default()))))
 }
 
 /// Lists the landmarks of a map by name.
@@ -193,21 +230,27 @@ async fn get(
     Ok(Json(shown(&app, &app.jobs.learning(&map).await?, &map, row)))
 }
 
-/// Sets or forgets size and place; sets how far it is trusted.
+/// Renames it; sets or forgets size and place; sets how far it is trusted. Everything that belongs to it follows the name.
 #[utoipa::path(patch, path = "/maps/{map}/landmarks/{landmark}", tag = "landmarks",
     params(("map" = String, Path), ("landmark" = String, Path)), request_body = LandmarkPatch,
     responses((status = 200, body = Landmark), (status = 404, body = Problem),
-    (status = 422, body = Problem, description = "out_of_range, invalid_value")))]
+    (status = 409, body = Problem, description = "exists"),
+    (status = 422, body = Problem, description = "bad_name, out_of_range, invalid_value")))]
 async fn patch(
     State(app): State<AppState>,
     PathParams((map, landmark)): PathParams<(String, String)>,
     Body(changes): Body<LandmarkPatch>,
 ) -> Result<Json<Landmark>, ApiError> {
     let checked = geometry(changes.size.flatten(), changes.place.flatten())?;
+    let new_name = changes.name.map(|new| name("name", new)).transpose()?;
     let (size, place) = (changes.size.is_some(), changes.place.is_some());
     let (map_name, health) = (map.clone(), changes.health.map(health));
     let write = app.store.write(move |tx| {
         Box::pin(async move {
+            let landmark = match new_name {
+                Some(new) => landmarks::rename(tx, &map, &landmark, new.as_str()).await?,
+                None => landmark,
+            };
             let changed = landmarks::update(tx, &map, &landmark, |old| LandmarkGeometry {
                 size: if size { checked.size } else { old.size },
                 place: if place { checked.place } else { old.place },

@@ -5,9 +5,12 @@ use super::{
     answers::page,
     error::ApiError,
     extract::{self, PathParams, QueryParams, after_number, page_limit},
+    landmarks::checked_size,
     upload::{FORM_OVERHEAD, Form},
 };
 use crate::store::{
+    StoreError,
+    kind::Kind,
     landmark_placement::{PlacementReport, StoredCapture},
     landmarks, maps,
     teaching::{self, Teaching},
@@ -25,7 +28,7 @@ use engine::{
     picture,
 };
 use protos::api::{
-    CaptureMetadata, NewViewForm, Page, PageQuery, PlacementReportBody, Problem, TrainingView,
+    CaptureMetadata, NewViewForm, Page, PageQuery, PlacementReportBody, Problem, Size, TrainingView,
     UploadOutcomeBody,
 };
 use serde_json::json;
@@ -37,6 +40,7 @@ use vision::{
     icon::{Icon, IconError, icon},
     learn::near_duplicates::NoveltyParams,
     params::Params as Algorithm,
+    pose::LandmarkSize,
 };
 
 pub(super) fn router(upload_bytes: usize) -> OpenApiRouter<AppState> {
@@ -76,6 +80,10 @@ pub(super) fn placement_shown(
     PlacementReportBody { placed, views_used, reason }
 }
 
+/// The parts of the form.
+const PARTS: [&str; 8] =
+    ["image", "corners", "whole_image", "capture", "keep_near_duplicate", "create", "width_m", "height_m"];
+
 /// What the form says of the landmark's place in the picture.
 enum LandmarkRegion {
     Detect,
@@ -86,12 +94,13 @@ enum LandmarkRegion {
 /// Adds a view. Without corners the server looks for the landmark itself and takes the one dominant quad; if there is
 /// none or more than one, the refusal lists what it saw. The same picture with the same corners a second time is
 /// answered with 200 and the view that is there; so is a near-duplicate of a view, which is not stored, as it would teach
-/// nothing (`outcome` says which).
+/// nothing (`outcome` says which). With `create` the landmark is made, too, if there is none of this name: nothing is made
+/// where the view is refused. A size is set where the landmark has none by hand; another one is refused.
 #[utoipa::path(post, path = "/maps/{map}/landmarks/{landmark}/views", tag = "landmarks",
     params(("map" = String, Path), ("landmark" = String, Path)),
     request_body(content = NewViewForm, content_type = "multipart/form-data"),
     responses((status = 201, body = TrainingView), (status = 200, body = TrainingView), (status = 404, body = Problem),
-    (status = 409, body = Problem, description = "too_many"), (status = 413, body = Problem),
+    (status = 409, body = Problem, description = "too_many; size_differs, with `stored` and `given`"), (status = 413, body = Problem),
     (status = 422, body = Problem, description = "bad_image, too_large, invalid_value, too_small, outside, \
      quad_not_found, quad_ambiguous")))]
 async fn add(
@@ -99,10 +108,18 @@ async fn add(
     PathParams((map, landmark)): PathParams<(String, String)>,
     request: Request,
 ) -> Result<(StatusCode, Json<TrainingView>), ApiError> {
-    landmarks::get(app.store.reads(), &map, &landmark).await?;
-    let mut form =
-        Form::read(&app, request, &["image", "corners", "whole_image", "capture", "keep_near_duplicate"])
-            .await?;
+    let exists = match landmarks::get(app.store.reads(), &map, &landmark).await {
+        Err(StoreError::NotFound { .. }) => false,
+        found => found.map(|_| true)?,
+    };
+    maps::get(app.store.reads(), &map).await?;
+    let mut form = Form::read(&app, request, &PARTS).await?;
+    let creates = flag("create", form.optional("create").as_ref())?;
+    if !exists && !creates {
+        return Err(StoreError::NotFound { what: Kind::Landmark, name: landmark }.into());
+    }
+    let landmark = if exists { landmark } else { extract::name("landmark", landmark)?.to_string() };
+    let size = size(form.optional("width_m").as_ref(), form.optional("height_m").as_ref())?;
     let image = form.needed("image")?;
     let extent = extent(form.optional("corners").as_ref(), form.optional("whole_image").as_ref())?;
     let mut capture = capture(form.optional("capture").as_ref())?;
@@ -115,7 +132,9 @@ async fn add(
     }
     let capture =
         capture.map(|c| serde_json::to_string(&c)).transpose().map_err(|e| ApiError::internal(&e))?;
-    let teaching = Teaching { map, landmark, view: NewView { capture, ..new }, max, novelty };
+    let create = creates.then_some(app.config.limits.landmarks);
+    let view = NewView { capture, ..new };
+    let teaching = Teaching { map, landmark, view, max, novelty, size, create };
     let (row, outcome, placing) = teaching::add(&app.store, teaching).await?;
     let view = TrainingView {
         placing: placing.map(placement_shown),
@@ -124,6 +143,17 @@ async fn add(
     };
     let status = if outcome == UploadOutcome::New { StatusCode::CREATED } else { StatusCode::OK };
     Ok((status, Json(view)))
+}
+
+/// A size by hand, checked. Both sides or none.
+fn size(width: Option<&Bytes>, height: Option<&Bytes>) -> Result<Option<LandmarkSize>, ApiError> {
+    let side = |part: Option<&Bytes>, name| part.map(|b| extract::json::<f64>(b, name)).transpose();
+    match (side(width, "width_m")?, side(height, "height_m")?) {
+        (None, None) => Ok(None),
+        (Some(width_m), Some(height_m)) => checked_size(Size { width_m, height_m }).map(Some),
+        (Some(_), None) => Err(ApiError::invalid("missing", "height_m", "`width_m` needs `height_m`")),
+        (None, Some(_)) => Err(ApiError::invalid("missing", "width_m", "`height_m` needs `width_m`")),
+    }
 }
 
 /// How the picture was taken, checked.

@@ -13,13 +13,14 @@ use super::{
     request::Request,
     spread_work::each_of,
 };
-use crate::store::kind::Kind;
 use crate::{
     config::Config,
+    failed_gates::{self, StoredLookAlike},
     publication::Catalogue,
     store::{
         StoreError,
         jobs::{self, Ended, JobRow},
+        kind::Kind,
         landmarks::ModelSummary,
         maps::{self, MapRow},
         models::{self, NewModel},
@@ -28,7 +29,7 @@ use crate::{
     },
 };
 use engine::{panics::Edge, snapshot::MapSnapshot};
-use serde_json::{Value, json};
+use serde_json::json;
 use std::{collections::BTreeMap, sync::Arc, time::Instant};
 use vision::{
     learn::{TrainingView, add_negatives, learn, synthesis},
@@ -315,12 +316,10 @@ async fn commit(
     });
     let message = format!("{active} of {} landmarks active", learnt.models.len() + learnt.failed.len());
     let ended = Ended { state: "done", message, result: Some(result.to_string()) };
-    let of = |model: &LandmarkModel| -> Vec<Value> {
+    let of = |model: &LandmarkModel| -> Vec<StoredLookAlike> {
         let found = learnt.look_alikes.get(&model.id).map_or(&[][..], Vec::as_slice);
-        found
-            .iter()
-            .map(|l| json!({ "landmark": name(&l.other), "gradient_similarity": l.gradient_similarity }))
-            .collect()
+        let stored = |l: &LookAlike| StoredLookAlike::new(l.other, &name(&l.other), l.gradient_similarity);
+        found.iter().map(stored).collect()
     };
     let models = learnt.models.iter().chain(&learnt.refitted);
     let rows: Vec<NewModel> = models.map(|model| row(model, &of(model))).collect();
@@ -338,15 +337,11 @@ async fn commit(
     write.await
 }
 
-fn row(model: &LandmarkModel, look_alikes: &[Value]) -> NewModel {
+fn row(model: &LandmarkModel, look_alikes: &[StoredLookAlike]) -> NewModel {
     let failures = match &model.status {
         ModelStatus::Active => &[][..],
         ModelStatus::Candidate(failures) => failures,
     };
-    let reasons: Vec<Value> = failures
-        .iter()
-        .map(|f| json!({ "gate": f.gate, "value": f.value, "limit": f.limit, "detail": f.to_string() }))
-        .collect();
     let facts = json!({
         "correlation": model.correlation,
         "hausdorff": model.hausdorff,
@@ -365,7 +360,7 @@ fn row(model: &LandmarkModel, look_alikes: &[Value]) -> NewModel {
         params_hash: model.params_hash,
         summary: ModelSummary {
             active: model.is_active(),
-            reasons: Value::from(reasons).to_string(),
+            reasons: failed_gates::stored(failures),
             facts: facts.to_string(),
             views: (model.views - model.generated_views) as u64,
             generated_views: model.generated_views as u64,

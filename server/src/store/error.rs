@@ -1,6 +1,7 @@
 //! What can go wrong with the store, sorted by what the caller can do about it.
 
 use super::kind::Kind;
+use vision::pose::LandmarkSize;
 
 /// Why a read or a write did not happen. Nothing was changed, except with [`StoreError::NotPublished`].
 #[derive(Debug, thiserror::Error)]
@@ -28,6 +29,16 @@ pub(crate) enum StoreError {
         what: &'static str,
         /// The bound.
         max: usize,
+    },
+    /// The landmark has another size by hand.
+    #[error("landmark `{landmark}` is {} m, not {} m", size_text(stored), size_text(given))]
+    SizeDiffers {
+        /// Name of the landmark.
+        landmark: String,
+        /// The size that it has.
+        stored: LandmarkSize,
+        /// The size that was given.
+        given: LandmarkSize,
     },
     /// Something else rests on it.
     #[error("{0}")]
@@ -72,6 +83,10 @@ pub(crate) enum StoreError {
         /// What the database says.
         source: sqlx::Error,
     },
+}
+
+fn size_text(size: &LandmarkSize) -> String {
+    format!("{} x {}", size.width_m, size.height_m)
 }
 
 /// SQLite result codes (primary, the low byte).

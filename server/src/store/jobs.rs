@@ -14,6 +14,9 @@ statements! {
     PUT_BACK = "UPDATE jobs SET state = 'queued', attempts = attempts - 1 WHERE id = ?1 AND state = 'running'";
     END = "UPDATE jobs SET state = ?2, message = ?3, result = ?4, ended_ms = ?5 \
            WHERE id = ?1 AND state IN ('queued', 'running')";
+    RENAME_LANDMARK = "UPDATE jobs SET request = json_set(request, '$.landmarks', json((SELECT \
+              json_group_array(CASE value WHEN ?2 THEN ?3 ELSE value END) FROM json_each(jobs.request, '$.landmarks')))) \
+              WHERE map = ?1 AND state IN ('queued', 'running') AND json_type(request, '$.landmarks') = 'array'";
     DELETE_OLD = "DELETE FROM jobs WHERE ended_ms IS NOT NULL AND id NOT IN \
               (SELECT id FROM jobs WHERE ended_ms IS NOT NULL ORDER BY id DESC LIMIT ?1)";
 }
@@ -57,6 +60,12 @@ fn job_row(row: &SqliteRow) -> Result<JobRow, sqlx::Error> {
         result: row.try_get("result")?,
         attempts: row.try_get("attempts")?,
     })
+}
+
+/// Gives a landmark its new name in what open jobs are asked for.
+pub(super) async fn rename_landmark(tx: &mut Tx, map: &str, name: &str, new: &str) -> Result<(), StoreError> {
+    let renamed = sqlx::query(RENAME_LANDMARK).bind(map).bind(name).bind(new).execute(&mut tx.conn).await;
+    renamed.map_err(StoreError::during("rename landmark in jobs")).map(drop)
 }
 
 /// Queues a job and deletes the oldest finished ones beyond `retained`. Errors: more than `max` open jobs.

@@ -1,13 +1,13 @@
 //! Landmarks of a map: name, size, place, and a summary of what was learnt.
 
-use super::{StoreError, Tx, kind::Kind, maps, now_ms, statements::statements, within};
+use super::{StoreError, Tx, jobs, kind::Kind, maps, now_ms, statements::statements, within};
 use map::{
     landmark_health::LandmarkHealth,
     place::{LandmarkPlace, PlaceSigmas},
 };
 use nalgebra::{Matrix6, Vector3};
 use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
-use vision::pose::LandmarkSize;
+use vision::{model::LandmarkId, pose::LandmarkSize};
 
 /// Columns of [`LandmarkRow`]; views and model are joined so that a list is one query.
 macro_rules! select {
@@ -32,6 +32,8 @@ statements! {
     UPDATE = "UPDATE landmarks SET width_m = ?2, height_m = ?3, x_m = ?4, y_m = ?5, z_m = ?6, theta_rad = ?7, \
               roll_rad = ?8, tilt_rad = ?9, place_covariance = ?10, size_from_views = ?11 WHERE id = ?1";
     DELETE = "DELETE FROM landmarks WHERE id = ?1";
+    RENAME = "UPDATE landmarks SET name = ?2 WHERE id = ?1";
+    NAME = "SELECT l.name FROM landmarks l JOIN maps m ON m.id = l.map_id WHERE m.name = ?1 AND l.id = ?2";
 }
 
 /// The place of a landmark, as it is stored: centre (map frame, m) and direction of the outward normal (rad).
@@ -299,6 +301,28 @@ pub(crate) async fn update(
     set_geometry(tx, landmark.id, &landmark.geometry).await?;
     maps::bump(tx, map.id).await?;
     Ok(landmark)
+}
+
+/// Gives a landmark another name, also in the jobs that wait for it; returns that name. Errors: `Exists`.
+pub(crate) async fn rename(tx: &mut Tx, map: &str, name: &str, new: &str) -> Result<String, StoreError> {
+    let map = maps::get(&mut tx.conn, map).await?;
+    let landmark = get(&mut tx.conn, &map.name, name).await?;
+    sqlx::query(RENAME)
+        .bind(landmark.id)
+        .bind(new)
+        .execute(&mut tx.conn)
+        .await
+        .map_err(StoreError::inserting("rename landmark", Kind::Landmark, new))?;
+    jobs::rename_landmark(tx, &map.name, name, new).await?;
+    maps::bump(tx, map.id).await?;
+    Ok(new.to_owned())
+}
+
+/// The present name of a landmark by its number.
+pub(crate) async fn name_of(tx: &mut Tx, map: &str, id: LandmarkId) -> Result<String, StoreError> {
+    let name = sqlx::query_scalar(NAME).bind(map).bind(id.0 as i64).fetch_optional(&mut tx.conn).await;
+    let name = name.map_err(StoreError::during("read the name of a landmark"))?;
+    name.ok_or_else(|| StoreError::NotFound { what: Kind::Landmark, name: id.0.to_string() })
 }
 
 /// Deletes a landmark with its views and model.

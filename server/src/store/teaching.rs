@@ -16,7 +16,10 @@ use engine::panics::Edge;
 use map::segments::LaserSegment;
 use sqlx::{Row, SqliteExecutor};
 use std::sync::Arc;
-use vision::learn::near_duplicates::{NoveltyParams, ViewSummary, most_alike};
+use vision::{
+    learn::near_duplicates::{NoveltyParams, ViewSummary, most_alike},
+    pose::LandmarkSize,
+};
 
 statements! {
     STAMP = "SELECT m.id AS map, m.walls_version, l.id AS landmark, count(v.id) AS views, \
@@ -24,6 +27,9 @@ statements! {
              l.tilt_rad, l.place_covariance, l.size_from_views FROM maps m JOIN landmarks l ON l.map_id = m.id \
              LEFT JOIN views v ON v.landmark_id = l.id WHERE m.name = ?1 AND l.name = ?2 GROUP BY l.id";
 }
+
+/// Two sizes are the same up to the rounding of their text.
+const SAME_SIZE_M: f64 = 1e-6;
 
 /// How often a write is prepared before its caller is told to try again.
 pub(super) const ATTEMPTS: usize = 5;
@@ -102,11 +108,40 @@ pub(crate) struct Teaching {
     pub(crate) max: usize,
     /// What counts as a near-duplicate; without it every view is stored.
     pub(crate) novelty: Option<NoveltyParams>,
+    /// Size of the landmark by hand. It is set where there is none by hand, and has to be the same else.
+    pub(crate) size: Option<LandmarkSize>,
+    /// Makes the landmark if there is none: the most that a map may have.
+    pub(crate) create: Option<usize>,
 }
 
-/// What was computed for a view, and the stamp that it rests on.
+impl Teaching {
+    /// The geometry of the landmark with the size that is given. Errors: `SizeDiffers`.
+    fn sized(&self, now: LandmarkGeometry) -> Result<LandmarkGeometry, StoreError> {
+        let Some(given) = self.size else { return Ok(now) };
+        if let Some(stored) = now.size.filter(|_| !now.size_from_views) {
+            let off_m = (stored.width_m - given.width_m).abs().max((stored.height_m - given.height_m).abs());
+            if off_m > SAME_SIZE_M {
+                return Err(StoreError::SizeDiffers { landmark: self.landmark.clone(), stored, given });
+            }
+            return Ok(now);
+        }
+        Ok(LandmarkGeometry { size: Some(given), size_from_views: false, ..now })
+    }
+}
+
+/// What a prepared view rests on.
+enum Basis {
+    /// A landmark that exists.
+    Landmark(Stamp),
+    /// There is none yet: the map and the version of its walls.
+    NewLandmark { map: i64, walls_version: i64 },
+}
+
+/// What was computed for a view, and what it rests on.
 struct Prepared {
-    stamp: Stamp,
+    basis: Basis,
+    /// The landmark's geometry with the size that was given.
+    geometry: LandmarkGeometry,
     /// Number of the stored view that the new one is a near-duplicate of.
     near_duplicate: Option<i64>,
     /// The landmark's placement with the new view, if that has a capture.
@@ -132,22 +167,64 @@ pub(crate) async fn add(
     Err(StoreError::Busy)
 }
 
-async fn prepare(store: &Store, teaching: &Arc<Teaching>) -> Result<Prepared, StoreError> {
-    let Teaching { map, landmark, view, novelty, .. } = &**teaching;
-    // The stamp is read first, so that the write notices whatever changes after it.
-    let Some(stamp) = stamp(store.reads(), map, landmark).await? else {
-        maps::get(store.reads(), map).await?;
+/// The landmark as it is, or that it is to be made.
+async fn basis(
+    store: &Store,
+    Teaching { map, landmark, create, .. }: &Teaching,
+) -> Result<Basis, StoreError> {
+    if let Some(stamp) = stamp(store.reads(), map, landmark).await? {
+        return Ok(Basis::Landmark(stamp));
+    }
+    let map = maps::get(store.reads(), map).await?.id;
+    if create.is_none() {
         return Err(StoreError::NotFound { what: Kind::Landmark, name: landmark.clone() });
+    }
+    Ok(Basis::NewLandmark { map, walls_version: walls::version(store.reads(), map).await? })
+}
+
+/// The landmark that gets the view: its number and that of its map. A new one is made, and one without a size gets it.
+async fn landmark_for(tx: &mut Tx, new: &Teaching, prepared: &Prepared) -> Result<(i64, i64), StoreError> {
+    let (Teaching { map, landmark, create, .. }, geometry) = (new, prepared.geometry);
+    let now = stamp(&mut tx.conn, map, landmark).await?;
+    match (&prepared.basis, now) {
+        (Basis::Landmark(was), Some(now)) if *was == now => {
+            if now.geometry != geometry {
+                landmarks::update(tx, map, landmark, |_| geometry).await?;
+            }
+            Ok((now.map, now.landmark))
+        }
+        (Basis::NewLandmark { map: was, walls_version }, None) => {
+            let row = maps::get(&mut tx.conn, map).await?;
+            if row.id != *was || walls::version(&mut tx.conn, row.id).await? != *walls_version {
+                return Err(StoreError::Changed);
+            }
+            let made = landmarks::create(tx, map, landmark, geometry, create.unwrap_or_default()).await?;
+            Ok((row.id, made.id))
+        }
+        _ => Err(StoreError::Changed),
+    }
+}
+
+async fn prepare(store: &Store, teaching: &Arc<Teaching>) -> Result<Prepared, StoreError> {
+    let Teaching { view, novelty, .. } = &**teaching;
+    // It is read first, so that the write notices whatever changes after it.
+    let basis = basis(store, teaching).await?;
+    let (map, landmark, now) = match &basis {
+        Basis::Landmark(stamp) => (stamp.map, Some(stamp.landmark), stamp.geometry),
+        Basis::NewLandmark { map, .. } => (*map, None, LandmarkGeometry::default()),
     };
-    let stored = match novelty {
-        Some(_) => views::crops(store.reads(), stamp.landmark).await?,
-        None => Vec::new(),
+    let geometry = teaching.sized(now)?;
+    let stored = match (novelty, landmark) {
+        (Some(_), Some(landmark)) => views::crops(store.reads(), landmark).await?,
+        _ => Vec::new(),
     };
     let (mut captures, mut on) = (Vec::new(), Vec::new());
     if let Some(capture) = &view.capture {
-        captures = landmark_placement::captures(store.reads(), stamp.landmark).await?;
+        if let Some(landmark) = landmark {
+            captures = landmark_placement::captures(store.reads(), landmark).await?;
+        }
         captures.insert(0, (view.crop.corners_px, capture.clone()));
-        on = wall_segments(store, stamp.map).await?;
+        on = wall_segments(store, map).await?;
     }
     let teaching = teaching.clone();
     let work = move || Prepared {
@@ -159,8 +236,9 @@ async fn prepare(store: &Store, teaching: &Arc<Teaching>) -> Result<Prepared, St
             .view
             .capture
             .is_some()
-            .then(|| landmark_placement::place_landmark(&captures, &on, &stamp.geometry)),
-        stamp,
+            .then(|| landmark_placement::place_landmark(&captures, &on, &geometry)),
+        basis,
+        geometry,
     };
     computed(store, "a view", work).await
 }
@@ -179,17 +257,14 @@ async fn write(
     prepared: Prepared,
 ) -> Result<(ViewRow, UploadOutcome, Option<PlacementReport>), StoreError> {
     let Teaching { map, landmark, view, max, .. } = new;
-    if stamp(&mut tx.conn, map, landmark).await?.as_ref() != Some(&prepared.stamp) {
-        return Err(StoreError::Changed);
-    }
-    let number = prepared.stamp.landmark;
+    let (of_map, number) = landmark_for(tx, new, &prepared).await?;
     if let Some(row) = views::same(tx, number, view).await? {
         return Ok((row, UploadOutcome::Duplicate, None));
     }
     if let Some(id) = prepared.near_duplicate {
         return Ok((views::get(&mut tx.conn, id).await?, UploadOutcome::NearDuplicate, None));
     }
-    let row = views::add(tx, (prepared.stamp.map, number), view, *max).await?;
+    let row = views::add(tx, (of_map, number), view, *max).await?;
     let placement = match prepared.placement {
         Some(outcome) => Some(landmark_placement::put(tx, map, landmark, outcome).await?),
         None => None,
@@ -225,7 +300,7 @@ mod tests {
     fn teaching(number: u8) -> Teaching {
         let (map, landmark) = ("a".to_owned(), "p1".to_owned());
         let view = seen_from(1.0 + f64::from(number) * 0.4, number, 0.0);
-        Teaching { map, landmark, view, max: 9, novelty: None }
+        Teaching { map, landmark, view, max: 9, novelty: None, size: None, create: None }
     }
 
     /// Prepares a view, lets `meanwhile` happen, and writes: was it refused, so that it is prepared again?

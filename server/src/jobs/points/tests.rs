@@ -50,7 +50,9 @@ async fn teach(store: &Catalogue, landmark: &str, image: &GrayImage, bytes: Vec<
         capture: None,
     };
     let (map, landmark) = ("a".to_owned(), landmark.to_owned());
-    teaching::add(store, Teaching { map, landmark, view, max: 9, novelty: None }).await.unwrap();
+    teaching::add(store, Teaching { map, landmark, view, max: 9, novelty: None, size: None, create: None })
+        .await
+        .unwrap();
 }
 
 fn png(image: &GrayImage) -> Vec<u8> {

@@ -66,7 +66,7 @@ pub(in crate::store) fn seen_from(x: f64, number: u8, shift_px: f64) -> NewView 
 
 async fn taught(store: &Catalogue, view: NewView) -> PlacementReport {
     let (map, landmark) = ("a".to_owned(), "p1".to_owned());
-    let teaching = Teaching { map, landmark, view, max: 100, novelty: None };
+    let teaching = Teaching { map, landmark, view, max: 100, novelty: None, size: None, create: None };
     teaching::add(store, teaching).await.unwrap().2.unwrap()
 }
 

@@ -1,0 +1,148 @@
+//! Views that make their landmark, sizes given with views, and landmarks that are renamed.
+
+use super::*;
+use crate::store::{jobs, landmarks};
+use engine::picture;
+use serde_json::json;
+use std::fmt::Write as _;
+
+/// Grey blocks, another number, other blocks: PNG.
+fn blocks(number: usize) -> Vec<u8> {
+    let grey = |i: usize| {
+        let (u, v) = (i % 240, i / 240);
+        let block = |size: usize| (u / size * 31 + v / size * 57 + size + number * 7919) as u64;
+        let hash = |x: u64| (x.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 48) % 128;
+        (hash(block(24)) + hash(block(60))) as u8
+    };
+    picture::png(240, 240, &(0..240 * 240).map(grey).collect::<Vec<_>>()).unwrap()
+}
+
+impl Service {
+    /// Uploads a view of `landmark` of the map `hall`, with these parts beside the picture.
+    async fn upload(&self, landmark: &str, image: Vec<u8>, parts: &[(&str, &str)]) -> (u16, Value) {
+        let mut text = String::new();
+        for (name, value) in parts {
+            write!(text, "--b\r\ncontent-disposition: form-data; name=\"{name}\"\r\n\r\n{value}\r\n")
+                .unwrap();
+        }
+        text.push_str("--b\r\ncontent-disposition: form-data; name=\"image\"; filename=\"i\"\r\n\r\n");
+        let body = [text.into_bytes(), image, b"\r\n--b--\r\n".to_vec()].concat();
+        let request = Request::builder()
+            .method("POST")
+            .uri(format!("/api/v1/maps/hall/landmarks/{landmark}/views"))
+            .header(header::HOST, "localhost")
+            .header(header::CONTENT_TYPE, "multipart/form-data; boundary=b")
+            .body(Body::from(body))
+            .unwrap();
+        read(self.ask(request).await).await
+    }
+
+    async fn patch(&self, landmark: &str, body: Value) -> (u16, Value) {
+        let path = format!("/api/v1/maps/hall/landmarks/{landmark}");
+        read(self.ask(request("PATCH", &path, body.to_string())).await).await
+    }
+
+    async fn landmark(&self, name: &str) -> (u16, Value) {
+        self.get(&format!("/api/v1/maps/hall/landmarks/{name}")).await
+    }
+}
+
+const WHOLE: (&str, &str) = ("whole_image", "true");
+const CREATE: (&str, &str) = ("create", "true");
+const SIZE: [(&str, &str); 2] = [("width_m", "0.6"), ("height_m", "0.84")];
+
+#[tokio::test]
+async fn a_landmark_is_made_with_its_first_view_or_not_at_all() {
+    let service = Service::start(Limits { landmarks: 1, ..Limits::default() }).await;
+    let refused = |answer: (u16, Value)| (answer.0, answer.1["code"].as_str().unwrap_or_default().to_owned());
+    let nothing = async || assert_eq!(service.landmark("poster").await.0, 404);
+
+    assert_eq!(
+        refused(service.upload("poster", blocks(1), &[WHOLE]).await),
+        (404, "unknown_landmark".into())
+    );
+    // Blank: there is no quad to take.
+    let blank = picture::png(240, 240, &[128; 240 * 240]).unwrap();
+    assert_eq!(refused(service.upload("poster", blank, &[CREATE]).await), (422, "quad_not_found".into()));
+    nothing().await;
+    let corners = ("corners", "[[500,0],[600,0],[600,100],[500,100]]");
+    assert_eq!(
+        refused(service.upload("poster", blocks(1), &[CREATE, corners]).await),
+        (422, "outside".into())
+    );
+    nothing().await;
+    assert_eq!(
+        refused(service.upload("Poster", blocks(1), &[CREATE, WHOLE]).await),
+        (422, "bad_name".into())
+    );
+    assert_eq!(
+        refused(service.upload("poster", blocks(1), &[CREATE, WHOLE, SIZE[0]]).await),
+        (422, "missing".into())
+    );
+    let huge = [CREATE, WHOLE, SIZE[0], ("height_m", "500")];
+    assert_eq!(refused(service.upload("poster", blocks(1), &huge).await), (422, "out_of_range".into()));
+    nothing().await;
+
+    let (status, view) = service.upload("poster", blocks(1), &[CREATE, WHOLE, SIZE[0], SIZE[1]]).await;
+    assert_eq!((status, &view["outcome"]), (201, &json!("new")), "{view}");
+    let (_, made) = service.landmark("poster").await;
+    assert_eq!((&made["size"], &made["views"]), (&json!({ "width_m": 0.6, "height_m": 0.84 }), &json!(1)));
+    // A second landmark is one too many.
+    assert_eq!(refused(service.upload("other", blocks(2), &[CREATE, WHOLE]).await), (409, "too_many".into()));
+}
+
+#[tokio::test]
+async fn a_size_given_again_is_applied_or_refused() {
+    let service = Service::start(Limits::default()).await;
+    assert_eq!(service.upload("poster", blocks(1), &[CREATE, WHOLE]).await.0, 201);
+    assert_eq!(service.landmark("poster").await.1["size"], Value::Null);
+    // The same picture: the view is there already, and the size is set.
+    let (status, view) = service.upload("poster", blocks(1), &[WHOLE, SIZE[0], SIZE[1]]).await;
+    assert_eq!((status, &view["outcome"]), (200, &json!("duplicate")));
+    let size = json!({ "width_m": 0.6, "height_m": 0.84 });
+    assert_eq!(service.landmark("poster").await.1["size"], size);
+    // The same again is fine, another one is not, and then the view is not stored.
+    assert_eq!(service.upload("poster", blocks(2), &[CREATE, WHOLE, SIZE[0], SIZE[1]]).await.0, 201);
+    let other = [CREATE, WHOLE, ("width_m", "60"), ("height_m", "84")];
+    let (status, problem) = service.upload("poster", blocks(3), &other).await;
+    assert_eq!((status, &problem["code"]), (409, &json!("size_differs")), "{problem}");
+    assert_eq!(problem["stored"], size);
+    assert_eq!(problem["given"], json!({ "width_m": 60.0, "height_m": 84.0 }));
+    assert!(problem["detail"].as_str().unwrap().contains("0.6 x 0.84 m, not 60 x 84 m"), "{problem}");
+    assert_eq!(service.landmark("poster").await.1["views"], 2);
+}
+
+#[tokio::test]
+async fn what_belongs_to_a_landmark_follows_its_new_name() {
+    let service = Service::start(Limits::default()).await;
+    for (name, number) in [("poster", 1), ("door", 2)] {
+        assert_eq!(service.upload(name, blocks(number), &[CREATE, WHOLE]).await.0, 201);
+    }
+    assert_eq!(service.patch("poster", json!({ "name": "door" })).await.1["code"], "exists");
+    assert_eq!(service.patch("poster", json!({ "name": "A door" })).await.1["code"], "bad_name");
+    assert_eq!(service.patch("nothing", json!({ "name": "else" })).await.1["code"], "unknown_landmark");
+    // A job that waits, as one does that was interrupted.
+    let queue = service.store.write(|tx| {
+        let request = r#"{"landmarks":["door","poster"]}"#;
+        Box::pin(async move { jobs::create(tx, "learn", "hall", request, (9, 9)).await })
+    });
+    let job = queue.await.unwrap().id;
+    let id = landmarks::get(service.store.reads(), "hall", "poster").await.unwrap().id;
+
+    let place = json!({ "x_m": 1.0, "y_m": 2.0, "z_m": 1.5, "theta_rad": 0.0 });
+    let (status, renamed) = service.patch("poster", json!({ "name": "picture", "place": place })).await;
+    assert_eq!((status, &renamed["name"], &renamed["place"]), (200, &json!("picture"), &place), "{renamed}");
+    assert_eq!((service.landmark("poster").await.0, service.landmark("picture").await.0), (404, 200));
+    let row = landmarks::get(service.store.reads(), "hall", "picture").await.unwrap();
+    assert_eq!((row.id, row.views), (id, 1));
+    let snapshot = service.store.snapshots().get("hall").unwrap();
+    assert!(snapshot.landmarks.values().any(|l| l.name == "picture"));
+    let waiting = jobs::get(service.store.reads(), job).await.unwrap();
+    assert_eq!(waiting.request, r#"{"landmarks":["door","picture"]}"#);
+    // A finding of a frame that was looked at before comes to the landmark by its number.
+    let name = service.store.write(move |tx| {
+        let id = vision::model::LandmarkId(id as u64);
+        Box::pin(async move { landmarks::name_of(tx, "hall", id).await })
+    });
+    assert_eq!(name.await.unwrap(), "picture");
+}
