@@ -13,7 +13,7 @@ import argparse
 import re
 from pathlib import Path
 
-from waymark import MapClient, Refused, Size, named_landmarks
+from waymark import MapClient, Refused, Region, Size, named_landmarks
 
 
 def main() -> None:
@@ -38,8 +38,9 @@ def main() -> None:
         names = []
         for path in map(Path, arguments.images):
             name = re.sub("[^a-z0-9_-]", "-", path.stem.lower())[:64]
-            maps.add_landmark(arguments.map, name, size)
-            view = maps.upload_view(arguments.map, name, path, "whole_image" if arguments.whole_image else "detect")
+            region: Region = "whole_image" if arguments.whole_image else "detect"
+            # The landmark is made with its first view: nothing is left behind if the view is refused.
+            view = maps.upload_view(arguments.map, name, path, region, make_landmark=True, size=size)
             print(f"{name}: corners {[(round(u), round(v)) for u, v in view.corners]}")
             names.append(name)
 
@@ -47,7 +48,7 @@ def main() -> None:
         maps.wait_for_job(maps.learn(arguments.map, names), progress=lambda job: print(f"{job.progress:4.0%}"))
         for name in names:
             landmark = maps.landmark(arguments.map, name)
-            print(f"{name}: {landmark.status}", *(gate.detail for gate in landmark.failed_gates))
+            print(f"{name}: {landmark.status}", *landmark.failed_gates)
         if arguments.robot:
             maps.put_robot(arguments.robot, arguments.map)
 

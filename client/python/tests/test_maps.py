@@ -193,6 +193,28 @@ def test_landmarks_are_placed_taught_and_learnt(server: Server) -> None:
         assert learnt.model is not None and learnt.model.generated_views == 4 and learnt.model.facts
 
 
+def test_a_landmark_is_made_with_its_first_view_renamed_and_refused_for_its_likeness(server: Server) -> None:
+    photo = pictures.teaching_photo(5)
+    size = Size(*pictures.SIZE_M)
+    with server.maps() as maps:
+        maps.create_map("first-views")
+        with pytest.raises(Refused):
+            maps.upload_view("first-views", "first", Image.gray(bytes(64 * 48), (64, 48)), make_landmark=True)
+        assert maps.landmarks("first-views") == (), "nothing is left behind"
+        maps.upload_view("first-views", "first", photo, make_landmark=True, size=size)
+        with pytest.raises(Refused) as differs:
+            maps.upload_view("first-views", "first", photo, size=Size(1.0, 2.0))
+        assert differs.value.code == "size_differs" and {"stored", "given"} <= set(differs.value.more)
+        maps.upload_view("first-views", "again", photo, make_landmark=True, size=size)
+        maps.wait_for_job(maps.learn("first-views"), SOON_S * 2)
+        why = [gate for landmark in maps.landmarks("first-views") for gate in landmark.failed_gates]
+        assert {gate.gate for gate in why} & {"looks_like", "by_pose_only"}, why
+        assert any(gate.look_alike is not None and gate.look_alike.gradient_similarity > 0.8 for gate in why)
+        assert str(why[0]) == f"{why[0].sentence} {why[0].advice}"
+        assert maps.update_landmark("first-views", "again", name="second").name == "second"
+        assert [each.name for each in maps.landmarks("first-views")] == ["first", "second"]
+
+
 def test_refused_photographs_say_what_to_do(server: Server) -> None:
     plain = Image.gray(bytes(64 * 48), (64, 48))
     with server.maps() as maps:

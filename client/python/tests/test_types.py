@@ -39,7 +39,6 @@ NOT_DESCRIBED = {
     "LiveMapChange",
     "LiveMissed",
     # Objects without a schema of their own.
-    "FailedGate",
     "MultiPolygon",
     "VisibilityAreaBody",
     "VisibilityAreaProperties",

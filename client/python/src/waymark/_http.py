@@ -20,6 +20,7 @@ from waymark.api import (
     LivePose,
     LivePosition,
     LivePresence,
+    Size,
 )
 from waymark.errors import InvalidInput, JobFailed, Refused, Unexpected, Unreachable
 from waymark.image import Picture, as_image
@@ -171,7 +172,13 @@ def parsed_items(kind: Any, items: Sequence[Any], response: httpx.Response) -> l
         raise Unexpected(f"{response.url} answered something unexpected ({error})") from error
 
 
-def view_form(region: Region, capture: CaptureMetadata | None, keep_near_duplicate: bool) -> dict[str, str]:
+def view_form(
+    region: Region,
+    capture: CaptureMetadata | None,
+    keep_near_duplicate: bool,
+    make_landmark: bool,
+    size: Size | None,
+) -> dict[str, str]:
     """The parts of an upload besides the picture."""
     form: dict[str, str] = {}
     if region == "whole_image":
@@ -182,6 +189,10 @@ def view_form(region: Region, capture: CaptureMetadata | None, keep_near_duplica
         form["capture"] = json.dumps(to_json(capture))
     if keep_near_duplicate:
         form["keep_near_duplicate"] = "true"
+    if make_landmark:
+        form["create"] = "true"
+    if size is not None:
+        form |= {"width_m": repr(float(size.width_m)), "height_m": repr(float(size.height_m))}
     return form
 
 

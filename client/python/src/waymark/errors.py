@@ -15,6 +15,7 @@ ADVICE: dict[str, str] = {
     "no_views": "upload a photograph first: `MapClient.upload_view`",
     "quad_not_found": 'give `region=corners`, or `region="whole_image"` if the picture shows the landmark alone',
     "quad_ambiguous": 'crop the picture, or give one of `error.more["quads"]` as `region`',
+    "size_differs": "measure again; `MapClient.update_landmark(..., size=...)` sets another size",
     "epoch_conflict": "another program uses this robot's name: stop one of them",
     "clock_ahead": "stamp all messages of a robot by one clock, at capture",
     "clock_behind": "stamp all messages of a robot by one clock, at capture",

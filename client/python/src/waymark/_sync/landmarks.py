@@ -57,12 +57,13 @@ class Landmarks(Base):
         map: str,
         landmark: str,
         *,
+        name: str | Unset = UNSET,
         size: Size | Unset | None = UNSET,
         place: Place | Unset | None = UNSET,
         health: LandmarkHealth | Unset = UNSET,
     ) -> Landmark:
-        """Sets size, place and health. What is not given stays; `None` forgets."""
-        body = given(size=size, place=place, health=health)
+        """Renames a landmark; sets size, place and health. What is not given stays; `None` forgets."""
+        body = given(name=name, size=size, place=place, health=health)
         return self._send(Landmark, "update_landmark", map, landmark, json=body)
 
     def delete_landmark(self, map: str, landmark: str) -> None:
@@ -85,9 +86,15 @@ class Landmarks(Base):
         *,
         capture: CaptureMetadata | None = None,
         keep_near_duplicate: bool = False,
+        make_landmark: bool = False,
+        size: Size | None = None,
     ) -> TrainingView:
-        """Adds a training view: a photograph, and the part of it that shows the landmark."""
-        form = view_form(region, capture, keep_near_duplicate)
+        """Adds a training view: a photograph, and the part of it that shows the landmark.
+
+        `make_landmark`: makes the landmark if there is none of this name, together with this view or not at all.
+        `size`: refused with `size_differs` if the landmark has another one by hand.
+        """
+        form = view_form(region, capture, keep_near_duplicate, make_landmark, size)
         return self._send(TrainingView, "upload_view", map, landmark, files=picture_part(image), data=form)
 
     def views(self, map: str, landmark: str) -> tuple[TrainingView, ...]:

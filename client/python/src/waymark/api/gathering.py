@@ -60,7 +60,8 @@ class EstimatedPlace:
 
 @dataclass(frozen=True, slots=True)
 class TrackSummary:
-    """An object that a robot drove past, for a person to decide on. `reasons` say what does not pass."""
+    """An object that a robot drove past, for a person to decide on. `failed_gates` say what speaks against
+    it."""
 
     number: int
     sightings: int
@@ -70,7 +71,7 @@ class TrackSummary:
     side_px: Point2
     v_c: float
     passes: bool
-    reasons: tuple[FailedGate, ...]
+    failed_gates: tuple[FailedGate, ...]
     similar_tracks: tuple[int, ...]
     landmark: str | None = None
     best_view: int | None = None

@@ -47,14 +47,41 @@ class PlaceSigma:
     height_m: float
 
 
+Gate = Literal[
+    "views",
+    "saliency",
+    "stable_points",
+    "content",
+    "visibility_confidence",
+    "not_distinct",
+    "looks_like",
+    "by_pose_only",
+    "stored_model",
+    "similar_tracks",
+    "known_landmark",
+]
+
+
+@dataclass(frozen=True, slots=True)
+class LookAlikeBody:
+    """A landmark that looks like another one."""
+
+    landmark: str
+    gradient_similarity: float
+
+
 @dataclass(frozen=True, slots=True)
 class FailedGate:
-    """A quality gate that a model fails: `gate` is stable, `detail` says what is wrong, `facts` are its other
-    fields, such as `value` and `limit`."""
+    """Why a landmark is not in use, or a track should not become one: the gate, one sentence, one advice; the other
+    landmark with `looks_like` and `by_pose_only`."""
 
-    gate: str = ""
-    detail: str = ""
-    facts: dict[str, Any] = field(default_factory=dict, metadata={REST: True})
+    gate: Gate
+    sentence: str
+    advice: str
+    look_alike: LookAlikeBody | None = None
+
+    def __str__(self) -> str:
+        return f"{self.sentence} {self.advice}"
 
 
 @dataclass(frozen=True, slots=True)
