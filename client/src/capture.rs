@@ -32,6 +32,32 @@ impl Capture {
         Self::new(v1::ImageEncoding::Gray8, image.width() as u32, image.height() as u32, bytes)
     }
 
+    /// Raw pixels, sent as they are: rows from the top without padding, `encoding` GRAY8 (mono8), RGB8 or BGR8. The
+    /// capture time is now. Error: not the bytes of `width_px` x `height_px` pixels of a raw encoding.
+    pub fn raw(
+        encoding: v1::ImageEncoding,
+        (width_px, height_px): (u32, u32),
+        pixels: impl Into<Bytes>,
+    ) -> Result<Self, ClientError> {
+        let each = match encoding {
+            v1::ImageEncoding::Gray8 => 1,
+            v1::ImageEncoding::Rgb8 | v1::ImageEncoding::Bgr8 => 3,
+            other => {
+                let detail = format!("{} is not an encoding of raw pixels", other.as_str_name());
+                return Err(ClientError::Image(detail));
+            }
+        };
+        let pixels = pixels.into();
+        let expected = (u64::from(width_px) * u64::from(height_px)).saturating_mul(each);
+        if expected == 0 || pixels.len() as u64 != expected {
+            let given = pixels.len();
+            let detail =
+                format!("{given} bytes of pixels, {expected} expected for {width_px} x {height_px} px");
+            return Err(ClientError::Image(detail));
+        }
+        Ok(Self::new(encoding, width_px, height_px, pixels))
+    }
+
     fn new(encoding: v1::ImageEncoding, width_px: u32, height_px: u32, image: Bytes) -> Self {
         let captured_ns = now_ns();
         let encoding = encoding.into();
@@ -174,6 +200,20 @@ mod tests {
         png.extend([0, 0, 1, 0, 0, 0, 0, 200]);
         let capture = Capture::encoded(png).unwrap();
         assert_eq!((capture.size_px(), capture.frame.encoding()), ((256, 200), v1::ImageEncoding::Png));
+    }
+
+    #[test]
+    fn raw_pixels_are_counted() {
+        use v1::ImageEncoding::{Bgr8, Gray8, Jpeg, Rgb8};
+        for (encoding, each) in [(Gray8, 1), (Rgb8, 3), (Bgr8, 3)] {
+            let of = |bytes: usize| Capture::raw(encoding, (4, 3), vec![7; bytes]);
+            let capture = of(12 * each).unwrap();
+            assert_eq!((capture.size_px(), capture.frame.encoding()), ((4, 3), encoding));
+            assert!(of(12 * each + 1).is_err() && of(12 * each - 1).is_err());
+        }
+        assert!(Capture::raw(Rgb8, (0, 3), Vec::new()).is_err());
+        assert!(Capture::raw(Jpeg, (4, 3), vec![0; 12]).is_err());
+        assert!(Capture::raw(Rgb8, (u32::MAX, u32::MAX), vec![0; 12]).is_err());
     }
 
     #[test]

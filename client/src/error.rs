@@ -53,8 +53,8 @@ pub enum ClientError {
         /// The frame.
         seq: u64,
     },
-    /// Neither JPEG nor PNG.
-    #[error("not a JPEG or PNG image, or its header is damaged: {0}")]
+    /// Neither JPEG nor PNG, or raw pixels of another number.
+    #[error("not a JPEG or PNG image, a damaged header, or raw pixels of another size: {0}")]
     Image(String),
     /// The HTTP server cannot be reached or broke off.
     #[error("no answer from {url}: is `waymark serve` running there? ({detail})")]

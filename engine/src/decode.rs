@@ -1,6 +1,6 @@
 //! Decodes images. In: encoded bytes. Out: a checked grey image within limits of bytes and pixels. Nothing else calls the
 //! decoders: the size is read from the header and checked before any pixel is unpacked, and metadata is ignored. JPEG gives
-//! luma directly; the colours of PNG are weighted as JPEG weights them, so that both give the same grey.
+//! luma directly; the colours of PNG and of raw pixels are weighted as JPEG weights them, so that all give the same grey.
 
 use image::{ColorType, ImageDecoder, Limits, codecs::png::PngDecoder};
 use protos::{CheckedFrame, Code, Rejection, convert::Encoding};
@@ -44,6 +44,8 @@ pub fn decode_frame(frame: &CheckedFrame, limits: ImageLimits) -> Result<GrayIma
     check_size(claimed, limits)?;
     match frame.encoding {
         Encoding::Gray8 => gray(claimed, frame.image.to_vec()),
+        Encoding::Rgb8 => gray(claimed, from_rgb(&frame.image)),
+        Encoding::Bgr8 => gray(claimed, from_bgr(&frame.image)),
         Encoding::Jpeg => jpeg(&frame.image, Some(claimed), limits),
         Encoding::Png => png(&frame.image, Some(claimed), limits),
     }
@@ -92,7 +94,7 @@ fn jpeg(bytes: &[u8], claimed: Option<(usize, usize)>, limits: ImageLimits) -> R
     // Rare colour spaces (RGB, CMYK) go through RGB.
     decoder.set_options(options.jpeg_set_out_colorspace(ColorSpace::RGB));
     let rgb = decoder.decode().map_err(|e| bad("JPEG", &e))?;
-    gray(size, rgb.chunks_exact(3).map(|p| luma(p[0], p[1], p[2])).collect())
+    gray(size, from_rgb(&rgb))
 }
 
 fn png(bytes: &[u8], claimed: Option<(usize, usize)>, limits: ImageLimits) -> Result<GrayImage, Rejection> {
@@ -127,7 +129,7 @@ fn to_gray(raw: &[u8], colours: ColorType) -> Result<Vec<u8>, Rejection> {
     Ok(match colours {
         ColorType::L8 => raw.to_vec(),
         ColorType::La8 => raw.chunks_exact(2).map(|p| p[0]).collect(),
-        ColorType::Rgb8 => raw.chunks_exact(3).map(|p| luma(p[0], p[1], p[2])).collect(),
+        ColorType::Rgb8 => from_rgb(raw),
         ColorType::Rgba8 => raw.chunks_exact(4).map(|p| luma(p[0], p[1], p[2])).collect(),
         ColorType::L16 => raw.chunks_exact(2).map(high).collect(),
         ColorType::La16 => raw.chunks_exact(4).map(high).collect(),
@@ -139,6 +141,16 @@ fn to_gray(raw: &[u8], colours: ColorType) -> Result<Vec<u8>, Rejection> {
         }
         other => return Err(bad("PNG", &format!("colours {other:?} are not supported"))),
     })
+}
+
+/// Grey of pixels of red, green and blue.
+fn from_rgb(pixels: &[u8]) -> Vec<u8> {
+    pixels.chunks_exact(3).map(|p| luma(p[0], p[1], p[2])).collect()
+}
+
+/// Grey of pixels of blue, green and red.
+fn from_bgr(pixels: &[u8]) -> Vec<u8> {
+    pixels.chunks_exact(3).map(|p| luma(p[2], p[1], p[0])).collect()
 }
 
 /// ITU-R BT.601 luma, the Y of JPEG, in 16-bit fixed point (the weights add up to 65 536).

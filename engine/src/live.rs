@@ -2,6 +2,7 @@
 //! frames, answers and poses of the bus and the workers. Out: copies for readers, who never hold up a worker: a slow reader
 //! misses events. Nothing is stored on disk, and every collection is bounded.
 
+use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 use map::pose2::{Pose2, Pose2Covariance};
 use protos::{
     Name,
@@ -44,20 +45,28 @@ pub struct LiveFrame {
 }
 
 impl LiveFrame {
-    /// The image in a form that browsers show: its media type and bytes. Raw grey becomes PNG.
+    /// The image in a form that browsers show: its media type and bytes. Raw pixels become PNG.
     pub fn for_browsers(&self) -> Result<(&'static str, Bytes), image::ImageError> {
         match self.encoding {
             Encoding::Jpeg => Ok(("image/jpeg", self.image.clone())),
             Encoding::Png => Ok(("image/png", self.image.clone())),
-            Encoding::Gray8 => {
-                let mut out = Vec::new();
-                let encoder = image::codecs::png::PngEncoder::new(&mut out);
-                let (width, height) = (self.width_px, self.height_px);
-                let gray = image::ExtendedColorType::L8;
-                image::ImageEncoder::write_image(encoder, &self.image, width, height, gray)?;
-                Ok(("image/png", out.into()))
+            Encoding::Gray8 => self.png(&self.image, ExtendedColorType::L8),
+            Encoding::Rgb8 => self.png(&self.image, ExtendedColorType::Rgb8),
+            Encoding::Bgr8 => {
+                let rgb: Vec<u8> = self.image.chunks_exact(3).flat_map(|p| [p[2], p[1], p[0]]).collect();
+                self.png(&rgb, ExtendedColorType::Rgb8)
             }
         }
+    }
+
+    fn png(
+        &self,
+        pixels: &[u8],
+        colours: ExtendedColorType,
+    ) -> Result<(&'static str, Bytes), image::ImageError> {
+        let mut out = Vec::new();
+        PngEncoder::new(&mut out).write_image(pixels, self.width_px, self.height_px, colours)?;
+        Ok(("image/png", out.into()))
     }
 }
 

@@ -16,7 +16,7 @@ pub fn kind(bytes: &[u8]) -> Option<&'static str> {
     match decode::sniff(bytes)? {
         Encoding::Jpeg => Some("jpeg"),
         Encoding::Png => Some("png"),
-        Encoding::Gray8 => None,
+        Encoding::Gray8 | Encoding::Rgb8 | Encoding::Bgr8 => None,
     }
 }
 

@@ -516,8 +516,13 @@ pub enum ImageEncoding {
     Unspecified = 0,
     Jpeg = 1,
     Png = 2,
-    /// width_px * height_px bytes, row-major.
+    /// Raw pixels, rows from the top, without padding between rows: a client whose rows are padded leaves the padding out as
+    /// it fills the message. mono8 of ROS, an H x W array of OpenCV: width_px * height_px bytes.
     Gray8 = 3,
+    /// Red, green, blue of each pixel: 3 * width_px * height_px bytes. rgb8 of ROS.
+    Rgb8 = 4,
+    /// Blue, green, red: bgr8 of ROS, an H x W x 3 array of OpenCV.
+    Bgr8 = 5,
 }
 impl ImageEncoding {
     /// String value of the enum field names used in the ProtoBuf definition.
@@ -530,6 +535,8 @@ impl ImageEncoding {
             Self::Jpeg => "IMAGE_ENCODING_JPEG",
             Self::Png => "IMAGE_ENCODING_PNG",
             Self::Gray8 => "IMAGE_ENCODING_GRAY8",
+            Self::Rgb8 => "IMAGE_ENCODING_RGB8",
+            Self::Bgr8 => "IMAGE_ENCODING_BGR8",
         }
     }
     /// Creates an enum from field names used in the ProtoBuf definition.
@@ -539,6 +546,8 @@ impl ImageEncoding {
             "IMAGE_ENCODING_JPEG" => Some(Self::Jpeg),
             "IMAGE_ENCODING_PNG" => Some(Self::Png),
             "IMAGE_ENCODING_GRAY8" => Some(Self::Gray8),
+            "IMAGE_ENCODING_RGB8" => Some(Self::Rgb8),
+            "IMAGE_ENCODING_BGR8" => Some(Self::Bgr8),
             _ => None,
         }
     }

@@ -56,6 +56,22 @@ const ROWS: &[(Spoil, &str, &str)] = &[
         "size_mismatch",
         "image",
     ),
+    (
+        |f| {
+            f.encoding = ImageEncoding::Rgb8.into();
+            f.image = vec![0; 160 * 120].into();
+        },
+        "size_mismatch",
+        "image",
+    ),
+    (
+        |f| {
+            f.encoding = ImageEncoding::Bgr8.into();
+            f.image = vec![0; 3 * 160 * 120 + 1].into();
+        },
+        "size_mismatch",
+        "image",
+    ),
     // Numbers that are not finite or out of range.
     (
         |f| f.intrinsics = Some(v1::Intrinsics { fx_px: f64::NAN, ..camera() }),

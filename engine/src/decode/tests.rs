@@ -65,6 +65,30 @@ fn every_depth_and_colour_of_png_is_read() {
     assert_eq!(decode_upload(&rgb16, ImageLimits::UPLOAD).unwrap().data(), grey);
 }
 
+/// Every level of each colour, and mixtures.
+#[test]
+fn raw_colour_gives_the_grey_of_the_same_png() {
+    let rgb: Vec<u8> = (0..64 * 48_u32)
+        .flat_map(|i| [(i % 256) as u8, (i * 7 / 3 % 256) as u8, (i * i % 251) as u8])
+        .collect();
+    let bgr: Vec<u8> = rgb.chunks_exact(3).flat_map(|p| [p[2], p[1], p[0]]).collect();
+    let png = as_png(&rgb, 64, 48, ExtendedColorType::Rgb8);
+    let decode = |encoding, image| decode_frame(&frame(encoding, 64, 48, image), ImageLimits::FRAME).unwrap();
+    let expected = decode(v1::ImageEncoding::Png, png);
+    assert_eq!(decode(v1::ImageEncoding::Rgb8, rgb), expected);
+    assert_eq!(decode(v1::ImageEncoding::Bgr8, bgr), expected);
+}
+
+/// The server's own limits hold for raw frames as for others.
+#[test]
+fn raw_frames_at_the_bounds_of_the_server() {
+    let wire = frame(v1::ImageEncoding::Rgb8, 4, 3, vec![9; 36]);
+    let decode = |bytes, pixels| decode_frame(&wire, ImageLimits { bytes, pixels });
+    assert!(decode(36, 12).is_ok());
+    assert_eq!(refused(decode(35, 12)), (Code::TooLarge, "image".into()));
+    assert_eq!(refused(decode(36, 11)), (Code::TooLarge, "image".into()));
+}
+
 #[test]
 fn frames_must_be_what_they_claim() {
     let raw = rgb(40, 30);

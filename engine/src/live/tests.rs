@@ -53,6 +53,18 @@ fn raw_grey_becomes_png() {
 }
 
 #[test]
+fn raw_colour_becomes_png_of_the_same_colours() {
+    for (encoding, image) in [(Encoding::Rgb8, [200, 100, 50]), (Encoding::Bgr8, [50, 100, 200])] {
+        let image = Bytes::copy_from_slice(&image);
+        let (media, bytes) =
+            LiveFrame { encoding, width_px: 1, height_px: 1, image, ..frame(1) }.for_browsers().unwrap();
+        assert_eq!(media, "image/png");
+        let back = image::load_from_memory(&bytes).unwrap().into_rgb8();
+        assert_eq!(back.get_pixel(0, 0).0, [200, 100, 50], "{encoding:?}");
+    }
+}
+
+#[test]
 fn events_read_as_the_page_expects() {
     let hub = LiveHub::default();
     let mut events = hub.events();

@@ -9,8 +9,10 @@ use map::{
 use prost::bytes::Bytes;
 use vision::frame::Intrinsics;
 
-/// Largest image of a frame, in encoded bytes: holds raw grey of [`MAX_FRAME_PX`] pixels.
-pub const MAX_FRAME_IMAGE_BYTES: usize = 2_400_000;
+/// Largest JPEG or PNG image of a frame, in bytes.
+pub const MAX_ENCODED_IMAGE_BYTES: usize = 2_400_000;
+/// Largest image of a frame, in bytes: raw colour of [`MAX_FRAME_PX`] pixels.
+pub const MAX_FRAME_IMAGE_BYTES: usize = 3 * MAX_FRAME_PX as usize;
 /// Largest frame, in pixels (1920 x 1200).
 pub const MAX_FRAME_PX: u32 = 2_304_000;
 /// Longest side of a frame, in pixels.
@@ -27,6 +29,21 @@ pub enum Encoding {
     Png,
     /// One byte per pixel, row-major, uncompressed.
     Gray8,
+    /// Red, green and blue of each pixel, row-major, uncompressed.
+    Rgb8,
+    /// Blue, green and red of each pixel, row-major, uncompressed.
+    Bgr8,
+}
+
+impl Encoding {
+    /// Bytes of a pixel; `None` for a compressed image.
+    pub fn bytes_per_px(self) -> Option<usize> {
+        match self {
+            Self::Jpeg | Self::Png => None,
+            Self::Gray8 => Some(1),
+            Self::Rgb8 | Self::Bgr8 => Some(3),
+        }
+    }
 }
 
 /// A checked frame. The pixels are still encoded.
@@ -44,7 +61,7 @@ pub struct CheckedFrame {
     pub width_px: u32,
     /// Claimed height, px; compared with the decoded one later.
     pub height_px: u32,
-    /// Encoded image, at most [`MAX_FRAME_IMAGE_BYTES`].
+    /// Encoded image: at most [`MAX_ENCODED_IMAGE_BYTES`], or exactly the bytes of its pixels.
     pub image: Bytes,
     /// Intrinsics of the camera, where it is calibrated.
     pub intrinsics: Option<Intrinsics>,
@@ -68,8 +85,11 @@ impl TryFrom<v1::Frame> for CheckedFrame {
             v1::ImageEncoding::Jpeg => Encoding::Jpeg,
             v1::ImageEncoding::Png => Encoding::Png,
             v1::ImageEncoding::Gray8 => Encoding::Gray8,
+            v1::ImageEncoding::Rgb8 => Encoding::Rgb8,
+            v1::ImageEncoding::Bgr8 => Encoding::Bgr8,
             v1::ImageEncoding::Unspecified => {
-                let detail = format!("{} is none of JPEG (1), PNG (2), GRAY8 (3)", frame.encoding);
+                let known = "JPEG (1), PNG (2), GRAY8 (3), RGB8 (4), BGR8 (5)";
+                let detail = format!("{} is none of {known}", frame.encoding);
                 return Err(Rejection::new(Code::OutOfRange, "encoding", detail));
             }
         };
@@ -121,15 +141,17 @@ fn size(frame: &v1::Frame, encoding: Encoding) -> Result<(), Rejection> {
     if bytes == 0 {
         return Err(Rejection::new(Code::Missing, "image", "the image is empty"));
     }
-    if bytes > MAX_FRAME_IMAGE_BYTES {
-        let detail = format!("{bytes} bytes are more than {MAX_FRAME_IMAGE_BYTES}");
-        return Err(Rejection::new(Code::TooLarge, "image", detail));
+    match encoding.bytes_per_px().map(|each| each * area as usize) {
+        None if bytes > MAX_ENCODED_IMAGE_BYTES => {
+            let detail = format!("{bytes} bytes are more than {MAX_ENCODED_IMAGE_BYTES}");
+            Err(Rejection::new(Code::TooLarge, "image", detail))
+        }
+        Some(expected) if bytes != expected => {
+            let detail = format!("{bytes} bytes, {expected} expected for the claimed size");
+            Err(Rejection::new(Code::SizeMismatch, "image", detail))
+        }
+        _ => Ok(()),
     }
-    if encoding == Encoding::Gray8 && bytes != area as usize {
-        let detail = format!("{bytes} bytes, {area} expected for the claimed size");
-        return Err(Rejection::new(Code::SizeMismatch, "image", detail));
-    }
-    Ok(())
 }
 
 #[cfg(test)]
@@ -206,8 +228,30 @@ mod tests {
             let image = Bytes::from(vec![0; bytes]);
             CheckedFrame::try_from(v1::Frame { encoding: v1::ImageEncoding::Jpeg.into(), image, ..frame() })
         };
-        assert!(packed(MAX_FRAME_IMAGE_BYTES).is_ok());
-        assert_eq!(packed(MAX_FRAME_IMAGE_BYTES + 1).unwrap_err().code, Code::TooLarge);
+        assert!(packed(MAX_ENCODED_IMAGE_BYTES).is_ok());
+        assert_eq!(packed(MAX_ENCODED_IMAGE_BYTES + 1).unwrap_err().code, Code::TooLarge);
+    }
+
+    #[test]
+    fn raw_images_have_exactly_the_bytes_of_their_pixels() {
+        for (encoding, checked, each) in [
+            (v1::ImageEncoding::Gray8, Encoding::Gray8, 1),
+            (v1::ImageEncoding::Rgb8, Encoding::Rgb8, 3),
+            (v1::ImageEncoding::Bgr8, Encoding::Bgr8, 3),
+        ] {
+            let of = |(width_px, height_px): (u32, u32), bytes: usize| {
+                let image = Bytes::from(vec![0; bytes]);
+                let encoding = encoding.into();
+                CheckedFrame::try_from(v1::Frame { encoding, width_px, height_px, image, ..frame() })
+            };
+            assert_eq!(of((4, 3), 12 * each).unwrap().encoding, checked);
+            // The largest frame: more than an encoded image may have, where it is coloured.
+            assert!(of((1920, 1200), each * MAX_FRAME_PX as usize).is_ok());
+            for wrong in [12 * each - 1, 12 * each + 1, 2 * 12 * each] {
+                let refusal = of((4, 3), wrong).unwrap_err();
+                assert_eq!((refusal.code, refusal.field.as_str()), (Code::SizeMismatch, "image"));
+            }
+        }
     }
 
     #[test]

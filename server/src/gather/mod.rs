@@ -283,7 +283,9 @@ fn new_view(
     let (image, image_kind) = match frame.encoding {
         Encoding::Jpeg => (frame.image.to_vec(), "jpeg"),
         Encoding::Png => (frame.image.to_vec(), "png"),
-        Encoding::Gray8 => (picture::png(grey.width(), grey.height(), grey.data()).ok()?, "png"),
+        Encoding::Gray8 | Encoding::Rgb8 | Encoding::Bgr8 => {
+            (picture::png(grey.width(), grey.height(), grey.data()).ok()?, "png")
+        }
     };
     Some(NewView {
         image_sha256: Sha256::digest(&image).into(),

@@ -1,0 +1,96 @@
+"""Client of Waymark: landmarks and poses for robots, from their cameras.
+
+`Robot` and `AsyncRobot` are the robot's side, over zenoh: frames, odometry and scans go out, answers and poses come in.
+`MapClient` and `AsyncMapClient` are the teacher's side, over HTTP, with a method for every operation of the API.
+`Image` takes files and NumPy or OpenCV arrays. `waymark.wire` has the messages, `waymark.api` the bodies of the API.
+"""
+
+from waymark import api, wire
+from waymark._async.client import AsyncMapClient
+from waymark._async.landmarks import AsyncJobEvents
+from waymark._async.maps import AsyncLiveEvents
+from waymark._http import Region
+from waymark._link import Delivery, Subscription
+from waymark._sync.client import MapClient
+from waymark._sync.landmarks import JobEvents
+from waymark._sync.maps import LiveEvents
+from waymark._values import UNSET
+from waymark.api import CaptureMetadata, Job, Landmark, Map, Place, Size, WallBody
+from waymark.async_robot import AsyncInbox, AsyncRobot
+from waymark.errors import (
+    InvalidInput,
+    JobFailed,
+    JobTimeout,
+    NoAnswer,
+    Refused,
+    Superseded,
+    Unexpected,
+    Unreachable,
+    WaymarkError,
+)
+from waymark.image import Capture, Image
+from waymark.named import NamedLandmark, named, named_landmarks, quad_corners
+from waymark.robot import Inbox, Robot
+from waymark.wire import (
+    Answer,
+    CameraAnswer,
+    Intrinsics,
+    Pose2,
+    Pose2Covariance,
+    Pose3,
+    QuadAnswer,
+    RobotPose,
+    Scan,
+)
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "UNSET",
+    "Answer",
+    "AsyncInbox",
+    "AsyncJobEvents",
+    "AsyncLiveEvents",
+    "AsyncMapClient",
+    "AsyncRobot",
+    "CameraAnswer",
+    "Capture",
+    "CaptureMetadata",
+    "Delivery",
+    "Image",
+    "Inbox",
+    "Intrinsics",
+    "InvalidInput",
+    "Job",
+    "JobEvents",
+    "JobFailed",
+    "JobTimeout",
+    "Landmark",
+    "LiveEvents",
+    "Map",
+    "MapClient",
+    "NamedLandmark",
+    "NoAnswer",
+    "Place",
+    "Pose2",
+    "Pose2Covariance",
+    "Pose3",
+    "QuadAnswer",
+    "Refused",
+    "Region",
+    "Robot",
+    "RobotPose",
+    "Scan",
+    "Size",
+    "Subscription",
+    "Superseded",
+    "Unexpected",
+    "Unreachable",
+    "WallBody",
+    "WaymarkError",
+    "api",
+    "named",
+    "named_landmarks",
+    "quad_corners",
+    "wire",
+]

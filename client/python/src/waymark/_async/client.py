@@ -1,0 +1,17 @@
+"""The teacher's and the administrator's side, over HTTP: one method for each operation of the API."""
+
+from __future__ import annotations
+
+from waymark._async.landmarks import AsyncLandmarks
+from waymark._async.maps import AsyncMaps
+from waymark._async.robots import AsyncRobots
+
+
+class AsyncMapClient(AsyncMaps, AsyncLandmarks, AsyncRobots):
+    """A client of the server's HTTP interface, `http://127.0.0.1:8080` by default. Nothing is sent when it is made.
+
+    Errors: `Refused` with code, field, detail and status; `Unreachable`; `InvalidInput`; `Unexpected`.
+    """
+
+    async def __aenter__(self) -> AsyncMapClient:
+        return self

@@ -1,0 +1,149 @@
+"""Maps, their walls, and the server itself."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from waymark._async.base import AsyncBase, AsyncEvents, AsyncStream
+from waymark._http import live_event
+from waymark._values import UNSET, Unset, given, present, to_json
+from waymark.api import (
+    CoverageResponse,
+    Distance,
+    GazeRankingBody,
+    Health,
+    LiveEvent,
+    Map,
+    Parent,
+    PoseBody,
+    Readiness,
+    TransformResponse,
+    Version,
+    VisibilitySettingsBody,
+    VisibleResponse,
+    WallBody,
+    WallsBody,
+)
+from waymark.wire import GazeCriterion, Pose2
+
+
+class AsyncLiveEvents(AsyncStream[LiveEvent]):
+    """Answers, poses and changes of a map from now on. A reader that is too slow gets `LiveMissed`."""
+
+    def __init__(self, events: AsyncEvents) -> None:
+        super().__init__(events)
+
+    def _read(self, name: str, data: str) -> LiveEvent | None:
+        return live_event(name, data)
+
+
+class AsyncMaps(AsyncBase):
+    """Operations on maps."""
+
+    async def health(self) -> Health:
+        """Whether the process answers."""
+        return await self._send(Health, "health")
+
+    async def readiness(self) -> Readiness:
+        """Whether every part of the server runs; `Refused` with status 503 otherwise."""
+        return await self._send(Readiness, "readiness")
+
+    async def version(self) -> Version:
+        """Version of the server."""
+        return await self._send(Version, "version")
+
+    async def create_map(
+        self,
+        name: str,
+        *,
+        distance: Distance = "both",
+        site: str | None = None,
+        building: str | None = None,
+        floor: str | None = None,
+        parent: Parent | None = None,
+    ) -> Map:
+        """Creates an empty map; `Refused` with code `exists` if there is one of that name."""
+        body = present(name=name, distance=distance, site=site, building=building, floor=floor, parent=parent)
+        return await self._send(Map, "create_map", json=body)
+
+    async def maps(self) -> tuple[Map, ...]:
+        """All maps, by name."""
+        return await self._all(Map, "maps")
+
+    async def map(self, map: str) -> Map:
+        """One map."""
+        return await self._send(Map, "map", map)
+
+    async def locate_map(
+        self,
+        map: str,
+        *,
+        site: str | Unset | None = UNSET,
+        building: str | Unset | None = UNSET,
+        floor: str | Unset | None = UNSET,
+        parent: Parent | Unset | None = UNSET,
+    ) -> Map:
+        """Sets where a map is. What is not given stays; `None` forgets."""
+        body = given(site=site, building=building, floor=floor, parent=parent)
+        return await self._send(Map, "locate_map", map, json=body)
+
+    async def delete_map(self, map: str) -> None:
+        """Deletes a map and all that is in it."""
+        await self._done("delete_map", map)
+
+    async def transform(self, map: str, to: str, pose: Pose2 | None = None) -> TransformResponse:
+        """How a map lies in another one, and a pose converted by it."""
+        query = {"to": to, **(to_json(pose) if pose is not None else {})}
+        return await self._send(TransformResponse, "transform", map, params=query)
+
+    async def live_events(self, map: str) -> AsyncLiveEvents:
+        """Follows a map. Close the stream, or use it as a context manager."""
+        return AsyncLiveEvents(await self._stream("live_events", map))
+
+    async def set_walls(self, map: str, segments: Iterable[WallBody]) -> WallsBody:
+        """Replaces the walls; returns those stored."""
+        return await self._send(WallsBody, "set_walls", map, json={"segments": to_json(list(segments))})
+
+    async def walls(self, map: str) -> WallsBody:
+        """The walls, as stored."""
+        return await self._send(WallsBody, "walls", map)
+
+    async def visibility_settings(self, map: str) -> VisibilitySettingsBody:
+        """The camera that visibility is computed for, and what counts as seen; every field is there."""
+        return await self._send(VisibilitySettingsBody, "visibility_settings", map)
+
+    async def set_visibility_settings(self, map: str, settings: VisibilitySettingsBody) -> VisibilitySettingsBody:
+        """Replaces the visibility settings; absent fields take their defaults."""
+        return await self._send(VisibilitySettingsBody, "set_visibility_settings", map, json=to_json(settings))
+
+    async def visible(
+        self, map: str, pose: PoseBody, visibility_settings: VisibilitySettingsBody | None = None
+    ) -> VisibleResponse:
+        """Landmarks that may be visible from an uncertain pose."""
+        body = present(pose=pose, visibility_settings=visibility_settings)
+        return await self._send(VisibleResponse, "visible", map, json=body)
+
+    async def coverage(
+        self,
+        map: str,
+        path: Iterable[tuple[float, float]],
+        *,
+        step_m: float = 0.1,
+        visibility_settings: VisibilitySettingsBody | None = None,
+    ) -> CoverageResponse:
+        """Landmarks that are visible along a path (x, y in metres), and the parts without any."""
+        body = present(path=list(path), step_m=step_m, visibility_settings=visibility_settings)
+        return await self._send(CoverageResponse, "coverage", map, json=body)
+
+    async def gaze_ranking(
+        self,
+        map: str,
+        pose: PoseBody,
+        *,
+        head: dict[str, object] | None = None,
+        viewer: dict[str, object] | None = None,
+        criterion: GazeCriterion | None = None,
+    ) -> GazeRankingBody:
+        """Ranks landmarks as gaze targets from a pose. A robot that turns its camera uses `Robot.gaze`."""
+        body = present(pose=pose, head=head, viewer=viewer, criterion=criterion)
+        return await self._send(GazeRankingBody, "gaze_ranking", map, json=body)

@@ -1,0 +1,249 @@
+"""What both clients of the HTTP interface share: operations, paths, forms, refusals, events. Nothing here waits."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from typing import Any, Literal, TypeAlias
+from urllib.parse import quote
+
+import httpx
+
+from waymark._values import MismatchError, from_json, to_json
+from waymark.api import (
+    CaptureMetadata,
+    Job,
+    LiveAnswer,
+    LiveEvent,
+    LiveMapChange,
+    LiveMissed,
+    LivePose,
+    LivePosition,
+    LivePresence,
+    Size,
+)
+from waymark.errors import InvalidInput, JobFailed, Refused, Unexpected, Unreachable
+from waymark.image import Picture, as_image
+
+# Longest wait for one request, and longest silence of a stream, in seconds; the server sends something every 15 s.
+TIMEOUT_S = 60.0
+# Largest event, in bytes.
+MAX_EVENT_BYTES = 4 << 20
+# Period of polling a job, in seconds.
+JOB_POLL_S = 0.2
+
+# The part of an uploaded picture that shows the landmark: the dominant quad, which the server detects; the whole
+# picture; or its corners, top-left, top-right, bottom-right, bottom-left, in pixels.
+Region: TypeAlias = Literal["detect", "whole_image"] | Sequence[Sequence[float]]
+
+# Every operation of the API, by the name of the client's method: HTTP method, and path below /api/v1.
+OPERATIONS: dict[str, tuple[str, str]] = {
+    "cameras": ("GET", "/robots/{robot}/cameras"),
+    "calibrate_camera": ("POST", "/robots/{robot}/cameras/{camera}/calibrate"),
+    "camera_frame": ("GET", "/robots/{robot}/cameras/{camera}/frame"),
+    "camera_answer": ("GET", "/robots/{robot}/cameras/{camera}/answer"),
+    "start_gathering": ("POST", "/maps/{map}/gatherings"),
+    "gatherings": ("GET", "/maps/{map}/gatherings"),
+    "gathering": ("GET", "/maps/{map}/gatherings/{gathering}"),
+    "stop_gathering": ("POST", "/maps/{map}/gatherings/{gathering}/stop"),
+    "delete_gathering": ("DELETE", "/maps/{map}/gatherings/{gathering}"),
+    "tracks": ("GET", "/maps/{map}/gatherings/{gathering}/tracks"),
+    "discard_track": ("DELETE", "/maps/{map}/gatherings/{gathering}/tracks/{track}"),
+    "track_icon": ("GET", "/maps/{map}/gatherings/{gathering}/tracks/{track}/views/{view}/icon"),
+    "accept_tracks": ("POST", "/maps/{map}/gatherings/{gathering}/accept"),
+    "health": ("GET", "/healthz"),
+    "readiness": ("GET", "/readyz"),
+    "version": ("GET", "/version"),
+    "add_landmark": ("POST", "/maps/{map}/landmarks"),
+    "landmarks": ("GET", "/maps/{map}/landmarks"),
+    "landmark": ("GET", "/maps/{map}/landmarks/{landmark}"),
+    "update_landmark": ("PATCH", "/maps/{map}/landmarks/{landmark}"),
+    "delete_landmark": ("DELETE", "/maps/{map}/landmarks/{landmark}"),
+    "visibility_area": ("GET", "/maps/{map}/landmarks/{landmark}/visibility"),
+    "learn": ("POST", "/maps/{map}/learn"),
+    "learn_landmark": ("POST", "/maps/{map}/landmarks/{landmark}/learn"),
+    "job": ("GET", "/jobs/{job}"),
+    "cancel_job": ("DELETE", "/jobs/{job}"),
+    "job_events": ("GET", "/jobs/{job}/events"),
+    "live_events": ("GET", "/maps/{map}/live"),
+    "start_mapping": ("POST", "/maps/{map}/mapping"),
+    "mapping": ("GET", "/maps/{map}/mapping"),
+    "cancel_mapping": ("DELETE", "/maps/{map}/mapping"),
+    "finish_mapping": ("POST", "/maps/{map}/mapping/finish"),
+    "create_map": ("POST", "/maps"),
+    "maps": ("GET", "/maps"),
+    "map": ("GET", "/maps/{map}"),
+    "locate_map": ("PATCH", "/maps/{map}"),
+    "delete_map": ("DELETE", "/maps/{map}"),
+    "transform": ("GET", "/maps/{map}/transform"),
+    "modalities": ("GET", "/maps/{map}/modalities"),
+    "set_modalities": ("PUT", "/maps/{map}/modalities"),
+    "modalities_at": ("GET", "/maps/{map}/modalities/at"),
+    "recognise": ("POST", "/maps/{map}/recognise"),
+    "start_recording": ("POST", "/robots/{robot}/recording"),
+    "recording": ("GET", "/robots/{robot}/recording"),
+    "cancel_recording": ("DELETE", "/robots/{robot}/recording"),
+    "finish_recording": ("POST", "/robots/{robot}/recording/reference"),
+    "reference_runs": ("GET", "/maps/{map}/reference-runs"),
+    "delete_reference_run": ("DELETE", "/maps/{map}/reference-runs/{run}"),
+    "put_robot": ("PUT", "/robots/{robot}"),
+    "robots": ("GET", "/robots"),
+    "robot": ("GET", "/robots/{robot}"),
+    "delete_robot": ("DELETE", "/robots/{robot}"),
+    "corrections": ("GET", "/robots/{robot}/corrections"),
+    "relocalisation": ("GET", "/robots/{robot}/relocalisation"),
+    "trajectories": ("GET", "/robots/{robot}/trajectories"),
+    "upload_view": ("POST", "/maps/{map}/landmarks/{landmark}/views"),
+    "views": ("GET", "/maps/{map}/landmarks/{landmark}/views"),
+    "delete_view": ("DELETE", "/maps/{map}/landmarks/{landmark}/views/{view}"),
+    "view_icon": ("GET", "/maps/{map}/landmarks/{landmark}/views/{view}/icon"),
+    "visible": ("POST", "/maps/{map}/visible"),
+    "coverage": ("POST", "/maps/{map}/coverage"),
+    "gaze_ranking": ("POST", "/maps/{map}/gaze"),
+    "visibility_settings": ("GET", "/maps/{map}/visibility-settings"),
+    "set_visibility_settings": ("PUT", "/maps/{map}/visibility-settings"),
+    "set_walls": ("PUT", "/maps/{map}/walls"),
+    "walls": ("GET", "/maps/{map}/walls"),
+}
+
+_EVENTS: dict[str, Any] = {
+    "answer": LiveAnswer,
+    "pose": LivePose,
+    "odometry": LivePosition,
+    "truth": LivePosition,
+    "presence": LivePresence,
+    "map_changed": LiveMapChange,
+    "missed": LiveMissed,
+}
+
+
+def request_of(call: str, at: Sequence[str | int]) -> tuple[str, str]:
+    """HTTP method and path of an operation, with these values for the parameters of its path, in order."""
+    method, path = OPERATIONS[call]
+    values = iter(at)
+    made = "/api/v1"
+    for segment in path.split("/")[1:]:
+        if segment.startswith("{"):
+            text = str(next(values))
+            # Not a segment of a path, or one that URLs take for another path.
+            if text in ("", ".", ".."):
+                raise InvalidInput(f"{segment[1:-1]} {text!r} is no name", code="bad_name", field=segment[1:-1])
+            segment = quote(text, safe="")
+        made += f"/{segment}"
+    return method, made
+
+
+def refusal(response: httpx.Response) -> Refused:
+    """What an answer of an error says."""
+    try:
+        problem = response.json()
+    except ValueError:
+        problem = {}
+    if not isinstance(problem, dict):
+        problem = {}
+    known = {"type", "title", "status", "code", "field", "detail"}
+    return Refused(
+        problem.get("detail") or f"status {response.status_code} from {response.url}",
+        code=problem.get("code") or "unknown",
+        field=problem.get("field") or "",
+        status=response.status_code,
+        more={name: value for name, value in problem.items() if name not in known},
+    )
+
+
+def unreachable(base: str, error: httpx.HTTPError) -> Unreachable:
+    """No answer from the server."""
+    return Unreachable(f"no answer from {base}: {error or type(error).__name__}")
+
+
+def parsed(kind: Any, response: httpx.Response) -> Any:
+    """The body of an answer."""
+    try:
+        return from_json(kind, response.json())
+    except (MismatchError, ValueError) as error:
+        raise Unexpected(f"{response.url} answered something unexpected ({error})") from error
+
+
+def parsed_items(kind: Any, items: Sequence[Any], response: httpx.Response) -> list[Any]:
+    """The items of a page."""
+    try:
+        return [from_json(kind, item) for item in items]
+    except MismatchError as error:
+        raise Unexpected(f"{response.url} answered something unexpected ({error})") from error
+
+
+def view_form(
+    region: Region,
+    capture: CaptureMetadata | None,
+    keep_near_duplicate: bool,
+    make_landmark: bool,
+    size: Size | None,
+) -> dict[str, str]:
+    """The parts of an upload besides the picture."""
+    form: dict[str, str] = {}
+    if region == "whole_image":
+        form["whole_image"] = "true"
+    elif region != "detect":
+        form["corners"] = json.dumps([[float(x) for x in corner] for corner in region])
+    if capture is not None:
+        form["capture"] = json.dumps(to_json(capture))
+    if keep_near_duplicate:
+        form["keep_near_duplicate"] = "true"
+    if make_landmark:
+        form["create"] = "true"
+    if size is not None:
+        form |= {"width_m": repr(float(size.width_m)), "height_m": repr(float(size.height_m))}
+    return form
+
+
+def picture_part(picture: Picture) -> dict[str, tuple[str, bytes]]:
+    """A picture as a part of a form: raw pixels go as PNG."""
+    return {"image": ("image", bytes(as_image(picture).png().data))}
+
+
+def live_event(name: str, data: str) -> LiveEvent | None:
+    """An event of a map; `None` for one that a newer server may send and is not known here."""
+    kind = _EVENTS.get(name)
+    if kind is None:
+        return None
+    value = json.loads(data)
+    if kind is LiveMissed:
+        return LiveMissed(int(value))
+    if kind is LivePosition:
+        value["source"] = name
+    event: LiveEvent = from_json(kind, value)
+    return event
+
+
+def job_ended(job: Job) -> bool:
+    """Whether it is done; raises if it ended without success."""
+    if job.state in ("failed", "cancelled"):
+        raise JobFailed(f"job {job.id} {job.state}: {job.message}", code=f"job_{job.state}")
+    return job.state == "done"
+
+
+class EventParser:
+    """Cuts a stream of lines into events: name and data."""
+
+    def __init__(self) -> None:
+        self._names: list[str] = []
+        self._data: list[str] = []
+        self._bytes = 0
+
+    def push(self, line: str) -> Iterator[tuple[str, str]]:
+        """Takes a line without its end; yields the event that it ends. Comments are skipped."""
+        if line:
+            self._bytes += len(line)
+            if self._bytes > MAX_EVENT_BYTES:
+                raise Unexpected(f"an event of more than {MAX_EVENT_BYTES} bytes")
+            field, _, value = line.partition(":")
+            value = value.removeprefix(" ")
+            if field == "event":
+                self._names.append(value)
+            elif field == "data":
+                self._data.append(value)
+            return
+        names, data = self._names, self._data
+        self._names, self._data, self._bytes = [], [], 0
+        if names or data:
+            yield (names[-1] if names else "message", "\n".join(data))

@@ -1,0 +1,332 @@
+"""A robot's zenoh session, shared by `Robot` and `AsyncRobot`. Out: frames, odometry, scans, a liveliness token. In:
+answers, poses and changes of maps, handed to listeners on a thread of zenoh.
+
+Nothing here waits but `open`, the questions (`gaze`, `map_version`), and a put on a full link.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+import logging
+import re
+import secrets
+import threading
+import time
+from collections.abc import Callable
+from typing import Any, Generic, Literal, TypeVar
+
+import zenoh
+from google.protobuf.message import DecodeError, Message
+
+from waymark._values import fill, from_message
+from waymark.errors import InvalidInput, NoAnswer, Unexpected, Unreachable
+from waymark.image import Capture, Encoding, Image, Picture, as_image
+from waymark.v1 import waymark_pb2 as pb
+from waymark.wire import Answer, CameraAnswer, GazeAdvice, GazeRequest, MapChanged, Pose2, RobotPose, Scan
+
+T = TypeVar("T")
+M = TypeVar("M", bound=Message)
+Delivery = Literal["latest", "every"]
+Listener = Callable[[T], None]
+
+# Answers and poses that wait for a slow reader; beyond, it misses the oldest.
+INBOX = 64
+# Largest message taken from the server, in bytes.
+_MAX_MESSAGE_BYTES = 4 << 20
+# What a droppable message waits for room on the link, in microseconds.
+_DROP_US = 50_000
+_NAME = re.compile(r"[a-z0-9_-]{1,64}")
+_ENCODINGS: dict[Encoding, pb.ImageEncoding] = {
+    "jpeg": pb.IMAGE_ENCODING_JPEG,
+    "png": pb.IMAGE_ENCODING_PNG,
+    "gray8": pb.IMAGE_ENCODING_GRAY8,
+    "rgb8": pb.IMAGE_ENCODING_RGB8,
+    "bgr8": pb.IMAGE_ENCODING_BGR8,
+}
+_log = logging.getLogger("waymark")
+
+
+def name(field: str, text: str) -> str:
+    """The text, if it is a name."""
+    if not _NAME.fullmatch(text):
+        raise InvalidInput(f"{field} {text!r} is no name", code="bad_name", field=field)
+    return text
+
+
+class Subscription:
+    """Calls a function until it is closed. A context manager."""
+
+    def __init__(self, close: Callable[[], None]) -> None:
+        self._close: Callable[[], None] | None = close
+
+    def close(self) -> None:
+        """No more calls. No effect the second time."""
+        close, self._close = self._close, None
+        if close is not None:
+            close()
+
+    def __enter__(self) -> Subscription:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+class Listeners(Generic[T]):
+    """Functions that are called with what arrives."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        # Replaced as a whole: what is being called is not changed.
+        self._all: tuple[Listener[T], ...] = ()
+
+    def add(self, listener: Listener[T]) -> Subscription:
+        """Calls `listener` from now on."""
+        with self._lock:
+            self._all = (*self._all, listener)
+        return Subscription(lambda: self._remove(listener))
+
+    def _remove(self, listener: Listener[T]) -> None:
+        with self._lock:
+            self._all = tuple(each for each in self._all if each is not listener)
+
+    def __bool__(self) -> bool:
+        return bool(self._all)
+
+    def call(self, value: T) -> None:
+        """Calls all. An error in one is logged, and the others are called."""
+        for listener in self._all:
+            try:
+                listener(value)
+            except Exception:
+                _log.exception("a listener failed")
+
+
+class Link:
+    """An open session under a robot's name."""
+
+    def __init__(
+        self, robot: str, endpoint: str, fleet: str, delivery: Delivery, timeout_s: float, epoch: int | None
+    ) -> None:
+        self.robot = name("robot", robot)
+        self.endpoint = endpoint
+        prefix = f"waymark/1/{name('fleet', fleet)}"
+        self._maps = f"{prefix}/map"
+        self._own = f"{prefix}/robot/{robot}"
+        # 53 bits, so that JSON readers with doubles keep it whole.
+        self.epoch = epoch if epoch is not None else secrets.randbits(53) | 1
+        self._seq = itertools.count(1)
+        self._congestion = zenoh.CongestionControl.BLOCK if delivery == "every" else zenoh.CongestionControl.DROP
+        self.answers: Listeners[CameraAnswer] = Listeners()
+        self.poses: Listeners[RobotPose] = Listeners()
+        self._session = _open(endpoint, delivery, timeout_s)
+        try:
+            # Held: dropping them ends subscriptions and token.
+            self._held: list[Any] = [
+                self._session.declare_subscriber(f"{self._own}/answer/*", self._on_answer),
+                self._session.declare_subscriber(f"{self._own}/pose", self._on_pose),
+                self._session.liveliness().declare_token(f"{self._own}/alive/{self.epoch}"),
+            ]
+        except zenoh.ZError as error:
+            self._session.close()
+            raise Unreachable(f"zenoh could not subscribe at {endpoint}: {error}") from error
+
+    def close(self) -> None:
+        """Ends the session, and with it the robot's presence. No effect the second time."""
+        if not self._session.is_closed():
+            for each in self._held:
+                each.undeclare()
+            self._session.close()
+
+    def _on_answer(self, sample: zenoh.Sample) -> None:
+        if not self.answers:
+            return
+        answer = _decoded(Answer, pb.Answer(), sample)
+        if answer is not None:
+            self.answers.call(CameraAnswer(str(sample.key_expr).rsplit("/", 1)[1], answer))
+
+    def _on_pose(self, sample: zenoh.Sample) -> None:
+        if not self.poses:
+            return
+        pose = _decoded(RobotPose, pb.RobotPose(), sample)
+        # A pose of another epoch belongs to another program under this robot's name.
+        if pose is not None and pose.epoch == self.epoch:
+            self.poses.call(pose)
+
+    def on_map_changed(self, map: str, listener: Listener[MapChanged]) -> Subscription:
+        """Calls `listener` with every new version of a map; `*` stands for all maps."""
+
+        def call(sample: zenoh.Sample) -> None:
+            changed = _decoded(MapChanged, pb.MapChanged(), sample)
+            if changed is not None:
+                listener(changed)
+
+        which = map if map == "*" else name("map", map)
+        subscriber = self._session.declare_subscriber(f"{self._maps}/{which}/changed", call)
+
+        def undeclare() -> None:
+            if not self._session.is_closed():
+                subscriber.undeclare()
+
+        return Subscription(undeclare)
+
+    def next_seq(self) -> int:
+        """The number of the next message."""
+        return next(self._seq)
+
+    def publish_frame(self, camera: str, frame: Capture | Picture, seq: int) -> None:
+        """Sends a frame."""
+        key = f"{self._own}/frame/{name('camera', camera)}"
+        self._put(key, frame_bytes(frame, self.epoch, seq), zenoh.Priority.DATA_LOW)
+
+    def publish_odometry(self, odom_from_robot: Pose2, captured_ns: int | None) -> int:
+        """Sends odometry, read now or at `captured_ns`."""
+        seq = self.next_seq()
+        message = pb.Odometry(epoch=self.epoch, seq=seq, captured_ns=captured_ns or time.time_ns())
+        message.odom_from_robot.SetInParent()
+        fill(message.odom_from_robot, odom_from_robot)
+        self._put(f"{self._own}/odometry", message.SerializeToString(), zenoh.Priority.DATA)
+        return seq
+
+    def publish_scan(self, scan: Scan) -> int:
+        """Sends a laser scan."""
+        seq = self.next_seq()
+        message = pb.Scan(epoch=self.epoch, seq=seq)
+        fill(message, scan)
+        self._put(f"{self._own}/scan", message.SerializeToString(), zenoh.Priority.DATA)
+        return seq
+
+    def _put(self, key: str, payload: bytes, priority: zenoh.Priority) -> None:
+        try:
+            self._session.put(key, payload, congestion_control=self._congestion, priority=priority)
+        except zenoh.ZError as error:
+            raise Unreachable(f"zenoh could not send to {self.endpoint}: {error}") from error
+
+    def gaze(self, request: GazeRequest, wait_s: float) -> GazeAdvice:
+        """Asks where to look."""
+        message = pb.GazeRequest()
+        fill(message, request)
+        advice = self._ask(f"{self._own}/rpc/gaze", message.SerializeToString(), pb.GazeAdvice(), wait_s)
+        if advice is None:
+            raise NoAnswer(f"no gaze advice within {wait_s} s from {self.endpoint}")
+        return from_message(GazeAdvice, advice)
+
+    def map_version(self, map: str, wait_s: float) -> int | None:
+        """The present version of a map; `None` if the server has no such map."""
+        found = self._ask(f"{self._maps}/{name('map', map)}/version", b"", pb.MapChanged(), wait_s)
+        return found.version if found is not None else None
+
+    def _ask(self, key: str, payload: bytes, reply: M, wait_s: float) -> M | None:
+        try:
+            for answer in self._session.get(key, payload=payload, timeout=wait_s):
+                if answer.ok is None:
+                    # What zenoh says when the time is up.
+                    return None
+                reply.ParseFromString(answer.ok.payload.to_bytes())
+                return reply
+        except zenoh.ZError as error:
+            raise Unreachable(f"zenoh could not ask {self.endpoint}: {error}") from error
+        except DecodeError as error:
+            raise Unexpected(f"{key}: {error}") from error
+        return None
+
+
+def frame_bytes(frame: Capture | Picture, epoch: int, seq: int) -> bytes:
+    """The `Frame` message of a frame. The image is copied once, into the message."""
+    capture = frame if isinstance(frame, Capture) else Capture(as_image(frame))
+    image: Image = capture.image
+    message = pb.Frame(
+        epoch=epoch,
+        seq=seq,
+        captured_ns=capture.captured_ns,
+        encoding=_ENCODINGS[image.encoding],
+        width_px=image.width_px,
+        height_px=image.height_px,
+        deadline_ms=capture.deadline_ms,
+        map=capture.map,
+    )
+    for field in ("intrinsics", "robot_from_camera", "odometry", "prior"):
+        value = getattr(capture, field)
+        if value is not None:
+            getattr(message, field).SetInParent()
+            fill(getattr(message, field), value)
+    # Fields of a message may come in any order: `image` is appended, so that it need not go through the message.
+    tag = pb.Frame.IMAGE_FIELD_NUMBER << 3 | 2
+    return b"".join((message.SerializeToString(), bytes([tag]), _varint(len(image.data)), image.data))
+
+
+def _varint(number: int) -> bytes:
+    out = bytearray()
+    while number > 0x7F:
+        out.append(number & 0x7F | 0x80)
+        number >>= 7
+    out.append(number)
+    return bytes(out)
+
+
+def _decoded(kind: type[T], message: Message, sample: zenoh.Sample) -> T | None:
+    try:
+        message.ParseFromString(sample.payload.to_bytes())
+    except DecodeError:
+        _log.warning("%s: not a message of this version", sample.key_expr)
+        return None
+    return from_message(kind, message)
+
+
+def _open(endpoint: str, delivery: Delivery, timeout_s: float) -> zenoh.Session:
+    """Opens the session. A listener that is silent and not zenoh can hold a handshake longer than zenoh's own
+    timeout, so it is opened on a thread of its own."""
+    result: list[zenoh.Session | Exception] = []
+    is_late = threading.Event()
+
+    def run() -> None:
+        try:
+            session = zenoh.open(zenoh.Config.from_json5(_config(endpoint, delivery, timeout_s)))
+            if is_late.is_set():
+                session.close()
+            result.append(session)
+        except Exception as error:
+            result.append(error)
+
+    thread = threading.Thread(target=run, daemon=True, name="waymark-open")
+    thread.start()
+    thread.join(timeout_s + 1)
+    opened = result[0] if result else None
+    if isinstance(opened, zenoh.Session):
+        return opened
+    is_late.set()
+    detail = f": {opened}" if opened is not None else f" within {timeout_s} s"
+    raise Unreachable(f"no session with a server at {endpoint}{detail}", field="endpoint") from opened
+
+
+def _config(endpoint: str, delivery: Delivery, timeout_s: float) -> str:
+    # A session whose sender waits must not be closed.
+    close_us = 60_000_000 if delivery == "every" else 5_000_000
+    return json.dumps(
+        {
+            "mode": "client",
+            "connect": {
+                "endpoints": [endpoint],
+                "timeout_ms": int(timeout_s * 1000),
+                "retry": {"period_init_ms": 100, "period_max_ms": 2000},
+            },
+            "scouting": {"delay": 0, "multicast": {"enabled": False}, "gossip": {"enabled": False}},
+            "adminspace": {"enabled": False},
+            "transport": {
+                "link": {
+                    "tx": {
+                        "lease": 2000,
+                        "queue": {
+                            "congestion_control": {
+                                "drop": {"wait_before_drop": _DROP_US, "max_wait_before_drop_fragments": _DROP_US},
+                                "block": {"wait_before_close": close_us},
+                            }
+                        },
+                    },
+                    "rx": {"max_message_size": _MAX_MESSAGE_BYTES},
+                },
+                "shared_memory": {"enabled": False},
+            },
+        }
+    )

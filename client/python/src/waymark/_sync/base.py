@@ -1,0 +1,123 @@
+# Made by tools/generate.py from _async/base.py. Do not edit.
+"""A connection to the server's HTTP interface: sends requests, reads answers, turns refusals into errors."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
+
+import httpx
+
+from waymark._http import TIMEOUT_S, EventParser, parsed, parsed_items, refusal, request_of, unreachable
+
+T = TypeVar("T")
+
+
+class Base:
+    """Sends requests."""
+
+    def __init__(self, server: str = "http://127.0.0.1:8080") -> None:
+        """A client of the server at this address. Nothing is sent yet."""
+        self._base = server.rstrip("/")
+        # Ignores proxies of the environment: the server is in the robot's own network.
+        self._http = httpx.Client(base_url=self._base, timeout=TIMEOUT_S, trust_env=False)
+
+    def close(self) -> None:
+        """Closes its connections."""
+        self._http.close()
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _checked(self, call: str, at: Sequence[str | int], is_stream: bool = False, **parts: Any) -> httpx.Response:
+        method, path = request_of(call, at)
+        try:
+            request = self._http.build_request(method, path, **parts)
+            response = self._http.send(request, stream=is_stream)
+            if response.is_error:
+                response.read()
+                raise refusal(response)
+            return response
+        except httpx.HTTPError as error:
+            raise unreachable(self._base, error) from error
+
+    def _send(self, kind: type[T], call: str, *at: str | int, **parts: Any) -> T:
+        found: T = parsed(kind, self._checked(call, at, **parts))
+        return found
+
+    def _done(self, call: str, *at: str | int) -> None:
+        self._checked(call, at)
+
+    def _bytes(self, call: str, *at: str | int) -> bytes:
+        return (self._checked(call, at)).content
+
+    def _all(self, kind: type[T], call: str, *at: str | int) -> tuple[T, ...]:
+        """Every page of a list."""
+        items: list[T] = []
+        cursor: str | None = None
+        while True:
+            response = self._checked(call, at, params={"cursor": cursor} if cursor else None)
+            page = parsed(_Page, response)
+            items.extend(parsed_items(kind, page.items, response))
+            if page.next is None:
+                return tuple(items)
+            cursor = page.next
+
+    def _stream(self, call: str, *at: str | int) -> Events:
+        return Events(self._checked(call, at, is_stream=True))
+
+
+@dataclass(frozen=True, slots=True)
+class _Page:
+    items: tuple[Any, ...]
+    next: str | None = None
+
+
+class Events:
+    """The events of one answer: name and data."""
+
+    def __init__(self, response: httpx.Response) -> None:
+        self._response = response
+
+    def events(self) -> Iterator[tuple[str, str]]:
+        """One after the other, until the server ends the stream."""
+        parser = EventParser()
+        try:
+            for line in self._response.iter_lines():
+                for event in parser.push(line):
+                    yield event
+        except httpx.StreamClosed:
+            return
+        except httpx.HTTPError as error:
+            raise unreachable(str(self._response.url), error) from error
+
+    def close(self) -> None:
+        """Ends the stream."""
+        self._response.close()
+
+
+class Stream(Generic[T]):
+    """Events as they come, until the server stops or it is closed. A context manager; iterate over it."""
+
+    def __init__(self, events: Events) -> None:
+        self._events = events
+
+    def _read(self, name: str, data: str) -> T | None:
+        raise NotImplementedError
+
+    def __iter__(self) -> Iterator[T]:
+        for name, data in self._events.events():
+            value = self._read(name, data)
+            if value is not None:
+                yield value
+
+    def close(self) -> None:
+        """Ends the stream."""
+        self._events.close()
+
+    def __enter__(self) -> Stream[T]:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()

@@ -1,0 +1,221 @@
+# Made by tools/generate.py from _async/robots.py. Do not edit.
+"""Robots, their cameras, recordings, gatherings, mapping, and modality statistics."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from waymark._sync.base import Base
+from waymark._values import UNSET, Unset, given, present
+from waymark.api import (
+    AcceptanceBody,
+    AcceptedTrackBody,
+    AreaBody,
+    AreaStatsBody,
+    CalibrationConstraintsBody,
+    CalibrationReport,
+    Camera,
+    CameraFrame,
+    CorrectionsBody,
+    FusionMode,
+    Gathering,
+    MappingProgressBody,
+    ModalityMapBody,
+    RecordingStatusBody,
+    ReferenceRunBody,
+    RelocalisationStatus,
+    Robot,
+    TrackSummary,
+    TrajectoriesBody,
+    UploadedViews,
+)
+from waymark.errors import Unexpected
+from waymark.wire import Answer, Pose2
+
+
+@dataclass(frozen=True, slots=True)
+class _Cameras:
+    cameras: tuple[Camera, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _Tracks:
+    tracks: tuple[TrackSummary, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _Runs:
+    runs: tuple[ReferenceRunBody, ...]
+
+
+class Robots(Base):
+    """Operations on robots."""
+
+    def put_robot(self, robot: str, map: str) -> Robot:
+        """Registers a robot, or gives it another map."""
+        return self._send(Robot, "put_robot", robot, json={"map": map})
+
+    def robots(self) -> tuple[Robot, ...]:
+        """All robots, by name."""
+        return self._all(Robot, "robots")
+
+    def robot(self, robot: str) -> Robot:
+        """One robot: whether it is connected, its pose, and whether a second program uses its name."""
+        return self._send(Robot, "robot", robot)
+
+    def delete_robot(self, robot: str) -> None:
+        """Deletes a robot; its frames are rejected from now on."""
+        self._done("delete_robot", robot)
+
+    def corrections(self, robot: str) -> CorrectionsBody:
+        """Support of a robot's pose, and the outcomes of its fixes."""
+        return self._send(CorrectionsBody, "corrections", robot)
+
+    def relocalisation(self, robot: str) -> RelocalisationStatus:
+        """Pose hypotheses of a robot that observes nothing unique."""
+        return self._send(RelocalisationStatus, "relocalisation", robot)
+
+    def trajectories(self, robot: str) -> TrajectoriesBody:
+        """Recent trajectories of a robot, by source."""
+        return self._send(TrajectoriesBody, "trajectories", robot)
+
+    def cameras(self, robot: str) -> tuple[Camera, ...]:
+        """The cameras of a robot in whose frames landmarks of known size were recognised, by name."""
+        return (self._send(_Cameras, "cameras", robot)).cameras
+
+    def calibrate_camera(
+        self,
+        robot: str,
+        camera: str,
+        *,
+        uploaded_views: UploadedViews | None = None,
+        constraints: CalibrationConstraintsBody | None = None,
+    ) -> CalibrationReport:
+        """Calibrates a camera, from uploaded corners or from stored views of its own frames."""
+        body = present(uploaded_views=uploaded_views, constraints=constraints)
+        return self._send(CalibrationReport, "calibrate_camera", robot, camera, json=body)
+
+    def camera_frame(self, robot: str, camera: str) -> CameraFrame:
+        """The last answered frame of a camera."""
+        response = self._checked("camera_frame", (robot, camera))
+        seq = response.headers.get("x-frame-seq", "")
+        if not seq.isdigit():
+            raise Unexpected(f"{response.url}: no number in x-frame-seq")
+        return CameraFrame(int(seq), response.headers.get("content-type", ""), response.content)
+
+    def camera_answer(self, robot: str, camera: str) -> Answer:
+        """The answer to that frame."""
+        return self._send(Answer, "camera_answer", robot, camera)
+
+    def start_recording(self, robot: str) -> RecordingStatusBody:
+        """Begins a recording of a robot, in the server's memory."""
+        return self._send(RecordingStatusBody, "start_recording", robot)
+
+    def recording(self, robot: str) -> RecordingStatusBody:
+        """Status of the recording."""
+        return self._send(RecordingStatusBody, "recording", robot)
+
+    def cancel_recording(self, robot: str) -> None:
+        """Cancels the recording."""
+        self._done("cancel_recording", robot)
+
+    def finish_recording(
+        self,
+        robot: str,
+        poses: Iterable[tuple[int, float, float, float]],
+        *,
+        sigma_m: float | None = None,
+        sigma_rad: float | None = None,
+    ) -> ReferenceRunBody:
+        """Ends the recording with a reference trajectory: time (ns of the robot's clock), x, y and heading on the map.
+        The map learns modality statistics from it."""
+        body = present(poses=list(poses), sigma_m=sigma_m, sigma_rad=sigma_rad)
+        return self._send(ReferenceRunBody, "finish_recording", robot, json=body)
+
+    def reference_runs(self, map: str) -> tuple[ReferenceRunBody, ...]:
+        """The reference runs of a map, oldest first."""
+        return (self._send(_Runs, "reference_runs", map)).runs
+
+    def delete_reference_run(self, map: str, run: int) -> None:
+        """Deletes a reference run with its statistics."""
+        self._done("delete_reference_run", map, run)
+
+    def modalities(self, map: str) -> ModalityMapBody:
+        """Modality statistics by pose cell from reference runs, and the fusion mode."""
+        return self._send(ModalityMapBody, "modalities", map)
+
+    def set_modalities(
+        self,
+        map: str,
+        *,
+        fusion_mode: FusionMode | Unset = UNSET,
+        areas: Sequence[AreaBody] | Unset = UNSET,
+    ) -> ModalityMapBody:
+        """Sets the fusion mode and the named areas; what is not given stays."""
+        body = given(fusion_mode=fusion_mode, areas=areas)
+        return self._send(ModalityMapBody, "set_modalities", map, json=body)
+
+    def modalities_at(self, map: str, pose: Pose2) -> AreaStatsBody:
+        """Modality statistics at a pose."""
+        query = {"x_m": pose.x_m, "y_m": pose.y_m, "theta_rad": pose.theta_rad}
+        return self._send(AreaStatsBody, "modalities_at", map, params=query)
+
+    def start_mapping(
+        self, map: str, robot: str, origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    ) -> MappingProgressBody:
+        """Begins to make the walls of a map from the scans of a robot; `origin` is its first pose on the map."""
+        body = {"robot": robot, "origin": list(origin)}
+        return self._send(MappingProgressBody, "start_mapping", map, json=body)
+
+    def mapping(self, map: str) -> MappingProgressBody:
+        """The present mapping, or the last one since the server started."""
+        return self._send(MappingProgressBody, "mapping", map)
+
+    def cancel_mapping(self, map: str) -> None:
+        """Cancels a mapping, or deletes one that failed; the map does not change."""
+        self._done("cancel_mapping", map)
+
+    def finish_mapping(self, map: str) -> MappingProgressBody:
+        """Ends the drive: the walls are fitted once more and stored. `mapping` says when they are."""
+        return self._send(MappingProgressBody, "finish_mapping", map)
+
+    def start_gathering(self, map: str, robot: str, *, landmark: str | None = None, known: bool = False) -> Gathering:
+        """Begins to gather views with a robot: of one landmark, or of new objects (`known`: of known ones, too)."""
+        body = present(robot=robot, landmark=landmark, known=known)
+        return self._send(Gathering, "start_gathering", map, json=body)
+
+    def gatherings(self, map: str) -> tuple[Gathering, ...]:
+        """All gatherings of a map, by number."""
+        return self._all(Gathering, "gatherings", map)
+
+    def gathering(self, map: str, gathering: int) -> Gathering:
+        """One gathering."""
+        return self._send(Gathering, "gathering", map, gathering)
+
+    def stop_gathering(self, map: str, gathering: int) -> Gathering:
+        """Ends a gathering; its tracks wait for a decision."""
+        return self._send(Gathering, "stop_gathering", map, gathering)
+
+    def delete_gathering(self, map: str, gathering: int) -> None:
+        """Ends a gathering and deletes all tracks that nobody has accepted."""
+        self._done("delete_gathering", map, gathering)
+
+    def tracks(self, map: str, gathering: int) -> tuple[TrackSummary, ...]:
+        """The tracks that wait for a decision."""
+        return (self._send(_Tracks, "tracks", map, gathering)).tracks
+
+    def discard_track(self, map: str, gathering: int, track: int) -> None:
+        """Deletes a track. While the gathering lasts, no more views of that object are stored."""
+        self._done("discard_track", map, gathering, track)
+
+    def track_icon(self, map: str, gathering: int, track: int, view: int) -> bytes:
+        """The rectified picture of a view of a track, PNG."""
+        return self._bytes("track_icon", map, gathering, track, view)
+
+    def accept_tracks(
+        self, map: str, gathering: int, tracks: Iterable[AcceptedTrackBody], *, learn: bool = True
+    ) -> AcceptanceBody:
+        """Creates landmarks from tracks, or adds views to the landmarks that they show; all or none."""
+        body = present(tracks=list(tracks), learn=learn)
+        return self._send(AcceptanceBody, "accept_tracks", map, gathering, json=body)

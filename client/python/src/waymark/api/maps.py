@@ -1,0 +1,111 @@
+"""Maps, walls, jobs, and the server itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+Distance = Literal["both", "correlation", "hausdorff"]
+JobState = Literal["queued", "running", "done", "failed", "cancelled"]
+Point2 = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Parent:
+    """Where a map lies in another: its origin and the direction of its x axis there, and its floor above that one's.
+    Without `covariance`: 5 cm and half a degree."""
+
+    map: str
+    x_m: float
+    y_m: float
+    theta_rad: float
+    level_m: float = 0.0
+    covariance: tuple[float, ...] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Map:
+    """A map. `version` counts up with every change that an answer could depend on."""
+
+    name: str
+    version: int
+    landmarks: int
+    distance: Distance
+    site: str | None = None
+    building: str | None = None
+    floor: str | None = None
+    parent: Parent | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class TransformedPose:
+    """A pose in the other map, with covariance."""
+
+    x_m: float
+    y_m: float
+    theta_rad: float
+    covariance: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class TransformResponse:
+    """How one map lies in another; `via` are the maps on the way. `pose` is the pose asked for, in the other map."""
+
+    via: tuple[str, ...]
+    to_from_map: TransformedPose
+    level_m: float
+    pose: TransformedPose | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class WallBody:
+    """A straight piece of wall from a to b, the free side on its left."""
+
+    a: Point2
+    b: Point2
+
+
+@dataclass(frozen=True, slots=True)
+class WallsBody:
+    """The walls of a map, in the order given."""
+
+    segments: tuple[WallBody, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """Long work. `progress` is 0 to 1; `message` says what it does, or why it failed."""
+
+    id: int
+    kind: str
+    map: str
+    state: JobState
+    progress: float
+    message: str
+    result: Any = None
+
+
+@dataclass(frozen=True, slots=True)
+class Health:
+    """The process answers: `ok`."""
+
+    status: str
+
+
+@dataclass(frozen=True, slots=True)
+class Readiness:
+    """`ready`, or `degraded`: everything runs, but some maps use an earlier version, or none."""
+
+    status: str
+    maps_not_in_use: dict[str, str]
+    panics: dict[str, int]
+
+
+@dataclass(frozen=True, slots=True)
+class Version:
+    """What runs there."""
+
+    name: str
+    version: str
+    api: str
+    protocol: str

@@ -1,0 +1,116 @@
+"""Errors. Each has a stable code, the field at fault, a sentence, and an advice what to do next."""
+
+from __future__ import annotations
+
+from typing import Any
+
+# By code: what to do next, in the words of this package.
+ADVICE: dict[str, str] = {
+    "bad_name": "lower-case letters, digits, - and _ only, at most 64",
+    "exists": "take another name, or work on the one that is there",
+    "in_use": "give its robots another map (`MapClient.put_robot`), or delete them, first",
+    "unknown_map": "`MapClient.maps` lists those that there are, `create_map` makes one",
+    "unknown_landmark": "`MapClient.landmarks` lists those that there are, `add_landmark` makes one",
+    "unknown_robot": "`MapClient.put_robot(robot, map)` makes it known",
+    "no_views": "upload a photograph first: `MapClient.upload_view`",
+    "quad_not_found": 'give `region=corners`, or `region="whole_image"` if the picture shows the landmark alone',
+    "quad_ambiguous": 'crop the picture, or give one of `error.more["quads"]` as `region`',
+    "size_differs": "measure again; `MapClient.update_landmark(..., size=...)` sets another size",
+    "epoch_conflict": "another program uses this robot's name: stop one of them",
+    "clock_ahead": "stamp all messages of a robot by one clock, at capture",
+    "clock_behind": "stamp all messages of a robot by one clock, at capture",
+    "too_large": "send a JPEG (`Image.jpeg`), or raise the server's `limits.frame_bytes`",
+    "too_many": "stop a robot or a camera that is not needed, or raise the server's limits",
+    "unreachable": "is `waymark serve` running, is this its endpoint?",
+    "no_answer": "the frame or its answer was dropped, or the work takes longer: send again, or give a longer `wait_s`",
+    "superseded": "send the next frame of a camera when the last is answered",
+    "no_encoder": "pip install 'waymark-client[jpeg]', or send the raw image",
+    "unexpected": "are client and server of the same version?",
+    "timeout": "the server is busy; ask again",
+    "busy": "the server is busy; ask again",
+}
+
+
+class WaymarkError(Exception):
+    """A failure. Its text is the sentence with the advice.
+
+    `code` is stable and for programs; `field` names the input at fault, or is empty; `detail` is a sentence for a
+    person; `status` is that of HTTP, or 0; `more` is what the server says beside, by code, such as the `quads` that
+    were found.
+    """
+
+    default_code = "error"
+
+    def __init__(
+        self,
+        detail: str,
+        *,
+        code: str = "",
+        field: str = "",
+        status: int = 0,
+        more: dict[str, Any] | None = None,
+    ) -> None:
+        self.code = code or self.default_code
+        self.field = field
+        self.detail = detail
+        self.status = status
+        self.more: dict[str, Any] = more or {}
+        super().__init__(detail)
+
+    @property
+    def advice(self) -> str:
+        """What to do next; empty where nothing general can be said."""
+        return ADVICE.get(self.code, "")
+
+    def __str__(self) -> str:
+        where = f"{self.field}: " if self.field and self.field not in self.detail else ""
+        advice = f" ({self.advice})" if self.advice else ""
+        return f"{self.code}: {where}{self.detail}{advice}"
+
+
+class InvalidInput(WaymarkError, ValueError):
+    """An argument that cannot be: a name, a picture, a number of bytes. Nothing was sent."""
+
+    default_code = "invalid_value"
+
+
+class Unreachable(WaymarkError):
+    """No server there, or the connection broke."""
+
+    default_code = "unreachable"
+
+
+class NoAnswer(WaymarkError):
+    """No answer to a frame or a question in time."""
+
+    default_code = "no_answer"
+
+
+class Superseded(WaymarkError):
+    """A newer frame of the same camera replaced this one."""
+
+    default_code = "superseded"
+
+
+class Refused(WaymarkError):
+    """The server refused, and said why."""
+
+    default_code = "refused"
+
+
+class Unexpected(WaymarkError):
+    """The answer does not fit this version of the package."""
+
+    default_code = "unexpected"
+
+
+class JobFailed(WaymarkError):
+    """A job ended without success: `job_failed` or `job_cancelled`."""
+
+    default_code = "job_failed"
+
+
+class JobTimeout(WaymarkError):
+    """A job did not end in time; it goes on at the server."""
+
+    default_code = "job_timeout"

@@ -1,0 +1,196 @@
+"""The robot's side, blocking. Out: frames, odometry, scans. In: answers, poses, changes of maps. Frames are best effort
+and numbered; the server keeps the newest of each camera, so a robot that sends fast never queues.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from collections.abc import Iterator
+from typing import Any, Generic, TypeVar
+from weakref import WeakSet
+
+from waymark._link import INBOX, Delivery, Link, Listener, Subscription
+from waymark.errors import NoAnswer, Superseded
+from waymark.image import Capture, Picture
+from waymark.wire import Answer, CameraAnswer, GazeAdvice, GazeRequest, MapChanged, Pose2, RobotPose, Scan
+
+T = TypeVar("T")
+
+
+class Inbox(Generic[T]):
+    """What arrives from now on, for one reader. At most 64 wait: beyond, the oldest is missed, and `missed` counts.
+
+    Iterate over it, or call `get`. A context manager; closing ends an iteration.
+    """
+
+    def __init__(self) -> None:
+        self._waiting: deque[T] = deque()
+        self._changed = threading.Condition()
+        self._is_closed = False
+        self._subscription: Subscription | None = None
+        self.missed = 0
+
+    def _attach(self, subscription: Subscription) -> Inbox[T]:
+        self._subscription = subscription
+        return self
+
+    def _push(self, value: T) -> None:
+        with self._changed:
+            if len(self._waiting) == INBOX:
+                self._waiting.popleft()
+                self.missed += 1
+            self._waiting.append(value)
+            self._changed.notify()
+
+    def get(self, wait_s: float | None = None) -> T | None:
+        """The next, waiting at most so long, or for ever; `None` when the time is up or the inbox is closed."""
+        with self._changed:
+            self._changed.wait_for(lambda: bool(self._waiting) or self._is_closed, wait_s)
+            return self._waiting.popleft() if self._waiting else None
+
+    def __iter__(self) -> Iterator[T]:
+        while True:
+            value = self.get()
+            if value is None:
+                return
+            yield value
+
+    def close(self) -> None:
+        """Nothing more arrives; what waits can still be read."""
+        if self._subscription is not None:
+            self._subscription.close()
+        with self._changed:
+            self._is_closed = True
+            self._changed.notify_all()
+
+    def __enter__(self) -> Inbox[T]:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+class Robot:
+    """A robot's connection, made by `Robot.connect`. A context manager; closing ends the robot's presence."""
+
+    def __init__(self, link: Link) -> None:
+        self._link = link
+        self._inboxes: WeakSet[Inbox[Any]] = WeakSet()
+
+    @classmethod
+    def connect(
+        cls,
+        robot: str,
+        *,
+        endpoint: str = "tcp/127.0.0.1:7447",
+        fleet: str = "default",
+        delivery: Delivery = "latest",
+        timeout_s: float = 5.0,
+        epoch: int | None = None,
+    ) -> Robot:
+        """Connects under the name of a robot that the server knows (`MapClient.put_robot`).
+
+        `delivery`: on a full link, `latest` drops a message after 50 ms, for robots, whose next frame is more useful;
+        `every` waits, for evaluations. `epoch`: that of an earlier session, for a program that restarts together with
+        the server; random if absent. Raises `Unreachable` after `timeout_s`.
+        """
+        return cls(Link(robot, endpoint, fleet, delivery, timeout_s, epoch))
+
+    @property
+    def name(self) -> str:
+        """The robot's name."""
+        return self._link.robot
+
+    @property
+    def epoch(self) -> int:
+        """Epoch of this start of the robot's software."""
+        return self._link.epoch
+
+    def publish_frame(self, camera: str, frame: Capture | Picture) -> int:
+        """Sends a frame and returns its number, at once."""
+        seq = self._link.next_seq()
+        self._link.publish_frame(camera, frame, seq)
+        return seq
+
+    def recognise(self, camera: str, frame: Capture | Picture, *, wait_s: float = 10.0) -> Answer:
+        """Sends a frame and waits for its answer. One at a time for each camera, or the older is `Superseded`."""
+        seq = self._link.next_seq()
+        answers: Inbox[CameraAnswer] = Inbox()
+        with answers._attach(self._link.answers.add(answers._push)):
+            self._link.publish_frame(camera, frame, seq)
+            until = time.monotonic() + wait_s
+            while (left := until - time.monotonic()) > 0:
+                arrived = answers.get(left)
+                answer = matching(arrived, camera, self.epoch, seq)
+                if answer is not None:
+                    return answer
+        raise NoAnswer(f"no answer to frame {seq} within {wait_s} s from {self._link.endpoint}")
+
+    def answers(self) -> Inbox[CameraAnswer]:
+        """Every answer from now on, of all cameras."""
+        inbox: Inbox[CameraAnswer] = Inbox()
+        self._inboxes.add(inbox)
+        return inbox._attach(self._link.answers.add(inbox._push))
+
+    def on_answer(self, call: Listener[CameraAnswer]) -> Subscription:
+        """Calls a function with every answer from now on, on a thread of the session; it should be quick."""
+        return self._link.answers.add(call)
+
+    def poses(self) -> Inbox[RobotPose]:
+        """Every fused pose from now on. None older than 2 s is sent: silence means that the pose is unknown."""
+        inbox: Inbox[RobotPose] = Inbox()
+        self._inboxes.add(inbox)
+        return inbox._attach(self._link.poses.add(inbox._push))
+
+    def on_pose(self, call: Listener[RobotPose]) -> Subscription:
+        """Calls a function with every fused pose from now on, on a thread of the session; it should be quick."""
+        return self._link.poses.add(call)
+
+    def map_changes(self, map: str) -> Inbox[MapChanged]:
+        """Every new version of a map from now on; `*` stands for all maps."""
+        inbox: Inbox[MapChanged] = Inbox()
+        self._inboxes.add(inbox)
+        return inbox._attach(self._link.on_map_changed(map, inbox._push))
+
+    def on_map_changed(self, map: str, call: Listener[MapChanged]) -> Subscription:
+        """Calls a function with every new version of a map, on a thread of the session; it should be quick."""
+        return self._link.on_map_changed(map, call)
+
+    def publish_odometry(self, odom_from_robot: Pose2, captured_ns: int | None = None) -> int:
+        """Sends odometry, read now or at `captured_ns` of the robot's clock; at least once a second, also at rest."""
+        return self._link.publish_odometry(odom_from_robot, captured_ns)
+
+    def publish_scan(self, scan: Scan) -> int:
+        """Sends a laser scan. It corrects a known pose on a map with walls and never gives a first one."""
+        return self._link.publish_scan(scan)
+
+    def gaze(self, request: GazeRequest, *, wait_s: float = 5.0) -> GazeAdvice:
+        """Asks where to look, for a camera that turns."""
+        return self._link.gaze(request, wait_s)
+
+    def map_version(self, map: str, *, wait_s: float = 5.0) -> int | None:
+        """The present version of a map; `None` if the server has no such map."""
+        return self._link.map_version(map, wait_s)
+
+    def close(self) -> None:
+        """Ends the session in order, and every iteration over what arrives."""
+        for inbox in list(self._inboxes):
+            inbox.close()
+        self._link.close()
+
+    def __enter__(self) -> Robot:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def matching(arrived: CameraAnswer | None, camera: str, epoch: int, seq: int) -> Answer | None:
+    """The answer to frame `seq`, if it is; raises `Superseded` if a newer frame was answered."""
+    if arrived is None or arrived.camera != camera or arrived.answer.epoch != epoch or arrived.answer.seq < seq:
+        return None
+    if arrived.answer.seq > seq:
+        raise Superseded(f"frame {seq} was superseded by a newer one of the same camera")
+    return arrived.answer

@@ -1,0 +1,331 @@
+"""The messages of the wire as frozen dataclasses, with the field names of `waymark.proto`.
+
+Lengths are metres, angles radians, image coordinates pixels with pixel (0, 0) at the centre of the top-left one. Frames
+of coordinates: `map` (x, y on the floor, z up), `robot` (x forward, y left, z up), `camera` (x right, y down,
+z forward), `landmark` (x outward normal, y the viewer's right, z up). `a_from_b` takes b-coordinates to
+a-coordinates. Covariances are row-major: of poses on the floor over (x, y, theta), of poses in space over
+(rotation vector, translation).
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass, field
+from typing import Literal
+
+from waymark.errors import Refused
+
+Status = Literal["unspecified", "matched", "ambiguous", "no_match", "rejected", "expired", "overloaded", "not_ready"]
+QuadKind = Literal["unspecified", "full", "three_sided", "expected"]
+Verdict = Literal["unspecified", "unknown", "unique", "ambiguous"]
+PartAgreement = Literal["unspecified", "silent", "agrees", "disagrees"]
+Sighting = Literal["unspecified", "global", "guided"]
+PoseTrust = Literal["unspecified", "unsupported", "supported", "stale", "contradicted"]
+GazeCriterion = Literal["unspecified", "product", "information"]
+GazeAction = Literal["unspecified", "landmark", "ahead", "sweep"]
+
+
+@dataclass(frozen=True, slots=True)
+class Pose3:
+    """A rigid transform: unit quaternion and translation."""
+
+    qx: float = 0.0
+    qy: float = 0.0
+    qz: float = 0.0
+    qw: float = 1.0
+    x_m: float = 0.0
+    y_m: float = 0.0
+    z_m: float = 0.0
+
+    @classmethod
+    def mounting(
+        cls, x_m: float, y_m: float, z_m: float, *, pan_rad: float = 0.0, tilt_rad: float = 0.0, roll_rad: float = 0.0
+    ) -> Pose3:
+        """`robot_from_camera` of a camera at this point of the robot frame. With all angles 0 it looks forward and
+        level; `pan_rad` turns it to the left, `tilt_rad` upwards, `roll_rad` clockwise about its own axis."""
+        # About z by pan, y by -tilt and x by roll, after the axes of the camera: z forward, x right, y down.
+        turned = _product(_about(2, pan_rad), _product(_about(1, -tilt_rad), _about(0, roll_rad)))
+        qx, qy, qz, qw = _product(turned, (-0.5, 0.5, -0.5, 0.5))
+        return cls(qx, qy, qz, qw, x_m, y_m, z_m)
+
+
+def _about(axis: int, angle_rad: float) -> tuple[float, float, float, float]:
+    turn = [0.0, 0.0, 0.0, math.cos(angle_rad / 2)]
+    turn[axis] = math.sin(angle_rad / 2)
+    return (turn[0], turn[1], turn[2], turn[3])
+
+
+def _product(
+    a: tuple[float, float, float, float], b: tuple[float, float, float, float]
+) -> tuple[float, float, float, float]:
+    ax, ay, az, aw = a
+    bx, by, bz, bw = b
+    return (
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+        aw * bw - ax * bx - ay * by - az * bz,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Pose2:
+    """A pose on the floor."""
+
+    x_m: float = 0.0
+    y_m: float = 0.0
+    theta_rad: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Pose2Covariance:
+    """A pose on the floor with covariance over (x, y, theta): 9 numbers."""
+
+    pose: Pose2 = Pose2()
+    covariance: tuple[float, ...] = (0.0,) * 9
+
+    @property
+    def sigma(self) -> tuple[float, float, float]:
+        """Standard deviations of x (m), y (m) and theta (rad)."""
+        c = self.covariance
+        return (math.sqrt(max(c[0], 0.0)), math.sqrt(max(c[4], 0.0)), math.sqrt(max(c[8], 0.0)))
+
+
+@dataclass(frozen=True, slots=True)
+class Intrinsics:
+    """A camera: focal lengths and principal point in pixels, and one lens model at most, in the order of ROS and
+    OpenCV."""
+
+    fx_px: float = 0.0
+    fy_px: float = 0.0
+    cx_px: float = 0.0
+    cy_px: float = 0.0
+    # k1, k2, p1, p2, k3.
+    plumb_bob: tuple[float, ...] = ()
+    # k1, k2, p1, p2, k3, k4, k5, k6.
+    rational_polynomial: tuple[float, ...] = ()
+    # k1, k2, k3, k4 of OpenCV's fisheye.
+    equidistant: tuple[float, ...] = ()
+    # Standard deviations, as a calibration gives them.
+    focal_sigma_px: float | None = None
+    center_sigma_px: float | None = None
+
+    @classmethod
+    def from_view(cls, width_px: int, height_px: int, horizontal_rad: float) -> Intrinsics:
+        """A camera without distortion that sees this angle from the left to the right border of its image. A guess
+        for the first steps: a calibrated camera gives better poses."""
+        focal = width_px / 2 / math.tan(horizontal_rad / 2)
+        return cls(focal, focal, (width_px - 1) / 2, (height_px - 1) / 2)
+
+
+@dataclass(frozen=True, slots=True)
+class Rejection:
+    """Why a message was refused: a stable code, the field at fault and a sentence."""
+
+    code: str = ""
+    field: str = ""
+    detail: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """A point of the image."""
+
+    u_px: float = 0.0
+    v_px: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """A landmark that a quad was compared with."""
+
+    landmark: str = ""
+    correlation: float = 0.0
+    hausdorff: float | None = None
+    distance: float = 0.0
+    threshold: float = 0.0
+    # Distance over threshold; accepted below 1.
+    ratio: float = 0.0
+    probability: float = 0.0
+    # Empty, or the gate that refused it.
+    refusal: str = ""
+    gradient_similarity: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class PointEvidence:
+    """What matched points say of the first candidate."""
+
+    matches: int = 0
+    inliers: int = 0
+    checked: int = 0
+    agreeing: int = 0
+    log10_false_alarms: float = 0.0
+    # 5 x 5 parts of the landmark as taught, by rows from its top left.
+    agreement: tuple[PartAgreement, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class LandmarkPose:
+    """Where a landmark is, seen from the camera, with covariance: 36 numbers."""
+
+    camera_from_landmark: Pose3 | None = None
+    covariance: tuple[float, ...] = ()
+    reprojection_rms_px: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class QuadAnswer:
+    """A quad of the image, and what it was recognised as. `landmark` is set only for the verdict `unique`."""
+
+    corners: tuple[Point, ...] = ()
+    kind: QuadKind = "unspecified"
+    score: float = 0.0
+    verdict: Verdict = "unspecified"
+    landmark: str = ""
+    candidates: tuple[Candidate, ...] = ()
+    entropy_m: float = 0.0
+    entropy_norm: float = 0.0
+    confidence: float = 0.0
+    pose: LandmarkPose | None = None
+    second_pose: LandmarkPose | None = None
+    pose_ambiguous: bool = False
+    pose_refusal: str = ""
+    points: PointEvidence | None = None
+    doubtful_landmark: str = ""
+    sighting: Sighting = "unspecified"
+    guided_landmark: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class StageTime:
+    """Time that a stage took."""
+
+    stage: str = ""
+    ms: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Hypothesis:
+    """A place where the robot may be."""
+
+    probability: float = 0.0
+    map_from_robot: Pose2Covariance | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """The answer to a frame. "Nothing recognised" (`no_match`) is an answer, not a failure."""
+
+    epoch: int = 0
+    seq: int = 0
+    captured_ns: int = 0
+    map: str = ""
+    map_version: int = 0
+    status: Status = "unspecified"
+    rejection: Rejection | None = None
+    quads: tuple[QuadAnswer, ...] = ()
+    # By landmarks named by the picture alone; a pose may start with it.
+    map_from_robot: Pose2Covariance | None = None
+    pose_landmarks: tuple[str, ...] = ()
+    latency_ms: float = 0.0
+    timings: tuple[StageTime, ...] = ()
+    clock_suspect: bool = False
+    # Why recognised landmarks gave no pose of the robot; empty where they did.
+    pose_refusal: str = ""
+    hypotheses: tuple[Hypothesis, ...] = ()
+    # By landmarks that were named with the pose known before; it corrects that pose and starts none.
+    guided_map_from_robot: Pose2Covariance | None = None
+    guided_landmarks: tuple[str, ...] = ()
+    only_expected: bool = False
+
+    def accepted(self) -> Answer:
+        """This answer; raises `Refused` with the code and the field if the server refused the frame."""
+        if self.rejection is not None:
+            raise Refused(self.rejection.detail, code=self.rejection.code, field=self.rejection.field)
+        return self
+
+
+@dataclass(frozen=True, slots=True)
+class CameraAnswer:
+    """An answer, and the camera that it is for."""
+
+    camera: str
+    answer: Answer
+
+
+@dataclass(frozen=True, slots=True)
+class Scan:
+    """One turn of a laser. Ranges at or beyond `max_range_m` had no return. The client sets epoch and number."""
+
+    ranges_m: tuple[float, ...]
+    first_bearing_rad: float
+    bearing_step_rad: float
+    max_range_m: float
+    odom_from_robot: Pose2
+    robot_from_laser: Pose2 = Pose2()
+    captured_ns: int = field(default_factory=time.time_ns)
+
+
+@dataclass(frozen=True, slots=True)
+class RobotPose:
+    """The fused pose of a robot. None older than 2 s is sent: silence means that the pose is unknown."""
+
+    epoch: int = 0
+    captured_ns: int = 0
+    map: str = ""
+    map_from_robot: Pose2Covariance | None = None
+    # What it rests on now: odometry, landmarks, guided, laser, relocalisation.
+    modalities: tuple[str, ...] = ()
+    corrections: int = 0
+    laser_corrections: int = 0
+    age_ms: float = 0.0
+    trust: PoseTrust = "unspecified"
+
+
+@dataclass(frozen=True, slots=True)
+class MapChanged:
+    """A map has a new version."""
+
+    map: str = ""
+    version: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class GazeRequest:
+    """A question where to look. Without `map_from_robot` the last fused pose counts."""
+
+    map_from_robot: Pose2Covariance | None = None
+    camera_x_m: float = 0.0
+    camera_y_m: float = 0.0
+    # 0 stands for 1.2 m.
+    camera_z_m: float = 0.0
+    pan_rad: float = 0.0
+    tilt_rad: float = 0.0
+    rate_radps: float = 0.0
+    pan_range_rad: tuple[float, ...] = ()
+    tilt_range_rad: tuple[float, ...] = ()
+    criterion: GazeCriterion = "unspecified"
+    at_ns: int = field(default_factory=time.time_ns)
+    looked_at: str = ""
+    recognised: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class GazeAdvice:
+    """Where to look. What follows `action` is set for `landmark` only."""
+
+    map: str = ""
+    map_version: int = 0
+    rejection: Rejection | None = None
+    action: GazeAction = "unspecified"
+    landmark: str = ""
+    pan_rad: float = 0.0
+    tilt_rad: float = 0.0
+    utility: float = 0.0
+    probability: float = 0.0
+    margin_m: float = 0.0
+    gain_nats: float = 0.0
+    range_m: float = 0.0
+    incidence_rad: float = 0.0

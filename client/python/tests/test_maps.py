@@ -1,0 +1,377 @@
+"""Claim: every operation of the API has a method of the same name as in Rust, blocking and for asyncio, and the methods
+of each resource work against a real server."""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+import math
+import re
+import time
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pictures
+import pytest
+from conftest import ROOT, SOON_S, Server
+
+from waymark import (
+    AsyncMapClient,
+    AsyncRobot,
+    Capture,
+    CaptureMetadata,
+    Image,
+    InvalidInput,
+    JobFailed,
+    JobTimeout,
+    MapClient,
+    Place,
+    Pose2,
+    Pose2Covariance,
+    Pose3,
+    Refused,
+    Robot,
+    Size,
+    Unreachable,
+    WallBody,
+)
+from waymark._http import OPERATIONS, job_ended
+from waymark.api import (
+    AcceptedTrackBody,
+    AreaBody,
+    CalibrationConstraintsBody,
+    Job,
+    Parent,
+    PoseBody,
+    UploadedView,
+    UploadedViews,
+    VisibilitySettingsBody,
+)
+
+# Methods of Rust that have another name here, with the reason.
+OTHER_NAMES = {
+    # Keyword arguments stand for the second method.
+    "upload_view_with": "upload_view",
+    "publish_odometry_at": "publish_odometry",
+}
+# Methods of Rust that are not here, with the reason.
+NOT_HERE = {
+    # For the server's own tests of refusals.
+    "publish_raw_frame",
+    # The constructors.
+    "new",
+}
+QUARTER = math.pi / 2
+
+
+def document(server: Server) -> dict[str, Any]:
+    found: dict[str, Any] = httpx.get(f"{server.http}/api/v1/openapi.json", trust_env=False).json()
+    return found
+
+
+def test_every_operation_of_the_document_has_a_method(server: Server) -> None:
+    described = {
+        (method.upper(), path.removeprefix("/api/v1"))
+        for path, item in document(server)["paths"].items()
+        for method in item
+    }
+    assert len(described) > 60
+    assert set(OPERATIONS.values()) == described and len(set(OPERATIONS.values())) == len(OPERATIONS)
+    for call in OPERATIONS:
+        assert callable(getattr(MapClient, call)) and inspect.iscoroutinefunction(getattr(AsyncMapClient, call)), call
+
+
+def rust_methods(file: Path) -> set[str]:
+    return set(re.findall(r"^    pub (?:async )?fn (\w+)", file.read_text(), re.MULTILINE))
+
+
+def test_methods_have_the_names_of_the_rust_sdk() -> None:
+    sources = ROOT / "client" / "src"
+    declared = r'\w+: (\w+) "([^"]+)" => (\w+)'
+    rust = {
+        OTHER_NAMES.get(call, call): (method, path)
+        for file in (sources / "http").glob("*.rs")
+        for method, path, call in re.findall(declared, file.read_text())
+    }
+    assert rust == OPERATIONS
+    robot = {OTHER_NAMES.get(each, each) for each in rust_methods(sources / "robot.rs")} - NOT_HERE
+    assert {"recognise", "poses", "gaze"} <= robot
+    for side in (Robot, AsyncRobot):
+        assert [each for each in robot if not hasattr(side, each)] == []
+
+
+def test_blocking_and_asynchronous_methods_take_the_same_arguments() -> None:
+    for blocking, waiting in ((MapClient, AsyncMapClient), (Robot, AsyncRobot)):
+        for name, method in inspect.getmembers(blocking, inspect.isfunction):
+            if not name.startswith("_") and name != "close":
+                other = inspect.signature(getattr(waiting, name))
+                assert inspect.signature(method).parameters == other.parameters, name
+
+
+def hall(maps: MapClient, name: str) -> None:
+    """A map with two walls and a poster on the first of them."""
+    maps.create_map(name)
+    maps.set_walls(name, [WallBody((0.0, 0.0), (10.0, 0.0)), WallBody((10.0, 8.0), (0.0, 8.0))])
+    maps.add_landmark(name, "poster", Size(0.6, 0.8), Place(5.0, 0.0, 1.5, QUARTER))
+
+
+def test_the_server_says_how_it_is(server: Server) -> None:
+    with server.maps() as maps:
+        assert (maps.health().status, maps.readiness().status) == ("ok", "ready")
+        version = maps.version()
+        assert (version.name, version.api, version.protocol) == ("waymark", "v1", "1")
+
+
+def test_maps_are_stored_with_all_their_fields(server: Server) -> None:
+    with server.maps() as maps:
+        hall(maps, "ground")
+        assert maps.walls("ground").segments[1] == WallBody((10.0, 8.0), (0.0, 8.0))
+        parent = Parent("ground", 1.0, 2.0, 0.0, level_m=3.0)
+        attic = maps.create_map("attic", distance="hausdorff", parent=parent)
+        assert attic.distance == "hausdorff" and attic.parent is not None
+        assert attic.parent.covariance is not None and len(attic.parent.covariance) == 9
+        assert dataclasses.replace(attic.parent, covariance=None) == parent
+        found = maps.transform("attic", "ground", Pose2(0.5, 0.0, 0.0))
+        assert found.pose is not None and found.pose.x_m == pytest.approx(1.5)
+        assert found.via == ("attic", "ground") and found.level_m == pytest.approx(3.0)
+        attic = maps.locate_map("attic", site="Works / 1", parent=None)
+        assert (attic.site, attic.parent) == ("Works / 1", None)
+        assert maps.locate_map("attic", floor="2").site == "Works / 1", "what is not given stays"
+        assert {"attic", "ground"} <= {each.name for each in maps.maps()}
+        maps.delete_map("attic")
+        with pytest.raises(Refused) as gone:
+            maps.map("attic")
+        error = gone.value
+        assert (error.code, error.field, error.status) == ("unknown_map", "map", 404)
+        assert "attic" in error.detail and "create_map" in str(error)
+        with pytest.raises(Refused):
+            maps.map("no / such?map")
+        with pytest.raises(InvalidInput):
+            maps.map("..")
+
+
+def test_landmarks_are_placed_taught_and_learnt(server: Server) -> None:
+    with server.maps() as maps:
+        hall(maps, "lessons")
+        sign = maps.add_landmark("lessons", "sign")
+        assert (sign.status, sign.size, sign.place) == ("not_learnt", None, None)
+        place = Place(5.0, 4.0, 2.5, 0.1, roll_rad=0.2, tilt_rad=QUARTER)
+        sign = maps.update_landmark("lessons", "sign", place=place, health="quarantined")
+        assert (sign.place, sign.health, sign.size) == (place, "quarantined", None)
+        assert maps.update_landmark("lessons", "sign", size=Size(1.0, 0.5)).place == place
+        assert maps.update_landmark("lessons", "sign", place=None).place is None
+        maps.delete_landmark("lessons", "sign")
+
+        photo = Image.rgb(pictures.seen_from(pictures.front(1.6)))
+        corners = pictures.corners_px(pictures.front(1.6))
+        first = maps.upload_view("lessons", "poster", photo, corners)
+        assert first.outcome == "new" and first.corners[0] == pytest.approx(corners[0], abs=3.0)
+        capture = CaptureMetadata(
+            pictures.CAMERA,
+            Pose2Covariance(pictures.front(1.6), (1e-4, 0, 0, 0, 1e-4, 0, 0, 0, 1e-4)),
+            Pose3.mounting(0.0, 0.0, pictures.CAMERA_HEIGHT_M),
+            corner_covariance_px2=((1.0, 0.0, 1.0),) * 4,
+        )
+        second = maps.upload_view("lessons", "poster", photo, corners, capture=capture, keep_near_duplicate=True)
+        assert second.placing is None or second.placing.reason == "by_hand"
+        whole = Image.rgb(pictures.poster(0)).png().data
+        assert isinstance(whole, bytes)
+        third = maps.upload_view("lessons", "poster", whole, "whole_image", keep_near_duplicate=True)
+        views = maps.views("lessons", "poster")
+        assert {first.id, third.id} <= {view.id for view in views}
+        assert maps.view_icon("lessons", "poster", first.id).startswith(b"\x89PNG")
+        maps.delete_view("lessons", "poster", third.id)
+
+        states: list[str] = []
+        job = maps.wait_for_job(maps.learn("lessons", ["poster"], 4), SOON_S, lambda each: states.append(each.state))
+        assert job.state == "done" and states[-1] == "done"
+        assert maps.cancel_job(job.id) == maps.job(job.id)
+        with maps.job_events(maps.learn_landmark("lessons", "poster", 4).id) as events:
+            assert [each.state for each in events][-1] == "done"
+        learnt = maps.landmark("lessons", "poster")
+        assert learnt.model is not None and learnt.model.generated_views == 4 and learnt.model.facts
+
+
+def test_a_landmark_is_made_with_its_first_view_renamed_and_refused_for_its_likeness(server: Server) -> None:
+    photo = pictures.teaching_photo(5)
+    size = Size(*pictures.SIZE_M)
+    with server.maps() as maps:
+        maps.create_map("first-views")
+        with pytest.raises(Refused):
+            maps.upload_view("first-views", "first", Image.gray(bytes(64 * 48), (64, 48)), make_landmark=True)
+        assert maps.landmarks("first-views") == (), "nothing is left behind"
+        maps.upload_view("first-views", "first", photo, make_landmark=True, size=size)
+        with pytest.raises(Refused) as differs:
+            maps.upload_view("first-views", "first", photo, size=Size(1.0, 2.0))
+        assert differs.value.code == "size_differs" and {"stored", "given"} <= set(differs.value.more)
+        maps.upload_view("first-views", "again", photo, make_landmark=True, size=size)
+        maps.wait_for_job(maps.learn("first-views"), SOON_S * 2)
+        why = [gate for landmark in maps.landmarks("first-views") for gate in landmark.failed_gates]
+        assert {gate.gate for gate in why} & {"looks_like", "by_pose_only"}, why
+        assert any(gate.look_alike is not None and gate.look_alike.gradient_similarity > 0.8 for gate in why)
+        assert str(why[0]) == f"{why[0].sentence} {why[0].advice}"
+        assert maps.update_landmark("first-views", "again", name="second").name == "second"
+        assert [each.name for each in maps.landmarks("first-views")] == ["first", "second"]
+
+
+def test_refused_photographs_say_what_to_do(server: Server) -> None:
+    plain = Image.gray(bytes(64 * 48), (64, 48))
+    with server.maps() as maps:
+        hall(maps, "refusals")
+        with pytest.raises(Refused) as refused:
+            maps.upload_view("refusals", "poster", plain)
+        assert refused.value.code == "quad_not_found" and "whole_image" in str(refused.value)
+        assert "quads" in refused.value.more
+        answer = maps.recognise("refusals", plain, pictures.CAMERA)
+        assert (answer.status, answer.quads) == ("no_match", ())
+
+
+def test_jobs_that_do_not_end_well_are_errors(server: Server) -> None:
+    failed = Job(3, "learn", "hall", "failed", 0.5, "the disk is full")
+    with pytest.raises(JobFailed, match="the disk is full"):
+        job_ended(failed)
+    with server.maps() as maps:
+        hall(maps, "slow")
+        running = Job(3, "learn", "slow", "running", 0.5, "")
+        with pytest.raises(JobTimeout):
+            maps.wait_for_job(running, 0.0)
+
+
+def test_visibility_follows_the_settings(server: Server) -> None:
+    with server.maps() as maps:
+        hall(maps, "visible")
+        near = VisibilitySettingsBody(focal_px=300.0)
+        assert maps.set_visibility_settings("visible", near).focal_px == 300.0
+        stored = maps.visibility_settings("visible")
+        assert stored.focal_px == 300.0 and stored.width_px == 640.0
+        area = maps.visibility_area("visible", "poster")
+        far = maps.visibility_area("visible", "poster", VisibilitySettingsBody(focal_px=800.0))
+        assert (area.kind, area.properties.landmark) == ("Feature", "poster")
+        assert area.properties.reach_m < far.properties.reach_m and far.geometry.coordinates
+        pose = PoseBody(5.0, 1.5, -QUARTER)
+        visible = maps.visible("visible", pose).landmarks
+        assert [each.landmark for each in visible] == ["poster"] and visible[0].margin_m > 0
+        coverage = maps.coverage("visible", [(0.5, 1.5), (9.5, 1.5)])
+        assert coverage.length_m == pytest.approx(9.0) and 0 <= coverage.share < 1
+        ranking = maps.gaze_ranking("visible", pose, criterion="information")
+        assert ranking.ranked == (), "a landmark without a model is no gaze target"
+
+
+def test_a_robot_is_observed_and_its_camera_calibrated(server: Server, taught: str) -> None:
+    with server.maps() as maps:
+        maps.put_robot("observed", taught)
+        with Robot.connect("observed", endpoint=server.zenoh, delivery="every") as robot:
+            image = Image.rgb(pictures.seen_from(pictures.front())).png()
+            frame = Capture(image, pictures.CAMERA, deadline_ms=60_000)
+            answer = robot.recognise("front", frame, wait_s=SOON_S)
+            shown = maps.camera_frame("observed", "front")
+            assert (shown.seq, shown.media_type, shown.image) == (answer.seq, "image/png", image.data)
+            assert maps.camera_answer("observed", "front") == answer, "one answer, by zenoh and by HTTP"
+            raw = Capture(Image.rgb(pictures.seen_from(pictures.front())), pictures.CAMERA, deadline_ms=60_000)
+            robot.recognise("front", raw, wait_s=SOON_S)
+            assert maps.camera_frame("observed", "front").media_type == "image/png"
+            camera = maps.cameras("observed")[0]
+            assert (camera.name, camera.width_px, camera.intrinsics.fx_px) == ("front", 640, 500.0)
+            assert camera.intrinsics.focal_sigma_px == 2.5, "what is not given has a default"
+            assert camera.intrinsics_monitor.suspicion is None
+            known = maps.robot("observed")
+            assert known.alive and known.conflict is None and known.map == taught
+        assert maps.trajectories("observed").truth == ()
+        assert not maps.relocalisation("observed").relocalising
+        assert maps.corrections("observed").corrections == ()
+        assert "observed" in {each.name for each in maps.robots()}
+        report = maps.calibrate_camera(
+            "observed",
+            "front",
+            uploaded_views=uploaded_views(),
+            constraints=CalibrationConstraintsBody(radial=0),
+        )
+        assert report.intrinsics.fx_px == pytest.approx(500.0, abs=5.0) and len(report.views) == 5
+        maps.delete_robot("observed")
+        with pytest.raises(Refused, match="put_robot"):
+            maps.robot("observed")
+
+
+def uploaded_views() -> UploadedViews:
+    """A rectangle of 0.6 m by 0.8 m, 2 m away and turned, in the image of a camera of 500 px."""
+
+    def view(pitch: float, yaw: float) -> UploadedView:
+        corners = []
+        for x, y in ((-0.3, -0.4), (0.3, -0.4), (0.3, 0.4), (-0.3, 0.4)):
+            down, away = y * math.cos(pitch), y * math.sin(pitch)
+            right = x * math.cos(yaw) + away * math.sin(yaw)
+            depth = 2.0 - x * math.sin(yaw) + away * math.cos(yaw)
+            corners.append((500.0 * right / depth + 319.5, 500.0 * down / depth + 239.5))
+        return UploadedView(tuple(corners))
+
+    angles = [(0.0, 0.7), (0.0, -0.7), (0.7, 0.0), (-0.7, 0.0), (0.5, 0.5)]
+    return UploadedViews(640, 480, 0.6, 0.8, tuple(view(*each) for each in angles))
+
+
+def test_drives_are_recorded_mapped_and_gathered(server: Server) -> None:
+    with server.maps() as maps:
+        hall(maps, "drives")
+        maps.put_robot("driver", "drives")
+        assert maps.start_recording("driver").active
+        with Robot.connect("driver", endpoint=server.zenoh) as robot:
+            poses = []
+            for step in range(21):
+                captured_ns = time.time_ns()
+                robot.publish_odometry(Pose2(0.05 * step), captured_ns)
+                poses.append((captured_ns, 4.0 + 0.05 * step, 2.0, 0.0))
+                time.sleep(0.05)
+            until = time.monotonic() + SOON_S
+            while maps.recording("driver").odometry < 21 and time.monotonic() < until:
+                time.sleep(0.1)
+            run = maps.finish_recording("driver", poses, sigma_m=0.01)
+            assert run.statistics[0].modality == "odometry" and maps.reference_runs("drives") == (run,)
+            maps.start_recording("driver")
+            maps.cancel_recording("driver")
+            with pytest.raises(Refused):
+                maps.recording("driver")
+
+            door = AreaBody("door", ((0.0, 0.0), (2.0, 0.0), (2.0, 2.0)))
+            known = maps.set_modalities("drives", fusion_mode="best", areas=[door])
+            assert (known.fusion_mode, known.areas[0].name, len(known.cells)) == ("best", "door", run.cells)
+            assert maps.modalities("drives") == known
+            assert maps.modalities_at("drives", Pose2(4.5, 2.0)).statistics[0].steps > 0
+            maps.delete_reference_run("drives", run.id)
+
+            assert maps.start_mapping("drives", "driver", (1.0, 2.0, 0.0)).stage == "mapping"
+            maps.cancel_mapping("drives")
+            maps.start_mapping("drives", "driver")
+            maps.finish_mapping("drives")
+            until = time.monotonic() + SOON_S
+            while maps.mapping("drives").stage != "failed" and time.monotonic() < until:
+                time.sleep(0.1)
+            assert maps.mapping("drives").reason
+
+            gathering = maps.start_gathering("drives", "driver", known=True)
+            assert maps.gathering("drives", gathering.id).open and gathering.known
+            assert maps.tracks("drives", gathering.id) == ()
+            assert not maps.stop_gathering("drives", gathering.id).open
+            for call in (
+                lambda: maps.accept_tracks("drives", gathering.id, [AcceptedTrackBody(1, "window")], learn=False),
+                lambda: maps.discard_track("drives", gathering.id, 1),
+                lambda: maps.track_icon("drives", gathering.id, 1, 1),
+            ):
+                with pytest.raises(Refused) as refused:
+                    call()
+                assert refused.value.code in ("unknown_track", "unknown_view")
+            assert len(maps.gatherings("drives")) == 1
+            maps.delete_gathering("drives", gathering.id)
+
+
+def test_lists_are_read_to_their_last_page(server: Server) -> None:
+    with server.maps() as maps:
+        maps.create_map("long")
+        names = [f"l{number:03}" for number in range(130)]
+        for name in names:
+            maps.add_landmark("long", name)
+        assert [each.name for each in maps.landmarks("long")] == names
+
+
+def test_no_server_is_an_error_with_advice() -> None:
+    with MapClient("http://127.0.0.1:1") as maps, pytest.raises(Unreachable, match="waymark serve"):
+        maps.maps()

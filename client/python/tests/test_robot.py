@@ -1,0 +1,224 @@
+"""Claim: a robot in Python sends frames of every encoding and gets answers, poses and changes of maps, by reply, by
+iteration and by callback; what is wrong is an error with a code."""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+
+import numpy as np
+import pictures
+import pytest
+from conftest import SOON_S, Server
+
+from waymark import (
+    Answer,
+    CameraAnswer,
+    Capture,
+    Image,
+    InvalidInput,
+    NoAnswer,
+    Pose2,
+    Pose3,
+    Refused,
+    Robot,
+    RobotPose,
+    Scan,
+    Superseded,
+    Unreachable,
+    named_landmarks,
+    quad_corners,
+)
+from waymark.robot import matching
+from waymark.wire import GazeRequest, MapChanged
+
+MOUNTING = Pose3.mounting(0.0, 0.0, pictures.CAMERA_HEIGHT_M)
+
+
+def connect(server: Server, robot: str) -> Robot:
+    return Robot.connect(robot, endpoint=server.zenoh, delivery="every")
+
+
+def capture(image: Image, odometry: Pose2 | None = None) -> Capture:
+    return Capture(
+        image,
+        intrinsics=pictures.CAMERA,
+        robot_from_camera=MOUNTING,
+        odometry=odometry,
+        deadline_ms=60_000,
+    )
+
+
+def recognised(answer: Answer) -> list[str]:
+    return [named.name for named in named_landmarks(answer.accepted())]
+
+
+def test_frames_of_every_encoding_are_recognised(server: Server, taught: str) -> None:
+    rgb = pictures.seen_from(pictures.front(2.2))
+    bgr = np.ascontiguousarray(rgb[:, :, ::-1])
+    gray = np.rint(rgb @ np.array([0.299, 0.587, 0.114])).astype(np.uint8)
+    images = {
+        "rgb8": Image.rgb(rgb),
+        "bgr8": Image.bgr(bgr),
+        "bgr8 mirrored view": Image.bgr(rgb[:, :, ::-1]),
+        "rgb8 bytes": Image.rgb(rgb.tobytes(), (pictures.WIDTH_PX, pictures.HEIGHT_PX)),
+        "gray8": Image.gray(gray),
+        "png": Image.rgb(rgb).png(),
+        "jpeg": Image.bgr(bgr).jpeg(95),
+    }
+    answers = {}
+    with connect(server, taught) as robot:
+        for name, image in images.items():
+            answers[name] = robot.recognise("front", capture(image), wait_s=SOON_S)
+            assert recognised(answers[name]) == ["poster-0"], name
+    # Raw colour and PNG are the same grey: the same quads to the last bit.
+    same = [answers[name].quads for name in ("rgb8", "bgr8", "bgr8 mirrored view", "rgb8 bytes", "png")]
+    assert all(quads == same[0] for quads in same)
+    found = np.array(quad_corners(named_landmarks(answers["rgb8"])[0].quad))
+    assert np.abs(found - np.array(pictures.corners_px(pictures.front(2.2)))).max() < 2.0
+
+
+def test_a_frame_gives_the_pose_of_the_robot(server: Server, taught: str) -> None:
+    truth = Pose2(5.4, 2.0, -math.pi / 2 - 0.15)
+    with connect(server, taught) as robot:
+        answer = robot.recognise("front", capture(Image.rgb(pictures.seen_from(truth))), wait_s=SOON_S)
+    assert answer.map_from_robot is not None, answer
+    pose = answer.map_from_robot.pose
+    assert math.hypot(pose.x_m - truth.x_m, pose.y_m - truth.y_m) < 0.1
+    assert abs(pose.theta_rad - truth.theta_rad) < 0.05
+    assert answer.pose_landmarks == ("poster-0",) and answer.map == taught
+    assert all(0 < sigma < 0.5 for sigma in answer.map_from_robot.sigma)
+
+
+def test_answers_and_poses_come_by_iteration_and_by_callback(server: Server, taught: str) -> None:
+    called: list[CameraAnswer | RobotPose] = []
+    with connect(server, taught) as robot, robot.answers() as answers, robot.poses() as poses:
+        with robot.on_answer(called.append), robot.on_pose(called.append):
+            image = Image.rgb(pictures.seen_from(pictures.front())).jpeg(95)
+            start = robot.publish_odometry(Pose2())
+            seq = robot.publish_frame("front", capture(image, Pose2()))
+            assert seq == start + 1
+            arrived = answers.get(SOON_S)
+            assert arrived is not None and arrived.camera == "front" and arrived.answer.seq == seq
+            assert arrived.answer.epoch == robot.epoch
+            pose = pose_of(robot, poses.get)
+            assert pose.map == taught and pose.map_from_robot is not None
+            assert math.hypot(pose.map_from_robot.pose.x_m - 5.0, pose.map_from_robot.pose.y_m - 2.0) < 0.1
+        assert {type(each) for each in called} == {CameraAnswer, RobotPose}
+        so_far = len(called)
+        robot.recognise("front", capture(image), wait_s=SOON_S)
+        assert len(called) == so_far, "a closed subscription is called no more"
+        threading.Timer(0.2, answers.close).start()
+        rest = [arrived.answer.seq for arrived in answers]
+        assert len(rest) == 1 and rest[0] > seq, "the iteration ends when the inbox is closed"
+
+
+def pose_of(robot: Robot, get: object) -> RobotPose:
+    """The first fused pose; odometry goes on meanwhile."""
+    assert callable(get)
+    until = time.monotonic() + SOON_S
+    while time.monotonic() < until:
+        robot.publish_odometry(Pose2())
+        pose = get(0.2)
+        if pose is not None:
+            assert isinstance(pose, RobotPose)
+            return pose
+    raise AssertionError("no pose")
+
+
+def test_changes_of_a_map_and_its_version_arrive(server: Server) -> None:
+    called: list[MapChanged] = []
+    with server.maps() as maps:
+        version = maps.create_map("changing").version
+        maps.put_robot("watcher", "changing")
+        with connect(server, "watcher") as robot, robot.map_changes("changing") as changes:
+            assert robot.map_version("changing") == version
+            assert robot.map_version("no-such-map", wait_s=2.0) is None
+            with robot.on_map_changed("*", called.append):
+                maps.add_landmark("changing", "new")
+                changed = changes.get(SOON_S)
+            assert changed is not None and changed.map == "changing" and changed.version > version
+            assert robot.map_version("changing") == changed.version
+        assert any(each.map == "changing" for each in called)
+
+
+def test_a_robot_is_alive_while_it_is_connected(server: Server) -> None:
+    with server.maps() as maps:
+        maps.create_map("presence")
+        maps.put_robot("here", "presence")
+
+        def is_alive() -> bool:
+            return maps.robot("here").alive
+
+        with connect(server, "here") as robot:
+            assert eventually(is_alive) and maps.robot("here").epoch == robot.epoch
+        assert eventually(lambda: not is_alive())
+
+
+def eventually(holds: object) -> bool:
+    assert callable(holds)
+    until = time.monotonic() + SOON_S
+    while time.monotonic() < until:
+        if holds():
+            return True
+        time.sleep(0.1)
+    return False
+
+
+def test_refused_frames_name_code_and_field(server: Server, taught: str) -> None:
+    with connect(server, "nobody") as robot:
+        answer = robot.recognise("front", Image.gray(bytes(12), (4, 3)), wait_s=SOON_S)
+        with pytest.raises(Refused) as refused:
+            answer.accepted()
+        assert (refused.value.code, refused.value.field) == ("unknown_robot", "robot")
+        assert "put_robot" in str(refused.value)
+    with connect(server, taught) as robot:
+        wrong = Capture(Image("rgb8", 4, 3, bytes(35)), deadline_ms=60_000)
+        rejection = robot.recognise("front", wrong, wait_s=SOON_S).rejection
+        assert rejection is not None and (rejection.code, rejection.field) == ("size_mismatch", "image")
+
+
+def test_scans_and_gaze_are_taken(server: Server, taught: str) -> None:
+    with connect(server, taught) as robot:
+        scan = Scan((1.0, 2.0, 30.0), -0.1, 0.1, 30.0, odom_from_robot=Pose2())
+        first = robot.publish_scan(scan)
+        assert robot.publish_odometry(Pose2(), time.time_ns()) == first + 1
+        answer = robot.recognise("front", capture(Image.rgb(pictures.seen_from(pictures.front()))), wait_s=SOON_S)
+        request = GazeRequest(map_from_robot=answer.map_from_robot, criterion="information", looked_at="poster-1")
+        advice = robot.gaze(request)
+        assert advice.rejection is None and advice.action == "landmark" and advice.landmark == "poster-0"
+
+
+def test_what_cannot_be_is_refused_before_it_is_sent(server: Server, taught: str) -> None:
+    with pytest.raises(InvalidInput) as wrong_name:
+        Robot.connect("Robot 1", endpoint=server.zenoh)
+    assert wrong_name.value.code == "bad_name" and "lower-case" in str(wrong_name.value)
+    with connect(server, taught) as robot, pytest.raises(InvalidInput):
+        robot.publish_frame("Camera/1", Image.gray(bytes(12), (4, 3)))
+
+
+def test_no_server_is_an_error_with_advice() -> None:
+    started = time.monotonic()
+    with pytest.raises(Unreachable) as error:
+        Robot.connect("r1", endpoint="tcp/127.0.0.1:1", timeout_s=0.5)
+    assert "waymark serve" in str(error.value) and time.monotonic() - started < 10
+
+
+def test_no_answer_and_superseded_frames_are_errors(server: Server, taught: str) -> None:
+    with connect(server, taught) as robot, pytest.raises(NoAnswer):
+        robot.recognise("front", capture(Image.rgb(pictures.seen_from(pictures.front()))), wait_s=0.0)
+    newer = CameraAnswer("front", Answer(epoch=1, seq=7))
+    assert matching(newer, "front", 1, 8) is None and matching(newer, "back", 1, 7) is None
+    assert matching(newer, "front", 1, 7) is newer.answer
+    with pytest.raises(Superseded):
+        matching(newer, "front", 1, 6)
+
+
+def test_a_slow_reader_misses_the_oldest_and_knows_how_many() -> None:
+    from waymark import Inbox
+
+    inbox: Inbox[int] = Inbox()
+    for number in range(70):
+        inbox._push(number)
+    assert inbox.missed == 6 and inbox.get(0) == 6

@@ -1,0 +1,231 @@
+"""Claim: the dataclasses have the fields of the wire and of the API, the generated files are up to date, and pictures
+of every kind are read."""
+
+from __future__ import annotations
+
+import ast
+import builtins
+import dataclasses
+import math
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import httpx
+import numpy as np
+import pictures
+import pytest
+from conftest import Server
+
+import waymark
+from waymark import Capture, Image, Intrinsics, InvalidInput, Pose2, Pose2Covariance, Pose3, Unexpected, api, wire
+from waymark._http import EventParser, live_event
+from waymark._link import frame_bytes
+from waymark._values import MismatchError, fill, from_json, from_message, given, to_json
+from waymark.v1 import waymark_pb2 as pb
+
+PACKAGE = Path(waymark.__file__).parent
+# Messages that the client makes itself.
+MADE_HERE = {"Frame", "Odometry", "Scan"}
+# Dataclasses of the API whose type in the OpenAPI document is not described, or has another name or form.
+NOT_DESCRIBED = {
+    # Read from headers and events.
+    "CameraFrame",
+    "LiveAnswer",
+    "LivePose",
+    "LivePosition",
+    "LivePresence",
+    "LiveMapChange",
+    "LiveMissed",
+    # Objects without a schema of their own.
+    "MultiPolygon",
+    "VisibilityAreaBody",
+    "VisibilityAreaProperties",
+    "IntrinsicsMonitorBody",
+    "IntrinsicsSuspicionBody",
+    "TrajectoriesBody",
+    # A part of a form; one of several forms.
+    "CaptureMetadata",
+    "FindingBody",
+}
+
+
+def test_generated_files_are_up_to_date() -> None:
+    command = [sys.executable, str(PACKAGE.parents[1] / "tools" / "generate.py"), "--check"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_dataclasses_have_the_fields_of_the_messages() -> None:
+    for name, descriptor in pb.DESCRIPTOR.message_types_by_name.items():
+        if name in MADE_HERE:
+            continue
+        fields = [field.name for field in dataclasses.fields(getattr(wire, name))]
+        assert fields == [field.name for field in descriptor.fields], name
+    # Epoch and number are set when it is sent.
+    scan = {field.name for field in dataclasses.fields(wire.Scan)} | {"epoch", "seq"}
+    assert scan == set(pb.Scan.DESCRIPTOR.fields_by_name)
+    for enum in pb.DESCRIPTOR.enum_types_by_name.values():
+        if enum.name != "ImageEncoding":
+            prefix = enum.values[0].name.removesuffix("UNSPECIFIED")
+            words = [value.name.removeprefix(prefix).lower() for value in enum.values]
+            assert list(getattr(wire, enum.name).__args__) == words
+
+
+def test_dataclasses_have_the_fields_of_the_api(server: Server) -> None:
+    document = httpx.get(f"{server.http}/api/v1/openapi.json", trust_env=False).json()
+    schemas: dict[str, Any] = document["components"]["schemas"]
+    compared = 0
+    for name in api.__all__:
+        kind = getattr(api, name)
+        if not dataclasses.is_dataclass(kind) or name in NOT_DESCRIBED:
+            continue
+        compared += 1
+        schema = schemas[name]
+        # A type with further fields of any name is an `allOf`.
+        parts = [part for part in schema.get("allOf", [schema]) if "properties" in part]
+        described = {field for part in parts for field in part["properties"]}
+        ours = {field.name for field in dataclasses.fields(kind)} - {"facts"}
+        assert ours == described, name
+    assert compared > 50
+
+
+def test_messages_come_back_as_they_were() -> None:
+    rejection = wire.Rejection("too_large", "frame", "5 bytes are more than 4")
+    request = wire.GazeRequest(
+        Pose2Covariance(Pose2(1.0, 2.0, 3.0), tuple(float(n) for n in range(9))), pan_range_rad=(-1.0, 1.0), at_ns=7
+    )
+    message = pb.GazeRequest()
+    fill(message, dataclasses.replace(request, criterion="product"))
+    assert from_message(wire.GazeRequest, message) == dataclasses.replace(request, criterion="product")
+    answer = pb.Answer(status=pb.STATUS_NO_MATCH, rejection=pb.Rejection(**to_json(rejection)))
+    agreement: Any = answer.quads.add(kind=pb.QUAD_KIND_THREE_SIDED).points.agreement
+    agreement.extend([1, 2, 3, 99])
+    read = from_message(wire.Answer, answer)
+    assert (read.status, read.rejection, read.map_from_robot) == ("no_match", rejection, None)
+    assert read.quads[0].points is not None and read.quads[0].pose is None
+    assert read.quads[0].points.agreement == ("silent", "agrees", "disagrees", "unspecified")
+    with pytest.raises(ValueError, match="information"):
+        fill(pb.GazeRequest(), wire.GazeRequest(criterion="fastest"))  # type: ignore[arg-type]
+
+
+def test_json_is_read_by_name_and_says_what_is_wrong() -> None:
+    job = {"id": 3, "kind": "learn", "map": "hall", "state": "done", "progress": 1, "message": "", "new_field": {}}
+    read = from_json(api.Job, job)
+    assert read.progress == 1.0 and isinstance(read.progress, float) and read.result is None
+    wrong: Any
+    for wrong in ({}, {**job, "progress": "much"}, [], None, {**job, "progress": None}):
+        with pytest.raises(MismatchError, match="Job"):
+            from_json(api.Job, wrong)
+    model = from_json(api.LandmarkModelBody, {"views": 1, "generated_views": 2, "learnt_ms": 3, "tau": 0.5})
+    assert model.facts == {"tau": 0.5}
+    assert given(a=None, b=waymark.UNSET, c=Pose2()) == {"a": None, "c": {"x_m": 0.0, "y_m": 0.0, "theta_rad": 0.0}}
+
+
+def test_a_frame_is_the_message_of_the_wire() -> None:
+    pixels = np.arange(2 * 3 * 3, dtype=np.uint8).reshape(2, 3, 3)
+    capture = Capture(
+        Image.bgr(pixels),
+        intrinsics=Intrinsics(500.0, 501.0, 1.0, 2.0, plumb_bob=(0.1, 0.2, 0.0, 0.0, 0.3)),
+        robot_from_camera=Pose3.mounting(0.1, 0.0, 1.2),
+        odometry=Pose2(),
+        captured_ns=17,
+        deadline_ms=5,
+        map="hall",
+    )
+    frame = pb.Frame.FromString(frame_bytes(capture, 9, 300))
+    assert (frame.epoch, frame.seq, frame.captured_ns, frame.deadline_ms, frame.map) == (9, 300, 17, 5, "hall")
+    assert (frame.encoding, frame.width_px, frame.height_px) == (pb.IMAGE_ENCODING_BGR8, 3, 2)
+    assert frame.image == pixels.tobytes() and list(frame.intrinsics.plumb_bob)[4] == 0.3
+    assert frame.HasField("odometry") and not frame.HasField("prior")
+    # A length of more than one byte.
+    long = pb.Frame.FromString(frame_bytes(Image.gray(bytes(300 * 400), (400, 300)), 9, 300))
+    assert len(long.image) == 120_000 and long.captured_ns > 0
+
+
+def test_a_camera_looks_where_its_mounting_says() -> None:
+    def looks(pose: Pose3) -> tuple[float, float, float]:
+        x, y, z, w = pose.qx, pose.qy, pose.qz, pose.qw
+        return (2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y))
+
+    assert looks(Pose3.mounting(0, 0, 1)) == pytest.approx((1, 0, 0))
+    assert looks(Pose3.mounting(0, 0, 1, pan_rad=math.pi / 2)) == pytest.approx((0, 1, 0), abs=1e-12)
+    assert looks(Pose3.mounting(0, 0, 1, tilt_rad=math.pi / 4)) == pytest.approx((0.5**0.5, 0, 0.5**0.5))
+    rolled = Pose3.mounting(0, 0, 1, pan_rad=0.3, tilt_rad=0.2, roll_rad=0.1)
+    assert looks(rolled) == pytest.approx(looks(Pose3.mounting(0, 0, 1, pan_rad=0.3, tilt_rad=0.2)))
+    camera = Intrinsics.from_view(640, 480, math.pi / 2)
+    assert camera.fx_px == pytest.approx(320.0) and (camera.cx_px, camera.cy_px) == (319.5, 239.5)
+
+
+def test_sizes_are_read_from_headers(tmp_path: Path) -> None:
+    photo = Image.rgb(pictures.poster(0))
+    path = tmp_path / "photo.png"
+    path.write_bytes(photo.png().data)
+    jpeg = photo.jpeg()
+    for image, encoding in ((Image.file(path), "png"), (Image.encoded(jpeg.data), "jpeg")):
+        assert (image.encoding, image.width_px, image.height_px) == (encoding, 480, 360)
+        assert image.png() is image and image.jpeg() is image and not image.is_raw
+    for damaged in (b"", b"GIF89a", b"\x89PNG\r\n\x1a\n", jpeg.data[:20], b"\xff\xd8\xff\xe0\0\0" * 1000):
+        with pytest.raises(InvalidInput) as refused:
+            Image.encoded(damaged)
+        assert refused.value.code == "bad_image"
+
+
+def test_png_and_jpeg_show_the_same_picture() -> None:
+    from io import BytesIO
+
+    from PIL import Image as Pillow
+
+    rgb = pictures.poster(3)
+    bgr = np.ascontiguousarray(rgb[:, :, ::-1])
+    gray = rgb[:, :, 1].copy()
+    for image, expected in ((Image.rgb(rgb), rgb), (Image.bgr(bgr), rgb), (Image.gray(gray), gray)):
+        assert (np.asarray(Pillow.open(BytesIO(image.png().data))) == expected).all()
+        lossy = np.asarray(Pillow.open(BytesIO(image.jpeg(95).data))).astype(int)
+        assert np.abs(lossy - expected).mean() < 4
+
+
+def test_arrays_of_other_shapes_are_refused() -> None:
+    rgb = pictures.poster(0)
+    for make, wrong in (
+        (Image.rgb, rgb[:, :, 0]),
+        (Image.gray, rgb),
+        (Image.bgr, rgb.astype(np.float32)),
+        (Image.rgb, np.zeros((0, 4, 3), np.uint8)),
+    ):
+        with pytest.raises(InvalidInput) as refused:
+            make(np.array(wrong))
+        assert refused.value.code == "bad_image"
+    with pytest.raises(InvalidInput) as short:
+        Image.rgb(bytes(35), (4, 3))
+    assert short.value.code == "size_mismatch"
+    with pytest.raises(InvalidInput):
+        Image.gray(bytes(12))
+
+
+def test_the_package_works_without_numpy_and_encoders(monkeypatch: pytest.MonkeyPatch) -> None:
+    for file in PACKAGE.rglob("*.py"):
+        tops = [node for node in ast.walk(ast.parse(file.read_text())) if isinstance(node, ast.Import | ast.ImportFrom)]
+        assert "numpy" not in {getattr(node, "module", None) or node.names[0].name for node in tops}, file
+    original = builtins.__import__
+    monkeypatch.setitem(sys.modules, "PIL.Image", None)
+    monkeypatch.setitem(sys.modules, "cv2", None)
+    assert builtins.__import__ is original
+    with pytest.raises(InvalidInput) as refused:
+        Image.gray(bytes(12), (4, 3)).jpeg()
+    assert refused.value.code == "no_encoder" and "pip install" in str(refused.value)
+
+
+def test_events_are_cut_and_named() -> None:
+    parser = EventParser()
+    body = [":", "", "event: pose", 'data: {"a": 1}', "", ": still here", "", "data: x", "data: y", "", "event: cut"]
+    assert [event for line in body for event in parser.push(line)] == [("pose", '{"a": 1}'), ("message", "x\ny")]
+    assert live_event("missed", "3") == api.LiveMissed(3)
+    assert live_event("newer-event", "{}") is None
+    gone = live_event("map_changed", '{"map": "hall", "version": null}')
+    assert gone == api.LiveMapChange("hall", None)
+    truth = live_event("truth", '{"robot": "r1", "map": "hall", "pose": {"x_m": 1, "y_m": 2, "theta_rad": 3}}')
+    assert truth == api.LivePosition("truth", "r1", "hall", Pose2(1.0, 2.0, 3.0))
+    with pytest.raises(Unexpected):
+        list(EventParser().push("data: " + "x" * (5 << 20)))
