@@ -137,7 +137,7 @@ impl Server {
         vitals.probe("the outbox", move || outbox.is_running());
         let workers = Workers::start(&engine, config.workers, &publisher).map_err(StartError::Threads)?;
         let zenoh_endpoint = bus.endpoint().to_owned();
-        let services = Services { jobs, gatherer };
+        let services = Services { jobs, gatherer, ros2: ros2.clone() };
         let app = App::new(config.clone(), store, services, &engine, stopping.clone());
         let pulse = vitals.begin("the HTTP listener");
         let router = http::router(app);

@@ -1,6 +1,6 @@
 //! What became of the messages of each robot, for people who look for what is missing.
 
-use serde::Serialize;
+use protos::api::Ros2Status;
 use std::{
     collections::BTreeMap,
     sync::{Mutex, MutexGuard, PoisonError},
@@ -9,27 +9,16 @@ use std::{
 /// Most different reasons that are counted of a robot: topics times words, both bounded by the settings and the program.
 const MAX_REASONS: usize = 512;
 
-/// Counts of one robot.
-#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
-pub struct Ros2Counts {
-    /// Messages received, by topic.
-    pub received: BTreeMap<String, u64>,
-    /// Messages sent, by topic.
-    pub sent: BTreeMap<String, u64>,
-    /// What was not used or incomplete, by topic and reason.
-    pub reasons: BTreeMap<String, BTreeMap<String, u64>>,
-}
-
 /// Shared by the robot's thread and zenoh's.
 #[derive(Debug, Default)]
-pub(super) struct Counters(Mutex<Ros2Counts>);
+pub(super) struct Counters(Mutex<Ros2Status>);
 
 impl Counters {
-    fn lock(&self) -> MutexGuard<'_, Ros2Counts> {
+    fn lock(&self) -> MutexGuard<'_, Ros2Status> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    pub(super) fn read(&self) -> Ros2Counts {
+    pub(super) fn read(&self) -> Ros2Status {
         self.lock().clone()
     }
 

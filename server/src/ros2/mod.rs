@@ -11,8 +11,6 @@ mod wire;
 mod graph;
 mod robot;
 
-pub use counts::Ros2Counts;
-
 use crate::{
     bus::{BusError, Outbox, Receivers, caught},
     config::Ros2Robot,
@@ -22,7 +20,7 @@ use engine::{slots::SlotKey, workers::Publish};
 use graph::Graph;
 use inbox::{Dropped, Event, Inbox};
 use outputs::Outputs;
-use protos::{Name, v1};
+use protos::{Name, api::Ros2Status, v1};
 use robot::RobotThread;
 use ros2::robot::{RobotAdapter, TopicUse};
 use std::{
@@ -74,9 +72,10 @@ impl Ros2 {
         Ok(opened)
     }
 
-    /// What became of the messages of each robot.
-    pub fn counts(&self) -> BTreeMap<Name, Ros2Counts> {
-        self.robots.iter().map(|(robot, running)| (robot.clone(), running.counts.read())).collect()
+    /// What became of the messages of a robot.
+    pub fn status(&self, robot: &Name) -> Ros2Status {
+        let counts = self.robots.get(robot).map(|running| running.counts.read());
+        counts.map_or_else(Ros2Status::default, |counts| Ros2Status { configured: true, ..counts })
     }
 
     /// The answers and poses of robots that are not of ROS go to `outbox` alone.
