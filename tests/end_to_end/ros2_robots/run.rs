@@ -30,12 +30,12 @@ pub(super) const OPTICAL: &str = "camera_optical_frame";
 
 /// Answers and poses of all robots, as on the wire of Waymark.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Seen {
+pub(super) struct Published {
     pub(super) answers: Arc<Mutex<Vec<(String, v1::Answer)>>>,
     pub(super) poses: Arc<Mutex<Vec<(String, v1::RobotPose)>>>,
 }
 
-impl Seen {
+impl Published {
     /// The answer to the frame of a robot that was captured then.
     pub(super) async fn answer(&self, robot: &str, captured_ns: i64) -> v1::Answer {
         let found = || async {
@@ -49,7 +49,7 @@ impl Seen {
 /// A native robot without SDK, and an ear for what every robot gets.
 pub(super) struct Native {
     pub(super) session: Session,
-    pub(super) seen: Seen,
+    pub(super) seen: Published,
     seq: u64,
 }
 
@@ -60,7 +60,7 @@ impl Native {
             inside.server.zenoh_endpoint
         );
         let session = zenoh::open(zenoh::Config::from_json5(&config).expect("settings")).await.expect("open");
-        let seen = Seen::default();
+        let seen = Published::default();
         let robot = |key: &str| key.split('/').nth(4).unwrap_or_default().to_owned();
         let (answers, poses) = (seen.answers.clone(), seen.poses.clone());
         let noted = move |sample: zenoh::sample::Sample| {
