@@ -4,6 +4,13 @@
 //! Precedence, weakest first: defaults, TOML file, `WAYMARK_...` variables (`WAYMARK_LIMITS__FRAME_BYTES=100000`),
 //! command line.
 
+mod ros2;
+
+pub use ros2::{
+    MAX_DOMAIN, MAX_KEY_PREFIX_BYTES, MAX_ROS2_ROBOTS, MAX_TRANSFORM_TOLERANCE_S, Middleware, PoseSource,
+    RawRos2, RawRos2Camera, RawRos2Robot, Ros2Outputs, Ros2Robot,
+};
+
 use engine::decode::ImageLimits;
 use figment::{
     Figment,
@@ -12,6 +19,7 @@ use figment::{
 use protos::Name;
 use serde::{Deserialize, Serialize};
 use std::{
+    borrow::Cow,
     net::{IpAddr, SocketAddr},
     path::{Path, PathBuf},
     sync::Arc,
@@ -33,7 +41,7 @@ pub enum ConfigError {
     #[error("setting `{field}`: {reason}")]
     Invalid {
         /// Name of the setting.
-        field: &'static str,
+        field: Cow<'static, str>,
         /// What is wrong with it.
         reason: String,
     },
@@ -70,6 +78,8 @@ pub struct RawConfig {
     pub search_every_frame: bool,
     /// Allows plain-text listeners beyond loopback.
     pub insecure: bool,
+    /// Robots of ROS 2.
+    pub ros2: RawRos2,
     /// Every bound.
     pub limits: Limits,
     /// Parameters of the algorithms. Models learnt under other distance parameters are refused.
@@ -86,6 +96,7 @@ impl Default for RawConfig {
             workers: 0,
             search_every_frame: true,
             insecure: false,
+            ros2: RawRos2::default(),
             limits: Limits::default(),
             algorithm: Params::default(),
         }
@@ -242,6 +253,8 @@ pub struct Config {
     pub workers: usize,
     /// Whether every frame is searched for all landmarks of its map.
     pub search_every_frame: bool,
+    /// Robots of ROS 2.
+    pub ros2: Vec<Ros2Robot>,
     /// Every bound.
     pub limits: Limits,
     /// Parameters of the algorithms.
@@ -293,6 +306,7 @@ impl TryFrom<RawConfig> for Config {
             fleet,
             workers: if raw.workers == 0 { cores } else { raw.workers },
             search_every_frame: raw.search_every_frame,
+            ros2: ros2::checked(raw.ros2)?,
             limits: raw.limits,
             params: Arc::new(raw.algorithm),
         })
@@ -305,8 +319,8 @@ impl Default for Config {
     }
 }
 
-fn invalid(field: &'static str, reason: String) -> ConfigError {
-    ConfigError::Invalid { field, reason }
+fn invalid(field: impl Into<Cow<'static, str>>, reason: String) -> ConfigError {
+    ConfigError::Invalid { field: field.into(), reason }
 }
 
 fn is_loopback(ip: IpAddr) -> bool {

@@ -7,6 +7,7 @@ use crate::{
     http::{self, App, Services},
     jobs::Jobs,
     publication::{Catalogue, CatalogueTasks},
+    ros2::Ros2,
     store::{OpenError, landmarks},
 };
 use engine::{
@@ -78,6 +79,8 @@ pub struct RunningServer {
     pub live: Arc<LiveHub>,
     /// Frames that wait, and the counters of all frames.
     pub slots: Arc<Slots<FrameJob>>,
+    /// Robots of ROS 2.
+    pub ros2: Arc<Ros2>,
     stop: watch::Sender<bool>,
     vitals: Arc<Vitals>,
     tasks: Tasks,
@@ -126,13 +129,15 @@ impl Server {
         let pulse = vitals.begin("the task that stores findings");
         let findings = tokio::spawn(store_findings(store.clone(), found, pulse));
         let (live, slots) = (engine.live.clone(), engine.slots.clone());
-        let bus = Bus::open(&config, receivers(&config, &engine)).await?;
+        let to = receivers(&config, &engine);
+        let bus = Bus::open(&config, to.clone()).await?;
         let outbox = bus.outbox().clone();
+        let ros2 = Arc::new(Ros2::open(bus.session(), &config.ros2, (&to, &outbox)).await?);
+        let publisher = Arc::new(ros2.publisher(outbox.clone()));
         vitals.probe("the outbox", move || outbox.is_running());
-        let workers = Workers::start(&engine, config.workers, &Arc::new(bus.outbox().clone()))
-            .map_err(StartError::Threads)?;
+        let workers = Workers::start(&engine, config.workers, &publisher).map_err(StartError::Threads)?;
         let zenoh_endpoint = bus.endpoint().to_owned();
-        let services = Services { jobs, gatherer };
+        let services = Services { jobs, gatherer, ros2: ros2.clone() };
         let app = App::new(config.clone(), store, services, &engine, stopping.clone());
         let pulse = vitals.begin("the HTTP listener");
         let router = http::router(app);
@@ -142,7 +147,7 @@ impl Server {
         });
         let watch = tokio::spawn(vitals.clone().watch());
         let tasks = Tasks { workers, bus, http, jobs: jobs_task, findings, gather, writer, watch };
-        Ok(RunningServer { http_addr, zenoh_endpoint, snapshots, live, slots, stop, vitals, tasks })
+        Ok(RunningServer { http_addr, zenoh_endpoint, snapshots, live, slots, ros2, stop, vitals, tasks })
     }
 }
 
@@ -223,6 +228,7 @@ impl RunningServer {
         if let Err(error) = workers.await {
             tracing::error!(%error, "worker_stop_failed");
         }
+        self.ros2.close().await;
         bus.close().await;
         for (what, task) in [("HTTP", http), ("jobs", jobs), ("findings", findings), ("gathering", gather)] {
             if let Err(error) = task.await {

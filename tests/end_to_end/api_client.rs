@@ -250,6 +250,7 @@ async fn a_robot_is_observable_from_its_first_frame_to_its_deletion() {
     assert_eq!(maps.trajectories("r1").await.expect("trajectories").pose, []);
     assert!(!maps.relocalisation("r1").await.expect("relocalisation").relocalising);
     assert_eq!(maps.corrections("r1").await.expect("corrections").corrections, []);
+    assert!(!maps.ros2_status("r1").await.expect("messages of ROS").configured);
     let known = maps.robot("r1").await.expect("robot");
     assert!(known.alive && known.epoch.is_some() && known.conflict.is_none(), "{known:?}");
     assert_eq!(maps.robots().await.expect("robots").len(), 1);

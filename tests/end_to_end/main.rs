@@ -20,6 +20,7 @@ mod look_alikes;
 mod moved_landmark;
 mod other_map;
 mod restart;
+mod ros2_robots;
 mod several_maps;
 mod style;
 mod teach_and_recognise;

@@ -8,6 +8,7 @@ pub mod guide_files;
 pub mod guides;
 pub mod pictures;
 pub mod robots;
+pub mod ros;
 pub mod scenes;
 
 pub use child::Child;
@@ -34,13 +35,17 @@ pub struct Inside {
 impl Inside {
     /// Starts one with these limits.
     pub async fn start(limits: Limits) -> Self {
+        Self::start_with(RawConfig { limits, ..RawConfig::default() }).await
+    }
+
+    /// Starts one with these settings but for data and addresses.
+    pub async fn start_with(settings: RawConfig) -> Self {
         let data = TempDir::new().expect("a temporary directory");
         let raw = RawConfig {
             data: data.path().to_owned(),
             http: "127.0.0.1:0".into(),
             zenoh: "tcp/127.0.0.1:0".into(),
-            limits,
-            ..RawConfig::default()
+            ..settings
         };
         let config = Config::try_from(raw).expect("a valid configuration");
         let server = Server::start(config).await.expect("the server starts");

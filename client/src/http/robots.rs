@@ -1,8 +1,10 @@
-//! Robots: pose, corrections, relocalisation, trajectories.
+//! Robots: pose, corrections, relocalisation, trajectories, messages of ROS 2.
 
 use super::{map_client::MapClient, operation::operations};
 use crate::ClientError;
-use protos::api::{CorrectionsBody, RelocalisationStatus, Robot, RobotAssignment, TrajectoriesBody};
+use protos::api::{
+    CorrectionsBody, RelocalisationStatus, Robot, RobotAssignment, Ros2Status, TrajectoriesBody,
+};
 
 operations! {
     PUT: PUT "/robots/{robot}" => put_robot,
@@ -11,6 +13,7 @@ operations! {
     DELETE: DELETE "/robots/{robot}" => delete_robot,
     CORRECTIONS: GET "/robots/{robot}/corrections" => corrections,
     RELOCALISATION: GET "/robots/{robot}/relocalisation" => relocalisation,
+    ROS2: GET "/robots/{robot}/ros2" => ros2_status,
     TRAJECTORIES: GET "/robots/{robot}/trajectories" => trajectories,
 }
 
@@ -44,6 +47,11 @@ impl MapClient {
     /// Pose hypotheses of a robot that observes nothing unique.
     pub async fn relocalisation(&self, robot: &str) -> Result<RelocalisationStatus, ClientError> {
         self.send(self.ask(&RELOCALISATION, &[&robot])?).await
+    }
+
+    /// What became of the messages of a robot of ROS 2.
+    pub async fn ros2_status(&self, robot: &str) -> Result<Ros2Status, ClientError> {
+        self.send(self.ask(&ROS2, &[&robot])?).await
     }
 
     /// Recent trajectories of a robot, by source.

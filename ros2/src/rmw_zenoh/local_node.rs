@@ -43,6 +43,15 @@ impl LocalNode {
         Self { token, next_id: 1 }
     }
 
+    /// The same node with numbers from `first` on, for a further node of the session.
+    #[must_use]
+    pub fn numbered_from(mut self, first: u64) -> Self {
+        self.token.node_id = first.to_string();
+        self.token.entity_id.clone_from(&self.token.node_id);
+        self.next_id = first + 1;
+        self
+    }
+
     /// The node's own token.
     pub fn token(&self) -> &Token {
         &self.token
@@ -123,6 +132,14 @@ mod tests {
             "@ros2_lv/3/8b20/0/1/MS/%/%/waymark/%r1%image%compressed/sensor_msgs::msg::dds_::CompressedImage_/\
              RIHS01_robots/2::,5:,:,:,,/backends:cpu:"
         );
+    }
+
+    #[test]
+    fn nodes_of_one_session_have_their_own_numbers() {
+        let mut second = node().numbered_from(1000);
+        assert_eq!(second.token().to_key().unwrap(), "@ros2_lv/3/8b20/1000/1000/NN/%/%/waymark");
+        let tf = second.subscription(&published::<TFMessage<'_>>("/tf", Qos::reliable(100)));
+        assert!(tf.to_key().unwrap().starts_with("@ros2_lv/3/8b20/1000/1001/MS/"));
     }
 
     #[test]

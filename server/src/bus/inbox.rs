@@ -52,7 +52,7 @@ pub(super) async fn subscribe(
         let (keys, to) = (keys.clone(), to.clone());
         move |sample: Sample| {
             if let Ok(Key::Alive(robot, epoch)) = keys.parse(sample.key_expr().as_str()) {
-                token(&to, &robot, (epoch, sample.kind() == SampleKind::Put));
+                announce_presence(&to, &robot, (epoch, sample.kind() == SampleKind::Put));
             }
         }
     };
@@ -73,8 +73,8 @@ pub(super) async fn subscribe(
     ])
 }
 
-/// A liveliness token appeared or went.
-fn token(to: &Receivers, robot: &Name, token: (Option<u64>, bool)) {
+/// A liveliness token of a robot's epoch appeared or went.
+pub(crate) fn announce_presence(to: &Receivers, robot: &Name, token: (Option<u64>, bool)) {
     let map_of = |robot: &Name| to.intake.snapshots.robot_map(robot.as_str());
     let is_registered = |robot: &Name| map_of(robot).is_some();
     let came = to.motion.epochs().token(robot, token, Instant::now(), is_registered);
@@ -95,21 +95,25 @@ fn frame(keys: &Keys, to: &Receivers, outbox: &Outbox, sample: &Sample) {
         tracing::debug!(key, "frame_key_invalid");
         return to.intake.slots.refuse(protos::Code::BadName);
     };
-    let slot = SlotKey { robot, camera };
+    take_frame(to, outbox, &SlotKey { robot, camera }, bytes(sample));
+}
+
+/// Passes a `Frame` message to the intake. A refusal is answered.
+pub(crate) fn take_frame(to: &Receivers, outbox: &Outbox, slot: &SlotKey, message: Bytes) {
     let panics = to.vitals.panics();
     let follows = "it is refused as internal";
     let received =
-        panics.catch(Edge::Message, "frame", follows, || to.intake.receive(slot.clone(), bytes(sample)));
-    if let Err(answer) = received.unwrap_or_else(|| Err(internal(sample))) {
-        tracing::debug!(key, rejection = ?answer.rejection, "frame_refused");
-        outbox.answer(&slot, &answer);
-        to.live.publish_refusal(&slot, answer.into());
+        panics.catch(Edge::Message, "frame", follows, || to.intake.receive(slot.clone(), message.clone()));
+    if let Err(answer) = received.unwrap_or_else(|| Err(internal(message))) {
+        tracing::debug!(?slot, rejection = ?answer.rejection, "frame_refused");
+        outbox.answer(slot, &answer);
+        to.live.publish_refusal(slot, answer.into());
     }
 }
 
 /// The answer to a frame on which the intake panicked.
-fn internal(sample: &Sample) -> Box<v1::Answer> {
-    let v1::Frame { epoch, seq, captured_ns, .. } = v1::Frame::decode(bytes(sample)).unwrap_or_default();
+fn internal(message: Bytes) -> Box<v1::Answer> {
+    let v1::Frame { epoch, seq, captured_ns, .. } = v1::Frame::decode(message).unwrap_or_default();
     let (status, rejection) = (v1::Status::Rejected.into(), Some((&failed()).into()));
     Box::new(v1::Answer { epoch, seq, captured_ns, status, rejection, ..v1::Answer::default() })
 }

@@ -1,5 +1,4 @@
-//! The zenoh side: frames, odometry, scans and presence in; answers, poses and map changes out. The only place of the
-//! server that knows zenoh. An embedded router on the configured endpoint, so robots need no other daemon; no
+//! The zenoh side: frames, odometry, scans and presence in; answers, poses and map changes out. An embedded router on the configured endpoint, so robots need no other daemon; no
 //! discovery, no shared memory, no administration space, bounded messages.
 //!
 //! Callbacks run on zenoh's threads and never wait: they check and hand over. What goes out passes a bounded queue
@@ -13,6 +12,7 @@ mod versions;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use inbox::{announce_presence, take_frame};
 pub use outbox::Outbox;
 
 use crate::config::Config;
@@ -115,6 +115,11 @@ impl Bus {
         &self.endpoint
     }
 
+    /// The session of the router, for robots of other middleware.
+    pub(crate) fn session(&self) -> &zenoh::Session {
+        &self.session
+    }
+
     /// Where answers and poses are put.
     pub fn outbox(&self) -> &Outbox {
         &self.outbox
@@ -141,7 +146,7 @@ impl Bus {
 }
 
 /// A zenoh callback that catches panics: a panic would end the task that receives from a robot. `kind` names the message.
-fn caught<T>(
+pub(crate) fn caught<T>(
     vitals: &Arc<Vitals>,
     kind: &'static str,
     receive: impl Fn(T) + Send + Sync + 'static,

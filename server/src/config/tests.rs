@@ -29,6 +29,93 @@ fn the_example_file_names_every_setting_with_its_default() {
 }
 
 #[test]
+fn the_example_file_shows_every_setting_of_a_robot_of_ros_with_its_default() {
+    let lines = include_str!("../../config.example.toml").lines();
+    let shown = lines.skip_while(|line| *line != "# [[ros2.robot]]").take_while(|line| line.starts_with('#'));
+    let shown: Vec<&str> = shown.map(|line| line.trim_start_matches(['#', ' '])).collect();
+    let shown = shown.join("\n");
+    let read: RawConfig = Figment::from(Toml::string(&shown)).extract().unwrap();
+    assert_eq!(read.ros2.robot, [RawRos2Robot::default()]);
+    let named: serde_json::Value = Figment::from(Toml::string(&shown)).extract().unwrap();
+    let all = serde_json::to_value(RawRos2 { robot: vec![RawRos2Robot::default()] }).unwrap();
+    for (named, all) in [
+        (&named["ros2"]["robot"][0], &all["robot"][0]),
+        (&named["ros2"]["robot"][0]["camera"][0], &all["robot"][0]["camera"][0]),
+    ] {
+        assert_eq!(keys(named, ""), keys(all, ""));
+        assert!(keys(all, "").len() >= 7);
+    }
+}
+
+/// The settings with one robot, changed.
+fn with_robot(change: impl FnOnce(&mut RawRos2Robot)) -> RawConfig {
+    let mut robot = RawRos2Robot { robot: "r1".into(), ..RawRos2Robot::default() };
+    change(&mut robot);
+    RawConfig { ros2: RawRos2 { robot: vec![robot] }, ..RawConfig::default() }
+}
+
+#[test]
+fn a_robot_of_ros_gets_absolute_topics() {
+    let raw = with_robot(|r| {
+        (r.namespace, r.key_prefix, r.odometry) = ("/r1/".into(), "/robots/r1".into(), String::new());
+        (r.domain, r.map_to_odom, r.transform_tolerance_s) = (7, true, 0.5);
+    });
+    let robots = Config::try_from(raw).unwrap().ros2;
+    let [robot] = robots.as_slice() else { panic!("{robots:?}") };
+    assert_eq!(
+        (robot.middleware, robot.key_prefix.as_str()),
+        (Middleware::RmwZenoh { domain: 7 }, "robots/r1")
+    );
+    assert_eq!(robot.inputs.cameras[0].image, "/r1/camera/image_raw/compressed");
+    assert_eq!((robot.inputs.tf.as_str(), &robot.inputs.odometry), ("/tf", &None));
+    let outputs = Ros2Outputs {
+        pose: Some(("/r1/waymark/pose".into(), PoseSource::Fixes)),
+        initial_pose: None,
+        detections: Some("/r1/waymark/detections".into()),
+        map_to_odom_ahead_ns: Some(500_000_000),
+    };
+    assert_eq!(robot.outputs, outputs);
+}
+
+#[test]
+fn bad_settings_of_a_robot_of_ros_are_named() {
+    type Change = fn(&mut RawRos2Robot);
+    let cases: [(&str, Change); 13] = [
+        ("robot", |r| r.robot.clear()),
+        ("domain", |r| r.domain = MAX_DOMAIN + 1),
+        ("key_prefix", |r| r.key_prefix = "a/*".into()),
+        ("key_prefix", |r| r.key_prefix = "a".repeat(MAX_KEY_PREFIX_BYTES + 1)),
+        ("namespace", |r| r.namespace = "/a b".into()),
+        ("scan", |r| r.scan = "1".into()),
+        ("tf", |r| r.tf.clear()),
+        ("base_frame", |r| r.base_frame = "/base_link".into()),
+        ("pose", |r| r.pose = "/odom".into()),
+        ("detections", |r| r.detections = r.pose.clone()),
+        ("transform_tolerance_s", |r| r.transform_tolerance_s = f64::NAN),
+        ("camera[0].name", |r| r.camera[0].name = "Front".into()),
+        ("camera[1].name", |r| r.camera = vec![RawRos2Camera::default(); 2]),
+    ];
+    for (named, change) in cases {
+        match Config::try_from(with_robot(change)) {
+            Err(ConfigError::Invalid { field, .. }) => assert_eq!(field, format!("ros2.robot[0].{named}")),
+            other => panic!("{named}: {other:?}"),
+        }
+    }
+    let robot = |name: &str, domain| RawRos2Robot { robot: name.into(), domain, ..RawRos2Robot::default() };
+    let refused =
+        |robot| match Config::try_from(RawConfig { ros2: RawRos2 { robot }, ..RawConfig::default() }) {
+            Err(ConfigError::Invalid { field, .. }) => Some(field.into_owned()),
+            _ => None,
+        };
+    assert_eq!(refused(vec![robot("a", 0), robot("b", 1)]), None);
+    assert_eq!(refused(vec![robot("a", 0), robot("b", 0)]), Some("ros2.robot[1].odometry".into()));
+    assert_eq!(refused(vec![robot("a", 0), robot("a", 1)]), Some("ros2.robot[1].robot".into()));
+    let many = |count: u32| (0..count).map(|i| robot(&format!("r{i}"), i)).collect::<Vec<_>>();
+    assert_eq!(refused(many(MAX_ROS2_ROBOTS as u32)), None);
+    assert_eq!(refused(many(MAX_ROS2_ROBOTS as u32 + 1)), Some("ros2.robot".into()));
+}
+
+#[test]
 fn plain_text_beyond_loopback_is_refused() {
     for (http, zenoh, ok) in [
         ("127.0.0.1:0", "tcp/[::1]:7447", true),

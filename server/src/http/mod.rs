@@ -21,6 +21,7 @@ mod recognise;
 mod reference_runs;
 mod relocalisation;
 mod robots;
+mod ros2;
 mod router;
 mod upload;
 mod views;
@@ -33,7 +34,7 @@ mod tests;
 
 pub(crate) use router::router;
 
-use crate::{config::Config, gather::Gatherer, jobs::Jobs, publication::Catalogue};
+use crate::{config::Config, gather::Gatherer, jobs::Jobs, publication::Catalogue, ros2::Ros2};
 use axum::http::StatusCode;
 use engine::{live::LiveHub, motion::MotionTracker, panics::Edge, relocalise::Relocalisers, workers::Engine};
 use error::ApiError;
@@ -54,6 +55,8 @@ pub(crate) struct App {
     pub(crate) motion: Arc<MotionTracker>,
     /// Where those may be that do not know.
     pub(crate) searches: Arc<Relocalisers>,
+    /// Robots of ROS 2.
+    pub(crate) ros2: Arc<Ros2>,
     /// Becomes true when the server stops; ends event streams.
     pub(crate) stopping: watch::Receiver<bool>,
     /// Places for vision work asked for over HTTP: as many as there are vision threads.
@@ -69,6 +72,7 @@ pub(crate) struct App {
 pub(crate) struct Services {
     pub(crate) jobs: Arc<Jobs>,
     pub(crate) gatherer: Arc<Gatherer>,
+    pub(crate) ros2: Arc<Ros2>,
 }
 
 /// The state of the router.
@@ -78,7 +82,7 @@ impl App {
     pub(crate) fn new(
         config: Arc<Config>,
         store: Catalogue,
-        Services { jobs, gatherer }: Services,
+        Services { jobs, gatherer, ros2 }: Services,
         engine: &Engine,
         stopping: watch::Receiver<bool>,
     ) -> Self {
@@ -87,7 +91,20 @@ impl App {
         let uploads = Semaphore::new(config.limits.uploads);
         let (live, motion) = (engine.live.clone(), engine.motion.clone());
         let searches = engine.relocalisers.clone();
-        Self { config, store, jobs, gatherer, live, motion, searches, stopping, vision, streams, uploads }
+        Self {
+            config,
+            store,
+            jobs,
+            gatherer,
+            live,
+            motion,
+            searches,
+            ros2,
+            stopping,
+            vision,
+            streams,
+            uploads,
+        }
     }
 
     /// Runs vision work off the runtime, a bounded number at a time.

@@ -2,7 +2,7 @@
 
 use super::{
     App, AppState, cameras, error::ApiError, gathering, guard, health, landmarks, learning, live, mapping,
-    maps, modalities, pages, recognise, reference_runs, relocalisation, robots, views, visibility,
+    maps, modalities, pages, recognise, reference_runs, relocalisation, robots, ros2, views, visibility,
     visibility_settings, walls,
 };
 use crate::config::Limits;
@@ -47,6 +47,7 @@ fn api(limits: &Limits) -> OpenApiRouter<AppState> {
         .merge(recognise::router(limits.upload_bytes))
         .merge(robots::router())
         .merge(relocalisation::router())
+        .merge(ros2::router())
         .merge(cameras::router())
         .merge(live::router())
         .merge(health::router())

@@ -51,7 +51,13 @@ impl Service {
         let hall = Arc::new(MapSnapshot::empty("hall", 1));
         let engine =
             Engine { vitals: store.vitals().clone(), frame_tap: Arc::new(tap), ..scene::engine(&[hall]) };
-        let app = App::new(config, store.clone(), Services { jobs, gatherer }, &engine, stopping);
+        let app = App::new(
+            config,
+            store.clone(),
+            Services { jobs, gatherer, ros2: Arc::default() },
+            &engine,
+            stopping,
+        );
         Self { router: router(app), store, engine, _writer: writer, _stop: stop, _data: data }
     }
 
