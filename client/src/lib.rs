@@ -8,13 +8,15 @@
 pub mod capture;
 pub mod error;
 pub mod http;
-pub mod named;
 pub mod robot;
 mod transport;
 
 pub use capture::Capture;
 pub use error::ClientError;
 pub use http::{LandmarkRegion, MapClient, NewView};
-pub use named::{NamedLandmark, named, named_landmarks, quad_corners};
-pub use protos::{self, api, v1};
+pub use protos::{
+    self, api,
+    named::{NamedLandmark, named, named_landmarks, quad_corners},
+    v1,
+};
 pub use robot::{Delivery, RobotClient, RobotOptions};
