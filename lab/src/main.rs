@@ -8,7 +8,7 @@ mod plot;
 mod train;
 
 use clap::{Parser, Subcommand};
-use server::cli::screen;
+use cli::screen;
 use std::process::ExitCode;
 
 /// Experiments on labelled pictures and in simulated buildings, benchmarks beside peers, and training.
@@ -42,7 +42,7 @@ enum Command {
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
-    server::cli::start_log(cli.log.as_deref(), "warn,zenoh=error");
+    cli::start_log(cli.log.as_deref(), "warn,zenoh=error");
     let done = match &cli.command {
         Command::Evaluate(command) => evaluate::run(command),
         Command::Bench(args) => bench::run(args),

@@ -15,7 +15,7 @@ use vision::{
 };
 
 /// Standard deviation of a corner per coordinate, where nobody says.
-pub(crate) const CORNER_SIGMA_PX: f64 = 0.5;
+pub const CORNER_SIGMA_PX: f64 = 0.5;
 /// What is known of any camera's principal point: standard deviation from the image's centre, as a share of its width.
 const CENTRE_SIGMA: f64 = 0.1;
 /// A camera is doubtful from so much chi2 a degree of freedom,
@@ -28,20 +28,16 @@ const ROLL_SIGMA_RAD: f64 = 0.0175;
 const HEIGHT_SIGMA_M: f64 = 0.02;
 
 /// Constraints of a calibration beside the views.
-#[derive(Debug, Clone, PartialEq, clap::Args)]
-pub(crate) struct CalibrationConstraints {
+#[derive(Debug, Clone, PartialEq)]
+pub struct CalibrationConstraints {
     /// Radial coefficients (k1, k2) that may be fitted, 0 to 2; only those are that the views ask for.
-    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u8).range(0..=2))]
-    pub(crate) radial: u8,
+    pub radial: u8,
     /// The camera does not roll (C2).
-    #[arg(long)]
-    pub(crate) zero_roll: bool,
+    pub zero_roll: bool,
     /// The camera is this high over the landmark's centre in all views, metres; negative below (C3).
-    #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
-    pub(crate) height_m: Option<f64>,
+    pub height_m: Option<f64>,
     /// The ratio of the landmark's sides is not what its size says, and is found with the camera.
-    #[arg(long)]
-    pub(crate) unknown_aspect: bool,
+    pub unknown_aspect: bool,
 }
 
 impl From<CalibrationConstraintsBody> for CalibrationConstraints {
@@ -86,7 +82,7 @@ fn warnings(c: &CameraCalibration, image_px: [usize; 2]) -> Vec<String> {
 }
 
 /// Calibrates a camera. Slow for hundreds of views: not for an async thread.
-pub(crate) fn calibrated(
+pub fn calibrated(
     views: &[PlanarView],
     image_px: [usize; 2],
     constraints: &CalibrationConstraints,

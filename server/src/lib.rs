@@ -1,4 +1,4 @@
-//! The Waymark server and command line: store, bus, engine and HTTP face around the pure crates `vision` and `map`.
+//! The Waymark server: store, bus, engine and HTTP face around the pure crates `vision` and `map`.
 //!
 //! The way of a frame: `bus -> engine -> vision -> map -> bus`; that of a lesson: `http -> store -> jobs -> store -> engine`.
 //! zenoh appears only in `bus`, sqlx only in `store`, axum only in `http`.
@@ -9,9 +9,8 @@ mod store;
 mod publication;
 mod jobs;
 pub mod gather;
-mod calibrating;
+pub mod calibrating;
 mod http;
 mod server;
-pub mod cli;
 
 pub use server::{RunningServer, Server, StartError};

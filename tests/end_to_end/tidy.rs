@@ -8,7 +8,8 @@ const ENDINGS: [&str; 4] = [".rs", ".md", ".sql", ".proto"];
 /// End of the path of a document.
 const DOCUMENT: &str = ".md";
 /// Folders with code and text of this project; missing ones are skipped.
-const FOLDERS: [&str; 13] = [
+const FOLDERS: [&str; 14] = [
+    "cli",
     "client",
     "engine",
     "formats",

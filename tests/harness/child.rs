@@ -74,7 +74,7 @@ pub(crate) fn program() -> &'static Path {
         let exe = std::env::current_exe().expect("own path");
         let profile = exe.parent().and_then(Path::parent).expect("target directory");
         let mut cargo = Command::new(env!("CARGO"));
-        cargo.args(["build", "--quiet", "--package", "server", "--bin", "waymark"]);
+        cargo.args(["build", "--quiet", "--package", "cli", "--bin", "waymark"]);
         cargo.current_dir(env!("CARGO_MANIFEST_DIR"));
         if profile.ends_with("release") {
             cargo.arg("--release");

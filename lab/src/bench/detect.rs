@@ -6,8 +6,8 @@ use super::{
     peers::{HINT, Peers},
 };
 use crate::evaluate::statistics::median;
+use cli::{clock::Clock, parameters::ParameterArgs, scratch, screen};
 use serde::Serialize;
-use server::cli::{clock::Clock, parameters::ParameterArgs, scratch, screen};
 use std::{collections::BTreeMap, hint::black_box, path::PathBuf};
 use vision::{
     detect::{

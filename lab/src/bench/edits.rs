@@ -4,6 +4,7 @@
 use super::recognise::landmarks::models;
 use crate::evaluate::statistics::quantile;
 use anyhow::Context as _;
+use cli::{pictures, scratch, screen};
 use client::{
     LandmarkRegion, MapClient,
     api::{NewMap, Place, WallsBody},
@@ -12,7 +13,6 @@ use serde::Serialize;
 use serde_json::{Value, json};
 use server::{
     Server,
-    cli::{pictures, scratch, screen},
     config::{Config, RawConfig},
 };
 use sha2::{Digest as _, Sha256};

@@ -2,8 +2,8 @@
 //! rendered views.
 
 use anyhow::Context as _;
+use cli::pictures;
 use image::{GrayImage as Buffer, imageops};
-use server::cli::pictures;
 use sim::views::{Views, ViewsParams};
 use std::path::{Path, PathBuf};
 use vision::frame::GrayImage;

@@ -2,8 +2,8 @@
 //! corridor. It asserts nothing; the figures go to docs/BENCHMARKS.md.
 
 use crate::evaluate::statistics;
+use cli::{screen, stopwatch::Stopwatch};
 use serde::Serialize;
-use server::cli::{screen, stopwatch::Stopwatch};
 use sim::{
     building::Building,
     drive::DriveParams,

@@ -9,10 +9,10 @@ mod scenes;
 mod single;
 mod lesson;
 
+use cli::{clock::Clock, screen};
 use frames::Named;
 use scenes::Scenes;
 use serde::Serialize;
-use server::cli::{clock::Clock, screen};
 use std::{collections::BTreeMap, path::PathBuf, sync::Arc};
 use vision::{
     model::{LandmarkModel, ModelSet},

@@ -1,9 +1,9 @@
 //! `waymark-lab evaluate grids`: how much of grid maps their imported walls explain.
 
 use anyhow::Context as _;
+use cli::screen;
 use formats::walls::{self, GridReport, ImportOptions, ImportReport};
 use serde_json::{Value, json};
-use server::cli::screen;
 use std::path::{Path, PathBuf};
 
 /// Maps that constants of the import were chosen on; all others are held out.

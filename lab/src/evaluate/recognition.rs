@@ -7,6 +7,7 @@ use super::{
     truth::{Truth, TruthImage},
 };
 use anyhow::Context as _;
+use cli::{scratch, screen};
 use client::{
     Capture, Delivery, LandmarkRegion, MapClient, RobotClient, RobotOptions,
     api::{Distance, Job, JobState, LandmarkStatus, NewMap},
@@ -14,10 +15,7 @@ use client::{
     v1::{Answer, QuadAnswer, Verdict},
 };
 use serde::Serialize;
-use server::{
-    Server,
-    cli::{scratch, screen},
-};
+use server::Server;
 use std::{collections::BTreeMap, path::PathBuf, time::Duration};
 use vision::{
     geometry::{Corners, polygon},
@@ -44,7 +42,7 @@ pub(crate) struct Args {
     #[arg(long)]
     generated_views: Option<u32>,
     /// The distance that decides: both, correlation or hausdorff.
-    #[arg(long, value_parser = server::cli::arg_parsers::distance)]
+    #[arg(long, value_parser = cli::arg_parsers::distance)]
     distance: Option<DistanceKind>,
     /// Print one JSON object instead of a table.
     #[arg(long)]

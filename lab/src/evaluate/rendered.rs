@@ -2,8 +2,8 @@
 //! they are used like any other set.
 
 use anyhow::Context as _;
+use cli::{pictures, scratch, screen};
 use image::{ExtendedColorType, ImageEncoder as _, codecs::png};
-use server::cli::{pictures, scratch, screen};
 use sim::{
     export::{DataSet, ImageEntry},
     scenes::{MAX_PICTURES, Scenes, ScenesParams},

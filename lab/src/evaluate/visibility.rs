@@ -2,6 +2,7 @@
 //! counting, and the time of areas and of gaze selection; for landmarks on walls and for tilted ones. Needs neither
 //! server nor data.
 
+use cli::{clock::Clock, screen};
 use map::{
     gaze::{GazeCandidate, GazeParams, PanTiltUnit, rank},
     place::{LandmarkPlace, PlaceSigmas},
@@ -9,7 +10,6 @@ use map::{
     visibility::{Obstacle, PanTiltCamera, VisibilityMap, VisibilityParams, pointwise, visibility},
 };
 use nalgebra::{Matrix3, Point2, Rotation2, Vector2, Vector3};
-use server::cli::{clock::Clock, screen};
 use std::{f64::consts::FRAC_PI_2, path::PathBuf};
 use vision::{model::LandmarkId, pose::LandmarkSize, random::Random};
 

@@ -6,8 +6,8 @@ use super::{
     panels::{around, column, cut, explained, gray, icon as drawn, on, row, titled},
 };
 use anyhow::Context as _;
+use cli::drawing::{GREEN, Picture, RED, WHITE, YELLOW};
 use nalgebra::Vector2;
-use server::cli::drawing::{GREEN, Picture, RED, WHITE, YELLOW};
 use vision::{
     geometry::Corners,
     icon::{Icon, icon},

@@ -5,8 +5,8 @@ use super::{
     scene::{Rendered, SceneArgs},
 };
 use anyhow::Context as _;
+use cli::drawing::{Colour, GREEN, Picture, WHITE, YELLOW};
 use nalgebra::{Point2, Vector2};
-use server::cli::drawing::{Colour, GREEN, Picture, WHITE, YELLOW};
 use vision::{
     detect::{
         DetectParams,

@@ -6,7 +6,7 @@ use super::{
     landmark::{Landmark, LandmarkArgs, Taught, oblique, plain},
     panels::{column, explained, icon as drawn, row, scale, titled},
 };
-use server::cli::drawing::{GREEN, Picture, RED, WHITE, YELLOW};
+use cli::drawing::{GREEN, Picture, RED, WHITE, YELLOW};
 use sim::exhibit::Conditions;
 use vision::{
     icon::icon,

@@ -4,7 +4,7 @@ use super::{
     panels::{explained, on, row, titled},
     scene::{Rendered, SceneArgs},
 };
-use server::cli::drawing::{BLUE, Colour, GREEN, Picture, RED, WHITE, YELLOW};
+use cli::drawing::{BLUE, Colour, GREEN, Picture, RED, WHITE, YELLOW};
 use vision::{
     detect::{
         DetectParams, Quad,

@@ -6,7 +6,7 @@ use super::{
     panels::{column, explained, icon as drawn, ring, row, titled},
 };
 use anyhow::Context as _;
-use server::cli::drawing::{BLUE, Colour, GREEN, ORANGE, Picture, WHITE, YELLOW};
+use cli::drawing::{BLUE, Colour, GREEN, ORANGE, Picture, WHITE, YELLOW};
 use vision::{
     icon::Icon,
     learn::{

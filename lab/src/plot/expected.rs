@@ -7,6 +7,7 @@ use super::{
     panels::{cut, explained, on, row, titled},
 };
 use anyhow::Context as _;
+use cli::drawing::{BLUE, Colour, GREEN, ORANGE, Picture, WHITE};
 use map::{
     extrinsics::{CameraExtrinsics, pan_tilt},
     guided::{CameraView, ExpectParams, Expected, KnownLandmark, expect},
@@ -15,7 +16,6 @@ use map::{
     visibility::Obstacle,
 };
 use nalgebra::{Isometry3, Matrix3, Point2, SymmetricEigen, Vector3};
-use server::cli::drawing::{BLUE, Colour, GREEN, ORANGE, Picture, WHITE};
 use sim::{
     building::{Building, LandmarkTruth},
     camera::Camera,

@@ -5,7 +5,7 @@ use super::{
     landmark::{LandmarkArgs, oblique},
     panels::{GAP_PX, explained, icon as drawn, on, ring},
 };
-use server::cli::drawing::{CYAN, GREEN, ORANGE, Picture, WHITE};
+use cli::drawing::{CYAN, GREEN, ORANGE, Picture, WHITE};
 use vision::{
     icon::icon,
     params::Params,

@@ -4,8 +4,8 @@ use super::{
     landmark::{LandmarkArgs, oblique},
     panels::{around, cut, explained, icon as drawn, on, row, titled},
 };
+use cli::drawing::{CYAN, GREEN, ORANGE, Picture, WHITE, YELLOW};
 use nalgebra::Point2;
-use server::cli::drawing::{CYAN, GREEN, ORANGE, Picture, WHITE, YELLOW};
 use vision::{geometry::homography::Homography, icon::icon, params::Params, recognise::features};
 
 /// A poster with a frame, letters and large motifs.

@@ -4,7 +4,7 @@
 use super::Target;
 use crate::evaluate::experiment::lesson::points_of;
 use anyhow::Context as _;
-use server::cli::pictures;
+use cli::pictures;
 use sim::{
     exhibit::{Conditions, Exhibit, Extent, exhibit},
     posters::poster,

@@ -7,7 +7,7 @@ use super::{
     panels::{GAP_PX, column, explained, gray, on, ring, row, titled},
 };
 use anyhow::Context as _;
-use server::cli::drawing::{Colour, GREEN, Picture, RED, WHITE, YELLOW};
+use cli::drawing::{Colour, GREEN, Picture, RED, WHITE, YELLOW};
 use sim::exhibit::{Conditions, Exhibit};
 use vision::{
     params::Params,

@@ -7,7 +7,7 @@ use super::{
     panels::{column, explained, icon as drawn, row, titled},
 };
 use anyhow::Context as _;
-use server::cli::drawing::{BLUE, GREEN, Picture, RED, WHITE, YELLOW};
+use cli::drawing::{BLUE, GREEN, Picture, RED, WHITE, YELLOW};
 use sim::{
     exhibit::Conditions,
     lookalikes::{LookAlikeKind, lookalikes},

@@ -30,10 +30,10 @@ mod map_relocalisation;
 mod map_scene;
 mod map_stages;
 
+use cli::drawing::Picture;
 use expected::ExpectedArgs;
 use landmark::LandmarkArgs;
 use scene::SceneArgs;
-use server::cli::drawing::Picture;
 use std::path::PathBuf;
 
 /// Which stage to draw.

@@ -1,6 +1,6 @@
 //! Pictures side by side and one above the other, with words above them.
 
-use server::cli::drawing::{Colour, Picture};
+use cli::drawing::{Colour, Picture};
 use vision::{frame::GrayImage, geometry::Corners, icon::Icon};
 
 /// Distance from one panel to the next.

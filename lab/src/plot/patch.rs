@@ -6,7 +6,7 @@ use super::{
     panels::{around, cut, explained, gray, on, ring, row, titled},
 };
 use anyhow::Context as _;
-use server::cli::drawing::{BLUE, CYAN, GREEN, ORANGE, Picture, WHITE};
+use cli::drawing::{BLUE, CYAN, GREEN, ORANGE, Picture, WHITE};
 use vision::points::{
     patch::{MARGIN, Patch, inner_px},
     point::SeenPatch,

@@ -2,8 +2,8 @@
 
 use super::Target;
 use anyhow::Context as _;
+use cli::pictures;
 use nalgebra::Vector3;
-use server::cli::pictures;
 use sim::{
     building::Building,
     camera::Camera,

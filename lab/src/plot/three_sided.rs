@@ -4,7 +4,7 @@ use super::{
     panels::{explained, row, titled},
     scene::{Rendered, SceneArgs},
 };
-use server::cli::drawing::{Colour, GREEN, MAGENTA, Picture, WHITE, YELLOW};
+use cli::drawing::{Colour, GREEN, MAGENTA, Picture, WHITE, YELLOW};
 use vision::{
     detect::{
         DetectParams, Quad, QuadKind, detect, proposals::three_sided::unexplained,

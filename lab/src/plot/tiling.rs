@@ -4,8 +4,8 @@ use super::{
     panels::{column, explained, row, titled},
     scene::{Rendered, SceneArgs},
 };
+use cli::drawing::{BLUE, CYAN, Colour, GREEN, ORANGE, Picture, RED, WHITE, YELLOW};
 use nalgebra::Point2;
-use server::cli::drawing::{BLUE, CYAN, Colour, GREEN, ORANGE, Picture, RED, WHITE, YELLOW};
 use vision::{
     detect::{
         DetectParams,

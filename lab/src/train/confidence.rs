@@ -9,7 +9,7 @@ use crate::evaluate::experiment::{
     confidence::{line, reliabilities},
 };
 use anyhow::Context as _;
-use server::cli::screen;
+use cli::screen;
 use std::{fmt::Write as _, path::PathBuf};
 use vision::{
     params::Params,

@@ -4,8 +4,8 @@
 use super::network_training::{ChoiceExample, LabelledExample};
 use crate::evaluate::truth::{Truth, TruthImage};
 use anyhow::Context as _;
+use cli::{pictures, screen};
 use nalgebra::Point2;
-use server::cli::{pictures, screen};
 use std::collections::{BTreeMap, BTreeSet};
 use vision::{
     detect::{

@@ -10,9 +10,9 @@ use super::{
 };
 use crate::evaluate::{rendered, reviewed::Reviewed, truth::Truth};
 use anyhow::Context as _;
+use cli::{parameters::ParameterArgs, scratch, screen};
 use serde::Serialize;
 use serde_json::json;
-use server::cli::{parameters::ParameterArgs, scratch, screen};
 use sim::{scenes::ScenesParams, views::ViewsParams};
 use std::path::{Path, PathBuf};
 use vision::detect::{DetectParams, border_model::network::Network};

@@ -12,8 +12,8 @@ use crate::evaluate::{
     truth::{QuadState, TruthQuad},
 };
 use anyhow::Context as _;
+use cli::{pictures, screen};
 use serde::Serialize;
-use server::cli::{pictures, screen};
 use vision::detect::{DetectParams, border_model::network::Network};
 
 /// A first choice is right if its error exceeds that of the best line by at most this, px of the working image.

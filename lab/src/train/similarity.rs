@@ -3,8 +3,8 @@
 use super::cue_fit::{FOLDS, FittedSimilarity, LabelledPair, fit, label_pairs, ungraded};
 use crate::evaluate::{rendered, truth::Truth};
 use anyhow::{Context as _, bail};
+use cli::{parameters::ParameterArgs, pictures, screen};
 use serde_json::json;
-use server::cli::{parameters::ParameterArgs, pictures, screen};
 use sim::views::ViewsParams;
 use std::path::PathBuf;
 use vision::{

@@ -10,8 +10,8 @@ use super::{
     threads,
 };
 use crate::evaluate::statistics::median;
+use cli::{clock::Clock, scratch, screen};
 use serde::{Deserialize, Serialize};
-use server::cli::{clock::Clock, scratch, screen};
 use std::collections::BTreeMap;
 use vision::{
     detect::{DetectBuffers, detect_with},

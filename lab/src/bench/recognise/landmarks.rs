@@ -1,7 +1,7 @@
 //! Landmarks of the benchmark's maps: the first few learnt by a lesson against each other; each of the others, up
 //! to thousands, with three icons and points of its own and the thresholds of one of the first.
 
-use server::cli::screen;
+use cli::screen;
 use sim::posters;
 use std::sync::{Arc, Mutex, PoisonError};
 use vision::{

@@ -1,6 +1,6 @@
 //! Frames of a corridor whose posters are among the landmarks.
 
-use server::cli::screen;
+use cli::screen;
 use sim::{
     building::{Building, LandmarkKind},
     corridor::CorridorParams,

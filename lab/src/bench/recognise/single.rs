@@ -7,8 +7,8 @@ use super::{
     threads,
 };
 use crate::evaluate::statistics::median;
+use cli::clock::Clock;
 use serde::Serialize;
-use server::cli::clock::Clock;
 use std::{collections::BTreeMap, sync::Arc};
 use vision::{
     model::{LandmarkModel, ModelSet},

@@ -4,9 +4,9 @@
 
 use crate::bench::Python;
 use anyhow::Context as _;
+use cli::pictures;
 use nalgebra::{Point2, Vector2};
 use serde::Deserialize;
-use server::cli::pictures;
 use std::{
     collections::BTreeMap,
     path::{Path, PathBuf},

@@ -11,9 +11,9 @@ mod pictures;
 
 use super::{rendered, reviewed::Reviewed, truth::Truth};
 use anyhow::Context as _;
+use cli::{parameters::ParameterArgs, pictures as files, screen};
 use report::Report;
 use score::{FOUND, ImageScore};
-use server::cli::{parameters::ParameterArgs, pictures as files, screen};
 use sim::views::ViewsParams;
 use std::path::{Path, PathBuf};
 use vision::detect::{DetectParams, Grouping, QuadParams};

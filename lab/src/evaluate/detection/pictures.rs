@@ -6,7 +6,7 @@ use super::{
 };
 use crate::evaluate::truth::{Truth, TruthImage};
 use anyhow::Context as _;
-use server::cli::{
+use cli::{
     drawing::{BLUE, GREEN, ORANGE, Picture, RED, WHITE, YELLOW},
     pictures, screen,
 };

@@ -5,7 +5,7 @@ use crate::evaluate::{
     reviewed::ReviewedQuad,
     truth::{QuadState, TruthImage, TruthQuad},
 };
-use server::cli::clock::Clock;
+use cli::clock::Clock;
 use vision::{
     detect::{DetectParams, Quad, QuadKind, detect},
     frame::GrayImage,

@@ -18,10 +18,10 @@ pub(crate) mod look_alikes;
 pub(crate) mod answers;
 pub(crate) mod confidence;
 
+use cli::screen;
 use lesson::Taught;
 use pictures::Part;
 use serde::Serialize;
-use server::cli::screen;
 use std::{
     path::{Path, PathBuf},
     sync::{

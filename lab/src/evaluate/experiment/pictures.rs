@@ -4,7 +4,7 @@
 
 use crate::evaluate::truth::Truth;
 use anyhow::Context as _;
-use server::cli::pictures;
+use cli::pictures;
 use sim::{
     posters::poster,
     texture::{Edge, Texture},

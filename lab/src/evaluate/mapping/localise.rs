@@ -1,6 +1,7 @@
 //! Localisation of single scans in the finished map: processor time, share of scans with an answer, error.
 
 use crate::evaluate::statistics;
+use cli::clock::Clock;
 use formats::scan_log::LogEntry;
 use map::{
     laser_fix::{LaserFixParams, WallIndex, laser_fix},
@@ -8,7 +9,6 @@ use map::{
     slam::SlamMap,
 };
 use nalgebra::{Matrix3, Vector3};
-use server::cli::clock::Clock;
 
 /// Most scans tried, evenly taken.
 const MAX_TRIED: usize = 300;

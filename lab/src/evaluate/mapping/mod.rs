@@ -7,6 +7,10 @@ mod score;
 
 use crate::evaluate::chart;
 use anyhow::Context as _;
+use cli::{
+    mapping::{LaserArgs, build},
+    screen,
+};
 use formats::{
     map_svg,
     scan_log::{self, LogEntry, ScanLog},
@@ -16,10 +20,6 @@ use map::pose2::Pose2;
 use odometry::Noise;
 use score::{Errors, Relations};
 use serde_json::{Value, json};
-use server::cli::{
-    mapping::{LaserArgs, build},
-    screen,
-};
 use sim::{
     building::Building,
     drive::{Drive, DriveParams},

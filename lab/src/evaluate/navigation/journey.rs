@@ -7,6 +7,7 @@ use super::{
     kidnap::{Kidnap, KidnapOutcome},
     world::{MAP, World},
 };
+use cli::simulated_errors::SimulatedRobotErrors;
 use engine::{
     frame_analysis::{StageTimes, analyse_frame},
     frame_context::FrameContext,
@@ -23,7 +24,6 @@ use map::{
 };
 use nalgebra::Matrix2;
 use protos::Name;
-use server::cli::simulated_errors::SimulatedRobotErrors;
 use sim::{
     building::LandmarkKind,
     drive::DriveParams,

@@ -2,17 +2,17 @@
 
 use crate::evaluate::experiment::{lesson::points_of, mixed, of_each};
 use anyhow::Context as _;
+use cli::{
+    screen,
+    simulated_errors::SimulatedRobotErrors,
+    survey::{SurveyView, place_on_walls, survey},
+};
 use engine::snapshot::{LandmarkInfo, MapSnapshot, StoredModel, look_alike_classes};
 use map::{
     laser_fix::WallIndex,
     place::{LandmarkPlace, PlaceSigmas},
     segments::LaserSegment,
     visibility::{Obstacle, PanTiltCamera, VisibilityParams, visibility},
-};
-use server::cli::{
-    screen,
-    simulated_errors::SimulatedRobotErrors,
-    survey::{SurveyView, place_on_walls, survey},
 };
 use sim::{
     building::Building,

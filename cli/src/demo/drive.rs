@@ -1,10 +1,7 @@
 //! The demo's second part: robots drive, send frames and odometry over zenoh, and receive their poses.
 
 use super::{Args, MAP};
-use crate::{
-    RunningServer,
-    cli::{pictures, screen},
-};
+use crate::{pictures, screen};
 use anyhow::Context as _;
 use client::{
     Capture, MapClient, RobotClient, RobotOptions, api::LandmarkStatus, named_landmarks, quad_corners,
@@ -12,6 +9,7 @@ use client::{
 };
 use map::pose2::Pose2;
 use protos::Name;
+use server::RunningServer;
 use sim::{
     building::Building,
     drive::DriveParams,

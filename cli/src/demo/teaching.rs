@@ -2,17 +2,15 @@
 
 use super::MAP;
 use crate::{
-    RunningServer,
-    cli::{
-        pictures, screen,
-        simulated_errors::SimulatedRobotErrors,
-        survey::{place_on_walls, survey},
-    },
+    pictures, screen,
+    simulated_errors::SimulatedRobotErrors,
+    survey::{place_on_walls, survey},
 };
 use client::{
     LandmarkRegion, MapClient,
     api::{Job, LandmarkStatus, NewMap, Place, Size, WallsBody},
 };
+use server::RunningServer;
 use sim::{
     building::Building,
     lesson::{LessonParams, stops},

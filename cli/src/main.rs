@@ -1,5 +1,5 @@
 //! The `waymark` command.
 
 fn main() -> std::process::ExitCode {
-    server::cli::main()
+    cli::main()
 }

@@ -1,11 +1,11 @@
 //! `waymark calibrate`: a camera's intrinsics from pictures of one flat object of known shape, no server needed.
 
 use super::{detect, pictures, screen};
-use crate::calibrating::{CORNER_SIGMA_PX, CalibrationConstraints, calibrated};
 use anyhow::Context as _;
 use engine::dominant::dominant;
 use protos::api::CalibrationReport;
 use serde::Deserialize;
+use server::calibrating::{CORNER_SIGMA_PX, CalibrationConstraints, calibrated};
 use std::path::{Path, PathBuf};
 use vision::{
     camera_calibration::PlanarView,
@@ -29,10 +29,34 @@ pub(crate) struct Args {
     #[arg(long, value_name = "FILE", conflicts_with = "images")]
     corners: Option<PathBuf>,
     #[command(flatten)]
-    constraints: CalibrationConstraints,
+    constraints: Constraints,
     /// The report as JSON.
     #[arg(long)]
     json: bool,
+}
+
+/// What is known of the camera beside the views.
+#[derive(Debug, clap::Args)]
+struct Constraints {
+    /// Radial coefficients (k1, k2) that may be fitted, 0 to 2; only those are that the views ask for.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u8).range(0..=2))]
+    radial: u8,
+    /// The camera does not roll (C2).
+    #[arg(long)]
+    zero_roll: bool,
+    /// The camera is this high over the landmark's centre in all views, metres; negative below (C3).
+    #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
+    height_m: Option<f64>,
+    /// The ratio of the landmark's sides is not what its size says, and is found with the camera.
+    #[arg(long)]
+    unknown_aspect: bool,
+}
+
+impl Constraints {
+    fn given(&self) -> CalibrationConstraints {
+        let &Self { radial, zero_roll, height_m, unknown_aspect } = self;
+        CalibrationConstraints { radial, zero_roll, height_m, unknown_aspect }
+    }
 }
 
 #[derive(Deserialize)]
@@ -56,7 +80,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         Some(file) => views_of_file(file, args.size)?,
         None => views_of_images(&args.images, args.size)?,
     };
-    let report = calibrated(&views, image_px, &args.constraints)?;
+    let report = calibrated(&views, image_px, &args.constraints.given())?;
     screen::say(&if args.json { serde_json::to_string(&report)? } else { table(&report, &names) });
     Ok(())
 }

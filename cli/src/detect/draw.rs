@@ -1,7 +1,7 @@
 //! One picture for every stage of the detector, and an overview of all. In: the recorded stages. Out: pictures.
 
 use super::record::Record;
-use crate::cli::drawing::{BLUE, CYAN, Colour, GREEN, MAGENTA, ORANGE, Picture, RED, SERIES, WHITE, YELLOW};
+use crate::drawing::{BLUE, CYAN, Colour, GREEN, MAGENTA, ORANGE, Picture, RED, SERIES, WHITE, YELLOW};
 use nalgebra::Point2;
 use std::path::Path;
 use vision::detect::{Quad, QuadKind};

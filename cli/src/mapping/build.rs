@@ -1,7 +1,7 @@
 //! `waymark map build`: builds a map from a scan log.
 
 use super::LaserArgs;
-use crate::cli::{clock::Clock, screen};
+use crate::{clock::Clock, screen};
 use anyhow::Context as _;
 use client::{MapClient, api::WallsBody};
 use formats::{

@@ -1,7 +1,7 @@
 //! `waymark map import` and `export`: walls from and to other programs' files.
 
 use super::build::Upload;
-use crate::cli::screen;
+use crate::screen;
 use anyhow::Context as _;
 use client::MapClient;
 use formats::{

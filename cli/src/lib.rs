@@ -1,4 +1,5 @@
-//! The `waymark` command line: one file per command.
+//! The `waymark` command line: one file per command. In: arguments, files, and a server over HTTP. Out: results on standard
+//! output, everything else on standard error, and an exit status.
 
 mod answers;
 pub mod arg_parsers;

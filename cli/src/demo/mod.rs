@@ -6,11 +6,11 @@ mod summary;
 mod teaching;
 
 use super::{scratch, screen};
-use crate::{
+use anyhow::Context as _;
+use server::{
     Server,
     config::{Config, RawConfig},
 };
-use anyhow::Context as _;
 use sim::building::Building;
 use std::{net::TcpListener, path::PathBuf, process::ExitCode, sync::Arc};
 

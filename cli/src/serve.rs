@@ -1,12 +1,12 @@
 //! `waymark serve`: the server, until Ctrl-C or SIGTERM.
 
-use crate::{
-    RunningServer, Server,
-    config::{Config, RawConfig},
-};
 use anyhow::{Context, anyhow};
 use clap::Args;
 use engine::vitals::Failure;
+use server::{
+    RunningServer, Server,
+    config::{Config, RawConfig},
+};
 use std::{path::PathBuf, time::Duration};
 
 /// Time that the other parts have to end after one has failed.

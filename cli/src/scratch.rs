@@ -1,6 +1,6 @@
 //! A folder and a server's settings for one run.
 
-use crate::config::{Config, ConfigError, RawConfig};
+use server::config::{Config, ConfigError, RawConfig};
 use std::path::{Path, PathBuf};
 
 /// Settings of a server that only this program knows of: free ports, and frames as large as the wire allows.
