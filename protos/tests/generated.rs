@@ -61,7 +61,7 @@ fn committed_rust_matches_the_proto() {
 fn is_committed(name: &str, fresh: &[u8]) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(name);
     if std::env::var_os("WAYMARK_REFRESH").is_some() {
-        fs::write(&path, fresh).unwrap();
+        fs::write(&path, fresh).expect("written");
     }
     assert!(
         fs::read(&path).unwrap_or_default() == fresh,
