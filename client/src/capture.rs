@@ -1,11 +1,13 @@
-//! One image with its capture data, before it is numbered and sent. Reads the size of JPEG and PNG from their
-//! headers, without decoding.
+//! One image with its capture data, before it is numbered and sent.
 
 use crate::ClientError;
 use map::pose2::{Pose2, Pose2Covariance};
 use nalgebra::Isometry3;
 use protos::{
-    convert::geometry::{intrinsics_wire, pose2_covariance_wire, pose2_wire, pose3_wire},
+    convert::{
+        geometry::{intrinsics_wire, pose2_covariance_wire, pose2_wire, pose3_wire},
+        image_header,
+    },
     prost::bytes::Bytes,
     v1,
 };
@@ -30,6 +32,11 @@ impl Capture {
     pub fn gray(image: &GrayImage) -> Self {
         let bytes = Bytes::copy_from_slice(image.data());
         Self::new(v1::ImageEncoding::Gray8, image.width() as u32, image.height() as u32, bytes)
+    }
+
+    /// A frame that was recorded. Epoch and number are set when it is sent; all else stays.
+    pub fn recorded(frame: v1::Frame) -> Self {
+        Self { frame }
     }
 
     fn new(encoding: v1::ImageEncoding, width_px: u32, height_px: u32, image: Bytes) -> Self {
@@ -108,50 +115,10 @@ pub(crate) fn now_ns() -> i64 {
 
 /// Encoding, width and height from the first bytes.
 fn header(image: &[u8]) -> Result<(v1::ImageEncoding, u32, u32), ClientError> {
-    if image.starts_with(b"\x89PNG\r\n\x1a\n") {
-        let (width, height) = png_size(image).ok_or_else(|| ClientError::Image("PNG without size".into()))?;
-        Ok((v1::ImageEncoding::Png, width, height))
-    } else if image.starts_with(&[0xFF, 0xD8]) {
-        let (width, height) =
-            jpeg_size(image).ok_or_else(|| ClientError::Image("JPEG without size".into()))?;
-        Ok((v1::ImageEncoding::Jpeg, width, height))
-    } else {
+    image_header(image).ok_or_else(|| {
         let first: Vec<u8> = image.iter().take(8).copied().collect();
-        Err(ClientError::Image(format!("it begins with {first:02x?}")))
-    }
-}
-
-fn png_size(image: &[u8]) -> Option<(u32, u32)> {
-    if image.get(12..16)? != b"IHDR" {
-        return None;
-    }
-    let word = |at: usize| Some(u32::from_be_bytes(image.get(at..at + 4)?.try_into().ok()?));
-    Some((word(16)?, word(20)?))
-}
-
-/// Walks the segments up to the start of frame (SOF0 to SOF15 without DHT, JPG and DAC).
-fn jpeg_size(image: &[u8]) -> Option<(u32, u32)> {
-    let mut at = 2;
-    loop {
-        while *image.get(at)? == 0xFF && *image.get(at + 1)? == 0xFF {
-            at += 1;
-        }
-        if *image.get(at)? != 0xFF {
-            return None;
-        }
-        let marker = *image.get(at + 1)?;
-        let half = |i: usize| Some(u32::from(u16::from_be_bytes([*image.get(i)?, *image.get(i + 1)?])));
-        match marker {
-            0xC0..=0xC3 | 0xC5..=0xC7 | 0xC9..=0xCB | 0xCD..=0xCF => {
-                return Some((half(at + 7)?, half(at + 5)?));
-            }
-            // Markers without a length.
-            0x01 | 0xD0..=0xD8 => at += 2,
-            // End of image or start of scan before any size.
-            0xD9 | 0xDA => return None,
-            _ => at += 2 + half(at + 2)? as usize,
-        }
-    }
+        ClientError::Image(format!("it begins with {first:02x?} and is no JPEG or PNG with a size"))
+    })
 }
 
 #[cfg(test)]

@@ -13,9 +13,11 @@ pub mod topics;
 mod view;
 pub mod write;
 pub mod read;
+pub mod bag;
 pub mod restamp;
 pub mod compare;
 
+pub use bag::BagRobot;
 pub use message::{Body, Recorded};
 pub use read::{DriveReader, ReadError};
 pub use view::MapContent;

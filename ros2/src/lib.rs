@@ -15,3 +15,4 @@ pub mod rmw_zenoh;
 pub mod bridge_dds;
 pub mod receive;
 pub mod convert;
+pub mod robot;

@@ -5,9 +5,11 @@
 pub mod frame;
 pub mod gaze;
 pub mod geometry;
+pub mod image_header;
 pub mod motion;
 pub mod result;
 
 pub use frame::{CheckedFrame, Encoding};
 pub use gaze::CheckedGaze;
+pub use image_header::image_header;
 pub use motion::{CheckedOdometry, CheckedScan};

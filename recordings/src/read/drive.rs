@@ -1,10 +1,12 @@
-//! The messages of a drive. In: a file. Out: messages of the wire in the order of time, with the images of frames.
+//! The messages of a drive. In: a file. Out: messages of the wire in the order of time, with the images of frames; those
+//! of ROS are converted where a robot is given for them.
 
 use super::{
     error::{ReadError, ReadFault},
     ordered::{MessageReader, RawMessage},
 };
 use crate::{
+    bag::BagRobot,
     foxglove::{CompressedImage, RawImage},
     message::{Body, Recorded},
     topics,
@@ -15,7 +17,7 @@ use protos::{
     prost::{Message as _, bytes::Bytes},
 };
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, VecDeque},
     io::{Read, Seek},
 };
 
@@ -35,13 +37,27 @@ struct LastImage {
 pub struct DriveReader<R> {
     messages: MessageReader<R>,
     images: BTreeMap<String, LastImage>,
+    bag: Option<BagRobot>,
+    /// What one message of ROS gave: at most one of each kind that waited for it.
+    ready: VecDeque<Recorded>,
     unused: u64,
 }
 
 impl<R: Read + Seek> DriveReader<R> {
     /// Opens a recording.
     pub fn open(file: R) -> Result<Self, ReadError> {
-        Ok(Self { messages: MessageReader::open(file)?, images: BTreeMap::new(), unused: 0 })
+        Self::open_bag(file, None)
+    }
+
+    /// Opens a recording or a bag of ROS 2, whose messages are those of this robot.
+    pub fn open_bag(file: R, bag: Option<BagRobot>) -> Result<Self, ReadError> {
+        let messages = MessageReader::open(file)?;
+        Ok(Self { messages, images: BTreeMap::new(), bag, ready: VecDeque::new(), unused: 0 })
+    }
+
+    /// What became of the messages of ROS; `None` if no robot is given for them.
+    pub fn bag(&self) -> Option<&BagRobot> {
+        self.bag.as_ref()
     }
 
     /// Where the file ends inside a record; `None` for a whole file.
@@ -56,7 +72,17 @@ impl<R: Read + Seek> DriveReader<R> {
 
     /// The next message of the wire; `None` at the end.
     pub fn next_message(&mut self) -> Result<Option<Recorded>, ReadError> {
+        if let Some(ready) = self.ready.pop_front() {
+            return Ok(Some(ready));
+        }
         while let Some(raw) = self.messages.next_message()? {
+            if let Some(bag) = self.bag.as_mut().filter(|_| raw.channel.encoding == "cdr") {
+                self.ready.extend(bag.take(&raw));
+                match self.ready.pop_front() {
+                    Some(ready) => return Ok(Some(ready)),
+                    None => continue,
+                }
+            }
             let is_protobuf = raw.channel.encoding == "protobuf";
             match raw.channel.schema.split_once('.') {
                 Some(("foxglove", "CompressedImage" | "RawImage")) if is_protobuf => self.keep_image(&raw)?,

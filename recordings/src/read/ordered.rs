@@ -110,6 +110,23 @@ impl<R: Read + Seek> MessageReader<R> {
         self.cut_off_at
     }
 
+    /// All channels, by topic, without their messages; it unpacks every chunk once. Call it before the first message.
+    pub fn channels(&mut self) -> Result<Vec<Arc<ChannelInfo>>, ReadError> {
+        for part in self.parts.clone() {
+            let announced = self.content(part).and_then(|content| {
+                walk(&content).try_for_each(|record| {
+                    let (kind, range) = record?;
+                    announcement(kind, &content[range])?.into_iter().for_each(|found| self.announce(found));
+                    Ok(())
+                })
+            });
+            announced.map_err(|fault: ReadFault| fault.at(part.offset))?;
+        }
+        let mut all: Vec<_> = self.channels.values().cloned().collect();
+        all.sort_by(|a, b| (&a.topic, &a.schema).cmp(&(&b.topic, &b.schema)));
+        Ok(all)
+    }
+
     /// The next message; `None` at the end. After an error the reader is at its end.
     pub fn next_message(&mut self) -> Result<Option<RawMessage>, ReadError> {
         while let Some(&earliest_ns) = self.earliest_ns.get(self.next_part) {
@@ -135,15 +152,19 @@ impl<R: Read + Seek> MessageReader<R> {
         Ok(Some(first.message))
     }
 
-    fn open_part(&mut self, number: usize, part: Part) -> Result<(), ReadFault> {
+    /// The records of a part.
+    fn content(&mut self, part: Part) -> Result<Bytes, ReadFault> {
         self.file.seek(SeekFrom::Start(part.offset))?;
         let mut bytes = Vec::new();
         (&mut self.file).take(part.bytes).read_to_end(&mut bytes)?;
-        let content = if part.is_chunk {
-            Bytes::from(chunk::unpack(bytes.get(HEAD_BYTES..).ok_or(ReadFault::Short)?)?)
-        } else {
-            Bytes::from(bytes)
-        };
+        if !part.is_chunk {
+            return Ok(Bytes::from(bytes));
+        }
+        Ok(Bytes::from(chunk::unpack(bytes.get(HEAD_BYTES..).ok_or(ReadFault::Short)?)?))
+    }
+
+    fn open_part(&mut self, number: usize, part: Part) -> Result<(), ReadFault> {
+        let content = self.content(part)?;
         let open: u64 = self.open.values().map(|(_, bytes)| bytes).sum();
         if open + content.len() as u64 > MAX_OPEN_BYTES {
             return Err(ReadFault::Overlap(MAX_OPEN_BYTES));

@@ -53,7 +53,8 @@ impl PixelLayout {
         }
     }
 
-    /// Luma as JPEG has it (ITU-R BT.601).
+    /// Luma as JPEG has it (ITU-R BT.601), in the fixed point of the server's decoder (`engine/src/decode.rs`): a raw image
+    /// gives the grey of its PNG.
     fn gray(self, pixel: &[u8]) -> u8 {
         match self {
             Self::Gray8 => pixel[0],
@@ -61,7 +62,7 @@ impl PixelLayout {
             Self::Luma { place } => pixel[place],
             Self::Colour { places, .. } => {
                 let [r, g, b] = places.map(|place| u32::from(pixel[place]));
-                ((77 * r + 150 * g + 29 * b + 128) >> 8) as u8
+                ((19_595 * r + 38_470 * g + 7_471 * b + 32_768) >> 16) as u8
             }
         }
     }
@@ -189,7 +190,7 @@ mod tests {
         assert_eq!(gray(&big), [1, 3]);
         assert_eq!(gray(&image("yuv422", 2, 1, 4, &[9, 1, 9, 2])), [1, 2]);
         assert_eq!(gray(&image("yuv422_yuy2", 2, 1, 4, &[1, 9, 2, 9])), [1, 2]);
-        let red = [77, 77, 77];
+        let red = [76, 76, 76];
         assert_eq!(gray(&image("rgb8", 1, 1, 3, &[255, 0, 0]))[0], red[0]);
         assert_eq!(gray(&image("bgr8", 1, 1, 3, &[0, 0, 255]))[0], red[1]);
         assert_eq!(gray(&image("bgra8", 1, 1, 4, &[0, 0, 255, 255]))[0], red[2]);

@@ -1,5 +1,5 @@
-//! The formats byte for byte: values measured with rosbags, Fast-CDR and zenoh, random messages of rosbags, and what
-//! holds for every message.
+//! The formats byte for byte: values measured with rosbags, Fast-CDR and zenoh, random messages of rosbags, what holds
+//! for every message, and what a robot of ROS is to Waymark.
 
 mod attachments;
 mod bounds;
@@ -10,6 +10,7 @@ mod hex;
 mod keys;
 mod padding;
 mod received;
+mod robot;
 mod rosbags;
 mod round_trips;
 mod tokens;
