@@ -60,6 +60,11 @@ impl Capture {
         Ok(Self::new(encoding, width_px, height_px, pixels))
     }
 
+    /// A frame that was recorded. Epoch and number are set when it is sent; all else stays.
+    pub fn recorded(frame: v1::Frame) -> Self {
+        Self { frame }
+    }
+
     fn new(encoding: v1::ImageEncoding, width_px: u32, height_px: u32, image: Bytes) -> Self {
         let captured_ns = now_ns();
         let encoding = encoding.into();

@@ -2,19 +2,23 @@
 //!
 //! [`RobotClient`] is the robot's side: frames, odometry and scans go out, answers and poses come back, over zenoh.
 //! [`MapClient`] is the teacher's side over HTTP: it has a method for every operation of the API, with the types of
-//! [`api`]. [`named_landmarks`] lists the landmarks that an answer names, each global or guided. No vision runs in
+//! [`api`]. [`FleetListener`] hears what all robots and the server send, for recordings. [`named_landmarks`] lists the landmarks that an answer names, each global or guided. No vision runs in
 //! the client. `examples/` shows both sides, numbered in reading order.
 
 pub mod capture;
 pub mod error;
 pub mod http;
-pub mod named;
+pub mod listener;
 pub mod robot;
 mod transport;
 
 pub use capture::Capture;
 pub use error::ClientError;
 pub use http::{LandmarkRegion, MapClient, NewView};
-pub use named::{NamedLandmark, named, named_landmarks, quad_corners};
-pub use protos::{self, api, v1};
+pub use listener::{FleetListener, ListenedMessage};
+pub use protos::{
+    self, api,
+    named::{NamedLandmark, named, named_landmarks, quad_corners},
+    v1,
+};
 pub use robot::{Delivery, RobotClient, RobotOptions};

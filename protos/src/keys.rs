@@ -185,6 +185,21 @@ impl Keys {
         format!("{}robot/*/alive/**", self.prefix)
     }
 
+    /// Key expression of all answers for all robots.
+    pub fn all_answers(&self) -> String {
+        format!("{}robot/*/answer/*", self.prefix)
+    }
+
+    /// Key expression of the fused poses of all robots.
+    pub fn all_poses(&self) -> String {
+        format!("{}robot/*/pose", self.prefix)
+    }
+
+    /// Key expression of the changes of all maps.
+    pub fn all_map_changes(&self) -> String {
+        format!("{}map/*/changed", self.prefix)
+    }
+
     /// Key expression of all answers for one robot.
     pub fn answers_of(&self, robot: &Name) -> String {
         format!("{}robot/{robot}/answer/*", self.prefix)

@@ -9,6 +9,7 @@ pub mod keys;
 pub mod rejection;
 pub mod convert;
 pub mod json;
+pub mod named;
 
 // Written by prost-build from waymark/v1/waymark.proto; `tests/generated.rs` keeps the two in step.
 #[rustfmt::skip]
@@ -19,6 +20,9 @@ mod generated;
 pub mod v1 {
     pub use crate::generated::*;
 }
+
+/// The definition of the messages as a `FileDescriptorSet`, for programs that read recordings without the .proto.
+pub const FILE_DESCRIPTOR_SET: &[u8] = include_bytes!("descriptors.binpb");
 
 pub use convert::CheckedFrame;
 pub use keys::{Key, Keys, Name, NameError};

@@ -1,6 +1,7 @@
-//! The committed Rust of the messages is what `waymark.proto` gives. After a change of the .proto run
+//! The committed Rust and descriptors of the messages are what `waymark.proto` gives. After a change of the .proto run
 //! `WAYMARK_REFRESH=1 cargo test -p protos --test generated`.
 
+use prost::Message as _;
 use std::{fs, path::Path};
 
 /// Messages that also travel as JSON over HTTP.
@@ -48,15 +49,23 @@ fn committed_rust_matches_the_proto() {
         let attribute = format!("#[serde(with = \"crate::json::{module}\")]");
         config.field_attribute(format!(".waymark.v1.{field}"), attribute);
     }
+    // The comments are for people, not for programs that read a recording.
+    let mut described = messages.clone();
+    described.file.iter_mut().for_each(|file| file.source_code_info = None);
     config.compile_fds(messages).unwrap();
     let fresh = fs::read_to_string(out.path().join("waymark.v1.rs")).unwrap();
-    let committed = root.join("src/generated.rs");
+    is_committed("src/generated.rs", fresh.as_bytes());
+    is_committed("src/descriptors.binpb", &described.encode_to_vec());
+}
+
+/// Checks a committed file of the crate against its fresh content; writes it first where that is asked for.
+fn is_committed(name: &str, fresh: &[u8]) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(name);
     if std::env::var_os("WAYMARK_REFRESH").is_some() {
-        fs::write(&committed, &fresh).unwrap();
+        fs::write(&path, fresh).expect("written");
     }
-    let committed = fs::read_to_string(committed).unwrap();
     assert!(
-        committed == fresh,
-        "src/generated.rs is stale: WAYMARK_REFRESH=1 cargo test -p protos --test generated"
+        fs::read(&path).unwrap_or_default() == fresh,
+        "{name} is stale: WAYMARK_REFRESH=1 cargo test -p protos --test generated"
     );
 }

@@ -10,8 +10,20 @@ use std::{
 };
 
 /// Crates that are checked.
-const CRATES: [&str; 11] =
-    ["vision", "map", "formats", "protos", "ros2", "sim", "client", "engine", "server", "cli", "lab"];
+const CRATES: [&str; 12] = [
+    "vision",
+    "map",
+    "formats",
+    "protos",
+    "ros2",
+    "recordings",
+    "sim",
+    "client",
+    "engine",
+    "server",
+    "cli",
+    "lab",
+];
 
 /// A module by its path in the crate: `["recognise", "alignment"]`.
 type Module = Vec<String>;

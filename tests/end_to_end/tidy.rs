@@ -8,7 +8,7 @@ const ENDINGS: [&str; 4] = [".rs", ".md", ".sql", ".proto"];
 /// End of the path of a document.
 const DOCUMENT: &str = ".md";
 /// Folders with code and text of this project; missing ones are skipped.
-const FOLDERS: [&str; 14] = [
+const FOLDERS: [&str; 15] = [
     "cli",
     "client",
     "engine",
@@ -17,6 +17,7 @@ const FOLDERS: [&str; 14] = [
     "map",
     "migrations",
     "protos",
+    "recordings",
     "ros2",
     "server",
     "sim",

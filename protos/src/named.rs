@@ -1,7 +1,7 @@
 //! The landmarks that an answer names, and whether each was recognised globally or guided. In: an answer. Out: one
 //! item for each named quad.
 
-use protos::v1::{Answer, QuadAnswer, Sighting, Verdict};
+use crate::v1::{Answer, QuadAnswer, Sighting, Verdict};
 use vision::geometry::Corners;
 
 /// A quad with a landmark's name.
@@ -52,7 +52,7 @@ pub fn quad_corners(quad: &QuadAnswer) -> Option<Corners> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use protos::v1::QuadKind;
+    use crate::v1::QuadKind;
 
     fn global(name: &str) -> QuadAnswer {
         let (verdict, sighting) = (Verdict::Unique.into(), Sighting::Global.into());
