@@ -246,6 +246,6 @@ async fn a_landmark_that_looks_like_an_active_one_is_refused_with_its_name() {
     let first = desk.server.maps().landmark("office", "first").await.expect("a landmark");
     assert_eq!(first.status, LandmarkStatus::Active, "the one in use stays as it is");
     let shown = desk.done("landmark show copy");
-    assert!(shown.contains("not in use: ") && shown.contains("`first`"), "{shown}");
+    assert!(shown.contains("copy: not in use") && shown.contains("`first`"), "{shown}");
     desk.server.kill();
 }

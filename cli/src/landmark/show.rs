@@ -38,7 +38,7 @@ pub(super) async fn one(session: &Session, map: &str, name: &str) -> anyhow::Res
 
 /// State, views, size, place and health, and why it is not in use.
 pub(super) fn text(landmark: &Landmark) -> String {
-    let reasons = reasons::lines(landmark).into_iter().map(|line| format!("  not in use: {line}"));
+    let reasons = reasons::lines(landmark).into_iter().map(|line| format!("  why     {line}"));
     std::iter::once(facts(landmark)).chain(reasons).collect::<Vec<_>>().join("\n")
 }
 
@@ -141,8 +141,8 @@ mod tests {
         let lines = text(&landmark());
         assert!(lines.starts_with("poster: not in use, 2 training views\n  size    0.6 x 0.84 m"), "{lines}");
         assert!(lines.contains("flagged: not found in 6 frames in a row"), "{lines}");
-        assert!(lines.ends_with("not in use: It looks like `first` (97 %). Delete one."), "{lines}");
-        assert_eq!(text(&landmark()).matches("not in use:").count(), 1);
+        assert!(lines.ends_with("  why     It looks like `first` (97 %). Delete one."), "{lines}");
+        assert!(!facts(&landmark()).contains("why"), "{lines}");
     }
 
     #[test]

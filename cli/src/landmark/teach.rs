@@ -1,10 +1,6 @@
 //! `waymark landmark teach`: photographs to a landmark that is in use, or to the reason why it is not.
 
-use super::{
-    quad_choice::{self, picked},
-    reasons::in_use,
-    show,
-};
+use super::{photograph::Photograph, reasons::in_use, show};
 use crate::{
     arg_parsers::{corners, size},
     failure::{Class, Failure},
