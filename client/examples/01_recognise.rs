@@ -40,7 +40,8 @@ async fn main() -> Result<(), anyhow::Error> {
     for (i, path) in arguments.images.iter().enumerate() {
         let image = std::fs::read(path)
             .map_err(|error| ClientError::File { path: path.display().to_string(), error })?;
-        // `.with_intrinsics(..)` gives poses of landmarks, `.with_mounting(..)` also the robot's own.
+        // `Capture::raw(..)` takes pixels of a camera. `.with_intrinsics(..)` gives poses of landmarks,
+        // `.with_mounting(..)` also the robot's own.
         let capture = Capture::encoded(image)?;
         let answer = robot.recognise("camera", capture, Duration::from_secs(30)).await?;
         println!("[{}/{count}] {}: {}", i + 1, path.display(), sentence(&answer));

@@ -145,8 +145,9 @@ def test_maps_are_stored_with_all_their_fields(server: Server) -> None:
         error = gone.value
         assert (error.code, error.field, error.status) == ("unknown_map", "map", 404)
         assert "attic" in error.detail and "create_map" in str(error)
-        with pytest.raises(Refused):
+        with pytest.raises(Refused) as escaped:
             maps.map("no / such?map")
+        assert escaped.value.code == "unknown_map", "a value of a path stays in its segment"
         with pytest.raises(InvalidInput):
             maps.map("..")
 

@@ -184,7 +184,6 @@ class Link:
         """Sends odometry, read now or at `captured_ns`."""
         seq = self.next_seq()
         message = pb.Odometry(epoch=self.epoch, seq=seq, captured_ns=captured_ns or time.time_ns())
-        message.odom_from_robot.SetInParent()
         fill(message.odom_from_robot, odom_from_robot)
         self._put(f"{self._own}/odometry", message.SerializeToString(), zenoh.Priority.DATA)
         return seq
@@ -249,7 +248,6 @@ def frame_bytes(frame: Capture | Picture, epoch: int, seq: int) -> bytes:
     for field in ("intrinsics", "robot_from_camera", "odometry", "prior"):
         value = getattr(capture, field)
         if value is not None:
-            getattr(message, field).SetInParent()
             fill(getattr(message, field), value)
     # Fields of a message may come in any order: `image` is appended, so that it need not go through the message.
     tag = pb.Frame.IMAGE_FIELD_NUMBER << 3 | 2

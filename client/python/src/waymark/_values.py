@@ -80,13 +80,12 @@ def present(**fields: Any) -> dict[str, Any]:
 
 def fill(message: Message, value: Any) -> None:
     """Writes the fields of a dataclass into a message; those that are `None` stay absent."""
+    # A message that a field was written to is present, even where all are zero.
     for name, each in ((f.name, getattr(value, f.name)) for f in dataclasses.fields(value)):
         if each is None:
             continue
         if dataclasses.is_dataclass(each):
-            inner = getattr(message, name)
-            inner.SetInParent()
-            fill(inner, each)
+            fill(getattr(message, name), each)
         elif isinstance(each, tuple | list):
             getattr(message, name).extend(each)
         else:
