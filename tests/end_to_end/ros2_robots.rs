@@ -8,12 +8,14 @@ use map::pose2::Pose2;
 use protos::v1;
 use reqwest::Method;
 use ros2::messages::{Detection2DArray, Message, PoseWithCovarianceStamped, TFMessage};
-use run::{IMAGES, OPTICAL, Run, now_ns, odometry, pose2};
+use run::{IMAGES, OPTICAL, RAW_IMAGES, Run, now_ns, odometry, pose2};
+use server::config::{Config, RawConfig, RawRos2Camera};
 use sim::{
     drive::DriveParams,
     robot::{Robot, RobotParams},
 };
 use tests::{
+    documents::root,
     eventually,
     robots::{call, teach},
     ros::{COMPRESSED_IMAGE, DETECTIONS, IMAGE, ODOMETRY, POSE, RosRobot, Speech, TF_MESSAGE},
@@ -48,7 +50,7 @@ fn compare(ros: &v1::Answer, native: &v1::Answer) {
 }
 
 /// Drives past the landmark; compares the answers of both robots. Capture times of the frames with a fix, and the fixes.
-async fn drive(run: &mut Run, suffixes: [&str; 2]) -> Vec<(i64, v1::Pose2)> {
+async fn drive(run: &mut Run, suffixes: [&str; 2], with_raw: bool) -> Vec<(i64, v1::Pose2)> {
     let params = DriveParams { start_m: 9.0, ..DriveParams::default() };
     let mut robot =
         Robot::new(run.building.clone(), &RobotParams { drive: params, ..RobotParams::default() });
@@ -69,6 +71,15 @@ async fn drive(run: &mut Run, suffixes: [&str; 2]) -> Vec<(i64, v1::Pose2)> {
             let truth = &readings.step.map_from_robot;
             assert!((pose.x_m - truth.x_m).hypot(pose.y_m - truth.y_m) < 0.5, "{pose:?} at {truth:?}");
             fixes.push((ns, pose));
+        }
+        if with_raw && shown == FRAMES {
+            let ns = run.show(&readings, "", false).await;
+            run.show_raw(&readings, ns).await;
+            let (ros, native) =
+                (run.native.seen.answer("r1", ns).await, run.native.seen.answer("native", ns).await);
+            compare(&ros, &native);
+            assert!(!ros.quads.is_empty(), "nothing to compare");
+            fixes.extend(ros.map_from_robot.and_then(|fix| fix.pose).map(|pose| (ns, pose)));
         }
     }
     assert!(fixes.len() >= 2, "{} of {shown} frames gave a fix", fixes.len());
@@ -97,6 +108,13 @@ fn off_m(a: &v1::Pose2, b: &v1::Pose2) -> f64 {
 async fn a_robot_with_rmw_zenoh_is_served_on_its_topics() {
     let mut run = Run::start(Speech::Rmw(7), |robot| {
         (robot.initial_pose, robot.map_to_odom) = ("/initialpose".into(), true);
+        let raw = RawRos2Camera {
+            name: "raw".into(),
+            image: RAW_IMAGES.into(),
+            compressed: false,
+            ..RawRos2Camera::default()
+        };
+        robot.camera.push(raw);
     })
     .await;
     teach(&run.inside, &run.building, &["poster-0"], 6).await;
@@ -116,7 +134,7 @@ async fn a_robot_with_rmw_zenoh_is_served_on_its_topics() {
     run.ros.sees(&["/MP/", "/%initialpose/", POSE.hash]).await;
     run.ros.listen("/tf", TF_MESSAGE).await;
 
-    let fixes = drive(&mut run, ["", "/_buf_cpu"]).await;
+    let fixes = drive(&mut run, ["", "/_buf_cpu"], true).await;
     let sent = poses(&run.ros, "/waymark/pose", fixes.len()).await;
     assert_eq!(sent.len(), fixes.len());
     for ((ns, fix), (stamp_ns, pose)) in fixes.iter().zip(&sent) {
@@ -193,7 +211,7 @@ async fn a_robot_behind_a_dds_bridge_is_served_on_its_topics() {
         (robot["alive"] == true).then_some(())
     };
     eventually("the robot is there", is_there).await;
-    drive(&mut run, ["", ""]).await;
+    drive(&mut run, ["", ""], false).await;
     for (stamp_ns, pose) in poses(&run.ros, "/waymark/pose", 1).await {
         was_published(&run, stamp_ns, &pose).await;
     }
@@ -236,4 +254,23 @@ async fn what_is_no_message_of_the_robot_changes_nothing() {
     eventually("good odometry is read", goes_on).await;
     assert_eq!(run.reasons("/odom", "bad_payload").await, 2);
     run.stop().await;
+}
+
+/// The settings that the guide shows are taken, by the server and by zenoh.
+#[test]
+fn settings_of_the_guide_are_understood() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let guide = std::fs::read_to_string(root().join("docs/guides/ros2.md")).expect("the guide");
+    let blocks = guide.split("```toml\n").skip(1).filter_map(|rest| rest.split("```").next());
+    let mut robots = 0;
+    for block in blocks {
+        let path = folder.path().join("waymark.toml");
+        std::fs::write(&path, block).expect("written");
+        let raw = RawConfig::read(Some(&path)).expect("settings");
+        robots += Config::try_from(raw).expect("valid settings").ros2.len();
+    }
+    assert_eq!(robots, 2);
+    let router = std::fs::read_to_string(root().join("client/ros2/router.json5")).expect("a file");
+    let router = zenoh::Config::from_json5(&router).expect("settings of zenoh");
+    assert!(router.get_json("connect/endpoints").expect("endpoints").contains("tcp/maps.example:7447"));
 }

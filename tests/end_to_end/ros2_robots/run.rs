@@ -4,8 +4,8 @@ use map::pose2::Pose2;
 use nalgebra::Isometry3;
 use protos::{convert::geometry::pose3_wire, prost::Message as _, v1};
 use ros2::messages::{
-    CameraInfo, CompressedImage, Header, LaserScan, Message, Odometry, Pose, PoseWithCovariance, Quaternion,
-    TFMessage, Time, Transform, TransformStamped, Vector3,
+    CameraInfo, CompressedImage, Header, Image, LaserScan, Message, Odometry, Pose, PoseWithCovariance,
+    Quaternion, TFMessage, Time, Transform, TransformStamped, Vector3,
 };
 use server::config::{Limits, RawConfig, RawRos2, RawRos2Robot};
 use sim::{
@@ -20,12 +20,13 @@ use std::{
 use tests::{
     Inside, eventually,
     robots::{MAP, jpeg, put_walls},
-    ros::{CAMERA_INFO, COMPRESSED_IMAGE, LASER_SCAN, ODOMETRY, RosRobot, Speech, TF_MESSAGE},
+    ros::{CAMERA_INFO, COMPRESSED_IMAGE, IMAGE, LASER_SCAN, ODOMETRY, RosRobot, Speech, TF_MESSAGE},
 };
 use zenoh::Session;
 
 pub(super) const IMAGES: &str = "/camera/image_raw/compressed";
 pub(super) const CALIBRATION: &str = "/camera/camera_info";
+pub(super) const RAW_IMAGES: &str = "/raw/image_raw";
 pub(super) const OPTICAL: &str = "camera_optical_frame";
 
 /// Answers and poses of all robots, as on the wire of Waymark.
@@ -89,18 +90,24 @@ impl Native {
         self.put("odometry", odometry.encode_to_vec()).await;
     }
 
-    pub(super) async fn frame(&mut self, readings: &SensorReadings, captured_ns: i64) {
+    /// A frame of camera `camera`, with the picture in this encoding.
+    pub(super) async fn frame(
+        &mut self,
+        (camera, encoding, image): (&str, v1::ImageEncoding, Vec<u8>),
+        readings: &SensorReadings,
+        captured_ns: i64,
+    ) {
         self.seq += 1;
-        let camera = sim::camera::Camera::vga();
-        let k = camera.intrinsics();
+        let vga = sim::camera::Camera::vga();
+        let k = vga.intrinsics();
         let frame = v1::Frame {
             epoch: 1,
             seq: self.seq,
             captured_ns,
-            encoding: v1::ImageEncoding::Jpeg.into(),
+            encoding: encoding.into(),
             width_px: 640,
             height_px: 480,
-            image: jpeg(&readings.frame.image).into(),
+            image: image.into(),
             intrinsics: Some(v1::Intrinsics {
                 fx_px: k.fx_px,
                 fy_px: k.fy_px,
@@ -112,7 +119,7 @@ impl Native {
             odometry: Some(pose2(&readings.step.odom_from_robot)),
             ..v1::Frame::default()
         };
-        self.put("frame/front", frame.encode_to_vec()).await;
+        self.put(&format!("frame/{camera}"), frame.encode_to_vec()).await;
     }
 }
 
@@ -243,9 +250,27 @@ impl Run {
             let data = jpeg(&readings.frame.image);
             let image = CompressedImage { header: header(ns, OPTICAL), format: "jpeg", data: &data };
             ros.put(IMAGES, COMPRESSED_IMAGE, suffix, image.encode()).await;
-            self.native.frame(readings, ns).await;
+            self.native.frame(("front", v1::ImageEncoding::Jpeg, data), readings, ns).await;
         }
         ns
+    }
+
+    /// Sends the picture of a step, whose transforms and odometry are there, without compression: in colour by ROS, in
+    /// grey by the native robot.
+    pub(super) async fn show_raw(&mut self, readings: &SensorReadings, ns: i64) {
+        let gray = readings.frame.image.data();
+        let colours: Vec<u8> = gray.iter().flat_map(|g| [*g; 3]).collect();
+        let image = Image {
+            header: header(ns, OPTICAL),
+            height: 480,
+            width: 640,
+            encoding: "rgb8",
+            is_bigendian: 0,
+            step: 3 * 640,
+            data: &colours,
+        };
+        self.ros.put(RAW_IMAGES, IMAGE, "", image.encode()).await;
+        self.native.frame(("raw", v1::ImageEncoding::Gray8, gray.to_vec()), readings, ns).await;
     }
 
     pub(super) async fn status(&self) -> client::api::Ros2Status {
