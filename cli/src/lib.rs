@@ -14,6 +14,7 @@ pub mod parameters;
 pub mod simulated_errors;
 pub mod pictures;
 mod record;
+mod recording;
 pub mod scratch;
 pub mod screen;
 mod serve;
@@ -94,6 +95,23 @@ enum Command {
     ///   waymark run mode --map office fuse
     #[command(subcommand, verbatim_doc_comment)]
     Run(record::Command),
+    /// Record what robots and the server send, as an MCAP file that Foxglove shows.
+    ///
+    /// Frames, odometry, scans, answers and poses, with the walls and landmarks of the robots' maps. For example:
+    ///   waymark record drive.mcap
+    ///   waymark record drive.mcap --robot r1 --seconds 60
+    #[command(verbatim_doc_comment)]
+    Record(recording::record::Args),
+    /// Play a recording, or a bag of ROS 2, into a running server as a robot, and compare the answers.
+    ///
+    /// The robot must be registered, or --map given. Two builds or two versions of a map are compared by playing the same
+    /// file into both. Exit status 1 if --compare finds a difference. For example:
+    ///   waymark replay drive.mcap --compare
+    ///   waymark replay drive.mcap --answers before.mcap
+    ///   waymark replay drive.mcap --compare before.mcap --json
+    ///   waymark replay bag/bag_0.mcap --robot r1 --map office --image front=/camera/image_raw
+    #[command(verbatim_doc_comment)]
+    Replay(recording::replay::Args),
     /// Ask a running server what is in photographs.
     Recognise(teach::RecogniseArgs),
 }
@@ -115,6 +133,8 @@ pub fn main() -> ExitCode {
         Command::Learn(args) => run(teach::learn(args)),
         Command::Gather(command) => run(gather::run(command)).map(|()| ExitCode::SUCCESS),
         Command::Run(command) => run(record::run(command)).map(|()| ExitCode::SUCCESS),
+        Command::Record(args) => run(recording::record::run(args)).map(|()| ExitCode::SUCCESS),
+        Command::Replay(args) => run(recording::replay::run(args)),
         Command::Recognise(args) => run(teach::recognise(args)),
     };
     match done {
