@@ -19,6 +19,7 @@ mod names;
 pub mod parameters;
 pub mod pictures;
 mod recognise;
+mod recording;
 mod robot;
 mod run;
 pub mod scratch;
@@ -85,6 +86,23 @@ enum Command {
     ///   waymark map fusion office best
     #[command(verbatim_doc_comment)]
     Run(run::Args),
+    /// Record what robots and the server send, as an MCAP file that Foxglove shows.
+    ///
+    /// Frames, odometry, scans, answers and poses, with the walls and landmarks of the robots' maps. For example:
+    ///   waymark record drive.mcap
+    ///   waymark record drive.mcap --robot r1 --seconds 60
+    #[command(verbatim_doc_comment)]
+    Record(recording::record::Args),
+    /// Play a recording, or a bag of ROS 2, into a running server as a robot, and compare the answers.
+    ///
+    /// The robot must be registered, or --map given. Two builds or two versions of a map are compared by playing the same
+    /// file into both. Exit status 1 if --compare finds a difference. For example:
+    ///   waymark replay drive.mcap --compare
+    ///   waymark replay drive.mcap --answers before.mcap
+    ///   waymark replay drive.mcap --compare before.mcap --json
+    ///   waymark replay bag/bag_0.mcap --robot r1 --map office --image front=/camera/image_raw
+    #[command(verbatim_doc_comment)]
+    Replay(recording::replay::Args),
     /// Jobs of a server: show, wait, cancel.
     Job(job::Args),
     /// What a server recognises in photographs
@@ -142,6 +160,8 @@ pub fn main() -> ExitCode {
         Command::Camera(args) => run(camera::run(args)).map(done),
         Command::Gathering(args) => run(gathering::run(args)).map(done),
         Command::Run(args) => run(run::run(args)).map(done),
+        Command::Record(args) => run(recording::record::run(args)).map(done),
+        Command::Replay(args) => run(recording::replay::run(args)),
         Command::Job(args) => run(job::run(args)).map(done),
         Command::Recognise(args) => run(recognise::run(args)).map(done),
         Command::Detect(args) => detect::run(args),

@@ -5,14 +5,24 @@ mod drive;
 mod summary;
 mod teaching;
 
-use super::{scratch, screen};
+use super::{
+    recording::recorder::{RecordReport, Recorder, RecorderOptions},
+    scratch, screen,
+};
 use anyhow::Context as _;
+use protos::Name;
 use server::{
-    Server,
+    RunningServer, Server,
     config::{Config, RawConfig},
 };
 use sim::building::Building;
-use std::{net::TcpListener, path::PathBuf, process::ExitCode, sync::Arc};
+use std::{
+    net::TcpListener,
+    path::{Path, PathBuf},
+    process::ExitCode,
+    sync::Arc,
+};
+use tokio::{sync::oneshot, task::JoinHandle};
 
 /// Name of the demo's map.
 const MAP: &str = "corridor";
@@ -45,6 +55,9 @@ pub(crate) struct Args {
     /// Keep serving the page after the summary, until Ctrl-C.
     #[arg(long)]
     stay: bool,
+    /// Record the robots' drives to this MCAP file; it must not exist.
+    #[arg(long, value_name = "FILE")]
+    record: Option<PathBuf>,
     /// End with the summary as one JSON object.
     #[arg(long)]
     json: bool,
@@ -77,7 +90,13 @@ pub(crate) async fn run(args: &Args) -> anyhow::Result<ExitCode> {
         taught.views_missed,
         taught.views_left_out
     ));
+    let recording = recording(args, &server).await?;
     let record = drive::drive(&building, &server, args).await?;
+    if let Some((end, recording)) = recording {
+        drop(end);
+        let report = recording.await.context("the recorder's task")??;
+        screen::complain(&report.sentence(args.record.as_deref().unwrap_or(Path::new(""))));
+    }
     let summary = summary::summarise(&taught, &record);
     if args.json {
         screen::say(&serde_json::to_string(&summary)?);
@@ -90,6 +109,25 @@ pub(crate) async fn run(args: &Args) -> anyhow::Result<ExitCode> {
     }
     server.stop().await;
     Ok(if summary.false_matches + summary.false_guided == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+/// A recording of the demo that ends when the sender is dropped.
+async fn recording(
+    args: &Args,
+    server: &RunningServer,
+) -> anyhow::Result<Option<(oneshot::Sender<()>, JoinHandle<anyhow::Result<RecordReport>>)>> {
+    let Some(file) = &args.record else { return Ok(None) };
+    let options = RecorderOptions {
+        file: file.clone(),
+        server: format!("http://{}", server.http_addr),
+        zenoh: server.zenoh_endpoint.clone(),
+        fleet: Name::new(FLEET)?,
+        maps: vec![MAP.to_owned()],
+        robots: Vec::new(),
+    };
+    let (end, ended) = oneshot::channel();
+    let recorder = Recorder::start(&options).await?;
+    Ok(Some((end, tokio::spawn(recorder.run(async move { drop(ended.await) })))))
 }
 
 fn settings(args: &Args, data: PathBuf) -> anyhow::Result<Config> {

@@ -39,29 +39,34 @@ pub(super) fn shown(
     all
 }
 
+const RAW: &str = "foxglove.RawImage";
+
 fn image(robot: &Name, camera: &Name, frame: &mut v1::Frame, at: Timestamp) -> Option<Shown> {
     let (frame_id, topic) = (topics::camera_frame(robot, camera), topics::image(robot, camera));
     let format = match frame.encoding() {
         v1::ImageEncoding::Jpeg => "jpeg",
         v1::ImageEncoding::Png => "png",
-        v1::ImageEncoding::Gray8 => {
-            let data = std::mem::take(&mut frame.image);
-            let message = RawImage {
-                timestamp: Some(at),
-                frame_id,
-                width: frame.width_px,
-                height: frame.height_px,
-                encoding: "mono8".to_owned(),
-                step: frame.width_px,
-                data,
-            };
-            return Some(Shown::new(topic, "foxglove.RawImage", &message));
-        }
+        v1::ImageEncoding::Gray8 => return Some(Shown::new(topic, RAW, &raw(frame, frame_id, at, "mono8", 1))),
+        v1::ImageEncoding::Rgb8 => return Some(Shown::new(topic, RAW, &raw(frame, frame_id, at, "rgb8", 3))),
+        v1::ImageEncoding::Bgr8 => return Some(Shown::new(topic, RAW, &raw(frame, frame_id, at, "bgr8", 3))),
         v1::ImageEncoding::Unspecified => return None,
     };
     let data = std::mem::take(&mut frame.image);
     let message = CompressedImage { timestamp: Some(at), frame_id, data, format: format.to_owned() };
     Some(Shown::new(topic, "foxglove.CompressedImage", &message))
+}
+
+/// Raw pixels, rows without padding; `bytes` a pixel.
+fn raw(frame: &mut v1::Frame, frame_id: String, at: Timestamp, encoding: &str, bytes: u32) -> RawImage {
+    RawImage {
+        timestamp: Some(at),
+        frame_id,
+        width: frame.width_px,
+        height: frame.height_px,
+        encoding: encoding.to_owned(),
+        step: frame.width_px.saturating_mul(bytes),
+        data: std::mem::take(&mut frame.image),
+    }
 }
 
 fn calibration(
