@@ -5,7 +5,7 @@ use prost::Message as _;
 use std::{fs, path::Path};
 
 /// Messages that also travel as JSON over HTTP.
-const JSON: [&str; 18] = [
+const JSON: [&str; 20] = [
     "Hypothesis",
     "Pose3",
     "Pose2",
@@ -18,6 +18,8 @@ const JSON: [&str; 18] = [
     "CameraPose",
     "QuadAnswer",
     "StageTime",
+    "PoseRefusalCause",
+    "PoseRefusalDetail",
     "Answer",
     "RobotPose",
     "MapChanged",
@@ -45,6 +47,7 @@ fn committed_rust_matches_the_proto() {
         ("QuadAnswer.sighting", "sighting"),
         ("RobotPose.trust", "pose_trust"),
         ("PointEvidence.agreement", "part_agreement"),
+        ("PoseRefusalCause.quantity", "fix_quantity"),
     ] {
         let attribute = format!("#[serde(with = \"crate::json::{module}\")]");
         config.field_attribute(format!(".waymark.v1.{field}"), attribute);

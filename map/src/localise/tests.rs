@@ -4,6 +4,7 @@
 mod derivatives;
 mod covariance;
 mod camera_pose;
+mod refusal_causes;
 
 use crate::{
     extrinsics::{CameraExtrinsics, pan_tilt},
