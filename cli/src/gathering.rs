@@ -22,7 +22,9 @@ pub(crate) struct Args {
 
 #[derive(Debug, clap::Subcommand)]
 enum Verb {
-    /// Start: while the robot drives, views of flat four-sided objects are stored. Prints the number of the gathering.
+    /// Start: while the robot drives, views of flat four-sided objects are stored.
+    ///
+    /// Prints the number of the gathering.
     Start {
         /// The robot.
         robot: String,
