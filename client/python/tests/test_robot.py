@@ -4,6 +4,8 @@ iteration and by callback; what is wrong is an error with a code."""
 from __future__ import annotations
 
 import math
+import subprocess
+import sys
 import threading
 import time
 
@@ -213,6 +215,18 @@ def test_no_answer_and_superseded_frames_are_errors(server: Server, taught: str)
     assert matching(newer, "front", 1, 7) is newer.answer
     with pytest.raises(Superseded):
         matching(newer, "front", 1, 6)
+
+
+def test_a_program_ends_though_it_leaves_its_session_open(server: Server, taught: str) -> None:
+    program = f"""
+from waymark import Pose2, Robot
+robot = Robot.connect({taught!r}, endpoint={server.zenoh!r})
+poses, changes = robot.poses(), robot.map_changes("*")
+robot.publish_odometry(Pose2())
+"""
+    for end in ("", "raise SystemExit(3)", "1 / 0"):
+        done = subprocess.run([sys.executable, "-c", program + end], capture_output=True, text=True, timeout=SOON_S)
+        assert done.returncode == {"": 0, "raise SystemExit(3)": 3, "1 / 0": 1}[end], done.stderr
 
 
 def test_a_slow_reader_misses_the_oldest_and_knows_how_many() -> None:
