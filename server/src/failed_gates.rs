@@ -59,25 +59,42 @@ pub(crate) fn from_stored(reasons: &str) -> Vec<GateFailure> {
     read.into_iter().filter_map(failure).collect()
 }
 
+/// Why a landmark is refused.
+#[derive(Debug)]
+pub(crate) enum Refusal {
+    /// It looks like this one, which is in use.
+    LooksLike(LookAlikeBody),
+    /// The one that it looked like is gone.
+    OtherIsGone,
+}
+
 /// What is known besides the gates.
 #[derive(Debug, Default)]
 pub(crate) struct Evidence {
     /// The landmark that is most like it.
     pub(crate) look_alike: Option<LookAlikeBody>,
+    /// It is refused, whatever its gates say.
+    pub(crate) refusal: Option<Refusal>,
     /// Least and greatest angle between its normal and the directions that it was seen from, rad.
     pub(crate) angle_rad: Option<[f64; 2]>,
 }
 
 /// The gates in words, each reason once.
 pub(crate) fn in_words(failures: &[GateFailure], about: &Evidence) -> Vec<FailedGate> {
-    let mut made: Vec<FailedGate> = Vec::new();
-    for failure in failures {
+    let mut made: Vec<FailedGate> = about.refusal.iter().map(refused).collect();
+    // A refused landmark has no threshold for the same reason.
+    let is_refused = !made.is_empty();
+    for failure in failures.iter().filter(|f| !(is_refused && is_threshold(f.gate))) {
         let failed = of_failure(failure, about);
         if made.iter().all(|m| m.gate != failed.gate) {
             made.push(failed);
         }
     }
     made
+}
+
+fn is_threshold(gate: Gate) -> bool {
+    matches!(gate, Gate::CorrelationThreshold(_) | Gate::HausdorffThreshold(_) | Gate::LikenessThreshold(_))
 }
 
 fn of_failure(failure: &GateFailure, about: &Evidence) -> FailedGate {
@@ -108,6 +125,16 @@ fn of_failure(failure: &GateFailure, about: &Evidence) -> FailedGate {
         | Gate::HausdorffThreshold(error)
         | Gate::LikenessThreshold(error) => without_threshold(*error, about.look_alike.as_ref()),
     }
+}
+
+fn refused(refusal: &Refusal) -> FailedGate {
+    let Refusal::LooksLike(other) = refusal else {
+        let sentence = "Not in use: it looked like a landmark that is gone now.";
+        return failed(GateBody::LooksLike, sentence, "Learn it again.");
+    };
+    let sentence = format!("Not in use: it looks like {}.", likeness(other));
+    let advice = "Delete one, or photograph what differs. If they are two objects, give both a place, and learn again.";
+    FailedGate { look_alike: Some(other.clone()), ..failed(GateBody::LooksLike, sentence, advice) }
 }
 
 fn seen_from_one_side(angle_rad: Option<[f64; 2]>) -> FailedGate {
@@ -213,6 +240,17 @@ mod tests {
         assert_eq!(words[0].look_alike, Some(other));
         assert_eq!(words[1].sentence, "It has 3 views; 20 are needed.");
         assert_eq!(in_words(&all, &Evidence::default())[0].gate, GateBody::NotDistinct);
+        // A refusal stands for the missing thresholds.
+        let refusal = about.look_alike.map(Refusal::LooksLike);
+        let refused = in_words(&all, &Evidence { refusal, ..Evidence::default() });
+        assert_eq!(
+            refused.iter().map(|w| w.gate).collect::<Vec<_>>(),
+            [GateBody::LooksLike, GateBody::Views]
+        );
+        assert_eq!(refused[0].sentence, "Not in use: it looks like `first` (97 %).");
+        let refusal = Some(Refusal::OtherIsGone);
+        let gone = in_words(&[], &Evidence { refusal, ..Evidence::default() });
+        assert_eq!((gone[0].gate, gone[0].advice.as_str()), (GateBody::LooksLike, "Learn it again."));
     }
 
     #[test]

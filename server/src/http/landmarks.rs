@@ -7,7 +7,7 @@ use super::{
     extract::{Body, PathParams, QueryParams, after_name, name, page_limit},
 };
 use crate::{
-    failed_gates::{self, Evidence, StoredLookAlike},
+    failed_gates::{self, Evidence, Refusal, StoredLookAlike},
     jobs::Learning,
     store::{
         landmarks::{self, LandmarkGeometry, LandmarkRow},
@@ -112,11 +112,20 @@ struct Context<'a> {
     snapshot: Option<&'a MapSnapshot>,
 }
 
+/// A stored look-alike under its present name; `None` if it is gone.
+fn look_alike_shown(stored: StoredLookAlike, snapshot: Option<&MapSnapshot>) -> Option<LookAlikeBody> {
+    stored.shown(|id| snapshot?.landmarks.get(&id).map(|l| l.name.clone()))
+}
+
+fn refusal(stored: &str, snapshot: Option<&MapSnapshot>) -> Refusal {
+    let other = serde_json::from_str(stored).ok().and_then(|l| look_alike_shown(l, snapshot));
+    other.map_or(Refusal::OtherIsGone, Refusal::LooksLike)
+}
+
 /// The stored look-alikes of a model under their present names, without those that are gone.
 fn look_alikes_shown(stored: &mut Value, snapshot: Option<&MapSnapshot>) -> Vec<LookAlikeBody> {
-    let name_of = |id: LandmarkId| snapshot?.landmarks.get(&id).map(|l| l.name.clone());
     let read: Vec<StoredLookAlike> = serde_json::from_value(stored.take()).unwrap_or_default();
-    let shown: Vec<_> = read.into_iter().filter_map(|l| l.shown(name_of)).collect();
+    let shown: Vec<_> = read.into_iter().filter_map(|l| look_alike_shown(l, snapshot)).collect();
     *stored = json!(shown);
     shown
 }
@@ -132,7 +141,8 @@ fn landmark_shown(row: LandmarkRow, context: &Context<'_>) -> Landmark {
             Some(reason) => vec![failed_gates::stored_model(reason)],
             None => {
                 let look_alike = look_alikes.into_iter().flatten().next();
-                let about = Evidence { look_alike, ..Evidence::default() };
+                let refusal = m.looks_like.as_deref().map(|text| refusal(text, context.snapshot));
+                let about = Evidence { look_alike, refusal, ..Evidence::default() };
                 failed_gates::in_words(&failed_gates::from_stored(&m.reasons), &about)
             }
         };

@@ -2,11 +2,13 @@
 //! of the job in one commit. The work runs on threads of its own, off the runtime; each decodes one stored picture at a time.
 //!
 //! Negatives are collected once for all landmarks. Landmarks that are not in the lesson keep their models and get the new
-//! icons as further negatives.
+//! icons as further negatives. A landmark that looks like one in use is refused (`duplicates`), and changes no other.
 
 use super::{
     JobError, ProgressReporter,
-    look_alikes::{LookAlike, look_alikes},
+    duplicates::{Suspect, refused},
+    lesson_result::{Fitted, Learnt, commit},
+    look_alikes::look_alikes,
     negatives::{Negatives, each, spread, untaught_distractors},
     pictures::{Pictures, point_views},
     points,
@@ -15,25 +17,25 @@ use super::{
 };
 use crate::{
     config::Config,
-    failed_gates::{self, StoredLookAlike},
     publication::Catalogue,
     store::{
         StoreError,
-        jobs::{self, Ended, JobRow},
+        jobs::JobRow,
         kind::Kind,
-        landmarks::ModelSummary,
         maps::{self, MapRow},
-        models::{self, NewModel},
-        now_ms,
+        models,
         views::{self, Digest, QuadCrop, TrainingViewRow},
     },
 };
 use engine::{panics::Edge, snapshot::MapSnapshot};
-use serde_json::json;
-use std::{collections::BTreeMap, sync::Arc, time::Instant};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    sync::Arc,
+    time::Instant,
+};
 use vision::{
-    learn::{TrainingView, add_negatives, learn, synthesis},
-    model::{LandmarkId, LandmarkModel, MAX_VIEWS, ModelStatus},
+    learn::{TrainingView, add_negatives, learn, refit_thresholds, synthesis},
+    model::{LandmarkId, LandmarkModel, MAX_VIEWS},
     params::Params,
     points::taught::{TaughtPoint, view_points},
     recognise::{IconFeatures, features},
@@ -68,14 +70,6 @@ struct Material {
     targets: Vec<LandmarkId>,
     views: BTreeMap<LandmarkId, Vec<TrainingViewRow>>,
     distractors: Vec<vision::icon::Icon>,
-}
-
-/// The result of a lesson.
-struct Learnt {
-    models: Vec<LandmarkModel>,
-    refitted: Vec<LandmarkModel>,
-    failed: Vec<(LandmarkId, String)>,
-    look_alikes: BTreeMap<LandmarkId, Vec<LookAlike>>,
 }
 
 /// Does the job: ends its row in the same transaction as it stores the models.
@@ -128,6 +122,9 @@ async fn read_material(
         views.entry(view.landmark).or_default().push(view);
     }
     let targets = targets(&snapshot, &views, request)?;
+    // A refused landmark is a negative of nobody, as long as it is not learnt again.
+    let refused = models::refused(store.reads(), map.id).await?;
+    views.retain(|id, _| targets.contains(id) || !refused.contains(id));
     Ok(Material {
         pictures: Pictures::new(store, config),
         params: config.params.clone(),
@@ -169,7 +166,8 @@ fn targets(
     Ok(ids)
 }
 
-/// Three passes over the landmarks, each over all threads: views with their points, negatives, models.
+/// Passes over the landmarks, each over all threads: views with their points, negatives, models, thresholds. The thresholds
+/// are fitted a second time where landmarks are refused: their icons are negatives of nobody.
 fn compute(m: &Material, reporter: &ProgressReporter) -> Result<Learnt, JobError> {
     let inputs = each_of(&m.targets, m.workers, reporter, (0.0, 0.3, "views"), |id| learning_input(m, *id))?;
     let (views, points): (Vec<_>, Vec<_>) =
@@ -177,16 +175,43 @@ fn compute(m: &Material, reporter: &ProgressReporter) -> Result<Learnt, JobError
     let of_targets = || m.targets.iter().copied();
     let views: BTreeMap<LandmarkId, Vec<TrainingView>> = of_targets().zip(views).collect();
     let points: BTreeMap<LandmarkId, Vec<Vec<TaughtPoint>>> = of_targets().zip(points).collect();
-    let negatives = collect_negatives(m, &views, reporter)?;
+    let mut negatives = collect_negatives(m, &views, reporter)?;
     let p = &m.params;
-    let learnt = each_of(&m.targets, m.workers, reporter, (0.4, 0.9, "models"), |id| {
-        let (before, after) = negatives.others(*id);
-        let model = learn(*id, &views[id], before, p).map_err(|e| e.to_string())?;
-        let model = model.with_points_if_used(p, || points[id].clone());
-        Ok::<_, String>(negatives.with_distractors(&add_negatives(&model, after, p), p))
+    let made = each_of(&m.targets, m.workers, reporter, (0.4, 0.8, "models"), |id| {
+        let model = learn(*id, &views[id], &[], p).map_err(|e| e.to_string())?;
+        Ok::<_, String>(model.with_points_if_used(p, || points[id].clone()))
+    })?;
+    let (mut models, mut failed) = (Vec::new(), Vec::new());
+    for (id, result) in m.targets.iter().zip(made) {
+        match result {
+            Ok(model) => models.push(model),
+            Err(reason) => failed.push((*id, reason)),
+        }
+    }
+    let mut fitted = fit(m, &models, &negatives, reporter)?;
+    let refused = refused(&suspects(m, &models, &fitted), &negatives, p);
+    if !refused.is_empty() {
+        negatives.remove(&refused.keys().copied().collect());
+        fitted = fit(m, &models, &negatives, reporter)?;
+    }
+    Ok(Learnt { fitted, failed, refused })
+}
+
+/// Fits the thresholds of the models of the lesson, and those of all others, to the negatives.
+fn fit(
+    m: &Material,
+    models: &[LandmarkModel],
+    negatives: &Negatives,
+    reporter: &ProgressReporter,
+) -> Result<Fitted, JobError> {
+    let p = &m.params;
+    let models = each_of(models, m.workers, reporter, (0.8, 0.9, "thresholds"), |model| {
+        let (before, after) = negatives.others(model.id);
+        let model = add_negatives(&add_negatives(model, before, p), after, p);
+        negatives.with_distractors(&model, p)
     })?;
     let others: Vec<LandmarkId> =
-        m.snapshot.learnt.keys().filter(|id| !views.contains_key(id)).copied().collect();
+        m.snapshot.learnt.keys().filter(|id| !m.targets.contains(id)).copied().collect();
     // A landmark that is learnt again is added a second time, and its older icons stay: thresholds only become stricter.
     // Learning the whole map resets them.
     let refitted = each_of(&others, m.workers, reporter, (0.9, 0.99, "thresholds of the others"), |id| {
@@ -194,19 +219,36 @@ fn compute(m: &Material, reporter: &ProgressReporter) -> Result<Learnt, JobError
             add_negatives(&model, negatives.of(*target), p)
         })
     })?;
-    let models: Vec<&LandmarkModel> = learnt.iter().flatten().chain(&refitted).collect();
-    let found = each_of(&models, m.workers, reporter, (0.99, 0.99, "look-alikes"), |model| {
-        look_alikes(model, &negatives, p)
+    let all: Vec<&LandmarkModel> = models.iter().chain(&refitted).collect();
+    let found = each_of(&all, m.workers, reporter, (0.99, 0.99, "look-alikes"), |model| {
+        look_alikes(model, negatives, p)
     })?;
-    let look_alikes = models.iter().map(|m| m.id).zip(found).filter(|(_, found)| !found.is_empty()).collect();
-    let mut done = Learnt { models: Vec::new(), refitted, failed: Vec::new(), look_alikes };
-    for (id, result) in m.targets.iter().zip(learnt) {
-        match result {
-            Ok(model) => done.models.push(model),
-            Err(reason) => done.failed.push((*id, reason)),
+    let look_alikes = all.iter().map(|m| m.id).zip(found).filter(|(_, found)| !found.is_empty()).collect();
+    Ok(Fitted { models, refitted, look_alikes })
+}
+
+/// The landmarks that look-alikes keep out of use, and those look-alikes.
+fn suspects(m: &Material, models: &[LandmarkModel], fitted: &Fitted) -> Vec<Suspect> {
+    let kept_out = fitted.models.iter().chain(&fitted.refitted).filter(|model| model.overlaps_others());
+    let mut ids: BTreeSet<LandmarkId> = BTreeSet::new();
+    for model in kept_out {
+        if let Some(found) = fitted.look_alikes.get(&model.id) {
+            ids.insert(model.id);
+            ids.extend(found.iter().map(|l| l.other));
         }
     }
-    Ok(done)
+    let suspect = |id: LandmarkId| {
+        let stored = m.snapshot.learnt.get(&id).map(|l| &*l.model);
+        let taught = models.iter().find(|model| model.id == id);
+        let model = taught.cloned().or_else(|| Some(refit_thresholds(stored?, &[], &m.params)))?;
+        Some(Suspect {
+            model,
+            place: m.snapshot.landmarks.get(&id).and_then(|l| l.place),
+            is_taught: taught.is_some(),
+            was_in_use: stored.is_some_and(|s| s.is_active() || s.is_kept_out_by_look_alikes()),
+        })
+    };
+    ids.into_iter().filter_map(suspect).collect()
 }
 
 /// What a landmark is learnt from.
@@ -282,89 +324,4 @@ fn collect_negatives(
     negatives
         .set_distractors(m.distractors.iter().map(|s| features(s.clone(), &m.params.recognise)).collect());
     Ok(negatives)
-}
-
-async fn commit(
-    store: &Catalogue,
-    map: MapRow,
-    job: i64,
-    learnt: Learnt,
-    names: &BTreeMap<LandmarkId, String>,
-    started: Instant,
-) -> Result<(), StoreError> {
-    let name = |id: &LandmarkId| names.get(id).cloned().unwrap_or_default();
-    let active = learnt.models.iter().filter(|m| m.is_active()).count();
-    let inactive: Vec<_> = learnt.models.iter().filter(|m| !m.is_active()).map(|m| name(&m.id)).collect();
-    let failed: Vec<_> =
-        learnt.failed.iter().map(|(id, reason)| json!({ "landmark": name(id), "reason": reason })).collect();
-    let look_alikes: Vec<_> = learnt
-        .look_alikes
-        .iter()
-        .flat_map(|(id, found)| found.iter().map(move |l| (id, l)))
-        .map(|(id, l)| json!({ "landmark": name(id), "other": name(&l.other), "gradient_similarity": l.gradient_similarity }))
-        .collect();
-    let result = json!({
-        "look_alikes": look_alikes,
-        "learnt": learnt.models.len(),
-        "active": active,
-        "inactive": inactive,
-        "failed": failed,
-        "points": learnt.models.iter().map(|m| m.points.len()).sum::<usize>(),
-        "refitted": learnt.refitted.len(),
-        "generated_views": learnt.models.iter().map(|m| m.generated_views).sum::<usize>(),
-        "seconds": started.elapsed().as_secs_f64(),
-    });
-    let message = format!("{active} of {} landmarks active", learnt.models.len() + learnt.failed.len());
-    let ended = Ended { state: "done", message, result: Some(result.to_string()) };
-    let of = |model: &LandmarkModel| -> Vec<StoredLookAlike> {
-        let found = learnt.look_alikes.get(&model.id).map_or(&[][..], Vec::as_slice);
-        let stored = |l: &LookAlike| StoredLookAlike::new(l.other, &name(&l.other), l.gradient_similarity);
-        found.iter().map(stored).collect()
-    };
-    let models = learnt.models.iter().chain(&learnt.refitted);
-    let rows: Vec<NewModel> = models.map(|model| row(model, &of(model))).collect();
-    let write = store.write(move |tx| {
-        Box::pin(async move {
-            let map = maps::recheck(tx, map).await?;
-            for row in &rows {
-                models::put(tx, map.id, row).await?;
-            }
-            maps::bump(tx, map.id).await?;
-            // A job that was cancelled stores nothing.
-            if jobs::end(tx, job, &ended).await? { Ok(()) } else { Err(StoreError::Changed) }
-        })
-    });
-    write.await
-}
-
-fn row(model: &LandmarkModel, look_alikes: &[StoredLookAlike]) -> NewModel {
-    let failures = match &model.status {
-        ModelStatus::Active => &[][..],
-        ModelStatus::Candidate(failures) => failures,
-    };
-    let facts = json!({
-        "correlation": model.correlation,
-        "hausdorff": model.hausdorff,
-        "gradient_similarity": model.likeness,
-        "look_alikes": look_alikes,
-        "saliency": model.saliency,
-        "saliency_f": model.saliency_f,
-        "stable_points": model.stable_points,
-        "v_c": model.v_c,
-        "photographed_v_c": model.photographed_v_c,
-        "points": model.points.len(),
-    });
-    NewModel {
-        landmark: model.id,
-        bytes: model.to_bytes(),
-        params_hash: model.params_hash,
-        summary: ModelSummary {
-            active: model.is_active(),
-            reasons: failed_gates::stored(failures),
-            facts: facts.to_string(),
-            views: (model.views - model.generated_views) as u64,
-            generated_views: model.generated_views as u64,
-            learnt_ms: now_ms(),
-        },
-    }
 }

@@ -4,7 +4,9 @@
 //! The next job is the first open row whose pause is over. A job that the end of the process interrupted starts again after a
 //! pause, and fails after [`MAX_ATTEMPTS`].
 
-pub(crate) mod learn;
+pub(crate) mod duplicates;
+mod learn;
+mod lesson_result;
 mod negatives;
 mod look_alikes;
 mod pictures;

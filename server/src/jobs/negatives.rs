@@ -2,7 +2,7 @@
 //! once for the whole lesson, ordered by landmark, so that the icons of one landmark are one range.
 
 use crate::store::views::{Digest, QuadCrop, TrainingViewRow};
-use std::ops::Range;
+use std::{collections::BTreeSet, ops::Range};
 use vision::{
     geometry::{Corners, polygon::intersection_area},
     icon::Icon,
@@ -47,6 +47,18 @@ impl Negatives {
         let start = self.icons.len();
         self.icons.extend(icons);
         self.owners.push((owner, start..self.icons.len()));
+    }
+
+    /// Removes the icons of these landmarks.
+    pub(super) fn remove(&mut self, landmarks: &BTreeSet<LandmarkId>) {
+        let (icons, owners) = (std::mem::take(&mut self.icons), std::mem::take(&mut self.owners));
+        let mut icons = icons.into_iter();
+        for (owner, range) in owners {
+            let own: Vec<IconFeatures> = icons.by_ref().take(range.len()).collect();
+            if !landmarks.contains(&owner) {
+                self.add(owner, own);
+            }
+        }
     }
 
     /// Sets the icons of no landmark.
@@ -152,5 +164,8 @@ mod tests {
         assert_eq!((before.len(), after.len(), negatives.of(LandmarkId(5)).len()), (2, 3, 1));
         let (before, after) = negatives.others(LandmarkId(7));
         assert_eq!((before.len(), after.len(), negatives.of(LandmarkId(7)).len()), (6, 0, 0));
+        negatives.remove(&[LandmarkId(1), LandmarkId(7)].into());
+        let (before, after) = negatives.others(LandmarkId(9));
+        assert_eq!((before.len(), after.len(), negatives.of(LandmarkId(1)).len()), (1, 0, 0));
     }
 }

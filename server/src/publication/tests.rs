@@ -155,6 +155,7 @@ async fn store_model(store: &Catalogue, landmark: i64, params: &vision::params::
         params_hash: model.params_hash,
         summary: landmarks::ModelSummary {
             active: false,
+            looks_like: None,
             reasons: "[]".into(),
             facts: "{}".into(),
             views: 2,

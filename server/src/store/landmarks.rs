@@ -16,7 +16,7 @@ macro_rules! select {
             "SELECT l.id, l.name, l.width_m, l.height_m, l.x_m, l.y_m, l.z_m, l.theta_rad, \
              l.roll_rad, l.tilt_rad, l.place_covariance, l.size_from_views, l.health, l.finding, \
              (SELECT count(*) FROM views v WHERE v.landmark_id = l.id) AS views, \
-             m.active, m.reasons, m.facts, m.views AS model_views, m.generated_views, m.learnt_ms \
+             m.active, m.looks_like, m.reasons, m.facts, m.views AS model_views, m.generated_views, m.learnt_ms \
              FROM landmarks l LEFT JOIN models m ON m.landmark_id = l.id ",
             $tail
         )
@@ -78,6 +78,8 @@ impl LandmarkGeometry {
 pub(crate) struct ModelSummary {
     /// The model passed all quality gates.
     pub(crate) active: bool,
+    /// Refused: JSON of the landmark in use that it looks like.
+    pub(crate) looks_like: Option<String>,
     /// JSON list of the failed quality gates.
     pub(crate) reasons: String,
     /// JSON object: thresholds and figures of the model.
@@ -176,6 +178,7 @@ fn landmark_row(row: &SqliteRow) -> Result<LandmarkRow, sqlx::Error> {
         None => None,
         Some(active) => Some(ModelSummary {
             active,
+            looks_like: row.try_get("looks_like")?,
             reasons: row.try_get("reasons")?,
             facts: row.try_get("facts")?,
             views: row.try_get::<i64, _>("model_views")? as u64,

@@ -8,14 +8,16 @@ use vision::model::LandmarkId;
 
 statements! {
     PUT = "INSERT INTO models (landmark_id, model, sha256, params_hash, active, reasons, facts, views, generated_views, \
-           learnt_ms) SELECT ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10 \
+           learnt_ms, looks_like) SELECT ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?12 \
            WHERE EXISTS (SELECT 1 FROM landmarks WHERE id = ?1 AND map_id = ?11) \
            ON CONFLICT (landmark_id) DO UPDATE SET model = excluded.model, sha256 = excluded.sha256, \
            params_hash = excluded.params_hash, active = excluded.active, reasons = excluded.reasons, \
            facts = excluded.facts, views = excluded.views, generated_views = excluded.generated_views, \
-           learnt_ms = excluded.learnt_ms";
+           learnt_ms = excluded.learnt_ms, looks_like = excluded.looks_like";
     DIGESTS = "SELECT m.landmark_id, m.sha256 FROM models m JOIN landmarks l ON l.id = m.landmark_id \
-               WHERE l.map_id = ?1 ORDER BY m.landmark_id";
+               WHERE l.map_id = ?1 AND m.looks_like IS NULL ORDER BY m.landmark_id";
+    REFUSED = "SELECT m.landmark_id FROM models m JOIN landmarks l ON l.id = m.landmark_id \
+               WHERE l.map_id = ?1 AND m.looks_like IS NOT NULL";
     REPLACE = "UPDATE models SET model = ?3, sha256 = ?4, facts = json_set(facts, '$.points', ?5) \
                WHERE landmark_id = ?1 AND sha256 = ?2";
     WITHOUT_POINTS_JOB = "SELECT m.landmark_id FROM models m JOIN landmarks l ON l.id = m.landmark_id \
@@ -56,6 +58,7 @@ pub(crate) async fn put(tx: &mut Tx, map_id: i64, new: &NewModel) -> Result<bool
         .bind(new.summary.generated_views as i64)
         .bind(new.summary.learnt_ms)
         .bind(map_id)
+        .bind(&new.summary.looks_like)
         .execute(&mut tx.conn)
         .await
         .map_err(StoreError::during("store model"))?;
@@ -101,7 +104,17 @@ pub(crate) async fn ask_points(tx: &mut Tx, landmarks: &[LandmarkId]) -> Result<
     Ok(())
 }
 
-/// Landmark and digest of every model of a map.
+/// Landmarks of a map that are refused because they look like one in use.
+pub(crate) async fn refused(
+    db: impl SqliteExecutor<'_>,
+    map_id: i64,
+) -> Result<BTreeSet<LandmarkId>, StoreError> {
+    let ids = sqlx::query_scalar::<_, i64>(REFUSED).bind(map_id).fetch_all(db).await;
+    let ids = ids.map_err(StoreError::during("list refused landmarks"))?;
+    Ok(ids.into_iter().map(|id| LandmarkId(id as u64)).collect())
+}
+
+/// Landmark and digest of every model of a map, without those of refused landmarks.
 pub(crate) async fn digests(
     db: impl SqliteExecutor<'_>,
     map_id: i64,

@@ -146,3 +146,57 @@ async fn what_belongs_to_a_landmark_follows_its_new_name() {
     });
     assert_eq!(name.await.unwrap(), "picture");
 }
+
+impl Service {
+    /// Trains a landmark.
+    async fn learn(&self, landmark: &str) {
+        let path = format!("/api/v1/maps/hall/landmarks/{landmark}/learn");
+        let (status, job) = read(self.ask(request("POST", &path, "{}")).await).await;
+        assert_eq!(status, 202, "{job}");
+        let id = job["id"].as_i64().unwrap();
+        for _ in 0..6_000 {
+            let row = jobs::get(self.store.reads(), id).await.unwrap();
+            if row.state == "done" {
+                return;
+            }
+            assert!(row.state != "failed", "{row:?}");
+            tokio::time::sleep(std::time::Duration::from_millis(10)).await;
+        }
+        panic!("the job does not end");
+    }
+}
+
+#[tokio::test]
+async fn the_second_name_of_a_picture_is_refused_with_the_first() {
+    let service = Service::start(Limits::default()).await;
+    let poster = sim::posters::poster_of_size(1, 260, 1.0);
+    let picture = picture::png(poster.width(), poster.height(), poster.data()).unwrap();
+    for name in ["first", "second"] {
+        assert_eq!(service.upload(name, picture.clone(), &[CREATE, WHOLE]).await.0, 201);
+        service.learn(name).await;
+        assert_eq!(service.landmark("first").await.1["status"], "active", "after {name}");
+    }
+    assert_eq!(service.patch("first", json!({ "name": "poster" })).await.0, 200);
+    let (_, second) = service.landmark("second").await;
+    assert_eq!(
+        (&second["status"], second["failed_gates"].as_array().unwrap().len()),
+        (&json!("inactive"), 1)
+    );
+    let reason = &second["failed_gates"][0];
+    assert_eq!(
+        (&reason["gate"], &reason["look_alike"]["landmark"]),
+        (&json!("looks_like"), &json!("poster"))
+    );
+    let likeness = reason["look_alike"]["gradient_similarity"].as_f64().unwrap();
+    let sentence = format!("Not in use: it looks like `poster` ({:.0} %).", 100.0 * likeness);
+    assert!(likeness > 0.9 && reason["sentence"] == sentence.as_str(), "{reason}");
+    assert_eq!(second["model"]["look_alikes"][0]["landmark"], "poster");
+
+    // When that one is gone it says so.
+    let gone = service.ask(request("DELETE", "/api/v1/maps/hall/landmarks/poster", "")).await;
+    assert_eq!(gone.status(), StatusCode::NO_CONTENT);
+    let (_, second) = service.landmark("second").await;
+    assert_eq!(second["failed_gates"][0]["advice"], "Learn it again.", "{second}");
+    service.learn("second").await;
+    assert_eq!(service.landmark("second").await.1["status"], "active");
+}

@@ -84,6 +84,7 @@ async fn store_model(store: &Catalogue, model: &LandmarkModel) {
         params_hash: model.params_hash,
         summary: landmarks::ModelSummary {
             active: model.is_active(),
+            looks_like: None,
             reasons: "[]".into(),
             facts: r#"{"look_alikes":[{"landmark":"twin"}]}"#.into(),
             views: 1,
