@@ -100,6 +100,7 @@ async function showFrame(key, answer) {
     const picture = await createImageBitmap(await reply.blob());
     drawFrame(byId("frame"), picture, answer);
     byId("quads").replaceChildren(...quadCells(answer).map(row));
+    byId("frame-hint").textContent = answer.pose_refusal_detail?.sentence ?? "";
     const work = (answer.timings ?? []).reduce((sum, t) => sum + t.ms, 0);
     byId("frame-facts").textContent = `frame ${answer.seq}: ${answer.status}, ${answer.quads.length} quads, ` +
       `${work.toFixed(1)} ms of work, answered after ${answer.latency_ms.toFixed(0)} ms`;

@@ -5,6 +5,7 @@ use super::{
     frame_analysis::{StageTimes, analyse_frame},
     guided::{GuidedObservation, GuidedResult},
     landmark_checks::FrameEvaluation,
+    pose_refusal::refusal_wire,
     snapshot::MapSnapshot,
 };
 use protos::{
@@ -120,4 +121,5 @@ pub fn fill_fixes(
         }
         Err(reason) => reason.as_str().clone_into(&mut answer.pose_refusal),
     }
+    answer.pose_refusal_detail = evaluation.refusal.as_ref().map(|r| refusal_wire(r, |id| name(map, id)));
 }

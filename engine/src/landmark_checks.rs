@@ -10,6 +10,7 @@ use super::{
     frame_context::FrameContext,
     guided::GuidedResult,
     motion::{FrameFixes, PriorPose},
+    pose_refusal::{PoseRefusal, pose_refusal},
 };
 use map::{
     landmark_health::{
@@ -42,7 +43,9 @@ pub struct FrameEvaluation {
     pub prior: Option<Pose2Covariance>,
     /// The fix by the landmarks that the picture alone names, or why there is none.
     pub fix: Result<Fix, NoFix>,
-    /// The same without the server's prior pose, which chooses among several solutions.
+    /// Which number does not fit, where the re-projection error refused that fix.
+    pub refusal: Option<PoseRefusal>,
+    /// The fix without the server's prior pose, which chooses among several solutions.
     pub independent: Option<FixResult>,
     /// The fix by the landmarks that the pose names, and by the others where they alone gave none.
     pub guided: Option<Fix>,
@@ -82,9 +85,11 @@ pub fn evaluate_frame(
         Ok(observations) => frame_fixes(frame, observations, prior),
         Err(reason) => (Err(*reason), None),
     };
+    let observations = global.as_deref().unwrap_or_default();
+    let refusal = pose_refusal(observations, frame.extrinsics, prior, independent.as_ref());
     let with = if fix == Err(NoFix::Ambiguous) { global.as_deref().unwrap_or_default() } else { &[] };
     let guided = prior.and_then(|prior| guided_fix(frame, guided, with, (prior, checks.as_ref())));
-    FrameEvaluation { prior: fused, fix, independent, guided, checks, only_expected: false }
+    FrameEvaluation { prior: fused, fix, refusal, independent, guided, checks, only_expected: false }
 }
 
 /// The guided fix of a frame in which only the expected landmarks were looked for: it may correct the prior pose. Searched
@@ -101,6 +106,7 @@ pub fn evaluate_expected_only(
     FrameEvaluation {
         prior,
         fix: Err(NoFix::NothingRecognised),
+        refusal: None,
         independent: None,
         guided,
         checks,

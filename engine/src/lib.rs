@@ -20,6 +20,7 @@ pub mod relocalise;
 pub mod mapping;
 pub mod cameras;
 pub mod picture;
+pub mod pose_refusal;
 pub mod dominant;
 pub mod epochs;
 pub mod gaze;

@@ -12,6 +12,7 @@ pub(crate) mod predict;
 mod planar;
 mod posterior;
 mod solve;
+mod refusal_causes;
 mod robot_pose;
 pub mod intrinsics_monitor;
 
@@ -19,6 +20,7 @@ pub use fix::{
     AmbiguityResolvedBy, Fix, FixRefusal, FixResult, FixSource, LandmarkObservation, Nuisance, NuisanceKey,
 };
 pub use params::LocaliseParams;
+pub use refusal_causes::{FixQuantity, RefusalCause, refusal_causes};
 pub use robot_pose::{MAX_OBSERVATIONS, robot_pose};
 
 #[cfg(test)]

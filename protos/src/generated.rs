@@ -256,6 +256,47 @@ pub struct QuadAnswer {
     #[prost(string, tag = "17")]
     pub guided_landmark: ::prost::alloc::string::String,
 }
+/// A number that makes recognised landmarks fit a pose if it alone is changed.
+#[derive(::serde::Serialize, ::serde::Deserialize)]
+#[serde(default)]
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct PoseRefusalCause {
+    #[prost(enumeration = "FixQuantity", tag = "1")]
+    #[serde(with = "crate::json::fix_quantity")]
+    pub quantity: i32,
+    /// Of SIZE: the landmark.
+    #[prost(string, tag = "2")]
+    pub landmark: ::prost::alloc::string::String,
+    /// The value that was stated, and the one that fits the image, with its standard deviation. Of MOUNTING: about the largest
+    /// error that is accepted, and the error of the best pose.
+    #[prost(double, tag = "3")]
+    pub expected: f64,
+    #[prost(double, tag = "4")]
+    pub measured: f64,
+    #[prost(double, tag = "5")]
+    pub sigma: f64,
+    /// m, rad or px.
+    #[prost(string, tag = "6")]
+    pub unit: ::prost::alloc::string::String,
+}
+/// By how much recognised landmarks fit no pose of an upright robot, and why.
+#[derive(::serde::Serialize, ::serde::Deserialize)]
+#[serde(default)]
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct PoseRefusalDetail {
+    /// Weighted squared re-projection error of the best pose, and the largest that is accepted.
+    #[prost(double, tag = "1")]
+    pub chi2: f64,
+    #[prost(double, tag = "2")]
+    pub limit: f64,
+    /// The likeliest first. Those that the frame cannot tell apart are all there: a landmark of another size at another
+    /// distance looks the same at another height, unless other landmarks or a known pose decide.
+    #[prost(message, repeated, tag = "3")]
+    pub causes: ::prost::alloc::vec::Vec<PoseRefusalCause>,
+    /// The same for a person.
+    #[prost(string, tag = "4")]
+    pub sentence: ::prost::alloc::string::String,
+}
 #[derive(::serde::Serialize, ::serde::Deserialize)]
 #[serde(default)]
 #[derive(Clone, PartialEq, ::prost::Message)]
@@ -336,6 +377,9 @@ pub struct Answer {
     /// picture alone. Never set unless the server is told to spare searches (its setting `search_every_frame`).
     #[prost(bool, tag = "18")]
     pub only_expected: bool,
+    /// With gate_reprojection and gate_inconsistent: which number does not fit, and by how much.
+    #[prost(message, optional, tag = "19")]
+    pub pose_refusal_detail: ::core::option::Option<PoseRefusalDetail>,
 }
 /// robot/{robot}/odometry : odom_from_robot
 #[derive(::serde::Serialize, ::serde::Deserialize)]
@@ -704,6 +748,47 @@ impl Sighting {
             "SIGHTING_UNSPECIFIED" => Some(Self::Unspecified),
             "SIGHTING_GLOBAL" => Some(Self::Global),
             "SIGHTING_GUIDED" => Some(Self::Guided),
+            _ => None,
+        }
+    }
+}
+/// A number that a robot pose by landmarks rests on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]
+#[repr(i32)]
+pub enum FixQuantity {
+    Unspecified = 0,
+    /// Width of a landmark (m); its height is wrong by the same factor.
+    Size = 1,
+    /// Height of the camera above the floor (m).
+    CameraHeight = 2,
+    /// Angle of the camera's axis above the horizon (rad).
+    CameraTilt = 3,
+    /// The camera's pose on the robot as a whole, or the landmark's place: none of the others alone explains the corners.
+    /// The value is the root mean square of the re-projection error (px).
+    Mounting = 4,
+}
+impl FixQuantity {
+    /// String value of the enum field names used in the ProtoBuf definition.
+    ///
+    /// The values are not transformed in any way and thus are considered stable
+    /// (if the ProtoBuf definition does not change) and safe for programmatic use.
+    pub fn as_str_name(&self) -> &'static str {
+        match self {
+            Self::Unspecified => "FIX_QUANTITY_UNSPECIFIED",
+            Self::Size => "FIX_QUANTITY_SIZE",
+            Self::CameraHeight => "FIX_QUANTITY_CAMERA_HEIGHT",
+            Self::CameraTilt => "FIX_QUANTITY_CAMERA_TILT",
+            Self::Mounting => "FIX_QUANTITY_MOUNTING",
+        }
+    }
+    /// Creates an enum from field names used in the ProtoBuf definition.
+    pub fn from_str_name(value: &str) -> ::core::option::Option<Self> {
+        match value {
+            "FIX_QUANTITY_UNSPECIFIED" => Some(Self::Unspecified),
+            "FIX_QUANTITY_SIZE" => Some(Self::Size),
+            "FIX_QUANTITY_CAMERA_HEIGHT" => Some(Self::CameraHeight),
+            "FIX_QUANTITY_CAMERA_TILT" => Some(Self::CameraTilt),
+            "FIX_QUANTITY_MOUNTING" => Some(Self::Mounting),
             _ => None,
         }
     }

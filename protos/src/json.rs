@@ -38,6 +38,7 @@ word!(quad_kind, crate::v1::QuadKind, "QUAD_KIND_", "Words of [`crate::v1::QuadK
 word!(verdict, crate::v1::Verdict, "VERDICT_", "Words of [`crate::v1::Verdict`].");
 word!(sighting, crate::v1::Sighting, "SIGHTING_", "Words of [`crate::v1::Sighting`].");
 word!(pose_trust, crate::v1::PoseTrust, "POSE_TRUST_", "Words of [`crate::v1::PoseTrust`].");
+word!(fix_quantity, crate::v1::FixQuantity, "FIX_QUANTITY_", "Words of [`crate::v1::FixQuantity`].");
 word!(part, crate::v1::PartAgreement, "PART_AGREEMENT_", "Words of [`crate::v1::PartAgreement`].");
 
 /// A list of words of [`crate::v1::PartAgreement`].

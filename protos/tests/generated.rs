@@ -4,7 +4,7 @@
 use std::{fs, path::Path};
 
 /// Messages that also travel as JSON over HTTP.
-const JSON: [&str; 17] = [
+const JSON: [&str; 19] = [
     "Hypothesis",
     "Pose3",
     "Pose2",
@@ -16,6 +16,8 @@ const JSON: [&str; 17] = [
     "LandmarkPose",
     "QuadAnswer",
     "StageTime",
+    "PoseRefusalCause",
+    "PoseRefusalDetail",
     "Answer",
     "RobotPose",
     "MapChanged",
@@ -43,6 +45,7 @@ fn committed_rust_matches_the_proto() {
         ("QuadAnswer.sighting", "sighting"),
         ("RobotPose.trust", "pose_trust"),
         ("PointEvidence.agreement", "part_agreement"),
+        ("PoseRefusalCause.quantity", "fix_quantity"),
     ] {
         let attribute = format!("#[serde(with = \"crate::json::{module}\")]");
         config.field_attribute(format!(".waymark.v1.{field}"), attribute);

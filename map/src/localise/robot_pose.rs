@@ -29,6 +29,11 @@ pub fn robot_pose(
     if let Some(prior) = prior {
         prior.check()?;
     }
+    Ok(solve(&largest(observations), mounting, prior, p))
+}
+
+/// The observations that a fix uses.
+pub(super) fn largest<'a>(observations: &[LandmarkObservation<'a>]) -> Vec<LandmarkObservation<'a>> {
     let mut used = observations.to_vec();
     // Largest first; stable, so equal ones stay in order.
     used.sort_by(|a, b| {
@@ -36,5 +41,5 @@ pub fn robot_pose(
         area(b).total_cmp(&area(a))
     });
     used.truncate(MAX_OBSERVATIONS);
-    Ok(solve(&used, mounting, prior, p))
+    used
 }

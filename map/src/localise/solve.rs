@@ -19,10 +19,10 @@ const SAME_POSE: f64 = 1e-3;
 const PATH_POINTS: usize = 24;
 
 /// A minimum of the weighted squared residual over (x, y, theta).
-struct Minimum {
-    pose: Pose2,
+pub(super) struct Minimum {
+    pub(super) pose: Pose2,
     weight: DMatrix<f64>,
-    chi2: f64,
+    pub(super) chi2: f64,
     /// Turns, negative and positive, at which the basin of another minimum begins.
     limit_rad: (f64, f64),
 }
@@ -62,7 +62,7 @@ pub(super) fn solve(
 
 /// Every minimum reachable from the solutions of each observation and their mirror images, by rising chi2. Minima
 /// behind a landmark's wall are left out.
-fn minima(problem: &Planar<'_>, observations: &[LandmarkObservation<'_>]) -> Vec<Minimum> {
+pub(super) fn minima(problem: &Planar<'_>, observations: &[LandmarkObservation<'_>]) -> Vec<Minimum> {
     let mut found: Vec<Minimum> = Vec::new();
     for (i, observation) in observations.iter().enumerate() {
         let solutions = [Some(&observation.seen.best), observation.seen.second.as_ref()];

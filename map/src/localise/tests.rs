@@ -3,6 +3,7 @@
 
 mod derivatives;
 mod covariance;
+mod refusal_causes;
 
 use crate::{
     extrinsics::{CameraExtrinsics, pan_tilt},

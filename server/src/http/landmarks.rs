@@ -137,14 +137,13 @@ fn landmark_shown(row: LandmarkRow, context: &Context<'_>) -> Landmark {
             serde_json::from_str(&m.facts).map(facts_shown).unwrap_or_default();
         let look_alikes = facts.get_mut("look_alikes").map(|l| look_alikes_shown(l, context.snapshot));
         is_active = m.active && context.unusable.is_none();
-        failed_gates = match &context.unusable {
-            Some(reason) => vec![failed_gates::stored_model(reason)],
-            None => {
-                let look_alike = look_alikes.into_iter().flatten().next();
-                let refusal = m.looks_like.as_deref().map(|text| refusal(text, context.snapshot));
-                let about = Evidence { look_alike, refusal, ..Evidence::default() };
-                failed_gates::in_words(&failed_gates::from_stored(&m.reasons), &about)
-            }
+        failed_gates = if let Some(reason) = &context.unusable {
+            vec![failed_gates::stored_model(reason)]
+        } else {
+            let look_alike = look_alikes.into_iter().flatten().next();
+            let refusal = m.looks_like.as_deref().map(|text| refusal(text, context.snapshot));
+            let about = Evidence { look_alike, refusal, ..Evidence::default() };
+            failed_gates::in_words(&failed_gates::from_stored(&m.reasons), &about)
         };
         let (views, generated_views) = (m.views, m.generated_views);
         LandmarkModelBody { views, generated_views, learnt_ms: m.learnt_ms, facts }

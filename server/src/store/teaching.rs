@@ -116,23 +116,23 @@ pub(crate) struct Teaching {
 
 impl Teaching {
     /// The geometry of the landmark with the size that is given. Errors: `SizeDiffers`.
-    fn sized(&self, now: LandmarkGeometry) -> Result<LandmarkGeometry, StoreError> {
-        let Some(given) = self.size else { return Ok(now) };
+    fn sized(&self, now: &LandmarkGeometry) -> Result<LandmarkGeometry, StoreError> {
+        let Some(given) = self.size else { return Ok(*now) };
         if let Some(stored) = now.size.filter(|_| !now.size_from_views) {
             let off_m = (stored.width_m - given.width_m).abs().max((stored.height_m - given.height_m).abs());
             if off_m > SAME_SIZE_M {
                 return Err(StoreError::SizeDiffers { landmark: self.landmark.clone(), stored, given });
             }
-            return Ok(now);
+            return Ok(*now);
         }
-        Ok(LandmarkGeometry { size: Some(given), size_from_views: false, ..now })
+        Ok(LandmarkGeometry { size: Some(given), size_from_views: false, ..*now })
     }
 }
 
 /// What a prepared view rests on.
 enum Basis {
     /// A landmark that exists.
-    Landmark(Stamp),
+    Landmark(Box<Stamp>),
     /// There is none yet: the map and the version of its walls.
     NewLandmark { map: i64, walls_version: i64 },
 }
@@ -173,7 +173,7 @@ async fn basis(
     Teaching { map, landmark, create, .. }: &Teaching,
 ) -> Result<Basis, StoreError> {
     if let Some(stamp) = stamp(store.reads(), map, landmark).await? {
-        return Ok(Basis::Landmark(stamp));
+        return Ok(Basis::Landmark(Box::new(stamp)));
     }
     let map = maps::get(store.reads(), map).await?.id;
     if create.is_none() {
@@ -187,7 +187,7 @@ async fn landmark_for(tx: &mut Tx, new: &Teaching, prepared: &Prepared) -> Resul
     let (Teaching { map, landmark, create, .. }, geometry) = (new, prepared.geometry);
     let now = stamp(&mut tx.conn, map, landmark).await?;
     match (&prepared.basis, now) {
-        (Basis::Landmark(was), Some(now)) if *was == now => {
+        (Basis::Landmark(was), Some(now)) if **was == now => {
             if now.geometry != geometry {
                 landmarks::update(tx, map, landmark, |_| geometry).await?;
             }
@@ -213,7 +213,7 @@ async fn prepare(store: &Store, teaching: &Arc<Teaching>) -> Result<Prepared, St
         Basis::Landmark(stamp) => (stamp.map, Some(stamp.landmark), stamp.geometry),
         Basis::NewLandmark { map, .. } => (*map, None, LandmarkGeometry::default()),
     };
-    let geometry = teaching.sized(now)?;
+    let geometry = teaching.sized(&now)?;
     let stored = match (novelty, landmark) {
         (Some(_), Some(landmark)) => views::crops(store.reads(), landmark).await?,
         _ => Vec::new(),

@@ -19,7 +19,12 @@ fn blocks(number: usize) -> Vec<u8> {
 
 impl Service {
     /// Uploads a view of `landmark` of the map `hall`, with these parts beside the picture.
-    async fn upload(&self, landmark: &str, image: Vec<u8>, parts: &[(&str, &str)]) -> (u16, Value) {
+    pub(super) async fn upload(
+        &self,
+        landmark: &str,
+        image: Vec<u8>,
+        parts: &[(&str, &str)],
+    ) -> (u16, Value) {
         let mut text = String::new();
         for (name, value) in parts {
             write!(text, "--b\r\ncontent-disposition: form-data; name=\"{name}\"\r\n\r\n{value}\r\n")
@@ -62,7 +67,7 @@ async fn a_landmark_is_made_with_its_first_view_or_not_at_all() {
         (404, "unknown_landmark".into())
     );
     // Blank: there is no quad to take.
-    let blank = picture::png(240, 240, &[128; 240 * 240]).unwrap();
+    let blank = picture::png(240, 240, &vec![128; 240 * 240]).unwrap();
     assert_eq!(refused(service.upload("poster", blank, &[CREATE]).await), (422, "quad_not_found".into()));
     nothing().await;
     let corners = ("corners", "[[500,0],[600,0],[600,100],[500,100]]");

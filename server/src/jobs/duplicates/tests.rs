@@ -66,7 +66,8 @@ impl School {
         Self { store, jobs, _tasks: tasks, _stop: stop, _data: data }
     }
 
-    async fn add(&self, name: &'static str, geometry: LandmarkGeometry) {
+    async fn add(&self, name: &'static str, geometry: &LandmarkGeometry) {
+        let geometry = *geometry;
         let write = self.store.write(move |tx| Box::pin(landmarks::create(tx, "a", name, geometry, 9)));
         write.await.unwrap();
     }
@@ -150,7 +151,7 @@ async fn a_landmark_that_looks_like_an_active_one_is_refused_and_that_one_stays_
     let school = School::open().await;
     // Made before the active one, and taught after it: the one in use stays.
     for name in ["later", "first", "other"] {
-        school.add(name, nowhere()).await;
+        school.add(name, &nowhere()).await;
     }
     school.teach("first", 1, false).await;
     school.teach("other", 2, false).await;
@@ -185,7 +186,7 @@ async fn a_landmark_that_looks_like_an_active_one_is_refused_and_that_one_stays_
 async fn of_two_look_alikes_in_one_lesson_the_older_stays() {
     let school = School::open().await;
     for (name, stain) in [("older", false), ("newer", true), ("newest", false)] {
-        school.add(name, nowhere()).await;
+        school.add(name, &nowhere()).await;
         school.teach(name, 1, stain).await;
     }
     school.learn(&[]).await;
@@ -196,13 +197,13 @@ async fn of_two_look_alikes_in_one_lesson_the_older_stays() {
 #[tokio::test]
 async fn look_alikes_at_different_places_are_a_class_that_a_pose_tells_apart() {
     let school = School::open().await;
-    school.add("door-1", at(1.0, 0.0)).await;
+    school.add("door-1", &at(1.0, 0.0)).await;
     // Behind it on the other side of the wall, and elsewhere on the same.
-    school.add("door-2", at(1.0, PI)).await;
-    school.add("door-3", at(5.0, 0.0)).await;
+    school.add("door-2", &at(1.0, PI)).await;
+    school.add("door-3", &at(5.0, 0.0)).await;
     // Perhaps the same object once more.
-    school.add("copy", at(1.1, 0.1)).await;
-    school.add("unplaced", nowhere()).await;
+    school.add("copy", &at(1.1, 0.1)).await;
+    school.add("unplaced", &nowhere()).await;
     let doors = ["door-1", "door-2", "door-3"];
     for name in doors {
         school.teach(name, 1, false).await;
