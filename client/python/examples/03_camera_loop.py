@@ -61,7 +61,9 @@ def main() -> None:
             # One frame at a time; with `publish_frame` and `answers()` the camera need not wait.
             answer = robot.recognise("front", capture).accepted()
             if answer.map_from_robot is None:
-                print(f"{answer.status}: no pose {answer.pose_refusal}")
+                # With `gate_reprojection`: which number does not fit, and by how much.
+                detail = answer.pose_refusal_detail
+                print(f"{answer.status}: no pose", detail.sentence if detail else answer.pose_refusal)
                 continue
             pose, (sigma_x, sigma_y, sigma_theta) = answer.map_from_robot.pose, answer.map_from_robot.sigma
             print(

@@ -50,7 +50,10 @@ def test_a_robot_gets_replies_answers_and_poses(server: Server, taught: str) -> 
                     arrived = await answers.get(SOON_S)
                     assert arrived is not None and arrived.answer == answer
                     pose = await moving(robot, poses.get(SOON_S))
-                    assert pose.map_from_robot is not None and called[0] == pose
+                    assert pose.map_from_robot is not None
+                    while not called:
+                        await asyncio.sleep(0.01)
+                    assert called[0] == pose
                 seq = await robot.publish_frame("front", capture())
                 async for each in answers:
                     assert each.answer.seq == seq

@@ -3,6 +3,7 @@ of each resource work against a real server."""
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import inspect
 import math
@@ -41,6 +42,7 @@ from waymark.api import (
     AcceptedTrackBody,
     AreaBody,
     CalibrationConstraintsBody,
+    CameraFrame,
     Job,
     Parent,
     PoseBody,
@@ -266,12 +268,12 @@ def test_a_robot_is_observed_and_its_camera_calibrated(server: Server, taught: s
             image = Image.rgb(pictures.seen_from(pictures.front())).png()
             frame = Capture(image, pictures.CAMERA, deadline_ms=60_000)
             answer = robot.recognise("front", frame, wait_s=SOON_S)
-            shown = maps.camera_frame("observed", "front")
+            shown = shown_frame(maps, "observed", answer.seq)
             assert (shown.seq, shown.media_type, shown.image) == (answer.seq, "image/png", image.data)
             assert maps.camera_answer("observed", "front") == answer, "one answer, by zenoh and by HTTP"
             raw = Capture(Image.rgb(pictures.seen_from(pictures.front())), pictures.CAMERA, deadline_ms=60_000)
-            robot.recognise("front", raw, wait_s=SOON_S)
-            assert maps.camera_frame("observed", "front").media_type == "image/png"
+            of_raw = robot.recognise("front", raw, wait_s=SOON_S)
+            assert shown_frame(maps, "observed", of_raw.seq).media_type == "image/png"
             camera = maps.cameras("observed")[0]
             assert (camera.name, camera.width_px, camera.intrinsics.fx_px) == ("front", 640, 500.0)
             assert camera.intrinsics.focal_sigma_px == 2.5, "what is not given has a default"
@@ -292,6 +294,18 @@ def test_a_robot_is_observed_and_its_camera_calibrated(server: Server, taught: s
         maps.delete_robot("observed")
         with pytest.raises(Refused, match="put_robot"):
             maps.robot("observed")
+
+
+def shown_frame(maps: MapClient, robot: str, seq: int) -> CameraFrame:
+    """The frame of this number; the server shows it shortly after the robot has its answer."""
+    until = time.monotonic() + SOON_S
+    while time.monotonic() < until:
+        with contextlib.suppress(Refused):
+            shown = maps.camera_frame(robot, "front")
+            if shown.seq == seq:
+                return shown
+        time.sleep(0.02)
+    raise AssertionError(f"frame {seq} is not shown")
 
 
 def uploaded_views() -> UploadedViews:

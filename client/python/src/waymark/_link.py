@@ -13,6 +13,7 @@ import re
 import secrets
 import threading
 import time
+import weakref
 from collections.abc import Callable
 from typing import Any, Generic, Literal, TypeVar
 
@@ -132,6 +133,8 @@ class Link:
             self._session.close()
             raise Unreachable(f"zenoh could not subscribe at {endpoint}: {error}") from error
 
+        _close_at_the_end(self)
+
     def close(self) -> None:
         """Ends the session, and with it the robot's presence. No effect the second time."""
         if not self._session.is_closed():
@@ -229,6 +232,29 @@ class Link:
         except DecodeError as error:
             raise Unexpected(f"{key}: {error}") from error
         return None
+
+
+_open_links: weakref.WeakSet[Link] = weakref.WeakSet()
+_end_lock = threading.Lock()
+_end_thread: threading.Thread | None = None
+
+
+def _close_at_the_end(link: Link) -> None:
+    """Closes the session when the main thread ends: the interpreter waits for the threads that zenoh calls back on, so
+    that a program that leaves a session open would never end."""
+    global _end_thread
+    with _end_lock:
+        _open_links.add(link)
+        if _end_thread is None:
+            # No daemon: the interpreter waits for it once the main thread has ended, and not before.
+            _end_thread = threading.Thread(target=_close_all, name="waymark-end")
+            _end_thread.start()
+
+
+def _close_all() -> None:
+    threading.main_thread().join()
+    for link in list(_open_links):
+        link.close()
 
 
 def frame_bytes(frame: Capture | Picture, epoch: int, seq: int) -> bytes:

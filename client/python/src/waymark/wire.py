@@ -21,6 +21,7 @@ QuadKind = Literal["unspecified", "full", "three_sided", "expected"]
 Verdict = Literal["unspecified", "unknown", "unique", "ambiguous"]
 PartAgreement = Literal["unspecified", "silent", "agrees", "disagrees"]
 Sighting = Literal["unspecified", "global", "guided"]
+FixQuantity = Literal["unspecified", "size", "camera_height", "camera_tilt", "mounting"]
 PoseTrust = Literal["unspecified", "unsupported", "supported", "stale", "contradicted"]
 GazeCriterion = Literal["unspecified", "product", "information"]
 GazeAction = Literal["unspecified", "landmark", "ahead", "sweep"]
@@ -215,6 +216,30 @@ class Hypothesis:
 
 
 @dataclass(frozen=True, slots=True)
+class PoseRefusalCause:
+    """A number that makes recognised landmarks fit a pose if it alone is changed: the value that was stated, and the
+    one that fits the image, in `unit` (m, rad or px). `landmark` is set for `size`."""
+
+    quantity: FixQuantity = "unspecified"
+    landmark: str = ""
+    expected: float = 0.0
+    measured: float = 0.0
+    sigma: float = 0.0
+    unit: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class PoseRefusalDetail:
+    """By how much recognised landmarks fit no pose of an upright robot, and why: the likeliest cause first, and the
+    same in a sentence for a person."""
+
+    chi2: float = 0.0
+    limit: float = 0.0
+    causes: tuple[PoseRefusalCause, ...] = ()
+    sentence: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class Answer:
     """The answer to a frame. "Nothing recognised" (`no_match`) is an answer, not a failure."""
 
@@ -239,6 +264,8 @@ class Answer:
     guided_map_from_robot: Pose2Covariance | None = None
     guided_landmarks: tuple[str, ...] = ()
     only_expected: bool = False
+    # With gate_reprojection and gate_inconsistent: which number does not fit, and by how much.
+    pose_refusal_detail: PoseRefusalDetail | None = None
 
     def accepted(self) -> Answer:
         """This answer; raises `Refused` with the code and the field if the server refused the frame."""

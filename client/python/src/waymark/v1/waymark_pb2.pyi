@@ -54,6 +54,14 @@ class Sighting(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     SIGHTING_GLOBAL: _ClassVar[Sighting]
     SIGHTING_GUIDED: _ClassVar[Sighting]
 
+class FixQuantity(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+    __slots__ = ()
+    FIX_QUANTITY_UNSPECIFIED: _ClassVar[FixQuantity]
+    FIX_QUANTITY_SIZE: _ClassVar[FixQuantity]
+    FIX_QUANTITY_CAMERA_HEIGHT: _ClassVar[FixQuantity]
+    FIX_QUANTITY_CAMERA_TILT: _ClassVar[FixQuantity]
+    FIX_QUANTITY_MOUNTING: _ClassVar[FixQuantity]
+
 class PoseTrust(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     __slots__ = ()
     POSE_TRUST_UNSPECIFIED: _ClassVar[PoseTrust]
@@ -103,6 +111,11 @@ PART_AGREEMENT_DISAGREES: PartAgreement
 SIGHTING_UNSPECIFIED: Sighting
 SIGHTING_GLOBAL: Sighting
 SIGHTING_GUIDED: Sighting
+FIX_QUANTITY_UNSPECIFIED: FixQuantity
+FIX_QUANTITY_SIZE: FixQuantity
+FIX_QUANTITY_CAMERA_HEIGHT: FixQuantity
+FIX_QUANTITY_CAMERA_TILT: FixQuantity
+FIX_QUANTITY_MOUNTING: FixQuantity
 POSE_TRUST_UNSPECIFIED: PoseTrust
 POSE_TRUST_UNSUPPORTED: PoseTrust
 POSE_TRUST_SUPPORTED: PoseTrust
@@ -308,6 +321,34 @@ class QuadAnswer(_message.Message):
     guided_landmark: str
     def __init__(self, corners: _Optional[_Iterable[_Union[Point, _Mapping]]] = ..., kind: _Optional[_Union[QuadKind, str]] = ..., score: _Optional[float] = ..., verdict: _Optional[_Union[Verdict, str]] = ..., landmark: _Optional[str] = ..., candidates: _Optional[_Iterable[_Union[Candidate, _Mapping]]] = ..., entropy_m: _Optional[float] = ..., entropy_norm: _Optional[float] = ..., confidence: _Optional[float] = ..., pose: _Optional[_Union[LandmarkPose, _Mapping]] = ..., second_pose: _Optional[_Union[LandmarkPose, _Mapping]] = ..., pose_ambiguous: bool = ..., pose_refusal: _Optional[str] = ..., points: _Optional[_Union[PointEvidence, _Mapping]] = ..., doubtful_landmark: _Optional[str] = ..., sighting: _Optional[_Union[Sighting, str]] = ..., guided_landmark: _Optional[str] = ...) -> None: ...
 
+class PoseRefusalCause(_message.Message):
+    __slots__ = ("quantity", "landmark", "expected", "measured", "sigma", "unit")
+    QUANTITY_FIELD_NUMBER: _ClassVar[int]
+    LANDMARK_FIELD_NUMBER: _ClassVar[int]
+    EXPECTED_FIELD_NUMBER: _ClassVar[int]
+    MEASURED_FIELD_NUMBER: _ClassVar[int]
+    SIGMA_FIELD_NUMBER: _ClassVar[int]
+    UNIT_FIELD_NUMBER: _ClassVar[int]
+    quantity: FixQuantity
+    landmark: str
+    expected: float
+    measured: float
+    sigma: float
+    unit: str
+    def __init__(self, quantity: _Optional[_Union[FixQuantity, str]] = ..., landmark: _Optional[str] = ..., expected: _Optional[float] = ..., measured: _Optional[float] = ..., sigma: _Optional[float] = ..., unit: _Optional[str] = ...) -> None: ...
+
+class PoseRefusalDetail(_message.Message):
+    __slots__ = ("chi2", "limit", "causes", "sentence")
+    CHI2_FIELD_NUMBER: _ClassVar[int]
+    LIMIT_FIELD_NUMBER: _ClassVar[int]
+    CAUSES_FIELD_NUMBER: _ClassVar[int]
+    SENTENCE_FIELD_NUMBER: _ClassVar[int]
+    chi2: float
+    limit: float
+    causes: _containers.RepeatedCompositeFieldContainer[PoseRefusalCause]
+    sentence: str
+    def __init__(self, chi2: _Optional[float] = ..., limit: _Optional[float] = ..., causes: _Optional[_Iterable[_Union[PoseRefusalCause, _Mapping]]] = ..., sentence: _Optional[str] = ...) -> None: ...
+
 class StageTime(_message.Message):
     __slots__ = ("stage", "ms")
     STAGE_FIELD_NUMBER: _ClassVar[int]
@@ -325,7 +366,7 @@ class Hypothesis(_message.Message):
     def __init__(self, probability: _Optional[float] = ..., map_from_robot: _Optional[_Union[Pose2Covariance, _Mapping]] = ...) -> None: ...
 
 class Answer(_message.Message):
-    __slots__ = ("epoch", "seq", "captured_ns", "map", "map_version", "status", "rejection", "quads", "map_from_robot", "pose_landmarks", "latency_ms", "timings", "clock_suspect", "pose_refusal", "hypotheses", "guided_map_from_robot", "guided_landmarks", "only_expected")
+    __slots__ = ("epoch", "seq", "captured_ns", "map", "map_version", "status", "rejection", "quads", "map_from_robot", "pose_landmarks", "latency_ms", "timings", "clock_suspect", "pose_refusal", "hypotheses", "guided_map_from_robot", "guided_landmarks", "only_expected", "pose_refusal_detail")
     EPOCH_FIELD_NUMBER: _ClassVar[int]
     SEQ_FIELD_NUMBER: _ClassVar[int]
     CAPTURED_NS_FIELD_NUMBER: _ClassVar[int]
@@ -344,6 +385,7 @@ class Answer(_message.Message):
     GUIDED_MAP_FROM_ROBOT_FIELD_NUMBER: _ClassVar[int]
     GUIDED_LANDMARKS_FIELD_NUMBER: _ClassVar[int]
     ONLY_EXPECTED_FIELD_NUMBER: _ClassVar[int]
+    POSE_REFUSAL_DETAIL_FIELD_NUMBER: _ClassVar[int]
     epoch: int
     seq: int
     captured_ns: int
@@ -362,7 +404,8 @@ class Answer(_message.Message):
     guided_map_from_robot: Pose2Covariance
     guided_landmarks: _containers.RepeatedScalarFieldContainer[str]
     only_expected: bool
-    def __init__(self, epoch: _Optional[int] = ..., seq: _Optional[int] = ..., captured_ns: _Optional[int] = ..., map: _Optional[str] = ..., map_version: _Optional[int] = ..., status: _Optional[_Union[Status, str]] = ..., rejection: _Optional[_Union[Rejection, _Mapping]] = ..., quads: _Optional[_Iterable[_Union[QuadAnswer, _Mapping]]] = ..., map_from_robot: _Optional[_Union[Pose2Covariance, _Mapping]] = ..., pose_landmarks: _Optional[_Iterable[str]] = ..., latency_ms: _Optional[float] = ..., timings: _Optional[_Iterable[_Union[StageTime, _Mapping]]] = ..., clock_suspect: bool = ..., pose_refusal: _Optional[str] = ..., hypotheses: _Optional[_Iterable[_Union[Hypothesis, _Mapping]]] = ..., guided_map_from_robot: _Optional[_Union[Pose2Covariance, _Mapping]] = ..., guided_landmarks: _Optional[_Iterable[str]] = ..., only_expected: bool = ...) -> None: ...
+    pose_refusal_detail: PoseRefusalDetail
+    def __init__(self, epoch: _Optional[int] = ..., seq: _Optional[int] = ..., captured_ns: _Optional[int] = ..., map: _Optional[str] = ..., map_version: _Optional[int] = ..., status: _Optional[_Union[Status, str]] = ..., rejection: _Optional[_Union[Rejection, _Mapping]] = ..., quads: _Optional[_Iterable[_Union[QuadAnswer, _Mapping]]] = ..., map_from_robot: _Optional[_Union[Pose2Covariance, _Mapping]] = ..., pose_landmarks: _Optional[_Iterable[str]] = ..., latency_ms: _Optional[float] = ..., timings: _Optional[_Iterable[_Union[StageTime, _Mapping]]] = ..., clock_suspect: bool = ..., pose_refusal: _Optional[str] = ..., hypotheses: _Optional[_Iterable[_Union[Hypothesis, _Mapping]]] = ..., guided_map_from_robot: _Optional[_Union[Pose2Covariance, _Mapping]] = ..., guided_landmarks: _Optional[_Iterable[str]] = ..., only_expected: bool = ..., pose_refusal_detail: _Optional[_Union[PoseRefusalDetail, _Mapping]] = ...) -> None: ...
 
 class Odometry(_message.Message):
     __slots__ = ("epoch", "seq", "captured_ns", "odom_from_robot")
