@@ -16,10 +16,10 @@ use sim::{
 use std::{fmt::Write as _, fs, path::Path};
 use vision::frame::{Distortion, GrayImage, Intrinsics};
 
-/// The office: 8 m x 5 m, four posters of 0.60 m x 0.84 m.
+/// The office: 10 m x 5 m, four posters of 0.60 m x 0.84 m.
 pub fn office() -> Building {
     let params = CorridorParams {
-        length_m: 8.0,
+        length_m: 10.0,
         width_m: 5.0,
         posters: 4,
         column: false,
@@ -119,7 +119,7 @@ fn laser_log(building: &Building) -> String {
     let mut log = String::new();
     for step in 0..60_u32 {
         let s = f64::from(step) / 59.0;
-        let pose = Pose2::new(1.0 + 6.0 * s, -1.0 + 2.0 * s, 0.4 * (12.0 * s).sin());
+        let pose = Pose2::new(1.0 + 8.0 * s, -1.0 + 2.0 * s, 0.4 * (12.0 * s).sin());
         let scan = scan(building, &pose, &params, u64::from(step));
         let ranges: Vec<String> = scan.ranges_m().iter().map(|range| format!("{range:.3}")).collect();
         let at = format!("{:.4} {:.4} {:.5}", pose.x_m, pose.y_m, pose.theta_rad);
@@ -132,12 +132,12 @@ fn laser_log(building: &Building) -> String {
 /// The walls of the office as a grid of `map_server`, as GeoJSON and as an SVG floor plan (1 px = 1 cm).
 fn floor_plans(folder: &Path, building: &Building) {
     const CELL_M: f64 = 0.05;
-    let (origin, width, height) = ([-1.0, -4.0], 200_usize, 160_usize);
+    let (origin, width, height) = ([-1.0, -4.0], 240_usize, 160_usize);
     let mut cells = vec![205_u8; width * height];
     for (i, cell) in cells.iter_mut().enumerate() {
         let x = origin[0] + (i % width) as f64 * CELL_M + 0.5 * CELL_M;
         let y = origin[1] + (height - 1 - i / width) as f64 * CELL_M + 0.5 * CELL_M;
-        let outside = (x - 4.0).abs() - 4.0;
+        let outside = (x - 5.0).abs() - 5.0;
         let outside = outside.max(y.abs() - 2.5);
         if outside < 0.0 {
             *cell = 254;
@@ -163,7 +163,29 @@ fn floor_plans(folder: &Path, building: &Building) {
         lines.join(", ")
     );
     fs::write(folder.join("floor.geojson"), geojson).expect("a plan");
-    let svg = "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"900\" height=\"600\" viewBox=\"0 0 900 600\">\
-               <path d=\"M 50 50 H 850 V 550 H 50 Z\" fill=\"none\" stroke=\"black\"/></svg>\n";
+    let svg = "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"1100\" height=\"600\" viewBox=\"0 0 1100 600\">\
+               <path d=\"M 50 50 H 1050 V 550 H 50 Z\" fill=\"none\" stroke=\"black\"/></svg>\n";
     fs::write(folder.join("plan.svg"), svg).expect("a plan");
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_poster_hangs_where_the_guides_say() {
+        let office = office();
+        let poster = office.landmark("poster-0").expect("a poster");
+        let (at, normal) = (
+            poster.map_from_landmark.translation.vector,
+            poster.map_from_landmark.rotation * Vector3::x(),
+        );
+        let found = [at.x, at.y, at.z, normal.y.atan2(normal.x).to_degrees(), poster.width_m, poster.height_m];
+        let said = [4.59, 2.50, 1.50, -90.0, 0.60, 0.84];
+        assert!(found.iter().zip(said).all(|(f, s)| (f - s).abs() < 0.005), "{found:?}");
+        let camera = map_from_camera("here.jpg");
+        let (at, ahead) = (camera.translation.vector, camera.rotation * Vector3::z());
+        let found = [at.x, at.y, at.z, ahead.y.atan2(ahead.x).to_degrees()];
+        assert!(found.iter().zip([3.23, 0.76, 1.45, 56.0]).all(|(f, s)| (f - s).abs() < 0.006), "{found:?}");
+    }
 }

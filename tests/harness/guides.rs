@@ -182,10 +182,10 @@ impl Guide {
             shell.env_remove(name);
         }
         shell.env("PATH", &self.path).env("NO_COLOR", "1");
-        shell.env("WAYMARK_PROGRAMS", program().parent().expect("its folder"));
-        shell.env("WAYMARK_SOURCES", crate::documents::root());
+        shell.env("TESTED_PROGRAMS", program().parent().expect("its folder"));
+        shell.env("TESTED_SOURCES", crate::documents::root());
         if let Some(server) = &self.server {
-            shell.env("WAYMARK_SERVER", &server.url).env("WAYMARK_ENDPOINT", &server.endpoint);
+            shell.env("WAYMARK_SERVER", &server.url).env("TESTED_ENDPOINT", &server.endpoint);
         }
         shell.stdin(Stdio::null());
         shell
@@ -234,7 +234,7 @@ const CARGO: &str = r#"#!/usr/bin/env bash
 set -euo pipefail
 case "$1" in
 install)
-    test -f "$WAYMARK_SOURCES/${3:?}/Cargo.toml" ;;
+    test -f "$TESTED_SOURCES/${3:?}/Cargo.toml" ;;
 run)
     shift
     while [ "$1" != "--" ]; do
@@ -242,7 +242,7 @@ run)
         shift
     done
     shift
-    exec "$WAYMARK_PROGRAMS/examples/${example:?}" "$@" ;;
+    exec "$TESTED_PROGRAMS/examples/${example:?}" --endpoint "${TESTED_ENDPOINT:?}" "$@" ;;
 *)
     echo "cargo $*: not run by the test" >&2
     exit 1 ;;
