@@ -80,7 +80,7 @@ enum Verb {
         #[command(flatten)]
         server: ServerArgs,
     },
-    /// Show or set the fusion mode of a map: which modalities are fused where reference runs have shown the best one.
+    /// Show or set the fusion mode of a map: what is fused where reference runs know the best modality.
     Fusion(fusion::FusionArgs),
     /// Delete a map with its landmarks, walls and runs. This cannot be undone.
     Delete {
@@ -112,7 +112,7 @@ enum Verb {
     ///   waymark map convert floor.yaml --out floor.json --draw floor.svg
     #[command(verbatim_doc_comment)]
     Convert(convert::ConvertArgs),
-    /// Build walls from a laser log: scans are matched, loops closed, walls drawn. No server needed without --into
+    /// Build walls from a laser log: scans are matched and loops closed; a server is needed only with --into
     ///
     /// The first pose is the origin of the map. Standard output says how many loops were closed and refused: a picture
     /// (--draw) shows where. Poses in a CARMEN log are taken for odometry; in a corrected log they are nearly right
