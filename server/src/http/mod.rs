@@ -23,6 +23,7 @@ mod reference_runs;
 mod relocalisation;
 mod robots;
 mod router;
+mod underlay;
 mod upload;
 mod views;
 mod visibility;
