@@ -163,6 +163,7 @@ function drawMap() {
   drawGrid(c, w, h, ink);
   drawModalities(c, px, ink);
   drawArea(c, px, ink);
+  drawUnderlay(c, px, px_per_m);
   if (layerOn("walls")) {
     stroke(c, ink.wall, 2.5);
     for (const wall of state.walls) { line(c, px(...wall.a), px(...wall.b)); }
@@ -194,6 +195,29 @@ function drawGrid(c, w, h, ink) {
   line(c, [12, h - 12], [12 + step * px_per_m, h - 12]);
   c.font = "12px system-ui";
   c.fillText(`${step} m`, 16, h - 17);
+}
+
+// The picture that the map was imported from, beneath everything that is known better.
+function drawUnderlay(c, px, px_per_m) {
+  if (!state.underlay || !layerOn("underlay")) return;
+  const { picture, place } = state.underlay;
+  const scale = px_per_m * place.metres_per_pixel;
+  c.save();
+  c.translate(...px(place.x_m, place.y_m));
+  c.rotate(-place.theta_rad);
+  c.globalAlpha = 0.5;
+  c.drawImage(picture, 0, -picture.height * scale, picture.width * scale, picture.height * scale);
+  c.restore();
+}
+
+async function loadUnderlay(map) {
+  const path = `/maps/${encodeURIComponent(map)}/underlay`;
+  const underlay = await getJson(path).catch(() => null);
+  const reply = underlay && await fetch(`${API}${path}/image`);
+  const picture = reply?.ok ? await createImageBitmap(await reply.blob()) : null;
+  if (state.map !== map) return;
+  state.underlay = picture && { picture, place: underlay.place };
+  state.dirty = true;
 }
 
 // From where the chosen landmark is seen.
@@ -346,6 +370,7 @@ async function loadMap(name) {
   await loadTrajectories(name);
   Object.assign(state, { map: name, walls: walls.segments, landmarks: landmarks.items, dirty: true });
   listNotInUse();
+  loadUnderlay(name);
   if (state.chosen) choose(state.landmarks.find((l) => l.name === state.chosen));
   const active = state.landmarks.filter((l) => l.status === "active").length;
   const where = [map.site, map.building, map.floor].filter(Boolean).join(" / ");

@@ -26,4 +26,5 @@ mod style;
 mod teach_and_recognise;
 mod tidy;
 mod two_programs;
+mod underlay;
 mod visibility_settings;

@@ -16,6 +16,7 @@ mod operation;
 mod recognise;
 mod reference_runs;
 mod robots;
+mod underlay;
 mod views;
 mod visibility;
 mod visibility_settings;
@@ -43,6 +44,7 @@ pub fn operations() -> impl Iterator<Item = &'static Operation> {
         recognise::OPERATIONS,
         reference_runs::OPERATIONS,
         robots::OPERATIONS,
+        underlay::OPERATIONS,
         views::OPERATIONS,
         visibility::OPERATIONS,
         visibility_settings::OPERATIONS,

@@ -96,6 +96,7 @@ impl From<StoreError> for ApiError {
                     Kind::Gathering => ("unknown_gathering", "gathering"),
                     Kind::Track => ("unknown_track", "track"),
                     Kind::ReferenceRun => ("unknown_reference_run", "run"),
+                    Kind::Underlay => ("unknown_underlay", "underlay"),
                     Kind::Model => ("not_found", "path"),
                 };
                 Self::new(StatusCode::NOT_FOUND, code, detail).field(field)

@@ -24,6 +24,7 @@ mod relocalisation;
 mod robots;
 mod ros2;
 mod router;
+mod underlay;
 mod upload;
 mod views;
 mod visibility;

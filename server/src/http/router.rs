@@ -3,7 +3,7 @@
 use super::{
     App, AppState, cameras, error::ApiError, examples::with_examples, gathering, guard, health, landmarks,
     learning, live, mapping, maps, modalities, pages, recognise, reference_runs, relocalisation, robots,
-    ros2, views, visibility, visibility_settings, walls,
+    ros2, underlay, views, visibility, visibility_settings, walls,
 };
 use crate::config::Limits;
 use axum::{
@@ -35,6 +35,7 @@ fn api(limits: &Limits) -> OpenApiRouter<AppState> {
     OpenApiRouter::new()
         .merge(maps::router())
         .merge(walls::router())
+        .merge(underlay::router(limits.upload_bytes))
         .merge(mapping::router())
         .merge(landmarks::router())
         .merge(views::router(limits.upload_bytes))

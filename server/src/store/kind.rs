@@ -15,6 +15,7 @@ pub(crate) enum Kind {
     Gathering,
     Track,
     ReferenceRun,
+    Underlay,
 }
 
 impl fmt::Display for Kind {
@@ -30,6 +31,7 @@ impl fmt::Display for Kind {
             Self::Gathering => "gathering",
             Self::Track => "track",
             Self::ReferenceRun => "reference run",
+            Self::Underlay => "underlay of map",
         })
     }
 }

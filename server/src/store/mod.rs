@@ -15,6 +15,7 @@ pub(crate) mod on_commit;
 pub(crate) mod maps;
 pub(crate) mod map_locations;
 pub(crate) mod landmarks;
+pub(crate) mod underlays;
 pub(crate) mod views;
 pub(crate) mod models;
 pub(crate) mod walls;

@@ -15,6 +15,7 @@ async fn every_statement_prepares_on_the_migrated_schema() {
         views::ALL,
         models::ALL,
         walls::ALL,
+        underlays::ALL,
         landmark_placement::ALL,
         teaching::ALL,
         gatherings::ALL,
