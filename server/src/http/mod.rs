@@ -6,6 +6,7 @@
 mod answers;
 mod cameras;
 mod error;
+mod examples;
 mod extract;
 mod gathering;
 mod guard;

@@ -1,9 +1,9 @@
 //! Every route, with the layers around them and the OpenAPI document made from them.
 
 use super::{
-    App, AppState, cameras, error::ApiError, gathering, guard, health, landmarks, learning, live, mapping,
-    maps, modalities, pages, recognise, reference_runs, relocalisation, robots, views, visibility,
-    visibility_settings, walls,
+    App, AppState, cameras, error::ApiError, examples::with_examples, gathering, guard, health, landmarks,
+    learning, live, mapping, maps, modalities, pages, recognise, reference_runs, relocalisation, robots,
+    views, visibility, visibility_settings, walls,
 };
 use crate::config::Limits;
 use axum::{
@@ -54,7 +54,9 @@ fn api(limits: &Limits) -> OpenApiRouter<AppState> {
 
 /// Routes and their OpenAPI document.
 fn parts(limits: &Limits) -> (Router<AppState>, openapi::OpenApi) {
-    OpenApiRouter::with_openapi(Document::openapi()).nest(API, api(limits)).split_for_parts()
+    let (routes, document) =
+        OpenApiRouter::with_openapi(Document::openapi()).nest(API, api(limits)).split_for_parts();
+    (routes, with_examples(document, API))
 }
 
 /// The whole service.

@@ -1,6 +1,7 @@
 //! The routes without a network: requests go straight to the router.
 
 mod earlier_build;
+mod openapi;
 mod teaching;
 
 use super::*;

@@ -341,4 +341,4 @@ fn geometry_of(place: &LandmarkPlace, by_hand: Option<LandmarkSize>) -> Landmark
 }
 
 #[cfg(test)]
-pub(super) mod tests;
+pub(crate) mod tests;

@@ -291,13 +291,13 @@ async fn landmark_of(
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::publication::Catalogue;
     use crate::store::{gatherings::NewGathering, robots, views::NewView};
 
     /// A gathering with one track of these views.
-    pub(in crate::store) async fn gathered(
+    pub(crate) async fn gathered(
         store: &Catalogue,
         map: &'static str,
         views: impl Iterator<Item = NewView>,

@@ -33,7 +33,7 @@ fn truth() -> LandmarkPlace {
     }
 }
 
-pub(in crate::store) fn seen_from(x: f64, number: u8, shift_px: f64) -> NewView {
+pub(crate) fn seen_from(x: f64, number: u8, shift_px: f64) -> NewView {
     let camera = Intrinsics::new(500.0, 500.0, 320.0, 240.0, vision::frame::Distortion::None).unwrap();
     let heading = (-2.0_f64).atan2(2.0 - x);
     let robot = Pose2::new(x, 2.0, heading);

@@ -1,0 +1,130 @@
+//! The OpenAPI document: names of schemas are unique, every JSON body has an example, and each example is accepted.
+
+use super::*;
+use crate::store::{landmark_placement::tests::seen_from, track_acceptance::tests::gathered};
+use serde_json::json;
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fs,
+    path::{Path, PathBuf},
+};
+
+/// Names of the Rust types with a schema, by file.
+fn schema_types() -> Vec<(String, PathBuf)> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let mut folders: Vec<PathBuf> = ["protos", "server", "engine", "client", "map", "vision"]
+        .map(|name| root.join(name).join("src"))
+        .to_vec();
+    let mut found = Vec::new();
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|e| e == "rs") && !path.ends_with("tests/openapi.rs") {
+                let source = fs::read_to_string(&path).unwrap();
+                for (at, _) in source.match_indices("utoipa::ToSchema") {
+                    let name = source[at..].lines().find_map(|line| {
+                        let rest =
+                            line.strip_prefix("pub struct ").or_else(|| line.strip_prefix("pub enum "))?;
+                        rest.split(|c: char| !c.is_alphanumeric()).next()
+                    });
+                    found.push((name.expect("a type after its schema").to_owned(), path.clone()));
+                }
+            }
+        }
+    }
+    found
+}
+
+#[tokio::test]
+async fn no_two_types_have_schemas_of_one_name() {
+    let mut by_name: BTreeMap<String, Vec<PathBuf>> = BTreeMap::new();
+    for (name, path) in schema_types() {
+        by_name.entry(name).or_default().push(path);
+    }
+    by_name.retain(|_, paths| paths.len() > 1);
+    assert!(by_name.is_empty(), "utoipa keeps one of these without a word: {by_name:?}");
+
+    // Nothing but these types is in the document.
+    let service = Service::start(Limits::default()).await;
+    let (_, document) = read_long(&service, "/api/v1/openapi.json").await;
+    let types: BTreeSet<String> = schema_types().into_iter().map(|(name, _)| name).collect();
+    let schemas = document["components"]["schemas"].as_object().unwrap();
+    assert!(schemas.len() > 50, "{}", schemas.len());
+    for name in schemas.keys() {
+        // `Page_Landmark` is a page of landmarks.
+        assert!(
+            name.split('_').all(|part| types.contains(part)),
+            "{name} is no type with a schema of its own"
+        );
+    }
+}
+
+async fn read_long(service: &Service, path: &str) -> (u16, Value) {
+    let response = service.ask(request("GET", path, "")).await;
+    let status = response.status().as_u16();
+    let bytes = to_bytes(response.into_body(), 8 << 20).await.unwrap();
+    (status, serde_json::from_slice(&bytes).unwrap())
+}
+
+/// Map `hall` with walls, the landmark `poster` with a view, and robot `r1`, which has been recorded or has gathered where the
+/// operation asks for it.
+async fn prepared(operation: &str) -> (Service, String) {
+    let service = Service::start(Limits::default()).await;
+    let walls = json!({ "segments": [{ "a": [0.0, 0.0], "b": [6.0, 0.0] }] }).to_string();
+    assert_eq!(service.ask(request("PUT", "/api/v1/maps/hall/walls", walls)).await.status(), StatusCode::OK);
+    let poster = sim::posters::poster_of_size(1, 120, 1.0);
+    let picture = engine::picture::png(poster.width(), poster.height(), poster.data()).unwrap();
+    let parts = [("create", "true"), ("whole_image", "true"), ("width_m", "0.6"), ("height_m", "0.84")];
+    assert_eq!(service.upload("poster", picture, &parts).await.0, 201);
+    let mut gathering = 0;
+    if operation.ends_with("/accept") {
+        gathering = gathered(&service.store, "hall", std::iter::once(seen_from(1.0, 1, 0.0))).await;
+    }
+    if operation.ends_with("/reference") {
+        driven(&service);
+    }
+    (service, gathering.to_string())
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn every_json_body_has_an_example_and_the_server_takes_it() {
+    let service = Service::start(Limits::default()).await;
+    let (_, document) = read_long(&service, "/api/v1/openapi.json").await;
+    let mut sent = BTreeSet::new();
+    for (path, item) in document["paths"].as_object().unwrap() {
+        for (method, operation) in item.as_object().unwrap() {
+            let body = &operation["requestBody"]["content"]["application/json"];
+            if body.is_null() {
+                continue;
+            }
+            let name = format!("{} {}", method.to_uppercase(), path.trim_start_matches("/api/v1"));
+            assert!(
+                !body["example"].is_null(),
+                "{name} has no example: add it to server/src/http/examples.json"
+            );
+            let (service, gathering) = prepared(&name).await;
+            let mut at = path.clone();
+            for (parameter, value) in [
+                ("{map}", "hall"),
+                ("{landmark}", "poster"),
+                ("{robot}", "r1"),
+                ("{camera}", "front"),
+                ("{gathering}", gathering.as_str()),
+            ] {
+                at = at.replace(parameter, value);
+            }
+            let request = request(&method.to_uppercase(), &at, body["example"].to_string());
+            let (status, answer) = read(service.ask(request).await).await;
+            assert!((200..300).contains(&status), "{name}: {status} {answer}");
+            sent.insert(name);
+        }
+    }
+    let examples: BTreeMap<String, Value> = serde_json::from_str(include_str!("../examples.json")).unwrap();
+    assert_eq!(
+        sent,
+        examples.into_keys().collect(),
+        "examples of operations that do not exist, or have no body"
+    );
+}
