@@ -18,7 +18,7 @@ use std::{
 };
 
 /// Programs that a guide may name for other machines.
-pub const ELSEWHERE: [&str; 12] = [
+pub const ELSEWHERE: [&str; 13] = [
     "ros2",
     "sudo",
     "systemctl",
@@ -27,6 +27,7 @@ pub const ELSEWHERE: [&str; 12] = [
     "export",
     "cp",
     "zenohd",
+    "zenoh-bridge-ros2dds",
     "apt",
     "docker",
     "colcon",
