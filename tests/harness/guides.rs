@@ -183,8 +183,9 @@ impl Guide {
             shell.env_remove(name);
         }
         shell.env("PATH", &self.path).env("NO_COLOR", "1");
-        shell.env("WAYMARK_PROGRAMS", program().parent().expect("its folder"));
-        shell.env("WAYMARK_SOURCES", crate::documents::root());
+        // Not `WAYMARK_...`: the server takes those for settings.
+        shell.env("GUIDE_PROGRAMS", program().parent().expect("its folder"));
+        shell.env("GUIDE_SOURCES", crate::documents::root());
         if let Some(server) = &self.server {
             shell.env("WAYMARK_SERVER", &server.url).env("WAYMARK_ENDPOINT", &server.endpoint);
         }
@@ -235,7 +236,7 @@ const CARGO: &str = r#"#!/usr/bin/env bash
 set -euo pipefail
 case "$1" in
 install)
-    test -f "$WAYMARK_SOURCES/${3:?}/Cargo.toml" ;;
+    test -f "$GUIDE_SOURCES/${3:?}/Cargo.toml" ;;
 run)
     shift
     while [ "$1" != "--" ]; do
@@ -243,7 +244,7 @@ run)
         shift
     done
     shift
-    exec "$WAYMARK_PROGRAMS/examples/${example:?}" "$@" ;;
+    exec "$GUIDE_PROGRAMS/examples/${example:?}" "$@" ;;
 *)
     echo "cargo $*: not run by the test" >&2
     exit 1 ;;
