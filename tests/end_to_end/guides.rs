@@ -66,6 +66,11 @@ fn the_commands_of_connect_a_robot_work() {
 }
 
 #[test]
+fn the_commands_of_ros2_work() {
+    run("ros2");
+}
+
+#[test]
 fn the_commands_of_deploy_work() {
     run("deploy");
 }

@@ -261,7 +261,8 @@ async fn what_is_no_message_of_the_robot_changes_nothing() {
 fn settings_of_the_guide_are_understood() {
     let folder = tempfile::tempdir().expect("a folder");
     let guide = std::fs::read_to_string(root().join("docs/guides/ros2.md")).expect("the guide");
-    let blocks = guide.split("```toml\n").skip(1).filter_map(|rest| rest.split("```").next());
+    let texts = guide.split("```toml").skip(1).filter_map(|rest| rest.split("```").next());
+    let blocks = texts.filter_map(|text| Some(text.split_once('\n')?.1));
     let mut robots = 0;
     for block in blocks {
         let path = folder.path().join("waymark.toml");

@@ -18,7 +18,7 @@ use std::{
 };
 
 /// Programs that a guide may name for other machines.
-pub const ELSEWHERE: [&str; 12] = [
+pub const ELSEWHERE: [&str; 13] = [
     "ros2",
     "sudo",
     "systemctl",
@@ -27,6 +27,7 @@ pub const ELSEWHERE: [&str; 12] = [
     "export",
     "cp",
     "zenohd",
+    "zenoh-bridge-ros2dds",
     "apt",
     "docker",
     "colcon",
@@ -182,6 +183,7 @@ impl Guide {
             shell.env_remove(name);
         }
         shell.env("PATH", &self.path).env("NO_COLOR", "1");
+        // Not `WAYMARK_...`: the server takes those for settings.
         shell.env("TESTED_PROGRAMS", program().parent().expect("its folder"));
         shell.env("TESTED_SOURCES", crate::documents::root());
         if let Some(server) = &self.server {
