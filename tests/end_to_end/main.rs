@@ -16,6 +16,7 @@ mod live_mapping;
 mod look_alikes;
 mod moved_landmark;
 mod other_map;
+mod recordings;
 mod restart;
 mod several_maps;
 mod style;
