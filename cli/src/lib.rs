@@ -100,7 +100,7 @@ enum Command {
     ///   waymark replay drive.mcap --compare
     ///   waymark replay drive.mcap --answers before.mcap
     ///   waymark replay drive.mcap --compare before.mcap --json
-    ///   waymark replay bag/bag_0.mcap --robot r1 --map office --image front=/camera/image_raw
+    ///   waymark replay bag/drive.mcap --robot r1 --map office --image front=/camera/image
     #[command(verbatim_doc_comment)]
     Replay(recording::replay::Args),
     /// Jobs of a server: show, wait, cancel.

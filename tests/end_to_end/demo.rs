@@ -1,8 +1,9 @@
 //! Claim: the demo runs without preparation: no landmark is named wrongly, and its robot is localised better than
-//! by odometry alone.
+//! by odometry alone. Its drive is recorded on demand.
 
+use recordings::{Body, DriveReader};
 use serde_json::Value;
-use std::time::Duration;
+use std::{fs::File, time::Duration};
 use tests::command::waymark;
 
 const LONGEST: Duration = Duration::from_mins(4);
@@ -13,8 +14,10 @@ fn number(summary: &Value, pointer: &str) -> f64 {
 
 #[test]
 fn a_robot_of_the_demo_is_localised() {
-    let args = "demo --robots 1 --legs 1 --rate-hz 1 --seed 2 --json --http 127.0.0.1:0";
-    let run = waymark(args.split(' '), LONGEST);
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("demo.mcap");
+    let args = "demo --robots 1 --legs 1 --rate-hz 1 --seed 2 --json --http 127.0.0.1:0 --record";
+    let run = waymark(args.split(' ').chain([file.to_str().expect("a path")]), LONGEST);
     assert_eq!(run.status, 0, "{run:?}");
     assert_eq!(run.stdout.lines().count(), 1, "results only: {run:?}");
     let summary = run.last_json();
@@ -26,4 +29,12 @@ fn a_robot_of_the_demo_is_localised() {
     assert!(of("/recognitions") > 0.0 && of("/corrections") > 0.0, "{summary}");
     let (with, without) = (of("/position_error_m/median"), of("/odometry_error_m/median"));
     assert!(with < 0.2 && with < without, "{with} m with landmarks, {without} m without: {summary}");
+
+    let mut drive = DriveReader::open(File::open(&file).expect("the recording")).expect("readable");
+    let (mut frames, mut answers) = (0, 0);
+    while let Some(message) = drive.next_message().expect("a message") {
+        frames += usize::from(matches!(message.body, Body::Frame(_)));
+        answers += usize::from(matches!(message.body, Body::Answer(_)));
+    }
+    assert_eq!((frames as f64, answers as f64), (of("/frames"), of("/answers")), "{summary}");
 }

@@ -19,6 +19,7 @@ mod live_mapping;
 mod look_alikes;
 mod moved_landmark;
 mod other_map;
+mod recordings;
 mod restart;
 mod ros2_robots;
 mod several_maps;

@@ -188,6 +188,7 @@ impl Guide {
         shell.env("TESTED_SOURCES", crate::documents::root());
         if let Some(server) = &self.server {
             shell.env("WAYMARK_SERVER", &server.url).env("TESTED_ENDPOINT", &server.endpoint);
+            shell.env("WAYMARK_ZENOH", &server.endpoint);
         }
         shell.stdin(Stdio::null());
         shell
@@ -214,7 +215,7 @@ impl Guide {
         self.server = None;
         let mut shell = self.shell(&format!("exec {command}"));
         shell.env("WAYMARK_HTTP", "127.0.0.1:0").env("WAYMARK_ZENOH", "tcp/127.0.0.1:0");
-        shell.env("WAYMARK_DATA", self.folder.join("data")).stdout(Stdio::piped());
+        shell.env("WAYMARK_DATA", self.folder.join("server")).stdout(Stdio::piped());
         let mut process = shell.spawn().expect("bash");
         let stdout = process.stdout.take().expect("its output");
         let mut lines = BufReader::new(stdout).lines().map(|line| line.expect("a line"));

@@ -45,6 +45,7 @@ pub(crate) struct Args {
     answers: Option<PathBuf>,
     /// Compare the answers with those of the recording, or of another file; exit status 1 if they differ.
     #[arg(long, value_name = "OTHER", num_args = 0..=1)]
+    #[allow(clippy::option_option, reason = "clap's form of an option with an optional value")]
     compare: Option<Option<PathBuf>>,
     /// End with the counts as one JSON object.
     #[arg(long)]

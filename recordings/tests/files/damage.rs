@@ -71,6 +71,20 @@ fn a_chunk_that_claims_to_be_huge_is_refused() {
     assert!(matches!(error.fault, ReadFault::TooLong { .. }), "{error}");
 }
 
+/// The head of the file, the metadata and the head of the first chunk, byte for byte.
+#[test]
+fn every_byte_of_the_heads_may_be_wrong() {
+    let whole = file(&messages(12)[..5]);
+    for at in 0..500 {
+        for value in [0, 1, 0x7f, 0xff] {
+            let mut damaged = whole.clone();
+            damaged[at] = value;
+            // Either is right; a panic is not.
+            drop(read(&damaged));
+        }
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 400, ..ProptestConfig::default() })]
     #[test]
