@@ -18,8 +18,9 @@ use std::{
 };
 
 /// Programs that a guide may name for other machines.
-pub const ELSEWHERE: [&str; 13] = [
+pub const ELSEWHERE: [&str; 14] = [
     "ros2",
+    "curl",
     "sudo",
     "systemctl",
     "ssh",
@@ -182,7 +183,7 @@ impl Guide {
         for name in ["WAYMARK_LOG", "WAYMARK_SERVER", "WAYMARK_CONFIG", "WAYMARK_DATA", "WAYMARK_MAP"] {
             shell.env_remove(name);
         }
-        shell.env("PATH", &self.path).env("NO_COLOR", "1");
+        shell.env("PATH", &self.path).env("NO_COLOR", "1").env("HOME", &self.folder);
         // Not `WAYMARK_...`: the server takes those for settings.
         shell.env("TESTED_PROGRAMS", program().parent().expect("its folder"));
         shell.env("TESTED_SOURCES", crate::documents::root());
